@@ -1,0 +1,49 @@
+# What every package of the suite builds with; comes with find_package(catkin REQUIRED COMPONENTS vcharge_core).
+
+# C++17, Release unless the user chose, warnings. A macro: the settings belong to the calling package.
+macro(vcharge_build_settings)
+  set(CMAKE_CXX_STANDARD 17)
+  set(CMAKE_CXX_STANDARD_REQUIRED ON)
+  set(CMAKE_CXX_EXTENSIONS OFF)
+  set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+  if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+    set(CMAKE_BUILD_TYPE Release)
+  endif()
+  option(VCHARGE_WARNINGS_AS_ERRORS "Fail the build on compiler warnings" OFF)
+  add_compile_options(-Wall -Wextra -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
+  if(VCHARGE_WARNINGS_AS_ERRORS)
+    add_compile_options(-Werror)
+  endif()
+endmacro()
+
+# vcharge_add_gtest(NAME SOURCES a_test.cpp... [LIBRARIES target...] [TIMEOUT seconds])
+function(vcharge_add_gtest name)
+  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LIBRARIES" ${ARGN})
+  if(NOT CATKIN_ENABLE_TESTING)
+    return()
+  endif()
+  if(NOT arg_TIMEOUT)
+    set(arg_TIMEOUT 300)
+  endif()
+  catkin_add_gtest(${name} ${arg_SOURCES} TIMEOUT ${arg_TIMEOUT})
+  if(TARGET ${name})
+    target_link_libraries(${name} gtest_main gmock ${arg_LIBRARIES})
+  endif()
+endfunction()
+
+# Installs libraries and tools where rosrun and roslaunch look for them, and the public headers.
+function(vcharge_install)
+  cmake_parse_arguments(arg "" "" "TARGETS;LIBRARIES" ${ARGN})
+  if(arg_LIBRARIES)
+    install(TARGETS ${arg_LIBRARIES}
+      ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
+      LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
+      RUNTIME DESTINATION ${CATKIN_GLOBAL_BIN_DESTINATION})
+  endif()
+  if(arg_TARGETS)
+    install(TARGETS ${arg_TARGETS} RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+  endif()
+  if(EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/include/${PROJECT_NAME})
+    install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION})
+  endif()
+endfunction()

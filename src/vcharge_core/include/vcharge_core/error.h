@@ -1,0 +1,21 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace vcharge {
+
+/// A bad file, message or option. The text names the file (or topic), the key and what was expected.
+class InputError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Throws std::logic_error with `message` unless `condition` holds: for a caller's bug, not for bad input.
+inline void check(bool condition, const char* message) {
+  if (!condition) {
+    throw std::logic_error(message);
+  }
+}
+
+}  // namespace vcharge

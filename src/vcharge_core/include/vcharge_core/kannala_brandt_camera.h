@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+
+#include <Eigen/Core>
+
+namespace vcharge {
+
+/// Equidistant fisheye model with an odd polynomial in the angle (Kannala and Brandt, PAMI 2006; OpenCV's fisheye,
+/// Kalibr's pinhole-equi): r(theta) = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8).
+/// Valid up to the angle at which r stops growing, at most pi.
+class KannalaBrandtCamera {
+ public:
+  static constexpr int kNumParameters = 8;
+  static constexpr const char* kName = "kannala_brandt";
+  using Parameters = Eigen::Matrix<double, kNumParameters, 1>;
+  static constexpr std::array<const char*, kNumParameters> parameterNames() {
+    return {"fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"};
+  }
+
+  /// std::invalid_argument when a focal length is not positive or anything is not finite.
+  explicit KannalaBrandtCamera(const Parameters& parameters);
+
+  const Parameters& parameters() const { return parameters_; }
+  double maxAngle() const { return max_angle_rad_; }
+
+  /// As MeiCamera::project.
+  bool project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel,
+               Eigen::Matrix<double, 2, 3>* pixel_by_point = nullptr,
+               Eigen::Matrix<double, 2, kNumParameters>* pixel_by_parameters = nullptr) const;
+  /// As MeiCamera::unproject; Newton's method, with bisection as its safeguard.
+  bool unproject(const Eigen::Vector2d& pixel, Eigen::Vector3d* ray_in_camera) const;
+
+ private:
+  Parameters parameters_;
+  double max_angle_rad_;
+  double max_radius_;
+};
+
+}  // namespace vcharge

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace vcharge {
+
+/// Radial (k1, k2) and tangential (p1, p2) distortion of a point in the normalized image plane
+/// (paper, section Camera Model). One-to-one only inside maxRadius(): there the radial part grows with the radius.
+class RadialTangentialDistortion {
+ public:
+  RadialTangentialDistortion() = default;
+  RadialTangentialDistortion(double k1, double k2, double p1, double p2);
+
+  double k1() const { return k1_; }
+  double k2() const { return k2_; }
+  double p1() const { return p1_; }
+  double p2() const { return p2_; }
+  bool isZero() const { return k1_ == 0.0 && k2_ == 0.0 && p1_ == 0.0 && p2_ == 0.0; }
+
+  /// Radius (undistorted) at which the radial part stops growing; infinity where it never does.
+  double maxRadius() const { return max_radius_; }
+
+  /// Distorted point. Optional derivatives by the point and by (k1, k2, p1, p2). False beyond maxRadius().
+  bool distort(const Eigen::Vector2d& undistorted, Eigen::Vector2d* distorted,
+               Eigen::Matrix2d* by_point = nullptr,
+               Eigen::Matrix<double, 2, 4>* by_parameters = nullptr) const;
+
+  /// Inverse of distort() by Newton's method; false where none exists inside maxRadius().
+  bool undistort(const Eigen::Vector2d& distorted, Eigen::Vector2d* undistorted) const;
+
+ private:
+  double k1_ = 0.0, k2_ = 0.0, p1_ = 0.0, p2_ = 0.0;
+  double max_radius_ = 0.0;
+  double max_distorted_radius_ = 0.0;
+  void computeLimits();
+};
+
+}  // namespace vcharge

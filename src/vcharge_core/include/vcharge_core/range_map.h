@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+
+#include <opencv2/core.hpp>
+
+#include "vcharge_core/content_hash.h"
+#include "vcharge_core/mei_camera.h"
+#include "vcharge_core/timestamp.h"
+
+namespace vcharge {
+
+/// Distance along the ray of each pixel of a working camera. All three images have one size and are CV_32FC1.
+struct RangeMap {
+  Timestamp stamp;
+  std::string camera_name;
+  std::string frame_id;            ///< optical frame of the camera
+  MeiCamera camera;                ///< without distortion; pixel -> ray
+  cv::Mat range_m;                 ///< metres along the ray (not depth along the axis); NaN where unknown
+  cv::Mat standard_deviation_m;    ///< one sigma of range_m; NaN where unknown
+  cv::Mat confidence;              ///< 0 (no support) to 1; 0 where unknown
+};
+
+/// Adds stamp, camera and all pixels; every NaN counts the same.
+void addToHash(const RangeMap& map, ContentHasher* hasher);
+
+}  // namespace vcharge
