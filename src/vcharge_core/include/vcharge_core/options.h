@@ -16,12 +16,8 @@ namespace vcharge {
 template <class Enum>
 std::vector<std::string> enumNames();
 
-/// Whether a type is an options struct, i.e. has visitFields(visitor), which calls visitor("name", field) for each.
-template <class T, class = void>
-struct HasFields : std::false_type {};
-template <class T>
-struct HasFields<T, std::void_t<decltype(std::declval<T&>().visitFields(std::declval<void (*)(const char*, int&)>()))>>
-    : std::true_type {};
+/// An options struct has `template <class V> void visitFields(V&& visit)`, which calls visit("name", field) for each
+/// field (a number, string, list, enum or another options struct), and `void validate() const`.
 
 namespace internal {
 
