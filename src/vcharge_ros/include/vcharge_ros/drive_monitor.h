@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,9 +30,9 @@ class DriveMonitor {
 
   /// A topic that must bring data; silence on others is no fault.
   void expectTopic(const std::string& topic);
-  /// Good data. A stamp before the topic's newest is counted as a jump back and reported for some seconds.
-  /// kRecovered when the topic was in fault.
-  Change addGood(const std::string& topic, Timestamp stamp, SteadyTime now);
+  /// Good data. A stamp (if it has one) before the topic's newest is counted as a jump back and reported for some
+  /// seconds. kRecovered when the topic was in fault.
+  Change addGood(const std::string& topic, std::optional<Timestamp> stamp, SteadyTime now);
   /// Bad data, and why. kFailed when the text is news for this topic: worth one line in the log.
   Change addBad(const std::string& topic, const std::string& error, SteadyTime now);
 
@@ -44,7 +45,7 @@ class DriveMonitor {
     uint64_t good = 0;
     uint64_t bad = 0;
     uint64_t jumps_back = 0;
-    Timestamp newest;
+    std::optional<Timestamp> newest;
     SteadyTime last_good;
     SteadyTime last_jump;
     std::string jump_text;

@@ -8,6 +8,7 @@
 
 #include "vcharge_core/camera_rig.h"
 #include "vcharge_core/drive_source.h"
+#include "vcharge_core/options.h"
 #include "vcharge_ros/drive_monitor.h"
 #include "vcharge_ros/drive_topics.h"
 
@@ -15,6 +16,11 @@ namespace vcharge {
 
 /// How images travel. kAuto: raw, and compressed from cameras that send nothing raw.
 enum class ImageTransport { kAuto, kRaw, kCompressed };
+
+template <>
+inline std::vector<std::string> enumNames<ImageTransport>() {
+  return {"auto", "raw", "compressed"};
+}
 
 struct LiveDriveSourceOptions {
   DriveTopics topics;
