@@ -7,7 +7,8 @@
 
 namespace vcharge {
 
-/// 128-bit hash (XXH3) of a result's content, to show that two runs agree. Provenance (time, host) never enters it.
+/// 128-bit hash (XXH3) of a result's content, to show that two runs agree. Provenance (time, host) never
+/// enters it.
 class ContentHasher {
  public:
   ContentHasher();

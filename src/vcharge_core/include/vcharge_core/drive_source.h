@@ -9,8 +9,8 @@
 
 namespace vcharge {
 
-/// Takes what a drive delivers, in order of stamps from a bag, in order of arrival from live topics. Calls are never
-/// concurrent. A stage's front that both its nodelet and its offline tool feed.
+/// Takes what a drive delivers, in order of stamps from a bag, in order of arrival from live topics. Calls
+/// are never concurrent. A stage's front that both its nodelet and its offline tool feed.
 class DriveConsumer {
  public:
   virtual ~DriveConsumer() = default;
@@ -20,8 +20,8 @@ class DriveConsumer {
   virtual void addWheelTicks(const WheelTicks& /*ticks*/) {}
 };
 
-/// Where a drive comes from: a bag (run() returns at its end) or live topics (run() returns at once and the consumer is
-/// called until the source is destroyed).
+/// Where a drive comes from: a bag (run() returns at its end) or live topics (run() returns at once and the
+/// consumer is called until the source is destroyed).
 class DriveSource {
  public:
   /// Share of the drive that was delivered, 0 to 1.

@@ -10,8 +10,8 @@
 
 namespace vcharge {
 
-/// 8-bit gray pixels (CV_8UC1) that are never written to once they are in here. `owner` keeps the memory alive
-/// where `pixels` is a view of a message's buffer; copying an Image copies no pixel.
+/// 8-bit gray pixels (CV_8UC1) that are never written to once they are in here. `owner` keeps the memory
+/// alive where `pixels` is a view of a message's buffer; copying an Image copies no pixel.
 struct Image {
   cv::Mat pixels;
   std::shared_ptr<const void> owner;

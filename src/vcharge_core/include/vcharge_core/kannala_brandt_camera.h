@@ -6,8 +6,8 @@
 
 namespace vcharge {
 
-/// Equidistant fisheye model with an odd polynomial in the angle (Kannala and Brandt, PAMI 2006; OpenCV's fisheye,
-/// Kalibr's pinhole-equi): r(theta) = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8).
+/// Equidistant fisheye model with an odd polynomial in the angle (Kannala and Brandt, PAMI 2006; OpenCV's
+/// fisheye, Kalibr's pinhole-equi): r(theta) = theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8).
 /// Valid up to the angle at which r stops growing, at most pi.
 class KannalaBrandtCamera {
  public:

@@ -8,12 +8,12 @@
 
 namespace vcharge {
 
-/// Unified projection with radial-tangential distortion (Mei and Rives, ICRA 2007; paper, section Camera Model):
-/// the point on the unit sphere is seen from `xi` behind the sphere's centre, distorted in the normalized plane and
-/// scaled by gamma. In the distortion `r` is the squared radius.
+/// Unified projection with radial-tangential distortion (Mei and Rives, ICRA 2007; paper, section Camera
+/// Model): the point on the unit sphere is seen from `xi` behind the sphere's centre, distorted in the
+/// normalized plane and scaled by gamma. In the distortion `r` is the squared radius.
 ///
-/// A point at angle theta from the axis has an image while cos(theta) > -1/xi (xi > 1) or > -xi (xi <= 1), and while
-/// the radial distortion still grows with the radius; beyond that project() returns false.
+/// A point at angle theta from the axis has an image while cos(theta) > -1/xi (xi > 1) or > -xi (xi <= 1),
+/// and while the radial distortion still grows with the radius; beyond that project() returns false.
 class MeiCamera {
  public:
   static constexpr int kNumParameters = 9;
@@ -36,14 +36,14 @@ class MeiCamera {
   double v0() const { return v0_; }
   const RadialTangentialDistortion& distortion() const { return distortion_; }
 
-  /// Pixel of a point; false (outputs untouched) where the model has no image of it. Optional Jacobians of the pixel
-  /// by the point and by the parameters.
+  /// Pixel of a point; false (outputs untouched) where the model has no image of it. Optional Jacobians of
+  /// the pixel by the point and by the parameters.
   bool project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel,
                Eigen::Matrix<double, 2, 3>* pixel_by_point = nullptr,
                Eigen::Matrix<double, 2, kNumParameters>* pixel_by_parameters = nullptr) const;
 
-  /// Unit ray of a pixel, by Newton's method on the distortion and the closed inverse of the unified projection, which
-  /// exists for r_u^2 <= 1 / (xi^2 - 1) when xi > 1. False (output untouched) elsewhere.
+  /// Unit ray of a pixel, by Newton's method on the distortion and the closed inverse of the unified
+  /// projection, which exists for r_u^2 <= 1 / (xi^2 - 1) when xi > 1. False (output untouched) elsewhere.
   bool unproject(const Eigen::Vector2d& pixel, Eigen::Vector3d* ray_in_camera) const;
 
  private:

@@ -12,9 +12,9 @@
 namespace vcharge {
 
 struct MultiFrameSynchronizerOptions {
-  double tolerance_s = 0.0;       ///< images this close belong together; 0: equal stamps (hardware sync)
-  int max_pending_sets = 8;       ///< incomplete sets kept before the oldest is given up
-  double reset_backwards_s = 1.0; ///< a stamp this far before the newest starts over (a replayed bag)
+  double tolerance_s = 0.0;        ///< images this close belong together; 0: equal stamps (hardware sync)
+  int max_pending_sets = 8;        ///< incomplete sets kept before the oldest is given up
+  double reset_backwards_s = 1.0;  ///< a stamp this far before the newest starts over (a replayed bag)
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
@@ -28,20 +28,20 @@ struct MultiFrameSynchronizerOptions {
 /// What became of the images so far.
 struct MultiFrameSynchronizerCounts {
   uint64_t complete_sets = 0;
-  uint64_t incomplete_sets = 0;    ///< given up with at least one camera missing
-  uint64_t late_images = 0;        ///< arrived after their set was complete, given up or overtaken
-  uint64_t duplicate_images = 0;   ///< same camera and stamp again
-  uint64_t resets = 0;             ///< time jumped back
+  uint64_t incomplete_sets = 0;              ///< given up with at least one camera missing
+  uint64_t late_images = 0;                  ///< arrived after their set was complete, given up or overtaken
+  uint64_t duplicate_images = 0;             ///< same camera and stamp again
+  uint64_t resets = 0;                       ///< time jumped back
   std::vector<uint64_t> missing_per_camera;  ///< incomplete sets that lacked this camera
 };
 
-/// Groups single images into MultiFrames. Emits sets in time order, each as soon as it is complete; a set that a
-/// complete later one overtakes is given up and counted. The set's stamp is the earliest of its images.
-/// Not thread safe.
+/// Groups single images into MultiFrames. Emits sets in time order, each as soon as it is complete; a set
+/// that a complete later one overtakes is given up and counted. The set's stamp is the earliest of its
+/// images. Not thread safe.
 class MultiFrameSynchronizer {
  public:
-  explicit MultiFrameSynchronizer(size_t num_cameras,
-                                  const MultiFrameSynchronizerOptions& options = MultiFrameSynchronizerOptions());
+  explicit MultiFrameSynchronizer(
+      size_t num_cameras, const MultiFrameSynchronizerOptions& options = MultiFrameSynchronizerOptions());
 
   /// Takes one image; returns the set that it completes, or null. std::logic_error for a bad camera index.
   std::shared_ptr<const MultiFrame> add(size_t camera_index, Timestamp stamp, const Image& image);

@@ -16,14 +16,14 @@ namespace vcharge {
 template <class Enum>
 std::vector<std::string> enumNames();
 
-/// An options struct has `template <class V> void visitFields(V&& visit)`, which calls visit("name", field) for each
-/// field (a number, string, list, enum or another options struct), and `void validate() const`.
+/// An options struct has `template <class V> void visitFields(V&& visit)`, which calls visit("name", field)
+/// for each field (a number, string, list, enum or another options struct), and `void validate() const`.
 
 namespace internal {
 
 /// InputError: "<source>: <key>: expected <expected>, got '<node>'".
-[[noreturn]] void throwBadField(const std::string& source, const std::string& key, const std::string& expected,
-                                const YAML::Node& node);
+[[noreturn]] void throwBadField(const std::string& source, const std::string& key,
+                                const std::string& expected, const YAML::Node& node);
 /// InputError unless `node` is a map (or absent) all of whose keys are in `known`.
 void checkKeys(const YAML::Node& node, const std::string& source, const std::string& prefix,
                const std::vector<std::string>& known);
@@ -31,7 +31,8 @@ void readValue(const YAML::Node& node, const std::string& source, const std::str
 void readValue(const YAML::Node& node, const std::string& source, const std::string& key, int* value);
 void readValue(const YAML::Node& node, const std::string& source, const std::string& key, double* value);
 void readValue(const YAML::Node& node, const std::string& source, const std::string& key, std::string* value);
-void readValue(const YAML::Node& node, const std::string& source, const std::string& key, std::vector<double>* value);
+void readValue(const YAML::Node& node, const std::string& source, const std::string& key,
+               std::vector<double>* value);
 void readValue(const YAML::Node& node, const std::string& source, const std::string& key,
                std::vector<std::string>* value);
 int readEnum(const YAML::Node& node, const std::string& source, const std::string& key,
@@ -46,7 +47,8 @@ struct NameCollector {
 };
 
 template <class Options>
-void readStruct(const YAML::Node& node, const std::string& source, const std::string& prefix, Options* options);
+void readStruct(const YAML::Node& node, const std::string& source, const std::string& prefix,
+                Options* options);
 
 struct FieldReader {
   const YAML::Node& node;
@@ -62,7 +64,8 @@ struct FieldReader {
     if constexpr (std::is_enum_v<T>) {
       field = static_cast<T>(readEnum(child, source, key, enumNames<T>()));
     } else if constexpr (std::is_class_v<T> && !std::is_same_v<T, std::string> &&
-                         !std::is_same_v<T, std::vector<double>> && !std::is_same_v<T, std::vector<std::string>>) {
+                         !std::is_same_v<T, std::vector<double>> &&
+                         !std::is_same_v<T, std::vector<std::string>>) {
       readStruct(child, source, key, &field);
     } else {
       readValue(child, source, key, &field);
@@ -71,7 +74,8 @@ struct FieldReader {
 };
 
 template <class Options>
-void readStruct(const YAML::Node& node, const std::string& source, const std::string& prefix, Options* options) {
+void readStruct(const YAML::Node& node, const std::string& source, const std::string& prefix,
+                Options* options) {
   NameCollector collector;
   options->visitFields(collector);
   checkKeys(node, source, prefix, collector.names);
@@ -86,7 +90,8 @@ struct FieldWriter {
     if constexpr (std::is_enum_v<T>) {
       node[name] = enumNames<T>().at(static_cast<size_t>(field));
     } else if constexpr (std::is_class_v<T> && !std::is_same_v<T, std::string> &&
-                         !std::is_same_v<T, std::vector<double>> && !std::is_same_v<T, std::vector<std::string>>) {
+                         !std::is_same_v<T, std::vector<double>> &&
+                         !std::is_same_v<T, std::vector<std::string>>) {
       YAML::Node child(YAML::NodeType::Map);
       field.visitFields(FieldWriter{child});
       node[name] = child;
@@ -98,10 +103,10 @@ struct FieldWriter {
 
 }  // namespace internal
 
-/// Overrides the fields of an options struct by the keys of a YAML map; fields without a key keep their value. The
-/// same function serves a YAML file and, through vcharge_ros, the parameter server. `source` names the file or
-/// namespace in errors. Throws InputError for unknown keys, values of a wrong type, and what validate() rejects;
-/// `options` is then unchanged.
+/// Overrides the fields of an options struct by the keys of a YAML map; fields without a key keep their
+/// value. The same function serves a YAML file and, through vcharge_ros, the parameter server. `source` names
+/// the file or namespace in errors. Throws InputError for unknown keys, values of a wrong type, and what
+/// validate() rejects; `options` is then unchanged.
 template <class Options>
 void readFields(const YAML::Node& node, const std::string& source, Options* options) {
   Options read = *options;

@@ -5,8 +5,8 @@
 
 namespace vcharge {
 
-/// A progress line on stderr for command-line tools: redrawn in place on a terminal, one line every ten percent
-/// elsewhere. Not thread safe.
+/// A progress line on stderr for command-line tools: redrawn in place on a terminal, one line every ten
+/// percent elsewhere. Not thread safe.
 class ProgressBar {
  public:
   explicit ProgressBar(std::string label);

@@ -1,14 +1,18 @@
 #pragma once
 
+#include <limits>
+
 #include <Eigen/Core>
 
 namespace vcharge {
 
 /// Radial (k1, k2) and tangential (p1, p2) distortion of a point in the normalized image plane
-/// (paper, section Camera Model). One-to-one only inside maxRadius(): there the radial part grows with the radius.
+/// (paper, section Camera Model). One-to-one only inside maxRadius(): there the radial part grows with the
+/// radius.
 class RadialTangentialDistortion {
  public:
   RadialTangentialDistortion() = default;
+  /// std::invalid_argument when anything is not finite.
   RadialTangentialDistortion(double k1, double k2, double p1, double p2);
 
   double k1() const { return k1_; }
@@ -30,9 +34,7 @@ class RadialTangentialDistortion {
 
  private:
   double k1_ = 0.0, k2_ = 0.0, p1_ = 0.0, p2_ = 0.0;
-  double max_radius_ = 0.0;
-  double max_distorted_radius_ = 0.0;
-  void computeLimits();
+  double max_radius_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace vcharge

@@ -14,11 +14,11 @@ namespace vcharge {
 struct RangeMap {
   Timestamp stamp;
   std::string camera_name;
-  std::string frame_id;            ///< optical frame of the camera
-  MeiCamera camera;                ///< without distortion; pixel -> ray
-  cv::Mat range_m;                 ///< metres along the ray (not depth along the axis); NaN where unknown
-  cv::Mat standard_deviation_m;    ///< one sigma of range_m; NaN where unknown
-  cv::Mat confidence;              ///< 0 (no support) to 1; 0 where unknown
+  std::string frame_id;          ///< optical frame of the camera
+  MeiCamera camera;              ///< without distortion; pixel -> ray
+  cv::Mat range_m;               ///< metres along the ray (not depth along the axis); NaN where unknown
+  cv::Mat standard_deviation_m;  ///< one sigma of range_m; NaN where unknown
+  cv::Mat confidence;            ///< 0 (no support) to 1; 0 where unknown
 };
 
 /// Adds stamp, camera and all pixels; every NaN counts the same.

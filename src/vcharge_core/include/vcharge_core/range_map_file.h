@@ -8,8 +8,8 @@
 namespace vcharge {
 
 /// Range maps on disk: FOLDER/<camera>/<stamp_ns>_{range,sigma,confidence}.tiff (CV_32FC1) and
-/// FOLDER/<camera>/<stamp_ns>.yaml (frame, working camera, content hash), written last, so that a map whose YAML
-/// exists is complete.
+/// FOLDER/<camera>/<stamp_ns>.yaml (frame, working camera, content hash), written last, so that a map whose
+/// YAML exists is complete.
 void writeRangeMap(const RangeMap& map, const std::string& folder);
 
 /// Names of the cameras (sub-folders with range maps), sorted.

@@ -23,7 +23,8 @@ class RigidTransform {
   RigidTransform() : rotation_(Eigen::Quaterniond::Identity()), translation_(Eigen::Vector3d::Zero()) {}
   /// Normalizes the rotation; std::logic_error when it is zero or anything is not finite.
   RigidTransform(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation_m);
-  /// From the upper three rows [R|t]; R is replaced by the nearest rotation. std::logic_error when not finite.
+  /// From the upper three rows [R|t]; R is replaced by the nearest rotation. std::logic_error when not
+  /// finite.
   static RigidTransform fromMatrix(const Eigen::Matrix<double, 3, 4>& matrix);
   /// Planar motion: x, y in metres, yaw in radians about z.
   static RigidTransform planar(double x_m, double y_m, double yaw_rad);

@@ -14,7 +14,9 @@ using Duration = std::chrono::nanoseconds;
 /// Nearest whole number of nanoseconds.
 Duration durationFromSeconds(double seconds);
 
-inline double toSeconds(Duration duration) { return static_cast<double>(duration.count()) * 1e-9; }
+inline double toSeconds(Duration duration) {
+  return static_cast<double>(duration.count()) * 1e-9;
+}
 
 /// A point in time as integer nanoseconds since the epoch of the drive's clock (ROS time). A value type.
 class Timestamp {

@@ -16,8 +16,8 @@ struct StampedTransform {
 /// Strictly increasing stamps.
 using Trajectory = std::vector<StampedTransform>;
 
-/// TUM text: "time_s tx ty tz qx qy qz qw" per line, '#' starts a comment. InputError naming file and line for anything
-/// else, for stamps that do not increase and for rotations whose norm is off by more than 1e-3.
+/// TUM text: "time_s tx ty tz qx qy qz qw" per line, '#' starts a comment. InputError naming file and line
+/// for anything else, for stamps that do not increase and for rotations whose norm is off by more than 1e-3.
 Trajectory readTrajectory(const std::string& path);
 /// Exact in time to the nanosecond; replaces the file only once it is complete.
 void writeTrajectory(const Trajectory& trajectory, const std::string& path);

@@ -10,9 +10,9 @@
 
 namespace vcharge {
 
-/// Dead reckoning of the vehicle at one instant. The vehicle frame (base_link) lies on the ground under the centre
-/// of the rear axle, x forward, y left, z up. From wheels alone the pose is planar (z, roll and pitch zero); a source
-/// that knows all six degrees of freedom may fill them in.
+/// Dead reckoning of the vehicle at one instant. The vehicle frame (base_link) lies on the ground under the
+/// centre of the rear axle, x forward, y left, z up. From wheels alone the pose is planar (z, roll and pitch
+/// zero); a source that knows all six degrees of freedom may fill them in.
 struct VehicleOdometry {
   Timestamp stamp;
   RigidTransform odom_from_vehicle;
@@ -30,9 +30,9 @@ struct WheelTicks {
 };
 
 struct OdometryBufferOptions {
-  double max_gap_s = 0.25;          ///< neighbours further apart are not interpolated
-  double history_s = 60.0;          ///< older entries are forgotten; infinity keeps all
-  double reset_backwards_s = 1.0;   ///< a stamp this far before the newest starts over (a replayed bag)
+  double max_gap_s = 0.25;         ///< neighbours further apart are not interpolated
+  double history_s = 60.0;         ///< older entries are forgotten; infinity keeps all
+  double reset_backwards_s = 1.0;  ///< a stamp this far before the newest starts over (a replayed bag)
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {

@@ -8,8 +8,8 @@ namespace vcharge {
 
 /// How an image is brought from the sensor's camera to the working camera.
 struct WorkingCameraOptions {
-  double image_scale = 0.5;   ///< size of the working image over the size of the sensor's
-  double focal_scale = 1.0;   ///< below 1 keeps more of the rim that undistortion pushes outwards
+  double image_scale = 0.5;  ///< size of the working image over the size of the sensor's
+  double focal_scale = 1.0;  ///< below 1 keeps more of the rim that undistortion pushes outwards
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
@@ -19,15 +19,16 @@ struct WorkingCameraOptions {
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
-/// A camera whose images carry no distortion but keep the wide field of view: the unified model with xi kept (Mei),
-/// xi = 0 (pinhole) or a fitted xi (Kannala-Brandt), focal lengths scaled, k = p = 0 (paper, section Depth Map
-/// Computation). Its projection has a closed form in both directions. Immutable.
+/// A camera whose images carry no distortion but keep the wide field of view: the unified model with xi kept
+/// (Mei), xi = 0 (pinhole) or a fitted xi (Kannala-Brandt), focal lengths scaled, k = p = 0 (paper, section
+/// Depth Map Computation). Its projection has a closed form in both directions. Immutable.
 class WorkingCamera {
  public:
-  /// field_of_view_rad and mask (empty, or CV_8UC1 of image_size_px, 0 where the vehicle is seen) are those of the
-  /// sensor's camera. std::invalid_argument for bad options, std::logic_error for a mask of another size.
-  WorkingCamera(const CameraModel& camera, cv::Size image_size_px, double field_of_view_rad, const cv::Mat& mask,
-                const WorkingCameraOptions& options = WorkingCameraOptions());
+  /// field_of_view_rad and mask (empty, or CV_8UC1 of image_size_px, 0 where the vehicle is seen) are those
+  /// of the sensor's camera. std::invalid_argument for bad options, std::logic_error for a mask of another
+  /// size.
+  WorkingCamera(const CameraModel& camera, cv::Size image_size_px, double field_of_view_rad,
+                const cv::Mat& mask, const WorkingCameraOptions& options = WorkingCameraOptions());
 
   const MeiCamera& model() const { return model_; }
   cv::Size size() const { return size_; }

@@ -1,0 +1,71 @@
+#include "vcharge_core/file_io.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "vcharge_core/error.h"
+
+namespace vcharge {
+namespace fs = std::filesystem;
+
+std::string readTextFile(const std::string& path) {
+  if (fs::is_directory(path)) {
+    throw InputError(path + ": expected a file, is a folder");
+  }
+  std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    throw InputError(path + ": cannot be read: " + std::strerror(errno));
+  }
+  std::ostringstream text;
+  text << file.rdbuf();
+  return text.str();
+}
+
+void writeFileAtomically(const std::string& path,
+                         const std::function<void(const std::string& temporary)>& write) {
+  const fs::path target(path);
+  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
+  if (!fs::is_directory(folder)) {
+    throw InputError(path + ": the folder " + folder.string() + " does not exist");
+  }
+  if (access(folder.c_str(), W_OK) != 0) {
+    throw InputError(path + ": the folder " + folder.string() +
+                     " cannot be written: " + std::strerror(errno));
+  }
+  const fs::path temporary = folder / ("." + target.stem().string() + "." + std::to_string(getpid()) +
+                                       ".tmp" + target.extension().string());
+  try {
+    write(temporary.string());
+    fs::rename(temporary, target);
+  } catch (...) {
+    std::error_code ignored;
+    fs::remove(temporary, ignored);
+    throw;
+  }
+}
+
+void writeTextFileAtomically(const std::string& path, const std::string& text) {
+  writeFileAtomically(path, [&](const std::string& temporary) {
+    std::ofstream file(temporary, std::ios::binary);
+    file << text;
+    file.close();
+    if (!file) {
+      throw InputError(path + ": cannot be written: " + std::strerror(errno));
+    }
+  });
+}
+
+void createFolder(const std::string& path) {
+  std::error_code error;
+  fs::create_directories(path, error);
+  if (error || !fs::is_directory(path)) {
+    throw InputError(path + ": the folder cannot be created" + (error ? ": " + error.message() : ""));
+  }
+}
+
+}  // namespace vcharge
