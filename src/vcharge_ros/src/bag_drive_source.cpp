@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 
 #include <rosbag/bag.h>
@@ -12,6 +13,7 @@
 
 #include "drive_item.h"
 #include "vcharge_core/error.h"
+#include "vcharge_core/options.h"
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/image_conversions.h"
 #include "vcharge_ros/stamp_sorter.h"
@@ -55,10 +57,12 @@ auto readingBag(const std::string& path, Function&& function) -> decltype(functi
   } catch (const InputError&) {
     throw;
   } catch (const rosbag::BagUnindexedException&) {
-    throw InputError(path + ": the bag has no index (was its recording cut off?); expected a complete bag, see "
-                            "`rosbag reindex`");
+    throw InputError(path +
+                     ": the bag has no index (was its recording cut off?); expected a complete bag, see "
+                     "`rosbag reindex`");
   } catch (const std::exception& error) {
-    throw InputError(path + ": corrupt or truncated; expected a ROS bag of format 2.0 (" + error.what() + ")");
+    throw InputError(path + ": corrupt or truncated; expected a ROS bag of format 2.0 (" + error.what() +
+                     ")");
   }
 }
 
@@ -166,7 +170,8 @@ boost::shared_ptr<Message> BagReading::instantiate(const rosbag::MessageInstance
   const boost::shared_ptr<Message> result = readingBag(path_, [&] { return message.instantiate<Message>(); });
   if (!result) {
     throw InputError(path_ + ": " + message.getTopic() + ": expected the message definition of " +
-                     ros::message_traits::datatype<Message>() + " that this program was built with, got another");
+                     ros::message_traits::datatype<Message>() +
+                     " that this program was built with, got another");
   }
   return result;
 }
@@ -190,7 +195,8 @@ DriveItem BagReading::convert(const rosbag::MessageInstance& message, const Topi
     *stamp = toTimestamp(raw->header.stamp);
     image = toImage(raw, source);
   } else {
-    const sensor_msgs::CompressedImageConstPtr compressed = instantiate<sensor_msgs::CompressedImage>(message);
+    const sensor_msgs::CompressedImageConstPtr compressed =
+        instantiate<sensor_msgs::CompressedImage>(message);
     *stamp = toTimestamp(compressed->header.stamp);
     image = toImage(compressed, source);
   }
@@ -204,7 +210,8 @@ void BagReading::push(const std::string& topic, Timestamp stamp, DriveItem item)
   }
   if (sorter_.isTooLate(stamp)) {
     throw InputError(path_ + ": " + topic + ": stamp " + toString(stamp) + " jumps back by " +
-                     seconds(toSeconds(sorter_.newest() - stamp)) + "; expected stamps that increase, within " +
+                     seconds(toSeconds(sorter_.newest() - stamp)) +
+                     "; expected stamps that increase, within " +
                      "sort_window_s = " + seconds(options_.sort_window_s));
   }
   const int rank = internal::rankOf(item);
@@ -213,7 +220,8 @@ void BagReading::push(const std::string& topic, Timestamp stamp, DriveItem item)
 
 std::string BagReading::topicName(size_t camera_index) const {
   for (const auto& [topic, role] : roles_) {
-    if ((role.kind == Kind::kImage || role.kind == Kind::kCompressedImage) && role.camera_index == camera_index) {
+    if ((role.kind == Kind::kImage || role.kind == Kind::kCompressedImage) &&
+        role.camera_index == camera_index) {
       return topic;
     }
   }

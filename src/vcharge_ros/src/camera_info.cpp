@@ -23,8 +23,9 @@ void setEquidistant(const KannalaBrandtCamera& camera, sensor_msgs::CameraInfo* 
 
 }  // namespace
 
-sensor_msgs::CameraInfo makeCameraInfo(const CameraModel& model, cv::Size image_size_px, double field_of_view_rad,
-                                       const std::string& frame_id, CameraInfoResidual* residual) {
+sensor_msgs::CameraInfo makeCameraInfo(const CameraModel& model, cv::Size image_size_px,
+                                       double field_of_view_rad, const std::string& frame_id,
+                                       CameraInfoResidual* residual) {
   sensor_msgs::CameraInfo info;
   info.header.frame_id = frame_id;
   info.width = static_cast<uint32_t>(image_size_px.width);
@@ -54,7 +55,8 @@ sensor_msgs::CameraInfo makeCameraInfo(const CameraModel& model, cv::Size image_
 }
 
 sensor_msgs::CameraInfo makeCameraInfo(const RigCamera& camera, CameraInfoResidual* residual) {
-  return makeCameraInfo(camera.model, camera.image_size_px, camera.field_of_view_rad, camera.frame_id, residual);
+  return makeCameraInfo(camera.model, camera.image_size_px, camera.field_of_view_rad, camera.frame_id,
+                        residual);
 }
 
 }  // namespace vcharge

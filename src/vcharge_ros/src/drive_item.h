@@ -35,7 +35,8 @@ inline void deliver(Timestamp stamp, const DriveItem& item, DriveConsumer* consu
   }
 }
 
-/// Indices of the named cameras, or of all where none is named. InputError for a name that the rig does not have.
+/// Indices of the named cameras, or of all where none is named. InputError for a name that the rig does not
+/// have.
 inline std::vector<size_t> selectCameras(const CameraRig& rig, const std::vector<std::string>& names) {
   std::vector<size_t> indices;
   for (const std::string& name : names) {

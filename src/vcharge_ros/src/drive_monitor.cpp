@@ -17,17 +17,21 @@ std::string tenths(double value, const char* unit) {
   return text;
 }
 
-void append(const std::string& text, std::string* list) { *list += (list->empty() ? "" : "; ") + text; }
+void append(const std::string& text, std::string* list) {
+  *list += (list->empty() ? "" : "; ") + text;
+}
 
 }  // namespace
 
 DriveMonitor::DriveMonitor(double max_silence_s, SteadyTime now)
     : max_silence_s_(max_silence_s), start_(now), last_report_(now) {}
 
-void DriveMonitor::expectTopic(const std::string& topic) { topics_[topic].expected = true; }
+void DriveMonitor::expectTopic(const std::string& topic) {
+  topics_[topic].expected = true;
+}
 
 DriveMonitor::Change DriveMonitor::addGood(const std::string& topic_name, std::optional<Timestamp> stamp,
- SteadyTime now) {
+                                           SteadyTime now) {
   Topic& topic = topics_[topic_name];
   if (stamp && topic.newest && *stamp < *topic.newest) {
     ++topic.jumps_back;
@@ -43,7 +47,8 @@ DriveMonitor::Change DriveMonitor::addGood(const std::string& topic_name, std::o
   return recovered ? Change::kRecovered : Change::kNone;
 }
 
-DriveMonitor::Change DriveMonitor::addBad(const std::string& topic_name, const std::string& error, SteadyTime now) {
+DriveMonitor::Change DriveMonitor::addBad(const std::string& topic_name, const std::string& error,
+                                          SteadyTime now) {
   Topic& topic = topics_[topic_name];
   const bool news = !topic.failing || topic.error != error;
   ++topic.bad;

@@ -3,11 +3,11 @@
 #include <vector>
 
 #include <nodelet/nodelet.h>
-#include <pluginlib/class_list_macros.hpp>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <tf2_msgs/TFMessage.h>
 #include <tf2_ros/static_transform_broadcaster.h>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "shared_topic.h"
 #include "vcharge_core/camera_rig.h"
@@ -19,9 +19,9 @@
 
 namespace vcharge {
 
-/// What a recorded drive needs beside its topics: odom -> base_link from the odometry, the rig's cameras on /tf_static,
-/// and camera_info with each image's stamp. Stands aside on /tf and on each camera_info where another node, or the bag,
-/// publishes the same. Parameters: ~rig (path), ~topics (DriveTopics).
+/// What a recorded drive needs beside its topics: odom -> base_link from the odometry, the rig's cameras on
+/// /tf_static, and camera_info with each image's stamp. Stands aside on /tf and on each camera_info where
+/// another node, or the bag, publishes the same. Parameters: ~rig (path), ~topics (DriveTopics).
 class DriveTfNodelet : public nodelet::Nodelet {
  private:
   using OdometryPtr = nav_msgs::OdometryConstPtr;
@@ -40,12 +40,14 @@ class DriveTfNodelet : public nodelet::Nodelet {
       advertiseCameraInfo(i);
     }
     tf_ = std::make_unique<internal::SharedTopic<tf2_msgs::TFMessage>>(
-        &node_, "/tf", 100, kPatience, [this](const tf2_msgs::TFMessage& message) { return isOurs(message); });
+        &node_, "/tf", 100, kPatience,
+        [this](const tf2_msgs::TFMessage& message) { return isOurs(message); });
     subscribers_.push_back(node_.subscribe<nav_msgs::Odometry>(
-        topics_.odometry, 100,
-        boost::function<void(const OdometryPtr&)>([this](const OdometryPtr& message) { onOdometry(message); })));
-    diagnostics_ = std::make_unique<NodeletDiagnostics>(
-        node_, private_node, getName(), [this] { return monitor_->report(Clock::now()); });
+        topics_.odometry, 100, boost::function<void(const OdometryPtr&)>([this](const OdometryPtr& message) {
+          onOdometry(message);
+        })));
+    diagnostics_ = std::make_unique<NodeletDiagnostics>(node_, private_node, getName(),
+                                                        [this] { return monitor_->report(Clock::now()); });
   }
 
   bool isOurs(const tf2_msgs::TFMessage& message) const {
@@ -64,7 +66,8 @@ class DriveTfNodelet : public nodelet::Nodelet {
         transforms.push_back(toTransformStamped(*camera.vehicle_from_camera, toTimestamp(ros::Time::now()),
                                                 rig_.vehicle_frame, camera.frame_id));
       } else {
-        NODELET_WARN_STREAM("rig: cameras." << camera.name << " has no vehicle_from_camera: not on /tf_static");
+        NODELET_WARN_STREAM("rig: cameras." << camera.name
+                                            << " has no vehicle_from_camera: not on /tf_static");
       }
     }
     static_broadcaster_.sendTransform(transforms);
@@ -107,8 +110,8 @@ class DriveTfNodelet : public nodelet::Nodelet {
       }
       last_stamp_ = odometry.stamp;
       auto transforms = boost::make_shared<tf2_msgs::TFMessage>();
-      transforms->transforms.push_back(toTransformStamped(odometry.odom_from_vehicle, odometry.stamp, odom_frame_,
-                                                          rig_.vehicle_frame));
+      transforms->transforms.push_back(
+          toTransformStamped(odometry.odom_from_vehicle, odometry.stamp, odom_frame_, rig_.vehicle_frame));
       tf_->publish(transforms);
     });
     if (!good) {

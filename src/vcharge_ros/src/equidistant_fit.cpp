@@ -22,7 +22,8 @@ struct Sample {
 };
 
 std::vector<Sample> takeSamples(const CameraModel& camera, cv::Size size, double field_of_view_rad) {
-  const int step = std::max(1, static_cast<int>(std::sqrt(static_cast<double>(size.area()) / kTargetSamples)));
+  const int step =
+      std::max(1, static_cast<int>(std::sqrt(static_cast<double>(size.area()) / kTargetSamples)));
   std::vector<Sample> samples;
   for (int y = 0; y < size.height; y += step) {
     for (int x = 0; x < size.width; x += step) {
@@ -67,7 +68,8 @@ double radius(const KannalaBrandtCamera::Parameters& p, double angle) {
 }
 
 Eigen::Vector2d residual(const KannalaBrandtCamera::Parameters& p, const Sample& sample) {
-  return radius(p, sample.angle_rad) * sample.direction.cwiseProduct(p.head<2>()) + p.segment<2>(2) - sample.pixel;
+  return radius(p, sample.angle_rad) * sample.direction.cwiseProduct(p.head<2>()) + p.segment<2>(2) -
+         sample.pixel;
 }
 
 double sumOfSquares(const KannalaBrandtCamera::Parameters& p, const std::vector<Sample>& samples) {

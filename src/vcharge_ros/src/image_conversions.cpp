@@ -2,9 +2,10 @@
 
 #include <limits>
 
+#include <sensor_msgs/image_encodings.h>
+#include <boost/make_shared.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <sensor_msgs/image_encodings.h>
 
 #include "vcharge_core/error.h"
 #include "vcharge_ros/conversions.h"
@@ -102,7 +103,8 @@ Image toImage(const sensor_msgs::CompressedImageConstPtr& message, const std::st
 }
 
 sensor_msgs::ImagePtr toImageMessage(const cv::Mat& pixels, Timestamp stamp, const std::string& frame_id) {
-  check(pixels.type() == CV_8UC1 || pixels.type() == CV_32FC1, "toImageMessage: expected CV_8UC1 or CV_32FC1");
+  check(pixels.type() == CV_8UC1 || pixels.type() == CV_32FC1,
+        "toImageMessage: expected CV_8UC1 or CV_32FC1");
   auto message = boost::make_shared<sensor_msgs::Image>();
   message->header.stamp = fromTimestamp(stamp);
   message->header.frame_id = frame_id;

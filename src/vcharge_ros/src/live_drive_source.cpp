@@ -24,7 +24,9 @@ constexpr char kProcessing[] = "processing";  // stands for the consumer among t
 constexpr size_t kMaxLoggedTexts = 100;
 
 // ROS takes 0 as "no limit", as the options do.
-uint32_t queueSize(int size) { return static_cast<uint32_t>(size); }
+uint32_t queueSize(int size) {
+  return static_cast<uint32_t>(size);
+}
 
 }  // namespace
 
@@ -116,13 +118,13 @@ void LiveDriveSource::Implementation::subscribe() {
   const std::string odometry_topic = options.topics.odometry;
   const std::string ticks_topic = options.topics.wheel_ticks;
   monitor.expectTopic(odometry_topic);
-  subscribeTopic<nav_msgs::Odometry>(
-      odometry_topic, options.odometry_queue_size,
-      [this, odometry_topic](const nav_msgs::OdometryConstPtr& message) {
-        const std::lock_guard<std::mutex> lock(mutex);
-        handle(odometry_topic, message->header.stamp,
-               [&] { return fromMessage(*message, odometry_topic, rig->vehicle_frame); });
-      });
+  subscribeTopic<nav_msgs::Odometry>(odometry_topic, options.odometry_queue_size,
+                                     [this, odometry_topic](const nav_msgs::OdometryConstPtr& message) {
+                                       const std::lock_guard<std::mutex> lock(mutex);
+                                       handle(odometry_topic, message->header.stamp, [&] {
+                                         return fromMessage(*message, odometry_topic, rig->vehicle_frame);
+                                       });
+                                     });
   if (!ticks_topic.empty()) {
     subscribeTopic<vcharge_msgs::WheelTicks>(
         ticks_topic, options.odometry_queue_size,
@@ -175,7 +177,9 @@ void LiveDriveSource::Implementation::take(const std::string& topic, Timestamp s
     deliver(stamp, item);
     return;
   }
-  const auto deliver_item = [this](Timestamp item_stamp, const DriveItem& sorted) { deliver(item_stamp, sorted); };
+  const auto deliver_item = [this](Timestamp item_stamp, const DriveItem& sorted) {
+    deliver(item_stamp, sorted);
+  };
   if (sorter.isTooLate(stamp)) {
     ROS_WARN_STREAM(topic << ": stamp " << stamp << " jumped back by " << toSeconds(sorter.newest() - stamp)
                           << " s, more than sort_window_s; starting over");

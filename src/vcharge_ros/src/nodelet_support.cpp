@@ -27,8 +27,8 @@ void CallbackGuard::fail(const std::string& text) {
   }
 }
 
-NodeletDiagnostics::NodeletDiagnostics(ros::NodeHandle node, ros::NodeHandle private_node, const std::string& name,
-                                       std::function<DriveMonitor::Report()> report)
+NodeletDiagnostics::NodeletDiagnostics(ros::NodeHandle node, ros::NodeHandle private_node,
+                                       const std::string& name, std::function<DriveMonitor::Report()> report)
     : guard_(name), report_(std::move(report)), updater_(node, private_node, name) {
   updater_.setHardwareID("none");
   updater_.add("drive", [this](diagnostic_updater::DiagnosticStatusWrapper& status) {

@@ -61,7 +61,8 @@ YAML::Node readParameter(const ros::NodeHandle& node, const std::string& key) {
   return toYaml(value, "parameter " + node.resolveName(key));
 }
 
-std::string requireStringParameter(const ros::NodeHandle& node, const std::string& key, const std::string& what) {
+std::string requireStringParameter(const ros::NodeHandle& node, const std::string& key,
+                                   const std::string& what) {
   XmlRpc::XmlRpcValue value;
   const std::string name = "parameter " + node.resolveName(key);
   if (!node.getParam(key, value)) {

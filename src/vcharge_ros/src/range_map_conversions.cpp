@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstring>
 
+#include <boost/make_shared.hpp>
+
 #include "vcharge_core/error.h"
 #include "vcharge_ros/camera_info.h"
 #include "vcharge_ros/conversions.h"
@@ -57,8 +59,9 @@ void RangeMapConverter::prepare(const RangeMap& map) {
 
 RangeMapMessages RangeMapConverter::convert(const RangeMap& map, const cv::Mat& gray) {
   const cv::Size size = map.range_m.size();
-  check(map.range_m.type() == CV_32FC1 && map.confidence.type() == CV_32FC1 && map.confidence.size() == size &&
-            map.standard_deviation_m.type() == CV_32FC1 && map.standard_deviation_m.size() == size,
+  check(map.range_m.type() == CV_32FC1 && map.confidence.type() == CV_32FC1 &&
+            map.confidence.size() == size && map.standard_deviation_m.type() == CV_32FC1 &&
+            map.standard_deviation_m.size() == size,
         "RangeMapConverter: expected three CV_32FC1 images of one size");
   check(gray.empty() || (gray.type() == CV_8UC1 && gray.size() == size),
         "RangeMapConverter: expected a CV_8UC1 image of the map's size");

@@ -6,22 +6,22 @@
 #include <string>
 #include <utility>
 
-#include <boost/shared_ptr.hpp>
 #include <ros/node_handle.h>
+#include <boost/shared_ptr.hpp>
 
 namespace vcharge::internal {
 
-/// Publishes on a topic unless somebody else says the same there. It listens to its own topic; roscpp hands a message
-/// that was published by pointer to subscribers of the same process as that very pointer, which tells own messages from
-/// others' also where those come from another nodelet of the same manager.
+/// Publishes on a topic unless somebody else says the same there. It listens to its own topic; roscpp hands a
+/// message that was published by pointer to subscribers of the same process as that very pointer, which tells
+/// own messages from others' also where those come from another nodelet of the same manager.
 template <class Message>
 class SharedTopic {
  public:
   using Clock = std::chrono::steady_clock;
   using MessageConstPtr = boost::shared_ptr<const Message>;
 
-  /// `conflicts` says whether a foreign message makes ours superfluous; the topic is taken back once none came for
-  /// `patience`.
+  /// `conflicts` says whether a foreign message makes ours superfluous; the topic is taken back once none
+  /// came for `patience`.
   SharedTopic(ros::NodeHandle* node, const std::string& topic, uint32_t queue_size, Clock::duration patience,
               std::function<bool(const Message&)> conflicts)
       : patience_(patience), conflicts_(std::move(conflicts)) {
