@@ -86,7 +86,8 @@ RigidTransform readExtrinsics(const Entry& entry, std::optional<Eigen::Matrix<do
 
 cv::Mat readMask(const Entry& entry, const std::string& folder, cv::Size size) {
   const std::string path = (fs::path(folder) / entry.text()).string();
-  cv::Mat mask = cv::imread(path, cv::IMREAD_GRAYSCALE);
+  // OpenCV would print a warning of its own for a file that is not there.
+  cv::Mat mask = fs::is_regular_file(path) ? cv::imread(path, cv::IMREAD_GRAYSCALE) : cv::Mat();
   if (mask.empty()) {
     throw InputError(entry.source + ": " + entry.key + ": the image " + path + " cannot be read");
   }

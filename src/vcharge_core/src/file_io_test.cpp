@@ -1,0 +1,68 @@
+#include "vcharge_core/file_io.h"
+
+#include <filesystem>
+
+#include <gtest/gtest.h>
+
+#include "vcharge_core/error.h"
+
+namespace vcharge {
+namespace {
+
+class FileIoTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = ::testing::TempDir() + "file_io_test";
+    std::filesystem::remove_all(folder_);
+    createFolder(folder_);
+  }
+  int countFiles() const {
+    int count = 0;
+    for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder_)) {
+      ++count;
+    }
+    return count;
+  }
+  std::string folder_;
+};
+
+TEST_F(FileIoTest, FailedWriteLeavesWhatWasThere) {
+  const std::string path = folder_ + "/a.txt";
+  writeTextFileAtomically(path, "old");
+  EXPECT_THROW(writeFileAtomically(path,
+                                   [](const std::string& temporary) {
+                                     writeTextFileAtomically(temporary, "half");
+                                     throw InputError("the disk is full");
+                                   }),
+               InputError);
+  EXPECT_EQ(readTextFile(path), "old");
+  EXPECT_EQ(countFiles(), 1);
+}
+
+TEST_F(FileIoTest, TemporaryFileKeepsTheExtension) {
+  writeFileAtomically(folder_ + "/a.png", [](const std::string& temporary) {
+    EXPECT_EQ(std::filesystem::path(temporary).extension(), ".png");
+    writeTextFileAtomically(temporary, "x");
+  });
+  EXPECT_EQ(readTextFile(folder_ + "/a.png"), "x");
+}
+
+TEST_F(FileIoTest, ErrorsNameThePath) {
+  for (const auto& action :
+       {std::function<void()>([&] { readTextFile(folder_ + "/missing.txt"); }),
+        std::function<void()>([&] { writeTextFileAtomically(folder_ + "/no/missing.txt", ""); }),
+        std::function<void()>([&] {
+          writeTextFileAtomically(folder_ + "/file", "");
+          createFolder(folder_ + "/file/missing.txt");
+        })}) {
+    try {
+      action();
+      FAIL() << "no error";
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find("missing.txt"), std::string::npos) << error.what();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace vcharge

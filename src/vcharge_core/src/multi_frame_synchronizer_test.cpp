@@ -1,0 +1,100 @@
+#include "vcharge_core/multi_frame_synchronizer.h"
+
+#include <gtest/gtest.h>
+
+namespace vcharge {
+namespace {
+
+Timestamp at(double seconds) {
+  return Timestamp::fromNanoseconds(1000000000000) + durationFromSeconds(seconds);
+}
+
+Image imageWith(int value) {
+  return {cv::Mat(1, 1, CV_8UC1, cv::Scalar(value)), nullptr};
+}
+
+TEST(MultiFrameSynchronizerTest, EmitsASetWhenItIsComplete) {
+  MultiFrameSynchronizer synchronizer(2);
+  EXPECT_EQ(synchronizer.add(1, at(0.0), imageWith(11)), nullptr);
+  const auto frame = synchronizer.add(0, at(0.0), imageWith(10));
+  ASSERT_NE(frame, nullptr);
+  EXPECT_EQ(frame->stamp, at(0.0));
+  EXPECT_EQ(frame->images[0].pixels.at<uint8_t>(0, 0), 10);
+  EXPECT_EQ(frame->images[1].pixels.at<uint8_t>(0, 0), 11);
+}
+
+TEST(MultiFrameSynchronizerTest, KeepsThePixelsWhereTheyAre) {
+  MultiFrameSynchronizer synchronizer(1);
+  const Image image = imageWith(5);
+  const auto frame = synchronizer.add(0, at(0.0), image);
+  ASSERT_NE(frame, nullptr);
+  EXPECT_EQ(frame->images[0].pixels.data, image.pixels.data);
+}
+
+TEST(MultiFrameSynchronizerTest, ExactStampsByDefaultToleranceAsAnOption) {
+  MultiFrameSynchronizer exact(2);
+  exact.add(0, at(0.0), imageWith(0));
+  EXPECT_EQ(exact.add(1, at(1e-6), imageWith(0)), nullptr);
+
+  MultiFrameSynchronizerOptions options;
+  options.tolerance_s = 0.005;
+  MultiFrameSynchronizer tolerant(2, options);
+  tolerant.add(0, at(0.004), imageWith(0));
+  const auto frame = tolerant.add(1, at(0.0), imageWith(0));
+  ASSERT_NE(frame, nullptr);
+  EXPECT_EQ(frame->stamp, at(0.0));
+  EXPECT_EQ(tolerant.add(0, at(0.08), imageWith(0)), nullptr);
+  EXPECT_EQ(tolerant.add(1, at(0.086), imageWith(0)), nullptr) << "6 ms apart";
+}
+
+TEST(MultiFrameSynchronizerTest, ACompleteSetOvertakesIncompleteOnesAndCountsThem) {
+  MultiFrameSynchronizer synchronizer(3);
+  synchronizer.add(0, at(0.0), imageWith(0));
+  synchronizer.add(1, at(0.0), imageWith(0));
+  for (size_t camera = 0; camera < 3; ++camera) {
+    synchronizer.add(camera, at(0.08), imageWith(0));
+  }
+  EXPECT_EQ(synchronizer.counts().complete_sets, 1U);
+  EXPECT_EQ(synchronizer.counts().incomplete_sets, 1U);
+  EXPECT_EQ(synchronizer.counts().missing_per_camera, (std::vector<uint64_t>{0, 0, 1}));
+  EXPECT_EQ(synchronizer.add(2, at(0.0), imageWith(0)), nullptr) << "too late";
+  EXPECT_EQ(synchronizer.counts().late_images, 1U);
+}
+
+TEST(MultiFrameSynchronizerTest, ADeadCameraDoesNotFillTheMemory) {
+  MultiFrameSynchronizerOptions options;
+  options.max_pending_sets = 4;
+  MultiFrameSynchronizer synchronizer(2, options);
+  for (int i = 0; i < 100; ++i) {
+    EXPECT_EQ(synchronizer.add(0, at(0.08 * i), imageWith(0)), nullptr);
+  }
+  EXPECT_EQ(synchronizer.counts().incomplete_sets, 96U);
+  EXPECT_EQ(synchronizer.counts().missing_per_camera[1], 96U);
+  EXPECT_NE(synchronizer.add(1, at(0.08 * 99), imageWith(0)), nullptr) << "it recovers";
+}
+
+TEST(MultiFrameSynchronizerTest, CountsDuplicatesAndKeepsTheFirst) {
+  MultiFrameSynchronizer synchronizer(2);
+  synchronizer.add(0, at(0.0), imageWith(1));
+  synchronizer.add(0, at(0.0), imageWith(2));
+  const auto frame = synchronizer.add(1, at(0.0), imageWith(3));
+  ASSERT_NE(frame, nullptr);
+  EXPECT_EQ(frame->images[0].pixels.at<uint8_t>(0, 0), 1);
+  EXPECT_EQ(synchronizer.counts().duplicate_images, 1U);
+}
+
+TEST(MultiFrameSynchronizerTest, StartsOverWhenTimeJumpsBack) {
+  MultiFrameSynchronizer synchronizer(1);
+  EXPECT_NE(synchronizer.add(0, at(100.0), imageWith(0)), nullptr);
+  EXPECT_NE(synchronizer.add(0, at(1.0), imageWith(0)), nullptr);
+  EXPECT_EQ(synchronizer.counts().resets, 1U);
+}
+
+TEST(MultiFrameSynchronizerTest, BadIndexIsACallersBug) {
+  MultiFrameSynchronizer synchronizer(2);
+  EXPECT_THROW(synchronizer.add(2, at(0.0), imageWith(0)), std::logic_error);
+  EXPECT_THROW(MultiFrameSynchronizer(0), std::logic_error);
+}
+
+}  // namespace
+}  // namespace vcharge

@@ -5,6 +5,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include <Eigen/LU>
+
 namespace vcharge {
 namespace {
 

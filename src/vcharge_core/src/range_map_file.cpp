@@ -30,7 +30,7 @@ void writeFloatTiff(const cv::Mat& image, const std::string& path) {
 }
 
 cv::Mat readFloatTiff(const std::string& path) {
-  cv::Mat image = cv::imread(path, cv::IMREAD_UNCHANGED);
+  cv::Mat image = fs::is_regular_file(path) ? cv::imread(path, cv::IMREAD_UNCHANGED) : cv::Mat();
   if (image.empty() || image.type() != CV_32FC1) {
     throw InputError(path + ": expected a TIFF of 32-bit floats");
   }

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 
 #include "vcharge_core/kannala_brandt_camera.h"
 #include "vcharge_core/mei_camera.h"
