@@ -79,8 +79,8 @@ TEST(ColourRangeTest, NearIsRedFarIsBlueUnknownIsBlack) {
   range.at<float>(0, 1) = 50.0F;
   range.at<float>(0, 2) = std::numeric_limits<float>::quiet_NaN();
   const cv::Mat coloured = colourRange(range, 0.3, 50.0);
-  const auto near = coloured.at<cv::Vec3b>(0, 0);
-  const auto far = coloured.at<cv::Vec3b>(0, 1);
+  const auto& near = coloured.at<cv::Vec3b>(0, 0);
+  const auto& far = coloured.at<cv::Vec3b>(0, 1);
   EXPECT_GT(near[2], near[0]);
   EXPECT_GT(far[0], far[2]);
   EXPECT_EQ(coloured.at<cv::Vec3b>(0, 2), cv::Vec3b(0, 0, 0));

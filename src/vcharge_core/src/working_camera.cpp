@@ -144,7 +144,7 @@ cv::Mat WorkingCamera::undistort(const cv::Mat& pixels) const {
       const uint8_t* bottom = pixels.ptr<uint8_t>(std::min(y0 + 1, max_y)) + x0;
       const float upper = static_cast<float>(top[0]) + a * static_cast<float>(top[right] - top[0]);
       const float lower = static_cast<float>(bottom[0]) + a * static_cast<float>(bottom[right] - bottom[0]);
-      out[x] = static_cast<uint8_t>(upper + b * (lower - upper) + 0.5F);
+      out[x] = static_cast<uint8_t>(upper + b * (lower - upper) + 0.5F);  // NOLINT: never negative
     }
   }
   return undistorted;

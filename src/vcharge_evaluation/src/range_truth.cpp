@@ -32,7 +32,7 @@ cv::Mat resampleRangeTruth(const cv::Mat& sensor_range_m, const WorkingCamera& w
   cv::Mat truth(working_camera.size(), CV_32FC1, cv::Scalar(kNan));
   for (int y = 0; y < truth.rows; ++y) {
     for (int x = 0; x < truth.cols; ++x) {
-      const cv::Vec2f pixel = sensor_pixels.at<cv::Vec2f>(y, x);
+      const cv::Vec2f& pixel = sensor_pixels.at<cv::Vec2f>(y, x);
       if (pixel[0] < 0.0F) {
         continue;
       }
