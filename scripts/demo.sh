@@ -1,0 +1,83 @@
+#!/usr/bin/env bash
+# From nothing to range maps: installs, builds, simulates a short drive of a car with four fisheye cameras, computes
+# range maps and judges them against the truth, replays the drive through the nodelets with rviz, and leaves pictures in
+# demo/. What is already in demo/ is kept: delete the folder to start over.
+#   demo.sh [--no-rviz] [--bag DRIVE.bag --rig rig.yaml]    the second form runs on a recording of your own
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
+
+bag="" rig="" with_rviz=true
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --bag) bag=$(realpath "${2:?--bag needs a file}"); shift 2 ;;
+    --rig) rig=$(realpath "${2:?--rig needs a file}"); shift 2 ;;
+    --no-rviz) with_rviz=false; shift ;;
+    -h | --help) sed -n '2,5s/^# \{0,1\}//p' "$0"; exit 0 ;;
+    *) echo "demo.sh: unknown argument '$1' (see --help)" >&2; exit 2 ;;
+  esac
+done
+if { [ -n "$bag" ] && [ -z "$rig" ]; } || { [ -z "$bag" ] && [ -n "$rig" ]; }; then
+  echo "demo.sh: --bag and --rig go together" >&2
+  exit 2
+fi
+
+step() { printf '\n== %s (%d s)\n' "$1" "$((SECONDS - started))"; }
+started=$SECONDS
+
+step "1/6 packages and build"
+scripts/install_dependencies.sh
+scripts/build.sh
+# shellcheck disable=SC1091
+set +u && . build/devel/setup.bash && set -u
+tools=build/devel/lib
+mkdir -p demo
+started=$SECONDS  # the steps from here on are the demo itself
+
+truth=""
+if [ -z "$bag" ]; then
+  step "2/6 a simulated drive through a parking lot"
+  bag=$PWD/demo/drive.bag rig=$PWD/demo/rig_truth.yaml truth=$PWD/demo/drive_truth
+  if [ ! -e "$bag" ]; then
+    "$tools/vcharge_simulation/simulate_drive" --scene lot --drive short --truth-range --output "$bag"
+  else
+    echo "kept: $bag"
+  fi
+else
+  step "2/6 your drive: $bag"
+fi
+
+step "3/6 range maps"
+if [ ! -e demo/range/complete ]; then
+  rm -rf demo/range
+  "$tools/vcharge_dense/compute_range_maps" --bag "$bag" --rig "$rig" --output demo/range
+  touch demo/range/complete
+else
+  echo "kept: demo/range"
+fi
+
+if [ -n "$truth" ]; then
+  step "4/6 errors against the truth"
+  "$tools/vcharge_evaluation/evaluate_range" --range demo/range --truth "$truth" --bag "$bag" --rig "$rig" \
+    --report demo/evaluation | tee demo/range_errors.txt
+else
+  step "4/6 no truth for a drive of your own"
+fi
+
+step "5/6 pictures"
+/usr/bin/python3 scripts/draw_demo.py --bag "$bag" --rig "$rig" --range demo/range ${truth:+--truth "$truth"} \
+  --output demo
+
+step "6/6 the same drive through the nodelets"
+if [ "$with_rviz" = false ]; then
+  echo "left out (--no-rviz)"
+elif [ -n "${DISPLAY:-}" ]; then
+  roslaunch vcharge_launch drive_replay.launch bag:="$bag" rig:="$rig" rviz:=true
+else
+  echo "no display: rviz runs on a virtual one and leaves demo/rviz.png"
+  scripts/rviz_screenshot.sh "$bag" "$rig" demo/rviz.png
+fi
+
+step "done"
+echo "Pictures:"
+ls demo/*.png demo/evaluation/*.png 2>/dev/null || true

@@ -1,0 +1,34 @@
+#!/usr/bin/env bash
+# Replays a drive through the nodelets with rviz on a virtual display, and takes a picture of it:
+#   rviz_screenshot.sh DRIVE.bag rig.yaml OUTPUT.png
+set -euo pipefail
+[ $# -eq 3 ] || { sed -n '2,3s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+bag=$1 rig=$2 output=$3
+export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin ROS_HOSTNAME=localhost
+scratch=$(mktemp -d)
+export ROS_HOME=$scratch
+pids=()
+cleanup() {
+  for pid in "${pids[@]}"; do kill "$pid" 2>/dev/null || true; done
+  wait 2>/dev/null || true
+  rm -rf "$scratch"
+}
+trap cleanup EXIT
+
+display=":$((70 + RANDOM % 900))"
+Xvfb "$display" -screen 0 1600x1000x24 >"$scratch/xvfb.log" 2>&1 &
+pids+=($!)
+export DISPLAY=$display LIBGL_ALWAYS_SOFTWARE=1
+for _ in $(seq 50); do xdpyinfo >/dev/null 2>&1 && break; sleep 0.1; done
+
+roslaunch -p $((20000 + RANDOM % 20000)) vcharge_launch drive_replay.launch bag:="$bag" rig:="$rig" rviz:=true \
+  loop:=true >"$scratch/roslaunch.log" 2>&1 &
+pids+=($!)
+# rviz needs a while on a software renderer; the drive goes on in a loop until its picture is there.
+for _ in $(seq 25); do
+  sleep 1
+  kill -0 "${pids[1]}" 2>/dev/null || { cat "$scratch/roslaunch.log" >&2; exit 1; }
+done
+import -window root "$scratch/rviz.png"
+mv "$scratch/rviz.png" "$output"
+echo "written: $output"
