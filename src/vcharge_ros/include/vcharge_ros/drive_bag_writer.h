@@ -10,8 +10,9 @@
 
 namespace vcharge {
 
-/// Writes a recorded drive on the suite's standard topics: images and camera_info of every camera, /odom, /wheel_ticks
-/// and, for simulated drives, /ground_truth. The bag appears under its name only once close() returned.
+/// Writes a recorded drive on the suite's standard topics: images and camera_info of every camera, /odom,
+/// /wheel_ticks and, for simulated drives, /ground_truth. The bag appears under its name only once close()
+/// returned.
 class DriveBagWriter {
  public:
   /// InputError when the folder cannot be written.

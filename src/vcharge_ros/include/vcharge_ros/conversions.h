@@ -1,0 +1,45 @@
+#pragma once
+
+#include <string>
+
+#include <geometry_msgs/Pose.h>
+#include <geometry_msgs/Transform.h>
+#include <geometry_msgs/TransformStamped.h>
+#include <nav_msgs/Odometry.h>
+#include <ros/time.h>
+#include <vcharge_msgs/WheelTicks.h>
+
+#include "vcharge_core/rigid_transform.h"
+#include "vcharge_core/timestamp.h"
+#include "vcharge_core/vehicle_odometry.h"
+
+namespace vcharge {
+
+/// Exact in both directions.
+Timestamp toTimestamp(const ros::Time& time);
+/// std::out_of_range for stamps that ros::Time cannot hold (before 0 or after 2^32 s).
+ros::Time fromTimestamp(Timestamp stamp);
+
+geometry_msgs::Pose toPoseMessage(const RigidTransform& target_from_source);
+geometry_msgs::Transform toTransformMessage(const RigidTransform& target_from_source);
+/// InputError "<source>: ..." when anything is not finite or the quaternion's norm is off by more than 1e-3.
+RigidTransform fromMessage(const geometry_msgs::Pose& pose, const std::string& source);
+RigidTransform fromMessage(const geometry_msgs::Transform& transform, const std::string& source);
+/// TF's parent is `target_frame`, its child `source_frame`.
+geometry_msgs::TransformStamped toTransformStamped(const RigidTransform& target_from_source, Timestamp stamp,
+                                                   const std::string& target_frame,
+                                                   const std::string& source_frame);
+
+/// Speed is twist.linear.x, yaw rate twist.angular.z, both in the child frame.
+nav_msgs::Odometry toMessage(const VehicleOdometry& odometry, const std::string& odom_frame,
+                             const std::string& vehicle_frame);
+/// InputError "<source>: ..." for a pose as above, velocities that are not finite, or a child_frame_id other
+/// than `vehicle_frame` (an empty one is taken as it).
+VehicleOdometry fromMessage(const nav_msgs::Odometry& message, const std::string& source,
+                            const std::string& vehicle_frame);
+
+vcharge_msgs::WheelTicks toMessage(const WheelTicks& ticks, const std::string& vehicle_frame);
+/// InputError "<source>: ..." when metres_per_tick is not positive or a number is not finite.
+WheelTicks fromMessage(const vcharge_msgs::WheelTicks& message, const std::string& source);
+
+}  // namespace vcharge

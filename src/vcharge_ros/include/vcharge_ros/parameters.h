@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+
+#include <ros/node_handle.h>
+#include <xmlrpcpp/XmlRpcValue.h>
+#include <yaml-cpp/yaml.h>
+
+#include "vcharge_core/options.h"
+
+namespace vcharge {
+
+/// The same tree as YAML, numbers exact. InputError "<source>: ..." for types that YAML options do not have
+/// (dates, binary).
+YAML::Node toYaml(const XmlRpc::XmlRpcValue& value, const std::string& source);
+
+/// The parameter, or an empty map where there is none.
+YAML::Node readParameter(const ros::NodeHandle& node, const std::string& key);
+
+/// readFields (vcharge_core/options.h) from the parameter server: overrides the fields of `options` by the
+/// parameters under `key`. InputError names the parameter.
+template <class Options>
+void readFieldsFromParameters(const ros::NodeHandle& node, const std::string& key, Options* options) {
+  readFields(readParameter(node, key), "parameter " + node.resolveName(key), options);
+}
+
+/// A parameter that must be there. InputError names it and says what it is for ("the path of a rig.yaml").
+std::string requireStringParameter(const ros::NodeHandle& node, const std::string& key,
+                                   const std::string& what);
+
+}  // namespace vcharge

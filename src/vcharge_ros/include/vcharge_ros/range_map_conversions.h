@@ -1,0 +1,45 @@
+#pragma once
+
+#include <memory>
+
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/PointCloud2.h>
+
+#include "vcharge_core/range_map.h"
+#include "vcharge_core/ray_table.h"
+
+namespace vcharge {
+
+/// One range map as messages, equal stamps, in the camera's optical frame.
+struct RangeMapMessages {
+  sensor_msgs::ImagePtr range;               ///< 32FC1, metres along the ray, NaN unknown
+  sensor_msgs::ImagePtr confidence;          ///< 32FC1
+  sensor_msgs::ImagePtr standard_deviation;  ///< 32FC1, metres
+  sensor_msgs::CameraInfoPtr camera_info;    ///< equidistant fit of the working camera
+  sensor_msgs::PointCloud2Ptr
+      points;  ///< x, y, z (metres) and intensity (0..255), FLOAT32, known ranges only
+};
+
+/// Converts the range maps of one camera; rays and camera_info are computed once per camera model and size.
+/// Not thread safe.
+class RangeMapConverter {
+ public:
+  /// camera_info is fitted over `field_of_view_rad` (full angle).
+  explicit RangeMapConverter(double field_of_view_rad);
+  ~RangeMapConverter();
+
+  /// `gray` (CV_8UC1 of the map's size, the undistorted image, or empty) becomes the points' intensity;
+  /// without it intensity is the confidence times 255. std::logic_error for images of unlike size or type.
+  RangeMapMessages convert(const RangeMap& map, const cv::Mat& gray);
+
+ private:
+  void prepare(const RangeMap& map);
+
+  const double field_of_view_rad_;
+  MeiCamera::Parameters camera_parameters_ = MeiCamera::Parameters::Zero();
+  std::unique_ptr<RayTable> rays_;
+  sensor_msgs::CameraInfo camera_info_;
+};
+
+}  // namespace vcharge

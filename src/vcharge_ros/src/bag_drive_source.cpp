@@ -1,0 +1,301 @@
+#include "vcharge_ros/bag_drive_source.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+
+#include "drive_item.h"
+#include "vcharge_core/error.h"
+#include "vcharge_core/options.h"
+#include "vcharge_ros/conversions.h"
+#include "vcharge_ros/image_conversions.h"
+#include "vcharge_ros/stamp_sorter.h"
+
+namespace vcharge {
+namespace {
+
+using internal::DriveItem;
+
+enum class Kind { kImage, kCompressedImage, kOdometry, kWheelTicks };
+
+struct TopicRole {
+  Kind kind;
+  size_t camera_index = 0;
+};
+
+const char* expectedType(Kind kind) {
+  switch (kind) {
+    case Kind::kImage:
+      return "sensor_msgs/Image";
+    case Kind::kCompressedImage:
+      return "sensor_msgs/CompressedImage";
+    case Kind::kOdometry:
+      return "nav_msgs/Odometry";
+    default:
+      return "vcharge_msgs/WheelTicks";
+  }
+}
+
+std::string seconds(double value) {
+  std::ostringstream text;
+  text << value << " s";
+  return text.str();
+}
+
+/// Runs a step of librosbag, whose errors come in many types, and names the bag in what it throws.
+template <class Function>
+auto readingBag(const std::string& path, Function&& function) -> decltype(function()) {
+  try {
+    return function();
+  } catch (const InputError&) {
+    throw;
+  } catch (const rosbag::BagUnindexedException&) {
+    throw InputError(path +
+                     ": the bag has no index (was its recording cut off?); expected a complete bag, see "
+                     "`rosbag reindex`");
+  } catch (const std::exception& error) {
+    throw InputError(path + ": corrupt or truncated; expected a ROS bag of format 2.0 (" + error.what() +
+                     ")");
+  }
+}
+
+std::unique_ptr<rosbag::Bag> openBag(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    throw InputError(path + ": no such file; expected a ROS bag");
+  }
+  return readingBag(path, [&] { return std::make_unique<rosbag::Bag>(path, rosbag::bagmode::Read); });
+}
+
+/// One reading of a bag, from its first message to its last.
+class BagReading {
+ public:
+  BagReading(const std::string& path, const CameraRig& rig, const BagDriveSourceOptions& options,
+             DriveConsumer* consumer)
+      : path_(path),
+        rig_(rig),
+        options_(options),
+        consumer_(consumer),
+        cameras_(internal::selectCameras(rig, options.cameras)),
+        bag_(openBag(path)),
+        sorter_(durationFromSeconds(options.sort_window_s)),
+        last_images_(rig.cameras.size()) {
+    readingBag(path_, [&] { findTopics(); });
+  }
+
+  void run(const DriveSource::ProgressCallback& progress);
+
+ private:
+  void findTopics();
+  void addRequiredTopic(const std::string& topic, TopicRole role);
+  bool hasTopic(const std::string& topic) const { return types_in_bag_.count(topic) > 0; }
+  std::string listTopics() const;
+  DriveItem convert(const rosbag::MessageInstance& message, const TopicRole& role, Timestamp* stamp) const;
+  template <class Message>
+  boost::shared_ptr<Message> instantiate(const rosbag::MessageInstance& message) const;
+  void push(const std::string& topic, Timestamp stamp, DriveItem item);
+  void deliver(Timestamp stamp, const DriveItem& item);
+  void checkCameras(Timestamp stamp) const;
+  std::string topicName(size_t camera_index) const;
+
+  const std::string& path_;
+  const CameraRig& rig_;
+  const BagDriveSourceOptions& options_;
+  DriveConsumer* const consumer_;
+  const std::vector<size_t> cameras_;
+  const std::unique_ptr<rosbag::Bag> bag_;
+  std::map<std::string, std::set<std::string>> types_in_bag_;  // by topic
+  std::map<std::string, TopicRole> roles_;                     // by topic
+  StampSorter<DriveItem> sorter_;
+  std::vector<std::optional<Timestamp>> last_images_;  // delivered, by camera
+  std::optional<Timestamp> first_image_;
+};
+
+std::string BagReading::listTopics() const {
+  std::string list;
+  for (const auto& [topic, types] : types_in_bag_) {
+    list += (list.empty() ? "" : ", ") + topic + " (" + *types.begin() + ")";
+  }
+  return list.empty() ? "none" : list;
+}
+
+void BagReading::addRequiredTopic(const std::string& topic, TopicRole role) {
+  const std::string expected = expectedType(role.kind);
+  for (const std::string& type : types_in_bag_.at(topic)) {
+    if (type != expected) {
+      throw InputError(path_ + ": " + topic + ": expected messages of type " + expected + ", got " + type);
+    }
+  }
+  if (rosbag::View(*bag_, rosbag::TopicQuery(topic)).size() == 0) {
+    throw InputError(path_ + ": " + topic + ": expected messages of type " + expected + ", got none");
+  }
+  roles_[topic] = role;
+}
+
+void BagReading::findTopics() {
+  for (const rosbag::ConnectionInfo* connection : rosbag::View(*bag_).getConnections()) {
+    types_in_bag_[connection->topic].insert(connection->datatype);
+  }
+  const DriveTopics& topics = options_.topics;
+  for (const size_t camera : cameras_) {
+    const std::string& name = rig_.cameras[camera].name;
+    if (hasTopic(topics.imageTopic(name))) {
+      addRequiredTopic(topics.imageTopic(name), {Kind::kImage, camera});
+    } else if (hasTopic(topics.compressedImageTopic(name))) {
+      addRequiredTopic(topics.compressedImageTopic(name), {Kind::kCompressedImage, camera});
+    } else {
+      throw InputError(path_ + ": expected images of camera '" + name + "' on " + topics.imageTopic(name) +
+                       " (or .../compressed); topics in the bag: " + listTopics());
+    }
+  }
+  if (!hasTopic(topics.odometry)) {
+    throw InputError(path_ + ": expected odometry on " + topics.odometry + " (" +
+                     expectedType(Kind::kOdometry) + "); topics in the bag: " + listTopics());
+  }
+  addRequiredTopic(topics.odometry, {Kind::kOdometry});
+  if (!topics.wheel_ticks.empty() && hasTopic(topics.wheel_ticks)) {
+    addRequiredTopic(topics.wheel_ticks, {Kind::kWheelTicks});
+  }
+}
+
+template <class Message>
+boost::shared_ptr<Message> BagReading::instantiate(const rosbag::MessageInstance& message) const {
+  const boost::shared_ptr<Message> result = readingBag(path_, [&] { return message.instantiate<Message>(); });
+  if (!result) {
+    throw InputError(path_ + ": " + message.getTopic() + ": expected the message definition of " +
+                     ros::message_traits::datatype<Message>() +
+                     " that this program was built with, got another");
+  }
+  return result;
+}
+
+DriveItem BagReading::convert(const rosbag::MessageInstance& message, const TopicRole& role,
+                              Timestamp* stamp) const {
+  const std::string source = path_ + ": " + message.getTopic();
+  if (role.kind == Kind::kOdometry) {
+    const auto odometry = instantiate<nav_msgs::Odometry>(message);
+    *stamp = toTimestamp(odometry->header.stamp);
+    return fromMessage(*odometry, source, rig_.vehicle_frame);
+  }
+  if (role.kind == Kind::kWheelTicks) {
+    const auto ticks = instantiate<vcharge_msgs::WheelTicks>(message);
+    *stamp = toTimestamp(ticks->header.stamp);
+    return fromMessage(*ticks, source);
+  }
+  Image image;
+  if (role.kind == Kind::kImage) {
+    const sensor_msgs::ImageConstPtr raw = instantiate<sensor_msgs::Image>(message);
+    *stamp = toTimestamp(raw->header.stamp);
+    image = toImage(raw, source);
+  } else {
+    const sensor_msgs::CompressedImageConstPtr compressed =
+        instantiate<sensor_msgs::CompressedImage>(message);
+    *stamp = toTimestamp(compressed->header.stamp);
+    image = toImage(compressed, source);
+  }
+  checkImageSize(rig_.cameras[role.camera_index], image.pixels.size(), source);
+  return internal::CameraImage{role.camera_index, image};
+}
+
+void BagReading::push(const std::string& topic, Timestamp stamp, DriveItem item) {
+  if (stamp == Timestamp()) {
+    throw InputError(path_ + ": " + topic + ": expected a stamp in the message's header, got 0");
+  }
+  if (sorter_.isTooLate(stamp)) {
+    throw InputError(path_ + ": " + topic + ": stamp " + toString(stamp) + " jumps back by " +
+                     seconds(toSeconds(sorter_.newest() - stamp)) +
+                     "; expected stamps that increase, within " +
+                     "sort_window_s = " + seconds(options_.sort_window_s));
+  }
+  const int rank = internal::rankOf(item);
+  sorter_.push(stamp, rank, std::move(item));
+}
+
+std::string BagReading::topicName(size_t camera_index) const {
+  for (const auto& [topic, role] : roles_) {
+    if ((role.kind == Kind::kImage || role.kind == Kind::kCompressedImage) &&
+        role.camera_index == camera_index) {
+      return topic;
+    }
+  }
+  return options_.topics.imageTopic(rig_.cameras[camera_index].name);
+}
+
+// A camera is silent since its last image, or since the first image of any camera.
+void BagReading::checkCameras(Timestamp stamp) const {
+  if (!first_image_) {
+    return;
+  }
+  for (const size_t camera : cameras_) {
+    const Timestamp last = last_images_[camera].value_or(*first_image_);
+    if (toSeconds(stamp - last) > options_.max_image_gap_s) {
+      throw InputError(path_ + ": " + topicName(camera) + ": no image between " + toString(last) + " and " +
+                       toString(stamp) + " while the drive goes on; expected one at least every " +
+                       "max_image_gap_s = " + seconds(options_.max_image_gap_s));
+    }
+  }
+}
+
+void BagReading::deliver(Timestamp stamp, const DriveItem& item) {
+  checkCameras(stamp);
+  if (const auto* image = std::get_if<internal::CameraImage>(&item)) {
+    last_images_[image->camera_index] = stamp;
+    first_image_ = first_image_.value_or(stamp);
+  }
+  internal::deliver(stamp, item, consumer_);
+}
+
+void BagReading::run(const DriveSource::ProgressCallback& progress) {
+  std::vector<std::string> topics;
+  for (const auto& entry : roles_) {
+    topics.push_back(entry.first);
+  }
+  const auto view =
+      readingBag(path_, [&] { return std::make_unique<rosbag::View>(*bag_, rosbag::TopicQuery(topics)); });
+  const double num_messages = view->size();
+  const auto deliver_item = [&](Timestamp stamp, const DriveItem& item) { deliver(stamp, item); };
+  double num_read = 0;
+  auto message = readingBag(path_, [&] { return view->begin(); });
+  while (message != view->end()) {
+    const std::string topic = message->getTopic();
+    Timestamp stamp;
+    DriveItem item = convert(*message, roles_.at(topic), &stamp);
+    push(topic, stamp, std::move(item));
+    sorter_.release(deliver_item);
+    readingBag(path_, [&] { ++message; });
+    ++num_read;
+    if (progress) {
+      progress(num_read / num_messages);
+    }
+  }
+  sorter_.flush(deliver_item);
+}
+
+}  // namespace
+
+void BagDriveSourceOptions::validate() const {
+  topics.validate();
+  requireField(sort_window_s >= 0.0, "sort_window_s", "must not be negative", sort_window_s);
+  requireField(max_image_gap_s > 0.0, "max_image_gap_s", "must be positive", max_image_gap_s);
+}
+
+BagDriveSource::BagDriveSource(std::string bag_path, std::shared_ptr<const CameraRig> rig,
+                               const BagDriveSourceOptions& options)
+    : bag_path_(std::move(bag_path)), rig_(std::move(rig)), options_(options) {
+  check(rig_ != nullptr, "BagDriveSource: expected a rig");
+  options_.validate();
+}
+
+void BagDriveSource::run(DriveConsumer* consumer, const ProgressCallback& progress) {
+  check(consumer != nullptr, "BagDriveSource::run: expected a consumer");
+  BagReading(bag_path_, *rig_, options_, consumer).run(progress);
+}
+
+}  // namespace vcharge

@@ -1,0 +1,50 @@
+#include "vcharge_ros/nodelet_support.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kDiagnosticsPeriod_s = 1.0;
+constexpr size_t kMaxLoggedTexts = 100;  // texts may carry stamps: no log may grow without end
+
+}  // namespace
+
+uint64_t CallbackGuard::numFailures() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return num_failures_;
+}
+
+std::string CallbackGuard::lastError() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return last_error_;
+}
+
+void CallbackGuard::fail(const std::string& text) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++num_failures_;
+  last_error_ = text;
+  if (logged_.size() < kMaxLoggedTexts && logged_.insert(text).second) {
+    ROS_ERROR_STREAM(name_ << ": " << text);
+  }
+}
+
+NodeletDiagnostics::NodeletDiagnostics(ros::NodeHandle node, ros::NodeHandle private_node,
+                                       const std::string& name, std::function<DriveMonitor::Report()> report)
+    : guard_(name), report_(std::move(report)), updater_(node, private_node, name) {
+  updater_.setHardwareID("none");
+  updater_.add("drive", [this](diagnostic_updater::DiagnosticStatusWrapper& status) {
+    const bool reported = guard_.run([&] {
+      const DriveMonitor::Report state = report_();
+      status.summary(static_cast<unsigned char>(state.level), state.message);
+      for (const auto& [key, value] : state.values) {
+        status.add(key, value);
+      }
+    });
+    if (!reported) {
+      status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, guard_.lastError());
+    }
+  });
+  timer_ = node.createWallTimer(ros::WallDuration(kDiagnosticsPeriod_s),
+                                [this](const ros::WallTimerEvent&) { updater_.force_update(); });
+}
+
+}  // namespace vcharge
