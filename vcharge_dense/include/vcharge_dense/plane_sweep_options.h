@@ -1,0 +1,102 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "vcharge_core/options.h"
+
+namespace vcharge {
+
+/// Which planes are swept. Fronto-parallel planes face the camera; ground-parallel ones lie at heights about
+/// the ground that the vehicle stands on, where they turn the matching window into the surface (paper, Depth
+/// Map Computation).
+enum class PlaneFamilies { kFrontoParallel, kGroundParallel, kBoth };
+template <>
+inline std::vector<std::string> enumNames<PlaneFamilies>() {
+  return {"fronto_parallel", "ground_parallel", "both"};
+}
+
+/// How the scores of the neighbours become the score of a plane.
+enum class Aggregation {
+  kMean,            ///< mean over the neighbours that see the window
+  kReferenceSplit,  ///< better of the means over those before and those after the reference (Kang 2001)
+  kBestK,           ///< mean of the best_k best ones
+};
+template <>
+inline std::vector<std::string> enumNames<Aggregation>() {
+  return {"mean", "reference_split", "best_k"};
+}
+
+/// Random error of the relative pose of two images, one sigma per axis. Independent parts add up in squares.
+struct PoseNoiseOptions {
+  double translation_m_per_m = 0.01;   ///< per metre of baseline
+  double translation_m = 0.002;        ///< of any pair
+  double rotation_rad_per_m = 0.0005;  ///< per metre of baseline
+  double rotation_rad = 0.0003;        ///< of any pair
+
+  template <class Visitor>
+  void visitFields(Visitor&& visit) {
+    visit("translation_m_per_m", translation_m_per_m);
+    visit("translation_m", translation_m);
+    visit("rotation_rad_per_m", rotation_rad_per_m);
+    visit("rotation_rad", rotation_rad);
+  }
+};
+
+/// Options of PlaneSweep. Distances are measured along the plane's normal from the reference camera.
+struct PlaneSweepOptions {
+  PlaneFamilies families = PlaneFamilies::kBoth;
+  double min_distance_m = 0.3;  ///< of the fronto-parallel planes, uniform in inverse distance
+  double max_distance_m = 50.0;
+  int num_planes = 64;
+  double ground_min_height_m =
+      -0.3;  ///< of the ground-parallel planes over the ground, uniform in inverse distance
+  double ground_max_height_m = 0.3;  ///< below the camera
+  int num_ground_planes = 16;
+
+  int window_px = 7;  ///< odd side of the square matching window (zero-mean normalized cross correlation)
+  Aggregation aggregation = Aggregation::kMean;
+  int best_k = 2;
+  bool sub_plane_interpolation = true;  ///< parabola through the scores, in inverse distance
+  /// Samples of the second sweep around the surface that the first one found (0: none). Its steps are step_px
+  /// wide in the neighbour that moves most, so that the peak of the score is sampled finely whatever the
+  /// baseline.
+  int num_refinement_steps = 16;
+  double refinement_step_px = 0.5;
+
+  double matching_noise_px = 0.15;  ///< error of a match that more neighbours do not average out
+  PoseNoiseOptions pose_noise;
+
+  double min_texture = 2.0;  ///< standard deviation of the reference window in gray levels; less is unknown
+  double min_score = 0.3;    ///< a lower correlation is unknown
+  double max_relative_sigma = 0.5;  ///< a larger standard deviation over range is unobserved
+  double min_confidence = 0.02;     ///< less is unknown
+  bool gate = true;                 ///< false keeps every range that some plane explains, for comparisons
+
+  template <class Visitor>
+  void visitFields(Visitor&& visit) {
+    visit("families", families);
+    visit("min_distance_m", min_distance_m);
+    visit("max_distance_m", max_distance_m);
+    visit("num_planes", num_planes);
+    visit("ground_min_height_m", ground_min_height_m);
+    visit("ground_max_height_m", ground_max_height_m);
+    visit("num_ground_planes", num_ground_planes);
+    visit("window_px", window_px);
+    visit("aggregation", aggregation);
+    visit("best_k", best_k);
+    visit("sub_plane_interpolation", sub_plane_interpolation);
+    visit("num_refinement_steps", num_refinement_steps);
+    visit("refinement_step_px", refinement_step_px);
+    visit("matching_noise_px", matching_noise_px);
+    visit("pose_noise", pose_noise);
+    visit("min_texture", min_texture);
+    visit("min_score", min_score);
+    visit("max_relative_sigma", max_relative_sigma);
+    visit("min_confidence", min_confidence);
+    visit("gate", gate);
+  }
+  void validate() const;  ///< throws std::invalid_argument naming the field
+};
+
+}  // namespace vcharge

@@ -1,0 +1,48 @@
+#include "vcharge_dense/neighbour_selection.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace vcharge {
+
+void NeighbourOptions::validate() const {
+  requireField(num_neighbours >= 1 && num_neighbours <= 32, "num_neighbours", "must be in [1, 32]",
+               num_neighbours);
+  requireField(min_baseline_m > 0.0, "min_baseline_m", "must be positive", min_baseline_m);
+  requireField(max_baseline_m >= min_baseline_m && max_baseline_m <= 100.0, "max_baseline_m",
+               "must be in [min_baseline_m, 100]", max_baseline_m);
+  requireField(max_forward_baseline_m >= max_baseline_m && max_forward_baseline_m <= 100.0,
+               "max_forward_baseline_m", "must be in [max_baseline_m, 100]", max_forward_baseline_m);
+}
+
+double longestBaseline(const NeighbourOptions& options, const Eigen::Vector3d& optical_axis,
+                       const Eigen::Vector3d& travel_direction) {
+  const double along = std::min(1.0, std::abs(optical_axis.dot(travel_direction)));
+  return options.max_baseline_m + along * (options.max_forward_baseline_m - options.max_baseline_m);
+}
+
+std::vector<size_t> selectNeighbours(const NeighbourOptions& options, const std::vector<double>& baselines_m,
+                                     int count, double longest_m) {
+  std::vector<size_t> chosen;
+  for (int k = count; k >= 1; --k) {
+    const double target_m = longest_m * k / count;
+    bool found = false;
+    size_t best = 0;
+    for (size_t i = 0; i < baselines_m.size(); ++i) {
+      const bool usable = baselines_m[i] >= options.min_baseline_m && baselines_m[i] <= 1.25 * longest_m &&
+                          std::find(chosen.begin(), chosen.end(), i) == chosen.end();
+      if (usable &&
+          (!found || std::abs(baselines_m[i] - target_m) < std::abs(baselines_m[best] - target_m))) {
+        best = i;
+        found = true;
+      }
+    }
+    if (found) {
+      chosen.push_back(best);
+    }
+  }
+  std::sort(chosen.begin(), chosen.end());
+  return chosen;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,53 @@
+#include "vcharge_dense/plane_family.h"
+
+#include <stdexcept>
+
+namespace vcharge {
+namespace {
+
+/// `count` inverse distances from 1 / far_m to 1 / near_m.
+std::vector<float> uniformInverse(double far_m, double near_m, int count) {
+  std::vector<float> inverse(static_cast<size_t>(count));
+  for (int i = 0; i < count; ++i) {
+    const double fraction = static_cast<double>(i) / (count - 1);
+    inverse[static_cast<size_t>(i)] =
+        static_cast<float>(1.0 / far_m + fraction * (1.0 / near_m - 1.0 / far_m));
+  }
+  return inverse;
+}
+
+}  // namespace
+
+Plane groundInCamera(const RigidTransform& vehicle_from_camera) {
+  const double height_m = vehicle_from_camera.translation().z();
+  if (!(height_m > 0.0)) {
+    throw std::invalid_argument("vehicle_from_camera: the camera must be above the ground (z > 0), is at " +
+                                std::to_string(height_m) + " m");
+  }
+  return {vehicle_from_camera.rotation().conjugate() * Eigen::Vector3d::UnitZ(), height_m};
+}
+
+std::vector<PlaneFamily> makePlaneFamilies(const PlaneSweepOptions& options,
+                                           const std::optional<Plane>& ground_in_camera) {
+  std::vector<PlaneFamily> families;
+  if (options.families != PlaneFamilies::kGroundParallel) {
+    families.push_back({-Eigen::Vector3d::UnitZ(),
+                        uniformInverse(options.max_distance_m, options.min_distance_m, options.num_planes)});
+  }
+  if (options.families != PlaneFamilies::kFrontoParallel) {
+    if (!ground_in_camera) {
+      throw std::invalid_argument("families: ground-parallel planes need the camera's pose on the vehicle");
+    }
+    const double far_m = ground_in_camera->distance_m - options.ground_min_height_m;
+    const double near_m = ground_in_camera->distance_m - options.ground_max_height_m;
+    if (!(near_m > 0.0)) {
+      throw std::invalid_argument("ground_max_height_m: must be below the camera, which is at " +
+                                  std::to_string(ground_in_camera->distance_m) + " m");
+    }
+    families.push_back(
+        {ground_in_camera->normal.normalized(), uniformInverse(far_m, near_m, options.num_ground_planes)});
+  }
+  return families;
+}
+
+}  // namespace vcharge

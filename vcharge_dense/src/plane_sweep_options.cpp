@@ -1,0 +1,45 @@
+#include "vcharge_dense/plane_sweep_options.h"
+
+#include <cmath>
+
+namespace vcharge {
+namespace {
+
+void requireNotNegative(const char* field, double value) {
+  requireField(std::isfinite(value) && value >= 0.0, field, "must be finite and not negative", value);
+}
+
+}  // namespace
+
+void PlaneSweepOptions::validate() const {
+  requireField(min_distance_m > 0.0, "min_distance_m", "must be positive", min_distance_m);
+  requireField(std::isfinite(max_distance_m) && max_distance_m > min_distance_m, "max_distance_m",
+               "must be finite and larger than min_distance_m", max_distance_m);
+  requireField(num_planes >= 3 && num_planes <= 1024, "num_planes", "must be in [3, 1024]", num_planes);
+  requireField(std::isfinite(ground_min_height_m), "ground_min_height_m", "must be finite",
+               ground_min_height_m);
+  requireField(std::isfinite(ground_max_height_m) && ground_max_height_m > ground_min_height_m,
+               "ground_max_height_m", "must be finite and larger than ground_min_height_m",
+               ground_max_height_m);
+  requireField(num_ground_planes >= 3 && num_ground_planes <= 1024, "num_ground_planes",
+               "must be in [3, 1024]", num_ground_planes);
+  requireField(window_px >= 3 && window_px <= 31 && window_px % 2 == 1, "window_px",
+               "must be odd and in [3, 31]", window_px);
+  requireField(best_k >= 1, "best_k", "must be at least 1", best_k);
+  requireField(num_refinement_steps >= 0 && num_refinement_steps <= 256 && num_refinement_steps != 1,
+               "num_refinement_steps", "must be 0 or in [2, 256]", num_refinement_steps);
+  requireField(refinement_step_px > 0.0 && refinement_step_px <= 10.0, "refinement_step_px",
+               "must be in (0, 10]", refinement_step_px);
+  requireNotNegative("matching_noise_px", matching_noise_px);
+  requireNotNegative("pose_noise.translation_m_per_m", pose_noise.translation_m_per_m);
+  requireNotNegative("pose_noise.translation_m", pose_noise.translation_m);
+  requireNotNegative("pose_noise.rotation_rad_per_m", pose_noise.rotation_rad_per_m);
+  requireNotNegative("pose_noise.rotation_rad", pose_noise.rotation_rad);
+  requireNotNegative("min_texture", min_texture);
+  requireField(min_score >= -1.0 && min_score < 1.0, "min_score", "must be in [-1, 1)", min_score);
+  requireField(max_relative_sigma > 0.0, "max_relative_sigma", "must be positive", max_relative_sigma);
+  requireField(min_confidence >= 0.0 && min_confidence < 1.0, "min_confidence", "must be in [0, 1)",
+               min_confidence);
+}
+
+}  // namespace vcharge

@@ -1,0 +1,267 @@
+#include "surface_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <opencv2/imgproc.hpp>
+
+#include "range_uncertainty.h"
+
+namespace vcharge {
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+
+struct Parabola {
+  float offset = 0.0f;     ///< of the maximum, in hypotheses
+  float curvature = kNaN;  ///< negative second difference
+  float rise = 0.0f;       ///< of the maximum over the middle score
+};
+
+/// Parabola through three scores whose middle one is the highest (Tian and Huhns 1986).
+Parabola fitParabola(float before, float middle, float after) {
+  Parabola parabola;
+  const float curvature = 2.0f * middle - before - after;
+  if (curvature > 1e-6f) {
+    parabola.curvature = curvature;
+    parabola.offset = std::clamp(0.5f * (after - before) / curvature, -0.5f, 0.5f);
+    parabola.rise = 0.125f * (after - before) * (after - before) / curvature;
+  }
+  return parabola;
+}
+
+/// Score of the best peak of one family that does not contain the hypothesis `excluded` (-1: none does) and,
+/// where `excluded` is -1, lies further than `separation` from `inverse_range`.
+float bestOtherPeak(const Hypotheses& hypotheses, const TileScores& scores, size_t pixel, float weight,
+                    int excluded, float inverse_range, float separation) {
+  const int count = static_cast<int>(hypotheses.offsets.size());
+  const size_t stride = scores.numPixels();
+  const float* at = scores.scores.data() + pixel;
+  float best = -1.0f;
+  for (int k = 0; k < count; ++k) {
+    const float score = at[static_cast<size_t>(k) * stride];
+    if (!(score > best) || k == excluded) {
+      continue;
+    }
+    const bool falls_before = k == 0 || !(at[static_cast<size_t>(k - 1) * stride] > score);
+    const bool falls_after = k == count - 1 || !(at[static_cast<size_t>(k + 1) * stride] > score);
+    const bool apart = excluded >= 0 || std::abs(hypotheses.offsets[static_cast<size_t>(k)] * weight -
+                                                 inverse_range) > separation;
+    if (falls_before && falls_after && apart) {
+      best = score;
+    }
+  }
+  return best;
+}
+
+/// Mean over a square of those values that are not NaN; NaN where there is none.
+cv::Mat meanOfKnown(const cv::Mat& values, int side) {
+  cv::Mat known = values == values;  // NaN differs from itself
+  cv::Mat filled = values.clone(), weights, sum, weight_sum;
+  filled.setTo(0.0f, ~known);
+  known.convertTo(weights, CV_32F, 1.0 / 255.0);
+  cv::boxFilter(filled, sum, CV_32F, cv::Size(side, side), cv::Point(-1, -1), false, cv::BORDER_CONSTANT);
+  cv::boxFilter(weights, weight_sum, CV_32F, cv::Size(side, side), cv::Point(-1, -1), false,
+                cv::BORDER_CONSTANT);
+  cv::Mat mean(values.size(), CV_32FC1, cv::Scalar(kNaN));
+  for (int y = 0; y < mean.rows; ++y) {
+    for (int x = 0; x < mean.cols; ++x) {
+      const float weight = weight_sum.at<float>(y, x);
+      if (weight > 0.5f) {
+        mean.at<float>(y, x) = sum.at<float>(y, x) / weight;
+      }
+    }
+  }
+  return mean;
+}
+
+/// Fills unknown values from ever larger neighbourhoods.
+cv::Mat fillUnknown(const cv::Mat& values) {
+  cv::Mat filled = values.clone();
+  for (int side = 5; side < 2 * std::max(values.cols, values.rows); side *= 3) {
+    const cv::Mat unknown = filled != filled;
+    if (cv::countNonZero(unknown) == 0) {
+      break;
+    }
+    meanOfKnown(filled, side | 1).copyTo(filled, unknown);
+  }
+  return filled;
+}
+
+/// The surface without outliers and plane steps: median, then the mean of those neighbours that lie within
+/// one step.
+cv::Mat smoothSurface(const SurfaceEstimate& estimate) {
+  constexpr int kRadius = 4;
+  cv::Mat median;
+  cv::medianBlur(fillUnknown(estimate.inverse_range), median, 5);
+  cv::Mat smooth = median.clone();
+  for (int y = 0; y < smooth.rows; ++y) {
+    for (int x = 0; x < smooth.cols; ++x) {
+      const float middle = median.at<float>(y, x);
+      const float step = estimate.step.at<float>(y, x);
+      float sum = 0.0f, weight = 0.0f;
+      for (int v = std::max(0, y - kRadius); v <= std::min(smooth.rows - 1, y + kRadius); v += 2) {
+        const float* row = median.ptr<float>(v);
+        for (int u = std::max(0, x - kRadius); u <= std::min(smooth.cols - 1, x + kRadius); u += 2) {
+          const float w = std::abs(row[u] - middle) <= step ? 1.0f : 0.0f;
+          sum += w * row[u];
+          weight += w;
+        }
+      }
+      if (weight > 0.0f) {
+        smooth.at<float>(y, x) = sum / weight;
+      }
+    }
+  }
+  return smooth;
+}
+
+}  // namespace
+
+SurfaceEstimate::SurfaceEstimate(cv::Size size)
+    : inverse_range(size, CV_32FC1, cv::Scalar(kNaN)),
+      step(size, CV_32FC1, cv::Scalar(kNaN)),
+      score(size, CV_32FC1, cv::Scalar(kNaN)),
+      curvature(size, CV_32FC1, cv::Scalar(kNaN)),
+      second_score(size, CV_32FC1, cv::Scalar(-1.0f)),
+      plane(size, CV_32SC1, cv::Scalar(-1)),
+      voters(size, CV_32SC1, cv::Scalar(0)),
+      at_limit(size, CV_8UC1, cv::Scalar(0)) {}
+
+Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays) {
+  Hypotheses hypotheses;
+  hypotheses.base = cv::Mat::zeros(rays.size(), CV_32FC1);
+  hypotheses.weight = cv::Mat(rays.size(), CV_32FC1);
+  hypotheses.offsets = family.inverse_distances_per_m;
+  const Eigen::Vector3f normal = family.normal.cast<float>();
+  for (int y = 0; y < rays.size().height; ++y) {
+    for (int x = 0; x < rays.size().width; ++x) {
+      const float weight = -normal.dot(rays.ray(x, y));
+      hypotheses.weight.at<float>(y, x) = weight > 1e-3f ? weight : kNaN;
+    }
+  }
+  return hypotheses;
+}
+
+void readPeaks(const std::vector<Hypotheses>& hypotheses, const std::vector<TileScores>& scores,
+               bool interpolate, SurfaceEstimate* estimate) {
+  const cv::Rect tile = scores.front().tile;
+  for (int i = 0; i < tile.area(); ++i) {
+    const auto pixel = static_cast<size_t>(i);
+    const int x = tile.x + i % tile.width;
+    const int y = tile.y + i / tile.width;
+    int family = -1;
+    float best_score = -std::numeric_limits<float>::infinity();
+    for (size_t f = 0; f < hypotheses.size(); ++f) {
+      const int best = scores[f].best[pixel];
+      const int last = static_cast<int>(hypotheses[f].offsets.size()) - 1;
+      if (best < 0 || (f > 0 && (best == 0 || best == last))) {
+        continue;
+      }
+      const float score = scores[f].scores[static_cast<size_t>(best) * scores[f].numPixels() + pixel];
+      if (score > best_score) {
+        best_score = score;
+        family = static_cast<int>(f);
+      }
+    }
+    if (family < 0) {
+      continue;
+    }
+    const auto f = static_cast<size_t>(family);
+    const Hypotheses& planes = hypotheses[f];
+    const int best = scores[f].best[pixel];
+    const int last = static_cast<int>(planes.offsets.size()) - 1;
+    const float weight = planes.weight.at<float>(y, x);
+    const float step = (planes.offsets[1] - planes.offsets[0]) * weight;
+    Parabola parabola;
+    const bool at_limit = best == 0 || best == last;
+    if (!at_limit) {
+      const float* at = scores[f].scores.data() + pixel + static_cast<size_t>(best) * scores[f].numPixels();
+      parabola = fitParabola(*(at - scores[f].numPixels()), *at, *(at + scores[f].numPixels()));
+    }
+    const float inverse_range = planes.offsets[static_cast<size_t>(best)] * weight;
+    int plane = best;
+    float second = -1.0f;
+    for (size_t g = 0; g < hypotheses.size(); ++g) {
+      if (g < f) {
+        plane += static_cast<int>(hypotheses[g].offsets.size());
+      }
+      second = std::max(second,
+                        bestOtherPeak(hypotheses[g], scores[g], pixel, hypotheses[g].weight.at<float>(y, x),
+                                      g == f ? best : -1, inverse_range, 2.0f * step));
+    }
+    estimate->inverse_range.at<float>(y, x) = inverse_range + (interpolate ? parabola.offset * step : 0.0f);
+    estimate->step.at<float>(y, x) = step;
+    estimate->score.at<float>(y, x) = best_score;
+    estimate->curvature.at<float>(y, x) = parabola.curvature / (step * step);
+    estimate->second_score.at<float>(y, x) = second;
+    estimate->plane.at<int>(y, x) = plane;
+    estimate->voters.at<int>(y, x) = static_cast<int>(scores[f].voters[pixel]);
+    estimate->at_limit.at<uint8_t>(y, x) = at_limit ? 255 : 0;
+  }
+}
+
+Hypotheses makeRefinement(const SweepInput& input, const SurfaceEstimate& estimate) {
+  const int half = input.options->num_refinement_steps / 2;
+  Hypotheses refinement;
+  refinement.base = smoothSurface(estimate);
+  refinement.weight = cv::Mat(refinement.base.size(), CV_32FC1, cv::Scalar(kNaN));
+  for (int k = -half; k <= half; ++k) {
+    refinement.offsets.push_back(static_cast<float>(k));
+  }
+  const cv::Mat step = fillUnknown(estimate.step);
+  for (int y = 0; y < step.rows; ++y) {
+    for (int x = 0; x < step.cols; ++x) {
+      const float inverse_range = refinement.base.at<float>(y, x);
+      float motion = 0.0f;
+      for (const SweepNeighbour& neighbour : input.neighbours) {
+        motion =
+            std::max(motion, pixelSensitivity(input.camera, neighbour, input.rays->ray(x, y), inverse_range)
+                                 .pixels_per_inverse_range);
+      }
+      // Fine enough for the neighbour that moves most, wide enough to reach half way to the next plane and
+      // back.
+      const float coarse = step.at<float>(y, x) / static_cast<float>(half);
+      const float fine = static_cast<float>(input.options->refinement_step_px) / std::max(motion, 1e-6f);
+      refinement.weight.at<float>(y, x) = std::clamp(fine, 0.75f * coarse, 2.0f * coarse);
+    }
+  }
+  return refinement;
+}
+
+void readRefinement(const Hypotheses& refinement, const TileScores& scores, bool interpolate,
+                    SurfaceEstimate* estimate) {
+  const cv::Rect tile = scores.tile;
+  const size_t stride = scores.numPixels();
+  const int last = static_cast<int>(refinement.offsets.size()) - 1;
+  for (int i = 0; i < tile.area(); ++i) {
+    const auto pixel = static_cast<size_t>(i);
+    const int x = tile.x + i % tile.width;
+    const int y = tile.y + i / tile.width;
+    const int best = scores.best[pixel];
+    if (best <= 0 || best == last) {
+      continue;
+    }
+    const float* at = scores.scores.data() + pixel + static_cast<size_t>(best) * stride;
+    const float weight = refinement.weight.at<float>(y, x);
+    const float peak =
+        refinement.base.at<float>(y, x) + refinement.offsets[static_cast<size_t>(best)] * weight;
+    float& inverse_range = estimate->inverse_range.at<float>(y, x);
+    float& step = estimate->step.at<float>(y, x);
+    float& score = estimate->score.at<float>(y, x);
+    // The first sweep's winner is another peak when the refinement ended far from it and scores less.
+    if (*at < score && std::abs(peak - inverse_range) > step) {
+      continue;
+    }
+    const Parabola parabola = fitParabola(*(at - stride), *at, *(at + stride));
+    inverse_range = peak + (interpolate ? parabola.offset * weight : 0.0f);
+    step = weight;
+    score = *at;
+    estimate->curvature.at<float>(y, x) = parabola.curvature / (weight * weight);
+    estimate->voters.at<int>(y, x) = static_cast<int>(scores.voters[pixel]);
+    estimate->at_limit.at<uint8_t>(y, x) = 0;
+  }
+}
+
+}  // namespace vcharge
