@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+namespace vcharge {
+
+/// From light on the sensor to gray levels, and the sensor's noise.
+struct CameraResponseOptions {
+  double exposure = 1.0;         ///< gain on the light
+  double shoulder = 1.6;         ///< light at which highlights are compressed by half; larger is more linear
+  double gamma = 0.62;           ///< exponent of the gray curve
+  double photon_noise = 0.0011;  ///< variance of the light per unit of light
+  double read_noise = 0.0012;    ///< standard deviation of the light in the dark
+  void validate() const;         ///< throws std::invalid_argument naming the field
+};
+
+/// Gray curve: gray = 255 min(1, x (1 + w) / (x + w))^gamma with x = exposure * light and w = shoulder.
+/// Noise can be added to an image that was rendered without it, so that many noisy drives cost one rendering.
+/// Immutable, thread safe.
+class CameraResponse {
+ public:
+  explicit CameraResponse(const CameraResponseOptions& options = CameraResponseOptions());
+
+  /// CV_32FC1 light -> CV_8UC1 gray, without noise.
+  cv::Mat develop(const cv::Mat& light) const;
+
+  /// The image as a sensor with photon and read noise would have seen it, at `gain` times the exposure.
+  /// Depends only on the arguments. `clean` is CV_8UC1.
+  cv::Mat addNoise(const cv::Mat& clean, uint64_t seed, int camera, int64_t frame, double gain = 1.0) const;
+
+  /// Gray value (0 to 255, not rounded) of an amount of light.
+  double grayFromLight(double light) const;
+  /// Inverse of grayFromLight, for gray in [0, 255].
+  double lightFromGray(double gray) const;
+
+ private:
+  CameraResponseOptions options_;
+  std::vector<uint8_t> gray_by_root_light_;
+};
+
+}  // namespace vcharge

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "vcharge_core/trajectory.h"
+#include "vcharge_core/vehicle_odometry.h"
+#include "vcharge_simulation/vehicle_motion.h"
+#include "vcharge_simulation/wheel_odometer.h"
+
+namespace vcharge {
+
+/// All of a drive but its images.
+struct SimulatedDrive {
+  Trajectory world_from_vehicle;              ///< truth at every image's stamp
+  std::vector<VehicleOdometry> ground_truth;  ///< truth (in the world frame) at every odometry stamp
+  std::vector<VehicleOdometry> odometry;      ///< 50 Hz, and at every image's stamp
+  std::vector<WheelTicks> wheel_ticks;        ///< 50 Hz
+};
+
+/// Simulates a drive along a path: images every 80 ms, 7 ms after an odometry sample. The same arguments give
+/// the same bits. std::invalid_argument for bad options.
+SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& motion_options,
+                             const WheelOdometerOptions& odometer_options, uint64_t seed);
+
+}  // namespace vcharge

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "vcharge_simulation/mesh.h"
+#include "vcharge_simulation/sky.h"
+#include "vcharge_simulation/texture.h"
+
+namespace vcharge {
+
+enum class SurfaceKind : uint8_t { kGround, kKerb, kCar, kBuilding, kPlant, kPole, kOther };
+
+/// How a surface answers light: a diffuse part, a Fresnel reflection of the surroundings, and light through
+/// leaves.
+struct Material {
+  enum class Mapping : uint8_t { kPlain, kTexture, kGround };
+  Mapping mapping = Mapping::kPlain;
+  int texture = -1;             ///< into Scene::textures (kTexture) or Scene::ground.layers (kGround)
+  float albedo = 0.5F;          ///< reflectance where the texture is 1
+  float texels_per_m = 100.0F;  ///< of the texture on the surface, for the level of detail
+  float reflectivity = 0.0F;    ///< at normal incidence; 0.04 for paint and glass
+  float translucency = 0.0F;    ///< share of the light on the back that leaves through the front
+  bool two_sided = false;       ///< normals turn to the viewer
+  SurfaceKind kind = SurfaceKind::kOther;
+};
+
+/// Textures on the ground plane, shared by all level surfaces.
+struct GroundLayers {
+  std::vector<GroundTexture> layers;   ///< reflectance over 0.8; each covers the one after it
+  std::vector<GroundTexture> details;  ///< fine relief on top of the layers: 0.5 leaves them as they are
+  std::unique_ptr<GroundTexture> sun;  ///< share of the sun that reaches the ground; absent: all
+  std::unique_ptr<GroundTexture> surrounding;  ///< share of the sky that the ground sees; absent: all
+};
+
+/// Reflectance of a ground layer's texel value 255.
+inline constexpr float kGroundLayerAlbedo = 0.8F;
+
+/// A solid thing that a car must not touch.
+struct Obstacle {
+  std::string kind;                          ///< "car", "tree", ...
+  std::vector<Eigen::Vector2d> footprint_m;  ///< polygon in the world frame, counter-clockwise
+  double base_z_m = 0.0;
+  double top_z_m = 0.0;
+};
+
+/// A static world: metres, z up, drivable ground at z = 0.
+struct Scene {
+  TriangleMesh mesh;
+  std::vector<Material> materials;
+  std::vector<Texture> textures;
+  GroundLayers ground;
+  std::unique_ptr<Sky> sky;
+  std::vector<Obstacle> obstacles;
+  Eigen::Vector2d min_m{-40.0, -30.0};  ///< corners of the area that truth maps cover
+  Eigen::Vector2d max_m{40.0, 30.0};
+
+  uint32_t addMaterial(const Material& material);
+  /// Adds a texture with its material. texels_per_m: see Material.
+  uint32_t addTexturedMaterial(const cv::Mat& image, Texture::Border border, Material material);
+};
+
+}  // namespace vcharge

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+namespace vcharge {
+
+/// An 8-bit reflectance image with its pyramid of half-size averages, sampled at the level of detail that
+/// fits the pixel's footprint. Immutable and safe to read from many threads.
+class Texture {
+ public:
+  enum class Border { kClamp, kRepeat };
+
+  /// From a CV_8UC1 image; kRepeat needs sides that are powers of two. std::logic_error otherwise.
+  Texture(const cv::Mat& image, Border border);
+
+  int width() const { return levels_.front().width; }
+  int height() const { return levels_.front().height; }
+  int numLevels() const { return static_cast<int>(levels_.size()); }
+
+  /// Value in [0, 1] at (x, y) in texels of the full-size image, whose first texel is centred at (0.5, 0.5);
+  /// linear in x, y and between the two nearest levels. Level 0 is the full-size image, each further one
+  /// halves it.
+  float sample(float x, float y, float level) const {
+    if (level <= 0.0F) {
+      return bilinear(0, x, y);
+    }
+    const float last = static_cast<float>(levels_.size() - 1);
+    if (level >= last) {
+      level = last;
+    }
+    const int lower = static_cast<int>(level);
+    const float weight = level - static_cast<float>(lower);
+    const float value = bilinear(lower, x, y);
+    if (weight < 0.02F) {
+      return value;
+    }
+    return value + weight * (bilinear(lower + 1, x, y) - value);
+  }
+
+ private:
+  struct Level {
+    size_t offset;
+    int width, height;
+    float x_scale, y_scale;
+  };
+
+  float bilinear(int index, float x, float y) const {
+    const Level& level = levels_[static_cast<size_t>(index)];
+    x = x * level.x_scale - 0.5F;
+    y = y * level.y_scale - 0.5F;
+    const float floor_x = std::floor(x);
+    const float floor_y = std::floor(y);
+    int x0 = static_cast<int>(floor_x);
+    int y0 = static_cast<int>(floor_y);
+    int x1 = x0 + 1;
+    int y1 = y0 + 1;
+    if (border_ == Border::kRepeat) {
+      x0 &= level.width - 1;
+      x1 &= level.width - 1;
+      y0 &= level.height - 1;
+      y1 &= level.height - 1;
+    } else {
+      x0 = clamp(x0, level.width);
+      x1 = clamp(x1, level.width);
+      y0 = clamp(y0, level.height);
+      y1 = clamp(y1, level.height);
+    }
+    const uint8_t* row0 = texels_.data() + level.offset + static_cast<size_t>(y0) * level.width;
+    const uint8_t* row1 = texels_.data() + level.offset + static_cast<size_t>(y1) * level.width;
+    const float wx = x - floor_x;
+    const float wy = y - floor_y;
+    const float v0 = static_cast<float>(row0[x0]) + wx * static_cast<float>(row0[x1] - row0[x0]);
+    const float v1 = static_cast<float>(row1[x0]) + wx * static_cast<float>(row1[x1] - row1[x0]);
+    return (v0 + wy * (v1 - v0)) * (1.0F / 255.0F);
+  }
+  static int clamp(int index, int size) { return index < 0 ? 0 : (index >= size ? size - 1 : index); }
+
+  Border border_;
+  std::vector<Level> levels_;
+  std::vector<uint8_t> texels_;
+};
+
+/// A texture that lies on the ground plane, addressed by world coordinates in metres.
+struct GroundTexture {
+  Texture texture;
+  float min_x_m, min_y_m;  ///< corner of the first texel
+  float texels_per_m;
+
+  /// footprint_m: width of the area to average over.
+  float sampleAt(float x_m, float y_m, float level) const {
+    return texture.sample((x_m - min_x_m) * texels_per_m, (y_m - min_y_m) * texels_per_m, level);
+  }
+};
+
+/// log2 to about 0.01, for levels of detail; `value` > 0.
+float fastLog2(float value);
+
+}  // namespace vcharge
