@@ -91,7 +91,9 @@ TEST(NeighbourSelectionTest, TakesEqualStepsUpToTheLongestBaseline) {
 
 TEST(RangeMapperTest, OnlineUsesEarlierImagesWithLongerBaselinesForwards) {
   Recorder recorder;
-  RangeMapper mapper(makeRig(), smallOptions(), recorder.callback());
+  RangeMapperOptions options = smallOptions();
+  options.neighbours.max_forward_baseline_m = 2.0;
+  RangeMapper mapper(makeRig(), options, recorder.callback());
   drive(&mapper, 20, 0.2);
   ASSERT_EQ(recorder.tasks.size(), 38u);  // each camera's first image has no neighbour
   for (const RangeTask& task : recorder.tasks) {
