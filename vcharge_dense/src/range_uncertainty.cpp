@@ -25,7 +25,7 @@ float inverseRangeVariance(const SweepInput& input, const SurfaceEstimate& estim
   const PlaneSweepOptions& options = *input.options;
   const float inverse_range = estimate.inverse_range.at<float>(y, x);
   const auto voters = static_cast<uint32_t>(estimate.voters.at<int>(y, x));
-  float motion_squares = 0.0f, motion_errors = 0.0f;
+  float motion_squares = 0.0f, motion_errors = 0.0f, matching_errors = 0.0f;
   int count = 0;
   for (size_t n = 0; n < input.neighbours.size(); ++n) {
     if ((voters & (1u << n)) == 0) {
@@ -44,6 +44,10 @@ float inverseRangeVariance(const SweepInput& input, const SurfaceEstimate& estim
     const float pixel_error =
         sensitivity.pixels_per_radian *
         std::sqrt(rotation_variance + translation_variance * square(inverse_range / sensitivity.range_ratio));
+    // Windows seen at another scale differ by more than a shift.
+    const float scale = std::max(sensitivity.range_ratio, 1.0f / sensitivity.range_ratio);
+    matching_errors += square(sensitivity.pixels_per_inverse_range *
+                              static_cast<float>(options.matching_noise_px) * scale * scale);
     motion_squares += square(sensitivity.pixels_per_inverse_range);
     motion_errors += sensitivity.pixels_per_inverse_range * pixel_error;
     ++count;
@@ -55,8 +59,7 @@ float inverseRangeVariance(const SweepInput& input, const SurfaceEstimate& estim
   const float curvature = estimate.curvature.at<float>(y, x);
   const float window = static_cast<float>(options.window_px * options.window_px);
   const float noise = kImageNoiseFactor * std::max(1.0f - score, 1e-3f) / (window * curvature);
-  const float matching =
-      square(static_cast<float>(options.matching_noise_px)) * static_cast<float>(count) / motion_squares;
+  const float matching = static_cast<float>(count) * matching_errors / square(motion_squares);
   const float pose = square(motion_errors / motion_squares);
   return std::isnan(noise) ? std::numeric_limits<float>::infinity() : noise + matching + pose;
 }

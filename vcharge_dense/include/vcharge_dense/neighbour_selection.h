@@ -10,10 +10,12 @@ namespace vcharge {
 
 /// Which images around the reference it is matched with. Baselines are distances between camera positions.
 struct NeighbourOptions {
-  int num_neighbours = 4;               ///< half of them on each side where later images are used, too
-  double min_baseline_m = 0.08;         ///< nearer ones show too little parallax
-  double max_baseline_m = 0.8;          ///< of a camera that looks across the direction of travel
-  double max_forward_baseline_m = 2.0;  ///< of one that looks along it, where parallax grows more slowly
+  int num_neighbours = 4;        ///< half of them on each side where later images are used, too
+  double min_baseline_m = 0.08;  ///< nearer ones show too little parallax
+  double max_baseline_m = 0.8;   ///< of a camera that looks across the direction of travel
+  /// Of a camera that looks along it. Longer ones measure far points better, but the ground nearby then
+  /// changes its scale too much between the images to be matched.
+  double max_forward_baseline_m = 0.8;
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {

@@ -29,10 +29,10 @@ inline std::vector<std::string> enumNames<Aggregation>() {
 
 /// Random error of the relative pose of two images, one sigma per axis. Independent parts add up in squares.
 struct PoseNoiseOptions {
-  double translation_m_per_m = 0.01;   ///< per metre of baseline
-  double translation_m = 0.002;        ///< of any pair
-  double rotation_rad_per_m = 0.0005;  ///< per metre of baseline
-  double rotation_rad = 0.0003;        ///< of any pair
+  double translation_m_per_m = 0.004;  ///< per metre of baseline
+  double translation_m = 0.001;        ///< of any pair
+  double rotation_rad_per_m = 0.0003;  ///< per metre of baseline
+  double rotation_rad = 0.0002;        ///< of any pair
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
@@ -64,13 +64,13 @@ struct PlaneSweepOptions {
   int num_refinement_steps = 16;
   double refinement_step_px = 0.5;
 
-  double matching_noise_px = 0.15;  ///< error of a match that more neighbours do not average out
+  double matching_noise_px = 0.07;  ///< error of a match that more neighbours do not average out
   PoseNoiseOptions pose_noise;
 
   double min_texture = 2.0;  ///< standard deviation of the reference window in gray levels; less is unknown
   double min_score = 0.3;    ///< a lower correlation is unknown
   double max_relative_sigma = 0.5;  ///< a larger standard deviation over range is unobserved
-  double min_confidence = 0.02;     ///< less is unknown
+  double min_confidence = 0.05;     ///< less is unknown
   bool gate = true;                 ///< false keeps every range that some plane explains, for comparisons
 
   template <class Visitor>

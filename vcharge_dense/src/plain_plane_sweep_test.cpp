@@ -1,0 +1,98 @@
+#include "plain_plane_sweep.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "real_images.h"
+#include "vcharge_core/working_camera.h"
+
+namespace vcharge {
+namespace {
+
+/// As the authors undistort: reads wrap around at the borders, and gray levels are truncated to 8 bits.
+cv::Mat undistortAsTheAuthors(const CameraModel& sensor, const WorkingCamera& working,
+                              const cv::Mat& pixels) {
+  const auto at = [&](int x, int y) {
+    return static_cast<double>(
+        pixels.at<uint8_t>((y + pixels.rows) % pixels.rows, (x + pixels.cols) % pixels.cols));
+  };
+  cv::Mat undistorted(working.size(), CV_8UC1, cv::Scalar(0));
+  for (int y = 0; y < undistorted.rows; ++y) {
+    for (int x = 0; x < undistorted.cols; ++x) {
+      Eigen::Vector3d ray;
+      Eigen::Vector2d pixel;
+      if (working.model().unproject(Eigen::Vector2d(x, y), &ray) && sensor.project(ray, &pixel)) {
+        const int u = static_cast<int>(std::floor(pixel.x()));
+        const int v = static_cast<int>(std::floor(pixel.y()));
+        const double a = pixel.x() - u;
+        const double b = pixel.y() - v;
+        undistorted.at<uint8_t>(y, x) =
+            static_cast<uint8_t>((1 - b) * ((1 - a) * at(u, v) + a * at(u + 1, v)) +
+                                 b * ((1 - a) * at(u, v + 1) + a * at(u + 1, v + 1)));
+      }
+    }
+  }
+  return undistorted;
+}
+
+TEST(PlainPlaneSweepTest, EqualsTheAuthorsResultInsideTheImage) {
+  const auto images = readRealImages();
+  if (!images) {
+    GTEST_SKIP() << "VCHARGE_DATA is not set: the real images are not compared with";
+  }
+  const WorkingCamera working(images->camera, cv::Size(1280, 800), 6.283185307179586, cv::Mat());
+  PlaneSweepOptions options;
+  options.families = PlaneFamilies::kFrontoParallel;
+  options.min_distance_m = 0.4;
+  options.max_distance_m = 5000.0;
+  options.num_planes = 256;
+  options.min_texture = 0.0;
+  SweepImage reference;
+  std::vector<SweepImage> neighbours;
+  for (size_t i = 0; i < 5; ++i) {
+    const SweepImage image{images->stamps[i],
+                           undistortAsTheAuthors(images->camera, working, images->pixels[i]),
+                           images->world_from_camera[i]};
+    if (i == 2) {
+      reference = image;
+    } else {
+      neighbours.push_back(image);
+    }
+  }
+  const cv::Mat all_valid(working.size(), CV_8UC1, cv::Scalar(255));
+  const PlainResult result =
+      plainPlaneSweep(working.model(), all_valid, makePlaneFamilies(options, std::nullopt), options,
+                      reference, neighbours, PlainBorder::kWrapAround);
+  const cv::Mat index =
+      cv::imread(images->folder + "/reference/ZNCC_NoOcclusionHandling_index.png", cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(index.size(), working.size());
+
+  // Constant (overexposed) windows have no score here and noise there.
+  const int radius = options.window_px / 2;
+  int agree_anywhere = 0, inside = 0, agree_inside = 0;
+  for (int y = 0; y < index.rows; ++y) {
+    for (int x = 0; x < index.cols; ++x) {
+      const double steps =
+          (result.inverse_distance.at<double>(y, x) - 1.0 / 5000.0) / (2.5 - 1.0 / 5000.0) * 255.0;
+      const bool agree = std::abs(std::round(steps) - index.at<uint8_t>(y, x)) <= 1.0;
+      agree_anywhere += agree ? 1 : 0;
+      if (x >= radius && y >= radius && x < index.cols - radius && y < index.rows - radius &&
+          !std::isnan(steps)) {
+        ++inside;
+        agree_inside += agree ? 1 : 0;
+      }
+    }
+  }
+  std::printf(
+      "within 1 of 255 steps: %.4f of all pixels, %.4f of the %d with texture and their window inside\n",
+      static_cast<double>(agree_anywhere) / index.size().area(), static_cast<double>(agree_inside) / inside,
+      inside);
+  EXPECT_GE(inside, 0.95 * index.size().area());
+  EXPECT_GE(agree_inside, 0.99 * inside);
+}
+
+}  // namespace
+}  // namespace vcharge
