@@ -50,15 +50,4 @@ Texture::Texture(const cv::Mat& image, Border border) : border_(border) {
   }
 }
 
-float fastLog2(float value) {
-  uint32_t bits;
-  std::memcpy(&bits, &value, sizeof(bits));
-  const float exponent = static_cast<float>(static_cast<int>(bits >> 23) - 127);
-  bits = (bits & 0x007FFFFFU) | 0x3F800000U;
-  float mantissa;
-  std::memcpy(&mantissa, &bits, sizeof(mantissa));
-  // Quadratic through log2 at 1, sqrt(2) and 2.
-  return exponent + (-0.3431457F * mantissa + 2.0294373F) * mantissa - 1.6862915F;
-}
-
 }  // namespace vcharge

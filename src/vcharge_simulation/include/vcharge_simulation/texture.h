@@ -1,7 +1,7 @@
 #pragma once
 
-#include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -52,10 +52,10 @@ class Texture {
     const Level& level = levels_[static_cast<size_t>(index)];
     x = x * level.x_scale - 0.5F;
     y = y * level.y_scale - 0.5F;
-    const float floor_x = std::floor(x);
-    const float floor_y = std::floor(y);
-    int x0 = static_cast<int>(floor_x);
-    int y0 = static_cast<int>(floor_y);
+    int x0 = floorToInt(x);
+    int y0 = floorToInt(y);
+    const float wx = x - static_cast<float>(x0);
+    const float wy = y - static_cast<float>(y0);
     int x1 = x0 + 1;
     int y1 = y0 + 1;
     if (border_ == Border::kRepeat) {
@@ -71,11 +71,14 @@ class Texture {
     }
     const uint8_t* row0 = texels_.data() + level.offset + static_cast<size_t>(y0) * level.width;
     const uint8_t* row1 = texels_.data() + level.offset + static_cast<size_t>(y1) * level.width;
-    const float wx = x - floor_x;
-    const float wy = y - floor_y;
     const float v0 = static_cast<float>(row0[x0]) + wx * static_cast<float>(row0[x1] - row0[x0]);
     const float v1 = static_cast<float>(row1[x0]) + wx * static_cast<float>(row1[x1] - row1[x0]);
     return (v0 + wy * (v1 - v0)) * (1.0F / 255.0F);
+  }
+  // std::floor is a call into the C library on a baseline x86-64.
+  static int floorToInt(float value) {
+    const int truncated = static_cast<int>(value);
+    return truncated - (value < static_cast<float>(truncated) ? 1 : 0);
   }
   static int clamp(int index, int size) { return index < 0 ? 0 : (index >= size ? size - 1 : index); }
 
@@ -90,13 +93,22 @@ struct GroundTexture {
   float min_x_m, min_y_m;  ///< corner of the first texel
   float texels_per_m;
 
-  /// footprint_m: width of the area to average over.
+  /// level: as in Texture::sample.
   float sampleAt(float x_m, float y_m, float level) const {
     return texture.sample((x_m - min_x_m) * texels_per_m, (y_m - min_y_m) * texels_per_m, level);
   }
 };
 
 /// log2 to about 0.01, for levels of detail; `value` > 0.
-float fastLog2(float value);
+inline float fastLog2(float value) {
+  uint32_t bits;
+  std::memcpy(&bits, &value, sizeof(bits));
+  const float exponent = static_cast<float>(static_cast<int>(bits >> 23) - 127);
+  bits = (bits & 0x007FFFFFU) | 0x3F800000U;
+  float mantissa;
+  std::memcpy(&mantissa, &bits, sizeof(mantissa));
+  // Quadratic through log2 at 1, sqrt(2) and 2.
+  return exponent + (-0.3431457F * mantissa + 2.0294373F) * mantissa - 1.6862915F;
+}
 
 }  // namespace vcharge

@@ -1,0 +1,110 @@
+#include "vcharge_simulation/drive_simulator.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "vcharge_simulation/lot_scene.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kDegree = 3.14159265358979323846 / 180.0;
+
+TEST(DriveSimulatorTest, ImagesComeEvery80Milliseconds) {
+  const LotDrive plan = lotDrive("short");
+  const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1);
+  ASSERT_GT(drive.world_from_vehicle.size(), 50U);
+  for (size_t i = 1; i < drive.world_from_vehicle.size(); ++i) {
+    EXPECT_EQ((drive.world_from_vehicle[i].stamp - drive.world_from_vehicle[i - 1].stamp).count(),
+              80'000'000);
+  }
+}
+
+TEST(DriveSimulatorTest, OdometryTurnsWithTruthWithinThreeHundredthsOfADegreePerFrame) {
+  for (const char* name : {"short", "figure_eight"}) {
+    const LotDrive plan = lotDrive(name);
+    WheelOdometerOptions options;
+    options.left_right_error = 0.0;
+    const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, options, 3);
+    double worst_rad = 0.0;
+    size_t frames = 0;
+    const VehicleOdometry* last_odometry = nullptr;
+    const VehicleOdometry* last_truth = nullptr;
+    for (size_t i = 0; i < drive.odometry.size(); ++i) {
+      const bool is_image = drive.odometry[i].stamp.nanoseconds() / 1'000'000 % 10 == 7;
+      if (!is_image) {
+        continue;
+      }
+      if (last_odometry != nullptr) {
+        const double turn = yawOfRotation(
+            (last_odometry->odom_from_vehicle.inverse() * drive.odometry[i].odom_from_vehicle).rotation());
+        const double truth = yawOfRotation(
+            (last_truth->odom_from_vehicle.inverse() * drive.ground_truth[i].odom_from_vehicle).rotation());
+        worst_rad = std::max(worst_rad, std::abs(turn - truth * (1.0 + options.scale_error)));
+        ++frames;
+      }
+      last_odometry = &drive.odometry[i];
+      last_truth = &drive.ground_truth[i];
+    }
+    EXPECT_GT(frames, 50U);
+    EXPECT_LT(worst_rad, 0.03 * kDegree) << name;
+    RecordProperty(std::string("worst_mdeg_") + name, static_cast<int>(worst_rad / kDegree * 1000));
+  }
+}
+
+TEST(DriveSimulatorTest, OdometryScalesWithTheWheelRadiusError) {
+  const DrivePath straight(RigidTransform(), {{40.0, 0.0, 0.0}});
+  VehicleMotionOptions motion;
+  WheelOdometerOptions options;
+  options.scale_error = 0.02;
+  options.left_right_error = 0.0;
+  const SimulatedDrive drive = simulateDrive(straight, motion, options, 5);
+  const double driven_m = (drive.ground_truth.back().odom_from_vehicle.translation() -
+                           drive.ground_truth.front().odom_from_vehicle.translation())
+                              .head<2>()
+                              .norm();
+  const double counted_m = drive.odometry.back().odom_from_vehicle.translation().norm();
+  EXPECT_NEAR(counted_m, 1.02 * driven_m, 0.005);
+  const auto ticks = static_cast<double>(drive.wheel_ticks.back().left_ticks);
+  EXPECT_NEAR(ticks * 0.01, 1.02 * driven_m,
+              0.01 + 2.7 * 0.02);  // ticks end at most 20 ms before the odometry
+}
+
+TEST(DriveSimulatorTest, StandsStillBeforeItStarts) {
+  LotDrive plan = lotDrive("loop");
+  plan.motion.duration_s = 0.5;
+  const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1);
+  EXPECT_EQ(drive.world_from_vehicle.front().world_from_vehicle.translation(),
+            drive.world_from_vehicle.back().world_from_vehicle.translation());
+  EXPECT_EQ(drive.wheel_ticks.back().left_ticks, 0);
+}
+
+TEST(DriveSimulatorTest, PlanarMotionObeysTheBicycleModelAndTheBodyTiltsALittle) {
+  const LotDrive plan = lotDrive("figure_eight");
+  const VehicleMotion motion(plan.path, plan.motion, 1);
+  double largest_tilt_rad = 0.0;
+  for (int ms = 0; ms < static_cast<int>(motion.duration() * 1000.0) - 1; ++ms) {
+    const MotionSample& now = motion.at(ms);
+    const MotionSample& next = motion.at(ms + 1);
+    const RigidTransform step = now.world_from_planar.inverse() * next.world_from_planar;
+    // The rear axle never slips sideways: the chord points along the mean heading.
+    EXPECT_NEAR(std::atan2(step.translation().y(), step.translation().x()),
+                0.5 * yawOfRotation(step.rotation()), 1e-8);
+    largest_tilt_rad = std::max(largest_tilt_rad, angleOfRotation(now.planar_from_body.rotation()));
+  }
+  EXPECT_GT(largest_tilt_rad, 0.1 * kDegree);
+  EXPECT_LT(largest_tilt_rad, 1.0 * kDegree);
+}
+
+TEST(DriveSimulatorTest, LoopEndsNearItsStart) {
+  const LotDrive plan = lotDrive("loop");
+  const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1);
+  EXPECT_LT((drive.world_from_vehicle.back().world_from_vehicle.translation() -
+             drive.world_from_vehicle.front().world_from_vehicle.translation())
+                .norm(),
+            1.0);
+}
+
+}  // namespace
+}  // namespace vcharge
