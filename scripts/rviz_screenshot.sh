@@ -22,10 +22,10 @@ export DISPLAY=$display LIBGL_ALWAYS_SOFTWARE=1
 for _ in $(seq 50); do xdpyinfo >/dev/null 2>&1 && break; sleep 0.1; done
 
 roslaunch -p $((20000 + RANDOM % 20000)) vcharge_launch drive_replay.launch bag:="$bag" rig:="$rig" rviz:=true \
-  loop:=true >"$scratch/roslaunch.log" 2>&1 &
+  loop:=true rate:=0.25 >"$scratch/roslaunch.log" 2>&1 &
 pids+=($!)
 # rviz needs a while on a software renderer; the drive goes on in a loop until its picture is there.
-for _ in $(seq 25); do
+for _ in $(seq 20); do
   sleep 1
   kill -0 "${pids[1]}" 2>/dev/null || { cat "$scratch/roslaunch.log" >&2; exit 1; }
 done
