@@ -217,7 +217,7 @@ void LiveDriveSourceOptions::validate() const {
   requireField(max_silence_s > 0.0, "max_silence_s", "must be positive", max_silence_s);
 }
 
-LiveDriveSource::LiveDriveSource(ros::NodeHandle node, std::shared_ptr<const CameraRig> rig,
+LiveDriveSource::LiveDriveSource(const ros::NodeHandle& node, std::shared_ptr<const CameraRig> rig,
                                  const LiveDriveSourceOptions& options) {
   check(rig != nullptr, "LiveDriveSource: expected a rig");
   options.validate();

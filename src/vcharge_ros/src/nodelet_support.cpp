@@ -27,7 +27,7 @@ void CallbackGuard::fail(const std::string& text) {
   }
 }
 
-NodeletDiagnostics::NodeletDiagnostics(ros::NodeHandle node, ros::NodeHandle private_node,
+NodeletDiagnostics::NodeletDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
                                        const std::string& name, std::function<DriveMonitor::Report()> report)
     : guard_(name), report_(std::move(report)), updater_(node, private_node, name) {
   updater_.setHardwareID("none");

@@ -54,7 +54,7 @@ struct LiveDriveSourceOptions {
 /// serialized here, also where that queue has several threads.
 class LiveDriveSource : public DriveSource {
  public:
-  LiveDriveSource(ros::NodeHandle node, std::shared_ptr<const CameraRig> rig,
+  LiveDriveSource(const ros::NodeHandle& node, std::shared_ptr<const CameraRig> rig,
                   const LiveDriveSourceOptions& options = LiveDriveSourceOptions());
   ~LiveDriveSource() override;
 

@@ -55,8 +55,8 @@ class CallbackGuard {
 class NodeletDiagnostics {
  public:
   /// `report` is called on the queue of `node`; `name` is the nodelet's and stands in the status's name.
-  NodeletDiagnostics(ros::NodeHandle node, ros::NodeHandle private_node, const std::string& name,
-                     std::function<DriveMonitor::Report()> report);
+  NodeletDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
+                     const std::string& name, std::function<DriveMonitor::Report()> report);
 
  private:
   CallbackGuard guard_;
