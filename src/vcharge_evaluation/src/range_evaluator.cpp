@@ -28,6 +28,7 @@ cv::Mat localStandardDeviation(const cv::Mat& image, int window_px) {
 }  // namespace
 
 void RangeEvaluationOptions::validate() const {
+  requireField(pixel_step >= 1, "pixel_step", "must be at least 1", pixel_step);
   requireField(texture_window_px >= 1 && texture_window_px % 2 == 1, "texture_window_px",
                "must be odd and positive", texture_window_px);
   requireField(min_texture_gray >= 0.0, "min_texture_gray", "must be at least 0", min_texture_gray);
@@ -60,8 +61,8 @@ void RangeEvaluator::add(const RangeMap& map, const cv::Mat& image, const cv::Ma
   if (travel_direction_in_camera) {
     travel = travel_direction_in_camera->normalized().cast<float>();
   }
-  for (int y = 0; y < size.height; ++y) {
-    for (int x = 0; x < size.width; ++x) {
+  for (int y = 0; y < size.height; y += options_.pixel_step) {
+    for (int x = 0; x < size.width; x += options_.pixel_step) {
       const float truth = truth_m.at<float>(y, x);
       if (valid.at<uint8_t>(y, x) == 0 || !(truth >= options_.min_truth_m && truth <= options_.max_truth_m) ||
           texture.at<double>(y, x) < options_.min_texture_gray || !rays.valid(x, y) ||

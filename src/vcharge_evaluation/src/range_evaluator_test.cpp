@@ -31,12 +31,15 @@ struct Frame {
     }
   }
   RangeErrors evaluate(const std::optional<Eigen::Vector3d>& travel = std::nullopt) const {
-    RangeEvaluator evaluator;
+    RangeEvaluationOptions options;
+    options.pixel_step = pixel_step;
+    RangeEvaluator evaluator(options);
     evaluator.add(map, image, truth, valid, travel);
     return evaluator.errors();
   }
   RangeMap map;
   cv::Mat image, truth, valid;
+  int pixel_step = 1;
 };
 
 const RangeAccuracy& at(const RangeErrors& errors, double density) {
@@ -53,6 +56,12 @@ TEST(RangeEvaluatorTest, PerfectMapIsAllRight) {
   EXPECT_EQ(errors.num_judged, static_cast<uint64_t>(kSize.area()));
   EXPECT_EQ(errors.num_known, errors.num_judged);
   EXPECT_DOUBLE_EQ(at(errors, 1.0).share_within_tolerance, 1.0);
+}
+
+TEST(RangeEvaluatorTest, JudgesEverySecondColumnAndRowAsToldTo) {
+  Frame frame;
+  frame.pixel_step = 2;
+  EXPECT_EQ(frame.evaluate().num_judged, static_cast<uint64_t>(kSize.area() / 4));
 }
 
 TEST(RangeEvaluatorTest, UnknownRangesCountAsWrongAtFixedDensity) {

@@ -13,6 +13,7 @@ namespace vcharge {
 
 /// Which pixels are judged, and how.
 struct RangeEvaluationOptions {
+  int pixel_step = 2;  ///< every how many columns and rows a pixel is judged: neighbours say the same
   int texture_window_px = 7;
   double min_texture_gray = 4.0;  ///< standard deviation of the image in the window
   double min_truth_m = 0.5;
@@ -24,6 +25,7 @@ struct RangeEvaluationOptions {
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
+    visit("pixel_step", pixel_step);
     visit("texture_window_px", texture_window_px);
     visit("min_texture_gray", min_texture_gray);
     visit("min_truth_m", min_truth_m);
