@@ -51,14 +51,15 @@ TEST(ImageConversionsTest, KeepsTheMessageAliveForTheImagesLife) {
 TEST(ImageConversionsTest, ReleasesTheMessageWithTheImage) {
   sensor_msgs::ImageConstPtr message = makeMessage(7, 5, "mono8", 1);
   const boost::weak_ptr<const sensor_msgs::Image> watched = message;
-  { const Image image = toImage(std::move(message), "topic"); }
+  { const Image image = toImage(message, "topic"); }
   message.reset();
   EXPECT_TRUE(watched.expired());
 }
 
 TEST(ImageConversionsTest, WeighsColoursAsLuma) {
   // ITU-R BT.601: 0.299 R + 0.587 G + 0.114 B.
-  const auto expectGray = [](const std::string& encoding, std::vector<uint8_t> pixel, double expected) {
+  const auto expectGray = [](const std::string& encoding, const std::vector<uint8_t>& pixel,
+                             double expected) {
     const sensor_msgs::ImagePtr message = makeMessage(1, 1, encoding, static_cast<int>(pixel.size()));
     message->data = pixel;
     EXPECT_NEAR(toImage(message, "topic").pixels.at<uint8_t>(0, 0), expected, 1.0) << encoding;
