@@ -1,0 +1,227 @@
+#!/usr/bin/env python3
+"""The depth nodelet on a simulated drive: it equals the offline tool and the truth, and outlives bad input."""
+import copy
+import os
+import sys
+import time
+import unittest
+
+import cv2
+import numpy as np
+import rospy
+import rostest
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from nodelet.srv import NodeletList, NodeletLoad, NodeletUnload
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Image, PointCloud2
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from drive_fixture import CAMERAS, Drive  # noqa: E402
+
+TIMEOUT_S = 60.0
+
+
+def wait_for(condition, what, timeout_s=TIMEOUT_S):
+    end = time.monotonic() + timeout_s
+    while time.monotonic() < end:
+        value = condition()
+        if value:
+            return value
+        time.sleep(0.05)
+    raise AssertionError(f"waited {timeout_s} s in vain for {what}")
+
+
+def project_mei(rays, p):
+    """Pixels (2 x N) of unit rays (3 x N); paper, section Camera Model."""
+    z = rays[2] + p["xi"]
+    x, y = rays[0] / z, rays[1] / z
+    r = x * x + y * y
+    radial = 1 + p["k1"] * r + p["k2"] * r * r
+    return (p["gamma1"] * (x * radial + 2 * p["p1"] * x * y + p["p2"] * (r + 2 * x * x)) + p["u0"],
+            p["gamma2"] * (y * radial + p["p1"] * (r + 2 * y * y) + 2 * p["p2"] * x * y) + p["v0"])
+
+
+def rays_without_distortion(width, height, p):
+    u, v = np.meshgrid(np.arange(width), np.arange(height))
+    x, y = (u - p["u0"]) / p["gamma1"], (v - p["v0"]) / p["gamma2"]
+    r = x * x + y * y
+    scale = (p["xi"] + np.sqrt(np.maximum(0, 1 + (1 - p["xi"] ** 2) * r))) / (r + 1)
+    return np.stack([scale * x, scale * y, scale - p["xi"]]).reshape(3, -1)
+
+
+class DepthNodeletTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.drive = Drive()
+        cls.offline = cls.drive.folder / "offline"
+        status, output, errors = cls.drive.compute_range_maps(cls.offline, extra=["--online"])
+        if status != 0:
+            raise RuntimeError(f"compute_range_maps failed: {output} {errors}")
+        cls.messages = [(topic, message) for topic, message in cls.drive.messages()
+                        if topic == "/odom" or topic.endswith("/image_raw")]
+        cls.received = {}
+        cls.clouds = []
+        cls.diagnostics = {}
+
+        def keep(topic):
+            def callback(message):
+                cls.received.setdefault(topic, {})[message.header.stamp.to_nsec()] = message
+            return callback
+
+        cls.subscribers = [
+            rospy.Subscriber(f"/dense/{camera}/range/{kind}", Image, keep((camera, kind)), queue_size=100)
+            for camera in CAMERAS for kind in ("image", "confidence", "standard_deviation")]
+        cls.subscribers.append(rospy.Subscriber("/dense/left/points", PointCloud2, cls.clouds.append, queue_size=100))
+        cls.subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, cls.keep_diagnostics))
+        cls.publishers = {"/odom": rospy.Publisher("/odom", Odometry, queue_size=1000)}
+        for camera in CAMERAS:
+            topic = f"/camera/{camera}/image_raw"
+            cls.publishers[topic] = rospy.Publisher(topic, Image, queue_size=1000)
+
+        rospy.set_param("/depth/rig", str(cls.drive.rig))
+        rospy.set_param("/depth/lossless_replay", True)
+        rospy.set_param("/drive_tf/rig", str(cls.drive.rig))
+        for service in ("load_nodelet", "unload_nodelet", "list"):
+            rospy.wait_for_service(f"/manager/{service}", TIMEOUT_S)
+        cls.load = rospy.ServiceProxy("/manager/load_nodelet", NodeletLoad)
+        cls.unload = rospy.ServiceProxy("/manager/unload_nodelet", NodeletUnload)
+        cls.list = rospy.ServiceProxy("/manager/list", NodeletList)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.drive.remove()
+
+    @classmethod
+    def keep_diagnostics(cls, message):
+        for status in message.status:
+            cls.diagnostics[status.name] = status
+
+    def setUp(self):
+        self.assertTrue(self.load("/depth", "vcharge_dense/depth_nodelet", [], [], [], "").success)
+        for topic, publisher in self.publishers.items():
+            wait_for(lambda p=publisher: p.get_num_connections() > 0, f"a subscriber of {topic}")
+        for kinds in self.received.values():
+            kinds.clear()
+        self.diagnostics.clear()
+
+    def tearDown(self):
+        self.assertTrue(self.unload("/depth").success)
+        self.assertNotIn("/depth", self.list().nodelets, "the manager outlives the nodelet")
+
+    def publish(self, change=lambda topic, message: message):
+        for topic, message in self.messages:
+            changed = change(topic, message)
+            if changed is not None:
+                self.publishers[topic].publish(changed)
+                time.sleep(0.002)
+
+    def count(self, camera="left"):
+        return len(self.received.get((camera, "standard_deviation"), {}))
+
+    def offline_stamps(self, camera):
+        return sorted(int(path.stem) for path in (self.offline / camera).glob("*.yaml"))
+
+    def wait_for_message(self, *words):
+        def found():
+            texts = [status.message for status in self.diagnostics.values()]
+            return any(all(word in text for word in words) for text in texts)
+        wait_for(found, f"a diagnostic with {words}; there are "
+                        f"{[status.message for status in self.diagnostics.values()]}", 20.0)
+
+    def expect_recovery(self):
+        """A good drive after whatever came before gives range maps."""
+        for kinds in self.received.values():
+            kinds.clear()
+        self.publish()
+        wait_for(lambda: self.count() >= len(self.offline_stamps("left")) - 2, "range maps of a good drive")
+
+    def test_equals_the_offline_tool_and_the_truth(self):
+        self.publish()
+        rig = yaml.safe_load(self.drive.rig.read_text())["cameras"]
+        errors = []
+        for camera in CAMERAS:
+            stamps = self.offline_stamps(camera)
+            self.assertGreater(len(stamps), 8)
+            wait_for(lambda c=camera, n=len(stamps): self.count(c) >= n, f"the range maps of {camera}")
+            self.assertEqual(sorted(self.received[camera, "image"]), stamps)
+            for stamp in stamps:
+                images = {}
+                for kind, part in (("image", "range"), ("confidence", "confidence"), ("standard_deviation", "sigma")):
+                    message = self.received[camera, kind][stamp]
+                    self.assertEqual((message.encoding, message.header.frame_id),
+                                     ("32FC1", f"camera_{camera}_optical"))
+                    images[part] = np.frombuffer(message.data, np.float32).reshape(message.height, message.width)
+                    stored = cv2.imread(str(self.offline / camera / f"{stamp}_{part}.tiff"), cv2.IMREAD_UNCHANGED)
+                    np.testing.assert_array_equal(images[part], stored)
+                errors.append(self.relative_errors(camera, stamp, rig[camera]["intrinsics"], images))
+        errors = np.concatenate(errors)
+        self.assertGreater(errors.size, 100000)
+        self.assertLess(np.median(errors), 0.03)
+        self.assertGreater(np.mean(errors < 0.05), 0.75)
+        wait_for(lambda: self.clouds, "a point cloud")
+        self.assertEqual(self.clouds[-1].header.frame_id, "camera_left_optical")
+
+    def relative_errors(self, camera, stamp, intrinsics, images):
+        """Of the confident pixels, against the truth at the nearest sensor pixel."""
+        working = yaml.safe_load((self.offline / camera / f"{stamp}.yaml").read_text())["mei"]
+        truth = cv2.imread(str(self.drive.truth / "range" / camera / f"{stamp}.tiff"), cv2.IMREAD_UNCHANGED)
+        height, width = images["range"].shape
+        u, v = project_mei(rays_without_distortion(width, height, working), intrinsics)
+        u, v = np.round(u).astype(int), np.round(v).astype(int)
+        inside = (u >= 0) & (v >= 0) & (u < truth.shape[1]) & (v < truth.shape[0])
+        inside &= (images["confidence"] > 0.5).ravel()
+        expected = truth[v[inside], u[inside]]
+        error = np.abs(images["range"].ravel()[inside] - expected) / expected
+        return error[np.isfinite(error) & (expected > 0.5) & (expected < 20)]
+
+    def test_image_unlike_the_rig_is_reported_and_skipped(self):
+        small = Image(height=48, width=64, step=64, encoding="mono8", data=bytes(48 * 64))
+        small.header = copy.deepcopy(self.messages[0][1].header)
+        self.publishers["/camera/left/image_raw"].publish(small)
+        self.wait_for_message("/camera/left/image_raw", "640x400", "64x48")
+        self.expect_recovery()
+
+    def test_odometry_that_is_not_finite_is_reported_and_skipped(self):
+        bad = copy.deepcopy(next(message for topic, message in self.messages if topic == "/odom"))
+        bad.pose.pose.position.x = float("nan")
+        self.publishers["/odom"].publish(bad)
+        self.wait_for_message("/odom", "finite")
+        self.expect_recovery()
+
+    def test_stamps_that_jump_back_are_reported_and_begin_anew(self):
+        self.publish()
+        wait_for(lambda: self.count() > 8, "range maps")
+
+        def earlier(_topic, message):
+            message = copy.copy(message)
+            message.header = copy.deepcopy(message.header)
+            message.header.stamp = message.header.stamp - rospy.Duration(100.0)
+            return message
+
+        for kinds in self.received.values():
+            kinds.clear()
+        self.publish(earlier)
+        self.wait_for_message("jumped back")
+        wait_for(lambda: self.count() > 8, "range maps after the jump")
+
+    def test_camera_that_stops_is_named_and_may_return(self):
+        self.publish(lambda topic, message: None if topic == "/camera/left/image_raw" else message)
+        self.wait_for_message("left")
+        self.expect_recovery()
+
+    def test_drive_tf_loads_and_unloads_beside_it(self):
+        self.assertTrue(self.load("/drive_tf", "vcharge_ros/drive_tf_nodelet", [], [], [], "").success)
+        self.assertEqual(sorted(self.list().nodelets), ["/depth", "/drive_tf"])
+        self.assertTrue(self.unload("/drive_tf").success)
+
+    def test_nodelet_with_a_bad_rig_does_not_load_and_the_manager_lives_on(self):
+        rospy.set_param("/other/rig", str(self.drive.folder / "no_such_rig.yaml"))
+        with self.assertRaises(rospy.ServiceException):
+            self.load("/other", "vcharge_dense/depth_nodelet", [], [], [], "")
+        self.assertEqual(self.list().nodelets, ["/depth"])
+
+
+if __name__ == "__main__":
+    rospy.init_node("depth_nodelet_test")
+    rostest.rosrun("vcharge_tests", "depth_nodelet", DepthNodeletTest)

@@ -1,0 +1,78 @@
+"""The simulated drive of the integration tests, the suite's tools, and what the tests do to a bag."""
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+
+import rosbag
+from roslib.packages import find_node
+
+CAMERAS = ("front", "left")
+
+
+def tool(package, name):
+    return find_node(package, name)[0]
+
+
+def run(command):
+    """Runs a tool; returns exit status, standard output, and the lines of standard error without progress."""
+    result = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+    errors = [line for line in result.stderr.splitlines() if line.strip() and not is_progress(line)]
+    return result.returncode, result.stdout, errors
+
+
+def is_progress(line):
+    return line.rstrip().endswith(" s)") and "%" in line
+
+
+class Drive:
+    """Two cameras at half resolution on the first 1.6 s of the short drive, with truth."""
+
+    def __init__(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="vcharge_tests_"))
+        self.bag = self.folder / "drive.bag"
+        self.rig = self.folder / "rig_truth.yaml"
+        self.truth = self.folder / "drive_truth"
+        status, output, errors = run([
+            tool("vcharge_simulation", "simulate_drive"), "--drive", "short", "--duration-s", "1.6", "--image-scale",
+            "0.5", "--cameras", *CAMERAS, "--truth-range", "--output", self.bag])
+        if status != 0:
+            raise RuntimeError(f"simulate_drive failed: {output} {errors}")
+
+    def remove(self):
+        shutil.rmtree(self.folder)
+
+    def messages(self):
+        with rosbag.Bag(str(self.bag)) as bag:
+            return [(topic, message) for topic, message, _ in bag.read_messages()]
+
+    def rewrite(self, name, change):
+        """Writes a bag of what change(topic, message) returns for each message: a list of (topic, message)."""
+        path = self.folder / name
+        with rosbag.Bag(str(path), "w") as bag:
+            for topic, message in self.messages():
+                for new_topic, new_message in change(topic, message):
+                    bag.write(new_topic, new_message, new_message.header.stamp)
+        return path
+
+    def write_text(self, name, text):
+        path = self.folder / name
+        path.write_text(text)
+        return path
+
+    def compute_range_maps(self, output, bag=None, rig=None, extra=()):
+        return run([tool("vcharge_dense", "compute_range_maps"), "--bag", bag or self.bag, "--rig", rig or self.rig,
+                    "--output", output, "--no-pictures", *extra])
+
+
+def content_hash(output):
+    for line in output.splitlines():
+        if line.startswith("content hash: "):
+            return line.split(": ")[1]
+    raise AssertionError(f"no content hash in: {output}")
+
+
+def files_below(folder):
+    return sorted(os.path.relpath(os.path.join(root, name), folder)
+                  for root, _, names in os.walk(folder) for name in names)

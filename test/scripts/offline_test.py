@@ -1,0 +1,183 @@
+#!/usr/bin/env python3
+"""The tools on a simulated drive: reproducible, blind to the truth, and one clear error for each bad input."""
+import copy
+import os
+import pathlib
+import sys
+import unittest
+
+import rospkg
+import rospy
+import rostest
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from drive_fixture import Drive, content_hash, files_below, run, tool  # noqa: E402
+
+
+class OfflineTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.drive = Drive()
+        status, output, errors = cls.drive.compute_range_maps(cls.drive.folder / "reference")
+        if status != 0:
+            raise RuntimeError(f"compute_range_maps failed: {output} {errors}")
+        cls.reference_hash = content_hash(output)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.drive.remove()
+
+    def test_removing_the_ground_truth_changes_nothing(self):
+        bag = self.drive.rewrite("blind.bag", lambda topic, message: (
+            [] if topic == "/ground_truth" else [(topic, message)]))
+        status, output, errors = self.drive.compute_range_maps(self.drive.folder / "blind", bag)
+        self.assertEqual((status, errors), (0, []))
+        self.assertEqual(content_hash(output), self.reference_hash)
+
+    def test_ranges_agree_with_the_truth(self):
+        report = self.drive.folder / "report"
+        status, output, errors = run([
+            tool("vcharge_evaluation", "evaluate_range"), "--range", self.drive.folder / "reference", "--truth",
+            self.drive.truth, "--bag", self.drive.bag, "--rig", self.drive.rig, "--report", report])
+        self.assertEqual((status, errors), (0, []), output)
+        line = next(line for line in output.splitlines() if line.strip().startswith("40 % most confident"))
+        right_percent = float(line.split(":")[1].split("%")[0])
+        # The first 1.6 s hold every image at a quarter of the sensor's pixels, half of them with a short baseline.
+        self.assertGreater(right_percent, 80.0, output)
+        self.assertIn("range_errors.json", files_below(report))
+        self.assertIn("range_errors_accuracy.png", files_below(report))
+
+    def test_every_shipped_yaml_loads(self):
+        config = pathlib.Path(rospkg.RosPack().get_path("vcharge_config"))
+        rigs = sorted((config / "rigs").glob("*.yaml"))
+        options = sorted(config.glob("*.yaml"))
+        self.assertTrue(rigs and options)
+        for rig, option in [(rig, options[0]) for rig in rigs] + [(rigs[0], option) for option in options]:
+            # The bag is read last: an error about it says that rig and options were taken.
+            self.expect_error(["no_such.bag"], bag=self.drive.folder / "no_such.bag", rig=rig,
+                              extra=["--options", option])
+
+    # --- bad input: one message that names file, key or topic and what was expected; nothing half-written
+
+    def expect_error(self, words, bag=None, rig=None, extra=()):
+        output = self.drive.folder / "bad_output"
+        output.mkdir(exist_ok=True)
+        (output / "kept.txt").write_text("kept")
+        status, _, errors = self.drive.compute_range_maps(output, bag, rig, extra)
+        self.assertNotEqual(status, 0)
+        self.assertEqual(len(errors), 1, f"expected one message: {errors}")
+        for word in words:
+            self.assertIn(word, errors[0])
+        self.assertEqual((output / "kept.txt").read_text(), "kept")
+        names = set(files_below(output))
+        self.assertFalse([name for name in names if ".tmp" in name], names)
+        for name in names:
+            if name.endswith(".yaml"):  # written last: the map is complete
+                for part in ("range", "sigma", "confidence"):
+                    self.assertIn(f"{name[:-len('.yaml')]}_{part}.tiff", names)
+
+    def test_missing_bag(self):
+        self.expect_error(["no_such.bag"], bag=self.drive.folder / "no_such.bag")
+
+    def test_corrupt_bag(self):
+        bag = self.drive.folder / "corrupt.bag"
+        bag.write_bytes(b"this is no bag" * 1000)
+        self.expect_error(["corrupt.bag"], bag=bag)
+
+    def test_truncated_bag(self):
+        data = self.drive.bag.read_bytes()
+        bag = self.drive.folder / "truncated.bag"
+        bag.write_bytes(data[:len(data) // 2])
+        self.expect_error(["truncated.bag"], bag=bag)
+
+    def test_wrong_topic(self):
+        bag = self.drive.rewrite("wrong_topic.bag", lambda topic, message: (
+            [(topic.replace("/camera/left/", "/cam_left/"), message)]))
+        self.expect_error(["wrong_topic.bag", "/camera/left/image_raw", "/cam_left/image_raw"], bag=bag)
+
+    def test_image_size_unlike_the_rig(self):
+        rig = self.drive.write_text("big_rig.yaml", self.drive.rig.read_text().replace(
+            "[640, 400]", "[1280, 800]").replace("    mask: front_mask.png\n", "").replace(
+                "    mask: left_mask.png\n", ""))
+        self.expect_error(["image_raw", "1280x800", "640x400"], rig=rig)
+
+    def test_unknown_key_in_the_options(self):
+        options = self.drive.write_text("options.yaml", "plane_sweep: {num_plains: 32}\n")
+        self.expect_error(["options.yaml", "plane_sweep.num_plains", "num_planes"], extra=["--options", options])
+
+    def test_unknown_key_in_the_rig(self):
+        rig = self.drive.write_text("key_rig.yaml", self.drive.rig.read_text().replace("model: mei", "modell: mei", 1))
+        self.expect_error(["key_rig.yaml", "cameras.front.modell", "model"], rig=rig)
+
+    def rig_with_rotation(self, name, rotation):
+        lines = self.drive.rig.read_text().splitlines()
+        at = next(i for i, line in enumerate(lines) if "rotation_xyzw" in line)
+        lines[at] = f"      rotation_xyzw: {rotation}"
+        return self.drive.write_text(name, "\n".join(lines) + "\n")
+
+    def test_nan_rotation_in_the_rig(self):
+        self.expect_error(["nan_rig.yaml", "cameras.front.vehicle_from_camera.rotation_xyzw", "finite"],
+                          rig=self.rig_with_rotation("nan_rig.yaml", "[.nan, 0, 0, 1]"))
+
+    def test_rotation_that_is_no_unit_quaternion(self):
+        self.expect_error(["unit_rig.yaml", "cameras.front.vehicle_from_camera.rotation_xyzw", "unit quaternion"],
+                          rig=self.rig_with_rotation("unit_rig.yaml", "[0.5, 0, 0, 1]"))
+
+    def test_stamps_that_jump_back(self):
+        start = self.drive.messages()[0][1].header.stamp
+
+        def jump(topic, message):
+            if (message.header.stamp - start).to_sec() < 0.8:
+                return [(topic, message)]
+            message = copy.copy(message)
+            message.header.stamp = message.header.stamp - rospy.Duration(5.0)
+            return [(topic, message)]
+
+        # In the order of the recording, as a recorder with a stepped clock leaves it.
+        path = self.drive.folder / "jump.bag"
+        import rosbag
+        with rosbag.Bag(str(path), "w") as bag:
+            for topic, message in self.drive.messages():
+                stamp = message.header.stamp
+                for new_topic, new_message in jump(topic, message):
+                    bag.write(new_topic, new_message, stamp)
+        self.expect_error(["jump.bag", "back"], bag=path)
+
+    def test_camera_that_stops(self):
+        messages = self.drive.messages()
+        start = messages[0][1].header.stamp
+        odometry = [message for topic, message in messages if topic == "/odom"][-1]
+        left = [message for topic, message in messages if topic == "/camera/left/image_raw"][-1]
+
+        def stop_front(topic, message):
+            stopped = topic.startswith("/camera/front/") and (message.header.stamp - start).to_sec() > 0.4
+            return [] if stopped else [(topic, message)]
+
+        path = self.drive.rewrite("stopped.bag", stop_front)
+        import rosbag
+        with rosbag.Bag(str(path), "a") as bag:
+            for i in range(1, 60):
+                later = left.header.stamp + rospy.Duration.from_sec(0.08 * i)
+                for topic, message in (("/odom", odometry), ("/camera/left/image_raw", left)):
+                    message = copy.deepcopy(message)
+                    message.header.stamp = later
+                    bag.write(topic, message, later)
+        self.expect_error(["stopped.bag", "/camera/front/image_raw"], bag=path)
+
+    def test_output_that_cannot_be_written(self):
+        blocked = self.drive.write_text("blocked", "a file, not a folder")
+        status, _, errors = self.drive.compute_range_maps(blocked / "output")
+        self.assertNotEqual(status, 0)
+        self.assertEqual(len(errors), 1, errors)
+        self.assertIn("blocked/output", errors[0])
+
+    def test_simulator_rejects_unknown_drives(self):
+        status, _, errors = run([tool("vcharge_simulation", "simulate_drive"), "--drive", "to_the_moon", "--output",
+                                 self.drive.folder / "moon.bag"])
+        self.assertNotEqual(status, 0)
+        self.assertTrue(any("to_the_moon" in line for line in errors), errors)
+        self.assertNotIn("moon.bag", files_below(self.drive.folder))
+
+
+if __name__ == "__main__":
+    rostest.rosrun("vcharge_tests", "offline", OfflineTest)
