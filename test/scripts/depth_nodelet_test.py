@@ -207,7 +207,7 @@ class DepthNodeletTest(unittest.TestCase):
 
     def test_camera_that_stops_is_named_and_may_return(self):
         self.publish(lambda topic, message: None if topic == "/camera/left/image_raw" else message)
-        self.wait_for_message("left")
+        self.wait_for_message("/camera/left/image_raw", "no data for")
         self.expect_recovery()
 
     def test_drive_tf_loads_and_unloads_beside_it(self):
