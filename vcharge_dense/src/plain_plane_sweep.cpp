@@ -22,7 +22,7 @@ double sample(const cv::Mat& pixels, const cv::Mat& valid_mask, const Eigen::Vec
   for (int dy = 0; dy < 2; ++dy) {
     for (int dx = 0; dx < 2; ++dx) {
       int u = x + dx, v = y + dy;
-      if (border == PlainBorder::kWrapAround) {
+      if (border == PlainBorder::kAsTheAuthors) {
         u = wrap(u, pixels.cols);
         v = wrap(v, pixels.rows);
       } else if (u < 0 || v < 0 || u >= pixels.cols || v >= pixels.rows ||
@@ -37,8 +37,8 @@ double sample(const cv::Mat& pixels, const cv::Mat& valid_mask, const Eigen::Vec
          fy * ((1 - fx) * values[1][0] + fx * values[1][1]);
 }
 
-/// Sum over the window around each pixel.
-cv::Mat windowSum(const cv::Mat& values, int radius, PlainBorder border) {
+/// Sum over the window around each pixel; NaN where it leaves the image.
+cv::Mat windowSum(const cv::Mat& values, int radius) {
   const auto sumAlong = [&](const cv::Mat& from, int step_x, int step_y) {
     cv::Mat sum(from.size(), CV_64FC1);
     for (int y = 0; y < from.rows; ++y) {
@@ -47,10 +47,7 @@ cv::Mat windowSum(const cv::Mat& values, int radius, PlainBorder border) {
         for (int k = -radius; k <= radius; ++k) {
           const int u = x + k * step_x, v = y + k * step_y;
           const bool inside = u >= 0 && v >= 0 && u < from.cols && v < from.rows;
-          total += inside ? from.at<double>(v, u)
-                   : border == PlainBorder::kWrapAround
-                       ? from.at<double>(wrap(v, from.rows), wrap(u, from.cols))
-                       : kNaN;
+          total += inside ? from.at<double>(v, u) : kNaN;
         }
         sum.at<double>(y, x) = total;
       }
@@ -60,7 +57,7 @@ cv::Mat windowSum(const cv::Mat& values, int radius, PlainBorder border) {
   return sumAlong(sumAlong(values, 1, 0), 0, 1);
 }
 
-/// Neighbour warped into the reference over a plane (paper, equation (warping)).
+/// Neighbour warped into the reference, whose rays are given, over a plane (paper, equation (warping)).
 cv::Mat warp(const MeiCamera& camera, const cv::Mat& valid_mask, const RayTable& rays, const Plane& plane,
              const SweepImage& reference, const SweepImage& neighbour, PlainBorder border) {
   const RigidTransform neighbour_from_reference =
@@ -68,7 +65,7 @@ cv::Mat warp(const MeiCamera& camera, const cv::Mat& valid_mask, const RayTable&
   const Eigen::Matrix3d homography =
       neighbour_from_reference.rotationMatrix() -
       neighbour_from_reference.translation() * plane.normal.transpose() / plane.distance_m;
-  cv::Mat warped(reference.pixels.size(), CV_64FC1, cv::Scalar(kNaN));
+  cv::Mat warped(rays.size(), CV_64FC1, cv::Scalar(kNaN));
   for (int y = 0; y < warped.rows; ++y) {
     for (int x = 0; x < warped.cols; ++x) {
       const Eigen::Vector3d ray = rays.ray(x, y).cast<double>();
@@ -123,17 +120,25 @@ PlainResult plainPlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask,
                             const std::vector<PlaneFamily>& families, const PlaneSweepOptions& options,
                             const SweepImage& reference, const std::vector<SweepImage>& neighbours,
                             PlainBorder border) {
-  const cv::Size size = reference.pixels.size();
   const int radius = options.window_px / 2;
   const double count = options.window_px * options.window_px;
-  const RayTable rays(camera, size, 6.283185307179586, valid_mask);
+  // Windows over the border: the reference repeats its last pixel, while the neighbours are warped to what
+  // the pixels outside the image would see.
+  const double without_texture = border == PlainBorder::kAsTheAuthors ? 0.0 : kNaN;
+  const int margin = border == PlainBorder::kAsTheAuthors ? radius : 0;
+  cv::Mat pixels;
+  cv::copyMakeBorder(reference.pixels, pixels, margin, margin, margin, margin, cv::BORDER_REPLICATE);
+  const cv::Size size = pixels.size();
+  const MeiCamera wide_camera(camera.xi(), camera.gamma1(), camera.gamma2(), camera.u0() + margin,
+                              camera.v0() + margin);
+  const RayTable rays(wide_camera, size, 6.283185307179586, margin == 0 ? valid_mask : cv::Mat());
   cv::Mat a;
-  reference.pixels.convertTo(a, CV_64F);
+  pixels.convertTo(a, CV_64F);
   if (border == PlainBorder::kUnknown) {
     a.setTo(kNaN, valid_mask == 0);
   }
-  const cv::Mat sum_a = windowSum(a, radius, border);
-  const cv::Mat sum_aa = windowSum(a.mul(a), radius, border);
+  const cv::Mat sum_a = windowSum(a, radius);
+  const cv::Mat sum_aa = windowSum(a.mul(a), radius);
   std::vector<bool> after;
   for (const SweepImage& neighbour : neighbours) {
     after.push_back(neighbour.stamp > reference.stamp);
@@ -152,10 +157,10 @@ PlainResult plainPlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask,
       for (const SweepImage& neighbour : neighbours) {
         const cv::Mat b = warp(camera, valid_mask, rays, {family.normal, 1.0 / inverse_distance}, reference,
                                neighbour, border);
-        const cv::Mat sum_b = windowSum(b, radius, border);
-        const cv::Mat sum_bb = windowSum(b.mul(b), radius, border);
-        const cv::Mat sum_ab = windowSum(a.mul(b), radius, border);
-        cv::Mat correlation(size, CV_64FC1, cv::Scalar(kNaN));
+        const cv::Mat sum_b = windowSum(b, radius);
+        const cv::Mat sum_bb = windowSum(b.mul(b), radius);
+        const cv::Mat sum_ab = windowSum(a.mul(b), radius);
+        cv::Mat correlation(size, CV_64FC1, cv::Scalar(without_texture));
         for (int y = 0; y < size.height; ++y) {
           for (int x = 0; x < size.width; ++x) {
             const double mean_a = sum_a.at<double>(y, x) / count, mean_b = sum_b.at<double>(y, x) / count;
@@ -215,6 +220,10 @@ PlainResult plainPlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask,
       }
     }
     first_plane += static_cast<int>(num_planes);
+  }
+  const cv::Rect image(margin, margin, reference.pixels.cols, reference.pixels.rows);
+  for (cv::Mat* map : {&result.plane, &result.inverse_distance, &result.inverse_range, &result.score}) {
+    *map = (*map)(image).clone();
   }
   return result;
 }

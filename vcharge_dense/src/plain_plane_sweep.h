@@ -12,9 +12,11 @@
 
 namespace vcharge {
 
-/// What happens at an image's border: kUnknown leaves out what is not seen; kWrapAround reads the opposite
-/// border, as the authors' code does, for comparison with their results.
-enum class PlainBorder { kUnknown, kWrapAround };
+/// What happens where an image does not tell. kUnknown leaves out what is not seen. kAsTheAuthors, for
+/// comparison with their results: neighbours are read beyond their border from the opposite one, a window
+/// over the reference's border repeats its last pixel (and meets what the pixels outside the image would
+/// see), and the correlation of a window without texture is 0.
+enum class PlainBorder { kUnknown, kAsTheAuthors };
 
 struct PlainResult {
   cv::Mat plane;             ///< CV_32SC1, over all families; -1 where none
