@@ -41,6 +41,9 @@ void writePicture(const RangeMap& map, const PlaneSweepOptions& options, const s
 
 RangeMapperOptions readOptions(const Arguments& arguments) {
   RangeMapperOptions options = arguments.online ? RangeMapperOptions() : RangeMapperOptions::offline();
+  if (!arguments.trajectory.empty()) {
+    options.plane_sweep.pose_noise = PoseNoiseOptions::trajectory();
+  }
   if (!arguments.options.empty()) {
     readFieldsFromFile(arguments.options, &options);
   }

@@ -11,6 +11,16 @@ void requireNotNegative(const char* field, double value) {
 
 }  // namespace
 
+PoseNoiseOptions PoseNoiseOptions::trajectory() {
+  PoseNoiseOptions noise;
+  noise.scale = 0.0;
+  noise.translation_m = 0.001;
+  noise.translation_m_per_sqrt_m = 0.0;
+  noise.rotation_rad = 0.0002;
+  noise.rotation_rad_per_sqrt_m = 0.0;
+  return noise;
+}
+
 void PlaneSweepOptions::validate() const {
   requireField(min_distance_m > 0.0, "min_distance_m", "must be positive", min_distance_m);
   requireField(std::isfinite(max_distance_m) && max_distance_m > min_distance_m, "max_distance_m",
@@ -31,10 +41,11 @@ void PlaneSweepOptions::validate() const {
   requireField(refinement_step_px > 0.0 && refinement_step_px <= 10.0, "refinement_step_px",
                "must be in (0, 10]", refinement_step_px);
   requireNotNegative("matching_noise_px", matching_noise_px);
-  requireNotNegative("pose_noise.translation_m_per_m", pose_noise.translation_m_per_m);
+  requireNotNegative("pose_noise.scale", pose_noise.scale);
   requireNotNegative("pose_noise.translation_m", pose_noise.translation_m);
-  requireNotNegative("pose_noise.rotation_rad_per_m", pose_noise.rotation_rad_per_m);
+  requireNotNegative("pose_noise.translation_m_per_sqrt_m", pose_noise.translation_m_per_sqrt_m);
   requireNotNegative("pose_noise.rotation_rad", pose_noise.rotation_rad);
+  requireNotNegative("pose_noise.rotation_rad_per_sqrt_m", pose_noise.rotation_rad_per_sqrt_m);
   requireNotNegative("min_texture", min_texture);
   requireField(min_score >= -1.0 && min_score < 1.0, "min_score", "must be in [-1, 1)", min_score);
   requireField(max_relative_sigma > 0.0, "max_relative_sigma", "must be positive", max_relative_sigma);

@@ -57,23 +57,41 @@ Sequence makeSequence(const AnalyticScene& scene, const RigidTransform& start, d
   return sequence;
 }
 
-/// Moves the neighbours as odometry errs: its scale and yaw rate are off for the whole sequence, and the
-/// reference's own jitter is common to all pairs.
+/// Moves the neighbours, which come in order of time, as odometry errs: its scale is off for the whole
+/// sequence, its pose walks at random from image to image, and the reference's own jitter is common to all
+/// pairs.
 void disturb(const PoseNoiseOptions& noise, std::mt19937* generator, Sequence* sequence) {
-  Eigen::Vector3d drift_m, turn_rad, jitter_m, jitter_rad;
-  for (int i = 0; i < 3; ++i) {
-    drift_m[i] = noise.translation_m_per_m * normalNumber(generator);
-    turn_rad[i] = noise.rotation_rad_per_m * normalNumber(generator);
-    jitter_m[i] = noise.translation_m * normalNumber(generator);
-    jitter_rad[i] = noise.rotation_rad * normalNumber(generator);
-  }
-  for (SweepImage& image : sequence->neighbours) {
-    const RigidTransform& pose = image.world_from_camera;
-    const double way_m = (pose.translation() - sequence->reference.world_from_camera.translation()).x();
-    image.world_from_camera =
-        RigidTransform(rotationFromVector(way_m * turn_rad + jitter_rad) * pose.rotation(),
-                       pose.translation() + way_m * drift_m + jitter_m);
-  }
+  const auto randomVector = [&](double sigma) {
+    Eigen::Vector3d vector;
+    for (int i = 0; i < 3; ++i) {
+      vector[i] = sigma * normalNumber(generator);
+    }
+    return vector;
+  };
+  const double scale = noise.scale * normalNumber(generator);
+  const Eigen::Vector3d jitter_m = randomVector(noise.translation_m);
+  const Eigen::Vector3d jitter_rad = randomVector(noise.rotation_rad);
+  const Eigen::Vector3d origin = sequence->reference.world_from_camera.translation();
+  const auto walk = [&](auto begin, auto end, const auto isOnThisSide) {
+    Eigen::Vector3d walked_m = jitter_m, walked_rad = jitter_rad, last = origin;
+    for (auto image = begin; image != end; ++image) {
+      if (!isOnThisSide(*image)) {
+        continue;
+      }
+      const RigidTransform pose = image->world_from_camera;
+      const double root_m = std::sqrt((pose.translation() - last).norm());
+      last = pose.translation();
+      walked_m += randomVector(noise.translation_m_per_sqrt_m * root_m);
+      walked_rad += randomVector(noise.rotation_rad_per_sqrt_m * root_m);
+      image->world_from_camera =
+          RigidTransform(rotationFromVector(walked_rad) * pose.rotation(),
+                         pose.translation() + scale * (pose.translation() - origin) + walked_m);
+    }
+  };
+  const Timestamp now = sequence->reference.stamp;
+  auto& images = sequence->neighbours;
+  walk(images.rbegin(), images.rend(), [&](const SweepImage& image) { return image.stamp < now; });
+  walk(images.begin(), images.end(), [&](const SweepImage& image) { return image.stamp > now; });
 }
 
 cv::Mat allValid() {

@@ -25,7 +25,9 @@ float inverseRangeVariance(const SweepInput& input, const SurfaceEstimate& estim
   const PlaneSweepOptions& options = *input.options;
   const float inverse_range = estimate.inverse_range.at<float>(y, x);
   const auto voters = static_cast<uint32_t>(estimate.voters.at<int>(y, x));
-  float motion_squares = 0.0f, motion_errors = 0.0f, matching_errors = 0.0f;
+  // A random walk errs alike for all neighbours on one side of the reference, and independently on the other
+  // side.
+  float motion_squares = 0.0f, errors_before = 0.0f, errors_after = 0.0f, matching_errors = 0.0f;
   int count = 0;
   for (size_t n = 0; n < input.neighbours.size(); ++n) {
     if ((voters & (1u << n)) == 0) {
@@ -35,12 +37,12 @@ float inverseRangeVariance(const SweepInput& input, const SurfaceEstimate& estim
     const PixelSensitivity sensitivity =
         pixelSensitivity(input.camera, neighbour, input.rays->ray(x, y), inverse_range);
     const float baseline_m = neighbour.translation_m.norm();
-    const float rotation_variance =
-        static_cast<float>(options.pose_noise.rotation_rad * options.pose_noise.rotation_rad) +
-        square(static_cast<float>(options.pose_noise.rotation_rad_per_m) * baseline_m);
-    const float translation_variance =
-        static_cast<float>(options.pose_noise.translation_m * options.pose_noise.translation_m) +
-        square(static_cast<float>(options.pose_noise.translation_m_per_m) * baseline_m);
+    const auto variance = [baseline_m](double of_any_pair, double per_sqrt_m) {
+      return static_cast<float>(of_any_pair * of_any_pair + per_sqrt_m * per_sqrt_m * baseline_m);
+    };
+    const PoseNoiseOptions& pose = options.pose_noise;
+    const float rotation_variance = variance(pose.rotation_rad, pose.rotation_rad_per_sqrt_m);
+    const float translation_variance = variance(pose.translation_m, pose.translation_m_per_sqrt_m);
     const float pixel_error =
         sensitivity.pixels_per_radian *
         std::sqrt(rotation_variance + translation_variance * square(inverse_range / sensitivity.range_ratio));
@@ -49,7 +51,7 @@ float inverseRangeVariance(const SweepInput& input, const SurfaceEstimate& estim
     matching_errors += square(sensitivity.pixels_per_inverse_range *
                               static_cast<float>(options.matching_noise_px) * scale * scale);
     motion_squares += square(sensitivity.pixels_per_inverse_range);
-    motion_errors += sensitivity.pixels_per_inverse_range * pixel_error;
+    (neighbour.after ? errors_after : errors_before) += sensitivity.pixels_per_inverse_range * pixel_error;
     ++count;
   }
   if (count == 0 || !(motion_squares > 0.0f)) {
@@ -60,7 +62,8 @@ float inverseRangeVariance(const SweepInput& input, const SurfaceEstimate& estim
   const float window = static_cast<float>(options.window_px * options.window_px);
   const float noise = kImageNoiseFactor * std::max(1.0f - score, 1e-3f) / (window * curvature);
   const float matching = static_cast<float>(count) * matching_errors / square(motion_squares);
-  const float pose = square(motion_errors / motion_squares);
+  const float pose = (square(errors_before) + square(errors_after)) / square(motion_squares) +
+                     square(static_cast<float>(options.pose_noise.scale) * inverse_range);
   return std::isnan(noise) ? std::numeric_limits<float>::infinity() : noise + matching + pose;
 }
 
