@@ -73,7 +73,7 @@ cv::Mat CameraResponse::develop(const cv::Mat& light) const {
     uint8_t* out = gray.ptr(y);
     for (int x = 0; x < light.cols; ++x) {
       const float root = std::sqrt(std::min(1.0F, std::max(0.0F, in[x] * exposure)));
-      out[x] = gray_by_root_light_[static_cast<size_t>(root * kTableSize + 0.5F)];
+      out[x] = gray_by_root_light_[static_cast<size_t>(root * kTableSize + 0.5F)];  // NOLINT: not negative
     }
   }
   return gray;

@@ -186,7 +186,7 @@ class LotBuilder {
     constexpr double kKerbWidth_m = 0.14;
     const std::vector<Eigen::Vector2d> outline = corners(area);
     for (size_t i = 0; i < outline.size(); ++i) {
-      const Eigen::Vector2d from = outline[i];
+      const Eigen::Vector2d& from = outline[i];
       const Eigen::Vector2d edge = outline[(i + 1) % outline.size()] - from;
       const double yaw = std::atan2(edge.y(), edge.x());
       const int stones = std::max(1, static_cast<int>(edge.norm() / kStone_m));
@@ -318,8 +318,8 @@ class LotBuilder {
       const auto h = static_cast<float>(house.height);
       std::vector<Eigen::Vector3f> top;
       for (size_t i = 0; i < outline.size(); ++i) {
-        const Eigen::Vector2d a = outline[i];
-        const Eigen::Vector2d b = outline[(i + 1) % outline.size()];
+        const Eigen::Vector2d& a = outline[i];
+        const Eigen::Vector2d& b = outline[(i + 1) % outline.size()];
         const uint32_t wall = textured(SurfaceKind::kBuilding,
                                        drawFacade((b - a).norm(), house.height, house.sign,
                                                   house.seed + 100U * static_cast<uint32_t>(i)),

@@ -178,7 +178,7 @@ Reprojection reproject(const CameraView& from, const RigidTransform& world_from_
         continue;
       }
       if (surfaces == Surfaces::kNoCars) {
-        const Eigen::Vector3d eye = world_from_1.translation();
+        const Eigen::Vector3d& eye = world_from_1.translation();
         SurfaceKind kind = SurfaceKind::kOther;
         testLot()->castRay(eye, (world_from_1 * here - eye).normalized(), 0.0, &kind);
         if (kind == SurfaceKind::kCar) {
@@ -188,8 +188,8 @@ Reprojection reproject(const CameraView& from, const RigidTransform& world_from_
       double gray = 0.0;
       bool inside = true;
       for (int k = 0; k < kSamples * kSamples; ++k) {
-        const Eigen::Vector2d offset((k % kSamples + 0.5) / kSamples - 0.5,
-                                     (k / kSamples + 0.5) / kSamples - 0.5);
+        const Eigen::Vector2d sample(k % kSamples, k / kSamples);  // NOLINT: whole column and row
+        const Eigen::Vector2d offset = (sample.array() + 0.5) / kSamples - 0.5;
         const Eigen::Vector2d at = pixel + footprint * offset;
         const int column = static_cast<int>(std::floor(at.x()));
         const int row = static_cast<int>(std::floor(at.y()));
