@@ -34,8 +34,9 @@ TEST(CameraResponseTest, NoiseHasTheVarianceOfPhotonsAndReadout) {
     cv::meanStdDev(noisy, mean, deviation);
     const double light = response.lightFromGray(gray);
     const double slope = (response.grayFromLight(light + 1e-5) - response.grayFromLight(light - 1e-5)) / 2e-5;
-    const double sigma =
-        slope * std::sqrt(options.photon_noise * light + options.read_noise * options.read_noise);
+    const double exposed = options.exposure * light;
+    const double sigma = slope / options.exposure *
+                         std::sqrt(options.photon_noise * exposed + options.read_noise * options.read_noise);
     EXPECT_NEAR(mean[0], gray, 0.15);
     // Rounding to whole gray levels adds a twelfth.
     EXPECT_NEAR(deviation[0], std::sqrt(sigma * sigma + 1.0 / 12.0), 0.06 * sigma + 0.02);

@@ -20,6 +20,9 @@ constexpr std::array<std::array<double, 2>, 4> kSampleOffsets = {
     {{-0.125, -0.375}, {0.375, -0.125}, {-0.375, 0.125}, {0.125, 0.375}}};
 // The rim of the image circle fades over this angle inside the field of view.
 constexpr double kRimFade_rad = 0.045;
+constexpr double kFullWidth_px = 1280.0;
+// The lens blurs the own car over its outline.
+constexpr int kMaskMargin_px = 2;
 
 float lensTransmission(double cos_angle, double angle_rad, double half_field_of_view_rad) {
   const double natural = 0.55 + 0.45 * std::max(0.0, cos_angle);
@@ -29,12 +32,15 @@ float lensTransmission(double cos_angle, double angle_rad, double half_field_of_
 
 }  // namespace
 
-CameraView::CameraView(const RigCamera& camera, std::shared_ptr<const VehicleBody> body)
+CameraView::CameraView(const RigCamera& camera, std::shared_ptr<const VehicleBody> body,
+                       const LensOptions& lens)
     : camera_(camera),
+      lens_(lens),
       body_(std::move(body)),
       blocks_per_row_((camera.image_size_px.width + 1) / 2),
       block_rows_((camera.image_size_px.height + 1) / 2) {
   check(camera.vehicle_from_camera.has_value(), "CameraView: the camera has no vehicle_from_camera");
+  lens.validate();
   const size_t num_blocks = static_cast<size_t>(blocks_per_row_) * static_cast<size_t>(block_rows_);
   const size_t num_pixels = static_cast<size_t>(size().area());
   sample_rays_.assign(num_blocks * 3 * kSamplesPerBlock, 0.0F);
@@ -53,6 +59,8 @@ CameraView::CameraView(const RigCamera& camera, std::shared_ptr<const VehicleBod
 }
 
 void CameraView::computeRays() {
+  const double image_scale = size().width / kFullWidth_px;
+  cv::Mat sigma_px = cv::Mat::zeros(size(), CV_32FC1);
   const double half_field_of_view_rad = 0.5 * camera_.field_of_view_rad;
   tbb::parallel_for(0, block_rows_, [&](int block_y) {
     for (int block_x = 0; block_x < blocks_per_row_; ++block_x) {
@@ -85,11 +93,13 @@ void CameraView::computeRays() {
         if (complete) {
           block_pixels_[block] |= static_cast<uint8_t>(1 << p);
           centre_rays_[static_cast<size_t>(y) * size().width + x] = centre.cast<float>();
+          sigma_px.at<float>(y, x) = static_cast<float>(lens_.blurAt(angle_rad, image_scale));
           vignette_.at<float>(y, x) = lensTransmission(centre.z(), angle_rad, half_field_of_view_rad);
         }
       }
     }
   });
+  blur_ = LensBlur(sigma_px);
 }
 
 void CameraView::computePixelAngles() {
@@ -146,7 +156,8 @@ void CameraView::findBody() {
     const std::vector<BodySample>& row = samples_of_row[static_cast<size_t>(block_y)];
     body_samples_.insert(body_samples_.end(), row.begin(), row.end());
   }
-  cv::erode(mask_, mask_, cv::Mat::ones(3, 3, CV_8UC1), cv::Point(-1, -1), 1, cv::BORDER_REPLICATE);
+  cv::erode(mask_, mask_, cv::Mat::ones(2 * kMaskMargin_px + 1, 2 * kMaskMargin_px + 1, CV_8UC1),
+            cv::Point(-1, -1), 1, cv::BORDER_REPLICATE);
 }
 
 }  // namespace vcharge

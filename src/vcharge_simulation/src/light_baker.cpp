@@ -19,6 +19,7 @@ constexpr float kFar_m = 120.0F;
 // Surroundings change slowly: they are sampled on a coarser grid than the sun's shadows.
 constexpr int kSurroundingStride = 5;
 constexpr int kSurroundingRays = 32;
+constexpr int kWallRays = 8;
 
 // Direction about `normal` with density proportional to the cosine.
 Eigen::Vector3f cosineDirection(const Eigen::Vector3f& normal, float u, float v) {
@@ -42,16 +43,63 @@ float freeSky(const RayTracer& tracer, const Eigen::Vector3f& position, const Ei
   return static_cast<float>(free) / static_cast<float>(rays);
 }
 
+// The sun's disk, sampled.
+class SunDisk {
+ public:
+  explicit SunDisk(const Eigen::Vector3f& centre)
+      : centre_(centre), side_(centre.unitOrthogonal()), other_(centre.cross(side_)) {}
+
+  Eigen::Vector3f direction(uint32_t hash) const {
+    const float radius = kSunRadius_rad * std::sqrt(unitFromBits(hash));
+    const float angle = kTwoPi * unitFromBits(mixBits(hash + 1U));
+    return (centre_ + radius * std::cos(angle) * side_ + radius * std::sin(angle) * other_).normalized();
+  }
+
+ private:
+  Eigen::Vector3f centre_, side_, other_;
+};
+
 }  // namespace
+
+void bakeWallLight(const std::vector<Wall>& walls, double texel_m, Scene* scene) {
+  const RayTracer tracer(scene->mesh);
+  const SunDisk sun(scene->sky->directionToSun());
+  for (const Wall& wall : walls) {
+    const int width = std::max(1, static_cast<int>(std::lround(wall.along.norm() / texel_m)));
+    const int height = std::max(1, static_cast<int>(std::lround(wall.up.norm() / texel_m)));
+    const Eigen::Vector3f normal = wall.along.cross(wall.up).normalized();
+    cv::Mat image(height, width, CV_8UC1, cv::Scalar(0));
+    if (normal.dot(scene->sky->directionToSun()) > 0.0F) {
+      tbb::parallel_for(0, height, [&](int row) {
+        for (int column = 0; column < width; ++column) {
+          int lit = 0;
+          for (int i = 0; i < kWallRays; ++i) {
+            const uint32_t hash = hashCell(column * kWallRays + i, row, wall.material);
+            const float u =
+                (static_cast<float>(column) + unitFromBits(mixBits(hash + 2U))) / static_cast<float>(width);
+            const float v =
+                (static_cast<float>(row) + unitFromBits(mixBits(hash + 3U))) / static_cast<float>(height);
+            const Eigen::Vector3f place =
+                wall.foot + u * wall.along + (1.0F - v) * wall.up + kLift_m * normal;
+            lit += tracer.occluded(place, sun.direction(hash), kFar_m) ? 0 : 1;
+          }
+          image.at<uint8_t>(row, column) = static_cast<uint8_t>(255 * lit / kWallRays);
+        }
+      });
+    }
+    Material& material = scene->materials[wall.material];
+    material.sun_map = static_cast<int>(scene->textures.size());
+    material.sun_map_texels_per_m = static_cast<float>(1.0 / texel_m);
+    scene->textures.emplace_back(image, Texture::Border::kClamp);
+  }
+}
 
 void bakeGroundLight(const Eigen::Vector2d& min_m, const Eigen::Vector2d& max_m, double texel_m,
                      const std::function<double(double, double)>& ground_height, Scene* scene) {
   const RayTracer tracer(scene->mesh);
   const int width = static_cast<int>(std::lround((max_m.x() - min_m.x()) / texel_m));
   const int height = static_cast<int>(std::lround((max_m.y() - min_m.y()) / texel_m));
-  const Eigen::Vector3f sun = scene->sky->directionToSun();
-  const Eigen::Vector3f side = sun.unitOrthogonal();
-  const Eigen::Vector3f other = sun.cross(side);
+  const SunDisk sun(scene->sky->directionToSun());
   const auto placeAt = [&](double column, double row) {
     const double x = min_m.x() + (column + 0.5) * texel_m;
     const double y = min_m.y() + (row + 0.5) * texel_m;
@@ -60,11 +108,7 @@ void bakeGroundLight(const Eigen::Vector2d& min_m, const Eigen::Vector2d& max_m,
   cv::Mat sun_image(height, width, CV_8UC1);
   tbb::parallel_for(0, height, [&](int row) {
     for (int column = 0; column < width; ++column) {
-      const uint32_t hash = hashCell(column, row, 77);
-      const float radius = kSunRadius_rad * std::sqrt(unitFromBits(hash));
-      const float angle = kTwoPi * unitFromBits(mixBits(hash + 1U));
-      const Eigen::Vector3f direction =
-          (sun + radius * std::cos(angle) * side + radius * std::sin(angle) * other).normalized();
+      const Eigen::Vector3f direction = sun.direction(hashCell(column, row, 77));
       sun_image.at<uint8_t>(row, column) = tracer.occluded(placeAt(column, row), direction, kFar_m) ? 0 : 255;
     }
   });

@@ -11,7 +11,6 @@ namespace vcharge {
 namespace {
 
 constexpr double kHalfPi = 1.57079632679489661923;
-constexpr int kNumTreeVariants = 4;
 constexpr double kOccupiedBays = 0.62;
 
 void addBays(LotLayout* layout) {
@@ -45,7 +44,7 @@ void addIslands(LotLayout* layout) {
 void addPlants(Random* random, LotLayout* layout) {
   const auto tree = [&](double x, double y, double low, double high) {
     layout->trees.push_back({x, y, layout->groundHeight(x, y), random->uniform(low, high),
-                             random->uniform(0.0, 6.28), random->index(kNumTreeVariants)});
+                             random->uniform(0.0, 6.28), random->index(kNumLotTrees)});
   };
   const auto bush = [&](double x, double y, double low, double high) {
     const double radius = random->uniform(low, high);
@@ -76,6 +75,24 @@ void addPlants(Random* random, LotLayout* layout) {
   layout->hedges.push_back({{-38.5, -20.0, -37.5, 20.0}, kKerbHeight_m, 1.7});
   for (const double y : {-17.0, -8.0, 2.0, 11.0}) {
     tree(random->uniform(32.5, 34.5), y + random->uniform(-1.5, 1.5), 0.7, 1.0);
+  }
+}
+
+// Tall trees beyond the lot's fence, which hide much of the houses behind them.
+void addWoods(uint64_t seed, LotLayout* layout) {
+  Random random(seed * 69U + 5U);
+  const auto tree = [&](double x, double y) {
+    layout->trees.push_back({x, y, 0.0, random.uniform(1.1, 1.7), random.uniform(0.0, 6.28),
+                             kNumLotTrees + random.index(kNumTallTrees)});
+  };
+  for (const double side : {-1.0, 1.0}) {
+    for (double x = -37.0; x < 37.0; x += random.uniform(3.0, 8.0)) {
+      tree(x, side * random.uniform(29.6, 30.6));
+    }
+  }
+  for (double y = -27.0; y < 28.0; y += random.uniform(3.5, 8.5)) {
+    tree(random.uniform(38.0, 40.5), y);
+    tree(random.uniform(-44.0, -41.0), y);
   }
 }
 
@@ -165,6 +182,7 @@ LotLayout makeLotLayout(uint64_t seed, int day, double moved_cars) {
   addBays(&layout);
   addIslands(&layout);
   addPlants(&random, &layout);
+  addWoods(seed, &layout);
   addHouses(&layout);
   addStreetFurniture(&random, &layout);
   parkCars(seed, day, moved_cars, &layout);

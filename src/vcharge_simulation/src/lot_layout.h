@@ -16,6 +16,10 @@ struct GroundRectangle {
   double depth() const { return max_y - min_y; }
 };
 
+// Tree::variant: small trees on the lot come first, then the tall ones around it.
+constexpr int kNumLotTrees = 4;
+constexpr int kNumTallTrees = 3;
+
 /// Where everything stands on the lot. The lanes run along y = -15, 0 and 15 and x = -26 and 26.
 struct LotLayout {
   struct Bay {

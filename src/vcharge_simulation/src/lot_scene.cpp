@@ -20,9 +20,11 @@ namespace vcharge {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr int kNumTreeVariants = 4;
+constexpr double kLotLeaf_m = 0.12;
+constexpr double kTallTreeLeaf_m = 0.17;  // times the tree's scale
 constexpr double kFarGround_m = 280.0;
 constexpr double kFarTexel_m = 0.2;
+constexpr double kWallLightTexel_m = 0.12;
 constexpr double kDetailTexel_m = 0.0035;
 constexpr std::array<double, 5> kPaints = {0.025, 0.07, 0.18, 0.4, 0.72};
 
@@ -82,6 +84,7 @@ class LotBuilder {
     addHouses();
     addFurniture();
     addSkyline();
+    bakeWallLight(walls_, kWallLightTexel_m, scene_.get());
     bakeGroundLight(
         {-44.0, -34.0}, {44.0, 34.0}, options_.light_texel_m,
         [&](double x, double y) { return layout_.groundHeight(x, y); }, scene_.get());
@@ -130,7 +133,7 @@ class LotBuilder {
     leaves.texels_per_m = 0.0F;
     cv::Mat tones(1, 64, CV_8UC1);
     for (int i = 0; i < tones.cols; ++i) {
-      tones.at<uint8_t>(0, i) = static_cast<uint8_t>(random_.uniform(90.0, 255.0));
+      tones.at<uint8_t>(0, i) = cv::saturate_cast<uint8_t>(90.0 + 165.0 * i / (tones.cols - 1));
     }
     leaves.albedo = 0.22F;
     plants_.leaves = scene_->addTexturedMaterial(tones, Texture::Border::kClamp, leaves);
@@ -266,9 +269,9 @@ class LotBuilder {
 
   void addPlants() {
     std::vector<TriangleMesh> trees;
-    for (int i = 0; i < kNumTreeVariants; ++i) {
-      trees.push_back(
-          makeTree(plants_, options_.foliage_density, options_.seed * 50U + static_cast<uint64_t>(i)));
+    for (int i = 0; i < kNumLotTrees + kNumTallTrees; ++i) {
+      trees.push_back(makeTree(plants_, i < kNumLotTrees ? kLotLeaf_m : kTallTreeLeaf_m,
+                               options_.foliage_density, options_.seed * 50U + static_cast<uint64_t>(i)));
     }
     for (const LotLayout::Tree& tree : layout_.trees) {
       Eigen::Isometry3f pose = placement(tree.x, tree.y, tree.z, tree.yaw_rad);
@@ -328,6 +331,7 @@ class LotBuilder {
         const Eigen::Vector3f low_b(static_cast<float>(b.x()), static_cast<float>(b.y()), 0.0F);
         const Eigen::Vector3f up(0.0F, 0.0F, h);
         addQuad(low_a, low_b, low_b + up, low_a + up, wall, &scene_->mesh);
+        walls_.push_back({low_a, low_b - low_a, up, wall});
         top.push_back(low_a + up);
       }
       addQuad(top[0], top[1], top[2], top[3], roof, &scene_->mesh);
@@ -416,6 +420,7 @@ class LotBuilder {
   Random random_;
   std::shared_ptr<Scene> scene_;
   PlantMaterials plants_{};
+  std::vector<Wall> walls_;
   uint32_t concrete_ = 0, metal_ = 0, dark_metal_ = 0;
   std::map<std::pair<int, int>, CarMaterials> car_materials_;
 };

@@ -10,7 +10,11 @@ namespace vcharge {
 
 namespace {
 
+constexpr double kLeaf_m = 0.075;
 constexpr double kTwoPi = 6.28318530717958647692;
+// Leaves in a ball of foliage, times the square of leaf length over radius: enough to hide most of what is
+// behind.
+constexpr double kLeafAreaPerBall = 13.0;
 
 Eigen::Vector3d randomDirection(Random* random) {
   const double z = random->uniform(-1.0, 1.0);
@@ -20,18 +24,22 @@ Eigen::Vector3d randomDirection(Random* random) {
 }
 
 // A leaf is one triangle that points and faces anywhere near `outwards`. `ambient` is the light that reaches
-// it; its u coordinate picks its tone from the leaves' texture.
+// it; its u coordinate picks its tone from the leaves' texture, dark to bright. A triangle larger than a leaf
+// stands for as many leaves as it covers: their tones and shades average.
 void addLeaf(const Eigen::Vector3d& position, const Eigen::Vector3d& outwards, double size_m, double ambient,
              uint32_t material, Random* random, TriangleMesh* mesh) {
-  const Eigen::Vector3d normal = (outwards + 0.9 * randomDirection(random)).normalized();
+  const double averaging = std::max(1.0, size_m / kLeaf_m);
+  const Eigen::Vector3d scatter = 0.9 * randomDirection(random);
+  const Eigen::Vector3d normal = (outwards + scatter).normalized();
   const Eigen::Vector3d along = normal.cross(randomDirection(random)).normalized() * size_m;
   const Eigen::Vector3d across = normal.cross(along) * 0.42;
   const auto first = static_cast<uint32_t>(mesh->vertices.size());
   MeshVertex vertex;
   // Shading follows the crown as a whole more than the single leaf: leaves scatter light among each other.
-  vertex.normal = (0.6 * outwards + normal).normalized().cast<float>();
+  const Eigen::Vector3d mean_normal = (outwards + scatter / averaging).normalized();
+  vertex.normal = (0.6 * outwards + mean_normal).normalized().cast<float>();
   vertex.ambient = static_cast<float>(ambient);
-  vertex.u = static_cast<float>(random->uniform());
+  vertex.u = static_cast<float>(0.5 + random->uniform(-0.5, 0.5) / averaging);
   vertex.v = 0.5F;
   for (const Eigen::Vector3d& corner :
        {Eigen::Vector3d(position - 0.5 * along - across), Eigen::Vector3d(position - 0.5 * along + across),
@@ -85,7 +93,7 @@ void addEllipsoid(const Eigen::Vector3d& centre, const Eigen::Vector3d& radii, u
 
 }  // namespace
 
-TriangleMesh makeTree(const PlantMaterials& materials, double density, uint64_t seed) {
+TriangleMesh makeTree(const PlantMaterials& materials, double leaf_m, double density, uint64_t seed) {
   Random random(seed);
   TriangleMesh mesh;
   const double trunk_m = random.uniform(1.7, 2.6);
@@ -102,7 +110,7 @@ TriangleMesh makeTree(const PlantMaterials& materials, double density, uint64_t 
     radius *= 0.85;
   }
   const Eigen::Vector3d crown = joint + Eigen::Vector3d(0.0, 0.0, 0.5 * crown_height_m);
-  const int num_balls = 22 + random.index(10);
+  const int num_balls = 30 + random.index(10);
   for (int i = 0; i < num_balls; ++i) {
     const Eigen::Vector3d direction = randomDirection(&random);
     const double reach = random.uniform(0.45, 1.0);
@@ -110,10 +118,11 @@ TriangleMesh makeTree(const PlantMaterials& materials, double density, uint64_t 
                                                        crown_radius_m, crown_radius_m, crown_height_m));
     addFrustum(joint.cast<float>(), centre.cast<float>(), static_cast<float>(0.4 * radius), 0.01F, 5, false,
                materials.bark, &mesh);
-    const double ball = random.uniform(0.4, 0.8);
+    const double ball = random.uniform(0.5, 0.95);
     const double shade = std::clamp(0.45 + 0.35 * reach + 0.25 * direction.z(), 0.2, 1.0);
-    addLeafBall(centre, {ball, ball, 0.75 * ball}, static_cast<int>(density * 480.0 * ball * ball / 0.36),
-                0.10, shade, materials.leaves, &random, &mesh);
+    addLeafBall(centre, {ball, ball, 0.75 * ball},
+                static_cast<int>(density * kLeafAreaPerBall * ball * ball / (leaf_m * leaf_m)), leaf_m, shade,
+                materials.leaves, &random, &mesh);
   }
   return mesh;
 }

@@ -10,8 +10,9 @@ struct PlantMaterials {
   uint32_t bark, leaves, dark_core;
 };
 
-/// A tree about 6 m high at the origin; every leaf is a triangle. `density` scales the number of leaves.
-TriangleMesh makeTree(const PlantMaterials& materials, double density, uint64_t seed);
+/// A tree about 6 m high at the origin; every leaf is a triangle of the given length, and there are as many
+/// as fill the crown. `density` scales their number.
+TriangleMesh makeTree(const PlantMaterials& materials, double leaf_m, double density, uint64_t seed);
 /// A bush of the given radius and height at the origin.
 TriangleMesh makeBush(const PlantMaterials& materials, double radius_m, double height_m, double density,
                       uint64_t seed);

@@ -8,6 +8,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "ground_finder.h"
 #include "ray_tracer.h"
 #include "surface_shader.h"
 
@@ -26,14 +27,16 @@ class BlockRenderer {
  public:
   BlockRenderer(const Scene& scene, const RayTracer& tracer, const CameraView& view,
                 const RigidTransform& world_from_vehicle)
-      : tracer_(tracer), shader_(scene), view_(view), sun_(scene.sky->directionToSun()) {
-    const RigidTransform world_from_camera = world_from_vehicle * *view.camera().vehicle_from_camera;
-    rotation_ = world_from_camera.rotationMatrix().cast<float>();
-    origin_ = world_from_camera.translation().cast<float>();
-    vehicle_rotation_ = world_from_vehicle.rotationMatrix().cast<float>();
-    vehicle_origin_ = world_from_vehicle.translation().cast<float>();
-    sun_in_vehicle_ = vehicle_rotation_.transpose() * sun_;
-  }
+      : tracer_(tracer),
+        shader_(scene),
+        view_(view),
+        sun_(scene.sky->directionToSun()),
+        vehicle_rotation_(world_from_vehicle.rotationMatrix().cast<float>()),
+        vehicle_origin_(world_from_vehicle.translation().cast<float>()),
+        sun_in_vehicle_(vehicle_rotation_.transpose() * sun_),
+        rotation_((world_from_vehicle * *view.camera().vehicle_from_camera).rotationMatrix().cast<float>()),
+        origin_((world_from_vehicle * *view.camera().vehicle_from_camera).translation().cast<float>()),
+        ground_(tracer, shader_, view, rotation_, origin_) {}
 
   void render(int block_x, int block_y, cv::Mat* light) const {
     const size_t block = static_cast<size_t>(block_y) * view_.blocksPerRow() + block_x;
@@ -42,6 +45,10 @@ class BlockRenderer {
       return;
     }
     RTCRayHit16 rays;
+    if (const GroundFinder::Plane* plane = ground_.planeOf(block); plane != nullptr) {
+      renderGround(block_x, block_y, *plane, light);
+      return;
+    }
     const uint32_t body_mask = view_.blockBodyMask(block);
     trace(block, pixels, body_mask, &rays);
     std::array<float, 4> sun_visibility{1.0F, 1.0F, 1.0F, 1.0F};
@@ -53,6 +60,16 @@ class BlockRenderer {
       }
       const int x = 2 * block_x + p % 2;
       const int y = 2 * block_y + p / 2;
+      if (meetsOneTriangle(rays, p, body_mask)) {
+        const float footprint_m = rays.ray.tfar[4 * p] * view_.pixelAngle(x, y);
+        light->at<float>(y, x) =
+            shader_.shadePixel(
+                {surfacePoint(rays, 4 * p, footprint_m), surfacePoint(rays, 4 * p + 1, footprint_m),
+                 surfacePoint(rays, 4 * p + 2, footprint_m), surfacePoint(rays, 4 * p + 3, footprint_m)},
+                sun_visibility[static_cast<size_t>(p)]) *
+            view_.vignette().at<float>(y, x);
+        continue;
+      }
       float sum = 0.0F;
       float sky = -1.0F;
       for (int s = 0; s < CameraView::kSamplesPerPixel; ++s) {
@@ -78,6 +95,15 @@ class BlockRenderer {
     return {rays.ray.dir_x[i], rays.ray.dir_y[i], rays.ray.dir_z[i]};
   }
 
+  static bool meetsOneTriangle(const RTCRayHit16& rays, int pixel, uint32_t body_mask) {
+    const int i = CameraView::kSamplesPerPixel * pixel;
+    const uint32_t triangle = rays.hit.primID[i];
+    return (body_mask >> i & 0xFU) == 0 && rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID &&
+           rays.hit.geomID[i + 1] != RTC_INVALID_GEOMETRY_ID && rays.hit.primID[i + 1] == triangle &&
+           rays.hit.geomID[i + 2] != RTC_INVALID_GEOMETRY_ID && rays.hit.primID[i + 2] == triangle &&
+           rays.hit.geomID[i + 3] != RTC_INVALID_GEOMETRY_ID && rays.hit.primID[i + 3] == triangle;
+  }
+
   SurfacePoint surfacePoint(const RTCRayHit16& rays, int i, float footprint_m) const {
     SurfacePoint point;
     point.direction = direction(rays, i);
@@ -88,6 +114,33 @@ class BlockRenderer {
     point.v = rays.hit.v[i];
     point.footprint_m = footprint_m;
     return point;
+  }
+
+  void renderGround(int block_x, int block_y, const GroundFinder::Plane& plane, cv::Mat* light) const {
+    const float* rays = view_.blockRays(static_cast<size_t>(block_y) * view_.blocksPerRow() + block_x);
+    const Material& material = shader_.materialOf(plane.triangle);
+    // In the camera frame, where the rays are given.
+    const Eigen::Vector3f normal = rotation_.transpose() * plane.normal;
+    const float distance = plane.offset - plane.normal.dot(origin_);
+    for (int p = 0; p < 4; ++p) {
+      const int x = 2 * block_x + p % 2;
+      const int y = 2 * block_y + p / 2;
+      std::array<Eigen::Vector3f, CameraView::kSamplesPerPixel> positions;
+      Eigen::Vector3f middle = Eigen::Vector3f::Zero();
+      float range_m = 0.0F;
+      for (int s = 0; s < CameraView::kSamplesPerPixel; ++s) {
+        const float* sample = rays + CameraView::kSamplesPerPixel * p + s;
+        const Eigen::Vector3f ray(sample[0], sample[kSamples], sample[2 * kSamples]);
+        const float along = distance / normal.dot(ray);
+        range_m += 0.25F * along;
+        positions[static_cast<size_t>(s)] = origin_ + along * (rotation_ * ray);
+        middle += 0.25F * positions[static_cast<size_t>(s)];
+      }
+      const float sun_visibility = shadowedByBody(middle) ? 0.0F : 1.0F;
+      light->at<float>(y, x) = shader_.shadeGroundPixel(material, positions, (middle - origin_) / range_m,
+                                                        range_m * view_.pixelAngle(x, y), sun_visibility) *
+                               view_.vignette().at<float>(y, x);
+    }
   }
 
   void trace(size_t block, uint8_t pixels, uint32_t body_mask, RTCRayHit16* rays) const {
@@ -198,9 +251,12 @@ class BlockRenderer {
   const RayTracer& tracer_;
   const SurfaceShader shader_;
   const CameraView& view_;
-  Eigen::Vector3f sun_, sun_in_vehicle_;
-  Eigen::Matrix3f rotation_, vehicle_rotation_;
-  Eigen::Vector3f origin_, vehicle_origin_;
+  const Eigen::Vector3f sun_;
+  const Eigen::Matrix3f vehicle_rotation_;
+  const Eigen::Vector3f vehicle_origin_, sun_in_vehicle_;
+  const Eigen::Matrix3f rotation_;  // of the camera
+  const Eigen::Vector3f origin_;
+  const GroundFinder ground_;
 };
 
 }  // namespace
@@ -218,6 +274,8 @@ cv::Mat Renderer::renderLight(const CameraView& view, const RigidTransform& worl
       renderer.render(block_x, block_y, &light);
     }
   });
+  view.blur().apply(&light);
+  light += cv::Scalar(view.lens().veil * cv::mean(light)[0]);
   return light;
 }
 

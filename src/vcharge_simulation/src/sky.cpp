@@ -10,6 +10,9 @@ namespace vcharge {
 namespace {
 
 constexpr int kCloudTextureSize = 1024;
+// A hazy sky is brighter to the camera than the light that it gives to the ground says: as in the real
+// images, it nearly saturates where the ground is well exposed.
+constexpr float kGlare = 2.8F;
 
 // Noise on a torus: blends four shifted copies so that the texture repeats without a seam.
 float periodicNoise(float x, float y, float period, uint32_t seed) {
@@ -58,7 +61,7 @@ float Sky::radiance(const Eigen::Vector3f& direction) const {
   const float towards_sun = 1.0F - direction.dot(direction_to_sun_);
   const float glow = 0.06F / (towards_sun + 0.012F);
   const float cloudy = 1.25F + 0.25F * haze + 0.5F * glow;
-  return static_cast<float>(light_.sky_irradiance) * 2.0F * (clear + cloud * (cloudy - clear) + glow);
+  return static_cast<float>(light_.sky_irradiance) * kGlare * (clear + cloud * (cloudy - clear) + glow);
 }
 
 }  // namespace vcharge

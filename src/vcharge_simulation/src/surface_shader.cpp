@@ -8,10 +8,23 @@ namespace vcharge {
 namespace {
 
 constexpr float kDetailContrast = 0.75F;
+// Coarser levels of the details are even.
+constexpr float kMaxDetailLevel = 4.0F;
 
 // Reflections see trees and houses, not sky, below this elevation (its sine).
 constexpr float kSkylineSine = 0.22F;
 constexpr float kSkylineLight = 0.10F;
+
+// Length over width of what a round cone of rays covers on level ground.
+float stretchOf(const Eigen::Vector3f& direction) {
+  return 1.0F / std::max(0.02F, std::abs(direction.z()));
+}
+
+// The four samples of a pixel lie in four rows and columns: along a stretched footprint they are taps a
+// quarter of the pixel apart, so that only the part between them has to be averaged by the pyramid.
+float groundSampleWidth(float footprint_m, float stretch) {
+  return std::max(footprint_m * 0.6F * std::sqrt(stretch), footprint_m * 0.2F * stretch);
+}
 
 }  // namespace
 
@@ -21,68 +34,141 @@ float SurfaceShader::ambient(const Eigen::Vector3f& normal) const {
          static_cast<float>(sky_.light().bounce_irradiance) * (1.0F - up);
 }
 
-float SurfaceShader::groundAlbedo(int layer, float x_m, float y_m, float footprint_m, float stretch) const {
-  // The four samples of a pixel lie in four rows and columns: along a stretched footprint they are taps a
-  // quarter of the pixel apart, so that only the part between them has to be averaged by the pyramid.
-  const float width_m = std::max(footprint_m * 0.6F * std::sqrt(stretch), footprint_m * 0.2F * stretch);
-  const GroundTexture& texture = scene_.ground.layers[static_cast<size_t>(layer)];
-  const float level = fastLog2(width_m * texture.texels_per_m);
-  float albedo = kGroundLayerAlbedo * texture.sampleAt(x_m, y_m, level);
+float SurfaceShader::detailFactor(const Eigen::Vector3f& position, float width_m) const {
+  float factor = 1.0F;
   for (const GroundTexture& detail : scene_.ground.details) {
-    const float detail_level = fastLog2(width_m * detail.texels_per_m);
-    if (detail_level < 4.0F) {
-      albedo *= 1.0F + kDetailContrast * (detail.sampleAt(x_m, y_m, detail_level) - 0.5F);
+    const float level = fastLog2(width_m * detail.texels_per_m);
+    if (level < kMaxDetailLevel) {
+      factor *= 1.0F + kDetailContrast * (detail.sampleAt(position.x(), position.y(), level) - 0.5F);
     }
   }
-  return albedo;
+  return factor;
+}
+
+float SurfaceShader::groundLight(const Eigen::Vector3f& position, float width_m, float sun_visibility) const {
+  float surrounding = 1.0F;
+  if (scene_.ground.sun != nullptr) {
+    const float level = fastLog2(width_m * scene_.ground.sun->texels_per_m);
+    sun_visibility *= scene_.ground.sun->sampleAt(position.x(), position.y(), level);
+    surrounding = scene_.ground.surrounding->sampleAt(position.x(), position.y(), 0.0F);
+  }
+  return static_cast<float>(sky_.light().sun_irradiance) * sky_.directionToSun().z() * sun_visibility +
+         static_cast<float>(sky_.light().sky_irradiance) * surrounding;
+}
+
+float SurfaceShader::shadeGroundPixel(const Material& material,
+                                      const std::array<Eigen::Vector3f, 4>& positions,
+                                      const Eigen::Vector3f& direction, float footprint_m,
+                                      float sun_visibility) const {
+  const float stretch = stretchOf(direction);
+  const GroundTexture& texture = scene_.ground.layers[static_cast<size_t>(material.texture)];
+  const float level = fastLog2(groundSampleWidth(footprint_m, stretch) * texture.texels_per_m);
+  float albedo = 0.0F;
+  for (const Eigen::Vector3f& position : positions) {
+    albedo += 0.25F * texture.sampleAt(position.x(), position.y(), level);
+  }
+  // The finer details at the middles of the two halves of the pixel, cut across its longer side.
+  const Eigen::Vector3f upper = 0.5F * (positions[0] + positions[1]);
+  const Eigen::Vector3f lower = 0.5F * (positions[2] + positions[3]);
+  const Eigen::Vector3f left = 0.5F * (positions[0] + positions[2]);
+  const Eigen::Vector3f right = 0.5F * (positions[1] + positions[3]);
+  const bool tall = (upper - lower).squaredNorm() > (left - right).squaredNorm();
+  const float width_m = footprint_m * std::max(0.8F * std::sqrt(stretch), 0.4F * stretch);
+  const float detail =
+      0.5F * (detailFactor(tall ? upper : left, width_m) + detailFactor(tall ? lower : right, width_m));
+  const Eigen::Vector3f middle = 0.5F * (upper + lower);
+  return kGroundLayerAlbedo * albedo * detail *
+         groundLight(middle, footprint_m * std::sqrt(stretch), sun_visibility);
 }
 
 float SurfaceShader::shade(const SurfacePoint& point, float sun_visibility) const {
-  const MeshTriangle& triangle = scene_.mesh.triangles[point.triangle];
-  const Material& material = scene_.materials[triangle.material];
-  const float sun = static_cast<float>(sky_.light().sun_irradiance);
+  const Material& material = materialOf(point.triangle);
   if (material.mapping == Material::Mapping::kGround) {
-    const float x = point.position.x();
-    const float y = point.position.y();
-    const float stretch = 1.0F / std::max(0.02F, std::abs(point.direction.z()));
-    const float albedo = groundAlbedo(material.texture, x, y, point.footprint_m, stretch);
-    float surrounding = 1.0F;
-    if (scene_.ground.sun != nullptr) {
-      const float width_m = point.footprint_m * std::sqrt(stretch);
-      const float level = fastLog2(width_m * scene_.ground.sun->texels_per_m);
-      sun_visibility *= scene_.ground.sun->sampleAt(x, y, level);
-      surrounding = scene_.ground.surrounding->sampleAt(x, y, 0.0F);
-    }
-    return albedo * (sun * sky_.directionToSun().z() * sun_visibility +
-                     static_cast<float>(sky_.light().sky_irradiance) * surrounding);
+    const float stretch = stretchOf(point.direction);
+    const GroundTexture& texture = scene_.ground.layers[static_cast<size_t>(material.texture)];
+    const float width_m = groundSampleWidth(point.footprint_m, stretch);
+    const float albedo =
+        kGroundLayerAlbedo *
+        texture.sampleAt(point.position.x(), point.position.y(), fastLog2(width_m * texture.texels_per_m)) *
+        detailFactor(point.position, width_m);
+    return albedo * groundLight(point.position, point.footprint_m * std::sqrt(stretch), sun_visibility);
   }
+  const Interpolated surface = interpolate(point);
+  return lightOf(point, surface, albedoAt(point, surface), sun_visibility);
+}
+
+float SurfaceShader::shadePixel(const std::array<SurfacePoint, 4>& points, float sun_visibility) const {
+  const Material& material = materialOf(points[0].triangle);
+  if (material.mapping == Material::Mapping::kGround) {
+    return shadeGroundPixel(material,
+                            {points[0].position, points[1].position, points[2].position, points[3].position},
+                            points[0].direction, points[0].footprint_m, sun_visibility);
+  }
+  const Interpolated surface = interpolate(points[0]);
+  float albedo = material.albedo;
+  if (material.mapping == Material::Mapping::kTexture) {
+    albedo = 0.0F;
+    for (const SurfacePoint& point : points) {
+      albedo += 0.25F * albedoAt(point, interpolate(point));
+    }
+  }
+  return lightOf(points[0], surface, albedo, sun_visibility);
+}
+
+SurfaceShader::Interpolated SurfaceShader::interpolate(const SurfacePoint& point) const {
+  const MeshTriangle& triangle = scene_.mesh.triangles[point.triangle];
   const MeshVertex& a = scene_.mesh.vertices[triangle.vertices[0]];
   const MeshVertex& b = scene_.mesh.vertices[triangle.vertices[1]];
   const MeshVertex& c = scene_.mesh.vertices[triangle.vertices[2]];
   const float wa = 1.0F - point.u - point.v;
-  Eigen::Vector3f normal = (wa * a.normal + point.u * b.normal + point.v * c.normal).normalized();
-  const float towards = point.direction.dot(normal);
-  if (towards > 0.0F && material.two_sided) {
-    normal = -normal;
+  Interpolated surface;
+  surface.normal = (wa * a.normal + point.u * b.normal + point.v * c.normal).normalized();
+  surface.towards = point.direction.dot(surface.normal);
+  if (surface.towards > 0.0F && scene_.materials[triangle.material].two_sided) {
+    surface.normal = -surface.normal;
   }
-  float albedo = material.albedo;
-  if (material.mapping == Material::Mapping::kTexture) {
-    const Texture& texture = scene_.textures[static_cast<size_t>(material.texture)];
-    const float u = wa * a.u + point.u * b.u + point.v * c.u;
-    const float v = wa * a.v + point.u * b.v + point.v * c.v;
-    const float stretch = 1.0F / std::max(0.05F, std::abs(towards));
-    const float level = fastLog2(0.6F * point.footprint_m * std::sqrt(stretch) * material.texels_per_m);
-    albedo *= texture.sample(u * static_cast<float>(texture.width()),
-                             v * static_cast<float>(texture.height()), level);
+  surface.u = wa * a.u + point.u * b.u + point.v * c.u;
+  surface.v = wa * a.v + point.u * b.v + point.v * c.v;
+  surface.occlusion = wa * a.ambient + point.u * b.ambient + point.v * c.ambient;
+  return surface;
+}
+
+float SurfaceShader::albedoAt(const SurfacePoint& point, const Interpolated& surface) const {
+  const Material& material = materialOf(point.triangle);
+  if (material.mapping != Material::Mapping::kTexture) {
+    return material.albedo;
   }
-  const float occlusion = wa * a.ambient + point.u * b.ambient + point.v * c.ambient;
-  const float to_sun = normal.dot(sky_.directionToSun());
+  const Texture& texture = scene_.textures[static_cast<size_t>(material.texture)];
+  const float stretch = 1.0F / std::max(0.05F, std::abs(surface.towards));
+  const float level = fastLog2(0.6F * point.footprint_m * std::sqrt(stretch) * material.texels_per_m);
+  return material.albedo * texture.sample(surface.u * static_cast<float>(texture.width()),
+                                          surface.v * static_cast<float>(texture.height()), level);
+}
+
+float SurfaceShader::sunMapAt(const SurfacePoint& point, const Interpolated& surface) const {
+  const Material& material = materialOf(point.triangle);
+  if (material.sun_map < 0) {
+    return 1.0F;
+  }
+  const Texture& map = scene_.textures[static_cast<size_t>(material.sun_map)];
+  const float stretch = 1.0F / std::max(0.05F, std::abs(surface.towards));
+  const float level = fastLog2(point.footprint_m * std::sqrt(stretch) * material.sun_map_texels_per_m);
+  return map.sample(surface.u * static_cast<float>(map.width()), surface.v * static_cast<float>(map.height()),
+                    level);
+}
+
+float SurfaceShader::lightOf(const SurfacePoint& point, const Interpolated& surface, float albedo,
+                             float sun_visibility) const {
+  const Material& material = materialOf(point.triangle);
+  const auto sun = static_cast<float>(sky_.light().sun_irradiance);
+  const float to_sun = surface.normal.dot(sky_.directionToSun());
   const float lit = std::max(to_sun, 0.0F) + material.translucency * std::max(-to_sun, 0.0F);
-  float light = albedo * (sun * lit * sun_visibility + ambient(normal) * occlusion);
-  if (material.reflectivity > 0.0F) {
-    light += occlusion * reflection(material, point.position, normal, point.direction);
-  }
-  return light;
+  sun_visibility *= sunMapAt(point, surface);
+  const float light = albedo * (sun * lit * sun_visibility + ambient(surface.normal) * surface.occlusion);
+  return material.reflectivity > 0.0F
+             ? light +
+                   surface.occlusion * reflection(material, point.position, surface.normal, point.direction)
+             : light;
 }
 
 float SurfaceShader::reflection(const Material& material, const Eigen::Vector3f& position,

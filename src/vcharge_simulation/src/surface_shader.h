@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include <Eigen/Core>
 
 #include "vcharge_simulation/scene.h"
@@ -24,11 +26,20 @@ class SurfaceShader {
   const Material& materialOf(uint32_t triangle) const {
     return scene_.materials[scene_.mesh.triangles[triangle].material];
   }
-  /// True when the sun's visibility of this surface is baked into the ground's light map.
-  static bool hasBakedSun(const Material& material) { return material.mapping == Material::Mapping::kGround; }
+  uint32_t materialIndexOf(uint32_t triangle) const { return scene_.mesh.triangles[triangle].material; }
+  /// True when the sun's visibility of this surface is baked into a light map.
+  static bool hasBakedSun(const Material& material) {
+    return material.mapping == Material::Mapping::kGround || material.sun_map >= 0;
+  }
 
-  /// sun_visibility: 0 in shadow, 1 in the sun (times the light map for the ground).
+  /// sun_visibility: 0 in shadow, 1 in the sun (times the light map where there is one).
   float shade(const SurfacePoint& point, float sun_visibility) const;
+  /// Mean light of a pixel whose four samples all meet the same triangle: its light is found once.
+  float shadePixel(const std::array<SurfacePoint, 4>& points, float sun_visibility) const;
+  /// Mean light of a pixel whose four samples (of CameraView's rotated grid) all meet one ground material at
+  /// `positions`, about `direction`.
+  float shadeGroundPixel(const Material& material, const std::array<Eigen::Vector3f, 4>& positions,
+                         const Eigen::Vector3f& direction, float footprint_m, float sun_visibility) const;
   /// Light of the sky, or of the ground where the direction points down; for reflections.
   float surroundings(const Eigen::Vector3f& position, const Eigen::Vector3f& direction) const;
   /// Light of a plain surface (the own car) in the world frame.
@@ -37,7 +48,19 @@ class SurfaceShader {
   float skyRadiance(const Eigen::Vector3f& direction) const { return sky_.radiance(direction); }
 
  private:
-  float groundAlbedo(int layer, float x_m, float y_m, float footprint_m, float stretch) const;
+  struct Interpolated {
+    Eigen::Vector3f normal;  ///< of the surface, turned to the viewer where the material is two-sided
+    float towards;           ///< cosine between the ray and the normal before it was turned
+    float u, v;              ///< texture coordinates
+    float occlusion;         ///< share of the surroundings' light
+  };
+  Interpolated interpolate(const SurfacePoint& point) const;
+  float albedoAt(const SurfacePoint& point, const Interpolated& surface) const;
+  float sunMapAt(const SurfacePoint& point, const Interpolated& surface) const;
+  float lightOf(const SurfacePoint& point, const Interpolated& surface, float albedo,
+                float sun_visibility) const;
+  float detailFactor(const Eigen::Vector3f& position, float width_m) const;
+  float groundLight(const Eigen::Vector3f& position, float width_m, float sun_visibility) const;
   float ambient(const Eigen::Vector3f& normal) const;
   float reflection(const Material& material, const Eigen::Vector3f& position, const Eigen::Vector3f& normal,
                    const Eigen::Vector3f& direction) const;

@@ -9,11 +9,11 @@ namespace vcharge {
 
 /// From light on the sensor to gray levels, and the sensor's noise.
 struct CameraResponseOptions {
-  double exposure = 1.0;         ///< gain on the light
+  double exposure = 0.7;         ///< gain on the light
   double shoulder = 1.6;         ///< light at which highlights are compressed by half; larger is more linear
   double gamma = 0.62;           ///< exponent of the gray curve
-  double photon_noise = 0.0011;  ///< variance of the light per unit of light
-  double read_noise = 0.0012;    ///< standard deviation of the light in the dark
+  double photon_noise = 1.5e-5;  ///< variance of the light per unit of light
+  double read_noise = 5e-4;      ///< standard deviation of the light in the dark
   void validate() const;         ///< throws std::invalid_argument naming the field
 };
 

@@ -7,12 +7,13 @@
 #include <opencv2/core.hpp>
 
 #include "vcharge_core/camera_rig.h"
+#include "vcharge_simulation/lens_blur.h"
 #include "vcharge_simulation/vehicle_body.h"
 
 namespace vcharge {
 
 /// All about one camera of a vehicle that stays the same from frame to frame: the rays of every pixel's four
-/// samples, the samples that meet the own car, and the vignette. Immutable, thread safe.
+/// samples, the samples that meet the own car, the vignette and the lens' blur. Immutable, thread safe.
 ///
 /// Pixels are grouped in blocks of 2x2; sample 4 * p + s of a block is sample s (of a rotated grid) of pixel
 /// p (row-major).
@@ -28,7 +29,8 @@ class CameraView {
   };
 
   /// The camera must have vehicle_from_camera (std::logic_error otherwise); `body` may be null.
-  CameraView(const RigCamera& camera, std::shared_ptr<const VehicleBody> body);
+  CameraView(const RigCamera& camera, std::shared_ptr<const VehicleBody> body,
+             const LensOptions& lens = LensOptions());
 
   const RigCamera& camera() const { return camera_; }
   const VehicleBody* body() const { return body_.get(); }
@@ -54,7 +56,9 @@ class CameraView {
   float pixelAngle(int x, int y) const { return pixel_angle_rad_[static_cast<size_t>(y) * size().width + x]; }
   /// CV_32FC1 share of the light that the lens lets through.
   const cv::Mat& vignette() const { return vignette_; }
-  /// CV_8UC1: 0 where any sample of the pixel or of a neighbour meets the own car, 255 elsewhere.
+  const LensOptions& lens() const { return lens_; }
+  const LensBlur& blur() const { return blur_; }
+  /// CV_8UC1: 0 where any sample of the pixel or of one within two pixels meets the own car, 255 elsewhere.
   const cv::Mat& mask() const { return mask_; }
 
  private:
@@ -63,6 +67,7 @@ class CameraView {
   void findBody();
 
   RigCamera camera_;
+  LensOptions lens_;
   std::shared_ptr<const VehicleBody> body_;
   int blocks_per_row_, block_rows_;
   std::vector<float> sample_rays_;
@@ -73,6 +78,7 @@ class CameraView {
   std::vector<Eigen::Vector3f> centre_rays_;
   std::vector<float> pixel_angle_rad_;
   cv::Mat vignette_, mask_;
+  LensBlur blur_;
 };
 
 }  // namespace vcharge

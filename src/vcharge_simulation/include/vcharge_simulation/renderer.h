@@ -23,7 +23,8 @@ class Renderer {
 
   const Scene& scene() const { return *scene_; }
 
-  /// Light on the sensor (CV_32FC1, 1 is white in the sun), 0 outside the field of view.
+  /// Light on the sensor (CV_32FC1, 1 is white in the sun), blurred by the lens; outside the field of view
+  /// only the light that the lens scatters.
   cv::Mat renderLight(const CameraView& view, const RigidTransform& world_from_vehicle) const;
 
   /// Distance in metres along the ray through each pixel's centre (CV_32FC1): NaN where it meets nothing of

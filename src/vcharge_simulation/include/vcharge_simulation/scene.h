@@ -20,8 +20,10 @@ enum class SurfaceKind : uint8_t { kGround, kKerb, kCar, kBuilding, kPlant, kPol
 struct Material {
   enum class Mapping : uint8_t { kPlain, kTexture, kGround };
   Mapping mapping = Mapping::kPlain;
-  int texture = -1;             ///< into Scene::textures (kTexture) or Scene::ground.layers (kGround)
-  float albedo = 0.5F;          ///< reflectance where the texture is 1
+  int texture = -1;     ///< into Scene::textures (kTexture) or Scene::ground.layers (kGround)
+  float albedo = 0.5F;  ///< reflectance where the texture is 1
+  int sun_map = -1;     ///< into Scene::textures: share of the sun that reaches the surface; -1: traced
+  float sun_map_texels_per_m = 1.0F;
   float texels_per_m = 100.0F;  ///< of the texture on the surface, for the level of detail
   float reflectivity = 0.0F;    ///< at normal incidence; 0.04 for paint and glass
   float translucency = 0.0F;    ///< share of the light on the back that leaves through the front

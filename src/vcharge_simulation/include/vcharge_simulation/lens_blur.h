@@ -1,0 +1,37 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+
+namespace vcharge {
+
+/// Point spread of a fisheye lens: nearly Gaussian, and wider towards the rim. The defaults give the
+/// simulated lot the fall-off of the spectrum that the V-Charge images have, at every angle from the axis.
+struct LensOptions {
+  double blur_axis_px = 0.35;  ///< standard deviation on the optical axis, in pixels of a 1280x800 image
+  double blur_rim_px = 0.80;   ///< 90 degrees away from it; between, it grows with the angle to the power 1.5
+  double veil = 0.08;          ///< share of the mean light that the lens scatters evenly over the sensor
+
+  void validate() const;  ///< throws std::invalid_argument naming the field
+  /// Standard deviation at an angle from the axis, for an image `image_scale` times as large as 1280x800.
+  double blurAt(double angle_rad, double image_scale) const;
+};
+
+/// Blurs an image by a Gaussian of another width at every pixel: repeated steps of diffusion along rows and
+/// columns. Immutable, thread safe; same bytes on any number of threads.
+class LensBlur {
+ public:
+  LensBlur() = default;
+  /// `sigma_px`: CV_32FC1, the standard deviation at each pixel, at most kMaxSigma_px.
+  explicit LensBlur(const cv::Mat& sigma_px);
+
+  static constexpr double kMaxSigma_px = 1.4;
+
+  /// In place; `light` is CV_32FC1 of the same size. Neighbours beyond the border repeat it.
+  void apply(cv::Mat* light) const;
+
+ private:
+  int num_steps_ = 0;
+  cv::Mat spread_;  // share of each neighbour's difference that flows in per step
+};
+
+}  // namespace vcharge
