@@ -6,6 +6,7 @@ import pathlib
 import sys
 import unittest
 
+import rosbag
 import rospkg
 import rospy
 import rostest
@@ -31,6 +32,18 @@ class OfflineTest(unittest.TestCase):
         bag = self.drive.rewrite("blind.bag", lambda topic, message: (
             [] if topic == "/ground_truth" else [(topic, message)]))
         status, output, errors = self.drive.compute_range_maps(self.drive.folder / "blind", bag)
+        self.assertEqual((status, errors), (0, []))
+        self.assertEqual(content_hash(output), self.reference_hash)
+
+    def test_odometry_that_runs_on_after_the_images_changes_nothing(self):
+        path = self.drive.rewrite("runs_on.bag", lambda topic, message: [(topic, message)])
+        last = [message for topic, message in self.drive.messages() if topic == "/odom"][-1]
+        with rosbag.Bag(str(path), "a") as bag:
+            for i in range(1, 250):
+                standing = copy.deepcopy(last)
+                standing.header.stamp += rospy.Duration.from_sec(0.02 * i)
+                bag.write("/odom", standing, standing.header.stamp)
+        status, output, errors = self.drive.compute_range_maps(self.drive.folder / "runs_on", path)
         self.assertEqual((status, errors), (0, []))
         self.assertEqual(content_hash(output), self.reference_hash)
 
@@ -135,7 +148,6 @@ class OfflineTest(unittest.TestCase):
 
         # In the order of the recording, as a recorder with a stepped clock leaves it.
         path = self.drive.folder / "jump.bag"
-        import rosbag
         with rosbag.Bag(str(path), "w") as bag:
             for topic, message in self.drive.messages():
                 stamp = message.header.stamp
@@ -154,7 +166,6 @@ class OfflineTest(unittest.TestCase):
             return [] if stopped else [(topic, message)]
 
         path = self.drive.rewrite("stopped.bag", stop_front)
-        import rosbag
         with rosbag.Bag(str(path), "a") as bag:
             for i in range(1, 60):
                 later = left.header.stamp + rospy.Duration.from_sec(0.08 * i)

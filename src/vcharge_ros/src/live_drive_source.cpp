@@ -1,5 +1,6 @@
 #include "vcharge_ros/live_drive_source.h"
 
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <mutex>
@@ -212,7 +213,8 @@ void LiveDriveSourceOptions::validate() const {
   topics.validate();
   requireField(image_queue_size >= 0, "image_queue_size", "must not be negative", image_queue_size);
   requireField(odometry_queue_size >= 0, "odometry_queue_size", "must not be negative", odometry_queue_size);
-  requireField(sort_window_s >= 0.0, "sort_window_s", "must not be negative", sort_window_s);
+  requireField(std::isfinite(sort_window_s) && sort_window_s >= 0.0, "sort_window_s",
+               "must be finite and not negative", sort_window_s);
   requireField(idle_flush_s > 0.0, "idle_flush_s", "must be positive", idle_flush_s);
   requireField(max_silence_s > 0.0, "max_silence_s", "must be positive", max_silence_s);
 }
