@@ -283,7 +283,7 @@ void BagReading::run(const DriveSource::ProgressCallback& progress) {
 }  // namespace
 
 void BagDriveSourceOptions::validate() const {
-  topics.validate();
+  validateInner("topics", topics);
   requireField(std::isfinite(sort_window_s) && sort_window_s >= 0.0, "sort_window_s",
                "must be finite and not negative", sort_window_s);
   requireField(max_image_gap_s > 0.0, "max_image_gap_s", "must be positive", max_image_gap_s);

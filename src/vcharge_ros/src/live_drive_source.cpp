@@ -233,7 +233,7 @@ void LiveDriveSource::Implementation::flushWhenIdle() {
 }
 
 void LiveDriveSourceOptions::validate() const {
-  topics.validate();
+  validateInner("topics", topics);
   requireField(image_queue_size >= 0, "image_queue_size", "must not be negative", image_queue_size);
   requireField(odometry_queue_size >= 0, "odometry_queue_size", "must not be negative", odometry_queue_size);
   requireField(std::isfinite(sort_window_s) && sort_window_s >= 0.0, "sort_window_s",
