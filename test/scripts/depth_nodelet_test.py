@@ -18,28 +18,7 @@ from sensor_msgs.msg import Image, PointCloud2
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import CAMERAS, Drive  # noqa: E402
-
-TIMEOUT_S = 60.0
-
-
-def wait_for(condition, what, timeout_s=TIMEOUT_S):
-    end = time.monotonic() + timeout_s
-    while time.monotonic() < end:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.05)
-    raise AssertionError(f"waited {timeout_s} s in vain for {what}")
-
-
-def project_mei(rays, p):
-    """Pixels (2 x N) of unit rays (3 x N); paper, section Camera Model."""
-    z = rays[2] + p["xi"]
-    x, y = rays[0] / z, rays[1] / z
-    r = x * x + y * y
-    radial = 1 + p["k1"] * r + p["k2"] * r * r
-    return (p["gamma1"] * (x * radial + 2 * p["p1"] * x * y + p["p2"] * (r + 2 * x * x)) + p["u0"],
-            p["gamma2"] * (y * radial + p["p1"] * (r + 2 * y * y) + 2 * p["p2"] * x * y) + p["v0"])
+from nodelet_fixture import TIMEOUT_S, project_mei, wait_for  # noqa: E402
 
 
 def rays_without_distortion(width, height, p):

@@ -3,10 +3,10 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <opencv2/imgcodecs.hpp>
 
 #include "vcharge_core/camera_rig.h"
+#include "vcharge_core/command_line.h"
 #include "vcharge_core/content_hash.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/file_io.h"
@@ -76,7 +76,6 @@ void printSummary(const RangeMapper& mapper, const std::vector<uint64_t>& maps,
 void computeRangeMaps(const Arguments& arguments) {
   const RangeMapperOptions options = readOptions(arguments);
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
-  createFolder(arguments.output);
   ContentHasher hasher;
   std::vector<uint64_t> maps(rig->cameras.size(), 0);
   std::vector<double> known(rig->cameras.size(), 0.0);
@@ -132,21 +131,16 @@ int main(int argc, char** argv) {
                  "TUM file; without it poses come from the drive's odometry");
   app.add_option("--options", arguments.options, "YAML with overrides of RangeMapperOptions");
   app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
-  app.add_option("--output", arguments.output, "folder to write")->required();
+  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireNotEmpty);
   app.add_flag(
       "--online", arguments.online,
       "as the nodelet does: only images before the reference, averaged (default: before and after, split)");
   app.add_flag("--no-pictures", arguments.no_pictures, "no PNG");
   app.add_flag("--show-options", arguments.show_options, "print all options with their values");
-  CLI11_PARSE(app, argc, argv);
-  try {
+  return runTool(&app, argc, argv, [&] {
     if (arguments.show_options) {
       std::cout << writeFields(readOptions(arguments)) << "\n";
     }
     computeRangeMaps(arguments);
-  } catch (const std::exception& error) {
-    std::cerr << "compute_range_maps: " << error.what() << "\n";
-    return 1;
-  }
-  return 0;
+  });
 }

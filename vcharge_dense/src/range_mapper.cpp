@@ -40,10 +40,10 @@ void RangeMapperOptions::validate() const {
   requireField(max_image_gap_s > 0.0, "max_image_gap_s", "must be positive", max_image_gap_s);
   requireField(!use_later_images || neighbours.num_neighbours % 2 == 0, "neighbours.num_neighbours",
                "must be even where later images are used", neighbours.num_neighbours);
-  working_camera.validate();
-  neighbours.validate();
-  plane_sweep.validate();
-  odometry.validate();
+  validateInner("working_camera", working_camera);
+  validateInner("neighbours", neighbours);
+  validateInner("plane_sweep", plane_sweep);
+  validateInner("odometry", odometry);
 }
 
 struct RangeMapper::Camera {

@@ -267,6 +267,47 @@ TEST(RangeMapperTest, MeasuresASceneThroughTheWholePath) {
   EXPECT_GE(right, 0.9 * known);
 }
 
+TEST(RangeMapperTest, MeasuresTheSameSceneAtAnyFocalScale) {
+  // A lens with distortion, which pushes the rim outwards: how much of it stays is the options' choice.
+  MeiCamera::Parameters parameters;
+  parameters << 1.158, 224.0, 223.5, 162.0, 99.5, -0.33, 0.0865, -0.00067, -0.00004;
+  const MeiCamera lens(parameters);
+  const cv::Size size(320, 200);
+  auto rig = std::make_shared<CameraRig>(*makeRig());
+  rig->cameras.pop_back();
+  rig->cameras[0].model = lens;
+  rig->cameras[0].image_size_px = size;
+  const AnalyticScene scene({{{0, 0, 0}, {0, 0, 1}}, {{0, 5, 0}, {0, -1, 0}}}, 8);
+  for (const double focal_scale : {1.0, 0.5}) {
+    SCOPED_TRACE(focal_scale);
+    Recorder recorder;
+    RangeMapperOptions options = smallOptions();
+    options.working_camera.focal_scale = focal_scale;
+    RangeMapper mapper(rig, options, recorder.callback());
+    for (int i = 0; i < 6; ++i) {
+      const VehicleOdometry odometry = odometryAt(stampOf(i), i * 0.2);
+      const RigidTransform pose = odometry.odom_from_vehicle * *rig->cameras[0].vehicle_from_camera;
+      mapper.addOdometry(odometry);
+      mapper.addImage(0, stampOf(i), Image{scene.render(lens, size, pose), nullptr});
+    }
+    ASSERT_FALSE(recorder.tasks.empty());
+    const RangeTask& task = recorder.tasks.back();
+    const RangeMap map = mapper.sweep(task);
+    EXPECT_DOUBLE_EQ(map.camera.gamma1(), focal_scale * lens.gamma1());
+    const cv::Mat truth = scene.range(map.camera, size, task.reference.world_from_camera);
+    int known = 0, right = 0;
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < size.width; ++x) {
+        const double error = map.range_m.at<float>(y, x) - truth.at<double>(y, x);
+        known += std::isnan(error) ? 0 : 1;
+        right += std::abs(error) <= 0.05 * truth.at<double>(y, x) ? 1 : 0;
+      }
+    }
+    EXPECT_GT(known, size.area() / 4);
+    EXPECT_GE(right, 0.9 * known);
+  }
+}
+
 TEST(RangeMapperTest, RejectsARigItCannotUse) {
   CameraRig bare = *makeRig();
   bare.cameras[1].vehicle_from_camera.reset();

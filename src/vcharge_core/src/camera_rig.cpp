@@ -1,5 +1,7 @@
 #include "vcharge_core/camera_rig.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -176,6 +178,12 @@ std::string exactList(const Container& values) {
 
 }  // namespace
 
+bool isCameraName(const std::string& name) {
+  const auto isNamePart = [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; };
+  return !name.empty() && std::isalpha(static_cast<unsigned char>(name[0])) != 0 &&
+         std::all_of(name.begin(), name.end(), isNamePart);
+}
+
 int CameraRig::findCamera(const std::string& name) const {
   for (size_t i = 0; i < cameras.size(); ++i) {
     if (cameras[i].name == name) {
@@ -235,6 +243,9 @@ CameraRig parseCameraRig(const std::string& text, const std::string& source, con
     const std::string name = item.first.as<std::string>();
     if (rig.findCamera(name) >= 0) {
       throw InputError(source + ": cameras." + name + ": the name is there twice");
+    }
+    if (!isCameraName(name)) {
+      throw InputError(source + ": cameras." + name + ": expected a name of letters, digits and underscores");
     }
     const Entry camera{item.second, source, "cameras." + name};
     if (!camera.node.IsMap()) {

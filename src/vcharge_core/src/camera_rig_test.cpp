@@ -92,6 +92,8 @@ TEST(CameraRigTest, SurvivesWritingAndReadingExactly) {
 }
 
 TEST(CameraRigTest, EveryErrorNamesFileKeyAndExpectation) {
+  EXPECT_THAT(errorOf(replaced(kRig, "  front:", "  front left:")),
+              AllOf(HasSubstr("rig.yaml"), HasSubstr("cameras.front left"), HasSubstr("underscores")));
   EXPECT_THAT(errorOf("- a\n"), AllOf(HasSubstr("rig.yaml"), HasSubstr("cameras")));
   EXPECT_THAT(errorOf("cameras: {a: [1\n"), AllOf(HasSubstr("rig.yaml"), HasSubstr("not valid YAML")));
   EXPECT_THAT(errorOf(replaced(kRig, "field_of_view_rad", "fov")),

@@ -1,6 +1,7 @@
 #include "vcharge_core/multi_frame_synchronizer.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "vcharge_core/error.h"
 #include "vcharge_core/options.h"
@@ -8,7 +9,8 @@
 namespace vcharge {
 
 void MultiFrameSynchronizerOptions::validate() const {
-  requireField(tolerance_s >= 0.0, "tolerance_s", "must be at least 0", tolerance_s);
+  requireField(std::isfinite(tolerance_s) && tolerance_s >= 0.0, "tolerance_s",
+               "must be finite and not negative", tolerance_s);
   requireField(max_pending_sets >= 1, "max_pending_sets", "must be at least 1", max_pending_sets);
   requireField(reset_backwards_s > 0.0, "reset_backwards_s", "must be positive", reset_backwards_s);
 }
@@ -50,8 +52,11 @@ std::shared_ptr<const MultiFrame> MultiFrameSynchronizer::add(size_t camera_inde
     return nullptr;
   }
 
-  // The pending set nearest in time, or a new one in its place.
-  const auto distance = [&](const PendingSet& set) { return std::chrono::abs(set.frame.stamp - stamp); };
+  // The pending set nearest in time, or a new one in its place. A set's distance is to its farthest image, so
+  // that no set spans more than the tolerance.
+  const auto distance = [&](const PendingSet& set) {
+    return std::max(std::chrono::abs(set.frame.stamp - stamp), std::chrono::abs(set.latest - stamp));
+  };
   auto set = std::min_element(
       pending_.begin(), pending_.end(),
       [&](const PendingSet& left, const PendingSet& right) { return distance(left) < distance(right); });
@@ -60,6 +65,7 @@ std::shared_ptr<const MultiFrame> MultiFrameSynchronizer::add(size_t camera_inde
                                        [&](const PendingSet& other) { return stamp < other.frame.stamp; });
     set = pending_.insert(position, PendingSet());
     set->frame.stamp = stamp;
+    set->latest = stamp;
     set->frame.images.resize(num_cameras_);
     set->present.assign(num_cameras_, false);
   }
@@ -70,6 +76,7 @@ std::shared_ptr<const MultiFrame> MultiFrameSynchronizer::add(size_t camera_inde
   set->present[camera_index] = true;
   set->frame.images[camera_index] = image;
   set->frame.stamp = std::min(set->frame.stamp, stamp);
+  set->latest = std::max(set->latest, stamp);
   ++set->num_present;
 
   if (set->num_present == num_cameras_) {

@@ -1,5 +1,8 @@
 #include "vcharge_core/multi_frame_synchronizer.h"
 
+#include <limits>
+
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace vcharge {
@@ -88,6 +91,88 @@ TEST(MultiFrameSynchronizerTest, StartsOverWhenTimeJumpsBack) {
   EXPECT_NE(synchronizer.add(0, at(100.0), imageWith(0)), nullptr);
   EXPECT_NE(synchronizer.add(0, at(1.0), imageWith(0)), nullptr);
   EXPECT_EQ(synchronizer.counts().resets, 1U);
+}
+
+TEST(MultiFrameSynchronizerTest, StartingOverGivesUpWhatWaits) {
+  MultiFrameSynchronizer synchronizer(2);
+  synchronizer.add(0, at(100.0), imageWith(1));
+  EXPECT_EQ(synchronizer.add(1, at(1.0), imageWith(2)), nullptr);
+  EXPECT_EQ(synchronizer.counts().incomplete_sets, 1U);
+  EXPECT_EQ(synchronizer.counts().missing_per_camera, (std::vector<uint64_t>{0, 1}));
+  const auto frame = synchronizer.add(0, at(1.0), imageWith(3));
+  ASSERT_NE(frame, nullptr);
+  EXPECT_EQ(frame->images[0].pixels.at<uint8_t>(0, 0), 3) << "not the image from before the jump";
+}
+
+TEST(MultiFrameSynchronizerTest, AStepBackThatIsNoRestartIsLate) {
+  MultiFrameSynchronizerOptions options;
+  options.reset_backwards_s = 1.0;
+  MultiFrameSynchronizer synchronizer(1, options);
+  EXPECT_NE(synchronizer.add(0, at(10.0), imageWith(0)), nullptr);
+  EXPECT_EQ(synchronizer.add(0, at(9.5), imageWith(0)), nullptr);
+  EXPECT_EQ(synchronizer.counts().late_images, 1U);
+  EXPECT_EQ(synchronizer.counts().resets, 0U);
+}
+
+TEST(MultiFrameSynchronizerTest, CompletesInterleavedSetsInOrderOfTime) {
+  MultiFrameSynchronizer synchronizer(2);
+  EXPECT_EQ(synchronizer.add(0, at(0.0), imageWith(0)), nullptr);
+  EXPECT_EQ(synchronizer.add(0, at(0.08), imageWith(1)), nullptr);
+  const auto first = synchronizer.add(1, at(0.0), imageWith(0));
+  const auto second = synchronizer.add(1, at(0.08), imageWith(1));
+  ASSERT_NE(first, nullptr);
+  ASSERT_NE(second, nullptr);
+  EXPECT_EQ(first->stamp, at(0.0));
+  EXPECT_EQ(second->stamp, at(0.08));
+  EXPECT_EQ(second->images[0].pixels.at<uint8_t>(0, 0), 1);
+  EXPECT_EQ(synchronizer.counts().complete_sets, 2U);
+  EXPECT_EQ(synchronizer.counts().incomplete_sets, 0U);
+}
+
+TEST(MultiFrameSynchronizerTest, AnImageGoesToTheNearestSet) {
+  MultiFrameSynchronizerOptions options;
+  options.tolerance_s = 0.05;
+  MultiFrameSynchronizer synchronizer(2, options);
+  synchronizer.add(0, at(0.0), imageWith(1));
+  synchronizer.add(0, at(0.06), imageWith(2));
+  const auto frame = synchronizer.add(1, at(0.04), imageWith(3));  // within tolerance of both
+  ASSERT_NE(frame, nullptr);
+  EXPECT_EQ(frame->images[0].pixels.at<uint8_t>(0, 0), 2);
+}
+
+TEST(MultiFrameSynchronizerTest, NoSetSpansMoreThanTheTolerance) {
+  MultiFrameSynchronizerOptions options;
+  options.tolerance_s = 0.005;
+  MultiFrameSynchronizer synchronizer(3, options);
+  synchronizer.add(0, at(0.010), imageWith(0));
+  synchronizer.add(1, at(0.006), imageWith(1));
+  // Close to the second image and 8 ms from the first.
+  EXPECT_EQ(synchronizer.add(2, at(0.002), imageWith(2)), nullptr);
+  const auto frame = synchronizer.add(2, at(0.009), imageWith(3));
+  ASSERT_NE(frame, nullptr);
+  EXPECT_EQ(frame->stamp, at(0.006));
+  EXPECT_EQ(frame->images[2].pixels.at<uint8_t>(0, 0), 3);
+}
+
+TEST(MultiFrameSynchronizerTest, RejectsBadOptionsByName) {
+  const auto errorOf = [](const auto& change) -> std::string {
+    MultiFrameSynchronizerOptions options;
+    change(&options);
+    try {
+      MultiFrameSynchronizer synchronizer(2, options);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  using ::testing::StartsWith;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(errorOf([](auto* o) { o->tolerance_s = -0.001; }), StartsWith("tolerance_s: "));
+  EXPECT_THAT(errorOf([&](auto* o) { o->tolerance_s = nan; }), StartsWith("tolerance_s: "));
+  EXPECT_THAT(errorOf([](auto* o) { o->tolerance_s = std::numeric_limits<double>::infinity(); }),
+              StartsWith("tolerance_s: "));
+  EXPECT_THAT(errorOf([](auto* o) { o->max_pending_sets = 0; }), StartsWith("max_pending_sets: "));
+  EXPECT_THAT(errorOf([&](auto* o) { o->reset_backwards_s = nan; }), StartsWith("reset_backwards_s: "));
 }
 
 TEST(MultiFrameSynchronizerTest, BadIndexIsACallersBug) {

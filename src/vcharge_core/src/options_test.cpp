@@ -24,6 +24,7 @@ struct InnerOptions {
   void visitFields(Visitor&& visit) {
     visit("scale", scale);
   }
+  void validate() const { requireField(scale > 0.0, "scale", "must be positive", scale); }
 };
 
 struct TestOptions {
@@ -44,7 +45,10 @@ struct TestOptions {
     visit("mode", mode);
     visit("inner", inner);
   }
-  void validate() const { requireField(count > 0, "count", "must be positive", count); }
+  void validate() const {
+    requireField(count > 0, "count", "must be positive", count);
+    validateInner("inner", inner);
+  }
 };
 
 std::string errorOf(const std::string& yaml) {
@@ -82,6 +86,7 @@ TEST(OptionsTest, ErrorsNameSourceKeyAndExpectation) {
   EXPECT_THAT(errorOf("{mode: median}"),
               AllOf(HasSubstr("mode"), HasSubstr("mean, best_k"), HasSubstr("median")));
   EXPECT_THAT(errorOf("{count: 0}"), AllOf(HasSubstr("stage.yaml"), HasSubstr("count: must be positive")));
+  EXPECT_THAT(errorOf("{inner: {scale: -1}}"), HasSubstr("stage.yaml: inner.scale: must be positive"));
   EXPECT_THAT(errorOf("[1, 2]"), HasSubstr("a map of"));
 }
 

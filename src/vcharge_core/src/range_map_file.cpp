@@ -1,9 +1,11 @@
 #include "vcharge_core/range_map_file.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <optional>
 
 #include <yaml-cpp/yaml.h>
 #include <opencv2/imgcodecs.hpp>
@@ -16,6 +18,17 @@
 namespace vcharge {
 namespace fs = std::filesystem;
 namespace {
+
+/// The stamp that a file's name says, if it is nothing but one.
+std::optional<Timestamp> stampOfName(const std::string& name) {
+  int64_t nanoseconds = 0;
+  const char* end = name.data() + name.size();
+  const auto result = std::from_chars(name.data(), end, nanoseconds);
+  if (result.ec != std::errc() || result.ptr != end || nanoseconds < 0) {
+    return std::nullopt;
+  }
+  return Timestamp::fromNanoseconds(nanoseconds);
+}
 
 std::string stemOf(const std::string& folder, const std::string& camera_name, Timestamp stamp) {
   return (fs::path(folder) / camera_name / std::to_string(stamp.nanoseconds())).string();
@@ -87,10 +100,9 @@ std::vector<Timestamp> listRangeMaps(const std::string& folder, const std::strin
   }
   std::vector<Timestamp> stamps;
   for (const auto& entry : fs::directory_iterator(camera_folder)) {
-    const std::string stem = entry.path().stem().string();
-    if (entry.path().extension() == ".yaml" && !stem.empty() &&
-        stem.find_first_not_of("0123456789") == std::string::npos) {
-      stamps.push_back(Timestamp::fromNanoseconds(std::stoll(stem)));
+    const std::optional<Timestamp> stamp = stampOfName(entry.path().stem().string());
+    if (stamp && entry.path().extension() == ".yaml") {
+      stamps.push_back(*stamp);
     }
   }
   std::sort(stamps.begin(), stamps.end());

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "vcharge_core/error.h"
+#include "vcharge_core/file_io.h"
 
 namespace vcharge {
 namespace {
@@ -71,6 +72,15 @@ TEST_F(RangeMapFileTest, MissingPartIsNamed) {
     EXPECT_NE(std::string(error.what()).find("5_sigma.tiff"), std::string::npos);
   }
   EXPECT_THROW(listRangeMaps(folder_, "front"), InputError);
+}
+
+TEST_F(RangeMapFileTest, FilesThatAreNoRangeMapsAreNotListed) {
+  const RangeMap map = makeMap(5);
+  writeRangeMap(map, folder_);
+  for (const std::string name : {"99999999999999999999.yaml", "5a.yaml", ".yaml", "6.tiff"}) {
+    writeTextFileAtomically(folder_ + "/left/" + name, "");
+  }
+  EXPECT_EQ(listRangeMaps(folder_, "left"), std::vector<Timestamp>{map.stamp});
 }
 
 TEST(ColourRangeTest, NearIsRedFarIsBlueUnknownIsBlack) {

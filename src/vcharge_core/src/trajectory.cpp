@@ -47,6 +47,9 @@ Trajectory readTrajectory(const std::string& path) {
     }
     trajectory.push_back({stamp, RigidTransform(rotation, Eigen::Vector3d(v[0], v[1], v[2]))});
   }
+  if (trajectory.empty()) {
+    throw InputError(path + ": expected lines 'time_s tx ty tz qx qy qz qw', got none");
+  }
   return trajectory;
 }
 

@@ -42,6 +42,7 @@ TEST(TrajectoryTest, SurvivesWritingAndReading) {
 }
 
 TEST(TrajectoryTest, ErrorsNameFileAndLine) {
+  EXPECT_THAT(errorOf("# only a comment\n\n"), HasSubstr("got none"));
   EXPECT_THAT(errorOf("# comment\n1.0 0 0 0 0 0 0\n"), AllOf(HasSubstr("line 2"), HasSubstr("time_s tx")));
   EXPECT_THAT(errorOf("1.0 0 0 0 0 0 0 1 5\n"), HasSubstr("eight numbers"));
   EXPECT_THAT(errorOf("1.0 0 0 nan 0 0 0 1\n"), HasSubstr("line 1"));

@@ -1,13 +1,12 @@
 #include <cstdio>
 #include <filesystem>
-#include <iostream>
 #include <map>
 #include <optional>
 #include <set>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "vcharge_core/command_line.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/options.h"
 #include "vcharge_core/progress_bar.h"
@@ -177,9 +176,9 @@ int main(int argc, char** argv) {
   app.add_option("--bag", bag, "the drive")->required();
   app.add_option("--rig", rig_path, "rig.yaml that the range maps were made with")->required();
   app.add_option("--options", options_path, "YAML with overrides of RangeEvaluationOptions");
-  app.add_option("--report", report, "folder for range_errors.json and its plots");
-  CLI11_PARSE(app, argc, argv);
-  try {
+  app.add_option("--report", report, "folder for range_errors.json and its plots")
+      ->check(vcharge::requireNotEmpty);
+  return vcharge::runTool(&app, argc, argv, [&] {
     vcharge::RangeEvaluationOptions options;
     if (!options_path.empty()) {
       vcharge::readFieldsFromFile(options_path, &options);
@@ -215,9 +214,5 @@ int main(int argc, char** argv) {
     if (!report.empty()) {
       vcharge::writeReport(json, report, "range_errors");
     }
-  } catch (const std::exception& error) {
-    std::cerr << "evaluate_range: " << error.what() << "\n";
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -1,10 +1,10 @@
 #include <cmath>
 #include <cstdio>
-#include <iostream>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "vcharge_core/command_line.h"
+#include "vcharge_core/error.h"
 #include "vcharge_evaluation/report.h"
 #include "vcharge_evaluation/trajectory_errors.h"
 
@@ -63,17 +63,21 @@ int main(int argc, char** argv) {
   std::string estimate_path, truth_path, report;
   app.add_option("--estimate", estimate_path, "trajectory to judge (.tum)")->required();
   app.add_option("--truth", truth_path, "true trajectory (.tum)")->required();
-  app.add_option("--report", report, "folder for trajectory_errors.json and its plots");
-  CLI11_PARSE(app, argc, argv);
-  try {
+  app.add_option("--report", report, "folder for trajectory_errors.json and its plots")
+      ->check(vcharge::requireNotEmpty);
+  return vcharge::runTool(&app, argc, argv, [&] {
     const vcharge::Trajectory estimate = vcharge::readTrajectory(estimate_path);
     const vcharge::Trajectory truth = vcharge::readTrajectory(truth_path);
     nlohmann::json json = {{"kind", "trajectory"}};
-    json["alignments"] = {
-        evaluate(estimate, truth, vcharge::TrajectoryAlignment::kNone, "not aligned"),
-        evaluate(estimate, truth, vcharge::TrajectoryAlignment::kFirstPose, "aligned at the first pose"),
-        evaluate(estimate, truth, vcharge::TrajectoryAlignment::kSe3, "aligned over all poses"),
-    };
+    try {
+      json["alignments"] = {
+          evaluate(estimate, truth, vcharge::TrajectoryAlignment::kNone, "not aligned"),
+          evaluate(estimate, truth, vcharge::TrajectoryAlignment::kFirstPose, "aligned at the first pose"),
+          evaluate(estimate, truth, vcharge::TrajectoryAlignment::kSe3, "aligned over all poses"),
+      };
+    } catch (const vcharge::InputError& error) {
+      throw vcharge::InputError(estimate_path + " against " + truth_path + ": " + error.what());
+    }
     json["drift"] = nlohmann::json::array();
     for (const double distance_m : {1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0}) {
       const vcharge::DriftErrors drift = vcharge::evaluateDrift(estimate, truth, distance_m);
@@ -92,9 +96,5 @@ int main(int argc, char** argv) {
     if (!report.empty()) {
       vcharge::writeReport(json, report, "trajectory_errors");
     }
-  } catch (const std::exception& error) {
-    std::cerr << "evaluate_trajectory: " << error.what() << "\n";
-    return 1;
-  }
-  return 0;
+  });
 }

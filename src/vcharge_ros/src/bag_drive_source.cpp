@@ -1,6 +1,7 @@
 #include "vcharge_ros/bag_drive_source.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -228,7 +229,8 @@ std::string BagReading::topicName(size_t camera_index) const {
   return options_.topics.imageTopic(rig_.cameras[camera_index].name);
 }
 
-// A camera is silent since its last image, or since the first image of any camera.
+// A camera is silent since its last image, or since the first image of any camera. Judged when some camera
+// brings an image: where all end together and odometry runs on, the drive's images are over.
 void BagReading::checkCameras(Timestamp stamp) const {
   if (!first_image_) {
     return;
@@ -237,15 +239,15 @@ void BagReading::checkCameras(Timestamp stamp) const {
     const Timestamp last = last_images_[camera].value_or(*first_image_);
     if (toSeconds(stamp - last) > options_.max_image_gap_s) {
       throw InputError(path_ + ": " + topicName(camera) + ": no image between " + toString(last) + " and " +
-                       toString(stamp) + " while the drive goes on; expected one at least every " +
+                       toString(stamp) + " while images go on; expected one at least every " +
                        "max_image_gap_s = " + seconds(options_.max_image_gap_s));
     }
   }
 }
 
 void BagReading::deliver(Timestamp stamp, const DriveItem& item) {
-  checkCameras(stamp);
   if (const auto* image = std::get_if<internal::CameraImage>(&item)) {
+    checkCameras(stamp);
     last_images_[image->camera_index] = stamp;
     first_image_ = first_image_.value_or(stamp);
   }
@@ -281,8 +283,9 @@ void BagReading::run(const DriveSource::ProgressCallback& progress) {
 }  // namespace
 
 void BagDriveSourceOptions::validate() const {
-  topics.validate();
-  requireField(sort_window_s >= 0.0, "sort_window_s", "must not be negative", sort_window_s);
+  validateInner("topics", topics);
+  requireField(std::isfinite(sort_window_s) && sort_window_s >= 0.0, "sort_window_s",
+               "must be finite and not negative", sort_window_s);
   requireField(max_image_gap_s > 0.0, "max_image_gap_s", "must be positive", max_image_gap_s);
 }
 

@@ -48,6 +48,9 @@ DriveBagWriter::DriveBagWriter(const std::string& path, const CameraRig& rig)
   for (const RigCamera& camera : rig.cameras) {
     implementation_->camera_infos.push_back(makeCameraInfo(camera));
   }
+  if (std::filesystem::is_directory(path)) {
+    throw InputError(path + ": cannot be written (it is a folder)");
+  }
   try {
     implementation_->bag.open(implementation_->unfinished_path, rosbag::bagmode::Write);
   } catch (const rosbag::BagException& error) {

@@ -95,6 +95,9 @@ TEST(DriveBagWriterTest, SameDriveGivesSameBytes) {
 TEST(DriveBagWriterTest, NamesAFolderItCannotWrite) {
   expectInputError([] { DriveBagWriter("/nonexistent/folder/drive.bag", testing::makeRig(kSize)); },
                    {"/nonexistent/folder/drive.bag", "cannot be written"});
+  const testing::ScratchFolder folder;
+  expectInputError([&] { DriveBagWriter(folder.path(), testing::makeRig(kSize)); },
+                   {folder.path(), "it is a folder"});
 }
 
 TEST(DriveBagWriterTest, RefusesImagesUnlikeTheRig) {

@@ -77,6 +77,7 @@ class DriveTfNodelet : public nodelet::Nodelet {
     const RigCamera& camera = rig_.cameras[index];
     CameraInfoResidual residual;
     camera_infos_.push_back(makeCameraInfo(camera, &residual));
+    last_info_stamps_.emplace_back();
     NODELET_INFO_STREAM("camera_info of '" << camera.name << "': " << camera_infos_.back().distortion_model
                                            << " differs from the rig's model by " << residual.rms_px
                                            << " px rms, at most " << residual.max_px << " px");
@@ -92,6 +93,10 @@ class DriveTfNodelet : public nodelet::Nodelet {
     using Pointer = boost::shared_ptr<const Message>;
     subscribers_.push_back(node_.subscribe<Message>(
         topic, 4, boost::function<void(const Pointer&)>([this, index](const Pointer& message) {
+          if (last_info_stamps_[index] == message->header.stamp) {
+            return;  // told for the image's raw or compressed twin
+          }
+          last_info_stamps_[index] = message->header.stamp;
           auto info = boost::make_shared<sensor_msgs::CameraInfo>(camera_infos_[index]);
           info->header.stamp = message->header.stamp;
           info_topics_[index]->publish(info);
@@ -129,7 +134,8 @@ class DriveTfNodelet : public nodelet::Nodelet {
   std::unique_ptr<DriveMonitor> monitor_;
   std::string odom_frame_ = "odom";
   std::optional<Timestamp> last_stamp_;
-  std::vector<sensor_msgs::CameraInfo> camera_infos_;  // by camera
+  std::vector<sensor_msgs::CameraInfo> camera_infos_;       // by camera
+  std::vector<std::optional<ros::Time>> last_info_stamps_;  // by camera
   std::vector<std::unique_ptr<internal::SharedTopic<sensor_msgs::CameraInfo>>> info_topics_;
   std::unique_ptr<internal::SharedTopic<tf2_msgs::TFMessage>> tf_;
   tf2_ros::StaticTransformBroadcaster static_broadcaster_;

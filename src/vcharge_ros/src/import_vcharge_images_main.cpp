@@ -1,9 +1,8 @@
-#include <iostream>
 #include <string>
 
-#include <CLI/CLI.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "vcharge_core/command_line.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/progress_bar.h"
 #include "vcharge_ros/drive_bag_writer.h"
@@ -20,7 +19,9 @@ cv::Mat readGray(const vcharge::VchargeRecording::ImageFile& file, const vcharge
   return image;
 }
 
-void writeDrive(const vcharge::VchargeRecording& recording, const std::string& path) {
+/// Both files or none: the bag appears once the rig could be written.
+void writeDriveAndRig(const vcharge::VchargeRecording& recording, const std::string& path,
+                      const std::string& rig_path) {
   vcharge::DriveBagWriter writer(path, recording.rig);
   vcharge::ProgressBar progress("writing " + path);
   auto odometry = recording.odometry.begin();
@@ -35,6 +36,7 @@ void writeDrive(const vcharge::VchargeRecording& recording, const std::string& p
   for (; odometry != recording.odometry.end(); ++odometry) {
     writer.writeOdometry(*odometry);
   }
+  vcharge::writeCameraRig(recording.rig, rig_path);
   writer.close();
 }
 
@@ -50,8 +52,10 @@ int main(int argc, char** argv) {
   vcharge::VchargeRecordingOptions options;
   bool no_mask = false;
   app.add_option("--folder", folder, "folder of the images")->required();
-  app.add_option("--output", output, "bag to write")->required();
-  app.add_option("--rig", rig, "rig.yaml to write; the mask goes beside it")->required();
+  app.add_option("--output", output, "bag to write")->required()->check(vcharge::requireNotEmpty);
+  app.add_option("--rig", rig, "rig.yaml to write; the mask goes beside it")
+      ->required()
+      ->check(vcharge::requireNotEmpty);
   app.add_option("--camera", options.camera_name, "name of the camera")->capture_default_str();
   app.add_option("--field-of-view-rad", options.field_of_view_rad, "full angle")->capture_default_str();
   app.add_option("--ground-height-m", options.ground_height_m,
@@ -60,15 +64,8 @@ int main(int argc, char** argv) {
   app.add_option("--ground-slope-x", options.ground_slope_x)->capture_default_str();
   app.add_option("--ground-slope-y", options.ground_slope_y)->capture_default_str();
   app.add_flag("--no-mask", no_mask, "do not mask the car's body");
-  CLI11_PARSE(app, argc, argv);
-  try {
+  return vcharge::runTool(&app, argc, argv, [&] {
     options.mask_vehicle = !no_mask;
-    const vcharge::VchargeRecording recording = vcharge::readVchargeRecording(folder, options);
-    writeDrive(recording, output);
-    vcharge::writeCameraRig(recording.rig, rig);
-  } catch (const std::exception& error) {
-    std::cerr << "import_vcharge_images: " << error.what() << "\n";
-    return 1;
-  }
-  return 0;
+    writeDriveAndRig(vcharge::readVchargeRecording(folder, options), output, rig);
+  });
 }

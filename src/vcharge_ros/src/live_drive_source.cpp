@@ -1,8 +1,10 @@
 #include "vcharge_ros/live_drive_source.h"
 
+#include <cmath>
 #include <functional>
 #include <limits>
 #include <mutex>
+#include <optional>
 #include <set>
 
 #include <ros/console.h>
@@ -23,6 +25,12 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr char kProcessing[] = "processing";  // stands for the consumer among the monitor's topics
 constexpr size_t kMaxLoggedTexts = 100;
 
+/// What came of one camera so far, for the choice between its transports.
+struct LastImages {
+  std::optional<Timestamp> raw;
+  std::optional<Timestamp> compressed;
+};
+
 // ROS takes 0 as "no limit", as the options do.
 uint32_t queueSize(int size) {
   return static_cast<uint32_t>(size);
@@ -39,7 +47,7 @@ struct LiveDriveSource::Implementation {
         cameras(internal::selectCameras(*rig, options.cameras)),
         monitor(options.max_silence_s, SteadyClock::now()),
         sorter(durationFromSeconds(options.sort_window_s)),
-        sends_raw(rig->cameras.size(), false) {}
+        last_images(rig->cameras.size()) {}
 
   void subscribe();
   void subscribeImages(size_t camera);
@@ -51,6 +59,7 @@ struct LiveDriveSource::Implementation {
   void handle(const std::string& topic, const ros::Time& ros_stamp, Convert&& convert);
   void take(const std::string& topic, Timestamp stamp, DriveItem item);
   void deliver(Timestamp stamp, const DriveItem& item);
+  bool isWanted(size_t camera, bool is_raw, Timestamp stamp);
   void flushWhenIdle();
   void log(DriveMonitor::Change change, const std::string& topic, const std::string& text);
 
@@ -64,7 +73,7 @@ struct LiveDriveSource::Implementation {
   DriveMonitor monitor;
   StampSorter<DriveItem> sorter;
   SteadyClock::time_point last_arrival = SteadyClock::now();
-  std::vector<bool> sends_raw;  // by camera
+  std::vector<LastImages> last_images;  // by camera
   std::set<std::string> logged;
 
   // Last, so that no callback runs once the rest is being destroyed.
@@ -98,8 +107,9 @@ void LiveDriveSource::Implementation::subscribeImages(size_t camera) {
     subscribeTopic<sensor_msgs::Image>(raw_topic, options.image_queue_size,
                                        [this, add, topic, camera](const sensor_msgs::ImageConstPtr& message) {
                                          const std::lock_guard<std::mutex> lock(mutex);
-                                         sends_raw[camera] = true;
-                                         add(topic, message->header.stamp, message);
+                                         if (isWanted(camera, true, toTimestamp(message->header.stamp))) {
+                                           add(topic, message->header.stamp, message);
+                                         }
                                        });
   }
   if (transport != ImageTransport::kRaw) {
@@ -107,7 +117,7 @@ void LiveDriveSource::Implementation::subscribeImages(size_t camera) {
         compressed_topic, options.image_queue_size,
         [this, add, topic, camera](const sensor_msgs::CompressedImageConstPtr& message) {
           const std::lock_guard<std::mutex> lock(mutex);
-          if (!sends_raw[camera]) {
+          if (isWanted(camera, false, toTimestamp(message->header.stamp))) {
             add(topic, message->header.stamp, message);
           }
         });
@@ -201,6 +211,20 @@ void LiveDriveSource::Implementation::deliver(Timestamp stamp, const DriveItem& 
   }
 }
 
+// Judged by the drive's time: neither a slow replay nor a slow consumer makes raw images seem to be missing.
+bool LiveDriveSource::Implementation::isWanted(size_t camera, bool is_raw, Timestamp stamp) {
+  LastImages& last = last_images[camera];
+  if (is_raw) {
+    last.raw = stamp;
+    return last.compressed != stamp;  // its compressed twin came first
+  }
+  if (last.raw && std::abs(toSeconds(stamp - *last.raw)) <= options.max_silence_s) {
+    return false;
+  }
+  last.compressed = stamp;
+  return true;
+}
+
 void LiveDriveSource::Implementation::flushWhenIdle() {
   const double idle_s = std::chrono::duration<double>(SteadyClock::now() - last_arrival).count();
   if (idle_s >= options.idle_flush_s) {
@@ -209,10 +233,11 @@ void LiveDriveSource::Implementation::flushWhenIdle() {
 }
 
 void LiveDriveSourceOptions::validate() const {
-  topics.validate();
+  validateInner("topics", topics);
   requireField(image_queue_size >= 0, "image_queue_size", "must not be negative", image_queue_size);
   requireField(odometry_queue_size >= 0, "odometry_queue_size", "must not be negative", odometry_queue_size);
-  requireField(sort_window_s >= 0.0, "sort_window_s", "must not be negative", sort_window_s);
+  requireField(std::isfinite(sort_window_s) && sort_window_s >= 0.0, "sort_window_s",
+               "must be finite and not negative", sort_window_s);
   requireField(idle_flush_s > 0.0, "idle_flush_s", "must be positive", idle_flush_s);
   requireField(max_silence_s > 0.0, "max_silence_s", "must be positive", max_silence_s);
 }

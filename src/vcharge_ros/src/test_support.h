@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 
 #include "vcharge_core/camera_rig.h"
+#include "vcharge_core/drive_source.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/timestamp.h"
 
@@ -56,6 +57,43 @@ inline Timestamp milliseconds(int64_t value) {
   constexpr int64_t kDriveStart_ns = 1342626147000000000;
   return Timestamp::fromNanoseconds(kDriveStart_ns + value * 1000000);
 }
+
+/// Size of the images of the tests' drives.
+inline const cv::Size kSize(32, 20);
+
+inline cv::Mat makePixels(int camera, int frame) {
+  cv::Mat pixels(kSize, CV_8UC1);
+  for (int i = 0; i < kSize.area(); ++i) {
+    pixels.data[i] = static_cast<uint8_t>(7 * i + 50 * camera + 3 * frame);
+  }
+  return pixels;
+}
+
+inline VehicleOdometry makeOdometry(int64_t time_ms) {
+  return {milliseconds(time_ms), RigidTransform::planar(0.001 * static_cast<double>(time_ms), 0.0, 0.0), 1.0,
+          0.0};
+}
+
+/// Notes what comes: "o<ms>", "t<ms>", "<camera>:<ms>".
+class Notes : public DriveConsumer {
+ public:
+  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
+    note(std::to_string(camera_index) + ":", stamp);
+    images.push_back(image);
+  }
+  void addOdometry(const VehicleOdometry& odometry) override { note("o", odometry.stamp); }
+  void addWheelTicks(const WheelTicks& ticks) override { note("t", ticks.stamp); }
+
+  std::vector<std::string> order;
+  std::vector<Timestamp> stamps;
+  std::vector<Image> images;
+
+ private:
+  void note(const std::string& what, Timestamp stamp) {
+    order.push_back(what + std::to_string((stamp - milliseconds(0)).count() / 1000000));
+    stamps.push_back(stamp);
+  }
+};
 
 /// Expects an InputError whose text holds all of `parts`.
 inline void expectInputError(const std::function<void()>& action, const std::vector<std::string>& parts) {

@@ -195,6 +195,10 @@ cv::Mat drawVehicleMask(cv::Size size) {
 }  // namespace
 
 void VchargeRecordingOptions::validate() const {
+  if (!isCameraName(camera_name)) {
+    throw std::invalid_argument("camera_name: must be letters, digits and underscores, is '" + camera_name +
+                                "'");
+  }
   requireField(field_of_view_rad > 0.0 && field_of_view_rad <= 2.0 * M_PI, "field_of_view_rad",
                "must be in (0, 2 pi]", field_of_view_rad);
   requireField(std::isfinite(ground_height_m), "ground_height_m", "must be finite", ground_height_m);

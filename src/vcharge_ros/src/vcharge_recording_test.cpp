@@ -76,6 +76,14 @@ TEST_F(VchargeRecordingTest, DerivesVelocitiesFromThePoses) {
   }
 }
 
+TEST_F(VchargeRecordingTest, RefusesOptionsOutOfRange) {
+  for (const std::string name : {"", "left mirror", "../left", "1left"}) {
+    VchargeRecordingOptions options;
+    options.camera_name = name;
+    EXPECT_THROW(readVchargeRecording(folder_.path(), options), std::invalid_argument) << name;
+  }
+}
+
 TEST_F(VchargeRecordingTest, NamesWhatIsWrong) {
   writeTextFileAtomically(folder_ / "images.txt", "mono_left_1000000.png\nmono_left_9080000.png\n");
   expectInputError([&] { readVchargeRecording(folder_.path()); }, {"system_poses.txt", "9.08"});

@@ -28,6 +28,9 @@ struct RigCamera {
   std::optional<Eigen::Matrix<double, 6, 6>> covariance;
 };
 
+/// A letter, then letters, digits and underscores: names make topics and files.
+bool isCameraName(const std::string& name);
+
 /// The cameras of a vehicle, in the order of the file. Shared as shared_ptr<const CameraRig>.
 class CameraRig {
  public:

@@ -50,7 +50,8 @@ class MultiFrameSynchronizer {
 
  private:
   struct PendingSet {
-    MultiFrame frame;
+    MultiFrame frame;  // its stamp is that of the earliest image
+    Timestamp latest;
     std::vector<bool> present;
     size_t num_present = 0;
   };

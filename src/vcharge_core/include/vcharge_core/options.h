@@ -1,6 +1,7 @@
 #pragma once
 
 #include <exception>
+#include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <vector>
@@ -137,5 +138,15 @@ YAML::Node writeFields(const Options& options) {
 
 /// std::invalid_argument "<field>: <requirement>, is <value>" unless the condition holds; for validate().
 void requireField(bool condition, const char* field, const char* requirement, double value);
+
+/// validate() of an options struct inside another; errors name "<field>.<inner field>".
+template <class Options>
+void validateInner(const char* field, const Options& options) {
+  try {
+    options.validate();
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(std::string(field) + "." + error.what());
+  }
+}
 
 }  // namespace vcharge

@@ -14,7 +14,7 @@ struct BagDriveSourceOptions {
   DriveTopics topics;
   std::vector<std::string> cameras;  ///< of the rig, by name; empty: all
   double sort_window_s = 0.5;        ///< messages later than this, by header stamp, are an error
-  double max_image_gap_s = 2.0;      ///< a camera silent for longer, while the drive goes on, is an error
+  double max_image_gap_s = 2.0;      ///< a camera silent for longer, while images go on, is an error
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
@@ -32,7 +32,8 @@ struct BagDriveSourceOptions {
 ///
 /// run() throws InputError that names the bag, the topic and what was expected, for: a missing, truncated or
 /// corrupt bag; a topic that is missing, empty or of another type (with the topics that are there); an image
-/// that cannot be decoded or is unlike the rig; bad numbers; stamps that jump back; a camera that stops.
+/// that cannot be decoded or is unlike the rig; bad numbers; stamps that jump back; a camera that stops
+/// before the others do, or pauses. Odometry may run on after all cameras have ended.
 class BagDriveSource : public DriveSource {
  public:
   BagDriveSource(std::string bag_path, std::shared_ptr<const CameraRig> rig,

@@ -14,7 +14,8 @@
 
 namespace vcharge {
 
-/// How images travel. kAuto: raw, and compressed from cameras that send nothing raw.
+/// How images travel. kAuto: raw, and compressed from cameras that send nothing raw, or nothing any more for
+/// max_silence_s of the drive's time.
 enum class ImageTransport { kAuto, kRaw, kCompressed };
 
 template <>

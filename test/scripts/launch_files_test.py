@@ -1,0 +1,148 @@
+#!/usr/bin/env python3
+"""Every launch file and every shipped YAML: they parse, and what they name exists."""
+import pathlib
+import re
+import sys
+import os
+import unittest
+from xml.etree import ElementTree
+
+import roslaunch.config
+import rospkg
+import rostest
+import yaml
+from roslib.packages import find_node
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from drive_fixture import run, tool  # noqa: E402
+
+PACKAGES = rospkg.RosPack()
+LAUNCH = pathlib.Path(PACKAGES.get_path("vcharge_launch"))
+CONFIG = pathlib.Path(PACKAGES.get_path("vcharge_config"))
+NODELET_PACKAGES = ("vcharge_ros", "vcharge_dense")
+
+
+def nodelet_types():
+    types = set()
+    for package in NODELET_PACKAGES:
+        plugins = ElementTree.parse(pathlib.Path(PACKAGES.get_path(package)) / "nodelet_plugins.xml")
+        types.update(entry.get("name") for entry in plugins.iter("class"))
+    return types
+
+
+def required_arguments(path):
+    return [arg.get("name") for arg in ElementTree.parse(path).getroot().findall("arg")
+            if arg.get("value") is None and arg.get("default") is None]
+
+
+def load(path, **arguments):
+    """The launch file's nodes and parameters; required arguments are paths that need not exist to parse it."""
+    given = {name: f"/nowhere/{name}" for name in required_arguments(path)}
+    given.update(arguments)
+    return roslaunch.config.load_config_default(
+        [(str(path), [f"{name}:={value}" for name, value in given.items()])], None, verbose=False)
+
+
+class LaunchFilesTest(unittest.TestCase):
+    def setUp(self):
+        self.launch_files = sorted(LAUNCH.glob("*.launch"))
+        self.assertGreaterEqual(len(self.launch_files), 3)
+
+    def test_every_launch_file_parses_and_names_nodes_that_exist(self):
+        for path in self.launch_files:
+            for arguments in ({}, {"rviz": "true"}, {"rviz": "false", "loop": "true"}):
+                config = load(path, **arguments)
+                self.assertEqual(config.config_errors, [], path.name)
+                self.assertTrue(config.nodes, path.name)
+                for node in config.nodes:
+                    self.assertTrue(find_node(node.package, node.type), f"{path.name}: {node.package}/{node.type}")
+
+    def test_every_nodelet_is_known_and_loaded_into_a_manager_that_is_there(self):
+        for path in self.launch_files:
+            nodelets = [node.args.split() for node in load(path).nodes if node.type == "nodelet"]
+            managers = [node.name for node in load(path).nodes if node.type == "nodelet" and node.args == "manager"]
+            loads = [words for words in nodelets if words[0] == "load"]
+            self.assertTrue(loads, path.name)
+            for _, name, manager in loads:
+                self.assertIn(name, nodelet_types(), path.name)
+                self.assertIn(manager, managers, path.name)
+
+    def test_arguments_reach_the_nodes(self):
+        for path in self.launch_files:
+            config = load(path, **({"folder": "/drives"} if "folder" in required_arguments(path) else
+                                   {"bag": "/drives/drive.bag", "rig": "/drives/rig_truth.yaml"}))
+            parameters = {name: parameter.value for name, parameter in config.params.items()}
+            self.assertIs(parameters["/use_sim_time"], True, path.name)
+            for nodelet in ("depth", "drive_tf"):
+                self.assertEqual(parameters[f"/{nodelet}/rig"], "/drives/rig_truth.yaml", path.name)
+            player = next(node for node in config.nodes if node.package == "rosbag")
+            self.assertEqual(player.args.split()[-1], "/drives/drive.bag", path.name)
+            self.assertIn("--clock", player.args, path.name)
+
+    def test_files_that_launch_files_name_exist(self):
+        for path in self.launch_files:
+            for node in load(path, rviz="true").nodes:
+                for word in node.args.split():
+                    if word.startswith("/") and not word.startswith("/nowhere/"):
+                        self.assertTrue(pathlib.Path(word).exists(), f"{path.name}: {word}")
+
+    def test_options_of_the_nodelets_are_those_of_the_yaml(self):
+        for options in sorted(CONFIG.glob("*.yaml")):
+            config = load(LAUNCH / "drive_replay.launch", options=str(options))
+            expected = yaml.safe_load(options.read_text())
+            found = {}
+            for name, parameter in config.params.items():
+                if name.startswith("/depth/options/"):
+                    found[name[len("/depth/options/"):]] = parameter.value
+            flat = {}
+
+            def flatten(prefix, value):
+                for key, entry in value.items():
+                    if isinstance(entry, dict):
+                        flatten(f"{prefix}{key}/", entry)
+                    else:
+                        flat[prefix + key] = entry
+            flatten("", expected)
+            self.assertEqual(found, flat, options.name)
+
+    def test_every_shipped_yaml_is_taken_by_the_option_reader(self):
+        rigs = sorted((CONFIG / "rigs").glob("*.yaml"))
+        options = sorted(CONFIG.glob("*.yaml"))
+        self.assertEqual(sorted(CONFIG.rglob("*.yaml")), sorted(rigs + options), "a YAML that nobody reads")
+        self.assertTrue(rigs and options)
+        program = tool("vcharge_dense", "compute_range_maps")
+        for rig, option in [(rig, options[0]) for rig in rigs] + [(rigs[0], option) for option in options]:
+            # The bag is read last: an error about it says that rig and options were taken.
+            status, _, errors = run([program, "--bag", "/nowhere/drive.bag", "--rig", rig, "--options", option,
+                                     "--output", "/nowhere/output"])
+            self.assertGreater(status, 0)
+            self.assertEqual(len(errors), 1, errors)
+            self.assertIn("/nowhere/drive.bag: no such file", errors[0])
+
+    def test_rviz_configurations_show_topics_that_are_published(self):
+        cameras = yaml.safe_load((CONFIG / "rigs" / "golf_nominal.yaml").read_text())["cameras"]
+        published = re.compile(rf"/camera/({'|'.join(cameras)})/image_raw|"
+                               rf"/dense/({'|'.join(cameras)})/(points|range/(image|confidence|standard_deviation))")
+
+        def topics(node):
+            if isinstance(node, dict):
+                for key, value in node.items():
+                    if key in ("Topic", "Image Topic") and value:
+                        yield value
+                    else:
+                        yield from topics(value)
+            elif isinstance(node, list):
+                for entry in node:
+                    yield from topics(entry)
+
+        files = sorted((CONFIG / "rviz").glob("*.rviz"))
+        self.assertTrue(files)
+        for path in files:
+            shown = list(topics(yaml.safe_load(path.read_text())["Visualization Manager"]["Displays"]))
+            self.assertTrue(shown, path.name)
+            for topic in shown:
+                self.assertTrue(published.fullmatch(topic), f"{path.name}: {topic}")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("vcharge_tests", "launch_files", LaunchFilesTest)
