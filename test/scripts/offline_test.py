@@ -5,6 +5,7 @@ import os
 import sys
 import unittest
 
+import numpy as np
 import rosbag
 import rospy
 import rostest
@@ -98,8 +99,8 @@ class OfflineTest(unittest.TestCase):
 
     def test_image_size_unlike_the_rig(self):
         rig = self.drive.write_text("big_rig.yaml", self.drive.rig.read_text().replace(
-            "[640, 400]", "[1280, 800]").replace("    mask: front_mask.png\n", "").replace(
-                "    mask: left_mask.png\n", ""))
+            "[640, 400]", "[1280, 800]").replace("    mask: drive_truth/front_mask.png\n", "").replace(
+                "    mask: drive_truth/left_mask.png\n", ""))
         self.expect_error(["image_raw", "1280x800", "640x400"], rig=rig)
 
     def test_unknown_key_in_the_options(self):
@@ -176,6 +177,49 @@ class OfflineTest(unittest.TestCase):
         self.assertNotEqual(status, 0)
         self.assertTrue(any("to_the_moon" in line for line in errors), errors)
         self.assertNotIn("moon.bag", files_below(self.drive.folder))
+
+    def simulate(self, name, **changes):
+        bag = self.drive.folder / "simulated" / name
+        bag.parent.mkdir(exist_ok=True)
+        arguments = {"drive": "short", "duration_s": 0.5, "image_scale": 0.1, "cameras": "left", "output": bag, **changes}
+        words = [word for key, value in arguments.items() for word in ("--" + key.replace("_", "-"), value)]
+        status, _, errors = run([tool("vcharge_simulation", "simulate_drive"), *words])
+        return bag, status, errors
+
+    def test_noise_and_ticks_of_another_seed_need_no_second_rendering(self):
+        clean, status, errors = self.simulate("clean.bag", noise="off")
+        self.assertEqual(status, 0, errors)
+        noisy, status, errors = self.simulate("noisy.bag")
+        self.assertEqual(status, 0, errors)
+        again, status, errors = self.simulate("again.bag", images_from=clean)
+        self.assertEqual(status, 0, errors)
+        self.assertEqual(noisy.read_bytes(), again.read_bytes())
+        other, status, errors = self.simulate("other.bag", images_from=clean, sensor_seed=7, exposure_gain=1.5)
+        self.assertEqual(status, 0, errors)
+        first, second = (self.drive_contents(bag) for bag in (noisy, other))
+        self.assertGreater(second["image"].mean(), 1.15 * first["image"].mean())
+        self.assertTrue((first["ticks"] != second["ticks"]).any())
+        self.assertLessEqual(abs(first["ticks"] - second["ticks"]).max(), 1)
+
+    @staticmethod
+    def drive_contents(path):
+        with rosbag.Bag(str(path)) as bag:
+            images = [np.frombuffer(message.data, np.uint8) for _, message, _ in bag.read_messages(
+                topics=["/camera/left/image_raw"])]
+            ticks = [[message.left_ticks, message.right_ticks] for _, message, _ in bag.read_messages(
+                topics=["/wheel_ticks"])]
+        return {"image": np.array(images).astype(float), "ticks": np.array(ticks)}
+
+    def test_images_of_another_drive_are_not_taken(self):
+        clean, status, errors = self.simulate("clean_of_seed_1.bag", noise="off")
+        self.assertEqual(status, 0, errors)
+        before = files_below(clean.parent)
+        for change in ({"seed": 2}, {"drive": "loop"}, {"cameras": "front"}, {"duration_s": 0.7}):
+            _, status, errors = self.simulate("mixed.bag", images_from=clean, **change)
+            self.assertNotEqual(status, 0, change)
+            self.assertEqual(len(errors), 1, errors)
+            self.assertIn("clean_of_seed_1.bag", errors[0])
+        self.assertEqual(files_below(clean.parent), before)
 
 
 if __name__ == "__main__":

@@ -205,6 +205,9 @@ class ToolsTest(unittest.TestCase):
     def test_numbers_out_of_range_are_named(self):
         for value in ("nan", "-1", "0", "inf"):
             self.fail_with("import", ["field_of_view_rad", value], field_of_view_rad=value)
+        for key, value in (("duration_s", "nan"), ("duration_s", "-1"), ("image_scale", "2"), ("seed", "-1"),
+                           ("exposure_gain", "0"), ("height_cell_m", "nan"), ("height_limit_m", "inf")):
+            self.fail_with("simulate", [key, value], **{key: value})
         self.fail_with("import", ["ground_height_m", "nan"], ground_height_m="nan")
         self.fail_with("import", ["ground_slope_x", "-2"], ground_slope_x="-2")
         for key, value in (("min_motion_m", ".nan"), ("max_speed_m_per_s", "-1"),
@@ -272,7 +275,7 @@ class ToolsTest(unittest.TestCase):
     def test_the_simulator_names_unknown_scenes_drives_and_cameras(self):
         # Its command line adds a hint to --help.
         self.fail_with("simulate", ["drive", "moon", "figure_eight"], drive="moon")
-        self.fail_with("simulate", ["--scene", "mars", "lot"], scene="mars")
+        self.fail_with("simulate", ["scene", "mars", "lot"], scene="mars")
         status, _, errors = run(self.command("simulate", {"--output": None}))
         self.assertGreater(status, 0)
         self.assertIn("--output", errors[0])

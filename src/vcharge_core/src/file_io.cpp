@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <utility>
 
 #include "vcharge_core/error.h"
 
@@ -58,6 +59,37 @@ void writeTextFileAtomically(const std::string& path, const std::string& text) {
       throw InputError(path + ": cannot be written: " + std::strerror(errno));
     }
   });
+}
+
+FolderTransaction::FolderTransaction(std::string path) : final_(std::move(path)) {
+  if (fs::exists(final_) && !fs::is_directory(final_)) {
+    throw InputError(final_ + ": expected a folder, is a file");
+  }
+  const fs::path target(final_);
+  temporary_ =
+      (target.parent_path() / ("." + target.filename().string() + "." + std::to_string(getpid()) + ".tmp"))
+          .string();
+  createFolder(temporary_);
+}
+
+FolderTransaction::~FolderTransaction() {
+  std::error_code ignored;
+  fs::remove_all(temporary_, ignored);
+}
+
+void FolderTransaction::commit() {
+  const std::string replaced = temporary_ + ".old";
+  std::error_code error;
+  if (fs::exists(final_)) {
+    fs::rename(final_, replaced, error);
+  }
+  if (!error) {
+    fs::rename(temporary_, final_, error);
+  }
+  if (error) {
+    throw InputError(final_ + ": the folder cannot be written: " + error.message());
+  }
+  fs::remove_all(replaced, error);
 }
 
 void createFolder(const std::string& path) {

@@ -47,6 +47,31 @@ TEST_F(FileIoTest, TemporaryFileKeepsTheExtension) {
   EXPECT_EQ(readTextFile(folder_ + "/a.png"), "x");
 }
 
+TEST_F(FileIoTest, FolderAppearsAsAWholeOrNotAtAll) {
+  const std::string path = folder_ + "/results";
+  createFolder(path);
+  writeTextFileAtomically(path + "/old.txt", "old");
+  {
+    const FolderTransaction abandoned(path);
+    writeTextFileAtomically(abandoned.path() + "/half.txt", "half");
+  }
+  EXPECT_EQ(readTextFile(path + "/old.txt"), "old");
+  EXPECT_EQ(countFiles(), 1);
+  FolderTransaction transaction(path);
+  writeTextFileAtomically(transaction.path() + "/new.txt", "new");
+  EXPECT_EQ(readTextFile(path + "/old.txt"), "old");
+  transaction.commit();
+  EXPECT_EQ(readTextFile(path + "/new.txt"), "new");
+  EXPECT_FALSE(std::filesystem::exists(path + "/old.txt"));
+  EXPECT_EQ(countFiles(), 1);
+}
+
+TEST_F(FileIoTest, FolderInPlaceOfAFileIsAnError) {
+  writeTextFileAtomically(folder_ + "/file", "x");
+  EXPECT_THROW(FolderTransaction(folder_ + "/file"), InputError);
+  EXPECT_EQ(countFiles(), 1);
+}
+
 TEST_F(FileIoTest, ErrorsNameThePath) {
   for (const auto& action :
        {std::function<void()>([&] { readTextFile(folder_ + "/missing.txt"); }),

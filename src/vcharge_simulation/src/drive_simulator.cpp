@@ -19,9 +19,10 @@ Timestamp stampAt(int milliseconds) {
 }  // namespace
 
 SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& motion_options,
-                             const WheelOdometerOptions& odometer_options, uint64_t seed) {
-  const VehicleMotion motion(path, motion_options, seed);
-  const WheelOdometer odometer(motion, odometer_options, seed + 1);
+                             const WheelOdometerOptions& odometer_options, uint64_t road_seed,
+                             uint64_t wheel_seed) {
+  const VehicleMotion motion(path, motion_options, road_seed);
+  const WheelOdometer odometer(motion, odometer_options, wheel_seed + 1);
   const int duration_ms = static_cast<int>(std::floor(motion.duration() * 1000.0 + 0.5));
   SimulatedDrive drive;
   std::vector<int> odometry_ms;

@@ -13,7 +13,7 @@ constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
 TEST(DriveSimulatorTest, ImagesComeEvery80Milliseconds) {
   const LotDrive plan = lotDrive("short");
-  const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1);
+  const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1);
   ASSERT_GT(drive.world_from_vehicle.size(), 50U);
   for (size_t i = 1; i < drive.world_from_vehicle.size(); ++i) {
     EXPECT_EQ((drive.world_from_vehicle[i].stamp - drive.world_from_vehicle[i - 1].stamp).count(),
@@ -26,7 +26,7 @@ TEST(DriveSimulatorTest, OdometryTurnsWithTruthWithinThreeHundredthsOfADegreePer
     const LotDrive plan = lotDrive(name);
     WheelOdometerOptions options;
     options.left_right_error = 0.0;
-    const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, options, 3);
+    const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, options, 3, 3);
     double worst_rad = 0.0;
     size_t frames = 0;
     const VehicleOdometry* last_odometry = nullptr;
@@ -59,7 +59,7 @@ TEST(DriveSimulatorTest, OdometryScalesWithTheWheelRadiusError) {
   WheelOdometerOptions options;
   options.scale_error = 0.02;
   options.left_right_error = 0.0;
-  const SimulatedDrive drive = simulateDrive(straight, motion, options, 5);
+  const SimulatedDrive drive = simulateDrive(straight, motion, options, 5, 5);
   const double driven_m = (drive.ground_truth.back().odom_from_vehicle.translation() -
                            drive.ground_truth.front().odom_from_vehicle.translation())
                               .head<2>()
@@ -74,7 +74,7 @@ TEST(DriveSimulatorTest, OdometryScalesWithTheWheelRadiusError) {
 TEST(DriveSimulatorTest, StandsStillBeforeItStarts) {
   LotDrive plan = lotDrive("loop");
   plan.motion.duration_s = 0.5;
-  const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1);
+  const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1);
   EXPECT_EQ(drive.world_from_vehicle.front().world_from_vehicle.translation(),
             drive.world_from_vehicle.back().world_from_vehicle.translation());
   EXPECT_EQ(drive.wheel_ticks.back().left_ticks, 0);
@@ -99,7 +99,7 @@ TEST(DriveSimulatorTest, PlanarMotionObeysTheBicycleModelAndTheBodyTiltsALittle)
 
 TEST(DriveSimulatorTest, LoopEndsNearItsStart) {
   const LotDrive plan = lotDrive("loop");
-  const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1);
+  const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1);
   EXPECT_LT((drive.world_from_vehicle.back().world_from_vehicle.translation() -
              drive.world_from_vehicle.front().world_from_vehicle.translation())
                 .norm(),

@@ -15,6 +15,24 @@ void writeFileAtomically(const std::string& path,
                          const std::function<void(const std::string& temporary)>& write);
 void writeTextFileAtomically(const std::string& path, const std::string& text);
 
+/// A folder of results that appears as a whole or not at all: write into path(), then commit(). Until then
+/// whatever stands under the final name stays; without commit() what was written is removed.
+class FolderTransaction {
+ public:
+  /// InputError when the folder beside `path` cannot be written, or `path` is a file.
+  explicit FolderTransaction(std::string path);
+  ~FolderTransaction();
+  FolderTransaction(const FolderTransaction&) = delete;
+  FolderTransaction& operator=(const FolderTransaction&) = delete;
+
+  const std::string& path() const { return temporary_; }
+  /// Moves the folder to its final name, in place of what stands there.
+  void commit();
+
+ private:
+  std::string final_, temporary_;
+};
+
 /// Creates a folder and its parents. InputError when that fails.
 void createFolder(const std::string& path);
 

@@ -14,7 +14,16 @@ struct CameraResponseOptions {
   double gamma = 0.62;           ///< exponent of the gray curve
   double photon_noise = 1.5e-5;  ///< variance of the light per unit of light
   double read_noise = 5e-4;      ///< standard deviation of the light in the dark
-  void validate() const;         ///< throws std::invalid_argument naming the field
+
+  template <class Visitor>
+  void visitFields(Visitor&& visit) {
+    visit("exposure", exposure);
+    visit("shoulder", shoulder);
+    visit("gamma", gamma);
+    visit("photon_noise", photon_noise);
+    visit("read_noise", read_noise);
+  }
+  void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
 /// Gray curve: gray = 255 min(1, x (1 + w) / (x + w))^gamma with x = exposure * light and w = shoulder.

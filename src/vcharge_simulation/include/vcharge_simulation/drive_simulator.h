@@ -18,9 +18,11 @@ struct SimulatedDrive {
   std::vector<WheelTicks> wheel_ticks;        ///< 50 Hz
 };
 
-/// Simulates a drive along a path: images every 80 ms, 7 ms after an odometry sample. The same arguments give
-/// the same bits. std::invalid_argument for bad options.
+/// Simulates a drive along a path: images every 80 ms, 7 ms after an odometry sample. `road_seed` shakes the
+/// car, `wheel_seed` sets where in a tick the wheels stand at the start. The same arguments give the same
+/// bits. std::invalid_argument for bad options.
 SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& motion_options,
-                             const WheelOdometerOptions& odometer_options, uint64_t seed);
+                             const WheelOdometerOptions& odometer_options, uint64_t road_seed,
+                             uint64_t wheel_seed);
 
 }  // namespace vcharge

@@ -11,6 +11,12 @@ struct LensOptions {
   double blur_rim_px = 0.80;   ///< 90 degrees away from it; between, it grows with the angle to the power 1.5
   double veil = 0.08;          ///< share of the mean light that the lens scatters evenly over the sensor
 
+  template <class Visitor>
+  void visitFields(Visitor&& visit) {
+    visit("blur_axis_px", blur_axis_px);
+    visit("blur_rim_px", blur_rim_px);
+    visit("veil", veil);
+  }
   void validate() const;  ///< throws std::invalid_argument naming the field
   /// Standard deviation at an angle from the axis, for an image `image_scale` times as large as 1280x800.
   double blurAt(double angle_rad, double image_scale) const;

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "vcharge_simulation/camera_response.h"
+#include "vcharge_simulation/drive_simulator.h"
+#include "vcharge_simulation/lens_blur.h"
+#include "vcharge_simulation/wheel_odometer.h"
+
+namespace vcharge {
+
+/// All that a simulated drive depends on. The same scenario gives the same bytes.
+struct DriveScenario {
+  std::string scene = "lot";
+  std::string drive = "short";
+  int seed = 1;                ///< of the road under the car
+  int sensor_seed = -1;        ///< of wheels and image noise; negative: as `seed`
+  double duration_s = 0.0;     ///< the drive ends early; 0: where its path ends
+  double image_scale = 1.0;    ///< image size over 1280x800
+  double exposure_gain = 1.0;  ///< of the images over the camera's normal exposure
+  bool noise = true;
+  std::vector<std::string> cameras;  ///< by name; empty: all
+  WheelOdometerOptions odometer;
+  LensOptions lens;
+  CameraResponseOptions response;
+
+  template <class Visitor>
+  void visitFields(Visitor&& visit) {
+    visit("scene", scene);
+    visit("drive", drive);
+    visit("seed", seed);
+    visit("sensor_seed", sensor_seed);
+    visit("duration_s", duration_s);
+    visit("image_scale", image_scale);
+    visit("exposure_gain", exposure_gain);
+    visit("noise", noise);
+    visit("cameras", cameras);
+    visit("odometer", odometer);
+    visit("lens", lens);
+    visit("response", response);
+  }
+  void validate() const;  ///< throws std::invalid_argument naming the field
+
+  uint64_t sensorSeed() const { return static_cast<uint64_t>(sensor_seed < 0 ? seed : sensor_seed); }
+};
+
+}  // namespace vcharge
