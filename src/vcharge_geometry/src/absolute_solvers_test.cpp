@@ -17,7 +17,7 @@ constexpr int kNumProblems = 10000;
 
 /// Largest angle between a ray and its point seen from a solution: no solution may miss its own points.
 template <class Matches>
-double largestAngle(const Matches& matches, const RigPose& map_from_rig) {
+double largestAngle(const Matches& matches, const RotationTranslation& map_from_rig) {
   double largest = 0.0;
   for (const PointMatch& match : matches) {
     const Eigen::Vector3d in_rig =
@@ -39,11 +39,11 @@ TEST(GeneralizedThreePointTest, SolvesRandomProblemsForEverySpreadOfTheCentres) 
     for (int i = 0; i < kNumProblems; ++i) {
       const RigidTransform truth = random.pose();
       const std::array<PointMatch, 3> matches = random.pointMatches<3>(truth, spread);
-      FixedVector<RigPose, 8> poses;
+      FixedVector<RotationTranslation, 8> poses;
       ASSERT_EQ(solveGeneralizedThreePoint(matches, &poses), SolverStatus::kOk);
       errors.push_back(smallestError(poses, truth));
       most_solutions = std::max(most_solutions, poses.size());
-      for (const RigPose& pose : poses) {
+      for (const RotationTranslation& pose : poses) {
         largest_angle = std::max(largest_angle, largestAngle(matches, pose));
       }
     }
@@ -66,10 +66,10 @@ TEST(GeneralizedThreePointTest, FindsBothPosesOfSymmetricTriangles) {
       const Eigen::Vector3d origin(i == 0 ? 0.0 : (i == 1 ? spread : -spread), 0.0, 0.0);
       matches[i] = {{origin, (points[i] - origin).normalized()}, points[i]};
     }
-    FixedVector<RigPose, 8> poses;
+    FixedVector<RotationTranslation, 8> poses;
     ASSERT_EQ(solveGeneralizedThreePoint(matches, &poses), SolverStatus::kOk);
     EXPECT_LE(smallestError(poses, RigidTransform()), 1e-6) << spread;
-    for (const RigPose& pose : poses) {
+    for (const RotationTranslation& pose : poses) {
       EXPECT_LE(largestAngle(matches, pose), 1e-7);
     }
   }
@@ -82,7 +82,7 @@ TEST(GeneralizedThreePointTest, ErrorGrowsInProportionToNoise) {
     std::vector<double> errors;
     for (int i = 0; i < kNumProblems; ++i) {
       const RigidTransform truth = random.pose();
-      FixedVector<RigPose, 8> poses;
+      FixedVector<RotationTranslation, 8> poses;
       solveGeneralizedThreePoint(random.pointMatches<3>(truth, 1.0, sigma_rad), &poses);
       errors.push_back(smallestError(poses, truth));
     }
@@ -106,7 +106,7 @@ TEST(GeneralizedThreePointTest, AcceptsParallelRays) {
                   truth * Eigen::Vector3d(first.origin_m + random.uniform(2.0, 10.0) * first.direction)};
     matches[1] = {second,
                   truth * Eigen::Vector3d(second.origin_m + random.uniform(2.0, 10.0) * second.direction)};
-    FixedVector<RigPose, 8> poses;
+    FixedVector<RotationTranslation, 8> poses;
     ASSERT_EQ(solveGeneralizedThreePoint(matches, &poses), SolverStatus::kOk);
     errors.push_back(smallestError(poses, truth));
   }
@@ -120,7 +120,7 @@ TEST(PerspectiveThreePointTest, SolvesRandomProblemsWithUpToFourPoses) {
   int most_solutions = 0;
   for (int i = 0; i < kNumProblems; ++i) {
     const RigidTransform truth = random.pose();
-    FixedVector<RigPose, 4> poses;
+    FixedVector<RotationTranslation, 4> poses;
     ASSERT_EQ(solvePerspectiveThreePoint(random.pointMatches<3>(truth, 0.0), &poses), SolverStatus::kOk);
     errors.push_back(smallestError(poses, truth));
     most_solutions = std::max(most_solutions, poses.size());
@@ -138,11 +138,11 @@ TEST(UprightTwoPointTest, SolvesRandomProblems) {
   for (int i = 0; i < kNumProblems; ++i) {
     const RigidTransform truth = random.uprightPose();
     const std::array<PointMatch, 2> matches = random.pointMatches<2>(truth, i % 2 == 0 ? 1.0 : 0.0);
-    FixedVector<RigPose, 2> poses;
+    FixedVector<RotationTranslation, 2> poses;
     ASSERT_EQ(solveUprightTwoPoint(matches, &poses), SolverStatus::kOk);
     errors.push_back(smallestError(poses, truth));
     num_double += poses.size() == 2 ? 1 : 0;
-    for (const RigPose& pose : poses) {
+    for (const RotationTranslation& pose : poses) {
       EXPECT_LE(largestAngle(matches, pose), 1e-6);
     }
   }
@@ -156,7 +156,7 @@ TEST(UprightTwoPointTest, RejectsHorizontalAndParallelRays) {
   std::array<PointMatch, 2> matches;
   matches[0] = {{Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(1, 0, 0)}, Eigen::Vector3d(5, 0, 1)};
   matches[1] = {{Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0, 1, 0)}, Eigen::Vector3d(0, 5, 1)};
-  FixedVector<RigPose, 2> poses;
+  FixedVector<RotationTranslation, 2> poses;
   EXPECT_EQ(solveUprightTwoPoint(matches, &poses), SolverStatus::kDegenerate);
   const Eigen::Vector3d down = Eigen::Vector3d(1, 0, -1).normalized();
   matches[0] = {{Eigen::Vector3d(0, 0, 1), down}, Eigen::Vector3d(1, 0, 0)};
@@ -168,9 +168,9 @@ TEST(UprightTwoPointTest, RejectsHorizontalAndParallelRays) {
 TEST(AbsoluteSolversTest, RejectWhatHasNoAnswer) {
   RandomProblems random(6);
   const std::array<PointMatch, 3> good = random.pointMatches<3>(random.pose());
-  FixedVector<RigPose, 8> poses;
-  FixedVector<RigPose, 4> central_poses;
-  FixedVector<RigPose, 2> upright_poses;
+  FixedVector<RotationTranslation, 8> poses;
+  FixedVector<RotationTranslation, 4> central_poses;
+  FixedVector<RotationTranslation, 2> upright_poses;
   for (const double bad :
        {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity()}) {
     for (const int where : {0, 1, 2}) {

@@ -25,7 +25,7 @@ namespace vcharge {
 /// when the rays share a centre; then the octic is a quartic in lambda_1^2, and plain P3P is faster and is
 /// called instead.
 inline SolverStatus solveGeneralizedThreePoint(const std::array<PointMatch, 3>& matches,
-                                               FixedVector<RigPose, 8>* poses) {
+                                               FixedVector<RotationTranslation, 8>* poses) {
   poses->clear();
   const std::array<double, 3> squared{(matches[0].point_m - matches[1].point_m).squaredNorm(),
                                       (matches[0].point_m - matches[2].point_m).squaredNorm(),
@@ -37,9 +37,9 @@ inline SolverStatus solveGeneralizedThreePoint(const std::array<PointMatch, 3>& 
     return SolverStatus::kNotFinite;
   }
   if (spread_squared <= 1e-28 * unit_squared) {
-    FixedVector<RigPose, 4> central_poses;
+    FixedVector<RotationTranslation, 4> central_poses;
     const SolverStatus status = solvePerspectiveThreePoint(matches, &central_poses);
-    for (const RigPose& pose : central_poses) {
+    for (const RotationTranslation& pose : central_poses) {
       poses->push_back(pose);
     }
     return status;

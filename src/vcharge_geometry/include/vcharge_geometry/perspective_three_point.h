@@ -19,7 +19,7 @@ namespace vcharge {
 /// it leaves U u + V = 0 with U, V of degrees 1 and 2 in x, and the first then a quartic in x: at most 4
 /// poses with all points in front. The rays' origins are taken to be one, that of the first ray.
 inline SolverStatus solvePerspectiveThreePoint(const std::array<PointMatch, 3>& matches,
-                                               FixedVector<RigPose, 4>* poses) {
+                                               FixedVector<RotationTranslation, 4>* poses) {
   poses->clear();
   Eigen::Matrix3d map_axes;
   const std::array<double, 3> squared{(matches[0].point_m - matches[1].point_m).squaredNorm(),

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cmath>
+
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include "vcharge_core/rigid_transform.h"
 #include "vcharge_geometry/pluecker_line.h"
+#include "vcharge_geometry/rotation_translation.h"
 
 namespace vcharge {
 
@@ -12,14 +14,8 @@ namespace vcharge {
 struct PointMatch {
   Ray ray;                  ///< in the frame of the rig
   Eigen::Vector3d point_m;  ///< in the frame of the map
-};
-
-/// A pose of the rig in the map: map_from_rig.
-struct RigPose {
-  Eigen::Matrix3d rotation;
-  Eigen::Vector3d translation_m;
-
-  RigidTransform transform() const { return RigidTransform(Eigen::Quaterniond(rotation), translation_m); }
+  int camera = 0;           ///< which camera the ray belongs to, any label; used to draw samples
+  double quality = 1.0;     ///< higher for matches more likely to be right; used to draw samples
 };
 
 /// Axes of a triangle: along its first side, in its plane, and normal to it. False where it has no area.

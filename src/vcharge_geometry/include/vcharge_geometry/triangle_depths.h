@@ -74,7 +74,7 @@ inline bool polishDepths(const TriangleDistances& pairs, Eigen::Vector3d* depths
 /// Pose from the depths along the three rays, metres; none unless all points lie in front.
 template <int Capacity>
 void addPoseOfDepths(const std::array<PointMatch, 3>& matches, const Eigen::Matrix3d& map_axes,
-                     const Eigen::Vector3d& depths_m, FixedVector<RigPose, Capacity>* poses) {
+                     const Eigen::Vector3d& depths_m, FixedVector<RotationTranslation, Capacity>* poses) {
   if (!(depths_m.minCoeff() > 0.0)) {
     return;
   }
@@ -86,7 +86,7 @@ void addPoseOfDepths(const std::array<PointMatch, 3>& matches, const Eigen::Matr
   if (!triangleAxes(points[0], points[1], points[2], &rig_axes)) {
     return;
   }
-  RigPose pose;
+  RotationTranslation pose;
   pose.rotation = map_axes * rig_axes.transpose();
   pose.translation_m = matches[0].point_m - pose.rotation * points[0];
   poses->push_back(pose);

@@ -19,7 +19,7 @@ namespace vcharge {
 /// the yaw, and a horizontal length, quadratic and also free of it: a line meets a quadric, at most 2 poses.
 /// Both points must lie in front of their cameras. Two horizontal rays leave the depths free: kDegenerate.
 inline SolverStatus solveUprightTwoPoint(const std::array<PointMatch, 2>& matches,
-                                         FixedVector<RigPose, 2>* poses) {
+                                         FixedVector<RotationTranslation, 2>* poses) {
   poses->clear();
   const Ray& first = matches[0].ray;
   const Ray& second = matches[1].ray;
@@ -64,7 +64,7 @@ inline SolverStatus solveUprightTwoPoint(const std::array<PointMatch, 2>& matche
     const double scale = 1.0 / std::sqrt((x * x + y * y) * horizontal_squared);
     const double cosine = scale * (x * points.x() + y * points.y());
     const double sine = scale * (x * points.y() - y * points.x());
-    RigPose pose;
+    RotationTranslation pose;
     pose.rotation << cosine, -sine, 0.0, sine, cosine, 0.0, 0.0, 0.0, 1.0;
     pose.translation_m =
         matches[0].point_m - pose.rotation * (first.origin_m + first_depth * first.direction);
