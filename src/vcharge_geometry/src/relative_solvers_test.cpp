@@ -90,7 +90,7 @@ TYPED_TEST(RelativeSolverTest, SolvesRandomProblemsToRounding) {
         const RigidTransform transform = motion.transform();
         const double size = 1.0 + transform.translation().norm();
         for (const LineMatch& match : matches) {
-          const double constraint = generalizedEpipolarConstraint(match, transform) / size;
+          const double constraint = std::abs(generalizedEpipolarConstraint(match, transform)) / size;
           largest_constraint = std::max(largest_constraint, motion.scale_observable ? constraint : 0.0);
         }
       }
