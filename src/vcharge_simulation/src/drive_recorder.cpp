@@ -22,24 +22,19 @@
 #include "vcharge_ros/drive_topics.h"
 #include "vcharge_ros/image_conversions.h"
 #include "vcharge_simulation/golf_rig.h"
-#include "vcharge_simulation/lot_scene.h"
 #include "vcharge_simulation/renderer.h"
+#include "vcharge_simulation/scene_catalogue.h"
 #include "vcharge_simulation/truth_maps.h"
 
 namespace vcharge {
 
 namespace {
 
-constexpr int kRigSeed = 1;
-constexpr double kGroundTexel_m = 0.0125;
 // Poses of the same drive agree to the last bits that a message holds.
 constexpr double kSamePose_m = 1e-9;
 
-LotDrive planDrive(const DriveScenario& scenario) {
-  if (scenario.scene != "lot") {
-    throw InputError("scene: expected lot, got '" + scenario.scene + "'");
-  }
-  LotDrive plan = lotDrive(scenario.drive);
+DrivePlan planDriveOf(const DriveScenario& scenario) {
+  DrivePlan plan = planDrive(scenario.scene, scenario.drive);
   if (scenario.duration_s > 0.0) {
     plan.motion.duration_s = scenario.duration_s;
   }
@@ -52,7 +47,7 @@ struct SelectedCamera {
 };
 
 std::vector<SelectedCamera> selectCameras(const DriveScenario& scenario) {
-  const CameraRig rig = makeGolfRig(kRigSeed, scenario.image_scale);
+  const CameraRig rig = makeGolfRig(static_cast<uint64_t>(scenario.rig_seed), scenario.image_scale);
   std::vector<SelectedCamera> selected;
   if (scenario.cameras.empty()) {
     for (const RigCamera& camera : rig.cameras) {
@@ -172,7 +167,7 @@ void RecordingOptions::validate() const {
 void recordDrive(const DriveScenario& scenario, const RecordingOptions& recording) {
   scenario.validate();
   recording.validate();
-  const LotDrive plan = planDrive(scenario);
+  const DrivePlan plan = planDriveOf(scenario);
   const std::vector<SelectedCamera> selected = selectCameras(scenario);
   const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, scenario.odometer,
                                              static_cast<uint64_t>(scenario.seed), scenario.sensorSeed());
@@ -196,10 +191,11 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   std::unique_ptr<ImageSource> images;
   writeTrajectory(drive.world_from_vehicle, truth.path() + "/trajectory.tum");
   if (recording.images_from.empty()) {
-    LotOptions lot;
-    lot.day = plan.day;
-    lot.ground_texel_m = std::max(lot.ground_texel_m, kGroundTexel_m / scenario.image_scale);
-    renderer.emplace(buildLotScene(lot));
+    SceneOptions scene;
+    scene.seed = scenario.scene_seed;
+    scene.day = plan.day;
+    scene.image_scale = scenario.image_scale;
+    renderer.emplace(buildScene(scenario.scene, scene));
     images = std::make_unique<RenderedImages>(*renderer, views, response, drive.world_from_vehicle);
     writeHeightMap(computeHeightMap(*renderer, recording.height_cell_m, recording.height_limit_m),
                    truth.path() + "/height_map");

@@ -7,6 +7,8 @@
 namespace vcharge {
 
 void DriveScenario::validate() const {
+  requireField(scene_seed >= 0, "scene_seed", "must not be negative", scene_seed);
+  requireField(rig_seed >= 0, "rig_seed", "must not be negative", rig_seed);
   requireField(seed >= 0, "seed", "must not be negative", seed);
   requireField(std::isfinite(duration_s) && duration_s >= 0.0, "duration_s", "must not be negative",
                duration_s);

@@ -33,7 +33,16 @@ DrivePath figureEightPath() {
 
 }  // namespace
 
-LotDrive lotDrive(const std::string& name) {
+std::vector<CatalogueEntry> listLotDrives() {
+  return {
+      {"short", "5 s of gentle curves in the middle lane"},
+      {"loop", "around all rows of bays, back to the start"},
+      {"figure_eight", "around the northern rows to the left, then around the southern ones to the right"},
+      {"other_day", "the loop in other light, with moved cars"},
+      {"approach", "straight at the plants that border the lot"}};
+}
+
+DrivePlan planLotDrive(const std::string& name) {
   VehicleMotionOptions motion;
   motion.duration_s = 600.0;
   if (name == "loop" || name == "other_day") {
@@ -59,8 +68,7 @@ LotDrive lotDrive(const std::string& name) {
     return {name, DrivePath(RigidTransform::planar(-8.0, 0.0, 3.14159265358979323846), {{15.0, 0.0, 0.0}}),
             motion, 0};
   }
-  throw std::invalid_argument("drive: expected loop, figure_eight, short, other_day or approach, got '" +
-                              name + "'");
+  throw std::invalid_argument("drive: the lot has none of the name '" + name + "'");
 }
 
 }  // namespace vcharge

@@ -44,7 +44,7 @@ void addIslands(LotLayout* layout) {
 void addPlants(Random* random, LotLayout* layout) {
   const auto tree = [&](double x, double y, double low, double high) {
     layout->trees.push_back({x, y, layout->groundHeight(x, y), random->uniform(low, high),
-                             random->uniform(0.0, 6.28), random->index(kNumLotTrees)});
+                             random->uniform(0.0, 6.28), random->index(kNumSmallTrees)});
   };
   const auto bush = [&](double x, double y, double low, double high) {
     const double radius = random->uniform(low, high);
@@ -74,7 +74,8 @@ void addPlants(Random* random, LotLayout* layout) {
   }
   layout->hedges.push_back({{-38.5, -20.0, -37.5, 20.0}, kKerbHeight_m, 1.7});
   for (const double y : {-17.0, -8.0, 2.0, 11.0}) {
-    tree(random->uniform(32.5, 34.5), y + random->uniform(-1.5, 1.5), 0.7, 1.0);
+    const double shifted_y = y + random->uniform(-1.5, 1.5);
+    tree(random->uniform(32.5, 34.5), shifted_y, 0.7, 1.0);
   }
 }
 
@@ -83,7 +84,7 @@ void addWoods(uint64_t seed, LotLayout* layout) {
   Random random(seed * 69U + 5U);
   const auto tree = [&](double x, double y) {
     layout->trees.push_back({x, y, 0.0, random.uniform(1.1, 1.7), random.uniform(0.0, 6.28),
-                             kNumLotTrees + random.index(kNumTallTrees)});
+                             kNumSmallTrees + random.index(kNumTallTrees)});
   };
   for (const double side : {-1.0, 1.0}) {
     for (double x = -37.0; x < 37.0; x += random.uniform(3.0, 8.0)) {
@@ -108,6 +109,9 @@ void addHouses(LotLayout* layout) {
 }
 
 void addStreetFurniture(Random* random, LotLayout* layout) {
+  const auto bin = [&](double x, double y, double yaw_rad) {
+    layout->bins.push_back({x, y, layout->groundHeight(x, y), yaw_rad});
+  };
   for (const double side : {-1.0, 1.0}) {
     for (double x = -27.0; x <= 28.0; x += 13.5) {
       layout->poles.push_back({x + random->uniform(-1.0, 1.0), side * 23.0, kKerbHeight_m, 5.5, 0.06, true});
@@ -116,20 +120,22 @@ void addStreetFurniture(Random* random, LotLayout* layout) {
       layout->poles.push_back({x, side * 7.5, kKerbHeight_m, 1.2, 0.035, false});
     }
     layout->fences.push_back({-38.0, side * 28.6, 38.0, side * 28.6, kKerbHeight_m});
-    layout->bins.push_back({random->uniform(-15.0, -5.0), side * 23.2, random->uniform(0.0, 3.0)});
-    layout->bins.push_back({random->uniform(5.0, 15.0), side * 23.2, random->uniform(0.0, 3.0)});
+    for (const double middle_x : {-10.0, 10.0}) {
+      const double x = random->uniform(middle_x - 5.0, middle_x + 5.0);
+      bin(x, side * 23.2, random->uniform(0.0, 3.0));
+    }
   }
   for (double y = -20.0; y <= 20.0; y += 2.5) {
     layout->poles.push_back({30.2, y, 0.0, 0.9, 0.06, false});  // bollards before the plaza
   }
   for (const double y : {-12.0, 6.5}) {
-    layout->bins.push_back({31.4, y, 0.3});
+    bin(31.4, y, 0.3);
     layout->poles.push_back({31.0, y + 3.0, 0.0, 4.5, 0.06, true});
   }
 }
 
-LotLayout::Car parkedCar(const LotLayout::Bay& bay, Random* random) {
-  LotLayout::Car car{};
+ParkedCar parkedCar(const LotLayout::Bay& bay, Random* random) {
+  ParkedCar car{};
   car.shape = random->index(static_cast<int>(carShapes().size()));
   car.paint = random->index(5);
   car.seed = static_cast<uint32_t>(random->bits());

@@ -225,7 +225,7 @@ Reprojection reproject(const CameraView& from, const RigidTransform& world_from_
 }
 
 TEST(RendererTest, ExactRangeReproducesTheImageFromFrameToFrame) {
-  const LotDrive plan = lotDrive("short");
+  const DrivePlan plan = planLotDrive("short");
   const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1);
   const CameraRig rig = makeGolfRig(1, 0.5);
   for (const size_t camera : {0U, 1U}) {

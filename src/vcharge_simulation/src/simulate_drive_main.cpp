@@ -22,6 +22,9 @@ int main(int argc, char** argv) {
   app.add_option("--drive", scenario.drive, "loop, figure_eight, short, other_day or approach")
       ->capture_default_str();
   app.add_option("--output", recording.bag, "bag to write")->required()->check(vcharge::requireNotEmpty);
+  app.add_option("--scene-seed", scenario.scene_seed, "of the scene")->capture_default_str();
+  app.add_option("--rig-seed", scenario.rig_seed, "of the lenses and how they are mounted")
+      ->capture_default_str();
   app.add_option("--seed", scenario.seed, "of the road, and of wheels and noise too")->capture_default_str();
   app.add_option("--sensor-seed", scenario.sensor_seed, "of wheels and noise, where it is not --seed");
   app.add_option(

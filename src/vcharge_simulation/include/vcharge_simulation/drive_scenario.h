@@ -14,6 +14,8 @@ namespace vcharge {
 struct DriveScenario {
   std::string scene = "lot";
   std::string drive = "short";
+  int scene_seed = 1;          ///< of the scene
+  int rig_seed = 1;            ///< of the lenses and how they are mounted
   int seed = 1;                ///< of the road under the car
   int sensor_seed = -1;        ///< of wheels and image noise; negative: as `seed`
   double duration_s = 0.0;     ///< the drive ends early; 0: where its path ends
@@ -29,6 +31,8 @@ struct DriveScenario {
   void visitFields(Visitor&& visit) {
     visit("scene", scene);
     visit("drive", drive);
+    visit("scene_seed", scene_seed);
+    visit("rig_seed", rig_seed);
     visit("seed", seed);
     visit("sensor_seed", sensor_seed);
     visit("duration_s", duration_s);

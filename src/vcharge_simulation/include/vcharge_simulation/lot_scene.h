@@ -3,10 +3,9 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
-#include "vcharge_simulation/drive_path.h"
-#include "vcharge_simulation/scene.h"
-#include "vcharge_simulation/vehicle_motion.h"
+#include "vcharge_simulation/scene_catalogue.h"
 
 namespace vcharge {
 
@@ -25,16 +24,9 @@ struct LotOptions {
 /// cars, trees, hedges, kerbs, posts, fences and houses around it. The same options give the same scene.
 std::shared_ptr<const Scene> buildLotScene(const LotOptions& options);
 
-/// A drive through the lot.
-struct LotDrive {
-  std::string name;
-  DrivePath path;
-  VehicleMotionOptions motion;
-  int day = 0;
-};
-
-/// "loop", "figure_eight", "short", "other_day", "approach". std::invalid_argument that lists the names for
-/// any other.
-LotDrive lotDrive(const std::string& name);
+/// Drives through the lot: "loop", "figure_eight", "short", "other_day", "approach".
+std::vector<CatalogueEntry> listLotDrives();
+/// std::invalid_argument for a name that listLotDrives() does not have.
+DrivePlan planLotDrive(const std::string& name);
 
 }  // namespace vcharge

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "vcharge_simulation/drive_path.h"
+#include "vcharge_simulation/scene.h"
+#include "vcharge_simulation/vehicle_motion.h"
+
+namespace vcharge {
+
+/// How a scene of the catalogue is built.
+struct SceneOptions {
+  int seed = 1;             ///< of everything that stays from day to day
+  int day = 0;              ///< another day: other light and moved cars
+  double moved_cars = 0.3;  ///< share of the parked cars that differ from day 0
+  /// Size of the images that will be rendered, over 1280x800: smaller images need no finer textures.
+  double image_scale = 1.0;
+  void validate() const;  ///< throws std::invalid_argument naming the field
+};
+
+/// A drive through a scene.
+struct DrivePlan {
+  std::string name;
+  DrivePath path;
+  VehicleMotionOptions motion;
+  int day = 0;  ///< on which the drive takes place
+};
+
+/// Name and one line about each scene, and each drive of a scene.
+struct CatalogueEntry {
+  std::string name, description;
+};
+std::vector<CatalogueEntry> listScenes();
+std::vector<CatalogueEntry> listDrives(const std::string& scene);
+
+/// std::invalid_argument that lists the names there are for an unknown one. The same options give the same
+/// scene.
+std::shared_ptr<const Scene> buildScene(const std::string& name, const SceneOptions& options);
+DrivePlan planDrive(const std::string& scene, const std::string& drive);
+
+}  // namespace vcharge

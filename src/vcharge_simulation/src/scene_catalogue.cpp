@@ -1,0 +1,90 @@
+#include "vcharge_simulation/scene_catalogue.h"
+
+#include <algorithm>
+#include <functional>
+#include <stdexcept>
+
+#include "vcharge_core/options.h"
+#include "vcharge_simulation/lot_scene.h"
+
+namespace vcharge {
+
+namespace {
+
+struct CatalogueScene {
+  CatalogueEntry entry;
+  std::function<std::shared_ptr<const Scene>(const SceneOptions&)> build;
+  std::function<std::vector<CatalogueEntry>()> drives;
+  std::function<DrivePlan(const std::string&)> plan;
+};
+
+std::shared_ptr<const Scene> buildLot(const SceneOptions& options) {
+  LotOptions lot;
+  lot.seed = static_cast<uint64_t>(options.seed);
+  lot.day = options.day;
+  lot.moved_cars = options.moved_cars;
+  lot.ground_texel_m = std::min(0.5, lot.ground_texel_m / options.image_scale);
+  return buildLotScene(lot);
+}
+
+const std::vector<CatalogueScene>& catalogue() {
+  static const std::vector<CatalogueScene> scenes = {
+      {{"lot", "parking lot of 80 x 60 m in the sun"}, buildLot, listLotDrives, planLotDrive}};
+  return scenes;
+}
+
+std::string namesOf(const std::vector<CatalogueEntry>& entries) {
+  std::string names;
+  for (const CatalogueEntry& entry : entries) {
+    names += (names.empty() ? "" : ", ") + entry.name;
+  }
+  return names;
+}
+
+const CatalogueScene& findScene(const std::string& name) {
+  for (const CatalogueScene& scene : catalogue()) {
+    if (scene.entry.name == name) {
+      return scene;
+    }
+  }
+  throw std::invalid_argument("scene: expected one of " + namesOf(listScenes()) + ", got '" + name + "'");
+}
+
+}  // namespace
+
+void SceneOptions::validate() const {
+  requireField(seed >= 0, "seed", "must not be negative", seed);
+  requireField(day >= 0, "day", "must not be negative", day);
+  requireField(moved_cars >= 0.0 && moved_cars <= 1.0, "moved_cars", "must be in [0, 1]", moved_cars);
+  requireField(image_scale >= 0.05 && image_scale <= 1.0, "image_scale", "must be in [0.05, 1]", image_scale);
+}
+
+std::vector<CatalogueEntry> listScenes() {
+  std::vector<CatalogueEntry> entries;
+  for (const CatalogueScene& scene : catalogue()) {
+    entries.push_back(scene.entry);
+  }
+  return entries;
+}
+
+std::vector<CatalogueEntry> listDrives(const std::string& scene) {
+  return findScene(scene).drives();
+}
+
+std::shared_ptr<const Scene> buildScene(const std::string& name, const SceneOptions& options) {
+  options.validate();
+  return findScene(name).build(options);
+}
+
+DrivePlan planDrive(const std::string& scene, const std::string& drive) {
+  const CatalogueScene& found = findScene(scene);
+  const std::vector<CatalogueEntry> drives = found.drives();
+  if (std::none_of(drives.begin(), drives.end(),
+                   [&](const CatalogueEntry& entry) { return entry.name == drive; })) {
+    throw std::invalid_argument("drive: expected one of " + namesOf(drives) + " in the scene " + scene +
+                                ", got '" + drive + "'");
+  }
+  return found.plan(drive);
+}
+
+}  // namespace vcharge

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace vcharge {
+
+/// An axis-aligned rectangle on the ground, metres.
+struct GroundRectangle {
+  double min_x, min_y, max_x, max_y;
+  bool contains(double x, double y) const { return x >= min_x && x <= max_x && y >= min_y && y <= max_y; }
+  double width() const { return max_x - min_x; }
+  double depth() const { return max_y - min_y; }
+};
+
+inline constexpr double kKerbHeight_m = 0.12;
+
+// Tree::variant: small trees come first, then tall ones.
+constexpr int kNumSmallTrees = 4;
+constexpr int kNumTallTrees = 3;
+
+/// Things that stand in a scene: metres, x and y in the world, z of their foot.
+struct ParkedCar {
+  double x, y, yaw_rad;  ///< rear axle
+  int shape;             ///< into carShapes()
+  int paint;             ///< 0 to kNumPaints - 1, dark to bright
+  uint32_t seed;         ///< of its number plate
+  double z = 0.0;
+};
+inline constexpr int kNumPaints = 5;
+struct Tree {
+  double x, y, z, scale, yaw_rad;
+  int variant;
+};
+struct Bush {
+  double x, y, z, radius, height;
+  uint32_t seed;
+};
+struct Hedge {
+  GroundRectangle area;
+  double base_z, height;
+};
+struct Building {
+  GroundRectangle area;
+  double height;
+  std::string sign;
+  uint32_t seed;
+};
+struct Pole {
+  double x, y, z, height, radius;
+  bool lamp;
+};
+struct Bin {
+  double x, y, z, yaw_rad;
+};
+struct Fence {
+  double x0, y0, x1, y1, z;
+};
+
+}  // namespace vcharge
