@@ -1,0 +1,14 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace vcharge {
+
+/// Number of correspondences (unit rays, 3 x N each, NaN counts as wrong) whose rays lie within
+/// `max_error_rad` of their epipolar planes for the essential matrix that fits most of them: eight-point
+/// samples, each refined on all that agree. No pose enters, so that real and simulated drives are judged
+/// alike. The same seed gives the same count. std::logic_error for different N.
+int countRightMatches(const Eigen::Matrix3Xd& first_rays, const Eigen::Matrix3Xd& second_rays,
+                      double max_error_rad, unsigned seed, int num_samples = 4000);
+
+}  // namespace vcharge
