@@ -36,33 +36,50 @@ Eigen::Matrix3d fitEssential(const Eigen::Matrix3Xd& first, const Eigen::Matrix3
   return svd.matrixU() * Eigen::Vector3d(1.0, 1.0, 0.0).asDiagonal() * svd.matrixV().transpose();
 }
 
-/// The correspondences both of whose rays are within max_error_rad of their epipolar planes.
-std::vector<int> agreeing(const Eigen::Matrix3d& essential, const Eigen::Matrix3Xd& first,
-                          const Eigen::Matrix3Xd& second, double max_error_rad) {
-  const double max_sine = std::sin(max_error_rad);
-  std::vector<int> agree;
+/// Larger sine of the angles of each correspondence's rays to their epipolar planes; NaN where a ray is.
+Eigen::VectorXd epipolarErrors(const Eigen::Matrix3d& essential, const Eigen::Matrix3Xd& first,
+                               const Eigen::Matrix3Xd& second) {
+  Eigen::VectorXd errors(first.cols());
   for (Eigen::Index i = 0; i < first.cols(); ++i) {
     const Eigen::Vector3d normal_in_second = essential * first.col(i);
     const Eigen::Vector3d normal_in_first = essential.transpose() * second.col(i);
-    const double product = std::abs(second.col(i).dot(normal_in_second));
-    if (product < max_sine * normal_in_second.norm() && product < max_sine * normal_in_first.norm()) {
+    errors[i] = std::abs(second.col(i).dot(normal_in_second)) /
+                std::sqrt(std::min(normal_in_second.squaredNorm(), normal_in_first.squaredNorm()));
+  }
+  return errors;
+}
+
+std::vector<int> below(const Eigen::VectorXd& errors, double max_error) {
+  std::vector<int> agree;
+  for (Eigen::Index i = 0; i < errors.size(); ++i) {
+    if (errors[i] < max_error) {  // false for NaN
       agree.push_back(static_cast<int>(i));
     }
   }
   return agree;
 }
 
+double medianOf(const Eigen::VectorXd& errors, const std::vector<int>& chosen) {
+  std::vector<double> values;
+  for (const int i : chosen) {
+    values.push_back(errors[i]);
+  }
+  std::sort(values.begin(), values.end());
+  return values.empty() ? 0.0 : std::asin(values[values.size() / 2]);
+}
+
 }  // namespace
 
-int countRightMatches(const Eigen::Matrix3Xd& first_rays, const Eigen::Matrix3Xd& second_rays,
-                      double max_error_rad, unsigned seed, int num_samples) {
-  check(first_rays.cols() == second_rays.cols(), "countRightMatches: as many first rays as second ones");
+EpipolarJudgement judgeMatches(const Eigen::Matrix3Xd& first_rays, const Eigen::Matrix3Xd& second_rays,
+                               double max_error_rad, unsigned seed, int num_samples) {
+  check(first_rays.cols() == second_rays.cols(), "judgeMatches: as many first rays as second ones");
+  EpipolarJudgement judgement;
   const auto count = static_cast<unsigned>(first_rays.cols());
   if (count < kSampleSize) {
-    return 0;
+    return judgement;
   }
+  const double max_error = std::sin(max_error_rad);
   std::mt19937 generator(seed);
-  size_t best = 0;
   std::vector<int> sample(kSampleSize);
   for (int iteration = 0; iteration < num_samples; ++iteration) {
     for (int k = 0; k < kSampleSize; ++k) {
@@ -71,21 +88,28 @@ int countRightMatches(const Eigen::Matrix3Xd& first_rays, const Eigen::Matrix3Xd
       } while (std::find(sample.begin(), sample.begin() + k, sample[k]) != sample.begin() + k);
     }
     Eigen::Matrix3d essential = fitEssential(first_rays, second_rays, sample);
-    if (!essential.allFinite() ||
-        2 * agreeing(essential, first_rays, second_rays, max_error_rad).size() < best) {
+    if (!essential.allFinite()) {
+      continue;
+    }
+    Eigen::VectorXd errors = epipolarErrors(essential, first_rays, second_rays);
+    if (2 * below(errors, max_error).size() < static_cast<size_t>(judgement.right)) {
       continue;
     }
     // Eight points err themselves: refined on all that agree, at first roughly.
     for (const double factor : {3.0, 2.0, 1.5, 1.0, 1.0, 1.0}) {
-      const std::vector<int> inliers = agreeing(essential, first_rays, second_rays, factor * max_error_rad);
+      const std::vector<int> inliers = below(errors, factor * max_error);
       if (inliers.size() < kSampleSize) {
         break;
       }
       essential = fitEssential(first_rays, second_rays, inliers);
-      best = std::max(best, agreeing(essential, first_rays, second_rays, max_error_rad).size());
+      errors = epipolarErrors(essential, first_rays, second_rays);
+      const std::vector<int> right = below(errors, max_error);
+      if (right.size() > static_cast<size_t>(judgement.right)) {
+        judgement = {static_cast<int>(right.size()), medianOf(errors, right)};
+      }
     }
   }
-  return static_cast<int>(best);
+  return judgement;
 }
 
 }  // namespace vcharge

@@ -32,6 +32,13 @@ void SiftOptions::validate() const {
                octave_layers);
 }
 
+FeatureExtractorOptions FeatureExtractorOptions::mapping() {
+  FeatureExtractorOptions options;
+  options.type = FeatureType::kRootSift;
+  options.max_features = 4000;
+  return options;
+}
+
 void FeatureExtractorOptions::validate() const {
   requireField(max_features >= 1 && max_features <= 1000000, "max_features", "must be in [1, 1000000]",
                max_features);

@@ -133,6 +133,11 @@ INSTANTIATE_TEST_SUITE_P(AllTypes, FeatureExtractorTest, ::testing::ValuesIn(ava
                            return enumNames<FeatureType>()[static_cast<size_t>(parameter.param)];
                          });
 
+TEST(FeatureExtractorOptionsTest, DefaultsForMappingAndLocalizationAreValid) {
+  EXPECT_EQ(makeFeatureExtractor(FeatureExtractorOptions::mapping())->descriptorType(), CV_32FC1);
+  EXPECT_EQ(makeFeatureExtractor()->descriptorType(), CV_8UC1);
+}
+
 TEST(FeatureExtractorOptionsTest, BadFieldsAreNamed) {
   const auto errorOf = [](const std::function<void(FeatureExtractorOptions*)>& spoil) -> std::string {
     FeatureExtractorOptions options;

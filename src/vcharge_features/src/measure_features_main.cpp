@@ -74,7 +74,7 @@ class ImageCollector : public DriveConsumer {
 
 /// What one pair of images gave, or the mean of many.
 struct Figures {
-  double distance_m = 0.0, matches = 0.0, right = 0.0;
+  double distance_m = 0.0, matches = 0.0, right = 0.0, error_rad = 0.0;
 };
 
 class Measurement {
@@ -93,9 +93,10 @@ class Measurement {
       std::vector<double> matching_ms;
       const Figures mean = measure(gap, &matching_ms);
       const double cost_ms = 2.0 * median(extraction_ms_) + median(matching_ms);
-      std::printf("| %s | +%d | %.1f | %.0f | %.0f | %.2f | %.1f | %.2f | %.1f |\n", name.c_str(), gap,
+      std::printf("| %s | +%d | %.1f | %.0f | %.0f | %.2f | %.3f | %.1f | %.2f | %.1f |\n", name.c_str(), gap,
                   mean.distance_m, mean.right, mean.matches, mean.right / std::max(mean.matches, 1.0),
-                  median(extraction_ms_), median(matching_ms), mean.right / cost_ms);
+                  mean.error_rad * 180.0 / 3.14159265358979, median(extraction_ms_), median(matching_ms),
+                  mean.right / cost_ms);
       std::fflush(stdout);
     }
   }
@@ -116,11 +117,13 @@ class Measurement {
           matchDescriptors(first.descriptors, second.descriptors, options);
       matching_ms->push_back(threadTime_ms() - start_ms);
       sum.matches += static_cast<double>(matches.size());
-      sum.right += countRight(first, second, matches);
+      const EpipolarJudgement judgement = judge(first, second, matches);
+      sum.right += judgement.right;
+      sum.error_rad += judgement.median_error_rad;
       sum.distance_m += drive_.travelled_m[i + gap] - drive_.travelled_m[i];
     }
     const double scale = 1.0 / std::max(count, 1);
-    return {sum.distance_m * scale, sum.matches * scale, sum.right * scale};
+    return {sum.distance_m * scale, sum.matches * scale, sum.right * scale, sum.error_rad * scale};
   }
 
   const ImageFeatures& featuresOf(size_t index) {
@@ -133,8 +136,8 @@ class Measurement {
     return *features;
   }
 
-  double countRight(const ImageFeatures& first, const ImageFeatures& second,
-                    const std::vector<FeatureMatch>& matches) const {
+  EpipolarJudgement judge(const ImageFeatures& first, const ImageFeatures& second,
+                          const std::vector<FeatureMatch>& matches) const {
     const auto rayOf = [&](const Keypoint& keypoint) {
       Eigen::Vector3d ray = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
       camera_.model.unproject(Eigen::Vector2d(keypoint.position_px.x, keypoint.position_px.y), &ray);
@@ -146,7 +149,7 @@ class Measurement {
       first_rays.col(static_cast<Eigen::Index>(i)) = rayOf(first.keypoints[matches[i].first_index]);
       second_rays.col(static_cast<Eigen::Index>(i)) = rayOf(second.keypoints[matches[i].second_index]);
     }
-    return countRightMatches(first_rays, second_rays, kMaxError_rad, 1);
+    return judgeMatches(first_rays, second_rays, kMaxError_rad, 1);
   }
 
   const RigCamera& camera_;
@@ -170,8 +173,9 @@ void measureFeatures(const Arguments& arguments) {
   BagDriveSourceOptions source_options;
   source_options.cameras = {arguments.camera};
   BagDriveSource(arguments.bag, rig, source_options).run(&drive, [](double) {});
-  std::cout << "| features | frames | metres | right | matches | precision | ms per image | ms matching | "
-               "right per core-ms |\n|---|---|---|---|---|---|---|---|---|\n";
+  std::cout << "| features | frames | metres | right | matches | precision | error, degrees | ms per image | "
+               "ms matching | "
+               "right per core-ms |\n|---|---|---|---|---|---|---|---|---|---|\n";
   for (const std::string& type : arguments.types) {
     YAML::Node node;
     node["type"] = type;
@@ -185,7 +189,9 @@ void measureFeatures(const Arguments& arguments) {
 int main(int argc, char** argv) {
   CLI::App app(
       "Measures features on a recorded drive: matches between images some frames apart, how many of them "
-      "are right (within 0.2 degrees of the epipolar geometry that fits the pair best), and the CPU time of "
+      "are right (within 0.2 degrees of the epipolar geometry that fits the pair best), their median error, "
+      "and "
+      "the CPU time of "
       "one thread; right per core-ms counts two extractions and one matching.");
   Arguments arguments;
   app.add_option("--bag", arguments.bag, "the drive")->required();

@@ -56,7 +56,12 @@ struct SiftOptions {
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
+/// The defaults are those for localization: the most right matches for the time (README, Results).
 struct FeatureExtractorOptions {
+  /// For mapping, where accuracy counts and time does not: RootSIFT, half the angular error and more right
+  /// matches over wide baselines.
+  static FeatureExtractorOptions mapping();
+
   FeatureType type = FeatureType::kFastBrief;
   int max_features = 1000;
   /// Features are taken from the cells of this grid in turn, the best of each first. Much finer grids spread
