@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,6 +20,7 @@
 #include "vcharge_core/progress_bar.h"
 #include "vcharge_features/descriptor_matching.h"
 #include "vcharge_features/feature_extractor.h"
+#include "vcharge_features/patch_tracker.h"
 #include "vcharge_ros/bag_drive_source.h"
 
 namespace {
@@ -33,6 +35,7 @@ struct Arguments {
   std::vector<int> frames = {1, 5, 10, 20};
   int num_pairs = 5;
   double max_ratio = 0.8;
+  bool track = false;
 };
 
 /// CPU time of this thread: what else runs on the machine counts less than in wall time.
@@ -75,6 +78,19 @@ class ImageCollector : public DriveConsumer {
 /// What one pair of images gave, or the mean of many.
 struct Figures {
   double distance_m = 0.0, matches = 0.0, right = 0.0, error_rad = 0.0;
+
+  void add(const Figures& other) {
+    distance_m += other.distance_m;
+    matches += other.matches;
+    right += other.right;
+    error_rad += other.error_rad;
+  }
+  void scale(double factor) {
+    distance_m *= factor;
+    matches *= factor;
+    right *= factor;
+    error_rad *= factor;
+  }
 };
 
 class Measurement {
@@ -93,21 +109,74 @@ class Measurement {
       std::vector<double> matching_ms;
       const Figures mean = measure(gap, &matching_ms);
       const double cost_ms = 2.0 * median(extraction_ms_) + median(matching_ms);
-      std::printf("| %s | +%d | %.1f | %.0f | %.0f | %.2f | %.3f | %.1f | %.2f | %.1f |\n", name.c_str(), gap,
-                  mean.distance_m, mean.right, mean.matches, mean.right / std::max(mean.matches, 1.0),
-                  mean.error_rad * 180.0 / 3.14159265358979, median(extraction_ms_), median(matching_ms),
-                  mean.right / cost_ms);
-      std::fflush(stdout);
+      printRow(name, gap, mean, median(extraction_ms_), median(matching_ms), mean.right / cost_ms);
+    }
+  }
+
+  /// Features of the first image followed from frame to frame.
+  void printTracking() {
+    for (const int gap : arguments_.frames) {
+      std::vector<double> tracking_ms;
+      Figures sum;
+      const int last = static_cast<int>(drive_.images.size()) - 1 - gap;
+      const int count = std::min(arguments_.num_pairs, last + 1);
+      for (int k = 0; k < count; ++k) {
+        const int i = startOf(k, count, last);
+        std::vector<cv::Point2f> start, found;
+        for (const Keypoint& keypoint : featuresOf(static_cast<size_t>(i)).keypoints) {
+          start.push_back(keypoint.position_px);
+        }
+        found = start;
+        for (int j = i; j < i + gap; ++j) {
+          follow(static_cast<size_t>(j), &start, &found, &tracking_ms);
+        }
+        const EpipolarJudgement judgement = judge(start, found);
+        sum.add({drive_.travelled_m[i + gap] - drive_.travelled_m[i], static_cast<double>(start.size()),
+                 static_cast<double>(judgement.right), judgement.median_error_rad});
+      }
+      sum.scale(1.0 / std::max(count, 1));
+      printRow("tracked", gap, sum, median(tracking_ms), 0.0, sum.right / (gap * median(tracking_ms)));
     }
   }
 
  private:
+  /// Pairs are spread over the drive.
+  static int startOf(int k, int count, int last) { return count > 1 ? k * last / (count - 1) : last / 2; }
+
+  static void printRow(const std::string& name, int gap, const Figures& mean, double image_ms,
+                       double matching_ms, double right_per_ms) {
+    std::printf("| %s | +%d | %.1f | %.0f | %.0f | %.2f | %.3f | %.1f | %.2f | %.1f |\n", name.c_str(), gap,
+                mean.distance_m, mean.right, mean.matches, mean.right / std::max(mean.matches, 1.0),
+                mean.error_rad * 180.0 / 3.14159265358979, image_ms, matching_ms, right_per_ms);
+    std::fflush(stdout);
+  }
+
+  /// From image `index` to the next; points that are lost leave both lists.
+  void follow(size_t index, std::vector<cv::Point2f>* start, std::vector<cv::Point2f>* found,
+              std::vector<double>* tracking_ms) const {
+    const ImagePyramid previous = tracker_.buildPyramid(drive_.images[index].pixels);
+    const double start_ms = threadTime_ms();
+    const std::vector<TrackedPoint> tracked =
+        tracker_.track(previous, tracker_.buildPyramid(drive_.images[index + 1].pixels), *found, mask_);
+    tracking_ms->push_back(threadTime_ms() - start_ms);
+    size_t kept = 0;
+    for (size_t i = 0; i < tracked.size(); ++i) {
+      if (tracked[i].status == TrackStatus::kTracked) {
+        (*start)[kept] = (*start)[i];
+        (*found)[kept] = tracked[i].position_px;
+        ++kept;
+      }
+    }
+    start->resize(kept);
+    found->resize(kept);
+  }
+
   Figures measure(int gap, std::vector<double>* matching_ms) {
     Figures sum;
     const int last = static_cast<int>(drive_.images.size()) - 1 - gap;
     const int count = std::min(arguments_.num_pairs, last + 1);
     for (int k = 0; k < count; ++k) {
-      const int i = count > 1 ? k * last / (count - 1) : last / 2;
+      const int i = startOf(k, count, last);
       const ImageFeatures& first = featuresOf(static_cast<size_t>(i));
       const ImageFeatures& second = featuresOf(static_cast<size_t>(i + gap));
       MatchOptions options;
@@ -116,14 +185,12 @@ class Measurement {
       const std::vector<FeatureMatch> matches =
           matchDescriptors(first.descriptors, second.descriptors, options);
       matching_ms->push_back(threadTime_ms() - start_ms);
-      sum.matches += static_cast<double>(matches.size());
       const EpipolarJudgement judgement = judge(first, second, matches);
-      sum.right += judgement.right;
-      sum.error_rad += judgement.median_error_rad;
-      sum.distance_m += drive_.travelled_m[i + gap] - drive_.travelled_m[i];
+      sum.add({drive_.travelled_m[i + gap] - drive_.travelled_m[i], static_cast<double>(matches.size()),
+               static_cast<double>(judgement.right), judgement.median_error_rad});
     }
-    const double scale = 1.0 / std::max(count, 1);
-    return {sum.distance_m * scale, sum.matches * scale, sum.right * scale, sum.error_rad * scale};
+    sum.scale(1.0 / std::max(count, 1));
+    return sum;
   }
 
   const ImageFeatures& featuresOf(size_t index) {
@@ -138,18 +205,27 @@ class Measurement {
 
   EpipolarJudgement judge(const ImageFeatures& first, const ImageFeatures& second,
                           const std::vector<FeatureMatch>& matches) const {
-    const auto rayOf = [&](const Keypoint& keypoint) {
-      Eigen::Vector3d ray = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
-      camera_.model.unproject(Eigen::Vector2d(keypoint.position_px.x, keypoint.position_px.y), &ray);
-      return ray;
-    };
-    Eigen::Matrix3Xd first_rays(3, static_cast<Eigen::Index>(matches.size()));
-    Eigen::Matrix3Xd second_rays(3, static_cast<Eigen::Index>(matches.size()));
-    for (size_t i = 0; i < matches.size(); ++i) {
-      first_rays.col(static_cast<Eigen::Index>(i)) = rayOf(first.keypoints[matches[i].first_index]);
-      second_rays.col(static_cast<Eigen::Index>(i)) = rayOf(second.keypoints[matches[i].second_index]);
+    std::vector<cv::Point2f> first_px, second_px;
+    for (const FeatureMatch& match : matches) {
+      first_px.push_back(first.keypoints[match.first_index].position_px);
+      second_px.push_back(second.keypoints[match.second_index].position_px);
     }
-    return judgeMatches(first_rays, second_rays, kMaxError_rad, 1);
+    return judge(first_px, second_px);
+  }
+
+  EpipolarJudgement judge(const std::vector<cv::Point2f>& first_px,
+                          const std::vector<cv::Point2f>& second_px) const {
+    return judgeMatches(raysOf(first_px), raysOf(second_px), kMaxError_rad, 1);
+  }
+
+  Eigen::Matrix3Xd raysOf(const std::vector<cv::Point2f>& pixels) const {
+    Eigen::Matrix3Xd rays(3, static_cast<Eigen::Index>(pixels.size()));
+    for (size_t i = 0; i < pixels.size(); ++i) {
+      Eigen::Vector3d ray = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+      camera_.model.unproject(Eigen::Vector2d(pixels[i].x, pixels[i].y), &ray);
+      rays.col(static_cast<Eigen::Index>(i)) = ray;
+    }
+    return rays;
   }
 
   const RigCamera& camera_;
@@ -157,6 +233,7 @@ class Measurement {
   const Arguments& arguments_;
   const cv::Mat mask_;
   const std::unique_ptr<FeatureExtractor> extractor_;
+  const PatchTracker tracker_;
   std::vector<std::optional<ImageFeatures>> features_;
   std::vector<double> extraction_ms_;
 };
@@ -180,7 +257,11 @@ void measureFeatures(const Arguments& arguments) {
     YAML::Node node;
     node["type"] = type;
     readFields(node, "--types", &options);
-    Measurement(rig->cameras[camera_index], drive, arguments, options).print(type);
+    Measurement measurement(rig->cameras[camera_index], drive, arguments, options);
+    measurement.print(type);
+    if (arguments.track) {
+      measurement.printTracking();
+    }
   }
 }
 
@@ -206,5 +287,7 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::PositiveNumber);
   app.add_option("--max-ratio", arguments.max_ratio, "of the ratio test")->capture_default_str();
+  app.add_flag("--track", arguments.track,
+               "also follow each type's points by patches, frame by frame (ms per image: of one step)");
   return runTool(&app, argc, argv, [&] { measureFeatures(arguments); });
 }
