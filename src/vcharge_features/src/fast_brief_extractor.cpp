@@ -96,7 +96,8 @@ ImageFeatures FastBriefExtractor::extractChecked(const cv::Mat& image, const cv:
   // Selected indices ascend, hence levels do.
   for (size_t l = 0; l < levels.size(); ++l) {
     cv::Mat smooth;
-    cv::GaussianBlur(levels[l].image, smooth, cv::Size(kBlurWindow_px, kBlurWindow_px), 0.0);
+    cv::GaussianBlur(levels[l].image, smooth, cv::Size(kBlurWindow_px, kBlurWindow_px), 0.0, 0.0,
+                     cv::BORDER_REFLECT_101 | cv::BORDER_ISOLATED);
     const BriefDescriptor brief(static_cast<int64_t>(smooth.step));
     for (; row < selected.size() && level_of[selected[row]] == l; ++row) {
       const cv::Point pixel = pixels[selected[row]];

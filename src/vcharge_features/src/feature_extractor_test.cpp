@@ -104,6 +104,17 @@ TEST_P(FeatureExtractorTest, GivesTheSameOnAnyNumberOfThreads) {
   EXPECT_EQ(cv::norm(one.descriptors, four.descriptors, cv::NORM_INF), 0.0);
 }
 
+TEST_P(FeatureExtractorTest, APartOfAnImageGivesWhatItsCopyGives) {
+  const cv::Mat image = randomTexture({480, 340}, 8);
+  const cv::Mat part = image(cv::Rect(31, 17, 401, 283));
+  const auto extractor = makeFeatureExtractor(options(200));
+  const ImageFeatures of_part = extractor->extract(part);
+  const ImageFeatures of_copy = extractor->extract(part.clone());
+  ASSERT_GT(of_part.size(), 100U);
+  ASSERT_EQ(of_part.size(), of_copy.size());
+  EXPECT_EQ(cv::norm(of_part.descriptors, of_copy.descriptors, cv::NORM_INF), 0.0);
+}
+
 TEST_P(FeatureExtractorTest, PlainAndTinyImagesHaveNoFeatures) {
   const auto extractor = makeFeatureExtractor(options());
   for (const cv::Size& size : {cv::Size(1, 1), cv::Size(3, 500), cv::Size(33, 33), cv::Size(300, 200)}) {

@@ -45,8 +45,13 @@ ImagePyramid PatchTracker::buildPyramid(const cv::Mat& image) const {
               std::to_string(image.rows) + " " + cv::typeToString(image.type()));
   ImagePyramid pyramid;
   pyramid.size_px = image.size();
-  cv::buildOpticalFlowPyramid(image, pyramid.levels, cv::Size(options_.window_px, options_.window_px),
-                              options_.num_levels - 1);
+  // OpenCV would read what surrounds an image that is a part of another.
+  const cv::Mat isolated = image.isSubmatrix() ? image.clone() : image;
+  constexpr bool kWithGradients = true;
+  constexpr bool kReuseImage = false;
+  cv::buildOpticalFlowPyramid(isolated, pyramid.levels, cv::Size(options_.window_px, options_.window_px),
+                              options_.num_levels - 1, kWithGradients, cv::BORDER_REFLECT_101,
+                              cv::BORDER_CONSTANT, kReuseImage);
   return pyramid;
 }
 

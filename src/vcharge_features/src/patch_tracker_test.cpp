@@ -109,6 +109,28 @@ TEST_F(PatchTrackerTest, SaysWhyPointsAreNotTracked) {
   EXPECT_TRUE(track({}).empty());
 }
 
+TEST_F(PatchTrackerTest, ImagesSmallerThanThePatchAreNoCrash) {
+  for (const cv::Size& size : {cv::Size(1, 1), cv::Size(3, 9), cv::Size(20, 20)}) {
+    first_ = randomTexture(size, 1);
+    second_ = first_.clone();
+    EXPECT_EQ(track({{0.0F, 0.0F}, {2.0F, 2.0F}}).size(), 2U);
+  }
+}
+
+TEST_F(PatchTrackerTest, PartsOfAnImageAreTrackedAsTheirCopies) {
+  const cv::Rect part(40, 30, 300, 200);
+  const std::vector<cv::Point2f> points = gridOfPoints(part.size(), 17, 3);
+  const auto trackParts = [&](const cv::Mat& first, const cv::Mat& second) {
+    return tracker_.track(tracker_.buildPyramid(first), tracker_.buildPyramid(second), points);
+  };
+  const auto views = trackParts(first_(part), second_(part));
+  const auto copies = trackParts(first_(part).clone(), second_(part).clone());
+  for (size_t i = 0; i < points.size(); ++i) {
+    EXPECT_EQ(views[i].status, copies[i].status);
+    EXPECT_EQ(views[i].position_px, copies[i].position_px);
+  }
+}
+
 TEST_F(PatchTrackerTest, BadArgumentsAreNamed) {
   const auto throwing = [](const char* text) {
     return ::testing::ThrowsMessage<std::invalid_argument>(::testing::HasSubstr(text));

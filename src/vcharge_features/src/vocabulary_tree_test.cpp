@@ -9,6 +9,7 @@
 #include <random>
 #include <set>
 
+#include "vcharge_core/content_hash.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/file_io.h"
 #include "vcharge_features/place_index.h"
@@ -154,6 +155,32 @@ TEST_P(VocabularyTreeTest, TruncatedAndCorruptFilesAreNamed) {
   expectError(other_version, "version 1, got 9");
   std::filesystem::remove(path());
   EXPECT_THROW(VocabularyTree::read(path()), InputError);
+}
+
+TEST_P(VocabularyTreeTest, FilesWithARightChecksumOverWrongNumbersAreReadOrNamed) {
+  VocabularyTree::train(trainingImages(20), options()).write(path());
+  const std::string text = readTextFile(path());
+  const cv::Mat query = descriptorsOf({1, 2, 3, 4, 5}, GetParam(), 1);
+  std::mt19937 generator(4);
+  int named = 0;
+  for (int i = 0; i < 500; ++i) {
+    std::string broken = text.substr(0, text.size() - 32);
+    // Mostly in the header and the nodes, which could send a search anywhere.
+    broken[8 + generator() % 300] = static_cast<char>(generator());
+    ContentHasher hasher;
+    hasher.addBytes(broken.data(), broken.size());
+    writeTextFileAtomically(path(), broken + hasher.hex());
+    try {
+      for (const int32_t word : VocabularyTree::read(path()).words(query)) {
+        EXPECT_GE(word, 0);
+      }
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr(path()));
+      ++named;
+    }
+  }
+  EXPECT_GT(named, 300);
+  std::filesystem::remove(path());
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, VocabularyTreeTest, ::testing::Values(CV_8UC1, CV_32FC1),
