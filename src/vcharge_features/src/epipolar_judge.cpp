@@ -112,4 +112,16 @@ EpipolarJudgement judgeMatches(const Eigen::Matrix3Xd& first_rays, const Eigen::
   return judgement;
 }
 
+EpipolarJudgement judgeMatches(const Eigen::Matrix3Xd& first_rays, const Eigen::Matrix3Xd& second_rays,
+                               double max_error_rad, const RigidTransform& second_from_first) {
+  check(first_rays.cols() == second_rays.cols(), "judgeMatches: as many first rays as second ones");
+  const Eigen::Vector3d& t = second_from_first.translation();
+  Eigen::Matrix3d cross;
+  cross << 0.0, -t.z(), t.y(), t.z(), 0.0, -t.x(), -t.y(), t.x(), 0.0;
+  const Eigen::VectorXd errors =
+      epipolarErrors(cross * second_from_first.rotationMatrix(), first_rays, second_rays);
+  const std::vector<int> right = below(errors, std::sin(max_error_rad));
+  return {static_cast<int>(right.size()), medianOf(errors, right)};
+}
+
 }  // namespace vcharge

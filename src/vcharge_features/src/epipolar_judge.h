@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 
+#include "vcharge_core/rigid_transform.h"
+
 namespace vcharge {
 
 /// What judgeMatches() found.
@@ -16,5 +18,9 @@ struct EpipolarJudgement {
 /// alike. The same seed gives the same judgement. std::logic_error for different N.
 EpipolarJudgement judgeMatches(const Eigen::Matrix3Xd& first_rays, const Eigen::Matrix3Xd& second_rays,
                                double max_error_rad, unsigned seed, int num_samples = 4000);
+
+/// As judgeMatches() for a known pose of the first camera in the second's frame.
+EpipolarJudgement judgeMatches(const Eigen::Matrix3Xd& first_rays, const Eigen::Matrix3Xd& second_rays,
+                               double max_error_rad, const RigidTransform& second_from_first);
 
 }  // namespace vcharge

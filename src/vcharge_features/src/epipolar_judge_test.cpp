@@ -16,12 +16,16 @@ struct Rays {
   Eigen::Matrix3Xd first, second;
 };
 
+RigidTransform secondFromFirst() {
+  return {rotationFromVector({0.1, -0.05, 0.2}), {0.8, 0.1, -0.3}};
+}
+
 /// Rays to random points from two places; the last `num_wrong` second rays point anywhere.
 Rays makeRays(int count, int num_wrong, double noise_rad, unsigned seed) {
   std::mt19937 generator(seed);
   std::normal_distribution<double> normal;
   const auto draw = [&] { return Eigen::Vector3d(normal(generator), normal(generator), normal(generator)); };
-  const RigidTransform second_from_first(rotationFromVector({0.1, -0.05, 0.2}), {0.8, 0.1, -0.3});
+  const RigidTransform second_from_first = secondFromFirst();
   Rays rays{Eigen::Matrix3Xd(3, count), Eigen::Matrix3Xd(3, count)};
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector3d point = 5.0 * draw();
@@ -50,6 +54,14 @@ TEST(EpipolarJudgeTest, TheErrorIsProportionalToTheNoise) {
   EXPECT_GT(errorOf(0.0002), 0.9);
   EXPECT_LT(errorOf(0.0002), 2.0);
   EXPECT_NEAR(errorOf(0.0002), errorOf(0.0004), 0.1);
+}
+
+TEST(EpipolarJudgeTest, CountsByAKnownPose) {
+  const Rays rays = makeRays(200, 80, 0.0005, 1);
+  const EpipolarJudgement judgement = judgeMatches(rays.first, rays.second, kMaxError_rad, secondFromFirst());
+  EXPECT_GE(judgement.right, 118);
+  EXPECT_LE(judgement.right, 124);
+  EXPECT_LT(judgeMatches(rays.first, rays.second, kMaxError_rad, secondFromFirst().inverse()).right, 10);
 }
 
 TEST(EpipolarJudgeTest, FindsAlmostNoneAmongWrongOnesAlone) {
