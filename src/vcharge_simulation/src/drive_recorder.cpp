@@ -23,6 +23,7 @@
 #include "vcharge_ros/image_conversions.h"
 #include "vcharge_simulation/golf_rig.h"
 #include "vcharge_simulation/renderer.h"
+#include "vcharge_simulation/rig_catalogue.h"
 #include "vcharge_simulation/scene_catalogue.h"
 #include "vcharge_simulation/truth_maps.h"
 
@@ -47,7 +48,7 @@ struct SelectedCamera {
 };
 
 std::vector<SelectedCamera> selectCameras(const DriveScenario& scenario) {
-  const CameraRig rig = makeGolfRig(static_cast<uint64_t>(scenario.rig_seed), scenario.image_scale);
+  const CameraRig rig = makeRig(scenario.rig, static_cast<uint64_t>(scenario.rig_seed), scenario.image_scale);
   std::vector<SelectedCamera> selected;
   if (scenario.cameras.empty()) {
     for (const RigCamera& camera : rig.cameras) {

@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
   app.add_option("--scene", scenario.scene, "lot")->capture_default_str();
   app.add_option("--drive", scenario.drive, "loop, figure_eight, short, other_day or approach")
       ->capture_default_str();
+  app.add_option("--rig", scenario.rig, "golf or random")->capture_default_str();
   app.add_option("--output", recording.bag, "bag to write")->required()->check(vcharge::requireNotEmpty);
   app.add_option("--scene-seed", scenario.scene_seed, "of the scene")->capture_default_str();
   app.add_option("--rig-seed", scenario.rig_seed, "of the lenses and how they are mounted")

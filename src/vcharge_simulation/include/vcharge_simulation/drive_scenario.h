@@ -14,6 +14,7 @@ namespace vcharge {
 struct DriveScenario {
   std::string scene = "lot";
   std::string drive = "short";
+  std::string rig = "golf";
   int scene_seed = 1;          ///< of the scene
   int rig_seed = 1;            ///< of the lenses and how they are mounted
   int seed = 1;                ///< of the road under the car
@@ -31,6 +32,7 @@ struct DriveScenario {
   void visitFields(Visitor&& visit) {
     visit("scene", scene);
     visit("drive", drive);
+    visit("rig", rig);
     visit("scene_seed", scene_seed);
     visit("rig_seed", rig_seed);
     visit("seed", seed);
