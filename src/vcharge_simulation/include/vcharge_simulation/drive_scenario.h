@@ -5,6 +5,7 @@
 
 #include "vcharge_simulation/camera_response.h"
 #include "vcharge_simulation/drive_simulator.h"
+#include "vcharge_simulation/fault_options.h"
 #include "vcharge_simulation/lens_blur.h"
 #include "vcharge_simulation/wheel_odometer.h"
 
@@ -27,6 +28,7 @@ struct DriveScenario {
   WheelOdometerOptions odometer;
   LensOptions lens;
   CameraResponseOptions response;
+  FaultOptions faults;
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
@@ -45,6 +47,7 @@ struct DriveScenario {
     visit("odometer", odometer);
     visit("lens", lens);
     visit("response", response);
+    visit("faults", faults);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
 
