@@ -134,7 +134,7 @@ void FaultOptions::validate() const {
 }
 
 std::vector<CatalogueEntry> listFaults() {
-  return {{"dead_camera", "cameras deliver no images, or black ones (black_images)"},
+  return {{"dead_camera", "cameras deliver no images, or black ones"},
           {"frozen_camera", "cameras deliver their last image again and again"},
           {"sun_glare", "a low sun shines into the lens: a white disk and veiling glare"},
           {"dirty_lens", "a fixed bright line and blobs in the image"},

@@ -17,6 +17,22 @@ void describe(const std::vector<CatalogueEntry>& entries, const std::string& ind
   }
 }
 
+// Adds to each fault's line the keys that it has.
+struct FaultDescriber {
+  std::vector<CatalogueEntry> entries = listFaults();
+  size_t next = 0;
+  template <class Fault>
+  void operator()(const char*, Fault& fault) {
+    internal::NameCollector keys;
+    fault.visitFields(keys);
+    std::string list;
+    for (const std::string& key : keys.names) {
+      list += (list.empty() ? "" : ", ") + key;
+    }
+    entries.at(next++).description += " [" + list + "]";
+  }
+};
+
 }  // namespace
 
 ScenarioCommandLine::ScenarioCommandLine(CLI::App* app) {
@@ -102,8 +118,10 @@ std::string describeCatalogue() {
   }
   text << "rigs (--rig):\n";
   describe(listRigs(), "  ", &text);
-  text << "faults (--set faults.NAME.KEY=VALUE; their keys are in --show-options):\n";
-  describe(listFaults(), "  ", &text);
+  text << "faults (--set faults.NAME.KEY=VALUE):\n";
+  FaultDescriber faults;
+  FaultOptions().visitFields(faults);
+  describe(faults.entries, "  ", &text);
   return text.str();
 }
 
