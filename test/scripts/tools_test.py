@@ -273,7 +273,6 @@ class ToolsTest(unittest.TestCase):
         self.fail_with("compute", ["cut.bag"], bag=self.work / "cut.bag", output=maps)
 
     def test_the_simulator_names_unknown_scenes_drives_and_cameras(self):
-        # Its command line adds a hint to --help.
         self.fail_with("simulate", ["drive", "moon", "figure_eight"], drive="moon")
         self.fail_with("simulate", ["scene", "mars", "lot"], scene="mars")
         self.fail_with("simulate", ["rig", "tractor", "random"], rig="tractor")
@@ -289,6 +288,7 @@ class ToolsTest(unittest.TestCase):
         self.fail_with("simulate", ["missing.yaml"], scenario=self.work / "missing.yaml")
 
     def test_the_simulator_asks_for_its_output(self):
+        # Its command line adds a hint to --help.
         status, _, errors = run(self.command("simulate", {"--output": None}))
         self.assertGreater(status, 0)
         self.assertIn("--output", errors[0])
