@@ -273,9 +273,22 @@ class ToolsTest(unittest.TestCase):
         self.fail_with("compute", ["cut.bag"], bag=self.work / "cut.bag", output=maps)
 
     def test_the_simulator_names_unknown_scenes_drives_and_cameras(self):
-        # Its command line adds a hint to --help.
         self.fail_with("simulate", ["drive", "moon", "figure_eight"], drive="moon")
         self.fail_with("simulate", ["scene", "mars", "lot"], scene="mars")
+        self.fail_with("simulate", ["rig", "tractor", "random"], rig="tractor")
+
+    def test_bad_scenario_files_are_named_with_their_key(self):
+        for name, text, words in (
+                ("key.yaml", "{drive: short, colour: red}", ["colour", "unknown key"]),
+                ("inner.yaml", "faults: {wheel_slip: {wheels: left}}", ["faults.wheel_slip.wheels", "wheel"]),
+                ("value.yaml", "image_scale: large", ["image_scale", "a number", "large"]),
+                ("range.yaml", "faults: {wheel_slip: {ratio: -3}}", ["faults.wheel_slip.ratio", "-3"]),
+                ("syntax.yaml", "drive: [short", ["YAML"])):
+            self.fail_with("simulate", [name, *words], scenario=self.text(name, text))
+        self.fail_with("simulate", ["missing.yaml"], scenario=self.work / "missing.yaml")
+
+    def test_the_simulator_asks_for_its_output(self):
+        # Its command line adds a hint to --help.
         status, _, errors = run(self.command("simulate", {"--output": None}))
         self.assertGreater(status, 0)
         self.assertIn("--output", errors[0])

@@ -30,10 +30,10 @@ struct DriveBagWriter::Implementation {
   bool closed = false;
 
   template <class Message>
-  void write(const std::string& topic, Timestamp stamp, const Message& message) {
+  void write(const std::string& topic, Timestamp received, const Message& message) {
     check(!closed, "DriveBagWriter: written to after close()");
     try {
-      bag.write(topic, fromTimestamp(stamp), message);
+      bag.write(topic, fromTimestamp(received), message);
     } catch (const rosbag::BagException& error) {
       throw InputError(path + ": cannot be written (" + error.what() + ")");
     }
@@ -71,24 +71,26 @@ DriveBagWriter::~DriveBagWriter() {
   std::filesystem::remove(implementation_->unfinished_path, ignored);
 }
 
-void DriveBagWriter::writeImage(size_t camera_index, Timestamp stamp, const cv::Mat& pixels) {
+void DriveBagWriter::writeImage(size_t camera_index, Timestamp stamp, const cv::Mat& pixels,
+                                std::optional<Timestamp> received) {
   const RigCamera& camera = implementation_->rig.cameras.at(camera_index);
   check(pixels.type() == CV_8UC1 && pixels.size() == camera.image_size_px,
         "DriveBagWriter: expected a CV_8UC1 image of the rig's size");
   sensor_msgs::CameraInfo& info = implementation_->camera_infos[camera_index];
   info.header.stamp = fromTimestamp(stamp);
-  implementation_->write(implementation_->topics.imageTopic(camera.name), stamp,
+  implementation_->write(implementation_->topics.imageTopic(camera.name), received.value_or(stamp),
                          toImageMessage(pixels, stamp, camera.frame_id));
-  implementation_->write(implementation_->topics.cameraInfoTopic(camera.name), stamp, info);
+  implementation_->write(implementation_->topics.cameraInfoTopic(camera.name), received.value_or(stamp),
+                         info);
 }
 
-void DriveBagWriter::writeOdometry(const VehicleOdometry& odometry) {
-  implementation_->write(implementation_->topics.odometry, odometry.stamp,
+void DriveBagWriter::writeOdometry(const VehicleOdometry& odometry, std::optional<Timestamp> received) {
+  implementation_->write(implementation_->topics.odometry, received.value_or(odometry.stamp),
                          toMessage(odometry, kOdomFrame, implementation_->rig.vehicle_frame));
 }
 
-void DriveBagWriter::writeWheelTicks(const WheelTicks& ticks) {
-  implementation_->write(implementation_->topics.wheel_ticks, ticks.stamp,
+void DriveBagWriter::writeWheelTicks(const WheelTicks& ticks, std::optional<Timestamp> received) {
+  implementation_->write(implementation_->topics.wheel_ticks, received.value_or(ticks.stamp),
                          toMessage(ticks, implementation_->rig.vehicle_frame));
 }
 

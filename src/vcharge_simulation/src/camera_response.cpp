@@ -79,6 +79,17 @@ cv::Mat CameraResponse::develop(const cv::Mat& light) const {
   return gray;
 }
 
+cv::Mat CameraResponse::expose(const cv::Mat& clean, double gain) const {
+  check(clean.type() == CV_8UC1, "CameraResponse::expose: expected CV_8UC1");
+  cv::Mat table(1, 256, CV_8UC1);
+  for (int gray = 0; gray < 256; ++gray) {
+    table.at<uint8_t>(gray) = static_cast<uint8_t>(std::lround(grayFromLight(gain * lightFromGray(gray))));
+  }
+  cv::Mat exposed;
+  cv::LUT(clean, table, exposed);
+  return exposed;
+}
+
 cv::Mat CameraResponse::addNoise(const cv::Mat& clean, uint64_t seed, int camera, int64_t frame,
                                  double gain) const {
   check(clean.type() == CV_8UC1, "CameraResponse::addNoise: expected CV_8UC1");

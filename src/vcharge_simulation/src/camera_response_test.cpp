@@ -48,6 +48,9 @@ TEST(CameraResponseTest, GainBrightens) {
   const cv::Mat clean(50, 50, CV_8UC1, cv::Scalar(90));
   EXPECT_NEAR(cv::mean(response.addNoise(clean, 1, 0, 0, 2.0))[0],
               response.grayFromLight(2.0 * response.lightFromGray(90)), 0.5);
+  EXPECT_NEAR(cv::mean(response.expose(clean, 2.0))[0],
+              response.grayFromLight(2.0 * response.lightFromGray(90)), 0.5);
+  EXPECT_EQ(cv::mean(response.expose(clean, 1.0))[0], 90.0);
 }
 
 }  // namespace

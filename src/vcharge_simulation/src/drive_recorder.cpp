@@ -2,26 +2,22 @@
 
 #include <cmath>
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
-#include <stdexcept>
+#include <utility>
 #include <vector>
 
-#include <nav_msgs/Odometry.h>
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "image_source.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/file_io.h"
 #include "vcharge_core/options.h"
 #include "vcharge_core/progress_bar.h"
-#include "vcharge_ros/conversions.h"
 #include "vcharge_ros/drive_bag_writer.h"
-#include "vcharge_ros/drive_topics.h"
-#include "vcharge_ros/image_conversions.h"
-#include "vcharge_simulation/golf_rig.h"
+#include "vcharge_simulation/fault_truth.h"
+#include "vcharge_simulation/image_faults.h"
+#include "vcharge_simulation/recorded_cameras.h"
 #include "vcharge_simulation/renderer.h"
 #include "vcharge_simulation/scene_catalogue.h"
 #include "vcharge_simulation/truth_maps.h"
@@ -29,9 +25,6 @@
 namespace vcharge {
 
 namespace {
-
-// Poses of the same drive agree to the last bits that a message holds.
-constexpr double kSamePose_m = 1e-9;
 
 DrivePlan planDriveOf(const DriveScenario& scenario) {
   DrivePlan plan = planDrive(scenario.scene, scenario.drive);
@@ -41,113 +34,72 @@ DrivePlan planDriveOf(const DriveScenario& scenario) {
   return plan;
 }
 
-struct SelectedCamera {
-  RigCamera camera;
-  int index;  ///< in the whole rig: noise does not depend on which cameras are selected
-};
-
-std::vector<SelectedCamera> selectCameras(const DriveScenario& scenario) {
-  const CameraRig rig = makeGolfRig(static_cast<uint64_t>(scenario.rig_seed), scenario.image_scale);
-  std::vector<SelectedCamera> selected;
-  if (scenario.cameras.empty()) {
-    for (const RigCamera& camera : rig.cameras) {
-      selected.push_back({camera, static_cast<int>(selected.size())});
+// Faults that change what is rendered cannot come from images that were rendered without them.
+void checkImagesCanBeReused(const FaultOptions& faults, const std::string& images_from) {
+  for (const auto& [name, is_active] : {std::pair("bumped_camera", faults.bumped_camera.isActive()),
+                                        std::pair("motion_blur", faults.motion_blur.isActive())}) {
+    if (is_active) {
+      throw InputError("faults." + std::string(name) + ": has to be rendered, images of " + images_from +
+                       " cannot be used");
     }
   }
-  for (const std::string& name : scenario.cameras) {
-    const size_t index = rig.cameraIndex(name);
-    selected.push_back({rig.cameras[index], static_cast<int>(index)});
-  }
-  return selected;
 }
 
-/// Hands out the noise-free images of a drive, frame by frame and camera by camera.
-class ImageSource {
- public:
-  virtual ~ImageSource() = default;
-  virtual cv::Mat image(size_t camera, size_t frame) = 0;
-};
+std::vector<ImageFaults::Camera> faultyCameras(const RecordedCameras& cameras) {
+  std::vector<ImageFaults::Camera> list;
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    list.push_back({cameras.name(i), cameras.index(i), cameras.rig().cameras[i].image_size_px});
+  }
+  return list;
+}
 
-class RenderedImages : public ImageSource {
+// Odometry, counters and truth, in the order of their stamps.
+class MotionRecorder {
  public:
-  RenderedImages(const Renderer& renderer, const std::vector<CameraView>& views,
-                 const CameraResponse& response, const Trajectory& world_from_vehicle)
-      : renderer_(renderer), views_(views), response_(response), world_from_vehicle_(world_from_vehicle) {}
-  cv::Mat image(size_t camera, size_t frame) override {
-    return response_.develop(
-        renderer_.renderLight(views_[camera], world_from_vehicle_[frame].world_from_vehicle));
+  MotionRecorder(const SimulatedDrive& drive, const OdometryStampShiftFault& shift, DriveBagWriter* writer)
+      : drive_(drive), shift_(shift), writer_(writer) {}
+
+  /// Up to and with `end`, or all that is left.
+  void writeUntil(std::optional<Timestamp> end) {
+    const auto isDue = [&](const auto& list, size_t i) {
+      return i < list.size() && (!end || list[i].stamp <= *end);
+    };
+    while (isDue(drive_.ground_truth, truth_)) {
+      const Timestamp stamp = drive_.ground_truth[truth_].stamp;
+      if (isDue(drive_.odometry, odometry_) && drive_.odometry[odometry_].stamp == stamp) {
+        VehicleOdometry odometry = drive_.odometry[odometry_++];
+        odometry.stamp = shifted(stamp);
+        writer_->writeOdometry(odometry, stamp);
+      }
+      writer_->writeGroundTruth(drive_.ground_truth[truth_++]);
+    }
+    for (; isDue(drive_.wheel_ticks, ticks_); ++ticks_) {
+      WheelTicks ticks = drive_.wheel_ticks[ticks_];
+      const Timestamp stamp = ticks.stamp;
+      ticks.stamp = shifted(stamp);
+      writer_->writeWheelTicks(ticks, stamp);
+    }
   }
 
  private:
-  const Renderer& renderer_;
-  const std::vector<CameraView>& views_;
-  const CameraResponse& response_;
-  const Trajectory& world_from_vehicle_;
-};
-
-class RecordedImages : public ImageSource {
- public:
-  RecordedImages(const std::string& path, const CameraRig& rig, const SimulatedDrive& drive)
-      : path_(path), rig_(rig), drive_(drive) {
-    try {
-      bag_.open(path, rosbag::bagmode::Read);
-      checkPoses();
-      std::vector<std::string> topics;
-      for (const RigCamera& camera : rig.cameras) {
-        topics.push_back(DriveTopics().imageTopic(camera.name));
-        views_.push_back(std::make_unique<rosbag::View>(bag_, rosbag::TopicQuery(topics.back())));
-        if (views_.back()->size() < drive.world_from_vehicle.size()) {
-          throw InputError(path + ": " + topics.back() + ": expected " +
-                           std::to_string(drive.world_from_vehicle.size()) + " images, got " +
-                           std::to_string(views_.back()->size()));
-        }
-        next_.push_back(views_.back()->begin());
-      }
-    } catch (const rosbag::BagException& error) {
-      throw InputError(path + ": cannot be read as a bag: " + error.what());
-    }
+  Timestamp shifted(Timestamp stamp) const {
+    const bool acts = shift_.isActive() && shift_.actsAt(stamp - drive_.ground_truth.front().stamp);
+    return acts ? stamp + durationFromSeconds(shift_.shift_s) : stamp;
   }
 
-  cv::Mat image(size_t camera, size_t frame) override {
-    const std::string source = path_ + ": " + next_[camera]->getTopic();
-    const auto message = next_[camera]->instantiate<sensor_msgs::Image>();
-    ++next_[camera];
-    if (message == nullptr || toTimestamp(message->header.stamp) != drive_.world_from_vehicle[frame].stamp) {
-      throw InputError(source + ": expected the images of the same drive, image " + std::to_string(frame) +
-                       " has another stamp or type");
-    }
-    const Image image = toImage(message, source);
-    checkImageSize(rig_.cameras[camera], image.pixels.size(), source);
-    return image.pixels.clone();  // the view ends with its message
-  }
-
- private:
-  void checkPoses() {
-    rosbag::View view(bag_, rosbag::TopicQuery("/ground_truth"));
-    size_t i = 0;
-    bool same = view.size() >= drive_.ground_truth.size();
-    for (const rosbag::MessageInstance& item : view) {
-      const auto message = item.instantiate<nav_msgs::Odometry>();
-      if (!same || i == drive_.ground_truth.size()) {
-        break;
-      }
-      const VehicleOdometry& truth = drive_.ground_truth[i++];
-      same = message != nullptr && toTimestamp(message->header.stamp) == truth.stamp &&
-             (fromMessage(message->pose.pose, path_).translation() - truth.odom_from_vehicle.translation())
-                     .norm() < kSamePose_m;
-    }
-    if (!same) {
-      throw InputError(path_ + ": /ground_truth: expected the poses of the same drive with the same seed");
-    }
-  }
-
-  const std::string path_;
-  const CameraRig& rig_;
   const SimulatedDrive& drive_;
-  rosbag::Bag bag_;
-  std::vector<std::unique_ptr<rosbag::View>> views_;
-  std::vector<rosbag::View::iterator> next_;
+  const OdometryStampShiftFault shift_;
+  DriveBagWriter* writer_;
+  size_t odometry_ = 0, truth_ = 0, ticks_ = 0;
 };
+
+// A rig beside its masks.
+void writeTruthRig(CameraRig rig, const std::string& folder, const std::string& suffix) {
+  for (RigCamera& camera : rig.cameras) {
+    camera.mask_file = camera.name + "_mask" + suffix + ".png";
+  }
+  writeCameraRig(rig, folder + "/rig" + suffix + ".yaml");
+}
 
 void writeRange(const cv::Mat& range_m, const std::string& folder, Timestamp stamp) {
   const std::string path = folder + "/" + std::to_string(stamp.nanoseconds()) + ".tiff";
@@ -168,21 +120,16 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   scenario.validate();
   recording.validate();
   const DrivePlan plan = planDriveOf(scenario);
-  const std::vector<SelectedCamera> selected = selectCameras(scenario);
-  const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, scenario.odometer,
-                                             static_cast<uint64_t>(scenario.seed), scenario.sensorSeed());
-
   const std::filesystem::path bag(recording.bag);
   const std::string truth_name = bag.stem().string() + "_truth";
-  const auto body = makeGolfBody();
-  CameraRig rig;
-  std::vector<CameraView> views;
-  for (const SelectedCamera& entry : selected) {
-    views.emplace_back(entry.camera, body, scenario.lens);
-    rig.cameras.push_back(entry.camera);
-    rig.cameras.back().mask = views.back().mask();
-    rig.cameras.back().mask_file = truth_name + "/" + entry.camera.name + "_mask.png";
-  }
+  const RecordedCameras cameras(scenario, truth_name);
+  const CameraRig& rig = cameras.rig();
+  const FaultOptions& faults = scenario.faults;
+  const SimulatedDrive drive =
+      simulateDrive(plan.path, plan.motion, scenario.odometer, static_cast<uint64_t>(scenario.seed),
+                    scenario.sensorSeed(), faults);
+  const Timestamp start = drive.ground_truth.front().stamp;
+
   DriveBagWriter writer(recording.bag, rig);
   FolderTransaction truth((bag.parent_path() / truth_name).string());
 
@@ -196,12 +143,13 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
     scene.day = plan.day;
     scene.image_scale = scenario.image_scale;
     renderer.emplace(buildScene(scenario.scene, scene));
-    images = std::make_unique<RenderedImages>(*renderer, views, response, drive.world_from_vehicle);
+    images = renderImages(*renderer, cameras, response, drive, faults.motion_blur);
     writeHeightMap(computeHeightMap(*renderer, recording.height_cell_m, recording.height_limit_m),
                    truth.path() + "/height_map");
     writeObstacles(renderer->scene().obstacles, truth.path() + "/obstacles.yaml");
   } else {
-    images = std::make_unique<RecordedImages>(recording.images_from, rig, drive);
+    checkImagesCanBeReused(faults, recording.images_from);
+    images = readImages(recording.images_from, rig, drive);
   }
   const bool truth_range = recording.truth_range && renderer.has_value();
   for (const RigCamera& camera : rig.cameras) {
@@ -210,36 +158,42 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
     }
   }
 
+  ImageFaults image_faults(faults, faultyCameras(cameras), response, start, scenario.sensorSeed());
+  MotionRecorder motion(drive, faults.odometry_stamp_shift, &writer);
   ProgressBar progress("simulating " + scenario.drive);
-  size_t odometry = 0;
-  size_t ticks = 0;
-  const auto writeUntil = [&](std::optional<Timestamp> end) {
-    for (; odometry < drive.odometry.size() && (!end || drive.odometry[odometry].stamp <= *end); ++odometry) {
-      writer.writeOdometry(drive.odometry[odometry]);
-      writer.writeGroundTruth(drive.ground_truth[odometry]);
-    }
-    for (; ticks < drive.wheel_ticks.size() && (!end || drive.wheel_ticks[ticks].stamp <= *end); ++ticks) {
-      writer.writeWheelTicks(drive.wheel_ticks[ticks]);
-    }
-  };
   for (size_t frame = 0; frame < drive.world_from_vehicle.size(); ++frame) {
     const auto& [stamp, world_from_vehicle] = drive.world_from_vehicle[frame];
-    writeUntil(stamp);
-    for (size_t camera = 0; camera < views.size(); ++camera) {
-      cv::Mat image = images->image(camera, frame);
+    motion.writeUntil(stamp);
+    for (size_t camera = 0; camera < cameras.size(); ++camera) {
+      cv::Mat image = image_faults.throughLens(camera, stamp, images->image(camera, frame));
+      const double gain = image_faults.exposureGain(camera, stamp);
       if (scenario.noise) {
-        image = response.addNoise(image, scenario.sensorSeed(), selected[camera].index,
-                                  static_cast<int64_t>(frame), scenario.exposure_gain);
+        image = response.addNoise(image, scenario.sensorSeed(), cameras.index(camera),
+                                  static_cast<int64_t>(frame), gain * scenario.exposure_gain);
+      } else if (gain != 1.0) {
+        image = response.expose(image, gain);
       }
-      writer.writeImage(camera, stamp, image);
+      const size_t plug = cameras.plug(camera, stamp - start);
+      if (const std::optional<DeliveredImage> delivered = image_faults.deliver(camera, frame, stamp, image)) {
+        writer.writeImage(plug, delivered->stamp, delivered->pixels, delivered->received);
+      }
       if (truth_range) {
-        writeRange(renderer->renderRange(views[camera], world_from_vehicle),
-                   truth.path() + "/range/" + rig.cameras[camera].name, stamp);
+        writeRange(renderer->renderRange(cameras.view(camera, stamp - start), world_from_vehicle),
+                   truth.path() + "/range/" + cameras.name(plug), stamp);
       }
     }
     progress.update(static_cast<double>(frame + 1) / static_cast<double>(drive.world_from_vehicle.size()));
   }
-  writeUntil(std::nullopt);
+  motion.writeUntil(std::nullopt);
+  std::vector<std::string> names;
+  for (const RigCamera& camera : rig.cameras) {
+    names.push_back(camera.name);
+  }
+  writeFaults(faults, start, names, image_faults.hits(), truth.path() + "/faults.yaml");
+  if (cameras.isRigFaulty()) {
+    writeTruthRig(rig, truth.path(), "_before");
+    writeTruthRig(cameras.rigAfterFaults(), truth.path(), "_after");
+  }
   writer.close();
   truth.commit();
   writeCameraRig(rig, (bag.parent_path() / "rig_truth.yaml").string());

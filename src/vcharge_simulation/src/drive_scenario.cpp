@@ -18,6 +18,7 @@ void DriveScenario::validate() const {
   validateInner("odometer", odometer);
   validateInner("lens", lens);
   validateInner("response", response);
+  validateInner("faults", faults);
 }
 
 }  // namespace vcharge

@@ -40,6 +40,9 @@ class CameraResponse {
   /// Depends only on the arguments. `clean` is CV_8UC1.
   cv::Mat addNoise(const cv::Mat& clean, uint64_t seed, int camera, int64_t frame, double gain = 1.0) const;
 
+  /// The image (CV_8UC1) at `gain` times the exposure, without noise.
+  cv::Mat expose(const cv::Mat& clean, double gain) const;
+
   /// Gray value (0 to 255, not rounded) of an amount of light.
   double grayFromLight(double light) const;
   /// Inverse of grayFromLight, for gray in [0, 255].

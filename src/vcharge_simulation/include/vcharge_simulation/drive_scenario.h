@@ -5,6 +5,7 @@
 
 #include "vcharge_simulation/camera_response.h"
 #include "vcharge_simulation/drive_simulator.h"
+#include "vcharge_simulation/fault_options.h"
 #include "vcharge_simulation/lens_blur.h"
 #include "vcharge_simulation/wheel_odometer.h"
 
@@ -14,6 +15,7 @@ namespace vcharge {
 struct DriveScenario {
   std::string scene = "lot";
   std::string drive = "short";
+  std::string rig = "golf";
   int scene_seed = 1;          ///< of the scene
   int rig_seed = 1;            ///< of the lenses and how they are mounted
   int seed = 1;                ///< of the road under the car
@@ -26,11 +28,13 @@ struct DriveScenario {
   WheelOdometerOptions odometer;
   LensOptions lens;
   CameraResponseOptions response;
+  FaultOptions faults;
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
     visit("scene", scene);
     visit("drive", drive);
+    visit("rig", rig);
     visit("scene_seed", scene_seed);
     visit("rig_seed", rig_seed);
     visit("seed", seed);
@@ -43,6 +47,7 @@ struct DriveScenario {
     visit("odometer", odometer);
     visit("lens", lens);
     visit("response", response);
+    visit("faults", faults);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
 

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "vcharge_core/vehicle_odometry.h"
+#include "vcharge_simulation/fault_options.h"
 #include "vcharge_simulation/vehicle_motion.h"
 
 namespace vcharge {
@@ -30,13 +31,15 @@ struct WheelOdometerOptions {
 /// of summing noisy increments; a wrong wheel radius stays in the result as drift.
 class WheelOdometer {
  public:
-  /// `seed` sets where in a tick the wheels stand at the start.
-  WheelOdometer(const VehicleMotion& motion, const WheelOdometerOptions& options, uint64_t seed);
+  /// `seed` sets where in a tick the wheels stand at the start. Of the faults, those of wheels and counters
+  /// act.
+  WheelOdometer(const VehicleMotion& motion, const WheelOdometerOptions& options, uint64_t seed,
+                const FaultOptions& faults = FaultOptions());
 
-  /// Raw counters at a whole millisecond of the drive.
+  /// Raw counters at a whole millisecond of the drive, from zero at its start and at a reset.
   WheelTicks ticks(int milliseconds) const;
-  /// Planar dead reckoning at increasing milliseconds; the pose at the first one is the identity. Stamps are
-  /// left to the caller.
+  /// Planar dead reckoning at increasing milliseconds; the pose at the first one, and at the first one after
+  /// a reset, is the identity. Stamps are left to the caller.
   std::vector<VehicleOdometry> deadReckoning(const std::vector<int>& milliseconds) const;
 
  private:
@@ -44,8 +47,10 @@ class WheelOdometer {
     double distance_m, speed_m_per_s;
   };
   WheelState smoothed(const std::vector<int64_t>& counter, int milliseconds) const;
+  bool isReset(int milliseconds) const;
 
   WheelOdometerOptions options_;
+  FaultOptions faults_;
   const VehicleMotion& motion_;
   std::vector<int64_t> left_, right_;  // one per millisecond
 };
