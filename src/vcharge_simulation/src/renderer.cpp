@@ -31,6 +31,7 @@ class BlockRenderer {
         shader_(scene),
         view_(view),
         sun_(scene.sky->directionToSun()),
+        has_sun_(scene.sky->light().sun_irradiance > 0.0),
         vehicle_rotation_(world_from_vehicle.rotationMatrix().cast<float>()),
         vehicle_origin_(world_from_vehicle.translation().cast<float>()),
         sun_in_vehicle_(vehicle_rotation_.transpose() * sun_),
@@ -174,6 +175,9 @@ class BlockRenderer {
   // One shadow ray for each pixel, from its first sample that needs one.
   void traceShadows(const RTCRayHit16& rays, uint8_t pixels, uint32_t body_mask,
                     std::array<float, 4>* sun_visibility) const {
+    if (!has_sun_) {
+      return;
+    }
     alignas(16) int active[4] = {0, 0, 0, 0};
     RTCRay4 shadow = {};
     bool any = false;
@@ -228,7 +232,7 @@ class BlockRenderer {
   }
 
   bool shadowedByBody(const Eigen::Vector3f& position) const {
-    if (view_.body() == nullptr) {
+    if (view_.body() == nullptr || !has_sun_) {
       return false;
     }
     const Eigen::Vector3f in_vehicle = vehicle_rotation_.transpose() * (position - vehicle_origin_);
@@ -252,6 +256,7 @@ class BlockRenderer {
   const SurfaceShader shader_;
   const CameraView& view_;
   const Eigen::Vector3f sun_;
+  const bool has_sun_;
   const Eigen::Matrix3f vehicle_rotation_;
   const Eigen::Vector3f vehicle_origin_, sun_in_vehicle_;
   const Eigen::Matrix3f rotation_;  // of the camera

@@ -4,6 +4,7 @@
 #include <functional>
 #include <stdexcept>
 
+#include "garage_scene.h"
 #include "vcharge_core/options.h"
 #include "vcharge_simulation/lot_scene.h"
 
@@ -29,7 +30,11 @@ std::shared_ptr<const Scene> buildLot(const SceneOptions& options) {
 
 const std::vector<CatalogueScene>& catalogue() {
   static const std::vector<CatalogueScene> scenes = {
-      {{"lot", "parking lot of 80 x 60 m in the sun"}, buildLot, listLotDrives, planLotDrive}};
+      {{"lot", "parking lot of 80 x 60 m in the sun"}, buildLot, listLotDrives, planLotDrive},
+      {{"garage", "underground garage of 64 x 47 m, lit by lamps"},
+       buildGarageScene,
+       listGarageDrives,
+       planGarageDrive}};
   return scenes;
 }
 

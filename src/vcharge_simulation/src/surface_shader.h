@@ -62,6 +62,9 @@ class SurfaceShader {
   float detailFactor(const Eigen::Vector3f& position, float width_m) const;
   float groundLight(const Eigen::Vector3f& position, float width_m, float sun_visibility) const;
   float ambient(const Eigen::Vector3f& normal) const;
+  float groundReflection(const Material& material, const Eigen::Vector3f& position,
+                         const Eigen::Vector3f& direction) const;
+  float ceilingRadiance(const Eigen::Vector3f& position, const Eigen::Vector3f& direction) const;
   float reflection(const Material& material, const Eigen::Vector3f& position, const Eigen::Vector3f& normal,
                    const Eigen::Vector3f& direction) const;
 

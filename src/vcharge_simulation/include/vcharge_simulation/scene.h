@@ -26,6 +26,7 @@ struct Material {
   float sun_map_texels_per_m = 1.0F;
   float texels_per_m = 100.0F;  ///< of the texture on the surface, for the level of detail
   float reflectivity = 0.0F;    ///< at normal incidence; 0.04 for paint and glass
+  float emission = 0.0F;        ///< light that the surface sends of its own
   float translucency = 0.0F;    ///< share of the light on the back that leaves through the front
   bool two_sided = false;       ///< normals turn to the viewer
   SurfaceKind kind = SurfaceKind::kOther;
@@ -42,6 +43,13 @@ struct GroundLayers {
 /// Reflectance of a ground layer's texel value 255.
 inline constexpr float kGroundLayerAlbedo = 0.8F;
 
+/// What polished floors and car paint mirror of a closed scene above them.
+struct Ceiling {
+  float height_m;
+  float scale;             ///< light of the texture's value 1
+  GroundTexture radiance;  ///< of ceiling and lamps, over scale
+};
+
 /// A solid thing that a car must not touch.
 struct Obstacle {
   std::string kind;                          ///< "car", "tree", ...
@@ -57,6 +65,7 @@ struct Scene {
   std::vector<Texture> textures;
   GroundLayers ground;
   std::unique_ptr<Sky> sky;
+  std::unique_ptr<Ceiling> ceiling;  ///< absent: reflections see the sky
   std::vector<Obstacle> obstacles;
   Eigen::Vector2d min_m{-40.0, -30.0};  ///< corners of the area that truth maps cover
   Eigen::Vector2d max_m{40.0, 30.0};
