@@ -71,11 +71,16 @@ class ImageSource {
 class RenderedImages : public ImageSource {
  public:
   RenderedImages(const Renderer& renderer, const std::vector<CameraView>& views,
-                 const CameraResponse& response, const Trajectory& world_from_vehicle)
-      : renderer_(renderer), views_(views), response_(response), world_from_vehicle_(world_from_vehicle) {}
+                 const CameraResponse& response, const Trajectory& world_from_vehicle,
+                 const std::vector<double>& scene_times_s)
+      : renderer_(renderer),
+        views_(views),
+        response_(response),
+        world_from_vehicle_(world_from_vehicle),
+        scene_times_s_(scene_times_s) {}
   cv::Mat image(size_t camera, size_t frame) override {
-    return response_.develop(
-        renderer_.renderLight(views_[camera], world_from_vehicle_[frame].world_from_vehicle));
+    return response_.develop(renderer_.renderLight(
+        views_[camera], world_from_vehicle_[frame].world_from_vehicle, scene_times_s_[frame]));
   }
 
  private:
@@ -83,6 +88,7 @@ class RenderedImages : public ImageSource {
   const std::vector<CameraView>& views_;
   const CameraResponse& response_;
   const Trajectory& world_from_vehicle_;
+  const std::vector<double>& scene_times_s_;
 };
 
 class RecordedImages : public ImageSource {
@@ -169,8 +175,9 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   recording.validate();
   const DrivePlan plan = planDriveOf(scenario);
   const std::vector<SelectedCamera> selected = selectCameras(scenario);
-  const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, scenario.odometer,
-                                             static_cast<uint64_t>(scenario.seed), scenario.sensorSeed());
+  const SimulatedDrive drive =
+      simulateDrive(plan.path, plan.motion, scenario.odometer, static_cast<uint64_t>(scenario.seed),
+                    scenario.sensorSeed(), plan.ground_height);
 
   const std::filesystem::path bag(recording.bag);
   const std::string truth_name = bag.stem().string() + "_truth";
@@ -186,6 +193,13 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   DriveBagWriter writer(recording.bag, rig);
   FolderTransaction truth((bag.parent_path() / truth_name).string());
 
+  std::vector<Timestamp> stamps;
+  std::vector<double> scene_times_s;
+  for (const auto& [stamp, world_from_vehicle] : drive.world_from_vehicle) {
+    stamps.push_back(stamp);
+    scene_times_s.push_back(plan.start_s +
+                            1e-9 * static_cast<double>((stamp - drive.ground_truth.front().stamp).count()));
+  }
   const CameraResponse response(scenario.response);
   std::optional<Renderer> renderer;
   std::unique_ptr<ImageSource> images;
@@ -196,10 +210,14 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
     scene.day = plan.day;
     scene.image_scale = scenario.image_scale;
     renderer.emplace(buildScene(scenario.scene, scene));
-    images = std::make_unique<RenderedImages>(*renderer, views, response, drive.world_from_vehicle);
+    images =
+        std::make_unique<RenderedImages>(*renderer, views, response, drive.world_from_vehicle, scene_times_s);
     writeHeightMap(computeHeightMap(*renderer, recording.height_cell_m, recording.height_limit_m),
                    truth.path() + "/height_map");
     writeObstacles(renderer->scene().obstacles, truth.path() + "/obstacles.yaml");
+    if (!renderer->scene().movers.empty()) {
+      writeMovers(renderer->scene().movers, stamps, scene_times_s, truth.path() + "/movers.yaml");
+    }
   } else {
     images = std::make_unique<RecordedImages>(recording.images_from, rig, drive);
   }
@@ -233,7 +251,7 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
       }
       writer.writeImage(camera, stamp, image);
       if (truth_range) {
-        writeRange(renderer->renderRange(views[camera], world_from_vehicle),
+        writeRange(renderer->renderRange(views[camera], world_from_vehicle, scene_times_s[frame]),
                    truth.path() + "/range/" + rig.cameras[camera].name, stamp);
       }
     }

@@ -20,8 +20,8 @@ Timestamp stampAt(int milliseconds) {
 
 SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& motion_options,
                              const WheelOdometerOptions& odometer_options, uint64_t road_seed,
-                             uint64_t wheel_seed) {
-  const VehicleMotion motion(path, motion_options, road_seed);
+                             uint64_t wheel_seed, const GroundHeight& ground_height) {
+  const VehicleMotion motion(path, motion_options, road_seed, ground_height);
   const WheelOdometer odometer(motion, odometer_options, wheel_seed + 1);
   const int duration_ms = static_cast<int>(std::floor(motion.duration() * 1000.0 + 0.5));
   SimulatedDrive drive;

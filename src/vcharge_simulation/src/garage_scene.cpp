@@ -80,8 +80,10 @@ class GarageBuilder {
         {Texture(drawGarageFloor(layout_, texel_m, seed_), Texture::Border::kClamp),
          static_cast<float>(kGarageArea.min_x), static_cast<float>(kGarageArea.min_y),
          static_cast<float>(1.0 / texel_m)});
-    scene().ground.details.push_back({Texture(drawGroundDetail(1024, seed_ + 40), Texture::Border::kRepeat),
-                                      0.0F, 0.0F, static_cast<float>(1.0 / kDetailTexel_m)});
+    for (const double stretch : {1.0, 1.61803}) {
+      scene().ground.details.push_back({Texture(drawGroundDetail(1024, seed_ + 40), Texture::Border::kRepeat),
+                                        0.0F, 0.0F, static_cast<float>(1.0 / (kDetailTexel_m * stretch))});
+    }
     parts_.addLevel(kGarageArea, 0.0, material);
   }
 

@@ -4,7 +4,11 @@
 #include <functional>
 #include <stdexcept>
 
+#include "board_scene.h"
+#include "course_scene.h"
 #include "garage_scene.h"
+#include "lot_variant.h"
+#include "two_levels_scene.h"
 #include "vcharge_core/options.h"
 #include "vcharge_simulation/lot_scene.h"
 
@@ -20,12 +24,7 @@ struct CatalogueScene {
 };
 
 std::shared_ptr<const Scene> buildLot(const SceneOptions& options) {
-  LotOptions lot;
-  lot.seed = static_cast<uint64_t>(options.seed);
-  lot.day = options.day;
-  lot.moved_cars = options.moved_cars;
-  lot.ground_texel_m = std::min(0.5, lot.ground_texel_m / options.image_scale);
-  return buildLotScene(lot);
+  return buildLotScene(lotOptionsOf(options));
 }
 
 const std::vector<CatalogueScene>& catalogue() {
@@ -34,7 +33,19 @@ const std::vector<CatalogueScene>& catalogue() {
       {{"garage", "underground garage of 64 x 47 m, lit by lamps"},
        buildGarageScene,
        listGarageDrives,
-       planGarageDrive}};
+       planGarageDrive},
+      {{"obstacles", "course of posts, boxes, kerbs, a trailer and people on the lot"},
+       buildCourseScene,
+       listCourseDrives,
+       planCourseDrive},
+      {{"two_levels", "lot on two levels with ramps of 6 degrees and uneven ground"},
+       buildTwoLevelsScene,
+       listTwoLevelsDrives,
+       planTwoLevelsDrive},
+      {{"chessboard", "chessboard held before each camera in turn, on the lot"},
+       buildBoardScene,
+       listBoardDrives,
+       planBoardDrive}};
   return scenes;
 }
 

@@ -127,10 +127,11 @@ float SurfaceShader::shadePixel(const std::array<SurfacePoint, 4>& points, float
 }
 
 SurfaceShader::Interpolated SurfaceShader::interpolate(const SurfacePoint& point) const {
-  const MeshTriangle& triangle = scene_.mesh.triangles[point.triangle];
-  const MeshVertex& a = scene_.mesh.vertices[triangle.vertices[0]];
-  const MeshVertex& b = scene_.mesh.vertices[triangle.vertices[1]];
-  const MeshVertex& c = scene_.mesh.vertices[triangle.vertices[2]];
+  const MeshTriangle& triangle = triangleOf(point.triangle);
+  const std::vector<MeshVertex>& vertices = meshOf(point.triangle).vertices;
+  const MeshVertex& a = vertices[triangle.vertices[0]];
+  const MeshVertex& b = vertices[triangle.vertices[1]];
+  const MeshVertex& c = vertices[triangle.vertices[2]];
   const float wa = 1.0F - point.u - point.v;
   Interpolated surface;
   surface.normal = (wa * a.normal + point.u * b.normal + point.v * c.normal).normalized();

@@ -23,6 +23,6 @@ struct SimulatedDrive {
 /// bits. std::invalid_argument for bad options.
 SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& motion_options,
                              const WheelOdometerOptions& odometer_options, uint64_t road_seed,
-                             uint64_t wheel_seed);
+                             uint64_t wheel_seed, const GroundHeight& ground_height = nullptr);
 
 }  // namespace vcharge

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "vcharge_core/rigid_transform.h"
+#include "vcharge_simulation/ground_height.h"
 #include "vcharge_simulation/mesh.h"
 #include "vcharge_simulation/sky.h"
 #include "vcharge_simulation/texture.h"
@@ -58,7 +61,20 @@ struct Obstacle {
   double top_z_m = 0.0;
 };
 
-/// A static world: metres, z up, drivable ground at z = 0.
+/// A mover as it is at one time.
+struct MoverState {
+  TriangleMesh mesh;  ///< in the world frame; materials are the scene's
+  RigidTransform world_from_mover;
+  Obstacle obstacle;  ///< the ground that it takes
+};
+
+/// A thing that moves through the scene, by a formula of the time: `stateAt` is thread safe.
+struct Mover {
+  std::string name;
+  std::function<MoverState(double time_s)> stateAt;
+};
+
+/// A world that stands still but for its movers: metres, z up.
 struct Scene {
   TriangleMesh mesh;
   std::vector<Material> materials;
@@ -66,7 +82,9 @@ struct Scene {
   GroundLayers ground;
   std::unique_ptr<Sky> sky;
   std::unique_ptr<Ceiling> ceiling;  ///< absent: reflections see the sky
-  std::vector<Obstacle> obstacles;
+  std::vector<Obstacle> obstacles;   ///< that stand still
+  std::vector<Mover> movers;
+  GroundHeight ground_height;           ///< of the drivable ground
   Eigen::Vector2d min_m{-40.0, -30.0};  ///< corners of the area that truth maps cover
   Eigen::Vector2d max_m{40.0, 30.0};
 

@@ -25,7 +25,9 @@ struct DrivePlan {
   std::string name;
   DrivePath path;
   VehicleMotionOptions motion;
-  int day = 0;  ///< on which the drive takes place
+  int day = 0;                           ///< on which the drive takes place
+  GroundHeight ground_height = nullptr;  ///< of the scene; null: level at z = 0
+  double start_s = 0.0;                  ///< time of the scene's movers when the drive starts
 };
 
 /// Name and one line about each scene, and each drive of a scene.
