@@ -26,6 +26,8 @@ constexpr double kMove_s = 0.4;  // of a pose's second; it is held for the rest
 constexpr double kSpan_s = kPosesPerCamera * kPose_s;
 constexpr double kMaxAngle_rad = 1.52;  // of a corner from the optical axis; the field of view ends at 1.61
 constexpr double kMinHeight_m = 0.08;
+constexpr double kFreeRadius_m = 9.0;
+
 const RigidTransform& worldFromVehicle() {
   static const RigidTransform place = RigidTransform::planar(-5.0, 0.2, 0.1);
   return place;
@@ -186,6 +188,14 @@ MoverState boardAt(const BoardMotion& motion, uint32_t front, uint32_t back, dou
 std::shared_ptr<const Scene> buildBoardScene(const SceneOptions& options) {
   LotVariant variant;
   variant.layout = makeLotLayout(static_cast<uint64_t>(options.seed), options.day, options.moved_cars);
+  // No car stands where the board is held.
+  const Eigen::Vector2d place = worldFromVehicle().translation().head<2>();
+  variant.layout.cars.erase(std::remove_if(variant.layout.cars.begin(), variant.layout.cars.end(),
+                                           [&](const ParkedCar& car) {
+                                             return (Eigen::Vector2d(car.x, car.y) - place).norm() <
+                                                    kFreeRadius_m;
+                                           }),
+                            variant.layout.cars.end());
   const auto motion = std::make_shared<const BoardMotion>(moveBoard(static_cast<uint64_t>(options.seed)));
   variant.add_things = [motion](SceneParts* parts) {
     const uint32_t front = parts->textured(SurfaceKind::kOther, drawBoard(), kTexelsPerSquare / kSquare_m);

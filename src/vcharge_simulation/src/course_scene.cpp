@@ -58,7 +58,7 @@ void addBoxes(SceneParts* parts) {
 // Diameters of 5 to 15 cm.
 void addPosts(SceneParts* parts) {
   parts->addPoles({{-17.5, -1.7, 0.0, 1.0, 0.025, false},
-                   {-12.2, 1.5, 0.0, 0.9, 0.03, true},
+                   {-12.2, 1.5, 0.0, 0.9, 0.03, false},
                    {-7.0, -2.0, 0.0, 1.1, 0.04, false},
                    {-1.8, 1.6, 0.0, 0.6, 0.05, false},
                    {3.6, -1.6, 0.0, 0.8, 0.06, false},
@@ -137,7 +137,7 @@ LotLayout courseLayout(const SceneOptions& options) {
   // Corners towards the lane.
   layout.cars.push_back(parkedAcross(-9.0, -5.2, 0.9, 1, 3));
   layout.cars.push_back(parkedAcross(11.5, -3.6, 2.7, 4, 2));
-  layout.cars.push_back(parkedAcross(0.5, -5.5, 1.1, 0, 4));
+  layout.cars.push_back(parkedAcross(0.5, -6.3, 1.1, 0, 4));
   layout.cars.push_back(parkedAcross(18.0, 5.5, -2.1, 5, 1));
   layout.islands.push_back({-9.5, 1.45, -6.5, 1.85});
   layout.islands.push_back({1.0, 1.5, 3.2, 2.6});

@@ -91,15 +91,16 @@ class FloorPainter {
   float albedo(float x, float y, float marking) const {
     float value = 0.27F;
     value *= 1.0F + 0.16F * fractalNoise(x * 0.18F, y * 0.18F, 3, 0.6F, seed_) +
-             0.10F * fractalNoise(x * 1.3F, y * 1.3F, 4, 0.75F, seed_ + 2) +
+             0.16F * fractalNoise(x * 1.3F, y * 1.3F, 4, 0.8F, seed_ + 2) +
+             0.15F * fractalNoise(x * 6.0F, y * 6.0F, 2, 0.8F, seed_ + 7) +
              0.10F * fractalNoise(x * 17.0F, y * 17.0F, 3, 0.85F, seed_ + 3);
     // Chipped paint and grit.
-    const CellNoise grains = cellNoise(x * 14.0F, y * 14.0F, seed_ + 4);
+    const CellNoise grains = cellNoise(x * 11.0F, y * 11.0F, seed_ + 4);
     const float grain = unitFromBits(mixBits(grains.cell));
     if (grain > 0.9F) {
-      value *= 1.0F + 0.9F * (grain - 0.62F) * ramp(grains.border_distance, 0.1F, 0.3F);
+      value *= 1.0F + 1.3F * (grain - 0.62F) * ramp(grains.border_distance, 0.1F, 0.3F);
     } else if (grain < 0.1F) {
-      value *= 1.0F - 0.4F * ramp(grains.border_distance, 0.1F, 0.25F);
+      value *= 1.0F - 0.45F * ramp(grains.border_distance, 0.1F, 0.25F);
     }
     value *= tyreFactor(x, y) * crackFactor(x, y) * spotFactor(x, y);
     const auto joint = static_cast<float>(kJoint_m);

@@ -19,9 +19,11 @@ constexpr float kLampRadiance = 2.4F;
 constexpr double kCeilingTexel_m = 0.1;
 constexpr double kCeilingAlbedo = 0.55;
 // Of the share 1 of the baked light: the camera is exposed for the garage.
-constexpr double kFullIrradiance = 3.0;
+constexpr double kFullIrradiance = 4.5;
 constexpr double kTypicalCeilingShare = 0.12;
-constexpr float kFloorReflectivity = 0.04F;
+// Ducts and lamps hang above this.
+constexpr double kOverhead_m = 2.1;
+constexpr float kFloorReflectivity = 0.03F;
 // Lamps bake onto the corners of cells of this size.
 constexpr double kLightCell_m = 0.5;
 
@@ -50,6 +52,7 @@ class GarageBuilder {
     scene().sky = std::make_unique<Sky>(lampLight(), 1);
     scene().min_m = {kGarageArea.min_x, kGarageArea.min_y};
     scene().max_m = {kGarageArea.max_x, kGarageArea.max_y};
+    scene().overhead_m = kOverhead_m;
     addFloor();
     addWalls();
     addCeiling();
@@ -58,8 +61,8 @@ class GarageBuilder {
     addLamps();
     parts_.addCars(layout_.cars);
     LampOptions light;
-    light.floor_texel_m = std::min(0.4, 0.1 / options_.image_scale);
-    light.gathered_rays = options_.image_scale < 0.5 ? 12 : 24;
+    light.floor_texel_m = 0.1 / options_.detail;
+    light.gathered_rays = static_cast<int>(std::lround(24 * options_.detail));
     bakeLampLight(layout_.lamps, light, scene().min_m, scene().max_m, &scene());
     addCeilingReflection();
     return parts_.sharedScene();
@@ -129,7 +132,7 @@ class GarageBuilder {
     const int size = 1024;
     const auto mean = static_cast<float>(kCeilingAlbedo);
     const uint32_t concrete = parts_.textured(
-        SurfaceKind::kBuilding, drawFormedConcrete(size, size, mean, static_cast<uint32_t>(seed_ + 70U)),
+        SurfaceKind::kOther, drawFormedConcrete(size, size, mean, static_cast<uint32_t>(seed_ + 70U)),
         kGarageTexelsPerM, 0.0, Texture::Border::kRepeat);
     const GroundRectangle& area = kGarageArea;
     const auto repeats_x = static_cast<float>(area.width() / kTile_m);
@@ -178,6 +181,9 @@ class GarageBuilder {
         addPanel(vector(corners[i].x(), corners[i].y(), 0.0), vector(edge.x(), edge.y(), 0.0),
                  vector(0.0, 0.0, kGarageHeight_m), material, {u, 0.0F, u + 0.25F, 1.0F});
       }
+      // Seen from above without what hangs overhead, a pillar is solid.
+      parts_.addLevel({corners[0].x(), corners[0].y(), corners[2].x(), corners[2].y()}, kOverhead_m - 0.01,
+                      material);
       scene().obstacles.push_back({"pillar", corners, 0.0, kGarageHeight_m});
     }
   }

@@ -154,6 +154,8 @@ LotOptions lotOptionsOf(const SceneOptions& options) {
   lot.day = options.day;
   lot.moved_cars = options.moved_cars;
   lot.ground_texel_m = std::min(0.5, lot.ground_texel_m / options.image_scale);
+  lot.light_texel_m /= options.detail;
+  lot.foliage_density *= options.detail;
   return lot;
 }
 

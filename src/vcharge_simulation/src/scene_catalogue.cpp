@@ -72,6 +72,7 @@ void SceneOptions::validate() const {
   requireField(seed >= 0, "seed", "must not be negative", seed);
   requireField(day >= 0, "day", "must not be negative", day);
   requireField(moved_cars >= 0.0 && moved_cars <= 1.0, "moved_cars", "must be in [0, 1]", moved_cars);
+  requireField(detail >= 0.1 && detail <= 1.0, "detail", "must be in [0.1, 1]", detail);
   requireField(image_scale >= 0.05 && image_scale <= 1.0, "image_scale", "must be in [0.05, 1]", image_scale);
 }
 

@@ -14,6 +14,8 @@ constexpr float kMaxDetailLevel = 4.0F;
 // Reflections see trees and houses, not sky, below this elevation (its sine).
 constexpr float kSkylineSine = 0.22F;
 constexpr float kSkylineLight = 0.10F;
+// Of rough polish: what flat rays reflect more than steep ones.
+constexpr float kGrazingGloss = 4.0F;
 constexpr float kFlattestCeilingRay = 0.12F;  // its sine
 
 // Length over width of what a round cone of rays covers on level ground.
@@ -87,8 +89,13 @@ float SurfaceShader::shadeGroundPixel(const Material& material,
 
 float SurfaceShader::groundReflection(const Material& material, const Eigen::Vector3f& position,
                                       const Eigen::Vector3f& direction) const {
-  return material.reflectivity > 0.0F ? reflection(material, position, Eigen::Vector3f::UnitZ(), direction)
-                                      : 0.0F;
+  if (material.reflectivity <= 0.0F) {
+    return 0.0F;
+  }
+  // A rough polish mirrors flat rays better than steep ones, but by far not as well as glass.
+  const float m = 1.0F + std::min(0.0F, direction.z());
+  const float share = material.reflectivity * (1.0F + kGrazingGloss * m * m * m * m * m);
+  return share * surroundings(position, {direction.x(), direction.y(), -direction.z()});
 }
 
 float SurfaceShader::shade(const SurfacePoint& point, float sun_visibility) const {

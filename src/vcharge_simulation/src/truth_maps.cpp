@@ -1,5 +1,6 @@
 #include "vcharge_simulation/truth_maps.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -20,6 +21,7 @@ constexpr double kStep_m = 1e-3;
 
 double heightAt(const Renderer& renderer, const Eigen::Vector2d& place_m, double max_height_m) {
   const GroundHeight& ground_height = renderer.scene().ground_height;
+  max_height_m = std::min(max_height_m, renderer.scene().overhead_m);
   max_height_m += ground_height ? ground_height(place_m.x(), place_m.y()) : 0.0;
   double travelled_m = 0.0;
   for (;;) {

@@ -99,6 +99,8 @@ double alongSurface(double horizontal_m, double rise_m) {
 // Distance before a stop at which the car aims to stand: it follows the wanted speed with a delay.
 constexpr double kStopReserve_m = 0.4;
 constexpr double kStanding_m_per_s = 0.02;
+// A car that stands within this distance of the path's end has arrived.
+constexpr double kEnd_m = 1.0;
 
 double desiredSpeed(const DrivePath& path, const VehicleMotionOptions& options, double s_m,
                     double wave_phase_rad) {
@@ -148,14 +150,16 @@ VehicleMotion::VehicleMotion(const DrivePath& path, const VehicleMotionOptions& 
   // A moving start has come along a straight line before the path.
   double s_m = from_rest ? 0.0 : -speed * kMargin_s;
   auto stop = path.stops().begin();
-  double stop_ends_s = -1.0;  // of the stop at which the car stands
+  double stop_ends_s = -1.0;  // of the stop at which the car stands; negative: it drives
+  double direction = path.direction(s_m);
   MotionSample sample;
-  sample.world_from_planar = path.worldFromStart() * arcMotion(path.direction(s_m) * s_m, 0.0);
+  sample.world_from_planar = path.worldFromStart() * arcMotion(direction * s_m, 0.0);
   int remaining_after_end = 2 * marginSteps();
   for (int step = -marginSteps(); remaining_after_end > 0; ++step) {
     const double time_s = step * kStep_s;
     const bool over = time_s >= options.duration_s || s_m >= path.length() ||
-                      (options.stop_at_end && time_s > options.standstill_s + 2.0 && speed < 0.01);
+                      (options.stop_at_end && path.length() - s_m < kEnd_m &&
+                       time_s > options.standstill_s + 2.0 && speed < 0.01);
     if (over && duration_s_ == 0.0) {
       duration_s_ = time_s;
       remaining_after_end = marginSteps() + 1;
@@ -163,14 +167,13 @@ VehicleMotion::VehicleMotion(const DrivePath& path, const VehicleMotionOptions& 
     if (duration_s_ > 0.0) {
       --remaining_after_end;
     }
-    const bool stands = stop_ends_s >= 0.0;
-    if (stands && time_s >= stop_ends_s) {
+    if (stop_ends_s >= 0.0 && time_s >= stop_ends_s) {
+      // It may stand a little short of its stop.
       s_m = stop->at_m;
+      direction = path.direction(s_m);
       ++stop;
       stop_ends_s = -1.0;
     }
-    const double direction =
-        path.direction(stop == path.stops().end() ? s_m : std::min(s_m, 0.999999 * stop->at_m));
     double acceleration = 0.0;
     if (time_s >= options.standstill_s && time_s >= 0.0 && stop_ends_s < 0.0) {
       double wanted = desiredSpeed(path, options, s_m, wave_phase_rad);

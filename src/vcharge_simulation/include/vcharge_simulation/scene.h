@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -84,7 +85,9 @@ struct Scene {
   std::unique_ptr<Ceiling> ceiling;  ///< absent: reflections see the sky
   std::vector<Obstacle> obstacles;   ///< that stand still
   std::vector<Mover> movers;
-  GroundHeight ground_height;           ///< of the drivable ground
+  GroundHeight ground_height;  ///< of the drivable ground
+  /// Height above the ground from which on things hang overhead: truth maps look through them.
+  double overhead_m = std::numeric_limits<double>::infinity();
   Eigen::Vector2d min_m{-40.0, -30.0};  ///< corners of the area that truth maps cover
   Eigen::Vector2d max_m{40.0, 30.0};
 

@@ -17,6 +17,8 @@ struct SceneOptions {
   double moved_cars = 0.3;  ///< share of the parked cars that differ from day 0
   /// Size of the images that will be rendered, over 1280x800: smaller images need no finer textures.
   double image_scale = 1.0;
+  /// Leaves and light maps over the default: less is quicker to build, for tests.
+  double detail = 1.0;
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
