@@ -170,6 +170,21 @@ TEST_P(SceneTest, HeightMapHoldsCarsPillarsAndThings) {
   EXPECT_GT(seen, 20);
 }
 
+TEST(CatalogueTest, EveryDriveStaysInItsSceneAndLastsSomeSeconds) {
+  for (const CatalogueEntry& scene : listScenes()) {
+    for (const CatalogueEntry& entry : listDrives(scene.name)) {
+      const DrivePlan plan = planDrive(scene.name, entry.name);
+      const SimulatedDrive drive =
+          simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1, plan.ground_height);
+      EXPECT_GT(drive.world_from_vehicle.size(), 50U) << scene.name << " " << entry.name;
+      for (const auto& [stamp, world_from_vehicle] : drive.world_from_vehicle) {
+        ASSERT_LT(std::abs(world_from_vehicle.translation().x()), 31.0) << scene.name << " " << entry.name;
+        ASSERT_LT(std::abs(world_from_vehicle.translation().y()), 21.0) << scene.name << " " << entry.name;
+      }
+    }
+  }
+}
+
 TEST(MoverTest, ChangesTheRangeOnlyWhereItsFootprintsAre) {
   const Renderer& renderer = rendererOf("obstacles");
   const CameraView view(makeGolfRig(1, kImageScale).cameras[1], nullptr);
