@@ -1,24 +1,38 @@
+#include <string>
+
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
 #include "vcharge_simulation/golf_rig.h"
-#include "vcharge_simulation/lot_scene.h"
 #include "vcharge_simulation/renderer.h"
+#include "vcharge_simulation/scene_catalogue.h"
 
 namespace vcharge {
 namespace {
 
-// One 1280x800 image of the lot at four rays per pixel, on one core.
-void renderImage(benchmark::State& state) {
-  static const Renderer renderer(buildLotScene(LotOptions()));
-  static const auto body = makeGolfBody();
+// One 1280x800 image at four rays per pixel, on one core, at the start of a drive.
+void renderImage(benchmark::State& state, const std::string& scene, const std::string& drive) {
+  const Renderer renderer(buildScene(scene, SceneOptions()));
+  const auto body = makeGolfBody();
+  const DrivePlan plan = planDrive(scene, drive);
+  const RigidTransform& start = plan.path.worldFromStart();
+  const double lift_m =
+      plan.ground_height ? plan.ground_height(start.translation().x(), start.translation().y()) : 0.0;
+  const RigidTransform world_from_vehicle(start.rotation(),
+                                          start.translation() + Eigen::Vector3d(0.0, 0.0, lift_m));
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
   const CameraView view(makeGolfRig(1, 1.0).cameras[static_cast<size_t>(state.range(0))], body);
   for (auto _ : state) {
-    benchmark::DoNotOptimize(renderer.renderLight(view, RigidTransform::planar(-5.0, 0.2, 0.1)).data);
+    benchmark::DoNotOptimize(renderer.renderLight(view, world_from_vehicle, plan.start_s).data);
   }
 }
-BENCHMARK(renderImage)->DenseRange(0, 3)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(renderImage, lot, "lot", "short")->DenseRange(0, 3)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(renderImage, garage, "garage", "loop")->DenseRange(0, 3)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(renderImage, obstacles, "obstacles", "creep")->Arg(1)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(renderImage, two_levels, "two_levels", "up_and_down")
+    ->Arg(1)
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(renderImage, chessboard, "chessboard", "board_left")->Arg(1)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace vcharge

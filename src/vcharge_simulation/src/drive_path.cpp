@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <stdexcept>
 #include <utility>
 
@@ -58,11 +59,14 @@ DrivePath::DrivePath(const RigidTransform& world_from_start, std::vector<Segment
     if (!(segment.length_m >= 0.0)) {
       throw std::invalid_argument("DrivePath: a segment has a negative length");
     }
+    if (!start_m_.empty() && segment.backwards != segments_[start_m_.size() - 1].backwards) {
+      addStop({length_m_, kTurnaround_s});
+    }
     start_m_.push_back(length_m_);
     start_heading_rad_.push_back(end_heading_rad_);
     length_m_ += segment.length_m;
-    end_heading_rad_ +=
-        0.5 * (segment.start_curvature_per_m + segment.end_curvature_per_m) * segment.length_m;
+    end_heading_rad_ += (segment.backwards ? -0.5 : 0.5) *
+                        (segment.start_curvature_per_m + segment.end_curvature_per_m) * segment.length_m;
   }
 }
 
@@ -70,8 +74,7 @@ double DrivePath::curvature(double s_m) const {
   if (s_m < 0.0 || s_m >= length_m_) {
     return 0.0;
   }
-  const size_t i =
-      static_cast<size_t>(std::upper_bound(start_m_.begin(), start_m_.end(), s_m) - start_m_.begin()) - 1;
+  const size_t i = segmentAt(s_m);
   const Segment& segment = segments_[i];
   const double fraction = segment.length_m > 0.0 ? (s_m - start_m_[i]) / segment.length_m : 0.0;
   return segment.start_curvature_per_m +
@@ -85,10 +88,24 @@ double DrivePath::heading(double s_m) const {
   if (s_m >= length_m_) {
     return end_heading_rad_;
   }
-  const size_t i =
-      static_cast<size_t>(std::upper_bound(start_m_.begin(), start_m_.end(), s_m) - start_m_.begin()) - 1;
+  const size_t i = segmentAt(s_m);
   const double along = s_m - start_m_[i];
-  return start_heading_rad_[i] + 0.5 * (segments_[i].start_curvature_per_m + curvature(s_m)) * along;
+  const double half = segments_[i].backwards ? -0.5 : 0.5;
+  return start_heading_rad_[i] + half * (segments_[i].start_curvature_per_m + curvature(s_m)) * along;
+}
+
+double DrivePath::direction(double s_m) const {
+  return !segments_.empty() && segments_[segmentAt(s_m)].backwards ? -1.0 : 1.0;
+}
+
+size_t DrivePath::segmentAt(double s_m) const {
+  const auto after = std::upper_bound(start_m_.begin(), start_m_.end(), s_m) - start_m_.begin();
+  return static_cast<size_t>(std::max<std::ptrdiff_t>(after - 1, 0));
+}
+
+void DrivePath::addStop(const Stop& stop) {
+  const auto later = [](const Stop& a, const Stop& b) { return a.at_m < b.at_m; };
+  stops_.insert(std::upper_bound(stops_.begin(), stops_.end(), stop, later), stop);
 }
 
 DrivePath DrivePath::throughWaypoints(const std::vector<Eigen::Vector2d>& waypoints, bool closed,

@@ -127,12 +127,19 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   const FaultOptions& faults = scenario.faults;
   const SimulatedDrive drive =
       simulateDrive(plan.path, plan.motion, scenario.odometer, static_cast<uint64_t>(scenario.seed),
-                    scenario.sensorSeed(), faults);
+                    scenario.sensorSeed(), faults, plan.ground_height);
   const Timestamp start = drive.ground_truth.front().stamp;
 
   DriveBagWriter writer(recording.bag, rig);
   FolderTransaction truth((bag.parent_path() / truth_name).string());
 
+  std::vector<Timestamp> stamps;
+  std::vector<double> scene_times_s;
+  for (const auto& [stamp, world_from_vehicle] : drive.world_from_vehicle) {
+    stamps.push_back(stamp);
+    scene_times_s.push_back(plan.start_s +
+                            1e-9 * static_cast<double>((stamp - drive.ground_truth.front().stamp).count()));
+  }
   const CameraResponse response(scenario.response);
   std::optional<Renderer> renderer;
   std::unique_ptr<ImageSource> images;
@@ -143,10 +150,13 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
     scene.day = plan.day;
     scene.image_scale = scenario.image_scale;
     renderer.emplace(buildScene(scenario.scene, scene));
-    images = renderImages(*renderer, cameras, response, drive, faults.motion_blur);
+    images = renderImages(*renderer, cameras, response, drive, scene_times_s, faults.motion_blur);
     writeHeightMap(computeHeightMap(*renderer, recording.height_cell_m, recording.height_limit_m),
                    truth.path() + "/height_map");
     writeObstacles(renderer->scene().obstacles, truth.path() + "/obstacles.yaml");
+    if (!renderer->scene().movers.empty()) {
+      writeMovers(renderer->scene().movers, stamps, scene_times_s, truth.path() + "/movers.yaml");
+    }
   } else {
     checkImagesCanBeReused(faults, recording.images_from);
     images = readImages(recording.images_from, rig, drive);
@@ -178,7 +188,8 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
         writer.writeImage(plug, delivered->stamp, delivered->pixels, delivered->received);
       }
       if (truth_range) {
-        writeRange(renderer->renderRange(cameras.view(camera, stamp - start), world_from_vehicle),
+        writeRange(renderer->renderRange(cameras.view(camera, stamp - start), world_from_vehicle,
+                                         scene_times_s[frame]),
                    truth.path() + "/range/" + cameras.name(plug), stamp);
       }
     }

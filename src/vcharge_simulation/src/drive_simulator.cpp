@@ -37,10 +37,11 @@ std::vector<RigidTransform> exposurePoses(const VehicleMotion& motion, int middl
 
 SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& motion_options,
                              const WheelOdometerOptions& odometer_options, uint64_t road_seed,
-                             uint64_t wheel_seed, const FaultOptions& faults) {
+                             uint64_t wheel_seed, const FaultOptions& faults,
+                             const GroundHeight& ground_height) {
   VehicleMotionOptions faulty_motion = motion_options;
   faulty_motion.pitch_rad_per_m_per_s2 *= faults.soft_suspension.pitch_factor;
-  const VehicleMotion motion(path, faulty_motion, road_seed);
+  const VehicleMotion motion(path, faulty_motion, road_seed, ground_height);
   const WheelOdometer odometer(motion, odometer_options, wheel_seed + 1, faults);
   const int duration_ms = static_cast<int>(std::floor(motion.duration() * 1000.0 + 0.5));
   SimulatedDrive drive;

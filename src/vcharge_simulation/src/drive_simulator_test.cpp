@@ -106,5 +106,71 @@ TEST(DriveSimulatorTest, LoopEndsNearItsStart) {
             1.0);
 }
 
+TEST(DriveSimulatorTest, BackwardsDriveReturnsToItsStart) {
+  const DrivePath path(RigidTransform::planar(1.0, 2.0, 0.5),
+                       {{5.0, 0.1, 0.1}, {5.0, 0.0, 0.0}, {5.0, 0.0, 0.0, true}, {5.0, 0.1, 0.1, true}});
+  VehicleMotionOptions options;
+  options.standstill_s = 0.5;
+  options.stop_at_end = true;
+  options.cruise_speed_m_per_s = 1.5;
+  const VehicleMotion motion(path, options, 1);
+  const MotionSample& end = motion.at(static_cast<int>(motion.duration() * 1000.0));
+  // It stops a little before each of its two ends.
+  EXPECT_LT((end.world_from_planar.translation() - path.worldFromStart().translation()).norm(), 0.7);
+  EXPECT_NEAR(yawOfRotation(end.world_from_planar.rotation()), 0.5, 0.1);
+  EXPECT_NEAR(end.left_wheel_m, 0.0, 0.7);
+  double slowest = 0.0;
+  double farthest_m = 0.0;
+  for (const MotionSample& sample : motion.samples()) {
+    slowest = std::min(slowest, sample.speed_m_per_s);
+    farthest_m = std::max(farthest_m, sample.left_wheel_m);
+  }
+  EXPECT_LT(slowest, -1.0);
+  EXPECT_GT(farthest_m, 8.5);
+}
+
+TEST(DriveSimulatorTest, StandsAtEachStopAsLongAsItShould) {
+  DrivePath path(RigidTransform(), {{20.0, 0.0, 0.0}});
+  path.addStop({6.0, 2.0});
+  path.addStop({12.0, 1.0});
+  VehicleMotionOptions options;
+  options.standstill_s = 0.5;
+  const VehicleMotion motion(path, options, 1);
+  int standing_ms = 0;
+  for (int ms = 1000; ms < static_cast<int>(motion.duration() * 1000.0); ++ms) {
+    standing_ms += motion.at(ms).speed_m_per_s == 0.0 ? 1 : 0;
+  }
+  EXPECT_NEAR(standing_ms, 3000, 5);
+}
+
+TEST(DriveSimulatorTest, CarStandsOnSlopingGroundAndItsWheelsCountTheWayOnIt) {
+  constexpr double kRise = 0.1;
+  const DrivePath path(RigidTransform::planar(3.0, -2.0, 0.0), {{30.0, 0.0, 0.0}});
+  VehicleMotionOptions options;
+  options.pitch_rad_per_m_per_s2 = options.road_noise_rad = options.road_heave_m = 0.0;
+  const VehicleMotion motion(path, options, 1, [](double x, double) { return kRise * x; });
+  const MotionSample& start = motion.at(0);
+  const MotionSample& end = motion.at(5000);
+  const RigidTransform world_from_vehicle = end.worldFromVehicle();
+  EXPECT_NEAR(world_from_vehicle.translation().z(), kRise * world_from_vehicle.translation().x(), 1e-9);
+  const Eigen::Vector3d forwards = world_from_vehicle.rotation() * Eigen::Vector3d::UnitX();
+  EXPECT_NEAR(forwards.z() / forwards.x(), kRise, 1e-9);
+  const double driven_m = (world_from_vehicle.translation() - start.worldFromVehicle().translation()).norm();
+  EXPECT_GT(driven_m, 8.0);
+  EXPECT_NEAR(end.left_wheel_m - start.left_wheel_m, driven_m, 1e-6);
+  // Its speed is along the slope.
+  EXPECT_NEAR((motion.at(5001).worldFromVehicle().translation() - world_from_vehicle.translation()).norm(),
+              1e-3 * end.speed_m_per_s, 1e-6);
+}
+
+TEST(DriveSimulatorTest, CarRollsOnGroundThatFallsToItsRight) {
+  const DrivePath path(RigidTransform(), {{30.0, 0.0, 0.0}});
+  VehicleMotionOptions options;
+  options.road_noise_rad = 0.0;
+  const VehicleMotion motion(path, options, 1, [](double, double y) { return 0.05 * y; });
+  const Eigen::Vector3d left = motion.at(2000).worldFromVehicle().rotation() * Eigen::Vector3d::UnitY();
+  EXPECT_NEAR(left.z() / left.y(), 0.05, 1e-9);
+}
+
 }  // namespace
 }  // namespace vcharge

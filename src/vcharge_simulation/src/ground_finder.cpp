@@ -19,9 +19,9 @@ constexpr float kPlaneTolerance_m = 0.001F;
 
 }  // namespace
 
-GroundFinder::GroundFinder(const RayTracer& tracer, const SurfaceShader& shader, const CameraView& view,
+GroundFinder::GroundFinder(const SceneInstant& instant, const SurfaceShader& shader, const CameraView& view,
                            const Eigen::Matrix3f& world_from_camera, const Eigen::Vector3f& origin)
-    : tracer_(tracer), shader_(shader), view_(view), rotation_(world_from_camera), origin_(origin) {
+    : instant_(instant), shader_(shader), view_(view), rotation_(world_from_camera), origin_(origin) {
   const size_t num_blocks = static_cast<size_t>(view.blocksPerRow()) * static_cast<size_t>(view.blockRows());
   probes_.resize(num_blocks);
   planes_.resize(num_blocks);
@@ -59,10 +59,7 @@ void GroundFinder::probeRow(int block_y) {
       // Only blocks that lie wholly in the field of view and show nothing of the own car.
       active[i] = inside && view_.blockPixels(block) == 0xF && view_.blockBodyMask(block) == 0 ? -1 : 0;
     }
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-    rtcIntersect16(active, tracer_.scene(), &context, &rays);
+    instant_.intersect(active, &rays);
     for (int i = 0; i < kPacket && start + i < blocks; ++i) {
       const size_t block = first + static_cast<size_t>(start + i);
       probes_[block].material = kNoGround;

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "ray_tracer.h"
+#include "scene_instant.h"
 #include "surface_shader.h"
 #include "vcharge_simulation/camera_view.h"
 
@@ -15,7 +15,7 @@ namespace vcharge {
 /// distance between two blocks; so blocks whose rays land more than kMaxSpacing_m apart are never plain.
 class GroundFinder {
  public:
-  GroundFinder(const RayTracer& tracer, const SurfaceShader& shader, const CameraView& view,
+  GroundFinder(const SceneInstant& instant, const SurfaceShader& shader, const CameraView& view,
                const Eigen::Matrix3f& world_from_camera, const Eigen::Vector3f& origin);
 
   static constexpr float kMaxSpacing_m = 0.03F;
@@ -37,7 +37,7 @@ class GroundFinder {
   void probeRow(int block_y);
   void findPlainRow(int block_y);
 
-  const RayTracer& tracer_;
+  const SceneInstant& instant_;
   const SurfaceShader& shader_;
   const CameraView& view_;
   const Eigen::Matrix3f rotation_;

@@ -21,20 +21,26 @@ constexpr double kSamePose_m = 1e-9;
 class RenderedImages : public ImageSource {
  public:
   RenderedImages(const Renderer& renderer, const RecordedCameras& cameras, const CameraResponse& response,
-                 const SimulatedDrive& drive, const MotionBlurFault& blur)
-      : renderer_(renderer), cameras_(cameras), response_(response), drive_(drive), blur_(blur) {}
+                 const SimulatedDrive& drive, const std::vector<double>& scene_times_s,
+                 const MotionBlurFault& blur)
+      : renderer_(renderer),
+        cameras_(cameras),
+        response_(response),
+        drive_(drive),
+        scene_times_s_(scene_times_s),
+        blur_(blur) {}
 
   cv::Mat image(size_t camera, size_t frame) override {
     const StampedTransform& pose = drive_.world_from_vehicle[frame];
     const Duration since_start = pose.stamp - drive_.ground_truth.front().stamp;
     const CameraView& view = cameras_.view(camera, since_start);
     if (!blur_.actsOn(cameras_.name(camera), since_start)) {
-      return response_.develop(renderer_.renderLight(view, pose.world_from_vehicle));
+      return response_.develop(renderer_.renderLight(view, pose.world_from_vehicle, scene_times_s_[frame]));
     }
     const std::vector<RigidTransform>& exposure = drive_.exposure_poses[frame];
     cv::Mat light = cv::Mat::zeros(view.size(), CV_32FC1);
     for (const RigidTransform& world_from_vehicle : exposure) {
-      light += renderer_.renderLight(view, world_from_vehicle);
+      light += renderer_.renderLight(view, world_from_vehicle, scene_times_s_[frame]);
     }
     return response_.develop(light / static_cast<double>(exposure.size()));
   }
@@ -44,6 +50,7 @@ class RenderedImages : public ImageSource {
   const RecordedCameras& cameras_;
   const CameraResponse& response_;
   const SimulatedDrive& drive_;
+  const std::vector<double>& scene_times_s_;
   const MotionBlurFault blur_;
 };
 
@@ -115,8 +122,9 @@ class RecordedImages : public ImageSource {
 
 std::unique_ptr<ImageSource> renderImages(const Renderer& renderer, const RecordedCameras& cameras,
                                           const CameraResponse& response, const SimulatedDrive& drive,
+                                          const std::vector<double>& scene_times_s,
                                           const MotionBlurFault& blur) {
-  return std::make_unique<RenderedImages>(renderer, cameras, response, drive, blur);
+  return std::make_unique<RenderedImages>(renderer, cameras, response, drive, scene_times_s, blur);
 }
 
 std::unique_ptr<ImageSource> readImages(const std::string& bag, const CameraRig& rig,

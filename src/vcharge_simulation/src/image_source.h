@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "vcharge_simulation/camera_response.h"
 #include "vcharge_simulation/drive_simulator.h"
@@ -17,9 +18,11 @@ class ImageSource {
   virtual cv::Mat image(size_t camera, size_t frame) = 0;
 };
 
-/// Renders the images; the arguments must outlive the source.
+/// Renders the images; the arguments must outlive the source. Things that move stand still during an
+/// exposure. `scene_times_s`: one per frame.
 std::unique_ptr<ImageSource> renderImages(const Renderer& renderer, const RecordedCameras& cameras,
                                           const CameraResponse& response, const SimulatedDrive& drive,
+                                          const std::vector<double>& scene_times_s,
                                           const MotionBlurFault& blur);
 
 /// Takes the images of a bag; the arguments must outlive the source. InputError, also while reading, for a

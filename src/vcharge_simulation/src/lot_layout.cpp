@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "vcharge_simulation/car_model.h"
 #include "vcharge_simulation/noise.h"
 
 namespace vcharge {
@@ -134,43 +133,6 @@ void addStreetFurniture(Random* random, LotLayout* layout) {
   }
 }
 
-ParkedCar parkedCar(const LotLayout::Bay& bay, Random* random) {
-  ParkedCar car{};
-  car.shape = random->index(static_cast<int>(carShapes().size()));
-  car.paint = random->index(5);
-  car.seed = static_cast<uint32_t>(random->bits());
-  car.yaw_rad = bay.yaw_rad + random->normal() * 0.02 + (random->chance(0.5) ? 2.0 * kHalfPi : 0.0);
-  const CarShape& shape = carShapes()[static_cast<size_t>(car.shape)];
-  // The bay's centre is the car's centre, not its rear axle.
-  const double middle = 0.5 * (shape.front() + shape.rear());
-  const double along = random->normal() * 0.12;
-  const double across = random->normal() * 0.1;
-  const double c = std::cos(car.yaw_rad);
-  const double s = std::sin(car.yaw_rad);
-  car.x = bay.x - c * (middle + along) - s * across;
-  car.y = bay.y - s * (middle + along) + c * across;
-  return car;
-}
-
-// Each bay has its own generator, so that another day changes only the bays that are meant to change.
-void parkCars(uint64_t seed, int day, double moved_cars, LotLayout* layout) {
-  for (const LotLayout::Bay& bay : layout->bays) {
-    const uint64_t bay_seed = seed * 1000003U + static_cast<uint64_t>(bay.number);
-    Random random(bay_seed);
-    bool occupied = random.chance(kOccupiedBays);
-    if (day != 0) {
-      Random other_day(bay_seed * 31U + static_cast<uint64_t>(day));
-      if (other_day.chance(moved_cars)) {
-        occupied = other_day.chance(kOccupiedBays);
-        random = other_day;
-      }
-    }
-    if (occupied) {
-      layout->cars.push_back(parkedCar(bay, &random));
-    }
-  }
-}
-
 }  // namespace
 
 double LotLayout::groundHeight(double x, double y) const {
@@ -191,7 +153,7 @@ LotLayout makeLotLayout(uint64_t seed, int day, double moved_cars) {
   addWoods(seed, &layout);
   addHouses(&layout);
   addStreetFurniture(&random, &layout);
-  parkCars(seed, day, moved_cars, &layout);
+  layout.cars = parkCars(layout.bays, kOccupiedBays, seed, day, moved_cars);
   return layout;
 }
 

@@ -5,16 +5,14 @@
 
 #include <Eigen/Core>
 
+#include "parking_bays.h"
 #include "scene_things.h"
 
 namespace vcharge {
 
 /// Where everything stands on the lot. The lanes run along y = -15, 0 and 15 and x = -26 and 26.
 struct LotLayout {
-  struct Bay {
-    double x, y, yaw_rad;  ///< centre; cars point along yaw or against it
-    int number;
-  };
+  using Bay = ParkingBay;
 
   std::vector<GroundRectangle> islands;  ///< raised by kKerbHeight_m
   std::vector<Bay> bays;
@@ -30,7 +28,6 @@ struct LotLayout {
   double groundHeight(double x, double y) const;
 };
 
-inline constexpr double kBayWidth_m = 2.6;
 inline constexpr double kBayLength_m = 4.3;
 
 LotLayout makeLotLayout(uint64_t seed, int day, double moved_cars);

@@ -1,8 +1,11 @@
 #include "vcharge_simulation/lot_scene.h"
 
+#include <algorithm>
+
 #include "light_baker.h"
 #include "lot_ground.h"
 #include "lot_layout.h"
+#include "lot_variant.h"
 #include "scene_parts.h"
 #include "vcharge_core/options.h"
 
@@ -30,9 +33,10 @@ LightOptions lightOfDay(int day) {
 // Builds one lot; each step adds to the scene.
 class LotBuilder {
  public:
-  explicit LotBuilder(const LotOptions& options)
+  LotBuilder(const LotOptions& options, const LotVariant& variant)
       : options_(options),
-        layout_(makeLotLayout(options.seed, options.day, options.moved_cars)),
+        variant_(variant),
+        layout_(variant.layout),
         parts_(options.seed * 77U + 1U, options.foliage_density) {}
 
   std::shared_ptr<const Scene> build() {
@@ -45,7 +49,7 @@ class LotBuilder {
     parts_.addBushes(layout_.bushes);
     parts_.addHedges(layout_.hedges);
     for (const GroundRectangle& island : layout_.islands) {
-      parts_.addGrassAlong(island);
+      parts_.addGrassAlong(island, levelOf(island));
     }
     parts_.addHouses(layout_.buildings);
     parts_.addPoles(layout_.poles);
@@ -54,15 +58,28 @@ class LotBuilder {
       parts_.addFence(fence);
     }
     parts_.addSkyline();
+    if (variant_.add_things) {
+      variant_.add_things(&parts_);
+    }
+    scene().ground_height = variant_.ground_height;
     bakeWallLight(parts_.walls(), kWallLightTexel_m, &scene());
     bakeGroundLight(
         {-44.0, -34.0}, {44.0, 34.0}, options_.light_texel_m,
-        [&](double x, double y) { return layout_.groundHeight(x, y); }, &scene());
+        [&](double x, double y) {
+          return layout_.groundHeight(x, y) + (variant_.ground_height ? variant_.ground_height(x, y) : 0.0);
+        },
+        &scene());
     return parts_.sharedScene();
   }
 
  private:
   Scene& scene() { return parts_.scene(); }
+
+  double levelOf(const GroundRectangle& island) const {
+    return variant_.ground_height ? variant_.ground_height(0.5 * (island.min_x + island.max_x),
+                                                           0.5 * (island.min_y + island.max_y))
+                                  : 0.0;
+  }
 
   void addGround() {
     Material ground;
@@ -86,19 +103,24 @@ class LotBuilder {
           {Texture(drawGroundDetail(1024, options_.seed + 40), Texture::Border::kRepeat), 0.0F, 0.0F,
            static_cast<float>(1.0 / (kDetailTexel_m * stretch))});
     }
-    parts_.addLevel(kLotArea, 0.0, near_ground);
+    if (variant_.add_ground) {
+      variant_.add_ground(near_ground, &parts_);
+    } else {
+      parts_.addLevel(kLotArea, 0.0, near_ground);
+    }
     const double far = 0.5 * kFarGround_m;
     parts_.addLevel({-far, kLotArea.max_y, far, far}, 0.0, far_ground);
     parts_.addLevel({-far, -far, far, kLotArea.min_y}, 0.0, far_ground);
     parts_.addLevel({-far, kLotArea.min_y, kLotArea.min_x, kLotArea.max_y}, 0.0, far_ground);
     parts_.addLevel({kLotArea.max_x, kLotArea.min_y, far, kLotArea.max_y}, 0.0, far_ground);
     for (const GroundRectangle& island : layout_.islands) {
-      parts_.addIsland(island, near_ground);
+      parts_.addIsland(island, near_ground, levelOf(island));
     }
   }
 
   const LotOptions options_;
-  const LotLayout layout_;
+  const LotVariant& variant_;
+  const LotLayout& layout_;
   SceneParts parts_;
 };
 
@@ -114,9 +136,27 @@ void LotOptions::validate() const {
                foliage_density);
 }
 
+std::shared_ptr<const Scene> buildLotVariant(const LotOptions& options, const LotVariant& variant) {
+  options.validate();
+  return LotBuilder(options, variant).build();
+}
+
 std::shared_ptr<const Scene> buildLotScene(const LotOptions& options) {
   options.validate();
-  return LotBuilder(options).build();
+  LotVariant lot;
+  lot.layout = makeLotLayout(options.seed, options.day, options.moved_cars);
+  return buildLotVariant(options, lot);
+}
+
+LotOptions lotOptionsOf(const SceneOptions& options) {
+  LotOptions lot;
+  lot.seed = static_cast<uint64_t>(options.seed);
+  lot.day = options.day;
+  lot.moved_cars = options.moved_cars;
+  lot.ground_texel_m = std::min(0.5, lot.ground_texel_m / options.image_scale);
+  lot.light_texel_m /= options.detail;
+  lot.foliage_density *= options.detail;
+  return lot;
 }
 
 }  // namespace vcharge

@@ -5,7 +5,7 @@
 
 namespace vcharge {
 
-RayTracer::RayTracer(const TriangleMesh& mesh) {
+RayTracer::RayTracer(const TriangleMesh& mesh, unsigned geometry_id) {
   // One build thread: the hierarchy, and so which of two coincident surfaces is hit, must not depend on the
   // machine.
   device_ = rtcNewDevice("threads=1,set_affinity=0");
@@ -21,7 +21,7 @@ RayTracer::RayTracer(const TriangleMesh& mesh) {
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, mesh.triangles.data(), 0,
                              sizeof(MeshTriangle), mesh.triangles.size());
   rtcCommitGeometry(geometry);
-  rtcAttachGeometry(scene_, geometry);
+  rtcAttachGeometryByID(scene_, geometry, geometry_id);
   rtcReleaseGeometry(geometry);
   rtcCommitScene(scene_);
   if (rtcGetDeviceError(device_) != RTC_ERROR_NONE) {

@@ -11,7 +11,8 @@ namespace vcharge {
 /// Embree's acceleration structure over one mesh, which must outlive it. Queries are thread safe.
 class RayTracer {
  public:
-  explicit RayTracer(const TriangleMesh& mesh);
+  /// geometry_id: what Embree's hits name the mesh.
+  explicit RayTracer(const TriangleMesh& mesh, unsigned geometry_id = 0);
   ~RayTracer();
   RayTracer(const RayTracer&) = delete;
   RayTracer& operator=(const RayTracer&) = delete;

@@ -10,6 +10,7 @@
 
 #include "ground_finder.h"
 #include "ray_tracer.h"
+#include "scene_instant.h"
 #include "surface_shader.h"
 
 namespace vcharge {
@@ -25,18 +26,19 @@ constexpr float kShadowOffset_m = 0.01F;
 // Renders the blocks of one image. Everything that does not change from block to block lives here.
 class BlockRenderer {
  public:
-  BlockRenderer(const Scene& scene, const RayTracer& tracer, const CameraView& view,
+  BlockRenderer(const Scene& scene, const SceneInstant& instant, const CameraView& view,
                 const RigidTransform& world_from_vehicle)
-      : tracer_(tracer),
-        shader_(scene),
+      : instant_(instant),
+        shader_(scene, instant.moving()),
         view_(view),
         sun_(scene.sky->directionToSun()),
+        has_sun_(scene.sky->light().sun_irradiance > 0.0),
         vehicle_rotation_(world_from_vehicle.rotationMatrix().cast<float>()),
         vehicle_origin_(world_from_vehicle.translation().cast<float>()),
         sun_in_vehicle_(vehicle_rotation_.transpose() * sun_),
         rotation_((world_from_vehicle * *view.camera().vehicle_from_camera).rotationMatrix().cast<float>()),
         origin_((world_from_vehicle * *view.camera().vehicle_from_camera).translation().cast<float>()),
-        ground_(tracer, shader_, view, rotation_, origin_) {}
+        ground_(instant, shader_, view, rotation_, origin_) {}
 
   void render(int block_x, int block_y, cv::Mat* light) const {
     const size_t block = static_cast<size_t>(block_y) * view_.blocksPerRow() + block_x;
@@ -136,7 +138,7 @@ class BlockRenderer {
         positions[static_cast<size_t>(s)] = origin_ + along * (rotation_ * ray);
         middle += 0.25F * positions[static_cast<size_t>(s)];
       }
-      const float sun_visibility = shadowedByBody(middle) ? 0.0F : 1.0F;
+      const float sun_visibility = isShadowed(middle) ? 0.0F : 1.0F;
       light->at<float>(y, x) = shader_.shadeGroundPixel(material, positions, (middle - origin_) / range_m,
                                                         range_m * view_.pixelAngle(x, y), sun_visibility) *
                                view_.vignette().at<float>(y, x);
@@ -165,15 +167,15 @@ class BlockRenderer {
       rays->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
       active[i] = (pixels >> (i / 4) & 1) != 0 && (body_mask >> i & 1U) == 0 ? -1 : 0;
     }
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-    rtcIntersect16(active, tracer_.scene(), &context, rays);
+    instant_.intersect(active, rays);
   }
 
   // One shadow ray for each pixel, from its first sample that needs one.
   void traceShadows(const RTCRayHit16& rays, uint8_t pixels, uint32_t body_mask,
                     std::array<float, 4>* sun_visibility) const {
+    if (!has_sun_) {
+      return;
+    }
     alignas(16) int active[4] = {0, 0, 0, 0};
     RTCRay4 shadow = {};
     bool any = false;
@@ -185,7 +187,7 @@ class BlockRenderer {
         }
         const Eigen::Vector3f position = origin_ + rays.ray.tfar[i] * direction(rays, i);
         const Material& material = shader_.materialOf(rays.hit.primID[i]);
-        if (shadowedByBody(position)) {
+        if (isShadowed(position)) {
           (*sun_visibility)[static_cast<size_t>(p)] = 0.0F;
           break;
         }
@@ -216,10 +218,7 @@ class BlockRenderer {
     if (!any) {
       return;
     }
-    RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-    rtcOccluded4(active, tracer_.scene(), &context, &shadow);
+    instant_.findOccluded(active, &shadow);
     for (int p = 0; p < 4; ++p) {
       if (active[p] != 0 && shadow.tfar[p] < 0.0F) {
         (*sun_visibility)[static_cast<size_t>(p)] = 0.0F;
@@ -227,7 +226,12 @@ class BlockRenderer {
     }
   }
 
-  bool shadowedByBody(const Eigen::Vector3f& position) const {
+  // By what no light map knows: the own car and movers.
+  bool isShadowed(const Eigen::Vector3f& position) const {
+    return has_sun_ && (isShadowedByBody(position) || instant_.isShadowedByMover(position, sun_));
+  }
+
+  bool isShadowedByBody(const Eigen::Vector3f& position) const {
     if (view_.body() == nullptr) {
       return false;
     }
@@ -248,10 +252,11 @@ class BlockRenderer {
                               vehicle_rotation_ * sample.normal, ray);
   }
 
-  const RayTracer& tracer_;
+  const SceneInstant& instant_;
   const SurfaceShader shader_;
   const CameraView& view_;
   const Eigen::Vector3f sun_;
+  const bool has_sun_;
   const Eigen::Matrix3f vehicle_rotation_;
   const Eigen::Vector3f vehicle_origin_, sun_in_vehicle_;
   const Eigen::Matrix3f rotation_;  // of the camera
@@ -266,9 +271,11 @@ Renderer::Renderer(std::shared_ptr<const Scene> scene)
 
 Renderer::~Renderer() = default;
 
-cv::Mat Renderer::renderLight(const CameraView& view, const RigidTransform& world_from_vehicle) const {
+cv::Mat Renderer::renderLight(const CameraView& view, const RigidTransform& world_from_vehicle,
+                              double time_s) const {
   cv::Mat light = cv::Mat::zeros(view.size(), CV_32FC1);
-  const BlockRenderer renderer(*scene_, *tracer_, view, world_from_vehicle);
+  const SceneInstant instant(*scene_, *tracer_, time_s);
+  const BlockRenderer renderer(*scene_, instant, view, world_from_vehicle);
   tbb::parallel_for(0, view.blockRows(), [&](int block_y) {
     for (int block_x = 0; block_x < view.blocksPerRow(); ++block_x) {
       renderer.render(block_x, block_y, &light);
@@ -279,7 +286,9 @@ cv::Mat Renderer::renderLight(const CameraView& view, const RigidTransform& worl
   return light;
 }
 
-cv::Mat Renderer::renderRange(const CameraView& view, const RigidTransform& world_from_vehicle) const {
+cv::Mat Renderer::renderRange(const CameraView& view, const RigidTransform& world_from_vehicle,
+                              double time_s) const {
+  const SceneInstant instant(*scene_, *tracer_, time_s);
   const RigidTransform world_from_camera = world_from_vehicle * *view.camera().vehicle_from_camera;
   const Eigen::Matrix3f rotation = world_from_camera.rotationMatrix().cast<float>();
   const Eigen::Vector3f origin = world_from_camera.translation().cast<float>();
@@ -291,7 +300,7 @@ cv::Mat Renderer::renderRange(const CameraView& view, const RigidTransform& worl
     for (int x = 0; x < view.size().width; ++x) {
       const Eigen::Vector3f ray = view.centreRay(x, y);
       RayTracer::Hit hit;
-      if (ray.isZero() || !tracer_->cast(origin, rotation * ray, &hit)) {
+      if (ray.isZero() || !instant.cast(origin, rotation * ray, &hit)) {
         continue;
       }
       RayTracer::Hit body_hit;

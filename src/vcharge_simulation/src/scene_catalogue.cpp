@@ -4,6 +4,11 @@
 #include <functional>
 #include <stdexcept>
 
+#include "board_scene.h"
+#include "course_scene.h"
+#include "garage_scene.h"
+#include "lot_variant.h"
+#include "two_levels_scene.h"
 #include "vcharge_core/options.h"
 #include "vcharge_simulation/lot_scene.h"
 
@@ -19,17 +24,28 @@ struct CatalogueScene {
 };
 
 std::shared_ptr<const Scene> buildLot(const SceneOptions& options) {
-  LotOptions lot;
-  lot.seed = static_cast<uint64_t>(options.seed);
-  lot.day = options.day;
-  lot.moved_cars = options.moved_cars;
-  lot.ground_texel_m = std::min(0.5, lot.ground_texel_m / options.image_scale);
-  return buildLotScene(lot);
+  return buildLotScene(lotOptionsOf(options));
 }
 
 const std::vector<CatalogueScene>& catalogue() {
   static const std::vector<CatalogueScene> scenes = {
-      {{"lot", "parking lot of 80 x 60 m in the sun"}, buildLot, listLotDrives, planLotDrive}};
+      {{"lot", "parking lot of 80 x 60 m in the sun"}, buildLot, listLotDrives, planLotDrive},
+      {{"garage", "underground garage of 64 x 47 m, lit by lamps"},
+       buildGarageScene,
+       listGarageDrives,
+       planGarageDrive},
+      {{"obstacles", "course of posts, boxes, kerbs, a trailer and people on the lot"},
+       buildCourseScene,
+       listCourseDrives,
+       planCourseDrive},
+      {{"two_levels", "lot on two levels with ramps of 6 degrees and uneven ground"},
+       buildTwoLevelsScene,
+       listTwoLevelsDrives,
+       planTwoLevelsDrive},
+      {{"chessboard", "chessboard held before each camera in turn, on the lot"},
+       buildBoardScene,
+       listBoardDrives,
+       planBoardDrive}};
   return scenes;
 }
 
@@ -56,6 +72,7 @@ void SceneOptions::validate() const {
   requireField(seed >= 0, "seed", "must not be negative", seed);
   requireField(day >= 0, "day", "must not be negative", day);
   requireField(moved_cars >= 0.0 && moved_cars <= 1.0, "moved_cars", "must be in [0, 1]", moved_cars);
+  requireField(detail >= 0.1 && detail <= 1.0, "detail", "must be in [0.1, 1]", detail);
   requireField(image_scale >= 0.05 && image_scale <= 1.0, "image_scale", "must be in [0.05, 1]", image_scale);
 }
 

@@ -104,8 +104,8 @@ void SceneParts::addLevel(const GroundRectangle& area, double z, uint32_t materi
           corner(area.min_x, area.max_y), material, &scene_->mesh);
 }
 
-void SceneParts::addIsland(const GroundRectangle& area, uint32_t ground) {
-  addLevel(area, kKerbHeight_m, ground);
+void SceneParts::addIsland(const GroundRectangle& area, uint32_t ground, double base_z_m) {
+  addLevel(area, base_z_m + kKerbHeight_m, ground);
   constexpr double kStone_m = 1.0;
   constexpr double kKerbWidth_m = 0.14;
   const std::vector<Eigen::Vector2d> outline = cornersOf(area);
@@ -118,7 +118,8 @@ void SceneParts::addIsland(const GroundRectangle& area, uint32_t ground) {
     for (int k = 0; k < stones; ++k) {
       const Eigen::Vector2d middle = from + edge * ((k + 0.5) / stones);
       const Eigen::Isometry3f pose =
-          placement(middle.x(), middle.y(), 0.5 * kKerbHeight_m + random_.uniform(-0.004, 0.004), yaw) *
+          placement(middle.x(), middle.y(), base_z_m + (0.5 * kKerbHeight_m + random_.uniform(-0.004, 0.004)),
+                    yaw) *
           placement(0.0, 0.5 * kKerbWidth_m, 0.0, 0.0);
       const size_t first = scene_->mesh.vertices.size();
       addBox(pose, Eigen::Vector3d(length - 0.01, kKerbWidth_m, kKerbHeight_m + 0.012).cast<float>(),
@@ -130,7 +131,7 @@ void SceneParts::addIsland(const GroundRectangle& area, uint32_t ground) {
       }
     }
   }
-  scene_->obstacles.push_back({"kerb", cornersOf(area), 0.0, kKerbHeight_m});
+  scene_->obstacles.push_back({"kerb", cornersOf(area), base_z_m, base_z_m + kKerbHeight_m});
 }
 
 const CarMaterials& SceneParts::carMaterials(int shape_index, int paint_index) {
@@ -224,7 +225,7 @@ void SceneParts::addHedges(const std::vector<Hedge>& hedges) {
   }
 }
 
-void SceneParts::addGrassAlong(const GroundRectangle& area) {
+void SceneParts::addGrassAlong(const GroundRectangle& area, double base_z_m) {
   const double perimeter = 2.0 * (area.width() + area.depth());
   const int tufts = static_cast<int>(foliage_density_ * perimeter * 0.9);
   for (int i = 0; i < tufts; ++i) {
@@ -234,8 +235,8 @@ void SceneParts::addGrassAlong(const GroundRectangle& area) {
     double y = random_.uniform(area.min_y + 0.2, area.max_y - 0.2);
     (along_x ? y : x) = random_.chance(0.5) ? (along_x ? area.min_y : area.min_x) + inset
                                             : (along_x ? area.max_y : area.max_x) - inset;
-    addGrassTuft(Eigen::Vector3d(x, y, kKerbHeight_m).cast<float>(), random_.uniform(0.08, 0.25), 24,
-                 plants_.leaves, random_.bits(), &scene_->mesh);
+    addGrassTuft(Eigen::Vector3d(x, y, base_z_m + kKerbHeight_m).cast<float>(), random_.uniform(0.08, 0.25),
+                 24, plants_.leaves, random_.bits(), &scene_->mesh);
   }
 }
 

@@ -43,13 +43,13 @@ class SceneParts {
 
   void addLevel(const GroundRectangle& area, double z, uint32_t material);
   /// A raised area with a kerb of stones around it.
-  void addIsland(const GroundRectangle& area, uint32_t ground);
+  void addIsland(const GroundRectangle& area, uint32_t ground, double base_z_m = 0.0);
   void addCars(const std::vector<ParkedCar>& cars);
   void addTrees(const std::vector<Tree>& trees, uint64_t seed);
   void addBushes(const std::vector<Bush>& bushes);
   void addHedges(const std::vector<Hedge>& hedges);
   /// Tufts of grass along the edge of a raised area.
-  void addGrassAlong(const GroundRectangle& area);
+  void addGrassAlong(const GroundRectangle& area, double base_z_m = 0.0);
   void addHouses(const std::vector<Building>& houses);
   void addPoles(const std::vector<Pole>& poles);
   void addBins(const std::vector<Bin>& bins);

@@ -14,6 +14,9 @@ constexpr float kMaxDetailLevel = 4.0F;
 // Reflections see trees and houses, not sky, below this elevation (its sine).
 constexpr float kSkylineSine = 0.22F;
 constexpr float kSkylineLight = 0.10F;
+// Of rough polish: what flat rays reflect more than steep ones.
+constexpr float kGrazingGloss = 4.0F;
+constexpr float kFlattestCeilingRay = 0.12F;  // its sine
 
 // Length over width of what a round cone of rays covers on level ground.
 float stretchOf(const Eigen::Vector3f& direction) {
@@ -50,6 +53,8 @@ float SurfaceShader::groundLight(const Eigen::Vector3f& position, float width_m,
   if (scene_.ground.sun != nullptr) {
     const float level = fastLog2(width_m * scene_.ground.sun->texels_per_m);
     sun_visibility *= scene_.ground.sun->sampleAt(position.x(), position.y(), level);
+  }
+  if (scene_.ground.surrounding != nullptr) {
     surrounding = scene_.ground.surrounding->sampleAt(position.x(), position.y(), 0.0F);
   }
   return static_cast<float>(sky_.light().sun_irradiance) * sky_.directionToSun().z() * sun_visibility +
@@ -78,7 +83,19 @@ float SurfaceShader::shadeGroundPixel(const Material& material,
       0.5F * (detailFactor(tall ? upper : left, width_m) + detailFactor(tall ? lower : right, width_m));
   const Eigen::Vector3f middle = 0.5F * (upper + lower);
   return kGroundLayerAlbedo * albedo * detail *
-         groundLight(middle, footprint_m * std::sqrt(stretch), sun_visibility);
+             groundLight(middle, footprint_m * std::sqrt(stretch), sun_visibility) +
+         groundReflection(material, middle, direction);
+}
+
+float SurfaceShader::groundReflection(const Material& material, const Eigen::Vector3f& position,
+                                      const Eigen::Vector3f& direction) const {
+  if (material.reflectivity <= 0.0F) {
+    return 0.0F;
+  }
+  // A rough polish mirrors flat rays better than steep ones, but by far not as well as glass.
+  const float m = 1.0F + std::min(0.0F, direction.z());
+  const float share = material.reflectivity * (1.0F + kGrazingGloss * m * m * m * m * m);
+  return share * surroundings(position, {direction.x(), direction.y(), -direction.z()});
 }
 
 float SurfaceShader::shade(const SurfacePoint& point, float sun_visibility) const {
@@ -91,7 +108,8 @@ float SurfaceShader::shade(const SurfacePoint& point, float sun_visibility) cons
         kGroundLayerAlbedo *
         texture.sampleAt(point.position.x(), point.position.y(), fastLog2(width_m * texture.texels_per_m)) *
         detailFactor(point.position, width_m);
-    return albedo * groundLight(point.position, point.footprint_m * std::sqrt(stretch), sun_visibility);
+    return albedo * groundLight(point.position, point.footprint_m * std::sqrt(stretch), sun_visibility) +
+           groundReflection(material, point.position, point.direction);
   }
   const Interpolated surface = interpolate(point);
   return lightOf(point, surface, albedoAt(point, surface), sun_visibility);
@@ -116,10 +134,11 @@ float SurfaceShader::shadePixel(const std::array<SurfacePoint, 4>& points, float
 }
 
 SurfaceShader::Interpolated SurfaceShader::interpolate(const SurfacePoint& point) const {
-  const MeshTriangle& triangle = scene_.mesh.triangles[point.triangle];
-  const MeshVertex& a = scene_.mesh.vertices[triangle.vertices[0]];
-  const MeshVertex& b = scene_.mesh.vertices[triangle.vertices[1]];
-  const MeshVertex& c = scene_.mesh.vertices[triangle.vertices[2]];
+  const MeshTriangle& triangle = triangleOf(point.triangle);
+  const std::vector<MeshVertex>& vertices = meshOf(point.triangle).vertices;
+  const MeshVertex& a = vertices[triangle.vertices[0]];
+  const MeshVertex& b = vertices[triangle.vertices[1]];
+  const MeshVertex& c = vertices[triangle.vertices[2]];
   const float wa = 1.0F - point.u - point.v;
   Interpolated surface;
   surface.normal = (wa * a.normal + point.u * b.normal + point.v * c.normal).normalized();
@@ -164,11 +183,14 @@ float SurfaceShader::lightOf(const SurfacePoint& point, const Interpolated& surf
   const float to_sun = surface.normal.dot(sky_.directionToSun());
   const float lit = std::max(to_sun, 0.0F) + material.translucency * std::max(-to_sun, 0.0F);
   sun_visibility *= sunMapAt(point, surface);
-  const float light = albedo * (sun * lit * sun_visibility + ambient(surface.normal) * surface.occlusion);
-  return material.reflectivity > 0.0F
-             ? light +
-                   surface.occlusion * reflection(material, point.position, surface.normal, point.direction)
-             : light;
+  const float light =
+      material.emission + albedo * (sun * lit * sun_visibility + ambient(surface.normal) * surface.occlusion);
+  if (material.reflectivity <= 0.0F) {
+    return light;
+  }
+  // Under a ceiling the share tells how much light there is, not how much of the surroundings is seen.
+  const float seen = scene_.ceiling != nullptr ? 1.0F : surface.occlusion;
+  return light + seen * reflection(material, point.position, surface.normal, point.direction);
 }
 
 float SurfaceShader::reflection(const Material& material, const Eigen::Vector3f& position,
@@ -180,7 +202,22 @@ float SurfaceShader::reflection(const Material& material, const Eigen::Vector3f&
   return fresnel * surroundings(position, mirrored);
 }
 
+float SurfaceShader::ceilingRadiance(const Eigen::Vector3f& position,
+                                     const Eigen::Vector3f& direction) const {
+  // Flatter rays end at a wall before they reach the ceiling.
+  const float distance =
+      (scene_.ceiling->height_m - position.z()) / std::max(direction.z(), kFlattestCeilingRay);
+  // Polish is not perfect.
+  const float level = fastLog2((0.1F + 0.06F * distance) * scene_.ceiling->radiance.texels_per_m);
+  return scene_.ceiling->scale * scene_.ceiling->radiance.sampleAt(position.x() + distance * direction.x(),
+                                                                   position.y() + distance * direction.y(),
+                                                                   level);
+}
+
 float SurfaceShader::surroundings(const Eigen::Vector3f& position, const Eigen::Vector3f& direction) const {
+  if (direction.z() > 0.0F && scene_.ceiling != nullptr) {
+    return ceilingRadiance(position, direction);
+  }
   if (direction.z() > 0.0F) {
     const float skyline = std::min(1.0F, std::max(0.0F, (direction.z() - kSkylineSine) * 12.0F));
     return kSkylineLight + skyline * (std::min(sky_.radiance(direction), 2.0F) - kSkylineLight);
@@ -195,6 +232,9 @@ float SurfaceShader::surroundings(const Eigen::Vector3f& position, const Eigen::
   const GroundTexture& texture = scene_.ground.layers.front();
   const float level = fastLog2((0.04F + 0.05F * distance) * texture.texels_per_m);
   const float albedo = kGroundLayerAlbedo * texture.sampleAt(x, y, level);
+  if (scene_.ceiling != nullptr) {
+    return albedo * groundLight({x, y, 0.0F}, 0.1F, 0.0F);
+  }
   const float sun = scene_.ground.sun == nullptr ? 1.0F : scene_.ground.sun->sampleAt(x, y, 1.0F);
   return albedo * (static_cast<float>(sky_.light().sun_irradiance) * sky_.directionToSun().z() * sun +
                    static_cast<float>(sky_.light().sky_irradiance));
@@ -203,8 +243,10 @@ float SurfaceShader::surroundings(const Eigen::Vector3f& position, const Eigen::
 float SurfaceShader::shadePlain(const Material& material, const Eigen::Vector3f& position,
                                 const Eigen::Vector3f& normal, const Eigen::Vector3f& direction) const {
   const float to_sun = std::max(0.0F, normal.dot(sky_.directionToSun()));
+  // Under a ceiling the light on the floor tells how bright the place is.
+  const float surrounding = scene_.ceiling != nullptr ? groundLight(position, 0.5F, 0.0F) : ambient(normal);
   const float diffuse =
-      material.albedo * (static_cast<float>(sky_.light().sun_irradiance) * to_sun + ambient(normal));
+      material.albedo * (static_cast<float>(sky_.light().sun_irradiance) * to_sun + surrounding);
   return material.reflectivity > 0.0F ? diffuse + reflection(material, position, normal, direction) : diffuse;
 }
 

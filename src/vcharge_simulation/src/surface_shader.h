@@ -21,12 +21,15 @@ struct SurfacePoint {
 /// Light that leaves the scene's surfaces towards the viewer.
 class SurfaceShader {
  public:
-  explicit SurfaceShader(const Scene& scene) : scene_(scene), sky_(*scene.sky) {}
+  /// `moving`: triangles that count on after those of the scene's mesh.
+  SurfaceShader(const Scene& scene, const TriangleMesh& moving)
+      : scene_(scene),
+        moving_(moving),
+        num_fixed_triangles_(static_cast<uint32_t>(scene.mesh.triangles.size())),
+        sky_(*scene.sky) {}
 
-  const Material& materialOf(uint32_t triangle) const {
-    return scene_.materials[scene_.mesh.triangles[triangle].material];
-  }
-  uint32_t materialIndexOf(uint32_t triangle) const { return scene_.mesh.triangles[triangle].material; }
+  const Material& materialOf(uint32_t triangle) const { return scene_.materials[materialIndexOf(triangle)]; }
+  uint32_t materialIndexOf(uint32_t triangle) const { return triangleOf(triangle).material; }
   /// True when the sun's visibility of this surface is baked into a light map.
   static bool hasBakedSun(const Material& material) {
     return material.mapping == Material::Mapping::kGround || material.sun_map >= 0;
@@ -54,6 +57,13 @@ class SurfaceShader {
     float u, v;              ///< texture coordinates
     float occlusion;         ///< share of the surroundings' light
   };
+  const TriangleMesh& meshOf(uint32_t triangle) const {
+    return triangle < num_fixed_triangles_ ? scene_.mesh : moving_;
+  }
+  const MeshTriangle& triangleOf(uint32_t triangle) const {
+    return triangle < num_fixed_triangles_ ? scene_.mesh.triangles[triangle]
+                                           : moving_.triangles[triangle - num_fixed_triangles_];
+  }
   Interpolated interpolate(const SurfacePoint& point) const;
   float albedoAt(const SurfacePoint& point, const Interpolated& surface) const;
   float sunMapAt(const SurfacePoint& point, const Interpolated& surface) const;
@@ -62,10 +72,15 @@ class SurfaceShader {
   float detailFactor(const Eigen::Vector3f& position, float width_m) const;
   float groundLight(const Eigen::Vector3f& position, float width_m, float sun_visibility) const;
   float ambient(const Eigen::Vector3f& normal) const;
+  float groundReflection(const Material& material, const Eigen::Vector3f& position,
+                         const Eigen::Vector3f& direction) const;
+  float ceilingRadiance(const Eigen::Vector3f& position, const Eigen::Vector3f& direction) const;
   float reflection(const Material& material, const Eigen::Vector3f& position, const Eigen::Vector3f& normal,
                    const Eigen::Vector3f& direction) const;
 
   const Scene& scene_;
+  const TriangleMesh& moving_;
+  const uint32_t num_fixed_triangles_;
   const Sky& sky_;
 };
 

@@ -1,5 +1,6 @@
 #include "vcharge_simulation/truth_maps.h"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -19,6 +20,9 @@ constexpr double kTop_m = 60.0;
 constexpr double kStep_m = 1e-3;
 
 double heightAt(const Renderer& renderer, const Eigen::Vector2d& place_m, double max_height_m) {
+  const GroundHeight& ground_height = renderer.scene().ground_height;
+  max_height_m = std::min(max_height_m, renderer.scene().overhead_m);
+  max_height_m += ground_height ? ground_height(place_m.x(), place_m.y()) : 0.0;
   double travelled_m = 0.0;
   for (;;) {
     SurfaceKind kind = SurfaceKind::kOther;
@@ -33,6 +37,18 @@ double heightAt(const Renderer& renderer, const Eigen::Vector2d& place_m, double
     }
     travelled_m = *distance_m + kStep_m;
   }
+}
+
+// Within a YAML map.
+void emitObstacle(const Obstacle& obstacle, YAML::Emitter* yaml) {
+  *yaml << YAML::Key << "kind" << YAML::Value << obstacle.kind;
+  *yaml << YAML::Key << "base_z_m" << YAML::Value << obstacle.base_z_m;
+  *yaml << YAML::Key << "top_z_m" << YAML::Value << obstacle.top_z_m;
+  *yaml << YAML::Key << "footprint_m" << YAML::Value << YAML::Flow << YAML::BeginSeq;
+  for (const Eigen::Vector2d& corner : obstacle.footprint_m) {
+    *yaml << YAML::Flow << YAML::BeginSeq << corner.x() << corner.y() << YAML::EndSeq;
+  }
+  *yaml << YAML::EndSeq;
 }
 
 }  // namespace
@@ -83,12 +99,34 @@ void writeObstacles(const std::vector<Obstacle>& obstacles, const std::string& p
   yaml << YAML::BeginMap << YAML::Key << "frame" << YAML::Value << "world";
   yaml << YAML::Key << "obstacles" << YAML::Value << YAML::BeginSeq;
   for (const Obstacle& obstacle : obstacles) {
-    yaml << YAML::BeginMap << YAML::Key << "kind" << YAML::Value << obstacle.kind;
-    yaml << YAML::Key << "base_z_m" << YAML::Value << obstacle.base_z_m;
-    yaml << YAML::Key << "top_z_m" << YAML::Value << obstacle.top_z_m;
-    yaml << YAML::Key << "footprint_m" << YAML::Value << YAML::Flow << YAML::BeginSeq;
-    for (const Eigen::Vector2d& corner : obstacle.footprint_m) {
-      yaml << YAML::Flow << YAML::BeginSeq << corner.x() << corner.y() << YAML::EndSeq;
+    yaml << YAML::BeginMap;
+    emitObstacle(obstacle, &yaml);
+    yaml << YAML::EndMap;
+  }
+  yaml << YAML::EndSeq << YAML::EndMap;
+  writeTextFileAtomically(path, std::string(yaml.c_str()) + "\n");
+}
+
+void writeMovers(const std::vector<Mover>& movers, const std::vector<Timestamp>& stamps,
+                 const std::vector<double>& times_s, const std::string& path) {
+  check(stamps.size() == times_s.size(), "writeMovers: expected a time for each stamp");
+  YAML::Emitter yaml;
+  yaml.SetDoublePrecision(12);
+  yaml << YAML::BeginMap << YAML::Key << "frame" << YAML::Value << "world";
+  yaml << YAML::Key << "images" << YAML::Value << YAML::BeginSeq;
+  for (size_t i = 0; i < stamps.size(); ++i) {
+    yaml << YAML::BeginMap << YAML::Key << "stamp_ns" << YAML::Value << stamps[i].nanoseconds();
+    yaml << YAML::Key << "movers" << YAML::Value << YAML::BeginSeq;
+    for (const Mover& mover : movers) {
+      const MoverState state = mover.stateAt(times_s[i]);
+      const Eigen::Vector3d& translation = state.world_from_mover.translation();
+      const Eigen::Quaterniond& rotation = state.world_from_mover.rotation();
+      yaml << YAML::BeginMap << YAML::Key << "name" << YAML::Value << mover.name;
+      emitObstacle(state.obstacle, &yaml);
+      yaml << YAML::Key << "translation_m" << YAML::Value << YAML::Flow << YAML::BeginSeq << translation.x()
+           << translation.y() << translation.z() << YAML::EndSeq;
+      yaml << YAML::Key << "rotation_xyzw" << YAML::Value << YAML::Flow << YAML::BeginSeq << rotation.x()
+           << rotation.y() << rotation.z() << rotation.w() << YAML::EndSeq << YAML::EndMap;
     }
     yaml << YAML::EndSeq << YAML::EndMap;
   }

@@ -26,6 +26,7 @@ struct SimulatedDrive {
 /// arguments give the same bits. std::invalid_argument for bad options.
 SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& motion_options,
                              const WheelOdometerOptions& odometer_options, uint64_t road_seed,
-                             uint64_t wheel_seed, const FaultOptions& faults = FaultOptions());
+                             uint64_t wheel_seed, const FaultOptions& faults = FaultOptions(),
+                             const GroundHeight& ground_height = nullptr);
 
 }  // namespace vcharge

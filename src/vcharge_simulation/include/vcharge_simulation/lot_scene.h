@@ -24,7 +24,7 @@ struct LotOptions {
 /// cars, trees, hedges, kerbs, posts, fences and houses around it. The same options give the same scene.
 std::shared_ptr<const Scene> buildLotScene(const LotOptions& options);
 
-/// Drives through the lot: "loop", "figure_eight", "short", "other_day", "approach".
+/// Drives through the lot: loops, short ones, and manoeuvres.
 std::vector<CatalogueEntry> listLotDrives();
 /// std::invalid_argument for a name that listLotDrives() does not have.
 DrivePlan planLotDrive(const std::string& name);

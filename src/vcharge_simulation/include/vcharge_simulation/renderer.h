@@ -23,15 +23,20 @@ class Renderer {
 
   const Scene& scene() const { return *scene_; }
 
+  /// time_s: of the scene, for its movers.
+  ///
   /// Light on the sensor (CV_32FC1, 1 is white in the sun), blurred by the lens; outside the field of view
   /// only the light that the lens scatters.
-  cv::Mat renderLight(const CameraView& view, const RigidTransform& world_from_vehicle) const;
+  cv::Mat renderLight(const CameraView& view, const RigidTransform& world_from_vehicle,
+                      double time_s = 0.0) const;
 
   /// Distance in metres along the ray through each pixel's centre (CV_32FC1): NaN where it meets nothing of
   /// the scene, meets the own car, or is outside the field of view.
-  cv::Mat renderRange(const CameraView& view, const RigidTransform& world_from_vehicle) const;
+  cv::Mat renderRange(const CameraView& view, const RigidTransform& world_from_vehicle,
+                      double time_s = 0.0) const;
 
-  /// Distance along a unit direction in the world to the first surface beyond min_distance_m.
+  /// Distance along a unit direction in the world to the first surface beyond min_distance_m; movers are not
+  /// seen.
   std::optional<double> castRay(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction,
                                 double min_distance_m = 0.0, SurfaceKind* kind = nullptr) const;
 

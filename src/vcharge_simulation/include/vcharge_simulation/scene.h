@@ -1,12 +1,16 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "vcharge_core/rigid_transform.h"
+#include "vcharge_simulation/ground_height.h"
 #include "vcharge_simulation/mesh.h"
 #include "vcharge_simulation/sky.h"
 #include "vcharge_simulation/texture.h"
@@ -26,6 +30,7 @@ struct Material {
   float sun_map_texels_per_m = 1.0F;
   float texels_per_m = 100.0F;  ///< of the texture on the surface, for the level of detail
   float reflectivity = 0.0F;    ///< at normal incidence; 0.04 for paint and glass
+  float emission = 0.0F;        ///< light that the surface sends of its own
   float translucency = 0.0F;    ///< share of the light on the back that leaves through the front
   bool two_sided = false;       ///< normals turn to the viewer
   SurfaceKind kind = SurfaceKind::kOther;
@@ -42,6 +47,13 @@ struct GroundLayers {
 /// Reflectance of a ground layer's texel value 255.
 inline constexpr float kGroundLayerAlbedo = 0.8F;
 
+/// What polished floors and car paint mirror of a closed scene above them.
+struct Ceiling {
+  float height_m;
+  float scale;             ///< light of the texture's value 1
+  GroundTexture radiance;  ///< of ceiling and lamps, over scale
+};
+
 /// A solid thing that a car must not touch.
 struct Obstacle {
   std::string kind;                          ///< "car", "tree", ...
@@ -50,14 +62,32 @@ struct Obstacle {
   double top_z_m = 0.0;
 };
 
-/// A static world: metres, z up, drivable ground at z = 0.
+/// A mover as it is at one time.
+struct MoverState {
+  TriangleMesh mesh;  ///< in the world frame; materials are the scene's
+  RigidTransform world_from_mover;
+  Obstacle obstacle;  ///< the ground that it takes
+};
+
+/// A thing that moves through the scene, by a formula of the time: `stateAt` is thread safe.
+struct Mover {
+  std::string name;
+  std::function<MoverState(double time_s)> stateAt;
+};
+
+/// A world that stands still but for its movers: metres, z up.
 struct Scene {
   TriangleMesh mesh;
   std::vector<Material> materials;
   std::vector<Texture> textures;
   GroundLayers ground;
   std::unique_ptr<Sky> sky;
-  std::vector<Obstacle> obstacles;
+  std::unique_ptr<Ceiling> ceiling;  ///< absent: reflections see the sky
+  std::vector<Obstacle> obstacles;   ///< that stand still
+  std::vector<Mover> movers;
+  GroundHeight ground_height;  ///< of the drivable ground
+  /// Height above the ground from which on things hang overhead: truth maps look through them.
+  double overhead_m = std::numeric_limits<double>::infinity();
   Eigen::Vector2d min_m{-40.0, -30.0};  ///< corners of the area that truth maps cover
   Eigen::Vector2d max_m{40.0, 30.0};
 

@@ -17,6 +17,8 @@ struct SceneOptions {
   double moved_cars = 0.3;  ///< share of the parked cars that differ from day 0
   /// Size of the images that will be rendered, over 1280x800: smaller images need no finer textures.
   double image_scale = 1.0;
+  /// Leaves and light maps over the default: less is quicker to build, for tests.
+  double detail = 1.0;
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
@@ -25,7 +27,9 @@ struct DrivePlan {
   std::string name;
   DrivePath path;
   VehicleMotionOptions motion;
-  int day = 0;  ///< on which the drive takes place
+  int day = 0;                           ///< on which the drive takes place
+  GroundHeight ground_height = nullptr;  ///< of the scene; null: level at z = 0
+  double start_s = 0.0;                  ///< time of the scene's movers when the drive starts
 };
 
 /// Name and one line about each scene, and each drive of a scene.

@@ -5,6 +5,7 @@
 
 #include "vcharge_core/rigid_transform.h"
 #include "vcharge_simulation/drive_path.h"
+#include "vcharge_simulation/ground_height.h"
 
 namespace vcharge {
 
@@ -45,10 +46,10 @@ struct VehicleMotionOptions {
 
 /// State of the vehicle at one instant.
 struct MotionSample {
-  RigidTransform world_from_planar;  ///< rear axle on the ground plane
-  RigidTransform
-      planar_from_body;  ///< pitch, roll and heave on the springs, about the vehicle frame's origin
-  double speed_m_per_s = 0.0;
+  RigidTransform world_from_planar;  ///< rear axle, in the plane z = 0
+  RigidTransform planar_from_body;   ///< the ground's height, pitch and roll, and those on the springs, about
+                                     ///< the vehicle frame's origin
+  double speed_m_per_s = 0.0;        ///< along the ground; negative backwards
   double curvature_per_m = 0.0;
   double left_wheel_m = 0.0;  ///< distance that the rear wheels rolled
   double right_wheel_m = 0.0;
@@ -56,14 +57,18 @@ struct MotionSample {
   RigidTransform worldFromVehicle() const { return world_from_planar * planar_from_body; }
 };
 
-/// Millisecond-by-millisecond motion along a path: each step is an exact circular arc of the bicycle model.
-/// Covers kMargin_s before time 0 and after duration(), so that filters can look both ways.
+/// Millisecond-by-millisecond motion along a path: each step is an exact circular arc of the bicycle model,
+/// seen from above. On ground that is not level the four wheels lift, pitch and roll the car, and they roll
+/// as far as the ground's surface is long. Covers kMargin_s before time 0 and after duration(), so that
+/// filters can look both ways.
 class VehicleMotion {
  public:
   static constexpr int kStepsPerSecond = 1000;
   static constexpr double kMargin_s = 0.5;
 
-  VehicleMotion(const DrivePath& path, const VehicleMotionOptions& options, uint64_t seed);
+  /// ground_height: null where the ground is level at z = 0.
+  VehicleMotion(const DrivePath& path, const VehicleMotionOptions& options, uint64_t seed,
+                const GroundHeight& ground_height = nullptr);
 
   /// Until the end of the path, or options.duration_s.
   double duration() const { return duration_s_; }

@@ -1,0 +1,250 @@
+#include "vcharge_simulation/scene_catalogue.h"
+
+#include <cmath>
+#include <map>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <opencv2/imgproc.hpp>
+
+#include "reprojection.h"
+#include "vcharge_simulation/drive_simulator.h"
+#include "vcharge_simulation/golf_rig.h"
+#include "vcharge_simulation/truth_maps.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kImageScale = 0.3;
+constexpr double kImagePeriod_s = 0.08;
+constexpr double kCell_m = 0.1;
+constexpr LensOptions kIdealLens{0.0, 0.0, 0.0};
+
+// A scene of the catalogue, and where and when the checks look at it.
+struct SceneCase {
+  const char* scene;
+  const char* drive;
+  int frame;
+};
+constexpr SceneCase kCases[] = {{"lot", "short", 10},
+                                {"garage", "short", 10},
+                                {"obstacles", "creep", 100},
+                                {"two_levels", "up_and_down", 100},
+                                {"chessboard", "board_front", 30}};
+
+// Sharp enough for small images, and quick to build.
+const Renderer& rendererOf(const std::string& scene) {
+  static std::map<std::string, Renderer> renderers;
+  const auto found = renderers.find(scene);
+  if (found != renderers.end()) {
+    return found->second;
+  }
+  SceneOptions options;
+  options.image_scale = kImageScale;
+  options.detail = 0.25;
+  return renderers.emplace(scene, buildScene(scene, options)).first->second;
+}
+
+class SceneTest : public testing::TestWithParam<SceneCase> {
+ protected:
+  const Renderer& renderer() const { return rendererOf(GetParam().scene); }
+  Sighting sighting(const CameraView& view, int later_frames = 0) const {
+    static std::map<std::string, SimulatedDrive> drives;
+    const DrivePlan plan = planDrive(GetParam().scene, GetParam().drive);
+    const std::string name = std::string(GetParam().scene) + plan.name;
+    if (drives.count(name) == 0) {
+      drives.emplace(name, simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1, FaultOptions(),
+                                         plan.ground_height));
+    }
+    const int frame = GetParam().frame + later_frames;
+    return {view, drives.at(name).world_from_vehicle.at(static_cast<size_t>(frame)).world_from_vehicle,
+            plan.start_s + kImagePeriod_s * frame};
+  }
+};
+
+std::string sceneOf(const testing::TestParamInfo<SceneCase>& info) {
+  return info.param.scene;
+}
+INSTANTIATE_TEST_SUITE_P(Catalogue, SceneTest, testing::ValuesIn(kCases), sceneOf);
+
+TEST_P(SceneTest, ExactRangeReproducesTheImageFromFrameToFrame) {
+  const CameraRig rig = makeGolfRig(1, kImageScale);
+  for (const size_t camera : {0U, 1U}) {
+    const CameraView view(rig.cameras[camera], nullptr);
+    const Reprojection result = reproject(renderer(), sighting(view), sighting(view, 1));
+    RecordProperty("milligray_" + rig.cameras[camera].name, static_cast<int>(1000 * result.mean_difference));
+    EXPECT_GT(result.count, 5000);
+    EXPECT_LE(result.mean_difference, 3.0) << rig.cameras[camera].name;
+  }
+}
+
+TEST_P(SceneTest, ExactRangeReproducesTheImageFromCameraToCamera) {
+  const CameraRig rig = makeGolfRig(1, kImageScale);
+  // One place is seen through different parts of the two lenses: as the vignette is divided out, the blur,
+  // which is twice as wide at the rim, is left out.
+  const CameraView front(rig.cameras[0], nullptr, kIdealLens);
+  const CameraView left(rig.cameras[1], nullptr, kIdealLens);
+  double sum = 0.0;
+  int count = 0;
+  // Paint and glass mirror other surroundings into each camera, by physics: 4 to 12 gray levels.
+  for (const Reprojection& result :
+       {reproject(renderer(), sighting(front), sighting(left), Surfaces::kNoCars),
+        reproject(renderer(), sighting(left), sighting(front), Surfaces::kNoCars)}) {
+    sum += result.count * result.mean_difference;
+    count += result.count;
+  }
+  RecordProperty("milligray", static_cast<int>(1000 * sum / count));
+  EXPECT_GT(count, 500);
+  EXPECT_LE(sum / count, 3.0);
+}
+
+TEST_P(SceneTest, SameBytesOnAnyNumberOfThreads) {
+  const CameraView view(makeGolfRig(1, 0.15).cameras[1], makeGolfBody());
+  const auto render = [&](size_t threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    const Sighting at = sighting(view);
+    return renderer().renderLight(at.view, at.world_from_vehicle, at.time_s);
+  };
+  EXPECT_EQ(cv::norm(render(1), render(4), cv::NORM_INF), 0.0);
+}
+
+double groundAt(const Scene& scene, const Eigen::Vector2d& place_m) {
+  return scene.ground_height ? scene.ground_height(place_m.x(), place_m.y()) : 0.0;
+}
+
+TEST_P(SceneTest, WhatStandsOutOfTheGroundBelongsToAnObstacle) {
+  const Scene& scene = renderer().scene();
+  const TruthHeightMap map = computeHeightMap(renderer(), kCell_m, 2.4);
+  // Footprints drawn on the grid, grown by the reach of leaves and mirrors; walls around the scene stand on
+  // its border.
+  cv::Mat covered = cv::Mat::zeros(map.height_m.size(), CV_8UC1);
+  cv::rectangle(covered, cv::Rect(0, 0, covered.cols, covered.rows), cv::Scalar(255), 3);
+  for (const Obstacle& obstacle : scene.obstacles) {
+    std::vector<cv::Point> polygon;
+    for (const Eigen::Vector2d& corner : obstacle.footprint_m) {
+      polygon.emplace_back(static_cast<int>(std::lround((corner.x() - map.origin_m.x()) / kCell_m)),
+                           static_cast<int>(std::lround((corner.y() - map.origin_m.y()) / kCell_m)));
+    }
+    cv::fillPoly(covered, std::vector<std::vector<cv::Point>>{polygon}, cv::Scalar(255));
+  }
+  cv::dilate(covered, covered, cv::Mat::ones(7, 7, CV_8UC1));
+  int standing = 0;
+  int unexplained = 0;
+  for (int row = 0; row < map.height_m.rows; ++row) {
+    for (int column = 0; column < map.height_m.cols; ++column) {
+      const Eigen::Vector2d place_m = map.origin_m + kCell_m * Eigen::Vector2d(column, row);
+      const double height_m = map.height_m.at<float>(row, column) - groundAt(scene, place_m);
+      if (height_m > 0.3 && height_m < 1.4) {
+        ++standing;
+        unexplained += covered.at<uint8_t>(row, column) == 0 ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(standing, 10000);
+  EXPECT_LT(unexplained, standing / 100);
+}
+
+TEST_P(SceneTest, HeightMapHoldsCarsPillarsAndThings) {
+  const Scene& scene = renderer().scene();
+  const TruthHeightMap map = computeHeightMap(renderer(), kCell_m, 2.8);
+  int seen = 0;
+  for (const Obstacle& obstacle : scene.obstacles) {
+    Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+    for (const Eigen::Vector2d& corner : obstacle.footprint_m) {
+      middle += corner / static_cast<double>(obstacle.footprint_m.size());
+    }
+    const Eigen::Vector2d cell = (middle - map.origin_m) / kCell_m;
+    const bool is_solid = obstacle.kind == "car" || obstacle.kind == "box" || obstacle.kind == "trailer" ||
+                          obstacle.kind == "bin" || obstacle.kind == "pedestrian";
+    if (!is_solid || cell.minCoeff() < 1.0 || cell.x() > map.height_m.cols - 2 ||
+        cell.y() > map.height_m.rows - 2) {
+      continue;
+    }
+    const float height_m = map.height_m.at<float>(static_cast<int>(std::lround(cell.y())),
+                                                  static_cast<int>(std::lround(cell.x())));
+    EXPECT_GT(height_m, obstacle.base_z_m + 0.45 * (obstacle.top_z_m - obstacle.base_z_m)) << obstacle.kind;
+    EXPECT_LT(height_m, obstacle.top_z_m + 0.05) << obstacle.kind;
+    ++seen;
+  }
+  EXPECT_GT(seen, 20);
+}
+
+TEST(CatalogueTest, EveryDriveStaysInItsSceneAndLastsSomeSeconds) {
+  for (const CatalogueEntry& scene : listScenes()) {
+    for (const CatalogueEntry& entry : listDrives(scene.name)) {
+      const DrivePlan plan = planDrive(scene.name, entry.name);
+      const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1,
+                                                 FaultOptions(), plan.ground_height);
+      EXPECT_GT(drive.world_from_vehicle.size(), 50U) << scene.name << " " << entry.name;
+      for (const auto& [stamp, world_from_vehicle] : drive.world_from_vehicle) {
+        ASSERT_LT(std::abs(world_from_vehicle.translation().x()), 31.0) << scene.name << " " << entry.name;
+        ASSERT_LT(std::abs(world_from_vehicle.translation().y()), 21.0) << scene.name << " " << entry.name;
+      }
+    }
+  }
+}
+
+TEST(MoverTest, ChangesTheRangeOnlyWhereItsFootprintsAre) {
+  const Renderer& renderer = rendererOf("obstacles");
+  const CameraView view(makeGolfRig(1, kImageScale).cameras[1], nullptr);
+  const RigidTransform world_from_vehicle = RigidTransform::planar(1.0, 0.0, 0.0);
+  const RigidTransform world_from_camera = world_from_vehicle * *view.camera().vehicle_from_camera;
+  const Mover& walker = renderer.scene().movers.front();
+  constexpr double kTimes_s[] = {10.0, 12.0};
+  const cv::Mat ranges[] = {renderer.renderRange(view, world_from_vehicle, kTimes_s[0]),
+                            renderer.renderRange(view, world_from_vehicle, kTimes_s[1])};
+  int changed = 0;
+  for (int y = 0; y < view.size().height; ++y) {
+    for (int x = 0; x < view.size().width; ++x) {
+      const float before_m = ranges[0].at<float>(y, x);
+      const float after_m = ranges[1].at<float>(y, x);
+      if (before_m == after_m || (std::isnan(before_m) && std::isnan(after_m))) {
+        continue;
+      }
+      // The walker is what is nearer.
+      const bool is_before = std::isnan(after_m) || before_m < after_m;
+      const double range_m = is_before ? before_m : after_m;
+      const Eigen::Vector3d place = world_from_camera * (range_m * view.centreRay(x, y).cast<double>());
+      const MoverState state = walker.stateAt(kTimes_s[is_before ? 0 : 1]);
+      const double reach_m = (place - state.world_from_mover.translation()).head<2>().norm();
+      EXPECT_LT(reach_m, 0.75);  // a stride
+      EXPECT_LT(place.z(), state.obstacle.top_z_m + 0.05);
+      ++changed;
+    }
+  }
+  EXPECT_GT(changed, 200);
+}
+
+TEST(MoverTest, CameraSeesTheSquaresOfTheBoardWhereItsPoseSays) {
+  const Renderer& renderer = rendererOf("chessboard");
+  const DrivePlan plan = planDrive("chessboard", "board_left");
+  const CameraView view(makeGolfRig(1, 1.0).cameras[1], nullptr);
+  int poses = 0;
+  for (int pose = 0; pose < 3; ++pose) {
+    const double time_s = plan.start_s + pose + 0.1;
+    const cv::Mat light = renderer.renderLight(view, plan.path.worldFromStart(), time_s);
+    const RigidTransform camera_from_board =
+        (plan.path.worldFromStart() * *view.camera().vehicle_from_camera).inverse() *
+        renderer.scene().movers.front().stateAt(time_s).world_from_mover;
+    double dark = 0.0;
+    double bright = 0.0;
+    for (int row = 0; row < 7; ++row) {
+      for (int column = 0; column < 10; ++column) {
+        // The board's origin is the first inner corner.
+        const Eigen::Vector3d middle(0.1 * column - 0.05, 0.1 * row - 0.05, 0.0);
+        Eigen::Vector2d pixel;
+        ASSERT_TRUE(view.camera().model.project(camera_from_board * middle, &pixel));
+        const double value = light.at<float>(static_cast<int>(std::lround(pixel.y())),
+                                             static_cast<int>(std::lround(pixel.x())));
+        ((row + column) % 2 == 0 ? dark : bright) += value / 35.0;
+      }
+    }
+    EXPECT_LT(dark, 0.35 * bright) << "pose " << pose;
+    ++poses;
+  }
+  EXPECT_EQ(poses, 3);
+}
+
+}  // namespace
+}  // namespace vcharge
