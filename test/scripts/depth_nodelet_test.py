@@ -105,8 +105,8 @@ class DepthNodeletTest(unittest.TestCase):
         def found():
             texts = [status.message for status in self.diagnostics.values()]
             return any(all(word in text for word in words) for text in texts)
-        wait_for(found, f"a diagnostic with {words}; there are "
-                        f"{[status.message for status in self.diagnostics.values()]}", 20.0)
+        # Every frame is processed in order: on a busy machine it takes long until the bad one's turn comes.
+        wait_for(found, f"a diagnostic with {words}")
 
     def expect_recovery(self):
         """A good drive after whatever came before gives range maps."""
