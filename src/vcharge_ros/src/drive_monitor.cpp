@@ -36,6 +36,7 @@ DriveMonitor::Change DriveMonitor::addGood(const std::string& topic_name, std::o
   if (stamp && topic.newest && *stamp < *topic.newest) {
     ++topic.jumps_back;
     topic.last_jump = now;
+    topic.jump_unreported = true;
     topic.jump_text = "stamp " + toString(*stamp) + " jumped back by " +
                       tenths(toSeconds(*topic.newest - *stamp), "s") + ", expected increasing stamps";
   }
@@ -75,7 +76,10 @@ DriveMonitor::Report DriveMonitor::report(SteadyTime now) {
                  tenths(max_silence_s_, "s"),
              &errors);
     }
-    if (topic.jumps_back > 0 && secondsBetween(topic.last_jump, now) < kJumpReportTime_s) {
+    const bool jumped_lately =
+        topic.jumps_back > 0 && secondsBetween(topic.last_jump, now) < kJumpReportTime_s;
+    if (topic.jump_unreported || jumped_lately) {
+      topic.jump_unreported = false;
       append(name + ": " + topic.jump_text, &warnings);
     }
     std::string value = std::to_string(topic.good) + " good, " + std::to_string(topic.bad) + " bad, " +

@@ -83,5 +83,12 @@ TEST_F(DriveMonitorTest, WarnsForSomeSecondsOfStampsThatJumpBack) {
   EXPECT_EQ(monitor_.report(at(6.0)).level, Level::kOk);
 }
 
+TEST_F(DriveMonitorTest, AJumpIsReportedOnceHoweverLateTheReport) {
+  monitor_.addGood("/odom", Timestamp::fromNanoseconds(2'000'000'000), at(0.1));
+  monitor_.addGood("/odom", Timestamp::fromNanoseconds(1'000'000'000), at(0.2));
+  EXPECT_NE(monitor_.report(at(500.0)).message.find("jumped back"), std::string::npos);
+  EXPECT_EQ(monitor_.report(at(501.0)).message.find("jumped back"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace vcharge

@@ -31,7 +31,7 @@ class DriveMonitor {
   /// A topic that must bring data; silence on others is no fault.
   void expectTopic(const std::string& topic);
   /// Good data. A stamp (if it has one) before the topic's newest is counted as a jump back and reported for
-  /// some seconds. kRecovered when the topic was in fault.
+  /// some seconds, and once however late the next report is. kRecovered when the topic was in fault.
   Change addGood(const std::string& topic, std::optional<Timestamp> stamp, SteadyTime now);
   /// Bad data, and why. kFailed when the text is news for this topic: worth one line in the log.
   Change addBad(const std::string& topic, const std::string& error, SteadyTime now);
@@ -49,6 +49,7 @@ class DriveMonitor {
     SteadyTime last_good;
     SteadyTime last_jump;
     std::string jump_text;
+    bool jump_unreported = false;
     bool failing = false;
     bool unreported = false;
     std::string error;
