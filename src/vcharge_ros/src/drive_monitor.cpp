@@ -27,11 +27,13 @@ DriveMonitor::DriveMonitor(double max_silence_s, SteadyTime now)
     : max_silence_s_(max_silence_s), start_(now), last_report_(now) {}
 
 void DriveMonitor::expectTopic(const std::string& topic) {
+  const std::lock_guard<std::mutex> lock(mutex_);
   topics_[topic].expected = true;
 }
 
 DriveMonitor::Change DriveMonitor::addGood(const std::string& topic_name, std::optional<Timestamp> stamp,
                                            SteadyTime now) {
+  const std::lock_guard<std::mutex> lock(mutex_);
   Topic& topic = topics_[topic_name];
   if (stamp && topic.newest && *stamp < *topic.newest) {
     ++topic.jumps_back;
@@ -50,6 +52,7 @@ DriveMonitor::Change DriveMonitor::addGood(const std::string& topic_name, std::o
 
 DriveMonitor::Change DriveMonitor::addBad(const std::string& topic_name, const std::string& error,
                                           SteadyTime now) {
+  const std::lock_guard<std::mutex> lock(mutex_);
   Topic& topic = topics_[topic_name];
   const bool news = !topic.failing || topic.error != error;
   ++topic.bad;
@@ -62,12 +65,32 @@ DriveMonitor::Change DriveMonitor::addBad(const std::string& topic_name, const s
   return news ? Change::kFailed : Change::kNone;
 }
 
+void DriveMonitor::beginWork(SteadyTime now) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  work_began_ = now;
+}
+
+void DriveMonitor::endWork(SteadyTime now) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!work_began_) {
+    return;
+  }
+  const SteadyTime::duration deaf = now - *work_began_;
+  work_began_.reset();
+  start_ += deaf;
+  for (auto& [name, topic] : topics_) {
+    topic.last_good += deaf;
+  }
+}
+
 DriveMonitor::Report DriveMonitor::report(SteadyTime now) {
+  const std::lock_guard<std::mutex> lock(mutex_);
   Report result;
   std::string errors, warnings;
   const double period_s = secondsBetween(last_report_, now);
   for (auto& [name, topic] : topics_) {
-    const double silence_s = secondsBetween(topic.good + topic.bad > 0 ? topic.last_good : start_, now);
+    const double silence_s =
+        secondsBetween(topic.good + topic.bad > 0 ? topic.last_good : start_, work_began_.value_or(now));
     if (topic.failing || topic.unreported) {
       append(topic.error, &errors);
       topic.unreported = false;

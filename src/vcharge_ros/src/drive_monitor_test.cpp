@@ -90,5 +90,15 @@ TEST_F(DriveMonitorTest, AJumpIsReportedOnceHoweverLateTheReport) {
   EXPECT_EQ(monitor_.report(at(501.0)).message.find("jumped back"), std::string::npos);
 }
 
+TEST_F(DriveMonitorTest, TimeAtWorkIsNobodysSilence) {
+  monitor_.expectTopic("/odom");
+  monitor_.addGood("/odom", std::nullopt, at(0.1));
+  monitor_.beginWork(at(0.2));
+  EXPECT_EQ(monitor_.report(at(50.0)).level, Level::kOk) << "at work, so nothing could be taken";
+  monitor_.endWork(at(50.0));
+  EXPECT_EQ(monitor_.report(at(50.1)).level, Level::kOk);
+  EXPECT_NE(monitor_.report(at(60.0)).message.find("/odom: no data for 10.1 s"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace vcharge

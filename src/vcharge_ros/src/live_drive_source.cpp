@@ -68,9 +68,10 @@ struct LiveDriveSource::Implementation {
   const LiveDriveSourceOptions options;
   const std::vector<size_t> cameras;
 
+  DriveMonitor monitor;  // has its own lock: a report waits for no consumer
+
   std::mutex mutex;  // guards all below, and serializes the consumer's calls
   DriveConsumer* consumer = nullptr;
-  DriveMonitor monitor;
   StampSorter<DriveItem> sorter;
   SteadyClock::time_point last_arrival = SteadyClock::now();
   std::vector<LastImages> last_images;  // by camera
@@ -203,12 +204,14 @@ void LiveDriveSource::Implementation::take(const std::string& topic, Timestamp s
 
 void LiveDriveSource::Implementation::deliver(Timestamp stamp, const DriveItem& item) {
   const SteadyClock::time_point now = SteadyClock::now();
+  monitor.beginWork(now);
   try {
     internal::deliver(stamp, item, consumer);
     log(monitor.addGood(kProcessing, std::nullopt, now), kProcessing, "");
   } catch (const std::exception& error) {
     log(monitor.addBad(kProcessing, error.what(), now), kProcessing, error.what());
   }
+  monitor.endWork(SteadyClock::now());
 }
 
 // Judged by the drive's time: neither a slow replay nor a slow consumer makes raw images seem to be missing.
@@ -260,7 +263,6 @@ void LiveDriveSource::run(DriveConsumer* consumer, const ProgressCallback& /*pro
 }
 
 DriveMonitor::Report LiveDriveSource::report() {
-  const std::lock_guard<std::mutex> lock(implementation_->mutex);
   return implementation_->monitor.report(SteadyClock::now());
 }
 

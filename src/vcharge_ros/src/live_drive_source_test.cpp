@@ -20,6 +20,7 @@ using ::testing::HasSubstr;
 using testing::kSize;
 using testing::makeOdometry;
 using testing::milliseconds;
+using ::testing::Not;
 using testing::Notes;
 
 constexpr int kPeriod_ms = 80;
@@ -268,6 +269,26 @@ TEST_F(LiveDriveSourceTest, NamesTheTopicsThatAreSilent) {
            message.find("/camera/left/image_raw: no data for") != std::string::npos &&
            message.find("/odom: no data") == std::string::npos;
   });
+}
+
+TEST_F(LiveDriveSourceTest, ReportsWhileTheConsumerIsAtWork) {
+  options_.max_silence_s = 0.3;
+  struct SlowNotes : Notes {
+    void addOdometry(const VehicleOdometry& odometry) override {
+      Notes::addOdometry(odometry);
+      ros::WallDuration(0.4).sleep();
+      reports.push_back(source->report());
+    }
+    LiveDriveSource* source = nullptr;
+    std::vector<DriveMonitor::Report> reports;
+  } notes;
+  const auto source = start(&notes);
+  notes.source = source.get();
+  publishOdometry(5000);
+  publishOdometry(0);
+  waitFor([&] { return notes.reports.size() == 2; });
+  EXPECT_THAT(notes.reports[0].message, Not(HasSubstr("/odom"))) << "busy, not silent";
+  EXPECT_THAT(notes.reports[1].message, HasSubstr("jumped back by 5.0 s"));
 }
 
 TEST_F(LiveDriveSourceTest, OutlivesAConsumerThatThrows) {

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,7 +15,7 @@ namespace vcharge {
 
 /// What arrives on a drive's topics, judged for /diagnostics: which topic is silent, which brought something
 /// bad and why, where time jumped back. A topic is well again once it brings good data. Knows no clock:
-/// callers pass a steady one. Not thread safe.
+/// callers pass a steady one. Thread safe: /diagnostics go on while data is processed.
 class DriveMonitor {
  public:
   using SteadyTime = std::chrono::steady_clock::time_point;
@@ -35,6 +36,10 @@ class DriveMonitor {
   Change addGood(const std::string& topic, std::optional<Timestamp> stamp, SteadyTime now);
   /// Bad data, and why. kFailed when the text is news for this topic: worth one line in the log.
   Change addBad(const std::string& topic, const std::string& error, SteadyTime now);
+
+  /// Nothing is taken from any topic from beginWork() to endWork(): that time counts as nobody's silence.
+  void beginWork(SteadyTime now);
+  void endWork(SteadyTime now);
 
   /// The state now. An error stays until it was reported once and good data came after it.
   Report report(SteadyTime now);
@@ -57,7 +62,9 @@ class DriveMonitor {
   };
 
   const double max_silence_s_;
-  const SteadyTime start_;
+  std::mutex mutex_;  // guards all below
+  SteadyTime start_;
+  std::optional<SteadyTime> work_began_;
   SteadyTime last_report_;
   std::map<std::string, Topic> topics_;
 };

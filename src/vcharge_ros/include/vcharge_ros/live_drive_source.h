@@ -63,7 +63,7 @@ class LiveDriveSource : public DriveSource {
   /// the end.
   void run(DriveConsumer* consumer, const ProgressCallback& progress) override;
 
-  /// State of the topics for /diagnostics. Thread safe.
+  /// State of the topics for /diagnostics. Thread safe, and waits for no consumer that is at work.
   DriveMonitor::Report report();
 
  private:
