@@ -78,10 +78,13 @@ void VocabularyTree::write(const std::string& path) const {
 }
 
 VocabularyTree VocabularyTree::read(const std::string& path) {
-  const std::string text = readTextFile(path);
+  return parse(readTextFile(path), path);
+}
+
+VocabularyTree VocabularyTree::parse(const std::string& text, const std::string& source) {
   const auto require = [&](bool condition, const std::string& message) {
     if (!condition) {
-      throw InputError(path + ": " + message);
+      throw InputError(source + ": " + message);
     }
   };
   require(text.compare(0, kMagicSize, kMagic) == 0, "expected a vocabulary, starts with other bytes");

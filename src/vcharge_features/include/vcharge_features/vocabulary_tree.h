@@ -52,6 +52,9 @@ class VocabularyTree {
   static VocabularyTree read(const std::string& path);
   /// Replaces the file only once it is complete. InputError when it cannot be written.
   void write(const std::string& path) const;
+  /// The bytes of such a file, to be kept inside another; `source` names them in errors, as a path does.
+  std::string serialize() const;
+  static VocabularyTree parse(const std::string& text, const std::string& source);
 
   int numWords() const { return static_cast<int>(word_weights_.size()); }
   int descriptorType() const { return centres_.type(); }
@@ -72,7 +75,6 @@ class VocabularyTree {
   VocabularyTree() = default;
   void addLeaves();
   void setWeights(const std::vector<cv::Mat>& descriptors_of_images);
-  std::string serialize() const;
   bool isValid() const;
 
   std::vector<Node> nodes_;  ///< the root is the first; children come after their parents

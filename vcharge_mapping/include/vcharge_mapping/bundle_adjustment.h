@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+
+#include "vcharge_core/options.h"
+#include "vcharge_mapping/mapping_data.h"
+
+namespace vcharge {
+
+struct BundleAdjustmentOptions {
+  int max_iterations = 25;
+  double huber_sigmas = 2.0;        ///< errors above count linearly
+  double outlier_sigmas = 6.0;      ///< observations with larger errors are removed
+  double min_parallax_rad = 0.015;  ///< landmarks whose remaining rays are more parallel are removed
+  int min_observations = 3;         ///< landmarks with fewer are removed
+  double max_range_m = 80.0;        ///< and those that are further from every camera
+  // What the odometer's motions between keyframes are good for.
+  double odometry_distance_sigma = 0.005;  ///< of the distance
+  double odometry_sigma_m = 0.005;         ///< besides
+  double odometry_turn_sigma = 0.02;       ///< of the turn
+  double odometry_sigma_rad = 0.002;       ///< besides
+  double height_sigma_m = 0.02;            ///< the odometer sees neither height
+  double tilt_sigma_rad = 0.01;            ///< nor roll and pitch: how much they change between keyframes
+  bool deterministic = true;               ///< one thread
+
+  template <class Visitor>
+  void visitFields(Visitor&& visit) {
+    visit("max_iterations", max_iterations);
+    visit("huber_sigmas", huber_sigmas);
+    visit("outlier_sigmas", outlier_sigmas);
+    visit("min_parallax_rad", min_parallax_rad);
+    visit("min_observations", min_observations);
+    visit("max_range_m", max_range_m);
+    visit("odometry_distance_sigma", odometry_distance_sigma);
+    visit("odometry_sigma_m", odometry_sigma_m);
+    visit("odometry_turn_sigma", odometry_turn_sigma);
+    visit("odometry_sigma_rad", odometry_sigma_rad);
+    visit("height_sigma_m", height_sigma_m);
+    visit("tilt_sigma_rad", tilt_sigma_rad);
+    visit("deterministic", deterministic);
+  }
+  void validate() const;  ///< throws std::invalid_argument naming the field
+};
+
+struct BundleAdjustmentSummary {
+  bool converged = false;
+  int num_iterations = 0;
+  int64_t num_observations = 0;
+  int64_t num_removed_observations = 0;
+  int64_t num_removed_landmarks = 0;
+  double rms_px = 0.0;  ///< of the observations that were kept, per coordinate
+};
+
+/// Moves the keyframes (six degrees of freedom; the first is held), the landmarks, and the odometer's scale
+/// and turn factors to the least robust sum of reprojection and odometry errors; the rig is known. Then
+/// removes outliers and gives the landmarks their covariance, given the poses.
+BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, MappingData* data);
+
+/// The odometer's motion between two keyframes of one part, corrected by its factors so far.
+RigidTransform odometryMotion(const MappingData& data, size_t previous, size_t current);
+
+}  // namespace vcharge
