@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <ceres/ceres.h>
+#include <ceres/normal_prior.h>
 #include <tbb/parallel_for.h>
 #include <Eigen/LU>
 
@@ -90,7 +91,7 @@ class Bundle {
 
  private:
   void addObservations(ceres::Problem* problem, ceres::ParameterBlockOrdering* ordering) {
-    auto* loss = new ceres::HuberLoss(options_.huber_sigmas);
+    auto* loss = new ceres::CauchyLoss(options_.loss_sigmas);
     std::vector<std::shared_ptr<const CameraModel>> models;
     for (const RigCamera& camera : data_->rig->cameras) {
       models.emplace_back(data_->rig, &camera.model);
@@ -120,6 +121,13 @@ class Bundle {
       const RigidTransform motion = previous.odom_from_vehicle.inverse() * current.odom_from_vehicle;
       problem->AddResidualBlock(makeOdometryCost(motion, odometryInformation(motion, options_)).release(),
                                 nullptr, poses_[i - 1].data(), poses_[i].data(), odometer_);
+    }
+    if (problem->HasParameterBlock(odometer_)) {
+      // Where images cannot tell the scale, the odometer's calibration does.
+      const Eigen::Vector2d information(1.0 / options_.odometer_scale_sigma,
+                                        1.0 / options_.odometer_turn_sigma);
+      problem->AddResidualBlock(new ceres::NormalPrior(information.asDiagonal(), Eigen::Vector2d::Ones()),
+                                nullptr, odometer_);
     }
   }
 
@@ -216,11 +224,13 @@ TrackCheck checkTrack(const BundleAdjustmentOptions& options, const MappingData&
 
 void BundleAdjustmentOptions::validate() const {
   requireField(max_iterations >= 1, "max_iterations", "must be 1 or more", max_iterations);
-  requireField(huber_sigmas > 0.0, "huber_sigmas", "must be positive", huber_sigmas);
+  requireField(loss_sigmas > 0.0, "loss_sigmas", "must be positive", loss_sigmas);
   requireField(outlier_sigmas > 0.0, "outlier_sigmas", "must be positive", outlier_sigmas);
   requireField(min_parallax_rad >= 0.0, "min_parallax_rad", "must not be negative", min_parallax_rad);
   requireField(min_observations >= 2, "min_observations", "must be 2 or more", min_observations);
   requireField(max_range_m > 0.0, "max_range_m", "must be positive", max_range_m);
+  requireField(odometer_scale_sigma > 0.0, "odometer_scale_sigma", "must be positive", odometer_scale_sigma);
+  requireField(odometer_turn_sigma > 0.0, "odometer_turn_sigma", "must be positive", odometer_turn_sigma);
   requireField(odometry_distance_sigma >= 0.0, "odometry_distance_sigma", "must not be negative",
                odometry_distance_sigma);
   requireField(odometry_sigma_m > 0.0, "odometry_sigma_m", "must be positive", odometry_sigma_m);

@@ -69,7 +69,7 @@ bool isUsable(const MotionEstimate& estimate) {
 
 RobustOptions EgoMotionOptions::defaultRobust() {
   RobustOptions options;
-  options.max_error_rad = 0.003;
+  options.max_error_rad = 0.002;
   options.max_iterations = 200;
   options.min_inliers = 15;
   return options;

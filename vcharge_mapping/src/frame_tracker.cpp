@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <set>
 
 #include "vcharge_core/error.h"
 
@@ -71,7 +73,8 @@ class OccupiedCells {
 
 PatchTrackerOptions FrameTrackerOptions::smallPatches() {
   PatchTrackerOptions options;
-  options.window_px = 15;
+  options.window_px = 11;  // larger ones straddle what is near and what is far
+  options.max_forward_backward_px = 0.2;
   options.max_iterations = 20;
   return options;
 }
@@ -83,6 +86,7 @@ void FrameTrackerOptions::validate() const {
                min_spacing_px);
   requireField(max_association_px >= 0.0 && max_association_px < 5.0, "max_association_px",
                "must be in [0, 5)", max_association_px);
+  requireField(max_alignment_px >= 0.0, "max_alignment_px", "must not be negative", max_alignment_px);
   requireField(tracking_sigma_px > 0.0 && tracking_sigma_px < 10.0, "tracking_sigma_px", "must be in (0, 10)",
                tracking_sigma_px);
   validateInner("patches", patches);
@@ -115,6 +119,7 @@ void CameraTracker::track(const Image& image, const RigidTransform& previous_fro
   image_ = image;
   if (image.pixels.empty()) {
     tracks_.clear();
+    anchors_.clear();
     pyramid_ = ImagePyramid();
     return;
   }
@@ -162,12 +167,42 @@ void CameraTracker::keep(const std::vector<bool>& is_good) {
   tracks_.resize(kept);
 }
 
+void CameraTracker::alignWithAnchors(int32_t keyframe) {
+  std::map<int32_t, std::vector<size_t>> tracks_of_anchor;
+  for (size_t i = 0; i < tracks_.size(); ++i) {
+    tracks_of_anchor[tracks_[i].anchor_keyframe].push_back(i);
+  }
+  for (const auto& [anchor, tracks] : tracks_of_anchor) {
+    std::vector<cv::Point2f> points, predictions;
+    for (const size_t i : tracks) {
+      points.push_back(tracks_[i].anchor_px);
+      predictions.push_back(tracks_[i].position_px);
+    }
+    const std::vector<TrackedPoint> aligned =
+        patch_tracker_.track(anchors_.at(anchor), pyramid_, points, mask_, predictions);
+    for (size_t i = 0; i < tracks.size(); ++i) {
+      LiveTrack& track = tracks_[tracks[i]];
+      const cv::Point2f shift = aligned[i].position_px - track.position_px;
+      const cv::Point2f position = aligned[i].position_px;
+      if (aligned[i].status == TrackStatus::kTracked &&
+          shift.dot(shift) <= options_.max_alignment_px * options_.max_alignment_px &&
+          camera_.model.unproject(Eigen::Vector2d(position.x, position.y), &track.ray_in_camera)) {
+        track.position_px = position;
+      } else {
+        track.anchor_keyframe = keyframe;
+        track.anchor_px = track.position_px;
+      }
+    }
+  }
+}
+
 void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, const FeatureExtractor& extractor,
                                 MappingData* data) {
   KeyframeImage& out = data->keyframes[keyframe].images[camera_index];
   if (image_.pixels.empty()) {
     return;
   }
+  alignWithAnchors(keyframe);
   out.features = extractor.extract(image_.pixels, mask_);
   const size_t num_features = out.features.size();
   out.track_of_feature.assign(num_features, -1);
@@ -223,7 +258,16 @@ void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, const Fe
                                                 options_.tracking_sigma_px});
     out.track_of_feature[feature] = track;
     cells.add(position, static_cast<int>(tracks_.size()));
-    tracks_.push_back({track, position, out.rays_in_camera.col(static_cast<Eigen::Index>(feature))});
+    tracks_.push_back(
+        {track, position, out.rays_in_camera.col(static_cast<Eigen::Index>(feature)), keyframe, position});
+  }
+  anchors_.emplace(keyframe, pyramid_);
+  std::set<int32_t> used;
+  for (const LiveTrack& track : tracks_) {
+    used.insert(track.anchor_keyframe);
+  }
+  for (auto anchor = anchors_.begin(); anchor != anchors_.end();) {
+    anchor = used.count(anchor->first) > 0 ? std::next(anchor) : anchors_.erase(anchor);
   }
 }
 

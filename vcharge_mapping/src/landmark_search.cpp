@@ -175,6 +175,55 @@ class TrackGroups {
   std::vector<int32_t> parent_;
 };
 
+/// In which images a landmark is seen. Two that are seen apart in one image are not one.
+class ImagesOfTracks {
+ public:
+  explicit ImagesOfTracks(const MappingData& data) : images_(data.tracks.size()) {
+    for (size_t t = 0; t < data.tracks.size(); ++t) {
+      for (const TrackObservation& observation : data.tracks[t].observations) {
+        images_[t].insert({observation.keyframe, observation.camera});
+      }
+    }
+  }
+  /// False where the track is seen in this image already.
+  bool add(int32_t track, int32_t keyframe, int32_t camera) {
+    return images_[track].insert({keyframe, camera}).second;
+  }
+  /// Of the tracks that stand for their groups; the lower number has both afterwards. False where they are
+  /// seen in one image.
+  bool merge(int32_t a, int32_t b) {
+    std::set<std::pair<int32_t, int32_t>>& to = images_[std::min(a, b)];
+    std::set<std::pair<int32_t, int32_t>>& from = images_[std::max(a, b)];
+    for (const auto& image : from) {
+      if (to.count(image) > 0) {
+        return false;
+      }
+    }
+    to.insert(from.begin(), from.end());
+    from.clear();
+    return true;
+  }
+
+ private:
+  std::vector<std::set<std::pair<int32_t, int32_t>>> images_;
+};
+
+/// Whether a track's own position, where it has one, is that of the landmark whose image it is said to be, as
+/// far as the camera can tell.
+bool arePointsOne(const LandmarkSearchOptions& options, const MappingData& data, int32_t track,
+                  const Proposal& proposal) {
+  const std::optional<Eigen::Vector3d>& own = data.tracks[track].position_m;
+  if (!own) {
+    return true;
+  }
+  const Eigen::Vector3d centre = data.keyframes[proposal.keyframe].map_from_vehicle *
+                                 data.rig->cameras[proposal.camera].vehicle_from_camera->translation();
+  const Eigen::Vector3d to_own = *own - centre;
+  const Eigen::Vector3d to_other = *data.tracks[proposal.track].position_m - centre;
+  const double ratio = to_own.norm() / to_other.norm();
+  return ratio < options.max_merge_ratio && 1.0 / ratio < options.max_merge_ratio;
+}
+
 /// Moves the observations of merged tracks to the one that stands for them; of two in one image the better
 /// stays.
 void joinTracks(TrackGroups* groups, MappingData* data) {
@@ -225,6 +274,7 @@ void LandmarkSearchOptions::validate() const {
   requireField(max_distance_m > 0.0, "max_distance_m", "must be positive", max_distance_m);
   requireField(max_view_angle_rad > 0.0, "max_view_angle_rad", "must be positive", max_view_angle_rad);
   requireField(max_range_ratio >= 1.0, "max_range_ratio", "must be 1 or more", max_range_ratio);
+  requireField(max_merge_ratio >= 1.0, "max_merge_ratio", "must be 1 or more", max_merge_ratio);
   requireField(feature_sigma_px > 0.0, "feature_sigma_px", "must be positive", feature_sigma_px);
   validateInner("matching", matching);
 }
@@ -237,18 +287,24 @@ LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, Mapp
 
   LandmarkSearchSummary summary;
   TrackGroups groups(data->tracks.size());
+  ImagesOfTracks images(*data);
   for (const std::vector<Proposal>& of_keyframe : proposals) {
     for (const Proposal& proposal : of_keyframe) {
       KeyframeImage& image = data->keyframes[proposal.keyframe].images[proposal.camera];
       int32_t& track = image.track_of_feature[proposal.feature];
       if (track < 0) {
+        if (!images.add(groups.find(proposal.track), proposal.keyframe, proposal.camera)) {
+          continue;  // seen elsewhere in this image
+        }
         const cv::Point2f position = image.features.keypoints[proposal.feature].position_px;
         track = proposal.track;
         data->tracks[proposal.track].observations.push_back(
             {proposal.keyframe, proposal.camera, proposal.feature, Eigen::Vector2d(position.x, position.y),
              options.feature_sigma_px});
         ++summary.num_new_observations;
-      } else if (groups.find(track) != groups.find(proposal.track)) {
+      } else if (groups.find(track) != groups.find(proposal.track) &&
+                 arePointsOne(options, *data, track, proposal) &&
+                 images.merge(groups.find(track), groups.find(proposal.track))) {
         groups.merge(track, proposal.track);
         ++summary.num_merged_tracks;
       }

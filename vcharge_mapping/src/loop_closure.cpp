@@ -33,7 +33,8 @@ Ray rayOf(const MappingData& data, int32_t keyframe, int camera, int feature) {
 /// Rays of both keyframes that look alike, and the landmark that the first sees along its ray.
 struct LoopMatches {
   std::vector<RayMatch> rays;
-  std::vector<int32_t> tracks;  ///< -1: none, or it has no position
+  /// What the first and the second see along their rays; -1: no track, or one without position.
+  std::vector<int32_t> first_tracks, second_tracks;
 };
 
 LoopMatches matchKeyframes(const LoopClosureOptions& options, const MappingData& data, int32_t first,
@@ -53,9 +54,12 @@ LoopMatches matchKeyframes(const LoopClosureOptions& options, const MappingData&
       rays.previous_camera = first_camera;
       rays.current_camera = second_camera;
       rays.quality = -match.distance;
-      const int32_t track = first_image.track_of_feature[match.first_index];
+      const auto landmarkOf = [&](int32_t track) {
+        return track >= 0 && data.tracks[track].position_m ? track : -1;
+      };
       result.rays.push_back(rays);
-      result.tracks.push_back(track >= 0 && data.tracks[track].position_m ? track : -1);
+      result.first_tracks.push_back(landmarkOf(first_image.track_of_feature[match.first_index]));
+      result.second_tracks.push_back(landmarkOf(second_image.track_of_feature[match.second_index]));
     }
   }
   return result;
@@ -63,6 +67,41 @@ LoopMatches matchKeyframes(const LoopClosureOptions& options, const MappingData&
 
 bool isUsable(const MotionEstimate& estimate) {
   return estimate.status == EstimationStatus::kOk || estimate.status == EstimationStatus::kScaleUnobservable;
+}
+
+/// Pose of one keyframe's rig in the vehicle's frame of the other, whose landmarks its rays meet.
+PoseEstimate poseAmongLandmarks(const LoopClosureOptions& options, const MappingData& data, int32_t reference,
+                                const LoopMatches& matches, const std::vector<int>& inliers,
+                                bool reference_is_second) {
+  const RigidTransform reference_from_map = data.keyframes[reference].map_from_vehicle.inverse();
+  const std::vector<int32_t>& tracks = reference_is_second ? matches.second_tracks : matches.first_tracks;
+  std::vector<PointMatch> points;
+  for (const int i : inliers) {
+    if (tracks[i] >= 0) {
+      PointMatch point;
+      point.ray = reference_is_second ? matches.rays[i].previous : matches.rays[i].current;
+      point.point_m = reference_from_map * *data.tracks[tracks[i]].position_m;
+      point.camera = reference_is_second ? matches.rays[i].previous_camera : matches.rays[i].current_camera;
+      point.quality = matches.rays[i].quality;
+      points.push_back(point);
+    }
+  }
+  return estimateAbsolutePose(points, options.robust);
+}
+
+/// Of target_from_source, over [dt, dphi] in the target's frame, to that of its inverse.
+Eigen::Matrix<double, 6, 6> covarianceOfInverse(const RigidTransform& target_from_source,
+                                                const Eigen::Matrix<double, 6, 6>& covariance) {
+  // source_from_target's translation is -R^T t: it moves by -R^T (dt - dphi x t), its rotation by -R^T dphi.
+  const Eigen::Matrix3d turn = target_from_source.rotationMatrix().transpose();
+  const Eigen::Vector3d& t = target_from_source.translation();
+  Eigen::Matrix3d cross;
+  cross << 0.0, -t.z(), t.y(), t.z(), 0.0, -t.x(), -t.y(), t.x(), 0.0;
+  Eigen::Matrix<double, 6, 6> jacobian = Eigen::Matrix<double, 6, 6>::Zero();
+  jacobian.topLeftCorner<3, 3>() = -turn;
+  jacobian.topRightCorner<3, 3>() = -turn * cross;
+  jacobian.bottomRightCorner<3, 3>() = -turn;
+  return jacobian * covariance * jacobian.transpose();
 }
 
 /// Turns the vehicle's frame upright: what the map knows of roll and pitch.
@@ -173,29 +212,26 @@ LoopEdge verifyLoop(const LoopClosureOptions& options, const MappingData& data, 
     edge.reason = "no motion explains enough matches";
     return edge;
   }
-  // Metric, and free to move in all directions: the later rig among the landmarks of the earlier one.
-  const RigidTransform first_from_map = data.keyframes[first].map_from_vehicle.inverse();
-  std::vector<PointMatch> points;
-  for (const int i : motion.inliers) {
-    if (matches.tracks[i] >= 0) {
-      PointMatch point;
-      point.ray = matches.rays[i].current;
-      point.point_m = first_from_map * *data.tracks[matches.tracks[i]].position_m;
-      point.camera = matches.rays[i].current_camera;
-      point.quality = matches.rays[i].quality;
-      points.push_back(point);
-    }
-  }
-  const PoseEstimate pose = estimateAbsolutePose(points, options.robust);
-  edge.num_inliers = static_cast<int>(pose.inliers.size());
-  if (pose.status != EstimationStatus::kOk) {
+  // Metric, and free to move in all directions: one rig among the landmarks of the other.
+  const PoseEstimate first_from_second =
+      poseAmongLandmarks(options, data, first, matches, motion.inliers, false);
+  const PoseEstimate second_from_first =
+      poseAmongLandmarks(options, data, second, matches, motion.inliers, true);
+  edge.num_inliers =
+      static_cast<int>(std::max(first_from_second.inliers.size(), second_from_first.inliers.size()));
+  if (edge.num_inliers == 0) {
     edge.reason = "too few landmarks agree";
     return edge;
   }
-  edge.first_from_second = pose.map_from_rig;
-  edge.covariance = pose.covariance;
-  if (angleOfRotation(motion.previous_from_current.rotation().conjugate() * pose.map_from_rig.rotation()) >
-      options.max_disagreement_rad) {
+  if (first_from_second.inliers.size() >= second_from_first.inliers.size()) {
+    edge.first_from_second = first_from_second.map_from_rig;
+    edge.covariance = first_from_second.covariance;
+  } else {
+    edge.first_from_second = second_from_first.map_from_rig.inverse();
+    edge.covariance = covarianceOfInverse(second_from_first.map_from_rig, second_from_first.covariance);
+  }
+  if (angleOfRotation(motion.previous_from_current.rotation().conjugate() *
+                      edge.first_from_second.rotation()) > options.max_disagreement_rad) {
     edge.reason = "matches and landmarks disagree";
   } else if (edge.covariance.topLeftCorner<3, 3>().trace() > options.max_sigma_m * options.max_sigma_m) {
     edge.reason = "too uncertain";

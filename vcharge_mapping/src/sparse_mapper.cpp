@@ -180,6 +180,9 @@ void SparseMapper::processFrame(Timestamp stamp, const PendingFrame& frame,
 
 void SparseMapper::addKeyframe(Timestamp stamp, const RigidTransform& odom_from_vehicle) {
   const auto index = static_cast<int32_t>(data_.keyframes.size());
+  if (index > 0) {
+    keyframe_from_next_.push_back(data_.keyframes.back().map_from_vehicle.inverse() * map_from_previous_);
+  }
   Keyframe keyframe;
   keyframe.stamp = stamp;
   keyframe.odom_from_vehicle = odom_from_vehicle;
@@ -210,8 +213,17 @@ std::shared_ptr<const SparseMap> SparseMapper::finish(const Progress& progress) 
     progress(name, 1.0);
   };
   BundleAdjustmentSummary bundle;
-  stage("triangulation", [&] { triangulateTracks(options_.triangulation, &data_); });
-  stage("first adjustment", [&] { bundle = adjustBundle(options_.bundle, &data_); });
+  stage("first adjustment", [&] {
+    // Chained motions bend: rays may miss their point by much more than they will in the end.
+    TriangulationOptions lenient = options_.triangulation;
+    lenient.max_error_rad = options_.first_max_error_rad;
+    BundleAdjustmentOptions lenient_bundle = options_.bundle;
+    lenient_bundle.outlier_sigmas = INFINITY;
+    triangulateTracks(lenient, &data_);
+    adjustBundle(lenient_bundle, &data_);
+    triangulateTracks(options_.triangulation, &data_);
+    bundle = adjustBundle(options_.bundle, &data_);
+  });
   std::shared_ptr<const VocabularyTree> vocabulary;
   stage("vocabulary", [&] { vocabulary = trainVocabulary(options_.loops, data_); });
   stage("loops", [&] {
@@ -242,8 +254,18 @@ std::shared_ptr<const SparseMap> SparseMapper::finish(const Progress& progress) 
 Trajectory SparseMapper::trajectory() const {
   Trajectory trajectory;
   for (const FramePose& frame : frames_) {
-    trajectory.push_back(
-        {frame.stamp, data_.keyframes[frame.keyframe].map_from_vehicle * frame.keyframe_from_vehicle});
+    const Keyframe& keyframe = data_.keyframes[frame.keyframe];
+    RigidTransform keyframe_from_vehicle = frame.keyframe_from_vehicle;
+    if (static_cast<size_t>(frame.keyframe) + 1 < data_.keyframes.size()) {
+      // What adjustment changed between two keyframes, in equal shares of time.
+      const Keyframe& next = data_.keyframes[frame.keyframe + 1];
+      const RigidTransform adjusted = keyframe.map_from_vehicle.inverse() * next.map_from_vehicle;
+      const double fraction =
+          toSeconds(frame.stamp - keyframe.stamp) / toSeconds(next.stamp - keyframe.stamp);
+      const RigidTransform change = adjusted * keyframe_from_next_[frame.keyframe].inverse();
+      keyframe_from_vehicle = interpolate(RigidTransform(), change, fraction) * keyframe_from_vehicle;
+    }
+    trajectory.push_back({frame.stamp, keyframe.map_from_vehicle * keyframe_from_vehicle});
   }
   return trajectory;
 }

@@ -21,22 +21,11 @@ double largestParallax(const std::vector<Ray>& rays) {
   return std::acos(std::max(-1.0, min_cosine));
 }
 
-}  // namespace
-
-void TriangulationOptions::validate() const {
-  requireField(min_parallax_rad > 0.0, "min_parallax_rad", "must be positive", min_parallax_rad);
-  requireField(min_range_m >= 0.0, "min_range_m", "must not be negative", min_range_m);
-  requireField(max_range_m > min_range_m, "max_range_m", "must be above min_range_m", max_range_m);
-  requireField(max_error_rad > 0.0, "max_error_rad", "must be positive", max_error_rad);
-  requireField(min_observations >= 2, "min_observations", "must be 2 or more", min_observations);
-}
-
-std::optional<Eigen::Vector3d> triangulate(const std::vector<Ray>& rays,
-                                           const TriangulationOptions& options) {
-  if (rays.size() < 2 || largestParallax(rays) < options.min_parallax_rad) {
+/// Least squares of the distances to the rays, each over its range, so that angles count.
+std::optional<Eigen::Vector3d> nearestPoint(const std::vector<Ray>& rays) {
+  if (rays.size() < 2) {
     return std::nullopt;
   }
-  // Least squares of the distances to the rays, each over the range, so that angles count.
   std::vector<double> weights(rays.size(), 1.0);
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   for (int iteration = 0; iteration < kIterations; ++iteration) {
@@ -56,12 +45,64 @@ std::optional<Eigen::Vector3d> triangulate(const std::vector<Ray>& rays,
       weights[i] = 1.0 / std::max(1e-4, (point - rays[i].origin_m).squaredNorm());
     }
   }
+  return point;
+}
+
+/// Sine of the angle between a ray and its point; infinite where the point is behind or out of range.
+double angularError(const Ray& ray, const Eigen::Vector3d& point, const TriangulationOptions& options) {
+  const Eigen::Vector3d to_point = point - ray.origin_m;
+  const double range_m = to_point.norm();
+  if (!(range_m >= options.min_range_m && range_m <= options.max_range_m) ||
+      to_point.dot(ray.direction) <= 0.0) {
+    return INFINITY;
+  }
+  return to_point.cross(ray.direction).norm() / range_m;
+}
+
+/// Triangulates without the rays that fit worst, as long as enough are left: a tracked patch may have
+/// slipped.
+std::optional<Eigen::Vector3d> triangulateMostOf(std::vector<Ray>* rays,
+                                                 const TriangulationOptions& options) {
+  while (static_cast<int>(rays->size()) >= options.min_observations) {
+    const std::optional<Eigen::Vector3d> point = nearestPoint(*rays);
+    if (!point || largestParallax(*rays) < options.min_parallax_rad) {
+      return std::nullopt;
+    }
+    size_t worst = 0;
+    double worst_error = 0.0;
+    for (size_t i = 0; i < rays->size(); ++i) {
+      const double error = angularError((*rays)[i], *point, options);
+      if (error > worst_error) {
+        worst_error = error;
+        worst = i;
+      }
+    }
+    if (worst_error <= options.max_error_rad) {
+      return point;
+    }
+    rays->erase(rays->begin() + static_cast<std::ptrdiff_t>(worst));
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+void TriangulationOptions::validate() const {
+  requireField(min_parallax_rad > 0.0, "min_parallax_rad", "must be positive", min_parallax_rad);
+  requireField(min_range_m >= 0.0, "min_range_m", "must not be negative", min_range_m);
+  requireField(max_range_m > min_range_m, "max_range_m", "must be above min_range_m", max_range_m);
+  requireField(max_error_rad > 0.0, "max_error_rad", "must be positive", max_error_rad);
+  requireField(min_observations >= 2, "min_observations", "must be 2 or more", min_observations);
+}
+
+std::optional<Eigen::Vector3d> triangulate(const std::vector<Ray>& rays,
+                                           const TriangulationOptions& options) {
+  const std::optional<Eigen::Vector3d> point = nearestPoint(rays);
+  if (!point || largestParallax(rays) < options.min_parallax_rad) {
+    return std::nullopt;
+  }
   for (const Ray& ray : rays) {
-    const Eigen::Vector3d to_point = point - ray.origin_m;
-    const double range_m = to_point.norm();
-    if (!(range_m >= options.min_range_m && range_m <= options.max_range_m) ||
-        to_point.dot(ray.direction) <= 0.0 ||
-        to_point.cross(ray.direction).norm() > options.max_error_rad * range_m) {
+    if (angularError(ray, *point, options) > options.max_error_rad) {
       return std::nullopt;
     }
   }
@@ -94,9 +135,7 @@ void triangulateTracks(const TriangulationOptions& options, MappingData* data) {
         rays.push_back(ray);
       }
     }
-    if (static_cast<int>(rays.size()) >= options.min_observations) {
-      track.position_m = triangulate(rays, options);
-    }
+    track.position_m = triangulateMostOf(&rays, options);
   });
 }
 

@@ -10,11 +10,13 @@ namespace vcharge {
 
 struct BundleAdjustmentOptions {
   int max_iterations = 25;
-  double huber_sigmas = 2.0;        ///< errors above count linearly
-  double outlier_sigmas = 6.0;      ///< observations with larger errors are removed
-  double min_parallax_rad = 0.015;  ///< landmarks whose remaining rays are more parallel are removed
-  int min_observations = 3;         ///< landmarks with fewer are removed
-  double max_range_m = 80.0;        ///< and those that are further from every camera
+  double loss_sigmas = 2.0;            ///< scale of the Cauchy loss
+  double outlier_sigmas = 5.0;         ///< observations with larger errors are removed
+  double min_parallax_rad = 0.015;     ///< landmarks whose remaining rays are more parallel are removed
+  int min_observations = 3;            ///< landmarks with fewer are removed
+  double max_range_m = 80.0;           ///< and those that are further from every camera
+  double odometer_scale_sigma = 0.03;  ///< of true over counted distance, before the drive
+  double odometer_turn_sigma = 0.05;   ///< of true over counted turn
   // What the odometer's motions between keyframes are good for.
   double odometry_distance_sigma = 0.005;  ///< of the distance
   double odometry_sigma_m = 0.005;         ///< besides
@@ -27,11 +29,13 @@ struct BundleAdjustmentOptions {
   template <class Visitor>
   void visitFields(Visitor&& visit) {
     visit("max_iterations", max_iterations);
-    visit("huber_sigmas", huber_sigmas);
+    visit("loss_sigmas", loss_sigmas);
     visit("outlier_sigmas", outlier_sigmas);
     visit("min_parallax_rad", min_parallax_rad);
     visit("min_observations", min_observations);
     visit("max_range_m", max_range_m);
+    visit("odometer_scale_sigma", odometer_scale_sigma);
+    visit("odometer_turn_sigma", odometer_turn_sigma);
     visit("odometry_distance_sigma", odometry_distance_sigma);
     visit("odometry_sigma_m", odometry_sigma_m);
     visit("odometry_turn_sigma", odometry_turn_sigma);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -23,6 +24,10 @@ struct FrameTrackerOptions {
   double min_spacing_px = 20.0;  ///< between a new track and those there are, at 1280 pixels of width
   /// A tracked point and a feature this close are the same.
   double max_association_px = 1.5;
+  /// At keyframes a patch is aligned with that of its anchor, so that it does not drift away from step to
+  /// step. Where that moves it by more, the patch looks different by now, and this keyframe becomes its
+  /// anchor.
+  double max_alignment_px = 2.0;
   double tracking_sigma_px = 0.3;  ///< standard deviation of a tracked position
   PatchTrackerOptions patches = smallPatches();
 
@@ -33,6 +38,7 @@ struct FrameTrackerOptions {
     visit("max_tracks_per_camera", max_tracks_per_camera);
     visit("min_spacing_px", min_spacing_px);
     visit("max_association_px", max_association_px);
+    visit("max_alignment_px", max_alignment_px);
     visit("tracking_sigma_px", tracking_sigma_px);
     visit("patches", patches);
   }
@@ -44,6 +50,8 @@ struct LiveTrack {
   int32_t track = -1;  ///< index into MappingData::tracks
   cv::Point2f position_px;
   Eigen::Vector3d ray_in_camera;
+  int32_t anchor_keyframe = 0;  ///< whose image shows the patch that is followed
+  cv::Point2f anchor_px;
 };
 
 /// Follows the points of one camera through its images.
@@ -68,6 +76,7 @@ class CameraTracker {
   size_t numTracks() const { return tracks_.size(); }
 
  private:
+  void alignWithAnchors(int32_t keyframe);
   cv::Point2f predict(const LiveTrack& track, const RigidTransform& current_from_previous) const;
 
   const RigCamera& camera_;
@@ -78,6 +87,7 @@ class CameraTracker {
   Image image_;
   ImagePyramid pyramid_;
   std::vector<LiveTrack> tracks_;
+  std::map<int32_t, ImagePyramid> anchors_;  // by keyframe, while a track has it
 };
 
 }  // namespace vcharge

@@ -13,6 +13,7 @@ struct LandmarkSearchOptions {
   double max_distance_m = 10.0;     ///< between keyframes whose landmarks are looked for in each other
   double max_view_angle_rad = 0.6;  ///< between the directions from which a landmark is seen
   double max_range_ratio = 1.8;     ///< between the distances
+  double max_merge_ratio = 1.25;    ///< between the distances of two landmarks that may be one
   double feature_sigma_px = 0.6;    ///< standard deviation of a feature's position
   MatchOptions matching = closeMatches();
 
@@ -24,6 +25,7 @@ struct LandmarkSearchOptions {
     visit("max_distance_m", max_distance_m);
     visit("max_view_angle_rad", max_view_angle_rad);
     visit("max_range_ratio", max_range_ratio);
+    visit("max_merge_ratio", max_merge_ratio);
     visit("feature_sigma_px", feature_sigma_px);
     visit("matching", matching);
   }

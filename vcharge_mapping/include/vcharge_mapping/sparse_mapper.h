@@ -28,7 +28,8 @@ struct SparseMapperOptions {
   double frame_turn_rad = 0.01;    ///< and turned less
   double keyframe_distance_m = 0.5;
   double keyframe_turn_rad = 0.1;
-  double max_speed_m_per_s = 25.0;  ///< faster odometry is a reset of the counters
+  double max_speed_m_per_s = 25.0;    ///< faster odometry is a reset of the counters
+  double first_max_error_rad = 0.02;  ///< of rays to their point by poses that were not adjusted yet
   FeatureExtractorOptions features;
   FrameTrackerOptions tracker;
   EgoMotionOptions ego_motion;
@@ -44,6 +45,7 @@ struct SparseMapperOptions {
     visit("keyframe_distance_m", keyframe_distance_m);
     visit("keyframe_turn_rad", keyframe_turn_rad);
     visit("max_speed_m_per_s", max_speed_m_per_s);
+    visit("first_max_error_rad", first_max_error_rad);
     visit("features", features);
     visit("tracker", tracker);
     visit("ego_motion", ego_motion);
@@ -115,7 +117,8 @@ class SparseMapper : public DriveConsumer {
     RigidTransform keyframe_from_vehicle;
   };
   MappingData data_;
-  std::vector<FramePose> frames_;  // that were followed
+  std::vector<FramePose> frames_;                   // that were followed
+  std::vector<RigidTransform> keyframe_from_next_;  // as the motions between them add up
   bool has_previous_ = false;
   RigidTransform previous_odom_from_vehicle_;
   RigidTransform map_from_previous_;
