@@ -7,6 +7,9 @@
 namespace vcharge {
 namespace {
 
+/// How much less certain the odometer is where the wheels slip.
+constexpr double kSlipFactor = 20.0;
+
 /// x, y (metres) and yaw (radians) of a motion, and their covariance.
 struct PlanarMotion {
   Eigen::Vector3d value;
@@ -126,7 +129,10 @@ EgoMotion estimateEgoMotion(const std::vector<RayMatch>& matches,
   if (!isUsable(best)) {
     return result;
   }
-  const PlanarMotion odometry = odometryMotion(odometry_previous_from_current, options);
+  PlanarMotion odometry = odometryMotion(odometry_previous_from_current, options);
+  if (hypothesis == MotionHypothesis::kPlanar) {
+    odometry.covariance *= kSlipFactor * kSlipFactor;  // wheels that slip count wrongly
+  }
   const Eigen::Vector3d fused = fuse(visualMotion(best, odometry, options), odometry);
   result.hypothesis = hypothesis;
   const RigidTransform planar = RigidTransform::planar(fused.x(), fused.y(), fused.z());
