@@ -42,7 +42,11 @@ void writeFileAtomically(const std::string& path,
                                        ".tmp" + target.extension().string());
   try {
     write(temporary.string());
-    fs::rename(temporary, target);
+    std::error_code error;
+    fs::rename(temporary, target, error);
+    if (error) {
+      throw InputError(path + ": cannot be written: " + error.message());
+    }
   } catch (...) {
     std::error_code ignored;
     fs::remove(temporary, ignored);
