@@ -66,6 +66,9 @@ void writeTextFileAtomically(const std::string& path, const std::string& text) {
 }
 
 FolderTransaction::FolderTransaction(std::string path) : final_(std::move(path)) {
+  while (final_.size() > 1 && final_.back() == '/') {
+    final_.pop_back();  // the temporary folder stands beside, not inside
+  }
   if (fs::exists(final_) && !fs::is_directory(final_)) {
     throw InputError(final_ + ": expected a folder, is a file");
   }

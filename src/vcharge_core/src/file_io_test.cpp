@@ -66,6 +66,16 @@ TEST_F(FileIoTest, FolderAppearsAsAWholeOrNotAtAll) {
   EXPECT_EQ(countFiles(), 1);
 }
 
+TEST_F(FileIoTest, FolderMayBeNamedWithASlashAtItsEnd) {
+  for (const char* text : {"new", "newer"}) {
+    FolderTransaction transaction(folder_ + "/results//");
+    writeTextFileAtomically(transaction.path() + "/a.txt", text);
+    transaction.commit();
+    EXPECT_EQ(readTextFile(folder_ + "/results/a.txt"), text);
+  }
+  EXPECT_EQ(countFiles(), 1);
+}
+
 TEST_F(FileIoTest, FolderInPlaceOfAFileIsAnError) {
   writeTextFileAtomically(folder_ + "/file", "x");
   EXPECT_THROW(FolderTransaction(folder_ + "/file"), InputError);
