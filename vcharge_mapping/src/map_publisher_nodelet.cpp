@@ -1,3 +1,4 @@
+#include <exception>
 #include <memory>
 
 #include <nodelet/nodelet.h>
@@ -13,6 +14,15 @@ namespace vcharge {
 /// the frame `map`. Does not load where the map cannot be read, and says why. Parameters: ~map (path).
 class MapPublisherNodelet : public nodelet::Nodelet {
   void onInit() override {
+    try {
+      publishMap();
+    } catch (const std::exception& error) {
+      NODELET_FATAL_STREAM(error.what());  // the manager would only tell that it did not load
+      throw;
+    }
+  }
+
+  void publishMap() {
     const std::string path =
         requireStringParameter(getPrivateNodeHandle(), "map", "the path of a map (*.vmap)");
     const auto map = readSparseMap(path);
