@@ -76,7 +76,11 @@ FolderTransaction::FolderTransaction(std::string path) : final_(std::move(path))
   temporary_ =
       (target.parent_path() / ("." + target.filename().string() + "." + std::to_string(getpid()) + ".tmp"))
           .string();
-  createFolder(temporary_);
+  std::error_code error;
+  fs::create_directories(temporary_, error);
+  if (error) {
+    throw InputError(final_ + ": the folder cannot be created: " + error.message());
+  }
 }
 
 FolderTransaction::~FolderTransaction() {

@@ -79,6 +79,12 @@ TEST_F(FileIoTest, FolderMayBeNamedWithASlashAtItsEnd) {
 TEST_F(FileIoTest, FolderInPlaceOfAFileIsAnError) {
   writeTextFileAtomically(folder_ + "/file", "x");
   EXPECT_THROW(FolderTransaction(folder_ + "/file"), InputError);
+  try {
+    const FolderTransaction below(folder_ + "/file/results");
+    ADD_FAILURE();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find(folder_ + "/file/results: "), std::string::npos) << error.what();
+  }
   EXPECT_EQ(countFiles(), 1);
 }
 

@@ -10,7 +10,7 @@
 namespace vcharge {
 namespace {
 
-constexpr double kLineWidth_m = 0.08;
+constexpr double kLineWidth_m = 0.15;
 
 visualization_msgs::Marker makeEdges(const SparseMap& map, bool accepted, const std::string& frame_id) {
   visualization_msgs::Marker marker;
@@ -22,7 +22,7 @@ visualization_msgs::Marker makeEdges(const SparseMap& map, bool accepted, const 
   marker.color.r = accepted ? 0.1F : 1.0F;
   marker.color.g = accepted ? 0.9F : 0.2F;
   marker.color.b = 0.1F;
-  marker.color.a = accepted ? 1.0F : 0.5F;
+  marker.color.a = accepted ? 1.0F : 0.8F;
   for (const MapLoopEdge& edge : map.contents().loop_edges) {
     if (edge.accepted != accepted) {
       continue;

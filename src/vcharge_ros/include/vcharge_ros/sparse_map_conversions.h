@@ -17,7 +17,7 @@ sensor_msgs::PointCloud2 makeLandmarkCloud(const SparseMap& map, const std::stri
 /// Poses of the vehicle at the keyframes, with their stamps.
 nav_msgs::Path makePath(const SparseMap& map, const std::string& frame_id = "map");
 
-/// Two line lists between keyframes, in the namespaces "accepted" (green) and "rejected" (red, half
+/// Two line lists between keyframes, in the namespaces "accepted" (green) and "rejected" (red, a little
 /// transparent). A list without edges is a DELETE of what an earlier map showed.
 visualization_msgs::MarkerArray makeLoopEdgeMarkers(const SparseMap& map,
                                                     const std::string& frame_id = "map");
