@@ -7,6 +7,8 @@
 #include <map>
 #include <vector>
 
+#include "vcharge_core/error.h"
+
 namespace vcharge {
 namespace {
 
@@ -14,17 +16,22 @@ constexpr double kDegreesPerRadian = 57.29577951308232;
 
 /// Appends as printf does.
 __attribute__((format(printf, 2, 3))) void append(std::string* text, const char* format, ...) {
-  char line[512];
-  va_list arguments;
+  va_list arguments, again;
   va_start(arguments, format);
-  std::vsnprintf(line, sizeof(line), format, arguments);
+  va_copy(again, arguments);
+  const int length = std::vsnprintf(nullptr, 0, format, arguments);
   va_end(arguments);
-  *text += line;
+  check(length >= 0, "append: bad format");
+  const size_t old_size = text->size();
+  text->resize(old_size + static_cast<size_t>(length) + 1);  // vsnprintf ends with a zero
+  std::vsnprintf(&(*text)[old_size], static_cast<size_t>(length) + 1, format, again);
+  va_end(again);
+  text->pop_back();
 }
 
 /// The value that a share of the values does not exceed; values must not be empty.
 double percentile(std::vector<double>* values, double share) {
-  const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(values->size() - 1) + 0.5);
+  const std::ptrdiff_t rank = std::lround(share * static_cast<double>(values->size() - 1));
   std::nth_element(values->begin(), values->begin() + rank, values->end());
   return (*values)[static_cast<size_t>(rank)];
 }

@@ -84,6 +84,7 @@ class Reader {
       : path_(path),
         file_size_(fs::file_size(path)),
         database_(path, path, SqliteDatabase::Access::kReadOnly) {
+    checkIntegrity();
     checkTables();
   }
 
@@ -116,6 +117,14 @@ class Reader {
   }
 
  private:
+  /// SQLite's own check finds what no hash covers, and tells where.
+  void checkIntegrity() {
+    SqliteStatement check(database_, "PRAGMA integrity_check(1)");
+    if (!check.step() || check.text(0) != "ok") {
+      damaged(check.text(0));
+    }
+  }
+
   /// Only tables just as they were created are read: no views, no generated columns.
   void checkTables() {
     for (const Table& table : tables()) {
