@@ -19,7 +19,7 @@ from drive_fixture import run, tool  # noqa: E402
 PACKAGES = rospkg.RosPack()
 LAUNCH = pathlib.Path(PACKAGES.get_path("vcharge_launch"))
 CONFIG = pathlib.Path(PACKAGES.get_path("vcharge_config"))
-NODELET_PACKAGES = ("vcharge_ros", "vcharge_dense")
+NODELET_PACKAGES = ("vcharge_ros", "vcharge_dense", "vcharge_mapping")
 
 
 def nodelet_types():
@@ -28,6 +28,10 @@ def nodelet_types():
         plugins = ElementTree.parse(pathlib.Path(PACKAGES.get_path(package)) / "nodelet_plugins.xml")
         types.update(entry.get("name") for entry in plugins.iter("class"))
     return types
+
+
+def all_arguments(path):
+    return [arg.get("name") for arg in ElementTree.parse(path).getroot().findall("arg") if arg.get("value") is None]
 
 
 def required_arguments(path):
@@ -51,7 +55,7 @@ class LaunchFilesTest(unittest.TestCase):
     def test_every_launch_file_parses_and_names_nodes_that_exist(self):
         for path in self.launch_files:
             for arguments in ({}, {"rviz": "true"}, {"rviz": "false", "loop": "true"}):
-                config = load(path, **arguments)
+                config = load(path, **{k: v for k, v in arguments.items() if k in all_arguments(path)})
                 self.assertEqual(config.config_errors, [], path.name)
                 self.assertTrue(config.nodes, path.name)
                 for node in config.nodes:
@@ -69,6 +73,10 @@ class LaunchFilesTest(unittest.TestCase):
 
     def test_arguments_reach_the_nodes(self):
         for path in self.launch_files:
+            if "map" in required_arguments(path):  # shows what was saved, and replays nothing
+                config = load(path, map="/maps/lot.vmap")
+                self.assertEqual(config.params["/map_publisher/map"].value, "/maps/lot.vmap", path.name)
+                continue
             config = load(path, **({"folder": "/drives"} if "folder" in required_arguments(path) else
                                    {"bag": "/drives/drive.bag", "rig": "/drives/rig_truth.yaml"}))
             parameters = {name: parameter.value for name, parameter in config.params.items()}
@@ -123,12 +131,13 @@ class LaunchFilesTest(unittest.TestCase):
     def test_rviz_configurations_show_topics_that_are_published(self):
         cameras = yaml.safe_load((CONFIG / "rigs" / "golf_nominal.yaml").read_text())["cameras"]
         published = re.compile(rf"/camera/({'|'.join(cameras)})/image_raw|"
-                               rf"/dense/({'|'.join(cameras)})/(points|range/(image|confidence|standard_deviation))")
+                               rf"/dense/({'|'.join(cameras)})/(points|range/(image|confidence|standard_deviation))|"
+                               r"/mapping/(landmarks|trajectory|loop_edges)")
 
         def topics(node):
             if isinstance(node, dict):
                 for key, value in node.items():
-                    if key in ("Topic", "Image Topic") and value:
+                    if key in ("Topic", "Image Topic", "Marker Topic") and value:
                         yield value
                     else:
                         yield from topics(value)

@@ -3,6 +3,7 @@
 import os
 import pathlib
 import shutil
+import sqlite3
 import sys
 import tempfile
 import unittest
@@ -54,6 +55,7 @@ class ToolsTest(unittest.TestCase):
                 "--rig": cls.good / "rig.yaml"}),
             "evaluate_trajectory": (tool("vcharge_evaluation", "evaluate_trajectory"), {
                 "--estimate": cls.good / "truth" / "trajectory.tum", "--truth": cls.good / "truth" / "trajectory.tum"}),
+            "map_info": (tool("vcharge_mapping", "map_info"), {"--map": cls.good / "map.vmap"}),
             "simulate": (tool("vcharge_simulation", "simulate_drive"), {"--output": cls.good / "simulated.bag"}),
         }
         cls.succeed("import")
@@ -67,6 +69,8 @@ class ToolsTest(unittest.TestCase):
             f"{stamp // 10**9}.{stamp % 10**9:09d} {2.5e-9 * stamp:.6f} 0 0 0 0 0 1\n" for stamp in stamps))
         cls.succeed("evaluate_range")
         cls.succeed("evaluate_trajectory")
+        run([tool("vcharge_mapping", "write_analytic_map"), "--output", cls.good / "map.vmap"])
+        cls.succeed("map_info")
 
     @classmethod
     def tearDownClass(cls):
@@ -141,15 +145,16 @@ class ToolsTest(unittest.TestCase):
         for name, (program, _) in self.tools.items():
             status, output, errors = run([program, "--help"])
             self.assertEqual((status, errors), (0, []), name)
-            self.assertIn("--output" if name in ("import", "compute", "simulate") else "--truth", output)
+            expected = {"import": "--output", "compute": "--output", "simulate": "--output", "map_info": "--map"}
+            self.assertIn(expected.get(name, "--truth"), output)
 
     def test_missing_required_options_are_named(self):
-        for name in ("import", "compute", "evaluate_range", "evaluate_trajectory"):
+        for name in ("import", "compute", "evaluate_range", "evaluate_trajectory", "map_info"):
             for option in self.tools[name][1]:
                 self.fail_with(name, [option, "required"], **{option[2:]: None})
 
     def test_unknown_options_and_words_for_numbers_are_named(self):
-        for name in ("import", "compute", "evaluate_range", "evaluate_trajectory"):
+        for name in ("import", "compute", "evaluate_range", "evaluate_trajectory", "map_info"):
             self.fail_with(name, ["--no-such-option"], no_such_option="1")
         self.fail_with("import", ["--ground-height-m", "low"], ground_height_m="low")
 
@@ -201,6 +206,26 @@ class ToolsTest(unittest.TestCase):
             (folder / name).write_bytes(good)
         shutil.rmtree(truth / "range")
         self.fail_with("evaluate_range", [truth / "range", "no truth"], truth=truth)
+
+    def test_bad_maps_are_named(self):
+        self.fail_with("map_info", ["none.vmap", "no such file"], map=self.work / "none.vmap")
+        self.fail_with("map_info", [self.garbage("garbage.vmap"), "SQLite"], map=self.work / "garbage.vmap")
+        self.fail_with("map_info", [self.work, "folder"], map=self.work)
+        whole = (self.good / "map.vmap").read_bytes()
+        for name, content, words in (
+                ("empty.vmap", b"", ["is empty"]),
+                ("cut.vmap", whole[:len(whole) // 2], ["truncated", len(whole)]),
+                ("newer.vmap", whole[:60] + b"\0\0\0\x09" + whole[64:], ["version 9", "newer"])):
+            (self.work / name).write_bytes(content)
+            self.fail_with("map_info", [name, *words], map=self.work / name, export_ply=self.work / "new.ply")
+        for name, sql, words in (("moved.vmap", "UPDATE landmark SET z_m = z_m + 1", ["damaged", "hash"]),
+                                 ("index.vmap", "UPDATE loop_edge SET first = 24", ["loop_edges[0]"])):
+            shutil.copy(self.good / "map.vmap", self.work / name)
+            connection = sqlite3.connect(str(self.work / name))
+            with connection:
+                connection.execute(sql)
+            connection.close()
+            self.fail_with("map_info", [name, *words], map=self.work / name)
 
     def test_numbers_out_of_range_are_named(self):
         for value in ("nan", "-1", "0", "inf"):
@@ -254,11 +279,16 @@ class ToolsTest(unittest.TestCase):
         self.fail_with("compute", [blocked / "new"], output=blocked / "new")
         self.fail_with("evaluate_range", [blocked / "new"], report=blocked / "new")
         self.fail_with("evaluate_trajectory", [blocked / "new"], report=blocked / "new")
+        for option in ("export_ply", "export_colmap", "trajectory"):
+            self.fail_with("map_info", [blocked / "new"], **{option: blocked / "new"})
+        self.fail_with("map_info", [self.work, "blocked", "COLMAP"], export_colmap=self.work)
         folder = self.work / "folder.bag"
         folder.mkdir()
         self.fail_with("import", [folder, "folder"], output=folder)
         for name, option in (("import", "output"), ("import", "rig"), ("compute", "output"),
-                             ("evaluate_range", "report"), ("evaluate_trajectory", "report")):
+                             ("evaluate_range", "report"), ("evaluate_trajectory", "report"),
+                             ("map_info", "map"), ("map_info", "export-ply"), ("map_info", "export-colmap"),
+                             ("map_info", "trajectory")):
             self.fail_with(name, [f"--{option}", "expected a path"], **{option: ""})
 
     def test_existing_outputs_outlive_a_failure(self):

@@ -1,12 +1,18 @@
+#include <fstream>
 #include <iostream>
+#include <map>
 #include <memory>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include "vcharge_core/camera_rig.h"
 #include "vcharge_core/command_line.h"
+#include "vcharge_core/content_hash.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/options.h"
 #include "vcharge_core/progress_bar.h"
+#include "vcharge_core/sparse_map_file.h"
 #include "vcharge_core/trajectory.h"
 #include "vcharge_mapping/sparse_mapper.h"
 #include "vcharge_ros/bag_drive_source.h"
@@ -51,6 +57,17 @@ void printReport(const SparseMapperReport& report, const SparseMap& map) {
   std::cout << "\ncontent hash: " << map.contentHash() << "\n";
 }
 
+/// Of the whole file: a map's provenance should tell two recordings of one name apart.
+std::string hashOfFile(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  ContentHasher hasher;
+  std::vector<char> buffer(1 << 20);
+  while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || file.gcount() > 0) {
+    hasher.addBytes(buffer.data(), static_cast<size_t>(file.gcount()));
+  }
+  return hasher.hex();
+}
+
 void buildMap(const Arguments& arguments, const SparseMapperOptions& options) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   SparseMapper mapper(rig, options);
@@ -70,6 +87,15 @@ void buildMap(const Arguments& arguments, const SparseMapperOptions& options) {
     bar->update(fraction);
   });
   bar.reset();
+  std::ostringstream option_text;
+  option_text << writeFields(options);
+  writeSparseMap(*map,
+                 {{"bag", arguments.bag},
+                  {"bag_hash", hashOfFile(arguments.bag)},
+                  {"rig", arguments.rig},
+                  {"mapper_options", option_text.str()},
+                  {"program", "build_map 0.1.0"}},
+                 arguments.output);
   if (!arguments.trajectory.empty()) {
     writeTrajectory(mapper.trajectory(), arguments.trajectory);
   }

@@ -83,7 +83,10 @@ RigidTransform readExtrinsics(const Entry& entry, std::optional<Eigen::Matrix<do
     }
     *covariance = matrix;
   }
-  return RigidTransform(rotation, Eigen::Vector3d(t[0], t[1], t[2]));
+  const Eigen::Vector3d translation_m(t[0], t[1], t[2]);
+  // Scaling anew what was written as a unit quaternion would change its last bits.
+  return std::abs(rotation.norm() - 1.0) <= 1e-12 ? RigidTransform::fromUnit(rotation, translation_m)
+                                                  : RigidTransform(rotation, translation_m);
 }
 
 cv::Mat readMask(const Entry& entry, const std::string& folder, cv::Size size) {
@@ -176,6 +179,10 @@ std::string exactList(const Container& values) {
   return text + "]";
 }
 
+std::string maskFileOf(const RigCamera& camera) {
+  return camera.mask_file.empty() ? camera.name + "_mask.png" : camera.mask_file;
+}
+
 }  // namespace
 
 bool isCameraName(const std::string& name) {
@@ -256,8 +263,7 @@ CameraRig parseCameraRig(const std::string& text, const std::string& source, con
   return rig;
 }
 
-void writeCameraRig(const CameraRig& rig, const std::string& path) {
-  const fs::path folder = fs::path(path).parent_path();
+std::string formatCameraRig(const CameraRig& rig) {
   std::string text = "vehicle_frame: " + rig.vehicle_frame + "\ncameras:\n";
   for (const RigCamera& camera : rig.cameras) {
     text += "  " + camera.name + ":\n";
@@ -272,13 +278,7 @@ void writeCameraRig(const CameraRig& rig, const std::string& path) {
     }
     text += "}\n    field_of_view_rad: " + exact(camera.field_of_view_rad) + "\n";
     if (!camera.mask.empty()) {
-      const std::string mask_file = camera.mask_file.empty() ? camera.name + "_mask.png" : camera.mask_file;
-      writeFileAtomically((folder / mask_file).string(), [&](const std::string& temporary) {
-        if (!cv::imwrite(temporary, camera.mask)) {
-          throw InputError((folder / mask_file).string() + ": cannot be written");
-        }
-      });
-      text += "    mask: " + mask_file + "\n";
+      text += "    mask: " + maskFileOf(camera) + "\n";
     }
     if (camera.vehicle_from_camera) {
       const RigidTransform& transform = *camera.vehicle_from_camera;
@@ -294,7 +294,22 @@ void writeCameraRig(const CameraRig& rig, const std::string& path) {
       }
     }
   }
-  writeTextFileAtomically(path, text);
+  return text;
+}
+
+void writeCameraRig(const CameraRig& rig, const std::string& path) {
+  const fs::path folder = fs::path(path).parent_path();
+  for (const RigCamera& camera : rig.cameras) {
+    if (!camera.mask.empty()) {
+      const std::string mask_path = (folder / maskFileOf(camera)).string();
+      writeFileAtomically(mask_path, [&](const std::string& temporary) {
+        if (!cv::imwrite(temporary, camera.mask)) {
+          throw InputError(mask_path + ": cannot be written");
+        }
+      });
+    }
+  }
+  writeTextFileAtomically(path, formatCameraRig(rig));
 }
 
 void checkImageSize(const RigCamera& camera, cv::Size size, const std::string& source) {

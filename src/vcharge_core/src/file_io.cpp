@@ -42,7 +42,11 @@ void writeFileAtomically(const std::string& path,
                                        ".tmp" + target.extension().string());
   try {
     write(temporary.string());
-    fs::rename(temporary, target);
+    std::error_code error;
+    fs::rename(temporary, target, error);
+    if (error) {
+      throw InputError(path + ": cannot be written: " + error.message());
+    }
   } catch (...) {
     std::error_code ignored;
     fs::remove(temporary, ignored);
@@ -62,6 +66,9 @@ void writeTextFileAtomically(const std::string& path, const std::string& text) {
 }
 
 FolderTransaction::FolderTransaction(std::string path) : final_(std::move(path)) {
+  while (final_.size() > 1 && final_.back() == '/') {
+    final_.pop_back();  // the temporary folder stands beside, not inside
+  }
   if (fs::exists(final_) && !fs::is_directory(final_)) {
     throw InputError(final_ + ": expected a folder, is a file");
   }
@@ -69,7 +76,11 @@ FolderTransaction::FolderTransaction(std::string path) : final_(std::move(path))
   temporary_ =
       (target.parent_path() / ("." + target.filename().string() + "." + std::to_string(getpid()) + ".tmp"))
           .string();
-  createFolder(temporary_);
+  std::error_code error;
+  fs::create_directories(temporary_, error);
+  if (error) {
+    throw InputError(final_ + ": the folder cannot be created: " + error.message());
+  }
 }
 
 FolderTransaction::~FolderTransaction() {

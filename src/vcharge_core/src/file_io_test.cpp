@@ -66,9 +66,25 @@ TEST_F(FileIoTest, FolderAppearsAsAWholeOrNotAtAll) {
   EXPECT_EQ(countFiles(), 1);
 }
 
+TEST_F(FileIoTest, FolderMayBeNamedWithASlashAtItsEnd) {
+  for (const char* text : {"new", "newer"}) {
+    FolderTransaction transaction(folder_ + "/results//");
+    writeTextFileAtomically(transaction.path() + "/a.txt", text);
+    transaction.commit();
+    EXPECT_EQ(readTextFile(folder_ + "/results/a.txt"), text);
+  }
+  EXPECT_EQ(countFiles(), 1);
+}
+
 TEST_F(FileIoTest, FolderInPlaceOfAFileIsAnError) {
   writeTextFileAtomically(folder_ + "/file", "x");
   EXPECT_THROW(FolderTransaction(folder_ + "/file"), InputError);
+  try {
+    const FolderTransaction below(folder_ + "/file/results");
+    ADD_FAILURE();
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find(folder_ + "/file/results: "), std::string::npos) << error.what();
+  }
   EXPECT_EQ(countFiles(), 1);
 }
 

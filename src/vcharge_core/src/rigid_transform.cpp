@@ -50,6 +50,14 @@ RigidTransform::RigidTransform(const Eigen::Quaterniond& rotation, const Eigen::
   rotation_.coeffs() /= norm;
 }
 
+RigidTransform RigidTransform::fromUnit(const Eigen::Quaterniond& rotation,
+                                        const Eigen::Vector3d& translation_m) {
+  check(std::abs(rotation.norm() - 1.0) <= 1e-12, "RigidTransform: expected a unit quaternion");
+  RigidTransform transform(rotation, translation_m);
+  transform.rotation_ = rotation;
+  return transform;
+}
+
 RigidTransform RigidTransform::fromMatrix(const Eigen::Matrix<double, 3, 4>& matrix) {
   check(matrix.allFinite(), "RigidTransform::fromMatrix: matrix must be finite");
   const Eigen::Matrix3d linear = matrix.leftCols<3>();

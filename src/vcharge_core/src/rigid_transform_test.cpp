@@ -67,6 +67,19 @@ TEST(RigidTransformTest, InterpolatesAlongTheShortWay) {
   expectNear(interpolate(from, to, 0.5), RigidTransform::planar(1.0, 2.0, M_PI), 1e-12);
 }
 
+TEST(RigidTransformTest, TakesAUnitQuaternionAsItIs) {
+  // Scaling such a quaternion anew changes a bit here and there.
+  for (int i = 0; i < 1000; ++i) {
+    const RigidTransform product = RigidTransform(rotationFromYawPitchRoll(0.1 * i, 0.03 * i, -0.7 * i),
+                                                  Eigen::Vector3d(i, 1.0 / 3.0, -0.0));
+    const RigidTransform kept = RigidTransform::fromUnit(product.rotation(), product.translation());
+    ASSERT_EQ(kept.rotation().coeffs(), product.rotation().coeffs());
+    ASSERT_EQ(kept.translation(), product.translation());
+  }
+  EXPECT_THROW(RigidTransform::fromUnit(Eigen::Quaterniond(1.001, 0, 0, 0), Eigen::Vector3d::Zero()),
+               std::logic_error);
+}
+
 TEST(RigidTransformTest, RefusesWhatIsNoTransform) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THROW(RigidTransform(Eigen::Quaterniond(0, 0, 0, 0), Eigen::Vector3d::Zero()), std::logic_error);

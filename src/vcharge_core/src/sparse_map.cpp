@@ -71,7 +71,12 @@ void sortObservations(SparseMapContents* contents) {
     const MapObservation& observation = contents->observations[i];
     return std::make_tuple(observation.keyframe, observation.camera, observation.landmark);
   };
-  std::sort(order.begin(), order.end(), [&](size_t a, size_t b) { return key(a) < key(b); });
+  const auto isBefore = [&](size_t a, size_t b) { return key(a) < key(b); };
+  const auto isNotBefore = [&](size_t a, size_t b) { return !isBefore(a, b); };
+  if (std::adjacent_find(order.begin(), order.end(), isNotBefore) == order.end()) {
+    return;  // as in every map that was saved
+  }
+  std::sort(order.begin(), order.end(), isBefore);
   std::vector<MapObservation> observations;
   observations.reserve(order.size());
   cv::Mat descriptors(contents->descriptors.size(), contents->descriptors.type());

@@ -51,6 +51,8 @@ class CameraRig {
 CameraRig readCameraRig(const std::string& path);
 /// As readCameraRig from a text; `source` names it in errors, masks are looked up in `mask_folder`.
 CameraRig parseCameraRig(const std::string& text, const std::string& source, const std::string& mask_folder);
+/// The text of rig.yaml, numbers exact to the last bit; masks are named, not written.
+std::string formatCameraRig(const CameraRig& rig);
 /// Writes rig.yaml, numbers exact to the last bit, and the masks beside it. Replaces the file only once it is
 /// complete.
 void writeCameraRig(const CameraRig& rig, const std::string& path);

@@ -23,6 +23,9 @@ class RigidTransform {
   RigidTransform() : rotation_(Eigen::Quaterniond::Identity()), translation_(Eigen::Vector3d::Zero()) {}
   /// Normalizes the rotation; std::logic_error when it is zero or anything is not finite.
   RigidTransform(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation_m);
+  /// Takes a unit quaternion as it is, to the last bit: for what rotation() gave and a file kept.
+  /// std::logic_error unless its norm is 1 within 1e-12 and all is finite.
+  static RigidTransform fromUnit(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation_m);
   /// From the upper three rows [R|t]; R is replaced by the nearest rotation. std::logic_error when not
   /// finite.
   static RigidTransform fromMatrix(const Eigen::Matrix<double, 3, 4>& matrix);

@@ -5,7 +5,7 @@
 #include <sensor_msgs/CameraInfo.h>
 
 #include "vcharge_core/camera_rig.h"
-#include "vcharge_ros/equidistant_fit.h"
+#include "vcharge_core/equidistant_fit.h"
 
 namespace vcharge {
 

@@ -1,4 +1,4 @@
-#include "vcharge_ros/equidistant_fit.h"
+#include "vcharge_core/equidistant_fit.h"
 
 #include <algorithm>
 #include <cmath>

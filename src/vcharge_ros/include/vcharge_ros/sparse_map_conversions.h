@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+
+#include <nav_msgs/Path.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <visualization_msgs/MarkerArray.h>
+
+#include "vcharge_core/sparse_map.h"
+
+namespace vcharge {
+
+/// Landmarks of a map as x, y, z (metres), observations (their count) and sigma_m (root of the trace of the
+/// covariance, NaN where unknown), all FLOAT32. Headers are stamped 0: valid at any time.
+sensor_msgs::PointCloud2 makeLandmarkCloud(const SparseMap& map, const std::string& frame_id = "map");
+
+/// Poses of the vehicle at the keyframes, with their stamps.
+nav_msgs::Path makePath(const SparseMap& map, const std::string& frame_id = "map");
+
+/// Two line lists between keyframes, in the namespaces "accepted" (green) and "rejected" (red, a little
+/// transparent). A list without edges is a DELETE of what an earlier map showed.
+visualization_msgs::MarkerArray makeLoopEdgeMarkers(const SparseMap& map,
+                                                    const std::string& frame_id = "map");
+
+}  // namespace vcharge
