@@ -34,6 +34,16 @@ DrivePlan planDriveOf(const DriveScenario& scenario) {
   return plan;
 }
 
+// Leaves every step-th image.
+template <class T>
+void thin(int step, std::vector<T>* list) {
+  size_t kept = 0;
+  for (size_t i = 0; i < list->size(); i += static_cast<size_t>(step)) {
+    (*list)[kept++] = std::move((*list)[i]);
+  }
+  list->resize(kept);
+}
+
 // Faults that change what is rendered cannot come from images that were rendered without them.
 void checkImagesCanBeReused(const FaultOptions& faults, const std::string& images_from) {
   for (const auto& [name, is_active] : {std::pair("bumped_camera", faults.bumped_camera.isActive()),
@@ -125,9 +135,11 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   const RecordedCameras cameras(scenario, truth_name);
   const CameraRig& rig = cameras.rig();
   const FaultOptions& faults = scenario.faults;
-  const SimulatedDrive drive =
+  SimulatedDrive drive =
       simulateDrive(plan.path, plan.motion, scenario.odometer, static_cast<uint64_t>(scenario.seed),
                     scenario.sensorSeed(), faults, plan.ground_height);
+  thin(scenario.image_step, &drive.world_from_vehicle);
+  thin(scenario.image_step, &drive.exposure_poses);
   const Timestamp start = drive.ground_truth.front().stamp;
 
   DriveBagWriter writer(recording.bag, rig);

@@ -2,13 +2,18 @@
 
 #include <cmath>
 #include <map>
+#include <set>
 #include <string>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 #include <opencv2/imgproc.hpp>
 
+#include "lot_layout.h"
 #include "reprojection.h"
+#include "scene_parts.h"
+#include "vcharge_simulation/car_model.h"
 #include "vcharge_simulation/drive_simulator.h"
 #include "vcharge_simulation/golf_rig.h"
 #include "vcharge_simulation/truth_maps.h"
@@ -180,6 +185,75 @@ TEST(CatalogueTest, EveryDriveStaysInItsSceneAndLastsSomeSeconds) {
       for (const auto& [stamp, world_from_vehicle] : drive.world_from_vehicle) {
         ASSERT_LT(std::abs(world_from_vehicle.translation().x()), 31.0) << scene.name << " " << entry.name;
         ASSERT_LT(std::abs(world_from_vehicle.translation().y()), 21.0) << scene.name << " " << entry.name;
+      }
+    }
+  }
+}
+
+cv::Mat_<cv::Point2f> outlineOf(const std::vector<Eigen::Vector2d>& footprint_m) {
+  cv::Mat_<cv::Point2f> outline(static_cast<int>(footprint_m.size()), 1);
+  for (int i = 0; i < outline.rows; ++i) {
+    const Eigen::Vector2f corner = footprint_m[static_cast<size_t>(i)].cast<float>();
+    outline(i) = {corner.x(), corner.y()};
+  }
+  return outline;
+}
+
+// Names of what the own car would touch on a drive of the given scene.
+std::set<std::string> touchedOn(const DrivePlan& plan, const std::vector<Obstacle>& obstacles) {
+  constexpr double kMirror_m = 0.1;
+  const CarShape& golf = carShapes().front();
+  std::vector<cv::Mat_<cv::Point2f>> outlines;
+  for (const Obstacle& obstacle : obstacles) {
+    outlines.push_back(outlineOf(obstacle.footprint_m));
+  }
+  std::set<std::string> touched;
+  const VehicleMotion motion(plan.path, plan.motion, 1, plan.ground_height);
+  for (int ms = 0; ms < static_cast<int>(motion.duration() * 1000.0); ms += 250) {
+    const RigidTransform place = motion.at(ms).world_from_planar;
+    const cv::Mat_<cv::Point2f> own = outlineOf(
+        orientedRectangle(place.translation().x(), place.translation().y(), yawOfRotation(place.rotation()),
+                          golf.rear(), golf.front(), 0.5 * golf.width + kMirror_m));
+    for (size_t i = 0; i < outlines.size(); ++i) {
+      const cv::Point2f corner = outlines[i](0);
+      const bool is_far =
+          std::abs(corner.x - own(0).x) + std::abs(corner.y - own(0).y) > 12.0F && obstacles[i].kind == "car";
+      cv::Mat overlap;
+      if (!is_far && cv::intersectConvexConvex(outlines[i], own, overlap) > 0.0F) {
+        touched.insert(obstacles[i].kind + " at " + std::to_string(corner.x) + ", " +
+                       std::to_string(corner.y));
+      }
+    }
+  }
+  return touched;
+}
+
+TEST_P(SceneTest, DrivesKeepClearOfAllThatStands) {
+  for (const CatalogueEntry& entry : listDrives(GetParam().scene)) {
+    const DrivePlan plan = planDrive(GetParam().scene, entry.name);
+    if (plan.day == 0) {
+      EXPECT_THAT(touchedOn(plan, renderer().scene().obstacles), testing::IsEmpty()) << entry.name;
+    }
+  }
+}
+
+// Parked cars are all that differs between the lots of different seeds and days on the lanes and bays.
+TEST(CatalogueTest, DrivesOfTheLotKeepClearOfParkedCarsForEverySeed) {
+  for (uint64_t seed = 1; seed <= 12; ++seed) {
+    for (const int day : {0, 1}) {
+      std::vector<Obstacle> cars;
+      for (const ParkedCar& car : makeLotLayout(seed, day, 0.3).cars) {
+        const CarShape& shape = carShapes()[static_cast<size_t>(car.shape)];
+        cars.push_back(
+            {"car",
+             orientedRectangle(car.x, car.y, car.yaw_rad, shape.rear(), shape.front(), 0.5 * shape.width),
+             0.0, shape.height});
+      }
+      for (const CatalogueEntry& entry : listDrives("lot")) {
+        const DrivePlan plan = planDrive("lot", entry.name);
+        if (plan.day == day) {
+          EXPECT_THAT(touchedOn(plan, cars), testing::IsEmpty()) << entry.name << ", seed " << seed;
+        }
       }
     }
   }

@@ -22,6 +22,7 @@ struct DriveScenario {
   int sensor_seed = -1;        ///< of wheels and image noise; negative: as `seed`
   double duration_s = 0.0;     ///< the drive ends early; 0: where its path ends
   double image_scale = 1.0;    ///< image size over 1280x800
+  int image_step = 1;          ///< only every so many of the 12.5 images a second
   double exposure_gain = 1.0;  ///< of the images over the camera's normal exposure
   bool noise = true;
   std::vector<std::string> cameras;  ///< by name; empty: all
@@ -41,6 +42,7 @@ struct DriveScenario {
     visit("sensor_seed", sensor_seed);
     visit("duration_s", duration_s);
     visit("image_scale", image_scale);
+    visit("image_step", image_step);
     visit("exposure_gain", exposure_gain);
     visit("noise", noise);
     visit("cameras", cameras);
