@@ -68,10 +68,7 @@ float SurfaceShader::shadeGroundPixel(const Material& material,
   const float stretch = stretchOf(direction);
   const GroundTexture& texture = scene_.ground.layers[static_cast<size_t>(material.texture)];
   const float level = fastLog2(groundSampleWidth(footprint_m, stretch) * texture.texels_per_m);
-  float albedo = 0.0F;
-  for (const Eigen::Vector3f& position : positions) {
-    albedo += 0.25F * texture.sampleAt(position.x(), position.y(), level);
-  }
+  const float albedo = texture.sampleMeanAt(positions, level);
   // The finer details at the middles of the two halves of the pixel, cut across its longer side.
   const Eigen::Vector3f upper = 0.5F * (positions[0] + positions[1]);
   const Eigen::Vector3f lower = 0.5F * (positions[2] + positions[3]);
@@ -123,13 +120,8 @@ float SurfaceShader::shadePixel(const std::array<SurfacePoint, 4>& points, float
                             points[0].direction, points[0].footprint_m, sun_visibility);
   }
   const Interpolated surface = interpolate(points[0]);
-  float albedo = material.albedo;
-  if (material.mapping == Material::Mapping::kTexture) {
-    albedo = 0.0F;
-    for (const SurfacePoint& point : points) {
-      albedo += 0.25F * albedoAt(point, interpolate(point));
-    }
-  }
+  const float albedo =
+      material.mapping == Material::Mapping::kTexture ? meanAlbedo(points, surface) : material.albedo;
   return lightOf(points[0], surface, albedo, sun_visibility);
 }
 
@@ -158,10 +150,35 @@ float SurfaceShader::albedoAt(const SurfacePoint& point, const Interpolated& sur
     return material.albedo;
   }
   const Texture& texture = scene_.textures[static_cast<size_t>(material.texture)];
-  const float stretch = 1.0F / std::max(0.05F, std::abs(surface.towards));
-  const float level = fastLog2(0.6F * point.footprint_m * std::sqrt(stretch) * material.texels_per_m);
   return material.albedo * texture.sample(surface.u * static_cast<float>(texture.width()),
-                                          surface.v * static_cast<float>(texture.height()), level);
+                                          surface.v * static_cast<float>(texture.height()),
+                                          textureLevel(material, point, surface));
+}
+
+float SurfaceShader::meanAlbedo(const std::array<SurfacePoint, 4>& points, const Interpolated& first) const {
+  const MeshTriangle& triangle = triangleOf(points[0].triangle);
+  const std::vector<MeshVertex>& vertices = meshOf(points[0].triangle).vertices;
+  const MeshVertex& a = vertices[triangle.vertices[0]];
+  const MeshVertex& b = vertices[triangle.vertices[1]];
+  const MeshVertex& c = vertices[triangle.vertices[2]];
+  const Material& material = scene_.materials[triangle.material];
+  const Texture& texture = scene_.textures[static_cast<size_t>(material.texture)];
+  const auto width = static_cast<float>(texture.width());
+  const auto height = static_cast<float>(texture.height());
+  std::array<float, 4> x;
+  std::array<float, 4> y;
+  for (size_t i = 0; i < 4; ++i) {
+    const float wa = 1.0F - points[i].u - points[i].v;
+    x[i] = width * (wa * a.u + points[i].u * b.u + points[i].v * c.u);
+    y[i] = height * (wa * a.v + points[i].u * b.v + points[i].v * c.v);
+  }
+  return material.albedo * texture.sampleMean(x, y, textureLevel(material, points[0], first));
+}
+
+float SurfaceShader::textureLevel(const Material& material, const SurfacePoint& point,
+                                  const Interpolated& surface) {
+  const float stretch = 1.0F / std::max(0.05F, std::abs(surface.towards));
+  return fastLog2(0.6F * point.footprint_m * std::sqrt(stretch) * material.texels_per_m);
 }
 
 float SurfaceShader::sunMapAt(const SurfacePoint& point, const Interpolated& surface) const {

@@ -66,6 +66,8 @@ class SurfaceShader {
   }
   Interpolated interpolate(const SurfacePoint& point) const;
   float albedoAt(const SurfacePoint& point, const Interpolated& surface) const;
+  float meanAlbedo(const std::array<SurfacePoint, 4>& points, const Interpolated& first) const;
+  static float textureLevel(const Material& material, const SurfacePoint& point, const Interpolated& surface);
   float sunMapAt(const SurfacePoint& point, const Interpolated& surface) const;
   float lightOf(const SurfacePoint& point, const Interpolated& surface, float albedo,
                 float sun_visibility) const;
