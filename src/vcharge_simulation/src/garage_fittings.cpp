@@ -145,7 +145,8 @@ void addDownPipes(const std::vector<GarageLayout::Pillar>& pillars, double overh
   const uint32_t zinc = parts->plain(SurfaceKind::kPole, 0.4, 0.04);
   const uint32_t clamp = parts->plain(SurfaceKind::kPole, 0.08);
   for (const GarageLayout::Pillar& pillar : pillars) {
-    const double side = parts->random().chance(0.5) ? 1.0 : -1.0;
+    // On the side away from the lanes that cross.
+    const double side = pillar.x > 0.0 ? -1.0 : 1.0;
     if (!parts->random().chance(0.3)) {
       continue;
     }

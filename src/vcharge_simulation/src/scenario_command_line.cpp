@@ -40,6 +40,7 @@ ScenarioCommandLine::ScenarioCommandLine(CLI::App* app) {
   add(app, "--scene", &DriveScenario::scene, "see --list");
   add(app, "--drive", &DriveScenario::drive, "see --list");
   add(app, "--rig", &DriveScenario::rig, "see --list");
+  add(app, "--board", &DriveScenario::board, "chessboard or aprilgrid, in the scene chessboard");
   add(app, "--scene-seed", &DriveScenario::scene_seed, "of the scene");
   add(app, "--rig-seed", &DriveScenario::rig_seed, "of the lenses and how they are mounted");
   add(app, "--seed", &DriveScenario::seed, "of the road, and of wheels and noise too");

@@ -16,6 +16,7 @@
 #include "vcharge_simulation/car_model.h"
 #include "vcharge_simulation/drive_simulator.h"
 #include "vcharge_simulation/golf_rig.h"
+#include "vcharge_simulation/rig_catalogue.h"
 #include "vcharge_simulation/truth_maps.h"
 
 namespace vcharge {
@@ -102,6 +103,35 @@ TEST_P(SceneTest, ExactRangeReproducesTheImageFromCameraToCamera) {
   RecordProperty("milligray", static_cast<int>(1000 * sum / count));
   EXPECT_GT(count, 500);
   EXPECT_LE(sum / count, 3.0);
+}
+
+// Lenses of both models. The front camera's view overlaps with either side's.
+TEST_P(SceneTest, ExactRangeReproducesTheImageThroughTheLensesOfRandomRigs) {
+  std::set<std::string> models;
+  for (const auto& [seed, side] : {std::pair<uint64_t, size_t>(1, 1), std::pair<uint64_t, size_t>(2, 3)}) {
+    const CameraRig rig = makeRig("random", seed, kImageScale);
+    const CameraView one(rig.cameras[0], nullptr, kIdealLens);
+    const CameraView other(rig.cameras[side], nullptr, kIdealLens);
+    const std::string label = "rig " + std::to_string(seed) + ", " + rig.cameras[side].name;
+    for (const CameraView* view : {&one, &other}) {
+      models.insert(view->camera().model.name());
+      const Reprojection result = reproject(renderer(), sighting(*view), sighting(*view, 1));
+      EXPECT_GT(result.count, 5000) << label;
+      EXPECT_LE(result.mean_difference, 3.0) << label;
+    }
+    double sum = 0.0;
+    int count = 0;
+    for (const Reprojection& result :
+         {reproject(renderer(), sighting(one), sighting(other), Surfaces::kNoCars),
+          reproject(renderer(), sighting(other), sighting(one), Surfaces::kNoCars)}) {
+      sum += result.count * result.mean_difference;
+      count += result.count;
+    }
+    RecordProperty("milligray_" + std::to_string(seed), static_cast<int>(1000 * sum / count));
+    EXPECT_GT(count, 500) << label;
+    EXPECT_LE(sum / count, 3.0) << label;
+  }
+  EXPECT_EQ(models.size(), 2U);
 }
 
 TEST_P(SceneTest, SameBytesOnAnyNumberOfThreads) {
@@ -256,6 +286,81 @@ TEST(CatalogueTest, DrivesOfTheLotKeepClearOfParkedCarsForEverySeed) {
         }
       }
     }
+  }
+}
+
+TEST(SlopeTest, ParkedCarsStandOnTheGroundWithAllFourWheels) {
+  const Scene& scene = rendererOf("two_levels").scene();
+  std::set<uint32_t> of_cars;
+  for (const MeshTriangle& triangle : scene.mesh.triangles) {
+    if (scene.materials[triangle.material].kind == SurfaceKind::kCar) {
+      of_cars.insert(triangle.vertices.begin(), triangle.vertices.end());
+    }
+  }
+  int cars = 0;
+  for (const Obstacle& obstacle : scene.obstacles) {
+    if (obstacle.kind != "car") {
+      continue;
+    }
+    const Eigen::Vector2d middle = 0.5 * (obstacle.footprint_m[0] + obstacle.footprint_m[2]);
+    const Eigen::Vector2d along = 0.5 * (obstacle.footprint_m[1] - obstacle.footprint_m[0]);
+    const Eigen::Vector2d across = 0.5 * (obstacle.footprint_m[3] - obstacle.footprint_m[0]);
+    // Over the ground, of the lowest part of each quarter of the car: a tyre.
+    std::map<std::pair<bool, bool>, double> lowest_m;
+    for (const uint32_t index : of_cars) {
+      const Eigen::Vector3d vertex = scene.mesh.vertices[index].position.cast<double>();
+      const double x = (vertex.head<2>() - middle).dot(along) / along.squaredNorm();
+      const double y = (vertex.head<2>() - middle).dot(across) / across.squaredNorm();
+      if (std::abs(x) < 1.0 && std::abs(y) < 1.0) {
+        const double height_m = vertex.z() - groundAt(scene, vertex.head<2>());
+        const auto [found, is_new] = lowest_m.emplace(std::pair(x > 0.0, y > 0.0), height_m);
+        found->second = std::min(found->second, height_m);
+      }
+    }
+    ASSERT_EQ(lowest_m.size(), 4U);
+    for (const auto& [quarter, height_m] : lowest_m) {
+      EXPECT_NEAR(height_m, 0.0, 0.015);
+    }
+    ++cars;
+  }
+  EXPECT_GT(cars, 20);
+}
+
+TEST(SlopeTest, GroundIsAsBrightAsTheCosineOfTheSunsAngleToIt) {
+  const CameraView view(makeGolfRig(1, 0.1).cameras[1], nullptr, kIdealLens);
+  LightOptions light;
+  light.sky_irradiance = 0.0;
+  light.bounce_irradiance = 0.0;
+  // At one place straight below the camera, so that both planes are seen there alike.
+  const auto lightOn = [&](const Eigen::Vector3d& normal) {
+    auto scene = std::make_shared<Scene>();
+    scene->sky = std::make_unique<Sky>(light, 1);
+    Material ground;
+    ground.kind = SurfaceKind::kGround;
+    ground.mapping = Material::Mapping::kGround;
+    ground.texture = 0;
+    scene->ground.layers.push_back(
+        {Texture(cv::Mat(4, 4, CV_8UC1, cv::Scalar(100)), Texture::Border::kClamp), -100.0F, -100.0F, 0.02F});
+    const Eigen::Vector3d place_m(1.9, 2.5, 0.0);
+    const auto on_plane = [&](double x, double y) {
+      const double z = -(normal.x() * (x - place_m.x()) + normal.y() * (y - place_m.y())) / normal.z();
+      return Eigen::Vector3d(x, y, z).cast<float>().eval();
+    };
+    addQuad(on_plane(-50, -50), on_plane(50, -50), on_plane(50, 50), on_plane(-50, 50),
+            scene->addMaterial(ground), &scene->mesh);
+    const Renderer renderer(scene);
+    Eigen::Vector2d pixel;
+    EXPECT_TRUE(view.camera().model.project(view.camera().vehicle_from_camera->inverse() * place_m, &pixel));
+    return static_cast<double>(
+        renderer.renderLight(view, RigidTransform())
+            .at<float>(static_cast<int>(std::lround(pixel.y())), static_cast<int>(std::lround(pixel.x()))));
+  };
+  const Eigen::Vector3d to_sun = Sky(light, 1).directionToSun().cast<double>();
+  const double level = lightOn(Eigen::Vector3d::UnitZ());
+  EXPECT_GT(level, 0.0);
+  for (const Eigen::Vector3d& tilted :
+       {Eigen::Vector3d(0.105, 0.0, 1.0), Eigen::Vector3d(-0.05, 0.08, 1.0)}) {
+    EXPECT_NEAR(lightOn(tilted.normalized()) / level, tilted.normalized().dot(to_sun) / to_sun.z(), 1e-3);
   }
 }
 

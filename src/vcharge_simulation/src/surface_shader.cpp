@@ -48,23 +48,28 @@ float SurfaceShader::detailFactor(const Eigen::Vector3f& position, float width_m
   return factor;
 }
 
-float SurfaceShader::groundLight(const Eigen::Vector3f& position, float width_m, float sun_visibility) const {
+float SurfaceShader::towardsSun(const Eigen::Vector3f& ground_normal) const {
+  const float up = ground_normal.z() < 0.0F ? -1.0F : 1.0F;
+  return std::max(0.0F, up * ground_normal.dot(sky_.directionToSun()));
+}
+
+float SurfaceShader::groundLight(const Eigen::Vector3f& position, float width_m, float sun_share) const {
   float surrounding = 1.0F;
   if (scene_.ground.sun != nullptr) {
     const float level = fastLog2(width_m * scene_.ground.sun->texels_per_m);
-    sun_visibility *= scene_.ground.sun->sampleAt(position.x(), position.y(), level);
+    sun_share *= scene_.ground.sun->sampleAt(position.x(), position.y(), level);
   }
   if (scene_.ground.surrounding != nullptr) {
     surrounding = scene_.ground.surrounding->sampleAt(position.x(), position.y(), 0.0F);
   }
-  return static_cast<float>(sky_.light().sun_irradiance) * sky_.directionToSun().z() * sun_visibility +
+  return static_cast<float>(sky_.light().sun_irradiance) * sun_share +
          static_cast<float>(sky_.light().sky_irradiance) * surrounding;
 }
 
 float SurfaceShader::shadeGroundPixel(const Material& material,
                                       const std::array<Eigen::Vector3f, 4>& positions,
-                                      const Eigen::Vector3f& direction, float footprint_m,
-                                      float sun_visibility) const {
+                                      const Eigen::Vector3f& normal, const Eigen::Vector3f& direction,
+                                      float footprint_m, float sun_visibility) const {
   const float stretch = stretchOf(direction);
   const GroundTexture& texture = scene_.ground.layers[static_cast<size_t>(material.texture)];
   const float level = fastLog2(groundSampleWidth(footprint_m, stretch) * texture.texels_per_m);
@@ -80,7 +85,7 @@ float SurfaceShader::shadeGroundPixel(const Material& material,
       0.5F * (detailFactor(tall ? upper : left, width_m) + detailFactor(tall ? lower : right, width_m));
   const Eigen::Vector3f middle = 0.5F * (upper + lower);
   return kGroundLayerAlbedo * albedo * detail *
-             groundLight(middle, footprint_m * std::sqrt(stretch), sun_visibility) +
+             groundLight(middle, footprint_m * std::sqrt(stretch), sun_visibility * towardsSun(normal)) +
          groundReflection(material, middle, direction);
 }
 
@@ -105,7 +110,8 @@ float SurfaceShader::shade(const SurfacePoint& point, float sun_visibility) cons
         kGroundLayerAlbedo *
         texture.sampleAt(point.position.x(), point.position.y(), fastLog2(width_m * texture.texels_per_m)) *
         detailFactor(point.position, width_m);
-    return albedo * groundLight(point.position, point.footprint_m * std::sqrt(stretch), sun_visibility) +
+    return albedo * groundLight(point.position, point.footprint_m * std::sqrt(stretch),
+                                sun_visibility * towardsSun(point.geometric_normal.normalized())) +
            groundReflection(material, point.position, point.direction);
   }
   const Interpolated surface = interpolate(point);
@@ -115,9 +121,9 @@ float SurfaceShader::shade(const SurfacePoint& point, float sun_visibility) cons
 float SurfaceShader::shadePixel(const std::array<SurfacePoint, 4>& points, float sun_visibility) const {
   const Material& material = materialOf(points[0].triangle);
   if (material.mapping == Material::Mapping::kGround) {
-    return shadeGroundPixel(material,
-                            {points[0].position, points[1].position, points[2].position, points[3].position},
-                            points[0].direction, points[0].footprint_m, sun_visibility);
+    return shadeGroundPixel(
+        material, {points[0].position, points[1].position, points[2].position, points[3].position},
+        points[0].geometric_normal.normalized(), points[0].direction, points[0].footprint_m, sun_visibility);
   }
   const Interpolated surface = interpolate(points[0]);
   const float albedo =

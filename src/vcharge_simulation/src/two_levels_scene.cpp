@@ -164,6 +164,24 @@ void lift(std::vector<Thing>* things) {
   }
 }
 
+// As its four wheels stand.
+void standOnGround(ParkedCar* car) {
+  const CarShape& shape = carShapes()[static_cast<size_t>(car->shape)];
+  const double c = std::cos(car->yaw_rad);
+  const double s = std::sin(car->yaw_rad);
+  const double half_track_m = 0.45 * shape.width;
+  const auto height = [&](double along_m, double across_m) {
+    return groundHeight(car->x + c * along_m - s * across_m, car->y + s * along_m + c * across_m);
+  };
+  const double rear_left = height(0.0, half_track_m);
+  const double rear_right = height(0.0, -half_track_m);
+  const double front_left = height(shape.wheelbase, half_track_m);
+  const double front_right = height(shape.wheelbase, -half_track_m);
+  car->z = 0.5 * (rear_left + rear_right);
+  car->pitch_rad = -std::atan(0.5 * (front_left + front_right - rear_left - rear_right) / shape.wheelbase);
+  car->roll_rad = std::atan(0.25 * (front_left + rear_left - front_right - rear_right) / half_track_m);
+}
+
 LotLayout twoLevelsLayout(const SceneOptions& options) {
   LotLayout layout = makeLotLayout(static_cast<uint64_t>(options.seed), options.day, options.moved_cars);
   // Level islands, hedges and fences cannot lie on the ramps, nor may anything stand where walls are.
@@ -199,7 +217,9 @@ LotLayout twoLevelsLayout(const SceneOptions& options) {
   settle(&layout.bushes);
   settle(&layout.poles);
   settle(&layout.bins);
-  lift(&layout.cars);
+  for (ParkedCar& car : layout.cars) {
+    standOnGround(&car);
+  }
   return layout;
 }
 

@@ -16,6 +16,7 @@ struct DriveScenario {
   std::string scene = "lot";
   std::string drive = "short";
   std::string rig = "golf";
+  std::string board = "chessboard";  ///< or aprilgrid: what the scene chessboard shows
   int scene_seed = 1;          ///< of the scene
   int rig_seed = 1;            ///< of the lenses and how they are mounted
   int seed = 1;                ///< of the road under the car
@@ -36,6 +37,7 @@ struct DriveScenario {
     visit("scene", scene);
     visit("drive", drive);
     visit("rig", rig);
+    visit("board", board);
     visit("scene_seed", scene_seed);
     visit("rig_seed", rig_seed);
     visit("seed", seed);
