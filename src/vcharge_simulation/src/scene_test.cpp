@@ -105,14 +105,14 @@ TEST_P(SceneTest, ExactRangeReproducesTheImageFromCameraToCamera) {
   EXPECT_LE(sum / count, 3.0);
 }
 
-// Lenses of both models. The front camera's view overlaps with either side's.
+// Front and left camera, as above, through lenses of both models.
 TEST_P(SceneTest, ExactRangeReproducesTheImageThroughTheLensesOfRandomRigs) {
   std::set<std::string> models;
-  for (const auto& [seed, side] : {std::pair<uint64_t, size_t>(1, 1), std::pair<uint64_t, size_t>(2, 3)}) {
+  for (const uint64_t seed : {1U, 2U, 3U}) {
     const CameraRig rig = makeRig("random", seed, kImageScale);
     const CameraView one(rig.cameras[0], nullptr, kIdealLens);
-    const CameraView other(rig.cameras[side], nullptr, kIdealLens);
-    const std::string label = "rig " + std::to_string(seed) + ", " + rig.cameras[side].name;
+    const CameraView other(rig.cameras[1], nullptr, kIdealLens);
+    const std::string label = "rig " + std::to_string(seed);
     for (const CameraView* view : {&one, &other}) {
       models.insert(view->camera().model.name());
       const Reprojection result = reproject(renderer(), sighting(*view), sighting(*view, 1));
@@ -128,7 +128,8 @@ TEST_P(SceneTest, ExactRangeReproducesTheImageThroughTheLensesOfRandomRigs) {
       count += result.count;
     }
     RecordProperty("milligray_" + std::to_string(seed), static_cast<int>(1000 * sum / count));
-    EXPECT_GT(count, 500) << label;
+    // Some lenses leave little of the overlap within their better resolved part.
+    EXPECT_GT(count, 100) << label;
     EXPECT_LE(sum / count, 3.0) << label;
   }
   EXPECT_EQ(models.size(), 2U);
