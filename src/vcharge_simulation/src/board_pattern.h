@@ -22,7 +22,7 @@ struct BoardPattern {
   RigidTransform sheet_from_pattern;
   std::vector<Eigen::Vector3d> corners_in_pattern_m;  ///< inner corners, or the four of each tag from its
                                                       ///< lower left one counter-clockwise
-  std::string target_yaml;  ///< the pattern as a target file of Kalibr
+  std::string target_yaml;                            ///< the pattern as a target file of Kalibr
 };
 
 /// "chessboard": 10 x 7 squares of 0.1 m. "aprilgrid": 6 x 6 tags of the family 36h11, 0.088 m wide with
