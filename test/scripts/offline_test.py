@@ -99,8 +99,8 @@ class OfflineTest(unittest.TestCase):
 
     def test_image_size_unlike_the_rig(self):
         rig = self.drive.write_text("big_rig.yaml", self.drive.rig.read_text().replace(
-            "[640, 400]", "[1280, 800]").replace("    mask: drive_truth/front_mask.png\n", "").replace(
-                "    mask: drive_truth/left_mask.png\n", ""))
+            "[640, 400]", "[1280, 800]").replace("    mask: rig_truth_masks/front_mask.png\n", "").replace(
+                "    mask: rig_truth_masks/left_mask.png\n", ""))
         self.expect_error(["image_raw", "1280x800", "640x400"], rig=rig)
 
     def test_unknown_key_in_the_options(self):

@@ -1,4 +1,7 @@
+#include <algorithm>
+#include <memory>
 #include <string>
+#include <vector>
 
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
@@ -10,9 +13,20 @@
 namespace vcharge {
 namespace {
 
+const Renderer& rendererOf(const std::string& scene) {
+  static std::string built;
+  static std::unique_ptr<const Renderer> renderer;
+  if (scene != built) {
+    renderer.reset();
+    renderer = std::make_unique<const Renderer>(buildScene(scene, SceneOptions()));
+    built = scene;
+  }
+  return *renderer;
+}
+
 // One 1280x800 image at four rays per pixel, on one core, at the start of a drive.
 void renderImage(benchmark::State& state, const std::string& scene, const std::string& drive) {
-  const Renderer renderer(buildScene(scene, SceneOptions()));
+  const Renderer& renderer = rendererOf(scene);
   const auto body = makeGolfBody();
   const DrivePlan plan = planDrive(scene, drive);
   const RigidTransform& start = plan.path.worldFromStart();
@@ -26,13 +40,20 @@ void renderImage(benchmark::State& state, const std::string& scene, const std::s
     benchmark::DoNotOptimize(renderer.renderLight(view, world_from_vehicle, plan.start_s).data);
   }
 }
-BENCHMARK_CAPTURE(renderImage, lot, "lot", "short")->DenseRange(0, 3)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(renderImage, garage, "garage", "loop")->DenseRange(0, 3)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(renderImage, obstacles, "obstacles", "creep")->Arg(1)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(renderImage, two_levels, "two_levels", "up_and_down")
-    ->Arg(1)
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(renderImage, chessboard, "chessboard", "board_left")->Arg(1)->Unit(benchmark::kMillisecond);
+// Other work on the machine only ever adds time.
+double minimum(const std::vector<double>& times) {
+  return *std::min_element(times.begin(), times.end());
+}
+
+void oneThread(benchmark::internal::Benchmark* images) {
+  images->Unit(benchmark::kMillisecond)->ComputeStatistics("min", minimum);
+}
+
+BENCHMARK_CAPTURE(renderImage, lot, "lot", "short")->DenseRange(0, 3)->Apply(oneThread);
+BENCHMARK_CAPTURE(renderImage, garage, "garage", "loop")->DenseRange(0, 3)->Apply(oneThread);
+BENCHMARK_CAPTURE(renderImage, obstacles, "obstacles", "creep")->Arg(1)->Apply(oneThread);
+BENCHMARK_CAPTURE(renderImage, two_levels, "two_levels", "up_and_down")->Arg(1)->Apply(oneThread);
+BENCHMARK_CAPTURE(renderImage, chessboard, "chessboard", "board_left")->Arg(1)->Apply(oneThread);
 
 }  // namespace
 }  // namespace vcharge

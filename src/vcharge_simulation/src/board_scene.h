@@ -8,9 +8,9 @@
 
 namespace vcharge {
 
-/// The lot with a chessboard of 10 x 7 squares that is held before one camera of the standing Golf after the
-/// other, at many places out to the rim of the image. The board's frame has its origin in the first inner
-/// corner, x along the 9 inner corners, y along the 6, and z away from the viewer.
+/// The lot with a calibration board (options.board) that is held before one camera of the standing car after
+/// the other, at many places out to the rim of the image. The places suit options.rig; the mover's pose is
+/// that of the board's pattern (BoardPattern).
 std::shared_ptr<const Scene> buildBoardScene(const SceneOptions& options);
 std::vector<CatalogueEntry> listBoardDrives();
 /// std::invalid_argument for a name that listBoardDrives() does not have.

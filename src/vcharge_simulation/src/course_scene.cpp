@@ -176,7 +176,7 @@ DrivePlan planCourseDrive(const std::string& name) {
   motion.duration_s = 600.0;
   if (name == "creep" || name == "creep_back") {
     const bool backwards = name == "creep_back";
-    const double k = 1.0 / 60.0;
+    const double k = 1.0 / 100.0;
     std::vector<DrivePath::Segment> segments;
     for (const double sign : {1.0, -1.0, -1.0, 1.0}) {
       segments.push_back({4.4, 0.0, sign * k, backwards});

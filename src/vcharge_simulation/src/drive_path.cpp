@@ -54,19 +54,43 @@ RigidTransform arcMotion(double distance_m, double turn_rad) {
 }
 
 DrivePath::DrivePath(const RigidTransform& world_from_start, std::vector<Segment> segments)
-    : world_from_start_(world_from_start), segments_(std::move(segments)) {
-  for (const Segment& segment : segments_) {
+    : world_from_start_(world_from_start) {
+  for (const Segment& segment : segments) {
     if (!(segment.length_m >= 0.0)) {
       throw std::invalid_argument("DrivePath: a segment has a negative length");
     }
-    if (!start_m_.empty() && segment.backwards != segments_[start_m_.size() - 1].backwards) {
-      addStop({length_m_, kTurnaround_s});
+    appendSegment(segment);
+  }
+}
+
+void DrivePath::appendSegment(const Segment& segment) {
+  if (!segments_.empty() && segment.backwards != segments_.back().backwards) {
+    addStop({length_m_, kTurnaround_s});
+  }
+  segments_.push_back(segment);
+  start_m_.push_back(length_m_);
+  start_heading_rad_.push_back(end_heading_rad_);
+  length_m_ += segment.length_m;
+  end_heading_rad_ += (segment.backwards ? -0.5 : 0.5) *
+                      (segment.start_curvature_per_m + segment.end_curvature_per_m) * segment.length_m;
+}
+
+void DrivePath::append(const DrivePath& next) {
+  if (&next == this) {
+    append(DrivePath(next));
+    return;
+  }
+  const double joint_m = length_m_;
+  for (const Segment& segment : next.segments_) {
+    appendSegment(segment);
+  }
+  // The stops where the next path turns around came with its segments.
+  for (const Stop& stop : next.stops_) {
+    const Stop shifted{joint_m + stop.at_m, stop.wait_s};
+    if (std::none_of(stops_.begin(), stops_.end(),
+                     [&](const Stop& known) { return std::abs(known.at_m - shifted.at_m) < 1e-9; })) {
+      addStop(shifted);
     }
-    start_m_.push_back(length_m_);
-    start_heading_rad_.push_back(end_heading_rad_);
-    length_m_ += segment.length_m;
-    end_heading_rad_ += (segment.backwards ? -0.5 : 0.5) *
-                        (segment.start_curvature_per_m + segment.end_curvature_per_m) * segment.length_m;
   }
 }
 

@@ -34,6 +34,16 @@ DrivePlan planDriveOf(const DriveScenario& scenario) {
   return plan;
 }
 
+// Leaves every step-th image.
+template <class T>
+void thin(int step, std::vector<T>* list) {
+  size_t kept = 0;
+  for (size_t i = 0; i < list->size(); i += static_cast<size_t>(step)) {
+    (*list)[kept++] = std::move((*list)[i]);
+  }
+  list->resize(kept);
+}
+
 // Faults that change what is rendered cannot come from images that were rendered without them.
 void checkImagesCanBeReused(const FaultOptions& faults, const std::string& images_from) {
   for (const auto& [name, is_active] : {std::pair("bumped_camera", faults.bumped_camera.isActive()),
@@ -122,12 +132,14 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   const DrivePlan plan = planDriveOf(scenario);
   const std::filesystem::path bag(recording.bag);
   const std::string truth_name = bag.stem().string() + "_truth";
-  const RecordedCameras cameras(scenario, truth_name);
+  const RecordedCameras cameras(scenario, "rig_truth_masks");
   const CameraRig& rig = cameras.rig();
   const FaultOptions& faults = scenario.faults;
-  const SimulatedDrive drive =
+  SimulatedDrive drive =
       simulateDrive(plan.path, plan.motion, scenario.odometer, static_cast<uint64_t>(scenario.seed),
                     scenario.sensorSeed(), faults, plan.ground_height);
+  thin(scenario.image_step, &drive.world_from_vehicle);
+  thin(scenario.image_step, &drive.exposure_poses);
   const Timestamp start = drive.ground_truth.front().stamp;
 
   DriveBagWriter writer(recording.bag, rig);
@@ -149,6 +161,9 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
     scene.seed = scenario.scene_seed;
     scene.day = plan.day;
     scene.image_scale = scenario.image_scale;
+    scene.board = scenario.board;
+    scene.rig = scenario.rig;
+    scene.rig_seed = scenario.rig_seed;
     renderer.emplace(buildScene(scenario.scene, scene));
     images = renderImages(*renderer, cameras, response, drive, scene_times_s, faults.motion_blur);
     writeHeightMap(computeHeightMap(*renderer, recording.height_cell_m, recording.height_limit_m),
@@ -160,6 +175,9 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   } else {
     checkImagesCanBeReused(faults, recording.images_from);
     images = readImages(recording.images_from, rig, drive);
+  }
+  if (scenario.scene == "chessboard") {
+    writeTextFileAtomically(truth.path() + "/board.yaml", boardTarget(scenario.board));
   }
   const bool truth_range = recording.truth_range && renderer.has_value();
   for (const RigCamera& camera : rig.cameras) {
@@ -201,12 +219,15 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
     names.push_back(camera.name);
   }
   writeFaults(faults, start, names, image_faults.hits(), truth.path() + "/faults.yaml");
+  writeTruthRig(rig, truth.path(), "");
   if (cameras.isRigFaulty()) {
     writeTruthRig(rig, truth.path(), "_before");
     writeTruthRig(cameras.rigAfterFaults(), truth.path(), "_after");
   }
   writer.close();
   truth.commit();
+  // A copy for many drives with one rig; its masks are its own, so that it outlives each drive.
+  createFolder((bag.parent_path() / "rig_truth_masks").string());
   writeCameraRig(rig, (bag.parent_path() / "rig_truth.yaml").string());
 }
 

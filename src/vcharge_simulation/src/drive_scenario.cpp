@@ -13,6 +13,7 @@ void DriveScenario::validate() const {
   requireField(std::isfinite(duration_s) && duration_s >= 0.0, "duration_s", "must not be negative",
                duration_s);
   requireField(image_scale >= 0.05 && image_scale <= 1.0, "image_scale", "must be in [0.05, 1]", image_scale);
+  requireField(image_step >= 1, "image_step", "must be at least 1", image_step);
   requireField(exposure_gain >= 0.01 && exposure_gain <= 100.0, "exposure_gain", "must be in [0.01, 100]",
                exposure_gain);
   validateInner("odometer", odometer);

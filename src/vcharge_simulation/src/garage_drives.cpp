@@ -1,30 +1,18 @@
-#include <algorithm>
 #include <stdexcept>
 
 #include "garage_scene.h"
+#include "lane_paths.h"
 
 namespace vcharge {
 
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kCornerRadius_m = 5.0;
-constexpr double kTransition_m = 3.0;
+constexpr Lanes kLanes{26.0, 15.5, 5.0};
 
-// Around all rows counter-clockwise, shifted outwards by `outwards_m` along the long lanes.
-std::vector<Eigen::Vector2d> loopCorners(double outwards_m) {
-  const double x = 26.0 + 0.3 * outwards_m;
-  const double y = 15.5 + outwards_m;
-  return {{x, -y}, {x, y}, {-x, y}, {-x, -y}};
-}
-
-DrivePath loopPath(double outwards_m, bool clockwise) {
-  std::vector<Eigen::Vector2d> corners = loopCorners(outwards_m);
-  if (clockwise) {
-    std::reverse(corners.begin(), corners.end());
-  }
-  return DrivePath::throughWaypoints(corners, true, kCornerRadius_m, kTransition_m);
-}
+// Mapped paths and those of another day lie 2 m apart in the long lanes, where there is room.
+const Eigen::Vector2d kMapped_m(0.24, 0.8);
+const Eigen::Vector2d kOtherDay_m(-0.36, -1.2);
 
 }  // namespace
 
@@ -32,7 +20,9 @@ std::vector<CatalogueEntry> listGarageDrives() {
   return {
       {"loop", "around all rows of bays, back to the start"},
       {"loop_reverse_direction", "the loop, clockwise"},
+      {"both_directions", "175 s through all lanes in both directions, to build maps from"},
       {"other_day", "the loop 2 m beside on another day, with moved cars and other lamps"},
+      {"other_day_reverse_direction", "the same, clockwise"},
       {"figure_eight", "around the northern rows to the left, then around the southern ones to the right"},
       {"short", "5 s of gentle curves in the middle lane"}};
 }
@@ -43,26 +33,17 @@ DrivePlan planGarageDrive(const std::string& name) {
   motion.standstill_s = 0.5;
   motion.stop_at_end = true;
   if (name == "loop" || name == "loop_reverse_direction") {
-    return {name, loopPath(0.8, name != "loop"), motion, 0};
+    return {name, kLanes.loop(kMapped_m, name != "loop"), motion, 0};
   }
-  if (name == "other_day") {
-    return {name, loopPath(-1.2, false), motion, 1};
+  if (name == "other_day" || name == "other_day_reverse_direction") {
+    return {name, kLanes.loop(kOtherDay_m, name != "other_day"), motion, 1};
+  }
+  if (name == "both_directions") {
+    return {name, kLanes.bothDirections(kMapped_m), motion, 0};
   }
   if (name == "figure_eight") {
     motion.standstill_s = 0.0;
-    return {name,
-            DrivePath::throughWaypoints({{-12.0, 0.0},
-                                         {26.0, 0.0},
-                                         {26.0, 15.5},
-                                         {-26.0, 15.5},
-                                         {-26.0, 0.0},
-                                         {26.0, 0.0},
-                                         {26.0, -15.5},
-                                         {-26.0, -15.5},
-                                         {-26.0, 0.0},
-                                         {-8.0, 0.0}},
-                                        false, kCornerRadius_m, kTransition_m),
-            motion, 0};
+    return {name, kLanes.figureEight(), motion, 0};
   }
   if (name == "short") {
     motion.standstill_s = 0.0;

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include <tbb/parallel_for.h>
 #include <opencv2/imgproc.hpp>
 
+#include "garage_stains.h"
 #include "garage_surfaces.h"
 #include "marking_painter.h"
 #include "vcharge_simulation/noise.h"
@@ -57,52 +57,22 @@ cv::Mat drawMarkings(const GarageLayout& layout, double texel_m) {
   return painter.image();
 }
 
-struct Spot {
-  float x, y, half_length, half_width, cosine, sine, strength;
-};
-
 class FloorPainter {
  public:
-  FloorPainter(const GarageLayout& layout, uint64_t seed) : seed_(static_cast<uint32_t>(seed * 6151U + 11U)) {
-    Random random(seed + 31);
-    const auto add = [&](double x, double y, double size, double strength) {
-      const double yaw_rad = random.uniform(0.0, 3.14);
-      spots_.push_back({static_cast<float>(x), static_cast<float>(y), static_cast<float>(size),
-                        static_cast<float>(size * random.uniform(0.4, 1.0)),
-                        static_cast<float>(std::cos(yaw_rad)), static_cast<float>(std::sin(yaw_rad)),
-                        static_cast<float>(strength)});
-    };
-    // Engines drip where they stand.
-    for (const ParkingBay& bay : layout.bays) {
-      for (int i = random.index(4); i > 0; --i) {
-        const double x = bay.x + random.uniform(-0.6, 0.6);
-        const double y = bay.y + random.uniform(-2.0, 2.0);
-        add(x, y, random.uniform(0.06, 0.4), random.uniform(-0.6, -0.2));
-      }
-    }
-    for (int i = 0; i < 160; ++i) {
-      const double x = random.uniform(kGarageArea.min_x, kGarageArea.max_x);
-      const double y = random.uniform(kGarageArea.min_y, kGarageArea.max_y);
-      const double size = 0.05 * std::pow(20.0, random.uniform());
-      add(x, y, size, random.uniform(-0.4, 0.3));
-    }
-  }
+  explicit FloorPainter(uint64_t seed) : seed_(static_cast<uint32_t>(seed * 6151U + 11U)) {}
 
-  float albedo(float x, float y, float marking) const {
+  /// `stains`: reflectance over that of the clean floor; `marking`: share of paint.
+  float albedo(float x, float y, float stains, float marking) const {
     float value = 0.27F;
     value *= 1.0F + 0.16F * fractalNoise(x * 0.18F, y * 0.18F, 3, 0.6F, seed_) +
              0.16F * fractalNoise(x * 1.3F, y * 1.3F, 4, 0.8F, seed_ + 2) +
              0.15F * fractalNoise(x * 6.0F, y * 6.0F, 2, 0.8F, seed_ + 7) +
              0.10F * fractalNoise(x * 17.0F, y * 17.0F, 3, 0.85F, seed_ + 3);
-    // Chipped paint and grit.
-    const CellNoise grains = cellNoise(x * 11.0F, y * 11.0F, seed_ + 4);
-    const float grain = unitFromBits(mixBits(grains.cell));
-    if (grain > 0.9F) {
-      value *= 1.0F + 1.3F * (grain - 0.62F) * ramp(grains.border_distance, 0.1F, 0.3F);
-    } else if (grain < 0.1F) {
-      value *= 1.0F - 0.45F * ramp(grains.border_distance, 0.1F, 0.25F);
-    }
-    value *= tyreFactor(x, y) * crackFactor(x, y) * spotFactor(x, y);
+    // The coating has come off in chips, down to bright concrete or to the dark of an older coat.
+    const float wear = fractalNoise(x * 4.5F, y * 4.5F, 5, 0.75F, seed_ + 4) +
+                       0.4F * valueNoise(x * 0.35F, y * 0.35F, seed_ + 8);
+    value *= 1.0F + 0.3F * ramp(wear, 0.95F, 1.02F) - 0.34F * ramp(-wear, 0.98F, 1.05F);
+    value *= tyreFactor(x, y) * crackFactor(x, y) * stains;
     const auto joint = static_cast<float>(kJoint_m);
     const float to_joint =
         std::min(std::abs(x - joint * std::round(x / joint)), std::abs(y - joint * std::round(y / joint)));
@@ -132,51 +102,32 @@ class FloorPainter {
 
   float crackFactor(float x, float y) const {
     const float presence = valueNoise(x * 0.12F, y * 0.12F, seed_ + 10);
-    if (presence < 0.05F) {
+    if (presence < -0.15F) {
       return 1.0F;
     }
-    const float warp_x = x + 0.3F * fractalNoise(x * 1.6F, y * 1.6F, 3, 0.6F, seed_ + 11);
-    const float warp_y = y + 0.3F * fractalNoise(x * 1.6F, y * 1.6F, 3, 0.6F, seed_ + 12);
+    const float warp_x = x + 0.16F * fractalNoise(x * 1.6F, y * 1.6F, 4, 0.6F, seed_ + 11);
+    const float warp_y = y + 0.16F * fractalNoise(x * 1.6F, y * 1.6F, 4, 0.6F, seed_ + 12);
     const float distance_m = cellNoise(warp_x * 0.4F, warp_y * 0.4F, seed_ + 13).border_distance / 0.4F;
-    return 1.0F - 0.5F * (1.0F - ramp(distance_m, 0.004F, 0.014F));
-  }
-
-  float spotFactor(float x, float y) const {
-    float factor = 1.0F;
-    for (const Spot& spot : spots_) {
-      const float dx = x - spot.x;
-      const float dy = y - spot.y;
-      const float reach = 1.5F * spot.half_length;
-      if (std::abs(dx) > reach || std::abs(dy) > reach) {
-        continue;
-      }
-      const float along = (dx * spot.cosine + dy * spot.sine) / spot.half_length;
-      const float across = (dy * spot.cosine - dx * spot.sine) / spot.half_width;
-      const float wobble =
-          0.35F * fractalNoise(x * 2.4F / spot.half_length, y * 2.4F / spot.half_length, 3, 0.6F, seed_ + 15);
-      const float radius = std::sqrt(along * along + across * across) + wobble;
-      factor *= 1.0F + spot.strength * (1.0F - ramp(radius, 0.5F, 0.95F));
-    }
-    return factor;
+    return 1.0F - 0.55F * (1.0F - ramp(distance_m, 0.003F, 0.011F));
   }
 
   uint32_t seed_;
-  std::vector<Spot> spots_;
 };
 
 }  // namespace
 
 cv::Mat drawGarageFloor(const GarageLayout& layout, double texel_m, uint64_t seed) {
   const cv::Mat markings = drawMarkings(layout, texel_m);
-  const FloorPainter painter(layout, seed);
+  const cv::Mat stains = drawGarageStains(layout, texel_m, seed);
+  const FloorPainter painter(seed);
   cv::Mat image(markings.size(), CV_8UC1);
   tbb::parallel_for(0, image.rows, [&](int row) {
     const auto y = static_cast<float>(kGarageArea.min_y + (row + 0.5) * texel_m);
     for (int column = 0; column < image.cols; ++column) {
       const auto x = static_cast<float>(kGarageArea.min_x + (column + 0.5) * texel_m);
       const float marking = static_cast<float>(markings.at<uint8_t>(row, column)) / 255.0F;
-      image.at<uint8_t>(row, column) =
-          cv::saturate_cast<uint8_t>(painter.albedo(x, y, marking) * (255.0F / kGroundLayerAlbedo));
+      image.at<uint8_t>(row, column) = cv::saturate_cast<uint8_t>(
+          painter.albedo(x, y, stains.at<float>(row, column), marking) * (255.0F / kGroundLayerAlbedo));
     }
   });
   return image;

@@ -5,6 +5,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "garage_fittings.h"
 #include "garage_surfaces.h"
 #include "lot_ground.h"
 #include "scene_parts.h"
@@ -17,7 +18,7 @@ constexpr double kFloorTexel_m = 0.0125;
 constexpr double kDetailTexel_m = 0.0035;
 constexpr float kLampRadiance = 2.4F;
 constexpr double kCeilingTexel_m = 0.1;
-constexpr double kCeilingAlbedo = 0.55;
+constexpr double kCeilingAlbedo = 0.6;
 // Of the share 1 of the baked light: the camera is exposed for the garage.
 constexpr double kFullIrradiance = 4.5;
 constexpr double kTypicalCeilingShare = 0.12;
@@ -59,6 +60,7 @@ class GarageBuilder {
     addPillars();
     addPipes();
     addLamps();
+    addGarageFittings(layout_, kOverhead_m, &parts_);
     parts_.addCars(layout_.cars);
     LampOptions light;
     light.floor_texel_m = 0.1 / options_.detail;

@@ -29,10 +29,40 @@ void writeSign(const std::string& text, const cv::Point& corner, double scale, i
               cv::Scalar(ink), 2, cv::LINE_AA);
 }
 
-// What hangs on a wall at `x`: an exit sign, a door, a fire extinguisher, a parking deck's name, a vent.
+// A poster or a notice: a picture of a few shapes, a headline and lines of text.
+void drawPoster(const cv::Point& corner, Random* random, cv::Mat* image) {
+  const int width = texels(random->uniform(0.5, 0.9));
+  const int height = texels(random->uniform(0.7, 1.1));
+  const cv::Rect sheet =
+      cv::Rect(corner.x, corner.y, width, height) & cv::Rect(0, 0, image->cols, image->rows);
+  const bool bright = random->chance(0.7);
+  const cv::Scalar paper(bright ? 215 : 60);
+  const cv::Scalar ink(bright ? 25 : 220);
+  cv::Mat poster(sheet.size(), CV_8UC1, paper);
+  for (int i = 0; i < 5; ++i) {
+    const cv::Point middle(random->index(sheet.width), random->index(std::max(1, 6 * sheet.height / 10)));
+    const int tone = 30 + random->index(200);
+    const int size = 4 + random->index(std::max(1, sheet.width / 4));
+    if (random->chance(0.5)) {
+      cv::circle(poster, middle, size, cv::Scalar(tone), cv::FILLED, cv::LINE_AA);
+    } else {
+      cv::rectangle(poster, cv::Rect(middle.x, middle.y, 2 * size, size), cv::Scalar(tone), cv::FILLED);
+    }
+  }
+  cv::putText(poster, random->chance(0.5) ? "NEU" : "INFO", {4, 7 * sheet.height / 10},
+              cv::FONT_HERSHEY_DUPLEX, 0.6, ink, 2, cv::LINE_AA);
+  for (int y = 3 * sheet.height / 4; y < sheet.height - 4; y += 4) {
+    cv::line(poster, {5, y}, {sheet.width / 2 + random->index(sheet.width / 2), y}, ink, 1);
+  }
+  cv::rectangle(poster, cv::Rect(0, 0, sheet.width, sheet.height), cv::Scalar(90), 1);
+  poster.copyTo((*image)(sheet));
+}
+
+// What hangs on a wall at `x`: an exit sign, a door, a fire extinguisher, a parking deck's name, a vent,
+// a poster, a cable in its duct.
 void drawFixture(int x, Random* random, cv::Mat* image) {
   const int top = texels(0.45 + 0.25 * random->uniform());
-  const int kind = random->index(6);
+  const int kind = random->index(8);
   if (kind == 0) {
     static const std::array<const char*, 5> kTexts = {"AUSGANG", "<- EXIT", "LIFT", "KASSE ->", "NOTAUSGANG"};
     const int text = random->index(5);
@@ -61,6 +91,8 @@ void drawFixture(int x, Random* random, cv::Mat* image) {
     for (int y = vent.y + 3; y < vent.y + vent.height; y += 5) {
       cv::line(*image, {vent.x, y}, {vent.x + vent.width, y}, cv::Scalar(130), 2);
     }
+  } else if (kind < 7) {
+    drawPoster({x, top}, random, image);
   } else {
     const int end = x + texels(random->uniform(0.5, 2.0));
     cv::line(*image, {x, top}, {end, top}, cv::Scalar(60), 4);
@@ -69,15 +101,44 @@ void drawFixture(int x, Random* random, cv::Mat* image) {
   }
 }
 
+// Bare concrete: boards of the form 0.25 m high with fins between them, holes of its ties, pores, gravel
+// where it was not shaken well, cracks, and rust that ran out of it.
 float concrete(float u, float v, float mean, uint32_t seed) {
-  // Boards of the form 0.25 m high, and pores.
-  const int board = static_cast<int>(std::floor(v / 0.25F));
-  float value = mean * (0.94F + 0.12F * cellValue(board, static_cast<int>(std::floor(u / 2.5F)), seed + 3));
-  value *= 1.0F + 0.12F * fractalNoise(u * 0.8F, v * 0.8F, 4, 0.7F, seed) +
+  constexpr float kBoard_m = 0.25F;
+  const int board = static_cast<int>(std::floor(v / kBoard_m));
+  const float board_start_m = 2.5F * cellValue(board, 0, seed + 6);
+  const float along_board_m = u + board_start_m;
+  float value =
+      mean * (0.92F + 0.16F * cellValue(board, static_cast<int>(std::floor(along_board_m / 2.5F)), seed + 3));
+  const float to_seam_m = std::min(std::abs(v - kBoard_m * std::round(v / kBoard_m)),
+                                   std::abs(along_board_m - 2.5F * std::round(along_board_m / 2.5F)));
+  if (to_seam_m < 0.012F) {
+    value *= 0.78F + 0.3F * valueNoise(u * 2.0F, v * 2.0F, seed + 12);
+  }
+  value *= 1.0F + 0.14F * fractalNoise(u * 0.8F, v * 0.8F, 4, 0.7F, seed) +
            0.06F * fractalNoise(u * 13.0F, v * 13.0F, 2, 0.8F, seed + 7);
+  // Ties every 1.25 m in two rows, some of them plugged with mortar.
+  const float tie_u = 1.25F * std::round(u / 1.25F);
+  const float tie_v = 1.0F * std::round((v - 0.62F) / 1.0F) + 0.62F;
+  const float to_tie_m = std::hypot(u - tie_u, v - tie_v);
+  if (to_tie_m < 0.035F) {
+    const bool plugged = cellValue(static_cast<int>(std::lround(tie_u)), static_cast<int>(std::lround(tie_v)),
+                                   seed + 9) > 0.6F;
+    value *= to_tie_m < 0.02F ? (plugged ? 1.2F : 0.25F) : 0.8F;
+  }
   const CellNoise pores = cellNoise(u * 9.0F, v * 9.0F, seed + 8);
-  if ((pores.cell & 15U) == 0 && pores.border_distance > 0.33F) {
-    value *= 0.6F;
+  if ((pores.cell & 7U) == 0 && pores.border_distance > 0.33F) {
+    value *= 0.55F;
+  }
+  const float nest = fractalNoise(u * 0.55F, v * 0.9F, 3, 0.7F, seed + 13);
+  if (nest > 0.75F) {
+    const CellNoise gravel = cellNoise(u * 30.0F, v * 30.0F, seed + 14);
+    value *= 0.6F + 0.7F * unitFromBits(mixBits(gravel.cell)) * std::min(1.0F, 6.0F * gravel.border_distance);
+  }
+  const float warp = 0.25F * fractalNoise(u * 1.3F, v * 1.3F, 3, 0.6F, seed + 15);
+  if (valueNoise(u * 0.25F, v * 0.3F, seed + 16) > 0.1F &&
+      cellNoise((u + warp) * 0.55F, (v + warp) * 0.4F, seed + 17).border_distance < 0.006F) {
+    value *= 0.5F;
   }
   return value;
 }
@@ -103,7 +164,7 @@ cv::Mat drawGarageWall(double width_m, double height_m, uint32_t seed) {
     for (int x = 0; x < image.cols; ++x) {
       const float u = static_cast<float>(x) / static_cast<float>(kGarageTexelsPerM);
       const float v = static_cast<float>(image.rows - y) / static_cast<float>(kGarageTexelsPerM);
-      float value = concrete(u, v, 0.5F, seed);
+      float value = concrete(u, v, 0.6F, seed);
       if (v < kBand_m + 0.01F * valueNoise(u * 3.0F, 0.0F, seed + 1)) {
         value *= 0.55F;
       }
@@ -118,7 +179,7 @@ cv::Mat drawGarageWall(double width_m, double height_m, uint32_t seed) {
     }
   });
   Random random(seed);
-  for (double x = 1.0; x + 2.5 < width_m; x += random.uniform(1.8, 4.5)) {
+  for (double x = 1.0; x + 2.5 < width_m; x += random.uniform(1.4, 3.4)) {
     drawFixture(texels(x), &random, &image);
   }
   return image;

@@ -20,7 +20,7 @@ struct LampOptions {
   int rays_per_lamp = 2;
   int gathered_rays = 24;        ///< of the light that comes back from floor and walls
   double floor_albedo = 0.22;    ///< mean
-  double other_radiance = 0.05;  ///< of walls, ceiling and things, on average
+  double other_radiance = 0.07;  ///< of walls, ceiling and things, on average
 };
 
 /// Bakes the light of lamps into a closed scene whose light is all local: fills scene->ground.surrounding in

@@ -16,13 +16,15 @@ void addBays(LotLayout* layout) {
   int number = 1;
   const auto addRow = [&](double y, double yaw_rad, double first_x, int count) {
     for (int i = 0; i < count; ++i) {
-      layout->bays.push_back({first_x + (i + 0.5) * kBayWidth_m, y, yaw_rad, number++});
+      const double x = first_x + (i + 0.5) * kBayWidth_m;
+      const bool keep_free = y == kFreeBayY_m && std::abs(x - kFreeBayX_m) < 0.5 * kBayWidth_m;
+      layout->bays.push_back({x, y, yaw_rad, number++, keep_free});
     }
   };
   for (const double side : {-1.0, 1.0}) {
-    addRow(side * 5.05, side * kHalfPi, -20.8, 16);   // along the middle lane
-    addRow(side * 9.95, -side * kHalfPi, -20.8, 16);  // along the outer lanes, from inside
-    addRow(side * 20.3, side * kHalfPi, -23.4, 18);   // and from outside
+    addRow(side * 5.05, side * kHalfPi, -20.8, 16);                    // along the middle lane
+    addRow(side * std::abs(kFreeBayY_m), -side * kHalfPi, -20.8, 16);  // along the outer lanes, from inside
+    addRow(side * 20.3, side * kHalfPi, -23.4, 18);                    // and from outside
   }
 }
 

@@ -29,6 +29,9 @@ struct LotLayout {
 };
 
 inline constexpr double kBayLength_m = 4.3;
+/// The bay here, north of the southern lane, is kept free for manoeuvres.
+inline constexpr double kFreeBayX_m = -9.1;
+inline constexpr double kFreeBayY_m = -9.95;
 
 LotLayout makeLotLayout(uint64_t seed, int day, double moved_cars);
 

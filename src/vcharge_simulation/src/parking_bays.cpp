@@ -46,7 +46,7 @@ std::vector<ParkedCar> parkCars(const std::vector<ParkingBay>& bays, double occu
         random = other_day;
       }
     }
-    if (occupied) {
+    if (occupied && !bay.keep_free) {
       cars.push_back(parkedCar(bay, &random));
     }
   }

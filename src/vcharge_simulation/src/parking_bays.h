@@ -13,6 +13,7 @@ inline constexpr double kBayWidth_m = 2.6;
 struct ParkingBay {
   double x, y, yaw_rad;  ///< centre; cars point along yaw or against it
   int number;
+  bool keep_free = false;
 };
 
 /// Cars on the bays, on ground at z = 0. Each bay has its own generator, so that another day (other than 0)

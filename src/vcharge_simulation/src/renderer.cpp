@@ -139,9 +139,10 @@ class BlockRenderer {
         middle += 0.25F * positions[static_cast<size_t>(s)];
       }
       const float sun_visibility = isShadowed(middle) ? 0.0F : 1.0F;
-      light->at<float>(y, x) = shader_.shadeGroundPixel(material, positions, (middle - origin_) / range_m,
-                                                        range_m * view_.pixelAngle(x, y), sun_visibility) *
-                               view_.vignette().at<float>(y, x);
+      light->at<float>(y, x) =
+          shader_.shadeGroundPixel(material, positions, plane.normal, (middle - origin_) / range_m,
+                                   range_m * view_.pixelAngle(x, y), sun_visibility) *
+          view_.vignette().at<float>(y, x);
     }
   }
 

@@ -40,12 +40,14 @@ ScenarioCommandLine::ScenarioCommandLine(CLI::App* app) {
   add(app, "--scene", &DriveScenario::scene, "see --list");
   add(app, "--drive", &DriveScenario::drive, "see --list");
   add(app, "--rig", &DriveScenario::rig, "see --list");
+  add(app, "--board", &DriveScenario::board, "chessboard or aprilgrid, in the scene chessboard");
   add(app, "--scene-seed", &DriveScenario::scene_seed, "of the scene");
   add(app, "--rig-seed", &DriveScenario::rig_seed, "of the lenses and how they are mounted");
   add(app, "--seed", &DriveScenario::seed, "of the road, and of wheels and noise too");
   add(app, "--sensor-seed", &DriveScenario::sensor_seed, "of wheels and noise, where it is not --seed");
   add(app, "--exposure-gain", &DriveScenario::exposure_gain, "of the images");
   add(app, "--image-scale", &DriveScenario::image_scale, "image size over 1280x800");
+  add(app, "--image-step", &DriveScenario::image_step, "only every so many of the 12.5 images a second");
   add(app, "--duration-s", &DriveScenario::duration_s, "end the drive early; 0: at the end of its path");
   add(app, "--cameras", &DriveScenario::cameras, "cameras to render, all by default")->delimiter(',');
   const CLI::Option* noise = app->add_option("--noise", noise_, "on or off")

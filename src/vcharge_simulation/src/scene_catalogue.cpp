@@ -4,6 +4,7 @@
 #include <functional>
 #include <stdexcept>
 
+#include "board_pattern.h"
 #include "board_scene.h"
 #include "course_scene.h"
 #include "garage_scene.h"
@@ -42,7 +43,7 @@ const std::vector<CatalogueScene>& catalogue() {
        buildTwoLevelsScene,
        listTwoLevelsDrives,
        planTwoLevelsDrive},
-      {{"chessboard", "chessboard held before each camera in turn, on the lot"},
+      {{"chessboard", "chessboard or AprilGrid (--board) held before each camera in turn, on the lot"},
        buildBoardScene,
        listBoardDrives,
        planBoardDrive}};
@@ -69,11 +70,17 @@ const CatalogueScene& findScene(const std::string& name) {
 }  // namespace
 
 void SceneOptions::validate() const {
+  makeBoardPattern(board);
+  requireField(rig_seed >= 0, "rig_seed", "must not be negative", rig_seed);
   requireField(seed >= 0, "seed", "must not be negative", seed);
   requireField(day >= 0, "day", "must not be negative", day);
   requireField(moved_cars >= 0.0 && moved_cars <= 1.0, "moved_cars", "must be in [0, 1]", moved_cars);
   requireField(detail >= 0.1 && detail <= 1.0, "detail", "must be in [0.1, 1]", detail);
   requireField(image_scale >= 0.05 && image_scale <= 1.0, "image_scale", "must be in [0.05, 1]", image_scale);
+}
+
+std::string boardTarget(const std::string& board) {
+  return makeBoardPattern(board).target_yaml;
 }
 
 std::vector<CatalogueEntry> listScenes() {

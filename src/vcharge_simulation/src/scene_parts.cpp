@@ -170,7 +170,10 @@ void SceneParts::addCars(const std::vector<ParkedCar>& cars) {
       meshes.emplace(key, std::move(mesh));
     }
     const size_t first = scene_->mesh.triangles.size();
-    scene_->mesh.append(meshes.at(key), placement(car.x, car.y, car.z, car.yaw_rad));
+    scene_->mesh.append(meshes.at(key),
+                        placement(car.x, car.y, car.z, car.yaw_rad) *
+                            Eigen::AngleAxisf(static_cast<float>(car.pitch_rad), Eigen::Vector3f::UnitY()) *
+                            Eigen::AngleAxisf(static_cast<float>(car.roll_rad), Eigen::Vector3f::UnitX()));
     Random plate_random(car.seed);
     std::string text = "BS ";
     for (int i = 0; i < 5; ++i) {

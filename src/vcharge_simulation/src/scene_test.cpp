@@ -2,15 +2,21 @@
 
 #include <cmath>
 #include <map>
+#include <set>
 #include <string>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 #include <opencv2/imgproc.hpp>
 
+#include "lot_layout.h"
 #include "reprojection.h"
+#include "scene_parts.h"
+#include "vcharge_simulation/car_model.h"
 #include "vcharge_simulation/drive_simulator.h"
 #include "vcharge_simulation/golf_rig.h"
+#include "vcharge_simulation/rig_catalogue.h"
 #include "vcharge_simulation/truth_maps.h"
 
 namespace vcharge {
@@ -99,6 +105,36 @@ TEST_P(SceneTest, ExactRangeReproducesTheImageFromCameraToCamera) {
   EXPECT_LE(sum / count, 3.0);
 }
 
+// Front and left camera, as above, through lenses of both models.
+TEST_P(SceneTest, ExactRangeReproducesTheImageThroughTheLensesOfRandomRigs) {
+  std::set<std::string> models;
+  for (const uint64_t seed : {1U, 2U, 3U}) {
+    const CameraRig rig = makeRig("random", seed, kImageScale);
+    const CameraView one(rig.cameras[0], nullptr, kIdealLens);
+    const CameraView other(rig.cameras[1], nullptr, kIdealLens);
+    const std::string label = "rig " + std::to_string(seed);
+    for (const CameraView* view : {&one, &other}) {
+      models.insert(view->camera().model.name());
+      const Reprojection result = reproject(renderer(), sighting(*view), sighting(*view, 1));
+      EXPECT_GT(result.count, 5000) << label;
+      EXPECT_LE(result.mean_difference, 3.0) << label;
+    }
+    double sum = 0.0;
+    int count = 0;
+    for (const Reprojection& result :
+         {reproject(renderer(), sighting(one), sighting(other), Surfaces::kNoCars),
+          reproject(renderer(), sighting(other), sighting(one), Surfaces::kNoCars)}) {
+      sum += result.count * result.mean_difference;
+      count += result.count;
+    }
+    RecordProperty("milligray_" + std::to_string(seed), static_cast<int>(1000 * sum / count));
+    // Some lenses leave little of the overlap within their better resolved part.
+    EXPECT_GT(count, 100) << label;
+    EXPECT_LE(sum / count, 3.0) << label;
+  }
+  EXPECT_EQ(models.size(), 2U);
+}
+
 TEST_P(SceneTest, SameBytesOnAnyNumberOfThreads) {
   const CameraView view(makeGolfRig(1, 0.15).cameras[1], makeGolfBody());
   const auto render = [&](size_t threads) {
@@ -183,6 +219,112 @@ TEST(CatalogueTest, EveryDriveStaysInItsSceneAndLastsSomeSeconds) {
       }
     }
   }
+}
+
+cv::Mat_<cv::Point2f> outlineOf(const std::vector<Eigen::Vector2d>& footprint_m) {
+  cv::Mat_<cv::Point2f> outline(static_cast<int>(footprint_m.size()), 1);
+  for (int i = 0; i < outline.rows; ++i) {
+    const Eigen::Vector2f corner = footprint_m[static_cast<size_t>(i)].cast<float>();
+    outline(i) = {corner.x(), corner.y()};
+  }
+  return outline;
+}
+
+// Names of what the own car would touch on a drive of the given scene.
+std::set<std::string> touchedOn(const DrivePlan& plan, const std::vector<Obstacle>& obstacles) {
+  constexpr double kMirror_m = 0.1;
+  const CarShape& golf = carShapes().front();
+  std::vector<cv::Mat_<cv::Point2f>> outlines;
+  for (const Obstacle& obstacle : obstacles) {
+    outlines.push_back(outlineOf(obstacle.footprint_m));
+  }
+  std::set<std::string> touched;
+  const VehicleMotion motion(plan.path, plan.motion, 1, plan.ground_height);
+  for (int ms = 0; ms < static_cast<int>(motion.duration() * 1000.0); ms += 250) {
+    const RigidTransform place = motion.at(ms).world_from_planar;
+    const cv::Mat_<cv::Point2f> own = outlineOf(
+        orientedRectangle(place.translation().x(), place.translation().y(), yawOfRotation(place.rotation()),
+                          golf.rear(), golf.front(), 0.5 * golf.width + kMirror_m));
+    for (size_t i = 0; i < outlines.size(); ++i) {
+      const cv::Point2f corner = outlines[i](0);
+      const bool is_far =
+          std::abs(corner.x - own(0).x) + std::abs(corner.y - own(0).y) > 12.0F && obstacles[i].kind == "car";
+      cv::Mat overlap;
+      if (!is_far && cv::intersectConvexConvex(outlines[i], own, overlap) > 0.0F) {
+        touched.insert(obstacles[i].kind + " at " + std::to_string(corner.x) + ", " +
+                       std::to_string(corner.y));
+      }
+    }
+  }
+  return touched;
+}
+
+TEST_P(SceneTest, DrivesKeepClearOfAllThatStands) {
+  for (const CatalogueEntry& entry : listDrives(GetParam().scene)) {
+    const DrivePlan plan = planDrive(GetParam().scene, entry.name);
+    if (plan.day == 0) {
+      EXPECT_THAT(touchedOn(plan, renderer().scene().obstacles), testing::IsEmpty()) << entry.name;
+    }
+  }
+}
+
+// Parked cars are all that differs between the lots of different seeds and days on the lanes and bays.
+TEST(CatalogueTest, DrivesOfTheLotKeepClearOfParkedCarsForEverySeed) {
+  for (uint64_t seed = 1; seed <= 12; ++seed) {
+    for (const int day : {0, 1}) {
+      std::vector<Obstacle> cars;
+      for (const ParkedCar& car : makeLotLayout(seed, day, 0.3).cars) {
+        const CarShape& shape = carShapes()[static_cast<size_t>(car.shape)];
+        cars.push_back(
+            {"car",
+             orientedRectangle(car.x, car.y, car.yaw_rad, shape.rear(), shape.front(), 0.5 * shape.width),
+             0.0, shape.height});
+      }
+      for (const CatalogueEntry& entry : listDrives("lot")) {
+        const DrivePlan plan = planDrive("lot", entry.name);
+        if (plan.day == day) {
+          EXPECT_THAT(touchedOn(plan, cars), testing::IsEmpty()) << entry.name << ", seed " << seed;
+        }
+      }
+    }
+  }
+}
+
+TEST(SlopeTest, ParkedCarsStandOnTheGroundWithAllFourWheels) {
+  const Scene& scene = rendererOf("two_levels").scene();
+  std::set<uint32_t> of_cars;
+  for (const MeshTriangle& triangle : scene.mesh.triangles) {
+    if (scene.materials[triangle.material].kind == SurfaceKind::kCar) {
+      of_cars.insert(triangle.vertices.begin(), triangle.vertices.end());
+    }
+  }
+  int cars = 0;
+  for (const Obstacle& obstacle : scene.obstacles) {
+    if (obstacle.kind != "car") {
+      continue;
+    }
+    const Eigen::Vector2d middle = 0.5 * (obstacle.footprint_m[0] + obstacle.footprint_m[2]);
+    const Eigen::Vector2d along = 0.5 * (obstacle.footprint_m[1] - obstacle.footprint_m[0]);
+    const Eigen::Vector2d across = 0.5 * (obstacle.footprint_m[3] - obstacle.footprint_m[0]);
+    // Over the ground, of the lowest part of each quarter of the car: a tyre.
+    std::map<std::pair<bool, bool>, double> lowest_m;
+    for (const uint32_t index : of_cars) {
+      const Eigen::Vector3d vertex = scene.mesh.vertices[index].position.cast<double>();
+      const double x = (vertex.head<2>() - middle).dot(along) / along.squaredNorm();
+      const double y = (vertex.head<2>() - middle).dot(across) / across.squaredNorm();
+      if (std::abs(x) < 1.0 && std::abs(y) < 1.0) {
+        const double height_m = vertex.z() - groundAt(scene, vertex.head<2>());
+        const auto [found, is_new] = lowest_m.emplace(std::pair(x > 0.0, y > 0.0), height_m);
+        found->second = std::min(found->second, height_m);
+      }
+    }
+    ASSERT_EQ(lowest_m.size(), 4U);
+    for (const auto& [quarter, height_m] : lowest_m) {
+      EXPECT_NEAR(height_m, 0.0, 0.015);
+    }
+    ++cars;
+  }
+  EXPECT_GT(cars, 20);
 }
 
 TEST(MoverTest, ChangesTheRangeOnlyWhereItsFootprintsAre) {

@@ -26,6 +26,8 @@ struct ParkedCar {
   int paint;             ///< 0 to kNumPaints - 1, dark to bright
   uint32_t seed;         ///< of its number plate
   double z = 0.0;
+  double pitch_rad = 0.0;  ///< of the ground along the car: positive where its nose points down
+  double roll_rad = 0.0;   ///< positive where its left side is up
 };
 inline constexpr int kNumPaints = 5;
 struct Tree {

@@ -12,9 +12,12 @@
 int main(int argc, char** argv) {
   CLI::App app(
       "Simulates a drive of a car with four fisheye cameras and writes it as a bag, with rig_truth.yaml "
-      "beside it and the truth in a folder BAG_truth: masks, trajectory.tum, height_map.tiff and .yaml, "
-      "obstacles.yaml, faults.yaml, range/CAMERA/STAMP_NS.tiff, and rig_before.yaml and rig_after.yaml where "
-      "a fault changes the rig.");
+      "beside it and the truth in a folder BAG_truth: rig.yaml with masks, trajectory.tum, height_map.tiff "
+      "and "
+      ".yaml, obstacles.yaml, movers.yaml, faults.yaml, range/CAMERA/STAMP_NS.tiff, board.yaml in the scene "
+      "chessboard, and rig_before.yaml and rig_after.yaml where a fault changes the rig. rig_truth.yaml is "
+      "that "
+      "of the last drive in its folder.");
   const vcharge::ScenarioCommandLine command_line(&app);
   vcharge::RecordingOptions recording;
   bool list = false;

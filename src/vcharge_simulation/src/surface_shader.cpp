@@ -48,30 +48,32 @@ float SurfaceShader::detailFactor(const Eigen::Vector3f& position, float width_m
   return factor;
 }
 
-float SurfaceShader::groundLight(const Eigen::Vector3f& position, float width_m, float sun_visibility) const {
+float SurfaceShader::towardsSun(const Eigen::Vector3f& ground_normal) const {
+  const float up = ground_normal.z() < 0.0F ? -1.0F : 1.0F;
+  return std::max(0.0F, up * ground_normal.dot(sky_.directionToSun()));
+}
+
+float SurfaceShader::groundLight(const Eigen::Vector3f& position, float width_m, float sun_share) const {
   float surrounding = 1.0F;
   if (scene_.ground.sun != nullptr) {
     const float level = fastLog2(width_m * scene_.ground.sun->texels_per_m);
-    sun_visibility *= scene_.ground.sun->sampleAt(position.x(), position.y(), level);
+    sun_share *= scene_.ground.sun->sampleAt(position.x(), position.y(), level);
   }
   if (scene_.ground.surrounding != nullptr) {
     surrounding = scene_.ground.surrounding->sampleAt(position.x(), position.y(), 0.0F);
   }
-  return static_cast<float>(sky_.light().sun_irradiance) * sky_.directionToSun().z() * sun_visibility +
+  return static_cast<float>(sky_.light().sun_irradiance) * sun_share +
          static_cast<float>(sky_.light().sky_irradiance) * surrounding;
 }
 
 float SurfaceShader::shadeGroundPixel(const Material& material,
                                       const std::array<Eigen::Vector3f, 4>& positions,
-                                      const Eigen::Vector3f& direction, float footprint_m,
-                                      float sun_visibility) const {
+                                      const Eigen::Vector3f& normal, const Eigen::Vector3f& direction,
+                                      float footprint_m, float sun_visibility) const {
   const float stretch = stretchOf(direction);
   const GroundTexture& texture = scene_.ground.layers[static_cast<size_t>(material.texture)];
   const float level = fastLog2(groundSampleWidth(footprint_m, stretch) * texture.texels_per_m);
-  float albedo = 0.0F;
-  for (const Eigen::Vector3f& position : positions) {
-    albedo += 0.25F * texture.sampleAt(position.x(), position.y(), level);
-  }
+  const float albedo = texture.sampleMeanAt(positions, level);
   // The finer details at the middles of the two halves of the pixel, cut across its longer side.
   const Eigen::Vector3f upper = 0.5F * (positions[0] + positions[1]);
   const Eigen::Vector3f lower = 0.5F * (positions[2] + positions[3]);
@@ -83,7 +85,7 @@ float SurfaceShader::shadeGroundPixel(const Material& material,
       0.5F * (detailFactor(tall ? upper : left, width_m) + detailFactor(tall ? lower : right, width_m));
   const Eigen::Vector3f middle = 0.5F * (upper + lower);
   return kGroundLayerAlbedo * albedo * detail *
-             groundLight(middle, footprint_m * std::sqrt(stretch), sun_visibility) +
+             groundLight(middle, footprint_m * std::sqrt(stretch), sun_visibility * towardsSun(normal)) +
          groundReflection(material, middle, direction);
 }
 
@@ -108,7 +110,8 @@ float SurfaceShader::shade(const SurfacePoint& point, float sun_visibility) cons
         kGroundLayerAlbedo *
         texture.sampleAt(point.position.x(), point.position.y(), fastLog2(width_m * texture.texels_per_m)) *
         detailFactor(point.position, width_m);
-    return albedo * groundLight(point.position, point.footprint_m * std::sqrt(stretch), sun_visibility) +
+    return albedo * groundLight(point.position, point.footprint_m * std::sqrt(stretch),
+                                sun_visibility * towardsSun(point.geometric_normal.normalized())) +
            groundReflection(material, point.position, point.direction);
   }
   const Interpolated surface = interpolate(point);
@@ -118,18 +121,13 @@ float SurfaceShader::shade(const SurfacePoint& point, float sun_visibility) cons
 float SurfaceShader::shadePixel(const std::array<SurfacePoint, 4>& points, float sun_visibility) const {
   const Material& material = materialOf(points[0].triangle);
   if (material.mapping == Material::Mapping::kGround) {
-    return shadeGroundPixel(material,
-                            {points[0].position, points[1].position, points[2].position, points[3].position},
-                            points[0].direction, points[0].footprint_m, sun_visibility);
+    return shadeGroundPixel(
+        material, {points[0].position, points[1].position, points[2].position, points[3].position},
+        points[0].geometric_normal.normalized(), points[0].direction, points[0].footprint_m, sun_visibility);
   }
   const Interpolated surface = interpolate(points[0]);
-  float albedo = material.albedo;
-  if (material.mapping == Material::Mapping::kTexture) {
-    albedo = 0.0F;
-    for (const SurfacePoint& point : points) {
-      albedo += 0.25F * albedoAt(point, interpolate(point));
-    }
-  }
+  const float albedo =
+      material.mapping == Material::Mapping::kTexture ? meanAlbedo(points, surface) : material.albedo;
   return lightOf(points[0], surface, albedo, sun_visibility);
 }
 
@@ -158,10 +156,35 @@ float SurfaceShader::albedoAt(const SurfacePoint& point, const Interpolated& sur
     return material.albedo;
   }
   const Texture& texture = scene_.textures[static_cast<size_t>(material.texture)];
-  const float stretch = 1.0F / std::max(0.05F, std::abs(surface.towards));
-  const float level = fastLog2(0.6F * point.footprint_m * std::sqrt(stretch) * material.texels_per_m);
   return material.albedo * texture.sample(surface.u * static_cast<float>(texture.width()),
-                                          surface.v * static_cast<float>(texture.height()), level);
+                                          surface.v * static_cast<float>(texture.height()),
+                                          textureLevel(material, point, surface));
+}
+
+float SurfaceShader::meanAlbedo(const std::array<SurfacePoint, 4>& points, const Interpolated& first) const {
+  const MeshTriangle& triangle = triangleOf(points[0].triangle);
+  const std::vector<MeshVertex>& vertices = meshOf(points[0].triangle).vertices;
+  const MeshVertex& a = vertices[triangle.vertices[0]];
+  const MeshVertex& b = vertices[triangle.vertices[1]];
+  const MeshVertex& c = vertices[triangle.vertices[2]];
+  const Material& material = scene_.materials[triangle.material];
+  const Texture& texture = scene_.textures[static_cast<size_t>(material.texture)];
+  const auto width = static_cast<float>(texture.width());
+  const auto height = static_cast<float>(texture.height());
+  std::array<float, 4> x;
+  std::array<float, 4> y;
+  for (size_t i = 0; i < 4; ++i) {
+    const float wa = 1.0F - points[i].u - points[i].v;
+    x[i] = width * (wa * a.u + points[i].u * b.u + points[i].v * c.u);
+    y[i] = height * (wa * a.v + points[i].u * b.v + points[i].v * c.v);
+  }
+  return material.albedo * texture.sampleMean(x, y, textureLevel(material, points[0], first));
+}
+
+float SurfaceShader::textureLevel(const Material& material, const SurfacePoint& point,
+                                  const Interpolated& surface) {
+  const float stretch = 1.0F / std::max(0.05F, std::abs(surface.towards));
+  return fastLog2(0.6F * point.footprint_m * std::sqrt(stretch) * material.texels_per_m);
 }
 
 float SurfaceShader::sunMapAt(const SurfacePoint& point, const Interpolated& surface) const {

@@ -40,9 +40,10 @@ class SurfaceShader {
   /// Mean light of a pixel whose four samples all meet the same triangle: its light is found once.
   float shadePixel(const std::array<SurfacePoint, 4>& points, float sun_visibility) const;
   /// Mean light of a pixel whose four samples (of CameraView's rotated grid) all meet one ground material at
-  /// `positions`, about `direction`.
+  /// `positions`, about `direction`; `normal` is the ground's, unit.
   float shadeGroundPixel(const Material& material, const std::array<Eigen::Vector3f, 4>& positions,
-                         const Eigen::Vector3f& direction, float footprint_m, float sun_visibility) const;
+                         const Eigen::Vector3f& normal, const Eigen::Vector3f& direction, float footprint_m,
+                         float sun_visibility) const;
   /// Light of the sky, or of the ground where the direction points down; for reflections.
   float surroundings(const Eigen::Vector3f& position, const Eigen::Vector3f& direction) const;
   /// Light of a plain surface (the own car) in the world frame.
@@ -66,11 +67,16 @@ class SurfaceShader {
   }
   Interpolated interpolate(const SurfacePoint& point) const;
   float albedoAt(const SurfacePoint& point, const Interpolated& surface) const;
+  float meanAlbedo(const std::array<SurfacePoint, 4>& points, const Interpolated& first) const;
+  static float textureLevel(const Material& material, const SurfacePoint& point, const Interpolated& surface);
   float sunMapAt(const SurfacePoint& point, const Interpolated& surface) const;
   float lightOf(const SurfacePoint& point, const Interpolated& surface, float albedo,
                 float sun_visibility) const;
   float detailFactor(const Eigen::Vector3f& position, float width_m) const;
-  float groundLight(const Eigen::Vector3f& position, float width_m, float sun_visibility) const;
+  /// Cosine of the sun's light on the ground.
+  float towardsSun(const Eigen::Vector3f& ground_normal) const;
+  /// sun_share: of the sun's light, by its angle and what no light map knows.
+  float groundLight(const Eigen::Vector3f& position, float width_m, float sun_share) const;
   float ambient(const Eigen::Vector3f& normal) const;
   float groundReflection(const Material& material, const Eigen::Vector3f& position,
                          const Eigen::Vector3f& direction) const;

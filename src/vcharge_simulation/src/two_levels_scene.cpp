@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "garage_surfaces.h"
 #include "lot_ground.h"
@@ -51,7 +50,7 @@ double outerHeight(double x, double y) {
   return rampHeight(y) + bumps(x, y);
 }
 double groundHeight(double x, double y) {
-  return std::abs(x) < kInner_m ? innerHeight(x, y) : outerHeight(x, y);
+  return twoLevelsGroundHeight(x, y);
 }
 
 Eigen::Vector3f vertexAt(double x, double y, double z) {
@@ -165,16 +164,36 @@ void lift(std::vector<Thing>* things) {
   }
 }
 
+// As its four wheels stand.
+void standOnGround(ParkedCar* car) {
+  const CarShape& shape = carShapes()[static_cast<size_t>(car->shape)];
+  const double c = std::cos(car->yaw_rad);
+  const double s = std::sin(car->yaw_rad);
+  const double half_track_m = 0.45 * shape.width;
+  const auto height = [&](double along_m, double across_m) {
+    return groundHeight(car->x + c * along_m - s * across_m, car->y + s * along_m + c * across_m);
+  };
+  const double rear_left = height(0.0, half_track_m);
+  const double rear_right = height(0.0, -half_track_m);
+  const double front_left = height(shape.wheelbase, half_track_m);
+  const double front_right = height(shape.wheelbase, -half_track_m);
+  car->z = 0.5 * (rear_left + rear_right);
+  car->pitch_rad = -std::atan(0.5 * (front_left + front_right - rear_left - rear_right) / shape.wheelbase);
+  car->roll_rad = std::atan(0.25 * (front_left + rear_left - front_right - rear_right) / half_track_m);
+}
+
 LotLayout twoLevelsLayout(const SceneOptions& options) {
   LotLayout layout = makeLotLayout(static_cast<uint64_t>(options.seed), options.day, options.moved_cars);
   // Level islands, hedges and fences cannot lie on the ramps, nor may anything stand where walls are.
-  const auto is_outside = [](const GroundRectangle& area) { return area.min_x < -kInner_m - 0.1; };
-  for (GroundRectangle& island : layout.islands) {
-    island.min_x = std::abs(island.min_y) > 20.0 ? std::max(island.min_x, -kInner_m) : island.min_x;
-    island.max_x = std::abs(island.min_y) > 20.0 ? std::min(island.max_x, kInner_m) : island.max_x;
-  }
+  const auto is_outside = [](const GroundRectangle& area) {
+    return area.max_x < -kInner_m || area.min_x > kInner_m;
+  };
   layout.islands.erase(std::remove_if(layout.islands.begin(), layout.islands.end(), is_outside),
                        layout.islands.end());
+  for (GroundRectangle& island : layout.islands) {
+    island.min_x = std::max(island.min_x, -kInner_m);
+    island.max_x = std::min(island.max_x, kInner_m);
+  }
   layout.hedges.erase(std::remove_if(layout.hedges.begin(), layout.hedges.end(),
                                      [&](const Hedge& hedge) { return is_outside(hedge.area); }),
                       layout.hedges.end());
@@ -198,11 +217,17 @@ LotLayout twoLevelsLayout(const SceneOptions& options) {
   settle(&layout.bushes);
   settle(&layout.poles);
   settle(&layout.bins);
-  lift(&layout.cars);
+  for (ParkedCar& car : layout.cars) {
+    standOnGround(&car);
+  }
   return layout;
 }
 
 }  // namespace
+
+double twoLevelsGroundHeight(double x_m, double y_m) {
+  return std::abs(x_m) < kInner_m ? innerHeight(x_m, y_m) : outerHeight(x_m, y_m);
+}
 
 std::shared_ptr<const Scene> buildTwoLevelsScene(const SceneOptions& options) {
   LotVariant two_levels;
@@ -211,42 +236,6 @@ std::shared_ptr<const Scene> buildTwoLevelsScene(const SceneOptions& options) {
   two_levels.add_things = addWalls;
   two_levels.ground_height = groundHeight;
   return buildLotVariant(lotOptionsOf(options), two_levels);
-}
-
-std::vector<CatalogueEntry> listTwoLevelsDrives() {
-  return {{"loop", "up the eastern ramp, along the upper level, down the western ramp, back to the start"},
-          {"loop_reverse_direction", "the loop, clockwise"},
-          {"up_and_down", "up the eastern ramp, a stop, and down again backwards"},
-          {"other_day", "the loop 2 m beside on another day"}};
-}
-
-DrivePlan planTwoLevelsDrive(const std::string& name) {
-  constexpr double kCornerRadius_m = 5.2;
-  constexpr double kTransition_m = 3.0;
-  VehicleMotionOptions motion;
-  motion.duration_s = 600.0;
-  motion.standstill_s = 0.5;
-  motion.stop_at_end = true;
-  DrivePlan plan{name, DrivePath(RigidTransform(), {}), motion, 0, groundHeight};
-  if (name == "up_and_down") {
-    plan.path = DrivePath(RigidTransform::planar(26.0, -15.0, 1.57079632679489661923),
-                          {{30.0, 0.0, 0.0}, {30.0, 0.0, 0.0, true}});
-    return plan;
-  }
-  if (name == "loop" || name == "loop_reverse_direction" || name == "other_day") {
-    const double beside_m = name == "other_day" ? -1.0 : 1.0;
-    std::vector<Eigen::Vector2d> corners = {{26.5, -15.0 - beside_m},
-                                            {26.5, 15.0 + beside_m},
-                                            {-26.5, 15.0 + beside_m},
-                                            {-26.5, -15.0 - beside_m}};
-    if (name == "loop_reverse_direction") {
-      std::reverse(corners.begin(), corners.end());
-    }
-    plan.path = DrivePath::throughWaypoints(corners, true, kCornerRadius_m, kTransition_m);
-    plan.day = name == "other_day" ? 1 : 0;
-    return plan;
-  }
-  throw std::invalid_argument("drive: the lot on two levels has none of the name '" + name + "'");
 }
 
 }  // namespace vcharge

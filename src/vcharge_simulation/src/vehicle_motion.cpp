@@ -112,6 +112,9 @@ double desiredSpeed(const DrivePath& path, const VehicleMotionOptions& options, 
   if (curvature > 0.0) {
     speed = std::min(speed, std::sqrt(options.max_lateral_acceleration_m_per_s2 / curvature));
   }
+  if (path.direction(s_m) < 0.0) {
+    speed = std::min(speed, options.max_backwards_speed_m_per_s);
+  }
   if (options.stop_at_end) {
     speed = std::min(speed, std::sqrt(2.0 * kBraking_m_per_s2 * std::max(0.0, path.length() - 0.2 - s_m)));
   }
@@ -122,6 +125,8 @@ double desiredSpeed(const DrivePath& path, const VehicleMotionOptions& options, 
 
 void VehicleMotionOptions::validate() const {
   requireField(cruise_speed_m_per_s > 0.0, "cruise_speed_m_per_s", "must be positive", cruise_speed_m_per_s);
+  requireField(max_backwards_speed_m_per_s > 0.0, "max_backwards_speed_m_per_s", "must be positive",
+               max_backwards_speed_m_per_s);
   requireField(max_lateral_acceleration_m_per_s2 > 0.0, "max_lateral_acceleration_m_per_s2",
                "must be positive", max_lateral_acceleration_m_per_s2);
   requireField(max_acceleration_m_per_s2 > 0.0, "max_acceleration_m_per_s2", "must be positive",

@@ -50,11 +50,14 @@ class DrivePath {
   /// In order of arc length; the car also stops for kTurnaround_s wherever it changes its direction.
   const std::vector<Stop>& stops() const { return stops_; }
   void addStop(const Stop& stop);
+  /// Goes on along another path from here, wherever that one starts; with a stop where the direction changes.
+  void append(const DrivePath& next);
 
   static constexpr double kTurnaround_s = 1.0;
 
  private:
   size_t segmentAt(double s_m) const;
+  void appendSegment(const Segment& segment);
 
   RigidTransform world_from_start_;
   std::vector<Segment> segments_;

@@ -19,8 +19,15 @@ struct SceneOptions {
   double image_scale = 1.0;
   /// Leaves and light maps over the default: less is quicker to build, for tests.
   double detail = 1.0;
+  /// Of the scene "chessboard": what is held ("chessboard" or "aprilgrid"), and for the cameras of which rig.
+  std::string board = "chessboard";
+  std::string rig = "golf";
+  int rig_seed = 1;
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
+
+/// SceneOptions::board as a target file of Kalibr. std::invalid_argument for an unknown one.
+std::string boardTarget(const std::string& board);
 
 /// A drive through a scene.
 struct DrivePlan {

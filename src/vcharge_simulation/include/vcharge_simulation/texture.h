@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <cstring>
 #include <vector>
 
+#include <Eigen/Core>
 #include <opencv2/core.hpp>
 
 namespace vcharge {
@@ -39,6 +41,23 @@ class Texture {
       return value;
     }
     return value + weight * (bilinear(lower + 1, x, y) - value);
+  }
+
+  /// Mean of four samples of one pixel. Of the coarser level, whose texels are wider than the samples lie
+  /// apart, the middles of the first and of the last two are enough.
+  float sampleMean(const std::array<float, 4>& x, const std::array<float, 4>& y, float level) const {
+    const float last = static_cast<float>(levels_.size() - 1);
+    level = level <= 0.0F ? 0.0F : (level >= last ? last : level);
+    const int lower = static_cast<int>(level);
+    const float weight = level - static_cast<float>(lower);
+    const float fine = 0.25F * (bilinear(lower, x[0], y[0]) + bilinear(lower, x[1], y[1]) +
+                                bilinear(lower, x[2], y[2]) + bilinear(lower, x[3], y[3]));
+    if (weight < 0.02F) {
+      return fine;
+    }
+    const float coarse = 0.5F * (bilinear(lower + 1, 0.5F * (x[0] + x[1]), 0.5F * (y[0] + y[1])) +
+                                 bilinear(lower + 1, 0.5F * (x[2] + x[3]), 0.5F * (y[2] + y[3])));
+    return fine + weight * (coarse - fine);
   }
 
  private:
@@ -96,6 +115,17 @@ struct GroundTexture {
   /// level: as in Texture::sample.
   float sampleAt(float x_m, float y_m, float level) const {
     return texture.sample((x_m - min_x_m) * texels_per_m, (y_m - min_y_m) * texels_per_m, level);
+  }
+
+  /// As Texture::sampleMean.
+  float sampleMeanAt(const std::array<Eigen::Vector3f, 4>& positions_m, float level) const {
+    std::array<float, 4> x;
+    std::array<float, 4> y;
+    for (size_t i = 0; i < 4; ++i) {
+      x[i] = (positions_m[i].x() - min_x_m) * texels_per_m;
+      y[i] = (positions_m[i].y() - min_y_m) * texels_per_m;
+    }
+    return texture.sampleMean(x, y, level);
   }
 };
 

@@ -12,6 +12,7 @@ namespace vcharge {
 /// How the car drives along a path and how its body moves on its springs.
 struct VehicleMotionOptions {
   double cruise_speed_m_per_s = 2.5;
+  double max_backwards_speed_m_per_s = 1.2;
   double max_lateral_acceleration_m_per_s2 = 1.2;
   double max_acceleration_m_per_s2 = 1.0;
   double standstill_s = 0.0;  ///< at the start; 0: the drive starts at cruise speed
@@ -28,6 +29,7 @@ struct VehicleMotionOptions {
   template <class Visitor>
   void visitFields(Visitor&& visit) {
     visit("cruise_speed_m_per_s", cruise_speed_m_per_s);
+    visit("max_backwards_speed_m_per_s", max_backwards_speed_m_per_s);
     visit("max_lateral_acceleration_m_per_s2", max_lateral_acceleration_m_per_s2);
     visit("max_acceleration_m_per_s2", max_acceleration_m_per_s2);
     visit("standstill_s", standstill_s);
