@@ -1,0 +1,134 @@
+#!/usr/bin/env python3
+"""build_map on a simulated drive: accurate, the same on any number of threads, blind to the truth, hard to break."""
+import os
+import pathlib
+import random
+import sys
+import unittest
+
+import numpy as np
+import rostest
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from drive_fixture import Drive, content_hash, run, tool  # noqa: E402
+
+
+def positions(path):
+    """Stamps (N) and positions (N x 3) of a TUM file."""
+    rows = np.loadtxt(path)
+    return rows[:, 0], rows[:, 1:4]
+
+
+def align(points, targets):
+    """Points moved rigidly to lie nearest to their targets (Umeyama 1991, without scale)."""
+    centre, target_centre = points.mean(axis=0), targets.mean(axis=0)
+    u, _, v = np.linalg.svd((targets - target_centre).T @ (points - centre))
+    rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
+    return (points - centre) @ rotation.T + target_centre
+
+
+class MappingTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.drive = Drive(drive="figure_eight", duration_s=9, cameras=("front", "left", "rear", "right"),
+                          extra=("--image-step", "2"))
+        cls.map = cls.drive.folder / "lot.vmap"
+        cls.trajectory = cls.drive.folder / "lot.tum"
+        status, cls.output, errors = cls.build(cls.drive.bag, cls.map, "--trajectory", cls.trajectory)
+        if status != 0:
+            raise RuntimeError(f"build_map failed: {cls.output} {errors}")
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.drive.remove()
+
+    @classmethod
+    def build(cls, bag, output, *extra, rig=None, prefix=()):
+        return run([*prefix, tool("vcharge_mapping", "build_map"), "--bag", bag, "--rig", rig or cls.drive.rig,
+                    "--output", output, *extra])
+
+    def rewritten(self, name, change):
+        return self.drive.rewrite(name, change)
+
+    def errors_m(self, trajectory):
+        stamps, estimate = positions(trajectory)
+        truth_stamps, truth = positions(self.drive.truth / "trajectory.tum")
+        nearest = np.abs(truth_stamps[None, :] - stamps[:, None]).argmin(axis=1)
+        return np.linalg.norm(align(estimate, truth[nearest]) - truth[nearest], axis=1)
+
+    def test_the_path_is_right_to_centimetres(self):
+        errors = self.errors_m(self.trajectory)
+        self.assertGreater(len(errors), 50)
+        # Half-size images over some 20 m of the way; the bar for a whole drive at full size is 5 cm.
+        self.assertLess(np.sqrt(np.mean(errors ** 2)), 0.05)
+
+    def test_the_map_holds_landmarks_of_all_cameras(self):
+        status, output, errors = run([tool("vcharge_mapping", "map_info"), "--map", self.map])
+        self.assertEqual((status, errors), (0, []))
+        self.assertIn(content_hash(self.output), output)
+        for camera in ("front", "left", "rear", "right"):
+            self.assertIn(camera, output)
+        landmarks = next(line for line in output.splitlines() if line.startswith("landmarks"))
+        self.assertGreater(int(landmarks.split()[1]), 1000)
+
+    def test_is_the_same_on_one_thread(self):
+        status, output, _ = self.build(self.drive.bag, self.drive.folder / "one.vmap", prefix=("taskset", "-c", "0"))
+        self.assertEqual(status, 0)
+        self.assertEqual(content_hash(output), content_hash(self.output))
+
+    def test_removing_the_ground_truth_changes_nothing(self):
+        bag = self.rewritten("blind.bag", lambda topic, message: (
+            [] if topic == "/ground_truth" else [(topic, message)]))
+        status, output, _ = self.build(bag, self.drive.folder / "blind.vmap")
+        self.assertEqual(status, 0)
+        self.assertEqual(content_hash(output), content_hash(self.output))
+
+    def test_bears_lost_images_a_camera_that_pauses_and_a_gap_in_the_odometry(self):
+        chance = random.Random(1)
+        start = self.drive.messages()[0][1].header.stamp.to_sec()
+
+        def worse(topic, message):
+            time_s = message.header.stamp.to_sec() - start
+            lost = topic.endswith("image_raw") and chance.random() < 0.1
+            paused = topic == "/camera/left/image_raw" and 2.0 < time_s < 3.5
+            gap = topic == "/odom" and 5.0 < time_s < 5.6
+            return [] if lost or paused or gap else [(topic, message)]
+
+        trajectory = self.drive.folder / "worse.tum"
+        status, output, errors = self.build(self.rewritten("worse.bag", worse), self.drive.folder / "worse.vmap",
+                                            "--trajectory", trajectory)
+        self.assertEqual((status, errors), (0, []), output)
+        frames = next(line for line in output.splitlines() if line.startswith("frames"))
+        self.assertNotIn(" 0 lack a camera", frames)
+        self.assertNotIn(" 0 without odometry", frames)
+        self.assertLess(np.sqrt(np.mean(self.errors_m(trajectory) ** 2)), 0.15)
+
+    def test_names_what_is_wrong_and_leaves_the_old_map_alone(self):
+        before = self.map.read_bytes()
+        no_odometry = self.rewritten("no_odometry.bag", lambda topic, message: (
+            [] if topic == "/odom" else [(topic, message)]))
+        no_extrinsics = self.drive.write_text("no_extrinsics.yaml", self.without_extrinsics())
+        missing = pathlib.Path("/no/such.bag")
+        for bag, rig, words in ((no_odometry, None, ("odom",)), (missing, None, ("/no/such.bag",)),
+                                (self.drive.bag, no_extrinsics, ("vehicle_from_camera",))):
+            status, _, errors = self.build(bag, self.map, rig=rig)
+            self.assertNotEqual(status, 0)
+            self.assertEqual(len(errors), 1, errors)
+            for word in words:
+                self.assertIn(word, errors[0])
+        self.assertEqual(self.map.read_bytes(), before)
+
+    def without_extrinsics(self):
+        lines, skipped = [], False
+        for line in self.drive.rig.read_text().splitlines():
+            if line.startswith("    vehicle_from_camera"):
+                skipped = True
+            elif skipped and not line.startswith("      "):
+                skipped = False
+            if not skipped:
+                lines.append(line)
+        return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    rostest.rosrun("vcharge_tests", "mapping", MappingTest)
