@@ -72,6 +72,10 @@ struct PlaneSweepOptions {
   int num_refinement_steps = 16;
   double refinement_step_px = 0.5;
 
+  /// The warp over planes is exact on a grid and interpolated between, where that errs by no more than this;
+  /// 0: every pixel is projected.
+  double warp_tolerance_px = 0.03;
+
   double matching_noise_px = 0.07;  ///< error of a match that more neighbours do not average out
   PoseNoiseOptions pose_noise;
 
@@ -96,6 +100,7 @@ struct PlaneSweepOptions {
     visit("sub_plane_interpolation", sub_plane_interpolation);
     visit("num_refinement_steps", num_refinement_steps);
     visit("refinement_step_px", refinement_step_px);
+    visit("warp_tolerance_px", warp_tolerance_px);
     visit("matching_noise_px", matching_noise_px);
     visit("pose_noise", pose_noise);
     visit("min_texture", min_texture);
