@@ -261,6 +261,7 @@ class RatioReporter : public benchmark::ConsoleReporter {
         keep(name + "_gathers", 1e9 * gathers->second.value / items->second.value);
       }
       keep(name, value);
+      keep(name + "_cpu", 1e3 * run.cpu_accumulated_time / static_cast<double>(run.iterations));
     }
   }
 
@@ -282,6 +283,7 @@ class RatioReporter : public benchmark::ConsoleReporter {
     }
     for (const char* what : {"first_sweep_of_4", "whole_of_4", "whole_of_2"}) {
       const std::string name = std::string("rangeMap/") + what;
+      print(name + ": processor time, ms", get(name + "/1_cpu"), 1.0);
       print(name + ": one thread, ms", get(name + "/1"), 1.0);
       print(name + ": two threads, ms", get(name + "/2"), 1.0);
       print(name + ": one over two threads", get(name + "/1"), get(name + "/2"));
@@ -331,16 +333,19 @@ BENCHMARK(plain)->Iterations(1)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(rangeMap, first_sweep_of_4, PlaneFamilies::kFrontoParallel, 0, 4)
     ->Arg(1)
     ->Arg(2)
+    ->MeasureProcessCPUTime()
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(rangeMap, whole_of_4, PlaneFamilies::kBoth, 16, 4)
     ->Arg(1)
     ->Arg(2)
+    ->MeasureProcessCPUTime()
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(rangeMap, whole_of_2, PlaneFamilies::kBoth, 16, 2)
     ->Arg(1)
     ->Arg(2)
+    ->MeasureProcessCPUTime()
     ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 

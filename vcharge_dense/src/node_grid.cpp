@@ -1,6 +1,7 @@
 #include "node_grid.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace vcharge {
@@ -14,6 +15,17 @@ constexpr float kMaxSecondDifference_px = 12.0f;
 /// Nodes that cover `pixels` with whole cells, at least two for a third difference.
 int countNodes(int pixels, int spacing) {
   return 2 * std::max(2, (pixels + 2 * spacing - 1) / (2 * spacing)) + 1;
+}
+
+/// Unit ray of a pixel of a camera without distortion (paper, Camera Model); NaN where there is none.
+Eigen::Vector3d rayWithoutDistortion(const MeiCamera& camera, double u, double v) {
+  const double x = (u - camera.u0()) / camera.gamma1();
+  const double y = (v - camera.v0()) / camera.gamma2();
+  const double squared_radius = x * x + y * y;
+  const double xi = camera.xi();
+  const double scale =
+      (xi + std::sqrt(1.0 + (1.0 - xi * xi) * squared_radius)) / (squared_radius + 1.0);  // NaN beyond
+  return Eigen::Vector3d(scale * x, scale * y, scale - xi);
 }
 
 }  // namespace
@@ -43,10 +55,9 @@ NodeGrid::NodeGrid(const MeiCamera& camera, const cv::Mat& near_valid, cv::Point
         const int x = origin.x + lane * layout.strip + node * spacing;
         const bool needed = near_valid.at<uint8_t>(std::clamp(y, 0, near_valid.rows - 1),
                                                    std::clamp(x, 0, near_valid.cols - 1)) != 0;
-        Eigen::Vector3d ray;
-        if (!needed || !camera.unproject(Eigen::Vector2d(x, y), &ray)) {
-          ray.setConstant(std::numeric_limits<double>::quiet_NaN());
-        }
+        const Eigen::Vector3d ray = needed
+                                        ? rayWithoutDistortion(camera, x, y)
+                                        : Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
         x_[at] = static_cast<float>(ray.x());
         y_[at] = static_cast<float>(ray.y());
         z_[at] = static_cast<float>(ray.z());

@@ -324,5 +324,19 @@ TEST(RangeMapperTest, RejectsARigItCannotUse) {
   EXPECT_THROW(RangeMapper(rig, options, recorder.callback()), std::invalid_argument);
 }
 
+TEST(RangeMapperOptionsTest, PresetComesBeforeOtherFields) {
+  RangeMapperOptions options;
+  readFields(YAML::Load("{plane_sweep: {num_planes: 40}, preset: fast}"), "test", &options);
+  EXPECT_EQ(options.preset, RangePreset::kFast);
+  EXPECT_EQ(options.plane_sweep.num_planes, 40);
+  RangeMapperOptions fast;
+  fast.usePreset(RangePreset::kFast);
+  EXPECT_EQ(options.neighbours.num_neighbours, fast.neighbours.num_neighbours);
+  EXPECT_LT(fast.neighbours.num_neighbours, RangeMapperOptions().neighbours.num_neighbours);
+  fast.usePreset(RangePreset::kDefault);
+  EXPECT_EQ(YAML::Dump(writeFields(fast)), YAML::Dump(writeFields(RangeMapperOptions())));
+  EXPECT_THROW(readFields(YAML::Load("{preset: quick}"), "test", &options), InputError);
+}
+
 }  // namespace
 }  // namespace vcharge

@@ -76,13 +76,13 @@ struct PlaneSweepOptions {
   /// 0: every pixel is projected.
   double warp_tolerance_px = 0.03;
 
-  double matching_noise_px = 0.07;  ///< error of a match that more neighbours do not average out
+  double matching_noise_px = 0.035;  ///< error of a match that more neighbours do not average out
   PoseNoiseOptions pose_noise;
 
   double min_texture = 2.0;  ///< standard deviation of the reference window in gray levels; less is unknown
   double min_score = 0.3;    ///< a lower correlation is unknown
   double max_relative_sigma = 0.5;  ///< a larger standard deviation over range is unobserved
-  double min_confidence = 0.05;     ///< less is unknown
+  double min_confidence = 0.25;     ///< probability to be within 5 %; less is unknown
   bool gate = true;                 ///< false keeps every range that some plane explains, for comparisons
 
   template <class Visitor>
