@@ -43,8 +43,7 @@ void RangeMapperOptions::usePreset(RangePreset new_preset) {
   plane_sweep.num_refinement_steps = default_sweep.num_refinement_steps;
   switch (preset) {
     case RangePreset::kFast:
-      neighbours.num_neighbours = 2;
-      plane_sweep.num_planes = 48;
+      plane_sweep.num_planes = 40;
       plane_sweep.num_ground_planes = 8;
       plane_sweep.num_refinement_steps = 8;
       break;

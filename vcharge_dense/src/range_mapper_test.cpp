@@ -326,13 +326,13 @@ TEST(RangeMapperTest, RejectsARigItCannotUse) {
 
 TEST(RangeMapperOptionsTest, PresetComesBeforeOtherFields) {
   RangeMapperOptions options;
-  readFields(YAML::Load("{plane_sweep: {num_planes: 40}, preset: fast}"), "test", &options);
+  readFields(YAML::Load("{plane_sweep: {num_planes: 50}, preset: fast}"), "test", &options);
   EXPECT_EQ(options.preset, RangePreset::kFast);
-  EXPECT_EQ(options.plane_sweep.num_planes, 40);
+  EXPECT_EQ(options.plane_sweep.num_planes, 50);
   RangeMapperOptions fast;
   fast.usePreset(RangePreset::kFast);
-  EXPECT_EQ(options.neighbours.num_neighbours, fast.neighbours.num_neighbours);
-  EXPECT_LT(fast.neighbours.num_neighbours, RangeMapperOptions().neighbours.num_neighbours);
+  EXPECT_EQ(options.plane_sweep.num_ground_planes, fast.plane_sweep.num_ground_planes);
+  EXPECT_LT(fast.plane_sweep.num_planes, RangeMapperOptions().plane_sweep.num_planes);
   fast.usePreset(RangePreset::kDefault);
   EXPECT_EQ(YAML::Dump(writeFields(fast)), YAML::Dump(writeFields(RangeMapperOptions())));
   EXPECT_THROW(readFields(YAML::Load("{preset: quick}"), "test", &options), InputError);
