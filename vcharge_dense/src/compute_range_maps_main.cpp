@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <string>
@@ -22,6 +23,7 @@ using namespace vcharge;
 
 struct Arguments {
   std::string bag, rig, trajectory, options, output;
+  std::string preset = "default";
   std::vector<std::string> cameras;
   bool online = false;
   bool no_pictures = false;
@@ -44,6 +46,9 @@ RangeMapperOptions readOptions(const Arguments& arguments) {
   if (!arguments.trajectory.empty()) {
     options.plane_sweep.pose_noise = PoseNoiseOptions::trajectory();
   }
+  const std::vector<std::string> presets = enumNames<RangePreset>();
+  const auto preset = std::find(presets.begin(), presets.end(), arguments.preset);
+  options.usePreset(static_cast<RangePreset>(preset - presets.begin()));
   if (!arguments.options.empty()) {
     readFieldsFromFile(arguments.options, &options);
   }
@@ -130,6 +135,9 @@ int main(int argc, char** argv) {
   app.add_option("--trajectory", arguments.trajectory,
                  "TUM file; without it poses come from the drive's odometry");
   app.add_option("--options", arguments.options, "YAML with overrides of RangeMapperOptions");
+  app.add_option("--preset", arguments.preset, "speed against accuracy, before --options")
+      ->check(CLI::IsMember(enumNames<RangePreset>()))
+      ->capture_default_str();
   app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
   app.add_option("--output", arguments.output, "folder to write")->required()->check(requireNotEmpty);
   app.add_flag(

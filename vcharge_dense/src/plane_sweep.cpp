@@ -1,12 +1,11 @@
 #include "vcharge_dense/plane_sweep.h"
 
-#include <algorithm>
-#include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <opencv2/imgproc.hpp>
 
 #include "range_uncertainty.h"
 #include "surface_estimate.h"
@@ -16,34 +15,9 @@
 namespace vcharge {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr int kTileWidth = 160;
-constexpr int kTileHeight = 32;
 constexpr double kWholeSphere_rad = 6.283185307179586;
-
-/// Gray levels less `mean`, NaN where the mask is 0, with a frame of NaN of the given width.
-cv::Mat toFloat(const cv::Mat& pixels, const cv::Mat& mask, float mean, int frame) {
-  cv::Mat framed(pixels.rows + 2 * frame, pixels.cols + 2 * frame, CV_32FC1, cv::Scalar(kNaN));
-  for (int y = 0; y < pixels.rows; ++y) {
-    const auto* from = pixels.ptr<uint8_t>(y);
-    const auto* valid = mask.ptr<uint8_t>(y);
-    auto* to = framed.ptr<float>(y + frame) + frame;
-    for (int x = 0; x < pixels.cols; ++x) {
-      to[x] = valid[x] != 0 ? static_cast<float>(from[x]) - mean : kNaN;
-    }
-  }
-  return framed;
-}
-
-std::vector<cv::Rect> makeTiles(cv::Size size) {
-  std::vector<cv::Rect> tiles;
-  for (int y = 0; y < size.height; y += kTileHeight) {
-    for (int x = 0; x < size.width; x += kTileWidth) {
-      tiles.emplace_back(x, y, std::min(kTileWidth, size.width - x), std::min(kTileHeight, size.height - y));
-    }
-  }
-  return tiles;
-}
+// Node grids need positions this far around valid pixels.
+constexpr int kNearValid_px = 17;
 
 /// Tiles are independent of each other, hence of who computes them.
 template <class Function>
@@ -75,6 +49,13 @@ PlaneSweep::PlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask, const
   const MeiCamera::Parameters p = camera.parameters();
   check(p.tail<4>().isZero(0.0), "PlaneSweep: the working camera must not have distortion");
   families_ = makePlaneFamilies(options_, ground_in_camera);
+  auto planes = std::make_shared<std::vector<Hypotheses>>();
+  for (const PlaneFamily& family : families_) {
+    planes->push_back(makePlaneHypotheses(family, rays_, valid_mask_, options_.window_px));
+  }
+  planes_ = planes;
+  valid_windows_ = windowsInside(valid_mask_, options_.window_px);
+  cv::dilate(valid_mask_, near_valid_, cv::Mat::ones(2 * kNearValid_px + 1, 2 * kNearValid_px + 1, CV_8UC1));
 }
 
 RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepImage>& neighbours,
@@ -83,42 +64,50 @@ RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepI
   checkImage(reference, size);
   check(neighbours.size() <= 32, "PlaneSweep: at most 32 neighbours");
 
-  const float mean = static_cast<float>(cv::mean(reference.pixels, valid_mask_)[0]);
-  SweepInput input{camera_, &rays_, toFloat(reference.pixels, valid_mask_, mean, 0), {}, &options_};
+  const SampleScale scale = SampleScale::forWindow(options_.window_px);
+  SweepInput input{camera_,
+                   &rays_,
+                   &near_valid_,
+                   &options_,
+                   sweepKernels(),
+                   scale,
+                   SweepReference(reference.pixels, options_, scale),
+                   {}};
   for (const SweepImage& image : neighbours) {
     checkImage(image, size);
     const RigidTransform neighbour_from_reference =
         image.world_from_camera.inverse() * reference.world_from_camera;
-    SweepNeighbour neighbour;
-    const cv::Mat framed = toFloat(image.pixels, valid_mask_, mean, 1);
-    neighbour.framed_pixels.assign(framed.ptr<float>(), framed.ptr<float>() + framed.total());
-    neighbour.neighbour_from_reference = neighbour_from_reference.rotationMatrix().cast<float>();
-    neighbour.translation_m = neighbour_from_reference.translation().cast<float>();
-    neighbour.after = image.stamp > reference.stamp;
-    input.neighbours.push_back(std::move(neighbour));
+    input.neighbours.push_back(
+        {PackedImage(image.pixels, valid_mask_), neighbour_from_reference.rotationMatrix().cast<float>(),
+         neighbour_from_reference.translation().cast<float>(), image.stamp > reference.stamp});
   }
 
-  std::vector<Hypotheses> hypotheses;
-  for (const PlaneFamily& family : families_) {
-    hypotheses.push_back(makePlaneHypotheses(family, rays_));
-  }
-  const std::vector<cv::Rect> tiles = makeTiles(size);
+  const std::vector<cv::Rect> tiles =
+      neighbours.empty() ? std::vector<cv::Rect>() : makeTiles(size, options_.window_px);
   SurfaceEstimate estimate(size);
+  struct Worker {
+    TileScorer scorer;
+    std::vector<TileScores> scores;
+  };
+  tbb::enumerable_thread_specific<Worker> workers([&] {
+    return Worker{TileScorer(input), std::vector<TileScores>(planes_->size())};
+  });
   forEachTile(tiles, [&](const cv::Rect& tile) {
-    TileScorer scorer(input, tile);
-    std::vector<TileScores> scores(hypotheses.size());
-    for (size_t f = 0; f < hypotheses.size(); ++f) {
-      scorer.score(hypotheses[f], &scores[f]);
+    Worker& worker = workers.local();
+    worker.scorer.setTile(tile);
+    for (size_t f = 0; f < planes_->size(); ++f) {
+      worker.scorer.score((*planes_)[f], &worker.scores[f]);
     }
-    readPeaks(hypotheses, scores, options_.sub_plane_interpolation, &estimate);
+    readPeaks(*planes_, worker.scores, options_.sub_plane_interpolation, &estimate);
   });
   const bool found = cv::countNonZero(estimate.plane >= 0) > 0;
   if (found && options_.num_refinement_steps > 0) {
-    const Hypotheses refinement = makeRefinement(input, estimate);
+    const Hypotheses refinement = makeRefinement(input, valid_windows_, estimate);
     forEachTile(tiles, [&](const cv::Rect& tile) {
-      TileScores scores;
-      TileScorer(input, tile).score(refinement, &scores);
-      readRefinement(refinement, scores, options_.sub_plane_interpolation, &estimate);
+      Worker& worker = workers.local();
+      worker.scorer.setTile(tile);
+      worker.scorer.score(refinement, &worker.scores.front());
+      readRefinement(refinement, worker.scores.front(), options_.sub_plane_interpolation, &estimate);
     });
   }
 

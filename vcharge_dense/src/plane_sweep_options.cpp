@@ -40,6 +40,8 @@ void PlaneSweepOptions::validate() const {
                "num_refinement_steps", "must be 0 or in [2, 256]", num_refinement_steps);
   requireField(refinement_step_px > 0.0 && refinement_step_px <= 10.0, "refinement_step_px",
                "must be in (0, 10]", refinement_step_px);
+  requireField(warp_tolerance_px >= 0.0 && warp_tolerance_px <= 1.0, "warp_tolerance_px", "must be in [0, 1]",
+               warp_tolerance_px);
   requireNotNegative("matching_noise_px", matching_noise_px);
   requireNotNegative("pose_noise.scale", pose_noise.scale);
   requireNotNegative("pose_noise.translation_m", pose_noise.translation_m);

@@ -25,6 +25,8 @@ using testing::makeSequence;
 using testing::plainOptions;
 using testing::Sequence;
 
+// Samples lie on a grid of 1/256 pixel and 1/8 gray level, and the warp between the nodes of a grid: scores
+// differ by thousandths, and so do the parabolas' peaks, in planes.
 TEST(PlaneSweepTest, EqualsThePlainReference) {
   for (const Aggregation aggregation :
        {Aggregation::kMean, Aggregation::kReferenceSplit, Aggregation::kBestK}) {
@@ -42,19 +44,24 @@ TEST(PlaneSweepTest, EqualsThePlainReference) {
     const RangeMap map = sweep.sweep(s.reference, s.neighbours, &details);
     const PlainResult plain = plainPlaneSweep(kCamera, mask, sweep.families(), options, s.reference,
                                               s.neighbours, PlainBorder::kUnknown);
-    int same_plane = 0, same_range = 0;
+    int same_plane = 0, same_score = 0, same_range = 0;
     for (int y = 0; y < kSize.height; ++y) {
       for (int x = 0; x < kSize.width; ++x) {
+        EXPECT_EQ(details.plane.at<int>(y, x) < 0, plain.plane.at<int>(y, x) < 0) << x << ", " << y;
         if (details.plane.at<int>(y, x) == plain.plane.at<int>(y, x)) {
           ++same_plane;
-          const double expected = 1.0 / plain.inverse_range.at<double>(y, x);
+          const double expected = plain.inverse_range.at<double>(y, x);
           const double range = map.range_m.at<float>(y, x);
-          const bool both_unknown = std::isnan(range) && !(plain.inverse_range.at<double>(y, x) > 0.0);
-          same_range += both_unknown || std::abs(range - expected) <= 1e-4 * expected ? 1 : 0;
+          const bool both_unknown = std::isnan(range) && !(expected > 0.0);
+          const double tolerance = 0.01 * sweep.families()[0].step_per_m();
+          same_range += both_unknown || std::abs(1.0 / range - expected) <= tolerance ? 1 : 0;
+          const double score = details.score.at<float>(y, x) - plain.score.at<double>(y, x);
+          same_score += both_unknown || std::abs(score) <= 0.002 ? 1 : 0;
         }
       }
     }
-    EXPECT_GE(same_plane, 0.999 * kSize.area()) << "aggregation " << static_cast<int>(aggregation);
+    EXPECT_GE(same_plane, 0.995 * kSize.area()) << "aggregation " << static_cast<int>(aggregation);
+    EXPECT_GE(same_score, 0.999 * same_plane);
     EXPECT_GE(same_range, 0.999 * same_plane);
   }
 }

@@ -34,6 +34,28 @@ RangeMapperOptions RangeMapperOptions::offline() {
   return options;
 }
 
+void RangeMapperOptions::usePreset(RangePreset new_preset) {
+  preset = new_preset;
+  const PlaneSweepOptions default_sweep;
+  neighbours.num_neighbours = NeighbourOptions().num_neighbours;
+  plane_sweep.num_planes = default_sweep.num_planes;
+  plane_sweep.num_ground_planes = default_sweep.num_ground_planes;
+  plane_sweep.num_refinement_steps = default_sweep.num_refinement_steps;
+  switch (preset) {
+    case RangePreset::kFast:
+      plane_sweep.num_planes = 40;
+      plane_sweep.num_ground_planes = 8;
+      plane_sweep.num_refinement_steps = 8;
+      break;
+    case RangePreset::kDefault:
+      break;
+    case RangePreset::kAccurate:
+      neighbours.num_neighbours = 6;
+      plane_sweep.num_planes = 96;
+      break;
+  }
+}
+
 void RangeMapperOptions::validate() const {
   requireField(min_motion_m > 0.0, "min_motion_m", "must be positive", min_motion_m);
   requireField(max_speed_m_per_s > 0.0, "max_speed_m_per_s", "must be positive", max_speed_m_per_s);

@@ -324,5 +324,19 @@ TEST(RangeMapperTest, RejectsARigItCannotUse) {
   EXPECT_THROW(RangeMapper(rig, options, recorder.callback()), std::invalid_argument);
 }
 
+TEST(RangeMapperOptionsTest, PresetComesBeforeOtherFields) {
+  RangeMapperOptions options;
+  readFields(YAML::Load("{plane_sweep: {num_planes: 50}, preset: fast}"), "test", &options);
+  EXPECT_EQ(options.preset, RangePreset::kFast);
+  EXPECT_EQ(options.plane_sweep.num_planes, 50);
+  RangeMapperOptions fast;
+  fast.usePreset(RangePreset::kFast);
+  EXPECT_EQ(options.plane_sweep.num_ground_planes, fast.plane_sweep.num_ground_planes);
+  EXPECT_LT(fast.plane_sweep.num_planes, RangeMapperOptions().plane_sweep.num_planes);
+  fast.usePreset(RangePreset::kDefault);
+  EXPECT_EQ(YAML::Dump(writeFields(fast)), YAML::Dump(writeFields(RangeMapperOptions())));
+  EXPECT_THROW(readFields(YAML::Load("{preset: quick}"), "test", &options), InputError);
+}
+
 }  // namespace
 }  // namespace vcharge

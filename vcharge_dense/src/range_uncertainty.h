@@ -21,13 +21,16 @@ struct PixelSensitivity {
 PixelSensitivity pixelSensitivity(const MeiCamera& camera, const SweepNeighbour& neighbour,
                                   const Eigen::Vector3f& ray, float inverse_range);
 
-/// Range, standard deviation and confidence from what the sweep found; applies the options' gates.
+/// Range, standard deviation and confidence from what the sweep found; applies the options' gates. The
+/// confidence is the probability that the range is within 5 %, as calibrated on simulated drives.
 ///
-/// The variance in inverse range has three parts: image noise, from the height and the curvature of the
+/// The variance in inverse range has four parts: image noise, from the height and the curvature of the
 /// score's peak (a peak of height 1 - e leaves noise e times the window's contrast, and the curvature says
 /// how fast the windows disagree); matching_noise_px over the motion of the neighbours' pixels, which does
-/// not average out; and the relative poses' errors, taken as common to all neighbours. Where the point hardly
-/// moves in the image (towards the direction of travel) all of them grow without bound.
+/// not average out; the relative poses' errors, taken as common to all neighbours; and how rough the
+/// neighbouring estimates are: at edges and on slanted surfaces windows do not fit, and estimates scatter
+/// more than noise makes them. Where the point hardly moves in the image (towards the direction of travel)
+/// all of them grow without bound.
 void estimateRange(const SweepInput& input, const SurfaceEstimate& estimate, RangeMap* map);
 
 }  // namespace vcharge

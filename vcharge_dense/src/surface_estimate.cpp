@@ -6,6 +6,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "parallel_rows.h"
 #include "range_uncertainty.h"
 
 namespace vcharge {
@@ -31,28 +32,33 @@ Parabola fitParabola(float before, float middle, float after) {
   return parabola;
 }
 
-/// Score of the best peak of one family that does not contain the hypothesis `excluded` (-1: none does) and,
-/// where `excluded` is -1, lies further than `separation` from `inverse_range`.
-float bestOtherPeak(const Hypotheses& hypotheses, const TileScores& scores, size_t pixel, float weight,
-                    int excluded, float inverse_range, float separation) {
-  const int count = static_cast<int>(hypotheses.offsets.size());
-  const size_t stride = scores.numPixels();
-  const float* at = scores.scores.data() + pixel;
-  float best = -1.0f;
-  for (int k = 0; k < count; ++k) {
-    const float score = at[static_cast<size_t>(k) * stride];
-    if (!(score > best) || k == excluded) {
-      continue;
-    }
-    const bool falls_before = k == 0 || !(at[static_cast<size_t>(k - 1) * stride] > score);
-    const bool falls_after = k == count - 1 || !(at[static_cast<size_t>(k + 1) * stride] > score);
-    const bool apart = excluded >= 0 || std::abs(hypotheses.offsets[static_cast<size_t>(k)] * weight -
-                                                 inverse_range) > separation;
-    if (falls_before && falls_after && apart) {
-      best = score;
+float correlation(int16_t score) {
+  return score == kNoScore ? kNaN : static_cast<float>(score) / kScoreScale;
+}
+
+/// Calls function(x, y, pixel of the layout) for the pixels of a tile.
+template <class Function>
+void forEachPixel(const TileScores& scores, const Function& function) {
+  for (int row = 0; row < scores.tile.height; ++row) {
+    for (int column = 0; column < scores.tile.width; ++column) {
+      function(scores.tile.x + column, scores.tile.y + row, scores.layout.index(row, column));
     }
   }
-  return best;
+}
+
+/// Score of a family's best peak that lies further than `separation` from `inverse_range`, of its two highest
+/// ones; -1 where there is none.
+float bestPeakApart(const Hypotheses& hypotheses, const TileScores& scores, size_t pixel, float weight,
+                    float inverse_range, float separation) {
+  const int16_t indices[] = {scores.best[pixel], scores.second[pixel]};
+  const int16_t values[] = {scores.best_score[pixel], scores.second_score[pixel]};
+  for (int i = 0; i < 2; ++i) {
+    if (indices[i] >= 0 &&
+        std::abs(hypotheses.offsets[static_cast<size_t>(indices[i])] * weight - inverse_range) > separation) {
+      return correlation(values[i]);
+    }
+  }
+  return -1.0f;
 }
 
 /// Mean over a square of those values that are not NaN; NaN where there is none.
@@ -65,14 +71,14 @@ cv::Mat meanOfKnown(const cv::Mat& values, int side) {
   cv::boxFilter(weights, weight_sum, CV_32F, cv::Size(side, side), cv::Point(-1, -1), false,
                 cv::BORDER_CONSTANT);
   cv::Mat mean(values.size(), CV_32FC1, cv::Scalar(kNaN));
-  for (int y = 0; y < mean.rows; ++y) {
+  forEachRow(mean.rows, [&](int y) {
     for (int x = 0; x < mean.cols; ++x) {
       const float weight = weight_sum.at<float>(y, x);
       if (weight > 0.5f) {
         mean.at<float>(y, x) = sum.at<float>(y, x) / weight;
       }
     }
-  }
+  });
   return mean;
 }
 
@@ -96,7 +102,7 @@ cv::Mat smoothSurface(const SurfaceEstimate& estimate) {
   cv::Mat median;
   cv::medianBlur(fillUnknown(estimate.inverse_range), median, 5);
   cv::Mat smooth = median.clone();
-  for (int y = 0; y < smooth.rows; ++y) {
+  forEachRow(smooth.rows, [&](int y) {
     for (int x = 0; x < smooth.cols; ++x) {
       const float middle = median.at<float>(y, x);
       const float step = estimate.step.at<float>(y, x);
@@ -113,7 +119,7 @@ cv::Mat smoothSurface(const SurfaceEstimate& estimate) {
         smooth.at<float>(y, x) = sum / weight;
       }
     }
-  }
+  });
   return smooth;
 }
 
@@ -129,44 +135,44 @@ SurfaceEstimate::SurfaceEstimate(cv::Size size)
       voters(size, CV_32SC1, cv::Scalar(0)),
       at_limit(size, CV_8UC1, cv::Scalar(0)) {}
 
-Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays) {
+Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays, const cv::Mat& valid_mask,
+                               int window_px) {
   Hypotheses hypotheses;
-  hypotheses.base = cv::Mat::zeros(rays.size(), CV_32FC1);
+  hypotheses.are_planes = true;
+  hypotheses.normal = family.normal.cast<float>();
   hypotheses.weight = cv::Mat(rays.size(), CV_32FC1);
   hypotheses.offsets = family.inverse_distances_per_m;
-  const Eigen::Vector3f normal = family.normal.cast<float>();
+  cv::Mat counts(rays.size(), CV_8UC1);
   for (int y = 0; y < rays.size().height; ++y) {
     for (int x = 0; x < rays.size().width; ++x) {
-      const float weight = -normal.dot(rays.ray(x, y));
-      hypotheses.weight.at<float>(y, x) = weight > 1e-3f ? weight : kNaN;
+      const float weight = -hypotheses.normal.dot(rays.ray(x, y));
+      const bool meets = weight > 1e-3f;
+      hypotheses.weight.at<float>(y, x) = meets ? weight : kNaN;
+      counts.at<uint8_t>(y, x) = meets && valid_mask.at<uint8_t>(y, x) != 0 ? 255 : 0;
     }
   }
+  hypotheses.window_counts = windowsInside(counts, window_px);
   return hypotheses;
 }
 
 void readPeaks(const std::vector<Hypotheses>& hypotheses, const std::vector<TileScores>& scores,
                bool interpolate, SurfaceEstimate* estimate) {
-  const cv::Rect tile = scores.front().tile;
-  for (int i = 0; i < tile.area(); ++i) {
-    const auto pixel = static_cast<size_t>(i);
-    const int x = tile.x + i % tile.width;
-    const int y = tile.y + i / tile.width;
+  forEachPixel(scores.front(), [&](int x, int y, size_t pixel) {
     int family = -1;
-    float best_score = -std::numeric_limits<float>::infinity();
+    int16_t best_score = kNoScore;
     for (size_t f = 0; f < hypotheses.size(); ++f) {
       const int best = scores[f].best[pixel];
       const int last = static_cast<int>(hypotheses[f].offsets.size()) - 1;
       if (best < 0 || (f > 0 && (best == 0 || best == last))) {
         continue;
       }
-      const float score = scores[f].scores[static_cast<size_t>(best) * scores[f].numPixels() + pixel];
-      if (score > best_score) {
-        best_score = score;
+      if (scores[f].best_score[pixel] > best_score) {
+        best_score = scores[f].best_score[pixel];
         family = static_cast<int>(f);
       }
     }
     if (family < 0) {
-      continue;
+      return;
     }
     const auto f = static_cast<size_t>(family);
     const Hypotheses& planes = hypotheses[f];
@@ -174,45 +180,51 @@ void readPeaks(const std::vector<Hypotheses>& hypotheses, const std::vector<Tile
     const int last = static_cast<int>(planes.offsets.size()) - 1;
     const float weight = planes.weight.at<float>(y, x);
     const float step = (planes.offsets[1] - planes.offsets[0]) * weight;
-    Parabola parabola;
     const bool at_limit = best == 0 || best == last;
+    Parabola parabola;
     if (!at_limit) {
-      const float* at = scores[f].scores.data() + pixel + static_cast<size_t>(best) * scores[f].numPixels();
-      parabola = fitParabola(*(at - scores[f].numPixels()), *at, *(at + scores[f].numPixels()));
+      parabola = fitParabola(correlation(scores[f].before[pixel]), correlation(best_score),
+                             correlation(scores[f].after[pixel]));
     }
     const float inverse_range = planes.offsets[static_cast<size_t>(best)] * weight;
     int plane = best;
-    float second = -1.0f;
+    float second = scores[f].second[pixel] >= 0 ? correlation(scores[f].second_score[pixel]) : -1.0f;
     for (size_t g = 0; g < hypotheses.size(); ++g) {
       if (g < f) {
         plane += static_cast<int>(hypotheses[g].offsets.size());
       }
-      second = std::max(second,
-                        bestOtherPeak(hypotheses[g], scores[g], pixel, hypotheses[g].weight.at<float>(y, x),
-                                      g == f ? best : -1, inverse_range, 2.0f * step));
+      if (g != f) {
+        const float other = bestPeakApart(hypotheses[g], scores[g], pixel,
+                                          hypotheses[g].weight.at<float>(y, x), inverse_range, 2.0f * step);
+        second = std::max(second, other);
+      }
     }
     estimate->inverse_range.at<float>(y, x) = inverse_range + (interpolate ? parabola.offset * step : 0.0f);
     estimate->step.at<float>(y, x) = step;
-    estimate->score.at<float>(y, x) = best_score;
+    estimate->score.at<float>(y, x) = correlation(best_score);
     estimate->curvature.at<float>(y, x) = parabola.curvature / (step * step);
     estimate->second_score.at<float>(y, x) = second;
     estimate->plane.at<int>(y, x) = plane;
-    estimate->voters.at<int>(y, x) = static_cast<int>(scores[f].voters[pixel]);
+    estimate->voters.at<int>(y, x) = static_cast<int>(scores[f].voters(best, pixel));
     estimate->at_limit.at<uint8_t>(y, x) = at_limit ? 255 : 0;
-  }
+  });
 }
 
-Hypotheses makeRefinement(const SweepInput& input, const SurfaceEstimate& estimate) {
+Hypotheses makeRefinement(const SweepInput& input, const cv::Mat& window_counts,
+                          const SurfaceEstimate& estimate) {
   const int half = input.options->num_refinement_steps / 2;
   Hypotheses refinement;
+  refinement.window_counts = window_counts;
   refinement.base = smoothSurface(estimate);
   refinement.weight = cv::Mat(refinement.base.size(), CV_32FC1, cv::Scalar(kNaN));
   for (int k = -half; k <= half; ++k) {
     refinement.offsets.push_back(static_cast<float>(k));
   }
   const cv::Mat step = fillUnknown(estimate.step);
-  for (int y = 0; y < step.rows; ++y) {
-    for (int x = 0; x < step.cols; ++x) {
+  // The neighbours' motion varies slowly: once for 2 x 2 pixels.
+  forEachRow((step.rows + 1) / 2, [&](int half_y) {
+    const int y = 2 * half_y;
+    for (int x = 0; x < step.cols; x += 2) {
       const float inverse_range = refinement.base.at<float>(y, x);
       float motion = 0.0f;
       for (const SweepNeighbour& neighbour : input.neighbours) {
@@ -220,30 +232,29 @@ Hypotheses makeRefinement(const SweepInput& input, const SurfaceEstimate& estima
             std::max(motion, pixelSensitivity(input.camera, neighbour, input.rays->ray(x, y), inverse_range)
                                  .pixels_per_inverse_range);
       }
-      // Fine enough for the neighbour that moves most, wide enough to reach half way to the next plane and
-      // back.
-      const float coarse = step.at<float>(y, x) / static_cast<float>(half);
       const float fine = static_cast<float>(input.options->refinement_step_px) / std::max(motion, 1e-6f);
-      refinement.weight.at<float>(y, x) = std::clamp(fine, 0.75f * coarse, 2.0f * coarse);
+      for (int v = y; v < std::min(y + 2, step.rows); ++v) {
+        for (int u = x; u < std::min(x + 2, step.cols); ++u) {
+          // Fine enough for the neighbour that moves most, wide enough to reach half way to the next plane
+          // and back.
+          const float coarse = step.at<float>(v, u) / static_cast<float>(half);
+          refinement.weight.at<float>(v, u) = std::clamp(fine, 0.75f * coarse, 2.0f * coarse);
+        }
+      }
     }
-  }
+  });
   return refinement;
 }
 
 void readRefinement(const Hypotheses& refinement, const TileScores& scores, bool interpolate,
                     SurfaceEstimate* estimate) {
-  const cv::Rect tile = scores.tile;
-  const size_t stride = scores.numPixels();
   const int last = static_cast<int>(refinement.offsets.size()) - 1;
-  for (int i = 0; i < tile.area(); ++i) {
-    const auto pixel = static_cast<size_t>(i);
-    const int x = tile.x + i % tile.width;
-    const int y = tile.y + i / tile.width;
+  forEachPixel(scores, [&](int x, int y, size_t pixel) {
     const int best = scores.best[pixel];
     if (best <= 0 || best == last) {
-      continue;
+      return;
     }
-    const float* at = scores.scores.data() + pixel + static_cast<size_t>(best) * stride;
+    const float best_score = correlation(scores.best_score[pixel]);
     const float weight = refinement.weight.at<float>(y, x);
     const float peak =
         refinement.base.at<float>(y, x) + refinement.offsets[static_cast<size_t>(best)] * weight;
@@ -251,17 +262,18 @@ void readRefinement(const Hypotheses& refinement, const TileScores& scores, bool
     float& step = estimate->step.at<float>(y, x);
     float& score = estimate->score.at<float>(y, x);
     // The first sweep's winner is another peak when the refinement ended far from it and scores less.
-    if (*at < score && std::abs(peak - inverse_range) > step) {
-      continue;
+    if (best_score < score && std::abs(peak - inverse_range) > step) {
+      return;
     }
-    const Parabola parabola = fitParabola(*(at - stride), *at, *(at + stride));
+    const Parabola parabola =
+        fitParabola(correlation(scores.before[pixel]), best_score, correlation(scores.after[pixel]));
     inverse_range = peak + (interpolate ? parabola.offset * weight : 0.0f);
     step = weight;
-    score = *at;
+    score = best_score;
     estimate->curvature.at<float>(y, x) = parabola.curvature / (weight * weight);
-    estimate->voters.at<int>(y, x) = static_cast<int>(scores.voters[pixel]);
+    estimate->voters.at<int>(y, x) = static_cast<int>(scores.voters(best, pixel));
     estimate->at_limit.at<uint8_t>(y, x) = 0;
-  }
+  });
 }
 
 }  // namespace vcharge

@@ -25,7 +25,8 @@ struct SurfaceEstimate {
 };
 
 /// The planes of a family as hypotheses: base 0, weight -normal . ray, NaN where a ray does not meet them.
-Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays);
+Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays, const cv::Mat& valid_mask,
+                               int window_px);
 
 /// Reads one tile's scores of all families into the estimate. A family beyond the first one only counts where
 /// its best plane lies inside the family: its neighbours belong to the first one.
@@ -33,7 +34,8 @@ void readPeaks(const std::vector<Hypotheses>& hypotheses, const std::vector<Tile
                bool interpolate, SurfaceEstimate* estimate);
 
 /// Hypotheses around the smoothed estimate, closely spaced (SweepInput's options); see PlaneSweepOptions.
-Hypotheses makeRefinement(const SweepInput& input, const SurfaceEstimate& estimate);
+Hypotheses makeRefinement(const SweepInput& input, const cv::Mat& window_counts,
+                          const SurfaceEstimate& estimate);
 
 /// Replaces the estimate of a tile where the refinement's scores have a peak; elsewhere the first sweep's
 /// stays.

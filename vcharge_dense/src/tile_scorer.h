@@ -1,81 +1,70 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
-#include <Eigen/Core>
 #include <opencv2/core.hpp>
 
-#include "vcharge_core/mei_camera.h"
-#include "vcharge_core/ray_table.h"
-#include "vcharge_dense/plane_sweep_options.h"
+#include "aligned_array.h"
+#include "node_grid.h"
+#include "sweep_input.h"
+#include "tile_layout.h"
 
 namespace vcharge {
 
-/// A neighbour's image as the kernel samples it.
-struct SweepNeighbour {
-  /// Gray levels less the reference's mean, framed by one pixel of NaN and NaN where invalid: interpolation
-  /// carries "not seen" along without a test per sample.
-  std::vector<float> framed_pixels;
-  Eigen::Matrix3f neighbour_from_reference;  ///< rotation
-  Eigen::Vector3f translation_m;             ///< of the same transform
-  bool after = false;                        ///< taken after the reference
-};
-
-/// What all tiles of one sweep share. The pointers outlive the tiles.
-struct SweepInput {
-  MeiCamera camera;
-  const RayTable* rays;
-  cv::Mat reference;  ///< CV_32FC1, gray levels less their mean, NaN where invalid
-  std::vector<SweepNeighbour> neighbours;
-  const PlaneSweepOptions* options;
-};
-
-/// A set of surfaces to score: pixel (x, y) on surface k has the inverse range base + offsets[k] * weight.
-/// For planes base is 0 and the weight is -normal . ray.
-struct Hypotheses {
-  cv::Mat base;    ///< CV_32FC1
-  cv::Mat weight;  ///< CV_32FC1, NaN where there is no surface
-  std::vector<float> offsets;
-};
-
-/// Scores of one tile: [hypothesis][row][column], NaN where nobody votes.
+/// Scores of one tile, in the order of its layout.
 struct TileScores {
-  cv::Rect tile;
-  std::vector<float> scores;
-  std::vector<int> best;         ///< hypothesis with the highest score per pixel, -1 where none
-  std::vector<uint32_t> voters;  ///< bit n: neighbour n took part in the best score
+  cv::Rect tile;      ///< pixels that were scored; those of the layout beyond its columns mean nothing
+  TileLayout layout;  ///< its rows are the tile's
+  size_t stride = 0;  ///< of hypotheses in `scores`
+  int num_neighbours = 0;
+  AlignedArray<int16_t> scores;     ///< [hypothesis][pixel]: correlation times kScoreScale
+  std::vector<uint8_t> voter_bits;  ///< [hypothesis][neighbour][pixel / 8]
+  size_t neighbour_bytes = 0;       ///< of voter_bits
+  AlignedArray<int16_t> best, best_score, before, after, second, second_score;  ///< see Peaks
 
-  size_t numPixels() const { return static_cast<size_t>(tile.area()); }
+  /// Bit n: neighbour n took part in the hypothesis's score at a pixel.
+  uint32_t voters(int hypothesis, size_t pixel) const;
 };
 
-/// Correlates a tile of the reference with its neighbours warped over hypothetical surfaces. The inner loops
-/// run over rows of plain floats, so that the compiler vectorizes them.
+/// Tiles of the pixels whose window lies in an image. Their size is fixed, whoever computes them.
+std::vector<cv::Rect> makeTiles(cv::Size image, int window_px);
+
+/// Correlates a tile of the reference with its neighbours (at least one) warped over hypothetical surfaces.
+/// One object per thread, for any number of tiles.
 class TileScorer {
  public:
-  TileScorer(const SweepInput& input, cv::Rect tile);
+  explicit TileScorer(const SweepInput& input);
+
+  void setTile(const cv::Rect& tile);
   void score(const Hypotheses& hypotheses, TileScores* result);
 
  private:
-  void warp(const SweepNeighbour& neighbour, const std::vector<float>& rotated_rays);
-  void correlate(float* scores);
-  void aggregate(float* aggregated);
+  struct Neighbour {
+    Projection projection;
+    AlignedArray<float> cells;
+    AlignedArray<int32_t> pairs, column_sums;
+    const NodeGrid* grid = nullptr;  // null: every pixel is projected
+  };
+
+  void loadSurface(const Hypotheses& hypotheses);
+  void placeNeighbour(const Hypotheses& hypotheses, float offset, Neighbour* neighbour);
+  void scoreHypothesis(const Hypotheses& hypotheses, size_t k, TileScores* result);
 
   const SweepInput& input_;
+  const int radius_;
   cv::Rect tile_;
-  int radius_;
-  int halo_width_, halo_height_;
-  std::vector<float> reference_;                    // with the halo
-  std::vector<float> reference_sum_;                // per pixel of the tile
-  std::vector<float> reference_inverse_deviation_;  // 1 / sqrt(sum of squares about the mean)
-  std::vector<std::vector<float>> rotated_rays_;    // per neighbour: x, y, z planes with the halo
-  std::vector<float> inverse_range_, warped_;       // with the halo
-  std::vector<float> row_sums_;                     // three planes: halo rows x tile columns
-  std::vector<float> position_x_, position_y_;      // of one row, in the framed neighbour
-  std::vector<float> window_sums_;                  // of one row
-  std::vector<std::vector<float>> neighbour_scores_;
-  std::vector<float> votes_, other_side_;
-  std::vector<uint32_t> voters_, other_voters_;
+  TileLayout halo_;  // the tile with the rows and columns that windows reach into
+  std::vector<std::unique_ptr<NodeGrid>> grids_;  // coarse to fine
+  std::vector<Neighbour> neighbours_;
+  AlignedArray<int32_t> reference_pairs_;
+  AlignedArray<float> mean_, inverse_deviation_;  // of the tile's rows
+  bool has_rays_ = false;
+  AlignedArray<float> ray_x_, ray_y_, ray_z_, base_, weight_;  // with the halo
+  AlignedArray<int32_t> u_, v_;                                // of one row
+  AlignedArray<float> votes_;                                  // of one row, per neighbour
+  std::unique_ptr<bool[]> after_;
 };
 
 }  // namespace vcharge

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,6 +17,8 @@
 #include "vcharge_dense/plane_sweep_options.h"
 
 namespace vcharge {
+
+struct Hypotheses;
 
 /// One image of the swept camera and where it was taken.
 struct SweepImage {
@@ -68,6 +71,9 @@ class PlaneSweep {
   PlaneSweepOptions options_;
   RayTable rays_;
   std::vector<PlaneFamily> families_;
+  std::shared_ptr<const std::vector<Hypotheses>> planes_;  // of the families
+  cv::Mat valid_windows_;  // CV_8UC1: not 0 where all pixels of the window are valid
+  cv::Mat near_valid_;     // CV_8UC1: not 0 where valid pixels are near
 };
 
 }  // namespace vcharge

@@ -72,13 +72,17 @@ struct PlaneSweepOptions {
   int num_refinement_steps = 16;
   double refinement_step_px = 0.5;
 
-  double matching_noise_px = 0.07;  ///< error of a match that more neighbours do not average out
+  /// The warp over planes is exact on a grid and interpolated between, where that errs by no more than this;
+  /// 0: every pixel is projected.
+  double warp_tolerance_px = 0.03;
+
+  double matching_noise_px = 0.035;  ///< error of a match that more neighbours do not average out
   PoseNoiseOptions pose_noise;
 
   double min_texture = 2.0;  ///< standard deviation of the reference window in gray levels; less is unknown
   double min_score = 0.3;    ///< a lower correlation is unknown
   double max_relative_sigma = 0.5;  ///< a larger standard deviation over range is unobserved
-  double min_confidence = 0.05;     ///< less is unknown
+  double min_confidence = 0.25;     ///< probability to be within 5 %; less is unknown
   bool gate = true;                 ///< false keeps every range that some plane explains, for comparisons
 
   template <class Visitor>
@@ -96,6 +100,7 @@ struct PlaneSweepOptions {
     visit("sub_plane_interpolation", sub_plane_interpolation);
     visit("num_refinement_steps", num_refinement_steps);
     visit("refinement_step_px", refinement_step_px);
+    visit("warp_tolerance_px", warp_tolerance_px);
     visit("matching_noise_px", matching_noise_px);
     visit("pose_noise", pose_noise);
     visit("min_texture", min_texture);

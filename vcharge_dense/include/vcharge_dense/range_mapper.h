@@ -19,8 +19,16 @@
 
 namespace vcharge {
 
+/// Settings of neighbours and planes that trade accuracy for time (package README, Settings).
+enum class RangePreset { kFast, kDefault, kAccurate };
+template <>
+inline std::vector<std::string> enumNames<RangePreset>() {
+  return {"fast", "default", "accurate"};
+}
+
 struct RangeMapperOptions {
-  std::vector<std::string> cameras;  ///< of the rig, by name; empty: all
+  RangePreset preset = RangePreset::kDefault;  ///< where it is read, it comes before all other fields
+  std::vector<std::string> cameras;            ///< of the rig, by name; empty: all
   bool use_later_images =
       false;                   ///< neighbours on both sides: needs images from after the reference (offline)
   double min_motion_m = 0.03;  ///< of a camera between two references; below it the vehicle stands
@@ -34,8 +42,16 @@ struct RangeMapperOptions {
   /// Neighbours before and after the reference, aggregated by reference-split.
   static RangeMapperOptions offline();
 
+  /// Sets the fields that the preset stands for, and leaves the others.
+  void usePreset(RangePreset new_preset);
+
   template <class Visitor>
   void visitFields(Visitor&& visit) {
+    const RangePreset before = preset;
+    visit("preset", preset);
+    if (preset != before) {
+      usePreset(preset);
+    }
     visit("cameras", cameras);
     visit("use_later_images", use_later_images);
     visit("min_motion_m", min_motion_m);

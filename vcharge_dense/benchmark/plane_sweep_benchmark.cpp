@@ -1,0 +1,368 @@
+// The plane sweep beside the limits of the machine and the plain reference, in one run: 640x400, ZNCC 7x7, 64
+// planes, 4 neighbours. Every figure is the least of its repetitions; --benchmark_filter picks some.
+#include <algorithm>
+#include <cstdio>
+#include <ctime>
+#include <map>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+#include <hwy/aligned_allocator.h>
+#include <hwy/targets.h>
+#include <tbb/global_control.h>
+
+#include "analytic_scene.h"
+#include "machine_limits.h"
+#include "plain_plane_sweep.h"
+#include "surface_estimate.h"
+#include "sweep_input.h"
+#include "tile_scorer.h"
+#include "vcharge_dense/plane_sweep.h"
+
+namespace vcharge {
+namespace {
+
+constexpr int kRounds = 10;
+constexpr size_t kGatherRows = 64, kGatherColumns = 640;
+const cv::Size kSize(640, 400);
+const MeiCamera kFisheye(1.158, 448.0, 447.0, 324.0, 199.0);
+const MeiCamera kPinhole(0.0, 330.0, 330.0, 324.0, 199.0);
+
+/// A side camera that passes a wall and a box, 0.2 m between images, all taken before the reference.
+struct Scene {
+  MeiCamera camera;
+  SweepImage reference;
+  std::vector<SweepImage> neighbours;
+  Plane ground;
+
+  Scene(const MeiCamera& model, int num_neighbours) : camera(model) {
+    const AnalyticScene world(
+        {{{0, 0, 0}, {0, 0, 1}}, {{0, 6.5, 0}, {0, -1, 0}}, {{1.5, 3.5, 0.6}, {0, -1, 0}, {1.0, 0.0, 0.6}}},
+        7);
+    const Eigen::Quaterniond vehicle_from_optical(0.5, -0.5, 0.5, -0.5);
+    const Eigen::Quaterniond rotation = rotationFromYawPitchRoll(1.5, 0.6, 0.0) * vehicle_from_optical;
+    for (int i = 0; i <= num_neighbours; ++i) {
+      const RigidTransform pose(rotation, Eigen::Vector3d(-0.2 * i, 1.0, 0.9));
+      SweepImage image{Timestamp::fromNanoseconds(1000000000 - i * 80000000),
+                       world.render(camera, kSize, pose, 1.0, static_cast<uint32_t>(1 + i)), pose};
+      i == 0 ? void(reference = image) : neighbours.push_back(image);
+    }
+    ground = groundInCamera(reference.world_from_camera);
+  }
+};
+
+const Scene& scene(bool fisheye) {
+  static const Scene fisheye_scene(kFisheye, 4);
+  static const Scene pinhole_scene(kPinhole, 4);
+  return fisheye ? fisheye_scene : pinhole_scene;
+}
+
+PlaneSweepOptions firstSweepOnly() {
+  PlaneSweepOptions options;
+  options.families = PlaneFamilies::kFrontoParallel;
+  options.num_refinement_steps = 0;
+  return options;
+}
+
+/// While it lives only one instruction set is used; works() says whether the machine has it.
+class OnlyTarget {
+ public:
+  OnlyTarget(benchmark::State* state, int64_t target) : works_((hwy::SupportedTargets() & target) != 0) {
+    if (works_) {
+      hwy::SetSupportedTargetsForTest(target);
+    } else {
+      state->SkipWithError("the processor lacks this instruction set");
+    }
+  }
+  ~OnlyTarget() { hwy::SetSupportedTargetsForTest(0); }
+  OnlyTarget(const OnlyTarget&) = delete;
+  OnlyTarget& operator=(const OnlyTarget&) = delete;
+  bool works() const { return works_; }
+
+ private:
+  bool works_;
+};
+
+void gather(benchmark::State& state, int64_t target) {
+  const OnlyTarget only(&state, target);
+  const std::vector<int32_t> image(1024 * (kGatherRows + 8), 1);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(gatherPixels(image.data(), kGatherRows, kGatherColumns));
+  }
+  state.counters["items"] = static_cast<double>(kGatherRows * kGatherColumns);
+}
+
+void multiplyAdds(benchmark::State& state, int64_t target) {
+  const OnlyTarget only(&state, target);
+  const size_t count = 1 << 16;
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(multiplyAdd(count));
+  }
+  state.counters["items"] = static_cast<double>(count * vectorLanes());
+}
+
+void readL2(benchmark::State& state, int64_t target) {
+  const OnlyTarget only(&state, target);
+  const size_t count = (384 * 1024) / sizeof(float), repetitions = 16;
+  const auto values = hwy::AllocateAligned<float>(count);
+  std::fill_n(values.get(), count, 1.0f);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(readFloats(values.get(), count, repetitions));
+  }
+  state.counters["items"] = static_cast<double>(count * repetitions);
+}
+
+/// Of a computation in laps that is done several times: the sum of each lap's least processor time.
+class LeastTimes {
+ public:
+  void start() {
+    lap_ = 0;
+    last_ = now_s();
+  }
+  void resume() { last_ = now_s(); }
+  void lap() {
+    const double now = now_s();
+    if (lap_ == least_.size()) {
+      least_.push_back(now - last_);
+    }
+    least_[lap_] = std::min(least_[lap_], now - last_);
+    ++lap_;
+    last_ = now_s();
+  }
+  double sum_s() const { return std::accumulate(least_.begin(), least_.end(), 0.0); }
+
+ private:
+  static double now_s() {
+    timespec time;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  }
+  std::vector<double> least_;
+  size_t lap_ = 0;
+  double last_ = 0.0;
+};
+
+/// The first sweep: matching, aggregation and the two best peaks of every pixel.
+void kernel(benchmark::State& state, int64_t target, bool fisheye) {
+  const OnlyTarget only(&state, target);
+  if (!only.works()) {
+    return;
+  }
+  const Scene& s = scene(fisheye);
+  const PlaneSweepOptions options = firstSweepOnly();
+  const cv::Mat valid(kSize, CV_8UC1, cv::Scalar(255));
+  const RayTable rays(s.camera, kSize, 6.283185307179586);
+  const Hypotheses planes =
+      makePlaneHypotheses(makePlaneFamilies(options, std::nullopt).front(), rays, valid, options.window_px);
+  const SampleScale scale = SampleScale::forWindow(options.window_px);
+  // Tile by tile, and between them as many gathers as each needs; the least times over some rounds: short
+  // enough to fall between what else runs, and under the same conditions.
+  const std::vector<int32_t> gathered(1024 * (kGatherRows + 8), 1);
+  const size_t num_hypotheses = planes.offsets.size() * s.neighbours.size();
+  const std::vector<cv::Rect> tiles = makeTiles(kSize, options.window_px);
+  for (auto _ : state) {
+    LeastTimes times, gathers;
+    for (int round = 0; round < kRounds; ++round) {
+      gathers.start();
+      times.start();
+      SweepInput input{s.camera,
+                       &rays,
+                       &valid,
+                       &options,
+                       sweepKernels(),
+                       scale,
+                       SweepReference(s.reference.pixels, options, scale),
+                       {}};
+      for (const SweepImage& image : s.neighbours) {
+        const RigidTransform from_reference =
+            image.world_from_camera.inverse() * s.reference.world_from_camera;
+        input.neighbours.push_back({PackedImage(image.pixels, valid),
+                                    from_reference.rotationMatrix().cast<float>(),
+                                    from_reference.translation().cast<float>(), false});
+      }
+      TileScorer scorer(input);
+      TileScores scores;
+      times.lap();
+      for (const cv::Rect& tile : tiles) {
+        scorer.setTile(tile);
+        scorer.score(planes, &scores);
+        benchmark::DoNotOptimize(scores.best.data());
+        times.lap();
+        gathers.resume();
+        const size_t pixels = static_cast<size_t>(tile.area()) * num_hypotheses;
+        for (size_t i = 0; i < pixels; i += kGatherRows * kGatherColumns) {
+          benchmark::DoNotOptimize(gatherPixels(gathered.data(), kGatherRows, kGatherColumns));
+        }
+        gathers.lap();
+        times.resume();
+      }
+    }
+    state.SetIterationTime(times.sum_s());
+    state.counters["gather_s"] = gathers.sum_s();
+  }
+  state.counters["items"] =
+      static_cast<double>(kSize.area()) * options.num_planes * static_cast<double>(s.neighbours.size());
+}
+
+void plain(benchmark::State& state) {
+  const Scene& s = scene(true);
+  PlaneSweepOptions options = firstSweepOnly();
+  options.num_planes = 4;
+  const cv::Mat valid(kSize, CV_8UC1, cv::Scalar(255));
+  const auto families = makePlaneFamilies(options, std::nullopt);
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(plainPlaneSweep(s.camera, valid, families, options, s.reference, s.neighbours,
+                                             PlainBorder::kUnknown));
+  }
+  state.counters["items"] =
+      static_cast<double>(kSize.area()) * options.num_planes * static_cast<double>(s.neighbours.size());
+}
+
+/// A range map from the first image to the last, as the options of the vehicle make it.
+void rangeMap(benchmark::State& state, PlaneFamilies families, int refinement_steps, size_t num_neighbours) {
+  const tbb::global_control control(tbb::global_control::max_allowed_parallelism,
+                                    static_cast<size_t>(state.range(0)));
+  const Scene& s = scene(true);
+  PlaneSweepOptions options;
+  options.families = families;
+  options.num_refinement_steps = refinement_steps;
+  const cv::Mat valid(kSize, CV_8UC1, cv::Scalar(255));
+  const PlaneSweep sweep(s.camera, valid, options, s.ground);
+  const std::vector<SweepImage> neighbours(
+      s.neighbours.begin(), s.neighbours.begin() + static_cast<std::ptrdiff_t>(num_neighbours));
+  for (auto _ : state) {
+    benchmark::DoNotOptimize(sweep.sweep(s.reference, neighbours));
+  }
+}
+
+/// Prints the runs as usual, keeps the least times, and puts them in relation at the end.
+class RatioReporter : public benchmark::ConsoleReporter {
+ public:
+  void ReportRuns(const std::vector<Run>& runs) override {
+    benchmark::ConsoleReporter::ReportRuns(runs);
+    for (const Run& run : runs) {
+      if (run.error_occurred || run.run_type != Run::RT_Iteration) {
+        continue;
+      }
+      const std::string name =
+          run.run_name.function_name + (run.run_name.args.empty() ? "" : "/" + run.run_name.args);
+      // Of one thread the processor's time, which a busy machine stretches least; else the clock's.
+      const auto items = run.counters.find("items");
+      const bool manual = run.run_name.time_type == "manual_time";
+      const double per_iteration_s =
+          (manual || items == run.counters.end() ? run.real_accumulated_time : run.cpu_accumulated_time) /
+          static_cast<double>(run.iterations);
+      const double value =
+          items != run.counters.end() ? 1e9 * per_iteration_s / items->second.value : 1e3 * per_iteration_s;
+      const auto gathers = run.counters.find("gather_s");
+      if (gathers != run.counters.end()) {
+        keep(name + "_gathers", 1e9 * gathers->second.value / items->second.value);
+      }
+      keep(name, value);
+      keep(name + "_cpu", 1e3 * run.cpu_accumulated_time / static_cast<double>(run.iterations));
+    }
+  }
+
+  void printRatios() const {
+    std::printf("\nleast of the repetitions, per pixel, plane and image:\n");
+    for (const char* set : {"avx3", "avx2"}) {
+      const std::string name(set);
+      print(name + ": gather limit, ns", get("gather/" + name), 1.0);
+      print(name + ": one vector multiply-add per pixel, ns", get("multiplyAdds/" + name), 1.0);
+      print(name + ": four bytes of L2, ns", get("readL2/" + name), 1.0);
+      print(name + ": kernel, ns", get("kernel/" + name + "_fisheye"), 1.0);
+      print(name + ": gathers between its tiles, ns", get("kernel/" + name + "_fisheye_gathers"), 1.0);
+      print(name + ": kernel over gather limit", get("kernel/" + name + "_fisheye"), get("gather/" + name));
+      print(name + ": kernel over gathers between its tiles", get("kernel/" + name + "_fisheye"),
+            get("kernel/" + name + "_fisheye_gathers"));
+      print(name + ": plain reference over kernel", get("plain"), get("kernel/" + name + "_fisheye"));
+      print(name + ": fisheye over pinhole", get("kernel/" + name + "_fisheye"),
+            get("kernel/" + name + "_pinhole"));
+    }
+    for (const char* what : {"first_sweep_of_4", "whole_of_4", "whole_of_2"}) {
+      const std::string name = std::string("rangeMap/") + what;
+      print(name + ": processor time, ms", get(name + "/1_cpu"), 1.0);
+      print(name + ": one thread, ms", get(name + "/1"), 1.0);
+      print(name + ": two threads, ms", get(name + "/2"), 1.0);
+      print(name + ": one over two threads", get(name + "/1"), get(name + "/2"));
+    }
+  }
+
+ private:
+  void keep(const std::string& name, double value) {
+    const auto known = least_.find(name);
+    least_[name] = known == least_.end() ? value : std::min(known->second, value);
+  }
+  double get(const std::string& name) const {
+    const auto found = least_.find(name);
+    return found == least_.end() ? -1.0 : found->second;
+  }
+  static void print(const std::string& what, double value, double of) {
+    if (value > 0.0 && of > 0.0) {
+      std::printf("  %-48s %8.3f\n", what.c_str(), value / of);
+    }
+  }
+  std::map<std::string, double> least_;
+};
+
+BENCHMARK_CAPTURE(gather, avx3, HWY_AVX3);
+BENCHMARK_CAPTURE(gather, avx2, HWY_AVX2);
+BENCHMARK_CAPTURE(multiplyAdds, avx3, HWY_AVX3);
+BENCHMARK_CAPTURE(multiplyAdds, avx2, HWY_AVX2);
+BENCHMARK_CAPTURE(readL2, avx3, HWY_AVX3);
+BENCHMARK_CAPTURE(readL2, avx2, HWY_AVX2);
+BENCHMARK_CAPTURE(kernel, avx3_fisheye, HWY_AVX3, true)
+    ->Iterations(1)
+    ->UseManualTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(kernel, avx3_pinhole, HWY_AVX3, false)
+    ->Iterations(1)
+    ->UseManualTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(kernel, avx2_fisheye, HWY_AVX2, true)
+    ->Iterations(1)
+    ->UseManualTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(kernel, avx2_pinhole, HWY_AVX2, false)
+    ->Iterations(1)
+    ->UseManualTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK(plain)->Iterations(1)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(rangeMap, first_sweep_of_4, PlaneFamilies::kFrontoParallel, 0, 4)
+    ->Arg(1)
+    ->Arg(2)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(rangeMap, whole_of_4, PlaneFamilies::kBoth, 16, 4)
+    ->Arg(1)
+    ->Arg(2)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(rangeMap, whole_of_2, PlaneFamilies::kBoth, 16, 2)
+    ->Arg(1)
+    ->Arg(2)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
+    ->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace vcharge
+
+int main(int argc, char** argv) {
+  std::vector<char*> arguments(argv, argv + argc);
+  std::string repetitions = "--benchmark_repetitions=5";
+  arguments.insert(arguments.begin() + 1, repetitions.data());  // the user's own comes later and wins
+  auto count = static_cast<int>(arguments.size());
+  benchmark::Initialize(&count, arguments.data());
+  if (benchmark::ReportUnrecognizedArguments(count, arguments.data())) {
+    return 1;
+  }
+  vcharge::RatioReporter reporter;
+  benchmark::RunSpecifiedBenchmarks(&reporter);
+  reporter.printRatios();
+  return 0;
+}

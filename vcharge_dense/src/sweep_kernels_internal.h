@@ -1,0 +1,12 @@
+#pragma once
+
+#include "sweep_kernels.h"
+
+namespace vcharge {
+
+// Each fills in the kernels of its file.
+void addWarpKernels(SweepKernels* kernels);
+void addCorrelationKernels(SweepKernels* kernels);
+void addVoteKernels(SweepKernels* kernels);
+
+}  // namespace vcharge
