@@ -264,7 +264,7 @@ Extent extentOf(const Grid& grid) {
 }
 
 /// The grid as corners of the board, when its extent is exactly the board's.
-std::optional<std::vector<BoardCorner>> asBoard(const Grid& grid, const Chessboard& board) {
+std::optional<std::vector<BoardCorner>> asBoard(const Grid& grid, const CalibrationBoard& board) {
   const Extent extent = extentOf(grid);
   const bool upright = extent.width() == board.columns && extent.height() == board.rows;
   const bool lying = extent.width() == board.rows && extent.height() == board.columns;
@@ -288,7 +288,7 @@ std::optional<std::vector<BoardCorner>> asBoard(const Grid& grid, const Chessboa
   return corners;
 }
 
-bool isComplete(const std::vector<BoardCorner>& corners, const Chessboard& board) {
+bool isComplete(const std::vector<BoardCorner>& corners, const CalibrationBoard& board) {
   return static_cast<double>(corners.size()) >= kMinShareSeen * board.numCorners();
 }
 
@@ -362,6 +362,16 @@ std::optional<BoardView> BoardDetector::detect(const cv::Mat& image, const Camer
     }
   }
   return std::nullopt;
+}
+
+std::string BoardDetector::describeOther(const cv::Mat& image) const {
+  const int flags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_LARGER;
+  std::vector<cv::Point2f> corners;
+  cv::Mat meta;
+  if (!cv::findChessboardCornersSB(image, cv::Size(3, 3), corners, flags, meta) || meta.empty()) {
+    return "";
+  }
+  return "a chessboard of " + std::to_string(meta.cols) + "x" + std::to_string(meta.rows) + " inner corners";
 }
 
 }  // namespace vcharge

@@ -62,7 +62,7 @@ void print(const vcharge::IntrinsicCalibration& result) {
       100.0 * result.covered_share);
 }
 
-void calibrate(const std::string& folder, const vcharge::Chessboard& board, const std::string& camera_name,
+void calibrate(const std::string& folder, const vcharge::CalibrationBoard& board, const std::string& camera_name,
                double field_of_view_rad, const vcharge::IntrinsicCalibrationOptions& options,
                const std::string& output) {
   const std::vector<vcharge::CalibrationImage> images = readImages(folder);
@@ -118,7 +118,7 @@ int main(int argc, char** argv) {
       throw vcharge::InputError("--camera: expected a letter, then letters, digits and underscores, got '" +
                                 camera_name + "'");
     }
-    calibrate(folder, vcharge::Chessboard::parse(size, square_m), camera_name, field_of_view_rad, options,
+    calibrate(folder, vcharge::CalibrationBoard::parse(size, square_m), camera_name, field_of_view_rad, options,
               output);
   });
 }

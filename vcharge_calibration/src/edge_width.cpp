@@ -26,8 +26,8 @@ double sample(const cv::Mat& image, const Eigen::Vector2d& pixel) {
 
 }  // namespace
 
-double edgeWidth(const cv::Mat& image, const Chessboard& board, const BoardView& view,
-                 const RigidTransform& camera_from_board, const CameraModel& model) {
+double edgeWidth(const cv::Mat& image, const CalibrationBoard& board, const BoardView& view,
+                 const PlacedBoard& placed, const CameraModel& model) {
   std::vector<double> widths_px;
   for (const BoardCorner& corner : view.corners) {
     const bool last = corner.index % board.columns + 1 == board.columns;
@@ -35,12 +35,13 @@ double edgeWidth(const cv::Mat& image, const Chessboard& board, const BoardView&
       continue;
     }
     // Across the edge between this corner and the next in its row.
-    const Eigen::Vector3d middle = 0.5 * (board.corner(corner.index) + board.corner(corner.index + 1));
-    const Eigen::Vector3d beside = middle + Eigen::Vector3d(0.0, 0.1 * board.square_m, 0.0);
+    const Eigen::Vector2d middle =
+        0.5 * (board.corner(corner.index) + board.corner(corner.index + 1)).head<2>();
+    const Eigen::Vector2d beside = middle + Eigen::Vector2d(0.0, 0.1 * board.square_m);
     Eigen::Vector2d at;
     Eigen::Vector2d towards;
-    if (!model.project(camera_from_board * middle, &at) ||
-        !model.project(camera_from_board * beside, &towards)) {
+    if (!model.project(placed.point(board, middle), &at) ||
+        !model.project(placed.point(board, beside), &towards)) {
       continue;
     }
     const double square_px = 10.0 * (towards - at).norm();

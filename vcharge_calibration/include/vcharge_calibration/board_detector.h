@@ -1,10 +1,11 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include <opencv2/core.hpp>
 
-#include "vcharge_calibration/chessboard.h"
+#include "vcharge_calibration/calibration_board.h"
 #include "vcharge_core/camera_model.h"
 
 namespace vcharge {
@@ -12,7 +13,7 @@ namespace vcharge {
 /// Finds a chessboard in fisheye images. Immutable, thread safe.
 class BoardDetector {
  public:
-  explicit BoardDetector(const Chessboard& board) : board_(board) {}
+  explicit BoardDetector(const CalibrationBoard& board) : board_(board) {}
 
   /// The whole board, without knowing the camera: at several scales of the image. `image` is CV_8UC1.
   std::optional<BoardView> detect(const cv::Mat& image) const;
@@ -22,8 +23,12 @@ class BoardDetector {
   /// corner by corner. Boards whose outline is not certain are not returned.
   std::optional<BoardView> detect(const cv::Mat& image, const CameraModel& model) const;
 
+  /// What an image shows instead of the board: "a chessboard of 8x6 inner corners", "the board mirrored".
+  /// Empty where nothing of the kind is seen.
+  std::string describeOther(const cv::Mat& image) const;
+
  private:
-  Chessboard board_;
+  CalibrationBoard board_;
 };
 
 }  // namespace vcharge
