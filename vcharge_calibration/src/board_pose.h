@@ -20,7 +20,7 @@ struct BoardRay {
 std::optional<RigidTransform> boardPoseFromRays(const std::vector<BoardRay>& rays);
 
 /// The same for corners in an image; those without a ray are left out.
-std::optional<RigidTransform> boardPose(const CalibrationBoard& board, const std::vector<BoardCorner>& corners,
-                                        const CameraModel& model);
+std::optional<RigidTransform> boardPose(const CalibrationBoard& board,
+                                        const std::vector<BoardCorner>& corners, const CameraModel& model);
 
 }  // namespace vcharge

@@ -33,9 +33,9 @@ cv::Mat toFloat(const cv::Mat& image) {
 struct BoardRefiner::Patch {
   int nx = 0, ny = 0;
   double step_x_m = 0.0, step_y_m = 0.0;
-  cv::Mat map;                   // CV_32FC2, pixels
-  Eigen::Vector2d predicted;     // the corner
-  Eigen::Matrix2d pixels_by_m;   // at the corner
+  cv::Mat map;                  // CV_32FC2, pixels
+  Eigen::Vector2d predicted;    // the corner
+  Eigen::Matrix2d pixels_by_m;  // at the corner
 };
 
 BoardRefiner::BoardRefiner(const cv::Mat& image, const CalibrationBoard& board, const CameraModel& model,
@@ -60,8 +60,8 @@ std::optional<BoardRefiner::Patch> BoardRefiner::cut(int index, double half_m) c
   Eigen::Vector2d right;
   Eigen::Vector2d above;
   Eigen::Vector2d below;
-  if (!project(0.0, 0.0, &patch.predicted) || !project(-half_m, 0.0, &left) || !project(half_m, 0.0, &right) ||
-      !project(0.0, -half_m, &above) || !project(0.0, half_m, &below)) {
+  if (!project(0.0, 0.0, &patch.predicted) || !project(-half_m, 0.0, &left) ||
+      !project(half_m, 0.0, &right) || !project(0.0, -half_m, &above) || !project(0.0, half_m, &below)) {
     return std::nullopt;
   }
   patch.pixels_by_m << (right - left) / (2.0 * half_m), (below - above) / (2.0 * half_m);

@@ -86,8 +86,7 @@ CalibrationBoard CalibrationBoard::aprilGrid(int tag_columns, int tag_rows, doub
   if (tag_columns < 1 || tag_rows < 1 || tag_columns > kMaxTags || tag_rows > kMaxTags ||
       tag_columns * tag_rows < 4 || tag_columns * tag_rows > kMaxTags) {
     throw std::invalid_argument("tagCols, tagRows: expected 4 to " + std::to_string(kMaxTags) +
-                                " tags, got " + std::to_string(tag_columns) + "x" +
-                                std::to_string(tag_rows));
+                                " tags, got " + std::to_string(tag_columns) + "x" + std::to_string(tag_rows));
   }
   requirePositive("tagSize", tag_m);
   requirePositive("tagSpacing", tag_spacing);
@@ -108,10 +107,9 @@ std::string CalibrationBoard::description() const {
 
 CalibrationBoard readCalibrationBoard(const std::string& path) {
   const YAML::Node node = loadYamlFile(path);
-  const std::string type =
-      node.IsMap() && node["target_type"].IsDefined() && node["target_type"].IsScalar()
-          ? node["target_type"].as<std::string>()
-          : "";
+  const std::string type = node.IsMap() && node["target_type"].IsDefined() && node["target_type"].IsScalar()
+                               ? node["target_type"].as<std::string>()
+                               : "";
   if (type == "aprilgrid") {
     AprilGridFile file;
     readFields(node, path, &file);

@@ -52,8 +52,8 @@ void judgeCalibration(const IntrinsicCalibrationOptions& options, IntrinsicCalib
     result->remarks = {reason};
   };
   if (!(result->rms_px <= kFailError_px)) {
-    return fail("no camera of the model " + options.model + " explains the corners: " +
-                toText(result->rms_px, 1) + " px RMS");
+    return fail("no camera of the model " + options.model +
+                " explains the corners: " + toText(result->rms_px, 1) + " px RMS");
   }
   if (coverage.coveredShare() < kFailCoverage || coverage.reach() < kFailReach) {
     return fail("the board was only seen in the middle, on " + toText(100.0 * coverage.coveredShare(), 0) +
@@ -75,7 +75,8 @@ void judgeCalibration(const IntrinsicCalibrationOptions& options, IntrinsicCalib
     warn("the board faces the camera in nearly all images: pictures with the board tilted are missing");
   }
   if (result->rms_px > kWarnError_px) {
-    warn("the error of " + toText(result->rms_px, 2) + " px RMS is large: is the board flat, its size right?");
+    warn("the error of " + toText(result->rms_px, 2) +
+         " px RMS is large: is the board flat, its size right?");
   }
   if (result->cross_validated_px > kWarnUnseen * result->rms_px) {
     warn("views that the fit did not see are off by " + toText(result->cross_validated_px, 2) +

@@ -45,7 +45,7 @@ double edgeWidth(const cv::Mat& image, const CalibrationBoard& board, const Boar
       continue;
     }
     const double square_px = 10.0 * (towards - at).norm();
-    const double reach_px = std::min(kReach_px, 0.4 * square_px);
+    const double reach_px = std::min(kReach_px, 0.4 * square_px * board.clearance_m() / board.square_m);
     if (reach_px < 2.0) {
       continue;
     }

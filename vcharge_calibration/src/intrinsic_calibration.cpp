@@ -74,8 +74,8 @@ class Calibration {
       const auto turned = findTurnedImages(board_, views, result_.image_size_px,
                                            fit.has_value() ? fit->camera.model : rough->model);
       if (!turned.empty()) {
-        return fail(std::to_string(turned.size()) + " of " + std::to_string(views.size()) +
-                    " images are " + turned.front().how + " against the others: " + listOf(turned));
+        return fail(std::to_string(turned.size()) + " of " + std::to_string(views.size()) + " images are " +
+                    turned.front().how + " against the others: " + listOf(turned));
       }
     }
     if (!fit.has_value()) {
@@ -228,11 +228,10 @@ class Calibration {
       count += counts[fold];
     }
     result_.cross_validated_px = count == 0 ? 0.0 : std::sqrt(sum / static_cast<double>(count));
-    result_.standard_deviations =
-        Eigen::VectorXd::Constant(size, std::numeric_limits<double>::infinity());
+    result_.standard_deviations = Eigen::VectorXd::Constant(size, std::numeric_limits<double>::infinity());
     const auto covariance = intrinsicsCovariance(board_, fit.views, fit.camera, fit.settings);
-    const bool all_fits = std::all_of(parameters.begin(), parameters.end(),
-                                      [](const auto& fold) { return fold.has_value(); });
+    const bool all_fits =
+        std::all_of(parameters.begin(), parameters.end(), [](const auto& fold) { return fold.has_value(); });
     if (!covariance.has_value() || !all_fits || folds < 2) {
       return;
     }

@@ -150,9 +150,9 @@ TEST(IntrinsicOptimizerTest, KnowsItsErrors) {
   constexpr int kSeeds = 20;
   for (uint32_t seed = 1; seed <= kSeeds; ++seed) {
     const std::vector<BoardView> views = randomViews(board, truth, 60, kNoise_px, seed);
-    const auto fit = fitCamera(board, views, truth, Loss::kSquared);
+    const auto fit = fitCamera(board, views, truth, {});
     ASSERT_TRUE(fit.has_value());
-    const auto covariance = intrinsicsCovariance(board, views, *fit, kNoise_px);
+    const auto covariance = intrinsicsCovariance(board, views, *fit, {Loss::kSquared, kNoise_px});
     ASSERT_TRUE(covariance.has_value());
     const Eigen::VectorXd error = fit->model.parameters() - truth.parameters();
     sum += error.dot(covariance->ldlt().solve(error));

@@ -238,7 +238,9 @@ std::optional<CameraModel> guessCamera(const std::string& model_name, cv::Size i
       any = any || pose.has_value();
       for (const BoardCorner& corner : views[v].corners) {
         const double miss_px =
-            pose.has_value() ? reprojectionError(board, corner, {*pose, Eigen::Vector3d::Zero()}, model).norm() : kMaxGuessError_px;
+            pose.has_value()
+                ? reprojectionError(board, corner, {*pose, Eigen::Vector3d::Zero()}, model).norm()
+                : kMaxGuessError_px;
         error += std::isfinite(miss_px) ? std::min(miss_px, kMaxGuessError_px) : kMaxGuessError_px;
       }
     }
@@ -268,7 +270,8 @@ std::optional<FittedCamera> fitCamera(const CalibrationBoard& board, const std::
 }
 
 std::optional<FittedCamera> fitFromScratch(const std::string& model_name, cv::Size image_size_px,
-                                           const CalibrationBoard& board, const std::vector<BoardView>& views) {
+                                           const CalibrationBoard& board,
+                                           const std::vector<BoardView>& views) {
   const Eigen::Vector2d middle(0.5 * (image_size_px.width - 1), 0.5 * (image_size_px.height - 1));
   const auto farthest_px = [&](const BoardView& view) {
     double distance_px = 0.0;

@@ -43,7 +43,8 @@ std::optional<FittedCamera> fitCamera(const CalibrationBoard& board, const std::
 /// distortion is about right, then ever more towards the rim. Empty where no camera of the model explains the
 /// views.
 std::optional<FittedCamera> fitFromScratch(const std::string& model_name, cv::Size image_size_px,
-                                           const CalibrationBoard& board, const std::vector<BoardView>& views);
+                                           const CalibrationBoard& board,
+                                           const std::vector<BoardView>& views);
 
 /// Place of the board in one view with a known camera. Empty when it fails.
 std::optional<PlacedBoard> fitBoard(const CalibrationBoard& board, const BoardView& view,

@@ -121,8 +121,8 @@ class ViewFitter {
     const double rest = sumOfSquares(*bent, fit_.views, &count);
     const double parameters = 3.0 * static_cast<double>(fit_.views.size());
     const double freedom = static_cast<double>(count) - 3.0 * parameters;
-    if (freedom > parameters && (flat - rest) / parameters >
-                                    options_.min_bending_significance * rest / freedom) {
+    if (freedom > parameters &&
+        (flat - rest) / parameters > options_.min_bending_significance * rest / freedom) {
       bending.sigma_px = std::sqrt(rest / freedom);
       fit_.settings = bending;
       return refit(bent->model);
@@ -148,8 +148,8 @@ class ViewFitter {
     size_t count = 0;
     const auto camera = fitCamera(board_, fit_.views, fit_.camera.model, flat);
     if (camera.has_value()) {
-      fit_.flat_rms_px = std::sqrt(sumOfSquares(*camera, fit_.views, &count) /
-                                   std::max(1.0, static_cast<double>(count)));
+      fit_.flat_rms_px =
+          std::sqrt(sumOfSquares(*camera, fit_.views, &count) / std::max(1.0, static_cast<double>(count)));
     }
   }
 
@@ -197,8 +197,7 @@ class ViewFitter {
     tbb::parallel_for(size_t{0}, count, [&](size_t v) {
       widths_px[v] = widthOf(v);
       // A noisy view's corners are judged by their own noise.
-      refined[v] =
-          refineView(v, options_.max_corner_error * std::max(usual_corner_px, view_medians_px[v]));
+      refined[v] = refineView(v, options_.max_corner_error * std::max(usual_corner_px, view_medians_px[v]));
       errors_px[v] = rmsError(board_, refined[v], fit_.camera.boards[v], fit_.camera.model);
     });
     const double usual_px = median(errors_px);
@@ -211,10 +210,10 @@ class ViewFitter {
       if (!(errors_px[v] <= limit * usual_px)) {
         const std::string blur = "blurred: its edges are " + toText(widths_px[v], 1) +
                                  " px wide, usual are " + toText(usual_width_px, 1) + " px; ";
-        fit_.rejected.push_back(
-            {fit_.views[v].image, (blurred ? blur : std::string()) + "its error of " +
-                                      toText(errors_px[v], 2) + " px RMS is " +
-                                      toText(errors_px[v] / usual_px, 1) + " times the usual one"});
+        fit_.rejected.push_back({fit_.views[v].image, (blurred ? blur : std::string()) + "its error of " +
+                                                          toText(errors_px[v], 2) + " px RMS is " +
+                                                          toText(errors_px[v] / usual_px, 1) +
+                                                          " times the usual one"});
         changed = true;
         continue;
       }

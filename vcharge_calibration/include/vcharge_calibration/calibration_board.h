@@ -53,8 +53,8 @@ struct CalibrationBoard {
 /// Where a board was held, and how it was bent there: boards held by hand bend by millimetres.
 struct PlacedBoard {
   RigidTransform camera_from_board;
-  /// Coefficients of x^2, x y and y^2 of the board's height along its z axis, metres, where x and y go from -1
-  /// to 1 over the corners. Zero: flat.
+  /// Coefficients of x^2, x y and y^2 of the board's height along its z axis, metres, where x and y go from
+  /// -1 to 1 over the corners. Zero: flat.
   Eigen::Vector3d bending_m = Eigen::Vector3d::Zero();
 
   /// x^2, x y and y^2 at a place on the board (metres).
