@@ -42,6 +42,8 @@ constexpr double kTagWindow = 0.7;
 const cv::Size kPart(4, 3);
 // In reduced images the search is faster and finds as many boards; the corners are refined afterwards.
 constexpr int kSearchWidth_px = 640;
+// Smaller images are also searched enlarged.
+constexpr int kSmallWidth_px = 500;
 
 std::optional<std::vector<cv::Point2f>> findGrid(const cv::Mat& image, int columns, int rows) {
   std::vector<cv::Point2f> corners;
@@ -389,7 +391,8 @@ std::optional<BoardView> BoardDetector::detect(const cv::Mat& image) const {
   std::vector<Search> searches = {{findQuads, 1.0}, {findGrid, 1.0}};
   if (image.cols > kSearchWidth_px) {
     searches.insert(searches.begin(), {findGrid, static_cast<double>(kSearchWidth_px) / image.cols});
-  } else {
+  }
+  if (image.cols < kSmallWidth_px) {
     searches.push_back({findGrid, 2.0});
   }
   for (const auto& [find, scale] : searches) {

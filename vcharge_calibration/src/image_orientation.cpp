@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include <tbb/parallel_for.h>
+
 #include "view_fit.h"
 
 namespace vcharge {
@@ -62,14 +64,16 @@ std::vector<bool> assign(const CalibrationBoard& board, const std::vector<BoardV
   for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
     std::vector<BoardView> upright = views;
     std::vector<bool> next(views.size(), false);
-    for (size_t v = 0; v < views.size(); ++v) {
+    tbb::parallel_for(size_t{0}, views.size(), [&](size_t v) {
       const BoardView other = turned(views[v], turn, size);
       (*as_is_px)[v] = errorOf(board, views[v], model);
       (*turned_px)[v] = errorOf(board, other, model);
-      next[v] = (*turned_px)[v] < (*as_is_px)[v];
-      if (next[v]) {
+      if ((*turned_px)[v] < (*as_is_px)[v]) {
         upright[v] = other;
       }
+    });
+    for (size_t v = 0; v < views.size(); ++v) {
+      next[v] = (*turned_px)[v] < (*as_is_px)[v];
     }
     const auto camera = fitCamera(board, upright, model, {Loss::kRobust});
     const bool settled = iteration > 0 && next == is_turned;

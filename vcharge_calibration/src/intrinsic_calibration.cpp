@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <mutex>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
@@ -70,12 +71,13 @@ class Calibration {
     if (fit.has_value()) {
       fill(*fit);
     }
-    if (!fit.has_value() || !fit->rejected.empty() || result_.rms_px > kSuspiciousError_px) {
-      const auto turned = findTurnedImages(board_, views, result_.image_size_px,
-                                           fit.has_value() ? fit->camera.model : rough->model);
+    if (!fit.has_value() || !fit->rejected.empty() || fit->settings.bending ||
+        result_.rms_px > kSuspiciousError_px) {
+      const CameraModel& camera = fit.has_value() ? fit->camera.model : rough->model;
+      const auto turned = findTurnedImages(board_, worstViews(views, camera), result_.image_size_px, camera);
       if (!turned.empty()) {
-        return fail(std::to_string(turned.size()) + " of " + std::to_string(views.size()) + " images are " +
-                    turned.front().how + " against the others: " + listOf(turned));
+        return fail(std::string("some images are ") + turned.front().how +
+                    " against the others: " + listOf(turned));
       }
     }
     if (!fit.has_value()) {
@@ -90,6 +92,26 @@ class Calibration {
  private:
   static std::string sizeText(cv::Size size) {
     return std::to_string(size.width) + "x" + std::to_string(size.height);
+  }
+
+  // Those that fit worst, up to some; a few show whether images are turned.
+  std::vector<BoardView> worstViews(const std::vector<BoardView>& views, const CameraModel& camera) const {
+    constexpr size_t kMaxViews = 24;
+    std::vector<std::pair<double, size_t>> order(views.size());
+    tbb::parallel_for(size_t{0}, views.size(), [&](size_t v) {
+      const auto placed = fitBoard(board_, views[v], camera, {Loss::kRobust});
+      order[v] = {placed.has_value() ? -rmsError(board_, views[v], *placed, camera)
+                                     : -std::numeric_limits<double>::infinity(),
+                  v};
+    });
+    std::sort(order.begin(), order.end());
+    order.resize(std::min(order.size(), kMaxViews));
+    std::sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
+    std::vector<BoardView> worst;
+    for (const auto& entry : order) {
+      worst.push_back(views[entry.second]);
+    }
+    return worst;
   }
 
   static std::string listOf(const std::vector<TurnedImage>& images) {
@@ -270,7 +292,6 @@ void IntrinsicCalibrationOptions::validate() const {
   requireField(min_views >= 3, "min_views", "must be at least 3", min_views);
   requireField(max_view_error > 1.0, "max_view_error", "must be above 1", max_view_error);
   requireField(max_edge_width > 1.0, "max_edge_width", "must be above 1", max_edge_width);
-  requireField(max_blurred_error > 1.0, "max_blurred_error", "must be above 1", max_blurred_error);
   requireField(max_corner_error > 1.0, "max_corner_error", "must be above 1", max_corner_error);
   requireField(min_bending_significance >= 1.0, "min_bending_significance", "must be at least 1",
                min_bending_significance);

@@ -243,10 +243,13 @@ TEST(ConvertCameraTest, OfTheSameModelIsTheCameraItself) {
 }
 
 TEST(ConvertCameraTest, APinholeCameraTakesTheMiddleOfAFisheye) {
-  const ConvertedCamera converted = convertCamera(modelOf("mei"), {1280, 800}, 3.2, "pinhole");
-  EXPECT_LT(converted.rms_px, 3.0);
-  EXPECT_LT(converted.covered_share, 0.95);
-  EXPECT_GT(converted.covered_share, 0.5);
+  const ConvertedCamera middle = convertCamera(modelOf("mei"), {1280, 800}, 1.6, "pinhole");
+  EXPECT_LT(middle.rms_px, 1.0);
+  EXPECT_GT(middle.covered_share, 0.99);
+  const ConvertedCamera all = convertCamera(modelOf("mei"), {1280, 800}, 3.2, "pinhole");
+  EXPECT_GT(all.rms_px, middle.rms_px);
+  EXPECT_LT(all.covered_share, 0.95);
+  EXPECT_GT(all.covered_share, 0.5);
 }
 
 }  // namespace

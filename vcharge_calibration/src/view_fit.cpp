@@ -206,14 +206,12 @@ class ViewFitter {
     std::vector<BoardView> kept;
     for (size_t v = 0; v < count; ++v) {
       const bool blurred = widths_px[v] > options_.max_edge_width * usual_width_px;
-      const double limit = blurred ? options_.max_blurred_error : options_.max_view_error;
-      if (!(errors_px[v] <= limit * usual_px)) {
-        const std::string blur = "blurred: its edges are " + toText(widths_px[v], 1) +
-                                 " px wide, usual are " + toText(usual_width_px, 1) + " px; ";
-        fit_.rejected.push_back({fit_.views[v].image, (blurred ? blur : std::string()) + "its error of " +
-                                                          toText(errors_px[v], 2) + " px RMS is " +
-                                                          toText(errors_px[v] / usual_px, 1) +
-                                                          " times the usual one"});
+      if (blurred || !(errors_px[v] <= options_.max_view_error * usual_px)) {
+        fit_.rejected.push_back(
+            {fit_.views[v].image, blurred ? "blurred: its edges are " + toText(widths_px[v], 1) +
+                                                " px wide, usual are " + toText(usual_width_px, 1) + " px"
+                                          : "its error of " + toText(errors_px[v], 2) + " px RMS is " +
+                                                toText(errors_px[v] / usual_px, 1) + " times the usual one"});
         changed = true;
         continue;
       }

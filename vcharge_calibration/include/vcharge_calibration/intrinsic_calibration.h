@@ -16,13 +16,11 @@ namespace vcharge {
 
 /// Options of calibrateIntrinsics.
 struct IntrinsicCalibrationOptions {
-  std::string model = "mei";    ///< or kannala_brandt, pinhole
-  int min_views = 5;            ///< fewer boards are no calibration
-  double max_view_error = 6.0;  ///< RMS error of a view over the usual one; a view above is left out
-  double max_edge_width =
-      1.6;  ///< width of a view's edges over the usual one; a view above counts as blurred
-  double max_blurred_error = 2.0;  ///< as max_view_error, of a blurred view
-  double max_corner_error = 5.0;   ///< error of a corner over its view's; a corner above is left out
+  std::string model = "mei";      ///< or kannala_brandt, pinhole
+  int min_views = 5;              ///< fewer boards are no calibration
+  double max_view_error = 6.0;    ///< RMS error of a view over the usual one; a view above is left out
+  double max_edge_width = 2.0;    ///< width of a view's edges over the usual one; a view above is blurred
+  double max_corner_error = 5.0;  ///< error of a corner over its view's; a corner above is left out
   /// Part by which bent boards must explain the errors better than chance before boards count as bent.
   double min_bending_significance = 3.0;
   int cross_validation_folds = 10;  ///< parts into which the views are split
@@ -33,7 +31,6 @@ struct IntrinsicCalibrationOptions {
     visit("min_views", min_views);
     visit("max_view_error", max_view_error);
     visit("max_edge_width", max_edge_width);
-    visit("max_blurred_error", max_blurred_error);
     visit("max_corner_error", max_corner_error);
     visit("min_bending_significance", min_bending_significance);
     visit("cross_validation_folds", cross_validation_folds);
