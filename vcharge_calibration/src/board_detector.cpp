@@ -525,7 +525,9 @@ std::string BoardDetector::describeOther(const cv::Mat& image) const {
   if (!cv::findChessboardCornersSB(image, cv::Size(3, 3), corners, flags, meta) || meta.empty()) {
     return "";
   }
-  return "a chessboard of " + std::to_string(meta.cols) + "x" + std::to_string(meta.rows) + " inner corners";
+  // How the board lies says nothing about which side its maker calls the columns.
+  return "a chessboard of " + std::to_string(std::max(meta.cols, meta.rows)) + "x" +
+         std::to_string(std::min(meta.cols, meta.rows)) + " inner corners";
 }
 
 }  // namespace vcharge

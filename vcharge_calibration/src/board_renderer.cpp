@@ -87,8 +87,9 @@ std::vector<Eigen::Vector3f> raysOf(const CameraModel& model, cv::Size size) {
   for (int row = 0; row < size.height; ++row) {
     for (int column = 0; column < size.width; ++column) {
       for (int i = 0; i < kRays * kRays; ++i) {
+        const int i_row = i / kRays;
         const Eigen::Vector2d pixel(column + (i % kRays + 0.5) / kRays - 0.5,
-                                    row + (i / kRays + 0.5) / kRays - 0.5);
+                                    row + (i_row + 0.5) / kRays - 0.5);
         Eigen::Vector3d ray;
         rays.push_back(model.unproject(pixel, &ray) ? ray.cast<float>().eval() : Eigen::Vector3f::Zero());
       }
@@ -102,7 +103,7 @@ cv::Mat render(const std::vector<Eigen::Vector3f>& rays, cv::Size size,
                const RigidTransform& camera_from_board, uint64_t seed, const Texture& texture) {
   const RigidTransform board_from_camera = camera_from_board.inverse();
   const Eigen::Matrix3d rotation = board_from_camera.rotationMatrix();
-  const Eigen::Vector3d eye = board_from_camera.translation();
+  const Eigen::Vector3d& eye = board_from_camera.translation();
   cv::Mat image(size, CV_8UC1);
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise(0.0, kNoise);

@@ -105,8 +105,8 @@ std::string listOf(const std::vector<double>& values) {
 /// A map of a foreign file; `key` says where it stands.
 class Section {
  public:
-  Section(YAML::Node node, std::string source, std::string key)
-      : node_(std::move(node)), source_(std::move(source)), key_(std::move(key)) {}
+  Section(const YAML::Node& node, std::string source, std::string key)
+      : node_(node), source_(std::move(source)), key_(std::move(key)) {}
 
   [[noreturn]] void fail(const std::string& name, const std::string& expected) const {
     throw InputError(source_ + ": " + key_ + name + ": expected " + expected);

@@ -45,8 +45,11 @@ struct CalibrationBoard {
 
  private:
   double along(int place) const {
-    return pattern == BoardPattern::kChessboard ? place * square_m
-                                                : (place / 2 * (1.0 + tag_spacing) + place % 2) * square_m;
+    if (pattern == BoardPattern::kChessboard) {
+      return place * square_m;
+    }
+    const int tag = place / 2;
+    return (tag * (1.0 + tag_spacing) + place % 2) * square_m;
   }
 };
 
