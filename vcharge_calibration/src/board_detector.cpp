@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "april_grid.h"
 #include "board_pose.h"
 #include "corner_refinement.h"
 #include "vcharge_core/error.h"
@@ -20,25 +22,53 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kViewWidth_rad = 1.75;
-constexpr int kViewSize_px = 720;
+constexpr int kViewSize_px = 420;
 // A corner is there when the squares around it correlate at least so well with a perfect corner.
 constexpr double kMinCorrelation = 0.75;
 // Window and largest step of a corner that was predicted, over the squares' size.
 constexpr double kGrowWindow = 0.3;
 constexpr double kMaxGrowMove = 0.3;
 constexpr int kMaxRounds = 20;
-// An outermost row or column with fewer of its corners does not belong to the board.
-constexpr double kMinRowShare = 0.3;
+// A row or column beyond the board in which more of the corners are seen belongs to a larger board.
+constexpr double kMaxShareBeyond = 0.6;
 // Of a board completed by prediction, so many corners may be hidden.
 constexpr double kMinShareSeen = 0.9;
+// An AprilGrid needs not be seen whole: so many corners (four tags) give its pose.
+constexpr size_t kMinTagCorners = 16;
+// Of a tag's corners, over their distance to edges that are not their own.
+constexpr double kTagWindow = 0.7;
+
+// Of a board that is not found whole.
+const cv::Size kPart(4, 3);
+// In reduced images the search is faster and finds as many boards; the corners are refined afterwards.
+constexpr int kSearchWidth_px = 640;
+// Smaller images are also searched enlarged.
+constexpr int kSmallWidth_px = 500;
 
 std::optional<std::vector<cv::Point2f>> findGrid(const cv::Mat& image, int columns, int rows) {
   std::vector<cv::Point2f> corners;
-  const int flags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE | cv::CALIB_CB_ACCURACY;
+  const int flags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE;
   if (!cv::findChessboardCornersSB(image, cv::Size(columns, rows), corners, flags)) {
     return std::nullopt;
   }
   return corners;
+}
+
+/// OpenCV's older detector: quick, and better at large squares that a lens bends.
+std::optional<std::vector<cv::Point2f>> findQuads(const cv::Mat& image, int columns, int rows) {
+  std::vector<cv::Point2f> corners;
+  const int flags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK;
+  if (!cv::findChessboardCorners(image, cv::Size(columns, rows), corners, flags)) {
+    return std::nullopt;
+  }
+  return corners;
+}
+
+/// camera_from_view of a pinhole view into a direction: `angle_rad` from the axis, towards `azimuth_rad`.
+Eigen::Matrix3d rotationOfView(double angle_rad, double azimuth_rad) {
+  return (Eigen::AngleAxisd(azimuth_rad, Eigen::Vector3d::UnitZ()) *
+          Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitY()))
+      .toRotationMatrix();
 }
 
 /// A pinhole view into a direction: how its pixels lie in the fisheye image.
@@ -46,9 +76,7 @@ class View {
  public:
   View(const cv::Mat& image, const CameraModel& model, double angle_rad, double azimuth_rad)
       : model_(model), focal_px_(0.5 * kViewSize_px / std::tan(0.5 * kViewWidth_rad)) {
-    const Eigen::Quaterniond turn(Eigen::AngleAxisd(azimuth_rad, Eigen::Vector3d::UnitZ()) *
-                                  Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitY()));
-    camera_from_view_ = turn.toRotationMatrix();
+    camera_from_view_ = rotationOfView(angle_rad, azimuth_rad);
     cv::Mat map(kViewSize_px, kViewSize_px, CV_32FC2, cv::Scalar(-1e4, -1e4));
     model.visit([&](const auto& concrete) {
       for (int y = 0; y < kViewSize_px; ++y) {
@@ -202,9 +230,15 @@ class GridGrower {
     for (const auto& [place, pixel] : grid_) {
       for (const auto& step : std::array<std::pair<int, int>, 4>{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}}) {
         const std::pair<int, int> next(place.first + step.first, place.second + step.second);
+        Eigen::Vector2d here;
         Eigen::Vector2d at;
-        if (grid_.count(next) == 0 && found.count(next) == 0 && predict(next.first, next.second, &at) &&
-            refine(next, &at) && polarity_ * signedCorrelation(next, at) > kMinCorrelation) {
+        if (grid_.count(next) > 0 || found.count(next) > 0 || !predict(place.first, place.second, &here) ||
+            !predict(next.first, next.second, &at)) {
+          continue;
+        }
+        // Off by about as much as its neighbour, where camera or board are not quite as thought.
+        at += pixel - here;
+        if (refine(next, &at) && polarity_ * signedCorrelation(next, at) > kMinCorrelation) {
           found[next] = at;
         }
       }
@@ -219,68 +253,72 @@ class GridGrower {
   double polarity_ = 1.0;
 };
 
+/// A rectangle of places on a grid.
 struct Extent {
-  int min_column, max_column, min_row, max_row;
-  int width() const { return max_column - min_column + 1; }
-  int height() const { return max_row - min_row + 1; }
+  int column, row, width, height;
   bool contains(const std::pair<int, int>& place) const {
-    return place.first >= min_column && place.first <= max_column && place.second >= min_row &&
-           place.second <= max_row;
+    return place.first >= column && place.first < column + width && place.second >= row &&
+           place.second < row + height;
   }
 };
 
-/// Extent of a grid without outermost rows and columns of which little was seen: a pattern beside the board.
-Extent extentOf(const Grid& grid) {
-  Extent extent{grid.begin()->first.first, grid.begin()->first.first, grid.begin()->first.second,
-                grid.begin()->first.second};
+int countInside(const Grid& grid, const Extent& extent) {
+  return static_cast<int>(std::count_if(grid.begin(), grid.end(),
+                                        [&](const auto& entry) { return extent.contains(entry.first); }));
+}
+
+/// Whether a line of corners goes on beyond a rectangle: then the board is a larger one.
+bool goesOn(const Grid& grid, const Extent& extent) {
+  const std::array<Extent, 4> beyond = {{{extent.column - 1, extent.row, 1, extent.height},
+                                         {extent.column + extent.width, extent.row, 1, extent.height},
+                                         {extent.column, extent.row - 1, extent.width, 1},
+                                         {extent.column, extent.row + extent.height, extent.width, 1}}};
+  return std::any_of(beyond.begin(), beyond.end(), [&](const Extent& line) {
+    return countInside(grid, line) > kMaxShareBeyond * line.width * line.height;
+  });
+}
+
+/// The grid as corners of the board, where the board fits on it in one place only.
+std::optional<std::vector<BoardCorner>> asBoard(const Grid& grid, const CalibrationBoard& board) {
+  Extent low{0, 0, 0, 0};
+  Extent high{0, 0, 0, 0};
   for (const auto& [place, pixel] : grid) {
-    extent.min_column = std::min(extent.min_column, place.first);
-    extent.max_column = std::max(extent.max_column, place.first);
-    extent.min_row = std::min(extent.min_row, place.second);
-    extent.max_row = std::max(extent.max_row, place.second);
+    low = {std::min(low.column, place.first), std::min(low.row, place.second), 0, 0};
+    high = {std::max(high.column, place.first), std::max(high.row, place.second), 0, 0};
   }
-  const auto seen = [&](const Extent& part) {
-    const auto count = std::count_if(grid.begin(), grid.end(),
-                                     [&](const auto& entry) { return part.contains(entry.first); });
-    return static_cast<double>(count) / (part.width() * part.height());
-  };
-  for (bool trimmed = true; trimmed && extent.width() > 2 && extent.height() > 2;) {
-    trimmed = false;
-    for (const auto& [edge, step] : {std::pair<int Extent::*, int>{&Extent::min_column, 1},
-                                     {&Extent::max_column, -1},
-                                     {&Extent::min_row, 1},
-                                     {&Extent::max_row, -1}}) {
-      Extent line = extent;
-      const bool column = edge == &Extent::min_column || edge == &Extent::max_column;
-      (column ? line.min_column : line.min_row) = extent.*edge;
-      (column ? line.max_column : line.max_row) = extent.*edge;
-      if (seen(line) < kMinRowShare) {
-        extent.*edge += step;
-        trimmed = true;
+  std::optional<Extent> best;
+  int best_count = 0;
+  bool ambiguous = true;
+  for (const auto& [width, height] :
+       {std::pair<int, int>{board.columns, board.rows}, {board.rows, board.columns}}) {
+    for (int column = low.column; column + width - 1 <= high.column; ++column) {
+      for (int row = low.row; row + height - 1 <= high.row; ++row) {
+        const Extent extent{column, row, width, height};
+        const int count = countInside(grid, extent);
+        if (count > best_count) {
+          ambiguous = false;
+          best_count = count;
+          best = extent;
+        } else if (count == best_count && !(best.has_value() && width == height)) {
+          ambiguous = true;
+        }
       }
     }
   }
-  return extent;
-}
-
-/// The grid as corners of the board, when its extent is exactly the board's.
-std::optional<std::vector<BoardCorner>> asBoard(const Grid& grid, const Chessboard& board) {
-  const Extent extent = extentOf(grid);
-  const bool upright = extent.width() == board.columns && extent.height() == board.rows;
-  const bool lying = extent.width() == board.rows && extent.height() == board.columns;
-  if (!upright && !lying) {
+  if (!best.has_value() || ambiguous || goesOn(grid, *best)) {
     return std::nullopt;
   }
+  const bool upright = best->width == board.columns;
   std::vector<BoardCorner> corners;
   for (const auto& [place, pixel] : grid) {
-    if (!extent.contains(place)) {
+    if (!best->contains(place)) {
       continue;
     }
-    const int column = place.first - extent.min_column;
-    const int row = place.second - extent.min_row;
+    const int column = place.first - best->column;
+    const int row = place.second - best->row;
     // A quarter turn keeps the board's handedness.
     const int index =
-        upright ? row * board.columns + column : (extent.width() - 1 - column) * board.columns + row;
+        upright ? row * board.columns + column : (best->width - 1 - column) * board.columns + row;
     corners.push_back({index, pixel});
   }
   std::sort(corners.begin(), corners.end(),
@@ -288,7 +326,52 @@ std::optional<std::vector<BoardCorner>> asBoard(const Grid& grid, const Chessboa
   return corners;
 }
 
-bool isComplete(const std::vector<BoardCorner>& corners, const Chessboard& board) {
+using ToImage = std::function<bool(const cv::Point2f&, Eigen::Vector2d*)>;
+
+bool isPixel(const cv::Point2f& point, Eigen::Vector2d* pixel) {
+  *pixel = {point.x, point.y};
+  return true;
+}
+
+/// Adds the corners of tags that were not seen before, refined in the image.
+void addTags(const cv::Mat& image, const CalibrationBoard& board, const std::vector<SeenTag>& tags,
+             const ToImage& toImage, std::map<int, Eigen::Vector2d>* corners) {
+  for (const SeenTag& tag : tags) {
+    const std::vector<int> indices = cornersOfTag(board, tag.id);
+    std::array<Eigen::Vector2d, 4> pixels;
+    bool inside = corners->count(indices[0]) == 0;
+    for (size_t i = 0; i < 4 && inside; ++i) {
+      inside = toImage(tag.corners[i], &pixels[i]);
+    }
+    if (!inside) {
+      continue;
+    }
+    double side_px = std::numeric_limits<double>::infinity();
+    for (size_t i = 0; i < 4; ++i) {
+      side_px = std::min(side_px, (pixels[i] - pixels[(i + 1) % 4]).norm());
+    }
+    const double window_px = kTagWindow * board.clearance_m() / board.square_m * side_px;
+    for (size_t i = 0; i < 4 && inside; ++i) {
+      inside = refineCorner(image, window_px, 1.0 + window_px, &pixels[i]);
+    }
+    for (size_t i = 0; i < 4 && inside; ++i) {
+      (*corners)[indices[i]] = pixels[i];
+    }
+  }
+}
+
+std::optional<BoardView> viewOfTags(const std::map<int, Eigen::Vector2d>& corners) {
+  if (corners.size() < kMinTagCorners) {
+    return std::nullopt;
+  }
+  BoardView view;
+  for (const auto& [index, pixel] : corners) {
+    view.corners.push_back({index, pixel});
+  }
+  return view;
+}
+
+bool isComplete(const std::vector<BoardCorner>& corners, const CalibrationBoard& board) {
   return static_cast<double>(corners.size()) >= kMinShareSeen * board.numCorners();
 }
 
@@ -296,18 +379,38 @@ bool isComplete(const std::vector<BoardCorner>& corners, const Chessboard& board
 
 std::optional<BoardView> BoardDetector::detect(const cv::Mat& image) const {
   check(image.type() == CV_8UC1, "BoardDetector::detect: expected a CV_8UC1 image");
-  for (const double scale : {1.0, 0.5, 2.0}) {
-    cv::Mat scaled;
-    cv::resize(image, scaled, cv::Size(), scale, scale, scale < 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
-    const auto points = findGrid(scaled, board_.columns, board_.rows);
+  if (board_.pattern == BoardPattern::kAprilGrid) {
+    std::map<int, Eigen::Vector2d> corners;
+    addTags(image, board_, findTags(image, board_), isPixel, &corners);
+    return viewOfTags(corners);
+  }
+  struct Search {
+    decltype(&findGrid) find;
+    double scale;
+  };
+  std::vector<Search> searches = {{findQuads, 1.0}, {findGrid, 1.0}};
+  if (image.cols > kSearchWidth_px) {
+    searches.insert(searches.begin(), {findGrid, static_cast<double>(kSearchWidth_px) / image.cols});
+  }
+  if (image.cols < kSmallWidth_px) {
+    searches.push_back({findGrid, 2.0});
+  }
+  for (const auto& [find, scale] : searches) {
+    cv::Mat scaled = image;
+    if (scale != 1.0) {
+      cv::resize(image, scaled, cv::Size(), scale, scale, scale < 1.0 ? cv::INTER_AREA : cv::INTER_LINEAR);
+    }
+    const auto points = find(scaled, board_.columns, board_.rows);
     if (!points.has_value()) {
       continue;
     }
     BoardView view;
     for (size_t i = 0; i < points->size(); ++i) {
       // Pixel centres are whole numbers: coordinates scale about half a pixel outside the image.
-      const auto unscaled = [&](float value) { return (static_cast<double>(value) + 0.5) / scale - 0.5; };
-      view.corners.push_back({static_cast<int>(i), {unscaled((*points)[i].x), unscaled((*points)[i].y)}});
+      const double across = static_cast<double>(scaled.cols) / image.cols;
+      const double down = static_cast<double>(scaled.rows) / image.rows;
+      view.corners.push_back({static_cast<int>(i),
+                              {((*points)[i].x + 0.5) / across - 0.5, ((*points)[i].y + 0.5) / down - 0.5}});
     }
     refineCorners(image, board_, &view.corners);
     if (view.corners.size() == points->size()) {
@@ -319,6 +422,11 @@ std::optional<BoardView> BoardDetector::detect(const cv::Mat& image) const {
 
 std::optional<BoardView> BoardDetector::detect(const cv::Mat& image, const CameraModel& model) const {
   check(image.type() == CV_8UC1, "BoardDetector::detect: expected a CV_8UC1 image");
+  if (board_.pattern == BoardPattern::kChessboard) {
+    if (auto found = detectQuickly(image, model)) {
+      return found;
+    }
+  }
   struct Direction {
     double angle_rad, azimuth_rad;
   };
@@ -328,40 +436,98 @@ std::optional<BoardView> BoardDetector::detect(const cv::Mat& image, const Camer
       directions.push_back({angle_rad, 2.0 * kPi * i / count});
     }
   }
-  const std::array<cv::Size, 3> parts = {
-      cv::Size(board_.columns, board_.rows),
-      cv::Size(std::max(3, board_.columns - 2), std::max(3, board_.rows - 2)), cv::Size(4, 3)};
-  for (const cv::Size& part : parts) {
-    for (const Direction& direction : directions) {
-      const View view(image, model, direction.angle_rad, direction.azimuth_rad);
-      const auto points = findGrid(view.pixels(), part.width, part.height);
-      if (!points.has_value()) {
-        continue;
-      }
-      Grid grid;
-      bool seen = true;
-      for (size_t i = 0; i < points->size(); ++i) {
-        Eigen::Vector2d pixel;
-        seen = seen && view.inImage((*points)[i], &pixel);
-        grid[{static_cast<int>(i) % part.width, static_cast<int>(i) / part.width}] = pixel;
-      }
-      GridGrower grower(image, model, grid);
-      if (!seen || !grower.grow()) {
-        continue;
-      }
-      auto corners = asBoard(grower.grid(), board_);
-      if (!corners.has_value()) {
-        continue;
-      }
-      BoardView result;
-      result.corners = *corners;
-      refineCorners(image, board_, &result.corners);
-      if (isComplete(result.corners, board_)) {
-        return result;
-      }
+  std::vector<View> views;
+  views.reserve(directions.size());
+  for (const Direction& direction : directions) {
+    const Eigen::Vector3d middle =
+        rotationOfView(direction.angle_rad, direction.azimuth_rad) * Eigen::Vector3d::UnitZ();
+    Eigen::Vector2d pixel;
+    if (model.project(middle, &pixel) && pixel.x() > 0 && pixel.y() > 0 && pixel.x() < image.cols - 1 &&
+        pixel.y() < image.rows - 1) {
+      views.emplace_back(image, model, direction.angle_rad, direction.azimuth_rad);
+    }
+  }
+  if (board_.pattern == BoardPattern::kAprilGrid) {
+    // Parts of the grid from all views, and tags that are distorted least from the image itself.
+    std::map<int, Eigen::Vector2d> corners;
+    addTags(image, board_, findTags(image, board_), isPixel, &corners);
+    for (const View& view : views) {
+      addTags(
+          image, board_, findTags(view.pixels(), board_),
+          [&view](const cv::Point2f& point, Eigen::Vector2d* pixel) { return view.inImage(point, pixel); },
+          &corners);
+    }
+    return viewOfTags(corners);
+  }
+  for (const View& view : views) {
+    if (auto found = growPart(image, model, kPart, findGrid(view.pixels(), kPart.width, kPart.height),
+                              [&view](const cv::Point2f& point, Eigen::Vector2d* pixel) {
+                                return view.inImage(point, pixel);
+                              })) {
+      return found;
     }
   }
   return std::nullopt;
+}
+
+std::optional<BoardView> BoardDetector::detectQuickly(const cv::Mat& image, const CameraModel& model) const {
+  check(image.type() == CV_8UC1, "BoardDetector::detectQuickly: expected a CV_8UC1 image");
+  if (board_.pattern == BoardPattern::kAprilGrid) {
+    return detect(image);
+  }
+  cv::Mat reduced;
+  const double scale = std::min(1.0, static_cast<double>(kSearchWidth_px) / image.cols);
+  cv::resize(image, reduced, cv::Size(), scale, scale, cv::INTER_AREA);
+  return growPart(image, model, kPart, findGrid(reduced, kPart.width, kPart.height),
+                  [scale](const cv::Point2f& point, Eigen::Vector2d* pixel) {
+                    *pixel = Eigen::Vector2d((point.x + 0.5) / scale - 0.5, (point.y + 0.5) / scale - 0.5);
+                    return true;
+                  });
+}
+
+std::optional<BoardView> BoardDetector::growPart(
+    const cv::Mat& image, const CameraModel& model, cv::Size part,
+    const std::optional<std::vector<cv::Point2f>>& points,
+    const std::function<bool(const cv::Point2f&, Eigen::Vector2d*)>& toImage) const {
+  if (!points.has_value()) {
+    return std::nullopt;
+  }
+  Grid grid;
+  for (size_t i = 0; i < points->size(); ++i) {
+    Eigen::Vector2d pixel;
+    if (!toImage((*points)[i], &pixel)) {
+      return std::nullopt;
+    }
+    grid[{static_cast<int>(i) % part.width, static_cast<int>(i) / part.width}] = pixel;
+  }
+  GridGrower grower(image, model, grid);
+  const auto corners = grower.grow() ? asBoard(grower.grid(), board_) : std::nullopt;
+  if (!corners.has_value()) {
+    return std::nullopt;
+  }
+  BoardView view;
+  view.corners = *corners;
+  refineCorners(image, board_, &view.corners);
+  return isComplete(view.corners, board_) ? std::optional<BoardView>(view) : std::nullopt;
+}
+
+std::string BoardDetector::describeOther(const cv::Mat& image) const {
+  if (board_.pattern == BoardPattern::kAprilGrid) {
+    cv::Mat mirrored;
+    cv::flip(image, mirrored, 1);
+    if (!findTags(mirrored, board_).empty()) {
+      return "it mirrored";
+    }
+  }
+  const int flags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_LARGER;
+  std::vector<cv::Point2f> corners;
+  cv::Mat meta;
+  if (!cv::findChessboardCornersSB(image, cv::Size(3, 3), corners, flags, meta) || meta.empty()) {
+    return "";
+  }
+  // How the board lies says nothing about which side its maker calls the columns.
+  return "a chessboard of " + std::to_string(std::max(meta.cols, meta.rows)) + "x" +
+         std::to_string(std::min(meta.cols, meta.rows)) + " inner corners";
 }
 
 }  // namespace vcharge

@@ -66,8 +66,8 @@ std::optional<RigidTransform> boardPoseFromRays(const std::vector<BoardRay>& ray
   return RigidTransform(Eigen::Quaterniond(rotation), translation);
 }
 
-std::optional<RigidTransform> boardPose(const Chessboard& board, const std::vector<BoardCorner>& corners,
-                                        const CameraModel& model) {
+std::optional<RigidTransform> boardPose(const CalibrationBoard& board,
+                                        const std::vector<BoardCorner>& corners, const CameraModel& model) {
   std::vector<BoardRay> rays;
   for (const BoardCorner& corner : corners) {
     Eigen::Vector3d ray;

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "vcharge_calibration/chessboard.h"
+#include "vcharge_calibration/calibration_board.h"
 #include "vcharge_core/camera_model.h"
 #include "vcharge_core/rigid_transform.h"
 
@@ -20,7 +20,7 @@ struct BoardRay {
 std::optional<RigidTransform> boardPoseFromRays(const std::vector<BoardRay>& rays);
 
 /// The same for corners in an image; those without a ray are left out.
-std::optional<RigidTransform> boardPose(const Chessboard& board, const std::vector<BoardCorner>& corners,
-                                        const CameraModel& model);
+std::optional<RigidTransform> boardPose(const CalibrationBoard& board,
+                                        const std::vector<BoardCorner>& corners, const CameraModel& model);
 
 }  // namespace vcharge

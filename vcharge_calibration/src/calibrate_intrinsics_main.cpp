@@ -1,47 +1,37 @@
-#include <algorithm>
 #include <cstdio>
-#include <filesystem>
-#include <iostream>
 #include <string>
 #include <vector>
 
-#include <opencv2/imgcodecs.hpp>
-
+#include "vcharge_calibration/calibration_files.h"
 #include "vcharge_calibration/intrinsic_calibration.h"
-#include "vcharge_core/camera_rig.h"
 #include "vcharge_core/command_line.h"
 #include "vcharge_core/error.h"
+#include "vcharge_core/options.h"
 #include "vcharge_core/progress_bar.h"
+#include "vcharge_ros/bag_images.h"
+#include "vcharge_ros/drive_topics.h"
 
 namespace {
 
-namespace fs = std::filesystem;
+constexpr double kDegrees = 57.29577951308232;
 
-std::vector<vcharge::CalibrationImage> readImages(const std::string& folder) {
-  if (!fs::is_directory(folder)) {
-    throw vcharge::InputError(folder + ": expected a folder of images");
-  }
-  std::vector<std::string> paths;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    std::string extension = entry.path().extension().string();
-    std::transform(extension.begin(), extension.end(), extension.begin(),
-                   [](unsigned char c) { return std::tolower(c); });
-    for (const char* known : {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}) {
-      if (extension == known) {
-        paths.push_back(entry.path().string());
-      }
-    }
-  }
-  if (paths.empty()) {
-    throw vcharge::InputError(folder + ": expected images (png, jpg, bmp, tif, pgm), found none");
-  }
-  std::sort(paths.begin(), paths.end());
+struct Arguments {
+  std::string images, bag, topic, target, options;
+  std::string board = "9x6";
+  double square_m = 0.1;
+  int max_images = 150;
+  vcharge::CalibrationOutput output{"front", 0.0, "", false, ""};
+};
+
+std::vector<vcharge::CalibrationImage> readBag(const Arguments& arguments) {
+  const std::string topic = arguments.topic.empty()
+                                ? vcharge::DriveTopics().imageTopic(arguments.output.camera_name)
+                                : arguments.topic;
+  vcharge::ProgressBar progress("reading " + topic);
   std::vector<vcharge::CalibrationImage> images;
-  for (const std::string& path : paths) {
-    images.push_back({fs::path(path).filename().string(), cv::imread(path, cv::IMREAD_GRAYSCALE)});
-    if (images.back().pixels.empty()) {
-      throw vcharge::InputError(path + ": expected an image, cannot be read");
-    }
+  for (const vcharge::StampedImage& image : vcharge::readBagImages(
+           arguments.bag, topic, arguments.max_images, [&](double share) { progress.update(share); })) {
+    images.push_back({toString(image.stamp), image.image.pixels.clone()});
   }
   return images;
 }
@@ -55,70 +45,94 @@ void print(const vcharge::IntrinsicCalibration& result) {
   }
   std::printf(
       "%zu images used, %zu left out; error %.3f px RMS per coordinate, %.3f px mean distance, %.3f px in "
-      "views "
-      "that the fit did not see; corners up to %.0f degrees from the axis on %.0f %% of the image\n",
+      "views that the fit did not see; corners up to %.0f degrees from the axis on %.0f %% of the image\n",
       result.views.size(), result.rejected.size(), result.rms_px, result.mean_error_px,
-      result.cross_validated_px, result.max_angle_rad * 180.0 / 3.14159265358979,
-      100.0 * result.covered_share);
+      result.cross_validated_px, kDegrees * result.max_angle_rad, 100.0 * result.covered_share);
+  if (result.bent_boards) {
+    std::printf("the board bends by %.1f mm (RMS); taken for flat, the error is %.3f px RMS per coordinate\n",
+                1000.0 * result.bending_m, result.flat_rms_px);
+  }
 }
 
-void calibrate(const std::string& folder, const vcharge::Chessboard& board, const std::string& camera_name,
-               double field_of_view_rad, const vcharge::IntrinsicCalibrationOptions& options,
-               const std::string& output) {
-  const std::vector<vcharge::CalibrationImage> images = readImages(folder);
+void calibrate(const Arguments& arguments, const vcharge::IntrinsicCalibrationOptions& options) {
+  const vcharge::CalibrationBoard board =
+      arguments.target.empty() ? vcharge::CalibrationBoard::parse(arguments.board, arguments.square_m)
+                               : vcharge::readCalibrationBoard(arguments.target);
+  const std::vector<vcharge::CalibrationImage> images =
+      arguments.bag.empty() ? vcharge::readCalibrationImages(arguments.images) : readBag(arguments);
   vcharge::IntrinsicCalibration result;
   {
-    vcharge::ProgressBar progress("calibrating " + camera_name);
+    vcharge::ProgressBar progress("calibrating " + arguments.output.camera_name);
     result =
         vcharge::calibrateIntrinsics(board, images, options, [&](double share) { progress.update(share); });
   }
   for (const vcharge::RejectedImage& image : result.rejected) {
     std::printf("left out %s: %s\n", image.name.c_str(), image.reason.c_str());
   }
+  vcharge::writeCalibration(arguments.output, board, images, result);
   if (result.verdict == vcharge::Verdict::kFail) {
-    throw vcharge::InputError(folder + ": FAIL: " + result.remarks.front());
+    throw vcharge::InputError((arguments.bag.empty() ? arguments.images : arguments.bag) +
+                              ": FAIL: " + result.remarks.front());
   }
   print(result);
-  std::printf("%s\n", result.verdict == vcharge::Verdict::kPass ? "PASS" : "WARN");
+  std::printf("%s\n", toString(result.verdict).c_str());
   for (const std::string& remark : result.remarks) {
     std::printf("  %s\n", remark.c_str());
   }
-  vcharge::CameraRig rig;
-  rig.cameras.push_back({camera_name, "camera_" + camera_name + "_optical", result.image_size_px,
-                         *result.model,
-                         field_of_view_rad > 0.0 ? field_of_view_rad : 2.0 * result.max_angle_rad});
-  vcharge::writeCameraRig(rig, output);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Calibrates the intrinsics of a camera from images of a chessboard and writes them as a rig.yaml "
-      "without "
-      "extrinsics. Prints every parameter with its standard deviation, the images left out and why, and a "
-      "verdict.");
-  std::string folder;
-  std::string size = "9x6";
-  std::string camera_name = "front";
-  std::string output;
-  double square_m = 0.1;
-  double field_of_view_rad = 0.0;
+      "Calibrates the intrinsics of a camera from images of a chessboard or an AprilGrid, in a folder or a "
+      "bag, and writes them as a rig.yaml without extrinsics. Prints every parameter with its standard "
+      "deviation, the images left out and why, and a verdict: PASS, WARN with what is missing, or FAIL, "
+      "which "
+      "writes no rig.yaml.");
+  Arguments arguments;
   vcharge::IntrinsicCalibrationOptions options;
-  app.add_option("--images", folder, "folder of images")->required();
-  app.add_option("--board", size, "inner corners, COLUMNSxROWS")->capture_default_str();
-  app.add_option("--square_m,--square-m", square_m, "side of a square")->capture_default_str();
-  app.add_option("--camera", camera_name, "name of the camera")->capture_default_str();
-  app.add_option("--model", options.model, "mei, kannala_brandt or pinhole")->capture_default_str();
-  app.add_option("--field-of-view-rad", field_of_view_rad, "full angle; 0: as far as corners were seen")
+  auto* images = app.add_option("--images", arguments.images, "folder of images");
+  auto* bag = app.add_option("--bag", arguments.bag, "bag with the camera's images");
+  images->excludes(bag);
+  app.add_option("--topic", arguments.topic, "of the bag; default: /camera/CAMERA/image_raw")->needs(bag);
+  app.add_option("--max-images", arguments.max_images, "of the bag, evenly spread")
+      ->needs(bag)
+      ->check(CLI::Range(1, 10000))
       ->capture_default_str();
-  app.add_option("--output", output, "rig.yaml to write")->required()->check(vcharge::requireNotEmpty);
+  app.add_option("--board", arguments.board, "chessboard's inner corners, COLUMNSxROWS")
+      ->capture_default_str();
+  app.add_option("--square_m,--square-m", arguments.square_m, "side of a square")->capture_default_str();
+  app.add_option("--target", arguments.target,
+                 "Kalibr's target YAML (aprilgrid, checkerboard), instead of --board");
+  app.add_option("--camera", arguments.output.camera_name, "name of the camera")->capture_default_str();
+  app.add_option("--model", options.model, "mei, kannala_brandt or pinhole")->capture_default_str();
+  app.add_option("--options", arguments.options, "YAML with other options of the calibration");
+  app.add_option("--field-of-view-rad", arguments.output.field_of_view_rad,
+                 "full angle; 0: as far as corners were seen")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 6.28));
+  app.add_option("--output", arguments.output.rig_file, "rig.yaml to write")
+      ->required()
+      ->check(vcharge::requireNotEmpty);
+  app.add_flag("--keep-others", arguments.output.keep_others, "keep the other cameras that the rig.yaml has");
+  app.add_option("--report", arguments.output.report_file, "HTML report to write")
+      ->check(vcharge::requireNotEmpty);
   return vcharge::runTool(&app, argc, argv, [&] {
-    if (!vcharge::isCameraName(camera_name)) {
-      throw vcharge::InputError("--camera: expected a letter, then letters, digits and underscores, got '" +
-                                camera_name + "'");
+    if (arguments.images.empty() && arguments.bag.empty()) {
+      throw vcharge::InputError("--images or --bag is required");
     }
-    calibrate(folder, vcharge::Chessboard::parse(size, square_m), camera_name, field_of_view_rad, options,
-              output);
+    if (!vcharge::isCameraName(arguments.output.camera_name)) {
+      throw vcharge::InputError("--camera: expected a letter, then letters, digits and underscores, got '" +
+                                arguments.output.camera_name + "'");
+    }
+    if (!arguments.options.empty()) {
+      const std::string model = options.model;
+      vcharge::readFieldsFromFile(arguments.options, &options);
+      if (app.count("--model") > 0) {
+        options.model = model;
+      }
+    }
+    calibrate(arguments, options);
   });
 }

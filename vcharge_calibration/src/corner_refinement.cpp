@@ -36,7 +36,7 @@ bool refineCorner(const cv::Mat& image, double half_window_px, double max_move_p
   return true;
 }
 
-void refineCorners(const cv::Mat& image, const Chessboard& board, std::vector<BoardCorner>* corners) {
+void refineCorners(const cv::Mat& image, const CalibrationBoard& board, std::vector<BoardCorner>* corners) {
   std::map<int, Eigen::Vector2d> by_index;
   for (const BoardCorner& corner : *corners) {
     by_index[corner.index] = corner.pixel;

@@ -4,7 +4,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "vcharge_calibration/chessboard.h"
+#include "vcharge_calibration/calibration_board.h"
 
 namespace vcharge {
 
@@ -17,6 +17,6 @@ bool refineCorner(const cv::Mat& image, double half_window_px, double max_move_p
 /// window follows the board's local spacing in this part of the image, so that it holds as much of the four
 /// squares as possible and nothing of other corners. Corners without a neighbour, or that moved further than
 /// a third of the spacing, are dropped.
-void refineCorners(const cv::Mat& image, const Chessboard& board, std::vector<BoardCorner>* corners);
+void refineCorners(const cv::Mat& image, const CalibrationBoard& board, std::vector<BoardCorner>* corners);
 
 }  // namespace vcharge

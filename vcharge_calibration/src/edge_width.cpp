@@ -26,59 +26,81 @@ double sample(const cv::Mat& image, const Eigen::Vector2d& pixel) {
 
 }  // namespace
 
-double edgeWidth(const cv::Mat& image, const Chessboard& board, const BoardView& view,
-                 const RigidTransform& camera_from_board, const CameraModel& model) {
-  std::vector<double> widths_px;
-  for (const BoardCorner& corner : view.corners) {
-    const bool last = corner.index % board.columns + 1 == board.columns;
-    if (last) {
-      continue;
-    }
-    // Across the edge between this corner and the next in its row.
-    const Eigen::Vector3d middle = 0.5 * (board.corner(corner.index) + board.corner(corner.index + 1));
-    const Eigen::Vector3d beside = middle + Eigen::Vector3d(0.0, 0.1 * board.square_m, 0.0);
-    Eigen::Vector2d at;
-    Eigen::Vector2d towards;
-    if (!model.project(camera_from_board * middle, &at) ||
-        !model.project(camera_from_board * beside, &towards)) {
-      continue;
-    }
-    const double square_px = 10.0 * (towards - at).norm();
-    const double reach_px = std::min(kReach_px, 0.4 * square_px);
-    if (reach_px < 2.0) {
-      continue;
-    }
-    const Eigen::Vector2d across = (towards - at).normalized();
-    double sum = 0.0;
-    double first = 0.0;
-    double second = 0.0;
-    bool inside = true;
-    double last_value = sample(image, at - reach_px * across);
-    const double start = last_value;
-    for (double s = -reach_px + kStep_px; s <= reach_px && inside; s += kStep_px) {
-      const double value = sample(image, at + s * across);
-      inside = value >= 0.0 && last_value >= 0.0;
-      const double slope = value - last_value;
-      const double place = s - 0.5 * kStep_px;
-      sum += slope;
-      first += slope * place;
-      second += slope * place * place;
-      last_value = value;
-    }
-    if (!inside || std::abs(last_value - start) < kMinContrast) {
-      continue;
-    }
-    const double variance = second / sum - (first / sum) * (first / sum);
-    if (variance > 0.0) {
-      widths_px.push_back(2.0 * std::sqrt(variance));
-    }
-  }
-  if (widths_px.empty()) {
+namespace {
+
+// Width of the edge through `middle` (on the board, metres) that runs along `along`; 0 where it cannot be
+// told.
+double widthAt(const cv::Mat& image, const CalibrationBoard& board, const PlacedBoard& placed,
+               const CameraModel& model, const Eigen::Vector2d& middle, const Eigen::Vector2d& across_m) {
+  Eigen::Vector2d at;
+  Eigen::Vector2d towards;
+  if (!model.project(placed.point(board, middle), &at) ||
+      !model.project(placed.point(board, middle + across_m), &towards)) {
     return 0.0;
   }
-  const auto middle = widths_px.begin() + static_cast<std::ptrdiff_t>(widths_px.size() / 2);
-  std::nth_element(widths_px.begin(), middle, widths_px.end());
+  const double clearance_px = (towards - at).norm() * board.clearance_m() / across_m.norm();
+  const double reach_px = std::min(kReach_px, 0.4 * clearance_px);
+  if (reach_px < 2.0) {
+    return 0.0;
+  }
+  const Eigen::Vector2d across = (towards - at).normalized();
+  double sum = 0.0;
+  double first = 0.0;
+  double second = 0.0;
+  double last_value = sample(image, at - reach_px * across);
+  const double start = last_value;
+  for (double s = -reach_px + kStep_px; s <= reach_px; s += kStep_px) {
+    const double value = sample(image, at + s * across);
+    if (value < 0.0 || last_value < 0.0) {
+      return 0.0;
+    }
+    const double slope = value - last_value;
+    const double place = s - 0.5 * kStep_px;
+    sum += slope;
+    first += slope * place;
+    second += slope * place * place;
+    last_value = value;
+  }
+  if (std::abs(last_value - start) < kMinContrast) {
+    return 0.0;
+  }
+  const double variance = second / sum - (first / sum) * (first / sum);
+  return variance > 0.0 ? 2.0 * std::sqrt(variance) : 0.0;
+}
+
+double medianOf(std::vector<double> values) {
+  if (values.empty()) {
+    return 0.0;
+  }
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+}  // namespace
+
+double edgeWidth(const cv::Mat& image, const CalibrationBoard& board, const BoardView& view,
+                 const PlacedBoard& placed, const CameraModel& model) {
+  // Motion blurs the edges of one direction only.
+  std::vector<double> along_rows;
+  std::vector<double> along_columns;
+  const double step_m = 0.1 * board.clearance_m();
+  const auto add = [&](int index, int next, const Eigen::Vector2d& across_m, std::vector<double>* widths) {
+    const Eigen::Vector2d middle = 0.5 * (board.corner(index) + board.corner(next)).head<2>();
+    const double width_px = widthAt(image, board, placed, model, middle, across_m);
+    if (width_px > 0.0) {
+      widths->push_back(width_px);
+    }
+  };
+  for (const BoardCorner& corner : view.corners) {
+    if (corner.index % board.columns + 1 < board.columns) {
+      add(corner.index, corner.index + 1, {0.0, step_m}, &along_rows);
+    }
+    if (corner.index + board.columns < board.numCorners()) {
+      add(corner.index, corner.index + board.columns, {step_m, 0.0}, &along_columns);
+    }
+  }
+  return std::max(medianOf(along_rows), medianOf(along_columns));
 }
 
 }  // namespace vcharge

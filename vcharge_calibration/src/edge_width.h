@@ -2,15 +2,15 @@
 
 #include <opencv2/core.hpp>
 
-#include "vcharge_calibration/chessboard.h"
+#include "vcharge_calibration/calibration_board.h"
 #include "vcharge_core/camera_model.h"
-#include "vcharge_core/rigid_transform.h"
 
 namespace vcharge {
 
 /// How wide the edges between the board's squares are in an image: twice the standard deviation of the step's
-/// slope, in pixels, median over the board. About 2 for a sharp image; 0 where nothing could be measured.
-double edgeWidth(const cv::Mat& image, const Chessboard& board, const BoardView& view,
-                 const RigidTransform& camera_from_board, const CameraModel& model);
+/// slope, in pixels, median over the board, of the edges along rows or along columns, whichever are
+/// wider. About 2 for a sharp image; 0 where nothing could be measured.
+double edgeWidth(const cv::Mat& image, const CalibrationBoard& board, const BoardView& view,
+                 const PlacedBoard& placed, const CameraModel& model);
 
 }  // namespace vcharge

@@ -27,7 +27,7 @@ CameraModel meiCamera() {
 }
 
 /// Views of a board in random poses up to the rim, with Gaussian noise on the corners.
-std::vector<BoardView> randomViews(const Chessboard& board, const CameraModel& model, int count,
+std::vector<BoardView> randomViews(const CalibrationBoard& board, const CameraModel& model, int count,
                                    double noise_px, uint32_t seed,
                                    std::vector<RigidTransform>* poses = nullptr) {
   std::mt19937 random(seed);
@@ -104,7 +104,7 @@ double projectionDifference(const CameraModel& truth, const CameraModel& fitted)
 }
 
 TEST(BoardPoseTest, IsExactWithoutNoiseUpToTheRim) {
-  const Chessboard board{9, 6, 0.1};
+  const CalibrationBoard board{9, 6, 0.1};
   const CameraModel model = meiCamera();
   std::vector<RigidTransform> poses;
   const std::vector<BoardView> views = randomViews(board, model, 50, 0.0, 3, &poses);
@@ -117,7 +117,7 @@ TEST(BoardPoseTest, IsExactWithoutNoiseUpToTheRim) {
 }
 
 TEST(BoardPoseTest, TooFewOrCollinearRaysHaveNone) {
-  const Chessboard board{9, 6, 0.1};
+  const CalibrationBoard board{9, 6, 0.1};
   const CameraModel model = meiCamera();
   std::vector<BoardCorner> row = randomViews(board, model, 1, 0.0, 3)[0].corners;
   row.resize(3);
@@ -128,7 +128,7 @@ TEST(BoardPoseTest, TooFewOrCollinearRaysHaveNone) {
 }
 
 TEST(IntrinsicOptimizerTest, FindsEveryModelWithoutAFocalGuess) {
-  const Chessboard board{9, 6, 0.1};
+  const CalibrationBoard board{9, 6, 0.1};
   Eigen::Matrix<double, 8, 1> kannala_brandt;
   kannala_brandt << 420.0, 421.0, 645.0, 402.0, 0.02, -0.006, 0.002, -0.0004;
   for (const CameraModel& truth : {meiCamera(), CameraModel::create("kannala_brandt", kannala_brandt)}) {
@@ -141,7 +141,7 @@ TEST(IntrinsicOptimizerTest, FindsEveryModelWithoutAFocalGuess) {
 
 TEST(IntrinsicOptimizerTest, KnowsItsErrors) {
   // Normalized error squared over 20 seeds: chi-squared with 9 x 20 degrees of freedom.
-  const Chessboard board{9, 6, 0.1};
+  const CalibrationBoard board{9, 6, 0.1};
   const CameraModel truth = meiCamera();
   constexpr double kNoise_px = 0.15;
   double sum = 0.0;
@@ -150,9 +150,9 @@ TEST(IntrinsicOptimizerTest, KnowsItsErrors) {
   constexpr int kSeeds = 20;
   for (uint32_t seed = 1; seed <= kSeeds; ++seed) {
     const std::vector<BoardView> views = randomViews(board, truth, 60, kNoise_px, seed);
-    const auto fit = fitCamera(board, views, truth, Loss::kSquared);
+    const auto fit = fitCamera(board, views, truth, {});
     ASSERT_TRUE(fit.has_value());
-    const auto covariance = intrinsicsCovariance(board, views, *fit, kNoise_px);
+    const auto covariance = intrinsicsCovariance(board, views, *fit, {Loss::kSquared, kNoise_px});
     ASSERT_TRUE(covariance.has_value());
     const Eigen::VectorXd error = fit->model.parameters() - truth.parameters();
     sum += error.dot(covariance->ldlt().solve(error));
@@ -169,13 +169,13 @@ TEST(IntrinsicOptimizerTest, KnowsItsErrors) {
   EXPECT_LE(beyond_three_sigma, 3);
 }
 
-TEST(ChessboardTest, SizesThatAreNoneAreNamed) {
+TEST(CalibrationBoardTest, SizesThatAreNoneAreNamed) {
   for (const char* bad : {"9", "9x", "x6", "2x6", "9x2", "9*6", "-9x6", "9x6x2", ""}) {
-    EXPECT_THROW(Chessboard::parse(bad, 0.1), std::invalid_argument) << bad;
+    EXPECT_THROW(CalibrationBoard::parse(bad, 0.1), std::invalid_argument) << bad;
   }
-  EXPECT_THROW(Chessboard::parse("9x6", 0.0), std::invalid_argument);
-  EXPECT_THROW(Chessboard::parse("9x6", std::nan("")), std::invalid_argument);
-  EXPECT_EQ(Chessboard::parse("9x6", 0.1).numCorners(), 54);
+  EXPECT_THROW(CalibrationBoard::parse("9x6", 0.0), std::invalid_argument);
+  EXPECT_THROW(CalibrationBoard::parse("9x6", std::nan("")), std::invalid_argument);
+  EXPECT_EQ(CalibrationBoard::parse("9x6", 0.1).numCorners(), 54);
 }
 
 const auto kNoProgress = [](double /*share*/) {};

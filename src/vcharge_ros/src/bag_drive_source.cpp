@@ -12,6 +12,7 @@
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 
+#include "bag_access.h"
 #include "drive_item.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/options.h"
@@ -23,6 +24,8 @@ namespace vcharge {
 namespace {
 
 using internal::DriveItem;
+using internal::openBag;
+using internal::readingBag;
 
 enum class Kind { kImage, kCompressedImage, kOdometry, kWheelTicks };
 
@@ -48,31 +51,6 @@ std::string seconds(double value) {
   std::ostringstream text;
   text << value << " s";
   return text.str();
-}
-
-/// Runs a step of librosbag, whose errors come in many types, and names the bag in what it throws.
-template <class Function>
-auto readingBag(const std::string& path, Function&& function) -> decltype(function()) {
-  try {
-    return function();
-  } catch (const InputError&) {
-    throw;
-  } catch (const rosbag::BagUnindexedException&) {
-    throw InputError(path +
-                     ": the bag has no index (was its recording cut off?); expected a complete bag, see "
-                     "`rosbag reindex`");
-  } catch (const std::exception& error) {
-    throw InputError(path + ": corrupt or truncated; expected a ROS bag of format 2.0 (" + error.what() +
-                     ")");
-  }
-}
-
-std::unique_ptr<rosbag::Bag> openBag(const std::string& path) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(path, error)) {
-    throw InputError(path + ": no such file; expected a ROS bag");
-  }
-  return readingBag(path, [&] { return std::make_unique<rosbag::Bag>(path, rosbag::bagmode::Read); });
 }
 
 /// One reading of a bag, from its first message to its last.

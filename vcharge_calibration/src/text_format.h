@@ -1,0 +1,16 @@
+#pragma once
+
+#include <array>
+#include <cstdio>
+#include <string>
+
+namespace vcharge {
+
+/// With so many digits after the point.
+inline std::string toText(double value, int digits) {
+  std::array<char, 64> text{};
+  std::snprintf(text.data(), text.size(), "%.*f", digits, value);
+  return text.data();
+}
+
+}  // namespace vcharge
