@@ -253,7 +253,7 @@ TEST(CalibrateIntrinsicsTest, CalibratesAVchargeCameraOnNearlyAllImages) {
       std::count_if(result.views.begin(), result.views.end(),
                     [](const CalibratedView& view) { return view.view.corners.size() == 54; });
   EXPECT_GE(result.views.size(), 60U);
-  EXPECT_GE(complete, 50);
+  EXPECT_GE(complete, 60);
   EXPECT_LE(result.rms_px, 0.26);
   EXPECT_LE(result.mean_error_px, 0.28);
   std::printf(
