@@ -41,6 +41,7 @@ class DepthNodeletTest(unittest.TestCase):
                         if topic == "/odom" or topic.endswith("/image_raw")]
         cls.received = {}
         cls.clouds = []
+        cls.reached = set()  # topics that brought the nodelet something
         cls.told = []  # every message of /diagnostics since the test's begin
 
         def keep(topic):
@@ -75,14 +76,24 @@ class DepthNodeletTest(unittest.TestCase):
     def keep_diagnostics(cls, message):
         for status in message.status:
             cls.told.append(status.message)
+            cls.reached.update(value.key for value in status.values if ", 0 bad" not in value.value)
 
     def setUp(self):
         self.assertTrue(self.load("/depth", "vcharge_dense/depth_nodelet", [], [], [], "").success)
-        for topic, publisher in self.publishers.items():
-            wait_for(lambda p=publisher: p.get_num_connections() > 0, f"a subscriber of {topic}")
+        self.reached.clear()
+        wait_for(self.reach, "the nodelet to hear all topics")
         for kinds in self.received.values():
             kinds.clear()
         self.told.clear()
+
+    def reach(self):
+        """Publishes what the nodelet refuses (no stamp) until it tells so of every topic: a connection alone may be that
+        of a nodelet that is gone."""
+        for topic, publisher in self.publishers.items():
+            if topic not in self.reached:
+                publisher.publish(publisher.data_class())
+        time.sleep(0.3)
+        return self.reached >= set(self.publishers)
 
     def tearDown(self):
         self.assertTrue(self.unload("/depth").success)

@@ -19,7 +19,7 @@ from drive_fixture import run, tool  # noqa: E402
 PACKAGES = rospkg.RosPack()
 LAUNCH = pathlib.Path(PACKAGES.get_path("vcharge_launch"))
 CONFIG = pathlib.Path(PACKAGES.get_path("vcharge_config"))
-NODELET_PACKAGES = ("vcharge_ros", "vcharge_dense", "vcharge_mapping")
+NODELET_PACKAGES = ("vcharge_ros", "vcharge_calibration", "vcharge_dense", "vcharge_mapping")
 
 
 def nodelet_types():
@@ -77,6 +77,11 @@ class LaunchFilesTest(unittest.TestCase):
                 config = load(path, map="/maps/lot.vmap")
                 self.assertEqual(config.params["/map_publisher/map"].value, "/maps/lot.vmap", path.name)
                 continue
+            if "camera" in required_arguments(path):  # listens to a camera, and replays nothing
+                config = load(path, camera="front", output="/rigs/cameras.yaml")
+                self.assertEqual(config.params["/intrinsic_calibration/camera"].value, "front", path.name)
+                self.assertEqual(config.params["/intrinsic_calibration/output"].value, "/rigs/cameras.yaml", path.name)
+                continue
             config = load(path, **({"folder": "/drives"} if "folder" in required_arguments(path) else
                                    {"bag": "/drives/drive.bag", "rig": "/drives/rig_truth.yaml"}))
             parameters = {name: parameter.value for name, parameter in config.params.items()}
@@ -132,7 +137,7 @@ class LaunchFilesTest(unittest.TestCase):
         cameras = yaml.safe_load((CONFIG / "rigs" / "golf_nominal.yaml").read_text())["cameras"]
         published = re.compile(rf"/camera/({'|'.join(cameras)})/image_raw|"
                                rf"/dense/({'|'.join(cameras)})/(points|range/(image|confidence|standard_deviation))|"
-                               r"/mapping/(landmarks|trajectory|loop_edges)")
+                               r"/calibration/image|/mapping/(landmarks|trajectory|loop_edges)")
 
         def topics(node):
             if isinstance(node, dict):

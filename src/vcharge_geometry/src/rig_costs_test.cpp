@@ -17,11 +17,10 @@ std::vector<CameraModel> models() {
   mei << 1.15, 895.5, 894.7, 649.6, 398.7, -0.33, 0.0865, -0.00067, -0.00004;
   Eigen::Matrix<double, 8, 1> kannala_brandt;
   kannala_brandt << 330.0, 331.0, 640.0, 400.0, 0.01, -0.004, 0.001, -0.0002;
-  const Eigen::VectorXd pinhole = (Eigen::VectorXd(4) << 500.0, 505.0, 640.0, 400.0).finished();
-  return {
-      CameraModel::create("mei", mei), CameraModel::create("kannala_brandt", kannala_brandt),
-      CameraModel::create(
-          "pinhole", pinhole.head(static_cast<Eigen::Index>(CameraModel::parameterNames("pinhole").size())))};
+  const Eigen::VectorXd pinhole =
+      (Eigen::VectorXd(8) << 500.0, 505.0, 640.0, 400.0, -0.05, 0.01, 0.001, -0.0005).finished();
+  return {CameraModel::create("mei", mei), CameraModel::create("kannala_brandt", kannala_brandt),
+          CameraModel::create("pinhole", pinhole)};
 }
 
 class RigCostsTest : public ::testing::Test {
