@@ -19,7 +19,7 @@ constexpr float kImageNoiseFactor = 0.5f;
 
 // Standard deviation over the mean second difference of neighbouring estimates, which are correlated where
 // their windows overlap. Fitted, with the two noises above and in the options, on simulated drives.
-constexpr float kRoughnessFactor = 1.0f;
+constexpr float kRoughnessFactor = 0.8f;
 
 // Share of right ranges (within 5 %) at products of the confidence's factors, fitted on simulated drives
 // other than those that the README judges it by.
