@@ -11,7 +11,7 @@ namespace vcharge {
 struct BundleAdjustmentOptions {
   int max_iterations = 25;
   double loss_sigmas = 2.0;            ///< scale of the Cauchy loss
-  double outlier_sigmas = 5.0;         ///< observations with larger errors are removed
+  double outlier_sigmas = 4.0;         ///< observations with larger errors are removed
   double min_parallax_rad = 0.015;     ///< landmarks whose remaining rays are more parallel are removed
   int min_observations = 3;            ///< landmarks with fewer are removed
   double max_range_m = 80.0;           ///< and those that are further from every camera

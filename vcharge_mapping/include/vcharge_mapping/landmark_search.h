@@ -9,7 +9,7 @@
 namespace vcharge {
 
 struct LandmarkSearchOptions {
-  double radius_px = 12.0;          ///< about where a landmark is expected, at 1280 pixels of width
+  double radius_px = 8.0;           ///< about where a landmark is expected, at 1280 pixels of width
   double max_distance_m = 10.0;     ///< between keyframes whose landmarks are looked for in each other
   double max_view_angle_rad = 0.6;  ///< between the directions from which a landmark is seen
   double max_range_ratio = 1.8;     ///< between the distances
