@@ -115,9 +115,6 @@ class Bundle {
     for (size_t i = 1; i < data_->keyframes.size(); ++i) {
       const Keyframe& previous = data_->keyframes[i - 1];
       const Keyframe& current = data_->keyframes[i];
-      if (previous.part != current.part) {
-        continue;
-      }
       const RigidTransform motion = previous.odom_from_vehicle.inverse() * current.odom_from_vehicle;
       problem->AddResidualBlock(makeOdometryCost(motion, odometryInformation(motion, options_)).release(),
                                 nullptr, poses_[i - 1].data(), poses_[i].data(), odometer_);
@@ -268,16 +265,6 @@ BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, Map
     summary.rms_px = std::sqrt(squares / (2.0 * static_cast<double>(summary.num_observations)));
   }
   return summary;
-}
-
-RigidTransform odometryMotion(const MappingData& data, size_t previous, size_t current) {
-  const RigidTransform motion =
-      data.keyframes[previous].odom_from_vehicle.inverse() * data.keyframes[current].odom_from_vehicle;
-  const double turn_rad = yawOfRotation(motion.rotation());
-  const double extra_rad = (data.odometry_turn_scale - 1.0) * turn_rad;
-  const RigidTransform half = RigidTransform::planar(0.0, 0.0, 0.5 * extra_rad);
-  return RigidTransform(half.rotation() * half.rotation() * motion.rotation(),
-                        half.rotation() * (data.odometry_distance_scale * motion.translation()));
 }
 
 }  // namespace vcharge

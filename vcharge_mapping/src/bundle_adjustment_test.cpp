@@ -88,15 +88,5 @@ TEST(BundleAdjustmentTest, GivesTheSameTwice) {
   EXPECT_EQ(worstPositionError(first, second), 0.0);
 }
 
-TEST(BundleAdjustmentTest, TheOdometersMotionIsCorrectedByItsFactors) {
-  testing::TestDriveOptions drive;
-  drive.odometry_scale = 1.25;
-  MappingData data = testing::makeTestDrive(drive);
-  data.odometry_distance_scale = 0.8;
-  const RigidTransform truth =
-      data.keyframes[3].map_from_vehicle.inverse() * data.keyframes[4].map_from_vehicle;
-  EXPECT_LT((odometryMotion(data, 3, 4).translation() - truth.translation()).norm(), 1e-9);
-}
-
 }  // namespace
 }  // namespace vcharge

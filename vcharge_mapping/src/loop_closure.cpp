@@ -163,8 +163,6 @@ void LoopClosureOptions::validate() const {
   requireField(step_sigma_rad > 0.0, "step_sigma_rad", "must be positive", step_sigma_rad);
   requireField(loop_sigma_m > 0.0, "loop_sigma_m", "must be positive", loop_sigma_m);
   requireField(loop_sigma_rad > 0.0, "loop_sigma_rad", "must be positive", loop_sigma_rad);
-  requireField(gap_sigma_m > 0.0, "gap_sigma_m", "must be positive", gap_sigma_m);
-  requireField(gap_sigma_rad > 0.0, "gap_sigma_rad", "must be positive", gap_sigma_rad);
 }
 
 std::shared_ptr<const VocabularyTree> trainVocabulary(const LoopClosureOptions& options,
@@ -289,9 +287,7 @@ void closeLoops(const LoopClosureOptions& options, std::vector<LoopEdge>* edges,
       step.second = static_cast<int64_t>(i);
       step.first_from_second =
           data->keyframes[i - 1].map_from_vehicle.inverse() * data->keyframes[i].map_from_vehicle;
-      const bool is_gap = data->keyframes[i - 1].part != data->keyframes[i].part;
-      step.information = is_gap ? diagonalInformation(options.gap_sigma_m, options.gap_sigma_rad)
-                                : diagonalInformation(options.step_sigma_m, options.step_sigma_rad);
+      step.information = diagonalInformation(options.step_sigma_m, options.step_sigma_rad);
       graph.edges.push_back(step);
     }
   }

@@ -188,7 +188,6 @@ void SparseMapper::addKeyframe(Timestamp stamp, const RigidTransform& odom_from_
   keyframe.odom_from_vehicle = odom_from_vehicle;
   keyframe.map_from_vehicle = map_from_previous_;
   keyframe.travelled_m = travelled_m_;
-  keyframe.part = part_;
   keyframe.images.resize(rig_->cameras.size());
   data_.keyframes.push_back(std::move(keyframe));
   for (size_t i = 0; i < trackers_.size(); ++i) {

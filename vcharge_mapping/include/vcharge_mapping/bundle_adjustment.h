@@ -61,7 +61,4 @@ struct BundleAdjustmentSummary {
 /// removes outliers and gives the landmarks their covariance, given the poses.
 BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, MappingData* data);
 
-/// The odometer's motion between two keyframes of one part, corrected by its factors so far.
-RigidTransform odometryMotion(const MappingData& data, size_t previous, size_t current);
-
 }  // namespace vcharge

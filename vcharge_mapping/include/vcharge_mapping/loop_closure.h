@@ -34,8 +34,6 @@ struct LoopClosureOptions {
   double step_sigma_rad = 0.001;
   double loop_sigma_m = 0.03;
   double loop_sigma_rad = 0.003;
-  double gap_sigma_m = 1.0;  ///< where odometry was interrupted
-  double gap_sigma_rad = 0.3;
 
   static VocabularyTreeOptions smallVocabulary();
   static RobustOptions defaultRobust();
@@ -55,8 +53,6 @@ struct LoopClosureOptions {
     visit("step_sigma_rad", step_sigma_rad);
     visit("loop_sigma_m", loop_sigma_m);
     visit("loop_sigma_rad", loop_sigma_rad);
-    visit("gap_sigma_m", gap_sigma_m);
-    visit("gap_sigma_rad", gap_sigma_rad);
     visit("vocabulary", vocabulary);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field

@@ -24,10 +24,9 @@ struct KeyframeImage {
 /// The vehicle at an instant that goes into the map.
 struct Keyframe {
   Timestamp stamp;
-  RigidTransform odom_from_vehicle;  ///< as the odometer counted
-  RigidTransform map_from_vehicle;   ///< estimated
-  double travelled_m = 0.0;          ///< by the odometer, since the drive's start
-  int32_t part = 0;  ///< odometry is continuous within a part: gaps and resets begin a new one
+  RigidTransform odom_from_vehicle;   ///< as the odometer counted
+  RigidTransform map_from_vehicle;    ///< estimated
+  double travelled_m = 0.0;           ///< by the odometer, since the drive's start
   std::vector<KeyframeImage> images;  ///< in the rig's order; without features where a camera sent no image
 };
 

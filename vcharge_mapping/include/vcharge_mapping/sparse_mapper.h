@@ -123,7 +123,6 @@ class SparseMapper : public DriveConsumer {
   RigidTransform previous_odom_from_vehicle_;
   RigidTransform map_from_previous_;
   double travelled_m_ = 0.0;
-  int32_t part_ = 0;
   SparseMapperReport report_;
 };
 
