@@ -64,10 +64,6 @@ Eigen::Vector3d fuse(const PlanarMotion& a, const PlanarMotion& b) {
   return (information_a + information_b).inverse() * (information_a * a.value + information_b * b.value);
 }
 
-bool isUsable(const MotionEstimate& estimate) {
-  return estimate.status == EstimationStatus::kOk || estimate.status == EstimationStatus::kScaleUnobservable;
-}
-
 }  // namespace
 
 RobustOptions EgoMotionOptions::defaultRobust() {

@@ -65,10 +65,6 @@ LoopMatches matchKeyframes(const LoopClosureOptions& options, const MappingData&
   return result;
 }
 
-bool isUsable(const MotionEstimate& estimate) {
-  return estimate.status == EstimationStatus::kOk || estimate.status == EstimationStatus::kScaleUnobservable;
-}
-
 /// Pose of one keyframe's rig in the vehicle's frame of the other, whose landmarks its rays meet.
 PoseEstimate poseAmongLandmarks(const LoopClosureOptions& options, const MappingData& data, int32_t reference,
                                 const LoopMatches& matches, const std::vector<int>& inliers,

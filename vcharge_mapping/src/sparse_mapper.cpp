@@ -31,11 +31,10 @@ class StageTimer {
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-OdometryBufferOptions keepAll() {
-  OdometryBufferOptions options;
-  options.history_s = 30.0;
-  return options;
-}
+/// Frames that may wait for odometry before they go without.
+constexpr size_t kMaxWaitingFrames = 32;
+/// An incomplete frame is ready once this many stamps came, itself among them.
+constexpr size_t kStampsForIncomplete = 3;
 
 }  // namespace
 
@@ -55,10 +54,7 @@ void SparseMapperOptions::validate() const {
 }
 
 SparseMapper::SparseMapper(std::shared_ptr<const CameraRig> rig, const SparseMapperOptions& options)
-    : rig_(std::move(rig)),
-      options_(options),
-      extractor_(makeFeatureExtractor(options.features)),
-      odometry_(keepAll()) {
+    : rig_(std::move(rig)), options_(options), extractor_(makeFeatureExtractor(options.features)) {
   options_.validate();
   check(rig_ != nullptr, "SparseMapper: expected a rig");
   if (!rig_->hasExtrinsics()) {
@@ -112,14 +108,15 @@ void SparseMapper::processFrames(bool all) {
   // A frame is ready once later images have come, or all of its own, and odometry reaches it.
   while (!pending_.empty()) {
     const auto first = pending_.begin();
+    const Timestamp stamp = first->first;
     const bool is_complete = first->second.num_present == rig_->cameras.size();
     const auto newest = odometry_.newestStamp();
-    if (!all && ((!is_complete && pending_.size() < 3) || !newest || *newest < first->first)) {
-      if (pending_.size() < 32 || !newest || *newest >= first->first) {
-        return;
-      }
+    const bool has_images = is_complete || pending_.size() >= kStampsForIncomplete;
+    const bool has_odometry = newest && *newest >= stamp;
+    const bool waited_in_vain = !has_odometry && pending_.size() >= kMaxWaitingFrames;
+    if (!all && !(has_images && has_odometry) && !waited_in_vain) {
+      return;
     }
-    const Timestamp stamp = first->first;
     const PendingFrame frame = std::move(first->second);
     pending_.erase(first);
     ++report_.num_frames;

@@ -197,7 +197,7 @@ MotionEstimate estimateKnownVerticalMotion(const std::vector<RayMatch>& matches,
     match.current = current_turn * match.current;
   }
   MotionEstimate estimate = estimateMotion<KnownVerticalSolver, CartesianParameters<4>>(upright, options);
-  if (estimate.status != EstimationStatus::kOk && estimate.status != EstimationStatus::kScaleUnobservable) {
+  if (!isUsable(estimate)) {
     return estimate;
   }
   estimate.previous_from_current = previous_turn.inverse() * estimate.previous_from_current * current_turn;

@@ -25,6 +25,11 @@ struct MotionEstimate {
   double relative_scale_deviation = 0.0;  ///< standard deviation of the translation's length over the length
 };
 
+/// Whether at least rotation and direction of the motion are known.
+inline bool isUsable(const MotionEstimate& estimate) {
+  return estimate.status == EstimationStatus::kOk || estimate.status == EstimationStatus::kScaleUnobservable;
+}
+
 // All are robust (robust_estimation.h) on the angles by which rays miss a common epipolar plane
 // (angular_error.h), deterministic, and thread-safe. Directions of rays must be unit vectors to 1e-6
 // (kNotFinite else). std::invalid_argument for invalid options.
