@@ -2,17 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
+#include <utility>
 #include <vector>
 
-#include <ceres/ceres.h>
-#include <ceres/normal_prior.h>
 #include <tbb/parallel_for.h>
 #include <Eigen/LU>
 
+#include "bundle_solver.h"
 #include "vcharge_core/error.h"
-#include "vcharge_geometry/pose_block.h"
-#include "vcharge_geometry/rig_costs.h"
 #include "vcharge_mapping/triangulation.h"
 
 namespace vcharge {
@@ -30,109 +27,49 @@ Eigen::Matrix<double, 6, 6> odometryInformation(const RigidTransform& motion,
   return sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
-/// The parameter blocks of a bundle adjustment.
-class Bundle {
- public:
-  Bundle(const BundleAdjustmentOptions& options, MappingData* data) : options_(options), data_(data) {
-    for (const Keyframe& keyframe : data->keyframes) {
-      poses_.push_back(toPoseBlock(keyframe.map_from_vehicle));
-    }
-    for (const RigCamera& camera : data->rig->cameras) {
-      extrinsics_.push_back(toPoseBlock(*camera.vehicle_from_camera));
-    }
-    odometer_[0] = data->odometry_distance_scale;
-    odometer_[1] = data->odometry_turn_scale;
+/// The landmarks' observations and the odometer's motions, as the solver wants them.
+BundleProblem makeProblem(const BundleAdjustmentOptions& options, const MappingData& data) {
+  BundleProblem problem;
+  problem.rig = data.rig;
+  problem.odometer = {data.odometry_distance_scale, data.odometry_turn_scale};
+  problem.odometer_sigmas = {options.odometer_scale_sigma, options.odometer_turn_sigma};
+  problem.loss_sigmas = options.loss_sigmas;
+  for (const Keyframe& keyframe : data.keyframes) {
+    problem.map_from_vehicle.push_back(keyframe.map_from_vehicle);
   }
-
-  ceres::Solver::Summary solve() {
-    ceres::Problem::Options problem_options;
-    problem_options.enable_fast_removal = false;
-    ceres::Problem problem(problem_options);
-    auto* manifold = makePoseManifold().release();  // the problem's from the first use on
-    for (PoseBlock& pose : poses_) {
-      problem.AddParameterBlock(pose.data(), 7, manifold);
+  for (const Track& track : data.tracks) {
+    if (!track.position_m) {
+      continue;
     }
-    for (PoseBlock& extrinsics : extrinsics_) {
-      problem.AddParameterBlock(extrinsics.data(), 7, manifold);
-      problem.SetParameterBlockConstant(extrinsics.data());
-    }
-    problem.SetParameterBlockConstant(poses_.front().data());
-    auto* ordering = new ceres::ParameterBlockOrdering;
-    addObservations(&problem, ordering);
-    addOdometry(&problem);
-    for (PoseBlock& pose : poses_) {
-      ordering->AddElementToGroup(pose.data(), 1);
-    }
-    for (PoseBlock& extrinsics : extrinsics_) {
-      ordering->AddElementToGroup(extrinsics.data(), 1);
-    }
-    if (problem.HasParameterBlock(odometer_)) {
-      ordering->AddElementToGroup(odometer_, 1);
-    }
-    ceres::Solver::Options solver;
-    solver.linear_solver_type = ceres::SPARSE_SCHUR;
-    solver.linear_solver_ordering.reset(ordering);
-    solver.max_num_iterations = options_.max_iterations;
-    solver.num_threads = options_.deterministic ? 1 : 2;
-    solver.function_tolerance = 1e-5;
-    solver.logging_type = ceres::SILENT;
-    ceres::Solver::Summary summary;
-    ceres::Solve(solver, &problem, &summary);
-    return summary;
-  }
-
-  void writeBack() {
-    for (size_t i = 0; i < poses_.size(); ++i) {
-      data_->keyframes[i].map_from_vehicle = fromPoseBlock(poses_[i]);
-    }
-    data_->odometry_distance_scale = odometer_[0];
-    data_->odometry_turn_scale = odometer_[1];
-  }
-
- private:
-  void addObservations(ceres::Problem* problem, ceres::ParameterBlockOrdering* ordering) {
-    auto* loss = new ceres::CauchyLoss(options_.loss_sigmas);
-    std::vector<std::shared_ptr<const CameraModel>> models;
-    for (const RigCamera& camera : data_->rig->cameras) {
-      models.emplace_back(data_->rig, &camera.model);
-    }
-    for (Track& track : data_->tracks) {
-      if (!track.position_m) {
-        continue;
-      }
-      for (const TrackObservation& observation : track.observations) {
-        problem->AddResidualBlock(
-            makeReprojectionCost(models[observation.camera], observation.position_px, observation.sigma_px)
-                .release(),
-            loss, poses_[observation.keyframe].data(), extrinsics_[observation.camera].data(),
-            track.position_m->data());
-      }
-      ordering->AddElementToGroup(track.position_m->data(), 0);
+    problem.points_in_map.push_back(*track.position_m);
+    problem.first_observation.push_back(problem.observations.size());
+    for (const TrackObservation& observation : track.observations) {
+      problem.observations.push_back(
+          {observation.keyframe, observation.camera, observation.position_px, observation.sigma_px});
     }
   }
+  problem.first_observation.push_back(problem.observations.size());
+  for (size_t i = 1; i < data.keyframes.size(); ++i) {
+    const RigidTransform motion =
+        data.keyframes[i - 1].odom_from_vehicle.inverse() * data.keyframes[i].odom_from_vehicle;
+    problem.motions.push_back({static_cast<int32_t>(i), motion, odometryInformation(motion, options)});
+  }
+  return problem;
+}
 
-  void addOdometry(ceres::Problem* problem) {
-    for (size_t i = 1; i < data_->keyframes.size(); ++i) {
-      const Keyframe& previous = data_->keyframes[i - 1];
-      const Keyframe& current = data_->keyframes[i];
-      const RigidTransform motion = previous.odom_from_vehicle.inverse() * current.odom_from_vehicle;
-      problem->AddResidualBlock(makeOdometryCost(motion, odometryInformation(motion, options_)).release(),
-                                nullptr, poses_[i - 1].data(), poses_[i].data(), odometer_);
-    }
-    if (problem->HasParameterBlock(odometer_)) {
-      // Where images cannot tell the scale, the odometer's calibration does.
-      const Eigen::Vector2d information(1.0 / options_.odometer_scale_sigma,
-                                        1.0 / options_.odometer_turn_sigma);
-      problem->AddResidualBlock(new ceres::NormalPrior(information.asDiagonal(), Eigen::Vector2d::Ones()),
-                                nullptr, odometer_);
+void writeBack(const BundleProblem& problem, MappingData* data) {
+  for (size_t i = 0; i < data->keyframes.size(); ++i) {
+    data->keyframes[i].map_from_vehicle = problem.map_from_vehicle[i];
+  }
+  auto point = problem.points_in_map.begin();
+  for (Track& track : data->tracks) {
+    if (track.position_m) {
+      track.position_m = *point++;
     }
   }
-
-  const BundleAdjustmentOptions& options_;
-  MappingData* data_;
-  std::vector<PoseBlock> poses_, extrinsics_;
-  double odometer_[2];
-};
+  data->odometry_distance_scale = problem.odometer[0];
+  data->odometry_turn_scale = problem.odometer[1];
+}
 
 struct TrackCheck {
   int64_t kept = 0, removed = 0;
@@ -221,6 +158,7 @@ TrackCheck checkTrack(const BundleAdjustmentOptions& options, const MappingData&
 
 void BundleAdjustmentOptions::validate() const {
   requireField(max_iterations >= 1, "max_iterations", "must be 1 or more", max_iterations);
+  requireField(cost_tolerance > 0.0, "cost_tolerance", "must be positive", cost_tolerance);
   requireField(loss_sigmas > 0.0, "loss_sigmas", "must be positive", loss_sigmas);
   requireField(outlier_sigmas > 0.0, "outlier_sigmas", "must be positive", outlier_sigmas);
   requireField(min_parallax_rad >= 0.0, "min_parallax_rad", "must not be negative", min_parallax_rad);
@@ -241,12 +179,12 @@ void BundleAdjustmentOptions::validate() const {
 BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, MappingData* data) {
   options.validate();
   check(!data->keyframes.empty(), "adjustBundle: expected keyframes");
-  Bundle bundle(options, data);
-  const ceres::Solver::Summary solved = bundle.solve();
-  bundle.writeBack();
+  BundleProblem problem = makeProblem(options, *data);
+  const BundleSolution solved = solveBundle(options.max_iterations, options.cost_tolerance, &problem);
+  writeBack(problem, data);
   BundleAdjustmentSummary summary;
-  summary.converged = solved.termination_type == ceres::CONVERGENCE;
-  summary.num_iterations = static_cast<int>(solved.iterations.size());
+  summary.converged = solved.converged;
+  summary.num_iterations = solved.num_iterations;
 
   std::vector<TrackCheck> checks(data->tracks.size());
   tbb::parallel_for(size_t{0}, data->tracks.size(), [&](size_t i) {

@@ -10,6 +10,7 @@ namespace vcharge {
 
 struct BundleAdjustmentOptions {
   int max_iterations = 25;
+  double cost_tolerance = 1e-5;        ///< relative decrease of the cost that ends the iterations
   double loss_sigmas = 2.0;            ///< scale of the Cauchy loss
   double outlier_sigmas = 4.0;         ///< observations with larger errors are removed
   double min_parallax_rad = 0.015;     ///< landmarks whose remaining rays are more parallel are removed
@@ -24,11 +25,11 @@ struct BundleAdjustmentOptions {
   double odometry_sigma_rad = 0.002;       ///< besides
   double height_sigma_m = 0.02;            ///< the odometer sees neither height
   double tilt_sigma_rad = 0.01;            ///< nor roll and pitch: how much they change between keyframes
-  bool deterministic = true;               ///< one thread
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
     visit("max_iterations", max_iterations);
+    visit("cost_tolerance", cost_tolerance);
     visit("loss_sigmas", loss_sigmas);
     visit("outlier_sigmas", outlier_sigmas);
     visit("min_parallax_rad", min_parallax_rad);
@@ -42,7 +43,6 @@ struct BundleAdjustmentOptions {
     visit("odometry_sigma_rad", odometry_sigma_rad);
     visit("height_sigma_m", height_sigma_m);
     visit("tilt_sigma_rad", tilt_sigma_rad);
-    visit("deterministic", deterministic);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
 };

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "bundle_solver.h"
+
+namespace ceres {
+class CostFunction;
+class Manifold;
+}  // namespace ceres
+
+namespace vcharge {
+
+/// Poses, points and the odometer's factors at one instant of the iteration.
+struct BundleState {
+  std::vector<RigidTransform> poses;
+  std::vector<Eigen::Vector3d> points;
+  Eigen::Vector2d odometer = Eigen::Vector2d::Ones();
+};
+
+/// An odometry error over its deviation, and its derivatives by the pose before, the pose, and the factors.
+struct MotionError {
+  Eigen::Matrix<double, 6, 1> error;
+  Eigen::Matrix<double, 6, 6> by_previous, by_current;
+  Eigen::Matrix<double, 6, 2> by_odometer;
+};
+
+/// The errors that a bundle adjustment makes small.
+class BundleErrors {
+ public:
+  explicit BundleErrors(const BundleProblem& problem);
+  ~BundleErrors();
+
+  /// Error of an observation over its deviation, and its derivative by the point where it is not null. False
+  /// where the camera cannot see the point: then the error is large, and flat.
+  bool ofObservation(const BundleState& state, size_t observation, const Eigen::Vector3d& point,
+                     Eigen::Vector2d* error, Eigen::Matrix<double, 2, 3>* by_point) const;
+  /// Weight of an observation whose error has this square.
+  double robustWeight(double square) const { return 1.0 / (1.0 + square / squared_loss_scale_); }
+  double robustCost(double square) const;
+
+  MotionError ofMotion(const BundleState& state, size_t motion) const;
+  Eigen::Vector2d ofOdometer(const BundleState& state) const;
+
+  /// Half of the sum of (robust) squares, added up in an order that no scheduling changes.
+  double cost(const BundleState& state) const;
+
+ private:
+  const BundleProblem& problem_;
+  const double squared_loss_scale_;
+  const std::unique_ptr<const ceres::Manifold> manifold_;
+  std::vector<RigidTransform> camera_from_vehicle_;
+  std::vector<std::unique_ptr<const ceres::CostFunction>> motion_costs_;
+};
+
+}  // namespace vcharge

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "vcharge_core/camera_rig.h"
+#include "vcharge_core/rigid_transform.h"
+
+namespace vcharge {
+
+/// A point as a camera of the rig saw it.
+struct BundleObservation {
+  int32_t pose = 0;
+  int32_t camera = 0;
+  Eigen::Vector2d position_px = Eigen::Vector2d::Zero();
+  double sigma_px = 1.0;
+};
+
+/// The planar motion from the pose before to `pose` as an odometer counted it, and the information of
+/// makeOdometryCost().
+struct BundleMotion {
+  int32_t pose = 0;
+  RigidTransform previous_from_current;
+  Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
+};
+
+/// Poses of a known rig, points and an odometer's factors, to be moved to the least sum of errors.
+struct BundleProblem {
+  std::shared_ptr<const CameraRig> rig;
+  std::vector<RigidTransform> map_from_vehicle;  ///< the first is held
+  std::vector<Eigen::Vector3d> points_in_map;
+  Eigen::Vector2d odometer = Eigen::Vector2d::Ones();  ///< true over counted distance, and turn
+  std::vector<BundleObservation> observations;         ///< grouped by point, by pose within a point
+  std::vector<size_t> first_observation;               ///< of every point, and the number of all at the end
+  std::vector<BundleMotion> motions;
+  Eigen::Vector2d odometer_sigmas = Eigen::Vector2d::Ones();  ///< of the factors, before the drive; around 1
+  double loss_sigmas = 2.0;                                   ///< scale of the Cauchy loss of observations
+};
+
+struct BundleSolution {
+  bool converged = false;
+  int num_iterations = 0;
+  double cost = 0.0;  ///< half of the sum of (robust) squares
+};
+
+/// Levenberg-Marquardt on the reduced system of the poses (Schur complement of the points), factorized by
+/// CHOLMOD. Parallel over points and over poses with sums in a fixed order: the same result on any number of
+/// threads. The robust loss acts as a weight that is computed anew at every iteration.
+/// `max_iterations` and the relative decrease of the cost that ends them.
+BundleSolution solveBundle(int max_iterations, double cost_tolerance, BundleProblem* problem);
+
+}  // namespace vcharge

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include <tbb/parallel_for.h>
+
+namespace vcharge {
+
+/// Calls a function with every point's index, in parallel, and adds up what it gives in an order that no
+/// scheduling changes.
+template <class Function>
+double sumOverPoints(size_t num_points, const Function& function) {
+  constexpr size_t kPointsPerTask = 256;
+  const size_t num_tasks = (num_points + kPointsPerTask - 1) / kPointsPerTask;
+  std::vector<double> sums(num_tasks, 0.0);
+  tbb::parallel_for(size_t{0}, num_tasks, [&](size_t task) {
+    const size_t end = std::min(num_points, (task + 1) * kPointsPerTask);
+    for (size_t point = task * kPointsPerTask; point < end; ++point) {
+      sums[task] += function(point);
+    }
+  });
+  double sum = 0.0;
+  for (const double of_task : sums) {
+    sum += of_task;
+  }
+  return sum;
+}
+
+}  // namespace vcharge
