@@ -252,9 +252,8 @@ double BundleEquations::step(double damping, BundleState* next) {
   *next = state_;
   for (size_t pose = 1; pose < slots_of_pose_.size(); ++pose) {
     const auto move = change.segment<6>(columnOf(pose));
-    next->poses[pose] =
-        RigidTransform(rotationFromVector(move.tail<3>()) * state_.poses[pose].rotation(),
-                       state_.poses[pose].translation() + move.head<3>());
+    next->poses[pose] = RigidTransform(rotationFromVector(move.tail<3>()) * state_.poses[pose].rotation(),
+                                       state_.poses[pose].translation() + move.head<3>());
   }
   next->odometer += change.tail<2>();
   // The linear model falls by d^T (damping d - gradient) / 2.

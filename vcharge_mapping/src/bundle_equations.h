@@ -38,9 +38,9 @@ class BundleEquations {
     int32_t pose = 0;
     int32_t point = 0;
     Eigen::Vector3d from_vehicle_m = Eigen::Vector3d::Zero();  ///< of the point, along the map's axes
-    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< sum of J_point^T J_point
-    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();  ///< sum of J_point^T error
-    Matrix63d with_point = Matrix63d::Zero();  ///< J_pose^T J_point
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();     ///< sum of J_point^T J_point
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();        ///< sum of J_point^T error
+    Matrix63d with_point = Matrix63d::Zero();                  ///< J_pose^T J_point
     Matrix63d over_point = Matrix63d::Zero();  ///< that times the inverse of the point's damped information
   };
   struct PointTerms {
@@ -80,7 +80,7 @@ class BundleEquations {
   std::vector<std::vector<size_t>> slots_of_pose_;
   std::vector<std::vector<int32_t>> rows_of_pose_;  ///< earlier poses that see a common point, and itself
   std::vector<PointTerms> points_;
-  Eigen::SparseMatrix<double> reduced_;                   ///< upper triangle
+  Eigen::SparseMatrix<double> reduced_;                    ///< upper triangle
   Eigen::VectorXd gradient_, reduced_gradient_, damping_;  ///< of the reduced system's unknowns
   Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Upper> factorization_;
 };

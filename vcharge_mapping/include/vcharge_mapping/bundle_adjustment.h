@@ -10,7 +10,7 @@ namespace vcharge {
 
 struct BundleAdjustmentOptions {
   int max_iterations = 25;
-  double cost_tolerance = 1e-5;        ///< relative decrease of the cost that ends the iterations
+  double cost_tolerance = 3e-3;        ///< relative decrease of the cost that ends the iterations
   double loss_sigmas = 2.0;            ///< scale of the Cauchy loss
   double outlier_sigmas = 4.0;         ///< observations with larger errors are removed
   double min_parallax_rad = 0.015;     ///< landmarks whose remaining rays are more parallel are removed
