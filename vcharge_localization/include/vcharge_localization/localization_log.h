@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "vcharge_core/camera_rig.h"
+#include "vcharge_localization/drive_localizer.h"
+
+namespace vcharge {
+
+/// Names of localizationRow()'s values, comma separated.
+std::string localizationHeader(const CameraRig& rig);
+
+/// A frame's result as comma separated values: time_s, status, the pose (empty where there is none), the
+/// upper triangle of its covariance row by row, matches, inliers, inliers by camera, second_best_ratio,
+/// fix_distance, since_fix_s, whether the whole map was searched, and the time it took.
+std::string localizationRow(const LocalizationResult& result, const CameraRig& rig);
+
+/// Frames by status and what the fixes looked like, for people.
+class LocalizationSummary {
+ public:
+  void add(const LocalizationResult& result);
+  std::string text() const;
+  int64_t numFrames() const;
+
+ private:
+  std::map<LocalizationStatus, int64_t> num_frames_;
+  std::vector<double> inliers_, latencies_s_;
+  std::map<std::string, std::vector<double>> stage_s_;
+};
+
+}  // namespace vcharge

@@ -1,0 +1,147 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "vcharge_core/camera_rig.h"
+#include "vcharge_core/image.h"
+#include "vcharge_core/options.h"
+#include "vcharge_core/sparse_map.h"
+#include "vcharge_features/descriptor_matching.h"
+#include "vcharge_features/feature_extractor.h"
+#include "vcharge_features/place_index.h"
+#include "vcharge_geometry/robust_options.h"
+#include "vcharge_localization/localization_status.h"
+
+namespace vcharge {
+
+struct MapLocalizerOptions {
+  int min_inliers = 20;  ///< the paper's
+  /// Of all matches that guided search found, those that the pose must explain.
+  double min_inlier_ratio = 0.3;
+  double max_sigma_m = 0.2;  ///< a less certain pose is no fix
+  double max_sigma_rad = 0.02;
+  // Guided search: landmarks that the nearest keyframes saw, where they are expected.
+  double max_distance_m = 8.0;  ///< of keyframes
+  int max_keyframes = 16;
+  double max_view_angle_rad = 0.6;  ///< between the directions from which a landmark is seen
+  double max_range_ratio = 1.8;     ///< between the distances
+  double min_radius_px = 6.0;       ///< of search, at 1280 pixels of width; also of the second search
+  double max_radius_px = 60.0;
+  double radius_sigmas = 3.0;  ///< of the expected pose
+  MatchOptions matching = closeMatches();
+  // Place recognition.
+  int max_places = 8;  ///< candidates
+  int min_inliers_without_prior = 40;
+  double max_ambiguity = 0.7;      ///< inliers of the second best place over those of the best
+  double other_place_m = 1.0;      ///< poses further apart are of two places
+  double other_heading_rad = 0.1;  ///< or turned by more
+  MatchOptions place_matching;
+  RobustOptions robust = defaultRobust();
+
+  static MatchOptions closeMatches();
+  static RobustOptions defaultRobust();
+
+  template <class Visitor>
+  void visitFields(Visitor&& visit) {
+    visit("min_inliers", min_inliers);
+    visit("min_inlier_ratio", min_inlier_ratio);
+    visit("max_sigma_m", max_sigma_m);
+    visit("max_sigma_rad", max_sigma_rad);
+    visit("max_distance_m", max_distance_m);
+    visit("max_keyframes", max_keyframes);
+    visit("max_view_angle_rad", max_view_angle_rad);
+    visit("max_range_ratio", max_range_ratio);
+    visit("min_radius_px", min_radius_px);
+    visit("max_radius_px", max_radius_px);
+    visit("radius_sigmas", radius_sigmas);
+    visit("matching", matching);
+    visit("max_places", max_places);
+    visit("min_inliers_without_prior", min_inliers_without_prior);
+    visit("max_ambiguity", max_ambiguity);
+    visit("other_place_m", other_place_m);
+    visit("other_heading_rad", other_heading_rad);
+    visit("place_matching", place_matching);
+    visit("robust", robust);
+  }
+  void validate() const;  ///< throws std::invalid_argument naming the field
+};
+
+/// Where the vehicle is expected.
+struct PosePrior {
+  RigidTransform map_from_vehicle;
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();  ///< [dt, dphi], map's frame
+};
+
+/// A landmark and the ray along which a camera sees it.
+struct LandmarkSighting {
+  int32_t landmark = 0;
+  int32_t camera = 0;
+  cv::Point2f position_px;
+};
+
+/// The vehicle's pose by the images of one instant. Pose and covariance are filled for kLocalized and
+/// kAmbiguous (the better one).
+struct PoseFix {
+  LocalizationStatus status = LocalizationStatus::kTooFewMatches;
+  RigidTransform map_from_vehicle;
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();  ///< [dt, dphi], map's frame
+  int num_matches = 0;
+  std::vector<int> matches_of_camera, inliers_of_camera;
+  std::vector<LandmarkSighting> inliers;
+  double second_best_ratio = 0.0;  ///< inliers of the best other place over these; 0 with a prior
+
+  int numInliers() const { return static_cast<int>(inliers.size()); }
+};
+
+/// What the rig's cameras show at one instant.
+struct RigFeatures {
+  std::vector<ImageFeatures> images;             ///< by camera; empty where one sent no image
+  std::vector<Eigen::Matrix3Xd> rays_in_camera;  ///< unit rays of the features; zero where there is none
+};
+
+/// Finds a rig's pose in a sparse map (paper, section Localization; Lee et al., IJRR 2015). Immutable; any
+/// number of threads may use it at once. Data parallel inside, deterministic.
+class MapLocalizer {
+ public:
+  /// The rig may differ from the map's; its cameras may have other lenses and places.
+  /// std::invalid_argument for bad options; InputError for a rig without extrinsics, or a map that no
+  /// extractor of this program can have made, or without a vocabulary.
+  MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
+               const MapLocalizerOptions& options = MapLocalizerOptions());
+  ~MapLocalizer();
+
+  /// Features as the map has them; images in the rig's order, empty ones where a camera sent none.
+  RigFeatures extract(const std::vector<Image>& images) const;
+
+  /// Guided search for the landmarks that are expected in view, generalized P3P among what was found, and a
+  /// second, narrower search about the result.
+  PoseFix localizeNear(const RigFeatures& features, const PosePrior& prior) const;
+
+  /// Place recognition over the whole rig, and the best of the candidates. Status kAmbiguous where two
+  /// places fit.
+  PoseFix localizeAnywhere(const RigFeatures& features) const;
+
+  const SparseMap& map() const { return *map_; }
+
+ private:
+  struct Matches;
+  struct Search;
+  Matches searchLandmarks(const RigFeatures& features, const RigidTransform& map_from_vehicle, double sigma_m,
+                          double sigma_rad) const;
+  PoseFix estimate(const Matches& matches, int min_inliers) const;
+  PoseFix localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const;
+  bool isOtherPlace(const PoseFix& a, const PoseFix& b) const;
+
+  const std::shared_ptr<const SparseMap> map_;
+  const std::shared_ptr<const CameraRig> rig_;
+  const MapLocalizerOptions options_;
+  std::unique_ptr<FeatureExtractor> extractor_;
+  std::vector<cv::Mat> masks_;  // by camera
+  std::unique_ptr<PlaceIndex> places_;
+};
+
+}  // namespace vcharge

@@ -1,0 +1,208 @@
+#include "vcharge_localization/drive_localizer.h"
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <sstream>
+#include <utility>
+
+#include "vcharge_core/error.h"
+
+namespace vcharge {
+namespace {
+
+class StageTimer {
+ public:
+  StageTimer(const char* name, LocalizationResult* result) : name_(name), result_(result) {}
+  ~StageTimer() {
+    result_->stage_s[name_] +=
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  StageTimer(const StageTimer&) = delete;
+  StageTimer& operator=(const StageTimer&) = delete;
+
+ private:
+  const char* name_;
+  LocalizationResult* result_;
+  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace
+
+void DriveLocalizerOptions::validate() const {
+  validateInner("frames", frames);
+  validateInner("localizer", localizer);
+  validateInner("filter", filter);
+  validateInner("health", health);
+  requireField(lost_sigma_m > 0.0, "lost_sigma_m", "must be positive", lost_sigma_m);
+  requireField(lost_sigma_rad > 0.0, "lost_sigma_rad", "must be positive", lost_sigma_rad);
+  requireField(max_frames_without_fix >= 1, "max_frames_without_fix", "must be 1 or more",
+               max_frames_without_fix);
+  requireField(confirmation_m > 0.0, "confirmation_m", "must be positive", confirmation_m);
+  requireField(confirmation_rad > 0.0, "confirmation_rad", "must be positive", confirmation_rad);
+  requireField(max_confirmation_s > 0.0, "max_confirmation_s", "must be positive", max_confirmation_s);
+  requireField(unknown_motion_m_per_s > 0.0, "unknown_motion_m_per_s", "must be positive",
+               unknown_motion_m_per_s);
+  requireField(unknown_turn_rad_per_s > 0.0, "unknown_turn_rad_per_s", "must be positive",
+               unknown_turn_rad_per_s);
+}
+
+DriveLocalizer::DriveLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
+                               const DriveLocalizerOptions& options)
+    : rig_(std::move(rig)),
+      options_((options.validate(), options)),
+      localizer_(std::move(map), rig_, options.localizer),
+      filter_(options.filter),
+      health_(rig_, options.health) {}
+
+void DriveLocalizer::seed(const PosePrior& pose) {
+  filter_.reset(pose);
+  candidate_.reset();
+  frames_without_fix_ = 0;
+}
+
+void DriveLocalizer::predict(const LocalizationFrame& frame) {
+  const double period_s = last_stamp_ ? toSeconds(frame.stamp - *last_stamp_) : 0.0;
+  const bool is_counted = last_odom_from_vehicle_ && frame.odom_from_vehicle && period_s > 0.0 &&
+                          frame.num_resets == last_num_resets_;
+  if (is_counted) {
+    last_motion_ = last_odom_from_vehicle_->inverse() * *frame.odom_from_vehicle;
+    last_period_s_ = period_s;
+    filter_.predict(last_motion_, period_s);
+  } else if (period_s > 0.0) {
+    // On as before, but who knows.
+    const double share = last_period_s_ > 0.0 ? period_s / last_period_s_ : 0.0;
+    if (share > 0.0 && share < 10.0) {
+      filter_.predict(interpolate(RigidTransform(), last_motion_, share), period_s);
+    }
+    filter_.addNoise(options_.unknown_motion_m_per_s * period_s, options_.unknown_turn_rad_per_s * period_s);
+  } else if (period_s < 0.0) {
+    filter_.forget();  // a replay that started over
+    candidate_.reset();
+    last_fix_.reset();
+  }
+  last_stamp_ = frame.stamp;
+  last_num_resets_ = frame.num_resets;
+  last_odom_from_vehicle_ = frame.odom_from_vehicle;
+}
+
+bool DriveLocalizer::isLost() const {
+  if (!filter_.hasPose()) {
+    return true;
+  }
+  const Eigen::Matrix<double, 6, 6> covariance = filter_.pose().covariance;
+  return covariance.topLeftCorner<3, 3>().trace() > options_.lost_sigma_m * options_.lost_sigma_m ||
+         covariance.bottomRightCorner<3, 3>().trace() > options_.lost_sigma_rad * options_.lost_sigma_rad;
+}
+
+void DriveLocalizer::takeFix(const PoseFix& fix, LocalizationResult* result) {
+  result->status = LocalizationStatus::kLocalized;
+  result->fix = fix;
+  frames_without_fix_ = 0;
+  candidate_.reset();
+  last_fix_ = result->stamp;
+}
+
+void DriveLocalizer::track(const RigFeatures& features, LocalizationResult* result) {
+  result->status = LocalizationStatus::kBridgedByOdometry;
+  result->fix = localizer_.localizeNear(features, filter_.pose());
+  if (result->fix.status == LocalizationStatus::kLocalized) {
+    health_.addFix(result->fix);
+    result->fix_distance = filter_.distanceOf(result->fix);
+    if (filter_.update(result->fix)) {
+      takeFix(result->fix, result);
+      return;
+    }
+    result->message = "the images contradict the pose so far";
+  } else {
+    result->message = result->fix.status == LocalizationStatus::kTooFewMatches
+                          ? "too little of the map found in the images"
+                          : "no pose explains enough of what was found in the images";
+  }
+  ++frames_without_fix_;
+}
+
+bool DriveLocalizer::isConfirmed(const Candidate& candidate) const {
+  if (!candidate_ || toSeconds(candidate.stamp - candidate_->stamp) > options_.max_confirmation_s) {
+    return false;
+  }
+  RigidTransform moved;
+  if (candidate_->odom_from_vehicle && candidate.odom_from_vehicle) {
+    moved = candidate_->odom_from_vehicle->inverse() * *candidate.odom_from_vehicle;
+  }
+  const RigidTransform difference =
+      (candidate_->map_from_vehicle * moved).inverse() * candidate.map_from_vehicle;
+  return difference.translation().norm() <= options_.confirmation_m &&
+         angleOfRotation(difference.rotation()) <= options_.confirmation_rad;
+}
+
+void DriveLocalizer::searchWholeMap(const LocalizationFrame& frame, const RigFeatures& features,
+                                    LocalizationResult* result) {
+  result->searched_whole_map = true;
+  const PoseFix fix = localizer_.localizeAnywhere(features);
+  const bool tracks = result->status == LocalizationStatus::kBridgedByOdometry;
+  if (!tracks) {
+    result->fix = fix;
+    result->status = fix.status;
+  }
+  if (fix.status != LocalizationStatus::kLocalized) {
+    candidate_.reset();
+    if (!tracks) {
+      result->message = fix.status == LocalizationStatus::kAmbiguous ? "two places of the map look alike"
+                                                                     : "no place of the map was recognized";
+    }
+    return;
+  }
+  const Candidate candidate{frame.stamp, fix.map_from_vehicle, frame.odom_from_vehicle};
+  if (tracks && filter_.update(fix)) {
+    takeFix(fix, result);
+  } else if (isConfirmed(candidate)) {
+    filter_.reset({fix.map_from_vehicle, options_.filter.fix_covariance_factor * fix.covariance});
+    takeFix(fix, result);
+    result->message = "found in the map";
+  } else {
+    candidate_ = candidate;
+    if (!tracks) {
+      result->status = LocalizationStatus::kLost;
+    }
+    result->message = "a place was recognized; the next frames must confirm it";
+  }
+}
+
+LocalizationResult DriveLocalizer::process(const LocalizationFrame& frame) {
+  LocalizationResult result;
+  result.stamp = frame.stamp;
+  result.odom_from_vehicle = frame.odom_from_vehicle;
+  predict(frame);
+  RigFeatures features;
+  {
+    const StageTimer timer("features", &result);
+    features = localizer_.extract(health_.withoutFrozen(frame));
+    health_.addFeatures(features);
+  }
+  if (isLost()) {
+    filter_.forget();
+    const StageTimer timer("whole map", &result);
+    searchWholeMap(frame, features, &result);
+  } else {
+    {
+      const StageTimer timer("guided search", &result);
+      track(features, &result);
+    }
+    const bool is_stuck =
+        frames_without_fix_ > 0 && frames_without_fix_ % options_.max_frames_without_fix == 0;
+    if (is_stuck || (frames_without_fix_ > 0 && candidate_)) {
+      const StageTimer timer("whole map", &result);
+      searchWholeMap(frame, features, &result);
+    }
+  }
+  if (filter_.hasPose()) {
+    result.pose = filter_.pose();
+  }
+  result.since_fix_s =
+      last_fix_ ? toSeconds(frame.stamp - *last_fix_) : std::numeric_limits<double>::infinity();
+  result.camera_warnings = health_.warnings();
+  return result;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,102 @@
+#include <chrono>
+#include <iostream>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "vcharge_core/camera_rig.h"
+#include "vcharge_core/command_line.h"
+#include "vcharge_core/content_hash.h"
+#include "vcharge_core/error.h"
+#include "vcharge_core/file_io.h"
+#include "vcharge_core/options.h"
+#include "vcharge_core/progress_bar.h"
+#include "vcharge_core/sparse_map_file.h"
+#include "vcharge_core/trajectory.h"
+#include "vcharge_localization/drive_localizer.h"
+#include "vcharge_localization/localization_log.h"
+#include "vcharge_ros/bag_drive_source.h"
+
+namespace {
+
+using namespace vcharge;
+
+struct Arguments {
+  std::string bag, rig, map, options, output;
+  std::vector<std::string> cameras;
+  bool show_options = false;
+};
+
+void localizeDrive(const Arguments& arguments, const DriveLocalizerOptions& options) {
+  const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
+  std::vector<bool> is_used(rig->cameras.size(), arguments.cameras.empty());
+  for (const std::string& name : arguments.cameras) {
+    is_used[rig->cameraIndex(name)] = true;
+  }
+  const auto start = std::chrono::steady_clock::now();
+  DriveLocalizer localizer(readSparseMap(arguments.map), rig, options);
+  std::cout << "map ready after "
+            << std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() << " s\n";
+  Trajectory trajectory;
+  std::ostringstream log;
+  log << localizationHeader(*rig) << "\n";
+  LocalizationSummary summary;
+  ContentHasher hasher;
+  FrameAssembler assembler(rig->cameras.size(), options.frames, [&](LocalizationFrame frame) {
+    for (size_t i = 0; i < is_used.size(); ++i) {
+      if (!is_used[i]) {
+        frame.images[i] = Image();
+      }
+    }
+    const LocalizationResult result = localizer.process(frame);
+    summary.add(result);
+    log << localizationRow(result, *rig) << "\n";
+    hasher.add(result.stamp.nanoseconds());
+    hasher.add(static_cast<int64_t>(result.status));
+    if (result.pose) {
+      trajectory.push_back({result.stamp, result.pose->map_from_vehicle});
+      const Eigen::Matrix<double, 3, 4> matrix = result.pose->map_from_vehicle.matrix();
+      hasher.addBytes(matrix.data(), sizeof(double) * 12);
+    }
+  });
+  BagDriveSource source(arguments.bag, rig, BagDriveSourceOptions());
+  {
+    ProgressBar progress("localizing");
+    source.run(&assembler, [&](double fraction) { progress.update(fraction); });
+    assembler.finish();
+  }
+  if (summary.numFrames() == 0) {
+    throw InputError(arguments.bag + ": no images");
+  }
+  writeTrajectory(trajectory, arguments.output);
+  writeTextFileAtomically(arguments.output + ".csv", log.str());
+  std::cout << summary.text() << "content hash: " << hasher.hex() << "\n";
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Localizes a recorded drive in a sparse map, frame by frame and causally. Writes the poses as TUM "
+      "text, "
+      "and status, covariance and matches of every frame beside it (.csv).");
+  Arguments arguments;
+  app.add_option("--bag", arguments.bag, "the drive")->required();
+  app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
+  app.add_option("--map", arguments.map, "map of build_map (*.vmap)")->required();
+  app.add_option("--output", arguments.output, "TUM file to write")->required()->check(requireNotEmpty);
+  app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
+  app.add_option("--options", arguments.options, "YAML with overrides of DriveLocalizerOptions");
+  app.add_flag("--show-options", arguments.show_options, "print all options with their values");
+  return runTool(&app, argc, argv, [&] {
+    DriveLocalizerOptions options;
+    if (!arguments.options.empty()) {
+      readFieldsFromFile(arguments.options, &options);
+    }
+    if (arguments.show_options) {
+      std::cout << writeFields(options) << "\n";
+    }
+    localizeDrive(arguments, options);
+  });
+}

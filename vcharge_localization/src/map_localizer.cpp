@@ -1,0 +1,417 @@
+#include "vcharge_localization/map_localizer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <unordered_map>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+#include <yaml-cpp/yaml.h>
+
+#include "vcharge_core/error.h"
+#include "vcharge_geometry/pose_estimation.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kReferenceWidth_px = 1280.0;
+// What a pose of place recognition is good for, where the guided search about it begins.
+constexpr double kPlaceSigma_m = 0.2;
+constexpr double kPlaceSigma_rad = 0.02;
+
+FeatureExtractorOptions extractorOptionsOf(const SparseMap& map) {
+  FeatureExtractorOptions options;
+  try {
+    readFields(YAML::Load(map.contents().feature_options), "map: feature_options", &options);
+  } catch (const YAML::Exception& error) {
+    throw InputError(std::string("map: feature_options: expected YAML: ") + error.what());
+  }
+  return options;
+}
+
+}  // namespace
+
+MatchOptions MapLocalizerOptions::closeMatches() {
+  MatchOptions options;
+  options.max_ratio = 0.85;
+  options.max_distance = 70.0;
+  return options;
+}
+
+RobustOptions MapLocalizerOptions::defaultRobust() {
+  RobustOptions options;
+  options.max_error_rad = 0.004;
+  options.max_iterations = 500;
+  options.min_inliers = 12;
+  return options;
+}
+
+void MapLocalizerOptions::validate() const {
+  requireField(min_inliers >= 6, "min_inliers", "must be 6 or more", min_inliers);
+  requireField(min_inlier_ratio >= 0.0 && min_inlier_ratio <= 1.0, "min_inlier_ratio", "must be in [0, 1]",
+               min_inlier_ratio);
+  requireField(max_sigma_m > 0.0, "max_sigma_m", "must be positive", max_sigma_m);
+  requireField(max_sigma_rad > 0.0, "max_sigma_rad", "must be positive", max_sigma_rad);
+  requireField(max_distance_m > 0.0, "max_distance_m", "must be positive", max_distance_m);
+  requireField(max_keyframes >= 1, "max_keyframes", "must be 1 or more", max_keyframes);
+  requireField(max_view_angle_rad > 0.0, "max_view_angle_rad", "must be positive", max_view_angle_rad);
+  requireField(max_range_ratio >= 1.0, "max_range_ratio", "must be 1 or more", max_range_ratio);
+  requireField(min_radius_px > 0.0, "min_radius_px", "must be positive", min_radius_px);
+  requireField(max_radius_px >= min_radius_px, "max_radius_px", "must not be below min_radius_px",
+               max_radius_px);
+  requireField(radius_sigmas > 0.0, "radius_sigmas", "must be positive", radius_sigmas);
+  requireField(max_places >= 1, "max_places", "must be 1 or more", max_places);
+  requireField(min_inliers_without_prior >= 6, "min_inliers_without_prior", "must be 6 or more",
+               min_inliers_without_prior);
+  requireField(max_ambiguity > 0.0 && max_ambiguity <= 1.0, "max_ambiguity", "must be in (0, 1]",
+               max_ambiguity);
+  requireField(other_place_m > 0.0, "other_place_m", "must be positive", other_place_m);
+  requireField(other_heading_rad > 0.0, "other_heading_rad", "must be positive", other_heading_rad);
+  validateInner("matching", matching);
+  validateInner("place_matching", place_matching);
+  validateInner("robust", robust);
+}
+
+/// Sightings of landmarks, right and wrong ones, and the same for the estimator.
+struct MapLocalizer::Matches {
+  std::vector<LandmarkSighting> sightings;
+  std::vector<PointMatch> points;
+
+  void append(const Matches& other) {
+    sightings.insert(sightings.end(), other.sightings.begin(), other.sightings.end());
+    points.insert(points.end(), other.points.begin(), other.points.end());
+  }
+};
+
+MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
+                           const MapLocalizerOptions& options)
+    : map_(std::move(map)), rig_(std::move(rig)), options_(options) {
+  options_.validate();
+  check(map_ != nullptr && rig_ != nullptr, "MapLocalizer: expected a map and a rig");
+  if (!rig_->hasExtrinsics()) {
+    throw InputError("rig: expected vehicle_from_camera of every camera, which extrinsic calibration gives");
+  }
+  extractor_ = makeFeatureExtractor(extractorOptionsOf(*map_));
+  const cv::Mat& descriptors = map_->descriptors();
+  if (descriptors.type() != extractor_->descriptorType() ||
+      descriptors.cols != extractor_->descriptorColumns()) {
+    throw InputError("map: its descriptors are not those of its feature_options");
+  }
+  if (map_->contents().vocabulary.empty()) {
+    throw InputError("map: expected a vocabulary, which build_map writes");
+  }
+  for (const RigCamera& camera : rig_->cameras) {
+    masks_.push_back(makeFeatureMask(camera));
+  }
+  const auto vocabulary = std::make_shared<const VocabularyTree>(
+      VocabularyTree::parse(map_->contents().vocabulary, "map: vocabulary"));
+  const size_t num_cameras = map_->rig().cameras.size();
+  places_ = std::make_unique<PlaceIndex>(vocabulary, static_cast<int>(num_cameras));
+  for (size_t keyframe = 0; keyframe < map_->keyframes().size(); ++keyframe) {
+    std::vector<cv::Mat> by_camera;
+    for (size_t camera = 0; camera < num_cameras; ++camera) {
+      const auto [begin, end] = map_->observationsOf(keyframe, camera);
+      by_camera.push_back(descriptors.rowRange(static_cast<int>(begin), static_cast<int>(end)));
+    }
+    places_->add(by_camera);
+  }
+}
+
+MapLocalizer::~MapLocalizer() = default;
+
+RigFeatures MapLocalizer::extract(const std::vector<Image>& images) const {
+  check(images.size() == rig_->cameras.size(), "MapLocalizer::extract: expected an image per camera");
+  RigFeatures features;
+  features.images.resize(images.size());
+  features.rays_in_camera.resize(images.size());
+  tbb::parallel_for(size_t{0}, images.size(), [&](size_t i) {
+    if (images[i].pixels.empty()) {
+      return;
+    }
+    features.images[i] = extractor_->extract(images[i].pixels, masks_[i]);
+    const std::vector<Keypoint>& keypoints = features.images[i].keypoints;
+    features.rays_in_camera[i].setZero(3, static_cast<Eigen::Index>(keypoints.size()));
+    for (size_t k = 0; k < keypoints.size(); ++k) {
+      Eigen::Vector3d ray;
+      if (rig_->cameras[i].model.unproject(
+              Eigen::Vector2d(keypoints[k].position_px.x, keypoints[k].position_px.y), &ray)) {
+        features.rays_in_camera[i].col(static_cast<Eigen::Index>(k)) = ray;
+      }
+    }
+  });
+  return features;
+}
+
+/// Guided search in the images of one instant.
+struct MapLocalizer::Search {
+  const MapLocalizer& localizer;
+  const RigidTransform& map_from_vehicle;
+
+  /// The landmarks that a camera should see, each by the observation that was made from most nearly the same
+  /// direction.
+  struct Expected {
+    std::vector<size_t> observations;
+    std::vector<cv::Point2f> positions_px;
+    std::vector<double> ranges_m;
+  };
+
+  std::vector<size_t> nearestKeyframes() const {
+    const std::vector<MapKeyframe>& keyframes = localizer.map_->keyframes();
+    std::vector<std::pair<double, size_t>> by_distance;
+    for (size_t i = 0; i < keyframes.size(); ++i) {
+      const double distance_m =
+          (keyframes[i].map_from_vehicle.translation() - map_from_vehicle.translation()).norm();
+      if (distance_m <= localizer.options_.max_distance_m) {
+        by_distance.emplace_back(distance_m, i);
+      }
+    }
+    std::sort(by_distance.begin(), by_distance.end());
+    std::vector<size_t> nearest;
+    for (const auto& [distance_m, i] : by_distance) {
+      if (static_cast<int>(nearest.size()) == localizer.options_.max_keyframes) {
+        break;
+      }
+      nearest.push_back(i);
+    }
+    return nearest;
+  }
+
+  Expected expectedIn(size_t camera, const std::vector<size_t>& keyframes) const {
+    const SparseMap& map = *localizer.map_;
+    const MapLocalizerOptions& options = localizer.options_;
+    const RigCamera& rig_camera = localizer.rig_->cameras[camera];
+    const RigidTransform map_from_camera = map_from_vehicle * *rig_camera.vehicle_from_camera;
+    const double min_cos_view = std::cos(options.max_view_angle_rad);
+    struct Source {
+      size_t observation;
+      double cos_angle;
+    };
+    std::unordered_map<int32_t, size_t> index_of_landmark;
+    std::vector<Source> sources;
+    for (const size_t keyframe : keyframes) {
+      for (size_t other = 0; other < map.rig().cameras.size(); ++other) {
+        const Eigen::Vector3d other_centre = map.keyframes()[keyframe].map_from_vehicle *
+                                             map.rig().cameras[other].vehicle_from_camera->translation();
+        const auto [begin, end] = map.observationsOf(keyframe, other);
+        for (size_t i = begin; i < end; ++i) {
+          const int32_t landmark = map.observations()[i].landmark;
+          const Eigen::Vector3d& point = map.landmarks()[landmark].position_m;
+          const Eigen::Vector3d from_here = point - map_from_camera.translation();
+          const Eigen::Vector3d from_there = point - other_centre;
+          const double range_m = from_here.norm(), other_range_m = from_there.norm();
+          const double cos_angle = from_here.dot(from_there) / (range_m * other_range_m);
+          if (!(cos_angle >= min_cos_view) || range_m > options.max_range_ratio * other_range_m ||
+              other_range_m > options.max_range_ratio * range_m) {
+            continue;
+          }
+          const auto [found, is_new] = index_of_landmark.emplace(landmark, sources.size());
+          if (is_new) {
+            sources.push_back({i, cos_angle});
+          } else if (cos_angle > sources[found->second].cos_angle) {
+            sources[found->second] = {i, cos_angle};
+          }
+        }
+      }
+    }
+    return inView(rig_camera, map_from_camera.inverse(), sources);
+  }
+
+  template <class Sources>
+  Expected inView(const RigCamera& rig_camera, const RigidTransform& camera_from_map,
+                  const Sources& sources) const {
+    const SparseMap& map = *localizer.map_;
+    const double min_cos_field = std::cos(0.5 * rig_camera.field_of_view_rad);
+    Expected expected;
+    for (const auto& source : sources) {
+      const Eigen::Vector3d point =
+          camera_from_map * map.landmarks()[map.observations()[source.observation].landmark].position_m;
+      const double range_m = point.norm();
+      Eigen::Vector2d pixel;
+      if (point.z() >= min_cos_field * range_m && rig_camera.model.project(point, &pixel) &&
+          pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < rig_camera.image_size_px.width &&
+          pixel.y() < rig_camera.image_size_px.height) {
+        expected.observations.push_back(source.observation);
+        expected.positions_px.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
+        expected.ranges_m.push_back(range_m);
+      }
+    }
+    return expected;
+  }
+};
+
+MapLocalizer::Matches MapLocalizer::searchLandmarks(const RigFeatures& features,
+                                                    const RigidTransform& map_from_vehicle, double sigma_m,
+                                                    double sigma_rad) const {
+  const Search search{*this, map_from_vehicle};
+  const std::vector<size_t> keyframes = search.nearestKeyframes();
+  std::vector<Matches> of_camera(rig_->cameras.size());
+  tbb::parallel_for(size_t{0}, of_camera.size(), [&](size_t camera) {
+    const ImageFeatures& image = features.images[camera];
+    if (image.empty()) {
+      return;
+    }
+    const Search::Expected expected = search.expectedIn(camera, keyframes);
+    if (expected.observations.empty()) {
+      return;
+    }
+    cv::Mat descriptors(static_cast<int>(expected.observations.size()), map_->descriptors().cols,
+                        map_->descriptors().type());
+    for (size_t i = 0; i < expected.observations.size(); ++i) {
+      map_->descriptors()
+          .row(static_cast<int>(expected.observations[i]))
+          .copyTo(descriptors.row(static_cast<int>(i)));
+    }
+    std::vector<cv::Point2f> positions;
+    for (const Keypoint& keypoint : image.keypoints) {
+      positions.push_back(keypoint.position_px);
+    }
+    const double px = rig_->cameras[camera].image_size_px.width / kReferenceWidth_px;
+    // How far a landmark in the middle of them may be from where it is expected; some 450 pixels a radian.
+    std::vector<double> ranges_m = expected.ranges_m;
+    std::nth_element(ranges_m.begin(), ranges_m.begin() + static_cast<std::ptrdiff_t>(ranges_m.size() / 2),
+                     ranges_m.end());
+    const double angle_rad = options_.radius_sigmas * (sigma_rad + sigma_m / ranges_m[ranges_m.size() / 2]);
+    const double radius_px =
+        px * std::clamp(450.0 * angle_rad, options_.min_radius_px, options_.max_radius_px);
+    const RigidTransform& vehicle_from_camera = *rig_->cameras[camera].vehicle_from_camera;
+    for (const FeatureMatch& match : matchNearPixels(descriptors, expected.positions_px, image.descriptors,
+                                                     positions, radius_px, options_.matching)) {
+      const Eigen::Vector3d ray = features.rays_in_camera[camera].col(match.second_index);
+      if (ray.isZero()) {
+        continue;
+      }
+      const int32_t landmark = map_->observations()[expected.observations[match.first_index]].landmark;
+      PointMatch point;
+      point.ray = {vehicle_from_camera.translation(), vehicle_from_camera.rotation() * ray};
+      point.point_m = map_->landmarks()[landmark].position_m;
+      point.camera = static_cast<int>(camera);
+      point.quality = -match.distance;
+      of_camera[camera].points.push_back(point);
+      of_camera[camera].sightings.push_back(
+          {landmark, static_cast<int32_t>(camera), positions[match.second_index]});
+    }
+  });
+  Matches matches;
+  for (const Matches& found : of_camera) {
+    matches.append(found);
+  }
+  return matches;
+}
+
+PoseFix MapLocalizer::estimate(const Matches& matches, int min_inliers) const {
+  PoseFix fix;
+  fix.num_matches = static_cast<int>(matches.points.size());
+  fix.inliers_of_camera.assign(rig_->cameras.size(), 0);
+  fix.matches_of_camera.assign(rig_->cameras.size(), 0);
+  for (const LandmarkSighting& sighting : matches.sightings) {
+    ++fix.matches_of_camera[sighting.camera];
+  }
+  if (fix.num_matches < min_inliers) {
+    return fix;
+  }
+  const PoseEstimate pose = estimateAbsolutePose(matches.points, options_.robust);
+  fix.status = LocalizationStatus::kNoConsensus;
+  if (pose.status != EstimationStatus::kOk) {
+    return fix;
+  }
+  for (const int i : pose.inliers) {
+    fix.inliers.push_back(matches.sightings[i]);
+    ++fix.inliers_of_camera[matches.sightings[i].camera];
+  }
+  fix.map_from_vehicle = pose.map_from_rig;
+  fix.covariance = pose.covariance;
+  if (fix.numInliers() >= min_inliers && fix.numInliers() >= options_.min_inlier_ratio * fix.num_matches &&
+      fix.covariance.topLeftCorner<3, 3>().trace() <= options_.max_sigma_m * options_.max_sigma_m &&
+      fix.covariance.bottomRightCorner<3, 3>().trace() <= options_.max_sigma_rad * options_.max_sigma_rad) {
+    fix.status = LocalizationStatus::kLocalized;
+  }
+  return fix;
+}
+
+PoseFix MapLocalizer::localizeNear(const RigFeatures& features, const PosePrior& prior) const {
+  const double sigma_m = std::sqrt(prior.covariance.topLeftCorner<3, 3>().diagonal().maxCoeff());
+  const double sigma_rad = std::sqrt(prior.covariance.bottomRightCorner<3, 3>().diagonal().maxCoeff());
+  const PoseFix first = estimate(searchLandmarks(features, prior.map_from_vehicle, sigma_m, sigma_rad),
+                                 options_.robust.min_inliers);
+  if (first.inliers.empty()) {
+    return first;
+  }
+  return estimate(searchLandmarks(features, first.map_from_vehicle, 0.0, 0.0), options_.min_inliers);
+}
+
+PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const {
+  const auto keyframe = static_cast<size_t>(place.place);
+  Matches matches;
+  for (size_t camera = 0; camera < rig_->cameras.size(); ++camera) {
+    const int other = camera < place.cameras.size() ? place.cameras[camera] : -1;
+    if (other < 0 || features.images[camera].empty()) {
+      continue;
+    }
+    const auto [begin, end] = map_->observationsOf(keyframe, static_cast<size_t>(other));
+    const cv::Mat descriptors = map_->descriptors().rowRange(static_cast<int>(begin), static_cast<int>(end));
+    const RigidTransform& vehicle_from_camera = *rig_->cameras[camera].vehicle_from_camera;
+    for (const FeatureMatch& match :
+         matchDescriptors(features.images[camera].descriptors, descriptors, options_.place_matching)) {
+      const Eigen::Vector3d ray = features.rays_in_camera[camera].col(match.first_index);
+      if (ray.isZero()) {
+        continue;
+      }
+      const int32_t landmark = map_->observations()[begin + match.second_index].landmark;
+      PointMatch point;
+      point.ray = {vehicle_from_camera.translation(), vehicle_from_camera.rotation() * ray};
+      point.point_m = map_->landmarks()[landmark].position_m;
+      point.camera = static_cast<int>(camera);
+      point.quality = -match.distance;
+      matches.points.push_back(point);
+      matches.sightings.push_back({landmark, static_cast<int32_t>(camera),
+                                   features.images[camera].keypoints[match.first_index].position_px});
+    }
+  }
+  const PoseFix first = estimate(matches, options_.robust.min_inliers);
+  if (first.inliers.empty()) {
+    return first;
+  }
+  return estimate(searchLandmarks(features, first.map_from_vehicle, kPlaceSigma_m, kPlaceSigma_rad),
+                  options_.min_inliers_without_prior);
+}
+
+bool MapLocalizer::isOtherPlace(const PoseFix& a, const PoseFix& b) const {
+  const RigidTransform between = a.map_from_vehicle.inverse() * b.map_from_vehicle;
+  return between.translation().norm() > options_.other_place_m ||
+         angleOfRotation(between.rotation()) > options_.other_heading_rad;
+}
+
+PoseFix MapLocalizer::localizeAnywhere(const RigFeatures& features) const {
+  std::vector<cv::Mat> descriptors(map_->rig().cameras.size());
+  for (size_t i = 0; i < std::min(descriptors.size(), features.images.size()); ++i) {
+    descriptors[i] = features.images[i].descriptors;
+  }
+  const std::vector<PlaceMatch> places = places_->query(descriptors, options_.max_places);
+  std::vector<PoseFix> fixes(places.size());
+  tbb::parallel_for(size_t{0}, places.size(),
+                    [&](size_t i) { fixes[i] = localizeAtPlace(features, places[i]); });
+  PoseFix best;
+  best.inliers_of_camera.assign(rig_->cameras.size(), 0);
+  best.matches_of_camera.assign(rig_->cameras.size(), 0);
+  for (const PoseFix& fix : fixes) {
+    const auto rank = [](const PoseFix& f) {
+      return std::make_pair(f.status == LocalizationStatus::kLocalized, f.numInliers());
+    };
+    if (rank(fix) > rank(best)) {
+      best = fix;
+    }
+  }
+  for (const PoseFix& fix : fixes) {
+    if (!fix.inliers.empty() && isOtherPlace(fix, best)) {
+      best.second_best_ratio = std::max(
+          best.second_best_ratio, static_cast<double>(fix.numInliers()) / std::max(1, best.numInliers()));
+    }
+  }
+  if (best.status == LocalizationStatus::kLocalized && best.second_best_ratio > options_.max_ambiguity) {
+    best.status = LocalizationStatus::kAmbiguous;
+  }
+  return best;
+}
+
+}  // namespace vcharge
