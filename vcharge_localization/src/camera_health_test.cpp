@@ -1,0 +1,86 @@
+#include "vcharge_localization/camera_health.h"
+
+#include <gtest/gtest.h>
+
+#include "test_map.h"
+
+namespace vcharge {
+namespace {
+
+class CameraHealthTest : public ::testing::Test {
+ protected:
+  LocalizationFrame frameAt(double x_m, int gray_of_first, int gray_of_second) const {
+    LocalizationFrame frame;
+    frame.odom_from_vehicle = RigidTransform::planar(x_m, 0.0, 0.0);
+    frame.images = {{cv::Mat(64, 64, CV_8UC1, cv::Scalar(gray_of_first)), nullptr},
+                    {cv::Mat(64, 64, CV_8UC1, cv::Scalar(gray_of_second)), nullptr}};
+    return frame;
+  }
+  void addFixes(int count, int inliers_of_second) {
+    PoseFix fix;
+    fix.matches_of_camera = {100, 100};
+    fix.inliers_of_camera = {90, inliers_of_second};
+    for (int i = 0; i < count; ++i) {
+      health_.addFix(fix);
+    }
+  }
+  void addFeatures(int count, int num_of_second) {
+    RigFeatures features;
+    features.images.resize(2);
+    features.images[0].keypoints.resize(500);
+    features.images[1].keypoints.resize(static_cast<size_t>(num_of_second));
+    for (int i = 0; i < count; ++i) {
+      health_.addFeatures(features);
+    }
+  }
+  const std::shared_ptr<const SparseMap> map_ = testing::makeTestMap({});
+  CameraHealth health_{std::shared_ptr<const CameraRig>(map_, &map_->rig()), CameraHealthOptions()};
+};
+
+TEST_F(CameraHealthTest, GoodCamerasHaveNoWarning) {
+  for (int i = 0; i < 20; ++i) {
+    health_.withoutFrozen(frameAt(0.2 * i, i, 100 + i));
+  }
+  addFeatures(20, 500);
+  addFixes(20, 90);
+  EXPECT_TRUE(health_.warnings().empty());
+}
+
+TEST_F(CameraHealthTest, AFrozenCameraIsNamedAndLeftOutWhileTheVehicleMoves) {
+  for (int i = 0; i < 6; ++i) {
+    health_.withoutFrozen(frameAt(0.0, i, 100));
+  }
+  EXPECT_TRUE(health_.warnings().empty()) << "a vehicle that stands may see the same";
+  std::vector<Image> images;
+  for (int i = 1; i < 6; ++i) {
+    images = health_.withoutFrozen(frameAt(0.2 * i, i, 100));
+  }
+  EXPECT_FALSE(images[0].pixels.empty());
+  EXPECT_TRUE(images[1].pixels.empty());
+  ASSERT_EQ(health_.warnings().size(), 1u);
+  EXPECT_NE(health_.warnings()[0].find("left: frozen"), std::string::npos) << health_.warnings()[0];
+}
+
+TEST_F(CameraHealthTest, ABlindCameraIsNamed) {
+  addFeatures(30, 3);
+  ASSERT_EQ(health_.warnings().size(), 1u);
+  EXPECT_NE(health_.warnings()[0].find("left: few features"), std::string::npos);
+}
+
+TEST_F(CameraHealthTest, ACameraThatContradictsTheOthersIsNamed) {
+  addFeatures(30, 500);
+  addFixes(30, 5);
+  ASSERT_EQ(health_.warnings().size(), 1u);
+  EXPECT_NE(health_.warnings()[0].find("wrong intrinsics"), std::string::npos);
+}
+
+TEST_F(CameraHealthTest, AMissingImageIsNamed) {
+  LocalizationFrame frame = frameAt(0.0, 1, 2);
+  frame.images[0] = Image();
+  health_.withoutFrozen(frame);
+  ASSERT_EQ(health_.warnings().size(), 1u);
+  EXPECT_EQ(health_.warnings()[0], "front: no image");
+}
+
+}  // namespace
+}  // namespace vcharge

@@ -1,0 +1,164 @@
+#include "vcharge_localization/pose_filter.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace vcharge {
+namespace {
+
+constexpr double kPeriod_s = 0.08;
+
+/// A drive in a gentle curve, as it is and as an odometer with wrong factors counts it.
+struct Drive {
+  RigidTransform map_from_vehicle;
+  double counted_per_true_distance = 0.98, counted_per_true_turn = 1.01;
+  double step_m = 0.2, turn_rad = 0.01;
+
+  RigidTransform step() {
+    const auto motion = [](double distance_m, double turn) {
+      return RigidTransform::planar(distance_m * std::cos(0.5 * turn), distance_m * std::sin(0.5 * turn),
+                                    turn);
+    };
+    map_from_vehicle = map_from_vehicle * motion(step_m, turn_rad);
+    return motion(step_m * counted_per_true_distance, turn_rad * counted_per_true_turn);
+  }
+};
+
+PoseFix fixAt(const RigidTransform& truth, double sigma_m, double sigma_rad, std::mt19937* random) {
+  std::normal_distribution<double> noise(0.0, 1.0);
+  Eigen::Vector3d shift, turn;
+  for (double& axis : shift) {
+    axis = sigma_m * noise(*random);
+  }
+  for (double& axis : turn) {
+    axis = sigma_rad * noise(*random);
+  }
+  PoseFix fix;
+  fix.status = LocalizationStatus::kLocalized;
+  fix.map_from_vehicle =
+      RigidTransform(rotationFromVector(turn) * truth.rotation(), truth.translation() + shift);
+  fix.covariance.diagonal() << Eigen::Vector3d::Constant(sigma_m * sigma_m),
+      Eigen::Vector3d::Constant(sigma_rad * sigma_rad);
+  return fix;
+}
+
+PosePrior priorAt(const PoseFix& fix) {
+  return {fix.map_from_vehicle, fix.covariance};
+}
+
+TEST(PoseFilterTest, LearnsTheOdometersFactorsAndBridgesByThem) {
+  std::mt19937 random(1);
+  Drive drive;
+  PoseFilter filter;
+  filter.reset(priorAt(fixAt(drive.map_from_vehicle, 0.01, 0.001, &random)));
+  for (int i = 0; i < 600; ++i) {
+    filter.predict(drive.step(), kPeriod_s);
+    EXPECT_TRUE(filter.update(fixAt(drive.map_from_vehicle, 0.01, 0.001, &random)));
+  }
+  EXPECT_NEAR(filter.distanceScale(), 1.0 / drive.counted_per_true_distance, 0.003);
+  EXPECT_NEAR(filter.turnScale(), 1.0 / drive.counted_per_true_turn, 0.005);
+  const PosePrior before = filter.pose();
+  for (int i = 0; i < 125; ++i) {  // 10 s, 25 m
+    filter.predict(drive.step(), kPeriod_s);
+  }
+  const PosePrior after = filter.pose();
+  const double error_m = (after.map_from_vehicle.translation() - drive.map_from_vehicle.translation()).norm();
+  EXPECT_LT(error_m, 0.15) << "the raw odometer is off by half a metre";
+  EXPECT_GT(after.covariance(0, 0), before.covariance(0, 0));
+  EXPECT_LT(error_m, 3.0 * std::sqrt(after.covariance.topLeftCorner<3, 3>().trace()));
+}
+
+TEST(PoseFilterTest, ErrorIsAsTheCovarianceTells) {
+  // Errors of fixes in a row have a part in common, as a map's: drawn anew every 5 m.
+  PoseFilterOptions options;
+  double sum = 0.0;
+  int count = 0;
+  for (uint32_t seed = 1; seed <= 20; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0.0, 1.0);
+    Drive drive;
+    PoseFilter filter(options);
+    filter.reset(priorAt(fixAt(drive.map_from_vehicle, 0.02, 0.001, &random)));
+    RigidTransform shifted;
+    for (int i = 0; i < 500; ++i) {
+      if (i % 25 == 0) {
+        const double x = options.map_sigma_m * noise(random);
+        const double y = options.map_sigma_m * noise(random);
+        const double yaw = options.map_sigma_rad * noise(random);
+        shifted = RigidTransform::planar(x, y, yaw);
+      }
+      filter.predict(drive.step(), kPeriod_s);
+      const RigidTransform seen(shifted.rotation() * drive.map_from_vehicle.rotation(),
+                                drive.map_from_vehicle.translation() + shifted.translation());
+      filter.update(fixAt(seen, 0.01, 0.0005, &random));
+      if (i > 100 && i % 50 == 24) {
+        const PosePrior pose = filter.pose();
+        const Eigen::Vector3d shift =
+            pose.map_from_vehicle.translation() - drive.map_from_vehicle.translation();
+        const Eigen::Vector3d turn = vectorFromRotation(pose.map_from_vehicle.rotation() *
+                                                        drive.map_from_vehicle.rotation().conjugate());
+        const Eigen::Vector3d error(shift.x(), shift.y(), turn.z());
+        Eigen::Matrix3d covariance;
+        const int planar[] = {0, 1, 5};
+        for (int row = 0; row < 3; ++row) {
+          for (int column = 0; column < 3; ++column) {
+            covariance(row, column) = pose.covariance(planar[row], planar[column]);
+          }
+        }
+        sum += error.dot(covariance.inverse() * error) / 3.0;
+        ++count;
+      }
+    }
+  }
+  EXPECT_GT(sum / count, 0.3);
+  EXPECT_LT(sum / count, 2.0);
+}
+
+TEST(PoseFilterTest, RefusesAFixThatContradicts) {
+  std::mt19937 random(2);
+  Drive drive;
+  PoseFilter filter;
+  filter.reset(priorAt(fixAt(drive.map_from_vehicle, 0.01, 0.001, &random)));
+  for (int i = 0; i < 50; ++i) {
+    filter.predict(drive.step(), kPeriod_s);
+    filter.update(fixAt(drive.map_from_vehicle, 0.01, 0.001, &random));
+  }
+  const PosePrior before = filter.pose();
+  const RigidTransform wrong = drive.map_from_vehicle * RigidTransform::planar(1.5, 0.5, 0.0);
+  EXPECT_FALSE(filter.update(fixAt(wrong, 0.01, 0.001, &random)));
+  EXPECT_EQ(filter.pose().map_from_vehicle.matrix(), before.map_from_vehicle.matrix());
+  EXPECT_EQ(filter.pose().covariance, before.covariance);
+}
+
+TEST(PoseFilterTest, KnowsNothingBeforeTheFirstPoseAndAfterForgetting) {
+  PoseFilter filter;
+  EXPECT_FALSE(filter.hasPose());
+  EXPECT_THROW(filter.pose(), std::logic_error);
+  filter.predict(RigidTransform::planar(1.0, 0.0, 0.0), 1.0);
+  EXPECT_FALSE(filter.hasPose());
+  filter.reset(PosePrior());
+  EXPECT_TRUE(filter.hasPose());
+  filter.forget();
+  EXPECT_FALSE(filter.hasPose());
+}
+
+TEST(PoseFilterTest, CovarianceStaysSymmetricAndPositive) {
+  std::mt19937 random(3);
+  Drive drive;
+  PoseFilter filter;
+  filter.reset(priorAt(fixAt(drive.map_from_vehicle, 0.01, 0.001, &random)));
+  for (int i = 0; i < 2000; ++i) {
+    filter.predict(drive.step(), kPeriod_s);
+    if (i % 3 == 0) {
+      filter.update(fixAt(drive.map_from_vehicle, 1e-4, 1e-5, &random));
+    }
+  }
+  const Eigen::Matrix<double, 6, 6> covariance = filter.pose().covariance;
+  EXPECT_LT((covariance - covariance.transpose()).norm(), 1e-12);
+  EXPECT_EQ(covariance.llt().info(), Eigen::Success);
+}
+
+}  // namespace
+}  // namespace vcharge
