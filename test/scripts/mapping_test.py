@@ -11,20 +11,7 @@ import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import Drive, content_hash, run, tool  # noqa: E402
-
-
-def positions(path):
-    """Stamps (N) and positions (N x 3) of a TUM file."""
-    rows = np.loadtxt(path)
-    return rows[:, 0], rows[:, 1:4]
-
-
-def align(points, targets):
-    """Points moved rigidly to lie nearest to their targets (Umeyama 1991, without scale)."""
-    centre, target_centre = points.mean(axis=0), targets.mean(axis=0)
-    u, _, v = np.linalg.svd((targets - target_centre).T @ (points - centre))
-    rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
-    return (points - centre) @ rotation.T + target_centre
+from mapping_fixture import errors_m  # noqa: E402
 
 
 class MappingTest(unittest.TestCase):
@@ -51,10 +38,7 @@ class MappingTest(unittest.TestCase):
         return self.drive.rewrite(name, change)
 
     def errors_m(self, trajectory):
-        stamps, estimate = positions(trajectory)
-        truth_stamps, truth = positions(self.drive.truth / "trajectory.tum")
-        nearest = np.abs(truth_stamps[None, :] - stamps[:, None]).argmin(axis=1)
-        return np.linalg.norm(align(estimate, truth[nearest]) - truth[nearest], axis=1)
+        return errors_m(trajectory, self.drive.truth / "trajectory.tum")
 
     def test_the_path_is_right_to_centimetres(self):
         errors = self.errors_m(self.trajectory)
