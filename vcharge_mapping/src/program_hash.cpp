@@ -3,6 +3,7 @@
 #include <link.h>
 
 #include <cerrno>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <system_error>
@@ -14,6 +15,9 @@
 namespace vcharge {
 
 std::string fileHash(const std::string& path) {
+  if (!std::filesystem::exists(path)) {
+    throw InputError(path + ": no such file");
+  }
   std::ifstream file(path, std::ios::binary);
   if (!file) {
     throw InputError(path + ": cannot be read: " + std::generic_category().message(errno));
