@@ -21,7 +21,8 @@ class MappingTest(unittest.TestCase):
                           extra=("--image-step", "2"))
         cls.map = cls.drive.folder / "lot.vmap"
         cls.trajectory = cls.drive.folder / "lot.tum"
-        status, cls.output, errors = cls.build(cls.drive.bag, cls.map, "--trajectory", cls.trajectory)
+        status, cls.output, errors = cls.build(cls.drive.bag, cls.map, "--trajectory", cls.trajectory,
+                                               "--report", cls.drive.folder / "report")
         if status != 0:
             raise RuntimeError(f"build_map failed: {cls.output} {errors}")
 
@@ -54,6 +55,14 @@ class MappingTest(unittest.TestCase):
             self.assertIn(camera, output)
         landmarks = next(line for line in output.splitlines() if line.startswith("landmarks"))
         self.assertGreater(int(landmarks.split()[1]), 1000)
+
+    def test_the_report_has_a_verdict_and_says_what_the_tool_says(self):
+        page = (self.drive.folder / "report" / "map_report.html").read_text()
+        verdict = next(line for line in self.output.splitlines() if line.startswith("verdict: ")).split()[1]
+        self.assertIn(f'class="verdict {verdict}"', page)
+        self.assertIn("no loop was found", page)  # 9 s are no round
+        self.assertIn(content_hash(self.output), page)
+        self.assertGreaterEqual(page.count("<svg"), 6)
 
     def test_is_the_same_on_one_thread(self):
         status, output, _ = self.build(self.drive.bag, self.drive.folder / "one.vmap", prefix=("taskset", "-c", "0"))

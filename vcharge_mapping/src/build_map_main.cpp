@@ -14,10 +14,12 @@
 #include "vcharge_core/camera_rig.h"
 #include "vcharge_core/command_line.h"
 #include "vcharge_core/error.h"
+#include "vcharge_core/file_io.h"
 #include "vcharge_core/options.h"
 #include "vcharge_core/progress_bar.h"
 #include "vcharge_core/sparse_map_file.h"
 #include "vcharge_core/trajectory.h"
+#include "vcharge_mapping/map_report.h"
 #include "vcharge_mapping/mapping_checkpoint.h"
 #include "vcharge_mapping/sparse_mapper.h"
 #include "vcharge_ros/bag_drive_source.h"
@@ -27,7 +29,7 @@ namespace {
 using namespace vcharge;
 
 struct Arguments {
-  std::string bag, rig, options, output, trajectory;
+  std::string bag, rig, options, output, trajectory, report;
   bool show_options = false, fresh = false, no_checkpoint = false;
 };
 
@@ -70,7 +72,7 @@ void printReport(const SparseMapperReport& report, const SparseMap& map) {
   for (const auto& [stage, seconds] : report.stage_s) {
     std::cout << " " << stage << " " << seconds << " s;";
   }
-  std::cout << "\ncontent hash: " << map.contentHash() << "\n";
+  std::cout << "\n";
 }
 
 /// A bar per stage, which names the stage and how many there are.
@@ -184,8 +186,20 @@ void buildMap(const Arguments& arguments, const SparseMapperOptions& options) {
   if (!arguments.trajectory.empty()) {
     writeTrajectory(mapper.trajectory(), arguments.trajectory);
   }
+  const std::string name = std::filesystem::path(arguments.output).filename().string();
+  if (!arguments.report.empty()) {
+    createFolder(arguments.report);
+    writeTextFileAtomically((std::filesystem::path(arguments.report) / "map_report.html").string(),
+                            makeMapReport("Map " + name, *map, mapper.state()));
+  }
   checkpoint.remove();
   printReport(mapper.report(), *map);
+  const MapVerdict verdict = judgeMap(*map, mapper.state());
+  std::cout << "verdict: " << toString(verdict.grade);
+  for (const std::string& remark : verdict.remarks) {
+    std::cout << "\n  " << remark;
+  }
+  std::cout << "\ncontent hash: " << map->contentHash() << "\n";
 }
 
 }  // namespace
@@ -198,6 +212,8 @@ int main(int argc, char** argv) {
   app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
   app.add_option("--output", arguments.output, "map to write (*.vmap)")->required()->check(requireNotEmpty);
   app.add_option("--trajectory", arguments.trajectory, "TUM file to write: the pose of every frame");
+  app.add_option("--report", arguments.report, "folder for map_report.html: pictures, numbers and a verdict")
+      ->check(requireNotEmpty);
   app.add_option("--options", arguments.options, "YAML with overrides of SparseMapperOptions");
   app.add_flag("--fresh", arguments.fresh, "do not go on from OUTPUT.work, which an earlier run left");
   app.add_flag("--no-checkpoint", arguments.no_checkpoint, "leave no OUTPUT.work to go on from");
