@@ -61,8 +61,8 @@ void printReport(const SparseMapperReport& report, const SparseMap& map) {
       ++rejected[edge.reason];
     }
   }
-  std::cout << "\nkeyframes: " << map.keyframes().size() << ", landmarks: " << report.num_landmarks
-            << ", observations: " << report.num_observations << ", error: " << report.rms_px << " px RMS\n"
+  std::cout << "\nkeyframes: " << map.keyframes().size() << ", landmarks: " << map.landmarks().size()
+            << ", observations: " << map.observations().size() << ", error: " << report.rms_px << " px RMS\n"
             << "loop edges: " << num_accepted << " accepted";
   for (const auto& [reason, count] : rejected) {
     std::cout << ", " << count << " rejected (" << reason << ")";
