@@ -29,14 +29,14 @@ def is_progress(line):
 class Drive:
     """A drive at half resolution with truth: two cameras on the first 1.6 s of the short drive, if not said otherwise."""
 
-    def __init__(self, drive="short", duration_s=1.6, cameras=CAMERAS, extra=("--truth-range",)):
+    def __init__(self, drive="short", duration_s=1.6, cameras=CAMERAS, extra=("--truth-range",), image_scale=0.5):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="vcharge_tests_"))
         self.bag = self.folder / "drive.bag"
         self.rig = self.folder / "rig_truth.yaml"
         self.truth = self.folder / "drive_truth"
         status, output, errors = run([
             tool("vcharge_simulation", "simulate_drive"), "--drive", drive, "--duration-s", duration_s,
-            "--image-scale", "0.5", "--cameras", *cameras, *extra, "--output", self.bag])
+            "--image-scale", image_scale, "--cameras", *cameras, *extra, "--output", self.bag])
         if status != 0:
             raise RuntimeError(f"simulate_drive failed: {output} {errors}")
 

@@ -77,6 +77,18 @@ class LaunchFilesTest(unittest.TestCase):
                 config = load(path, map="/maps/lot.vmap")
                 self.assertEqual(config.params["/map_publisher/map"].value, "/maps/lot.vmap", path.name)
                 continue
+            if "output" in required_arguments(path) and "rig" in required_arguments(path):  # maps a drive
+                config = load(path, rig="/rigs/rig.yaml", output="/maps/lot.vmap", bag="/drives/drive.bag",
+                              lossless_replay="true")
+                for name, value in (("/mapping/rig", "/rigs/rig.yaml"), ("/mapping/output", "/maps/lot.vmap"),
+                                    ("/mapping/lossless_replay", True), ("/use_sim_time", True)):
+                    self.assertEqual(config.params[name].value, value, path.name)
+                player = next(node for node in config.nodes if node.package == "rosbag")
+                self.assertEqual(player.args.split()[-1], "/drives/drive.bag", path.name)
+                live = load(path, rig="/rigs/rig.yaml", output="/maps/lot.vmap")
+                self.assertFalse([node for node in live.nodes if node.package == "rosbag"], path.name)
+                self.assertNotIn("/use_sim_time", live.params)
+                continue
             if "camera" in required_arguments(path):  # listens to a camera, and replays nothing
                 config = load(path, camera="front", output="/rigs/cameras.yaml")
                 self.assertEqual(config.params["/intrinsic_calibration/camera"].value, "front", path.name)
@@ -101,12 +113,13 @@ class LaunchFilesTest(unittest.TestCase):
 
     def test_options_of_the_nodelets_are_those_of_the_yaml(self):
         for options in sorted(CONFIG.glob("*.yaml")):
-            config = load(LAUNCH / "drive_replay.launch", options=str(options))
+            nodelet, launch = ("mapping", "mapping") if options.name.startswith("mapping") else ("depth", "drive_replay")
+            config = load(LAUNCH / f"{launch}.launch", options=str(options))
             expected = yaml.safe_load(options.read_text())
             found = {}
             for name, parameter in config.params.items():
-                if name.startswith("/depth/options/"):
-                    found[name[len("/depth/options/"):]] = parameter.value
+                if name.startswith(f"/{nodelet}/options/"):
+                    found[name[len(f"/{nodelet}/options/"):]] = parameter.value
             flat = {}
 
             def flatten(prefix, value):
@@ -124,8 +137,9 @@ class LaunchFilesTest(unittest.TestCase):
         scenarios = sorted((CONFIG / "scenarios").glob("*.yaml"))  # faults_test.py loads them
         self.assertEqual(sorted(CONFIG.rglob("*.yaml")), sorted(rigs + options + scenarios), "a YAML that nobody reads")
         self.assertTrue(rigs and options)
-        program = tool("vcharge_dense", "compute_range_maps")
+        dense, mapping = tool("vcharge_dense", "compute_range_maps"), tool("vcharge_mapping", "build_map")
         for rig, option in [(rig, options[0]) for rig in rigs] + [(rigs[0], option) for option in options]:
+            program = mapping if option.name.startswith("mapping") else dense
             # The bag is read last: an error about it says that rig and options were taken.
             status, _, errors = run([program, "--bag", "/nowhere/drive.bag", "--rig", rig, "--options", option,
                                      "--output", "/nowhere/output"])

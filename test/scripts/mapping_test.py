@@ -11,20 +11,7 @@ import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import Drive, content_hash, run, tool  # noqa: E402
-
-
-def positions(path):
-    """Stamps (N) and positions (N x 3) of a TUM file."""
-    rows = np.loadtxt(path)
-    return rows[:, 0], rows[:, 1:4]
-
-
-def align(points, targets):
-    """Points moved rigidly to lie nearest to their targets (Umeyama 1991, without scale)."""
-    centre, target_centre = points.mean(axis=0), targets.mean(axis=0)
-    u, _, v = np.linalg.svd((targets - target_centre).T @ (points - centre))
-    rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
-    return (points - centre) @ rotation.T + target_centre
+from mapping_fixture import errors_m  # noqa: E402
 
 
 class MappingTest(unittest.TestCase):
@@ -34,7 +21,8 @@ class MappingTest(unittest.TestCase):
                           extra=("--image-step", "2"))
         cls.map = cls.drive.folder / "lot.vmap"
         cls.trajectory = cls.drive.folder / "lot.tum"
-        status, cls.output, errors = cls.build(cls.drive.bag, cls.map, "--trajectory", cls.trajectory)
+        status, cls.output, errors = cls.build(cls.drive.bag, cls.map, "--trajectory", cls.trajectory,
+                                               "--report", cls.drive.folder / "report")
         if status != 0:
             raise RuntimeError(f"build_map failed: {cls.output} {errors}")
 
@@ -51,10 +39,7 @@ class MappingTest(unittest.TestCase):
         return self.drive.rewrite(name, change)
 
     def errors_m(self, trajectory):
-        stamps, estimate = positions(trajectory)
-        truth_stamps, truth = positions(self.drive.truth / "trajectory.tum")
-        nearest = np.abs(truth_stamps[None, :] - stamps[:, None]).argmin(axis=1)
-        return np.linalg.norm(align(estimate, truth[nearest]) - truth[nearest], axis=1)
+        return errors_m(trajectory, self.drive.truth / "trajectory.tum")
 
     def test_the_path_is_right_to_centimetres(self):
         errors = self.errors_m(self.trajectory)
@@ -70,6 +55,14 @@ class MappingTest(unittest.TestCase):
             self.assertIn(camera, output)
         landmarks = next(line for line in output.splitlines() if line.startswith("landmarks"))
         self.assertGreater(int(landmarks.split()[1]), 1000)
+
+    def test_the_report_has_a_verdict_and_says_what_the_tool_says(self):
+        page = (self.drive.folder / "report" / "map_report.html").read_text()
+        verdict = next(line for line in self.output.splitlines() if line.startswith("verdict: ")).split()[1]
+        self.assertIn(f'class="verdict {verdict}"', page)
+        self.assertIn("no loop was found", page)  # 9 s are no round
+        self.assertIn(content_hash(self.output), page)
+        self.assertGreaterEqual(page.count("<svg"), 6)
 
     def test_is_the_same_on_one_thread(self):
         status, output, _ = self.build(self.drive.bag, self.drive.folder / "one.vmap", prefix=("taskset", "-c", "0"))

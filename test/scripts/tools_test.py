@@ -55,6 +55,8 @@ class ToolsTest(unittest.TestCase):
                 "--rig": cls.good / "rig.yaml"}),
             "evaluate_trajectory": (tool("vcharge_evaluation", "evaluate_trajectory"), {
                 "--estimate": cls.good / "truth" / "trajectory.tum", "--truth": cls.good / "truth" / "trajectory.tum"}),
+            "evaluate_map": (tool("vcharge_evaluation", "evaluate_map"), {
+                "--map": cls.good / "map.vmap", "--truth": cls.good / "map.tum"}),
             "map_info": (tool("vcharge_mapping", "map_info"), {"--map": cls.good / "map.vmap"}),
             "simulate": (tool("vcharge_simulation", "simulate_drive"), {"--output": cls.good / "simulated.bag"}),
         }
@@ -71,6 +73,8 @@ class ToolsTest(unittest.TestCase):
         cls.succeed("evaluate_trajectory")
         run([tool("vcharge_mapping", "write_analytic_map"), "--output", cls.good / "map.vmap"])
         cls.succeed("map_info")
+        run([tool("vcharge_mapping", "map_info"), "--map", cls.good / "map.vmap", "--trajectory", cls.good / "map.tum"])
+        cls.succeed("evaluate_map")
 
     @classmethod
     def tearDownClass(cls):
@@ -149,12 +153,12 @@ class ToolsTest(unittest.TestCase):
             self.assertIn(expected.get(name, "--truth"), output)
 
     def test_missing_required_options_are_named(self):
-        for name in ("import", "compute", "evaluate_range", "evaluate_trajectory", "map_info"):
+        for name in ("import", "compute", "evaluate_range", "evaluate_trajectory", "evaluate_map", "map_info"):
             for option in self.tools[name][1]:
                 self.fail_with(name, [option, "required"], **{option[2:]: None})
 
     def test_unknown_options_and_words_for_numbers_are_named(self):
-        for name in ("import", "compute", "evaluate_range", "evaluate_trajectory", "map_info"):
+        for name in ("import", "compute", "evaluate_range", "evaluate_trajectory", "evaluate_map", "map_info"):
             self.fail_with(name, ["--no-such-option"], no_such_option="1")
         self.fail_with("import", ["--ground-height-m", "low"], ground_height_m="low")
 
@@ -169,6 +173,8 @@ class ToolsTest(unittest.TestCase):
             self.fail_with("evaluate_range", [none], **{option: none})
         self.fail_with("evaluate_trajectory", [none], estimate=none)
         self.fail_with("evaluate_trajectory", [none], truth=none)
+        self.fail_with("evaluate_map", [none], map=none)
+        self.fail_with("evaluate_map", [none], truth=none)
 
     def test_corrupt_input_files_are_named(self):
         garbage = self.garbage("garbage")
@@ -211,6 +217,7 @@ class ToolsTest(unittest.TestCase):
         self.fail_with("map_info", ["none.vmap", "no such file"], map=self.work / "none.vmap")
         self.fail_with("map_info", [self.garbage("garbage.vmap"), "SQLite"], map=self.work / "garbage.vmap")
         self.fail_with("map_info", [self.work, "folder"], map=self.work)
+        self.fail_with("evaluate_map", [self.work / "garbage.vmap", "SQLite"], map=self.work / "garbage.vmap")
         whole = (self.good / "map.vmap").read_bytes()
         for name, content, words in (
                 ("empty.vmap", b"", ["is empty"]),
@@ -246,6 +253,8 @@ class ToolsTest(unittest.TestCase):
         for key, value in (("tolerance", ".nan"), ("max_truth_m", "-1"), ("pixel_step", "0")):
             options = self.text("options.yaml", f"{key}: {value}\n")
             self.fail_with("evaluate_range", [options, key, value.lstrip(".")], options=options)
+        options = self.text("options.yaml", "opposite_rad: 4\n")
+        self.fail_with("evaluate_map", [options, "opposite_rad", "4"], options=options)
         rig = self.changed_rig("nan.yaml", lambda camera: camera.update(field_of_view_rad=float("nan")))
         self.fail_with("compute", [rig, "cameras.left.field_of_view_rad", "finite"], rig=rig)
         rig = self.changed_rig("size.yaml", lambda camera: camera.update(image_size_px=[-80, 50]))
@@ -267,6 +276,7 @@ class ToolsTest(unittest.TestCase):
     def test_trajectories_without_common_time_are_named(self):
         other = self.text("other.tum", "".join(f"{5000 + i} 0 0 0 0 0 0 1\n" for i in range(5)))
         self.fail_with("evaluate_trajectory", [other, "trajectory.tum", "0 of 5 poses"], estimate=other)
+        self.fail_with("evaluate_map", ["map.vmap", other, "0 of"], truth=other)
         empty = self.text("empty.tum", "")
         self.fail_with("evaluate_trajectory", [empty, "got none"], truth=empty)
 
@@ -279,6 +289,7 @@ class ToolsTest(unittest.TestCase):
         self.fail_with("compute", [blocked / "new"], output=blocked / "new")
         self.fail_with("evaluate_range", [blocked / "new"], report=blocked / "new")
         self.fail_with("evaluate_trajectory", [blocked / "new"], report=blocked / "new")
+        self.fail_with("evaluate_map", [blocked / "new"], report=blocked / "new")
         for option in ("export_ply", "export_colmap", "trajectory"):
             self.fail_with("map_info", [blocked / "new"], **{option: blocked / "new"})
         self.fail_with("map_info", [self.work, "blocked", "COLMAP"], export_colmap=self.work)

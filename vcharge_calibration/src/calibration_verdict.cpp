@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "text_format.h"
 #include "vcharge_calibration/image_coverage.h"
+#include "vcharge_core/text_format.h"
 
 namespace vcharge {
 

@@ -11,11 +11,11 @@
 #include "calibration_verdict.h"
 #include "image_orientation.h"
 #include "intrinsic_optimizer.h"
-#include "text_format.h"
 #include "vcharge_calibration/board_detector.h"
 #include "vcharge_calibration/image_coverage.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/options.h"
+#include "vcharge_core/text_format.h"
 #include "view_fit.h"
 
 namespace vcharge {

@@ -7,7 +7,8 @@
 
 #include "intrinsic_optimizer.h"
 #include "report_pictures.h"
-#include "text_format.h"
+#include "vcharge_core/html.h"
+#include "vcharge_core/text_format.h"
 
 namespace vcharge {
 
@@ -16,39 +17,6 @@ namespace {
 constexpr double kDegrees = 57.29577951308232;
 constexpr double kVectorScale = 100.0;
 constexpr double kSideYaw_rad = 1.0;
-
-const char* const kStyle =
-    "body{font:15px/1.45 sans-serif;margin:2em auto;max-width:1100px;color:#222;padding:0 1em}"
-    "h1{font-size:1.5em}h2{font-size:1.15em;margin-top:1.8em}"
-    ".verdict{padding:.7em 1em;border-radius:6px;color:#fff;font-size:1.1em}"
-    ".PASS{background:#2c6e2f}.WARN{background:#a06a00}.FAIL{background:#b3261e}"
-    "table{border-collapse:collapse}td,th{padding:.2em .8em;border-bottom:1px solid #ddd;text-align:right}"
-    "td:first-child,th:first-child,td.text{text-align:left}"
-    ".row{display:flex;flex-wrap:wrap;gap:1em}.row>figure{flex:1 1 300px;margin:0}"
-    "svg,img{width:100%;height:auto}figcaption{color:#555;font-size:.9em}"
-    "td svg.bar{width:80px;height:8px}";
-
-std::string escape(const std::string& text) {
-  std::string result;
-  for (const char letter : text) {
-    if (letter == '<') {
-      result += "&lt;";
-    } else if (letter == '>') {
-      result += "&gt;";
-    } else if (letter == '&') {
-      result += "&amp;";
-    } else if (letter == '"') {
-      result += "&quot;";
-    } else {
-      result += letter;
-    }
-  }
-  return result;
-}
-
-std::string figure(const std::string& picture, const std::string& caption) {
-  return "<figure>" + picture + "<figcaption>" + escape(caption) + "</figcaption></figure>";
-}
 
 class Report {
  public:
@@ -61,8 +29,6 @@ class Report {
   }
 
   std::string make(const std::string& title) {
-    out_ << "<!DOCTYPE html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>" << escape(title)
-         << "</title><style>" << kStyle << "</style></head><body><h1>" << escape(title) << "</h1>";
     writeVerdict();
     if (result_.model.has_value()) {
       writeParameters();
@@ -71,8 +37,7 @@ class Report {
       writePictures();
     }
     writeImages();
-    out_ << "</body></html>\n";
-    return out_.str();
+    return htmlPage(title, out_.str());
   }
 
  private:
@@ -80,7 +45,7 @@ class Report {
     const std::string verdict = toString(result_.verdict);
     out_ << "<p class=\"verdict " << verdict << "\"><b>" << verdict << "</b>";
     for (const std::string& remark : result_.remarks) {
-      out_ << "<br>" << escape(remark);
+      out_ << "<br>" << escapeHtml(remark);
     }
     out_ << "</p>";
     if (result_.views.empty()) {
@@ -88,7 +53,7 @@ class Report {
     }
     out_ << "<table>";
     const auto row = [this](const std::string& name, const std::string& value) {
-      out_ << "<tr><td>" << escape(name) << "</td><td>" << escape(value) << "</td></tr>";
+      out_ << "<tr><td>" << escapeHtml(name) << "</td><td>" << escapeHtml(value) << "</td></tr>";
     };
     row("board", board_.description() + ", " + toText(1000.0 * board_.square_m, 1) + " mm");
     row("images used", std::to_string(result_.views.size()) + " of " +
@@ -107,7 +72,7 @@ class Report {
   }
 
   void writeParameters() {
-    out_ << "<h2>Parameters (" << escape(result_.model->name())
+    out_ << "<h2>Parameters (" << escapeHtml(result_.model->name())
          << ")</h2><table><tr><th>name</th><th>value</th><th>standard deviation</th></tr>";
     const std::vector<std::string> names = result_.model->parameterNames();
     const Eigen::VectorXd values = result_.model->parameters();
@@ -132,31 +97,32 @@ class Report {
       }
     }
     out_ << "<h2>Where the board was seen</h2><div class=\"row\">"
-         << figure(drawCoverage(result_.image_size_px, views),
-                   "Corners of all images used. Red: no picture shows the board there.");
+         << htmlFigure(drawCoverage(result_.image_size_px, views),
+                       "Corners of all images used. Red: no picture shows the board there.");
     if (!result_.model.has_value()) {
       out_ << "</div>";
       return;
     }
-    out_ << figure(drawErrorMap(result_.image_size_px, errors), "RMS error per coordinate, pixels.")
+    out_ << htmlFigure(drawErrorMap(result_.image_size_px, errors), "RMS error per coordinate, pixels.")
          << "</div><h2>Errors</h2><div class=\"row\">"
-         << figure(drawErrorVectors(result_.image_size_px, errors, kVectorScale),
-                   "Errors of all corners, " + toText(kVectorScale, 0) +
-                       " times as long as they are. Where neighbours point the same way, lens or board are "
-                       "not quite as modelled.");
+         << htmlFigure(
+                drawErrorVectors(result_.image_size_px, errors, kVectorScale),
+                "Errors of all corners, " + toText(kVectorScale, 0) +
+                    " times as long as they are. Where neighbours point the same way, lens or board are "
+                    "not quite as modelled.");
     const CalibratedView& shown = *std::max_element(result_.views.begin(), result_.views.end(),
                                                     [](const CalibratedView& a, const CalibratedView& b) {
                                                       return a.view.corners.size() < b.view.corners.size();
                                                     });
     const auto image = images_.find(shown.view.image);
     if (image != images_.end()) {
-      out_ << figure(embedPicture(drawCorners(image->second, board_, shown.view), 640),
-                     shown.view.image + " with its corners; red: the first, blue: the first row.")
+      out_ << htmlFigure(embedPicture(drawCorners(image->second, board_, shown.view), 640),
+                         shown.view.image + " with its corners; red: the first, blue: the first row.")
            << "</div><h2>Undistorted views</h2><div class=\"row\">";
       for (const auto& [yaw_rad, name] :
            {std::pair<double, const char*>{-kSideYaw_rad, "left"}, {0.0, "ahead"}, {kSideYaw_rad, "right"}}) {
-        out_ << figure(embedPicture(undistortedView(image->second, *result_.model, yaw_rad), 360),
-                       std::string("to the ") + name + ": straight edges must be straight");
+        out_ << htmlFigure(embedPicture(undistortedView(image->second, *result_.model, yaw_rad), 360),
+                           std::string("to the ") + name + ": straight edges must be straight");
       }
     }
     out_ << "</div>";
@@ -170,7 +136,7 @@ class Report {
       worst_px = std::max(worst_px, view.rms_px);
     }
     for (const CalibratedView& view : result_.views) {
-      out_ << "<tr><td>" << escape(view.view.image) << "</td><td>" << view.view.corners.size() << " of "
+      out_ << "<tr><td>" << escapeHtml(view.view.image) << "</td><td>" << view.view.corners.size() << " of "
            << board_.numCorners() << "</td><td>" << toText(view.rms_px, 3)
            << "</td><td><svg class=\"bar\" viewBox=\"0 0 100 10\" preserveAspectRatio=\"none\"><rect width=\""
            << toText(100.0 * view.rms_px / worst_px, 0)
@@ -179,8 +145,8 @@ class Report {
            << "</td><td class=\"text\"></td></tr>";
     }
     for (const RejectedImage& image : result_.rejected) {
-      out_ << "<tr><td>" << escape(image.name) << "</td><td></td><td></td><td></td><td></td><td></td>"
-           << "<td class=\"text\">" << escape(image.reason) << "</td></tr>";
+      out_ << "<tr><td>" << escapeHtml(image.name) << "</td><td></td><td></td><td></td><td></td><td></td>"
+           << "<td class=\"text\">" << escapeHtml(image.reason) << "</td></tr>";
     }
     out_ << "</table>";
   }

@@ -8,8 +8,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "text_format.h"
 #include "vcharge_calibration/image_coverage.h"
+#include "vcharge_core/text_format.h"
 
 namespace vcharge {
 

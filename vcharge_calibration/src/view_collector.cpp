@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "intrinsic_optimizer.h"
-#include "text_format.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/options.h"
+#include "vcharge_core/text_format.h"
 
 namespace vcharge {
 

@@ -11,7 +11,7 @@
 
 #include "board_refinement.h"
 #include "edge_width.h"
-#include "text_format.h"
+#include "vcharge_core/text_format.h"
 
 namespace vcharge {
 

@@ -1,19 +1,26 @@
-#include <fstream>
+#include <cmath>
+#include <filesystem>
 #include <iostream>
 #include <map>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <string>
+#include <system_error>
+#include <utility>
 #include <vector>
 
+#include "program_hash.h"
 #include "vcharge_core/camera_rig.h"
 #include "vcharge_core/command_line.h"
-#include "vcharge_core/content_hash.h"
 #include "vcharge_core/error.h"
+#include "vcharge_core/file_io.h"
 #include "vcharge_core/options.h"
 #include "vcharge_core/progress_bar.h"
 #include "vcharge_core/sparse_map_file.h"
 #include "vcharge_core/trajectory.h"
+#include "vcharge_mapping/map_report.h"
+#include "vcharge_mapping/mapping_checkpoint.h"
 #include "vcharge_mapping/sparse_mapper.h"
 #include "vcharge_ros/bag_drive_source.h"
 
@@ -22,14 +29,25 @@ namespace {
 using namespace vcharge;
 
 struct Arguments {
-  std::string bag, rig, options, output, trajectory;
-  bool show_options = false;
+  std::string bag, rig, options, output, trajectory, report;
+  bool show_options = false, fresh = false, no_checkpoint = false;
 };
 
 void printReport(const SparseMapperReport& report, const SparseMap& map) {
-  std::cout << "frames: " << report.num_frames << " (" << report.num_incomplete_frames << " lack a camera, "
-            << report.num_frames_without_odometry << " without odometry, " << report.num_standing_frames
-            << " standing)\n";
+  std::cout << "frames: " << report.num_frames << " (" << report.num_incomplete_frames << " lack a camera";
+  for (size_t i = 0; i < report.num_missing_images.size(); ++i) {
+    if (report.num_missing_images[i] > 0) {
+      std::cout << ", " << report.num_missing_images[i] << " of them " << map.rig().cameras[i].name;
+    }
+  }
+  std::cout << "; " << report.num_frames_without_odometry << " without odometry; "
+            << report.num_standing_frames << " standing)\n";
+  if (report.num_odometry_resets > 0) {
+    std::cout << "odometer: started over " << report.num_odometry_resets << " times\n";
+  }
+  if (report.num_late_images > 0) {
+    std::cout << "late images, not used: " << report.num_late_images << "\n";
+  }
   const std::vector<std::string> hypotheses = enumNames<MotionHypothesis>();
   std::cout << "motions:";
   for (size_t i = 0; i < hypotheses.size(); ++i) {
@@ -43,8 +61,8 @@ void printReport(const SparseMapperReport& report, const SparseMap& map) {
       ++rejected[edge.reason];
     }
   }
-  std::cout << "\nkeyframes: " << map.keyframes().size() << ", landmarks: " << report.num_landmarks
-            << ", observations: " << report.num_observations << ", error: " << report.rms_px << " px RMS\n"
+  std::cout << "\nkeyframes: " << map.keyframes().size() << ", landmarks: " << map.landmarks().size()
+            << ", observations: " << map.observations().size() << ", error: " << report.rms_px << " px RMS\n"
             << "loop edges: " << num_accepted << " accepted";
   for (const auto& [reason, count] : rejected) {
     std::cout << ", " << count << " rejected (" << reason << ")";
@@ -54,44 +72,113 @@ void printReport(const SparseMapperReport& report, const SparseMap& map) {
   for (const auto& [stage, seconds] : report.stage_s) {
     std::cout << " " << stage << " " << seconds << " s;";
   }
-  std::cout << "\ncontent hash: " << map.contentHash() << "\n";
+  std::cout << "\n";
 }
 
-/// Of the whole file: a map's provenance should tell two recordings of one name apart.
-std::string hashOfFile(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  ContentHasher hasher;
-  std::vector<char> buffer(1 << 20);
-  while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || file.gcount() > 0) {
-    hasher.addBytes(buffer.data(), static_cast<size_t>(file.gcount()));
+/// A bar per stage, which names the stage and how many there are.
+class StageBars {
+ public:
+  /// Following the drive is the first stage, before those of the back end.
+  void show(const std::string& stage, int number, int num_stages, double fraction) {
+    if (stage != shown_) {
+      bar_.reset();
+      bar_ = std::make_unique<ProgressBar>(std::to_string(number) + "/" + std::to_string(num_stages) + " " +
+                                           stage);
+      shown_ = stage;
+    }
+    bar_->update(fraction);
   }
-  return hasher.hex();
+  void end() { bar_.reset(); }
+
+ private:
+  std::unique_ptr<ProgressBar> bar_;
+  std::string shown_;
+};
+
+/// The work of an earlier run that did not come to its end, kept beside the map.
+class Checkpoint {
+ public:
+  Checkpoint(const Arguments& arguments, std::string key)
+      : path_(arguments.output + ".work"), key_(std::move(key)), is_on_(!arguments.no_checkpoint) {}
+
+  std::optional<MappingState> read(const std::shared_ptr<const CameraRig>& rig) const {
+    CheckpointReading reading = readCheckpoint(path_, key_, rig);
+    if (!reading.refusal.empty()) {
+      std::cerr << "build_map: " << reading.refusal << "; starting anew\n";
+    }
+    return std::move(reading.state);
+  }
+  /// To be called while this object lives.
+  CheckpointCallback writer() const {
+    if (!is_on_) {
+      return CheckpointCallback();
+    }
+    return [this](const std::string& /*stage*/, const MappingState& state) {
+      try {
+        writeCheckpoint(state, key_, path_);
+      } catch (const InputError& error) {
+        has_failed_ = true;
+        throw InputError(std::string(error.what()) + " (--no-checkpoint does without)");
+      }
+    };
+  }
+  /// That the newest could not be written.
+  bool hasFailed() const { return has_failed_; }
+  void remove() const {
+    std::error_code ignored;
+    std::filesystem::remove(path_, ignored);
+  }
+
+ private:
+  const std::string path_, key_;
+  const bool is_on_;
+  mutable bool has_failed_ = false;
+};
+
+std::string nameOfStage(const MappingState& state) {
+  return state.num_finished_stages == 0 ? "following the drive"
+                                        : backEndStages()[state.num_finished_stages - 1];
 }
 
 void buildMap(const Arguments& arguments, const SparseMapperOptions& options) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   SparseMapper mapper(rig, options);
-  BagDriveSource source(arguments.bag, rig, BagDriveSourceOptions());
-  {
-    ProgressBar progress("following the drive");
-    source.run(&mapper, [&](double fraction) { progress.update(fraction); });
+  const std::string bag_hash = fileHash(arguments.bag);
+  const Checkpoint checkpoint(arguments, checkpointKey(bag_hash, *rig, options, programHash()));
+  std::optional<MappingState> earlier;
+  if (!arguments.fresh) {
+    earlier = checkpoint.read(rig);
   }
-  std::unique_ptr<ProgressBar> bar;
-  std::string shown;
-  const std::shared_ptr<const SparseMap> map = mapper.finish([&](const std::string& stage, double fraction) {
-    if (stage != shown) {
-      bar.reset();
-      bar = std::make_unique<ProgressBar>(stage);
-      shown = stage;
+  StageBars bars;
+  if (earlier) {
+    std::cout << "going on after the stage '" << nameOfStage(*earlier) << "' of an earlier run\n";
+    mapper.resume(std::move(*earlier));
+  } else {
+    const int num_stages = static_cast<int>(backEndStages().size()) + 2;
+    BagDriveSourceOptions source_options;
+    source_options.max_image_gap_s = INFINITY;  // a camera that pauses is borne, and told of
+    BagDriveSource source(arguments.bag, rig, source_options);
+    source.run(&mapper, [&](double fraction) { bars.show("following the drive", 1, num_stages, fraction); });
+  }
+  std::shared_ptr<const SparseMap> map;
+  try {
+    map = mapper.finish(
+        [&](const StageProgress& progress) {
+          bars.show(progress.stage, progress.number + 1, progress.num_stages + 1, progress.fraction);
+        },
+        checkpoint.writer());
+  } catch (const InputError&) {
+    if (!checkpoint.hasFailed()) {
+      checkpoint.remove();  // this drive makes no map: nothing to go on from
     }
-    bar->update(fraction);
-  });
-  bar.reset();
+    throw;
+  }
+  bars.end();
   std::ostringstream option_text;
   option_text << writeFields(options);
   writeSparseMap(*map,
                  {{"bag", arguments.bag},
-                  {"bag_hash", hashOfFile(arguments.bag)},
+                  {"bag_hash", bag_hash},
                   {"rig", arguments.rig},
                   {"mapper_options", option_text.str()},
                   {"program", "build_map 0.1.0"}},
@@ -99,7 +186,20 @@ void buildMap(const Arguments& arguments, const SparseMapperOptions& options) {
   if (!arguments.trajectory.empty()) {
     writeTrajectory(mapper.trajectory(), arguments.trajectory);
   }
+  const std::string name = std::filesystem::path(arguments.output).filename().string();
+  if (!arguments.report.empty()) {
+    createFolder(arguments.report);
+    writeTextFileAtomically((std::filesystem::path(arguments.report) / "map_report.html").string(),
+                            makeMapReport("Map " + name, *map, mapper.state()));
+  }
+  checkpoint.remove();
   printReport(mapper.report(), *map);
+  const MapVerdict verdict = judgeMap(*map, mapper.state());
+  std::cout << "verdict: " << toString(verdict.grade);
+  for (const std::string& remark : verdict.remarks) {
+    std::cout << "\n  " << remark;
+  }
+  std::cout << "\ncontent hash: " << map->contentHash() << "\n";
 }
 
 }  // namespace
@@ -112,7 +212,11 @@ int main(int argc, char** argv) {
   app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
   app.add_option("--output", arguments.output, "map to write (*.vmap)")->required()->check(requireNotEmpty);
   app.add_option("--trajectory", arguments.trajectory, "TUM file to write: the pose of every frame");
+  app.add_option("--report", arguments.report, "folder for map_report.html: pictures, numbers and a verdict")
+      ->check(requireNotEmpty);
   app.add_option("--options", arguments.options, "YAML with overrides of SparseMapperOptions");
+  app.add_flag("--fresh", arguments.fresh, "do not go on from OUTPUT.work, which an earlier run left");
+  app.add_flag("--no-checkpoint", arguments.no_checkpoint, "leave no OUTPUT.work to go on from");
   app.add_flag("--show-options", arguments.show_options, "print all options with their values");
   return runTool(&app, argc, argv, [&] {
     SparseMapperOptions options;

@@ -1,35 +1,17 @@
 #include "vcharge_mapping/sparse_mapper.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <sstream>
 #include <utility>
 
 #include <tbb/parallel_for.h>
 
-#include "map_assembly.h"
+#include "stage_timer.h"
 #include "vcharge_core/error.h"
 
 namespace vcharge {
 namespace {
-
-/// Wall time of a stage, reported where it ends.
-class StageTimer {
- public:
-  StageTimer(std::string name, std::map<std::string, double>* times)
-      : name_(std::move(name)), times_(times) {}
-  ~StageTimer() {
-    (*times_)[name_] += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-  StageTimer(const StageTimer&) = delete;
-  StageTimer& operator=(const StageTimer&) = delete;
-
- private:
-  const std::string name_;
-  std::map<std::string, double>* times_;
-  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 /// Frames that may wait for odometry before they go without.
 constexpr size_t kMaxWaitingFrames = 32;
@@ -60,7 +42,8 @@ SparseMapper::SparseMapper(std::shared_ptr<const CameraRig> rig, const SparseMap
   if (!rig_->hasExtrinsics()) {
     throw InputError("rig: expected vehicle_from_camera of every camera, which extrinsic calibration gives");
   }
-  data_.rig = rig_;
+  state_.data.rig = rig_;
+  state_.report.num_missing_images.assign(rig_->cameras.size(), 0);
   for (const RigCamera& camera : rig_->cameras) {
     trackers_.emplace_back(camera, options_.tracker);
   }
@@ -75,7 +58,7 @@ void SparseMapper::addOdometry(const VehicleOdometry& odometry) {
     const RigidTransform motion =
         last_raw_odometry_->odom_from_vehicle.inverse() * odometry.odom_from_vehicle;
     if (motion.translation().norm() > options_.max_speed_m_per_s * period_s + 0.1) {
-      ++report_.num_odometry_resets;
+      ++state_.report.num_odometry_resets;
       const RigidTransform likely =
           RigidTransform::planar(last_raw_odometry_->forward_speed_m_per_s * period_s, 0.0,
                                  last_raw_odometry_->yaw_rate_rad_per_s * period_s);
@@ -92,8 +75,9 @@ void SparseMapper::addOdometry(const VehicleOdometry& odometry) {
 
 void SparseMapper::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
   check(camera_index < rig_->cameras.size(), "SparseMapper::addImage: bad camera");
-  if (!data_.keyframes.empty() && stamp <= frames_.back().stamp) {
-    return;  // late
+  if (last_stamp_ && stamp <= *last_stamp_) {
+    ++state_.report.num_late_images;
+    return;
   }
   PendingFrame& frame = pending_[stamp];
   frame.images.resize(rig_->cameras.size());
@@ -119,25 +103,54 @@ void SparseMapper::processFrames(bool all) {
     }
     const PendingFrame frame = std::move(first->second);
     pending_.erase(first);
-    ++report_.num_frames;
-    report_.num_incomplete_frames += is_complete ? 0 : 1;
+    last_stamp_ = stamp;
+    ++state_.report.num_frames;
+    if (!is_complete) {
+      ++state_.report.num_incomplete_frames;
+      noteSkipped(stamp, missingCameras(frame));
+    }
     const OdometryBuffer::Lookup lookup = odometry_.lookup(stamp);
     if (!lookup) {
-      ++report_.num_frames_without_odometry;
+      ++state_.report.num_frames_without_odometry;
+      noteSkipped(stamp, describe(lookup.status));
       continue;
     }
     processFrame(stamp, frame, lookup.odometry.odom_from_vehicle);
   }
 }
 
+std::string SparseMapper::missingCameras(const PendingFrame& frame) {
+  std::string names;
+  for (size_t i = 0; i < frame.images.size(); ++i) {
+    if (frame.images[i].pixels.empty()) {
+      ++state_.report.num_missing_images[i];
+      names += (names.empty() ? "without camera " : ", ") + rig_->cameras[i].name;
+    }
+  }
+  return names;
+}
+
+void SparseMapper::noteSkipped(Timestamp stamp, const std::string& reason) {
+  std::vector<SkippedFrames>& skipped = state_.report.skipped;
+  const auto [last, is_new] = last_skipped_.try_emplace(reason);
+  if (is_new || last->second.frame + 1 < state_.report.num_frames) {
+    last->second.entry = skipped.size();
+    skipped.push_back({reason, stamp, stamp, 0});
+  }
+  last->second.frame = state_.report.num_frames;
+  skipped[last->second.entry].last = stamp;
+  ++skipped[last->second.entry].num_frames;
+}
+
 void SparseMapper::processFrame(Timestamp stamp, const PendingFrame& frame,
                                 const RigidTransform& odom_from_vehicle) {
-  const StageTimer timer("following", &report_.stage_s);
+  const StageTimer timer("following", &state_.report.stage_s);
   const RigidTransform odometry_motion = previous_odom_from_vehicle_.inverse() * odom_from_vehicle;
   const double distance_m = odometry_motion.translation().norm();
   const double turn_rad = angleOfRotation(odometry_motion.rotation());
   if (has_previous_ && distance_m < options_.frame_distance_m && turn_rad < options_.frame_turn_rad) {
-    ++report_.num_standing_frames;
+    ++state_.report.num_standing_frames;
+    noteSkipped(stamp, "standing");
     return;
   }
   std::vector<std::vector<RayMatch>> matches_of(trackers_.size());
@@ -147,7 +160,7 @@ void SparseMapper::processFrame(Timestamp stamp, const PendingFrame& frame,
   if (!has_previous_) {
     has_previous_ = true;
     previous_odom_from_vehicle_ = odom_from_vehicle;
-    addKeyframe(stamp, odom_from_vehicle);
+    addKeyframe(stamp, odom_from_vehicle, MotionHypothesis::kOdometry);
     return;
   }
   std::vector<RayMatch> matches;
@@ -155,7 +168,7 @@ void SparseMapper::processFrame(Timestamp stamp, const PendingFrame& frame,
     matches.insert(matches.end(), of_camera.begin(), of_camera.end());
   }
   const EgoMotion motion = estimateEgoMotion(matches, odometry_motion, options_.ego_motion);
-  ++report_.num_motions[static_cast<size_t>(motion.hypothesis)];
+  ++state_.report.num_motions[static_cast<size_t>(motion.hypothesis)];
   auto inlier = motion.is_inlier.begin();
   for (size_t i = 0; i < trackers_.size(); ++i) {
     const auto end = inlier + static_cast<std::ptrdiff_t>(matches_of[i].size());
@@ -165,20 +178,23 @@ void SparseMapper::processFrame(Timestamp stamp, const PendingFrame& frame,
   previous_odom_from_vehicle_ = odom_from_vehicle;
   map_from_previous_ = map_from_previous_ * motion.previous_from_current;
   travelled_m_ += distance_m;
-  const Keyframe& last = data_.keyframes.back();
+  const Keyframe& last = state_.data.keyframes.back();
   const RigidTransform since = last.map_from_vehicle.inverse() * map_from_previous_;
   if (since.translation().norm() >= options_.keyframe_distance_m ||
       angleOfRotation(since.rotation()) >= options_.keyframe_turn_rad) {
-    addKeyframe(stamp, odom_from_vehicle);
+    addKeyframe(stamp, odom_from_vehicle, motion.hypothesis);
   } else {
-    frames_.push_back({stamp, static_cast<int32_t>(data_.keyframes.size()) - 1, since});
+    state_.frames.push_back(
+        {stamp, static_cast<int32_t>(state_.data.keyframes.size()) - 1, since, motion.hypothesis});
   }
 }
 
-void SparseMapper::addKeyframe(Timestamp stamp, const RigidTransform& odom_from_vehicle) {
-  const auto index = static_cast<int32_t>(data_.keyframes.size());
+void SparseMapper::addKeyframe(Timestamp stamp, const RigidTransform& odom_from_vehicle,
+                               MotionHypothesis motion) {
+  const auto index = static_cast<int32_t>(state_.data.keyframes.size());
   if (index > 0) {
-    keyframe_from_next_.push_back(data_.keyframes.back().map_from_vehicle.inverse() * map_from_previous_);
+    state_.keyframe_from_next.push_back(state_.data.keyframes.back().map_from_vehicle.inverse() *
+                                        map_from_previous_);
   }
   Keyframe keyframe;
   keyframe.stamp = stamp;
@@ -186,79 +202,50 @@ void SparseMapper::addKeyframe(Timestamp stamp, const RigidTransform& odom_from_
   keyframe.map_from_vehicle = map_from_previous_;
   keyframe.travelled_m = travelled_m_;
   keyframe.images.resize(rig_->cameras.size());
-  data_.keyframes.push_back(std::move(keyframe));
+  state_.data.keyframes.push_back(std::move(keyframe));
   for (size_t i = 0; i < trackers_.size(); ++i) {
-    trackers_[i].addKeyframe(index, static_cast<int32_t>(i), *extractor_, &data_);
+    trackers_[i].addKeyframe(index, static_cast<int32_t>(i), *extractor_, &state_.data);
   }
-  frames_.push_back({stamp, index, RigidTransform()});
+  state_.frames.push_back({stamp, index, RigidTransform(), motion});
 }
 
-std::shared_ptr<const SparseMap> SparseMapper::finish(const Progress& progress) {
+std::shared_ptr<const SparseMap> SparseMapper::finish(const StageCallback& progress,
+                                                      const CheckpointCallback& checkpoint) {
   processFrames(true);
-  if (data_.keyframes.size() < 2) {
+  const SparseMapperReport& report = state_.report;
+  if (state_.data.keyframes.size() < 2) {
     std::ostringstream text;
-    text << "no map could be made: " << report_.num_frames << " frames, "
-         << report_.num_frames_without_odometry << " without odometry, " << report_.num_standing_frames
-         << " standing";
+    text << "no map could be made: " << report.num_frames << " frames, " << report.num_frames_without_odometry
+         << " without odometry, " << report.num_standing_frames << " standing";
     throw InputError(text.str());
   }
-  const auto stage = [&](const char* name, const auto& work) {
-    progress(name, 0.0);
-    const StageTimer timer(name, &report_.stage_s);
-    work();
-    progress(name, 1.0);
-  };
-  BundleAdjustmentSummary bundle;
-  stage("first adjustment", [&] {
-    // Chained motions bend: rays may miss their point by much more than they will in the end.
-    TriangulationOptions lenient = options_.triangulation;
-    lenient.max_error_rad = options_.first_max_error_rad;
-    BundleAdjustmentOptions lenient_bundle = options_.bundle;
-    lenient_bundle.outlier_sigmas = INFINITY;
-    triangulateTracks(lenient, &data_);
-    adjustBundle(lenient_bundle, &data_);
-    triangulateTracks(options_.triangulation, &data_);
-    bundle = adjustBundle(options_.bundle, &data_);
-  });
-  std::shared_ptr<const VocabularyTree> vocabulary;
-  stage("vocabulary", [&] { vocabulary = trainVocabulary(options_.loops, data_); });
-  stage("loops", [&] {
-    report_.loop_edges =
-        findLoops(options_.loops, vocabulary, data_, [&](double fraction) { progress("loops", fraction); });
-  });
-  stage("pose graph", [&] {
-    closeLoops(options_.loops, &report_.loop_edges, &data_);
-    triangulateTracks(options_.triangulation, &data_);
-  });
-  for (int round = 0; round < 2; ++round) {
-    stage("landmark search", [&] { searchLandmarks(options_.search, &data_); });
-    stage("last adjustment", [&] { bundle = adjustBundle(options_.bundle, &data_); });
+  if (checkpoint && state_.num_finished_stages == 0) {
+    checkpoint("following", state_);
   }
-  report_.num_observations = bundle.num_observations;
-  report_.rms_px = bundle.rms_px;
-  for (const Track& track : data_.tracks) {
-    report_.num_landmarks += track.position_m ? 1 : 0;
-  }
-  if (report_.num_landmarks == 0) {
-    throw InputError("no map could be made: no point of the scene was seen from enough places");
-  }
-  std::shared_ptr<const SparseMap> map;
-  stage("assembly", [&] { map = assembleMap(data_, report_.loop_edges, options_.features, *vocabulary); });
-  return map;
+  return runBackEnd(
+      options_, progress ? progress : [](const StageProgress&) {}, checkpoint, &state_);
+}
+
+void SparseMapper::resume(MappingState state) {
+  check(pending_.empty() && state_.frames.empty(),
+        "SparseMapper::resume: expected a mapper that was not fed");
+  check(state.data.rig != nullptr, "SparseMapper::resume: expected a rig");
+  state_ = std::move(state);
+  last_stamp_ = state_.frames.empty() ? std::nullopt : std::make_optional(state_.frames.back().stamp);
 }
 
 Trajectory SparseMapper::trajectory() const {
   Trajectory trajectory;
-  for (const FramePose& frame : frames_) {
-    const Keyframe& keyframe = data_.keyframes[frame.keyframe];
+  for (const FramePose& frame : state_.frames) {
+    const Keyframe& keyframe = state_.data.keyframes[frame.keyframe];
     RigidTransform keyframe_from_vehicle = frame.keyframe_from_vehicle;
-    if (static_cast<size_t>(frame.keyframe) + 1 < data_.keyframes.size()) {
+    if (static_cast<size_t>(frame.keyframe) + 1 < state_.data.keyframes.size()) {
       // What adjustment changed between two keyframes, in equal shares of time.
-      const Keyframe& next = data_.keyframes[frame.keyframe + 1];
+      const Keyframe& next = state_.data.keyframes[frame.keyframe + 1];
       const RigidTransform adjusted = keyframe.map_from_vehicle.inverse() * next.map_from_vehicle;
       const double fraction =
           toSeconds(frame.stamp - keyframe.stamp) / toSeconds(next.stamp - keyframe.stamp);
-      const RigidTransform change = adjusted * keyframe_from_next_[frame.keyframe].inverse();
+      const RigidTransform change = adjusted * state_.keyframe_from_next[frame.keyframe].inverse();
       keyframe_from_vehicle = interpolate(RigidTransform(), change, fraction) * keyframe_from_vehicle;
     }
     trajectory.push_back({frame.stamp, keyframe.map_from_vehicle * keyframe_from_vehicle});

@@ -14,7 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-const auto kSilent = [](const std::string&, double) {};
+const auto kSilent = [](const StageProgress&) {};
 
 Image grayImage() {
   return {cv::Mat(400, 640, CV_8UC1, cv::Scalar(128)), nullptr};

@@ -39,7 +39,11 @@ void ProgressBar::update(double fraction) {
     line_open_ = true;
   } else if (tenth != last_tenth_) {
     last_tenth_ = tenth;
-    std::fprintf(stderr, "%s %3d %% (%.0f s)\n", label_.c_str(), tenth * 10, elapsed_s);
+    std::fprintf(stderr, "%s %3d %% (%.0f s", label_.c_str(), tenth * 10, elapsed_s);
+    if (fraction > 0.0 && fraction < 1.0) {
+      std::fprintf(stderr, " of about %.0f s", elapsed_s / fraction);
+    }
+    std::fprintf(stderr, ")\n");
   }
   std::fflush(stderr);
 }

@@ -13,9 +13,9 @@ namespace {
 constexpr double kDegreesPerRadian = 57.29577951308232;
 
 void printRow(const char* label, const vcharge::ErrorDistribution& d, double factor) {
-  std::printf("  %-22s %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f\n", label, factor * d.mean,
-              factor * d.percentile_50, factor * d.percentile_90, factor * d.percentile_95,
-              factor * d.percentile_99, factor * d.max);
+  std::printf("  %-22s %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f %8.4f\n", label, factor * d.mean,
+              factor * d.root_mean_square, factor * d.percentile_50, factor * d.percentile_90,
+              factor * d.percentile_95, factor * d.percentile_99, factor * d.max);
 }
 
 nlohmann::json evaluate(const vcharge::Trajectory& estimate, const vcharge::Trajectory& truth,
@@ -23,7 +23,8 @@ nlohmann::json evaluate(const vcharge::Trajectory& estimate, const vcharge::Traj
   const vcharge::TrajectoryErrors errors = vcharge::evaluateTrajectory(estimate, truth, alignment);
   std::printf("%s: %zu poses over %.1f m, %zu without truth\n", label, errors.poses.size(),
               errors.truth_length_m, errors.num_without_truth);
-  std::printf("  %-22s %8s %8s %8s %8s %8s %8s\n", "", "mean", "50 %", "90 %", "95 %", "99 %", "max");
+  std::printf("  %-22s %8s %8s %8s %8s %8s %8s %8s\n", "", "mean", "rms", "50 %", "90 %", "95 %", "99 %",
+              "max");
   printRow("position (m)", errors.position_m, 1.0);
   printRow("along (m)", errors.longitudinal_m, 1.0);
   printRow("across (m)", errors.lateral_m, 1.0);
@@ -75,6 +76,10 @@ int main(int argc, char** argv) {
           evaluate(estimate, truth, vcharge::TrajectoryAlignment::kFirstPose, "aligned at the first pose"),
           evaluate(estimate, truth, vcharge::TrajectoryAlignment::kSe3, "aligned over all poses"),
       };
+      if (const auto scale_error = vcharge::evaluateScaleError(estimate, truth)) {
+        std::printf("scale: %+.4f %%\n", 100.0 * *scale_error);
+        json["scale_error"] = *scale_error;
+      }
     } catch (const vcharge::InputError& error) {
       throw vcharge::InputError(estimate_path + " against " + truth_path + ": " + error.what());
     }

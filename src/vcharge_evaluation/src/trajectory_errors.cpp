@@ -59,6 +59,15 @@ RigidTransform truthFromEstimate(const std::vector<Pair>& pairs, TrajectoryAlign
   return alignPoints(source, target);
 }
 
+/// InputError when fewer than `needed` poses of the estimate have truth.
+void requirePairs(const std::vector<Pair>& pairs, const Trajectory& estimate, size_t needed) {
+  if (pairs.size() < needed) {
+    throw InputError("trajectory: " + std::to_string(pairs.size()) + " of " +
+                     std::to_string(estimate.size()) + " poses have truth at their time, at least " +
+                     std::to_string(needed) + " are needed");
+  }
+}
+
 }  // namespace
 
 RigidTransform alignPoints(const std::vector<Eigen::Vector3d>& points_in_source,
@@ -86,12 +95,7 @@ RigidTransform alignPoints(const std::vector<Eigen::Vector3d>& points_in_source,
 TrajectoryErrors evaluateTrajectory(const Trajectory& estimate, const Trajectory& truth,
                                     TrajectoryAlignment alignment, double max_gap_s) {
   const std::vector<Pair> pairs = associate(estimate, truth, max_gap_s);
-  const size_t needed = alignment == TrajectoryAlignment::kSe3 ? 3 : 2;
-  if (pairs.size() < needed) {
-    throw InputError("trajectory: " + std::to_string(pairs.size()) + " of " +
-                     std::to_string(estimate.size()) + " poses have truth at their time, at least " +
-                     std::to_string(needed) + " are needed");
-  }
+  requirePairs(pairs, estimate, alignment == TrajectoryAlignment::kSe3 ? 3 : 2);
   TrajectoryErrors errors;
   errors.num_without_truth = estimate.size() - pairs.size();
   errors.truth_length_m = travelledDistance(pairs).back();
@@ -141,6 +145,40 @@ DriftErrors evaluateDrift(const Trajectory& estimate, const Trajectory& truth, d
   drift.translation_percent = summarize(std::move(translation));
   drift.rotation_rad = summarize(std::move(rotation));
   return drift;
+}
+
+std::optional<double> evaluateScaleError(const Trajectory& estimate, const Trajectory& truth,
+                                         double max_gap_s) {
+  const std::vector<Pair> pairs = associate(estimate, truth, max_gap_s);
+  requirePairs(pairs, estimate, 3);
+  const RigidTransform truth_from_estimate = truthFromEstimate(pairs, TrajectoryAlignment::kSe3);
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero(), true_mean = Eigen::Vector3d::Zero();
+  for (const Pair& pair : pairs) {
+    mean += truth_from_estimate * pair.estimate.translation();
+    true_mean += pair.truth.translation();
+  }
+  mean /= static_cast<double>(pairs.size());
+  true_mean /= static_cast<double>(pairs.size());
+  double correlation_m2 = 0.0, true_m2 = 0.0;
+  for (const Pair& pair : pairs) {
+    const Eigen::Vector3d true_offset = pair.truth.translation() - true_mean;
+    correlation_m2 += true_offset.dot(truth_from_estimate * pair.estimate.translation() - mean);
+    true_m2 += true_offset.squaredNorm();
+  }
+  if (!(true_m2 > 0.0)) {
+    return std::nullopt;
+  }
+  return correlation_m2 / true_m2 - 1.0;
+}
+
+AssociatedTrajectories associateWithTruth(const Trajectory& estimate, const Trajectory& truth,
+                                          double max_gap_s) {
+  AssociatedTrajectories result;
+  for (const Pair& pair : associate(estimate, truth, max_gap_s)) {
+    result.estimate.push_back({pair.stamp, pair.estimate});
+    result.truth.push_back({pair.stamp, pair.truth});
+  }
+  return result;
 }
 
 }  // namespace vcharge

@@ -79,6 +79,23 @@ TEST(TrajectoryErrorsTest, DriftOfAWrongScaleIsItsShare) {
   EXPECT_EQ(evaluateDrift(estimate, truth, 1e6).translation_percent.count, 0U);
 }
 
+TEST(TrajectoryErrorsTest, ScaleErrorIsThatOfAnEnlargedPathWhereverItLies) {
+  const Trajectory truth = circle(400);
+  Trajectory estimate = truth;
+  for (StampedTransform& entry : estimate) {
+    entry.world_from_vehicle =
+        RigidTransform(entry.world_from_vehicle.rotation(), 0.995 * entry.world_from_vehicle.translation());
+  }
+  estimate = moved(RigidTransform::planar(4.0, -3.0, 2.0), estimate);
+  EXPECT_NEAR(*evaluateScaleError(estimate, truth), -0.005, 1e-9);
+  Trajectory standing = truth;
+  for (StampedTransform& entry : standing) {
+    entry.world_from_vehicle = RigidTransform();
+  }
+  EXPECT_FALSE(evaluateScaleError(estimate, standing).has_value());
+  EXPECT_THROW(evaluateScaleError({estimate[0], estimate[1]}, truth), InputError);
+}
+
 TEST(AlignPointsTest, RecoversARandomTransform) {
   std::mt19937 generator(4);
   std::normal_distribution<double> normal;

@@ -60,6 +60,7 @@ struct LiveDriveSource::Implementation {
   void take(const std::string& topic, Timestamp stamp, DriveItem item);
   void deliver(Timestamp stamp, const DriveItem& item);
   bool isWanted(size_t camera, bool is_raw, Timestamp stamp);
+  void flush();
   void flushWhenIdle();
   void log(DriveMonitor::Change change, const std::string& topic, const std::string& text);
 
@@ -231,8 +232,12 @@ bool LiveDriveSource::Implementation::isWanted(size_t camera, bool is_raw, Times
 void LiveDriveSource::Implementation::flushWhenIdle() {
   const double idle_s = std::chrono::duration<double>(SteadyClock::now() - last_arrival).count();
   if (idle_s >= options.idle_flush_s) {
-    sorter.flush([this](Timestamp stamp, const DriveItem& item) { deliver(stamp, item); });
+    flush();
   }
+}
+
+void LiveDriveSource::Implementation::flush() {
+  sorter.flush([this](Timestamp stamp, const DriveItem& item) { deliver(stamp, item); });
 }
 
 void LiveDriveSourceOptions::validate() const {
@@ -260,6 +265,11 @@ void LiveDriveSource::run(DriveConsumer* consumer, const ProgressCallback& /*pro
   check(implementation_->consumer == nullptr, "LiveDriveSource::run: runs already");
   implementation_->consumer = consumer;
   implementation_->subscribe();
+}
+
+void LiveDriveSource::flush() {
+  const std::lock_guard<std::mutex> lock(implementation_->mutex);
+  implementation_->flush();
 }
 
 DriveMonitor::Report LiveDriveSource::report() {

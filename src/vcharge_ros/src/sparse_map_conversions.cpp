@@ -37,16 +37,22 @@ visualization_msgs::Marker makeEdges(const SparseMap& map, bool accepted, const 
   return marker;
 }
 
-}  // namespace
-
-sensor_msgs::PointCloud2 makeLandmarkCloud(const SparseMap& map, const std::string& frame_id) {
+/// A cloud of so many points, in the fields of landmarks.
+sensor_msgs::PointCloud2 makeEmptyCloud(size_t num_points, const std::string& frame_id) {
   sensor_msgs::PointCloud2 cloud;
   cloud.header.frame_id = frame_id;
   sensor_msgs::PointCloud2Modifier modifier(cloud);
   constexpr auto kFloat = sensor_msgs::PointField::FLOAT32;
   modifier.setPointCloud2Fields(5, "x", 1, kFloat, "y", 1, kFloat, "z", 1, kFloat, "observations", 1, kFloat,
                                 "sigma_m", 1, kFloat);
-  modifier.resize(map.landmarks().size());
+  modifier.resize(num_points);
+  return cloud;
+}
+
+}  // namespace
+
+sensor_msgs::PointCloud2 makeLandmarkCloud(const SparseMap& map, const std::string& frame_id) {
+  sensor_msgs::PointCloud2 cloud = makeEmptyCloud(map.landmarks().size(), frame_id);
   sensor_msgs::PointCloud2Iterator<float> values(cloud, "x");
   for (size_t i = 0; i < map.landmarks().size(); ++i, ++values) {
     const MapLandmark& landmark = map.landmarks()[i];
@@ -62,14 +68,36 @@ sensor_msgs::PointCloud2 makeLandmarkCloud(const SparseMap& map, const std::stri
   return cloud;
 }
 
+sensor_msgs::PointCloud2 makeLandmarkCloud(const std::vector<Eigen::Vector3d>& positions_m,
+                                           const std::string& frame_id) {
+  sensor_msgs::PointCloud2 cloud = makeEmptyCloud(positions_m.size(), frame_id);
+  sensor_msgs::PointCloud2Iterator<float> values(cloud, "x");
+  for (const Eigen::Vector3d& position_m : positions_m) {
+    for (int k = 0; k < 3; ++k) {
+      values[k] = static_cast<float>(position_m[k]);
+    }
+    values[3] = values[4] = std::numeric_limits<float>::quiet_NaN();
+    ++values;
+  }
+  return cloud;
+}
+
 nav_msgs::Path makePath(const SparseMap& map, const std::string& frame_id) {
+  Trajectory trajectory;
+  for (const MapKeyframe& keyframe : map.keyframes()) {
+    trajectory.push_back({keyframe.stamp, keyframe.map_from_vehicle});
+  }
+  return makePath(trajectory, frame_id);
+}
+
+nav_msgs::Path makePath(const Trajectory& trajectory, const std::string& frame_id) {
   nav_msgs::Path path;
   path.header.frame_id = frame_id;
-  for (const MapKeyframe& keyframe : map.keyframes()) {
+  for (const StampedTransform& entry : trajectory) {
     geometry_msgs::PoseStamped pose;
     pose.header.frame_id = frame_id;
-    pose.header.stamp = fromTimestamp(keyframe.stamp);
-    pose.pose = toPoseMessage(keyframe.map_from_vehicle);
+    pose.header.stamp = fromTimestamp(entry.stamp);
+    pose.pose = toPoseMessage(entry.world_from_vehicle);
     path.poses.push_back(pose);
   }
   return path;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "vcharge_core/trajectory.h"
@@ -48,6 +49,19 @@ TrajectoryErrors evaluateTrajectory(const Trajectory& estimate, const Trajectory
 /// shorter.
 DriftErrors evaluateDrift(const Trajectory& estimate, const Trajectory& truth, double distance_m,
                           double max_gap_s = 0.25);
+
+/// How much larger the estimate is than the truth, by the similarity that lays its positions over the truth
+/// (least squares of the aligned positions): 0.01 where all distances are 1 % too long. Absent where the
+/// truth does not move. InputError when fewer than three poses have truth.
+std::optional<double> evaluateScaleError(const Trajectory& estimate, const Trajectory& truth,
+                                         double max_gap_s = 0.25);
+
+/// The poses of a trajectory that have truth, and the truth interpolated to their stamps; of equal length.
+struct AssociatedTrajectories {
+  Trajectory estimate, truth;
+};
+AssociatedTrajectories associateWithTruth(const Trajectory& estimate, const Trajectory& truth,
+                                          double max_gap_s = 0.25);
 
 /// Rigid transform target_from_source that minimizes the squared distances of corresponding points (Horn,
 /// Umeyama; no scale). std::logic_error unless there are at least three pairs.

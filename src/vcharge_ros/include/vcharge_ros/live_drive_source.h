@@ -63,6 +63,9 @@ class LiveDriveSource : public DriveSource {
   /// the end.
   void run(DriveConsumer* consumer, const ProgressCallback& progress) override;
 
+  /// Delivers what waits to be sorted: nothing more is to come for now.
+  void flush();
+
   /// State of the topics for /diagnostics. Thread safe, and waits for no consumer that is at work.
   DriveMonitor::Report report();
 

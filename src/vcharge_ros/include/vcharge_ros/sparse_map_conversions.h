@@ -1,12 +1,14 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <nav_msgs/Path.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <visualization_msgs/MarkerArray.h>
 
 #include "vcharge_core/sparse_map.h"
+#include "vcharge_core/trajectory.h"
 
 namespace vcharge {
 
@@ -14,8 +16,14 @@ namespace vcharge {
 /// covariance, NaN where unknown), all FLOAT32. Headers are stamped 0: valid at any time.
 sensor_msgs::PointCloud2 makeLandmarkCloud(const SparseMap& map, const std::string& frame_id = "map");
 
+/// Points of a map that is being made: in the same form, observations and sigma_m NaN.
+sensor_msgs::PointCloud2 makeLandmarkCloud(const std::vector<Eigen::Vector3d>& positions_m,
+                                           const std::string& frame_id = "map");
+
 /// Poses of the vehicle at the keyframes, with their stamps.
 nav_msgs::Path makePath(const SparseMap& map, const std::string& frame_id = "map");
+/// Poses of the vehicle in `frame_id`, with their stamps.
+nav_msgs::Path makePath(const Trajectory& trajectory, const std::string& frame_id = "map");
 
 /// Two line lists between keyframes, in the namespaces "accepted" (green) and "rejected" (red, a little
 /// transparent). A list without edges is a DELETE of what an earlier map showed.

@@ -1,0 +1,221 @@
+#!/usr/bin/env python3
+"""The mapping nodelet on a simulated drive: it makes the map of build_map, shows it, and outlives bad input."""
+import copy
+import os
+import sys
+import time
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import Odometry, Path
+from nodelet.srv import NodeletList, NodeletLoad, NodeletUnload
+from sensor_msgs import point_cloud2
+from sensor_msgs.msg import Image, PointCloud2
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import MarkerArray
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from drive_fixture import Drive, content_hash, run, tool  # noqa: E402
+from mapping_fixture import numbers_of_map  # noqa: E402
+from nodelet_fixture import TIMEOUT_S, wait_for  # noqa: E402
+
+CAMERAS = ("front", "left", "rear", "right")
+WORK_TIMEOUT_S = 150.0
+
+
+class MappingNodeletTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.drive = Drive(drive="figure_eight", duration_s=7, cameras=CAMERAS, extra=("--image-step", "2"),
+                          image_scale=0.25)
+        cls.offline_map = cls.drive.folder / "offline.vmap"
+        status, cls.offline, errors = run([
+            tool("vcharge_mapping", "build_map"), "--bag", cls.drive.bag, "--rig", cls.drive.rig, "--output",
+            cls.offline_map])
+        if status != 0:
+            raise RuntimeError(f"build_map failed: {cls.offline} {errors}")
+        cls.messages = [(topic, message) for topic, message in cls.drive.messages()
+                        if topic == "/odom" or topic.endswith("/image_raw")]
+        cls.num_frames = len({message.header.stamp.to_nsec() for topic, message in cls.messages if topic != "/odom"})
+        cls.received = {}
+        cls.status = {}  # by name: the newest of /diagnostics
+        cls.told = []
+
+        def keep(topic):
+            return lambda message: cls.received.setdefault(topic, []).append(message)
+
+        cls.subscribers = [rospy.Subscriber(topic, kind, keep(topic), queue_size=1000) for topic, kind in (
+            ("/mapping/landmarks", PointCloud2), ("/mapping/trajectory", Path), ("/mapping/loop_edges", MarkerArray))]
+        cls.subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, cls.keep_diagnostics))
+        cls.publishers = {"/odom": rospy.Publisher("/odom", Odometry, queue_size=10000)}
+        for camera in CAMERAS:
+            topic = f"/camera/{camera}/image_raw"
+            cls.publishers[topic] = rospy.Publisher(topic, Image, queue_size=10000)
+        for service in ("load_nodelet", "unload_nodelet", "list"):
+            rospy.wait_for_service(f"/manager/{service}", TIMEOUT_S)
+        cls.load = rospy.ServiceProxy("/manager/load_nodelet", NodeletLoad)
+        cls.unload = rospy.ServiceProxy("/manager/unload_nodelet", NodeletUnload)
+        cls.list = rospy.ServiceProxy("/manager/list", NodeletList)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.drive.remove()
+
+    @classmethod
+    def keep_diagnostics(cls, message):
+        for status in message.status:
+            cls.status[status.name] = status
+            cls.told.append(status.message)
+
+    def setUp(self):
+        self.output = self.drive.folder / f"{self.id().split('.')[-1]}.vmap"
+        rospy.set_param("/mapping/rig", str(self.drive.rig))
+        rospy.set_param("/mapping/output", str(self.output))
+        rospy.set_param("/mapping/lossless_replay", True)
+        self.assertTrue(self.load("/mapping", "vcharge_mapping/mapping_nodelet", [], [], [], "").success)
+        self.finish = rospy.ServiceProxy("/mapping/finish", Trigger)
+        self.save = rospy.ServiceProxy("/mapping/save", Trigger)
+        self.finish.wait_for_service(TIMEOUT_S)
+        self.status.clear()
+        wait_for(self.reach, "the nodelet to hear all topics")
+        for kind in self.received.values():
+            kind.clear()
+        self.told.clear()
+
+    def tearDown(self):
+        self.assertTrue(self.unload("/mapping").success)
+        self.assertEqual(self.list().nodelets, [], "the manager outlives the nodelet")
+
+    def values(self, of_map):
+        """Keys and values of the nodelet's newest status: of the map, or of the topics."""
+        for name, status in list(self.status.items()):
+            if ("mapping/map" in name) == of_map:
+                return {value.key: value.value for value in status.values}
+        return {}
+
+    def reach(self):
+        """Publishes what the nodelet refuses (no stamp) until it tells so of every topic."""
+        heard = {key for key, value in self.values(False).items() if key in self.publishers and ", 0 bad" not in value}
+        for topic, publisher in self.publishers.items():
+            if topic not in heard:
+                publisher.publish(publisher.data_class())
+        time.sleep(0.3)
+        return heard >= set(self.publishers)
+
+    def publish(self, change=lambda topic, message: message):
+        for topic, message in self.messages:
+            changed = change(topic, message)
+            if changed is not None:
+                self.publishers[topic].publish(changed)
+                time.sleep(0.001)
+
+    def message_of_map(self):
+        return next((status.message for name, status in list(self.status.items()) if "mapping/map" in name), "")
+
+    def wait_for_frames(self, count):
+        wait_for(lambda: int(self.values(True).get("frames", 0)) >= count, f"{count} frames", WORK_TIMEOUT_S)
+
+    def wait_until_finished(self):
+        wait_for(lambda: self.message_of_map().startswith("finished"), "the map", WORK_TIMEOUT_S)
+
+    def finish_good_drive(self):
+        self.publish()
+        # The last of the odometry still waits to be sorted, and with it the last frames: finish() takes them too.
+        self.wait_for_frames(self.num_frames - 10)
+        time.sleep(1.0)
+        answer = self.finish()
+        self.assertTrue(answer.success, answer.message)
+        self.wait_until_finished()
+
+    def test_makes_shows_and_saves_the_map_of_the_offline_tool(self):
+        self.assertFalse(self.save().success, "there is no map yet")
+        self.assertFalse(self.output.exists())
+        self.finish_good_drive()
+        self.assertTrue(any(text.startswith("stage ") for text in self.told), "progress is told")
+        self.assertIn(content_hash(self.offline), self.message_of_map())
+        answer = self.save()
+        self.assertTrue(answer.success, answer.message)
+        self.assertIn(content_hash(self.offline), answer.message)
+        saved, offline = numbers_of_map(self.output), numbers_of_map(self.offline_map)
+        for column, values in offline.items():
+            np.testing.assert_array_equal(saved[column], values, column)
+        again = self.finish()
+        self.assertFalse(again.success)
+        self.assertIn("made before", again.message)
+
+        wait_for(lambda: self.received.get("/mapping/loop_edges"), "the loop edges")
+        num_keyframes = len(offline["keyframe.x_m"])
+        lengths = [len(path.poses) for path in self.received["/mapping/trajectory"]]
+        self.assertGreater(len(lengths), 3, "the path is shown while it grows")
+        self.assertEqual(lengths, sorted(lengths))
+        self.assertEqual(lengths[-1], num_keyframes)
+        clouds = self.received["/mapping/landmarks"]
+        self.assertEqual(clouds[-1].width, len(offline["landmark.x_m"]))
+        self.assertEqual(clouds[-1].header.frame_id, "map")
+        # What is shown while driving lies about where the map has it in the end: within the drive's extent and 60 m.
+        points = np.array(list(point_cloud2.read_points(clouds[-2], field_names=("x", "y", "z"))))
+        self.assertGreater(len(points), 100)
+        self.assertTrue(np.isfinite(points).all())
+        self.assertLess(np.abs(points).max(), 100.0)
+
+    def test_a_drive_without_odometry_is_told_and_the_next_one_is_mapped(self):
+        first = self.messages[0][1].header.stamp
+        self.publish(lambda topic, message: (
+            None if topic == "/odom" and (message.header.stamp - first).to_sec() > 0.1 else message))
+        wait_for(lambda: any("/odom: no data for" in text for text in list(self.told)), "the missing topic")
+        answer = self.finish()
+        self.assertTrue(answer.success, answer.message)
+        wait_for(lambda: "without odometry" in self.message_of_map(), "why there is no map", WORK_TIMEOUT_S)
+        self.assertFalse(self.save().success)
+
+        def later(_topic, message):
+            message = copy.copy(message)
+            message.header = copy.deepcopy(message.header)
+            message.header.stamp += rospy.Duration(1000.0)
+            return message
+
+        self.publish(later)
+        self.wait_for_frames(self.num_frames - 10)
+        time.sleep(1.0)
+        self.assertTrue(self.finish().success)
+        self.wait_until_finished()
+        self.assertTrue(self.save().success)
+        self.assertTrue(np.isfinite(numbers_of_map(self.output)["landmark.x_m"]).all())
+
+    def test_a_map_that_cannot_be_written_is_told_and_may_be_written_elsewhere(self):
+        self.finish_good_drive()
+        rospy.set_param("/mapping/output", "/no/such/folder/lot.vmap")
+        answer = self.save()
+        self.assertFalse(answer.success)
+        self.assertIn("/no/such/folder", answer.message)
+        rospy.set_param("/mapping/output", str(self.output))
+        self.assertTrue(self.save().success)
+
+    def test_unloading_while_the_map_is_made_leaves_nothing_behind(self):
+        self.publish()
+        self.wait_for_frames(self.num_frames - 10)
+        self.assertTrue(self.finish().success)
+        self.assertFalse(self.output.exists())
+
+    def test_a_bad_rig_or_option_does_not_load_and_the_manager_lives_on(self):
+        lines = self.drive.rig.read_text()
+        without = "\n".join(line for line in lines.splitlines()
+                            if not line.startswith(("    vehicle_from_camera", "      translation", "      rotation")))
+        rigs = {"missing": self.drive.folder / "none.yaml", "bare": self.drive.write_text("bare.yaml", without + "\n")}
+        for name, rig in rigs.items():
+            rospy.set_param(f"/{name}/rig", str(rig))
+            with self.assertRaises(rospy.ServiceException):
+                self.load(f"/{name}", "vcharge_mapping/mapping_nodelet", [], [], [], "")
+        rospy.set_param("/odd/rig", str(self.drive.rig))
+        rospy.set_param("/odd/options", {"no_such_option": 1})
+        with self.assertRaises(rospy.ServiceException):
+            self.load("/odd", "vcharge_mapping/mapping_nodelet", [], [], [], "")
+        self.assertEqual(self.list().nodelets, ["/mapping"])
+
+
+if __name__ == "__main__":
+    rospy.init_node("mapping_nodelet_test")
+    rostest.rosrun("vcharge_tests", "mapping_nodelet", MappingNodeletTest)
