@@ -155,6 +155,8 @@ void LoopClosureOptions::validate() const {
                min_inlier_ratio);
   requireField(max_sigma_m > 0.0, "max_sigma_m", "must be positive", max_sigma_m);
   requireField(max_disagreement_rad > 0.0, "max_disagreement_rad", "must be positive", max_disagreement_rad);
+  requireField(max_final_error_m > 0.0, "max_final_error_m", "must be positive", max_final_error_m);
+  requireField(max_final_error_rad > 0.0, "max_final_error_rad", "must be positive", max_final_error_rad);
   requireField(step_sigma_m > 0.0, "step_sigma_m", "must be positive", step_sigma_m);
   requireField(step_sigma_rad > 0.0, "step_sigma_rad", "must be positive", step_sigma_rad);
   requireField(loop_sigma_m > 0.0, "loop_sigma_m", "must be positive", loop_sigma_m);
@@ -310,6 +312,19 @@ void closeLoops(const LoopClosureOptions& options, std::vector<LoopEdge>* edges,
   }
   for (size_t i = 0; i < data->keyframes.size(); ++i) {
     data->keyframes[i].map_from_vehicle = graph.map_from_node[static_cast<int64_t>(i)];
+  }
+}
+
+void checkLoops(const LoopClosureOptions& options, const MappingData& data, std::vector<LoopEdge>* edges) {
+  for (LoopEdge& edge : *edges) {
+    const RigidTransform adjusted =
+        data.keyframes[edge.first].map_from_vehicle.inverse() * data.keyframes[edge.second].map_from_vehicle;
+    const RigidTransform error = adjusted.inverse() * edge.first_from_second;
+    if (edge.accepted && (error.translation().norm() > options.max_final_error_m ||
+                          angleOfRotation(error.rotation()) > options.max_final_error_rad)) {
+      edge.accepted = false;
+      edge.reason = "contradicts the adjusted map";
+    }
   }
 }
 

@@ -46,8 +46,13 @@ void search(const SparseMapperOptions& options, const Fraction& /*progress*/, Ma
   searchLandmarks(options.search, &state->data);
 }
 
+void adjustAgain(const SparseMapperOptions& options, const Fraction& /*progress*/, MappingState* state) {
+  adjust(options.bundle, state);
+}
+
 void adjustLast(const SparseMapperOptions& options, const Fraction& /*progress*/, MappingState* state) {
   adjust(options.bundle, state);
+  checkLoops(options.loops, state->data, &state->report.loop_edges);
 }
 
 struct Stage {
@@ -57,7 +62,7 @@ struct Stage {
 
 constexpr Stage kStages[] = {
     {"first adjustment", adjustFirst},  {"vocabulary", train},           {"loops", findAllLoops},
-    {"pose graph", closeAllLoops},      {"landmark search", search},     {"adjustment", adjustLast},
+    {"pose graph", closeAllLoops},      {"landmark search", search},     {"adjustment", adjustAgain},
     {"second landmark search", search}, {"last adjustment", adjustLast},
 };
 constexpr int kNumStages = sizeof(kStages) / sizeof(kStages[0]);

@@ -28,6 +28,9 @@ struct LoopClosureOptions {
   double min_inlier_ratio = 0.15;
   double max_sigma_m = 0.15;            ///< a less certain edge is rejected
   double max_disagreement_rad = 0.035;  ///< between the planar motion and the pose among landmarks
+  /// Between an edge and the adjusted keyframes; one that is further off was wrong after all.
+  double max_final_error_m = 0.2;
+  double max_final_error_rad = 0.03;
   // Pose graph: what the motion between consecutive keyframes and a loop edge are good for, besides their own
   // covariance.
   double step_sigma_m = 0.01;
@@ -49,6 +52,8 @@ struct LoopClosureOptions {
     visit("min_inlier_ratio", min_inlier_ratio);
     visit("max_sigma_m", max_sigma_m);
     visit("max_disagreement_rad", max_disagreement_rad);
+    visit("max_final_error_m", max_final_error_m);
+    visit("max_final_error_rad", max_final_error_rad);
     visit("step_sigma_m", step_sigma_m);
     visit("step_sigma_rad", step_sigma_rad);
     visit("loop_sigma_m", loop_sigma_m);
@@ -92,5 +97,8 @@ LoopEdge verifyLoop(const LoopClosureOptions& options, const MappingData& data, 
 /// Robust pose graph over all keyframes (Lee et al., IROS 2013): moves the keyframes, and says of every
 /// verified edge whether it was accepted.
 void closeLoops(const LoopClosureOptions& options, std::vector<LoopEdge>* edges, MappingData* data);
+
+/// Rejects accepted edges that the adjusted keyframes contradict: thousands of landmarks outvote a few.
+void checkLoops(const LoopClosureOptions& options, const MappingData& data, std::vector<LoopEdge>* edges);
 
 }  // namespace vcharge
