@@ -77,9 +77,7 @@ void DriveLocalizer::predict(const LocalizationFrame& frame) {
     }
     filter_.addNoise(options_.unknown_motion_m_per_s * period_s, options_.unknown_turn_rad_per_s * period_s);
   } else if (period_s < 0.0) {
-    filter_.forget();  // a replay that started over
-    candidate_.reset();
-    last_fix_.reset();
+    forget();  // a replay that started over
   }
   last_stamp_ = frame.stamp;
   last_num_resets_ = frame.num_resets;
@@ -169,40 +167,56 @@ void DriveLocalizer::searchWholeMap(const LocalizationFrame& frame, const RigFea
   }
 }
 
+void DriveLocalizer::forget() {
+  filter_.forget();
+  candidate_.reset();
+  last_fix_.reset();
+  frames_without_fix_ = 0;
+}
+
 LocalizationResult DriveLocalizer::process(const LocalizationFrame& frame) {
   LocalizationResult result;
-  result.stamp = frame.stamp;
-  result.odom_from_vehicle = frame.odom_from_vehicle;
-  predict(frame);
   RigFeatures features;
   {
     const StageTimer timer("features", &result);
     features = localizer_.extract(health_.withoutFrozen(frame));
-    health_.addFeatures(features);
   }
-  if (isLost()) {
+  localize(frame, features, &result);
+  return result;
+}
+
+LocalizationResult DriveLocalizer::process(const LocalizationFrame& frame, const RigFeatures& features) {
+  LocalizationResult result;
+  localize(frame, features, &result);
+  return result;
+}
+
+void DriveLocalizer::localize(const LocalizationFrame& frame, const RigFeatures& features,
+                              LocalizationResult* result) {
+  result->stamp = frame.stamp;
+  result->odom_from_vehicle = frame.odom_from_vehicle;
+  health_.addFeatures(features);
+  predict(frame);
+  bool search_whole_map = isLost();
+  if (search_whole_map) {
     filter_.forget();
-    const StageTimer timer("whole map", &result);
-    searchWholeMap(frame, features, &result);
   } else {
-    {
-      const StageTimer timer("guided search", &result);
-      track(features, &result);
-    }
+    const StageTimer timer("guided search", result);
+    track(features, result);
     const bool is_stuck =
         frames_without_fix_ > 0 && frames_without_fix_ % options_.max_frames_without_fix == 0;
-    if (is_stuck || (frames_without_fix_ > 0 && candidate_)) {
-      const StageTimer timer("whole map", &result);
-      searchWholeMap(frame, features, &result);
-    }
+    search_whole_map = is_stuck || (frames_without_fix_ > 0 && candidate_);
+  }
+  if (search_whole_map) {
+    const StageTimer timer("whole map", result);
+    searchWholeMap(frame, features, result);
   }
   if (filter_.hasPose()) {
-    result.pose = filter_.pose();
+    result->pose = filter_.pose();
   }
-  result.since_fix_s =
+  result->since_fix_s =
       last_fix_ ? toSeconds(frame.stamp - *last_fix_) : std::numeric_limits<double>::infinity();
-  result.camera_warnings = health_.warnings();
-  return result;
+  result->camera_warnings = health_.warnings();
 }
 
 }  // namespace vcharge

@@ -25,6 +25,7 @@ using namespace vcharge;
 struct Arguments {
   std::string bag, rig, map, options, output;
   std::vector<std::string> cameras;
+  int forget_every = 0;
   bool show_options = false;
 };
 
@@ -48,6 +49,9 @@ void localizeDrive(const Arguments& arguments, const DriveLocalizerOptions& opti
       if (!is_used[i]) {
         frame.images[i] = Image();
       }
+    }
+    if (arguments.forget_every > 0 && summary.numFrames() % arguments.forget_every == 0) {
+      localizer.forget();
     }
     const LocalizationResult result = localizer.process(frame);
     summary.add(result);
@@ -88,6 +92,9 @@ int main(int argc, char** argv) {
   app.add_option("--output", arguments.output, "TUM file to write")->required()->check(requireNotEmpty);
   app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
   app.add_option("--options", arguments.options, "YAML with overrides of DriveLocalizerOptions");
+  app.add_option("--forget-every", arguments.forget_every,
+                 "start from nothing again after so many frames, to see how soon a place is found; 0: never")
+      ->check(CLI::NonNegativeNumber);
   app.add_flag("--show-options", arguments.show_options, "print all options with their values");
   return runTool(&app, argc, argv, [&] {
     DriveLocalizerOptions options;

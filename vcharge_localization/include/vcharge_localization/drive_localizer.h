@@ -73,9 +73,14 @@ class DriveLocalizer {
                  const DriveLocalizerOptions& options = DriveLocalizerOptions());
 
   LocalizationResult process(const LocalizationFrame& frame);
+  /// The same where the frame's features are known; its images are not looked at.
+  LocalizationResult process(const LocalizationFrame& frame, const RigFeatures& features);
 
   /// Somebody says where the vehicle is now; the next frames tell whether that is right.
   void seed(const PosePrior& pose);
+
+  /// As if this were the first frame.
+  void forget();
 
   const MapLocalizer& localizer() const { return localizer_; }
 
@@ -85,6 +90,7 @@ class DriveLocalizer {
     RigidTransform map_from_vehicle;
     std::optional<RigidTransform> odom_from_vehicle;
   };
+  void localize(const LocalizationFrame& frame, const RigFeatures& features, LocalizationResult* result);
   void predict(const LocalizationFrame& frame);
   bool isLost() const;
   void track(const RigFeatures& features, LocalizationResult* result);

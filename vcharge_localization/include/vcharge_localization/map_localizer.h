@@ -20,8 +20,9 @@ namespace vcharge {
 
 struct MapLocalizerOptions {
   int min_inliers = 20;  ///< the paper's
-  /// Of all matches that guided search found, those that the pose must explain.
-  double min_inlier_ratio = 0.3;
+  /// Of all matches that guided search found, those that the pose must explain: about twice as many as fit
+  /// any pose by chance, since a match is off by no more than the search's radius.
+  double min_inlier_ratio = 0.15;
   double max_sigma_m = 0.2;  ///< a less certain pose is no fix
   double max_sigma_rad = 0.02;
   // Guided search: landmarks that the nearest keyframes saw, where they are expected.
