@@ -23,6 +23,21 @@ float stretchOf(const Eigen::Vector3f& direction) {
   return 1.0F / std::max(0.02F, std::abs(direction.z()));
 }
 
+SurfacePoint middleOf(const std::array<SurfacePoint, 4>& points) {
+  SurfacePoint middle = points[0];
+  for (size_t i = 1; i < 4; ++i) {
+    middle.position += points[i].position;
+    middle.direction += points[i].direction;
+    middle.u += points[i].u;
+    middle.v += points[i].v;
+  }
+  middle.position *= 0.25F;
+  middle.direction *= 0.25F;  // unit to within a millionth
+  middle.u *= 0.25F;
+  middle.v *= 0.25F;
+  return middle;
+}
+
 // The four samples of a pixel lie in four rows and columns: along a stretched footprint they are taps a
 // quarter of the pixel apart, so that only the part between them has to be averaged by the pyramid.
 float groundSampleWidth(float footprint_m, float stretch) {
@@ -120,15 +135,17 @@ float SurfaceShader::shade(const SurfacePoint& point, float sun_visibility) cons
 
 float SurfaceShader::shadePixel(const std::array<SurfacePoint, 4>& points, float sun_visibility) const {
   const Material& material = materialOf(points[0].triangle);
+  // Light, like texture, is that of the whole pixel: of its middle, which is not where any sample is.
+  const SurfacePoint middle = middleOf(points);
   if (material.mapping == Material::Mapping::kGround) {
     return shadeGroundPixel(
         material, {points[0].position, points[1].position, points[2].position, points[3].position},
-        points[0].geometric_normal.normalized(), points[0].direction, points[0].footprint_m, sun_visibility);
+        middle.geometric_normal.normalized(), middle.direction, middle.footprint_m, sun_visibility);
   }
-  const Interpolated surface = interpolate(points[0]);
+  const Interpolated surface = interpolate(middle);
   const float albedo =
       material.mapping == Material::Mapping::kTexture ? meanAlbedo(points, surface) : material.albedo;
-  return lightOf(points[0], surface, albedo, sun_visibility);
+  return lightOf(middle, surface, albedo, sun_visibility);
 }
 
 SurfaceShader::Interpolated SurfaceShader::interpolate(const SurfacePoint& point) const {
