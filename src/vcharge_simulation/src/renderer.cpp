@@ -180,8 +180,8 @@ class BlockRenderer {
     instant_.intersect(active, rays);
   }
 
-  // One shadow ray for each pixel: from its middle where one surface fills it, else from its first sample that
-  // needs one.
+  // One shadow ray for each pixel: from its middle where one surface fills it, else from its first sample
+  // that needs one.
   void traceShadows(const RTCRayHit16& rays, uint8_t pixels, uint32_t body_mask,
                     std::array<float, 4>* sun_visibility) const {
     if (!has_sun_) {
@@ -196,9 +196,8 @@ class BlockRenderer {
             rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
           continue;
         }
-        const Eigen::Vector3f position = i == 4 * p && meetsOneTriangle(rays, p, body_mask)
-                                             ? middleOfPixel(rays, p)
-                                             : positionOf(rays, i);
+        const Eigen::Vector3f position =
+            i == 4 * p && meetsOneTriangle(rays, p, body_mask) ? middleOfPixel(rays, p) : positionOf(rays, i);
         const Material& material = shader_.materialOf(rays.hit.primID[i]);
         if (isShadowed(position)) {
           (*sun_visibility)[static_cast<size_t>(p)] = 0.0F;

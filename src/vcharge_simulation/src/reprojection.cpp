@@ -1,21 +1,28 @@
 #include "reprojection.h"
 
+#include <algorithm>
 #include <cmath>
+#include <iomanip>
 #include <limits>
 #include <optional>
+#include <sstream>
 
+#include <tbb/parallel_for.h>
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <Eigen/SVD>
 #include <opencv2/imgproc.hpp>
 
+#include "vcharge_core/error.h"
 #include "vcharge_simulation/camera_response.h"
 
 namespace vcharge {
 
 namespace {
 
-const double kMinCosine = std::cos(75.0 * 3.14159265358979323846 / 180.0);
+constexpr double kDegree = 3.14159265358979323846 / 180.0;
+const double kMinIncidenceCosine = std::cos(75.0 * kDegree);
+const double kMinAxisCosine = std::cos(85.0 * kDegree);  // the image fades at the rim, from 89 degrees
 constexpr double kMinResolution = 0.8;
 constexpr double kMaxRangeError = 0.03;  // share of the range
 constexpr double kMaxRelief_px = 0.25;   // of `first`
@@ -28,39 +35,27 @@ class Comparison {
   Comparison(const Picture& first, const Picture& second)
       : first_(first),
         second_(second),
-        second_from_first_(second.world_from_camera.inverse() * first.world_from_camera),
-        points_(static_cast<size_t>(first.gray.size().area()), Eigen::Vector3d::Constant(kNaN)) {
-    for (int y = 0; y < first.gray.rows; ++y) {
-      for (int x = 0; x < first.gray.cols; ++x) {
-        Eigen::Vector3d ray;
-        if (!std::isnan(first.range_m.at<float>(y, x)) && first.camera.unproject({x, y}, &ray)) {
-          points_[index(x, y)] = first.range_m.at<float>(y, x) * ray;
-        }
-      }
-    }
-  }
+        second_from_first_(second.world_from_camera.inverse() * first.world_from_camera) {}
 
   // Gray of `second` over the part of the surface that a pixel of `first` (not on its border) shows.
   std::optional<double> grayOfSecond(int x, int y) const {
-    const Eigen::Vector3d& here = points_[index(x, y)];
+    const Eigen::Vector3d here = point(x, y);
     const Eigen::Vector3d normal =
-        (points_[index(x + 1, y)] - points_[index(x - 1, y)])
-            .cross(points_[index(x, y + 1)] - points_[index(x, y - 1)])
-            .normalized();
+        (point(x + 1, y) - point(x - 1, y)).cross(point(x, y + 1) - point(x, y - 1)).normalized();
     const Eigen::Vector3d there = second_from_first_ * here;
     const Eigen::Vector3d normal_there = second_from_first_.rotation() * normal;
     // Also false where a range is missing.
-    const bool faces_both = std::abs(normal.dot(here.normalized())) > kMinCosine &&
-                            std::abs(normal_there.dot(there.normalized())) > kMinCosine &&
-                            here.z() > kMinCosine * here.norm() && there.z() > kMinCosine * there.norm();
+    const bool faces_both = std::abs(normal.dot(here.normalized())) > kMinIncidenceCosine &&
+                            std::abs(normal_there.dot(there.normalized())) > kMinIncidenceCosine &&
+                            here.z() > kMinAxisCosine * here.norm() &&
+                            there.z() > kMinAxisCosine * there.norm();
     Eigen::Vector2d pixel;
     if (!faces_both || !second_.camera.project(there, &pixel)) {
       return std::nullopt;
     }
     const std::optional<Eigen::Matrix2d> footprint = findFootprint(x, y, pixel);
     // A view that is coarser in any direction cannot reproduce a finer one; a finer one is averaged.
-    if (!footprint ||
-        Eigen::JacobiSVD<Eigen::Matrix2d>(*footprint).singularValues().y() < kMinResolution) {
+    if (!footprint || Eigen::JacobiSVD<Eigen::Matrix2d>(*footprint).singularValues().y() < kMinResolution) {
       return std::nullopt;
     }
     double gray = 0.0;
@@ -77,14 +72,16 @@ class Comparison {
   }
 
  private:
-  size_t index(int x, int y) const { return static_cast<size_t>(y) * first_.gray.cols + x; }
+  Eigen::Vector3d point(int x, int y) const {
+    return first_.points[static_cast<size_t>(y) * first_.gray.cols + x].cast<double>();
+  }
 
   // What one pixel of `first` covers in `second`, where its neighbours are parts of the same surface.
   std::optional<Eigen::Matrix2d> findFootprint(int x, int y, const Eigen::Vector2d& pixel) const {
     Eigen::Matrix<double, 2, 9> around;
     for (int k = 0; k < 9; ++k) {
       Eigen::Vector2d at;
-      const Eigen::Vector3d& neighbour = points_[index(x + k % 3 - 1, y + k / 3 - 1)];
+      const Eigen::Vector3d neighbour = point(x + k % 3 - 1, y + k / 3 - 1);
       if (!neighbour.allFinite() || !second_.camera.project(second_from_first_ * neighbour, &at)) {
         return std::nullopt;
       }
@@ -124,30 +121,45 @@ class Comparison {
   const Picture& first_;
   const Picture& second_;
   const RigidTransform second_from_first_;
-  std::vector<Eigen::Vector3d> points_;  // of `first`'s pixels, in its frame
 };
 
 bool showsCar(const Renderer& renderer, const Picture& picture, int x, int y) {
-  Eigen::Vector3d ray;
+  const Eigen::Vector3d point =
+      picture.points[static_cast<size_t>(y) * picture.gray.cols + x].cast<double>().normalized();
   SurfaceKind kind = SurfaceKind::kOther;
-  return picture.camera.unproject({x, y}, &ray) &&
-         renderer.castRay(picture.world_from_camera.translation(), picture.world_from_camera.rotation() * ray,
-                          0.0, &kind) &&
+  return renderer.castRay(picture.world_from_camera.translation(),
+                          picture.world_from_camera.rotation() * point, 0.0, &kind) &&
          kind == SurfaceKind::kCar;
 }
 
 }  // namespace
 
-Picture takePicture(const Renderer& renderer, const Sighting& sighting) {
-  const CameraView& view = sighting.view;
-  const RigidTransform world_from_camera = sighting.world_from_vehicle * *view.camera().vehicle_from_camera;
+Picture takePicture(const Renderer& renderer, const CameraView& view,
+                    const RigidTransform& world_from_vehicle, double time_s) {
+  check(view.lens().veil == 0.0, "takePicture: expected a lens without veil");
   // The same surface passes other parts of each lens.
   cv::Mat flat;
-  cv::divide(renderer.renderLight(view, sighting.world_from_vehicle, sighting.time_s),
-             cv::max(view.vignette(), 0.05), flat);
-  return {CameraResponse().develop(flat),
-          renderer.renderRange(view, sighting.world_from_vehicle, sighting.time_s), view.camera().model,
-          world_from_camera};
+  cv::divide(renderer.renderLight(view, world_from_vehicle, time_s), cv::max(view.vignette(), 0.05), flat);
+  Picture picture{CameraResponse().develop(flat),
+                  renderer.renderRange(view, world_from_vehicle, time_s),
+                  {},
+                  view.camera().model,
+                  world_from_vehicle * *view.camera().vehicle_from_camera};
+  picture.points.reserve(static_cast<size_t>(view.size().area()));
+  for (int y = 0; y < view.size().height; ++y) {
+    for (int x = 0; x < view.size().width; ++x) {
+      picture.points.push_back(view.centreRay(x, y) * picture.range_m.at<float>(y, x));
+    }
+  }
+  return picture;
+}
+
+std::string toString(const Reprojection& result) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(2) << result.mean_difference << " gray levels (single pixels "
+       << result.mean_pixel_difference << "), shift " << std::setprecision(3) << result.shift_px.norm()
+       << " pixels, " << result.count << " means";
+  return text.str();
 }
 
 Reprojection reproject(const Renderer& renderer, const Picture& first, const Picture& second,
@@ -155,14 +167,14 @@ Reprojection reproject(const Renderer& renderer, const Picture& first, const Pic
   const Comparison comparison(first, second);
   const cv::Size size = first.gray.size();
   cv::Mat moved(size, CV_32FC1, cv::Scalar(kNaN));  // `second` as `first` would see it
-  for (int y = 1; y + 1 < size.height; ++y) {
+  tbb::parallel_for(1, std::max(1, size.height - 1), [&](int y) {
     for (int x = 1; x + 1 < size.width; ++x) {
       const std::optional<double> gray = comparison.grayOfSecond(x, y);
       if (gray && (surfaces == Surfaces::kAll || !showsCar(renderer, first, x, y))) {
         moved.at<float>(y, x) = static_cast<float>(*gray);
       }
     }
-  }
+  });
   Reprojection result;
   // Of the fit difference = gradient * shift + brightness.
   Eigen::Matrix3d normal_matrix = Eigen::Matrix3d::Zero();
