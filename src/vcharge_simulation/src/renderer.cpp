@@ -101,9 +101,9 @@ class BlockRenderer {
     return origin_ + rays.ray.tfar[i] * direction(rays, i);
   }
 
+  // The first and the last of a pixel's samples lie opposite each other about its middle.
   Eigen::Vector3f middleOfPixel(const RTCRayHit16& rays, int p) const {
-    return 0.25F * (positionOf(rays, 4 * p) + positionOf(rays, 4 * p + 1) + positionOf(rays, 4 * p + 2) +
-                    positionOf(rays, 4 * p + 3));
+    return 0.5F * (positionOf(rays, 4 * p) + positionOf(rays, 4 * p + 3));
   }
 
   static bool meetsOneTriangle(const RTCRayHit16& rays, int pixel, uint32_t body_mask) {

@@ -23,18 +23,13 @@ float stretchOf(const Eigen::Vector3f& direction) {
   return 1.0F / std::max(0.02F, std::abs(direction.z()));
 }
 
+// The first and the last of a pixel's samples lie opposite each other about its middle.
 SurfacePoint middleOf(const std::array<SurfacePoint, 4>& points) {
   SurfacePoint middle = points[0];
-  for (size_t i = 1; i < 4; ++i) {
-    middle.position += points[i].position;
-    middle.direction += points[i].direction;
-    middle.u += points[i].u;
-    middle.v += points[i].v;
-  }
-  middle.position *= 0.25F;
-  middle.direction *= 0.25F;  // unit to within a millionth
-  middle.u *= 0.25F;
-  middle.v *= 0.25F;
+  middle.position = 0.5F * (points[0].position + points[3].position);
+  middle.direction = 0.5F * (points[0].direction + points[3].direction);  // unit to within a millionth
+  middle.u = 0.5F * (points[0].u + points[3].u);
+  middle.v = 0.5F * (points[0].v + points[3].v);
   return middle;
 }
 
@@ -135,13 +130,14 @@ float SurfaceShader::shade(const SurfacePoint& point, float sun_visibility) cons
 
 float SurfaceShader::shadePixel(const std::array<SurfacePoint, 4>& points, float sun_visibility) const {
   const Material& material = materialOf(points[0].triangle);
-  // Light, like texture, is that of the whole pixel: of its middle, which is not where any sample is.
-  const SurfacePoint middle = middleOf(points);
   if (material.mapping == Material::Mapping::kGround) {
     return shadeGroundPixel(
         material, {points[0].position, points[1].position, points[2].position, points[3].position},
-        middle.geometric_normal.normalized(), middle.direction, middle.footprint_m, sun_visibility);
+        points[0].geometric_normal.normalized(), 0.5F * (points[0].direction + points[3].direction),
+        points[0].footprint_m, sun_visibility);
   }
+  // Light, like texture, is that of the whole pixel: of its middle, where no sample is.
+  const SurfacePoint middle = middleOf(points);
   const Interpolated surface = interpolate(middle);
   const float albedo =
       material.mapping == Material::Mapping::kTexture ? meanAlbedo(points, surface) : material.albedo;
