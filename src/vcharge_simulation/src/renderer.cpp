@@ -97,6 +97,15 @@ class BlockRenderer {
     return {rays.ray.dir_x[i], rays.ray.dir_y[i], rays.ray.dir_z[i]};
   }
 
+  Eigen::Vector3f positionOf(const RTCRayHit16& rays, int i) const {
+    return origin_ + rays.ray.tfar[i] * direction(rays, i);
+  }
+
+  // The first and the last of a pixel's samples lie opposite each other about its middle.
+  Eigen::Vector3f middleOfPixel(const RTCRayHit16& rays, int p) const {
+    return 0.5F * (positionOf(rays, 4 * p) + positionOf(rays, 4 * p + 3));
+  }
+
   static bool meetsOneTriangle(const RTCRayHit16& rays, int pixel, uint32_t body_mask) {
     const int i = CameraView::kSamplesPerPixel * pixel;
     const uint32_t triangle = rays.hit.primID[i];
@@ -109,7 +118,7 @@ class BlockRenderer {
   SurfacePoint surfacePoint(const RTCRayHit16& rays, int i, float footprint_m) const {
     SurfacePoint point;
     point.direction = direction(rays, i);
-    point.position = origin_ + rays.ray.tfar[i] * point.direction;
+    point.position = positionOf(rays, i);
     point.geometric_normal = {rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]};
     point.triangle = rays.hit.primID[i];
     point.u = rays.hit.u[i];
@@ -171,7 +180,8 @@ class BlockRenderer {
     instant_.intersect(active, rays);
   }
 
-  // One shadow ray for each pixel, from its first sample that needs one.
+  // One shadow ray for each pixel: from its middle where one surface fills it, else from its first sample
+  // that needs one.
   void traceShadows(const RTCRayHit16& rays, uint8_t pixels, uint32_t body_mask,
                     std::array<float, 4>* sun_visibility) const {
     if (!has_sun_) {
@@ -186,7 +196,8 @@ class BlockRenderer {
             rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
           continue;
         }
-        const Eigen::Vector3f position = origin_ + rays.ray.tfar[i] * direction(rays, i);
+        const Eigen::Vector3f position =
+            i == 4 * p && meetsOneTriangle(rays, p, body_mask) ? middleOfPixel(rays, p) : positionOf(rays, i);
         const Material& material = shader_.materialOf(rays.hit.primID[i]);
         if (isShadowed(position)) {
           (*sun_visibility)[static_cast<size_t>(p)] = 0.0F;

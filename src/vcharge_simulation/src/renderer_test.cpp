@@ -188,6 +188,63 @@ TEST(RendererTest, CheckerboardKeepsItsSquaresNearbyAndItsMeanFarAway) {
   EXPECT_NEAR(far_albedo / far_pixels, 0.5 * (kDarkSquare + kBrightSquare), 8.0);
 }
 
+// The edge of the light on a wall, between rows of the image, is where the range says.
+TEST(RendererTest, LightLiesWhereItsSurfaceIs) {
+  constexpr int kTexels = 256;
+  constexpr float kHalf_m = 2.0F;
+  cv::Mat light_map(kTexels, kTexels, CV_8UC1, cv::Scalar(0));
+  light_map.rowRange(0, kTexels / 2).setTo(255);
+  auto scene = std::make_shared<Scene>();
+  Material material;
+  material.translucency = 1.0F;  // wherever the sun is
+  material.sun_map = 0;
+  material.sun_map_texels_per_m = kTexels / (2.0F * kHalf_m);
+  scene->textures.emplace_back(light_map, Texture::Border::kClamp);
+  const uint32_t wall = scene->addMaterial(material);
+  constexpr float kWall_m = 6.0F;
+  constexpr float kEdge_m = 1.0F;
+  addQuad({kWall_m, kHalf_m, kEdge_m - kHalf_m}, {kWall_m, -kHalf_m, kEdge_m - kHalf_m},
+          {kWall_m, -kHalf_m, kEdge_m + kHalf_m}, {kWall_m, kHalf_m, kEdge_m + kHalf_m}, wall, &scene->mesh);
+  scene->sky = std::make_unique<Sky>(LightOptions(), 1);
+  const Renderer renderer(scene);
+  const RigCamera camera = makeGolfRig(1, 0.5).cameras[0];
+  const CameraView view(camera, nullptr, kIdealLens);
+  cv::Mat light;
+  cv::divide(renderer.renderLight(view, RigidTransform()), view.vignette(), light);
+  const cv::Mat range_m = renderer.renderRange(view, RigidTransform());
+  const auto height = [&](int x, int y) {
+    return (*camera.vehicle_from_camera * (range_m.at<float>(y, x) * view.centreRay(x, y).cast<double>()))
+        .z();
+  };
+  int columns = 0;
+  double mean_error_px = 0.0;
+  for (int x = 0; x < light.cols; ++x) {
+    // Rows about the edge, all on the wall.
+    constexpr int kReach = 8;
+    int first_below = 0;
+    while (first_below < light.rows && !(height(x, first_below) < kEdge_m)) {
+      ++first_below;
+    }
+    const int top = first_below - kReach;
+    if (first_below + kReach >= light.rows || top < 0 || std::isnan(height(x, top)) ||
+        std::isnan(height(x, first_below + kReach))) {
+      continue;
+    }
+    const double above_m = height(x, first_below - 1);
+    const double edge = first_below - 1 + (above_m - kEdge_m) / (above_m - height(x, first_below));
+    const double bright = light.at<float>(top, x);
+    const double dark = light.at<float>(first_below + kReach, x);
+    double seen = top - 0.5;
+    for (int y = top; y < first_below + kReach; ++y) {
+      seen += (light.at<float>(y, x) - dark) / (bright - dark);
+    }
+    mean_error_px += seen - edge;
+    ++columns;
+  }
+  ASSERT_GT(columns, 50);
+  EXPECT_NEAR(mean_error_px / columns, 0.0, 0.05);
+}
+
 TEST(RendererTest, PostsAndKerbsOnPlainGroundAreNotOverlooked) {
   const auto with_post = checkerboardScene();
   Material black;

@@ -10,137 +10,36 @@
 #include <tbb/global_control.h>
 #include <opencv2/imgproc.hpp>
 
+#include "catalogue_cases.h"
 #include "lot_layout.h"
-#include "reprojection.h"
 #include "scene_parts.h"
 #include "vcharge_simulation/car_model.h"
 #include "vcharge_simulation/drive_simulator.h"
 #include "vcharge_simulation/golf_rig.h"
-#include "vcharge_simulation/rig_catalogue.h"
 #include "vcharge_simulation/truth_maps.h"
 
 namespace vcharge {
 namespace {
 
 constexpr double kImageScale = 0.3;
-constexpr double kImagePeriod_s = 0.08;
 constexpr double kCell_m = 0.1;
-constexpr LensOptions kIdealLens{0.0, 0.0, 0.0};
-
-// A scene of the catalogue, and where and when the checks look at it.
-struct SceneCase {
-  const char* scene;
-  const char* drive;
-  int frame;
-};
-constexpr SceneCase kCases[] = {{"lot", "short", 10},
-                                {"garage", "short", 10},
-                                {"obstacles", "creep", 100},
-                                {"two_levels", "up_and_down", 100},
-                                {"chessboard", "board_front", 30}};
-
-// Sharp enough for small images, and quick to build.
-const Renderer& rendererOf(const std::string& scene) {
-  static std::map<std::string, Renderer> renderers;
-  const auto found = renderers.find(scene);
-  if (found != renderers.end()) {
-    return found->second;
-  }
-  SceneOptions options;
-  options.image_scale = kImageScale;
-  options.detail = 0.25;
-  return renderers.emplace(scene, buildScene(scene, options)).first->second;
-}
 
 class SceneTest : public testing::TestWithParam<SceneCase> {
  protected:
   const Renderer& renderer() const { return rendererOf(GetParam().scene); }
-  Sighting sighting(const CameraView& view, int later_frames = 0) const {
-    static std::map<std::string, SimulatedDrive> drives;
-    const DrivePlan plan = planDrive(GetParam().scene, GetParam().drive);
-    const std::string name = std::string(GetParam().scene) + plan.name;
-    if (drives.count(name) == 0) {
-      drives.emplace(name, simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1, FaultOptions(),
-                                         plan.ground_height));
-    }
-    const int frame = GetParam().frame + later_frames;
-    return {view, drives.at(name).world_from_vehicle.at(static_cast<size_t>(frame)).world_from_vehicle,
-            plan.start_s + kImagePeriod_s * frame};
-  }
 };
 
 std::string sceneOf(const testing::TestParamInfo<SceneCase>& info) {
   return info.param.scene;
 }
-INSTANTIATE_TEST_SUITE_P(Catalogue, SceneTest, testing::ValuesIn(kCases), sceneOf);
-
-TEST_P(SceneTest, ExactRangeReproducesTheImageFromFrameToFrame) {
-  const CameraRig rig = makeGolfRig(1, kImageScale);
-  for (const size_t camera : {0U, 1U}) {
-    const CameraView view(rig.cameras[camera], nullptr);
-    const Reprojection result = reproject(renderer(), sighting(view), sighting(view, 1));
-    RecordProperty("milligray_" + rig.cameras[camera].name, static_cast<int>(1000 * result.mean_difference));
-    EXPECT_GT(result.count, 5000);
-    EXPECT_LE(result.mean_difference, 3.0) << rig.cameras[camera].name;
-  }
-}
-
-TEST_P(SceneTest, ExactRangeReproducesTheImageFromCameraToCamera) {
-  const CameraRig rig = makeGolfRig(1, kImageScale);
-  // One place is seen through different parts of the two lenses: as the vignette is divided out, the blur,
-  // which is twice as wide at the rim, is left out.
-  const CameraView front(rig.cameras[0], nullptr, kIdealLens);
-  const CameraView left(rig.cameras[1], nullptr, kIdealLens);
-  double sum = 0.0;
-  int count = 0;
-  // Paint and glass mirror other surroundings into each camera, by physics: 4 to 12 gray levels.
-  for (const Reprojection& result :
-       {reproject(renderer(), sighting(front), sighting(left), Surfaces::kNoCars),
-        reproject(renderer(), sighting(left), sighting(front), Surfaces::kNoCars)}) {
-    sum += result.count * result.mean_difference;
-    count += result.count;
-  }
-  RecordProperty("milligray", static_cast<int>(1000 * sum / count));
-  EXPECT_GT(count, 500);
-  EXPECT_LE(sum / count, 3.0);
-}
-
-// Front and left camera, as above, through lenses of both models.
-TEST_P(SceneTest, ExactRangeReproducesTheImageThroughTheLensesOfRandomRigs) {
-  std::set<std::string> models;
-  for (const uint64_t seed : {1U, 2U, 3U}) {
-    const CameraRig rig = makeRig("random", seed, kImageScale);
-    const CameraView one(rig.cameras[0], nullptr, kIdealLens);
-    const CameraView other(rig.cameras[1], nullptr, kIdealLens);
-    const std::string label = "rig " + std::to_string(seed);
-    for (const CameraView* view : {&one, &other}) {
-      models.insert(view->camera().model.name());
-      const Reprojection result = reproject(renderer(), sighting(*view), sighting(*view, 1));
-      EXPECT_GT(result.count, 5000) << label;
-      EXPECT_LE(result.mean_difference, 3.0) << label;
-    }
-    double sum = 0.0;
-    int count = 0;
-    for (const Reprojection& result :
-         {reproject(renderer(), sighting(one), sighting(other), Surfaces::kNoCars),
-          reproject(renderer(), sighting(other), sighting(one), Surfaces::kNoCars)}) {
-      sum += result.count * result.mean_difference;
-      count += result.count;
-    }
-    RecordProperty("milligray_" + std::to_string(seed), static_cast<int>(1000 * sum / count));
-    // Some lenses leave little of the overlap within their better resolved part.
-    EXPECT_GT(count, 100) << label;
-    EXPECT_LE(sum / count, 3.0) << label;
-  }
-  EXPECT_EQ(models.size(), 2U);
-}
+INSTANTIATE_TEST_SUITE_P(Catalogue, SceneTest, testing::ValuesIn(kSceneCases), sceneOf);
 
 TEST_P(SceneTest, SameBytesOnAnyNumberOfThreads) {
   const CameraView view(makeGolfRig(1, 0.15).cameras[1], makeGolfBody());
   const auto render = [&](size_t threads) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    const Sighting at = sighting(view);
-    return renderer().renderLight(at.view, at.world_from_vehicle, at.time_s);
+    const Moment moment = momentOf(GetParam());
+    return renderer().renderLight(view, moment.world_from_vehicle, moment.time_s);
   };
   EXPECT_EQ(cv::norm(render(1), render(4), cv::NORM_INF), 0.0);
 }

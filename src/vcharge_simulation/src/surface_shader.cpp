@@ -23,6 +23,16 @@ float stretchOf(const Eigen::Vector3f& direction) {
   return 1.0F / std::max(0.02F, std::abs(direction.z()));
 }
 
+// The first and the last of a pixel's samples lie opposite each other about its middle.
+SurfacePoint middleOf(const std::array<SurfacePoint, 4>& points) {
+  SurfacePoint middle = points[0];
+  middle.position = 0.5F * (points[0].position + points[3].position);
+  middle.direction = 0.5F * (points[0].direction + points[3].direction);  // unit to within a millionth
+  middle.u = 0.5F * (points[0].u + points[3].u);
+  middle.v = 0.5F * (points[0].v + points[3].v);
+  return middle;
+}
+
 // The four samples of a pixel lie in four rows and columns: along a stretched footprint they are taps a
 // quarter of the pixel apart, so that only the part between them has to be averaged by the pyramid.
 float groundSampleWidth(float footprint_m, float stretch) {
@@ -123,12 +133,15 @@ float SurfaceShader::shadePixel(const std::array<SurfacePoint, 4>& points, float
   if (material.mapping == Material::Mapping::kGround) {
     return shadeGroundPixel(
         material, {points[0].position, points[1].position, points[2].position, points[3].position},
-        points[0].geometric_normal.normalized(), points[0].direction, points[0].footprint_m, sun_visibility);
+        points[0].geometric_normal.normalized(), 0.5F * (points[0].direction + points[3].direction),
+        points[0].footprint_m, sun_visibility);
   }
-  const Interpolated surface = interpolate(points[0]);
+  // Light, like texture, is that of the whole pixel: of its middle, where no sample is.
+  const SurfacePoint middle = middleOf(points);
+  const Interpolated surface = interpolate(middle);
   const float albedo =
       material.mapping == Material::Mapping::kTexture ? meanAlbedo(points, surface) : material.albedo;
-  return lightOf(points[0], surface, albedo, sun_visibility);
+  return lightOf(middle, surface, albedo, sun_visibility);
 }
 
 SurfaceShader::Interpolated SurfaceShader::interpolate(const SurfacePoint& point) const {
