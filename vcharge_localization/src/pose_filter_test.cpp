@@ -88,7 +88,7 @@ TEST(PoseFilterTest, ErrorIsAsTheCovarianceTells) {
       filter.predict(drive.step(), kPeriod_s);
       const RigidTransform seen(shifted.rotation() * drive.map_from_vehicle.rotation(),
                                 drive.map_from_vehicle.translation() + shifted.translation());
-      filter.update(fixAt(seen, 0.01, 0.0005, &random));
+      filter.update(fixAt(seen, 0.004, 0.0003, &random));
       if (i > 100 && i % 50 == 24) {
         const PosePrior pose = filter.pose();
         const Eigen::Vector3d shift =
