@@ -14,6 +14,7 @@
 #include "vcharge_core/progress_bar.h"
 #include "vcharge_core/sparse_map_file.h"
 #include "vcharge_core/trajectory.h"
+#include "vcharge_localization/drive_experiment.h"
 #include "vcharge_localization/drive_localizer.h"
 #include "vcharge_localization/localization_log.h"
 #include "vcharge_ros/bag_drive_source.h"
@@ -25,30 +26,40 @@ using namespace vcharge;
 struct Arguments {
   std::string bag, rig, map, options, output;
   std::vector<std::string> cameras;
+  std::vector<double> cover_s, carry_s;
   int forget_every = 0;
   bool show_options = false;
 };
 
+DriveExperiment makeExperiment(const Arguments& arguments, const CameraRig& rig) {
+  DriveExperimentOptions options;
+  for (const std::string& name : arguments.cameras) {
+    options.cameras.push_back(rig.cameraIndex(name));
+  }
+  if (!arguments.cover_s.empty()) {
+    options.cover_s = {arguments.cover_s[0], arguments.cover_s[1]};
+  }
+  if (!arguments.carry_s.empty()) {
+    options.carry_s = {arguments.carry_s[0], arguments.carry_s[1]};
+  }
+  return DriveExperiment(options);
+}
+
 void localizeDrive(const Arguments& arguments, const DriveLocalizerOptions& options) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
-  std::vector<bool> is_used(rig->cameras.size(), arguments.cameras.empty());
-  for (const std::string& name : arguments.cameras) {
-    is_used[rig->cameraIndex(name)] = true;
-  }
   const auto start = std::chrono::steady_clock::now();
   DriveLocalizer localizer(readSparseMap(arguments.map), rig, options);
   std::cout << "map ready after "
             << std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() << " s\n";
+  DriveExperiment experiment = makeExperiment(arguments, *rig);
   Trajectory trajectory;
   std::ostringstream log;
   log << localizationHeader(*rig) << "\n";
   LocalizationSummary summary;
   ContentHasher hasher;
   FrameAssembler assembler(rig->cameras.size(), options.frames, [&](LocalizationFrame frame) {
-    for (size_t i = 0; i < is_used.size(); ++i) {
-      if (!is_used[i]) {
-        frame.images[i] = Image();
-      }
+    if (!experiment.apply(&frame)) {
+      return;
     }
     if (arguments.forget_every > 0 && summary.numFrames() % arguments.forget_every == 0) {
       localizer.forget();
@@ -92,6 +103,12 @@ int main(int argc, char** argv) {
   app.add_option("--output", arguments.output, "TUM file to write")->required()->check(requireNotEmpty);
   app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
   app.add_option("--options", arguments.options, "YAML with overrides of DriveLocalizerOptions");
+  app.add_option("--cover-s", arguments.cover_s,
+                 "cover all cameras, from and to, in seconds since the first frame")
+      ->expected(2);
+  app.add_option("--carry-away-s", arguments.carry_s,
+                 "leave a part of the drive out, unseen by the odometer too, from and to")
+      ->expected(2);
   app.add_option("--forget-every", arguments.forget_every,
                  "start from nothing again after so many frames, to see how soon a place is found; 0: never")
       ->check(CLI::NonNegativeNumber);
