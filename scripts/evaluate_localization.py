@@ -288,7 +288,7 @@ def main():
         scenes = list(places)
         rows = []
         for scene, other in zip(scenes, scenes[1:] + scenes[:1]):
-            foreign = Run(args, others[other], places[scene], f"in_the_{scene}", ["--forget-every", 1])
+            foreign = Run(args, others[other], places[scene], f"in_the_{scene}")
             refused = 1.0 - np.mean(foreign.status == "localized")
             rows.append((f"the {other} refused in the map of the {scene}, frame by frame", ">= 99 %",
                          f"{100 * refused:.1f} %", mark(refused >= 0.99)))

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 #include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include <tbb/parallel_for.h>
@@ -19,6 +20,8 @@ constexpr double kReferenceWidth_px = 1280.0;
 // What a pose of place recognition is good for, where the guided search about it begins.
 constexpr double kPlaceSigma_m = 0.2;
 constexpr double kPlaceSigma_rad = 0.02;
+/// Keyframes beside a recognized one whose landmarks are looked for too.
+constexpr int kNeighbours = 2;
 
 FeatureExtractorOptions extractorOptionsOf(const SparseMap& map) {
   FeatureExtractorOptions options;
@@ -66,6 +69,7 @@ void MapLocalizerOptions::validate() const {
                min_inliers_without_prior);
   requireField(max_ambiguity > 0.0 && max_ambiguity <= 1.0, "max_ambiguity", "must be in (0, 1]",
                max_ambiguity);
+  requireField(place_max_error_rad > 0.0, "place_max_error_rad", "must be positive", place_max_error_rad);
   requireField(other_place_m > 0.0, "other_place_m", "must be positive", other_place_m);
   requireField(other_heading_rad > 0.0, "other_heading_rad", "must be positive", other_heading_rad);
   validateInner("matching", matching);
@@ -240,6 +244,35 @@ struct MapLocalizer::Search {
   }
 };
 
+cv::Mat MapLocalizer::descriptorsOf(const std::vector<size_t>& observations) const {
+  cv::Mat descriptors(static_cast<int>(observations.size()), map_->descriptors().cols,
+                      map_->descriptors().type());
+  for (size_t i = 0; i < observations.size(); ++i) {
+    map_->descriptors().row(static_cast<int>(observations[i])).copyTo(descriptors.row(static_cast<int>(i)));
+  }
+  return descriptors;
+}
+
+void MapLocalizer::add(const RigFeatures& features, size_t camera, int observation_index, int feature_index,
+                       float distance, const std::vector<size_t>& observations, Matches* matches) const {
+  const Eigen::Vector3d ray = features.rays_in_camera[camera].col(feature_index);
+  if (ray.isZero()) {
+    return;
+  }
+  const RigidTransform& vehicle_from_camera = *rig_->cameras[camera].vehicle_from_camera;
+  const int32_t landmark =
+      map_->observations()[observations[static_cast<size_t>(observation_index)]].landmark;
+  PointMatch point;
+  point.ray = {vehicle_from_camera.translation(), vehicle_from_camera.rotation() * ray};
+  point.point_m = map_->landmarks()[static_cast<size_t>(landmark)].position_m;
+  point.camera = static_cast<int>(camera);
+  point.quality = -distance;
+  matches->points.push_back(point);
+  matches->sightings.push_back(
+      {landmark, static_cast<int32_t>(camera),
+       features.images[camera].keypoints[static_cast<size_t>(feature_index)].position_px});
+}
+
 MapLocalizer::Matches MapLocalizer::searchLandmarks(const RigFeatures& features,
                                                     const RigidTransform& map_from_vehicle, double sigma_m,
                                                     double sigma_rad) const {
@@ -255,13 +288,6 @@ MapLocalizer::Matches MapLocalizer::searchLandmarks(const RigFeatures& features,
     if (expected.observations.empty()) {
       return;
     }
-    cv::Mat descriptors(static_cast<int>(expected.observations.size()), map_->descriptors().cols,
-                        map_->descriptors().type());
-    for (size_t i = 0; i < expected.observations.size(); ++i) {
-      map_->descriptors()
-          .row(static_cast<int>(expected.observations[i]))
-          .copyTo(descriptors.row(static_cast<int>(i)));
-    }
     std::vector<cv::Point2f> positions;
     for (const Keypoint& keypoint : image.keypoints) {
       positions.push_back(keypoint.position_px);
@@ -274,22 +300,11 @@ MapLocalizer::Matches MapLocalizer::searchLandmarks(const RigFeatures& features,
     const double angle_rad = options_.radius_sigmas * (sigma_rad + sigma_m / ranges_m[ranges_m.size() / 2]);
     const double radius_px =
         px * std::clamp(450.0 * angle_rad, options_.min_radius_px, options_.max_radius_px);
-    const RigidTransform& vehicle_from_camera = *rig_->cameras[camera].vehicle_from_camera;
-    for (const FeatureMatch& match : matchNearPixels(descriptors, expected.positions_px, image.descriptors,
-                                                     positions, radius_px, options_.matching)) {
-      const Eigen::Vector3d ray = features.rays_in_camera[camera].col(match.second_index);
-      if (ray.isZero()) {
-        continue;
-      }
-      const int32_t landmark = map_->observations()[expected.observations[match.first_index]].landmark;
-      PointMatch point;
-      point.ray = {vehicle_from_camera.translation(), vehicle_from_camera.rotation() * ray};
-      point.point_m = map_->landmarks()[landmark].position_m;
-      point.camera = static_cast<int>(camera);
-      point.quality = -match.distance;
-      of_camera[camera].points.push_back(point);
-      of_camera[camera].sightings.push_back(
-          {landmark, static_cast<int32_t>(camera), positions[match.second_index]});
+    for (const FeatureMatch& match :
+         matchNearPixels(descriptorsOf(expected.observations), expected.positions_px, image.descriptors,
+                         positions, radius_px, options_.matching)) {
+      add(features, camera, match.first_index, match.second_index, match.distance, expected.observations,
+          &of_camera[camera]);
     }
   });
   Matches matches;
@@ -299,7 +314,7 @@ MapLocalizer::Matches MapLocalizer::searchLandmarks(const RigFeatures& features,
   return matches;
 }
 
-PoseFix MapLocalizer::estimate(const Matches& matches, int min_inliers) const {
+PoseFix MapLocalizer::estimate(const Matches& matches, int min_inliers, double min_inlier_ratio) const {
   PoseFix fix;
   fix.num_matches = static_cast<int>(matches.points.size());
   fix.inliers_of_camera.assign(rig_->cameras.size(), 0);
@@ -321,7 +336,7 @@ PoseFix MapLocalizer::estimate(const Matches& matches, int min_inliers) const {
   }
   fix.map_from_vehicle = pose.map_from_rig;
   fix.covariance = pose.covariance;
-  if (fix.numInliers() >= min_inliers && fix.numInliers() >= options_.min_inlier_ratio * fix.num_matches &&
+  if (fix.numInliers() >= min_inliers && fix.numInliers() >= min_inlier_ratio * fix.num_matches &&
       fix.covariance.topLeftCorner<3, 3>().trace() <= options_.max_sigma_m * options_.max_sigma_m &&
       fix.covariance.bottomRightCorner<3, 3>().trace() <= options_.max_sigma_rad * options_.max_sigma_rad) {
     fix.status = LocalizationStatus::kLocalized;
@@ -333,11 +348,41 @@ PoseFix MapLocalizer::localizeNear(const RigFeatures& features, const PosePrior&
   const double sigma_m = std::sqrt(prior.covariance.topLeftCorner<3, 3>().diagonal().maxCoeff());
   const double sigma_rad = std::sqrt(prior.covariance.bottomRightCorner<3, 3>().diagonal().maxCoeff());
   const PoseFix first = estimate(searchLandmarks(features, prior.map_from_vehicle, sigma_m, sigma_rad),
-                                 options_.robust.min_inliers);
-  if (first.inliers.empty()) {
-    return first;
+                                 options_.robust.min_inliers, 0.0);
+  return first.inliers.empty() ? first : refine(features, first);
+}
+
+PoseFix MapLocalizer::refine(const RigFeatures& features, const PoseFix& fix) const {
+  return estimate(searchLandmarks(features, fix.map_from_vehicle, 0.0, 0.0), options_.min_inliers,
+                  options_.min_inlier_ratio);
+}
+
+MapLocalizer::Matches MapLocalizer::matchPlace(const RigFeatures& features, size_t camera, size_t keyframe,
+                                               size_t place_camera) const {
+  // The landmarks that this camera saw thereabouts, each once, as nearly from the place as possible.
+  std::vector<size_t> observations;
+  std::unordered_set<int32_t> landmarks;
+  const auto num_keyframes = static_cast<std::ptrdiff_t>(map_->keyframes().size());
+  for (int i = 0; i <= 2 * kNeighbours; ++i) {
+    const std::ptrdiff_t neighbour =
+        static_cast<std::ptrdiff_t>(keyframe) + (i % 2 == 0 ? i / 2 : -(i + 1) / 2);
+    if (neighbour < 0 || neighbour >= num_keyframes) {
+      continue;
+    }
+    const auto [begin, end] = map_->observationsOf(static_cast<size_t>(neighbour), place_camera);
+    for (size_t k = begin; k < end; ++k) {
+      if (landmarks.insert(map_->observations()[k].landmark).second) {
+        observations.push_back(k);
+      }
+    }
   }
-  return estimate(searchLandmarks(features, first.map_from_vehicle, 0.0, 0.0), options_.min_inliers);
+  Matches matches;
+  const ImageFeatures& image = features.images[camera];
+  for (const FeatureMatch& match :
+       matchDescriptors(image.descriptors, descriptorsOf(observations), options_.place_matching)) {
+    add(features, camera, match.second_index, match.first_index, match.distance, observations, &matches);
+  }
+  return matches;
 }
 
 PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const {
@@ -345,35 +390,31 @@ PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMa
   Matches matches;
   for (size_t camera = 0; camera < rig_->cameras.size(); ++camera) {
     const int other = camera < place.cameras.size() ? place.cameras[camera] : -1;
-    if (other < 0 || features.images[camera].empty()) {
-      continue;
-    }
-    const auto [begin, end] = map_->observationsOf(keyframe, static_cast<size_t>(other));
-    const cv::Mat descriptors = map_->descriptors().rowRange(static_cast<int>(begin), static_cast<int>(end));
-    const RigidTransform& vehicle_from_camera = *rig_->cameras[camera].vehicle_from_camera;
-    for (const FeatureMatch& match :
-         matchDescriptors(features.images[camera].descriptors, descriptors, options_.place_matching)) {
-      const Eigen::Vector3d ray = features.rays_in_camera[camera].col(match.first_index);
-      if (ray.isZero()) {
-        continue;
-      }
-      const int32_t landmark = map_->observations()[begin + match.second_index].landmark;
-      PointMatch point;
-      point.ray = {vehicle_from_camera.translation(), vehicle_from_camera.rotation() * ray};
-      point.point_m = map_->landmarks()[landmark].position_m;
-      point.camera = static_cast<int>(camera);
-      point.quality = -match.distance;
-      matches.points.push_back(point);
-      matches.sightings.push_back({landmark, static_cast<int32_t>(camera),
-                                   features.images[camera].keypoints[match.first_index].position_px});
+    if (other >= 0 && !features.images[camera].empty()) {
+      matches.append(matchPlace(features, camera, keyframe, static_cast<size_t>(other)));
     }
   }
-  const PoseFix first = estimate(matches, options_.robust.min_inliers);
-  if (first.inliers.empty()) {
-    return first;
+  // Few of these are right. A vehicle stands on the ground as the map's did: two matches tell its pose.
+  const double yaw_rad = yawOfRotation(map_->keyframes()[keyframe].map_from_vehicle.rotation());
+  const Eigen::Quaterniond upright_from_vehicle =
+      rotationFromYawPitchRoll(-yaw_rad, 0.0, 0.0) * map_->keyframes()[keyframe].map_from_vehicle.rotation();
+  RobustOptions coarse = options_.robust;
+  coarse.max_error_rad = options_.place_max_error_rad;
+  PoseEstimate pose = estimateUprightPose(matches.points, upright_from_vehicle, coarse);
+  if (pose.status != EstimationStatus::kOk) {
+    pose = estimateAbsolutePose(matches.points, coarse);
   }
-  return estimate(searchLandmarks(features, first.map_from_vehicle, kPlaceSigma_m, kPlaceSigma_rad),
-                  options_.min_inliers_without_prior);
+  PoseFix fix;
+  fix.num_matches = static_cast<int>(matches.points.size());
+  fix.inliers_of_camera.assign(rig_->cameras.size(), 0);
+  fix.matches_of_camera.assign(rig_->cameras.size(), 0);
+  if (pose.status != EstimationStatus::kOk) {
+    return fix;
+  }
+  // The wide search tells right from wrong: hardly a wrong match fits a pose by chance there.
+  fix = estimate(searchLandmarks(features, pose.map_from_rig, kPlaceSigma_m, kPlaceSigma_rad),
+                 options_.min_inliers_without_prior, 0.0);
+  return fix.status == LocalizationStatus::kLocalized ? refine(features, fix) : fix;
 }
 
 bool MapLocalizer::isOtherPlace(const PoseFix& a, const PoseFix& b) const {

@@ -35,11 +35,12 @@ struct MapLocalizerOptions {
   double radius_sigmas = 3.0;  ///< of the expected pose
   MatchOptions matching = closeMatches();
   // Place recognition.
-  int max_places = 8;  ///< candidates
-  int min_inliers_without_prior = 40;
-  double max_ambiguity = 0.7;      ///< inliers of the second best place over those of the best
-  double other_place_m = 1.0;      ///< poses further apart are of two places
-  double other_heading_rad = 0.1;  ///< or turned by more
+  int max_places = 12;                 ///< candidates
+  double place_max_error_rad = 0.012;  ///< of a match with a recognized place, by a pose that is upright
+  int min_inliers_without_prior = 30;  ///< in the wide search about it
+  double max_ambiguity = 0.7;          ///< inliers of the second best place over those of the best
+  double other_place_m = 1.0;          ///< poses further apart are of two places
+  double other_heading_rad = 0.1;      ///< or turned by more
   MatchOptions place_matching;
   RobustOptions robust = defaultRobust();
 
@@ -61,6 +62,7 @@ struct MapLocalizerOptions {
     visit("radius_sigmas", radius_sigmas);
     visit("matching", matching);
     visit("max_places", max_places);
+    visit("place_max_error_rad", place_max_error_rad);
     visit("min_inliers_without_prior", min_inliers_without_prior);
     visit("max_ambiguity", max_ambiguity);
     visit("other_place_m", other_place_m);
@@ -131,9 +133,15 @@ class MapLocalizer {
  private:
   struct Matches;
   struct Search;
+  cv::Mat descriptorsOf(const std::vector<size_t>& observations) const;
+  /// The landmark of one of the map's observations is what a feature shows.
+  void add(const RigFeatures& features, size_t camera, int observation_index, int feature_index,
+           float distance, const std::vector<size_t>& observations, Matches* matches) const;
   Matches searchLandmarks(const RigFeatures& features, const RigidTransform& map_from_vehicle, double sigma_m,
                           double sigma_rad) const;
-  PoseFix estimate(const Matches& matches, int min_inliers) const;
+  Matches matchPlace(const RigFeatures& features, size_t camera, size_t keyframe, size_t place_camera) const;
+  PoseFix estimate(const Matches& matches, int min_inliers, double min_inlier_ratio) const;
+  PoseFix refine(const RigFeatures& features, const PoseFix& fix) const;
   PoseFix localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const;
   bool isOtherPlace(const PoseFix& a, const PoseFix& b) const;
 
