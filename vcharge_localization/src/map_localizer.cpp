@@ -22,6 +22,8 @@ constexpr double kPlaceSigma_m = 0.2;
 constexpr double kPlaceSigma_rad = 0.02;
 /// Keyframes beside a recognized one whose landmarks are looked for too.
 constexpr int kNeighbours = 2;
+/// Places that are asked for, to get as many candidates apart from each other.
+constexpr int kPlacesPerCandidate = 10;
 
 FeatureExtractorOptions extractorOptionsOf(const SparseMap& map) {
   FeatureExtractorOptions options;
@@ -69,6 +71,8 @@ void MapLocalizerOptions::validate() const {
                min_inliers_without_prior);
   requireField(max_ambiguity > 0.0 && max_ambiguity <= 1.0, "max_ambiguity", "must be in (0, 1]",
                max_ambiguity);
+  requireField(place_spacing_m >= 0.0, "place_spacing_m", "must not be negative", place_spacing_m);
+  requireField(place_spacing_rad >= 0.0, "place_spacing_rad", "must not be negative", place_spacing_rad);
   requireField(place_max_error_rad > 0.0, "place_max_error_rad", "must be positive", place_max_error_rad);
   requireField(other_place_m > 0.0, "other_place_m", "must be positive", other_place_m);
   requireField(other_heading_rad > 0.0, "other_heading_rad", "must be positive", other_heading_rad);
@@ -423,12 +427,33 @@ bool MapLocalizer::isOtherPlace(const PoseFix& a, const PoseFix& b) const {
          angleOfRotation(between.rotation()) > options_.other_heading_rad;
 }
 
-PoseFix MapLocalizer::localizeAnywhere(const RigFeatures& features) const {
+std::vector<PlaceMatch> MapLocalizer::recognizePlaces(const RigFeatures& features) const {
   std::vector<cv::Mat> descriptors(map_->rig().cameras.size());
   for (size_t i = 0; i < std::min(descriptors.size(), features.images.size()); ++i) {
     descriptors[i] = features.images[i].descriptors;
   }
-  const std::vector<PlaceMatch> places = places_->query(descriptors, options_.max_places);
+  // Keyframes beside each other look alike: one of them stands for all, and leaves room for other places.
+  std::vector<PlaceMatch> places;
+  for (const PlaceMatch& match : places_->query(descriptors, kPlacesPerCandidate * options_.max_places)) {
+    const RigidTransform& pose = map_->keyframes()[static_cast<size_t>(match.place)].map_from_vehicle;
+    const bool is_new = std::none_of(places.begin(), places.end(), [&](const PlaceMatch& other) {
+      const RigidTransform between =
+          pose.inverse() * map_->keyframes()[static_cast<size_t>(other.place)].map_from_vehicle;
+      return between.translation().norm() < options_.place_spacing_m &&
+             angleOfRotation(between.rotation()) < options_.place_spacing_rad;
+    });
+    if (is_new) {
+      places.push_back(match);
+    }
+    if (static_cast<int>(places.size()) == options_.max_places) {
+      break;
+    }
+  }
+  return places;
+}
+
+PoseFix MapLocalizer::localizeAnywhere(const RigFeatures& features) const {
+  const std::vector<PlaceMatch> places = recognizePlaces(features);
   std::vector<PoseFix> fixes(places.size());
   tbb::parallel_for(size_t{0}, places.size(),
                     [&](size_t i) { fixes[i] = localizeAtPlace(features, places[i]); });

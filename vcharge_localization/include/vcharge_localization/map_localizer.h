@@ -36,6 +36,8 @@ struct MapLocalizerOptions {
   MatchOptions matching = closeMatches();
   // Place recognition.
   int max_places = 12;                 ///< candidates
+  double place_spacing_m = 2.5;        ///< candidates nearer to a better one are left out
+  double place_spacing_rad = 0.6;      ///< unless they are turned by more
   double place_max_error_rad = 0.012;  ///< of a match with a recognized place, by a pose that is upright
   int min_inliers_without_prior = 30;  ///< in the wide search about it
   double max_ambiguity = 0.7;          ///< inliers of the second best place over those of the best
@@ -62,6 +64,8 @@ struct MapLocalizerOptions {
     visit("radius_sigmas", radius_sigmas);
     visit("matching", matching);
     visit("max_places", max_places);
+    visit("place_spacing_m", place_spacing_m);
+    visit("place_spacing_rad", place_spacing_rad);
     visit("place_max_error_rad", place_max_error_rad);
     visit("min_inliers_without_prior", min_inliers_without_prior);
     visit("max_ambiguity", max_ambiguity);
@@ -142,6 +146,7 @@ class MapLocalizer {
   Matches matchPlace(const RigFeatures& features, size_t camera, size_t keyframe, size_t place_camera) const;
   PoseFix estimate(const Matches& matches, int min_inliers, double min_inlier_ratio) const;
   PoseFix refine(const RigFeatures& features, const PoseFix& fix) const;
+  std::vector<PlaceMatch> recognizePlaces(const RigFeatures& features) const;
   PoseFix localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const;
   bool isOtherPlace(const PoseFix& a, const PoseFix& b) const;
 
