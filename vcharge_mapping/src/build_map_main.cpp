@@ -69,8 +69,14 @@ void printReport(const SparseMapperReport& report, const SparseMap& map) {
   }
   std::cout << "\nodometer: distance x " << map.contents().odometry_distance_scale << ", turn x "
             << map.contents().odometry_turn_scale << "\ntime:";
-  for (const auto& [stage, seconds] : report.stage_s) {
-    std::cout << " " << stage << " " << seconds << " s;";
+  std::vector<std::string> stages = {"following"};
+  stages.insert(stages.end(), backEndStages().begin(), backEndStages().end());
+  stages.insert(stages.end(), {"assembly", "checkpoints"});
+  for (const std::string& stage : stages) {
+    const auto found = report.stage_s.find(stage);
+    if (found != report.stage_s.end()) {
+      std::cout << " " << stage << " " << found->second << " s;";
+    }
   }
   std::cout << "\n";
 }
