@@ -4,6 +4,8 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
+arguments=("$@")
+set --  # a sourced script sees them
 # shellcheck disable=SC1091
 set +u && . build/devel/setup.bash && set -u
-exec /usr/bin/python3 scripts/evaluate_mapping.py "$@"
+exec /usr/bin/python3 scripts/evaluate_mapping.py "${arguments[@]}"
