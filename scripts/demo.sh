@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # From nothing to range maps: installs, builds, simulates a short drive of a car with four fisheye cameras, computes
-# range maps and judges them against the truth, replays the drive through the nodelets with rviz, and leaves pictures in
-# demo/. What is already in demo/ is kept: delete the folder to start over.
+# range maps and judges them against the truth, builds a sparse map, replays the drive through the nodelets with rviz,
+# and leaves pictures in demo/. What is already in demo/ is kept: delete the folder to start over.
 #   demo.sh [--no-rviz] [--bag DRIVE.bag --rig rig.yaml]    the second form runs on a recording of your own
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -25,7 +25,7 @@ fi
 step() { printf '\n== %s (%d s)\n' "$1" "$((SECONDS - started))"; }
 started=$SECONDS
 
-step "1/6 packages and build"
+step "1/7 packages and build"
 scripts/install_dependencies.sh
 scripts/build.sh
 # shellcheck disable=SC1091
@@ -36,7 +36,7 @@ started=$SECONDS  # the steps from here on are the demo itself
 
 truth=""
 if [ -z "$bag" ]; then
-  step "2/6 a simulated drive through a parking lot"
+  step "2/7 a simulated drive through a parking lot"
   bag=$PWD/demo/drive.bag rig=$PWD/demo/rig_truth.yaml truth=$PWD/demo/drive_truth
   if [ ! -e "$bag" ]; then
     "$tools/vcharge_simulation/simulate_drive" --scene lot --drive short --truth-range --output "$bag"
@@ -44,10 +44,10 @@ if [ -z "$bag" ]; then
     echo "kept: $bag"
   fi
 else
-  step "2/6 your drive: $bag"
+  step "2/7 your drive: $bag"
 fi
 
-step "3/6 range maps"
+step "3/7 range maps"
 if [ ! -e demo/range/complete ]; then
   rm -rf demo/range
   "$tools/vcharge_dense/compute_range_maps" --bag "$bag" --rig "$rig" --output demo/range
@@ -57,18 +57,32 @@ else
 fi
 
 if [ -n "$truth" ]; then
-  step "4/6 errors against the truth"
+  step "4/7 errors against the truth"
   "$tools/vcharge_evaluation/evaluate_range" --range demo/range --truth "$truth" --bag "$bag" --rig "$rig" \
     --report demo/evaluation | tee demo/range_errors.txt
 else
-  step "4/6 no truth for a drive of your own"
+  step "4/7 no truth for a drive of your own"
 fi
 
-step "5/6 pictures"
+step "5/7 pictures"
 /usr/bin/python3 scripts/draw_demo.py --bag "$bag" --rig "$rig" --range demo/range ${truth:+--truth "$truth"} \
   --output demo
 
-step "6/6 the same drive through the nodelets"
+step "6/7 a sparse map"
+if [ ! -e demo/map.vmap ]; then
+  "$tools/vcharge_mapping/build_map" --bag "$bag" --rig "$rig" --output demo/map.vmap --trajectory demo/map.tum \
+    --options config/mapping.yaml --report demo/map
+else
+  echo "kept: demo/map.vmap"
+fi
+camera=$("$tools/vcharge_mapping/map_info" --map demo/map.vmap | awk 'found { print $1; exit } /^camera / { found = 1 }')
+"$tools/vcharge_mapping/draw_landmarks" --map demo/map.vmap --bag "$bag" --camera "$camera" --output demo/landmarks.png
+if [ -n "$truth" ]; then
+  "$tools/vcharge_evaluation/evaluate_map" --map demo/map.vmap --truth "$truth/trajectory.tum" --report demo/map |
+    tee demo/map_errors.txt
+fi
+
+step "7/7 the same drive through the nodelets"
 if [ "$with_rviz" = false ]; then
   echo "left out (--no-rviz)"
 elif [ -n "${DISPLAY:-}" ]; then
@@ -80,4 +94,4 @@ fi
 
 step "done"
 echo "Pictures:"
-ls demo/*.png demo/evaluation/*.png 2>/dev/null || true
+ls demo/*.png demo/evaluation/*.png demo/map/*.png demo/map/*.html 2>/dev/null || true

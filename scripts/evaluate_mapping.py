@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""What mapping reaches, as a Markdown table: accuracy, loops, time, memory, growth, determinism; see evaluate_mapping.sh."""
+"""What mapping reaches, as a Markdown table: accuracy, loops, time, memory, growth; see evaluate_mapping.sh."""
 import argparse
 import json
 import math
@@ -278,7 +278,8 @@ def main():
     args.work.mkdir(parents=True, exist_ok=True)
     commit = subprocess.run(["git", "-C", str(ROOT), "describe", "--always", "--dirty"], capture_output=True, text=True,
                             check=False).stdout.strip()
-    parts = [f"Mapping at {args.image_scale:g} of 1280x800, code {commit}, {os.cpu_count()} cores, options {args.options.name}.\n"]
+    parts = [f"Mapping at {args.image_scale:g} of 1280x800, code {commit}, {os.cpu_count()} cores, options "
+             f"{args.options.name}.\n"]
 
     def add(part):
         if part is not None:

@@ -113,7 +113,8 @@ class LaunchFilesTest(unittest.TestCase):
 
     def test_options_of_the_nodelets_are_those_of_the_yaml(self):
         for options in sorted(CONFIG.glob("*.yaml")):
-            nodelet, launch = ("mapping", "mapping") if options.name.startswith("mapping") else ("depth", "drive_replay")
+            is_mapping = options.name.startswith("mapping")
+            nodelet, launch = ("mapping", "mapping") if is_mapping else ("depth", "drive_replay")
             config = load(LAUNCH / f"{launch}.launch", options=str(options))
             expected = yaml.safe_load(options.read_text())
             found = {}

@@ -33,7 +33,8 @@ def numbers_of_map(path):
     with sqlite3.connect(str(path)) as connection:
         for table, names in (("keyframe", poses), ("landmark", "x_m y_m z_m"), ("loop_edge", poses)):
             for name in names.split():
-                columns[f"{table}.{name}"] = np.array([row[0] for row in connection.execute(f"SELECT {name} FROM {table}")])
+                rows = connection.execute(f"SELECT {name} FROM {table}").fetchall()
+                columns[f"{table}.{name}"] = np.array([row[0] for row in rows])
         for table, name, kind in (("image", "positions_px_f32", np.float32), ("landmark", "covariance_3x3_f64", float)):
             blobs = [np.frombuffer(row[0], kind) for row in connection.execute(
                 f"SELECT {name} FROM {table} WHERE {name} IS NOT NULL")]

@@ -63,6 +63,12 @@ class MappingTest(unittest.TestCase):
         self.assertIn("no loop was found", page)  # 9 s are no round
         self.assertIn(content_hash(self.output), page)
         self.assertGreaterEqual(page.count("<svg"), 6)
+        frames = (self.drive.folder / "report" / "frames.csv").read_text().splitlines()
+        self.assertEqual(frames[0], "time_s,motion,keyframe")
+        counted = [line.split(",")[1] for line in frames[2:]]  # the first frame has no motion
+        motions = next(line for line in self.output.splitlines() if line.startswith("motions: ")).split()[1:]
+        self.assertEqual({name: counted.count(name) for name in motions[::2]},
+                         {name: int(count) for name, count in zip(motions[::2], motions[1::2])})
 
     def test_is_the_same_on_one_thread(self):
         status, output, _ = self.build(self.drive.bag, self.drive.folder / "one.vmap", prefix=("taskset", "-c", "0"))

@@ -69,10 +69,27 @@ void printReport(const SparseMapperReport& report, const SparseMap& map) {
   }
   std::cout << "\nodometer: distance x " << map.contents().odometry_distance_scale << ", turn x "
             << map.contents().odometry_turn_scale << "\ntime:";
-  for (const auto& [stage, seconds] : report.stage_s) {
-    std::cout << " " << stage << " " << seconds << " s;";
+  std::vector<std::string> stages = {"following"};
+  stages.insert(stages.end(), backEndStages().begin(), backEndStages().end());
+  stages.insert(stages.end(), {"assembly", "checkpoints"});
+  for (const std::string& stage : stages) {
+    const auto found = report.stage_s.find(stage);
+    if (found != report.stage_s.end()) {
+      std::cout << " " << stage << " " << found->second << " s;";
+    }
   }
   std::cout << "\n";
+}
+
+/// A line per frame that was followed, for scripts.
+std::string listFrames(const MappingState& state) {
+  const std::vector<std::string> motions = enumNames<MotionHypothesis>();
+  std::string text = "time_s,motion,keyframe\n";
+  for (const FramePose& frame : state.frames) {
+    text += toString(frame.stamp) + "," + motions[static_cast<size_t>(frame.motion)] + "," +
+            std::to_string(frame.keyframe) + "\n";
+  }
+  return text;
 }
 
 /// A bar per stage, which names the stage and how many there are.
@@ -189,8 +206,10 @@ void buildMap(const Arguments& arguments, const SparseMapperOptions& options) {
   const std::string name = std::filesystem::path(arguments.output).filename().string();
   if (!arguments.report.empty()) {
     createFolder(arguments.report);
-    writeTextFileAtomically((std::filesystem::path(arguments.report) / "map_report.html").string(),
+    const std::filesystem::path folder(arguments.report);
+    writeTextFileAtomically((folder / "map_report.html").string(),
                             makeMapReport("Map " + name, *map, mapper.state()));
+    writeTextFileAtomically((folder / "frames.csv").string(), listFrames(mapper.state()));
   }
   checkpoint.remove();
   printReport(mapper.report(), *map);

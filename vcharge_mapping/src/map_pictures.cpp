@@ -98,11 +98,14 @@ std::string colourOf(MotionHypothesis motion) {
 std::string colourOfReason(const std::string& reason) {
   static const std::map<std::string, std::string> colours = {{"", "#2c8c4a"},
                                                              {"contradicts the other edges", "#b3261e"},
+                                                             {"contradicts the adjusted map", "#7a1020"},
                                                              {"matches and landmarks disagree", "#e0701e"},
                                                              {"too uncertain", "#a05fc0"},
-                                                             {"too few landmarks agree", "#8aa8d0"}};
+                                                             {"too few landmarks agree", "#8aa8d0"},
+                                                             {"no motion explains enough matches", "#c4c4c4"},
+                                                             {"too few matches", "#c4c4c4"}};
   const auto found = colours.find(reason);
-  return found == colours.end() ? "#c4c4c4" : found->second;
+  return found == colours.end() ? "#202020" : found->second;
 }
 
 std::string drawTopView(const SparseMap& map) {
@@ -141,7 +144,8 @@ std::string drawLoops(const SparseMap& map) {
     order.push_back(reason);
   }
   const auto is_faint = [](const std::string& reason) {
-    return colourOfReason(reason) == "#c4c4c4" || reason == "too few landmarks agree";
+    return reason == "too few landmarks agree" || reason == "too few matches" ||
+           reason == "no motion explains enough matches";
   };
   const auto rank = [&](const std::string& reason) { return reason.empty() ? 1 : is_faint(reason) ? 0 : 2; };
   std::stable_sort(order.begin(), order.end(),

@@ -1,6 +1,5 @@
 #include <functional>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -53,7 +52,6 @@ class MappingNodelet : public nodelet::Nodelet {
       source_options.sort_window_s = 0.5;
     }
     readFieldsFromParameters(private_node, "source", &source_options);
-
     session_ = std::make_unique<MappingSession>(
         rig, options_, [this](const MappingState& state) { publish(state); },
         [this](const SparseMap& map) { publish(map); });
@@ -98,25 +96,20 @@ class MappingNodelet : public nodelet::Nodelet {
     if (!map) {
       throw InputError("no map yet, expected one that ~finish made: " + session_->status().message);
     }
-    std::ostringstream option_text;
-    option_text << writeFields(options_);
-    writeSparseMap(
-        *map,
-        {{"rig", rig_path_}, {"mapper_options", option_text.str()}, {"program", "mapping_nodelet 0.1.0"}},
-        path);
+    writeSparseMap(*map,
+                   {{"rig", rig_path_},
+                    {"mapper_options", YAML::Dump(writeFields(options_))},
+                    {"program", "mapping_nodelet 0.1.0"}},
+                   path);
     response->success = 1;
     response->message = path + ": content hash: " + map->contentHash();
   }
 
   /// While driving; seldom enough that showing costs little.
   void publish(const MappingState& state) {
-    const ros::WallTime now = ros::WallTime::now();
-    if ((now - last_shown_).toSec() < kShowPeriod_s) {
-      return;
-    }
-    last_shown_ = now;
-    trajectory_.publish(makePath(keyframePath(state)));
-    if (landmarks_.getNumSubscribers() > 0) {
+    if ((ros::WallTime::now() - last_shown_).toSec() >= kShowPeriod_s) {
+      last_shown_ = ros::WallTime::now();
+      trajectory_.publish(makePath(keyframePath(state)));
       landmarks_.publish(makeLandmarkCloud(recentLandmarks(state, options_.triangulation, kShownKeyframes)));
     }
   }
@@ -140,7 +133,6 @@ class MappingNodelet : public nodelet::Nodelet {
 
   static constexpr double kShowPeriod_s = 0.5;
   static constexpr int kShownKeyframes = 20;
-
   std::string rig_path_;
   SparseMapperOptions options_;
   CallbackGuard guard_{"mapping"};

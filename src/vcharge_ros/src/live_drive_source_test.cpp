@@ -204,6 +204,8 @@ TEST_F(LiveDriveSourceTest, SortsThroughAWindowAndDeliversTheLastOnceNothingCome
                                          "o240", "0:240", "1:240"));
   EXPECT_THAT(waiting.order, ElementsAre("o0", "0:0", "1:0", "o80", "0:80", "1:80"))
       << "what is less than a window older than the newest";
+  patient->flush();
+  EXPECT_EQ(waiting.order, flushed.order);
 }
 
 TEST_F(LiveDriveSourceTest, PassesStampsThatJumpBackOnAndReportsThem) {

@@ -34,6 +34,23 @@ TEST(SparseMapConversionsTest, CloudHasTheLandmarksInOrder) {
   }
 }
 
+TEST(SparseMapConversionsTest, PointsOfAMapInTheMakingHaveTheSameFields) {
+  const std::vector<Eigen::Vector3d> points = {{1.0, 2.0, 3.0}, {-4.0, 0.5, 0.25}};
+  const sensor_msgs::PointCloud2 cloud = makeLandmarkCloud(points, "other");
+  const sensor_msgs::PointCloud2 finished = makeLandmarkCloud(SparseMap(makeAnalyticMap()));
+  EXPECT_EQ(cloud.header.frame_id, "other");
+  ASSERT_EQ(cloud.width * cloud.height, 2U);
+  ASSERT_EQ(cloud.fields.size(), finished.fields.size());
+  EXPECT_EQ(cloud.point_step, finished.point_step);
+  sensor_msgs::PointCloud2ConstIterator<float> x(cloud, "x"), y(cloud, "y"), z(cloud, "z"),
+      count(cloud, "observations");
+  for (const Eigen::Vector3d& point : points) {
+    EXPECT_EQ(Eigen::Vector3d(*x, *y, *z), point);  // exact in single precision
+    EXPECT_TRUE(std::isnan(*count));
+    ++x, ++y, ++z, ++count;
+  }
+}
+
 TEST(SparseMapConversionsTest, PathHasPosesAndStampsOfTheKeyframes) {
   const SparseMap map(makeAnalyticMap());
   const nav_msgs::Path path = makePath(map, "other");
