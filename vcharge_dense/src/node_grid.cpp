@@ -36,7 +36,7 @@ NodeGrid::NodeGrid(const MeiCamera& camera, const cv::Mat& near_valid, cv::Point
   while ((1 << cell_shift_) < 2 * spacing) {
     ++cell_shift_;
   }
-  nodes_ = countNodes(layout.strip, spacing);
+  nodes_ = countNodes(layout.strip + layout.strip % 2, spacing);  // samples come in twos
   node_rows_ = countNodes(layout.rows, spacing);
   const size_t size =
       static_cast<size_t>(node_rows_) * static_cast<size_t>(nodes_) * static_cast<size_t>(layout.lanes);

@@ -137,26 +137,29 @@ NodeDifferences nodeDifferencesTarget(const float* u, const float* v, int node_r
   const size_t lanes = hn::Lanes(df);
   const size_t row_size = static_cast<size_t>(nodes) * lanes;
   VF second = hn::Zero(df), third = hn::Zero(df);
-  const auto consider = [&](const float* values, size_t step, int left) HWY_ATTR {
-    if (left < 3) {
-      return;
-    }
-    const VF a = hn::Load(df, values), b = hn::Load(df, values + step), c = hn::Load(df, values + 2 * step);
-    const VF bend = hn::Sub(hn::Add(a, c), hn::Add(b, b));
-    second = maxOfKnown(hn::Abs(bend), second);
-    if (left > 3) {
-      const VF d = hn::Load(df, values + 3 * step);
-      const VF next_bend = hn::Sub(hn::Add(b, d), hn::Add(c, c));
-      third = maxOfKnown(hn::Abs(hn::Sub(next_bend, bend)), third);
+  // Along `count` values, `step` floats apart.
+  const auto consider = [&](const float* values, size_t step, int count) HWY_ATTR {
+    VF last = hn::Load(df, values + step);
+    VF slope = hn::Sub(last, hn::Load(df, values)), last_bend = slope;
+    for (int i = 2; i < count; ++i) {
+      const VF value = hn::Load(df, values + static_cast<size_t>(i) * step);
+      const VF next_slope = hn::Sub(value, last);
+      const VF bend = hn::Sub(next_slope, slope);
+      second = maxOfKnown(hn::Abs(bend), second);
+      if (i > 2) {
+        third = maxOfKnown(hn::Abs(hn::Sub(bend, last_bend)), third);
+      }
+      last = value;
+      slope = next_slope;
+      last_bend = bend;
     }
   };
-  for (int row = 0; row < node_rows; ++row) {
+  for (const float* values : {u, v}) {
+    for (int row = 0; row < node_rows; ++row) {
+      consider(values + static_cast<size_t>(row) * row_size, lanes, nodes);
+    }
     for (int node = 0; node < nodes; ++node) {
-      const size_t at = static_cast<size_t>(row) * row_size + static_cast<size_t>(node) * lanes;
-      for (const float* values : {u + at, v + at}) {
-        consider(values, lanes, nodes - node);
-        consider(values, row_size, node_rows - row);
-      }
+      consider(values + static_cast<size_t>(node) * lanes, row_size, node_rows);
     }
   }
   return {hn::GetLane(hn::MaxOfLanes(df, second)), hn::GetLane(hn::MaxOfLanes(df, third))};
