@@ -9,7 +9,7 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 // A tile's reference, its neighbours' footprints and one hypothesis's sums fit into a megabyte of L2.
-constexpr int kTileRows = 64;
+constexpr int kTileRows = 64;  // about
 constexpr int kMaxTileColumns = 215;
 constexpr int kNodeSpacings_px[] = {8, 4};
 // Nodes this far from the packed image's ends count as unseen: interpolated positions lie between them, or a
@@ -60,9 +60,11 @@ std::vector<cv::Rect> makeTiles(cv::Size image, int window_px) {
   }
   const int columns = (all.width + kMaxTileColumns - 1) / kMaxTileColumns;
   const int width = (all.width + columns - 1) / columns;
-  for (int y = 0; y < all.height; y += kTileRows) {
+  const int bands = std::max(1, (all.height + kTileRows / 2) / kTileRows);
+  const int height = (all.height + bands - 1) / bands;
+  for (int y = 0; y < all.height; y += height) {
     for (int x = 0; x < all.width; x += width) {
-      tiles.push_back(cv::Rect(all.x + x, all.y + y, width, kTileRows) & all);
+      tiles.push_back(cv::Rect(all.x + x, all.y + y, width, height) & all);
     }
   }
   return tiles;
