@@ -9,7 +9,7 @@ namespace vcharge {
 namespace {
 
 // A quadratic through three nodes leaves their range by no more than an eighth of their second difference, in
-// each direction: with this, positions stay in the packed image (see kInset_px in tile_scorer.cpp).
+// each direction: with this, positions stay in the packed image (see kInset_px in sweep_input.cpp).
 constexpr float kMaxSecondDifference_px = 12.0f;
 
 /// Nodes that cover `pixels` with whole cells, at least two for a third difference.

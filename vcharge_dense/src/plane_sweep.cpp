@@ -19,6 +19,8 @@ constexpr double kWholeSphere_rad = 6.283185307179586;
 // Node grids need positions this far around valid pixels.
 constexpr int kNearValid_px = 17;
 
+constexpr int kMinWidth_px = 16;  // the most lanes that a vector has
+
 /// Tiles are independent of each other, hence of who computes them.
 template <class Function>
 void forEachTile(const std::vector<cv::Rect>& tiles, const Function& function) {
@@ -48,6 +50,7 @@ PlaneSweep::PlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask, const
   options_.validate();
   const MeiCamera::Parameters p = camera.parameters();
   check(p.tail<4>().isZero(0.0), "PlaneSweep: the working camera must not have distortion");
+  check(valid_mask.cols >= kMinWidth_px, "PlaneSweep: images must be at least 16 pixels wide");
   families_ = makePlaneFamilies(options_, ground_in_camera);
   auto planes = std::make_shared<std::vector<Hypotheses>>();
   for (const PlaneFamily& family : families_) {

@@ -32,53 +32,6 @@ float square(float value) {
   return value * value;
 }
 
-/// Variance of the inverse range at one pixel.
-float inverseRangeVariance(const SweepInput& input, const SurfaceEstimate& estimate, int x, int y) {
-  const PlaneSweepOptions& options = *input.options;
-  const float inverse_range = estimate.inverse_range.at<float>(y, x);
-  const auto voters = static_cast<uint32_t>(estimate.voters.at<int>(y, x));
-  // A random walk errs alike for all neighbours on one side of the reference, and independently on the other
-  // side.
-  float motion_squares = 0.0f, errors_before = 0.0f, errors_after = 0.0f, matching_errors = 0.0f;
-  int count = 0;
-  for (size_t n = 0; n < input.neighbours.size(); ++n) {
-    if ((voters & (1u << n)) == 0) {
-      continue;
-    }
-    const SweepNeighbour& neighbour = input.neighbours[n];
-    const PixelSensitivity sensitivity =
-        pixelSensitivity(input.camera, neighbour, input.rays->ray(x, y), inverse_range);
-    const float baseline_m = neighbour.translation_m.norm();
-    const auto variance = [baseline_m](double of_any_pair, double per_sqrt_m) {
-      return static_cast<float>(of_any_pair * of_any_pair + per_sqrt_m * per_sqrt_m * baseline_m);
-    };
-    const PoseNoiseOptions& pose = options.pose_noise;
-    const float rotation_variance = variance(pose.rotation_rad, pose.rotation_rad_per_sqrt_m);
-    const float translation_variance = variance(pose.translation_m, pose.translation_m_per_sqrt_m);
-    const float pixel_error =
-        sensitivity.pixels_per_radian *
-        std::sqrt(rotation_variance + translation_variance * square(inverse_range / sensitivity.range_ratio));
-    // Windows seen at another scale differ by more than a shift.
-    const float scale = std::max(sensitivity.range_ratio, 1.0f / sensitivity.range_ratio);
-    matching_errors += square(sensitivity.pixels_per_inverse_range *
-                              static_cast<float>(options.matching_noise_px) * scale * scale);
-    motion_squares += square(sensitivity.pixels_per_inverse_range);
-    (neighbour.after ? errors_after : errors_before) += sensitivity.pixels_per_inverse_range * pixel_error;
-    ++count;
-  }
-  if (count == 0 || !(motion_squares > 0.0f)) {
-    return std::numeric_limits<float>::infinity();
-  }
-  const float score = estimate.score.at<float>(y, x);
-  const float curvature = estimate.curvature.at<float>(y, x);
-  const float window = static_cast<float>(options.window_px * options.window_px);
-  const float noise = kImageNoiseFactor * std::max(1.0f - score, 1e-3f) / (window * curvature);
-  const float matching = static_cast<float>(count) * matching_errors / square(motion_squares);
-  const float pose = (square(errors_before) + square(errors_after)) / square(motion_squares) +
-                     square(static_cast<float>(options.pose_noise.scale) * inverse_range);
-  return std::isnan(noise) ? std::numeric_limits<float>::infinity() : noise + matching + pose;
-}
-
 /// The probability that a range is right, by its confidence's factors.
 float calibratedConfidence(float factors) {
   size_t i = 1;
@@ -162,35 +115,33 @@ std::vector<float> neighbourhoodRoughness(const cv::Mat& inverse_range, int y) {
 
 }  // namespace
 
-PixelSensitivity pixelSensitivity(const MeiCamera& camera, const SweepNeighbour& neighbour,
-                                  const Eigen::Vector3f& ray, float inverse_range) {
-  PixelSensitivity result;
-  const Eigen::Vector3f point =
-      neighbour.neighbour_from_reference * ray + inverse_range * neighbour.translation_m;
-  const float norm = point.norm();
-  const auto xi = static_cast<float>(camera.xi());
-  const float denominator = point.z() / norm + xi;
-  if (!(norm > 1e-6f) || !(point.z() > norm * (xi > 1.0f ? -1.0f / xi : -xi)) || !(denominator > 1e-6f)) {
-    return result;
+std::vector<NeighbourUncertainty> neighbourUncertainties(const SweepInput& input) {
+  const PoseNoiseOptions& pose = input.options->pose_noise;
+  std::vector<NeighbourUncertainty> result;
+  for (const SweepNeighbour& neighbour : input.neighbours) {
+    const float baseline_m = neighbour.translation_m.norm();
+    const auto variance = [baseline_m](double of_any_pair, double per_sqrt_m) {
+      return static_cast<float>(of_any_pair * of_any_pair + per_sqrt_m * per_sqrt_m * baseline_m);
+    };
+    result.push_back({neighbour.projectionOf(input.camera),
+                      variance(pose.rotation_rad, pose.rotation_rad_per_sqrt_m),
+                      variance(pose.translation_m, pose.translation_m_per_sqrt_m), neighbour.after});
   }
-  const Eigen::Vector3f direction = point / norm;
-  const Eigen::Vector2f plane(direction.x() / denominator, direction.y() / denominator);
-  const Eigen::Vector2f gamma(static_cast<float>(camera.gamma1()), static_cast<float>(camera.gamma2()));
-  // Pixel by direction on the sphere.
-  const auto pixelMotion = [&](const Eigen::Vector3f& d) {
-    return Eigen::Vector2f(gamma.x() * (d.x() - plane.x() * d.z()) / denominator,
-                           gamma.y() * (d.y() - plane.y() * d.z()) / denominator);
-  };
-  const Eigen::Vector3f& t = neighbour.translation_m;
-  const Eigen::Vector2f motion = pixelMotion((t - direction * direction.dot(t)) / norm);
-  result.pixels_per_inverse_range = motion.norm();
-  result.range_ratio = norm;
-  const Eigen::Vector2f along = motion / std::max(result.pixels_per_inverse_range, 1e-9f);
-  Eigen::Vector3f row(gamma.x() * along.x(), gamma.y() * along.y(),
-                      -gamma.x() * along.x() * plane.x() - gamma.y() * along.y() * plane.y());
-  row /= denominator;
-  result.pixels_per_radian = (row - direction * direction.dot(row)).norm();
   return result;
+}
+
+UncertaintyRow uncertaintyRow(const SweepInput& input, const std::vector<NeighbourUncertainty>& neighbours,
+                              const cv::Mat& inverse_range, int y) {
+  const size_t first = static_cast<size_t>(y) * static_cast<size_t>(inverse_range.cols);
+  UncertaintyRow row;
+  row.count = static_cast<size_t>(inverse_range.cols);
+  row.ray_x = input.rays->x().data() + first;
+  row.ray_y = input.rays->y().data() + first;
+  row.ray_z = input.rays->z().data() + first;
+  row.inverse_range = inverse_range.ptr<float>(y);
+  row.neighbours = neighbours.data();
+  row.num_neighbours = static_cast<int>(neighbours.size());
+  return row;
 }
 
 void estimateRange(const SweepInput& input, const SurfaceEstimate& estimate, RangeMap* map) {
@@ -200,13 +151,16 @@ void estimateRange(const SweepInput& input, const SurfaceEstimate& estimate, Ran
   map->standard_deviation_m = cv::Mat(size, CV_32FC1, cv::Scalar(kNaN));
   map->confidence = cv::Mat(size, CV_32FC1, cv::Scalar(0.0f));
   cv::Mat sigma(size, CV_32FC1, cv::Scalar(kNaN));
+  const std::vector<NeighbourUncertainty> neighbours = neighbourUncertainties(input);
   forEachRow(size.height, [&](int y) {
-    for (int x = 0; x < size.width; ++x) {
-      const float inverse_range = estimate.inverse_range.at<float>(y, x);
-      if (inverse_range > 0.0f) {
-        sigma.at<float>(y, x) = std::sqrt(inverseRangeVariance(input, estimate, x, y));
-      }
-    }
+    UncertaintyRow row = uncertaintyRow(input, neighbours, estimate.inverse_range, y);
+    row.voters = estimate.voters.ptr<int32_t>(y);
+    row.score = estimate.score.ptr<float>(y);
+    row.curvature = estimate.curvature.ptr<float>(y);
+    row.noise_factor = kImageNoiseFactor / static_cast<float>(options.window_px * options.window_px);
+    row.matching_noise_px = static_cast<float>(options.matching_noise_px);
+    row.scale_noise = static_cast<float>(options.pose_noise.scale);
+    input.kernels.inverseRangeSigma(row, sigma.ptr<float>(y));
   });
   // What is accepted by itself, then its deviation with what its neighbourhood says.
   cv::Mat accepted(size, CV_32FC1, cv::Scalar(kNaN));

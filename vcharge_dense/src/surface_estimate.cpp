@@ -221,26 +221,19 @@ Hypotheses makeRefinement(const SweepInput& input, const cv::Mat& window_counts,
     refinement.offsets.push_back(static_cast<float>(k));
   }
   const cv::Mat step = fillUnknown(estimate.step);
-  // The neighbours' motion varies slowly: once for 2 x 2 pixels.
-  forEachRow((step.rows + 1) / 2, [&](int half_y) {
-    const int y = 2 * half_y;
-    for (int x = 0; x < step.cols; x += 2) {
-      const float inverse_range = refinement.base.at<float>(y, x);
-      float motion = 0.0f;
-      for (const SweepNeighbour& neighbour : input.neighbours) {
-        motion =
-            std::max(motion, pixelSensitivity(input.camera, neighbour, input.rays->ray(x, y), inverse_range)
-                                 .pixels_per_inverse_range);
-      }
-      const float fine = static_cast<float>(input.options->refinement_step_px) / std::max(motion, 1e-6f);
-      for (int v = y; v < std::min(y + 2, step.rows); ++v) {
-        for (int u = x; u < std::min(x + 2, step.cols); ++u) {
-          // Fine enough for the neighbour that moves most, wide enough to reach half way to the next plane
-          // and back.
-          const float coarse = step.at<float>(v, u) / static_cast<float>(half);
-          refinement.weight.at<float>(v, u) = std::clamp(fine, 0.75f * coarse, 2.0f * coarse);
-        }
-      }
+  const std::vector<NeighbourUncertainty> neighbours = neighbourUncertainties(input);
+  forEachRow(step.rows, [&](int y) {
+    std::vector<float> motion(static_cast<size_t>(step.cols));
+    input.kernels.largestMotion(uncertaintyRow(input, neighbours, refinement.base, y), motion.data());
+    const auto* coarse_row = step.ptr<float>(y);
+    auto* weight_row = refinement.weight.ptr<float>(y);
+    for (int x = 0; x < step.cols; ++x) {
+      const float fine = static_cast<float>(input.options->refinement_step_px) /
+                         std::max(motion[static_cast<size_t>(x)], 1e-6f);
+      // Fine enough for the neighbour that moves most, wide enough to reach half way to the next plane and
+      // back.
+      const float coarse = coarse_row[x] / static_cast<float>(half);
+      weight_row[x] = std::clamp(fine, 0.75f * coarse, 2.0f * coarse);
     }
   });
   return refinement;

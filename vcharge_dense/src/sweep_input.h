@@ -18,6 +18,8 @@ struct SweepNeighbour {
   Eigen::Matrix3f neighbour_from_reference;  ///< rotation
   Eigen::Vector3f translation_m;             ///< of the same transform
   bool after = false;                        ///< taken after the reference
+
+  Projection projectionOf(const MeiCamera& camera) const;
 };
 
 /// The reference image as the kernels use it.

@@ -126,6 +126,32 @@ struct Peaks {
   int16_t* second_score;
 };
 
+/// A neighbour and how well its pose relative to the reference is known.
+struct NeighbourUncertainty {
+  Projection projection;
+  float rotation_variance_rad2;
+  float translation_variance_m2;
+  bool after;  ///< taken after the reference: a random walk errs independently on the two sides
+};
+
+/// One row of pixels: at least as many as the chosen set has lanes; nothing needs to be aligned.
+struct UncertaintyRow {
+  size_t count = 0;
+  const float* ray_x = nullptr;
+  const float* ray_y = nullptr;
+  const float* ray_z = nullptr;
+  const float* inverse_range = nullptr;
+  const NeighbourUncertainty* neighbours = nullptr;
+  int num_neighbours = 0;
+  // Only for the standard deviation:
+  const int32_t* voters = nullptr;  ///< bit n: neighbour n
+  const float* score = nullptr;
+  const float* curvature = nullptr;
+  float noise_factor = 0.0f;  ///< times what the score leaves unexplained, over its curvature, is a variance
+  float matching_noise_px = 0.0f;
+  float scale_noise = 0.0f;  ///< of all baselines alike
+};
+
 /// The kernels of one instruction set.
 struct SweepKernels {
   int lanes;
@@ -145,6 +171,11 @@ struct SweepKernels {
   /// Scores are [hypothesis][pixel], `stride` apart.
   void (*findPeaks)(const int16_t* scores, size_t stride, int num_hypotheses, size_t num_pixels,
                     const Peaks& peaks);
+  /// Pixels per 1/m that the image of each point moves by, in the neighbour where it is most.
+  void (*largestMotion)(const UncertaintyRow& row, float* motion);
+  /// Standard deviation of each inverse range, infinite where the voters say nothing and NaN where there is
+  /// none (see estimateRange()).
+  void (*inverseRangeSigma)(const UncertaintyRow& row, float* sigma);
 };
 
 /// Of the best instruction set that the machine has.

@@ -12,9 +12,6 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr int kTileRows = 64;  // about
 constexpr int kMaxTileColumns = 215;
 constexpr int kNodeSpacings_px[] = {8, 4};
-// Nodes this far from the packed image's ends count as unseen: interpolated positions lie between them, or a
-// little beyond.
-constexpr float kInset_px = 4.0f;
 
 /// Copies the part of an image around (x, y) into the order of a layout.
 template <class To, class From>
@@ -75,23 +72,7 @@ TileScorer::TileScorer(const SweepInput& input) : input_(input), radius_(input.o
   neighbours_.resize(input.neighbours.size());
   for (size_t n = 0; n < input.neighbours.size(); ++n) {
     const SweepNeighbour& from = input.neighbours[n];
-    Projection& p = neighbours_[n].projection;
-    constexpr auto kMargin = static_cast<float>(PackedImage::kMargin);
-    p.fx = static_cast<float>(input.camera.gamma1());
-    p.fy = static_cast<float>(input.camera.gamma2());
-    p.cx = static_cast<float>(input.camera.u0()) + kMargin;
-    p.cy = static_cast<float>(input.camera.v0()) + kMargin;
-    p.xi = static_cast<float>(input.camera.xi());
-    p.min_x = kInset_px;
-    p.min_y = kInset_px;
-    p.max_x = static_cast<float>(from.image.size().width - 1) - kInset_px;
-    p.max_y = static_cast<float>(from.image.size().height - 1) - kInset_px;
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) {
-        p.rotation[3 * i + j] = from.neighbour_from_reference(i, j);
-      }
-      p.translation[i] = from.translation_m[i];
-    }
+    neighbours_[n].projection = from.projectionOf(input.camera);
     after_[n] = from.after;
   }
 }
