@@ -55,31 +55,29 @@ float pixelConfidence(const SweepInput& input, const SurfaceEstimate& estimate, 
   return height * (0.2f + 0.8f * lead) * precision;
 }
 
-/// Of one row: the share of the neighbouring pixels in the image that found the same surface.
-std::vector<float> neighbourhoodSupport(const cv::Mat& inverse_range, const cv::Mat& sigma, int y) {
-  constexpr int kRadius = 3;
-  const int columns = inverse_range.cols;
-  const auto* middle = inverse_range.ptr<float>(y);
+constexpr int kSupportRadius_px = 3;
+
+/// Of one row: the share of the neighbouring pixels in the image that found the same surface. `padded`: the
+/// inverse ranges with a margin of kSupportRadius_px columns.
+std::vector<float> neighbourhoodSupport(const SweepKernels& kernels, const cv::Mat& padded,
+                                        const cv::Mat& sigma, int y) {
+  const int columns = sigma.cols;
+  const float* middle = padded.ptr<float>(y) + kSupportRadius_px;
   const auto* row_sigma = sigma.ptr<float>(y);
-  std::vector<float> tolerance(static_cast<size_t>(columns)), agree(static_cast<size_t>(columns), 0.0f);
+  std::vector<float> tolerance(static_cast<size_t>(columns)), agree(tolerance), sum(tolerance);
   for (int x = 0; x < columns; ++x) {
     tolerance[static_cast<size_t>(x)] = 2.0f * row_sigma[x] + 0.03f * middle[x];
   }
-  const int first = std::max(0, y - kRadius), last = std::min(inverse_range.rows - 1, y + kRadius);
-  for (int v = first; v <= last; ++v) {
-    const auto* other = inverse_range.ptr<float>(v);
-    for (int shift = -kRadius; shift <= kRadius; ++shift) {
-      const int begin = std::max(0, -shift), end = std::min(columns, columns - shift);
-      for (int x = begin; x < end; ++x) {
-        // False for NaN.
-        const auto at = static_cast<size_t>(x);
-        agree[at] += std::abs(other[x + shift] - middle[x]) <= tolerance[at] ? 1.0f : 0.0f;
-      }
-    }
+  std::vector<const float*> rows;
+  for (int v = std::max(0, y - kSupportRadius_px); v <= std::min(sigma.rows - 1, y + kSupportRadius_px); ++v) {
+    rows.push_back(padded.ptr<float>(v) + kSupportRadius_px);
   }
+  kernels.sumAgreeing({tolerance.size(), rows.data(), static_cast<int>(rows.size()), kSupportRadius_px, 1,
+                       middle, tolerance.data()},
+                      agree.data(), sum.data());
   for (int x = 0; x < columns; ++x) {
-    const int width = std::min(columns - 1, x + kRadius) - std::max(0, x - kRadius) + 1;
-    agree[static_cast<size_t>(x)] /= static_cast<float>(width * (last - first + 1));
+    const int width = std::min(columns - 1, x + kSupportRadius_px) - std::max(0, x - kSupportRadius_px) + 1;
+    agree[static_cast<size_t>(x)] /= static_cast<float>(width) * static_cast<float>(rows.size());
   }
   return agree;
 }
@@ -163,9 +161,11 @@ void estimateRange(const SweepInput& input, const SurfaceEstimate& estimate, Ran
     input.kernels.inverseRangeSigma(row, sigma.ptr<float>(y));
   });
   // What is accepted by itself, then its deviation with what its neighbourhood says.
-  cv::Mat accepted(size, CV_32FC1, cv::Scalar(kNaN));
+  cv::Mat accepted(size, CV_32FC1, cv::Scalar(kNaN)), padded;
+  cv::copyMakeBorder(estimate.inverse_range, padded, 0, 0, kSupportRadius_px, kSupportRadius_px,
+                     cv::BORDER_CONSTANT, cv::Scalar(kNaN));
   forEachRow(size.height, [&](int y) {
-    const std::vector<float> support = neighbourhoodSupport(estimate.inverse_range, sigma, y);
+    const std::vector<float> support = neighbourhoodSupport(input.kernels, padded, sigma, y);
     for (int x = 0; x < size.width; ++x) {
       const float inverse_range = estimate.inverse_range.at<float>(y, x);
       if (!(inverse_range > 0.0f)) {

@@ -97,27 +97,25 @@ cv::Mat fillUnknown(const cv::Mat& values) {
 
 /// The surface without outliers and plane steps: median, then the mean of those neighbours that lie within
 /// one step.
-cv::Mat smoothSurface(const SurfaceEstimate& estimate) {
-  constexpr int kRadius = 4;
-  cv::Mat median;
+cv::Mat smoothSurface(const SweepKernels& kernels, const SurfaceEstimate& estimate) {
+  constexpr int kRadius = 4, kStep = 2;
+  cv::Mat median, padded;
   cv::medianBlur(fillUnknown(estimate.inverse_range), median, 5);
+  cv::copyMakeBorder(median, padded, 0, 0, kRadius, kRadius, cv::BORDER_CONSTANT, cv::Scalar(kNaN));
   cv::Mat smooth = median.clone();
   forEachRow(smooth.rows, [&](int y) {
-    for (int x = 0; x < smooth.cols; ++x) {
-      const float middle = median.at<float>(y, x);
-      const float step = estimate.step.at<float>(y, x);
-      float sum = 0.0f, weight = 0.0f;
-      for (int v = std::max(0, y - kRadius); v <= std::min(smooth.rows - 1, y + kRadius); v += 2) {
-        const float* row = median.ptr<float>(v);
-        for (int u = std::max(0, x - kRadius); u <= std::min(smooth.cols - 1, x + kRadius); u += 2) {
-          const float w = std::abs(row[u] - middle) <= step ? 1.0f : 0.0f;
-          sum += w * row[u];
-          weight += w;
-        }
-      }
-      if (weight > 0.0f) {
-        smooth.at<float>(y, x) = sum / weight;
-      }
+    std::vector<const float*> rows;
+    for (int v = std::max(0, y - kRadius); v <= std::min(smooth.rows - 1, y + kRadius); v += kStep) {
+      rows.push_back(padded.ptr<float>(v) + kRadius);
+    }
+    const auto columns = static_cast<size_t>(smooth.cols);
+    std::vector<float> number(columns), sum(columns);
+    kernels.sumAgreeing({columns, rows.data(), static_cast<int>(rows.size()), kRadius, kStep,
+                         median.ptr<float>(y), estimate.step.ptr<float>(y)},
+                        number.data(), sum.data());
+    auto* row = smooth.ptr<float>(y);
+    for (size_t x = 0; x < columns; ++x) {
+      row[x] = number[x] > 0.0f ? sum[x] / number[x] : row[x];
     }
   });
   return smooth;
@@ -215,7 +213,7 @@ Hypotheses makeRefinement(const SweepInput& input, const cv::Mat& window_counts,
   const int half = input.options->num_refinement_steps / 2;
   Hypotheses refinement;
   refinement.window_counts = window_counts;
-  refinement.base = smoothSurface(estimate);
+  refinement.base = smoothSurface(input.kernels, estimate);
   refinement.weight = cv::Mat(refinement.base.size(), CV_32FC1, cv::Scalar(kNaN));
   for (int k = -half; k <= half; ++k) {
     refinement.offsets.push_back(static_cast<float>(k));

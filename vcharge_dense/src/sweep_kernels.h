@@ -152,6 +152,18 @@ struct UncertaintyRow {
   float scale_noise = 0.0f;  ///< of all baselines alike
 };
 
+/// The neighbourhood of each pixel of a row: `rows` point at its first pixel's column, in images with a margin
+/// as wide as the shifts. At least as many pixels as the chosen set has lanes.
+struct NeighbourhoodRow {
+  size_t count = 0;
+  const float* const* rows = nullptr;
+  int num_rows = 0;
+  int max_shift = 0;  ///< columns from -max_shift to max_shift ...
+  int shift_step = 1;
+  const float* middle = nullptr;
+  const float* tolerance = nullptr;
+};
+
 /// The kernels of one instruction set.
 struct SweepKernels {
   int lanes;
@@ -171,6 +183,8 @@ struct SweepKernels {
   /// Scores are [hypothesis][pixel], `stride` apart.
   void (*findPeaks)(const int16_t* scores, size_t stride, int num_hypotheses, size_t num_pixels,
                     const Peaks& peaks);
+  /// Number and sum of the neighbours within the tolerance of the middle; NaN is not.
+  void (*sumAgreeing)(const NeighbourhoodRow& row, float* number, float* sum);
   /// Pixels per 1/m that the image of each point moves by, in the neighbour where it is most.
   void (*largestMotion)(const UncertaintyRow& row, float* motion);
   /// Standard deviation of each inverse range, infinite where the voters say nothing and NaN where there is

@@ -16,16 +16,19 @@ constexpr int kNodeSpacings_px[] = {8, 4};
 /// Copies the part of an image around (x, y) into the order of a layout.
 template <class To, class From>
 void copyIntoLayout(const cv::Mat& image, cv::Point origin, const TileLayout& layout, From outside, To* to) {
+  std::vector<From> line(static_cast<size_t>(layout.columns()));
+  const int begin = std::clamp(-origin.x, 0, layout.columns());
+  const int end = std::clamp(image.cols - origin.x, begin, layout.columns());
   for (int row = 0; row < layout.rows; ++row) {
     const int y = origin.y + row;
-    const From* from = y >= 0 && y < image.rows ? image.ptr<From>(y) : nullptr;
-    for (int lane = 0; lane < layout.lanes; ++lane) {
-      const int first = origin.x + lane * layout.strip;
-      To* strip = to + layout.index(row, lane * layout.strip);
-      for (int s = 0; s < layout.strip; ++s) {
-        const int x = first + s;
-        strip[static_cast<ptrdiff_t>(s) * layout.lanes] =
-            from != nullptr && x >= 0 && x < image.cols ? static_cast<To>(from[x]) : static_cast<To>(outside);
+    std::fill(line.begin(), line.end(), outside);
+    if (y >= 0 && y < image.rows) {
+      std::copy_n(image.ptr<From>(y) + origin.x + begin, end - begin, line.begin() + begin);
+    }
+    for (int s = 0; s < layout.strip; ++s) {
+      const From* from = line.data() + s;
+      for (int lane = 0; lane < layout.lanes; ++lane) {
+        *to++ = static_cast<To>(from[lane * layout.strip]);
       }
     }
   }

@@ -148,9 +148,31 @@ void inverseRangeSigmaTarget(const UncertaintyRow& row, float* sigma) {
   }
 }
 
+void sumAgreeingTarget(const NeighbourhoodRow& row, float* number, float* sum) {
+  const DF df;
+  const size_t lanes = hn::Lanes(df);
+  for (size_t first = 0; first < row.count; first += lanes) {
+    const size_t at = HWY_MIN(first, row.count - lanes);
+    const VF middle = hn::LoadU(df, row.middle + at), tolerance = hn::LoadU(df, row.tolerance + at);
+    VF agreeing = hn::Zero(df), total = hn::Zero(df);
+    for (int r = 0; r < row.num_rows; ++r) {
+      const float* values = row.rows[r] + at;
+      for (int shift = -row.max_shift; shift <= row.max_shift; shift += row.shift_step) {
+        const VF value = hn::LoadU(df, values + shift);
+        const MF agrees = hn::Le(hn::Abs(hn::Sub(value, middle)), tolerance);
+        agreeing = hn::Add(agreeing, hn::IfThenElseZero(agrees, set(1.0f)));
+        total = hn::Add(total, hn::IfThenElseZero(agrees, value));
+      }
+    }
+    hn::StoreU(agreeing, df, number + at);
+    hn::StoreU(total, df, sum + at);
+  }
+}
+
 }  // namespace
 
 void fillUncertaintyKernels(SweepKernels* kernels) {
+  kernels->sumAgreeing = &sumAgreeingTarget;
   kernels->largestMotion = &largestMotionTarget;
   kernels->inverseRangeSigma = &inverseRangeSigmaTarget;
 }
