@@ -7,6 +7,7 @@
 #include <tbb/parallel_for.h>
 #include <opencv2/imgproc.hpp>
 
+#include "pose_refinement.h"
 #include "range_uncertainty.h"
 #include "surface_estimate.h"
 #include "tile_scorer.h"
@@ -76,10 +77,17 @@ RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepI
                    scale,
                    SweepReference(reference.pixels, options_, scale),
                    {}};
+  std::optional<PoseRefinement> poses;
+  if (options_.refine_poses) {
+    poses.emplace(camera_, reference.pixels, valid_mask_, options_.pose_noise);
+  }
   for (const SweepImage& image : neighbours) {
     checkImage(image, size);
-    const RigidTransform neighbour_from_reference =
-        image.world_from_camera.inverse() * reference.world_from_camera;
+    RigidTransform neighbour_from_reference = image.world_from_camera.inverse() * reference.world_from_camera;
+    if (poses) {
+      neighbour_from_reference =
+          poses->refine(image.pixels, neighbour_from_reference).neighbour_from_reference;
+    }
     input.neighbours.push_back(
         {PackedImage(image.pixels, valid_mask_), neighbour_from_reference.rotationMatrix().cast<float>(),
          neighbour_from_reference.translation().cast<float>(), image.stamp > reference.stamp});
