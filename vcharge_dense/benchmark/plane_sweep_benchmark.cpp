@@ -277,7 +277,8 @@ class RatioReporter : public benchmark::ConsoleReporter {
   bool printRatios() const {
     missing_ = false;
     std::printf("\nleast of the repetitions, per pixel, plane and image:\n");
-    for (const auto& [name, target] : {std::pair<std::string, int64_t>{"avx3", HWY_AVX3}, {"avx2", HWY_AVX2}}) {
+    for (const auto& [name, target] :
+         {std::pair<std::string, int64_t>{"avx3", HWY_AVX3}, {"avx2", HWY_AVX2}}) {
       if ((hwy::SupportedTargets() & target) == 0) {
         continue;
       }
@@ -381,8 +382,8 @@ BENCHMARK_CAPTURE(rangeMap, whole_of_2, PlaneFamilies::kBoth, 16, 2)
 
 int main(int argc, char** argv) {
   std::vector<char*> arguments(argv, argv + argc);
-  const auto smoke =
-      std::find_if(arguments.begin(), arguments.end(), [](const char* a) { return std::string(a) == "--smoke"; });
+  const auto smoke = std::find_if(arguments.begin(), arguments.end(),
+                                  [](const char* a) { return std::string(a) == "--smoke"; });
   const bool is_smoke = smoke != arguments.end();
   std::string repetitions = is_smoke ? "--benchmark_repetitions=1" : "--benchmark_repetitions=5";
   std::string min_time = "--benchmark_min_time=0.001";

@@ -20,8 +20,8 @@ class PackedImage {
   PackedImage(const cv::Mat& pixels, const cv::Mat& valid_mask);
 
   const int32_t* cells() const { return cells_.data(); }
-  int pitch() const { return pitch_; }  ///< of rows, in cells
-  cv::Size size() const { return size_; }          ///< with the margin
+  int pitch() const { return pitch_; }     ///< of rows, in cells
+  cv::Size size() const { return size_; }  ///< with the margin
 
  private:
   cv::Size size_;

@@ -1,6 +1,7 @@
 #include "vcharge_dense/plane_sweep.h"
 
 #include <stdexcept>
+#include <utility>
 
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
@@ -81,16 +82,22 @@ RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepI
   if (options_.refine_poses) {
     poses.emplace(camera_, reference.pixels, valid_mask_, options_.pose_noise);
   }
-  for (const SweepImage& image : neighbours) {
+  std::vector<std::optional<SweepNeighbour>> prepared(neighbours.size());
+  tbb::parallel_for(size_t{0}, neighbours.size(), [&](size_t n) {
+    const SweepImage& image = neighbours[n];
     checkImage(image, size);
-    RigidTransform neighbour_from_reference = image.world_from_camera.inverse() * reference.world_from_camera;
+    PoseRefinement::Result pose;
+    pose.neighbour_from_reference = image.world_from_camera.inverse() * reference.world_from_camera;
     if (poses) {
-      neighbour_from_reference =
-          poses->refine(image.pixels, neighbour_from_reference).neighbour_from_reference;
+      pose = poses->refine(image.pixels, pose.neighbour_from_reference);
     }
-    input.neighbours.push_back(
-        {PackedImage(image.pixels, valid_mask_), neighbour_from_reference.rotationMatrix().cast<float>(),
-         neighbour_from_reference.translation().cast<float>(), image.stamp > reference.stamp});
+    prepared[n].emplace(SweepNeighbour{
+        PackedImage(image.pixels, valid_mask_), pose.neighbour_from_reference.rotationMatrix().cast<float>(),
+        pose.neighbour_from_reference.translation().cast<float>(), image.stamp > reference.stamp,
+        static_cast<float>(pose.rotation_variance_left), static_cast<float>(pose.translation_variance_left)});
+  });
+  for (std::optional<SweepNeighbour>& neighbour : prepared) {
+    input.neighbours.push_back(std::move(*neighbour));
   }
 
   const std::vector<cv::Rect> tiles =

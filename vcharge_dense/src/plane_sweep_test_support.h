@@ -4,6 +4,8 @@
 #include <random>
 #include <vector>
 
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
 #include <opencv2/core.hpp>
 
 #include "analytic_scene.h"
@@ -85,6 +87,17 @@ inline void disturb(const PoseNoiseOptions& noise, std::mt19937* generator, Sequ
   auto& images = sequence->neighbours;
   walk(images.rbegin(), images.rend(), [&](const SweepImage& image) { return image.stamp < now; });
   walk(images.begin(), images.end(), [&](const SweepImage& image) { return image.stamp > now; });
+}
+
+/// Runs a function with only one instruction set after the other.
+template <class Function>
+void onEveryTarget(const Function& function) {
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    SCOPED_TRACE(hwy::TargetName(target));
+    hwy::SetSupportedTargetsForTest(target);
+    function();
+  }
+  hwy::SetSupportedTargetsForTest(0);
 }
 
 inline cv::Mat allValid() {

@@ -23,7 +23,7 @@ constexpr double kGuess_per_m = 0.15;
 // Rays closer to the direction of travel (sine) say nothing about epipolar planes.
 constexpr double kMinSine = 0.1;
 constexpr int kMaxSteps = 10;
-constexpr double kSettled = 1e-3;        // of the noise's standard deviations
+constexpr double kSettled = 1e-3;       // of the noise's standard deviations
 constexpr double kMaxDeviations = 4.0;  // of each axis from the given pose
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
@@ -69,7 +69,8 @@ PoseRefinement::PoseRefinement(const MeiCamera& camera, const cv::Mat& reference
 
 PoseRefinement::Result PoseRefinement::refine(const cv::Mat& pixels,
                                               const RigidTransform& neighbour_from_reference) const {
-  Result result{neighbour_from_reference, false, 0};
+  Result result;
+  result.neighbour_from_reference = neighbour_from_reference;
   const double baseline_m = neighbour_from_reference.translation().norm();
   if (corners_.empty() || !(baseline_m > 0.0)) {
     return result;
@@ -117,10 +118,11 @@ PoseRefinement::Result PoseRefinement::refine(const cv::Mat& pixels,
   const double noise = kTrackNoise_px * (1.0 + camera_.xi()) / camera_.gamma1();
   // Gauss-Newton with Cauchy's weights; unknowns in the pose's standard deviations.
   Vector6 x = Vector6::Zero();
+  Matrix6 hessian;
   bool settled = false;
   int agreeing = 0;
   for (int step = 0; step < kMaxSteps && !settled; ++step) {
-    Matrix6 hessian = Matrix6::Identity();
+    hessian.setIdentity();
     Vector6 gradient = x;
     agreeing = 0;
     const RigidTransform pose = corrected(neighbour_from_reference, x.cwiseProduct(sigma));
@@ -155,6 +157,9 @@ PoseRefinement::Result PoseRefinement::refine(const cv::Mat& pixels,
       x.cwiseAbs().maxCoeff() <= kMaxDeviations) {
     result.neighbour_from_reference = corrected(neighbour_from_reference, x.cwiseProduct(sigma));
     result.is_refined = true;
+    const Vector6 variance_left = hessian.inverse().diagonal();
+    result.rotation_variance_left = variance_left.head<3>().mean();
+    result.translation_variance_left = variance_left.tail<3>().mean();
   }
   return result;
 }

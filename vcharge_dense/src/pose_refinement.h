@@ -27,6 +27,8 @@ class PoseRefinement {
     RigidTransform neighbour_from_reference;
     bool is_refined = false;
     int num_tracks = 0;  ///< that came back to where they started
+    /// What the tracks leave of the given pose's variances, mean over the axes.
+    double rotation_variance_left = 1.0, translation_variance_left = 1.0;
   };
   /// `pixels` as the reference.
   Result refine(const cv::Mat& pixels, const RigidTransform& neighbour_from_reference) const;

@@ -69,7 +69,8 @@ std::vector<float> neighbourhoodSupport(const SweepKernels& kernels, const cv::M
     tolerance[static_cast<size_t>(x)] = 2.0f * row_sigma[x] + 0.03f * middle[x];
   }
   std::vector<const float*> rows;
-  for (int v = std::max(0, y - kSupportRadius_px); v <= std::min(sigma.rows - 1, y + kSupportRadius_px); ++v) {
+  for (int v = std::max(0, y - kSupportRadius_px); v <= std::min(sigma.rows - 1, y + kSupportRadius_px);
+       ++v) {
     rows.push_back(padded.ptr<float>(v) + kSupportRadius_px);
   }
   kernels.sumAgreeing({tolerance.size(), rows.data(), static_cast<int>(rows.size()), kSupportRadius_px, 1,
@@ -121,9 +122,11 @@ std::vector<NeighbourUncertainty> neighbourUncertainties(const SweepInput& input
     const auto variance = [baseline_m](double of_any_pair, double per_sqrt_m) {
       return static_cast<float>(of_any_pair * of_any_pair + per_sqrt_m * per_sqrt_m * baseline_m);
     };
-    result.push_back({neighbour.projectionOf(input.camera),
-                      variance(pose.rotation_rad, pose.rotation_rad_per_sqrt_m),
-                      variance(pose.translation_m, pose.translation_m_per_sqrt_m), neighbour.after});
+    result.push_back(
+        {neighbour.projectionOf(input.camera),
+         neighbour.rotation_variance_left * variance(pose.rotation_rad, pose.rotation_rad_per_sqrt_m),
+         neighbour.translation_variance_left * variance(pose.translation_m, pose.translation_m_per_sqrt_m),
+         neighbour.after});
   }
   return result;
 }

@@ -22,8 +22,8 @@ constexpr int kWeightSum = 255;
 /// Scores are kept as integers: this is the correlation 1, kNoScore where nobody votes.
 constexpr float kScoreScale = 32000.0f;
 constexpr int16_t kNoScore = -32768;
-/// A neighbour's vote for a hypothesis: kVote plus its correlation times kVoteScale, 0 where it does not vote.
-/// A sum of up to 32 votes tells their number and the sum of their correlations.
+/// A neighbour's vote for a hypothesis: kVote plus its correlation times kVoteScale, 0 where it does not
+/// vote. A sum of up to 32 votes tells their number and the sum of their correlations.
 constexpr int kVoteBits = 24;
 constexpr int32_t kVote = 1 << kVoteBits;
 constexpr float kVoteScale = 262144.0f;
@@ -90,12 +90,12 @@ struct CorrelationRow {
   /// rowSamples().
   int16_t* samples = nullptr;
   const int16_t* old_samples = nullptr;
-  int32_t* column_sums = nullptr;            ///< [strip][3][lanes]: of b, b^2 and a b over one window of rows
+  int32_t* column_sums = nullptr;  ///< [strip][3][lanes]: of b, b^2 and a b over one window of rows
   /// Of the windows that end in this row and start in each column: mean and kVoteScale / sqrt(sum of squares
   /// about it).
   const float* reference_mean = nullptr;
   const float* vote_per_covariance = nullptr;
-  int32_t* votes = nullptr;  ///< [strip][lanes]; null: no window ends here
+  int32_t* votes = nullptr;   ///< [strip][lanes]; null: no window ends here
   uint8_t* voters = nullptr;  ///< bits of the lanes, rowVoterBytes()
 };
 
@@ -104,7 +104,7 @@ struct VoteRow {
   Aggregation aggregation = Aggregation::kMean;
   int best_k = 1;
   int num_neighbours = 0;
-  const bool* after = nullptr;   ///< per neighbour
+  const bool* after = nullptr;     ///< per neighbour
   const int32_t* votes = nullptr;  ///< [neighbour][strip][lanes]
   size_t neighbour_stride = 0;     ///< of votes
   /// Not more than 0 where the reference's window does not count.
@@ -152,8 +152,8 @@ struct UncertaintyRow {
   float scale_noise = 0.0f;  ///< of all baselines alike
 };
 
-/// The neighbourhood of each pixel of a row: `rows` point at its first pixel's column, in images with a margin
-/// as wide as the shifts. At least as many pixels as the chosen set has lanes.
+/// The neighbourhood of each pixel of a row: `rows` point at its first pixel's column, in images with a
+/// margin as wide as the shifts. At least as many pixels as the chosen set has lanes.
 struct NeighbourhoodRow {
   size_t count = 0;
   const float* const* rows = nullptr;

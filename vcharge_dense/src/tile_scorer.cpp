@@ -42,8 +42,8 @@ uint32_t TileScores::voters(int hypothesis, size_t pixel) const {
   const size_t bit = in_row % lanes;
   const size_t byte = lanes < 8 ? in_row / lanes : in_row / 8;
   const size_t row_bytes = rowVoterBytes(layout.lanes, layout.strip);
-  const uint8_t* bytes =
-      voter_bits.data() + (row * num_hypotheses + static_cast<size_t>(hypothesis)) * num_neighbours * row_bytes;
+  const uint8_t* bytes = voter_bits.data() + (row * num_hypotheses + static_cast<size_t>(hypothesis)) *
+                                                 num_neighbours * row_bytes;
   uint32_t voters = 0;
   for (size_t n = 0; n < num_neighbours; ++n) {
     voters |= (static_cast<uint32_t>(bytes[n * row_bytes + byte]) >> (bit % 8) & 1u) << n;

@@ -67,10 +67,8 @@ HWY_INLINE Sensitivity sensitivityOf(const Projection& camera, const Vector3& ra
   const VF plane_x = hn::Mul(direction.x, per_denominator), plane_y = hn::Mul(direction.y, per_denominator);
   // Of the direction, hence of the pixel.
   const Vector3 turn = t.plus(hn::Neg(direction.dot(t)), direction).times(per_norm);
-  const VF motion_x =
-      hn::Mul(hn::Mul(fx, per_denominator), hn::NegMulAdd(plane_x, turn.z, turn.x));
-  const VF motion_y =
-      hn::Mul(hn::Mul(fy, per_denominator), hn::NegMulAdd(plane_y, turn.z, turn.y));
+  const VF motion_x = hn::Mul(hn::Mul(fx, per_denominator), hn::NegMulAdd(plane_x, turn.z, turn.x));
+  const VF motion_y = hn::Mul(hn::Mul(fy, per_denominator), hn::NegMulAdd(plane_y, turn.z, turn.y));
   const VF motion = hn::Sqrt(hn::MulAdd(motion_x, motion_x, hn::Mul(motion_y, motion_y)));
   const VF scale = hn::Div(per_denominator, hn::Max(motion, set(1e-9f)));
   const VF along_x = hn::Mul(fx, hn::Mul(motion_x, scale)), along_y = hn::Mul(fy, hn::Mul(motion_y, scale));
@@ -141,7 +139,8 @@ void inverseRangeSigmaTarget(const UncertaintyRow& row, float* sigma) {
     const VF errors = hn::MulAdd(errors_before, errors_before, square(errors_after));
     const VF pose = hn::MulAdd(errors, per_square, square(hn::Mul(set(row.scale_noise), inverse_range)));
     const VF variance = hn::Add(noise, hn::MulAdd(hn::Mul(count, matching_errors), per_square, pose));
-    const MF is_known = hn::And(hn::Gt(motion_squares, zero), hn::Eq(noise, noise));  // NaN differs from itself
+    const MF is_known =
+        hn::And(hn::Gt(motion_squares, zero), hn::Eq(noise, noise));  // NaN differs from itself
     const VF result = hn::IfThenElse(is_known, hn::Sqrt(variance), infinite);
     const VF nan = set(std::numeric_limits<float>::quiet_NaN());
     hn::StoreU(hn::IfThenElse(hn::Gt(inverse_range, zero), result, nan), df, sigma + at);

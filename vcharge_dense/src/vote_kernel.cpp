@@ -6,6 +6,7 @@
 //
 #include <hwy/highway.h>
 
+#include "lane_operations-inl.h"
 #include "sweep_kernels.h"
 #include "sweep_kernels_internal.h"
 
@@ -14,27 +15,11 @@ namespace vcharge {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using DF = hn::ScalableTag<float>;
-using DI = hn::ScalableTag<int32_t>;
 using DI16 = hn::ScalableTag<int16_t>;
-using VF = hn::VFromD<DF>;
-using VI = hn::VFromD<DI>;
 using MF = decltype(hn::Lt(VF(), VF()));
 using V16 = hn::VFromD<DI16>;
 
 constexpr int kMaxNeighbours = 32;
-
-/// Of floats that fit into integers.
-HWY_INLINE VI nearest(VF a) {
-#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
-  return VI{_mm512_cvtps_epi32(a.raw)};
-#elif HWY_ARCH_X86 && HWY_TARGET == HWY_AVX2
-  return VI{_mm256_cvtps_epi32(a.raw)};
-#else
-  return hn::NearestInt(a);
-#endif
-}
 
 /// Sum of some neighbours' votes at one vector of pixels, hence their mean.
 struct Mean {
@@ -80,9 +65,11 @@ HWY_INLINE void storeScores(const Pixels& pixels, const Mean& mean) {
   const DF df;
   const hn::Rebind<int16_t, DF> d16;
   const size_t at = pixels.vector * hn::Lanes(df);
-  const VF scaled = hn::Min(hn::Mul(mean.value, hn::Set(df, kScoreScale / kVoteScale)), hn::Set(df, kScoreScale));
+  const VF scaled =
+      hn::Min(hn::Mul(mean.value, hn::Set(df, kScoreScale / kVoteScale)), hn::Set(df, kScoreScale));
   const MF counts = hn::Gt(hn::Load(df, pixels.row.vote_per_covariance + at), hn::Zero(df));
-  const VF known = hn::IfThenElse(hn::And(mean.known, counts), scaled, hn::Set(df, static_cast<float>(kNoScore)));
+  const VF known =
+      hn::IfThenElse(hn::And(mean.known, counts), scaled, hn::Set(df, static_cast<float>(kNoScore)));
   hn::Store(hn::DemoteTo(d16, nearest(known)), d16, pixels.row.scores + at);
 }
 
