@@ -62,7 +62,7 @@ TEST(NodeGridTest, InterpolatedWarpErrsNoMoreThanItSays) {
             camera_pose.translation() - Eigen::Vector3d(baseline_m, 0.0, 0.0));
         const RigidTransform neighbour_from_reference = neighbour.inverse() * camera_pose;
         const Eigen::Matrix3d rotation = neighbour_from_reference.rotationMatrix();
-        const Eigen::Vector3d translation = neighbour_from_reference.translation();
+        const Eigen::Vector3d& translation = neighbour_from_reference.translation();
         Projection projection{224.0f, 223.5f, 194.0f, 131.5f, 1.158f, 4.0f, 4.0f, 379.0f, 259.0f, {}, {}};
         for (int i = 0; i < 9; ++i) {
           projection.rotation[i] = static_cast<float>(rotation(i / 3, i % 3));
