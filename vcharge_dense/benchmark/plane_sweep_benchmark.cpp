@@ -327,6 +327,13 @@ class RatioReporter : public benchmark::ConsoleReporter {
   std::map<std::string, double> least_;
 };
 
+void byTheLaps(benchmark::internal::Benchmark* b) {
+  b->Iterations(1)->UseManualTime()->Unit(benchmark::kMillisecond);
+}
+void onOneAndTwoThreads(benchmark::internal::Benchmark* b) {
+  b->Arg(1)->Arg(2)->MeasureProcessCPUTime()->UseRealTime()->Unit(benchmark::kMillisecond);
+}
+
 BENCHMARK_CAPTURE(gather, avx3, HWY_AVX3, false);
 BENCHMARK_CAPTURE(gather, avx3_in_turn, HWY_AVX3, true);
 BENCHMARK_CAPTURE(gather, avx2, HWY_AVX2, false);
@@ -335,47 +342,17 @@ BENCHMARK_CAPTURE(multiplyAdds, avx3, HWY_AVX3);
 BENCHMARK_CAPTURE(multiplyAdds, avx2, HWY_AVX2);
 BENCHMARK_CAPTURE(readL2, avx3, HWY_AVX3);
 BENCHMARK_CAPTURE(readL2, avx2, HWY_AVX2);
-BENCHMARK_CAPTURE(kernel, avx3_fisheye, HWY_AVX3, true)
-    ->Iterations(1)
-    ->UseManualTime()
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(kernel, avx3_pinhole, HWY_AVX3, false)
-    ->Iterations(1)
-    ->UseManualTime()
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(kernel, avx2_fisheye, HWY_AVX2, true)
-    ->Iterations(1)
-    ->UseManualTime()
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(kernel, avx2_pinhole, HWY_AVX2, false)
-    ->Iterations(1)
-    ->UseManualTime()
-    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(kernel, avx3_fisheye, HWY_AVX3, true)->Apply(byTheLaps);
+BENCHMARK_CAPTURE(kernel, avx3_pinhole, HWY_AVX3, false)->Apply(byTheLaps);
+BENCHMARK_CAPTURE(kernel, avx2_fisheye, HWY_AVX2, true)->Apply(byTheLaps);
+BENCHMARK_CAPTURE(kernel, avx2_pinhole, HWY_AVX2, false)->Apply(byTheLaps);
 BENCHMARK(plain)->Iterations(1)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(rangeMap, first_sweep_of_4, PlaneFamilies::kFrontoParallel, 0, 4)
-    ->Arg(1)
-    ->Arg(2)
-    ->MeasureProcessCPUTime()
-    ->UseRealTime()
-    ->Unit(benchmark::kMillisecond);
+    ->Apply(onOneAndTwoThreads);
 BENCHMARK_CAPTURE(rangeMap, first_sweep_of_2, PlaneFamilies::kFrontoParallel, 0, 2)
-    ->Arg(1)
-    ->Arg(2)
-    ->MeasureProcessCPUTime()
-    ->UseRealTime()
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(rangeMap, whole_of_4, PlaneFamilies::kBoth, 16, 4)
-    ->Arg(1)
-    ->Arg(2)
-    ->MeasureProcessCPUTime()
-    ->UseRealTime()
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(rangeMap, whole_of_2, PlaneFamilies::kBoth, 16, 2)
-    ->Arg(1)
-    ->Arg(2)
-    ->MeasureProcessCPUTime()
-    ->UseRealTime()
-    ->Unit(benchmark::kMillisecond);
+    ->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, whole_of_4, PlaneFamilies::kBoth, 16, 4)->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, whole_of_2, PlaneFamilies::kBoth, 16, 2)->Apply(onOneAndTwoThreads);
 
 }  // namespace
 }  // namespace vcharge
