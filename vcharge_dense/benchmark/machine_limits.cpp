@@ -30,21 +30,35 @@ HWY_INLINE hn::VFromD<DI> gatherBytes(const int32_t* base, hn::VFromD<DI> offset
 #endif
 }
 
-int64_t gatherPixelsTarget(const int32_t* image, size_t rows, size_t columns) {
+template <class Gather>
+HWY_INLINE int64_t sumOfGathers(const int32_t* image, size_t rows, size_t columns, const Gather& gather) {
   const DI di;
   const auto strip = columns / hn::Lanes(di);
   const auto lane = hn::Mul(hn::Iota(di, 0), hn::Set(di, static_cast<int32_t>(4 * strip)));
   auto sum = hn::Zero(di);
   const auto pixel = hn::Set(di, 4);
-  const auto all_lanes = hn::Gt(hn::Set(di, static_cast<int32_t>(rows)), hn::Zero(di));
   for (size_t y = 0; y < rows; ++y) {
     auto offset = hn::Add(lane, hn::Set(di, static_cast<int32_t>(4096 * y)));
     for (size_t s = 0; s < strip; ++s) {
-      sum = hn::Add(sum, gatherBytes(image, offset, all_lanes));
+      sum = hn::Add(sum, gather(image, offset));
       offset = hn::Add(offset, pixel);
     }
   }
   return hn::GetLane(hn::SumOfLanes(di, sum));
+}
+
+int64_t gatherPixelsTarget(const int32_t* image, size_t rows, size_t columns) {
+  const DI di;
+  const auto all_lanes = hn::Gt(hn::Set(di, static_cast<int32_t>(rows)), hn::Zero(di));
+  return sumOfGathers(image, rows, columns, [&](const int32_t* base, hn::VFromD<DI> offset) HWY_ATTR {
+    return gatherBytes(base, offset, all_lanes);
+  });
+}
+
+int64_t gatherPixelsInTurnTarget(const int32_t* image, size_t rows, size_t columns) {
+  return sumOfGathers(image, rows, columns, [](const int32_t* base, hn::VFromD<DI> offset) HWY_ATTR {
+    return hn::GatherOffset(DI(), base, offset);
+  });
 }
 
 float multiplyAddTarget(size_t count) {
@@ -93,12 +107,17 @@ HWY_AFTER_NAMESPACE();
 namespace vcharge {
 
 HWY_EXPORT(gatherPixelsTarget);
+HWY_EXPORT(gatherPixelsInTurnTarget);
 HWY_EXPORT(multiplyAddTarget);
 HWY_EXPORT(readFloatsTarget);
 HWY_EXPORT(vectorLanesTarget);
 
 int64_t gatherPixels(const int32_t* image, size_t rows, size_t columns) {
   return HWY_DYNAMIC_DISPATCH(gatherPixelsTarget)(image, rows, columns);
+}
+
+int64_t gatherPixelsInTurn(const int32_t* image, size_t rows, size_t columns) {
+  return HWY_DYNAMIC_DISPATCH(gatherPixelsInTurnTarget)(image, rows, columns);
 }
 
 float multiplyAdd(size_t count) {

@@ -12,6 +12,10 @@ namespace vcharge {
 /// checksum.
 int64_t gatherPixels(const int32_t* image, size_t rows, size_t columns);
 
+/// The same with the gather as compilers emit it: on x86 each waits for the one before, whose register it
+/// writes.
+int64_t gatherPixelsInTurn(const int32_t* image, size_t rows, size_t columns);
+
 /// `count` vectors of independent multiply-adds in registers; returns a checksum.
 float multiplyAdd(size_t count);
 

@@ -1,11 +1,13 @@
 // The plane sweep beside the limits of the machine and the plain reference, in one run: 640x400, ZNCC 7x7, 64
-// planes, 4 neighbours. Every figure is the least of its repetitions; --benchmark_filter picks some.
+// planes, 4 neighbours. Every figure is the least of its repetitions; --benchmark_filter picks some. --smoke
+// does all of it once on a small image, and fails where a figure is missing.
 #include <algorithm>
 #include <cstdio>
 #include <ctime>
 #include <map>
 #include <numeric>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <benchmark/benchmark.h>
@@ -24,9 +26,14 @@
 namespace vcharge {
 namespace {
 
-constexpr int kRounds = 10;
+/// What is measured: small and once for a smoke test.
+struct Sizes {
+  cv::Size image = cv::Size(640, 400);
+  int num_rounds = 10;
+};
+Sizes sizes;
+
 constexpr size_t kGatherRows = 64, kGatherColumns = 640;
-const cv::Size kSize(640, 400);
 const MeiCamera kFisheye(1.158, 448.0, 447.0, 324.0, 199.0);
 const MeiCamera kPinhole(0.0, 330.0, 330.0, 324.0, 199.0);
 
@@ -46,7 +53,7 @@ struct Scene {
     for (int i = 0; i <= num_neighbours; ++i) {
       const RigidTransform pose(rotation, Eigen::Vector3d(-0.2 * i, 1.0, 0.9));
       SweepImage image{Timestamp::fromNanoseconds(1000000000 - i * 80000000),
-                       world.render(camera, kSize, pose, 1.0, static_cast<uint32_t>(1 + i)), pose};
+                       world.render(camera, sizes.image, pose, 1.0, static_cast<uint32_t>(1 + i)), pose};
       i == 0 ? void(reference = image) : neighbours.push_back(image);
     }
     ground = groundInCamera(reference.world_from_camera);
@@ -85,11 +92,12 @@ class OnlyTarget {
   bool works_;
 };
 
-void gather(benchmark::State& state, int64_t target) {
+void gather(benchmark::State& state, int64_t target, bool in_turn) {
   const OnlyTarget only(&state, target);
   const std::vector<int32_t> image(1024 * (kGatherRows + 8), 1);
   for (auto _ : state) {
-    benchmark::DoNotOptimize(gatherPixels(image.data(), kGatherRows, kGatherColumns));
+    benchmark::DoNotOptimize(in_turn ? gatherPixelsInTurn(image.data(), kGatherRows, kGatherColumns)
+                                     : gatherPixels(image.data(), kGatherRows, kGatherColumns));
   }
   state.counters["items"] = static_cast<double>(kGatherRows * kGatherColumns);
 }
@@ -152,8 +160,8 @@ void kernel(benchmark::State& state, int64_t target, bool fisheye) {
   }
   const Scene& s = scene(fisheye);
   const PlaneSweepOptions options = firstSweepOnly();
-  const cv::Mat valid(kSize, CV_8UC1, cv::Scalar(255));
-  const RayTable rays(s.camera, kSize, 6.283185307179586);
+  const cv::Mat valid(sizes.image, CV_8UC1, cv::Scalar(255));
+  const RayTable rays(s.camera, sizes.image, 6.283185307179586);
   const Hypotheses planes =
       makePlaneHypotheses(makePlaneFamilies(options, std::nullopt).front(), rays, valid, options.window_px);
   const SampleScale scale = SampleScale::forWindow(options.window_px);
@@ -161,10 +169,10 @@ void kernel(benchmark::State& state, int64_t target, bool fisheye) {
   // enough to fall between what else runs, and under the same conditions.
   const std::vector<int32_t> gathered(1024 * (kGatherRows + 8), 1);
   const size_t num_hypotheses = planes.offsets.size() * s.neighbours.size();
-  const std::vector<cv::Rect> tiles = makeTiles(kSize, options.window_px);
+  const std::vector<cv::Rect> tiles = makeTiles(sizes.image, options.window_px);
   for (auto _ : state) {
     LeastTimes times, gathers;
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < sizes.num_rounds; ++round) {
       gathers.start();
       times.start();
       SweepInput input{s.camera,
@@ -203,21 +211,21 @@ void kernel(benchmark::State& state, int64_t target, bool fisheye) {
     state.counters["gather_s"] = gathers.sum_s();
   }
   state.counters["items"] =
-      static_cast<double>(kSize.area()) * options.num_planes * static_cast<double>(s.neighbours.size());
+      static_cast<double>(sizes.image.area()) * options.num_planes * static_cast<double>(s.neighbours.size());
 }
 
 void plain(benchmark::State& state) {
   const Scene& s = scene(true);
   PlaneSweepOptions options = firstSweepOnly();
   options.num_planes = 4;
-  const cv::Mat valid(kSize, CV_8UC1, cv::Scalar(255));
+  const cv::Mat valid(sizes.image, CV_8UC1, cv::Scalar(255));
   const auto families = makePlaneFamilies(options, std::nullopt);
   for (auto _ : state) {
     benchmark::DoNotOptimize(plainPlaneSweep(s.camera, valid, families, options, s.reference, s.neighbours,
                                              PlainBorder::kUnknown));
   }
   state.counters["items"] =
-      static_cast<double>(kSize.area()) * options.num_planes * static_cast<double>(s.neighbours.size());
+      static_cast<double>(sizes.image.area()) * options.num_planes * static_cast<double>(s.neighbours.size());
 }
 
 /// A range map from the first image to the last, as the options of the vehicle make it.
@@ -228,7 +236,7 @@ void rangeMap(benchmark::State& state, PlaneFamilies families, int refinement_st
   PlaneSweepOptions options;
   options.families = families;
   options.num_refinement_steps = refinement_steps;
-  const cv::Mat valid(kSize, CV_8UC1, cv::Scalar(255));
+  const cv::Mat valid(sizes.image, CV_8UC1, cv::Scalar(255));
   const PlaneSweep sweep(s.camera, valid, options, s.ground);
   const std::vector<SweepImage> neighbours(
       s.neighbours.begin(), s.neighbours.begin() + static_cast<std::ptrdiff_t>(num_neighbours));
@@ -265,29 +273,38 @@ class RatioReporter : public benchmark::ConsoleReporter {
     }
   }
 
-  void printRatios() const {
+  /// False where a figure is missing of those that the machine can measure.
+  bool printRatios() const {
+    missing_ = false;
     std::printf("\nleast of the repetitions, per pixel, plane and image:\n");
-    for (const char* set : {"avx3", "avx2"}) {
-      const std::string name(set);
-      print(name + ": gather limit, ns", get("gather/" + name), 1.0);
+    for (const auto& [name, target] :
+         {std::pair<std::string, int64_t>{"avx3", HWY_AVX3}, {"avx2", HWY_AVX2}}) {
+      if ((hwy::SupportedTargets() & target) == 0) {
+        continue;
+      }
+      print(name + ": gather limit (independent gathers), ns", get("gather/" + name), 1.0);
+      print(name + ": gathers in turn, ns", get("gather/" + name + "_in_turn"), 1.0);
       print(name + ": one vector multiply-add per pixel, ns", get("multiplyAdds/" + name), 1.0);
       print(name + ": four bytes of L2, ns", get("readL2/" + name), 1.0);
       print(name + ": kernel, ns", get("kernel/" + name + "_fisheye"), 1.0);
       print(name + ": gathers between its tiles, ns", get("kernel/" + name + "_fisheye_gathers"), 1.0);
       print(name + ": kernel over gather limit", get("kernel/" + name + "_fisheye"), get("gather/" + name));
+      print(name + ": kernel over gathers in turn", get("kernel/" + name + "_fisheye"),
+            get("gather/" + name + "_in_turn"));
       print(name + ": kernel over gathers between its tiles", get("kernel/" + name + "_fisheye"),
             get("kernel/" + name + "_fisheye_gathers"));
       print(name + ": plain reference over kernel", get("plain"), get("kernel/" + name + "_fisheye"));
       print(name + ": fisheye over pinhole", get("kernel/" + name + "_fisheye"),
             get("kernel/" + name + "_pinhole"));
     }
-    for (const char* what : {"first_sweep_of_4", "whole_of_4", "whole_of_2"}) {
+    for (const char* what : {"first_sweep_of_4", "first_sweep_of_2", "whole_of_4", "whole_of_2"}) {
       const std::string name = std::string("rangeMap/") + what;
       print(name + ": processor time, ms", get(name + "/1_cpu"), 1.0);
       print(name + ": one thread, ms", get(name + "/1"), 1.0);
       print(name + ": two threads, ms", get(name + "/2"), 1.0);
       print(name + ": one over two threads", get(name + "/1"), get(name + "/2"));
     }
+    return !missing_;
   }
 
  private:
@@ -299,62 +316,58 @@ class RatioReporter : public benchmark::ConsoleReporter {
     const auto found = least_.find(name);
     return found == least_.end() ? -1.0 : found->second;
   }
-  static void print(const std::string& what, double value, double of) {
+  void print(const std::string& what, double value, double of) const {
     if (value > 0.0 && of > 0.0) {
       std::printf("  %-48s %8.3f\n", what.c_str(), value / of);
+    } else {
+      missing_ = true;
     }
   }
+  mutable bool missing_ = false;
   std::map<std::string, double> least_;
 };
 
-BENCHMARK_CAPTURE(gather, avx3, HWY_AVX3);
-BENCHMARK_CAPTURE(gather, avx2, HWY_AVX2);
+void byTheLaps(benchmark::internal::Benchmark* b) {
+  b->Iterations(1)->UseManualTime()->Unit(benchmark::kMillisecond);
+}
+void onOneAndTwoThreads(benchmark::internal::Benchmark* b) {
+  b->Arg(1)->Arg(2)->MeasureProcessCPUTime()->UseRealTime()->Unit(benchmark::kMillisecond);
+}
+
+BENCHMARK_CAPTURE(gather, avx3, HWY_AVX3, false);
+BENCHMARK_CAPTURE(gather, avx3_in_turn, HWY_AVX3, true);
+BENCHMARK_CAPTURE(gather, avx2, HWY_AVX2, false);
+BENCHMARK_CAPTURE(gather, avx2_in_turn, HWY_AVX2, true);
 BENCHMARK_CAPTURE(multiplyAdds, avx3, HWY_AVX3);
 BENCHMARK_CAPTURE(multiplyAdds, avx2, HWY_AVX2);
 BENCHMARK_CAPTURE(readL2, avx3, HWY_AVX3);
 BENCHMARK_CAPTURE(readL2, avx2, HWY_AVX2);
-BENCHMARK_CAPTURE(kernel, avx3_fisheye, HWY_AVX3, true)
-    ->Iterations(1)
-    ->UseManualTime()
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(kernel, avx3_pinhole, HWY_AVX3, false)
-    ->Iterations(1)
-    ->UseManualTime()
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(kernel, avx2_fisheye, HWY_AVX2, true)
-    ->Iterations(1)
-    ->UseManualTime()
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(kernel, avx2_pinhole, HWY_AVX2, false)
-    ->Iterations(1)
-    ->UseManualTime()
-    ->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(kernel, avx3_fisheye, HWY_AVX3, true)->Apply(byTheLaps);
+BENCHMARK_CAPTURE(kernel, avx3_pinhole, HWY_AVX3, false)->Apply(byTheLaps);
+BENCHMARK_CAPTURE(kernel, avx2_fisheye, HWY_AVX2, true)->Apply(byTheLaps);
+BENCHMARK_CAPTURE(kernel, avx2_pinhole, HWY_AVX2, false)->Apply(byTheLaps);
 BENCHMARK(plain)->Iterations(1)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(rangeMap, first_sweep_of_4, PlaneFamilies::kFrontoParallel, 0, 4)
-    ->Arg(1)
-    ->Arg(2)
-    ->MeasureProcessCPUTime()
-    ->UseRealTime()
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(rangeMap, whole_of_4, PlaneFamilies::kBoth, 16, 4)
-    ->Arg(1)
-    ->Arg(2)
-    ->MeasureProcessCPUTime()
-    ->UseRealTime()
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(rangeMap, whole_of_2, PlaneFamilies::kBoth, 16, 2)
-    ->Arg(1)
-    ->Arg(2)
-    ->MeasureProcessCPUTime()
-    ->UseRealTime()
-    ->Unit(benchmark::kMillisecond);
+    ->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, first_sweep_of_2, PlaneFamilies::kFrontoParallel, 0, 2)
+    ->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, whole_of_4, PlaneFamilies::kBoth, 16, 4)->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, whole_of_2, PlaneFamilies::kBoth, 16, 2)->Apply(onOneAndTwoThreads);
 
 }  // namespace
 }  // namespace vcharge
 
 int main(int argc, char** argv) {
   std::vector<char*> arguments(argv, argv + argc);
-  std::string repetitions = "--benchmark_repetitions=5";
+  const auto smoke = std::find_if(arguments.begin(), arguments.end(),
+                                  [](const char* a) { return std::string(a) == "--smoke"; });
+  const bool is_smoke = smoke != arguments.end();
+  std::string repetitions = is_smoke ? "--benchmark_repetitions=1" : "--benchmark_repetitions=5";
+  std::string min_time = "--benchmark_min_time=0.001";
+  if (is_smoke) {
+    vcharge::sizes = {cv::Size(96, 80), 1};
+    *smoke = min_time.data();
+  }
   arguments.insert(arguments.begin() + 1, repetitions.data());  // the user's own comes later and wins
   auto count = static_cast<int>(arguments.size());
   benchmark::Initialize(&count, arguments.data());
@@ -363,6 +376,5 @@ int main(int argc, char** argv) {
   }
   vcharge::RatioReporter reporter;
   benchmark::RunSpecifiedBenchmarks(&reporter);
-  reporter.printRatios();
-  return 0;
+  return reporter.printRatios() || !is_smoke ? 0 : 1;
 }

@@ -3,9 +3,9 @@
 #define HWY_TARGET_INCLUDE "correlation_kernel.cpp"
 #include <hwy/foreach_target.h>  // IWYU pragma: keep
 //
-#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
+#include "lane_operations-inl.h"
 #include "sweep_kernels.h"
 #include "sweep_kernels_internal.h"
 
@@ -14,124 +14,18 @@ namespace vcharge {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using DF = hn::ScalableTag<float>;
-using DI = hn::ScalableTag<int32_t>;
-using VF = hn::VFromD<DF>;
-using VI = hn::VFromD<DI>;
-using MI = decltype(hn::Lt(VI(), VI()));
-
-// Operations on the parts of 32-bit lanes:
-// multiplyHalves  sum of the products of the signed 16-bit halves
-// multiplyBytes   the same of unsigned bytes with signed ones, into the halves that the bytes lie in
-// gather          on x86 a gather waits for what its register held before, even where all
-//                 lanes are read: it starts from zeros, and the compiler must not know that `lanes` are all
-// negateHighHalf  the low half stays
-// fractionBytes   byte 1, the highest bits of a position's fraction, in all bytes
-// fractionHalves  the same in the low byte of both halves
-#if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSSE3
-#if HWY_TARGET <= HWY_AVX3
-HWY_INLINE VI multiplyHalves(VI a, VI b) {
-  return VI{_mm512_madd_epi16(a.raw, b.raw)};
-}
-HWY_INLINE VI multiplyBytes(VI u, VI s) {
-  return VI{_mm512_maddubs_epi16(u.raw, s.raw)};
-}
-HWY_INLINE VI gather(const int32_t* base, VI index, MI lanes) {
-  return VI{_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), lanes.raw, index.raw, base, 4)};
-}
-#elif HWY_TARGET == HWY_AVX2
-HWY_INLINE VI multiplyHalves(VI a, VI b) {
-  return VI{_mm256_madd_epi16(a.raw, b.raw)};
-}
-HWY_INLINE VI multiplyBytes(VI u, VI s) {
-  return VI{_mm256_maddubs_epi16(u.raw, s.raw)};
-}
-HWY_INLINE VI gather(const int32_t* base, VI index, MI lanes) {
-  return VI{_mm256_mask_i32gather_epi32(_mm256_setzero_si256(), base, index.raw, lanes.raw, 4)};
-}
-#else
-HWY_INLINE VI multiplyHalves(VI a, VI b) {
-  return VI{_mm_madd_epi16(a.raw, b.raw)};
-}
-HWY_INLINE VI multiplyBytes(VI u, VI s) {
-  return VI{_mm_maddubs_epi16(u.raw, s.raw)};
-}
-HWY_INLINE VI gather(const int32_t* base, VI index, MI /*lanes*/) {
-  return hn::GatherIndex(DI(), base, index);
-}
-#endif
-HWY_INLINE VI negateHighHalf(VI a) {
-  const hn::Repartition<int16_t, DI> d16;
-  const VI signs = hn::Set(DI(), static_cast<int32_t>(0xffff0001u));
-  return hn::BitCast(DI(), hn::Mul(hn::BitCast(d16, a), hn::BitCast(d16, signs)));
-}
-HWY_INLINE VI shuffleBytes(VI from, uint32_t bytes_of_lane) {
-  const DI di;
-  const hn::Repartition<uint8_t, DI> du8;
-  alignas(16) const uint32_t block[4] = {bytes_of_lane, bytes_of_lane + 0x04040404u,
-                                         bytes_of_lane + 0x08080808u, bytes_of_lane + 0x0c0c0c0cu};
-  const VI at = hn::LoadDup128(di, reinterpret_cast<const int32_t*>(block));
-  return hn::BitCast(di, hn::TableLookupBytesOr0(hn::BitCast(du8, from), hn::BitCast(du8, at)));
-}
-HWY_INLINE VI fractionBytes(VI position) {
-  return shuffleBytes(position, 0x01010101u);
-}
-HWY_INLINE VI fractionHalves(VI position) {
-  return shuffleBytes(position, 0x80018001u);
-}
-#else
-HWY_INLINE VI gather(const int32_t* base, VI index, MI /*lanes*/) {
-  return hn::GatherIndex(DI(), base, index);
-}
-HWY_INLINE VI lowHalf(VI a) {
-  return hn::ShiftRight<16>(hn::ShiftLeft<16>(a));
-}
-HWY_INLINE VI multiplyHalves(VI a, VI b) {
-  return hn::Add(hn::Mul(lowHalf(a), lowHalf(b)), hn::Mul(hn::ShiftRight<16>(a), hn::ShiftRight<16>(b)));
-}
-HWY_INLINE VI multiplyBytes(VI u, VI s) {
-  const VI byte = hn::Set(DI(), 0xff);
-  const auto product = [&](VI weight, VI pixel_on_top) HWY_ATTR {
-    return hn::Mul(hn::And(weight, byte), hn::ShiftRight<24>(pixel_on_top));
-  };
-  const VI low =
-      hn::Add(product(u, hn::ShiftLeft<24>(s)), product(hn::ShiftRight<8>(u), hn::ShiftLeft<16>(s)));
-  const VI high =
-      hn::Add(product(hn::ShiftRight<16>(u), hn::ShiftLeft<8>(s)), product(hn::ShiftRight<24>(u), s));
-  return hn::OrAnd(hn::ShiftLeft<16>(high), low, hn::Set(DI(), 0xffff));
-}
-HWY_INLINE VI negateHighHalf(VI a) {
-  const VI high = hn::And(a, hn::Set(DI(), -65536));
-  return hn::OrAnd(hn::Sub(hn::Zero(DI()), high), a, hn::Set(DI(), 0xffff));
-}
-HWY_INLINE VI fractionHalves(VI position) {
-  const VI byte = hn::And(hn::ShiftRight<8>(position), hn::Set(DI(), 0xff));
-  return hn::Or(byte, hn::ShiftLeft<16>(byte));
-}
-HWY_INLINE VI fractionBytes(VI position) {
-  const VI halves = fractionHalves(position);
-  return hn::Or(halves, hn::ShiftLeft<8>(halves));
-}
-#endif
-
-/// sum + multiplyHalves(a, b).
-HWY_INLINE VI addHalves(VI sum, VI a, VI b) {
-  return hn::Add(sum, multiplyHalves(a, b));
-}
-
 /// Bilinear samples of a PackedImage at fixed-point positions.
 struct Sampler {
   const int32_t* image;
-  int row_shift, scale_shift;
-  VI row_mask, unseen_cell, unseen_sample, flip_bytes, flip_low;
+  int scale_shift;
+  VI high_half, pitch, unseen_cell, unseen_sample, flip_bytes, flip_low;
   MI all_lanes;
 
   explicit HWY_INLINE Sampler(const CorrelationRow& row)
       : image(row.image),
-        row_shift(kPositionBits - (row.pitch_shift - 2)),
         scale_shift(row.scale.shift),
-        row_mask(hn::Set(DI(), -(1 << (row.pitch_shift - 2)))),
+        high_half(hn::Set(DI(), -65536)),
+        pitch(hn::Set(DI(), row.pitch << 16 | 1)),
         unseen_cell(hn::Set(DI(), kUnseenCell)),
         unseen_sample(hn::Set(DI(), row.scale.unseen)),
         flip_bytes(hn::Set(DI(), 0x00ff00ff)),
@@ -139,15 +33,9 @@ struct Sampler {
         all_lanes(hn::Gt(hn::Set(DI(), row.strip), hn::Zero(DI()))) {}
 
   HWY_INLINE VI index(VI u, VI v) const {
-    return hn::OrAnd(hn::ShiftRight<kPositionBits>(u), hn::ShiftRightSame(v, row_shift), row_mask);
-  }
-  HWY_INLINE void prefetch(VI u, VI v) const {
-    const DI di;
-    HWY_ALIGN int32_t indices[HWY_LANES(int32_t)];
-    hn::Store(index(u, v), di, indices);
-    for (const int32_t at : indices) {
-      hwy::Prefetch(image + at);
-    }
+    static_assert(kPositionBits == 16, "a position's whole pixels are the high half");
+    const VI column = hn::BitCast(DI(), hn::ShiftRight<16>(hn::BitCast(hn::Repartition<uint32_t, DI>(), u)));
+    return multiplyHalves(hn::OrAnd(column, v, high_half), pitch);
   }
   HWY_INLINE VI operator()(VI u, VI v) const {
     const VI cells = gather(image, index(u, v), all_lanes);
@@ -192,30 +80,36 @@ HWY_INLINE VF reciprocalRoot(VF value) {
 #endif
 }
 
-/// Zero-mean normalized cross correlation from a window's sums.
+/// Votes by zero-mean normalized cross correlation from a window's sums.
 struct Correlator {
   const float* HWY_RESTRICT mean;
-  const float* HWY_RESTRICT inverse_deviation;
-  float* HWY_RESTRICT scores;
+  const float* HWY_RESTRICT vote_per_covariance;
+  int32_t* HWY_RESTRICT votes;
+  uint8_t* HWY_RESTRICT voters;
   VF inverse_count, min_squares, max_squares;
 
   explicit HWY_INLINE Correlator(const CorrelationRow& row)
       : mean(row.reference_mean),
-        inverse_deviation(row.reference_inverse_deviation),
-        scores(row.scores),
+        vote_per_covariance(row.vote_per_covariance),
+        votes(row.votes),
+        voters(row.voters),
         inverse_count(hn::Set(DF(), 1.0f / static_cast<float>(row.window * row.window))),
         min_squares(hn::Set(DF(), row.scale.min_squares)),
         max_squares(hn::Set(DF(), row.scale.max_squares)) {}
 
-  HWY_INLINE void operator()(const Sums& sums, size_t at) const {
+  HWY_INLINE void operator()(const Sums& sums, size_t vector) const {
     const DF df;
+    const DI di;
+    const size_t at = vector * hn::Lanes(df);
     const VF b = hn::ConvertTo(df, sums.b);
     const VF squares = hn::NegMulAdd(hn::Mul(b, inverse_count), b, hn::ConvertTo(df, sums.bb));
     const VF covariance = hn::NegMulAdd(hn::Load(df, mean + at), b, hn::ConvertTo(df, sums.ab));
-    const VF score =
-        hn::Mul(hn::Mul(covariance, hn::Load(df, inverse_deviation + at)), reciprocalRoot(squares));
-    const auto votes = hn::And(hn::Gt(squares, min_squares), hn::Lt(squares, max_squares));
-    hn::Store(hn::IfThenElse(votes, score, hn::Set(df, kNoVote)), df, scores + at);
+    const VF vote =
+        hn::Mul(hn::Mul(covariance, hn::Load(df, vote_per_covariance + at)), reciprocalRoot(squares));
+    const auto seen = hn::And(hn::Gt(squares, min_squares), hn::Lt(squares, max_squares));
+    const VI counted = hn::Add(nearest(vote), hn::Set(di, kVote));
+    hn::Store(hn::IfThenElseZero(hn::RebindMask(di, seen), counted), di, votes + at);
+    hn::StoreMaskBits(df, seen, voters + vector * rowVoterBytes(static_cast<int>(hn::Lanes(df)), 1));
   }
 };
 
@@ -231,7 +125,7 @@ struct CellWalk {
     const DF df;
     const float* c = cell + 3 * i * hn::Lanes(df);
     const VF outer = hn::MulAdd(row, hn::Load(df, c + 2 * hn::Lanes(df)), hn::Load(df, c + hn::Lanes(df)));
-    return hn::NearestInt(hn::MulAdd(row, outer, hn::Load(df, c)));
+    return nearest(hn::MulAdd(row, outer, hn::Load(df, c)));
   }
   HWY_INLINE void enterCell() {
     u = polynomial(0);
@@ -250,8 +144,35 @@ struct CellWalk {
   }
 };
 
-/// Samples of a row, a block of vectors at a time: apart from what is done with them, lest all of that waits
-/// in the processor's queues for a gather.
+#if HWY_TARGET == HWY_SCALAR
+HWY_INLINE void storeSamples(VI even, VI odd, int16_t* to) {
+  to[0] = static_cast<int16_t>(hn::GetLane(even));
+  to[1] = static_cast<int16_t>(hn::GetLane(odd));
+}
+template <int kVector>
+HWY_INLINE VI samplePairs(const int16_t* now, const int16_t* old) {
+  const uint32_t high = static_cast<uint32_t>(static_cast<int32_t>(old[kVector])) << 16;
+  return hn::Set(DI(), static_cast<int32_t>(high | static_cast<uint16_t>(now[kVector])));
+}
+#else
+using D16 = hn::Repartition<int16_t, DI>;
+/// Packs two vectors of samples into one: of each block of 128 bits first the first vector's lanes.
+HWY_INLINE void storeSamples(VI even, VI odd, int16_t* to) {
+  const D16 d16;
+  hn::Store(hn::ReorderDemote2To(d16, even, odd), d16, to);
+}
+/// Of one of two vectors that were packed: samples of two rows as the low and the high halves of lanes.
+template <int kVector>
+HWY_INLINE VI samplePairs(const int16_t* now, const int16_t* old) {
+  const D16 d16;
+  const auto low = hn::Load(d16, now), high = hn::Load(d16, old);
+  return hn::BitCast(
+      DI(), kVector == 0 ? hn::InterleaveLower(d16, low, high) : hn::InterleaveUpper(d16, low, high));
+}
+#endif
+
+/// Samples of a row, kept two vectors at a time (see storeSamples()).
+/// Apart from what is done with them, lest all of that waits in the processor's queues for a gather.
 template <bool kFromCells>
 class BlockSampler {
  public:
@@ -259,35 +180,28 @@ class BlockSampler {
       : sample_(sample),
         u_(row.u),
         v_(row.v),
-        last_(static_cast<int32_t>(kFromCells ? (size_t{1} << row.cell_shift) - 1 : 0)),
+        samples_(row.samples),
         walk_{row.cells, hn::Set(DF(), static_cast<float>(row.row_in_cell)), {}, {}, {}, {}, {}, {}} {}
 
-  /// Brings the next block's pixels, from where its strips start and end, while something else is computed.
-  HWY_INLINE void prepare() {
-    if constexpr (kFromCells) {
-      const DI di;
-      walk_.enterCell();
-      sample_.prefetch(walk_.u, walk_.v);
-      const VI steps = hn::Set(di, last_);
-      sample_.prefetch(hn::Add(walk_.u, hn::Mul(steps, walk_.du)),
-                       hn::Add(walk_.v, hn::Mul(steps, walk_.dv)));
-    }
-  }
-  /// `count` vectors from `first` on, after prepare().
-  HWY_INLINE void sample(size_t first, size_t count, int32_t* HWY_RESTRICT samples) const {
+  /// Vectors `first` to `end`, of which there is an even number, from the next cell.
+  HWY_INLINE void sample(size_t first, size_t end) {
     const DI di;
     const size_t lanes = hn::Lanes(di);
     if constexpr (kFromCells) {
+      walk_.enterCell();
       CellWalk walk = walk_;
-      for (size_t s = 0; s < count; ++s) {
-        hn::Store(sample_(walk.u, walk.v), di, samples + s * lanes);
+      for (size_t s = first; s < end; s += 2) {
+        const VI even = sample_(walk.u, walk.v);
         walk.advance();
+        const VI odd = sample_(walk.u, walk.v);
+        walk.advance();
+        storeSamples(even, odd, samples_ + s * lanes);
       }
     } else {
-      const int32_t* HWY_RESTRICT u = u_ + first * lanes;
-      const int32_t* HWY_RESTRICT v = v_ + first * lanes;
-      for (size_t s = 0; s < count; ++s) {
-        hn::Store(sample_(hn::Load(di, u + s * lanes), hn::Load(di, v + s * lanes)), di, samples + s * lanes);
+      for (size_t at = first * lanes; at < end * lanes; at += 2 * lanes) {
+        const VI even = sample_(hn::Load(di, u_ + at), hn::Load(di, v_ + at));
+        const VI odd = sample_(hn::Load(di, u_ + at + lanes), hn::Load(di, v_ + at + lanes));
+        storeSamples(even, odd, samples_ + at);
       }
     }
   }
@@ -296,77 +210,92 @@ class BlockSampler {
   const Sampler& sample_;
   const int32_t* u_;
   const int32_t* v_;
-  const int32_t last_;
+  int16_t* HWY_RESTRICT samples_;
   CellWalk walk_;
 };
 
-template <bool kFromCells, bool kWithScores>
-void correlateRow(const CorrelationRow& row) {
-  const DI di;
-  const size_t lanes = hn::Lanes(di);
-  const Sampler sample(row);
-  const Correlator correlate(row);
-  const VI low_half = hn::Set(di, 0xffff);
-  const VI new_less_old = hn::Set(di, static_cast<int32_t>(0xffff0001u));  // the halves 1 and -1
-  const auto strip = static_cast<size_t>(row.strip);
-  const auto window = static_cast<size_t>(row.window);
-  const size_t block_size = kFromCells ? size_t{1} << row.cell_shift : kMaxBlock;
-  int32_t* HWY_RESTRICT pairs = row.pairs;
-  int32_t* HWY_RESTRICT columns = row.column_sums;
-  const int32_t* HWY_RESTRICT reference_pairs = row.reference_pairs;
-  HWY_ALIGN int32_t samples[kMaxBlock * HWY_LANES(int32_t)];
-  BlockSampler<kFromCells> blocks(row, sample);
-  Sums sums{hn::Zero(di), hn::Zero(di), hn::Zero(di)};
+/// Running sums along a row of windows that end in it.
+template <bool kWithVotes>
+class RowSums {
+ public:
+  explicit HWY_INLINE RowSums(const CorrelationRow& row)
+      : correlate_(row),
+        columns_(row.column_sums),
+        reference_pairs_(row.reference_pairs),
+        window_(static_cast<size_t>(row.window)),
+        strip_(static_cast<size_t>(row.strip)),
+        sums_{hn::Zero(DI()), hn::Zero(DI()), hn::Zero(DI())} {}
 
-  blocks.prepare();
-  for (size_t first = 0; first < strip; first += block_size) {
-    const size_t end = first + block_size < strip ? first + block_size : strip;
-    blocks.sample(first, end - first, samples);
-    if (end < strip) {
-      blocks.prepare();
-    }
-    const int32_t* HWY_RESTRICT next = samples;
-    for (size_t s = first; s < end; ++s, next += lanes) {
-      const size_t at = s * lanes;
-      // This row enters the column's sums, and the one that lies a window above leaves them.
-      const VI pair = hn::OrAnd(hn::ShiftLeft<16>(hn::Load(di, pairs + at)), hn::Load(di, next), low_half);
-      hn::Store(pair, di, pairs + at);
-      int32_t* column = columns + 3 * at;
-      const VI column_b = addHalves(hn::Load(di, column), pair, new_less_old);
-      const VI column_bb = addHalves(hn::Load(di, column + lanes), pair, negateHighHalf(pair));
-      const VI column_ab =
-          addHalves(hn::Load(di, column + 2 * lanes), pair, hn::Load(di, reference_pairs + at));
-      hn::Store(column_b, di, column);
-      hn::Store(column_bb, di, column + lanes);
-      hn::Store(column_ab, di, column + 2 * lanes);
-      if constexpr (kWithScores) {
-        sums.b = hn::Add(sums.b, column_b);
-        sums.bb = hn::Add(sums.bb, column_bb);
-        sums.ab = hn::Add(sums.ab, column_ab);
-        if (s + 1 >= window) {
-          const size_t start = (s + 1 - window) * lanes;
-          correlate(sums, start);
-          sums.subtract(columns + 3 * start);
-        }
+  /// A column's new sample, and the one that lies a window above and leaves its sums, as a pair of halves.
+  HWY_INLINE void add(size_t s, VI pair) {
+    const DI di;
+    const size_t lanes = hn::Lanes(di);
+    const VI new_less_old = hn::Set(di, static_cast<int32_t>(0xffff0001u));  // the halves 1 and -1
+    int32_t* column = columns_ + 3 * s * lanes;
+    const VI b = addHalves(hn::Load(di, column), pair, new_less_old);
+    const VI bb = addHalves(hn::Load(di, column + lanes), pair, negateHighHalf(pair));
+    const VI ab =
+        addHalves(hn::Load(di, column + 2 * lanes), pair, hn::Load(di, reference_pairs_ + s * lanes));
+    hn::Store(b, di, column);
+    hn::Store(bb, di, column + lanes);
+    hn::Store(ab, di, column + 2 * lanes);
+    if constexpr (kWithVotes) {
+      sums_.b = hn::Add(sums_.b, b);
+      sums_.bb = hn::Add(sums_.bb, bb);
+      sums_.ab = hn::Add(sums_.ab, ab);
+      if (s + 1 >= window_) {
+        correlate_(sums_, s + 1 - window_);
+        sums_.subtract(columns_ + 3 * (s + 1 - window_) * lanes);
       }
     }
   }
-  if constexpr (kWithScores) {
-    // The windows over the end of a strip reach into the next lane's: its first columns, one lane on.
-    for (size_t s = 0; s + 1 < window; ++s) {
-      sums.add(columns + 3 * s * lanes + 1);
-      const size_t start = (strip + s + 1 - window) * lanes;
-      correlate(sums, start);
-      sums.subtract(columns + 3 * start);
+  /// The windows over the end of a strip reach into the next lane's: its first columns, one lane on.
+  HWY_INLINE void finish() {
+    const size_t lanes = hn::Lanes(DI());
+    for (size_t s = 0; kWithVotes && s + 1 < window_; ++s) {
+      const size_t start = strip_ + s + 1 - window_;
+      sums_.add(columns_ + 3 * s * lanes + 1);
+      correlate_(sums_, start);
+      sums_.subtract(columns_ + 3 * start * lanes);
     }
   }
+
+ private:
+  const Correlator correlate_;
+  int32_t* HWY_RESTRICT columns_;
+  const int32_t* HWY_RESTRICT reference_pairs_;
+  const size_t window_, strip_;
+  Sums sums_;
+};
+
+template <bool kFromCells, bool kWithVotes>
+void correlateRow(const CorrelationRow& row) {
+  const size_t lanes = hn::Lanes(DI());
+  const Sampler sample(row);
+  BlockSampler<kFromCells> blocks(row, sample);
+  RowSums<kWithVotes> sums(row);
+  const auto strip = static_cast<size_t>(row.strip);
+  const size_t block_size = kFromCells ? size_t{1} << row.cell_shift : kMaxBlock;
+  const int16_t* HWY_RESTRICT new_samples = row.samples;
+  const int16_t* HWY_RESTRICT old_samples = row.old_samples;
+  for (size_t first = 0; first < strip; first += block_size) {
+    const size_t end = HWY_MIN(first + block_size, strip);
+    blocks.sample(first, end + (end - first) % 2);
+    for (size_t s = first; s < end; s += 2) {
+      sums.add(s, samplePairs<0>(new_samples + s * lanes, old_samples + s * lanes));
+      if (s + 1 < end) {
+        sums.add(s + 1, samplePairs<1>(new_samples + s * lanes, old_samples + s * lanes));
+      }
+    }
+  }
+  sums.finish();
 }
 
 void correlateTarget(const CorrelationRow& row) {
   if (row.cells != nullptr) {
-    row.scores != nullptr ? correlateRow<true, true>(row) : correlateRow<true, false>(row);
+    row.votes != nullptr ? correlateRow<true, true>(row) : correlateRow<true, false>(row);
   } else {
-    row.scores != nullptr ? correlateRow<false, true>(row) : correlateRow<false, false>(row);
+    row.votes != nullptr ? correlateRow<false, true>(row) : correlateRow<false, false>(row);
   }
 }
 

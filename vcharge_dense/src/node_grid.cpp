@@ -9,7 +9,7 @@ namespace vcharge {
 namespace {
 
 // A quadratic through three nodes leaves their range by no more than an eighth of their second difference, in
-// each direction: with this, positions stay in the packed image (see kInset_px in tile_scorer.cpp).
+// each direction: with this, positions stay in the packed image (see kInset_px in sweep_input.cpp).
 constexpr float kMaxSecondDifference_px = 12.0f;
 
 /// Nodes that cover `pixels` with whole cells, at least two for a third difference.
@@ -36,7 +36,7 @@ NodeGrid::NodeGrid(const MeiCamera& camera, const cv::Mat& near_valid, cv::Point
   while ((1 << cell_shift_) < 2 * spacing) {
     ++cell_shift_;
   }
-  nodes_ = countNodes(layout.strip, spacing);
+  nodes_ = countNodes(layout.strip + layout.strip % 2, spacing);  // samples come in twos
   node_rows_ = countNodes(layout.rows, spacing);
   const size_t size =
       static_cast<size_t>(node_rows_) * static_cast<size_t>(nodes_) * static_cast<size_t>(layout.lanes);

@@ -1,40 +1,56 @@
 #include "packed_image.h"
 
 #include <algorithm>
+#include <limits>
 
+#include "parallel_rows.h"
 #include "sweep_kernels.h"
+#include "vcharge_core/error.h"
 
 namespace vcharge {
 namespace {
 
-/// Two pixels of a column as the low half of a cell.
-inline uint32_t columnBytes(const uint8_t* top, const uint8_t* bottom, int x) {
-  const auto signedByte = [](uint8_t gray) { return static_cast<uint32_t>(std::max<int>(gray, 1)) ^ 0x80u; };
-  return signedByte(top[x]) | signedByte(bottom[x]) << 8;
+constexpr int kCellsPerLine = 16;  // of a cache line
+
+/// Cells of a row: an odd number of cache lines, for rows a power of two apart would share few places of the
+/// caches.
+int pitchOf(int width) {
+  const int lines = (width + kCellsPerLine - 1) / kCellsPerLine;
+  return kCellsPerLine * (lines | 1);
+}
+
+inline uint32_t signedByte(uint8_t gray) {
+  return static_cast<uint32_t>(std::max<uint8_t>(gray, 1)) ^ 0x80u;
 }
 
 }  // namespace
 
 PackedImage::PackedImage(const cv::Mat& pixels, const cv::Mat& valid_mask)
-    : size_(pixels.cols + 2 * kMargin, pixels.rows + 2 * kMargin), pitch_shift_(2) {
-  while ((1 << pitch_shift_) < 4 * size_.width) {
-    ++pitch_shift_;
-  }
-  const size_t pitch = (size_t{1} << pitch_shift_) / sizeof(int32_t);
-  cells_.assign(pitch * static_cast<size_t>(size_.height), kUnseenCell);
-  for (int y = 0; y + 1 < pixels.rows; ++y) {
+    : size_(pixels.cols + 2 * kMargin, pixels.rows + 2 * kMargin), pitch_(pitchOf(size_.width)) {
+  check(std::max(pitch_, size_.height) <= std::numeric_limits<int16_t>::max(),
+        "PackedImage: an image may have at most 32,000 pixels a side");
+  const auto pitch = static_cast<size_t>(pitch_);
+  cells_.resize(pitch * static_cast<size_t>(size_.height));
+  forEachRow(size_.height, [&](int row) {
+    int32_t* cells = cells_.data() + static_cast<size_t>(row) * pitch;
+    std::fill_n(cells, pitch, kUnseenCell);
+    const int y = row - kMargin;
+    if (y < 0 || y + 1 >= pixels.rows) {
+      return;
+    }
     const auto* top = pixels.ptr<uint8_t>(y);
     const auto* bottom = pixels.ptr<uint8_t>(y + 1);
     const auto* top_valid = valid_mask.ptr<uint8_t>(y);
     const auto* bottom_valid = valid_mask.ptr<uint8_t>(y + 1);
-    int32_t* cells = cells_.data() + static_cast<size_t>(y + kMargin) * pitch + kMargin;
+    cells += kMargin;
     for (int x = 0; x + 1 < pixels.cols; ++x) {
       const bool seen =
           (top_valid[x] != 0) & (bottom_valid[x] != 0) & (top_valid[x + 1] != 0) & (bottom_valid[x + 1] != 0);
-      const uint32_t cell = columnBytes(top, bottom, x) | columnBytes(top, bottom, x + 1) << 16;
+      const uint32_t cell = signedByte(top[x]) | signedByte(bottom[x]) << 8 | signedByte(top[x + 1]) << 16 |
+                            signedByte(bottom[x + 1]) << 24;
       cells[x] = seen ? static_cast<int32_t>(cell) : kUnseenCell;
     }
-  }
+  });
 }
 
 }  // namespace vcharge

@@ -1,9 +1,10 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
 #include <opencv2/core.hpp>
+
+#include "aligned_array.h"
 
 namespace vcharge {
 
@@ -19,13 +20,13 @@ class PackedImage {
   PackedImage(const cv::Mat& pixels, const cv::Mat& valid_mask);
 
   const int32_t* cells() const { return cells_.data(); }
-  int pitchShift() const { return pitch_shift_; }  ///< rows are 1 << pitchShift() bytes apart
-  cv::Size size() const { return size_; }          ///< with the margin
+  int pitch() const { return pitch_; }     ///< of rows, in cells
+  cv::Size size() const { return size_; }  ///< with the margin
 
  private:
   cv::Size size_;
-  int pitch_shift_;
-  std::vector<int32_t> cells_;
+  int pitch_;
+  AlignedArray<int32_t> cells_;
 };
 
 }  // namespace vcharge

@@ -1,12 +1,14 @@
 #include "vcharge_dense/plane_sweep.h"
 
 #include <stdexcept>
+#include <utility>
 
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <opencv2/imgproc.hpp>
 
+#include "pose_refinement.h"
 #include "range_uncertainty.h"
 #include "surface_estimate.h"
 #include "tile_scorer.h"
@@ -18,6 +20,8 @@ namespace {
 constexpr double kWholeSphere_rad = 6.283185307179586;
 // Node grids need positions this far around valid pixels.
 constexpr int kNearValid_px = 17;
+
+constexpr int kMinWidth_px = 16;  // the most lanes that a vector has
 
 /// Tiles are independent of each other, hence of who computes them.
 template <class Function>
@@ -48,6 +52,7 @@ PlaneSweep::PlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask, const
   options_.validate();
   const MeiCamera::Parameters p = camera.parameters();
   check(p.tail<4>().isZero(0.0), "PlaneSweep: the working camera must not have distortion");
+  check(valid_mask.cols >= kMinWidth_px, "PlaneSweep: images must be at least 16 pixels wide");
   families_ = makePlaneFamilies(options_, ground_in_camera);
   auto planes = std::make_shared<std::vector<Hypotheses>>();
   for (const PlaneFamily& family : families_) {
@@ -73,13 +78,26 @@ RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepI
                    scale,
                    SweepReference(reference.pixels, options_, scale),
                    {}};
-  for (const SweepImage& image : neighbours) {
+  std::optional<PoseRefinement> poses;
+  if (options_.refine_poses) {
+    poses.emplace(camera_, reference.pixels, valid_mask_, options_.pose_noise);
+  }
+  std::vector<std::optional<SweepNeighbour>> prepared(neighbours.size());
+  tbb::parallel_for(size_t{0}, neighbours.size(), [&](size_t n) {
+    const SweepImage& image = neighbours[n];
     checkImage(image, size);
-    const RigidTransform neighbour_from_reference =
-        image.world_from_camera.inverse() * reference.world_from_camera;
-    input.neighbours.push_back(
-        {PackedImage(image.pixels, valid_mask_), neighbour_from_reference.rotationMatrix().cast<float>(),
-         neighbour_from_reference.translation().cast<float>(), image.stamp > reference.stamp});
+    PoseRefinement::Result pose;
+    pose.neighbour_from_reference = image.world_from_camera.inverse() * reference.world_from_camera;
+    if (poses) {
+      pose = poses->refine(image.pixels, pose.neighbour_from_reference);
+    }
+    prepared[n].emplace(SweepNeighbour{
+        PackedImage(image.pixels, valid_mask_), pose.neighbour_from_reference.rotationMatrix().cast<float>(),
+        pose.neighbour_from_reference.translation().cast<float>(), image.stamp > reference.stamp,
+        static_cast<float>(pose.rotation_variance_left), static_cast<float>(pose.translation_variance_left)});
+  });
+  for (std::optional<SweepNeighbour>& neighbour : prepared) {
+    input.neighbours.push_back(std::move(*neighbour));
   }
 
   const std::vector<cv::Rect> tiles =

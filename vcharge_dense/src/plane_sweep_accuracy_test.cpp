@@ -17,6 +17,7 @@ namespace {
 
 using testing::allValid;
 using testing::cameraPose;
+using testing::disturb;
 using testing::kCamera;
 using testing::kFront;
 using testing::kLeft;
@@ -25,43 +26,6 @@ using testing::lotScene;
 using testing::makeSequence;
 using testing::plainOptions;
 using testing::Sequence;
-
-/// Moves the neighbours, which come in order of time, as odometry errs: its scale is off for the whole
-/// sequence, its pose walks at random from image to image, and the reference's own jitter is common to all
-/// pairs.
-void disturb(const PoseNoiseOptions& noise, std::mt19937* generator, Sequence* sequence) {
-  const auto randomVector = [&](double sigma) {
-    Eigen::Vector3d vector;
-    for (int i = 0; i < 3; ++i) {
-      vector[i] = sigma * normalNumber(generator);
-    }
-    return vector;
-  };
-  const double scale = noise.scale * normalNumber(generator);
-  const Eigen::Vector3d jitter_m = randomVector(noise.translation_m);
-  const Eigen::Vector3d jitter_rad = randomVector(noise.rotation_rad);
-  const Eigen::Vector3d origin = sequence->reference.world_from_camera.translation();
-  const auto walk = [&](auto begin, auto end, const auto isOnThisSide) {
-    Eigen::Vector3d walked_m = jitter_m, walked_rad = jitter_rad, last = origin;
-    for (auto image = begin; image != end; ++image) {
-      if (!isOnThisSide(*image)) {
-        continue;
-      }
-      const RigidTransform pose = image->world_from_camera;
-      const double root_m = std::sqrt((pose.translation() - last).norm());
-      last = pose.translation();
-      walked_m += randomVector(noise.translation_m_per_sqrt_m * root_m);
-      walked_rad += randomVector(noise.rotation_rad_per_sqrt_m * root_m);
-      image->world_from_camera =
-          RigidTransform(rotationFromVector(walked_rad) * pose.rotation(),
-                         pose.translation() + scale * (pose.translation() - origin) + walked_m);
-    }
-  };
-  const Timestamp now = sequence->reference.stamp;
-  auto& images = sequence->neighbours;
-  walk(images.rbegin(), images.rend(), [&](const SweepImage& image) { return image.stamp < now; });
-  walk(images.begin(), images.end(), [&](const SweepImage& image) { return image.stamp > now; });
-}
 
 /// Shares of pixels inside the image's border.
 struct Score {

@@ -1,7 +1,11 @@
 #pragma once
 
+#include <cmath>
+#include <random>
 #include <vector>
 
+#include <gtest/gtest.h>
+#include <hwy/targets.h>
 #include <opencv2/core.hpp>
 
 #include "analytic_scene.h"
@@ -46,6 +50,54 @@ inline Sequence makeSequence(const AnalyticScene& scene, const RigidTransform& s
   sequence.truth = scene.range(kCamera, kSize, start);
   sequence.ground = groundInCamera(start);
   return sequence;
+}
+
+/// Moves the neighbours, which come in order of time, as odometry errs: its scale is off for the whole
+/// sequence, its pose walks at random from image to image, and the reference's own jitter is common to all
+/// pairs.
+inline void disturb(const PoseNoiseOptions& noise, std::mt19937* generator, Sequence* sequence) {
+  const auto randomVector = [&](double sigma) {
+    Eigen::Vector3d vector;
+    for (int i = 0; i < 3; ++i) {
+      vector[i] = sigma * normalNumber(generator);
+    }
+    return vector;
+  };
+  const double scale = noise.scale * normalNumber(generator);
+  const Eigen::Vector3d jitter_m = randomVector(noise.translation_m);
+  const Eigen::Vector3d jitter_rad = randomVector(noise.rotation_rad);
+  const Eigen::Vector3d origin = sequence->reference.world_from_camera.translation();
+  const auto walk = [&](auto begin, auto end, const auto isOnThisSide) {
+    Eigen::Vector3d walked_m = jitter_m, walked_rad = jitter_rad, last = origin;
+    for (auto image = begin; image != end; ++image) {
+      if (!isOnThisSide(*image)) {
+        continue;
+      }
+      const RigidTransform pose = image->world_from_camera;
+      const double root_m = std::sqrt((pose.translation() - last).norm());
+      last = pose.translation();
+      walked_m += randomVector(noise.translation_m_per_sqrt_m * root_m);
+      walked_rad += randomVector(noise.rotation_rad_per_sqrt_m * root_m);
+      image->world_from_camera =
+          RigidTransform(rotationFromVector(walked_rad) * pose.rotation(),
+                         pose.translation() + scale * (pose.translation() - origin) + walked_m);
+    }
+  };
+  const Timestamp now = sequence->reference.stamp;
+  auto& images = sequence->neighbours;
+  walk(images.rbegin(), images.rend(), [&](const SweepImage& image) { return image.stamp < now; });
+  walk(images.begin(), images.end(), [&](const SweepImage& image) { return image.stamp > now; });
+}
+
+/// Runs a function with only one instruction set after the other.
+template <class Function>
+void onEveryTarget(const Function& function) {
+  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
+    SCOPED_TRACE(hwy::TargetName(target));
+    hwy::SetSupportedTargetsForTest(target);
+    function();
+  }
+  hwy::SetSupportedTargetsForTest(0);
 }
 
 inline cv::Mat allValid() {

@@ -32,53 +32,6 @@ float square(float value) {
   return value * value;
 }
 
-/// Variance of the inverse range at one pixel.
-float inverseRangeVariance(const SweepInput& input, const SurfaceEstimate& estimate, int x, int y) {
-  const PlaneSweepOptions& options = *input.options;
-  const float inverse_range = estimate.inverse_range.at<float>(y, x);
-  const auto voters = static_cast<uint32_t>(estimate.voters.at<int>(y, x));
-  // A random walk errs alike for all neighbours on one side of the reference, and independently on the other
-  // side.
-  float motion_squares = 0.0f, errors_before = 0.0f, errors_after = 0.0f, matching_errors = 0.0f;
-  int count = 0;
-  for (size_t n = 0; n < input.neighbours.size(); ++n) {
-    if ((voters & (1u << n)) == 0) {
-      continue;
-    }
-    const SweepNeighbour& neighbour = input.neighbours[n];
-    const PixelSensitivity sensitivity =
-        pixelSensitivity(input.camera, neighbour, input.rays->ray(x, y), inverse_range);
-    const float baseline_m = neighbour.translation_m.norm();
-    const auto variance = [baseline_m](double of_any_pair, double per_sqrt_m) {
-      return static_cast<float>(of_any_pair * of_any_pair + per_sqrt_m * per_sqrt_m * baseline_m);
-    };
-    const PoseNoiseOptions& pose = options.pose_noise;
-    const float rotation_variance = variance(pose.rotation_rad, pose.rotation_rad_per_sqrt_m);
-    const float translation_variance = variance(pose.translation_m, pose.translation_m_per_sqrt_m);
-    const float pixel_error =
-        sensitivity.pixels_per_radian *
-        std::sqrt(rotation_variance + translation_variance * square(inverse_range / sensitivity.range_ratio));
-    // Windows seen at another scale differ by more than a shift.
-    const float scale = std::max(sensitivity.range_ratio, 1.0f / sensitivity.range_ratio);
-    matching_errors += square(sensitivity.pixels_per_inverse_range *
-                              static_cast<float>(options.matching_noise_px) * scale * scale);
-    motion_squares += square(sensitivity.pixels_per_inverse_range);
-    (neighbour.after ? errors_after : errors_before) += sensitivity.pixels_per_inverse_range * pixel_error;
-    ++count;
-  }
-  if (count == 0 || !(motion_squares > 0.0f)) {
-    return std::numeric_limits<float>::infinity();
-  }
-  const float score = estimate.score.at<float>(y, x);
-  const float curvature = estimate.curvature.at<float>(y, x);
-  const float window = static_cast<float>(options.window_px * options.window_px);
-  const float noise = kImageNoiseFactor * std::max(1.0f - score, 1e-3f) / (window * curvature);
-  const float matching = static_cast<float>(count) * matching_errors / square(motion_squares);
-  const float pose = (square(errors_before) + square(errors_after)) / square(motion_squares) +
-                     square(static_cast<float>(options.pose_noise.scale) * inverse_range);
-  return std::isnan(noise) ? std::numeric_limits<float>::infinity() : noise + matching + pose;
-}
-
 /// The probability that a range is right, by its confidence's factors.
 float calibratedConfidence(float factors) {
   size_t i = 1;
@@ -102,31 +55,30 @@ float pixelConfidence(const SweepInput& input, const SurfaceEstimate& estimate, 
   return height * (0.2f + 0.8f * lead) * precision;
 }
 
-/// Of one row: the share of the neighbouring pixels in the image that found the same surface.
-std::vector<float> neighbourhoodSupport(const cv::Mat& inverse_range, const cv::Mat& sigma, int y) {
-  constexpr int kRadius = 3;
-  const int columns = inverse_range.cols;
-  const auto* middle = inverse_range.ptr<float>(y);
+constexpr int kSupportRadius_px = 3;
+
+/// Of one row: the share of the neighbouring pixels in the image that found the same surface. `padded`: the
+/// inverse ranges with a margin of kSupportRadius_px columns.
+std::vector<float> neighbourhoodSupport(const SweepKernels& kernels, const cv::Mat& padded,
+                                        const cv::Mat& sigma, int y) {
+  const int columns = sigma.cols;
+  const float* middle = padded.ptr<float>(y) + kSupportRadius_px;
   const auto* row_sigma = sigma.ptr<float>(y);
-  std::vector<float> tolerance(static_cast<size_t>(columns)), agree(static_cast<size_t>(columns), 0.0f);
+  std::vector<float> tolerance(static_cast<size_t>(columns)), agree(tolerance), sum(tolerance);
   for (int x = 0; x < columns; ++x) {
     tolerance[static_cast<size_t>(x)] = 2.0f * row_sigma[x] + 0.03f * middle[x];
   }
-  const int first = std::max(0, y - kRadius), last = std::min(inverse_range.rows - 1, y + kRadius);
-  for (int v = first; v <= last; ++v) {
-    const auto* other = inverse_range.ptr<float>(v);
-    for (int shift = -kRadius; shift <= kRadius; ++shift) {
-      const int begin = std::max(0, -shift), end = std::min(columns, columns - shift);
-      for (int x = begin; x < end; ++x) {
-        // False for NaN.
-        const auto at = static_cast<size_t>(x);
-        agree[at] += std::abs(other[x + shift] - middle[x]) <= tolerance[at] ? 1.0f : 0.0f;
-      }
-    }
+  std::vector<const float*> rows;
+  for (int v = std::max(0, y - kSupportRadius_px); v <= std::min(sigma.rows - 1, y + kSupportRadius_px);
+       ++v) {
+    rows.push_back(padded.ptr<float>(v) + kSupportRadius_px);
   }
+  kernels.sumAgreeing({tolerance.size(), rows.data(), static_cast<int>(rows.size()), kSupportRadius_px, 1,
+                       middle, tolerance.data()},
+                      agree.data(), sum.data());
   for (int x = 0; x < columns; ++x) {
-    const int width = std::min(columns - 1, x + kRadius) - std::max(0, x - kRadius) + 1;
-    agree[static_cast<size_t>(x)] /= static_cast<float>(width * (last - first + 1));
+    const int width = std::min(columns - 1, x + kSupportRadius_px) - std::max(0, x - kSupportRadius_px) + 1;
+    agree[static_cast<size_t>(x)] /= static_cast<float>(width) * static_cast<float>(rows.size());
   }
   return agree;
 }
@@ -162,35 +114,35 @@ std::vector<float> neighbourhoodRoughness(const cv::Mat& inverse_range, int y) {
 
 }  // namespace
 
-PixelSensitivity pixelSensitivity(const MeiCamera& camera, const SweepNeighbour& neighbour,
-                                  const Eigen::Vector3f& ray, float inverse_range) {
-  PixelSensitivity result;
-  const Eigen::Vector3f point =
-      neighbour.neighbour_from_reference * ray + inverse_range * neighbour.translation_m;
-  const float norm = point.norm();
-  const auto xi = static_cast<float>(camera.xi());
-  const float denominator = point.z() / norm + xi;
-  if (!(norm > 1e-6f) || !(point.z() > norm * (xi > 1.0f ? -1.0f / xi : -xi)) || !(denominator > 1e-6f)) {
-    return result;
+std::vector<NeighbourUncertainty> neighbourUncertainties(const SweepInput& input) {
+  const PoseNoiseOptions& pose = input.options->pose_noise;
+  std::vector<NeighbourUncertainty> result;
+  for (const SweepNeighbour& neighbour : input.neighbours) {
+    const float baseline_m = neighbour.translation_m.norm();
+    const auto variance = [baseline_m](double of_any_pair, double per_sqrt_m) {
+      return static_cast<float>(of_any_pair * of_any_pair + per_sqrt_m * per_sqrt_m * baseline_m);
+    };
+    result.push_back(
+        {neighbour.projectionOf(input.camera),
+         neighbour.rotation_variance_left * variance(pose.rotation_rad, pose.rotation_rad_per_sqrt_m),
+         neighbour.translation_variance_left * variance(pose.translation_m, pose.translation_m_per_sqrt_m),
+         neighbour.after});
   }
-  const Eigen::Vector3f direction = point / norm;
-  const Eigen::Vector2f plane(direction.x() / denominator, direction.y() / denominator);
-  const Eigen::Vector2f gamma(static_cast<float>(camera.gamma1()), static_cast<float>(camera.gamma2()));
-  // Pixel by direction on the sphere.
-  const auto pixelMotion = [&](const Eigen::Vector3f& d) {
-    return Eigen::Vector2f(gamma.x() * (d.x() - plane.x() * d.z()) / denominator,
-                           gamma.y() * (d.y() - plane.y() * d.z()) / denominator);
-  };
-  const Eigen::Vector3f& t = neighbour.translation_m;
-  const Eigen::Vector2f motion = pixelMotion((t - direction * direction.dot(t)) / norm);
-  result.pixels_per_inverse_range = motion.norm();
-  result.range_ratio = norm;
-  const Eigen::Vector2f along = motion / std::max(result.pixels_per_inverse_range, 1e-9f);
-  Eigen::Vector3f row(gamma.x() * along.x(), gamma.y() * along.y(),
-                      -gamma.x() * along.x() * plane.x() - gamma.y() * along.y() * plane.y());
-  row /= denominator;
-  result.pixels_per_radian = (row - direction * direction.dot(row)).norm();
   return result;
+}
+
+UncertaintyRow uncertaintyRow(const SweepInput& input, const std::vector<NeighbourUncertainty>& neighbours,
+                              const cv::Mat& inverse_range, int y) {
+  const size_t first = static_cast<size_t>(y) * static_cast<size_t>(inverse_range.cols);
+  UncertaintyRow row;
+  row.count = static_cast<size_t>(inverse_range.cols);
+  row.ray_x = input.rays->x().data() + first;
+  row.ray_y = input.rays->y().data() + first;
+  row.ray_z = input.rays->z().data() + first;
+  row.inverse_range = inverse_range.ptr<float>(y);
+  row.neighbours = neighbours.data();
+  row.num_neighbours = static_cast<int>(neighbours.size());
+  return row;
 }
 
 void estimateRange(const SweepInput& input, const SurfaceEstimate& estimate, RangeMap* map) {
@@ -200,18 +152,23 @@ void estimateRange(const SweepInput& input, const SurfaceEstimate& estimate, Ran
   map->standard_deviation_m = cv::Mat(size, CV_32FC1, cv::Scalar(kNaN));
   map->confidence = cv::Mat(size, CV_32FC1, cv::Scalar(0.0f));
   cv::Mat sigma(size, CV_32FC1, cv::Scalar(kNaN));
+  const std::vector<NeighbourUncertainty> neighbours = neighbourUncertainties(input);
   forEachRow(size.height, [&](int y) {
-    for (int x = 0; x < size.width; ++x) {
-      const float inverse_range = estimate.inverse_range.at<float>(y, x);
-      if (inverse_range > 0.0f) {
-        sigma.at<float>(y, x) = std::sqrt(inverseRangeVariance(input, estimate, x, y));
-      }
-    }
+    UncertaintyRow row = uncertaintyRow(input, neighbours, estimate.inverse_range, y);
+    row.voters = estimate.voters.ptr<int32_t>(y);
+    row.score = estimate.score.ptr<float>(y);
+    row.curvature = estimate.curvature.ptr<float>(y);
+    row.noise_factor = kImageNoiseFactor / static_cast<float>(options.window_px * options.window_px);
+    row.matching_noise_px = static_cast<float>(options.matching_noise_px);
+    row.scale_noise = static_cast<float>(options.pose_noise.scale);
+    input.kernels.inverseRangeSigma(row, sigma.ptr<float>(y));
   });
   // What is accepted by itself, then its deviation with what its neighbourhood says.
-  cv::Mat accepted(size, CV_32FC1, cv::Scalar(kNaN));
+  cv::Mat accepted(size, CV_32FC1, cv::Scalar(kNaN)), padded;
+  cv::copyMakeBorder(estimate.inverse_range, padded, 0, 0, kSupportRadius_px, kSupportRadius_px,
+                     cv::BORDER_CONSTANT, cv::Scalar(kNaN));
   forEachRow(size.height, [&](int y) {
-    const std::vector<float> support = neighbourhoodSupport(estimate.inverse_range, sigma, y);
+    const std::vector<float> support = neighbourhoodSupport(input.kernels, padded, sigma, y);
     for (int x = 0; x < size.width; ++x) {
       const float inverse_range = estimate.inverse_range.at<float>(y, x);
       if (!(inverse_range > 0.0f)) {

@@ -1,6 +1,7 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <vector>
+
 #include <opencv2/core.hpp>
 
 #include "surface_estimate.h"
@@ -9,17 +10,12 @@
 
 namespace vcharge {
 
-/// How the image of a point in a neighbour reacts to errors.
-struct PixelSensitivity {
-  float pixels_per_inverse_range =
-      0.0f;  ///< pixels per 1/m along the ray; 0 where the neighbour does not see the point
-  float pixels_per_radian = 0.0f;  ///< along that same direction, of a rotation of the neighbour (worst axis)
-  float range_ratio = 1.0f;        ///< range from the neighbour over range from the reference
-};
+/// The neighbours with the errors of their poses that the options expect.
+std::vector<NeighbourUncertainty> neighbourUncertainties(const SweepInput& input);
 
-/// Of the point on the unit `ray` at `inverse_range` (per metre), by the unified projection's derivative.
-PixelSensitivity pixelSensitivity(const MeiCamera& camera, const SweepNeighbour& neighbour,
-                                  const Eigen::Vector3f& ray, float inverse_range);
+/// Row y of `inverse_range` (CV_32FC1) and of the rays for the kernels.
+UncertaintyRow uncertaintyRow(const SweepInput& input, const std::vector<NeighbourUncertainty>& neighbours,
+                              const cv::Mat& inverse_range, int y);
 
 /// Range, standard deviation and confidence from what the sweep found; applies the options' gates. The
 /// confidence is the probability that the range is within 5 %, as calibrated on simulated drives.

@@ -97,27 +97,25 @@ cv::Mat fillUnknown(const cv::Mat& values) {
 
 /// The surface without outliers and plane steps: median, then the mean of those neighbours that lie within
 /// one step.
-cv::Mat smoothSurface(const SurfaceEstimate& estimate) {
-  constexpr int kRadius = 4;
-  cv::Mat median;
+cv::Mat smoothSurface(const SweepKernels& kernels, const SurfaceEstimate& estimate) {
+  constexpr int kRadius = 4, kStep = 2;
+  cv::Mat median, padded;
   cv::medianBlur(fillUnknown(estimate.inverse_range), median, 5);
+  cv::copyMakeBorder(median, padded, 0, 0, kRadius, kRadius, cv::BORDER_CONSTANT, cv::Scalar(kNaN));
   cv::Mat smooth = median.clone();
   forEachRow(smooth.rows, [&](int y) {
-    for (int x = 0; x < smooth.cols; ++x) {
-      const float middle = median.at<float>(y, x);
-      const float step = estimate.step.at<float>(y, x);
-      float sum = 0.0f, weight = 0.0f;
-      for (int v = std::max(0, y - kRadius); v <= std::min(smooth.rows - 1, y + kRadius); v += 2) {
-        const float* row = median.ptr<float>(v);
-        for (int u = std::max(0, x - kRadius); u <= std::min(smooth.cols - 1, x + kRadius); u += 2) {
-          const float w = std::abs(row[u] - middle) <= step ? 1.0f : 0.0f;
-          sum += w * row[u];
-          weight += w;
-        }
-      }
-      if (weight > 0.0f) {
-        smooth.at<float>(y, x) = sum / weight;
-      }
+    std::vector<const float*> rows;
+    for (int v = std::max(0, y - kRadius); v <= std::min(smooth.rows - 1, y + kRadius); v += kStep) {
+      rows.push_back(padded.ptr<float>(v) + kRadius);
+    }
+    const auto columns = static_cast<size_t>(smooth.cols);
+    std::vector<float> number(columns), sum(columns);
+    kernels.sumAgreeing({columns, rows.data(), static_cast<int>(rows.size()), kRadius, kStep,
+                         median.ptr<float>(y), estimate.step.ptr<float>(y)},
+                        number.data(), sum.data());
+    auto* row = smooth.ptr<float>(y);
+    for (size_t x = 0; x < columns; ++x) {
+      row[x] = number[x] > 0.0f ? sum[x] / number[x] : row[x];
     }
   });
   return smooth;
@@ -215,32 +213,25 @@ Hypotheses makeRefinement(const SweepInput& input, const cv::Mat& window_counts,
   const int half = input.options->num_refinement_steps / 2;
   Hypotheses refinement;
   refinement.window_counts = window_counts;
-  refinement.base = smoothSurface(estimate);
+  refinement.base = smoothSurface(input.kernels, estimate);
   refinement.weight = cv::Mat(refinement.base.size(), CV_32FC1, cv::Scalar(kNaN));
   for (int k = -half; k <= half; ++k) {
     refinement.offsets.push_back(static_cast<float>(k));
   }
   const cv::Mat step = fillUnknown(estimate.step);
-  // The neighbours' motion varies slowly: once for 2 x 2 pixels.
-  forEachRow((step.rows + 1) / 2, [&](int half_y) {
-    const int y = 2 * half_y;
-    for (int x = 0; x < step.cols; x += 2) {
-      const float inverse_range = refinement.base.at<float>(y, x);
-      float motion = 0.0f;
-      for (const SweepNeighbour& neighbour : input.neighbours) {
-        motion =
-            std::max(motion, pixelSensitivity(input.camera, neighbour, input.rays->ray(x, y), inverse_range)
-                                 .pixels_per_inverse_range);
-      }
-      const float fine = static_cast<float>(input.options->refinement_step_px) / std::max(motion, 1e-6f);
-      for (int v = y; v < std::min(y + 2, step.rows); ++v) {
-        for (int u = x; u < std::min(x + 2, step.cols); ++u) {
-          // Fine enough for the neighbour that moves most, wide enough to reach half way to the next plane
-          // and back.
-          const float coarse = step.at<float>(v, u) / static_cast<float>(half);
-          refinement.weight.at<float>(v, u) = std::clamp(fine, 0.75f * coarse, 2.0f * coarse);
-        }
-      }
+  const std::vector<NeighbourUncertainty> neighbours = neighbourUncertainties(input);
+  forEachRow(step.rows, [&](int y) {
+    std::vector<float> motion(static_cast<size_t>(step.cols));
+    input.kernels.largestMotion(uncertaintyRow(input, neighbours, refinement.base, y), motion.data());
+    const auto* coarse_row = step.ptr<float>(y);
+    auto* weight_row = refinement.weight.ptr<float>(y);
+    for (int x = 0; x < step.cols; ++x) {
+      const float fine = static_cast<float>(input.options->refinement_step_px) /
+                         std::max(motion[static_cast<size_t>(x)], 1e-6f);
+      // Fine enough for the neighbour that moves most, wide enough to reach half way to the next plane and
+      // back.
+      const float coarse = coarse_row[x] / static_cast<float>(half);
+      weight_row[x] = std::clamp(fine, 0.75f * coarse, 2.0f * coarse);
     }
   });
   return refinement;

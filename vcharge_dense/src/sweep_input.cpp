@@ -6,6 +6,34 @@
 #include <opencv2/imgproc.hpp>
 
 namespace vcharge {
+namespace {
+
+// Nodes this far from the packed image's ends count as unseen: interpolated positions lie between them, or a
+// little beyond.
+constexpr float kInset_px = 4.0f;
+
+}  // namespace
+
+Projection SweepNeighbour::projectionOf(const MeiCamera& camera) const {
+  constexpr auto kMargin = static_cast<float>(PackedImage::kMargin);
+  Projection p;
+  p.fx = static_cast<float>(camera.gamma1());
+  p.fy = static_cast<float>(camera.gamma2());
+  p.cx = static_cast<float>(camera.u0()) + kMargin;
+  p.cy = static_cast<float>(camera.v0()) + kMargin;
+  p.xi = static_cast<float>(camera.xi());
+  p.min_x = kInset_px;
+  p.min_y = kInset_px;
+  p.max_x = static_cast<float>(image.size().width - 1) - kInset_px;
+  p.max_y = static_cast<float>(image.size().height - 1) - kInset_px;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) {
+      p.rotation[3 * i + j] = neighbour_from_reference(i, j);
+    }
+    p.translation[i] = translation_m[i];
+  }
+  return p;
+}
 
 SweepReference::SweepReference(const cv::Mat& pixels, const PlaneSweepOptions& options,
                                const SampleScale& scale)

@@ -18,6 +18,10 @@ struct SweepNeighbour {
   Eigen::Matrix3f neighbour_from_reference;  ///< rotation
   Eigen::Vector3f translation_m;             ///< of the same transform
   bool after = false;                        ///< taken after the reference
+  /// Of the variances that the options' noise expects; less where the pose was refined.
+  float rotation_variance_left = 1.0f, translation_variance_left = 1.0f;
+
+  Projection projectionOf(const MeiCamera& camera) const;
 };
 
 /// The reference image as the kernels use it.

@@ -47,6 +47,7 @@ SweepKernels sweepKernels() {
   addWarpKernels(&kernels);
   addCorrelationKernels(&kernels);
   addVoteKernels(&kernels);
+  addUncertaintyKernels(&kernels);
   return kernels;
 }
 

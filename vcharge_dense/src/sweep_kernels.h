@@ -22,8 +22,11 @@ constexpr int kWeightSum = 255;
 /// Scores are kept as integers: this is the correlation 1, kNoScore where nobody votes.
 constexpr float kScoreScale = 32000.0f;
 constexpr int16_t kNoScore = -32768;
-/// In a row of correlations: the neighbour does not vote. Correlations are at least -1.
-constexpr float kNoVote = -2.0f;
+/// A neighbour's vote for a hypothesis: kVote plus its correlation times kVoteScale, 0 where it does not
+/// vote. A sum of up to 32 votes tells their number and the sum of their correlations.
+constexpr int kVoteBits = 24;
+constexpr int32_t kVote = 1 << kVoteBits;
+constexpr float kVoteScale = 262144.0f;
 
 /// Integers for which the sums of a window fit into 32 bits, and a single unseen sample shows in them.
 struct SampleScale {
@@ -77,19 +80,23 @@ struct CorrelationRow {
   const int32_t* u = nullptr;  ///< [strip][lanes]
   const int32_t* v = nullptr;
   const int32_t* image = nullptr;  ///< PackedImage
-  int pitch_shift = 0;             ///< its rows are 1 << pitch_shift bytes apart
+  int pitch = 0;                   ///< of its rows, in cells
 
   int strip = 0;
   int window = 0;
   SampleScale scale;
   const int32_t* reference_pairs = nullptr;  ///< samples of this row, and less those one window above
-  int32_t* pairs = nullptr;                  ///< the neighbour's, from one window above; become this row's
-  int32_t* column_sums = nullptr;            ///< [strip][3][lanes]: of b, b^2 and a b over one window of rows
-  /// Of the windows that end in this row and start in each column: mean and 1 / sqrt(sum of squares about
-  /// it), NaN where they do not count.
+  /// The neighbour's samples of this row, and of one window above, in the kernel's own order; room for
+  /// rowSamples().
+  int16_t* samples = nullptr;
+  const int16_t* old_samples = nullptr;
+  int32_t* column_sums = nullptr;  ///< [strip][3][lanes]: of b, b^2 and a b over one window of rows
+  /// Of the windows that end in this row and start in each column: mean and kVoteScale / sqrt(sum of squares
+  /// about it).
   const float* reference_mean = nullptr;
-  const float* reference_inverse_deviation = nullptr;
-  float* scores = nullptr;  ///< [strip][lanes], kNoVote or NaN where there is none; null: no window ends here
+  const float* vote_per_covariance = nullptr;
+  int32_t* votes = nullptr;   ///< [strip][lanes]; null: no window ends here
+  uint8_t* voters = nullptr;  ///< bits of the lanes, rowVoterBytes()
 };
 
 /// The neighbours' votes in one row.
@@ -97,12 +104,14 @@ struct VoteRow {
   Aggregation aggregation = Aggregation::kMean;
   int best_k = 1;
   int num_neighbours = 0;
-  const bool* after = nullptr;   ///< per neighbour
-  const float* votes = nullptr;  ///< [neighbour][strip][lanes]
-  size_t neighbour_stride = 0;   ///< of votes
+  const bool* after = nullptr;     ///< per neighbour
+  const int32_t* votes = nullptr;  ///< [neighbour][strip][lanes]
+  size_t neighbour_stride = 0;     ///< of votes
+  /// Not more than 0 where the reference's window does not count.
+  const float* vote_per_covariance = nullptr;
   int strip = 0;
   int16_t* scores = nullptr;  ///< [strip][lanes]
-  uint8_t* voters = nullptr;  ///< bits of the lanes, rowVoterBytes() per neighbour
+  uint8_t* voters = nullptr;  ///< of the neighbours, rowVoterBytes() each; those who do not count are cleared
   size_t voter_stride = 0;    ///< bytes from one neighbour's voters to the next one's
 };
 
@@ -115,6 +124,44 @@ struct Peaks {
   int16_t* after;
   int16_t* second;  ///< hypothesis, -1 where there is none
   int16_t* second_score;
+};
+
+/// A neighbour and how well its pose relative to the reference is known.
+struct NeighbourUncertainty {
+  Projection projection;
+  float rotation_variance_rad2;
+  float translation_variance_m2;
+  bool after;  ///< taken after the reference: a random walk errs independently on the two sides
+};
+
+/// One row of pixels: at least as many as the chosen set has lanes; nothing needs to be aligned.
+struct UncertaintyRow {
+  size_t count = 0;
+  const float* ray_x = nullptr;
+  const float* ray_y = nullptr;
+  const float* ray_z = nullptr;
+  const float* inverse_range = nullptr;
+  const NeighbourUncertainty* neighbours = nullptr;
+  int num_neighbours = 0;
+  // Only for the standard deviation:
+  const int32_t* voters = nullptr;  ///< bit n: neighbour n
+  const float* score = nullptr;
+  const float* curvature = nullptr;
+  float noise_factor = 0.0f;  ///< times what the score leaves unexplained, over its curvature, is a variance
+  float matching_noise_px = 0.0f;
+  float scale_noise = 0.0f;  ///< of all baselines alike
+};
+
+/// The neighbourhood of each pixel of a row: `rows` point at its first pixel's column, in images with a
+/// margin as wide as the shifts. At least as many pixels as the chosen set has lanes.
+struct NeighbourhoodRow {
+  size_t count = 0;
+  const float* const* rows = nullptr;
+  int num_rows = 0;
+  int max_shift = 0;  ///< columns from -max_shift to max_shift ...
+  int shift_step = 1;
+  const float* middle = nullptr;
+  const float* tolerance = nullptr;
 };
 
 /// The kernels of one instruction set.
@@ -136,10 +183,22 @@ struct SweepKernels {
   /// Scores are [hypothesis][pixel], `stride` apart.
   void (*findPeaks)(const int16_t* scores, size_t stride, int num_hypotheses, size_t num_pixels,
                     const Peaks& peaks);
+  /// Number and sum of the neighbours within the tolerance of the middle; NaN is not.
+  void (*sumAgreeing)(const NeighbourhoodRow& row, float* number, float* sum);
+  /// Pixels per 1/m that the image of each point moves by, in the neighbour where it is most.
+  void (*largestMotion)(const UncertaintyRow& row, float* motion);
+  /// Standard deviation of each inverse range, infinite where the voters say nothing and NaN where there is
+  /// none (see estimateRange()).
+  void (*inverseRangeSigma)(const UncertaintyRow& row, float* sigma);
 };
 
 /// Of the best instruction set that the machine has.
 SweepKernels sweepKernels();
+
+/// Room for the samples of one row of one neighbour.
+inline size_t rowSamples(int lanes, int strip) {
+  return static_cast<size_t>(strip + strip % 2) * static_cast<size_t>(lanes);
+}
 
 /// Bytes of the voters' bits of one row of one neighbour.
 inline size_t rowVoterBytes(int lanes, int strip) {

@@ -8,5 +8,6 @@ namespace vcharge {
 void addWarpKernels(SweepKernels* kernels);
 void addCorrelationKernels(SweepKernels* kernels);
 void addVoteKernels(SweepKernels* kernels);
+void addUncertaintyKernels(SweepKernels* kernels);
 
 }  // namespace vcharge

@@ -1,11 +1,12 @@
 // The parts of the sweep's inner loops, against formulas, on every instruction set of the machine.
 #include "sweep_kernels.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include "node_grid.h"
 #include "packed_image.h"
@@ -22,18 +23,8 @@ using testing::kLeft;
 using testing::kSize;
 using testing::lotScene;
 using testing::makeSequence;
+using testing::onEveryTarget;
 using testing::Sequence;
-
-/// Runs a function with only one instruction set after the other.
-template <class Function>
-void onEveryTarget(const Function& function) {
-  for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
-    SCOPED_TRACE(hwy::TargetName(target));
-    hwy::SetSupportedTargetsForTest(target);
-    function();
-  }
-  hwy::SetSupportedTargetsForTest(0);
-}
 
 /// Of the grid's cells at a pixel of the tile, in pixels of the packed image.
 Eigen::Vector2d positionFromCells(const NodeGrid& grid, const AlignedArray<float>& cells,
@@ -71,7 +62,7 @@ TEST(NodeGridTest, InterpolatedWarpErrsNoMoreThanItSays) {
             camera_pose.translation() - Eigen::Vector3d(baseline_m, 0.0, 0.0));
         const RigidTransform neighbour_from_reference = neighbour.inverse() * camera_pose;
         const Eigen::Matrix3d rotation = neighbour_from_reference.rotationMatrix();
-        const Eigen::Vector3d translation = neighbour_from_reference.translation();
+        const Eigen::Vector3d& translation = neighbour_from_reference.translation();
         Projection projection{224.0f, 223.5f, 194.0f, 131.5f, 1.158f, 4.0f, 4.0f, 379.0f, 259.0f, {}, {}};
         for (int i = 0; i < 9; ++i) {
           projection.rotation[i] = static_cast<float>(rotation(i / 3, i % 3));
@@ -182,6 +173,78 @@ TEST(SweepKernelsTest, AllInstructionSetsAgree) {
   // With every pixel projected, sums are integers; reciprocal roots and roundings differ by 1e-4.
   options.warp_tolerance_px = 0.0;
   expectAgreement(options, 0.0002f);
+}
+
+TEST(SweepKernelsTest, LargestMotionIsTheProjectionsDerivative) {
+  const RigidTransform slow(rotationFromVector({0.01, -0.02, 0.01}), {0.1, 0.02, 0.05});
+  const RigidTransform fast(rotationFromVector({0.0, 0.03, 0.0}), {-0.4, 0.0, 0.1});
+  const std::vector<RigidTransform> poses = {slow, fast};
+  std::vector<NeighbourUncertainty> neighbours(2);
+  for (size_t n = 0; n < 2; ++n) {
+    Projection& p = neighbours[n].projection;
+    p = {224.0f, 223.5f, 162.0f, 99.5f, 1.158f, 0.0f, 0.0f, 319.0f, 199.0f, {}, {}};
+    for (int i = 0; i < 9; ++i) {
+      p.rotation[i] = static_cast<float>(poses[n].rotationMatrix()(i / 3, i % 3));
+    }
+    for (int i = 0; i < 3; ++i) {
+      p.translation[i] = static_cast<float>(poses[n].translation()[i]);
+    }
+  }
+  constexpr size_t kCount = 21;  // no multiple of any vector
+  std::vector<float> x(kCount), y(kCount), z(kCount), inverse_range(kCount), expected(kCount);
+  for (size_t i = 0; i < kCount; ++i) {
+    Eigen::Vector3d ray;
+    ASSERT_TRUE(kCamera.unproject({10.0 + 14.0 * static_cast<double>(i), 60.0}, &ray));
+    ray.normalize();
+    x[i] = static_cast<float>(ray.x());
+    y[i] = static_cast<float>(ray.y());
+    z[i] = static_cast<float>(ray.z());
+    const double here = 0.05 + 0.03 * static_cast<double>(i);
+    inverse_range[i] = static_cast<float>(here);
+    for (const RigidTransform& pose : poses) {
+      Eigen::Vector2d before, after;
+      ASSERT_TRUE(kCamera.project(pose.rotation() * ray + (here - 1e-5) * pose.translation(), &before));
+      ASSERT_TRUE(kCamera.project(pose.rotation() * ray + (here + 1e-5) * pose.translation(), &after));
+      expected[i] = std::max(expected[i], static_cast<float>((after - before).norm() / 2e-5));
+    }
+  }
+  onEveryTarget([&] {
+    std::vector<float> motion(kCount);
+    UncertaintyRow row;
+    row.count = kCount;
+    row.ray_x = x.data();
+    row.ray_y = y.data();
+    row.ray_z = z.data();
+    row.inverse_range = inverse_range.data();
+    row.neighbours = neighbours.data();
+    row.num_neighbours = 2;
+    sweepKernels().largestMotion(row, motion.data());
+    for (size_t i = 0; i < kCount; ++i) {
+      EXPECT_NEAR(motion[i], expected[i], 1e-3f * expected[i]) << i;
+    }
+  });
+}
+
+TEST(SweepKernelsTest, SumsOnlyNeighboursThatAgree) {
+  constexpr size_t kCount = 21, kMargin = 2;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  std::vector<float> values(kCount + 2 * kMargin, nan), middle(kCount), tolerance(kCount, 1.0f);
+  for (size_t i = 0; i < kCount; ++i) {
+    values[kMargin + i] = i < 10 ? 1.0f : 5.0f;
+  }
+  std::copy(values.begin() + kMargin, values.end() - kMargin, middle.begin());
+  const float* rows[] = {values.data() + kMargin};
+  onEveryTarget([&] {
+    std::vector<float> number(kCount), sum(kCount);
+    sweepKernels().sumAgreeing({kCount, rows, 1, 2, 1, middle.data(), tolerance.data()}, number.data(),
+                               sum.data());
+    EXPECT_EQ(number[0], 3.0f) << "a margin of NaN does not agree";
+    EXPECT_EQ(number[5], 5.0f);
+    EXPECT_EQ(number[9], 3.0f) << "beside the step";
+    EXPECT_EQ(sum[9], 3.0f);
+    EXPECT_EQ(sum[10], 15.0f);
+    EXPECT_EQ(sum[kCount - 1], 15.0f);
+  });
 }
 
 }  // namespace

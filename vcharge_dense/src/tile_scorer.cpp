@@ -9,26 +9,26 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 // A tile's reference, its neighbours' footprints and one hypothesis's sums fit into a megabyte of L2.
-constexpr int kTileRows = 64;
-constexpr int kMaxTileColumns = 330;
+constexpr int kTileRows = 64;  // about
+constexpr int kMaxTileColumns = 215;
 constexpr int kNodeSpacings_px[] = {8, 4};
-// Nodes this far from the packed image's ends count as unseen: interpolated positions lie between them, or a
-// little beyond.
-constexpr float kInset_px = 4.0f;
 
 /// Copies the part of an image around (x, y) into the order of a layout.
 template <class To, class From>
 void copyIntoLayout(const cv::Mat& image, cv::Point origin, const TileLayout& layout, From outside, To* to) {
+  std::vector<From> line(static_cast<size_t>(layout.columns()));
+  const int begin = std::clamp(-origin.x, 0, layout.columns());
+  const int end = std::clamp(image.cols - origin.x, begin, layout.columns());
   for (int row = 0; row < layout.rows; ++row) {
     const int y = origin.y + row;
-    const From* from = y >= 0 && y < image.rows ? image.ptr<From>(y) : nullptr;
-    for (int lane = 0; lane < layout.lanes; ++lane) {
-      const int first = origin.x + lane * layout.strip;
-      To* strip = to + layout.index(row, lane * layout.strip);
-      for (int s = 0; s < layout.strip; ++s) {
-        const int x = first + s;
-        strip[static_cast<ptrdiff_t>(s) * layout.lanes] =
-            from != nullptr && x >= 0 && x < image.cols ? static_cast<To>(from[x]) : static_cast<To>(outside);
+    std::fill(line.begin(), line.end(), outside);
+    if (y >= 0 && y < image.rows) {
+      std::copy_n(image.ptr<From>(y) + origin.x + begin, end - begin, line.begin() + begin);
+    }
+    for (int s = 0; s < layout.strip; ++s) {
+      const From* from = line.data() + s;
+      for (int lane = 0; lane < layout.lanes; ++lane) {
+        *to++ = static_cast<To>(from[lane * layout.strip]);
       }
     }
   }
@@ -38,13 +38,15 @@ void copyIntoLayout(const cv::Mat& image, cv::Point origin, const TileLayout& la
 
 uint32_t TileScores::voters(int hypothesis, size_t pixel) const {
   const auto lanes = static_cast<size_t>(layout.lanes);
-  const size_t bit = pixel % lanes;
-  const size_t byte = lanes < 8 ? pixel / lanes : pixel / 8;
+  const size_t row = pixel / layout.rowSize(), in_row = pixel % layout.rowSize();
+  const size_t bit = in_row % lanes;
+  const size_t byte = lanes < 8 ? in_row / lanes : in_row / 8;
+  const size_t row_bytes = rowVoterBytes(layout.lanes, layout.strip);
+  const uint8_t* bytes = voter_bits.data() + (row * num_hypotheses + static_cast<size_t>(hypothesis)) *
+                                                 num_neighbours * row_bytes;
   uint32_t voters = 0;
-  for (int n = 0; n < num_neighbours; ++n) {
-    const auto plane =
-        static_cast<size_t>(hypothesis) * static_cast<size_t>(num_neighbours) + static_cast<size_t>(n);
-    voters |= (static_cast<uint32_t>(voter_bits[plane * neighbour_bytes + byte]) >> (bit % 8) & 1u) << n;
+  for (size_t n = 0; n < num_neighbours; ++n) {
+    voters |= (static_cast<uint32_t>(bytes[n * row_bytes + byte]) >> (bit % 8) & 1u) << n;
   }
   return voters;
 }
@@ -58,9 +60,11 @@ std::vector<cv::Rect> makeTiles(cv::Size image, int window_px) {
   }
   const int columns = (all.width + kMaxTileColumns - 1) / kMaxTileColumns;
   const int width = (all.width + columns - 1) / columns;
-  for (int y = 0; y < all.height; y += kTileRows) {
+  const int bands = std::max(1, (all.height + kTileRows / 2) / kTileRows);
+  const int height = (all.height + bands - 1) / bands;
+  for (int y = 0; y < all.height; y += height) {
     for (int x = 0; x < all.width; x += width) {
-      tiles.push_back(cv::Rect(all.x + x, all.y + y, width, kTileRows) & all);
+      tiles.push_back(cv::Rect(all.x + x, all.y + y, width, height) & all);
     }
   }
   return tiles;
@@ -71,23 +75,7 @@ TileScorer::TileScorer(const SweepInput& input) : input_(input), radius_(input.o
   neighbours_.resize(input.neighbours.size());
   for (size_t n = 0; n < input.neighbours.size(); ++n) {
     const SweepNeighbour& from = input.neighbours[n];
-    Projection& p = neighbours_[n].projection;
-    constexpr auto kMargin = static_cast<float>(PackedImage::kMargin);
-    p.fx = static_cast<float>(input.camera.gamma1());
-    p.fy = static_cast<float>(input.camera.gamma2());
-    p.cx = static_cast<float>(input.camera.u0()) + kMargin;
-    p.cy = static_cast<float>(input.camera.v0()) + kMargin;
-    p.xi = static_cast<float>(input.camera.xi());
-    p.min_x = kInset_px;
-    p.min_y = kInset_px;
-    p.max_x = static_cast<float>(from.image.size().width - 1) - kInset_px;
-    p.max_y = static_cast<float>(from.image.size().height - 1) - kInset_px;
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) {
-        p.rotation[3 * i + j] = from.neighbour_from_reference(i, j);
-      }
-      p.translation[i] = from.translation_m[i];
-    }
+    neighbours_[n].projection = from.projectionOf(input.camera);
     after_[n] = from.after;
   }
 }
@@ -103,7 +91,7 @@ void TileScorer::setTile(const cv::Rect& tile) {
   const size_t row_size = halo_.rowSize();
   const cv::Point origin(tile.x - radius_, tile.y - radius_);
   for (Neighbour& neighbour : neighbours_) {
-    neighbour.pairs.resize(static_cast<size_t>(input_.options->window_px) * row_size);
+    neighbour.samples.resize(ringRows() * rowSamples(halo_.lanes, halo_.strip));
     neighbour.column_sums.resize(3 * row_size);
   }
   // A sample and, negated, the one a window above.
@@ -120,23 +108,25 @@ void TileScorer::setTile(const cv::Rect& tile) {
   TileLayout windows = halo_;
   windows.rows = tile.height;
   mean_.resize(windows.size());
-  inverse_deviation_.resize(windows.size());
+  vote_per_covariance_.resize(windows.size());
   copyIntoLayout<float, float>(input_.reference.mean, tile.tl(), windows, 0.0f, mean_.data());
-  u_.resize(row_size);
-  v_.resize(row_size);
+  // One vector more than a row of an odd number has, for samples come in twos.
+  u_.assign(row_size + static_cast<size_t>(halo_.lanes), 0);
+  v_.assign(row_size + static_cast<size_t>(halo_.lanes), 0);
   votes_.resize(std::max<size_t>(1, neighbours_.size()) * row_size);
 }
 
 void TileScorer::loadSurface(const Hypotheses& hypotheses) {
   TileLayout windows = halo_;
   windows.rows = tile_.height;
-  copyIntoLayout<float, float>(input_.reference.inverse_deviation, tile_.tl(), windows, kNaN,
-                               inverse_deviation_.data());
+  copyIntoLayout<float, float>(input_.reference.inverse_deviation, tile_.tl(), windows, 0.0f,
+                               vote_per_covariance_.data());
   AlignedArray<uint8_t> counts;
   counts.resize(windows.size());
   copyIntoLayout<uint8_t, uint8_t>(hypotheses.window_counts, tile_.tl(), windows, 0, counts.data());
   for (size_t i = 0; i < windows.size(); ++i) {
-    inverse_deviation_[i] = counts[i] != 0 ? inverse_deviation_[i] : kNaN;
+    const bool counts_here = counts[i] != 0 && vote_per_covariance_[i] > 0.0f;  // false for NaN
+    vote_per_covariance_[i] = counts_here ? kVoteScale * vote_per_covariance_[i] : 0.0f;
   }
   for (const std::unique_ptr<NodeGrid>& grid : grids_) {
     grid->setNormal(hypotheses.normal);
@@ -191,10 +181,11 @@ void TileScorer::scoreHypothesis(const Hypotheses& hypotheses, size_t k, TileSco
   const SweepKernels& kernels = input_.kernels;
   const size_t row_size = halo_.rowSize();
   const int window = input_.options->window_px;
+  const size_t ring_row = rowSamples(halo_.lanes, halo_.strip);
   const float offset = hypotheses.offsets[k];
   for (Neighbour& neighbour : neighbours_) {
     placeNeighbour(hypotheses, offset, &neighbour);
-    std::fill_n(neighbour.pairs.data(), neighbour.pairs.size(), 0);
+    std::fill_n(neighbour.samples.data(), neighbour.samples.size(), int16_t{0});
     std::fill_n(neighbour.column_sums.data(), neighbour.column_sums.size(), 0);
   }
   CorrelationRow row;
@@ -209,11 +200,13 @@ void TileScorer::scoreHypothesis(const Hypotheses& hypotheses, size_t k, TileSco
   vote.votes = votes_.data();
   vote.neighbour_stride = row_size;
   vote.strip = halo_.strip;
-  vote.voter_stride = result->neighbour_bytes;
-  const size_t voter_bytes = rowVoterBytes(halo_.lanes, halo_.strip);
+  vote.voter_stride = rowVoterBytes(halo_.lanes, halo_.strip);
   for (int y = 0; y < halo_.rows; ++y) {
     const int window_row = y - (window - 1);  // of the windows that end here
     const size_t at = static_cast<size_t>(y) * row_size;
+    const size_t window_at = static_cast<size_t>(std::max(0, window_row)) * row_size;
+    const size_t row_hypothesis = static_cast<size_t>(std::max(0, window_row)) * result->num_hypotheses + k;
+    vote.voters = result->voter_bits.data() + row_hypothesis * neighbours_.size() * vote.voter_stride;
     for (size_t n = 0; n < neighbours_.size(); ++n) {
       Neighbour& neighbour = neighbours_[n];
       if (neighbour.grid != nullptr) {
@@ -229,22 +222,22 @@ void TileScorer::scoreHypothesis(const Hypotheses& hypotheses, size_t k, TileSco
         row.v = v_.data();
       }
       row.image = input_.neighbours[n].image.cells();
-      row.pitch_shift = input_.neighbours[n].image.pitchShift();
+      row.pitch = input_.neighbours[n].image.pitch();
       row.reference_pairs = reference_pairs_.data() + at;
-      row.pairs = neighbour.pairs.data() + static_cast<size_t>(y % window) * row_size;
+      row.samples = neighbour.samples.data() + static_cast<size_t>(y) % ringRows() * ring_row;
+      row.old_samples = neighbour.samples.data() + static_cast<size_t>(y + 1) % ringRows() * ring_row;
       row.column_sums = neighbour.column_sums.data();
       if (window_row >= 0) {
-        const size_t window_at = static_cast<size_t>(window_row) * row_size;
         row.reference_mean = mean_.data() + window_at;
-        row.reference_inverse_deviation = inverse_deviation_.data() + window_at;
-        row.scores = votes_.data() + n * row_size;
+        row.vote_per_covariance = vote_per_covariance_.data() + window_at;
+        row.votes = votes_.data() + n * row_size;
+        row.voters = vote.voters + n * vote.voter_stride;
       }
       kernels.correlate(row);
     }
     if (window_row >= 0) {
-      vote.scores = result->scores.data() + k * result->stride + static_cast<size_t>(window_row) * row_size;
-      vote.voters = result->voter_bits.data() + k * neighbours_.size() * result->neighbour_bytes +
-                    static_cast<size_t>(window_row) * voter_bytes;
+      vote.vote_per_covariance = vote_per_covariance_.data() + window_at;
+      vote.scores = result->scores.data() + row_hypothesis * row_size;
       kernels.vote(vote);
     }
   }
@@ -254,29 +247,28 @@ void TileScorer::score(const Hypotheses& hypotheses, TileScores* result) {
   result->tile = tile_;
   result->layout = halo_;
   result->layout.rows = tile_.height;
-  result->num_neighbours = static_cast<int>(neighbours_.size());
+  result->num_neighbours = neighbours_.size();
+  result->num_hypotheses = hypotheses.offsets.size();
+  const size_t row_size = halo_.rowSize();
   const size_t size = result->layout.size();
-  // Whole vectors of 16-bit numbers.
-  result->stride = (size + 2 * static_cast<size_t>(halo_.lanes) - 1) /
-                   (2 * static_cast<size_t>(halo_.lanes)) * (2 * static_cast<size_t>(halo_.lanes));
-  result->scores.resize(result->stride * hypotheses.offsets.size());
-  result->neighbour_bytes = rowVoterBytes(halo_.lanes, halo_.strip) * static_cast<size_t>(tile_.height);
-  result->voter_bits.resize(hypotheses.offsets.size() * neighbours_.size() * result->neighbour_bytes);
+  result->scores.resize(size * result->num_hypotheses);
+  result->voter_bits.resize(static_cast<size_t>(tile_.height) * result->num_hypotheses * neighbours_.size() *
+                            rowVoterBytes(halo_.lanes, halo_.strip));
   for (AlignedArray<int16_t>* array : {&result->best, &result->best_score, &result->before, &result->after,
                                        &result->second, &result->second_score}) {
-    array->resize(result->stride);
+    array->resize(size);
   }
   loadSurface(hypotheses);
-  for (size_t k = 0; k < hypotheses.offsets.size(); ++k) {
-    for (size_t i = size; i < result->stride; ++i) {
-      result->scores[k * result->stride + i] = kNoScore;
-    }
+  for (size_t k = 0; k < result->num_hypotheses; ++k) {
     scoreHypothesis(hypotheses, k, result);
   }
-  const Peaks peaks{result->best.data(),  result->best_score.data(), result->before.data(),
-                    result->after.data(), result->second.data(),     result->second_score.data()};
-  input_.kernels.findPeaks(result->scores.data(), result->stride, static_cast<int>(hypotheses.offsets.size()),
-                           result->stride, peaks);
+  for (size_t at = 0; at < size; at += row_size) {
+    const Peaks peaks{result->best.data() + at,   result->best_score.data() + at,
+                      result->before.data() + at, result->after.data() + at,
+                      result->second.data() + at, result->second_score.data() + at};
+    input_.kernels.findPeaks(result->scores.data() + at * result->num_hypotheses, row_size,
+                             static_cast<int>(result->num_hypotheses), row_size, peaks);
+  }
 }
 
 }  // namespace vcharge

@@ -17,11 +17,9 @@ namespace vcharge {
 struct TileScores {
   cv::Rect tile;      ///< pixels that were scored; those of the layout beyond its columns mean nothing
   TileLayout layout;  ///< its rows are the tile's
-  size_t stride = 0;  ///< of hypotheses in `scores`
-  int num_neighbours = 0;
-  AlignedArray<int16_t> scores;     ///< [hypothesis][pixel]: correlation times kScoreScale
-  std::vector<uint8_t> voter_bits;  ///< [hypothesis][neighbour][pixel / 8]
-  size_t neighbour_bytes = 0;       ///< of voter_bits
+  size_t num_neighbours = 0, num_hypotheses = 0;
+  AlignedArray<int16_t> scores;     ///< [row][hypothesis][pixel in row]: correlation times kScoreScale
+  std::vector<uint8_t> voter_bits;  ///< [row][hypothesis][neighbour][pixel in row / 8]
   AlignedArray<int16_t> best, best_score, before, after, second, second_score;  ///< see Peaks
 
   /// Bit n: neighbour n took part in the hypothesis's score at a pixel.
@@ -44,10 +42,12 @@ class TileScorer {
   struct Neighbour {
     Projection projection;
     AlignedArray<float> cells;
-    AlignedArray<int32_t> pairs, column_sums;
+    AlignedArray<int16_t> samples;  // the last ringRows() rows
+    AlignedArray<int32_t> column_sums;
     const NodeGrid* grid = nullptr;  // null: every pixel is projected
   };
 
+  size_t ringRows() const { return static_cast<size_t>(input_.options->window_px) + 1; }
   void loadSurface(const Hypotheses& hypotheses);
   void placeNeighbour(const Hypotheses& hypotheses, float offset, Neighbour* neighbour);
   void scoreHypothesis(const Hypotheses& hypotheses, size_t k, TileScores* result);
@@ -59,11 +59,11 @@ class TileScorer {
   std::vector<std::unique_ptr<NodeGrid>> grids_;  // coarse to fine
   std::vector<Neighbour> neighbours_;
   AlignedArray<int32_t> reference_pairs_;
-  AlignedArray<float> mean_, inverse_deviation_;  // of the tile's rows
+  AlignedArray<float> mean_, vote_per_covariance_;  // of the tile's rows
   bool has_rays_ = false;
   AlignedArray<float> ray_x_, ray_y_, ray_z_, base_, weight_;  // with the halo
   AlignedArray<int32_t> u_, v_;                                // of one row
-  AlignedArray<float> votes_;                                  // of one row, per neighbour
+  AlignedArray<int32_t> votes_;                                // of one row, per neighbour
   std::unique_ptr<bool[]> after_;
 };
 

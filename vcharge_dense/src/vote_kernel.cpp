@@ -6,6 +6,7 @@
 //
 #include <hwy/highway.h>
 
+#include "lane_operations-inl.h"
 #include "sweep_kernels.h"
 #include "sweep_kernels_internal.h"
 
@@ -14,90 +15,87 @@ namespace vcharge {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using DF = hn::ScalableTag<float>;
 using DI16 = hn::ScalableTag<int16_t>;
-using VF = hn::VFromD<DF>;
 using MF = decltype(hn::Lt(VF(), VF()));
 using V16 = hn::VFromD<DI16>;
 
 constexpr int kMaxNeighbours = 32;
-constexpr float kLowestVote = -1.5f;  // between kNoVote and the lowest correlation
 
-/// Mean of some neighbours' votes at one vector of pixels.
+/// Sum of some neighbours' votes at one vector of pixels, hence their mean.
 struct Mean {
-  VF value;  // meaningless where nobody votes
+  VF value;  // in units of 1 / kVoteScale; meaningless where nobody votes
   MF known;
+
+  explicit HWY_INLINE Mean(VI sum) {
+    const DF df;
+    const DI di;
+    const VI count = hn::ShiftRight<kVoteBits>(hn::Add(sum, hn::Set(di, kVote / 2)));
+    const VF votes = hn::ConvertTo(df, count);
+    const VF total = hn::ConvertTo(df, hn::Sub(sum, hn::ShiftLeft<kVoteBits>(count)));
+    // One step of Newton's method.
+    const VF estimate = hn::ApproximateReciprocal(votes);
+    const VF reciprocal = hn::Mul(estimate, hn::NegMulAdd(votes, estimate, hn::Set(df, 2.0f)));
+    value = hn::Mul(total, reciprocal);
+    known = hn::Gt(votes, hn::Zero(df));
+  }
+  HWY_INLINE Mean(VF value_, MF known_) : value(value_), known(known_) {}
 };
 
 struct Pixels {
   const VoteRow row;  // a copy: what a reference names is read again after every byte that is stored
   size_t vector;
 
-  /// NaN and kNoVote are not more than kLowestVote.
-  HWY_INLINE VF vote(int n) const {
-    const DF df;
-    return hn::Load(df, row.votes + static_cast<size_t>(n) * row.neighbour_stride + vector * hn::Lanes(df));
+  HWY_INLINE VI vote(int n) const {
+    const DI di;
+    return hn::Load(di, row.votes + static_cast<size_t>(n) * row.neighbour_stride + vector * hn::Lanes(di));
   }
-  HWY_INLINE MF votes(int n) const { return hn::Gt(vote(n), hn::Set(DF(), kLowestVote)); }
   HWY_INLINE void storeVoters(int n, MF voters) const {
     const DF df;
-    const size_t bytes = hn::Lanes(df) < 8 ? 1 : hn::Lanes(df) / 8;
-    hn::StoreMaskBits(df, voters, row.voters + static_cast<size_t>(n) * row.voter_stride + vector * bytes);
+    hn::StoreMaskBits(df, voters,
+                      row.voters + static_cast<size_t>(n) * row.voter_stride +
+                          vector * rowVoterBytes(static_cast<int>(hn::Lanes(df)), 1));
   }
 };
 
-template <class Selects>
-HWY_INLINE Mean meanOf(const Pixels& pixels, const Selects& selects) {
-  const DF df;
-  VF sum = hn::Zero(df), count = hn::Zero(df);
-  for (int n = 0; n < pixels.row.num_neighbours; ++n) {
-    if (selects(n)) {
-      const VF vote = pixels.vote(n);
-      const MF votes = hn::Gt(vote, hn::Set(df, kLowestVote));
-      sum = hn::Add(sum, hn::IfThenElseZero(votes, vote));
-      count = hn::Add(count, hn::IfThenElseZero(votes, hn::Set(df, 1.0f)));
-    }
-  }
-  return {hn::Div(sum, count), hn::Gt(count, hn::Zero(df))};
+HWY_INLINE MF votes(VI vote) {
+  return hn::RebindMask(DF(), hn::Gt(vote, hn::Zero(DI())));
 }
 
 HWY_INLINE void storeScores(const Pixels& pixels, const Mean& mean) {
   const DF df;
   const hn::Rebind<int16_t, DF> d16;
-  const VF scaled = hn::Mul(hn::Min(mean.value, hn::Set(df, 1.0f)), hn::Set(df, kScoreScale));
-  const VF known = hn::IfThenElse(mean.known, scaled, hn::Set(df, static_cast<float>(kNoScore)));
-  hn::Store(hn::DemoteTo(d16, hn::NearestInt(known)), d16, pixels.row.scores + pixels.vector * hn::Lanes(df));
+  const size_t at = pixels.vector * hn::Lanes(df);
+  const VF scaled =
+      hn::Min(hn::Mul(mean.value, hn::Set(df, kScoreScale / kVoteScale)), hn::Set(df, kScoreScale));
+  const MF counts = hn::Gt(hn::Load(df, pixels.row.vote_per_covariance + at), hn::Zero(df));
+  const VF known =
+      hn::IfThenElse(hn::And(mean.known, counts), scaled, hn::Set(df, static_cast<float>(kNoScore)));
+  hn::Store(hn::DemoteTo(d16, nearest(known)), d16, pixels.row.scores + at);
 }
 
 HWY_INLINE Mean meanOfAll(const Pixels& pixels) {
-  const DF df;
-  const int num_neighbours = pixels.row.num_neighbours;
-  VF sum = pixels.vote(0);
-  MF all = pixels.votes(0);
-  pixels.storeVoters(0, all);
-  for (int n = 1; n < num_neighbours; ++n) {
-    const MF votes = pixels.votes(n);
-    pixels.storeVoters(n, votes);
+  VI sum = pixels.vote(0);
+  for (int n = 1; n < pixels.row.num_neighbours; ++n) {
     sum = hn::Add(sum, pixels.vote(n));
-    all = hn::And(all, votes);
   }
-  if (HWY_LIKELY(hn::AllTrue(df, all))) {
-    return {hn::Mul(sum, hn::Set(df, 1.0f / static_cast<float>(num_neighbours))), all};
-  }
-  return meanOf(pixels, [](int) { return true; });
+  return Mean(sum);
 }
 
 /// The better of the means before and after the reference.
 HWY_INLINE Mean meanOfBetterSide(const Pixels& pixels) {
+  const DI di;
   const bool* after = pixels.row.after;
-  const Mean mean_before = meanOf(pixels, [after](int n) { return !after[n]; });
-  const Mean mean_after = meanOf(pixels, [after](int n) { return after[n]; });
+  VI sum_before = hn::Zero(di), sum_after = hn::Zero(di);
+  for (int n = 0; n < pixels.row.num_neighbours; ++n) {
+    VI& side = after[n] ? sum_after : sum_before;
+    side = hn::Add(side, pixels.vote(n));
+  }
+  const Mean mean_before(sum_before), mean_after(sum_after);
   const MF is_better = hn::Gt(mean_after.value, mean_before.value);
   const MF after_wins = hn::And(mean_after.known, hn::Or(is_better, hn::Not(mean_before.known)));
   for (int n = 0; n < pixels.row.num_neighbours; ++n) {
     const MF side = after[n] ? after_wins : hn::Not(after_wins);
-    pixels.storeVoters(n, hn::And(side, pixels.votes(n)));
+    pixels.storeVoters(n, hn::And(side, votes(pixels.vote(n))));
   }
   return {hn::IfThenElse(after_wins, mean_after.value, mean_before.value),
           hn::Or(mean_before.known, mean_after.known)};
@@ -105,33 +103,30 @@ HWY_INLINE Mean meanOfBetterSide(const Pixels& pixels) {
 
 /// Mean of the best_k best votes, or of all where there are fewer.
 HWY_INLINE Mean meanOfBest(const Pixels& pixels) {
-  const DF df;
-  const VF no_vote = hn::Set(df, kNoVote);
-  VF open[kMaxNeighbours];
+  const DI di;
+  VI open[kMaxNeighbours];
   const int num_neighbours = pixels.row.num_neighbours;
   for (int n = 0; n < num_neighbours; ++n) {
-    open[n] = hn::IfThenElse(pixels.votes(n), pixels.vote(n), no_vote);
+    open[n] = pixels.vote(n);
   }
-  VF sum = hn::Zero(df), count = hn::Zero(df);
+  VI sum = hn::Zero(di);
   for (int k = 0; k < pixels.row.best_k; ++k) {
-    VF best = no_vote;
+    VI best = hn::Zero(di);
     for (int n = 0; n < num_neighbours; ++n) {
       best = hn::Max(best, open[n]);
     }
-    MF wanted = hn::Gt(best, hn::Set(df, kLowestVote));
-    sum = hn::Add(sum, hn::IfThenElseZero(wanted, best));
-    count = hn::Add(count, hn::IfThenElseZero(wanted, hn::Set(df, 1.0f)));
+    sum = hn::Add(sum, best);
+    auto wanted = hn::Gt(best, hn::Zero(di));
     for (int n = 0; n < num_neighbours; ++n) {
-      const MF chosen = hn::And(wanted, hn::Eq(open[n], best));
-      open[n] = hn::IfThenElse(chosen, no_vote, open[n]);
+      const auto chosen = hn::And(wanted, hn::Eq(open[n], best));
+      open[n] = hn::IfThenZeroElse(chosen, open[n]);
       wanted = hn::AndNot(chosen, wanted);
     }
   }
   for (int n = 0; n < num_neighbours; ++n) {
-    const MF left = hn::Gt(open[n], hn::Set(df, kLowestVote));
-    pixels.storeVoters(n, hn::AndNot(left, pixels.votes(n)));
+    pixels.storeVoters(n, hn::AndNot(votes(open[n]), votes(pixels.vote(n))));
   }
-  return {hn::Div(sum, count), hn::Gt(count, hn::Zero(df))};
+  return Mean(sum);
 }
 
 template <class Aggregate>
@@ -179,12 +174,12 @@ struct PeakSearch {
   }
   HWY_INLINE void store(const Peaks& peaks, size_t at) const {
     const DI16 d;
-    hn::Store(best, d, peaks.best + at);
-    hn::Store(score, d, peaks.score + at);
-    hn::Store(before, d, peaks.before + at);
-    hn::Store(after, d, peaks.after + at);
-    hn::Store(second, d, peaks.second + at);
-    hn::Store(second_score, d, peaks.second_score + at);
+    hn::StoreU(best, d, peaks.best + at);
+    hn::StoreU(score, d, peaks.score + at);
+    hn::StoreU(before, d, peaks.before + at);
+    hn::StoreU(after, d, peaks.after + at);
+    hn::StoreU(second, d, peaks.second + at);
+    hn::StoreU(second_score, d, peaks.second_score + at);
   }
 };
 
@@ -192,12 +187,15 @@ void findPeaksTarget(const int16_t* scores, size_t stride, int num_hypotheses, s
                      const Peaks& peaks) {
   const DI16 d;
   const V16 none = hn::Set(d, kNoScore);
-  for (size_t i = 0; i < num_pixels; i += hn::Lanes(d)) {
-    PeakSearch search(hn::Load(d, scores + i));
+  const size_t lanes = hn::Lanes(d);
+  for (size_t first = 0; first < num_pixels; first += lanes) {
+    // The last vector overlaps the one before where the pixels do not fill it.
+    const size_t i = HWY_MIN(first, num_pixels - lanes);
+    PeakSearch search(hn::LoadU(d, scores + i));
     const int16_t* next = scores + i;
     for (int k = 0; k + 1 < num_hypotheses; ++k) {
       next += stride;
-      search.advance(k, hn::Load(d, next));
+      search.advance(k, hn::LoadU(d, next));
     }
     search.advance(num_hypotheses - 1, none);
     search.store(peaks, i);

@@ -52,7 +52,8 @@ class PlaneSweep {
  public:
   /// camera: without distortion; valid_mask: CV_8UC1, not 0 where its pixels may be used (both of a
   /// WorkingCamera). ground_in_camera is needed for ground-parallel planes. std::invalid_argument for bad
-  /// options or a missing or impossible ground, std::logic_error for a camera with distortion.
+  /// options or a missing or impossible ground, std::logic_error for a camera with distortion and
+  /// images of less than 16 pixels a row.
   PlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask, const PlaneSweepOptions& options,
              const std::optional<Plane>& ground_in_camera = std::nullopt);
 

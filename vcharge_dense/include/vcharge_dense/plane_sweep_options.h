@@ -79,6 +79,10 @@ struct PlaneSweepOptions {
   double matching_noise_px = 0.035;  ///< error of a match that more neighbours do not average out
   PoseNoiseOptions pose_noise;
 
+  /// Corrects the neighbours' relative poses by tracks of image points, within pose_noise; falls back to the
+  /// given poses.
+  bool refine_poses = false;
+
   double min_texture = 2.0;  ///< standard deviation of the reference window in gray levels; less is unknown
   double min_score = 0.3;    ///< a lower correlation is unknown
   double max_relative_sigma = 0.5;  ///< a larger standard deviation over range is unobserved
@@ -103,6 +107,7 @@ struct PlaneSweepOptions {
     visit("warp_tolerance_px", warp_tolerance_px);
     visit("matching_noise_px", matching_noise_px);
     visit("pose_noise", pose_noise);
+    visit("refine_poses", refine_poses);
     visit("min_texture", min_texture);
     visit("min_score", min_score);
     visit("max_relative_sigma", max_relative_sigma);

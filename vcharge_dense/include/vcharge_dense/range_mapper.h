@@ -39,6 +39,8 @@ struct RangeMapperOptions {
   PlaneSweepOptions plane_sweep;
   OdometryBufferOptions odometry;
 
+  RangeMapperOptions() { plane_sweep.refine_poses = true; }  // a drive's poses are odometry's, as a rule
+
   /// Neighbours before and after the reference, aggregated by reference-split.
   static RangeMapperOptions offline();
 

@@ -1,0 +1,139 @@
+// Operations on the parts of 32-bit lanes. Included once per instruction set by the kernels' files.
+#if defined(VCHARGE_LANE_OPERATIONS_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef VCHARGE_LANE_OPERATIONS_INL_H_
+#undef VCHARGE_LANE_OPERATIONS_INL_H_
+#else
+#define VCHARGE_LANE_OPERATIONS_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace vcharge {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+using DF = hn::ScalableTag<float>;
+using DI = hn::ScalableTag<int32_t>;
+using VF = hn::VFromD<DF>;
+using VI = hn::VFromD<DI>;
+using MI = decltype(hn::Lt(VI(), VI()));
+
+// multiplyHalves  sum of the products of the signed 16-bit halves
+// multiplyBytes   the same of unsigned bytes with signed ones, into the halves that the bytes lie in
+// gather          on x86 a gather waits for what its register held before, even where all
+//                 lanes are read: it starts from zeros, and the compiler must not know that `lanes` are all
+// negateHighHalf  the low half stays
+// fractionBytes   byte 1, the highest bits of a position's fraction, in all bytes
+// fractionHalves  the same in the low byte of both halves
+// nearest         of floats that fit into integers
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSSE3
+#if HWY_TARGET <= HWY_AVX3
+HWY_INLINE VI nearest(VF a) {
+  return VI{_mm512_cvtps_epi32(a.raw)};
+}
+HWY_INLINE VI multiplyHalves(VI a, VI b) {
+  return VI{_mm512_madd_epi16(a.raw, b.raw)};
+}
+HWY_INLINE VI multiplyBytes(VI u, VI s) {
+  return VI{_mm512_maddubs_epi16(u.raw, s.raw)};
+}
+HWY_INLINE VI gather(const int32_t* base, VI index, MI lanes) {
+  return VI{_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), lanes.raw, index.raw, base, 4)};
+}
+#elif HWY_TARGET == HWY_AVX2
+HWY_INLINE VI nearest(VF a) {
+  return VI{_mm256_cvtps_epi32(a.raw)};
+}
+HWY_INLINE VI multiplyHalves(VI a, VI b) {
+  return VI{_mm256_madd_epi16(a.raw, b.raw)};
+}
+HWY_INLINE VI multiplyBytes(VI u, VI s) {
+  return VI{_mm256_maddubs_epi16(u.raw, s.raw)};
+}
+HWY_INLINE VI gather(const int32_t* base, VI index, MI lanes) {
+  return VI{_mm256_mask_i32gather_epi32(_mm256_setzero_si256(), base, index.raw, lanes.raw, 4)};
+}
+#else
+HWY_INLINE VI nearest(VF a) {
+  return VI{_mm_cvtps_epi32(a.raw)};
+}
+HWY_INLINE VI multiplyHalves(VI a, VI b) {
+  return VI{_mm_madd_epi16(a.raw, b.raw)};
+}
+HWY_INLINE VI multiplyBytes(VI u, VI s) {
+  return VI{_mm_maddubs_epi16(u.raw, s.raw)};
+}
+HWY_INLINE VI gather(const int32_t* base, VI index, MI /*lanes*/) {
+  return hn::GatherIndex(DI(), base, index);
+}
+#endif
+HWY_INLINE VI negateHighHalf(VI a) {
+  const hn::Repartition<int16_t, DI> d16;
+  const VI signs = hn::Set(DI(), static_cast<int32_t>(0xffff0001u));
+  return hn::BitCast(DI(), hn::Mul(hn::BitCast(d16, a), hn::BitCast(d16, signs)));
+}
+HWY_INLINE VI shuffleBytes(VI from, uint32_t bytes_of_lane) {
+  const DI di;
+  const hn::Repartition<uint8_t, DI> du8;
+  alignas(16) const uint32_t block[4] = {bytes_of_lane, bytes_of_lane + 0x04040404u,
+                                         bytes_of_lane + 0x08080808u, bytes_of_lane + 0x0c0c0c0cu};
+  const VI at = hn::LoadDup128(di, reinterpret_cast<const int32_t*>(block));
+  return hn::BitCast(di, hn::TableLookupBytesOr0(hn::BitCast(du8, from), hn::BitCast(du8, at)));
+}
+HWY_INLINE VI fractionBytes(VI position) {
+  return shuffleBytes(position, 0x01010101u);
+}
+HWY_INLINE VI fractionHalves(VI position) {
+  return shuffleBytes(position, 0x80018001u);
+}
+#else
+HWY_INLINE VI nearest(VF a) {
+  return hn::NearestInt(a);
+}
+HWY_INLINE VI gather(const int32_t* base, VI index, MI /*lanes*/) {
+  return hn::GatherIndex(DI(), base, index);
+}
+HWY_INLINE VI lowHalf(VI a) {
+  return hn::ShiftRight<16>(hn::ShiftLeft<16>(a));
+}
+HWY_INLINE VI multiplyHalves(VI a, VI b) {
+  return hn::Add(hn::Mul(lowHalf(a), lowHalf(b)), hn::Mul(hn::ShiftRight<16>(a), hn::ShiftRight<16>(b)));
+}
+HWY_INLINE VI multiplyBytes(VI u, VI s) {
+  const VI byte = hn::Set(DI(), 0xff);
+  const auto product = [&](VI weight, VI pixel_on_top) HWY_ATTR {
+    return hn::Mul(hn::And(weight, byte), hn::ShiftRight<24>(pixel_on_top));
+  };
+  const VI low =
+      hn::Add(product(u, hn::ShiftLeft<24>(s)), product(hn::ShiftRight<8>(u), hn::ShiftLeft<16>(s)));
+  const VI high =
+      hn::Add(product(hn::ShiftRight<16>(u), hn::ShiftLeft<8>(s)), product(hn::ShiftRight<24>(u), s));
+  return hn::OrAnd(hn::ShiftLeft<16>(high), low, hn::Set(DI(), 0xffff));
+}
+HWY_INLINE VI negateHighHalf(VI a) {
+  const VI high = hn::And(a, hn::Set(DI(), -65536));
+  return hn::OrAnd(hn::Sub(hn::Zero(DI()), high), a, hn::Set(DI(), 0xffff));
+}
+HWY_INLINE VI fractionHalves(VI position) {
+  const VI byte = hn::And(hn::ShiftRight<8>(position), hn::Set(DI(), 0xff));
+  return hn::Or(byte, hn::ShiftLeft<16>(byte));
+}
+HWY_INLINE VI fractionBytes(VI position) {
+  const VI halves = fractionHalves(position);
+  return hn::Or(halves, hn::ShiftLeft<8>(halves));
+}
+#endif
+
+/// sum + multiplyHalves(a, b).
+HWY_INLINE VI addHalves(VI sum, VI a, VI b) {
+  return hn::Add(sum, multiplyHalves(a, b));
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace vcharge
+HWY_AFTER_NAMESPACE();
+
+#endif  // per instruction set
