@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <unordered_map>
 #include <unordered_set>
 #include <utility>
 
 #include <tbb/parallel_for.h>
 #include <yaml-cpp/yaml.h>
 
+#include "landmark_view.h"
 #include "vcharge_core/error.h"
 #include "vcharge_geometry/pose_estimation.h"
 
@@ -151,103 +151,6 @@ RigFeatures MapLocalizer::extract(const std::vector<Image>& images) const {
   return features;
 }
 
-/// Guided search in the images of one instant.
-struct MapLocalizer::Search {
-  const MapLocalizer& localizer;
-  const RigidTransform& map_from_vehicle;
-
-  /// The landmarks that a camera should see, each by the observation that was made from most nearly the same
-  /// direction.
-  struct Expected {
-    std::vector<size_t> observations;
-    std::vector<cv::Point2f> positions_px;
-    std::vector<double> ranges_m;
-  };
-
-  std::vector<size_t> nearestKeyframes() const {
-    const std::vector<MapKeyframe>& keyframes = localizer.map_->keyframes();
-    std::vector<std::pair<double, size_t>> by_distance;
-    for (size_t i = 0; i < keyframes.size(); ++i) {
-      const double distance_m =
-          (keyframes[i].map_from_vehicle.translation() - map_from_vehicle.translation()).norm();
-      if (distance_m <= localizer.options_.max_distance_m) {
-        by_distance.emplace_back(distance_m, i);
-      }
-    }
-    std::sort(by_distance.begin(), by_distance.end());
-    std::vector<size_t> nearest;
-    for (const auto& [distance_m, i] : by_distance) {
-      if (static_cast<int>(nearest.size()) == localizer.options_.max_keyframes) {
-        break;
-      }
-      nearest.push_back(i);
-    }
-    return nearest;
-  }
-
-  Expected expectedIn(size_t camera, const std::vector<size_t>& keyframes) const {
-    const SparseMap& map = *localizer.map_;
-    const MapLocalizerOptions& options = localizer.options_;
-    const RigCamera& rig_camera = localizer.rig_->cameras[camera];
-    const RigidTransform map_from_camera = map_from_vehicle * *rig_camera.vehicle_from_camera;
-    const double min_cos_view = std::cos(options.max_view_angle_rad);
-    struct Source {
-      size_t observation;
-      double cos_angle;
-    };
-    std::unordered_map<int32_t, size_t> index_of_landmark;
-    std::vector<Source> sources;
-    for (const size_t keyframe : keyframes) {
-      for (size_t other = 0; other < map.rig().cameras.size(); ++other) {
-        const Eigen::Vector3d other_centre = map.keyframes()[keyframe].map_from_vehicle *
-                                             map.rig().cameras[other].vehicle_from_camera->translation();
-        const auto [begin, end] = map.observationsOf(keyframe, other);
-        for (size_t i = begin; i < end; ++i) {
-          const int32_t landmark = map.observations()[i].landmark;
-          const Eigen::Vector3d& point = map.landmarks()[landmark].position_m;
-          const Eigen::Vector3d from_here = point - map_from_camera.translation();
-          const Eigen::Vector3d from_there = point - other_centre;
-          const double range_m = from_here.norm(), other_range_m = from_there.norm();
-          const double cos_angle = from_here.dot(from_there) / (range_m * other_range_m);
-          if (!(cos_angle >= min_cos_view) || range_m > options.max_range_ratio * other_range_m ||
-              other_range_m > options.max_range_ratio * range_m) {
-            continue;
-          }
-          const auto [found, is_new] = index_of_landmark.emplace(landmark, sources.size());
-          if (is_new) {
-            sources.push_back({i, cos_angle});
-          } else if (cos_angle > sources[found->second].cos_angle) {
-            sources[found->second] = {i, cos_angle};
-          }
-        }
-      }
-    }
-    return inView(rig_camera, map_from_camera.inverse(), sources);
-  }
-
-  template <class Sources>
-  Expected inView(const RigCamera& rig_camera, const RigidTransform& camera_from_map,
-                  const Sources& sources) const {
-    const SparseMap& map = *localizer.map_;
-    const double min_cos_field = std::cos(0.5 * rig_camera.field_of_view_rad);
-    Expected expected;
-    for (const auto& source : sources) {
-      const Eigen::Vector3d point =
-          camera_from_map * map.landmarks()[map.observations()[source.observation].landmark].position_m;
-      const double range_m = point.norm();
-      Eigen::Vector2d pixel;
-      if (point.z() >= min_cos_field * range_m && rig_camera.model.project(point, &pixel) &&
-          pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < rig_camera.image_size_px.width &&
-          pixel.y() < rig_camera.image_size_px.height) {
-        expected.observations.push_back(source.observation);
-        expected.positions_px.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
-        expected.ranges_m.push_back(range_m);
-      }
-    }
-    return expected;
-  }
-};
-
 cv::Mat MapLocalizer::descriptorsOf(const std::vector<size_t>& observations) const {
   cv::Mat descriptors(static_cast<int>(observations.size()), map_->descriptors().cols,
                       map_->descriptors().type());
@@ -280,15 +183,14 @@ void MapLocalizer::add(const RigFeatures& features, size_t camera, int observati
 MapLocalizer::Matches MapLocalizer::searchLandmarks(const RigFeatures& features,
                                                     const RigidTransform& map_from_vehicle, double sigma_m,
                                                     double sigma_rad) const {
-  const Search search{*this, map_from_vehicle};
-  const std::vector<size_t> keyframes = search.nearestKeyframes();
+  const LandmarkView view(*map_, *rig_, options_, map_from_vehicle);
   std::vector<Matches> of_camera(rig_->cameras.size());
   tbb::parallel_for(size_t{0}, of_camera.size(), [&](size_t camera) {
     const ImageFeatures& image = features.images[camera];
     if (image.empty()) {
       return;
     }
-    const Search::Expected expected = search.expectedIn(camera, keyframes);
+    const ExpectedLandmarks expected = view.expectedIn(camera);
     if (expected.observations.empty()) {
       return;
     }

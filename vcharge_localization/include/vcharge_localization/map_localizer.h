@@ -136,7 +136,6 @@ class MapLocalizer {
 
  private:
   struct Matches;
-  struct Search;
   cv::Mat descriptorsOf(const std::vector<size_t>& observations) const;
   /// The landmark of one of the map's observations is what a feature shows.
   void add(const RigFeatures& features, size_t camera, int observation_index, int feature_index,
