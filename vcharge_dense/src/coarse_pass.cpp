@@ -39,7 +39,8 @@ cv::Mat halvedMask(const cv::Mat& mask) {
     const auto* above = mask.ptr<uint8_t>(2 * y);
     const auto* below = mask.ptr<uint8_t>(2 * y + 1);
     for (int x = 0; x < half.cols; ++x) {
-      const bool valid = above[2 * x] != 0 && above[2 * x + 1] != 0 && below[2 * x] != 0 && below[2 * x + 1] != 0;
+      const bool valid =
+          above[2 * x] != 0 && above[2 * x + 1] != 0 && below[2 * x] != 0 && below[2 * x + 1] != 0;
       half.at<uint8_t>(y, x) = valid ? 255 : 0;
     }
   }
@@ -62,7 +63,8 @@ std::vector<int> slotsOf(const std::vector<int>& counts) {
   std::vector<int> slots;
   for (int plane = 0; plane < num_planes; ++plane) {
     int named = 0;
-    for (int i = std::max(0, plane - kMarginPlanes); i <= std::min(num_planes - 1, plane + kMarginPlanes); ++i) {
+    for (int i = std::max(0, plane - kMarginPlanes); i <= std::min(num_planes - 1, plane + kMarginPlanes);
+         ++i) {
       named = std::max(named, counts[static_cast<size_t>(i)]);
     }
     if (named >= kMinCount) {

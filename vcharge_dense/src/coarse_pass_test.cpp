@@ -28,12 +28,12 @@ using testing::onEveryTarget;
 using testing::Sequence;
 
 /// The level and its input for a sequence.
-struct Setup {
+struct Level {
   Sequence sequence;
   std::shared_ptr<const SweepLevel> level;
   std::vector<cv::Rect> tiles;
 
-  Setup()
+  Level()
       : sequence(makeSequence(lotScene(2), kLeft, 0.2, -4, 0, 2.0)),
         level(std::make_shared<SweepLevel>(kCamera, allValid(), PlaneSweepOptions(), sequence.ground)),
         tiles(makeTiles(kSize, PlaneSweepOptions().window_px, TileSize::kSmall)) {}
@@ -41,8 +41,7 @@ struct Setup {
   SweepInput input() const {
     SweepInput input = level->makeInput(sequence.reference.pixels);
     for (const SweepImage& image : sequence.neighbours) {
-      const RigidTransform pose =
-          image.world_from_camera.inverse() * sequence.reference.world_from_camera;
+      const RigidTransform pose = image.world_from_camera.inverse() * sequence.reference.world_from_camera;
       input.neighbours.push_back({PackedImage(image.pixels, level->validMask()),
                                   pose.rotationMatrix().cast<float>(), pose.translation().cast<float>(),
                                   false});
@@ -62,7 +61,7 @@ std::vector<int> allSlots(const Hypotheses& planes) {
 }
 
 TEST(CoarsePassTest, PlanesLeftOutDoNotChangeTheScoresOfOthers) {
-  const Setup setup;
+  const Level setup;
   onEveryTarget([&] {
     const SweepInput input = setup.input();
     const Hypotheses& planes = setup.level->planes().front();
@@ -75,16 +74,17 @@ TEST(CoarsePassTest, PlanesLeftOutDoNotChangeTheScoresOfOthers) {
     int inside = 0;
     for (int y = 0; y < all.tile.height; ++y) {
       for (size_t slot = 0; slot < some.slots.size(); ++slot) {
-        const int16_t* scores = some.scores.data() + (static_cast<size_t>(y) * some.slots.size() + slot) * row;
+        const int16_t* scores =
+            some.scores.data() + (static_cast<size_t>(y) * some.slots.size() + slot) * row;
         if (some.slots[slot] == kGap) {
           EXPECT_TRUE(std::all_of(scores, scores + row, [](int16_t score) { return score == kNoScore; }));
           continue;
         }
         const size_t plane = static_cast<size_t>(some.slots[slot]);
-        EXPECT_EQ(std::memcmp(scores,
-                              all.scores.data() + (static_cast<size_t>(y) * all.slots.size() + plane) * row,
-                              row * sizeof(int16_t)),
-                  0);
+        EXPECT_EQ(
+            std::memcmp(scores, all.scores.data() + (static_cast<size_t>(y) * all.slots.size() + plane) * row,
+                        row * sizeof(int16_t)),
+            0);
       }
       for (int x = 0; x < all.tile.width; ++x) {
         const size_t pixel = all.layout.index(y, x);
@@ -101,7 +101,7 @@ TEST(CoarsePassTest, PlanesLeftOutDoNotChangeTheScoresOfOthers) {
 }
 
 TEST(CoarsePassTest, EqualsTheFullSweepWhereAllPlanesAreChosen) {
-  const Setup setup;
+  const Level setup;
   const SweepInput input = setup.input();
   const CoarsePass coarse(setup.level, setup.sequence.ground);
   // Nothing found: nothing is sure.
@@ -127,7 +127,7 @@ TEST(CoarsePassTest, EqualsTheFullSweepWhereAllPlanesAreChosen) {
 }
 
 TEST(CoarsePassTest, SweepsFewPlanesAmongThemTheRightOnes) {
-  const Setup setup;
+  const Level setup;
   const SweepInput input = setup.input();
   const CoarsePass coarse(setup.level, setup.sequence.ground);
   const SurfaceEstimate found =
@@ -140,7 +140,8 @@ TEST(CoarsePassTest, SweepsFewPlanesAmongThemTheRightOnes) {
   for (size_t i = 0; i < setup.tiles.size(); ++i) {
     const std::vector<int>& slots = choice[i].front();
     all += static_cast<int>(planes.offsets.size());
-    swept += static_cast<int>(std::count_if(slots.begin(), slots.end(), [](int slot) { return slot != kGap; }));
+    swept +=
+        static_cast<int>(std::count_if(slots.begin(), slots.end(), [](int slot) { return slot != kGap; }));
     for (int y = setup.tiles[i].y; y < setup.tiles[i].br().y; ++y) {
       for (int x = setup.tiles[i].x; x < setup.tiles[i].br().x; ++x) {
         const double truth = setup.sequence.truth.at<double>(y, x);
@@ -161,7 +162,7 @@ TEST(CoarsePassTest, SweepsFewPlanesAmongThemTheRightOnes) {
 }
 
 TEST(CoarsePassTest, SecondPeaksOfPlanesThatWereLeftOutCount) {
-  const Setup setup;
+  const Level setup;
   const CoarsePass coarse(setup.level, setup.sequence.ground);
   SurfaceEstimate found(cv::Size(kSize.width / 2, kSize.height / 2)), estimate(kSize);
   found.second_score.setTo(0.5f);

@@ -24,8 +24,9 @@ struct Worker {
 template <class Function>
 void forEachTile(const SweepInput& input, const std::vector<cv::Rect>& tiles, size_t num_families,
                  const Function& function) {
-  tbb::enumerable_thread_specific<Worker> workers(
-      [&] { return Worker{TileScorer(input), std::vector<TileScores>(num_families)}; });
+  tbb::enumerable_thread_specific<Worker> workers([&] {
+    return Worker{TileScorer(input), std::vector<TileScores>(num_families)};
+  });
   tbb::parallel_for(
       tbb::blocked_range<size_t>(0, tiles.size(), 1),
       [&](const tbb::blocked_range<size_t>& range) {
