@@ -229,13 +229,15 @@ void plain(benchmark::State& state) {
 }
 
 /// A range map from the first image to the last, as the options of the vehicle make it.
-void rangeMap(benchmark::State& state, PlaneFamilies families, int refinement_steps, size_t num_neighbours) {
+void rangeMap(benchmark::State& state, PlaneFamilies families, int refinement_steps, size_t num_neighbours,
+              bool coarse_pass) {
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism,
                                     static_cast<size_t>(state.range(0)));
   const Scene& s = scene(true);
   PlaneSweepOptions options;
   options.families = families;
   options.num_refinement_steps = refinement_steps;
+  options.coarse_pass = coarse_pass;
   const cv::Mat valid(sizes.image, CV_8UC1, cv::Scalar(255));
   const PlaneSweep sweep(s.camera, valid, options, s.ground);
   const std::vector<SweepImage> neighbours(
@@ -297,7 +299,8 @@ class RatioReporter : public benchmark::ConsoleReporter {
       print(name + ": fisheye over pinhole", get("kernel/" + name + "_fisheye"),
             get("kernel/" + name + "_pinhole"));
     }
-    for (const char* what : {"first_sweep_of_4", "first_sweep_of_2", "whole_of_4", "whole_of_2"}) {
+    for (const char* what : {"first_sweep_of_4", "first_sweep_of_2", "whole_of_4", "whole_of_2",
+                             "coarse_and_whole_of_4", "coarse_and_whole_of_2"}) {
       const std::string name = std::string("rangeMap/") + what;
       print(name + ": processor time, ms", get(name + "/1_cpu"), 1.0);
       print(name + ": one thread, ms", get(name + "/1"), 1.0);
@@ -347,12 +350,16 @@ BENCHMARK_CAPTURE(kernel, avx3_pinhole, HWY_AVX3, false)->Apply(byTheLaps);
 BENCHMARK_CAPTURE(kernel, avx2_fisheye, HWY_AVX2, true)->Apply(byTheLaps);
 BENCHMARK_CAPTURE(kernel, avx2_pinhole, HWY_AVX2, false)->Apply(byTheLaps);
 BENCHMARK(plain)->Iterations(1)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(rangeMap, first_sweep_of_4, PlaneFamilies::kFrontoParallel, 0, 4)
+BENCHMARK_CAPTURE(rangeMap, first_sweep_of_4, PlaneFamilies::kFrontoParallel, 0, 4, false)
     ->Apply(onOneAndTwoThreads);
-BENCHMARK_CAPTURE(rangeMap, first_sweep_of_2, PlaneFamilies::kFrontoParallel, 0, 2)
+BENCHMARK_CAPTURE(rangeMap, first_sweep_of_2, PlaneFamilies::kFrontoParallel, 0, 2, false)
     ->Apply(onOneAndTwoThreads);
-BENCHMARK_CAPTURE(rangeMap, whole_of_4, PlaneFamilies::kBoth, 16, 4)->Apply(onOneAndTwoThreads);
-BENCHMARK_CAPTURE(rangeMap, whole_of_2, PlaneFamilies::kBoth, 16, 2)->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, whole_of_4, PlaneFamilies::kBoth, 16, 4, false)->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, whole_of_2, PlaneFamilies::kBoth, 16, 2, false)->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, coarse_and_whole_of_4, PlaneFamilies::kBoth, 16, 4, true)
+    ->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, coarse_and_whole_of_2, PlaneFamilies::kBoth, 16, 2, true)
+    ->Apply(onOneAndTwoThreads);
 
 }  // namespace
 }  // namespace vcharge

@@ -46,6 +46,10 @@ void forEachPixel(const TileScores& scores, const Function& function) {
   }
 }
 
+float offsetOf(const Hypotheses& hypotheses, const TileScores& scores, int slot) {
+  return hypotheses.offsets[static_cast<size_t>(scores.slots[static_cast<size_t>(slot)])];
+}
+
 /// Score of a family's best peak that lies further than `separation` from `inverse_range`, of its two highest
 /// ones; -1 where there is none.
 float bestPeakApart(const Hypotheses& hypotheses, const TileScores& scores, size_t pixel, float weight,
@@ -54,7 +58,7 @@ float bestPeakApart(const Hypotheses& hypotheses, const TileScores& scores, size
   const int16_t values[] = {scores.best_score[pixel], scores.second_score[pixel]};
   for (int i = 0; i < 2; ++i) {
     if (indices[i] >= 0 &&
-        std::abs(hypotheses.offsets[static_cast<size_t>(indices[i])] * weight - inverse_range) > separation) {
+        std::abs(offsetOf(hypotheses, scores, indices[i]) * weight - inverse_range) > separation) {
       return correlation(values[i]);
     }
   }
@@ -160,8 +164,7 @@ void readPeaks(const std::vector<Hypotheses>& hypotheses, const std::vector<Tile
     int16_t best_score = kNoScore;
     for (size_t f = 0; f < hypotheses.size(); ++f) {
       const int best = scores[f].best[pixel];
-      const int last = static_cast<int>(hypotheses[f].offsets.size()) - 1;
-      if (best < 0 || (f > 0 && (best == 0 || best == last))) {
+      if (best < 0 || (f > 0 && !scores[f].isInside(best))) {
         continue;
       }
       if (scores[f].best_score[pixel] > best_score) {
@@ -175,17 +178,16 @@ void readPeaks(const std::vector<Hypotheses>& hypotheses, const std::vector<Tile
     const auto f = static_cast<size_t>(family);
     const Hypotheses& planes = hypotheses[f];
     const int best = scores[f].best[pixel];
-    const int last = static_cast<int>(planes.offsets.size()) - 1;
     const float weight = planes.weight.at<float>(y, x);
     const float step = (planes.offsets[1] - planes.offsets[0]) * weight;
-    const bool at_limit = best == 0 || best == last;
+    const bool at_limit = !scores[f].isInside(best);
     Parabola parabola;
     if (!at_limit) {
       parabola = fitParabola(correlation(scores[f].before[pixel]), correlation(best_score),
                              correlation(scores[f].after[pixel]));
     }
-    const float inverse_range = planes.offsets[static_cast<size_t>(best)] * weight;
-    int plane = best;
+    const float inverse_range = offsetOf(planes, scores[f], best) * weight;
+    int plane = scores[f].slots[static_cast<size_t>(best)];
     float second = scores[f].second[pixel] >= 0 ? correlation(scores[f].second_score[pixel]) : -1.0f;
     for (size_t g = 0; g < hypotheses.size(); ++g) {
       if (g < f) {

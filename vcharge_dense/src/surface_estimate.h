@@ -21,7 +21,7 @@ struct SurfaceEstimate {
   cv::Mat second_score;  ///< of the next best separate peak, -1 where there is none
   cv::Mat plane;         ///< CV_32SC1: over all families, -1 where none
   cv::Mat voters;        ///< CV_32SC1: bit n for neighbour n
-  cv::Mat at_limit;      ///< CV_8UC1: not 0 where the best plane is the first or last of its family
+  cv::Mat at_limit;      ///< CV_8UC1: not 0 where the planes on both sides of the best one were not scored
 };
 
 /// The planes of a family as hypotheses: base 0, weight -normal . ray, NaN where a ray does not meet them.
@@ -29,7 +29,7 @@ Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays, 
                                int window_px);
 
 /// Reads one tile's scores of all families into the estimate. A family beyond the first one only counts where
-/// its best plane lies inside the family: its neighbours belong to the first one.
+/// its best plane lies inside the planes that were scored: those beyond belong to the first one.
 void readPeaks(const std::vector<Hypotheses>& hypotheses, const std::vector<TileScores>& scores,
                bool interpolate, SurfaceEstimate* estimate);
 

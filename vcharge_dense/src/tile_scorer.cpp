@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace vcharge {
 namespace {
@@ -11,6 +12,7 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 // A tile's reference, its neighbours' footprints and one hypothesis's sums fit into a megabyte of L2.
 constexpr int kTileRows = 64;  // about
 constexpr int kMaxTileColumns = 215;
+constexpr int kSmallTileRows = 32, kMaxSmallTileColumns = 107;
 constexpr int kNodeSpacings_px[] = {8, 4};
 
 /// Copies the part of an image around (x, y) into the order of a layout.
@@ -36,14 +38,14 @@ void copyIntoLayout(const cv::Mat& image, cv::Point origin, const TileLayout& la
 
 }  // namespace
 
-uint32_t TileScores::voters(int hypothesis, size_t pixel) const {
+uint32_t TileScores::voters(int slot, size_t pixel) const {
   const auto lanes = static_cast<size_t>(layout.lanes);
   const size_t row = pixel / layout.rowSize(), in_row = pixel % layout.rowSize();
   const size_t bit = in_row % lanes;
   const size_t byte = lanes < 8 ? in_row / lanes : in_row / 8;
   const size_t row_bytes = rowVoterBytes(layout.lanes, layout.strip);
-  const uint8_t* bytes = voter_bits.data() + (row * num_hypotheses + static_cast<size_t>(hypothesis)) *
-                                                 num_neighbours * row_bytes;
+  const uint8_t* bytes =
+      voter_bits.data() + (row * slots.size() + static_cast<size_t>(slot)) * num_neighbours * row_bytes;
   uint32_t voters = 0;
   for (size_t n = 0; n < num_neighbours; ++n) {
     voters |= (static_cast<uint32_t>(bytes[n * row_bytes + byte]) >> (bit % 8) & 1u) << n;
@@ -51,16 +53,23 @@ uint32_t TileScores::voters(int hypothesis, size_t pixel) const {
   return voters;
 }
 
-std::vector<cv::Rect> makeTiles(cv::Size image, int window_px) {
+bool TileScores::isInside(int slot) const {
+  const auto s = static_cast<size_t>(slot);
+  return slot > 0 && s + 1 < slots.size() && slots[s - 1] != kGap && slots[s + 1] != kGap;
+}
+
+std::vector<cv::Rect> makeTiles(cv::Size image, int window_px, TileSize size) {
   const int radius = window_px / 2;
   const cv::Rect all(radius, radius, image.width - 2 * radius, image.height - 2 * radius);
   std::vector<cv::Rect> tiles;
   if (all.width <= 0 || all.height <= 0) {
     return tiles;
   }
-  const int columns = (all.width + kMaxTileColumns - 1) / kMaxTileColumns;
+  const int max_columns = size == TileSize::kLarge ? kMaxTileColumns : kMaxSmallTileColumns;
+  const int rows = size == TileSize::kLarge ? kTileRows : kSmallTileRows;
+  const int columns = (all.width + max_columns - 1) / max_columns;
   const int width = (all.width + columns - 1) / columns;
-  const int bands = std::max(1, (all.height + kTileRows / 2) / kTileRows);
+  const int bands = std::max(1, (all.height + rows / 2) / rows);
   const int height = (all.height + bands - 1) / bands;
   for (int y = 0; y < all.height; y += height) {
     for (int x = 0; x < all.width; x += width) {
@@ -177,12 +186,19 @@ void TileScorer::placeNeighbour(const Hypotheses& hypotheses, float offset, Neig
   }
 }
 
-void TileScorer::scoreHypothesis(const Hypotheses& hypotheses, size_t k, TileScores* result) {
+void TileScorer::scoreSlot(const Hypotheses& hypotheses, size_t slot, TileScores* result) {
   const SweepKernels& kernels = input_.kernels;
   const size_t row_size = halo_.rowSize();
   const int window = input_.options->window_px;
   const size_t ring_row = rowSamples(halo_.lanes, halo_.strip);
-  const float offset = hypotheses.offsets[k];
+  const size_t num_slots = result->slots.size();
+  if (result->slots[slot] == kGap) {
+    for (size_t y = 0; y < static_cast<size_t>(tile_.height); ++y) {
+      std::fill_n(result->scores.data() + (y * num_slots + slot) * row_size, row_size, kNoScore);
+    }
+    return;
+  }
+  const float offset = hypotheses.offsets[static_cast<size_t>(result->slots[slot])];
   for (Neighbour& neighbour : neighbours_) {
     placeNeighbour(hypotheses, offset, &neighbour);
     std::fill_n(neighbour.samples.data(), neighbour.samples.size(), int16_t{0});
@@ -205,8 +221,8 @@ void TileScorer::scoreHypothesis(const Hypotheses& hypotheses, size_t k, TileSco
     const int window_row = y - (window - 1);  // of the windows that end here
     const size_t at = static_cast<size_t>(y) * row_size;
     const size_t window_at = static_cast<size_t>(std::max(0, window_row)) * row_size;
-    const size_t row_hypothesis = static_cast<size_t>(std::max(0, window_row)) * result->num_hypotheses + k;
-    vote.voters = result->voter_bits.data() + row_hypothesis * neighbours_.size() * vote.voter_stride;
+    const size_t row_slot = static_cast<size_t>(std::max(0, window_row)) * num_slots + slot;
+    vote.voters = result->voter_bits.data() + row_slot * neighbours_.size() * vote.voter_stride;
     for (size_t n = 0; n < neighbours_.size(); ++n) {
       Neighbour& neighbour = neighbours_[n];
       if (neighbour.grid != nullptr) {
@@ -237,37 +253,43 @@ void TileScorer::scoreHypothesis(const Hypotheses& hypotheses, size_t k, TileSco
     }
     if (window_row >= 0) {
       vote.vote_per_covariance = vote_per_covariance_.data() + window_at;
-      vote.scores = result->scores.data() + row_hypothesis * row_size;
+      vote.scores = result->scores.data() + row_slot * row_size;
       kernels.vote(vote);
     }
   }
 }
 
 void TileScorer::score(const Hypotheses& hypotheses, TileScores* result) {
+  std::vector<int> all(hypotheses.offsets.size());
+  std::iota(all.begin(), all.end(), 0);
+  score(hypotheses, all, result);
+}
+
+void TileScorer::score(const Hypotheses& hypotheses, const std::vector<int>& slots, TileScores* result) {
   result->tile = tile_;
   result->layout = halo_;
   result->layout.rows = tile_.height;
   result->num_neighbours = neighbours_.size();
-  result->num_hypotheses = hypotheses.offsets.size();
+  result->slots = slots;
   const size_t row_size = halo_.rowSize();
   const size_t size = result->layout.size();
-  result->scores.resize(size * result->num_hypotheses);
-  result->voter_bits.resize(static_cast<size_t>(tile_.height) * result->num_hypotheses * neighbours_.size() *
+  result->scores.resize(size * slots.size());
+  result->voter_bits.resize(static_cast<size_t>(tile_.height) * slots.size() * neighbours_.size() *
                             rowVoterBytes(halo_.lanes, halo_.strip));
   for (AlignedArray<int16_t>* array : {&result->best, &result->best_score, &result->before, &result->after,
                                        &result->second, &result->second_score}) {
     array->resize(size);
   }
   loadSurface(hypotheses);
-  for (size_t k = 0; k < result->num_hypotheses; ++k) {
-    scoreHypothesis(hypotheses, k, result);
+  for (size_t slot = 0; slot < slots.size(); ++slot) {
+    scoreSlot(hypotheses, slot, result);
   }
   for (size_t at = 0; at < size; at += row_size) {
     const Peaks peaks{result->best.data() + at,   result->best_score.data() + at,
                       result->before.data() + at, result->after.data() + at,
                       result->second.data() + at, result->second_score.data() + at};
-    input_.kernels.findPeaks(result->scores.data() + at * result->num_hypotheses, row_size,
-                             static_cast<int>(result->num_hypotheses), row_size, peaks);
+    input_.kernels.findPeaks(result->scores.data() + at * slots.size(), row_size,
+                             static_cast<int>(slots.size()), row_size, peaks);
   }
 }
 

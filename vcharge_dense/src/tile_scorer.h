@@ -13,21 +13,31 @@
 
 namespace vcharge {
 
+/// A slot of scores between planes that are not neighbours.
+constexpr int kGap = -1;
+
 /// Scores of one tile, in the order of its layout.
 struct TileScores {
   cv::Rect tile;      ///< pixels that were scored; those of the layout beyond its columns mean nothing
   TileLayout layout;  ///< its rows are the tile's
-  size_t num_neighbours = 0, num_hypotheses = 0;
-  AlignedArray<int16_t> scores;     ///< [row][hypothesis][pixel in row]: correlation times kScoreScale
-  std::vector<uint8_t> voter_bits;  ///< [row][hypothesis][neighbour][pixel in row / 8]
-  AlignedArray<int16_t> best, best_score, before, after, second, second_score;  ///< see Peaks
+  size_t num_neighbours = 0;
+  std::vector<int> slots;           ///< the hypotheses that were scored, in order, and kGap between them
+  AlignedArray<int16_t> scores;     ///< [row][slot][pixel in row]: correlation times kScoreScale
+  std::vector<uint8_t> voter_bits;  ///< [row][slot][neighbour][pixel in row / 8]
+  AlignedArray<int16_t> best, best_score, before, after, second, second_score;  ///< see Peaks, by slot
 
-  /// Bit n: neighbour n took part in the hypothesis's score at a pixel.
-  uint32_t voters(int hypothesis, size_t pixel) const;
+  /// Bit n: neighbour n took part in the slot's score at a pixel.
+  uint32_t voters(int slot, size_t pixel) const;
+  /// The hypotheses before and after the slot's were scored as well.
+  bool isInside(int slot) const;
 };
 
+enum class TileSize {
+  kLarge,  ///< fewest windows that reach beyond a tile
+  kSmall,  ///< fewest depths in a tile
+};
 /// Tiles of the pixels whose window lies in an image. Their size is fixed, whoever computes them.
-std::vector<cv::Rect> makeTiles(cv::Size image, int window_px);
+std::vector<cv::Rect> makeTiles(cv::Size image, int window_px, TileSize size = TileSize::kLarge);
 
 /// Correlates a tile of the reference with its neighbours (at least one) warped over hypothetical surfaces.
 /// One object per thread, for any number of tiles.
@@ -37,6 +47,8 @@ class TileScorer {
 
   void setTile(const cv::Rect& tile);
   void score(const Hypotheses& hypotheses, TileScores* result);
+  /// Only some hypotheses, see TileScores.
+  void score(const Hypotheses& hypotheses, const std::vector<int>& slots, TileScores* result);
 
  private:
   struct Neighbour {
@@ -50,7 +62,7 @@ class TileScorer {
   size_t ringRows() const { return static_cast<size_t>(input_.options->window_px) + 1; }
   void loadSurface(const Hypotheses& hypotheses);
   void placeNeighbour(const Hypotheses& hypotheses, float offset, Neighbour* neighbour);
-  void scoreHypothesis(const Hypotheses& hypotheses, size_t k, TileScores* result);
+  void scoreSlot(const Hypotheses& hypotheses, size_t slot, TileScores* result);
 
   const SweepInput& input_;
   const int radius_;

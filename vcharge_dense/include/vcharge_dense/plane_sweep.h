@@ -10,7 +10,6 @@
 
 #include "vcharge_core/mei_camera.h"
 #include "vcharge_core/range_map.h"
-#include "vcharge_core/ray_table.h"
 #include "vcharge_core/rigid_transform.h"
 #include "vcharge_core/timestamp.h"
 #include "vcharge_dense/plane_family.h"
@@ -18,7 +17,8 @@
 
 namespace vcharge {
 
-struct Hypotheses;
+class CoarsePass;
+class SweepLevel;
 
 /// One image of the swept camera and where it was taken.
 struct SweepImage {
@@ -63,18 +63,12 @@ class PlaneSweep {
   RangeMap sweep(const SweepImage& reference, const std::vector<SweepImage>& neighbours,
                  SweepDetails* details = nullptr) const;
 
-  const PlaneSweepOptions& options() const { return options_; }
-  const std::vector<PlaneFamily>& families() const { return families_; }
+  const PlaneSweepOptions& options() const;
+  const std::vector<PlaneFamily>& families() const;
 
  private:
-  MeiCamera camera_;
-  cv::Mat valid_mask_;
-  PlaneSweepOptions options_;
-  RayTable rays_;
-  std::vector<PlaneFamily> families_;
-  std::shared_ptr<const std::vector<Hypotheses>> planes_;  // of the families
-  cv::Mat valid_windows_;  // CV_8UC1: not 0 where all pixels of the window are valid
-  cv::Mat near_valid_;     // CV_8UC1: not 0 where valid pixels are near
+  std::shared_ptr<const SweepLevel> level_;
+  std::shared_ptr<const CoarsePass> coarse_;  // null: all planes
 };
 
 }  // namespace vcharge

@@ -62,6 +62,10 @@ struct PlaneSweepOptions {
   double ground_max_height_m = 0.3;  ///< below the camera
   int num_ground_planes = 16;
 
+  /// Sweeps at half the resolution first, over every second plane, and then in each tile only the planes near
+  /// what that found; all of them where it found little. Fewer planes, less time (package README, Settings).
+  bool coarse_pass = false;
+
   int window_px = 7;  ///< odd side of the square matching window (zero-mean normalized cross correlation)
   Aggregation aggregation = Aggregation::kMean;
   int best_k = 2;
@@ -98,6 +102,7 @@ struct PlaneSweepOptions {
     visit("ground_min_height_m", ground_min_height_m);
     visit("ground_max_height_m", ground_max_height_m);
     visit("num_ground_planes", num_ground_planes);
+    visit("coarse_pass", coarse_pass);
     visit("window_px", window_px);
     visit("aggregation", aggregation);
     visit("best_k", best_k);

@@ -39,7 +39,10 @@ struct RangeMapperOptions {
   PlaneSweepOptions plane_sweep;
   OdometryBufferOptions odometry;
 
-  RangeMapperOptions() { plane_sweep.refine_poses = true; }  // a drive's poses are odometry's, as a rule
+  RangeMapperOptions() {
+    plane_sweep.refine_poses = true;  // a drive's poses are odometry's, as a rule
+    plane_sweep.coarse_pass = true;
+  }
 
   /// Neighbours before and after the reference, aggregated by reference-split.
   static RangeMapperOptions offline();
