@@ -25,7 +25,25 @@ namespace vcharge {
 /// (path), ~options (DriverOptions). Cameras and bus may come and go; options and rig must be right.
 class CameraDriverNodelet : public nodelet::Nodelet {
  public:
-  ~CameraDriverNodelet() override {
+  ~CameraDriverNodelet() override { shutDown(); }
+
+ private:
+  struct Output {
+    std::string name, frame_id;
+    ros::Publisher image, info;
+    sensor_msgs::CameraInfo camera_info;
+  };
+
+  void onInit() override {
+    try {
+      start();
+    } catch (...) {
+      shutDown();  // a nodelet that is refused outlives its callback queues: nothing may use them any more
+      throw;
+    }
+  }
+
+  void shutDown() {
     diagnostics_.clear();
     ticks_subscriber_.shutdown();
     if (source_) {
@@ -37,35 +55,31 @@ class CameraDriverNodelet : public nodelet::Nodelet {
     for (std::thread& thread : threads_) {
       thread.join();
     }
+    threads_.clear();
+    odometry_.reset();
+    outputs_.clear();
   }
 
- private:
-  struct Output {
-    std::string name, frame_id;
-    ros::Publisher image, info;
-    sensor_msgs::CameraInfo camera_info;
-  };
-
-  void onInit() override {
+  void start() {
     ros::NodeHandle& node = getMTNodeHandle();
     ros::NodeHandle& private_node = getMTPrivateNodeHandle();
     rig_ = std::make_shared<const CameraRig>(
         readCameraRig(requireStringParameter(private_node, "rig", "the path of a rig.yaml")));
-    options_.odometry_source =
-        OdometrySourceKind::kWheelTicks;  // CAN needs a description: not the default here
     readFieldsFromParameters(private_node, "options", &options_);
-    const cv::Size size = addOutputs(&node, private_node.resolveName("options"));
+    const cv::Size size = checkCameras(private_node.resolveName("options"));
     options_.v4l2.capture.width_px = size.width;
     options_.v4l2.capture.height_px = size.height;
     const double rate_hz = options_.v4l2.capture.frame_rate_hz;
+    sink_ = std::make_unique<MessageSink>(
+        options_.cameras.size(), TriggerGrouperOptions{rate_hz, options_.realign_frames},
+        options_.stamp_offset_s, [this](const MultiFrame& group) { publish(group); });
+    makeSource(size);
+    // All that may be refused is above: topics that come and go at once confuse those who listen.
+    addOutputs(&node);
     if (options_.odometry_source != OdometrySourceKind::kNone) {
       odometry_ = std::make_unique<OdometryPublisher>(&node, options_.odometry, rate_hz, topics_.odometry,
                                                       rig_->vehicle_frame);
     }
-    sink_ = std::make_unique<MessageSink>(
-        outputs_.size(), TriggerGrouperOptions{rate_hz, options_.realign_frames}, options_.stamp_offset_s,
-        [this](const MultiFrame& group) { publish(group); });
-    makeSource(size);
     broadcastCameras();
     addDiagnostics(node, private_node);
     if (options_.odometry_source == OdometrySourceKind::kCan) {
@@ -86,7 +100,7 @@ class CameraDriverNodelet : public nodelet::Nodelet {
   static Timestamp now() { return toTimestamp(ros::Time::now()); }
 
   /// Returns the size of the cameras' images.
-  cv::Size addOutputs(ros::NodeHandle* node, const std::string& source) {
+  cv::Size checkCameras(const std::string& source) {
     if (options_.cameras.empty()) {
       for (const RigCamera& camera : rig_->cameras) {
         options_.cameras.push_back(camera.name);
@@ -101,12 +115,18 @@ class CameraDriverNodelet : public nodelet::Nodelet {
     for (const std::string& name : options_.cameras) {
       const RigCamera& camera = rig_->cameras[rig_->cameraIndex(name)];
       checkImageSize(camera, size, "parameter " + source + ": cameras: " + options_.cameras.front());
+    }
+    return size;
+  }
+
+  void addOutputs(ros::NodeHandle* node) {
+    for (const std::string& name : options_.cameras) {
+      const RigCamera& camera = rig_->cameras[rig_->cameraIndex(name)];
       outputs_.push_back({name, camera.frame_id,
                           node->advertise<sensor_msgs::Image>(topics_.imageTopic(name), 10),
                           node->advertise<sensor_msgs::CameraInfo>(topics_.cameraInfoTopic(name), 10),
                           makeCameraInfo(camera)});
     }
-    return size;
   }
 
   void makeSource(cv::Size size) {
