@@ -198,7 +198,7 @@ class CameraDriverNodelet : public nodelet::Nodelet {
   }
 
   DriverOptions options_;
-  const DriveTopics topics_;
+  DriveTopics topics_;
   CallbackGuard guard_{"camera_driver"};
   std::shared_ptr<const CameraRig> rig_;
   std::vector<Output> outputs_;  // by camera
