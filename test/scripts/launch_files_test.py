@@ -19,7 +19,7 @@ from drive_fixture import run, tool  # noqa: E402
 PACKAGES = rospkg.RosPack()
 LAUNCH = pathlib.Path(PACKAGES.get_path("vcharge_launch"))
 CONFIG = pathlib.Path(PACKAGES.get_path("vcharge_config"))
-NODELET_PACKAGES = ("vcharge_ros", "vcharge_calibration", "vcharge_dense", "vcharge_mapping")
+NODELET_PACKAGES = ("vcharge_ros", "vcharge_calibration", "vcharge_camera_driver", "vcharge_dense", "vcharge_mapping")
 
 
 def nodelet_types():
@@ -42,6 +42,8 @@ def required_arguments(path):
 def load(path, **arguments):
     """The launch file's nodes and parameters; required arguments are paths that need not exist to parse it."""
     given = {name: f"/nowhere/{name}" for name in required_arguments(path)}
+    if "options" in given:  # loaded while parsing
+        given["options"] = str(CONFIG / "driver" / "example_car.yaml")
     given.update(arguments)
     return roslaunch.config.load_config_default(
         [(str(path), [f"{name}:={value}" for name, value in given.items()])], None, verbose=False)
@@ -94,6 +96,11 @@ class LaunchFilesTest(unittest.TestCase):
                 self.assertEqual(config.params["/intrinsic_calibration/camera"].value, "front", path.name)
                 self.assertEqual(config.params["/intrinsic_calibration/output"].value, "/rigs/cameras.yaml", path.name)
                 continue
+            if "options" in required_arguments(path):  # of the car itself
+                config = load(path, rig="/rigs/rig.yaml")
+                self.assertEqual(config.params["/camera_driver/rig"].value, "/rigs/rig.yaml", path.name)
+                self.assertEqual(config.params["/camera_driver/options/can_interface"].value, "can0", path.name)
+                continue
             config = load(path, **({"folder": "/drives"} if "folder" in required_arguments(path) else
                                    {"bag": "/drives/drive.bag", "rig": "/drives/rig_truth.yaml"}))
             parameters = {name: parameter.value for name, parameter in config.params.items()}
@@ -136,7 +143,9 @@ class LaunchFilesTest(unittest.TestCase):
         rigs = sorted((CONFIG / "rigs").glob("*.yaml"))
         options = sorted(CONFIG.glob("*.yaml"))
         scenarios = sorted((CONFIG / "scenarios").glob("*.yaml"))  # faults_test.py loads them
-        self.assertEqual(sorted(CONFIG.rglob("*.yaml")), sorted(rigs + options + scenarios), "a YAML that nobody reads")
+        drivers = sorted((CONFIG / "driver").glob("*.yaml"))  # driver_test.py loads them
+        self.assertEqual(sorted(CONFIG.rglob("*.yaml")), sorted(rigs + options + scenarios + drivers),
+                         "a YAML that nobody reads")
         self.assertTrue(rigs and options)
         dense, mapping = tool("vcharge_dense", "compute_range_maps"), tool("vcharge_mapping", "build_map")
         for rig, option in [(rig, options[0]) for rig in rigs] + [(rigs[0], option) for option in options]:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "vcharge_core/error.h"
 #include "vcharge_core/options.h"
@@ -24,7 +25,7 @@ MultiFrameSynchronizer::MultiFrameSynchronizer(size_t num_cameras,
 }
 
 void MultiFrameSynchronizer::giveUpOldest() {
-  const PendingSet& oldest = pending_.front();
+  PendingSet& oldest = pending_.front();
   ++counts_.incomplete_sets;
   for (size_t i = 0; i < num_cameras_; ++i) {
     if (!oldest.present[i]) {
@@ -32,7 +33,20 @@ void MultiFrameSynchronizer::giveUpOldest() {
     }
   }
   last_closed_ = oldest.frame.stamp;
+  if (options_.keep_incomplete) {
+    incomplete_.push_back(std::make_shared<const MultiFrame>(std::move(oldest.frame)));
+  }
   pending_.pop_front();
+}
+
+void MultiFrameSynchronizer::giveUpUntil(Timestamp stamp) {
+  while (!pending_.empty() && pending_.front().frame.stamp <= stamp) {
+    giveUpOldest();
+  }
+}
+
+std::vector<std::shared_ptr<const MultiFrame>> MultiFrameSynchronizer::takeIncomplete() {
+  return std::exchange(incomplete_, {});
 }
 
 std::shared_ptr<const MultiFrame> MultiFrameSynchronizer::add(size_t camera_index, Timestamp stamp,

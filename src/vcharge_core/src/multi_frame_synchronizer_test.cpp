@@ -154,6 +154,29 @@ TEST(MultiFrameSynchronizerTest, NoSetSpansMoreThanTheTolerance) {
   EXPECT_EQ(frame->images[2].pixels.at<uint8_t>(0, 0), 3);
 }
 
+TEST(MultiFrameSynchronizerTest, KeepsIncompleteSetsInOrderWhereAsked) {
+  MultiFrameSynchronizerOptions options;
+  options.keep_incomplete = true;
+  MultiFrameSynchronizer synchronizer(2, options);
+  synchronizer.add(1, at(0.1), imageWith(1));
+  synchronizer.add(0, at(0.2), imageWith(2));
+  synchronizer.add(0, at(0.3), imageWith(3));
+  EXPECT_TRUE(synchronizer.takeIncomplete().empty());
+  synchronizer.giveUpUntil(at(0.1));
+  auto sets = synchronizer.takeIncomplete();
+  ASSERT_EQ(sets.size(), 1u);
+  EXPECT_EQ(sets[0]->stamp, at(0.1));
+  EXPECT_TRUE(sets[0]->images[0].pixels.empty());
+  EXPECT_EQ(sets[0]->images[1].pixels.at<uint8_t>(0, 0), 1);
+  ASSERT_NE(synchronizer.add(1, at(0.3), imageWith(4)), nullptr);  // overtakes
+  sets = synchronizer.takeIncomplete();
+  ASSERT_EQ(sets.size(), 1u);
+  EXPECT_EQ(sets[0]->stamp, at(0.2));
+  EXPECT_TRUE(synchronizer.takeIncomplete().empty());
+  EXPECT_EQ(synchronizer.add(0, at(0.1), imageWith(5)), nullptr);
+  EXPECT_EQ(synchronizer.counts().late_images, 1u);
+}
+
 TEST(MultiFrameSynchronizerTest, RejectsBadOptionsByName) {
   const auto errorOf = [](const auto& change) -> std::string {
     MultiFrameSynchronizerOptions options;

@@ -17,7 +17,8 @@ struct Image {
   std::shared_ptr<const void> owner;
 };
 
-/// The images of all cameras of a rig at one instant, in the rig's camera order.
+/// The images of all cameras of a rig at one instant, in the rig's camera order. Whoever takes incomplete
+/// frames finds images without pixels in them.
 struct MultiFrame {
   Timestamp stamp;
   std::vector<Image> images;

@@ -15,12 +15,14 @@ struct MultiFrameSynchronizerOptions {
   double tolerance_s = 0.0;        ///< images this close belong together; 0: equal stamps (hardware sync)
   int max_pending_sets = 8;        ///< incomplete sets kept before the oldest is given up
   double reset_backwards_s = 1.0;  ///< a stamp this far before the newest starts over (a replayed bag)
+  bool keep_incomplete = false;    ///< sets that were given up wait in takeIncomplete()
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
     visit("tolerance_s", tolerance_s);
     visit("max_pending_sets", max_pending_sets);
     visit("reset_backwards_s", reset_backwards_s);
+    visit("keep_incomplete", keep_incomplete);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
@@ -46,6 +48,12 @@ class MultiFrameSynchronizer {
   /// Takes one image; returns the set that it completes, or null. std::logic_error for a bad camera index.
   std::shared_ptr<const MultiFrame> add(size_t camera_index, Timestamp stamp, const Image& image);
 
+  /// Gives up the pending sets whose stamp is not after `stamp`: what they lack is not waited for any more.
+  void giveUpUntil(Timestamp stamp);
+  /// The sets given up since the last call, in order of time; images that are missing have no pixels. Empty
+  /// unless keep_incomplete is set. They are older than what add() returns next, also when it gave them up.
+  std::vector<std::shared_ptr<const MultiFrame>> takeIncomplete();
+
   const MultiFrameSynchronizerCounts& counts() const { return counts_; }
 
  private:
@@ -63,6 +71,7 @@ class MultiFrameSynchronizer {
   std::deque<PendingSet> pending_;  // in order of stamp
   std::optional<Timestamp> last_closed_;
   std::optional<Timestamp> newest_;
+  std::vector<std::shared_ptr<const MultiFrame>> incomplete_;
   MultiFrameSynchronizerCounts counts_;
 };
 

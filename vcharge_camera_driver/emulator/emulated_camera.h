@@ -1,0 +1,103 @@
+#pragma once
+
+#include <linux/videodev2.h>
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace vcharge::emulator {
+
+/// What an emulated camera is, read from the file that stands for its device node: lines "key=value".
+struct CameraConfig {
+  uint32_t width = 1280, height = 800;
+  std::vector<std::string> formats = {"GREY"};  ///< four character codes
+  double rate_hz = 12.5;                        ///< of the trigger; pulses are at multiples of its period
+  std::string capabilities = "capture";         ///< or "output", "no_streaming"
+  int64_t exposure_us = 5000;                   ///< from the pulse to the frame's stamp
+  int64_t readout_us = 20000;                   ///< from the pulse to the frame's delivery
+  int64_t jitter_us = 0;                        ///< the stamps are off by at most this
+  uint64_t drop_every = 0;              ///< of so many frames the first is lost (its number is counted)
+  uint64_t damage_every = 0;            ///< of so many frames the first is flagged as damaged
+  uint64_t short_every = 0;             ///< of so many frames the first has half its bytes
+  uint64_t silent_after = 0;            ///< no frames after so many; 0: always
+  std::map<std::string, int> failures;  ///< errno that an ioctl ends with, by "STREAMON"...: fail=STREAMON:5
+  bool unknown_clock = false;
+};
+
+CameraConfig readCameraConfig(const std::string& path);
+
+/// State behind one open file of an emulated camera. Guarded by the emulator's mutex.
+class EmulatedCamera {
+ public:
+  /// `application_fd` is what open() returned, `hardware_fd` the other end of its socket pair; `memory_fd`
+  /// holds the frames.
+  EmulatedCamera(std::string path, const CameraConfig& config, int application_fd, int hardware_fd,
+                 int memory_fd);
+  ~EmulatedCamera();
+  EmulatedCamera(const EmulatedCamera&) = delete;
+  EmulatedCamera& operator=(const EmulatedCamera&) = delete;
+
+  /// As the kernel answers: 0, or an errno.
+  int control(unsigned long request, void* argument);
+  int memoryFd() const { return memory_fd_; }
+
+  /// Nanoseconds of CLOCK_MONOTONIC when the next frame is delivered; INT64_MAX when it does not stream.
+  int64_t nextDelivery() const;
+  /// Delivers what is due; notices when the device's file went away.
+  void work(int64_t now_ns);
+
+ private:
+  struct Slot {
+    uint8_t* data = nullptr;  // user pointer, or null: in memory_fd_
+    bool painted = false;
+  };
+  struct Done {
+    uint32_t index = 0, sequence = 0, flags = 0, bytes_used = 0;
+    int64_t stamp_ns = 0;
+  };
+  static constexpr int kNumControls = 3;
+
+  int answer(unsigned long request, void* argument);
+  void describe(v4l2_capability* capability) const;
+  int enumerateFormat(v4l2_fmtdesc* format) const;
+  int enumerateSize(v4l2_frmsizeenum* size) const;
+  int enumerateRate(v4l2_frmivalenum* rate) const;
+  void agree(v4l2_format* format);
+  int allocate(v4l2_requestbuffers* request);
+  int queryBuffer(v4l2_buffer* buffer) const;
+  int enqueue(const v4l2_buffer& buffer);
+  int dequeue(v4l2_buffer* buffer);
+  int queryControl(v4l2_queryctrl* control) const;
+  int accessControl(v4l2_control* control, bool set);
+  void stop();
+  void deliver(uint64_t pulse);
+  void paint(uint32_t index, uint64_t pulse);
+  uint8_t* memory(uint32_t index);
+  int64_t period() const;
+  bool isFile() const;
+
+  const std::string path_;
+  const CameraConfig config_;
+  const int application_fd_;
+  int hardware_fd_;
+  const int memory_fd_;
+  uint64_t inode_ = 0;
+  bool unplugged_ = false;
+  bool streaming_ = false;
+  uint32_t fourcc_ = V4L2_PIX_FMT_GREY;
+  uint32_t image_bytes_ = 0;
+  uint8_t* mapped_ = nullptr;
+  size_t mapped_bytes_ = 0;
+  std::vector<Slot> slots_;
+  std::vector<uint8_t> jpeg_;
+  std::deque<uint32_t> queued_;
+  std::deque<Done> done_;
+  uint64_t next_pulse_ = 0;
+  uint64_t frames_ = 0;
+  int controls_[kNumControls] = {100, 0, 0};
+};
+
+}  // namespace vcharge::emulator

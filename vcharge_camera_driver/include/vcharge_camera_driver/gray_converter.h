@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+namespace vcharge {
+
+/// How a camera delivers its pixels; names as the V4L2 documentation has them.
+enum class PixelFormat {
+  kGrey,   ///< 8 bit
+  kY10,    ///< 10 bit in the lower bits of 16, little endian
+  kY12,    ///< 12 bit in the lower bits of 16, little endian
+  kY16,    ///< 16 bit little endian
+  kYuyv,   ///< 4:2:2, luminance first
+  kUyvy,   ///< 4:2:2, luminance second
+  kBggr8,  ///< Bayer patterns, named by their first two rows
+  kGbrg8,
+  kGrbg8,
+  kRggb8,
+  kMjpeg,
+};
+
+/// All formats, in the order in which they are preferred when the options name none: least work first.
+const std::vector<PixelFormat>& allPixelFormats();
+/// V4L2's four character code.
+uint32_t fourccOf(PixelFormat format);
+/// "GREY", "Y10", "YUYV"...
+std::string toString(PixelFormat format);
+/// Every name, in the order of allPixelFormats().
+std::vector<std::string> pixelFormatNames();
+/// The characters of a code, without trailing blanks.
+std::string fourccText(uint32_t fourcc);
+/// Bytes of one row without padding; 0 for kMjpeg, which has none.
+size_t bytesPerRow(PixelFormat format, int width_px);
+
+/// Converts a frame as a camera delivered it to 8-bit gray, straight into the caller's memory. Not thread
+/// safe; one per camera.
+class GrayConverter {
+ public:
+  GrayConverter();
+  ~GrayConverter();
+  GrayConverter(GrayConverter&& other) noexcept;
+  GrayConverter& operator=(GrayConverter&& other) noexcept;
+
+  /// `data` holds `size_bytes` bytes of rows `stride_bytes` apart (ignored for kMjpeg); `gray` is CV_8UC1 of
+  /// the frame's size. Returns an empty text, or why the frame is bad (too short, not a JPEG, a JPEG of
+  /// another size or a damaged one); `gray` then holds no image.
+  std::string convert(PixelFormat format, const uint8_t* data, size_t size_bytes, size_t stride_bytes,
+                      cv::Mat* gray);
+
+ private:
+  struct Jpeg;
+  std::unique_ptr<Jpeg> jpeg_;  // made when the first JPEG comes
+};
+
+}  // namespace vcharge

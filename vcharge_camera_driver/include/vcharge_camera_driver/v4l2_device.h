@@ -1,0 +1,128 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "vcharge_camera_driver/file_descriptor.h"
+#include "vcharge_camera_driver/gray_converter.h"
+#include "vcharge_core/options.h"
+#include "vcharge_core/timestamp.h"
+
+namespace vcharge {
+
+enum class BufferMemory { kMmap, kUserPointer };
+
+template <>
+inline std::vector<std::string> enumNames<BufferMemory>() {
+  return {"mmap", "userptr"};
+}
+
+/// What is asked of every camera.
+struct V4l2Options {
+  int width_px = 1280;
+  int height_px = 800;
+  double frame_rate_hz = 12.5;  ///< of the trigger; also asked of the camera, where it has a rate
+  std::vector<std::string>
+      pixel_formats;  ///< tried in this order; empty: all that are known, least work first
+  BufferMemory memory = BufferMemory::kMmap;
+  int num_buffers = 4;                ///< frames that the kernel may be ahead
+  std::vector<std::string> controls;  ///< "name=value", by the names that list_cameras prints
+
+  template <class Visitor>
+  void visitFields(Visitor&& visit) {
+    visit("width_px", width_px);
+    visit("height_px", height_px);
+    visit("frame_rate_hz", frame_rate_hz);
+    visit("pixel_formats", pixel_formats);
+    visit("memory", memory);
+    visit("num_buffers", num_buffers);
+    visit("controls", controls);
+  }
+  void validate() const;  ///< throws std::invalid_argument naming the field
+};
+
+/// A control of a camera, menus and buttons left out.
+struct V4l2Control {
+  uint32_t id = 0;
+  std::string name;  ///< as v4l2-ctl writes it: "Exposure Time, Absolute" is exposure_time_absolute
+  int32_t minimum = 0, maximum = 0, step = 0, default_value = 0, value = 0;
+};
+
+/// A frame in the kernel's buffer; valid until it is given back.
+struct V4l2Frame {
+  uint32_t buffer_index = 0;
+  uint32_t sequence = 0;
+  /// Of the kernel's CLOCK_MONOTONIC; at the end of the frame, or at the start of its exposure where the
+  /// driver says so.
+  Timestamp monotonic_stamp;
+  bool has_kernel_stamp = true;  ///< false: the driver's clock is unknown, the stamp is that of dequeuing
+  bool is_damaged = false;       ///< V4L2_BUF_FLAG_ERROR
+  const uint8_t* data = nullptr;
+  size_t size_bytes = 0;
+};
+
+/// One V4L2 capture device, opened and streaming. Everything that fails throws InputError
+/// "<device>: <what>: <reason>"; the destructor stops and closes. Not thread safe.
+class V4l2Device {
+ public:
+  /// Opens, checks that it captures and streams, agrees on format and rate, sets the controls, and starts.
+  V4l2Device(const std::string& path, const V4l2Options& options);
+  ~V4l2Device();
+  V4l2Device(const V4l2Device&) = delete;
+  V4l2Device& operator=(const V4l2Device&) = delete;
+
+  const std::string& path() const { return path_; }
+  int fileDescriptor() const { return fd_.get(); }  ///< readable (poll) when a frame is there
+  PixelFormat pixelFormat() const { return format_; }
+  cv::Size size() const { return size_; }
+  size_t strideBytes() const { return stride_bytes_; }
+
+  /// Takes the oldest filled buffer. False where none is there (never waits).
+  bool dequeue(V4l2Frame* frame);
+  /// Gives the frame's buffer back to the kernel.
+  void enqueue(const V4l2Frame& frame);
+
+  std::vector<V4l2Control> controls() const;
+  int32_t control(const std::string& name) const;
+  void setControl(const std::string& name, int32_t value);
+
+ private:
+  struct Buffer;
+
+  void checkCapabilities() const;
+  void negotiate(const V4l2Options& options);
+  void allocate(const V4l2Options& options);
+  void start();
+  V4l2Control findControl(const std::string& name) const;
+  [[noreturn]] void fail(const std::string& what) const;  // with errno's text
+
+  const std::string path_;
+  FileDescriptor fd_;
+  BufferMemory memory_;
+  PixelFormat format_ = PixelFormat::kGrey;
+  cv::Size size_;
+  size_t stride_bytes_ = 0;
+  size_t image_bytes_ = 0;
+  std::vector<std::unique_ptr<Buffer>> buffers_;
+  bool streaming_ = false;
+};
+
+/// What a device node is and can, for list_cameras.
+struct V4l2Description {
+  std::string path, card, driver, bus;
+  bool captures = false;
+  std::vector<std::string>
+      formats;  ///< "GREY 1280x800 (12.5, 25 Hz)", a trailing '*' where it is not understood
+  std::vector<V4l2Control> controls;
+};
+
+/// InputError when it cannot be opened or is no V4L2 device.
+V4l2Description describeV4l2Device(const std::string& path);
+/// "name=value" taken apart. InputError for anything else.
+std::pair<std::string, int32_t> parseControl(const std::string& text);
+
+}  // namespace vcharge

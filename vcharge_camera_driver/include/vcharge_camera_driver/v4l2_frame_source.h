@@ -1,0 +1,59 @@
+#pragma once
+
+#include <memory>
+#include <mutex>
+
+#include "vcharge_camera_driver/clock_map.h"
+#include "vcharge_camera_driver/file_descriptor.h"
+#include "vcharge_camera_driver/frame_source.h"
+#include "vcharge_camera_driver/v4l2_device.h"
+
+namespace vcharge {
+
+struct V4l2FrameSourceOptions {
+  V4l2Options capture;
+  double timeout_s = 1.0;    ///< a camera silent for longer is opened anew
+  double reconnect_s = 0.5;  ///< between attempts to open a camera
+
+  template <class Visitor>
+  void visitFields(Visitor&& visit) {
+    visit("capture", capture);
+    visit("timeout_s", timeout_s);
+    visit("reconnect_s", reconnect_s);
+  }
+  void validate() const;  ///< throws std::invalid_argument naming the field
+};
+
+/// Frames of several V4L2 cameras, all served by the thread that calls run(): it sleeps in poll() until a
+/// frame, a deadline or stop() is there. A camera that cannot be opened, fails or is unplugged is reported in
+/// its status, tried again every reconnect_s, and disturbs no other. Each frame is converted once, from the
+/// kernel's buffer into the sink's memory.
+class V4l2FrameSource : public FrameSource {
+ public:
+  /// `devices`: one path per camera.
+  V4l2FrameSource(std::vector<std::string> devices, const V4l2FrameSourceOptions& options,
+                  ClockMap::Clock drive_clock);
+  ~V4l2FrameSource() override;
+
+  void run(FrameSink* sink) override;
+  void stop() override;
+  std::vector<CameraStatus> status() const override;
+
+ private:
+  struct Camera;
+
+  void connect(Camera* camera, Timestamp now);
+  void disconnect(Camera* camera, const std::string& reason, Timestamp now);
+  void readFrames(size_t index, FrameSink* sink, Timestamp now);
+  bool take(size_t index, const V4l2Frame& frame, FrameSink* sink);
+  /// Opens what is due and closes what is silent; returns how long nothing else is due.
+  Duration maintain(Timestamp now);
+
+  const V4l2FrameSourceOptions options_;
+  ClockMap clock_;
+  FileDescriptor wake_;
+  mutable std::mutex mutex_;  // guards the cameras' status
+  std::vector<std::unique_ptr<Camera>> cameras_;
+};
+
+}  // namespace vcharge

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "vcharge_camera_driver/can_reader.h"
+#include "vcharge_camera_driver/frame_source.h"
+#include "vcharge_camera_driver/trigger_grouper.h"
+#include "vcharge_ros/drive_monitor.h"
+
+namespace vcharge {
+
+/// Of one camera.
+DriveMonitor::Report reportCamera(const std::string& name, const CameraStatus& status,
+                                  const TriggerCameraCounts& counts);
+/// Of the groups; `before` holds the counts of the last report.
+DriveMonitor::Report reportSync(const TriggerGrouperCounts& now, const TriggerGrouperCounts& before);
+/// Of the bus.
+DriveMonitor::Report reportCan(const CanStatus& status);
+
+}  // namespace vcharge

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include <sensor_msgs/Image.h>
+
+#include "vcharge_camera_driver/frame_source.h"
+#include "vcharge_camera_driver/image_pool.h"
+#include "vcharge_camera_driver/trigger_grouper.h"
+
+namespace vcharge {
+
+/// Groups frames that lie in pooled messages, and passes the groups on.
+class MessageSink : public FrameSink {
+ public:
+  using GroupCallback = std::function<void(const MultiFrame&)>;
+
+  MessageSink(size_t num_cameras, const TriggerGrouperOptions& options, double stamp_offset_s,
+              GroupCallback callback);
+
+  Image acquire(cv::Size size_px) override;
+  void add(const CapturedFrame& frame) override;
+  Duration idle() override;
+  TriggerGrouperCounts counts() const;  ///< thread safe
+
+  /// The message in which an image of a group lies: mono8, complete but for its header, to be published once.
+  static sensor_msgs::ImagePtr messageOf(const Image& image);
+
+ private:
+  void pass(const TriggerGrouper::Groups& groups);
+
+  const Duration stamp_offset_;
+  const GroupCallback callback_;
+  BufferPool<sensor_msgs::Image> pool_;
+  mutable std::mutex mutex_;
+  TriggerGrouper grouper_;
+};
+
+}  // namespace vcharge
