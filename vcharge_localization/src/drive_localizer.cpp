@@ -11,6 +11,10 @@
 namespace vcharge {
 namespace {
 
+double squared(double value) {
+  return value * value;
+}
+
 class StageTimer {
  public:
   StageTimer(const char* name, LocalizationResult* result) : name_(name), result_(result) {}
@@ -120,46 +124,66 @@ void DriveLocalizer::track(const RigFeatures& features, LocalizationResult* resu
   ++frames_without_fix_;
 }
 
-bool DriveLocalizer::isConfirmed(const Candidate& candidate) const {
-  if (!candidate_ || toSeconds(candidate.stamp - candidate_->stamp) > options_.max_confirmation_s) {
-    return false;
+std::optional<RigidTransform> DriveLocalizer::candidateNow(const LocalizationFrame& frame) const {
+  if (!candidate_ || toSeconds(frame.stamp - candidate_->stamp) > options_.max_confirmation_s) {
+    return std::nullopt;
   }
   RigidTransform moved;
-  if (candidate_->odom_from_vehicle && candidate.odom_from_vehicle) {
-    moved = candidate_->odom_from_vehicle->inverse() * *candidate.odom_from_vehicle;
+  if (candidate_->odom_from_vehicle && frame.odom_from_vehicle) {
+    moved = candidate_->odom_from_vehicle->inverse() * *frame.odom_from_vehicle;
   }
-  const RigidTransform difference =
-      (candidate_->map_from_vehicle * moved).inverse() * candidate.map_from_vehicle;
-  return difference.translation().norm() <= options_.confirmation_m &&
+  return candidate_->map_from_vehicle * moved;
+}
+
+bool DriveLocalizer::isConfirmed(const RigidTransform& expected, const PoseFix& fix) const {
+  const RigidTransform difference = expected.inverse() * fix.map_from_vehicle;
+  return fix.status == LocalizationStatus::kLocalized &&
+         difference.translation().norm() <= options_.confirmation_m &&
          angleOfRotation(difference.rotation()) <= options_.confirmation_rad;
+}
+
+PoseFix DriveLocalizer::searchFrom(const std::optional<RigidTransform>& expected,
+                                   const RigFeatures& features) const {
+  if (expected) {
+    PosePrior prior{*expected, Eigen::Matrix<double, 6, 6>::Zero()};
+    prior.covariance.diagonal() << Eigen::Vector3d::Constant(squared(options_.confirmation_m) / 9.0),
+        Eigen::Vector3d::Constant(squared(options_.confirmation_rad) / 9.0);
+    const PoseFix fix = localizer_.localizeNear(features, prior);
+    if (isConfirmed(*expected, fix)) {
+      return fix;
+    }
+  }
+  return localizer_.localizeAnywhere(features);
 }
 
 void DriveLocalizer::searchWholeMap(const LocalizationFrame& frame, const RigFeatures& features,
                                     LocalizationResult* result) {
   result->searched_whole_map = true;
-  const PoseFix fix = localizer_.localizeAnywhere(features);
+  const std::optional<RigidTransform> expected = candidateNow(frame);
+  const PoseFix fix = searchFrom(expected, features);
   const bool tracks = result->status == LocalizationStatus::kBridgedByOdometry;
   if (!tracks) {
     result->fix = fix;
     result->status = fix.status;
   }
   if (fix.status != LocalizationStatus::kLocalized) {
-    candidate_.reset();
+    if (!expected) {
+      candidate_.reset();  // else it may yet be confirmed
+    }
     if (!tracks) {
       result->message = fix.status == LocalizationStatus::kAmbiguous ? "two places of the map look alike"
                                                                      : "no place of the map was recognized";
     }
     return;
   }
-  const Candidate candidate{frame.stamp, fix.map_from_vehicle, frame.odom_from_vehicle};
   if (tracks && filter_.update(fix)) {
     takeFix(fix, result);
-  } else if (isConfirmed(candidate)) {
+  } else if (expected && isConfirmed(*expected, fix)) {
     filter_.reset({fix.map_from_vehicle, options_.filter.fix_covariance_factor * fix.covariance});
     takeFix(fix, result);
     result->message = "found in the map";
   } else {
-    candidate_ = candidate;
+    candidate_ = {frame.stamp, fix.map_from_vehicle, frame.odom_from_vehicle};
     if (!tracks) {
       result->status = LocalizationStatus::kLost;
     }

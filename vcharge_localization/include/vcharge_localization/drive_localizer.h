@@ -96,7 +96,10 @@ class DriveLocalizer {
   void track(const RigFeatures& features, LocalizationResult* result);
   void searchWholeMap(const LocalizationFrame& frame, const RigFeatures& features,
                       LocalizationResult* result);
-  bool isConfirmed(const Candidate& candidate) const;
+  /// Where the vehicle is by a recognized place that is not confirmed yet; none, or too old: nothing.
+  std::optional<RigidTransform> candidateNow(const LocalizationFrame& frame) const;
+  bool isConfirmed(const RigidTransform& expected, const PoseFix& fix) const;
+  PoseFix searchFrom(const std::optional<RigidTransform>& expected, const RigFeatures& features) const;
   void takeFix(const PoseFix& fix, LocalizationResult* result);
 
   const std::shared_ptr<const CameraRig> rig_;

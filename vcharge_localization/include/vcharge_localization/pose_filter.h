@@ -16,7 +16,7 @@ struct PoseFilterOptions {
   double turn_sigma = 0.02;       ///< of true over counted turn
   double scale_walk = 0.001;      ///< how much either changes in a metre of way, per square root
   double distance_sigma = 0.01;   ///< metres in a metre of way, per square root
-  double yaw_sigma_rad = 0.0015;  ///< in a metre of way, per square root
+  double yaw_sigma_rad = 0.0012;  ///< in a metre of way, per square root
   double yaw_turn_sigma = 0.01;   ///< in a radian of turn, per square root
   double height_sigma_m = 0.01;   ///< in a metre of way, per square root
   double tilt_sigma_rad = 0.003;  ///< roll and pitch in a metre of way, per square root
@@ -24,10 +24,10 @@ struct PoseFilterOptions {
   double time_sigma_rad = 0.0005;
   // What a fix is good for: its own covariance takes matches to be independent, and the map to be right.
   double fix_covariance_factor = 1.0;
-  double map_sigma_m = 0.006;
-  double map_sigma_rad = 0.0005;
+  double map_sigma_m = 0.005;
+  double map_sigma_rad = 0.0004;
   /// Errors of the map stay the same while the same landmarks are seen: frames whose fixes count as one.
-  double correlated_frames = 4.0;
+  double correlated_frames = 3.0;
   double gate = 30.0;  ///< squared Mahalanobis distance (6 degrees of freedom) of a likely fix
 
   template <class Visitor>
