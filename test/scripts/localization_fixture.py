@@ -1,6 +1,7 @@
 """What the tests of localization share: a mapped stretch of road, another day's drive over it, and what may befall that."""
 import csv
 import re
+import sqlite3
 
 import numpy as np
 import yaml
@@ -85,6 +86,29 @@ class Place:
         posed = [row for row in rows if row["tx"]]
         return self.errors_m([float(row["time_s"]) for row in posed],
                              [[float(row[key]) for key in ("tx", "ty", "tz")] for row in posed])
+
+    def bad_inputs(self):
+        """Name, map, rig, options, and the words of the error."""
+        folder = self.folder
+        cut = folder / "cut.vmap"
+        cut.write_bytes(self.map.read_bytes()[:50000])
+        changed = folder / "changed.vmap"
+        changed.write_bytes(self.map.read_bytes())
+        with sqlite3.connect(str(changed)) as connection:
+            cursor = connection.execute("UPDATE meta SET value = 'type: orb' WHERE key = 'feature_options'")
+            if cursor.rowcount != 1:
+                raise RuntimeError(f"{changed}: no feature_options to change")
+        bare = self.rig.parent / "bare.yaml"
+
+        def without_extrinsics(cameras):
+            del cameras["left"]["vehicle_from_camera"]
+
+        bare.write_text(rig_text(self.rig, without_extrinsics))
+        return (("missing", folder / "none.vmap", None, None, ("none.vmap: no such file",)),
+                ("cut", cut, None, None, ("cut.vmap: the map is truncated",)),
+                ("changed", changed, None, None, ("changed.vmap: the map is damaged",)),
+                ("bare", None, bare, None, ("bare.yaml", "vehicle_from_camera")),
+                ("option", None, None, {"no_such_option": 1}, ("no_such_option",)))
 
 
 def count(rows, status):

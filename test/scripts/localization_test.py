@@ -2,7 +2,6 @@
 """Another day's drive in a mapped place: right poses, offline as online, and everything that is wrong has a name."""
 import copy
 import os
-import sqlite3
 import sys
 import time
 import unittest
@@ -125,7 +124,8 @@ class LocalizationTest(unittest.TestCase):
                                         (None, wrong, ("right",), "intrinsics")):
             status, output, errors, rows = self.place.localize(bag=bag, rig=rig)
             self.assertEqual((status, errors), (0, []))
-            self.expect_right(rows)
+            # At this size a frame has some 80 inliers of the 20 that it needs: each lost camera costs frames.
+            self.expect_right(rows, min_localized=0.9 - 0.1 * len(blamed))
             told = warnings(output)
             self.assertEqual({text.split(":")[0] for _, text in told}, set(blamed), told)
             self.assertTrue(all(words in text for _, text in told), told)
@@ -153,30 +153,8 @@ class LocalizationTest(unittest.TestCase):
         self.assertEqual((status, errors), (0, []))
         self.expect_right(rows, min_localized=0.8)
 
-    def bad_inputs(self):
-        """Name, map, rig, options, and the words of the error."""
-        folder = self.place.folder
-        cut = folder / "cut.vmap"
-        cut.write_bytes(self.place.map.read_bytes()[:50000])
-        changed = folder / "changed.vmap"
-        changed.write_bytes(self.place.map.read_bytes())
-        with sqlite3.connect(str(changed)) as connection:
-            cursor = connection.execute("UPDATE meta SET value = 'type: orb' WHERE key = 'feature_options'")
-            self.assertEqual(cursor.rowcount, 1)
-        bare = self.place.rig.parent / "bare.yaml"
-
-        def without_extrinsics(cameras):
-            del cameras["left"]["vehicle_from_camera"]
-
-        bare.write_text(rig_text(self.place.rig, without_extrinsics))
-        return (("missing", folder / "none.vmap", None, None, ("none.vmap: no such file",)),
-                ("cut", cut, None, None, ("cut.vmap: the map is truncated",)),
-                ("changed", changed, None, None, ("changed.vmap: the map is damaged",)),
-                ("bare", None, bare, None, ("bare.yaml", "vehicle_from_camera")),
-                ("option", None, None, {"no_such_option": 1}, ("no_such_option",)))
-
     def test_bad_input_is_one_error_and_nothing_is_written(self):
-        for name, place, rig, options, words in self.bad_inputs():
+        for name, place, rig, options, words in self.place.bad_inputs():
             extra = ()
             if options:
                 path = self.place.folder / "odd.yaml"
@@ -388,7 +366,7 @@ class LocalizationTest(unittest.TestCase):
         self.assertLess(self.pose_errors_m().max(), MAX_ERROR_M)
 
     def test_bad_input_does_not_load_is_told_and_the_manager_lives_on(self):
-        for name, place, rig, options, words in self.bad_inputs():
+        for name, place, rig, options, words in self.place.bad_inputs():
             rospy.set_param(f"/{name}/map", str(place or self.place.map))
             rospy.set_param(f"/{name}/rig", str(rig or self.place.rig))
             if options:
