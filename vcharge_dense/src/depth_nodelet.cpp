@@ -52,7 +52,8 @@ class DepthNodelet : public nodelet::Nodelet {
     readFieldsFromParameters(private_node, "source", &source_options);
 
     if (!lossless) {
-      worker_ = std::make_unique<NewestFirstWorker<RangeTask>>([this](const RangeTask& task) { sweep(task); });
+      worker_ =
+          std::make_unique<NewestFirstWorker<RangeTask>>([this](const RangeTask& task) { sweep(task); });
     }
     mapper_ = std::make_unique<RangeMapper>(rig_, options, [this](RangeTask task) {
       if (worker_) {

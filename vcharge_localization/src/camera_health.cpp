@@ -107,8 +107,8 @@ std::string CameraHealth::contradictionOf(size_t index) const {
     text << "hardly any of its features (" << std::lround(camera.matches) << " of "
          << std::lround(camera.features) << ") match the map: bumped, wrong intrinsics, or an unmapped side?";
   } else if (camera.inliers * others.matches < options_.min_agreement * camera.matches * others.inliers) {
-    text << "only " << std::lround(100.0 * camera.inliers / camera.matches) << " % of its matches fit the pose, "
-         << std::lround(100.0 * others.inliers / others.matches)
+    text << "only " << std::lround(100.0 * camera.inliers / camera.matches)
+         << " % of its matches fit the pose, " << std::lround(100.0 * others.inliers / others.matches)
          << " % of the other cameras': bumped, or wrong intrinsics?";
   }
   return text.str();

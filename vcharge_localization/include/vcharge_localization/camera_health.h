@@ -30,8 +30,8 @@ struct CameraHealthOptions {
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
-/// Says which cameras do not contribute, and why that may be. What fits a pose by chance differs from place to
-/// place and with the images' size, so a camera that contradicts the pose is told by comparing it with the
+/// Says which cameras do not contribute, and why that may be. What fits a pose by chance differs from place
+/// to place and with the images' size, so a camera that contradicts the pose is told by comparing it with the
 /// others. Not thread safe.
 class CameraHealth {
  public:
