@@ -1,4 +1,4 @@
-// The stages of a frame by four cameras in a map of 200,000 landmarks and some 2 million observations, and
+// The stages of a frame by four cameras in a map of 200,000 landmarks and 3.4 million observations, and
 // how long it takes until such a map is ready. Everything on as many threads as there are cores.
 
 #include <algorithm>
@@ -25,7 +25,7 @@ namespace {
 constexpr int kRounds = 68;  // circles of the vehicle, beside each other
 constexpr int kKeyframesPerRound = 60;
 constexpr int kLandmarksPerRound = 3000;
-constexpr int kNeighbours = 3;  // keyframes before and behind its own that see a landmark
+constexpr int kNeighbours = 5;  // keyframes before and behind its own that see a landmark
 constexpr double kRadius_m = 20.0, kSpacing_m = 100.0;
 constexpr double kPi = 3.14159265358979323846;
 
