@@ -19,7 +19,8 @@ from drive_fixture import run, tool  # noqa: E402
 PACKAGES = rospkg.RosPack()
 LAUNCH = pathlib.Path(PACKAGES.get_path("vcharge_launch"))
 CONFIG = pathlib.Path(PACKAGES.get_path("vcharge_config"))
-NODELET_PACKAGES = ("vcharge_ros", "vcharge_calibration", "vcharge_camera_driver", "vcharge_dense", "vcharge_mapping")
+NODELET_PACKAGES = ("vcharge_ros", "vcharge_calibration", "vcharge_camera_driver", "vcharge_dense", "vcharge_mapping",
+                    "vcharge_localization")
 
 
 def nodelet_types():
@@ -75,6 +76,19 @@ class LaunchFilesTest(unittest.TestCase):
 
     def test_arguments_reach_the_nodes(self):
         for path in self.launch_files:
+            if "map" in required_arguments(path) and "rig" in required_arguments(path):  # localizes a drive
+                config = load(path, rig="/rigs/rig.yaml", map="/maps/lot.vmap", bag="/drives/drive.bag",
+                              lossless_replay="true")
+                for name, value in (("/localization/rig", "/rigs/rig.yaml"), ("/localization/map", "/maps/lot.vmap"),
+                                    ("/localization/lossless_replay", True), ("/map_publisher/map", "/maps/lot.vmap"),
+                                    ("/drive_tf/rig", "/rigs/rig.yaml"), ("/use_sim_time", True)):
+                    self.assertEqual(config.params[name].value, value, path.name)
+                player = next(node for node in config.nodes if node.package == "rosbag")
+                self.assertEqual(player.args.split()[-1], "/drives/drive.bag", path.name)
+                live = load(path, rig="/rigs/rig.yaml", map="/maps/lot.vmap")
+                self.assertFalse([node for node in live.nodes if node.package == "rosbag"], path.name)
+                self.assertNotIn("/use_sim_time", live.params)
+                continue
             if "map" in required_arguments(path):  # shows what was saved, and replays nothing
                 config = load(path, map="/maps/lot.vmap")
                 self.assertEqual(config.params["/map_publisher/map"].value, "/maps/lot.vmap", path.name)
@@ -120,8 +134,8 @@ class LaunchFilesTest(unittest.TestCase):
 
     def test_options_of_the_nodelets_are_those_of_the_yaml(self):
         for options in sorted(CONFIG.glob("*.yaml")):
-            is_mapping = options.name.startswith("mapping")
-            nodelet, launch = ("mapping", "mapping") if is_mapping else ("depth", "drive_replay")
+            activity = options.stem if options.stem in ("mapping", "localization") else ""
+            nodelet, launch = (activity, activity) if activity else ("depth", "drive_replay")
             config = load(LAUNCH / f"{launch}.launch", options=str(options))
             expected = yaml.safe_load(options.read_text())
             found = {}
@@ -147,11 +161,12 @@ class LaunchFilesTest(unittest.TestCase):
         self.assertEqual(sorted(CONFIG.rglob("*.yaml")), sorted(rigs + options + scenarios + drivers),
                          "a YAML that nobody reads")
         self.assertTrue(rigs and options)
-        dense, mapping = tool("vcharge_dense", "compute_range_maps"), tool("vcharge_mapping", "build_map")
+        readers = {"mapping": [tool("vcharge_mapping", "build_map")],
+                   "localization": [tool("vcharge_localization", "localize_drive"), "--map", "/nowhere/drive.bag"]}
+        dense = [tool("vcharge_dense", "compute_range_maps")]
         for rig, option in [(rig, options[0]) for rig in rigs] + [(rigs[0], option) for option in options]:
-            program = mapping if option.name.startswith("mapping") else dense
-            # The bag is read last: an error about it says that rig and options were taken.
-            status, _, errors = run([program, "--bag", "/nowhere/drive.bag", "--rig", rig, "--options", option,
+            # Bag and map are read last: an error about them says that rig and options were taken.
+            status, _, errors = run([*readers.get(option.stem, dense), "--bag", "/nowhere/drive.bag", "--rig", rig, "--options", option,
                                      "--output", "/nowhere/output"])
             self.assertGreater(status, 0)
             self.assertEqual(len(errors), 1, errors)
@@ -161,7 +176,7 @@ class LaunchFilesTest(unittest.TestCase):
         cameras = yaml.safe_load((CONFIG / "rigs" / "golf_nominal.yaml").read_text())["cameras"]
         published = re.compile(rf"/camera/({'|'.join(cameras)})/image_raw|"
                                rf"/dense/({'|'.join(cameras)})/(points|range/(image|confidence|standard_deviation))|"
-                               r"/calibration/image|/mapping/(landmarks|trajectory|loop_edges)")
+                               r"/calibration/image|/mapping/(landmarks|trajectory|loop_edges)|/localization/(pose|sightings)")
 
         def topics(node):
             if isinstance(node, dict):

@@ -10,12 +10,17 @@ def positions(path):
     return rows[:, 0], rows[:, 1:4]
 
 
-def align(points, targets):
-    """Points moved rigidly to lie nearest to their targets (Umeyama 1991, without scale)."""
+def rigid_transform(points, targets):
+    """Rotation and shift that move points to lie nearest to their targets (Umeyama 1991, without scale)."""
     centre, target_centre = points.mean(axis=0), targets.mean(axis=0)
     u, _, v = np.linalg.svd((targets - target_centre).T @ (points - centre))
     rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
-    return (points - centre) @ rotation.T + target_centre
+    return rotation, target_centre - rotation @ centre
+
+
+def align(points, targets):
+    rotation, shift = rigid_transform(points, targets)
+    return points @ rotation.T + shift
 
 
 def errors_m(trajectory, truth):

@@ -5,8 +5,8 @@
 #include <nodelet/nodelet.h>
 #include <pluginlib/class_list_macros.hpp>
 
-#include "newest_first_worker.h"
 #include "vcharge_core/camera_rig.h"
+#include "vcharge_core/newest_first_worker.h"
 #include "vcharge_dense/range_mapper.h"
 #include "vcharge_ros/live_drive_source.h"
 #include "vcharge_ros/nodelet_support.h"
@@ -52,11 +52,13 @@ class DepthNodelet : public nodelet::Nodelet {
     readFieldsFromParameters(private_node, "source", &source_options);
 
     if (!lossless) {
-      worker_ = std::make_unique<NewestFirstWorker>([this](const RangeTask& task) { sweep(task); });
+      worker_ =
+          std::make_unique<NewestFirstWorker<RangeTask>>([this](const RangeTask& task) { sweep(task); });
     }
     mapper_ = std::make_unique<RangeMapper>(rig_, options, [this](RangeTask task) {
       if (worker_) {
-        worker_->push(std::move(task));
+        const size_t camera_index = task.camera_index;
+        worker_->push(camera_index, std::move(task));
       } else {
         sweep(task);
       }
@@ -138,7 +140,7 @@ class DepthNodelet : public nodelet::Nodelet {
   std::map<size_t, Output> outputs_;  // by camera
   std::map<size_t, uint64_t> reported_failures_;
   std::unique_ptr<RangeMapper> mapper_;
-  std::unique_ptr<NewestFirstWorker> worker_;
+  std::unique_ptr<NewestFirstWorker<RangeTask>> worker_;
   std::unique_ptr<LiveDriveSource> source_;
   std::vector<std::unique_ptr<NodeletDiagnostics>> diagnostics_;
 };

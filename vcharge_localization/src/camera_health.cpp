@@ -34,6 +34,7 @@ void CameraHealthOptions::validate() const {
   requireField(min_features >= 0, "min_features", "must not be negative", min_features);
   requireField(min_agreement >= 0.0 && min_agreement <= 1.0, "min_agreement", "must be in [0, 1]",
                min_agreement);
+  requireField(min_found >= 0.0 && min_found <= 1.0, "min_found", "must be in [0, 1]", min_found);
   requireField(memory_frames >= 1.0, "memory_frames", "must be 1 or more", memory_frames);
   requireField(frozen_after_frames >= 1, "frozen_after_frames", "must be 1 or more", frozen_after_frames);
 }
@@ -82,9 +83,35 @@ void CameraHealth::addFeatures(const RigFeatures& features) {
 
 void CameraHealth::addFix(const PoseFix& fix) {
   for (size_t i = 0; i < cameras_.size(); ++i) {
+    ++cameras_[i].fixes;
     average(fix.matches_of_camera[i], &cameras_[i].matches);
     average(fix.inliers_of_camera[i], &cameras_[i].inliers);
   }
+}
+
+std::string CameraHealth::contradictionOf(size_t index) const {
+  const Camera& camera = cameras_[index];
+  if (camera.fixes < options_.memory_frames) {
+    return "";
+  }
+  Camera others;
+  for (size_t i = 0; i < cameras_.size(); ++i) {
+    if (i != index) {
+      others.features += cameras_[i].features;
+      others.matches += cameras_[i].matches;
+      others.inliers += cameras_[i].inliers;
+    }
+  }
+  std::ostringstream text;
+  if (camera.matches * others.features < options_.min_found * camera.features * others.matches) {
+    text << "hardly any of its features (" << std::lround(camera.matches) << " of "
+         << std::lround(camera.features) << ") match the map: bumped, wrong intrinsics, or an unmapped side?";
+  } else if (camera.inliers * others.matches < options_.min_agreement * camera.matches * others.inliers) {
+    text << "only " << std::lround(100.0 * camera.inliers / camera.matches)
+         << " % of its matches fit the pose, " << std::lround(100.0 * others.inliers / others.matches)
+         << " % of the other cameras': bumped, or wrong intrinsics?";
+  }
+  return text.str();
 }
 
 std::vector<std::string> CameraHealth::warnings() const {
@@ -92,6 +119,7 @@ std::vector<std::string> CameraHealth::warnings() const {
   for (size_t i = 0; i < cameras_.size(); ++i) {
     const Camera& camera = cameras_[i];
     const std::string& name = rig_->cameras[i].name;
+    const std::string contradiction = contradictionOf(i);
     std::ostringstream text;
     if (camera.is_missing) {
       text << name << ": no image";
@@ -99,10 +127,8 @@ std::vector<std::string> CameraHealth::warnings() const {
       text << name << ": frozen, the same image again and again";
     } else if (camera.frames >= options_.memory_frames && camera.features < options_.min_features) {
       text << name << ": few features (" << std::lround(camera.features) << "): dark, blinded or covered?";
-    } else if (camera.frames >= options_.memory_frames && camera.matches >= 1.0 &&
-               camera.inliers < options_.min_agreement * camera.matches) {
-      text << name << ": only " << std::lround(100.0 * camera.inliers / camera.matches)
-           << " % of its matches fit the pose: bumped, or wrong intrinsics?";
+    } else if (!contradiction.empty()) {
+      text << name << ": " << contradiction;
     } else {
       continue;
     }

@@ -16,10 +16,10 @@ class CameraHealthTest : public ::testing::Test {
                     {cv::Mat(64, 64, CV_8UC1, cv::Scalar(gray_of_second)), nullptr}};
     return frame;
   }
-  void addFixes(int count, int inliers_of_second) {
+  void addFixes(int count, int inliers_of_second, int inliers_of_first = 90, int matches_of_second = 100) {
     PoseFix fix;
-    fix.matches_of_camera = {100, 100};
-    fix.inliers_of_camera = {90, inliers_of_second};
+    fix.matches_of_camera = {100, matches_of_second};
+    fix.inliers_of_camera = {inliers_of_first, inliers_of_second};
     for (int i = 0; i < count; ++i) {
       health_.addFix(fix);
     }
@@ -72,6 +72,35 @@ TEST_F(CameraHealthTest, ACameraThatContradictsTheOthersIsNamed) {
   addFixes(30, 5);
   ASSERT_EQ(health_.warnings().size(), 1u);
   EXPECT_NE(health_.warnings()[0].find("wrong intrinsics"), std::string::npos);
+}
+
+TEST_F(CameraHealthTest, CamerasThatAgreeAboutAsRarelyAsEachOtherHaveNoWarning) {
+  addFeatures(30, 500);
+  addFixes(30, 15, 18);
+  EXPECT_TRUE(health_.warnings().empty()) << health_.warnings()[0];
+}
+
+TEST_F(CameraHealthTest, ACameraWhoseLandmarksAreNotWhereItSeesThemIsNamed) {
+  addFeatures(30, 500);
+  addFixes(30, 0, 90, 1);
+  ASSERT_EQ(health_.warnings().size(), 1u);
+  EXPECT_EQ(health_.warnings()[0].find("left: hardly any of its features (1 of "), 0u)
+      << health_.warnings()[0];
+}
+
+TEST_F(CameraHealthTest, ACameraAloneContradictsNobody) {
+  PoseFix fix;
+  fix.matches_of_camera = {0, 100};
+  fix.inliers_of_camera = {0, 12};
+  RigFeatures features;
+  features.images.resize(2);
+  features.images[1].keypoints.resize(500);
+  for (int i = 0; i < 30; ++i) {
+    health_.addFeatures(features);
+    health_.addFix(fix);
+  }
+  ASSERT_EQ(health_.warnings().size(), 1u);
+  EXPECT_EQ(health_.warnings()[0].find("front: few features"), 0u) << health_.warnings()[0];
 }
 
 TEST_F(CameraHealthTest, AMissingImageIsNamed) {

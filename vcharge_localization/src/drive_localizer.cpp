@@ -61,6 +61,7 @@ DriveLocalizer::DriveLocalizer(std::shared_ptr<const SparseMap> map, std::shared
 
 void DriveLocalizer::seed(const PosePrior& pose) {
   filter_.reset(pose);
+  is_seed_ = true;
   candidate_.reset();
   frames_without_fix_ = 0;
 }
@@ -92,6 +93,9 @@ bool DriveLocalizer::isLost() const {
   if (!filter_.hasPose()) {
     return true;
   }
+  if (is_seed_) {
+    return false;  // however uncertain: the next frames look there
+  }
   const Eigen::Matrix<double, 6, 6> covariance = filter_.pose().covariance;
   return covariance.topLeftCorner<3, 3>().trace() > options_.lost_sigma_m * options_.lost_sigma_m ||
          covariance.bottomRightCorner<3, 3>().trace() > options_.lost_sigma_rad * options_.lost_sigma_rad;
@@ -101,6 +105,7 @@ void DriveLocalizer::takeFix(const PoseFix& fix, LocalizationResult* result) {
   result->status = LocalizationStatus::kLocalized;
   result->fix = fix;
   frames_without_fix_ = 0;
+  is_seed_ = false;
   candidate_.reset();
   last_fix_ = result->stamp;
 }
@@ -193,6 +198,7 @@ void DriveLocalizer::searchWholeMap(const LocalizationFrame& frame, const RigFea
 
 void DriveLocalizer::forget() {
   filter_.forget();
+  is_seed_ = false;
   candidate_.reset();
   last_fix_.reset();
   frames_without_fix_ = 0;
@@ -230,12 +236,19 @@ void DriveLocalizer::localize(const LocalizationFrame& frame, const RigFeatures&
     const bool is_stuck =
         frames_without_fix_ > 0 && frames_without_fix_ % options_.max_frames_without_fix == 0;
     search_whole_map = is_stuck || (frames_without_fix_ > 0 && candidate_);
+    if (is_seed_) {
+      result->status = LocalizationStatus::kLost;
+      result->message = "the images do not show the place that was told: " + result->message;
+      if (is_stuck) {
+        forget();
+      }
+    }
   }
   if (search_whole_map) {
     const StageTimer timer("whole map", result);
     searchWholeMap(frame, features, result);
   }
-  if (filter_.hasPose()) {
+  if (filter_.hasPose() && !is_seed_) {
     result->pose = filter_.pose();
   }
   result->since_fix_s =

@@ -156,6 +156,31 @@ TEST_F(DriveLocalizerTest, TakesASeedAndChecksIt) {
   EXPECT_LT(error_m_, 0.05);
 }
 
+TEST_F(DriveLocalizerTest, TakesASeedThatIsLessCertainThanALostPose) {
+  PosePrior prior;
+  prior.map_from_vehicle = truthAt(way_m_) * RigidTransform::planar(0.3, -0.2, 0.03);
+  prior.covariance.diagonal() << 0.25, 0.25, 0.25, 7e-4, 7e-4, 0.07;  // what rviz sends
+  localizer_.seed(prior);
+  const LocalizationResult result = drive(1);
+  EXPECT_EQ(result.status, LocalizationStatus::kLocalized);
+  EXPECT_FALSE(result.searched_whole_map);
+  EXPECT_LT(error_m_, 0.05);
+}
+
+TEST_F(DriveLocalizerTest, AWrongSeedIsNoPoseAndTheVehicleIsFoundElsewhere) {
+  PosePrior prior;
+  prior.map_from_vehicle = RigidTransform::planar(300.0, 0.0, 0.0);
+  prior.covariance.diagonal() << 0.25, 0.25, 0.25, 7e-4, 7e-4, 0.07;
+  localizer_.seed(prior);
+  const int max_frames = DriveLocalizerOptions().max_frames_without_fix + 1;
+  LocalizationResult result;
+  for (int i = 0; i < max_frames; ++i) {
+    result = drive(1);
+    EXPECT_TRUE(!result.pose || error_m_ < 0.05) << "frame " << i;
+  }
+  EXPECT_EQ(result.status, LocalizationStatus::kLocalized);
+}
+
 TEST_F(DriveLocalizerTest, AReplayThatStartsOverStartsFromNothing) {
   drive(10);
   num_frames_ = 0;

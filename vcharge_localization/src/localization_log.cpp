@@ -1,6 +1,7 @@
 #include "vcharge_localization/localization_log.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <iomanip>
 #include <sstream>
@@ -23,6 +24,13 @@ double latencyOf(const LocalizationResult& result) {
     sum_s += seconds;
   }
   return sum_s;
+}
+
+/// A warning without its numbers, which differ from frame to frame.
+std::string kindOf(std::string warning) {
+  const auto isDigit = [](unsigned char letter) { return std::isdigit(letter) != 0; };
+  warning.erase(std::remove_if(warning.begin(), warning.end(), isDigit), warning.end());
+  return warning;
 }
 
 }  // namespace
@@ -82,6 +90,11 @@ void LocalizationSummary::add(const LocalizationResult& result) {
   for (const auto& [stage, seconds] : result.stage_s) {
     stage_s_[stage].push_back(seconds);
   }
+  for (const std::string& warning : result.camera_warnings) {
+    Warning& known = warnings_[kindOf(warning)];
+    ++known.num_frames;
+    known.last_text = warning;
+  }
 }
 
 int64_t LocalizationSummary::numFrames() const {
@@ -103,6 +116,9 @@ std::string LocalizationSummary::text() const {
     text << "; " << stage << " " << 1e3 * quantile(seconds, 0.5) << " ms";
   }
   text << "\n";
+  for (const auto& [kind, warning] : warnings_) {
+    text << "warning in " << warning.num_frames << " frames: " << warning.last_text << "\n";
+  }
   return text.str();
 }
 

@@ -8,6 +8,7 @@
 #include <pluginlib/class_list_macros.hpp>
 
 #include "localization_messages.h"
+#include "vcharge_core/error.h"
 #include "vcharge_core/newest_first_worker.h"
 #include "vcharge_core/sparse_map_file.h"
 #include "vcharge_localization/drive_localizer.h"
@@ -45,8 +46,11 @@ class LocalizationNodelet : public nodelet::Nodelet {
   void start() {
     node_ = getNodeHandle();
     ros::NodeHandle& private_node = getPrivateNodeHandle();
-    rig_ = std::make_shared<const CameraRig>(
-        readCameraRig(requireStringParameter(private_node, "rig", "the path of a rig.yaml")));
+    const std::string rig_path = requireStringParameter(private_node, "rig", "the path of a rig.yaml");
+    rig_ = std::make_shared<const CameraRig>(readCameraRig(rig_path));
+    if (!rig_->hasExtrinsics()) {
+      throw InputError(rig_path + ": expected vehicle_from_camera of every camera");
+    }
     const std::string map_path = requireStringParameter(private_node, "map", "the path of a map (*.vmap)");
     private_node.param("map_frame", map_frame_, map_frame_);
     private_node.param("odom_frame", odom_frame_, odom_frame_);

@@ -1,4 +1,5 @@
 #include <chrono>
+#include <cmath>
 #include <iostream>
 #include <memory>
 #include <sstream>
@@ -47,6 +48,9 @@ DriveExperiment makeExperiment(const Arguments& arguments, const CameraRig& rig)
 
 void localizeDrive(const Arguments& arguments, const DriveLocalizerOptions& options) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
+  if (!rig->hasExtrinsics()) {
+    throw InputError(arguments.rig + ": expected vehicle_from_camera of every camera");
+  }
   const auto start = std::chrono::steady_clock::now();
   DriveLocalizer localizer(readSparseMap(arguments.map), rig, options);
   std::cout << "map ready after "
@@ -75,7 +79,9 @@ void localizeDrive(const Arguments& arguments, const DriveLocalizerOptions& opti
       hasher.addBytes(matrix.data(), sizeof(double) * 12);
     }
   });
-  BagDriveSource source(arguments.bag, rig, BagDriveSourceOptions());
+  BagDriveSourceOptions source_options;
+  source_options.max_image_gap_s = INFINITY;  // a camera that stops is borne, and told of
+  BagDriveSource source(arguments.bag, rig, source_options);
   {
     ProgressBar progress("localizing");
     source.run(&assembler, [&](double fraction) { progress.update(fraction); });

@@ -116,14 +116,14 @@ MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr
       VocabularyTree::parse(map_->contents().vocabulary, "map: vocabulary"));
   const size_t num_cameras = map_->rig().cameras.size();
   places_ = std::make_unique<PlaceIndex>(vocabulary, static_cast<int>(num_cameras));
-  for (size_t keyframe = 0; keyframe < map_->keyframes().size(); ++keyframe) {
-    std::vector<cv::Mat> by_camera;
+  std::vector<std::vector<cv::Mat>> of_places(map_->keyframes().size());
+  for (size_t keyframe = 0; keyframe < of_places.size(); ++keyframe) {
     for (size_t camera = 0; camera < num_cameras; ++camera) {
       const auto [begin, end] = map_->observationsOf(keyframe, camera);
-      by_camera.push_back(descriptors.rowRange(static_cast<int>(begin), static_cast<int>(end)));
+      of_places[keyframe].push_back(descriptors.rowRange(static_cast<int>(begin), static_cast<int>(end)));
     }
-    places_->add(by_camera);
   }
+  places_->addAll(of_places);
 }
 
 MapLocalizer::~MapLocalizer() = default;

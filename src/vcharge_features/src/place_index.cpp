@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 
+#include <tbb/parallel_for.h>
+
 #include "vcharge_core/error.h"
 
 namespace vcharge {
@@ -15,18 +17,27 @@ PlaceIndex::PlaceIndex(std::shared_ptr<const VocabularyTree> vocabulary, int num
 }
 
 int PlaceIndex::add(const std::vector<cv::Mat>& descriptors_by_camera) {
-  check(descriptors_by_camera.size() == static_cast<size_t>(num_cameras_),
-        "PlaceIndex: one matrix of descriptors per camera");
-  std::vector<BagOfWords> bags;
-  for (const cv::Mat& descriptors : descriptors_by_camera) {
-    bags.push_back(vocabulary_->bagOfWords(descriptors));
+  return addAll({descriptors_by_camera});
+}
+
+int PlaceIndex::addAll(const std::vector<std::vector<cv::Mat>>& descriptors_of_places) {
+  for (const std::vector<cv::Mat>& by_camera : descriptors_of_places) {
+    check(by_camera.size() == static_cast<size_t>(num_cameras_),
+          "PlaceIndex: one matrix of descriptors per camera");
   }
-  for (int camera = 0; camera < num_cameras_; ++camera) {
-    for (const WeightedWord& entry : bags[camera]) {
-      postings_[entry.word].push_back({num_places_ * num_cameras_ + camera, entry.weight});
+  const auto num_cameras = static_cast<size_t>(num_cameras_);
+  std::vector<BagOfWords> bags(descriptors_of_places.size() * num_cameras);
+  tbb::parallel_for(size_t{0}, bags.size(), [&](size_t i) {
+    bags[i] = vocabulary_->bagOfWords(descriptors_of_places[i / num_cameras][i % num_cameras]);
+  });
+  const int first_place = num_places_;
+  for (size_t i = 0; i < bags.size(); ++i) {
+    for (const WeightedWord& entry : bags[i]) {
+      postings_[entry.word].push_back({first_place * num_cameras_ + static_cast<int32_t>(i), entry.weight});
     }
   }
-  return num_places_++;
+  num_places_ += static_cast<int>(descriptors_of_places.size());
+  return first_place;
 }
 
 std::vector<PlaceMatch> PlaceIndex::query(const std::vector<cv::Mat>& descriptors_by_camera, int max_results,

@@ -211,6 +211,8 @@ TEST(VocabularyTreeErrorTest, BadInputIsNamed) {
   PlaceIndex index(tree, 2);
   EXPECT_THROW(index.add({bits}), std::logic_error);
   EXPECT_THAT([&] { index.add({bits, numbers}); }, throwing("descriptors"));
+  EXPECT_THROW(index.addAll({{bits, bits}, {bits}}), std::logic_error);
+  EXPECT_THAT([&] { index.addAll({{bits, bits}, {bits, numbers}}); }, throwing("descriptors"));
   EXPECT_EQ(index.numPlaces(), 0) << "nothing half added";
 }
 
@@ -283,6 +285,36 @@ TEST(PlaceIndexTest, ScoreAddsTheMostSimilarCamerasAndIsThatOfTheBags) {
     EXPECT_LT(match.place, 2);
   }
   EXPECT_TRUE(index.query({cv::Mat(), cv::Mat()}, 10).empty());
+}
+
+TEST(PlaceIndexTest, AddingAllAtOnceIsAddingOneByOne) {
+  std::vector<std::vector<cv::Mat>> places;
+  std::vector<cv::Mat> training;
+  for (int i = 0; i < 40; ++i) {
+    training.push_back(descriptorsOf(topicsOfImage(i), CV_8UC1, static_cast<unsigned>(i)));
+    places.push_back({training.back(), i % 3 == 0 ? cv::Mat() : training[static_cast<size_t>(i / 2)]});
+  }
+  const auto tree = std::make_shared<const VocabularyTree>(VocabularyTree::train(training));
+  PlaceIndex one_by_one(tree, 2), at_once(tree, 2);
+  for (const std::vector<cv::Mat>& place : places) {
+    one_by_one.add(place);
+  }
+  EXPECT_EQ(at_once.addAll({places.begin(), places.begin() + 15}), 0);
+  EXPECT_EQ(at_once.addAll({places.begin() + 15, places.end()}), 15);
+  EXPECT_EQ(at_once.addAll({}), 40);
+  EXPECT_EQ(at_once.numPlaces(), one_by_one.numPlaces());
+  for (int i = 0; i < 40; ++i) {
+    const std::vector<cv::Mat> seen = {training[static_cast<size_t>(39 - i)],
+                                       training[static_cast<size_t>(i)]};
+    const std::vector<PlaceMatch> expected = one_by_one.query(seen, 40), found = at_once.query(seen, 40);
+    ASSERT_FALSE(expected.empty());
+    ASSERT_EQ(found.size(), expected.size());
+    for (size_t k = 0; k < found.size(); ++k) {
+      EXPECT_EQ(found[k].place, expected[k].place);
+      EXPECT_EQ(found[k].score, expected[k].score);
+      EXPECT_EQ(found[k].cameras, expected[k].cameras);
+    }
+  }
 }
 
 }  // namespace

@@ -14,7 +14,8 @@ namespace vcharge {
 
 struct CameraHealthOptions {
   int min_features = 50;        ///< fewer on average: dark, blinded or covered
-  double min_agreement = 0.2;   ///< share of a camera's matches that fit the pose, on average
+  double min_agreement = 0.6;   ///< share of its matches that fit the pose, over that of all other cameras
+  double min_found = 0.1;       ///< share of its features that match the map, over that of all others
   double memory_frames = 12.0;  ///< of the averages
   int frozen_after_frames = 3;  ///< equal images in a row while the odometer moves
 
@@ -22,13 +23,16 @@ struct CameraHealthOptions {
   void visitFields(Visitor&& visit) {
     visit("min_features", min_features);
     visit("min_agreement", min_agreement);
+    visit("min_found", min_found);
     visit("memory_frames", memory_frames);
     visit("frozen_after_frames", frozen_after_frames);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
-/// Says which cameras do not contribute, and why that may be. Not thread safe.
+/// Says which cameras do not contribute, and why that may be. What fits a pose by chance differs from place
+/// to place and with the images' size, so a camera that contradicts the pose is told by comparing it with the
+/// others. Not thread safe.
 class CameraHealth {
  public:
   CameraHealth(std::shared_ptr<const CameraRig> rig, const CameraHealthOptions& options);
@@ -47,12 +51,13 @@ class CameraHealth {
   struct Camera {
     cv::Mat sample;  // a part of the last image's pixels
     int equal_images = 0;
-    int frames = 0;
+    int frames = 0, fixes = 0;
     bool is_missing = false;
     double features = 0.0;  // averages
     double matches = 0.0, inliers = 0.0;
   };
   void average(double value, double* mean) const;
+  std::string contradictionOf(size_t index) const;
 
   const std::shared_ptr<const CameraRig> rig_;
   const CameraHealthOptions options_;

@@ -76,7 +76,8 @@ class DriveLocalizer {
   /// The same where the frame's features are known; its images are not looked at.
   LocalizationResult process(const LocalizationFrame& frame, const RigFeatures& features);
 
-  /// Somebody says where the vehicle is now; the next frames tell whether that is right.
+  /// Somebody says where the vehicle is now; the next frames tell whether that is right, and until then there
+  /// is no pose. After max_frames_without_fix the whole map is searched.
   void seed(const PosePrior& pose);
 
   /// As if this were the first frame.
@@ -113,6 +114,7 @@ class DriveLocalizer {
   RigidTransform last_motion_;
   double last_period_s_ = 0.0;
   int frames_without_fix_ = 0;
+  bool is_seed_ = false;  // what the filter has was told, and no image confirmed it
   std::optional<Candidate> candidate_;
 };
 

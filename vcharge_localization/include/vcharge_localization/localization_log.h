@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -16,7 +18,7 @@ std::string localizationHeader(const CameraRig& rig);
 /// fix_distance, since_fix_s, whether the whole map was searched, and the time it took.
 std::string localizationRow(const LocalizationResult& result, const CameraRig& rig);
 
-/// Frames by status and what the fixes looked like, for people.
+/// Frames by status, what the fixes looked like, and what was wrong with the cameras, for people.
 class LocalizationSummary {
  public:
   void add(const LocalizationResult& result);
@@ -27,6 +29,11 @@ class LocalizationSummary {
   std::map<LocalizationStatus, int64_t> num_frames_;
   std::vector<double> inliers_, latencies_s_;
   std::map<std::string, std::vector<double>> stage_s_;
+  struct Warning {
+    int64_t num_frames = 0;
+    std::string last_text;
+  };
+  std::map<std::string, Warning> warnings_;  // by what is the same in every frame
 };
 
 }  // namespace vcharge

@@ -33,6 +33,10 @@ class PlaceIndex {
   /// descriptors of another kind than the vocabulary's.
   int add(const std::vector<cv::Mat>& descriptors_by_camera);
 
+  /// Adds many places as add() does one after the other, their descriptors quantized in parallel: the same
+  /// index on any number of threads. Returns the first one's number. Errors as add(), and then none is added.
+  int addAll(const std::vector<std::vector<cv::Mat>>& descriptors_of_places);
+
   /// At most `max_results` places with a score above 0, the best first, ties by number; only places below
   /// `end_place` count: a drive should not find what it saw just before. Errors as add().
   std::vector<PlaceMatch> query(const std::vector<cv::Mat>& descriptors_by_camera, int max_results,
