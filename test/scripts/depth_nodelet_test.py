@@ -18,7 +18,7 @@ from sensor_msgs.msg import Image, PointCloud2
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import CAMERAS, Drive  # noqa: E402
-from nodelet_fixture import TIMEOUT_S, project_mei, wait_for  # noqa: E402
+from nodelet_fixture import TIMEOUT_S, project_mei, wait_for, wait_until_gone  # noqa: E402
 
 
 def rays_without_distortion(width, height, p):
@@ -97,6 +97,7 @@ class DepthNodeletTest(unittest.TestCase):
 
     def tearDown(self):
         self.assertTrue(self.unload("/depth").success)
+        wait_until_gone("/manager", self.subscribers)
         self.assertNotIn("/depth", self.list().nodelets, "the manager outlives the nodelet")
 
     def publish(self, change=lambda topic, message: message):

@@ -22,7 +22,7 @@ from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 from tf2_msgs.msg import TFMessage
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from nodelet_fixture import TIMEOUT_S, project_mei, wait_for  # noqa: E402
+from nodelet_fixture import TIMEOUT_S, project_mei, wait_for, wait_until_gone  # noqa: E402
 
 NOW = rospy.Time(1342626147, 250000000)  # of the drive: far from the wall clock
 
@@ -107,6 +107,7 @@ class DriveTfNodeletTest(unittest.TestCase):
 
     def tearDown(self):
         self.assertTrue(self.unload("/drive_tf").success)
+        wait_until_gone("/manager", self.subscribers)
         self.diagnostics.clear()
 
     def settle(self):
@@ -159,6 +160,7 @@ class DriveTfNodeletTest(unittest.TestCase):
         frames = {camera["frame_id"]: camera["vehicle_from_camera"] for camera in self.cameras.values()}
         # Loaded again now that the manager knows the time for sure.
         self.assertTrue(self.unload("/drive_tf").success)
+        wait_until_gone("/manager", self.subscribers)
         self.statics.clear()
         self.assertTrue(self.load("/drive_tf", "vcharge_ros/drive_tf_nodelet", [], [], [], "").success)
         wait_for(lambda: all(f in self.statics and self.statics[f].header.stamp == NOW for f in frames), "/tf_static")

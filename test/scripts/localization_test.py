@@ -22,7 +22,7 @@ from visualization_msgs.msg import Marker
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import content_hash  # noqa: E402
 from localization_fixture import CAMERAS, Place, count, rig_text, warnings  # noqa: E402
-from nodelet_fixture import TIMEOUT_S, wait_for  # noqa: E402
+from nodelet_fixture import TIMEOUT_S, wait_for, wait_until_gone  # noqa: E402
 from vcharge_msgs.msg import LocalizationStatus  # noqa: E402
 
 MAX_ERROR_M = 0.1
@@ -184,6 +184,7 @@ class LocalizationTest(unittest.TestCase):
 
     def stop(self):
         self.assertTrue(self.unload("/localization").success)
+        wait_until_gone("/manager", self.subscribers[:-1])  # the manager itself goes on writing to /rosout
         self.assertEqual(self.list().nodelets, [], "the manager outlives the nodelet")
 
     def reach(self):

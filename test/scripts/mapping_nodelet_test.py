@@ -20,7 +20,7 @@ from visualization_msgs.msg import MarkerArray
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import Drive, content_hash, run, tool  # noqa: E402
 from mapping_fixture import numbers_of_map  # noqa: E402
-from nodelet_fixture import TIMEOUT_S, wait_for  # noqa: E402
+from nodelet_fixture import TIMEOUT_S, wait_for, wait_until_gone  # noqa: E402
 
 CAMERAS = ("front", "left", "rear", "right")
 WORK_TIMEOUT_S = 150.0
@@ -87,6 +87,7 @@ class MappingNodeletTest(unittest.TestCase):
 
     def tearDown(self):
         self.assertTrue(self.unload("/mapping").success)
+        wait_until_gone("/manager", self.subscribers)
         self.assertEqual(self.list().nodelets, [], "the manager outlives the nodelet")
 
     def values(self, of_map):

@@ -1,6 +1,8 @@
 """What the tests of nodelets share: waiting, and the camera model that results are compared with."""
 import time
 
+import rosgraph
+
 TIMEOUT_S = 60.0
 
 
@@ -12,6 +14,15 @@ def wait_for(condition, what, timeout_s=TIMEOUT_S):
             return value
         time.sleep(0.05)
     raise AssertionError(f"waited {timeout_s} s in vain for {what}")
+
+
+def wait_until_gone(manager, subscribers):
+    """After unloading: returns once none of the subscribers is connected to the manager. A nodelet that advertises the same
+    topics before that would not be heard: rospy takes the dying connection for the new one."""
+    uri = rosgraph.Master("/" + __name__).lookupNode(manager)
+    wait_for(lambda: all(connection.endpoint_id != uri
+                         for subscriber in subscribers for connection in list(subscriber.impl.connections)),
+             f"connections to {manager} to end")
 
 
 def project_mei(rays, p):
