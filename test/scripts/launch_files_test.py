@@ -93,6 +93,11 @@ class LaunchFilesTest(unittest.TestCase):
                 config = load(path, map="/maps/lot.vmap")
                 self.assertEqual(config.params["/map_publisher/map"].value, "/maps/lot.vmap", path.name)
                 continue
+            if "options" in required_arguments(path):  # of the car itself
+                config = load(path, rig="/rigs/rig.yaml")
+                self.assertEqual(config.params["/camera_driver/rig"].value, "/rigs/rig.yaml", path.name)
+                self.assertEqual(config.params["/camera_driver/options/can_interface"].value, "can0", path.name)
+                continue
             if "output" in required_arguments(path) and "rig" in required_arguments(path):  # maps a drive
                 config = load(path, rig="/rigs/rig.yaml", output="/maps/lot.vmap", bag="/drives/drive.bag",
                               lossless_replay="true")
@@ -109,11 +114,6 @@ class LaunchFilesTest(unittest.TestCase):
                 config = load(path, camera="front", output="/rigs/cameras.yaml")
                 self.assertEqual(config.params["/intrinsic_calibration/camera"].value, "front", path.name)
                 self.assertEqual(config.params["/intrinsic_calibration/output"].value, "/rigs/cameras.yaml", path.name)
-                continue
-            if "options" in required_arguments(path):  # of the car itself
-                config = load(path, rig="/rigs/rig.yaml")
-                self.assertEqual(config.params["/camera_driver/rig"].value, "/rigs/rig.yaml", path.name)
-                self.assertEqual(config.params["/camera_driver/options/can_interface"].value, "can0", path.name)
                 continue
             config = load(path, **({"folder": "/drives"} if "folder" in required_arguments(path) else
                                    {"bag": "/drives/drive.bag", "rig": "/drives/rig_truth.yaml"}))
