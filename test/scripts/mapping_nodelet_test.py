@@ -134,8 +134,11 @@ class MappingNodeletTest(unittest.TestCase):
     def test_makes_shows_and_saves_the_map_of_the_offline_tool(self):
         self.assertFalse(self.save().success, "there is no map yet")
         self.assertFalse(self.output.exists())
+        start = time.monotonic()
         self.finish_good_drive()
-        self.assertTrue(any(text.startswith("stage ") for text in self.told), "progress is told")
+        # Diagnostics come once a second: a map that is made sooner may tell no stage.
+        took_long = time.monotonic() - start > 1.0 + 3.0 + self.num_frames * len(self.publishers) * 0.002
+        self.assertTrue(any(text.startswith("stage ") for text in self.told) or not took_long, "progress is told")
         self.assertIn(content_hash(self.offline), self.message_of_map())
         answer = self.save()
         self.assertTrue(answer.success, answer.message)
