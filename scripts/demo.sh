@@ -75,7 +75,9 @@ if [ ! -e demo/map.vmap ]; then
 else
   echo "kept: demo/map.vmap"
 fi
-camera=$("$tools/vcharge_mapping/map_info" --map demo/map.vmap | awk 'found { print $1; exit } /^camera / { found = 1 }')
+# Awk reads to the end: one that leaves early breaks the pipe.
+camera=$("$tools/vcharge_mapping/map_info" --map demo/map.vmap |
+  awk '/^camera / && !found { found = 1; next } found == 1 { print $1; found = 2 }')
 "$tools/vcharge_mapping/draw_landmarks" --map demo/map.vmap --bag "$bag" --camera "$camera" --output demo/landmarks.png
 if [ -n "$truth" ]; then
   "$tools/vcharge_evaluation/evaluate_map" --map demo/map.vmap --truth "$truth/trajectory.tum" --report demo/map |
