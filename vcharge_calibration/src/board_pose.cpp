@@ -4,6 +4,8 @@
 
 #include <Eigen/SVD>
 
+#include "vcharge_core/cross_matrix.h"
+
 namespace vcharge {
 
 std::optional<RigidTransform> boardPoseFromRays(const std::vector<BoardRay>& rays) {
@@ -26,9 +28,7 @@ std::optional<RigidTransform> boardPoseFromRays(const std::vector<BoardRay>& ray
   Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
   for (const BoardRay& entry : rays) {
     const Eigen::Vector2d p = (entry.point_m - mean) / scale;
-    Eigen::Matrix3d cross;
-    cross << 0.0, -entry.ray.z(), entry.ray.y(), entry.ray.z(), 0.0, -entry.ray.x(), -entry.ray.y(),
-        entry.ray.x(), 0.0;
+    const Eigen::Matrix3d cross = crossMatrix(entry.ray);
     Eigen::Matrix<double, 3, 9> rows;
     rows << p.x() * cross, p.y() * cross, cross;
     normal += rows.transpose() * rows;

@@ -1,12 +1,11 @@
 #include "vcharge_localization/drive_localizer.h"
 
-#include <chrono>
 #include <cmath>
 #include <limits>
-#include <sstream>
 #include <utility>
 
 #include "vcharge_core/error.h"
+#include "vcharge_core/stage_timer.h"
 
 namespace vcharge {
 namespace {
@@ -14,22 +13,6 @@ namespace {
 double squared(double value) {
   return value * value;
 }
-
-class StageTimer {
- public:
-  StageTimer(const char* name, LocalizationResult* result) : name_(name), result_(result) {}
-  ~StageTimer() {
-    result_->stage_s[name_] +=
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  }
-  StageTimer(const StageTimer&) = delete;
-  StageTimer& operator=(const StageTimer&) = delete;
-
- private:
-  const char* name_;
-  LocalizationResult* result_;
-  const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 }  // namespace
 
@@ -208,7 +191,7 @@ LocalizationResult DriveLocalizer::process(const LocalizationFrame& frame) {
   LocalizationResult result;
   RigFeatures features;
   {
-    const StageTimer timer("features", &result);
+    const StageTimer timer("features", &result.stage_s);
     features = localizer_.extract(health_.withoutFrozen(frame));
   }
   localize(frame, features, &result);
@@ -231,7 +214,7 @@ void DriveLocalizer::localize(const LocalizationFrame& frame, const RigFeatures&
   if (search_whole_map) {
     filter_.forget();
   } else {
-    const StageTimer timer("guided search", result);
+    const StageTimer timer("guided search", &result->stage_s);
     track(features, result);
     const bool is_stuck =
         frames_without_fix_ > 0 && frames_without_fix_ % options_.max_frames_without_fix == 0;
@@ -245,7 +228,7 @@ void DriveLocalizer::localize(const LocalizationFrame& frame, const RigFeatures&
     }
   }
   if (search_whole_map) {
-    const StageTimer timer("whole map", result);
+    const StageTimer timer("whole map", &result->stage_s);
     searchWholeMap(frame, features, result);
   }
   if (filter_.hasPose() && !is_seed_) {

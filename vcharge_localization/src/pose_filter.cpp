@@ -5,16 +5,11 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
+#include "vcharge_core/cross_matrix.h"
 #include "vcharge_core/error.h"
 
 namespace vcharge {
 namespace {
-
-Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return matrix;
-}
 
 double squared(double value) {
   return value * value;

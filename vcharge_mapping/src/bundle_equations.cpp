@@ -8,18 +8,13 @@
 #include <Eigen/LU>
 
 #include "point_tasks.h"
+#include "vcharge_core/cross_matrix.h"
 
 namespace vcharge {
 namespace {
 
 /// Of an unknown that the errors do not depend on.
 constexpr double kMinInformation = 1e-6;
-
-Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return matrix;
-}
 
 }  // namespace
 

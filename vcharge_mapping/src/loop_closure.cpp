@@ -6,6 +6,7 @@
 #include <tbb/parallel_for.h>
 #include <Eigen/LU>
 
+#include "vcharge_core/cross_matrix.h"
 #include "vcharge_core/error.h"
 #include "vcharge_features/place_index.h"
 #include "vcharge_geometry/motion_estimation.h"
@@ -90,9 +91,7 @@ Eigen::Matrix<double, 6, 6> covarianceOfInverse(const RigidTransform& target_fro
                                                 const Eigen::Matrix<double, 6, 6>& covariance) {
   // source_from_target's translation is -R^T t: it moves by -R^T (dt - dphi x t), its rotation by -R^T dphi.
   const Eigen::Matrix3d turn = target_from_source.rotationMatrix().transpose();
-  const Eigen::Vector3d& t = target_from_source.translation();
-  Eigen::Matrix3d cross;
-  cross << 0.0, -t.z(), t.y(), t.z(), 0.0, -t.x(), -t.y(), t.x(), 0.0;
+  const Eigen::Matrix3d cross = crossMatrix(target_from_source.translation());
   Eigen::Matrix<double, 6, 6> jacobian = Eigen::Matrix<double, 6, 6>::Zero();
   jacobian.topLeftCorner<3, 3>() = -turn;
   jacobian.topRightCorner<3, 3>() = -turn * cross;

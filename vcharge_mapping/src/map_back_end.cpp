@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "map_assembly.h"
-#include "stage_timer.h"
 #include "vcharge_core/error.h"
+#include "vcharge_core/stage_timer.h"
 
 namespace vcharge {
 namespace {

@@ -7,8 +7,8 @@
 
 #include <tbb/parallel_for.h>
 
-#include "stage_timer.h"
 #include "vcharge_core/error.h"
+#include "vcharge_core/stage_timer.h"
 
 namespace vcharge {
 namespace {

@@ -8,6 +8,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 
+#include "vcharge_core/cross_matrix.h"
 #include "vcharge_core/error.h"
 
 namespace vcharge {
@@ -115,11 +116,9 @@ EpipolarJudgement judgeMatches(const Eigen::Matrix3Xd& first_rays, const Eigen::
 EpipolarJudgement judgeMatches(const Eigen::Matrix3Xd& first_rays, const Eigen::Matrix3Xd& second_rays,
                                double max_error_rad, const RigidTransform& second_from_first) {
   check(first_rays.cols() == second_rays.cols(), "judgeMatches: as many first rays as second ones");
-  const Eigen::Vector3d& t = second_from_first.translation();
-  Eigen::Matrix3d cross;
-  cross << 0.0, -t.z(), t.y(), t.z(), 0.0, -t.x(), -t.y(), t.x(), 0.0;
   const Eigen::VectorXd errors =
-      epipolarErrors(cross * second_from_first.rotationMatrix(), first_rays, second_rays);
+      epipolarErrors(crossMatrix(second_from_first.translation()) * second_from_first.rotationMatrix(),
+                     first_rays, second_rays);
   const std::vector<int> right = below(errors, std::sin(max_error_rad));
   return {static_cast<int>(right.size()), medianOf(errors, right)};
 }

@@ -5,13 +5,9 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-namespace vcharge {
+#include "vcharge_core/cross_matrix.h"
 
-inline Eigen::Matrix3d crossMatrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d matrix;
-  matrix << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return matrix;
-}
+namespace vcharge {
 
 /// Derivative of Exp(dphi) q by dphi at 0; q as x, y, z, w.
 inline Eigen::Matrix<double, 4, 3> quaternionByTurn(const double* q) {

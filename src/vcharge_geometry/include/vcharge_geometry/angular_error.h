@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include "vcharge_core/cross_matrix.h"
 #include "vcharge_geometry/point_match.h"
 #include "vcharge_geometry/ray_match.h"
 #include "vcharge_geometry/rotation_translation.h"
@@ -92,11 +93,6 @@ inline Eigen::Vector3d pointingError(const PointMatch& match, const RotationTran
   const double inverse_range = 1.0 / to_point.norm();
   const Eigen::Vector3d unit = inverse_range * to_point;
   if (jacobian != nullptr) {
-    const auto crossMatrix = [](const Eigen::Vector3d& v) {
-      Eigen::Matrix3d matrix;
-      matrix << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-      return matrix;
-    };
     const Eigen::Matrix3d direction_cross = crossMatrix(direction);
     const Eigen::Matrix3d by_point =
         inverse_range * direction_cross * (Eigen::Matrix3d::Identity() - unit * unit.transpose());
