@@ -96,6 +96,43 @@ class MappingFaultsTest(unittest.TestCase):
         with rosbag.Bag(str(bag)) as opened:
             return [(topic, message) for topic, message, _ in opened.read_messages()]
 
+    def check_bag(self, bag, rig=None):
+        """Exit status, the subjects of what did not pass with their grades, and the errors."""
+        status, output, errors = run([tool("vcharge_camera_driver", "check_bag"), "--bag", bag, "--rig",
+                                      rig or self.drive.rig])
+        found = dict(reversed(line.split("  ")[:2]) for line in output.splitlines() if not line.startswith("verdict"))
+        return status, {subject: grade for subject, grade in found.items() if grade != "PASS"}, errors
+
+    def test_check_bag_judges_a_recording_before_it_is_used(self):
+        self.assertEqual(self.check_bag(self.drive.bag), (0, {}, []))
+        bag = self.rewritten(lambda _, topic, message: [] if topic == "/odom" else [(topic, message)])
+        status, found, errors = self.check_bag(bag)
+        self.assertEqual((status, found), (1, {"odometry": "FAIL"}))
+        self.assertEqual(len(errors), 1)
+        self.assertIn(str(bag), errors[0])
+
+        def garbled(_, topic, message):
+            if topic == "/camera/rear/image_raw":
+                message = copy.copy(message)
+                message.data = message.data[:100]
+            return [(topic, message)]
+
+        status, found, _ = self.check_bag(self.rewritten(garbled))
+        self.assertEqual((status, found), (1, {"/camera/rear/image_raw": "FAIL", "rear": "FAIL"}))
+        swapped = {"front": "rear", "rear": "front"}
+        bag = self.rewritten(lambda _, topic, message: [
+            ("/".join(swapped.get(part, part) for part in topic.split("/")), message)])
+        status, found, _ = self.check_bag(bag)
+        self.assertEqual(status, 1)
+        self.assertEqual({found.get("front: direction"), found.get("rear: direction")}, {"FAIL"})
+        truncated = self.drive.folder / f"{self.name}_truncated.bag"
+        truncated.write_bytes(self.drive.bag.read_bytes()[:200000])
+        for path, word in ((truncated, "truncated"), (self.drive.folder / "none.bag", "no such file")):
+            status, _, errors = self.check_bag(path)
+            self.assertEqual((status, len(errors)), (1, 1), errors)
+            self.assertIn(str(path), errors[0])
+            self.assertIn(word, errors[0])
+
     def test_a_camera_that_pauses_for_long_is_named_with_its_frames(self):
         bag = self.rewritten(lambda time_s, topic, message: (
             [] if topic == "/camera/left/image_raw" and 3.0 < time_s < 6.5 else [(topic, message)]))

@@ -13,39 +13,20 @@
 #include <rosbag/view.h>
 
 #include "bag_access.h"
-#include "drive_item.h"
+#include "drive_message.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/options.h"
-#include "vcharge_ros/conversions.h"
-#include "vcharge_ros/image_conversions.h"
 #include "vcharge_ros/stamp_sorter.h"
 
 namespace vcharge {
 namespace {
 
 using internal::DriveItem;
+using internal::expectedType;
 using internal::openBag;
 using internal::readingBag;
-
-enum class Kind { kImage, kCompressedImage, kOdometry, kWheelTicks };
-
-struct TopicRole {
-  Kind kind;
-  size_t camera_index = 0;
-};
-
-const char* expectedType(Kind kind) {
-  switch (kind) {
-    case Kind::kImage:
-      return "sensor_msgs/Image";
-    case Kind::kCompressedImage:
-      return "sensor_msgs/CompressedImage";
-    case Kind::kOdometry:
-      return "nav_msgs/Odometry";
-    default:
-      return "vcharge_msgs/WheelTicks";
-  }
-}
+using Kind = internal::DriveTopicKind;
+using TopicRole = internal::DriveTopicRole;
 
 std::string seconds(double value) {
   std::ostringstream text;
@@ -77,8 +58,6 @@ class BagReading {
   bool hasTopic(const std::string& topic) const { return types_in_bag_.count(topic) > 0; }
   std::string listTopics() const;
   DriveItem convert(const rosbag::MessageInstance& message, const TopicRole& role, Timestamp* stamp) const;
-  template <class Message>
-  boost::shared_ptr<Message> instantiate(const rosbag::MessageInstance& message) const;
   void push(const std::string& topic, Timestamp stamp, DriveItem item);
   void deliver(Timestamp stamp, const DriveItem& item);
   void checkCameras(Timestamp stamp) const;
@@ -144,43 +123,14 @@ void BagReading::findTopics() {
   }
 }
 
-template <class Message>
-boost::shared_ptr<Message> BagReading::instantiate(const rosbag::MessageInstance& message) const {
-  const boost::shared_ptr<Message> result = readingBag(path_, [&] { return message.instantiate<Message>(); });
-  if (!result) {
-    throw InputError(path_ + ": " + message.getTopic() + ": expected the message definition of " +
-                     ros::message_traits::datatype<Message>() +
-                     " that this program was built with, got another");
-  }
-  return result;
-}
-
 DriveItem BagReading::convert(const rosbag::MessageInstance& message, const TopicRole& role,
                               Timestamp* stamp) const {
-  const std::string source = path_ + ": " + message.getTopic();
-  if (role.kind == Kind::kOdometry) {
-    const auto odometry = instantiate<nav_msgs::Odometry>(message);
-    *stamp = toTimestamp(odometry->header.stamp);
-    return fromMessage(*odometry, source, rig_.vehicle_frame);
+  DriveItem item = internal::convertDriveMessage(message, role, path_, rig_.vehicle_frame, stamp);
+  if (const auto* image = std::get_if<internal::CameraImage>(&item)) {
+    checkImageSize(rig_.cameras[image->camera_index], image->image.pixels.size(),
+                   path_ + ": " + message.getTopic());
   }
-  if (role.kind == Kind::kWheelTicks) {
-    const auto ticks = instantiate<vcharge_msgs::WheelTicks>(message);
-    *stamp = toTimestamp(ticks->header.stamp);
-    return fromMessage(*ticks, source);
-  }
-  Image image;
-  if (role.kind == Kind::kImage) {
-    const sensor_msgs::ImageConstPtr raw = instantiate<sensor_msgs::Image>(message);
-    *stamp = toTimestamp(raw->header.stamp);
-    image = toImage(raw, source);
-  } else {
-    const sensor_msgs::CompressedImageConstPtr compressed =
-        instantiate<sensor_msgs::CompressedImage>(message);
-    *stamp = toTimestamp(compressed->header.stamp);
-    image = toImage(compressed, source);
-  }
-  checkImageSize(rig_.cameras[role.camera_index], image.pixels.size(), source);
-  return internal::CameraImage{role.camera_index, image};
+  return item;
 }
 
 void BagReading::push(const std::string& topic, Timestamp stamp, DriveItem item) {

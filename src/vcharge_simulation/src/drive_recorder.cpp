@@ -37,11 +37,11 @@ DrivePlan planDriveOf(const DriveScenario& scenario) {
 // Leaves every step-th image.
 template <class T>
 void thin(int step, std::vector<T>* list) {
-  size_t kept = 0;
+  std::vector<T> kept;
   for (size_t i = 0; i < list->size(); i += static_cast<size_t>(step)) {
-    (*list)[kept++] = std::move((*list)[i]);
+    kept.push_back(std::move((*list)[i]));
   }
-  list->resize(kept);
+  *list = std::move(kept);
 }
 
 // Faults that change what is rendered cannot come from images that were rendered without them.

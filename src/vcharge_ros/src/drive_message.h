@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+
+#include <rosbag/view.h>
+
+#include "drive_item.h"
+#include "vcharge_core/timestamp.h"
+
+namespace vcharge::internal {
+
+enum class DriveTopicKind { kImage, kCompressedImage, kOdometry, kWheelTicks };
+
+/// What a topic of a drive carries.
+struct DriveTopicRole {
+  DriveTopicKind kind;
+  size_t camera_index = 0;
+};
+
+/// "nav_msgs/Odometry"
+const char* expectedType(DriveTopicKind kind);
+
+/// The content of a bag's message and its stamp, whatever size an image has. InputError naming the bag and the
+/// topic for what cannot be understood.
+DriveItem convertDriveMessage(const rosbag::MessageInstance& message, const DriveTopicRole& role,
+                              const std::string& bag_path, const std::string& vehicle_frame,
+                              Timestamp* stamp);
+
+}  // namespace vcharge::internal
