@@ -12,13 +12,11 @@ import rospy
 import rostest
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
-from nodelet.srv import NodeletList, NodeletLoad, NodeletUnload
-from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Image, PointCloud2
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import CAMERAS, Drive  # noqa: E402
-from nodelet_fixture import TIMEOUT_S, project_mei, wait_for, wait_until_gone  # noqa: E402
+from nodelet_fixture import drive_publishers, manager_services, project_mei, reach, wait_for, wait_until_gone  # noqa: E402
 
 
 def rays_without_distortion(width, height, p):
@@ -54,19 +52,12 @@ class DepthNodeletTest(unittest.TestCase):
             for camera in CAMERAS for kind in ("image", "confidence", "standard_deviation")]
         cls.subscribers.append(rospy.Subscriber("/dense/left/points", PointCloud2, cls.clouds.append, queue_size=100))
         cls.subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, cls.keep_diagnostics))
-        cls.publishers = {"/odom": rospy.Publisher("/odom", Odometry, queue_size=1000)}
-        for camera in CAMERAS:
-            topic = f"/camera/{camera}/image_raw"
-            cls.publishers[topic] = rospy.Publisher(topic, Image, queue_size=1000)
+        cls.publishers = drive_publishers(CAMERAS)
 
         rospy.set_param("/depth/rig", str(cls.drive.rig))
         rospy.set_param("/depth/lossless_replay", True)
         rospy.set_param("/drive_tf/rig", str(cls.drive.rig))
-        for service in ("load_nodelet", "unload_nodelet", "list"):
-            rospy.wait_for_service(f"/manager/{service}", TIMEOUT_S)
-        cls.load = rospy.ServiceProxy("/manager/load_nodelet", NodeletLoad)
-        cls.unload = rospy.ServiceProxy("/manager/unload_nodelet", NodeletUnload)
-        cls.list = rospy.ServiceProxy("/manager/list", NodeletList)
+        cls.load, cls.unload, cls.list = manager_services()
 
     @classmethod
     def tearDownClass(cls):
@@ -81,19 +72,10 @@ class DepthNodeletTest(unittest.TestCase):
     def setUp(self):
         self.assertTrue(self.load("/depth", "vcharge_dense/depth_nodelet", [], [], [], "").success)
         self.reached.clear()
-        wait_for(self.reach, "the nodelet to hear all topics")
+        reach(self.publishers, lambda: self.reached)
         for kinds in self.received.values():
             kinds.clear()
         self.told.clear()
-
-    def reach(self):
-        """Publishes what the nodelet refuses (no stamp) until it tells so of every topic: a connection alone may be that
-        of a nodelet that is gone."""
-        for topic, publisher in self.publishers.items():
-            if topic not in self.reached:
-                publisher.publish(publisher.data_class())
-        time.sleep(0.3)
-        return self.reached >= set(self.publishers)
 
     def tearDown(self):
         self.assertTrue(self.unload("/depth").success)

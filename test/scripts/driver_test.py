@@ -17,14 +17,13 @@ import rostest
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
-from nodelet.srv import NodeletLoad, NodeletUnload
 from roslib.packages import find_node
 from sensor_msgs.msg import CameraInfo, Image
 from tf2_msgs.msg import TFMessage
 from vcharge_msgs.msg import WheelTicks
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from nodelet_fixture import TIMEOUT_S, wait_for  # noqa: E402
+from nodelet_fixture import manager_services, wait_for  # noqa: E402
 
 WIDTH, HEIGHT = 320, 200
 CAMERAS = ("front", "left", "rear", "right")
@@ -53,10 +52,7 @@ class DriverTest(unittest.TestCase):
         environment = dict(os.environ, LD_PRELOAD="libvcharge_v4l2_emulator.so", VCHARGE_EMULATED_CAMERAS=str(cls.folder))
         cls.manager = subprocess.Popen([find_node("nodelet", "nodelet")[0], "manager", "__name:=manager",
                                         "_num_worker_threads:=4"], env=environment)
-        for service in ("load_nodelet", "unload_nodelet"):
-            rospy.wait_for_service(f"/manager/{service}", TIMEOUT_S)
-        cls.load_service = rospy.ServiceProxy("/manager/load_nodelet", NodeletLoad)
-        cls.unload_service = rospy.ServiceProxy("/manager/unload_nodelet", NodeletUnload)
+        cls.load_service, cls.unload_service, _ = manager_services()
         cls.images = {camera: {} for camera in CAMERAS}  # by stamp: pulse
         cls.infos = {camera: {} for camera in CAMERAS}
         cls.odometry, cls.transforms, cls.statics, cls.diagnostics = [], [], {}, {}

@@ -12,8 +12,6 @@ import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from nav_msgs.msg import Odometry
-from nodelet.srv import NodeletList, NodeletLoad, NodeletUnload
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import Image
 from tf2_msgs.msg import TFMessage
@@ -22,7 +20,7 @@ from visualization_msgs.msg import Marker
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import content_hash  # noqa: E402
 from localization_fixture import CAMERAS, Place, count, rig_text, warnings  # noqa: E402
-from nodelet_fixture import TIMEOUT_S, wait_for, wait_until_gone  # noqa: E402
+from nodelet_fixture import drive_publishers, manager_services, reach, wait_for, wait_until_gone  # noqa: E402
 from vcharge_msgs.msg import LocalizationStatus  # noqa: E402
 
 MAX_ERROR_M = 0.1
@@ -59,16 +57,9 @@ class LocalizationTest(unittest.TestCase):
             ("/localization/sightings", Marker), ("/tf", TFMessage))]
         cls.subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, cls.keep_diagnostics))
         cls.subscribers.append(rospy.Subscriber("/rosout", Log, lambda m: cls.logged.append(m.msg), queue_size=100))
-        cls.publishers = {"/odom": rospy.Publisher("/odom", Odometry, queue_size=10000)}
-        for camera in CAMERAS:
-            topic = f"/camera/{camera}/image_raw"
-            cls.publishers[topic] = rospy.Publisher(topic, Image, queue_size=10000)
+        cls.publishers = drive_publishers(CAMERAS)
         cls.initial_pose = rospy.Publisher("/initialpose", PoseWithCovarianceStamped, queue_size=1)
-        for service in ("load_nodelet", "unload_nodelet", "list"):
-            rospy.wait_for_service(f"/manager/{service}", TIMEOUT_S)
-        cls.load = rospy.ServiceProxy("/manager/load_nodelet", NodeletLoad)
-        cls.unload = rospy.ServiceProxy("/manager/unload_nodelet", NodeletUnload)
-        cls.list = rospy.ServiceProxy("/manager/list", NodeletList)
+        cls.load, cls.unload, cls.list = manager_services()
 
     @classmethod
     def tearDownClass(cls):
@@ -177,7 +168,7 @@ class LocalizationTest(unittest.TestCase):
         self.assertTrue(self.load("/localization", NODELET, [], [], [], "").success)
         self.addCleanup(self.stop)
         self.diagnostics.clear()
-        wait_for(self.reach, "the nodelet to hear all topics")
+        reach(self.publishers, self.heard)
         self.told.clear()
         for messages in self.received.values():
             messages.clear()
@@ -187,15 +178,10 @@ class LocalizationTest(unittest.TestCase):
         wait_until_gone("/manager", self.subscribers[:-1])  # the manager itself goes on writing to /rosout
         self.assertEqual(self.list().nodelets, [], "the manager outlives the nodelet")
 
-    def reach(self):
-        """Publishes what the nodelet refuses (no stamp) until it tells so of every topic."""
-        heard = {value.key for status in list(self.diagnostics.values()) for value in status.values
-                 if value.key in self.publishers and ", 0 bad" not in value.value}
-        for topic, publisher in self.publishers.items():
-            if topic not in heard:
-                publisher.publish(publisher.data_class())
-        time.sleep(0.2)
-        return heard >= set(self.publishers)
+    def heard(self):
+        """Topics of which the nodelet says that something bad came."""
+        return {value.key for status in list(self.diagnostics.values()) for value in status.values
+                if ", 0 bad" not in value.value}
 
     def publish(self, change=lambda topic, message: message, pause_s=0.001):
         for topic, message in self.messages:

@@ -13,14 +13,13 @@ import unittest
 import rospy
 import rostest
 from nav_msgs.msg import Path
-from nodelet.srv import NodeletList, NodeletLoad, NodeletUnload
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import files_below, run, tool  # noqa: E402
-from nodelet_fixture import TIMEOUT_S, wait_for  # noqa: E402
+from nodelet_fixture import TIMEOUT_S, manager_services, wait_for  # noqa: E402
 
 NUM_KEYFRAMES = 24
 RADIUS_M = 20.0  # of the circle that the analytic map's vehicle drives on, to the left
@@ -43,11 +42,7 @@ class MapTest(unittest.TestCase):
         connection = sqlite3.connect(str(cls.map))
         cls.landmarks = connection.execute("SELECT x_m, y_m, z_m, sigma_m FROM landmark ORDER BY id").fetchall()
         connection.close()
-        for service in ("load_nodelet", "unload_nodelet", "list"):
-            rospy.wait_for_service(f"/manager/{service}", TIMEOUT_S)
-        cls.load = rospy.ServiceProxy("/manager/load_nodelet", NodeletLoad)
-        cls.unload = rospy.ServiceProxy("/manager/unload_nodelet", NodeletUnload)
-        cls.list = rospy.ServiceProxy("/manager/list", NodeletList)
+        cls.load, cls.unload, cls.list = manager_services()
         cls.logged = []
         cls.log = rospy.Subscriber("/rosout", Log, lambda m: cls.logged.append(m.msg), queue_size=100)
 

@@ -10,17 +10,16 @@ import numpy as np
 import rospy
 import rostest
 from diagnostic_msgs.msg import DiagnosticArray
-from nav_msgs.msg import Odometry, Path
-from nodelet.srv import NodeletList, NodeletLoad, NodeletUnload
+from nav_msgs.msg import Path
 from sensor_msgs import point_cloud2
-from sensor_msgs.msg import Image, PointCloud2
+from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import Drive, content_hash, run, tool  # noqa: E402
 from mapping_fixture import numbers_of_map  # noqa: E402
-from nodelet_fixture import TIMEOUT_S, wait_for, wait_until_gone  # noqa: E402
+from nodelet_fixture import TIMEOUT_S, drive_publishers, manager_services, reach, wait_for, wait_until_gone  # noqa: E402
 
 CAMERAS = ("front", "left", "rear", "right")
 WORK_TIMEOUT_S = 150.0
@@ -50,15 +49,8 @@ class MappingNodeletTest(unittest.TestCase):
         cls.subscribers = [rospy.Subscriber(topic, kind, keep(topic), queue_size=1000) for topic, kind in (
             ("/mapping/landmarks", PointCloud2), ("/mapping/trajectory", Path), ("/mapping/loop_edges", MarkerArray))]
         cls.subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, cls.keep_diagnostics))
-        cls.publishers = {"/odom": rospy.Publisher("/odom", Odometry, queue_size=10000)}
-        for camera in CAMERAS:
-            topic = f"/camera/{camera}/image_raw"
-            cls.publishers[topic] = rospy.Publisher(topic, Image, queue_size=10000)
-        for service in ("load_nodelet", "unload_nodelet", "list"):
-            rospy.wait_for_service(f"/manager/{service}", TIMEOUT_S)
-        cls.load = rospy.ServiceProxy("/manager/load_nodelet", NodeletLoad)
-        cls.unload = rospy.ServiceProxy("/manager/unload_nodelet", NodeletUnload)
-        cls.list = rospy.ServiceProxy("/manager/list", NodeletList)
+        cls.publishers = drive_publishers(CAMERAS)
+        cls.load, cls.unload, cls.list = manager_services()
 
     @classmethod
     def tearDownClass(cls):
@@ -80,7 +72,8 @@ class MappingNodeletTest(unittest.TestCase):
         self.save = rospy.ServiceProxy("/mapping/save", Trigger)
         self.finish.wait_for_service(TIMEOUT_S)
         self.status.clear()
-        wait_for(self.reach, "the nodelet to hear all topics")
+        reach(self.publishers,
+              lambda: {key for key, value in self.values(False).items() if ", 0 bad" not in value})
         for kind in self.received.values():
             kind.clear()
         self.told.clear()
@@ -96,15 +89,6 @@ class MappingNodeletTest(unittest.TestCase):
             if ("mapping/map" in name) == of_map:
                 return {value.key: value.value for value in status.values}
         return {}
-
-    def reach(self):
-        """Publishes what the nodelet refuses (no stamp) until it tells so of every topic."""
-        heard = {key for key, value in self.values(False).items() if key in self.publishers and ", 0 bad" not in value}
-        for topic, publisher in self.publishers.items():
-            if topic not in heard:
-                publisher.publish(publisher.data_class())
-        time.sleep(0.3)
-        return heard >= set(self.publishers)
 
     def publish(self, change=lambda topic, message: message):
         for topic, message in self.messages:

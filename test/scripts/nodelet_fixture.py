@@ -2,6 +2,10 @@
 import time
 
 import rosgraph
+import rospy
+from nav_msgs.msg import Odometry
+from nodelet.srv import NodeletList, NodeletLoad, NodeletUnload
+from sensor_msgs.msg import Image
 
 TIMEOUT_S = 60.0
 
@@ -14,6 +18,35 @@ def wait_for(condition, what, timeout_s=TIMEOUT_S):
             return value
         time.sleep(0.05)
     raise AssertionError(f"waited {timeout_s} s in vain for {what}")
+
+
+def manager_services(manager="/manager"):
+    """The manager's services to load and unload a nodelet and to list them, once they are there."""
+    services = (("load_nodelet", NodeletLoad), ("unload_nodelet", NodeletUnload), ("list", NodeletList))
+    for name, _ in services:
+        rospy.wait_for_service(f"{manager}/{name}", TIMEOUT_S)
+    return [rospy.ServiceProxy(f"{manager}/{name}", kind) for name, kind in services]
+
+
+def drive_publishers(cameras):
+    """Publishers of a drive's odometry and images, by topic."""
+    publishers = {"/odom": rospy.Publisher("/odom", Odometry, queue_size=10000)}
+    for camera in cameras:
+        topic = f"/camera/{camera}/image_raw"
+        publishers[topic] = rospy.Publisher(topic, Image, queue_size=10000)
+    return publishers
+
+
+def reach(publishers, heard):
+    """Publishes what a nodelet refuses (no stamp) until it tells so of every topic: a connection alone may be that of a
+    nodelet that is gone. `heard()` returns the topics of which it has told."""
+    def all_heard():
+        for topic in set(publishers) - set(heard()):
+            publishers[topic].publish(publishers[topic].data_class())
+        time.sleep(0.3)
+        return set(heard()) >= set(publishers)
+
+    wait_for(all_heard, "the nodelet to hear all topics")
 
 
 def wait_until_gone(manager, subscribers):
