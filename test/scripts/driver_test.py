@@ -11,6 +11,7 @@ import unittest
 
 import cv2
 import numpy as np
+import rosbag
 import rospkg
 import rospy
 import rostest
@@ -209,6 +210,42 @@ class DriverTest(unittest.TestCase):
         self.assertEqual(steps, {1.0})
         first = cv2.imread(str(self.folder / "images" / "rear" / f"{10**18 + 5 * 10**8}.png"), 0)
         self.assertTrue(any(message.data == first.tobytes() for message in self.images["rear"].values()))
+
+    def write_bag(self, seconds):
+        """A drive at 2 m/s: images at RATE_HZ and, at the same instants and between them, wheel ticks and odometry."""
+        path = self.folder / "drive.bag"
+        with rosbag.Bag(str(path), "w") as bag:
+            for i in range(int(seconds * 50)):
+                stamp = rospy.Time(10**9, 0) + rospy.Duration(0, i * 2 * 10**7)
+                ticks = WheelTicks(metres_per_tick=0.01, left_ticks=4 * i, right_ticks=4 * i)
+                odometry = Odometry(child_frame_id="base_link")
+                odometry.pose.pose.orientation.w = 1.0
+                messages = [("/wheel_ticks", ticks), ("/odom", odometry)]
+                if i % int(50 / RATE_HZ) == 0:
+                    messages += [(f"/camera/{camera}/image_raw", Image(
+                        height=HEIGHT, width=WIDTH, step=WIDTH, encoding="mono8",
+                        data=bytes([i % 256]) * (WIDTH * HEIGHT))) for camera in CAMERAS]
+                for topic, message in messages:
+                    message.header.stamp = stamp
+                    bag.write(topic, message, stamp)
+        return path
+
+    def test_a_bag_comes_in_real_time_and_its_stamps_may_be_shifted(self):
+        bag, offset_s, count = self.write_bag(4.0), -0.007, 30
+        began = rospy.Time.now()
+        self.assertTrue(self.load(source="bag", bag=str(bag), stamp_offset_s=offset_s))
+        wait_for(lambda: len(self.groups()) >= count, "groups")
+        stamps = self.groups()
+        self.assertGreater(stamps[0], began)
+        self.assertGreater(rospy.Time.now() - began, rospy.Duration((count - 1) / RATE_HZ), "in real time")
+        self.assertEqual({round((b - a).to_sec() * RATE_HZ, 3) for a, b in zip(stamps, stamps[1:])}, {1.0})
+        gray = [self.images["left"][stamp].data[0] for stamp in stamps]
+        self.assertEqual(gray, list(range(gray[0], gray[0] + 5 * len(gray), 5)))
+        # The wheels' stamps are not shifted: each image lies beside a tick of its instant, where odometry is published too.
+        told = {message.header.stamp for message in self.odometry}
+        beside = [stamp for stamp in stamps[5:-5] if stamp - rospy.Duration(offset_s) in told]
+        self.assertGreater(len(beside), 15)
+        self.assertTrue(told.issuperset(stamps[5:-5]), "odometry at the images' own stamps")
 
 
 if __name__ == "__main__":
