@@ -1,7 +1,7 @@
 #include "coarse_pass.h"
 
 #include <algorithm>
-#include <cmath>
+#include <optional>
 #include <utility>
 
 #include <tbb/parallel_for.h>
@@ -52,11 +52,6 @@ MeiCamera halved(const MeiCamera& camera) {
                    0.5 * camera.v0() - 0.25);
 }
 
-bool isSure(const SurfaceEstimate& coarse, int x, int y) {
-  const float score = coarse.score.at<float>(y, x);
-  return score >= kSureScore && score - coarse.second_score.at<float>(y, x) >= kSureLead;
-}
-
 /// Slots of the planes that are named often enough, widened by the margin; a gap where some are left out.
 std::vector<int> slotsOf(const std::vector<int>& counts) {
   const int num_planes = static_cast<int>(counts.size());
@@ -104,7 +99,7 @@ SurfaceEstimate CoarsePass::sweepChosenPlanes(const SweepInput& fine_input, cons
   const std::vector<cv::Rect> tiles =
       makeTiles(fine_->validMask().size(), fine_->options().window_px, TileSize::kSmall);
   const std::vector<TilePlanes> choice = choosePlanes(coarse, tiles);
-  SurfaceEstimate estimate = sweepPlanes(fine_input, fine_->planes(), tiles, choice);
+  SurfaceEstimate estimate = fine_->sweepPlanes(fine_input, tiles, choice);
   addSecondPeaks(coarse, tiles, choice, &estimate);
   return estimate;
 }
@@ -112,15 +107,17 @@ SurfaceEstimate CoarsePass::sweepChosenPlanes(const SweepInput& fine_input, cons
 SurfaceEstimate CoarsePass::sweep(const SweepInput& fine_input, const cv::Mat& reference_pixels,
                                   const std::vector<SweepImage>& neighbours) const {
   SweepInput input = level_->makeInput(halved(reference_pixels));
+  std::vector<std::optional<PackedImage>> images(neighbours.size());
+  tbb::parallel_for(size_t{0}, neighbours.size(),
+                    [&](size_t n) { images[n].emplace(halved(neighbours[n].pixels), level_->validMask()); });
   for (size_t n = 0; n < neighbours.size(); ++n) {
     const SweepNeighbour& from = fine_input.neighbours[n];
-    input.neighbours.push_back({PackedImage(halved(neighbours[n].pixels), level_->validMask()),
-                                from.neighbour_from_reference, from.translation_m, from.after,
-                                from.rotation_variance_left, from.translation_variance_left});
+    input.neighbours.push_back({std::move(*images[n]), from.neighbour_from_reference, from.translation_m,
+                                from.after, from.rotation_variance_left, from.translation_variance_left});
   }
   const std::vector<cv::Rect> tiles =
       makeTiles(level_->validMask().size(), level_->options().window_px, TileSize::kLarge);
-  return sweepPlanes(input, level_->planes(), tiles, {});
+  return level_->sweepPlanes(input, tiles, {});
 }
 
 TilePlanes CoarsePass::choosePlanes(const SurfaceEstimate& coarse, const cv::Rect& tile) const {
@@ -129,27 +126,33 @@ TilePlanes CoarsePass::choosePlanes(const SurfaceEstimate& coarse, const cv::Rec
   for (const Hypotheses& family : planes) {
     counts.emplace_back(family.offsets.size(), 0);
   }
+  std::vector<int> sure;  // columns of a row
   const cv::Rect around(tile.x / 2 - kReach_px, tile.y / 2 - kReach_px, tile.width / 2 + 2 * kReach_px,
                         tile.height / 2 + 2 * kReach_px);
   const cv::Rect region = around & cv::Rect(cv::Point(), coarse.score.size());
   int num_textured = 0, num_sure = 0;
   for (int y = region.y; y < region.br().y; ++y) {
+    const auto* plane = coarse.plane.ptr<int>(y);
+    const auto* score = coarse.score.ptr<float>(y);
+    const auto* second_score = coarse.second_score.ptr<float>(y);
+    const auto* inverse_range = coarse.inverse_range.ptr<float>(y);
+    sure.clear();
     for (int x = region.x; x < region.br().x; ++x) {
-      if (coarse.plane.at<int>(y, x) < 0) {
-        continue;
+      num_textured += plane[x] >= 0 ? 1 : 0;
+      if (plane[x] >= 0 && score[x] >= kSureScore && score[x] - second_score[x] >= kSureLead) {
+        sure.push_back(x);
       }
-      ++num_textured;
-      if (!isSure(coarse, x, y)) {
-        continue;
-      }
-      ++num_sure;
-      for (size_t f = 0; f < planes.size(); ++f) {
-        const std::vector<float>& offsets = planes[f].offsets;
-        const float inverse_distance =
-            coarse.inverse_range.at<float>(y, x) / planes[f].weight.at<float>(2 * y, 2 * x);
-        const float index = (inverse_distance - offsets.front()) / (offsets[1] - offsets[0]);
-        if (index > -0.5f && index < static_cast<float>(offsets.size()) - 0.5f) {  // false for NaN
-          ++counts[f][static_cast<size_t>(std::lround(index))];
+    }
+    num_sure += static_cast<int>(sure.size());
+    for (size_t f = 0; f < planes.size(); ++f) {
+      const std::vector<float>& offsets = planes[f].offsets;
+      const auto* weight = planes[f].weight.ptr<float>(2 * y);
+      const float per_step = 1.0f / (offsets[1] - offsets[0]);
+      const auto end = static_cast<float>(offsets.size());
+      for (const int x : sure) {
+        const float index = (inverse_range[x] / weight[2 * x] - offsets.front()) * per_step + 0.5f;
+        if (index > 0.0f && index < end) {  // false for NaN
+          ++counts[f][static_cast<size_t>(index)];
         }
       }
     }
@@ -175,9 +178,9 @@ std::vector<TilePlanes> CoarsePass::choosePlanes(const SurfaceEstimate& coarse,
 void CoarsePass::addSecondPeaks(const SurfaceEstimate& coarse, const std::vector<cv::Rect>& tiles,
                                 const std::vector<TilePlanes>& choice, SurfaceEstimate* estimate) const {
   const cv::Size size = coarse.score.size();
-  for (size_t i = 0; i < tiles.size(); ++i) {
+  tbb::parallel_for(size_t{0}, tiles.size(), [&](size_t i) {
     if (!hasGaps(choice[i])) {
-      continue;
+      return;
     }
     for (int y = tiles[i].y; y < tiles[i].br().y; ++y) {
       const auto* from = coarse.second_score.ptr<float>(std::min(y / 2, size.height - 1));
@@ -186,7 +189,7 @@ void CoarsePass::addSecondPeaks(const SurfaceEstimate& coarse, const std::vector
         to[x] = std::max(to[x], from[std::min(x / 2, size.width - 1)]);
       }
     }
-  }
+  });
 }
 
 }  // namespace vcharge

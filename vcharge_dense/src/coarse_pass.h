@@ -20,7 +20,7 @@ class CoarsePass {
 
   CoarsePass(std::shared_ptr<const SweepLevel> fine, const std::optional<Plane>& ground_in_camera);
 
-  /// Like sweepPlanes() with the planes of the fine level. neighbours: in the order of the input's.
+  /// Like the fine level's sweepPlanes(). neighbours: in the order of the input's.
   SurfaceEstimate sweepChosenPlanes(const SweepInput& fine_input, const cv::Mat& reference_pixels,
                                     const std::vector<SweepImage>& neighbours) const;
 

@@ -89,11 +89,11 @@ RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepI
   if (coarse_ && !neighbours.empty()) {
     estimate = coarse_->sweepChosenPlanes(input, reference.pixels, neighbours);
   } else {
-    estimate = sweepPlanes(input, level_->planes(), tiles, {});
+    estimate = level_->sweepPlanes(input, tiles, {});
   }
   const bool found = cv::countNonZero(estimate.plane >= 0) > 0;
   if (found && options().num_refinement_steps > 0) {
-    refineSurface(input, makeRefinement(input, level_->validWindows(), estimate), tiles, &estimate);
+    level_->refineSurface(input, makeRefinement(input, level_->validWindows(), estimate), tiles, &estimate);
   }
 
   RangeMap map{reference.stamp, "", "", level_->camera(), {}, {}, {}};
