@@ -1,16 +1,14 @@
 #include "coarse_pass.h"
 
 #include <algorithm>
-#include <optional>
 #include <utility>
 
 #include <tbb/parallel_for.h>
-#include <opencv2/imgproc.hpp>
+
+#include "half_resolution.h"
 
 namespace vcharge {
 namespace {
-
-constexpr int kMinWidth_px = 16;  // the most lanes that a vector has
 
 // Chosen on two simulated drives other than those that the README judges by. Sizes are of the coarse image.
 // A pixel is sure where its score is high and leads the second peak.
@@ -19,38 +17,6 @@ constexpr double kMinSureShare = 0.3;  // of a tile's pixels with texture; less:
 constexpr int kMinSure = 16, kReach_px = 2;
 constexpr int kMinCount = 8;      // sure pixels that name a plane
 constexpr int kMarginPlanes = 1;  // swept beyond the named planes
-
-cv::Size halfSize(cv::Size size) {
-  return {size.width / 2, size.height / 2};
-}
-
-/// Means of two by two pixels.
-cv::Mat halved(const cv::Mat& image) {
-  const cv::Size size = halfSize(image.size());
-  cv::Mat half;
-  cv::resize(image(cv::Rect(0, 0, 2 * size.width, 2 * size.height)), half, size, 0.0, 0.0, cv::INTER_AREA);
-  return half;
-}
-
-/// Not 0 where all four pixels are valid.
-cv::Mat halvedMask(const cv::Mat& mask) {
-  cv::Mat half(halfSize(mask.size()), CV_8UC1);
-  for (int y = 0; y < half.rows; ++y) {
-    const auto* above = mask.ptr<uint8_t>(2 * y);
-    const auto* below = mask.ptr<uint8_t>(2 * y + 1);
-    for (int x = 0; x < half.cols; ++x) {
-      const bool valid =
-          above[2 * x] != 0 && above[2 * x + 1] != 0 && below[2 * x] != 0 && below[2 * x + 1] != 0;
-      half.at<uint8_t>(y, x) = valid ? 255 : 0;
-    }
-  }
-  return half;
-}
-
-MeiCamera halved(const MeiCamera& camera) {
-  return MeiCamera(camera.xi(), 0.5 * camera.gamma1(), 0.5 * camera.gamma2(), 0.5 * camera.u0() - 0.25,
-                   0.5 * camera.v0() - 0.25);
-}
 
 /// Slots of the planes that are named often enough, widened by the margin; a gap where some are left out.
 std::vector<int> slotsOf(const std::vector<int>& counts) {
@@ -79,45 +45,19 @@ bool hasGaps(const TilePlanes& planes) {
 
 }  // namespace
 
-bool CoarsePass::fits(cv::Size fine_size) {
-  const cv::Size size = halfSize(fine_size);
-  return size.width >= kMinWidth_px && size.height > 0;
-}
-
 CoarsePass::CoarsePass(std::shared_ptr<const SweepLevel> fine, const std::optional<Plane>& ground_in_camera)
     : fine_(std::move(fine)) {
   PlaneSweepOptions options = fine_->options();
   options.num_planes = std::max(3, (options.num_planes + 1) / 2);
   options.num_ground_planes = std::max(3, (options.num_ground_planes + 1) / 2);
-  level_ = std::make_unique<SweepLevel>(halved(fine_->camera()), halvedMask(fine_->validMask()), options,
-                                        ground_in_camera);
+  options.semi_global_smoothing = false;
+  level_ = halfLevel(*fine_, options, ground_in_camera);
 }
 
-SurfaceEstimate CoarsePass::sweepChosenPlanes(const SweepInput& fine_input, const cv::Mat& reference_pixels,
-                                              const std::vector<SweepImage>& neighbours) const {
-  const SurfaceEstimate coarse = sweep(fine_input, reference_pixels, neighbours);
-  const std::vector<cv::Rect> tiles =
-      makeTiles(fine_->validMask().size(), fine_->options().window_px, TileSize::kSmall);
-  const std::vector<TilePlanes> choice = choosePlanes(coarse, tiles);
-  SurfaceEstimate estimate = fine_->sweepPlanes(fine_input, tiles, choice);
-  addSecondPeaks(coarse, tiles, choice, &estimate);
-  return estimate;
-}
-
-SurfaceEstimate CoarsePass::sweep(const SweepInput& fine_input, const cv::Mat& reference_pixels,
-                                  const std::vector<SweepImage>& neighbours) const {
-  SweepInput input = level_->makeInput(halved(reference_pixels));
-  std::vector<std::optional<PackedImage>> images(neighbours.size());
-  tbb::parallel_for(size_t{0}, neighbours.size(),
-                    [&](size_t n) { images[n].emplace(halved(neighbours[n].pixels), level_->validMask()); });
-  for (size_t n = 0; n < neighbours.size(); ++n) {
-    const SweepNeighbour& from = fine_input.neighbours[n];
-    input.neighbours.push_back({std::move(*images[n]), from.neighbour_from_reference, from.translation_m,
-                                from.after, from.rotation_variance_left, from.translation_variance_left});
-  }
+SurfaceEstimate CoarsePass::sweep(const SweepInput& half_input) const {
   const std::vector<cv::Rect> tiles =
       makeTiles(level_->validMask().size(), level_->options().window_px, TileSize::kLarge);
-  return level_->sweepPlanes(input, tiles, {});
+  return level_->sweepPlanes(half_input, tiles, {});
 }
 
 TilePlanes CoarsePass::choosePlanes(const SurfaceEstimate& coarse, const cv::Rect& tile) const {

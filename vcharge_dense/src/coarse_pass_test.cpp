@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "half_resolution.h"
 #include "plane_sweep_test_support.h"
 #include "tile_scorer.h"
 #include "vcharge_core/content_hash.h"
@@ -177,8 +178,8 @@ TEST(CoarsePassTest, SweepsFewPlanesAmongThemTheRightOnes) {
   const Level setup;
   const SweepInput input = setup.input();
   const CoarsePass coarse(setup.level, setup.sequence.ground);
-  const SurfaceEstimate found =
-      coarse.sweep(input, setup.sequence.reference.pixels, setup.sequence.neighbours);
+  const SurfaceEstimate found = coarse.sweep(
+      halfInput(coarse.level(), input, setup.sequence.reference.pixels, setup.sequence.neighbours));
   EXPECT_EQ(found.score.size(), cv::Size(kSize.width / 2, kSize.height / 2));
   const std::vector<TilePlanes> choice = coarse.choosePlanes(found, setup.tiles);
   const Hypotheses& planes = setup.level->planes().front();

@@ -16,23 +16,6 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 constexpr float kPerScore = 1.0f / kScoreScale;
 
-struct Parabola {
-  float offset = 0.0f;     ///< of the maximum, in hypotheses
-  float curvature = kNaN;  ///< negative second difference of the correlations
-};
-
-/// Parabola through three scores whose middle one is the highest (Tian and Huhns 1986).
-Parabola fitParabola(int before, int middle, int after) {
-  Parabola parabola;
-  const int curvature = 2 * middle - before - after;
-  if (curvature > 0) {
-    const auto scaled = static_cast<float>(curvature);
-    parabola.curvature = kPerScore * scaled;
-    parabola.offset = std::clamp(0.5f * static_cast<float>(after - before) / scaled, -0.5f, 0.5f);
-  }
-  return parabola;
-}
-
 /// A tile's scores as they are read along its rows, pixel by pixel, which the layout spreads.
 class RowReader {
  public:
@@ -117,6 +100,17 @@ struct EstimateRow {
 };
 
 }  // namespace
+
+Parabola fitParabola(int before, int middle, int after) {
+  Parabola parabola;
+  const int curvature = 2 * middle - before - after;
+  if (curvature > 0) {
+    const auto scaled = static_cast<float>(curvature);
+    parabola.curvature = kPerScore * scaled;
+    parabola.offset = std::clamp(0.5f * static_cast<float>(after - before) / scaled, -0.5f, 0.5f);
+  }
+  return parabola;
+}
 
 SurfaceEstimate::SurfaceEstimate(cv::Size size)
     : inverse_range(pooledMat(size, CV_32FC1)),

@@ -9,6 +9,7 @@
 #include <tbb/parallel_for.h>
 #include <opencv2/imgproc.hpp>
 
+#include "plane_smoothing.h"
 #include "tile_scorer.h"
 
 namespace vcharge {
@@ -99,7 +100,12 @@ SweepInput SweepLevel::makeInput(const cv::Mat& reference_pixels) const {
 
 SurfaceEstimate SweepLevel::sweepPlanes(const SweepInput& input, const std::vector<cv::Rect>& tiles,
                                         const std::vector<TilePlanes>& choice) const {
-  SurfaceEstimate estimate(input.reference.samples.size());
+  const cv::Size size = input.reference.samples.size();
+  SurfaceEstimate estimate(size);
+  std::optional<PlaneSmoothing> smoothing;
+  if (options_.semi_global_smoothing) {
+    smoothing.emplace(size, planes_, options_);
+  }
   workers_->forEachTile(input, tiles, planes_.size(), [&](size_t tile, WorkerPool::Worker* worker) {
     for (size_t f = 0; f < planes_.size(); ++f) {
       if (choice.empty()) {
@@ -109,7 +115,13 @@ SurfaceEstimate SweepLevel::sweepPlanes(const SweepInput& input, const std::vect
       }
     }
     readPeaks(planes_, worker->scores, options_.sub_plane_interpolation, &estimate);
+    if (smoothing) {
+      smoothing->addTile(worker->scores);
+    }
   });
+  if (smoothing) {
+    smoothing->smooth(options_.sub_plane_interpolation, &estimate);
+  }
   return estimate;
 }
 
