@@ -190,11 +190,11 @@ void kernel(benchmark::State& state, int64_t target, bool fisheye) {
                                     from_reference.rotationMatrix().cast<float>(),
                                     from_reference.translation().cast<float>(), false});
       }
-      TileScorer scorer(input);
+      TileScorer scorer;
       TileScores scores;
       times.lap();
       for (const cv::Rect& tile : tiles) {
-        scorer.setTile(tile);
+        scorer.setTile(input, tile);
         scorer.score(planes, &scores);
         benchmark::DoNotOptimize(scores.best.data());
         times.lap();

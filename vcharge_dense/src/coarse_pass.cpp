@@ -1,16 +1,14 @@
 #include "coarse_pass.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include <tbb/parallel_for.h>
-#include <opencv2/imgproc.hpp>
+
+#include "half_resolution.h"
 
 namespace vcharge {
 namespace {
-
-constexpr int kMinWidth_px = 16;  // the most lanes that a vector has
 
 // Chosen on two simulated drives other than those that the README judges by. Sizes are of the coarse image.
 // A pixel is sure where its score is high and leads the second peak.
@@ -19,43 +17,6 @@ constexpr double kMinSureShare = 0.3;  // of a tile's pixels with texture; less:
 constexpr int kMinSure = 16, kReach_px = 2;
 constexpr int kMinCount = 8;      // sure pixels that name a plane
 constexpr int kMarginPlanes = 1;  // swept beyond the named planes
-
-cv::Size halfSize(cv::Size size) {
-  return {size.width / 2, size.height / 2};
-}
-
-/// Means of two by two pixels.
-cv::Mat halved(const cv::Mat& image) {
-  const cv::Size size = halfSize(image.size());
-  cv::Mat half;
-  cv::resize(image(cv::Rect(0, 0, 2 * size.width, 2 * size.height)), half, size, 0.0, 0.0, cv::INTER_AREA);
-  return half;
-}
-
-/// Not 0 where all four pixels are valid.
-cv::Mat halvedMask(const cv::Mat& mask) {
-  cv::Mat half(halfSize(mask.size()), CV_8UC1);
-  for (int y = 0; y < half.rows; ++y) {
-    const auto* above = mask.ptr<uint8_t>(2 * y);
-    const auto* below = mask.ptr<uint8_t>(2 * y + 1);
-    for (int x = 0; x < half.cols; ++x) {
-      const bool valid =
-          above[2 * x] != 0 && above[2 * x + 1] != 0 && below[2 * x] != 0 && below[2 * x + 1] != 0;
-      half.at<uint8_t>(y, x) = valid ? 255 : 0;
-    }
-  }
-  return half;
-}
-
-MeiCamera halved(const MeiCamera& camera) {
-  return MeiCamera(camera.xi(), 0.5 * camera.gamma1(), 0.5 * camera.gamma2(), 0.5 * camera.u0() - 0.25,
-                   0.5 * camera.v0() - 0.25);
-}
-
-bool isSure(const SurfaceEstimate& coarse, int x, int y) {
-  const float score = coarse.score.at<float>(y, x);
-  return score >= kSureScore && score - coarse.second_score.at<float>(y, x) >= kSureLead;
-}
 
 /// Slots of the planes that are named often enough, widened by the margin; a gap where some are left out.
 std::vector<int> slotsOf(const std::vector<int>& counts) {
@@ -84,43 +45,19 @@ bool hasGaps(const TilePlanes& planes) {
 
 }  // namespace
 
-bool CoarsePass::fits(cv::Size fine_size) {
-  const cv::Size size = halfSize(fine_size);
-  return size.width >= kMinWidth_px && size.height > 0;
-}
-
 CoarsePass::CoarsePass(std::shared_ptr<const SweepLevel> fine, const std::optional<Plane>& ground_in_camera)
     : fine_(std::move(fine)) {
   PlaneSweepOptions options = fine_->options();
   options.num_planes = std::max(3, (options.num_planes + 1) / 2);
   options.num_ground_planes = std::max(3, (options.num_ground_planes + 1) / 2);
-  level_ = std::make_unique<SweepLevel>(halved(fine_->camera()), halvedMask(fine_->validMask()), options,
-                                        ground_in_camera);
+  options.semi_global_smoothing = false;
+  level_ = halfLevel(*fine_, options, ground_in_camera);
 }
 
-SurfaceEstimate CoarsePass::sweepChosenPlanes(const SweepInput& fine_input, const cv::Mat& reference_pixels,
-                                              const std::vector<SweepImage>& neighbours) const {
-  const SurfaceEstimate coarse = sweep(fine_input, reference_pixels, neighbours);
-  const std::vector<cv::Rect> tiles =
-      makeTiles(fine_->validMask().size(), fine_->options().window_px, TileSize::kSmall);
-  const std::vector<TilePlanes> choice = choosePlanes(coarse, tiles);
-  SurfaceEstimate estimate = sweepPlanes(fine_input, fine_->planes(), tiles, choice);
-  addSecondPeaks(coarse, tiles, choice, &estimate);
-  return estimate;
-}
-
-SurfaceEstimate CoarsePass::sweep(const SweepInput& fine_input, const cv::Mat& reference_pixels,
-                                  const std::vector<SweepImage>& neighbours) const {
-  SweepInput input = level_->makeInput(halved(reference_pixels));
-  for (size_t n = 0; n < neighbours.size(); ++n) {
-    const SweepNeighbour& from = fine_input.neighbours[n];
-    input.neighbours.push_back({PackedImage(halved(neighbours[n].pixels), level_->validMask()),
-                                from.neighbour_from_reference, from.translation_m, from.after,
-                                from.rotation_variance_left, from.translation_variance_left});
-  }
+SurfaceEstimate CoarsePass::sweep(const SweepInput& half_input) const {
   const std::vector<cv::Rect> tiles =
       makeTiles(level_->validMask().size(), level_->options().window_px, TileSize::kLarge);
-  return sweepPlanes(input, level_->planes(), tiles, {});
+  return level_->sweepPlanes(half_input, tiles, {});
 }
 
 TilePlanes CoarsePass::choosePlanes(const SurfaceEstimate& coarse, const cv::Rect& tile) const {
@@ -129,27 +66,33 @@ TilePlanes CoarsePass::choosePlanes(const SurfaceEstimate& coarse, const cv::Rec
   for (const Hypotheses& family : planes) {
     counts.emplace_back(family.offsets.size(), 0);
   }
+  std::vector<int> sure;  // columns of a row
   const cv::Rect around(tile.x / 2 - kReach_px, tile.y / 2 - kReach_px, tile.width / 2 + 2 * kReach_px,
                         tile.height / 2 + 2 * kReach_px);
   const cv::Rect region = around & cv::Rect(cv::Point(), coarse.score.size());
   int num_textured = 0, num_sure = 0;
   for (int y = region.y; y < region.br().y; ++y) {
+    const auto* plane = coarse.plane.ptr<int>(y);
+    const auto* score = coarse.score.ptr<float>(y);
+    const auto* second_score = coarse.second_score.ptr<float>(y);
+    const auto* inverse_range = coarse.inverse_range.ptr<float>(y);
+    sure.clear();
     for (int x = region.x; x < region.br().x; ++x) {
-      if (coarse.plane.at<int>(y, x) < 0) {
-        continue;
+      num_textured += plane[x] >= 0 ? 1 : 0;
+      if (plane[x] >= 0 && score[x] >= kSureScore && score[x] - second_score[x] >= kSureLead) {
+        sure.push_back(x);
       }
-      ++num_textured;
-      if (!isSure(coarse, x, y)) {
-        continue;
-      }
-      ++num_sure;
-      for (size_t f = 0; f < planes.size(); ++f) {
-        const std::vector<float>& offsets = planes[f].offsets;
-        const float inverse_distance =
-            coarse.inverse_range.at<float>(y, x) / planes[f].weight.at<float>(2 * y, 2 * x);
-        const float index = (inverse_distance - offsets.front()) / (offsets[1] - offsets[0]);
-        if (index > -0.5f && index < static_cast<float>(offsets.size()) - 0.5f) {  // false for NaN
-          ++counts[f][static_cast<size_t>(std::lround(index))];
+    }
+    num_sure += static_cast<int>(sure.size());
+    for (size_t f = 0; f < planes.size(); ++f) {
+      const std::vector<float>& offsets = planes[f].offsets;
+      const auto* weight = planes[f].weight.ptr<float>(2 * y);
+      const float per_step = 1.0f / (offsets[1] - offsets[0]);
+      const auto end = static_cast<float>(offsets.size());
+      for (const int x : sure) {
+        const float index = (inverse_range[x] / weight[2 * x] - offsets.front()) * per_step + 0.5f;
+        if (index > 0.0f && index < end) {  // false for NaN
+          ++counts[f][static_cast<size_t>(index)];
         }
       }
     }
@@ -175,9 +118,9 @@ std::vector<TilePlanes> CoarsePass::choosePlanes(const SurfaceEstimate& coarse,
 void CoarsePass::addSecondPeaks(const SurfaceEstimate& coarse, const std::vector<cv::Rect>& tiles,
                                 const std::vector<TilePlanes>& choice, SurfaceEstimate* estimate) const {
   const cv::Size size = coarse.score.size();
-  for (size_t i = 0; i < tiles.size(); ++i) {
+  tbb::parallel_for(size_t{0}, tiles.size(), [&](size_t i) {
     if (!hasGaps(choice[i])) {
-      continue;
+      return;
     }
     for (int y = tiles[i].y; y < tiles[i].br().y; ++y) {
       const auto* from = coarse.second_score.ptr<float>(std::min(y / 2, size.height - 1));
@@ -186,7 +129,7 @@ void CoarsePass::addSecondPeaks(const SurfaceEstimate& coarse, const std::vector
         to[x] = std::max(to[x], from[std::min(x / 2, size.width - 1)]);
       }
     }
-  }
+  });
 }
 
 }  // namespace vcharge

@@ -15,18 +15,11 @@ namespace vcharge {
 /// proper needs.
 class CoarsePass {
  public:
-  /// False for images that are too small for it.
-  static bool fits(cv::Size fine_size);
-
   CoarsePass(std::shared_ptr<const SweepLevel> fine, const std::optional<Plane>& ground_in_camera);
 
-  /// Like sweepPlanes() with the planes of the fine level. neighbours: in the order of the input's.
-  SurfaceEstimate sweepChosenPlanes(const SweepInput& fine_input, const cv::Mat& reference_pixels,
-                                    const std::vector<SweepImage>& neighbours) const;
-
-  /// At half the resolution.
-  SurfaceEstimate sweep(const SweepInput& fine_input, const cv::Mat& reference_pixels,
-                        const std::vector<SweepImage>& neighbours) const;
+  const SweepLevel& level() const { return *level_; }
+  /// half_input: of the level.
+  SurfaceEstimate sweep(const SweepInput& half_input) const;
 
   /// Per tile the planes within some planes of what sure pixels in and around it found, or all where too few
   /// of them are sure.

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "half_resolution.h"
 #include "plane_sweep_test_support.h"
 #include "tile_scorer.h"
 #include "vcharge_core/content_hash.h"
@@ -65,8 +66,8 @@ TEST(CoarsePassTest, PlanesLeftOutDoNotChangeTheScoresOfOthers) {
   onEveryTarget([&] {
     const SweepInput input = setup.input();
     const Hypotheses& planes = setup.level->planes().front();
-    TileScorer scorer(input);
-    scorer.setTile(setup.tiles[setup.tiles.size() / 2]);
+    TileScorer scorer;
+    scorer.setTile(input, setup.tiles[setup.tiles.size() / 2]);
     TileScores all, some;
     scorer.score(planes, &all);
     scorer.score(planes, {kGap, 4, 5, 6, kGap, 9, kGap}, &some);
@@ -100,6 +101,53 @@ TEST(CoarsePassTest, PlanesLeftOutDoNotChangeTheScoresOfOthers) {
   });
 }
 
+TEST(TileScorerTest, RowsWithoutTextureDoNotChangeOthers) {
+  Sequence s = makeSequence(lotScene(2), kLeft, 0.2, -4, 0, 2.0);
+  const int first = 90, end = 110;  // rows with texture
+  s.reference.pixels.rowRange(0, first).setTo(90);
+  s.reference.pixels.rowRange(end, kSize.height).setTo(90);
+  PlaneSweepOptions options;
+  options.warp_tolerance_px = 0.0;  // exact everywhere, whatever the tile
+  const SweepLevel level(kCamera, allValid(), options, s.ground);
+  SweepInput input = level.makeInput(s.reference.pixels);
+  for (const SweepImage& image : s.neighbours) {
+    const RigidTransform pose = image.world_from_camera.inverse() * s.reference.world_from_camera;
+    input.neighbours.push_back({PackedImage(image.pixels, level.validMask()),
+                                pose.rotationMatrix().cast<float>(), pose.translation().cast<float>(),
+                                false});
+  }
+  const int radius = options.window_px / 2;
+  const cv::Rect tight(40, first - radius, 100, end - first + 2 * radius);
+  const cv::Rect wide(tight.x, tight.y - 20, tight.width, tight.height + 35);
+  TileScorer scorer;
+  TileScores of_tight, of_wide;
+  scorer.setTile(input, tight);
+  scorer.score(level.planes().front(), &of_tight);
+  scorer.setTile(input, wide);
+  scorer.score(level.planes().front(), &of_wide);
+  int known = 0;
+  for (int y = 0; y < wide.height; ++y) {
+    for (int x = 0; x < wide.width; ++x) {
+      const size_t pixel = of_wide.layout.index(y, x);
+      const int row = wide.y + y - tight.y;
+      if (row < 0 || row >= tight.height) {
+        EXPECT_EQ(of_wide.best[pixel], -1);
+        EXPECT_EQ(of_wide.second[pixel], -1);
+        continue;
+      }
+      const size_t same = of_tight.layout.index(row, x);
+      ASSERT_EQ(of_wide.best[pixel], of_tight.best[same]);
+      EXPECT_EQ(of_wide.second[pixel], of_tight.second[same]);
+      if (of_tight.best[same] >= 0) {
+        ++known;
+        EXPECT_EQ(of_wide.best_score[pixel], of_tight.best_score[same]);
+        EXPECT_EQ(of_wide.voters(of_wide.best[pixel], pixel), of_tight.voters(of_tight.best[same], same));
+      }
+    }
+  }
+  EXPECT_GT(known, 1000);
+}
+
 TEST(CoarsePassTest, EqualsTheFullSweepWhereAllPlanesAreChosen) {
   const Level setup;
   const SweepInput input = setup.input();
@@ -113,8 +161,8 @@ TEST(CoarsePassTest, EqualsTheFullSweepWhereAllPlanesAreChosen) {
       EXPECT_EQ(planes[f], allSlots(setup.level->planes()[f]));
     }
   }
-  const SurfaceEstimate full = sweepPlanes(input, setup.level->planes(), setup.tiles, {});
-  SurfaceEstimate chosen = sweepPlanes(input, setup.level->planes(), setup.tiles, choice);
+  const SurfaceEstimate full = setup.level->sweepPlanes(input, setup.tiles, {});
+  SurfaceEstimate chosen = setup.level->sweepPlanes(input, setup.tiles, choice);
   SurfaceEstimate doubtful(cv::Size(kSize.width / 2, kSize.height / 2));
   doubtful.second_score.setTo(1.0f);
   coarse.addSecondPeaks(doubtful, setup.tiles, choice, &chosen);
@@ -130,8 +178,8 @@ TEST(CoarsePassTest, SweepsFewPlanesAmongThemTheRightOnes) {
   const Level setup;
   const SweepInput input = setup.input();
   const CoarsePass coarse(setup.level, setup.sequence.ground);
-  const SurfaceEstimate found =
-      coarse.sweep(input, setup.sequence.reference.pixels, setup.sequence.neighbours);
+  const SurfaceEstimate found = coarse.sweep(
+      halfInput(coarse.level(), input, setup.sequence.reference.pixels, setup.sequence.neighbours));
   EXPECT_EQ(found.score.size(), cv::Size(kSize.width / 2, kSize.height / 2));
   const std::vector<TilePlanes> choice = coarse.choosePlanes(found, setup.tiles);
   const Hypotheses& planes = setup.level->planes().front();

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "parallel_rows.h"
+#include "pooled_mat.h"
 #include "sweep_kernels.h"
 #include "vcharge_core/error.h"
 
@@ -30,9 +31,9 @@ PackedImage::PackedImage(const cv::Mat& pixels, const cv::Mat& valid_mask)
   check(std::max(pitch_, size_.height) <= std::numeric_limits<int16_t>::max(),
         "PackedImage: an image may have at most 32,000 pixels a side");
   const auto pitch = static_cast<size_t>(pitch_);
-  cells_.resize(pitch * static_cast<size_t>(size_.height));
+  cells_ = pooledMat({pitch_, size_.height}, CV_32SC1);
   forEachRow(size_.height, [&](int row) {
-    int32_t* cells = cells_.data() + static_cast<size_t>(row) * pitch;
+    auto* cells = cells_.ptr<int32_t>(row);
     std::fill_n(cells, pitch, kUnseenCell);
     const int y = row - kMargin;
     if (y < 0 || y + 1 >= pixels.rows) {

@@ -4,8 +4,6 @@
 
 #include <opencv2/core.hpp>
 
-#include "aligned_array.h"
-
 namespace vcharge {
 
 /// An image for bilinear sampling: the cell (x, y) holds the four pixels around a position in [x, x + 1) x
@@ -19,14 +17,14 @@ class PackedImage {
   /// pixels and valid_mask: CV_8UC1 of the same size.
   PackedImage(const cv::Mat& pixels, const cv::Mat& valid_mask);
 
-  const int32_t* cells() const { return cells_.data(); }
+  const int32_t* cells() const { return cells_.ptr<int32_t>(); }
   int pitch() const { return pitch_; }     ///< of rows, in cells
   cv::Size size() const { return size_; }  ///< with the margin
 
  private:
   cv::Size size_;
   int pitch_;
-  AlignedArray<int32_t> cells_;
+  cv::Mat cells_;  // CV_32SC1
 };
 
 }  // namespace vcharge

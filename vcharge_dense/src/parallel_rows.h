@@ -1,5 +1,8 @@
 #pragma once
 
+#include <algorithm>
+#include <limits>
+
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -13,6 +16,21 @@ void forEachRow(int rows, const Function& function) {
       function(y);
     }
   });
+}
+
+/// Calls function(begin, end) for bands of rows, the same ones on any number of threads.
+template <class Function>
+void forEachBand(int rows, const Function& function) {
+  constexpr int kBandRows = 32;
+  tbb::parallel_for(0, (rows + kBandRows - 1) / kBandRows,
+                    [&](int band) { function(band * kBandRows, std::min(rows, (band + 1) * kBandRows)); });
+}
+
+/// Copies a row into the middle of one with NaN in `margin` columns on both sides.
+inline void copyPadded(const float* row, int columns, int margin, float* padded) {
+  std::fill_n(padded, margin, std::numeric_limits<float>::quiet_NaN());
+  std::copy_n(row, columns, padded + margin);
+  std::fill_n(padded + margin + columns, margin, std::numeric_limits<float>::quiet_NaN());
 }
 
 }  // namespace vcharge

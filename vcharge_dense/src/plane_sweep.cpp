@@ -5,6 +5,8 @@
 #include <tbb/parallel_for.h>
 
 #include "coarse_pass.h"
+#include "far_planes.h"
+#include "half_resolution.h"
 #include "pose_refinement.h"
 #include "range_uncertainty.h"
 #include "sweep_level.h"
@@ -56,8 +58,11 @@ PlaneSweep::PlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask, const
   check(p.tail<4>().isZero(0.0), "PlaneSweep: the working camera must not have distortion");
   check(valid_mask.cols >= kMinWidth_px, "PlaneSweep: images must be at least 16 pixels wide");
   level_ = std::make_shared<SweepLevel>(camera, valid_mask, options, ground_in_camera);
-  if (options.coarse_pass && CoarsePass::fits(valid_mask.size())) {
+  if (options.coarse_pass && canBeHalved(valid_mask.size())) {
     coarse_ = std::make_shared<CoarsePass>(level_, ground_in_camera);
+  }
+  if (options.half_resolution_beyond_m > 0.0 && canBeHalved(valid_mask.size())) {
+    far_ = std::make_shared<FarPlanes>(level_, ground_in_camera);
   }
 }
 
@@ -67,6 +72,36 @@ const PlaneSweepOptions& PlaneSweep::options() const {
 
 const std::vector<PlaneFamily>& PlaneSweep::families() const {
   return level_->families();
+}
+
+SurfaceEstimate PlaneSweep::sweepPlanes(const SweepInput& input, const cv::Mat& reference_pixels,
+                                        const std::vector<SweepImage>& neighbours,
+                                        const std::vector<cv::Rect>& large_tiles) const {
+  if (!coarse_ && !far_) {
+    return level_->sweepPlanes(input, large_tiles, {});
+  }
+  const SweepInput half_input =
+      halfInput(coarse_ ? coarse_->level() : far_->level(), input, reference_pixels, neighbours);
+  std::vector<cv::Rect> tiles = large_tiles;
+  std::vector<TilePlanes> choice = allPlanes(*level_, tiles.size());
+  std::optional<SurfaceEstimate> coarse;
+  if (coarse_) {
+    coarse = coarse_->sweep(half_input);
+    tiles = makeTiles(level_->validMask().size(), options().window_px, TileSize::kSmall);
+    choice = coarse_->choosePlanes(*coarse, tiles);
+  }
+  SurfaceEstimate estimate =
+      level_->sweepPlanes(input, tiles, far_ && far_->any() ? far_->nearOf(choice) : choice);
+  if (far_ && far_->any()) {
+    const std::vector<TilePlanes> far_choice = coarse_ ? coarse_->choosePlanes(*coarse, far_->tilesOfFine())
+                                                       : allPlanes(*level_, far_->tiles().size());
+    far_->merge(input, far_->level().sweepPlanes(half_input, far_->tiles(), far_->farOf(far_choice)),
+                &estimate);
+  }
+  if (coarse_) {
+    coarse_->addSecondPeaks(*coarse, tiles, choice, &estimate);
+  }
+  return estimate;
 }
 
 RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepImage>& neighbours,
@@ -86,14 +121,12 @@ RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepI
     tiles = makeTiles(size, window_px);
   }
   SurfaceEstimate estimate(size);
-  if (coarse_ && !neighbours.empty()) {
-    estimate = coarse_->sweepChosenPlanes(input, reference.pixels, neighbours);
-  } else {
-    estimate = sweepPlanes(input, level_->planes(), tiles, {});
+  if (!neighbours.empty()) {
+    estimate = sweepPlanes(input, reference.pixels, neighbours, tiles);
   }
   const bool found = cv::countNonZero(estimate.plane >= 0) > 0;
   if (found && options().num_refinement_steps > 0) {
-    refineSurface(input, makeRefinement(input, level_->validWindows(), estimate), tiles, &estimate);
+    level_->refineSurface(input, makeRefinement(input, level_->validWindows(), estimate), tiles, &estimate);
   }
 
   RangeMap map{reference.stamp, "", "", level_->camera(), {}, {}, {}};

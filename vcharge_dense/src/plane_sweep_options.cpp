@@ -33,6 +33,10 @@ void PlaneSweepOptions::validate() const {
                ground_max_height_m);
   requireField(num_ground_planes >= 3 && num_ground_planes <= 1024, "num_ground_planes",
                "must be in [3, 1024]", num_ground_planes);
+  requireNotNegative("half_resolution_beyond_m", half_resolution_beyond_m);
+  requireField(smoothness_step >= 0.0 && smoothness_step <= smoothness_jump, "smoothness_step",
+               "must be in [0, smoothness_jump]", smoothness_step);
+  requireField(smoothness_jump <= 2.0, "smoothness_jump", "must be at most 2", smoothness_jump);
   requireField(window_px >= 3 && window_px <= 31 && window_px % 2 == 1, "window_px",
                "must be odd and in [3, 31]", window_px);
   requireField(best_k >= 1, "best_k", "must be at least 1", best_k);

@@ -18,6 +18,7 @@ namespace {
 
 using testing::allValid;
 using testing::kCamera;
+using testing::kFront;
 using testing::kLeft;
 using testing::kSize;
 using testing::lotScene;
@@ -83,6 +84,23 @@ TEST(PlaneSweepTest, GivesTheSameBytesOnAnyNumberOfThreads) {
   }
   EXPECT_EQ(hashes[0], hashes[1]);
   EXPECT_EQ(hashes[0], hashes[2]);
+}
+
+TEST(PlaneSweepTest, WhatWasSweptBeforeDoesNotMatter) {
+  const Sequence s = makeSequence(lotScene(2), kLeft, 0.2, -4, 0, 2.0);
+  const Sequence other = makeSequence(lotScene(3), kFront, 0.2, -3, 0, 2.0);
+  PlaneSweepOptions options;
+  options.coarse_pass = true;
+  const auto hashOf = [](const RangeMap& map) {
+    ContentHasher hasher;
+    addToHash(map, &hasher);
+    return hasher.hex();
+  };
+  const std::string fresh =
+      hashOf(PlaneSweep(kCamera, allValid(), options, s.ground).sweep(s.reference, s.neighbours));
+  const PlaneSweep sweep(kCamera, allValid(), options, s.ground);
+  EXPECT_NE(hashOf(sweep.sweep(other.reference, other.neighbours)), fresh);
+  EXPECT_EQ(hashOf(sweep.sweep(s.reference, s.neighbours)), fresh);
 }
 
 TEST(PlaneSweepTest, MaskedPixelsAreUnknownAndDoNotVote) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "parallel_rows.h"
+#include "pooled_mat.h"
 
 namespace vcharge {
 namespace {
@@ -32,27 +33,17 @@ float square(float value) {
   return value * value;
 }
 
-/// The probability that a range is right, by its confidence's factors.
-float calibratedConfidence(float factors) {
-  size_t i = 1;
-  while (i + 1 < std::size(kFactors) && factors > kFactors[i]) {
-    ++i;
+/// Turns a row of products of confidence's factors into the probability that each range is right.
+void calibrate(std::vector<float>* confidence) {
+  std::vector<float> calibrated(confidence->size(), kShareRight[0]);
+  for (size_t i = 1; i < std::size(kFactors); ++i) {
+    const float length = kFactors[i] - kFactors[i - 1];
+    const float slope = (kShareRight[i] - kShareRight[i - 1]) / length;
+    for (size_t x = 0; x < calibrated.size(); ++x) {
+      calibrated[x] += slope * std::min(std::max((*confidence)[x] - kFactors[i - 1], 0.0f), length);
+    }
   }
-  const float along = (factors - kFactors[i - 1]) / (kFactors[i] - kFactors[i - 1]);
-  return std::clamp(kShareRight[i - 1] + along * (kShareRight[i] - kShareRight[i - 1]), 0.0f, 1.0f);
-}
-
-/// Confidence's factors before the neighbourhood is looked at.
-float pixelConfidence(const SweepInput& input, const SurfaceEstimate& estimate, int x, int y,
-                      float relative_sigma) {
-  const PlaneSweepOptions& options = *input.options;
-  const float score = estimate.score.at<float>(y, x);
-  const auto min_score = static_cast<float>(options.min_score);
-  const float height = std::clamp((score - min_score) / (1.0f - min_score), 0.0f, 1.0f);
-  const float lead =
-      std::clamp((score - std::max(estimate.second_score.at<float>(y, x), 0.0f)) / 0.3f, 0.0f, 1.0f);
-  const float precision = 1.0f / (1.0f + square(relative_sigma / 0.05f));
-  return height * (0.2f + 0.8f * lead) * precision;
+  confidence->swap(calibrated);
 }
 
 constexpr int kSupportRadius_px = 3;
@@ -81,6 +72,28 @@ std::vector<float> neighbourhoodSupport(const SweepKernels& kernels, const cv::M
     agree[static_cast<size_t>(x)] /= static_cast<float>(width) * static_cast<float>(rows.size());
   }
   return agree;
+}
+
+/// Of one row: the confidence of each pixel, from its score, its lead over the second peak, its deviation and
+/// its support.
+std::vector<float> rowConfidence(const SweepInput& input, const SurfaceEstimate& estimate,
+                                 const cv::Mat& padded, const cv::Mat& sigma, int y) {
+  std::vector<float> confidence = neighbourhoodSupport(input.kernels, padded, sigma, y);
+  const auto* inverse_range = estimate.inverse_range.ptr<float>(y);
+  const auto* score = estimate.score.ptr<float>(y);
+  const auto* second = estimate.second_score.ptr<float>(y);
+  const auto* deviation = sigma.ptr<float>(y);
+  const auto min_score = static_cast<float>(input.options->min_score);
+  const float per_height = 1.0f / (1.0f - min_score);
+  for (size_t x = 0; x < confidence.size(); ++x) {
+    const float height = std::min(std::max(per_height * (score[x] - min_score), 0.0f), 1.0f);
+    const float lead = std::min(std::max((score[x] - std::max(second[x], 0.0f)) / 0.3f, 0.0f), 1.0f);
+    const float precision = 1.0f / (1.0f + square(deviation[x] / (0.05f * inverse_range[x])));
+    const float factors = confidence[x] * height * (0.2f + 0.8f * lead) * precision;
+    confidence[x] = inverse_range[x] > 0.0f ? factors : 0.0f;
+  }
+  calibrate(&confidence);
+  return confidence;
 }
 
 /// Of one row: mean second difference of inverse ranges over their neighbourhood, as the standard deviation
@@ -148,10 +161,11 @@ UncertaintyRow uncertaintyRow(const SweepInput& input, const std::vector<Neighbo
 void estimateRange(const SweepInput& input, const SurfaceEstimate& estimate, RangeMap* map) {
   const PlaneSweepOptions& options = *input.options;
   const cv::Size size = estimate.score.size();
-  map->range_m = cv::Mat(size, CV_32FC1, cv::Scalar(kNaN));
-  map->standard_deviation_m = cv::Mat(size, CV_32FC1, cv::Scalar(kNaN));
-  map->confidence = cv::Mat(size, CV_32FC1, cv::Scalar(0.0f));
-  cv::Mat sigma(size, CV_32FC1, cv::Scalar(kNaN));
+  map->range_m = pooledMat(size, CV_32FC1);
+  map->standard_deviation_m = pooledMat(size, CV_32FC1);
+  map->confidence = pooledMat(size, CV_32FC1);
+  cv::Mat sigma = pooledMat(size, CV_32FC1), accepted = pooledMat(size, CV_32FC1);
+  cv::Mat padded = pooledMat({size.width + 2 * kSupportRadius_px, size.height}, CV_32FC1);
   const std::vector<NeighbourUncertainty> neighbours = neighbourUncertainties(input);
   forEachRow(size.height, [&](int y) {
     UncertaintyRow row = uncertaintyRow(input, neighbours, estimate.inverse_range, y);
@@ -162,44 +176,40 @@ void estimateRange(const SweepInput& input, const SurfaceEstimate& estimate, Ran
     row.matching_noise_px = static_cast<float>(options.matching_noise_px);
     row.scale_noise = static_cast<float>(options.pose_noise.scale);
     input.kernels.inverseRangeSigma(row, sigma.ptr<float>(y));
+    copyPadded(row.inverse_range, size.width, kSupportRadius_px, padded.ptr<float>(y));
   });
   // What is accepted by itself, then its deviation with what its neighbourhood says.
-  cv::Mat accepted(size, CV_32FC1, cv::Scalar(kNaN)), padded;
-  cv::copyMakeBorder(estimate.inverse_range, padded, 0, 0, kSupportRadius_px, kSupportRadius_px,
-                     cv::BORDER_CONSTANT, cv::Scalar(kNaN));
   forEachRow(size.height, [&](int y) {
-    const std::vector<float> support = neighbourhoodSupport(input.kernels, padded, sigma, y);
+    const std::vector<float> confidence = rowConfidence(input, estimate, padded, sigma, y);
+    const auto* inverse_range = estimate.inverse_range.ptr<float>(y);
+    const auto* score = estimate.score.ptr<float>(y);
+    const auto* at_limit = estimate.at_limit.ptr<uint8_t>(y);
+    auto* out = accepted.ptr<float>(y);
+    const auto min_score = static_cast<float>(options.min_score);
+    const auto min_confidence = static_cast<float>(options.min_confidence);
     for (int x = 0; x < size.width; ++x) {
-      const float inverse_range = estimate.inverse_range.at<float>(y, x);
-      if (!(inverse_range > 0.0f)) {
-        continue;
-      }
-      const float relative_sigma = sigma.at<float>(y, x) / inverse_range;
-      const float confidence = calibratedConfidence(pixelConfidence(input, estimate, x, y, relative_sigma) *
-                                                    support[static_cast<size_t>(x)]);
-      map->confidence.at<float>(y, x) = confidence;
-      const bool is_accepted = estimate.at_limit.at<uint8_t>(y, x) == 0 &&
-                               estimate.score.at<float>(y, x) >= static_cast<float>(options.min_score) &&
-                               confidence >= static_cast<float>(options.min_confidence);
-      if (is_accepted || !options.gate) {
-        accepted.at<float>(y, x) = inverse_range;
-      }
+      const bool passes = (at_limit[x] == 0) & (score[x] >= min_score) &
+                          (confidence[static_cast<size_t>(x)] >= min_confidence);
+      const bool is_accepted = (inverse_range[x] > 0.0f) & (passes | !options.gate);
+      out[x] = is_accepted ? inverse_range[x] : kNaN;
     }
+    std::copy(confidence.begin(), confidence.end(), map->confidence.ptr<float>(y));
   });
   forEachRow(size.height, [&](int y) {
     const std::vector<float> roughness = neighbourhoodRoughness(accepted, y);
+    const auto* inverse_range = accepted.ptr<float>(y);
+    const auto* deviation = sigma.ptr<float>(y);
+    auto* range = map->range_m.ptr<float>(y);
+    auto* range_deviation = map->standard_deviation_m.ptr<float>(y);
+    auto* confidence = map->confidence.ptr<float>(y);
+    const auto max_relative_sigma = static_cast<float>(options.max_relative_sigma);
     for (int x = 0; x < size.width; ++x) {
-      const float inverse_range = accepted.at<float>(y, x);
-      const float relative_sigma =
-          std::hypot(sigma.at<float>(y, x), kRoughnessFactor * roughness[static_cast<size_t>(x)]) /
-          inverse_range;
-      const bool too_uncertain = relative_sigma > static_cast<float>(options.max_relative_sigma);
-      if (std::isnan(inverse_range) || (options.gate && too_uncertain)) {
-        map->confidence.at<float>(y, x) = 0.0f;
-        continue;
-      }
-      map->range_m.at<float>(y, x) = 1.0f / inverse_range;
-      map->standard_deviation_m.at<float>(y, x) = relative_sigma / inverse_range;
+      const float rough = kRoughnessFactor * roughness[static_cast<size_t>(x)];
+      const float relative_sigma = std::sqrt(square(deviation[x]) + square(rough)) / inverse_range[x];
+      const bool known = (inverse_range[x] > 0.0f) & !(options.gate & (relative_sigma > max_relative_sigma));
+      range[x] = known ? 1.0f / inverse_range[x] : kNaN;
+      range_deviation[x] = known ? relative_sigma / inverse_range[x] : kNaN;
+      confidence[x] = known ? confidence[x] : 0.0f;
     }
   });
 }

@@ -4,138 +4,133 @@
 #include <cmath>
 #include <limits>
 
-#include <opencv2/imgproc.hpp>
-
 #include "parallel_rows.h"
+#include "pooled_mat.h"
 #include "range_uncertainty.h"
+#include "surface_smoothing.h"
 
 namespace vcharge {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-struct Parabola {
-  float offset = 0.0f;     ///< of the maximum, in hypotheses
-  float curvature = kNaN;  ///< negative second difference
-  float rise = 0.0f;       ///< of the maximum over the middle score
+constexpr float kPerScore = 1.0f / kScoreScale;
+
+/// A tile's scores as they are read along its rows, pixel by pixel, which the layout spreads.
+class RowReader {
+ public:
+  RowReader(const Hypotheses& hypotheses, const TileScores& scores, int first_plane)
+      : hypotheses_(hypotheses), scores_(scores), first_plane_(first_plane) {
+    for (size_t slot = 0; slot < scores.slots.size(); ++slot) {
+      const int hypothesis = scores.slots[slot];
+      offsets_.push_back(hypothesis == kGap ? kNaN : hypotheses.offsets[static_cast<size_t>(hypothesis)]);
+      inside_.push_back(scores.isInside(static_cast<int>(slot)) ? 1 : 0);
+    }
+  }
+
+  void setRow(int row) {
+    row_ = static_cast<size_t>(row);
+    first_ = row_ * scores_.layout.rowSize();
+    weight_ = hypotheses_.weight.ptr<float>(scores_.tile.y + row) + scores_.tile.x;
+  }
+  // Of the row's pixels: by their place in the layout's row.
+  int best(size_t pixel) const { return scores_.best[first_ + pixel]; }
+  int score(size_t pixel) const { return scores_.best_score[first_ + pixel]; }
+  Parabola parabola(size_t pixel) const {
+    return fitParabola(scores_.before[first_ + pixel], score(pixel), scores_.after[first_ + pixel]);
+  }
+  int second(size_t pixel) const { return scores_.second[first_ + pixel]; }
+  float secondScore(size_t pixel) const {
+    return second(pixel) >= 0 ? kPerScore * static_cast<float>(scores_.second_score[first_ + pixel]) : -1.0f;
+  }
+  uint32_t voters(int slot, size_t pixel) const { return scores_.voters(slot, row_, pixel); }
+
+  float weight(int column) const { return weight_[column]; }
+  float offset(int slot) const { return offsets_[static_cast<size_t>(slot)]; }
+  float step() const { return hypotheses_.offsets[1] - hypotheses_.offsets[0]; }
+  bool isInside(int slot) const { return inside_[static_cast<size_t>(slot)] != 0; }
+  int plane(int slot) const { return first_plane_ + scores_.slots[static_cast<size_t>(slot)]; }
+
+  /// Score of the best of the two highest peaks that lies further than `separation` from `inverse_range`; -1
+  /// where there is none.
+  float bestPeakApart(size_t pixel, int column, float inverse_range, float separation) const {
+    const auto is_apart = [&](int slot) {
+      return slot >= 0 && std::abs(offset(slot) * weight(column) - inverse_range) > separation;
+    };
+    if (is_apart(best(pixel))) {
+      return kPerScore * static_cast<float>(score(pixel));
+    }
+    return is_apart(second(pixel)) ? secondScore(pixel) : -1.0f;
+  }
+
+ private:
+  const Hypotheses& hypotheses_;
+  const TileScores& scores_;
+  const int first_plane_;
+  std::vector<float> offsets_;  // by slot
+  std::vector<uint8_t> inside_;
+  size_t row_ = 0, first_ = 0;
+  const float* weight_ = nullptr;
 };
 
-/// Parabola through three scores whose middle one is the highest (Tian and Huhns 1986).
-Parabola fitParabola(float before, float middle, float after) {
+/// Of each column of a tile its place in the rows of the layout.
+std::vector<size_t> placesOf(const TileScores& scores) {
+  std::vector<size_t> places(static_cast<size_t>(scores.tile.width));
+  for (int column = 0; column < scores.tile.width; ++column) {
+    places[static_cast<size_t>(column)] = scores.layout.index(0, column);
+  }
+  return places;
+}
+
+/// The rows of an estimate that start at a tile's column.
+struct EstimateRow {
+  float *inverse_range, *step, *score, *curvature, *second_score;
+  int *plane, *voters;
+  uint8_t* at_limit;
+
+  EstimateRow(SurfaceEstimate* estimate, int x, int y)
+      : inverse_range(estimate->inverse_range.ptr<float>(y) + x),
+        step(estimate->step.ptr<float>(y) + x),
+        score(estimate->score.ptr<float>(y) + x),
+        curvature(estimate->curvature.ptr<float>(y) + x),
+        second_score(estimate->second_score.ptr<float>(y) + x),
+        plane(estimate->plane.ptr<int>(y) + x),
+        voters(estimate->voters.ptr<int>(y) + x),
+        at_limit(estimate->at_limit.ptr<uint8_t>(y) + x) {}
+};
+
+}  // namespace
+
+Parabola fitParabola(int before, int middle, int after) {
   Parabola parabola;
-  const float curvature = 2.0f * middle - before - after;
-  if (curvature > 1e-6f) {
-    parabola.curvature = curvature;
-    parabola.offset = std::clamp(0.5f * (after - before) / curvature, -0.5f, 0.5f);
-    parabola.rise = 0.125f * (after - before) * (after - before) / curvature;
+  const int curvature = 2 * middle - before - after;
+  if (curvature > 0) {
+    const auto scaled = static_cast<float>(curvature);
+    parabola.curvature = kPerScore * scaled;
+    parabola.offset = std::clamp(0.5f * static_cast<float>(after - before) / scaled, -0.5f, 0.5f);
   }
   return parabola;
 }
 
-float correlation(int16_t score) {
-  return score == kNoScore ? kNaN : static_cast<float>(score) / kScoreScale;
-}
-
-/// Calls function(x, y, pixel of the layout) for the pixels of a tile.
-template <class Function>
-void forEachPixel(const TileScores& scores, const Function& function) {
-  for (int row = 0; row < scores.tile.height; ++row) {
-    for (int column = 0; column < scores.tile.width; ++column) {
-      function(scores.tile.x + column, scores.tile.y + row, scores.layout.index(row, column));
-    }
-  }
-}
-
-float offsetOf(const Hypotheses& hypotheses, const TileScores& scores, int slot) {
-  return hypotheses.offsets[static_cast<size_t>(scores.slots[static_cast<size_t>(slot)])];
-}
-
-/// Score of a family's best peak that lies further than `separation` from `inverse_range`, of its two highest
-/// ones; -1 where there is none.
-float bestPeakApart(const Hypotheses& hypotheses, const TileScores& scores, size_t pixel, float weight,
-                    float inverse_range, float separation) {
-  const int16_t indices[] = {scores.best[pixel], scores.second[pixel]};
-  const int16_t values[] = {scores.best_score[pixel], scores.second_score[pixel]};
-  for (int i = 0; i < 2; ++i) {
-    if (indices[i] >= 0 &&
-        std::abs(offsetOf(hypotheses, scores, indices[i]) * weight - inverse_range) > separation) {
-      return correlation(values[i]);
-    }
-  }
-  return -1.0f;
-}
-
-/// Mean over a square of those values that are not NaN; NaN where there is none.
-cv::Mat meanOfKnown(const cv::Mat& values, int side) {
-  cv::Mat known = values == values;  // NaN differs from itself
-  cv::Mat filled = values.clone(), weights, sum, weight_sum;
-  filled.setTo(0.0f, ~known);
-  known.convertTo(weights, CV_32F, 1.0 / 255.0);
-  cv::boxFilter(filled, sum, CV_32F, cv::Size(side, side), cv::Point(-1, -1), false, cv::BORDER_CONSTANT);
-  cv::boxFilter(weights, weight_sum, CV_32F, cv::Size(side, side), cv::Point(-1, -1), false,
-                cv::BORDER_CONSTANT);
-  cv::Mat mean(values.size(), CV_32FC1, cv::Scalar(kNaN));
-  forEachRow(mean.rows, [&](int y) {
-    for (int x = 0; x < mean.cols; ++x) {
-      const float weight = weight_sum.at<float>(y, x);
-      if (weight > 0.5f) {
-        mean.at<float>(y, x) = sum.at<float>(y, x) / weight;
-      }
-    }
-  });
-  return mean;
-}
-
-/// Fills unknown values from ever larger neighbourhoods.
-cv::Mat fillUnknown(const cv::Mat& values) {
-  cv::Mat filled = values.clone();
-  for (int side = 5; side < 2 * std::max(values.cols, values.rows); side *= 3) {
-    const cv::Mat unknown = filled != filled;
-    if (cv::countNonZero(unknown) == 0) {
-      break;
-    }
-    meanOfKnown(filled, side | 1).copyTo(filled, unknown);
-  }
-  return filled;
-}
-
-/// The surface without outliers and plane steps: median, then the mean of those neighbours that lie within
-/// one step.
-cv::Mat smoothSurface(const SweepKernels& kernels, const SurfaceEstimate& estimate) {
-  constexpr int kRadius = 4, kStep = 2;
-  cv::Mat median, padded;
-  cv::medianBlur(fillUnknown(estimate.inverse_range), median, 5);
-  cv::copyMakeBorder(median, padded, 0, 0, kRadius, kRadius, cv::BORDER_CONSTANT, cv::Scalar(kNaN));
-  cv::Mat smooth = median.clone();
-  forEachRow(smooth.rows, [&](int y) {
-    std::vector<const float*> rows;
-    for (int v = std::max(0, y - kRadius); v <= std::min(smooth.rows - 1, y + kRadius); v += kStep) {
-      rows.push_back(padded.ptr<float>(v) + kRadius);
-    }
-    const auto columns = static_cast<size_t>(smooth.cols);
-    std::vector<float> number(columns), sum(columns);
-    kernels.sumAgreeing({columns, rows.data(), static_cast<int>(rows.size()), kRadius, kStep,
-                         median.ptr<float>(y), estimate.step.ptr<float>(y)},
-                        number.data(), sum.data());
-    auto* row = smooth.ptr<float>(y);
-    for (size_t x = 0; x < columns; ++x) {
-      row[x] = number[x] > 0.0f ? sum[x] / number[x] : row[x];
-    }
-  });
-  return smooth;
-}
-
-}  // namespace
-
 SurfaceEstimate::SurfaceEstimate(cv::Size size)
-    : inverse_range(size, CV_32FC1, cv::Scalar(kNaN)),
-      step(size, CV_32FC1, cv::Scalar(kNaN)),
-      score(size, CV_32FC1, cv::Scalar(kNaN)),
-      curvature(size, CV_32FC1, cv::Scalar(kNaN)),
-      second_score(size, CV_32FC1, cv::Scalar(-1.0f)),
-      plane(size, CV_32SC1, cv::Scalar(-1)),
-      voters(size, CV_32SC1, cv::Scalar(0)),
-      at_limit(size, CV_8UC1, cv::Scalar(0)) {}
+    : inverse_range(pooledMat(size, CV_32FC1)),
+      step(pooledMat(size, CV_32FC1)),
+      score(pooledMat(size, CV_32FC1)),
+      curvature(pooledMat(size, CV_32FC1)),
+      second_score(pooledMat(size, CV_32FC1)),
+      plane(pooledMat(size, CV_32SC1)),
+      voters(pooledMat(size, CV_32SC1)),
+      at_limit(pooledMat(size, CV_8UC1)) {
+  forEachRow(size.height, [&](int y) {
+    for (cv::Mat* mat : {&inverse_range, &step, &score, &curvature}) {
+      std::fill_n(mat->ptr<float>(y), size.width, kNaN);
+    }
+    std::fill_n(second_score.ptr<float>(y), size.width, -1.0f);
+    std::fill_n(plane.ptr<int>(y), size.width, -1);
+    std::fill_n(voters.ptr<int>(y), size.width, 0);
+    std::fill_n(at_limit.ptr<uint8_t>(y), size.width, uint8_t{0});
+  });
+}
 
 Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays, const cv::Mat& valid_mask,
                                int window_px) {
@@ -159,55 +154,55 @@ Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays, 
 
 void readPeaks(const std::vector<Hypotheses>& hypotheses, const std::vector<TileScores>& scores,
                bool interpolate, SurfaceEstimate* estimate) {
-  forEachPixel(scores.front(), [&](int x, int y, size_t pixel) {
-    int family = -1;
-    int16_t best_score = kNoScore;
-    for (size_t f = 0; f < hypotheses.size(); ++f) {
-      const int best = scores[f].best[pixel];
-      if (best < 0 || (f > 0 && !scores[f].isInside(best))) {
+  std::vector<RowReader> families;
+  int first_plane = 0;
+  for (size_t f = 0; f < hypotheses.size(); ++f) {
+    families.emplace_back(hypotheses[f], scores[f], first_plane);
+    first_plane += static_cast<int>(hypotheses[f].offsets.size());
+  }
+  const cv::Rect tile = scores.front().tile;
+  const std::vector<size_t> places = placesOf(scores.front());
+  for (int row = 0; row < tile.height; ++row) {
+    for (RowReader& family : families) {
+      family.setRow(row);
+    }
+    const EstimateRow out(estimate, tile.x, tile.y + row);
+    for (int column = 0; column < tile.width; ++column) {
+      const size_t pixel = places[static_cast<size_t>(column)];
+      const RowReader* chosen = nullptr;
+      int best_score = kNoScore;
+      for (const RowReader& family : families) {
+        const int best = family.best(pixel);
+        const bool counts = best >= 0 && (&family == &families.front() || family.isInside(best));
+        if (counts && family.score(pixel) > best_score) {
+          best_score = family.score(pixel);
+          chosen = &family;
+        }
+      }
+      if (chosen == nullptr) {
         continue;
       }
-      if (scores[f].best_score[pixel] > best_score) {
-        best_score = scores[f].best_score[pixel];
-        family = static_cast<int>(f);
+      const int best = chosen->best(pixel);
+      const float step = chosen->step() * chosen->weight(column);
+      const bool at_limit = !chosen->isInside(best);
+      const Parabola parabola = at_limit ? Parabola() : chosen->parabola(pixel);
+      const float inverse_range = chosen->offset(best) * chosen->weight(column);
+      float second = chosen->secondScore(pixel);
+      for (const RowReader& family : families) {
+        if (&family != chosen) {
+          second = std::max(second, family.bestPeakApart(pixel, column, inverse_range, 2.0f * step));
+        }
       }
+      out.inverse_range[column] = inverse_range + (interpolate ? parabola.offset * step : 0.0f);
+      out.step[column] = step;
+      out.score[column] = kPerScore * static_cast<float>(best_score);
+      out.curvature[column] = parabola.curvature / (step * step);
+      out.second_score[column] = second;
+      out.plane[column] = chosen->plane(best);
+      out.voters[column] = static_cast<int>(chosen->voters(best, pixel));
+      out.at_limit[column] = at_limit ? 255 : 0;
     }
-    if (family < 0) {
-      return;
-    }
-    const auto f = static_cast<size_t>(family);
-    const Hypotheses& planes = hypotheses[f];
-    const int best = scores[f].best[pixel];
-    const float weight = planes.weight.at<float>(y, x);
-    const float step = (planes.offsets[1] - planes.offsets[0]) * weight;
-    const bool at_limit = !scores[f].isInside(best);
-    Parabola parabola;
-    if (!at_limit) {
-      parabola = fitParabola(correlation(scores[f].before[pixel]), correlation(best_score),
-                             correlation(scores[f].after[pixel]));
-    }
-    const float inverse_range = offsetOf(planes, scores[f], best) * weight;
-    int plane = scores[f].slots[static_cast<size_t>(best)];
-    float second = scores[f].second[pixel] >= 0 ? correlation(scores[f].second_score[pixel]) : -1.0f;
-    for (size_t g = 0; g < hypotheses.size(); ++g) {
-      if (g < f) {
-        plane += static_cast<int>(hypotheses[g].offsets.size());
-      }
-      if (g != f) {
-        const float other = bestPeakApart(hypotheses[g], scores[g], pixel,
-                                          hypotheses[g].weight.at<float>(y, x), inverse_range, 2.0f * step);
-        second = std::max(second, other);
-      }
-    }
-    estimate->inverse_range.at<float>(y, x) = inverse_range + (interpolate ? parabola.offset * step : 0.0f);
-    estimate->step.at<float>(y, x) = step;
-    estimate->score.at<float>(y, x) = correlation(best_score);
-    estimate->curvature.at<float>(y, x) = parabola.curvature / (step * step);
-    estimate->second_score.at<float>(y, x) = second;
-    estimate->plane.at<int>(y, x) = plane;
-    estimate->voters.at<int>(y, x) = static_cast<int>(scores[f].voters(best, pixel));
-    estimate->at_limit.at<uint8_t>(y, x) = at_limit ? 255 : 0;
-  });
+  }
 }
 
 Hypotheses makeRefinement(const SweepInput& input, const cv::Mat& window_counts,
@@ -215,8 +210,8 @@ Hypotheses makeRefinement(const SweepInput& input, const cv::Mat& window_counts,
   const int half = input.options->num_refinement_steps / 2;
   Hypotheses refinement;
   refinement.window_counts = window_counts;
-  refinement.base = smoothSurface(input.kernels, estimate);
-  refinement.weight = cv::Mat(refinement.base.size(), CV_32FC1, cv::Scalar(kNaN));
+  refinement.base = smoothSurface(input.kernels, estimate.inverse_range, estimate.step);
+  refinement.weight = pooledMat(refinement.base.size(), CV_32FC1);
   for (int k = -half; k <= half; ++k) {
     refinement.offsets.push_back(static_cast<float>(k));
   }
@@ -242,31 +237,34 @@ Hypotheses makeRefinement(const SweepInput& input, const cv::Mat& window_counts,
 void readRefinement(const Hypotheses& refinement, const TileScores& scores, bool interpolate,
                     SurfaceEstimate* estimate) {
   const int last = static_cast<int>(refinement.offsets.size()) - 1;
-  forEachPixel(scores, [&](int x, int y, size_t pixel) {
-    const int best = scores.best[pixel];
-    if (best <= 0 || best == last) {
-      return;
+  RowReader reader(refinement, scores, 0);
+  const std::vector<size_t> places = placesOf(scores);
+  for (int row = 0; row < scores.tile.height; ++row) {
+    reader.setRow(row);
+    const EstimateRow out(estimate, scores.tile.x, scores.tile.y + row);
+    const auto* base = refinement.base.ptr<float>(scores.tile.y + row) + scores.tile.x;
+    for (int column = 0; column < scores.tile.width; ++column) {
+      const size_t pixel = places[static_cast<size_t>(column)];
+      const int best = reader.best(pixel);
+      if (best <= 0 || best == last) {
+        continue;
+      }
+      const float best_score = kPerScore * static_cast<float>(reader.score(pixel));
+      const float weight = reader.weight(column);
+      const float peak = base[column] + reader.offset(best) * weight;
+      // The first sweep's winner is another peak when the refinement ended far from it and scores less.
+      if (best_score < out.score[column] && std::abs(peak - out.inverse_range[column]) > out.step[column]) {
+        continue;
+      }
+      const Parabola parabola = reader.parabola(pixel);
+      out.inverse_range[column] = peak + (interpolate ? parabola.offset * weight : 0.0f);
+      out.step[column] = weight;
+      out.score[column] = best_score;
+      out.curvature[column] = parabola.curvature / (weight * weight);
+      out.voters[column] = static_cast<int>(reader.voters(best, pixel));
+      out.at_limit[column] = 0;
     }
-    const float best_score = correlation(scores.best_score[pixel]);
-    const float weight = refinement.weight.at<float>(y, x);
-    const float peak =
-        refinement.base.at<float>(y, x) + refinement.offsets[static_cast<size_t>(best)] * weight;
-    float& inverse_range = estimate->inverse_range.at<float>(y, x);
-    float& step = estimate->step.at<float>(y, x);
-    float& score = estimate->score.at<float>(y, x);
-    // The first sweep's winner is another peak when the refinement ended far from it and scores less.
-    if (best_score < score && std::abs(peak - inverse_range) > step) {
-      return;
-    }
-    const Parabola parabola =
-        fitParabola(correlation(scores.before[pixel]), best_score, correlation(scores.after[pixel]));
-    inverse_range = peak + (interpolate ? parabola.offset * weight : 0.0f);
-    step = weight;
-    score = best_score;
-    estimate->curvature.at<float>(y, x) = parabola.curvature / (weight * weight);
-    estimate->voters.at<int>(y, x) = static_cast<int>(scores.voters(best, pixel));
-    estimate->at_limit.at<uint8_t>(y, x) = 0;
-  });
+  }
 }
 
 }  // namespace vcharge

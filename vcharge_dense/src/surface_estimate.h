@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -23,6 +24,15 @@ struct SurfaceEstimate {
   cv::Mat voters;        ///< CV_32SC1: bit n for neighbour n
   cv::Mat at_limit;      ///< CV_8UC1: not 0 where the planes on both sides of the best one were not scored
 };
+
+struct Parabola {
+  float offset = 0.0f;                                        ///< of the maximum, in hypotheses
+  float curvature = std::numeric_limits<float>::quiet_NaN();  ///< negative second difference of correlations
+};
+
+/// Parabola through three scores whose middle one is the highest (Tian and Huhns 1986); scores as in
+/// TileScores.
+Parabola fitParabola(int before, int middle, int after);
 
 /// The planes of a family as hypotheses: base 0, weight -normal . ray, NaN where a ray does not meet them.
 Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays, const cv::Mat& valid_mask,

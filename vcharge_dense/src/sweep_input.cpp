@@ -1,9 +1,14 @@
 #include "sweep_input.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include <opencv2/imgproc.hpp>
+
+#include "parallel_rows.h"
+#include "pooled_mat.h"
 
 namespace vcharge {
 namespace {
@@ -11,6 +16,60 @@ namespace {
 // Nodes this far from the packed image's ends count as unseen: interpolated positions lie between them, or a
 // little beyond.
 constexpr float kInset_px = 4.0f;
+
+/// Finds the reference's mean and inverse deviation in the rows `begin` to `end`.
+void findMoments(int begin, int end, int window, double min_squares, SweepReference* reference) {
+  const cv::Mat& samples = reference->samples;
+  const int radius = window / 2;
+  const double count = window * window;
+  const auto per_count = static_cast<float>(1.0 / count);
+  const auto columns = static_cast<size_t>(samples.cols);
+  // Sums over a window of rows, per column; then over a window of columns, per first one.
+  std::vector<int32_t> sums(columns, 0), squares(columns, 0), sum(columns), square(columns);
+  const auto addRow = [&](int y, int sign) {
+    const auto* row = samples.ptr<int16_t>(y);
+    for (size_t x = 0; x < columns; ++x) {
+      sums[x] += sign * row[x];
+      squares[x] += sign * row[x] * row[x];
+    }
+  };
+  bool has_sums = false;
+  for (int y = begin; y < end; ++y) {
+    auto* mean_row = reference->mean.ptr<float>(y);
+    auto* inverse_row = reference->inverse_deviation.ptr<float>(y);
+    std::fill_n(mean_row, columns, 0.0f);
+    std::fill_n(inverse_row, columns, std::numeric_limits<float>::quiet_NaN());
+    if (y < radius || y + radius >= samples.rows || samples.cols < window) {
+      continue;
+    }
+    if (has_sums) {
+      addRow(y - radius - 1, -1);
+      addRow(y + radius, 1);
+    }
+    for (int v = y - radius; v <= y + radius && !has_sums; ++v) {
+      addRow(v, 1);
+    }
+    has_sums = true;
+    const size_t num_windows = columns + 1 - static_cast<size_t>(window);
+    std::fill(sum.begin(), sum.end(), 0);
+    std::fill(square.begin(), square.end(), 0);
+    for (size_t i = 0; i < static_cast<size_t>(window); ++i) {
+      for (size_t x = 0; x < num_windows; ++x) {
+        sum[x] += sums[x + i];
+        square[x] += squares[x + i];
+      }
+    }
+    mean_row += radius;
+    inverse_row += radius;
+    for (size_t x = 0; x < num_windows; ++x) {
+      const double total = sum[x];
+      const double about_mean = square[x] - total * total / count;
+      const float inverse = 1.0f / std::sqrt(static_cast<float>(about_mean));
+      mean_row[x] = static_cast<float>(total) * per_count;
+      inverse_row[x] = about_mean >= min_squares ? inverse : std::numeric_limits<float>::quiet_NaN();
+    }
+  }
+}
 
 }  // namespace
 
@@ -37,63 +96,26 @@ Projection SweepNeighbour::projectionOf(const MeiCamera& camera) const {
 
 SweepReference::SweepReference(const cv::Mat& pixels, const PlaneSweepOptions& options,
                                const SampleScale& scale)
-    : samples(pixels.size(), CV_16SC1),
-      mean(pixels.size(), CV_32FC1, cv::Scalar(0.0f)),
-      inverse_deviation(pixels.size(), CV_32FC1, cv::Scalar(std::numeric_limits<float>::quiet_NaN())) {
-  cv::Mat table(1, 256, CV_16SC1);
+    : samples(pooledMat(pixels.size(), CV_16SC1)),
+      mean(pooledMat(pixels.size(), CV_32FC1)),
+      inverse_deviation(pooledMat(pixels.size(), CV_32FC1)) {
+  int16_t table[256];
   for (int gray = 0; gray < 256; ++gray) {
-    table.at<int16_t>(gray) = static_cast<int16_t>(scale.sample(gray));
+    table[gray] = static_cast<int16_t>(scale.sample(gray));
   }
-  for (int y = 0; y < pixels.rows; ++y) {
+  forEachRow(pixels.rows, [&](int y) {
     const auto* from = pixels.ptr<uint8_t>(y);
     auto* to = samples.ptr<int16_t>(y);
     for (int x = 0; x < pixels.cols; ++x) {
-      to[x] = table.at<int16_t>(from[x]);
+      to[x] = table[from[x]];
     }
-  }
+  });
   const int window = options.window_px;
-  const int radius = window / 2;
   const int count = window * window;
   const double per_gray = static_cast<double>(kWeightSum * kWeightSum) / (1 << scale.shift);
   const double min_squares =
       std::max(static_cast<double>(scale.min_squares), count * std::pow(options.min_texture * per_gray, 2.0));
-  if (pixels.rows < window || pixels.cols < window) {
-    return;
-  }
-  // Sums over a window of rows, per column; then over a window of columns.
-  const auto columns = static_cast<size_t>(pixels.cols);
-  std::vector<int32_t> sums(columns, 0), squares(columns, 0);
-  const auto addRow = [&](int y, int sign) {
-    const auto* row = samples.ptr<int16_t>(y);
-    for (size_t x = 0; x < columns; ++x) {
-      sums[x] += sign * row[x];
-      squares[x] += sign * row[x] * row[x];
-    }
-  };
-  for (int y = 0; y < pixels.rows; ++y) {
-    addRow(y, 1);
-    if (y < window - 1) {
-      continue;
-    }
-    auto* mean_row = mean.ptr<float>(y - radius) + radius;
-    auto* inverse_row = inverse_deviation.ptr<float>(y - radius) + radius;
-    int64_t sum = 0, square = 0;
-    for (int x = 0; x < pixels.cols; ++x) {
-      sum += sums[static_cast<size_t>(x)];
-      square += squares[static_cast<size_t>(x)];
-      if (x >= window - 1) {
-        const int start = x + 1 - window;
-        const double about_mean = static_cast<double>(count * square - sum * sum) / count;
-        mean_row[start] = static_cast<float>(sum) / static_cast<float>(count);
-        if (about_mean >= min_squares) {
-          inverse_row[start] = static_cast<float>(1.0 / std::sqrt(about_mean));
-        }
-        sum -= sums[static_cast<size_t>(start)];
-        square -= squares[static_cast<size_t>(start)];
-      }
-    }
-    addRow(y + 1 - window, -1);
-  }
+  forEachBand(pixels.rows, [&](int begin, int end) { findMoments(begin, end, window, min_squares, this); });
 }
 
 cv::Mat windowsInside(const cv::Mat& counts, int window_px) {

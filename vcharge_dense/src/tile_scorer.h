@@ -27,7 +27,10 @@ struct TileScores {
   AlignedArray<int16_t> best, best_score, before, after, second, second_score;  ///< see Peaks, by slot
 
   /// Bit n: neighbour n took part in the slot's score at a pixel.
-  uint32_t voters(int slot, size_t pixel) const;
+  uint32_t voters(int slot, size_t pixel) const {
+    return voters(slot, pixel / layout.rowSize(), pixel % layout.rowSize());
+  }
+  uint32_t voters(int slot, size_t row, size_t pixel_in_row) const;
   /// The hypotheses before and after the slot's were scored as well.
   bool isInside(int slot) const;
 };
@@ -36,16 +39,16 @@ enum class TileSize {
   kLarge,  ///< fewest windows that reach beyond a tile
   kSmall,  ///< fewest depths in a tile
 };
-/// Tiles of the pixels whose window lies in an image. Their size is fixed, whoever computes them.
+/// Tiles of the pixels whose window lies in an image. Their sizes are fixed, whoever computes them; to be
+/// taken in order.
 std::vector<cv::Rect> makeTiles(cv::Size image, int window_px, TileSize size = TileSize::kLarge);
 
 /// Correlates a tile of the reference with its neighbours (at least one) warped over hypothetical surfaces.
-/// One object per thread, for any number of tiles.
+/// One object per thread, for any number of tiles; it keeps its memory.
 class TileScorer {
  public:
-  explicit TileScorer(const SweepInput& input);
-
-  void setTile(const cv::Rect& tile);
+  /// The input is used until the next call.
+  void setTile(const SweepInput& input, const cv::Rect& tile);
   void score(const Hypotheses& hypotheses, TileScores* result);
   /// Only some hypotheses, see TileScores.
   void score(const Hypotheses& hypotheses, const std::vector<int>& slots, TileScores* result);
@@ -59,15 +62,17 @@ class TileScorer {
     const NodeGrid* grid = nullptr;  // null: every pixel is projected
   };
 
-  size_t ringRows() const { return static_cast<size_t>(input_.options->window_px) + 1; }
+  size_t ringRows() const { return static_cast<size_t>(input_->options->window_px) + 1; }
+  void setInput(const SweepInput& input);
   void loadSurface(const Hypotheses& hypotheses);
   void placeNeighbour(const Hypotheses& hypotheses, float offset, Neighbour* neighbour);
   void scoreSlot(const Hypotheses& hypotheses, size_t slot, TileScores* result);
 
-  const SweepInput& input_;
-  const int radius_;
+  const SweepInput* input_ = nullptr;
+  int radius_ = 0;
   cv::Rect tile_;
-  TileLayout halo_;  // the tile with the rows and columns that windows reach into
+  int first_row_ = 0, end_row_ = 0;  // of the tile, between which windows count
+  TileLayout halo_;                  // the tile with the rows and columns that windows reach into
   std::vector<std::unique_ptr<NodeGrid>> grids_;  // coarse to fine
   std::vector<Neighbour> neighbours_;
   AlignedArray<int32_t> reference_pairs_;
@@ -76,7 +81,7 @@ class TileScorer {
   AlignedArray<float> ray_x_, ray_y_, ray_z_, base_, weight_;  // with the halo
   AlignedArray<int32_t> u_, v_;                                // of one row
   AlignedArray<int32_t> votes_;                                // of one row, per neighbour
-  std::unique_ptr<bool[]> after_;
+  AlignedArray<bool> after_;
 };
 
 }  // namespace vcharge

@@ -18,7 +18,10 @@
 namespace vcharge {
 
 class CoarsePass;
+class FarPlanes;
 class SweepLevel;
+struct SurfaceEstimate;
+struct SweepInput;
 
 /// One image of the swept camera and where it was taken.
 struct SweepImage {
@@ -67,8 +70,13 @@ class PlaneSweep {
   const std::vector<PlaneFamily>& families() const;
 
  private:
+  SurfaceEstimate sweepPlanes(const SweepInput& input, const cv::Mat& reference_pixels,
+                              const std::vector<SweepImage>& neighbours,
+                              const std::vector<cv::Rect>& large_tiles) const;
+
   std::shared_ptr<const SweepLevel> level_;
   std::shared_ptr<const CoarsePass> coarse_;  // null: all planes
+  std::shared_ptr<const FarPlanes> far_;      // null: all at full resolution
 };
 
 }  // namespace vcharge

@@ -66,6 +66,16 @@ struct PlaneSweepOptions {
   /// what that found; all of them where it found little. Fewer planes, less time (package README, Settings).
   bool coarse_pass = false;
 
+  /// The fronto-parallel planes beyond this distance are swept at half the resolution, 0: none of them. The
+  /// refinement steps see the whole resolution.
+  double half_resolution_beyond_m = 0.0;
+
+  /// Looks for the planes of all pixels together, see the package README (Settings): a step to the next plane
+  /// between neighbouring pixels costs smoothness_step of correlation, any other jump smoothness_jump.
+  bool semi_global_smoothing = false;
+  double smoothness_step = 0.03;
+  double smoothness_jump = 0.3;
+
   int window_px = 7;  ///< odd side of the square matching window (zero-mean normalized cross correlation)
   Aggregation aggregation = Aggregation::kMean;
   int best_k = 2;
@@ -103,6 +113,10 @@ struct PlaneSweepOptions {
     visit("ground_max_height_m", ground_max_height_m);
     visit("num_ground_planes", num_ground_planes);
     visit("coarse_pass", coarse_pass);
+    visit("half_resolution_beyond_m", half_resolution_beyond_m);
+    visit("semi_global_smoothing", semi_global_smoothing);
+    visit("smoothness_step", smoothness_step);
+    visit("smoothness_jump", smoothness_jump);
     visit("window_px", window_px);
     visit("aggregation", aggregation);
     visit("best_k", best_k);
