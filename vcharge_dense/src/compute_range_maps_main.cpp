@@ -45,7 +45,6 @@ RangeMapperOptions readOptions(const Arguments& arguments) {
   RangeMapperOptions options = arguments.online ? RangeMapperOptions() : RangeMapperOptions::offline();
   if (!arguments.trajectory.empty()) {
     options.plane_sweep.pose_noise = PoseNoiseOptions::trajectory();
-    options.plane_sweep.refine_poses = false;  // tracks would add more error than such poses have
   }
   const std::vector<std::string> presets = enumNames<RangePreset>();
   const auto preset = std::find(presets.begin(), presets.end(), arguments.preset);

@@ -13,10 +13,10 @@ void requireNotNegative(const char* field, double value) {
 
 PoseNoiseOptions PoseNoiseOptions::trajectory() {
   PoseNoiseOptions noise;
-  noise.scale = 0.0;
-  noise.translation_m = 0.001;
+  noise.scale = 0.001;
+  noise.translation_m = 0.002;
   noise.translation_m_per_sqrt_m = 0.0;
-  noise.rotation_rad = 0.0002;
+  noise.rotation_rad = 0.0006;
   noise.rotation_rad_per_sqrt_m = 0.0;
   return noise;
 }
