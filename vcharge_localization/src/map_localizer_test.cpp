@@ -149,6 +149,53 @@ TEST(MapLocalizerTwinsTest, TwoPlacesThatLookAlikeAreAmbiguous) {
   EXPECT_LT(positionError(expected, truth), 0.02);
 }
 
+/// What a view of the map with bits shows, where the descriptors are the bits as numbers 0 and `one`.
+RigFeatures withNumbers(RigFeatures features, float one) {
+  for (ImageFeatures& image : features.images) {
+    image.descriptors = testing::descriptorsAsNumbers(image.descriptors, one);
+  }
+  return features;
+}
+
+/// Descriptors of numbers have other distances: those of SIFT are hundreds, those of RootSIFT about 1.
+TEST(MapLocalizerDescriptorTest, NumbersLocalizeAsBitsDo) {
+  const auto map = testing::makeTestMap({});
+  const RigidTransform truth = posesBetween(*map, 8);
+  testing::TestViewOptions view;
+  view.share_of_wrong = 0.3;
+  const RigFeatures bits = testing::makeTestView(*map, truth, view);
+  const PoseFix by_bits = MapLocalizer(map, rigOf(map)).localizeNear(bits, priorAbout(truth, 0.1, 0.0));
+  ASSERT_EQ(by_bits.status, LocalizationStatus::kLocalized);
+  for (const float one : {1.0F / 16.0F, 40.0F}) {
+    SparseMapContents contents = map->contents();
+    contents.descriptors = testing::descriptorsAsNumbers(contents.descriptors, one);
+    contents.feature_options = "type: sift\n";
+    const auto map_of_numbers = std::make_shared<const SparseMap>(std::move(contents));
+    const MapLocalizer localizer(map_of_numbers, rigOf(map_of_numbers));
+    const RigFeatures numbers = withNumbers(bits, one);
+    const PoseFix near = localizer.localizeNear(numbers, priorAbout(truth, 0.1, 0.0));
+    ASSERT_EQ(near.status, LocalizationStatus::kLocalized) << one;
+    EXPECT_GT(near.numInliers(), by_bits.numInliers() / 2);
+    const PoseFix anywhere = localizer.localizeAnywhere(numbers);
+    ASSERT_EQ(anywhere.status, LocalizationStatus::kLocalized) << one;
+    EXPECT_LT(positionError(anywhere, truth), 0.03);
+    const RigFeatures foreign = withNumbers(testing::makeForeignView(*map, 3), one);
+    EXPECT_NE(localizer.localizeAnywhere(foreign).status, LocalizationStatus::kLocalized);
+    // The limit counts: what differs as much as two landmarks do is no match.
+    EXPECT_LT(localizer.localizeNear(foreign, priorAbout(truth, 0.0, 0.0)).num_matches, 10);
+  }
+}
+
+TEST(MapLocalizerDescriptorTest, NeedsNoVocabulary) {
+  const auto map = testing::makeTestMap({});
+  SparseMapContents contents = map->contents();
+  contents.vocabulary.clear();
+  const auto bare = std::make_shared<const SparseMap>(std::move(contents));
+  const RigidTransform truth = posesBetween(*map, 8);
+  const PoseFix fix = MapLocalizer(bare, rigOf(bare)).localizeAnywhere(testing::makeTestView(*map, truth, {}));
+  EXPECT_EQ(fix.status, LocalizationStatus::kLocalized);
+}
+
 TEST(MapLocalizerInputTest, NamesWhatIsWrongWithAMap) {
   const auto map = testing::makeTestMap({});
   const auto expectError = [&](const char* text, const auto& change) {
@@ -162,8 +209,6 @@ TEST(MapLocalizerInputTest, NamesWhatIsWrongWithAMap) {
       EXPECT_NE(std::string(error.what()).find(text), std::string::npos) << error.what();
     }
   };
-  expectError("vocabulary", [](SparseMapContents* contents) { contents->vocabulary.clear(); });
-  expectError("vocabulary", [](SparseMapContents* contents) { contents->vocabulary = "garbage"; });
   expectError("feature_options", [](SparseMapContents* contents) { contents->feature_options = "type: {"; });
   expectError("feature_options",
               [](SparseMapContents* contents) { contents->feature_options = "detector: another\n"; });

@@ -12,7 +12,7 @@
 #include "vcharge_core/sparse_map.h"
 #include "vcharge_features/descriptor_matching.h"
 #include "vcharge_features/feature_extractor.h"
-#include "vcharge_features/place_index.h"
+#include "vcharge_features/place_votes.h"
 #include "vcharge_geometry/robust_options.h"
 #include "vcharge_localization/localization_status.h"
 
@@ -33,8 +33,12 @@ struct MapLocalizerOptions {
   double min_radius_px = 6.0;       ///< of search, at 1280 pixels of width; also of the second search
   double max_radius_px = 60.0;
   double radius_sigmas = 3.0;  ///< of the expected pose
+  /// Of the descriptors of a match, over the median distance between two landmarks of the map: the same for
+  /// all kinds of descriptors.
+  double max_relative_distance = 0.55;
   MatchOptions matching = closeMatches();
   // Place recognition.
+  PlaceVotesOptions places;
   int max_places = 12;                 ///< candidates
   double place_spacing_m = 2.5;        ///< candidates nearer to a better one are left out
   double place_spacing_rad = 0.6;      ///< unless they are turned by more
@@ -62,7 +66,9 @@ struct MapLocalizerOptions {
     visit("min_radius_px", min_radius_px);
     visit("max_radius_px", max_radius_px);
     visit("radius_sigmas", radius_sigmas);
+    visit("max_relative_distance", max_relative_distance);
     visit("matching", matching);
+    visit("places", places);
     visit("max_places", max_places);
     visit("place_spacing_m", place_spacing_m);
     visit("place_spacing_rad", place_spacing_rad);
@@ -110,13 +116,16 @@ struct RigFeatures {
   std::vector<Eigen::Matrix3Xd> rays_in_camera;  ///< unit rays of the features; zero where there is none
 };
 
+class LandmarkMatcher;
+struct LandmarkMatches;
+
 /// Finds a rig's pose in a sparse map (paper, section Localization; Lee et al., IJRR 2015). Immutable; any
 /// number of threads may use it at once. Data parallel inside, deterministic.
 class MapLocalizer {
  public:
   /// The rig may differ from the map's; its cameras may have other lenses and places.
   /// std::invalid_argument for bad options; InputError for a rig without extrinsics, or a map that no
-  /// extractor of this program can have made, or without a vocabulary.
+  /// extractor of this program can have made.
   MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
                const MapLocalizerOptions& options = MapLocalizerOptions());
   ~MapLocalizer();
@@ -135,15 +144,9 @@ class MapLocalizer {
   const SparseMap& map() const { return *map_; }
 
  private:
-  struct Matches;
-  cv::Mat descriptorsOf(const std::vector<size_t>& observations) const;
-  /// The landmark of one of the map's observations is what a feature shows.
-  void add(const RigFeatures& features, size_t camera, int observation_index, int feature_index,
-           float distance, const std::vector<size_t>& observations, Matches* matches) const;
-  Matches searchLandmarks(const RigFeatures& features, const RigidTransform& map_from_vehicle, double sigma_m,
-                          double sigma_rad) const;
-  Matches matchPlace(const RigFeatures& features, size_t camera, size_t keyframe, size_t place_camera) const;
-  PoseFix estimate(const Matches& matches, int min_inliers, double min_inlier_ratio) const;
+  /// A fix without a pose, with the counts of the matches.
+  PoseFix fixWithoutPose(const LandmarkMatches& matches) const;
+  PoseFix estimate(const LandmarkMatches& matches, int min_inliers, double min_inlier_ratio) const;
   PoseFix refine(const RigFeatures& features, const PoseFix& fix) const;
   std::vector<PlaceMatch> recognizePlaces(const RigFeatures& features) const;
   PoseFix localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const;
@@ -154,7 +157,8 @@ class MapLocalizer {
   const MapLocalizerOptions options_;
   std::unique_ptr<FeatureExtractor> extractor_;
   std::vector<cv::Mat> masks_;  // by camera
-  std::unique_ptr<PlaceIndex> places_;
+  std::unique_ptr<LandmarkMatcher> matcher_;
+  std::unique_ptr<PlaceVotes> places_;
 };
 
 }  // namespace vcharge
