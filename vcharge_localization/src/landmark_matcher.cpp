@@ -95,9 +95,8 @@ void LandmarkMatcher::add(const RigFeatures& features, size_t camera, size_t obs
   point.camera = static_cast<int>(camera);
   point.quality = -distance;
   matches->points.push_back(point);
-  matches->sightings.push_back(
-      {landmark, static_cast<int32_t>(camera),
-       features.images[camera].keypoints[static_cast<size_t>(feature)].position_px});
+  matches->sightings.push_back({landmark, static_cast<int32_t>(camera),
+                                features.images[camera].keypoints[static_cast<size_t>(feature)].position_px});
 }
 
 LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
@@ -123,8 +122,9 @@ LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
     const double radius_px =
         rig_->cameras[camera].image_size_px.width / kReferenceWidth_px *
         std::clamp(kReferencePixelsPerRadian * angle_rad, options_.min_radius_px, options_.max_radius_px);
-    for (const FeatureMatch& match : matchNearPixels(descriptorsOf(expected.observations), expected.positions_px,
-                                                     image.descriptors, positions, radius_px, matching_)) {
+    for (const FeatureMatch& match :
+         matchNearPixels(descriptorsOf(expected.observations), expected.positions_px, image.descriptors,
+                         positions, radius_px, matching_)) {
       add(features, camera, expected.observations[static_cast<size_t>(match.first_index)], match.second_index,
           match.distance, &of_camera[camera]);
     }

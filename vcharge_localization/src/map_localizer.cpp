@@ -102,9 +102,9 @@ MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr
   for (const MapObservation& observation : map_->observations()) {
     images.push_back(observation.keyframe * static_cast<int32_t>(num_cameras) + observation.camera);
   }
-  places_ = std::make_unique<PlaceVotes>(descriptors, std::move(images),
-                                         static_cast<int>(map_->keyframes().size()),
-                                         static_cast<int>(num_cameras), options_.places);
+  places_ =
+      std::make_unique<PlaceVotes>(descriptors, std::move(images), static_cast<int>(map_->keyframes().size()),
+                                   static_cast<int>(num_cameras), options_.places);
 }
 
 MapLocalizer::~MapLocalizer() = default;

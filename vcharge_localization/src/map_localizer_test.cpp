@@ -192,7 +192,8 @@ TEST(MapLocalizerDescriptorTest, NeedsNoVocabulary) {
   contents.vocabulary.clear();
   const auto bare = std::make_shared<const SparseMap>(std::move(contents));
   const RigidTransform truth = posesBetween(*map, 8);
-  const PoseFix fix = MapLocalizer(bare, rigOf(bare)).localizeAnywhere(testing::makeTestView(*map, truth, {}));
+  const PoseFix fix =
+      MapLocalizer(bare, rigOf(bare)).localizeAnywhere(testing::makeTestView(*map, truth, {}));
   EXPECT_EQ(fix.status, LocalizationStatus::kLocalized);
 }
 

@@ -78,7 +78,9 @@ std::vector<DescriptorNeighbour> HammingIndex::near(const uint8_t* query, int ma
     }
   }
   // Those with several equal pieces came several times.
-  const auto byIndex = [](const DescriptorNeighbour& a, const DescriptorNeighbour& b) { return a.index < b.index; };
+  const auto byIndex = [](const DescriptorNeighbour& a, const DescriptorNeighbour& b) {
+    return a.index < b.index;
+  };
   std::sort(found.begin(), found.end(), byIndex);
   found.erase(std::unique(found.begin(), found.end(),
                           [](const DescriptorNeighbour& a, const DescriptorNeighbour& b) {

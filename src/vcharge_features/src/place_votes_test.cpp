@@ -35,8 +35,9 @@ class AlikePlaces {
     cv::Mat descriptors;
     for (int i = 0; i < kFeatures; ++i) {
       const bool is_seen_again = i < share_seen_again * kFeatures;
-      descriptors.push_back(is_seen_again ? varied(feature(image, i), 12, 0.1F, &random)
-                                          : varied(kind((image % kCameras) * 100 + i % 6), 40, 0.5F, &random));
+      descriptors.push_back(is_seen_again
+                                ? varied(feature(image, i), 12, 0.1F, &random)
+                                : varied(kind((image % kCameras) * 100 + i % 6), 40, 0.5F, &random));
     }
     return descriptors;
   }
@@ -126,8 +127,8 @@ TEST_P(PlaceVotesTest, GivesTheSameOnOneThread) {
 TEST_P(PlaceVotesTest, NamesBadInput) {
   const AlikePlaces places(GetParam());
   const PlaceVotes votes = places.votes();
-  const cv::Mat other_kind = cv::Mat::zeros(3, GetParam() == CV_8UC1 ? 64 : 32,
-                                            GetParam() == CV_8UC1 ? CV_32FC1 : CV_8UC1);
+  const cv::Mat other_kind =
+      cv::Mat::zeros(3, GetParam() == CV_8UC1 ? 64 : 32, GetParam() == CV_8UC1 ? CV_32FC1 : CV_8UC1);
   EXPECT_THROW(votes.query({other_kind}, 5), std::invalid_argument);
   EXPECT_TRUE(votes.query({cv::Mat(), cv::Mat()}, 5).empty());
   EXPECT_THROW(PlaceVotes(places.feature(0, 0), {0, 1}, 2, 1), std::logic_error);

@@ -53,8 +53,8 @@ struct PoseFilterOptions {
 /// Fuses fixes with the odometer: an error-state Kalman filter over the vehicle's pose in the map and the
 /// odometer's factors, so that a bridged way is known as well as the odometer was while there were fixes.
 ///
-/// Errors of fixes in a row have a part in common, which no averaging lessens: that of the map. It is added to
-/// what pose() tells.
+/// Errors of fixes in a row have a part in common, which no averaging lessens: that of the map. It is added
+/// to what pose() tells.
 class PoseFilter {
  public:
   explicit PoseFilter(const PoseFilterOptions& options = PoseFilterOptions());

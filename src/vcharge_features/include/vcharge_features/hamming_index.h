@@ -32,7 +32,8 @@ class HammingIndex {
  public:
   /// CV_8UC1 with 32 columns; the pixels are shared, not copied. std::invalid_argument for others, and for
   /// bad options.
-  explicit HammingIndex(const cv::Mat& descriptors, const HammingIndexOptions& options = HammingIndexOptions());
+  explicit HammingIndex(const cv::Mat& descriptors,
+                        const HammingIndexOptions& options = HammingIndexOptions());
 
   /// Descriptors that differ from `query` (32 bytes) in at most `max_distance` bits, ascending by index; most
   /// of them (see above).

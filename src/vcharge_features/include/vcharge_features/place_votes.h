@@ -12,8 +12,8 @@
 namespace vcharge {
 
 struct PlaceVotesOptions {
-  int max_distance_bits = 32;   ///< between a feature and what it votes for
-  double sigma_bits = 20.0;     ///< a vote's weight falls off as a normal distribution of the distance
+  int max_distance_bits = 32;  ///< between a feature and what it votes for
+  double sigma_bits = 20.0;    ///< a vote's weight falls off as a normal distribution of the distance
   HammingIndexOptions index;
 
   template <class Visitor>
@@ -32,8 +32,8 @@ struct PlaceVotesOptions {
 /// faster, and grows) ranks the right place behind many others. Immutable.
 class PlaceVotes {
  public:
-  /// Descriptor i was seen in image images[i] = place * num_cameras + camera. Numbers are compared by 256 bits
-  /// that tell which of two of them is larger. std::logic_error for counts or images that do not fit;
+  /// Descriptor i was seen in image images[i] = place * num_cameras + camera. Numbers are compared by 256
+  /// bits that tell which of two of them is larger. std::logic_error for counts or images that do not fit;
   /// std::invalid_argument for bad options or descriptors.
   PlaceVotes(const cv::Mat& descriptors, std::vector<int32_t> images, int num_places, int num_cameras,
              const PlaceVotesOptions& options = PlaceVotesOptions());
