@@ -15,6 +15,8 @@ namespace vcharge {
 namespace {
 
 constexpr double kReferenceWidth_px = 1280.0;
+/// Of search: features of small images are no more exact.
+constexpr double kLeastRadius_px = 3.0;
 /// Of most lenses of such images, about.
 constexpr double kReferencePixelsPerRadian = 450.0;
 /// Keyframes beside a recognized one whose landmarks are looked for too.
@@ -120,8 +122,9 @@ LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
     // How far a landmark in the middle of them may be from where it is expected.
     const double angle_rad = options_.radius_sigmas * (sigma_rad + sigma_m / median(expected.ranges_m));
     const double radius_px =
-        rig_->cameras[camera].image_size_px.width / kReferenceWidth_px *
-        std::clamp(kReferencePixelsPerRadian * angle_rad, options_.min_radius_px, options_.max_radius_px);
+        std::max(kLeastRadius_px, rig_->cameras[camera].image_size_px.width / kReferenceWidth_px *
+                                      std::clamp(kReferencePixelsPerRadian * angle_rad,
+                                                 options_.min_radius_px, options_.max_radius_px));
     for (const FeatureMatch& match :
          matchNearPixels(descriptorsOf(expected.observations), expected.positions_px, image.descriptors,
                          positions, radius_px, matching_)) {

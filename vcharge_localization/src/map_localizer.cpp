@@ -31,6 +31,17 @@ FeatureExtractorOptions extractorOptionsOf(const SparseMap& map) {
   return options;
 }
 
+/// How far apart two pixels in the middle of the image look.
+double radiansPerPixel(const RigCamera& camera) {
+  const Eigen::Vector2d middle(0.5 * camera.image_size_px.width, 0.5 * camera.image_size_px.height);
+  Eigen::Vector3d ray, next;
+  if (!camera.model.unproject(middle, &ray) ||
+      !camera.model.unproject(middle + Eigen::Vector2d::UnitX(), &next)) {
+    return 0.0;
+  }
+  return std::atan2(ray.cross(next).norm(), ray.dot(next));
+}
+
 }  // namespace
 
 MatchOptions MapLocalizerOptions::closeMatches() {
@@ -77,11 +88,12 @@ void MapLocalizerOptions::validate() const {
   validateInner("places", places);
   validateInner("place_matching", place_matching);
   validateInner("robust", robust);
+  requireField(min_error_px >= 0.0, "min_error_px", "must not be negative", min_error_px);
 }
 
 MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
                            const MapLocalizerOptions& options)
-    : map_(std::move(map)), rig_(std::move(rig)), options_(options) {
+    : map_(std::move(map)), rig_(std::move(rig)), options_(options), robust_(options.robust) {
   options_.validate();
   check(map_ != nullptr && rig_ != nullptr, "MapLocalizer: expected a map and a rig");
   if (!rig_->hasExtrinsics()) {
@@ -95,6 +107,7 @@ MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr
   }
   for (const RigCamera& camera : rig_->cameras) {
     masks_.push_back(makeFeatureMask(camera));
+    robust_.max_error_rad = std::max(robust_.max_error_rad, options_.min_error_px * radiansPerPixel(camera));
   }
   matcher_ = std::make_unique<LandmarkMatcher>(map_, rig_, options_);
   const size_t num_cameras = map_->rig().cameras.size();
@@ -149,7 +162,7 @@ PoseFix MapLocalizer::estimate(const LandmarkMatches& matches, int min_inliers,
   if (fix.num_matches < min_inliers) {
     return fix;
   }
-  const PoseEstimate pose = estimateAbsolutePose(matches.points, options_.robust);
+  const PoseEstimate pose = estimateAbsolutePose(matches.points, robust_);
   fix.status = LocalizationStatus::kNoConsensus;
   if (pose.status != EstimationStatus::kOk) {
     return fix;
@@ -172,7 +185,7 @@ PoseFix MapLocalizer::localizeNear(const RigFeatures& features, const PosePrior&
   const double sigma_m = std::sqrt(prior.covariance.topLeftCorner<3, 3>().diagonal().maxCoeff());
   const double sigma_rad = std::sqrt(prior.covariance.bottomRightCorner<3, 3>().diagonal().maxCoeff());
   const PoseFix first = estimate(matcher_->searchNear(features, prior.map_from_vehicle, sigma_m, sigma_rad),
-                                 options_.robust.min_inliers, 0.0);
+                                 robust_.min_inliers, 0.0);
   return first.inliers.empty() ? first : refine(features, first);
 }
 
@@ -189,8 +202,8 @@ PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMa
   const Eigen::Quaterniond upright_from_vehicle =
       rotationFromYawPitchRoll(-yawOfRotation(map_from_keyframe.rotation()), 0.0, 0.0) *
       map_from_keyframe.rotation();
-  RobustOptions coarse = options_.robust;
-  coarse.max_error_rad = options_.place_max_error_rad;
+  RobustOptions coarse = robust_;
+  coarse.max_error_rad = std::max(coarse.max_error_rad, options_.place_max_error_rad);
   PoseEstimate pose = estimateUprightPose(matches.points, upright_from_vehicle, coarse);
   if (pose.status != EstimationStatus::kOk) {
     pose = estimateAbsolutePose(matches.points, coarse);

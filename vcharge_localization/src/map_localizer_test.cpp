@@ -149,6 +149,37 @@ TEST(MapLocalizerTwinsTest, TwoPlacesThatLookAlikeAreAmbiguous) {
   EXPECT_LT(positionError(expected, truth), 0.02);
 }
 
+/// A quarter of the size: a pixel is four times as wide, and features are found to half a pixel as ever.
+TEST(MapLocalizerSizeTest, SmallImagesAreGivenTheirPixels) {
+  SparseMapContents contents = testing::makeTestMap({})->contents();
+  contents.rig = parseCameraRig(R"(cameras:
+  front:
+    image_size_px: [320, 200]
+    model: mei
+    intrinsics: {xi: 1.15, gamma1: 223.9, gamma2: 223.7, u0: 162.4, v0: 99.7, k1: -0.33, k2: 0.0865, p1: -0.00067, p2: -0.00004}
+    field_of_view_rad: 3.2289
+    vehicle_from_camera: {translation_m: [3.6, 0.0, 0.6], rotation_xyzw: [0.5, -0.5, 0.5, -0.5]}
+  left:
+    image_size_px: [160, 120]
+    model: kannala_brandt
+    intrinsics: {fx: 47.5, fy: 47.75, cx: 80, cy: 60, k1: 0.01, k2: -0.002, k3: 0, k4: 0}
+    vehicle_from_camera: {translation_m: [1.7, 1.0, 0.9], rotation_xyzw: [-0.70710678, 0, 0, 0.70710678]}
+)",
+                                "quarter", "");
+  const auto map = std::make_shared<const SparseMap>(std::move(contents));
+  const MapLocalizer localizer(map, rigOf(map));
+  for (size_t keyframe = 2; keyframe + 2 < map->keyframes().size(); keyframe += 5) {
+    const RigidTransform truth = posesBetween(*map, keyframe);
+    testing::TestViewOptions view;
+    view.noise_px = 0.5;
+    const PoseFix fix =
+        localizer.localizeNear(testing::makeTestView(*map, truth, view), priorAbout(truth, 0.1, 0.0));
+    ASSERT_EQ(fix.status, LocalizationStatus::kLocalized) << "keyframe " << keyframe;
+    EXPECT_GT(fix.numInliers(), 0.6 * fix.num_matches);
+    EXPECT_LT(positionError(fix, truth), 0.05);
+  }
+}
+
 /// What a view of the map with bits shows, where the descriptors are the bits as numbers 0 and `one`.
 RigFeatures withNumbers(RigFeatures features, float one) {
   for (ImageFeatures& image : features.images) {

@@ -30,7 +30,8 @@ struct MapLocalizerOptions {
   int max_keyframes = 16;
   double max_view_angle_rad = 0.6;  ///< between the directions from which a landmark is seen
   double max_range_ratio = 1.8;     ///< between the distances
-  double min_radius_px = 6.0;       ///< of search, at 1280 pixels of width; also of the second search
+  /// Of search, at 1280 pixels of width; also of the second search. Never below 3 pixels of the image.
+  double min_radius_px = 6.0;
   double max_radius_px = 60.0;
   double radius_sigmas = 3.0;  ///< of the expected pose
   /// Of the descriptors of a match, over the median distance between two landmarks of the map: the same for
@@ -49,6 +50,8 @@ struct MapLocalizerOptions {
   double other_heading_rad = 0.1;      ///< or turned by more
   MatchOptions place_matching;
   RobustOptions robust = defaultRobust();
+  /// Of the coarsest camera: robust.max_error_rad is not taken for less, since no feature is more exact.
+  double min_error_px = 0.8;
 
   static MatchOptions closeMatches();
   static RobustOptions defaultRobust();
@@ -79,6 +82,7 @@ struct MapLocalizerOptions {
     visit("other_heading_rad", other_heading_rad);
     visit("place_matching", place_matching);
     visit("robust", robust);
+    visit("min_error_px", min_error_px);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
@@ -155,6 +159,7 @@ class MapLocalizer {
   const std::shared_ptr<const SparseMap> map_;
   const std::shared_ptr<const CameraRig> rig_;
   const MapLocalizerOptions options_;
+  RobustOptions robust_;  // the options', for the rig's pixels
   std::unique_ptr<FeatureExtractor> extractor_;
   std::vector<cv::Mat> masks_;  // by camera
   std::unique_ptr<LandmarkMatcher> matcher_;
