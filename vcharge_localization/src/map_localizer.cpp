@@ -77,6 +77,8 @@ void MapLocalizerOptions::validate() const {
   requireField(max_places >= 1, "max_places", "must be 1 or more", max_places);
   requireField(min_inliers_without_prior >= 6, "min_inliers_without_prior", "must be 6 or more",
                min_inliers_without_prior);
+  requireField(min_inliers_per_camera_without_prior >= 0, "min_inliers_per_camera_without_prior",
+               "must not be negative", min_inliers_per_camera_without_prior);
   requireField(max_ambiguity > 0.0 && max_ambiguity <= 1.0, "max_ambiguity", "must be in (0, 1]",
                max_ambiguity);
   requireField(place_spacing_m >= 0.0, "place_spacing_m", "must not be negative", place_spacing_m);
@@ -186,11 +188,11 @@ PoseFix MapLocalizer::localizeNear(const RigFeatures& features, const PosePrior&
   const double sigma_rad = std::sqrt(prior.covariance.bottomRightCorner<3, 3>().diagonal().maxCoeff());
   const PoseFix first = estimate(matcher_->searchNear(features, prior.map_from_vehicle, sigma_m, sigma_rad),
                                  robust_.min_inliers, 0.0);
-  return first.inliers.empty() ? first : refine(features, first);
+  return first.inliers.empty() ? first : refine(features, first, options_.min_inliers);
 }
 
-PoseFix MapLocalizer::refine(const RigFeatures& features, const PoseFix& fix) const {
-  return estimate(matcher_->searchNear(features, fix.map_from_vehicle, 0.0, 0.0), options_.min_inliers,
+PoseFix MapLocalizer::refine(const RigFeatures& features, const PoseFix& fix, int min_inliers) const {
+  return estimate(matcher_->searchNear(features, fix.map_from_vehicle, 0.0, 0.0), min_inliers,
                   options_.min_inlier_ratio);
 }
 
@@ -215,7 +217,15 @@ PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMa
   const PoseFix fix =
       estimate(matcher_->searchNear(features, pose.map_from_rig, kPlaceSigma_m, kPlaceSigma_rad),
                options_.min_inliers_without_prior, 0.0);
-  return fix.status == LocalizationStatus::kLocalized ? refine(features, fix) : fix;
+  if (fix.status != LocalizationStatus::kLocalized) {
+    return fix;
+  }
+  const auto num_cameras =
+      static_cast<int>(std::count_if(features.images.begin(), features.images.end(),
+                                     [](const ImageFeatures& image) { return !image.empty(); }));
+  return refine(features, fix,
+                std::max(options_.min_inliers_without_prior,
+                         options_.min_inliers_per_camera_without_prior * num_cameras));
 }
 
 bool MapLocalizer::isOtherPlace(const PoseFix& a, const PoseFix& b) const {

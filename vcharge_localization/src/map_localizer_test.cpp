@@ -104,6 +104,18 @@ TEST_F(MapLocalizerTest, FindsThePoseFromNothing) {
   }
 }
 
+TEST_F(MapLocalizerTest, FewerThanItWantsOfEachCameraAreNotEnoughFromNothing) {
+  const RigidTransform truth = posesBetween(*map_, 8);
+  const RigFeatures view = testing::makeTestView(*map_, truth, {});
+  const PoseFix fix = localizer_.localizeAnywhere(view);
+  ASSERT_EQ(fix.status, LocalizationStatus::kLocalized);
+  MapLocalizerOptions options;
+  options.min_inliers_per_camera_without_prior = fix.numInliers() / 2 + 20;  // two cameras
+  const MapLocalizer stricter(map_, rigOf(map_), options);
+  EXPECT_NE(stricter.localizeAnywhere(view).status, LocalizationStatus::kLocalized);
+  EXPECT_EQ(stricter.localizeNear(view, priorAbout(truth, 0.1, 0.0)).status, LocalizationStatus::kLocalized);
+}
+
 TEST_F(MapLocalizerTest, RefusesWhatIsNotInTheMap) {
   for (uint32_t seed = 1; seed <= 10; ++seed) {
     const RigFeatures foreign = testing::makeForeignView(*map_, seed);

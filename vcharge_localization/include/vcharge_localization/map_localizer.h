@@ -45,9 +45,12 @@ struct MapLocalizerOptions {
   double place_spacing_rad = 0.6;      ///< unless they are turned by more
   double place_max_error_rad = 0.012;  ///< of a match with a recognized place, by a pose that is upright
   int min_inliers_without_prior = 30;  ///< in the wide search about it
-  double max_ambiguity = 0.7;          ///< inliers of the second best place over those of the best
-  double other_place_m = 1.0;          ///< poses further apart are of two places
-  double other_heading_rad = 0.1;      ///< or turned by more
+  /// Besides, on average over the cameras that sent an image: a place that has only its pillars in common
+  /// with another, or with itself long ago, is not believed.
+  int min_inliers_per_camera_without_prior = 12;
+  double max_ambiguity = 0.7;      ///< inliers of the second best place over those of the best
+  double other_place_m = 1.0;      ///< poses further apart are of two places
+  double other_heading_rad = 0.1;  ///< or turned by more
   MatchOptions place_matching;
   RobustOptions robust = defaultRobust();
   /// Of the coarsest camera: robust.max_error_rad is not taken for less, since no feature is more exact.
@@ -77,6 +80,7 @@ struct MapLocalizerOptions {
     visit("place_spacing_rad", place_spacing_rad);
     visit("place_max_error_rad", place_max_error_rad);
     visit("min_inliers_without_prior", min_inliers_without_prior);
+    visit("min_inliers_per_camera_without_prior", min_inliers_per_camera_without_prior);
     visit("max_ambiguity", max_ambiguity);
     visit("other_place_m", other_place_m);
     visit("other_heading_rad", other_heading_rad);
@@ -151,7 +155,7 @@ class MapLocalizer {
   /// A fix without a pose, with the counts of the matches.
   PoseFix fixWithoutPose(const LandmarkMatches& matches) const;
   PoseFix estimate(const LandmarkMatches& matches, int min_inliers, double min_inlier_ratio) const;
-  PoseFix refine(const RigFeatures& features, const PoseFix& fix) const;
+  PoseFix refine(const RigFeatures& features, const PoseFix& fix, int min_inliers) const;
   std::vector<PlaceMatch> recognizePlaces(const RigFeatures& features) const;
   PoseFix localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const;
   bool isOtherPlace(const PoseFix& a, const PoseFix& b) const;
