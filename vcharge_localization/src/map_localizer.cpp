@@ -196,6 +196,14 @@ PoseFix MapLocalizer::refine(const RigFeatures& features, const PoseFix& fix, in
                   options_.min_inlier_ratio);
 }
 
+int MapLocalizer::minInliersWithoutPrior(const RigFeatures& features) const {
+  const auto num_cameras =
+      static_cast<int>(std::count_if(features.images.begin(), features.images.end(),
+                                     [](const ImageFeatures& image) { return !image.empty(); }));
+  return std::max(options_.min_inliers_without_prior,
+                  options_.min_inliers_per_camera_without_prior * num_cameras);
+}
+
 PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const {
   const LandmarkMatches matches = matcher_->searchAtPlace(features, place);
   // Few of these are right. A vehicle stands on the ground as the map's did: two matches tell its pose.
@@ -220,12 +228,7 @@ PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMa
   if (fix.status != LocalizationStatus::kLocalized) {
     return fix;
   }
-  const auto num_cameras =
-      static_cast<int>(std::count_if(features.images.begin(), features.images.end(),
-                                     [](const ImageFeatures& image) { return !image.empty(); }));
-  return refine(features, fix,
-                std::max(options_.min_inliers_without_prior,
-                         options_.min_inliers_per_camera_without_prior * num_cameras));
+  return refine(features, fix, minInliersWithoutPrior(features));
 }
 
 bool MapLocalizer::isOtherPlace(const PoseFix& a, const PoseFix& b) const {

@@ -47,7 +47,7 @@ struct MapLocalizerOptions {
   int min_inliers_without_prior = 30;  ///< in the wide search about it
   /// Besides, on average over the cameras that sent an image: a place that has only its pillars in common
   /// with another, or with itself long ago, is not believed.
-  int min_inliers_per_camera_without_prior = 12;
+  int min_inliers_per_camera_without_prior = 15;
   double max_ambiguity = 0.7;      ///< inliers of the second best place over those of the best
   double other_place_m = 1.0;      ///< poses further apart are of two places
   double other_heading_rad = 0.1;  ///< or turned by more
@@ -148,6 +148,9 @@ class MapLocalizer {
   /// Place recognition over the whole rig, and the best of the candidates. Status kAmbiguous where two
   /// places fit.
   PoseFix localizeAnywhere(const RigFeatures& features) const;
+
+  /// Inliers that a pose needs to be believed by who knew nothing before.
+  int minInliersWithoutPrior(const RigFeatures& features) const;
 
   const SparseMap& map() const { return *map_; }
 
