@@ -137,7 +137,7 @@ PoseFix DriveLocalizer::searchFrom(const std::optional<RigidTransform>& expected
     prior.covariance.diagonal() << Eigen::Vector3d::Constant(squared(options_.confirmation_m) / 9.0),
         Eigen::Vector3d::Constant(squared(options_.confirmation_rad) / 9.0);
     const PoseFix fix = localizer_.localizeNear(features, prior);
-    if (isConfirmed(*expected, fix)) {
+    if (isConfirmed(*expected, fix) && fix.numInliers() >= localizer_.minInliersWithoutPrior(features)) {
       return fix;
     }
   }

@@ -8,6 +8,7 @@
 #include <pluginlib/class_list_macros.hpp>
 
 #include "localization_messages.h"
+#include "localization_report.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/newest_first_worker.h"
 #include "vcharge_core/sparse_map_file.h"
@@ -85,8 +86,9 @@ class LocalizationNodelet : public nodelet::Nodelet {
     source_ = std::make_unique<LiveDriveSource>(node_, rig_, source_options);
     diagnostics_.push_back(std::make_unique<NodeletDiagnostics>(node_, private_node, getName(),
                                                                 [this] { return source_->report(); }));
-    diagnostics_.push_back(std::make_unique<NodeletDiagnostics>(node_, private_node, getName() + "/pose",
-                                                                [this] { return report(); }));
+    diagnostics_.push_back(std::make_unique<NodeletDiagnostics>(
+        node_, private_node, getName() + "/pose",
+        [this] { return report_.report(guard_, worker_ ? worker_->numDropped(0) : 0); }));
     source_->run(assembler_.get(), DriveSource::ProgressCallback());
     initial_pose_subscriber_ = node_.subscribe<geometry_msgs::PoseWithCovarianceStamped>(
         "/initialpose", 1,
@@ -103,16 +105,14 @@ class LocalizationNodelet : public nodelet::Nodelet {
   void localize(const LocalizationFrame& frame) {
     guard_.run([&] {
       const std::lock_guard<std::mutex> lock(mutex_);
-      const LocalizationResult result = localizer_->process(frame);
-      publish(result);
-      const std::lock_guard<std::mutex> report_lock(report_mutex_);
-      last_status_ = toStatusMessage(result, *rig_, map_frame_);
-      ++num_frames_;
+      publish(localizer_->process(frame));
     });
   }
 
   void publish(const LocalizationResult& result) {
-    status_.publish(toStatusMessage(result, *rig_, map_frame_));
+    const vcharge_msgs::LocalizationStatus status = toStatusMessage(result, *rig_, map_frame_);
+    status_.publish(status);
+    report_.add(status);
     if (sightings_.getNumSubscribers() > 0) {
       sightings_.publish(toSightingMarker(result, *rig_, localizer_->localizer().map(), map_frame_));
     }
@@ -127,35 +127,6 @@ class LocalizationNodelet : public nodelet::Nodelet {
     }
   }
 
-  DriveMonitor::Report report() {
-    using Status = vcharge_msgs::LocalizationStatus;
-    const std::lock_guard<std::mutex> lock(report_mutex_);
-    DriveMonitor::Report report;
-    report.level = DriveMonitor::Level::kWarn;
-    report.message = "no frame yet";
-    if (num_frames_ > 0) {
-      const bool is_good = last_status_.status == Status::LOCALIZED && last_status_.camera_warnings.empty();
-      report.level = is_good ? DriveMonitor::Level::kOk : DriveMonitor::Level::kWarn;
-      report.message = enumNames<LocalizationStatus>()[last_status_.status];
-      if (!last_status_.message.empty()) {
-        report.message += ": " + last_status_.message;
-      }
-      for (const std::string& warning : last_status_.camera_warnings) {
-        report.message += "; " + warning;
-      }
-    }
-    if (guard_.numFailures() > reported_failures_) {
-      reported_failures_ = guard_.numFailures();
-      report.level = DriveMonitor::Level::kError;
-      report.message = guard_.lastError();
-    }
-    report.values.emplace_back("frames", std::to_string(num_frames_));
-    report.values.emplace_back("dropped", std::to_string(worker_ ? worker_->numDropped(0) : 0));
-    report.values.emplace_back("inliers", std::to_string(last_status_.num_inliers));
-    report.values.emplace_back("position_sigma_m", std::to_string(last_status_.position_sigma_m));
-    return report;
-  }
-
   ros::NodeHandle node_;
   std::shared_ptr<const CameraRig> rig_;
   std::string map_frame_ = "map", odom_frame_ = "odom";
@@ -168,10 +139,7 @@ class LocalizationNodelet : public nodelet::Nodelet {
   std::unique_ptr<tf2_ros::TransformBroadcaster> broadcaster_;
   ros::Publisher pose_, status_, sightings_;
   ros::Subscriber initial_pose_subscriber_;
-  std::mutex report_mutex_;
-  vcharge_msgs::LocalizationStatus last_status_;
-  uint64_t num_frames_ = 0;
-  uint64_t reported_failures_ = 0;
+  LocalizationReport report_;
   std::vector<std::unique_ptr<NodeletDiagnostics>> diagnostics_;
 };
 

@@ -3,25 +3,21 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-#include <unordered_set>
 #include <utility>
 
 #include <tbb/parallel_for.h>
 #include <yaml-cpp/yaml.h>
 
-#include "landmark_view.h"
+#include "landmark_matcher.h"
 #include "vcharge_core/error.h"
 #include "vcharge_geometry/pose_estimation.h"
 
 namespace vcharge {
 namespace {
 
-constexpr double kReferenceWidth_px = 1280.0;
 // What a pose of place recognition is good for, where the guided search about it begins.
 constexpr double kPlaceSigma_m = 0.2;
 constexpr double kPlaceSigma_rad = 0.02;
-/// Keyframes beside a recognized one whose landmarks are looked for too.
-constexpr int kNeighbours = 2;
 /// Places that are asked for, to get as many candidates apart from each other.
 constexpr int kPlacesPerCandidate = 10;
 
@@ -35,12 +31,22 @@ FeatureExtractorOptions extractorOptionsOf(const SparseMap& map) {
   return options;
 }
 
+/// How far apart two pixels in the middle of the image look.
+double radiansPerPixel(const RigCamera& camera) {
+  const Eigen::Vector2d middle(0.5 * camera.image_size_px.width, 0.5 * camera.image_size_px.height);
+  Eigen::Vector3d ray, next;
+  if (!camera.model.unproject(middle, &ray) ||
+      !camera.model.unproject(middle + Eigen::Vector2d::UnitX(), &next)) {
+    return 0.0;
+  }
+  return std::atan2(ray.cross(next).norm(), ray.dot(next));
+}
+
 }  // namespace
 
 MatchOptions MapLocalizerOptions::closeMatches() {
   MatchOptions options;
   options.max_ratio = 0.85;
-  options.max_distance = 70.0;
   return options;
 }
 
@@ -66,9 +72,13 @@ void MapLocalizerOptions::validate() const {
   requireField(max_radius_px >= min_radius_px, "max_radius_px", "must not be below min_radius_px",
                max_radius_px);
   requireField(radius_sigmas > 0.0, "radius_sigmas", "must be positive", radius_sigmas);
+  requireField(max_relative_distance > 0.0, "max_relative_distance", "must be positive",
+               max_relative_distance);
   requireField(max_places >= 1, "max_places", "must be 1 or more", max_places);
   requireField(min_inliers_without_prior >= 6, "min_inliers_without_prior", "must be 6 or more",
                min_inliers_without_prior);
+  requireField(min_inliers_per_camera_without_prior >= 0, "min_inliers_per_camera_without_prior",
+               "must not be negative", min_inliers_per_camera_without_prior);
   requireField(max_ambiguity > 0.0 && max_ambiguity <= 1.0, "max_ambiguity", "must be in (0, 1]",
                max_ambiguity);
   requireField(place_spacing_m >= 0.0, "place_spacing_m", "must not be negative", place_spacing_m);
@@ -77,24 +87,15 @@ void MapLocalizerOptions::validate() const {
   requireField(other_place_m > 0.0, "other_place_m", "must be positive", other_place_m);
   requireField(other_heading_rad > 0.0, "other_heading_rad", "must be positive", other_heading_rad);
   validateInner("matching", matching);
+  validateInner("places", places);
   validateInner("place_matching", place_matching);
   validateInner("robust", robust);
+  requireField(min_error_px >= 0.0, "min_error_px", "must not be negative", min_error_px);
 }
-
-/// Sightings of landmarks, right and wrong ones, and the same for the estimator.
-struct MapLocalizer::Matches {
-  std::vector<LandmarkSighting> sightings;
-  std::vector<PointMatch> points;
-
-  void append(const Matches& other) {
-    sightings.insert(sightings.end(), other.sightings.begin(), other.sightings.end());
-    points.insert(points.end(), other.points.begin(), other.points.end());
-  }
-};
 
 MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
                            const MapLocalizerOptions& options)
-    : map_(std::move(map)), rig_(std::move(rig)), options_(options) {
+    : map_(std::move(map)), rig_(std::move(rig)), options_(options), robust_(options.robust) {
   options_.validate();
   check(map_ != nullptr && rig_ != nullptr, "MapLocalizer: expected a map and a rig");
   if (!rig_->hasExtrinsics()) {
@@ -106,24 +107,19 @@ MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr
       descriptors.cols != extractor_->descriptorColumns()) {
     throw InputError("map: its descriptors are not those of its feature_options");
   }
-  if (map_->contents().vocabulary.empty()) {
-    throw InputError("map: expected a vocabulary, which build_map writes");
-  }
   for (const RigCamera& camera : rig_->cameras) {
     masks_.push_back(makeFeatureMask(camera));
+    robust_.max_error_rad = std::max(robust_.max_error_rad, options_.min_error_px * radiansPerPixel(camera));
   }
-  const auto vocabulary = std::make_shared<const VocabularyTree>(
-      VocabularyTree::parse(map_->contents().vocabulary, "map: vocabulary"));
+  matcher_ = std::make_unique<LandmarkMatcher>(map_, rig_, options_);
   const size_t num_cameras = map_->rig().cameras.size();
-  places_ = std::make_unique<PlaceIndex>(vocabulary, static_cast<int>(num_cameras));
-  std::vector<std::vector<cv::Mat>> of_places(map_->keyframes().size());
-  for (size_t keyframe = 0; keyframe < of_places.size(); ++keyframe) {
-    for (size_t camera = 0; camera < num_cameras; ++camera) {
-      const auto [begin, end] = map_->observationsOf(keyframe, camera);
-      of_places[keyframe].push_back(descriptors.rowRange(static_cast<int>(begin), static_cast<int>(end)));
-    }
+  std::vector<int32_t> images;
+  for (const MapObservation& observation : map_->observations()) {
+    images.push_back(observation.keyframe * static_cast<int32_t>(num_cameras) + observation.camera);
   }
-  places_->addAll(of_places);
+  places_ =
+      std::make_unique<PlaceVotes>(descriptors, std::move(images), static_cast<int>(map_->keyframes().size()),
+                                   static_cast<int>(num_cameras), options_.places);
 }
 
 MapLocalizer::~MapLocalizer() = default;
@@ -151,76 +147,7 @@ RigFeatures MapLocalizer::extract(const std::vector<Image>& images) const {
   return features;
 }
 
-cv::Mat MapLocalizer::descriptorsOf(const std::vector<size_t>& observations) const {
-  cv::Mat descriptors(static_cast<int>(observations.size()), map_->descriptors().cols,
-                      map_->descriptors().type());
-  for (size_t i = 0; i < observations.size(); ++i) {
-    map_->descriptors().row(static_cast<int>(observations[i])).copyTo(descriptors.row(static_cast<int>(i)));
-  }
-  return descriptors;
-}
-
-void MapLocalizer::add(const RigFeatures& features, size_t camera, int observation_index, int feature_index,
-                       float distance, const std::vector<size_t>& observations, Matches* matches) const {
-  const Eigen::Vector3d ray = features.rays_in_camera[camera].col(feature_index);
-  if (ray.isZero()) {
-    return;
-  }
-  const RigidTransform& vehicle_from_camera = *rig_->cameras[camera].vehicle_from_camera;
-  const int32_t landmark =
-      map_->observations()[observations[static_cast<size_t>(observation_index)]].landmark;
-  PointMatch point;
-  point.ray = {vehicle_from_camera.translation(), vehicle_from_camera.rotation() * ray};
-  point.point_m = map_->landmarks()[static_cast<size_t>(landmark)].position_m;
-  point.camera = static_cast<int>(camera);
-  point.quality = -distance;
-  matches->points.push_back(point);
-  matches->sightings.push_back(
-      {landmark, static_cast<int32_t>(camera),
-       features.images[camera].keypoints[static_cast<size_t>(feature_index)].position_px});
-}
-
-MapLocalizer::Matches MapLocalizer::searchLandmarks(const RigFeatures& features,
-                                                    const RigidTransform& map_from_vehicle, double sigma_m,
-                                                    double sigma_rad) const {
-  const LandmarkView view(*map_, *rig_, options_, map_from_vehicle);
-  std::vector<Matches> of_camera(rig_->cameras.size());
-  tbb::parallel_for(size_t{0}, of_camera.size(), [&](size_t camera) {
-    const ImageFeatures& image = features.images[camera];
-    if (image.empty()) {
-      return;
-    }
-    const ExpectedLandmarks expected = view.expectedIn(camera);
-    if (expected.observations.empty()) {
-      return;
-    }
-    std::vector<cv::Point2f> positions;
-    for (const Keypoint& keypoint : image.keypoints) {
-      positions.push_back(keypoint.position_px);
-    }
-    const double px = rig_->cameras[camera].image_size_px.width / kReferenceWidth_px;
-    // How far a landmark in the middle of them may be from where it is expected; some 450 pixels a radian.
-    std::vector<double> ranges_m = expected.ranges_m;
-    std::nth_element(ranges_m.begin(), ranges_m.begin() + static_cast<std::ptrdiff_t>(ranges_m.size() / 2),
-                     ranges_m.end());
-    const double angle_rad = options_.radius_sigmas * (sigma_rad + sigma_m / ranges_m[ranges_m.size() / 2]);
-    const double radius_px =
-        px * std::clamp(450.0 * angle_rad, options_.min_radius_px, options_.max_radius_px);
-    for (const FeatureMatch& match :
-         matchNearPixels(descriptorsOf(expected.observations), expected.positions_px, image.descriptors,
-                         positions, radius_px, options_.matching)) {
-      add(features, camera, match.first_index, match.second_index, match.distance, expected.observations,
-          &of_camera[camera]);
-    }
-  });
-  Matches matches;
-  for (const Matches& found : of_camera) {
-    matches.append(found);
-  }
-  return matches;
-}
-
-PoseFix MapLocalizer::estimate(const Matches& matches, int min_inliers, double min_inlier_ratio) const {
+PoseFix MapLocalizer::fixWithoutPose(const LandmarkMatches& matches) const {
   PoseFix fix;
   fix.num_matches = static_cast<int>(matches.points.size());
   fix.inliers_of_camera.assign(rig_->cameras.size(), 0);
@@ -228,10 +155,16 @@ PoseFix MapLocalizer::estimate(const Matches& matches, int min_inliers, double m
   for (const LandmarkSighting& sighting : matches.sightings) {
     ++fix.matches_of_camera[sighting.camera];
   }
+  return fix;
+}
+
+PoseFix MapLocalizer::estimate(const LandmarkMatches& matches, int min_inliers,
+                               double min_inlier_ratio) const {
+  PoseFix fix = fixWithoutPose(matches);
   if (fix.num_matches < min_inliers) {
     return fix;
   }
-  const PoseEstimate pose = estimateAbsolutePose(matches.points, options_.robust);
+  const PoseEstimate pose = estimateAbsolutePose(matches.points, robust_);
   fix.status = LocalizationStatus::kNoConsensus;
   if (pose.status != EstimationStatus::kOk) {
     return fix;
@@ -253,74 +186,49 @@ PoseFix MapLocalizer::estimate(const Matches& matches, int min_inliers, double m
 PoseFix MapLocalizer::localizeNear(const RigFeatures& features, const PosePrior& prior) const {
   const double sigma_m = std::sqrt(prior.covariance.topLeftCorner<3, 3>().diagonal().maxCoeff());
   const double sigma_rad = std::sqrt(prior.covariance.bottomRightCorner<3, 3>().diagonal().maxCoeff());
-  const PoseFix first = estimate(searchLandmarks(features, prior.map_from_vehicle, sigma_m, sigma_rad),
-                                 options_.robust.min_inliers, 0.0);
-  return first.inliers.empty() ? first : refine(features, first);
+  const PoseFix first = estimate(matcher_->searchNear(features, prior.map_from_vehicle, sigma_m, sigma_rad),
+                                 robust_.min_inliers, 0.0);
+  return first.inliers.empty() ? first : refine(features, first, options_.min_inliers);
 }
 
-PoseFix MapLocalizer::refine(const RigFeatures& features, const PoseFix& fix) const {
-  return estimate(searchLandmarks(features, fix.map_from_vehicle, 0.0, 0.0), options_.min_inliers,
+PoseFix MapLocalizer::refine(const RigFeatures& features, const PoseFix& fix, int min_inliers) const {
+  return estimate(matcher_->searchNear(features, fix.map_from_vehicle, 0.0, 0.0), min_inliers,
                   options_.min_inlier_ratio);
 }
 
-MapLocalizer::Matches MapLocalizer::matchPlace(const RigFeatures& features, size_t camera, size_t keyframe,
-                                               size_t place_camera) const {
-  // The landmarks that this camera saw thereabouts, each once, as nearly from the place as possible.
-  std::vector<size_t> observations;
-  std::unordered_set<int32_t> landmarks;
-  const auto num_keyframes = static_cast<std::ptrdiff_t>(map_->keyframes().size());
-  for (int i = 0; i <= 2 * kNeighbours; ++i) {
-    const std::ptrdiff_t neighbour =
-        static_cast<std::ptrdiff_t>(keyframe) + (i % 2 == 0 ? i / 2 : -(i + 1) / 2);
-    if (neighbour < 0 || neighbour >= num_keyframes) {
-      continue;
-    }
-    const auto [begin, end] = map_->observationsOf(static_cast<size_t>(neighbour), place_camera);
-    for (size_t k = begin; k < end; ++k) {
-      if (landmarks.insert(map_->observations()[k].landmark).second) {
-        observations.push_back(k);
-      }
-    }
-  }
-  Matches matches;
-  const ImageFeatures& image = features.images[camera];
-  for (const FeatureMatch& match :
-       matchDescriptors(image.descriptors, descriptorsOf(observations), options_.place_matching)) {
-    add(features, camera, match.second_index, match.first_index, match.distance, observations, &matches);
-  }
-  return matches;
+int MapLocalizer::minInliersWithoutPrior(const RigFeatures& features) const {
+  const auto num_cameras =
+      static_cast<int>(std::count_if(features.images.begin(), features.images.end(),
+                                     [](const ImageFeatures& image) { return !image.empty(); }));
+  return std::max(options_.min_inliers_without_prior,
+                  options_.min_inliers_per_camera_without_prior * num_cameras);
 }
 
 PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const {
-  const auto keyframe = static_cast<size_t>(place.place);
-  Matches matches;
-  for (size_t camera = 0; camera < rig_->cameras.size(); ++camera) {
-    const int other = camera < place.cameras.size() ? place.cameras[camera] : -1;
-    if (other >= 0 && !features.images[camera].empty()) {
-      matches.append(matchPlace(features, camera, keyframe, static_cast<size_t>(other)));
-    }
-  }
+  const LandmarkMatches matches = matcher_->searchAtPlace(features, place);
   // Few of these are right. A vehicle stands on the ground as the map's did: two matches tell its pose.
-  const double yaw_rad = yawOfRotation(map_->keyframes()[keyframe].map_from_vehicle.rotation());
+  const RigidTransform& map_from_keyframe =
+      map_->keyframes()[static_cast<size_t>(place.place)].map_from_vehicle;
   const Eigen::Quaterniond upright_from_vehicle =
-      rotationFromYawPitchRoll(-yaw_rad, 0.0, 0.0) * map_->keyframes()[keyframe].map_from_vehicle.rotation();
-  RobustOptions coarse = options_.robust;
-  coarse.max_error_rad = options_.place_max_error_rad;
+      rotationFromYawPitchRoll(-yawOfRotation(map_from_keyframe.rotation()), 0.0, 0.0) *
+      map_from_keyframe.rotation();
+  RobustOptions coarse = robust_;
+  coarse.max_error_rad = std::max(coarse.max_error_rad, options_.place_max_error_rad);
   PoseEstimate pose = estimateUprightPose(matches.points, upright_from_vehicle, coarse);
   if (pose.status != EstimationStatus::kOk) {
     pose = estimateAbsolutePose(matches.points, coarse);
   }
-  PoseFix fix;
-  fix.num_matches = static_cast<int>(matches.points.size());
-  fix.inliers_of_camera.assign(rig_->cameras.size(), 0);
-  fix.matches_of_camera.assign(rig_->cameras.size(), 0);
   if (pose.status != EstimationStatus::kOk) {
-    return fix;
+    return fixWithoutPose(matches);
   }
   // The wide search tells right from wrong: hardly a wrong match fits a pose by chance there.
-  fix = estimate(searchLandmarks(features, pose.map_from_rig, kPlaceSigma_m, kPlaceSigma_rad),
-                 options_.min_inliers_without_prior, 0.0);
-  return fix.status == LocalizationStatus::kLocalized ? refine(features, fix) : fix;
+  const PoseFix fix =
+      estimate(matcher_->searchNear(features, pose.map_from_rig, kPlaceSigma_m, kPlaceSigma_rad),
+               options_.min_inliers_without_prior, 0.0);
+  if (fix.status != LocalizationStatus::kLocalized) {
+    return fix;
+  }
+  return refine(features, fix, minInliersWithoutPrior(features));
 }
 
 bool MapLocalizer::isOtherPlace(const PoseFix& a, const PoseFix& b) const {
@@ -330,9 +238,9 @@ bool MapLocalizer::isOtherPlace(const PoseFix& a, const PoseFix& b) const {
 }
 
 std::vector<PlaceMatch> MapLocalizer::recognizePlaces(const RigFeatures& features) const {
-  std::vector<cv::Mat> descriptors(map_->rig().cameras.size());
-  for (size_t i = 0; i < std::min(descriptors.size(), features.images.size()); ++i) {
-    descriptors[i] = features.images[i].descriptors;
+  std::vector<cv::Mat> descriptors;
+  for (const ImageFeatures& image : features.images) {
+    descriptors.push_back(image.descriptors);
   }
   // Keyframes beside each other look alike: one of them stands for all, and leaves room for other places.
   std::vector<PlaceMatch> places;
@@ -359,9 +267,7 @@ PoseFix MapLocalizer::localizeAnywhere(const RigFeatures& features) const {
   std::vector<PoseFix> fixes(places.size());
   tbb::parallel_for(size_t{0}, places.size(),
                     [&](size_t i) { fixes[i] = localizeAtPlace(features, places[i]); });
-  PoseFix best;
-  best.inliers_of_camera.assign(rig_->cameras.size(), 0);
-  best.matches_of_camera.assign(rig_->cameras.size(), 0);
+  PoseFix best = fixWithoutPose(LandmarkMatches());
   for (const PoseFix& fix : fixes) {
     const auto rank = [](const PoseFix& f) {
       return std::make_pair(f.status == LocalizationStatus::kLocalized, f.numInliers());

@@ -104,6 +104,18 @@ TEST_F(MapLocalizerTest, FindsThePoseFromNothing) {
   }
 }
 
+TEST_F(MapLocalizerTest, FewerThanItWantsOfEachCameraAreNotEnoughFromNothing) {
+  const RigidTransform truth = posesBetween(*map_, 8);
+  const RigFeatures view = testing::makeTestView(*map_, truth, {});
+  const PoseFix fix = localizer_.localizeAnywhere(view);
+  ASSERT_EQ(fix.status, LocalizationStatus::kLocalized);
+  MapLocalizerOptions options;
+  options.min_inliers_per_camera_without_prior = fix.numInliers() / 2 + 20;  // two cameras
+  const MapLocalizer stricter(map_, rigOf(map_), options);
+  EXPECT_NE(stricter.localizeAnywhere(view).status, LocalizationStatus::kLocalized);
+  EXPECT_EQ(stricter.localizeNear(view, priorAbout(truth, 0.1, 0.0)).status, LocalizationStatus::kLocalized);
+}
+
 TEST_F(MapLocalizerTest, RefusesWhatIsNotInTheMap) {
   for (uint32_t seed = 1; seed <= 10; ++seed) {
     const RigFeatures foreign = testing::makeForeignView(*map_, seed);
@@ -149,6 +161,85 @@ TEST(MapLocalizerTwinsTest, TwoPlacesThatLookAlikeAreAmbiguous) {
   EXPECT_LT(positionError(expected, truth), 0.02);
 }
 
+/// A quarter of the size: a pixel is four times as wide, and features are found to half a pixel as ever.
+TEST(MapLocalizerSizeTest, SmallImagesAreGivenTheirPixels) {
+  SparseMapContents contents = testing::makeTestMap({})->contents();
+  contents.rig = parseCameraRig(R"(cameras:
+  front:
+    image_size_px: [320, 200]
+    model: mei
+    intrinsics: {xi: 1.15, gamma1: 223.9, gamma2: 223.7, u0: 162.4, v0: 99.7, k1: -0.33, k2: 0.0865, p1: -0.00067, p2: -0.00004}
+    field_of_view_rad: 3.2289
+    vehicle_from_camera: {translation_m: [3.6, 0.0, 0.6], rotation_xyzw: [0.5, -0.5, 0.5, -0.5]}
+  left:
+    image_size_px: [160, 120]
+    model: kannala_brandt
+    intrinsics: {fx: 47.5, fy: 47.75, cx: 80, cy: 60, k1: 0.01, k2: -0.002, k3: 0, k4: 0}
+    vehicle_from_camera: {translation_m: [1.7, 1.0, 0.9], rotation_xyzw: [-0.70710678, 0, 0, 0.70710678]}
+)",
+                                "quarter", "");
+  const auto map = std::make_shared<const SparseMap>(std::move(contents));
+  const MapLocalizer localizer(map, rigOf(map));
+  for (size_t keyframe = 2; keyframe + 2 < map->keyframes().size(); keyframe += 5) {
+    const RigidTransform truth = posesBetween(*map, keyframe);
+    testing::TestViewOptions view;
+    view.noise_px = 0.5;
+    const PoseFix fix =
+        localizer.localizeNear(testing::makeTestView(*map, truth, view), priorAbout(truth, 0.1, 0.0));
+    ASSERT_EQ(fix.status, LocalizationStatus::kLocalized) << "keyframe " << keyframe;
+    EXPECT_GT(fix.numInliers(), 0.6 * fix.num_matches);
+    EXPECT_LT(positionError(fix, truth), 0.05);
+  }
+}
+
+/// What a view of the map with bits shows, where the descriptors are the bits as numbers 0 and `one`.
+RigFeatures withNumbers(RigFeatures features, float one) {
+  for (ImageFeatures& image : features.images) {
+    image.descriptors = testing::descriptorsAsNumbers(image.descriptors, one);
+  }
+  return features;
+}
+
+/// Descriptors of numbers have other distances: those of SIFT are hundreds, those of RootSIFT about 1.
+TEST(MapLocalizerDescriptorTest, NumbersLocalizeAsBitsDo) {
+  const auto map = testing::makeTestMap({});
+  const RigidTransform truth = posesBetween(*map, 8);
+  testing::TestViewOptions view;
+  view.share_of_wrong = 0.3;
+  const RigFeatures bits = testing::makeTestView(*map, truth, view);
+  const PoseFix by_bits = MapLocalizer(map, rigOf(map)).localizeNear(bits, priorAbout(truth, 0.1, 0.0));
+  ASSERT_EQ(by_bits.status, LocalizationStatus::kLocalized);
+  for (const float one : {1.0F / 16.0F, 40.0F}) {
+    SparseMapContents contents = map->contents();
+    contents.descriptors = testing::descriptorsAsNumbers(contents.descriptors, one);
+    contents.feature_options = "type: sift\n";
+    const auto map_of_numbers = std::make_shared<const SparseMap>(std::move(contents));
+    const MapLocalizer localizer(map_of_numbers, rigOf(map_of_numbers));
+    const RigFeatures numbers = withNumbers(bits, one);
+    const PoseFix near = localizer.localizeNear(numbers, priorAbout(truth, 0.1, 0.0));
+    ASSERT_EQ(near.status, LocalizationStatus::kLocalized) << one;
+    EXPECT_GT(near.numInliers(), by_bits.numInliers() / 2);
+    const PoseFix anywhere = localizer.localizeAnywhere(numbers);
+    ASSERT_EQ(anywhere.status, LocalizationStatus::kLocalized) << one;
+    EXPECT_LT(positionError(anywhere, truth), 0.03);
+    const RigFeatures foreign = withNumbers(testing::makeForeignView(*map, 3), one);
+    EXPECT_NE(localizer.localizeAnywhere(foreign).status, LocalizationStatus::kLocalized);
+    // The limit counts: what differs as much as two landmarks do is no match.
+    EXPECT_LT(localizer.localizeNear(foreign, priorAbout(truth, 0.0, 0.0)).num_matches, 10);
+  }
+}
+
+TEST(MapLocalizerDescriptorTest, NeedsNoVocabulary) {
+  const auto map = testing::makeTestMap({});
+  SparseMapContents contents = map->contents();
+  contents.vocabulary.clear();
+  const auto bare = std::make_shared<const SparseMap>(std::move(contents));
+  const RigidTransform truth = posesBetween(*map, 8);
+  const PoseFix fix =
+      MapLocalizer(bare, rigOf(bare)).localizeAnywhere(testing::makeTestView(*map, truth, {}));
+  EXPECT_EQ(fix.status, LocalizationStatus::kLocalized);
+}
+
 TEST(MapLocalizerInputTest, NamesWhatIsWrongWithAMap) {
   const auto map = testing::makeTestMap({});
   const auto expectError = [&](const char* text, const auto& change) {
@@ -162,8 +253,6 @@ TEST(MapLocalizerInputTest, NamesWhatIsWrongWithAMap) {
       EXPECT_NE(std::string(error.what()).find(text), std::string::npos) << error.what();
     }
   };
-  expectError("vocabulary", [](SparseMapContents* contents) { contents->vocabulary.clear(); });
-  expectError("vocabulary", [](SparseMapContents* contents) { contents->vocabulary = "garbage"; });
   expectError("feature_options", [](SparseMapContents* contents) { contents->feature_options = "type: {"; });
   expectError("feature_options",
               [](SparseMapContents* contents) { contents->feature_options = "detector: another\n"; });

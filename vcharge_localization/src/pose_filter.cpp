@@ -32,7 +32,6 @@ void PoseFilterOptions::validate() const {
                fix_covariance_factor);
   requireField(map_sigma_m >= 0.0, "map_sigma_m", "must not be negative", map_sigma_m);
   requireField(map_sigma_rad >= 0.0, "map_sigma_rad", "must not be negative", map_sigma_rad);
-  requireField(correlated_frames >= 1.0, "correlated_frames", "must be 1 or more", correlated_frames);
   requireField(gate > 0.0, "gate", "must be positive", gate);
 }
 
@@ -127,7 +126,7 @@ bool PoseFilter::update(const PoseFix& fix) {
   if (!(distanceOf(fix) <= options_.gate)) {
     return false;
   }
-  const Matrix6d noise = options_.correlated_frames * noiseOf(fix);
+  const Matrix6d noise = noiseOf(fix);
   const Matrix6d expected = covariance_.topLeftCorner<6, 6>() + noise;
   const Eigen::Matrix<double, 8, 6> gain = expected.ldlt().solve(covariance_.topRows<6>()).transpose();
   const Eigen::Matrix<double, 8, 1> change = gain * differenceTo(fix.map_from_vehicle);

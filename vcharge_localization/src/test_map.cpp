@@ -136,6 +136,17 @@ RigFeatures makeTestView(const SparseMap& map, const RigidTransform& map_from_ve
   return features;
 }
 
+cv::Mat descriptorsAsNumbers(const cv::Mat& descriptors, float one) {
+  constexpr int kNumbers = 128;
+  cv::Mat numbers(descriptors.rows, kNumbers, CV_32FC1);
+  for (int row = 0; row < descriptors.rows; ++row) {
+    for (int i = 0; i < kNumbers; ++i) {
+      numbers.at<float>(row, i) = ((descriptors.at<uchar>(row, i / 8) >> (i % 8)) & 1) != 0 ? one : 0.0F;
+    }
+  }
+  return numbers;
+}
+
 RigFeatures makeForeignView(const SparseMap& map, uint32_t seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> share(0.2, 0.8);

@@ -31,6 +31,9 @@ struct TestViewOptions {
 RigFeatures makeTestView(const SparseMap& map, const RigidTransform& map_from_vehicle,
                          const TestViewOptions& options);
 
+/// The first 128 bits of binary descriptors as numbers (CV_32FC1, 128 columns): 0, or `one`.
+cv::Mat descriptorsAsNumbers(const cv::Mat& descriptors, float one);
+
 /// Features at random places with random descriptors.
 RigFeatures makeForeignView(const SparseMap& map, uint32_t seed);
 

@@ -12,7 +12,7 @@
 #include "vcharge_core/sparse_map.h"
 #include "vcharge_features/descriptor_matching.h"
 #include "vcharge_features/feature_extractor.h"
-#include "vcharge_features/place_index.h"
+#include "vcharge_features/place_votes.h"
 #include "vcharge_geometry/robust_options.h"
 #include "vcharge_localization/localization_status.h"
 
@@ -30,21 +30,31 @@ struct MapLocalizerOptions {
   int max_keyframes = 16;
   double max_view_angle_rad = 0.6;  ///< between the directions from which a landmark is seen
   double max_range_ratio = 1.8;     ///< between the distances
-  double min_radius_px = 6.0;       ///< of search, at 1280 pixels of width; also of the second search
+  /// Of search, at 1280 pixels of width; also of the second search. Never below 3 pixels of the image.
+  double min_radius_px = 6.0;
   double max_radius_px = 60.0;
   double radius_sigmas = 3.0;  ///< of the expected pose
+  /// Of the descriptors of a match, over the median distance between two landmarks of the map: the same for
+  /// all kinds of descriptors.
+  double max_relative_distance = 0.55;
   MatchOptions matching = closeMatches();
   // Place recognition.
+  PlaceVotesOptions places;
   int max_places = 12;                 ///< candidates
   double place_spacing_m = 2.5;        ///< candidates nearer to a better one are left out
   double place_spacing_rad = 0.6;      ///< unless they are turned by more
   double place_max_error_rad = 0.012;  ///< of a match with a recognized place, by a pose that is upright
   int min_inliers_without_prior = 30;  ///< in the wide search about it
-  double max_ambiguity = 0.7;          ///< inliers of the second best place over those of the best
-  double other_place_m = 1.0;          ///< poses further apart are of two places
-  double other_heading_rad = 0.1;      ///< or turned by more
+  /// Besides, on average over the cameras that sent an image: a place that has only its pillars in common
+  /// with another, or with itself long ago, is not believed.
+  int min_inliers_per_camera_without_prior = 15;
+  double max_ambiguity = 0.7;      ///< inliers of the second best place over those of the best
+  double other_place_m = 1.0;      ///< poses further apart are of two places
+  double other_heading_rad = 0.1;  ///< or turned by more
   MatchOptions place_matching;
   RobustOptions robust = defaultRobust();
+  /// Of the coarsest camera: robust.max_error_rad is not taken for less, since no feature is more exact.
+  double min_error_px = 0.8;
 
   static MatchOptions closeMatches();
   static RobustOptions defaultRobust();
@@ -62,17 +72,21 @@ struct MapLocalizerOptions {
     visit("min_radius_px", min_radius_px);
     visit("max_radius_px", max_radius_px);
     visit("radius_sigmas", radius_sigmas);
+    visit("max_relative_distance", max_relative_distance);
     visit("matching", matching);
+    visit("places", places);
     visit("max_places", max_places);
     visit("place_spacing_m", place_spacing_m);
     visit("place_spacing_rad", place_spacing_rad);
     visit("place_max_error_rad", place_max_error_rad);
     visit("min_inliers_without_prior", min_inliers_without_prior);
+    visit("min_inliers_per_camera_without_prior", min_inliers_per_camera_without_prior);
     visit("max_ambiguity", max_ambiguity);
     visit("other_place_m", other_place_m);
     visit("other_heading_rad", other_heading_rad);
     visit("place_matching", place_matching);
     visit("robust", robust);
+    visit("min_error_px", min_error_px);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
@@ -110,13 +124,16 @@ struct RigFeatures {
   std::vector<Eigen::Matrix3Xd> rays_in_camera;  ///< unit rays of the features; zero where there is none
 };
 
+class LandmarkMatcher;
+struct LandmarkMatches;
+
 /// Finds a rig's pose in a sparse map (paper, section Localization; Lee et al., IJRR 2015). Immutable; any
 /// number of threads may use it at once. Data parallel inside, deterministic.
 class MapLocalizer {
  public:
   /// The rig may differ from the map's; its cameras may have other lenses and places.
   /// std::invalid_argument for bad options; InputError for a rig without extrinsics, or a map that no
-  /// extractor of this program can have made, or without a vocabulary.
+  /// extractor of this program can have made.
   MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
                const MapLocalizerOptions& options = MapLocalizerOptions());
   ~MapLocalizer();
@@ -132,19 +149,16 @@ class MapLocalizer {
   /// places fit.
   PoseFix localizeAnywhere(const RigFeatures& features) const;
 
+  /// Inliers that a pose needs to be believed by who knew nothing before.
+  int minInliersWithoutPrior(const RigFeatures& features) const;
+
   const SparseMap& map() const { return *map_; }
 
  private:
-  struct Matches;
-  cv::Mat descriptorsOf(const std::vector<size_t>& observations) const;
-  /// The landmark of one of the map's observations is what a feature shows.
-  void add(const RigFeatures& features, size_t camera, int observation_index, int feature_index,
-           float distance, const std::vector<size_t>& observations, Matches* matches) const;
-  Matches searchLandmarks(const RigFeatures& features, const RigidTransform& map_from_vehicle, double sigma_m,
-                          double sigma_rad) const;
-  Matches matchPlace(const RigFeatures& features, size_t camera, size_t keyframe, size_t place_camera) const;
-  PoseFix estimate(const Matches& matches, int min_inliers, double min_inlier_ratio) const;
-  PoseFix refine(const RigFeatures& features, const PoseFix& fix) const;
+  /// A fix without a pose, with the counts of the matches.
+  PoseFix fixWithoutPose(const LandmarkMatches& matches) const;
+  PoseFix estimate(const LandmarkMatches& matches, int min_inliers, double min_inlier_ratio) const;
+  PoseFix refine(const RigFeatures& features, const PoseFix& fix, int min_inliers) const;
   std::vector<PlaceMatch> recognizePlaces(const RigFeatures& features) const;
   PoseFix localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const;
   bool isOtherPlace(const PoseFix& a, const PoseFix& b) const;
@@ -152,9 +166,11 @@ class MapLocalizer {
   const std::shared_ptr<const SparseMap> map_;
   const std::shared_ptr<const CameraRig> rig_;
   const MapLocalizerOptions options_;
+  RobustOptions robust_;  // the options', for the rig's pixels
   std::unique_ptr<FeatureExtractor> extractor_;
   std::vector<cv::Mat> masks_;  // by camera
-  std::unique_ptr<PlaceIndex> places_;
+  std::unique_ptr<LandmarkMatcher> matcher_;
+  std::unique_ptr<PlaceVotes> places_;
 };
 
 }  // namespace vcharge

@@ -22,12 +22,12 @@ struct PoseFilterOptions {
   double tilt_sigma_rad = 0.003;  ///< roll and pitch in a metre of way, per square root
   double time_sigma_m = 0.002;    ///< in a second, per square root, also of a vehicle that stands
   double time_sigma_rad = 0.0005;
-  // What a fix is good for: its own covariance takes matches to be independent, and the map to be right.
-  double fix_covariance_factor = 1.0;
+  /// What a fix is good for: its own covariance takes all inliers to be right, and their errors to be
+  /// independent.
+  double fix_covariance_factor = 3.0;
+  // Errors of the map itself, which stay the same while the same landmarks are seen.
   double map_sigma_m = 0.005;
   double map_sigma_rad = 0.0004;
-  /// Errors of the map stay the same while the same landmarks are seen: frames whose fixes count as one.
-  double correlated_frames = 3.0;
   double gate = 30.0;  ///< squared Mahalanobis distance (6 degrees of freedom) of a likely fix
 
   template <class Visitor>
@@ -45,7 +45,6 @@ struct PoseFilterOptions {
     visit("fix_covariance_factor", fix_covariance_factor);
     visit("map_sigma_m", map_sigma_m);
     visit("map_sigma_rad", map_sigma_rad);
-    visit("correlated_frames", correlated_frames);
     visit("gate", gate);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
@@ -54,9 +53,8 @@ struct PoseFilterOptions {
 /// Fuses fixes with the odometer: an error-state Kalman filter over the vehicle's pose in the map and the
 /// odometer's factors, so that a bridged way is known as well as the odometer was while there were fixes.
 ///
-/// Errors of fixes in a row have a part in common, which no averaging lessens: that of the map. So a fix is
-/// given less weight than its covariance (correlated_frames), and the common part is added to what
-/// covariance() tells.
+/// Errors of fixes in a row have a part in common, which no averaging lessens: that of the map. It is added
+/// to what pose() tells.
 class PoseFilter {
  public:
   explicit PoseFilter(const PoseFilterOptions& options = PoseFilterOptions());

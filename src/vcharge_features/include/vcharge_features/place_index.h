@@ -14,7 +14,7 @@ namespace vcharge {
 /// A place that looks like the query.
 struct PlaceMatch {
   int place = -1;      ///< as add() numbered it
-  double score = 0.0;  ///< sum over the query's cameras, in [0, number of cameras]
+  double score = 0.0;  ///< higher is better; PlaceIndex: in [0, number of cameras]
   /// Per camera of the query: the place's camera that looks most alike (-1: none). A place passed in the
   /// opposite direction is seen by another camera.
   std::vector<int> cameras;
