@@ -1,4 +1,4 @@
-#include "bundle_solver.h"
+#include "vcharge_mapping/bundle_solver.h"
 
 #include <cmath>
 #include <random>

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "map_assembly.h"
+#include "vcharge_mapping/map_assembly.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/stage_timer.h"
 
