@@ -14,6 +14,7 @@
 #include "vcharge_core/options.h"
 #include "vcharge_core/progress_bar.h"
 #include "vcharge_core/sparse_map_file.h"
+#include "vcharge_mapping/mapping_checkpoint.h"
 #include "vcharge_ros/bag_drive_source.h"
 
 namespace {
@@ -67,12 +68,17 @@ void print(const RigCalibration& result) {
 void calibrate(const Arguments& arguments, const RigCalibratorOptions& options) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   RigCalibrator calibrator(rig, options);
-  {
+  const char* dbg = getenv("EX_STATE");
+  if (dbg && std::filesystem::exists(dbg)) {
+    auto r = readCheckpoint(dbg, std::string(32, '0'), rig);
+    calibrator.resume(std::move(*r.state));
+  } else {
     ProgressBar bar("following the drive");
     BagDriveSourceOptions source_options;
     source_options.max_image_gap_s = INFINITY;  // a camera that pauses is borne, and told of
     BagDriveSource source(arguments.bag, rig, source_options);
     source.run(&calibrator, [&](double fraction) { bar.update(fraction); });
+    if (dbg) writeCheckpoint(calibrator.state(), std::string(32, '0'), dbg);
   }
   RigCalibration result;
   {
@@ -105,6 +111,12 @@ void calibrate(const Arguments& arguments, const RigCalibratorOptions& options) 
   }
   if (!arguments.trajectory.empty()) {
     writeTrajectory(calibrator.trajectory(), arguments.trajectory);
+  }
+  const std::filesystem::path folder = std::filesystem::path(arguments.output).parent_path();
+  for (const RigCamera& camera : result.rig->cameras) {
+    if (!camera.mask_file.empty()) {
+      createFolder((folder / camera.mask_file).parent_path().string());
+    }
   }
   writeCameraRig(*result.rig, arguments.output);
 }

@@ -14,24 +14,14 @@ namespace vcharge {
 /// ground.
 std::optional<double> findCameraHeight(const MappingData& data, int32_t camera);
 
-/// The ground as all cameras together see it around the vehicle: z = height + slope_x x + slope_y y in the
-/// vehicle's frame.
-struct GroundPlane {
-  Eigen::Vector3d height_and_slopes = Eigen::Vector3d::Zero();             ///< metres; 1; 1
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of these, from how parts of the drive differ
-  int num_keyframes = 0;  ///< at which enough ground was seen
-  int num_points = 0;     ///< on average
+/// A landmark on the ground, and the keyframe that passed nearest to it.
+struct GroundPoint {
+  int32_t track = 0;
+  int32_t keyframe = 0;
 };
 
-/// Mean over the keyframes, robust within each. Empty where at too few of them enough ground is seen. The
-/// vehicle's frame must be within `max_distance_m` of the ground already.
-std::optional<GroundPlane> fitGround(const MappingData& data, double max_distance_m);
-
-/// The motion of the vehicle's frame, new_from_old, that puts the ground to z = 0.
-RigidTransform levelFromVehicle(const GroundPlane& ground);
-
-/// Moves the vehicle's frame: the cameras on it, the keyframes and the map's frame alike, so that nothing that
-/// was seen changes.
-void moveVehicleFrame(const RigidTransform& new_from_old, MappingData* data);
+/// Landmarks that lie within `max_distance_m` of the vehicle's z = 0 and near its path: the ground, to the
+/// accuracy of poses and rig. In order of tracks.
+std::vector<GroundPoint> findGroundPoints(const MappingData& data, double max_distance_m);
 
 }  // namespace vcharge

@@ -8,16 +8,16 @@
 namespace vcharge {
 
 /// Adjusts cameras, keyframes, landmarks and the odometer's turn together (paper, equation joint_opt), removes
-/// outliers. The rig's mean height and tilt stay: what is seen does not tell them; see ground.h.
-BundleAdjustmentSummary adjustRig(const BundleAdjustmentOptions& options, MappingData* data);
+/// outliers. Landmarks on the ground say where the ground is under the vehicle: planar motion shows neither
+/// the cameras' heights nor, well, their tilt.
+BundleAdjustmentSummary adjustRig(const RigCalibratorOptions& options, MappingData* data);
 
 /// What the adjusted data tell of the cameras: columns [dt, dphi] of each.
 struct RigUncertainty {
   bool is_valid = false;
   Eigen::MatrixXd covariance;  ///< Schur marginals
-  Eigen::MatrixXd jackknife;   ///< from how parts of the drive of this length pull
+  Eigen::MatrixXd jackknife;   ///< from how parts of the drive pull
 };
-RigUncertainty rigUncertainty(const BundleAdjustmentOptions& options, double segment_m,
-                              const MappingData& data);
+RigUncertainty rigUncertainty(const RigCalibratorOptions& options, const MappingData& data);
 
 }  // namespace vcharge

@@ -8,6 +8,7 @@
 #include "rig_adjustment.h"
 #include "rig_judgement.h"
 #include "vcharge_core/stage_timer.h"
+#include "vcharge_core/text_format.h"
 
 namespace vcharge {
 namespace {
@@ -30,16 +31,16 @@ class RigBackEnd {
       stage("loops", 3, [&] { closeAllLoops(); });
       stage("landmark search", 4, [&] {
         searchLandmarks(options_.search, data_);
-        adjust(options_.bundle);
+        adjust(options_);
       });
       stage("last adjustment", 5, [&] {
         searchLandmarks(options_.search, data_);
-        adjust(options_.bundle);
+        adjust(options_);
         checkLoops(options_.loops, *data_, &state_->report.loop_edges);
         adjustFinely();
       });
       stage("judgement", 6, [&] {
-        judgeRig(options_, *state_, ground_, &result_);
+        judgeRig(options_, *state_, &result_);
       });
     } catch (const NotCalibrated& failure) {
       result_.verdict = Verdict::kFail;
@@ -93,10 +94,13 @@ class RigBackEnd {
   void initialize() {
     auto rig = std::make_shared<CameraRig>(*data_->rig);
     std::vector<std::string> failures;
+    std::vector<std::vector<MotionPair>> motions;
+    std::vector<Eigen::Vector3d> up_in_camera;
     for (size_t i = 0; i < rig->cameras.size(); ++i) {
       HandEye& initial = result_.cameras[i].initial;
-      initial = solvePlanarHandEye(
-          estimateCameraMotions(*data_, static_cast<int32_t>(i), options_.camera_motion), options_.hand_eye);
+      motions.push_back(estimateCameraMotions(*data_, static_cast<int32_t>(i), options_.camera_motion));
+      initial = solvePlanarHandEye(motions.back(), options_.hand_eye);
+      up_in_camera.emplace_back(initial.vehicle_from_camera.rotation().conjugate() * Eigen::Vector3d::UnitZ());
       if (initial.status != HandEyeStatus::kOk) {
         failures.push_back(describeFailure(rig->cameras[i].name, initial, result_));
       }
@@ -104,6 +108,14 @@ class RigBackEnd {
     }
     if (!failures.empty()) {
       throw NotCalibrated{failures};
+    }
+    const std::string wrong_sign = findWrongSign(*rig);
+    if (!wrong_sign.empty()) {
+      throw NotCalibrated{{wrong_sign}};
+    }
+    const TimeOffset offset = estimateTimeOffset(*state_, motions, up_in_camera);
+    if (std::abs(offset.offset_s) > 3.0 * offset.sigma_s) {
+      result_.time_offset_s = offset.offset_s;
     }
     data_->rig = rig;
     // With rays from height zero each camera's points lie below it as far as the ground is.
@@ -128,6 +140,8 @@ class RigBackEnd {
       raised->cameras[i].vehicle_from_camera = RigidTransform(level.rotation(), place_m);
     }
     data_->rig = raised;
+    for (const auto& c : data_->rig->cameras) fprintf(stderr, "DBG %s %.3f %.3f %.3f up %.4f %.4f %.4f\n", c.name.c_str(), c.vehicle_from_camera->translation().x(), c.vehicle_from_camera->translation().y(), c.vehicle_from_camera->translation().z(), c.vehicle_from_camera->rotationMatrix()(0,2), c.vehicle_from_camera->rotationMatrix()(1,2), c.vehicle_from_camera->rotationMatrix()(2,2));
+    fprintf(stderr, "DBG offset %f +- %f\n", offset.offset_s, offset.sigma_s);
   }
 
   TriangulationOptions firstTriangulation() const {
@@ -136,28 +150,20 @@ class RigBackEnd {
     return lenient;
   }
 
-  void adjust(const BundleAdjustmentOptions& bundle) {
-    const BundleAdjustmentSummary summary = adjustRig(bundle, data_);
+  void adjust(const RigCalibratorOptions& options) {
+    const BundleAdjustmentSummary summary = adjustRig(options, data_);
     state_->report.num_observations = summary.num_observations;
     state_->report.rms_px = summary.rms_px;
-    findGround();
-  }
-
-  void findGround() {
-    const std::optional<GroundPlane> ground = fitGround(*data_, options_.max_ground_distance_m);
-    if (ground) {
-      ground_ = ground;
-      moveVehicleFrame(levelFromVehicle(*ground), data_);
-    }
   }
 
   void adjustFirst() {
-    BundleAdjustmentOptions lenient = options_.bundle;
-    lenient.outlier_sigmas = INFINITY;
+    RigCalibratorOptions lenient = options_;
+    lenient.bundle.outlier_sigmas = INFINITY;
+    lenient.max_ground_distance_m *= 2.0;
     triangulateTracks(firstTriangulation(), data_);
     adjust(lenient);
     triangulateTracks(options_.triangulation, data_);
-    adjust(options_.bundle);
+    adjust(options_);
   }
 
   void closeAllLoops() {
@@ -167,13 +173,13 @@ class RigBackEnd {
     });
     closeLoops(options_.loops, &state_->report.loop_edges, data_);
     triangulateTracks(options_.triangulation, data_);
-    adjust(options_.bundle);
+    adjust(options_);
   }
 
   /// Extrinsics are a weak direction of the cost: the last iterations go further than a map needs.
   void adjustFinely() {
-    BundleAdjustmentOptions fine = options_.bundle;
-    fine.cost_tolerance *= 0.01;
+    RigCalibratorOptions fine = options_;
+    fine.bundle.cost_tolerance *= 0.01;
     adjust(fine);
   }
 
@@ -181,7 +187,6 @@ class RigBackEnd {
   const StageCallback& progress_;
   MappingState* const state_;
   MappingData* const data_;
-  std::optional<GroundPlane> ground_;
   RigCalibration result_;
 };
 

@@ -45,6 +45,7 @@ void RigCalibratorOptions::validate() const {
   requireField(max_speed_m_per_s > 0.0, "max_speed_m_per_s", "must be positive", max_speed_m_per_s);
   requireField(first_max_error_rad > 0.0, "first_max_error_rad", "must be positive", first_max_error_rad);
   requireField(max_ground_distance_m > 0.0, "max_ground_distance_m", "must be positive", max_ground_distance_m);
+  requireField(ground_sigma_m > 0.0, "ground_sigma_m", "must be positive", ground_sigma_m);
   requireField(segment_m > 0.0, "segment_m", "must be positive", segment_m);
   validateInner("features", features);
   validateInner("tracker", tracker);

@@ -21,7 +21,7 @@ Eigen::MatrixXd BundleEquations::pointInfluence(size_t point, const Eigen::Matri
     if (slot.pose > 0) {
       by_point += inverse.middleRows<6>(columnOf(slot.pose)).transpose() * slot.with_point;
     }
-    if (hasCameras()) {
+    if (hasCamera(slot)) {
       by_point += inverse.middleRows<6>(tailColumn() + cameraInTail(slot.camera)).transpose() *
                   slot.camera_with_point;
     }
@@ -62,7 +62,7 @@ BundleCovariance BundleEquations::covariance() {
         gradient << -slot.gradient, -crossMatrix(slot.from_vehicle_m) * slot.gradient;
         influence -= inverse.middleRows<6>(columnOf(pose)).transpose() * gradient;
       }
-      if (hasCameras()) {
+      if (hasCamera(slot)) {
         influence -= inverse.middleRows<6>(tailColumn() + cameraInTail(slot.camera)).transpose() *
                      (slot.by_camera.transpose() * slot.gradient);
       }

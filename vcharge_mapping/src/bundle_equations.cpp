@@ -122,7 +122,7 @@ void BundleEquations::linearizePoint(size_t point) {
     slot.from_vehicle_m = position - state_.poses[slot.pose].translation();
     slot.with_point.topRows<3>() = -slot.information;
     slot.with_point.bottomRows<3>() = -crossMatrix(slot.from_vehicle_m) * slot.information;
-    if (hasCameras()) {
+    if (hasCamera(slot)) {
       const Eigen::Matrix3d map_from_vehicle = state_.poses[slot.pose].rotationMatrix();
       const Eigen::Vector3d from_camera_m = map_from_vehicle.transpose() * slot.from_vehicle_m -
                                             state_.vehicle_from_camera[slot.camera].translation();
@@ -207,6 +207,9 @@ BundleEquations::TailTerms BundleEquations::tailTerms() const {
     for (size_t point = task * kPointsPerTask; point < end; ++point) {
       for (size_t s = first_slot_of_point_[point]; s < first_slot_of_point_[point + 1]; ++s) {
         const Slot& slot = slots_[s];
+        if (!hasCamera(slot)) {
+          continue;
+        }
         const Eigen::Index row = cameraInTail(slot.camera);
         const Matrix6d own = slot.camera_with_point * slot.by_camera;
         const Vector6d gradient = slot.by_camera.transpose() * slot.gradient;
@@ -216,8 +219,10 @@ BundleEquations::TailTerms BundleEquations::tailTerms() const {
         terms.gradient.segment<6>(row) += gradient;
         terms.reduced_gradient.segment<6>(row) += gradient - over_point * points_[point].gradient;
         for (size_t other = first_slot_of_point_[point]; other < first_slot_of_point_[point + 1]; ++other) {
-          terms.information.block<6, 6>(row, cameraInTail(slots_[other].camera)).noalias() -=
-              over_point * slots_[other].camera_with_point.transpose();
+          if (hasCamera(slots_[other])) {
+            terms.information.block<6, 6>(row, cameraInTail(slots_[other].camera)).noalias() -=
+                over_point * slots_[other].camera_with_point.transpose();
+          }
         }
       }
     }
@@ -288,11 +293,15 @@ void BundleEquations::assemblePose(size_t pose, double damping, MotionTerms* mot
       const auto withCamera = [&](int32_t camera) {
         return motions->with_tail.block<6, 6>(columnOf(pose), cameraInTail(camera));
       };
-      withCamera(slot.camera).noalias() += slot.with_point * slot.by_camera;
+      if (hasCamera(slot)) {
+        withCamera(slot.camera).noalias() += slot.with_point * slot.by_camera;
+      }
       for (size_t other = first_slot_of_point_[slot.point]; other < first_slot_of_point_[slot.point + 1];
            ++other) {
-        withCamera(slots_[other].camera).noalias() -=
-            slot.over_point * slots_[other].camera_with_point.transpose();
+        if (hasCamera(slots_[other])) {
+          withCamera(slots_[other].camera).noalias() -=
+              slot.over_point * slots_[other].camera_with_point.transpose();
+        }
       }
     }
   }
@@ -350,7 +359,7 @@ double BundleEquations::step(double damping, BundleState* next) {
              if (slots_[s].pose > 0) {
                gradient += slots_[s].with_point.transpose() * change.segment<6>(columnOf(slots_[s].pose));
              }
-             if (hasCameras()) {
+             if (hasCamera(slots_[s])) {
                gradient += slots_[s].camera_with_point.transpose() *
                            change.segment<6>(tailColumn() + cameraInTail(slots_[s].camera));
              }

@@ -83,6 +83,9 @@ class BundleEquations {
   static Eigen::Index cameraInTail(int32_t camera) { return 2 + 6 * static_cast<Eigen::Index>(camera); }
   bool hasCameras() const { return !problem_.vehicle_from_camera.empty(); }
 
+  /// Whether the slot's camera is unknown.
+  bool hasCamera(const Slot& slot) const { return hasCameras() && slot.camera != kGroundCamera; }
+
   void makeSlots();
   void makePattern();
   void linearizePoint(size_t point);

@@ -46,6 +46,14 @@ bool BundleErrors::ofObservation(const BundleState& state, size_t observation, c
                                  Eigen::Vector2d* error, Eigen::Matrix<double, 2, 3>* by_point) const {
   const BundleObservation& observed = problem_.observations[observation];
   const RigidTransform& pose = state.poses[observed.pose];
+  if (observed.camera == kGroundCamera) {
+    const Eigen::RowVector3d up = pose.rotationMatrix().col(2).transpose();
+    *error = Eigen::Vector2d(up.dot(point - pose.translation()) / observed.sigma_px, 0.0);
+    if (by_point != nullptr) {
+      *by_point << up / observed.sigma_px, Eigen::RowVector3d::Zero();
+    }
+    return true;
+  }
   const RigidTransform& camera_from_vehicle = state.camera_from_vehicle[observed.camera];
   const Eigen::Matrix3d camera_from_map =
       (camera_from_vehicle.rotation() * pose.rotation().conjugate()).toRotationMatrix();

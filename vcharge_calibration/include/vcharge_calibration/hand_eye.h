@@ -1,6 +1,6 @@
 #pragma once
 
-#include <string>
+#include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
@@ -44,6 +44,7 @@ struct MotionPair {
   double rotation_sigma_rad = 0.001;
   double direction_sigma_rad = 0.01;
   bool has_direction = true;  ///< false: the camera hardly moved
+  int32_t keyframe = 0;       ///< a label: where the motion begins
 };
 
 enum class HandEyeStatus {

@@ -21,6 +21,7 @@ struct RigCalibratorOptions {
   double max_speed_m_per_s = 25.0;  ///< faster odometry is a reset of the counters
   double first_max_error_rad = 0.03;     ///< of rays to their point by the first guess of rig and poses
   double max_ground_distance_m = 0.15;   ///< of ground points from where the ground was found before
+  double ground_sigma_m = 0.05;          ///< of a ground point from the plane on which the vehicle stands
   double segment_m = 10.0;               ///< parts of the drive whose errors are independent of each other
   FeatureExtractorOptions features;
   FrameTrackerOptions tracker;
@@ -44,6 +45,7 @@ struct RigCalibratorOptions {
     visit("max_speed_m_per_s", max_speed_m_per_s);
     visit("first_max_error_rad", first_max_error_rad);
     visit("max_ground_distance_m", max_ground_distance_m);
+    visit("ground_sigma_m", ground_sigma_m);
     visit("segment_m", segment_m);
     visit("features", features);
     visit("tracker", tracker);

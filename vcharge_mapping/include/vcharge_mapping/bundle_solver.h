@@ -12,7 +12,10 @@
 
 namespace vcharge {
 
-/// A point as a camera of the rig saw it.
+constexpr int32_t kGroundCamera = -1;
+
+/// A point as a camera of the rig saw it; or, with camera kGroundCamera, one that lies on the ground, z = 0 in
+/// the vehicle's frame of a pose: then sigma_px is in metres and position_px of no use.
 struct BundleObservation {
   int32_t pose = 0;
   int32_t camera = 0;
