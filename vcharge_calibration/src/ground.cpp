@@ -6,7 +6,7 @@
 namespace vcharge {
 namespace {
 
-constexpr double kMaxRange_m = 6.0;       // of ground points, along the ground
+constexpr double kMaxRange_m = 5.0;       // of ground points, along the ground
 constexpr double kMinBelow_m = 0.15;      // a camera is at least this high
 constexpr double kMaxBelow_m = 4.0;
 constexpr double kBin_m = 0.02;

@@ -1,5 +1,6 @@
 #include "rig_adjustment.h"
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -9,10 +10,39 @@
 namespace vcharge {
 namespace {
 
+/// How much less certain the odometer is where wheels slipped.
+constexpr double kSlipFactor = 20.0;
+constexpr double kSlipSigmas = 5.0;
+/// No odometer is taken for better.
+constexpr double kMinOdometrySigma_m = 0.0005;
+constexpr double kMinOdometrySigma_rad = 0.0002;
+constexpr double kMinHeightSigma_m = 0.001;
+constexpr double kMinTiltSigma_rad = 0.0005;
+
+double medianOf(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 /// The problem of mapping, with the ground's observations put to their points.
-BundleProblem makeRigProblem(const RigCalibratorOptions& options, const MappingData& data) {
-  const BundleProblem mapping = makeBundleProblem(options.bundle, data);
+BundleProblem makeRigProblem(const RigCalibratorOptions& options, const OdometryNoise& odometry,
+                             const MappingData& data) {
+  BundleAdjustmentOptions bundle = options.bundle;
+  if (odometry.sigma_m > 0.0) {
+    bundle.odometry_sigma_m = odometry.sigma_m;
+    bundle.odometry_sigma_rad = odometry.sigma_rad;
+    bundle.height_sigma_m = odometry.height_sigma_m;
+    bundle.tilt_sigma_rad = odometry.tilt_sigma_rad;
+    bundle.odometry_distance_sigma = bundle.odometry_turn_sigma = 0.0;
+  }
+  const BundleProblem mapping = makeBundleProblem(bundle, data);
   BundleProblem problem = mapping;
+  for (BundleMotion& motion : problem.motions) {
+    if (!odometry.has_slipped.empty() && odometry.has_slipped[motion.pose]) {
+      motion.information /= kSlipFactor * kSlipFactor;
+    }
+  }
   for (const RigCamera& camera : data.rig->cameras) {
     problem.vehicle_from_camera.push_back(*camera.vehicle_from_camera);
   }
@@ -44,9 +74,48 @@ BundleProblem makeRigProblem(const RigCalibratorOptions& options, const MappingD
 
 }  // namespace
 
-BundleAdjustmentSummary adjustRig(const RigCalibratorOptions& options, MappingData* data) {
+OdometryNoise estimateOdometryNoise(const RigCalibratorOptions& options, const MappingData& data) {
+  OdometryNoise noise;
+  std::vector<double> errors_m, errors_rad, heights_m, tilts_rad;
+  for (size_t i = 1; i < data.keyframes.size(); ++i) {
+    const RigidTransform counted =
+        data.keyframes[i - 1].odom_from_vehicle.inverse() * data.keyframes[i].odom_from_vehicle;
+    const RigidTransform seen =
+        data.keyframes[i - 1].map_from_vehicle.inverse() * data.keyframes[i].map_from_vehicle;
+    const Eigen::Vector2d error_m = (seen.translation() - counted.translation()).head<2>();
+    // Per axis, of a distance in two.
+    errors_m.push_back(error_m.norm() / std::sqrt(2.0));
+    errors_rad.push_back(std::abs(yawOfRotation(seen.rotation()) -
+                                  data.odometry_turn_scale * yawOfRotation(counted.rotation())));
+    heights_m.push_back(std::abs(seen.translation().z()));
+    tilts_rad.push_back(vectorFromRotation(seen.rotation()).head<2>().norm());
+  }
+  if (errors_m.size() < 10) {
+    return noise;
+  }
+  // Medians of a Rayleigh distribution and of the absolute value of a normal one.
+  constexpr double kRayleigh = 1.1774, kNormal = 0.6745;
+  const BundleAdjustmentOptions& bundle = options.bundle;
+  noise.sigma_m =
+      std::clamp(medianOf(errors_m) * std::sqrt(2.0) / kRayleigh, kMinOdometrySigma_m, bundle.odometry_sigma_m);
+  noise.sigma_rad =
+      std::clamp(medianOf(errors_rad) / kNormal, kMinOdometrySigma_rad, bundle.odometry_sigma_rad);
+  noise.height_sigma_m =
+      std::clamp(medianOf(heights_m) / kNormal, kMinHeightSigma_m, bundle.height_sigma_m);
+  noise.tilt_sigma_rad =
+      std::clamp(medianOf(tilts_rad) / kRayleigh, kMinTiltSigma_rad, bundle.tilt_sigma_rad);
+  noise.has_slipped.push_back(false);
+  for (size_t i = 0; i < errors_m.size(); ++i) {
+    noise.has_slipped.push_back(errors_m[i] > kSlipSigmas * noise.sigma_m ||
+                                errors_rad[i] > kSlipSigmas * noise.sigma_rad);
+  }
+  return noise;
+}
+
+BundleAdjustmentSummary adjustRig(const RigCalibratorOptions& options, const OdometryNoise& odometry,
+                                  MappingData* data) {
   check(!data->keyframes.empty(), "adjustRig: expected keyframes");
-  BundleProblem problem = makeRigProblem(options, *data);
+  BundleProblem problem = makeRigProblem(options, odometry, *data);
   const BundleSolution solved = solveBundle(options.bundle.max_iterations, options.bundle.cost_tolerance, &problem);
   writeBack(problem, data);
   auto rig = std::make_shared<CameraRig>(*data->rig);
@@ -60,9 +129,10 @@ BundleAdjustmentSummary adjustRig(const RigCalibratorOptions& options, MappingDa
   return summary;
 }
 
-RigUncertainty rigUncertainty(const RigCalibratorOptions& options, const MappingData& data) {
+RigUncertainty rigUncertainty(const RigCalibratorOptions& options, const OdometryNoise& odometry,
+                              const MappingData& data) {
   RigUncertainty result;
-  const BundleCovariance tail = bundleCovariance(makeRigProblem(options, data));
+  const BundleCovariance tail = bundleCovariance(makeRigProblem(options, odometry, data));
   if (!tail.is_valid) {
     return result;
   }

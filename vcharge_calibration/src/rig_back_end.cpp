@@ -13,6 +13,9 @@
 namespace vcharge {
 namespace {
 
+/// The first guess of the ground is wrong by so many times more.
+constexpr double kFirstGround = 4.0;
+
 /// Thrown where nothing can be calibrated, with the verdict's reason.
 struct NotCalibrated {
   std::vector<std::string> remarks;
@@ -33,6 +36,8 @@ class RigBackEnd {
         searchLandmarks(options_.search, data_);
         adjust(options_);
       });
+      odometry_ = estimateOdometryNoise(options_, *data_);
+      fprintf(stderr, "DBG odo %f m %f rad %f m %f rad slip %d\n", odometry_.sigma_m, odometry_.sigma_rad, odometry_.height_sigma_m, odometry_.tilt_sigma_rad, (int)std::count(odometry_.has_slipped.begin(), odometry_.has_slipped.end(), true));
       stage("last adjustment", 5, [&] {
         searchLandmarks(options_.search, data_);
         adjust(options_);
@@ -40,7 +45,7 @@ class RigBackEnd {
         adjustFinely();
       });
       stage("judgement", 6, [&] {
-        judgeRig(options_, *state_, &result_);
+        judgeRig(options_, odometry_, *state_, &result_);
       });
     } catch (const NotCalibrated& failure) {
       result_.verdict = Verdict::kFail;
@@ -151,7 +156,7 @@ class RigBackEnd {
   }
 
   void adjust(const RigCalibratorOptions& options) {
-    const BundleAdjustmentSummary summary = adjustRig(options, data_);
+    const BundleAdjustmentSummary summary = adjustRig(options, odometry_, data_);
     state_->report.num_observations = summary.num_observations;
     state_->report.rms_px = summary.rms_px;
   }
@@ -159,11 +164,12 @@ class RigBackEnd {
   void adjustFirst() {
     RigCalibratorOptions lenient = options_;
     lenient.bundle.outlier_sigmas = INFINITY;
-    lenient.max_ground_distance_m *= 2.0;
+    lenient.max_ground_distance_m *= kFirstGround;
     triangulateTracks(firstTriangulation(), data_);
     adjust(lenient);
+    lenient.bundle.outlier_sigmas = options_.bundle.outlier_sigmas;
     triangulateTracks(options_.triangulation, data_);
-    adjust(options_);
+    adjust(lenient);
   }
 
   void closeAllLoops() {
@@ -187,6 +193,7 @@ class RigBackEnd {
   const StageCallback& progress_;
   MappingState* const state_;
   MappingData* const data_;
+  OdometryNoise odometry_;
   RigCalibration result_;
 };
 

@@ -95,7 +95,8 @@ void countObservations(const MappingData& data, RigCalibration* result) {
 }
 
 /// The rig from the odd or the even parts of the drive alone; all keyframes stay, joined by odometry.
-std::shared_ptr<const CameraRig> calibrateHalf(const RigCalibratorOptions& options, const MappingData& data,
+std::shared_ptr<const CameraRig> calibrateHalf(const RigCalibratorOptions& options,
+                                               const OdometryNoise& odometry, const MappingData& data,
                                                bool odd) {
   MappingData half;
   half.rig = data.rig;
@@ -117,7 +118,7 @@ std::shared_ptr<const CameraRig> calibrateHalf(const RigCalibratorOptions& optio
   }
   RigCalibratorOptions quick = options;
   quick.bundle.max_iterations = kHalfIterations;
-  adjustRig(quick, &half);
+  adjustRig(quick, odometry, &half);
   return half.rig;
 }
 
@@ -195,7 +196,8 @@ std::string findWrongSign(const CameraRig& rig) {
   return "";
 }
 
-void judgeRig(const RigCalibratorOptions& options, const MappingState& state, RigCalibration* result) {
+void judgeRig(const RigCalibratorOptions& options, const OdometryNoise& odometry, const MappingState& state,
+              RigCalibration* result) {
   const MappingData& data = state.data;
   result->rms_px = state.report.rms_px;
   result->odometer_turn_scale = data.odometry_turn_scale;
@@ -207,9 +209,9 @@ void judgeRig(const RigCalibratorOptions& options, const MappingState& state, Ri
   result->height_source = "from " + std::to_string(num_ground) +
                           " landmarks on the ground near the path, on which base_link stands in the mean";
   auto rig = std::make_shared<CameraRig>(*data.rig);
-  const RigUncertainty uncertainty = rigUncertainty(options, data);
-  const auto odd = calibrateHalf(options, data, true);
-  const auto even = calibrateHalf(options, data, false);
+  const RigUncertainty uncertainty = rigUncertainty(options, odometry, data);
+  const auto odd = calibrateHalf(options, odometry, data, true);
+  const auto even = calibrateHalf(options, odometry, data, false);
   for (size_t i = 0; i < rig->cameras.size(); ++i) {
     CameraCalibration& camera = result->cameras[i];
     camera.half_difference =

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "rig_adjustment.h"
 #include "vcharge_calibration/rig_calibration.h"
 #include "vcharge_calibration/rig_calibrator_options.h"
 #include "vcharge_mapping/mapping_state.h"
@@ -17,7 +18,8 @@ std::string describeFailure(const std::string& camera, const HandEye& initial, c
 std::string findWrongSign(const CameraRig& rig);
 
 /// Fills in covariances, statistics and verdict of an adjusted rig.
-void judgeRig(const RigCalibratorOptions& options, const MappingState& state, RigCalibration* result);
+void judgeRig(const RigCalibratorOptions& options, const OdometryNoise& odometry, const MappingState& state,
+              RigCalibration* result);
 
 /// Verdict and remarks from the figures of a calibration.
 void findVerdict(RigCalibration* result);
