@@ -6,6 +6,7 @@
 #include <string>
 
 #include "vcharge_calibration/rig_calibrator.h"
+#include "vcharge_calibration/rig_report.h"
 #include "vcharge_core/camera_rig.h"
 #include "vcharge_core/command_line.h"
 #include "vcharge_core/content_hash.h"
@@ -14,7 +15,6 @@
 #include "vcharge_core/options.h"
 #include "vcharge_core/progress_bar.h"
 #include "vcharge_core/sparse_map_file.h"
-#include "vcharge_mapping/mapping_checkpoint.h"
 #include "vcharge_ros/bag_drive_source.h"
 
 namespace {
@@ -68,17 +68,12 @@ void print(const RigCalibration& result) {
 void calibrate(const Arguments& arguments, const RigCalibratorOptions& options) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   RigCalibrator calibrator(rig, options);
-  const char* dbg = getenv("EX_STATE");
-  if (dbg && std::filesystem::exists(dbg)) {
-    auto r = readCheckpoint(dbg, std::string(32, '0'), rig);
-    calibrator.resume(std::move(*r.state));
-  } else {
+  {
     ProgressBar bar("following the drive");
     BagDriveSourceOptions source_options;
     source_options.max_image_gap_s = INFINITY;  // a camera that pauses is borne, and told of
     BagDriveSource source(arguments.bag, rig, source_options);
     source.run(&calibrator, [&](double fraction) { bar.update(fraction); });
-    if (dbg) writeCheckpoint(calibrator.state(), std::string(32, '0'), dbg);
   }
   RigCalibration result;
   {
@@ -94,6 +89,13 @@ void calibrate(const Arguments& arguments, const RigCalibratorOptions& options) 
   std::printf("\n%s\n", toString(result.verdict).c_str());
   for (const std::string& remark : result.remarks) {
     std::printf("  %s\n", remark.c_str());
+  }
+  if (!arguments.report.empty()) {
+    createFolder(arguments.report);
+    writeTextFileAtomically(
+        (std::filesystem::path(arguments.report) / "rig_report.html").string(),
+        makeRigReport("Rig by " + std::filesystem::path(arguments.bag).filename().string(), result,
+                      calibrator.state()));
   }
   if (result.verdict == Verdict::kFail) {
     throw InputError(arguments.bag + ": FAIL: " + result.remarks.front());

@@ -60,7 +60,7 @@ MappingData makeDrive(uint32_t seed, double noise_px) {
                                                length_m * std::sin(0.5 * turn_rad) + side_m * std::cos(0.5 * turn_rad),
                                                counted_rad);
   }
-  for (int p = 0; p < 2500; ++p) {
+  for (int p = 0; p < 1500; ++p) {
     const double x = -12.0 + 24.0 * uniform(random);
     const double y = -18.0 + 36.0 * uniform(random);
     const bool is_ground = uniform(random) < 0.5;
@@ -141,7 +141,7 @@ TEST(RigAdjustmentTest, FindsTheCamerasOfAKnownDrive) {
 TEST(RigAdjustmentTest, KnowsItsUncertainty) {
   // Errors over their standard deviations, squared: mean of many drives near 1.
   Vector6d sum = Vector6d::Zero();
-  constexpr int kDrives = 8;
+  constexpr int kDrives = 5;
   for (uint32_t seed = 1; seed <= kDrives; ++seed) {
     MappingData data = makeDrive(seed, kNoise_px);
     const std::shared_ptr<const CameraRig> truth = data.rig;
@@ -158,10 +158,13 @@ TEST(RigAdjustmentTest, KnowsItsUncertainty) {
   }
   const Vector6d mean = sum / (2.0 * kDrives);
   for (int i = 0; i < 6; ++i) {
-    // 16 errors that go together by pairs: a chi-square of about 8 degrees of freedom over 8. The ground's
-    // deviation is said to be five times what it is here, so height, roll and pitch may err less.
-    EXPECT_LT(mean[i], 2.7) << i << ": " << mean.transpose();
-    EXPECT_GT(mean[i], i == 0 || i == 1 || i == 5 ? 0.2 : 0.02) << i << ": " << mean.transpose();
+    // Ten errors that go together by pairs: a chi-square of five degrees of freedom over five is within these
+    // bounds in 99 % of all cases. The ground, which height and tilt come from, is said to be much rougher than
+    // it is here: those may err less.
+    EXPECT_LT(mean[i], 3.3) << i << ": " << mean.transpose();
+    if (i == 0 || i == 1 || i == 5) {
+      EXPECT_GT(mean[i], 0.08) << i << ": " << mean.transpose();
+    }
   }
 }
 
@@ -221,7 +224,7 @@ TEST(GroundTest, FindsTheHeightOfACameraPutAtZero) {
 TEST(GroundTest, TakesThePointsUnderThePathAlone) {
   const MappingData data = makeDrive(5, 0.0);
   const std::vector<GroundPoint> ground = findGroundPoints(data, 0.15);
-  EXPECT_GT(ground.size(), 200U);
+  EXPECT_GT(ground.size(), 100U);
   for (const GroundPoint& point : ground) {
     EXPECT_LT(std::abs(data.tracks[point.track].position_m->z()), 0.15);
   }

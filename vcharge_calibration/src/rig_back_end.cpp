@@ -37,7 +37,6 @@ class RigBackEnd {
         adjust(options_);
       });
       odometry_ = estimateOdometryNoise(options_, *data_);
-      fprintf(stderr, "DBG odo %f m %f rad %f m %f rad slip %d\n", odometry_.sigma_m, odometry_.sigma_rad, odometry_.height_sigma_m, odometry_.tilt_sigma_rad, (int)std::count(odometry_.has_slipped.begin(), odometry_.has_slipped.end(), true));
       stage("last adjustment", 5, [&] {
         searchLandmarks(options_.search, data_);
         adjust(options_);
@@ -145,8 +144,6 @@ class RigBackEnd {
       raised->cameras[i].vehicle_from_camera = RigidTransform(level.rotation(), place_m);
     }
     data_->rig = raised;
-    for (const auto& c : data_->rig->cameras) fprintf(stderr, "DBG %s %.3f %.3f %.3f up %.4f %.4f %.4f\n", c.name.c_str(), c.vehicle_from_camera->translation().x(), c.vehicle_from_camera->translation().y(), c.vehicle_from_camera->translation().z(), c.vehicle_from_camera->rotationMatrix()(0,2), c.vehicle_from_camera->rotationMatrix()(1,2), c.vehicle_from_camera->rotationMatrix()(2,2));
-    fprintf(stderr, "DBG offset %f +- %f\n", offset.offset_s, offset.sigma_s);
   }
 
   TriangulationOptions firstTriangulation() const {

@@ -3,7 +3,6 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "vcharge_calibration/rig_calibration.h"
@@ -35,10 +34,6 @@ class RigCalibrator : public DriveConsumer {
   /// The calibration by all that was fed. A drive that does not suffice gives Verdict::kFail with the reason.
   /// The callback may be empty, and may throw to end the work.
   RigCalibration finish(const StageCallback& progress);
-
-  /// Instead of feeding the drive: goes on from the state() of a calibrator with the same rig and options that
-  /// was fed and not finished.
-  void resume(MappingState state) { state_ = std::move(state); }
 
   /// After finish() with another verdict than kFail: poses of all frames, and the map that came with them.
   Trajectory trajectory() const { return trajectoryOf(state_); }
