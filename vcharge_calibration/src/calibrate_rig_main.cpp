@@ -35,6 +35,13 @@ void print(const RigCalibration& result) {
       result.distance_m, kDegrees * result.left_turn_rad, kDegrees * result.right_turn_rad, result.num_keyframes,
       static_cast<long long>(result.num_landmarks), result.num_loop_edges, result.rms_px);
   if (result.rig == nullptr) {
+    for (const CameraCalibration& camera : result.cameras) {
+      const Eigen::Vector3d& travel = camera.initial.travel_in_camera;
+      if (travel.norm() > 0.0) {
+        std::printf("camera '%s': straight ahead is (%.4f, %.4f, %.4f) in its frame\n", camera.name.c_str(),
+                    travel.x(), travel.y(), travel.z());
+      }
+    }
     return;
   }
   std::printf("%-10s %9s %9s %9s   %9s %9s %9s   %8s %8s\n", "camera", "x (cm)", "y (cm)", "z (cm)", "yaw (deg)",

@@ -154,6 +154,29 @@ PlanarPlace findPlace(const std::vector<MotionPair>& motions, const std::vector<
   return place;
 }
 
+/// Mean direction of motions that went straight, against which the others weigh less the further they are.
+Eigen::Vector3d findTravel(const std::vector<MotionPair>& motions, const HandEyeOptions& options) {
+  constexpr double kStraight_rad = 0.02;
+  Eigen::Vector3d travel = Eigen::Vector3d::Zero();
+  for (int iteration = 0; iteration < options.num_iterations; ++iteration) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const MotionPair& motion : motions) {
+      if (motion.has_direction && std::abs(yawOf(motion)) < kStraight_rad) {
+        const double forwards = motion.vehicle.translation().x() < 0.0 ? -1.0 : 1.0;
+        const Eigen::Vector3d direction = forwards * motion.camera_direction;
+        const double sigma = std::hypot(motion.direction_sigma_rad, kStraight_rad);
+        const double sigmas = iteration == 0 ? 0.0 : (direction - travel).norm() / sigma;
+        sum += cauchyWeight(sigmas, options.loss_sigmas) / (sigma * sigma) * direction;
+      }
+    }
+    if (!(sum.norm() > 0.0)) {
+      return Eigen::Vector3d::Zero();
+    }
+    travel = sum.normalized();
+  }
+  return travel;
+}
+
 }  // namespace
 
 void HandEyeOptions::validate() const {
@@ -174,6 +197,7 @@ HandEye solvePlanarHandEye(const std::vector<MotionPair>& motions, const HandEye
   if (result.num_motions < options.min_motions) {
     return result;
   }
+  result.travel_in_camera = findTravel(motions, options);
   const Vertical vertical = findVertical(motions, options);
   result.tilt_sigma_rad = vertical.sigma_rad;
   const Eigen::Quaterniond level_from_camera =

@@ -89,7 +89,11 @@ TEST(PlanarHandEyeTest, TellsStraightDrivesFromTurns) {
   Drive drive;
   drive.turn_rad = 0.0;
   drive.noise_rad = 0.002;
-  EXPECT_EQ(solvePlanarHandEye(makeMotions(drive), HandEyeOptions()).status, HandEyeStatus::kNoTurn);
+  const HandEye found = solvePlanarHandEye(makeMotions(drive), HandEyeOptions());
+  EXPECT_EQ(found.status, HandEyeStatus::kNoTurn);
+  // Straight ahead is seen all the same.
+  const Eigen::Vector3d ahead = truePlace().rotation().conjugate() * Eigen::Vector3d::UnitX();
+  EXPECT_LT(std::acos(found.travel_in_camera.dot(ahead)), 0.002);
 }
 
 TEST(PlanarHandEyeTest, TellsTooFewMotions) {

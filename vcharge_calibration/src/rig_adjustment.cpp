@@ -13,6 +13,8 @@ namespace {
 /// How much less certain the odometer is where wheels slipped.
 constexpr double kSlipFactor = 20.0;
 constexpr double kSlipSigmas = 5.0;
+/// Of a keyframe to the next, to lean in.
+constexpr double kMinTurn_rad = 0.01;
 /// No odometer is taken for better.
 constexpr double kMinOdometrySigma_m = 0.0005;
 constexpr double kMinOdometrySigma_rad = 0.0002;
@@ -23,6 +25,26 @@ double medianOf(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+/// Weights of what keyframes tell of the cameras' tilt. The body leans outwards in turns: with turns to both
+/// sides counting the same in sum that cancels, so the side with more of them counts less.
+std::vector<double> balanceTurns(const MappingData& data) {
+  std::vector<double> turns_rad(data.keyframes.size(), 0.0);
+  double left_rad = 0.0, right_rad = 0.0;
+  for (size_t i = 1; i < data.keyframes.size(); ++i) {
+    turns_rad[i] = yawOfRotation(data.keyframes[i - 1].odom_from_vehicle.rotation().conjugate() *
+                                 data.keyframes[i].odom_from_vehicle.rotation());
+    (turns_rad[i] > 0.0 ? left_rad : right_rad) += std::abs(turns_rad[i]);
+  }
+  const double less_rad = std::max(std::min(left_rad, right_rad), 1e-6);
+  std::vector<double> weights(data.keyframes.size(), 1.0);
+  for (size_t i = 0; i < weights.size(); ++i) {
+    if (std::abs(turns_rad[i]) > kMinTurn_rad) {
+      weights[i] = less_rad / std::max(less_rad, turns_rad[i] > 0.0 ? left_rad : right_rad);
+    }
+  }
+  return weights;
 }
 
 /// The problem of mapping, with the ground's observations put to their points.
@@ -38,10 +60,12 @@ BundleProblem makeRigProblem(const RigCalibratorOptions& options, const Odometry
   }
   const BundleProblem mapping = makeBundleProblem(bundle, data);
   BundleProblem problem = mapping;
+  const std::vector<double> weights = balanceTurns(data);
   for (BundleMotion& motion : problem.motions) {
     if (!odometry.has_slipped.empty() && odometry.has_slipped[motion.pose]) {
       motion.information /= kSlipFactor * kSlipFactor;
     }
+    motion.information.block<2, 2>(3, 3) *= weights[motion.pose];
   }
   for (const RigCamera& camera : data.rig->cameras) {
     problem.vehicle_from_camera.push_back(*camera.vehicle_from_camera);
@@ -60,8 +84,8 @@ BundleProblem makeRigProblem(const RigCalibratorOptions& options, const Odometry
       if (is_ground && mapping.observations[i].pose == next_ground->keyframe &&
           (i == mapping.first_observation[point] ||
            mapping.observations[i - 1].pose != next_ground->keyframe)) {
-        problem.observations.push_back(
-            {next_ground->keyframe, kGroundCamera, Eigen::Vector2d::Zero(), options.ground_sigma_m});
+        problem.observations.push_back({next_ground->keyframe, kGroundCamera, Eigen::Vector2d::Zero(),
+                                        options.ground_sigma_m / std::sqrt(weights[next_ground->keyframe])});
       }
       problem.observations.push_back(mapping.observations[i]);
     }

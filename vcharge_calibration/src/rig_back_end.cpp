@@ -16,6 +16,9 @@ namespace {
 /// The first guess of the ground is wrong by so many times more.
 constexpr double kFirstGround = 4.0;
 
+/// Of the keyframes, at which a camera must see how it moves.
+constexpr double kMinSeenShare = 0.2;
+
 /// Thrown where nothing can be calibrated, with the verdict's reason.
 struct NotCalibrated {
   std::vector<std::string> remarks;
@@ -104,6 +107,9 @@ class RigBackEnd {
       HandEye& initial = result_.cameras[i].initial;
       motions.push_back(estimateCameraMotions(*data_, static_cast<int32_t>(i), options_.camera_motion));
       initial = solvePlanarHandEye(motions.back(), options_.hand_eye);
+      if (kMinSeenShare * static_cast<double>(data_->keyframes.size()) > static_cast<double>(motions.back().size())) {
+        initial.status = HandEyeStatus::kTooFewMotions;
+      }
       up_in_camera.emplace_back(initial.vehicle_from_camera.rotation().conjugate() * Eigen::Vector3d::UnitZ());
       if (initial.status != HandEyeStatus::kOk) {
         failures.push_back(describeFailure(rig->cameras[i].name, initial, result_));

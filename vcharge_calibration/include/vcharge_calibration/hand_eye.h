@@ -12,7 +12,7 @@
 namespace vcharge {
 
 struct HandEyeOptions {
-  int min_motions = 20;
+  int min_motions = 6;
   int num_iterations = 30;        ///< of reweighting
   double loss_sigmas = 2.0;       ///< scale of the Cauchy loss
   double max_inlier_sigmas = 5.0;
@@ -61,6 +61,8 @@ struct HandEye {
   double yaw_sigma_rad = 0.0;
   double place_sigma_m = 0.0;  ///< of x and y, the larger
   int num_motions = 0, num_inliers = 0;
+  /// Where straight ahead is in the camera's frame, which needs no turn; zero where nothing went straight.
+  Eigen::Vector3d travel_in_camera = Eigen::Vector3d::Zero();
 };
 
 /// Planar hand-eye calibration (Guo, Mirzaei, Roumeliotis, ICRA 2012): the place of a camera on a vehicle that
