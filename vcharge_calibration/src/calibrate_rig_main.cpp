@@ -30,10 +30,12 @@ struct Arguments {
 
 void print(const RigCalibration& result) {
   std::printf(
-      "%.0f m, %.0f degrees of turn to the left, %.0f to the right; %d keyframes, %lld landmarks, %d loop edges, "
+      "%.0f m, %.0f degrees of turn to the left, %.0f to the right; %d keyframes, %lld landmarks, %d loop "
+      "edges, "
       "error %.3f px RMS per coordinate\n",
-      result.distance_m, kDegrees * result.left_turn_rad, kDegrees * result.right_turn_rad, result.num_keyframes,
-      static_cast<long long>(result.num_landmarks), result.num_loop_edges, result.rms_px);
+      result.distance_m, kDegrees * result.left_turn_rad, kDegrees * result.right_turn_rad,
+      result.num_keyframes, static_cast<long long>(result.num_landmarks), result.num_loop_edges,
+      result.rms_px);
   if (result.rig == nullptr) {
     for (const CameraCalibration& camera : result.cameras) {
       const Eigen::Vector3d& travel = camera.initial.travel_in_camera;
@@ -44,8 +46,8 @@ void print(const RigCalibration& result) {
     }
     return;
   }
-  std::printf("%-10s %9s %9s %9s   %9s %9s %9s   %8s %8s\n", "camera", "x (cm)", "y (cm)", "z (cm)", "yaw (deg)",
-              "pitch", "roll", "points", "shared");
+  std::printf("%-10s %9s %9s %9s   %9s %9s %9s   %8s %8s\n", "camera", "x (cm)", "y (cm)", "z (cm)",
+              "yaw (deg)", "pitch", "roll", "points", "shared");
   for (size_t i = 0; i < result.cameras.size(); ++i) {
     const CameraCalibration& camera = result.cameras[i];
     const RigidTransform& place = *result.rig->cameras[i].vehicle_from_camera;
@@ -135,7 +137,8 @@ void calibrate(const Arguments& arguments, const RigCalibratorOptions& options) 
 int main(int argc, char** argv) {
   CLI::App app(
       "Calibrates the places of a rig's cameras on the vehicle from a drive: images, /odom and the cameras' "
-      "intrinsics, without a guess, overlap or a board. Drive 100 m or more with turns to both sides and come "
+      "intrinsics, without a guess, overlap or a board. Drive 100 m or more with turns to both sides and "
+      "come "
       "past the same places again, best a figure of eight. Prints every degree of freedom with its standard "
       "deviation and a verdict: PASS, WARN with what is missing, or FAIL, which writes no file.");
   Arguments arguments;

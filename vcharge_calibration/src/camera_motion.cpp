@@ -67,8 +67,8 @@ std::vector<MotionPair> estimateCameraMotions(const MappingData& data, int32_t c
          pair.camera_direction.dot(motion.covariance.topLeftCorner<3, 3>() * pair.camera_direction)) /
         2.0);
     pair.direction_sigma_rad = std::hypot(sigma / translation.norm(), kMinDirectionSigma_rad);
-    pair.rotation_sigma_rad =
-        std::hypot(std::sqrt(motion.covariance.bottomRightCorner<3, 3>().trace() / 3.0), kMinRotationSigma_rad);
+    pair.rotation_sigma_rad = std::hypot(std::sqrt(motion.covariance.bottomRightCorner<3, 3>().trace() / 3.0),
+                                         kMinRotationSigma_rad);
     pair.has_direction = pair.direction_sigma_rad < kMaxDirectionSigma_rad;
     found[i] = pair;
   });
@@ -95,8 +95,8 @@ TimeOffset estimateTimeOffset(const MappingState& state,
     if (frame.stamp == keyframes[frame.keyframe].stamp) {
       const RigidTransform motion =
           odom_from_vehicle(state.frames[i - 1]).inverse() * odom_from_vehicle(state.frames[i + 1]);
-      rate_rad_per_s[frame.keyframe] = yawOfRotation(motion.rotation()) /
-                                       toSeconds(state.frames[i + 1].stamp - state.frames[i - 1].stamp);
+      rate_rad_per_s[frame.keyframe] =
+          yawOfRotation(motion.rotation()) / toSeconds(state.frames[i + 1].stamp - state.frames[i - 1].stamp);
     }
   }
   // Odometry that is late lags behind the camera's turn by offset times the change of the rate.

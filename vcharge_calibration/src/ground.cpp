@@ -6,8 +6,8 @@
 namespace vcharge {
 namespace {
 
-constexpr double kMaxRange_m = 5.0;       // of ground points, along the ground
-constexpr double kMinBelow_m = 0.15;      // a camera is at least this high
+constexpr double kMaxRange_m = 5.0;   // of ground points, along the ground
+constexpr double kMinBelow_m = 0.15;  // a camera is at least this high
 constexpr double kMaxBelow_m = 4.0;
 constexpr double kBin_m = 0.02;
 
@@ -37,8 +37,7 @@ std::optional<double> findCameraHeight(const MappingData& data, int32_t camera) 
   std::vector<double> depths_m;
   forNearPoints(data, [&](const TrackObservation& observation, const Eigen::Vector3d& point) {
     if (observation.camera == camera) {
-      const double below_m =
-          data.rig->cameras[camera].vehicle_from_camera->translation().z() - point.z();
+      const double below_m = data.rig->cameras[camera].vehicle_from_camera->translation().z() - point.z();
       if (below_m > kMinBelow_m && below_m < kMaxBelow_m) {
         ++histogram[static_cast<size_t>(below_m / kBin_m)];
         depths_m.push_back(below_m);
@@ -51,8 +50,8 @@ std::optional<double> findCameraHeight(const MappingData& data, int32_t camera) 
   size_t best = 2;
   double best_count = 0.0;
   for (size_t i = 2; i + 2 < histogram.size(); ++i) {
-    const double count = histogram[i - 2] + 2.0 * histogram[i - 1] + 3.0 * histogram[i] + 2.0 * histogram[i + 1] +
-                         histogram[i + 2];
+    const double count = histogram[i - 2] + 2.0 * histogram[i - 1] + 3.0 * histogram[i] +
+                         2.0 * histogram[i + 1] + histogram[i + 2];
     if (count > best_count) {
       best_count = count;
       best = i;

@@ -9,9 +9,9 @@
 
 namespace vcharge {
 
-/// Where the ground is below a camera that was put at height zero, from its landmarks alone: the level on which
-/// most of the points near the path lie. Gives the camera's height. Empty where the camera sees too little
-/// ground.
+/// Where the ground is below a camera that was put at height zero, from its landmarks alone: the level on
+/// which most of the points near the path lie. Gives the camera's height. Empty where the camera sees too
+/// little ground.
 std::optional<double> findCameraHeight(const MappingData& data, int32_t camera);
 
 /// A landmark on the ground, and the keyframe that passed nearest to it.

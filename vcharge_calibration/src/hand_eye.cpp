@@ -10,9 +10,13 @@
 namespace vcharge {
 namespace {
 
-double cauchyWeight(double sigmas, double scale) { return 1.0 / (1.0 + sigmas * sigmas / (scale * scale)); }
+double cauchyWeight(double sigmas, double scale) {
+  return 1.0 / (1.0 + sigmas * sigmas / (scale * scale));
+}
 
-double yawOf(const MotionPair& motion) { return yawOfRotation(motion.vehicle.rotation()); }
+double yawOf(const MotionPair& motion) {
+  return yawOfRotation(motion.vehicle.rotation());
+}
 
 /// The vertical, and how certain it is.
 struct Vertical {
@@ -58,12 +62,12 @@ Vertical findVertical(const std::vector<MotionPair>& motions, const HandEyeOptio
     result.sigma_rad = 1.0 / std::sqrt(std::max(1e-12, of_tilt.eigenvalues()[0]));
     for (size_t i = 0; i < motions.size(); ++i) {
       const double turn_sigma = std::hypot(motions[i].rotation_sigma_rad, options.odometry_sigma_rad);
-      double sigmas = (vectorFromRotation(motions[i].camera_rotation) - yawOf(motions[i]) * result.up_in_camera)
-                          .norm() /
-                      turn_sigma;
+      double sigmas =
+          (vectorFromRotation(motions[i].camera_rotation) - yawOf(motions[i]) * result.up_in_camera).norm() /
+          turn_sigma;
       if (motions[i].has_direction) {
-        sigmas = std::hypot(sigmas, motions[i].camera_direction.dot(result.up_in_camera) /
-                                        motions[i].direction_sigma_rad);
+        sigmas = std::hypot(
+            sigmas, motions[i].camera_direction.dot(result.up_in_camera) / motions[i].direction_sigma_rad);
       }
       result.weights[i] = cauchyWeight(sigmas, options.loss_sigmas);
     }
@@ -112,8 +116,8 @@ PlanarPlace findPlace(const std::vector<MotionPair>& motions, const std::vector<
       row.tail<2>() = (Eigen::Rotation2Dd(yawOf(motions[i])).toRotationMatrix() - Eigen::Matrix2d::Identity())
                           .transpose() *
                       across;
-      information += cauchyWeight(place.sigmas[i], options.loss_sigmas) / (sigma_m * sigma_m) * row *
-                     row.transpose();
+      information +=
+          cauchyWeight(place.sigmas[i], options.loss_sigmas) / (sigma_m * sigma_m) * row * row.transpose();
     }
     // The place is eliminated; of the yaw's form the smaller eigenvalue belongs to its cosine and sine.
     const Eigen::Matrix2d of_place =
@@ -136,7 +140,8 @@ PlanarPlace findPlace(const std::vector<MotionPair>& motions, const std::vector<
     }
     place.yaw_sigma_rad = 1.0 / std::sqrt(std::max(1e-12, eigen.eigenvalues()[1]));
     place.place_sigma_m =
-        1.0 / std::sqrt(std::max(1e-12, Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(of_place).eigenvalues()[0]));
+        1.0 /
+        std::sqrt(std::max(1e-12, Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(of_place).eigenvalues()[0]));
     for (size_t i = 0; i < motions.size(); ++i) {
       if (!motions[i].has_direction) {
         continue;
@@ -210,7 +215,8 @@ HandEye solvePlanarHandEye(const std::vector<MotionPair>& motions, const HandEye
   result.yaw_sigma_rad = place.yaw_sigma_rad;
   result.place_sigma_m = place.place_sigma_m;
   for (size_t i = 0; i < motions.size(); ++i) {
-    const double turn_error_sigmas = (1.0 / vertical.weights[i] - 1.0) * options.loss_sigmas * options.loss_sigmas;
+    const double turn_error_sigmas =
+        (1.0 / vertical.weights[i] - 1.0) * options.loss_sigmas * options.loss_sigmas;
     result.num_inliers += std::abs(place.sigmas[i]) < options.max_inlier_sigmas &&
                                   turn_error_sigmas < options.max_inlier_sigmas * options.max_inlier_sigmas
                               ? 1
@@ -225,7 +231,8 @@ HandEye solvePlanarHandEye(const std::vector<MotionPair>& motions, const HandEye
   const Eigen::Vector2d place_m = Eigen::Rotation2Dd(yaw_rad) * place.turned_place_m;
   result.vehicle_from_camera = RigidTransform(rotationFromYawPitchRoll(yaw_rad, 0.0, 0.0) * level_from_camera,
                                               Eigen::Vector3d(place_m.x(), place_m.y(), 0.0));
-  result.status = 2 * result.num_inliers > result.num_motions ? HandEyeStatus::kOk : HandEyeStatus::kNoAgreement;
+  result.status =
+      2 * result.num_inliers > result.num_motions ? HandEyeStatus::kOk : HandEyeStatus::kNoAgreement;
   return result;
 }
 

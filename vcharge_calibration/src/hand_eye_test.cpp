@@ -80,7 +80,8 @@ TEST(PlanarHandEyeTest, BearsNoiseAndWrongMotions) {
   ASSERT_EQ(found.status, HandEyeStatus::kOk);
   // 160 motions of 0.57 degrees: four standard deviations of the mean, and what the wrong ones pull.
   EXPECT_LT(angleBetween(found.vehicle_from_camera, truePlace()), 0.4 * kDegree);
-  // A motion's direction tells the place to 0.01 x 0.5 m / 0.06 at best: 8 cm over the root of 160, six times.
+  // A motion's direction tells the place to 0.01 x 0.5 m / 0.06 at best: 8 cm over the root of 160, six
+  // times.
   EXPECT_LT((found.vehicle_from_camera.translation() - truePlace().translation()).norm(), 0.04);
   EXPECT_LT(found.num_inliers, found.num_motions);
 }

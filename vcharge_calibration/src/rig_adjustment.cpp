@@ -120,12 +120,11 @@ OdometryNoise estimateOdometryNoise(const RigCalibratorOptions& options, const M
   // Medians of a Rayleigh distribution and of the absolute value of a normal one.
   constexpr double kRayleigh = 1.1774, kNormal = 0.6745;
   const BundleAdjustmentOptions& bundle = options.bundle;
-  noise.sigma_m =
-      std::clamp(medianOf(errors_m) * std::sqrt(2.0) / kRayleigh, kMinOdometrySigma_m, bundle.odometry_sigma_m);
+  noise.sigma_m = std::clamp(medianOf(errors_m) * std::sqrt(2.0) / kRayleigh, kMinOdometrySigma_m,
+                             bundle.odometry_sigma_m);
   noise.sigma_rad =
       std::clamp(medianOf(errors_rad) / kNormal, kMinOdometrySigma_rad, bundle.odometry_sigma_rad);
-  noise.height_sigma_m =
-      std::clamp(medianOf(heights_m) / kNormal, kMinHeightSigma_m, bundle.height_sigma_m);
+  noise.height_sigma_m = std::clamp(medianOf(heights_m) / kNormal, kMinHeightSigma_m, bundle.height_sigma_m);
   noise.tilt_sigma_rad =
       std::clamp(medianOf(tilts_rad) / kRayleigh, kMinTiltSigma_rad, bundle.tilt_sigma_rad);
   noise.has_slipped.push_back(false);
@@ -140,7 +139,8 @@ BundleAdjustmentSummary adjustRig(const RigCalibratorOptions& options, const Odo
                                   MappingData* data) {
   check(!data->keyframes.empty(), "adjustRig: expected keyframes");
   BundleProblem problem = makeRigProblem(options, odometry, *data);
-  const BundleSolution solved = solveBundle(options.bundle.max_iterations, options.bundle.cost_tolerance, &problem);
+  const BundleSolution solved =
+      solveBundle(options.bundle.max_iterations, options.bundle.cost_tolerance, &problem);
   writeBack(problem, data);
   auto rig = std::make_shared<CameraRig>(*data->rig);
   for (size_t i = 0; i < rig->cameras.size(); ++i) {

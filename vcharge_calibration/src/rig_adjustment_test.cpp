@@ -31,7 +31,6 @@ RigCamera makeCamera(const std::string& name, double yaw_rad, const Eigen::Vecto
   return camera;
 }
 
-
 /// Keyframes 0.5 m apart along a figure of eight of circles of 6 m.
 MappingData makeDrive(uint32_t seed, double noise_px) {
   MappingData data;
@@ -55,10 +54,11 @@ MappingData makeDrive(uint32_t seed, double noise_px) {
     const double length_m = 0.5 + 0.002 * noise(random);
     const double side_m = 0.002 * noise(random);
     const double counted_rad = turn_rad + 0.0005 * noise(random);
-    odom_from_vehicle = odom_from_vehicle *
-                        RigidTransform::planar(length_m * std::cos(0.5 * turn_rad) - side_m * std::sin(0.5 * turn_rad),
-                                               length_m * std::sin(0.5 * turn_rad) + side_m * std::cos(0.5 * turn_rad),
-                                               counted_rad);
+    odom_from_vehicle =
+        odom_from_vehicle *
+        RigidTransform::planar(length_m * std::cos(0.5 * turn_rad) - side_m * std::sin(0.5 * turn_rad),
+                               length_m * std::sin(0.5 * turn_rad) + side_m * std::cos(0.5 * turn_rad),
+                               counted_rad);
   }
   for (int p = 0; p < 1500; ++p) {
     const double x = -12.0 + 24.0 * uniform(random);
@@ -152,15 +152,16 @@ TEST(RigAdjustmentTest, KnowsItsUncertainty) {
     for (Eigen::Index i = 0; i < 2; ++i) {
       const Vector6d error = errorOf(*data.rig, *truth, static_cast<size_t>(i));
       sum += error.cwiseAbs2().cwiseQuotient(
-          uncertainty.covariance.block<6, 6>(6 * i, 6 * i).diagonal().cwiseMax(
-              uncertainty.jackknife.block<6, 6>(6 * i, 6 * i).diagonal()));
+          uncertainty.covariance.block<6, 6>(6 * i, 6 * i)
+              .diagonal()
+              .cwiseMax(uncertainty.jackknife.block<6, 6>(6 * i, 6 * i).diagonal()));
     }
   }
   const Vector6d mean = sum / (2.0 * kDrives);
   for (int i = 0; i < 6; ++i) {
     // Ten errors that go together by pairs: a chi-square of five degrees of freedom over five is within these
-    // bounds in 99 % of all cases. The ground, which height and tilt come from, is said to be much rougher than
-    // it is here: those may err less.
+    // bounds in 99 % of all cases. The ground, which height and tilt come from, is said to be much rougher
+    // than it is here: those may err less.
     EXPECT_LT(mean[i], 3.3) << i << ": " << mean.transpose();
     if (i == 0 || i == 1 || i == 5) {
       EXPECT_GT(mean[i], 0.08) << i << ": " << mean.transpose();
@@ -208,8 +209,8 @@ TEST(GroundTest, FindsTheHeightOfACameraPutAtZero) {
   MappingData data = makeDrive(4, 0.0);
   auto rig = std::make_shared<CameraRig>(*data.rig);
   const RigidTransform& place = *rig->cameras[1].vehicle_from_camera;
-  rig->cameras[1].vehicle_from_camera =
-      RigidTransform(place.rotation(), Eigen::Vector3d(place.translation().x(), place.translation().y(), 0.0));
+  rig->cameras[1].vehicle_from_camera = RigidTransform(
+      place.rotation(), Eigen::Vector3d(place.translation().x(), place.translation().y(), 0.0));
   data.rig = rig;
   for (Track& track : data.tracks) {
     if (track.position_m) {

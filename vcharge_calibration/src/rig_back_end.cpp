@@ -46,9 +46,7 @@ class RigBackEnd {
         checkLoops(options_.loops, *data_, &state_->report.loop_edges);
         adjustFinely();
       });
-      stage("judgement", 6, [&] {
-        judgeRig(options_, odometry_, *state_, &result_);
-      });
+      stage("judgement", 6, [&] { judgeRig(options_, odometry_, *state_, &result_); });
     } catch (const NotCalibrated& failure) {
       result_.verdict = Verdict::kFail;
       result_.remarks = failure.remarks;
@@ -89,8 +87,9 @@ class RigBackEnd {
       throw NotCalibrated{{"no images came with the drive"}};
     }
     if (2 * report.num_frames_without_odometry > report.num_frames) {
-      throw NotCalibrated{{"most images have no odometry at their time: are the clocks of cameras and odometer the "
-                           "same?"}};
+      throw NotCalibrated{
+          {"most images have no odometry at their time: are the clocks of cameras and odometer the "
+           "same?"}};
     }
     if (result_.distance_m < 5.0) {
       throw NotCalibrated{{"the vehicle stood: by the odometer it moved " + toText(result_.distance_m, 1) +
@@ -107,10 +106,12 @@ class RigBackEnd {
       HandEye& initial = result_.cameras[i].initial;
       motions.push_back(estimateCameraMotions(*data_, static_cast<int32_t>(i), options_.camera_motion));
       initial = solvePlanarHandEye(motions.back(), options_.hand_eye);
-      if (kMinSeenShare * static_cast<double>(data_->keyframes.size()) > static_cast<double>(motions.back().size())) {
+      if (kMinSeenShare * static_cast<double>(data_->keyframes.size()) >
+          static_cast<double>(motions.back().size())) {
         initial.status = HandEyeStatus::kTooFewMotions;
       }
-      up_in_camera.emplace_back(initial.vehicle_from_camera.rotation().conjugate() * Eigen::Vector3d::UnitZ());
+      up_in_camera.emplace_back(initial.vehicle_from_camera.rotation().conjugate() *
+                                Eigen::Vector3d::UnitZ());
       if (initial.status != HandEyeStatus::kOk) {
         failures.push_back(describeFailure(rig->cameras[i].name, initial, result_));
       }
@@ -139,7 +140,8 @@ class RigBackEnd {
       }
     }
     if (heights_m.empty()) {
-      throw NotCalibrated{{"no camera sees the ground near the vehicle: the cameras' heights cannot be told"}};
+      throw NotCalibrated{
+          {"no camera sees the ground near the vehicle: the cameras' heights cannot be told"}};
     }
     std::sort(heights_m.begin(), heights_m.end());
     auto raised = std::make_shared<CameraRig>(*rig);

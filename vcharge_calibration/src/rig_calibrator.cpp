@@ -44,7 +44,8 @@ void RigCalibratorOptions::validate() const {
   requireField(keyframe_turn_rad > 0.0, "keyframe_turn_rad", "must be positive", keyframe_turn_rad);
   requireField(max_speed_m_per_s > 0.0, "max_speed_m_per_s", "must be positive", max_speed_m_per_s);
   requireField(first_max_error_rad > 0.0, "first_max_error_rad", "must be positive", first_max_error_rad);
-  requireField(max_ground_distance_m > 0.0, "max_ground_distance_m", "must be positive", max_ground_distance_m);
+  requireField(max_ground_distance_m > 0.0, "max_ground_distance_m", "must be positive",
+               max_ground_distance_m);
   requireField(ground_sigma_m > 0.0, "ground_sigma_m", "must be positive", ground_sigma_m);
   requireField(segment_m > 0.0, "segment_m", "must be positive", segment_m);
   validateInner("features", features);
@@ -105,8 +106,8 @@ void RigCalibrator::processFrame(Timestamp stamp, const std::vector<Image>& imag
       angleOfRotation(since.rotation()) >= options_.keyframe_turn_rad) {
     addKeyframe(stamp, odom_from_vehicle);
   } else {
-    state_.frames.push_back({stamp, static_cast<int32_t>(state_.data.keyframes.size()) - 1, since,
-                             MotionHypothesis::kOdometry});
+    state_.frames.push_back(
+        {stamp, static_cast<int32_t>(state_.data.keyframes.size()) - 1, since, MotionHypothesis::kOdometry});
   }
 }
 
@@ -132,7 +133,8 @@ void RigCalibrator::addKeyframe(Timestamp stamp, const RigidTransform& odom_from
 
 RigCalibration RigCalibrator::finish(const StageCallback& progress) {
   gatherer_->finish();
-  return runRigBackEnd(options_, progress ? progress : [](const StageProgress&) {}, &state_);
+  return runRigBackEnd(
+      options_, progress ? progress : [](const StageProgress&) {}, &state_);
 }
 
 std::shared_ptr<const SparseMap> RigCalibrator::map() const {

@@ -8,10 +8,10 @@ namespace vcharge {
 namespace {
 
 CameraRig makeRig(double forwards_m, double yaw_rad) {
-  RigCamera camera{"front", "camera_front_optical", cv::Size(640, 400),
-                   KannalaBrandtCamera((KannalaBrandtCamera::Parameters() << 200.0, 200.0, 319.5, 199.5, 0.0, 0.0,
-                                        0.0, 0.0)
-                                           .finished())};
+  RigCamera camera{
+      "front", "camera_front_optical", cv::Size(640, 400),
+      KannalaBrandtCamera(
+          (KannalaBrandtCamera::Parameters() << 200.0, 200.0, 319.5, 199.5, 0.0, 0.0, 0.0, 0.0).finished())};
   camera.vehicle_from_camera = RigidTransform::planar(forwards_m, 0.0, yaw_rad);
   camera.covariance = 1e-6 * Eigen::Matrix<double, 6, 6>::Identity();
   CameraRig rig;

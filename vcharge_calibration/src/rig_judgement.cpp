@@ -27,10 +27,13 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 class ErrorStatistics {
  public:
   explicit ErrorStatistics(cv::Size image_size_px)
-      : size_px_(image_size_px), sums_(kColumns * kRows, Eigen::Vector2d::Zero()), counts_(kColumns * kRows, 0) {}
+      : size_px_(image_size_px),
+        sums_(kColumns * kRows, Eigen::Vector2d::Zero()),
+        counts_(kColumns * kRows, 0) {}
 
   void add(const Eigen::Vector2d& position_px, const Eigen::Vector2d& error_px) {
-    const int column = std::clamp(static_cast<int>(kColumns * position_px.x() / size_px_.width), 0, kColumns - 1);
+    const int column =
+        std::clamp(static_cast<int>(kColumns * position_px.x() / size_px_.width), 0, kColumns - 1);
     const int row = std::clamp(static_cast<int>(kRows * position_px.y() / size_px_.height), 0, kRows - 1);
     sums_[row * kColumns + column] += error_px;
     ++counts_[row * kColumns + column];
@@ -153,15 +156,17 @@ std::string describeFailure(const std::string& camera, const HandEye& initial, c
   const std::string who = "camera '" + camera + "'";
   switch (initial.status) {
     case HandEyeStatus::kTooFewMotions:
-      return who + ": too few images in which points could be followed (" + std::to_string(initial.num_motions) +
-             " motions of " + std::to_string(drive.num_keyframes) + "): is it covered, dirty, or without light?";
+      return who + ": too few images in which points could be followed (" +
+             std::to_string(initial.num_motions) + " motions of " + std::to_string(drive.num_keyframes) +
+             "): is it covered, dirty, or without light?";
     case HandEyeStatus::kNoTurn:
       return who + ": no turn: the drive turned " + toText(kDegrees * drive.left_turn_rad, 0) +
              " degrees to the left and " + toText(kDegrees * drive.right_turn_rad, 0) +
-             " to the right; straight ahead shows neither where a camera is nor its roll. Drive a figure of eight";
+             " to the right; straight ahead shows neither where a camera is nor its roll. Drive a figure of "
+             "eight";
     case HandEyeStatus::kNoAgreement:
-      return who + ": its motions contradict the odometer's (" + std::to_string(initial.num_inliers) + " of " +
-             std::to_string(initial.num_motions) +
+      return who + ": its motions contradict the odometer's (" + std::to_string(initial.num_inliers) +
+             " of " + std::to_string(initial.num_motions) +
              " agree): check the intrinsics, the stamps, and the odometer's signs";
     case HandEyeStatus::kOk:
       break;
@@ -190,7 +195,8 @@ std::string findWrongSign(const CameraRig& rig) {
     return "all cameras would hang upside down: the odometer's turns have the wrong sign";
   }
   if (num_named > 0 && num_round == num_named) {
-    return "all cameras would look the opposite way of their names: the odometer's direction of travel has the "
+    return "all cameras would look the opposite way of their names: the odometer's direction of travel has "
+           "the "
            "wrong sign";
   }
   return "";

@@ -52,9 +52,12 @@ std::string summaryOf(const RigCalibration& result) {
 
 std::string placesOf(const RigCalibration& result, const CameraRig& rig) {
   std::string text =
-      "<h2>Places of the cameras</h2><p>Axes of the vehicle: x forwards, y to the left, z up. All lengths are the "
+      "<h2>Places of the cameras</h2><p>Axes of the vehicle: x forwards, y to the left, z up. All lengths "
+      "are the "
       "odometer's: an error of the wheels' size is in them.</p><table>" +
-      rowOf({"camera", "x (cm)", "y (cm)", "z (cm)", "roll (degrees)", "pitch", "yaw", "least certain"}, true);
+      rowOf({"camera", "x (cm)", "y (cm)", "z (cm)", "\u00b1 roll (degrees)", "\u00b1 pitch", "\u00b1 yaw",
+             "least certain"},
+            true);
   for (size_t i = 0; i < result.cameras.size(); ++i) {
     const CameraCalibration& camera = result.cameras[i];
     const Eigen::Matrix<double, 6, 1> sigma = camera.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
@@ -64,7 +67,7 @@ std::string placesOf(const RigCalibration& result, const CameraRig& rig) {
                       toText(100.0 * sigma[k], 2));
     }
     for (int k = 3; k < 6; ++k) {
-      cells.push_back("\u00b1 " + toText(kDegrees * sigma[k], 3));
+      cells.push_back(toText(kDegrees * sigma[k], 3));
     }
     cells.push_back(camera.weakest_direction);
     text += rowOf(cells);

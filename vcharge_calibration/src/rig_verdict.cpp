@@ -11,7 +11,7 @@ namespace {
 constexpr double kDegrees = 57.29577951308232;
 // Standard deviations with which a calibration is good, and with which it is of no use.
 constexpr double kGoodSigma_m = 0.01, kBadSigma_m = 0.05;
-constexpr double kGoodSigma_rad = 0.05 / kDegrees, kBadSigma_rad = 0.3 / kDegrees;
+constexpr double kGoodSigma_rad = 0.1 / kDegrees, kBadSigma_rad = 0.5 / kDegrees;
 // Between the halves of the drive.
 constexpr double kMaxHalfSigmas = 4.0;
 constexpr double kBadHalf_m = 0.10, kBadHalf_rad = 0.5 / kDegrees;
@@ -27,8 +27,8 @@ class RigJudge {
   explicit RigJudge(RigCalibration* result) : result_(result) {}
 
   void judge() {
+    judgeSigmas();
     for (const CameraCalibration& camera : result_->cameras) {
-      judgeSigmas(camera);
       judgeHalves(camera);
       judgeErrors(camera);
     }
@@ -44,25 +44,31 @@ class RigJudge {
  private:
   void remark(Verdict grade, const std::string& text) { found_.emplace_back(grade, text); }
 
-  void judgeSigmas(const CameraCalibration& camera) {
+  /// One remark per degree of freedom, of all cameras of which it is known too little.
+  void judgeSigmas() {
     const char* const names[] = {"forwards", "sideways", "height", "roll", "pitch", "yaw"};
-    if (!(camera.covariance.diagonal().minCoeff() > 0.0)) {
-      remark(Verdict::kFail, "camera '" + camera.name + "': its place cannot be told from this drive");
-      return;
+    for (const CameraCalibration& camera : result_->cameras) {
+      if (!(camera.covariance.diagonal().minCoeff() > 0.0)) {
+        remark(Verdict::kFail, "camera '" + camera.name + "': its place cannot be told from this drive");
+        return;
+      }
     }
     for (int i = 0; i < 6; ++i) {
-      const double sigma = std::sqrt(camera.covariance(i, i));
-      const bool is_good = sigma <= (i < 3 ? kGoodSigma_m : kGoodSigma_rad);
-      if (is_good) {
-        continue;
+      double worst = 0.0;
+      std::string who;
+      for (const CameraCalibration& camera : result_->cameras) {
+        const double sigma = std::sqrt(camera.covariance(i, i));
+        if (sigma > (i < 3 ? kGoodSigma_m : kGoodSigma_rad)) {
+          who += (who.empty() ? "'" : ", '") + camera.name + "'";
+          worst = std::max(worst, sigma);
+        }
       }
-      const bool is_bad = sigma > (i < 3 ? kBadSigma_m : kBadSigma_rad);
-      remark(is_bad ? Verdict::kFail : Verdict::kWarn,
-             "camera '" + camera.name + "': " + names[i] + " is known to " +
-                 (i < 3 ? toText(100.0 * sigma, 1) + " cm" : toText(kDegrees * sigma, 2) + " degrees") +
-                 " only: " +
-                 (i == 2 ? "it sees too little ground, or shares too little with the others"
-                         : "drive further, with tighter turns to both sides"));
+      if (!who.empty()) {
+        remark(worst > (i < 3 ? kBadSigma_m : kBadSigma_rad) ? Verdict::kFail : Verdict::kWarn,
+               who + ": " + names[i] + " is known to " + amount(i, worst) + " only: " +
+                   (i == 2 ? "they see too little ground, or share too little with the others"
+                           : "drive further, with tighter turns to both sides"));
+      }
     }
   }
 
@@ -73,11 +79,11 @@ class RigJudge {
       // Each half has twice the variance of the whole.
       const double sigmas = difference / (2.0 * std::sqrt(std::max(1e-18, camera.covariance(i, i))));
       if (difference > (i < 3 ? kBadHalf_m : kBadHalf_rad)) {
-        remark(Verdict::kFail, "camera '" + camera.name + "': two halves of the drive differ by " +
-                                   amount(i, difference));
+        remark(Verdict::kFail,
+               "camera '" + camera.name + "': two halves of the drive differ by " + amount(i, difference));
         return;
       }
-      if (difference > 2.0 * limit && sigmas > kMaxHalfSigmas) {
+      if (difference > limit && sigmas > kMaxHalfSigmas) {
         remark(Verdict::kWarn, "camera '" + camera.name + "': two halves of the drive differ by " +
                                    amount(i, difference) + ", " + toText(sigmas, 1) + " standard deviations");
         return;
@@ -97,23 +103,25 @@ class RigJudge {
                  " % of them): its intrinsics are wrong. Calibrate the intrinsics anew");
     }
     if (camera.num_shared_landmarks < kMinShared && result_->cameras.size() > 1) {
-      remark(Verdict::kWarn, "camera '" + camera.name + "' shares only " +
-                                 std::to_string(camera.num_shared_landmarks) +
-                                 " landmarks with other cameras: pass the same places again, in both directions");
+      remark(Verdict::kWarn,
+             "camera '" + camera.name + "' shares only " + std::to_string(camera.num_shared_landmarks) +
+                 " landmarks with other cameras: pass the same places again, in both directions");
     }
   }
 
   void judgeDrive() {
     const RigCalibration& drive = *result_;
-    for (const auto& [turn_rad, side] : {std::make_pair(drive.left_turn_rad, "left"),
-                                         std::make_pair(drive.right_turn_rad, "right")}) {
+    for (const auto& [turn_rad, side] :
+         {std::make_pair(drive.left_turn_rad, "left"), std::make_pair(drive.right_turn_rad, "right")}) {
       if (turn_rad < kMinTurn_rad) {
         remark(Verdict::kWarn, std::string("the drive turned only ") + toText(kDegrees * turn_rad, 0) +
-                                   " degrees to the " + side + ": turn to both sides, best a figure of eight");
+                                   " degrees to the " + side +
+                                   ": turn to both sides, best a figure of eight");
       }
     }
     if (drive.distance_m < kMinDistance_m) {
-      remark(Verdict::kWarn, "the drive is only " + toText(drive.distance_m, 0) + " m long: drive 100 m or more");
+      remark(Verdict::kWarn,
+             "the drive is only " + toText(drive.distance_m, 0) + " m long: drive 100 m or more");
     }
     if (drive.num_loop_edges == 0) {
       remark(Verdict::kWarn, "no place was passed twice: come back to where the drive began");
@@ -122,7 +130,8 @@ class RigJudge {
       remark(std::abs(drive.time_offset_s) > kFailOffset_s ? Verdict::kFail : Verdict::kWarn,
              "the odometer's stamps are " + toText(1000.0 * std::abs(drive.time_offset_s), 0) + " ms " +
                  (drive.time_offset_s > 0.0 ? "late" : "early") +
-                 " against the images: correct the clocks, the cameras' places are wrong by the way driven in that "
+                 " against the images: correct the clocks, the cameras' places are wrong by the way driven "
+                 "in that "
                  "time");
     }
   }
@@ -133,6 +142,8 @@ class RigJudge {
 
 }  // namespace
 
-void findVerdict(RigCalibration* result) { RigJudge(result).judge(); }
+void findVerdict(RigCalibration* result) {
+  RigJudge(result).judge();
+}
 
 }  // namespace vcharge

@@ -43,8 +43,7 @@ BundleCovariance BundleEquations::covariance() {
   const Eigen::MatrixXd inverse = factorization_.solve(units);
   result.covariance = inverse.bottomRows(tailSize());
   result.covariance = (0.5 * (result.covariance + result.covariance.transpose())).eval();
-  result.is_valid =
-      result.covariance.allFinite() && (result.covariance.diagonal().array() >= 0.0).all();
+  result.is_valid = result.covariance.allFinite() && (result.covariance.diagonal().array() >= 0.0).all();
   if (!result.is_valid) {
     return result;
   }
@@ -72,14 +71,14 @@ BundleCovariance BundleEquations::covariance() {
     const auto pose = static_cast<size_t>(problem_.motions[i].pose);
     const MotionError motion = errors_.ofMotion(state_, i);
     auto influence = result.influence.col(static_cast<Eigen::Index>(pose));
-    influence -= inverse.middleRows<6>(columnOf(pose)).transpose() *
-                 (motion.by_current.transpose() * motion.error);
+    influence -=
+        inverse.middleRows<6>(columnOf(pose)).transpose() * (motion.by_current.transpose() * motion.error);
     if (pose > 1) {
       influence -= inverse.middleRows<6>(columnOf(pose - 1)).transpose() *
                    (motion.by_previous.transpose() * motion.error);
     }
-    influence -= inverse.middleRows<2>(tailColumn()).transpose() *
-                 (motion.by_odometer.transpose() * motion.error);
+    influence -=
+        inverse.middleRows<2>(tailColumn()).transpose() * (motion.by_odometer.transpose() * motion.error);
   }
   return result;
 }

@@ -318,8 +318,7 @@ void BundleEquations::assembleTail(double damping, const MotionTerms& motions) {
   const Eigen::MatrixXd information = motions.tail + tail.information;
   reduced_gradient_.tail(tailSize()) = gradient_.tail(tailSize()) + tail.reduced_gradient;
   gradient_.tail(tailSize()) += tail.gradient;
-  damping_.tail(tailSize()) =
-      damping * (motions.tail.diagonal() + tail.diagonal).cwiseMax(kMinInformation);
+  damping_.tail(tailSize()) = damping * (motions.tail.diagonal() + tail.diagonal).cwiseMax(kMinInformation);
   for (Eigen::Index i = 0; i < tailSize(); ++i) {
     double* value = reduced_.valuePtr() + reduced_.outerIndexPtr()[tailColumn() + i];
     value = std::copy_n(motions.with_tail.col(i).data(), tailColumn(), value);

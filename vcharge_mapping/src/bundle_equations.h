@@ -18,8 +18,8 @@ namespace vcharge {
 /// is factorized by CHOLMOD.
 ///
 /// A pose's derivative follows from that of the point: J_pose = J_point [-I, cross(point - position)]. So a
-/// point's observations from one pose, by whatever camera, enter as one 3x3 sum, a slot. Where the cameras are
-/// unknown a slot is of one camera, whose derivative follows alike: J_camera = J_point R_vehicle [-I,
+/// point's observations from one pose, by whatever camera, enter as one 3x3 sum, a slot. Where the cameras
+/// are unknown a slot is of one camera, whose derivative follows alike: J_camera = J_point R_vehicle [-I,
 /// cross(point - camera)], the latter in the vehicle's frame.
 class BundleEquations {
  public:
@@ -45,7 +45,7 @@ class BundleEquations {
   struct Slot {
     int32_t pose = 0;
     int32_t point = 0;
-    int32_t camera = 0;  ///< of the first observation
+    int32_t camera = 0;                                        ///< of the first observation
     Eigen::Vector3d from_vehicle_m = Eigen::Vector3d::Zero();  ///< of the point, along the map's axes
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();     ///< sum of J_point^T J_point
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();        ///< sum of J_point^T error
@@ -79,7 +79,9 @@ class BundleEquations {
   // Unknowns of the reduced system: all poses but the first, then the tail.
   static Eigen::Index columnOf(size_t pose) { return static_cast<Eigen::Index>(6 * (pose - 1)); }
   Eigen::Index tailColumn() const { return columnOf(rows_of_pose_.size()); }
-  Eigen::Index tailSize() const { return 2 + 6 * static_cast<Eigen::Index>(problem_.vehicle_from_camera.size()); }
+  Eigen::Index tailSize() const {
+    return 2 + 6 * static_cast<Eigen::Index>(problem_.vehicle_from_camera.size());
+  }
   static Eigen::Index cameraInTail(int32_t camera) { return 2 + 6 * static_cast<Eigen::Index>(camera); }
   bool hasCameras() const { return !problem_.vehicle_from_camera.empty(); }
 
@@ -95,8 +97,8 @@ class BundleEquations {
   void assemble(double damping);
   void assemblePose(size_t pose, double damping, MotionTerms* motions, Scratch* scratch);
   void assembleTail(double damping, const MotionTerms& motions);
-  /// Of a point: what its move does to the tail, rows of the tail by the point's axes, given the tail's columns
-  /// of the inverse.
+  /// Of a point: what its move does to the tail, rows of the tail by the point's axes, given the tail's
+  /// columns of the inverse.
   Eigen::MatrixXd pointInfluence(size_t point, const Eigen::MatrixXd& inverse) const;
 
   const BundleProblem& problem_;

@@ -42,7 +42,8 @@ nlohmann::json print(const char* title, const std::vector<vcharge::CameraErrors>
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Errors of a rig's extrinsics against the truth, per camera and degree of freedom (axes of the vehicle), "
+      "Errors of a rig's extrinsics against the truth, per camera and degree of freedom (axes of the "
+      "vehicle), "
       "as they are and without the common scale, which a calibration from a drive takes from the odometer.");
   std::string estimate, truth, json_path;
   app.add_option("--estimate", estimate, "rig.yaml to judge")->required();

@@ -28,9 +28,9 @@ TEST(RigErrorsTest, FindsTheScaleAndWhatItDoesNotExplain) {
     camera.vehicle_from_camera = RigidTransform(camera.vehicle_from_camera->rotation(),
                                                 1.01 * camera.vehicle_from_camera->translation());
   }
-  estimate.cameras[1].vehicle_from_camera =
-      RigidTransform(rotationFromVector({0.0, 0.0, 0.002}) * estimate.cameras[1].vehicle_from_camera->rotation(),
-                     estimate.cameras[1].vehicle_from_camera->translation());
+  estimate.cameras[1].vehicle_from_camera = RigidTransform(
+      rotationFromVector({0.0, 0.0, 0.002}) * estimate.cameras[1].vehicle_from_camera->rotation(),
+      estimate.cameras[1].vehicle_from_camera->translation());
   const RigErrors errors = evaluateRig(estimate, truth);
   EXPECT_NEAR(errors.scale, 1.0 / 1.01, 1e-9);
   EXPECT_NEAR(errors.as_is[0].error[0], -0.036, 1e-9);

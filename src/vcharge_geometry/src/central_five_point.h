@@ -16,9 +16,9 @@ struct CentralMotion {
 /// Ten essential matrices at most, each of which stands for four motions.
 using CentralMotions = FixedVector<CentralMotion, 40>;
 
-/// Motions of a camera in the origin that five matches allow (Nister, "An efficient solution to the five-point
-/// relative pose problem", PAMI 2004). Which of the four motions of an essential matrix has the points before
-/// the camera is left to the caller's errors.
+/// Motions of a camera in the origin that five matches allow (Nister, "An efficient solution to the
+/// five-point relative pose problem", PAMI 2004). Which of the four motions of an essential matrix has the
+/// points before the camera is left to the caller's errors.
 void solveCentralFivePoint(const std::array<LineMatch, 5>& matches, CentralMotions* motions);
 
 }  // namespace vcharge

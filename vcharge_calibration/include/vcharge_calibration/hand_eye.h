@@ -13,8 +13,8 @@ namespace vcharge {
 
 struct HandEyeOptions {
   int min_motions = 6;
-  int num_iterations = 30;        ///< of reweighting
-  double loss_sigmas = 2.0;       ///< scale of the Cauchy loss
+  int num_iterations = 30;   ///< of reweighting
+  double loss_sigmas = 2.0;  ///< scale of the Cauchy loss
   double max_inlier_sigmas = 5.0;
   double odometry_sigma_m = 0.005;  ///< of a motion's translation
   double odometry_sigma_rad = 0.002;
@@ -65,12 +65,13 @@ struct HandEye {
   Eigen::Vector3d travel_in_camera = Eigen::Vector3d::Zero();
 };
 
-/// Planar hand-eye calibration (Guo, Mirzaei, Roumeliotis, ICRA 2012): the place of a camera on a vehicle that
-/// moves in a plane, from its motions without scale; 5 degrees of freedom, each step a closed form, reweighted
-/// against wrong motions. First the vertical in the camera's frame: about it the camera turns by the odometer's
-/// yaw, and perpendicular to it it moves. Then yaw and place: with u the place turned back by the yaw alpha, a
-/// motion's direction c is parallel to Rz(-alpha) t_odometer + (R_odometer - I) u, which is linear in cos(alpha),
-/// sin(alpha), u; the scale of each motion drops out. The sign of alpha follows from moving forwards.
+/// Planar hand-eye calibration (Guo, Mirzaei, Roumeliotis, ICRA 2012): the place of a camera on a vehicle
+/// that moves in a plane, from its motions without scale; 5 degrees of freedom, each step a closed form,
+/// reweighted against wrong motions. First the vertical in the camera's frame: about it the camera turns by
+/// the odometer's yaw, and perpendicular to it it moves. Then yaw and place: with u the place turned back by
+/// the yaw alpha, a motion's direction c is parallel to Rz(-alpha) t_odometer + (R_odometer - I) u, which is
+/// linear in cos(alpha), sin(alpha), u; the scale of each motion drops out. The sign of alpha follows from
+/// moving forwards.
 HandEye solvePlanarHandEye(const std::vector<MotionPair>& motions, const HandEyeOptions& options);
 
 }  // namespace vcharge

@@ -41,7 +41,8 @@ class RigCalibrator : public DriveConsumer {
   const MappingState& state() const { return state_; }
 
  private:
-  void processFrame(Timestamp stamp, const std::vector<Image>& images, const RigidTransform& odom_from_vehicle);
+  void processFrame(Timestamp stamp, const std::vector<Image>& images,
+                    const RigidTransform& odom_from_vehicle);
   void addKeyframe(Timestamp stamp, const RigidTransform& odom_from_vehicle);
 
   const RigCalibratorOptions options_;

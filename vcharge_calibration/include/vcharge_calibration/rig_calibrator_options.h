@@ -18,13 +18,13 @@ struct RigCalibratorOptions {
   double frame_turn_rad = 0.01;    ///< and turned less
   double keyframe_distance_m = 0.5;
   double keyframe_turn_rad = 0.1;
-  double max_speed_m_per_s = 25.0;  ///< faster odometry is a reset of the counters
-  double first_max_error_rad = 0.03;     ///< of rays to their point by the first guess of rig and poses
-  double max_ground_distance_m = 0.05;   ///< of ground points from where the ground was found before
+  double max_speed_m_per_s = 25.0;      ///< faster odometry is a reset of the counters
+  double first_max_error_rad = 0.03;    ///< of rays to their point by the first guess of rig and poses
+  double max_ground_distance_m = 0.05;  ///< of ground points from where the ground was found before
   /// Of a ground point from the plane on which the vehicle stands: more than the ground is rough, since what
   /// is wrong with neighbouring points goes together.
   double ground_sigma_m = 0.2;
-  double segment_m = 10.0;               ///< parts of the drive whose errors are independent of each other
+  double segment_m = 10.0;  ///< parts of the drive whose errors are independent of each other
   FeatureExtractorOptions features;
   FrameTrackerOptions tracker;
   RobustOptions camera_motion = defaultCameraMotion();

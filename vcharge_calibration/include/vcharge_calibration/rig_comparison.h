@@ -23,7 +23,7 @@ struct CameraDifference {
 };
 
 struct RigComparison {
-  std::vector<CameraDifference> cameras;        ///< that both have
+  std::vector<CameraDifference> cameras;  ///< that both have
   std::vector<std::string> only_first, only_second;
 };
 

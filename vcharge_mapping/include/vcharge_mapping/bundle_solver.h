@@ -14,8 +14,8 @@ namespace vcharge {
 
 constexpr int32_t kGroundCamera = -1;
 
-/// A point as a camera of the rig saw it; or, with camera kGroundCamera, one that lies on the ground, z = 0 in
-/// the vehicle's frame of a pose: then sigma_px is in metres and position_px of no use.
+/// A point as a camera of the rig saw it; or, with camera kGroundCamera, one that lies on the ground, z = 0
+/// in the vehicle's frame of a pose: then sigma_px is in metres and position_px of no use.
 struct BundleObservation {
   int32_t pose = 0;
   int32_t camera = 0;
@@ -62,8 +62,8 @@ struct BundleSolution {
 /// `max_iterations` and the relative decrease of the cost that ends them.
 BundleSolution solveBundle(int max_iterations, double cost_tolerance, BundleProblem* problem);
 
-/// What an adjusted problem tells of the odometer's factors and the cameras: columns and rows [distance, turn,
-/// then dt, dphi of each camera].
+/// What an adjusted problem tells of the odometer's factors and the cameras: columns and rows [distance,
+/// turn, then dt, dphi of each camera].
 struct BundleCovariance {
   bool is_valid = false;  ///< false where something is not observable at all
   /// As the errors' standard deviations are said to be, and independent (Schur complement).
