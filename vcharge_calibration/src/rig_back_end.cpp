@@ -71,6 +71,12 @@ class RigBackEnd {
       result_.cameras.emplace_back();
       result_.cameras.back().name = camera.name;
     }
+    for (const Track& track : data_->tracks) {
+      if (track.observations.size() >= 3) {
+        result_.cameras[track.observations.front().camera].num_tracked +=
+            static_cast<int64_t>(track.observations.size());
+      }
+    }
     const std::vector<Keyframe>& keyframes = data_->keyframes;
     result_.num_keyframes = static_cast<int>(keyframes.size());
     for (size_t i = 1; i < keyframes.size(); ++i) {

@@ -73,13 +73,14 @@ std::string placesOf(const RigCalibration& result, const CameraRig& rig) {
     text += rowOf(cells);
   }
   text += "</table><h2>Checks</h2><table>" +
-          rowOf({"camera", "observations", "error (px RMS)", "of it common to neighbours (px)",
-                 "landmarks shared with other cameras", "halves of the drive differ by (cm)", "(degrees)",
-                 "jackknife over formula, largest"},
+          rowOf({"camera", "observations followed", "that fit", "error (px RMS)",
+                 "of it common to neighbours (px)", "landmarks shared with other cameras",
+                 "halves of the drive differ by (cm)", "(degrees)", "jackknife over formula, largest"},
                 true);
   for (const CameraCalibration& camera : result.cameras) {
-    text += rowOf({camera.name, std::to_string(camera.num_observations), toText(camera.rms_px, 3),
-                   toText(camera.structure_px, 3), std::to_string(camera.num_shared_landmarks),
+    text += rowOf({camera.name, std::to_string(camera.num_tracked), std::to_string(camera.num_observations),
+                   toText(camera.rms_px, 3), toText(camera.structure_px, 3),
+                   std::to_string(camera.num_shared_landmarks),
                    toText(100.0 * camera.half_difference.head<3>().norm(), 2),
                    toText(kDegrees * camera.half_difference.tail<3>().norm(), 3),
                    toText(camera.inflation.maxCoeff(), 1)});

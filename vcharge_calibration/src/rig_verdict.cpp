@@ -17,6 +17,8 @@ constexpr double kMaxHalfSigmas = 4.0;
 constexpr double kBadHalf_m = 0.10, kBadHalf_rad = 0.5 / kDegrees;
 // Share of the errors that neighbours have in common: lenses that are not as their parameters say.
 constexpr double kWarnStructure = 0.4, kFailStructure = 0.7;
+// Share of its points that fit, against that of the camera where most do.
+constexpr double kWarnFit = 0.8, kFailFit = 0.65;
 constexpr double kMinTurn_rad = 90.0 / kDegrees;
 constexpr double kMinDistance_m = 50.0;
 constexpr double kWarnOffset_s = 0.01, kFailOffset_s = 0.05;
@@ -32,6 +34,7 @@ class RigJudge {
       judgeHalves(camera);
       judgeErrors(camera);
     }
+    judgeFit();
     judgeDrive();
     std::stable_sort(found_.begin(), found_.end(),
                      [](const auto& a, const auto& b) { return a.first > b.first; });
@@ -106,6 +109,27 @@ class RigJudge {
       remark(Verdict::kWarn,
              "camera '" + camera.name + "' shares only " + std::to_string(camera.num_shared_landmarks) +
                  " landmarks with other cameras: pass the same places again, in both directions");
+    }
+  }
+
+  /// Wrong intrinsics bend the camera's place until what fits fits well: the rest was left out.
+  void judgeFit() {
+    const auto shareOf = [](const CameraCalibration& camera) {
+      return static_cast<double>(camera.num_observations) /
+             std::max(1.0, static_cast<double>(camera.num_tracked));
+    };
+    double best = 0.0;
+    for (const CameraCalibration& camera : result_->cameras) {
+      best = std::max(best, shareOf(camera));
+    }
+    for (const CameraCalibration& camera : result_->cameras) {
+      const double share = shareOf(camera);
+      if (share < kWarnFit * best) {
+        remark(share < kFailFit * best ? Verdict::kFail : Verdict::kWarn,
+               "camera '" + camera.name + "': only " + toText(100.0 * share, 0) +
+                   " % of its points fit, against " + toText(100.0 * best, 0) +
+                   " % of the best camera's: its intrinsics are wrong, or it moved during the drive");
+      }
     }
   }
 

@@ -16,6 +16,7 @@ RigCalibration makeGood() {
     camera.name = name;
     camera.covariance.diagonal() << 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7;
     camera.num_shared_landmarks = 500;
+    camera.num_tracked = camera.num_observations = 10000;
     camera.rms_px = 0.5;
     camera.structure_px = 0.03;
     result.cameras.push_back(camera);
@@ -77,6 +78,9 @@ TEST(RigVerdictTest, AsksForTheManoeuvreThatIsMissing) {
 TEST(RigVerdictTest, TellsLateStampsAndWrongLenses) {
   Verdict verdict = Verdict::kPass;
   expectRemark(judge([](RigCalibration* r) { r->time_offset_s = 0.1; }, &verdict), "100 ms late");
+  EXPECT_EQ(verdict, Verdict::kFail);
+  expectRemark(judge([](RigCalibration* r) { r->cameras[0].num_observations = 5000; }, &verdict),
+               "camera 'front': only 50 % of its points fit");
   EXPECT_EQ(verdict, Verdict::kFail);
   expectRemark(judge([](RigCalibration* r) { r->cameras[1].structure_px = 0.4; }, &verdict),
                "camera 'left': errors go together over the image");

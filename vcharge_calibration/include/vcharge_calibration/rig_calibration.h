@@ -25,7 +25,8 @@ struct CameraCalibration {
   Eigen::Matrix<double, 6, 1> inflation = Eigen::Matrix<double, 6, 1>::Ones();
   /// Between the extrinsics from the odd and from the even parts of the drive.
   Eigen::Matrix<double, 6, 1> half_difference = Eigen::Matrix<double, 6, 1>::Zero();
-  int64_t num_observations = 0;
+  int64_t num_tracked = 0;       ///< observations of points that were followed over three keyframes or more
+  int64_t num_observations = 0;  ///< of these, and found later, that fit in the end
   int64_t num_shared_landmarks = 0;  ///< that another camera sees too
   double rms_px = 0.0;               ///< per coordinate
   double structure_px = 0.0;         ///< RMS over the image of what neighbouring errors have in common
