@@ -17,8 +17,8 @@ constexpr double kMaxHalfSigmas = 4.0;
 constexpr double kBadHalf_m = 0.10, kBadHalf_rad = 0.5 / kDegrees;
 // Share of the errors that neighbours have in common: lenses that are not as their parameters say.
 constexpr double kWarnStructure = 0.4, kFailStructure = 0.7;
-// Share of its points that fit, against that of the camera where most do.
-constexpr double kWarnFit = 0.8, kFailFit = 0.65;
+// Share of its points that fit, against the median of the other cameras.
+constexpr double kWarnFit = 0.75, kFailFit = 0.65;
 constexpr double kMinTurn_rad = 90.0 / kDegrees;
 constexpr double kMinDistance_m = 50.0;
 constexpr double kWarnOffset_s = 0.01, kFailOffset_s = 0.05;
@@ -118,17 +118,24 @@ class RigJudge {
       return static_cast<double>(camera.num_observations) /
              std::max(1.0, static_cast<double>(camera.num_tracked));
     };
-    double best = 0.0;
     for (const CameraCalibration& camera : result_->cameras) {
-      best = std::max(best, shareOf(camera));
-    }
-    for (const CameraCalibration& camera : result_->cameras) {
+      std::vector<double> others;
+      for (const CameraCalibration& other : result_->cameras) {
+        if (&other != &camera) {
+          others.push_back(shareOf(other));
+        }
+      }
+      if (others.size() < 2) {
+        return;  // two cameras may differ by what they look at
+      }
+      std::sort(others.begin(), others.end());
+      const double usual = others[others.size() / 2];
       const double share = shareOf(camera);
-      if (share < kWarnFit * best) {
-        remark(share < kFailFit * best ? Verdict::kFail : Verdict::kWarn,
+      if (share < kWarnFit * usual) {
+        remark(share < kFailFit * usual ? Verdict::kFail : Verdict::kWarn,
                "camera '" + camera.name + "': only " + toText(100.0 * share, 0) +
-                   " % of its points fit, against " + toText(100.0 * best, 0) +
-                   " % of the best camera's: its intrinsics are wrong, or it moved during the drive");
+                   " % of its points fit, against " + toText(100.0 * usual, 0) +
+                   " % of the others': its intrinsics are wrong, or it moved during the drive");
       }
     }
   }

@@ -5,13 +5,13 @@
 namespace vcharge {
 namespace {
 
-/// A drive and two cameras without fault.
+/// A drive and three cameras without fault.
 RigCalibration makeGood() {
   RigCalibration result;
   result.distance_m = 150.0;
   result.left_turn_rad = result.right_turn_rad = 6.0;
   result.num_loop_edges = 50;
-  for (const char* name : {"front", "left"}) {
+  for (const char* name : {"front", "left", "rear"}) {
     CameraCalibration camera;
     camera.name = name;
     camera.covariance.diagonal() << 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7;
