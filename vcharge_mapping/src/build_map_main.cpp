@@ -13,6 +13,7 @@
 #include "program_hash.h"
 #include "vcharge_core/camera_rig.h"
 #include "vcharge_core/command_line.h"
+#include "vcharge_core/content_hash.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/file_io.h"
 #include "vcharge_core/options.h"

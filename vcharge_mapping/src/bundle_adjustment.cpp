@@ -8,7 +8,6 @@
 #include <tbb/parallel_for.h>
 #include <Eigen/LU>
 
-#include "bundle_solver.h"
 #include "vcharge_core/error.h"
 #include "vcharge_mapping/triangulation.h"
 
@@ -25,50 +24,6 @@ Eigen::Matrix<double, 6, 6> odometryInformation(const RigidTransform& motion,
   sigmas << sigma_m, sigma_m, options.height_sigma_m, options.tilt_sigma_rad, options.tilt_sigma_rad,
       sigma_rad;
   return sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
-}
-
-/// The landmarks' observations and the odometer's motions, as the solver wants them.
-BundleProblem makeProblem(const BundleAdjustmentOptions& options, const MappingData& data) {
-  BundleProblem problem;
-  problem.rig = data.rig;
-  problem.odometer = {data.odometry_distance_scale, data.odometry_turn_scale};
-  problem.odometer_sigmas = {options.odometer_scale_sigma, options.odometer_turn_sigma};
-  problem.loss_sigmas = options.loss_sigmas;
-  for (const Keyframe& keyframe : data.keyframes) {
-    problem.map_from_vehicle.push_back(keyframe.map_from_vehicle);
-  }
-  for (const Track& track : data.tracks) {
-    if (!track.position_m) {
-      continue;
-    }
-    problem.points_in_map.push_back(*track.position_m);
-    problem.first_observation.push_back(problem.observations.size());
-    for (const TrackObservation& observation : track.observations) {
-      problem.observations.push_back(
-          {observation.keyframe, observation.camera, observation.position_px, observation.sigma_px});
-    }
-  }
-  problem.first_observation.push_back(problem.observations.size());
-  for (size_t i = 1; i < data.keyframes.size(); ++i) {
-    const RigidTransform motion =
-        data.keyframes[i - 1].odom_from_vehicle.inverse() * data.keyframes[i].odom_from_vehicle;
-    problem.motions.push_back({static_cast<int32_t>(i), motion, odometryInformation(motion, options)});
-  }
-  return problem;
-}
-
-void writeBack(const BundleProblem& problem, MappingData* data) {
-  for (size_t i = 0; i < data->keyframes.size(); ++i) {
-    data->keyframes[i].map_from_vehicle = problem.map_from_vehicle[i];
-  }
-  auto point = problem.points_in_map.begin();
-  for (Track& track : data->tracks) {
-    if (track.position_m) {
-      track.position_m = *point++;
-    }
-  }
-  data->odometry_distance_scale = problem.odometer[0];
-  data->odometry_turn_scale = problem.odometer[1];
 }
 
 struct TrackCheck {
@@ -176,16 +131,63 @@ void BundleAdjustmentOptions::validate() const {
   requireField(tilt_sigma_rad > 0.0, "tilt_sigma_rad", "must be positive", tilt_sigma_rad);
 }
 
+BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const MappingData& data) {
+  BundleProblem problem;
+  problem.rig = data.rig;
+  problem.odometer = {data.odometry_distance_scale, data.odometry_turn_scale};
+  problem.odometer_sigmas = {options.odometer_scale_sigma, options.odometer_turn_sigma};
+  problem.loss_sigmas = options.loss_sigmas;
+  for (const Keyframe& keyframe : data.keyframes) {
+    problem.map_from_vehicle.push_back(keyframe.map_from_vehicle);
+  }
+  for (const Track& track : data.tracks) {
+    if (!track.position_m) {
+      continue;
+    }
+    problem.points_in_map.push_back(*track.position_m);
+    problem.first_observation.push_back(problem.observations.size());
+    for (const TrackObservation& observation : track.observations) {
+      problem.observations.push_back(
+          {observation.keyframe, observation.camera, observation.position_px, observation.sigma_px});
+    }
+  }
+  problem.first_observation.push_back(problem.observations.size());
+  for (size_t i = 1; i < data.keyframes.size(); ++i) {
+    const RigidTransform motion =
+        data.keyframes[i - 1].odom_from_vehicle.inverse() * data.keyframes[i].odom_from_vehicle;
+    problem.motions.push_back({static_cast<int32_t>(i), motion, odometryInformation(motion, options)});
+  }
+  return problem;
+}
+
+void writeBack(const BundleProblem& problem, MappingData* data) {
+  for (size_t i = 0; i < data->keyframes.size(); ++i) {
+    data->keyframes[i].map_from_vehicle = problem.map_from_vehicle[i];
+  }
+  auto point = problem.points_in_map.begin();
+  for (Track& track : data->tracks) {
+    if (track.position_m) {
+      track.position_m = *point++;
+    }
+  }
+  data->odometry_distance_scale = problem.odometer[0];
+  data->odometry_turn_scale = problem.odometer[1];
+}
+
 BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, MappingData* data) {
   options.validate();
   check(!data->keyframes.empty(), "adjustBundle: expected keyframes");
-  BundleProblem problem = makeProblem(options, *data);
+  BundleProblem problem = makeBundleProblem(options, *data);
   const BundleSolution solved = solveBundle(options.max_iterations, options.cost_tolerance, &problem);
   writeBack(problem, data);
-  BundleAdjustmentSummary summary;
+  BundleAdjustmentSummary summary = removeOutliers(options, data);
   summary.converged = solved.converged;
   summary.num_iterations = solved.num_iterations;
+  return summary;
+}
 
+BundleAdjustmentSummary removeOutliers(const BundleAdjustmentOptions& options, MappingData* data) {
+  BundleAdjustmentSummary summary;
   std::vector<TrackCheck> checks(data->tracks.size());
   tbb::parallel_for(size_t{0}, data->tracks.size(), [&](size_t i) {
     if (data->tracks[i].position_m) {

@@ -30,11 +30,14 @@ void BundleEquations::makeSlots() {
     first_slot_of_point_.push_back(slots_.size());
     for (size_t i = problem_.first_observation[point]; i < problem_.first_observation[point + 1]; ++i) {
       const int32_t pose = problem_.observations[i].pose;
-      if (slots_.size() == first_slot_of_point_.back() || slots_.back().pose != pose) {
+      const int32_t camera = problem_.observations[i].camera;
+      if (slots_.size() == first_slot_of_point_.back() || slots_.back().pose != pose ||
+          (hasCameras() && slots_.back().camera != camera)) {
         slots_of_pose_[pose].push_back(slots_.size());
         Slot slot;
         slot.pose = pose;
         slot.point = static_cast<int32_t>(point);
+        slot.camera = camera;
         slots_.push_back(slot);
       }
     }
@@ -66,10 +69,10 @@ void BundleEquations::makePattern() {
       starts.push_back(starts.back() + 6 * static_cast<int>(rows_of_pose_[pose].size() - 1) + i);
     }
   }
-  for (int i = 1; i <= 2; ++i) {
-    starts.push_back(starts.back() + static_cast<int>(odometerColumn()) + i);
+  for (int i = 1; i <= tailSize(); ++i) {
+    starts.push_back(starts.back() + static_cast<int>(tailColumn()) + i);
   }
-  reduced_.resize(odometerColumn() + 2, odometerColumn() + 2);
+  reduced_.resize(tailColumn() + tailSize(), tailColumn() + tailSize());
   reduced_.resizeNonZeros(starts.back());
   std::copy(starts.begin(), starts.end(), reduced_.outerIndexPtr());
   int* inner = reduced_.innerIndexPtr();
@@ -83,8 +86,8 @@ void BundleEquations::makePattern() {
       }
     }
   }
-  for (int i = 0; i < 2; ++i) {
-    for (int k = 0; k <= odometerColumn() + i; ++k) {
+  for (int i = 0; i < tailSize(); ++i) {
+    for (int k = 0; k <= tailColumn() + i; ++k) {
       *inner++ = k;
     }
   }
@@ -104,7 +107,8 @@ void BundleEquations::linearizePoint(size_t point) {
     slot.information.setZero();
     slot.gradient.setZero();
     for (; observation < problem_.first_observation[point + 1] &&
-           problem_.observations[observation].pose == slot.pose;
+           problem_.observations[observation].pose == slot.pose &&
+           (!hasCameras() || problem_.observations[observation].camera == slot.camera);
          ++observation) {
       Eigen::Vector2d error;
       Eigen::Matrix<double, 2, 3> by_point;
@@ -118,6 +122,14 @@ void BundleEquations::linearizePoint(size_t point) {
     slot.from_vehicle_m = position - state_.poses[slot.pose].translation();
     slot.with_point.topRows<3>() = -slot.information;
     slot.with_point.bottomRows<3>() = -crossMatrix(slot.from_vehicle_m) * slot.information;
+    if (hasCamera(slot)) {
+      const Eigen::Matrix3d map_from_vehicle = state_.poses[slot.pose].rotationMatrix();
+      const Eigen::Vector3d from_camera_m = map_from_vehicle.transpose() * slot.from_vehicle_m -
+                                            state_.vehicle_from_camera[slot.camera].translation();
+      slot.by_camera.leftCols<3>() = -map_from_vehicle;
+      slot.by_camera.rightCols<3>() = map_from_vehicle * crossMatrix(from_camera_m);
+      slot.camera_with_point = slot.by_camera.transpose() * slot.information;
+    }
   }
 }
 
@@ -141,44 +153,102 @@ BundleEquations::MotionTerms BundleEquations::motionTerms() const {
   MotionTerms terms;
   terms.own.assign(slots_of_pose_.size(), Matrix6d::Zero());
   terms.with_previous.assign(slots_of_pose_.size(), Matrix6d::Zero());
-  terms.with_odometer.setZero(odometerColumn(), 2);
-  terms.gradient.setZero(odometerColumn() + 2);
+  terms.with_tail.setZero(tailColumn(), tailSize());
+  terms.gradient.setZero(tailColumn() + tailSize());
   const Eigen::Vector2d prior_information = problem_.odometer_sigmas.cwiseAbs2().cwiseInverse();
-  terms.odometer = prior_information.asDiagonal();
-  terms.gradient.tail<2>() = errors_.ofOdometer(state_).cwiseQuotient(problem_.odometer_sigmas);
+  terms.tail.setZero(tailSize(), tailSize());
+  terms.tail.topLeftCorner<2, 2>() = prior_information.asDiagonal();
+  auto odometer_gradient = terms.gradient.segment<2>(tailColumn());
+  odometer_gradient = errors_.ofOdometer(state_).cwiseQuotient(problem_.odometer_sigmas);
   for (size_t i = 0; i < problem_.motions.size(); ++i) {
     const auto pose = static_cast<size_t>(problem_.motions[i].pose);
     const MotionError motion = errors_.ofMotion(state_, i);
     terms.own[pose] += motion.by_current.transpose() * motion.by_current;
     terms.gradient.segment<6>(columnOf(pose)) += motion.by_current.transpose() * motion.error;
-    terms.with_odometer.middleRows<6>(columnOf(pose)) += motion.by_current.transpose() * motion.by_odometer;
+    terms.with_tail.block<6, 2>(columnOf(pose), 0) += motion.by_current.transpose() * motion.by_odometer;
     if (pose > 1) {
       terms.own[pose - 1] += motion.by_previous.transpose() * motion.by_previous;
       terms.with_previous[pose] += motion.by_previous.transpose() * motion.by_current;
       terms.gradient.segment<6>(columnOf(pose - 1)) += motion.by_previous.transpose() * motion.error;
-      terms.with_odometer.middleRows<6>(columnOf(pose - 1)) +=
+      terms.with_tail.block<6, 2>(columnOf(pose - 1), 0) +=
           motion.by_previous.transpose() * motion.by_odometer;
     }
-    terms.odometer += motion.by_odometer.transpose() * motion.by_odometer;
-    terms.gradient.tail<2>() += motion.by_odometer.transpose() * motion.error;
+    terms.tail.topLeftCorner<2, 2>() += motion.by_odometer.transpose() * motion.by_odometer;
+    odometer_gradient += motion.by_odometer.transpose() * motion.error;
+  }
+  if (hasCameras()) {
+    Eigen::MatrixXd common(6, tailSize() - 2);
+    for (size_t i = 0; i < problem_.vehicle_from_camera.size(); ++i) {
+      common.middleCols<6>(static_cast<Eigen::Index>(6 * i)) = errors_.commonMotionByCamera(i);
+    }
+    terms.tail.bottomRightCorner(tailSize() - 2, tailSize() - 2) +=
+        common.transpose() * problem_.common_information * common;
+    terms.gradient.tail(tailSize() - 2) +=
+        common.transpose() * (problem_.common_information * errors_.commonMotion(state_));
   }
   return terms;
 }
 
+BundleEquations::TailTerms BundleEquations::tailTerms() const {
+  TailTerms zero;
+  zero.information.setZero(tailSize(), tailSize());
+  zero.gradient.setZero(tailSize());
+  zero.reduced_gradient.setZero(tailSize());
+  zero.diagonal.setZero(tailSize());
+  if (!hasCameras()) {
+    return zero;
+  }
+  // A fixed number of points per task, added up in order: the same sums on any number of threads.
+  constexpr size_t kPointsPerTask = 1024;
+  std::vector<TailTerms> of_task((points_.size() + kPointsPerTask - 1) / kPointsPerTask, zero);
+  tbb::parallel_for(size_t{0}, of_task.size(), [&](size_t task) {
+    TailTerms& terms = of_task[task];
+    const size_t end = std::min(points_.size(), (task + 1) * kPointsPerTask);
+    for (size_t point = task * kPointsPerTask; point < end; ++point) {
+      for (size_t s = first_slot_of_point_[point]; s < first_slot_of_point_[point + 1]; ++s) {
+        const Slot& slot = slots_[s];
+        if (!hasCamera(slot)) {
+          continue;
+        }
+        const Eigen::Index row = cameraInTail(slot.camera);
+        const Matrix6d own = slot.camera_with_point * slot.by_camera;
+        const Vector6d gradient = slot.by_camera.transpose() * slot.gradient;
+        const Matrix63d over_point = slot.camera_with_point * points_[point].inverse;
+        terms.information.block<6, 6>(row, row) += own;
+        terms.diagonal.segment<6>(row) += own.diagonal();
+        terms.gradient.segment<6>(row) += gradient;
+        terms.reduced_gradient.segment<6>(row) += gradient - over_point * points_[point].gradient;
+        for (size_t other = first_slot_of_point_[point]; other < first_slot_of_point_[point + 1]; ++other) {
+          if (hasCamera(slots_[other])) {
+            terms.information.block<6, 6>(row, cameraInTail(slots_[other].camera)).noalias() -=
+                over_point * slots_[other].camera_with_point.transpose();
+          }
+        }
+      }
+    }
+  });
+  for (const TailTerms& terms : of_task) {
+    zero.information += terms.information;
+    zero.gradient += terms.gradient;
+    zero.reduced_gradient += terms.reduced_gradient;
+    zero.diagonal += terms.diagonal;
+  }
+  return zero;
+}
+
 void BundleEquations::assemble(double damping) {
-  const MotionTerms motions = motionTerms();
+  MotionTerms motions = motionTerms();
   gradient_ = motions.gradient;
   reduced_gradient_.setZero(gradient_.size());
   damping_.setZero(gradient_.size());
   tbb::enumerable_thread_specific<Scratch> scratch;
   tbb::parallel_for(size_t{1}, slots_of_pose_.size(),
-                    [&](size_t pose) { assemblePose(pose, damping, motions, &scratch.local()); });
-  assembleOdometer(damping, motions);
+                    [&](size_t pose) { assemblePose(pose, damping, &motions, &scratch.local()); });
+  assembleTail(damping, motions);
 }
 
 // A pose owns its columns, and adds up in a fixed order.
-void BundleEquations::assemblePose(size_t pose, double damping, const MotionTerms& motions,
-                                   Scratch* scratch) {
+void BundleEquations::assemblePose(size_t pose, double damping, MotionTerms* motions, Scratch* scratch) {
   const std::vector<int32_t>& rows = rows_of_pose_[pose];
   scratch->block_of_pose.resize(slots_of_pose_.size());
   scratch->blocks.assign(rows.size(), Matrix6d::Zero());
@@ -186,7 +256,7 @@ void BundleEquations::assemblePose(size_t pose, double damping, const MotionTerm
     scratch->block_of_pose[rows[k]] = static_cast<int32_t>(k);
   }
   Matrix6d& own = scratch->blocks.back();
-  own = motions.own[pose];
+  own = motions->own[pose];
   Vector6d gradient = gradient_.segment<6>(columnOf(pose));
   Vector6d eliminated = Vector6d::Zero();
   for (const size_t s : slots_of_pose_[pose]) {
@@ -203,13 +273,35 @@ void BundleEquations::assemblePose(size_t pose, double damping, const MotionTerm
   damping_.segment<6>(columnOf(pose)) = damping * own.diagonal().cwiseMax(kMinInformation);
   own.diagonal() += damping_.segment<6>(columnOf(pose));
   if (pose > 1) {
-    scratch->blocks[scratch->block_of_pose[pose - 1]] += motions.with_previous[pose];
+    scratch->blocks[scratch->block_of_pose[pose - 1]] += motions->with_previous[pose];
   }
   for (const size_t s : slots_of_pose_[pose]) {
     for (size_t other = first_slot_of_point_[slots_[s].point]; other <= s; ++other) {
       if (slots_[other].pose > 0) {
-        scratch->blocks[scratch->block_of_pose[slots_[other].pose]].noalias() -=
-            slots_[other].over_point * slots_[s].with_point.transpose();
+        const Matrix6d product = slots_[other].over_point * slots_[s].with_point.transpose();
+        Matrix6d& block = scratch->blocks[scratch->block_of_pose[slots_[other].pose]];
+        block -= product;
+        if (other < s && slots_[other].pose == slots_[s].pose) {
+          block -= product.transpose();
+        }
+      }
+    }
+  }
+  if (hasCameras()) {
+    for (const size_t s : slots_of_pose_[pose]) {
+      const Slot& slot = slots_[s];
+      const auto withCamera = [&](int32_t camera) {
+        return motions->with_tail.block<6, 6>(columnOf(pose), cameraInTail(camera));
+      };
+      if (hasCamera(slot)) {
+        withCamera(slot.camera).noalias() += slot.with_point * slot.by_camera;
+      }
+      for (size_t other = first_slot_of_point_[slot.point]; other < first_slot_of_point_[slot.point + 1];
+           ++other) {
+        if (hasCamera(slots_[other])) {
+          withCamera(slots_[other].camera).noalias() -=
+              slot.over_point * slots_[other].camera_with_point.transpose();
+        }
       }
     }
   }
@@ -221,14 +313,17 @@ void BundleEquations::assemblePose(size_t pose, double damping, const MotionTerm
   }
 }
 
-void BundleEquations::assembleOdometer(double damping, const MotionTerms& motions) {
-  reduced_gradient_.tail<2>() = gradient_.tail<2>();
-  damping_.tail<2>() = damping * motions.odometer.diagonal().cwiseMax(kMinInformation);
-  for (int i = 0; i < 2; ++i) {
-    double* value = reduced_.valuePtr() + reduced_.outerIndexPtr()[odometerColumn() + i];
-    value = std::copy_n(motions.with_odometer.col(i).data(), odometerColumn(), value);
-    for (int k = 0; k <= i; ++k) {
-      *value++ = motions.odometer(k, i) + (k == i ? damping_[odometerColumn() + i] : 0.0);
+void BundleEquations::assembleTail(double damping, const MotionTerms& motions) {
+  const TailTerms tail = tailTerms();
+  const Eigen::MatrixXd information = motions.tail + tail.information;
+  reduced_gradient_.tail(tailSize()) = gradient_.tail(tailSize()) + tail.reduced_gradient;
+  gradient_.tail(tailSize()) += tail.gradient;
+  damping_.tail(tailSize()) = damping * (motions.tail.diagonal() + tail.diagonal).cwiseMax(kMinInformation);
+  for (Eigen::Index i = 0; i < tailSize(); ++i) {
+    double* value = reduced_.valuePtr() + reduced_.outerIndexPtr()[tailColumn() + i];
+    value = std::copy_n(motions.with_tail.col(i).data(), tailColumn(), value);
+    for (Eigen::Index k = 0; k <= i; ++k) {
+      *value++ = information(k, i) + (k == i ? damping_[tailColumn() + i] : 0.0);
     }
   }
 }
@@ -250,7 +345,10 @@ double BundleEquations::step(double damping, BundleState* next) {
     next->poses[pose] = RigidTransform(rotationFromVector(move.tail<3>()) * state_.poses[pose].rotation(),
                                        state_.poses[pose].translation() + move.head<3>());
   }
-  next->odometer += change.tail<2>();
+  next->odometer += change.segment<2>(tailColumn());
+  for (size_t i = 0; i < problem_.vehicle_from_camera.size(); ++i) {
+    next->moveCamera(i, change.segment<6>(tailColumn() + cameraInTail(static_cast<int32_t>(i))));
+  }
   // The linear model falls by d^T (damping d - gradient) / 2.
   const double by_poses = 0.5 * change.dot(damping_.cwiseProduct(change) - gradient_);
   return by_poses + sumOverPoints(points_.size(), [&](size_t point) {
@@ -259,6 +357,10 @@ double BundleEquations::step(double damping, BundleState* next) {
            for (size_t s = first_slot_of_point_[point]; s < first_slot_of_point_[point + 1]; ++s) {
              if (slots_[s].pose > 0) {
                gradient += slots_[s].with_point.transpose() * change.segment<6>(columnOf(slots_[s].pose));
+             }
+             if (hasCamera(slots_[s])) {
+               gradient += slots_[s].camera_with_point.transpose() *
+                           change.segment<6>(tailColumn() + cameraInTail(slots_[s].camera));
              }
            }
            const Eigen::Vector3d move = -(terms.inverse * gradient);

@@ -7,18 +7,34 @@
 #include <ceres/manifold.h>
 
 #include "point_tasks.h"
+#include "vcharge_core/cross_matrix.h"
 #include "vcharge_geometry/pose_block.h"
 #include "vcharge_geometry/rig_costs.h"
 
 namespace vcharge {
 
+BundleState BundleState::of(const BundleProblem& problem) {
+  BundleState state{problem.map_from_vehicle, problem.points_in_map, problem.odometer, {}, {}};
+  for (size_t i = 0; i < problem.rig->cameras.size(); ++i) {
+    state.vehicle_from_camera.push_back(problem.vehicle_from_camera.empty()
+                                            ? *problem.rig->cameras[i].vehicle_from_camera
+                                            : problem.vehicle_from_camera[i]);
+    state.camera_from_vehicle.push_back(state.vehicle_from_camera.back().inverse());
+  }
+  return state;
+}
+
+void BundleState::moveCamera(size_t camera, const Eigen::Matrix<double, 6, 1>& move) {
+  const RigidTransform& before = vehicle_from_camera[camera];
+  vehicle_from_camera[camera] = RigidTransform(rotationFromVector(move.tail<3>()) * before.rotation(),
+                                               before.translation() + move.head<3>());
+  camera_from_vehicle[camera] = vehicle_from_camera[camera].inverse();
+}
+
 BundleErrors::BundleErrors(const BundleProblem& problem)
     : problem_(problem),
       squared_loss_scale_(problem.loss_sigmas * problem.loss_sigmas),
       manifold_(makePoseManifold()) {
-  for (const RigCamera& camera : problem.rig->cameras) {
-    camera_from_vehicle_.push_back(camera.vehicle_from_camera->inverse());
-  }
   for (const BundleMotion& motion : problem.motions) {
     motion_costs_.push_back(makeOdometryCost(motion.previous_from_current, motion.information));
   }
@@ -30,7 +46,15 @@ bool BundleErrors::ofObservation(const BundleState& state, size_t observation, c
                                  Eigen::Vector2d* error, Eigen::Matrix<double, 2, 3>* by_point) const {
   const BundleObservation& observed = problem_.observations[observation];
   const RigidTransform& pose = state.poses[observed.pose];
-  const RigidTransform& camera_from_vehicle = camera_from_vehicle_[observed.camera];
+  if (observed.camera == kGroundCamera) {
+    const Eigen::RowVector3d up = pose.rotationMatrix().col(2).transpose();
+    *error = Eigen::Vector2d(up.dot(point - pose.translation()) / observed.sigma_px, 0.0);
+    if (by_point != nullptr) {
+      *by_point << up / observed.sigma_px, Eigen::RowVector3d::Zero();
+    }
+    return true;
+  }
+  const RigidTransform& camera_from_vehicle = state.camera_from_vehicle[observed.camera];
   const Eigen::Matrix3d camera_from_map =
       (camera_from_vehicle.rotation() * pose.rotation().conjugate()).toRotationMatrix();
   const Eigen::Vector3d in_camera =
@@ -78,6 +102,26 @@ Eigen::Vector2d BundleErrors::ofOdometer(const BundleState& state) const {
   return (state.odometer - Eigen::Vector2d::Ones()).cwiseQuotient(problem_.odometer_sigmas);
 }
 
+Eigen::Matrix<double, 6, 6> BundleErrors::commonMotionByCamera(size_t camera) const {
+  // A rig that turns by dphi about the vehicle's origin moves a camera at t by dphi x t.
+  Eigen::Matrix<double, 6, 6> derivative = Eigen::Matrix<double, 6, 6>::Identity();
+  derivative.topRightCorner<3, 3>() = crossMatrix(problem_.vehicle_from_camera[camera].translation());
+  return derivative / static_cast<double>(problem_.vehicle_from_camera.size());
+}
+
+Eigen::Matrix<double, 6, 1> BundleErrors::commonMotion(const BundleState& state) const {
+  Eigen::Matrix<double, 6, 1> common = Eigen::Matrix<double, 6, 1>::Zero();
+  for (size_t i = 0; i < problem_.vehicle_from_camera.size(); ++i) {
+    const RigidTransform& before = problem_.vehicle_from_camera[i];
+    const RigidTransform& now = state.vehicle_from_camera[i];
+    Eigen::Matrix<double, 6, 1> move;
+    move << now.translation() - before.translation(),
+        vectorFromRotation(now.rotation() * before.rotation().conjugate());
+    common += commonMotionByCamera(i) * move;
+  }
+  return common;
+}
+
 double BundleErrors::cost(const BundleState& state) const {
   double cost = sumOverPoints(state.points.size(), [&](size_t point) {
     double of_point = 0.0;
@@ -91,7 +135,9 @@ double BundleErrors::cost(const BundleState& state) const {
   for (size_t i = 0; i < motion_costs_.size(); ++i) {
     cost += 0.5 * ofMotion(state, i).error.squaredNorm();
   }
-  return cost + 0.5 * ofOdometer(state).squaredNorm();
+  const Eigen::Matrix<double, 6, 1> common = commonMotion(state);
+  return cost + 0.5 * ofOdometer(state).squaredNorm() +
+         0.5 * common.dot(problem_.common_information * common);
 }
 
 }  // namespace vcharge

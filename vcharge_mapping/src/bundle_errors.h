@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "bundle_solver.h"
+#include "vcharge_mapping/bundle_solver.h"
 
 namespace ceres {
 class CostFunction;
@@ -20,6 +20,10 @@ struct BundleState {
   std::vector<RigidTransform> poses;
   std::vector<Eigen::Vector3d> points;
   Eigen::Vector2d odometer = Eigen::Vector2d::Ones();
+  std::vector<RigidTransform> vehicle_from_camera, camera_from_vehicle;
+
+  static BundleState of(const BundleProblem& problem);
+  void moveCamera(size_t camera, const Eigen::Matrix<double, 6, 1>& move);
 };
 
 /// An odometry error over its deviation, and its derivatives by the pose before, the pose, and the factors.
@@ -45,6 +49,10 @@ class BundleErrors {
 
   MotionError ofMotion(const BundleState& state, size_t motion) const;
   Eigen::Vector2d ofOdometer(const BundleState& state) const;
+  /// How far the cameras moved as one rigid body, [dt, dphi]; zero where they are known.
+  Eigen::Matrix<double, 6, 1> commonMotion(const BundleState& state) const;
+  /// Derivative of commonMotion() by the motion of a camera.
+  Eigen::Matrix<double, 6, 6> commonMotionByCamera(size_t camera) const;
 
   /// Half of the sum of (robust) squares, added up in an order that no scheduling changes.
   double cost(const BundleState& state) const;
@@ -53,7 +61,6 @@ class BundleErrors {
   const BundleProblem& problem_;
   const double squared_loss_scale_;
   const std::unique_ptr<const ceres::Manifold> manifold_;
-  std::vector<RigidTransform> camera_from_vehicle_;
   std::vector<std::unique_ptr<const ceres::CostFunction>> motion_costs_;
 };
 

@@ -1,4 +1,4 @@
-#include "bundle_solver.h"
+#include "vcharge_mapping/bundle_solver.h"
 
 #include <algorithm>
 #include <cmath>
@@ -18,15 +18,22 @@ constexpr double kMaxRadius = 1e16;
 constexpr double kMinRadius = 1e-32;
 constexpr double kMinGain = 1e-3;
 
+void checkProblem(const BundleProblem& problem) {
+  check(problem.first_observation.size() == problem.points_in_map.size() + 1 &&
+            problem.first_observation.back() == problem.observations.size(),
+        "BundleProblem: expected the observations grouped by point");
+  check(problem.vehicle_from_camera.empty() ||
+            problem.vehicle_from_camera.size() == problem.rig->cameras.size(),
+        "BundleProblem: expected vehicle_from_camera of every camera, or none");
+}
+
 }  // namespace
 
 BundleSolution solveBundle(int max_iterations, double cost_tolerance, BundleProblem* problem) {
-  check(problem->first_observation.size() == problem->points_in_map.size() + 1 &&
-            problem->first_observation.back() == problem->observations.size(),
-        "solveBundle: expected the observations grouped by point");
+  checkProblem(*problem);
   const BundleErrors errors(*problem);
   BundleEquations equations(*problem, errors);
-  BundleState state{problem->map_from_vehicle, problem->points_in_map, problem->odometer};
+  BundleState state = BundleState::of(*problem);
   BundleSolution solution;
   solution.cost = errors.cost(state);
   equations.linearize(state);
@@ -56,7 +63,18 @@ BundleSolution solveBundle(int max_iterations, double cost_tolerance, BundleProb
   problem->map_from_vehicle = std::move(state.poses);
   problem->points_in_map = std::move(state.points);
   problem->odometer = state.odometer;
+  if (!problem->vehicle_from_camera.empty()) {
+    problem->vehicle_from_camera = std::move(state.vehicle_from_camera);
+  }
   return solution;
+}
+
+BundleCovariance bundleCovariance(const BundleProblem& problem) {
+  checkProblem(problem);
+  const BundleErrors errors(problem);
+  BundleEquations equations(problem, errors);
+  equations.linearize(BundleState::of(problem));
+  return equations.covariance();
 }
 
 }  // namespace vcharge

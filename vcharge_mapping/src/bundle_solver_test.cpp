@@ -1,4 +1,4 @@
-#include "bundle_solver.h"
+#include "vcharge_mapping/bundle_solver.h"
 
 #include <cmath>
 #include <random>
@@ -79,6 +79,39 @@ TEST(BundleSolverTest, GoesThePathOfCeres) {
     EXPECT_NEAR(ours.odometer[0], theirs.odometer[0], 1e-6);
     EXPECT_LE(solution.num_iterations, iterations);
   }
+}
+
+TEST(BundleSolverTest, MovesUnknownCamerasAsCeresDoes) {
+  BundleProblem ours = makeProblem();
+  for (const RigCamera& camera : ours.rig->cameras) {
+    const RigidTransform& place = *camera.vehicle_from_camera;
+    ours.vehicle_from_camera.emplace_back(
+        rotationFromVector(Eigen::Vector3d(0.004, -0.003, 0.005)) * place.rotation(),
+        place.translation() + Eigen::Vector3d(0.03, 0.02, -0.02));
+  }
+  BundleProblem theirs = ours;
+  const BundleProblem before = ours;
+  solveBundle(3, 1e-9, &ours);
+  testing::solveWithCeres(3, 1e-9, &theirs);
+  EXPECT_LT(largestDifference_m(ours, theirs), 1e-8);
+  for (size_t i = 0; i < ours.vehicle_from_camera.size(); ++i) {
+    const RigidTransform& camera = ours.vehicle_from_camera[i];
+    EXPECT_GT((camera.translation() - before.vehicle_from_camera[i].translation()).norm(), 0.01);
+    EXPECT_LT((camera.translation() - theirs.vehicle_from_camera[i].translation()).norm(), 1e-8);
+    EXPECT_LT(angleOfRotation(camera.rotation().conjugate() * theirs.vehicle_from_camera[i].rotation()),
+              1e-8);
+  }
+}
+
+TEST(BundleSolverTest, PutsPointsOfTheGroundUnderTheVehicle) {
+  // One point that nothing sees, but that is said to lie on the ground at a pose.
+  BundleProblem problem = makeProblem();
+  problem.points_in_map = {problem.map_from_vehicle[3] * Eigen::Vector3d(1.0, 2.0, 0.3)};
+  problem.observations = {{3, kGroundCamera, Eigen::Vector2d::Zero(), 1e-3}};
+  problem.first_observation = {0, 1};
+  problem.loss_sigmas = 1e6;
+  solveBundle(30, 1e-12, &problem);
+  EXPECT_NEAR((problem.map_from_vehicle[3].inverse() * problem.points_in_map[0]).z(), 0.0, 1e-4);
 }
 
 TEST(BundleSolverTest, GivesTheSameBitsOnOneThread) {

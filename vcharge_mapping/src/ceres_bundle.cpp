@@ -17,8 +17,11 @@ void solveWithCeres(int max_iterations, double cost_tolerance, BundleProblem* bu
     poses.push_back(toPoseBlock(pose));
   }
   std::vector<std::shared_ptr<const CameraModel>> models;
-  for (const RigCamera& camera : bundle->rig->cameras) {
-    extrinsics.push_back(toPoseBlock(*camera.vehicle_from_camera));
+  const bool known_cameras = bundle->vehicle_from_camera.empty();
+  for (size_t i = 0; i < bundle->rig->cameras.size(); ++i) {
+    const RigCamera& camera = bundle->rig->cameras[i];
+    extrinsics.push_back(
+        toPoseBlock(known_cameras ? *camera.vehicle_from_camera : bundle->vehicle_from_camera[i]));
     models.emplace_back(bundle->rig, &camera.model);
   }
   ceres::Problem problem;
@@ -28,7 +31,9 @@ void solveWithCeres(int max_iterations, double cost_tolerance, BundleProblem* bu
   }
   for (PoseBlock& pose : extrinsics) {
     problem.AddParameterBlock(pose.data(), 7, manifold);
-    problem.SetParameterBlockConstant(pose.data());
+    if (known_cameras) {
+      problem.SetParameterBlockConstant(pose.data());
+    }
   }
   problem.SetParameterBlockConstant(poses.front().data());
   auto* loss = new ceres::CauchyLoss(bundle->loss_sigmas);
@@ -59,6 +64,9 @@ void solveWithCeres(int max_iterations, double cost_tolerance, BundleProblem* bu
   ceres::Solve(options, &problem, &summary);
   for (size_t i = 0; i < poses.size(); ++i) {
     bundle->map_from_vehicle[i] = fromPoseBlock(poses[i]);
+  }
+  for (size_t i = 0; i < bundle->vehicle_from_camera.size(); ++i) {
+    bundle->vehicle_from_camera[i] = fromPoseBlock(extrinsics[i]);
   }
 }
 

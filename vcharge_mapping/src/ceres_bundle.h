@@ -1,6 +1,6 @@
 #pragma once
 
-#include "bundle_solver.h"
+#include "vcharge_mapping/bundle_solver.h"
 
 namespace vcharge::testing {
 

@@ -97,12 +97,17 @@ CameraTracker::CameraTracker(const RigCamera& camera, const FrameTrackerOptions&
       options_(options),
       patch_tracker_(options.patches),
       mask_(makeFeatureMask(camera)),
-      spacing_px_(std::max(4.0, options.min_spacing_px * camera.image_size_px.width / kReferenceWidth_px)) {
-  check(camera.vehicle_from_camera.has_value(), "CameraTracker: expected extrinsics");
+      spacing_px_(std::max(4.0, options.min_spacing_px * camera.image_size_px.width / kReferenceWidth_px)) {}
+
+RigidTransform CameraTracker::vehicleFromCamera() const {
+  return camera_.vehicle_from_camera.value_or(RigidTransform());
 }
 
 cv::Point2f CameraTracker::predict(const LiveTrack& track,
                                    const RigidTransform& current_from_previous) const {
+  if (!camera_.vehicle_from_camera) {
+    return track.position_px + track.last_step_px;
+  }
   const RigidTransform& vehicle_from_camera = *camera_.vehicle_from_camera;
   const Eigen::Vector3d direction = vehicle_from_camera.rotation() * track.ray_in_camera;
   const Eigen::Vector3d point = vehicle_from_camera.translation() +
@@ -134,10 +139,12 @@ void CameraTracker::track(const Image& image, const RigidTransform& previous_fro
     }
     const std::vector<TrackedPoint> tracked =
         patch_tracker_.track(pyramid_, current, points, mask_, predictions);
-    const Ray camera_ray{camera_.vehicle_from_camera->translation(), Eigen::Vector3d::Zero()};
+    const RigidTransform vehicle_from_camera = vehicleFromCamera();
+    const Ray camera_ray{vehicle_from_camera.translation(), Eigen::Vector3d::Zero()};
     for (size_t i = 0; i < tracks_.size(); ++i) {
       LiveTrack next = tracks_[i];
       next.position_px = tracked[i].position_px;
+      next.last_step_px = next.position_px - tracks_[i].position_px;
       if (tracked[i].status != TrackStatus::kTracked ||
           !camera_.model.unproject(Eigen::Vector2d(next.position_px.x, next.position_px.y),
                                    &next.ray_in_camera)) {
@@ -145,8 +152,8 @@ void CameraTracker::track(const Image& image, const RigidTransform& previous_fro
       }
       RayMatch match;
       match.previous = match.current = camera_ray;
-      match.previous.direction = camera_.vehicle_from_camera->rotation() * tracks_[i].ray_in_camera;
-      match.current.direction = camera_.vehicle_from_camera->rotation() * next.ray_in_camera;
+      match.previous.direction = vehicle_from_camera.rotation() * tracks_[i].ray_in_camera;
+      match.current.direction = vehicle_from_camera.rotation() * next.ray_in_camera;
       match.previous_camera = match.current_camera = camera_index;
       matches->push_back(match);
       kept.push_back(next);

@@ -1,4 +1,4 @@
-#include "map_assembly.h"
+#include "vcharge_mapping/map_assembly.h"
 
 #include <cstdlib>
 #include <sstream>

@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-#include "map_assembly.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/stage_timer.h"
+#include "vcharge_mapping/map_assembly.h"
 
 namespace vcharge {
 namespace {

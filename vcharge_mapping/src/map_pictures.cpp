@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "svg_plot.h"
+#include "vcharge_mapping/svg_plot.h"
 
 namespace vcharge {
 namespace {

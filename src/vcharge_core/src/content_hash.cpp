@@ -1,11 +1,18 @@
 #include "vcharge_core/content_hash.h"
 
+#include <cerrno>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <new>
+#include <system_error>
+#include <vector>
 
 #include <xxhash.h>
+
+#include "vcharge_core/error.h"
 
 namespace vcharge {
 
@@ -55,6 +62,22 @@ std::string ContentHasher::hex() const {
     text.push_back(kDigits[byte & 15]);
   }
   return text;
+}
+
+std::string fileHash(const std::string& path) {
+  if (!std::filesystem::exists(path)) {
+    throw InputError(path + ": no such file");
+  }
+  std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    throw InputError(path + ": cannot be read: " + std::generic_category().message(errno));
+  }
+  ContentHasher hasher;
+  std::vector<char> buffer(1 << 20);
+  while (file.read(buffer.data(), static_cast<std::streamsize>(buffer.size())) || file.gcount() > 0) {
+    hasher.addBytes(buffer.data(), static_cast<size_t>(file.gcount()));
+  }
+  return hasher.hex();
 }
 
 }  // namespace vcharge

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 
+#include "central_five_point.h"
 #include "local_refinement.h"
 #include "vcharge_geometry/ackermann_two_point.h"
 #include "vcharge_geometry/angular_error.h"
@@ -37,6 +38,14 @@ struct KnownVerticalSolver {
   }
 };
 
+struct CentralSolver {
+  static constexpr int kSampleSize = 5;
+  using Motions = CentralMotions;
+  static void solve(const std::array<LineMatch, 5>& matches, Motions* motions) {
+    solveCentralFivePoint(matches, motions);
+  }
+};
+
 /// A Problem of estimateRobustly; see there.
 template <class Solver, class Parameters>
 class MotionProblem {
@@ -64,7 +73,7 @@ class MotionProblem {
     }
     typename Solver::Motions motions;
     Solver::solve(lines, &motions);
-    for (const YawMotion& motion : motions) {
+    for (const auto& motion : motions) {
       visit(RotationTranslation(motion.transform()));
     }
   }
@@ -205,6 +214,10 @@ MotionEstimate estimateKnownVerticalMotion(const std::vector<RayMatch>& matches,
   turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = previous_turn.inverse().rotationMatrix();
   estimate.covariance = turn * estimate.covariance * turn.transpose();
   return estimate;
+}
+
+MotionEstimate estimateCentralMotion(const std::vector<RayMatch>& matches, const RobustOptions& options) {
+  return estimateMotion<CentralSolver, CartesianParameters<6>>(matches, options);
 }
 
 MotionEstimate refineMotion(const std::vector<RayMatch>& matches,

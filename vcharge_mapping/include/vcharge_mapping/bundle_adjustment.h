@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "vcharge_core/options.h"
+#include "vcharge_mapping/bundle_solver.h"
 #include "vcharge_mapping/mapping_data.h"
 
 namespace vcharge {
@@ -60,5 +61,14 @@ struct BundleAdjustmentSummary {
 /// and turn factors to the least robust sum of reprojection and odometry errors; the rig is known. Then
 /// removes outliers and gives the landmarks their covariance, given the poses.
 BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, MappingData* data);
+
+// The parts of adjustBundle(), for those who adjust more than it does.
+
+/// The landmarks' observations and the odometer's motions, as the solver wants them.
+BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const MappingData& data);
+/// Poses, points and odometer's factors back to where makeBundleProblem() took them from.
+void writeBack(const BundleProblem& problem, MappingData* data);
+/// Removes what does not fit the poses and points as they are now; gives landmarks their covariance.
+BundleAdjustmentSummary removeOutliers(const BundleAdjustmentOptions& options, MappingData* data);
 
 }  // namespace vcharge

@@ -52,9 +52,11 @@ struct LiveTrack {
   Eigen::Vector3d ray_in_camera;
   int32_t anchor_keyframe = 0;  ///< whose image shows the patch that is followed
   cv::Point2f anchor_px;
+  cv::Point2f last_step_px{0.0F, 0.0F};  ///< from the image before
 };
 
-/// Follows the points of one camera through its images.
+/// Follows the points of one camera through its images. Without extrinsics points are expected to go on as
+/// they went, and matches are in the camera's frame instead of the vehicle's.
 class CameraTracker {
  public:
   /// Both must outlive this object.
@@ -77,6 +79,7 @@ class CameraTracker {
 
  private:
   void alignWithAnchors(int32_t keyframe);
+  RigidTransform vehicleFromCamera() const;
   cv::Point2f predict(const LiveTrack& track, const RigidTransform& current_from_previous) const;
 
   const RigCamera& camera_;

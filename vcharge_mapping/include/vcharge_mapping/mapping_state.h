@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "vcharge_core/trajectory.h"
 #include "vcharge_features/vocabulary_tree.h"
 #include "vcharge_mapping/mapping_data.h"
 #include "vcharge_mapping/sparse_mapper_report.h"
@@ -27,5 +28,8 @@ struct MappingState {
   std::shared_ptr<const VocabularyTree> vocabulary;  ///< null before its stage
   int32_t num_finished_stages = 0;                   ///< of backEndStages()
 };
+
+/// Poses of all frames that were followed, in the map, by those of the keyframes as they are now.
+Trajectory trajectoryOf(const MappingState& state);
 
 }  // namespace vcharge

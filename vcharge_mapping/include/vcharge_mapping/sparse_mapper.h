@@ -10,8 +10,8 @@
 #include "vcharge_core/drive_source.h"
 #include "vcharge_core/sparse_map.h"
 #include "vcharge_core/trajectory.h"
-#include "vcharge_core/vehicle_odometry.h"
 #include "vcharge_features/feature_extractor.h"
+#include "vcharge_mapping/frame_gatherer.h"
 #include "vcharge_mapping/frame_tracker.h"
 #include "vcharge_mapping/map_back_end.h"
 #include "vcharge_mapping/mapping_state.h"
@@ -28,8 +28,10 @@ class SparseMapper : public DriveConsumer {
   SparseMapper(std::shared_ptr<const CameraRig> rig, const SparseMapperOptions& options);
   ~SparseMapper() override;
 
-  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
-  void addOdometry(const VehicleOdometry& odometry) override;
+  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
+    gatherer_->addImage(camera_index, stamp, image);
+  }
+  void addOdometry(const VehicleOdometry& odometry) override { gatherer_->addOdometry(odometry); }
 
   /// The map of all that was fed. InputError where the drive does not suffice, saying why. Both callbacks may
   /// be empty, and may throw to end the work; `checkpoint` is called first with the stage "following".
@@ -41,38 +43,21 @@ class SparseMapper : public DriveConsumer {
 
   const SparseMapperReport& report() const { return state_.report; }
   /// Poses of all frames that were followed, in the map, after finish().
-  Trajectory trajectory() const;
+  Trajectory trajectory() const { return trajectoryOf(state_); }
   /// What is known so far.
   const MappingState& state() const { return state_; }
 
  private:
-  struct PendingFrame {
-    std::vector<Image> images;
-    size_t num_present = 0;
-  };
-  void processFrames(bool all);
-  void processFrame(Timestamp stamp, const PendingFrame& frame, const RigidTransform& odom_from_vehicle);
+  void processFrame(Timestamp stamp, const std::vector<Image>& images,
+                    const RigidTransform& odom_from_vehicle);
   void addKeyframe(Timestamp stamp, const RigidTransform& odom_from_vehicle, MotionHypothesis motion);
-  void noteSkipped(Timestamp stamp, const std::string& reason);
-  std::string missingCameras(const PendingFrame& frame);
 
   const std::shared_ptr<const CameraRig> rig_;
   const SparseMapperOptions options_;
   const std::unique_ptr<FeatureExtractor> extractor_;
   std::vector<CameraTracker> trackers_;  // by camera
-  OdometryBuffer odometry_;
-  RigidTransform corrected_from_raw_odom_;
-  std::optional<VehicleOdometry> last_raw_odometry_;
-  std::map<Timestamp, PendingFrame> pending_;
-
-  std::optional<Timestamp> last_stamp_;  // of a frame that had its turn
   MappingState state_;
-  /// Which entry of the report a reason has last, and the number of the frame that it ends with.
-  struct LastSkipped {
-    size_t entry = 0;
-    int64_t frame = 0;
-  };
-  std::map<std::string, LastSkipped> last_skipped_;  // by reason
+  std::unique_ptr<FrameGatherer> gatherer_;
   bool has_previous_ = false;
   RigidTransform previous_odom_from_vehicle_;
   RigidTransform map_from_previous_;

@@ -30,4 +30,7 @@ class ContentHasher {
   std::unique_ptr<State> state_;
 };
 
+/// Of a whole file: tells two recordings of one name apart. InputError when it cannot be read.
+std::string fileHash(const std::string& path);
+
 }  // namespace vcharge

@@ -49,6 +49,11 @@ MotionEstimate estimateKnownVerticalMotion(const std::vector<RayMatch>& matches,
                                            const Eigen::Quaterniond& upright_from_current,
                                            const RobustOptions& options);
 
+/// Any motion of one camera whose centre is the origin of the rays: five matches a sample (Nister, PAMI 2004,
+/// by OpenGV); rotation and direction of the translation (kScaleUnobservable), 5 degrees of freedom. Origins
+/// of rays must be zero.
+MotionEstimate estimateCentralMotion(const std::vector<RayMatch>& matches, const RobustOptions& options);
+
 /// Local refinement of a motion in all 6 degrees of freedom, without sampling.
 MotionEstimate refineMotion(const std::vector<RayMatch>& matches,
                             const RigidTransform& initial_previous_from_current,

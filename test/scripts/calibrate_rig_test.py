@@ -1,0 +1,95 @@
+#!/usr/bin/env python3
+"""calibrate_rig on drives that do not suffice: the right reason, and no file; compare_rigs and evaluate_rig."""
+import copy
+import os
+import sys
+import unittest
+
+import rostest
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from drive_fixture import Drive, run, tool  # noqa: E402
+
+
+class CalibrateRigTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.drive = Drive("straight", duration_s=6, extra=(), image_scale=0.25)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.drive.remove()
+
+    def calibrate(self, bag, *extra):
+        """Expects a failure that leaves the old file as it is; returns what was printed and the line of the error."""
+        output = self.drive.write_text("rig.yaml", "an older rig\n")
+        status, printed, errors = run([tool("vcharge_calibration", "calibrate_rig"), "--bag", bag, "--rig",
+                                       self.drive.rig, "--output", output, *extra])
+        self.assertEqual(status, 1, printed)
+        self.assertEqual(len(errors), 1, errors)
+        self.assertEqual(output.read_text(), "an older rig\n")
+        return printed, errors[0]
+
+    def test_straight_ahead_is_not_enough(self):
+        report = self.drive.folder / "report"
+        map_file = self.drive.folder / "map.vmap"
+        printed, error = self.calibrate(self.drive.bag, "--report", report, "--map", map_file)
+        self.assertIn("FAIL: camera 'front': no turn", error)
+        self.assertIn("figure of eight", error)
+        self.assertIn("camera 'left': no turn", printed)
+        self.assertFalse(map_file.exists())
+        page = (report / "rig_report.html").read_text()
+        self.assertIn('class="verdict FAIL"', page)
+        self.assertIn("no turn", page)
+
+    def test_a_standing_vehicle_is_told(self):
+        poses = []
+
+        def stop(topic, message):
+            if topic == "/odom":
+                poses.append(message.pose)
+                message = copy.deepcopy(message)
+                message.pose = poses[0]
+            return [(topic, message)]
+
+        _, error = self.calibrate(self.drive.rewrite("standing.bag", stop))
+        self.assertIn("the vehicle stood", error)
+
+    def test_a_covered_camera_is_named(self):
+        def cover(topic, message):
+            if topic == "/camera/left/image_raw":
+                message = copy.deepcopy(message)
+                message.data = bytes(len(message.data))
+            return [(topic, message)]
+
+        printed, _ = self.calibrate(self.drive.rewrite("covered.bag", cover))
+        self.assertIn("camera 'left': too few images in which points could be followed", printed)
+
+    def test_a_drive_without_odometry_is_refused(self):
+        bag = self.drive.rewrite("blind.bag", lambda topic, message: [] if topic == "/odom" else [(topic, message)])
+        _, error = self.calibrate(bag)
+        self.assertIn("/odom", error)
+
+    def test_missing_arguments_are_named(self):
+        status, _, errors = run([tool("vcharge_calibration", "calibrate_rig"), "--bag", self.drive.bag])
+        self.assertNotEqual(status, 0)
+        self.assertIn("--output", errors[0])
+
+    def test_a_rig_is_like_itself_and_unlike_one_that_was_moved(self):
+        text = self.drive.rig.read_text()
+        line = next(line for line in text.splitlines() if "translation_m" in line)
+        x = line.split("[")[1].split(",")[0]
+        moved = self.drive.write_text("moved.yaml", text.replace(x, str(float(x) + 0.02), 1))
+        compare = tool("vcharge_calibration", "compare_rigs")
+        status, output, _ = run([compare, self.drive.rig, moved])
+        self.assertEqual(status, 0)
+        self.assertIn("forwards     2.000 cm", output)
+        status, output, _ = run([tool("vcharge_evaluation", "evaluate_rig"), "--estimate", moved, "--truth",
+                                 self.drive.rig])
+        self.assertEqual(status, 0)
+        row = next(line for line in output.splitlines() if line.split()[:1] == ["front"]).split()
+        self.assertEqual(row[1], "-2.00")
+
+
+if __name__ == "__main__":
+    rostest.rosrun("vcharge_tests", "calibrate_rig", CalibrateRigTest)

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "vcharge_calibration/rig_calibration.h"
+#include "vcharge_calibration/rig_calibrator_options.h"
+#include "vcharge_core/drive_source.h"
+#include "vcharge_core/sparse_map.h"
+#include "vcharge_core/trajectory.h"
+#include "vcharge_mapping/frame_gatherer.h"
+#include "vcharge_mapping/frame_tracker.h"
+#include "vcharge_mapping/map_back_end.h"
+#include "vcharge_mapping/mapping_state.h"
+
+namespace vcharge {
+
+/// Calibrates the extrinsics of a rig from a drive (paper, section SLAM-based Extrinsic Calibration): no
+/// guess, no overlap of the cameras, no board. Feed it the drive, then call finish(). Extrinsics that the rig
+/// has are not used. Data parallel inside; the same input gives the same result on any number of threads.
+class RigCalibrator : public DriveConsumer {
+ public:
+  /// std::invalid_argument for bad options; InputError for a rig without cameras.
+  RigCalibrator(std::shared_ptr<const CameraRig> rig, const RigCalibratorOptions& options);
+  ~RigCalibrator() override;
+
+  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
+    gatherer_->addImage(camera_index, stamp, image);
+  }
+  void addOdometry(const VehicleOdometry& odometry) override { gatherer_->addOdometry(odometry); }
+
+  /// The calibration by all that was fed. A drive that does not suffice gives Verdict::kFail with the reason.
+  /// The callback may be empty, and may throw to end the work.
+  RigCalibration finish(const StageCallback& progress);
+
+  /// After finish() with another verdict than kFail: poses of all frames, and the map that came with them.
+  Trajectory trajectory() const { return trajectoryOf(state_); }
+  std::shared_ptr<const SparseMap> map() const;
+  const MappingState& state() const { return state_; }
+
+ private:
+  void processFrame(Timestamp stamp, const std::vector<Image>& images,
+                    const RigidTransform& odom_from_vehicle);
+  void addKeyframe(Timestamp stamp, const RigidTransform& odom_from_vehicle);
+
+  const RigCalibratorOptions options_;
+  std::shared_ptr<const CameraRig> rig_;  // without extrinsics
+  const std::unique_ptr<FeatureExtractor> extractor_;
+  std::vector<CameraTracker> trackers_;
+  MappingState state_;
+  std::unique_ptr<FrameGatherer> gatherer_;
+  std::optional<RigidTransform> last_odom_from_vehicle_;
+  double travelled_m_ = 0.0;
+};
+
+}  // namespace vcharge
