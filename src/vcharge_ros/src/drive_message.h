@@ -20,8 +20,8 @@ struct DriveTopicRole {
 /// "nav_msgs/Odometry"
 const char* expectedType(DriveTopicKind kind);
 
-/// The content of a bag's message and its stamp, whatever size an image has. InputError naming the bag and the
-/// topic for what cannot be understood.
+/// The content of a bag's message and its stamp, whatever size an image has. InputError naming the bag and
+/// the topic for what cannot be understood.
 DriveItem convertDriveMessage(const rosbag::MessageInstance& message, const DriveTopicRole& role,
                               const std::string& bag_path, const std::string& vehicle_frame,
                               Timestamp* stamp);

@@ -27,8 +27,8 @@ CheckGrade worstGrade(const std::vector<CheckFinding>& findings);
 /// Judges a recorded drive before hours are spent on it: are the four cameras and the odometry complete, in
 /// step, well exposed, and do they tell of the same motion? The rig may lack extrinsics; where it has them,
 /// the images' motion is compared with them as well. Turns are compared by the angle about the axis that each
-/// camera's rotations have in common, so no calibration of the mounting is needed. Deterministic. Keeps times,
-/// odometry and a few figures per pair of images, no images but the last ones. Not thread safe.
+/// camera's rotations have in common, so no calibration of the mounting is needed. Deterministic. Keeps
+/// times, odometry and a few figures per pair of images, no images but the last ones. Not thread safe.
 class DriveChecker : public RecordedDriveConsumer {
  public:
   explicit DriveChecker(std::shared_ptr<const CameraRig> rig);
