@@ -58,6 +58,12 @@ def wait_until_gone(manager, subscribers):
              f"connections to {manager} to end")
 
 
+def announce_again(topic, kind):
+    """Has the master tell all subscribers of a topic who publishes on it. rospy takes the last such news for the newest;
+    where a nodelet goes and comes again at once, that may be the news that it went."""
+    rospy.Publisher(topic, kind, queue_size=1).unregister()
+
+
 def project_mei(rays, p):
     """Pixels (2 x N) of unit rays (3 x N); paper, section Camera Model."""
     z = rays[2] + p["xi"]
