@@ -58,7 +58,7 @@ void RigCalibratorOptions::validate() const {
   validateInner("bundle", bundle);
 }
 
-RigCalibrator::RigCalibrator(std::shared_ptr<const CameraRig> rig, const RigCalibratorOptions& options)
+RigCalibrator::RigCalibrator(const std::shared_ptr<const CameraRig>& rig, const RigCalibratorOptions& options)
     : options_(options), extractor_(makeFeatureExtractor(options.features)) {
   options_.validate();
   check(rig != nullptr, "RigCalibrator: expected a rig");

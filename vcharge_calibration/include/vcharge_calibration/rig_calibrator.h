@@ -23,7 +23,7 @@ namespace vcharge {
 class RigCalibrator : public DriveConsumer {
  public:
   /// std::invalid_argument for bad options; InputError for a rig without cameras.
-  RigCalibrator(std::shared_ptr<const CameraRig> rig, const RigCalibratorOptions& options);
+  RigCalibrator(const std::shared_ptr<const CameraRig>& rig, const RigCalibratorOptions& options);
   ~RigCalibrator() override;
 
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
