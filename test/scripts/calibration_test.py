@@ -14,14 +14,13 @@ import rospy
 import rostest
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray
-from nodelet.srv import NodeletLoad
 from sensor_msgs.msg import CompressedImage, Image
 from std_srvs.srv import Trigger
 from vcharge_msgs.msg import CalibrationStatus
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import run, tool  # noqa: E402
-from nodelet_fixture import TIMEOUT_S, wait_for  # noqa: E402
+from nodelet_fixture import manager_services, wait_for  # noqa: E402
 
 WIDTH, HEIGHT = 640, 400
 FOCAL_PX, CENTRE = 210.0, (325.0, 195.0)  # equidistant: radius = focal length x angle
@@ -197,8 +196,7 @@ class CalibrationTest(unittest.TestCase):
         rospy.set_param("/calibration", {
             "camera": "front", "output": str(self.rig), "square_m": SQUARE_M, "options": {"model": "kannala_brandt"},
             "collector": {"enough_views": 8, "enough_coverage": 0.5, "enough_tilted": 1}})
-        rospy.wait_for_service("/manager/load_nodelet", TIMEOUT_S)
-        load = rospy.ServiceProxy("/manager/load_nodelet", NodeletLoad)
+        load, _, _ = manager_services()
         self.assertTrue(load("/calibration", "vcharge_calibration/intrinsic_calibration_nodelet", [], [], [], "").success)
         wait_for(lambda: publisher.get_num_connections() > 0, "a subscriber")
         calibrate = rospy.ServiceProxy("/calibration/calibrate", Trigger)

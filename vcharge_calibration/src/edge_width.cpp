@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "vcharge_core/quantile.h"
+
 namespace vcharge {
 
 namespace {
@@ -68,13 +70,8 @@ double widthAt(const cv::Mat& image, const CalibrationBoard& board, const Placed
   return variance > 0.0 ? 2.0 * std::sqrt(variance) : 0.0;
 }
 
-double medianOf(std::vector<double> values) {
-  if (values.empty()) {
-    return 0.0;
-  }
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+double medianOf(const std::vector<double>& values) {
+  return values.empty() ? 0.0 : quantile(values, 0.5);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include "ground.h"
 #include "vcharge_core/error.h"
+#include "vcharge_core/quantile.h"
 
 namespace vcharge {
 namespace {
@@ -20,12 +21,6 @@ constexpr double kMinOdometrySigma_m = 0.0005;
 constexpr double kMinOdometrySigma_rad = 0.0002;
 constexpr double kMinHeightSigma_m = 0.001;
 constexpr double kMinTiltSigma_rad = 0.0005;
-
-double medianOf(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Weights of what keyframes tell of the cameras' tilt. The body leans outwards in turns: with turns to both
 /// sides counting the same in sum that cancels, so the side with more of them counts less.
@@ -120,13 +115,14 @@ OdometryNoise estimateOdometryNoise(const RigCalibratorOptions& options, const M
   // Medians of a Rayleigh distribution and of the absolute value of a normal one.
   constexpr double kRayleigh = 1.1774, kNormal = 0.6745;
   const BundleAdjustmentOptions& bundle = options.bundle;
-  noise.sigma_m = std::clamp(medianOf(errors_m) * std::sqrt(2.0) / kRayleigh, kMinOdometrySigma_m,
+  noise.sigma_m = std::clamp(quantile(errors_m, 0.5) * std::sqrt(2.0) / kRayleigh, kMinOdometrySigma_m,
                              bundle.odometry_sigma_m);
   noise.sigma_rad =
-      std::clamp(medianOf(errors_rad) / kNormal, kMinOdometrySigma_rad, bundle.odometry_sigma_rad);
-  noise.height_sigma_m = std::clamp(medianOf(heights_m) / kNormal, kMinHeightSigma_m, bundle.height_sigma_m);
+      std::clamp(quantile(errors_rad, 0.5) / kNormal, kMinOdometrySigma_rad, bundle.odometry_sigma_rad);
+  noise.height_sigma_m =
+      std::clamp(quantile(heights_m, 0.5) / kNormal, kMinHeightSigma_m, bundle.height_sigma_m);
   noise.tilt_sigma_rad =
-      std::clamp(medianOf(tilts_rad) / kRayleigh, kMinTiltSigma_rad, bundle.tilt_sigma_rad);
+      std::clamp(quantile(tilts_rad, 0.5) / kRayleigh, kMinTiltSigma_rad, bundle.tilt_sigma_rad);
   noise.has_slipped.push_back(false);
   for (size_t i = 0; i < errors_m.size(); ++i) {
     noise.has_slipped.push_back(errors_m[i] > kSlipSigmas * noise.sigma_m ||

@@ -11,6 +11,7 @@
 
 #include "board_refinement.h"
 #include "edge_width.h"
+#include "vcharge_core/quantile.h"
 #include "vcharge_core/text_format.h"
 
 namespace vcharge {
@@ -230,13 +231,8 @@ class ViewFitter {
 
 }  // namespace
 
-double median(std::vector<double> values) {
-  if (values.empty()) {
-    return 0.0;
-  }
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+double median(const std::vector<double>& values) {
+  return values.empty() ? 0.0 : quantile(values, 0.5);
 }
 
 double rmsError(const CalibrationBoard& board, const BoardView& view, const PlacedBoard& placed,

@@ -22,7 +22,7 @@ struct ViewFit {
 double rmsError(const CalibrationBoard& board, const BoardView& view, const PlacedBoard& placed,
                 const CameraModel& model);
 
-double median(std::vector<double> values);
+double median(const std::vector<double>& values);
 
 /// Fits a camera to views, alternately finding the corners anew in the board's plane, leaving out what does
 /// not belong, and deciding whether boards bend. Noisy views weigh less. `images` has the views' images by

@@ -1,11 +1,12 @@
 #pragma once
 
-#include <algorithm>
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "vcharge_camera_driver/drive_check.h"
+#include "vcharge_core/quantile.h"
 #include "vcharge_core/text_format.h"
 
 namespace vcharge::internal {
@@ -30,16 +31,14 @@ class CheckFindings {
   std::vector<CheckFinding> findings_;
 };
 
+constexpr double kDegree = 3.14159265358979323846 / 180.0;
+
 inline std::string percentText(double share) {
   return toText(100.0 * share, share < 0.01 ? 2 : 1) + " %";
 }
 
-/// The entry at the given share of the sorted values; `values` must not be empty.
-inline double quantile(std::vector<double> values, double share) {
-  const auto index = static_cast<size_t>(share * static_cast<double>(values.size() - 1) + 0.5);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(index);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+inline double shareOf(int64_t part, int64_t whole) {
+  return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
 }  // namespace vcharge::internal

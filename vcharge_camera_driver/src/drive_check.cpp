@@ -1,5 +1,6 @@
 #include "vcharge_camera_driver/drive_check.h"
 
+#include <algorithm>
 #include <map>
 
 #include "check_findings.h"

@@ -1,5 +1,7 @@
 #include "image_check.h"
 
+#include <algorithm>
+
 #include <opencv2/imgproc.hpp>
 
 #include "vcharge_features/feature_extractor.h"
@@ -45,10 +47,6 @@ cv::Mat shrinkMask(const cv::Mat& mask) {
   cv::Mat result;
   cv::threshold(shrink(mask), result, 254, 255, cv::THRESH_BINARY);
   return result;
-}
-
-double share(int64_t part, int64_t whole) {
-  return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 
 }  // namespace
@@ -114,7 +112,7 @@ void ImageCheck::judge(CheckFindings* findings) const {
   if (num_wrong_size_ == num_images_) {
     return;
   }
-  findings->atMost(name_ + ": frozen", share(num_repeated_, num_images_), kManyRepeated, kTooManyRepeated,
+  findings->atMost(name_ + ": frozen", shareOf(num_repeated_, num_images_), kManyRepeated, kTooManyRepeated,
                    std::to_string(num_repeated_) + " of " + std::to_string(num_images_) +
                        " images are the one before to the last pixel",
                    "the camera or its cable hangs?");
@@ -162,7 +160,7 @@ void ImageCheck::judgeMask(CheckFindings* findings) const {
   cv::Mat inside;
   cv::erode(valid_, inside, cv::Mat::ones(7, 7, CV_8U), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT,
             cv::Scalar(0));
-  const double in_use = share(cv::countNonZero(stays & inside), cv::countNonZero(inside));
+  const double in_use = shareOf(cv::countNonZero(stays & inside), cv::countNonZero(inside));
   const std::string subject = name_ + ": mask";
   const std::string figure =
       percentText(in_use) + " of the image shows edges that stay while the vehicle moves";

@@ -1,5 +1,7 @@
 #include "image_motion.h"
 
+#include <algorithm>
+
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 

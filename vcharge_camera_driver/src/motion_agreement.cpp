@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -6,7 +7,6 @@
 namespace vcharge::internal {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 /// Ways in the image of a vehicle that stands and of one that moves.
 constexpr double kStill_px = 0.4;
 constexpr double kMoves_px = 1.5;

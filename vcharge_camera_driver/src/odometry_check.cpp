@@ -1,11 +1,11 @@
 #include "odometry_check.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace vcharge::internal {
 namespace {
 
-constexpr double kDegree = 3.14159265358979323846 / 180.0;
 constexpr double kManyUncovered = 0.01;
 constexpr double kTooManyUncovered = 0.2;
 /// Faster than a car in a car park, and than any car.

@@ -1,5 +1,6 @@
 #include "stamp_check.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 
@@ -16,10 +17,6 @@ constexpr double kManyDisordered = 0.0;
 constexpr double kTooManyDisordered = 0.3;
 constexpr double kManyIncomplete = 0.01;
 constexpr double kTooManyIncomplete = 0.7;
-
-double shareOf(int64_t part, size_t whole) {
-  return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
-}
 
 /// Median distance, in seconds, from each stamp to the nearest of `others` (sorted, not empty).
 double medianSkew(const std::vector<Timestamp>& stamps, const std::vector<Timestamp>& others) {
@@ -69,8 +66,9 @@ double TopicTimes::period_s() const {
 
 void TopicTimes::judgeOrder(const std::string& subject, CheckFindings* findings) const {
   const int64_t num_bad = num_backwards_ + num_repeated_ + num_unstamped_;
-  findings->atMost(subject + ": stamp order", shareOf(num_bad, stamps_.size() + num_unstamped_),
-                   kManyDisordered, kTooManyDisordered,
+  findings->atMost(subject + ": stamp order",
+                   shareOf(num_bad, static_cast<int64_t>(stamps_.size()) + num_unstamped_), kManyDisordered,
+                   kTooManyDisordered,
                    std::to_string(num_backwards_) + " stamps go back, " + std::to_string(num_repeated_) +
                        " repeat, " + std::to_string(num_unstamped_) + " are missing",
                    "two publishers on one topic, or a clock that was set?");
@@ -104,7 +102,7 @@ void TopicTimes::judgeRate(const std::string& subject, double max_gap_s, CheckFi
     longest = std::max(longest, gap);
     num_lost += std::max<int64_t>(0, std::llround(gap / period) - 1);
   }
-  const double lost = shareOf(num_lost, sorted.size() + static_cast<size_t>(num_lost));
+  const double lost = shareOf(num_lost, static_cast<int64_t>(sorted.size()) + num_lost);
   const std::string figure = toText(1.0 / period, 2) + " Hz, " + std::to_string(num_lost) + " of " +
                              std::to_string(sorted.size() + num_lost) + " lost, longest gap " +
                              toText(longest, 2) + " s";
@@ -154,8 +152,8 @@ void judgeSync(const std::vector<std::vector<Timestamp>>& stamps_by_camera, doub
     skew = std::max(skew, medianSkew(*cameras.front(), *stamps));
   }
   const std::string figure = "all " + std::to_string(cameras.size()) + " cameras at " +
-                             percentText(1.0 - shareOf(num_incomplete, static_cast<size_t>(num_instants))) +
-                             " of " + std::to_string(num_instants) + " instants";
+                             percentText(1.0 - shareOf(num_incomplete, num_instants)) + " of " +
+                             std::to_string(num_instants) + " instants";
   if (skew > 0.0) {
     findings->add("sync", CheckGrade::kFail,
                   figure + ", usual stamps " + toText(1e3 * skew, 2) + " ms apart" +
@@ -163,8 +161,8 @@ void judgeSync(const std::vector<std::vector<Timestamp>>& stamps_by_camera, doub
                       ": images of one trigger pulse need one stamp");
     return;
   }
-  findings->atMost("sync", shareOf(num_incomplete, static_cast<size_t>(num_instants)), kManyIncomplete,
-                   kTooManyIncomplete, figure, "a camera that loses images, or stamps that differ");
+  findings->atMost("sync", shareOf(num_incomplete, num_instants), kManyIncomplete, kTooManyIncomplete, figure,
+                   "a camera that loses images, or stamps that differ");
 }
 
 }  // namespace vcharge::internal

@@ -9,12 +9,10 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include "half_resolution.h"
 #include "plane_sweep_test_support.h"
 #include "tile_scorer.h"
-#include "vcharge_core/content_hash.h"
 
 namespace vcharge {
 namespace {
@@ -232,15 +230,7 @@ TEST(CoarsePassTest, GivesTheSameBytesOnAnyNumberOfThreads) {
   PlaneSweepOptions options;
   options.coarse_pass = true;
   const PlaneSweep sweep(kCamera, allValid(), options, s.ground);
-  std::vector<std::string> hashes;
-  for (const size_t threads : {1u, 2u, 5u}) {
-    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    ContentHasher hasher;
-    addToHash(sweep.sweep(s.reference, s.neighbours), &hasher);
-    hashes.push_back(hasher.hex());
-  }
-  EXPECT_EQ(hashes[0], hashes[1]);
-  EXPECT_EQ(hashes[0], hashes[2]);
+  testing::expectTheSameOnAnyNumberOfThreads(sweep, s);
 }
 
 TEST(CoarsePassTest, KeepsWhatTheFullSweepFinds) {

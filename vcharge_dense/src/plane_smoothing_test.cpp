@@ -6,11 +6,9 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <tbb/global_control.h>
 
 #include "plane_sweep_test_support.h"
 #include "sweep_level.h"
-#include "vcharge_core/content_hash.h"
 
 namespace vcharge {
 namespace {
@@ -142,15 +140,7 @@ TEST(PlaneSmoothingTest, GivesTheSameBytesOnAnyNumberOfThreads) {
   PlaneSweepOptions options = smoothed(0.03, 0.1);
   options.coarse_pass = true;
   const PlaneSweep sweep(kCamera, allValid(), options, s.ground);
-  std::vector<std::string> hashes;
-  for (const size_t threads : {1u, 2u, 5u}) {
-    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    ContentHasher hasher;
-    addToHash(sweep.sweep(s.reference, s.neighbours), &hasher);
-    hashes.push_back(hasher.hex());
-  }
-  EXPECT_EQ(hashes[0], hashes[1]);
-  EXPECT_EQ(hashes[0], hashes[2]);
+  testing::expectTheSameOnAnyNumberOfThreads(sweep, s);
 }
 
 }  // namespace

@@ -2,13 +2,16 @@
 
 #include <cmath>
 #include <random>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
+#include <tbb/global_control.h>
 #include <opencv2/core.hpp>
 
 #include "analytic_scene.h"
+#include "vcharge_core/content_hash.h"
 #include "vcharge_core/mei_camera.h"
 #include "vcharge_core/rigid_transform.h"
 #include "vcharge_dense/plane_sweep.h"
@@ -121,5 +124,17 @@ inline AnalyticScene lotScene(uint32_t seed) {
 
 inline const RigidTransform kLeft = cameraPose({0.0, 1.0, 0.9}, 1.5, 0.6);
 inline const RigidTransform kFront = cameraPose({3.6, 0.0, 0.7}, 0.0, 0.2);
+
+inline void expectTheSameOnAnyNumberOfThreads(const PlaneSweep& sweep, const Sequence& sequence) {
+  std::vector<std::string> hashes;
+  for (const size_t threads : {1u, 2u, 5u}) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    ContentHasher hasher;
+    addToHash(sweep.sweep(sequence.reference, sequence.neighbours), &hasher);
+    hashes.push_back(hasher.hex());
+  }
+  EXPECT_EQ(hashes[0], hashes[1]);
+  EXPECT_EQ(hashes[0], hashes[2]);
+}
 
 }  // namespace vcharge::testing

@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 
 #include "landmark_view.h"
+#include "vcharge_core/quantile.h"
 #include "vcharge_features/descriptor_matching.h"
 
 namespace vcharge {
@@ -40,18 +41,7 @@ double medianUnrelatedDistance(const SparseMap& map) {
       distances.push_back(cv::norm(descriptors.row(first), descriptors.row(second), norm));
     }
   }
-  if (distances.empty()) {
-    return 0.0;
-  }
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return distances.empty() ? 0.0 : quantile(distances, 0.5);
 }
 
 }  // namespace
@@ -120,7 +110,8 @@ LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
       positions.push_back(keypoint.position_px);
     }
     // How far a landmark in the middle of them may be from where it is expected.
-    const double angle_rad = options_.radius_sigmas * (sigma_rad + sigma_m / median(expected.ranges_m));
+    const double angle_rad =
+        options_.radius_sigmas * (sigma_rad + sigma_m / quantile(expected.ranges_m, 0.5));
     const double radius_px =
         std::max(kLeastRadius_px, rig_->cameras[camera].image_size_px.width / kReferenceWidth_px *
                                       std::clamp(kReferencePixelsPerRadian * angle_rad,
