@@ -81,48 +81,4 @@ std::vector<MotionPair> estimateCameraMotions(const MappingData& data, int32_t c
   return motions;
 }
 
-TimeOffset estimateTimeOffset(const MappingState& state,
-                              const std::vector<std::vector<MotionPair>>& motions_of_camera,
-                              const std::vector<Eigen::Vector3d>& up_in_camera) {
-  // The odometer's yaw rate at each keyframe, from the frames around it.
-  const std::vector<Keyframe>& keyframes = state.data.keyframes;
-  const auto odom_from_vehicle = [&](const FramePose& frame) {
-    return keyframes[frame.keyframe].odom_from_vehicle * frame.keyframe_from_vehicle;
-  };
-  std::vector<double> rate_rad_per_s(keyframes.size(), 0.0);
-  for (size_t i = 1; i + 1 < state.frames.size(); ++i) {
-    const FramePose& frame = state.frames[i];
-    if (frame.stamp == keyframes[frame.keyframe].stamp) {
-      const RigidTransform motion =
-          odom_from_vehicle(state.frames[i - 1]).inverse() * odom_from_vehicle(state.frames[i + 1]);
-      rate_rad_per_s[frame.keyframe] =
-          yawOfRotation(motion.rotation()) / toSeconds(state.frames[i + 1].stamp - state.frames[i - 1].stamp);
-    }
-  }
-  // Odometry that is late lags behind the camera's turn by offset times the change of the rate.
-  TimeOffset result;
-  constexpr int kIterations = 10;
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
-    double information = 0.0, right_side = 0.0;
-    for (size_t camera = 0; camera < motions_of_camera.size(); ++camera) {
-      for (const MotionPair& motion : motions_of_camera[camera]) {
-        const double change = rate_rad_per_s[motion.keyframe + 1] - rate_rad_per_s[motion.keyframe];
-        const double error_rad = vectorFromRotation(motion.camera_rotation).dot(up_in_camera[camera]) -
-                                 yawOfRotation(motion.vehicle.rotation());
-        const double sigma_rad = std::hypot(motion.rotation_sigma_rad, 0.001);
-        const double sigmas = (error_rad - result.offset_s * change) / sigma_rad;
-        const double weight = 1.0 / (1.0 + sigmas * sigmas / 4.0) / (sigma_rad * sigma_rad);
-        information += weight * change * change;
-        right_side += weight * change * error_rad;
-      }
-    }
-    if (!(information > 0.0)) {
-      return result;
-    }
-    result.offset_s = right_side / information;
-    result.sigma_s = 1.0 / std::sqrt(information);
-  }
-  return result;
-}
-
 }  // namespace vcharge

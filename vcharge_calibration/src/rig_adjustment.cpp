@@ -9,6 +9,15 @@
 #include "vcharge_core/quantile.h"
 
 namespace vcharge {
+
+void RigAdjustmentOptions::validate() const {
+  requireField(max_ground_distance_m > 0.0, "max_ground_distance_m", "must be positive",
+               max_ground_distance_m);
+  requireField(ground_sigma_m > 0.0, "ground_sigma_m", "must be positive", ground_sigma_m);
+  requireField(segment_m > 0.0, "segment_m", "must be positive", segment_m);
+  validateInner("bundle", bundle);
+}
+
 namespace {
 
 /// How much less certain the odometer is where wheels slipped.
@@ -42,9 +51,22 @@ std::vector<double> balanceTurns(const MappingData& data) {
   return weights;
 }
 
+/// In a finished map no keyframe is held: the first pose of the problem becomes the map's frame, which
+/// nothing refers to.
+void freeAllKeyframes(BundleProblem* problem) {
+  problem->map_from_vehicle.insert(problem->map_from_vehicle.begin(), RigidTransform());
+  for (BundleObservation& observation : problem->observations) {
+    ++observation.pose;
+  }
+  for (BundleMotion& motion : problem->motions) {
+    ++motion.pose;
+  }
+}
+
 /// The problem of mapping, with the ground's observations put to their points.
-BundleProblem makeRigProblem(const RigCalibratorOptions& options, const OdometryNoise& odometry,
+BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPriors& priors,
                              const MappingData& data) {
+  const OdometryNoise& odometry = priors.odometry;
   BundleAdjustmentOptions bundle = options.bundle;
   if (odometry.sigma_m > 0.0) {
     bundle.odometry_sigma_m = odometry.sigma_m;
@@ -88,12 +110,23 @@ BundleProblem makeRigProblem(const RigCalibratorOptions& options, const Odometry
     ++point;
   }
   problem.first_observation[point] = problem.observations.size();
+  if (priors.height_sigma_m > 0.0) {
+    problem.common_information(2, 2) = 1.0 / (priors.height_sigma_m * priors.height_sigma_m);
+  }
+  if (priors.hasMap()) {
+    for (size_t t = 0; t < data.tracks.size(); ++t) {
+      if (data.tracks[t].position_m) {
+        problem.point_information.push_back(priors.landmark_information[t]);
+      }
+    }
+    freeAllKeyframes(&problem);
+  }
   return problem;
 }
 
 }  // namespace
 
-OdometryNoise estimateOdometryNoise(const RigCalibratorOptions& options, const MappingData& data) {
+OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const MappingData& data) {
   OdometryNoise noise;
   std::vector<double> errors_m, errors_rad, heights_m, tilts_rad;
   for (size_t i = 1; i < data.keyframes.size(); ++i) {
@@ -131,12 +164,19 @@ OdometryNoise estimateOdometryNoise(const RigCalibratorOptions& options, const M
   return noise;
 }
 
-BundleAdjustmentSummary adjustRig(const RigCalibratorOptions& options, const OdometryNoise& odometry,
+BundleAdjustmentSummary adjustRig(const RigAdjustmentOptions& options, const RigPriors& priors,
                                   MappingData* data) {
   check(!data->keyframes.empty(), "adjustRig: expected keyframes");
-  BundleProblem problem = makeRigProblem(options, odometry, *data);
+  check(!priors.hasMap() || priors.landmark_information.size() == data->tracks.size(),
+        "adjustRig: expected landmark_information of every track");
+  BundleProblem problem = makeRigProblem(options, priors, *data);
+  const std::vector<Eigen::Vector3d> before = problem.points_in_map;
   const BundleSolution solved =
       solveBundle(options.bundle.max_iterations, options.bundle.cost_tolerance, &problem);
+  if (priors.hasMap()) {
+    problem.map_from_vehicle.erase(problem.map_from_vehicle.begin());
+    problem.points_in_map = before;
+  }
   writeBack(problem, data);
   auto rig = std::make_shared<CameraRig>(*data->rig);
   for (size_t i = 0; i < rig->cameras.size(); ++i) {
@@ -149,13 +189,14 @@ BundleAdjustmentSummary adjustRig(const RigCalibratorOptions& options, const Odo
   return summary;
 }
 
-RigUncertainty rigUncertainty(const RigCalibratorOptions& options, const OdometryNoise& odometry,
+RigUncertainty rigUncertainty(const RigAdjustmentOptions& options, const RigPriors& priors,
                               const MappingData& data) {
   RigUncertainty result;
-  const BundleCovariance tail = bundleCovariance(makeRigProblem(options, odometry, data));
+  const BundleCovariance tail = bundleCovariance(makeRigProblem(options, priors, data));
   if (!tail.is_valid) {
     return result;
   }
+  const Eigen::Index first_keyframe = priors.hasMap() ? 1 : 0;
   const Eigen::Index size = tail.covariance.rows() - 2;
   result.is_valid = true;
   result.covariance = tail.covariance.bottomRightCorner(size, size);
@@ -173,7 +214,7 @@ RigUncertainty rigUncertainty(const RigCalibratorOptions& options, const Odometr
       add();
       begin_m = data.keyframes[i].travelled_m;
     }
-    segment += tail.influence.col(static_cast<Eigen::Index>(i)).tail(size);
+    segment += tail.influence.col(static_cast<Eigen::Index>(i) + first_keyframe).tail(size);
   }
   add();
   if (num_segments > 1) {

@@ -11,6 +11,7 @@
 #include <tbb/global_control.h>
 
 #include "ground.h"
+#include "vcharge_calibration/rig_calibrator_options.h"
 
 namespace vcharge {
 namespace {
@@ -89,8 +90,8 @@ MappingData makeDrive(uint32_t seed, double noise_px) {
   return data;
 }
 
-RigCalibratorOptions makeOptions() {
-  RigCalibratorOptions options;
+RigAdjustmentOptions makeOptions() {
+  RigAdjustmentOptions options = RigCalibratorOptions::defaultAdjustment();
   options.bundle.odometry_sigma_m = 0.002;
   options.bundle.odometry_distance_sigma = 0.0;
   options.bundle.odometry_sigma_rad = 0.0005;
@@ -126,11 +127,11 @@ TEST(RigAdjustmentTest, FindsTheCamerasOfAKnownDrive) {
   MappingData data = makeDrive(1, kNoise_px);
   const std::shared_ptr<const CameraRig> truth = data.rig;
   disturbRig(&data);
-  const RigCalibratorOptions options = makeOptions();
-  RigCalibratorOptions lenient = options;
+  const RigAdjustmentOptions options = makeOptions();
+  RigAdjustmentOptions lenient = options;
   lenient.bundle.outlier_sigmas = INFINITY;
-  adjustRig(lenient, OdometryNoise(), &data);
-  adjustRig(options, OdometryNoise(), &data);
+  adjustRig(lenient, RigPriors(), &data);
+  adjustRig(options, RigPriors(), &data);
   for (size_t i = 0; i < 2; ++i) {
     const Vector6d error = errorOf(*data.rig, *truth, i);
     EXPECT_LT(error.head<3>().cwiseAbs().maxCoeff(), 0.01) << error.transpose();
@@ -145,9 +146,9 @@ TEST(RigAdjustmentTest, KnowsItsUncertainty) {
   for (uint32_t seed = 1; seed <= kDrives; ++seed) {
     MappingData data = makeDrive(seed, kNoise_px);
     const std::shared_ptr<const CameraRig> truth = data.rig;
-    const RigCalibratorOptions options = makeOptions();
-    adjustRig(options, OdometryNoise(), &data);
-    const RigUncertainty uncertainty = rigUncertainty(options, OdometryNoise(), data);
+    const RigAdjustmentOptions options = makeOptions();
+    adjustRig(options, RigPriors(), &data);
+    const RigUncertainty uncertainty = rigUncertainty(options, RigPriors(), data);
     ASSERT_TRUE(uncertainty.is_valid);
     for (Eigen::Index i = 0; i < 2; ++i) {
       const Vector6d error = errorOf(*data.rig, *truth, static_cast<size_t>(i));
@@ -173,11 +174,11 @@ TEST(RigAdjustmentTest, GivesTheSameBitsOnOneThread) {
   MappingData parallel = makeDrive(2, kNoise_px);
   disturbRig(&parallel);
   MappingData serial = parallel;
-  RigCalibratorOptions options = makeOptions();
+  RigAdjustmentOptions options = makeOptions();
   options.bundle.max_iterations = 3;
-  adjustRig(options, OdometryNoise(), &parallel);
+  adjustRig(options, RigPriors(), &parallel);
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
-  adjustRig(options, OdometryNoise(), &serial);
+  adjustRig(options, RigPriors(), &serial);
   for (size_t i = 0; i < 2; ++i) {
     EXPECT_EQ(parallel.rig->cameras[i].vehicle_from_camera->translation(),
               serial.rig->cameras[i].vehicle_from_camera->translation());
@@ -186,7 +187,7 @@ TEST(RigAdjustmentTest, GivesTheSameBitsOnOneThread) {
 
 TEST(OdometryNoiseTest, IsThatOfTheDrive) {
   const MappingData data = makeDrive(3, kNoise_px);
-  RigCalibratorOptions loose;
+  RigAdjustmentOptions loose;
   const OdometryNoise noise = estimateOdometryNoise(loose, data);
   EXPECT_NEAR(noise.sigma_m, 0.002, 0.0006);
   EXPECT_NEAR(noise.sigma_rad, 0.0005, 0.00015);
@@ -199,7 +200,7 @@ TEST(OdometryNoiseTest, FindsTheWheelThatSlipped) {
     pose = data.keyframes[59].odom_from_vehicle * RigidTransform::planar(0.1, 0.0, 0.0) *
            data.keyframes[59].odom_from_vehicle.inverse() * pose;
   }
-  const OdometryNoise noise = estimateOdometryNoise(RigCalibratorOptions(), data);
+  const OdometryNoise noise = estimateOdometryNoise(RigAdjustmentOptions(), data);
   EXPECT_TRUE(noise.has_slipped[60]);
   EXPECT_EQ(std::count(noise.has_slipped.begin(), noise.has_slipped.end(), true), 1);
   EXPECT_NEAR(noise.sigma_m, 0.002, 0.0006);

@@ -5,7 +5,9 @@
 
 #include "camera_motion.h"
 #include "ground.h"
+#include "ground_normal.h"
 #include "rig_adjustment.h"
+#include "rig_initialization.h"
 #include "rig_judgement.h"
 #include "vcharge_core/stage_timer.h"
 #include "vcharge_core/text_format.h"
@@ -16,37 +18,31 @@ namespace {
 /// The first guess of the ground is wrong by so many times more.
 constexpr double kFirstGround = 4.0;
 
-/// Of the keyframes, at which a camera must see how it moves.
-constexpr double kMinSeenShare = 0.2;
-
-/// Thrown where nothing can be calibrated, with the verdict's reason.
-struct NotCalibrated {
-  std::vector<std::string> remarks;
-};
-
 class RigBackEnd {
  public:
   RigBackEnd(const RigCalibratorOptions& options, const StageCallback& progress, MappingState* state)
-      : options_(options), progress_(progress), state_(state), data_(&state->data) {}
+      : options_(options), progress_(progress), state_(state), data_(&state->data), series_(*state) {}
 
   RigCalibration run() {
     try {
-      describeDrive();
+      describeDrive(*state_, &result_);
+      countTracked();
       stage("camera motions", 1, [&] { initialize(); });
       stage("first adjustment", 2, [&] { adjustFirst(); });
       stage("loops", 3, [&] { closeAllLoops(); });
       stage("landmark search", 4, [&] {
         searchLandmarks(options_.search, data_);
-        adjust(options_);
+        adjust(options_.adjustment);
       });
-      odometry_ = estimateOdometryNoise(options_, *data_);
+      correctTimeOffset(series_, state_, &result_);
+      priors_.odometry = estimateOdometryNoise(options_.adjustment, *data_);
       stage("last adjustment", 5, [&] {
         searchLandmarks(options_.search, data_);
-        adjust(options_);
+        adjust(options_.adjustment);
         checkLoops(options_.loops, *data_, &state_->report.loop_edges);
         adjustFinely();
       });
-      stage("judgement", 6, [&] { judgeRig(options_, odometry_, *state_, &result_); });
+      stage("judgement", 6, [&] { judgeRig(options_.adjustment, priors_, *state_, &result_); });
     } catch (const NotCalibrated& failure) {
       result_.verdict = Verdict::kFail;
       result_.remarks = failure.remarks;
@@ -66,73 +62,32 @@ class RigBackEnd {
     progress_({name, number, kNumStages, 1.0});
   }
 
-  void describeDrive() {
-    for (const RigCamera& camera : data_->rig->cameras) {
-      result_.cameras.emplace_back();
-      result_.cameras.back().name = camera.name;
-    }
+  void countTracked() {
     for (const Track& track : data_->tracks) {
       if (track.observations.size() >= 3) {
         result_.cameras[track.observations.front().camera].num_tracked +=
             static_cast<int64_t>(track.observations.size());
       }
     }
-    const std::vector<Keyframe>& keyframes = data_->keyframes;
-    result_.num_keyframes = static_cast<int>(keyframes.size());
-    for (size_t i = 1; i < keyframes.size(); ++i) {
-      const RigidTransform motion =
-          keyframes[i - 1].odom_from_vehicle.inverse() * keyframes[i].odom_from_vehicle;
-      const double turn_rad = yawOfRotation(motion.rotation());
-      (turn_rad > 0.0 ? result_.left_turn_rad : result_.right_turn_rad) += std::abs(turn_rad);
-    }
-    if (!keyframes.empty()) {
-      result_.distance_m = keyframes.back().travelled_m;
-    }
-    const SparseMapperReport& report = state_->report;
-    if (report.num_frames == 0) {
-      throw NotCalibrated{{"no images came with the drive"}};
-    }
-    if (2 * report.num_frames_without_odometry > report.num_frames) {
-      throw NotCalibrated{
-          {"most images have no odometry at their time: are the clocks of cameras and odometer the "
-           "same?"}};
-    }
-    if (result_.distance_m < 5.0) {
-      throw NotCalibrated{{"the vehicle stood: by the odometer it moved " + toText(result_.distance_m, 1) +
-                           " m. Drive 100 m or more, with turns to both sides"}};
-    }
   }
 
   void initialize() {
-    auto rig = std::make_shared<CameraRig>(*data_->rig);
-    std::vector<std::string> failures;
     std::vector<std::vector<MotionPair>> motions;
-    std::vector<Eigen::Vector3d> up_in_camera;
-    for (size_t i = 0; i < rig->cameras.size(); ++i) {
-      HandEye& initial = result_.cameras[i].initial;
+    for (size_t i = 0; i < data_->rig->cameras.size(); ++i) {
       motions.push_back(estimateCameraMotions(*data_, static_cast<int32_t>(i), options_.camera_motion));
-      initial = solvePlanarHandEye(motions.back(), options_.hand_eye);
-      if (kMinSeenShare * static_cast<double>(data_->keyframes.size()) >
-          static_cast<double>(motions.back().size())) {
-        initial.status = HandEyeStatus::kTooFewMotions;
-      }
-      up_in_camera.emplace_back(initial.vehicle_from_camera.rotation().conjugate() *
-                                Eigen::Vector3d::UnitZ());
-      if (initial.status != HandEyeStatus::kOk) {
-        failures.push_back(describeFailure(rig->cameras[i].name, initial, result_));
-      }
-      rig->cameras[i].vehicle_from_camera = initial.vehicle_from_camera;
     }
-    if (!failures.empty()) {
-      throw NotCalibrated{failures};
+    std::shared_ptr<const CameraRig> rig;
+    try {
+      rig = guessRig(series_, options_.hand_eye, motions, state_, &result_);
+    } catch (const NotCalibrated&) {
+      tellWhatIsKnown(motions);
+      throw;
     }
-    const std::string wrong_sign = findWrongSign(*rig);
-    if (!wrong_sign.empty()) {
-      throw NotCalibrated{{wrong_sign}};
-    }
-    const TimeOffset offset = estimateTimeOffset(*state_, motions, up_in_camera);
-    if (std::abs(offset.offset_s) > 3.0 * offset.sigma_s) {
-      result_.time_offset_s = offset.offset_s;
+    for (size_t i = 1; i < data_->keyframes.size(); ++i) {
+      const Keyframe& previous = data_->keyframes[i - 1];
+      Keyframe& keyframe = data_->keyframes[i];
+      keyframe.map_from_vehicle =
+          previous.map_from_vehicle * (previous.odom_from_vehicle.inverse() * keyframe.odom_from_vehicle);
     }
     data_->rig = rig;
     // With rays from height zero each camera's points lie below it as far as the ground is.
@@ -160,26 +115,38 @@ class RigBackEnd {
     data_->rig = raised;
   }
 
+  /// Without a turn the ground still tells which way is up.
+  void tellWhatIsKnown(const std::vector<std::vector<MotionPair>>& motions) {
+    for (size_t i = 0; i < motions.size(); ++i) {
+      if (result_.cameras[i].initial.status == HandEyeStatus::kNoTurn) {
+        result_.cameras[i].up_in_camera =
+            findUpwards(*data_, static_cast<int32_t>(i), motions[i], options_.triangulation)
+                .value_or(Eigen::Vector3d::Zero());
+      }
+    }
+  }
+
   TriangulationOptions firstTriangulation() const {
     TriangulationOptions lenient = options_.triangulation;
     lenient.max_error_rad = options_.first_max_error_rad;
     return lenient;
   }
 
-  void adjust(const RigCalibratorOptions& options) {
-    const BundleAdjustmentSummary summary = adjustRig(options, odometry_, data_);
+  void adjust(const RigAdjustmentOptions& options) {
+    const BundleAdjustmentSummary summary = adjustRig(options, priors_, data_);
     state_->report.num_observations = summary.num_observations;
     state_->report.rms_px = summary.rms_px;
   }
 
   void adjustFirst() {
-    RigCalibratorOptions lenient = options_;
+    RigAdjustmentOptions lenient = options_.adjustment;
     lenient.bundle.outlier_sigmas = INFINITY;
     lenient.max_ground_distance_m *= kFirstGround;
     triangulateTracks(firstTriangulation(), data_);
     adjust(lenient);
-    lenient.bundle.outlier_sigmas = options_.bundle.outlier_sigmas;
+    lenient.bundle.outlier_sigmas = options_.adjustment.bundle.outlier_sigmas;
     triangulateTracks(options_.triangulation, data_);
+    correctTimeOffset(series_, state_, &result_);
     adjust(lenient);
   }
 
@@ -190,12 +157,12 @@ class RigBackEnd {
     });
     closeLoops(options_.loops, &state_->report.loop_edges, data_);
     triangulateTracks(options_.triangulation, data_);
-    adjust(options_);
+    adjust(options_.adjustment);
   }
 
   /// Extrinsics are a weak direction of the cost: the last iterations go further than a map needs.
   void adjustFinely() {
-    RigCalibratorOptions fine = options_;
+    RigAdjustmentOptions fine = options_.adjustment;
     fine.bundle.cost_tolerance *= 0.01;
     adjust(fine);
   }
@@ -204,7 +171,8 @@ class RigBackEnd {
   const StageCallback& progress_;
   MappingState* const state_;
   MappingData* const data_;
-  OdometryNoise odometry_;
+  const OdometrySeries series_;
+  RigPriors priors_;
   RigCalibration result_;
 };
 

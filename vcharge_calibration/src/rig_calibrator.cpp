@@ -31,9 +31,9 @@ RobustOptions RigCalibratorOptions::defaultCameraMotion() {
   return options;
 }
 
-BundleAdjustmentOptions RigCalibratorOptions::defaultBundle() {
-  BundleAdjustmentOptions options;
-  options.odometer_scale_sigma = 1e-7;
+RigAdjustmentOptions RigCalibratorOptions::defaultAdjustment() {
+  RigAdjustmentOptions options;
+  options.bundle.odometer_scale_sigma = 1e-7;
   return options;
 }
 
@@ -44,10 +44,6 @@ void RigCalibratorOptions::validate() const {
   requireField(keyframe_turn_rad > 0.0, "keyframe_turn_rad", "must be positive", keyframe_turn_rad);
   requireField(max_speed_m_per_s > 0.0, "max_speed_m_per_s", "must be positive", max_speed_m_per_s);
   requireField(first_max_error_rad > 0.0, "first_max_error_rad", "must be positive", first_max_error_rad);
-  requireField(max_ground_distance_m > 0.0, "max_ground_distance_m", "must be positive",
-               max_ground_distance_m);
-  requireField(ground_sigma_m > 0.0, "ground_sigma_m", "must be positive", ground_sigma_m);
-  requireField(segment_m > 0.0, "segment_m", "must be positive", segment_m);
   validateInner("features", features);
   validateInner("tracker", tracker);
   validateInner("camera_motion", camera_motion);
@@ -55,7 +51,7 @@ void RigCalibratorOptions::validate() const {
   validateInner("triangulation", triangulation);
   validateInner("loops", loops);
   validateInner("search", search);
-  validateInner("bundle", bundle);
+  validateInner("adjustment", adjustment);
 }
 
 RigCalibrator::RigCalibrator(const std::shared_ptr<const CameraRig>& rig, const RigCalibratorOptions& options)

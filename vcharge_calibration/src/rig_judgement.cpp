@@ -98,9 +98,8 @@ void countObservations(const MappingData& data, RigCalibration* result) {
 }
 
 /// The rig from the odd or the even parts of the drive alone; all keyframes stay, joined by odometry.
-std::shared_ptr<const CameraRig> calibrateHalf(const RigCalibratorOptions& options,
-                                               const OdometryNoise& odometry, const MappingData& data,
-                                               bool odd) {
+std::shared_ptr<const CameraRig> calibrateHalf(const RigAdjustmentOptions& options, const RigPriors& priors,
+                                               const MappingData& data, bool odd) {
   MappingData half;
   half.rig = data.rig;
   half.odometry_distance_scale = data.odometry_distance_scale;
@@ -111,17 +110,24 @@ std::shared_ptr<const CameraRig> calibrateHalf(const RigCalibratorOptions& optio
     half.keyframes.back().map_from_vehicle = keyframe.map_from_vehicle;
     half.keyframes.back().travelled_m = keyframe.travelled_m;
   }
-  for (const Track& track : data.tracks) {
+  RigPriors half_priors;
+  half_priors.odometry = priors.odometry;
+  half_priors.height_sigma_m = priors.height_sigma_m;
+  for (size_t t = 0; t < data.tracks.size(); ++t) {
+    const Track& track = data.tracks[t];
     if (track.position_m) {
       const double travelled_m = data.keyframes[track.observations.front().keyframe].travelled_m;
       if ((static_cast<int64_t>(travelled_m / options.segment_m) % 2 == 1) == odd) {
         half.tracks.push_back(track);
+        if (!priors.landmark_information.empty()) {
+          half_priors.landmark_information.push_back(priors.landmark_information[t]);
+        }
       }
     }
   }
-  RigCalibratorOptions quick = options;
+  RigAdjustmentOptions quick = options;
   quick.bundle.max_iterations = kHalfIterations;
-  adjustRig(quick, odometry, &half);
+  adjustRig(quick, half_priors, &half);
   return half.rig;
 }
 
@@ -202,7 +208,7 @@ std::string findWrongSign(const CameraRig& rig) {
   return "";
 }
 
-void judgeRig(const RigCalibratorOptions& options, const OdometryNoise& odometry, const MappingState& state,
+void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, const MappingState& state,
               RigCalibration* result) {
   const MappingData& data = state.data;
   result->rms_px = state.report.rms_px;
@@ -214,10 +220,13 @@ void judgeRig(const RigCalibratorOptions& options, const OdometryNoise& odometry
   const auto num_ground = findGroundPoints(data, options.max_ground_distance_m).size();
   result->height_source = "from " + std::to_string(num_ground) +
                           " landmarks on the ground near the path, on which base_link stands in the mean";
+  if (result->is_from_map) {
+    result->height_source += ", and from the ground on which the map's vehicle stood";
+  }
   auto rig = std::make_shared<CameraRig>(*data.rig);
-  const RigUncertainty uncertainty = rigUncertainty(options, odometry, data);
-  const auto odd = calibrateHalf(options, odometry, data, true);
-  const auto even = calibrateHalf(options, odometry, data, false);
+  const RigUncertainty uncertainty = rigUncertainty(options, priors, data);
+  const auto odd = calibrateHalf(options, priors, data, true);
+  const auto even = calibrateHalf(options, priors, data, false);
   for (size_t i = 0; i < rig->cameras.size(); ++i) {
     CameraCalibration& camera = result->cameras[i];
     camera.half_difference =

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "rig_adjustment.h"
+#include "vcharge_calibration/rig_adjustment_options.h"
 #include "vcharge_calibration/rig_calibration.h"
-#include "vcharge_calibration/rig_calibrator_options.h"
 #include "vcharge_mapping/mapping_state.h"
 
 namespace vcharge {
@@ -18,7 +18,7 @@ std::string describeFailure(const std::string& camera, const HandEye& initial, c
 std::string findWrongSign(const CameraRig& rig);
 
 /// Fills in covariances, statistics and verdict of an adjusted rig.
-void judgeRig(const RigCalibratorOptions& options, const OdometryNoise& odometry, const MappingState& state,
+void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, const MappingState& state,
               RigCalibration* result);
 
 /// Verdict and remarks from the figures of a calibration.

@@ -78,6 +78,8 @@ TEST(RigVerdictTest, AsksForTheManoeuvreThatIsMissing) {
 TEST(RigVerdictTest, TellsLateStampsAndWrongLenses) {
   Verdict verdict = Verdict::kPass;
   expectRemark(judge([](RigCalibration* r) { r->time_offset_s = 0.1; }, &verdict), "100 ms late");
+  EXPECT_EQ(verdict, Verdict::kWarn) << "it is corrected for";
+  judge([](RigCalibration* r) { r->time_offset_s = -0.4; }, &verdict);
   EXPECT_EQ(verdict, Verdict::kFail);
   expectRemark(judge([](RigCalibration* r) { r->cameras[0].num_observations = 5000; }, &verdict),
                "camera 'front': only 50 % of its points fit");

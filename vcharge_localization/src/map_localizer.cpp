@@ -95,7 +95,15 @@ void MapLocalizerOptions::validate() const {
 
 MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
                            const MapLocalizerOptions& options)
-    : map_(std::move(map)), rig_(std::move(rig)), options_(options), robust_(options.robust) {
+    : MapLocalizer(std::move(map), std::move(rig), options, nullptr) {}
+
+MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
+                           const MapLocalizerOptions& options, std::shared_ptr<const PlaceVotes> places)
+    : map_(std::move(map)),
+      rig_(std::move(rig)),
+      options_(options),
+      robust_(options.robust),
+      places_(std::move(places)) {
   options_.validate();
   check(map_ != nullptr && rig_ != nullptr, "MapLocalizer: expected a map and a rig");
   if (!rig_->hasExtrinsics()) {
@@ -112,17 +120,24 @@ MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr
     robust_.max_error_rad = std::max(robust_.max_error_rad, options_.min_error_px * radiansPerPixel(camera));
   }
   matcher_ = std::make_unique<LandmarkMatcher>(map_, rig_, options_);
+  if (places_ != nullptr) {
+    return;
+  }
   const size_t num_cameras = map_->rig().cameras.size();
   std::vector<int32_t> images;
   for (const MapObservation& observation : map_->observations()) {
     images.push_back(observation.keyframe * static_cast<int32_t>(num_cameras) + observation.camera);
   }
   places_ =
-      std::make_unique<PlaceVotes>(descriptors, std::move(images), static_cast<int>(map_->keyframes().size()),
+      std::make_shared<PlaceVotes>(descriptors, std::move(images), static_cast<int>(map_->keyframes().size()),
                                    static_cast<int>(num_cameras), options_.places);
 }
 
 MapLocalizer::~MapLocalizer() = default;
+
+std::unique_ptr<MapLocalizer> MapLocalizer::forRig(std::shared_ptr<const CameraRig> rig) const {
+  return std::unique_ptr<MapLocalizer>(new MapLocalizer(map_, std::move(rig), options_, places_));
+}
 
 RigFeatures MapLocalizer::extract(const std::vector<Image>& images) const {
   check(images.size() == rig_->cameras.size(), "MapLocalizer::extract: expected an image per camera");
@@ -214,7 +229,10 @@ PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMa
       map_from_keyframe.rotation();
   RobustOptions coarse = robust_;
   coarse.max_error_rad = std::max(coarse.max_error_rad, options_.place_max_error_rad);
-  PoseEstimate pose = estimateUprightPose(matches.points, upright_from_vehicle, coarse);
+  PoseEstimate pose;
+  if (options_.stands_upright) {
+    pose = estimateUprightPose(matches.points, upright_from_vehicle, coarse);
+  }
   if (pose.status != EstimationStatus::kOk) {
     pose = estimateAbsolutePose(matches.points, coarse);
   }

@@ -117,7 +117,7 @@ void BundleAdjustmentOptions::validate() const {
   requireField(loss_sigmas > 0.0, "loss_sigmas", "must be positive", loss_sigmas);
   requireField(outlier_sigmas > 0.0, "outlier_sigmas", "must be positive", outlier_sigmas);
   requireField(min_parallax_rad >= 0.0, "min_parallax_rad", "must not be negative", min_parallax_rad);
-  requireField(min_observations >= 2, "min_observations", "must be 2 or more", min_observations);
+  requireField(min_observations >= 1, "min_observations", "must be 1 or more", min_observations);
   requireField(max_range_m > 0.0, "max_range_m", "must be positive", max_range_m);
   requireField(odometer_scale_sigma > 0.0, "odometer_scale_sigma", "must be positive", odometer_scale_sigma);
   requireField(odometer_turn_sigma > 0.0, "odometer_turn_sigma", "must be positive", odometer_turn_sigma);

@@ -134,9 +134,9 @@ void BundleEquations::linearizePoint(size_t point) {
 }
 
 void BundleEquations::eliminatePoint(size_t point, double damping) {
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   PointTerms& terms = points_[point];
-  terms.gradient.setZero();
+  Eigen::Matrix3d information = errors_.priorInformation(point);
+  terms.gradient = information * (state_.points[point] - problem_.points_in_map[point]);
   for (size_t s = first_slot_of_point_[point]; s < first_slot_of_point_[point + 1]; ++s) {
     information += slots_[s].information;
     terms.gradient += slots_[s].gradient;

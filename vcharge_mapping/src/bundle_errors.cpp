@@ -124,7 +124,8 @@ Eigen::Matrix<double, 6, 1> BundleErrors::commonMotion(const BundleState& state)
 
 double BundleErrors::cost(const BundleState& state) const {
   double cost = sumOverPoints(state.points.size(), [&](size_t point) {
-    double of_point = 0.0;
+    const Eigen::Vector3d moved_m = state.points[point] - problem_.points_in_map[point];
+    double of_point = 0.5 * moved_m.dot(priorInformation(point) * moved_m);
     for (size_t i = problem_.first_observation[point]; i < problem_.first_observation[point + 1]; ++i) {
       Eigen::Vector2d error;
       ofObservation(state, i, state.points[point], &error, nullptr);

@@ -47,6 +47,12 @@ class BundleErrors {
   double robustWeight(double square) const { return 1.0 / (1.0 + square / squared_loss_scale_); }
   double robustCost(double square) const;
 
+  /// Of what is known of a point beforehand.
+  Eigen::Matrix3d priorInformation(size_t point) const {
+    return problem_.point_information.empty() ? Eigen::Matrix3d::Zero().eval()
+                                              : problem_.point_information[point];
+  }
+
   MotionError ofMotion(const BundleState& state, size_t motion) const;
   Eigen::Vector2d ofOdometer(const BundleState& state) const;
   /// How far the cameras moved as one rigid body, [dt, dphi]; zero where they are known.

@@ -22,6 +22,8 @@ void checkProblem(const BundleProblem& problem) {
   check(problem.first_observation.size() == problem.points_in_map.size() + 1 &&
             problem.first_observation.back() == problem.observations.size(),
         "BundleProblem: expected the observations grouped by point");
+  check(problem.point_information.empty() || problem.point_information.size() == problem.points_in_map.size(),
+        "BundleProblem: expected point_information of every point, or none");
   check(problem.vehicle_from_camera.empty() ||
             problem.vehicle_from_camera.size() == problem.rig->cameras.size(),
         "BundleProblem: expected vehicle_from_camera of every camera, or none");

@@ -64,6 +64,18 @@ struct Entry {
   }
 };
 
+std::map<std::string, std::string> readProvenance(const Entry& entry) {
+  std::map<std::string, std::string> provenance;
+  if (!entry.node.IsMap()) {
+    entry.fail("a map of texts");
+  }
+  for (const auto& item : entry.node) {
+    const auto key = item.first.as<std::string>();
+    provenance[key] = entry.required(key).text();
+  }
+  return provenance;
+}
+
 RigidTransform readExtrinsics(const Entry& entry, std::optional<Eigen::Matrix<double, 6, 6>>* covariance) {
   checkKeys(entry.node, entry.source, entry.key, {"translation_m", "rotation_xyzw", "covariance"});
   const std::vector<double> t = entry.required("translation_m").numbers(3);
@@ -237,8 +249,11 @@ CameraRig parseCameraRig(const std::string& text, const std::string& source, con
   if (!root.IsMap()) {
     throw InputError(source + ": expected a rig with the keys vehicle_frame and cameras");
   }
-  checkKeys(root, source, "", {"vehicle_frame", "cameras"});
+  checkKeys(root, source, "", {"vehicle_frame", "provenance", "cameras"});
   CameraRig rig;
+  if (root["provenance"].IsDefined()) {
+    rig.provenance = readProvenance(top.required("provenance"));
+  }
   if (root["vehicle_frame"].IsDefined()) {
     rig.vehicle_frame = top.required("vehicle_frame").text();
   }
@@ -264,7 +279,14 @@ CameraRig parseCameraRig(const std::string& text, const std::string& source, con
 }
 
 std::string formatCameraRig(const CameraRig& rig) {
-  std::string text = "vehicle_frame: " + rig.vehicle_frame + "\ncameras:\n";
+  std::string text = "vehicle_frame: " + rig.vehicle_frame + "\n";
+  if (!rig.provenance.empty()) {
+    YAML::Emitter provenance;
+    provenance << YAML::BeginMap << YAML::Key << "provenance" << YAML::Value << rig.provenance
+               << YAML::EndMap;
+    text += std::string(provenance.c_str()) + "\n";
+  }
+  text += "cameras:\n";
   for (const RigCamera& camera : rig.cameras) {
     text += "  " + camera.name + ":\n";
     text += "    frame_id: " + camera.frame_id + "\n";

@@ -77,8 +77,10 @@ TEST(CameraRigTest, SurvivesWritingAndReadingExactly) {
   rig.cameras[0].covariance = covariance;
   rig.cameras[0].mask = cv::Mat(800, 1280, CV_8UC1, cv::Scalar(255));
   rig.cameras[0].mask.at<uint8_t>(3, 4) = 0;
+  rig.provenance = {{"bag", "a: \"b\" # c.bag"}, {"options", "{a: 1,\n b: [2]}"}, {"verdict", "yes"}};
   writeCameraRig(rig, folder + "/rig.yaml");
   const CameraRig read = readCameraRig(folder + "/rig.yaml");
+  EXPECT_EQ(read.provenance, rig.provenance);
   EXPECT_EQ(read.cameras[0].model.parameters(), rig.cameras[0].model.parameters());
   EXPECT_EQ(read.cameras[0].vehicle_from_camera->translation(),
             rig.cameras[0].vehicle_from_camera->translation());
@@ -94,6 +96,10 @@ TEST(CameraRigTest, SurvivesWritingAndReadingExactly) {
 TEST(CameraRigTest, EveryErrorNamesFileKeyAndExpectation) {
   EXPECT_THAT(errorOf(replaced(kRig, "  front:", "  front left:")),
               AllOf(HasSubstr("rig.yaml"), HasSubstr("cameras.front left"), HasSubstr("underscores")));
+  EXPECT_THAT(errorOf(replaced(kRig, "cameras:", "provenance: [a]\ncameras:")),
+              AllOf(HasSubstr("rig.yaml"), HasSubstr("provenance"), HasSubstr("a map of texts")));
+  EXPECT_THAT(errorOf(replaced(kRig, "cameras:", "provenance: {a: [b]}\ncameras:")),
+              HasSubstr("provenance.a"));
   EXPECT_THAT(errorOf("- a\n"), AllOf(HasSubstr("rig.yaml"), HasSubstr("cameras")));
   EXPECT_THAT(errorOf("cameras: {a: [1\n"), AllOf(HasSubstr("rig.yaml"), HasSubstr("not valid YAML")));
   EXPECT_THAT(errorOf(replaced(kRig, "field_of_view_rad", "fov")),

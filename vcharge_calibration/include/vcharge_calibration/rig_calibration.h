@@ -17,6 +17,8 @@ namespace vcharge {
 struct CameraCalibration {
   std::string name;
   HandEye initial;  ///< from the camera's own motions alone
+  /// Upwards in the camera's frame by the ground that it saw, where there was no turn; zero: not known.
+  Eigen::Vector3d up_in_camera = Eigen::Vector3d::Zero();
   /// Of vehicle_from_camera, [dt, dphi] in the vehicle's frame; beside the common scale, which is the
   /// odometer's.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
@@ -46,8 +48,10 @@ struct RigCalibration {
   int num_loop_edges = 0;  ///< accepted
   double rms_px = 0.0;
   double odometer_turn_scale = 1.0;
-  double time_offset_s = 0.0;  ///< by which the odometer's stamps are late, as the turns tell
+  double time_offset_s = 0.0;        ///< by which the odometer's stamps are late, which was corrected for
+  double time_offset_sigma_s = 0.0;  ///< 0: not known
   std::string height_source;
+  bool is_from_map = false;  ///< the landmarks were those of a finished map, which is the measure of lengths
 };
 
 }  // namespace vcharge

@@ -1,10 +1,10 @@
 #pragma once
 
 #include "vcharge_calibration/hand_eye.h"
+#include "vcharge_calibration/rig_adjustment_options.h"
 #include "vcharge_core/options.h"
 #include "vcharge_features/feature_extractor.h"
 #include "vcharge_geometry/robust_options.h"
-#include "vcharge_mapping/bundle_adjustment.h"
 #include "vcharge_mapping/frame_tracker.h"
 #include "vcharge_mapping/landmark_search.h"
 #include "vcharge_mapping/loop_closure.h"
@@ -18,13 +18,8 @@ struct RigCalibratorOptions {
   double frame_turn_rad = 0.01;    ///< and turned less
   double keyframe_distance_m = 0.5;
   double keyframe_turn_rad = 0.1;
-  double max_speed_m_per_s = 25.0;      ///< faster odometry is a reset of the counters
-  double first_max_error_rad = 0.03;    ///< of rays to their point by the first guess of rig and poses
-  double max_ground_distance_m = 0.05;  ///< of ground points from where the ground was found before
-  /// Of a ground point from the plane on which the vehicle stands: more than the ground is rough, since what
-  /// is wrong with neighbouring points goes together.
-  double ground_sigma_m = 0.2;
-  double segment_m = 10.0;  ///< parts of the drive whose errors are independent of each other
+  double max_speed_m_per_s = 25.0;    ///< faster odometry is a reset of the counters
+  double first_max_error_rad = 0.03;  ///< of rays to their point by the first guess of rig and poses
   FeatureExtractorOptions features;
   FrameTrackerOptions tracker;
   RobustOptions camera_motion = defaultCameraMotion();
@@ -32,11 +27,11 @@ struct RigCalibratorOptions {
   TriangulationOptions triangulation;
   LoopClosureOptions loops;
   LandmarkSearchOptions search;
-  BundleAdjustmentOptions bundle = defaultBundle();
+  RigAdjustmentOptions adjustment = defaultAdjustment();
 
   static RobustOptions defaultCameraMotion();
   /// The odometer's distance is the measure of all lengths here.
-  static BundleAdjustmentOptions defaultBundle();
+  static RigAdjustmentOptions defaultAdjustment();
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
@@ -46,9 +41,6 @@ struct RigCalibratorOptions {
     visit("keyframe_turn_rad", keyframe_turn_rad);
     visit("max_speed_m_per_s", max_speed_m_per_s);
     visit("first_max_error_rad", first_max_error_rad);
-    visit("max_ground_distance_m", max_ground_distance_m);
-    visit("ground_sigma_m", ground_sigma_m);
-    visit("segment_m", segment_m);
     visit("features", features);
     visit("tracker", tracker);
     visit("camera_motion", camera_motion);
@@ -56,7 +48,7 @@ struct RigCalibratorOptions {
     visit("triangulation", triangulation);
     visit("loops", loops);
     visit("search", search);
-    visit("bundle", bundle);
+    visit("adjustment", adjustment);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
 };

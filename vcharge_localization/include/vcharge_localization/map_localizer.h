@@ -39,6 +39,9 @@ struct MapLocalizerOptions {
   double max_relative_distance = 0.55;
   MatchOptions matching = closeMatches();
   // Place recognition.
+  /// The vehicle stands on the ground as the map's did, which makes a recognized place easier to believe.
+  /// False for a camera that is looked for without knowing how it is mounted.
+  bool stands_upright = true;
   PlaceVotesOptions places;
   int max_places = 12;                 ///< candidates
   double place_spacing_m = 2.5;        ///< candidates nearer to a better one are left out
@@ -74,6 +77,7 @@ struct MapLocalizerOptions {
     visit("radius_sigmas", radius_sigmas);
     visit("max_relative_distance", max_relative_distance);
     visit("matching", matching);
+    visit("stands_upright", stands_upright);
     visit("places", places);
     visit("max_places", max_places);
     visit("place_spacing_m", place_spacing_m);
@@ -138,6 +142,9 @@ class MapLocalizer {
                const MapLocalizerOptions& options = MapLocalizerOptions());
   ~MapLocalizer();
 
+  /// The same for another rig, without preparing the map anew. Errors as those of the constructor.
+  std::unique_ptr<MapLocalizer> forRig(std::shared_ptr<const CameraRig> rig) const;
+
   /// Features as the map has them; images in the rig's order, empty ones where a camera sent none.
   RigFeatures extract(const std::vector<Image>& images) const;
 
@@ -155,6 +162,9 @@ class MapLocalizer {
   const SparseMap& map() const { return *map_; }
 
  private:
+  MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
+               const MapLocalizerOptions& options, std::shared_ptr<const PlaceVotes> places);
+
   /// A fix without a pose, with the counts of the matches.
   PoseFix fixWithoutPose(const LandmarkMatches& matches) const;
   PoseFix estimate(const LandmarkMatches& matches, int min_inliers, double min_inlier_ratio) const;
@@ -170,7 +180,7 @@ class MapLocalizer {
   std::unique_ptr<FeatureExtractor> extractor_;
   std::vector<cv::Mat> masks_;  // by camera
   std::unique_ptr<LandmarkMatcher> matcher_;
-  std::unique_ptr<PlaceVotes> places_;
+  std::shared_ptr<const PlaceVotes> places_;
 };
 
 }  // namespace vcharge

@@ -15,7 +15,7 @@ struct BundleAdjustmentOptions {
   double loss_sigmas = 2.0;            ///< scale of the Cauchy loss
   double outlier_sigmas = 4.0;         ///< observations with larger errors are removed
   double min_parallax_rad = 0.015;     ///< landmarks whose remaining rays are more parallel are removed
-  int min_observations = 3;            ///< landmarks with fewer are removed
+  int min_observations = 3;            ///< landmarks with fewer are removed; 1 for those of a finished map
   double max_range_m = 80.0;           ///< and those that are further from every camera
   double odometer_scale_sigma = 0.03;  ///< of true over counted distance, before the drive
   double odometer_turn_sigma = 0.05;   ///< of true over counted turn

@@ -42,6 +42,9 @@ struct BundleProblem {
   std::vector<BundleMotion> motions;
   Eigen::Vector2d odometer_sigmas = Eigen::Vector2d::Ones();  ///< of the factors, before the drive; around 1
   double loss_sigmas = 2.0;                                   ///< scale of the Cauchy loss of observations
+  /// How well each point is known beforehand to be where it begins, 1/m^2 along the map's axes. Empty: not at
+  /// all.
+  std::vector<Eigen::Matrix3d> point_information;
 
   // For calibration. Empty: the cameras are where the rig says.
   std::vector<RigidTransform> vehicle_from_camera;  ///< unknown too, one per camera of the rig

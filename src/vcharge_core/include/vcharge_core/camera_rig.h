@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <numeric>
 #include <optional>
 #include <string>
@@ -36,6 +37,8 @@ class CameraRig {
  public:
   std::string vehicle_frame = "base_link";
   std::vector<RigCamera> cameras;
+  /// How the rig came to be, by keys like `program`: for people, nothing depends on it.
+  std::map<std::string, std::string> provenance;
 
   /// Index of a camera by name, or -1.
   int findCamera(const std::string& name) const;

@@ -1,0 +1,27 @@
+#pragma once
+
+#include "vcharge_core/options.h"
+#include "vcharge_mapping/bundle_adjustment.h"
+
+namespace vcharge {
+
+/// Options of the joint adjustment of cameras, poses and landmarks.
+struct RigAdjustmentOptions {
+  double max_ground_distance_m = 0.05;  ///< of ground points from where the ground was found before
+  /// Of a ground point from the plane on which the vehicle stands: more than the ground is rough, since what
+  /// is wrong with neighbouring points goes together.
+  double ground_sigma_m = 0.2;
+  double segment_m = 10.0;  ///< parts of the drive whose errors are independent of each other
+  BundleAdjustmentOptions bundle;
+
+  template <class Visitor>
+  void visitFields(Visitor&& visit) {
+    visit("max_ground_distance_m", max_ground_distance_m);
+    visit("ground_sigma_m", ground_sigma_m);
+    visit("segment_m", segment_m);
+    visit("bundle", bundle);
+  }
+  void validate() const;  ///< throws std::invalid_argument naming the field
+};
+
+}  // namespace vcharge

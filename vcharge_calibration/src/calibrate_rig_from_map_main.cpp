@@ -1,0 +1,62 @@
+#include <cstdio>
+#include <memory>
+#include <sstream>
+#include <string>
+
+#include "rig_tool.h"
+#include "vcharge_calibration/map_rig_calibrator.h"
+#include "vcharge_core/error.h"
+#include "vcharge_core/options.h"
+#include "vcharge_core/sparse_map_file.h"
+
+namespace {
+
+using namespace vcharge;
+
+void calibrate(const RigToolArguments& arguments, const std::string& map_file,
+               const MapRigCalibratorOptions& options, const std::string& option_text) {
+  const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
+  const std::shared_ptr<const SparseMap> map = readSparseMap(map_file);
+  MapRigCalibrator calibrator(map, *rig, options);
+  followDrive(arguments, rig, &calibrator);
+  const RigCalibration result =
+      finishAndPrint(arguments, calibrator.state(),
+                     [&](const StageCallback& progress) { return calibrator.finish(progress); });
+  auto provenance = provenanceOf(arguments, "calibrate_rig_from_map", option_text, result);
+  provenance["map"] = map_file;
+  provenance["map_hash"] = map->contentHash();
+  writeRigAndTrajectory(arguments, result, calibrator.state(), provenance);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Calibrates the places of a rig's cameras on the vehicle from a drive in a finished map: images, "
+      "/odom, "
+      "the cameras' intrinsics, and the map, of whatever car. No guess, overlap, board or loop; some turns "
+      "to "
+      "both sides. The map is the measure of all lengths. Prints every degree of freedom with its standard "
+      "deviation and a verdict: PASS, WARN with what is missing, or FAIL, which writes no file.");
+  RigToolArguments arguments;
+  addRigToolArguments(&app, &arguments);
+  std::string map_file;
+  app.add_option("--map", map_file, "map of build_map or calibrate_rig (.vmap)")->check(requireNotEmpty);
+  return runTool(&app, argc, argv, [&] {
+    MapRigCalibratorOptions options;
+    if (!arguments.options.empty()) {
+      readFieldsFromFile(arguments.options, &options);
+    }
+    std::ostringstream option_text;
+    option_text << writeFields(options);
+    if (arguments.show_options) {
+      std::printf("%s\n", option_text.str().c_str());
+      return;
+    }
+    requireRigToolArguments(arguments);
+    if (map_file.empty()) {
+      throw InputError("--map is required");
+    }
+    calibrate(arguments, map_file, options, option_text.str());
+  });
+}

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <vector>
+
+#include "vcharge_calibration/map_rig_calibrator.h"
+
+namespace vcharge {
+
+/// Calibrates by a drive whose cameras were found in a map, each alone; `state` has the rig, the poses and
+/// the landmarks that were seen in the end.
+RigCalibration runMapRigBackEnd(const MapRigCalibratorOptions& options, const SparseMap& map,
+                                const MapLocalizer& localizer, const std::vector<MapKeyframeView>& views,
+                                const StageCallback& progress, MappingState* state);
+
+}  // namespace vcharge

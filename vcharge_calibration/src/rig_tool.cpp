@@ -1,0 +1,94 @@
+#include "rig_tool.h"
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+
+#include "vcharge_calibration/rig_calibration_text.h"
+#include "vcharge_calibration/rig_report.h"
+#include "vcharge_core/content_hash.h"
+#include "vcharge_core/error.h"
+#include "vcharge_core/file_io.h"
+#include "vcharge_core/progress_bar.h"
+#include "vcharge_ros/bag_drive_source.h"
+
+namespace vcharge {
+
+void addRigToolArguments(CLI::App* app, RigToolArguments* arguments) {
+  app->add_option("--bag", arguments->bag, "drive with images and /odom");
+  app->add_option("--rig", arguments->rig, "rig.yaml with intrinsics; extrinsics that it has are not used");
+  app->add_option("--output", arguments->output, "rig.yaml to write")->check(requireNotEmpty);
+  app->add_option("--trajectory", arguments->trajectory, "poses of all frames to write (.tum)")
+      ->check(requireNotEmpty);
+  app->add_option("--report", arguments->report, "folder for rig_report.html")->check(requireNotEmpty);
+  app->add_option("--options", arguments->options, "YAML with options of the calibration");
+  app->add_flag("--show-options", arguments->show_options, "prints all options as YAML");
+}
+
+void requireRigToolArguments(const RigToolArguments& arguments) {
+  if (arguments.bag.empty() || arguments.rig.empty() || arguments.output.empty()) {
+    throw InputError("--bag, --rig and --output are required");
+  }
+}
+
+void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const CameraRig>& rig,
+                 DriveConsumer* consumer) {
+  ProgressBar bar("following the drive");
+  BagDriveSourceOptions options;
+  options.max_image_gap_s = INFINITY;  // a camera that pauses is borne, and told of
+  BagDriveSource source(arguments.bag, rig, options);
+  source.run(consumer, [&](double fraction) { bar.update(fraction); });
+}
+
+RigCalibration finishAndPrint(const RigToolArguments& arguments, const MappingState& state,
+                              const std::function<RigCalibration(const StageCallback&)>& finish) {
+  RigCalibration result;
+  {
+    ProgressBar bar("calibrating");
+    result = finish([&](const StageProgress& progress) {
+      bar.update((progress.number - 1 + progress.fraction) / progress.num_stages);
+    });
+  }
+  std::printf("%s", describeCalibration(result).c_str());
+  for (const auto& [stage, seconds] : state.report.stage_s) {
+    std::printf("%s %.1f s; ", stage.c_str(), seconds);
+  }
+  std::printf("\n%s\n", toString(result.verdict).c_str());
+  for (const std::string& remark : result.remarks) {
+    std::printf("  %s\n", remark.c_str());
+  }
+  if (!arguments.report.empty()) {
+    createFolder(arguments.report);
+    writeTextFileAtomically(
+        (std::filesystem::path(arguments.report) / "rig_report.html").string(),
+        makeRigReport("Rig by " + std::filesystem::path(arguments.bag).filename().string(), result, state));
+  }
+  if (result.verdict == Verdict::kFail) {
+    throw InputError(arguments.bag + ": FAIL: " + result.remarks.front());
+  }
+  return result;
+}
+
+std::map<std::string, std::string> provenanceOf(const RigToolArguments& arguments, const std::string& program,
+                                                const std::string& options, const RigCalibration& result) {
+  return {{"bag", arguments.bag}, {"bag_hash", fileHash(arguments.bag)}, {"rig", arguments.rig},
+          {"options", options},   {"verdict", toString(result.verdict)}, {"program", program + " 0.1.0"}};
+}
+
+void writeRigAndTrajectory(const RigToolArguments& arguments, const RigCalibration& result,
+                           const MappingState& state, const std::map<std::string, std::string>& provenance) {
+  if (!arguments.trajectory.empty()) {
+    writeTrajectory(trajectoryOf(state), arguments.trajectory);
+  }
+  const std::filesystem::path folder = std::filesystem::path(arguments.output).parent_path();
+  for (const RigCamera& camera : result.rig->cameras) {
+    if (!camera.mask_file.empty()) {
+      createFolder((folder / camera.mask_file).parent_path().string());
+    }
+  }
+  CameraRig rig = *result.rig;
+  rig.provenance = provenance;
+  writeCameraRig(rig, arguments.output);
+}
+
+}  // namespace vcharge

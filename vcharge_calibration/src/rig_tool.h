@@ -1,0 +1,45 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "vcharge_calibration/rig_calibration.h"
+#include "vcharge_core/camera_rig.h"
+#include "vcharge_core/command_line.h"
+#include "vcharge_core/drive_source.h"
+#include "vcharge_mapping/map_back_end.h"
+#include "vcharge_mapping/mapping_state.h"
+
+namespace vcharge {
+
+// What the tools that calibrate a rig from a drive have in common.
+
+struct RigToolArguments {
+  std::string bag, rig, options, output, trajectory, report;
+  bool show_options = false;
+};
+
+void addRigToolArguments(CLI::App* app, RigToolArguments* arguments);
+
+/// InputError that names them where files are missing that the tool cannot do without.
+void requireRigToolArguments(const RigToolArguments& arguments);
+
+/// Feeds the bag with a progress bar.
+void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const CameraRig>& rig,
+                 DriveConsumer* consumer);
+
+/// Runs the calibration with a progress bar, prints what came out, and writes the report. InputError with the
+/// verdict's first reason where it is kFail.
+RigCalibration finishAndPrint(const RigToolArguments& arguments, const MappingState& state,
+                              const std::function<RigCalibration(const StageCallback&)>& finish);
+
+/// What the rig and the map say of where they come from.
+std::map<std::string, std::string> provenanceOf(const RigToolArguments& arguments, const std::string& program,
+                                                const std::string& options, const RigCalibration& result);
+
+/// Writes trajectory and rig, the rig last.
+void writeRigAndTrajectory(const RigToolArguments& arguments, const RigCalibration& result,
+                           const MappingState& state, const std::map<std::string, std::string>& provenance);
+
+}  // namespace vcharge
