@@ -14,6 +14,7 @@ import numpy as np
 import rosbag
 import yaml
 
+from evaluate_localization import rotations
 from evaluate_mapping import ROOT, TOOLS, mark, run, say, simulate
 
 MAX_TURN_DEG, MAX_SHIFT_M = 0.05, 0.01
@@ -21,6 +22,7 @@ DEGREES = 180.0 / math.pi
 AXES = ("forwards", "sideways", "height", "roll", "pitch", "yaw")
 SCENARIO = ROOT / "config" / "scenarios" / "calibration_figure_eight.yaml"
 RIGHT_WHEELS = ("--set", "odometer.scale_error=0.0005", "--set", "odometer.left_right_error=0.0002")
+OPTIONS = {"calibrate_rig": "calibration.yaml", "calibrate_rig_from_map": "calibration_in_map.yaml"}
 PARTS = ("rigs", "seeds", "wheels", "map", "faults", "real")
 
 
@@ -65,7 +67,7 @@ def calibrate(folder, rig, *words, tool="calibrate_rig", name="rig"):
     say(f"{folder}: {tool} {name}")
     log = folder / f"{name}.log"
     timed = run([TOOLS / "vcharge_calibration" / tool, "--bag", folder / "drive.bag", "--rig", rig, "--output", output,
-                 *words], log, may_fail=True)
+                 "--options", ROOT / "config" / OPTIONS[tool], *words], log, may_fail=True)
     (folder / f"{name}.txt").write_text(timed["output"])
     lines = timed["output"].splitlines()
     verdict = next((i for i, line in enumerate(lines) if line in ("PASS", "WARN", "FAIL")), None)
@@ -275,12 +277,15 @@ def evaluate_real(args):
     """The published images: too short and straight for a rig, but the direction of travel can be compared."""
     folder = args.work / "real"
     folder.mkdir(parents=True, exist_ok=True)
+    if "VCHARGE_DATA" not in os.environ:
+        say("real images: skipped, VCHARGE_DATA is not set")
+        return
     data = pathlib.Path(os.environ["VCHARGE_DATA"]) / "vcharge_left"
     given = folder / "given.yaml"
     run([TOOLS / "vcharge_ros" / "import_vcharge_images", "--folder", data, "--output", folder / "drive.bag", "--rig",
          given], folder / "import.log")
     result = calibrate(folder, given)
-    rotation = yaml.safe_load(given.read_text())["cameras"]
+    cameras = yaml.safe_load(given.read_text())["cameras"]
     rows = [("verdict", "FAIL, no turn", f"{result['verdict']}: {'; '.join(result['remarks'][:1])}",
              mark(result["verdict"] == "FAIL" and "no turn" in " ".join(result["remarks"])))]
     for name, axis, pattern, limit in (("direction of travel", 0, r"straight ahead is \((\S+), (\S+), (\S+)\)", 0.5),
@@ -289,12 +294,10 @@ def evaluate_real(args):
         if not found:
             rows.append((f"{name} against the calibration given there", f"<= {limit} degrees", "not told", mark(False)))
             continue
-        x, y, z, w = next(iter(rotation.values()))["vehicle_from_camera"]["rotation_xyzw"]
-        matrix = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                           [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                           [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+        # The vehicle's axis in the camera's frame.
+        turn = rotations(np.array([next(iter(cameras.values()))["vehicle_from_camera"]["rotation_xyzw"]]))[0]
         seen = np.array([float(value.rstrip(",")) for value in found.groups()])
-        angle = DEGREES * math.acos(min(1.0, float(seen @ matrix[axis])))
+        angle = DEGREES * math.atan2(float(np.linalg.norm(np.cross(seen, turn[axis]))), float(seen @ turn[axis]))
         rows.append((f"{name} against the calibration given there", f"<= {limit} degrees", f"{angle:.2f} degrees",
                      mark(angle <= limit)))
     table("Real images", JUDGED, rows)

@@ -11,7 +11,7 @@
 namespace vcharge {
 namespace {
 
-constexpr double kMaxRange_m = 8.0;  // of points from the camera that passes nearest
+constexpr double kMaxRange_m = 5.0;  // of points from the camera that passes nearest
 constexpr double kMinHeight_m = 0.15;
 constexpr double kMaxHeight_m = 4.0;
 constexpr double kThickness_m = 0.04;
@@ -106,17 +106,31 @@ Plane throughPoint(const Eigen::Vector3d& normal, const Eigen::Vector3d& point,
   return {up, up.dot(point)};
 }
 
-Plane fitPlane(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& above) {
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& point : points) {
-    mean += point / static_cast<double>(points.size());
+/// What a point's height is worth: its error grows with the square of the range.
+double weightOf(const CameraPath& path, const Eigen::Vector3d& point) {
+  double square_m2 = kMaxRange_m * kMaxRange_m;
+  for (const Eigen::Vector3d& place : path.places_m) {
+    square_m2 = std::min(square_m2, (place - point).squaredNorm());
   }
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  return 1.0 / (square_m2 * square_m2);
+}
+
+Plane fitPlane(const CameraPath& path, const std::vector<Eigen::Vector3d>& points) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  double sum = 0.0;
+  std::vector<double> weights;
   for (const Eigen::Vector3d& point : points) {
-    scatter += (point - mean) * (point - mean).transpose();
+    weights.push_back(weightOf(path, point));
+    mean += weights.back() * point;
+    sum += weights.back();
+  }
+  mean /= sum;
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (size_t i = 0; i < points.size(); ++i) {
+    scatter += weights[i] * (points[i] - mean) * (points[i] - mean).transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
-  return throughPoint(eigen.eigenvectors().col(0), mean, above);
+  return throughPoint(eigen.eigenvectors().col(0), mean, path.places_m.front());
 }
 
 }  // namespace
@@ -154,7 +168,7 @@ std::optional<Eigen::Vector3d> findUpwards(const MappingData& data, int32_t came
   }
   constexpr int kRefinements = 5;
   for (int i = 0; i < kRefinements; ++i) {
-    best = fitPlane(pointsIn(path, best), path.places_m.front());
+    best = fitPlane(path, pointsIn(path, best));
   }
   // The vehicle leans little: the mean over the way.
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();

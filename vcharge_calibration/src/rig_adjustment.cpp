@@ -15,6 +15,8 @@ void RigAdjustmentOptions::validate() const {
                max_ground_distance_m);
   requireField(ground_sigma_m > 0.0, "ground_sigma_m", "must be positive", ground_sigma_m);
   requireField(segment_m > 0.0, "segment_m", "must be positive", segment_m);
+  requireField(common_error_px >= 0.0, "common_error_px", "must not be negative", common_error_px);
+  requireField(common_range_m > 0.0, "common_range_m", "must be positive", common_range_m);
   validateInner("bundle", bundle);
 }
 

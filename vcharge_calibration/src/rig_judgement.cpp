@@ -9,6 +9,7 @@
 
 #include "ground.h"
 #include "rig_adjustment.h"
+#include "vcharge_core/pixel_angle.h"
 #include "vcharge_core/text_format.h"
 
 namespace vcharge {
@@ -137,6 +138,13 @@ Vector6d difference(const RigidTransform& a, const RigidTransform& b) {
   return result;
 }
 
+Vector6d commonVariances(const RigAdjustmentOptions& options, const RigCamera& camera) {
+  const double sigma_rad = options.common_error_px * radiansPerPixel(camera);
+  Vector6d sigmas = Vector6d::Constant(sigma_rad);
+  sigmas.head<3>() *= options.common_range_m;
+  return sigmas.cwiseAbs2();
+}
+
 /// What can be told least of a camera: the longest axis of its uncertainty, in words.
 std::string describeWeakest(const Matrix6d& covariance) {
   const char* const names[] = {"forwards", "sideways", "height", "roll", "pitch", "yaw"};
@@ -238,6 +246,7 @@ void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, cons
           uncertainty.jackknife.block<6, 6>(at, at).diagonal().cwiseQuotient(schur.diagonal());
       camera.inflation = ratio.cwiseMax(1.0).cwiseSqrt();
       camera.covariance = camera.inflation.asDiagonal() * schur * camera.inflation.asDiagonal();
+      camera.covariance.diagonal() += commonVariances(options, rig->cameras[i]);
       camera.weakest_direction = describeWeakest(camera.covariance);
       rig->cameras[i].covariance = camera.covariance;
     }

@@ -10,6 +10,7 @@
 
 #include "landmark_matcher.h"
 #include "vcharge_core/error.h"
+#include "vcharge_core/pixel_angle.h"
 #include "vcharge_geometry/pose_estimation.h"
 
 namespace vcharge {
@@ -29,17 +30,6 @@ FeatureExtractorOptions extractorOptionsOf(const SparseMap& map) {
     throw InputError(std::string("map: feature_options: expected YAML: ") + error.what());
   }
   return options;
-}
-
-/// How far apart two pixels in the middle of the image look.
-double radiansPerPixel(const RigCamera& camera) {
-  const Eigen::Vector2d middle(0.5 * camera.image_size_px.width, 0.5 * camera.image_size_px.height);
-  Eigen::Vector3d ray, next;
-  if (!camera.model.unproject(middle, &ray) ||
-      !camera.model.unproject(middle + Eigen::Vector2d::UnitX(), &next)) {
-    return 0.0;
-  }
-  return std::atan2(ray.cross(next).norm(), ray.dot(next));
 }
 
 }  // namespace
