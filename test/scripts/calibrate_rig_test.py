@@ -20,10 +20,10 @@ class CalibrateRigTest(unittest.TestCase):
     def tearDownClass(cls):
         cls.drive.remove()
 
-    def calibrate(self, bag, *extra):
+    def calibrate(self, bag, *extra, program="calibrate_rig"):
         """Expects a failure that leaves the old file as it is; returns what was printed and the line of the error."""
         output = self.drive.write_text("rig.yaml", "an older rig\n")
-        status, printed, errors = run([tool("vcharge_calibration", "calibrate_rig"), "--bag", bag, "--rig",
+        status, printed, errors = run([tool("vcharge_calibration", program), "--bag", bag, "--rig",
                                        self.drive.rig, "--output", output, *extra])
         self.assertEqual(status, 1, printed)
         self.assertEqual(len(errors), 1, errors)
@@ -74,6 +74,20 @@ class CalibrateRigTest(unittest.TestCase):
         status, _, errors = run([tool("vcharge_calibration", "calibrate_rig"), "--bag", self.drive.bag])
         self.assertNotEqual(status, 0)
         self.assertIn("--output", errors[0])
+
+    def test_a_map_of_unknown_features_is_refused(self):
+        map_file = self.drive.folder / "analytic.vmap"
+        status, printed, errors = run([tool("vcharge_mapping", "write_analytic_map"), "--output", map_file])
+        self.assertEqual(status, 0, printed + str(errors))
+        _, error = self.calibrate(self.drive.bag, "--map", map_file, program="calibrate_rig_from_map")
+        self.assertIn("feature_options", error)
+
+    def test_a_map_that_is_none_is_named(self):
+        map_file = self.drive.write_text("broken.vmap", "not a map")
+        _, error = self.calibrate(self.drive.bag, "--map", map_file, program="calibrate_rig_from_map")
+        self.assertIn("broken.vmap", error)
+        _, error = self.calibrate(self.drive.bag, program="calibrate_rig_from_map")
+        self.assertIn("--map", error)
 
     def test_a_rig_is_like_itself_and_unlike_one_that_was_moved(self):
         text = self.drive.rig.read_text()

@@ -103,6 +103,28 @@ TEST(BundleSolverTest, MovesUnknownCamerasAsCeresDoes) {
   }
 }
 
+TEST(BundleSolverTest, TakesPointsThatAreKnownBeforehandAsCeresDoes) {
+  BundleProblem ours = makeProblem();
+  Eigen::Matrix3d information;
+  information << 400.0, 50.0, -20.0, 50.0, 900.0, 30.0, -20.0, 30.0, 200.0;
+  ours.point_information.assign(ours.points_in_map.size(), information);
+  BundleProblem theirs = ours;
+  const BundleProblem before = ours;
+  solveBundle(3, 1e-9, &ours);
+  testing::solveWithCeres(3, 1e-9, &theirs);
+  EXPECT_GT(largestDifference_m(ours, before), 0.03);
+  EXPECT_LT(largestDifference_m(ours, theirs), 1e-8);
+  for (size_t i = 0; i < ours.points_in_map.size(); ++i) {
+    ASSERT_LT((ours.points_in_map[i] - theirs.points_in_map[i]).norm(), 1e-7) << i;
+  }
+  BundleProblem fixed = before;
+  fixed.point_information.assign(fixed.points_in_map.size(), 1e12 * Eigen::Matrix3d::Identity());
+  solveBundle(10, 1e-9, &fixed);
+  for (size_t i = 0; i < fixed.points_in_map.size(); ++i) {
+    ASSERT_LT((fixed.points_in_map[i] - before.points_in_map[i]).norm(), 1e-5) << i;
+  }
+}
+
 TEST(BundleSolverTest, PutsPointsOfTheGroundUnderTheVehicle) {
   // One point that nothing sees, but that is said to lie on the ground at a pose.
   BundleProblem problem = makeProblem();

@@ -3,6 +3,7 @@
 #include <memory>
 #include <vector>
 
+#include <Eigen/Cholesky>
 #include <ceres/ceres.h>
 #include <ceres/normal_prior.h>
 
@@ -45,6 +46,11 @@ void solveWithCeres(int max_iterations, double cost_tolerance, BundleProblem* bu
               .release(),
           loss, poses[observation.pose].data(), extrinsics[observation.camera].data(),
           bundle->points_in_map[point].data());
+    }
+    if (!bundle->point_information.empty()) {
+      const Eigen::Matrix3d root = bundle->point_information[point].llt().matrixU();
+      problem.AddResidualBlock(new ceres::NormalPrior(root, bundle->points_in_map[point]), nullptr,
+                               bundle->points_in_map[point].data());
     }
   }
   for (const BundleMotion& motion : bundle->motions) {
