@@ -98,17 +98,23 @@ class LaunchFilesTest(unittest.TestCase):
                 self.assertEqual(config.params["/camera_driver/rig"].value, "/rigs/rig.yaml", path.name)
                 self.assertEqual(config.params["/camera_driver/options/can_interface"].value, "can0", path.name)
                 continue
-            if "output" in required_arguments(path) and "rig" in required_arguments(path):  # maps a drive
+            if "output" in required_arguments(path) and "rig" in required_arguments(path):  # maps a drive, or calibrates
+                nodelet = "/calibration" if "automatic" in all_arguments(path) else "/mapping"
                 config = load(path, rig="/rigs/rig.yaml", output="/maps/lot.vmap", bag="/drives/drive.bag",
                               lossless_replay="true")
-                for name, value in (("/mapping/rig", "/rigs/rig.yaml"), ("/mapping/output", "/maps/lot.vmap"),
-                                    ("/mapping/lossless_replay", True), ("/use_sim_time", True)):
+                for name, value in ((f"{nodelet}/rig", "/rigs/rig.yaml"), (f"{nodelet}/output", "/maps/lot.vmap"),
+                                    (f"{nodelet}/lossless_replay", True), ("/use_sim_time", True)):
                     self.assertEqual(config.params[name].value, value, path.name)
                 player = next(node for node in config.nodes if node.package == "rosbag")
                 self.assertEqual(player.args.split()[-1], "/drives/drive.bag", path.name)
                 live = load(path, rig="/rigs/rig.yaml", output="/maps/lot.vmap")
                 self.assertFalse([node for node in live.nodes if node.package == "rosbag"], path.name)
                 self.assertNotIn("/use_sim_time", live.params)
+                if nodelet == "/calibration":
+                    itself = "/calibration/session/calibrates_itself"
+                    self.assertIs(live.params[itself].value, False)
+                    live = load(path, rig="/rigs/rig.yaml", output="/maps/lot.vmap", automatic="true")
+                    self.assertIs(live.params[itself].value, True)
                 continue
             if "camera" in required_arguments(path):  # listens to a camera, and replays nothing
                 config = load(path, camera="front", output="/rigs/cameras.yaml")
@@ -133,9 +139,12 @@ class LaunchFilesTest(unittest.TestCase):
                         self.assertTrue(pathlib.Path(word).exists(), f"{path.name}: {word}")
 
     def test_options_of_the_nodelets_are_those_of_the_yaml(self):
+        activities = {"mapping": ("mapping", "mapping"), "localization": ("localization", "localization"),
+                      "calibration": ("calibration", "calibrate_rig")}
         for options in sorted(CONFIG.glob("*.yaml")):
-            activity = options.stem if options.stem in ("mapping", "localization") else ""
-            nodelet, launch = (activity, activity) if activity else ("depth", "drive_replay")
+            if options.stem == "calibration_in_map":  # of a tool alone
+                continue
+            nodelet, launch = activities.get(options.stem, ("depth", "drive_replay"))
             config = load(LAUNCH / f"{launch}.launch", options=str(options))
             expected = yaml.safe_load(options.read_text())
             found = {}
@@ -161,7 +170,9 @@ class LaunchFilesTest(unittest.TestCase):
         self.assertEqual(sorted(CONFIG.rglob("*.yaml")), sorted(rigs + options + scenarios + drivers),
                          "a YAML that nobody reads")
         self.assertTrue(rigs and options)
-        readers = {"mapping": [tool("vcharge_mapping", "build_map")],
+        readers = {"calibration": [tool("vcharge_calibration", "calibrate_rig")],
+                   "calibration_in_map": [tool("vcharge_calibration", "calibrate_rig_from_map"), "--map", "/nowhere/drive.bag"],
+                   "mapping": [tool("vcharge_mapping", "build_map")],
                    "localization": [tool("vcharge_localization", "localize_drive"), "--map", "/nowhere/drive.bag"]}
         dense = [tool("vcharge_dense", "compute_range_maps")]
         for rig, option in [(rig, options[0]) for rig in rigs] + [(rigs[0], option) for option in options]:
@@ -176,7 +187,7 @@ class LaunchFilesTest(unittest.TestCase):
         cameras = yaml.safe_load((CONFIG / "rigs" / "golf_nominal.yaml").read_text())["cameras"]
         published = re.compile(rf"/camera/({'|'.join(cameras)})/image_raw|"
                                rf"/dense/({'|'.join(cameras)})/(points|range/(image|confidence|standard_deviation))|"
-                               r"/calibration/image|/mapping/(landmarks|trajectory|loop_edges)|/localization/(pose|sightings)")
+                               r"/calibration/(image|landmarks|trajectory|cameras)|/mapping/(landmarks|trajectory|loop_edges)|/localization/(pose|sightings)")
 
         def topics(node):
             if isinstance(node, dict):

@@ -5,6 +5,7 @@
 
 #include "rig_tool.h"
 #include "vcharge_calibration/map_rig_calibrator.h"
+#include "vcharge_calibration/rig_calibration_files.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/options.h"
 #include "vcharge_core/sparse_map_file.h"
@@ -25,7 +26,7 @@ void calibrate(const RigToolArguments& arguments, const std::string& map_file,
   auto provenance = provenanceOf(arguments, "calibrate_rig_from_map", option_text, result);
   provenance["map"] = map_file;
   provenance["map_hash"] = map->contentHash();
-  writeRigAndTrajectory(arguments, result, calibrator.state(), provenance);
+  writeRigAndTrajectory(arguments.output, arguments.trajectory, result, calibrator.state(), provenance);
 }
 
 }  // namespace

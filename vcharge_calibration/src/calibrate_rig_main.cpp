@@ -4,6 +4,7 @@
 #include <string>
 
 #include "rig_tool.h"
+#include "vcharge_calibration/rig_calibration_files.h"
 #include "vcharge_calibration/rig_calibrator.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/options.h"
@@ -18,14 +19,14 @@ void calibrate(const RigToolArguments& arguments, const std::string& map_file,
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   RigCalibrator calibrator(rig, options);
   followDrive(arguments, rig, &calibrator);
-  const RigCalibration result =
-      finishAndPrint(arguments, calibrator.state(),
-                     [&](const StageCallback& progress) { return calibrator.finish(progress); });
+  const RigCalibration result = finishAndPrint(
+      arguments, calibrator.state(),
+      [&](const StageCallback& progress) { return calibrator.finish(progress); }, calibrator.images());
   const auto provenance = provenanceOf(arguments, "calibrate_rig", option_text, result);
   if (!map_file.empty()) {
     writeSparseMap(*calibrator.map(), provenance, map_file);
   }
-  writeRigAndTrajectory(arguments, result, calibrator.state(), provenance);
+  writeRigAndTrajectory(arguments.output, arguments.trajectory, result, calibrator.state(), provenance);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "vcharge_calibration/image_coverage.h"
+#include "vcharge_calibration/keyframe_images.h"
 #include "vcharge_core/text_format.h"
 
 namespace vcharge {
@@ -51,6 +52,27 @@ std::string base64(const std::vector<uint8_t>& bytes) {
     text += left > 2 ? kLetters[group & 63] : '=';
   }
   return text;
+}
+
+/// `scale`: size of the image over that of the camera.
+cv::Mat pinholeView(const cv::Mat& image, const CameraModel& model, double scale,
+                    const Eigen::Matrix3d& camera_from_view, cv::Size size_px, double focal_px) {
+  cv::Mat map(size_px, CV_32FC2, cv::Scalar(-1e4, -1e4));
+  model.visit([&](const auto& concrete) {
+    for (int y = 0; y < size_px.height; ++y) {
+      for (int x = 0; x < size_px.width; ++x) {
+        const Eigen::Vector3d ray(x - 0.5 * (size_px.width - 1), y - 0.5 * (size_px.height - 1), focal_px);
+        Eigen::Vector2d pixel;
+        if (concrete.project(camera_from_view * ray, &pixel)) {
+          map.at<cv::Vec2f>(y, x) = {static_cast<float>(toSmallImage(pixel.x(), scale)),
+                                     static_cast<float>(toSmallImage(pixel.y(), scale))};
+        }
+      }
+    }
+  });
+  cv::Mat view;
+  cv::remap(image, view, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(0));
+  return view;
 }
 
 }  // namespace
@@ -158,25 +180,17 @@ cv::Mat drawCorners(const cv::Mat& image, const CalibrationBoard& board, const B
   return picture;
 }
 
+cv::Mat perspectiveView(const cv::Mat& image, const RigCamera& camera,
+                        const Eigen::Matrix3d& camera_from_view, cv::Size size_px, double focal_px) {
+  return pinholeView(image, camera.model, static_cast<double>(image.cols) / camera.image_size_px.width,
+                     camera_from_view, size_px, focal_px);
+}
+
 cv::Mat undistortedView(const cv::Mat& image, const CameraModel& model, double yaw_rad) {
   const double focal_px = 0.5 * kViewSize_px / std::tan(0.5 * kViewWidth_rad);
-  const Eigen::Matrix3d camera_from_view =
-      Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitY()).toRotationMatrix();
-  cv::Mat map(kViewSize_px, kViewSize_px, CV_32FC2, cv::Scalar(-1e4, -1e4));
-  model.visit([&](const auto& concrete) {
-    for (int y = 0; y < kViewSize_px; ++y) {
-      for (int x = 0; x < kViewSize_px; ++x) {
-        const Eigen::Vector3d ray(x - 0.5 * (kViewSize_px - 1), y - 0.5 * (kViewSize_px - 1), focal_px);
-        Eigen::Vector2d pixel;
-        if (concrete.project(camera_from_view * ray, &pixel)) {
-          map.at<cv::Vec2f>(y, x) = {static_cast<float>(pixel.x()), static_cast<float>(pixel.y())};
-        }
-      }
-    }
-  });
-  cv::Mat view;
-  cv::remap(image, view, map, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(0));
-  return view;
+  return pinholeView(image, model, 1.0,
+                     Eigen::AngleAxisd(yaw_rad, Eigen::Vector3d::UnitY()).toRotationMatrix(),
+                     {kViewSize_px, kViewSize_px}, focal_px);
 }
 
 }  // namespace vcharge

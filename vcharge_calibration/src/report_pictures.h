@@ -8,6 +8,7 @@
 
 #include "vcharge_calibration/calibration_board.h"
 #include "vcharge_core/camera_model.h"
+#include "vcharge_core/camera_rig.h"
 
 namespace vcharge {
 
@@ -26,6 +27,9 @@ std::string drawErrorMap(cv::Size image_size_px, const std::vector<CornerError>&
 std::string embedPicture(const cv::Mat& picture, int max_width_px);
 /// The image with a view's corners, numbered at the board's origin.
 cv::Mat drawCorners(const cv::Mat& image, const CalibrationBoard& board, const BoardView& view);
+/// Pinhole view of a camera's image, which may be smaller than the camera's, turned by camera_from_view.
+cv::Mat perspectiveView(const cv::Mat& image, const RigCamera& camera,
+                        const Eigen::Matrix3d& camera_from_view, cv::Size size_px, double focal_px);
 /// Pinhole view of the image, turned to the right by `yaw_rad`; 100 degrees across.
 cv::Mat undistortedView(const cv::Mat& image, const CameraModel& model, double yaw_rad);
 

@@ -143,6 +143,7 @@ class RigBackEnd {
     lenient.bundle.outlier_sigmas = INFINITY;
     lenient.max_ground_distance_m *= kFirstGround;
     triangulateTracks(firstTriangulation(), data_);
+    result_.first_scene = std::make_shared<const RigScene>(makeRigScene(*data_));
     adjust(lenient);
     lenient.bundle.outlier_sigmas = options_.adjustment.bundle.outlier_sigmas;
     triangulateTracks(options_.triangulation, data_);

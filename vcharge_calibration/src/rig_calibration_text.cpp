@@ -19,26 +19,13 @@ std::string tableRow(const std::string& name, const Eigen::Matrix<double, 6, 1>&
   return text;
 }
 
-/// Of a camera turned forwards: zero angles for one that looks ahead, upright. Centimetres and degrees.
-Eigen::Matrix<double, 6, 1> placeAndAngles(const RigidTransform& vehicle_from_camera) {
-  Eigen::Matrix3d optical_from_body;
-  optical_from_body << 0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0;
-  const Eigen::Matrix3d body = vehicle_from_camera.rotationMatrix() * optical_from_body;
-  Eigen::Matrix<double, 6, 1> result;
-  result << 100.0 * vehicle_from_camera.translation(), kDegrees * std::atan2(body(1, 0), body(0, 0)),
-      kDegrees * std::asin(std::clamp(-body(2, 0), -1.0, 1.0)), kDegrees * std::atan2(body(2, 1), body(2, 2));
-  return result;
-}
-
 std::string describeCamera(const CameraCalibration& camera, const RigidTransform& vehicle_from_camera) {
   char counts[64];
   std::snprintf(counts, sizeof(counts), "   %8lld %8lld", static_cast<long long>(camera.num_observations),
                 static_cast<long long>(camera.num_shared_landmarks));
-  const Eigen::Matrix<double, 6, 1> sigmas = camera.covariance.diagonal().cwiseSqrt();
-  Eigen::Matrix<double, 6, 1> in_order;
-  in_order << 100.0 * sigmas.head<3>(), kDegrees * sigmas[5], kDegrees * sigmas[4], kDegrees * sigmas[3];
   std::string text = tableRow(camera.name, placeAndAngles(vehicle_from_camera)) + counts + "\n" +
-                     tableRow("  +-", in_order) + "   about z, y, x of the vehicle\n";
+                     tableRow("  +-", placeAndAngleSigmas(camera.covariance)) +
+                     "   about z, y, x of the vehicle\n";
   if (!camera.weakest_direction.empty()) {
     text += "  least certain: " + camera.weakest_direction + "\n";
   }
@@ -64,6 +51,23 @@ std::string describeDirections(const RigCalibration& result) {
 }
 
 }  // namespace
+
+Eigen::Matrix<double, 6, 1> placeAndAngles(const RigidTransform& vehicle_from_camera) {
+  Eigen::Matrix3d optical_from_body;
+  optical_from_body << 0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0;
+  const Eigen::Matrix3d body = vehicle_from_camera.rotationMatrix() * optical_from_body;
+  Eigen::Matrix<double, 6, 1> result;
+  result << 100.0 * vehicle_from_camera.translation(), kDegrees * std::atan2(body(1, 0), body(0, 0)),
+      kDegrees * std::asin(std::clamp(-body(2, 0), -1.0, 1.0)), kDegrees * std::atan2(body(2, 1), body(2, 2));
+  return result;
+}
+
+Eigen::Matrix<double, 6, 1> placeAndAngleSigmas(const Eigen::Matrix<double, 6, 6>& covariance) {
+  const Eigen::Matrix<double, 6, 1> sigmas = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  Eigen::Matrix<double, 6, 1> result;
+  result << 100.0 * sigmas.head<3>(), kDegrees * sigmas[5], kDegrees * sigmas[4], kDegrees * sigmas[3];
+  return result;
+}
 
 std::string describeCalibration(const RigCalibration& result) {
   std::string text = toText(result.distance_m, 0) + " m, " + toText(kDegrees * result.left_turn_rad, 0) +

@@ -94,20 +94,21 @@ void RigCalibrator::processFrame(Timestamp stamp, const std::vector<Image>& imag
     trackers_[i].track(images[i], motion, static_cast<int>(i), &matches);
   });
   if (state_.data.keyframes.empty()) {
-    addKeyframe(stamp, odom_from_vehicle);
+    addKeyframe(stamp, images, odom_from_vehicle);
     return;
   }
   const RigidTransform since = state_.data.keyframes.back().odom_from_vehicle.inverse() * odom_from_vehicle;
   if (since.translation().norm() >= options_.keyframe_distance_m ||
       angleOfRotation(since.rotation()) >= options_.keyframe_turn_rad) {
-    addKeyframe(stamp, odom_from_vehicle);
+    addKeyframe(stamp, images, odom_from_vehicle);
   } else {
     state_.frames.push_back(
         {stamp, static_cast<int32_t>(state_.data.keyframes.size()) - 1, since, MotionHypothesis::kOdometry});
   }
 }
 
-void RigCalibrator::addKeyframe(Timestamp stamp, const RigidTransform& odom_from_vehicle) {
+void RigCalibrator::addKeyframe(Timestamp stamp, const std::vector<Image>& images,
+                                const RigidTransform& odom_from_vehicle) {
   std::vector<Keyframe>& keyframes = state_.data.keyframes;
   const auto index = static_cast<int32_t>(keyframes.size());
   Keyframe keyframe;
@@ -124,18 +125,29 @@ void RigCalibrator::addKeyframe(Timestamp stamp, const RigidTransform& odom_from
   for (size_t i = 0; i < trackers_.size(); ++i) {
     trackers_[i].addKeyframe(index, static_cast<int32_t>(i), *extractor_, &state_.data);
   }
+  images_.add(index, images);
   state_.frames.push_back({stamp, index, RigidTransform(), MotionHypothesis::kOdometry});
 }
 
 RigCalibration RigCalibrator::finish(const StageCallback& progress) {
-  gatherer_->finish();
-  return runRigBackEnd(
-      options_, progress ? progress : [](const StageProgress&) {}, &state_);
+  flush();
+  return calibrateFollowedDrive(options_, progress, &state_);
 }
 
 std::shared_ptr<const SparseMap> RigCalibrator::map() const {
-  check(state_.vocabulary != nullptr, "RigCalibrator::map: expected a calibration that was finished");
-  return assembleMap(state_.data, state_.report.loop_edges, options_.features, *state_.vocabulary);
+  return mapOfCalibration(options_, state_);
+}
+
+RigCalibration calibrateFollowedDrive(const RigCalibratorOptions& options, const StageCallback& progress,
+                                      MappingState* state) {
+  return runRigBackEnd(
+      options, progress ? progress : [](const StageProgress&) {}, state);
+}
+
+std::shared_ptr<const SparseMap> mapOfCalibration(const RigCalibratorOptions& options,
+                                                  const MappingState& state) {
+  check(state.vocabulary != nullptr, "mapOfCalibration: expected a calibration that was finished");
+  return assembleMap(state.data, state.report.loop_edges, options.features, *state.vocabulary);
 }
 
 }  // namespace vcharge

@@ -1,23 +1,25 @@
 #include "vcharge_calibration/rig_report.h"
 
-#include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
 
-#include <Eigen/Geometry>
-
+#include "bird_view.h"
+#include "rectified_matches.h"
+#include "report_pictures.h"
+#include "rig_pictures.h"
+#include "vcharge_calibration/rig_calibration_text.h"
 #include "vcharge_core/html.h"
 #include "vcharge_core/text_format.h"
-#include "vcharge_mapping/svg_plot.h"
 
 namespace vcharge {
 namespace {
 
 constexpr double kDegrees = 57.29577951308232;
-constexpr size_t kMaxDrawnLandmarks = 20000;
-constexpr double kMargin_m = 10.0;
-using Points = std::vector<Eigen::Vector2d>;
+constexpr int kPictureWidth_px = 450;
+constexpr int kPairWidth_px = 1120;
+constexpr double kVectorScale = 50.0;
+const std::vector<double> kSeamDistances_m = {2.0, 5.0, 10.0};
 
 std::string rowOf(const std::vector<std::string>& cells, bool is_head = false) {
   std::string text = "<tr>";
@@ -50,33 +52,40 @@ std::string summaryOf(const RigCalibration& result) {
          rowOf({"height", result.height_source}) + "</table>";
 }
 
-std::string placesOf(const RigCalibration& result, const CameraRig& rig) {
+/// Name, and each degree of freedom with its standard deviation: yaw, pitch and roll are those of a camera
+/// that was turned forwards.
+std::string parametersOf(const RigCalibration& result) {
   std::string text =
-      "<h2>Places of the cameras</h2><p>Axes of the vehicle: x forwards, y to the left, z up. All lengths "
-      "are the "
-      "odometer's: an error of the wheels' size is in them.</p><table>" +
-      rowOf({"camera", "x (cm)", "y (cm)", "z (cm)", "\u00b1 roll (degrees)", "\u00b1 pitch", "\u00b1 yaw",
-             "least certain"},
+      "<h2>Places of the cameras</h2><p>Axes of the vehicle: x forwards, y to the left, z up. " +
+      std::string(result.is_from_map
+                      ? "All lengths are the map's."
+                      : "All lengths are the odometer's: an error of the wheels' size is in them.") +
+      " Yaw, pitch and roll are zero for a camera that looks ahead, upright; their deviations are about the "
+      "vehicle's z, y and x.</p><table>" +
+      rowOf({"camera", "x (cm)", "y (cm)", "z (cm)", "yaw (degrees)", "pitch", "roll", "least certain"},
             true);
   for (size_t i = 0; i < result.cameras.size(); ++i) {
     const CameraCalibration& camera = result.cameras[i];
-    const Eigen::Matrix<double, 6, 1> sigma = camera.covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+    const Eigen::Matrix<double, 6, 1> values = placeAndAngles(*result.rig->cameras[i].vehicle_from_camera);
+    const Eigen::Matrix<double, 6, 1> sigmas = placeAndAngleSigmas(camera.covariance);
     std::vector<std::string> cells{camera.name};
-    for (int k = 0; k < 3; ++k) {
-      cells.push_back(toText(100.0 * rig.cameras[i].vehicle_from_camera->translation()[k], 2) + " \u00b1 " +
-                      toText(100.0 * sigma[k], 2));
-    }
-    for (int k = 3; k < 6; ++k) {
-      cells.push_back(toText(kDegrees * sigma[k], 3));
+    for (int k = 0; k < 6; ++k) {
+      const int digits = k < 3 ? 2 : 3;
+      cells.push_back(toText(values[k], digits) + " \u00b1 " + toText(sigmas[k], digits));
     }
     cells.push_back(camera.weakest_direction);
     text += rowOf(cells);
   }
-  text += "</table><h2>Checks</h2><table>" +
-          rowOf({"camera", "observations followed", "that fit", "error (px RMS)",
-                 "of it common to neighbours (px)", "landmarks shared with other cameras",
-                 "halves of the drive differ by (cm)", "(degrees)", "jackknife over formula, largest"},
-                true);
+  return text + "</table>";
+}
+
+std::string checksOf(const RigCalibration& result) {
+  std::string text =
+      "<h2>Checks</h2><table>" +
+      rowOf({"camera", "observations followed", "that fit", "error (px RMS)",
+             "of it common to neighbours (px)", "landmarks shared with other cameras",
+             "halves of the drive differ by (cm)", "(degrees)", "jackknife over formula, largest"},
+            true);
   for (const CameraCalibration& camera : result.cameras) {
     text += rowOf({camera.name, std::to_string(camera.num_tracked), std::to_string(camera.num_observations),
                    toText(camera.rms_px, 3), toText(camera.structure_px, 3),
@@ -88,70 +97,125 @@ std::string placesOf(const RigCalibration& result, const CameraRig& rig) {
   return text + "</table>";
 }
 
-std::string drawPath(const MappingState& state) {
-  Points path, landmarks;
-  Eigen::AlignedBox2d box;
-  for (const Keyframe& keyframe : state.data.keyframes) {
-    path.emplace_back(keyframe.map_from_vehicle.translation().head<2>());
-    box.extend(path.back());
-  }
-  size_t num_landmarks = 0;
-  for (const Track& track : state.data.tracks) {
-    num_landmarks += track.position_m ? 1 : 0;
-  }
-  const size_t step = num_landmarks / kMaxDrawnLandmarks + 1;
-  size_t next = 0;
-  const Eigen::Vector2d margin(kMargin_m, kMargin_m);
-  const Eigen::AlignedBox2d shown(box.min() - margin, box.max() + margin);
-  for (const Track& track : state.data.tracks) {
-    if (track.position_m && next++ % step == 0 && shown.contains(track.position_m->head<2>())) {
-      landmarks.emplace_back(track.position_m->head<2>());
-    }
-  }
-  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> loops;
-  for (const LoopEdge& edge : state.report.loop_edges) {
-    if (edge.accepted) {
-      loops.emplace_back(path[edge.first], path[edge.second]);
-    }
-  }
-  SvgPlot plot({shown.min().x(), shown.max().x()}, {shown.min().y(), shown.max().y()}, 0.0, true, "x (m)",
-               "y (m)");
-  plot.addDots(landmarks, 0.8, "#9ab");
-  plot.addSegments(loops, "stroke=\"#2ca02c\" stroke-width=\"1\"");
-  plot.addLine(path, "stroke=\"#333\" stroke-width=\"1.5\" fill=\"none\"");
-  return htmlFigure(plot.make(), "Path (black), loops (green) and landmarks from above.");
+std::string row(const std::string& figures) {
+  return "<div class=\"row\">" + figures + "</div>";
 }
 
-std::string drawRig(const CameraRig& rig) {
-  constexpr double kAxis_m = 0.7;
-  Points places;
-  std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>> axes;
-  Eigen::AlignedBox2d box(Eigen::Vector2d(-1.5, -1.8), Eigen::Vector2d(4.5, 1.8));
-  for (const RigCamera& camera : rig.cameras) {
-    const Eigen::Vector2d place = camera.vehicle_from_camera->translation().head<2>();
-    const Eigen::Vector3d axis = camera.vehicle_from_camera->rotation() * Eigen::Vector3d::UnitZ();
-    places.push_back(place);
-    axes.emplace_back(place, place + kAxis_m * axis.head<2>());
-    box.extend(axes.back().first);
-    box.extend(axes.back().second);
+std::string mapsOf(const RigCalibration& result, const MappingState& state) {
+  std::string figures;
+  if (result.first_scene != nullptr) {
+    figures += htmlFigure(drawSparseMap(*result.first_scene),
+                          "Before: landmarks by the odometer's path and hand-eye's rig, in the colour of the "
+                          "camera that saw them first.");
   }
-  SvgPlot plot({box.min().x(), box.max().x()}, {box.min().y(), box.max().y()}, 0.0, true, "x (m)", "y (m)");
-  plot.addSegments(axes, "stroke=\"#b3261e\" stroke-width=\"2\"");
-  plot.addDots(places, 4.0, "#b3261e");
-  return htmlFigure(plot.make(), "Cameras and their directions from above; the vehicle drives to the right.");
+  return "<h2>Sparse map</h2>" + row(figures + htmlFigure(drawSparseMap(makeRigScene(state.data)),
+                                                          "After: landmarks by the adjusted path and rig."));
+}
+
+std::string seamsOf(const RigCalibration& result, const KeyframeImages& images) {
+  const CameraRig* before = result.first_scene != nullptr ? result.first_scene->rig.get() : nullptr;
+  const CameraRig& rig = *result.rig;
+  std::string text = "<h2>The ground from above</h2>";
+  const std::vector<int32_t> keyframes = images.keyframes();
+  if (!keyframes.empty()) {
+    std::vector<cv::Mat> shown;
+    for (size_t i = 0; i < rig.cameras.size(); ++i) {
+      shown.push_back(images.image(keyframes[keyframes.size() / 2], i));
+    }
+    std::string figures;
+    if (before != nullptr) {
+      figures +=
+          htmlFigure(embedPicture(makeBirdView(*before, shown, BirdViewArea()), kPictureWidth_px),
+                     "Before: by hand-eye's rig. Lines: where one camera's picture ends and the next "
+                     "begins; marks on the road go on across them where the cameras' places are right.");
+    }
+    text += row(figures + htmlFigure(embedPicture(makeBirdView(rig, shown, BirdViewArea()), kPictureWidth_px),
+                                     "After: by the calibrated rig. The vehicle drives upwards."));
+  }
+  text +=
+      "<p>How far apart two neighbouring cameras show a place on the ground that both see, half way between "
+      "their directions: \u00b1 one standard deviation after the calibration, the errors of the two taken "
+      "for "
+      "independent (height and tilt are largely common and cancel: an upper bound); in brackets, how far "
+      "apart they were by hand-eye.</p><table>";
+  std::vector<std::string> head{"cameras"};
+  for (const double distance_m : kSeamDistances_m) {
+    head.push_back("at " + toText(distance_m, 0) + " m (cm)");
+  }
+  text += rowOf(head, true);
+  std::vector<std::string> cells;
+  for (const SeamPoint& point : seamPoints(rig, before, kSeamDistances_m)) {
+    if (cells.empty()) {
+      cells.push_back(rig.cameras[point.first].name + ", " + rig.cameras[point.second].name);
+    }
+    cells.push_back(!point.is_seen
+                        ? "not seen by both"
+                        : "\u00b1 " + toText(100.0 * point.sigma_m, 1) +
+                              (before == nullptr ? "" : " (" + toText(100.0 * point.before_m, 1) + ")"));
+    if (cells.size() > kSeamDistances_m.size()) {
+      text += rowOf(cells);
+      cells.clear();
+    }
+  }
+  return text + "</table>";
+}
+
+std::string sharedOf(const MappingState& state, const KeyframeImages& images) {
+  std::string text;
+  for (const CameraPairView& pair : findCameraPairViews(state.data, images)) {
+    const auto nameOf = [&](size_t camera, int32_t keyframe) {
+      return state.data.rig->cameras[camera].name + " at keyframe " + std::to_string(keyframe);
+    };
+    text += htmlFigure(embedPicture(drawCameraPairView(state.data, images, pair), kPairWidth_px),
+                       nameOf(pair.first_camera, pair.first_keyframe) + ", " +
+                           nameOf(pair.second_camera, pair.second_keyframe) + ": " +
+                           std::to_string(pair.tracks.size()) + " landmarks in both views.");
+  }
+  return text.empty()
+             ? ""
+             : "<h2>Landmarks that cameras share</h2><p>Views rectified to the average rotation of the "
+               "two cameras; lines join the observations of a landmark.</p>" +
+                   row(text);
+}
+
+std::string errorsOf(const MappingState& state) {
+  std::string maps, vectors;
+  const std::vector<std::vector<CornerError>> errors = errorsByCamera(state.data);
+  for (size_t i = 0; i < errors.size(); ++i) {
+    const RigCamera& camera = state.data.rig->cameras[i];
+    maps += htmlFigure(drawErrorMap(camera.image_size_px, errors[i]),
+                       camera.name + ": RMS error per coordinate, pixels.");
+    vectors += htmlFigure(
+        drawErrorVectors(camera.image_size_px, meanErrors(camera.image_size_px, errors[i]), kVectorScale),
+        camera.name + ": mean errors, " + toText(kVectorScale, 0) +
+            " times as long as they are. Where neighbours point the same way, the lens is not as "
+            "its intrinsics say.");
+  }
+  return "<h2>Errors over the images</h2>" + row(maps) + row(vectors);
 }
 
 }  // namespace
 
-std::string makeRigReport(const std::string& title, const RigCalibration& result, const MappingState& state) {
+std::string makeRigReport(const std::string& title, const RigCalibration& result, const MappingState& state,
+                          const KeyframeImages& images, const std::string& more_sections) {
   std::string body = verdictOf(result) + summaryOf(result);
   if (result.rig != nullptr) {
-    body += placesOf(result, *result.rig) + "<div class=\"row\">" + drawRig(*result.rig) + "</div>";
+    body += parametersOf(result) +
+            row(htmlFigure(drawCameras(*result.rig),
+                           "Cameras and their directions from above; the vehicle drives to the right.")) +
+            checksOf(result);
   }
-  if (!state.data.keyframes.empty()) {
-    body += "<h2>Drive</h2><div class=\"row\">" + drawPath(state) + "</div>";
+  // After a failure there may be poses and landmarks all the same, which show what is wrong.
+  if (state.data.rig->hasExtrinsics() && !state.data.keyframes.empty()) {
+    body += mapsOf(result, state);
+    body += result.rig != nullptr ? seamsOf(result, images) : "";
+    body += sharedOf(state, images) + errorsOf(state);
   }
-  body += "<h2>Times</h2><table>";
+  if (!state.data.keyframes.empty() && !result.is_from_map) {
+    body += "<h2>Loops</h2>" +
+            row(htmlFigure(drawLoopGraph(state), "Places that were passed again, on the vehicle's path."));
+  }
+  body += more_sections + "<h2>Times</h2><table>";
   for (const auto& [stage, seconds] : state.report.stage_s) {
     body += rowOf({stage, toText(seconds, 1) + " s"});
   }

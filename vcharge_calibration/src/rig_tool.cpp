@@ -4,11 +4,10 @@
 #include <cstdio>
 #include <filesystem>
 
+#include "vcharge_calibration/rig_calibration_files.h"
 #include "vcharge_calibration/rig_calibration_text.h"
-#include "vcharge_calibration/rig_report.h"
 #include "vcharge_core/content_hash.h"
 #include "vcharge_core/error.h"
-#include "vcharge_core/file_io.h"
 #include "vcharge_core/progress_bar.h"
 #include "vcharge_ros/bag_drive_source.h"
 
@@ -41,7 +40,8 @@ void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const 
 }
 
 RigCalibration finishAndPrint(const RigToolArguments& arguments, const MappingState& state,
-                              const std::function<RigCalibration(const StageCallback&)>& finish) {
+                              const std::function<RigCalibration(const StageCallback&)>& finish,
+                              const KeyframeImages& images) {
   RigCalibration result;
   {
     ProgressBar bar("calibrating");
@@ -57,12 +57,8 @@ RigCalibration finishAndPrint(const RigToolArguments& arguments, const MappingSt
   for (const std::string& remark : result.remarks) {
     std::printf("  %s\n", remark.c_str());
   }
-  if (!arguments.report.empty()) {
-    createFolder(arguments.report);
-    writeTextFileAtomically(
-        (std::filesystem::path(arguments.report) / "rig_report.html").string(),
-        makeRigReport("Rig by " + std::filesystem::path(arguments.bag).filename().string(), result, state));
-  }
+  writeRigReport(arguments.report, "Rig by " + std::filesystem::path(arguments.bag).filename().string(),
+                 result, state, images);
   if (result.verdict == Verdict::kFail) {
     throw InputError(arguments.bag + ": FAIL: " + result.remarks.front());
   }
@@ -73,22 +69,6 @@ std::map<std::string, std::string> provenanceOf(const RigToolArguments& argument
                                                 const std::string& options, const RigCalibration& result) {
   return {{"bag", arguments.bag}, {"bag_hash", fileHash(arguments.bag)}, {"rig", arguments.rig},
           {"options", options},   {"verdict", toString(result.verdict)}, {"program", program + " 0.1.0"}};
-}
-
-void writeRigAndTrajectory(const RigToolArguments& arguments, const RigCalibration& result,
-                           const MappingState& state, const std::map<std::string, std::string>& provenance) {
-  if (!arguments.trajectory.empty()) {
-    writeTrajectory(trajectoryOf(state), arguments.trajectory);
-  }
-  const std::filesystem::path folder = std::filesystem::path(arguments.output).parent_path();
-  for (const RigCamera& camera : result.rig->cameras) {
-    if (!camera.mask_file.empty()) {
-      createFolder((folder / camera.mask_file).parent_path().string());
-    }
-  }
-  CameraRig rig = *result.rig;
-  rig.provenance = provenance;
-  writeCameraRig(rig, arguments.output);
 }
 
 }  // namespace vcharge

@@ -4,6 +4,7 @@
 #include <memory>
 #include <string>
 
+#include "vcharge_calibration/keyframe_images.h"
 #include "vcharge_calibration/rig_calibration.h"
 #include "vcharge_core/camera_rig.h"
 #include "vcharge_core/command_line.h"
@@ -32,14 +33,11 @@ void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const 
 /// Runs the calibration with a progress bar, prints what came out, and writes the report. InputError with the
 /// verdict's first reason where it is kFail.
 RigCalibration finishAndPrint(const RigToolArguments& arguments, const MappingState& state,
-                              const std::function<RigCalibration(const StageCallback&)>& finish);
+                              const std::function<RigCalibration(const StageCallback&)>& finish,
+                              const KeyframeImages& images = KeyframeImages());
 
 /// What the rig and the map say of where they come from.
 std::map<std::string, std::string> provenanceOf(const RigToolArguments& arguments, const std::string& program,
                                                 const std::string& options, const RigCalibration& result);
-
-/// Writes trajectory and rig, the rig last.
-void writeRigAndTrajectory(const RigToolArguments& arguments, const RigCalibration& result,
-                           const MappingState& state, const std::map<std::string, std::string>& provenance);
 
 }  // namespace vcharge

@@ -45,9 +45,7 @@ class DepthNodelet : public nodelet::Nodelet {
     LiveDriveSourceOptions source_options;
     source_options.cameras = options.cameras;
     if (lossless) {
-      source_options.image_queue_size = 0;
-      source_options.odometry_queue_size = 0;
-      source_options.sort_window_s = 0.5;
+      source_options.takeEverything();
     }
     readFieldsFromParameters(private_node, "source", &source_options);
 

@@ -60,9 +60,7 @@ class LocalizationNodelet : public nodelet::Nodelet {
     readFieldsFromParameters(private_node, "options", &options);
     LiveDriveSourceOptions source_options;
     if (lossless) {
-      source_options.image_queue_size = 0;
-      source_options.odometry_queue_size = 0;
-      source_options.sort_window_s = 0.5;
+      source_options.takeEverything();
     }
     readFieldsFromParameters(private_node, "source", &source_options);
     localizer_ = std::make_unique<DriveLocalizer>(readSparseMap(map_path), rig_, options);

@@ -36,8 +36,7 @@ class MappingNodelet : public nodelet::Nodelet {
   }
 
  private:
-  using Request = std_srvs::Trigger::Request;
-  using Response = std_srvs::Trigger::Response;
+  using Response = std_srvs::TriggerResponse;
 
   void onInit() override {
     ros::NodeHandle& node = getNodeHandle();
@@ -47,9 +46,7 @@ class MappingNodelet : public nodelet::Nodelet {
     readFieldsFromParameters(private_node, "options", &options_);
     LiveDriveSourceOptions source_options;
     if (private_node.param("lossless_replay", false)) {
-      source_options.image_queue_size = 0;
-      source_options.odometry_queue_size = 0;
-      source_options.sort_window_s = 0.5;
+      source_options.takeEverything();
     }
     readFieldsFromParameters(private_node, "source", &source_options);
     session_ = std::make_unique<MappingSession>(
@@ -62,26 +59,15 @@ class MappingNodelet : public nodelet::Nodelet {
     loop_edges_ = node.advertise<visualization_msgs::MarkerArray>("/mapping/loop_edges", 1, true);
     addDiagnostics("", [this] { return source_->report(); });
     addDiagnostics("/map", [this] { return report(); });
-    finish_ = advertise("finish", &MappingNodelet::finish);
-    save_ = advertise("save", &MappingNodelet::save);
+    finish_ =
+        advertiseTrigger(&private_node, "finish", &guard_, [this](Response* response) { finish(response); });
+    save_ = advertiseTrigger(&private_node, "save", &guard_, [this](Response* response) { save(response); });
     source_->run(session_.get(), DriveSource::ProgressCallback());
   }
 
   void addDiagnostics(const std::string& name, std::function<DriveMonitor::Report()> report) {
     diagnostics_.push_back(std::make_unique<NodeletDiagnostics>(getMTNodeHandle(), getMTPrivateNodeHandle(),
                                                                 getName() + name, std::move(report)));
-  }
-
-  ros::ServiceServer advertise(const std::string& name, void (MappingNodelet::*serve)(Response*)) {
-    const boost::function<bool(Request&, Response&)> call = [this, serve](Request& /*request*/,
-                                                                          Response& response) {
-      if (!guard_.run([&] { (this->*serve)(&response); })) {
-        response.success = 0;
-        response.message = guard_.lastError();
-      }
-      return true;
-    };
-    return getPrivateNodeHandle().advertiseService(name, call);
   }
 
   void finish(Response* response) {

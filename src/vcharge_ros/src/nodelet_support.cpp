@@ -27,6 +27,20 @@ void CallbackGuard::fail(const std::string& text) {
   }
 }
 
+ros::ServiceServer advertiseTrigger(ros::NodeHandle* node, const std::string& name, CallbackGuard* guard,
+                                    std::function<void(std_srvs::TriggerResponse*)> serve) {
+  const boost::function<bool(std_srvs::TriggerRequest&, std_srvs::TriggerResponse&)> call =
+      [guard, serve = std::move(serve)](std_srvs::TriggerRequest& /*request*/,
+                                        std_srvs::TriggerResponse& response) {
+        if (!guard->run([&] { serve(&response); })) {
+          response.success = 0;
+          response.message = guard->lastError();
+        }
+        return true;
+      };
+  return node->advertiseService(name, call);
+}
+
 NodeletDiagnostics::NodeletDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
                                        const std::string& name, std::function<DriveMonitor::Report()> report)
     : guard_(name), report_(std::move(report)), updater_(node, private_node, name) {

@@ -9,6 +9,7 @@
 
 #include "vcharge_calibration/hand_eye.h"
 #include "vcharge_calibration/intrinsic_calibration.h"
+#include "vcharge_calibration/rig_scene.h"
 #include "vcharge_core/camera_rig.h"
 
 namespace vcharge {
@@ -51,6 +52,8 @@ struct RigCalibration {
   double time_offset_s = 0.0;        ///< by which the odometer's stamps are late, which was corrected for
   double time_offset_sigma_s = 0.0;  ///< 0: not known
   std::string height_source;
+  /// By the first guess, before anything was adjusted: null where there was none.
+  std::shared_ptr<const RigScene> first_scene;
   bool is_from_map = false;  ///< the landmarks were those of a finished map, which is the measure of lengths
 };
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "vcharge_calibration/keyframe_images.h"
 #include "vcharge_calibration/rig_calibration.h"
 #include "vcharge_calibration/rig_calibrator_options.h"
 #include "vcharge_core/drive_source.h"
@@ -31,6 +32,9 @@ class RigCalibrator : public DriveConsumer {
   }
   void addOdometry(const VehicleOdometry& odometry) override { gatherer_->addOdometry(odometry); }
 
+  /// Takes the frames that wait for odometry: none that is older will come.
+  void flush() { gatherer_->finish(); }
+
   /// The calibration by all that was fed. A drive that does not suffice gives Verdict::kFail with the reason.
   /// The callback may be empty, and may throw to end the work.
   RigCalibration finish(const StageCallback& progress);
@@ -39,20 +43,33 @@ class RigCalibrator : public DriveConsumer {
   Trajectory trajectory() const { return trajectoryOf(state_); }
   std::shared_ptr<const SparseMap> map() const;
   const MappingState& state() const { return state_; }
+  /// Of a few keyframes, for pictures.
+  const KeyframeImages& images() const { return images_; }
 
  private:
   void processFrame(Timestamp stamp, const std::vector<Image>& images,
                     const RigidTransform& odom_from_vehicle);
-  void addKeyframe(Timestamp stamp, const RigidTransform& odom_from_vehicle);
+  void addKeyframe(Timestamp stamp, const std::vector<Image>& images,
+                   const RigidTransform& odom_from_vehicle);
 
   const RigCalibratorOptions options_;
   std::shared_ptr<const CameraRig> rig_;  // without extrinsics
   const std::unique_ptr<FeatureExtractor> extractor_;
   std::vector<CameraTracker> trackers_;
   MappingState state_;
+  KeyframeImages images_;
   std::unique_ptr<FrameGatherer> gatherer_;
   std::optional<RigidTransform> last_odom_from_vehicle_;
   double travelled_m_ = 0.0;
 };
+
+/// What RigCalibrator::finish() does with the drive that it followed. With a copy of state() a drive can be
+/// calibrated while it goes on; `state` has the rig, the poses and the landmarks in the end.
+RigCalibration calibrateFollowedDrive(const RigCalibratorOptions& options, const StageCallback& progress,
+                                      MappingState* state);
+
+/// The sparse map that came with a calibration of another verdict than kFail.
+std::shared_ptr<const SparseMap> mapOfCalibration(const RigCalibratorOptions& options,
+                                                  const MappingState& state);
 
 }  // namespace vcharge

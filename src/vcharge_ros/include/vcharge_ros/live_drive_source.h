@@ -46,6 +46,12 @@ struct LiveDriveSourceOptions {
     visit("idle_flush_s", idle_flush_s);
     visit("max_silence_s", max_silence_s);
   }
+  /// For a replay of which every message is taken, in the order in which a bag's are.
+  void takeEverything() {
+    image_queue_size = 0;
+    odometry_queue_size = 0;
+    sort_window_s = 0.5;
+  }
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 

@@ -10,6 +10,7 @@
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <ros/console.h>
 #include <ros/node_handle.h>
+#include <std_srvs/Trigger.h>
 
 #include "vcharge_ros/drive_monitor.h"
 
@@ -49,6 +50,11 @@ class CallbackGuard {
   std::string last_error_;
   uint64_t num_failures_ = 0;
 };
+
+/// Serves std_srvs/Trigger under `name`. What `serve` throws is the answer's text, without success. The guard
+/// must outlive the server.
+ros::ServiceServer advertiseTrigger(ros::NodeHandle* node, const std::string& name, CallbackGuard* guard,
+                                    std::function<void(std_srvs::TriggerResponse*)> serve);
 
 /// Publishes one status on /diagnostics, every second of wall time, also where a simulated clock stands
 /// still.

@@ -1,0 +1,60 @@
+#include "camera_landmarks.h"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "ground.h"
+
+namespace vcharge {
+
+MappingData lastPart(const MappingData& data, int32_t begin) {
+  MappingData part;
+  part.rig = data.rig;
+  for (auto k = static_cast<size_t>(begin); k < data.keyframes.size(); ++k) {
+    part.keyframes.emplace_back();
+    part.keyframes.back().odom_from_vehicle = data.keyframes[k].odom_from_vehicle;
+    part.keyframes.back().map_from_vehicle = data.keyframes[k].map_from_vehicle;
+  }
+  for (const Track& track : data.tracks) {
+    if (track.observations.empty() || track.observations.back().keyframe < begin) {
+      continue;
+    }
+    Track seen;
+    for (TrackObservation observation : track.observations) {
+      if (observation.keyframe >= begin) {
+        observation.keyframe -= begin;
+        seen.observations.push_back(observation);
+      }
+    }
+    part.tracks.push_back(std::move(seen));
+  }
+  return part;
+}
+
+LandmarksByCamera recentLandmarksByCamera(const MappingState& state, const CameraRig& guess,
+                                          const TriangulationOptions& options, int num_keyframes) {
+  const auto end = static_cast<int32_t>(state.data.keyframes.size());
+  MappingData part = lastPart(state.data, std::max(0, end - num_keyframes));
+  auto rig = std::make_shared<CameraRig>(guess);
+  std::vector<bool> has_place;
+  for (RigCamera& camera : rig->cameras) {
+    has_place.push_back(camera.vehicle_from_camera.has_value());
+    camera.vehicle_from_camera = camera.vehicle_from_camera.value_or(RigidTransform());
+  }
+  part.rig = rig;
+  triangulateTracks(options, &part);
+  LandmarksByCamera landmarks = landmarksByCamera(part);
+  for (size_t i = 0; i < landmarks.size(); ++i) {
+    if (!has_place[i]) {
+      landmarks[i].clear();
+    }
+    const double height_m = findCameraHeight(part, static_cast<int32_t>(i)).value_or(0.0);
+    for (Eigen::Vector3d& position_m : landmarks[i]) {
+      position_m.z() += height_m;
+    }
+  }
+  return landmarks;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstdint>
+
+#include "vcharge_calibration/rig_scene.h"
+#include "vcharge_core/camera_rig.h"
+#include "vcharge_mapping/mapping_data.h"
+#include "vcharge_mapping/mapping_state.h"
+#include "vcharge_mapping/triangulation.h"
+
+namespace vcharge {
+
+/// Keyframes from `begin` on with what was seen in them, numbered from there; without descriptors.
+MappingData lastPart(const MappingData& data, int32_t begin);
+
+/// While driving: points that the last keyframes saw, by cameras whose places come from hand-eye and whose
+/// heights these points tell; cameras without a place have none. Takes milliseconds.
+LandmarksByCamera recentLandmarksByCamera(const MappingState& state, const CameraRig& guess,
+                                          const TriangulationOptions& options, int num_keyframes);
+
+}  // namespace vcharge
