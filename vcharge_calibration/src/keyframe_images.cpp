@@ -4,11 +4,6 @@
 #include <opencv2/imgproc.hpp>
 
 namespace vcharge {
-namespace {
-
-constexpr int kQuality = 80;
-
-}  // namespace
 
 void KeyframeImages::add(int32_t keyframe, const std::vector<Image>& images) {
   if (keyframe % step_ != 0) {
@@ -21,15 +16,15 @@ void KeyframeImages::add(int32_t keyframe, const std::vector<Image>& images) {
       continue;
     }
     cv::Mat small = image.pixels;
-    if (small.cols > kMaxWidth_px) {
-      const double scale = static_cast<double>(kMaxWidth_px) / small.cols;
+    if (small.cols > max_width_px_) {
+      const double scale = static_cast<double>(max_width_px_) / small.cols;
       cv::resize(image.pixels, small, cv::Size(), scale, scale, cv::INTER_AREA);
     }
     auto bytes = std::make_shared<std::vector<uint8_t>>();
-    cv::imencode(".jpg", small, *bytes, {cv::IMWRITE_JPEG_QUALITY, kQuality});
+    cv::imencode(".jpg", small, *bytes, {cv::IMWRITE_JPEG_QUALITY, quality_});
     jpegs.back() = bytes;
   }
-  if (jpegs_.size() > kMaxKeyframes) {
+  if (jpegs_.size() > max_keyframes_) {
     step_ *= 2;
     for (auto entry = jpegs_.begin(); entry != jpegs_.end();) {
       entry = entry->first % step_ == 0 ? std::next(entry) : jpegs_.erase(entry);

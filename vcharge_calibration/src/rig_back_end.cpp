@@ -6,6 +6,7 @@
 #include "camera_motion.h"
 #include "ground.h"
 #include "ground_normal.h"
+#include "inter_camera_matching.h"
 #include "rig_adjustment.h"
 #include "rig_initialization.h"
 #include "rig_judgement.h"
@@ -18,10 +19,18 @@ namespace {
 /// The first guess of the ground is wrong by so many times more.
 constexpr double kFirstGround = 4.0;
 
+constexpr int kNumStages = 7;
+
 class RigBackEnd {
  public:
-  RigBackEnd(const RigCalibratorOptions& options, const StageCallback& progress, MappingState* state)
-      : options_(options), progress_(progress), state_(state), data_(&state->data), series_(*state) {}
+  RigBackEnd(const RigCalibratorOptions& options, const KeyframeImages& all_images,
+             const StageCallback& progress, MappingState* state)
+      : options_(options),
+        all_images_(all_images),
+        progress_(progress),
+        state_(state),
+        data_(&state->data),
+        series_(*state) {}
 
   RigCalibration run() {
     try {
@@ -36,13 +45,18 @@ class RigBackEnd {
       });
       correctTimeOffset(series_, state_, &result_);
       priors_.odometry = estimateOdometryNoise(options_.adjustment, *data_);
-      stage("last adjustment", 5, [&] {
+      if (options_.inter_camera.enabled) {
+        stage("between cameras", 5, [&] {
+          result_.num_inter_camera_matches = matchBetweenCameras(options_.inter_camera, all_images_, data_);
+        });
+      }
+      stage("last adjustment", 6, [&] {
         searchLandmarks(options_.search, data_);
         adjust(options_.adjustment);
         checkLoops(options_.loops, *data_, &state_->report.loop_edges);
         adjustFinely();
       });
-      stage("judgement", 6, [&] { judgeRig(options_.adjustment, priors_, *state_, &result_); });
+      stage("judgement", 7, [&] { judgeRig(options_.adjustment, priors_, *state_, &result_); });
     } catch (const NotCalibrated& failure) {
       result_.verdict = Verdict::kFail;
       result_.remarks = failure.remarks;
@@ -53,7 +67,6 @@ class RigBackEnd {
  private:
   template <class Work>
   void stage(const char* name, int number, const Work& work) {
-    constexpr int kNumStages = 6;
     progress_({name, number, kNumStages, 0.0});
     {
       const StageTimer timer(name, &state_->report.stage_s);
@@ -154,7 +167,7 @@ class RigBackEnd {
   void closeAllLoops() {
     state_->vocabulary = trainVocabulary(options_.loops, *data_);
     state_->report.loop_edges = findLoops(options_.loops, state_->vocabulary, *data_, [&](double fraction) {
-      progress_({"loops", 3, 6, fraction});
+      progress_({"loops", 3, kNumStages, fraction});
     });
     closeLoops(options_.loops, &state_->report.loop_edges, data_);
     triangulateTracks(options_.triangulation, data_);
@@ -169,6 +182,7 @@ class RigBackEnd {
   }
 
   const RigCalibratorOptions& options_;
+  const KeyframeImages& all_images_;
   const StageCallback& progress_;
   MappingState* const state_;
   MappingData* const data_;
@@ -179,9 +193,9 @@ class RigBackEnd {
 
 }  // namespace
 
-RigCalibration runRigBackEnd(const RigCalibratorOptions& options, const StageCallback& progress,
-                             MappingState* state) {
-  return RigBackEnd(options, progress, state).run();
+RigCalibration runRigBackEnd(const RigCalibratorOptions& options, const KeyframeImages& all_images,
+                             const StageCallback& progress, MappingState* state) {
+  return RigBackEnd(options, all_images, progress, state).run();
 }
 
 }  // namespace vcharge

@@ -103,6 +103,7 @@ struct RigCalibrationSession::Follower {
 /// A calibration that runs, or ran.
 struct RigCalibrationSession::Job {
   FinishedCalibration work;
+  KeyframeImages all_images;
   std::atomic<bool> is_abandoned{false}, is_done{false};
 };
 
@@ -208,6 +209,7 @@ bool RigCalibrationSession::begin(bool flushes, std::string* message) {
   }
   job_->work.state = follower_->calibrator.state();
   job_->work.images = follower_->calibrator.images();
+  job_->all_images = follower_->calibrator.allImages();
   *message = "calibrating by " + std::to_string(job_->work.state.data.keyframes.size()) + " keyframes";
   tell([&](Status* status) {
     status->phase = Phase::kCalibrating;
@@ -230,7 +232,7 @@ void RigCalibrationSession::run(const std::shared_ptr<Job>& job) {
   std::string message;
   try {
     job->work.result = calibrateFollowedDrive(
-        calibrator_options_,
+        calibrator_options_, job->all_images,
         [&](const StageProgress& progress) {
           if (job->is_abandoned) {
             throw Abandoned();

@@ -74,7 +74,10 @@ std::string describeCalibration(const RigCalibration& result) {
                      " degrees of turn to the left, " + toText(kDegrees * result.right_turn_rad, 0) +
                      " to the right; " + std::to_string(result.num_keyframes) + " keyframes, " +
                      std::to_string(result.num_landmarks) + " landmarks, " +
-                     (result.is_from_map ? "" : std::to_string(result.num_loop_edges) + " loop edges, ") +
+                     (result.is_from_map ? ""
+                                         : std::to_string(result.num_loop_edges) + " loop edges, " +
+                                               std::to_string(result.num_inter_camera_matches) +
+                                               " matches in rectified views, ") +
                      "error " + toText(result.rms_px, 3) + " px RMS per coordinate\n";
   if (result.rig == nullptr) {
     return text + describeDirections(result);

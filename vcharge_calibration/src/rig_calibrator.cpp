@@ -51,6 +51,7 @@ void RigCalibratorOptions::validate() const {
   validateInner("triangulation", triangulation);
   validateInner("loops", loops);
   validateInner("search", search);
+  validateInner("inter_camera", inter_camera);
   validateInner("adjustment", adjustment);
 }
 
@@ -126,22 +127,25 @@ void RigCalibrator::addKeyframe(Timestamp stamp, const std::vector<Image>& image
     trackers_[i].addKeyframe(index, static_cast<int32_t>(i), *extractor_, &state_.data);
   }
   images_.add(index, images);
+  if (options_.inter_camera.enabled && index % options_.inter_camera.keyframe_step == 0) {
+    all_images_.add(index, images);
+  }
   state_.frames.push_back({stamp, index, RigidTransform(), MotionHypothesis::kOdometry});
 }
 
 RigCalibration RigCalibrator::finish(const StageCallback& progress) {
   flush();
-  return calibrateFollowedDrive(options_, progress, &state_);
+  return calibrateFollowedDrive(options_, all_images_, progress, &state_);
 }
 
 std::shared_ptr<const SparseMap> RigCalibrator::map() const {
   return mapOfCalibration(options_, state_);
 }
 
-RigCalibration calibrateFollowedDrive(const RigCalibratorOptions& options, const StageCallback& progress,
-                                      MappingState* state) {
+RigCalibration calibrateFollowedDrive(const RigCalibratorOptions& options, const KeyframeImages& all_images,
+                                      const StageCallback& progress, MappingState* state) {
   return runRigBackEnd(
-      options, progress ? progress : [](const StageProgress&) {}, state);
+      options, all_images, progress ? progress : [](const StageProgress&) {}, state);
 }
 
 std::shared_ptr<const SparseMap> mapOfCalibration(const RigCalibratorOptions& options,

@@ -3,9 +3,9 @@
 #include <memory>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <ceres/ceres.h>
 #include <ceres/normal_prior.h>
+#include <Eigen/Cholesky>
 
 #include "vcharge_geometry/pose_block.h"
 #include "vcharge_geometry/rig_costs.h"

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <climits>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -11,12 +12,19 @@
 
 namespace vcharge {
 
-/// A few keyframes' images of a drive, for pictures: small JPEGs, evenly spread over the drive however long
-/// it becomes. Copies share the images.
+/// Keyframes' images of a drive as JPEGs: by default a few small ones for pictures, evenly spread over the
+/// drive however long it becomes. Copies share the images.
 class KeyframeImages {
  public:
   static constexpr size_t kMaxKeyframes = 64;
   static constexpr int kMaxWidth_px = 640;
+  static constexpr int kQuality = 80;
+
+  explicit KeyframeImages(size_t max_keyframes = kMaxKeyframes, int max_width_px = kMaxWidth_px,
+                          int quality = kQuality)
+      : max_keyframes_(max_keyframes), max_width_px_(max_width_px), quality_(quality) {}
+  /// All of them, of full size, and so that hardly anything is lost.
+  static KeyframeImages ofAllKeyframes() { return KeyframeImages(SIZE_MAX, INT_MAX, 95); }
 
   /// Takes the images of a keyframe, in the rig's order (empty where a camera sent none), or does not, where
   /// it has enough of that part of the drive. Keyframes come in order.
@@ -25,11 +33,13 @@ class KeyframeImages {
   /// In order.
   std::vector<int32_t> keyframes() const;
 
-  /// CV_8UC1, at most kMaxWidth_px wide; empty where there is none.
+  /// CV_8UC1, at most as wide as was said; empty where there is none.
   cv::Mat image(int32_t keyframe, size_t camera) const;
 
  private:
   using Jpeg = std::shared_ptr<const std::vector<uint8_t>>;
+  size_t max_keyframes_;
+  int max_width_px_, quality_;
   std::map<int32_t, std::vector<Jpeg>> jpegs_;  // null: no image
   int32_t step_ = 1;                            // in keyframes
 };

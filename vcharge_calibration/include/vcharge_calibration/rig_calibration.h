@@ -46,7 +46,8 @@ struct RigCalibration {
   double left_turn_rad = 0.0, right_turn_rad = 0.0;  ///< both positive
   int num_keyframes = 0;
   int64_t num_landmarks = 0;
-  int num_loop_edges = 0;  ///< accepted
+  int num_loop_edges = 0;                ///< accepted
+  int64_t num_inter_camera_matches = 0;  ///< of landmarks found in rectified views of a neighbouring camera
   double rms_px = 0.0;
   double odometer_turn_scale = 1.0;
   double time_offset_s = 0.0;        ///< by which the odometer's stamps are late, which was corrected for

@@ -45,6 +45,8 @@ class RigCalibrator : public DriveConsumer {
   const MappingState& state() const { return state_; }
   /// Of a few keyframes, for pictures.
   const KeyframeImages& images() const { return images_; }
+  /// Of all keyframes that are matched between cameras.
+  const KeyframeImages& allImages() const { return all_images_; }
 
  private:
   void processFrame(Timestamp stamp, const std::vector<Image>& images,
@@ -58,15 +60,16 @@ class RigCalibrator : public DriveConsumer {
   std::vector<CameraTracker> trackers_;
   MappingState state_;
   KeyframeImages images_;
+  KeyframeImages all_images_ = KeyframeImages::ofAllKeyframes();
   std::unique_ptr<FrameGatherer> gatherer_;
   std::optional<RigidTransform> last_odom_from_vehicle_;
   double travelled_m_ = 0.0;
 };
 
-/// What RigCalibrator::finish() does with the drive that it followed. With a copy of state() a drive can be
-/// calibrated while it goes on; `state` has the rig, the poses and the landmarks in the end.
-RigCalibration calibrateFollowedDrive(const RigCalibratorOptions& options, const StageCallback& progress,
-                                      MappingState* state);
+/// What RigCalibrator::finish() does with the drive that it followed. With copies of state() and allImages()
+/// a drive can be calibrated while it goes on; `state` has the rig, the poses and the landmarks in the end.
+RigCalibration calibrateFollowedDrive(const RigCalibratorOptions& options, const KeyframeImages& all_images,
+                                      const StageCallback& progress, MappingState* state);
 
 /// The sparse map that came with a calibration of another verdict than kFail.
 std::shared_ptr<const SparseMap> mapOfCalibration(const RigCalibratorOptions& options,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "vcharge_calibration/hand_eye.h"
+#include "vcharge_calibration/inter_camera_options.h"
 #include "vcharge_calibration/rig_adjustment_options.h"
 #include "vcharge_core/options.h"
 #include "vcharge_features/feature_extractor.h"
@@ -27,6 +28,7 @@ struct RigCalibratorOptions {
   TriangulationOptions triangulation;
   LoopClosureOptions loops;
   LandmarkSearchOptions search;
+  InterCameraOptions inter_camera;
   RigAdjustmentOptions adjustment = defaultAdjustment();
 
   static RobustOptions defaultCameraMotion();
@@ -48,6 +50,7 @@ struct RigCalibratorOptions {
     visit("triangulation", triangulation);
     visit("loops", loops);
     visit("search", search);
+    visit("inter_camera", inter_camera);
     visit("adjustment", adjustment);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
