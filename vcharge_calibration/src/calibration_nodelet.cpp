@@ -1,27 +1,21 @@
-#include <exception>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include <nav_msgs/Path.h>
 #include <nodelet/nodelet.h>
-#include <sensor_msgs/PointCloud2.h>
 #include <std_srvs/Trigger.h>
-#include <vcharge_msgs/CalibrationStatus.h>
-#include <visualization_msgs/MarkerArray.h>
 #include <yaml-cpp/yaml.h>
 #include <pluginlib/class_list_macros.hpp>
 
-#include "calibration_messages.h"
+#include "calibration_display.h"
 #include "vcharge_calibration/rig_calibration_files.h"
 #include "vcharge_calibration/rig_calibration_session.h"
 #include "vcharge_core/sparse_map_file.h"
-#include "vcharge_mapping/live_view.h"
 #include "vcharge_ros/live_drive_source.h"
 #include "vcharge_ros/nodelet_support.h"
 #include "vcharge_ros/parameters.h"
-#include "vcharge_ros/sparse_map_conversions.h"
 
 namespace vcharge {
 
@@ -68,15 +62,12 @@ class CalibrationNodelet : public nodelet::Nodelet {
     readFieldsFromParameters(private_node, "source", &source_options);
     source_ = std::make_unique<LiveDriveSource>(node, rig, source_options);
     session_ = std::make_unique<RigCalibrationSession>(
-        rig, options_, session_options, [this](const Status& status) { publish(status); },
+        rig, options_, session_options, [this](const Status& status) { display_->tell(status); },
         [this](const MappingState& state, const CameraRig& guess) { watch(state, guess); },
         [this](const FinishedCalibration& work) { finish(work); });
     // Nothing throws any more: a nodelet that does not load must leave no publisher behind.
-    status_publisher_ = node.advertise<vcharge_msgs::CalibrationStatus>("/calibration/status", 10, true);
-    path_publisher_ = node.advertise<nav_msgs::Path>("/calibration/trajectory", 1, true);
-    landmark_publisher_ = node.advertise<sensor_msgs::PointCloud2>("/calibration/landmarks", 1, true);
-    camera_publisher_ = node.advertise<visualization_msgs::MarkerArray>("/calibration/cameras", 1, true);
-    publish(session_->status());
+    display_ = std::make_unique<CalibrationDisplay>(&node, options_);
+    display_->tell(session_->status());
     addDiagnostics("", [this] { return source_->report(); });
     addDiagnostics("/rig", [this] { return report(); });
     calibrate_ = advertiseTrigger(&private_node, "calibrate", &guard_,
@@ -103,18 +94,10 @@ class CalibrationNodelet : public nodelet::Nodelet {
     response->message = "a new drive begins";
   }
 
-  /// From the thread of the drive and that of the calibration.
-  void publish(const Status& status) {
-    vcharge_msgs::CalibrationStatus message = toStatusMessage(status);
-    message.header.stamp = ros::Time::now();
-    status_publisher_.publish(message);
-  }
-
   void watch(const MappingState& state, const CameraRig& guess) {
     const Status status = session_->status();
     if (status.phase != RigCalibrationSession::Phase::kCalibrated) {  // what was found stays to be seen
-      show(state, guess, status,
-           recentLandmarksByCamera(state, guess, options_.triangulation, kShownKeyframes));
+      display_->showDrive(status, state, guess);
     }
   }
 
@@ -127,19 +110,8 @@ class CalibrationNodelet : public nodelet::Nodelet {
         writeSparseMap(*mapOfCalibration(options_, work.state), provenance, map_);
       }
       writeRigAndTrajectory(output_, trajectory_, work.result, work.state, provenance);
-      Status status = session_->status();
-      status.phase = RigCalibrationSession::Phase::kCalibrated;
-      status.result = std::make_shared<const RigCalibration>(work.result);
-      show(work.state, *work.result.rig, status, landmarksByCamera(work.state.data));
+      display_->showResult(session_->status(), work);
     }
-  }
-
-  void show(const MappingState& state, const CameraRig& rig, const Status& status,
-            const LandmarksByCamera& landmarks) {
-    landmark_publisher_.publish(toCloud(landmarks, kFrame));
-    path_publisher_.publish(makePath(keyframePath(state), kFrame));
-    camera_publisher_.publish(
-        toCameraMarkers(rig, state.data.keyframes.back().map_from_vehicle, toStatusMessage(status), kFrame));
   }
 
   DriveMonitor::Report report() {
@@ -155,13 +127,11 @@ class CalibrationNodelet : public nodelet::Nodelet {
     return report;
   }
 
-  static constexpr const char* kFrame = "map";
-  static constexpr int kShownKeyframes = 20;
   RigCalibratorOptions options_;
   std::string output_, map_, trajectory_, report_;  // paths
   std::map<std::string, std::string> provenance_;
   CallbackGuard guard_{"calibration"};
-  ros::Publisher status_publisher_, path_publisher_, landmark_publisher_, camera_publisher_;
+  std::unique_ptr<CalibrationDisplay> display_;
   std::unique_ptr<RigCalibrationSession> session_;
   std::unique_ptr<LiveDriveSource> source_;
   std::vector<std::unique_ptr<NodeletDiagnostics>> diagnostics_;

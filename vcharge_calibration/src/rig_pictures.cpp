@@ -14,7 +14,7 @@ constexpr size_t kMaxDrawnLandmarks = 20000;
 constexpr size_t kMaxDrawnLines = 3000;
 constexpr double kMargin_m = 10.0;
 constexpr int kColumns = 16, kRows = 10, kMinPerCell = 10;
-constexpr const char* kPathCss = "stroke=\"#333\" stroke-width=\"1.5\" fill=\"none\"";
+constexpr const char* kPathCss = "stroke=\"#333\" stroke-width=\"1.5\"";
 
 using Points = std::vector<Eigen::Vector2d>;
 using Segments = std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>>;

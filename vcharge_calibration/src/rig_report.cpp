@@ -148,10 +148,12 @@ std::string seamsOf(const RigCalibration& result, const KeyframeImages& images) 
     if (cells.empty()) {
       cells.push_back(rig.cameras[point.first].name + ", " + rig.cameras[point.second].name);
     }
-    cells.push_back(!point.is_seen
-                        ? "not seen by both"
-                        : "\u00b1 " + toText(100.0 * point.sigma_m, 1) +
-                              (before == nullptr ? "" : " (" + toText(100.0 * point.before_m, 1) + ")"));
+    cells.push_back(!point.is_seen                  ? "not seen by both"
+                    : !std::isfinite(point.sigma_m) ? "not known"
+                                                    : "\u00b1 " + toText(100.0 * point.sigma_m, 1));
+    if (point.is_seen && before != nullptr) {
+      cells.back() += " (" + toText(100.0 * point.before_m, 1) + ")";
+    }
     if (cells.size() > kSeamDistances_m.size()) {
       text += rowOf(cells);
       cells.clear();
@@ -206,7 +208,7 @@ std::string makeRigReport(const std::string& title, const RigCalibration& result
             checksOf(result);
   }
   // After a failure there may be poses and landmarks all the same, which show what is wrong.
-  if (state.data.rig->hasExtrinsics() && !state.data.keyframes.empty()) {
+  if (state.data.rig != nullptr && state.data.rig->hasExtrinsics() && !state.data.keyframes.empty()) {
     body += mapsOf(result, state);
     body += result.rig != nullptr ? seamsOf(result, images) : "";
     body += sharedOf(state, images) + errorsOf(state);
