@@ -20,9 +20,10 @@ void calibrate(const RigToolArguments& arguments, const std::string& map_file,
   const std::shared_ptr<const SparseMap> map = readSparseMap(map_file);
   MapRigCalibrator calibrator(map, *rig, options);
   followDrive(arguments, rig, &calibrator);
-  const RigCalibration result =
-      finishAndPrint(arguments, calibrator.state(),
-                     [&](const StageCallback& progress) { return calibrator.finish(progress); });
+  const RigCalibration result = finishAndPrint(
+      arguments, calibrator.state(),
+      [&](const StageCallback& progress) { return calibrator.finish(progress); }, calibrator.images(),
+      [&] { return calibrator.reportSection(); });
   auto provenance = provenanceOf(arguments, "calibrate_rig_from_map", option_text, result);
   provenance["map"] = map_file;
   provenance["map_hash"] = map->contentHash();

@@ -60,7 +60,8 @@ std::vector<MotionPair> motionsInMap(const std::vector<MapKeyframeView>& views,
 class MapRigBackEnd {
  public:
   MapRigBackEnd(const MapRigCalibratorOptions& options, const SparseMap& map, const MapLocalizer& localizer,
-                const std::vector<MapKeyframeView>& views, const StageCallback& progress, MappingState* state)
+                const std::vector<MapKeyframeView>& views, const StageCallback& progress, MappingState* state,
+                std::vector<int32_t>* landmark_of_track)
       : options_(options),
         map_(map),
         localizer_(localizer),
@@ -68,7 +69,8 @@ class MapRigBackEnd {
         progress_(progress),
         state_(state),
         data_(&state->data),
-        series_(*state) {}
+        series_(*state),
+        landmark_of_track_(landmark_of_track) {}
 
   RigCalibration run() {
     result_.is_from_map = true;
@@ -241,6 +243,7 @@ class MapRigBackEnd {
       }
     }
     data_->tracks.clear();
+    landmark_of_track_->clear();
     priors_.landmark_information.clear();
     const Eigen::Matrix3d own_m2 =
         options_.landmark_sigma_m * options_.landmark_sigma_m * Eigen::Matrix3d::Identity();
@@ -252,6 +255,7 @@ class MapRigBackEnd {
       const MapLandmark& in_map = map_.landmarks()[landmark];
       track.position_m = in_map.position_m;
       data_->tracks.push_back(std::move(track));
+      landmark_of_track_->push_back(landmark);
       priors_.landmark_information.emplace_back((in_map.covariance_m2 + own_m2).inverse());
     }
   }
@@ -270,6 +274,7 @@ class MapRigBackEnd {
   MappingState* const state_;
   MappingData* const data_;
   const OdometrySeries series_;
+  std::vector<int32_t>* const landmark_of_track_;
   RigPriors priors_;
   RigCalibration result_;
 };
@@ -278,8 +283,9 @@ class MapRigBackEnd {
 
 RigCalibration runMapRigBackEnd(const MapRigCalibratorOptions& options, const SparseMap& map,
                                 const MapLocalizer& localizer, const std::vector<MapKeyframeView>& views,
-                                const StageCallback& progress, MappingState* state) {
-  return MapRigBackEnd(options, map, localizer, views, progress, state).run();
+                                const StageCallback& progress, MappingState* state,
+                                std::vector<int32_t>* landmark_of_track) {
+  return MapRigBackEnd(options, map, localizer, views, progress, state, landmark_of_track).run();
 }
 
 }  // namespace vcharge

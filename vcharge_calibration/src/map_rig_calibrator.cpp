@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include "map_rig_back_end.h"
+#include "rig_pictures.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/stage_timer.h"
 
@@ -85,12 +86,14 @@ void MapRigCalibrator::processFrame(Timestamp stamp, const std::vector<Image>& i
                                     const RigidTransform& odom_from_vehicle) {
   const StageTimer timer("finding cameras", &state_.report.stage_s);
   if (views_.empty()) {
+    images_.add(0, images);
     addKeyframe(stamp, localizer_->extract(images), odom_from_vehicle);
     return;
   }
   const RigidTransform since = state_.data.keyframes.back().odom_from_vehicle.inverse() * odom_from_vehicle;
   if (since.translation().norm() >= options_.keyframe_distance_m ||
       angleOfRotation(since.rotation()) >= options_.keyframe_turn_rad) {
+    images_.add(static_cast<int32_t>(views_.size()), images);
     addKeyframe(stamp, localizer_->extract(images), odom_from_vehicle);
   } else {
     state_.frames.push_back(
@@ -150,7 +153,41 @@ std::optional<PoseFix> MapRigCalibrator::findCamera(const RigFeatures& features,
 RigCalibration MapRigCalibrator::finish(const StageCallback& progress) {
   gatherer_->finish();
   return runMapRigBackEnd(
-      options_, *map_, *localizer_, views_, progress ? progress : [](const StageProgress&) {}, &state_);
+      options_, *map_, *localizer_, views_, progress ? progress : [](const StageProgress&) {}, &state_,
+      &landmark_of_track_);
+}
+
+std::string MapRigCalibrator::reportSection() const {
+  if (landmark_of_track_.empty()) {
+    return "";
+  }
+  std::vector<LandmarkSightings> sightings;
+  for (size_t t = 0; t < state_.data.tracks.size(); ++t) {
+    const Track& track = state_.data.tracks[t];
+    if (!track.position_m) {
+      continue;
+    }
+    const auto landmark = static_cast<size_t>(landmark_of_track_[t]);
+    const auto first = static_cast<size_t>(*map_->observationsOfLandmark(landmark).first);
+    sightings.push_back({*track.position_m, static_cast<size_t>(map_->observations()[first].camera), {}});
+    for (const TrackObservation& observation : track.observations) {
+      sightings.back().cameras_m.push_back(
+          state_.data.keyframes[observation.keyframe].map_from_vehicle *
+          state_.data.rig->cameras[observation.camera].vehicle_from_camera->translation());
+    }
+  }
+  std::vector<Eigen::Vector3d> path_m;
+  for (const Keyframe& keyframe : state_.data.keyframes) {
+    path_m.push_back(keyframe.map_from_vehicle.translation());
+  }
+  std::vector<std::string> names;
+  for (const RigCamera& camera : map_->rig().cameras) {
+    names.push_back(camera.name);
+  }
+  return "<h2>Landmarks of the map that were seen</h2><p>In the colour of the map's camera that saw them "
+         "first, "
+         "with lines to the cameras that see them now.</p><div class=\"row\">" +
+         drawSightings(sightings, path_m, names) + "</div>";
 }
 
 }  // namespace vcharge

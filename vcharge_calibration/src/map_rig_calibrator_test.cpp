@@ -96,6 +96,7 @@ TEST_F(MapRigCalibratorTest, FindsTheCamerasWithTheMapsScaleWhateverTheOdometerC
     EXPECT_LT(sigmas.head<2>().maxCoeff(), 0.01);
   }
   EXPECT_NEAR(calibrator->state().data.odometry_distance_scale, 1.0 / 1.02, 0.001);
+  EXPECT_NE(calibrator->reportSection().find("<svg"), std::string::npos);
 }
 
 TEST_F(MapRigCalibratorTest, GivesTheSameBitsOnOneThread) {

@@ -12,11 +12,12 @@ namespace vcharge {
 namespace fs = std::filesystem;
 
 void writeRigReport(const std::string& folder, const std::string& title, const RigCalibration& result,
-                    const MappingState& state, const KeyframeImages& images) {
+                    const MappingState& state, const KeyframeImages& images,
+                    const std::string& more_sections) {
   if (!folder.empty()) {
     createFolder(folder);
     writeTextFileAtomically((fs::path(folder) / "rig_report.html").string(),
-                            makeRigReport(title, result, state, images));
+                            makeRigReport(title, result, state, images, more_sections));
   }
 }
 

@@ -41,7 +41,8 @@ void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const 
 
 RigCalibration finishAndPrint(const RigToolArguments& arguments, const MappingState& state,
                               const std::function<RigCalibration(const StageCallback&)>& finish,
-                              const KeyframeImages& images) {
+                              const KeyframeImages& images,
+                              const std::function<std::string()>& more_sections) {
   RigCalibration result;
   {
     ProgressBar bar("calibrating");
@@ -58,7 +59,7 @@ RigCalibration finishAndPrint(const RigToolArguments& arguments, const MappingSt
     std::printf("  %s\n", remark.c_str());
   }
   writeRigReport(arguments.report, "Rig by " + std::filesystem::path(arguments.bag).filename().string(),
-                 result, state, images);
+                 result, state, images, more_sections ? more_sections() : "");
   if (result.verdict == Verdict::kFail) {
     throw InputError(arguments.bag + ": FAIL: " + result.remarks.front());
   }

@@ -30,11 +30,12 @@ void requireRigToolArguments(const RigToolArguments& arguments);
 void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const CameraRig>& rig,
                  DriveConsumer* consumer);
 
-/// Runs the calibration with a progress bar, prints what came out, and writes the report. InputError with the
-/// verdict's first reason where it is kFail.
+/// Runs the calibration with a progress bar, prints what came out, and writes the report, with more sections
+/// where there are some. InputError with the verdict's first reason where it is kFail.
 RigCalibration finishAndPrint(const RigToolArguments& arguments, const MappingState& state,
                               const std::function<RigCalibration(const StageCallback&)>& finish,
-                              const KeyframeImages& images = KeyframeImages());
+                              const KeyframeImages& images,
+                              const std::function<std::string()>& more_sections = nullptr);
 
 /// What the rig and the map say of where they come from.
 std::map<std::string, std::string> provenanceOf(const RigToolArguments& arguments, const std::string& program,

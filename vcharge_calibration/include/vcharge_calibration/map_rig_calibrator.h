@@ -2,8 +2,10 @@
 
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "vcharge_calibration/keyframe_images.h"
 #include "vcharge_calibration/map_rig_calibrator_options.h"
 #include "vcharge_calibration/rig_calibration.h"
 #include "vcharge_core/drive_source.h"
@@ -51,6 +53,11 @@ class MapRigCalibrator : public DriveConsumer {
   /// After finish() with another verdict than kFail: poses of all frames in the map.
   Trajectory trajectory() const { return trajectoryOf(state_); }
   const MappingState& state() const { return state_; }
+  /// Of a few keyframes, for pictures.
+  const KeyframeImages& images() const { return images_; }
+  /// For the report: which landmarks of the map are seen from where, in the colours of the cameras that saw
+  /// them first. HTML; empty before finish() and after a failure.
+  std::string reportSection() const;
 
  private:
   void processFrame(Timestamp stamp, const std::vector<Image>& images,
@@ -62,6 +69,8 @@ class MapRigCalibrator : public DriveConsumer {
   std::shared_ptr<const CameraRig> rig_;  ///< each camera is where the vehicle is
   std::unique_ptr<MapLocalizer> localizer_;
   std::vector<MapKeyframeView> views_;
+  KeyframeImages images_;
+  std::vector<int32_t> landmark_of_track_;  ///< of the map, after finish()
   MappingState state_;
   std::unique_ptr<FrameGatherer> gatherer_;
   double travelled_m_ = 0.0;

@@ -9,9 +9,10 @@
 
 namespace vcharge {
 
-/// Writes rig_report.html into a folder, which is made; an empty one: nowhere.
+/// Writes rig_report.html (see makeRigReport()) into a folder, which is made; an empty one: nowhere.
 void writeRigReport(const std::string& folder, const std::string& title, const RigCalibration& result,
-                    const MappingState& state, const KeyframeImages& images);
+                    const MappingState& state, const KeyframeImages& images,
+                    const std::string& more_sections = "");
 
 /// Writes trajectory (*.tum, where not empty) and rig.yaml, the rig last, each atomically. InputError names
 /// what cannot be written. Not after kFail.
