@@ -106,14 +106,22 @@ class CalibrationNodeletTest(unittest.TestCase):
                      for key, status in list(self.status.items()) if name in key), {})
 
     def publish(self, share=1.0):
-        """The first share of the drive; returns once all frames but those that wait to be sorted were followed."""
+        """The first share of the drive; returns once the nodelet has followed all of it and rests: a nodelet that is
+        unloaded inside a callback outlives its queues."""
         count = int(share * len(self.messages))
         for topic, message in self.messages[:count]:
             self.publishers[topic].publish(message)
             time.sleep(0.0005)
         expected = int(share * self.num_frames) - 10
-        wait_for(lambda: int(self.values("calibration/rig").get("frames", 0)) >= expected, "the frames", WORK_TIMEOUT_S)
-        time.sleep(1.0)
+        wait_for(lambda: self.num_followed() >= expected, "the frames", WORK_TIMEOUT_S)
+        while True:
+            before = self.num_followed()
+            time.sleep(2.5)  # more than two periods of diagnostics
+            if self.num_followed() == before:
+                break
+
+    def num_followed(self):
+        return int(self.values("calibration/rig").get("frames", 0))
 
     def wait_for_end(self):
         return wait_for(lambda: next((state for state in list(self.states) if state.state in ENDED), None),

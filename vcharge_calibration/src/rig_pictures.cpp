@@ -46,7 +46,7 @@ std::string drawSparseMap(const RigScene& scene) {
     for (size_t i = 0; i < scene.landmarks[camera].size(); i += step) {
       shown.emplace_back(scene.landmarks[camera][i].head<2>());
     }
-    plot.addDots(shown, 1.4, colourOfCamera(camera));
+    plot.addDots(shown, 2.0, colourOfCamera(camera));
     plot.addLegend(colourOfCamera(camera), scene.rig->cameras[camera].name);
   }
   plot.addLine(path, kPathCss);
