@@ -20,7 +20,7 @@ PACKAGES = rospkg.RosPack()
 LAUNCH = pathlib.Path(PACKAGES.get_path("vcharge_launch"))
 CONFIG = pathlib.Path(PACKAGES.get_path("vcharge_config"))
 NODELET_PACKAGES = ("vcharge_ros", "vcharge_calibration", "vcharge_camera_driver", "vcharge_dense", "vcharge_mapping",
-                    "vcharge_localization")
+                    "vcharge_localization", "vcharge_obstacles")
 
 
 def nodelet_types():
@@ -140,7 +140,7 @@ class LaunchFilesTest(unittest.TestCase):
 
     def test_options_of_the_nodelets_are_those_of_the_yaml(self):
         activities = {"mapping": ("mapping", "mapping"), "localization": ("localization", "localization"),
-                      "calibration": ("calibration", "calibrate_rig")}
+                      "calibration": ("calibration", "calibrate_rig"), "obstacles": ("obstacles", "obstacles")}
         for options in sorted(CONFIG.glob("*.yaml")):
             if options.stem == "calibration_in_map":  # of a tool alone
                 continue
@@ -173,7 +173,8 @@ class LaunchFilesTest(unittest.TestCase):
         readers = {"calibration": [tool("vcharge_calibration", "calibrate_rig")],
                    "calibration_in_map": [tool("vcharge_calibration", "calibrate_rig_from_map"), "--map", "/nowhere/drive.bag"],
                    "mapping": [tool("vcharge_mapping", "build_map")],
-                   "localization": [tool("vcharge_localization", "localize_drive"), "--map", "/nowhere/drive.bag"]}
+                   "localization": [tool("vcharge_localization", "localize_drive"), "--map", "/nowhere/drive.bag"],
+                   "obstacles": [tool("vcharge_obstacles", "detect_obstacles")]}
         dense = [tool("vcharge_dense", "compute_range_maps")]
         for rig, option in [(rig, options[0]) for rig in rigs] + [(rigs[0], option) for option in options]:
             # Bag and map are read last: an error about them says that rig and options were taken.
@@ -187,7 +188,8 @@ class LaunchFilesTest(unittest.TestCase):
         cameras = yaml.safe_load((CONFIG / "rigs" / "golf_nominal.yaml").read_text())["cameras"]
         published = re.compile(rf"/camera/({'|'.join(cameras)})/image_raw|"
                                rf"/dense/({'|'.join(cameras)})/(points|range/(image|confidence|standard_deviation))|"
-                               r"/calibration/(image|landmarks|trajectory|cameras)|/mapping/(landmarks|trajectory|loop_edges)|/localization/(pose|sightings)")
+                               r"/calibration/(image|landmarks|trajectory|cameras)|/mapping/(landmarks|trajectory|loop_edges)|/localization/(pose|sightings)|"
+                               r"/obstacles/(grid|scan|markers)")
 
         def topics(node):
             if isinstance(node, dict):

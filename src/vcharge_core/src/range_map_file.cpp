@@ -8,9 +8,9 @@
 #include <optional>
 
 #include <yaml-cpp/yaml.h>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "float_tiff.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/file_io.h"
 #include "vcharge_core/options.h"
@@ -32,22 +32,6 @@ std::optional<Timestamp> stampOfName(const std::string& name) {
 
 std::string stemOf(const std::string& folder, const std::string& camera_name, Timestamp stamp) {
   return (fs::path(folder) / camera_name / std::to_string(stamp.nanoseconds())).string();
-}
-
-void writeFloatTiff(const cv::Mat& image, const std::string& path) {
-  writeFileAtomically(path, [&](const std::string& temporary) {
-    if (!cv::imwrite(temporary, image)) {
-      throw InputError(path + ": cannot be written");
-    }
-  });
-}
-
-cv::Mat readFloatTiff(const std::string& path) {
-  cv::Mat image = fs::is_regular_file(path) ? cv::imread(path, cv::IMREAD_UNCHANGED) : cv::Mat();
-  if (image.empty() || image.type() != CV_32FC1) {
-    throw InputError(path + ": expected a TIFF of 32-bit floats");
-  }
-  return image;
 }
 
 }  // namespace

@@ -150,4 +150,19 @@ cv::Mat WorkingCamera::undistort(const cv::Mat& pixels) const {
   return undistorted;
 }
 
+WorkingCamera rebuildWorkingCamera(const MeiCamera& model, cv::Size size, const RigCamera& camera) {
+  WorkingCameraOptions options;
+  options.image_scale = static_cast<double>(size.width) / camera.image_size_px.width;
+  const auto build = [&] {
+    return WorkingCamera(camera.model, camera.image_size_px, camera.field_of_view_rad, camera.mask, options);
+  };
+  options.focal_scale = model.gamma1() / build().model().gamma1();
+  WorkingCamera working = build();
+  const double difference = (working.model().parameters() - model.parameters()).cwiseAbs().maxCoeff();
+  if (working.size() != size || !(difference <= 1e-6)) {
+    throw InputError("camera '" + camera.name + "': the range maps were made with another rig");
+  }
+  return working;
+}
+
 }  // namespace vcharge

@@ -23,23 +23,6 @@ namespace {
 using vcharge::RigidTransform;
 using vcharge::Timestamp;
 
-/// The working camera of stored range maps, rebuilt from their size and focal length.
-vcharge::WorkingCamera rebuildWorkingCamera(const vcharge::RangeMap& map, const vcharge::RigCamera& camera) {
-  vcharge::WorkingCameraOptions options;
-  options.image_scale = static_cast<double>(map.range_m.cols) / camera.image_size_px.width;
-  const vcharge::WorkingCamera unscaled(camera.model, camera.image_size_px, camera.field_of_view_rad,
-                                        camera.mask, options);
-  options.focal_scale = map.camera.gamma1() / unscaled.model().gamma1();
-  vcharge::WorkingCamera working(camera.model, camera.image_size_px, camera.field_of_view_rad, camera.mask,
-                                 options);
-  const double difference = (working.model().parameters() - map.camera.parameters()).cwiseAbs().maxCoeff();
-  if (working.size() != map.range_m.size() || difference > 1e-6) {
-    throw vcharge::InputError("camera '" + camera.name +
-                              "': the range maps were made with another rig than --rig");
-  }
-  return working;
-}
-
 /// Judges every range map whose image passes by in the bag.
 class Judge : public vcharge::DriveConsumer {
  public:
@@ -75,7 +58,7 @@ class Judge : public vcharge::DriveConsumer {
     vcharge::checkImageSize(rig_camera, truth.size(), truth_folder_ + "/" + rig_camera.name);
     const vcharge::RangeMap map = vcharge::readRangeMap(range_folder_, rig_camera.name, stamp);
     if (!camera.working) {
-      camera.working = rebuildWorkingCamera(map, rig_camera);
+      camera.working = vcharge::rebuildWorkingCamera(map.camera, map.range_m.size(), rig_camera);
     }
     const cv::Mat working_image = camera.working->undistort(image.pixels);
     const cv::Mat working_truth = vcharge::resampleRangeTruth(truth, *camera.working);

@@ -3,6 +3,7 @@
 #include <opencv2/core.hpp>
 
 #include "vcharge_core/camera_model.h"
+#include "vcharge_core/camera_rig.h"
 
 namespace vcharge {
 
@@ -48,5 +49,9 @@ class WorkingCamera {
   cv::Mat valid_mask_;
   cv::Mat sensor_pixels_;
 };
+
+/// The working camera of range maps that have this model and size, rebuilt from the rig's camera that they
+/// were made of. InputError when they were made with another rig.
+WorkingCamera rebuildWorkingCamera(const MeiCamera& model, cv::Size size, const RigCamera& camera);
 
 }  // namespace vcharge

@@ -1,0 +1,156 @@
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "vcharge_evaluation/obstacle_map_errors.h"
+#include "vcharge_evaluation/obstacle_scan_errors.h"
+
+namespace vcharge {
+namespace {
+
+/// A wall along x at y = 3, of the given height, as cameras would see it.
+std::vector<SeenPoint> makeWall(double height_m, double y_m = 3.0) {
+  std::vector<SeenPoint> points;
+  for (double x = -6.0; x < 6.0; x += 0.01) {
+    for (double z = 0.02; z < height_m; z += 0.02) {
+      points.push_back({Eigen::Vector3d(x, y_m, z).cast<float>(), 1.0F});
+    }
+  }
+  return points;
+}
+
+ObstacleScan makeScan(double wall_y_m, double error_m) {
+  ObstacleScan scan = ObstacleScan::unknown(360, 10.0);
+  for (size_t i = 0; i < scan.size(); ++i) {
+    const double sine = std::sin(scan.angle_rad(i));
+    if (sine > 0.3) {
+      scan.range_m[i] = static_cast<float>(wall_y_m / sine + error_m);
+      scan.range_sigma_m[i] = 0.05F;
+    }
+  }
+  return scan;
+}
+
+TEST(ObstacleScanErrorsTest, KnownErrorIsFound) {
+  ObstacleScanEvaluator evaluator;
+  evaluator.add(makeScan(3.0, 0.1), makeWall(1.0), RigidTransform());
+  const RayErrors errors = evaluator.aside();
+  EXPECT_GT(errors.num_judged, 80U);
+  EXPECT_NEAR(errors.mean_signed_m, 0.1, 0.05);
+  EXPECT_NEAR(errors.error_own_ray_m.percentile_50, 0.1, 0.03);
+  EXPECT_LT(errors.share_within_one_sigma, 0.6);
+  EXPECT_EQ(evaluator.ahead().num_judged, 0U);
+}
+
+TEST(ObstacleScanErrorsTest, NothingReportedAndWallsBehindAreMissed) {
+  ObstacleScanEvaluator evaluator;
+  evaluator.add(ObstacleScan::unknown(360, 10.0), makeWall(1.0), RigidTransform());
+  EXPECT_EQ(evaluator.aside().num_missed, evaluator.aside().num_judged);
+  evaluator.add(makeScan(4.0, 0.0), makeWall(1.0), RigidTransform());
+  EXPECT_EQ(evaluator.aside().num_missed, evaluator.aside().num_judged);
+  EXPECT_EQ(evaluator.aside().error_m.count, 0U);
+}
+
+TEST(ObstacleScanErrorsTest, KerbsAreNotJudgedAsWalls) {
+  ObstacleScanEvaluator evaluator;
+  evaluator.add(makeScan(3.0, 0.0), makeWall(0.15), RigidTransform());
+  EXPECT_EQ(evaluator.aside().num_judged, 0U);
+}
+
+/// One box of 0.4 m beside a path along x; height map of the same.
+class ObstacleMapErrorsTest : public ::testing::Test {
+ protected:
+  ObstacleMapErrorsTest() {
+    box_.kind = "box";
+    box_.footprint_m = {{1.0, 2.5}, {1.4, 2.5}, {1.4, 2.9}, {1.0, 2.9}};
+    box_.top_z_m = 0.5;
+    heights_.height_m = cv::Mat(200, 200, CV_32FC1, cv::Scalar(0.0));
+    heights_.origin_m = {-9.95, -9.95};
+    for (int row = 125; row < 129; ++row) {
+      heights_.height_m.row(row).colRange(110, 114).setTo(0.5F);
+    }
+    for (double x = 0.0; x < 3.0; x += 0.1) {
+      path_.push_back(RigidTransform::planar(x, 0.0, 0.0));
+    }
+    for (double x = 1.0; x < 1.4; x += 0.02) {
+      for (double z = 0.12; z < 0.5; z += 0.05) {
+        points_.push_back({Eigen::Vector3d(x, 2.5, z).cast<float>(), 1.0F});
+      }
+    }
+  }
+  ObstacleMap mapWith(const std::vector<Eigen::Vector2d>& occupied,
+                      const std::vector<Eigen::Vector2d>& free) const {
+    ObstacleMap map = ObstacleMap::unobserved({160, 160}, 0.1);
+    map.origin_m = {-8.0, -8.0};
+    const auto set = [&](const Eigen::Vector2d& place, int8_t state) {
+      map.state.at<int8_t>(static_cast<int>(std::floor((place.y() + 8.0) / 0.1)),
+                           static_cast<int>(std::floor((place.x() + 8.0) / 0.1))) = state;
+    };
+    for (const auto& place : occupied) {
+      set(place, kCellOccupied);
+    }
+    for (const auto& place : free) {
+      set(place, kCellFree);
+    }
+    return map;
+  }
+  ObstacleMapErrors judge(const std::vector<Eigen::Vector2d>& occupied,
+                          const std::vector<Eigen::Vector2d>& free, size_t poses = 30) {
+    ObstacleMapEvaluator evaluator({box_}, heights_, path_);
+    for (size_t i = 0; i < poses; ++i) {
+      ObstacleMap map = mapWith(occupied, free);
+      map.fixed_from_vehicle = path_[i];
+      evaluator.add(map, points_, path_[i], {}, {});
+    }
+    return evaluator.errors();
+  }
+
+  TruthObstacle box_;
+  TruthHeights heights_;
+  std::vector<RigidTransform> path_;
+  std::vector<SeenPoint> points_;
+};
+
+TEST_F(ObstacleMapErrorsTest, ReportedMissedAndTooEarlyToTell) {
+  const ObstacleMapErrors reported = judge({{1.05, 2.55}}, {});
+  ASSERT_EQ(reported.obstacles.size(), 1U);
+  EXPECT_TRUE(reported.obstacles[0].reported);
+  EXPECT_NEAR(reported.obstacles[0].distance_m, 1.6, 0.05);
+  EXPECT_NEAR(reported.driven_m, 2.9, 1e-6);
+  const ObstacleMapErrors missed = judge({{1.05, 3.55}}, {});
+  ASSERT_EQ(missed.obstacles.size(), 1U);
+  EXPECT_FALSE(missed.obstacles[0].reported);
+  EXPECT_TRUE(judge({}, {}, 8).obstacles.empty());  // less than the grace
+}
+
+TEST_F(ObstacleMapErrorsTest, FalseCellsAndFreeCellsInsideObstaclesAreCounted) {
+  const ObstacleMapErrors errors = judge({{1.05, 2.55}, {1.55, -2.0}}, {{1.25, 2.75}, {2.0, 1.5}});
+  EXPECT_EQ(errors.num_false_cells, 1U);
+  EXPECT_EQ(errors.num_false_left, 1U);
+  EXPECT_NEAR(errors.false_cells_per_10_m, 10.0 / 2.9, 0.01);
+  EXPECT_EQ(errors.num_free_inside, 1U);
+  EXPECT_EQ(errors.num_observed_inside, 1U);
+}
+
+TEST(ObstacleTruthTest, DistanceToAPolygon) {
+  const std::vector<Eigen::Vector2d> square = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  EXPECT_EQ(distanceToPolygon({0.5, 0.5}, square), 0.0);
+  EXPECT_DOUBLE_EQ(distanceToPolygon({2.0, 0.5}, square), 1.0);
+  EXPECT_DOUBLE_EQ(distanceToPolygon({-3.0, -4.0}, square), 5.0);
+}
+
+TEST(ObstacleTruthTest, CellsOfTheWorldHaveTheirOwnKeys) {
+  SeenCells cells;
+  cells.add({-0.05, -3.25}, 3);
+  cells.add({-0.15, -3.25}, 2);
+  cells.add({5.0, 5.0}, 7);
+  EXPECT_EQ(cells.countAround({-0.05, -3.25}), 5);
+  EXPECT_EQ(cells.counts().size(), 3U);
+  for (const auto& [key, count] : cells.counts()) {
+    EXPECT_EQ(SeenCells::keyOf(SeenCells::middleOf(key)), key) << count;
+  }
+}
+
+}  // namespace
+}  // namespace vcharge

@@ -1,0 +1,150 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "vcharge_core/camera_rig.h"
+#include "vcharge_core/range_map.h"
+#include "vcharge_core/vehicle_odometry.h"
+#include "vcharge_obstacles/local_obstacle_map.h"
+#include "vcharge_obstacles/obstacle_detector.h"
+
+namespace vcharge {
+
+/// Where the map's cells stay: in odometry's frame, or in the map's, which they follow when localization
+/// moves it.
+enum class FixedFrame { kOdom, kMap };
+template <>
+inline std::vector<std::string> enumNames<FixedFrame>() {
+  return {"odom", "map"};
+}
+
+struct ObstacleMapperOptions {
+  std::vector<std::string> cameras;  ///< of the rig, by name; empty: all
+  FixedFrame fixed_frame = FixedFrame::kOdom;
+  ObstacleDetectorOptions detector;
+  LocalObstacleMapOptions map;
+  OdometryBufferOptions odometry;
+  double max_wait_s = 0.15;      ///< for a camera's range map of a stamp that others have delivered
+  double silent_s = 0.5;         ///< without any range map for so long, the map comes all the same
+  double max_silence_s = 1.0;    ///< a camera without range maps for longer, while driving, has stopped
+  double min_known_share = 0.1;  ///< of a camera's pixels with a range; with less it hardly sees
+  double max_step_m = 0.15;      ///< change of odometry's way from message to message: more is a jump
+  double max_step_rad = 0.05;
+  double anchor_step_m = 0.03;  ///< map -> odom moves the cells once it has changed by so much
+  double anchor_step_rad = 0.003;
+
+  template <class Visitor>
+  void visitFields(Visitor&& visit) {
+    visit("cameras", cameras);
+    visit("fixed_frame", fixed_frame);
+    visit("detector", detector);
+    visit("map", map);
+    visit("odometry", odometry);
+    visit("max_wait_s", max_wait_s);
+    visit("silent_s", silent_s);
+    visit("max_silence_s", max_silence_s);
+    visit("min_known_share", min_known_share);
+    visit("max_step_m", max_step_m);
+    visit("max_step_rad", max_step_rad);
+    visit("anchor_step_m", anchor_step_m);
+    visit("anchor_step_rad", anchor_step_rad);
+  }
+  void validate() const;  ///< throws std::invalid_argument naming the field
+};
+
+/// What a camera adds to the map at present.
+enum class ObstacleCameraState {
+  kNoRangeMaps,   ///< none yet, or they stopped while the vehicle drives
+  kStanding,      ///< the vehicle stands: motion stereo sees nothing
+  kHardlySees,    ///< few ranges: night, dirt, no texture
+  kGroundLost,    ///< the ground is tilted beyond the bounds: nothing is cleared
+  kGroundUnsure,  ///< few ground points: nothing is cleared
+  kMapping,
+};
+std::string toString(ObstacleCameraState state);
+
+struct ObstacleCameraStatus {
+  std::string camera_name;
+  ObstacleCameraState state = ObstacleCameraState::kNoRangeMaps;
+  std::string message;  ///< one line for people
+  GroundPlane ground;   ///< of the last range map
+  double known_share = 0.0;
+  uint64_t range_maps = 0;
+  uint64_t without_pose = 0;
+  uint64_t late = 0;  ///< came after their stamp had been fused, and were left out
+};
+
+/// The map after all range maps of one stamp, or, where none come, from time to time.
+struct ObstacleFrame {
+  ObstacleMap map;
+  ObstacleScan scan;                     ///< of the fused map
+  std::vector<CameraObstacles> cameras;  ///< that were added at this stamp, in the rig's order
+  std::vector<ObstacleCameraStatus> status;
+};
+
+/// Turns range maps and odometry into obstacle maps: one front for the nodelet and the offline tool. Range
+/// maps of one stamp are fused together, in the rig's order. Not thread safe.
+class ObstacleMapper {
+ public:
+  using FrameCallback = std::function<void(const ObstacleFrame&)>;
+
+  /// InputError when the rig lacks a camera of the options or the pose of one on the vehicle;
+  /// std::invalid_argument for bad options.
+  ObstacleMapper(std::shared_ptr<const CameraRig> rig, const ObstacleMapperOptions& options,
+                 FrameCallback on_frame);
+  ~ObstacleMapper();
+
+  void addOdometry(const VehicleOdometry& odometry);
+  /// From localization; needed for, and only heard with, fixed_frame: map.
+  void setMapFromOdom(const RigidTransform& map_from_odom);
+  /// InputError for a map of no camera in use, or made with another rig.
+  void addRangeMap(const RangeMap& map);
+  /// Fuses what still waits: the drive is over.
+  void finish();
+
+  /// Of the cameras in use, in the rig's order.
+  std::vector<ObstacleCameraStatus> status() const;
+  /// How often odometry jumped, and the map was emptied for it.
+  uint64_t numJumps() const { return num_jumps_; }
+  const PolarGrid& grid() const { return grid_; }
+  const ObstacleMapperOptions& options() const { return options_; }
+
+ private:
+  struct Camera;
+  struct Group {  // range maps of one stamp, by camera
+    std::map<size_t, CameraObstacles> cameras;
+  };
+
+  std::optional<RigidTransform> fixedFromVehicle(Timestamp stamp) const;
+  void watchForJumps(const VehicleOdometry& odometry);
+  bool isComplete(Timestamp stamp) const;
+  void fuseWaiting(bool all);
+  void fuse(Timestamp stamp, const Group& group, const RigidTransform& fixed_from_vehicle);
+  void emit(const std::vector<const CameraObstacles*>& cameras);
+  void emitWhenSilent(const VehicleOdometry& odometry);
+  void updateStatus(Camera* camera, const CameraObstacles& seen) const;
+  void startOver();
+
+  const std::shared_ptr<const CameraRig> rig_;
+  const ObstacleMapperOptions options_;
+  const FrameCallback on_frame_;
+  const PolarGrid grid_;
+  std::vector<std::unique_ptr<Camera>> cameras_;  // by index in the rig; null where not in use
+  OdometryBuffer poses_;
+  LocalObstacleMap map_;
+  std::map<Timestamp, Group> waiting_;
+  std::optional<Timestamp> last_fused_, last_emitted_;
+  std::optional<VehicleOdometry> last_odometry_;
+  std::optional<Eigen::Vector3d> last_velocity_;  // x, y, yaw per second
+  RigidTransform map_from_odom_, anchor_;
+  bool has_anchor_ = false;
+  uint64_t num_jumps_ = 0;
+};
+
+}  // namespace vcharge

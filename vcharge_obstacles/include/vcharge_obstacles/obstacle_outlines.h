@@ -1,0 +1,20 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "vcharge_core/obstacle_map.h"
+
+namespace vcharge {
+
+/// A connected group of occupied cells.
+struct ObstacleOutline {
+  std::vector<Eigen::Vector2d> corners_m;  ///< closed polygon around its cells, in the map's fixed frame
+  double height_m = 0.0;                   ///< of the highest cell
+};
+
+/// Outlines of all groups of occupied cells that touch, also by corners. Every occupied cell lies in one.
+std::vector<ObstacleOutline> findOutlines(const ObstacleMap& map);
+
+}  // namespace vcharge

@@ -1,0 +1,54 @@
+#include "cell_look.h"
+
+#include <cmath>
+
+namespace vcharge {
+namespace {
+
+// Half diagonal of a square cell over its side.
+constexpr double kHalfDiagonal = 0.7072;
+// So many sides of a cell around an obstacle no ground is believed, besides two sigmas of its range.
+constexpr double kMarginCells = 0.75;
+
+}  // namespace
+
+CellLooker::CellLooker(const CameraObstacles& seen, const PolarGrid& grid, double cell_m)
+    : seen_(seen), grid_(grid), cell_m_(cell_m), obstacles_of_ray_(static_cast<size_t>(grid.numRays())) {
+  for (const PolarObstacle& obstacle : seen.obstacles) {
+    obstacles_of_ray_[static_cast<size_t>(obstacle.ray)].push_back(&obstacle);
+  }
+}
+
+CellLook CellLooker::look(double angle_rad, double range_m, int bin) const {
+  const int middle = grid_.rayOf(angle_rad);
+  const int spread = static_cast<int>(kHalfDiagonal * cell_m_ / range_m / grid_.increment_rad() + 0.5);
+  CellLook look;
+  for (int step = middle - spread; step <= middle + spread; ++step) {
+    const int ray = grid_.wrap(step);
+    const size_t index = grid_.index(ray, bin);
+    look.free_share += seen_.free_share[index];
+    look.hidden_share += seen_.hidden_share[index];
+    look.unknown_share += seen_.unknown_share[index];
+    look.blocked = look.blocked || blocks(ray, range_m);
+  }
+  const int count = 2 * spread + 1;
+  look.free_share /= count;
+  look.hidden_share /= count;
+  look.unknown_share /= count;
+  return look;
+}
+
+bool CellLooker::blocks(int ray, double range_m) const {
+  for (const PolarObstacle* obstacle : obstacles_of_ray_[static_cast<size_t>(ray)]) {
+    const double margin_m = kMarginCells * cell_m_ + 2.0 * obstacle->range_sigma_m;
+    // Over what stands before it, ground can only be seen from higher up; else it is a mirror's.
+    const double sight_m = seen_.camera_height_m * (1.0 - obstacle->range_m / range_m);
+    if (std::abs(obstacle->range_m - range_m) < margin_m ||
+        (obstacle->range_m < range_m && sight_m < obstacle->height_m)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace vcharge

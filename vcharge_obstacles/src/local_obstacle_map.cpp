@@ -1,0 +1,367 @@
+#include "vcharge_obstacles/local_obstacle_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "cell_look.h"
+#include "vcharge_core/error.h"
+#include "vcharge_obstacles/map_scan.h"
+
+namespace vcharge {
+namespace {
+
+// A look's place counts so much more than those before it, so that a cell follows the odometry's drift.
+constexpr float kMemory = 0.9F;
+
+RigidTransform levelled(const RigidTransform& transform) {
+  return RigidTransform::planar(transform.translation().x(), transform.translation().y(),
+                                yawOfRotation(transform.rotation()));
+}
+
+Eigen::Vector2d transformed(const RigidTransform& transform, const Eigen::Vector2d& point_m) {
+  return (transform * Eigen::Vector3d(point_m.x(), point_m.y(), 0.0)).head<2>();
+}
+
+}  // namespace
+
+void LocalObstacleMapOptions::validate() const {
+  requireField(cell_size_m >= 0.01 && cell_size_m <= 1.0, "cell_size_m", "must be in [0.01, 1]", cell_size_m);
+  requireField(half_size_m >= 5.0 * cell_size_m && half_size_m <= 2000.0 * cell_size_m, "half_size_m",
+               "must be 5 to 2000 cells", half_size_m);
+  requireField(free_range_m > 0.0, "free_range_m", "must be positive", free_range_m);
+  requireField(occupied_range_m > 0.0, "occupied_range_m", "must be positive", occupied_range_m);
+  requireField(occupied_log_odds > 0.0, "occupied_log_odds", "must be positive", occupied_log_odds);
+  requireField(free_log_odds > 0.0, "free_log_odds", "must be positive", free_log_odds);
+  requireField(min_free_share > 0.0 && min_free_share <= 1.0, "min_free_share", "must be in (0, 1]",
+               min_free_share);
+  requireField(min_hidden_share > 0.0 && min_hidden_share <= 1.0, "min_hidden_share", "must be in (0, 1]",
+               min_hidden_share);
+  requireField(doubt >= 0.0 && doubt <= 1.0, "doubt", "must be in [0, 1]", doubt);
+  requireField(unknown_doubt >= 0.0 && unknown_doubt <= 1.0, "unknown_doubt", "must be in [0, 1]",
+               unknown_doubt);
+  requireField(blind_angle_rad >= 0.0, "blind_angle_rad", "must not be negative", blind_angle_rad);
+  requireField(look_distance_m > 0.0, "look_distance_m", "must be positive", look_distance_m);
+  requireField(occupied_threshold > 0.0, "occupied_threshold", "must be positive", occupied_threshold);
+  requireField(free_threshold < 0.0, "free_threshold", "must be negative", free_threshold);
+  requireField(max_log_odds > occupied_threshold, "max_log_odds", "must be above occupied_threshold",
+               max_log_odds);
+  requireField(min_log_odds < free_threshold, "min_log_odds", "must be below free_threshold", min_log_odds);
+  requireField(forget_occupied_m > 0.0, "forget_occupied_m", "must be positive", forget_occupied_m);
+  requireField(forget_free_m > 0.0, "forget_free_m", "must be positive", forget_free_m);
+  requireField(odometry_sigma_m_per_m >= 0.0, "odometry_sigma_m_per_m", "must not be negative",
+               odometry_sigma_m_per_m);
+  requireField(scan_depth_m >= 0.0, "scan_depth_m", "must not be negative", scan_depth_m);
+  requireField(scan_rays >= 8, "scan_rays", "must be at least 8", scan_rays);
+}
+
+LocalObstacleMap::LocalObstacleMap(const LocalObstacleMapOptions& options) : options_(options) {
+  options_.validate();
+  size_ = 2 * static_cast<int>(std::lround(options_.half_size_m / options_.cell_size_m));
+  clear();
+}
+
+int LocalObstacleMap::wrapped(int64_t index) const {
+  const auto remainder = static_cast<int>(index % size_);
+  return remainder < 0 ? remainder + size_ : remainder;
+}
+
+LocalObstacleMap::Cell& LocalObstacleMap::cellAt(int64_t x, int64_t y) {
+  return cells_[static_cast<size_t>(wrapped(y)) * static_cast<size_t>(size_) +
+                static_cast<size_t>(wrapped(x))];
+}
+
+const LocalObstacleMap::Cell& LocalObstacleMap::cellAt(int64_t x, int64_t y) const {
+  return cells_[static_cast<size_t>(wrapped(y)) * static_cast<size_t>(size_) +
+                static_cast<size_t>(wrapped(x))];
+}
+
+int64_t LocalObstacleMap::indexOf(double coordinate_m) const {
+  return static_cast<int64_t>(std::floor(coordinate_m / options_.cell_size_m));
+}
+
+bool LocalObstacleMap::isInside(int64_t x, int64_t y) const {
+  return x >= first_x_ && x < first_x_ + size_ && y >= first_y_ && y < first_y_ + size_;
+}
+
+void LocalObstacleMap::clear() {
+  cells_.assign(static_cast<size_t>(size_) * static_cast<size_t>(size_), Cell());
+  last_camera_position_.clear();
+}
+
+void LocalObstacleMap::scroll(int64_t first_x, int64_t first_y) {
+  if (std::abs(first_x - first_x_) >= size_ || std::abs(first_y - first_y_) >= size_) {
+    clear();
+  } else {
+    // Columns and rows that come in take the place of those that go out.
+    for (int64_t x = std::min(first_x, first_x_); x < std::max(first_x, first_x_); ++x) {
+      for (int64_t y = 0; y < size_; ++y) {
+        cellAt(x, y) = Cell();
+      }
+    }
+    for (int64_t y = std::min(first_y, first_y_); y < std::max(first_y, first_y_); ++y) {
+      for (int64_t x = 0; x < size_; ++x) {
+        cellAt(x, y) = Cell();
+      }
+    }
+  }
+  first_x_ = first_x;
+  first_y_ = first_y;
+}
+
+void LocalObstacleMap::forget(double travelled_m) {
+  const auto keep_occupied = static_cast<float>(std::exp(-travelled_m / options_.forget_occupied_m));
+  const auto keep_free = static_cast<float>(std::exp(-travelled_m / options_.forget_free_m));
+  for (Cell& cell : cells_) {
+    cell.log_odds *= cell.log_odds > 0.0F ? keep_occupied : keep_free;
+  }
+}
+
+void LocalObstacleMap::moveTo(Timestamp stamp, const RigidTransform& fixed_from_vehicle) {
+  const RigidTransform level = levelled(fixed_from_vehicle);
+  const int64_t first_x = indexOf(level.translation().x()) - size_ / 2;
+  const int64_t first_y = indexOf(level.translation().y()) - size_ / 2;
+  if (placed_) {
+    const double travelled_m = (level.translation() - fixed_from_vehicle_.translation()).norm();
+    if (travelled_m > 0.0) {
+      forget(travelled_m);
+      travel_direction_ = (level.translation() - fixed_from_vehicle_.translation()).head<2>().normalized();
+      travel_m_ += travelled_m;
+    }
+    scroll(first_x, first_y);
+  } else {
+    first_x_ = first_x;
+    first_y_ = first_y;
+    placed_ = true;
+  }
+  stamp_ = stamp;
+  fixed_from_vehicle_ = level;
+}
+
+void LocalObstacleMap::add(const CameraObstacles& seen, const PolarGrid& grid,
+                           const RigidTransform& fixed_from_vehicle) {
+  check(placed_, "LocalObstacleMap::add: moveTo() comes first");
+  const RigidTransform level = levelled(fixed_from_vehicle);
+  const double weight = weightOf(seen, level);
+  addGround(seen, grid, level, weight);
+  addOccupied(seen, grid, level, weight);
+}
+
+/// Range maps from nearly the same place are of nearly the same images, and wrong together.
+double LocalObstacleMap::weightOf(const CameraObstacles& seen, const RigidTransform& fixed_from_vehicle) {
+  const Eigen::Vector2d position = transformed(fixed_from_vehicle, seen.origin_m);
+  const auto [last, is_first] = last_camera_position_.try_emplace(seen.camera_name, position);
+  const double moved_m = (position - last->second).norm();
+  last->second = position;
+  return is_first ? 1.0 : std::min(1.0, moved_m / options_.look_distance_m);
+}
+
+void LocalObstacleMap::addGround(const CameraObstacles& seen, const PolarGrid& grid,
+                                 const RigidTransform& fixed_from_vehicle, double weight) {
+  const double cell_m = options_.cell_size_m;
+  const double blind_sine = std::sin(options_.blind_angle_rad);
+  const CellLooker looker(seen, grid, cell_m);
+  const Eigen::Vector2d camera_m = transformed(fixed_from_vehicle, seen.origin_m);
+  const double yaw_rad = yawOfRotation(fixed_from_vehicle.rotation());
+  const auto reach = static_cast<int64_t>(std::ceil(options_.free_range_m / cell_m));
+  const int64_t middle_x = indexOf(camera_m.x());
+  const int64_t middle_y = indexOf(camera_m.y());
+  for (int64_t y = std::max(first_y_, middle_y - reach);
+       y <= std::min(first_y_ + size_ - 1, middle_y + reach); ++y) {
+    for (int64_t x = std::max(first_x_, middle_x - reach);
+         x <= std::min(first_x_ + size_ - 1, middle_x + reach); ++x) {
+      const Eigen::Vector2d offset_m((x + 0.5) * cell_m - camera_m.x(), (y + 0.5) * cell_m - camera_m.y());
+      const double range_m = offset_m.norm();
+      const int bin = range_m > 0.0 ? grid.binOfInverse(static_cast<float>(1.0 / range_m)) : grid.numBins();
+      if (range_m > options_.free_range_m || bin < 0 || bin >= grid.numBins()) {
+        continue;
+      }
+      const double angle_rad = std::remainder(std::atan2(offset_m.y(), offset_m.x()) - yaw_rad, 2.0 * M_PI);
+      const size_t index = grid.index(grid.rayOf(angle_rad), bin);
+      if (seen.free_share[index] <= 0.0F && seen.hidden_share[index] <= 0.0F &&
+          seen.unknown_share[index] <= 0.0F) {
+        continue;
+      }
+      CellLook look = looker.look(angle_rad, range_m, bin);
+      const double across_m =
+          std::abs(offset_m.x() * travel_direction_.y() - offset_m.y() * travel_direction_.x());
+      if (across_m <= blind_sine * range_m) {
+        look.unknown_share = 0.0;  // also before the first motion
+      }
+      addGroundLook(look, weight, seen.stamp, &cellAt(x, y));
+    }
+  }
+}
+
+void LocalObstacleMap::addGroundLook(const CellLook& look, double weight, Timestamp stamp, Cell* cell) const {
+  if (!look.blocked && look.free_share >= options_.min_free_share) {
+    const double log_odds = cell->log_odds - weight * options_.free_log_odds * look.free_share;
+    cell->log_odds = static_cast<float>(std::max(options_.min_log_odds, log_odds));
+    cell->last_seen_ns = stamp.nanoseconds();
+    cell->travel_m = static_cast<float>(travel_m_);
+  } else if (cell->log_odds < 0.0F && look.hidden_share + look.unknown_share >= options_.min_hidden_share) {
+    // That it was free once is no longer sure: something stands there now, or before it, or cannot be told.
+    const bool hides = look.hidden_share >= look.unknown_share;
+    cell->log_odds *= static_cast<float>(std::pow(hides ? options_.doubt : options_.unknown_doubt, weight));
+  }
+}
+
+void LocalObstacleMap::addLook(const Look& look, Timestamp stamp) {
+  const int64_t x = indexOf(look.point_m.x());
+  const int64_t y = indexOf(look.point_m.y());
+  if (!isInside(x, y)) {
+    return;
+  }
+  Cell& cell = cellAt(x, y);
+  cell.log_odds = std::min(static_cast<float>(options_.max_log_odds),
+                           cell.log_odds + static_cast<float>(options_.occupied_log_odds * look.mass));
+  const double sigma_m = look.obstacle->range_sigma_m;
+  const auto weight = static_cast<float>(look.mass / (sigma_m * sigma_m + 1e-4));
+  const float kept = kMemory * cell.weight;
+  const float share = weight / (kept + weight);
+  const auto blend = [share](float* mean, double value) {
+    *mean += share * (static_cast<float>(value) - *mean);
+  };
+  cell.weight = kept + weight;
+  blend(&cell.x_m, look.point_m.x() - static_cast<double>(x) * options_.cell_size_m);
+  blend(&cell.y_m, look.point_m.y() - static_cast<double>(y) * options_.cell_size_m);
+  blend(&cell.sigma_m, sigma_m);
+  blend(&cell.height_m, look.obstacle->height_m);
+  blend(&cell.height_sigma_m, look.obstacle->height_sigma_m);
+  cell.travel_m = static_cast<float>(travel_m_);
+  cell.last_seen_ns = stamp.nanoseconds();
+}
+
+void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid& grid,
+                                   const RigidTransform& fixed_from_vehicle, double weight) {
+  const double cell_m = options_.cell_size_m;
+  for (const PolarObstacle& obstacle : seen.obstacles) {
+    if (obstacle.range_m > options_.occupied_range_m) {
+      continue;
+    }
+    const double width_m = obstacle.range_m * grid.increment_rad();
+    const int across = std::max(1, static_cast<int>(std::ceil(width_m / cell_m)));
+    // Several rays meet one cell nearby: together they are one look.
+    const double ray_mass = weight * std::min(1.0, width_m / cell_m * 1.5) * std::max(0.3, obstacle.support);
+    const int along = obstacle.range_sigma_m < 0.6 * cell_m
+                          ? 0
+                          : static_cast<int>(std::ceil(2.0 * obstacle.range_sigma_m / cell_m));
+    double normalizer = 0.0;
+    const auto density = [&](int step) {
+      const double z = step * cell_m / obstacle.range_sigma_m;
+      return std::exp(-0.5 * z * z);
+    };
+    for (int step = -along; step <= along; ++step) {
+      normalizer += density(step);
+    }
+    for (int side = 0; side < across; ++side) {
+      const double angle_rad =
+          grid.angle_rad(obstacle.ray) + ((side + 0.5) / across - 0.5) * grid.increment_rad();
+      const Eigen::Vector2d direction(std::cos(angle_rad), std::sin(angle_rad));
+      for (int step = -along; step <= along; ++step) {
+        const Eigen::Vector2d point_in_vehicle =
+            seen.origin_m + (obstacle.range_m + step * cell_m) * direction;
+        addLook({transformed(fixed_from_vehicle, point_in_vehicle), ray_mass * density(step) / normalizer,
+                 &obstacle},
+                seen.stamp);
+      }
+    }
+  }
+}
+
+int8_t LocalObstacleMap::stateOf(const Cell& cell) const {
+  if (cell.log_odds >= static_cast<float>(options_.occupied_threshold)) {
+    return kCellOccupied;
+  }
+  return cell.log_odds <= static_cast<float>(options_.free_threshold) ? kCellFree : kCellUnobserved;
+}
+
+void LocalObstacleMap::reanchor(const RigidTransform& new_from_old_fixed) {
+  if (!placed_) {
+    return;
+  }
+  const RigidTransform new_from_old = levelled(new_from_old_fixed);
+  const RigidTransform old_from_new = new_from_old.inverse();
+  LocalObstacleMap moved(options_);
+  moved.moveTo(stamp_, new_from_old * fixed_from_vehicle_);
+  const double cell_m = options_.cell_size_m;
+  const auto oldCell = [&](int64_t x, int64_t y) -> const Cell* {
+    const Eigen::Vector2d place =
+        transformed(old_from_new, Eigen::Vector2d((x + 0.5) * cell_m, (y + 0.5) * cell_m));
+    const int64_t old_x = indexOf(place.x());
+    const int64_t old_y = indexOf(place.y());
+    return isInside(old_x, old_y) ? &cellAt(old_x, old_y) : nullptr;
+  };
+  for (int64_t y = moved.first_y_; y < moved.first_y_ + size_; ++y) {
+    for (int64_t x = moved.first_x_; x < moved.first_x_ + size_; ++x) {
+      const Cell* old = oldCell(x, y);
+      if (old != nullptr && old->log_odds <= 0.0F) {
+        moved.cellAt(x, y) = *old;
+      }
+    }
+  }
+  // Obstacles go where their points go, so that none falls between two cells.
+  for (int64_t y = first_y_; y < first_y_ + size_; ++y) {
+    for (int64_t x = first_x_; x < first_x_ + size_; ++x) {
+      const Cell& old = cellAt(x, y);
+      const Eigen::Vector2d place =
+          transformed(new_from_old, Eigen::Vector2d(x * cell_m + old.x_m, y * cell_m + old.y_m));
+      const int64_t new_x = indexOf(place.x());
+      const int64_t new_y = indexOf(place.y());
+      if (old.log_odds <= 0.0F || !moved.isInside(new_x, new_y)) {
+        continue;
+      }
+      Cell& target = moved.cellAt(new_x, new_y);
+      if (old.log_odds > target.log_odds) {
+        target = old;
+        target.x_m = static_cast<float>(place.x() - static_cast<double>(new_x) * cell_m);
+        target.y_m = static_cast<float>(place.y() - static_cast<double>(new_y) * cell_m);
+      }
+    }
+  }
+  moved.travel_m_ = travel_m_;
+  moved.travel_direction_ =
+      (new_from_old.rotation() * Eigen::Vector3d(travel_direction_.x(), travel_direction_.y(), 0.0))
+          .head<2>();
+  for (const auto& [name, position] : last_camera_position_) {
+    moved.last_camera_position_[name] = transformed(new_from_old, position);
+  }
+  *this = moved;
+}
+
+ObstacleMap LocalObstacleMap::snapshot() const {
+  ObstacleMap map = ObstacleMap::unobserved({size_, size_}, options_.cell_size_m);
+  map.stamp = stamp_;
+  map.fixed_from_vehicle = fixed_from_vehicle_;
+  map.origin_m =
+      options_.cell_size_m * Eigen::Vector2d(static_cast<double>(first_x_), static_cast<double>(first_y_));
+  for (int row = 0; row < size_; ++row) {
+    for (int column = 0; column < size_; ++column) {
+      const Cell& cell = cellAt(first_x_ + column, first_y_ + row);
+      if (cell.last_seen_ns == kNever) {
+        continue;
+      }
+      map.age_s.at<float>(row, column) =
+          static_cast<float>(static_cast<double>(stamp_.nanoseconds() - cell.last_seen_ns) * 1e-9);
+      const int8_t state = stateOf(cell);
+      map.state.at<int8_t>(row, column) = state;
+      if (state == kCellOccupied) {
+        const auto drift_m =
+            static_cast<float>((travel_m_ - cell.travel_m) * options_.odometry_sigma_m_per_m);
+        const auto cell_m = static_cast<float>(options_.cell_size_m);
+        map.point_m.at<cv::Vec2f>(row, column) = {static_cast<float>(column) * cell_m + cell.x_m,
+                                                  static_cast<float>(row) * cell_m + cell.y_m};
+        map.point_sigma_m.at<float>(row, column) = std::hypot(cell.sigma_m, drift_m);
+        map.height_m.at<float>(row, column) = cell.height_m;
+        map.height_sigma_m.at<float>(row, column) = cell.height_sigma_m;
+      }
+    }
+  }
+  return map;
+}
+
+ObstacleScan LocalObstacleMap::scan() const {
+  return makeScan(snapshot(), options_.scan_rays, options_.scan_depth_m);
+}
+
+}  // namespace vcharge

@@ -1,0 +1,114 @@
+#include "vcharge_obstacles/map_scan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace vcharge {
+namespace {
+
+struct Hit {
+  double range_m;
+  double weight;
+  float sigma_m, height_m, height_sigma_m;
+};
+
+/// Where the vehicle stands and looks, on the plane.
+struct Viewpoint {
+  explicit Viewpoint(const ObstacleMap& map)
+      : position_m(map.fixed_from_vehicle.translation().head<2>()),
+        yaw_rad(yawOfRotation(map.fixed_from_vehicle.rotation())) {}
+  Eigen::Vector2d position_m;
+  double yaw_rad;
+};
+
+std::vector<std::vector<Hit>> collectHits(const ObstacleMap& map, const Viewpoint& viewpoint, int num_rays) {
+  std::vector<std::vector<Hit>> hits(static_cast<size_t>(num_rays));
+  const double per_rad = num_rays / (2.0 * M_PI);
+  for (int row = 0; row < map.state.rows; ++row) {
+    for (int column = 0; column < map.state.cols; ++column) {
+      if (map.state.at<int8_t>(row, column) != kCellOccupied) {
+        continue;
+      }
+      const auto point = map.point_m.at<cv::Vec2f>(row, column);
+      const Eigen::Vector2d offset_m =
+          map.origin_m + Eigen::Vector2d(point[0], point[1]) - viewpoint.position_m;
+      const double range_m = std::max(offset_m.norm(), 0.5 * map.cell_size_m);
+      const double angle_rad = std::atan2(offset_m.y(), offset_m.x()) - viewpoint.yaw_rad;
+      const double half_width_rad = std::atan(0.5 * map.cell_size_m / range_m);
+      const int first = static_cast<int>(std::floor((angle_rad - half_width_rad + M_PI) * per_rad));
+      const int last = static_cast<int>(std::floor((angle_rad + half_width_rad + M_PI) * per_rad));
+      const float sigma_m = map.point_sigma_m.at<float>(row, column);
+      const Hit hit{range_m, 1.0 / (sigma_m * sigma_m + 1e-4), sigma_m, map.height_m.at<float>(row, column),
+                    map.height_sigma_m.at<float>(row, column)};
+      for (int ray = first; ray <= last; ++ray) {
+        hits[static_cast<size_t>(((ray % num_rays) + num_rays) % num_rays)].push_back(hit);
+      }
+    }
+  }
+  return hits;
+}
+
+void setRay(const std::vector<Hit>& hits, double depth_m, size_t ray, ObstacleScan* scan) {
+  if (hits.empty()) {
+    return;
+  }
+  const auto nearest = std::min_element(hits.begin(), hits.end(),
+                                        [](const Hit& a, const Hit& b) { return a.range_m < b.range_m; });
+  double weight = 0.0;
+  double range_m = 0.0;
+  for (const Hit& hit : hits) {
+    if (hit.range_m <= nearest->range_m + depth_m) {
+      weight += hit.weight;
+      range_m += hit.weight * hit.range_m;
+      // The highest of them is the obstacle's height.
+      if (!(hit.height_m <= scan->height_m[ray])) {
+        scan->height_m[ray] = hit.height_m;
+        scan->height_sigma_m[ray] = hit.height_sigma_m;
+      }
+    }
+  }
+  scan->range_m[ray] = static_cast<float>(range_m / weight);
+  scan->range_sigma_m[ray] = nearest->sigma_m;
+}
+
+/// How far the ray is free, from the first free cell on: cells under and beside the vehicle are never seen.
+float freeRange(const ObstacleMap& map, const Viewpoint& viewpoint, double angle_in_fixed_rad, double max_m) {
+  const Eigen::Vector2d direction(std::cos(angle_in_fixed_rad), std::sin(angle_in_fixed_rad));
+  const double step_m = 0.5 * map.cell_size_m;
+  double free_m = 0.0;
+  for (double range_m = step_m; range_m < max_m; range_m += step_m) {
+    const Eigen::Vector2d cell =
+        (viewpoint.position_m + range_m * direction - map.origin_m) / map.cell_size_m;
+    const int column = static_cast<int>(std::floor(cell.x()));
+    const int row = static_cast<int>(std::floor(cell.y()));
+    if (column < 0 || row < 0 || column >= map.state.cols || row >= map.state.rows) {
+      break;
+    }
+    const int8_t state = map.state.at<int8_t>(row, column);
+    if (state == kCellFree) {
+      free_m = range_m;
+    } else if (state == kCellOccupied || free_m > 0.0) {
+      break;
+    }
+  }
+  return static_cast<float>(free_m);
+}
+
+}  // namespace
+
+ObstacleScan makeScan(const ObstacleMap& map, int num_rays, double depth_m) {
+  const Viewpoint viewpoint(map);
+  const double max_range_m = 0.5 * map.cell_size_m * std::min(map.state.cols, map.state.rows);
+  ObstacleScan scan = ObstacleScan::unknown(static_cast<size_t>(num_rays), max_range_m);
+  scan.stamp = map.stamp;
+  scan.name = "fused";
+  const auto hits = collectHits(map, viewpoint, num_rays);
+  for (size_t ray = 0; ray < scan.size(); ++ray) {
+    setRay(hits[ray], depth_m, ray, &scan);
+    scan.free_m[ray] = freeRange(map, viewpoint, viewpoint.yaw_rad + scan.angle_rad(ray), max_range_m);
+  }
+  return scan;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,96 @@
+#include "vcharge_obstacles/map_scan.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "vcharge_obstacles/obstacle_outlines.h"
+
+namespace vcharge {
+namespace {
+
+/// 4 m x 4 m around the origin, all free, the vehicle in the middle looking along x.
+ObstacleMap makeMap() {
+  ObstacleMap map = ObstacleMap::unobserved({40, 40}, 0.1);
+  map.origin_m = {-2.0, -2.0};
+  map.state.setTo(kCellFree);
+  return map;
+}
+
+void occupy(ObstacleMap* map, int column, int row, float height_m) {
+  map->state.at<int8_t>(row, column) = kCellOccupied;
+  map->point_m.at<cv::Vec2f>(row, column) = {0.1F * static_cast<float>(column) + 0.05F,
+                                             0.1F * static_cast<float>(row) + 0.05F};
+  map->point_sigma_m.at<float>(row, column) = 0.03F;
+  map->height_m.at<float>(row, column) = height_m;
+  map->height_sigma_m.at<float>(row, column) = 0.02F;
+}
+
+// Of a cell whose middle lies a little off the axis.
+constexpr double kAside_rad = 0.0476;
+
+size_t rayTo(const ObstacleScan& scan, double angle_rad) {
+  return static_cast<size_t>(std::lround((angle_rad - scan.angle_min_rad) / scan.angle_increment_rad));
+}
+
+TEST(MapScanTest, RangeIsThatOfTheNearestCellInEachDirection) {
+  ObstacleMap map = makeMap();
+  occupy(&map, 20, 30, 0.5F);  // at (0.05, 1.05)
+  occupy(&map, 20, 36, 1.5F);  // behind it
+  const ObstacleScan scan = makeScan(map, 360, 0.2);
+  const size_t ray = rayTo(scan, 0.5 * M_PI - kAside_rad);
+  EXPECT_NEAR(scan.range_m[ray], 1.05, 0.01);
+  EXPECT_FLOAT_EQ(scan.height_m[ray], 0.5F);
+  EXPECT_GT(scan.free_m[ray], 0.8F);
+  EXPECT_LT(scan.free_m[ray], 1.05F);
+  EXPECT_TRUE(std::isnan(scan.range_m[rayTo(scan, 0.0)]));
+  EXPECT_GT(scan.free_m[rayTo(scan, 0.0)], 1.8F);
+}
+
+TEST(MapScanTest, DirectionsTurnWithTheVehicle) {
+  ObstacleMap map = makeMap();
+  occupy(&map, 20, 30, 0.5F);
+  map.fixed_from_vehicle = RigidTransform::planar(0.0, 0.0, 0.5 * M_PI);
+  const ObstacleScan scan = makeScan(map, 360, 0.2);
+  EXPECT_NEAR(scan.range_m[rayTo(scan, -kAside_rad)], 1.05, 0.01);
+  EXPECT_TRUE(std::isnan(scan.range_m[rayTo(scan, 0.5 * M_PI)]));
+}
+
+TEST(MapScanTest, UnobservedGroundEndsWhatIsFree) {
+  ObstacleMap map = makeMap();
+  map.state.colRange(30, 40).setTo(kCellUnobserved);
+  const ObstacleScan scan = makeScan(map, 360, 0.2);
+  EXPECT_LT(scan.free_m[rayTo(scan, 0.0)], 1.01F);
+  EXPECT_TRUE(std::isnan(scan.range_m[rayTo(scan, 0.0)]));
+}
+
+TEST(OutlinesTest, GroupsOfCellsAreSurroundedEachByOne) {
+  ObstacleMap map = makeMap();
+  for (int column = 10; column < 15; ++column) {
+    occupy(&map, column, 10, 0.3F);
+  }
+  occupy(&map, 15, 11, 0.9F);  // touches by a corner
+  occupy(&map, 30, 30, 0.2F);
+  const std::vector<ObstacleOutline> outlines = findOutlines(map);
+  ASSERT_EQ(outlines.size(), 2U);
+  for (const ObstacleOutline& outline : outlines) {
+    const bool is_single = outline.corners_m[0].x() > 0.5;
+    EXPECT_FLOAT_EQ(static_cast<float>(outline.height_m), is_single ? 0.2F : 0.9F);
+    Eigen::Vector2d low(9, 9), high(-9, -9);
+    for (const Eigen::Vector2d& corner : outline.corners_m) {
+      low = low.cwiseMin(corner);
+      high = high.cwiseMax(corner);
+    }
+    EXPECT_NEAR(low.x(), is_single ? 1.0 : -1.0, 0.01);
+    EXPECT_NEAR(high.x(), is_single ? 1.1 : -0.4, 0.01);
+    EXPECT_NEAR(low.y(), is_single ? 1.0 : -1.0, 0.01);
+    EXPECT_NEAR(high.y(), is_single ? 1.1 : -0.8, 0.01);
+  }
+}
+
+TEST(OutlinesTest, MapWithoutObstaclesHasNone) {
+  EXPECT_TRUE(findOutlines(makeMap()).empty());
+}
+
+}  // namespace
+}  // namespace vcharge

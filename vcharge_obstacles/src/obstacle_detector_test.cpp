@@ -1,0 +1,188 @@
+#include "vcharge_obstacles/obstacle_detector.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "box_world.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kDegree = M_PI / 180.0;
+
+class ObstacleDetectorTest : public ::testing::Test {
+ protected:
+  CameraObstacles detect(const BoxWorld& world, const std::string& name, const RigidTransform& pose = {},
+                         const BoxWorldNoise& noise = {}) const {
+    const RigCamera& camera = rig_.cameras[rig_.cameraIndex(name)];
+    const RangeMap map = measureBoxWorld(world, camera, pose, Timestamp(), noise);
+    return detectIn(map, camera);
+  }
+  CameraObstacles detectIn(const RangeMap& map, const RigCamera& camera) const {
+    return ObstacleDetector(rebuildWorkingCamera(map.camera, map.range_m.size(), camera),
+                            *camera.vehicle_from_camera, options_)
+        .detect(map);
+  }
+  /// The scan's ray that looks in a direction from the camera.
+  static size_t rayTo(const CameraObstacles& seen, double angle_rad) {
+    return static_cast<size_t>(
+        std::lround((angle_rad - seen.scan.angle_min_rad) / seen.scan.angle_increment_rad));
+  }
+  static int countObstacles(const CameraObstacles& seen) {
+    return static_cast<int>(std::count_if(seen.scan.range_m.begin(), seen.scan.range_m.end(),
+                                          [](float range) { return std::isfinite(range); }));
+  }
+
+  const CameraRig rig_ = makeBoxWorldRig();
+  ObstacleDetectorOptions options_;
+};
+
+TEST_F(ObstacleDetectorTest, BareGroundIsFreeAndHasNoObstacle) {
+  const CameraObstacles seen = detect({}, "left", {}, {0.01, 0.1, 5});
+  EXPECT_EQ(seen.ground.state, GroundState::kMeasured);
+  EXPECT_EQ(countObstacles(seen), 0);
+  EXPECT_GT(seen.scan.free_m[rayTo(seen, 0.5 * M_PI)], 4.0F);
+}
+
+TEST_F(ObstacleDetectorTest, WallIsReportedAtItsRangeWithItsHeight) {
+  for (const double distance_m : {1.0, 2.0, 4.0}) {
+    const double wall_y = 0.98 + distance_m;
+    const BoxWorld world{{{{-20.0, wall_y, 0.0}, {20.0, wall_y + 0.3, 0.8}}}};
+    const CameraObstacles seen = detect(world, "left", {}, {0.01, 0.1, 7});
+    for (const double angle_rad : {0.3 * M_PI, 0.5 * M_PI, 0.7 * M_PI}) {
+      const size_t ray = rayTo(seen, angle_rad);
+      const double expected_m = distance_m / std::sin(seen.scan.angle_rad(ray));
+      EXPECT_NEAR(seen.scan.range_m[ray], expected_m, 0.02 * expected_m + 0.01) << distance_m;
+      EXPECT_NEAR(seen.scan.height_m[ray], 0.8, 0.15) << distance_m;
+      EXPECT_LT(seen.scan.free_m[ray], expected_m);
+      EXPECT_GT(seen.scan.free_m[ray], 0.6 * expected_m);
+    }
+  }
+}
+
+TEST_F(ObstacleDetectorTest, KerbIsReportedWithItsHeight) {
+  const BoxWorld world{{{{-20.0, 2.5, 0.0}, {20.0, 3.2, 0.12}}}};
+  const CameraObstacles seen = detect(world, "left", {}, {0.005, 0.0, 3});
+  const size_t ray = rayTo(seen, 0.5 * M_PI);
+  EXPECT_NEAR(seen.scan.range_m[ray], 1.52, 0.1);
+  EXPECT_NEAR(seen.scan.height_m[ray], 0.12, 0.03);
+}
+
+TEST_F(ObstacleDetectorTest, WhatLiesLowerThanTheMinimumIsGround) {
+  const BoxWorld world{{{{-20.0, 2.5, 0.0}, {20.0, 3.2, 0.04}}}};
+  EXPECT_EQ(countObstacles(detect(world, "left")), 0);
+}
+
+TEST_F(ObstacleDetectorTest, ThinPostIsReported) {
+  const BoxWorld world{{{{1.85, 3.0, 0.0}, {1.95, 3.1, 1.0}}}};
+  const CameraObstacles seen = detect(world, "left", {}, {0.01, 0.1, 9});
+  const size_t ray = rayTo(seen, 0.5 * M_PI);
+  EXPECT_NEAR(seen.scan.range_m[ray], 2.02, 0.05);
+}
+
+TEST_F(ObstacleDetectorTest, BarThatHangsLowIsAnObstacleAndAPortalIsNot) {
+  const BoxWorld bar{{{{-1.0, 2.5, 0.4}, {5.0, 2.57, 0.47}}}};
+  EXPECT_NEAR(detect(bar, "left").scan.range_m[rayTo(detect(bar, "left"), 0.5 * M_PI)], 1.52, 0.05);
+  const BoxWorld portal{{{{-1.0, 2.5, 2.3}, {5.0, 2.7, 2.6}}}};
+  EXPECT_EQ(countObstacles(detect(portal, "left")), 0);
+}
+
+TEST_F(ObstacleDetectorTest, PitchOfTheBodyIsCorrected) {
+  const BoxWorld world{{{{-20.0, 3.98, 0.0}, {20.0, 4.2, 0.6}}}};
+  for (const double pitch_rad : {-1.0 * kDegree, 1.0 * kDegree}) {
+    const RigidTransform pose(rotationFromYawPitchRoll(0.0, pitch_rad, 0.0), Eigen::Vector3d::Zero());
+    const CameraObstacles seen = detect(world, "left", pose, {0.01, 0.0, 4});
+    EXPECT_NEAR(seen.ground.pitch_rad(), pitch_rad, 0.1 * kDegree);
+    const size_t ray = rayTo(seen, 0.5 * M_PI);
+    EXPECT_NEAR(seen.scan.range_m[ray], 3.0, 0.08);
+    EXPECT_NEAR(seen.scan.height_m[ray], 0.6, 0.1);
+    EXPECT_EQ(countObstacles(detect({}, "front", pose, {0.01, 0.0, 4})), 0);
+  }
+}
+
+TEST_F(ObstacleDetectorTest, GroundTiltedByThreeDegreesIsToldAndClearsNothing) {
+  const BoxWorld world{{{{-20.0, 3.0, 0.0}, {20.0, 3.3, 1.5}}}};
+  for (const double roll_rad : {-3.0 * kDegree, 3.0 * kDegree}) {
+    const RigidTransform pose(rotationFromYawPitchRoll(0.0, 0.0, roll_rad), Eigen::Vector3d::Zero());
+    const CameraObstacles seen = detect(world, "left", pose, {0.01, 0.0, 4});
+    EXPECT_EQ(seen.ground.state, GroundState::kOutOfBounds);
+    EXPECT_EQ(*std::max_element(seen.free_share.begin(), seen.free_share.end()), 0.0F);
+    // A wall is one all the same, ground is none.
+    EXPECT_NEAR(seen.scan.range_m[rayTo(seen, 0.5 * M_PI)], 2.02, 0.1);
+    EXPECT_EQ(countObstacles(detect({}, "left", pose)), 0);
+  }
+}
+
+TEST_F(ObstacleDetectorTest, UnknownRangesAreNeitherFreeNorOccupied) {
+  const RigCamera& camera = rig_.cameras[rig_.cameraIndex("left")];
+  RangeMap night = measureBoxWorld({}, camera, {}, Timestamp());
+  night.range_m.setTo(std::numeric_limits<float>::quiet_NaN());
+  night.standard_deviation_m.setTo(std::numeric_limits<float>::quiet_NaN());
+  night.confidence.setTo(0.0);
+  const CameraObstacles seen = detectIn(night, camera);
+  EXPECT_EQ(seen.known_share, 0.0);
+  EXPECT_EQ(seen.ground.state, GroundState::kFewPoints);
+  EXPECT_EQ(*std::max_element(seen.free_share.begin(), seen.free_share.end()), 0.0F);
+  EXPECT_EQ(countObstacles(seen), 0);
+}
+
+TEST_F(ObstacleDetectorTest, SkyAndFarWallsClearNothing) {
+  // Of the left half only what lies far or above the horizon has a range.
+  const RigCamera& camera = rig_.cameras[rig_.cameraIndex("left")];
+  const BoxWorld world{{{{-30.0, 12.5, 0.0}, {30.0, 13.0, 8.0}}}};
+  RangeMap map = measureBoxWorld(world, camera, {}, Timestamp());
+  for (int row = 0; row < map.range_m.rows; ++row) {
+    for (int column = 0; column < map.range_m.cols / 2; ++column) {
+      float& range_m = map.range_m.at<float>(row, column);
+      range_m = range_m > 9.0F ? range_m : std::numeric_limits<float>::quiet_NaN();
+    }
+  }
+  const CameraObstacles seen = detectIn(map, camera);
+  ASSERT_EQ(seen.ground.state, GroundState::kMeasured);
+  const size_t unknown_ray = rayTo(seen, 0.35 * M_PI);  // columns from the left run forwards
+  const size_t known_ray = rayTo(seen, 0.65 * M_PI);
+  EXPECT_GT(std::max(seen.scan.free_m[unknown_ray], seen.scan.free_m[known_ray]), 3.0F);
+  EXPECT_EQ(std::min(seen.scan.free_m[unknown_ray], seen.scan.free_m[known_ray]), 0.0F);
+}
+
+TEST_F(ObstacleDetectorTest, BrightLineOfADirtyLensThatLooksFarIsNotGround) {
+  // Dirt has no parallax: the planes furthest away fit it, which lie below the ground on rays that fall.
+  const RigCamera& camera = rig_.cameras[rig_.cameraIndex("left")];
+  RangeMap map = measureBoxWorld({}, camera, {}, Timestamp());
+  map.range_m.rowRange(80, 88).setTo(40.0F);
+  map.standard_deviation_m.rowRange(80, 88).setTo(0.5F);
+  const CameraObstacles dirty = detectIn(map, camera);
+  const CameraObstacles clean = detect({}, "left");
+  EXPECT_EQ(countObstacles(dirty), 0);
+  double more = 0.0;
+  double less = 0.0;
+  for (size_t i = 0; i < clean.free_share.size(); ++i) {
+    more = std::max<double>(more, dirty.free_share[i] - clean.free_share[i]);
+    less = std::max<double>(less, clean.free_share[i] - dirty.free_share[i]);
+  }
+  EXPECT_LT(more, 0.01);
+  EXPECT_GT(less, 0.5);
+}
+
+TEST_F(ObstacleDetectorTest, CameraBelowTheReferenceObstacleIsRefused) {
+  RigCamera camera = rig_.cameras[0];
+  camera.vehicle_from_camera = RigidTransform(camera.vehicle_from_camera->rotation(), {3.6, 0.0, 0.2});
+  const RangeMap map = measureBoxWorld({}, rig_.cameras[0], {}, Timestamp());
+  EXPECT_THROW(detectIn(map, camera), std::invalid_argument);
+}
+
+TEST_F(ObstacleDetectorTest, OptionsNameTheField) {
+  options_.min_height_m = 0.3;
+  try {
+    options_.validate();
+    ADD_FAILURE();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_NE(std::string(error.what()).find("reference_height_m"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace vcharge

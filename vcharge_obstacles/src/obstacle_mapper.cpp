@@ -1,0 +1,324 @@
+#include "vcharge_obstacles/obstacle_mapper.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "vcharge_core/error.h"
+#include "vcharge_core/text_format.h"
+
+namespace vcharge {
+namespace {
+
+// A stamp this far before the newest means that the drive started over.
+constexpr double kReplay_s = 1.0;
+// Below this speed the vehicle stands.
+constexpr double kStanding_m_per_s = 0.02;
+
+}  // namespace
+
+struct ObstacleMapper::Camera {
+  size_t index = 0;
+  std::unique_ptr<ObstacleDetector> detector;  // made when the size of the range maps is known
+  std::optional<Timestamp> newest;
+  ObstacleCameraStatus status;
+};
+
+std::string toString(ObstacleCameraState state) {
+  switch (state) {
+    case ObstacleCameraState::kNoRangeMaps:
+      return "no range maps";
+    case ObstacleCameraState::kStanding:
+      return "standing";
+    case ObstacleCameraState::kHardlySees:
+      return "hardly sees";
+    case ObstacleCameraState::kGroundLost:
+      return "ground lost";
+    case ObstacleCameraState::kGroundUnsure:
+      return "ground unsure";
+    case ObstacleCameraState::kMapping:
+      break;
+  }
+  return "mapping";
+}
+
+void ObstacleMapperOptions::validate() const {
+  validateInner("detector", detector);
+  validateInner("map", map);
+  validateInner("odometry", odometry);
+  requireField(max_wait_s >= 0.0, "max_wait_s", "must not be negative", max_wait_s);
+  requireField(silent_s > 0.0, "silent_s", "must be positive", silent_s);
+  requireField(max_silence_s > 0.0, "max_silence_s", "must be positive", max_silence_s);
+  requireField(min_known_share >= 0.0 && min_known_share < 1.0, "min_known_share", "must be in [0, 1)",
+               min_known_share);
+  requireField(max_step_m > 0.0, "max_step_m", "must be positive", max_step_m);
+  requireField(max_step_rad > 0.0, "max_step_rad", "must be positive", max_step_rad);
+  requireField(anchor_step_m >= 0.0, "anchor_step_m", "must not be negative", anchor_step_m);
+  requireField(anchor_step_rad >= 0.0, "anchor_step_rad", "must not be negative", anchor_step_rad);
+}
+
+ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const ObstacleMapperOptions& options,
+                               FrameCallback on_frame)
+    : rig_(std::move(rig)),
+      options_((options.validate(), options)),
+      on_frame_(std::move(on_frame)),
+      grid_(options.detector.grid),
+      poses_(options.odometry),
+      map_(options.map) {
+  cameras_.resize(rig_->cameras.size());
+  std::vector<std::string> names = options_.cameras;
+  if (names.empty()) {
+    for (const RigCamera& camera : rig_->cameras) {
+      names.push_back(camera.name);
+    }
+  }
+  for (const std::string& name : names) {
+    const size_t index = rig_->cameraIndex(name);
+    if (!rig_->cameras[index].vehicle_from_camera) {
+      throw InputError("rig: cameras." + name + ": vehicle_from_camera is missing: obstacles need it");
+    }
+    cameras_[index] = std::make_unique<Camera>();
+    cameras_[index]->index = index;
+    cameras_[index]->status.camera_name = name;
+    cameras_[index]->status.message = "no range map yet";
+  }
+}
+
+ObstacleMapper::~ObstacleMapper() = default;
+
+void ObstacleMapper::startOver() {
+  map_ = LocalObstacleMap(options_.map);
+  waiting_.clear();
+  last_fused_.reset();
+  last_emitted_.reset();
+  for (const std::unique_ptr<Camera>& camera : cameras_) {
+    if (camera) {
+      camera->newest.reset();
+    }
+  }
+}
+
+void ObstacleMapper::watchForJumps(const VehicleOdometry& odometry) {
+  if (last_odometry_ && odometry.stamp > last_odometry_->stamp) {
+    const RigidTransform& from = last_odometry_->odom_from_vehicle;
+    const RigidTransform& to = odometry.odom_from_vehicle;
+    const double dt = toSeconds(odometry.stamp - last_odometry_->stamp);
+    const double turn_rad =
+        std::remainder(yawOfRotation(to.rotation()) - yawOfRotation(from.rotation()), 2.0 * M_PI);
+    const Eigen::Vector3d step(to.translation().x() - from.translation().x(),
+                               to.translation().y() - from.translation().y(), turn_rad);
+    // Against going on as before: a car's speed changes little between two messages. How fast it is at first
+    // is not known.
+    const Eigen::Vector3d change =
+        last_velocity_ ? Eigen::Vector3d(step - *last_velocity_ * dt) : Eigen::Vector3d::Zero();
+    if (dt <= options_.odometry.max_gap_s &&
+        (change.head<2>().norm() > options_.max_step_m || std::abs(change.z()) > options_.max_step_rad)) {
+      ++num_jumps_;
+      fuseWaiting(true);
+      startOver();
+      last_velocity_.reset();
+    } else {
+      last_velocity_ = step / dt;
+    }
+  }
+  last_odometry_ = odometry;
+}
+
+void ObstacleMapper::addOdometry(const VehicleOdometry& odometry) {
+  const OdometryBuffer::AddResult result = poses_.add(odometry);
+  if (result == OdometryBuffer::AddResult::kDuplicate || result == OdometryBuffer::AddResult::kOutOfOrder) {
+    return;
+  }
+  if (result == OdometryBuffer::AddResult::kReset) {
+    startOver();
+    last_odometry_.reset();
+    last_velocity_.reset();
+  } else if (result == OdometryBuffer::AddResult::kAddedAfterGap) {
+    // How far the vehicle went meanwhile is what the odometry says it is: not to be relied on.
+    ++num_jumps_;
+    startOver();
+    last_odometry_.reset();
+    last_velocity_.reset();
+  }
+  watchForJumps(odometry);
+  fuseWaiting(false);
+  emitWhenSilent(odometry);
+}
+
+void ObstacleMapper::setMapFromOdom(const RigidTransform& map_from_odom) {
+  if (options_.fixed_frame != FixedFrame::kMap) {
+    return;
+  }
+  map_from_odom_ = map_from_odom;
+  const RigidTransform moved = map_from_odom * anchor_.inverse();
+  if (has_anchor_ && moved.translation().norm() < options_.anchor_step_m &&
+      angleOfRotation(moved.rotation()) < options_.anchor_step_rad) {
+    // Less than the cells can tell. Translation far from the map's origin stands for small turns, too.
+    return;
+  }
+  map_.reanchor(moved);
+  anchor_ = map_from_odom;
+  has_anchor_ = true;
+}
+
+std::optional<RigidTransform> ObstacleMapper::fixedFromVehicle(Timestamp stamp) const {
+  const OdometryBuffer::Lookup lookup = poses_.lookup(stamp);
+  if (!lookup || (options_.fixed_frame == FixedFrame::kMap && !has_anchor_)) {
+    return std::nullopt;
+  }
+  return anchor_ * lookup.odometry.odom_from_vehicle;
+}
+
+void ObstacleMapper::addRangeMap(const RangeMap& map) {
+  const int found = rig_->findCamera(map.camera_name);
+  Camera* camera = found < 0 ? nullptr : cameras_[static_cast<size_t>(found)].get();
+  if (camera == nullptr) {
+    throw InputError("range map of camera '" + map.camera_name + "': not one of the cameras in use");
+  }
+  const RigCamera& rig_camera = rig_->cameras[camera->index];
+  if (!camera->detector) {
+    camera->detector =
+        std::make_unique<ObstacleDetector>(rebuildWorkingCamera(map.camera, map.range_m.size(), rig_camera),
+                                           *rig_camera.vehicle_from_camera, options_.detector);
+  }
+  if (camera->newest && toSeconds(*camera->newest - map.stamp) > kReplay_s) {
+    startOver();
+  }
+  const CameraObstacles seen = camera->detector->detect(map);
+  updateStatus(camera, seen);
+  camera->newest = camera->newest ? std::max(*camera->newest, map.stamp) : map.stamp;
+  if (last_fused_ && map.stamp <= *last_fused_) {
+    ++camera->status.late;
+    return;
+  }
+  waiting_[map.stamp].cameras[camera->index] = seen;
+  fuseWaiting(false);
+}
+
+void ObstacleMapper::updateStatus(Camera* camera, const CameraObstacles& seen) const {
+  ObstacleCameraStatus& status = camera->status;
+  ++status.range_maps;
+  status.ground = seen.ground;
+  status.known_share = seen.known_share;
+  const std::string known = toText(100.0 * seen.known_share, 0) + " % of the pixels have a range";
+  if (seen.known_share < options_.min_known_share) {
+    status.state = ObstacleCameraState::kHardlySees;
+    status.message = "hardly sees: " + known;
+  } else if (seen.ground.state == GroundState::kOutOfBounds) {
+    status.state = ObstacleCameraState::kGroundLost;
+    status.message = "the ground is tilted beyond the bounds: nothing is taken for free";
+  } else if (seen.ground.state == GroundState::kFewPoints) {
+    status.state = ObstacleCameraState::kGroundUnsure;
+    status.message =
+        "only " + std::to_string(seen.ground.num_points) + " ground points: nothing is taken for free";
+  } else {
+    status.state = ObstacleCameraState::kMapping;
+    status.message = "mapping: " + known;
+  }
+}
+
+/// Whether every camera that delivers has come to this stamp.
+bool ObstacleMapper::isComplete(Timestamp stamp) const {
+  for (const std::unique_ptr<Camera>& camera : cameras_) {
+    if (!camera || (camera->newest && *camera->newest >= stamp)) {
+      continue;
+    }
+    const bool delivers = !camera->newest || toSeconds(stamp - *camera->newest) < options_.silent_s;
+    const bool may_come = !last_odometry_ || toSeconds(last_odometry_->stamp - stamp) < options_.max_wait_s;
+    if (delivers && may_come) {
+      return false;
+    }
+  }
+  return true;
+}
+
+void ObstacleMapper::fuseWaiting(bool all) {
+  while (!waiting_.empty()) {
+    const Timestamp stamp = waiting_.begin()->first;
+    if (!all && !isComplete(stamp)) {
+      return;
+    }
+    const std::optional<RigidTransform> fixed_from_vehicle = fixedFromVehicle(stamp);
+    if (!fixed_from_vehicle) {
+      const OdometryBuffer::LookupStatus lookup = poses_.lookup(stamp).status;
+      const bool may_come = lookup == OdometryBuffer::LookupStatus::kEmpty ||
+                            lookup == OdometryBuffer::LookupStatus::kAfterLast;
+      if (may_come && !all) {
+        return;
+      }
+    }
+    const Group group = std::move(waiting_.begin()->second);
+    waiting_.erase(waiting_.begin());
+    last_fused_ = stamp;
+    if (fixed_from_vehicle) {
+      fuse(stamp, group, *fixed_from_vehicle);
+      continue;
+    }
+    for (const auto& [index, seen] : group.cameras) {
+      ObstacleCameraStatus& status = cameras_[index]->status;
+      ++status.without_pose;
+      status.state = ObstacleCameraState::kNoRangeMaps;
+      status.message = "no pose at the range map's stamp " + toString(stamp);
+    }
+  }
+}
+
+void ObstacleMapper::fuse(Timestamp stamp, const Group& group, const RigidTransform& fixed_from_vehicle) {
+  map_.moveTo(stamp, fixed_from_vehicle);
+  std::vector<const CameraObstacles*> cameras;
+  for (const auto& [index, seen] : group.cameras) {
+    map_.add(seen, grid_, fixed_from_vehicle);
+    cameras.push_back(&seen);
+  }
+  emit(cameras);
+}
+
+void ObstacleMapper::emit(const std::vector<const CameraObstacles*>& cameras) {
+  ObstacleFrame frame;
+  frame.map = map_.snapshot();
+  frame.map.frame_id = enumNames<FixedFrame>()[static_cast<size_t>(options_.fixed_frame)];
+  frame.scan = map_.scan();
+  for (const CameraObstacles* camera : cameras) {
+    frame.cameras.push_back(*camera);
+  }
+  frame.status = status();
+  last_emitted_ = frame.map.stamp;
+  on_frame_(frame);
+}
+
+void ObstacleMapper::emitWhenSilent(const VehicleOdometry& odometry) {
+  if (!last_emitted_ || !waiting_.empty() || toSeconds(odometry.stamp - *last_emitted_) < options_.silent_s) {
+    return;
+  }
+  const std::optional<RigidTransform> fixed_from_vehicle = fixedFromVehicle(odometry.stamp);
+  if (fixed_from_vehicle) {
+    map_.moveTo(odometry.stamp, *fixed_from_vehicle);
+    emit({});
+  }
+}
+
+void ObstacleMapper::finish() {
+  fuseWaiting(true);
+}
+
+std::vector<ObstacleCameraStatus> ObstacleMapper::status() const {
+  std::vector<ObstacleCameraStatus> all;
+  const bool stands =
+      last_odometry_ && last_velocity_ && last_velocity_->head<2>().norm() < kStanding_m_per_s;
+  for (const std::unique_ptr<Camera>& camera : cameras_) {
+    if (!camera) {
+      continue;
+    }
+    all.push_back(camera->status);
+    if (!last_odometry_ || !camera->newest ||
+        toSeconds(last_odometry_->stamp - *camera->newest) < options_.max_silence_s) {
+      continue;
+    }
+    all.back().state = stands ? ObstacleCameraState::kStanding : ObstacleCameraState::kNoRangeMaps;
+    all.back().message = stands ? "the vehicle stands: nothing new is seen, the map keeps what it has"
+                                : "no range map since " + toString(*camera->newest);
+  }
+  return all;
+}
+
+}  // namespace vcharge
