@@ -95,7 +95,7 @@ def sizes(errors, kind):
 def normalized_squares(results, kind="without_scale"):
     """Mean normalized squared error of each degree of freedom over all cameras of all results."""
     rows = [camera["normalized"] for result in results if result["errors"] for camera in result["errors"][kind]]
-    return np.mean(np.square(np.array(rows)), axis=0)
+    return np.mean(np.square(np.array(rows)), axis=0) if rows else np.full(len(AXES), np.nan)
 
 
 def table(title, headings, rows):
