@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+
+#include <octomap_msgs/Octomap.h>
+
+#include "vcharge_core/timestamp.h"
+
+namespace octomap {
+class OcTree;
+}
+
+namespace vcharge {
+
+/// An octree as a message: binary (free and occupied leaves alone), in the tree's own frame, which is called
+/// `frame_id`. std::runtime_error when octomap cannot serialize it.
+octomap_msgs::Octomap toMessage(const octomap::OcTree& tree, const std::string& frame_id, Timestamp stamp);
+
+/// The tree of a binary message. InputError "<source>: ..." for a message that holds no binary OcTree.
+void fromMessage(const octomap_msgs::Octomap& message, const std::string& source, octomap::OcTree* tree);
+
+}  // namespace vcharge
