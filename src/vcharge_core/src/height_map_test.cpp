@@ -1,0 +1,3 @@
+#include "vcharge_core/height_map.h"
+
+#include <gtest/gtest.h>
