@@ -30,9 +30,13 @@ void print(const HeightMapErrors& errors) {
   std::printf("height error: mean %.2f cm, 95 %% within %.2f cm, %.1f %% within 10 cm, signed mean %.2f cm\n",
               100.0 * errors.height_m.mean, 100.0 * errors.height_m.percentile_95,
               100.0 * errors.share_within_10_cm, 100.0 * errors.mean_signed_m);
-  std::printf("steps: %zu, %.1f %% of them found; horizontal error: mean %.2f cm, 95 %% within %.2f cm\n",
-              errors.num_steps, percent(errors.num_steps_found, errors.num_steps),
-              100.0 * errors.step_position_m.mean, 100.0 * errors.step_position_m.percentile_95);
+  std::printf(
+      "steps: %zu places, %.1f %% of them mapped on both sides, %.1f %% of these found; horizontal error: "
+      "mean "
+      "%.2f cm, 95 %% within %.2f cm\n",
+      errors.num_steps, percent(errors.num_steps_mapped, errors.num_steps),
+      percent(errors.num_steps_found, errors.num_steps_mapped), 100.0 * errors.step_position_m.mean,
+      100.0 * errors.step_position_m.percentile_95);
   std::printf("heights of kerbs: %zu places, error mean %.2f cm, 95 %% within %.2f cm\n", errors.num_kerbs,
               100.0 * errors.kerb_height_m.mean, 100.0 * errors.kerb_height_m.percentile_95);
   std::printf("tape measure: %zu distances, %zu not shown by the map, error mean %.2f cm, largest %.2f cm\n",
@@ -64,6 +68,7 @@ nlohmann::json toJson(const HeightMapErrors& errors) {
           {"mean_signed_m", errors.mean_signed_m},
           {"share_within_10_cm", errors.share_within_10_cm},
           {"num_steps", errors.num_steps},
+          {"num_steps_mapped", errors.num_steps_mapped},
           {"num_steps_found", errors.num_steps_found},
           {"step_position_m", errors.step_position_m},
           {"num_kerbs", errors.num_kerbs},

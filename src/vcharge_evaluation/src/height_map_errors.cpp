@@ -105,6 +105,13 @@ void judgeCells(const HeightMap& map, const MapInWorld& in_world, const HeightMa
   errors->height_m = summarize(std::move(absolute));
 }
 
+/// Whether the map has heights on both sides.
+bool isMapped(const MapInWorld& in_world, const HeightStep& step, double beside_m) {
+  const Eigen::Vector2d beside = beside_m * step.direction;
+  return std::isfinite(in_world.heightAt(step.place_m - beside, step.low_m)) &&
+         std::isfinite(in_world.heightAt(step.place_m + beside, step.low_m));
+}
+
 void judgeSteps(const MapInWorld& in_world, const std::vector<HeightStep>& steps,
                 const HeightMapErrorOptions& options, HeightMapErrors* errors) {
   std::vector<double> positions, kerbs;
@@ -116,7 +123,6 @@ void judgeSteps(const MapInWorld& in_world, const std::vector<HeightStep>& steps
     const double low = height(step.place_m - beside), high = height(step.place_m + beside);
     const auto crossing = findCrossing(height, step.place_m, step.direction, -options.search_m,
                                        options.search_m, step.low_m + stepLevel(step));
-    ++errors->num_steps;
     if (crossing) {
       ++errors->num_steps_found;
       positions.push_back(std::abs(*crossing));
@@ -227,12 +233,18 @@ HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& wo
   const double ground_m =
       (world_from_map.inverse() * world_from_vehicle.front().world_from_vehicle.translation()).z();
   judgeCells(map, in_world, truth, ground_m, visibility, options, &errors);
-  const std::vector<HeightStep> steps = findHeightSteps(truth, options, [&](const Eigen::Vector2d& place_m) {
+  std::vector<HeightStep> steps = findHeightSteps(truth, options, [&](const Eigen::Vector2d& place_m) {
     const double height = interpolateHeight(truth, place_m);
     return std::isfinite(height) &&
            visibility.countViews({place_m.x(), place_m.y(), height + kAboveSurface_m}, options.min_views) >=
                options.min_views;
   });
+  errors.num_steps = steps.size();
+  steps.erase(
+      std::remove_if(steps.begin(), steps.end(),
+                     [&](const HeightStep& step) { return !isMapped(in_world, step, options.plateau_m); }),
+      steps.end());
+  errors.num_steps_mapped = steps.size();
   judgeSteps(in_world, steps, options, &errors);
   measure(in_world, steps, options, &errors);
   return errors;

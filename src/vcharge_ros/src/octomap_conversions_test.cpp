@@ -40,6 +40,24 @@ TEST(OctomapConversionsTest, KeepFreeOccupiedAndUnknownSpace) {
   EXPECT_EQ(read.search(3.0, 3.0, 0.0), nullptr);
 }
 
+TEST(OctomapConversionsTest, MarkerHasACubeForEachOccupiedVoxelAlsoWhereLeavesArePruned) {
+  octomap::OcTree tree(0.1);
+  for (int i = 0; i < 8; ++i) {
+    tree.updateNode(0.05 + 0.1 * (i % 2), 0.05 + 0.1 * (i / 2 % 2), 0.05 + 0.1 * (i / 4), true);
+  }
+  tree.updateNode(3.05, 0.05, 0.05, false);
+  tree.prune();
+  ASSERT_EQ(tree.getNumLeafNodes(), 2U);
+  const visualization_msgs::Marker marker = makeOctomapMarker(tree, "map", Timestamp::fromNanoseconds(0));
+  ASSERT_EQ(marker.points.size(), 8U);
+  EXPECT_EQ(marker.colors.size(), 8U);
+  for (const geometry_msgs::Point& point : marker.points) {
+    EXPECT_TRUE(tree.isNodeOccupied(tree.search(point.x, point.y, point.z)));
+  }
+  EXPECT_EQ(makeOctomapMarker(octomap::OcTree(0.1), "map", Timestamp::fromNanoseconds(0)).action,
+            visualization_msgs::Marker::DELETE);
+}
+
 TEST(OctomapConversionsTest, KeepAnEmptyTree) {
   octomap::OcTree read(1.0);
   fromMessage(toMessage(octomap::OcTree(0.2), "map", Timestamp::fromNanoseconds(0)), "/octomap", &read);

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "vcharge_core/range_map.h"
+#include "vcharge_core/ray_table.h"
 #include "vcharge_core/rigid_transform.h"
 #include "vcharge_dense/height_map_options.h"
 
@@ -28,9 +31,12 @@ class OctomapBuilder {
   void write(const std::string& path);
 
  private:
+  const RayTable& raysOf(const RangeMap& map);
+
   const OctomapOptions options_;
   const double farthest_m_;
   std::unique_ptr<octomap::OcTree> tree_;
+  std::map<std::vector<double>, std::unique_ptr<RayTable>> rays_;  // by camera model and size
 };
 
 }  // namespace vcharge

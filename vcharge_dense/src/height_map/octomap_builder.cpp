@@ -29,8 +29,20 @@ OctomapBuilder::OctomapBuilder(const OctomapOptions& options, double farthest_m)
 
 OctomapBuilder::~OctomapBuilder() = default;
 
+const RayTable& OctomapBuilder::raysOf(const RangeMap& map) {
+  const MeiCamera::Parameters parameters = map.camera.parameters();
+  std::vector<double> key(parameters.data(), parameters.data() + parameters.size());
+  key.push_back(map.range_m.cols);
+  key.push_back(map.range_m.rows);
+  std::unique_ptr<RayTable>& rays = rays_[key];
+  if (!rays) {
+    rays = std::make_unique<RayTable>(map.camera, map.range_m.size(), kWholeSphere_rad);
+  }
+  return *rays;
+}
+
 void OctomapBuilder::add(const RangeMap& map, const RigidTransform& world_from_camera) {
-  const RayTable rays(map.camera, map.range_m.size(), kWholeSphere_rad);
+  const RayTable& rays = raysOf(map);
   const Eigen::Vector3d origin = world_from_camera.translation();
   octomap::KeySet free, occupied;
   octomap::KeyRay ray_keys;

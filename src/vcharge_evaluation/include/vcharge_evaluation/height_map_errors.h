@@ -68,7 +68,9 @@ struct HeightMapErrors {
   ErrorDistribution height_m;  ///< absolute
   double mean_signed_m = 0.0;
   double share_within_10_cm = 0.0;
-  size_t num_steps = 0, num_steps_found = 0;
+  size_t num_steps = 0;         ///< places on steps whose lower side is seen often enough
+  size_t num_steps_mapped = 0;  ///< of these, with heights on both sides; the others are not judged
+  size_t num_steps_found = 0;   ///< of these, the map rises there
   ErrorDistribution step_position_m;
   size_t num_kerbs = 0;
   ErrorDistribution kerb_height_m;  ///< absolute errors of the height of kerbs
