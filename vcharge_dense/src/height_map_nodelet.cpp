@@ -6,7 +6,6 @@
 
 #include <nodelet/nodelet.h>
 #include <octomap/OcTree.h>
-#include <std_srvs/Trigger.h>
 #include <pluginlib/class_list_macros.hpp>
 
 #include "height_map_publication.h"
@@ -32,8 +31,7 @@ class HeightMapNodelet : public nodelet::Nodelet, private DriveConsumer {
   }
 
  private:
-  using Request = std_srvs::Trigger::Request;
-  using Response = std_srvs::Trigger::Response;
+  using Response = std_srvs::TriggerResponse;
 
   void onInit() override {
     ros::NodeHandle& private_node = getPrivateNodeHandle();
@@ -49,9 +47,7 @@ class HeightMapNodelet : public nodelet::Nodelet, private DriveConsumer {
     LiveDriveSourceOptions source_options;
     source_options.cameras = options.range_maps.cameras;
     if (private_node.param("lossless_replay", false)) {
-      source_options.image_queue_size = 0;
-      source_options.odometry_queue_size = 0;
-      source_options.sort_window_s = 0.5;
+      source_options.takeEverything();
     }
     readFieldsFromParameters(private_node, "source", &source_options);
     mapper_ = std::make_unique<HeightMapper>(rig, options, output_ + ".range_maps", "");
@@ -62,13 +58,8 @@ class HeightMapNodelet : public nodelet::Nodelet, private DriveConsumer {
     publication_ = std::make_unique<HeightMapPublication>(&getNodeHandle());
     addDiagnostics("", [this] { return source_->report(); });
     addDiagnostics("/height_map", [this] { return report(); });
-    const boost::function<bool(Request&, Response&)> call = [this](Request& /*request*/, Response& response) {
-      const bool done = guard_.run([&] { finish(&response); });
-      response.success = done ? 1 : 0;
-      response.message = done ? response.message : guard_.lastError();
-      return true;
-    };
-    finish_ = private_node.advertiseService("finish", call);
+    finish_ =
+        advertiseTrigger(&private_node, "finish", &guard_, [this](Response* response) { finish(response); });
     source_->run(this, DriveSource::ProgressCallback());
   }
 
@@ -94,6 +85,7 @@ class HeightMapNodelet : public nodelet::Nodelet, private DriveConsumer {
     publication_->publish(result.map, result.states, result.octomap->tree());
     ContentHasher hasher;
     addToHash(result.map, &hasher);
+    response->success = 1;
     response->message = output_ + ": content hash: " + hasher.hex();
   }
 
