@@ -27,7 +27,8 @@ class OctomapBuilder {
 
   void add(const RangeMap& map, const RigidTransform& world_from_camera);
   const octomap::OcTree& tree() const { return *tree_; }
-  /// Prunes and writes a .bt file, whole or not at all. InputError naming the file.
+  /// Writes a .bt file, whole or not at all; the tree then knows free and occupied alone. InputError naming
+  /// the file.
   void write(const std::string& path);
 
  private:

@@ -248,6 +248,23 @@ TEST_F(OctomapBuilderTest, ClearsToTheSurfaceOnlyWhereARangeIsKnown) {
   EXPECT_EQ(at(builder.tree(), 1.05, 0.45, 1.05), "unknown");
 }
 
+TEST_F(OctomapBuilderTest, FileIsReadAsItWasWritten) {
+  OctomapOptions options;
+  options.pixel_step = 1;
+  OctomapBuilder builder(options, 40.0);
+  builder.add(wall(), along_x_);
+  const std::string path = ::testing::TempDir() + "octomap_builder_test.bt";
+  builder.write(path);
+  octomap::OcTree read(1.0);
+  ASSERT_TRUE(read.readBinary(path));
+  fs::remove(path);
+  EXPECT_DOUBLE_EQ(read.getResolution(), 0.1);
+  EXPECT_EQ(read.size(), builder.tree().size());
+  EXPECT_EQ(at(read, 2.05, -0.45, 1.05), "occupied");
+  EXPECT_EQ(at(read, 1.05, -0.25, 1.05), "free");
+  EXPECT_EQ(at(read, 1.05, 0.45, 1.05), "unknown");
+}
+
 TEST_F(OctomapBuilderTest, FarthestPlaneAndRangesWithoutSigmaClearNothing) {
   OctomapBuilder builder(OctomapOptions(), 1.9);
   builder.add(wall(), along_x_);

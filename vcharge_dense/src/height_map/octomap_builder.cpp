@@ -83,9 +83,15 @@ void OctomapBuilder::add(const RangeMap& map, const RigidTransform& world_from_c
 
 void OctomapBuilder::write(const std::string& path) {
   tree_->updateInnerOccupancy();
+  tree_->toMaxLikelihood();
+  tree_->prune();
   writeFileAtomically(path, [&](const std::string& temporary) {
     std::ofstream file(temporary, std::ios::binary);
-    const bool written = tree_->writeBinary(file);
+    // As OcTree::writeBinary(), which tells standard error about it.
+    file.precision(17);
+    file << "# Octomap OcTree binary file\n# free, occupied and unknown space\nid " << tree_->getTreeType()
+         << "\nsize " << tree_->size() << "\nres " << tree_->getResolution() << "\ndata\n";
+    const bool written = static_cast<bool>(tree_->writeBinaryData(file));
     file.close();
     if (!written || !file) {
       throw InputError(path + ": cannot be written (is the disk full?)");
