@@ -1,0 +1,94 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "vcharge_core/camera_rig.h"
+#include "vcharge_core/height_map.h"
+#include "vcharge_core/options.h"
+#include "vcharge_core/rigid_transform.h"
+#include "vcharge_core/trajectory.h"
+#include "vcharge_evaluation/error_distribution.h"
+
+namespace vcharge {
+
+struct HeightMapErrorOptions {
+  double view_distance_m = 0.3;  ///< travel between frames that count as views
+  double max_view_range_m = 8.0;
+  int min_views = 3;          ///< a cell is judged where its true surface is seen in as many frames
+  double step_m = 0.08;       ///< a change of the true height within a cell that counts as a step
+  double kerb_low_m = 0.1;    ///< steps of this height to
+  double kerb_high_m = 0.14;  ///< this one are kerbs
+  double search_m = 0.4;      ///< how far aside a step is looked for in the map
+  double plateau_m = 0.15;    ///< heights beside a step are read this far from it
+  int num_measurements = 20;  ///< tape-measure distances
+  double min_length_m = 0.5;
+  double max_length_m = 6.0;
+  int seed = 1;  ///< picks the measurements
+
+  template <class Visitor>
+  void visitFields(Visitor&& visit) {
+    visit("view_distance_m", view_distance_m);
+    visit("max_view_range_m", max_view_range_m);
+    visit("min_views", min_views);
+    visit("step_m", step_m);
+    visit("kerb_low_m", kerb_low_m);
+    visit("kerb_high_m", kerb_high_m);
+    visit("search_m", search_m);
+    visit("plateau_m", plateau_m);
+    visit("num_measurements", num_measurements);
+    visit("min_length_m", min_length_m);
+    visit("max_length_m", max_length_m);
+    visit("seed", seed);
+  }
+  void validate() const;  ///< throws std::invalid_argument naming the field
+};
+
+/// A place where the true height jumps, crossed along an axis of the world from its low to its high side.
+struct HeightStep {
+  Eigen::Vector2d place_m{0, 0};     ///< of the edge, in the world
+  Eigen::Vector2d direction{1, 0};   ///< unit, upwards
+  double low_m = 0.0, high_m = 0.0;  ///< true heights beside it
+  bool both_sides_seen = false;      ///< the upper one, too
+};
+
+/// A distance that could be taken with a tape measure in the world, and is read from the map.
+struct TapeMeasurement {
+  enum class Kind { kLength, kHeight };
+  Kind kind = Kind::kLength;
+  Eigen::Vector2d from_m{0, 0}, to_m{0, 0};  ///< in the world; of a height, where it is read below and above
+  double truth_m = 0.0;
+  double map_m = 0.0;  ///< NaN: the map does not show it
+};
+
+struct HeightMapErrors {
+  size_t num_seen = 0;         ///< cells whose true surface is seen often enough, apart from steps
+  size_t num_mapped = 0;       ///< of these, observed in the map
+  ErrorDistribution height_m;  ///< absolute
+  double mean_signed_m = 0.0;
+  double share_within_10_cm = 0.0;
+  size_t num_steps = 0;         ///< places on steps whose lower side is seen often enough
+  size_t num_steps_mapped = 0;  ///< of these, with heights on both sides; the others are not judged
+  size_t num_steps_found = 0;   ///< of these, the map rises there
+  ErrorDistribution step_position_m;
+  size_t num_kerbs = 0;
+  ErrorDistribution kerb_height_m;  ///< absolute errors of the height of kerbs
+  std::vector<TapeMeasurement> measurements;
+  double mean_measurement_m = 0.0, max_measurement_m = 0.0;  ///< absolute errors, of those the map shows
+  size_t num_measurements_missing = 0;
+  cv::Mat error_m;  ///< CV_32FC1 of the map's size: estimate less truth of the judged cells, NaN elsewhere
+};
+
+/// Lays the map's trajectory over the true one by whole poses, so that a straight drive does, too.
+/// InputError when fewer than two poses have truth.
+RigidTransform alignToTruth(const Trajectory& estimate, const Trajectory& truth);
+
+/// Judges a height map by the true one (cells no larger than half the map's give the steps' places well).
+/// `world_from_vehicle` is the true trajectory; `world_from_map` see alignToTruth().
+HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& world_from_map,
+                                  const HeightMap& truth, const Trajectory& world_from_vehicle,
+                                  const CameraRig& rig,
+                                  const HeightMapErrorOptions& options = HeightMapErrorOptions());
+
+}  // namespace vcharge

@@ -1,0 +1,253 @@
+#include "vcharge_evaluation/height_map_errors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <tbb/parallel_for.h>
+
+#include "height_steps.h"
+#include "surface_visibility.h"
+#include "vcharge_core/error.h"
+#include "vcharge_core/quantile.h"
+#include "vcharge_evaluation/trajectory_errors.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kLever_m = 5.0;           // of the points by which poses are laid over each other
+constexpr double kAboveSurface_m = 0.005;  // of the point that is looked for
+constexpr double kNotMapped = std::numeric_limits<double>::quiet_NaN();
+
+/// A map read in the world's frame.
+class MapInWorld {
+ public:
+  MapInWorld(const HeightMap& map, const RigidTransform& world_from_map)
+      : map_(map), world_from_map_(world_from_map), map_from_world_(world_from_map.inverse()) {}
+
+  /// Height in the world at a place of the world, interpolated; NaN where it is not mapped. `about_m`: height
+  /// near which the surface is, for maps that are tilted.
+  double heightAt(const Eigen::Vector2d& place_m, double about_m) const {
+    const Eigen::Vector3d in_map = map_from_world_ * Eigen::Vector3d(place_m.x(), place_m.y(), about_m);
+    const double height = interpolateHeight(map_, in_map.head<2>());
+    return (world_from_map_ * Eigen::Vector3d(in_map.x(), in_map.y(), height)).z();
+  }
+
+  /// The centre of a cell on the map's surface, or near the ground where it is not observed.
+  Eigen::Vector3d cell(int column, int row, double ground_m) const {
+    const Eigen::Vector2d centre = map_.centreOf(column, row);
+    const float height = map_.height_m.at<float>(row, column);
+    return world_from_map_ *
+           Eigen::Vector3d(centre.x(), centre.y(), std::isfinite(height) ? height : ground_m);
+  }
+
+ private:
+  const HeightMap& map_;
+  const RigidTransform world_from_map_, map_from_world_;
+};
+
+/// Difference of the highest and the lowest true cell within `reach_m`, along rows and columns.
+double spreadAround(const HeightMap& truth, const Eigen::Vector2d& place_m, double reach_m) {
+  const Eigen::Vector2d cell = (place_m - truth.origin_m) / truth.cell_size_m;
+  const auto column = static_cast<int>(std::lround(cell.x())), row = static_cast<int>(std::lround(cell.y()));
+  const auto reach = static_cast<int>(std::ceil(reach_m / truth.cell_size_m));
+  float low = std::numeric_limits<float>::infinity(), high = -low;
+  for (int r = std::max(0, row - reach); r <= std::min(truth.height_m.rows - 1, row + reach); ++r) {
+    for (int c = std::max(0, column - reach); c <= std::min(truth.height_m.cols - 1, column + reach); ++c) {
+      low = std::min(low, truth.height_m.at<float>(r, c));
+      high = std::max(high, truth.height_m.at<float>(r, c));
+    }
+  }
+  return high - low;
+}
+
+/// Errors of all cells that are seen, apart from steps. Row by row, so that threads change nothing.
+void judgeCells(const HeightMap& map, const MapInWorld& in_world, const HeightMap& truth, double ground_m,
+                const SurfaceVisibility& visibility, const HeightMapErrorOptions& options,
+                HeightMapErrors* errors) {
+  cv::Mat seen(map.height_m.size(), CV_8UC1, cv::Scalar(0));
+  errors->error_m = cv::Mat(map.height_m.size(), CV_32FC1, cv::Scalar(kNotMapped));
+  tbb::parallel_for(0, map.height_m.rows, [&](int row) {
+    for (int column = 0; column < map.height_m.cols; ++column) {
+      const Eigen::Vector3d cell = in_world.cell(column, row, ground_m);
+      const double height = interpolateHeight(truth, cell.head<2>());
+      if (!std::isfinite(height) ||
+          !(spreadAround(truth, cell.head<2>(), map.cell_size_m) <= options.step_m) ||
+          visibility.countViews({cell.x(), cell.y(), height + kAboveSurface_m}, options.min_views) <
+              options.min_views) {
+        continue;
+      }
+      seen.at<uint8_t>(row, column) = 1;
+      if (std::isfinite(map.height_m.at<float>(row, column))) {
+        errors->error_m.at<float>(row, column) = static_cast<float>(cell.z() - height);
+      }
+    }
+  });
+  std::vector<double> absolute;
+  double sum = 0.0;
+  size_t within = 0;
+  for (int row = 0; row < seen.rows; ++row) {
+    for (int column = 0; column < seen.cols; ++column) {
+      errors->num_seen += seen.at<uint8_t>(row, column);
+      const double error = errors->error_m.at<float>(row, column);
+      if (std::isfinite(error)) {
+        absolute.push_back(std::abs(error));
+        sum += error;
+        within += std::abs(error) <= 0.1 ? 1 : 0;
+      }
+    }
+  }
+  errors->num_mapped = absolute.size();
+  if (!absolute.empty()) {
+    errors->mean_signed_m = sum / static_cast<double>(absolute.size());
+    errors->share_within_10_cm = static_cast<double>(within) / static_cast<double>(absolute.size());
+  }
+  errors->height_m = summarize(std::move(absolute));
+}
+
+/// Whether the map has heights on both sides.
+bool isMapped(const MapInWorld& in_world, const HeightStep& step, double beside_m) {
+  const Eigen::Vector2d beside = beside_m * step.direction;
+  return std::isfinite(in_world.heightAt(step.place_m - beside, step.low_m)) &&
+         std::isfinite(in_world.heightAt(step.place_m + beside, step.low_m));
+}
+
+void judgeSteps(const MapInWorld& in_world, const std::vector<HeightStep>& steps,
+                const HeightMapErrorOptions& options, HeightMapErrors* errors) {
+  std::vector<double> positions, kerbs;
+  for (const HeightStep& step : steps) {
+    const HeightAt height = [&](const Eigen::Vector2d& place_m) {
+      return in_world.heightAt(place_m, step.low_m);
+    };
+    const Eigen::Vector2d beside = options.plateau_m * step.direction;
+    const double low = height(step.place_m - beside), high = height(step.place_m + beside);
+    const auto crossing = findCrossing(height, step.place_m, step.direction, -options.search_m,
+                                       options.search_m, step.low_m + stepLevel(step));
+    if (crossing) {
+      ++errors->num_steps_found;
+      positions.push_back(std::abs(*crossing));
+    }
+    const double rise = step.high_m - step.low_m;
+    if (step.both_sides_seen && rise >= options.kerb_low_m && rise <= options.kerb_high_m &&
+        std::isfinite(high - low)) {
+      kerbs.push_back(std::abs(high - low - rise));
+    }
+  }
+  errors->step_position_m = summarize(std::move(positions));
+  errors->num_kerbs = kerbs.size();
+  errors->kerb_height_m = summarize(std::move(kerbs));
+}
+
+/// The edge near a true one as somebody reads it from the map: the middle one of five lines.
+double readEdge(const MapInWorld& in_world, const HeightStep& step, double search_m) {
+  const Eigen::Vector2d across(-step.direction.y(), step.direction.x());
+  const HeightAt height = [&](const Eigen::Vector2d& place_m) {
+    return in_world.heightAt(place_m, step.low_m);
+  };
+  std::vector<double> crossings;
+  for (const double aside : {-0.1, -0.05, 0.0, 0.05, 0.1}) {
+    const auto crossing = findCrossing(height, step.place_m + aside * across, step.direction, -search_m,
+                                       search_m, step.low_m + stepLevel(step));
+    if (crossing) {
+      crossings.push_back(*crossing);
+    }
+  }
+  return crossings.size() < 3 ? kNotMapped : quantile(crossings, 0.5);
+}
+
+const HeightStep& stepAt(const std::vector<HeightStep>& steps, const Eigen::Vector2d& place_m) {
+  return *std::find_if(steps.begin(), steps.end(),
+                       [&](const HeightStep& step) { return step.place_m == place_m; });
+}
+
+void measure(const MapInWorld& in_world, const std::vector<HeightStep>& steps,
+             const HeightMapErrorOptions& options, HeightMapErrors* errors) {
+  errors->measurements = pickMeasurements(steps, options);
+  double sum = 0.0;
+  size_t shown = 0;
+  for (TapeMeasurement& measurement : errors->measurements) {
+    if (measurement.kind == TapeMeasurement::Kind::kHeight) {
+      measurement.map_m =
+          in_world.heightAt(measurement.to_m, 0.0) - in_world.heightAt(measurement.from_m, 0.0);
+    } else {
+      const HeightStep &a = stepAt(steps, measurement.from_m), &b = stepAt(steps, measurement.to_m);
+      const Eigen::Vector2d from = a.place_m + readEdge(in_world, a, options.search_m) * a.direction;
+      const Eigen::Vector2d to = b.place_m + readEdge(in_world, b, options.search_m) * b.direction;
+      measurement.map_m = (to - from).norm();
+    }
+    const double error = std::abs(measurement.map_m - measurement.truth_m);
+    if (std::isfinite(error)) {
+      sum += error;
+      ++shown;
+      errors->max_measurement_m = std::max(errors->max_measurement_m, error);
+    } else {
+      ++errors->num_measurements_missing;
+    }
+  }
+  errors->mean_measurement_m = shown > 0 ? sum / static_cast<double>(shown) : 0.0;
+}
+
+}  // namespace
+
+void HeightMapErrorOptions::validate() const {
+  requireField(view_distance_m > 0.0, "view_distance_m", "must be positive", view_distance_m);
+  requireField(max_view_range_m > 0.0, "max_view_range_m", "must be positive", max_view_range_m);
+  requireField(min_views > 0, "min_views", "must be positive", min_views);
+  requireField(step_m > 0.0, "step_m", "must be positive", step_m);
+  requireField(kerb_low_m > 0.0, "kerb_low_m", "must be positive", kerb_low_m);
+  requireField(kerb_high_m > kerb_low_m, "kerb_high_m", "must be above kerb_low_m", kerb_high_m);
+  requireField(search_m > 0.0, "search_m", "must be positive", search_m);
+  requireField(plateau_m > 0.0, "plateau_m", "must be positive", plateau_m);
+  requireField(num_measurements >= 0, "num_measurements", "must not be negative", num_measurements);
+  requireField(min_length_m > 0.0, "min_length_m", "must be positive", min_length_m);
+  requireField(max_length_m > min_length_m, "max_length_m", "must be above min_length_m", max_length_m);
+}
+
+RigidTransform alignToTruth(const Trajectory& estimate, const Trajectory& truth) {
+  const AssociatedTrajectories pairs = associateWithTruth(estimate, truth);
+  if (pairs.estimate.size() < 2) {
+    throw InputError("the trajectory and the true one share " + std::to_string(pairs.estimate.size()) +
+                     " stamps, expected at least 2");
+  }
+  std::vector<Eigen::Vector3d> from, to;
+  for (size_t i = 0; i < pairs.estimate.size(); ++i) {
+    for (const Eigen::Vector3d& lever : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(kLever_m, 0, 0),
+                                         Eigen::Vector3d(0, kLever_m, 0), Eigen::Vector3d(0, 0, kLever_m)}) {
+      from.push_back(pairs.estimate[i].world_from_vehicle * lever);
+      to.push_back(pairs.truth[i].world_from_vehicle * lever);
+    }
+  }
+  return alignPoints(from, to);
+}
+
+HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& world_from_map,
+                                  const HeightMap& truth, const Trajectory& world_from_vehicle,
+                                  const CameraRig& rig, const HeightMapErrorOptions& options) {
+  options.validate();
+  check(rig.hasExtrinsics(), "evaluateHeightMap: expected vehicle_from_camera of every camera");
+  check(!world_from_vehicle.empty(), "evaluateHeightMap: expected poses");
+  const SurfaceVisibility visibility(truth, world_from_vehicle, rig, options.view_distance_m,
+                                     options.max_view_range_m);
+  const MapInWorld in_world(map, world_from_map);
+  HeightMapErrors errors;
+  const double ground_m =
+      (world_from_map.inverse() * world_from_vehicle.front().world_from_vehicle.translation()).z();
+  judgeCells(map, in_world, truth, ground_m, visibility, options, &errors);
+  std::vector<HeightStep> steps = findHeightSteps(truth, options, [&](const Eigen::Vector2d& place_m) {
+    const double height = interpolateHeight(truth, place_m);
+    return std::isfinite(height) &&
+           visibility.countViews({place_m.x(), place_m.y(), height + kAboveSurface_m}, options.min_views) >=
+               options.min_views;
+  });
+  errors.num_steps = steps.size();
+  steps.erase(
+      std::remove_if(steps.begin(), steps.end(),
+                     [&](const HeightStep& step) { return !isMapped(in_world, step, options.plateau_m); }),
+      steps.end());
+  errors.num_steps_mapped = steps.size();
+  judgeSteps(in_world, steps, options, &errors);
+  measure(in_world, steps, options, &errors);
+  return errors;
+}
+
+}  // namespace vcharge

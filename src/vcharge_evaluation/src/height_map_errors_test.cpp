@@ -1,0 +1,150 @@
+#include "vcharge_evaluation/height_map_errors.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "vcharge_core/error.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kKerb_m = 0.12;
+
+/// Ground with a platform of a kerb's height from x = 3 to 4 m, and a wall of 2 m from y = 2.5 m on.
+HeightMap world(double cell_size_m) {
+  HeightMap map;
+  map.frame_id = "world";
+  map.cell_size_m = cell_size_m;
+  map.origin_m = {-2.0 + 0.5 * cell_size_m, -3.0 + 0.5 * cell_size_m};
+  map.height_m.create(static_cast<int>(std::lround(6.0 / cell_size_m)),
+                      static_cast<int>(std::lround(10.0 / cell_size_m)), CV_32FC1);
+  for (int row = 0; row < map.height_m.rows; ++row) {
+    for (int column = 0; column < map.height_m.cols; ++column) {
+      const Eigen::Vector2d place = map.centreOf(column, row);
+      const bool on_platform = place.x() > 3.0 && place.x() < 4.0;
+      map.height_m.at<float>(row, column) = static_cast<float>(place.y() > 2.5 ? 2.0
+                                                               : on_platform   ? kKerb_m
+                                                                               : 0.0);
+    }
+  }
+  return map;
+}
+
+class HeightMapErrorsTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    for (const double yaw : {0.0, 1.57, -1.57}) {
+      rig_.cameras.push_back(
+          {"camera" + std::to_string(rig_.cameras.size()), "optical", cv::Size(200, 150),
+           MeiCamera(1.1, 120.0, 120.0, 99.5, 74.5), 3.1, "", cv::Mat(),
+           RigidTransform(rotationFromYawPitchRoll(yaw, 0.4, 0.0) * Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5),
+                          Eigen::Vector3d(0.0, 0.0, 1.0)),
+           std::nullopt});
+    }
+    for (int i = 0; i < 12; ++i) {
+      poses_.push_back(
+          {Timestamp::fromNanoseconds(1000 + i), RigidTransform::planar(0.4 * i - 1.0, 0.0, 0.0)});
+    }
+  }
+  HeightMapErrors evaluate(const HeightMap& map,
+                           const RigidTransform& world_from_map = RigidTransform()) const {
+    return evaluateHeightMap(map, world_from_map, world(0.025), poses_, rig_);
+  }
+
+  CameraRig rig_;
+  Trajectory poses_;
+};
+
+TEST_F(HeightMapErrorsTest, ThereAreNoneOfThePerfectMap) {
+  const HeightMapErrors errors = evaluate(world(0.05));
+  EXPECT_GT(errors.num_seen, 10000U);
+  EXPECT_EQ(errors.num_mapped, errors.num_seen);
+  EXPECT_LT(errors.height_m.max, 1e-5);
+  EXPECT_GT(errors.num_steps_found, 80U);
+  EXPECT_EQ(errors.num_steps_found, errors.num_steps_mapped);
+  EXPECT_LT(errors.step_position_m.max, 0.026);  // half a cell
+  EXPECT_GT(errors.num_kerbs, 50U);
+  EXPECT_LT(errors.kerb_height_m.max, 1e-5);
+  EXPECT_GT(errors.measurements.size(), 8U);
+  EXPECT_EQ(errors.num_measurements_missing, 0U);
+  EXPECT_LT(errors.max_measurement_m, 0.051);
+}
+
+TEST_F(HeightMapErrorsTest, TellsAMapThatIsTooHigh) {
+  HeightMap map = world(0.05);
+  map.height_m += 0.07F;
+  const HeightMapErrors errors = evaluate(map);
+  EXPECT_NEAR(errors.height_m.mean, 0.07, 1e-5);
+  EXPECT_NEAR(errors.mean_signed_m, 0.07, 1e-5);
+  EXPECT_EQ(errors.share_within_10_cm, 1.0);
+  EXPECT_LT(errors.kerb_height_m.max, 1e-5);  // heights of steps stay
+}
+
+TEST_F(HeightMapErrorsTest, TellsStepsThatAreAside) {
+  HeightMap map = world(0.05);
+  map.origin_m.x() += 0.1;
+  const HeightMapErrors errors = evaluate(map);
+  double kerbs = 0.0;
+  for (const TapeMeasurement& measurement : errors.measurements) {
+    kerbs += measurement.kind == TapeMeasurement::Kind::kLength ? 1.0 : 0.0;
+  }
+  EXPECT_GT(kerbs, 0.0);
+  EXPECT_NEAR(errors.step_position_m.max, 0.1, 0.026);
+  EXPECT_GT(errors.step_position_m.mean, 0.03);  // of all, the wall's lie right
+}
+
+TEST_F(HeightMapErrorsTest, LaysAMapOfAnotherFrameOverTheTruth) {
+  // The map's frame is turned by 180 degrees, which keeps its cells on the grid, and lies elsewhere.
+  const RigidTransform world_from_map(rotationFromYawPitchRoll(M_PI, 0.0, 0.0),
+                                      Eigen::Vector3d(7.0, 1.0, 0.3));
+  HeightMap map = world(0.05);
+  cv::flip(map.height_m, map.height_m, -1);
+  map.height_m -= 0.3F;
+  const HeightMap upright = world(0.05);
+  const Eigen::Vector2d last = upright.centreOf(upright.height_m.cols - 1, upright.height_m.rows - 1);
+  map.origin_m = (world_from_map.inverse() * Eigen::Vector3d(last.x(), last.y(), 0.0)).head<2>();
+  Trajectory in_map = poses_;
+  for (StampedTransform& pose : in_map) {
+    pose.world_from_vehicle = world_from_map.inverse() * pose.world_from_vehicle;
+  }
+  const RigidTransform aligned = alignToTruth(in_map, poses_);  // from a straight drive
+  EXPECT_LT((aligned.translation() - world_from_map.translation()).norm(), 1e-6);
+  const HeightMapErrors errors = evaluate(map, aligned);
+  EXPECT_GT(errors.num_mapped, 10000U);
+  EXPECT_LT(errors.height_m.max, 1e-4);
+}
+
+TEST_F(HeightMapErrorsTest, UnmappedCellsAreCountedAndNotJudged) {
+  HeightMap map = world(0.05);
+  map.height_m.colRange(0, 100).setTo(std::numeric_limits<float>::quiet_NaN());
+  const HeightMapErrors errors = evaluate(map);
+  EXPECT_LT(errors.num_mapped, errors.num_seen);
+  EXPECT_GT(errors.num_mapped, 1000U);
+  EXPECT_LT(errors.height_m.max, 1e-5);
+  EXPECT_LT(errors.num_steps_mapped, errors.num_steps);
+}
+
+TEST_F(HeightMapErrorsTest, NobodySeesBehindTheWall) {
+  HeightMap map = world(0.05);
+  const HeightMapErrors errors = evaluate(map);
+  for (int row = 0; row < map.height_m.rows; ++row) {
+    for (int column = 0; column < map.height_m.cols; ++column) {
+      if (map.centreOf(column, row).y() > 2.6) {
+        ASSERT_TRUE(std::isnan(errors.error_m.at<float>(row, column)));
+      }
+    }
+  }
+}
+
+TEST_F(HeightMapErrorsTest, RefusesTrajectoriesThatShareNoTime) {
+  Trajectory other = poses_;
+  for (StampedTransform& pose : other) {
+    pose.stamp = Timestamp::fromNanoseconds(pose.stamp.nanoseconds() + 5000000000);
+  }
+  EXPECT_THROW(alignToTruth(other, poses_), InputError);
+}
+
+}  // namespace
+}  // namespace vcharge

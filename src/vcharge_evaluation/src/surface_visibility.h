@@ -1,0 +1,36 @@
+#pragma once
+
+#include <vector>
+
+#include "vcharge_core/camera_rig.h"
+#include "vcharge_core/height_map.h"
+#include "vcharge_core/trajectory.h"
+
+namespace vcharge {
+
+/// Where the cameras of a drive stood, and what they could see of a surface given by its heights.
+class SurfaceVisibility {
+ public:
+  /// A view each `view_distance_m` of travel, from each camera.
+  SurfaceVisibility(const HeightMap& surface, const Trajectory& world_from_vehicle, const CameraRig& rig,
+                    double view_distance_m, double max_range_m);
+
+  /// In how many views a point a little above the surface is in the image, not behind the own vehicle, and
+  /// not hidden; counting ends at `enough`. Thread safe.
+  int countViews(const Eigen::Vector3d& point_in_world, int enough) const;
+
+ private:
+  struct View {
+    size_t camera;
+    RigidTransform camera_from_world;
+    Eigen::Vector3d position_m;
+  };
+  bool sees(const View& view, const Eigen::Vector3d& point_in_world) const;
+
+  const HeightMap& surface_;
+  const CameraRig& rig_;
+  const double max_range_m_;
+  std::vector<View> views_;
+};
+
+}  // namespace vcharge

@@ -1,0 +1,150 @@
+#!/usr/bin/env python3
+"""Height maps of a simulated drive: the tool's bad input, the nodelet equals the tool, and saved maps are published."""
+import os
+import sys
+import time
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from nav_msgs.msg import OccupancyGrid
+from octomap_msgs.msg import Octomap
+from std_srvs.srv import Trigger
+from vcharge_msgs.msg import HeightMap
+from visualization_msgs.msg import Marker
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from drive_fixture import Drive, content_hash, run, tool  # noqa: E402
+from nodelet_fixture import drive_publishers, manager_services, reach, wait_for  # noqa: E402
+
+CAMERA = "left"
+
+
+class HeightMapTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.drive = Drive(duration_s=2.4, cameras=(CAMERA,), extra=(), image_scale=0.4)
+        cls.options = {"range_maps": {"working_camera": {"image_scale": 1.0}, "cameras": [CAMERA]},
+                       "fusion": {"max_range_m": 4.0}}
+        cls.options_path = cls.drive.write_text("height_map.yaml", yaml.safe_dump(cls.options))
+        cls.saved = cls.drive.folder / "saved"
+        status, output, errors = cls.build(cls.saved)
+        if status != 0:
+            raise RuntimeError(f"build_height_map failed: {output} {errors}")
+        cls.hash = content_hash(output)
+        cls.load, cls.unload, cls.list = manager_services()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.drive.remove()
+
+    @classmethod
+    def build(cls, output, bag=None, extra=()):
+        return run([tool("vcharge_dense", "build_height_map"), "--bag", bag or cls.drive.bag, "--rig", cls.drive.rig,
+                    "--options", cls.options_path, "--output", output, *extra])
+
+    def expect_failure(self, words, **arguments):
+        output = self.drive.folder / "failed"
+        status, _, errors = self.build(output, **arguments)
+        self.assertNotEqual(status, 0)
+        self.assertEqual(len(errors), 1, errors)
+        for word in words:
+            self.assertIn(word, errors[0])
+        self.assertFalse(output.exists())
+
+    def test_poses_that_do_not_cover_the_drive_are_refused(self):
+        lines = (self.drive.truth / "trajectory.tum").read_text().splitlines()
+        short = self.drive.write_text("short.tum", "\n".join(lines[:12]) + "\n")
+        self.expect_failure(["short.tum", "poses cover", "expected at least 90.0 %"], extra=["--trajectory", short])
+
+    def test_a_grid_too_large_for_memory_is_refused(self):
+        options = dict(self.options, fusion={"cell_size_m": 0.0001})
+        path = self.drive.write_text("large.yaml", yaml.safe_dump(options))
+        self.expect_failure(["max_memory_gb", "GB"], extra=["--options", path])
+
+    def test_options_that_do_not_exist_are_refused(self):
+        path = self.drive.write_text("unknown.yaml", "fusion: {cell_m: 1}\n")
+        self.expect_failure(["unknown.yaml", "fusion.cell_m"], extra=["--options", path])
+
+    def test_a_file_in_the_place_of_the_folder_is_refused(self):
+        path = self.drive.write_text("taken", "mine")
+        status, _, errors = self.build(path)
+        self.assertNotEqual(status, 0)
+        self.assertIn("taken: expected a folder, is a file", errors[-1])
+        self.assertEqual(path.read_text(), "mine")
+
+    def test_nodelet_equals_the_tool(self):
+        output = self.drive.folder / "online"
+        rospy.set_param("/height_map/rig", str(self.drive.rig))
+        rospy.set_param("/height_map/output", str(output))
+        rospy.set_param("/height_map/options", self.options)
+        rospy.set_param("/height_map/lossless_replay", True)
+        reached = {}
+
+        def keep(message):
+            for status in message.status:
+                reached.update({value.key: int(value.value.split(" good, ")[0]) for value in status.values
+                                if " good, " in value.value and ", 0 bad" not in value.value})
+
+        diagnostics = rospy.Subscriber("/diagnostics", DiagnosticArray, keep)
+        publishers = drive_publishers((CAMERA,))
+        self.assertTrue(self.load("/height_map", "vcharge_dense/height_map_nodelet", [], [], [], "").success)
+        try:
+            finish = rospy.ServiceProxy("/height_map/finish", Trigger)
+            early = finish()
+            self.assertFalse(early.success)
+            self.assertIn("no range map could be made", early.message)
+            self.assertFalse(output.exists())
+            reach(publishers, lambda: reached)
+            messages = [(topic, message) for topic, message in self.drive.messages() if topic in publishers]
+            for topic, message in messages:
+                publishers[topic].publish(message)
+                time.sleep(0.002)
+            # finish() ends the drive for all that came: it must be all.
+            for topic in publishers:
+                count = sum(other == topic for other, _ in messages)
+                wait_for(lambda t=topic, c=count: reached.get(t, 0) >= c, f"{count} messages on {topic}", 120.0)
+            answer = finish()
+            self.assertTrue(answer.success, answer.message)
+            self.assertIn(self.hash, answer.message)
+            self.assertTrue((output / "octomap.bt").exists())
+            self.assertEqual((output / "height_map.tiff").read_bytes(), (self.saved / "height_map.tiff").read_bytes())
+        finally:
+            diagnostics.unregister()
+            self.assertTrue(self.unload("/height_map").success)
+
+    def test_saved_map_is_published(self):
+        received = {}
+        topics = (("/dense/height_map", HeightMap), ("/dense/height_map/grid", OccupancyGrid),
+                  ("/dense/height_map/mesh", Marker), ("/dense/octomap", Octomap), ("/dense/octomap/occupied", Marker))
+        rospy.set_param("/publisher/height_map", str(self.saved))
+        self.assertTrue(self.load("/publisher", "vcharge_dense/height_map_publisher_nodelet", [], [], [], "").success)
+        subscribers = [rospy.Subscriber(topic, kind, lambda message, t=topic: received.__setitem__(t, message))
+                       for topic, kind in topics]
+        try:
+            wait_for(lambda: len(received) == len(topics), "all topics of a height map")
+            heights = np.array(received["/dense/height_map"].height_m)
+            size = yaml.safe_load((self.saved / "height_map.yaml").read_text())["size_cells"]
+            self.assertEqual(heights.size, size[0] * size[1])
+            self.assertEqual(np.isfinite(heights).sum(), np.sum(np.array(received["/dense/height_map/grid"].data) >= 0))
+            self.assertGreater(len(received["/dense/height_map/mesh"].points), 1000)
+            self.assertEqual(received["/dense/octomap"].id, "OcTree")
+            self.assertGreater(len(received["/dense/octomap/occupied"].points), 100)
+        finally:
+            for subscriber in subscribers:
+                subscriber.unregister()
+            self.assertTrue(self.unload("/publisher").success)
+
+    def test_publisher_without_a_map_does_not_load_and_the_manager_lives_on(self):
+        rospy.set_param("/nothing/height_map", str(self.drive.folder / "nowhere"))
+        with self.assertRaises(rospy.ServiceException):
+            self.load("/nothing", "vcharge_dense/height_map_publisher_nodelet", [], [], [], "")
+        self.assertEqual(self.list().nodelets, [])
+
+
+if __name__ == "__main__":
+    rospy.init_node("height_map_test")
+    rostest.rosrun("vcharge_tests", "height_map", HeightMapTest)

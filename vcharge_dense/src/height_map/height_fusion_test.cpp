@@ -1,0 +1,148 @@
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "height_map/height_regularization.h"
+#include "height_map/test_views.h"
+#include "vcharge_core/error.h"
+
+namespace vcharge {
+namespace {
+
+using testing::BoxWorld;
+
+/// A camera that drives along x beside a box, looking to it and downwards.
+struct Drive {
+  BoxWorld world;
+  std::vector<RigidTransform> poses;
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<std::shared_ptr<const PackedRangeMap>> maps;
+  HeightFusionOptions options;
+  VoxelGrid grid;
+
+  explicit Drive(double noise_m = 0.0) {
+    options.max_range_m = 4.0;
+    cv::RNG random(5);
+    for (int i = 0; i < 14; ++i) {
+      for (const double side : {-1.0, 1.0}) {
+        const Eigen::Vector3d place(0.4 * i, side * -2.0, 1.0);
+        poses.push_back(testing::lookFrom(place, side * 1.57, 0.6));
+        positions.push_back(place);
+        RangeMap map = testing::renderView(world, poses.back(), cv::Size(320, 200));
+        cv::Mat noise(map.range_m.size(), CV_32FC1);
+        random.fill(noise, cv::RNG::NORMAL, 0.0, noise_m > 0.0 ? noise_m : 1e-12);
+        map.range_m += noise;
+        map.standard_deviation_m.setTo(std::max(0.01, noise_m));
+        maps.push_back(std::make_shared<const PackedRangeMap>(packRangeMap(map, poses.back(), options)));
+      }
+    }
+    grid = makeVoxelGrid(positions, 0.0, 0.0, options);
+  }
+
+  ColumnImages fuse() const {
+    return fuseColumns(grid, positions, [this](size_t view) { return maps[view]; }, options, {});
+  }
+};
+
+Eigen::Vector2d centreOf(const VoxelGrid& grid, int column, int row) {
+  return grid.origin_m + grid.cell_size_m * Eigen::Vector2d(column, row);
+}
+
+/// Whether a cell's height is level around it.
+bool isLevel(const BoxWorld& world, const Eigen::Vector2d& place) {
+  for (const double dx : {-0.06, 0.06}) {
+    for (const double dy : {-0.06, 0.06}) {
+      if (world.heightAt(place.x() + dx, place.y() + dy) != world.heightAt(place.x(), place.y())) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
+TEST(HeightFusionTest, FindsGroundAndBoxWithinAVoxel) {
+  const Drive drive;
+  const ColumnImages columns = drive.fuse();
+  int num_ground = 0, num_box = 0;
+  for (int row = 0; row < drive.grid.rows; ++row) {
+    for (int column = 0; column < drive.grid.columns; ++column) {
+      const Eigen::Vector2d place = centreOf(drive.grid, column, row);
+      if (place.x() < 0.5 || place.x() > 4.5 || std::abs(place.y()) > 1.5 || !isLevel(drive.world, place)) {
+        continue;
+      }
+      const double truth = drive.world.heightAt(place.x(), place.y());
+      EXPECT_NEAR(columns.best_height_m.at<float>(row, column), truth, drive.grid.height_step_m + 1e-4)
+          << place.transpose();
+      EXPECT_GT(columns.confidence.at<float>(row, column), 0.5F);
+      ++(truth > 0.0 ? num_box : num_ground);
+    }
+  }
+  EXPECT_GT(num_box, 250);
+  EXPECT_GT(num_ground, 3000);
+}
+
+TEST(HeightFusionTest, SmoothedHeightsOfNoisyRangesAreFlatAndKeepTheEdge) {
+  const Drive drive(0.08);
+  const ColumnImages columns = drive.fuse();
+  PrimalDualReport report;
+  const HeightRegularizationOptions options;
+  const cv::Mat observed = labelObserved(columns, options, &report);
+  EXPECT_TRUE(report.converged);
+  const cv::Mat heights = smoothHeights(columns, observed, drive.grid, options, &report);
+  EXPECT_TRUE(report.converged);
+  double sum = 0.0;
+  int num = 0;
+  for (int row = 0; row < drive.grid.rows; ++row) {
+    for (int column = 0; column < drive.grid.columns; ++column) {
+      const Eigen::Vector2d place = centreOf(drive.grid, column, row);
+      if (place.x() < 0.5 || place.x() > 4.5 || std::abs(place.y()) > 1.5 || !isLevel(drive.world, place)) {
+        continue;
+      }
+      const double truth = drive.world.heightAt(place.x(), place.y());
+      ASSERT_TRUE(std::isfinite(heights.at<float>(row, column))) << place.transpose();
+      sum += std::abs(heights.at<float>(row, column) - truth);
+      ++num;
+    }
+  }
+  EXPECT_LT(sum / num, 0.0125);  // half a voxel
+  EXPECT_GT(num, 3000);
+}
+
+TEST(HeightFusionTest, DoesNotClaimWhatNobodySaw) {
+  const Drive drive;
+  PrimalDualReport report;
+  const cv::Mat observed = labelObserved(drive.fuse(), HeightRegularizationOptions(), &report);
+  EXPECT_EQ(observed.at<uint8_t>(0, 0), 0);
+  EXPECT_EQ(observed.at<uint8_t>(drive.grid.rows - 1, drive.grid.columns - 1), 0);
+  EXPECT_GT(cv::countNonZero(observed), 5000);
+}
+
+TEST(HeightFusionTest, IsTheSameOnAnyNumberOfThreads) {
+  const Drive drive(0.02);
+  cv::Mat heights[2];
+  for (int i = 0; i < 2; ++i) {
+    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, i == 0 ? 1 : 4);
+    heights[i] = drive.fuse().best_height_m;
+  }
+  EXPECT_EQ(std::memcmp(heights[0].data, heights[1].data, heights[0].total() * sizeof(float)), 0);
+}
+
+TEST(HeightFusionTest, RefusesAGridThatTakesTooMuchMemory) {
+  const std::vector<Eigen::Vector3d> positions = {{0, 0, 1}, {90000, 70000, 1}};
+  try {
+    makeVoxelGrid(positions, 0.0, 0.0, HeightFusionOptions());
+    FAIL() << "expected an error";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("max_memory_gb"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("GB"), std::string::npos);
+  }
+  EXPECT_THROW(makeVoxelGrid({{0, 0, 1}, {1e300, 0, 1}}, 0.0, 0.0, HeightFusionOptions()), InputError);
+  EXPECT_THROW(makeVoxelGrid({{0, 0, 1}}, 0.0, 1e12, HeightFusionOptions()), InputError);
+}
+
+}  // namespace
+}  // namespace vcharge

@@ -1,0 +1,219 @@
+#include "vcharge_dense/height_mapper.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <sstream>
+#include <utility>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "height_map/cell_colours.h"
+#include "height_map/height_regularization.h"
+#include "vcharge_core/error.h"
+#include "vcharge_core/file_io.h"
+#include "vcharge_core/range_map_file.h"
+#include "vcharge_core/stage_timer.h"
+#include "vcharge_core/text_format.h"
+
+namespace vcharge {
+namespace fs = std::filesystem;
+namespace {
+
+// Ranges beyond this share of the farthest plane's distance count as lying on it.
+constexpr double kFarthestShare = 0.95;
+
+std::string imagePath(const std::string& folder, const std::string& camera, Timestamp stamp) {
+  return folder + "/" + camera + "/" + std::to_string(stamp.nanoseconds()) + "_image.png";
+}
+
+bool isKept(const std::string& folder, const std::string& camera, Timestamp stamp) {
+  return fs::exists(folder + "/" + camera + "/" + std::to_string(stamp.nanoseconds()) + ".yaml");
+}
+
+std::string hashOf(const std::vector<std::string>& texts) {
+  ContentHasher hasher;
+  for (const std::string& text : texts) {
+    hasher.add(text);
+  }
+  return hasher.hex();
+}
+
+std::string hashOf(const Trajectory& trajectory) {
+  ContentHasher hasher;
+  for (const StampedTransform& entry : trajectory) {
+    hasher.add(entry.stamp.nanoseconds());
+    const Eigen::Matrix<double, 3, 4> matrix = entry.world_from_vehicle.matrix();
+    for (int i = 0; i < matrix.size(); ++i) {
+      hasher.add(matrix(i));
+    }
+  }
+  return hasher.hex();
+}
+
+}  // namespace
+
+HeightMapper::HeightMapper(std::shared_ptr<const CameraRig> rig, const HeightMapOptions& options,
+                           std::string work_folder, const std::string& drive_name)
+    : rig_(std::move(rig)), options_(options), work_folder_(std::move(work_folder)), drive_name_(drive_name) {
+  options_.validate();
+  range_mapper_ = std::make_unique<RangeMapper>(rig_, options_.range_maps,
+                                                [this](const RangeTask& task) { addTask(task); });
+}
+
+HeightMapper::~HeightMapper() = default;
+
+void HeightMapper::setTrajectory(const Trajectory& map_from_vehicle, const std::string& frame_id) {
+  range_mapper_->setTrajectory(map_from_vehicle);
+  frame_id_ = frame_id;
+  trajectory_hash_ = hashOf(map_from_vehicle);
+}
+
+void HeightMapper::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
+  range_mapper_->addImage(camera_index, stamp, image);
+}
+
+void HeightMapper::addOdometry(const VehicleOdometry& odometry) {
+  range_mapper_->addOdometry(odometry);
+}
+
+std::string HeightMapper::folder() const {
+  std::ostringstream options;
+  options << writeFields(options_.range_maps);
+  return work_folder_ + "/" + hashOf({drive_name_, trajectory_hash_, formatCameraRig(*rig_), options.str()});
+}
+
+void HeightMapper::addTask(const RangeTask& task) {
+  const Eigen::Vector3d position = task.reference.world_from_camera.translation();
+  const auto last = last_position_m_.find(task.camera_index);
+  if (last != last_position_m_.end() && (position - last->second).norm() < options_.min_view_distance_m) {
+    return;
+  }
+  last_position_m_[task.camera_index] = position;
+  const StageTimer timer("range maps", &times_s_);
+  const RigCamera& camera = rig_->cameras[task.camera_index];
+  if (!drive_name_.empty() && isKept(folder(), camera.name, task.reference.stamp)) {
+    ++num_reused_;
+  } else {
+    const std::string path = imagePath(folder(), camera.name, task.reference.stamp);
+    createFolder(fs::path(path).parent_path().string());
+    writeFileAtomically(path, [&](const std::string& temporary) {
+      if (!cv::imwrite(temporary, task.reference.pixels)) {
+        throw InputError(path + ": cannot be written (is the disk full?)");
+      }
+    });
+    writeRangeMap(range_mapper_->sweep(task), folder());  // its YAML comes last: all is there
+  }
+  views_.push_back({task.camera_index, task.reference.stamp, task.reference.world_from_camera});
+  const double height =
+      (task.reference.world_from_camera * camera.vehicle_from_camera->inverse()).translation().z();
+  lowest_m_ = views_.size() == 1 ? height : std::min(lowest_m_, height);
+  highest_m_ = views_.size() == 1 ? height : std::max(highest_m_, height);
+}
+
+RangeMap HeightMapper::readView(const View& view) const {
+  return readRangeMap(folder(), rig_->cameras[view.camera_index].name, view.stamp);
+}
+
+void HeightMapper::checkCoverage() const {
+  uint64_t images = 0, without_pose = 0;
+  std::string reasons;
+  for (const RangeMapperStatus& status : range_mapper_->status()) {
+    images += status.images;
+    without_pose += status.without_pose;
+    reasons += (reasons.empty() ? "" : "; ") + status.camera_name + ": " + status.message;
+  }
+  const double covered =
+      images == 0 ? 0.0 : 1.0 - static_cast<double>(without_pose) / static_cast<double>(images);
+  if (images > 0 && covered < options_.min_covered_images) {
+    throw InputError("poses cover " + toText(100.0 * covered, 1) + " % of the drive's " +
+                     std::to_string(images) + " images, expected at least " +
+                     toText(100.0 * options_.min_covered_images, 1) + " % (" + reasons + ")");
+  }
+  if (views_.empty()) {
+    throw InputError("no range map could be made (" + (reasons.empty() ? "no image" : reasons) + ")");
+  }
+}
+
+HeightMapResult HeightMapper::finish(const std::function<void(const std::string&, double)>& progress) {
+  range_mapper_->finish();
+  checkCoverage();
+  const auto report = [&](const char* step) {
+    return [&progress, step](double share) {
+      if (progress) {
+        progress(step, share);
+      }
+    };
+  };
+  HeightMapResult result;
+  HeightMapStatistics& statistics = result.statistics;
+  std::vector<Eigen::Vector3d> positions;
+  for (const View& view : views_) {
+    positions.push_back(view.world_from_camera.translation());
+  }
+  const HeightFusionOptions& fusion = options_.fusion;
+  const VoxelGrid grid = makeVoxelGrid(positions, lowest_m_, highest_m_, fusion);
+  const auto pack = [&](size_t i) {
+    return std::make_shared<const PackedRangeMap>(
+        packRangeMap(readView(views_[i]), views_[i].world_from_camera, fusion));
+  };
+  ColumnImages columns;
+  {
+    const StageTimer timer("fusion", &times_s_);
+    columns = fuseColumns(grid, positions, pack, fusion, report("fusion"));
+  }
+  PrimalDualReport labelling, smoothing;
+  cv::Mat observed;
+  {
+    const StageTimer timer("labelling", &times_s_);
+    observed = labelObserved(columns, options_.regularization, &labelling);
+  }
+  statistics.num_observed = static_cast<size_t>(cv::countNonZero(observed));
+  if (statistics.num_observed == 0) {
+    throw InputError(
+        "no cell was observed: the " + std::to_string(views_.size()) +
+        " range maps have no sure range on a surface within fusion.max_range_m and the grid's heights " +
+        toText(grid.bottom_m, 2) + " to " + toText(grid.top_m(), 2) + " m, or their poses do not overlap");
+  }
+  result.map.frame_id = frame_id_;
+  result.map.origin_m = grid.origin_m;
+  result.map.cell_size_m = grid.cell_size_m;
+  {
+    const StageTimer timer("smoothing", &times_s_);
+    result.map.height_m = smoothHeights(columns, observed, grid, options_.regularization, &smoothing);
+  }
+  result.map.confidence = columns.confidence.clone();
+  result.map.confidence.setTo(0.0F, observed == 0);
+  result.states = classifyCells(result.map, options_.drivability);
+  result.octomap = std::make_unique<OctomapBuilder>(
+      options_.octomap, kFarthestShare * options_.range_maps.plane_sweep.max_distance_m);
+  {
+    const StageTimer timer("colours and octomap", &times_s_);
+    const auto show = report("colours and octomap");
+    result.map.gray = colourCells(
+        result.map, views_.size(),
+        [&](size_t i, PackedRangeMap* range, cv::Mat* image) {
+          const View& view = views_[i];
+          const RangeMap map = readView(view);
+          *range = packRangeMap(map, view.world_from_camera, fusion);
+          const std::string path = imagePath(folder(), rig_->cameras[view.camera_index].name, view.stamp);
+          *image = cv::imread(path, cv::IMREAD_GRAYSCALE);
+          if (image->size() != map.range_m.size()) {
+            throw InputError(path + ": expected the image of a range map");
+          }
+          result.octomap->add(map, view.world_from_camera);
+          show(static_cast<double>(i + 1) / static_cast<double>(views_.size()));
+        },
+        fusion.max_range_m);
+  }
+  statistics.num_views = views_.size();
+  statistics.num_reused = num_reused_;
+  statistics.label_iterations = labelling.iterations;
+  statistics.height_iterations = smoothing.iterations;
+  statistics.label_gap_per_cell = labelling.gap / static_cast<double>(observed.total());
+  statistics.height_gap_per_cell = smoothing.gap / static_cast<double>(statistics.num_observed);
+  statistics.converged = labelling.converged && smoothing.converged;
+  statistics.times_s = times_s_;
+  return result;
+}
+
+}  // namespace vcharge
