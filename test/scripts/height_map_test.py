@@ -42,9 +42,9 @@ class HeightMapTest(unittest.TestCase):
         cls.drive.remove()
 
     @classmethod
-    def build(cls, output, bag=None, extra=()):
-        return run([tool("vcharge_dense", "build_height_map"), "--bag", bag or cls.drive.bag, "--rig", cls.drive.rig,
-                    "--options", cls.options_path, "--output", output, *extra])
+    def build(cls, output, options=None, extra=()):
+        return run([tool("vcharge_dense", "build_height_map"), "--bag", cls.drive.bag, "--rig", cls.drive.rig,
+                    "--options", options or cls.options_path, "--output", output, *extra])
 
     def expect_failure(self, words, **arguments):
         output = self.drive.folder / "failed"
@@ -63,11 +63,11 @@ class HeightMapTest(unittest.TestCase):
     def test_a_grid_too_large_for_memory_is_refused(self):
         options = dict(self.options, fusion={"cell_size_m": 0.0001})
         path = self.drive.write_text("large.yaml", yaml.safe_dump(options))
-        self.expect_failure(["max_memory_gb", "GB"], extra=["--options", path])
+        self.expect_failure(["max_memory_gb", "GB"], options=path)
 
     def test_options_that_do_not_exist_are_refused(self):
         path = self.drive.write_text("unknown.yaml", "fusion: {cell_m: 1}\n")
-        self.expect_failure(["unknown.yaml", "fusion.cell_m"], extra=["--options", path])
+        self.expect_failure(["unknown.yaml", "fusion.cell_m"], options=path)
 
     def test_a_file_in_the_place_of_the_folder_is_refused(self):
         path = self.drive.write_text("taken", "mine")
