@@ -43,6 +43,8 @@ def required_arguments(path):
 def load(path, **arguments):
     """The launch file's nodes and parameters; required arguments are paths that need not exist to parse it."""
     given = {name: f"/nowhere/{name}" for name in required_arguments(path)}
+    if "map" in all_arguments(path):  # view_map.launch shows whichever maps it is given
+        given["map"] = "/nowhere/map"
     if "options" in given:  # loaded while parsing
         given["options"] = str(CONFIG / "driver" / "example_car.yaml")
     given.update(arguments)
@@ -89,7 +91,7 @@ class LaunchFilesTest(unittest.TestCase):
                 self.assertFalse([node for node in live.nodes if node.package == "rosbag"], path.name)
                 self.assertNotIn("/use_sim_time", live.params)
                 continue
-            if "map" in required_arguments(path):  # shows what was saved, and replays nothing
+            if "map" in all_arguments(path):  # shows what was saved, and replays nothing
                 config = load(path, map="/maps/lot.vmap")
                 self.assertEqual(config.params["/map_publisher/map"].value, "/maps/lot.vmap", path.name)
                 continue
@@ -99,7 +101,7 @@ class LaunchFilesTest(unittest.TestCase):
                 self.assertEqual(config.params["/camera_driver/options/can_interface"].value, "can0", path.name)
                 continue
             if "output" in required_arguments(path) and "rig" in required_arguments(path):  # maps a drive, or calibrates
-                nodelet = "/calibration" if "automatic" in all_arguments(path) else "/mapping"
+                nodelet = {"calibrate_rig": "/calibration", "height_map": "/height_map"}.get(path.stem, "/mapping")
                 config = load(path, rig="/rigs/rig.yaml", output="/maps/lot.vmap", bag="/drives/drive.bag",
                               lossless_replay="true")
                 for name, value in ((f"{nodelet}/rig", "/rigs/rig.yaml"), (f"{nodelet}/output", "/maps/lot.vmap"),
@@ -172,6 +174,7 @@ class LaunchFilesTest(unittest.TestCase):
         self.assertTrue(rigs and options)
         readers = {"calibration": [tool("vcharge_calibration", "calibrate_rig")],
                    "calibration_in_map": [tool("vcharge_calibration", "calibrate_rig_from_map"), "--map", "/nowhere/drive.bag"],
+                   "height_map": [tool("vcharge_dense", "build_height_map")],
                    "mapping": [tool("vcharge_mapping", "build_map")],
                    "localization": [tool("vcharge_localization", "localize_drive"), "--map", "/nowhere/drive.bag"],
                    "obstacles": [tool("vcharge_obstacles", "detect_obstacles")]}
@@ -189,7 +192,7 @@ class LaunchFilesTest(unittest.TestCase):
         published = re.compile(rf"/camera/({'|'.join(cameras)})/image_raw|"
                                rf"/dense/({'|'.join(cameras)})/(points|range/(image|confidence|standard_deviation))|"
                                r"/calibration/(image|landmarks|trajectory|cameras)|/mapping/(landmarks|trajectory|loop_edges)|/localization/(pose|sightings)|"
-                               r"/obstacles/(grid|scan|markers)")
+                               r"/obstacles/(grid|scan|markers)|/dense/height_map(/(points|grid|mesh))?|/dense/octomap/occupied")
 
         def topics(node):
             if isinstance(node, dict):
