@@ -9,6 +9,10 @@ if ! command -v dpkg-query >/dev/null || ! command -v apt-get >/dev/null; then
 fi
 
 mapfile -t packages < <(sed -e 's/#.*//' -e 's/[[:space:]]*$//' -e '/^$/d' debian_packages.txt)
+if [ "${#packages[@]}" -eq 0 ]; then
+  echo "install_dependencies.sh: scripts/debian_packages.txt names no package" >&2
+  exit 1
+fi
 installed=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' | awk '$1 == "installed" {print $2}')
 missing=()
 for package in "${packages[@]}"; do
