@@ -72,6 +72,7 @@ struct PolarObstacle {
   double range_sigma_m = 0.0;
   double height_m = 0.0;  ///< of its highest part that was seen
   double height_sigma_m = 0.0;
+  double bottom_m = 0.0;  ///< height of its lowest part that was seen
   double support = 0.0;  ///< its points over those of the reference obstacle, at most 1
 };
 
@@ -92,6 +93,9 @@ struct CameraObstacles {
   std::vector<float> hidden_share;
   /// Share of the pixels that would show a cell's ground and show nothing, by PolarGrid::index.
   std::vector<float> unknown_share;
+  /// Share of the pixels that would show a cell's ground and look otherwise than it looked before, by
+  /// PolarGrid::index; empty where there was nothing to compare with. GroundWatch's, not the detector's.
+  std::vector<float> changed_share;
   /// Share of a cell's points that rise above the ground, by PolarGrid::index; NaN without points.
   std::vector<float> occupied_share;
   ObstacleScan scan;  ///< the first obstacle on each ray
