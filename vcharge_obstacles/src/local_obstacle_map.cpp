@@ -44,6 +44,7 @@ void LocalObstacleMapOptions::validate() const {
   requireField(unknown_doubt >= 0.0 && unknown_doubt <= 1.0, "unknown_doubt", "must be in [0, 1]",
                unknown_doubt);
   requireField(blind_angle_rad >= 0.0, "blind_angle_rad", "must not be negative", blind_angle_rad);
+  requireField(parallax_sigma >= 0.0, "parallax_sigma", "must not be negative", parallax_sigma);
   requireField(look_distance_m > 0.0, "look_distance_m", "must be positive", look_distance_m);
   requireField(occupied_threshold > 0.0, "occupied_threshold", "must be positive", occupied_threshold);
   requireField(free_threshold < 0.0, "free_threshold", "must be negative", free_threshold);
@@ -265,7 +266,7 @@ void LocalObstacleMap::addLook(const Look& look, Timestamp stamp) {
   Cell& cell = cellAt(x, y);
   cell.log_odds = std::min(static_cast<float>(options_.max_log_odds),
                            cell.log_odds + static_cast<float>(options_.occupied_log_odds * look.mass));
-  const double sigma_m = look.obstacle->range_sigma_m;
+  const double sigma_m = look.sigma_m;
   const auto weight = static_cast<float>(look.mass / (sigma_m * sigma_m + 1e-4));
   const float kept = kMemory * cell.weight;
   const float share = weight / (kept + weight);
@@ -282,23 +283,35 @@ void LocalObstacleMap::addLook(const Look& look, Timestamp stamp) {
   cell.last_seen_ns = stamp.nanoseconds();
 }
 
+/// Standard deviation of a range by the error across the ray of how the camera moved. Directions are in the
+/// fixed frame; before the first motion nothing is known.
+double LocalObstacleMap::parallaxSigma_m(double range_m, const Eigen::Vector2d& direction) const {
+  constexpr double kLeastSine = 0.03;
+  const double across = std::abs(direction.x() * travel_direction_.y() - direction.y() * travel_direction_.x());
+  const double along = std::abs(direction.dot(travel_direction_));
+  return options_.parallax_sigma * range_m * along / std::max(across, kLeastSine);
+}
+
 void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid& grid,
                                    const RigidTransform& fixed_from_vehicle, double weight) {
   const double cell_m = options_.cell_size_m;
+  const double yaw_rad = yawOfRotation(fixed_from_vehicle.rotation());
   for (const PolarObstacle& obstacle : seen.obstacles) {
-    if (obstacle.range_m > options_.occupied_range_m) {
+    if (obstacle.is_off_axis || obstacle.range_m > options_.occupied_range_m) {
       continue;
     }
     const double width_m = obstacle.range_m * grid.increment_rad();
     const int across = std::max(1, static_cast<int>(std::ceil(width_m / cell_m)));
     // Several rays meet one cell nearby: together they are one look.
     const double ray_mass = weight * std::min(1.0, width_m / cell_m * 1.5) * std::max(0.3, obstacle.support);
-    const int along = obstacle.range_sigma_m < 0.6 * cell_m
-                          ? 0
-                          : static_cast<int>(std::ceil(2.0 * obstacle.range_sigma_m / cell_m));
+    const double middle_rad = grid.angle_rad(obstacle.ray) + yaw_rad;
+    const double sigma_m =
+        std::hypot(obstacle.range_sigma_m,
+                   parallaxSigma_m(obstacle.range_m, {std::cos(middle_rad), std::sin(middle_rad)}));
+    const int along = sigma_m < 0.6 * cell_m ? 0 : static_cast<int>(std::ceil(2.0 * sigma_m / cell_m));
     double normalizer = 0.0;
     const auto density = [&](int step) {
-      const double z = step * cell_m / obstacle.range_sigma_m;
+      const double z = step * cell_m / sigma_m;
       return std::exp(-0.5 * z * z);
     };
     for (int step = -along; step <= along; ++step) {
@@ -312,7 +325,7 @@ void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid&
         const Eigen::Vector2d point_in_vehicle =
             seen.origin_m + (obstacle.range_m + step * cell_m) * direction;
         addLook({transformed(fixed_from_vehicle, point_in_vehicle), ray_mass * density(step) / normalizer,
-                 &obstacle},
+                 sigma_m, &obstacle},
                 seen.stamp);
       }
     }

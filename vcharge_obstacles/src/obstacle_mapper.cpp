@@ -6,6 +6,7 @@
 
 #include "vcharge_core/error.h"
 #include "vcharge_core/text_format.h"
+#include "vcharge_obstacles/map_scan.h"
 
 namespace vcharge {
 namespace {
@@ -316,7 +317,7 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const std::vector<const C
   ObstacleFrame frame;
   frame.map = map.snapshot();
   frame.map.frame_id = enumNames<FixedFrame>()[static_cast<size_t>(options_.fixed_frame)];
-  frame.scan = map.scan();
+  frame.scan = makeScan(frame.map, options_.map.scan_rays, options_.map.scan_depth_m);
   for (const CameraObstacles* camera : cameras) {
     frame.cameras.push_back(*camera);
   }
