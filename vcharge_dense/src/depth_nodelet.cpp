@@ -16,10 +16,10 @@
 namespace vcharge {
 
 /// Range maps of a live or replayed drive. Publishes
-/// /dense/<camera>/range/{image,confidence,standard_deviation,reference,camera_info} and /dense/<camera>/points, and a
-/// status per camera in /diagnostics; nothing else while the vehicle stands. Parameters: ~rig (path),
-/// ~options (RangeMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every image in order,
-/// as compute_range_maps; otherwise the newest first, drops are counted).
+/// /dense/<camera>/range/{image,confidence,standard_deviation,reference,camera_info} and
+/// /dense/<camera>/points, and a status per camera in /diagnostics; nothing else while the vehicle stands.
+/// Parameters: ~rig (path), ~options (RangeMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay
+/// (every image in order, as compute_range_maps; otherwise the newest first, drops are counted).
 class DepthNodelet : public nodelet::Nodelet {
  public:
   ~DepthNodelet() override {

@@ -97,8 +97,8 @@ class Pipeline : public DriveConsumer {
     }
     obstacles_->finish();
   }
-  /// What a core has to do per range map, without reading the bag and without writing the results, which is part
-  /// of detecting.
+  /// What a core has to do per range map, without reading the bag and without writing the results, which is
+  /// part of detecting.
   void printTiming(double writing_s) const {
     if (num_maps_ == 0) {
       return;

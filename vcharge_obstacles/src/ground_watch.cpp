@@ -125,8 +125,8 @@ std::vector<Comparison> GroundWatch::Implementation::comparePixels(const View& n
   const Eigen::Vector3f camera = vehicle_from_camera.translation().cast<float>();
   const auto slope_x = static_cast<float>(ground.slope.x());
   const auto slope_y = static_cast<float>(ground.slope.y());
-  const float height = camera.z() - static_cast<float>(ground.offset_m) - slope_x * camera.x() -
-                       slope_y * camera.y();
+  const float height =
+      camera.z() - static_cast<float>(ground.offset_m) - slope_x * camera.x() - slope_y * camera.y();
   const auto xi = static_cast<float>(model.xi());
   const auto max_distance = static_cast<float>(options.max_distance_m);
   // Ground is seen up to here, and hides what is lower: as a pixel's ground is judged by the detector.
@@ -145,8 +145,10 @@ std::vector<Comparison> GroundWatch::Implementation::comparePixels(const View& n
     if (denominator <= 0.1F) {
       continue;
     }
-    const float u = static_cast<float>(model.gamma1()) * point.x() / denominator + static_cast<float>(model.u0());
-    const float v = static_cast<float>(model.gamma2()) * point.y() / denominator + static_cast<float>(model.v0());
+    const float u =
+        static_cast<float>(model.gamma1()) * point.x() / denominator + static_cast<float>(model.u0());
+    const float v =
+        static_cast<float>(model.gamma2()) * point.y() / denominator + static_cast<float>(model.v0());
     if (!(u >= 1.0F && v >= 1.0F && u < static_cast<float>(size.width - 2) &&
           v < static_cast<float>(size.height - 2))) {
       continue;
@@ -221,9 +223,8 @@ std::vector<float> GroundWatch::compare(Timestamp stamp, const cv::Mat& image, c
                              yawOfRotation(fixed_from_vehicle.rotation()));
   self.views.push_back(self.makeView(stamp, image, planar * levelFromBody(ground)));
   const View* before = self.viewBefore(stamp);
-  return before == nullptr
-             ? std::vector<float>()
-             : self.changedShare(self.comparePixels(self.views.back(), *before, ground));
+  return before == nullptr ? std::vector<float>()
+                           : self.changedShare(self.comparePixels(self.views.back(), *before, ground));
 }
 
 void GroundWatch::clear() {

@@ -77,11 +77,12 @@ class GroundWatchTest : public ::testing::Test {
     watch_.clear();
     GroundPlane level;
     level.state = GroundState::kMeasured;
-    EXPECT_TRUE(watch_.compare(Timestamp(), takeImage(first, poseAt(0.0, 0.0)), level, poseAt(0.0, 0.0)).empty());
+    EXPECT_TRUE(
+        watch_.compare(Timestamp(), takeImage(first, poseAt(0.0, 0.0)), level, poseAt(0.0, 0.0)).empty());
     GroundPlane tilted = level;
     tilted.slope.x() = std::tan(pitch_rad);
-    return watch_.compare(Timestamp() + durationFromSeconds(kStep_s), takeImage(second, poseAt(0.2, pitch_rad)),
-                          tilted, poseAt(0.2, 0.0));
+    return watch_.compare(Timestamp() + durationFromSeconds(kStep_s),
+                          takeImage(second, poseAt(0.2, pitch_rad)), tilted, poseAt(0.2, 0.0));
   }
   static RigidTransform poseAt(double x_m, double pitch_rad) {
     return RigidTransform(rotationFromYawPitchRoll(0.0, pitch_rad, 0.0), Eigen::Vector3d(x_m, 0.0, 0.0));
@@ -161,8 +162,8 @@ TEST_F(GroundWatchTest, ImagesTooFarApartAreNotCompared) {
   EXPECT_TRUE(watch_.compare(Timestamp() + durationFromSeconds(1.5), image, level, RigidTransform()).empty());
   level.state = GroundState::kOutOfBounds;
   EXPECT_TRUE(watch_.compare(Timestamp() + durationFromSeconds(1.6), image, level, RigidTransform()).empty());
-  EXPECT_THROW(watch_.compare(Timestamp() + durationFromSeconds(1.7), cv::Mat(10, 10, CV_8UC1),
-                              GroundPlane(), RigidTransform()),
+  EXPECT_THROW(watch_.compare(Timestamp() + durationFromSeconds(1.7), cv::Mat(10, 10, CV_8UC1), GroundPlane(),
+                              RigidTransform()),
                std::logic_error);
 }
 

@@ -287,7 +287,8 @@ void LocalObstacleMap::addLook(const Look& look, Timestamp stamp) {
 /// fixed frame; before the first motion nothing is known.
 double LocalObstacleMap::parallaxSigma_m(double range_m, const Eigen::Vector2d& direction) const {
   constexpr double kLeastSine = 0.03;
-  const double across = std::abs(direction.x() * travel_direction_.y() - direction.y() * travel_direction_.x());
+  const double across =
+      std::abs(direction.x() * travel_direction_.y() - direction.y() * travel_direction_.x());
   const double along = std::abs(direction.dot(travel_direction_));
   return options_.parallax_sigma * range_m * along / std::max(across, kLeastSine);
 }

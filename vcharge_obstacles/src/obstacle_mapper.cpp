@@ -198,8 +198,8 @@ void ObstacleMapper::addRangeMap(const RangeMap& map) {
   if (!camera->detector || camera->size != map.range_m.size() ||
       camera->parameters != map.camera.parameters()) {
     const WorkingCamera working = rebuildWorkingCamera(map.camera, map.range_m.size(), rig_camera);
-    camera->detector = std::make_unique<ObstacleDetector>(working, *rig_camera.vehicle_from_camera,
-                                                          options_.detector);
+    camera->detector =
+        std::make_unique<ObstacleDetector>(working, *rig_camera.vehicle_from_camera, options_.detector);
     camera->watch =
         std::make_unique<GroundWatch>(working, *rig_camera.vehicle_from_camera, grid_, options_.watch);
     camera->size = map.range_m.size();

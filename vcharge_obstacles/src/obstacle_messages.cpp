@@ -98,10 +98,9 @@ void RangeMapReader::prepare(cv::Size size) {
   const WorkingCamera working(camera_.model, camera_.image_size_px, camera_.field_of_view_rad, camera_.mask,
                               options);
   if (working.size() != size) {
-    throw InputError(topic_ + "/image: expected images with the sides of camera '" + camera_.name +
-                     "', as " + std::to_string(working.size().width) + "x" +
-                     std::to_string(working.size().height) + ", got " + std::to_string(size.width) + "x" +
-                     std::to_string(size.height));
+    throw InputError(topic_ + "/image: expected images with the sides of camera '" + camera_.name + "', as " +
+                     std::to_string(working.size().width) + "x" + std::to_string(working.size().height) +
+                     ", got " + std::to_string(size.width) + "x" + std::to_string(size.height));
   }
   model_ = working.model();
   expected_ = makeCameraInfo(*model_, size, camera_.field_of_view_rad, camera_.frame_id);
@@ -122,8 +121,14 @@ RangeMap RangeMapReader::read(const RangeMapParts& parts) {
     throw InputError(topic_ + "/camera_info: expected camera '" + camera_.name + "' of the rig, " +
                      describe(expected_) + "; got " + describe(*parts.camera_info));
   }
-  return {toTimestamp(parts.range->header.stamp), camera_.name, camera_.frame_id, *model_, range_m, sigma_m,
-          confidence, reference};
+  return {toTimestamp(parts.range->header.stamp),
+          camera_.name,
+          camera_.frame_id,
+          *model_,
+          range_m,
+          sigma_m,
+          confidence,
+          reference};
 }
 
 nav_msgs::OccupancyGrid toMessage(const ObstacleMap& map) {

@@ -43,8 +43,8 @@ class RangeMapReaderTest : public ::testing::Test {
   }
 
   const RigCamera camera_ = makeBoxWorldRig().cameras[1];
-  const RangeMap map_ =
-      measureBoxWorld({}, camera_, RigidTransform(), Timestamp::fromNanoseconds(5000000000LL), {0.01, 0.1, 1});
+  const RangeMap map_ = measureBoxWorld({}, camera_, RigidTransform(),
+                                        Timestamp::fromNanoseconds(5000000000LL), {0.01, 0.1, 1});
   RangeMapConverter converter_;
   sensor_msgs::ImagePtr range_, sigma_, confidence_, reference_;
   sensor_msgs::CameraInfoPtr info_;

@@ -26,12 +26,12 @@
 namespace vcharge {
 
 /// Obstacles and free ground around the vehicle, from depth_nodelet's /dense/<camera>/range/* and /odom.
-/// Publishes /obstacles/grid, /obstacles/scan, /obstacles/markers, /obstacles/octomap, /obstacles/<camera>/scan
-/// and /obstacles/<camera>/ground_plane, the scans' frames on /tf_static, and a status per camera in
-/// /diagnostics. Callbacks only sort messages: all else is done in a thread of its own. Parameters: ~rig
-/// (path), ~options (ObstacleMapperOptions; fixed_frame: map needs localization's map -> odom on /tf),
-/// ~odometry_topic, ~lossless_replay (every range map in order, however late, as detect_obstacles; otherwise
-/// those that wait too long are dropped).
+/// Publishes /obstacles/grid, /obstacles/scan, /obstacles/markers, /obstacles/octomap,
+/// /obstacles/<camera>/scan and /obstacles/<camera>/ground_plane, the scans' frames on /tf_static, and a
+/// status per camera in /diagnostics. Callbacks only sort messages: all else is done in a thread of its own.
+/// Parameters: ~rig (path), ~options (ObstacleMapperOptions; fixed_frame: map needs localization's map ->
+/// odom on /tf), ~odometry_topic, ~lossless_replay (every range map in order, however late, as
+/// detect_obstacles; otherwise those that wait too long are dropped).
 class ObstacleNodelet : public nodelet::Nodelet {
  public:
   ~ObstacleNodelet() override {
@@ -123,12 +123,12 @@ class ObstacleNodelet : public nodelet::Nodelet {
   void subscribe(const std::string& topic,
                  std::function<void(const boost::shared_ptr<const Message>&)> callback) {
     constexpr uint32_t kQueueSize = 500;
-    subscribers_.push_back(node_.subscribe<Message>(
-        topic, is_lossless_ ? 0 : kQueueSize,
-        boost::function<void(const boost::shared_ptr<const Message>&)>(
-            [this, callback](const boost::shared_ptr<const Message>& message) {
-              guard_.run([&] { callback(message); });
-            })));
+    subscribers_.push_back(
+        node_.subscribe<Message>(topic, is_lossless_ ? 0 : kQueueSize,
+                                 boost::function<void(const boost::shared_ptr<const Message>&)>(
+                                     [this, callback](const boost::shared_ptr<const Message>& message) {
+                                       guard_.run([&] { callback(message); });
+                                     })));
   }
 
   template <class Message>

@@ -11,8 +11,8 @@
 
 namespace vcharge {
 
-/// Works on tasks in a thread of its own, in the order in which they came. Of the tasks that may be dropped no
-/// more than max_droppable wait: a newer one takes the place of the oldest, which is counted.
+/// Works on tasks in a thread of its own, in the order in which they came. Of the tasks that may be dropped
+/// no more than max_droppable wait: a newer one takes the place of the oldest, which is counted.
 template <class Task>
 class OrderedWorker {
  public:

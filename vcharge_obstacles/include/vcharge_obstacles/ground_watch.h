@@ -17,12 +17,12 @@ namespace vcharge {
 
 /// Options of GroundWatch.
 struct GroundWatchOptions {
-  double interval_s = 0.24;         ///< between the images that are compared, as near as they come
-  double max_interval_s = 1.0;      ///< images further apart are not compared
-  double max_distance_m = 7.0;      ///< from the camera; ground further away is not compared
-  double min_difference = 7.0;      ///< gray levels; less is noise
+  double interval_s = 0.24;           ///< between the images that are compared, as near as they come
+  double max_interval_s = 1.0;        ///< images further apart are not compared
+  double max_distance_m = 7.0;        ///< from the camera; ground further away is not compared
+  double min_difference = 7.0;        ///< gray levels; less is noise
   double relative_difference = 0.05;  ///< of the brightness; less is noise, too
-  int slack_px = 1;                 ///< the warp may err by so much
+  int slack_px = 1;                   ///< the warp may err by so much
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {

@@ -16,19 +16,19 @@ class CellLooker;
 /// Options of LocalObstacleMap.
 struct LocalObstacleMapOptions {
   double cell_size_m = 0.1;
-  double half_size_m = 10.0;        ///< the map reaches so far from the vehicle, along both axes
-  double free_range_m = 7.0;        ///< from the camera; ground further away is not cleared
-  double occupied_range_m = 9.0;    ///< from the camera; obstacles further away are too uncertain
-  double occupied_log_odds = 0.6;   ///< of a look with full support whose sigma is small to the cell
-  double free_log_odds = 0.6;       ///< of a look at which all of the cell's pixels lie on the ground
-  double min_free_share = 0.4;      ///< of a cell's pixels that lie on the ground, for any evidence
-  double min_hidden_share = 0.5;    ///< of a cell's pixels that show something else, to doubt that it is free
-  double doubt = 0.5;               ///< what such a look leaves of the log-odds of a free cell
-  double unknown_doubt = 0.7;       ///< and one that shows nothing, aside of the direction of travel
-  double min_changed_share = 0.4;   ///< of a cell's pixels that look otherwise than before, to take it back
-  double changed_margin_m = 0.4;    ///< around such cells nothing is free: who moves is wider than his feet
-  double changed_hold_s = 0.3;      ///< and for so long nothing becomes free
-  double blind_angle_rad = 0.35;    ///< so near to the direction of travel nothing is to be expected
+  double half_size_m = 10.0;       ///< the map reaches so far from the vehicle, along both axes
+  double free_range_m = 7.0;       ///< from the camera; ground further away is not cleared
+  double occupied_range_m = 9.0;   ///< from the camera; obstacles further away are too uncertain
+  double occupied_log_odds = 0.6;  ///< of a look with full support whose sigma is small to the cell
+  double free_log_odds = 0.6;      ///< of a look at which all of the cell's pixels lie on the ground
+  double min_free_share = 0.4;     ///< of a cell's pixels that lie on the ground, for any evidence
+  double min_hidden_share = 0.5;   ///< of a cell's pixels that show something else, to doubt that it is free
+  double doubt = 0.5;              ///< what such a look leaves of the log-odds of a free cell
+  double unknown_doubt = 0.7;      ///< and one that shows nothing, aside of the direction of travel
+  double min_changed_share = 0.4;  ///< of a cell's pixels that look otherwise than before, to take it back
+  double changed_margin_m = 0.4;   ///< around such cells nothing is free: who moves is wider than his feet
+  double changed_hold_s = 0.3;     ///< and for so long nothing becomes free
+  double blind_angle_rad = 0.35;   ///< so near to the direction of travel nothing is to be expected
   /// Of a camera's motion across its ray to an obstacle, relative to the motion along it: an error of the
   /// range where stereo sees little parallax.
   double parallax_sigma = 0.005;
@@ -110,7 +110,7 @@ class LocalObstacleMap {
     float sigma_m = 0.0F;
     float height_m = 0.0F;
     float height_sigma_m = 0.0F;
-    float travel_m = 0.0F;          // distance driven when it was last seen
+    float travel_m = 0.0F;           // distance driven when it was last seen
     int64_t last_seen_ns = kNever;   // INT64_MIN: never
     int64_t held_until_ns = kNever;  // not free before
   };

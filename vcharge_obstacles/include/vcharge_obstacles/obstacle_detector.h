@@ -30,8 +30,8 @@ struct ObstacleDetectorOptions {
   double min_ratio = 0.4;           ///< obstacle points over all points of the cell
   double min_separation_m = 0.4;    ///< between two obstacles on one ray
   int max_obstacles_per_ray = 3;
-  /// What is seen further from the optical axis than this, from above, and is not near, hides ground but marks
-  /// no obstacle in the map: there the lens resolves little, and another camera sees better.
+  /// What is seen further from the optical axis than this, from above, and is not near, hides ground but
+  /// marks no obstacle in the map: there the lens resolves little, and another camera sees better.
   double max_off_axis_rad = 1.1;
   double max_off_axis_range_m = 2.5;
   double sure_ground_sigmas = 1.0;  ///< a ground point lies so far below min_height_m
@@ -78,9 +78,9 @@ struct PolarObstacle {
   double range_sigma_m = 0.0;
   double height_m = 0.0;  ///< of its highest part that was seen
   double height_sigma_m = 0.0;
-  double bottom_m = 0.0;  ///< height of its lowest part that was seen
+  double bottom_m = 0.0;     ///< height of its lowest part that was seen
   bool is_off_axis = false;  ///< beyond max_off_axis_rad and max_off_axis_range_m
-  double support = 0.0;  ///< its points over those of the reference obstacle, at most 1
+  double support = 0.0;      ///< its points over those of the reference obstacle, at most 1
 };
 
 /// What one range map says about the ground around the camera.
