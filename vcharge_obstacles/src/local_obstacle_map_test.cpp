@@ -234,6 +234,37 @@ TEST_F(LocalObstacleMapTest, UncertainLooksMarkMoreCellsMoreSlowly) {
   EXPECT_GT(unsure, 3 * sure);
 }
 
+TEST_F(LocalObstacleMapTest, RangesAlongTheTravelAreUncertain) {
+  const auto sigmaAt = [&](double angle_rad) {
+    LocalObstacleMap map;
+    CameraObstacles seen = detectors_[0].detect(measureBoxWorld({}, rig_.cameras[0], {}, stamp_));
+    std::fill(seen.free_share.begin(), seen.free_share.end(), 0.0F);
+    PolarObstacle obstacle;
+    obstacle.ray = grid_.rayOf(angle_rad);
+    obstacle.range_m = 3.0;
+    obstacle.range_sigma_m = 0.02;
+    obstacle.height_m = 1.0;
+    obstacle.support = 1.0;
+    seen.obstacles = {obstacle};
+    for (int looks = 0; looks < 40; ++looks) {
+      const RigidTransform pose = RigidTransform::planar(0.1 * looks, 0.0, 0.0);
+      map.moveTo(stamp_, pose);
+      seen.origin_m.x() = 3.6 - 0.1 * looks;  // the camera sees the same place from the same place
+      seen.camera_name = std::to_string(looks);
+      map.add(seen, grid_, pose);
+    }
+    double largest = 0.0;
+    const ObstacleMap result = map.snapshot();
+    cv::minMaxLoc(result.point_sigma_m, nullptr, &largest, nullptr, nullptr, result.state == kCellOccupied);
+    return largest;
+  };
+  const double aside_m = sigmaAt(0.5 * M_PI - 0.01);
+  const double ahead_m = sigmaAt(0.1);
+  EXPECT_LT(aside_m, 0.06);
+  // A direction of motion that errs by parallax_sigma, seen under 0.1 rad.
+  EXPECT_GT(ahead_m, LocalObstacleMapOptions().parallax_sigma * 3.0 / std::tan(0.12));
+}
+
 TEST_F(LocalObstacleMapTest, LooksFromTheSamePlaceCountOnce) {
   look(kPerson, 0.0);
   const ObstacleMap first = map_.snapshot();
