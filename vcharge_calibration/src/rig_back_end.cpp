@@ -7,6 +7,7 @@
 #include "ground.h"
 #include "ground_normal.h"
 #include "inter_camera_matching.h"
+#include "landmark_alignment.h"
 #include "rig_adjustment.h"
 #include "rig_initialization.h"
 #include "rig_judgement.h"
@@ -25,7 +26,8 @@ class RigBackEnd {
              const StageCallback& progress, MappingState* state)
       : options_(options),
         all_images_(all_images),
-        stages_(options.inter_camera.enabled ? 7 : 6, progress, &state->report),
+        stages_(7 + (options.inter_camera.enabled ? 1 : 0) + (options.landmark_alignment.enabled ? 1 : 0),
+                progress, &state->report),
         state_(state),
         data_(&state->data),
         series_(*state) {}
@@ -48,12 +50,18 @@ class RigBackEnd {
           result_.num_inter_camera_matches = matchBetweenCameras(options_.inter_camera, all_images_, data_);
         });
       }
-      stages_.run("last adjustment", [&] {
+      stages_.run("last search", [&] {
         searchLandmarks(options_.search, data_);
         adjust(options_.adjustment);
         checkLoops(options_.loops, *data_, &state_->report.loop_edges);
-        adjustFinely();
       });
+      if (options_.landmark_alignment.enabled) {
+        stages_.run("landmark patches", [&] {
+          result_.num_aligned_observations = alignLandmarks(options_.landmark_alignment, all_images_, data_);
+          adjust(options_.adjustment);
+        });
+      }
+      stages_.run("last adjustment", [&] { adjustFinely(); });
       stages_.run("judgement", [&] { judgeRig(options_.adjustment, priors_, *state_, &result_); });
     } catch (const NotCalibrated& failure) {
       result_.verdict = Verdict::kFail;

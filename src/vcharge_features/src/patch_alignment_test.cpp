@@ -92,7 +92,8 @@ TEST_F(PatchAlignmentTest, ScaleAndSlantPullNothingAside) {
     SCOPED_TRACE(testing::Message() << "scales " << scale_x << " and " << scale_y << ", turned by "
                                     << turn_rad);
     EXPECT_GT(errors_px.size(), 0.9 * static_cast<double>(points().size()));
-    EXPECT_LT(quantile(errors_px, 0.5), 0.06);  // interpolation between pixels costs this much without any scale
+    EXPECT_LT(quantile(errors_px, 0.5),
+              0.06);  // interpolation between pixels costs this much without any scale
     EXPECT_LT(quantile(errors_px, 0.95), 0.1);
   }
   EXPECT_GT(quantile(errorsOfTracker(), 0.5), 0.2) << "a patch that is moved alone does as well";
