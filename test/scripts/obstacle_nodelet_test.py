@@ -278,7 +278,7 @@ class ObstacleNodeletTest(unittest.TestCase):
         self.wait_for_message("/dense/left/range/camera_info", "expected camera 'left' of the rig", "320x200")
         errors = [text for text in list(self.log) if "expected camera 'left'" in text]
         self.assertEqual(len(errors), 1, errors)
-        maps = [int(values["range_maps"]) for name, values in self.status.items() if "/obstacles/left" in name]
+        maps = [int(values["range_maps"]) for name, values in self.status.items() if "obstacles/left" in name]
         self.assertEqual(maps, [0])
         self.expect_recovery()
 
@@ -313,7 +313,7 @@ class ObstacleNodeletTest(unittest.TestCase):
 
         def counts():
             return next(({key: int(values[key]) for key in ("range_maps", "without_pose", "waiting_stamps")}
-                         for name, values in self.status.items() if "/obstacles/left" in name), {})
+                         for name, values in self.status.items() if "obstacles/left" in name), {})
         wait_for(lambda: counts().get("range_maps") == 3 * stamps, "the range maps")
         self.assertGreater(3 * stamps, 2 * MAX_WAITING)
         self.assertLessEqual(counts()["waiting_stamps"], MAX_WAITING)
