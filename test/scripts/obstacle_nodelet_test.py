@@ -331,7 +331,7 @@ class ObstacleNodeletTest(unittest.TestCase):
         try:
             for _ in range(6):
                 time.sleep(0.7)
-                self.assertTrue(self.unload("/obstacles").success)
+                self.unload_obstacles()
                 self.assertTrue(self.load("/obstacles", "vcharge_obstacles/obstacle_nodelet", [], [], [], "").success)
         finally:
             stop.set()
