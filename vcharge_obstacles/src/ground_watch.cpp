@@ -153,7 +153,7 @@ std::vector<Comparison> GroundWatch::Implementation::comparePixels(const View& n
           v < static_cast<float>(size.height - 2))) {
       continue;
     }
-    const int nearest = static_cast<int>(v + 0.5F) * size.width + static_cast<int>(u + 0.5F);
+    const int nearest = static_cast<int>(std::lround(v)) * size.width + static_cast<int>(std::lround(u));
     if (valid.data[nearest] == 0) {
       continue;
     }

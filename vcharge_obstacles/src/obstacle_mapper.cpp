@@ -15,7 +15,7 @@ namespace {
 constexpr double kReplay_s = 1.0;
 // Below this speed the vehicle stands.
 constexpr double kStanding_m_per_s = 0.02;
-// Stamps that wait for odometry that may still come; two seconds at 12.5 Hz.
+// Stamps that wait for odometry or a camera that may still come; two seconds at 12.5 Hz.
 constexpr size_t kMaxWaiting = 25;
 
 }  // namespace
@@ -217,9 +217,6 @@ void ObstacleMapper::addRangeMap(const RangeMap& map) {
   }
   waiting_[map.stamp].cameras[camera->index] = {std::move(seen), map.reference.clone()};
   fuseWaiting(false);
-  while (waiting_.size() > kMaxWaiting) {  // odometry has stopped
-    loseFirstWaiting();
-  }
 }
 
 void ObstacleMapper::updateStatus(Camera* camera, const CameraObstacles& seen) const {
@@ -262,7 +259,8 @@ bool ObstacleMapper::isComplete(Timestamp stamp) const {
 void ObstacleMapper::fuseWaiting(bool all) {
   while (!waiting_.empty()) {
     const Timestamp stamp = waiting_.begin()->first;
-    if (!all && !isComplete(stamp)) {
+    const bool must_go = all || waiting_.size() > kMaxWaiting;  // a camera, or odometry, does not come
+    if (!must_go && !isComplete(stamp)) {
       return;
     }
     const std::optional<RigidTransform> fixed_from_vehicle = fixedFromVehicle(stamp);
@@ -270,7 +268,7 @@ void ObstacleMapper::fuseWaiting(bool all) {
       const OdometryBuffer::LookupStatus lookup = poses_.lookup(stamp).status;
       const bool may_come = lookup == OdometryBuffer::LookupStatus::kEmpty ||
                             lookup == OdometryBuffer::LookupStatus::kAfterLast;
-      if (may_come && !all) {
+      if (may_come && !must_go) {
         return;
       }
     }

@@ -238,6 +238,16 @@ TEST_F(ObstacleMapperTest, RangeMapsWithoutOdometryDoNotPileUp) {
   EXPECT_EQ(mapper_->status()[1].state, ObstacleCameraState::kNoPose);
 }
 
+TEST_F(ObstacleMapperTest, CameraThatNeverComesIsNotWaitedForWithoutEnd) {
+  options_.max_wait_s = std::numeric_limits<double>::infinity();  // as in a replay without loss
+  dead_camera_ = "left";
+  start();
+  drive(0, 240);
+  EXPECT_GE(frames_.size(), 60U - 26U);
+  EXPECT_LE(mapper_->numWaiting(), 25U);
+  EXPECT_GT(count(frames_.back(), kCellFree), 500);
+}
+
 TEST_F(ObstacleMapperTest, MapsDoNotDependOnHowLateRangeMapsCome) {
   const auto run = [&](int delay_ticks) {
     options_.max_wait_s = std::numeric_limits<double>::infinity();

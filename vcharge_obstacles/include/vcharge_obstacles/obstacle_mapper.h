@@ -94,8 +94,8 @@ struct ObstacleFrame {
 };
 
 /// Turns range maps and odometry into obstacle maps: one front for the nodelet and the offline tool. Range
-/// maps of one stamp are fused together, in the rig's order, once odometry has come to it; without odometry
-/// the newest 25 stamps wait, no more. Not thread safe.
+/// maps of one stamp are fused together, in the rig's order, once odometry has come to it; no more
+/// than 25 stamps wait for odometry, or for a camera. Not thread safe.
 class ObstacleMapper {
  public:
   using FrameCallback = std::function<void(const ObstacleFrame&)>;
