@@ -337,6 +337,8 @@ class ObstacleNodeletTest(unittest.TestCase):
             stop.set()
             player.join()
         self.assertEqual(self.list().nodelets, ["/obstacles"])
+        self.reach()
+        self.expect_recovery()
 
     def test_nodelet_of_a_loaded_name_is_refused(self):
         with self.assertRaises(rospy.ServiceException):
