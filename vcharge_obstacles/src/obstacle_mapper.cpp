@@ -279,7 +279,7 @@ void ObstacleMapper::fuseWaiting(bool all) {
     Group group = std::move(waiting_.begin()->second);
     waiting_.erase(waiting_.begin());
     last_fused_ = stamp;
-    fuse(stamp, std::move(group), *fixed_from_vehicle);
+    fuse(stamp, &group, *fixed_from_vehicle);
   }
 }
 
@@ -296,10 +296,10 @@ void ObstacleMapper::loseFirstWaiting() {
   waiting_.erase(first);
 }
 
-void ObstacleMapper::fuse(Timestamp stamp, Group group, const RigidTransform& fixed_from_vehicle) {
+void ObstacleMapper::fuse(Timestamp stamp, Group* group, const RigidTransform& fixed_from_vehicle) {
   map_.moveTo(stamp, fixed_from_vehicle);
   std::vector<const CameraObstacles*> cameras;
-  for (auto& [index, look] : group.cameras) {
+  for (auto& [index, look] : group->cameras) {
     CameraObstacles& seen = look.seen;
     if (!look.reference.empty()) {
       seen.changed_share =

@@ -137,7 +137,7 @@ class ObstacleMapper {
   void watchForJumps(const VehicleOdometry& odometry);
   bool isComplete(Timestamp stamp) const;
   void fuseWaiting(bool all);
-  void fuse(Timestamp stamp, Group group, const RigidTransform& fixed_from_vehicle);
+  void fuse(Timestamp stamp, Group* group, const RigidTransform& fixed_from_vehicle);
   void loseFirstWaiting();
   void emit(const LocalObstacleMap& map, const std::vector<const CameraObstacles*>& cameras);
   void emitAt(Timestamp stamp);
