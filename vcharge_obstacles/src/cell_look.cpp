@@ -27,7 +27,7 @@ CellLooker::CellLooker(const CameraObstacles& seen, const PolarGrid& grid, doubl
 
 CellLook CellLooker::look(double angle_rad, double range_m, int bin) const {
   const int middle = grid_.rayOf(angle_rad);
-  const int spread = static_cast<int>(kHalfDiagonal * cell_m_ / range_m / grid_.increment_rad() + 0.5);
+  const int spread = static_cast<int>(std::lround(kHalfDiagonal * cell_m_ / range_m / grid_.increment_rad()));
   CellLook look;
   for (int step = middle - spread; step <= middle + spread; ++step) {
     const int ray = grid_.wrap(step);

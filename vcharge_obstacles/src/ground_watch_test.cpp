@@ -62,7 +62,7 @@ class GroundWatchTest : public ::testing::Test {
           continue;
         }
         const Eigen::Vector3d direction = world_from_camera.rotation() * rays.ray(x, y).cast<double>();
-        const Eigen::Vector3d origin = world_from_camera.translation();
+        const Eigen::Vector3d& origin = world_from_camera.translation();
         const double range_m = world.castRay(origin, direction);
         const Eigen::Vector3d place = origin + range_m * direction;
         const double brightness =
