@@ -68,6 +68,25 @@ step "5/7 pictures"
 /usr/bin/python3 scripts/draw_demo.py --bag "$bag" --rig "$rig" --range demo/range ${truth:+--truth "$truth"} \
   --output demo
 
+step "obstacles around the vehicle"
+if [ ! -e demo/obstacles ]; then
+  "$tools/vcharge_obstacles/detect_obstacles" --bag "$bag" --rig "$rig" ${truth:+--options config/obstacles.yaml} \
+    --range-options config/dense_obstacles.yaml --output demo/obstacles
+else
+  echo "kept: demo/obstacles"
+fi
+/usr/bin/python3 scripts/draw_obstacles.py --bag "$bag" --rig "$rig" --obstacles demo/obstacles ${truth:+--truth "$truth"} \
+  --output demo/obstacles.png
+if [ -d "${VCHARGE_DATA:-}/vcharge_left" ]; then
+  real=demo/obstacles_real
+  if [ ! -e "$real" ]; then
+    "$tools/vcharge_ros/import_vcharge_images" --folder "$VCHARGE_DATA/vcharge_left" --output demo/real.bag --rig demo/real.yaml
+    "$tools/vcharge_obstacles/detect_obstacles" --bag demo/real.bag --rig demo/real.yaml --cameras left \
+      --range-options config/dense_obstacles.yaml --output "$real"
+  fi
+  /usr/bin/python3 scripts/draw_obstacles.py --bag demo/real.bag --rig demo/real.yaml --obstacles "$real" --output "$real.png"
+fi
+
 step "6/7 a sparse map"
 if [ ! -e demo/map.vmap ]; then
   "$tools/vcharge_mapping/build_map" --bag "$bag" --rig "$rig" --output demo/map.vmap --trajectory demo/map.tum \

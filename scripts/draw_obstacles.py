@@ -136,12 +136,14 @@ def main():
     parser.add_argument("--bag", type=pathlib.Path, required=True)
     parser.add_argument("--rig", type=pathlib.Path, required=True)
     parser.add_argument("--obstacles", type=pathlib.Path, required=True, help="folder that detect_obstacles wrote")
-    parser.add_argument("--camera", default="left")
+    parser.add_argument("--camera", help="default: left, or the first of the rig")
     parser.add_argument("--share", type=float, default=0.7, help="where in the drive, 0 to 1")
     parser.add_argument("--truth", type=pathlib.Path)
     parser.add_argument("--output", type=pathlib.Path, required=True)
     arguments = parser.parse_args()
-    camera = yaml.safe_load(arguments.rig.read_text())["cameras"][arguments.camera]
+    cameras = yaml.safe_load(arguments.rig.read_text())["cameras"]
+    arguments.camera = arguments.camera or ("left" if "left" in cameras else next(iter(cameras)))
+    camera = cameras[arguments.camera]
     stamps = sorted(int(path.stem) for path in arguments.obstacles.glob("*.yaml") if path.stem.isdigit())
     with_camera = [stamp for stamp in stamps
                    if arguments.camera in read_scans(arguments.obstacles / f"{stamp}_scans.csv")]

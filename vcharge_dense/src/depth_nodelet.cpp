@@ -16,10 +16,10 @@
 namespace vcharge {
 
 /// Range maps of a live or replayed drive. Publishes
-/// /dense/<camera>/range/{image,confidence,standard_deviation, camera_info} and /dense/<camera>/points, and a
-/// status per camera in /diagnostics; nothing else while the vehicle stands. Parameters: ~rig (path),
-/// ~options (RangeMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every image in order,
-/// as compute_range_maps; otherwise the newest first, drops are counted).
+/// /dense/<camera>/range/{image,confidence,standard_deviation,reference,camera_info} and
+/// /dense/<camera>/points, and a status per camera in /diagnostics; nothing else while the vehicle stands.
+/// Parameters: ~rig (path), ~options (RangeMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay
+/// (every image in order, as compute_range_maps; otherwise the newest first, drops are counted).
 class DepthNodelet : public nodelet::Nodelet {
  public:
   ~DepthNodelet() override {
@@ -31,7 +31,7 @@ class DepthNodelet : public nodelet::Nodelet {
  private:
   struct Output {
     std::unique_ptr<RangeMapConverter> converter;
-    ros::Publisher range, confidence, standard_deviation, camera_info, points;
+    ros::Publisher range, confidence, standard_deviation, reference, camera_info, points;
   };
 
   void onInit() override {
@@ -77,6 +77,7 @@ class DepthNodelet : public nodelet::Nodelet {
     output.range = node_.advertise<sensor_msgs::Image>(name + "/range/image", 10);
     output.confidence = node_.advertise<sensor_msgs::Image>(name + "/range/confidence", 10);
     output.standard_deviation = node_.advertise<sensor_msgs::Image>(name + "/range/standard_deviation", 10);
+    output.reference = node_.advertise<sensor_msgs::Image>(name + "/range/reference", 10);
     output.camera_info = node_.advertise<sensor_msgs::CameraInfo>(name + "/range/camera_info", 10);
     output.points = node_.advertise<sensor_msgs::PointCloud2>(name + "/points", 10);
   }
@@ -127,6 +128,7 @@ class DepthNodelet : public nodelet::Nodelet {
       output.range.publish(messages.range);
       output.confidence.publish(messages.confidence);
       output.standard_deviation.publish(messages.standard_deviation);
+      output.reference.publish(messages.reference);
       output.camera_info.publish(messages.camera_info);
       output.points.publish(messages.points);
     });

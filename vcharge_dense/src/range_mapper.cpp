@@ -322,6 +322,7 @@ RangeMap RangeMapper::sweep(const RangeTask& task) const {
   RangeMap map = cameras_[task.camera_index]->plane_sweep.sweep(task.reference, task.neighbours);
   map.camera_name = rig_->cameras[task.camera_index].name;
   map.frame_id = rig_->cameras[task.camera_index].frame_id;
+  map.reference = task.reference.pixels;
   return map;
 }
 

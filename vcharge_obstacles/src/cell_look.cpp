@@ -9,6 +9,12 @@ namespace {
 constexpr double kHalfDiagonal = 0.7072;
 // So many sides of a cell around an obstacle no ground is believed, besides two sigmas of its range.
 constexpr double kMarginCells = 0.75;
+// What stands on the ground is seen down to this height; a thing that moves is ranged where it is not, and
+// seems to hang above the ground.
+constexpr double kStandsBelow_m = 0.25;
+// Between two images, what is hidden by a standing thing moves by so much.
+constexpr double kParallax_rad = 0.09;
+constexpr double kExplainedMargin_m = 0.3;
 
 }  // namespace
 
@@ -21,7 +27,7 @@ CellLooker::CellLooker(const CameraObstacles& seen, const PolarGrid& grid, doubl
 
 CellLook CellLooker::look(double angle_rad, double range_m, int bin) const {
   const int middle = grid_.rayOf(angle_rad);
-  const int spread = static_cast<int>(kHalfDiagonal * cell_m_ / range_m / grid_.increment_rad() + 0.5);
+  const int spread = static_cast<int>(std::lround(kHalfDiagonal * cell_m_ / range_m / grid_.increment_rad()));
   CellLook look;
   for (int step = middle - spread; step <= middle + spread; ++step) {
     const int ray = grid_.wrap(step);
@@ -29,13 +35,28 @@ CellLook CellLooker::look(double angle_rad, double range_m, int bin) const {
     look.free_share += seen_.free_share[index];
     look.hidden_share += seen_.hidden_share[index];
     look.unknown_share += seen_.unknown_share[index];
+    look.changed_share += seen_.changed_share.empty() ? 0.0 : seen_.changed_share[index];
     look.blocked = look.blocked || blocks(ray, range_m);
   }
   const int count = 2 * spread + 1;
   look.free_share /= count;
   look.hidden_share /= count;
   look.unknown_share /= count;
+  look.changed_share /= count;
   return look;
+}
+
+bool CellLooker::isExplained(double angle_rad, double range_m) const {
+  const int middle = grid_.rayOf(angle_rad);
+  const int spread = static_cast<int>(std::ceil(kParallax_rad / grid_.increment_rad()));
+  for (int step = middle - spread; step <= middle + spread; ++step) {
+    for (const PolarObstacle* obstacle : obstacles_of_ray_[static_cast<size_t>(grid_.wrap(step))]) {
+      if (obstacle->bottom_m < kStandsBelow_m && obstacle->range_m < range_m + kExplainedMargin_m) {
+        return true;
+      }
+    }
+  }
+  return false;
 }
 
 bool CellLooker::blocks(int ray, double range_m) const {

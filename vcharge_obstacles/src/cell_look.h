@@ -11,6 +11,7 @@ struct CellLook {
   double free_share = 0.0;
   double hidden_share = 0.0;
   double unknown_share = 0.0;
+  double changed_share = 0.0;
   bool blocked = false;  ///< an obstacle stands in the cell, or hides it
 };
 
@@ -23,6 +24,9 @@ class CellLooker {
   /// Of the cell in a direction (vehicle's axes) and range from the camera, whose bin is given. All rays that
   /// cross the cell speak; one that meets an obstacle there silences the others.
   CellLook look(double angle_rad, double range_m, int bin) const;
+  /// Whether ground in that direction and range looks otherwise than before because of something that stands
+  /// there, or before it: whatever rises from the ground does not follow its plane.
+  bool isExplained(double angle_rad, double range_m) const;
 
  private:
   bool blocks(int ray, double range_m) const;

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <ctime>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -28,6 +30,26 @@ struct Arguments {
   bool show_options = false;
 };
 
+/// Processor time of the whole process, that is of all its threads, in parts of a run.
+class ProcessorTime {
+ public:
+  /// Runs and counts.
+  template <class Function>
+  auto add(const Function& function) {
+    const Count count{std::clock(), &ticks_};
+    return function();
+  }
+  double seconds() const { return static_cast<double>(ticks_) / CLOCKS_PER_SEC; }
+
+ private:
+  struct Count {
+    ~Count() { *sum += std::clock() - begin; }
+    std::clock_t begin;
+    std::clock_t* sum;
+  };
+  std::clock_t ticks_ = 0;
+};
+
 /// Hands odometry to both stages, and range maps from one to the other.
 class Pipeline : public DriveConsumer {
  public:
@@ -36,7 +58,9 @@ class Pipeline : public DriveConsumer {
       : obstacles_(obstacles) {
     if (range_folder.empty()) {
       ranges_ = std::make_unique<RangeMapper>(rig, range_options, [this](const RangeTask& task) {
-        obstacles_->addRangeMap(ranges_->sweep(task));
+        const RangeMap map = sweeping_.add([&] { return ranges_->sweep(task); });
+        detecting_.add([&] { obstacles_->addRangeMap(map); });
+        ++num_maps_;
       });
       return;
     }
@@ -51,13 +75,13 @@ class Pipeline : public DriveConsumer {
 
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
     if (ranges_) {
-      ranges_->addImage(camera_index, stamp, image);
+      whole_.add([&] { ranges_->addImage(camera_index, stamp, image); });
     }
   }
   void addOdometry(const VehicleOdometry& odometry) override {
-    obstacles_->addOdometry(odometry);
+    detecting_.add([&] { obstacles_->addOdometry(odometry); });
     if (ranges_) {
-      ranges_->addOdometry(odometry);
+      whole_.add([&] { ranges_->addOdometry(odometry); });
       return;
     }
     while (!stored_.empty() && stored_.begin()->first <= odometry.stamp) {
@@ -73,9 +97,26 @@ class Pipeline : public DriveConsumer {
     }
     obstacles_->finish();
   }
+  /// What a core has to do per range map, without reading the bag and without writing the results, which is
+  /// part of detecting.
+  void printTiming(double writing_s) const {
+    if (num_maps_ == 0) {
+      return;
+    }
+    const double per_map_ms = 1000.0 / static_cast<double>(num_maps_);
+    const double sweep_ms = per_map_ms * sweeping_.seconds();
+    const double obstacles_ms = per_map_ms * (detecting_.seconds() - writing_s);
+    const double images_ms =
+        std::max(0.0, per_map_ms * (whole_.seconds() - writing_s) - sweep_ms - obstacles_ms);
+    std::cout << "processor time per range map: " << toText(images_ms + sweep_ms + obstacles_ms, 1)
+              << " ms (images " << toText(images_ms, 1) << ", ranges " << toText(sweep_ms, 1)
+              << ", obstacles " << toText(obstacles_ms, 1) << ")\n";
+  }
 
  private:
   ObstacleMapper* obstacles_;
+  ProcessorTime whole_, sweeping_, detecting_;  // the last two are nearly all parts of the first
+  uint64_t num_maps_ = 0;
   std::unique_ptr<RangeMapper> ranges_;
   std::string range_folder_;
   std::map<Timestamp, std::map<size_t, std::string>> stored_;
@@ -134,7 +175,9 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
   }
   FolderTransaction output(arguments.output);
   Recorder recorder(output.path());
-  ObstacleMapper mapper(rig, options, [&](const ObstacleFrame& frame) { recorder.add(frame); });
+  ProcessorTime writing;
+  ObstacleMapper mapper(rig, options,
+                        [&](const ObstacleFrame& frame) { writing.add([&] { recorder.add(frame); }); });
   Pipeline pipeline(rig, range_options, arguments.range, &mapper);
   BagDriveSourceOptions source_options;
   source_options.cameras = options.cameras;
@@ -152,6 +195,7 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
     throw InputError(arguments.bag + ": no obstacle map could be made (" + reasons + ")");
   }
   recorder.finish(mapper);
+  pipeline.printTiming(writing.seconds());
   output.commit();
 }
 

@@ -37,10 +37,14 @@ void LocalObstacleMapOptions::validate() const {
                min_free_share);
   requireField(min_hidden_share > 0.0 && min_hidden_share <= 1.0, "min_hidden_share", "must be in (0, 1]",
                min_hidden_share);
+  requireField(min_changed_share > 0.0, "min_changed_share", "must be positive", min_changed_share);
+  requireField(changed_margin_m >= 0.0, "changed_margin_m", "must not be negative", changed_margin_m);
+  requireField(changed_hold_s >= 0.0, "changed_hold_s", "must not be negative", changed_hold_s);
   requireField(doubt >= 0.0 && doubt <= 1.0, "doubt", "must be in [0, 1]", doubt);
   requireField(unknown_doubt >= 0.0 && unknown_doubt <= 1.0, "unknown_doubt", "must be in [0, 1]",
                unknown_doubt);
   requireField(blind_angle_rad >= 0.0, "blind_angle_rad", "must not be negative", blind_angle_rad);
+  requireField(parallax_sigma >= 0.0, "parallax_sigma", "must not be negative", parallax_sigma);
   requireField(look_distance_m > 0.0, "look_distance_m", "must be positive", look_distance_m);
   requireField(occupied_threshold > 0.0, "occupied_threshold", "must be positive", occupied_threshold);
   requireField(free_threshold < 0.0, "free_threshold", "must be negative", free_threshold);
@@ -156,16 +160,23 @@ double LocalObstacleMap::weightOf(const CameraObstacles& seen, const RigidTransf
   return is_first ? 1.0 : std::min(1.0, moved_m / options_.look_distance_m);
 }
 
-void LocalObstacleMap::addGround(const CameraObstacles& seen, const PolarGrid& grid,
-                                 const RigidTransform& fixed_from_vehicle, double weight) {
+struct LocalObstacleMap::GroundLook {
+  int64_t x, y;  // of the cell
+  CellLook look;
+  bool explained;  // a change of its looks, by something that stands there
+};
+
+std::vector<LocalObstacleMap::GroundLook> LocalObstacleMap::lookAtGround(
+    const CameraObstacles& seen, const CellLooker& looker, const PolarGrid& grid,
+    const RigidTransform& fixed_from_vehicle) const {
   const double cell_m = options_.cell_size_m;
   const double blind_sine = std::sin(options_.blind_angle_rad);
-  const CellLooker looker(seen, grid, cell_m);
   const Eigen::Vector2d camera_m = transformed(fixed_from_vehicle, seen.origin_m);
   const double yaw_rad = yawOfRotation(fixed_from_vehicle.rotation());
   const auto reach = static_cast<int64_t>(std::ceil(options_.free_range_m / cell_m));
   const int64_t middle_x = indexOf(camera_m.x());
   const int64_t middle_y = indexOf(camera_m.y());
+  std::vector<GroundLook> looks;
   for (int64_t y = std::max(first_y_, middle_y - reach);
        y <= std::min(first_y_ + size_ - 1, middle_y + reach); ++y) {
     for (int64_t x = std::max(first_x_, middle_x - reach);
@@ -178,8 +189,9 @@ void LocalObstacleMap::addGround(const CameraObstacles& seen, const PolarGrid& g
       }
       const double angle_rad = std::remainder(std::atan2(offset_m.y(), offset_m.x()) - yaw_rad, 2.0 * M_PI);
       const size_t index = grid.index(grid.rayOf(angle_rad), bin);
+      const bool has_changed = !seen.changed_share.empty() && seen.changed_share[index] > 0.0F;
       if (seen.free_share[index] <= 0.0F && seen.hidden_share[index] <= 0.0F &&
-          seen.unknown_share[index] <= 0.0F) {
+          seen.unknown_share[index] <= 0.0F && !has_changed) {
         continue;
       }
       CellLook look = looker.look(angle_rad, range_m, bin);
@@ -188,7 +200,45 @@ void LocalObstacleMap::addGround(const CameraObstacles& seen, const PolarGrid& g
       if (across_m <= blind_sine * range_m) {
         look.unknown_share = 0.0;  // also before the first motion
       }
-      addGroundLook(look, weight, seen.stamp, &cellAt(x, y));
+      const bool explained =
+          look.changed_share >= options_.min_changed_share && looker.isExplained(angle_rad, range_m);
+      looks.push_back({x, y, look, explained});
+    }
+  }
+  return looks;
+}
+
+void LocalObstacleMap::addGround(const CameraObstacles& seen, const PolarGrid& grid,
+                                 const RigidTransform& fixed_from_vehicle, double weight) {
+  const std::vector<GroundLook> looks =
+      lookAtGround(seen, CellLooker(seen, grid, options_.cell_size_m), grid, fixed_from_vehicle);
+  holdChanged(looks, seen.stamp);
+  for (const GroundLook& ground : looks) {
+    addGroundLook(ground.look, weight, seen.stamp, &cellAt(ground.x, ground.y));
+  }
+}
+
+/// Takes back what was free where the ground looks otherwise than before, and around it.
+void LocalObstacleMap::holdChanged(const std::vector<GroundLook>& looks, Timestamp stamp) {
+  for (const GroundLook& ground : looks) {
+    if (ground.look.changed_share >= options_.min_changed_share) {
+      hold(ground.x, ground.y, ground.explained ? 0.0 : options_.changed_margin_m, stamp);
+    }
+  }
+}
+
+void LocalObstacleMap::hold(int64_t x, int64_t y, double radius_m, Timestamp stamp) {
+  const int64_t until_ns = (stamp + durationFromSeconds(options_.changed_hold_s)).nanoseconds();
+  const double radius = radius_m / options_.cell_size_m;
+  const auto reach = static_cast<int64_t>(radius);
+  for (int64_t row = y - reach; row <= y + reach; ++row) {
+    for (int64_t column = x - reach; column <= x + reach; ++column) {
+      const double distance = std::hypot(static_cast<double>(row - y), static_cast<double>(column - x));
+      if (distance <= radius && isInside(column, row)) {
+        Cell& cell = cellAt(column, row);
+        cell.held_until_ns = std::max(cell.held_until_ns, until_ns);
+        cell.log_odds = std::max(cell.log_odds, 0.0F);
+      }
     }
   }
 }
@@ -196,7 +246,8 @@ void LocalObstacleMap::addGround(const CameraObstacles& seen, const PolarGrid& g
 void LocalObstacleMap::addGroundLook(const CellLook& look, double weight, Timestamp stamp, Cell* cell) const {
   if (!look.blocked && look.free_share >= options_.min_free_share) {
     const double log_odds = cell->log_odds - weight * options_.free_log_odds * look.free_share;
-    cell->log_odds = static_cast<float>(std::max(options_.min_log_odds, log_odds));
+    const double least = stamp.nanoseconds() < cell->held_until_ns ? 0.0 : options_.min_log_odds;
+    cell->log_odds = static_cast<float>(std::max(least, log_odds));
     cell->last_seen_ns = stamp.nanoseconds();
     cell->travel_m = static_cast<float>(travel_m_);
   } else if (cell->log_odds < 0.0F && look.hidden_share + look.unknown_share >= options_.min_hidden_share) {
@@ -215,7 +266,7 @@ void LocalObstacleMap::addLook(const Look& look, Timestamp stamp) {
   Cell& cell = cellAt(x, y);
   cell.log_odds = std::min(static_cast<float>(options_.max_log_odds),
                            cell.log_odds + static_cast<float>(options_.occupied_log_odds * look.mass));
-  const double sigma_m = look.obstacle->range_sigma_m;
+  const double sigma_m = look.sigma_m;
   const auto weight = static_cast<float>(look.mass / (sigma_m * sigma_m + 1e-4));
   const float kept = kMemory * cell.weight;
   const float share = weight / (kept + weight);
@@ -232,23 +283,36 @@ void LocalObstacleMap::addLook(const Look& look, Timestamp stamp) {
   cell.last_seen_ns = stamp.nanoseconds();
 }
 
+/// Standard deviation of a range by the error across the ray of how the camera moved. Directions are in the
+/// fixed frame; before the first motion nothing is known.
+double LocalObstacleMap::parallaxSigma_m(double range_m, const Eigen::Vector2d& direction) const {
+  constexpr double kLeastSine = 0.03;
+  const double across =
+      std::abs(direction.x() * travel_direction_.y() - direction.y() * travel_direction_.x());
+  const double along = std::abs(direction.dot(travel_direction_));
+  return options_.parallax_sigma * range_m * along / std::max(across, kLeastSine);
+}
+
 void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid& grid,
                                    const RigidTransform& fixed_from_vehicle, double weight) {
   const double cell_m = options_.cell_size_m;
+  const double yaw_rad = yawOfRotation(fixed_from_vehicle.rotation());
   for (const PolarObstacle& obstacle : seen.obstacles) {
-    if (obstacle.range_m > options_.occupied_range_m) {
+    if (obstacle.is_off_axis || obstacle.range_m > options_.occupied_range_m) {
       continue;
     }
     const double width_m = obstacle.range_m * grid.increment_rad();
     const int across = std::max(1, static_cast<int>(std::ceil(width_m / cell_m)));
     // Several rays meet one cell nearby: together they are one look.
     const double ray_mass = weight * std::min(1.0, width_m / cell_m * 1.5) * std::max(0.3, obstacle.support);
-    const int along = obstacle.range_sigma_m < 0.6 * cell_m
-                          ? 0
-                          : static_cast<int>(std::ceil(2.0 * obstacle.range_sigma_m / cell_m));
+    const double middle_rad = grid.angle_rad(obstacle.ray) + yaw_rad;
+    const double sigma_m =
+        std::hypot(obstacle.range_sigma_m,
+                   parallaxSigma_m(obstacle.range_m, {std::cos(middle_rad), std::sin(middle_rad)}));
+    const int along = sigma_m < 0.6 * cell_m ? 0 : static_cast<int>(std::ceil(2.0 * sigma_m / cell_m));
     double normalizer = 0.0;
     const auto density = [&](int step) {
-      const double z = step * cell_m / obstacle.range_sigma_m;
+      const double z = step * cell_m / sigma_m;
       return std::exp(-0.5 * z * z);
     };
     for (int step = -along; step <= along; ++step) {
@@ -262,7 +326,7 @@ void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid&
         const Eigen::Vector2d point_in_vehicle =
             seen.origin_m + (obstacle.range_m + step * cell_m) * direction;
         addLook({transformed(fixed_from_vehicle, point_in_vehicle), ray_mass * density(step) / normalizer,
-                 &obstacle},
+                 sigma_m, &obstacle},
                 seen.stamp);
       }
     }

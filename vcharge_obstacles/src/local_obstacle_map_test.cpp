@@ -140,6 +140,39 @@ TEST_F(LocalObstacleMapTest, WhoStepsIntoFreeGroundMakesItAtLeastUnsure) {
   EXPECT_NE(stateAt(1.9, 3.3), kCellFree);  // hidden behind
 }
 
+TEST_F(LocalObstacleMapTest, GroundThatLooksOtherwiseIsTakenBackAtOnceAndHeld) {
+  drive({}, 0.0, 0.8);
+  ASSERT_EQ(stateAt(1.9, 3.0), kCellFree);
+  ASSERT_EQ(stateAt(1.9, 2.7), kCellFree);
+  // The range map still says that all is bare ground, as where a window matches the ground beside a foot.
+  const auto lookAtChange = [&](double x_m, bool changed) {
+    stamp_ = stamp_ + durationFromSeconds(0.08);
+    const RigidTransform pose = RigidTransform::planar(x_m, 0.0, 0.0);
+    map_.moveTo(stamp_, pose);
+    CameraObstacles seen = detectors_[1].detect(measureBoxWorld({}, rig_.cameras[1], pose, stamp_));
+    const Eigen::Vector2d offset = Eigen::Vector2d(1.9 - x_m, 3.0) - seen.origin_m;
+    seen.changed_share.assign(grid_.size(), 0.0F);
+    for (int side = -2; side <= 2 && changed; ++side) {
+      const int ray = grid_.wrap(grid_.rayOf(std::atan2(offset.y(), offset.x())) + side);
+      const int bin = grid_.binOfInverse(static_cast<float>(1.0 / offset.norm()));
+      seen.changed_share[grid_.index(ray, bin)] = seen.changed_share[grid_.index(ray, bin + 1)] = 1.0F;
+    }
+    map_.add(seen, grid_, pose);
+  };
+  lookAtChange(0.9, true);
+  EXPECT_EQ(stateAt(1.9, 3.0), kCellUnobserved);
+  EXPECT_EQ(stateAt(1.9, 2.7), kCellUnobserved);  // within the margin
+  EXPECT_EQ(stateAt(1.9, 2.2), kCellFree);
+  for (int i = 1; i <= 3; ++i) {
+    lookAtChange(0.9 + 0.1 * i, false);
+    EXPECT_EQ(stateAt(1.9, 3.0), kCellUnobserved);
+  }
+  for (int i = 4; i <= 10; ++i) {
+    lookAtChange(0.9 + 0.1 * i, false);
+  }
+  EXPECT_EQ(stateAt(1.9, 3.0), kCellFree);  // within a second
+}
+
 TEST_F(LocalObstacleMapTest, ScrollingKeepsPlacesInTheFixedFrame) {
   const BoxWorld world{{{{4.0, 3.0, 0.0}, {4.4, 3.4, 1.0}}}};
   drive(world, 0.0, 3.3);  // crosses many cells
@@ -199,6 +232,37 @@ TEST_F(LocalObstacleMapTest, UncertainLooksMarkMoreCellsMoreSlowly) {
   const int unsure = looksUntilOccupied(0.3);
   EXPECT_LT(sure, 8);
   EXPECT_GT(unsure, 3 * sure);
+}
+
+TEST_F(LocalObstacleMapTest, RangesAlongTheTravelAreUncertain) {
+  const auto sigmaAt = [&](double angle_rad) {
+    LocalObstacleMap map;
+    CameraObstacles seen = detectors_[0].detect(measureBoxWorld({}, rig_.cameras[0], {}, stamp_));
+    std::fill(seen.free_share.begin(), seen.free_share.end(), 0.0F);
+    PolarObstacle obstacle;
+    obstacle.ray = grid_.rayOf(angle_rad);
+    obstacle.range_m = 3.0;
+    obstacle.range_sigma_m = 0.02;
+    obstacle.height_m = 1.0;
+    obstacle.support = 1.0;
+    seen.obstacles = {obstacle};
+    for (int looks = 0; looks < 40; ++looks) {
+      const RigidTransform pose = RigidTransform::planar(0.1 * looks, 0.0, 0.0);
+      map.moveTo(stamp_, pose);
+      seen.origin_m.x() = 3.6 - 0.1 * looks;  // the camera sees the same place from the same place
+      seen.camera_name = std::to_string(looks);
+      map.add(seen, grid_, pose);
+    }
+    double largest = 0.0;
+    const ObstacleMap result = map.snapshot();
+    cv::minMaxLoc(result.point_sigma_m, nullptr, &largest, nullptr, nullptr, result.state == kCellOccupied);
+    return largest;
+  };
+  const double aside_m = sigmaAt(0.5 * M_PI - 0.01);
+  const double ahead_m = sigmaAt(0.1);
+  EXPECT_LT(aside_m, 0.06);
+  // A direction of motion that errs by parallax_sigma, seen under 0.1 rad.
+  EXPECT_GT(ahead_m, LocalObstacleMapOptions().parallax_sigma * 3.0 / std::tan(0.12));
 }
 
 TEST_F(LocalObstacleMapTest, LooksFromTheSamePlaceCountOnce) {

@@ -49,7 +49,7 @@ std::vector<std::vector<Hit>> collectHits(const ObstacleMap& map, const Viewpoin
   return hits;
 }
 
-void setRay(const std::vector<Hit>& hits, double depth_m, size_t ray, ObstacleScan* scan) {
+void setRay(const std::vector<Hit>& hits, double depth_m, double cell_m, size_t ray, ObstacleScan* scan) {
   if (hits.empty()) {
     return;
   }
@@ -57,10 +57,12 @@ void setRay(const std::vector<Hit>& hits, double depth_m, size_t ray, ObstacleSc
                                         [](const Hit& a, const Hit& b) { return a.range_m < b.range_m; });
   double weight = 0.0;
   double range_m = 0.0;
+  double square_m2 = 0.0;
   for (const Hit& hit : hits) {
     if (hit.range_m <= nearest->range_m + depth_m) {
       weight += hit.weight;
       range_m += hit.weight * hit.range_m;
+      square_m2 += hit.weight * hit.range_m * hit.range_m;
       // The highest of them is the obstacle's height.
       if (!(hit.height_m <= scan->height_m[ray])) {
         scan->height_m[ray] = hit.height_m;
@@ -68,8 +70,11 @@ void setRay(const std::vector<Hit>& hits, double depth_m, size_t ray, ObstacleSc
       }
     }
   }
-  scan->range_m[ray] = static_cast<float>(range_m / weight);
-  scan->range_sigma_m[ray] = nearest->sigma_m;
+  const double mean_m = range_m / weight;
+  scan->range_m[ray] = static_cast<float>(mean_m);
+  // Which of the cells the ray meets first is not known, nor where in its cell.
+  const double spread_m2 = std::max(0.0, square_m2 / weight - mean_m * mean_m) + cell_m * cell_m / 12.0;
+  scan->range_sigma_m[ray] = static_cast<float>(std::sqrt(nearest->sigma_m * nearest->sigma_m + spread_m2));
 }
 
 /// How far the ray is free, from the first free cell on: cells under and beside the vehicle are never seen.
@@ -105,7 +110,7 @@ ObstacleScan makeScan(const ObstacleMap& map, int num_rays, double depth_m) {
   scan.name = "fused";
   const auto hits = collectHits(map, viewpoint, num_rays);
   for (size_t ray = 0; ray < scan.size(); ++ray) {
-    setRay(hits[ray], depth_m, ray, &scan);
+    setRay(hits[ray], depth_m, map.cell_size_m, ray, &scan);
     scan.free_m[ray] = freeRange(map, viewpoint, viewpoint.yaw_rad + scan.angle_rad(ray), max_range_m);
   }
   return scan;

@@ -56,6 +56,18 @@ TEST(MapScanTest, DirectionsTurnWithTheVehicle) {
   EXPECT_TRUE(std::isnan(scan.range_m[rayTo(scan, 0.5 * M_PI)]));
 }
 
+TEST(MapScanTest, SigmaCountsTheCellAndHowFarItsCellsLieApart) {
+  ObstacleMap one = makeMap();
+  occupy(&one, 20, 30, 0.5F);
+  const size_t ray = rayTo(makeScan(one, 360, 0.2), 0.5 * M_PI - kAside_rad);
+  const double cell_sigma_m = 0.1 / std::sqrt(12.0);
+  EXPECT_NEAR(makeScan(one, 360, 0.2).range_sigma_m[ray], std::hypot(0.03, cell_sigma_m), 1e-4);
+  ObstacleMap two = one;
+  occupy(&two, 20, 31, 0.5F);  // 0.1 m behind: the mean of both is 0.05 m from each
+  EXPECT_NEAR(makeScan(two, 360, 0.2).range_sigma_m[ray], std::hypot(std::hypot(0.03, cell_sigma_m), 0.05),
+              2e-3);
+}
+
 TEST(MapScanTest, UnobservedGroundEndsWhatIsFree) {
   ObstacleMap map = makeMap();
   map.state.colRange(30, 40).setTo(kCellUnobserved);

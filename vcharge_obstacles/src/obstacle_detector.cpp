@@ -47,7 +47,14 @@ struct ObstacleDetector::Implementation {
         size(camera.size()),
         position(vehicle_from_camera.translation().cast<float>()),
         rays(camera, vehicle_from_camera, grid, options.pixel_step),
-        expected(rays, grid, position.z(), options.min_height_m, options.reference_height_m) {}
+        expected(rays, grid, position.z(), options.min_height_m, options.reference_height_m) {
+    const Eigen::Vector3d axis = vehicle_from_camera.rotation() * Eigen::Vector3d::UnitZ();
+    const double axis_rad = std::atan2(axis.y(), axis.x());
+    for (int ray = 0; ray < grid.numRays(); ++ray) {
+      const double off_axis_rad = std::abs(std::remainder(grid.angle_rad(ray) - axis_rad, 2.0 * M_PI));
+      is_off_axis.push_back(off_axis_rad > options.max_off_axis_rad);
+    }
+  }
 
   bool usable(float range_m, float sigma_m, float confidence) const {
     return range_m > 0.0F && confidence >= static_cast<float>(options.min_confidence) &&
@@ -68,6 +75,7 @@ struct ObstacleDetector::Implementation {
   const Eigen::Vector3f position;
   const PixelRays rays;
   const ExpectedPixels expected;
+  std::vector<bool> is_off_axis;  // by sector
 };
 
 void ObstacleDetectorOptions::validate() const {
@@ -90,6 +98,9 @@ void ObstacleDetectorOptions::validate() const {
   requireField(min_separation_m > 0.0, "min_separation_m", "must be positive", min_separation_m);
   requireField(max_obstacles_per_ray >= 1, "max_obstacles_per_ray", "must be positive",
                max_obstacles_per_ray);
+  requireField(max_off_axis_rad > 0.0, "max_off_axis_rad", "must be positive", max_off_axis_rad);
+  requireField(max_off_axis_range_m >= 0.0, "max_off_axis_range_m", "must not be negative",
+               max_off_axis_range_m);
   requireField(sure_ground_sigmas >= 0.0, "sure_ground_sigmas", "must not be negative", sure_ground_sigmas);
   requireField(below_ground_m > 0.0, "below_ground_m", "must be positive", below_ground_m);
   requireField(lost_ground_tilt_rad > ground.max_tilt_rad, "lost_ground_tilt_rad",
@@ -240,6 +251,10 @@ CameraObstacles ObstacleDetector::detect(const RangeMap& map) const {
   result.unknown_share = self.shareOf(evidence.unknown.finish());
   result.occupied_share = points.occupiedShare();
   result.obstacles = findPolarObstacles(points, self.expected.obstacle, self.options);
+  for (PolarObstacle& obstacle : result.obstacles) {
+    obstacle.is_off_axis = self.is_off_axis[static_cast<size_t>(obstacle.ray)] &&
+                           obstacle.range_m > self.options.max_off_axis_range_m;
+  }
   result.scan = makePolarScan(self.grid, result.obstacles, result.free_share, self.expected.ground);
   result.scan.stamp = map.stamp;
   result.scan.name = map.camera_name;

@@ -47,6 +47,27 @@ TEST_F(ObstacleDetectorTest, BareGroundIsFreeAndHasNoObstacle) {
   EXPECT_GT(seen.scan.free_m[rayTo(seen, 0.5 * M_PI)], 4.0F);
 }
 
+TEST_F(ObstacleDetectorTest, FarThingsAtTheRimOfTheLensAreOnlyForHiding) {
+  // A wall along the vehicle: before the left camera, and from there to the rim of its image.
+  const BoxWorld world{{{{-20.0, 2.98, 0.0}, {20.0, 3.2, 0.8}}}};
+  const CameraObstacles seen = detect(world, "left", {}, {0.01, 0.1, 7});
+  int marking = 0;
+  int hiding = 0;
+  for (const PolarObstacle& obstacle : seen.obstacles) {
+    const double off_axis_rad = std::abs(seen.scan.angle_rad(static_cast<size_t>(obstacle.ray)) - 0.5 * M_PI);
+    const bool expected =
+        off_axis_rad > options_.max_off_axis_rad && obstacle.range_m > options_.max_off_axis_range_m;
+    EXPECT_EQ(obstacle.is_off_axis, expected) << off_axis_rad << " " << obstacle.range_m;
+    ++(expected ? hiding : marking);
+  }
+  EXPECT_GT(marking, 90);
+  EXPECT_GT(hiding, 10);
+  const BoxWorld near_box{{{{3.9, 1.2, 0.0}, {4.3, 1.6, 0.8}}}};  // beside the bumper, at the rim
+  const CameraObstacles near_seen = detect(near_box, "left", {}, {0.01, 0.1, 7});
+  ASSERT_FALSE(near_seen.obstacles.empty());
+  EXPECT_FALSE(near_seen.obstacles.front().is_off_axis);
+}
+
 TEST_F(ObstacleDetectorTest, WallIsReportedAtItsRangeWithItsHeight) {
   for (const double distance_m : {1.0, 2.0, 4.0}) {
     const double wall_y = 0.98 + distance_m;

@@ -6,6 +6,7 @@
 
 #include "vcharge_core/error.h"
 #include "vcharge_core/text_format.h"
+#include "vcharge_obstacles/map_scan.h"
 
 namespace vcharge {
 namespace {
@@ -14,12 +15,17 @@ namespace {
 constexpr double kReplay_s = 1.0;
 // Below this speed the vehicle stands.
 constexpr double kStanding_m_per_s = 0.02;
+// Stamps that wait for odometry or a camera that may still come; two seconds at 12.5 Hz.
+constexpr size_t kMaxWaiting = 25;
 
 }  // namespace
 
 struct ObstacleMapper::Camera {
   size_t index = 0;
-  std::unique_ptr<ObstacleDetector> detector;  // made when the size of the range maps is known
+  std::unique_ptr<ObstacleDetector> detector;  // of the range maps' camera, which is known with the first one
+  std::unique_ptr<GroundWatch> watch;
+  MeiCamera::Parameters parameters = MeiCamera::Parameters::Zero();  // of that camera
+  cv::Size size;
   std::optional<Timestamp> newest;
   ObstacleCameraStatus status;
 };
@@ -28,6 +34,8 @@ std::string toString(ObstacleCameraState state) {
   switch (state) {
     case ObstacleCameraState::kNoRangeMaps:
       return "no range maps";
+    case ObstacleCameraState::kNoPose:
+      return "no pose";
     case ObstacleCameraState::kStanding:
       return "standing";
     case ObstacleCameraState::kHardlySees:
@@ -44,6 +52,7 @@ std::string toString(ObstacleCameraState state) {
 
 void ObstacleMapperOptions::validate() const {
   validateInner("detector", detector);
+  validateInner("watch", watch);
   validateInner("map", map);
   validateInner("odometry", odometry);
   requireField(max_wait_s >= 0.0, "max_wait_s", "must not be negative", max_wait_s);
@@ -91,9 +100,13 @@ void ObstacleMapper::startOver() {
   waiting_.clear();
   last_fused_.reset();
   last_emitted_.reset();
+  last_jump_.reset();
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (camera) {
       camera->newest.reset();
+      if (camera->watch) {
+        camera->watch->clear();
+      }
     }
   }
 }
@@ -113,10 +126,8 @@ void ObstacleMapper::watchForJumps(const VehicleOdometry& odometry) {
         last_velocity_ ? Eigen::Vector3d(step - *last_velocity_ * dt) : Eigen::Vector3d::Zero();
     if (dt <= options_.odometry.max_gap_s &&
         (change.head<2>().norm() > options_.max_step_m || std::abs(change.z()) > options_.max_step_rad)) {
-      ++num_jumps_;
       fuseWaiting(true);
-      startOver();
-      last_velocity_.reset();
+      jump(odometry.stamp);
     } else {
       last_velocity_ = step / dt;
     }
@@ -133,16 +144,24 @@ void ObstacleMapper::addOdometry(const VehicleOdometry& odometry) {
     startOver();
     last_odometry_.reset();
     last_velocity_.reset();
+    emitAt(odometry.stamp);
   } else if (result == OdometryBuffer::AddResult::kAddedAfterGap) {
     // How far the vehicle went meanwhile is what the odometry says it is: not to be relied on.
-    ++num_jumps_;
-    startOver();
     last_odometry_.reset();
-    last_velocity_.reset();
+    jump(odometry.stamp);
   }
   watchForJumps(odometry);
   fuseWaiting(false);
   emitWhenSilent(odometry);
+}
+
+/// Nothing in the map is where it was: all learn it at once.
+void ObstacleMapper::jump(Timestamp stamp) {
+  ++num_jumps_;
+  startOver();
+  last_velocity_.reset();
+  last_jump_ = stamp;
+  emitAt(stamp);
 }
 
 void ObstacleMapper::setMapFromOdom(const RigidTransform& map_from_odom) {
@@ -176,22 +195,27 @@ void ObstacleMapper::addRangeMap(const RangeMap& map) {
     throw InputError("range map of camera '" + map.camera_name + "': not one of the cameras in use");
   }
   const RigCamera& rig_camera = rig_->cameras[camera->index];
-  if (!camera->detector) {
+  if (!camera->detector || camera->size != map.range_m.size() ||
+      camera->parameters != map.camera.parameters()) {
+    const WorkingCamera working = rebuildWorkingCamera(map.camera, map.range_m.size(), rig_camera);
     camera->detector =
-        std::make_unique<ObstacleDetector>(rebuildWorkingCamera(map.camera, map.range_m.size(), rig_camera),
-                                           *rig_camera.vehicle_from_camera, options_.detector);
+        std::make_unique<ObstacleDetector>(working, *rig_camera.vehicle_from_camera, options_.detector);
+    camera->watch =
+        std::make_unique<GroundWatch>(working, *rig_camera.vehicle_from_camera, grid_, options_.watch);
+    camera->size = map.range_m.size();
+    camera->parameters = map.camera.parameters();
   }
   if (camera->newest && toSeconds(*camera->newest - map.stamp) > kReplay_s) {
     startOver();
   }
-  const CameraObstacles seen = camera->detector->detect(map);
+  CameraObstacles seen = camera->detector->detect(map);
   updateStatus(camera, seen);
   camera->newest = camera->newest ? std::max(*camera->newest, map.stamp) : map.stamp;
-  if (last_fused_ && map.stamp <= *last_fused_) {
+  if ((last_fused_ && map.stamp <= *last_fused_) || (last_jump_ && map.stamp < *last_jump_)) {
     ++camera->status.late;
     return;
   }
-  waiting_[map.stamp].cameras[camera->index] = seen;
+  waiting_[map.stamp].cameras[camera->index] = {std::move(seen), map.reference.clone()};
   fuseWaiting(false);
 }
 
@@ -235,7 +259,8 @@ bool ObstacleMapper::isComplete(Timestamp stamp) const {
 void ObstacleMapper::fuseWaiting(bool all) {
   while (!waiting_.empty()) {
     const Timestamp stamp = waiting_.begin()->first;
-    if (!all && !isComplete(stamp)) {
+    const bool must_go = all || waiting_.size() > kMaxWaiting;  // a camera, or odometry, does not come
+    if (!must_go && !isComplete(stamp)) {
       return;
     }
     const std::optional<RigidTransform> fixed_from_vehicle = fixedFromVehicle(stamp);
@@ -243,41 +268,54 @@ void ObstacleMapper::fuseWaiting(bool all) {
       const OdometryBuffer::LookupStatus lookup = poses_.lookup(stamp).status;
       const bool may_come = lookup == OdometryBuffer::LookupStatus::kEmpty ||
                             lookup == OdometryBuffer::LookupStatus::kAfterLast;
-      if (may_come && !all) {
+      if (may_come && !must_go) {
         return;
       }
     }
-    const Group group = std::move(waiting_.begin()->second);
-    waiting_.erase(waiting_.begin());
-    last_fused_ = stamp;
-    if (fixed_from_vehicle) {
-      fuse(stamp, group, *fixed_from_vehicle);
+    if (!fixed_from_vehicle) {
+      loseFirstWaiting();
       continue;
     }
-    for (const auto& [index, seen] : group.cameras) {
-      ObstacleCameraStatus& status = cameras_[index]->status;
-      ++status.without_pose;
-      status.state = ObstacleCameraState::kNoRangeMaps;
-      status.message = "no pose at the range map's stamp " + toString(stamp);
-    }
+    Group group = std::move(waiting_.begin()->second);
+    waiting_.erase(waiting_.begin());
+    last_fused_ = stamp;
+    fuse(stamp, &group, *fixed_from_vehicle);
   }
 }
 
-void ObstacleMapper::fuse(Timestamp stamp, const Group& group, const RigidTransform& fixed_from_vehicle) {
+/// There is no pose for it.
+void ObstacleMapper::loseFirstWaiting() {
+  const auto first = waiting_.begin();
+  for (const auto& [index, look] : first->second.cameras) {
+    ObstacleCameraStatus& status = cameras_[index]->status;
+    ++status.without_pose;
+    status.state = ObstacleCameraState::kNoPose;
+    status.message = "no pose at the range map's stamp " + toString(first->first);
+  }
+  last_fused_ = first->first;
+  waiting_.erase(first);
+}
+
+void ObstacleMapper::fuse(Timestamp stamp, Group* group, const RigidTransform& fixed_from_vehicle) {
   map_.moveTo(stamp, fixed_from_vehicle);
   std::vector<const CameraObstacles*> cameras;
-  for (const auto& [index, seen] : group.cameras) {
+  for (auto& [index, look] : group->cameras) {
+    CameraObstacles& seen = look.seen;
+    if (!look.reference.empty()) {
+      seen.changed_share =
+          cameras_[index]->watch->compare(stamp, look.reference, seen.ground, fixed_from_vehicle);
+    }
     map_.add(seen, grid_, fixed_from_vehicle);
     cameras.push_back(&seen);
   }
-  emit(cameras);
+  emit(map_, cameras);
 }
 
-void ObstacleMapper::emit(const std::vector<const CameraObstacles*>& cameras) {
+void ObstacleMapper::emit(const LocalObstacleMap& map, const std::vector<const CameraObstacles*>& cameras) {
   ObstacleFrame frame;
-  frame.map = map_.snapshot();
+  frame.map = map.snapshot();
   frame.map.frame_id = enumNames<FixedFrame>()[static_cast<size_t>(options_.fixed_frame)];
-  frame.scan = map_.scan();
+  frame.scan = makeScan(frame.map, options_.map.scan_rays, options_.map.scan_depth_m);
   for (const CameraObstacles* camera : cameras) {
     frame.cameras.push_back(*camera);
   }
@@ -290,10 +328,17 @@ void ObstacleMapper::emitWhenSilent(const VehicleOdometry& odometry) {
   if (!last_emitted_ || !waiting_.empty() || toSeconds(odometry.stamp - *last_emitted_) < options_.silent_s) {
     return;
   }
-  const std::optional<RigidTransform> fixed_from_vehicle = fixedFromVehicle(odometry.stamp);
+  emitAt(odometry.stamp);
+}
+
+/// What the map would be at a stamp of which there are no range maps (yet). The map itself stays as it is: it
+/// depends on the range maps alone, and not on when they come.
+void ObstacleMapper::emitAt(Timestamp stamp) {
+  const std::optional<RigidTransform> fixed_from_vehicle = fixedFromVehicle(stamp);
   if (fixed_from_vehicle) {
-    map_.moveTo(odometry.stamp, *fixed_from_vehicle);
-    emit({});
+    LocalObstacleMap moved = map_;
+    moved.moveTo(stamp, *fixed_from_vehicle);
+    emit(moved, {});
   }
 }
 

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 
 #include "box_world.h"
 #include "vcharge_core/error.h"
@@ -203,6 +205,96 @@ TEST_F(ObstacleMapperTest, OdometryThatJumpsEmptiesTheMap) {
   // One look from the new place, no more.
   EXPECT_EQ(stateAt(frames_.back(), 3.25, 2.55), kCellUnobserved);
   EXPECT_LT(count(frames_.back(), kCellFree), before / 20);
+}
+
+TEST_F(ObstacleMapperTest, JumpPublishesTheEmptyMapAtOnce) {
+  start();
+  drive(0, 40);
+  mapper_->finish();
+  const size_t before = frames_.size();
+  VehicleOdometry odometry;
+  odometry.stamp = stampAt(41);
+  odometry.odom_from_vehicle = RigidTransform::planar(3.0, 0.0, 0.0);
+  mapper_->addOdometry(odometry);  // alone
+  ASSERT_EQ(frames_.size(), before + 1);
+  EXPECT_EQ(frames_.back().map.stamp, odometry.stamp);
+  EXPECT_EQ(count(frames_.back(), kCellUnobserved),
+            frames_.back().map.state.rows * frames_.back().map.state.cols);
+  // A range map from before it has no place in the new map.
+  mapper_->addRangeMap(measureBoxWorld(kWorld, rig_->cameras[1], poseAt(38), stampAt(39)));
+  EXPECT_EQ(mapper_->status()[1].late, 1U);
+}
+
+TEST_F(ObstacleMapperTest, RangeMapsWithoutOdometryDoNotPileUp) {
+  start();
+  drive(0, 20);
+  mapper_->finish();
+  constexpr int kMaps = 60;
+  for (int i = 0; i < kMaps; ++i) {
+    mapper_->addRangeMap(measureBoxWorld(kWorld, rig_->cameras[1], poseAt(20), stampAt(20 + 4 * i)));
+  }
+  EXPECT_LE(mapper_->numWaiting(), 25U);
+  EXPECT_EQ(mapper_->status()[1].without_pose + mapper_->numWaiting(), static_cast<size_t>(kMaps));
+  EXPECT_EQ(mapper_->status()[1].state, ObstacleCameraState::kNoPose);
+}
+
+TEST_F(ObstacleMapperTest, CameraThatNeverComesIsNotWaitedForWithoutEnd) {
+  options_.max_wait_s = std::numeric_limits<double>::infinity();  // as in a replay without loss
+  dead_camera_ = "left";
+  start();
+  drive(0, 240);
+  EXPECT_GE(frames_.size(), 60U - 26U);
+  EXPECT_LE(mapper_->numWaiting(), 25U);
+  EXPECT_GT(count(frames_.back(), kCellFree), 500);
+}
+
+TEST_F(ObstacleMapperTest, MapsDoNotDependOnHowLateRangeMapsCome) {
+  const auto run = [&](int delay_ticks) {
+    options_.max_wait_s = std::numeric_limits<double>::infinity();
+    start();
+    std::map<Timestamp, std::string> hashes;
+    for (int tick = 0; tick < 60 + delay_ticks; ++tick) {
+      if (tick < 60) {
+        VehicleOdometry odometry;
+        odometry.stamp = stampAt(tick);
+        odometry.odom_from_vehicle = poseAt(tick);
+        mapper_->addOdometry(odometry);
+      }
+      const int seen = tick - delay_ticks;
+      for (size_t i = 0; i < 3 && seen >= 0 && seen % 4 == 0; ++i) {
+        mapper_->addRangeMap(
+            measureBoxWorld(kWorld, rig_->cameras[i], poseAt(seen), stampAt(seen), {0.01, 0.1, 1}));
+      }
+    }
+    for (const ObstacleFrame& frame : frames_) {
+      ContentHasher hasher;
+      addToHash(frame.map, &hasher);
+      if (!frame.cameras.empty()) {
+        hashes[frame.map.stamp] = hasher.hex();
+      }
+    }
+    return hashes;
+  };
+  const auto expected = run(0);
+  EXPECT_EQ(expected.size(), 15U);
+  EXPECT_EQ(run(41), expected);  // 0.8 s: maps come between, where nothing is heard
+}
+
+TEST_F(ObstacleMapperTest, RangeMapsMayChangeTheirSize) {
+  start();
+  drive(0, 40);
+  RigCamera half = rig_->cameras[1];
+  RangeMap map = measureBoxWorld(kWorld, half, poseAt(40), stampAt(40));
+  WorkingCameraOptions working;
+  working.image_scale = 0.5 * map.range_m.cols / half.image_size_px.width;
+  const WorkingCamera small(half.model, half.image_size_px, half.field_of_view_rad, half.mask, working);
+  map.camera = small.model();
+  for (cv::Mat* image : {&map.range_m, &map.standard_deviation_m, &map.confidence}) {
+    cv::Mat smaller;
+    cv::resize(*image, smaller, small.size(), 0.0, 0.0, cv::INTER_NEAREST);
+    *image = smaller;
+  }
+  EXPECT_NO_THROW(mapper_->addRangeMap(map));
 }
 
 TEST_F(ObstacleMapperTest, BrakingIsNoJump) {

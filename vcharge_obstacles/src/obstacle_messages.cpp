@@ -1,18 +1,23 @@
 #include "obstacle_messages.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
-#include <memory>
+#include <utility>
+
+#include <octomap/OcTree.h>
 
 #include "vcharge_core/error.h"
+#include "vcharge_core/text_format.h"
 #include "vcharge_core/working_camera.h"
 #include "vcharge_obstacles/obstacle_outlines.h"
+#include "vcharge_ros/camera_info.h"
 #include "vcharge_ros/conversions.h"
 
 namespace vcharge {
 namespace {
 
-/// A float image that keeps its message alive, as OpenCV's own reference count.
+/// The message's own pixels.
 cv::Mat toFloatImage(const sensor_msgs::ImageConstPtr& message, const std::string& topic) {
   const size_t row_bytes = message->width * sizeof(float);
   if (message->encoding != "32FC1" || message->is_bigendian != 0 || message->step != row_bytes ||
@@ -22,6 +27,32 @@ cv::Mat toFloatImage(const sensor_msgs::ImageConstPtr& message, const std::strin
   }
   return cv::Mat(static_cast<int>(message->height), static_cast<int>(message->width), CV_32FC1,
                  const_cast<uint8_t*>(message->data.data()));  // nobody writes to it
+}
+
+cv::Mat toGrayImage(const sensor_msgs::ImageConstPtr& message, const std::string& topic) {
+  if (message->encoding != "mono8" || message->step != message->width || message->data.empty() ||
+      message->data.size() != static_cast<size_t>(message->step) * message->height) {
+    throw InputError(topic + ": expected mono8 images without padding, got " + message->encoding + " of " +
+                     std::to_string(message->width) + "x" + std::to_string(message->height));
+  }
+  return cv::Mat(static_cast<int>(message->height), static_cast<int>(message->width), CV_8UC1,
+                 const_cast<uint8_t*>(message->data.data()));  // nobody writes to it
+}
+
+/// Size, focal lengths and principal point, for errors.
+std::string describe(const sensor_msgs::CameraInfo& info) {
+  return std::to_string(info.width) + "x" + std::to_string(info.height) + " " + info.distortion_model +
+         " in " + info.header.frame_id + ", K " + toText(info.K[0], 2) + ", " + toText(info.K[4], 2) + ", " +
+         toText(info.K[2], 2) + ", " + toText(info.K[5], 2);
+}
+
+bool isSameCamera(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b) {
+  constexpr double kTolerance = 1e-3;  // pixels, and coefficients; a fit is as exact as its platform
+  const auto is_near = [](double x, double y) { return std::abs(x - y) <= kTolerance; };
+  return a.width == b.width && a.height == b.height && a.distortion_model == b.distortion_model &&
+         a.header.frame_id == b.header.frame_id && a.D.size() == b.D.size() &&
+         std::equal(a.D.begin(), a.D.end(), b.D.begin(), is_near) &&
+         std::equal(a.K.begin(), a.K.end(), b.K.begin(), is_near);
 }
 
 std_msgs::ColorRGBA colourOf(double height_m) {
@@ -55,27 +86,49 @@ visualization_msgs::Marker makeMarker(const ObstacleMap& map, const char* name, 
 
 }  // namespace
 
-RangeMap toRangeMap(const sensor_msgs::ImageConstPtr& range, const sensor_msgs::ImageConstPtr& sigma,
-                    const sensor_msgs::ImageConstPtr& confidence, const RigCamera& camera,
-                    const std::string& topic) {
-  const cv::Mat range_m = toFloatImage(range, topic);
-  WorkingCameraOptions options;
-  options.image_scale = static_cast<double>(range_m.cols) / camera.image_size_px.width;
-  const WorkingCamera working(camera.model, camera.image_size_px, camera.field_of_view_rad, camera.mask,
-                              options);
-  if (working.size() != range_m.size() || sigma->width != range->width || sigma->height != range->height ||
-      confidence->width != range->width || confidence->height != range->height) {
-    throw InputError(topic + ": expected three images of " + std::to_string(working.size().width) + "x" +
-                     std::to_string(working.size().height) + ", as camera '" + camera.name +
-                     "' has it, got " + std::to_string(range_m.cols) + "x" + std::to_string(range_m.rows));
+RangeMapReader::RangeMapReader(const RigCamera& camera, std::string topic)
+    : camera_(camera), topic_(std::move(topic)) {}
+
+void RangeMapReader::prepare(cv::Size size) {
+  if (size == size_) {
+    return;
   }
-  return {toTimestamp(range->header.stamp),
-          camera.name,
-          range->header.frame_id,
-          working.model(),
+  WorkingCameraOptions options;
+  options.image_scale = static_cast<double>(size.width) / camera_.image_size_px.width;
+  const WorkingCamera working(camera_.model, camera_.image_size_px, camera_.field_of_view_rad, camera_.mask,
+                              options);
+  if (working.size() != size) {
+    throw InputError(topic_ + "/image: expected images with the sides of camera '" + camera_.name + "', as " +
+                     std::to_string(working.size().width) + "x" + std::to_string(working.size().height) +
+                     ", got " + std::to_string(size.width) + "x" + std::to_string(size.height));
+  }
+  model_ = working.model();
+  expected_ = makeCameraInfo(*model_, size, camera_.field_of_view_rad, camera_.frame_id);
+  size_ = size;
+}
+
+RangeMap RangeMapReader::read(const RangeMapParts& parts) {
+  const cv::Mat range_m = toFloatImage(parts.range, topic_ + "/image");
+  const cv::Mat sigma_m = toFloatImage(parts.standard_deviation, topic_ + "/standard_deviation");
+  const cv::Mat confidence = toFloatImage(parts.confidence, topic_ + "/confidence");
+  const cv::Mat reference = toGrayImage(parts.reference, topic_ + "/reference");
+  prepare(range_m.size());
+  if (sigma_m.size() != size_ || confidence.size() != size_ || reference.size() != size_) {
+    throw InputError(topic_ + ": expected four images of one size, got another than the range's " +
+                     std::to_string(size_.width) + "x" + std::to_string(size_.height));
+  }
+  if (!isSameCamera(*parts.camera_info, expected_)) {
+    throw InputError(topic_ + "/camera_info: expected camera '" + camera_.name + "' of the rig, " +
+                     describe(expected_) + "; got " + describe(*parts.camera_info));
+  }
+  return {toTimestamp(parts.range->header.stamp),
+          camera_.name,
+          camera_.frame_id,
+          *model_,
           range_m,
-          toFloatImage(sigma, topic),
-          toFloatImage(confidence, topic)};
+          sigma_m,
+          confidence,
+          reference};
 }
 
 nav_msgs::OccupancyGrid toMessage(const ObstacleMap& map) {
@@ -139,6 +192,29 @@ visualization_msgs::MarkerArray toMarkers(const ObstacleMap& map) {
     markers.markers.push_back(marker);
   }
   return markers;
+}
+
+std::unique_ptr<octomap::OcTree> toOctree(const ObstacleMap& map) {
+  auto tree = std::make_unique<octomap::OcTree>(map.cell_size_m);
+  const auto setVoxel = [&](int column, int row, int layer, float log_odds) {
+    const Eigen::Vector2d middle = map.origin_m + map.cell_size_m * Eigen::Vector2d(column + 0.5, row + 0.5);
+    tree->setNodeValue(middle.x(), middle.y(), (layer + 0.5) * map.cell_size_m, log_odds, true);
+  };
+  for (int row = 0; row < map.state.rows; ++row) {
+    for (int column = 0; column < map.state.cols; ++column) {
+      const int8_t state = map.state.at<int8_t>(row, column);
+      if (state == kCellFree) {
+        setVoxel(column, row, 0, tree->getClampingThresMinLog());
+      } else if (state == kCellOccupied) {
+        const double layers = std::ceil(map.height_m.at<float>(row, column) / map.cell_size_m - 1e-3);
+        for (int layer = 0; layer < std::max(1, static_cast<int>(layers)); ++layer) {
+          setVoxel(column, row, layer, tree->getClampingThresMaxLog());
+        }
+      }
+    }
+  }
+  tree->updateInnerOccupancy();
+  return tree;
 }
 
 geometry_msgs::Vector3Stamped toMessage(const GroundPlane& ground, Timestamp stamp,

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <memory>
+#include <optional>
 #include <string>
 
 #include <geometry_msgs/Vector3Stamped.h>
 #include <nav_msgs/OccupancyGrid.h>
+#include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/LaserScan.h>
 #include <visualization_msgs/MarkerArray.h>
@@ -13,14 +16,38 @@
 #include "vcharge_core/range_map.h"
 #include "vcharge_obstacles/ground_plane.h"
 
+namespace octomap {
+class OcTree;
+}
+
 namespace vcharge {
 
-/// The three images of one stamp that depth_nodelet publishes. The pixels are not copied: the messages live
-/// as long as the range map. InputError "<topic>: ..." for another encoding, size or a size that is not that
-/// of a working image of the camera.
-RangeMap toRangeMap(const sensor_msgs::ImageConstPtr& range, const sensor_msgs::ImageConstPtr& sigma,
-                    const sensor_msgs::ImageConstPtr& confidence, const RigCamera& camera,
-                    const std::string& topic);
+/// What depth_nodelet publishes of one camera at one stamp.
+struct RangeMapParts {
+  sensor_msgs::ImageConstPtr range, standard_deviation, confidence, reference;
+  sensor_msgs::CameraInfoConstPtr camera_info;
+  bool complete() const { return range && standard_deviation && confidence && reference && camera_info; }
+};
+
+/// Turns them into range maps; the working camera is built once for all images of a size. Not thread safe.
+class RangeMapReader {
+ public:
+  /// `topic` stands in errors: that of the parts without their own names.
+  RangeMapReader(const RigCamera& camera, std::string topic);
+
+  /// The range map's pixels are those of the messages, which must outlive it. InputError "<topic>/...: ..."
+  /// for another encoding, images of unlike size, or a camera that is not the rig's at that size.
+  RangeMap read(const RangeMapParts& parts);
+
+ private:
+  void prepare(cv::Size size);
+
+  const RigCamera camera_;
+  const std::string topic_;
+  cv::Size size_;  // of the two below
+  std::optional<MeiCamera> model_;
+  sensor_msgs::CameraInfo expected_;
+};
 
 /// -1 unobserved, 0 free, 100 occupied; frame_id and stamp of the map.
 nav_msgs::OccupancyGrid toMessage(const ObstacleMap& map);
@@ -32,6 +59,10 @@ sensor_msgs::LaserScan toMessage(const ObstacleScan& scan, const std::string& fr
 
 /// Outlines of the occupied cells as walls up to their heights, and as lines; replaces those before.
 visualization_msgs::MarkerArray toMarkers(const ObstacleMap& map);
+
+/// Occupied cells as columns of voxels from the ground up to their height, free ones as one voxel on the
+/// ground, unobserved ones as nothing. Voxels are as large as cells, and lie in their places.
+std::unique_ptr<octomap::OcTree> toOctree(const ObstacleMap& map);
 
 /// x: roll, y: pitch (rad), z: height (m) of the body over the ground.
 geometry_msgs::Vector3Stamped toMessage(const GroundPlane& ground, Timestamp stamp,

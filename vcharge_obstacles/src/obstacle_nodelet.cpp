@@ -1,3 +1,5 @@
+#include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -5,39 +7,46 @@
 #include <vector>
 
 #include <nodelet/nodelet.h>
+#include <octomap/OcTree.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 #include <tf2_ros/transform_listener.h>
 #include <pluginlib/class_list_macros.hpp>
 
 #include "obstacle_messages.h"
+#include "ordered_worker.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/text_format.h"
 #include "vcharge_obstacles/obstacle_mapper.h"
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/nodelet_support.h"
+#include "vcharge_ros/octomap_conversions.h"
 #include "vcharge_ros/parameters.h"
 
 namespace vcharge {
 
 /// Obstacles and free ground around the vehicle, from depth_nodelet's /dense/<camera>/range/* and /odom.
-/// Publishes /obstacles/grid, /obstacles/scan, /obstacles/markers, /obstacles/<camera>/scan and
-/// /obstacles/<camera>/ground_plane, the scans' frames on /tf_static, and a status per camera in
-/// /diagnostics. Parameters: ~rig (path), ~options (ObstacleMapperOptions; fixed_frame: map needs
-/// localization's map -> odom on /tf), ~odometry_topic.
+/// Publishes /obstacles/grid, /obstacles/scan, /obstacles/markers, /obstacles/octomap,
+/// /obstacles/<camera>/scan and /obstacles/<camera>/ground_plane, the scans' frames on /tf_static, and a
+/// status per camera in /diagnostics. Callbacks only sort messages: all else is done in a thread of its own.
+/// Parameters: ~rig (path), ~options (ObstacleMapperOptions; fixed_frame: map needs localization's map ->
+/// odom on /tf), ~odometry_topic, ~lossless_replay (every range map in order, however late, as
+/// detect_obstacles; otherwise those that wait too long are dropped).
 class ObstacleNodelet : public nodelet::Nodelet {
  public:
   ~ObstacleNodelet() override {
     diagnostics_.clear();
-    subscribers_.clear();
+    subscribers_.clear();  // no callback any more, hence no task
+    worker_.reset();
   }
 
  private:
   static constexpr size_t kMaxIncomplete = 20;
-  enum Part { kRange, kSigma, kConfidence, kNumParts };
+  static constexpr size_t kMaxWaitingPerCamera = 2;
+  using Task = std::function<void()>;
   struct Camera {
-    std::string topic;
-    std::map<ros::Time, std::array<sensor_msgs::ImageConstPtr, kNumParts>> incomplete;
+    std::unique_ptr<RangeMapReader> reader;  // of the worker's thread
+    std::map<ros::Time, RangeMapParts> incomplete;
     ros::Publisher scan, ground;
   };
 
@@ -58,32 +67,43 @@ class ObstacleNodelet : public nodelet::Nodelet {
     ObstacleMapperOptions options;
     readFieldsFromParameters(private_node, "options", &options);
     private_node.param("odometry_topic", odometry_topic_, odometry_topic_);
+    is_lossless_ = private_node.param("lossless_replay", false);
+    if (is_lossless_) {
+      options.max_wait_s = std::numeric_limits<double>::infinity();
+      options.odometry.history_s = std::numeric_limits<double>::infinity();
+    }
     mapper_ = std::make_unique<ObstacleMapper>(rig_, options,
                                                [this](const ObstacleFrame& frame) { publish(frame); });
+    const std::vector<ObstacleCameraStatus> cameras = mapper_->status();
+    worker_ = std::make_unique<OrderedWorker<Task>>([](const Task& task) { task(); },
+                                                    is_lossless_ ? 0 : kMaxWaitingPerCamera * cameras.size());
     if (options.fixed_frame == FixedFrame::kMap) {
       listener_ = std::make_unique<tf2_ros::TransformListener>(transforms_);
     }
     grid_ = node_.advertise<nav_msgs::OccupancyGrid>("/obstacles/grid", 5, true);
     scan_ = node_.advertise<sensor_msgs::LaserScan>("/obstacles/scan", 10);
     markers_ = node_.advertise<visualization_msgs::MarkerArray>("/obstacles/markers", 5);
+    octomap_ = node_.advertise<octomap_msgs::Octomap>("/obstacles/octomap", 2);
     std::vector<geometry_msgs::TransformStamped> frames;
-    for (const ObstacleCameraStatus& status : mapper_->status()) {
-      addCamera(status.camera_name, &frames);
-      diagnostics_.push_back(
-          std::make_unique<NodeletDiagnostics>(node_, private_node, getName() + "/" + status.camera_name,
-                                               [this, name = status.camera_name] { return report(name); }));
+    for (const ObstacleCameraStatus& camera : cameras) {
+      addCamera(camera.camera_name, &frames);
     }
-    broadcaster_.sendTransform(frames);
-    subscribers_.push_back(node_.subscribe<nav_msgs::Odometry>(
-        odometry_topic_, 500,
-        boost::function<void(const nav_msgs::OdometryConstPtr&)>(
-            [this](const nav_msgs::OdometryConstPtr& message) { addOdometry(message); })));
+    broadcaster_ = std::make_unique<tf2_ros::StaticTransformBroadcaster>();
+    broadcaster_->sendTransform(frames);
+    for (const ObstacleCameraStatus& camera : cameras) {
+      diagnostics_.push_back(
+          std::make_unique<NodeletDiagnostics>(node_, private_node, getName() + "/" + camera.camera_name,
+                                               [this, name = camera.camera_name] { return report(name); }));
+    }
+    subscribe<nav_msgs::Odometry>(
+        odometry_topic_, [this](const nav_msgs::OdometryConstPtr& message) { addOdometry(*message); });
   }
 
   void addCamera(const std::string& name, std::vector<geometry_msgs::TransformStamped>* frames) {
     const size_t index = rig_->cameraIndex(name);
+    const std::string topic = "/dense/" + name + "/range";
     Camera& camera = cameras_[index];
-    camera.topic = "/dense/" + name + "/range";
+    camera.reader = std::make_unique<RangeMapReader>(rig_->cameras[index], topic);
     camera.scan = node_.advertise<sensor_msgs::LaserScan>("/obstacles/" + name + "/scan", 10);
     camera.ground =
         node_.advertise<geometry_msgs::Vector3Stamped>("/obstacles/" + name + "/ground_plane", 10);
@@ -91,43 +111,69 @@ class ObstacleNodelet : public nodelet::Nodelet {
     origin.z() = 0.0;
     frames->push_back(toTransformStamped(RigidTransform(Eigen::Quaterniond::Identity(), origin), Timestamp(),
                                          rig_->vehicle_frame, "camera_" + name + "_scan"));
-    const char* const parts[kNumParts] = {"image", "standard_deviation", "confidence"};
-    for (int part = 0; part < kNumParts; ++part) {
-      subscribers_.push_back(node_.subscribe<sensor_msgs::Image>(
-          camera.topic + "/" + parts[part], 10,
-          boost::function<void(const sensor_msgs::ImageConstPtr&)>(
-              [this, index, part](const sensor_msgs::ImageConstPtr& message) {
-                guard_.run([&] { addImage(index, part, message); });
-              })));
-    }
+    subscribePart<sensor_msgs::Image>(index, topic + "/image", &RangeMapParts::range);
+    subscribePart<sensor_msgs::Image>(index, topic + "/standard_deviation",
+                                      &RangeMapParts::standard_deviation);
+    subscribePart<sensor_msgs::Image>(index, topic + "/confidence", &RangeMapParts::confidence);
+    subscribePart<sensor_msgs::Image>(index, topic + "/reference", &RangeMapParts::reference);
+    subscribePart<sensor_msgs::CameraInfo>(index, topic + "/camera_info", &RangeMapParts::camera_info);
   }
 
-  void addOdometry(const nav_msgs::OdometryConstPtr& message) {
-    guard_.run([&] {
-      const VehicleOdometry odometry = fromMessage(*message, odometry_topic_, rig_->vehicle_frame);
-      const std::lock_guard<std::mutex> lock(mutex_);
-      if (listener_ && transforms_.canTransform("map", "odom", ros::Time(0))) {
-        mapper_->setMapFromOdom(
-            fromMessage(transforms_.lookupTransform("map", "odom", ros::Time(0)).transform, "/tf"));
+  template <class Message>
+  void subscribe(const std::string& topic,
+                 std::function<void(const boost::shared_ptr<const Message>&)> callback) {
+    constexpr uint32_t kQueueSize = 500;
+    subscribers_.push_back(
+        node_.subscribe<Message>(topic, is_lossless_ ? 0 : kQueueSize,
+                                 boost::function<void(const boost::shared_ptr<const Message>&)>(
+                                     [this, callback](const boost::shared_ptr<const Message>& message) {
+                                       guard_.run([&] { callback(message); });
+                                     })));
+  }
+
+  template <class Message>
+  void subscribePart(size_t index, const std::string& topic,
+                     boost::shared_ptr<const Message> RangeMapParts::*part) {
+    subscribe<Message>(topic, [this, index, part](const boost::shared_ptr<const Message>& message) {
+      auto& incomplete = cameras_.at(index).incomplete;
+      RangeMapParts& parts = incomplete[message->header.stamp];
+      parts.*part = message;
+      if (parts.complete()) {
+        addTask([this, index, complete = parts] { addRangeMap(index, complete); }, true);
+        incomplete.erase(message->header.stamp);
       }
-      mapper_->addOdometry(odometry);
+      while (incomplete.size() > kMaxIncomplete) {
+        incomplete.erase(incomplete.begin());
+      }
     });
   }
 
-  void addImage(size_t index, int part, const sensor_msgs::ImageConstPtr& message) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    Camera& camera = cameras_.at(index);
-    auto& images = camera.incomplete[message->header.stamp];
-    images[static_cast<size_t>(part)] = message;
-    if (images[kRange] && images[kSigma] && images[kConfidence]) {
-      const auto complete = images;  // erased also when one of them turns out to be bad
-      camera.incomplete.erase(message->header.stamp);
-      mapper_->addRangeMap(toRangeMap(complete[kRange], complete[kSigma], complete[kConfidence],
-                                      rig_->cameras[index], camera.topic));
-    }
-    while (camera.incomplete.size() > kMaxIncomplete) {
-      camera.incomplete.erase(camera.incomplete.begin());
-    }
+  void addTask(Task task, bool is_droppable) {
+    worker_->push(
+        [this, task = std::move(task)] {
+          guard_.run([&] {
+            const std::lock_guard<std::mutex> lock(mutex_);
+            task();
+          });
+        },
+        is_droppable);
+  }
+
+  void addOdometry(const nav_msgs::Odometry& message) {
+    const VehicleOdometry odometry = fromMessage(message, odometry_topic_, rig_->vehicle_frame);
+    addTask(
+        [this, odometry] {
+          if (listener_ && transforms_.canTransform("map", "odom", ros::Time(0))) {
+            mapper_->setMapFromOdom(
+                fromMessage(transforms_.lookupTransform("map", "odom", ros::Time(0)).transform, "/tf"));
+          }
+          mapper_->addOdometry(odometry);
+        },
+        false);
+  }
+
+  void addRangeMap(size_t index, const RangeMapParts& parts) {
+    mapper_->addRangeMap(cameras_.at(index).reader->read(parts));
   }
 
   void publish(const ObstacleFrame& frame) {
@@ -135,6 +181,9 @@ class ObstacleNodelet : public nodelet::Nodelet {
     scan_.publish(toMessage(frame.scan, rig_->vehicle_frame));
     if (markers_.getNumSubscribers() > 0) {
       markers_.publish(toMarkers(frame.map));
+    }
+    if (octomap_.getNumSubscribers() > 0) {
+      octomap_.publish(toMessage(*toOctree(frame.map), frame.map.frame_id, frame.map.stamp));
     }
     for (const CameraObstacles& seen : frame.cameras) {
       const Camera& camera = cameras_.at(rig_->cameraIndex(seen.camera_name));
@@ -158,6 +207,8 @@ class ObstacleNodelet : public nodelet::Nodelet {
                        {"range_maps", std::to_string(status.range_maps)},
                        {"without_pose", std::to_string(status.without_pose)},
                        {"late", std::to_string(status.late)},
+                       {"waiting_stamps", std::to_string(mapper_->numWaiting())},
+                       {"dropped_of_all_cameras", std::to_string(worker_->numDropped())},
                        {"odometry_jumps", std::to_string(mapper_->numJumps())},
                        {"ground", toString(status.ground.state)},
                        {"pitch_rad", toText(status.ground.pitch_rad(), 4)},
@@ -174,16 +225,18 @@ class ObstacleNodelet : public nodelet::Nodelet {
 
   ros::NodeHandle node_;
   std::string odometry_topic_ = "/odom";
+  bool is_lossless_ = false;
   std::shared_ptr<const CameraRig> rig_;
   CallbackGuard guard_{"obstacles"};
-  std::mutex mutex_;  // of the mapper and the cameras' parts
+  std::mutex mutex_;  // of the mapper: diagnostics have another thread
   std::unique_ptr<ObstacleMapper> mapper_;
   std::map<size_t, Camera> cameras_;
   std::map<std::string, uint64_t> reported_failures_;
   tf2_ros::Buffer transforms_;
   std::unique_ptr<tf2_ros::TransformListener> listener_;
-  tf2_ros::StaticTransformBroadcaster broadcaster_;
-  ros::Publisher grid_, scan_, markers_;
+  std::unique_ptr<tf2_ros::StaticTransformBroadcaster> broadcaster_;
+  ros::Publisher grid_, scan_, markers_, octomap_;
+  std::unique_ptr<OrderedWorker<Task>> worker_;
   std::vector<ros::Subscriber> subscribers_;
   std::vector<std::unique_ptr<NodeletDiagnostics>> diagnostics_;
 };

@@ -53,6 +53,7 @@ PolarObstacle refine(int ray, const std::vector<PolarPoint>& points, double supp
   for (const PolarPoint& point : points) {
     heights.push_back(point.height_m);
   }
+  obstacle.bottom_m = quantile(heights, 1.0 - kTopShare);
   obstacle.height_m = quantile(std::move(heights), kTopShare);
   obstacle.height_sigma_m = medianOf(points, &PolarPoint::height_sigma_m);
   return obstacle;

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include <yaml-cpp/yaml.h>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "float_tiff.h"
@@ -48,6 +49,15 @@ void writeRangeMap(const RangeMap& map, const std::string& folder) {
   writeFloatTiff(map.range_m, stem + "_range.tiff");
   writeFloatTiff(map.standard_deviation_m, stem + "_sigma.tiff");
   writeFloatTiff(map.confidence, stem + "_confidence.tiff");
+  const std::string reference = stem + "_reference.png";
+  fs::remove(reference, ignored);
+  if (!map.reference.empty()) {
+    check(map.reference.type() == CV_8UC1 && map.reference.size() == map.range_m.size(),
+          "writeRangeMap: expected a CV_8UC1 reference of the ranges' size");
+    if (!cv::imwrite(reference, map.reference)) {
+      throw InputError(reference + ": cannot be written");
+    }
+  }
 
   ContentHasher hasher;
   addToHash(map, &hasher);
@@ -114,9 +124,17 @@ RangeMap readRangeMap(const std::string& folder, const std::string& camera_name,
                MeiCamera(parameters),
                readFloatTiff(stem + "_range.tiff"),
                readFloatTiff(stem + "_sigma.tiff"),
-               readFloatTiff(stem + "_confidence.tiff")};
+               readFloatTiff(stem + "_confidence.tiff"),
+               {}};
   if (map.standard_deviation_m.size() != map.range_m.size() || map.confidence.size() != map.range_m.size()) {
     throw InputError(stem + "_{range,sigma,confidence}.tiff: expected images of one size");
+  }
+  const std::string reference = stem + "_reference.png";
+  if (fs::exists(reference)) {
+    map.reference = cv::imread(reference, cv::IMREAD_UNCHANGED);
+    if (map.reference.type() != CV_8UC1 || map.reference.size() != map.range_m.size()) {
+      throw InputError(reference + ": expected an 8-bit gray image of the ranges' size");
+    }
   }
   return map;
 }

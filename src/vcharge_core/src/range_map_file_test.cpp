@@ -53,6 +53,20 @@ TEST_F(RangeMapFileTest, SurvivesWritingAndReadingExactly) {
   EXPECT_EQ(hashOf(readRangeMap(folder_, "left", map.stamp)), hashOf(map));
 }
 
+TEST_F(RangeMapFileTest, KeepsTheReferenceWhereThereIsOne) {
+  RangeMap map = makeMap(1);
+  map.reference = cv::Mat(20, 32, CV_8UC1, cv::Scalar(7));
+  map.reference.at<uint8_t>(3, 5) = 201;
+  writeRangeMap(map, folder_);
+  const RangeMap read = readRangeMap(folder_, "left", map.stamp);
+  ASSERT_EQ(read.reference.size(), map.reference.size());
+  EXPECT_EQ(cv::countNonZero(read.reference != map.reference), 0);
+  writeRangeMap(makeMap(1), folder_);  // replaced by one without
+  EXPECT_TRUE(readRangeMap(folder_, "left", map.stamp).reference.empty());
+  map.reference = cv::Mat(10, 32, CV_8UC1, cv::Scalar(7));
+  EXPECT_THROW(writeRangeMap(map, folder_), std::logic_error);
+}
+
 TEST_F(RangeMapFileTest, HashFollowsEveryPixel) {
   const RangeMap map = makeMap(1);
   RangeMap other = makeMap(1);

@@ -71,6 +71,9 @@ RangeMapMessages RangeMapConverter::convert(const RangeMap& map, const cv::Mat& 
   messages.range = toImageMessage(map.range_m, map.stamp, map.frame_id);
   messages.confidence = toImageMessage(map.confidence, map.stamp, map.frame_id);
   messages.standard_deviation = toImageMessage(map.standard_deviation_m, map.stamp, map.frame_id);
+  if (!gray.empty()) {
+    messages.reference = toImageMessage(gray, map.stamp, map.frame_id);
+  }
   messages.camera_info = boost::make_shared<sensor_msgs::CameraInfo>(camera_info_);
   messages.camera_info->header.stamp = fromTimestamp(map.stamp);
   messages.camera_info->header.frame_id = map.frame_id;

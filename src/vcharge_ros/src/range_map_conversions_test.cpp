@@ -66,6 +66,10 @@ TEST(RangeMapConverterTest, TakesIntensityFromTheImage) {
   const RangeMapMessages messages = converter.convert(map, gray);
   ASSERT_EQ(messages.points->width, 1u);
   EXPECT_EQ(pointAt(*messages.points, 0)[3], 201.0f);
+  ASSERT_TRUE(messages.reference);
+  EXPECT_EQ(messages.reference->encoding, "mono8");
+  EXPECT_EQ(messages.reference->data[3 * 16 + 5], 201);
+  EXPECT_EQ(toTimestamp(messages.reference->header.stamp), map.stamp);
   Eigen::Vector3d ray;
   ASSERT_TRUE(map.camera.unproject(Eigen::Vector2d(5, 3), &ray));
   EXPECT_NEAR(pointAt(*messages.points, 0)[0], 2.0 * ray.x(), 1e-6);
@@ -76,6 +80,7 @@ TEST(RangeMapConverterTest, StampsAndFramesAllAlike) {
   const RangeMap map = makeWall(cv::Size(64, 40));
   RangeMapConverter converter(3.2);
   const RangeMapMessages messages = converter.convert(map, cv::Mat());
+  EXPECT_FALSE(messages.reference);
   for (const std_msgs::Header& header :
        {messages.range->header, messages.confidence->header, messages.standard_deviation->header,
         messages.camera_info->header, messages.points->header}) {

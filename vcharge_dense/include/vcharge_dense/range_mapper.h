@@ -126,7 +126,7 @@ class RangeMapper : public DriveConsumer {
   /// Hands out what still waits for later images: the drive is over.
   void finish();
 
-  /// Thread safe. camera_name and frame_id of the map are those of the rig.
+  /// Thread safe. camera_name and frame_id of the map are those of the rig; its reference is the task's.
   RangeMap sweep(const RangeTask& task) const;
 
   /// Of the cameras in use, in the rig's order.

@@ -11,20 +11,27 @@
 namespace vcharge {
 
 struct CellLook;
+class CellLooker;
 
 /// Options of LocalObstacleMap.
 struct LocalObstacleMapOptions {
   double cell_size_m = 0.1;
-  double half_size_m = 10.0;        ///< the map reaches so far from the vehicle, along both axes
-  double free_range_m = 7.0;        ///< from the camera; ground further away is not cleared
-  double occupied_range_m = 9.0;    ///< from the camera; obstacles further away are too uncertain
-  double occupied_log_odds = 0.9;   ///< of a look with full support whose sigma is small to the cell
-  double free_log_odds = 0.6;       ///< of a look at which all of the cell's pixels lie on the ground
-  double min_free_share = 0.4;      ///< of a cell's pixels that lie on the ground, for any evidence
-  double min_hidden_share = 0.5;    ///< of a cell's pixels that show something else, to doubt that it is free
-  double doubt = 0.5;               ///< what such a look leaves of the log-odds of a free cell
-  double unknown_doubt = 0.7;       ///< and one that shows nothing, aside of the direction of travel
-  double blind_angle_rad = 0.35;    ///< so near to the direction of travel nothing is to be expected
+  double half_size_m = 10.0;       ///< the map reaches so far from the vehicle, along both axes
+  double free_range_m = 7.0;       ///< from the camera; ground further away is not cleared
+  double occupied_range_m = 9.0;   ///< from the camera; obstacles further away are too uncertain
+  double occupied_log_odds = 0.6;  ///< of a look with full support whose sigma is small to the cell
+  double free_log_odds = 0.6;      ///< of a look at which all of the cell's pixels lie on the ground
+  double min_free_share = 0.4;     ///< of a cell's pixels that lie on the ground, for any evidence
+  double min_hidden_share = 0.5;   ///< of a cell's pixels that show something else, to doubt that it is free
+  double doubt = 0.5;              ///< what such a look leaves of the log-odds of a free cell
+  double unknown_doubt = 0.7;      ///< and one that shows nothing, aside of the direction of travel
+  double min_changed_share = 0.4;  ///< of a cell's pixels that look otherwise than before, to take it back
+  double changed_margin_m = 0.4;   ///< around such cells nothing is free: who moves is wider than his feet
+  double changed_hold_s = 0.3;     ///< and for so long nothing becomes free
+  double blind_angle_rad = 0.35;   ///< so near to the direction of travel nothing is to be expected
+  /// Of a camera's motion across its ray to an obstacle, relative to the motion along it: an error of the
+  /// range where stereo sees little parallax.
+  double parallax_sigma = 0.005;
   double look_distance_m = 0.1;     ///< looks of a camera that moved less share their errors: weigh less
   double occupied_threshold = 1.5;  ///< log-odds from which on a cell is occupied
   double free_threshold = -1.0;     ///< and up to which it is free
@@ -48,7 +55,11 @@ struct LocalObstacleMapOptions {
     visit("min_hidden_share", min_hidden_share);
     visit("doubt", doubt);
     visit("unknown_doubt", unknown_doubt);
+    visit("min_changed_share", min_changed_share);
+    visit("changed_margin_m", changed_margin_m);
+    visit("changed_hold_s", changed_hold_s);
     visit("blind_angle_rad", blind_angle_rad);
+    visit("parallax_sigma", parallax_sigma);
     visit("look_distance_m", look_distance_m);
     visit("occupied_threshold", occupied_threshold);
     visit("free_threshold", free_threshold);
@@ -99,13 +110,17 @@ class LocalObstacleMap {
     float sigma_m = 0.0F;
     float height_m = 0.0F;
     float height_sigma_m = 0.0F;
-    float travel_m = 0.0F;          // distance driven when it was last seen
-    int64_t last_seen_ns = kNever;  // INT64_MIN: never
+    float travel_m = 0.0F;           // distance driven when it was last seen
+    int64_t last_seen_ns = kNever;   // INT64_MIN: never
+    int64_t held_until_ns = kNever;  // not free before
   };
+  /// What a camera says about the ground of one cell.
+  struct GroundLook;
   /// A look at an obstacle, in the fixed frame.
   struct Look {
     Eigen::Vector2d point_m;
     double mass;
+    double sigma_m;  // along the ray
     const PolarObstacle* obstacle;
   };
   static constexpr int64_t kNever = INT64_MIN;
@@ -120,10 +135,15 @@ class LocalObstacleMap {
   double weightOf(const CameraObstacles& seen, const RigidTransform& fixed_from_vehicle);
   void addGround(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle,
                  double weight);
+  std::vector<GroundLook> lookAtGround(const CameraObstacles& seen, const CellLooker& looker,
+                                       const PolarGrid& grid, const RigidTransform& fixed_from_vehicle) const;
+  void holdChanged(const std::vector<GroundLook>& looks, Timestamp stamp);
+  void hold(int64_t x, int64_t y, double radius_m, Timestamp stamp);
   void addGroundLook(const CellLook& look, double weight, Timestamp stamp, Cell* cell) const;
   void addOccupied(const CameraObstacles& seen, const PolarGrid& grid,
                    const RigidTransform& fixed_from_vehicle, double weight);
   void addLook(const Look& look, Timestamp stamp);
+  double parallaxSigma_m(double range_m, const Eigen::Vector2d& direction) const;
   int8_t stateOf(const Cell& cell) const;
 
   LocalObstacleMapOptions options_;

@@ -30,6 +30,10 @@ struct ObstacleDetectorOptions {
   double min_ratio = 0.4;           ///< obstacle points over all points of the cell
   double min_separation_m = 0.4;    ///< between two obstacles on one ray
   int max_obstacles_per_ray = 3;
+  /// What is seen further from the optical axis than this, from above, and is not near, hides ground but
+  /// marks no obstacle in the map: there the lens resolves little, and another camera sees better.
+  double max_off_axis_rad = 1.1;
+  double max_off_axis_range_m = 2.5;
   double sure_ground_sigmas = 1.0;  ///< a ground point lies so far below min_height_m
   double below_ground_m = 0.08;     ///< deeper points are wrong ranges, not ground
   /// Where the ground is not known, an obstacle rises above all that a tilt of this size explains.
@@ -55,6 +59,8 @@ struct ObstacleDetectorOptions {
     visit("min_ratio", min_ratio);
     visit("min_separation_m", min_separation_m);
     visit("max_obstacles_per_ray", max_obstacles_per_ray);
+    visit("max_off_axis_rad", max_off_axis_rad);
+    visit("max_off_axis_range_m", max_off_axis_range_m);
     visit("sure_ground_sigmas", sure_ground_sigmas);
     visit("below_ground_m", below_ground_m);
     visit("lost_ground_tilt_rad", lost_ground_tilt_rad);
@@ -72,7 +78,9 @@ struct PolarObstacle {
   double range_sigma_m = 0.0;
   double height_m = 0.0;  ///< of its highest part that was seen
   double height_sigma_m = 0.0;
-  double support = 0.0;  ///< its points over those of the reference obstacle, at most 1
+  double bottom_m = 0.0;     ///< height of its lowest part that was seen
+  bool is_off_axis = false;  ///< beyond max_off_axis_rad and max_off_axis_range_m
+  double support = 0.0;      ///< its points over those of the reference obstacle, at most 1
 };
 
 /// What one range map says about the ground around the camera.
@@ -92,6 +100,9 @@ struct CameraObstacles {
   std::vector<float> hidden_share;
   /// Share of the pixels that would show a cell's ground and show nothing, by PolarGrid::index.
   std::vector<float> unknown_share;
+  /// Share of the pixels that would show a cell's ground and look otherwise than it looked before, by
+  /// PolarGrid::index; empty where there was nothing to compare with. GroundWatch's, not the detector's.
+  std::vector<float> changed_share;
   /// Share of a cell's points that rise above the ground, by PolarGrid::index; NaN without points.
   std::vector<float> occupied_share;
   ObstacleScan scan;  ///< the first obstacle on each ray

@@ -11,6 +11,7 @@
 #include "vcharge_core/camera_rig.h"
 #include "vcharge_core/range_map.h"
 #include "vcharge_core/vehicle_odometry.h"
+#include "vcharge_obstacles/ground_watch.h"
 #include "vcharge_obstacles/local_obstacle_map.h"
 #include "vcharge_obstacles/obstacle_detector.h"
 
@@ -28,6 +29,7 @@ struct ObstacleMapperOptions {
   std::vector<std::string> cameras;  ///< of the rig, by name; empty: all
   FixedFrame fixed_frame = FixedFrame::kOdom;
   ObstacleDetectorOptions detector;
+  GroundWatchOptions watch;
   LocalObstacleMapOptions map;
   OdometryBufferOptions odometry;
   double max_wait_s = 0.15;      ///< for a camera's range map of a stamp that others have delivered
@@ -44,6 +46,7 @@ struct ObstacleMapperOptions {
     visit("cameras", cameras);
     visit("fixed_frame", fixed_frame);
     visit("detector", detector);
+    visit("watch", watch);
     visit("map", map);
     visit("odometry", odometry);
     visit("max_wait_s", max_wait_s);
@@ -61,6 +64,7 @@ struct ObstacleMapperOptions {
 /// What a camera adds to the map at present.
 enum class ObstacleCameraState {
   kNoRangeMaps,   ///< none yet, or they stopped while the vehicle drives
+  kNoPose,        ///< range maps come, but there is no odometry at their stamps
   kStanding,      ///< the vehicle stands: motion stereo sees nothing
   kHardlySees,    ///< few ranges: night, dirt, no texture
   kGroundLost,    ///< the ground is tilted beyond the bounds: nothing is cleared
@@ -80,7 +84,8 @@ struct ObstacleCameraStatus {
   uint64_t late = 0;  ///< came after their stamp had been fused, and were left out
 };
 
-/// The map after all range maps of one stamp, or, where none come, from time to time.
+/// The map after all range maps of one stamp; where none come, from time to time; empty, where odometry
+/// jumped.
 struct ObstacleFrame {
   ObstacleMap map;
   ObstacleScan scan;                     ///< of the fused map
@@ -89,7 +94,8 @@ struct ObstacleFrame {
 };
 
 /// Turns range maps and odometry into obstacle maps: one front for the nodelet and the offline tool. Range
-/// maps of one stamp are fused together, in the rig's order. Not thread safe.
+/// maps of one stamp are fused together, in the rig's order, once odometry has come to it; no more
+/// than 25 stamps wait for odometry, or for a camera. Not thread safe.
 class ObstacleMapper {
  public:
   using FrameCallback = std::function<void(const ObstacleFrame&)>;
@@ -112,24 +118,33 @@ class ObstacleMapper {
   std::vector<ObstacleCameraStatus> status() const;
   /// How often odometry jumped, and the map was emptied for it.
   uint64_t numJumps() const { return num_jumps_; }
+  /// Stamps whose range maps wait for others, or for odometry.
+  size_t numWaiting() const { return waiting_.size(); }
   const PolarGrid& grid() const { return grid_; }
   const ObstacleMapperOptions& options() const { return options_; }
 
  private:
   struct Camera;
+  struct Look {
+    CameraObstacles seen;
+    cv::Mat reference;  // the image, where the range map brought it
+  };
   struct Group {  // range maps of one stamp, by camera
-    std::map<size_t, CameraObstacles> cameras;
+    std::map<size_t, Look> cameras;
   };
 
   std::optional<RigidTransform> fixedFromVehicle(Timestamp stamp) const;
   void watchForJumps(const VehicleOdometry& odometry);
   bool isComplete(Timestamp stamp) const;
   void fuseWaiting(bool all);
-  void fuse(Timestamp stamp, const Group& group, const RigidTransform& fixed_from_vehicle);
-  void emit(const std::vector<const CameraObstacles*>& cameras);
+  void fuse(Timestamp stamp, Group* group, const RigidTransform& fixed_from_vehicle);
+  void loseFirstWaiting();
+  void emit(const LocalObstacleMap& map, const std::vector<const CameraObstacles*>& cameras);
+  void emitAt(Timestamp stamp);
   void emitWhenSilent(const VehicleOdometry& odometry);
   void updateStatus(Camera* camera, const CameraObstacles& seen) const;
   void startOver();
+  void jump(Timestamp stamp);
 
   const std::shared_ptr<const CameraRig> rig_;
   const ObstacleMapperOptions options_;
@@ -139,7 +154,7 @@ class ObstacleMapper {
   OdometryBuffer poses_;
   LocalObstacleMap map_;
   std::map<Timestamp, Group> waiting_;
-  std::optional<Timestamp> last_fused_, last_emitted_;
+  std::optional<Timestamp> last_fused_, last_emitted_, last_jump_;
   std::optional<VehicleOdometry> last_odometry_;
   std::optional<Eigen::Vector3d> last_velocity_;  // x, y, yaw per second
   RigidTransform map_from_odom_, anchor_;

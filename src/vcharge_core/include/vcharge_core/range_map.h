@@ -10,7 +10,8 @@
 
 namespace vcharge {
 
-/// Distance along the ray of each pixel of a working camera. All three images have one size and are CV_32FC1.
+/// Distance along the ray of each pixel of a working camera. The first three images have one size and are
+/// CV_32FC1.
 struct RangeMap {
   Timestamp stamp;
   std::string camera_name;
@@ -19,9 +20,10 @@ struct RangeMap {
   cv::Mat range_m;               ///< metres along the ray (not depth along the axis); NaN where unknown
   cv::Mat standard_deviation_m;  ///< one sigma of range_m; NaN where unknown
   cv::Mat confidence;            ///< 0 (no support) to 1; 0 where unknown
+  cv::Mat reference;             ///< CV_8UC1 of that size: what the camera saw; empty where it is not kept
 };
 
-/// Adds stamp, camera and all pixels; every NaN counts the same.
+/// Adds stamp, camera and all pixels but the reference's; every NaN counts the same.
 void addToHash(const RangeMap& map, ContentHasher* hasher);
 
 }  // namespace vcharge

@@ -16,6 +16,7 @@ struct RangeMapMessages {
   sensor_msgs::ImagePtr range;               ///< 32FC1, metres along the ray, NaN unknown
   sensor_msgs::ImagePtr confidence;          ///< 32FC1
   sensor_msgs::ImagePtr standard_deviation;  ///< 32FC1, metres
+  sensor_msgs::ImagePtr reference;           ///< mono8: what the camera saw; null where that is not given
   sensor_msgs::CameraInfoPtr camera_info;    ///< equidistant fit of the working camera
   sensor_msgs::PointCloud2Ptr
       points;  ///< x, y, z (metres) and intensity (0..255), FLOAT32, known ranges only

@@ -1,0 +1,357 @@
+#!/usr/bin/env python3
+"""The obstacle nodelet on a simulated drive: it equals the offline tool and the truth, and outlives bad input."""
+import copy
+import csv
+import math
+import os
+import sys
+import threading
+import time
+import unittest
+
+import cv2
+import numpy as np
+import rospy
+import rostest
+import yaml
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Vector3Stamped
+from nav_msgs.msg import OccupancyGrid, Odometry
+from octomap_msgs.msg import Octomap
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import CameraInfo, Image, LaserScan
+from visualization_msgs.msg import MarkerArray
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from drive_fixture import CAMERAS, Drive, run, tool  # noqa: E402
+from nodelet_fixture import drive_publishers, manager_services, reach, wait_for, wait_until_gone  # noqa: E402
+
+PARTS = {"image": Image, "standard_deviation": Image, "confidence": Image, "reference": Image, "camera_info": CameraInfo}
+FREE, OCCUPIED, UNOBSERVED = 0, 100, -1
+MAX_WAITING = 25  # stamps of range maps that wait for odometry
+
+
+def cells_of(grid):
+    return np.array(grid.data, np.int8).reshape(grid.info.height, grid.info.width)
+
+
+def places_of(grid, state):
+    """Middles of the cells of a state in the fixed frame (N x 2)."""
+    rows, columns = np.nonzero(cells_of(grid) == state)
+    origin = grid.info.origin.position
+    return np.stack([origin.x + (columns + 0.5) * grid.info.resolution,
+                     origin.y + (rows + 0.5) * grid.info.resolution], 1)
+
+
+def moved(message, seconds):
+    """A copy with another stamp."""
+    message = copy.copy(message)
+    message.header = copy.deepcopy(message.header)
+    message.header.stamp = message.header.stamp + rospy.Duration(seconds)
+    return message
+
+
+class ObstacleNodeletTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.drive = Drive(drive="creep", duration_s=4.0, extra=("--scene", "obstacles", "--truth-range"))
+        range_options = {"preset": "fast", "cameras": list(CAMERAS), "working_camera": {"image_scale": 0.5}}
+        options = {"cameras": list(CAMERAS)}
+        cls.offline = cls.drive.folder / "offline"
+        status, output, errors = run([
+            tool("vcharge_obstacles", "detect_obstacles"), "--bag", cls.drive.bag, "--rig", cls.drive.rig,
+            "--options", cls.drive.write_text("obstacles.yaml", yaml.safe_dump(options)),
+            "--range-options", cls.drive.write_text("dense.yaml", yaml.safe_dump(range_options)),
+            "--output", cls.offline])
+        if status != 0:
+            raise RuntimeError(f"detect_obstacles failed: {output} {errors}")
+        cls.load, cls.unload, cls.list = manager_services()
+        rospy.set_param("/depth", {"rig": str(cls.drive.rig), "lossless_replay": True, "options": range_options})
+        rospy.set_param("/obstacles", {"rig": str(cls.drive.rig), "lossless_replay": True, "options": options})
+        cls.messages = cls.record_range_maps()
+        cls.publishers = {topic: rospy.Publisher(topic, type(message), queue_size=10000)
+                          for topic, message in {topic: message for topic, message in cls.messages}.items()}
+        cls.received, cls.status, cls.told, cls.log = {}, {}, [], []
+        topics = {"/obstacles/grid": OccupancyGrid, "/obstacles/scan": LaserScan, "/obstacles/markers": MarkerArray,
+                  "/obstacles/octomap": Octomap}
+        for camera in CAMERAS:
+            topics[f"/obstacles/{camera}/scan"] = LaserScan
+            topics[f"/obstacles/{camera}/ground_plane"] = Vector3Stamped
+
+        def keep(topic):
+            return lambda message: cls.received.setdefault(topic, []).append(message)
+
+        cls.subscribers = [rospy.Subscriber(topic, kind, keep(topic), queue_size=1000) for topic, kind in topics.items()]
+        cls.topics = topics
+        cls.subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, cls.keep_diagnostics))
+        rospy.Subscriber("/rosout", Log, lambda message: cls.log.append(message.msg), queue_size=1000)
+
+    @classmethod
+    def record_range_maps(cls):
+        """The drive's odometry and what the depth nodelet makes of its images, by stamp."""
+        recorded = []
+        subscribers = [
+            rospy.Subscriber(f"/dense/{camera}/range/{part}", kind,
+                             lambda message, topic=f"/dense/{camera}/range/{part}": recorded.append((topic, message)),
+                             queue_size=1000)
+            for camera in CAMERAS for part, kind in PARTS.items()]
+        reached = set()
+
+        def hear(message):
+            for status in message.status:
+                reached.update(value.key for value in status.values if ", 0 bad" not in value.value)
+
+        subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, hear))
+        publishers = drive_publishers(CAMERAS)
+        if not cls.load("/depth", "vcharge_dense/depth_nodelet", [], [], [], "").success:
+            raise RuntimeError("the depth nodelet does not load")
+        reach(publishers, lambda: reached)
+        drive = [(topic, message) for topic, message in cls.drive.messages()
+                 if topic == "/odom" or topic.endswith("/image_raw")]
+        for topic, message in drive:
+            publishers[topic].publish(message)
+            time.sleep(0.002)
+        stamps = sorted(int(path.stem) for path in cls.offline.glob("*.yaml"))
+        wait_for(lambda: len(recorded) >= len(PARTS) * len(CAMERAS) * (len(stamps) - 3), "range maps", 150.0)
+        time.sleep(2.0)
+        cls.unload("/depth")
+        for connection in [*subscribers, *publishers.values()]:
+            connection.unregister()
+        odometry = [(topic, message) for topic, message in drive if topic == "/odom"]
+        return sorted(odometry + recorded, key=lambda entry: entry[1].header.stamp.to_nsec())
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.drive.remove()
+
+    @classmethod
+    def keep_diagnostics(cls, message):
+        for status in message.status:
+            cls.status[status.name] = {value.key: value.value for value in status.values}
+            cls.told.append(status.message)
+
+    def setUp(self):
+        self.load_obstacles()
+
+    def tearDown(self):
+        self.unload_obstacles()
+        self.assertNotIn("/obstacles", self.list().nodelets, "the manager outlives the nodelet")
+
+    def load_obstacles(self):
+        self.assertTrue(self.load("/obstacles", "vcharge_obstacles/obstacle_nodelet", [], [], [], "").success)
+        wait_for(lambda: all(publisher.get_num_connections() > 0 for publisher in self.publishers.values()),
+                 "the nodelet to subscribe")
+        self.reach()
+
+    def unload_obstacles(self):
+        self.assertTrue(self.unload("/obstacles").success)
+        wait_until_gone("/manager", self.subscribers)
+
+    def reach(self):
+        """Until the nodelet tells of odometry without a stamp, and all else is connected."""
+        self.told.clear()
+
+        def heard():
+            self.publishers["/odom"].publish(Odometry())
+            time.sleep(0.3)
+            return any("/odom" in text for text in list(self.told))
+        wait_for(heard, "the nodelet to hear /odom")
+        self.clear()
+
+    def clear(self):
+        for messages in self.received.values():
+            messages.clear()
+        self.told.clear()
+        self.log.clear()
+
+    def publish(self, change=lambda topic, message: message, from_share=0.0, to_share=1.0):
+        messages = self.messages[int(from_share * len(self.messages)):int(to_share * len(self.messages))]
+        for topic, message in messages:
+            changed = change(topic, message)
+            if changed is not None:
+                self.publishers[topic].publish(changed)
+                time.sleep(0.001)
+        return messages
+
+    def grids(self):
+        return list(self.received.get("/obstacles/grid", []))
+
+    def offline_stamps(self):
+        return sorted(int(path.stem) for path in self.offline.glob("*.yaml"))
+
+    def wait_for_message(self, *words):
+        wait_for(lambda: any(all(word in text for word in words) for text in list(self.told)), f"a diagnostic with {words}")
+
+    def expect_recovery(self):
+        """A good drive after whatever came before gives a map."""
+        self.clear()
+        self.publish()
+        wait_for(lambda: len(self.grids()) >= len(self.offline_stamps()) - 3, "maps of a good drive")
+        self.assertGreater(len(places_of(self.grids()[-1], FREE)), 300)
+
+    def test_equals_the_offline_tool_and_the_truth(self):
+        self.publish()
+        stamps = self.offline_stamps()
+        self.assertGreater(len(stamps), 30)
+        wait_for(lambda: len(self.grids()) >= len(stamps) - 3, "grids")
+        for topic in self.topics:
+            wait_for(lambda t=topic: self.received.get(t), topic)
+        grids = {grid.header.stamp.to_nsec(): grid for grid in self.grids()}
+        scans = {scan.header.stamp.to_nsec(): scan for scan in self.received["/obstacles/scan"]}
+        compared = 0
+        for stamp in stamps:
+            if stamp not in grids or stamp not in scans:
+                continue
+            compared += 1
+            pixels = cv2.imread(str(self.offline / f"{stamp}.pgm"), cv2.IMREAD_UNCHANGED)[::-1]
+            expected = np.select([pixels == 254, pixels == 0], [FREE, OCCUPIED], UNOBSERVED)
+            np.testing.assert_array_equal(cells_of(grids[stamp]), expected)
+            self.compare_scan(scans[stamp], "fused", stamp)
+        self.assertGreaterEqual(compared, len(stamps) - 3)
+        for camera in CAMERAS:
+            scan = self.received[f"/obstacles/{camera}/scan"][-1]
+            self.assertEqual(scan.header.frame_id, f"camera_{camera}_scan")
+            self.compare_scan(scan, camera, scan.header.stamp.to_nsec())
+        self.check_against_truth(grids[max(grids)])
+        self.check_other_outputs()
+
+    def compare_scan(self, scan, name, stamp):
+        with open(self.offline / f"{stamp}_scans.csv") as file:
+            expected = [float(row["range_m"]) for row in csv.DictReader(file) if row["name"] == name]
+        ranges = [math.nan if math.isinf(value) else value for value in scan.ranges]
+        np.testing.assert_allclose(ranges, expected, atol=2e-4)  # the file has four digits
+
+    def check_against_truth(self, grid):
+        """Odometry begins where the drive begins: its frame is the world's, turned and moved."""
+        world_from_odom = self.world_from_odom()
+        meta = yaml.safe_load((self.drive.truth / "height_map.yaml").read_text())
+        heights = cv2.imread(str(self.drive.truth / meta["file"]), cv2.IMREAD_UNCHANGED)
+        near = int(math.ceil(0.2 / meta["cell_size_m"]))
+        highest = cv2.dilate(heights, np.ones((2 * near + 1, 2 * near + 1)))
+        lowest = cv2.erode(heights, np.ones((2 * near + 1, 2 * near + 1)))
+
+        def at(image, places):
+            world = places @ world_from_odom[:, :2].T + world_from_odom[:, 2]
+            cells = np.round((world - meta["origin_m"]) / meta["cell_size_m"]).astype(int)
+            return image[cells[:, 1], cells[:, 0]]
+
+        free, occupied = places_of(grid, FREE), places_of(grid, OCCUPIED)
+        self.assertGreater(len(free), 300)
+        self.assertGreater(len(occupied), 10)
+        self.assertGreaterEqual(np.mean(at(lowest, free) < 0.2), 0.99)
+        self.assertGreaterEqual(np.mean(at(highest, occupied) > 0.08), 0.7)
+
+    def world_from_odom(self):
+        """2 x 3, by the pose at the first image."""
+        truth = np.loadtxt(self.drive.truth / "trajectory.tum")[0]
+        odometry = min((message for topic, message in self.messages if topic == "/odom"),
+                       key=lambda message: abs(message.header.stamp.to_sec() - truth[0])).pose.pose
+        yaw = 2 * math.atan2(truth[6], truth[7]) - 2 * math.atan2(odometry.orientation.z, odometry.orientation.w)
+        rotation = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+        translation = truth[1:3] - rotation @ np.array([odometry.position.x, odometry.position.y])
+        return np.column_stack([rotation, translation])
+
+    def check_other_outputs(self):
+        grid = self.grids()[-1]
+        self.assertEqual(grid.header.frame_id, "odom")
+        octomap = self.received["/obstacles/octomap"][-1]
+        self.assertEqual((octomap.header.frame_id, octomap.id, octomap.binary), ("odom", "OcTree", True))
+        self.assertAlmostEqual(octomap.resolution, grid.info.resolution, places=5)
+        self.assertGreater(len(octomap.data), 100)
+        walls = next(marker for marker in self.received["/obstacles/markers"][-1].markers if marker.ns == "walls")
+        self.assertEqual(walls.header.frame_id, "odom")
+        self.assertGreater(max(point.z for point in walls.points), 0.1)
+        for camera in CAMERAS:
+            planes = np.array([[m.vector.x, m.vector.y, m.vector.z]
+                               for m in self.received[f"/obstacles/{camera}/ground_plane"]])
+            # The ground is level, and the suspension gives way by less than a degree and 3 cm.
+            self.assertLess(np.abs(np.median(planes[:, :2], axis=0)).max(), math.radians(1.0))
+            self.assertLess(abs(np.median(planes[:, 2])), 0.03)
+
+    def test_camera_info_unlike_the_rig_is_refused_with_one_error(self):
+        def other_lens(topic, message):
+            if topic == "/dense/left/range/camera_info":
+                message = copy.deepcopy(message)
+                message.K = [value * 1.1 for value in message.K]
+            return message
+        self.publish(other_lens)
+        self.wait_for_message("/dense/left/range/camera_info", "expected camera 'left' of the rig", "320x200")
+        errors = [text for text in list(self.log) if "expected camera 'left'" in text]
+        self.assertEqual(len(errors), 1, errors)
+        maps = [int(values["range_maps"]) for name, values in self.status.items() if "obstacles/left" in name]
+        self.assertEqual(maps, [0])
+        self.expect_recovery()
+
+    def test_images_of_another_kind_are_refused(self):
+        bad = copy.copy(next(message for topic, message in self.messages if topic == "/dense/left/range/image"))
+        bad.encoding = "mono8"
+        self.publish(lambda topic, message: bad if topic == "/dense/left/range/image" and
+                     message.header.stamp == bad.header.stamp else message)
+        self.wait_for_message("/dense/left/range/image", "32FC1", "mono8")
+        self.expect_recovery()
+
+    def test_jump_of_odometry_empties_the_map_at_once(self):
+        last = self.publish(to_share=0.7)
+        wait_for(lambda: self.grids() and len(places_of(self.grids()[-1], FREE)) > 300, "free ground")
+        odometry = moved([message for topic, message in last if topic == "/odom"][-1], 0.02)
+        odometry.pose = copy.deepcopy(odometry.pose)
+        odometry.pose.pose.position.x += 2.0
+        time.sleep(1.0)
+        self.clear()
+        self.publishers["/odom"].publish(odometry)  # alone: no range map comes with it
+        grid = wait_for(lambda: self.grids() and self.grids()[-1], "the empty map", 5.0)
+        self.assertEqual(grid.header.stamp, odometry.header.stamp)
+        self.assertEqual(np.count_nonzero(cells_of(grid) != UNOBSERVED), 0)
+
+    def test_range_maps_without_odometry_do_not_pile_up(self):
+        left = [(topic, message) for topic, message in self.messages if topic.startswith("/dense/left/range/")]
+        stamps = len(left) // len(PARTS)
+        for repetition in range(3):
+            for topic, message in left:
+                self.publishers[topic].publish(moved(message, 100.0 + 10.0 * repetition))
+                time.sleep(0.002)
+
+        def counts():
+            return next(({key: int(values[key]) for key in ("range_maps", "without_pose", "waiting_stamps")}
+                         for name, values in self.status.items() if "obstacles/left" in name), {})
+        wait_for(lambda: counts().get("range_maps") == 3 * stamps, "the range maps")
+        self.assertGreater(3 * stamps, 2 * MAX_WAITING)
+        self.assertLessEqual(counts()["waiting_stamps"], MAX_WAITING)
+        self.assertEqual(counts()["without_pose"] + counts()["waiting_stamps"], 3 * stamps)
+        self.expect_recovery()
+
+    def test_unloads_and_loads_again_amid_messages(self):
+        stop = threading.Event()
+
+        def play():
+            while not stop.is_set():
+                self.publish(lambda topic, message: None if stop.is_set() else message)
+        player = threading.Thread(target=play)
+        player.start()
+        try:
+            for _ in range(6):
+                time.sleep(0.7)
+                self.unload_obstacles()
+                self.assertTrue(self.load("/obstacles", "vcharge_obstacles/obstacle_nodelet", [], [], [], "").success)
+        finally:
+            stop.set()
+            player.join()
+        self.assertEqual(self.list().nodelets, ["/obstacles"])
+        self.reach()
+        self.expect_recovery()
+
+    def test_nodelet_of_a_loaded_name_is_refused(self):
+        with self.assertRaises(rospy.ServiceException):
+            self.load("/obstacles", "vcharge_obstacles/obstacle_nodelet", [], [], [], "")
+        self.assertEqual(self.list().nodelets, ["/obstacles"])
+
+    def test_nodelet_with_a_bad_rig_does_not_load_and_the_manager_lives_on(self):
+        rospy.set_param("/other/rig", str(self.drive.folder / "no_such_rig.yaml"))
+        with self.assertRaises(rospy.ServiceException):
+            self.load("/other", "vcharge_obstacles/obstacle_nodelet", [], [], [], "")
+        self.assertEqual(self.list().nodelets, ["/obstacles"])
+
+
+if __name__ == "__main__":
+    rospy.init_node("obstacle_nodelet_test")
+    rostest.rosrun("vcharge_tests", "obstacle_nodelet", ObstacleNodeletTest)
