@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "pixel_rays.h"
+#include "vcharge_core/bilinear_sample.h"
 #include "vcharge_core/error.h"
 
 namespace vcharge {
@@ -30,18 +31,6 @@ RigidTransform levelFromBody(const GroundPlane& ground) {
   const Eigen::Quaterniond rotation =
       Eigen::Quaterniond::FromTwoVectors(normal.normalized(), Eigen::Vector3d::UnitZ());
   return RigidTransform(rotation, Eigen::Vector3d(0.0, 0.0, -ground.offset_m / normal.norm()));
-}
-
-float sample(const cv::Mat& image, float u, float v) {
-  const int x = static_cast<int>(u);
-  const int y = static_cast<int>(v);
-  const float a = u - static_cast<float>(x);
-  const float b = v - static_cast<float>(y);
-  const uint8_t* top = image.ptr<uint8_t>(y) + x;
-  const uint8_t* bottom = image.ptr<uint8_t>(y + 1) + x;
-  const float upper = static_cast<float>(top[0]) + a * static_cast<float>(top[1] - top[0]);
-  const float lower = static_cast<float>(bottom[0]) + a * static_cast<float>(bottom[1] - bottom[0]);
-  return upper + b * (lower - upper);
 }
 
 /// What a pixel shows now, and what it would show if it were the ground that was seen before.
@@ -159,7 +148,7 @@ std::vector<Comparison> GroundWatch::Implementation::comparePixels(const View& n
     }
     const float inverse = 1.0F / (range * rays.horizontal[i]);
     pixels.push_back({i, inverse, inverse * height / (height - kLow_m),
-                      static_cast<float>(now.smooth.data[rays.pixel[i]]), sample(before.smooth, u, v),
+                      static_cast<float>(now.smooth.data[rays.pixel[i]]), bilinearSample(before.smooth, u, v),
                       static_cast<float>(before.lowest.data[nearest]),
                       static_cast<float>(before.highest.data[nearest])});
   }

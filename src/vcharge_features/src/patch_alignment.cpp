@@ -5,6 +5,8 @@
 #include <Eigen/SVD>
 #include <cmath>
 
+#include "vcharge_core/bilinear_sample.h"
+
 namespace vcharge {
 namespace {
 
@@ -13,17 +15,6 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 /// Patches of less contrast (standard deviation in gray levels) have no texture.
 constexpr float kMinContrast = 2.0F;
-
-/// Bilinear; the position must be inside.
-float sample(const cv::Mat& image, float x, float y) {
-  const auto column = static_cast<int>(x), row = static_cast<int>(y);
-  const float right = x - static_cast<float>(column), low = y - static_cast<float>(row);
-  const uint8_t* upper = image.ptr<uint8_t>(row) + column;
-  const uint8_t* lower = image.ptr<uint8_t>(row + 1) + column;
-  const float above = static_cast<float>(upper[0]) + right * static_cast<float>(upper[1] - upper[0]);
-  const float below = static_cast<float>(lower[0]) + right * static_cast<float>(lower[1] - lower[0]);
-  return above + low * (below - above);
-}
 
 /// Whether the deformed square of this radius, and a pixel around it, is in the image.
 bool isInside(const cv::Mat& image, const PatchPlace& place, double radius_px) {
@@ -52,8 +43,10 @@ class Alignment {
     for (int i = 0; i < size_; ++i) {
       const Eigen::Vector2f offset = offsetOf(i);
       const Eigen::Vector2f at = anchor_px.cast<float>() + offset;
-      const float by_x = 0.5F * (sample(image, at.x() + 1, at.y()) - sample(image, at.x() - 1, at.y()));
-      const float by_y = 0.5F * (sample(image, at.x(), at.y() + 1) - sample(image, at.x(), at.y() - 1));
+      const float by_x =
+          0.5F * (bilinearSample(image, at.x() + 1, at.y()) - bilinearSample(image, at.x() - 1, at.y()));
+      const float by_y =
+          0.5F * (bilinearSample(image, at.x(), at.y() + 1) - bilinearSample(image, at.x(), at.y() - 1));
       jacobian_.row(i) << by_x, by_y, by_x * offset.x(), by_x * offset.y(), by_y * offset.x(),
           by_y * offset.y();
     }
@@ -117,7 +110,7 @@ class Alignment {
     const Eigen::Vector2f center = place.position_px.cast<float>();
     for (int i = 0; i < size_; ++i) {
       const Eigen::Vector2f at = center + shape * offsetOf(i);
-      patch[i] = sample(image, at.x(), at.y());
+      patch[i] = bilinearSample(image, at.x(), at.y());
     }
     return patch;
   }
