@@ -17,6 +17,9 @@ namespace {
 
 constexpr double kLever_m = 5.0;           // of the points by which poses are laid over each other
 constexpr double kAboveSurface_m = 0.005;  // of the point that is looked for
+constexpr double kFromPlants_m = 0.3;
+constexpr double kKerbTolerance_m = 0.03;
+constexpr double kOverGrass_m = 0.4;
 constexpr double kNotMapped = std::numeric_limits<double>::quiet_NaN();
 
 /// A map read in the world's frame.
@@ -112,8 +115,14 @@ bool isMapped(const MapInWorld& in_world, const HeightStep& step, double beside_
          std::isfinite(in_world.heightAt(step.place_m + beside, step.low_m));
 }
 
-void judgeSteps(const MapInWorld& in_world, const std::vector<HeightStep>& steps,
-                const HeightMapErrorOptions& options, HeightMapErrors* errors) {
+bool isKerb(const HeightStep& step, const HeightMapErrorOptions& options) {
+  const double rise = step.high_m - step.low_m;
+  return step.both_sides_seen && rise >= options.kerb_low_m && rise <= options.kerb_high_m;
+}
+
+void judgeSteps(const MapInWorld& in_world, const SurfaceVisibility& visibility,
+                const std::vector<HeightStep>& steps, const HeightMapErrorOptions& options,
+                HeightMapErrors* errors) {
   std::vector<double> positions, kerbs;
   for (const HeightStep& step : steps) {
     const HeightAt height = [&](const Eigen::Vector2d& place_m) {
@@ -127,14 +136,15 @@ void judgeSteps(const MapInWorld& in_world, const std::vector<HeightStep>& steps
       ++errors->num_steps_found;
       positions.push_back(std::abs(*crossing));
     }
-    const double rise = step.high_m - step.low_m;
-    if (step.both_sides_seen && rise >= options.kerb_low_m && rise <= options.kerb_high_m &&
-        std::isfinite(high - low)) {
-      kerbs.push_back(std::abs(high - low - rise));
+    if (isKerb(step, options) && std::isfinite(high - low)) {
+      const double error = high - low - (step.high_m - step.low_m);
+      const Eigen::Vector2d top = step.place_m + beside;
+      errors->kerbs.push_back(
+          {step.place_m, error, visibility.nearestView({top.x(), top.y(), step.high_m + kAboveSurface_m})});
+      kerbs.push_back(std::abs(error));
     }
   }
   errors->step_position_m = summarize(std::move(positions));
-  errors->num_kerbs = kerbs.size();
   errors->kerb_height_m = summarize(std::move(kerbs));
 }
 
@@ -162,7 +172,6 @@ const HeightStep& stepAt(const std::vector<HeightStep>& steps, const Eigen::Vect
 
 void measure(const MapInWorld& in_world, const std::vector<HeightStep>& steps,
              const HeightMapErrorOptions& options, HeightMapErrors* errors) {
-  errors->measurements = pickMeasurements(steps, options);
   double sum = 0.0;
   size_t shown = 0;
   for (TapeMeasurement& measurement : errors->measurements) {
@@ -203,6 +212,22 @@ void HeightMapErrorOptions::validate() const {
   requireField(max_length_m > min_length_m, "max_length_m", "must be above min_length_m", max_length_m);
 }
 
+IsRigid rigidBy(const std::vector<TruthObstacle>& obstacles) {
+  return [obstacles](const Eigen::Vector2d& place_m, double high_m) {
+    return std::all_of(obstacles.begin(), obstacles.end(), [&](const TruthObstacle& obstacle) {
+      const double distance = distanceToPolygon(place_m, obstacle.footprint_m);
+      const bool is_plant = obstacle.kind == "tree" || obstacle.kind == "bush" || obstacle.kind == "hedge";
+      if (is_plant) {
+        return distance > kFromPlants_m;
+      }
+      // What is lower or a little higher than a kerb, on its island, is grass.
+      const double over_kerb = high_m - obstacle.top_z_m;
+      return obstacle.kind != "kerb" || distance > 0.0 || std::abs(over_kerb) < kKerbTolerance_m ||
+             over_kerb > kOverGrass_m;
+    });
+  };
+}
+
 RigidTransform alignToTruth(const Trajectory& estimate, const Trajectory& truth) {
   const AssociatedTrajectories pairs = associateWithTruth(estimate, truth);
   if (pairs.estimate.size() < 2) {
@@ -222,7 +247,8 @@ RigidTransform alignToTruth(const Trajectory& estimate, const Trajectory& truth)
 
 HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& world_from_map,
                                   const HeightMap& truth, const Trajectory& world_from_vehicle,
-                                  const CameraRig& rig, const HeightMapErrorOptions& options) {
+                                  const CameraRig& rig, const IsRigid& is_rigid,
+                                  const HeightMapErrorOptions& options) {
   options.validate();
   check(rig.hasExtrinsics(), "evaluateHeightMap: expected vehicle_from_camera of every camera");
   check(!world_from_vehicle.empty(), "evaluateHeightMap: expected poses");
@@ -240,13 +266,16 @@ HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& wo
                options.min_views;
   });
   errors.num_steps = steps.size();
+  errors.num_kerbs_seen = static_cast<size_t>(std::count_if(
+      steps.begin(), steps.end(), [&](const HeightStep& step) { return isKerb(step, options); }));
+  errors.measurements = pickMeasurements(truth, steps, is_rigid, options);
+  measure(in_world, steps, options, &errors);
   steps.erase(
       std::remove_if(steps.begin(), steps.end(),
                      [&](const HeightStep& step) { return !isMapped(in_world, step, options.plateau_m); }),
       steps.end());
   errors.num_steps_mapped = steps.size();
-  judgeSteps(in_world, steps, options, &errors);
-  measure(in_world, steps, options, &errors);
+  judgeSteps(in_world, visibility, steps, options, &errors);
   return errors;
 }
 

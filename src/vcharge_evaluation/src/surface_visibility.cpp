@@ -1,6 +1,8 @@
 #include "surface_visibility.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace vcharge {
 namespace {
@@ -74,6 +76,17 @@ int SurfaceVisibility::countViews(const Eigen::Vector3d& point_in_world, int eno
     }
   }
   return count;
+}
+
+double SurfaceVisibility::nearestView(const Eigen::Vector3d& point_in_world) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const View& view : views_) {
+    const double distance = (view.position_m - point_in_world).norm();
+    if (distance < nearest && sees(view, point_in_world)) {
+      nearest = distance;
+    }
+  }
+  return nearest;
 }
 
 }  // namespace vcharge
