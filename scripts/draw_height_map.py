@@ -79,7 +79,7 @@ def main():
             add_scales(panel, low, scale / cell)
         panels.append(with_title(panel, title))
     temporary = args.output.with_name("." + args.output.name)
-    if not cv2.imwrite(str(temporary), np.hstack(panels)):
+    if not cv2.imwrite(str(temporary), np.vstack(panels) if heights[part].shape[1] > heights[part].shape[0] else np.hstack(panels)):
         raise SystemExit(f"{args.output}: cannot be written")
     os.replace(temporary, args.output)
     print(f"written: {args.output}")

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include <tbb/parallel_for.h>
 
@@ -148,16 +149,36 @@ void judgeSteps(const MapInWorld& in_world, const SurfaceVisibility& visibility,
   errors->kerb_height_m = summarize(std::move(kerbs));
 }
 
-/// The edge near a true one as somebody reads it from the map: the middle one of five lines.
-double readEdge(const MapInWorld& in_world, const HeightStep& step, double search_m) {
+/// Where the map's ground ends along a line, if it ends near 0 and nothing is mapped for a hand beyond:
+/// behind the face of a wall or a pillar no camera sees free space, so that the map has no height there.
+std::optional<double> findEnd(const HeightAt& height, const Eigen::Vector2d& start_m,
+                              const Eigen::Vector2d& direction, double search_m, double cell_size_m) {
+  constexpr double kSample_m = 0.01, kHand_m = 0.1;
+  std::optional<double> end;
+  for (double s = -search_m; s <= search_m + kHand_m; s += kSample_m) {
+    if (std::isfinite(height(start_m + s * direction))) {
+      end = s;
+    }
+  }
+  // Heights are interpolated up to the middle of the last cell.
+  return end && *end <= search_m ? std::optional<double>(*end + 0.5 * cell_size_m) : std::nullopt;
+}
+
+/// The edge near a true one as somebody reads it from the map, where it rises or else ends: the middle one of
+/// five lines.
+double readEdge(const MapInWorld& in_world, const HeightStep& step, double search_m, double cell_size_m) {
   const Eigen::Vector2d across(-step.direction.y(), step.direction.x());
   const HeightAt height = [&](const Eigen::Vector2d& place_m) {
     return in_world.heightAt(place_m, step.low_m);
   };
   std::vector<double> crossings;
   for (const double aside : {-0.1, -0.05, 0.0, 0.05, 0.1}) {
-    const auto crossing = findCrossing(height, step.place_m + aside * across, step.direction, -search_m,
-                                       search_m, step.low_m + stepLevel(step));
+    const Eigen::Vector2d start = step.place_m + aside * across;
+    std::optional<double> crossing =
+        findCrossing(height, start, step.direction, -search_m, search_m, step.low_m + stepLevel(step));
+    if (!crossing) {
+      crossing = findEnd(height, start, step.direction, search_m, cell_size_m);
+    }
     if (crossing) {
       crossings.push_back(*crossing);
     }
@@ -170,7 +191,7 @@ const HeightStep& stepAt(const std::vector<HeightStep>& steps, const Eigen::Vect
                        [&](const HeightStep& step) { return step.place_m == place_m; });
 }
 
-void measure(const MapInWorld& in_world, const std::vector<HeightStep>& steps,
+void measure(const MapInWorld& in_world, double cell_size_m, const std::vector<HeightStep>& steps,
              const HeightMapErrorOptions& options, HeightMapErrors* errors) {
   double sum = 0.0;
   size_t shown = 0;
@@ -180,8 +201,10 @@ void measure(const MapInWorld& in_world, const std::vector<HeightStep>& steps,
           in_world.heightAt(measurement.to_m, 0.0) - in_world.heightAt(measurement.from_m, 0.0);
     } else {
       const HeightStep &a = stepAt(steps, measurement.from_m), &b = stepAt(steps, measurement.to_m);
-      const Eigen::Vector2d from = a.place_m + readEdge(in_world, a, options.search_m) * a.direction;
-      const Eigen::Vector2d to = b.place_m + readEdge(in_world, b, options.search_m) * b.direction;
+      const Eigen::Vector2d from =
+          a.place_m + readEdge(in_world, a, options.search_m, cell_size_m) * a.direction;
+      const Eigen::Vector2d to =
+          b.place_m + readEdge(in_world, b, options.search_m, cell_size_m) * b.direction;
       measurement.map_m = (to - from).norm();
     }
     const double error = std::abs(measurement.map_m - measurement.truth_m);
@@ -269,7 +292,7 @@ HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& wo
   errors.num_kerbs_seen = static_cast<size_t>(std::count_if(
       steps.begin(), steps.end(), [&](const HeightStep& step) { return isKerb(step, options); }));
   errors.measurements = pickMeasurements(truth, steps, is_rigid, options);
-  measure(in_world, steps, options, &errors);
+  measure(in_world, map.cell_size_m, steps, options, &errors);
   steps.erase(
       std::remove_if(steps.begin(), steps.end(),
                      [&](const HeightStep& step) { return !isMapped(in_world, step, options.plateau_m); }),

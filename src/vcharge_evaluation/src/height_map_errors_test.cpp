@@ -177,6 +177,22 @@ TEST_F(HeightMapErrorsTest, NoTapeIsHeldToPlantsOrToGrassOnAnIsland) {
   }
 }
 
+TEST_F(HeightMapErrorsTest, AWallIsWhereTheMapEnds) {
+  HeightMap map = world(0.05);
+  for (int row = 0; row < map.height_m.rows; ++row) {
+    if (map.centreOf(0, row).y() > 2.5) {
+      map.height_m.row(row).setTo(std::numeric_limits<float>::quiet_NaN());
+    }
+  }
+  // Of the lengths between the platform and the wall, the wall's end.
+  HeightMapErrorOptions options;
+  options.num_measurements = 60;
+  const HeightMapErrors errors =
+      evaluateHeightMap(map, RigidTransform(), world(0.025), poses_, rig_, everything_rigid_, options);
+  EXPECT_LT(errors.max_measurement_m, 0.051);
+  EXPECT_EQ(errors.num_measurements_missing, 0U);
+}
+
 TEST_F(HeightMapErrorsTest, NobodySeesBehindTheWall) {
   HeightMap map = world(0.05);
   const HeightMapErrors errors = evaluate(map);

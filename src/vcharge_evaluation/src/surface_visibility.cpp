@@ -42,7 +42,8 @@ SurfaceVisibility::SurfaceVisibility(const HeightMap& surface, const Trajectory&
 bool SurfaceVisibility::sees(const View& view, const Eigen::Vector3d& point_in_world) const {
   const Eigen::Vector3d to_camera = view.position_m - point_in_world;
   const double distance = to_camera.norm();
-  if (distance > max_range_m_) {
+  // What heights describe faces up: nobody sees it from below, as the top of a wall over the camera.
+  if (distance > max_range_m_ || to_camera.z() <= 0.0) {
     return false;
   }
   const RigCamera& camera = rig_.cameras[view.camera];

@@ -28,6 +28,8 @@ void HeightFusionOptions::validate() const {
   requirePositive("band_m", band_m);
   requirePositive("min_ramp_m", min_ramp_m);
   requirePositive("reference_sigma_m", reference_sigma_m);
+  requireField(reference_confidence == 0.0 || (reference_confidence > 0.5 && reference_confidence < 1.0),
+               "reference_confidence", "must be 0 or in (0.5, 1)", reference_confidence);
   requireNotNegative("reference_footprint_m", reference_footprint_m);
   requirePositive("free_weight", free_weight);
   requirePositive("max_memory_gb", max_memory_gb);

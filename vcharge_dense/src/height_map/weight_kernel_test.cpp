@@ -17,6 +17,7 @@ HeightFusionOptions fusionOptions() {
   HeightFusionOptions options;
   options.min_ramp_m = 0.02;
   options.reference_footprint_m = 0.0;
+  options.reference_confidence = 0.0;
   return options;
 }
 
@@ -54,6 +55,22 @@ TEST(WeightKernelTest, IsFreeInFrontOccupiedInABandBehindAndNothingBeyond) {
 TEST(WeightKernelTest, CountsUncertainRangesLess) {
   EXPECT_NEAR(alongAxis(0.05F)[0], -0.5, 1e-3);
   EXPECT_NEAR(alongAxis(0.1F)[0], -0.2, 1e-3);
+}
+
+TEST(WeightKernelTest, CountsRangesByTheLogOddsOfTheirConfidence) {
+  HeightFusionOptions options = fusionOptions();
+  const auto weightAt = [&](double confidence) {
+    RangeMap map = testing::blankView(cv::Size(64, 48));
+    map.confidence.setTo(confidence);
+    return packRangeMap(map, RigidTransform(), options).values[4];
+  };
+  const float alike = weightAt(0.7);
+  EXPECT_EQ(weightAt(0.95), alike);
+  options.reference_confidence = 0.9;
+  EXPECT_NEAR(weightAt(0.9), alike, 1e-5);
+  EXPECT_NEAR(weightAt(0.5), 0.0, 1e-5);
+  EXPECT_NEAR(weightAt(0.99) / alike, std::log(99.0) / std::log(9.0), 1e-3);
+  EXPECT_EQ(weightAt(1.0), weightAt(0.99));  // finite
 }
 
 TEST(WeightKernelTest, CountsRangesLessWhosePixelSpansMoreOfTheSurface) {
