@@ -1,13 +1,10 @@
-#include <cstdio>
 #include <memory>
-#include <sstream>
 #include <string>
 
 #include "rig_tool.h"
 #include "vcharge_calibration/map_rig_calibrator.h"
 #include "vcharge_calibration/rig_calibration_files.h"
 #include "vcharge_core/error.h"
-#include "vcharge_core/options.h"
 #include "vcharge_core/sparse_map_file.h"
 
 namespace {
@@ -45,20 +42,12 @@ int main(int argc, char** argv) {
   std::string map_file;
   app.add_option("--map", map_file, "map of build_map or calibrate_rig (.vmap)")->check(requireNotEmpty);
   return runTool(&app, argc, argv, [&] {
-    MapRigCalibratorOptions options;
-    if (!arguments.options.empty()) {
-      readFieldsFromFile(arguments.options, &options);
-    }
-    std::ostringstream option_text;
-    option_text << writeFields(options);
-    if (arguments.show_options) {
-      std::printf("%s\n", option_text.str().c_str());
-      return;
-    }
-    requireRigToolArguments(arguments);
-    if (map_file.empty()) {
-      throw InputError("--map is required");
-    }
-    calibrate(arguments, map_file, options, option_text.str());
+    runWithOptions<MapRigCalibratorOptions>(
+        arguments, [&](const MapRigCalibratorOptions& options, const std::string& option_text) {
+          if (map_file.empty()) {
+            throw InputError("--map is required");
+          }
+          calibrate(arguments, map_file, options, option_text);
+        });
   });
 }

@@ -1,13 +1,10 @@
-#include <cstdio>
 #include <memory>
-#include <sstream>
 #include <string>
 
 #include "rig_tool.h"
 #include "vcharge_calibration/rig_calibration_files.h"
 #include "vcharge_calibration/rig_calibrator.h"
 #include "vcharge_core/error.h"
-#include "vcharge_core/options.h"
 #include "vcharge_core/sparse_map_file.h"
 
 namespace {
@@ -42,17 +39,9 @@ int main(int argc, char** argv) {
   std::string map_file;
   app.add_option("--map", map_file, "sparse map to write (.vmap)")->check(requireNotEmpty);
   return runTool(&app, argc, argv, [&] {
-    RigCalibratorOptions options;
-    if (!arguments.options.empty()) {
-      readFieldsFromFile(arguments.options, &options);
-    }
-    std::ostringstream option_text;
-    option_text << writeFields(options);
-    if (arguments.show_options) {
-      std::printf("%s\n", option_text.str().c_str());
-      return;
-    }
-    requireRigToolArguments(arguments);
-    calibrate(arguments, map_file, options, option_text.str());
+    runWithOptions<RigCalibratorOptions>(
+        arguments, [&](const RigCalibratorOptions& options, const std::string& option_text) {
+          calibrate(arguments, map_file, options, option_text);
+        });
   });
 }

@@ -2,35 +2,11 @@
 
 #include <algorithm>
 #include <memory>
-#include <utility>
 
 #include "ground.h"
+#include "vcharge_mapping/live_view.h"
 
 namespace vcharge {
-
-MappingData lastPart(const MappingData& data, int32_t begin) {
-  MappingData part;
-  part.rig = data.rig;
-  for (auto k = static_cast<size_t>(begin); k < data.keyframes.size(); ++k) {
-    part.keyframes.emplace_back();
-    part.keyframes.back().odom_from_vehicle = data.keyframes[k].odom_from_vehicle;
-    part.keyframes.back().map_from_vehicle = data.keyframes[k].map_from_vehicle;
-  }
-  for (const Track& track : data.tracks) {
-    if (track.observations.empty() || track.observations.back().keyframe < begin) {
-      continue;
-    }
-    Track seen;
-    for (TrackObservation observation : track.observations) {
-      if (observation.keyframe >= begin) {
-        observation.keyframe -= begin;
-        seen.observations.push_back(observation);
-      }
-    }
-    part.tracks.push_back(std::move(seen));
-  }
-  return part;
-}
 
 LandmarksByCamera recentLandmarksByCamera(const MappingState& state, const CameraRig& guess,
                                           const TriangulationOptions& options, int num_keyframes) {

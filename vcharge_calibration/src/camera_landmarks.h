@@ -10,9 +10,6 @@
 
 namespace vcharge {
 
-/// Keyframes from `begin` on with what was seen in them, numbered from there; without descriptors.
-MappingData lastPart(const MappingData& data, int32_t begin);
-
 /// While driving: points that the last keyframes saw, by cameras whose places come from hand-eye and whose
 /// heights these points tell; cameras without a place have none. Takes milliseconds.
 LandmarksByCamera recentLandmarksByCamera(const MappingState& state, const CameraRig& guess,

@@ -39,7 +39,7 @@ class NeighbourSearch {
 
   std::vector<Found> run() {
     for (size_t k = 0; k < data_.keyframes.size(); k += static_cast<size_t>(options_.keyframe_step)) {
-      for (const size_t earlier : chooseHistory(k)) {
+      for (const HistoryView& earlier : chooseHistory(k)) {
         matchViews(earlier, k);
       }
     }
@@ -47,6 +47,12 @@ class NeighbourSearch {
   }
 
  private:
+  /// A keyframe, and what the first camera saw there that the second should see now.
+  struct HistoryView {
+    size_t keyframe = 0;
+    std::vector<Sighting> common;
+  };
+
   const std::vector<Sighting>& sightingsAt(size_t keyframe, size_t camera) const {
     return sightings_[keyframe * data_.rig->cameras.size() + camera];
   }
@@ -56,9 +62,9 @@ class NeighbourSearch {
         .inverse();
   }
 
-  /// Keyframes at which the first camera saw most of what the second should see at `k`.
-  std::vector<size_t> chooseHistory(size_t k) const {
-    std::vector<std::pair<size_t, size_t>> by_overlap;  // negative order: most first, then the latest
+  /// Keyframes at which the first camera saw most of what the second should see at `k`, the latest of equals.
+  std::vector<HistoryView> chooseHistory(size_t k) const {
+    std::vector<HistoryView> views;
     const Keyframe& now = data_.keyframes[k];
     const auto step = static_cast<size_t>(options_.keyframe_step);
     for (size_t back = 0; back <= k; back += step) {
@@ -66,19 +72,16 @@ class NeighbourSearch {
       if (now.travelled_m - data_.keyframes[h].travelled_m > options_.history_m) {
         break;
       }
-      const size_t overlap = commonSightings(h, k).size();
-      if (overlap >= static_cast<size_t>(options_.min_overlap)) {
-        by_overlap.emplace_back(overlap, h);
+      HistoryView view{h, commonSightings(h, k)};
+      if (view.common.size() >= static_cast<size_t>(options_.min_overlap)) {
+        views.push_back(std::move(view));
       }
     }
-    std::sort(by_overlap.rbegin(), by_overlap.rend());
-    std::vector<size_t> chosen;
-    for (const auto& [overlap, h] : by_overlap) {
-      if (chosen.size() < static_cast<size_t>(options_.num_views)) {
-        chosen.push_back(h);
-      }
-    }
-    return chosen;
+    std::stable_sort(views.begin(), views.end(), [](const HistoryView& a, const HistoryView& b) {
+      return a.common.size() > b.common.size();
+    });
+    views.resize(std::min(views.size(), static_cast<size_t>(options_.num_views)));
+    return views;
   }
 
   /// The first camera's landmarks at `earlier` that the second should see at `k`, from nearly the same side.
@@ -124,9 +127,9 @@ class NeighbourSearch {
                : ImagePyramid();
   }
 
-  void matchViews(size_t earlier, size_t k) {
+  void matchViews(const HistoryView& earlier, size_t k) {
     const RigidTransform between =
-        data_.keyframes[earlier].map_from_vehicle.inverse() * data_.keyframes[k].map_from_vehicle;
+        data_.keyframes[earlier.keyframe].map_from_vehicle.inverse() * data_.keyframes[k].map_from_vehicle;
     const std::optional<RectifiedPair> pair = cache_.pair(first_, second_, yawOfRotation(between.rotation()));
     if (!pair) {
       return;
@@ -134,7 +137,7 @@ class NeighbourSearch {
     std::vector<int32_t> tracks;
     std::vector<cv::Point2f> seen_px, expected_px;
     const RigidTransform second_from_map = cameraFromMap(k, second_);
-    for (const Sighting& sighting : commonSightings(earlier, k)) {
+    for (const Sighting& sighting : earlier.common) {
       Eigen::Vector3d ray;
       if (!data_.rig->cameras[first_].model.unproject(sighting.position_px, &ray)) {
         continue;
@@ -150,7 +153,7 @@ class NeighbourSearch {
     if (tracks.empty()) {
       return;
     }
-    const ImagePyramid first_view = viewOf(*pair->first, earlier, first_);
+    const ImagePyramid first_view = viewOf(*pair->first, earlier.keyframe, first_);
     const ImagePyramid second_view = viewOf(*pair->second, k, second_);
     if (first_view.levels.empty() || second_view.levels.empty()) {
       return;  // a camera sent no image

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "camera_landmarks.h"
 #include "camera_motion.h"
+#include "vcharge_mapping/live_view.h"
 
 namespace vcharge {
 void tellCoach(const MappingState& state, const RobustOptions& camera_motion, CalibrationCoach* coach) {

@@ -14,8 +14,8 @@
 #include "rig_adjustment.h"
 #include "rig_initialization.h"
 #include "rig_judgement.h"
+#include "stage_runner.h"
 #include "vcharge_core/quantile.h"
-#include "vcharge_core/stage_timer.h"
 
 namespace vcharge {
 namespace {
@@ -26,8 +26,6 @@ constexpr double kMinFoundShare = 0.2;
 constexpr double kMinDirectionSigma_rad = 0.003;
 constexpr double kMinRotationSigma_rad = 0.0003;
 constexpr double kMaxDirectionSigma_rad = 0.3;
-constexpr int kNumStages = 3;
-
 /// How each camera moved between keyframes one after the other at both of which it was found.
 std::vector<MotionPair> motionsInMap(const std::vector<MapKeyframeView>& views,
                                      const std::vector<Keyframe>& keyframes, size_t camera) {
@@ -66,7 +64,7 @@ class MapRigBackEnd {
         map_(map),
         localizer_(localizer),
         views_(views),
-        progress_(progress),
+        stages_(3, progress, &state->report),
         state_(state),
         data_(&state->data),
         series_(*state),
@@ -77,12 +75,12 @@ class MapRigBackEnd {
     priors_.height_sigma_m = options_.height_sigma_m;
     try {
       describeDrive(*state_, &result_);
-      stage("first guess", 1, [&] {
+      stages_.run("first guess", [&] {
         guess();
         useFixesOfCameras();
         adjust();
       });
-      stage("joint adjustment", 2, [&] {
+      stages_.run("joint adjustment", [&] {
         for (int i = 0; i < options_.num_searches; ++i) {
           correctTimeOffset(series_, state_, &result_);
           searchWithAllCameras();
@@ -92,7 +90,7 @@ class MapRigBackEnd {
           adjust();
         }
       });
-      stage("judgement", 3, [&] { judgeRig(options_.adjustment, priors_, *state_, &result_); });
+      stages_.run("judgement", [&] { judgeRig(options_.adjustment, priors_, *state_, &result_); });
     } catch (const NotCalibrated& failure) {
       result_.verdict = Verdict::kFail;
       result_.remarks = failure.remarks;
@@ -101,16 +99,6 @@ class MapRigBackEnd {
   }
 
  private:
-  template <class Work>
-  void stage(const char* name, int number, const Work& work) {
-    progress_({name, number, kNumStages, 0.0});
-    {
-      const StageTimer timer(name, &state_->report.stage_s);
-      work();
-    }
-    progress_({name, number, kNumStages, 1.0});
-  }
-
   void guess() {
     requireEnoughFound();
     std::vector<std::vector<MotionPair>> motions;
@@ -270,7 +258,7 @@ class MapRigBackEnd {
   const SparseMap& map_;
   const MapLocalizer& localizer_;
   const std::vector<MapKeyframeView>& views_;
-  const StageCallback& progress_;
+  StageRunner stages_;
   MappingState* const state_;
   MappingData* const data_;
   const OdometrySeries series_;

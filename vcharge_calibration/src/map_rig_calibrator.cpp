@@ -85,13 +85,10 @@ MapRigCalibrator::~MapRigCalibrator() = default;
 void MapRigCalibrator::processFrame(Timestamp stamp, const std::vector<Image>& images,
                                     const RigidTransform& odom_from_vehicle) {
   const StageTimer timer("finding cameras", &state_.report.stage_s);
-  if (views_.empty()) {
-    images_.add(0, images);
-    addKeyframe(stamp, localizer_->extract(images), odom_from_vehicle);
-    return;
-  }
-  const RigidTransform since = state_.data.keyframes.back().odom_from_vehicle.inverse() * odom_from_vehicle;
-  if (since.translation().norm() >= options_.keyframe_distance_m ||
+  const RigidTransform since =
+      views_.empty() ? RigidTransform()
+                     : state_.data.keyframes.back().odom_from_vehicle.inverse() * odom_from_vehicle;
+  if (views_.empty() || since.translation().norm() >= options_.keyframe_distance_m ||
       angleOfRotation(since.rotation()) >= options_.keyframe_turn_rad) {
     images_.add(static_cast<int32_t>(views_.size()), images);
     addKeyframe(stamp, localizer_->extract(images), odom_from_vehicle);

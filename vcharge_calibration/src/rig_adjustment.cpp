@@ -172,7 +172,8 @@ BundleAdjustmentSummary adjustRig(const RigAdjustmentOptions& options, const Rig
   check(!priors.hasMap() || priors.landmark_information.size() == data->tracks.size(),
         "adjustRig: expected landmark_information of every track");
   BundleProblem problem = makeRigProblem(options, priors, *data);
-  const std::vector<Eigen::Vector3d> before = problem.points_in_map;
+  const std::vector<Eigen::Vector3d> before =
+      priors.hasMap() ? problem.points_in_map : std::vector<Eigen::Vector3d>();
   const BundleSolution solved =
       solveBundle(options.bundle.max_iterations, options.bundle.cost_tolerance, &problem);
   if (priors.hasMap()) {

@@ -7,10 +7,11 @@
 #include "ground.h"
 #include "ground_normal.h"
 #include "inter_camera_matching.h"
+#include "landmark_alignment.h"
 #include "rig_adjustment.h"
 #include "rig_initialization.h"
 #include "rig_judgement.h"
-#include "vcharge_core/stage_timer.h"
+#include "stage_runner.h"
 #include "vcharge_core/text_format.h"
 
 namespace vcharge {
@@ -19,15 +20,14 @@ namespace {
 /// The first guess of the ground is wrong by so many times more.
 constexpr double kFirstGround = 4.0;
 
-constexpr int kNumStages = 7;
-
 class RigBackEnd {
  public:
   RigBackEnd(const RigCalibratorOptions& options, const KeyframeImages& all_images,
              const StageCallback& progress, MappingState* state)
       : options_(options),
         all_images_(all_images),
-        progress_(progress),
+        stages_(7 + (options.inter_camera.enabled ? 1 : 0) + (options.landmark_alignment.enabled ? 1 : 0),
+                progress, &state->report),
         state_(state),
         data_(&state->data),
         series_(*state) {}
@@ -36,27 +36,33 @@ class RigBackEnd {
     try {
       describeDrive(*state_, &result_);
       countTracked();
-      stage("camera motions", 1, [&] { initialize(); });
-      stage("first adjustment", 2, [&] { adjustFirst(); });
-      stage("loops", 3, [&] { closeAllLoops(); });
-      stage("landmark search", 4, [&] {
+      stages_.run("camera motions", [&] { initialize(); });
+      stages_.run("first adjustment", [&] { adjustFirst(); });
+      stages_.run("loops", [&] { closeAllLoops(); });
+      stages_.run("landmark search", [&] {
         searchLandmarks(options_.search, data_);
         adjust(options_.adjustment);
       });
       correctTimeOffset(series_, state_, &result_);
       priors_.odometry = estimateOdometryNoise(options_.adjustment, *data_);
       if (options_.inter_camera.enabled) {
-        stage("between cameras", 5, [&] {
+        stages_.run("between cameras", [&] {
           result_.num_inter_camera_matches = matchBetweenCameras(options_.inter_camera, all_images_, data_);
         });
       }
-      stage("last adjustment", 6, [&] {
+      stages_.run("last search", [&] {
         searchLandmarks(options_.search, data_);
         adjust(options_.adjustment);
         checkLoops(options_.loops, *data_, &state_->report.loop_edges);
-        adjustFinely();
       });
-      stage("judgement", 7, [&] { judgeRig(options_.adjustment, priors_, *state_, &result_); });
+      if (options_.landmark_alignment.enabled) {
+        stages_.run("landmark patches", [&] {
+          result_.num_aligned_observations = alignLandmarks(options_.landmark_alignment, all_images_, data_);
+          adjust(options_.adjustment);
+        });
+      }
+      stages_.run("last adjustment", [&] { adjustFinely(); });
+      stages_.run("judgement", [&] { judgeRig(options_.adjustment, priors_, *state_, &result_); });
     } catch (const NotCalibrated& failure) {
       result_.verdict = Verdict::kFail;
       result_.remarks = failure.remarks;
@@ -65,16 +71,6 @@ class RigBackEnd {
   }
 
  private:
-  template <class Work>
-  void stage(const char* name, int number, const Work& work) {
-    progress_({name, number, kNumStages, 0.0});
-    {
-      const StageTimer timer(name, &state_->report.stage_s);
-      work();
-    }
-    progress_({name, number, kNumStages, 1.0});
-  }
-
   void countTracked() {
     for (const Track& track : data_->tracks) {
       if (track.observations.size() >= 3) {
@@ -166,9 +162,8 @@ class RigBackEnd {
 
   void closeAllLoops() {
     state_->vocabulary = trainVocabulary(options_.loops, *data_);
-    state_->report.loop_edges = findLoops(options_.loops, state_->vocabulary, *data_, [&](double fraction) {
-      progress_({"loops", 3, kNumStages, fraction});
-    });
+    state_->report.loop_edges = findLoops(options_.loops, state_->vocabulary, *data_,
+                                          [&](double fraction) { stages_.tell("loops", fraction); });
     closeLoops(options_.loops, &state_->report.loop_edges, data_);
     triangulateTracks(options_.triangulation, data_);
     adjust(options_.adjustment);
@@ -183,7 +178,7 @@ class RigBackEnd {
 
   const RigCalibratorOptions& options_;
   const KeyframeImages& all_images_;
-  const StageCallback& progress_;
+  StageRunner stages_;
   MappingState* const state_;
   MappingData* const data_;
   const OdometrySeries series_;

@@ -77,7 +77,9 @@ std::string describeCalibration(const RigCalibration& result) {
                      (result.is_from_map ? ""
                                          : std::to_string(result.num_loop_edges) + " loop edges, " +
                                                std::to_string(result.num_inter_camera_matches) +
-                                               " matches in rectified views, ") +
+                                               " matches in rectified views, " +
+                                               std::to_string(result.num_aligned_observations) +
+                                               " observations aligned with their landmark's patch, ") +
                      "error " + toText(result.rms_px, 3) + " px RMS per coordinate\n";
   if (result.rig == nullptr) {
     return text + describeDirections(result);

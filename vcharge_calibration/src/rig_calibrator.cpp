@@ -52,6 +52,7 @@ void RigCalibratorOptions::validate() const {
   validateInner("loops", loops);
   validateInner("search", search);
   validateInner("inter_camera", inter_camera);
+  validateInner("landmark_alignment", landmark_alignment);
   validateInner("adjustment", adjustment);
 }
 
@@ -127,7 +128,8 @@ void RigCalibrator::addKeyframe(Timestamp stamp, const std::vector<Image>& image
     trackers_[i].addKeyframe(index, static_cast<int32_t>(i), *extractor_, &state_.data);
   }
   images_.add(index, images);
-  if (options_.inter_camera.enabled && index % options_.inter_camera.keyframe_step == 0) {
+  if (options_.landmark_alignment.enabled ||
+      (options_.inter_camera.enabled && index % options_.inter_camera.keyframe_step == 0)) {
     all_images_.add(index, images);
   }
   state_.frames.push_back({stamp, index, RigidTransform(), MotionHypothesis::kOdometry});

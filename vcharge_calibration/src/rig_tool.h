@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstdio>
 #include <functional>
+#include <map>
 #include <memory>
+#include <sstream>
 #include <string>
 
 #include "vcharge_calibration/keyframe_images.h"
@@ -9,6 +12,7 @@
 #include "vcharge_core/camera_rig.h"
 #include "vcharge_core/command_line.h"
 #include "vcharge_core/drive_source.h"
+#include "vcharge_core/options.h"
 #include "vcharge_mapping/map_back_end.h"
 #include "vcharge_mapping/mapping_state.h"
 
@@ -25,6 +29,24 @@ void addRigToolArguments(CLI::App* app, RigToolArguments* arguments);
 
 /// InputError that names them where files are missing that the tool cannot do without.
 void requireRigToolArguments(const RigToolArguments& arguments);
+
+/// The options of the file that was given, printed where that was asked for; otherwise calls `calibrate` with
+/// them and their text.
+template <class Options, class Calibrate>
+void runWithOptions(const RigToolArguments& arguments, const Calibrate& calibrate) {
+  Options options;
+  if (!arguments.options.empty()) {
+    readFieldsFromFile(arguments.options, &options);
+  }
+  std::ostringstream text;
+  text << writeFields(options);
+  if (arguments.show_options) {
+    std::printf("%s\n", text.str().c_str());
+    return;
+  }
+  requireRigToolArguments(arguments);
+  calibrate(options, text.str());
+}
 
 /// Feeds the bag with a progress bar.
 void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const CameraRig>& rig,

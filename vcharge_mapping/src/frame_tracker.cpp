@@ -4,6 +4,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <optional>
 #include <set>
 
 #include "vcharge_core/error.h"
@@ -90,6 +91,7 @@ void FrameTrackerOptions::validate() const {
   requireField(tracking_sigma_px > 0.0 && tracking_sigma_px < 10.0, "tracking_sigma_px", "must be in (0, 10)",
                tracking_sigma_px);
   validateInner("patches", patches);
+  validateInner("alignment", alignment);
 }
 
 CameraTracker::CameraTracker(const RigCamera& camera, const FrameTrackerOptions& options)
@@ -174,31 +176,26 @@ void CameraTracker::keep(const std::vector<bool>& is_good) {
   tracks_.resize(kept);
 }
 
+bool CameraTracker::isMasked(const Eigen::Vector2d& position_px) const {
+  return !mask_.empty() && mask_.at<uint8_t>(static_cast<int>(std::lround(position_px.y())),
+                                             static_cast<int>(std::lround(position_px.x()))) == 0;
+}
+
 void CameraTracker::alignWithAnchors(int32_t keyframe) {
-  std::map<int32_t, std::vector<size_t>> tracks_of_anchor;
-  for (size_t i = 0; i < tracks_.size(); ++i) {
-    tracks_of_anchor[tracks_[i].anchor_keyframe].push_back(i);
-  }
-  for (const auto& [anchor, tracks] : tracks_of_anchor) {
-    std::vector<cv::Point2f> points, predictions;
-    for (const size_t i : tracks) {
-      points.push_back(tracks_[i].anchor_px);
-      predictions.push_back(tracks_[i].position_px);
-    }
-    const std::vector<TrackedPoint> aligned =
-        patch_tracker_.track(anchors_.at(anchor), pyramid_, points, mask_, predictions);
-    for (size_t i = 0; i < tracks.size(); ++i) {
-      LiveTrack& track = tracks_[tracks[i]];
-      const cv::Point2f shift = aligned[i].position_px - track.position_px;
-      const cv::Point2f position = aligned[i].position_px;
-      if (aligned[i].status == TrackStatus::kTracked &&
-          shift.dot(shift) <= options_.max_alignment_px * options_.max_alignment_px &&
-          camera_.model.unproject(Eigen::Vector2d(position.x, position.y), &track.ray_in_camera)) {
-        track.position_px = position;
-      } else {
-        track.anchor_keyframe = keyframe;
-        track.anchor_px = track.position_px;
-      }
+  for (LiveTrack& track : tracks_) {
+    const Eigen::Vector2d position_px(track.position_px.x, track.position_px.y);
+    const std::optional<PatchPlace> place =
+        alignPatch(anchors_.at(track.anchor_keyframe).pixels, image_.pixels,
+                   {track.anchor_px.x, track.anchor_px.y}, {position_px, track.shape}, options_.alignment);
+    if (place && (place->position_px - position_px).norm() <= options_.max_alignment_px &&
+        !isMasked(place->position_px) && camera_.model.unproject(place->position_px, &track.ray_in_camera)) {
+      track.position_px =
+          cv::Point2f(static_cast<float>(place->position_px.x()), static_cast<float>(place->position_px.y()));
+      track.shape = place->shape;
+    } else {
+      track.anchor_keyframe = keyframe;
+      track.anchor_px = track.position_px;
+      track.shape.setIdentity();
     }
   }
 }
@@ -265,10 +262,14 @@ void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, const Fe
                                                 options_.tracking_sigma_px});
     out.track_of_feature[feature] = track;
     cells.add(position, static_cast<int>(tracks_.size()));
-    tracks_.push_back(
-        {track, position, out.rays_in_camera.col(static_cast<Eigen::Index>(feature)), keyframe, position});
+    LiveTrack begun;
+    begun.track = track;
+    begun.position_px = begun.anchor_px = position;
+    begun.ray_in_camera = out.rays_in_camera.col(static_cast<Eigen::Index>(feature));
+    begun.anchor_keyframe = keyframe;
+    tracks_.push_back(begun);
   }
-  anchors_.emplace(keyframe, pyramid_);
+  anchors_.emplace(keyframe, image_);
   std::set<int32_t> used;
   for (const LiveTrack& track : tracks_) {
     used.insert(track.anchor_keyframe);

@@ -1,6 +1,7 @@
 #include "vcharge_mapping/live_view.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace vcharge {
 
@@ -12,18 +13,15 @@ Trajectory keyframePath(const MappingState& state) {
   return path;
 }
 
-std::vector<Eigen::Vector3d> recentLandmarks(const MappingState& state, const TriangulationOptions& options,
-                                             int num_keyframes) {
-  const auto end = static_cast<int32_t>(state.data.keyframes.size());
-  const int32_t begin = std::max(0, end - num_keyframes);
-  MappingData recent;
-  recent.rig = state.data.rig;
-  for (int32_t k = begin; k < end; ++k) {
-    Keyframe keyframe;  // without the images, which triangulation needs not
-    keyframe.map_from_vehicle = state.data.keyframes[k].map_from_vehicle;
-    recent.keyframes.push_back(keyframe);
+MappingData lastPart(const MappingData& data, int32_t begin) {
+  MappingData part;
+  part.rig = data.rig;
+  for (auto k = static_cast<size_t>(begin); k < data.keyframes.size(); ++k) {
+    part.keyframes.emplace_back();
+    part.keyframes.back().odom_from_vehicle = data.keyframes[k].odom_from_vehicle;
+    part.keyframes.back().map_from_vehicle = data.keyframes[k].map_from_vehicle;
   }
-  for (const Track& track : state.data.tracks) {
+  for (const Track& track : data.tracks) {
     if (track.observations.empty() || track.observations.back().keyframe < begin) {
       continue;
     }
@@ -34,8 +32,15 @@ std::vector<Eigen::Vector3d> recentLandmarks(const MappingState& state, const Tr
         seen.observations.push_back(observation);
       }
     }
-    recent.tracks.push_back(std::move(seen));
+    part.tracks.push_back(std::move(seen));
   }
+  return part;
+}
+
+std::vector<Eigen::Vector3d> recentLandmarks(const MappingState& state, const TriangulationOptions& options,
+                                             int num_keyframes) {
+  const auto end = static_cast<int32_t>(state.data.keyframes.size());
+  MappingData recent = lastPart(state.data, std::max(0, end - num_keyframes));
   triangulateTracks(options, &recent);
   std::vector<Eigen::Vector3d> points;
   for (const Track& track : recent.tracks) {

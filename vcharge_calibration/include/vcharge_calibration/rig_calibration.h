@@ -47,6 +47,7 @@ struct RigCalibration {
   int num_keyframes = 0;
   int64_t num_landmarks = 0;
   int num_loop_edges = 0;                ///< accepted
+  int64_t num_aligned_observations = 0;  ///< that were aligned with the patch of their landmark
   int64_t num_inter_camera_matches = 0;  ///< of landmarks found in rectified views of a neighbouring camera
   double rms_px = 0.0;
   double odometer_turn_scale = 1.0;

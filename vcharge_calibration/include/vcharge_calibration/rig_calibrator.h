@@ -45,7 +45,7 @@ class RigCalibrator : public DriveConsumer {
   const MappingState& state() const { return state_; }
   /// Of a few keyframes, for pictures.
   const KeyframeImages& images() const { return images_; }
-  /// Of all keyframes that are matched between cameras.
+  /// Of all keyframes whose patches are matched between cameras or aligned.
   const KeyframeImages& allImages() const { return all_images_; }
 
  private:

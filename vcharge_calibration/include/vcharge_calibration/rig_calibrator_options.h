@@ -2,6 +2,7 @@
 
 #include "vcharge_calibration/hand_eye.h"
 #include "vcharge_calibration/inter_camera_options.h"
+#include "vcharge_calibration/landmark_alignment_options.h"
 #include "vcharge_calibration/rig_adjustment_options.h"
 #include "vcharge_core/options.h"
 #include "vcharge_features/feature_extractor.h"
@@ -29,6 +30,7 @@ struct RigCalibratorOptions {
   LoopClosureOptions loops;
   LandmarkSearchOptions search;
   InterCameraOptions inter_camera;
+  LandmarkAlignmentOptions landmark_alignment;
   RigAdjustmentOptions adjustment = defaultAdjustment();
 
   static RobustOptions defaultCameraMotion();
@@ -51,6 +53,7 @@ struct RigCalibratorOptions {
     visit("loops", loops);
     visit("search", search);
     visit("inter_camera", inter_camera);
+    visit("landmark_alignment", landmark_alignment);
     visit("adjustment", adjustment);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field

@@ -13,6 +13,7 @@
 #include "vcharge_core/options.h"
 #include "vcharge_core/rigid_transform.h"
 #include "vcharge_features/feature_extractor.h"
+#include "vcharge_features/patch_alignment.h"
 #include "vcharge_features/patch_tracker.h"
 #include "vcharge_geometry/ray_match.h"
 #include "vcharge_mapping/mapping_data.h"
@@ -24,12 +25,13 @@ struct FrameTrackerOptions {
   double min_spacing_px = 20.0;  ///< between a new track and those there are, at 1280 pixels of width
   /// A tracked point and a feature this close are the same.
   double max_association_px = 1.5;
-  /// At keyframes a patch is aligned with that of its anchor, so that it does not drift away from step to
-  /// step. Where that moves it by more, the patch looks different by now, and this keyframe becomes its
-  /// anchor.
+  /// At keyframes a patch is aligned with that of its anchor, with its shape, so that it neither drifts away
+  /// from step to step nor is pulled aside where the scene comes nearer. Where that moves it by more, or the
+  /// patch looks different by now, this keyframe becomes its anchor.
   double max_alignment_px = 2.0;
   double tracking_sigma_px = 0.3;  ///< standard deviation of a tracked position
   PatchTrackerOptions patches = smallPatches();
+  PatchAlignmentOptions alignment;
 
   static PatchTrackerOptions smallPatches();
 
@@ -41,6 +43,7 @@ struct FrameTrackerOptions {
     visit("max_alignment_px", max_alignment_px);
     visit("tracking_sigma_px", tracking_sigma_px);
     visit("patches", patches);
+    visit("alignment", alignment);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
@@ -52,7 +55,9 @@ struct LiveTrack {
   Eigen::Vector3d ray_in_camera;
   int32_t anchor_keyframe = 0;  ///< whose image shows the patch that is followed
   cv::Point2f anchor_px;
-  cv::Point2f last_step_px{0.0F, 0.0F};  ///< from the image before
+  /// Of the patch at the last keyframe, against the anchor's.
+  Eigen::Matrix2d shape = Eigen::Matrix2d::Identity();
+  cv::Point2f last_step_px = {0.0F, 0.0F};  ///< from the image before
 };
 
 /// Follows the points of one camera through its images. Without extrinsics points are expected to go on as
@@ -79,6 +84,7 @@ class CameraTracker {
 
  private:
   void alignWithAnchors(int32_t keyframe);
+  bool isMasked(const Eigen::Vector2d& position_px) const;
   RigidTransform vehicleFromCamera() const;
   cv::Point2f predict(const LiveTrack& track, const RigidTransform& current_from_previous) const;
 
@@ -90,7 +96,7 @@ class CameraTracker {
   Image image_;
   ImagePyramid pyramid_;
   std::vector<LiveTrack> tracks_;
-  std::map<int32_t, ImagePyramid> anchors_;  // by keyframe, while a track has it
+  std::map<int32_t, Image> anchors_;  // by keyframe, while a track has it
 };
 
 }  // namespace vcharge

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include <Eigen/Core>
@@ -12,6 +13,9 @@ namespace vcharge {
 
 /// Poses of the keyframes so far, in the map: before loops are closed they drift.
 Trajectory keyframePath(const MappingState& state);
+
+/// Keyframes from `begin` on with what was seen in them, numbered from there; without images.
+MappingData lastPart(const MappingData& data, int32_t begin);
 
 /// Points of the scene that the last keyframes saw, triangulated from these alone by their poses so far; in
 /// the map. Takes milliseconds: for showing while driving.
