@@ -47,6 +47,8 @@ def load(path, **arguments):
         given["map"] = "/nowhere/map"
     if "options" in given:  # loaded while parsing
         given["options"] = str(CONFIG / "driver" / "example_car.yaml")
+    if "driver" in all_arguments(path):
+        given["driver"] = str(CONFIG / "driver" / "example_car.yaml")
     given.update(arguments)
     return roslaunch.config.load_config_default(
         [(str(path), [f"{name}:={value}" for name, value in given.items()])], None, verbose=False)

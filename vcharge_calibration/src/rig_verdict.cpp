@@ -133,10 +133,10 @@ class RigJudge {
       const double usual = others[others.size() / 2];
       const double share = shareOf(camera);
       if (share < kWarnFit * usual) {
-        remark(share < kFailFit * usual ? Verdict::kFail : Verdict::kWarn,
-               "camera '" + camera.name + "': only " + toText(100.0 * share, 0) +
-                   " % of its points fit, against " + toText(100.0 * usual, 0) +
-                   " % of the others': its intrinsics are wrong, or it moved during the drive");
+        remark(
+            share < kFailFit * usual ? Verdict::kFail : Verdict::kWarn,
+            "camera '" + camera.name + "': of its points only " + toText(100.0 * share / usual, 0) +
+                " % as many fit as of the others': its intrinsics are wrong, or it moved during the drive");
       }
     }
   }

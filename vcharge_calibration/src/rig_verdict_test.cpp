@@ -82,7 +82,7 @@ TEST(RigVerdictTest, TellsLateStampsAndWrongLenses) {
   judge([](RigCalibration* r) { r->time_offset_s = -0.4; }, &verdict);
   EXPECT_EQ(verdict, Verdict::kFail);
   expectRemark(judge([](RigCalibration* r) { r->cameras[0].num_observations = 5000; }, &verdict),
-               "camera 'front': only 50 % of its points fit");
+               "camera 'front': of its points only 50 % as many fit");
   EXPECT_EQ(verdict, Verdict::kFail);
   expectRemark(judge([](RigCalibration* r) { r->cameras[1].structure_px = 0.4; }, &verdict),
                "camera 'left': errors go together over the image");
