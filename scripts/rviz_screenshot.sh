@@ -1,14 +1,39 @@
 #!/usr/bin/env bash
-# Replays a drive through the nodelets with rviz on a virtual display, and takes a picture of it:
+# Starts rviz on a virtual display and takes a picture of a drive that is replayed through the nodelets, or of a saved map:
 #   rviz_screenshot.sh DRIVE.bag rig.yaml OUTPUT.png            range maps and point clouds
 #   rviz_screenshot.sh DRIVE.bag rig.yaml OUTPUT.png LOT.vmap   the pose in a map
+#   rviz_screenshot.sh MAP OUTPUT.png                           a height map with its OctoMap (folder of build_height_map)
 set -euo pipefail
-[ $# -eq 3 ] || [ $# -eq 4 ] || { sed -n '2,4s/^# \{0,1\}//p' "$0" >&2; exit 2; }
-bag=$1 rig=$2 output=$3 map=${4:-} launch_file=drive_replay.launch
-[ -z "$map" ] || launch_file=localization.launch
+views=$(realpath "$(dirname "${BASH_SOURCE[0]}")/../config/rviz")
+[ $# -ge 2 ] && [ $# -le 4 ] || { sed -n '2,5s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+if [ $# -eq 2 ]; then
+  output=$2
+  wait_s=40  # a mesh of some hundred thousand triangles
+  launch=(view_map.launch height_map:="$(realpath "$1")")
+  centre_on=$1
+else
+  output=$3
+  wait_s=20
+  launch=(drive_replay.launch)
+  [ $# -eq 3 ] || launch=(localization.launch map:="$4")
+  launch+=(bag:="$1" rig:="$2" loop:=true rate:=0.25)
+fi
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin ROS_HOSTNAME=localhost
 scratch=$(mktemp -d)
 export ROS_HOME=$scratch
+if [ -n "${centre_on:-}" ]; then
+  # The usual view is of a map's origin.
+  /usr/bin/python3 - "$centre_on/height_map.yaml" "$views/height_map.rviz" "$scratch/view.rviz" <<'END'
+import sys, yaml
+grid, view = yaml.safe_load(open(sys.argv[1])), yaml.safe_load(open(sys.argv[2]))
+current = view["Visualization Manager"]["Views"]["Current"]
+size = [grid["cell_size_m"] * cells for cells in grid["size_cells"]]
+current["Focal Point"].update(X=grid["origin_m"][0] + 0.5 * size[0], Y=grid["origin_m"][1] + 0.5 * size[1])
+current["Distance"] = max(size)
+yaml.safe_dump(view, open(sys.argv[3], "w"))
+END
+  launch+=(rviz_config:="$scratch/view.rviz")
+fi
 pids=()
 cleanup() {
   for pid in "${pids[@]}"; do kill "$pid" 2>/dev/null || true; done
@@ -23,11 +48,10 @@ pids+=($!)
 export DISPLAY=$display LIBGL_ALWAYS_SOFTWARE=1
 for _ in $(seq 50); do xdpyinfo >/dev/null 2>&1 && break; sleep 0.1; done
 
-roslaunch -p $((20000 + RANDOM % 20000)) vcharge_launch "$launch_file" \
-  bag:="$bag" rig:="$rig" ${map:+map:="$map"} rviz:=true loop:=true rate:=0.25 >"$scratch/roslaunch.log" 2>&1 &
+roslaunch -p $((20000 + RANDOM % 20000)) vcharge_launch "${launch[@]}" rviz:=true >"$scratch/roslaunch.log" 2>&1 &
 pids+=($!)
 # rviz needs a while on a software renderer; the drive goes on in a loop until its picture is there.
-for _ in $(seq 20); do
+for _ in $(seq "$wait_s"); do
   sleep 1
   kill -0 "${pids[1]}" 2>/dev/null || { cat "$scratch/roslaunch.log" >&2; exit 1; }
 done

@@ -24,6 +24,24 @@ double percent(size_t part, size_t whole) {
   return whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
 }
 
+void printKerbs(const HeightMapErrors& errors) {
+  std::printf(
+      "heights of kerbs: %zu places seen, %zu of them in the map, error mean %.2f cm, 95 %% within %.2f cm\n",
+      errors.num_kerbs_seen, errors.kerbs.size(), 100.0 * errors.kerb_height_m.mean,
+      100.0 * errors.kerb_height_m.percentile_95);
+  for (const double reach_m : {2.0, 3.0, 4.0, 5.0, 6.0}) {
+    std::vector<double> near;
+    for (const KerbError& kerb : errors.kerbs) {
+      if (kerb.nearest_view_m <= reach_m) {
+        near.push_back(std::abs(kerb.error_m));
+      }
+    }
+    const size_t count = near.size();
+    std::printf("  that some frame saw from %.0f m or nearer: %zu places, error mean %.2f cm\n", reach_m,
+                count, 100.0 * summarize(std::move(near)).mean);
+  }
+}
+
 void print(const HeightMapErrors& errors) {
   std::printf("cells seen in the drive, apart from steps: %zu, %.1f %% of them in the map\n", errors.num_seen,
               percent(errors.num_mapped, errors.num_seen));
@@ -37,11 +55,13 @@ void print(const HeightMapErrors& errors) {
       errors.num_steps, percent(errors.num_steps_mapped, errors.num_steps),
       percent(errors.num_steps_found, errors.num_steps_mapped), 100.0 * errors.step_position_m.mean,
       100.0 * errors.step_position_m.percentile_95);
-  std::printf("heights of kerbs: %zu places, error mean %.2f cm, 95 %% within %.2f cm\n", errors.num_kerbs,
-              100.0 * errors.kerb_height_m.mean, 100.0 * errors.kerb_height_m.percentile_95);
-  std::printf("tape measure: %zu distances, %zu not shown by the map, error mean %.2f cm, largest %.2f cm\n",
-              errors.measurements.size(), errors.num_measurements_missing, 100.0 * errors.mean_measurement_m,
-              100.0 * errors.max_measurement_m);
+  printKerbs(errors);
+  std::printf(
+      "tape measure: %zu distances on rigid things, %zu not shown by the map, error of the others mean %.2f "
+      "cm, "
+      "largest %.2f cm\n",
+      errors.measurements.size(), errors.num_measurements_missing, 100.0 * errors.mean_measurement_m,
+      100.0 * errors.max_measurement_m);
   std::printf("  %3s %-7s %16s %16s %8s %8s %9s\n", "", "kind", "from x, y (m)", "to x, y (m)", "truth m",
               "map m", "error cm");
   int number = 0;
@@ -53,7 +73,12 @@ void print(const HeightMapErrors& errors) {
 }
 
 nlohmann::json toJson(const HeightMapErrors& errors) {
-  nlohmann::json measurements = nlohmann::json::array();
+  nlohmann::json measurements = nlohmann::json::array(), kerbs = nlohmann::json::array();
+  for (const KerbError& kerb : errors.kerbs) {
+    kerbs.push_back({{"place_m", {kerb.place_m.x(), kerb.place_m.y()}},
+                     {"error_m", kerb.error_m},
+                     {"nearest_view_m", kerb.nearest_view_m}});
+  }
   for (const TapeMeasurement& m : errors.measurements) {
     measurements.push_back({{"kind", nameOf(m.kind)},
                             {"from_m", {m.from_m.x(), m.from_m.y()}},
@@ -71,7 +96,9 @@ nlohmann::json toJson(const HeightMapErrors& errors) {
           {"num_steps_mapped", errors.num_steps_mapped},
           {"num_steps_found", errors.num_steps_found},
           {"step_position_m", errors.step_position_m},
-          {"num_kerbs", errors.num_kerbs},
+          {"num_kerbs_seen", errors.num_kerbs_seen},
+          {"num_kerbs", errors.kerbs.size()},
+          {"kerbs", kerbs},
           {"kerb_height_m", errors.kerb_height_m},
           {"mean_measurement_m", errors.mean_measurement_m},
           {"max_measurement_m", errors.max_measurement_m},
@@ -100,7 +127,8 @@ int main(int argc, char** argv) {
       "of steps, heights of kerbs, and distances as a tape measure would find them.");
   std::string map_path, truth_path, rig_path, trajectory_path, options_path, report;
   app.add_option("--map", map_path, "folder of build_height_map")->required()->check(requireNotEmpty);
-  app.add_option("--truth", truth_path, "the drive's truth folder (height_map.yaml, trajectory.tum)")
+  app.add_option("--truth", truth_path,
+                 "the drive's truth folder (height_map.yaml, obstacles.yaml, trajectory.tum)")
       ->required();
   app.add_option("--rig", rig_path, "rig.yaml of the drive")->required();
   app.add_option(
@@ -131,7 +159,9 @@ int main(int argc, char** argv) {
         throw InputError(trajectory_path + ": " + error.what());
       }
     }
-    const HeightMapErrors errors = evaluateHeightMap(map, world_from_map, truth, true_poses, rig, options);
+    const IsRigid is_rigid = rigidBy(readTruthObstacles(truth_path + "/obstacles.yaml"));
+    const HeightMapErrors errors =
+        evaluateHeightMap(map, world_from_map, truth, true_poses, rig, is_rigid, options);
     if (errors.num_seen == 0) {
       throw InputError(map_path + ": no cell of it was seen in the drive of " + truth_path);
     }

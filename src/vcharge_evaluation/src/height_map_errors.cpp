@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include <tbb/parallel_for.h>
 
@@ -17,6 +18,9 @@ namespace {
 
 constexpr double kLever_m = 5.0;           // of the points by which poses are laid over each other
 constexpr double kAboveSurface_m = 0.005;  // of the point that is looked for
+constexpr double kFromPlants_m = 0.3;
+constexpr double kKerbTolerance_m = 0.03;
+constexpr double kOverGrass_m = 0.4;
 constexpr double kNotMapped = std::numeric_limits<double>::quiet_NaN();
 
 /// A map read in the world's frame.
@@ -112,8 +116,14 @@ bool isMapped(const MapInWorld& in_world, const HeightStep& step, double beside_
          std::isfinite(in_world.heightAt(step.place_m + beside, step.low_m));
 }
 
-void judgeSteps(const MapInWorld& in_world, const std::vector<HeightStep>& steps,
-                const HeightMapErrorOptions& options, HeightMapErrors* errors) {
+bool isKerb(const HeightStep& step, const HeightMapErrorOptions& options) {
+  const double rise = step.high_m - step.low_m;
+  return step.both_sides_seen && rise >= options.kerb_low_m && rise <= options.kerb_high_m;
+}
+
+void judgeSteps(const MapInWorld& in_world, const SurfaceVisibility& visibility,
+                const std::vector<HeightStep>& steps, const HeightMapErrorOptions& options,
+                HeightMapErrors* errors) {
   std::vector<double> positions, kerbs;
   for (const HeightStep& step : steps) {
     const HeightAt height = [&](const Eigen::Vector2d& place_m) {
@@ -127,27 +137,48 @@ void judgeSteps(const MapInWorld& in_world, const std::vector<HeightStep>& steps
       ++errors->num_steps_found;
       positions.push_back(std::abs(*crossing));
     }
-    const double rise = step.high_m - step.low_m;
-    if (step.both_sides_seen && rise >= options.kerb_low_m && rise <= options.kerb_high_m &&
-        std::isfinite(high - low)) {
-      kerbs.push_back(std::abs(high - low - rise));
+    if (isKerb(step, options) && std::isfinite(high - low)) {
+      const double error = high - low - (step.high_m - step.low_m);
+      const Eigen::Vector2d top = step.place_m + beside;
+      errors->kerbs.push_back(
+          {step.place_m, error, visibility.nearestView({top.x(), top.y(), step.high_m + kAboveSurface_m})});
+      kerbs.push_back(std::abs(error));
     }
   }
   errors->step_position_m = summarize(std::move(positions));
-  errors->num_kerbs = kerbs.size();
   errors->kerb_height_m = summarize(std::move(kerbs));
 }
 
-/// The edge near a true one as somebody reads it from the map: the middle one of five lines.
-double readEdge(const MapInWorld& in_world, const HeightStep& step, double search_m) {
+/// Where the map's ground ends along a line, if it ends near 0 and nothing is mapped for a hand beyond:
+/// behind the face of a wall or a pillar no camera sees free space, so that the map has no height there.
+std::optional<double> findEnd(const HeightAt& height, const Eigen::Vector2d& start_m,
+                              const Eigen::Vector2d& direction, double search_m, double cell_size_m) {
+  constexpr double kSample_m = 0.01, kHand_m = 0.1;
+  std::optional<double> end;
+  for (double s = -search_m; s <= search_m + kHand_m; s += kSample_m) {
+    if (std::isfinite(height(start_m + s * direction))) {
+      end = s;
+    }
+  }
+  // Heights are interpolated up to the middle of the last cell.
+  return end && *end <= search_m ? std::optional<double>(*end + 0.5 * cell_size_m) : std::nullopt;
+}
+
+/// The edge near a true one as somebody reads it from the map, where it rises or else ends: the middle one of
+/// five lines.
+double readEdge(const MapInWorld& in_world, const HeightStep& step, double search_m, double cell_size_m) {
   const Eigen::Vector2d across(-step.direction.y(), step.direction.x());
   const HeightAt height = [&](const Eigen::Vector2d& place_m) {
     return in_world.heightAt(place_m, step.low_m);
   };
   std::vector<double> crossings;
   for (const double aside : {-0.1, -0.05, 0.0, 0.05, 0.1}) {
-    const auto crossing = findCrossing(height, step.place_m + aside * across, step.direction, -search_m,
-                                       search_m, step.low_m + stepLevel(step));
+    const Eigen::Vector2d start = step.place_m + aside * across;
+    std::optional<double> crossing =
+        findCrossing(height, start, step.direction, -search_m, search_m, step.low_m + stepLevel(step));
+    if (!crossing) {
+      crossing = findEnd(height, start, step.direction, search_m, cell_size_m);
+    }
     if (crossing) {
       crossings.push_back(*crossing);
     }
@@ -160,9 +191,8 @@ const HeightStep& stepAt(const std::vector<HeightStep>& steps, const Eigen::Vect
                        [&](const HeightStep& step) { return step.place_m == place_m; });
 }
 
-void measure(const MapInWorld& in_world, const std::vector<HeightStep>& steps,
+void measure(const MapInWorld& in_world, double cell_size_m, const std::vector<HeightStep>& steps,
              const HeightMapErrorOptions& options, HeightMapErrors* errors) {
-  errors->measurements = pickMeasurements(steps, options);
   double sum = 0.0;
   size_t shown = 0;
   for (TapeMeasurement& measurement : errors->measurements) {
@@ -171,8 +201,10 @@ void measure(const MapInWorld& in_world, const std::vector<HeightStep>& steps,
           in_world.heightAt(measurement.to_m, 0.0) - in_world.heightAt(measurement.from_m, 0.0);
     } else {
       const HeightStep &a = stepAt(steps, measurement.from_m), &b = stepAt(steps, measurement.to_m);
-      const Eigen::Vector2d from = a.place_m + readEdge(in_world, a, options.search_m) * a.direction;
-      const Eigen::Vector2d to = b.place_m + readEdge(in_world, b, options.search_m) * b.direction;
+      const Eigen::Vector2d from =
+          a.place_m + readEdge(in_world, a, options.search_m, cell_size_m) * a.direction;
+      const Eigen::Vector2d to =
+          b.place_m + readEdge(in_world, b, options.search_m, cell_size_m) * b.direction;
       measurement.map_m = (to - from).norm();
     }
     const double error = std::abs(measurement.map_m - measurement.truth_m);
@@ -203,6 +235,22 @@ void HeightMapErrorOptions::validate() const {
   requireField(max_length_m > min_length_m, "max_length_m", "must be above min_length_m", max_length_m);
 }
 
+IsRigid rigidBy(const std::vector<TruthObstacle>& obstacles) {
+  return [obstacles](const Eigen::Vector2d& place_m, double high_m) {
+    return std::all_of(obstacles.begin(), obstacles.end(), [&](const TruthObstacle& obstacle) {
+      const double distance = distanceToPolygon(place_m, obstacle.footprint_m);
+      const bool is_plant = obstacle.kind == "tree" || obstacle.kind == "bush" || obstacle.kind == "hedge";
+      if (is_plant) {
+        return distance > kFromPlants_m;
+      }
+      // What is lower or a little higher than a kerb, on its island, is grass.
+      const double over_kerb = high_m - obstacle.top_z_m;
+      return obstacle.kind != "kerb" || distance > 0.0 || std::abs(over_kerb) < kKerbTolerance_m ||
+             over_kerb > kOverGrass_m;
+    });
+  };
+}
+
 RigidTransform alignToTruth(const Trajectory& estimate, const Trajectory& truth) {
   const AssociatedTrajectories pairs = associateWithTruth(estimate, truth);
   if (pairs.estimate.size() < 2) {
@@ -222,7 +270,8 @@ RigidTransform alignToTruth(const Trajectory& estimate, const Trajectory& truth)
 
 HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& world_from_map,
                                   const HeightMap& truth, const Trajectory& world_from_vehicle,
-                                  const CameraRig& rig, const HeightMapErrorOptions& options) {
+                                  const CameraRig& rig, const IsRigid& is_rigid,
+                                  const HeightMapErrorOptions& options) {
   options.validate();
   check(rig.hasExtrinsics(), "evaluateHeightMap: expected vehicle_from_camera of every camera");
   check(!world_from_vehicle.empty(), "evaluateHeightMap: expected poses");
@@ -240,13 +289,16 @@ HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& wo
                options.min_views;
   });
   errors.num_steps = steps.size();
+  errors.num_kerbs_seen = static_cast<size_t>(std::count_if(
+      steps.begin(), steps.end(), [&](const HeightStep& step) { return isKerb(step, options); }));
+  errors.measurements = pickMeasurements(truth, steps, is_rigid, options);
+  measure(in_world, map.cell_size_m, steps, options, &errors);
   steps.erase(
       std::remove_if(steps.begin(), steps.end(),
                      [&](const HeightStep& step) { return !isMapped(in_world, step, options.plateau_m); }),
       steps.end());
   errors.num_steps_mapped = steps.size();
-  judgeSteps(in_world, steps, options, &errors);
-  measure(in_world, steps, options, &errors);
+  judgeSteps(in_world, visibility, steps, options, &errors);
   return errors;
 }
 

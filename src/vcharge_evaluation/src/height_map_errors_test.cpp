@@ -50,11 +50,12 @@ class HeightMapErrorsTest : public ::testing::Test {
   }
   HeightMapErrors evaluate(const HeightMap& map,
                            const RigidTransform& world_from_map = RigidTransform()) const {
-    return evaluateHeightMap(map, world_from_map, world(0.025), poses_, rig_);
+    return evaluateHeightMap(map, world_from_map, world(0.025), poses_, rig_, everything_rigid_);
   }
 
   CameraRig rig_;
   Trajectory poses_;
+  const IsRigid everything_rigid_ = rigidBy({});
 };
 
 TEST_F(HeightMapErrorsTest, ThereAreNoneOfThePerfectMap) {
@@ -65,9 +66,10 @@ TEST_F(HeightMapErrorsTest, ThereAreNoneOfThePerfectMap) {
   EXPECT_GT(errors.num_steps_found, 80U);
   EXPECT_EQ(errors.num_steps_found, errors.num_steps_mapped);
   EXPECT_LT(errors.step_position_m.max, 0.026);  // half a cell
-  EXPECT_GT(errors.num_kerbs, 50U);
+  EXPECT_GT(errors.kerbs.size(), 50U);
+  EXPECT_EQ(errors.kerbs.size(), errors.num_kerbs_seen);
   EXPECT_LT(errors.kerb_height_m.max, 1e-5);
-  EXPECT_GT(errors.measurements.size(), 8U);
+  EXPECT_EQ(errors.measurements.size(), 20U);
   EXPECT_EQ(errors.num_measurements_missing, 0U);
   EXPECT_LT(errors.max_measurement_m, 0.051);
 }
@@ -124,6 +126,71 @@ TEST_F(HeightMapErrorsTest, UnmappedCellsAreCountedAndNotJudged) {
   EXPECT_GT(errors.num_mapped, 1000U);
   EXPECT_LT(errors.height_m.max, 1e-5);
   EXPECT_LT(errors.num_steps_mapped, errors.num_steps);
+}
+
+TEST_F(HeightMapErrorsTest, TellsHowFarTheKerbsWereSeen) {
+  const HeightMapErrors errors = evaluate(world(0.05));
+  for (const KerbError& kerb : errors.kerbs) {
+    // The path runs along y = 0 from x = -1 to 3.4 m, 1 m up; each camera looks down on all sides of it.
+    const double beside = std::hypot(kerb.place_m.y(), 1.0 - kKerb_m);
+    EXPECT_GT(kerb.nearest_view_m, beside - 1e-6);
+    EXPECT_LT(kerb.nearest_view_m, beside + 1.5);
+  }
+}
+
+TEST_F(HeightMapErrorsTest, TapeMeasurementsAreTheSameWhateverTheMapShows) {
+  const HeightMapErrors perfect = evaluate(world(0.05));
+  HeightMap map = world(0.05);
+  map.height_m.colRange(50, 120).setTo(std::numeric_limits<float>::quiet_NaN());
+  const HeightMapErrors errors = evaluate(map);
+  ASSERT_EQ(errors.measurements.size(), perfect.measurements.size());
+  for (size_t i = 0; i < errors.measurements.size(); ++i) {
+    EXPECT_EQ(errors.measurements[i].from_m, perfect.measurements[i].from_m);
+    EXPECT_EQ(errors.measurements[i].to_m, perfect.measurements[i].to_m);
+  }
+  EXPECT_GT(errors.num_measurements_missing, 5U);
+  EXPECT_LT(errors.max_measurement_m, 0.051);
+}
+
+TEST_F(HeightMapErrorsTest, NoTapeIsHeldToPlantsOrToGrassOnAnIsland) {
+  const auto rectangle = [](double x0, double y0, double x1, double y1) {
+    return std::vector<Eigen::Vector2d>{{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}};
+  };
+  const IsRigid is_rigid = rigidBy({{"kerb", rectangle(0, 0, 4, 4), 0.0, kKerb_m},
+                                    {"car", rectangle(10, 0, 14, 2), 0.0, 1.4},
+                                    {"hedge", rectangle(1, 3, 3, 3.5), kKerb_m, 1.0}});
+  EXPECT_TRUE(is_rigid({0.05, 1.0}, kKerb_m + 0.01));
+  EXPECT_FALSE(is_rigid({2.0, 1.0}, 0.25));  // grass
+  EXPECT_FALSE(is_rigid({2.0, 3.2}, 1.0));
+  EXPECT_FALSE(is_rigid({0.8, 3.2}, kKerb_m));  // leaves hang over
+  EXPECT_TRUE(is_rigid({10.05, 1.0}, 0.9));
+  EXPECT_TRUE(is_rigid({20.0, 1.0}, 2.0));  // a wall
+
+  // Of the platform, half is a hedge's.
+  const HeightMapErrors errors =
+      evaluateHeightMap(world(0.05), RigidTransform(), world(0.025), poses_, rig_,
+                        rigidBy({{"hedge", rectangle(3, 0, 4, 2.4), 0.0, kKerb_m}}));
+  EXPECT_GT(errors.measurements.size(), 8U);  // in half the place there is no room for 20
+  for (const TapeMeasurement& measurement : errors.measurements) {
+    EXPECT_TRUE(measurement.from_m.y() < 0.0 || measurement.from_m.y() > 2.3)
+        << measurement.from_m.transpose();
+  }
+}
+
+TEST_F(HeightMapErrorsTest, AWallIsWhereTheMapEnds) {
+  HeightMap map = world(0.05);
+  for (int row = 0; row < map.height_m.rows; ++row) {
+    if (map.centreOf(0, row).y() > 2.5) {
+      map.height_m.row(row).setTo(std::numeric_limits<float>::quiet_NaN());
+    }
+  }
+  // Of the lengths between the platform and the wall, the wall's end.
+  HeightMapErrorOptions options;
+  options.num_measurements = 60;
+  const HeightMapErrors errors =
+      evaluateHeightMap(map, RigidTransform(), world(0.025), poses_, rig_, everything_rigid_, options);
+  EXPECT_LT(errors.max_measurement_m, 0.051);
+  EXPECT_EQ(errors.num_measurements_missing, 0U);
 }
 
 TEST_F(HeightMapErrorsTest, NobodySeesBehindTheWall) {

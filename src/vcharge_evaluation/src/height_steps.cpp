@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <random>
 
 namespace vcharge {
@@ -13,7 +14,9 @@ constexpr double kHand_m = 0.15;       // above the ground: where the place of a
 constexpr double kBeside_m = 0.1;      // from a line to those beside it
 constexpr double kMaxSkew_m = 0.058;   // of the edge on them: 30 degrees
 constexpr double kSpacing_m = 0.1;     // between the lines that are looked along
-constexpr double kApart_m = 0.7;       // between measurements of one kind
+constexpr double kFarApart_m = 12.8;   // between measurements of one kind, where there is room; else half as
+constexpr double kApart_m = 0.4;       // much, and again, down to this
+constexpr double kOverEdge_m = 0.05;   // from an edge onto what it is the edge of
 constexpr double kOnOneLine_m = 0.02;  // two steps are on one line
 
 double heightOf(const HeightMap& map, const Eigen::Vector2d& place_m) {
@@ -77,21 +80,26 @@ void addLength(const HeightStep& a, const HeightStep& b, const HeightMapErrorOpt
   }
 }
 
-/// The first of the shuffled candidates that lie apart.
-void takeApart(std::vector<TapeMeasurement> candidates, size_t count, std::mt19937* random,
-               std::vector<TapeMeasurement>* taken) {
-  std::shuffle(candidates.begin(), candidates.end(), *random);
+/// Whether a tape can be held over the step: both sides are level.
+bool isLevel(const HeightMap& truth, const HeightStep& step, double plateau_m) {
+  return isFlat(truth, step.place_m - 0.5 * truth.cell_size_m * step.direction, -step.direction, plateau_m) &&
+         isFlat(truth, step.place_m + 0.5 * truth.cell_size_m * step.direction, step.direction, plateau_m);
+}
+
+/// Some of the candidates in the order given, as far apart as there is room for so many.
+std::vector<TapeMeasurement> spread(const std::vector<TapeMeasurement>& candidates, size_t count) {
   std::vector<TapeMeasurement> chosen;
-  for (const TapeMeasurement& candidate : candidates) {
-    const bool apart = std::none_of(chosen.begin(), chosen.end(), [&](const TapeMeasurement& other) {
-      return (candidate.from_m - other.from_m).norm() < kApart_m &&
-             (candidate.to_m - other.to_m).norm() < kApart_m;
-    });
-    if (apart && chosen.size() < count) {
-      chosen.push_back(candidate);
+  for (double apart_m = kFarApart_m; apart_m >= kApart_m; apart_m *= 0.5) {
+    for (const TapeMeasurement& candidate : candidates) {
+      const bool apart = std::none_of(chosen.begin(), chosen.end(), [&](const TapeMeasurement& other) {
+        return (candidate.from_m + candidate.to_m - other.from_m - other.to_m).norm() < 2.0 * apart_m;
+      });
+      if (apart && chosen.size() < count) {
+        chosen.push_back(candidate);
+      }
     }
   }
-  taken->insert(taken->end(), chosen.begin(), chosen.end());
+  return chosen;
 }
 
 }  // namespace
@@ -146,23 +154,33 @@ std::vector<HeightStep> findHeightSteps(const HeightMap& truth, const HeightMapE
   return steps;
 }
 
-std::vector<TapeMeasurement> pickMeasurements(const std::vector<HeightStep>& steps,
-                                              const HeightMapErrorOptions& options) {
-  std::vector<TapeMeasurement> heights, lengths, taken;
+std::vector<TapeMeasurement> pickMeasurements(const HeightMap& truth,
+                                              const std::vector<HeightStep>& all_steps,
+                                              const IsRigid& is_rigid, const HeightMapErrorOptions& options) {
+  std::vector<HeightStep> steps;
+  std::copy_if(all_steps.begin(), all_steps.end(), std::back_inserter(steps), [&](const HeightStep& step) {
+    return is_rigid(step.place_m + kOverEdge_m * step.direction, step.high_m);
+  });
+  std::vector<TapeMeasurement> heights, lengths;
   for (size_t i = 0; i < steps.size(); ++i) {
-    if (steps[i].both_sides_seen) {
+    if (steps[i].both_sides_seen && isLevel(truth, steps[i], options.plateau_m)) {
       const Eigen::Vector2d beside = options.plateau_m * steps[i].direction;
-      heights.push_back({TapeMeasurement::Kind::kHeight, steps[i].place_m - beside, steps[i].place_m + beside,
-                         steps[i].high_m - steps[i].low_m, std::nan("")});
+      const Eigen::Vector2d below = steps[i].place_m - beside, above = steps[i].place_m + beside;
+      heights.push_back({TapeMeasurement::Kind::kHeight, below, above,
+                         heightOf(truth, above) - heightOf(truth, below), std::nan("")});
     }
     for (size_t k = i + 1; k < steps.size(); ++k) {
       addLength(steps[i], steps[k], options, &lengths);
     }
   }
   std::mt19937 random(static_cast<uint32_t>(options.seed));
+  std::shuffle(heights.begin(), heights.end(), random);
+  std::shuffle(lengths.begin(), lengths.end(), random);
   const auto count = static_cast<size_t>(options.num_measurements);
-  takeApart(lengths, count - count / 2, &random, &taken);
-  takeApart(heights, count - std::min(count, taken.size()), &random, &taken);
+  const size_t num_heights = spread(heights, count / 2).size();
+  std::vector<TapeMeasurement> taken = spread(lengths, count - num_heights);
+  const std::vector<TapeMeasurement> others = spread(heights, count - taken.size());
+  taken.insert(taken.end(), others.begin(), others.end());
   return taken;
 }
 

@@ -27,9 +27,11 @@ double stepLevel(const HeightStep& step);
 std::vector<HeightStep> findHeightSteps(const HeightMap& truth, const HeightMapErrorOptions& options,
                                         const std::function<bool(const Eigen::Vector2d& place_m)>& isSeen);
 
-/// Tape-measure distances between and over some of the steps, picked by the options' seed: half of them
-/// heights of steps, half lengths between two edges on a line, as far as there are such.
-std::vector<TapeMeasurement> pickMeasurements(const std::vector<HeightStep>& steps,
-                                              const HeightMapErrorOptions& options);
+/// Tape-measure distances as somebody would take them in the scene itself, whatever a map shows of it:
+/// between and over edges of rigid things that the cameras saw, spread over the place, picked by the options'
+/// seed. Half of them are heights of steps that are flat over plateau_m on both sides, half lengths between
+/// two edges on a line; where there are too few of one kind the other fills up.
+std::vector<TapeMeasurement> pickMeasurements(const HeightMap& truth, const std::vector<HeightStep>& steps,
+                                              const IsRigid& is_rigid, const HeightMapErrorOptions& options);
 
 }  // namespace vcharge

@@ -1,6 +1,8 @@
 #include "surface_visibility.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace vcharge {
 namespace {
@@ -40,7 +42,8 @@ SurfaceVisibility::SurfaceVisibility(const HeightMap& surface, const Trajectory&
 bool SurfaceVisibility::sees(const View& view, const Eigen::Vector3d& point_in_world) const {
   const Eigen::Vector3d to_camera = view.position_m - point_in_world;
   const double distance = to_camera.norm();
-  if (distance > max_range_m_) {
+  // What heights describe faces up: nobody sees it from below, as the top of a wall over the camera.
+  if (distance > max_range_m_ || to_camera.z() <= 0.0) {
     return false;
   }
   const RigCamera& camera = rig_.cameras[view.camera];
@@ -74,6 +77,17 @@ int SurfaceVisibility::countViews(const Eigen::Vector3d& point_in_world, int eno
     }
   }
   return count;
+}
+
+double SurfaceVisibility::nearestView(const Eigen::Vector3d& point_in_world) const {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const View& view : views_) {
+    const double distance = (view.position_m - point_in_world).norm();
+    if (distance < nearest && sees(view, point_in_world)) {
+      nearest = distance;
+    }
+  }
+  return nearest;
 }
 
 }  // namespace vcharge

@@ -15,9 +15,11 @@ class SurfaceVisibility {
   SurfaceVisibility(const HeightMap& surface, const Trajectory& world_from_vehicle, const CameraRig& rig,
                     double view_distance_m, double max_range_m);
 
-  /// In how many views a point a little above the surface is in the image, not behind the own vehicle, and
-  /// not hidden; counting ends at `enough`. Thread safe.
+  /// In how many views a point a little above the surface is in the image, below the camera, not behind the
+  /// own vehicle, and not hidden; counting ends at `enough`. Thread safe.
   int countViews(const Eigen::Vector3d& point_in_world, int enough) const;
+  /// Distance of the nearest of these views; infinite where there is none. Thread safe.
+  double nearestView(const Eigen::Vector3d& point_in_world) const;
 
  private:
   struct View {

@@ -4,10 +4,13 @@
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include <octomap/OcTree.h>
 
 #include "vcharge_core/error.h"
+#include "vcharge_core/quantile.h"
 #include "vcharge_ros/conversions.h"
 
 namespace vcharge {
@@ -44,7 +47,9 @@ void fromMessage(const octomap_msgs::Octomap& message, const std::string& source
 
 visualization_msgs::Marker makeOctomapMarker(const octomap::OcTree& tree, const std::string& frame_id,
                                              Timestamp stamp) {
-  constexpr double kSpan_m = 2.5;  // of the colours, from the lowest leaf
+  constexpr double kSpan_m = 2.5;  // of the colours, from the height below which
+  constexpr double kLowShare =
+      0.05;  // this share of the leaves lies: a few wrong ranges end deep in the ground
   visualization_msgs::Marker marker;
   marker.header.frame_id = frame_id;
   marker.header.stamp = fromTimestamp(stamp);
@@ -72,10 +77,12 @@ visualization_msgs::Marker makeOctomapMarker(const octomap::OcTree& tree, const 
     marker.action = visualization_msgs::Marker::DELETE;
     return marker;
   }
-  const double low =
-      std::min_element(marker.points.begin(), marker.points.end(), [](const auto& a, const auto& b) {
-        return a.z < b.z;
-      })->z;
+  std::vector<double> heights;
+  heights.reserve(marker.points.size());
+  for (const geometry_msgs::Point& point : marker.points) {
+    heights.push_back(point.z);
+  }
+  const double low = quantile(std::move(heights), kLowShare);
   for (const geometry_msgs::Point& point : marker.points) {
     const auto share = static_cast<float>(std::clamp((point.z - low) / kSpan_m, 0.0, 1.0));
     std_msgs::ColorRGBA colour;

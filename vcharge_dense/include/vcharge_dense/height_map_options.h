@@ -19,8 +19,13 @@ struct HeightFusionOptions {
   double band_m = 0.15;              ///< behind the surface, along the ray: occupied; free or unknown beyond
   double min_ramp_m = 0.01;          ///< the weight runs from free to occupied over sigma, no less than this
   double reference_sigma_m = 0.05;   ///< the weight of a range of this sigma is one half
-  double free_weight = 1.0;          ///< of free voxels over that of occupied ones
-  double max_memory_gb = 4.0;        ///< a grid that needs more is refused
+  /// A range's weight grows with the log odds of its confidence and is 1 at this one (0: all alike).
+  double reference_confidence = 0.9;
+  /// The weight of a range whose pixel spans this much of the surface is one half (0: all alike). Far ground
+  /// is seen at grazing angles: a matching window there covers both sides of a kerb.
+  double reference_footprint_m = 0.0;
+  double free_weight = 1.0;    ///< of free voxels over that of occupied ones
+  double max_memory_gb = 4.0;  ///< a grid that needs more is refused
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
@@ -34,6 +39,8 @@ struct HeightFusionOptions {
     visit("band_m", band_m);
     visit("min_ramp_m", min_ramp_m);
     visit("reference_sigma_m", reference_sigma_m);
+    visit("reference_confidence", reference_confidence);
+    visit("reference_footprint_m", reference_footprint_m);
     visit("free_weight", free_weight);
     visit("max_memory_gb", max_memory_gb);
   }
@@ -61,9 +68,10 @@ struct HeightRegularizationOptions {
   double label_lambda = 0.2;  ///< lambda_l
   double label_gamma = 12.0;  ///< gamma: sum of weights that the free space of an observed cell must reach
   PrimalDualOptions label_solver = {1e-3, 4000, 1.0};
-  double height_lambda = 1.0;  ///< lambda_h
-  double alpha_up = 1.0;       ///< alpha_1: slope of the cost below the cell's best height
-  double alpha_down = 1.0;     ///< alpha_2: above it
+  double height_lambda = 2.0;         ///< lambda_h
+  double alpha_up = 1.0;              ///< alpha_1: slope of the cost below the cell's best height
+  double alpha_down = 1.0;            ///< alpha_2: above it
+  double confidence_weighting = 1.0;  ///< 0: the data of all cells count alike; 1: as their confidence
   double huber_epsilon_m = 0.01;
   PrimalDualOptions height_solver;
 
@@ -75,6 +83,7 @@ struct HeightRegularizationOptions {
     visit("height_lambda", height_lambda);
     visit("alpha_up", alpha_up);
     visit("alpha_down", alpha_down);
+    visit("confidence_weighting", confidence_weighting);
     visit("huber_epsilon_m", huber_epsilon_m);
     visit("height_solver", height_solver);
   }

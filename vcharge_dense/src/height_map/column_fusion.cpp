@@ -18,7 +18,7 @@
 namespace vcharge {
 namespace {
 
-constexpr int kBlockCells = 128;        // side of a block of columns
+constexpr int kBlockCells = 256;        // side of a block of columns
 constexpr size_t kViewsAtOnce = 8;      // that are added to a block in one parallel loop
 constexpr size_t kKeptViews = 64;       // in memory, the last ones that were used
 constexpr double kBytesPerCell = 80.0;  // of images and solvers, see primal_dual.h

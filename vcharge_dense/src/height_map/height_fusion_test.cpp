@@ -1,5 +1,6 @@
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -119,6 +120,24 @@ TEST(HeightFusionTest, DoesNotClaimWhatNobodySaw) {
   EXPECT_EQ(observed.at<uint8_t>(0, 0), 0);
   EXPECT_EQ(observed.at<uint8_t>(drive.grid.rows - 1, drive.grid.columns - 1), 0);
   EXPECT_GT(cv::countNonZero(observed), 5000);
+}
+
+TEST(HeightFusionTest, RangesThatAreNotFiniteChangeNothing) {
+  const Drive drive;
+  Drive other;
+  int number = 0;
+  for (const float value : {std::nanf(""), std::numeric_limits<float>::infinity(), 0.0F, -1.0F}) {
+    for (const bool in_sigma : {false, true}) {
+      // Beside the box, where all others see the same.
+      const RigidTransform pose = other.poses[static_cast<size_t>(8 + number++)];
+      RangeMap map = testing::renderView(other.world, pose, cv::Size(320, 200));
+      (in_sigma ? map.standard_deviation_m : map.range_m).setTo(value);
+      other.maps.push_back(std::make_shared<const PackedRangeMap>(packRangeMap(map, pose, other.options)));
+      other.positions.push_back(pose.translation());
+    }
+  }
+  const cv::Mat expected = drive.fuse().best_height_m, actual = other.fuse().best_height_m;
+  EXPECT_EQ(std::memcmp(expected.data, actual.data, expected.total() * sizeof(float)), 0);
 }
 
 TEST(HeightFusionTest, IsTheSameOnAnyNumberOfThreads) {

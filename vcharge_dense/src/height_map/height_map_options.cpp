@@ -28,6 +28,9 @@ void HeightFusionOptions::validate() const {
   requirePositive("band_m", band_m);
   requirePositive("min_ramp_m", min_ramp_m);
   requirePositive("reference_sigma_m", reference_sigma_m);
+  requireField(reference_confidence == 0.0 || (reference_confidence > 0.5 && reference_confidence < 1.0),
+               "reference_confidence", "must be 0 or in (0.5, 1)", reference_confidence);
+  requireNotNegative("reference_footprint_m", reference_footprint_m);
   requirePositive("free_weight", free_weight);
   requirePositive("max_memory_gb", max_memory_gb);
 }
@@ -45,6 +48,8 @@ void HeightRegularizationOptions::validate() const {
   requirePositive("height_lambda", height_lambda);
   requirePositive("alpha_up", alpha_up);
   requirePositive("alpha_down", alpha_down);
+  requireField(confidence_weighting >= 0.0 && confidence_weighting <= 1.0, "confidence_weighting",
+               "must be in [0, 1]", confidence_weighting);
   requirePositive("huber_epsilon_m", huber_epsilon_m);
   validateInner("height_solver", height_solver);
 }

@@ -5,6 +5,7 @@
 #include <sstream>
 #include <utility>
 
+#include <tbb/task_group.h>
 #include <opencv2/imgcodecs.hpp>
 
 #include "height_map/cell_colours.h"
@@ -189,21 +190,24 @@ HeightMapResult HeightMapper::finish(const std::function<void(const std::string&
   {
     const StageTimer timer("colours and octomap", &times_s_);
     const auto show = report("colours and octomap");
+    tbb::task_group rays;  // of one view after the other, while the next one is read and coloured
     result.map.gray = colourCells(
         result.map, views_.size(),
         [&](size_t i, PackedRangeMap* range, cv::Mat* image) {
           const View& view = views_[i];
-          const RangeMap map = readView(view);
-          *range = packRangeMap(map, view.world_from_camera, fusion);
+          const auto map = std::make_shared<const RangeMap>(readView(view));
+          rays.wait();
+          rays.run([&octomap = *result.octomap, map, &view] { octomap.add(*map, view.world_from_camera); });
+          *range = packRangeMap(*map, view.world_from_camera, fusion);
           const std::string path = imagePath(folder(), rig_->cameras[view.camera_index].name, view.stamp);
           *image = cv::imread(path, cv::IMREAD_GRAYSCALE);
-          if (image->size() != map.range_m.size()) {
+          if (image->size() != map->range_m.size()) {
             throw InputError(path + ": expected the image of a range map");
           }
-          result.octomap->add(map, view.world_from_camera);
           show(static_cast<double>(i + 1) / static_cast<double>(views_.size()));
         },
         fusion.max_range_m);
+    rays.wait();
   }
   statistics.num_views = views_.size();
   statistics.num_reused = num_reused_;

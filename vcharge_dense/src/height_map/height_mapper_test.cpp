@@ -2,11 +2,14 @@
 
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <octomap/OcTree.h>
@@ -91,7 +94,14 @@ TEST_F(HeightMapperTest, MapsLevelGroundAndGoesOnWhereItWasStopped) {
     HeightMapper mapper(rig_, options_, folder_ + "/work", "drive");
     mapper.setTrajectory(poses(kNumImages));
     drive(&mapper);
-    HeightMapResult result = mapper.finish({});
+    std::map<std::string, std::vector<double>> shares;
+    HeightMapResult result =
+        mapper.finish([&](const std::string& step, double share) { shares[step].push_back(share); });
+    EXPECT_GE(shares.size(), 2U);
+    for (const auto& [step, values] : shares) {
+      EXPECT_TRUE(std::is_sorted(values.begin(), values.end())) << step;
+      EXPECT_DOUBLE_EQ(values.back(), 1.0) << step;
+    }
     hash = hashOf(result.map);
     EXPECT_EQ(result.map.frame_id, "map");
     EXPECT_TRUE(result.statistics.converged);

@@ -44,7 +44,7 @@ const RayTable& OctomapBuilder::raysOf(const RangeMap& map) {
 void OctomapBuilder::add(const RangeMap& map, const RigidTransform& world_from_camera) {
   const RayTable& rays = raysOf(map);
   const Eigen::Vector3d origin = world_from_camera.translation();
-  octomap::KeySet free, occupied;
+  octomap::KeySet ends, free, occupied;
   octomap::KeyRay ray_keys;
   for (int y = 0; y < map.range_m.rows; y += options_.pixel_step) {
     for (int x = 0; x < map.range_m.cols; x += options_.pixel_step) {
@@ -64,8 +64,8 @@ void OctomapBuilder::add(const RangeMap& map, const RigidTransform& world_from_c
       if (ends_here) {
         occupied.insert(end_key);
       }
-      // Rays to one voxel clear much the same: many end in one that a ray went through already.
-      if (tree_->computeRayKeys(toOctomap(origin), toOctomap(end), ray_keys)) {
+      // Rays to one voxel clear much the same: the first one stands for all.
+      if (ends.insert(end_key).second && tree_->computeRayKeys(toOctomap(origin), toOctomap(end), ray_keys)) {
         free.insert(ray_keys.begin(), ray_keys.end());
       }
     }

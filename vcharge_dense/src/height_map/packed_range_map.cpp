@@ -1,5 +1,6 @@
 #include "height_map/packed_range_map.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "vcharge_core/error.h"
@@ -20,6 +21,47 @@ float changeAcross(float before, float here, float after) {
   }
   return has_before ? here - before : has_after ? after - here : 0.0F;
 }
+
+float squared(float value) {
+  return value * value;
+}
+
+// A range more confident than this one counts no more.
+constexpr float kFullConfidence = 0.99F;
+
+float logOdds(float confidence) {
+  return std::log(confidence / (1.0F - confidence));
+}
+
+/// Weight of a range by its sigma, its confidence and by how much of the surface its pixel spans.
+/// `pixel_rad`: angle of a pixel; changes of the inverse range to the neighbours.
+class RangeWeight {
+ public:
+  RangeWeight(const HeightFusionOptions& options, float pixel_rad)
+      : inverse_sigma_(static_cast<float>(1.0 / options.reference_sigma_m)),
+        inverse_footprint_(options.reference_footprint_m > 0.0
+                               ? static_cast<float>(1.0 / options.reference_footprint_m)
+                               : 0.0F),
+        inverse_log_odds_(options.reference_confidence > 0.0
+                              ? 1.0F / logOdds(static_cast<float>(options.reference_confidence))
+                              : 0.0F),
+        pixel_rad_(pixel_rad) {}
+
+  float operator()(float inverse_range, float sigma_m, float confidence, float by_column,
+                   float by_row) const {
+    const float range = 1.0F / inverse_range;
+    const float along = range * range * std::max(std::abs(by_column), std::abs(by_row));
+    const float footprint_squared = squared(range * pixel_rad_) + squared(along);
+    const float sure = inverse_log_odds_ > 0.0F
+                           ? inverse_log_odds_ * logOdds(std::clamp(confidence, 0.5F, kFullConfidence))
+                           : 1.0F;
+    return sure / ((1.0F + squared(sigma_m * inverse_sigma_)) *
+                   (1.0F + footprint_squared * squared(inverse_footprint_)));
+  }
+
+ private:
+  const float inverse_sigma_, inverse_footprint_, inverse_log_odds_, pixel_rad_;
+};
 
 cv::Mat inverseRange(const RangeMap& map, const HeightFusionOptions& options, size_t* num_known) {
   cv::Mat inverse(map.range_m.size(), CV_32FC1, cv::Scalar(0));
@@ -64,6 +106,7 @@ PackedRangeMap packRangeMap(const RangeMap& map, const RigidTransform& world_fro
   }
   packed.position_m = world_from_camera.translation();
 
+  const RangeWeight weightOf(options, (1.0F + packed.xi) / packed.fx);  // of a pixel in the middle
   const cv::Mat inverse = inverseRange(map, options, &packed.num_known);
   packed.values.resize(inverse.total() * PackedRangeMap::kValues);
   float* out = packed.values.data();
@@ -72,6 +115,7 @@ PackedRangeMap packRangeMap(const RangeMap& map, const RigidTransform& world_fro
     const auto* above = inverse.ptr<float>(y > 0 ? y - 1 : y);
     const auto* below = inverse.ptr<float>(y + 1 < inverse.rows ? y + 1 : y);
     const auto* sigma = map.standard_deviation_m.ptr<float>(y);
+    const auto* confidence = map.confidence.ptr<float>(y);
     for (int x = 0; x < inverse.cols; ++x, out += PackedRangeMap::kValues) {
       const float here = row[x];
       const bool known = here > 0.0F;
@@ -81,6 +125,7 @@ PackedRangeMap packRangeMap(const RangeMap& map, const RigidTransform& world_fro
       out[2] =
           known ? changeAcross(y > 0 ? above[x] : 0.0F, here, y + 1 < inverse.rows ? below[x] : 0.0F) : 0.0F;
       out[3] = known ? sigma[x] : 1.0F;
+      out[4] = known ? weightOf(here, sigma[x], confidence[x], out[1], out[2]) : 0.0F;
     }
   }
   return packed;

@@ -9,10 +9,10 @@
 
 namespace vcharge {
 
-/// A range map as the fusion reads it: per pixel inverse range, its change to the right and downwards, and
-/// sigma, side by side, so that a voxel between pixels is compared with the surface between them.
+/// A range map as the fusion reads it: per pixel inverse range, its change to the right and downwards, sigma
+/// and weight, side by side, so that a voxel between pixels is compared with the surface between them.
 struct PackedRangeMap {
-  static constexpr int kValues = 4;  // inverse range (0: unknown), by column, by row, sigma in metres
+  static constexpr int kValues = 5;  // inverse range (0: unknown), by column, by row, sigma in metres, weight
 
   AlignedArray<float> values;
   int width = 0, height = 0;

@@ -47,9 +47,8 @@ void addColumnWeightsPlain(const PackedRangeMap& map, const WeightProfile& profi
     if (behind > profile.band_m + ramp) {
       continue;
     }
-    const float relative = sigma * profile.inverse_reference_sigma;
     const float side = std::clamp(behind / ramp, -1.0F, 1.0F);
-    weights[z] += (side < 0.0F ? profile.free_weight * side : side) / (1.0F + relative * relative);
+    weights[z] += (side < 0.0F ? profile.free_weight * side : side) * pixel[4];
   }
 }
 
@@ -92,15 +91,16 @@ void PlainPrimalDual::iterate() {
       }
       const float ceiling = problem_.ceiling.at<float>(row, column);
       const float slope = problem_.slope.empty() ? 0.0F : problem_.slope.at<float>(row, column);
+      const float weight = problem_.weight.empty() ? 1.0F : problem_.weight.at<float>(row, column);
       const float divergence =
           dual_x_.at<float>(row, column) - (column > 0 ? dual_x_.at<float>(row, column - 1) : 0.0F) +
           dual_y_.at<float>(row, column) - (row > 0 ? dual_y_.at<float>(row - 1, column) : 0.0F);
       const float before = value_.at<float>(row, column);
       float after = before + primal_step_ * (divergence - slope);
       if (after < floor) {
-        after = std::min(floor, after + primal_step_ * problem_.below);
+        after = std::min(floor, after + primal_step_ * weight * problem_.below);
       } else if (after > ceiling) {
-        after = std::max(ceiling, after - primal_step_ * problem_.above);
+        after = std::max(ceiling, after - primal_step_ * weight * problem_.above);
       }
       after = std::clamp(after, problem_.low, problem_.high);
       value_.at<float>(row, column) = after;
@@ -121,8 +121,9 @@ double plainEnergy(const VariationalProblem& problem, const cv::Mat& values) {
           std::hypot(gradient(values, row, column, 0, 1), gradient(values, row, column, 1, 0));
       const double epsilon = problem.epsilon;
       energy += norm < epsilon ? norm * norm / (2.0 * epsilon) : norm - 0.5 * epsilon;
-      energy += problem.below * std::max(0.0, problem.floor.at<float>(row, column) - value);
-      energy += problem.above * std::max(0.0, value - problem.ceiling.at<float>(row, column));
+      const double weight = problem.weight.empty() ? 1.0 : problem.weight.at<float>(row, column);
+      energy += weight * problem.below * std::max(0.0, problem.floor.at<float>(row, column) - value);
+      energy += weight * problem.above * std::max(0.0, value - problem.ceiling.at<float>(row, column));
       energy += problem.slope.empty() ? 0.0 : problem.slope.at<float>(row, column) * value;
     }
   }

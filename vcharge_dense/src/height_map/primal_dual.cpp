@@ -40,7 +40,8 @@ PrimalDualSolver::PrimalDualSolver(const VariationalProblem& problem, const cv::
     : problem_(problem), rows_(start.rows), columns_(start.cols), stride_(strideFor(start.cols)) {
   check(start.type() == CV_32FC1 && problem.floor.size() == start.size() &&
             problem.ceiling.size() == start.size() &&
-            (problem.slope.empty() || problem.slope.size() == start.size()),
+            (problem.slope.empty() || problem.slope.size() == start.size()) &&
+            (problem.weight.empty() || problem.weight.size() == start.size()),
         "PrimalDualSolver: expected CV_32FC1 images of one size");
   // The gradient's norm is below sqrt(8): the product of the steps must not exceed 1/8.
   primal_step_ = static_cast<float>(step_ratio / std::sqrt(8.0));
@@ -48,6 +49,7 @@ PrimalDualSolver::PrimalDualSolver(const VariationalProblem& problem, const cv::
   floor_ = padded(problem.floor, stride_, rows_, kNan);
   ceiling_ = padded(problem.ceiling, stride_, rows_, kNan);
   slope_ = padded(problem.slope, stride_, rows_, 0.0F);
+  weight_ = padded(problem.weight, stride_, rows_, 1.0F);
   cv::Mat first = start.clone();
   for (int row = 0; row < rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
@@ -95,11 +97,12 @@ void PrimalDualSolver::iterateBand(int first_row, int last_row, const Fields& fr
       }
       const size_t at = static_cast<size_t>(row + 1) * stride_ + kRowPadding;
       const size_t data = offset(begin + row) + kRowPadding;
-      iterateRow({scratch.value.data() + at, scratch.extrapolated.data() + at,
-                  scratch.extrapolated.data() + at + stride_, scratch.dual_x.data() + at,
-                  scratch.dual_y.data() + at, scratch.dual_y.data() + at - stride_, floor_.data() + data,
-                  ceiling_.data() + data, slope_.data() + data, stride_ - 2 * kRowPadding},
-                 steps);
+      iterateRow(
+          {scratch.value.data() + at, scratch.extrapolated.data() + at,
+           scratch.extrapolated.data() + at + stride_, scratch.dual_x.data() + at, scratch.dual_y.data() + at,
+           scratch.dual_y.data() + at - stride_, floor_.data() + data, ceiling_.data() + data,
+           slope_.data() + data, weight_.data() + data, stride_ - 2 * kRowPadding},
+          steps);
     }
   }
   for (const auto member : members) {
@@ -132,7 +135,8 @@ double PrimalDualSolver::rowEnergy(int row, double* dual) const {
       continue;
     }
     const auto cost = [&](double u) {
-      return problem_.below * std::max(0.0, floor - u) + problem_.above * std::max(0.0, u - ceiling) +
+      return weight_[at + i] *
+                 (problem_.below * std::max(0.0, floor - u) + problem_.above * std::max(0.0, u - ceiling)) +
              slope * u;
     };
     const double by_x = std::isnan(value[i + 1]) ? 0.0 : value[i + 1] - value[i];

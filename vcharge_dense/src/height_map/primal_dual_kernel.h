@@ -16,6 +16,7 @@ struct PrimalDualRow {
   const float* floor;
   const float* ceiling;
   const float* slope;
+  const float* weight;
   size_t padded_columns;  ///< a multiple of kRowPadding
 };
 

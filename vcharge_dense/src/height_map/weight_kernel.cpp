@@ -27,11 +27,9 @@ HWY_INLINE VF set(float value) {
 }
 
 /// Weight at a signed distance behind the surface.
-HWY_INLINE VF weightAt(const WeightProfile& profile, VF behind, VF sigma) {
+HWY_INLINE VF weightAt(const WeightProfile& profile, VF behind, VF sigma, VF scale) {
   const VF one = set(1.0f), zero = hn::Zero(DF());
   const VF ramp = hn::Max(sigma, set(profile.min_ramp_m));
-  const VF relative = hn::Mul(sigma, set(profile.inverse_reference_sigma));
-  const VF scale = hn::Div(one, hn::MulAdd(relative, relative, one));
   const VF signed_weight = hn::Max(set(-1.0f), hn::Min(hn::Div(behind, ramp), one));
   const VF sided = hn::IfThenElse(hn::Lt(signed_weight, zero),
                                   hn::Mul(signed_weight, set(profile.free_weight)), signed_weight);
@@ -68,16 +66,17 @@ void addColumnWeightsTarget(const PackedRangeMap& map, const WeightProfile& prof
     }
     const VI pixel = hn::ConvertTo(
         di, hn::IfThenElseZero(seen, hn::MulAdd(row_px, set(static_cast<float>(map.width)), column_px)));
-    const VI index = hn::ShiftLeft<2>(pixel);
+    const VI index = hn::Add(hn::ShiftLeft<2>(pixel), pixel);  // PackedRangeMap::kValues
     const VF middle = hn::GatherIndex(df, values, index);
     const VF by_column = hn::GatherIndex(df, values + 1, index);
     const VF by_row = hn::GatherIndex(df, values + 2, index);
     const VF sigma = hn::GatherIndex(df, values + 3, index);
+    const VF scale = hn::GatherIndex(df, values + 4, index);
     const VF rho =
         hn::MulAdd(by_column, hn::Sub(u, column_px), hn::MulAdd(by_row, hn::Sub(v, row_px), middle));
     const MF known = hn::And(seen, hn::And(hn::Gt(middle, hn::Zero(df)), hn::Gt(rho, set(1e-4f))));
     const VF behind = hn::Sub(distance, hn::Div(one, hn::IfThenElse(known, rho, one)));
-    const VF weight = hn::IfThenElseZero(known, weightAt(profile, behind, sigma));
+    const VF weight = hn::IfThenElseZero(known, weightAt(profile, behind, sigma, scale));
     hn::StoreU(hn::Add(hn::LoadU(df, weights + z), weight), df, weights + z);
   }
 }
@@ -105,7 +104,6 @@ WeightProfile::WeightProfile(const HeightFusionOptions& options)
     : max_range_m(static_cast<float>(options.max_range_m)),
       band_m(static_cast<float>(options.band_m)),
       min_ramp_m(static_cast<float>(options.min_ramp_m)),
-      inverse_reference_sigma(static_cast<float>(1.0 / options.reference_sigma_m)),
       free_weight(static_cast<float>(options.free_weight)) {}
 
 }  // namespace vcharge

@@ -6,7 +6,7 @@ namespace vcharge {
 
 /// How a ray's weight runs along it: see HeightFusionOptions.
 struct WeightProfile {
-  float max_range_m, band_m, min_ramp_m, inverse_reference_sigma, free_weight;
+  float max_range_m, band_m, min_ramp_m, free_weight;
 
   explicit WeightProfile(const HeightFusionOptions& options);
 };
@@ -21,7 +21,7 @@ struct VoxelColumn {
 constexpr int kVoxelLanes = 16;  // of the widest vectors
 
 /// Adds a range map's weight to each voxel of a column: negative in front of the surface on the voxel's ray,
-/// rising over sigma to positive in a band behind it, zero beyond; scaled by how certain the range is.
+/// rising over sigma to positive in a band behind it, zero beyond; times the range's weight.
 using AddColumnWeights = void (*)(const PackedRangeMap& map, const WeightProfile& profile,
                                   const VoxelColumn& column, float* weights);
 

@@ -16,6 +16,8 @@ namespace {
 HeightFusionOptions fusionOptions() {
   HeightFusionOptions options;
   options.min_ramp_m = 0.02;
+  options.reference_footprint_m = 0.0;
+  options.reference_confidence = 0.0;
   return options;
 }
 
@@ -55,6 +57,53 @@ TEST(WeightKernelTest, CountsUncertainRangesLess) {
   EXPECT_NEAR(alongAxis(0.1F)[0], -0.2, 1e-3);
 }
 
+TEST(WeightKernelTest, CountsRangesByTheLogOddsOfTheirConfidence) {
+  HeightFusionOptions options = fusionOptions();
+  const auto weightAt = [&](double confidence) {
+    RangeMap map = testing::blankView(cv::Size(64, 48));
+    map.confidence.setTo(confidence);
+    return packRangeMap(map, RigidTransform(), options).values[4];
+  };
+  const float alike = weightAt(0.7);
+  EXPECT_EQ(weightAt(0.95), alike);
+  options.reference_confidence = 0.9;
+  EXPECT_NEAR(weightAt(0.9), alike, 1e-5);
+  EXPECT_NEAR(weightAt(0.5), 0.0, 1e-5);
+  EXPECT_NEAR(weightAt(0.99) / alike, std::log(99.0) / std::log(9.0), 1e-3);
+  EXPECT_EQ(weightAt(1.0), weightAt(0.99));  // finite
+}
+
+TEST(WeightKernelTest, CountsRangesLessWhosePixelSpansMoreOfTheSurface) {
+  // Level ground 1 m below a camera that looks to the horizon: on the axis' column a pixel at range r spans
+  // r * r / 1 m of it for each radian.
+  RangeMap map = testing::blankView(cv::Size(640, 400));
+  for (int y = 0; y < map.range_m.rows; ++y) {
+    for (int x = 0; x < map.range_m.cols; ++x) {
+      const double down = testing::rayOf(map, x, y).y();
+      map.range_m.at<float>(y, x) = down > 0.05 ? static_cast<float>(1.0 / down) : std::nanf("");
+    }
+  }
+  HeightFusionOptions options = fusionOptions();
+  const PackedRangeMap without = packRangeMap(map, RigidTransform(), options);
+  options.reference_footprint_m = 0.05;
+  const PackedRangeMap with = packRangeMap(map, RigidTransform(), options);
+  const double pixel_rad = 2.1 / 320.0;
+  int num = 0;
+  for (int y = 210; y < 300; y += 10) {
+    const size_t at = (static_cast<size_t>(y) * 640 + 320) * PackedRangeMap::kValues;
+    const double range = map.range_m.at<float>(y, 320);
+    if (!(range > 2.0)) {
+      continue;  // nearer, pixels away from the middle are wider
+    }
+    const double relative = range * range * pixel_rad / options.reference_footprint_m;
+    EXPECT_NEAR(with.values[at + 4] / without.values[at + 4], 1.0 / (1.0 + relative * relative),
+                0.2 / (1.0 + relative * relative))
+        << range;
+    ++num;
+  }
+  EXPECT_GT(num, 3);
+}
+
 TEST(WeightKernelTest, EqualsThePlainReference) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> uniform(0.0F, 1.0F);
@@ -65,7 +114,8 @@ TEST(WeightKernelTest, EqualsThePlainReference) {
       map.standard_deviation_m.at<float>(y, x) = 0.3F * uniform(random);
     }
   }
-  const HeightFusionOptions options = fusionOptions();
+  HeightFusionOptions options = fusionOptions();
+  options.reference_footprint_m = 0.1;
   const PackedRangeMap packed = packRangeMap(map, RigidTransform(), options);
   const WeightProfile profile(options);
   size_t num_different = 0, num_touched = 0;

@@ -10,6 +10,7 @@
 #include "vcharge_core/rigid_transform.h"
 #include "vcharge_core/trajectory.h"
 #include "vcharge_evaluation/error_distribution.h"
+#include "vcharge_evaluation/obstacle_truth.h"
 
 namespace vcharge {
 
@@ -45,6 +46,14 @@ struct HeightMapErrorOptions {
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
+/// Whether a place is on something rigid, well enough defined for a tape measure (not a plant, not grass).
+/// Told by the scene alone; `high_m`: the true height there.
+using IsRigid = std::function<bool(const Eigen::Vector2d& place_m, double high_m)>;
+
+/// From the obstacles of the scene (obstacles.yaml): not where a tree, bush or hedge stands within 0.3 m, and
+/// on an island with a kerb only at the kerb's own height. All else is rigid: cars, walls, pillars, bins.
+IsRigid rigidBy(const std::vector<TruthObstacle>& obstacles);
+
 /// A place where the true height jumps, crossed along an axis of the world from its low to its high side.
 struct HeightStep {
   Eigen::Vector2d place_m{0, 0};     ///< of the edge, in the world
@@ -62,6 +71,13 @@ struct TapeMeasurement {
   double map_m = 0.0;  ///< NaN: the map does not show it
 };
 
+/// How the map shows a place on a kerb.
+struct KerbError {
+  Eigen::Vector2d place_m{0, 0};
+  double error_m = 0.0;         ///< height in the map less the true one
+  double nearest_view_m = 0.0;  ///< distance of the nearest frame that saw its top
+};
+
 struct HeightMapErrors {
   size_t num_seen = 0;         ///< cells whose true surface is seen often enough, apart from steps
   size_t num_mapped = 0;       ///< of these, observed in the map
@@ -72,7 +88,8 @@ struct HeightMapErrors {
   size_t num_steps_mapped = 0;  ///< of these, with heights on both sides; the others are not judged
   size_t num_steps_found = 0;   ///< of these, the map rises there
   ErrorDistribution step_position_m;
-  size_t num_kerbs = 0;
+  size_t num_kerbs_seen = 0;        ///< places on kerbs whose both sides are seen often enough
+  std::vector<KerbError> kerbs;     ///< of these, with heights on both sides
   ErrorDistribution kerb_height_m;  ///< absolute errors of the height of kerbs
   std::vector<TapeMeasurement> measurements;
   double mean_measurement_m = 0.0, max_measurement_m = 0.0;  ///< absolute errors, of those the map shows
@@ -85,10 +102,11 @@ struct HeightMapErrors {
 RigidTransform alignToTruth(const Trajectory& estimate, const Trajectory& truth);
 
 /// Judges a height map by the true one (cells no larger than half the map's give the steps' places well).
-/// `world_from_vehicle` is the true trajectory; `world_from_map` see alignToTruth().
+/// `world_from_vehicle` is the true trajectory; `world_from_map` see alignToTruth(); `is_rigid` tells between
+/// which things tape-measure distances are taken.
 HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& world_from_map,
                                   const HeightMap& truth, const Trajectory& world_from_vehicle,
-                                  const CameraRig& rig,
+                                  const CameraRig& rig, const IsRigid& is_rigid,
                                   const HeightMapErrorOptions& options = HeightMapErrorOptions());
 
 }  // namespace vcharge
