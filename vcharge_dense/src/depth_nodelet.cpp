@@ -29,6 +29,7 @@ class DepthNodelet : public nodelet::Nodelet {
   }
 
  private:
+  static constexpr uint32_t kQueueSize = 10;  // of what is published; 0: nothing is ever dropped
   struct Output {
     std::unique_ptr<RangeMapConverter> converter;
     ros::Publisher range, confidence, standard_deviation, reference, camera_info, points;
@@ -62,24 +63,25 @@ class DepthNodelet : public nodelet::Nodelet {
       }
     });
     for (const RangeMapperStatus& status : mapper_->status()) {
-      advertise(status.camera_name);
+      advertise(status.camera_name, lossless ? 0 : kQueueSize);
     }
     source_ = std::make_unique<LiveDriveSource>(node_, rig_, source_options);
     addDiagnostics(private_node);
     source_->run(mapper_.get(), DriveSource::ProgressCallback());
   }
 
-  void advertise(const std::string& camera_name) {
+  void advertise(const std::string& camera_name, uint32_t queue_size) {
     const size_t index = rig_->cameraIndex(camera_name);
     const std::string name = "/dense/" + camera_name;
     Output& output = outputs_[index];
     output.converter = std::make_unique<RangeMapConverter>(rig_->cameras[index].field_of_view_rad);
-    output.range = node_.advertise<sensor_msgs::Image>(name + "/range/image", 10);
-    output.confidence = node_.advertise<sensor_msgs::Image>(name + "/range/confidence", 10);
-    output.standard_deviation = node_.advertise<sensor_msgs::Image>(name + "/range/standard_deviation", 10);
-    output.reference = node_.advertise<sensor_msgs::Image>(name + "/range/reference", 10);
-    output.camera_info = node_.advertise<sensor_msgs::CameraInfo>(name + "/range/camera_info", 10);
-    output.points = node_.advertise<sensor_msgs::PointCloud2>(name + "/points", 10);
+    output.range = node_.advertise<sensor_msgs::Image>(name + "/range/image", queue_size);
+    output.confidence = node_.advertise<sensor_msgs::Image>(name + "/range/confidence", queue_size);
+    output.standard_deviation =
+        node_.advertise<sensor_msgs::Image>(name + "/range/standard_deviation", queue_size);
+    output.reference = node_.advertise<sensor_msgs::Image>(name + "/range/reference", queue_size);
+    output.camera_info = node_.advertise<sensor_msgs::CameraInfo>(name + "/range/camera_info", queue_size);
+    output.points = node_.advertise<sensor_msgs::PointCloud2>(name + "/points", queue_size);
   }
 
   void addDiagnostics(const ros::NodeHandle& private_node) {

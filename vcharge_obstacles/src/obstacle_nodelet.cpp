@@ -42,6 +42,7 @@ class ObstacleNodelet : public nodelet::Nodelet {
 
  private:
   static constexpr size_t kMaxIncomplete = 20;
+  static constexpr uint32_t kOutputQueue = 10;
   static constexpr size_t kMaxWaitingPerCamera = 2;
   using Task = std::function<void()>;
   struct Camera {
@@ -80,10 +81,10 @@ class ObstacleNodelet : public nodelet::Nodelet {
     if (options.fixed_frame == FixedFrame::kMap) {
       listener_ = std::make_unique<tf2_ros::TransformListener>(transforms_);
     }
-    grid_ = node_.advertise<nav_msgs::OccupancyGrid>("/obstacles/grid", 5, true);
-    scan_ = node_.advertise<sensor_msgs::LaserScan>("/obstacles/scan", 10);
-    markers_ = node_.advertise<visualization_msgs::MarkerArray>("/obstacles/markers", 5);
-    octomap_ = node_.advertise<octomap_msgs::Octomap>("/obstacles/octomap", 2);
+    grid_ = node_.advertise<nav_msgs::OccupancyGrid>("/obstacles/grid", outputQueue(), true);
+    scan_ = node_.advertise<sensor_msgs::LaserScan>("/obstacles/scan", outputQueue());
+    markers_ = node_.advertise<visualization_msgs::MarkerArray>("/obstacles/markers", outputQueue());
+    octomap_ = node_.advertise<octomap_msgs::Octomap>("/obstacles/octomap", outputQueue());
     std::vector<geometry_msgs::TransformStamped> frames;
     for (const ObstacleCameraStatus& camera : cameras) {
       addCamera(camera.camera_name, &frames);
@@ -99,14 +100,17 @@ class ObstacleNodelet : public nodelet::Nodelet {
         odometry_topic_, [this](const nav_msgs::OdometryConstPtr& message) { addOdometry(*message); });
   }
 
+  /// Of a replay without loss nothing that is published is dropped either.
+  uint32_t outputQueue() const { return is_lossless_ ? 0 : kOutputQueue; }
+
   void addCamera(const std::string& name, std::vector<geometry_msgs::TransformStamped>* frames) {
     const size_t index = rig_->cameraIndex(name);
     const std::string topic = "/dense/" + name + "/range";
     Camera& camera = cameras_[index];
     camera.reader = std::make_unique<RangeMapReader>(rig_->cameras[index], topic);
-    camera.scan = node_.advertise<sensor_msgs::LaserScan>("/obstacles/" + name + "/scan", 10);
+    camera.scan = node_.advertise<sensor_msgs::LaserScan>("/obstacles/" + name + "/scan", outputQueue());
     camera.ground =
-        node_.advertise<geometry_msgs::Vector3Stamped>("/obstacles/" + name + "/ground_plane", 10);
+        node_.advertise<geometry_msgs::Vector3Stamped>("/obstacles/" + name + "/ground_plane", outputQueue());
     Eigen::Vector3d origin = rig_->cameras[index].vehicle_from_camera->translation();
     origin.z() = 0.0;
     frames->push_back(toTransformStamped(RigidTransform(Eigen::Quaterniond::Identity(), origin), Timestamp(),
