@@ -16,7 +16,8 @@ from sensor_msgs.msg import Image, PointCloud2
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import CAMERAS, Drive  # noqa: E402
-from nodelet_fixture import drive_publishers, manager_services, project_mei, reach, wait_for, wait_until_gone  # noqa: E402
+from nodelet_fixture import (drive_publishers, expect_bad_rig_is_refused, manager_services, project_mei,  # noqa: E402
+                             reach, wait_for, wait_until_gone)
 
 
 def rays_without_distortion(width, height, p):
@@ -188,10 +189,7 @@ class DepthNodeletTest(unittest.TestCase):
         self.assertTrue(self.unload("/drive_tf").success)
 
     def test_nodelet_with_a_bad_rig_does_not_load_and_the_manager_lives_on(self):
-        rospy.set_param("/other/rig", str(self.drive.folder / "no_such_rig.yaml"))
-        with self.assertRaises(rospy.ServiceException):
-            self.load("/other", "vcharge_dense/depth_nodelet", [], [], [], "")
-        self.assertEqual(self.list().nodelets, ["/depth"])
+        expect_bad_rig_is_refused(self, "vcharge_dense/depth_nodelet", self.drive.folder / "no_such_rig.yaml")
 
 
 if __name__ == "__main__":

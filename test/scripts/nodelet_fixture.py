@@ -58,6 +58,15 @@ def wait_until_gone(manager, subscribers):
              f"connections to {manager} to end")
 
 
+def expect_bad_rig_is_refused(test, nodelet, rig):
+    """The nodelet does not load with a rig that is not there, and the manager goes on with what it has."""
+    loaded = test.list().nodelets
+    rospy.set_param("/other/rig", str(rig))
+    with test.assertRaises(rospy.ServiceException):
+        test.load("/other", nodelet, [], [], [], "")
+    test.assertEqual(test.list().nodelets, loaded)
+
+
 def announce_again(topic, kind):
     """Has the master tell all subscribers of a topic who publishes on it. rospy takes the last such news for the newest;
     where a nodelet goes and comes again at once, that may be the news that it went."""

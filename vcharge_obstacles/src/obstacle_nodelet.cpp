@@ -14,8 +14,8 @@
 #include <pluginlib/class_list_macros.hpp>
 
 #include "obstacle_messages.h"
-#include "ordered_worker.h"
 #include "vcharge_core/error.h"
+#include "vcharge_core/ordered_worker.h"
 #include "vcharge_core/text_format.h"
 #include "vcharge_obstacles/obstacle_mapper.h"
 #include "vcharge_ros/conversions.h"
@@ -76,8 +76,9 @@ class ObstacleNodelet : public nodelet::Nodelet {
     mapper_ = std::make_unique<ObstacleMapper>(rig_, options,
                                                [this](const ObstacleFrame& frame) { publish(frame); });
     const std::vector<ObstacleCameraStatus> cameras = mapper_->status();
-    worker_ = std::make_unique<OrderedWorker<Task>>([](const Task& task) { task(); },
-                                                    is_lossless_ ? 0 : kMaxWaitingPerCamera * cameras.size());
+    worker_ = std::make_unique<OrderedWorker<Task>>(
+        [](const Task& task) { task(); },
+        OrderedQueue<Task>(is_lossless_ ? 0 : kMaxWaitingPerCamera * cameras.size()));
     if (options.fixed_frame == FixedFrame::kMap) {
       listener_ = std::make_unique<tf2_ros::TransformListener>(transforms_);
     }

@@ -1,4 +1,4 @@
-#include "ordered_worker.h"
+#include "vcharge_core/ordered_worker.h"
 
 #include <atomic>
 #include <future>
@@ -13,14 +13,12 @@ TEST(OrderedWorkerTest, WorksInTheOrderInWhichTasksCome) {
   std::vector<int> done;
   std::promise<void> finished;
   {
-    OrderedWorker<int> worker(
-        [&](const int& task) {
-          done.push_back(task);
-          if (task == 99) {
-            finished.set_value();
-          }
-        },
-        0);
+    OrderedWorker<int> worker([&](const int& task) {
+      done.push_back(task);
+      if (task == 99) {
+        finished.set_value();
+      }
+    });
     for (int i = 0; i < 100; ++i) {
       worker.push(i, i % 2 == 0);
     }
@@ -48,7 +46,7 @@ TEST(OrderedWorkerTest, DropsTheOldestThatMayBeDroppedAndKeepsAllOthers) {
           finished.set_value();
         }
       },
-      2);
+      OrderedQueue<int>(2));
   worker.push(0, true);
   begun.get_future().wait();
   for (int i = 1; i < 10; ++i) {
@@ -64,14 +62,12 @@ TEST(OrderedWorkerTest, EndsWithTheTaskInWorkAndBeginsNoOther) {
   std::atomic<int> begun{0};
   std::promise<void> in_work, go_on;
   std::shared_future<void> may_go_on = go_on.get_future().share();
-  auto worker = std::make_unique<OrderedWorker<int>>(
-      [&](const int&) {
-        if (++begun == 1) {
-          in_work.set_value();
-          may_go_on.wait();
-        }
-      },
-      0);
+  auto worker = std::make_unique<OrderedWorker<int>>([&](const int&) {
+    if (++begun == 1) {
+      in_work.set_value();
+      may_go_on.wait();
+    }
+  });
   worker->push(0, false);
   worker->push(1, false);
   in_work.get_future().wait();
