@@ -91,8 +91,9 @@ class Alignment {
 
  private:
   Eigen::Vector2f offsetOf(int i) const {
-    return Eigen::Vector2f(static_cast<float>(i % side_ - options_.radius_px),
-                           static_cast<float>(i / side_ - options_.radius_px));
+    const int row = i / side_, column = i % side_;
+    return Eigen::Vector2f(static_cast<float>(column - options_.radius_px),
+                           static_cast<float>(row - options_.radius_px));
   }
 
   static Eigen::Matrix2d shapeOf(const Vector6& step) {
