@@ -58,6 +58,20 @@ def wait_until_gone(manager, subscribers):
              f"connections to {manager} to end")
 
 
+def wait_until_connected(manager, subscribers):
+    """After loading: returns once each of the subscribers is connected to the manager, to which rospy may need to be led."""
+    uri = rosgraph.Master("/" + __name__).lookupNode(manager)
+
+    def all_connected():
+        time.sleep(0.5)
+        missing = [subscriber for subscriber in subscribers
+                   if all(connection.endpoint_id != uri for connection in list(subscriber.impl.connections))]
+        for subscriber in missing:
+            announce_again(subscriber.name, subscriber.data_class)
+        return not missing
+    wait_for(all_connected, f"connections to {manager}")
+
+
 def expect_bad_rig_is_refused(test, nodelet, rig):
     """The nodelet does not load with a rig that is not there, and the manager goes on with what it has."""
     loaded = test.list().nodelets

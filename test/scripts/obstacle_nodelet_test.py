@@ -26,7 +26,7 @@ from visualization_msgs.msg import MarkerArray
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import CAMERAS, Drive, run, tool  # noqa: E402
 from nodelet_fixture import (drive_publishers, expect_bad_rig_is_refused, manager_services, reach,  # noqa: E402
-                             wait_for, wait_until_gone)
+                             wait_for, wait_until_connected, wait_until_gone)
 
 PARTS = {"image": Image, "standard_deviation": Image, "confidence": Image, "reference": Image, "camera_info": CameraInfo}
 FREE, OCCUPIED, UNOBSERVED = 0, 100, -1
@@ -145,13 +145,20 @@ class ObstacleNodeletTest(unittest.TestCase):
 
     def load_obstacles(self):
         self.assertTrue(self.load("/obstacles", "vcharge_obstacles/obstacle_nodelet", [], [], [], "").success)
-        wait_for(lambda: all(publisher.get_num_connections() > 0 for publisher in self.publishers.values()),
-                 "the nodelet to subscribe")
+        self.wait_until_connected()
         self.reach()
 
+    def wait_until_connected(self):
+        wait_for(lambda: all(publisher.get_num_connections() > 0 for publisher in self.publishers.values()),
+                 "the nodelet to subscribe")
+        wait_until_connected("/manager", self.subscribers)
+
     def unload_obstacles(self):
+        """Until no connection is left that would be taken for one of the next nodelet's."""
         self.assertTrue(self.unload("/obstacles").success)
         wait_until_gone("/manager", self.subscribers)
+        wait_for(lambda: all(publisher.get_num_connections() == 0 for publisher in self.publishers.values()),
+                 "the nodelet's subscriptions to end")
 
     def reach(self):
         """Until the nodelet tells of odometry without a stamp, and all else is connected."""
@@ -351,6 +358,7 @@ class ObstacleNodeletTest(unittest.TestCase):
             stop.set()
             player.join()
         self.assertEqual(self.list().nodelets, ["/obstacles"])
+        self.wait_until_connected()
         self.wait_until_quiet()  # what is still on its way belongs to the drive before
         self.reach()
         self.expect_recovery()
