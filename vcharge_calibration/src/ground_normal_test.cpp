@@ -1,5 +1,6 @@
 // A camera that looks down to the left, on a straight drive beside a wall.
 #include "ground_normal.h"
+#include "test_camera.h"
 
 #include <cmath>
 #include <memory>
@@ -30,11 +31,7 @@ StraightDrive makeStraightDrive(const SceneOptions& scene) {
   KannalaBrandtCamera::Parameters parameters;
   parameters << 400.0, 400.0, 639.5, 399.5, 0.0, 0.0, 0.0, 0.0;
   RigCamera camera{"left", "camera_left_optical", cv::Size(1280, 800), KannalaBrandtCamera(parameters)};
-  Eigen::Matrix3d forward_from_optical;
-  forward_from_optical << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
-  const RigidTransform vehicle_from_camera(
-      rotationFromYawPitchRoll(1.57, 0.7, 0.05) * Eigen::Quaterniond(forward_from_optical),
-      Eigen::Vector3d(1.9, 0.95, 0.9));
+  const RigidTransform vehicle_from_camera = placeCamera(1.57, 0.7, 0.05, {1.9, 0.95, 0.9});
   StraightDrive drive;
   auto rig = std::make_shared<CameraRig>();
   rig->cameras = {camera};

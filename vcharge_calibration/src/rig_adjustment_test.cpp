@@ -11,6 +11,7 @@
 #include <tbb/global_control.h>
 
 #include "ground.h"
+#include "test_camera.h"
 #include "vcharge_calibration/rig_calibrator_options.h"
 
 namespace vcharge {
@@ -21,15 +22,7 @@ constexpr double kNoise_px = 0.3;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 RigCamera makeCamera(const std::string& name, double yaw_rad, const Eigen::Vector3d& place_m) {
-  KannalaBrandtCamera::Parameters parameters;
-  parameters << 200.0, 200.0, 319.5, 199.5, 0.0, 0.0, 0.0, 0.0;
-  RigCamera camera{name, "camera_" + name + "_optical", cv::Size(640, 400), KannalaBrandtCamera(parameters)};
-  camera.field_of_view_rad = 3.0;
-  Eigen::Matrix3d forward_from_optical;
-  forward_from_optical << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
-  camera.vehicle_from_camera = RigidTransform(
-      rotationFromYawPitchRoll(yaw_rad, 0.35, 0.0) * Eigen::Quaterniond(forward_from_optical), place_m);
-  return camera;
+  return makeFisheyeCamera(name, 200.0, placeCamera(yaw_rad, 0.35, 0.0, place_m));
 }
 
 /// Keyframes 0.5 m apart along a figure of eight of circles of 6 m.

@@ -13,6 +13,7 @@
 
 #include "bird_view.h"
 #include "rectified_matches.h"
+#include "test_camera.h"
 #include "vcharge_calibration/keyframe_images.h"
 #include "vcharge_calibration/rig_report.h"
 
@@ -21,14 +22,6 @@ namespace {
 
 constexpr double kRightAngle_rad = 1.5707963267948966;
 const cv::Size kImageSize_px(640, 400);
-
-/// Looks to a yaw on the vehicle, and down.
-RigidTransform placed(double yaw_rad, double down_rad, const Eigen::Vector3d& place_m) {
-  Eigen::Matrix3d body_from_optical;
-  body_from_optical << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
-  return RigidTransform(
-      rotationFromYawPitchRoll(yaw_rad, down_rad, 0.0) * Eigen::Quaterniond(body_from_optical), place_m);
-}
 
 /// Four fisheye cameras around a car.
 std::shared_ptr<CameraRig> makeRig() {
@@ -46,7 +39,7 @@ std::shared_ptr<CameraRig> makeRig() {
                             3.0,
                             "",
                             {},
-                            placed(yaw_rad, 0.5, place_m),
+                            placeCamera(yaw_rad, 0.5, 0.0, place_m),
                             {}});
     yaw_rad += kRightAngle_rad;
   }
@@ -89,7 +82,7 @@ double medianError(const CameraRig& rig, const std::vector<cv::Mat>& images) {
   std::vector<double> errors;
   for (int row = 0; row < view.rows; ++row) {
     for (int column = 0; column < view.cols; ++column) {
-      const auto pixel = view.at<cv::Vec3b>(row, column);
+      const auto& pixel = view.at<cv::Vec3b>(row, column);
       if (pixel != cv::Vec3b::all(0)) {
         const double x_m = area.front_m - (row + 0.5) * area.metres_per_px;
         const double y_m = area.side_m - (column + 0.5) * area.metres_per_px;
@@ -125,7 +118,7 @@ TEST(BirdViewTest, ShowsTheGroundWhereItIs) {
 }
 
 TEST(BirdViewTest, UncertaintyOnTheGroundIsThatOfTheRays) {
-  const RigidTransform place = placed(0.7, 0.4, {1.9, 0.9, 0.9});
+  const RigidTransform place = placeCamera(0.7, 0.4, 0.0, {1.9, 0.9, 0.9});
   const Eigen::Vector2d ground(4.0, 5.0);
   const Eigen::Vector3d ray_in_camera = place.inverse() * Eigen::Vector3d(4.0, 5.0, 0.0);
   constexpr double kStep = 1e-6;

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "rig_judgement.h"
+#include "test_camera.h"
 
 namespace vcharge {
 namespace {
@@ -90,8 +91,6 @@ TEST(RigVerdictTest, TellsLateStampsAndWrongLenses) {
 }
 
 TEST(WrongSignTest, IsToldFromNamesAndFromWhatIsUp) {
-  Eigen::Matrix3d forward_from_optical;
-  forward_from_optical << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
   const auto rigOf = [&](const RigidTransform& vehicle_from_wrong) {
     KannalaBrandtCamera::Parameters parameters;
     parameters << 200.0, 200.0, 319.5, 199.5, 0.0, 0.0, 0.0, 0.0;
@@ -99,9 +98,7 @@ TEST(WrongSignTest, IsToldFromNamesAndFromWhatIsUp) {
     for (const auto& [name, yaw_rad] : {std::make_pair("front", 0.0), std::make_pair("left", 1.57)}) {
       RigCamera camera{name, name, cv::Size(640, 400), KannalaBrandtCamera(parameters)};
       camera.vehicle_from_camera =
-          vehicle_from_wrong * RigidTransform(rotationFromYawPitchRoll(yaw_rad, 0.3, 0.0) *
-                                                  Eigen::Quaterniond(forward_from_optical),
-                                              Eigen::Vector3d::Zero());
+          vehicle_from_wrong * placeCamera(yaw_rad, 0.3, 0.0, Eigen::Vector3d::Zero());
       rig.cameras.push_back(camera);
     }
     return rig;

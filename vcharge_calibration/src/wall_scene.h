@@ -7,6 +7,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "test_camera.h"
 #include "vcharge_calibration/keyframe_images.h"
 #include "vcharge_mapping/mapping_data.h"
 
@@ -16,17 +17,8 @@ inline constexpr double kWall_m = 6.0;  // ahead of the vehicle
 inline constexpr double kMetresPerTexel = 0.01;
 inline constexpr int kKeyframes = 3;
 
-inline RigCamera makeCamera(const std::string& name, double yaw_rad, double side_m) {
-  KannalaBrandtCamera::Parameters parameters;
-  parameters << 250.0, 250.0, 319.5, 199.5, 0.0, 0.0, 0.0, 0.0;
-  RigCamera camera{name, "camera_" + name + "_optical", cv::Size(640, 400), KannalaBrandtCamera(parameters)};
-  camera.field_of_view_rad = 3.0;
-  Eigen::Matrix3d forward_from_optical;
-  forward_from_optical << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
-  camera.vehicle_from_camera =
-      RigidTransform(rotationFromYawPitchRoll(yaw_rad, 0.0, 0.0) * Eigen::Quaterniond(forward_from_optical),
-                     Eigen::Vector3d(0.0, side_m, 1.0));
-  return camera;
+inline RigCamera makeWallCamera(const std::string& name, double yaw_rad, double side_m) {
+  return makeFisheyeCamera(name, 250.0, placeCamera(yaw_rad, 0.0, 0.0, {0.0, side_m, 1.0}));
 }
 
 /// A vehicle that creeps towards the wall, cameras that look half to the left and half to the right, and
@@ -38,7 +30,7 @@ struct WallScene {
 
   WallScene() : texture(1600, 3200, CV_8UC1) {
     auto rig = std::make_shared<CameraRig>();
-    rig->cameras = {makeCamera("left", 0.7, 0.4), makeCamera("right", -0.7, -0.4)};
+    rig->cameras = {makeWallCamera("left", 0.7, 0.4), makeWallCamera("right", -0.7, -0.4)};
     data.rig = rig;
     cv::RNG random(4);
     random.fill(texture, cv::RNG::UNIFORM, 0, 255);
