@@ -190,10 +190,12 @@ nlohmann::json mapToJson(const ObstacleMapErrors& errors) {
                          {"maps_reported", outcome.frames_reported}});
   }
   std::printf(
-      "false: %llu cells over %.1f m, %.2f per 10 m; left occupied behind the vehicle: %llu, %.2f per 10 m\n",
+      "false: %llu cells over %.1f m, %.2f per 10 m; left occupied behind the vehicle: %llu, %.2f per 10 m; "
+      "%.2f in a map; %llu more where no camera saw the ground\n",
       static_cast<unsigned long long>(errors.num_false_cells), errors.driven_m, errors.false_cells_per_10_m,
       static_cast<unsigned long long>(errors.num_false_left),
-      10.0 * static_cast<double>(errors.num_false_left) / std::max(0.1, errors.driven_m));
+      10.0 * static_cast<double>(errors.num_false_left) / std::max(0.1, errors.driven_m),
+      errors.false_cells_per_map, static_cast<unsigned long long>(errors.num_false_hidden));
   std::printf("inside true obstacles: %llu of %llu observed cells were ever free\n",
               static_cast<unsigned long long>(errors.num_free_inside),
               static_cast<unsigned long long>(errors.num_observed_inside));
@@ -206,12 +208,24 @@ nlohmann::json mapToJson(const ObstacleMapErrors& errors) {
               static_cast<unsigned long long>(errors.num_mover_frames),
               static_cast<unsigned long long>(errors.num_mover_free),
               static_cast<unsigned long long>(errors.num_mover_cells));
+  nlohmann::json false_cells = nlohmann::json::array();
+  for (const FalseCell& cell : errors.false_cells) {
+    false_cells.push_back({{"x_m", cell.world_m.x()},
+                           {"y_m", cell.world_m.y()},
+                           {"first_seen_ns", cell.first_seen.nanoseconds()},
+                           {"maps", cell.frames},
+                           {"left", cell.is_left},
+                           {"on_open_ground", cell.is_on_open}});
+  }
   return {{"maps", errors.num_frames},
           {"driven_m", errors.driven_m},
           {"obstacles", obstacles},
           {"false_cells", errors.num_false_cells},
           {"false_cells_per_10_m", errors.false_cells_per_10_m},
           {"false_left", errors.num_false_left},
+          {"false_cells_per_map", errors.false_cells_per_map},
+          {"false_cells_hidden", errors.num_false_hidden},
+          {"false_cell_list", false_cells},
           {"observed_inside", errors.num_observed_inside},
           {"free_inside", errors.num_free_inside},
           {"kerb_places", errors.num_kerb_points},

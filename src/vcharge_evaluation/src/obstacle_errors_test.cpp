@@ -73,6 +73,11 @@ class ObstacleMapErrorsTest : public ::testing::Test {
     for (double x = 0.0; x < 3.0; x += 0.1) {
       path_.push_back(RigidTransform::planar(x, 0.0, 0.0));
     }
+    for (double x = -1.0; x < 4.0; x += 0.05) {  // ground on both sides, not that behind the box
+      for (double y = -3.0; y < 2.5; y += 0.05) {
+        points_.push_back({Eigen::Vector3d(x, y, 0.0).cast<float>(), 1.0F});
+      }
+    }
     for (double x = 1.0; x < 1.4; x += 0.02) {
       for (double z = 0.12; z < 0.5; z += 0.05) {
         points_.push_back({Eigen::Vector3d(x, 2.5, z).cast<float>(), 1.0F});
@@ -131,6 +136,30 @@ TEST_F(ObstacleMapErrorsTest, FalseCellsAndFreeCellsInsideObstaclesAreCounted) {
   EXPECT_NEAR(errors.false_cells_per_10_m, 10.0 / 2.9, 0.01);
   EXPECT_EQ(errors.num_free_inside, 1U);
   EXPECT_EQ(errors.num_observed_inside, 1U);
+}
+
+TEST_F(ObstacleMapErrorsTest, GroundIsOpenWhereItWasSeenAndNothingIsNear) {
+  // 0.25 m before the box a range may err so much; 0.35 m before it no more; behind it nobody sees.
+  const ObstacleMapErrors errors = judge({{1.25, 2.25}, {1.25, 2.15}, {1.25, 3.35}}, {});
+  EXPECT_EQ(errors.num_false_cells, 1U);
+  EXPECT_EQ(errors.num_false_hidden, 1U);
+  EXPECT_NEAR(errors.false_cells_per_map, 1.0, 1e-9);
+  ASSERT_EQ(errors.false_cells.size(), 2U);
+  EXPECT_NEAR(errors.false_cells[0].world_m.y(), 2.15, 1e-6);
+  EXPECT_TRUE(errors.false_cells[0].is_on_open);
+  EXPECT_EQ(errors.false_cells[0].frames, 30U);
+}
+
+TEST_F(ObstacleMapErrorsTest, FalseCellCountsOnceAndAsLeftOnlyWhileItIsOccupied) {
+  ObstacleMapEvaluator evaluator({box_}, heights_, path_);
+  for (size_t i = 0; i < path_.size(); ++i) {
+    ObstacleMap map = mapWith(i < 10 ? std::vector<Eigen::Vector2d>{{1.55, -2.0}} : std::vector<Eigen::Vector2d>{}, {});
+    map.fixed_from_vehicle = path_[i];
+    // Odometry that drifts across the borders of the world's cells: the map's cell stays the same.
+    evaluator.add(map, points_, RigidTransform::planar(0.1 * i, 0.01 * i, 0.0), {}, {});
+  }
+  EXPECT_EQ(evaluator.errors().num_false_cells, 1U);
+  EXPECT_EQ(evaluator.errors().num_false_left, 0U);
 }
 
 TEST(ObstacleTruthTest, DistanceToAPolygon) {

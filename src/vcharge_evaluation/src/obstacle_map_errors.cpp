@@ -63,8 +63,11 @@ struct ObstacleMapEvaluator::Frame {
   const std::vector<TruthObstacle>& movers;
   const std::vector<TruthObstacle>& earlier_movers;
 
+  Eigen::Vector2d fixedOf(int column, int row) const {
+    return map.origin_m + map.cell_size_m * Eigen::Vector2d(column + 0.5, row + 0.5);
+  }
   Eigen::Vector2d worldOf(int column, int row) const {
-    const Eigen::Vector2d fixed = map.origin_m + map.cell_size_m * Eigen::Vector2d(column + 0.5, row + 0.5);
+    const Eigen::Vector2d fixed = fixedOf(column, row);
     return (world_from_fixed * Eigen::Vector3d(fixed.x(), fixed.y(), 0.0)).head<2>();
   }
   int seenPointsOf(const TruthObstacle& obstacle) const {
@@ -179,6 +182,10 @@ void ObstacleMapEvaluator::add(const ObstacleMap& map, const std::vector<SeenPoi
   for (const SeenPoint& point : points) {
     const Eigen::Vector2d place = point.world_m.head<2>().cast<double>();
     const double height_m = point.world_m.z();
+    if (height_m < options_.false_height_m &&
+        (place - frame.vehicle_middle_m).norm() <= options_.false_range_m) {
+      seen_ground_.add(place);
+    }
     if (point.from_travel_rad < options_.min_angle_from_travel_rad ||
         (place - frame.vehicle_middle_m).norm() > options_.view_range_m) {
       continue;
@@ -264,12 +271,13 @@ void ObstacleMapEvaluator::judgeCells(const Frame& frame) {
   for (int row = 0; row < map.state.rows; ++row) {
     for (int column = 0; column < map.state.cols; ++column) {
       const int8_t state = map.state.at<int8_t>(row, column);
-      const Eigen::Vector2d place = frame.worldOf(column, row);
-      if (state == kCellUnobserved) {
-        false_now_.erase(SeenCells::keyOf(place));
-        continue;
+      const int64_t fixed_key = SeenCells::keyOf(frame.fixedOf(column, row));
+      const auto known = false_cells_.find(fixed_key);
+      if (known != false_cells_.end() && state != kCellOccupied) {
+        known->second.is_left = false;
       }
-      if ((place - frame.vehicle_middle_m).norm() > options_.false_range_m) {
+      const Eigen::Vector2d place = frame.worldOf(column, row);
+      if (state == kCellUnobserved || (place - frame.vehicle_middle_m).norm() > options_.false_range_m) {
         continue;
       }
       const int64_t key = SeenCells::keyOf(place);
@@ -280,13 +288,41 @@ void ObstacleMapEvaluator::judgeCells(const Frame& frame) {
         }
       } else if (state == kCellOccupied && !isNearMover(place) && !isNearObstacle(place) &&
                  heights_.at(highest_around_, place) < static_cast<float>(options_.false_height_m)) {
-        false_cells_.insert(key);
-        false_now_.insert(key);
-        continue;
+        addFalseCell(frame, fixed_key, place);
       }
-      false_now_.erase(key);
     }
   }
+}
+
+void ObstacleMapEvaluator::addFalseCell(const Frame& frame, int64_t key, const Eigen::Vector2d& place_m) {
+  const auto [entry, is_new] = false_cells_.try_emplace(key);
+  FalseCell& cell = entry->second;
+  if (is_new) {
+    cell.world_m = place_m;
+    cell.first_seen = frame.map.stamp;
+  }
+  ++cell.frames;
+  cell.is_left = true;
+}
+
+void ObstacleMapEvaluator::addFalseCellsTo(ObstacleMapErrors* errors) const {
+  uint64_t maps = 0;
+  for (const auto& entry : false_cells_) {
+    FalseCell cell = entry.second;
+    cell.is_on_open = seen_ground_.countAround(cell.world_m) > 0;
+    errors->false_cells.push_back(cell);
+    if (!cell.is_on_open) {
+      ++errors->num_false_hidden;
+      continue;
+    }
+    ++errors->num_false_cells;
+    errors->num_false_left += cell.is_left ? 1 : 0;
+    maps += cell.frames;
+  }
+  errors->false_cells_per_10_m =
+      driven_m_ > 0.0 ? 10.0 * static_cast<double>(errors->num_false_cells) / driven_m_ : 0.0;
+  errors->false_cells_per_map =
+      num_frames_ > 0 ? static_cast<double>(maps) / static_cast<double>(num_frames_) : 0.0;
 }
 
 void ObstacleMapEvaluator::judgeMovers(const Frame& frame) {
@@ -316,10 +352,7 @@ ObstacleMapErrors ObstacleMapEvaluator::errors() const {
       errors.obstacles.push_back(tracked.outcome);
     }
   }
-  errors.num_false_cells = false_cells_.size();
-  errors.false_cells_per_10_m =
-      driven_m_ > 0.0 ? 10.0 * static_cast<double>(false_cells_.size()) / driven_m_ : 0.0;
-  errors.num_false_left = false_now_.size();
+  addFalseCellsTo(&errors);
   errors.num_observed_inside = observed_inside_.size();
   errors.num_free_inside = free_inside_.size();
   std::vector<double> height_errors_m;

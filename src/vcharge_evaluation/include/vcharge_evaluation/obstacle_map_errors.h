@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -22,10 +23,12 @@ struct ObstacleMapEvaluationOptions {
   double min_angle_from_travel_rad = 0.3490658503988659;  ///< and by rays so far from the direction of travel
   int min_seen_points = 15;                               ///< and with so many points
   double grace_m = 1.0;          ///< motion past the first view until it must be reported
-  double tolerance_m = 0.25;     ///< an occupied cell so near reports an obstacle
-  double false_radius_m = 0.2;   ///< an occupied cell without anything so near is false ...
-  double false_height_m = 0.08;  ///< ... where things from this height on count
-  double false_range_m = 5.0;    ///< from the vehicle's middle
+  double tolerance_m = 0.25;  ///< an occupied cell so near reports an obstacle
+  /// Around whatever rises to false_height_m the ground is not open: the range error that is allowed (15 cm)
+  /// and the diagonal of a cell.
+  double false_radius_m = 0.29;
+  double false_height_m = 0.08;
+  double false_range_m = 5.0;  ///< from the vehicle's middle; further away no cell is judged
   double kerb_min_m = 0.1;       ///< outlines of kerbs whose true height lies between are judged
   double kerb_max_m = 0.16;
 
@@ -61,13 +64,25 @@ struct ObstacleOutcome {
   uint64_t frames_reported = 0;
 };
 
+/// A cell of the map that was occupied where nothing is: each counts once, however often.
+struct FalseCell {
+  Eigen::Vector2d world_m{0.0, 0.0};  ///< when it was first occupied
+  Timestamp first_seen;
+  uint64_t frames = 0;      ///< in so many of the maps that were judged
+  bool is_left = false;     ///< still, when the vehicle had left it behind
+  bool is_on_open = false;  ///< a camera saw the ground there at some time of the drive
+};
+
 struct ObstacleMapErrors {
   uint64_t num_frames = 0;
   double driven_m = 0.0;
   std::vector<ObstacleOutcome> obstacles;
-  uint64_t num_false_cells = 0;  ///< different ones, over the whole drive
+  std::vector<FalseCell> false_cells;  ///< by place; the numbers below are of those on open ground
+  uint64_t num_false_cells = 0;        ///< over the whole drive
   double false_cells_per_10_m = 0.0;
   uint64_t num_false_left = 0;       ///< of them, still occupied when the vehicle had left them behind
+  uint64_t num_false_hidden = 0;     ///< others, on ground that no camera ever saw
+  double false_cells_per_map = 0.0;  ///< on average at a time
   uint64_t num_observed_inside = 0;  ///< different cells inside true obstacles that were free or occupied
   uint64_t num_free_inside = 0;      ///< and those that were ever free
   uint64_t num_kerb_points = 0;      ///< places on outlines of kerbs, every 10 cm, that were viewed
@@ -116,6 +131,8 @@ class ObstacleMapEvaluator {
   void judgeObstacles(const Frame& frame);
   void judgeKerbs(const Frame& frame);
   void judgeCells(const Frame& frame);
+  void addFalseCell(const Frame& frame, int64_t key, const Eigen::Vector2d& place_m);
+  void addFalseCellsTo(ObstacleMapErrors* errors) const;
   void judgeMovers(const Frame& frame);
 
   ObstacleMapEvaluationOptions options_;
@@ -124,7 +141,9 @@ class ObstacleMapEvaluator {
   std::vector<TruthObstacle> standing_;
   std::vector<Tracked> tracked_;
   std::vector<KerbPoint> kerb_points_;
-  std::set<int64_t> false_cells_, false_now_, observed_inside_, free_inside_;
+  std::map<int64_t, FalseCell> false_cells_;  // by cell of the map's fixed frame
+  SeenCells seen_ground_;
+  std::set<int64_t> observed_inside_, free_inside_;
   std::optional<Eigen::Vector2d> last_position_m_;
   double driven_m_ = 0.0;
   uint64_t num_frames_ = 0, num_mover_frames_ = 0, num_mover_reported_ = 0, num_mover_cells_ = 0,
