@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <opencv2/imgproc.hpp>
+
 #include "vcharge_core/error.h"
 #include "vcharge_core/options.h"
 
@@ -73,6 +75,28 @@ cv::Size scaledSize(cv::Size size, double scale) {
                   std::max(1, static_cast<int>(std::lround(size.height * scale))));
 }
 
+/// Bilinear sampling averages over two pixels; where samples lie further apart, as many have to be averaged
+/// before it, or what is finer than they turns into a pattern that moves otherwise than the things it is on.
+int averagedPixels(const WorkingCameraOptions& options) {
+  const double samples_per_pixel = options.image_scale * options.focal_scale;
+  return std::max(1, static_cast<int>(std::ceil(0.5 / samples_per_pixel - 1e-9)));
+}
+
+/// Mean over whole blocks of `block` pixels each way.
+cv::Mat averageBlocks(const cv::Mat& pixels, int block) {
+  const cv::Size size(pixels.cols / block, pixels.rows / block);
+  cv::Mat averaged;
+  cv::resize(pixels(cv::Rect(0, 0, size.width * block, size.height * block)), averaged, size, 0.0, 0.0,
+             cv::INTER_AREA);
+  return averaged;
+}
+
+/// Of a sensor's coordinate, among the means of blocks; not beyond the first and the last one.
+float blockCoordinate(float pixel, int block, int num_blocks) {
+  const float coordinate = (pixel + 0.5F) / static_cast<float>(block) - 0.5F;
+  return std::clamp(coordinate, 0.0F, static_cast<float>(num_blocks - 1));
+}
+
 }  // namespace
 
 void WorkingCameraOptions::validate() const {
@@ -85,10 +109,16 @@ WorkingCamera::WorkingCamera(const CameraModel& camera, cv::Size image_size_px, 
     : model_(makeWorkingModel(camera, field_of_view_rad, options)),
       size_(scaledSize(image_size_px, options.image_scale)),
       sensor_size_(image_size_px),
+      block_px_(averagedPixels(options)),
       valid_mask_(cv::Mat::zeros(size_, CV_8UC1)),
       sensor_pixels_(size_, CV_32FC2, cv::Scalar(-1.0, -1.0)) {
   check(mask.empty() || (mask.size() == image_size_px && mask.type() == CV_8UC1),
         "WorkingCamera: the mask must be CV_8UC1 of the image's size");
+  // A mean is valid where all of its pixels are.
+  cv::Mat valid_blocks;
+  if (!mask.empty()) {
+    cv::compare(averageBlocks(mask != 0, block_px_), 255, valid_blocks, cv::CMP_EQ);
+  }
   const double min_z = std::cos(0.5 * field_of_view_rad);
   camera.visit([&](const auto& sensor_model) {
     for (int y = 0; y < size_.height; ++y) {
@@ -105,17 +135,20 @@ WorkingCamera::WorkingCamera(const CameraModel& camera, cv::Size image_size_px, 
         }
         sensor_pixels_.at<cv::Vec2f>(y, x) =
             cv::Vec2f(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
-        const int x0 = static_cast<int>(pixel.x());
-        const int y0 = static_cast<int>(pixel.y());
-        const int x1 = std::min(x0 + 1, image_size_px.width - 1);
-        const int y1 = std::min(y0 + 1, image_size_px.height - 1);
-        const bool masked =
-            !mask.empty() && (mask.at<uint8_t>(y0, x0) == 0 || mask.at<uint8_t>(y0, x1) == 0 ||
-                              mask.at<uint8_t>(y1, x0) == 0 || mask.at<uint8_t>(y1, x1) == 0);
-        valid_mask_.at<uint8_t>(y, x) = masked ? 0 : 255;
+        valid_mask_.at<uint8_t>(y, x) = mask.empty() || isValid(valid_blocks, sensor_pixels_.at<cv::Vec2f>(y, x)) ? 255 : 0;
       }
     }
   });
+}
+
+/// Whether all that bilinear sampling takes in at a sensor's pixel is valid.
+bool WorkingCamera::isValid(const cv::Mat& valid_blocks, const cv::Vec2f& sensor_pixel) const {
+  const int x = static_cast<int>(blockCoordinate(sensor_pixel[0], block_px_, valid_blocks.cols));
+  const int y = static_cast<int>(blockCoordinate(sensor_pixel[1], block_px_, valid_blocks.rows));
+  const int right = std::min(x + 1, valid_blocks.cols - 1);
+  const int below = std::min(y + 1, valid_blocks.rows - 1);
+  return valid_blocks.at<uint8_t>(y, x) != 0 && valid_blocks.at<uint8_t>(y, right) != 0 &&
+         valid_blocks.at<uint8_t>(below, x) != 0 && valid_blocks.at<uint8_t>(below, right) != 0;
 }
 
 cv::Mat WorkingCamera::undistort(const cv::Mat& pixels) const {
@@ -123,25 +156,24 @@ cv::Mat WorkingCamera::undistort(const cv::Mat& pixels) const {
         "WorkingCamera::undistort: expected CV_8UC1 of the sensor's size");
   // Own bilinear sampling: cv::remap rounds coordinates to 1/32 pixel, which stereo would see.
   cv::Mat undistorted(size_, CV_8UC1);
-  const int max_x = sensor_size_.width - 1;
-  const int max_y = sensor_size_.height - 1;
+  const cv::Mat source = block_px_ > 1 ? averageBlocks(pixels, block_px_) : pixels;
   for (int y = 0; y < size_.height; ++y) {
     const auto* sensor = sensor_pixels_.ptr<cv::Vec2f>(y);
     auto* out = undistorted.ptr<uint8_t>(y);
     for (int x = 0; x < size_.width; ++x) {
-      const float u = sensor[x][0];
-      const float v = sensor[x][1];
-      if (u < 0.0F) {
+      if (sensor[x][0] < 0.0F) {
         out[x] = 0;
         continue;
       }
+      const float u = blockCoordinate(sensor[x][0], block_px_, source.cols);
+      const float v = blockCoordinate(sensor[x][1], block_px_, source.rows);
       const int x0 = static_cast<int>(u);
       const int y0 = static_cast<int>(v);
       const float a = u - static_cast<float>(x0);
       const float b = v - static_cast<float>(y0);
-      const int right = x0 < max_x ? 1 : 0;
-      const uint8_t* top = pixels.ptr<uint8_t>(y0) + x0;
-      const uint8_t* bottom = pixels.ptr<uint8_t>(std::min(y0 + 1, max_y)) + x0;
+      const int right = x0 < source.cols - 1 ? 1 : 0;
+      const uint8_t* top = source.ptr<uint8_t>(y0) + x0;
+      const uint8_t* bottom = source.ptr<uint8_t>(std::min(y0 + 1, source.rows - 1)) + x0;
       const float upper = static_cast<float>(top[0]) + a * static_cast<float>(top[right] - top[0]);
       const float lower = static_cast<float>(bottom[0]) + a * static_cast<float>(bottom[right] - bottom[0]);
       out[x] = static_cast<uint8_t>(upper + b * (lower - upper) + 0.5F);  // NOLINT: never negative

@@ -67,6 +67,57 @@ TEST(WorkingCameraTest, UndistortedImageShowsTheSameRays) {
   }
 }
 
+TEST(WorkingCameraTest, PatternFinerThanTheWorkingPixelsBecomesGray) {
+  cv::Mat image(kSize, CV_8UC1);
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) {
+      image.at<uint8_t>(y, x) = (x + y) % 2 == 0 ? 40 : 200;
+    }
+  }
+  WorkingCameraOptions options;
+  for (const double scale : {0.25, 0.3, 0.4}) {  // with 0.5, bilinear sampling averages well where it falls between
+    options.image_scale = scale;
+    const WorkingCamera working(golfCamera(), kSize, kFieldOfView, cv::Mat(), options);
+    cv::Mat mean, deviation;
+    cv::meanStdDev(working.undistort(image), mean, deviation, working.validMask());
+    EXPECT_NEAR(mean.at<double>(0), 120.0, 1.0) << scale;
+    EXPECT_LT(deviation.at<double>(0), 1.0) << scale;
+  }
+}
+
+TEST(WorkingCameraTest, AveragedPixelsShowTheSameRaysAndNothingMasked) {
+  // Bright beside the mask: where it is taken in, a pixel is brighter than what it shows.
+  cv::Mat image(kSize, CV_8UC1, cv::Scalar(255));
+  cv::Mat mask(kSize, CV_8UC1, cv::Scalar(0));
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) {
+      Eigen::Vector3d ray;
+      if (x + 2 * y < 1500 && golfCamera().unproject(Eigen::Vector2d(x, y), &ray)) {
+        image.at<uint8_t>(y, x) = cv::saturate_cast<uint8_t>(skyLevel(ray));
+        mask.at<uint8_t>(y, x) = 255;
+      }
+    }
+  }
+  WorkingCameraOptions options;
+  for (const double scale : {0.2, 0.3}) {
+    options.image_scale = scale;
+    const WorkingCamera working(golfCamera(), kSize, kFieldOfView, mask, options);
+    const cv::Mat undistorted = working.undistort(image);
+    const RayTable rays(working.model(), working.size(), kFieldOfView);
+    int compared = 0;
+    for (int y = 0; y < working.size().height; ++y) {
+      for (int x = 0; x < working.size().width; ++x) {
+        if (working.validMask().at<uint8_t>(y, x) != 0) {
+          ASSERT_NEAR(undistorted.at<uint8_t>(y, x), skyLevel(rays.ray(x, y).cast<double>()), 1.6)
+              << scale << " at " << x << ", " << y;
+          ++compared;
+        }
+      }
+    }
+    EXPECT_GT(compared, static_cast<int>(3e5 * scale * scale)) << scale;
+  }
+}
+
 TEST(WorkingCameraTest, MaskAndFieldOfViewLimitTheValidPixels) {
   cv::Mat mask(kSize, CV_8UC1, cv::Scalar(255));
   mask(cv::Rect(0, 600, 1280, 200)).setTo(0);

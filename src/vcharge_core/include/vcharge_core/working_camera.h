@@ -38,14 +38,18 @@ class WorkingCamera {
   /// Sensor pixel that each working pixel shows (CV_32FC2); (-1, -1) where there is none.
   const cv::Mat& sensorPixels() const { return sensor_pixels_; }
 
-  /// Undistorted image of the working camera's size: bilinear, 0 where there is no sensor pixel.
+  /// Undistorted image of the working camera's size: bilinear, 0 where there is no sensor pixel. Of images
+  /// more than twice as large as the working camera's, blocks of pixels are averaged first.
   /// std::logic_error when `pixels` is not CV_8UC1 of the sensor's size.
   cv::Mat undistort(const cv::Mat& pixels) const;
 
  private:
+  bool isValid(const cv::Mat& valid_blocks, const cv::Vec2f& sensor_pixel) const;
+
   MeiCamera model_;
   cv::Size size_;
   cv::Size sensor_size_;
+  int block_px_;  // side of the blocks that are averaged
   cv::Mat valid_mask_;
   cv::Mat sensor_pixels_;
 };
