@@ -17,7 +17,8 @@ namespace vcharge {
 
 /// Range maps of a live or replayed drive. Publishes
 /// /dense/<camera>/range/{image,confidence,standard_deviation,reference,camera_info} and
-/// /dense/<camera>/points, and a status per camera in /diagnostics; nothing else while the vehicle stands.
+/// /dense/<camera>/points (made for subscribers only), and a status per camera in /diagnostics; nothing else
+/// while the vehicle stands.
 /// Parameters: ~rig (path), ~options (RangeMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay
 /// (every image in order, as compute_range_maps; otherwise the newest first, drops are counted).
 class DepthNodelet : public nodelet::Nodelet {
@@ -125,14 +126,17 @@ class DepthNodelet : public nodelet::Nodelet {
   void sweep(const RangeTask& task) {
     guard_.run([&] {
       Output& output = outputs_.at(task.camera_index);
-      const RangeMapMessages messages =
-          output.converter->convert(mapper_->sweep(task), task.reference.pixels);
+      const RangeMap map = mapper_->sweep(task);
+      const bool with_points = output.points.getNumSubscribers() > 0;
+      const RangeMapMessages messages = output.converter->convert(map, task.reference.pixels, with_points);
       output.range.publish(messages.range);
       output.confidence.publish(messages.confidence);
       output.standard_deviation.publish(messages.standard_deviation);
       output.reference.publish(messages.reference);
       output.camera_info.publish(messages.camera_info);
-      output.points.publish(messages.points);
+      if (with_points) {
+        output.points.publish(messages.points);
+      }
     });
   }
 

@@ -13,6 +13,8 @@ namespace {
 
 // A look's place counts so much more than those before it, so that a cell follows the odometry's drift.
 constexpr float kMemory = 0.9F;
+// A look speaks for so many sigmas of its range to both sides: further away it rather says that nothing is.
+constexpr double kLookSigmas = 1.0;
 
 RigidTransform levelled(const RigidTransform& transform) {
   return RigidTransform::planar(transform.translation().x(), transform.translation().y(),
@@ -32,6 +34,7 @@ void LocalObstacleMapOptions::validate() const {
   requireField(free_range_m > 0.0, "free_range_m", "must be positive", free_range_m);
   requireField(occupied_range_m > 0.0, "occupied_range_m", "must be positive", occupied_range_m);
   requireField(occupied_log_odds > 0.0, "occupied_log_odds", "must be positive", occupied_log_odds);
+  requireField(sharp_sigma_m > 0.0, "sharp_sigma_m", "must be positive", sharp_sigma_m);
   requireField(free_log_odds > 0.0, "free_log_odds", "must be positive", free_log_odds);
   requireField(min_free_share > 0.0 && min_free_share <= 1.0, "min_free_share", "must be in (0, 1]",
                min_free_share);
@@ -309,7 +312,9 @@ void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid&
     const double sigma_m =
         std::hypot(obstacle.range_sigma_m,
                    parallaxSigma_m(obstacle.range_m, {std::cos(middle_rad), std::sin(middle_rad)}));
-    const int along = sigma_m < 0.6 * cell_m ? 0 : static_cast<int>(std::ceil(2.0 * sigma_m / cell_m));
+    const double sharpness = std::min(1.0, options_.sharp_sigma_m / sigma_m);
+    const double look_mass = sharpness * sharpness * ray_mass;
+    const int along = sigma_m < 0.6 * cell_m ? 0 : static_cast<int>(std::ceil(kLookSigmas * sigma_m / cell_m));
     double normalizer = 0.0;
     const auto density = [&](int step) {
       const double z = step * cell_m / sigma_m;
@@ -325,7 +330,7 @@ void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid&
       for (int step = -along; step <= along; ++step) {
         const Eigen::Vector2d point_in_vehicle =
             seen.origin_m + (obstacle.range_m + step * cell_m) * direction;
-        addLook({transformed(fixed_from_vehicle, point_in_vehicle), ray_mass * density(step) / normalizer,
+        addLook({transformed(fixed_from_vehicle, point_in_vehicle), look_mass * density(step) / normalizer,
                  sigma_m, &obstacle},
                 seen.stamp);
       }

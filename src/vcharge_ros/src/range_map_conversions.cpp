@@ -57,7 +57,7 @@ void RangeMapConverter::prepare(const RangeMap& map) {
   camera_info_ = makeCameraInfo(map.camera, map.range_m.size(), field_of_view_rad_, map.frame_id);
 }
 
-RangeMapMessages RangeMapConverter::convert(const RangeMap& map, const cv::Mat& gray) {
+RangeMapMessages RangeMapConverter::convert(const RangeMap& map, const cv::Mat& gray, bool with_points) {
   const cv::Size size = map.range_m.size();
   check(map.range_m.type() == CV_32FC1 && map.confidence.type() == CV_32FC1 &&
             map.confidence.size() == size && map.standard_deviation_m.type() == CV_32FC1 &&
@@ -77,7 +77,14 @@ RangeMapMessages RangeMapConverter::convert(const RangeMap& map, const cv::Mat& 
   messages.camera_info = boost::make_shared<sensor_msgs::CameraInfo>(camera_info_);
   messages.camera_info->header.stamp = fromTimestamp(map.stamp);
   messages.camera_info->header.frame_id = map.frame_id;
+  if (with_points) {
+    messages.points = makePoints(map, gray);
+  }
+  return messages;
+}
 
+sensor_msgs::PointCloud2Ptr RangeMapConverter::makePoints(const RangeMap& map, const cv::Mat& gray) const {
+  const cv::Size size = map.range_m.size();
   std::vector<PackedPoint> points;
   points.reserve(static_cast<size_t>(size.area()));
   for (int y = 0; y < size.height; ++y) {
@@ -93,8 +100,7 @@ RangeMapMessages RangeMapConverter::convert(const RangeMap& map, const cv::Mat& 
       points.push_back({point.x(), point.y(), point.z(), intensity});
     }
   }
-  messages.points = makeCloud(points, map.stamp, map.frame_id);
-  return messages;
+  return makeCloud(points, map.stamp, map.frame_id);
 }
 
 }  // namespace vcharge

@@ -56,6 +56,13 @@ TEST(RangeMapConverterTest, PutsAWallsPointsOnTheWall) {
   }
 }
 
+TEST(RangeMapConverterTest, MakesNoPointsThatNobodyWants) {
+  RangeMapConverter converter(3.2);
+  const RangeMapMessages messages = converter.convert(makeWall(cv::Size(32, 20)), cv::Mat(), false);
+  EXPECT_EQ(messages.points, nullptr);
+  EXPECT_NE(messages.range, nullptr);
+}
+
 TEST(RangeMapConverterTest, TakesIntensityFromTheImage) {
   RangeMap map = makeWall(cv::Size(16, 10));
   map.range_m.setTo(kNan);

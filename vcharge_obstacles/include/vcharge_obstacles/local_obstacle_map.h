@@ -19,7 +19,10 @@ struct LocalObstacleMapOptions {
   double half_size_m = 10.0;       ///< the map reaches so far from the vehicle, along both axes
   double free_range_m = 7.0;       ///< from the camera; ground further away is not cleared
   double occupied_range_m = 9.0;   ///< from the camera; obstacles further away are too uncertain
-  double occupied_log_odds = 0.6;  ///< of a look with full support whose sigma is small to the cell
+  double occupied_log_odds = 0.9;  ///< of a look with full support whose sigma is small to the cell
+  /// Looks with a larger sigma count for less, by its square: many of them, which err together, would else
+  /// mark ground that the obstacle is far from.
+  double sharp_sigma_m = 0.12;
   double free_log_odds = 0.6;      ///< of a look at which all of the cell's pixels lie on the ground
   double min_free_share = 0.4;     ///< of a cell's pixels that lie on the ground, for any evidence
   double min_hidden_share = 0.5;   ///< of a cell's pixels that show something else, to doubt that it is free
@@ -50,6 +53,7 @@ struct LocalObstacleMapOptions {
     visit("free_range_m", free_range_m);
     visit("occupied_range_m", occupied_range_m);
     visit("occupied_log_odds", occupied_log_odds);
+    visit("sharp_sigma_m", sharp_sigma_m);
     visit("free_log_odds", free_log_odds);
     visit("min_free_share", min_free_share);
     visit("min_hidden_share", min_hidden_share);

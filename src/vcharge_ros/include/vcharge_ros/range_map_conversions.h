@@ -18,8 +18,8 @@ struct RangeMapMessages {
   sensor_msgs::ImagePtr standard_deviation;  ///< 32FC1, metres
   sensor_msgs::ImagePtr reference;           ///< mono8: what the camera saw; null where that is not given
   sensor_msgs::CameraInfoPtr camera_info;    ///< equidistant fit of the working camera
-  sensor_msgs::PointCloud2Ptr
-      points;  ///< x, y, z (metres) and intensity (0..255), FLOAT32, known ranges only
+  /// x, y, z (metres) and intensity (0..255), FLOAT32, known ranges only; null where it was not asked for.
+  sensor_msgs::PointCloud2Ptr points;
 };
 
 /// Converts the range maps of one camera; rays and camera_info are computed once per camera model and size.
@@ -31,11 +31,13 @@ class RangeMapConverter {
   ~RangeMapConverter();
 
   /// `gray` (CV_8UC1 of the map's size, the undistorted image, or empty) becomes the points' intensity;
-  /// without it intensity is the confidence times 255. std::logic_error for images of unlike size or type.
-  RangeMapMessages convert(const RangeMap& map, const cv::Mat& gray);
+  /// without it intensity is the confidence times 255. with_points: whether anybody wants
+  /// them. std::logic_error for images of unlike size or type.
+  RangeMapMessages convert(const RangeMap& map, const cv::Mat& gray, bool with_points = true);
 
  private:
   void prepare(const RangeMap& map);
+  sensor_msgs::PointCloud2Ptr makePoints(const RangeMap& map, const cv::Mat& gray) const;
 
   const double field_of_view_rad_;
   MeiCamera::Parameters camera_parameters_ = MeiCamera::Parameters::Zero();
