@@ -103,7 +103,7 @@ PICTURES = (
     ("Lenses", (("intrinsics.png", "How far the calibrated lens is from the true one, by the angle from its axis"),)),
     ("Where the cameras are", (("rig.png", "Errors of the cameras' places"),)),
     ("The sparse map", (("map.png", "The map from above, over the truth"),
-                        ("landmarks.png", "Its landmarks in the image that saw most of them, by distance"))),
+                        ("map_landmarks.png", "Its landmarks in the image that saw most of them, by distance"))),
     ("Range maps", (("input_frames.png", "What the cameras see on another day"),
                     ("range_maps.png", "Range along each pixel's ray"),
                     ("cloud_from_above.png", "The points of all cameras from above"))),
@@ -119,7 +119,7 @@ PICTURES = (
 
 def write(path, chain):
     figures = {name: step["figures"] for name, step in chain.figures.items()}
-    origin = (f"A simulated {chain.args.scene}, seed {chain.args.seed}, images of {'640x400' if chain.args.quick else '1280x800'}: "
+    origin = (f"A simulated {chain.args.scene}, seed {chain.args.seed}, rig {chain.args.rig_seed}, images of {'640x400' if chain.args.quick else '1280x800'}: "
               "lenses and mounting of the cameras are known to nobody but the simulator; truth serves to judge alone"
               ", and for the masks of the vehicle's body, drawn by hand on a real car." if chain.simulated else
               f"The recording {chain.args.bag}; there is no truth to judge it by.")
