@@ -146,7 +146,7 @@ class Chain:
                 raise SystemExit(f"{self.args.boards}: no folder CAMERA and no CAMERA.bag in it")
             self.keys["boards"] = identity(self.args.boards)
             return entries
-        words = [*self.words, "--scene", "chessboard", "--seed", self.args.seed + 100, "--image-step", 5]
+        words = [*self.words, "--scene", "chessboard", "--seed", self.args.seed + 100, "--image-step", 8]
 
         def work(folder):
             for camera in CAMERAS:
@@ -333,6 +333,7 @@ class Chain:
             log = self.work / "rviz" / "rviz.log"
             run([script, drive / "drive.bag", rig, self.pictures / "rviz_ranges.png"], log)
             run([script, drive / "drive.bag", rig, self.pictures / "rviz_pose.png", mapped / "map.vmap"], log)
+            run([script, drive / "drive.bag", rig, self.pictures / "rviz_obstacles.png", mapped / "map.vmap", "obstacles"], log)
             run([script, heights / "map", self.pictures / "rviz_height_map.png"], log)
             return {}
 

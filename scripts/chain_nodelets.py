@@ -92,7 +92,8 @@ def replay(work, map_path, bag, rig, folder):
             os.killpg(launched.pid, signal.SIGKILL)
     equal_poses = sum(stamp in poses and np.allclose(pose, poses[stamp], rtol=0, atol=1e-7)
                       for stamp, pose in recorder.poses.items())
-    equal_grids = sum(any(np.array_equal(grid, came) for came in recorder.grids.get(stamp, [])) for stamp, grid in grids.items())
+    equal_grids = sum(any(np.array_equal(grid, came) for came in recorder.grids.get(stamp, []))
+                      for stamp, grid in grids.items())
     return {"poses": len(poses), "equal_poses": int(equal_poses), "grids": len(grids), "equal_grids": int(equal_grids),
             "took_s": took_s}
 

@@ -15,8 +15,8 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--work", type=pathlib.Path, default=pathlib.Path("build/chain_evaluation"),
                         help="folder for everything; what an earlier run finished is kept")
-    parser.add_argument("--cars", nargs="*", default=["lot:1:1", "lot:2:2", "lot:3:3", "garage:1:4", "garage:2:5", "garage:3:6"],
-                        help="SCENE:SEED:RIG_SEED of each")
+    parser.add_argument("--cars", nargs="*", help="SCENE:SEED:RIG_SEED of each",
+                        default=["lot:1:1", "lot:2:2", "lot:3:3", "garage:1:4", "garage:2:5", "garage:3:6"])
     parser.add_argument("--full", action="store_true", help="images of 1280x800 and longer drives")
     parser.add_argument("--no-truth", action="store_true", help="not once more with the true rig")
     return parser.parse_args()

@@ -71,7 +71,8 @@ def localize(folder, place):
                   folder / "rig_truth.yaml", "--map", place.map, "--options", ROOT / "config" / "localization.yaml", "--output",
                   folder / "poses.tum"], folder / "localize.log", may_fail=True)
     if not (folder / "poses.tum.csv").exists():
-        return {"says": (folder / "localize.log").read_text().strip().splitlines()[-1], "share": 0.0, "wrong": 0, "median_m": None}
+        return {"says": (folder / "localize.log").read_text().strip().splitlines()[-1], "share": 0.0, "wrong": 0,
+                "median_m": None}
     errors = LocalizationErrors(folder / "poses.tum.csv", folder / "drive_truth" / "trajectory.tum", place.mapped)
     good = errors.localized()
     states, last = [], None
