@@ -15,7 +15,9 @@ mkdir -p "$work"
 bag=$work/drive.bag rig=$work/rig_truth.yaml truth=$work/drive_truth
 [ -e "$bag" ] || "$tools/vcharge_simulation/simulate_drive" --scene lot --drive short --truth-range --output "$bag"
 "$tools/vcharge_dense/compute_range_maps" --bag "$bag" --rig "$rig" --output "$work/odometry" --no-pictures
-"$tools/vcharge_evaluation/evaluate_range" --range "$work/odometry" --truth "$truth" --bag "$bag" --rig "$rig" --report "$work/odometry_report"
+"$tools/vcharge_evaluation/evaluate_range" --range "$work/odometry" --truth "$truth" --bag "$bag" --rig "$rig" \
+  --report "$work/odometry_report"
 "$tools/vcharge_dense/compute_range_maps" --bag "$bag" --rig "$rig" --cameras front left --trajectory "$truth/trajectory.tum" \
   --output "$work/truth" --no-pictures
-"$tools/vcharge_evaluation/evaluate_range" --range "$work/truth" --truth "$truth" --bag "$bag" --rig "$rig" --report "$work/truth_report"
+"$tools/vcharge_evaluation/evaluate_range" --range "$work/truth" --truth "$truth" --bag "$bag" --rig "$rig" \
+  --report "$work/truth_report"

@@ -2,15 +2,13 @@
 """Memory of the nodelets' manager while a drive is replayed over and over; see soak.sh."""
 import os
 import pathlib
-import signal
-import subprocess
 import sys
 import tempfile
 import time
 
 import numpy as np
 
-from chain_nodelets import free_port
+from chain_nodelets import Launch
 
 MAX_GROWTH_MB_PER_HOUR = 20.0
 SAMPLE_S = 5.0
@@ -61,21 +59,10 @@ def watch(launched, minutes):
 def main():
     bag, rig, map_path = (os.path.realpath(path) for path in sys.argv[1:4])
     minutes, rate = (float(word) for word in (sys.argv[4:6] + ["60", "1.0"][len(sys.argv) - 4:])[:2])
-    port = free_port()
     with tempfile.TemporaryDirectory() as folder:
-        os.environ.update({"ROS_MASTER_URI": f"http://localhost:{port}", "ROS_HOSTNAME": "localhost", "ROS_HOME": folder})
-        with open(f"{folder}/roslaunch.log", "w", encoding="utf-8") as log:
-            launched = subprocess.Popen(["roslaunch", "-p", str(port), "vcharge_launch", "vcharge.launch", f"bag:={bag}",
-                                         f"rig:={rig}", f"map:={map_path}", f"rate:={rate}", "loop:=true"],
-                                        stdout=log, stderr=subprocess.STDOUT, start_new_session=True)
-        try:
-            samples = watch(launched, minutes)
-        finally:
-            os.killpg(launched.pid, signal.SIGINT)
-            try:
-                launched.wait(20)
-            except subprocess.TimeoutExpired:
-                os.killpg(launched.pid, signal.SIGKILL)
+        with Launch(pathlib.Path(folder), "vcharge.launch", f"bag:={bag}", f"rig:={rig}", f"map:={map_path}", f"rate:={rate}",
+                    "loop:=true") as launched:
+            samples = watch(launched.process, minutes)
     late = samples[samples[:, 0] >= samples[-1, 0] / 2]
     growth = np.polyfit(late[:, 0], late[:, 1], 1)[0] * 3600
     print(f"memory {late[:, 1].mean():.0f} MB, growth over the second half {growth:+.1f} MB an hour")
