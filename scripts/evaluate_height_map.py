@@ -9,7 +9,7 @@ import re
 
 import yaml
 
-from evaluate_mapping import ROOT, TOOLS, mark, run, say, simulate
+from tool_runs import ROOT, TOOLS, mark, run, say, simulate
 
 
 def arguments():
