@@ -2,7 +2,7 @@
 # The tables of what obstacle detection reaches: simulates drives (or takes those that --work has from an earlier run), detects
 # obstacles with config/dense_obstacles.yaml and config/obstacles.yaml and compares them with the truth.
 #   evaluate_obstacles.sh [--work DIR] [--small] [--seed N] [--drives "course lot pitch garage"]
-# Images of 1280x800, or with --small of 512x320, which render five times as fast; the range maps have 384x240 pixels either way.
+# Images of 1280x800, or with --small of 512x320, which render faster; the range maps have 384x240 pixels either way.
 # pitch is the lot's drive on a soft suspension. Seeds below 50 are for choosing settings.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

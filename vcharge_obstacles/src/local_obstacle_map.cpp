@@ -314,7 +314,8 @@ void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid&
                    parallaxSigma_m(obstacle.range_m, {std::cos(middle_rad), std::sin(middle_rad)}));
     const double sharpness = std::min(1.0, options_.sharp_sigma_m / sigma_m);
     const double look_mass = sharpness * sharpness * ray_mass;
-    const int along = sigma_m < 0.6 * cell_m ? 0 : static_cast<int>(std::ceil(kLookSigmas * sigma_m / cell_m));
+    const int along =
+        sigma_m < 0.6 * cell_m ? 0 : static_cast<int>(std::ceil(kLookSigmas * sigma_m / cell_m));
     double normalizer = 0.0;
     const auto density = [&](int step) {
       const double z = step * cell_m / sigma_m;

@@ -96,8 +96,8 @@ TEST_F(LocalObstacleMapTest, WhoWalksAwayIsClearedWithinASecondOnceSeenFree) {
 
 constexpr double kFlankY_m = 5.0;
 
-/// What a camera at (x, 0) that looks along the axes says of a flank from (-1, kFlankY_m) to (1, kFlankY_m), when
-/// all its ranges err by error_m.
+/// What a camera at (x, 0) that looks along the axes says of a flank from (-1, kFlankY_m) to (1, kFlankY_m),
+/// when all its ranges err by error_m.
 CameraObstacles makeLookAtFlank(double x_m, double sigma_m, double error_m, const PolarGrid& grid) {
   CameraObstacles seen;
   seen.camera_name = "left";

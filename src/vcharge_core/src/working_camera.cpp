@@ -77,9 +77,10 @@ cv::Size scaledSize(cv::Size size, double scale) {
 
 /// Bilinear sampling averages over two pixels; where samples lie further apart, as many have to be averaged
 /// before it, or what is finer than they turns into a pattern that moves otherwise than the things it is on.
-int averagedPixels(const WorkingCameraOptions& options) {
+int averagedPixels(cv::Size image_size, const WorkingCameraOptions& options) {
   const double samples_per_pixel = options.image_scale * options.focal_scale;
-  return std::max(1, static_cast<int>(std::ceil(0.5 / samples_per_pixel - 1e-9)));
+  const double block_px = std::ceil(0.5 / samples_per_pixel - 1e-9);
+  return static_cast<int>(std::clamp(block_px, 1.0, 1.0 * std::min(image_size.width, image_size.height)));
 }
 
 /// Mean over whole blocks of `block` pixels each way.
@@ -109,7 +110,7 @@ WorkingCamera::WorkingCamera(const CameraModel& camera, cv::Size image_size_px, 
     : model_(makeWorkingModel(camera, field_of_view_rad, options)),
       size_(scaledSize(image_size_px, options.image_scale)),
       sensor_size_(image_size_px),
-      block_px_(averagedPixels(options)),
+      block_px_(averagedPixels(image_size_px, options)),
       valid_mask_(cv::Mat::zeros(size_, CV_8UC1)),
       sensor_pixels_(size_, CV_32FC2, cv::Scalar(-1.0, -1.0)) {
   check(mask.empty() || (mask.size() == image_size_px && mask.type() == CV_8UC1),
@@ -135,7 +136,8 @@ WorkingCamera::WorkingCamera(const CameraModel& camera, cv::Size image_size_px, 
         }
         sensor_pixels_.at<cv::Vec2f>(y, x) =
             cv::Vec2f(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
-        valid_mask_.at<uint8_t>(y, x) = mask.empty() || isValid(valid_blocks, sensor_pixels_.at<cv::Vec2f>(y, x)) ? 255 : 0;
+        valid_mask_.at<uint8_t>(y, x) =
+            mask.empty() || isValid(valid_blocks, sensor_pixels_.at<cv::Vec2f>(y, x)) ? 255 : 0;
       }
     }
   });

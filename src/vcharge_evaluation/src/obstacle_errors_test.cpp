@@ -153,7 +153,8 @@ TEST_F(ObstacleMapErrorsTest, GroundIsOpenWhereItWasSeenAndNothingIsNear) {
 TEST_F(ObstacleMapErrorsTest, FalseCellCountsOnceAndAsLeftOnlyWhileItIsOccupied) {
   ObstacleMapEvaluator evaluator({box_}, heights_, path_);
   for (size_t i = 0; i < path_.size(); ++i) {
-    ObstacleMap map = mapWith(i < 10 ? std::vector<Eigen::Vector2d>{{1.55, -2.0}} : std::vector<Eigen::Vector2d>{}, {});
+    ObstacleMap map =
+        mapWith(i < 10 ? std::vector<Eigen::Vector2d>{{1.55, -2.0}} : std::vector<Eigen::Vector2d>{}, {});
     map.fixed_from_vehicle = path_[i];
     // Odometry that drifts across the borders of the world's cells: the map's cell stays the same.
     evaluator.add(map, points_, RigidTransform::planar(0.1 * i, 0.01 * i, 0.0), {}, {});

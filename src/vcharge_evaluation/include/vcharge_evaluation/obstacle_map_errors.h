@@ -22,14 +22,14 @@ struct ObstacleMapEvaluationOptions {
   double view_range_m = 5.0;                              ///< an obstacle counts as viewed from here on
   double min_angle_from_travel_rad = 0.3490658503988659;  ///< and by rays so far from the direction of travel
   int min_seen_points = 15;                               ///< and with so many points
-  double grace_m = 1.0;          ///< motion past the first view until it must be reported
+  double grace_m = 1.0;       ///< motion past the first view until it must be reported
   double tolerance_m = 0.25;  ///< an occupied cell so near reports an obstacle
   /// Around whatever rises to false_height_m the ground is not open: the range error that is allowed (15 cm)
   /// and the diagonal of a cell.
   double false_radius_m = 0.29;
   double false_height_m = 0.08;
   double false_range_m = 5.0;  ///< from the vehicle's middle; further away no cell is judged
-  double kerb_min_m = 0.1;       ///< outlines of kerbs whose true height lies between are judged
+  double kerb_min_m = 0.1;     ///< outlines of kerbs whose true height lies between are judged
   double kerb_max_m = 0.16;
 
   template <class Visitor>
