@@ -75,8 +75,7 @@ TEST(WorkingCameraTest, PatternFinerThanTheWorkingPixelsBecomesGray) {
     }
   }
   WorkingCameraOptions options;
-  for (const double scale :
-       {0.25, 0.3, 0.4}) {  // with 0.5, bilinear sampling averages well where it falls between
+  for (const double scale : {0.25, 0.3, 0.4}) {
     options.image_scale = scale;
     const WorkingCamera working(golfCamera(), kSize, kFieldOfView, cv::Mat(), options);
     cv::Mat mean, deviation;

@@ -20,7 +20,7 @@ namespace {
 using namespace vcharge;
 
 struct Options {
-  int frame_step = 3;  ///< every how many maps one is judged
+  int frame_step = 1;  ///< every how many maps one is judged
   int pixel_step = 2;  ///< of the true ranges
   ObstacleScanEvaluationOptions scan;
   ObstacleMapEvaluationOptions map;

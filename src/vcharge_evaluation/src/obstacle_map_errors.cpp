@@ -19,6 +19,7 @@ constexpr double kMiddle_m = 1.4;
 constexpr double kSeenHeight_m = 0.1;
 constexpr double kMaxHeight_m = 2.0;
 constexpr double kKerbTolerance_m = 0.15;
+constexpr double kKerbWidth_m = 0.2;
 
 /// From the ground between the wheels, over all poses.
 double distanceFromPath(const std::vector<Eigen::Vector2d>& points_m, const std::vector<RigidTransform>& path,
@@ -108,8 +109,14 @@ ObstacleMapEvaluator::ObstacleMapEvaluator(const std::vector<TruthObstacle>& obs
     : options_(options), heights_(heights) {
   options_.validate();
   const cv::Mat known = withoutNaN(heights.height_m);
-  const int side = 2 * static_cast<int>(std::lround(options_.false_radius_m / heights.cell_size_m)) + 1;
-  cv::dilate(known, highest_around_, cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
+  const auto highestWithin = [&](double radius_m) {
+    const int side = 2 * static_cast<int>(std::lround(radius_m / heights.cell_size_m)) + 1;
+    cv::Mat highest;
+    cv::dilate(known, highest, cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
+    return highest;
+  };
+  highest_around_ = highestWithin(options_.false_radius_m);
+  const cv::Mat highest_on_kerbs = highestWithin(kKerbWidth_m);
   cv::erode(known, lowest_around_, cv::getStructuringElement(cv::MORPH_RECT, {3, 3}));
   for (const TruthObstacle& obstacle : obstacles) {
     if (obstacle.top_z_m >= options_.false_height_m && obstacle.base_z_m < kMaxHeight_m) {
@@ -117,7 +124,7 @@ ObstacleMapEvaluator::ObstacleMapEvaluator(const std::vector<TruthObstacle>& obs
     }
     std::vector<Eigen::Vector2d> outline = obstacle.footprint_m;
     if (obstacle.kind == "kerb") {
-      addKerbPoints(obstacle, path);
+      addKerbPoints(obstacle, highest_on_kerbs, path);
     }
     for (size_t i = 0; i < obstacle.footprint_m.size(); ++i) {  // long walls have their corners far away
       const Eigen::Vector2d& a = obstacle.footprint_m[i];
@@ -137,7 +144,8 @@ ObstacleMapEvaluator::ObstacleMapEvaluator(const std::vector<TruthObstacle>& obs
   }
 }
 
-void ObstacleMapEvaluator::addKerbPoints(const TruthObstacle& kerb, const std::vector<RigidTransform>& path) {
+void ObstacleMapEvaluator::addKerbPoints(const TruthObstacle& kerb, const cv::Mat& highest_m,
+                                         const std::vector<RigidTransform>& path) {
   for (size_t i = 0; i < kerb.footprint_m.size(); ++i) {
     const Eigen::Vector2d& a = kerb.footprint_m[i];
     const Eigen::Vector2d& b = kerb.footprint_m[(i + 1) % kerb.footprint_m.size()];
@@ -145,7 +153,7 @@ void ObstacleMapEvaluator::addKerbPoints(const TruthObstacle& kerb, const std::v
     for (int step = 0; step < steps; ++step) {
       const Eigen::Vector2d point = a + (step + 0.5) / steps * (b - a);
       // Grass and bushes on the island hide what the kerb itself rises to.
-      const double height_m = heights_.at(highest_around_, point);
+      const double height_m = heights_.at(highest_m, point);
       if (height_m >= options_.kerb_min_m && height_m <= options_.kerb_max_m &&
           distanceFromPath({point}, path, options_.vehicle_half_width_m) <= options_.corridor_m) {
         kerb_points_.push_back({point, height_m, std::nullopt, false, false, 0.0});

@@ -127,7 +127,8 @@ class ObstacleMapEvaluator {
   };
   struct Frame;
 
-  void addKerbPoints(const TruthObstacle& kerb, const std::vector<RigidTransform>& path);
+  void addKerbPoints(const TruthObstacle& kerb, const cv::Mat& highest_m,
+                     const std::vector<RigidTransform>& path);
   void judgeObstacles(const Frame& frame);
   void judgeKerbs(const Frame& frame);
   void judgeCells(const Frame& frame);
