@@ -63,7 +63,19 @@ class HeightMapTest(unittest.TestCase):
     def test_a_grid_too_large_for_memory_is_refused(self):
         options = dict(self.options, fusion={"cell_size_m": 0.0001})
         path = self.drive.write_text("large.yaml", yaml.safe_dump(options))
-        self.expect_failure(["max_memory_gb", "GB"], options=path)
+        self.expect_failure([str(self.drive.bag), "max_memory_gb", "GB"], options=path)
+        self.assertFalse((self.drive.folder / "failed.range_maps").exists())
+
+    def test_poses_too_far_apart_are_refused_before_any_range_map(self):
+        lines = []
+        for i, line in enumerate((self.drive.truth / "trajectory.tum").read_text().splitlines()):
+            words = line.split()
+            if i == 40:
+                words[1] = "1e7"
+            lines.append(" ".join(words))
+        apart = self.drive.write_text("apart.tum", "\n".join(lines) + "\n")
+        self.expect_failure(["apart.tum", "max_memory_gb"], extra=["--trajectory", apart])
+        self.assertFalse((self.drive.folder / "failed.range_maps").exists())
 
     def test_options_that_do_not_exist_are_refused(self):
         path = self.drive.write_text("unknown.yaml", "fusion: {cell_m: 1}\n")

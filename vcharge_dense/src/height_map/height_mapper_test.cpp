@@ -179,12 +179,26 @@ TEST_F(HeightMapperTest, SaysThatNothingSureWasSeen) {
   EXPECT_NE(error.find("max_range_m"), std::string::npos) << error;
 }
 
-TEST_F(HeightMapperTest, SaysThatTheGridIsTooLarge) {
+TEST_F(HeightMapperTest, RefusesAGridThatIsTooLargeBeforeAnyRangeMap) {
   options_.fusion.cell_size_m = 1e-5;
-  HeightMapper mapper(rig_, options_, folder_, "");
+  HeightMapper mapper(rig_, options_, folder_ + "/work", "");
   mapper.setTrajectory(poses(kNumImages));
-  drive(&mapper);
+  try {
+    drive(&mapper);
+    FAIL() << "expected an error";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("max_memory_gb"), std::string::npos) << error.what();
+  }
+  EXPECT_FALSE(fs::exists(folder_ + "/work"));
   EXPECT_NE(errorOf(&mapper).find("max_memory_gb"), std::string::npos);
+}
+
+TEST_F(HeightMapperTest, RefusesPosesTooFarApartBeforeTheDriveAndTakesNoOthersIntoAccount) {
+  const HeightMapper mapper(rig_, options_, folder_, "");
+  const Trajectory apart = poses(kNumImages, 5e5);  // from the sixth on
+  EXPECT_THROW(mapper.checkGrid(apart, stampOf(0), stampOf(kNumImages)), InputError);
+  EXPECT_NO_THROW(mapper.checkGrid(apart, stampOf(0), stampOf(4)));
+  EXPECT_NO_THROW(mapper.checkGrid(apart, stampOf(kNumImages), stampOf(kNumImages + 1)));
 }
 
 TEST_F(HeightMapperTest, LeavesNoFolderOnAFullDisk) {
