@@ -158,13 +158,18 @@ TEST_F(HeightMapErrorsTest, NoTapeIsHeldToPlantsOrToGrassOnAnIsland) {
   };
   const IsRigid is_rigid = rigidBy({{"kerb", rectangle(0, 0, 4, 4), 0.0, kKerb_m},
                                     {"car", rectangle(10, 0, 14, 2), 0.0, 1.4},
-                                    {"hedge", rectangle(1, 3, 3, 3.5), kKerb_m, 1.0}});
+                                    {"hedge", rectangle(1, 3, 3, 3.5), kKerb_m, 1.0},
+                                    {"tree", rectangle(12, 5, 12.2, 5.2), 0.0, 1.8}});
   EXPECT_TRUE(is_rigid({0.05, 1.0}, kKerb_m + 0.01));
   EXPECT_FALSE(is_rigid({2.0, 1.0}, 0.25));  // grass
   EXPECT_FALSE(is_rigid({2.0, 3.2}, 1.0));
   EXPECT_FALSE(is_rigid({0.8, 3.2}, kKerb_m));  // leaves hang over
   EXPECT_TRUE(is_rigid({10.05, 1.0}, 0.9));
-  EXPECT_TRUE(is_rigid({20.0, 1.0}, 2.0));  // a wall
+  EXPECT_TRUE(is_rigid({20.0, 1.0}, 2.0));   // a wall
+  EXPECT_FALSE(is_rigid({14.0, 6.0}, 2.5));  // a crown, of which the scene lists the stem alone
+  EXPECT_TRUE(is_rigid({14.0, 6.0}, 0.2));   // below it
+  EXPECT_TRUE(is_rigid({12.0, 1.95}, 1.4));  // the car under it
+  EXPECT_TRUE(is_rigid({16.0, 6.0}, 2.5));  // beside it
 
   // Of the platform, half is a hedge's.
   const HeightMapErrors errors =

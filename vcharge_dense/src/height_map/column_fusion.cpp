@@ -18,12 +18,13 @@
 namespace vcharge {
 namespace {
 
-constexpr int kBlockCells = 256;          // side of a block of columns
+constexpr int kBlockCells = 512;          // side of a block of columns
 constexpr size_t kViewsAtOnce = 8;        // that are added to a block in one parallel loop
-constexpr size_t kKeptBytes = 400000000;  // of views in memory, the last ones that were used
+constexpr size_t kKeptBytes = 800000000;  // of views in memory, the last ones that were used
 constexpr double kBytesPerCell = 80.0;    // of images and solvers, see primal_dual.h
-constexpr int kSupportVoxels = 4;         // above and below the best height, for the confidence
-constexpr double kFullSupport = 2.0;      // sum of weights by which 1 - 1/e of full confidence is reached
+constexpr double kSupport_m = 0.1;        // above and below the best height, for the confidence
+// Sum of weights, times the height of a voxel, by which 1 - 1/e of full confidence is reached.
+constexpr double kFullSupport_m = 0.05;
 
 /// Keeps the views that were used last.
 class ViewCache {
@@ -79,16 +80,16 @@ double distanceToBlock(const VoxelGrid& grid, const Block& block, const Eigen::V
   return (place - place.cwiseMax(low).cwiseMin(high)).norm();
 }
 
-double confidenceOf(const float* weights, int num_voxels, int height_index) {
+double confidenceOf(const float* weights, const VoxelGrid& grid, int height_index) {
+  const int reach = std::max(1, static_cast<int>(std::lround(kSupport_m / grid.height_step_m)));
   double above = 0.0, below = 0.0, contrary = 0.0;
-  for (int z = std::max(0, height_index - kSupportVoxels);
-       z < std::min(num_voxels, height_index + kSupportVoxels); ++z) {
+  for (int z = std::max(0, height_index - reach); z < std::min(grid.num_voxels, height_index + reach); ++z) {
     const double support = z < height_index ? weights[z] : -weights[z];
     (support < 0.0 ? contrary : z < height_index ? below : above) += std::abs(support);
   }
-  const double support = std::min(above, below);
+  const double support_m = std::min(above, below) * grid.height_step_m;
   const double total = above + below + contrary;
-  return total > 0.0 ? (above + below) / total * (1.0 - std::exp(-support / kFullSupport)) : 0.0;
+  return total > 0.0 ? (above + below) / total * (1.0 - std::exp(-support_m / kFullSupport_m)) : 0.0;
 }
 
 /// Fuses one block after the other.
@@ -157,7 +158,7 @@ class BlockFuser {
     confidence = 0.0F;
     if (best.has_surface) {
       height = static_cast<float>(grid_.bottom_m + best.height_index * grid_.height_step_m);
-      confidence = static_cast<float>(confidenceOf(weights, grid_.num_voxels, best.height_index));
+      confidence = static_cast<float>(confidenceOf(weights, grid_, best.height_index));
     }
   }
 

@@ -119,7 +119,9 @@ void HeightMapper::addTask(const RangeTask& task) {
         throw InputError(path + ": cannot be written (is the disk full?)");
       }
     });
-    writeRangeMap(range_mapper_->sweep(task), folder());  // its YAML comes last: all is there
+    RangeMap map = range_mapper_->sweep(task);
+    map.reference.release();       // it is there already, and is read once, not whenever ranges are
+    writeRangeMap(map, folder());  // its YAML comes last: all is there
   }
   views_.push_back({task.camera_index, task.reference.stamp, task.reference.world_from_camera});
 }
