@@ -20,7 +20,7 @@ namespace {
 
 constexpr int kBlockCells = 512;          // side of a block of columns
 constexpr size_t kViewsAtOnce = 8;        // that are added to a block in one parallel loop
-constexpr size_t kKeptBytes = 800000000;  // of views in memory, the last ones that were used
+constexpr size_t kKeptBytes = 600000000;  // of views in memory, the last ones that were used
 constexpr double kBytesPerCell = 80.0;    // of images and solvers, see primal_dual.h
 constexpr double kSupport_m = 0.1;        // above and below the best height, for the confidence
 // Sum of weights, times the height of a voxel, by which 1 - 1/e of full confidence is reached.
