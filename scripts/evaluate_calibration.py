@@ -14,8 +14,8 @@ import numpy as np
 import rosbag
 import yaml
 
-from evaluate_localization import rotations
-from evaluate_mapping import ROOT, TOOLS, mark, run, say, simulate
+from localization_errors import rotations
+from tool_runs import ROOT, TOOLS, mark, run, say, simulate
 
 MAX_TURN_DEG, MAX_SHIFT_M = 0.05, 0.01
 DEGREES = 180.0 / math.pi

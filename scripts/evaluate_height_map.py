@@ -7,7 +7,7 @@ import os
 import pathlib
 import re
 
-from evaluate_mapping import ROOT, TOOLS, mark, run, say, simulate
+from tool_runs import ROOT, TOOLS, mark, run, say, simulate
 
 
 def arguments():

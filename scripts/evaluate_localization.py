@@ -2,18 +2,14 @@
 """What localization reaches, as a Markdown table: share of frames, errors, consistency, starts, cameras, time, mishaps;
 see evaluate_localization.sh."""
 import argparse
-import csv
 import pathlib
 import re
 import sys
 
-import matplotlib
 import numpy as np
 
-matplotlib.use("Agg")
-from matplotlib import pyplot as plt  # noqa: E402
-
-from evaluate_mapping import ROOT, TOOLS, mark, run, say, simulate  # noqa: E402
+from tool_runs import ROOT, TOOLS, mark, run, say, simulate
+from localization_errors import LocalizationErrors, Map
 
 FRAMES_OF_START = 5
 START_EVERY = 10
@@ -49,139 +45,29 @@ def drive(args, scenario, seed, duration_s):
     return folder
 
 
-def rotations(quaternions):
-    x, y, z, w = quaternions.T
-    return np.stack([np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], -1),
-                     np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], -1),
-                     np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], -1)], -2)
+def map_of(folder):
+    """The map of a mapping drive; one that is there is taken as it is."""
+    path = folder / "lot.vmap"
+    if not path.exists():
+        say(f"{folder}: building the map")
+        run([TOOLS / "vcharge_mapping" / "build_map", "--bag", folder / "drive.bag", "--rig", folder / "rig_truth.yaml",
+             "--output", path, "--options", ROOT / "config" / "mapping.yaml"], folder / "lot.log")
+    return Map(path, folder / "drive_truth" / "trajectory.tum")
 
 
-def nearest(times, wanted):
-    """Indices of the entries of `times` (ascending) that are nearest to the wanted ones."""
-    right = np.clip(np.searchsorted(times, wanted), 1, len(times) - 1)
-    return np.where(wanted - times[right - 1] < times[right] - wanted, right - 1, right)
-
-
-class Map:
-    """A map and the true poses of its keyframes."""
-
-    def __init__(self, folder, args):
-        self.path = folder / "lot.vmap"
-        if not self.path.exists():
-            say(f"{folder}: building the map")
-            run([TOOLS / "vcharge_mapping" / "build_map", "--bag", folder / "drive.bag", "--rig",
-                 folder / "rig_truth.yaml", "--output", self.path, "--options", ROOT / "config" / "mapping.yaml"],
-                folder / "lot.log")
-        keyframes_path = folder / "lot_keyframes.tum"
-        run([TOOLS / "vcharge_mapping" / "map_info", "--map", self.path, "--trajectory", keyframes_path],
-            folder / "lot_info.log")
-        poses = np.loadtxt(keyframes_path)
-        truth = np.loadtxt(folder / "drive_truth" / "trajectory.tum")
-        truth = truth[nearest(truth[:, 0], poses[:, 0])]
-        self.positions, self.rotations = poses[:, 1:4], rotations(poses[:, 4:])
-        self.true_positions, self.true_rotations = truth[:, 1:4], rotations(truth[:, 4:])
-        # world_from_map by all keyframes.
-        centre, true_centre = self.positions.mean(0), self.true_positions.mean(0)
-        u, _, v = np.linalg.svd((self.true_positions - true_centre).T @ (self.positions - centre))
-        self.turn = u @ np.diag([1, 1, np.linalg.det(u @ v)]) @ v
-        self.shift = true_centre - self.turn @ centre
-
-    def carry(self, positions, turns):
-        """True poses of the world into the map, by the nearest keyframe."""
-        keyframe = ((positions[:, None, :] - self.true_positions[None, :, :]) ** 2).sum(-1).argmin(1)
-        back = self.true_rotations[keyframe].transpose(0, 2, 1)
-        between = np.einsum("nij,nj->ni", back, positions - self.true_positions[keyframe])
-        return (self.positions[keyframe] + np.einsum("nij,nj->ni", self.rotations[keyframe], between),
-                self.rotations[keyframe] @ back @ turns)
-
-
-class Run:
+class Run(LocalizationErrors):
     """A drive that was localized, and its errors."""
 
     def __init__(self, args, folder, place, name, words=()):
-        self.log = folder / f"{name}.log"
         output = folder / f"{name}.tum"
         say(f"{folder}: {name}")
         result = run([TOOLS / "vcharge_localization" / "localize_drive", "--bag", folder / "drive.bag", "--rig",
                       folder / "rig_truth.yaml", "--map", place.path, "--options", args.options, "--output", output,
-                      *words], self.log)
+                      *words], folder / f"{name}.log")
         self.map_ready_s = float(re.search(r"map ready after (\S+) s", result["output"]).group(1))
         self.hash = re.search(r"content hash: (\S+)", result["output"]).group(1)
         self.cpu_s = result["cpu_s"]
-        with open(f"{output}.csv", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-        self.time_s = np.array([float(row["time_s"]) for row in rows])
-        self.status = np.array([row["status"] for row in rows])
-        self.latency_s = np.array([float(row["latency_s"]) for row in rows])
-        self.has_pose = np.array([row["tx"] != "" for row in rows])
-        size = len(rows)
-        self.error_m, self.error_deg = np.full(size, np.inf), np.full(size, np.inf)
-        self.heading_deg, self.absolute_m = np.full(size, np.inf), np.full(size, np.inf)
-        self.normalized, self.sigma_m = np.full(size, np.nan), np.full(size, np.nan)
-        if self.has_pose.any():
-            self.judge([row for row in rows if row["tx"] != ""], folder, place)
-
-    def judge(self, rows, folder, place):
-        truth = np.loadtxt(folder / "drive_truth" / "trajectory.tum")
-        truth = truth[nearest(truth[:, 0], self.time_s[self.has_pose])]
-        estimated = np.array([[float(row[key]) for key in ("tx", "ty", "tz", "qx", "qy", "qz", "qw")] for row in rows])
-        true_positions, true_turns = place.carry(truth[:, 1:4], rotations(truth[:, 4:]))
-        shift = estimated[:, :3] - true_positions
-        turn = rotations(estimated[:, 3:]) @ true_turns.transpose(0, 2, 1)
-        axis = 0.5 * np.stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0],
-                               turn[:, 1, 0] - turn[:, 0, 1]], -1)
-        cosine = np.clip((np.trace(turn, axis1=1, axis2=2) - 1) / 2, -1, 1)
-        covariance = np.zeros((len(rows), 6, 6))
-        for i in range(6):
-            for k in range(i, 6):
-                covariance[:, i, k] = covariance[:, k, i] = [float(row[f"covariance_{i}{k}"]) for row in rows]
-        planar = np.ix_(range(len(rows)), [0, 1, 5], [0, 1, 5])
-        errors = np.stack([shift[:, 0], shift[:, 1], axis[:, 2]], -1)
-        self.error_m[self.has_pose] = np.linalg.norm(shift, axis=1)
-        self.error_deg[self.has_pose] = np.degrees(np.arccos(cosine))
-        self.heading_deg[self.has_pose] = np.degrees(np.abs(axis[:, 2]))
-        world = estimated[:, :3] @ place.turn.T + place.shift
-        self.absolute_m[self.has_pose] = np.linalg.norm(world - truth[:, 1:4], axis=1)
-        self.normalized[self.has_pose] = np.einsum(
-            "ni,ni->n", errors, np.linalg.solve(covariance[planar], errors[..., None])[..., 0]) / 3
-        self.sigma_m[self.has_pose] = np.sqrt(np.trace(covariance[:, :3, :3], axis1=1, axis2=2))
-
-    def localized(self):
-        return self.status == "localized"
-
-    def share(self):
-        return self.localized().mean()
-
-    def num_false(self):
-        return int((self.localized() & ((self.error_m > 0.5) | (self.error_deg > 2.0))).sum())
-
-    def consistency(self):
-        """Mean normalized error squared per degree of freedom, of localized frames two seconds apart."""
-        values, last_s = [], -np.inf
-        for i in np.flatnonzero(self.localized()):
-            if self.time_s[i] - last_s >= 2.0:
-                last_s = self.time_s[i]
-                values.append(self.normalized[i])
-        return float(np.mean(values)), len(values)
-
-    def plot(self, path):
-        figure, axes = plt.subplots(3, 1, figsize=(9, 8), sharex=True)
-        time_s = self.time_s - self.time_s[0]
-        good = self.localized()
-        axes[0].plot(time_s[self.has_pose], 100 * self.error_m[self.has_pose], ".", color="0.6", label="bridged")
-        axes[0].plot(time_s[good], 100 * self.error_m[good], ".", label="localized")
-        axes[0].plot(time_s[self.has_pose], 100 * self.sigma_m[self.has_pose], "-", linewidth=0.8, label="sigma")
-        axes[0].set_ylabel("position (cm)")
-        axes[0].legend(loc="upper right")
-        axes[1].plot(time_s[good], self.heading_deg[good], ".")
-        axes[1].set_ylabel("heading (deg)")
-        axes[2].plot(time_s[good], self.normalized[good], ".")
-        axes[2].axhline(1.0, color="0.5", linewidth=0.8)
-        axes[2].set_ylabel("normalized error\nsquared per degree\nof freedom")
-        axes[2].set_xlabel("time (s)")
-        figure.tight_layout()
-        figure.savefig(path, dpi=110)
-        plt.close(figure)
+        super().__init__(f"{output}.csv", folder / "drive_truth" / "trajectory.tum", place)
 
 
 def other_day_rows(result, min_share):
@@ -265,7 +151,7 @@ def main():
     places, others, starts = {}, {}, []
     for scene in args.scenes:
         mapped = drive(args, f"mapping_{scene}", args.seed, args.map_duration_s)
-        places[scene] = Map(mapped, args)
+        places[scene] = map_of(mapped)
         others[scene] = drive(args, f"other_day_{scene}", args.seed + 100, args.duration_s)
     for scene, place in places.items():
         result = Run(args, others[scene], place, "localized")

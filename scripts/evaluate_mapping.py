@@ -6,17 +6,15 @@ import math
 import os
 import pathlib
 import re
-import shutil
 import subprocess
 import sys
-import time
 
 import numpy as np
 import rosbag
 import yaml
 
-ROOT = pathlib.Path(__file__).resolve().parent.parent
-TOOLS = ROOT / "build" / "devel" / "lib"
+from tool_runs import ROOT, TOOLS, mark, run, say, simulate
+
 MAX_ERROR_M = {"mapping_two_levels": 0.15}  # else:
 USUAL_MAX_ERROR_M = 0.05
 # Change of pitch and roll from frame to frame.
@@ -41,40 +39,6 @@ def arguments():
     parser.add_argument("--no-hash", action="store_true", help="not a second time on one thread")
     parser.add_argument("--keep-maps", action="store_true", help="take maps that are there, with their times")
     return parser.parse_args()
-
-
-def run(words, log, may_fail=False):
-    """Runs a tool; returns its output, wall time, processor time and peak memory. Its progress goes into the log."""
-    words = [str(word) for word in words]
-    log.parent.mkdir(parents=True, exist_ok=True)
-    start = time.monotonic()
-    with open(log, "w", encoding="utf-8") as errors:
-        process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=errors, text=True)
-        output = process.stdout.read()
-        _, status, usage = os.wait4(process.pid, 0)
-    if status != 0 and not may_fail:
-        raise RuntimeError(f"{' '.join(words)} failed ({status}): see {log}")
-    return {"output": output, "wall_s": time.monotonic() - start, "cpu_s": usage.ru_utime + usage.ru_stime,
-            "peak_gb": usage.ru_maxrss * 1024 / 1e9}
-
-
-def say(text):
-    print(time.strftime("%H:%M:%S"), text, file=sys.stderr, flush=True)
-
-
-def simulate(folder, words):
-    """A drive in a folder of its own; one that is complete and made with the same words is taken as it is."""
-    words = [str(word) for word in words]
-    done = folder / "simulated.txt"
-    if done.exists() and done.read_text() == " ".join(words):
-        say(f"{folder}: drive taken as it is")
-        return
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    say(f"{folder}: simulating")
-    run([TOOLS / "vcharge_simulation" / "simulate_drive", *words, "--output", folder / "drive.bag"],
-        folder / "simulate.log")
-    done.write_text(" ".join(words))
 
 
 def poses_of_odometry(bag_path, path):
@@ -158,10 +122,6 @@ def planar_failure(folder):
                          (f"< {IN_PLANE_DEGREES:g} degrees", tilts < IN_PLANE_DEGREES)):
         texts.append(f"{name}: {spatial[1:][chosen].sum()} of {chosen.sum()}")
     return "; ".join(texts)
-
-
-def mark(reached):
-    return "yes" if reached else "**no**"
 
 
 def share(count):

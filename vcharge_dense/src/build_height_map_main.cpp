@@ -1,5 +1,4 @@
 #include <cstdio>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -9,6 +8,7 @@
 #include "vcharge_core/command_line.h"
 #include "vcharge_core/content_hash.h"
 #include "vcharge_core/error.h"
+#include "vcharge_core/file_io.h"
 #include "vcharge_core/options.h"
 #include "vcharge_core/progress_bar.h"
 #include "vcharge_core/sparse_map_file.h"
@@ -151,8 +151,7 @@ void buildHeightMap(const Arguments& arguments) {
   steps.end();
   writeHeightMapFolder(&result, arguments.output);
   if (!arguments.keep_range_maps) {
-    std::error_code ignored;
-    std::filesystem::remove_all(work, ignored);
+    removeFolder(work);
   }
   print(result);
 }

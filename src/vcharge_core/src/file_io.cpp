@@ -111,4 +111,12 @@ void createFolder(const std::string& path) {
   }
 }
 
+void removeFolder(const std::string& path) {
+  const std::string removed = path + ".removed";
+  std::error_code ignored;
+  fs::remove_all(removed, ignored);
+  fs::rename(path, removed, ignored);
+  fs::remove_all(removed, ignored);
+}
+
 }  // namespace vcharge

@@ -105,5 +105,17 @@ TEST_F(FileIoTest, ErrorsNameThePath) {
   }
 }
 
+TEST_F(FileIoTest, RemovedFolderTakesAlongWhatAKilledRemovalLeft) {
+  const std::string path = folder_ + "/work";
+  for (const std::string& made : {path, path + ".removed"}) {
+    createFolder(made);
+    writeTextFileAtomically(made + "/a.txt", "a");
+  }
+  removeFolder(path);
+  EXPECT_FALSE(std::filesystem::exists(path));
+  EXPECT_FALSE(std::filesystem::exists(path + ".removed"));
+  EXPECT_NO_THROW(removeFolder(path));
+}
+
 }  // namespace
 }  // namespace vcharge

@@ -35,5 +35,9 @@ class FolderTransaction {
 
 /// Creates a folder and its parents. InputError when that fails.
 void createFolder(const std::string& path);
+/// Removes a folder that goes on being used should it stay: it is gone under its name before its first file
+/// is, so that being killed leaves no part of it there, and what an earlier kill left is removed too. Errors
+/// are ignored.
+void removeFolder(const std::string& path);
 
 }  // namespace vcharge

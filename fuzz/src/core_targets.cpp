@@ -1,0 +1,105 @@
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "fuzz_target.h"
+#include "vcharge_core/analytic_map.h"
+#include "vcharge_core/camera_rig.h"
+#include "vcharge_core/file_io.h"
+#include "vcharge_core/height_map_file.h"
+#include "vcharge_core/range_map_file.h"
+#include "vcharge_core/sparse_map_file.h"
+#include "vcharge_core/trajectory.h"
+#include "vcharge_features/vocabulary_tree.h"
+#include "vcharge_geometry/pose_graph.h"
+
+namespace vcharge {
+namespace {
+
+constexpr char kGraph2d[] =
+    "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0.1\nFIX 0\nEDGE_SE2 0 1 1.0 0.0 0.1 100 0 0 100 0 500\n";
+constexpr char kGraph3d[] =
+    "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1 0 0 0 0 0 1\n"
+    "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1 100 0 0 0 0 0 100 0 0 0 0 100 0 0 0 400 0 0 400 0 400\n";
+constexpr char kTrajectory[] =
+    "# time x y z q\n1.0 0 0 0 0 0 0 1\n1.080000001 0.1 -1e-3 0 0 0 0.1 0.99498743710662\n";
+
+std::string rigText() {
+  CameraRig rig = makeAnalyticMap({2, 4}).rig;
+  for (RigCamera& camera : rig.cameras) {
+    camera.mask = cv::Mat();
+    camera.mask_file.clear();
+  }
+  rig.provenance["program"] = "test";
+  return formatCameraRig(rig);
+}
+
+std::string sparseMapBytes() {
+  return bytesOf("a.vmap", [](const std::string& path) {
+    writeSparseMap(SparseMap(makeAnalyticMap({4, 12})), MapProvenance(), path);
+  });
+}
+
+HeightMap smallHeightMap() {
+  HeightMap map;
+  map.frame_id = "map";
+  map.cell_size_m = 0.05;
+  map.height_m = cv::Mat(4, 5, CV_32FC1, cv::Scalar(0.25));
+  return map;
+}
+
+/// Files of a height map beside each other, of which one is replaced.
+FuzzTarget heightMapTarget(const std::string& name, const std::string& replaced) {
+  return {name,
+          [replaced] {
+            const ScratchFolder folder;
+            writeHeightMap(smallHeightMap(), folder.path() + "/height_map");
+            return std::vector<std::string>{readTextFile(folder.path() + "/" + replaced)};
+          },
+          [replaced](const std::string& bytes) {
+            const ScratchFolder folder;
+            writeHeightMap(smallHeightMap(), folder.path() + "/height_map");
+            folder.write(replaced, bytes);
+            readHeightMap(folder.path() + "/height_map.yaml");
+          }};
+}
+
+std::string vocabularyBytes() {
+  std::vector<cv::Mat> descriptors;
+  cv::RNG random(3);
+  for (int i = 0; i < 6; ++i) {
+    descriptors.emplace_back(12, 32, CV_8UC1);
+    random.fill(descriptors.back(), cv::RNG::UNIFORM, 0, 256);
+  }
+  return VocabularyTree::train(descriptors).serialize();
+}
+
+}  // namespace
+
+std::vector<FuzzTarget> coreTargets() {
+  return {
+      {"rig", [] { return std::vector<std::string>{rigText()}; },
+       [](const std::string& bytes) {
+         const ScratchFolder folder;
+         formatCameraRig(parseCameraRig(bytes, "rig.yaml", folder.path()));
+       }},
+      fileTarget("trajectory", "a.tum", {kTrajectory}, [](const std::string& path) { readTrajectory(path); }),
+      fileTarget("pose_graph", "a.g2o", {kGraph2d, kGraph3d},
+                 [](const std::string& path) { chiSquared(readG2o(path)); }),
+      fileTarget("sparse_map", "a.vmap", {sparseMapBytes()},
+                 [](const std::string& path) { readSparseMap(path)->contentHash(); }),
+      heightMapTarget("height_map_yaml", "height_map.yaml"),
+      heightMapTarget("height_map_tiff", "height_map.tiff"),
+      {"vocabulary", [] { return std::vector<std::string>{vocabularyBytes()}; },
+       [](const std::string& bytes) {
+         const VocabularyTree tree = VocabularyTree::parse(bytes, "vocabulary");
+         if (tree.descriptorColumns() < 4096) {
+           tree.bagOfWords(cv::Mat(3, tree.descriptorColumns(), tree.descriptorType(), cv::Scalar(7)));
+         }
+       }},
+  };
+}
+
+}  // namespace vcharge

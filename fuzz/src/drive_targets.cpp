@@ -1,0 +1,207 @@
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <nav_msgs/Odometry.h>
+#include <ros/serialization.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+#include <boost/make_shared.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "fuzz_target.h"
+#include "vcharge_camera_driver/can_wheel_decoder.h"
+#include "vcharge_camera_driver/gray_converter.h"
+#include "vcharge_core/error.h"
+#include "vcharge_core/recorded_drive.h"
+#include "vcharge_ros/conversions.h"
+#include "vcharge_ros/drive_bag_writer.h"
+#include "vcharge_ros/image_conversions.h"
+#include "vcharge_ros/recorded_drive_reader.h"
+
+namespace vcharge {
+namespace {
+
+constexpr int kWidth_px = 16, kHeight_px = 12;
+
+cv::Mat smallImage() {
+  cv::Mat image(kHeight_px, kWidth_px, CV_8UC1);
+  cv::RNG(5).fill(image, cv::RNG::UNIFORM, 0, 256);
+  return image;
+}
+
+std::string jpegBytes() {
+  std::vector<uint8_t> bytes;
+  cv::imencode(".jpg", smallImage(), bytes);
+  return {bytes.begin(), bytes.end()};
+}
+
+template <class Message>
+std::string serialized(const Message& message) {
+  std::string bytes(ros::serialization::serializationLength(message), '\0');
+  ros::serialization::OStream stream(reinterpret_cast<uint8_t*>(bytes.data()),
+                                     static_cast<uint32_t>(bytes.size()));
+  ros::serialization::serialize(stream, message);
+  return bytes;
+}
+
+/// As a bag or a connection brings it; InputError where the bytes are no such message.
+template <class Message>
+boost::shared_ptr<const Message> deserialized(std::string bytes) {
+  const auto message = boost::make_shared<Message>();
+  ros::serialization::IStream stream(reinterpret_cast<uint8_t*>(bytes.data()),
+                                     static_cast<uint32_t>(bytes.size()));
+  try {
+    ros::serialization::deserialize(stream, *message);
+  } catch (const ros::serialization::StreamOverrunException&) {
+    throw InputError("no such message");
+  }
+  return message;
+}
+
+constexpr size_t kImageFields = 13;
+
+/// Height, width and step (32 bits each), a byte for the encoding, and the data: roscpp makes room for
+/// whatever length a serialized message claims, up to 4 GB, before it looks whether the bytes are there.
+std::string imageFields() {
+  std::string bytes(kImageFields, '\0');
+  const std::array<uint32_t, 3> sizes = {kHeight_px, kWidth_px, kWidth_px};
+  std::memcpy(bytes.data(), sizes.data(), sizeof(sizes));
+  return bytes + std::string(size_t{kHeight_px} * kWidth_px, '\x42');
+}
+
+void takeImage(const std::string& bytes) {
+  static const std::array<const char*, 8> kEncodings = {"mono8",  "8UC1",        "bgr8", "rgba8",
+                                                        "mono16", "bayer_rggb8", "",     "32FC1"};
+  if (bytes.size() < kImageFields) {
+    throw InputError("too short");
+  }
+  std::array<uint32_t, 3> sizes{};
+  std::memcpy(sizes.data(), bytes.data(), sizeof(sizes));
+  const auto message = boost::make_shared<sensor_msgs::Image>();
+  message->height = sizes[0];
+  message->width = sizes[1];
+  message->step = sizes[2];
+  message->encoding = kEncodings[static_cast<uint8_t>(bytes[12]) % kEncodings.size()];
+  message->data.assign(bytes.begin() + kImageFields, bytes.end());
+  const Image image = toImage(message, "/camera/front/image_raw");
+  cv::sum(image.pixels);
+}
+
+void takeCompressedImage(const std::string& bytes) {
+  const auto message = boost::make_shared<sensor_msgs::CompressedImage>();
+  message->format = "jpeg";
+  message->data.assign(bytes.begin(), bytes.end());
+  toImage(message, "/camera/front/image_raw/compressed");
+}
+
+/// The first byte chooses the format, the second adds to the stride.
+void convertFrame(const std::string& bytes) {
+  if (bytes.size() < 2) {
+    return;
+  }
+  const auto* data = reinterpret_cast<const uint8_t*>(bytes.data());
+  const std::vector<PixelFormat>& formats = allPixelFormats();
+  const PixelFormat format = formats[data[0] % formats.size()];
+  cv::Mat gray(kHeight_px, kWidth_px, CV_8UC1);
+  // A copy of its own: what is read behind the frame's end is seen.
+  const std::vector<uint8_t> frame(data + 2, data + bytes.size());
+  GrayConverter().convert(format, frame.data(), frame.size(), bytesPerRow(format, kWidth_px) + data[1] % 5,
+                          &gray);
+}
+
+std::vector<std::string> frames() {
+  std::vector<std::string> seeds;
+  const std::vector<PixelFormat>& formats = allPixelFormats();
+  for (size_t i = 0; i < formats.size(); ++i) {
+    std::string seed{static_cast<char>(i), '\0'};
+    seed += formats[i] == PixelFormat::kMjpeg
+                ? jpegBytes()
+                : std::string(bytesPerRow(formats[i], kWidth_px) * kHeight_px, '\x55');
+    seeds.push_back(seed);
+  }
+  return seeds;
+}
+
+/// Signals that cross bytes, both orders, and frames of 12 bytes each: id, size, data, time.
+void decodeCan(const std::string& bytes) {
+  CanWheelOptions options;
+  options.left_ticks = {0x101, 3, 13, ByteOrder::kLittle, false, 1.0, 0.0};
+  options.right_ticks = {0x101, 31, 16, ByteOrder::kBig, false, 1.0, 0.0};
+  options.steering_angle_rad = {0x7a, 7, 64, ByteOrder::kBig, true, 1e-4, 0.5};
+  options.validate();
+  CanWheelDecoder decoder(options);
+  int64_t now_ns = 0;
+  for (size_t at = 0; at + 12 <= bytes.size(); at += 12) {
+    CanFrame frame;
+    const auto* data = reinterpret_cast<const uint8_t*>(bytes.data() + at);
+    frame.id = data[0] % 2 == 0 ? 0x101 : 0x7a;
+    frame.size = std::min<uint8_t>(data[1] % 16, 8);
+    std::memcpy(frame.data.data(), data + 2, 8);
+    now_ns += int64_t{data[10]} * 1000000 + data[11];
+    decoder.add(frame, Timestamp::fromNanoseconds(now_ns));
+  }
+}
+
+struct NobodyLooks : RecordedDriveConsumer {
+  void addImage(size_t, Timestamp, Timestamp, const Image&) override {}
+  void addOdometry(Timestamp, const VehicleOdometry&) override {}
+  void addBroken(const std::string&, const std::string&) override {}
+};
+
+CameraRig oneCamera() {
+  return parseCameraRig(
+      "cameras:\n  front:\n    image_size_px: [16, 12]\n    model: pinhole\n"
+      "    intrinsics: {fx: 8, fy: 8, cx: 8, cy: 6, k1: 0, k2: 0, p1: 0, p2: 0}\n    field_of_view_rad: "
+      "1.0\n",
+      "rig.yaml", "");
+}
+
+std::string bagBytes() {
+  return bytesOf("a.bag", [](const std::string& path) {
+    DriveBagWriter writer(path, oneCamera());
+    for (int i = 0; i < 3; ++i) {
+      const Timestamp stamp = Timestamp::fromNanoseconds(1000000000 + int64_t{80000000} * i);
+      writer.writeImage(0, stamp, smallImage());
+      VehicleOdometry odometry;
+      odometry.stamp = stamp;
+      writer.writeOdometry(odometry);
+    }
+    writer.close();
+  });
+}
+
+}  // namespace
+
+std::vector<FuzzTarget> driveTargets() {
+  return {
+      {"image_message", [] { return std::vector<std::string>{imageFields()}; }, takeImage},
+      {"compressed_image_message", [] { return std::vector<std::string>{jpegBytes()}; }, takeCompressedImage},
+      {"odometry_message",
+       [] { return std::vector<std::string>{serialized(toMessage(VehicleOdometry(), "odom", "base_link"))}; },
+       [](const std::string& bytes) {
+         fromMessage(*deserialized<nav_msgs::Odometry>(bytes), "/odom", "base_link");
+       }},
+      {"wheel_ticks_message",
+       [] {
+         WheelTicks ticks;
+         ticks.metres_per_tick = 0.01;
+         return std::vector<std::string>{serialized(toMessage(ticks, "base_link"))};
+       },
+       [](const std::string& bytes) {
+         fromMessage(*deserialized<vcharge_msgs::WheelTicks>(bytes), "/wheel_ticks");
+       }},
+      fileTarget("bag", "a.bag", {bagBytes()},
+                 [](const std::string& path) {
+                   NobodyLooks nobody;
+                   readRecordedDrive(path, oneCamera(), DriveTopics(), &nobody, {});
+                 }),
+      {"camera_frame", frames, convertFrame},
+      {"can", [] { return std::vector<std::string>{std::string(48, '\x11')}; }, decodeCan},
+  };
+}
+
+}  // namespace vcharge

@@ -1,0 +1,400 @@
+#!/usr/bin/env python3
+"""The whole chain on one car, step by step: boards -> intrinsics; a drive -> the cameras' places; a drive -> a sparse map,
+range maps, a height map and an OctoMap; another day's drive -> the pose in the map and obstacles, offline and through the
+nodelets. Ends with report.html. A step that an earlier run finished with the same input is kept; one that was stopped
+goes on. Truth of simulated drives is used to judge, and for the masks of the vehicle's own body, which are drawn by hand
+on a real car."""
+import argparse
+import hashlib
+import json
+import os
+import pathlib
+import shutil
+import sys
+import time
+
+import yaml
+
+import chain_errors
+import chain_nodelets
+import chain_report
+from tool_runs import ROOT, TOOLS, run, say
+
+CAMERAS = ("front", "left", "rear", "right")
+CONFIG = ROOT / "config"
+# An odometer whose metres per tick were measured to 0.05 %, as the bring-up guide asks for.
+WHEELS = ("--set", "odometer.scale_error=0.0005", "--set", "odometer.left_right_error=0.0002")
+OTHER_WHEELS = ("--set", "odometer.scale_error=-0.0005", "--set", "odometer.left_right_error=0.0003")
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--work", type=pathlib.Path, default=ROOT / "demo", help="folder for everything")
+    parser.add_argument("--quick", action="store_true", help="simulated images of half the size, shorter drives")
+    parser.add_argument("--scene", default="lot", help="simulated scene: lot or garage")
+    parser.add_argument("--seed", type=int, default=1, help="of scene, lenses, how they are mounted, and noise")
+    parser.add_argument("--no-nodelets", action="store_true", help="offline tools only")
+    parser.add_argument("--no-rviz", action="store_true", help="no pictures of rviz")
+    own = parser.add_argument_group("your own recordings")
+    own.add_argument("--bag", type=pathlib.Path, help="drive with images and /odom: calibrates, and is mapped")
+    own.add_argument("--other-bag", type=pathlib.Path, help="drive to localize in the map of --bag (default: --bag itself)")
+    own.add_argument("--boards", type=pathlib.Path,
+                     help="pictures of the board: a folder of images, or a bag, per camera: BOARDS/CAMERA or BOARDS/CAMERA.bag")
+    own.add_argument("--board", default="9x6", help="inner corners of the chessboard")
+    own.add_argument("--square-m", type=float, default=0.1, help="side of its squares")
+    own.add_argument("--rig", type=pathlib.Path,
+                     help="rig.yaml: with intrinsics alone (or with masks besides --boards), or with the cameras' places too, "
+                          "which are taken as they are then")
+    args = parser.parse_args()
+    if args.bag is None and (args.boards or args.rig or args.other_bag):
+        parser.error("--boards, --rig and --other-bag go with --bag")
+    if args.bag is not None and not (args.boards or args.rig):
+        parser.error("--bag needs --boards (pictures of the board) or --rig (a rig.yaml with intrinsics)")
+    for path in (args.bag, args.other_bag, args.boards, args.rig):
+        if path is not None and not path.exists():
+            parser.error(f"{path}: there is no such file or folder")
+    return args
+
+
+def identity(path):
+    """What tells that a recording is the one that an earlier run took."""
+    path = path.resolve()
+    files = sorted(path.rglob("*")) if path.is_dir() else [path]
+    return " ".join(f"{file}:{file.stat().st_size}:{file.stat().st_mtime_ns}" for file in files if file.is_file())
+
+
+def settings(name):
+    return CONFIG / name, (CONFIG / name).read_text()
+
+
+class Chain:
+    """Steps, in their order, each in a folder of its own below the work folder."""
+
+    def __init__(self, args):
+        self.args = args
+        self.work = args.work.resolve()
+        self.simulated = args.bag is None
+        self.pictures = self.work / "pictures"
+        self.pictures.mkdir(parents=True, exist_ok=True)
+        self.keys, self.figures, self.number = {}, {}, 0
+        scale = 0.5 if args.quick else 1.0
+        self.words = ["--scene-seed", args.seed, "--rig", "random", "--rig-seed", args.seed,
+                      "--image-scale", scale]
+
+    def step(self, name, title, needs, given, work):
+        """Does `work(folder)`, which returns figures, unless an earlier run did it with the same `given` after the same
+        `needs`."""
+        self.number += 1
+        folder = self.work / name
+        key = hashlib.sha1(repr([[str(word) for word in given], [self.keys[need] for need in needs]]).encode()).hexdigest()
+        self.keys[name] = key
+        begun, done = folder / "begun", folder / "done.json"
+        if done.exists() and json.loads(done.read_text())["key"] == key:
+            say(f"{self.number:2d} {title}: kept")
+        else:
+            say(f"{self.number:2d} {title}")
+            if not begun.exists() or begun.read_text() != key:
+                shutil.rmtree(folder, ignore_errors=True)
+                folder.mkdir(parents=True)
+                begun.write_text(key)
+            start, cpu_s = time.monotonic(), sum(os.times()[2:4])
+            figures = work(folder)
+            temporary = folder / "done.json.tmp"
+            temporary.write_text(json.dumps({"key": key, "title": title, "figures": figures,
+                                             "wall_s": time.monotonic() - start,
+                                             "cpu_s": sum(os.times()[2:4]) - cpu_s}, indent=1))
+            temporary.rename(done)
+        self.figures[name] = json.loads(done.read_text())
+        return folder
+
+    def simulate(self, name, title, *words):
+        words = ["--scene", self.args.scene, *self.words, *words]
+
+        def work(folder):
+            run([TOOLS / "vcharge_simulation" / "simulate_drive", *words, "--output", folder / "drive.bag"],
+                folder / "simulate.log")
+            return {}
+
+        return self.step(name, title, [], words, work)
+
+    def take_own(self, name, title, bag):
+        def work(folder):
+            (folder / "drive.bag").symlink_to(bag.resolve())
+            return {}
+
+        return self.step(name, title, [], [identity(bag)], work)
+
+    def truth_of(self, drive):
+        return drive / "drive_truth" if self.simulated else None
+
+    # Calibration.
+
+    def boards(self):
+        """Folder or bag of each camera's pictures."""
+        if not self.simulated:
+            entries = {}
+            for entry in sorted(self.args.boards.iterdir()):
+                if entry.is_dir() or entry.suffix == ".bag":
+                    entries[entry.stem] = entry
+            if not entries:
+                raise SystemExit(f"{self.args.boards}: no folder CAMERA and no CAMERA.bag in it")
+            self.keys["boards"] = identity(self.args.boards)
+            return entries
+        words = [*self.words, "--scene", "chessboard", "--seed", self.args.seed + 100, "--image-step", 5]
+
+        def work(folder):
+            for camera in CAMERAS:
+                run([TOOLS / "vcharge_simulation" / "simulate_drive", *words, "--drive", f"board_{camera}", "--cameras",
+                     camera, "--output", folder / f"{camera}.bag"], folder / f"{camera}.log")
+            return {}
+
+        folder = self.step("boards", "a chessboard before each camera", [], words, work)
+        return {camera: folder / f"{camera}.bag" for camera in CAMERAS}
+
+    def intrinsics(self):
+        boards = self.boards()
+
+        def work(folder):
+            output, figures = folder / "cameras.yaml", {}
+            for camera, source in boards.items():
+                words = ["--bag", source] if source.suffix == ".bag" else ["--images", source]
+                result = run([TOOLS / "vcharge_calibration" / "calibrate_intrinsics", *words, "--board", self.args.board,
+                              "--square-m", self.args.square_m, "--camera", camera, "--output", output, "--keep-others",
+                              "--report", folder / f"{camera}.html"], folder / f"{camera}.log")
+                (folder / f"{camera}.txt").write_text(result["output"])
+                figures[camera] = chain_errors.intrinsics_figures(result["output"])
+            self.add_masks(output, boards)
+            if self.simulated:
+                truths = {camera: source.parent / f"{camera}_truth" / "rig.yaml" for camera, source in boards.items()}
+                chain_errors.judge_intrinsics(output, truths, figures, self.pictures / "intrinsics.png")
+            return figures
+
+        given = [self.args.board, self.args.square_m, identity(self.args.rig) if self.args.rig else ""]
+        return self.step("intrinsics", "intrinsics from the boards", ["boards"], given, work) / "cameras.yaml"
+
+    def add_masks(self, path, boards):
+        """What the vehicle's own body covers: drawn by hand on a real car (--rig names the masks), here the simulator's,
+        grown by a margin as a hand would leave."""
+        rig = yaml.safe_load(path.read_text())
+        for camera in rig["cameras"]:
+            mask = None
+            if self.simulated:
+                mask = boards[camera].parent / f"{camera}_truth" / f"{camera}_mask.png"
+            elif self.args.rig:
+                given = yaml.safe_load(self.args.rig.read_text())["cameras"].get(camera, {})
+                mask = self.args.rig.parent / given["mask"] if "mask" in given else None
+            if mask is not None and mask.exists():
+                chain_errors.copy_mask(mask, path.parent / f"{camera}_mask.png", margin=self.simulated)
+                rig["cameras"][camera]["mask"] = f"{camera}_mask.png"
+        path.write_text(yaml.safe_dump(rig, sort_keys=False))
+
+    def extrinsics(self, cameras, drive, needs):
+        def work(folder):
+            bag, rig = drive / "drive.bag", folder / "rig.yaml"
+            checked = run([TOOLS / "vcharge_camera_driver" / "check_bag", "--bag", bag, "--rig", cameras],
+                          folder / "check.log", may_fail=True)
+            (folder / "check.txt").write_text(checked["output"])
+            options, _ = settings("calibration.yaml")
+            result = run([TOOLS / "vcharge_calibration" / "calibrate_rig", "--bag", bag, "--rig", cameras, "--output", rig,
+                          "--options", options, "--report", folder / "report"], folder / "calibrate.log", may_fail=True)
+            (folder / "calibrate.txt").write_text(result["output"])
+            if not rig.exists():
+                raise SystemExit(f"{bag}: no calibration, and why:\n{result['output']}")
+            figures = chain_errors.rig_figures(result["output"], checked["output"])
+            if self.simulated:
+                chain_errors.judge_rig(rig, drive / "rig_truth.yaml", figures, folder, self.pictures / "rig.png")
+            return figures
+
+        return self.step("extrinsics", "where the cameras are, from a drive", needs, settings("calibration.yaml")[1:],
+                         work) / "rig.yaml"
+
+    # Maps.
+
+    def sparse_map(self, drive, rig, needs, name="map", title="a sparse map"):
+        truth = self.truth_of(drive)
+
+        def work(folder):
+            path = folder / "map.vmap"
+            options, _ = settings("mapping.yaml")
+            result = run([TOOLS / "vcharge_mapping" / "build_map", "--bag", drive / "drive.bag", "--rig", rig, "--output",
+                          path, "--trajectory", folder / "map.tum", "--options", options, "--report", folder / "report"],
+                         folder / "map.log")
+            figures = chain_errors.map_figures(result["output"])
+            camera = next(iter(yaml.safe_load(rig.read_text())["cameras"]))
+            run([TOOLS / "vcharge_mapping" / "draw_landmarks", "--map", path, "--bag", drive / "drive.bag", "--camera", camera,
+                 "--output", self.pictures / "landmarks.png"], folder / "draw.log")
+            if truth:
+                chain_errors.judge_map(path, truth, figures, folder / "report", self.pictures / "map.png")
+            return figures
+
+        return self.step(name, title, needs, settings("mapping.yaml")[1:], work)
+
+    def height_map(self, drive, rig, poses, needs, name="height_map", title="a height map and an OctoMap"):
+        truth = self.truth_of(drive) if name != "real_height_map" else None
+        options, text = settings("height_map.yaml")
+
+        def work(folder):
+            output = folder / "map"
+            words = ["--trajectory", poses] if poses else []
+            result = run([TOOLS / "vcharge_dense" / "build_height_map", "--bag", drive / "drive.bag", "--rig", rig, "--output",
+                          output, "--options", options, *words], folder / "build.log")
+            figures = chain_errors.height_map_figures(result)
+            self.draw("draw_height_map.py", name, "--map", output)
+            if truth:
+                chain_errors.judge_height_map(output, truth, rig, poses, figures, folder)
+            return figures
+
+        return self.step(name, title, needs, [text], work)
+
+    def draw(self, script, name, *words):
+        run([sys.executable, ROOT / "scripts" / script, *words, "--output", self.pictures / f"{name}.png"],
+            self.work / f"{name}" / "draw.log")
+
+    # Another day.
+
+    def ranges(self, drive, rig, needs):
+        truth = self.truth_of(drive)
+        options, text = settings("dense.yaml")
+
+        def work(folder):
+            output = folder / "range"
+            run([TOOLS / "vcharge_dense" / "compute_range_maps", "--bag", drive / "drive.bag", "--rig", rig, "--options",
+                 options, "--output", output], folder / "ranges.log")
+            self.pictures.mkdir(exist_ok=True)
+            run([sys.executable, ROOT / "scripts" / "draw_demo.py", "--bag", drive / "drive.bag", "--rig", rig, "--range",
+                 output, *(["--truth", truth] if truth else []), "--output", self.pictures], folder / "draw.log")
+            return chain_errors.judge_ranges(output, truth, drive / "drive.bag", rig, folder) if truth else {}
+
+        return self.step("ranges", "range maps", needs, [text], work)
+
+    def localization(self, mapped, drive, rig, mapping_drive, needs, name="localization",
+                     title="the pose in the map, on another day"):
+        options, text = settings("localization.yaml")
+        truths = (self.truth_of(mapping_drive), self.truth_of(drive)) if self.simulated else None
+
+        def work(folder):
+            result = run([TOOLS / "vcharge_localization" / "localize_drive", "--bag", drive / "drive.bag", "--rig", rig,
+                          "--map", mapped / "map.vmap", "--options", options, "--output", folder / "poses.tum"],
+                         folder / "localize.log")
+            return chain_errors.localization_figures(result, folder / "poses.tum.csv", mapped / "map.vmap", truths,
+                                                     self.pictures / f"{name}.png")
+
+        return self.step(name, title, needs, [text], work)
+
+    def obstacles(self, drive, rig, needs, name="obstacles", title="obstacles and free ground around the vehicle"):
+        truth = self.truth_of(drive) if name != "real_obstacles" else None
+        (ranges, range_text), (options, text) = settings("dense_obstacles.yaml"), settings("obstacles.yaml")
+
+        def work(folder):
+            # The options name cameras that another rig may not have.
+            known = set(yaml.safe_load(rig.read_text())["cameras"])
+            words = ["--options", options] if {"front", "left", "right"} <= known else []
+            result = run([TOOLS / "vcharge_obstacles" / "detect_obstacles", "--bag", drive / "drive.bag", "--rig", rig, *words,
+                          "--range-options", self.range_options(ranges, known, drive, folder), "--output", folder / "maps"],
+                         folder / "detect.log")
+            figures = chain_errors.obstacle_figures(result["output"])
+            self.draw("draw_obstacles.py", name, "--bag", drive / "drive.bag", "--rig", rig, "--obstacles", folder / "maps",
+                      *(["--truth", truth] if truth else []))
+            if truth:
+                chain_errors.judge_obstacles(folder / "maps", truth, figures, folder)
+            return figures
+
+        return self.step(name, title, needs, [range_text, text], work)
+
+    def range_options(self, path, cameras, drive, folder):
+        """Range maps have 384x240 pixels, whatever the images have; and only of cameras that there are."""
+        options = yaml.safe_load(path.read_text())
+        options["cameras"] = [camera for camera in options.get("cameras", []) if camera in cameras]
+        if not options["cameras"]:
+            del options["cameras"]
+        if self.simulated and self.args.quick and drive.name != "real":
+            options["working_camera"]["image_scale"] *= 2.0
+        output = folder / "range_options.yaml"
+        output.write_text(yaml.safe_dump(options))
+        return output
+
+    def nodelets(self, mapped, drive, rig, needs):
+        """The same drive through vcharge.launch without losses: must give what the offline tools gave."""
+        def work(folder):
+            return chain_nodelets.replay(self.work, mapped / "map.vmap", drive / "drive.bag", rig, folder)
+
+        return self.step("nodelets", "the same drive through the nodelets", needs, [], work)
+
+    def rviz(self, mapped, drive, rig, heights, needs):
+        def work(folder):
+            del folder
+            script = ROOT / "scripts" / "rviz_screenshot.sh"
+            log = self.work / "rviz" / "rviz.log"
+            run([script, drive / "drive.bag", rig, self.pictures / "rviz_ranges.png"], log)
+            run([script, drive / "drive.bag", rig, self.pictures / "rviz_pose.png", mapped / "map.vmap"], log)
+            run([script, heights / "map", self.pictures / "rviz_height_map.png"], log)
+            return {}
+
+        return self.step("rviz", "pictures of rviz", needs, [], work)
+
+    def real_images(self):
+        """The published images of the V-Charge car, where they are."""
+        source = pathlib.Path(os.environ.get("VCHARGE_DATA", "")) / "vcharge_left"
+        if not os.environ.get("VCHARGE_DATA") or not source.is_dir():
+            say("   VCHARGE_DATA names no folder with vcharge_left: the published images are left out")
+            return
+
+        def work(folder):
+            run([TOOLS / "vcharge_ros" / "import_vcharge_images", "--folder", source, "--output", folder / "drive.bag", "--rig",
+                 folder / "rig.yaml"], folder / "import.log")
+            return {}
+
+        drive = self.step("real", "the published images of the V-Charge car", [], [], work)
+        self.height_map(drive, drive / "rig.yaml", None, ["real"], "real_height_map", "their height map")
+        self.obstacles(drive, drive / "rig.yaml", ["real"], "real_obstacles", "their obstacles")
+
+    def drives(self):
+        """For calibration, for the map, and on another day."""
+        if not self.simulated:
+            mapping = self.take_own("mapping_drive", "your drive", self.args.bag)
+            other = self.take_own("other_day", "your other drive", self.args.other_bag) if self.args.other_bag else mapping
+            return mapping, mapping, other
+        args = self.args
+        calibration = self.simulate("calibration_drive", "a drive to calibrate from", "--drive", "figure_eight", "--seed",
+                                    args.seed + 200, "--image-step", 2, "--duration-s", 80, *WHEELS)
+        mapping = self.simulate("mapping_drive", "a drive to map", "--drive", "loop", "--seed", args.seed + 300, "--image-step",
+                                2, "--height-cell-m", 0.025, "--duration-s", 24 if args.quick else 48, *WHEELS)
+        other = self.simulate("other_day", "another day: other light, other cars", "--drive", "other_day", "--seed",
+                              args.seed + 400, "--exposure-gain", 1.2, "--truth-range", "--duration-s", 8 if args.quick else 16,
+                              *OTHER_WHEELS)
+        return calibration, mapping, other
+
+    def rig(self, calibration):
+        """Intrinsics from boards and places from a drive, unless the user has them."""
+        given = self.args.rig
+        if given and not self.args.boards:
+            cameras = yaml.safe_load(given.read_text())["cameras"]
+            self.keys["intrinsics"] = identity(given)
+            if all("vehicle_from_camera" in camera for camera in cameras.values()):
+                self.keys["extrinsics"] = identity(given)
+                return given.resolve()
+            path = given.resolve()
+        else:
+            path = self.intrinsics()
+        return self.extrinsics(path, calibration, ["intrinsics", calibration.name])
+
+    def go(self):
+        calibration, mapping, other = self.drives()
+        rig = self.rig(calibration)
+        mapped = self.sparse_map(mapping, rig, ["extrinsics", mapping.name])
+        heights = self.height_map(mapping, rig, mapped / "map.tum", ["map"])
+        self.ranges(other, rig, ["extrinsics", other.name])
+        self.localization(mapped, other, rig, mapping, ["map", other.name])
+        self.obstacles(other, rig, ["extrinsics", other.name])
+        if not self.args.no_nodelets:
+            self.nodelets(mapped, other, rig, ["localization", "obstacles"])
+        if not self.args.no_rviz and not self.args.no_nodelets:
+            self.rviz(mapped, other, rig, heights, ["nodelets", "height_map"])
+        if self.simulated:
+            self.real_images()
+        chain_report.write(self.work / "report.html", self)
+        say(f"written: {self.work / 'report.html'}")
+
+
+if __name__ == "__main__":
+    Chain(arguments()).go()
