@@ -169,7 +169,7 @@ TEST_F(HeightMapErrorsTest, NoTapeIsHeldToPlantsOrToGrassOnAnIsland) {
   EXPECT_FALSE(is_rigid({14.0, 6.0}, 2.5));  // a crown, of which the scene lists the stem alone
   EXPECT_TRUE(is_rigid({14.0, 6.0}, 0.2));   // below it
   EXPECT_TRUE(is_rigid({12.0, 1.95}, 1.4));  // the car under it
-  EXPECT_TRUE(is_rigid({16.0, 6.0}, 2.5));  // beside it
+  EXPECT_TRUE(is_rigid({16.0, 6.0}, 2.5));   // beside it
 
   // Of the platform, half is a hedge's.
   const HeightMapErrors errors =
