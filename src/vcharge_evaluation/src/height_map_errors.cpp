@@ -18,6 +18,7 @@ namespace {
 
 constexpr double kLever_m = 5.0;           // of the points by which poses are laid over each other
 constexpr double kAboveSurface_m = 0.005;  // of the point that is looked for
+constexpr double kBeforeFoot_m = 0.05;     // where the foot of a face is looked for
 constexpr double kFromPlants_m = 0.3;
 constexpr double kCrownReach_m = 3.5;   // leaves of a tree, from its stem
 constexpr double kUnderCrowns_m = 0.3;  // up to here above its foot there are none
@@ -301,6 +302,12 @@ HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& wo
            visibility.countViews({place_m.x(), place_m.y(), height + kAboveSurface_m}, options.min_views) >=
                options.min_views;
   });
+  for (HeightStep& step : steps) {
+    const Eigen::Vector2d foot = step.place_m - kBeforeFoot_m * step.direction;
+    step.foot_seen = visibility.countFaceViews({foot.x(), foot.y(), step.low_m + kAboveSurface_m},
+                                               {-step.direction.x(), -step.direction.y(), 0.0},
+                                               options.min_views) >= options.min_views;
+  }
   errors.num_steps = steps.size();
   errors.num_kerbs_seen = static_cast<size_t>(std::count_if(
       steps.begin(), steps.end(), [&](const HeightStep& step) { return isKerb(step, options); }));

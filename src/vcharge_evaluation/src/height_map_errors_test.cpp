@@ -182,6 +182,34 @@ TEST_F(HeightMapErrorsTest, NoTapeIsHeldToPlantsOrToGrassOnAnIsland) {
   }
 }
 
+TEST_F(HeightMapErrorsTest, NoTapeIsHeldToTheBackOfAThingThatNobodySees) {
+  // A pillar beside the path, which runs along y = 0: the cameras see the ground behind it aslant, and its
+  // back never.
+  HeightMap truth = world(0.025);
+  for (int row = 0; row < truth.height_m.rows; ++row) {
+    for (int column = 0; column < truth.height_m.cols; ++column) {
+      const Eigen::Vector2d place = truth.centreOf(column, row);
+      if (std::abs(place.x() - 1.0) < 0.2 && std::abs(place.y() + 1.4) < 0.2) {
+        truth.height_m.at<float>(row, column) = 2.0F;
+      }
+    }
+  }
+  HeightMapErrorOptions options;
+  options.num_measurements = 60;
+  const HeightMapErrors errors =
+      evaluateHeightMap(truth, RigidTransform(), truth, poses_, rig_, everything_rigid_, options);
+  const auto isAt = [](const Eigen::Vector2d& place, double y) {
+    return std::abs(place.x() - 1.0) < 0.2 && std::abs(place.y() - y) < 0.03;
+  };
+  size_t at_front = 0;
+  for (const TapeMeasurement& measurement : errors.measurements) {
+    EXPECT_FALSE(isAt(measurement.from_m, -1.6) || isAt(measurement.to_m, -1.6))
+        << measurement.from_m.transpose() << " to " << measurement.to_m.transpose();
+    at_front += isAt(measurement.from_m, -1.2) || isAt(measurement.to_m, -1.2) ? 1 : 0;
+  }
+  EXPECT_GT(at_front, 0U);
+}
+
 TEST_F(HeightMapErrorsTest, AWallIsWhereTheMapEnds) {
   HeightMap map = world(0.05);
   for (int row = 0; row < map.height_m.rows; ++row) {

@@ -61,6 +61,7 @@ struct HeightStep {
   Eigen::Vector2d direction{1, 0};   ///< unit, upwards
   double low_m = 0.0, high_m = 0.0;  ///< true heights beside it
   bool both_sides_seen = false;      ///< the upper one, too
+  bool foot_seen = false;            ///< that of its face, by cameras in front of the face
 };
 
 /// A distance that could be taken with a tape measure in the world, and is read from the map.
