@@ -42,8 +42,8 @@ RATIOS = (
      "search/float128_avx2/1000"),
     ("Huber-TV iteration against the plain loop, one core", "height_map_benchmark", "BM_HuberIterationPlain",
      "BM_HuberIteration/1/process_time/real_time"),
-    ("fusion of 300 range maps over 75 (linear: 4)", "height_map_benchmark", "BM_Fusion/300/60/iterations:1/process_time/real_time",
-     "BM_Fusion/75/60/iterations:1/process_time/real_time"),
+    ("fusion of 300 range maps over 75 (linear: 4)", "height_map_benchmark",
+     "BM_Fusion/300/60/iterations:1/process_time/real_time", "BM_Fusion/75/60/iterations:1/process_time/real_time"),
     ("range map with 4 neighbours, one core over two", "plane_sweep_benchmark",
      "rangeMap/whole_of_4/1/process_time/real_time", "rangeMap/whole_of_4/2/process_time/real_time"),
     ("range map with 2 neighbours, one core over two", "plane_sweep_benchmark",
@@ -80,8 +80,9 @@ def measure(name, repetitions):
         return {}
     with tempfile.TemporaryDirectory() as folder:
         output = pathlib.Path(folder) / "out.json"
-        subprocess.run([path, f"--benchmark_out={output}", "--benchmark_out_format=json", f"--benchmark_repetitions={repetitions}",
-                        "--benchmark_min_time=0.1"], stdout=subprocess.DEVNULL, check=True)
+        subprocess.run([path, f"--benchmark_out={output}", "--benchmark_out_format=json",
+                        f"--benchmark_repetitions={repetitions}", "--benchmark_min_time=0.1"],
+                       stdout=subprocess.DEVNULL, check=True)
         entries = json.loads(output.read_text())["benchmarks"]
     units = {"ns": 1.0, "us": 1e3, "ms": 1e6, "s": 1e9}
     cases = {}

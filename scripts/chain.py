@@ -27,12 +27,13 @@ WHEELS = ("--set", "odometer.scale_error=0.0005", "--set", "odometer.left_right_
 OTHER_WHEELS = ("--set", "odometer.scale_error=-0.0005", "--set", "odometer.left_right_error=0.0003")
 
 
-def arguments():
+def argument_parser():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "demo", help="folder for everything")
     parser.add_argument("--quick", action="store_true", help="simulated images of half the size, shorter drives")
     parser.add_argument("--scene", default="lot", help="simulated scene: lot or garage")
-    parser.add_argument("--seed", type=int, default=1, help="of scene, lenses, how they are mounted, and noise")
+    parser.add_argument("--seed", type=int, default=1, help="of the scene and of noise")
+    parser.add_argument("--rig-seed", type=int, default=1, help="of the lenses and how they are mounted")
     parser.add_argument("--no-nodelets", action="store_true", help="offline tools only")
     parser.add_argument("--no-rviz", action="store_true", help="no pictures of rviz")
     own = parser.add_argument_group("your own recordings")
@@ -45,6 +46,11 @@ def arguments():
     own.add_argument("--rig", type=pathlib.Path,
                      help="rig.yaml: with intrinsics alone (or with masks besides --boards), or with the cameras' places too, "
                           "which are taken as they are then")
+    return parser
+
+
+def arguments():
+    parser = argument_parser()
     args = parser.parse_args()
     if args.bag is None and (args.boards or args.rig or args.other_bag):
         parser.error("--boards, --rig and --other-bag go with --bag")
@@ -78,7 +84,7 @@ class Chain:
         self.pictures.mkdir(parents=True, exist_ok=True)
         self.keys, self.figures, self.number = {}, {}, 0
         scale = 0.5 if args.quick else 1.0
-        self.words = ["--scene-seed", args.seed, "--rig", "random", "--rig-seed", args.seed,
+        self.words = ["--scene-seed", args.seed, "--rig", "random", "--rig-seed", args.rig_seed,
                       "--image-scale", scale]
 
     def step(self, name, title, needs, given, work):
@@ -140,7 +146,7 @@ class Chain:
                 raise SystemExit(f"{self.args.boards}: no folder CAMERA and no CAMERA.bag in it")
             self.keys["boards"] = identity(self.args.boards)
             return entries
-        words = [*self.words, "--scene", "chessboard", "--seed", self.args.seed + 100, "--image-step", 5]
+        words = [*self.words, "--scene", "chessboard", "--seed", self.args.seed + 100, "--image-step", 8]
 
         def work(folder):
             for camera in CAMERAS:
@@ -222,9 +228,9 @@ class Chain:
             figures = chain_errors.map_figures(result["output"])
             camera = next(iter(yaml.safe_load(rig.read_text())["cameras"]))
             run([TOOLS / "vcharge_mapping" / "draw_landmarks", "--map", path, "--bag", drive / "drive.bag", "--camera", camera,
-                 "--output", self.pictures / "landmarks.png"], folder / "draw.log")
+                 "--output", self.pictures / f"{name}_landmarks.png"], folder / "draw.log")
             if truth:
-                chain_errors.judge_map(path, truth, figures, folder / "report", self.pictures / "map.png")
+                chain_errors.judge_map(path, truth, figures, folder / "report", self.pictures / f"{name}.png")
             return figures
 
         return self.step(name, title, needs, settings("mapping.yaml")[1:], work)
@@ -327,6 +333,7 @@ class Chain:
             log = self.work / "rviz" / "rviz.log"
             run([script, drive / "drive.bag", rig, self.pictures / "rviz_ranges.png"], log)
             run([script, drive / "drive.bag", rig, self.pictures / "rviz_pose.png", mapped / "map.vmap"], log)
+            run([script, drive / "drive.bag", rig, self.pictures / "rviz_obstacles.png", mapped / "map.vmap", "obstacles"], log)
             run([script, heights / "map", self.pictures / "rviz_height_map.png"], log)
             return {}
 
@@ -378,7 +385,8 @@ class Chain:
             path = self.intrinsics()
         return self.extrinsics(path, calibration, ["intrinsics", calibration.name])
 
-    def go(self):
+    def stages(self):
+        """All from recordings to results, with what each stage before gave."""
         calibration, mapping, other = self.drives()
         rig = self.rig(calibration)
         mapped = self.sparse_map(mapping, rig, ["extrinsics", mapping.name])
@@ -386,6 +394,22 @@ class Chain:
         self.ranges(other, rig, ["extrinsics", other.name])
         self.localization(mapped, other, rig, mapping, ["map", other.name])
         self.obstacles(other, rig, ["extrinsics", other.name])
+        return mapping, other, rig, mapped, heights
+
+    def stages_from_truth(self, mapping, other):
+        """The stages after calibration once more with the true rig, and heights with true poses too: what errors of the
+        stages before add."""
+        rig, poses = mapping / "rig_truth.yaml", mapping / "drive_truth" / "trajectory.tum"
+        mapped = self.sparse_map(mapping, rig, [mapping.name], "map_true_rig", "a sparse map, true rig")
+        self.localization(mapped, other, rig, mapping, ["map_true_rig", other.name], "localization_true_rig",
+                          "the pose, true rig")
+        self.obstacles(other, rig, [other.name], "obstacles_true_rig", "obstacles, true rig")
+        self.height_map(mapping, rig, mapped / "map.tum", ["map_true_rig"], "height_map_true_rig", "a height map, true rig")
+        self.height_map(mapping, rig, poses, [mapping.name], "height_map_truth", "a height map, true rig and poses")
+
+    def go(self):
+        mapping, other, rig, mapped, heights = self.stages()
+        del mapping
         if not self.args.no_nodelets:
             self.nodelets(mapped, other, rig, ["localization", "obstacles"])
         if not self.args.no_rviz and not self.args.no_nodelets:

@@ -172,8 +172,10 @@ def judge_map(path, truth, figures, report, picture):
 
 
 def height_map_figures(result):
-    return {"grid": first(r"^grid: (.*?) in the frame", result["output"]), "hash": first(r"^content hash: (\S+)", result["output"]),
-            "range_maps": int(first(r"^range maps: (\d+)", result["output"], "0")), "peak_gb": result["peak_gb"]}
+    return {"grid": first(r"^grid: (.*?) in the frame", result["output"]),
+            "hash": first(r"^content hash: (\S+)", result["output"]),
+            "range_maps": int(first(r"^range maps: (\d+)", result["output"], "0")),
+            "peak_gb": result["peak_gb"]}
 
 
 def judge_height_map(output, truth, rig, poses, figures, folder):
@@ -190,8 +192,8 @@ def judge_height_map(output, truth, rig, poses, figures, folder):
 # Another day.
 
 def judge_ranges(output, truth, bag, rig, folder):
-    result = run([TOOLS / "vcharge_evaluation" / "evaluate_range", "--range", output, "--truth", truth, "--bag", bag, "--rig", rig,
-                  "--report", folder / "report"], folder / "evaluate.log")
+    result = run([TOOLS / "vcharge_evaluation" / "evaluate_range", "--range", output, "--truth", truth, "--bag", bag,
+                  "--rig", rig, "--report", folder / "report"], folder / "evaluate.log")
     (folder / "errors.txt").write_text(result["output"])
     errors = json_of(folder / "report" / "range_errors.json")
     whole = next((part for part in errors["sets"] if part["label"] == "all cameras"), errors["sets"][0])
@@ -199,7 +201,8 @@ def judge_ranges(output, truth, bag, rig, folder):
 
 
 def localization_figures(result, csv, map_path, truths, picture):
-    figures = {"hash": first(r"^content hash: (\S+)", result["output"]), "frames": int(first(r"^frames: (\d+)", result["output"])),
+    figures = {"hash": first(r"^content hash: (\S+)", result["output"]),
+               "frames": int(first(r"^frames: (\d+)", result["output"])),
                "localized": int(first(r"^  localized: (\d+)", result["output"], "0"))}
     if truths is None:
         return figures
@@ -207,7 +210,8 @@ def localization_figures(result, csv, map_path, truths, picture):
     errors = LocalizationErrors(csv, other / "trajectory.tum", Map(map_path, mapping / "trajectory.tum"))
     good = errors.localized()
     if good.any():
-        figures.update({"median_m": float(np.median(errors.error_m[good])), "p95_m": float(np.percentile(errors.error_m[good], 95)),
+        figures.update({"median_m": float(np.median(errors.error_m[good])),
+                        "p95_m": float(np.percentile(errors.error_m[good], 95)),
                         "median_deg": float(np.median(errors.error_deg[good])),
                         "p95_deg": float(np.percentile(errors.error_deg[good], 95)), "wrong": errors.num_false(),
                         "absolute_median_m": float(np.median(errors.absolute_m[good]))})

@@ -47,8 +47,10 @@ def summary_rows(figures):
                      listed({name: camera["error_px"] for name, camera in lenses.items()}, "px", 2), "not given"))
     rig = figures.get("extrinsics", {})
     if "error_m" in rig:
-        rows.append(("cameras' places: error", listed({name: 100 * value for name, value in rig["error_m"].items()}, "cm", 2) + "; " +
-                     listed(rig["error_deg"], "degrees", 3), "no truth; repeats within about 8 cm and 1 degree, as users report"))
+        rows.append(("cameras' places: error",
+                     listed({name: 100 * value for name, value in rig["error_m"].items()}, "cm", 2) + "; " +
+                     listed(rig["error_deg"], "degrees", 3),
+                     "no truth; repeats within about 8 cm and 1 degree, as users report"))
     mapped = figures.get("map", {})
     if "position_rms_m" in mapped:
         rows.append((f"sparse map: keyframes' positions over {mapped['length_m']:.0f} m, rms; scale",
@@ -74,7 +76,8 @@ def summary_rows(figures):
         rows.append(("obstacles of 20 cm and more within 5 m: range error, mean, 95 %",
                      f"{centimetres(obstacles['mean_m'])}, {centimetres(obstacles['p95_m'])}", "below 10 cm"))
         rows.append(("obstacles missed; false cells on open ground",
-                     f"{obstacles['missed']} of {obstacles['obstacles']}; {obstacles['false_per_10_m']:.1f} per 10 m", "not given"))
+                     f"{obstacles['missed']} of {obstacles['obstacles']}; {obstacles['false_per_10_m']:.1f} per 10 m",
+                     "not given"))
     nodelets = figures.get("nodelets", {})
     if nodelets:
         rows.append(("nodelets give what the offline tools give", f"{nodelets['equal_poses']} of {nodelets['poses']} poses, "
@@ -103,15 +106,16 @@ PICTURES = (
     ("Lenses", (("intrinsics.png", "How far the calibrated lens is from the true one, by the angle from its axis"),)),
     ("Where the cameras are", (("rig.png", "Errors of the cameras' places"),)),
     ("The sparse map", (("map.png", "The map from above, over the truth"),
-                        ("landmarks.png", "Its landmarks in the image that saw most of them, by distance"))),
+                        ("map_landmarks.png", "Its landmarks in the image that saw most of them, by distance"))),
     ("Range maps", (("input_frames.png", "What the cameras see on another day"),
                     ("range_maps.png", "Range along each pixel's ray"),
+                    ("rviz_ranges.png", "Images, range maps and clouds in rviz"),
                     ("cloud_from_above.png", "The points of all cameras from above"))),
     ("Height map", (("height_map.png", "Heights, drivable cells, gray of the images"),
                     ("rviz_height_map.png", "Mesh, grid and OctoMap in rviz"))),
     ("The pose on another day", (("localization.png", "Errors frame by frame"), ("rviz_pose.png", "In rviz"))),
     ("Obstacles", (("obstacles.png", "What the left camera reports, and the fused map"),
-                   ("rviz_ranges.png", "Images, range maps and clouds in rviz"))),
+                   ("rviz_obstacles.png", "Obstacle map and scan in rviz"))),
     ("The published images of the V-Charge car", (("real_height_map.png", "Height map: cobbles, kerb, hedge"),
                                                   ("real_obstacles.png", "Obstacles: kerb and hedge; the cobbles are free"))),
 )
@@ -119,12 +123,14 @@ PICTURES = (
 
 def write(path, chain):
     figures = {name: step["figures"] for name, step in chain.figures.items()}
-    origin = (f"A simulated {chain.args.scene}, seed {chain.args.seed}, images of {'640x400' if chain.args.quick else '1280x800'}: "
+    size = "640x400" if chain.args.quick else "1280x800"
+    origin = (f"A simulated {chain.args.scene}, seed {chain.args.seed}, rig {chain.args.rig_seed}, images of {size}: "
               "lenses and mounting of the cameras are known to nobody but the simulator; truth serves to judge alone"
               ", and for the masks of the vehicle's body, drawn by hand on a real car." if chain.simulated else
               f"The recording {chain.args.bag}; there is no truth to judge it by.")
     parts = ['<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>vcharge: the whole chain</title>',
-             f"<style>{STYLE}</style></head><body><h1>From unknown cameras to a drive in its own map</h1><p>{html.escape(origin)}</p>"]
+             f"<style>{STYLE}</style></head><body><h1>From unknown cameras to a drive in its own map</h1>",
+             f"<p>{html.escape(origin)}</p>"]
     rows = summary_rows(figures)
     if rows:
         parts.append("<h2>Errors against the truth</h2>" + table(("what", "here", "the paper"), rows))

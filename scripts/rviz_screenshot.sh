@@ -2,10 +2,11 @@
 # Starts rviz on a virtual display and takes a picture of a drive that is replayed through the nodelets, or of a saved map:
 #   rviz_screenshot.sh DRIVE.bag rig.yaml OUTPUT.png            range maps and point clouds
 #   rviz_screenshot.sh DRIVE.bag rig.yaml OUTPUT.png LOT.vmap   the pose in a map
+#   rviz_screenshot.sh DRIVE.bag rig.yaml OUTPUT.png LOT.vmap obstacles    obstacles and free ground, the whole car running
 #   rviz_screenshot.sh MAP OUTPUT.png                           a height map with its OctoMap (folder of build_height_map)
 set -euo pipefail
 views=$(realpath "$(dirname "${BASH_SOURCE[0]}")/../config/rviz")
-[ $# -ge 2 ] && [ $# -le 4 ] || { sed -n '2,5s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+[ $# -ge 2 ] && [ $# -le 5 ] || { sed -n '2,6s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 if [ $# -eq 2 ]; then
   output=$2
   wait_s=40  # a mesh of some hundred thousand triangles
@@ -14,9 +15,15 @@ if [ $# -eq 2 ]; then
 else
   output=$3
   wait_s=20
-  launch=(drive_replay.launch)
-  [ $# -eq 3 ] || launch=(localization.launch map:="$4")
-  launch+=(bag:="$1" rig:="$2" loop:=true rate:=0.25)
+  if [ "${5:-}" = obstacles ]; then
+    launch=(vcharge.launch map:="$4")
+    wait_s=35  # the drive begins after 5 s and goes once
+  elif [ $# -eq 4 ]; then
+    launch=(localization.launch map:="$4" loop:=true)
+  else
+    launch=(drive_replay.launch loop:=true)
+  fi
+  launch+=(bag:="$1" rig:="$2" rate:=0.25)
 fi
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin ROS_HOSTNAME=localhost
 scratch=$(mktemp -d)

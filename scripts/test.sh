@@ -1,13 +1,28 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds, and runs every test: test.sh [ctest arguments, e.g. -R PlaneSweep].
+# Installs what is missing, builds, and runs every test: test.sh [--sanitize] [ctest arguments, e.g. -R PlaneSweep].
 # Tests on real images look for them in $VCHARGE_DATA and are skipped, and counted as skipped, without it.
+# --sanitize: built by clang with AddressSanitizer and UndefinedBehaviorSanitizer (build_sanitize/, which scripts/fuzz.sh uses
+# too); all unit tests, and the integration tests that run tools. Debian's nodelet manager cannot load such libraries.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 
+folder=build
+if [ "${1:-}" = "--sanitize" ]; then
+  shift
+  folder=build_sanitize
+  set -- -R '_gtest_|rostest_(tools|offline|map|mapping|mapping_faults|faults|determinism)\.test' "$@"
+  # Debian's libraries are not instrumented: containers that cross them would be reported, and what they keep is no leak.
+  export ASAN_OPTIONS=detect_container_overflow=0:detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1
+fi
+
 scripts/install_dependencies.sh
 scripts/check_format.sh
-scripts/build.sh --tests
+if [ "$folder" = build ]; then
+  scripts/build.sh --tests
+else
+  scripts/build_sanitized.sh all tests
+fi
 
 export ROS_HOSTNAME=localhost
 ROS_HOME=$(mktemp -d)
@@ -15,8 +30,8 @@ export ROS_HOME
 trap 'rm -rf "$ROS_HOME"' EXIT
 [ -n "${VCHARGE_DATA:-}" ] || echo "VCHARGE_DATA is not set: the tests on real images are skipped."
 
-rm -rf build/test_results
+rm -rf "$folder/test_results"
 status=0
-(cd build && ctest -j"$(nproc)" --output-on-failure "$@") || status=$?
-/usr/bin/python3 scripts/count_tests.py build/test_results || status=1
+(cd "$folder" && ctest -j"$(nproc)" --output-on-failure "$@") || status=$?
+/usr/bin/python3 scripts/count_tests.py "$folder/test_results" || status=1
 exit "$status"

@@ -16,7 +16,7 @@ import rospkg
 import rospy
 import rostest
 import yaml
-from diagnostic_msgs.msg import DiagnosticArray
+from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from nav_msgs.msg import Odometry
 from roslib.packages import find_node
 from sensor_msgs.msg import CameraInfo, Image
@@ -160,6 +160,24 @@ class DriverTest(unittest.TestCase):
         self.assertGreater(at[stamps[-1]].pose.covariance[0], 0.0)
         self.assertEqual(set(self.statics), {f"camera_{camera}_optical" for camera in CAMERAS})
         wait_for(lambda: all(self.level(name) == 0 for name in (*CAMERAS, "sync", "odometry")), "good diagnostics")
+
+    def test_nodelets_of_the_manager_share_the_drivers_images(self):
+        """What depth, localization and obstacles are given is the driver's own buffer: one address for all of them."""
+        probes = {name: {} for name in ("probe_of_depth", "probe_of_localization")}
+        for name, buffers in probes.items():
+            rospy.Subscriber(f"/{name}/buffers", KeyValue, lambda m, b=buffers: b.__setitem__(m.key, m.value), queue_size=100)
+            self.assertTrue(self.load_service(f"/{name}", "vcharge_ros/buffer_probe_nodelet", ["/image"],
+                                              ["/camera/front/image_raw"], [], "").success)
+        try:
+            self.assertTrue(self.load())
+            first, second = probes.values()
+            wait_for(lambda: len(set(first) & set(second)) >= 15, "images at both probes")
+            common = sorted(set(first) & set(second))[:15]
+            self.assertEqual([first[stamp] for stamp in common], [second[stamp] for stamp in common])
+            self.assertGreater(len({first[stamp] for stamp in common}), 10, "addresses that say nothing")
+        finally:
+            for name in probes:
+                self.unload_service(f"/{name}")
 
     def test_a_camera_is_unplugged_and_plugged_in_again(self):
         self.assertTrue(self.load())

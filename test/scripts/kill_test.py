@@ -45,15 +45,15 @@ class KillTest(unittest.TestCase):
         output = self.chain.folder / name
         output.mkdir()
         if name == "simulate_drive":
-            words = [tool("vcharge_simulation", "simulate_drive"), "--duration-s", 0.8, "--cameras", "front", "--image-scale", 0.25,
-                     "--output", output / "drive.bag"]
+            words = [tool("vcharge_simulation", "simulate_drive"), "--duration-s", 0.8, "--cameras", "front",
+                     "--image-scale", 0.25, "--output", output / "drive.bag"]
             return output, [*words, "--seed", 1], [*words, "--seed", 2]
         words = self.chain.words(name, output, self.source)
         other_bag = self.chain.folder / f"{name}_other.bag"
         if not other_bag.exists():
-            status, _, errors = run([tool("vcharge_simulation", "simulate_drive"), "--drive", "figure_eight", "--duration-s", 2.4,
-                                     "--cameras", *CAMERAS, "--image-step", 2, "--image-scale", 0.25, "--images-from",
-                                     self.chain.drive.bag, "--sensor-seed", 9, "--output", other_bag])
+            status, _, errors = run([tool("vcharge_simulation", "simulate_drive"), "--drive", "figure_eight",
+                                     "--duration-s", 2.4, "--cameras", *CAMERAS, "--image-step", 2, "--image-scale", 0.25,
+                                     "--images-from", self.chain.drive.bag, "--sensor-seed", 9, "--output", other_bag])
             if status != 0:
                 raise RuntimeError(f"simulate_drive failed: {errors}")
         other = [other_bag if word == self.chain.drive.bag else word for word in words]

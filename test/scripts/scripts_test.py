@@ -15,7 +15,8 @@ SCRIPTS = pathlib.Path(os.path.realpath(__file__)).parents[2] / "scripts"
 
 
 def run(script, *words):
-    result = subprocess.run([sys.executable, str(SCRIPTS / script), *map(str, words)], capture_output=True, text=True, check=False)
+    result = subprocess.run([sys.executable, str(SCRIPTS / script), *map(str, words)], capture_output=True,
+                            text=True, check=False)
     return result.returncode, result.stdout, result.stderr
 
 
@@ -32,7 +33,8 @@ class ScriptsTest(unittest.TestCase):
         return path
 
     def test_a_slower_machine_is_no_regression(self):
-        status, output, _ = run("bench_compare.py", self.bench("a", [1, 2, 3, 4, 5]), self.bench("b", [1, 2, 3, 4, 5], machine=1.7))
+        status, output, _ = run("bench_compare.py", self.bench("a", [1, 2, 3, 4, 5]),
+                                self.bench("b", [1, 2, 3, 4, 5], machine=1.7))
         self.assertEqual(status, 0, output)
         self.assertIn("took 1.7", output)
 

@@ -5,6 +5,7 @@ from drive_fixture import Drive, tool
 
 CAMERAS = ("front", "left", "rear", "right")
 OBSTACLE_RANGES = "preset: fast\ncameras: [front, left, right]\nworking_camera: {image_scale: 1.0}\n"
+HEIGHTS = "fusion: {cell_size_m: 0.1}\nrange_maps: {working_camera: {image_scale: 1.0}}\n"
 
 
 class WholeChain:
@@ -19,7 +20,7 @@ class WholeChain:
     def words(self, name, output, source):
         """The command of a tool that writes below `output` and takes what it needs from below `source`."""
         given = ["--bag", self.drive.bag, "--rig", self.drive.rig]
-        heights = self.drive.write_text("heights.yaml", "fusion: {cell_size_m: 0.1}\nrange_maps: {working_camera: {image_scale: 1.0}}\n")
+        heights = self.drive.write_text("heights.yaml", HEIGHTS)
         return {
             "build_map": [tool("vcharge_mapping", "build_map"), *given, "--output", output / "lot.vmap", "--trajectory",
                           output / "lot.tum"],
