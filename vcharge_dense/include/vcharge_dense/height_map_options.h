@@ -93,7 +93,7 @@ struct HeightRegularizationOptions {
 struct OctomapOptions {
   double resolution_m = 0.1;
   double max_range_m = 8.0;  ///< longer rays clear up to here and end nowhere
-  int pixel_step = 4;        ///< every how many rows and columns a ray is cast
+  int pixel_step = 2;        ///< every how many rows and columns a ray is cast
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
@@ -112,9 +112,6 @@ struct HeightMapOptions {
   HeightRegularizationOptions regularization;
   DrivabilityOptions drivability;
   OctomapOptions octomap;
-
-  /// Range maps of the images' own resolution: at half of it, windows of far ground hold both sides of a kerb.
-  HeightMapOptions() { range_maps.working_camera.image_scale = 1.0; }
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
