@@ -51,8 +51,8 @@ struct HeightMapErrorOptions {
 using IsRigid = std::function<bool(const Eigen::Vector2d& place_m, double high_m)>;
 
 /// From the obstacles of the scene (obstacles.yaml): not where a tree, bush or hedge stands within 0.3 m, not
-/// in a tree's crown (over 0.3 m up, within 3.5 m of the stem, and not on a car or the like), and on an island
-/// with a kerb only at the kerb's own height. All else is rigid: cars, walls, pillars, bins.
+/// in a tree's crown (over 0.3 m up, within 3.5 m of the stem, and not on a car or the like), and on an
+/// island with a kerb only at the kerb's own height. All else is rigid: cars, walls, pillars, bins.
 IsRigid rigidBy(const std::vector<TruthObstacle>& obstacles);
 
 /// A place where the true height jumps, crossed along an axis of the world from its low to its high side.
