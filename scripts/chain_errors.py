@@ -8,6 +8,7 @@ import matplotlib
 import numpy as np
 import yaml
 
+from camera_models import project
 from localization_errors import LocalizationErrors, Map
 from tool_runs import TOOLS, run
 
@@ -41,50 +42,25 @@ def intrinsics_figures(output):
             "rms_px": float(first(r"error (\S+) px RMS", output, "nan"))}
 
 
-def project_mei(rays, mei):
-    """Paper, section Camera Model."""
-    x, y = rays[0] / (rays[2] + mei["xi"]), rays[1] / (rays[2] + mei["xi"])
-    r = x * x + y * y
-    radial = 1 + mei["k1"] * r + mei["k2"] * r * r
-    x_distorted = x * radial + 2 * mei["p1"] * x * y + mei["p2"] * (r + 2 * x * x)
-    y_distorted = y * radial + mei["p1"] * (r + 2 * y * y) + 2 * mei["p2"] * x * y
-    return np.stack([mei["gamma1"] * x_distorted + mei["u0"], mei["gamma2"] * y_distorted + mei["v0"]])
-
-
-def project_kannala_brandt(rays, lens):
-    """Kannala and Brandt, PAMI 2006, as OpenCV's fisheye model."""
-    across = np.hypot(rays[0], rays[1])
-    theta = np.arctan2(across, rays[2])
-    radius = theta * (1 + sum(lens[f"k{i}"] * theta ** (2 * i) for i in (1, 2, 3, 4)))
-    return np.stack([lens["fx"] * radius * rays[0] / across + lens["cx"], lens["fy"] * radius * rays[1] / across + lens["cy"]])
-
-
-def project(rays, camera):
-    """Pixels of unit rays: 2 x N of 3 x N."""
-    models = {"mei": project_mei, "kannala_brandt": project_kannala_brandt}
-    return models[camera["model"]](rays, camera["intrinsics"])
-
-
 def lens_error(estimate, truth):
     """Angle from the axis (degrees) and distance (px) between the pixels of the same rays in two cameras, in the true image
     alone; the turn between the two that fits best is no error: extrinsics take it up."""
     tilt, around = np.meshgrid(np.radians(np.arange(2.0, 92.5, 1.0)), np.radians(np.arange(0.0, 360.0, 5.0)))
     tilt, around = tilt.ravel(), around.ravel()
-    rays = np.stack([np.sin(tilt) * np.cos(around), np.sin(tilt) * np.sin(around), np.cos(tilt)])
+    rays = np.stack([np.sin(tilt) * np.cos(around), np.sin(tilt) * np.sin(around), np.cos(tilt)], 1)
     wanted = project(rays, truth)
-    width, height = truth["image_size_px"]
-    inside = (wanted[0] >= 0) & (wanted[0] < width) & (wanted[1] >= 0) & (wanted[1] < height)
-    tilt, rays, wanted = tilt[inside], rays[:, inside], wanted[:, inside]
+    inside = ((wanted >= 0) & (wanted < truth["image_size_px"])).all(1)
+    tilt, rays, wanted = tilt[inside], rays[inside], wanted[inside]
 
     def turned(angles):
-        return project(cv2.Rodrigues(np.array(angles, float))[0] @ rays, estimate)
+        return project(rays @ cv2.Rodrigues(np.array(angles, float))[0].T, estimate)
 
     turn = np.zeros(3)
     for _ in range(5):
         residual = (turned(turn) - wanted).ravel()
         jacobian = np.stack([(turned(turn + step) - turned(turn)).ravel() / 1e-6 for step in 1e-6 * np.eye(3)], 1)
         turn -= np.linalg.lstsq(jacobian, residual, rcond=None)[0]
-    return np.degrees(tilt), np.linalg.norm(turned(turn) - wanted, axis=0)
+    return np.degrees(tilt), np.linalg.norm(turned(turn) - wanted, axis=1)
 
 
 def judge_intrinsics(path, truths, figures, picture):

@@ -9,29 +9,12 @@ import pathlib
 
 import cv2
 import numpy as np
-import rosbag
 import yaml
 
+from camera_models import project
+from draw_demo import read_images, rotation_from_quaternion
+
 PIXELS_PER_CELL = 4
-
-
-def project_mei(points, p):
-    """Pixels (N x 2) of points (N x 3) in the camera frame; paper, section Camera Model."""
-    unit = points / np.linalg.norm(points, axis=1, keepdims=True)
-    z = unit[:, 2] + p["xi"]
-    x, y = unit[:, 0] / z, unit[:, 1] / z
-    r = x * x + y * y
-    radial = 1 + p["k1"] * r + p["k2"] * r * r
-    u = p["gamma1"] * (x * radial + 2 * p["p1"] * x * y + p["p2"] * (r + 2 * x * x)) + p["u0"]
-    v = p["gamma2"] * (y * radial + p["p1"] * (r + 2 * y * y) + 2 * p["p2"] * x * y) + p["v0"]
-    return np.stack([u, v], 1), unit[:, 2] > math.cos(math.radians(88))
-
-
-def rotation_matrix(x, y, z, w):
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
 
 
 def read_scans(path):
@@ -43,23 +26,23 @@ def read_scans(path):
 
 
 def read_image(bag, camera, stamp):
-    topic = f"/camera/{camera}/image_raw"
-    with rosbag.Bag(str(bag)) as drive:
-        for _, message, _ in drive.read_messages(topics=[topic]):
-            if message.header.stamp.to_nsec() == stamp:
-                return np.frombuffer(message.data, np.uint8).reshape(message.height, message.width)
-    raise SystemExit(f"{bag}: no image of {topic} at {stamp}")
+    images = read_images(bag, camera, [stamp])
+    if not images:
+        raise SystemExit(f"{bag}: no image of camera '{camera}' at {stamp}")
+    return images[stamp]
 
 
 def draw_over_image(image, scan, camera):
     """Obstacles as vertical bars up to their heights, free ground as green dots."""
     picture = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     pose = camera["vehicle_from_camera"]
-    rotation = rotation_matrix(*pose["rotation_xyzw"])
+    rotation = rotation_from_quaternion(*pose["rotation_xyzw"])
     translation = np.array(pose["translation_m"])
 
     def pixels_of(points):
-        return project_mei((np.array(points) - translation) @ rotation, camera["intrinsics"])
+        in_camera = (np.array(points) - translation) @ rotation
+        in_front = in_camera[:, 2] > np.linalg.norm(in_camera, axis=1) * math.cos(math.radians(88))
+        return project(in_camera, camera), in_front
 
     for ray in scan:
         direction = np.array([math.cos(ray["angle_rad"]), math.sin(ray["angle_rad"])])
