@@ -55,7 +55,7 @@ const RayTable& OctomapBuilder::raysOf(const RangeMap& map) {
 std::vector<OctomapBuilder::Ray> OctomapBuilder::markEnds(const RangeMap& map,
                                                           const RigidTransform& world_from_camera) {
   const RayTable& table = raysOf(map);
-  const Eigen::Vector3d origin = world_from_camera.translation();
+  const Eigen::Vector3d& origin = world_from_camera.translation();
   std::vector<Ray> rays;
   for (int y = 0; y < map.range_m.rows; y += options_.pixel_step) {
     for (int x = 0; x < map.range_m.cols; x += options_.pixel_step) {
