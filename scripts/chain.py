@@ -237,15 +237,18 @@ class Chain:
 
     def height_map(self, drive, rig, poses, needs, name="height_map", title="a height map and an OctoMap"):
         truth = self.truth_of(drive) if name != "real_height_map" else None
-        options, text = settings("height_map.yaml")
+        # The odometry of the published images is too coarse for range maps of full resolution: the defaults are for them.
+        options, text = settings("height_map.yaml") if poses else (None, "")
 
         def work(folder):
             output = folder / "map"
-            words = ["--trajectory", poses] if poses else []
+            words = ["--trajectory", poses, "--options", options] if poses else []
             result = run([TOOLS / "vcharge_dense" / "build_height_map", "--bag", drive / "drive.bag", "--rig", rig, "--output",
-                          output, "--options", options, *words], folder / "build.log")
+                          output, *words], folder / "build.log")
             figures = chain_errors.height_map_figures(result)
             self.draw("draw_height_map.py", name, "--map", output)
+            run([sys.executable, ROOT / "scripts" / "draw_octomap.py", "--octomap", output / "octomap.bt",
+                 "--output", self.pictures / f"{name}_octomap.png"], folder / "draw_octomap.log")
             if truth:
                 chain_errors.judge_height_map(output, truth, rig, poses, figures, folder)
             return figures

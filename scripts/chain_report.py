@@ -112,6 +112,7 @@ PICTURES = (
                     ("rviz_ranges.png", "Images, range maps and clouds in rviz"),
                     ("cloud_from_above.png", "The points of all cameras from above"))),
     ("Height map", (("height_map.png", "Heights, drivable cells, gray of the images"),
+                    ("height_map_octomap.png", "Occupied voxels of the OctoMap by height"),
                     ("rviz_height_map.png", "Mesh, grid and OctoMap in rviz"))),
     ("The pose on another day", (("localization.png", "Errors frame by frame"), ("rviz_pose.png", "In rviz"))),
     ("Obstacles", (("obstacles.png", "What the left camera reports, and the fused map"),

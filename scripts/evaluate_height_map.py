@@ -7,8 +7,6 @@ import os
 import pathlib
 import re
 
-import yaml
-
 from tool_runs import ROOT, TOOLS, mark, run, say, simulate
 
 
@@ -20,20 +18,11 @@ def arguments():
     parser.add_argument("--drive", default="loop")
     parser.add_argument("--seed", type=int, default=101, help="of scene and drive; below 100 is for choosing options")
     parser.add_argument("--duration-s", type=float, default=25.0)
-    parser.add_argument("--image-scale", type=float, default=0.5)
+    parser.add_argument("--image-scale", type=float, default=1.0, help="of the cameras' own size, 1280x800")
     parser.add_argument("--image-step", type=int, default=1)
     parser.add_argument("--options", type=pathlib.Path, default=ROOT / "config" / "height_map.yaml")
     parser.add_argument("--true-poses", action="store_true", help="the truth's poses in place of build_map's")
     return parser.parse_args()
-
-
-def options_for(args, folder):
-    """The options, with range maps of 640x400 or what the images have."""
-    options = yaml.safe_load(args.options.read_text()) or {}
-    options.setdefault("range_maps", {})["working_camera"] = {"image_scale": min(1.0, 0.5 / args.image_scale)}
-    path = folder / "height_map_options.yaml"
-    path.write_text(yaml.safe_dump(options))
-    return path
 
 
 def evaluate(args, scene):
@@ -49,7 +38,7 @@ def evaluate(args, scene):
              "--trajectory", trajectory, "--options", ROOT / "config" / "mapping.yaml"], folder / "build_map.log")
     say(f"{folder}: height map")
     made = run([TOOLS / "vcharge_dense" / "build_height_map", "--bag", bag, "--rig", rig, "--trajectory", trajectory,
-                "--options", options_for(args, folder), "--output", folder / "height_map"], folder / "height_map.log")
+                "--options", args.options, "--output", folder / "height_map"], folder / "height_map.log")
     print(f"\n### {scene}\n\n```\n{made['output']}```\n")
     result = run([TOOLS / "vcharge_evaluation" / "evaluate_height_map", "--map", folder / "height_map", "--truth", truth,
                   "--rig", rig, "--trajectory", trajectory, "--report", folder / "report"], folder / "evaluate.log")

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Height maps of a simulated drive: the tool's bad input, the nodelet equals the tool, and saved maps are published."""
 import os
+import shutil
 import sys
 import time
 import unittest
@@ -48,6 +49,7 @@ class HeightMapTest(unittest.TestCase):
 
     def expect_failure(self, words, **arguments):
         output = self.drive.folder / "failed"
+        shutil.rmtree(self.drive.folder / "failed.range_maps", ignore_errors=True)
         status, _, errors = self.build(output, **arguments)
         self.assertNotEqual(status, 0)
         self.assertEqual(len(errors), 1, errors)
@@ -63,7 +65,19 @@ class HeightMapTest(unittest.TestCase):
     def test_a_grid_too_large_for_memory_is_refused(self):
         options = dict(self.options, fusion={"cell_size_m": 0.0001})
         path = self.drive.write_text("large.yaml", yaml.safe_dump(options))
-        self.expect_failure(["max_memory_gb", "GB"], options=path)
+        self.expect_failure([str(self.drive.bag), "max_memory_gb", "GB"], options=path)
+        self.assertFalse((self.drive.folder / "failed.range_maps").exists())
+
+    def test_poses_too_far_apart_are_refused_before_any_range_map(self):
+        lines = []
+        for i, line in enumerate((self.drive.truth / "trajectory.tum").read_text().splitlines()):
+            words = line.split()
+            if i == 15:
+                words[1] = "1e7"
+            lines.append(" ".join(words))
+        apart = self.drive.write_text("apart.tum", "\n".join(lines) + "\n")
+        self.expect_failure(["apart.tum", "max_memory_gb"], extra=["--trajectory", apart])
+        self.assertFalse((self.drive.folder / "failed.range_maps").exists())
 
     def test_options_that_do_not_exist_are_refused(self):
         path = self.drive.write_text("unknown.yaml", "fusion: {cell_m: 1}\n")

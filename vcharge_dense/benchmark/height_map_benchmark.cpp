@@ -66,6 +66,7 @@ void BM_Fusion(benchmark::State& state) {
   const testing::BoxWorld world;
   HeightFusionOptions options;
   std::vector<Eigen::Vector3d> positions;
+  Eigen::AlignedBox3d extent_m;
   std::vector<std::shared_ptr<const PackedRangeMap>> maps;
   const auto count = static_cast<int>(state.range(0));
   const double width_m = static_cast<double>(state.range(1)) - 2.0 * options.max_range_m;
@@ -76,10 +77,11 @@ void BM_Fusion(benchmark::State& state) {
     const Eigen::Vector3d place(width_m * along, height_m * lane / 3.0, 1.0);
     const RigidTransform pose = testing::lookFrom(place, i % 2 == 0 ? 1.57 : -1.57, 0.5);
     positions.push_back(place);
+    extent_m.extend(Eigen::Vector3d(place.x(), place.y(), 0.0));
     maps.push_back(std::make_shared<const PackedRangeMap>(
         packRangeMap(testing::renderView(world, pose, cv::Size(320, 200)), pose, options)));
   }
-  const VoxelGrid grid = makeVoxelGrid(positions, 0.0, 0.0, options);
+  const VoxelGrid grid = makeVoxelGrid(extent_m, options);
   for (auto _ : state) {
     benchmark::DoNotOptimize(
         fuseColumns(grid, positions, [&](size_t view) { return maps[view]; }, options, {}));

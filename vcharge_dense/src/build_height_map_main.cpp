@@ -81,6 +81,46 @@ void print(const HeightMapResult& result) {
   std::printf("content hash: %s\n", hasher.hex().c_str());
 }
 
+/// The poses that the user gave, if any.
+std::optional<Trajectory> readPoses(const Arguments& arguments) {
+  if (!arguments.trajectory.empty()) {
+    return readTrajectory(arguments.trajectory);
+  }
+  if (!arguments.map.empty()) {
+    return keyframesOf(arguments.map);
+  }
+  return std::nullopt;
+}
+
+/// What the stage finds wrong with a drive, with the names of the files.
+template <class Work>
+void namingFiles(const Arguments& arguments, const Work& work) {
+  try {
+    work();
+  } catch (const InputError& error) {
+    const std::string poses = !arguments.trajectory.empty() ? arguments.trajectory
+                              : !arguments.map.empty()      ? arguments.map
+                                                            : arguments.bag + ": /odom";
+    throw InputError(arguments.bag + " with poses of " + poses + ": " + error.what());
+  }
+}
+
+/// Hands a drive to the stage.
+class NamingConsumer : public DriveConsumer {
+ public:
+  NamingConsumer(const Arguments& arguments, HeightMapper* mapper) : arguments_(arguments), mapper_(mapper) {}
+  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
+    namingFiles(arguments_, [&] { mapper_->addImage(camera_index, stamp, image); });
+  }
+  void addOdometry(const VehicleOdometry& odometry) override {
+    namingFiles(arguments_, [&] { mapper_->addOdometry(odometry); });
+  }
+
+ private:
+  const Arguments& arguments_;
+  HeightMapper* const mapper_;
+};
+
 void buildHeightMap(const Arguments& arguments) {
   if (!arguments.trajectory.empty() && !arguments.map.empty()) {
     throw InputError("--trajectory and --map: expected one of them");
@@ -93,25 +133,21 @@ void buildHeightMap(const Arguments& arguments) {
   }
   work += ".range_maps";
   HeightMapper mapper(rig, options, work, fileHash(arguments.bag));
-  std::string poses = arguments.bag + ": /odom";
-  if (!arguments.trajectory.empty()) {
-    mapper.setTrajectory(readTrajectory(arguments.trajectory));
-    poses = arguments.trajectory;
-  } else if (!arguments.map.empty()) {
-    mapper.setTrajectory(keyframesOf(arguments.map));
-    poses = arguments.map;
-  }
   BagDriveSourceOptions source_options;
   source_options.cameras = options.range_maps.cameras;
   BagDriveSource source(arguments.bag, rig, source_options);
-  Steps steps;
-  source.run(&mapper, [&](double share) { steps.show("range maps", share); });
-  HeightMapResult result;
-  try {
-    result = mapper.finish([&](const std::string& step, double share) { steps.show(step, share); });
-  } catch (const InputError& error) {
-    throw InputError(arguments.bag + " with poses of " + poses + ": " + error.what());
+  if (const std::optional<Trajectory> poses = readPoses(arguments)) {
+    const auto [first, last] = source.recordedSpan();
+    namingFiles(arguments, [&, first = first, last = last] { mapper.checkGrid(*poses, first, last); });
+    mapper.setTrajectory(*poses);
   }
+  Steps steps;
+  NamingConsumer consumer(arguments, &mapper);
+  source.run(&consumer, [&](double share) { steps.show("range maps", share); });
+  HeightMapResult result;
+  namingFiles(arguments, [&] {
+    result = mapper.finish([&](const std::string& step, double share) { steps.show(step, share); });
+  });
   steps.end();
   writeHeightMapFolder(&result, arguments.output);
   if (!arguments.keep_range_maps) {

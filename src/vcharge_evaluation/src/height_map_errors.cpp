@@ -18,7 +18,11 @@ namespace {
 
 constexpr double kLever_m = 5.0;           // of the points by which poses are laid over each other
 constexpr double kAboveSurface_m = 0.005;  // of the point that is looked for
+constexpr double kBeforeFoot_m = 0.05;     // where the foot of a face is looked for
 constexpr double kFromPlants_m = 0.3;
+constexpr double kCrownReach_m = 3.5;   // leaves of a tree, from its stem
+constexpr double kUnderCrowns_m = 0.3;  // up to here above its foot there are none
+constexpr double kOnFootprint_m = 0.1;
 constexpr double kKerbTolerance_m = 0.03;
 constexpr double kOverGrass_m = 0.4;
 constexpr double kNotMapped = std::numeric_limits<double>::quiet_NaN();
@@ -236,12 +240,22 @@ void HeightMapErrorOptions::validate() const {
 }
 
 IsRigid rigidBy(const std::vector<TruthObstacle>& obstacles) {
-  return [obstacles](const Eigen::Vector2d& place_m, double high_m) {
+  const auto isPlant = [](const TruthObstacle& obstacle) {
+    return obstacle.kind == "tree" || obstacle.kind == "bush" || obstacle.kind == "hedge";
+  };
+  return [obstacles, isPlant](const Eigen::Vector2d& place_m, double high_m) {
+    const bool is_on_thing =
+        std::any_of(obstacles.begin(), obstacles.end(), [&](const TruthObstacle& obstacle) {
+          return !isPlant(obstacle) && obstacle.kind != "kerb" &&
+                 distanceToPolygon(place_m, obstacle.footprint_m) < kOnFootprint_m;
+        });
     return std::all_of(obstacles.begin(), obstacles.end(), [&](const TruthObstacle& obstacle) {
       const double distance = distanceToPolygon(place_m, obstacle.footprint_m);
-      const bool is_plant = obstacle.kind == "tree" || obstacle.kind == "bush" || obstacle.kind == "hedge";
-      if (is_plant) {
-        return distance > kFromPlants_m;
+      if (isPlant(obstacle)) {
+        // The footprint is the stem's: leaves hang over what is around it.
+        const bool is_crown = obstacle.kind == "tree" && !is_on_thing && distance < kCrownReach_m &&
+                              high_m > obstacle.base_z_m + kUnderCrowns_m;
+        return distance > kFromPlants_m && !is_crown;
       }
       // What is lower or a little higher than a kerb, on its island, is grass.
       const double over_kerb = high_m - obstacle.top_z_m;
@@ -288,6 +302,12 @@ HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& wo
            visibility.countViews({place_m.x(), place_m.y(), height + kAboveSurface_m}, options.min_views) >=
                options.min_views;
   });
+  for (HeightStep& step : steps) {
+    const Eigen::Vector2d foot = step.place_m - kBeforeFoot_m * step.direction;
+    step.foot_seen = visibility.countFaceViews({foot.x(), foot.y(), step.low_m + kAboveSurface_m},
+                                               {-step.direction.x(), -step.direction.y(), 0.0},
+                                               options.min_views) >= options.min_views;
+  }
   errors.num_steps = steps.size();
   errors.num_kerbs_seen = static_cast<size_t>(std::count_if(
       steps.begin(), steps.end(), [&](const HeightStep& step) { return isKerb(step, options); }));

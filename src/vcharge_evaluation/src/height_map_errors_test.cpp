@@ -158,13 +158,18 @@ TEST_F(HeightMapErrorsTest, NoTapeIsHeldToPlantsOrToGrassOnAnIsland) {
   };
   const IsRigid is_rigid = rigidBy({{"kerb", rectangle(0, 0, 4, 4), 0.0, kKerb_m},
                                     {"car", rectangle(10, 0, 14, 2), 0.0, 1.4},
-                                    {"hedge", rectangle(1, 3, 3, 3.5), kKerb_m, 1.0}});
+                                    {"hedge", rectangle(1, 3, 3, 3.5), kKerb_m, 1.0},
+                                    {"tree", rectangle(12, 5, 12.2, 5.2), 0.0, 1.8}});
   EXPECT_TRUE(is_rigid({0.05, 1.0}, kKerb_m + 0.01));
   EXPECT_FALSE(is_rigid({2.0, 1.0}, 0.25));  // grass
   EXPECT_FALSE(is_rigid({2.0, 3.2}, 1.0));
   EXPECT_FALSE(is_rigid({0.8, 3.2}, kKerb_m));  // leaves hang over
   EXPECT_TRUE(is_rigid({10.05, 1.0}, 0.9));
-  EXPECT_TRUE(is_rigid({20.0, 1.0}, 2.0));  // a wall
+  EXPECT_TRUE(is_rigid({20.0, 1.0}, 2.0));   // a wall
+  EXPECT_FALSE(is_rigid({14.0, 6.0}, 2.5));  // a crown, of which the scene lists the stem alone
+  EXPECT_TRUE(is_rigid({14.0, 6.0}, 0.2));   // below it
+  EXPECT_TRUE(is_rigid({12.0, 1.95}, 1.4));  // the car under it
+  EXPECT_TRUE(is_rigid({16.0, 6.0}, 2.5));   // beside it
 
   // Of the platform, half is a hedge's.
   const HeightMapErrors errors =
@@ -175,6 +180,34 @@ TEST_F(HeightMapErrorsTest, NoTapeIsHeldToPlantsOrToGrassOnAnIsland) {
     EXPECT_TRUE(measurement.from_m.y() < 0.0 || measurement.from_m.y() > 2.3)
         << measurement.from_m.transpose();
   }
+}
+
+TEST_F(HeightMapErrorsTest, NoTapeIsHeldToTheBackOfAThingThatNobodySees) {
+  // A pillar beside the path, which runs along y = 0: the cameras see the ground behind it aslant, and its
+  // back never.
+  HeightMap truth = world(0.025);
+  for (int row = 0; row < truth.height_m.rows; ++row) {
+    for (int column = 0; column < truth.height_m.cols; ++column) {
+      const Eigen::Vector2d place = truth.centreOf(column, row);
+      if (std::abs(place.x() - 1.0) < 0.2 && std::abs(place.y() + 1.4) < 0.2) {
+        truth.height_m.at<float>(row, column) = 2.0F;
+      }
+    }
+  }
+  HeightMapErrorOptions options;
+  options.num_measurements = 60;
+  const HeightMapErrors errors =
+      evaluateHeightMap(truth, RigidTransform(), truth, poses_, rig_, everything_rigid_, options);
+  const auto isAt = [](const Eigen::Vector2d& place, double y) {
+    return std::abs(place.x() - 1.0) < 0.2 && std::abs(place.y() - y) < 0.03;
+  };
+  size_t at_front = 0;
+  for (const TapeMeasurement& measurement : errors.measurements) {
+    EXPECT_FALSE(isAt(measurement.from_m, -1.6) || isAt(measurement.to_m, -1.6))
+        << measurement.from_m.transpose() << " to " << measurement.to_m.transpose();
+    at_front += isAt(measurement.from_m, -1.2) || isAt(measurement.to_m, -1.2) ? 1 : 0;
+  }
+  EXPECT_GT(at_front, 0U);
 }
 
 TEST_F(HeightMapErrorsTest, AWallIsWhereTheMapEnds) {

@@ -70,6 +70,11 @@ std::optional<HeightStep> stepBetween(const HeightMap& truth, const Eigen::Vecto
 
 void addLength(const HeightStep& a, const HeightStep& b, const HeightMapErrorOptions& options,
                std::vector<TapeMeasurement>* lengths) {
+  // From behind, the edge of what is low is seen over its top.
+  const auto isSeen = [](const HeightStep& step) { return step.foot_seen || step.both_sides_seen; };
+  if (!isSeen(a) || !isSeen(b)) {
+    return;
+  }
   const bool along_x = std::abs(a.direction.x()) > 0.5;
   const bool same_axis = along_x == (std::abs(b.direction.x()) > 0.5);
   const Eigen::Vector2d between = b.place_m - a.place_m;

@@ -28,9 +28,10 @@ std::vector<HeightStep> findHeightSteps(const HeightMap& truth, const HeightMapE
                                         const std::function<bool(const Eigen::Vector2d& place_m)>& isSeen);
 
 /// Tape-measure distances as somebody would take them in the scene itself, whatever a map shows of it:
-/// between and over edges of rigid things that the cameras saw, spread over the place, picked by the options'
-/// seed. Half of them are heights of steps that are flat over plateau_m on both sides, half lengths between
-/// two edges on a line; where there are too few of one kind the other fills up.
+/// between edges of rigid things that the cameras saw, from in front of the face or over its top, and over
+/// such edges, spread over the place, picked by the options' seed. Half of them are heights of steps that are
+/// flat over plateau_m on both sides, half lengths between two edges on a line; where there are too few of
+/// one kind the other fills up.
 std::vector<TapeMeasurement> pickMeasurements(const HeightMap& truth, const std::vector<HeightStep>& steps,
                                               const IsRigid& is_rigid, const HeightMapErrorOptions& options);
 

@@ -7,7 +7,8 @@
 namespace vcharge {
 namespace {
 
-constexpr double kClearance_m = 0.02;  // by which a line of sight may cut into the surface
+constexpr double kClearance_m = 0.02;     // by which a line of sight may cut into the surface
+constexpr double kMinFaceCosine = 0.174;  // between a face's normal and who looks at it: 80 degrees
 
 /// NaN outside the map.
 float heightAt(const HeightMap& map, const Eigen::Vector2d& place_m) {
@@ -72,6 +73,19 @@ int SurfaceVisibility::countViews(const Eigen::Vector3d& point_in_world, int eno
   int count = 0;
   for (const View& view : views_) {
     count += sees(view, point_in_world) ? 1 : 0;
+    if (count >= enough) {
+      break;
+    }
+  }
+  return count;
+}
+
+int SurfaceVisibility::countFaceViews(const Eigen::Vector3d& point_in_world, const Eigen::Vector3d& normal,
+                                      int enough) const {
+  int count = 0;
+  for (const View& view : views_) {
+    const bool looks_at_face = normal.dot((view.position_m - point_in_world).normalized()) >= kMinFaceCosine;
+    count += looks_at_face && sees(view, point_in_world) ? 1 : 0;
     if (count >= enough) {
       break;
     }

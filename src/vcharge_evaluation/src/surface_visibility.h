@@ -18,6 +18,9 @@ class SurfaceVisibility {
   /// In how many views a point a little above the surface is in the image, below the camera, not behind the
   /// own vehicle, and not hidden; counting ends at `enough`. Thread safe.
   int countViews(const Eigen::Vector3d& point_in_world, int enough) const;
+  /// The same, of the views that look at an upright face there, by 10 degrees or more. `normal`: unit, out of
+  /// the face. Thread safe.
+  int countFaceViews(const Eigen::Vector3d& point_in_world, const Eigen::Vector3d& normal, int enough) const;
   /// Distance of the nearest of these views; infinite where there is none. Thread safe.
   double nearestView(const Eigen::Vector3d& point_in_world) const;
 

@@ -51,8 +51,10 @@ class BagReading {
   }
 
   void run(const DriveSource::ProgressCallback& progress);
+  std::pair<Timestamp, Timestamp> recordedSpan() const;
 
  private:
+  std::unique_ptr<rosbag::View> openView() const;
   void findTopics();
   void addRequiredTopic(const std::string& topic, TopicRole role);
   bool hasTopic(const std::string& topic) const { return types_in_bag_.count(topic) > 0; }
@@ -182,13 +184,22 @@ void BagReading::deliver(Timestamp stamp, const DriveItem& item) {
   internal::deliver(stamp, item, consumer_);
 }
 
-void BagReading::run(const DriveSource::ProgressCallback& progress) {
+std::unique_ptr<rosbag::View> BagReading::openView() const {
   std::vector<std::string> topics;
   for (const auto& entry : roles_) {
     topics.push_back(entry.first);
   }
-  const auto view =
-      readingBag(path_, [&] { return std::make_unique<rosbag::View>(*bag_, rosbag::TopicQuery(topics)); });
+  return readingBag(path_, [&] { return std::make_unique<rosbag::View>(*bag_, rosbag::TopicQuery(topics)); });
+}
+
+std::pair<Timestamp, Timestamp> BagReading::recordedSpan() const {
+  const auto view = openView();
+  return {Timestamp::fromNanoseconds(static_cast<int64_t>(view->getBeginTime().toNSec())),
+          Timestamp::fromNanoseconds(static_cast<int64_t>(view->getEndTime().toNSec()))};
+}
+
+void BagReading::run(const DriveSource::ProgressCallback& progress) {
+  const auto view = openView();
   const double num_messages = view->size();
   const auto deliver_item = [&](Timestamp stamp, const DriveItem& item) { deliver(stamp, item); };
   double num_read = 0;
@@ -227,6 +238,10 @@ BagDriveSource::BagDriveSource(std::string bag_path, std::shared_ptr<const Camer
 void BagDriveSource::run(DriveConsumer* consumer, const ProgressCallback& progress) {
   check(consumer != nullptr, "BagDriveSource::run: expected a consumer");
   BagReading(bag_path_, *rig_, options_, consumer).run(progress);
+}
+
+std::pair<Timestamp, Timestamp> BagDriveSource::recordedSpan() const {
+  return BagReading(bag_path_, *rig_, options_, nullptr).recordedSpan();
 }
 
 }  // namespace vcharge

@@ -100,6 +100,15 @@ TEST_F(BagDriveSourceTest, MayBeReadTwice) {
   EXPECT_EQ(first.order, second.order);
 }
 
+TEST_F(BagDriveSourceTest, TellsWhenItWasRecorded) {
+  writeDrive(3);
+  const Notes notes = read();
+  const auto [first, last] = BagDriveSource(path_, rig_).recordedSpan();
+  EXPECT_EQ(first, milliseconds(0));
+  EXPECT_GE(last, milliseconds(160));  // the last image's stamp
+  EXPECT_LE(last, milliseconds(300));
+}
+
 TEST_F(BagDriveSourceTest, LetsTheConsumersErrorsThrough) {
   struct Refuser : DriveConsumer {
     void addImage(size_t, Timestamp, const Image&) override { throw std::domain_error("the consumer's own"); }

@@ -10,7 +10,7 @@ namespace vcharge {
 /// of the vehicle: from the lowest and to the highest one.
 struct HeightFusionOptions {
   double cell_size_m = 0.05;
-  double height_step_m = 0.025;      ///< height of a voxel
+  double height_step_m = 0.0125;     ///< height of a voxel; the smoothing takes steps down by up to one
   double min_height_m = -0.5;        ///< of the grid, from the lowest pose of the vehicle
   double max_height_m = 2.0;         ///< of the grid, from the highest pose; below a garage's ceiling
   double max_range_m = 8.0;          ///< voxels further from the camera are not touched, ranges may be longer
@@ -23,7 +23,7 @@ struct HeightFusionOptions {
   double reference_confidence = 0.9;
   /// The weight of a range whose pixel spans this much of the surface is one half (0: all alike). Far ground
   /// is seen at grazing angles: a matching window there covers both sides of a kerb.
-  double reference_footprint_m = 0.0;
+  double reference_footprint_m = 0.15;
   double free_weight = 1.0;    ///< of free voxels over that of occupied ones
   double max_memory_gb = 4.0;  ///< a grid that needs more is refused
 
@@ -65,8 +65,8 @@ struct PrimalDualOptions {
 /// Options of the two passes (paper, equations E^Labeling and E^Height). Gradients are differences between
 /// neighbouring cells, so that lambda and epsilon are per cell.
 struct HeightRegularizationOptions {
-  double label_lambda = 0.2;  ///< lambda_l
-  double label_gamma = 12.0;  ///< gamma: sum of weights that the free space of an observed cell must reach
+  double label_lambda = 0.1;  ///< lambda_l
+  double label_gamma = 24.0;  ///< gamma: sum of weights that the free space of an observed cell must reach
   PrimalDualOptions label_solver = {1e-3, 4000, 1.0};
   double height_lambda = 2.0;         ///< lambda_h
   double alpha_up = 1.0;              ///< alpha_1: slope of the cost below the cell's best height

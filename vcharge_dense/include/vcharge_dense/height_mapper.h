@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "vcharge_core/camera_rig.h"
 #include "vcharge_core/drive_source.h"
 #include "vcharge_core/height_map.h"
@@ -48,6 +50,12 @@ class HeightMapper : public DriveConsumer {
   /// Poses in place of odometry's; the map is then in the frame `frame_id`, else in "odom".
   void setTrajectory(const Trajectory& map_from_vehicle, const std::string& frame_id = "map");
 
+  /// Whether the grid over these poses fits into memory, told before any work: those of the drive's time,
+  /// from `first` to `last`. The grid of the cameras' positions is checked before each range map, too.
+  /// InputError with the numbers where it does not fit.
+  void checkGrid(const Trajectory& world_from_vehicle, Timestamp first, Timestamp last) const;
+
+  /// InputError as soon as the grid over the views so far is too large.
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
 
@@ -80,7 +88,7 @@ class HeightMapper : public DriveConsumer {
   std::map<size_t, Eigen::Vector3d> last_position_m_;  // by camera, of its newest view
   std::map<std::string, double> times_s_;
   size_t num_reused_ = 0;
-  double lowest_m_ = 0.0, highest_m_ = 0.0;  // of the vehicle's poses
+  Eigen::AlignedBox3d extent_m_;  // in x and y of the views, in z of the vehicle's poses
 };
 
 }  // namespace vcharge

@@ -18,12 +18,13 @@
 namespace vcharge {
 namespace {
 
-constexpr int kBlockCells = 256;        // side of a block of columns
-constexpr size_t kViewsAtOnce = 8;      // that are added to a block in one parallel loop
-constexpr size_t kKeptViews = 64;       // in memory, the last ones that were used
-constexpr double kBytesPerCell = 80.0;  // of images and solvers, see primal_dual.h
-constexpr int kSupportVoxels = 4;       // above and below the best height, for the confidence
-constexpr double kFullSupport = 2.0;    // sum of weights by which 1 - 1/e of full confidence is reached
+constexpr int kBlockCells = 512;          // side of a block of columns
+constexpr size_t kViewsAtOnce = 8;        // that are added to a block in one parallel loop
+constexpr size_t kKeptBytes = 600000000;  // of views in memory, the last ones that were used
+constexpr double kBytesPerCell = 80.0;    // of images and solvers, see primal_dual.h
+constexpr double kSupport_m = 0.1;        // above and below the best height, for the confidence
+// Sum of weights, times the height of a voxel, by which 1 - 1/e of full confidence is reached.
+constexpr double kFullSupport_m = 0.05;
 
 /// Keeps the views that were used last.
 class ViewCache {
@@ -40,6 +41,7 @@ class ViewCache {
     std::vector<std::shared_ptr<const PackedRangeMap>> loaded(missing.size());
     tbb::parallel_for(size_t{0}, missing.size(), [&](size_t i) { loaded[i] = load_(missing[i]); });
     for (size_t i = 0; i < missing.size(); ++i) {
+      kept_bytes_ += bytesOf(*loaded[i]);
       kept_[missing[i]] = std::move(loaded[i]);
     }
     std::vector<std::shared_ptr<const PackedRangeMap>> maps;
@@ -48,7 +50,8 @@ class ViewCache {
       order_.remove(view);
       order_.push_back(view);
     }
-    while (order_.size() > kKeptViews) {
+    while (kept_bytes_ > kKeptBytes && order_.size() > views.size()) {
+      kept_bytes_ -= bytesOf(*kept_.at(order_.front()));
       kept_.erase(order_.front());
       order_.pop_front();
     }
@@ -56,8 +59,11 @@ class ViewCache {
   }
 
  private:
+  static size_t bytesOf(const PackedRangeMap& map) { return map.values.size() * sizeof(float); }
+
   const LoadView load_;
   std::map<size_t, std::shared_ptr<const PackedRangeMap>> kept_;
+  size_t kept_bytes_ = 0;
   std::list<size_t> order_;  // oldest use first
 };
 
@@ -74,16 +80,16 @@ double distanceToBlock(const VoxelGrid& grid, const Block& block, const Eigen::V
   return (place - place.cwiseMax(low).cwiseMin(high)).norm();
 }
 
-double confidenceOf(const float* weights, int num_voxels, int height_index) {
+double confidenceOf(const float* weights, const VoxelGrid& grid, int height_index) {
+  const int reach = std::max(1, static_cast<int>(std::lround(kSupport_m / grid.height_step_m)));
   double above = 0.0, below = 0.0, contrary = 0.0;
-  for (int z = std::max(0, height_index - kSupportVoxels);
-       z < std::min(num_voxels, height_index + kSupportVoxels); ++z) {
+  for (int z = std::max(0, height_index - reach); z < std::min(grid.num_voxels, height_index + reach); ++z) {
     const double support = z < height_index ? weights[z] : -weights[z];
     (support < 0.0 ? contrary : z < height_index ? below : above) += std::abs(support);
   }
-  const double support = std::min(above, below);
+  const double support_m = std::min(above, below) * grid.height_step_m;
   const double total = above + below + contrary;
-  return total > 0.0 ? (above + below) / total * (1.0 - std::exp(-support / kFullSupport)) : 0.0;
+  return total > 0.0 ? (above + below) / total * (1.0 - std::exp(-support_m / kFullSupport_m)) : 0.0;
 }
 
 /// Fuses one block after the other.
@@ -152,7 +158,7 @@ class BlockFuser {
     confidence = 0.0F;
     if (best.has_surface) {
       height = static_cast<float>(grid_.bottom_m + best.height_index * grid_.height_step_m);
-      confidence = static_cast<float>(confidenceOf(weights, grid_.num_voxels, best.height_index));
+      confidence = static_cast<float>(confidenceOf(weights, grid_, best.height_index));
     }
   }
 
@@ -183,18 +189,13 @@ std::vector<Block> blocksOf(const VoxelGrid& grid) {
 
 }  // namespace
 
-VoxelGrid makeVoxelGrid(const std::vector<Eigen::Vector3d>& camera_positions_m, double lowest_pose_m,
-                        double highest_pose_m, const HeightFusionOptions& options) {
-  check(!camera_positions_m.empty(), "makeVoxelGrid: expected cameras");
-  Eigen::Vector2d low = camera_positions_m.front().head<2>(), high = low;
-  for (const Eigen::Vector3d& position : camera_positions_m) {
-    low = low.cwiseMin(position.head<2>());
-    high = high.cwiseMax(position.head<2>());
-  }
+VoxelGrid makeVoxelGrid(const Eigen::AlignedBox3d& extent_m, const HeightFusionOptions& options) {
+  check(!extent_m.isEmpty(), "makeVoxelGrid: expected views");
+  const Eigen::Vector2d low = extent_m.min().head<2>(), high = extent_m.max().head<2>();
   const double cell = options.cell_size_m;
   const Eigen::Vector2d first = ((low.array() - options.max_range_m) / cell).floor();
   const Eigen::Vector2d last = ((high.array() + options.max_range_m) / cell).ceil();
-  const double height = highest_pose_m - lowest_pose_m + options.max_height_m - options.min_height_m;
+  const double height = extent_m.sizes().z() + options.max_height_m - options.min_height_m;
   const double columns = last.x() - first.x() + 1.0, rows = last.y() - first.y() + 1.0;
   const double voxels = std::ceil(height / options.height_step_m);
   const double bytes =
@@ -213,7 +214,7 @@ VoxelGrid makeVoxelGrid(const std::vector<Eigen::Vector3d>& camera_positions_m, 
   grid.cell_size_m = cell;
   grid.columns = static_cast<int>(columns);
   grid.rows = static_cast<int>(rows);
-  grid.bottom_m = lowest_pose_m + options.min_height_m;
+  grid.bottom_m = extent_m.min().z() + options.min_height_m;
   grid.height_step_m = options.height_step_m;
   grid.num_voxels = static_cast<int>(voxels);
   return grid;

@@ -4,6 +4,8 @@
 #include <memory>
 #include <vector>
 
+#include <Eigen/Geometry>
+
 #include "height_map/packed_range_map.h"
 
 namespace vcharge {
@@ -20,10 +22,9 @@ struct VoxelGrid {
   double top_m() const { return bottom_m + num_voxels * height_step_m; }
 };
 
-/// The grid that voxels within max_range_m of the cameras fill. InputError with the numbers where it would
-/// take more than max_memory_gb.
-VoxelGrid makeVoxelGrid(const std::vector<Eigen::Vector3d>& camera_positions_m, double lowest_pose_m,
-                        double highest_pose_m, const HeightFusionOptions& options);
+/// The grid that voxels within max_range_m of the cameras fill. `extent_m`: in x and y of the cameras, in z
+/// of the vehicle's poses. InputError with the numbers where it would take more than max_memory_gb.
+VoxelGrid makeVoxelGrid(const Eigen::AlignedBox3d& extent_m, const HeightFusionOptions& options);
 
 /// What is kept of all columns. All images have the grid's size.
 struct ColumnImages {

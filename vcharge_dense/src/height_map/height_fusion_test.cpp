@@ -41,7 +41,11 @@ struct Drive {
         maps.push_back(std::make_shared<const PackedRangeMap>(packRangeMap(map, poses.back(), options)));
       }
     }
-    grid = makeVoxelGrid(positions, 0.0, 0.0, options);
+    Eigen::AlignedBox3d extent_m;
+    for (const Eigen::Vector3d& position : positions) {
+      extent_m.extend(Eigen::Vector3d(position.x(), position.y(), 0.0));
+    }
+    grid = makeVoxelGrid(extent_m, options);
   }
 
   ColumnImages fuse() const {
@@ -151,16 +155,18 @@ TEST(HeightFusionTest, IsTheSameOnAnyNumberOfThreads) {
 }
 
 TEST(HeightFusionTest, RefusesAGridThatTakesTooMuchMemory) {
-  const std::vector<Eigen::Vector3d> positions = {{0, 0, 1}, {90000, 70000, 1}};
+  const auto refuse = [](const Eigen::Vector3d& high_m) {
+    makeVoxelGrid(Eigen::AlignedBox3d(Eigen::Vector3d::Zero(), high_m), HeightFusionOptions());
+  };
   try {
-    makeVoxelGrid(positions, 0.0, 0.0, HeightFusionOptions());
+    refuse({90000, 70000, 1});
     FAIL() << "expected an error";
   } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("max_memory_gb"), std::string::npos);
     EXPECT_NE(std::string(error.what()).find("GB"), std::string::npos);
   }
-  EXPECT_THROW(makeVoxelGrid({{0, 0, 1}, {1e300, 0, 1}}, 0.0, 0.0, HeightFusionOptions()), InputError);
-  EXPECT_THROW(makeVoxelGrid({{0, 0, 1}}, 0.0, 1e12, HeightFusionOptions()), InputError);
+  EXPECT_THROW(refuse({1e300, 0, 1}), InputError);
+  EXPECT_THROW(refuse({0, 0, 1e12}), InputError);
 }
 
 }  // namespace

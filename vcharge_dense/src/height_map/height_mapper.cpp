@@ -69,6 +69,18 @@ void HeightMapper::setTrajectory(const Trajectory& map_from_vehicle, const std::
   trajectory_hash_ = hashOf(map_from_vehicle);
 }
 
+void HeightMapper::checkGrid(const Trajectory& world_from_vehicle, Timestamp first, Timestamp last) const {
+  Eigen::AlignedBox3d extent_m;
+  for (const StampedTransform& pose : world_from_vehicle) {
+    if (pose.stamp >= first && pose.stamp <= last) {
+      extent_m.extend(pose.world_from_vehicle.translation());
+    }
+  }
+  if (!extent_m.isEmpty()) {
+    makeVoxelGrid(extent_m, options_.fusion);
+  }
+}
+
 void HeightMapper::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
   range_mapper_->addImage(camera_index, stamp, image);
 }
@@ -90,8 +102,13 @@ void HeightMapper::addTask(const RangeTask& task) {
     return;
   }
   last_position_m_[task.camera_index] = position;
-  const StageTimer timer("range maps", &times_s_);
   const RigCamera& camera = rig_->cameras[task.camera_index];
+  const RigidTransform world_from_vehicle =
+      task.reference.world_from_camera * camera.vehicle_from_camera->inverse();
+  extent_m_.extend(Eigen::Vector3d(position.x(), position.y(), world_from_vehicle.translation().z()));
+  makeVoxelGrid(extent_m_,
+                options_.fusion);  // one that is too large is refused before more range maps are made
+  const StageTimer timer("range maps", &times_s_);
   if (!drive_name_.empty() && isKept(folder(), camera.name, task.reference.stamp)) {
     ++num_reused_;
   } else {
@@ -102,13 +119,11 @@ void HeightMapper::addTask(const RangeTask& task) {
         throw InputError(path + ": cannot be written (is the disk full?)");
       }
     });
-    writeRangeMap(range_mapper_->sweep(task), folder());  // its YAML comes last: all is there
+    RangeMap map = range_mapper_->sweep(task);
+    map.reference.release();       // it is there already, and is read once, not whenever ranges are
+    writeRangeMap(map, folder());  // its YAML comes last: all is there
   }
   views_.push_back({task.camera_index, task.reference.stamp, task.reference.world_from_camera});
-  const double height =
-      (task.reference.world_from_camera * camera.vehicle_from_camera->inverse()).translation().z();
-  lowest_m_ = views_.size() == 1 ? height : std::min(lowest_m_, height);
-  highest_m_ = views_.size() == 1 ? height : std::max(highest_m_, height);
 }
 
 RangeMap HeightMapper::readView(const View& view) const {
@@ -152,7 +167,7 @@ HeightMapResult HeightMapper::finish(const std::function<void(const std::string&
     positions.push_back(view.world_from_camera.translation());
   }
   const HeightFusionOptions& fusion = options_.fusion;
-  const VoxelGrid grid = makeVoxelGrid(positions, lowest_m_, highest_m_, fusion);
+  const VoxelGrid grid = makeVoxelGrid(extent_m_, fusion);
   const auto pack = [&](size_t i) {
     return std::make_shared<const PackedRangeMap>(
         packRangeMap(readView(views_[i]), views_[i].world_from_camera, fusion));

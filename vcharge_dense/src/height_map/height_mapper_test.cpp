@@ -179,12 +179,26 @@ TEST_F(HeightMapperTest, SaysThatNothingSureWasSeen) {
   EXPECT_NE(error.find("max_range_m"), std::string::npos) << error;
 }
 
-TEST_F(HeightMapperTest, SaysThatTheGridIsTooLarge) {
+TEST_F(HeightMapperTest, RefusesAGridThatIsTooLargeBeforeAnyRangeMap) {
   options_.fusion.cell_size_m = 1e-5;
-  HeightMapper mapper(rig_, options_, folder_, "");
+  HeightMapper mapper(rig_, options_, folder_ + "/work", "");
   mapper.setTrajectory(poses(kNumImages));
-  drive(&mapper);
+  try {
+    drive(&mapper);
+    FAIL() << "expected an error";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("max_memory_gb"), std::string::npos) << error.what();
+  }
+  EXPECT_FALSE(fs::exists(folder_ + "/work"));
   EXPECT_NE(errorOf(&mapper).find("max_memory_gb"), std::string::npos);
+}
+
+TEST_F(HeightMapperTest, RefusesPosesTooFarApartBeforeTheDriveAndTakesNoOthersIntoAccount) {
+  const HeightMapper mapper(rig_, options_, folder_, "");
+  const Trajectory apart = poses(kNumImages, 5e5);  // from the sixth on
+  EXPECT_THROW(mapper.checkGrid(apart, stampOf(0), stampOf(kNumImages)), InputError);
+  EXPECT_NO_THROW(mapper.checkGrid(apart, stampOf(0), stampOf(4)));
+  EXPECT_NO_THROW(mapper.checkGrid(apart, stampOf(kNumImages), stampOf(kNumImages + 1)));
 }
 
 TEST_F(HeightMapperTest, LeavesNoFolderOnAFullDisk) {
@@ -287,6 +301,61 @@ TEST_F(OctomapBuilderTest, FarthestPlaneAndRangesWithoutSigmaClearNothing) {
   map.range_m.setTo(std::numeric_limits<float>::infinity());
   other.add(map, along_x_);
   EXPECT_EQ(other.tree().size(), 0U);
+}
+
+TEST_F(OctomapBuilderTest, EqualsAnOctreeThatIsUpdatedRayByRay) {
+  OctomapOptions options;
+  options.max_range_m = 3.0;
+  octomap::OcTree plain(options.resolution_m);
+  OctomapBuilder builder(options, 40.0);
+  const RangeMap map = wall();
+  for (int view = 0; view < 7; ++view) {  // enough for voxels to be as sure as they can get
+    const RigidTransform pose = testing::lookFrom({0.05, 0.05 + 0.11 * view, 1.05}, 0.4 * view, 0.05 * view);
+    octomap::KeySet ends, free, occupied;
+    octomap::KeyRay passed;
+    const auto toOctomap = [](const Eigen::Vector3d& p) {
+      return octomap::point3d(static_cast<float>(p.x()), static_cast<float>(p.y()),
+                              static_cast<float>(p.z()));
+    };
+    for (int y = 0; y < map.range_m.rows; y += options.pixel_step) {
+      for (int x = 0; x < map.range_m.cols; x += options.pixel_step) {
+        const double range = map.range_m.at<float>(y, x);
+        if (std::isnan(range)) {
+          continue;
+        }
+        const Eigen::Vector3d ray = testing::rayOf(map, x, y).cast<float>().normalized().cast<double>();
+        const octomap::point3d end =
+            toOctomap(pose.translation() + std::min(range, options.max_range_m) * (pose.rotation() * ray));
+        if (range <= options.max_range_m) {
+          occupied.insert(plain.coordToKey(end));
+        }
+        if (ends.insert(plain.coordToKey(end)).second) {
+          plain.computeRayKeys(toOctomap(pose.translation()), end, passed);
+          free.insert(passed.begin(), passed.end());
+        }
+      }
+    }
+    for (const octomap::OcTreeKey& key : free) {
+      if (occupied.count(key) == 0) {
+        plain.updateNode(key, false);
+      }
+    }
+    for (const octomap::OcTreeKey& key : occupied) {
+      plain.updateNode(key, true);
+    }
+    builder.add(map, pose);
+  }
+  plain.expand();
+  ASSERT_GT(plain.getNumLeafNodes(), 3000U);
+  EXPECT_EQ(builder.tree().getNumLeafNodes(), plain.getNumLeafNodes());
+  size_t occupied = 0;
+  for (auto leaf = plain.begin_leafs(); leaf != plain.end_leafs(); ++leaf) {
+    const octomap::OcTreeNode* node = builder.tree().search(leaf.getKey());
+    ASSERT_NE(node, nullptr);
+    ASSERT_EQ(node->getLogOdds(), leaf->getLogOdds());
+    occupied += plain.isNodeOccupied(*leaf) ? 1 : 0;
+  }
+  EXPECT_GT(occupied, 100U);
 }
 
 TEST_F(OctomapBuilderTest, RangesBeyondTheLimitClearUpToItAndEndNowhere) {

@@ -1,10 +1,12 @@
 #include "vcharge_dense/octomap_builder.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 
 #include <octomap/OcTree.h>
 
+#include "height_map/voxel_blocks.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/file_io.h"
 #include "vcharge_core/ray_table.h"
@@ -13,6 +15,9 @@ namespace vcharge {
 namespace {
 
 constexpr double kWholeSphere_rad = 6.2831853;
+
+// Marks of voxels in the view that is added.
+constexpr uint8_t kEnd = 1, kOccupied = 2, kFree = 4;
 
 octomap::point3d toOctomap(const Eigen::Vector3d& point) {
   return {static_cast<float>(point.x()), static_cast<float>(point.y()), static_cast<float>(point.z())};
@@ -23,11 +28,17 @@ octomap::point3d toOctomap(const Eigen::Vector3d& point) {
 OctomapBuilder::OctomapBuilder(const OctomapOptions& options, double farthest_m)
     : options_(options),
       farthest_m_(farthest_m),
-      tree_(std::make_unique<octomap::OcTree>(options.resolution_m)) {
+      tree_(std::make_unique<octomap::OcTree>(options.resolution_m)),
+      voxels_(std::make_unique<VoxelBlocks>()) {
   options.validate();
 }
 
 OctomapBuilder::~OctomapBuilder() = default;
+
+struct OctomapBuilder::Ray {
+  octomap::point3d end;
+  octomap::OcTreeKey end_key;
+};
 
 const RayTable& OctomapBuilder::raysOf(const RangeMap& map) {
   const MeiCamera::Parameters parameters = map.camera.parameters();
@@ -41,48 +52,78 @@ const RayTable& OctomapBuilder::raysOf(const RangeMap& map) {
   return *rays;
 }
 
-void OctomapBuilder::add(const RangeMap& map, const RigidTransform& world_from_camera) {
-  const RayTable& rays = raysOf(map);
-  const Eigen::Vector3d origin = world_from_camera.translation();
-  octomap::KeySet ends, free, occupied;
-  octomap::KeyRay ray_keys;
+std::vector<OctomapBuilder::Ray> OctomapBuilder::markEnds(const RangeMap& map,
+                                                          const RigidTransform& world_from_camera) {
+  const RayTable& table = raysOf(map);
+  const Eigen::Vector3d& origin = world_from_camera.translation();
+  std::vector<Ray> rays;
   for (int y = 0; y < map.range_m.rows; y += options_.pixel_step) {
     for (int x = 0; x < map.range_m.cols; x += options_.pixel_step) {
       const float range = map.range_m.at<float>(y, x), sigma = map.standard_deviation_m.at<float>(y, x);
       if (!std::isfinite(range) || !std::isfinite(sigma) || range <= 0.0F || range >= farthest_m_ ||
-          !rays.valid(x, y)) {
+          !table.valid(x, y)) {
         continue;
       }
       const bool ends_here = range <= options_.max_range_m;
       const double length = ends_here ? range : options_.max_range_m;
-      const Eigen::Vector3d end =
-          origin + length * (world_from_camera.rotation() * rays.ray(x, y).cast<double>());
-      octomap::OcTreeKey end_key;
-      if (!tree_->coordToKeyChecked(toOctomap(end), end_key)) {
+      Ray ray;
+      ray.end = toOctomap(origin + length * (world_from_camera.rotation() * table.ray(x, y).cast<double>()));
+      if (!tree_->coordToKeyChecked(ray.end, ray.end_key)) {
         continue;  // beyond what an octree holds
       }
-      if (ends_here) {
-        occupied.insert(end_key);
+      uint8_t& marks = *voxels_->at(ray.end_key).marks;
+      if ((marks & kEnd) == 0) {
+        rays.push_back(ray);  // rays to one voxel clear much the same: the first one stands for all
       }
-      // Rays to one voxel clear much the same: the first one stands for all.
-      if (ends.insert(end_key).second && tree_->computeRayKeys(toOctomap(origin), toOctomap(end), ray_keys)) {
-        free.insert(ray_keys.begin(), ray_keys.end());
+      marks |= ends_here ? kEnd | kOccupied : kEnd;
+    }
+  }
+  return rays;
+}
+
+void OctomapBuilder::update(float* log_odds, float change) const {
+  const float before = std::isnan(*log_odds) ? 0.0F : *log_odds;
+  *log_odds = std::clamp(before + change, tree_->getClampingThresMinLog(), tree_->getClampingThresMaxLog());
+}
+
+void OctomapBuilder::add(const RangeMap& map, const RigidTransform& world_from_camera) {
+  voxels_->startView();
+  const std::vector<Ray> rays = markEnds(map, world_from_camera);
+  const octomap::point3d origin = toOctomap(world_from_camera.translation());
+  octomap::KeyRay passed;
+  for (const Ray& ray : rays) {
+    if (tree_->computeRayKeys(origin, ray.end, passed)) {
+      for (const octomap::OcTreeKey& key : passed) {
+        const VoxelBlocks::Voxel voxel = voxels_->at(key);
+        // Voxels on the surface are occupied although rays to the surface behind graze them.
+        if ((*voxel.marks & (kFree | kOccupied)) == 0) {
+          *voxel.marks |= kFree;
+          update(voxel.value, tree_->getProbMissLog());
+        }
       }
     }
   }
-  // Voxels on the surface are occupied although rays to the surface behind graze them.
-  for (const octomap::OcTreeKey& key : free) {
-    if (occupied.count(key) == 0) {
-      tree_->updateNode(key, false, true);
+  for (const Ray& ray : rays) {
+    const VoxelBlocks::Voxel voxel = voxels_->at(ray.end_key);
+    if ((*voxel.marks & kOccupied) != 0) {
+      update(voxel.value, tree_->getProbHitLog());
     }
   }
-  for (const octomap::OcTreeKey& key : occupied) {
-    tree_->updateNode(key, true, true);
+  tree_is_current_ = false;
+}
+
+const octomap::OcTree& OctomapBuilder::tree() {
+  if (!tree_is_current_) {
+    voxels_->forEach(
+        [&](const octomap::OcTreeKey& key, float log_odds) { tree_->setNodeValue(key, log_odds, true); });
+    tree_->updateInnerOccupancy();
+    tree_is_current_ = true;
   }
+  return *tree_;
 }
 
 void OctomapBuilder::write(const std::string& path) {
-  tree_->updateInnerOccupancy();
+  tree();
   tree_->toMaxLikelihood();
   tree_->prune();
   writeFileAtomically(path, [&](const std::string& temporary) {

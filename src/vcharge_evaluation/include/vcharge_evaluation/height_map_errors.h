@@ -50,8 +50,9 @@ struct HeightMapErrorOptions {
 /// Told by the scene alone; `high_m`: the true height there.
 using IsRigid = std::function<bool(const Eigen::Vector2d& place_m, double high_m)>;
 
-/// From the obstacles of the scene (obstacles.yaml): not where a tree, bush or hedge stands within 0.3 m, and
-/// on an island with a kerb only at the kerb's own height. All else is rigid: cars, walls, pillars, bins.
+/// From the obstacles of the scene (obstacles.yaml): not where a tree, bush or hedge stands within 0.3 m, not
+/// in a tree's crown (over 0.3 m up, within 3.5 m of the stem, and not on a car or the like), and on an
+/// island with a kerb only at the kerb's own height. All else is rigid: cars, walls, pillars, bins.
 IsRigid rigidBy(const std::vector<TruthObstacle>& obstacles);
 
 /// A place where the true height jumps, crossed along an axis of the world from its low to its high side.
@@ -60,6 +61,7 @@ struct HeightStep {
   Eigen::Vector2d direction{1, 0};   ///< unit, upwards
   double low_m = 0.0, high_m = 0.0;  ///< true heights beside it
   bool both_sides_seen = false;      ///< the upper one, too
+  bool foot_seen = false;            ///< that of its face, by cameras in front of the face
 };
 
 /// A distance that could be taken with a tape measure in the world, and is read from the map.

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "vcharge_core/camera_rig.h"
@@ -40,6 +41,11 @@ class BagDriveSource : public DriveSource {
                  const BagDriveSourceOptions& options = BagDriveSourceOptions());
   /// May be called again: reads the bag anew.
   void run(DriveConsumer* consumer, const ProgressCallback& progress) override;
+
+  /// When the first and the last message of the drive's topics were recorded, by the recorder's clock: about
+  /// the stamps that run() will deliver. Reads the bag's index alone; errors of the bag and its topics are
+  /// run()'s.
+  std::pair<Timestamp, Timestamp> recordedSpan() const;
 
  private:
   const std::string bag_path_;
