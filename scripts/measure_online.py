@@ -76,10 +76,11 @@ def main():
     print(f"images: {len(stamps)}, {(len(stamps) - 1) / duration_s:.1f} a second")
     for topic, came in listener.results.items():
         latencies = np.array([came[stamp] - listener.images[stamp] for stamp in came if stamp in listener.images])
-        if len(latencies):
-            print(f"{topic}: {len(latencies)} of {len(stamps)} stamps, {len(latencies) / duration_s:.1f} a second; latency median, "
-                  f"95 %, largest: {1e3 * np.median(latencies):.0f}, {1e3 * np.percentile(latencies, 95):.0f}, "
-                  f"{1e3 * latencies.max():.0f} ms")
+        if len(latencies) > 1:
+            came_s = (max(came) - min(came)) * 1e-9 / args.rate
+            print(f"{topic}: {len(latencies)} of {len(stamps)} stamps, {(len(latencies) - 1) / came_s:.1f} a second from the first to "
+                  f"the last; latency median, 95 %, largest: {1e3 * np.median(latencies):.0f}, "
+                  f"{1e3 * np.percentile(latencies, 95):.0f}, {1e3 * latencies.max():.0f} ms")
 
 
 if __name__ == "__main__":
