@@ -83,8 +83,8 @@ def expect_bad_rig_is_refused(test, nodelet, rig):
 
 def announce_again(topic, kind):
     """Has the master tell all subscribers of a topic who publishes on it. rospy takes the last such news for the newest;
-    where a nodelet goes and comes again at once, that may be the news that it went. By a name of its own: this script may publish
-    on the topic, too, and its registration has to stay."""
+    where a nodelet goes and comes again at once, that may be the news that it went. By a name of its own: this script may
+    publish on the topic, too, and its registration has to stay."""
     master = rosgraph.Master(rospy.get_name() + "_announcer")
     master.registerPublisher(topic, kind._type, rospy.get_node_uri())
     master.unregisterPublisher(topic, rospy.get_node_uri())
