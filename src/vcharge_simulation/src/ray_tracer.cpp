@@ -3,12 +3,16 @@
 #include <limits>
 #include <stdexcept>
 
+#include <tbb/global_control.h>
+
 namespace vcharge {
 
 RayTracer::RayTracer(const TriangleMesh& mesh, unsigned geometry_id) {
   // One build thread: the hierarchy, and so which of two coincident surfaces is hit, must not depend on the
-  // machine.
-  device_ = rtcNewDevice("threads=1,set_affinity=0");
+  // machine. Embree's own setting of threads would hold for all of the process, and as long as the device
+  // lives.
+  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+  device_ = rtcNewDevice("set_affinity=0");
   if (device_ == nullptr) {
     throw std::runtime_error("RayTracer: Embree gives no device");
   }
