@@ -70,7 +70,10 @@ std::map<std::string, std::string> readProvenance(const Entry& entry) {
     entry.fail("a map of texts");
   }
   for (const auto& item : entry.node) {
-    const auto key = item.first.as<std::string>();
+    if (!item.first.IsScalar()) {
+      entry.fail("a map of texts");
+    }
+    const std::string key = item.first.Scalar();
     provenance[key] = entry.required(key).text();
   }
   return provenance;
@@ -262,7 +265,10 @@ CameraRig parseCameraRig(const std::string& text, const std::string& source, con
     cameras.fail("a map from camera names to cameras");
   }
   for (const auto& item : cameras.node) {
-    const std::string name = item.first.as<std::string>();
+    if (!item.first.IsScalar()) {
+      cameras.fail("a map from camera names to cameras");
+    }
+    const std::string name = item.first.Scalar();
     if (rig.findCamera(name) >= 0) {
       throw InputError(source + ": cameras." + name + ": the name is there twice");
     }

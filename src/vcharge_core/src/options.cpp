@@ -51,7 +51,10 @@ void checkKeys(const YAML::Node& node, const std::string& source, const std::str
     throwBadField(source, prefix.empty() ? "(top level)" : prefix, "a map of " + join(known), node);
   }
   for (const auto& entry : node) {
-    const std::string key = entry.first.as<std::string>();
+    if (!entry.first.IsScalar()) {
+      throwBadField(source, prefix.empty() ? "(top level)" : prefix, "a text as a key", entry.first);
+    }
+    const std::string key = entry.first.Scalar();
     if (std::find(known.begin(), known.end(), key) == known.end()) {
       throw InputError(source + ": " + (prefix.empty() ? "" : prefix + ".") + key +
                        ": unknown key, expected one of " + join(known));

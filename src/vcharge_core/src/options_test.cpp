@@ -88,6 +88,8 @@ TEST(OptionsTest, ErrorsNameSourceKeyAndExpectation) {
   EXPECT_THAT(errorOf("{count: 0}"), AllOf(HasSubstr("stage.yaml"), HasSubstr("count: must be positive")));
   EXPECT_THAT(errorOf("{inner: {scale: -1}}"), HasSubstr("stage.yaml: inner.scale: must be positive"));
   EXPECT_THAT(errorOf("[1, 2]"), HasSubstr("a map of"));
+  EXPECT_THAT(errorOf("{[1, 2]: 3}"), AllOf(HasSubstr("stage.yaml"), HasSubstr("a text as a key")));
+  EXPECT_THAT(errorOf("{inner: {{a: b}: 3}}"), AllOf(HasSubstr("inner"), HasSubstr("a text as a key")));
 }
 
 TEST(OptionsTest, WrittenFieldsReadBackTheSame) {
