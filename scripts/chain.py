@@ -269,7 +269,6 @@ class Chain:
             output = folder / "range"
             run([TOOLS / "vcharge_dense" / "compute_range_maps", "--bag", drive / "drive.bag", "--rig", rig, "--options",
                  options, "--output", output], folder / "ranges.log")
-            self.pictures.mkdir(exist_ok=True)
             run([sys.executable, ROOT / "scripts" / "draw_demo.py", "--bag", drive / "drive.bag", "--rig", rig, "--range",
                  output, *(["--truth", truth] if truth else []), "--output", self.pictures], folder / "draw.log")
             return chain_errors.judge_ranges(output, truth, drive / "drive.bag", rig, folder) if truth else {}
@@ -411,8 +410,7 @@ class Chain:
         self.height_map(mapping, rig, poses, [mapping.name], "height_map_truth", "a height map, true rig and poses")
 
     def go(self):
-        mapping, other, rig, mapped, heights = self.stages()
-        del mapping
+        _, other, rig, mapped, heights = self.stages()
         if not self.args.no_nodelets:
             self.nodelets(mapped, other, rig, ["localization", "obstacles"])
         if not self.args.no_rviz and not self.args.no_nodelets:
