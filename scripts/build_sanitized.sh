@@ -1,15 +1,21 @@
 #!/usr/bin/env bash
-# Builds into build_sanitize/ by clang with AddressSanitizer, UndefinedBehaviorSanitizer and what libFuzzer needs:
-# build_sanitized.sh TARGET... Further CMake options come through VCHARGE_CMAKE_OPTIONS.
+# Builds by clang into build_sanitize/ with AddressSanitizer, UndefinedBehaviorSanitizer and what libFuzzer needs, or into
+# build_sanitize_threads/ with ThreadSanitizer: build_sanitized.sh [--threads] TARGET... Further CMake options come through
+# VCHARGE_CMAKE_OPTIONS.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 command -v clang++ >/dev/null || { echo "build_sanitized.sh: clang is missing: scripts/install_dependencies.sh" >&2; exit 1; }
+folder=build_sanitize options=(-DVCHARGE_FUZZ=ON -DVCHARGE_SANITIZE=address,undefined,fuzzer-no-link)
+if [ "${1:-}" = --threads ]; then
+  shift
+  folder=build_sanitize_threads options=(-DVCHARGE_SANITIZE=thread "-DCMAKE_CXX_FLAGS=-I$PWD/test/thread_sanitizer")
+fi
 # shellcheck disable=SC2086 # the options are words
-cmake -S . -B build_sanitize -G Ninja -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_C_COMPILER=clang -DVCHARGE_FUZZ=ON \
-  -DVCHARGE_SANITIZE=address,undefined,fuzzer-no-link ${VCHARGE_CMAKE_OPTIONS:-} >build_sanitize_configure.log 2>&1 || {
-  cat build_sanitize_configure.log >&2
+cmake -S . -B "$folder" -G Ninja -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_C_COMPILER=clang "${options[@]}" \
+  ${VCHARGE_CMAKE_OPTIONS:-} >"${folder}_configure.log" 2>&1 || {
+  cat "${folder}_configure.log" >&2
   exit 1
 }
-mv build_sanitize_configure.log build_sanitize/configure.log
-cmake --build build_sanitize --target "$@"
+mv "${folder}_configure.log" "$folder/configure.log"
+cmake --build "$folder" --target "$@"

@@ -298,7 +298,7 @@ class Chain:
             known = set(yaml.safe_load(rig.read_text())["cameras"])
             words = ["--options", options] if {"front", "left", "right"} <= known else []
             result = run([TOOLS / "vcharge_obstacles" / "detect_obstacles", "--bag", drive / "drive.bag", "--rig", rig, *words,
-                          "--range-options", self.range_options(ranges, known, drive, folder), "--output", folder / "maps"],
+                          "--range-options", self.range_options(ranges, known, folder), "--output", folder / "maps"],
                          folder / "detect.log")
             figures = chain_errors.obstacle_figures(result["output"])
             self.draw("draw_obstacles.py", name, "--bag", drive / "drive.bag", "--rig", rig, "--obstacles", folder / "maps",
@@ -309,14 +309,13 @@ class Chain:
 
         return self.step(name, title, needs, [range_text, text], work)
 
-    def range_options(self, path, cameras, drive, folder):
-        """Range maps have 384x240 pixels, whatever the images have; and only of cameras that there are."""
+    @staticmethod
+    def range_options(path, cameras, folder):
+        """Range maps only of cameras that there are."""
         options = yaml.safe_load(path.read_text())
         options["cameras"] = [camera for camera in options.get("cameras", []) if camera in cameras]
         if not options["cameras"]:
             del options["cameras"]
-        if self.simulated and self.args.quick and drive.name != "real":
-            options["working_camera"]["image_scale"] *= 2.0
         output = folder / "range_options.yaml"
         output.write_text(yaml.safe_dump(options))
         return output

@@ -8,8 +8,6 @@ import json
 import pathlib
 import re
 
-import yaml
-
 from localization_errors import LocalizationErrors, Map
 from tool_runs import ROOT, TOOLS, mark, run, say, simulate
 
@@ -87,14 +85,10 @@ def localize(folder, place):
 
 
 def obstacles(folder, truth):
-    ranges = folder / "ranges.yaml"
-    options = yaml.safe_load((ROOT / "config" / "dense_obstacles.yaml").read_text())
-    options["working_camera"]["image_scale"] *= 2
-    ranges.write_text(yaml.safe_dump(options))
     output = folder / "obstacles"
     detected = run([TOOLS / "vcharge_obstacles" / "detect_obstacles", "--bag", folder / "drive.bag", "--rig",
-                    folder / "rig_truth.yaml", "--options", ROOT / "config" / "obstacles.yaml", "--range-options", ranges,
-                    "--output", output], folder / "obstacles.log", may_fail=True)
+                    folder / "rig_truth.yaml", "--options", ROOT / "config" / "obstacles.yaml", "--range-options",
+                    ROOT / "config" / "dense_obstacles.yaml", "--output", output], folder / "obstacles.log", may_fail=True)
     if not (output / "status.csv").exists():
         return {"says": (folder / "obstacles.log").read_text().strip().splitlines()[-1], "free_inside": 0, "observed": 0}
     with open(output / "status.csv", encoding="utf-8") as file:

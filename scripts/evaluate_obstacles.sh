@@ -8,20 +8,19 @@ set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 
-work=/tmp/vcharge_obstacles scale=1.0 working_scale=0.3 seed=108 drives="course lot pitch garage"
+work=/tmp/vcharge_obstacles scale=1.0 seed=108 drives="course lot pitch garage"
 while [ $# -gt 0 ]; do
   case "$1" in
     --work) work=${2:?--work needs a folder}; shift 2 ;;
     --seed) seed=${2:?--seed needs a number}; shift 2 ;;
     --drives) drives=${2:?--drives needs names}; shift 2 ;;
-    --small) scale=0.4 working_scale=0.75; shift ;;
+    --small) scale=0.4; shift ;;
     -h | --help) sed -n '2,6s/^# \{0,1\}//p' "$0"; exit 0 ;;
     *) echo "evaluate_obstacles.sh: unknown argument '$1' (see --help)" >&2; exit 2 ;;
   esac
 done
 tools=$PWD/build/devel/lib
 mkdir -p "$work"
-sed "s/image_scale: 0.3/image_scale: $working_scale/" config/dense_obstacles.yaml >"$work/dense.yaml"
 
 scenario() {
   case "$1" in
@@ -41,7 +40,7 @@ for drive in $drives; do
       --image-scale "$scale" --cameras front left right --truth-range --output "$bag"
   fi
   "$tools/vcharge_obstacles/detect_obstacles" --bag "$bag" --rig "$work/${drive}_truth/rig.yaml" \
-    --options config/obstacles.yaml --range-options "$work/dense.yaml" --output "$work/$drive"
+    --options config/obstacles.yaml --range-options config/dense_obstacles.yaml --output "$work/$drive"
   echo "== $drive"
   "$tools/vcharge_evaluation/evaluate_obstacles" --obstacles "$work/$drive" --truth "$work/${drive}_truth" \
     --report "$work/report_$drive"

@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
-# Installs what is missing, builds, and runs every test: test.sh [--sanitize] [ctest arguments, e.g. -R PlaneSweep].
+# Installs what is missing, builds, and runs every test: test.sh [--sanitize | --sanitize-threads] [ctest arguments, e.g. -R PlaneSweep].
 # Tests on real images look for them in $VCHARGE_DATA and are skipped, and counted as skipped, without it.
 # --sanitize: built by clang with AddressSanitizer and UndefinedBehaviorSanitizer (build_sanitize/, which scripts/fuzz.sh uses
 # too); all unit tests, and the integration tests that run tools. Debian's nodelet manager cannot load such libraries.
+# --sanitize-threads: all unit tests with ThreadSanitizer (build_sanitize_threads/; test/thread_sanitizer/README.md).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
@@ -14,15 +15,21 @@ if [ "${1:-}" = "--sanitize" ]; then
   set -- -R '_gtest_|rostest_(tools|offline|map|mapping|mapping_faults|faults|determinism)\.test' "$@"
   # Debian's libraries are not instrumented: containers that cross them would be reported, and what they keep is no leak.
   export ASAN_OPTIONS=detect_container_overflow=0:detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1
+elif [ "${1:-}" = "--sanitize-threads" ]; then
+  shift
+  folder=build_sanitize_threads
+  set -- -R '_gtest_' "$@"
+  # What Debian's libraries do among themselves cannot be seen, and is not judged.
+  export TSAN_OPTIONS=ignore_noninstrumented_modules=1:second_deadlock_stack=1
 fi
 
 scripts/install_dependencies.sh
 scripts/check_format.sh
-if [ "$folder" = build ]; then
-  scripts/build.sh --tests
-else
-  scripts/build_sanitized.sh all tests
-fi
+case "$folder" in
+  build) scripts/build.sh --tests ;;
+  build_sanitize) scripts/build_sanitized.sh all tests ;;
+  build_sanitize_threads) scripts/build_sanitized.sh --threads tests ;;
+esac
 
 export ROS_HOSTNAME=localhost
 ROS_HOME=$(mktemp -d)

@@ -152,6 +152,16 @@ class ToolsTest(unittest.TestCase):
             expected = {"import": "--output", "compute": "--output", "simulate": "--output", "map_info": "--map"}
             self.assertIn(expected.get(name, "--truth"), output)
 
+    def test_options_are_shown_without_any_other_argument(self):
+        for package, program in (("vcharge_calibration", "calibrate_rig"), ("vcharge_calibration", "calibrate_rig_from_map"),
+                                 ("vcharge_dense", "build_height_map"), ("vcharge_dense", "compute_range_maps"),
+                                 ("vcharge_features", "train_vocabulary"), ("vcharge_localization", "localize_drive"),
+                                 ("vcharge_mapping", "build_map"), ("vcharge_obstacles", "detect_obstacles"),
+                                 ("vcharge_simulation", "simulate_drive")):
+            status, output, errors = run([tool(package, program), "--show-options"])
+            self.assertEqual((status, errors), (0, []), program)
+            self.assertGreater(len(yaml.safe_load(output)), 2, program)
+
     def test_missing_required_options_are_named(self):
         for name in ("import", "compute", "evaluate_range", "evaluate_trajectory", "evaluate_map", "map_info"):
             for option in self.tools[name][1]:

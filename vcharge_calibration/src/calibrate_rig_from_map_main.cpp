@@ -40,13 +40,12 @@ int main(int argc, char** argv) {
   RigToolArguments arguments;
   addRigToolArguments(&app, &arguments);
   std::string map_file;
-  app.add_option("--map", map_file, "map of build_map or calibrate_rig (.vmap)")->check(requireNotEmpty);
+  app.add_option("--map", map_file, "map of build_map or calibrate_rig (.vmap)")
+      ->required()
+      ->check(requireNotEmpty);
   return runTool(&app, argc, argv, [&] {
     runWithOptions<MapRigCalibratorOptions>(
         arguments, [&](const MapRigCalibratorOptions& options, const std::string& option_text) {
-          if (map_file.empty()) {
-            throw InputError("--map is required");
-          }
           calibrate(arguments, map_file, options, option_text);
         });
   });

@@ -14,20 +14,16 @@
 namespace vcharge {
 
 void addRigToolArguments(CLI::App* app, RigToolArguments* arguments) {
-  app->add_option("--bag", arguments->bag, "drive with images and /odom");
-  app->add_option("--rig", arguments->rig, "rig.yaml with intrinsics; extrinsics that it has are not used");
-  app->add_option("--output", arguments->output, "rig.yaml to write")->check(requireNotEmpty);
+  app->add_option("--bag", arguments->bag, "drive with images and /odom")->required();
+  app->add_option("--rig", arguments->rig, "rig.yaml with intrinsics; extrinsics that it has are not used")
+      ->required();
+  app->add_option("--output", arguments->output, "rig.yaml to write")->required()->check(requireNotEmpty);
   app->add_option("--trajectory", arguments->trajectory, "poses of all frames to write (.tum)")
       ->check(requireNotEmpty);
   app->add_option("--report", arguments->report, "folder for rig_report.html")->check(requireNotEmpty);
   app->add_option("--options", arguments->options, "YAML with options of the calibration");
-  app->add_flag("--show-options", arguments->show_options, "prints all options as YAML");
-}
-
-void requireRigToolArguments(const RigToolArguments& arguments) {
-  if (arguments.bag.empty() || arguments.rig.empty() || arguments.output.empty()) {
-    throw InputError("--bag, --rig and --output are required");
-  }
+  app->add_flag("--show-options", arguments->show_options,
+                "print all options with their values, and do nothing else");
 }
 
 void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const CameraRig>& rig,

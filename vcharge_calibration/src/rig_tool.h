@@ -27,9 +27,6 @@ struct RigToolArguments {
 
 void addRigToolArguments(CLI::App* app, RigToolArguments* arguments);
 
-/// InputError that names them where files are missing that the tool cannot do without.
-void requireRigToolArguments(const RigToolArguments& arguments);
-
 /// The options of the file that was given, printed where that was asked for; otherwise calls `calibrate` with
 /// them and their text.
 template <class Options, class Calibrate>
@@ -44,7 +41,6 @@ void runWithOptions(const RigToolArguments& arguments, const Calibrate& calibrat
     std::printf("%s\n", text.str().c_str());
     return;
   }
-  requireRigToolArguments(arguments);
   calibrate(options, text.str());
 }
 

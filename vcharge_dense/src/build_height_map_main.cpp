@@ -174,10 +174,12 @@ int main(int argc, char** argv) {
   app.add_option("--options", arguments.options, "YAML with overrides of HeightMapOptions");
   app.add_option("--output", arguments.output, "folder to write")->required()->check(requireNotEmpty);
   app.add_flag("--keep-range-maps", arguments.keep_range_maps, "do not remove OUTPUT.range_maps at the end");
-  app.add_flag("--show-options", arguments.show_options, "print all options with their values");
+  app.add_flag("--show-options", arguments.show_options,
+               "print all options with their values, and do nothing else");
   return runTool(&app, argc, argv, [&] {
     if (arguments.show_options) {
       std::cout << writeFields(readOptions(arguments)) << "\n";
+      return;
     }
     buildHeightMap(arguments);
   });

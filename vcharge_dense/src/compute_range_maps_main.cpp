@@ -144,10 +144,12 @@ int main(int argc, char** argv) {
       "--online", arguments.online,
       "as the nodelet does: only images before the reference, averaged (default: before and after, split)");
   app.add_flag("--no-pictures", arguments.no_pictures, "no PNG");
-  app.add_flag("--show-options", arguments.show_options, "print all options with their values");
+  app.add_flag("--show-options", arguments.show_options,
+               "print all options with their values, and do nothing else");
   return runTool(&app, argc, argv, [&] {
     if (arguments.show_options) {
       std::cout << writeFields(readOptions(arguments)) << "\n";
+      return;
     }
     computeRangeMaps(arguments);
   });

@@ -118,7 +118,8 @@ int main(int argc, char** argv) {
   app.add_option("--forget-every", arguments.forget_every,
                  "start from nothing again after so many frames, to see how soon a place is found; 0: never")
       ->check(CLI::NonNegativeNumber);
-  app.add_flag("--show-options", arguments.show_options, "print all options with their values");
+  app.add_flag("--show-options", arguments.show_options,
+               "print all options with their values, and do nothing else");
   return runTool(&app, argc, argv, [&] {
     DriveLocalizerOptions options;
     if (!arguments.options.empty()) {
@@ -126,6 +127,7 @@ int main(int argc, char** argv) {
     }
     if (arguments.show_options) {
       std::cout << writeFields(options) << "\n";
+      return;
     }
     localizeDrive(arguments, options);
   });

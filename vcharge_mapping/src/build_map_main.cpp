@@ -237,7 +237,8 @@ int main(int argc, char** argv) {
   app.add_option("--options", arguments.options, "YAML with overrides of SparseMapperOptions");
   app.add_flag("--fresh", arguments.fresh, "do not go on from OUTPUT.work, which an earlier run left");
   app.add_flag("--no-checkpoint", arguments.no_checkpoint, "leave no OUTPUT.work to go on from");
-  app.add_flag("--show-options", arguments.show_options, "print all options with their values");
+  app.add_flag("--show-options", arguments.show_options,
+               "print all options with their values, and do nothing else");
   return runTool(&app, argc, argv, [&] {
     SparseMapperOptions options;
     if (!arguments.options.empty()) {
@@ -245,6 +246,7 @@ int main(int argc, char** argv) {
     }
     if (arguments.show_options) {
       std::cout << writeFields(options) << "\n";
+      return;
     }
     buildMap(arguments, options);
   });

@@ -215,7 +215,8 @@ int main(int argc, char** argv) {
                  "folder that compute_range_maps wrote, instead of computing range maps");
   app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
   app.add_option("--output", arguments.output, "folder to write")->required()->check(requireNotEmpty);
-  app.add_flag("--show-options", arguments.show_options, "print all options with their values");
+  app.add_flag("--show-options", arguments.show_options,
+               "print all options with their values, and do nothing else");
   return runTool(&app, argc, argv, [&] {
     ObstacleMapperOptions options;
     RangeMapperOptions range_options;
@@ -233,6 +234,7 @@ int main(int argc, char** argv) {
       std::cout << "# ObstacleMapperOptions\n"
                 << writeFields(options) << "\n# RangeMapperOptions\n"
                 << writeFields(range_options) << "\n";
+      return;
     }
     detectObstacles(arguments, options, range_options);
   });

@@ -58,12 +58,12 @@ MeiCamera withoutDistortion(const KannalaBrandtCamera& camera, double field_of_v
   return fitUnifiedModel(camera, field_of_view_rad);
 }
 
-MeiCamera makeWorkingModel(const CameraModel& camera, double field_of_view_rad,
+MeiCamera makeWorkingModel(const CameraModel& camera, double field_of_view_rad, cv::Size image_size_px,
                            const WorkingCameraOptions& options) {
   options.validate();
   const MeiCamera unified =
       camera.visit([&](const auto& model) { return withoutDistortion(model, field_of_view_rad); });
-  const double scale = options.image_scale;
+  const double scale = options.scaleOf(image_size_px);
   const double focal_scale = scale * options.focal_scale;
   // Pixel centres are at whole coordinates, so corners are at halves.
   return MeiCamera(unified.xi(), unified.gamma1() * focal_scale, unified.gamma2() * focal_scale,
@@ -78,7 +78,7 @@ cv::Size scaledSize(cv::Size size, double scale) {
 /// Bilinear sampling averages over two pixels; where samples lie further apart, as many have to be averaged
 /// before it, or what is finer than they turns into a pattern that moves otherwise than the things it is on.
 int averagedPixels(cv::Size image_size, const WorkingCameraOptions& options) {
-  const double samples_per_pixel = options.image_scale * options.focal_scale;
+  const double samples_per_pixel = options.scaleOf(image_size) * options.focal_scale;
   const double block_px = std::ceil(0.5 / samples_per_pixel - 1e-9);
   return static_cast<int>(std::clamp(block_px, 1.0, 1.0 * std::min(image_size.width, image_size.height)));
 }
@@ -102,13 +102,18 @@ float blockCoordinate(float pixel, int block, int num_blocks) {
 
 void WorkingCameraOptions::validate() const {
   requireField(image_scale > 0.0 && image_scale <= 1.0, "image_scale", "must be in (0, 1]", image_scale);
+  requireField(width_px >= 0, "width_px", "must not be negative", width_px);
   requireField(focal_scale > 0.0 && focal_scale <= 4.0, "focal_scale", "must be in (0, 4]", focal_scale);
+}
+
+double WorkingCameraOptions::scaleOf(cv::Size sensor_size_px) const {
+  return width_px > 0 ? std::min(1.0, static_cast<double>(width_px) / sensor_size_px.width) : image_scale;
 }
 
 WorkingCamera::WorkingCamera(const CameraModel& camera, cv::Size image_size_px, double field_of_view_rad,
                              const cv::Mat& mask, const WorkingCameraOptions& options)
-    : model_(makeWorkingModel(camera, field_of_view_rad, options)),
-      size_(scaledSize(image_size_px, options.image_scale)),
+    : model_(makeWorkingModel(camera, field_of_view_rad, image_size_px, options)),
+      size_(scaledSize(image_size_px, options.scaleOf(image_size_px))),
       sensor_size_(image_size_px),
       block_px_(averagedPixels(image_size_px, options)),
       valid_mask_(cv::Mat::zeros(size_, CV_8UC1)),

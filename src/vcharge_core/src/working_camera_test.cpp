@@ -157,8 +157,28 @@ TEST(WorkingCameraTest, SmallerFocalLengthKeepsMoreOfTheField) {
   EXPECT_GT(widest(WorkingCamera(golfCamera(), kSize, kFieldOfView, cv::Mat(), wide)), 1.5);
 }
 
+TEST(WorkingCameraTest, WidthInPixelsHoldsForSensorsOfAllSizesButNeverEnlarges) {
+  WorkingCameraOptions by_width, by_scale;
+  by_width.width_px = 384;
+  for (const int width : {1280, 640, 512, 384, 320}) {
+    const cv::Size size(width, width * 5 / 8);
+    by_scale.image_scale = std::min(1.0, 384.0 / width);
+    const MeiCamera::Parameters p = golfCamera().parameters();
+    const double ratio = width / 1280.0;
+    const MeiCamera camera(p[0], p[1] * ratio, p[2] * ratio, p[3] * ratio, p[4] * ratio);
+    const WorkingCamera working(camera, size, kFieldOfView, cv::Mat(), by_width);
+    EXPECT_EQ(working.size(), cv::Size(std::min(384, width), std::min(240, width * 5 / 8)));
+    const WorkingCamera same(camera, size, kFieldOfView, cv::Mat(), by_scale);
+    EXPECT_EQ(working.model().parameters(), same.model().parameters()) << width;
+    EXPECT_EQ(cv::norm(working.sensorPixels(), same.sensorPixels(), cv::NORM_INF), 0.0) << width;
+  }
+}
+
 TEST(WorkingCameraTest, RejectsBadOptionsAndMasks) {
   WorkingCameraOptions options;
+  options.width_px = -1;
+  EXPECT_THROW(WorkingCamera(golfCamera(), kSize, kFieldOfView, cv::Mat(), options), std::invalid_argument);
+  options = WorkingCameraOptions();
   options.image_scale = 0.0;
   EXPECT_THROW(WorkingCamera(golfCamera(), kSize, kFieldOfView, cv::Mat(), options), std::invalid_argument);
   EXPECT_THROW(WorkingCamera(golfCamera(), kSize, kFieldOfView, cv::Mat::zeros(10, 10, CV_8UC1)),

@@ -45,6 +45,7 @@ void trainVocabulary(const Arguments& arguments) {
   }
   if (arguments.show_options) {
     std::cout << writeFields(options) << "\n";
+    return;
   }
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   const auto extractor = makeFeatureExtractor(options.extractor);
@@ -76,6 +77,7 @@ int main(int argc, char** argv) {
   app.add_option("--rig", arguments.rig, "rig.yaml")->required();
   app.add_option("--options", arguments.options, "YAML with overrides of the options");
   app.add_option("--output", arguments.output, "file to write")->required()->check(requireNotEmpty);
-  app.add_flag("--show-options", arguments.show_options, "print all options with their values");
+  app.add_flag("--show-options", arguments.show_options,
+               "print all options with their values, and do nothing else");
   return runTool(&app, argc, argv, [&] { trainVocabulary(arguments); });
 }

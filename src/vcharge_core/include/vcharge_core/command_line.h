@@ -1,10 +1,12 @@
 #pragma once
 
+#include <algorithm>
 #include <exception>
 #include <filesystem>
 #include <functional>
 #include <iostream>
 #include <string>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
 
@@ -16,9 +18,15 @@ inline std::string requireNotEmpty(const std::string& value) {
 }
 
 /// A tool's main(): parses its arguments, then calls `run`. Returns the exit status, which is 0 only for
-/// success. An error, of the arguments or thrown by `run`, is one line "<tool>: <what>" on standard error.
+/// success. Asked for --show-options, a tool that has it requires nothing else. An error, of the arguments or
+/// thrown by `run`, is one line "<tool>: <what>" on standard error.
 inline int runTool(CLI::App* app, int argc, char** argv, const std::function<void()>& run) {
   const std::string tool = std::filesystem::path(argv[0]).filename().string();
+  if (std::find(argv, argv + argc, std::string_view("--show-options")) != argv + argc) {
+    for (CLI::Option* option : app->get_options()) {
+      option->required(false);
+    }
+  }
   try {
     app->parse(argc, argv);
     run();

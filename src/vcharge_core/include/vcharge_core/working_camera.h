@@ -10,14 +10,18 @@ namespace vcharge {
 /// How an image is brought from the sensor's camera to the working camera.
 struct WorkingCameraOptions {
   double image_scale = 0.5;  ///< size of the working image over the size of the sensor's
+  int width_px = 0;          ///< its width, whatever the sensor's, but no larger; 0: image_scale counts
   double focal_scale = 1.0;  ///< below 1 keeps more of the rim that undistortion pushes outwards
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
     visit("image_scale", image_scale);
+    visit("width_px", width_px);
     visit("focal_scale", focal_scale);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
+  /// Size of the working image over the sensor's, in (0, 1].
+  double scaleOf(cv::Size sensor_size_px) const;
 };
 
 /// A camera whose images carry no distortion but keep the wide field of view: the unified model with xi kept
