@@ -121,7 +121,7 @@ TEST_F(ObstacleDetectorTest, RampOfRangesUpToAWallCountsForLess) {
 TEST_F(ObstacleDetectorTest, LowThingsBeforeAWallAreNoRamps) {
   const WorldBox wall{{-20.0, 3.4, 0.0}, {20.0, 3.6, 1.2}};
   const WorldBox pavement{{1.0, 2.4, 0.0}, {2.8, 3.4, 0.12}};  // no gap, but flat
-  const WorldBox box{{-20.0, 2.4, 0.0}, {20.0, 2.5, 0.25}};  // as high as a ramp, but hides what is behind
+  const WorldBox box{{-20.0, 2.4, 0.0}, {20.0, 2.5, 0.25}};    // as high as a ramp, but hides what is behind
   for (const WorldBox& low : {pavement, box}) {
     const CameraObstacles seen = detect({{wall, low}}, "left", {}, {0.005, 0.0, 3});
     const std::vector<PolarObstacle> found = onRay(seen, rayTo(seen, 0.5 * M_PI));

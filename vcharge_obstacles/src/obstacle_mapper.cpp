@@ -333,8 +333,8 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const std::vector<const C
   on_frame_(frame);
 }
 
-/// Silence is told by when range maps come, not by their stamps: those that are late are no silence. Who waits
-/// for every range map cannot tell the two apart, and hears of the range maps' stamps alone.
+/// Silence is told by when range maps come, not by their stamps: those that are late are no silence. Who
+/// waits for every range map cannot tell the two apart, and hears of the range maps' stamps alone.
 void ObstacleMapper::emitWhenSilent() {
   if (!last_odometry_ || !last_emitted_ || !waiting_.empty() || std::isinf(options_.max_wait_s)) {
     return;
