@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "pixel_rays.h"
@@ -12,7 +11,6 @@
 namespace vcharge {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 // Ground points are looked for in every so many-th column and row of the pixels in use: they are plenty.
 constexpr size_t kGroundStride = 7;
 
