@@ -332,7 +332,8 @@ void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid&
     const double width_m = obstacle.range_m * grid.increment_rad();
     const int across = std::max(1, static_cast<int>(std::ceil(width_m / cell_m)));
     // Several rays meet one cell nearby: together they are one look.
-    const double ray_mass = weight * std::min(1.0, width_m / cell_m * 1.5) * std::max(0.3, obstacle.support);
+    const double ray_mass =
+        weight * obstacle.weight * std::min(1.0, width_m / cell_m * 1.5) * std::max(0.3, obstacle.support);
     const double middle_rad = grid.angle_rad(obstacle.ray) + yaw_rad;
     const double sigma_m =
         std::hypot(obstacle.range_sigma_m,

@@ -191,6 +191,30 @@ TEST_F(LocalObstacleMapTest, GroundUnderABodyThatAnotherCameraSeesIsNotFree) {
   }
 }
 
+TEST_F(LocalObstacleMapTest, LooksOfLittleWeightNeedMoreOfThem) {
+  const auto looksUntilOccupied = [&](double look_weight) {
+    LocalObstacleMap map;
+    for (int looks = 1; looks < 200; ++looks) {
+      const RigidTransform pose = RigidTransform::planar(-0.9 + 0.1 * (looks % 18), 0.0, 0.0);
+      map.moveTo(stamp_, pose);
+      CameraObstacles seen = makeLookAtFlank(pose.translation().x(), 0.03, 0.0, grid_);
+      for (PolarObstacle& obstacle : seen.obstacles) {
+        obstacle.weight = look_weight;
+      }
+      map.add(seen, grid_, pose);
+      if (count(map.snapshot(), kCellOccupied) > 0) {
+        return looks;
+      }
+    }
+    return 200;
+  };
+  const int full = looksUntilOccupied(1.0);
+  const int ramp = looksUntilOccupied(0.25);
+  EXPECT_LT(full, 6);
+  EXPECT_GE(ramp, 3 * full);
+  EXPECT_LT(ramp, 30);
+}
+
 TEST_F(LocalObstacleMapTest, StandingKeepsStatesAndTheirAgeGrows) {
   drive(kPerson, 0.0, 0.8);
   const ObstacleMap before = map_.snapshot();

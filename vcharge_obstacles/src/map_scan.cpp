@@ -7,6 +7,10 @@
 namespace vcharge {
 namespace {
 
+// Cells behind the first one of something so low are its top, which lies behind its edge; those of something
+// higher are where ranges of one upright surface scatter.
+constexpr float kLow_m = 0.2F;
+
 struct Hit {
   double range_m;
   double weight;
@@ -58,8 +62,9 @@ void setRay(const std::vector<Hit>& hits, double depth_m, double cell_m, size_t 
   double weight = 0.0;
   double range_m = 0.0;
   double square_m2 = 0.0;
+  const double furthest_m = nearest->range_m + (nearest->height_m < kLow_m ? 0.0 : depth_m);
   for (const Hit& hit : hits) {
-    if (hit.range_m <= nearest->range_m + depth_m) {
+    if (hit.range_m <= furthest_m) {
       weight += hit.weight;
       range_m += hit.weight * hit.range_m;
       square_m2 += hit.weight * hit.range_m * hit.range_m;

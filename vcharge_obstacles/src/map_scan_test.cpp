@@ -68,6 +68,18 @@ TEST(MapScanTest, SigmaCountsTheCellAndHowFarItsCellsLieApart) {
               2e-3);
 }
 
+TEST(MapScanTest, TopOfAKerbDoesNotPullItsEdgeBack) {
+  for (const float height_m : {0.12F, 0.5F}) {
+    ObstacleMap map = makeMap();
+    occupy(&map, 20, 30, height_m);
+    occupy(&map, 20, 31, height_m);
+    const ObstacleScan scan = makeScan(map, 360, 0.2);
+    const size_t ray = rayTo(scan, 0.5 * M_PI - kAside_rad);
+    // Two cells of an upright surface are its scatter, two of a kerb are its edge and its top.
+    EXPECT_NEAR(scan.range_m[ray], height_m < 0.2F ? 1.05 : 1.10, 0.01);
+  }
+}
+
 TEST(MapScanTest, UnobservedGroundEndsWhatIsFree) {
   ObstacleMap map = makeMap();
   map.state.colRange(30, 40).setTo(kCellUnobserved);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 
 #include "pixel_rays.h"
@@ -12,7 +11,6 @@
 namespace vcharge {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 // Ground points are looked for in every so many-th column and row of the pixels in use: they are plenty.
 constexpr size_t kGroundStride = 7;
 
@@ -101,6 +99,9 @@ void ObstacleDetectorOptions::validate() const {
   requireField(max_off_axis_rad > 0.0, "max_off_axis_rad", "must be positive", max_off_axis_rad);
   requireField(max_off_axis_range_m >= 0.0, "max_off_axis_range_m", "must not be negative",
                max_off_axis_range_m);
+  requireField(max_ramp_height_m >= 0.0, "max_ramp_height_m", "must not be negative", max_ramp_height_m);
+  requireField(max_ramp_length_m >= 0.0, "max_ramp_length_m", "must not be negative", max_ramp_length_m);
+  requireField(ramp_weight >= 0.0 && ramp_weight <= 1.0, "ramp_weight", "must be in [0, 1]", ramp_weight);
   requireField(sure_ground_sigmas >= 0.0, "sure_ground_sigmas", "must not be negative", sure_ground_sigmas);
   requireField(below_ground_m > 0.0, "below_ground_m", "must be positive", below_ground_m);
   requireField(lost_ground_tilt_rad > ground.max_tilt_rad, "lost_ground_tilt_rad",

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include <gtest/gtest.h>
@@ -90,6 +91,45 @@ TEST_F(ObstacleDetectorTest, KerbIsReportedWithItsHeight) {
   const size_t ray = rayTo(seen, 0.5 * M_PI);
   EXPECT_NEAR(seen.scan.range_m[ray], 1.52, 0.1);
   EXPECT_NEAR(seen.scan.height_m[ray], 0.12, 0.03);
+}
+
+/// What the left camera sees straight aside, nearest first.
+std::vector<PolarObstacle> onRay(const CameraObstacles& seen, size_t ray) {
+  std::vector<PolarObstacle> found;
+  std::copy_if(seen.obstacles.begin(), seen.obstacles.end(), std::back_inserter(found),
+               [&](const PolarObstacle& obstacle) { return static_cast<size_t>(obstacle.ray) == ray; });
+  return found;
+}
+
+TEST_F(ObstacleDetectorTest, RampOfRangesUpToAWallCountsForLess) {
+  // From 9 to 25 cm within 0.8 m, in steps of 1 cm: a slope of 0.2.
+  BoxWorld world{{{{-20.0, 3.2, 0.0}, {20.0, 3.4, 1.2}}}};
+  for (int step = 0; step <= 16; ++step) {
+    world.boxes.push_back({{-20.0, 2.4 + 0.05 * step, 0.0}, {20.0, 3.2, 0.09 + 0.01 * step}});
+  }
+  const CameraObstacles seen = detect(world, "left", {}, {0.005, 0.0, 3});
+  const std::vector<PolarObstacle> found = onRay(seen, rayTo(seen, 0.5 * M_PI));
+  ASSERT_GE(found.size(), 2U);
+  EXPECT_LT(found.front().height_m, 0.3);
+  EXPECT_TRUE(found.front().is_ramp);
+  EXPECT_EQ(found.front().weight, options_.ramp_weight);
+  EXPECT_GT(found.back().height_m, 0.8);
+  EXPECT_FALSE(found.back().is_ramp);
+  EXPECT_EQ(found.back().weight, 1.0);
+}
+
+TEST_F(ObstacleDetectorTest, LowThingsBeforeAWallAreNoRamps) {
+  const WorldBox wall{{-20.0, 3.4, 0.0}, {20.0, 3.6, 1.2}};
+  const WorldBox pavement{{1.0, 2.4, 0.0}, {2.8, 3.4, 0.12}};  // no gap, but flat
+  const WorldBox box{{-20.0, 2.4, 0.0}, {20.0, 2.5, 0.25}};    // as high as a ramp, but hides what is behind
+  for (const WorldBox& low : {pavement, box}) {
+    const CameraObstacles seen = detect({{wall, low}}, "left", {}, {0.005, 0.0, 3});
+    const std::vector<PolarObstacle> found = onRay(seen, rayTo(seen, 0.5 * M_PI));
+    ASSERT_FALSE(found.empty());
+    EXPECT_NEAR(found.front().range_m, 1.42, 0.15);
+    EXPECT_LT(found.front().height_m, 0.3);
+    EXPECT_FALSE(found.front().is_ramp) << low.max_m.z();
+  }
 }
 
 TEST_F(ObstacleDetectorTest, WhatLiesLowerThanTheMinimumIsGround) {

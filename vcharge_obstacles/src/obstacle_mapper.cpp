@@ -100,6 +100,7 @@ void ObstacleMapper::startOver() {
   waiting_.clear();
   last_fused_.reset();
   last_emitted_.reset();
+  last_heard_.reset();
   last_jump_.reset();
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (camera) {
@@ -136,6 +137,7 @@ void ObstacleMapper::watchForJumps(const VehicleOdometry& odometry) {
 }
 
 void ObstacleMapper::addOdometry(const VehicleOdometry& odometry) {
+  emitWhenSilent();  // until now: range maps of the odometry before have had their turn
   const OdometryBuffer::AddResult result = poses_.add(odometry);
   if (result == OdometryBuffer::AddResult::kDuplicate || result == OdometryBuffer::AddResult::kOutOfOrder) {
     return;
@@ -152,7 +154,6 @@ void ObstacleMapper::addOdometry(const VehicleOdometry& odometry) {
   }
   watchForJumps(odometry);
   fuseWaiting(false);
-  emitWhenSilent(odometry);
 }
 
 /// Nothing in the map is where it was: all learn it at once.
@@ -215,7 +216,11 @@ void ObstacleMapper::addRangeMap(const RangeMap& map) {
     ++camera->status.late;
     return;
   }
-  waiting_[map.stamp].cameras[camera->index] = {std::move(seen), map.reference.clone()};
+  if (last_odometry_) {
+    last_heard_ = last_odometry_->stamp;
+  }
+  Group& group = waiting_.try_emplace(map.stamp, Group{{}, last_heard_}).first->second;
+  group.cameras[camera->index] = {std::move(seen), map.reference.clone()};
   fuseWaiting(false);
 }
 
@@ -241,14 +246,16 @@ void ObstacleMapper::updateStatus(Camera* camera, const CameraObstacles& seen) c
   }
 }
 
-/// Whether every camera that delivers has come to this stamp.
-bool ObstacleMapper::isComplete(Timestamp stamp) const {
+/// Whether every camera that delivers has come to this stamp. A camera is waited for from when the first one
+/// came, however late range maps are by then.
+bool ObstacleMapper::isComplete(Timestamp stamp, const Group& group) const {
+  const Timestamp heard = group.first_heard.value_or(stamp);
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (!camera || (camera->newest && *camera->newest >= stamp)) {
       continue;
     }
     const bool delivers = !camera->newest || toSeconds(stamp - *camera->newest) < options_.silent_s;
-    const bool may_come = !last_odometry_ || toSeconds(last_odometry_->stamp - stamp) < options_.max_wait_s;
+    const bool may_come = !last_odometry_ || toSeconds(last_odometry_->stamp - heard) < options_.max_wait_s;
     if (delivers && may_come) {
       return false;
     }
@@ -260,7 +267,7 @@ void ObstacleMapper::fuseWaiting(bool all) {
   while (!waiting_.empty()) {
     const Timestamp stamp = waiting_.begin()->first;
     const bool must_go = all || waiting_.size() > kMaxWaiting;  // a camera, or odometry, does not come
-    if (!must_go && !isComplete(stamp)) {
+    if (!must_go && !isComplete(stamp, waiting_.begin()->second)) {
       return;
     }
     const std::optional<RigidTransform> fixed_from_vehicle = fixedFromVehicle(stamp);
@@ -308,7 +315,9 @@ void ObstacleMapper::fuse(Timestamp stamp, Group* group, const RigidTransform& f
     map_.add(seen, grid_, fixed_from_vehicle);
     cameras.push_back(&seen);
   }
-  emit(map_, cameras);
+  if (!last_emitted_ || stamp > *last_emitted_) {  // else the next map shows what it adds
+    emit(map_, cameras);
+  }
 }
 
 void ObstacleMapper::emit(const LocalObstacleMap& map, const std::vector<const CameraObstacles*>& cameras) {
@@ -324,11 +333,16 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const std::vector<const C
   on_frame_(frame);
 }
 
-void ObstacleMapper::emitWhenSilent(const VehicleOdometry& odometry) {
-  if (!last_emitted_ || !waiting_.empty() || toSeconds(odometry.stamp - *last_emitted_) < options_.silent_s) {
+/// Silence is told by when range maps come, not by their stamps: those that are late are no silence. Who
+/// waits for every range map cannot tell the two apart, and hears of the range maps' stamps alone.
+void ObstacleMapper::emitWhenSilent() {
+  if (!last_odometry_ || !last_emitted_ || !waiting_.empty() || std::isinf(options_.max_wait_s)) {
     return;
   }
-  emitAt(odometry.stamp);
+  const Timestamp last = last_heard_ ? std::max(*last_heard_, *last_emitted_) : *last_emitted_;
+  if (toSeconds(last_odometry_->stamp - last) >= options_.silent_s) {
+    emitAt(last_odometry_->stamp);
+  }
 }
 
 /// What the map would be at a stamp of which there are no range maps (yet). The map itself stays as it is: it

@@ -269,15 +269,66 @@ TEST_F(ObstacleMapperTest, MapsDoNotDependOnHowLateRangeMapsCome) {
     for (const ObstacleFrame& frame : frames_) {
       ContentHasher hasher;
       addToHash(frame.map, &hasher);
-      if (!frame.cameras.empty()) {
-        hashes[frame.map.stamp] = hasher.hex();
-      }
+      EXPECT_FALSE(frame.cameras.empty());
+      hashes[frame.map.stamp] = hasher.hex();
     }
     return hashes;
   };
   const auto expected = run(0);
   EXPECT_EQ(expected.size(), 15U);
-  EXPECT_EQ(run(41), expected);  // 0.8 s: maps come between, where nothing is heard
+  EXPECT_EQ(run(41), expected);  // 0.8 s
+}
+
+TEST_F(ObstacleMapperTest, RangeMapsThatLagAreNoSilence) {
+  start();
+  constexpr int kDelayTicks = 41;  // 0.8 s: longer than silent_s and max_wait_s
+  for (int tick = 0; tick < 100; ++tick) {
+    VehicleOdometry odometry;
+    odometry.stamp = stampAt(tick);
+    odometry.odom_from_vehicle = poseAt(tick);
+    mapper_->addOdometry(odometry);
+    const int seen = tick - kDelayTicks;
+    for (size_t i = 0; i < 3 && seen >= 0 && seen % 4 == 0; ++i) {
+      mapper_->addRangeMap(measureBoxWorld(kWorld, rig_->cameras[i], poseAt(seen), stampAt(seen)));
+    }
+  }
+  ASSERT_EQ(frames_.size(), 15U);
+  for (size_t i = 0; i < frames_.size(); ++i) {
+    EXPECT_EQ(frames_[i].map.stamp, stampAt(4 * static_cast<int>(i)));
+    EXPECT_EQ(frames_[i].cameras.size(), 3U);
+  }
+}
+
+TEST_F(ObstacleMapperTest, StampsOfMapsGrowAndLateRangeMapsShowInTheNext) {
+  start();
+  drive(0, 40);
+  const auto moveOn = [&](int from_tick, int to_tick) {
+    for (int tick = from_tick; tick < to_tick; ++tick) {
+      VehicleOdometry odometry;
+      odometry.stamp = stampAt(tick);
+      odometry.odom_from_vehicle = poseAt(tick);
+      mapper_->addOdometry(odometry);
+    }
+  };
+  moveOn(40, 100);
+  ASSERT_TRUE(frames_.back().cameras.empty());  // of silence
+  const ObstacleFrame silent = frames_.back();
+  const size_t num_frames = frames_.size();
+  for (int tick = 40; stampAt(tick) <= silent.map.stamp; tick += 4) {
+    for (const RigCamera& camera : rig_->cameras) {
+      mapper_->addRangeMap(measureBoxWorld(kWorld, camera, poseAt(tick), stampAt(tick)));
+    }
+  }
+  EXPECT_EQ(frames_.size(), num_frames);
+  moveOn(100, 105);
+  for (const RigCamera& camera : rig_->cameras) {
+    mapper_->addRangeMap(measureBoxWorld(kWorld, camera, poseAt(104), stampAt(104)));
+  }
+  ASSERT_EQ(frames_.size(), num_frames + 1);
+  EXPECT_GT(newlyFree(silent, frames_.back(), -100.0), 1000);  // no cell becomes free by one look
+  for (size_t i = 1; i < frames_.size(); ++i) {
+    EXPECT_GT(frames_[i].map.stamp, frames_[i - 1].map.stamp);
+  }
 }
 
 TEST_F(ObstacleMapperTest, RangeMapsMayChangeTheirSize) {

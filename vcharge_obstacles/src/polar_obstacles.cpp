@@ -14,6 +14,15 @@ namespace {
 constexpr double kTopShare = 0.9;
 // A ray's ground counts as bare where this share of its pixels lies on it.
 constexpr float kBareShare = 0.4F;
+// A ramp of ranges has no larger gap than this, rises at least so steeply, where a kerb's top is flat, and
+// ends at points that are so much higher than its own at most.
+constexpr double kRampGap_m = 0.4;
+constexpr double kRampSlope = 0.05;
+constexpr double kRampRise_m = 0.05;
+// It is so long at least, else it is the foot of the high thing, which reaches so far before that.
+constexpr double kRampLength_m = 0.3;
+constexpr double kRampFoot_m = 0.1;
+constexpr size_t kFewPoints = 4;
 
 double medianOf(const std::vector<PolarPoint>& points, float PolarPoint::*member) {
   std::vector<double> values;
@@ -98,6 +107,67 @@ float bareShareAround(const PolarGrid& grid, const std::vector<float>& free_shar
   return expected < kFewPixels ? -1.0F : bare / expected;
 }
 
+/// Slope of heights over ranges; zero where the ranges do not tell.
+double slopeOf(const std::vector<PolarPoint>& points) {
+  double range_m = 0.0;
+  double height_m = 0.0;
+  for (const PolarPoint& point : points) {
+    range_m += point.range_m / static_cast<double>(points.size());
+    height_m += point.height_m / static_cast<double>(points.size());
+  }
+  double covariance = 0.0;
+  double variance = 1e-6;
+  for (const PolarPoint& point : points) {
+    covariance += (point.range_m - range_m) * (point.height_m - height_m);
+    variance += (point.range_m - range_m) * (point.range_m - range_m);
+  }
+  return covariance / variance;
+}
+
+/// Whether the points of a sector rise from a low obstacle to something higher behind it, without a gap.
+bool isRamp(const PolarPoints& points, const PolarObstacle& low, const ObstacleDetectorOptions& options) {
+  if (low.height_m > options.max_ramp_height_m) {
+    return false;
+  }
+  const PolarGrid& grid = points.grid();
+  const auto furthest_m = static_cast<float>(low.range_m + options.max_ramp_length_m);
+  std::vector<PolarPoint> run = points.pointsOf(low.ray, grid.binOfInverse(1.0F / furthest_m),
+                                                grid.binOfInverse(1.0F / static_cast<float>(low.range_m)));
+  std::vector<double> high_m;
+  for (const PolarPoint& point : run) {
+    if (point.height_m > options.max_ramp_height_m + kRampRise_m) {
+      high_m.push_back(point.range_m);
+    }
+  }
+  if (high_m.size() < kFewPoints) {
+    return false;
+  }
+  const double end_m = quantile(std::move(high_m), 0.1);
+  if (end_m < low.range_m + kRampLength_m) {
+    return false;
+  }
+  // The low part of the high thing does not belong to it.
+  run.erase(std::remove_if(run.begin(), run.end(),
+                           [&](const PolarPoint& point) {
+                             return point.range_m < low.range_m || point.range_m > end_m - kRampFoot_m ||
+                                    point.height_m > options.max_ramp_height_m + kRampRise_m;
+                           }),
+            run.end());
+  std::sort(run.begin(), run.end(),
+            [](const PolarPoint& a, const PolarPoint& b) { return a.range_m < b.range_m; });
+  if (run.size() < kFewPoints || slopeOf(run) < kRampSlope) {
+    return false;
+  }
+  double last_m = low.range_m;
+  for (const PolarPoint& point : run) {
+    if (point.range_m - last_m > kRampGap_m) {
+      return false;
+    }
+    last_m = point.range_m;
+  }
+  return end_m - last_m <= kRampGap_m;
+}
+
 }  // namespace
 
 void PolarPoints::sortByRay() {
@@ -150,6 +220,8 @@ std::vector<PolarObstacle> findPolarObstacles(const PolarPoints& points,
           supportOf(points, ray, bin, expected_pixels[grid.index(ray, bin)], options);
       if (support && (count == 0 || *support >= options.min_support_behind)) {
         found.push_back(refine(ray, points.pointsOf(ray, bin - 1, bin + 1), *support));
+        found.back().is_ramp = isRamp(points, found.back(), options);
+        found.back().weight = found.back().is_ramp ? options.ramp_weight : 1.0;
         last_range_m = found.back().range_m;
         ++count;
       }

@@ -177,6 +177,28 @@ void printObstacles(const ObstacleMapErrors& errors) {
   }
 }
 
+/// By how near the vehicle's middle came: what is only seen from afar has few pixels on its face.
+void printKerbs(const ObstacleMapErrors& errors) {
+  std::printf("kerbs: %llu of %llu places reported, height error mean %.1f cm, 95 %% %.1f cm\n",
+              static_cast<unsigned long long>(errors.num_kerb_reported),
+              static_cast<unsigned long long>(errors.num_kerb_points),
+              100.0 * errors.kerb_height_error_m.mean, 100.0 * errors.kerb_height_error_m.percentile_95);
+  const double bands_m[] = {0.0, 2.5, 3.5, 100.0};
+  for (int band = 0; band < 3; ++band) {
+    int places = 0;
+    int reported = 0;
+    int ever = 0;
+    for (const KerbOutcome& kerb : errors.kerbs) {
+      const bool here = kerb.nearest_m >= bands_m[band] && kerb.nearest_m < bands_m[band + 1];
+      places += here ? 1 : 0;
+      reported += here && kerb.reported ? 1 : 0;
+      ever += here && kerb.ever_reported ? 1 : 0;
+    }
+    std::printf("  nearest at %.1f to %.1f m: %d of %d, at any time %d\n", bands_m[band], bands_m[band + 1],
+                reported, places, ever);
+  }
+}
+
 nlohmann::json mapToJson(const ObstacleMapErrors& errors) {
   printObstacles(errors);
   nlohmann::json obstacles = nlohmann::json::array();
@@ -199,15 +221,19 @@ nlohmann::json mapToJson(const ObstacleMapErrors& errors) {
   std::printf("inside true obstacles: %llu of %llu observed cells were ever free\n",
               static_cast<unsigned long long>(errors.num_free_inside),
               static_cast<unsigned long long>(errors.num_observed_inside));
-  std::printf("kerbs: %llu of %llu places reported, height error mean %.1f cm, 95 %% %.1f cm\n",
-              static_cast<unsigned long long>(errors.num_kerb_reported),
-              static_cast<unsigned long long>(errors.num_kerb_points),
-              100.0 * errors.kerb_height_error_m.mean, 100.0 * errors.kerb_height_error_m.percentile_95);
+  printKerbs(errors);
   std::printf("moving things: reported in %llu of %llu maps; %llu of %llu cells under them free\n",
               static_cast<unsigned long long>(errors.num_mover_reported),
               static_cast<unsigned long long>(errors.num_mover_frames),
               static_cast<unsigned long long>(errors.num_mover_free),
               static_cast<unsigned long long>(errors.num_mover_cells));
+  nlohmann::json kerbs = nlohmann::json::array();
+  for (const KerbOutcome& kerb : errors.kerbs) {
+    kerbs.push_back({{"place_m", {kerb.place_m.x(), kerb.place_m.y()}},
+                     {"nearest_m", kerb.nearest_m},
+                     {"reported", kerb.reported},
+                     {"ever_reported", kerb.ever_reported}});
+  }
   nlohmann::json false_cells = nlohmann::json::array();
   for (const FalseCell& cell : errors.false_cells) {
     false_cells.push_back({{"x_m", cell.world_m.x()},
@@ -231,6 +257,7 @@ nlohmann::json mapToJson(const ObstacleMapErrors& errors) {
           {"kerb_places", errors.num_kerb_points},
           {"kerb_reported", errors.num_kerb_reported},
           {"kerb_height_error_m", errors.kerb_height_error_m},
+          {"kerbs", kerbs},
           {"mover_maps", errors.num_mover_frames},
           {"mover_reported", errors.num_mover_reported},
           {"mover_cells", errors.num_mover_cells},

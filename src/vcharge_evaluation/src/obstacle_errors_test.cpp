@@ -138,6 +138,50 @@ TEST_F(ObstacleMapErrorsTest, FalseCellsAndFreeCellsInsideObstaclesAreCounted) {
   EXPECT_EQ(errors.num_observed_inside, 1U);
 }
 
+TEST_F(ObstacleMapErrorsTest, PlacesOfKerbsAreJudgedOnceAndToldByHowNearTheyWere) {
+  TruthObstacle kerb;
+  kerb.kind = "kerb";
+  kerb.footprint_m = {{1.0, -2.5}, {2.0, -2.5}, {2.0, -2.0}, {1.0, -2.0}};
+  kerb.top_z_m = 0.12;
+  for (int row = 75; row < 80; ++row) {
+    heights_.height_m.row(row).colRange(110, 120).setTo(0.12F);
+  }
+  for (double x = 1.0; x < 2.0; x += 0.01) {  // the side towards the path
+    for (const double z : {0.05, 0.08, 0.11}) {
+      points_.push_back({Eigen::Vector3d(x, -2.0, z).cast<float>(), 1.0F});
+    }
+  }
+  ObstacleMapEvaluator evaluator({kerb}, heights_, path_);
+  for (size_t i = 0; i < path_.size(); ++i) {
+    // One place when it has to be reported, another one too late.
+    std::vector<Eigen::Vector2d> occupied = {{1.25, -2.05}};
+    if (i > 15) {
+      occupied.push_back({1.75, -2.05});
+    }
+    ObstacleMap map = mapWith(occupied, {});
+    map.height_m.setTo(0.10F);
+    map.fixed_from_vehicle = path_[i];
+    evaluator.add(map, points_, path_[i], {}, {});
+  }
+  const ObstacleMapErrors errors = evaluator.errors();
+  ASSERT_FALSE(errors.kerbs.empty());
+  EXPECT_EQ(errors.kerbs.size(), errors.num_kerb_points);
+  uint64_t reported = 0;
+  uint64_t ever = 0;
+  for (const KerbOutcome& place : errors.kerbs) {
+    // The middle of the vehicle, 1.4 m before the rear axle, passes all of it.
+    EXPECT_NEAR(place.nearest_m, -place.place_m.y(), 0.05);
+    EXPECT_TRUE(place.ever_reported || !place.reported);
+    reported += place.reported ? 1 : 0;
+    ever += place.ever_reported ? 1 : 0;
+  }
+  EXPECT_EQ(reported, errors.num_kerb_reported);
+  EXPECT_GT(reported, 0U);
+  EXPECT_GT(ever, reported);
+  EXPECT_LT(ever, errors.num_kerb_points);
+  EXPECT_NEAR(errors.kerb_height_error_m.mean, 0.02, 1e-3);
+}
+
 TEST_F(ObstacleMapErrorsTest, GroundIsOpenWhereItWasSeenAndNothingIsNear) {
   // 0.25 m before the box a range may err so much; 0.35 m before it no more; behind it nobody sees.
   const ObstacleMapErrors errors = judge({{1.25, 2.25}, {1.25, 2.15}, {1.25, 3.35}}, {});

@@ -156,7 +156,10 @@ void ObstacleMapEvaluator::addKerbPoints(const TruthObstacle& kerb, const cv::Ma
       const double height_m = heights_.at(highest_m, point);
       if (height_m >= options_.kerb_min_m && height_m <= options_.kerb_max_m &&
           distanceFromPath({point}, path, options_.vehicle_half_width_m) <= options_.corridor_m) {
-        kerb_points_.push_back({point, height_m, std::nullopt, false, false, 0.0});
+        KerbOutcome outcome;
+        outcome.place_m = point;
+        outcome.nearest_m = std::numeric_limits<double>::infinity();
+        kerb_points_.push_back({height_m, std::nullopt, false, outcome});
       }
     }
   }
@@ -233,27 +236,42 @@ void ObstacleMapEvaluator::judgeObstacles(const Frame& frame) {
   }
 }
 
+/// Of the occupied cell that reports the place.
+std::optional<double> ObstacleMapEvaluator::kerbHeightError(const Frame& frame, const KerbPoint& point) {
+  std::optional<double> error_m;
+  double nearest_m = kKerbTolerance_m;
+  for (const OccupiedCell& cell : frame.occupied) {
+    const double distance_m = (cell.world_m - point.outcome.place_m).norm();
+    if (distance_m <= nearest_m) {
+      nearest_m = distance_m;
+      error_m = std::abs(cell.height_m - point.height_m);
+    }
+  }
+  return error_m;
+}
+
 void ObstacleMapEvaluator::judgeKerbs(const Frame& frame) {
   for (KerbPoint& point : kerb_points_) {
-    if (point.judged) {
-      continue;
-    }
-    if (!point.first_view_m && frame.seen_low.countAround(point.point_m) >= options_.min_seen_points) {
+    KerbOutcome& outcome = point.outcome;
+    const double distance_m = (outcome.place_m - frame.vehicle_middle_m).norm();
+    if (!point.first_view_m && frame.seen_low.countAround(outcome.place_m) >= options_.min_seen_points) {
       point.first_view_m = driven_m_;
     }
-    if (!point.first_view_m || driven_m_ < *point.first_view_m + options_.grace_m) {
+    if (!point.first_view_m) {
       continue;
     }
-    point.judged = true;
-    double nearest_m = kKerbTolerance_m;
-    for (const OccupiedCell& cell : frame.occupied) {
-      const double distance_m = (cell.world_m - point.point_m).norm();
-      if (distance_m <= nearest_m) {
-        nearest_m = distance_m;
-        point.reported = true;
-        point.height_error_m = std::abs(cell.height_m - point.height_m);
-      }
+    outcome.nearest_m = std::min(outcome.nearest_m, distance_m);
+    const bool is_due = !point.judged && driven_m_ >= *point.first_view_m + options_.grace_m;
+    if (!is_due && (outcome.ever_reported || distance_m > options_.view_range_m)) {
+      continue;
     }
+    const std::optional<double> height_error_m = kerbHeightError(frame, point);
+    if (is_due) {
+      point.judged = true;
+      outcome.reported = height_error_m.has_value();
+      outcome.height_error_m = height_error_m.value_or(0.0);
+    }
+    outcome.ever_reported = outcome.ever_reported || height_error_m;
   }
 }
 
@@ -365,10 +383,14 @@ ObstacleMapErrors ObstacleMapEvaluator::errors() const {
   errors.num_free_inside = free_inside_.size();
   std::vector<double> height_errors_m;
   for (const KerbPoint& point : kerb_points_) {
-    errors.num_kerb_points += point.judged ? 1 : 0;
-    if (point.reported) {
+    if (!point.judged) {
+      continue;
+    }
+    ++errors.num_kerb_points;
+    errors.kerbs.push_back(point.outcome);
+    if (point.outcome.reported) {
       ++errors.num_kerb_reported;
-      height_errors_m.push_back(point.height_error_m);
+      height_errors_m.push_back(point.outcome.height_error_m);
     }
   }
   errors.kerb_height_error_m = summarize(height_errors_m);

@@ -46,7 +46,8 @@ struct LocalObstacleMapOptions {
   double forget_occupied_m = 15.0;  ///< travel after which log-odds have fallen to 1/e
   double forget_free_m = 4.0;
   double odometry_sigma_m_per_m = 0.01;  ///< drift of the fixed frame, per metre of travel
-  double scan_depth_m = 0.2;             ///< cells so far behind the first one take part in its range
+  double scan_depth_m =
+      0.2;  ///< cells so far behind the first one take part in its range; not those of kerbs
   int scan_rays = 360;
 
   template <class Visitor>

@@ -34,6 +34,12 @@ struct ObstacleDetectorOptions {
   /// marks no obstacle in the map: there the lens resolves little, and another camera sees better.
   double max_off_axis_rad = 1.1;
   double max_off_axis_range_m = 2.5;
+  /// Between a low thing and a high one behind it the ranges leave a gap. Where they rise without one from a
+  /// height up to max_ramp_height_m to something higher within max_ramp_length_m, windows of the range map
+  /// saw the high thing, its shadow and the ground before it at once, and made a ramp of them.
+  double max_ramp_height_m = 0.3;
+  double max_ramp_length_m = 1.3;
+  double ramp_weight = 0.25;        ///< of a look at such a ramp in the map: it may be a kerb after all
   double sure_ground_sigmas = 1.0;  ///< a ground point lies so far below min_height_m
   double below_ground_m = 0.08;     ///< deeper points are wrong ranges, not ground
   /// Where the ground is not known, an obstacle rises above all that a tilt of this size explains.
@@ -61,6 +67,9 @@ struct ObstacleDetectorOptions {
     visit("max_obstacles_per_ray", max_obstacles_per_ray);
     visit("max_off_axis_rad", max_off_axis_rad);
     visit("max_off_axis_range_m", max_off_axis_range_m);
+    visit("max_ramp_height_m", max_ramp_height_m);
+    visit("max_ramp_length_m", max_ramp_length_m);
+    visit("ramp_weight", ramp_weight);
     visit("sure_ground_sigmas", sure_ground_sigmas);
     visit("below_ground_m", below_ground_m);
     visit("lost_ground_tilt_rad", lost_ground_tilt_rad);
@@ -80,7 +89,9 @@ struct PolarObstacle {
   double height_sigma_m = 0.0;
   double bottom_m = 0.0;     ///< height of its lowest part that was seen
   bool is_off_axis = false;  ///< beyond max_off_axis_rad and max_off_axis_range_m
+  bool is_ramp = false;      ///< rises towards something higher without a gap: rather a smear of the ranges
   double support = 0.0;      ///< its points over those of the reference obstacle, at most 1
+  double weight = 1.0;       ///< of the look in the map
 };
 
 /// What one range map says about the ground around the camera.

@@ -32,7 +32,7 @@ struct ObstacleMapperOptions {
   GroundWatchOptions watch;
   LocalObstacleMapOptions map;
   OdometryBufferOptions odometry;
-  double max_wait_s = 0.15;      ///< for a camera's range map of a stamp that others have delivered
+  double max_wait_s = 0.15;      ///< for a camera's range map once another has delivered its stamp
   double silent_s = 0.5;         ///< without any range map for so long, the map comes all the same
   double max_silence_s = 1.0;    ///< a camera without range maps for longer, while driving, has stopped
   double min_known_share = 0.1;  ///< of a camera's pixels with a range; with less it hardly sees
@@ -85,7 +85,8 @@ struct ObstacleCameraStatus {
 };
 
 /// The map after all range maps of one stamp; where none come, from time to time; empty, where odometry
-/// jumped.
+/// jumped. Stamps grow from frame to frame, until the drive starts over: range maps of a stamp that is no
+/// later than the last frame's are fused without a frame of their own.
 struct ObstacleFrame {
   ObstacleMap map;
   ObstacleScan scan;                     ///< of the fused map
@@ -131,17 +132,18 @@ class ObstacleMapper {
   };
   struct Group {  // range maps of one stamp, by camera
     std::map<size_t, Look> cameras;
+    std::optional<Timestamp> first_heard;  // odometry's stamp when the first of them came
   };
 
   std::optional<RigidTransform> fixedFromVehicle(Timestamp stamp) const;
   void watchForJumps(const VehicleOdometry& odometry);
-  bool isComplete(Timestamp stamp) const;
+  bool isComplete(Timestamp stamp, const Group& group) const;
   void fuseWaiting(bool all);
   void fuse(Timestamp stamp, Group* group, const RigidTransform& fixed_from_vehicle);
   void loseFirstWaiting();
   void emit(const LocalObstacleMap& map, const std::vector<const CameraObstacles*>& cameras);
   void emitAt(Timestamp stamp);
-  void emitWhenSilent(const VehicleOdometry& odometry);
+  void emitWhenSilent();
   void updateStatus(Camera* camera, const CameraObstacles& seen) const;
   void startOver();
   void jump(Timestamp stamp);
@@ -155,6 +157,7 @@ class ObstacleMapper {
   LocalObstacleMap map_;
   std::map<Timestamp, Group> waiting_;
   std::optional<Timestamp> last_fused_, last_emitted_, last_jump_;
+  std::optional<Timestamp> last_heard_;  // odometry's stamp when the last range map came
   std::optional<VehicleOdometry> last_odometry_;
   std::optional<Eigen::Vector3d> last_velocity_;  // x, y, yaw per second
   RigidTransform map_from_odom_, anchor_;

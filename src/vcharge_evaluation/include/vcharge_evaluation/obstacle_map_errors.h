@@ -73,6 +73,15 @@ struct FalseCell {
   bool is_on_open = false;  ///< a camera saw the ground there at some time of the drive
 };
 
+/// A place on the outline of a kerb that was viewed and could be judged.
+struct KerbOutcome {
+  Eigen::Vector2d place_m{0.0, 0.0};  ///< in the world
+  double nearest_m = 0.0;             ///< of the vehicle's middle to it, from the first view on
+  bool reported = false;              ///< when it had to be
+  bool ever_reported = false;         ///< at any time of the drive within the view range
+  double height_error_m = 0.0;        ///< absolute, when it had to be
+};
+
 struct ObstacleMapErrors {
   uint64_t num_frames = 0;
   double driven_m = 0.0;
@@ -88,6 +97,7 @@ struct ObstacleMapErrors {
   uint64_t num_kerb_points = 0;      ///< places on outlines of kerbs, every 10 cm, that were viewed
   uint64_t num_kerb_reported = 0;
   ErrorDistribution kerb_height_error_m;  ///< absolute, of the reported ones
+  std::vector<KerbOutcome> kerbs;         ///< the places
   uint64_t num_mover_frames = 0;          ///< images in which a moving thing was in view
   uint64_t num_mover_reported = 0;
   uint64_t num_mover_cells = 0;  ///< under them, over all these images
@@ -118,12 +128,10 @@ class ObstacleMapEvaluator {
     ObstacleOutcome outcome;
   };
   struct KerbPoint {
-    Eigen::Vector2d point_m;
     double height_m = 0.0;
     std::optional<double> first_view_m;
     bool judged = false;
-    bool reported = false;
-    double height_error_m = 0.0;
+    KerbOutcome outcome;
   };
   struct Frame;
 
@@ -131,6 +139,7 @@ class ObstacleMapEvaluator {
                      const std::vector<RigidTransform>& path);
   void judgeObstacles(const Frame& frame);
   void judgeKerbs(const Frame& frame);
+  static std::optional<double> kerbHeightError(const Frame& frame, const KerbPoint& point);
   void judgeCells(const Frame& frame);
   void addFalseCell(const Frame& frame, int64_t key, const Eigen::Vector2d& place_m);
   void addFalseCellsTo(ObstacleMapErrors* errors) const;
