@@ -205,7 +205,8 @@ class Chain:
                           "--options", options, "--report", folder / "report"], folder / "calibrate.log", may_fail=True)
             (folder / "calibrate.txt").write_text(result["output"])
             if not rig.exists():
-                raise SystemExit(f"{bag}: no calibration, and why:\n{result['output']}")
+                said = (folder / "calibrate.log").read_text().strip().splitlines()[-1]
+                raise SystemExit(f"{bag}: no calibration, and why:\n{result['output']}\n{said}")
             figures = chain_errors.rig_figures(result["output"], checked["output"])
             if self.simulated:
                 chain_errors.judge_rig(rig, drive / "rig_truth.yaml", figures, folder, self.pictures / "rig.png")
