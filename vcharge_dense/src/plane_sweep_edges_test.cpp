@@ -1,6 +1,8 @@
 // Ranges beside a kerb: a road, a face of 12 cm and a top, against their formulas.
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <stdexcept>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -12,6 +14,7 @@ namespace vcharge {
 namespace {
 
 using testing::allValid;
+using testing::expectTheSameOnAnyNumberOfThreads;
 using testing::kCamera;
 using testing::kLeft;
 using testing::kSize;
@@ -85,11 +88,12 @@ double relativeErrorOf(double pixels) {
 }
 
 /// Fronto-parallel planes, with 64 of them 4.4 pixels apart in the farthest neighbour, with 256 of them 1.1.
-RangeMap sweepOf(const Sequence& s, int num_planes) {
+RangeMap sweepOf(const Sequence& s, int num_planes, double near_spacing = 1.0) {
   PlaneSweepOptions options;
   options.aggregation = Aggregation::kReferenceSplit;
   options.pose_noise = PoseNoiseOptions::trajectory();
   options.num_planes = num_planes;
+  options.near_spacing = near_spacing;
   return PlaneSweep(kCamera, allValid(), options, s.ground).sweep(s.reference, s.neighbours);
 }
 
@@ -102,6 +106,44 @@ TEST(PlaneSweepEdgesTest, PlanesAPixelApartFindAKerbsFaceWithinAQuarterOfAPixel)
     EXPECT_LE(std::abs(fine.median), relativeErrorOf(0.1));
     EXPECT_LE(fine.median_absolute, 0.5 * coarse.median_absolute);
   }
+}
+
+TEST(PlaneSweepEdgesTest, AsManyPlanesCloserTogetherFarAwayFindAKerbsFaceBetter) {
+  for (const uint32_t seed : {1u, 2u, 3u}) {
+    SCOPED_TRACE(seed);
+    const Sequence s = fourNeighbours(seed);
+    // At the kerb planes are then 0.45 times as far apart.
+    const Errors uniform = errorsOf(sweepOf(s, 64), s, kFace), spaced = errorsOf(sweepOf(s, 64, 6.0), s, kFace);
+    EXPECT_LE(spaced.median_absolute, 0.7 * uniform.median_absolute);
+  }
+}
+
+TEST(PlaneSweepEdgesTest, SpacingOfPlanesGrowsEvenlyBetweenTheSameEnds) {
+  PlaneSweepOptions options;
+  options.families = PlaneFamilies::kFrontoParallel;
+  options.num_planes = 33;
+  options.near_spacing = 5.0;
+  const std::vector<float> inverse = makePlaneFamilies(options, std::nullopt).front().inverse_distances_per_m;
+  ASSERT_EQ(inverse.size(), 33u);
+  EXPECT_FLOAT_EQ(inverse.front(), static_cast<float>(1.0 / options.max_distance_m));
+  EXPECT_FLOAT_EQ(inverse.back(), static_cast<float>(1.0 / options.min_distance_m));
+  const double second = (inverse[2] - inverse[1]) - (inverse[1] - inverse[0]);
+  for (size_t i = 1; i + 1 < inverse.size(); ++i) {
+    EXPECT_NEAR((inverse[i + 1] - inverse[i]) - (inverse[i] - inverse[i - 1]), second, 1e-5) << i;
+  }
+  // The differences' own ends lie half a plane inside those of the spacing.
+  const double slope = 4.0 / 32.0, first = inverse[1] - inverse[0], last = inverse[32] - inverse[31];
+  EXPECT_NEAR(last / first, (1.0 + 31.5 * slope) / (1.0 + 0.5 * slope), 1e-3);
+  options.near_spacing = 0.5;
+  EXPECT_THROW(options.validate(), std::invalid_argument);
+}
+
+TEST(PlaneSweepEdgesTest, UnevenPlanesGiveTheSameBytesOnAnyNumberOfThreads) {
+  const Sequence s = fourNeighbours(4);
+  PlaneSweepOptions options;
+  options.near_spacing = 6.0;
+  options.coarse_pass = true;
+  expectTheSameOnAnyNumberOfThreads(PlaneSweep(kCamera, allValid(), options, s.ground), s);
 }
 
 TEST(PlaneSweepEdgesTest, TheRoadBeforeAKerbIsWithinTwoMillimetresOfItsHeight) {
