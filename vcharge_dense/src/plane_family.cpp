@@ -49,9 +49,8 @@ std::vector<PlaneFamily> makePlaneFamilies(const PlaneSweepOptions& options,
       throw std::invalid_argument("ground_max_height_m: must be below the camera, which is at " +
                                   std::to_string(ground_in_camera->distance_m) + " m");
     }
-    families.push_back(
-        {ground_in_camera->normal.normalized(),
-         inverseDistances(far_m, near_m, options.num_ground_planes, 1.0), true});
+    families.push_back({ground_in_camera->normal.normalized(),
+                        inverseDistances(far_m, near_m, options.num_ground_planes, 1.0), true});
   }
   return families;
 }

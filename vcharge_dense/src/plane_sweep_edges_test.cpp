@@ -50,8 +50,7 @@ Errors errorsOf(const RangeMap& map, const Sequence& s, const Select& select) {
   for (int y = 8; y < kSize.height - 8; ++y) {
     for (int x = 100; x < 220; ++x) {
       const double range = s.truth.at<double>(y, x);
-      const Eigen::Vector3d point =
-          s.reference.world_from_camera * (range * rays.ray(x, y).cast<double>());
+      const Eigen::Vector3d point = s.reference.world_from_camera * (range * rays.ray(x, y).cast<double>());
       if (!std::isfinite(range) || !select(point)) {
         continue;
       }
@@ -79,8 +78,8 @@ Sequence fourNeighbours(uint32_t seed) {
   return makeSequence(kerb(seed), kLeft, 0.4, -2, 2, 1.0);
 }
 
-/// An error of this many pixels in the neighbour that is farthest away, of the inverse range at the kerb times
-/// the range.
+/// An error of this many pixels in the neighbour that is farthest away, of the inverse range at the kerb
+/// times the range.
 double relativeErrorOf(double pixels) {
   const double pixels_per_rad = kCamera.gamma1() / (1.0 + kCamera.xi()), baseline_m = 0.8;
   const double range_m = std::hypot(kEdge_m - 1.0, 0.9);
@@ -113,7 +112,8 @@ TEST(PlaneSweepEdgesTest, AsManyPlanesCloserTogetherFarAwayFindAKerbsFaceBetter)
     SCOPED_TRACE(seed);
     const Sequence s = fourNeighbours(seed);
     // At the kerb planes are then 0.45 times as far apart.
-    const Errors uniform = errorsOf(sweepOf(s, 64), s, kFace), spaced = errorsOf(sweepOf(s, 64, 6.0), s, kFace);
+    const Errors uniform = errorsOf(sweepOf(s, 64), s, kFace),
+                 spaced = errorsOf(sweepOf(s, 64, 6.0), s, kFace);
     EXPECT_LE(spaced.median_absolute, 0.7 * uniform.median_absolute);
   }
 }

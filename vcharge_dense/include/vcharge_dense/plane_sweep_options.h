@@ -59,9 +59,10 @@ struct PlaneSweepOptions {
   double min_distance_m = 0.3;  ///< of the fronto-parallel planes, see near_spacing
   double max_distance_m = 50.0;
   int num_planes = 64;
-  /// Distance of neighbouring fronto-parallel planes at min_distance_m over that at max_distance_m, in inverse
-  /// distance; it grows evenly in between. More than 1 spends fewer planes on what is near and more on what is
-  /// far, where planes further apart than about half a window in the neighbours miss what lies between them.
+  /// Distance of neighbouring fronto-parallel planes at min_distance_m over that at max_distance_m, in
+  /// inverse distance; it grows evenly in between. More than 1 spends fewer planes on what is near and more
+  /// on what is far, where planes further apart than about half a window in the neighbours miss what lies
+  /// between them.
   double near_spacing = 1.0;
   double ground_min_height_m =
       -0.3;  ///< of the ground-parallel planes over the ground, uniform in inverse distance
