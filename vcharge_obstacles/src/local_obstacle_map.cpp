@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "cell_look.h"
+#include "ground_shadows.h"
 #include "vcharge_core/error.h"
 #include "vcharge_obstacles/map_scan.h"
 
@@ -46,6 +47,7 @@ void LocalObstacleMapOptions::validate() const {
   requireField(doubt >= 0.0 && doubt <= 1.0, "doubt", "must be in [0, 1]", doubt);
   requireField(unknown_doubt >= 0.0 && unknown_doubt <= 1.0, "unknown_doubt", "must be in [0, 1]",
                unknown_doubt);
+  requireField(shadow_s >= 0.0, "shadow_s", "must not be negative", shadow_s);
   requireField(blind_angle_rad >= 0.0, "blind_angle_rad", "must not be negative", blind_angle_rad);
   requireField(parallax_sigma >= 0.0, "parallax_sigma", "must not be negative", parallax_sigma);
   requireField(look_distance_m > 0.0, "look_distance_m", "must be positive", look_distance_m);
@@ -166,8 +168,26 @@ double LocalObstacleMap::weightOf(const CameraObstacles& seen, const RigidTransf
 struct LocalObstacleMap::GroundLook {
   int64_t x, y;  // of the cell
   CellLook look;
+  bool in_shadow;  // of what other looks have found before it
   bool explained;  // a change of its looks, by something that stands there
 };
+
+GroundShadows LocalObstacleMap::shadowsFor(const CameraObstacles& seen,
+                                           const Eigen::Vector2d& camera_m) const {
+  GroundShadows shadows(seen.camera_height_m);
+  const double cell_m = options_.cell_size_m;
+  const int64_t since_ns = (seen.stamp - durationFromSeconds(options_.shadow_s)).nanoseconds();
+  for (int64_t y = first_y_; y < first_y_ + size_; ++y) {
+    for (int64_t x = first_x_; x < first_x_ + size_; ++x) {
+      const Cell& cell = cellAt(x, y);
+      if (cell.last_occupied_ns > since_ns && stateOf(cell) == kCellOccupied) {
+        const Eigen::Vector2d middle_m((x + 0.5) * cell_m, (y + 0.5) * cell_m);
+        shadows.add(middle_m - camera_m, cell_m, cell.height_m);
+      }
+    }
+  }
+  return shadows;
+}
 
 std::vector<LocalObstacleMap::GroundLook> LocalObstacleMap::lookAtGround(
     const CameraObstacles& seen, const CellLooker& looker, const PolarGrid& grid,
@@ -176,6 +196,7 @@ std::vector<LocalObstacleMap::GroundLook> LocalObstacleMap::lookAtGround(
   const double blind_sine = std::sin(options_.blind_angle_rad);
   const Eigen::Vector2d camera_m = transformed(fixed_from_vehicle, seen.origin_m);
   const double yaw_rad = yawOfRotation(fixed_from_vehicle.rotation());
+  const GroundShadows shadows = shadowsFor(seen, camera_m);
   const auto reach = static_cast<int64_t>(std::ceil(options_.free_range_m / cell_m));
   const int64_t middle_x = indexOf(camera_m.x());
   const int64_t middle_y = indexOf(camera_m.y());
@@ -205,7 +226,7 @@ std::vector<LocalObstacleMap::GroundLook> LocalObstacleMap::lookAtGround(
       }
       const bool explained =
           look.changed_share >= options_.min_changed_share && looker.isExplained(angle_rad, range_m);
-      looks.push_back({x, y, look, explained});
+      looks.push_back({x, y, look, shadows.hides(offset_m), explained});
     }
   }
   return looks;
@@ -217,7 +238,7 @@ void LocalObstacleMap::addGround(const CameraObstacles& seen, const PolarGrid& g
       lookAtGround(seen, CellLooker(seen, grid, options_.cell_size_m), grid, fixed_from_vehicle);
   holdChanged(looks, seen.stamp);
   for (const GroundLook& ground : looks) {
-    addGroundLook(ground.look, weight, seen.stamp, &cellAt(ground.x, ground.y));
+    addGroundLook(ground, weight, seen.stamp);
   }
 }
 
@@ -246,16 +267,20 @@ void LocalObstacleMap::hold(int64_t x, int64_t y, double radius_m, Timestamp sta
   }
 }
 
-void LocalObstacleMap::addGroundLook(const CellLook& look, double weight, Timestamp stamp, Cell* cell) const {
-  if (!look.blocked && look.free_share >= options_.min_free_share) {
+void LocalObstacleMap::addGroundLook(const GroundLook& ground, double weight, Timestamp stamp) {
+  const CellLook& look = ground.look;
+  Cell* cell = &cellAt(ground.x, ground.y);
+  const bool shows_ground = !look.blocked && look.free_share >= options_.min_free_share;
+  if (shows_ground && !ground.in_shadow) {
     const double log_odds = cell->log_odds - weight * options_.free_log_odds * look.free_share;
     const double least = stamp.nanoseconds() < cell->held_until_ns ? 0.0 : options_.min_log_odds;
     cell->log_odds = static_cast<float>(std::max(least, log_odds));
     cell->last_seen_ns = stamp.nanoseconds();
     cell->travel_m = static_cast<float>(travel_m_);
-  } else if (cell->log_odds < 0.0F && look.hidden_share + look.unknown_share >= options_.min_hidden_share) {
+  } else if (cell->log_odds < 0.0F &&
+             (shows_ground || look.hidden_share + look.unknown_share >= options_.min_hidden_share)) {
     // That it was free once is no longer sure: something stands there now, or before it, or cannot be told.
-    const bool hides = look.hidden_share >= look.unknown_share;
+    const bool hides = shows_ground || look.hidden_share >= look.unknown_share;
     cell->log_odds *= static_cast<float>(std::pow(hides ? options_.doubt : options_.unknown_doubt, weight));
   }
 }
@@ -283,7 +308,7 @@ void LocalObstacleMap::addLook(const Look& look, Timestamp stamp) {
   blend(&cell.height_m, look.obstacle->height_m);
   blend(&cell.height_sigma_m, look.obstacle->height_sigma_m);
   cell.travel_m = static_cast<float>(travel_m_);
-  cell.last_seen_ns = stamp.nanoseconds();
+  cell.last_seen_ns = cell.last_occupied_ns = stamp.nanoseconds();
 }
 
 /// Standard deviation of a range by the error across the ray of how the camera moved. Directions are in the

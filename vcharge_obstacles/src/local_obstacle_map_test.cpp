@@ -141,6 +141,56 @@ TEST_F(LocalObstacleMapTest, ManyUncertainLooksDoNotMarkWhatIsFarFromTheObstacle
   }
 }
 
+/// What a low camera at (x, 0) says that sees ground wherever it looks, as it does under the body of a car.
+CameraObstacles makeLookAtGround(Timestamp stamp, const PolarGrid& grid) {
+  CameraObstacles seen;
+  seen.stamp = stamp;
+  seen.camera_name = "front";
+  seen.camera_height_m = 0.55;
+  seen.free_share.assign(grid.size(), 1.0F);
+  seen.hidden_share.assign(grid.size(), 0.0F);
+  seen.unknown_share = seen.hidden_share;
+  return seen;
+}
+
+TEST_F(LocalObstacleMapTest, GroundUnderABodyThatAnotherCameraSeesIsNotFree) {
+  const double near_y_m = kFlankY_m - 0.55, under_y_m = kFlankY_m + 0.65;
+  for (const double height_m : {1.0, 0.05}) {
+    for (const double shadow_s : {0.2, 0.0}) {
+      LocalObstacleMapOptions options;
+      options.shadow_s = shadow_s;
+      LocalObstacleMap map(options);
+      Timestamp stamp;
+      const auto pass = [&](int from, int to, bool flank_is_seen) {
+        for (int i = from; i < to; ++i) {
+          stamp = stamp + durationFromSeconds(0.08);
+          const RigidTransform pose = RigidTransform::planar(-1.0 + 0.1 * i, 0.0, 0.0);
+          map.moveTo(stamp, pose);
+          CameraObstacles flank = makeLookAtFlank(pose.translation().x(), 0.03, 0.0, grid_);
+          flank.stamp = stamp;
+          for (PolarObstacle& obstacle : flank.obstacles) {
+            obstacle.height_m = height_m;
+          }
+          if (flank_is_seen) {
+            map.add(flank, grid_, pose);
+          }
+          if (i >= 5) {
+            map.add(makeLookAtGround(stamp, grid_), grid_, pose);
+          }
+        }
+      };
+      pass(0, 15, true);
+      const bool may_be_seen = height_m < 0.5 || shadow_s == 0.0;  // over it, or by mistake
+      EXPECT_EQ(stateIn(map.snapshot(), 0.05, near_y_m), kCellFree);
+      EXPECT_EQ(stateIn(map.snapshot(), 0.05, under_y_m), may_be_seen ? kCellFree : kCellUnobserved)
+          << height_m << " " << shadow_s;
+      // Nobody sees the flank any more: it is not there.
+      pass(15, 30, false);
+      EXPECT_EQ(stateIn(map.snapshot(), 0.05, under_y_m), kCellFree);
+    }
+  }
+}
+
 TEST_F(LocalObstacleMapTest, StandingKeepsStatesAndTheirAgeGrows) {
   drive(kPerson, 0.0, 0.8);
   const ObstacleMap before = map_.snapshot();

@@ -10,8 +10,8 @@
 
 namespace vcharge {
 
-struct CellLook;
 class CellLooker;
+class GroundShadows;
 
 /// Options of LocalObstacleMap.
 struct LocalObstacleMapOptions {
@@ -31,7 +31,10 @@ struct LocalObstacleMapOptions {
   double min_changed_share = 0.4;  ///< of a cell's pixels that look otherwise than before, to take it back
   double changed_margin_m = 0.4;   ///< around such cells nothing is free: who moves is wider than his feet
   double changed_hold_s = 0.3;     ///< and for so long nothing becomes free
-  double blind_angle_rad = 0.35;   ///< so near to the direction of travel nothing is to be expected
+  /// Ground behind what was seen as an obstacle no longer ago is no evidence, whatever a camera says of it:
+  /// under the body of a car the ground shows. 0: it is.
+  double shadow_s = 0.13;
+  double blind_angle_rad = 0.35;  ///< so near to the direction of travel nothing is to be expected
   /// Of a camera's motion across its ray to an obstacle, relative to the motion along it: an error of the
   /// range where stereo sees little parallax.
   double parallax_sigma = 0.005;
@@ -62,6 +65,7 @@ struct LocalObstacleMapOptions {
     visit("min_changed_share", min_changed_share);
     visit("changed_margin_m", changed_margin_m);
     visit("changed_hold_s", changed_hold_s);
+    visit("shadow_s", shadow_s);
     visit("blind_angle_rad", blind_angle_rad);
     visit("parallax_sigma", parallax_sigma);
     visit("look_distance_m", look_distance_m);
@@ -114,8 +118,9 @@ class LocalObstacleMap {
     float sigma_m = 0.0F;
     float height_m = 0.0F;
     float height_sigma_m = 0.0F;
-    float travel_m = 0.0F;           // distance driven when it was last seen
-    int64_t last_seen_ns = kNever;   // INT64_MIN: never
+    float travel_m = 0.0F;          // distance driven when it was last seen
+    int64_t last_seen_ns = kNever;  // INT64_MIN: never
+    int64_t last_occupied_ns = kNever;
     int64_t held_until_ns = kNever;  // not free before
   };
   /// What a camera says about the ground of one cell.
@@ -139,11 +144,12 @@ class LocalObstacleMap {
   double weightOf(const CameraObstacles& seen, const RigidTransform& fixed_from_vehicle);
   void addGround(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle,
                  double weight);
+  GroundShadows shadowsFor(const CameraObstacles& seen, const Eigen::Vector2d& camera_m) const;
   std::vector<GroundLook> lookAtGround(const CameraObstacles& seen, const CellLooker& looker,
                                        const PolarGrid& grid, const RigidTransform& fixed_from_vehicle) const;
   void holdChanged(const std::vector<GroundLook>& looks, Timestamp stamp);
   void hold(int64_t x, int64_t y, double radius_m, Timestamp stamp);
-  void addGroundLook(const CellLook& look, double weight, Timestamp stamp, Cell* cell) const;
+  void addGroundLook(const GroundLook& ground, double weight, Timestamp stamp);
   void addOccupied(const CameraObstacles& seen, const PolarGrid& grid,
                    const RigidTransform& fixed_from_vehicle, double weight);
   void addLook(const Look& look, Timestamp stamp);
