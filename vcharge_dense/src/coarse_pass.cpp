@@ -37,6 +37,17 @@ std::vector<int> slotsOf(const std::vector<int>& counts) {
   return slots;
 }
 
+/// Index, with its fraction, of a value among the offsets of a family; beyond their ends it goes on.
+float placeOf(float value, const Hypotheses& family) {
+  const std::vector<float>& offsets = family.offsets;
+  if (family.are_uniform || !(value == value)) {  // NaN differs from itself
+    return (value - offsets.front()) * (1.0f / (offsets[1] - offsets[0]));
+  }
+  const auto after = std::upper_bound(offsets.begin() + 1, offsets.end() - 1, value);
+  const float before = *(after - 1);
+  return static_cast<float>(after - 1 - offsets.begin()) + (value - before) / (*after - before);
+}
+
 bool hasGaps(const TilePlanes& planes) {
   return std::any_of(planes.begin(), planes.end(), [](const std::vector<int>& slots) {
     return std::find(slots.begin(), slots.end(), kGap) != slots.end();
@@ -85,12 +96,10 @@ TilePlanes CoarsePass::choosePlanes(const SurfaceEstimate& coarse, const cv::Rec
     }
     num_sure += static_cast<int>(sure.size());
     for (size_t f = 0; f < planes.size(); ++f) {
-      const std::vector<float>& offsets = planes[f].offsets;
       const auto* weight = planes[f].weight.ptr<float>(2 * y);
-      const float per_step = 1.0f / (offsets[1] - offsets[0]);
-      const auto end = static_cast<float>(offsets.size());
+      const auto end = static_cast<float>(planes[f].offsets.size());
       for (const int x : sure) {
-        const float index = (inverse_range[x] / weight[2 * x] - offsets.front()) * per_step + 0.5f;
+        const float index = placeOf(inverse_range[x] / weight[2 * x], planes[f]) + 0.5f;
         if (index > 0.0f && index < end) {  // false for NaN
           ++counts[f][static_cast<size_t>(index)];
         }

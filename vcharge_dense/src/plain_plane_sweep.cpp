@@ -7,6 +7,12 @@
 namespace vcharge {
 namespace {
 
+/// Mean distance of an inner plane from its neighbours.
+double stepAt(const PlaneFamily& family, size_t plane) {
+  const std::vector<float>& inverse = family.inverse_distances_per_m;
+  return 0.5 * (inverse[plane + 1] - inverse[plane - 1]);
+}
+
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 int wrap(int value, int size) {
@@ -210,7 +216,8 @@ PlainResult plainPlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask,
             offset = std::clamp(0.5 * (behind - before) / curvature, -0.5, 0.5);
           }
         }
-        const double inverse_distance = family.inverse_distances_per_m[best] + offset * family.step_per_m();
+        const double step = offset != 0.0 ? stepAt(family, best) : 0.0;
+        const double inverse_distance = family.inverse_distances_per_m[best] + offset * step;
         result.plane.at<int>(y, x) = first_plane + static_cast<int>(best);
         result.score.at<double>(y, x) = score;
         result.inverse_distance.at<double>(y, x) = inverse_distance;

@@ -5,11 +5,14 @@
 namespace vcharge {
 namespace {
 
-/// `count` inverse distances from 1 / far_m to 1 / near_m.
-std::vector<float> uniformInverse(double far_m, double near_m, int count) {
+/// `count` inverse distances from 1 / far_m to 1 / near_m; their differences grow evenly, to `growth` times
+/// the first one.
+std::vector<float> inverseDistances(double far_m, double near_m, int count, double growth) {
+  const double linear = 2.0 / (1.0 + growth);
   std::vector<float> inverse(static_cast<size_t>(count));
   for (int i = 0; i < count; ++i) {
-    const double fraction = static_cast<double>(i) / (count - 1);
+    const double index = static_cast<double>(i) / (count - 1);
+    const double fraction = index * (linear + (1.0 - linear) * index);
     inverse[static_cast<size_t>(i)] =
         static_cast<float>(1.0 / far_m + fraction * (1.0 / near_m - 1.0 / far_m));
   }
@@ -32,7 +35,9 @@ std::vector<PlaneFamily> makePlaneFamilies(const PlaneSweepOptions& options,
   std::vector<PlaneFamily> families;
   if (options.families != PlaneFamilies::kGroundParallel) {
     families.push_back({-Eigen::Vector3d::UnitZ(),
-                        uniformInverse(options.max_distance_m, options.min_distance_m, options.num_planes)});
+                        inverseDistances(options.max_distance_m, options.min_distance_m, options.num_planes,
+                                         options.near_spacing),
+                        options.near_spacing == 1.0});
   }
   if (options.families != PlaneFamilies::kFrontoParallel) {
     if (!ground_in_camera) {
@@ -44,8 +49,8 @@ std::vector<PlaneFamily> makePlaneFamilies(const PlaneSweepOptions& options,
       throw std::invalid_argument("ground_max_height_m: must be below the camera, which is at " +
                                   std::to_string(ground_in_camera->distance_m) + " m");
     }
-    families.push_back(
-        {ground_in_camera->normal.normalized(), uniformInverse(far_m, near_m, options.num_ground_planes)});
+    families.push_back({ground_in_camera->normal.normalized(),
+                        inverseDistances(far_m, near_m, options.num_ground_planes, 1.0), true});
   }
   return families;
 }

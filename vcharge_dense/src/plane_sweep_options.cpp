@@ -26,6 +26,10 @@ void PlaneSweepOptions::validate() const {
   requireField(std::isfinite(max_distance_m) && max_distance_m > min_distance_m, "max_distance_m",
                "must be finite and larger than min_distance_m", max_distance_m);
   requireField(num_planes >= 3 && num_planes <= 1024, "num_planes", "must be in [3, 1024]", num_planes);
+  requireField(near_spacing >= 1.0 && near_spacing <= 100.0, "near_spacing", "must be in [1, 100]",
+               near_spacing);
+  requireField(near_spacing == 1.0 || !semi_global_smoothing, "near_spacing",
+               "must be 1 with semi_global_smoothing, whose steps are of one size", near_spacing);
   requireField(std::isfinite(ground_min_height_m), "ground_min_height_m", "must be finite",
                ground_min_height_m);
   requireField(std::isfinite(ground_max_height_m) && ground_max_height_m > ground_min_height_m,

@@ -47,7 +47,9 @@ class RowReader {
 
   float weight(int column) const { return weight_[column]; }
   float offset(int slot) const { return offsets_[static_cast<size_t>(slot)]; }
-  float step() const { return hypotheses_.offsets[1] - hypotheses_.offsets[0]; }
+  float step(int slot) const {
+    return hypotheses_.stepAt(static_cast<size_t>(scores_.slots[static_cast<size_t>(slot)]));
+  }
   bool isInside(int slot) const { return inside_[static_cast<size_t>(slot)] != 0; }
   int plane(int slot) const { return first_plane_ + scores_.slots[static_cast<size_t>(slot)]; }
 
@@ -139,6 +141,7 @@ Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays, 
   hypotheses.normal = family.normal.cast<float>();
   hypotheses.weight = cv::Mat(rays.size(), CV_32FC1);
   hypotheses.offsets = family.inverse_distances_per_m;
+  hypotheses.are_uniform = family.is_uniform;
   cv::Mat counts(rays.size(), CV_8UC1);
   for (int y = 0; y < rays.size().height; ++y) {
     for (int x = 0; x < rays.size().width; ++x) {
@@ -183,7 +186,7 @@ void readPeaks(const std::vector<Hypotheses>& hypotheses, const std::vector<Tile
         continue;
       }
       const int best = chosen->best(pixel);
-      const float step = chosen->step() * chosen->weight(column);
+      const float step = chosen->step(best) * chosen->weight(column);
       const bool at_limit = !chosen->isInside(best);
       const Parabola parabola = at_limit ? Parabola() : chosen->parabola(pixel);
       const float inverse_range = chosen->offset(best) * chosen->weight(column);

@@ -56,6 +56,15 @@ struct Hypotheses {
   cv::Mat weight;                                    ///< CV_32FC1, NaN where there is no surface
   cv::Mat window_counts;  ///< CV_8UC1: not 0 where all pixels of the window are valid and have a surface
   std::vector<float> offsets;
+  bool are_uniform = true;  ///< offsets are equally far apart
+
+  /// Distance of an offset from its neighbours.
+  float stepAt(size_t hypothesis) const {
+    const size_t last = offsets.size() - 1;
+    const size_t before = are_uniform ? 0 : hypothesis - (hypothesis > 0 ? 1 : 0);
+    const size_t after = are_uniform ? 1 : hypothesis + (hypothesis < last ? 1 : 0);
+    return (offsets[after] - offsets[before]) / static_cast<float>(after - before);
+  }
 };
 
 /// Not 0 where `counts` is nowhere 0 in the window around the pixel.

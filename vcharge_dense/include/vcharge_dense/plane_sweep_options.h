@@ -56,9 +56,14 @@ struct PoseNoiseOptions {
 /// Options of PlaneSweep. Distances are measured along the plane's normal from the reference camera.
 struct PlaneSweepOptions {
   PlaneFamilies families = PlaneFamilies::kBoth;
-  double min_distance_m = 0.3;  ///< of the fronto-parallel planes, uniform in inverse distance
+  double min_distance_m = 0.3;  ///< of the fronto-parallel planes, see near_spacing
   double max_distance_m = 50.0;
   int num_planes = 64;
+  /// Distance of neighbouring fronto-parallel planes at min_distance_m over that at max_distance_m, in
+  /// inverse distance; it grows evenly in between. More than 1 spends fewer planes on what is near and more
+  /// on what is far, where planes further apart than about half a window in the neighbours miss what lies
+  /// between them.
+  double near_spacing = 1.0;
   double ground_min_height_m =
       -0.3;  ///< of the ground-parallel planes over the ground, uniform in inverse distance
   double ground_max_height_m = 0.3;  ///< below the camera
@@ -111,6 +116,7 @@ struct PlaneSweepOptions {
     visit("min_distance_m", min_distance_m);
     visit("max_distance_m", max_distance_m);
     visit("num_planes", num_planes);
+    visit("near_spacing", near_spacing);
     visit("ground_min_height_m", ground_min_height_m);
     visit("ground_max_height_m", ground_max_height_m);
     visit("num_ground_planes", num_ground_planes);
