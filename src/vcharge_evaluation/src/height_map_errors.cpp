@@ -153,14 +153,17 @@ void judgeSteps(const MapInWorld& in_world, const SurfaceVisibility& visibility,
   errors->kerb_height_m = summarize(std::move(kerbs));
 }
 
-/// Where the map's ground ends along a line, if it ends near 0 and nothing is mapped for a hand beyond:
-/// behind the face of a wall or a pillar no camera sees free space, so that the map has no height there.
+/// Where the map's ground, which is below a level, ends along a line, if it ends near 0 and no ground is
+/// mapped for a hand beyond: behind the face of a wall or a pillar no camera sees free space, so that the map
+/// has no height there. What is mapped above the level, as the roof of a car behind cells of its side without
+/// a height, is no ground.
 std::optional<double> findEnd(const HeightAt& height, const Eigen::Vector2d& start_m,
-                              const Eigen::Vector2d& direction, double search_m, double cell_size_m) {
+                              const Eigen::Vector2d& direction, double search_m, double level_m,
+                              double cell_size_m) {
   constexpr double kSample_m = 0.01, kHand_m = 0.1;
   std::optional<double> end;
   for (double s = -search_m; s <= search_m + kHand_m; s += kSample_m) {
-    if (std::isfinite(height(start_m + s * direction))) {
+    if (height(start_m + s * direction) < level_m) {  // false for NaN
       end = s;
     }
   }
@@ -178,10 +181,11 @@ double readEdge(const MapInWorld& in_world, const HeightStep& step, double searc
   std::vector<double> crossings;
   for (const double aside : {-0.1, -0.05, 0.0, 0.05, 0.1}) {
     const Eigen::Vector2d start = step.place_m + aside * across;
+    const double level_m = step.low_m + stepLevel(step);
     std::optional<double> crossing =
-        findCrossing(height, start, step.direction, -search_m, search_m, step.low_m + stepLevel(step));
+        findCrossing(height, start, step.direction, -search_m, search_m, level_m);
     if (!crossing) {
-      crossing = findEnd(height, start, step.direction, search_m, cell_size_m);
+      crossing = findEnd(height, start, step.direction, search_m, level_m, cell_size_m);
     }
     if (crossing) {
       crossings.push_back(*crossing);

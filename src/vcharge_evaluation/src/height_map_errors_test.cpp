@@ -97,6 +97,27 @@ TEST_F(HeightMapErrorsTest, TellsStepsThatAreAside) {
   EXPECT_GT(errors.step_position_m.mean, 0.03);  // of all, the wall's lie right
 }
 
+TEST_F(HeightMapErrorsTest, EdgesAreWhereTheGroundEndsNotWhatIsMappedBehindAGap) {
+  // The platform's outermost cells have no height, nor has its middle: what lies between has its own ends.
+  HeightMap map = world(0.05);
+  for (int row = 0; row < map.height_m.rows; ++row) {
+    for (int column = 0; column < map.height_m.cols; ++column) {
+      const double inside_m = 0.5 - std::abs(map.centreOf(column, row).x() - 3.5);
+      if (inside_m > 0.0 && (inside_m < 0.05 || inside_m > 0.35)) {
+        map.height_m.at<float>(row, column) = std::numeric_limits<float>::quiet_NaN();
+      }
+    }
+  }
+  int num_lengths = 0;
+  for (const TapeMeasurement& measurement : evaluate(map).measurements) {
+    if (measurement.kind == TapeMeasurement::Kind::kLength) {
+      EXPECT_NEAR(measurement.map_m, measurement.truth_m, 0.051);
+      ++num_lengths;
+    }
+  }
+  EXPECT_GT(num_lengths, 0);
+}
+
 TEST_F(HeightMapErrorsTest, LaysAMapOfAnotherFrameOverTheTruth) {
   // The map's frame is turned by 180 degrees, which keeps its cells on the grid, and lies elsewhere.
   const RigidTransform world_from_map(rotationFromYawPitchRoll(M_PI, 0.0, 0.0),
