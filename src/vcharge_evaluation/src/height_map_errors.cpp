@@ -178,10 +178,10 @@ double readEdge(const MapInWorld& in_world, const HeightStep& step, double searc
   const HeightAt height = [&](const Eigen::Vector2d& place_m) {
     return in_world.heightAt(place_m, step.low_m);
   };
+  const double level_m = step.low_m + stepLevel(step);
   std::vector<double> crossings;
   for (const double aside : {-0.1, -0.05, 0.0, 0.05, 0.1}) {
     const Eigen::Vector2d start = step.place_m + aside * across;
-    const double level_m = step.low_m + stepLevel(step);
     std::optional<double> crossing =
         findCrossing(height, start, step.direction, -search_m, search_m, level_m);
     if (!crossing) {
