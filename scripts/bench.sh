@@ -9,6 +9,4 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 case " $* " in *" -h "* | *" --help "*) sed -n '2,6s/^# \{0,1\}//p' "$0"; exit 0 ;; esac
 [ -d build/devel/lib ] || scripts/build.sh
-# shellcheck disable=SC1091
-set +u && . build/devel/setup.bash && set -u
-exec /usr/bin/python3 scripts/bench.py "$@"
+exec scripts/in_build.sh /usr/bin/python3 scripts/bench.py "$@"

@@ -17,11 +17,9 @@ esac
 
 scripts/install_dependencies.sh
 scripts/build.sh
-# shellcheck disable=SC1091
-set +u && . build/devel/setup.bash && set -u
 if [ -n "${DISPLAY:-}" ] && [ $# -eq 0 ]; then
-  /usr/bin/python3 scripts/chain.py
-  exec roslaunch vcharge_launch vcharge.launch rviz:=true bag:="$PWD/demo/other_day/drive.bag" \
+  scripts/in_build.sh /usr/bin/python3 scripts/chain.py
+  exec scripts/in_build.sh roslaunch vcharge_launch vcharge.launch rviz:=true bag:="$PWD/demo/other_day/drive.bag" \
     rig:="$PWD/demo/extrinsics/rig.yaml" map:="$PWD/demo/map/map.vmap"
 fi
-exec /usr/bin/python3 scripts/chain.py "$@"
+exec scripts/in_build.sh /usr/bin/python3 scripts/chain.py "$@"

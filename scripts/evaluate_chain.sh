@@ -3,7 +3,4 @@
 # map, another day's pose, heights and obstacles, and what the errors of each stage add to the next. See --help.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
-# shellcheck disable=SC1091
-set +u && . build/devel/setup.bash && set -u
-exec /usr/bin/python3 scripts/evaluate_chain.py "$@"
+exec scripts/in_build.sh /usr/bin/python3 scripts/evaluate_chain.py "$@"

@@ -3,9 +3,4 @@
 # config/mapping.yaml, and judges the maps by the truth. See --help; the whole of it takes an hour and 10 GB per drive.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
-arguments=("$@")
-set --  # a sourced script sees them
-# shellcheck disable=SC1091
-set +u && . build/devel/setup.bash && set -u
-exec /usr/bin/python3 scripts/evaluate_mapping.py "${arguments[@]}"
+exec scripts/in_build.sh /usr/bin/python3 scripts/evaluate_mapping.py "$@"

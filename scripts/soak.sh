@@ -5,8 +5,5 @@
 # 20 MB an hour, or where the manager died.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 [ $# -ge 3 ] || { sed -n '2,5s/^# \{0,1\}//p' "$0" >&2; exit 2; }
-# shellcheck disable=SC1091
-set +u && . build/devel/setup.bash && set -u
-exec /usr/bin/python3 scripts/soak.py "$@"
+exec scripts/in_build.sh /usr/bin/python3 scripts/soak.py "$@"

@@ -74,14 +74,14 @@ TEST(PlaneSweepAccuracyTest, FindsFrontoParallelWallWithinOnePlaneSpacing) {
   const PlaneSweep sweep(kCamera, allValid(), options);
   SweepDetails details;
   sweep.sweep(s.reference, s.neighbours, &details);
-  const PlaneFamily& family = sweep.families()[0];
+  const std::vector<float>& planes = sweep.families()[0].inverse_distances_per_m;
   int right = 0, all = 0;
   for (int y = 20; y < 180; ++y) {
     for (int x = 40; x < 280; ++x) {
       const int plane = details.plane.at<int>(y, x);
       ASSERT_GE(plane, 0);
-      const float error = family.inverse_distances_per_m[static_cast<size_t>(plane)] - 0.25f;
-      right += std::abs(error) <= family.step_per_m() ? 1 : 0;
+      const float error = planes[static_cast<size_t>(plane)] - 0.25f;
+      right += std::abs(error) <= planes[1] - planes[0] ? 1 : 0;
       ++all;
     }
   }

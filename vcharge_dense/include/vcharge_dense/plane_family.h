@@ -25,9 +25,7 @@ Plane groundInCamera(const RigidTransform& vehicle_from_camera);
 struct PlaneFamily {
   Eigen::Vector3d normal;  ///< in the camera frame, pointing to the camera
   std::vector<float> inverse_distances_per_m;
-  bool is_uniform = true;  ///< planes are step_per_m() apart
-
-  float step_per_m() const { return inverse_distances_per_m[1] - inverse_distances_per_m[0]; }
+  bool is_uniform = true;  ///< inverse distances are equally far apart
 };
 
 /// The families that the options name. std::invalid_argument when they need a ground that is not given, or
