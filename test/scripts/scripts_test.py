@@ -4,6 +4,7 @@ import json
 import os
 import pathlib
 import random
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -23,6 +24,7 @@ def run(script, *words):
 class ScriptsTest(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="vcharge_tests_"))
+        self.addCleanup(shutil.rmtree, self.folder)
         self.random = random.Random(4)
 
     def bench(self, name, factors, machine=1.0):
