@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <filesystem>
 #include <iostream>
@@ -181,6 +182,7 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
   Pipeline pipeline(rig, range_options, arguments.range, &mapper);
   BagDriveSourceOptions source_options;
   source_options.cameras = options.cameras;
+  source_options.max_image_gap_s = INFINITY;  // a camera that stops is borne, and told of
   BagDriveSource source(arguments.bag, rig, source_options);
   {
     ProgressBar progress("obstacles");
