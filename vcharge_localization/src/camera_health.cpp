@@ -103,9 +103,9 @@ std::string CameraHealth::contradictionOf(size_t index) const {
     }
   }
   std::ostringstream text;
-  if (camera.matches * others.features < options_.min_found * camera.features * others.matches) {
-    text << "hardly any of its features (" << std::lround(camera.matches) << " of "
-         << std::lround(camera.features) << ") match the map: bumped, wrong intrinsics, or an unmapped side?";
+  if (camera.inliers * others.features < options_.min_found * camera.features * others.inliers) {
+    text << "hardly any of its features (" << std::lround(camera.inliers) << " of "
+         << std::lround(camera.features) << ") fit the map: bumped, wrong intrinsics, or an unmapped side?";
   } else if (camera.inliers * others.matches < options_.min_agreement * camera.matches * others.inliers) {
     text << "only " << std::lround(100.0 * camera.inliers / camera.matches)
          << " % of its matches fit the pose, " << std::lround(100.0 * others.inliers / others.matches)

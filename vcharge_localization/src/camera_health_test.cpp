@@ -84,8 +84,17 @@ TEST_F(CameraHealthTest, ACameraWhoseLandmarksAreNotWhereItSeesThemIsNamed) {
   addFeatures(30, 500);
   addFixes(30, 0, 90, 1);
   ASSERT_EQ(health_.warnings().size(), 1u);
-  EXPECT_EQ(health_.warnings()[0].find("left: hardly any of its features (1 of "), 0u)
+  EXPECT_EQ(health_.warnings()[0].find("left: hardly any of its features (0 of "), 0u)
       << health_.warnings()[0];
+}
+
+TEST_F(CameraHealthTest, ABumpedCameraIsNamedWithinThreeMemories) {
+  addFeatures(60, 500);
+  addFixes(24, 40, 40, 100);
+  EXPECT_TRUE(health_.warnings().empty());
+  addFixes(32, 0, 40, 30);  // what lies near by chance still looks alike, and fits no pose
+  ASSERT_EQ(health_.warnings().size(), 1u);
+  EXPECT_EQ(health_.warnings()[0].find("left: hardly any"), 0u) << health_.warnings()[0];
 }
 
 TEST_F(CameraHealthTest, ACameraAloneContradictsNobody) {

@@ -15,7 +15,7 @@ namespace vcharge {
 struct CameraHealthOptions {
   int min_features = 50;        ///< fewer on average: dark, blinded or covered
   double min_agreement = 0.5;   ///< share of its matches that fit the pose, over that of all other cameras
-  double min_found = 0.1;       ///< share of its features that match the map, over that of all others
+  double min_found = 0.1;       ///< share of its features that fit the map and pose, over that of all others
   double memory_frames = 12.0;  ///< of the averages
   int frozen_after_frames = 3;  ///< equal images in a row while the odometer moves
 
