@@ -42,13 +42,14 @@ void CellLooker::bridgeGaps() {
   bridge_of_ray_.assign(static_cast<size_t>(grid_.numRays()), Bridge());
   for (int ray = 0; ray < grid_.numRays(); ++ray) {
     const PolarObstacle* first = nearestOn(ray);
-    if (first == nullptr) {
+    if (first == nullptr || first->height_m <= kClearance_m) {
       continue;
     }
     const auto reach = static_cast<int>(kGapWidth_m / (first->range_m * grid_.increment_rad()));
     for (int step = 1; step <= reach; ++step) {
       const PolarObstacle* next = nearestOn(ray + step);
-      if (next == nullptr || std::abs(next->range_m - first->range_m) > kGapDepth_m) {
+      if (next == nullptr || next->height_m <= kClearance_m ||
+          std::abs(next->range_m - first->range_m) > kGapDepth_m) {
         continue;
       }
       for (int between = ray + 1; between < ray + step; ++between) {

@@ -240,7 +240,8 @@ std::vector<float> ObstacleDetector::Implementation::shareOf(const std::vector<f
 
 void ObstacleDetector::Implementation::dropGroundBelowTheImage(std::vector<float>* free_share) const {
   for (int ray = 0; ray < grid.numRays(); ++ray) {
-    for (int bin = 0; bin < grid.numBins() && grid.range_m(bin) > overseen_m[static_cast<size_t>(ray)]; ++bin) {
+    const double from_m = std::max(options.max_off_axis_range_m, overseen_m[static_cast<size_t>(ray)]);
+    for (int bin = 0; bin < grid.numBins() && grid.range_m(bin) > from_m; ++bin) {
       (*free_share)[grid.index(ray, bin)] = 0.0F;
     }
   }
