@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "pixel_rays.h"
 
@@ -32,29 +33,28 @@ CellLooker::CellLooker(const CameraObstacles& seen, const PolarGrid& grid, doubl
   bridgeGaps();
 }
 
-const PolarObstacle* CellLooker::nearestOn(int ray) const {
+/// The nearest obstacle on a ray, if it is so high that a body under which ground shows may be a part of it.
+const PolarObstacle* CellLooker::nearestBodyOn(int ray) const {
   const auto& obstacles = obstacles_of_ray_[static_cast<size_t>(grid_.wrap(ray))];
-  return obstacles.empty() ? nullptr : obstacles.front();
+  return obstacles.empty() || obstacles.front()->height_m <= kClearance_m ? nullptr : obstacles.front();
 }
 
 /// Of a dark body stereo sees edges, plates and lamps, and nothing between them but the ground below it.
 void CellLooker::bridgeGaps() {
-  bridge_of_ray_.assign(static_cast<size_t>(grid_.numRays()), Bridge());
+  bridge_m_.assign(static_cast<size_t>(grid_.numRays()), std::numeric_limits<double>::infinity());
   for (int ray = 0; ray < grid_.numRays(); ++ray) {
-    const PolarObstacle* first = nearestOn(ray);
-    if (first == nullptr || first->height_m <= kClearance_m) {
+    const PolarObstacle* first = nearestBodyOn(ray);
+    if (first == nullptr) {
       continue;
     }
     const auto reach = static_cast<int>(kGapWidth_m / (first->range_m * grid_.increment_rad()));
     for (int step = 1; step <= reach; ++step) {
-      const PolarObstacle* next = nearestOn(ray + step);
-      if (next == nullptr || next->height_m <= kClearance_m ||
-          std::abs(next->range_m - first->range_m) > kGapDepth_m) {
+      const PolarObstacle* next = nearestBodyOn(ray + step);
+      if (next == nullptr || std::abs(next->range_m - first->range_m) > kGapDepth_m) {
         continue;
       }
       for (int between = ray + 1; between < ray + step; ++between) {
-        bridge_of_ray_[static_cast<size_t>(grid_.wrap(between))] = {
-            std::min(first->range_m, next->range_m), std::min(first->height_m, next->height_m)};
+        bridge_m_[static_cast<size_t>(grid_.wrap(between))] = std::min(first->range_m, next->range_m);
       }
       break;
     }
@@ -96,9 +96,8 @@ bool CellLooker::isExplained(double angle_rad, double range_m) const {
 }
 
 bool CellLooker::blocks(int ray, double range_m) const {
-  const Bridge& bridge = bridge_of_ray_[static_cast<size_t>(ray)];
-  if (bridge.range_m < range_m && seen_.camera_height_m * (1.0 - bridge.range_m / range_m) <
-                                      std::min(bridge.height_m, kClearance_m)) {
+  const double bridge_m = bridge_m_[static_cast<size_t>(ray)];
+  if (bridge_m < range_m && seen_.camera_height_m * (1.0 - bridge_m / range_m) < kClearance_m) {
     return true;
   }
   for (const PolarObstacle* obstacle : obstacles_of_ray_[static_cast<size_t>(ray)]) {

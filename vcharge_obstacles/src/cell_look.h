@@ -1,6 +1,5 @@
 #pragma once
 
-#include <limits>
 #include <vector>
 
 #include "vcharge_obstacles/obstacle_detector.h"
@@ -30,21 +29,15 @@ class CellLooker {
   bool isExplained(double angle_rad, double range_m) const;
 
  private:
-  /// A surface between two obstacles that are seen side by side.
-  struct Bridge {
-    double range_m = std::numeric_limits<double>::infinity();
-    double height_m = 0.0;
-  };
-
   void bridgeGaps();
-  const PolarObstacle* nearestOn(int ray) const;
+  const PolarObstacle* nearestBodyOn(int ray) const;
   bool blocks(int ray, double range_m) const;
 
   const CameraObstacles& seen_;
   const PolarGrid& grid_;
   const double cell_m_;
   std::vector<std::vector<const PolarObstacle*>> obstacles_of_ray_;
-  std::vector<Bridge> bridge_of_ray_;
+  std::vector<double> bridge_m_;  // by ray: range of a body between two obstacles beside it; else infinite
 };
 
 }  // namespace vcharge

@@ -67,7 +67,7 @@ struct ObstacleDetector::Implementation {
   PolarPoints collectPoints(const RangeMap& map, const GroundPlane& ground, GroundEvidence* evidence) const;
   void addGroundStrip(size_t i, const GroundPlane& ground, float weight, StripSum* sum) const;
   std::vector<float> shareOf(const std::vector<float>& weights) const;
-  void dropGroundBelowTheImage(std::vector<float>* free_share) const;
+  void dropOverhungGround(std::vector<float>* free_share) const;
 
   const ObstacleDetectorOptions options;
   const PolarGrid grid;
@@ -238,7 +238,8 @@ std::vector<float> ObstacleDetector::Implementation::shareOf(const std::vector<f
   return share;
 }
 
-void ObstacleDetector::Implementation::dropGroundBelowTheImage(std::vector<float>* free_share) const {
+/// Ground over which the image ends too low is no evidence: the body under which it shows may lie outside.
+void ObstacleDetector::Implementation::dropOverhungGround(std::vector<float>* free_share) const {
   for (int ray = 0; ray < grid.numRays(); ++ray) {
     const double from_m = std::max(options.max_off_axis_range_m, overseen_m[static_cast<size_t>(ray)]);
     for (int bin = 0; bin < grid.numBins() && grid.range_m(bin) > from_m; ++bin) {
@@ -262,7 +263,7 @@ CameraObstacles ObstacleDetector::detect(const RangeMap& map) const {
   GroundEvidence evidence(self.grid);
   const PolarPoints points = self.collectPoints(map, result.ground, &evidence);
   result.free_share = self.shareOf(evidence.bare.finish());
-  self.dropGroundBelowTheImage(&result.free_share);
+  self.dropOverhungGround(&result.free_share);
   result.hidden_share = self.shareOf(evidence.hidden.finish());
   result.unknown_share = self.shareOf(evidence.unknown.finish());
   result.occupied_share = points.occupiedShare();

@@ -122,28 +122,30 @@ TEST_F(ObstacleDetectorTest, HighThingsWeighByTheLogOddsOfTheirConfidence) {
 }
 
 TEST_F(ObstacleDetectorTest, GroundOverWhichTheImageEndsIsNotFree) {
-  // The image ends at rays that fall by 0.2 m per metre: from 0.9 m height, above 0.25 m up to 3.25 m away, and
-  // at the ground 4.5 m away.
-  RigCamera camera = rig_.cameras[rig_.cameraIndex("left")];
-  const auto freeAt = [&](double range_m) {
-    const RangeMap map = measureBoxWorld({}, camera, {}, Timestamp());
-    const CameraObstacles seen = detectIn(map, camera);
-    const PolarGrid grid(options_.grid);
-    return seen.free_share[grid.index(grid.rayOf(0.5 * M_PI), grid.binOfInverse(1.0F / static_cast<float>(range_m)))];
-  };
-  EXPECT_GT(freeAt(3.6), 0.5F);
-  const RayTable rays(camera.model, camera.image_size_px, 2.0 * M_PI, camera.mask);
-  camera.mask = cv::Mat(camera.image_size_px, CV_8UC1, cv::Scalar(255));
-  for (int y = 0; y < camera.mask.rows; ++y) {
-    for (int x = 0; x < camera.mask.cols; ++x) {
-      const Eigen::Vector3d ray = camera.vehicle_from_camera->rotation() * rays.ray(x, y).cast<double>();
-      if (ray.z() > -0.2 * ray.head<2>().norm()) {
-        camera.mask.at<uint8_t>(y, x) = 0;
+  const PolarGrid grid(options_.grid);
+  /// Of bare ground straight aside of the left camera, whose image ends at rays that fall so much per metre.
+  const auto freeShare = [&](double fall, double range_m) {
+    RigCamera camera = rig_.cameras[rig_.cameraIndex("left")];
+    const RayTable rays(camera.model, camera.image_size_px, 2.0 * M_PI, camera.mask);
+    camera.mask = cv::Mat(camera.image_size_px, CV_8UC1, cv::Scalar(255));
+    for (int y = 0; y < camera.mask.rows; ++y) {
+      for (int x = 0; x < camera.mask.cols; ++x) {
+        const Eigen::Vector3d ray = camera.vehicle_from_camera->rotation() * rays.ray(x, y).cast<double>();
+        if (ray.z() > -fall * ray.head<2>().norm()) {
+          camera.mask.at<uint8_t>(y, x) = 0;
+        }
       }
     }
-  }
-  EXPECT_GT(freeAt(2.9), 0.5F);
-  EXPECT_EQ(freeAt(3.6), 0.0F);
+    const CameraObstacles seen = detectIn(measureBoxWorld({}, camera, {}, Timestamp()), camera);
+    const int bin = grid.binOfInverse(static_cast<float>(1.0 / range_m));
+    return seen.free_share[grid.index(grid.rayOf(0.5 * M_PI), bin)];
+  };
+  EXPECT_GT(freeShare(-1.0, 3.6), 0.5F);  // no end
+  // From 0.9 m height a ray that falls by 0.2 passes 0.25 m above the ground 3.25 m away, and meets it at 4.5 m.
+  EXPECT_GT(freeShare(0.2, 2.9), 0.5F);
+  EXPECT_EQ(freeShare(0.2, 3.6), 0.0F);
+  // So near, another camera sees what stands there, if any: 0.25 m at 1.6 m, the ground at 2.25 m.
+  EXPECT_GT(freeShare(0.4, 2.0), 0.5F);
 }
 
 TEST_F(ObstacleDetectorTest, RampOfRangesUpToAWallCountsForLess) {
