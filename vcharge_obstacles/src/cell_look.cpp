@@ -19,7 +19,8 @@ constexpr double kStandsBelow_m = 0.25;
 // Between two images, what is hidden by a standing thing moves by so much.
 constexpr double kParallax_rad = 0.09;
 constexpr double kExplainedMargin_m = 0.3;
-// Obstacles so near to each other, side by side and in range, are parts of one body: no vehicle passes between.
+// Obstacles so near to each other, side by side and in range, are parts of one body: no vehicle passes
+// between.
 constexpr double kGapWidth_m = 0.3;
 constexpr double kGapDepth_m = 0.3;
 

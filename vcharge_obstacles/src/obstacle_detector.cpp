@@ -76,7 +76,7 @@ struct ObstacleDetector::Implementation {
   const PixelRays rays;
   const ExpectedPixels expected;
   const std::vector<double> overseen_m;  // by sector
-  std::vector<bool> is_off_axis;  // by sector
+  std::vector<bool> is_off_axis;         // by sector
 };
 
 void ObstacleDetectorOptions::validate() const {

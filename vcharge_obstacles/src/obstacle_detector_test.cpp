@@ -116,7 +116,8 @@ TEST_F(ObstacleDetectorTest, HighThingsWeighByTheLogOddsOfTheirConfidence) {
   };
   EXPECT_NEAR(weightAt(wall, 0.95), 1.0, 1e-6);
   EXPECT_NEAR(weightAt(wall, 0.75), std::log(3.0) / std::log(9.0), 1e-3);
-  EXPECT_NEAR(weightAt(wall, 0.45), 0.0, 1e-6);  // rather wrong than right; hides the ground behind all the same
+  EXPECT_NEAR(weightAt(wall, 0.45), 0.0,
+              1e-6);  // rather wrong than right; hides the ground behind all the same
   EXPECT_NEAR(weightAt(wall, 0.85), std::log(0.85 / 0.15) / std::log(9.0), 1e-3);
   EXPECT_NEAR(weightAt(kerb, 0.85), 1.0, 1e-6);
 }
@@ -141,7 +142,8 @@ TEST_F(ObstacleDetectorTest, GroundOverWhichTheImageEndsIsNotFree) {
     return seen.free_share[grid.index(grid.rayOf(0.5 * M_PI), bin)];
   };
   EXPECT_GT(freeShare(-1.0, 3.6), 0.5F);  // no end
-  // From 0.9 m height a ray that falls by 0.2 passes 0.25 m above the ground 3.25 m away, and meets it at 4.5 m.
+  // From 0.9 m height a ray that falls by 0.2 passes 0.25 m above the ground 3.25 m away, and meets it at 4.5
+  // m.
   EXPECT_GT(freeShare(0.2, 2.9), 0.5F);
   EXPECT_EQ(freeShare(0.2, 3.6), 0.0F);
   // So near, another camera sees what stands there, if any: 0.25 m at 1.6 m, the ground at 2.25 m.

@@ -48,7 +48,8 @@ ExpectedPixels::ExpectedPixels(const PixelRays& rays, const PolarGrid& grid, dou
 }
 
 std::vector<double> overseenRange(const PixelRays& rays, const PolarGrid& grid, double camera_height_m) {
-  std::vector<double> least_fall(static_cast<size_t>(grid.numRays()), std::numeric_limits<double>::infinity());
+  std::vector<double> least_fall(static_cast<size_t>(grid.numRays()),
+                                 std::numeric_limits<double>::infinity());
   for (size_t i = 0; i < rays.size(); ++i) {
     double& fall = least_fall[static_cast<size_t>(rays.polar_ray[i])];
     fall = std::min(fall, static_cast<double>(-rays.z[i] / rays.horizontal[i]));
