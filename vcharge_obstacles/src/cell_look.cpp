@@ -1,6 +1,10 @@
 #include "cell_look.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "pixel_rays.h"
 
 namespace vcharge {
 namespace {
@@ -15,6 +19,10 @@ constexpr double kStandsBelow_m = 0.25;
 // Between two images, what is hidden by a standing thing moves by so much.
 constexpr double kParallax_rad = 0.09;
 constexpr double kExplainedMargin_m = 0.3;
+// Obstacles so near to each other, side by side and in range, are parts of one body: no vehicle passes
+// between.
+constexpr double kGapWidth_m = 0.3;
+constexpr double kGapDepth_m = 0.3;
 
 }  // namespace
 
@@ -22,6 +30,35 @@ CellLooker::CellLooker(const CameraObstacles& seen, const PolarGrid& grid, doubl
     : seen_(seen), grid_(grid), cell_m_(cell_m), obstacles_of_ray_(static_cast<size_t>(grid.numRays())) {
   for (const PolarObstacle& obstacle : seen.obstacles) {
     obstacles_of_ray_[static_cast<size_t>(obstacle.ray)].push_back(&obstacle);
+  }
+  bridgeGaps();
+}
+
+/// The nearest obstacle on a ray, if it is so high that a body under which ground shows may be a part of it.
+const PolarObstacle* CellLooker::nearestBodyOn(int ray) const {
+  const auto& obstacles = obstacles_of_ray_[static_cast<size_t>(grid_.wrap(ray))];
+  return obstacles.empty() || obstacles.front()->height_m <= kClearance_m ? nullptr : obstacles.front();
+}
+
+/// Of a dark body stereo sees edges, plates and lamps, and nothing between them but the ground below it.
+void CellLooker::bridgeGaps() {
+  bridge_m_.assign(static_cast<size_t>(grid_.numRays()), std::numeric_limits<double>::infinity());
+  for (int ray = 0; ray < grid_.numRays(); ++ray) {
+    const PolarObstacle* first = nearestBodyOn(ray);
+    if (first == nullptr) {
+      continue;
+    }
+    const auto reach = static_cast<int>(kGapWidth_m / (first->range_m * grid_.increment_rad()));
+    for (int step = 1; step <= reach; ++step) {
+      const PolarObstacle* next = nearestBodyOn(ray + step);
+      if (next == nullptr || std::abs(next->range_m - first->range_m) > kGapDepth_m) {
+        continue;
+      }
+      for (int between = ray + 1; between < ray + step; ++between) {
+        bridge_m_[static_cast<size_t>(grid_.wrap(between))] = std::min(first->range_m, next->range_m);
+      }
+      break;
+    }
   }
 }
 
@@ -60,6 +97,10 @@ bool CellLooker::isExplained(double angle_rad, double range_m) const {
 }
 
 bool CellLooker::blocks(int ray, double range_m) const {
+  const double bridge_m = bridge_m_[static_cast<size_t>(ray)];
+  if (bridge_m < range_m && seen_.camera_height_m * (1.0 - bridge_m / range_m) < kClearance_m) {
+    return true;
+  }
   for (const PolarObstacle* obstacle : obstacles_of_ray_[static_cast<size_t>(ray)]) {
     const double margin_m = kMarginCells * cell_m_ + 2.0 * obstacle->range_sigma_m;
     // Over what stands before it, ground can only be seen from higher up; else it is a mirror's.

@@ -29,12 +29,15 @@ class CellLooker {
   bool isExplained(double angle_rad, double range_m) const;
 
  private:
+  void bridgeGaps();
+  const PolarObstacle* nearestBodyOn(int ray) const;
   bool blocks(int ray, double range_m) const;
 
   const CameraObstacles& seen_;
   const PolarGrid& grid_;
   const double cell_m_;
   std::vector<std::vector<const PolarObstacle*>> obstacles_of_ray_;
+  std::vector<double> bridge_m_;  // by ray: range of a body between two obstacles beside it; else infinite
 };
 
 }  // namespace vcharge

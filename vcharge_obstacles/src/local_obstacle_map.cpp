@@ -288,7 +288,7 @@ void LocalObstacleMap::addGroundLook(const GroundLook& ground, double weight, Ti
 void LocalObstacleMap::addLook(const Look& look, Timestamp stamp) {
   const int64_t x = indexOf(look.point_m.x());
   const int64_t y = indexOf(look.point_m.y());
-  if (!isInside(x, y)) {
+  if (!isInside(x, y) || look.mass <= 0.0) {
     return;
   }
   Cell& cell = cellAt(x, y);

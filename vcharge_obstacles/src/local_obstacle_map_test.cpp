@@ -56,6 +56,37 @@ class LocalObstacleMapTest : public ::testing::Test {
 
 const BoxWorld kPerson{{{{1.7, 2.8, 0.0}, {2.1, 3.2, 1.7}}}};
 
+TEST_F(LocalObstacleMapTest, LooksWithoutWeightLeaveNoTrace) {
+  CameraObstacles seen;
+  seen.camera_name = "front";
+  seen.camera_height_m = 0.6;
+  seen.free_share.assign(grid_.size(), 0.0F);
+  seen.hidden_share = seen.unknown_share = seen.free_share;
+  PolarObstacle wall;
+  wall.ray = grid_.rayOf(0.0);
+  wall.range_m = 3.05;
+  wall.range_sigma_m = 0.03;
+  wall.height_m = 1.0;
+  wall.support = 1.0;
+  for (const double weight : {0.0, 1.0, 1.0, 1.0}) {
+    wall.weight = weight;
+    seen.obstacles = {wall};
+    seen.camera_name += "x";  // a camera's first look counts in full
+    stamp_ = stamp_ + durationFromSeconds(0.08);
+    map_.moveTo(stamp_, {});
+    map_.add(seen, grid_, {});
+    if (weight == 0.0) {
+      EXPECT_EQ(count(map_.snapshot(), kCellUnobserved), map_.snapshot().state.size().area());
+    }
+  }
+  const ObstacleMap map = map_.snapshot();
+  const cv::Mat occupied = map.state == kCellOccupied;
+  ASSERT_EQ(cv::countNonZero(occupied), 1);
+  std::vector<cv::Point> places;
+  cv::findNonZero(occupied, places);
+  EXPECT_NEAR(map.height_m.at<float>(places[0]), 1.0F, 1e-4F);
+}
+
 TEST_F(LocalObstacleMapTest, KeepsFreeOccupiedAndUnobservedApart) {
   drive(kPerson, 0.0, 0.8);
   EXPECT_EQ(stateAt(1.9, 2.85), kCellOccupied);

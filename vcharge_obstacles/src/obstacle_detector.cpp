@@ -45,7 +45,8 @@ struct ObstacleDetector::Implementation {
         size(camera.size()),
         position(vehicle_from_camera.translation().cast<float>()),
         rays(camera, vehicle_from_camera, grid, options.pixel_step),
-        expected(rays, grid, position.z(), options.min_height_m, options.reference_height_m) {
+        expected(rays, grid, position.z(), options.min_height_m, options.reference_height_m),
+        overseen_m(overseenRange(rays, grid, position.z())) {
     const Eigen::Vector3d axis = vehicle_from_camera.rotation() * Eigen::Vector3d::UnitZ();
     const double axis_rad = std::atan2(axis.y(), axis.x());
     for (int ray = 0; ray < grid.numRays(); ++ray) {
@@ -66,6 +67,7 @@ struct ObstacleDetector::Implementation {
   PolarPoints collectPoints(const RangeMap& map, const GroundPlane& ground, GroundEvidence* evidence) const;
   void addGroundStrip(size_t i, const GroundPlane& ground, float weight, StripSum* sum) const;
   std::vector<float> shareOf(const std::vector<float>& weights) const;
+  void dropOverhungGround(std::vector<float>* free_share) const;
 
   const ObstacleDetectorOptions options;
   const PolarGrid grid;
@@ -73,7 +75,8 @@ struct ObstacleDetector::Implementation {
   const Eigen::Vector3f position;
   const PixelRays rays;
   const ExpectedPixels expected;
-  std::vector<bool> is_off_axis;  // by sector
+  const std::vector<double> overseen_m;  // by sector
+  std::vector<bool> is_off_axis;         // by sector
 };
 
 void ObstacleDetectorOptions::validate() const {
@@ -87,6 +90,8 @@ void ObstacleDetectorOptions::validate() const {
                max_height_m);
   requireField(min_confidence >= 0.0 && min_confidence < 1.0, "min_confidence", "must be in [0, 1)",
                min_confidence);
+  requireField(reference_confidence > 0.5 && reference_confidence < 1.0, "reference_confidence",
+               "must be in (0.5, 1)", reference_confidence);
   requireField(max_relative_sigma > 0.0, "max_relative_sigma", "must be positive", max_relative_sigma);
   requireField(min_support > 0.0 && min_support <= 1.0, "min_support", "must be in (0, 1]", min_support);
   requireField(min_support_behind >= min_support, "min_support_behind", "must not be below min_support",
@@ -199,7 +204,7 @@ PolarPoints ObstacleDetector::Implementation::collectPoints(const RangeMap& map,
       const float above = 1.0F / (1.0F + std::exp(-1.7F * (height - threshold) / height_sigma));
       if (bin >= 0 && height < max_height) {
         points.addObstacle({static_cast<int16_t>(rays.polar_ray[i]), static_cast<int16_t>(bin), distance,
-                            sigma_m[pixel] * rays.horizontal[i], height, height_sigma,
+                            sigma_m[pixel] * rays.horizontal[i], height, height_sigma, confidence[pixel],
                             above * confidence[pixel]});
       }
       addGroundStrip(i, ground, confidence[pixel], &evidence->hidden);
@@ -233,6 +238,16 @@ std::vector<float> ObstacleDetector::Implementation::shareOf(const std::vector<f
   return share;
 }
 
+/// Ground over which the image ends too low is no evidence: the body under which it shows may lie outside.
+void ObstacleDetector::Implementation::dropOverhungGround(std::vector<float>* free_share) const {
+  for (int ray = 0; ray < grid.numRays(); ++ray) {
+    const double from_m = std::max(options.max_off_axis_range_m, overseen_m[static_cast<size_t>(ray)]);
+    for (int bin = 0; bin < grid.numBins() && grid.range_m(bin) > from_m; ++bin) {
+      (*free_share)[grid.index(ray, bin)] = 0.0F;
+    }
+  }
+}
+
 CameraObstacles ObstacleDetector::detect(const RangeMap& map) const {
   const Implementation& self = *implementation_;
   check(map.range_m.size() == self.size && map.standard_deviation_m.size() == self.size &&
@@ -248,6 +263,7 @@ CameraObstacles ObstacleDetector::detect(const RangeMap& map) const {
   GroundEvidence evidence(self.grid);
   const PolarPoints points = self.collectPoints(map, result.ground, &evidence);
   result.free_share = self.shareOf(evidence.bare.finish());
+  self.dropOverhungGround(&result.free_share);
   result.hidden_share = self.shareOf(evidence.hidden.finish());
   result.unknown_share = self.shareOf(evidence.unknown.finish());
   result.occupied_share = points.occupiedShare();

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "box_world.h"
+#include "vcharge_core/ray_table.h"
 
 namespace vcharge {
 namespace {
@@ -99,6 +100,54 @@ std::vector<PolarObstacle> onRay(const CameraObstacles& seen, size_t ray) {
   std::copy_if(seen.obstacles.begin(), seen.obstacles.end(), std::back_inserter(found),
                [&](const PolarObstacle& obstacle) { return static_cast<size_t>(obstacle.ray) == ray; });
   return found;
+}
+
+TEST_F(ObstacleDetectorTest, HighThingsWeighByTheLogOddsOfTheirConfidence) {
+  const BoxWorld wall{{{{-20.0, 2.98, 0.0}, {20.0, 3.2, 0.8}}}};
+  const BoxWorld kerb{{{{-20.0, 2.5, 0.0}, {20.0, 3.2, 0.12}}}};
+  options_.reference_confidence = 0.9;
+  const RigCamera& camera = rig_.cameras[rig_.cameraIndex("left")];
+  const auto weightAt = [&](const BoxWorld& world, double confidence) {
+    RangeMap map = measureBoxWorld(world, camera, {}, Timestamp(), {0.005, 0.0, 3});
+    map.confidence.setTo(confidence, map.confidence > 0.0);
+    const CameraObstacles seen = detectIn(map, camera);
+    const std::vector<PolarObstacle> found = onRay(seen, rayTo(seen, 0.5 * M_PI));
+    return found.empty() ? -1.0 : found.front().weight;
+  };
+  EXPECT_NEAR(weightAt(wall, 0.95), 1.0, 1e-6);
+  EXPECT_NEAR(weightAt(wall, 0.75), std::log(3.0) / std::log(9.0), 1e-3);
+  EXPECT_NEAR(weightAt(wall, 0.45), 0.0,
+              1e-6);  // rather wrong than right; hides the ground behind all the same
+  EXPECT_NEAR(weightAt(wall, 0.85), std::log(0.85 / 0.15) / std::log(9.0), 1e-3);
+  EXPECT_NEAR(weightAt(kerb, 0.85), 1.0, 1e-6);
+}
+
+TEST_F(ObstacleDetectorTest, GroundOverWhichTheImageEndsIsNotFree) {
+  const PolarGrid grid(options_.grid);
+  /// Of bare ground straight aside of the left camera, whose image ends at rays that fall so much per metre.
+  const auto freeShare = [&](double fall, double range_m) {
+    RigCamera camera = rig_.cameras[rig_.cameraIndex("left")];
+    const RayTable rays(camera.model, camera.image_size_px, 2.0 * M_PI, camera.mask);
+    camera.mask = cv::Mat(camera.image_size_px, CV_8UC1, cv::Scalar(255));
+    for (int y = 0; y < camera.mask.rows; ++y) {
+      for (int x = 0; x < camera.mask.cols; ++x) {
+        const Eigen::Vector3d ray = camera.vehicle_from_camera->rotation() * rays.ray(x, y).cast<double>();
+        if (ray.z() > -fall * ray.head<2>().norm()) {
+          camera.mask.at<uint8_t>(y, x) = 0;
+        }
+      }
+    }
+    const CameraObstacles seen = detectIn(measureBoxWorld({}, camera, {}, Timestamp()), camera);
+    const int bin = grid.binOfInverse(static_cast<float>(1.0 / range_m));
+    return seen.free_share[grid.index(grid.rayOf(0.5 * M_PI), bin)];
+  };
+  EXPECT_GT(freeShare(-1.0, 3.6), 0.5F);  // no end
+  // From 0.9 m height a ray that falls by 0.2 passes 0.25 m above the ground 3.25 m away, and meets it at 4.5
+  // m.
+  EXPECT_GT(freeShare(0.2, 2.9), 0.5F);
+  EXPECT_EQ(freeShare(0.2, 3.6), 0.0F);
+  // So near, another camera sees what stands there, if any: 0.25 m at 1.6 m, the ground at 2.25 m.
+  EXPECT_GT(freeShare(0.4, 2.0), 0.5F);
 }
 
 TEST_F(ObstacleDetectorTest, RampOfRangesUpToAWallCountsForLess) {

@@ -47,6 +47,21 @@ ExpectedPixels::ExpectedPixels(const PixelRays& rays, const PolarGrid& grid, dou
   obstacle = obstacle_sum.finish();
 }
 
+std::vector<double> overseenRange(const PixelRays& rays, const PolarGrid& grid, double camera_height_m) {
+  std::vector<double> least_fall(static_cast<size_t>(grid.numRays()),
+                                 std::numeric_limits<double>::infinity());
+  for (size_t i = 0; i < rays.size(); ++i) {
+    double& fall = least_fall[static_cast<size_t>(rays.polar_ray[i])];
+    fall = std::min(fall, static_cast<double>(-rays.z[i] / rays.horizontal[i]));
+  }
+  std::vector<double> range_m;
+  for (const double fall : least_fall) {
+    const double above_m = std::max(0.0, camera_height_m - kClearance_m);
+    range_m.push_back(fall > 0.0 ? above_m / fall : std::numeric_limits<double>::infinity());
+  }
+  return range_m;
+}
+
 std::vector<float> StripSum::finish() const {
   std::vector<float> sums(grid_.size());
   for (int ray = 0; ray < grid_.numRays(); ++ray) {

@@ -34,6 +34,13 @@ struct ExpectedPixels {
   std::vector<float> obstacle;  ///< rays that would hit an obstacle between low_m and reference_m
 };
 
+/// Bodies may hang so high over ground that shows under them.
+constexpr double kClearance_m = 0.25;
+
+/// How far, by sector, a camera sees not the ground alone but also up to kClearance_m over it: beyond, the
+/// body under which ground shows may lie outside the image.
+std::vector<double> overseenRange(const PixelRays& rays, const PolarGrid& grid, double camera_height_m);
+
 /// Adds `weight` to all cells of a sector whose middle lies between two inverse ranges. Sums up when
 /// finished: cheap for long strips.
 class StripSum {

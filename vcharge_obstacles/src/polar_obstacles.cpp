@@ -33,6 +33,22 @@ double medianOf(const std::vector<PolarPoint>& points, float PolarPoint::*member
   return quantile(std::move(values), 0.5);
 }
 
+/// What a look of this confidence, which is the probability that its ranges are right, weighs: points of one
+/// window are right or wrong together, so that their number does not make them surer.
+double weightOfConfidence(double confidence, double reference) {
+  const auto logOdds = [](double probability) { return std::log(probability / (1.0 - probability)); };
+  constexpr double kCertain = 0.999;
+  return std::clamp(logOdds(std::min(confidence, kCertain)) / logOdds(reference), 0.0, 1.0);
+}
+
+double meanConfidence(const std::vector<PolarPoint>& points) {
+  double sum = 0.0;
+  for (const PolarPoint& point : points) {
+    sum += point.confidence;
+  }
+  return sum / static_cast<double>(points.size());
+}
+
 /// Range and height of an obstacle from the points in its cell and the two beside it.
 PolarObstacle refine(int ray, const std::vector<PolarPoint>& points, double support) {
   PolarObstacle obstacle;
@@ -168,6 +184,16 @@ bool isRamp(const PolarPoints& points, const PolarObstacle& low, const ObstacleD
   return end_m - last_m <= kRampGap_m;
 }
 
+double weightOf(const PolarObstacle& obstacle, const std::vector<PolarPoint>& points,
+                const ObstacleDetectorOptions& options) {
+  if (obstacle.is_ramp) {
+    return options.ramp_weight;
+  }
+  return obstacle.height_m <= options.max_ramp_height_m
+             ? 1.0
+             : weightOfConfidence(meanConfidence(points), options.reference_confidence);
+}
+
 }  // namespace
 
 void PolarPoints::sortByRay() {
@@ -219,9 +245,10 @@ std::vector<PolarObstacle> findPolarObstacles(const PolarPoints& points,
       const std::optional<double> support =
           supportOf(points, ray, bin, expected_pixels[grid.index(ray, bin)], options);
       if (support && (count == 0 || *support >= options.min_support_behind)) {
-        found.push_back(refine(ray, points.pointsOf(ray, bin - 1, bin + 1), *support));
+        const std::vector<PolarPoint> here = points.pointsOf(ray, bin - 1, bin + 1);
+        found.push_back(refine(ray, here, *support));
         found.back().is_ramp = isRamp(points, found.back(), options);
-        found.back().weight = found.back().is_ramp ? options.ramp_weight : 1.0;
+        found.back().weight = weightOf(found.back(), here, options);
         last_range_m = found.back().range_m;
         ++count;
       }

@@ -12,6 +12,7 @@ struct PolarPoint {
   int16_t ray, bin;
   float range_m, range_sigma_m;  // horizontal
   float height_m, height_sigma_m;
+  float confidence;
   float weight;
 };
 

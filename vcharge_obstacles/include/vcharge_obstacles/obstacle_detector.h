@@ -39,7 +39,9 @@ struct ObstacleDetectorOptions {
   /// saw the high thing, its shadow and the ground before it at once, and made a ramp of them.
   double max_ramp_height_m = 0.3;
   double max_ramp_length_m = 1.3;
-  double ramp_weight = 0.25;        ///< of a look at such a ramp in the map: it may be a kerb after all
+  double ramp_weight = 0.25;  ///< of a look at such a ramp in the map: it may be a kerb after all
+  /// Points of this mean confidence make a full look in the map; less sure ones weigh by their log odds.
+  double reference_confidence = 0.9;
   double sure_ground_sigmas = 1.0;  ///< a ground point lies so far below min_height_m
   double below_ground_m = 0.08;     ///< deeper points are wrong ranges, not ground
   /// Where the ground is not known, an obstacle rises above all that a tilt of this size explains.
@@ -70,6 +72,7 @@ struct ObstacleDetectorOptions {
     visit("max_ramp_height_m", max_ramp_height_m);
     visit("max_ramp_length_m", max_ramp_length_m);
     visit("ramp_weight", ramp_weight);
+    visit("reference_confidence", reference_confidence);
     visit("sure_ground_sigmas", sure_ground_sigmas);
     visit("below_ground_m", below_ground_m);
     visit("lost_ground_tilt_rad", lost_ground_tilt_rad);
