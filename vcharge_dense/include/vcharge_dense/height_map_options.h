@@ -25,6 +25,9 @@ struct HeightFusionOptions {
   /// is seen at grazing angles: a matching window there covers both sides of a kerb.
   double reference_footprint_m = 0.15;
   double free_weight = 1.0;    ///< of free voxels over that of occupied ones
+  /// What is occupied over free space, as a car's body over the ground under it, is the surface where its
+  /// weights, times the height of a voxel, sum to this (0: one height parts what is occupied from what is free).
+  double min_layer_weight_m = 0.0;
   double max_memory_gb = 4.0;  ///< a grid that needs more is refused
 
   template <class Visitor>
@@ -42,6 +45,7 @@ struct HeightFusionOptions {
     visit("reference_confidence", reference_confidence);
     visit("reference_footprint_m", reference_footprint_m);
     visit("free_weight", free_weight);
+    visit("min_layer_weight_m", min_layer_weight_m);
     visit("max_memory_gb", max_memory_gb);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field

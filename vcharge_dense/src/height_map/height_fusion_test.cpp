@@ -82,7 +82,8 @@ TEST(HeightFusionTest, FindsGroundAndBoxWithinAVoxel) {
       const double truth = drive.world.heightAt(place.x(), place.y());
       EXPECT_NEAR(columns.best_height_m.at<float>(row, column), truth, drive.grid.height_step_m + 1e-4)
           << place.transpose();
-      EXPECT_GT(columns.confidence.at<float>(row, column), 0.5F);
+      EXPECT_GT(columns.support_below.at<float>(row, column), 0.5F);
+      EXPECT_GT(columns.support_above.at<float>(row, column), 0.5F);
       ++(truth > 0.0 ? num_box : num_ground);
     }
   }
