@@ -27,7 +27,7 @@ struct HeightFusionOptions {
   double free_weight = 1.0;    ///< of free voxels over that of occupied ones
   /// What is occupied over free space, as a car's body over the ground under it, is the surface where its
   /// weights, times the height of a voxel, sum to this (0: one height parts what is occupied from what is free).
-  double min_layer_weight_m = 0.0;
+  double min_layer_weight_m = 0.2;
   double max_memory_gb = 4.0;  ///< a grid that needs more is refused
 
   template <class Visitor>
@@ -70,13 +70,13 @@ struct PrimalDualOptions {
 /// neighbouring cells, so that lambda and epsilon are per cell.
 struct HeightRegularizationOptions {
   double label_lambda = 0.1;  ///< lambda_l
-  double label_gamma = 24.0;  ///< gamma: sum of weights that the free space of an observed cell must reach
+  double label_gamma = 10.0;  ///< gamma: sum of weights that the free space of an observed cell must reach
   PrimalDualOptions label_solver = {1e-3, 4000, 1.0};
   double height_lambda = 2.0;         ///< lambda_h
   double alpha_up = 1.0;              ///< alpha_1: slope of the cost below the cell's best height
   double alpha_down = 1.0;            ///< alpha_2: above it
   double confidence_weighting = 1.0;  ///< 0: the data of all cells count alike; 1: as their confidence
-  double huber_epsilon_m = 0.01;
+  double huber_epsilon_m = 0.002;
   PrimalDualOptions height_solver;
 
   template <class Visitor>
