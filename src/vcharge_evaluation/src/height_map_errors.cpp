@@ -52,9 +52,9 @@ class MapInWorld {
     return (world_from_map_ * Eigen::Vector3d(in_map.x(), in_map.y(), map_.height_m.at<float>(at))).z();
   }
 
-  /// Heights along a line over a step. The middle of the slope between two cells is where the edge is likeliest to
-  /// be; what is read a hand above the ground of a high step would lie up to half a cell before it. So cells are
-  /// taken as they are there: the edge is where the first one begins that rises.
+  /// Heights along a line over a step. The middle of the slope between two cells is where the edge is
+  /// likeliest to be; what is read a hand above the ground of a high step would lie up to half a cell before
+  /// it. So cells are taken as they are there: the edge is where the first one begins that rises.
   HeightAt heightsOver(const HeightStep& step) const {
     return [this, high = isHigh(step), about_m = step.low_m](const Eigen::Vector2d& place_m) {
       return high ? cellHeightAt(place_m, about_m) : heightAt(place_m, about_m);
@@ -153,8 +153,8 @@ void judgeSteps(const MapInWorld& in_world, const SurfaceVisibility& visibility,
     const Eigen::Vector2d beside = options.plateau_m * step.direction;
     const double low = in_world.heightAt(step.place_m - beside, step.low_m);
     const double high = in_world.heightAt(step.place_m + beside, step.low_m);
-    const auto crossing = findCrossing(in_world.heightsOver(step), step.place_m, step.direction, -options.search_m,
-                                       options.search_m, step.low_m + stepLevel(step));
+    const auto crossing = findCrossing(in_world.heightsOver(step), step.place_m, step.direction,
+                                       -options.search_m, options.search_m, step.low_m + stepLevel(step));
     if (crossing) {
       ++errors->num_steps_found;
       positions.push_back(std::abs(*crossing));

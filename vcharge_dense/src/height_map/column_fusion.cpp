@@ -21,7 +21,7 @@ namespace {
 constexpr int kBlockCells = 512;          // side of a block of columns
 constexpr size_t kViewsAtOnce = 8;        // that are added to a block in one parallel loop
 constexpr size_t kKeptBytes = 600000000;  // of views in memory, the last ones that were used
-constexpr double kBytesPerCell = 80.0;    // of images and solvers, see primal_dual.h
+constexpr double kBytesPerCell = 92.0;    // of images and solvers, see primal_dual.h
 constexpr double kSupport_m = 0.1;        // above and below the best height, for the confidence
 // Sum of weights, times the height of a voxel, by which 1 - 1/e of full confidence is reached.
 constexpr double kFullSupport_m = 0.05;
@@ -239,7 +239,8 @@ ColumnImages fuseColumns(const VoxelGrid& grid, const std::vector<Eigen::Vector3
                          const LoadView& load_view, const HeightFusionOptions& options,
                          const std::function<void(double)>& progress) {
   ColumnImages images;
-  for (cv::Mat* image : {&images.best_height_m, &images.occupied_gain, &images.support_below, &images.support_above}) {
+  for (cv::Mat* image :
+       {&images.best_height_m, &images.occupied_gain, &images.support_below, &images.support_above}) {
     image->create(grid.rows, grid.columns, CV_32FC1);
   }
   BlockFuser fuser(grid, options, &images);

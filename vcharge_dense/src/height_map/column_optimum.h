@@ -16,10 +16,10 @@ struct ColumnOptimum {
 /// Height of least cost C(h) = - sum of the weights below h + sum of those from h up (paper, equation
 /// perColumnMin); the lowest one where several cost the same. Weights are negative where the data say free.
 ///
-/// One height cannot show what stands over free space: cameras look under a car's body, and where its paint is
-/// hardly matched the free space outweighs it. So a column may have layers (Gallup et al. 2010, A heightmap
-/// model for efficient 3D reconstruction from street-level video): a run of voxels above the best height whose
-/// weights sum to `min_layer_weight` or more is one, and the height is its top.
+/// One height cannot show what stands over free space: cameras look under a car's body, and where its paint
+/// is hardly matched the free space outweighs it. So a column may have layers (Gallup et al. 2010, 3D
+/// reconstruction using an n-layer heightmap): a run of voxels above the best height whose weights sum to
+/// `min_layer_weight` or more is one, and the height is its top.
 inline ColumnOptimum findColumnOptimum(const float* weights, int num_voxels,
                                        double min_layer_weight = std::numeric_limits<double>::infinity()) {
   double cost = 0.0;

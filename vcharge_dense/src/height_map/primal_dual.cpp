@@ -99,13 +99,12 @@ void PrimalDualSolver::iterateBand(int first_row, int last_row, const Fields& fr
       }
       const size_t at = static_cast<size_t>(row + 1) * stride_ + kRowPadding;
       const size_t data = offset(begin + row) + kRowPadding;
-      iterateRow(
-          {scratch.value.data() + at, scratch.extrapolated.data() + at,
-           scratch.extrapolated.data() + at + stride_, scratch.dual_x.data() + at, scratch.dual_y.data() + at,
-           scratch.dual_y.data() + at - stride_, floor_.data() + data, ceiling_.data() + data,
-           slope_.data() + data, weight_below_.data() + data, weight_above_.data() + data,
-           stride_ - 2 * kRowPadding},
-          steps);
+      iterateRow({scratch.value.data() + at, scratch.extrapolated.data() + at,
+                  scratch.extrapolated.data() + at + stride_, scratch.dual_x.data() + at,
+                  scratch.dual_y.data() + at, scratch.dual_y.data() + at - stride_, floor_.data() + data,
+                  ceiling_.data() + data, slope_.data() + data, weight_below_.data() + data,
+                  weight_above_.data() + data, stride_ - 2 * kRowPadding},
+                 steps);
     }
   }
   for (const auto member : members) {
