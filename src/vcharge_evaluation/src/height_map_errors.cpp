@@ -41,6 +41,26 @@ class MapInWorld {
     return (world_from_map_ * Eigen::Vector3d(in_map.x(), in_map.y(), height)).z();
   }
 
+  /// As heightAt(), of the cell there.
+  double cellHeightAt(const Eigen::Vector2d& place_m, double about_m) const {
+    const Eigen::Vector3d in_map = map_from_world_ * Eigen::Vector3d(place_m.x(), place_m.y(), about_m);
+    const Eigen::Vector2d cell = (in_map.head<2>() - map_.origin_m) / map_.cell_size_m;
+    const cv::Point at(static_cast<int>(std::lround(cell.x())), static_cast<int>(std::lround(cell.y())));
+    if (!cv::Rect(cv::Point(), map_.height_m.size()).contains(at)) {
+      return kNotMapped;
+    }
+    return (world_from_map_ * Eigen::Vector3d(in_map.x(), in_map.y(), map_.height_m.at<float>(at))).z();
+  }
+
+  /// Heights along a line over a step. The middle of the slope between two cells is where the edge is
+  /// likeliest to be; what is read a hand above the ground of a high step would lie up to half a cell before
+  /// it. So cells are taken as they are there: the edge is where the first one begins that rises.
+  HeightAt heightsOver(const HeightStep& step) const {
+    return [this, high = isHigh(step), about_m = step.low_m](const Eigen::Vector2d& place_m) {
+      return high ? cellHeightAt(place_m, about_m) : heightAt(place_m, about_m);
+    };
+  }
+
   /// The centre of a cell on the map's surface, or near the ground where it is not observed.
   Eigen::Vector3d cell(int column, int row, double ground_m) const {
     const Eigen::Vector2d centre = map_.centreOf(column, row);
@@ -130,13 +150,11 @@ void judgeSteps(const MapInWorld& in_world, const SurfaceVisibility& visibility,
                 HeightMapErrors* errors) {
   std::vector<double> positions, kerbs;
   for (const HeightStep& step : steps) {
-    const HeightAt height = [&](const Eigen::Vector2d& place_m) {
-      return in_world.heightAt(place_m, step.low_m);
-    };
     const Eigen::Vector2d beside = options.plateau_m * step.direction;
-    const double low = height(step.place_m - beside), high = height(step.place_m + beside);
-    const auto crossing = findCrossing(height, step.place_m, step.direction, -options.search_m,
-                                       options.search_m, step.low_m + stepLevel(step));
+    const double low = in_world.heightAt(step.place_m - beside, step.low_m);
+    const double high = in_world.heightAt(step.place_m + beside, step.low_m);
+    const auto crossing = findCrossing(in_world.heightsOver(step), step.place_m, step.direction,
+                                       -options.search_m, options.search_m, step.low_m + stepLevel(step));
     if (crossing) {
       ++errors->num_steps_found;
       positions.push_back(std::abs(*crossing));
@@ -175,7 +193,7 @@ std::optional<double> findEnd(const HeightAt& height, const Eigen::Vector2d& sta
 /// five lines.
 double readEdge(const MapInWorld& in_world, const HeightStep& step, double search_m, double cell_size_m) {
   const Eigen::Vector2d across(-step.direction.y(), step.direction.x());
-  const HeightAt height = [&](const Eigen::Vector2d& place_m) {
+  const HeightAt interpolated = [&](const Eigen::Vector2d& place_m) {
     return in_world.heightAt(place_m, step.low_m);
   };
   const double level_m = step.low_m + stepLevel(step);
@@ -183,9 +201,9 @@ double readEdge(const MapInWorld& in_world, const HeightStep& step, double searc
   for (const double aside : {-0.1, -0.05, 0.0, 0.05, 0.1}) {
     const Eigen::Vector2d start = step.place_m + aside * across;
     std::optional<double> crossing =
-        findCrossing(height, start, step.direction, -search_m, search_m, level_m);
+        findCrossing(in_world.heightsOver(step), start, step.direction, -search_m, search_m, level_m);
     if (!crossing) {
-      crossing = findEnd(height, start, step.direction, search_m, level_m, cell_size_m);
+      crossing = findEnd(interpolated, start, step.direction, search_m, level_m, cell_size_m);
     }
     if (crossing) {
       crossings.push_back(*crossing);

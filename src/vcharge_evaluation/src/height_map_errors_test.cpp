@@ -118,6 +118,28 @@ TEST_F(HeightMapErrorsTest, EdgesAreWhereTheGroundEndsNotWhatIsMappedBehindAGap)
   EXPECT_GT(num_lengths, 0);
 }
 
+TEST_F(HeightMapErrorsTest, HighEdgesAreNotReadBeforeTheCellThatRises) {
+  // A pillar whose faces lie wherever they may in the map's cells, of which the truth's are a fifth.
+  for (const double offset_m : {0.0, 0.01, 0.02, 0.03, 0.04}) {
+    const auto withPillar = [&](double cell_size_m) {
+      HeightMap map = world(cell_size_m);
+      for (int row = 0; row < map.height_m.rows; ++row) {
+        for (int column = 0; column < map.height_m.cols; ++column) {
+          const Eigen::Vector2d place = map.centreOf(column, row);
+          if (std::abs(place.x() - 1.0 - offset_m) < 0.2 && std::abs(place.y() + 1.4) < 0.2) {
+            map.height_m.at<float>(row, column) = 2.0F;
+          }
+        }
+      }
+      return map;
+    };
+    const HeightMapErrors errors = evaluateHeightMap(withPillar(0.05), RigidTransform(), withPillar(0.01),
+                                                     poses_, rig_, everything_rigid_);
+    EXPECT_LT(errors.step_position_m.max, 0.036) << offset_m;  // half a cell, and a sample
+    EXPECT_GT(errors.step_position_m.count, 50U);
+  }
+}
+
 TEST_F(HeightMapErrorsTest, LaysAMapOfAnotherFrameOverTheTruth) {
   // The map's frame is turned by 180 degrees, which keeps its cells on the grid, and lies elsewhere.
   const RigidTransform world_from_map(rotationFromYawPitchRoll(M_PI, 0.0, 0.0),

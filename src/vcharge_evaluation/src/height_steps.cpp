@@ -52,8 +52,7 @@ std::optional<HeightStep> stepBetween(const HeightMap& truth, const Eigen::Vecto
       !isFlat(truth, low_cell_m, -direction, options.plateau_m)) {
     return std::nullopt;
   }
-  const bool is_high = step.high_m - step.low_m > 2.0 * kHand_m;
-  if (!is_high && !isFlat(truth, high_cell_m, direction, options.plateau_m)) {
+  if (!isHigh(step) && !isFlat(truth, high_cell_m, direction, options.plateau_m)) {
     return std::nullopt;
   }
   const HeightAt height = [&](const Eigen::Vector2d& place_m) { return heightOf(truth, place_m); };
@@ -127,8 +126,12 @@ std::optional<double> findCrossing(const HeightAt& height, const Eigen::Vector2d
   return nearest;
 }
 
+bool isHigh(const HeightStep& step) {
+  return step.high_m - step.low_m > 2.0 * kHand_m;
+}
+
 double stepLevel(const HeightStep& step) {
-  return std::min(0.5 * (step.high_m - step.low_m), kHand_m);
+  return isHigh(step) ? kHand_m : 0.5 * (step.high_m - step.low_m);
 }
 
 std::vector<HeightStep> findHeightSteps(const HeightMap& truth, const HeightMapErrorOptions& options,

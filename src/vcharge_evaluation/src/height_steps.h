@@ -21,6 +21,9 @@ std::optional<double> findCrossing(const HeightAt& height, const Eigen::Vector2d
 /// of a high one, whose top no camera may see.
 double stepLevel(const HeightStep& step);
 
+/// Whether the place of a step is read a hand above the ground, below half its height.
+bool isHigh(const HeightStep& step);
+
 /// Steps of a true height map: jumps within a cell along rows and columns, between places that are flat over
 /// plateau_m, at edges that run across the line within 30 degrees. `isSeen` tells whether the surface at a
 /// place is seen: lower sides must be.

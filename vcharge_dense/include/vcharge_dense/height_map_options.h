@@ -24,7 +24,11 @@ struct HeightFusionOptions {
   /// The weight of a range whose pixel spans this much of the surface is one half (0: all alike). Far ground
   /// is seen at grazing angles: a matching window there covers both sides of a kerb.
   double reference_footprint_m = 0.15;
-  double free_weight = 1.0;    ///< of free voxels over that of occupied ones
+  double free_weight = 1.0;  ///< of free voxels over that of occupied ones
+  /// What is occupied over free space, as a car's body over the ground under it, is the surface where its
+  /// weights, times the height of a voxel, sum to this (0: one height parts what is occupied from what is
+  /// free).
+  double min_layer_weight_m = 0.2;
   double max_memory_gb = 4.0;  ///< a grid that needs more is refused
 
   template <class Visitor>
@@ -42,6 +46,7 @@ struct HeightFusionOptions {
     visit("reference_confidence", reference_confidence);
     visit("reference_footprint_m", reference_footprint_m);
     visit("free_weight", free_weight);
+    visit("min_layer_weight_m", min_layer_weight_m);
     visit("max_memory_gb", max_memory_gb);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
@@ -66,13 +71,14 @@ struct PrimalDualOptions {
 /// neighbouring cells, so that lambda and epsilon are per cell.
 struct HeightRegularizationOptions {
   double label_lambda = 0.1;  ///< lambda_l
-  double label_gamma = 24.0;  ///< gamma: sum of weights that the free space of an observed cell must reach
+  double label_gamma = 10.0;  ///< gamma: sum of weights that the free space of an observed cell must reach
   PrimalDualOptions label_solver = {1e-3, 4000, 1.0};
-  double height_lambda = 2.0;         ///< lambda_h
-  double alpha_up = 1.0;              ///< alpha_1: slope of the cost below the cell's best height
-  double alpha_down = 1.0;            ///< alpha_2: above it
-  double confidence_weighting = 1.0;  ///< 0: the data of all cells count alike; 1: as their confidence
-  double huber_epsilon_m = 0.01;
+  double height_lambda = 2.0;  ///< lambda_h
+  double alpha_up = 1.0;       ///< alpha_1: slope of the cost below the cell's best height
+  double alpha_down = 1.0;     ///< alpha_2: above it
+  /// 0: the data of all cells hold their height alike; 1: from either side as much as was seen there.
+  double confidence_weighting = 1.0;
+  double huber_epsilon_m = 0.002;
   PrimalDualOptions height_solver;
 
   template <class Visitor>

@@ -21,7 +21,7 @@ namespace {
 constexpr int kBlockCells = 512;          // side of a block of columns
 constexpr size_t kViewsAtOnce = 8;        // that are added to a block in one parallel loop
 constexpr size_t kKeptBytes = 600000000;  // of views in memory, the last ones that were used
-constexpr double kBytesPerCell = 80.0;    // of images and solvers, see primal_dual.h
+constexpr double kBytesPerCell = 92.0;    // of images and solvers, see primal_dual.h
 constexpr double kSupport_m = 0.1;        // above and below the best height, for the confidence
 // Sum of weights, times the height of a voxel, by which 1 - 1/e of full confidence is reached.
 constexpr double kFullSupport_m = 0.05;
@@ -80,16 +80,25 @@ double distanceToBlock(const VoxelGrid& grid, const Block& block, const Eigen::V
   return (place - place.cwiseMax(low).cwiseMin(high)).norm();
 }
 
-double confidenceOf(const float* weights, const VoxelGrid& grid, int height_index) {
+struct Supports {
+  double below, above;
+};
+
+/// How surely a best height has something occupied below it and free space above.
+Supports supportsOf(const float* weights, const VoxelGrid& grid, int height_index) {
   const int reach = std::max(1, static_cast<int>(std::lround(kSupport_m / grid.height_step_m)));
   double above = 0.0, below = 0.0, contrary = 0.0;
   for (int z = std::max(0, height_index - reach); z < std::min(grid.num_voxels, height_index + reach); ++z) {
     const double support = z < height_index ? weights[z] : -weights[z];
     (support < 0.0 ? contrary : z < height_index ? below : above) += std::abs(support);
   }
-  const double support_m = std::min(above, below) * grid.height_step_m;
   const double total = above + below + contrary;
-  return total > 0.0 ? (above + below) / total * (1.0 - std::exp(-support_m / kFullSupport_m)) : 0.0;
+  const auto supportBy = [&](double weight) {
+    return total > 0.0
+               ? (above + below) / total * (1.0 - std::exp(-weight * grid.height_step_m / kFullSupport_m))
+               : 0.0;
+  };
+  return {supportBy(below), supportBy(above)};
 }
 
 /// Fuses one block after the other.
@@ -98,6 +107,8 @@ class BlockFuser {
   BlockFuser(const VoxelGrid& grid, const HeightFusionOptions& options, ColumnImages* images)
       : grid_(grid),
         profile_(options),
+        min_layer_weight_(options.min_layer_weight_m > 0.0 ? options.min_layer_weight_m / grid.height_step_m
+                                                           : std::numeric_limits<double>::infinity()),
         padded_((grid.num_voxels + kVoxelLanes - 1) / kVoxelLanes * kVoxelLanes),
         kernel_(addColumnWeightsKernel()),
         images_(images),
@@ -149,21 +160,25 @@ class BlockFuser {
 
   void extractColumn(int column, int row, int grid_column, int grid_row) {
     const float* weights = columnWeights(column, row);
-    const ColumnOptimum best = findColumnOptimum(weights, grid_.num_voxels);
+    const ColumnOptimum best = findColumnOptimum(weights, grid_.num_voxels, min_layer_weight_);
     float& height = images_->best_height_m.at<float>(grid_row, grid_column);
     float& gain = images_->occupied_gain.at<float>(grid_row, grid_column);
-    float& confidence = images_->confidence.at<float>(grid_row, grid_column);
+    float& support_below = images_->support_below.at<float>(grid_row, grid_column);
+    float& support_above = images_->support_above.at<float>(grid_row, grid_column);
     height = std::numeric_limits<float>::quiet_NaN();
     gain = static_cast<float>(best.occupied_cost - best.min_cost);
-    confidence = 0.0F;
+    support_below = support_above = 0.0F;
     if (best.has_surface) {
       height = static_cast<float>(grid_.bottom_m + best.height_index * grid_.height_step_m);
-      confidence = static_cast<float>(confidenceOf(weights, grid_, best.height_index));
+      const Supports supports = supportsOf(weights, grid_, best.height_index);
+      support_below = static_cast<float>(supports.below);
+      support_above = static_cast<float>(supports.above);
     }
   }
 
   const VoxelGrid grid_;
   const WeightProfile profile_;
+  const double min_layer_weight_;
   const int padded_;  // voxels of a column, for the widest vectors
   const AddColumnWeights kernel_;
   ColumnImages* images_;
@@ -224,7 +239,8 @@ ColumnImages fuseColumns(const VoxelGrid& grid, const std::vector<Eigen::Vector3
                          const LoadView& load_view, const HeightFusionOptions& options,
                          const std::function<void(double)>& progress) {
   ColumnImages images;
-  for (cv::Mat* image : {&images.best_height_m, &images.occupied_gain, &images.confidence}) {
+  for (cv::Mat* image :
+       {&images.best_height_m, &images.occupied_gain, &images.support_below, &images.support_above}) {
     image->create(grid.rows, grid.columns, CV_32FC1);
   }
   BlockFuser fuser(grid, options, &images);

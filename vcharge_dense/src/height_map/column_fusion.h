@@ -30,7 +30,12 @@ VoxelGrid makeVoxelGrid(const Eigen::AlignedBox3d& extent_m, const HeightFusionO
 struct ColumnImages {
   cv::Mat best_height_m;  ///< CV_32FC1; NaN where no surface was seen
   cv::Mat occupied_gain;  ///< CV_32FC1, C^occ - C^min: how strongly free space was seen
-  cv::Mat confidence;     ///< CV_32FC1, 0 where no surface was seen
+  /// CV_32FC1, 0 to 1: how surely what lies just below the best height is occupied, and what lies just above
+  /// it free. Of a car's side the one is seen, and not the other; 0 where no surface was seen.
+  cv::Mat support_below, support_above;
+
+  /// Of the best height: as its weaker side.
+  cv::Mat confidence() const { return cv::min(support_below, support_above); }
 };
 
 /// A camera's range map; called from many threads, each view once per block of the grid that it reaches and

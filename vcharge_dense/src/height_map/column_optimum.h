@@ -1,5 +1,7 @@
 #pragma once
 
+#include <limits>
+
 namespace vcharge {
 
 /// What is kept of a column of voxels.
@@ -8,16 +10,25 @@ struct ColumnOptimum {
   double min_cost = 0.0;       ///< C^min
   double occupied_cost = 0.0;  ///< C^occ: of the column filled to its top
   bool has_surface = false;    ///< something occupied was seen below the best height
+  double layer_weight = 0.0;   ///< of the layer whose top the best height is; 0: all below it is one layer
 };
 
 /// Height of least cost C(h) = - sum of the weights below h + sum of those from h up (paper, equation
 /// perColumnMin); the lowest one where several cost the same. Weights are negative where the data say free.
-inline ColumnOptimum findColumnOptimum(const float* weights, int num_voxels) {
+///
+/// One height cannot show what stands over free space: cameras look under a car's body, and where its paint
+/// is hardly matched the free space outweighs it. So a column may have layers (Gallup et al. 2010, 3D
+/// reconstruction using an n-layer heightmap): a run of voxels above the best height whose weights sum to
+/// `min_layer_weight` or more is one, and the height is its top.
+inline ColumnOptimum findColumnOptimum(const float* weights, int num_voxels,
+                                       double min_layer_weight = std::numeric_limits<double>::infinity()) {
   double cost = 0.0;
   for (int z = 0; z < num_voxels; ++z) {
     cost += weights[z];
   }
-  ColumnOptimum best{0, cost, -cost, false};
+  ColumnOptimum best;
+  best.min_cost = cost;
+  best.occupied_cost = -cost;
   bool occupied_below = false;
   for (int z = 0; z < num_voxels; ++z) {
     cost -= 2.0 * weights[z];
@@ -28,6 +39,21 @@ inline ColumnOptimum findColumnOptimum(const float* weights, int num_voxels) {
       best.min_cost = cost;
       best.has_surface = occupied_below;
     }
+  }
+  double run = 0.0, heaviest = 0.0;
+  int top = best.height_index;
+  for (int z = best.height_index; z < num_voxels; ++z) {
+    run = run > 0.0 ? run + weights[z] : weights[z];
+    if (run > heaviest + 1e-6) {
+      heaviest = run;
+      top = z + 1;
+    }
+  }
+  if (heaviest >= min_layer_weight) {
+    best.height_index = top;
+    best.min_cost -= 2.0 * heaviest;
+    best.has_surface = true;
+    best.layer_weight = heaviest;
   }
   return best;
 }

@@ -1,6 +1,7 @@
 #include "height_map/column_optimum.h"
 
 #include <algorithm>
+#include <numeric>
 #include <random>
 #include <vector>
 
@@ -56,6 +57,50 @@ TEST(ColumnOptimumTest, KnowsThatFreeSpaceAloneIsNoSurface) {
 TEST(ColumnOptimumTest, TakesTheStrongerOfTwoSurfaces) {
   EXPECT_EQ(optimumOf({3, -1, 1, -1}).height_index, 1);
   EXPECT_EQ(optimumOf({3, -1, 2, -1}).height_index, 3);
+}
+
+TEST(ColumnOptimumTest, HasALayerThatTheFreeSpaceUnderItOutweighs) {
+  // The ground, a gap, a car's body of which little is seen, nothing above.
+  const std::vector<float> weights = {3, -4, -4, 2, 2, 0, 0};
+  const auto optimum = [&](double min_layer_weight) {
+    return findColumnOptimum(weights.data(), static_cast<int>(weights.size()), min_layer_weight);
+  };
+  EXPECT_EQ(optimumOf(weights).height_index, 1);
+  EXPECT_EQ(optimum(4.5).height_index, 1);
+  EXPECT_EQ(optimum(4.5).layer_weight, 0.0);
+  EXPECT_EQ(optimum(4.0).height_index, 5);
+  EXPECT_EQ(optimum(4.0).layer_weight, 4.0);
+  EXPECT_EQ(optimum(4.0).min_cost, -15.0);  // nothing speaks against ground, gap and body
+  EXPECT_EQ(optimum(4.0).occupied_cost, optimumOf(weights).occupied_cost);
+}
+
+TEST(ColumnOptimumTest, TheLayerIsTheHeaviestRunAboveTheBestHeight) {
+  std::mt19937 random(8);
+  int num_layers = 0;
+  for (int trial = 0; trial < 2000; ++trial) {
+    std::vector<float> weights(1 + random() % 12);
+    for (float& weight : weights) {
+      weight = static_cast<float>(static_cast<int>(random() % 7) - 3);
+    }
+    const auto size = static_cast<int>(weights.size());
+    const ColumnOptimum single = optimumOf(weights);
+    double heaviest = 0.0;
+    int top = 0;
+    for (int end = single.height_index + 1; end <= size; ++end) {
+      for (int begin = single.height_index; begin < end; ++begin) {
+        const double sum = std::accumulate(weights.begin() + begin, weights.begin() + end, 0.0);
+        top = sum > heaviest ? end : top;
+        heaviest = std::max(heaviest, sum);
+      }
+    }
+    const ColumnOptimum layered = findColumnOptimum(weights.data(), size, 2.0);
+    const bool has_layer = heaviest >= 2.0;
+    num_layers += has_layer ? 1 : 0;
+    EXPECT_EQ(layered.height_index, has_layer ? top : single.height_index);
+    EXPECT_EQ(layered.layer_weight, has_layer ? heaviest : 0.0);
+    EXPECT_EQ(layered.min_cost, single.min_cost - 2.0 * layered.layer_weight);
+  }
+  EXPECT_GT(num_layers, 100);
 }
 
 }  // namespace

@@ -25,7 +25,10 @@ struct Drive {
   HeightFusionOptions options;
   VoxelGrid grid;
 
-  explicit Drive(double noise_m = 0.0) {
+  /// `matched_up_to_m`: what is higher has no range, as paint without texture.
+  explicit Drive(double noise_m = 0.0, const BoxWorld& box = BoxWorld(),
+                 double matched_up_to_m = std::numeric_limits<double>::infinity())
+      : world(box) {
     options.max_range_m = 4.0;
     cv::RNG random(5);
     for (int i = 0; i < 14; ++i) {
@@ -34,6 +37,7 @@ struct Drive {
         poses.push_back(testing::lookFrom(place, side * 1.57, 0.6));
         positions.push_back(place);
         RangeMap map = testing::renderView(world, poses.back(), cv::Size(320, 200));
+        leaveOut(matched_up_to_m, &map);
         cv::Mat noise(map.range_m.size(), CV_32FC1);
         random.fill(noise, cv::RNG::NORMAL, 0.0, noise_m > 0.0 ? noise_m : 1e-12);
         map.range_m += noise;
@@ -46,6 +50,18 @@ struct Drive {
       extent_m.extend(Eigen::Vector3d(position.x(), position.y(), 0.0));
     }
     grid = makeVoxelGrid(extent_m, options);
+  }
+
+  void leaveOut(double matched_up_to_m, RangeMap* map) const {
+    for (int y = 0; y < map->range_m.rows; ++y) {
+      for (int x = 0; x < map->range_m.cols; ++x) {
+        float& range = map->range_m.at<float>(y, x);
+        const Eigen::Vector3d ray = poses.back().rotation() * testing::rayOf(*map, x, y);
+        if (positions.back().z() + range * ray.z() > matched_up_to_m) {
+          range = std::nanf("");
+        }
+      }
+    }
   }
 
   ColumnImages fuse() const {
@@ -82,7 +98,8 @@ TEST(HeightFusionTest, FindsGroundAndBoxWithinAVoxel) {
       const double truth = drive.world.heightAt(place.x(), place.y());
       EXPECT_NEAR(columns.best_height_m.at<float>(row, column), truth, drive.grid.height_step_m + 1e-4)
           << place.transpose();
-      EXPECT_GT(columns.confidence.at<float>(row, column), 0.5F);
+      EXPECT_GT(columns.support_below.at<float>(row, column), 0.5F);
+      EXPECT_GT(columns.support_above.at<float>(row, column), 0.5F);
       ++(truth > 0.0 ? num_box : num_ground);
     }
   }
@@ -115,6 +132,37 @@ TEST(HeightFusionTest, SmoothedHeightsOfNoisyRangesAreFlatAndKeepTheEdge) {
   }
   EXPECT_LT(sum / num, 0.0125);  // half a voxel
   EXPECT_GT(num, 3000);
+}
+
+TEST(HeightFusionTest, ShowsABodyUnderWhichTheGroundIsSeen) {
+  BoxWorld car;
+  car.low.z() = 0.35;
+  car.high.z() = 1.4;
+  Drive drive(0.0, car, 0.5);
+  const auto cellOf = [&](const Eigen::Vector2d& place) {
+    const Eigen::Vector2d cell = (place - drive.grid.origin_m) / drive.grid.cell_size_m;
+    return cv::Point(static_cast<int>(std::lround(cell.x())), static_cast<int>(std::lround(cell.y())));
+  };
+  const ColumnImages layered = drive.fuse();
+  drive.options.min_layer_weight_m = 0.0;
+  const ColumnImages single = drive.fuse();
+  PrimalDualReport report;
+  const HeightRegularizationOptions options;
+  const cv::Mat heights =
+      smoothHeights(layered, labelObserved(layered, options, &report), drive.grid, options, &report);
+  for (const double side : {-1.0, 1.0}) {
+    for (double x = 2.1; x < 2.9; x += 0.1) {
+      const cv::Point inside = cellOf({x, side * 0.45}), before = cellOf({x, side * 0.6});
+      EXPECT_NEAR(single.best_height_m.at<float>(inside), 0.0, 0.03) << x;
+      EXPECT_GT(layered.best_height_m.at<float>(inside), 0.45) << x;
+      EXPECT_LT(layered.best_height_m.at<float>(inside), 0.6) << x;
+      // Nothing was seen above the strip: its height is held from below alone.
+      EXPECT_GT(layered.support_below.at<float>(inside), 0.5F) << x;
+      EXPECT_LT(layered.support_above.at<float>(inside), 0.1F) << x;
+      EXPECT_GT(heights.at<float>(inside), 0.4) << x;
+      EXPECT_NEAR(heights.at<float>(before), 0.0, 0.03) << x;
+    }
+  }
 }
 
 TEST(HeightFusionTest, DoesNotClaimWhatNobodySaw) {

@@ -32,6 +32,7 @@ void HeightFusionOptions::validate() const {
                "reference_confidence", "must be 0 or in (0.5, 1)", reference_confidence);
   requireNotNegative("reference_footprint_m", reference_footprint_m);
   requirePositive("free_weight", free_weight);
+  requireNotNegative("min_layer_weight_m", min_layer_weight_m);
   requirePositive("max_memory_gb", max_memory_gb);
 }
 

@@ -197,7 +197,7 @@ HeightMapResult HeightMapper::finish(const std::function<void(const std::string&
     const StageTimer timer("smoothing", &times_s_);
     result.map.height_m = smoothHeights(columns, observed, grid, options_.regularization, &smoothing);
   }
-  result.map.confidence = columns.confidence.clone();
+  result.map.confidence = columns.confidence();
   result.map.confidence.setTo(0.0F, observed == 0);
   result.states = classifyCells(result.map, options_.drivability);
   result.octomap = std::make_unique<OctomapBuilder>(

@@ -44,7 +44,8 @@ cv::Mat smoothHeights(const ColumnImages& columns, const cv::Mat& observed, cons
   problem.above = static_cast<float>(options.height_lambda * options.alpha_down);
   problem.epsilon = static_cast<float>(options.huber_epsilon_m);
   const double share = options.confidence_weighting;
-  problem.weight = cv::Mat(columns.confidence * share + (1.0 - share));
+  problem.weight_below = cv::Mat(columns.support_below * share + (1.0 - share));
+  problem.weight_above = cv::Mat(columns.support_above * share + (1.0 - share));
   problem.low = static_cast<float>(grid.bottom_m);
   problem.high = static_cast<float>(grid.top_m());
   for (int row = 0; row < size.height; ++row) {

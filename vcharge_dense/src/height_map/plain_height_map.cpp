@@ -16,6 +16,10 @@ float gradient(const cv::Mat& values, int row, int column, int row_step, int col
   return std::isnan(difference) ? 0.0F : difference;
 }
 
+float weightAt(const cv::Mat& weights, int row, int column) {
+  return weights.empty() ? 1.0F : weights.at<float>(row, column);
+}
+
 }  // namespace
 
 void addColumnWeightsPlain(const PackedRangeMap& map, const WeightProfile& profile, const VoxelColumn& column,
@@ -91,16 +95,17 @@ void PlainPrimalDual::iterate() {
       }
       const float ceiling = problem_.ceiling.at<float>(row, column);
       const float slope = problem_.slope.empty() ? 0.0F : problem_.slope.at<float>(row, column);
-      const float weight = problem_.weight.empty() ? 1.0F : problem_.weight.at<float>(row, column);
+      const float weight_below = weightAt(problem_.weight_below, row, column);
+      const float weight_above = weightAt(problem_.weight_above, row, column);
       const float divergence =
           dual_x_.at<float>(row, column) - (column > 0 ? dual_x_.at<float>(row, column - 1) : 0.0F) +
           dual_y_.at<float>(row, column) - (row > 0 ? dual_y_.at<float>(row - 1, column) : 0.0F);
       const float before = value_.at<float>(row, column);
       float after = before + primal_step_ * (divergence - slope);
       if (after < floor) {
-        after = std::min(floor, after + primal_step_ * weight * problem_.below);
+        after = std::min(floor, after + primal_step_ * weight_below * problem_.below);
       } else if (after > ceiling) {
-        after = std::max(ceiling, after - primal_step_ * weight * problem_.above);
+        after = std::max(ceiling, after - primal_step_ * weight_above * problem_.above);
       }
       after = std::clamp(after, problem_.low, problem_.high);
       value_.at<float>(row, column) = after;
@@ -121,9 +126,10 @@ double plainEnergy(const VariationalProblem& problem, const cv::Mat& values) {
           std::hypot(gradient(values, row, column, 0, 1), gradient(values, row, column, 1, 0));
       const double epsilon = problem.epsilon;
       energy += norm < epsilon ? norm * norm / (2.0 * epsilon) : norm - 0.5 * epsilon;
-      const double weight = problem.weight.empty() ? 1.0 : problem.weight.at<float>(row, column);
-      energy += weight * problem.below * std::max(0.0, problem.floor.at<float>(row, column) - value);
-      energy += weight * problem.above * std::max(0.0, value - problem.ceiling.at<float>(row, column));
+      energy += weightAt(problem.weight_below, row, column) * problem.below *
+                std::max(0.0, problem.floor.at<float>(row, column) - value);
+      energy += weightAt(problem.weight_above, row, column) * problem.above *
+                std::max(0.0, value - problem.ceiling.at<float>(row, column));
       energy += problem.slope.empty() ? 0.0 : problem.slope.at<float>(row, column) * value;
     }
   }

@@ -41,7 +41,8 @@ PrimalDualSolver::PrimalDualSolver(const VariationalProblem& problem, const cv::
   check(start.type() == CV_32FC1 && problem.floor.size() == start.size() &&
             problem.ceiling.size() == start.size() &&
             (problem.slope.empty() || problem.slope.size() == start.size()) &&
-            (problem.weight.empty() || problem.weight.size() == start.size()),
+            (problem.weight_below.empty() || problem.weight_below.size() == start.size()) &&
+            (problem.weight_above.empty() || problem.weight_above.size() == start.size()),
         "PrimalDualSolver: expected CV_32FC1 images of one size");
   // The gradient's norm is below sqrt(8): the product of the steps must not exceed 1/8.
   primal_step_ = static_cast<float>(step_ratio / std::sqrt(8.0));
@@ -49,7 +50,8 @@ PrimalDualSolver::PrimalDualSolver(const VariationalProblem& problem, const cv::
   floor_ = padded(problem.floor, stride_, rows_, kNan);
   ceiling_ = padded(problem.ceiling, stride_, rows_, kNan);
   slope_ = padded(problem.slope, stride_, rows_, 0.0F);
-  weight_ = padded(problem.weight, stride_, rows_, 1.0F);
+  weight_below_ = padded(problem.weight_below, stride_, rows_, 1.0F);
+  weight_above_ = padded(problem.weight_above, stride_, rows_, 1.0F);
   cv::Mat first = start.clone();
   for (int row = 0; row < rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
@@ -97,12 +99,12 @@ void PrimalDualSolver::iterateBand(int first_row, int last_row, const Fields& fr
       }
       const size_t at = static_cast<size_t>(row + 1) * stride_ + kRowPadding;
       const size_t data = offset(begin + row) + kRowPadding;
-      iterateRow(
-          {scratch.value.data() + at, scratch.extrapolated.data() + at,
-           scratch.extrapolated.data() + at + stride_, scratch.dual_x.data() + at, scratch.dual_y.data() + at,
-           scratch.dual_y.data() + at - stride_, floor_.data() + data, ceiling_.data() + data,
-           slope_.data() + data, weight_.data() + data, stride_ - 2 * kRowPadding},
-          steps);
+      iterateRow({scratch.value.data() + at, scratch.extrapolated.data() + at,
+                  scratch.extrapolated.data() + at + stride_, scratch.dual_x.data() + at,
+                  scratch.dual_y.data() + at, scratch.dual_y.data() + at - stride_, floor_.data() + data,
+                  ceiling_.data() + data, slope_.data() + data, weight_below_.data() + data,
+                  weight_above_.data() + data, stride_ - 2 * kRowPadding},
+                 steps);
     }
   }
   for (const auto member : members) {
@@ -135,9 +137,8 @@ double PrimalDualSolver::rowEnergy(int row, double* dual) const {
       continue;
     }
     const auto cost = [&](double u) {
-      return weight_[at + i] *
-                 (problem_.below * std::max(0.0, floor - u) + problem_.above * std::max(0.0, u - ceiling)) +
-             slope * u;
+      return weight_below_[at + i] * problem_.below * std::max(0.0, floor - u) +
+             weight_above_[at + i] * problem_.above * std::max(0.0, u - ceiling) + slope * u;
     };
     const double by_x = std::isnan(value[i + 1]) ? 0.0 : value[i + 1] - value[i];
     const double by_y = std::isnan(next_row[i]) ? 0.0 : next_row[i] - value[i];

@@ -13,12 +13,13 @@ namespace vcharge {
 /// min over u of  sum |grad u|_eps + sum of the data's cost,  low <= u <= high, on the cells of the domain;
 /// gradients are forward differences between neighbours of the domain, |.|_eps is the Huber norm of the paper
 /// (eps = 0: total variation). A cell's cost is
-///   weight * (below * [floor - u]_+  +  above * [u - ceiling]_+)  +  slope * u.
+///   weight_below * below * [floor - u]_+  +  weight_above * above * [u - ceiling]_+  +  slope * u.
 struct VariationalProblem {
-  cv::Mat floor;    ///< CV_32FC1; NaN outside the domain, -inf where nothing pulls up
-  cv::Mat ceiling;  ///< CV_32FC1; +inf where nothing pulls down
-  cv::Mat slope;    ///< CV_32FC1, or empty: none
-  cv::Mat weight;   ///< CV_32FC1, not negative, or empty: 1
+  cv::Mat floor;         ///< CV_32FC1; NaN outside the domain, -inf where nothing pulls up
+  cv::Mat ceiling;       ///< CV_32FC1; +inf where nothing pulls down
+  cv::Mat slope;         ///< CV_32FC1, or empty: none
+  cv::Mat weight_below;  ///< CV_32FC1, not negative, or empty: 1
+  cv::Mat weight_above;  ///< the same
   float below = 0.0F, above = 0.0F;
   float epsilon = 0.0F;
   float low = 0.0F, high = 1.0F;
@@ -63,7 +64,7 @@ class PrimalDualSolver {
   float primal_step_, dual_step_;
   int num_cells_ = 0;
   int iterations_ = 0;
-  AlignedArray<float> floor_, ceiling_, slope_, weight_;
+  AlignedArray<float> floor_, ceiling_, slope_, weight_below_, weight_above_;
   Fields now_, next_;
 };
 

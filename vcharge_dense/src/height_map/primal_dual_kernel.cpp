@@ -54,9 +54,10 @@ HWY_INLINE void updateValues(const PrimalDualRow& row, const PrimalDualSteps& st
                                   hn::Sub(hn::Load(df, row.dual_y + i), hn::Load(df, row.dual_y_above + i)));
     const VF moved = hn::MulAdd(step, hn::Sub(divergence, hn::Load(df, row.slope + i)), before);
     // Proximal map of the flat-bottomed cost: towards the bottom, not beyond its edge.
-    const VF weight = hn::Load(df, row.weight + i);
-    const VF raised = hn::Min(hn::MulAdd(weight, below, moved), floor);
-    const VF lowered = hn::Min(hn::Max(hn::NegMulAdd(weight, above, moved), ceiling), moved);
+    const VF weight_below = hn::Load(df, row.weight_below + i);
+    const VF weight_above = hn::Load(df, row.weight_above + i);
+    const VF raised = hn::Min(hn::MulAdd(weight_below, below, moved), floor);
+    const VF lowered = hn::Min(hn::Max(hn::NegMulAdd(weight_above, above, moved), ceiling), moved);
     const VF inside = hn::Min(hn::Max(hn::Max(raised, lowered), low), high);
     const VF after = hn::IfThenElse(hn::Eq(floor, floor), inside, floor);  // NaN outside the domain
     hn::Store(after, df, row.value + i);

@@ -16,7 +16,8 @@ struct PrimalDualRow {
   const float* floor;
   const float* ceiling;
   const float* slope;
-  const float* weight;
+  const float* weight_below;
+  const float* weight_above;
   size_t padded_columns;  ///< a multiple of kRowPadding
 };
 

@@ -29,13 +29,15 @@ Case heightCase(cv::Size size, uint32_t seed) {
   c.start.create(size, CV_32FC1);
   c.problem.floor.create(size, CV_32FC1);
   c.problem.ceiling.create(size, CV_32FC1);
-  c.problem.weight.create(size, CV_32FC1);
+  c.problem.weight_below.create(size, CV_32FC1);
+  c.problem.weight_above.create(size, CV_32FC1);
   for (int row = 0; row < size.height; ++row) {
     for (int column = 0; column < size.width; ++column) {
       const float height = (column > size.width / 2 ? 0.4F : 0.0F) + 0.2F * uniform(random);
       const float kind = uniform(random);
       c.start.at<float>(row, column) = height;
-      c.problem.weight.at<float>(row, column) = 2.0F * uniform(random);
+      c.problem.weight_below.at<float>(row, column) = 2.0F * uniform(random);
+      c.problem.weight_above.at<float>(row, column) = 2.0F * uniform(random);
       c.problem.floor.at<float>(row, column) = kind < 0.1F ? kNan : kind < 0.2F ? -kInfinite : height - 0.02F;
       c.problem.ceiling.at<float>(row, column) = kind < 0.1F   ? kNan
                                                  : kind < 0.2F ? kInfinite
@@ -203,7 +205,8 @@ TEST(PrimalDualTest, StaysWithinTheGridsHeights) {
   c.start.setTo(5.0F);
   c.problem.floor.setTo(4.9F);
   c.problem.ceiling.setTo(5.1F);
-  c.problem.weight.setTo(1.0F);
+  c.problem.weight_below.setTo(1.0F);
+  c.problem.weight_above.setTo(1.0F);
   PrimalDualReport report;
   const cv::Mat solution = solveVariational(c.problem, c.start, PrimalDualOptions(), &report);
   EXPECT_TRUE(report.converged);
