@@ -9,13 +9,11 @@
 #include <sstream>
 #include <stdexcept>
 
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
-
-#include "bag_access.h"
 #include "drive_message.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/options.h"
+#include "vcharge_ros/bag_reader.h"
+#include "vcharge_ros/conversions.h"
 #include "vcharge_ros/stamp_sorter.h"
 
 namespace vcharge {
@@ -23,8 +21,6 @@ namespace {
 
 using internal::DriveItem;
 using internal::expectedType;
-using internal::openBag;
-using internal::readingBag;
 using Kind = internal::DriveTopicKind;
 using TopicRole = internal::DriveTopicRole;
 
@@ -44,22 +40,22 @@ class BagReading {
         options_(options),
         consumer_(consumer),
         cameras_(internal::selectCameras(rig, options.cameras)),
-        bag_(openBag(path)),
+        bag_(path),
         sorter_(durationFromSeconds(options.sort_window_s)),
         last_images_(rig.cameras.size()) {
-    readingBag(path_, [&] { findTopics(); });
+    findTopics();
   }
 
   void run(const DriveSource::ProgressCallback& progress);
   std::pair<Timestamp, Timestamp> recordedSpan() const;
 
  private:
-  std::unique_ptr<rosbag::View> openView() const;
+  std::vector<BagEntry> entries() const;
   void findTopics();
   void addRequiredTopic(const std::string& topic, TopicRole role);
-  bool hasTopic(const std::string& topic) const { return types_in_bag_.count(topic) > 0; }
+  bool hasTopic(const std::string& topic) const { return bag_.topics().count(topic) > 0; }
   std::string listTopics() const;
-  DriveItem convert(const rosbag::MessageInstance& message, const TopicRole& role, Timestamp* stamp) const;
+  DriveItem convert(const BagMessage& message, const TopicRole& role, Timestamp* stamp) const;
   void push(const std::string& topic, Timestamp stamp, DriveItem item);
   void deliver(Timestamp stamp, const DriveItem& item);
   void checkCameras(Timestamp stamp) const;
@@ -70,9 +66,8 @@ class BagReading {
   const BagDriveSourceOptions& options_;
   DriveConsumer* const consumer_;
   const std::vector<size_t> cameras_;
-  const std::unique_ptr<rosbag::Bag> bag_;
-  std::map<std::string, std::set<std::string>> types_in_bag_;  // by topic
-  std::map<std::string, TopicRole> roles_;                     // by topic
+  BagReader bag_;
+  std::map<std::string, TopicRole> roles_;  // by topic
   StampSorter<DriveItem> sorter_;
   std::vector<std::optional<Timestamp>> last_images_;  // delivered, by camera
   std::optional<Timestamp> first_image_;
@@ -80,7 +75,7 @@ class BagReading {
 
 std::string BagReading::listTopics() const {
   std::string list;
-  for (const auto& [topic, types] : types_in_bag_) {
+  for (const auto& [topic, types] : bag_.topics()) {
     list += (list.empty() ? "" : ", ") + topic + " (" + *types.begin() + ")";
   }
   return list.empty() ? "none" : list;
@@ -88,21 +83,15 @@ std::string BagReading::listTopics() const {
 
 void BagReading::addRequiredTopic(const std::string& topic, TopicRole role) {
   const std::string expected = expectedType(role.kind);
-  for (const std::string& type : types_in_bag_.at(topic)) {
+  for (const std::string& type : bag_.topics().at(topic)) {
     if (type != expected) {
       throw InputError(path_ + ": " + topic + ": expected messages of type " + expected + ", got " + type);
     }
-  }
-  if (rosbag::View(*bag_, rosbag::TopicQuery(topic)).size() == 0) {
-    throw InputError(path_ + ": " + topic + ": expected messages of type " + expected + ", got none");
   }
   roles_[topic] = role;
 }
 
 void BagReading::findTopics() {
-  for (const rosbag::ConnectionInfo* connection : rosbag::View(*bag_).getConnections()) {
-    types_in_bag_[connection->topic].insert(connection->datatype);
-  }
   const DriveTopics& topics = options_.topics;
   for (const size_t camera : cameras_) {
     const std::string& name = rig_.cameras[camera].name;
@@ -125,12 +114,10 @@ void BagReading::findTopics() {
   }
 }
 
-DriveItem BagReading::convert(const rosbag::MessageInstance& message, const TopicRole& role,
-                              Timestamp* stamp) const {
-  DriveItem item = internal::convertDriveMessage(message, role, path_, rig_.vehicle_frame, stamp);
+DriveItem BagReading::convert(const BagMessage& message, const TopicRole& role, Timestamp* stamp) const {
+  DriveItem item = internal::convertDriveMessage(message, role, rig_.vehicle_frame, stamp);
   if (const auto* image = std::get_if<internal::CameraImage>(&item)) {
-    checkImageSize(rig_.cameras[image->camera_index], image->image.pixels.size(),
-                   path_ + ": " + message.getTopic());
+    checkImageSize(rig_.cameras[image->camera_index], image->image.pixels.size(), message.source());
   }
   return item;
 }
@@ -184,36 +171,32 @@ void BagReading::deliver(Timestamp stamp, const DriveItem& item) {
   internal::deliver(stamp, item, consumer_);
 }
 
-std::unique_ptr<rosbag::View> BagReading::openView() const {
-  std::vector<std::string> topics;
+std::vector<BagEntry> BagReading::entries() const {
+  std::set<std::string> topics;
   for (const auto& entry : roles_) {
-    topics.push_back(entry.first);
+    topics.insert(entry.first);
   }
-  return readingBag(path_, [&] { return std::make_unique<rosbag::View>(*bag_, rosbag::TopicQuery(topics)); });
+  return bag_.entries(topics);
 }
 
 std::pair<Timestamp, Timestamp> BagReading::recordedSpan() const {
-  const auto view = openView();
-  return {Timestamp::fromNanoseconds(static_cast<int64_t>(view->getBeginTime().toNSec())),
-          Timestamp::fromNanoseconds(static_cast<int64_t>(view->getEndTime().toNSec()))};
+  const std::vector<BagEntry> all = entries();
+  return {toTimestamp(all.front().time), toTimestamp(all.back().time)};
 }
 
 void BagReading::run(const DriveSource::ProgressCallback& progress) {
-  const auto view = openView();
-  const double num_messages = view->size();
+  const std::vector<BagEntry> all = entries();
   const auto deliver_item = [&](Timestamp stamp, const DriveItem& item) { deliver(stamp, item); };
   double num_read = 0;
-  auto message = readingBag(path_, [&] { return view->begin(); });
-  while (message != view->end()) {
-    const std::string topic = message->getTopic();
+  for (const BagEntry& entry : all) {
+    const std::string& topic = bag_.topicOf(entry);
     Timestamp stamp;
-    DriveItem item = convert(*message, roles_.at(topic), &stamp);
+    DriveItem item = convert(bag_.read(entry), roles_.at(topic), &stamp);
     push(topic, stamp, std::move(item));
     sorter_.release(deliver_item);
-    readingBag(path_, [&] { ++message; });
     ++num_read;
     if (progress) {
-      progress(num_read / num_messages);
+      progress(num_read / static_cast<double>(all.size()));
     }
   }
   sorter_.flush(deliver_item);

@@ -1,46 +1,34 @@
 #include "vcharge_ros/bag_images.h"
 
-#include <map>
-#include <set>
-
-#include <rosbag/view.h>
-
-#include "bag_access.h"
+#include "vcharge_ros/bag_reader.h"
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/image_conversions.h"
 
 namespace vcharge {
 namespace {
 
-using internal::readingBag;
+constexpr const char *kRaw = "sensor_msgs/Image", *kCompressed = "sensor_msgs/CompressedImage";
 
 template <class Message>
-StampedImage convert(const rosbag::MessageInstance& instance, const std::string& source) {
-  const boost::shared_ptr<const Message> message = instance.instantiate<Message>();
-  if (!message) {
-    throw InputError(source + ": expected the message definition of " +
-                     ros::message_traits::datatype<Message>() + " that this program was built with");
-  }
-  return {toTimestamp(message->header.stamp), toImage(message, source)};
+StampedImage convert(const BagMessage& recorded) {
+  const boost::shared_ptr<const Message> message = recorded.instantiate<Message>();
+  return {toTimestamp(message->header.stamp), toImage(message, recorded.source())};
 }
 
-// The topic that has the images: the given one or its compressed copy.
-std::string findImageTopic(const rosbag::Bag& bag, const std::string& path, const std::string& topic) {
-  std::map<std::string, std::string> types;
-  for (const rosbag::ConnectionInfo* connection : rosbag::View(bag).getConnections()) {
-    types[connection->topic] = connection->datatype;
-  }
-  for (const auto& [name, type] : {std::pair<std::string, std::string>{topic, "sensor_msgs/Image"},
-                                   {topic, "sensor_msgs/CompressedImage"},
-                                   {topic + "/compressed", "sensor_msgs/CompressedImage"}}) {
-    const auto found = types.find(name);
-    if (found != types.end() && found->second == type) {
-      return name;
+// The topic that has the images and its type: the given one or its compressed copy.
+std::pair<std::string, std::string> findImageTopic(const BagReader& bag, const std::string& path,
+                                                   const std::string& topic) {
+  for (const auto& candidate : {std::pair<std::string, std::string>{topic, kRaw},
+                                {topic, kCompressed},
+                                {topic + "/compressed", kCompressed}}) {
+    const auto found = bag.topics().find(candidate.first);
+    if (found != bag.topics().end() && found->second.count(candidate.second) > 0) {
+      return candidate;
     }
   }
   std::string list;
-  for (const auto& [name, type] : types) {
-    list += (list.empty() ? "" : ", ") + name + " (" + type + ")";
+  for (const auto& [name, types] : bag.topics()) {
+    list += (list.empty() ? "" : ", ") + name + " (" + *types.begin() + ")";
   }
   throw InputError(path + ": expected images on " + topic + " or " + topic +
                    "/compressed; topics in the bag: " + (list.empty() ? "none" : list));
@@ -51,30 +39,17 @@ std::string findImageTopic(const rosbag::Bag& bag, const std::string& path, cons
 std::vector<StampedImage> readBagImages(const std::string& bag_path, const std::string& topic, int max_images,
                                         const std::function<void(double)>& progress) {
   check(max_images > 0, "readBagImages: expected a positive number of images");
-  const std::unique_ptr<rosbag::Bag> bag = internal::openBag(bag_path);
+  BagReader bag(bag_path);
+  const auto [name, type] = findImageTopic(bag, bag_path, topic);
+  const std::vector<BagEntry> entries = bag.entries({name});
+  const size_t wanted = std::min(entries.size(), static_cast<size_t>(max_images));
   std::vector<StampedImage> images;
-  readingBag(bag_path, [&] {
-    const std::string name = findImageTopic(*bag, bag_path, topic);
-    const std::string source = bag_path + ": " + name;
-    rosbag::View view(*bag, rosbag::TopicQuery(name));
-    const auto count = static_cast<int64_t>(view.size());
-    const int64_t wanted = std::min<int64_t>(count, max_images);
-    int64_t index = 0;
-    for (const rosbag::MessageInstance& instance : view) {
-      // The k-th of `wanted` is the message at k * count / wanted.
-      const auto next = static_cast<int64_t>(images.size());
-      if (next < wanted && index == next * count / wanted) {
-        images.push_back(instance.isType<sensor_msgs::Image>()
-                             ? convert<sensor_msgs::Image>(instance, source)
-                             : convert<sensor_msgs::CompressedImage>(instance, source));
-        progress(static_cast<double>(images.size()) / static_cast<double>(wanted));
-      }
-      ++index;
-    }
-    if (images.empty()) {
-      throw InputError(source + ": expected images, got none");
-    }
-  });
+  for (size_t i = 0; i < wanted; ++i) {
+    const BagMessage message = bag.read(entries[i * entries.size() / wanted]);
+    images.push_back(type == kRaw ? convert<sensor_msgs::Image>(message)
+                                  : convert<sensor_msgs::CompressedImage>(message));
+    progress(static_cast<double>(i + 1) / static_cast<double>(wanted));
+  }
   return images;
 }
 

@@ -2,10 +2,9 @@
 
 #include <string>
 
-#include <rosbag/view.h>
-
 #include "drive_item.h"
 #include "vcharge_core/timestamp.h"
+#include "vcharge_ros/bag_reader.h"
 
 namespace vcharge::internal {
 
@@ -22,8 +21,7 @@ const char* expectedType(DriveTopicKind kind);
 
 /// The content of a bag's message and its stamp, whatever size an image has. InputError naming the bag and
 /// the topic for what cannot be understood.
-DriveItem convertDriveMessage(const rosbag::MessageInstance& message, const DriveTopicRole& role,
-                              const std::string& bag_path, const std::string& vehicle_frame,
-                              Timestamp* stamp);
+DriveItem convertDriveMessage(const BagMessage& message, const DriveTopicRole& role,
+                              const std::string& vehicle_frame, Timestamp* stamp);
 
 }  // namespace vcharge::internal

@@ -2,8 +2,8 @@
 
 #include <map>
 
-#include "bag_access.h"
 #include "drive_message.h"
+#include "vcharge_ros/bag_reader.h"
 #include "vcharge_ros/conversions.h"
 
 namespace vcharge {
@@ -11,9 +11,8 @@ namespace {
 
 using internal::DriveTopicKind;
 using internal::DriveTopicRole;
-using internal::readingBag;
 
-std::map<std::string, DriveTopicRole> rolesOf(const rosbag::Bag& bag, const CameraRig& rig,
+std::map<std::string, DriveTopicRole> rolesOf(const BagReader& bag, const CameraRig& rig,
                                               const DriveTopics& topics) {
   std::map<std::string, DriveTopicRole> wanted;
   for (size_t i = 0; i < rig.cameras.size(); ++i) {
@@ -22,8 +21,8 @@ std::map<std::string, DriveTopicRole> rolesOf(const rosbag::Bag& bag, const Came
   }
   wanted[topics.odometry] = {DriveTopicKind::kOdometry};
   std::map<std::string, DriveTopicRole> roles;
-  for (const rosbag::ConnectionInfo* connection : rosbag::View(bag).getConnections()) {
-    const auto found = wanted.find(connection->topic);
+  for (const auto& topic : bag.topics()) {
+    const auto found = wanted.find(topic.first);
     if (found != wanted.end()) {
       roles.insert(*found);
     }
@@ -42,28 +41,21 @@ std::map<std::string, DriveTopicRole> rolesOf(const rosbag::Bag& bag, const Came
 void readRecordedDrive(const std::string& bag_path, const CameraRig& rig, const DriveTopics& topics,
                        RecordedDriveConsumer* consumer, const std::function<void(double)>& progress) {
   check(consumer != nullptr, "readRecordedDrive: expected a consumer");
-  const std::unique_ptr<rosbag::Bag> bag = internal::openBag(bag_path);
-  const auto roles = readingBag(bag_path, [&] { return rolesOf(*bag, rig, topics); });
-  if (roles.empty()) {
-    return;
-  }
-  std::vector<std::string> names;
+  BagReader bag(bag_path);
+  const auto roles = rolesOf(bag, rig, topics);
+  std::set<std::string> names;
   for (const auto& entry : roles) {
-    names.push_back(entry.first);
+    names.insert(entry.first);
   }
-  const auto view =
-      readingBag(bag_path, [&] { return std::make_unique<rosbag::View>(*bag, rosbag::TopicQuery(names)); });
-  const double num_messages = view->size();
+  const std::vector<BagEntry> entries = bag.entries(names);
   double num_read = 0;
-  auto message = readingBag(bag_path, [&] { return view->begin(); });
-  while (message != view->end()) {
-    const std::string topic = message->getTopic();
-    const DriveTopicRole& role = roles.at(topic);
-    const Timestamp recorded = toTimestamp(message->getTime());
+  for (const BagEntry& entry : entries) {
+    const std::string& topic = bag.topicOf(entry);
+    const Timestamp recorded = toTimestamp(entry.time);
     try {
       Timestamp stamp;
       const internal::DriveItem item =
-          internal::convertDriveMessage(*message, role, bag_path, rig.vehicle_frame, &stamp);
+          internal::convertDriveMessage(bag.read(entry), roles.at(topic), rig.vehicle_frame, &stamp);
       if (const auto* image = std::get_if<internal::CameraImage>(&item)) {
         consumer->addImage(image->camera_index, stamp, recorded, image->image);
       } else {
@@ -72,10 +64,9 @@ void readRecordedDrive(const std::string& bag_path, const CameraRig& rig, const 
     } catch (const InputError& error) {
       consumer->addBroken(topic, error.what());
     }
-    readingBag(bag_path, [&] { ++message; });
     ++num_read;
     if (progress) {
-      progress(num_read / num_messages);
+      progress(num_read / static_cast<double>(entries.size()));
     }
   }
 }

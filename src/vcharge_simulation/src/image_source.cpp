@@ -3,10 +3,9 @@
 #include <vector>
 
 #include <nav_msgs/Odometry.h>
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
 
 #include "vcharge_core/error.h"
+#include "vcharge_ros/bag_reader.h"
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/drive_topics.h"
 #include "vcharge_ros/image_conversions.h"
@@ -57,65 +56,52 @@ class RenderedImages : public ImageSource {
 class RecordedImages : public ImageSource {
  public:
   RecordedImages(const std::string& path, const CameraRig& rig, const SimulatedDrive& drive)
-      : path_(path), rig_(rig), drive_(drive) {
-    try {
-      bag_.open(path, rosbag::bagmode::Read);
-      checkPoses();
-      std::vector<std::string> topics;
-      for (const RigCamera& camera : rig.cameras) {
-        topics.push_back(DriveTopics().imageTopic(camera.name));
-        views_.push_back(std::make_unique<rosbag::View>(bag_, rosbag::TopicQuery(topics.back())));
-        if (views_.back()->size() < drive.world_from_vehicle.size()) {
-          throw InputError(path + ": " + topics.back() + ": expected " +
-                           std::to_string(drive.world_from_vehicle.size()) + " images, got " +
-                           std::to_string(views_.back()->size()));
-        }
-        next_.push_back(views_.back()->begin());
+      : rig_(rig), drive_(drive), bag_(path), next_(rig.cameras.size(), 0) {
+    checkPoses(path);
+    for (const RigCamera& camera : rig.cameras) {
+      const std::string topic = DriveTopics().imageTopic(camera.name);
+      entries_.push_back(bag_.entries({topic}));
+      if (entries_.back().size() < drive.world_from_vehicle.size()) {
+        throw InputError(path + ": " + topic + ": expected " +
+                         std::to_string(drive.world_from_vehicle.size()) + " images, got " +
+                         std::to_string(entries_.back().size()));
       }
-    } catch (const rosbag::BagException& error) {
-      throw InputError(path + ": cannot be read as a bag: " + error.what());
     }
   }
 
   cv::Mat image(size_t camera, size_t frame) override {
-    const std::string source = path_ + ": " + next_[camera]->getTopic();
-    const auto message = next_[camera]->instantiate<sensor_msgs::Image>();
-    ++next_[camera];
-    if (message == nullptr || toTimestamp(message->header.stamp) != drive_.world_from_vehicle[frame].stamp) {
-      throw InputError(source + ": expected the images of the same drive, image " + std::to_string(frame) +
-                       " has another stamp or type");
+    const BagMessage recorded = bag_.read(entries_[camera].at(next_[camera]++));
+    const auto message = recorded.instantiate<sensor_msgs::Image>();
+    if (toTimestamp(message->header.stamp) != drive_.world_from_vehicle[frame].stamp) {
+      throw InputError(recorded.source() + ": expected the images of the same drive, image " +
+                       std::to_string(frame) + " has another stamp");
     }
-    const Image image = toImage(message, source);
-    checkImageSize(rig_.cameras[camera], image.pixels.size(), source);
+    const Image image = toImage(message, recorded.source());
+    checkImageSize(rig_.cameras[camera], image.pixels.size(), recorded.source());
     return image.pixels.clone();  // the view ends with its message
   }
 
  private:
-  void checkPoses() {
-    rosbag::View view(bag_, rosbag::TopicQuery("/ground_truth"));
-    size_t i = 0;
-    bool same = view.size() >= drive_.ground_truth.size();
-    for (const rosbag::MessageInstance& item : view) {
-      const auto message = item.instantiate<nav_msgs::Odometry>();
-      if (!same || i == drive_.ground_truth.size()) {
-        break;
-      }
-      const VehicleOdometry& truth = drive_.ground_truth[i++];
-      same = message != nullptr && toTimestamp(message->header.stamp) == truth.stamp &&
-             (fromMessage(message->pose.pose, path_).translation() - truth.odom_from_vehicle.translation())
+  void checkPoses(const std::string& path) {
+    const std::vector<BagEntry> entries = bag_.entries({"/ground_truth"});
+    bool same = entries.size() >= drive_.ground_truth.size();
+    for (size_t i = 0; same && i < drive_.ground_truth.size(); ++i) {
+      const auto message = bag_.read(entries[i]).instantiate<nav_msgs::Odometry>();
+      const VehicleOdometry& truth = drive_.ground_truth[i];
+      same = toTimestamp(message->header.stamp) == truth.stamp &&
+             (fromMessage(message->pose.pose, path).translation() - truth.odom_from_vehicle.translation())
                      .norm() < kSamePose_m;
     }
     if (!same) {
-      throw InputError(path_ + ": /ground_truth: expected the poses of the same drive with the same seed");
+      throw InputError(path + ": /ground_truth: expected the poses of the same drive with the same seed");
     }
   }
 
-  const std::string path_;
   const CameraRig& rig_;
   const SimulatedDrive& drive_;
-  rosbag::Bag bag_;
-  std::vector<std::unique_ptr<rosbag::View>> views_;
-  std::vector<rosbag::View::iterator> next_;
+  BagReader bag_;
+  std::vector<std::vector<BagEntry>> entries_;  // by camera
+  std::vector<size_t> next_;                    // by camera
 };
 
 }  // namespace
