@@ -20,6 +20,11 @@ float ramp(float value, float low, float high) {
   return std::clamp((value - low) / (high - low), 0.0F, 1.0F);
 }
 
+// A seed from coordinates, negative ones too: these have no unsigned value, but their integers wrap.
+uint32_t wrapped(double value) {
+  return static_cast<uint32_t>(static_cast<int64_t>(value));
+}
+
 // An ellipse with a ragged border. Reflectance within changes by `strength`, on its border by `rim` more.
 struct Blob {
   double x, y, half_length, half_width, yaw_rad;
@@ -161,7 +166,7 @@ class StainPainter {
     const auto sine = static_cast<float>(std::sin(blob.yaw_rad));
     const auto half_length = static_cast<float>(blob.half_length);
     const auto half_width = static_cast<float>(blob.half_width);
-    const uint32_t seed = mixBits(seed_ + static_cast<uint32_t>(1000.0 * (blob.x + 100.0 * blob.y)));
+    const uint32_t seed = mixBits(seed_ + wrapped(1000.0 * (blob.x + 100.0 * blob.y)));
     // Borders are as sharp as a texel is wide.
     const float soft = std::max(0.3F, static_cast<float>(texel_m_) / half_width);
     for (int row = box.y; row < box.y + box.height; ++row) {
@@ -188,7 +193,7 @@ class StainPainter {
            double to_rad, double strength) {
     const double step_rad = 0.5 * texel_m_ / radius_m;
     const double half_m = 0.09;
-    const uint32_t seed = mixBits(seed_ + static_cast<uint32_t>(1000.0 * (middle_x + 300.0 + radius_m)));
+    const uint32_t seed = mixBits(seed_ + wrapped(1000.0 * (middle_x + 300.0 + radius_m)));
     for (double angle = from_rad; angle < to_rad; angle += step_rad) {
       const double end_m = radius_m * std::min(angle - from_rad, to_rad - angle);
       const auto along = static_cast<float>(radius_m * angle);
