@@ -7,6 +7,7 @@
 
 #include <nav_msgs/Odometry.h>
 #include <ros/serialization.h>
+#include <rosbag/bag.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <boost/make_shared.hpp>
@@ -18,7 +19,6 @@
 #include "vcharge_core/error.h"
 #include "vcharge_core/recorded_drive.h"
 #include "vcharge_ros/conversions.h"
-#include "vcharge_ros/drive_bag_writer.h"
 #include "vcharge_ros/image_conversions.h"
 #include "vcharge_ros/recorded_drive_reader.h"
 
@@ -160,17 +160,18 @@ CameraRig oneCamera() {
       "rig.yaml", "");
 }
 
-std::string bagBytes() {
-  return bytesOf("a.bag", [](const std::string& path) {
-    DriveBagWriter writer(path, oneCamera());
+std::string bagBytes(rosbag::CompressionType compression) {
+  return bytesOf("a.bag", [&](const std::string& path) {
+    rosbag::Bag bag(path, rosbag::bagmode::Write);
+    bag.setCompression(compression);
     for (int i = 0; i < 3; ++i) {
-      const Timestamp stamp = Timestamp::fromNanoseconds(1000000000 + int64_t{80000000} * i);
-      writer.writeImage(0, stamp, smallImage());
       VehicleOdometry odometry;
-      odometry.stamp = stamp;
-      writer.writeOdometry(odometry);
+      odometry.stamp = Timestamp::fromNanoseconds(1000000000 + int64_t{80000000} * i);
+      const ros::Time time = fromTimestamp(odometry.stamp);
+      bag.write("/camera/front/image_raw", time, *toImageMessage(smallImage(), odometry.stamp, "front"));
+      bag.write("/odom", time, toMessage(odometry, "odom", "base_link"));
     }
-    writer.close();
+    bag.close();
   });
 }
 
@@ -194,7 +195,9 @@ std::vector<FuzzTarget> driveTargets() {
        [](const std::string& bytes) {
          fromMessage(*deserialized<vcharge_msgs::WheelTicks>(bytes), "/wheel_ticks");
        }},
-      fileTarget("bag", "a.bag", {bagBytes()},
+      fileTarget("bag", "a.bag",
+                 {bagBytes(rosbag::compression::Uncompressed), bagBytes(rosbag::compression::BZ2),
+                  bagBytes(rosbag::compression::LZ4)},
                  [](const std::string& path) {
                    NobodyLooks nobody;
                    readRecordedDrive(path, oneCamera(), DriveTopics(), &nobody, {});

@@ -57,8 +57,8 @@ BagReader::BagReader(std::string path)
     : path_(std::move(path)), file_(std::make_unique<internal::BagFile>(path_)) {
   readVersion();
   readIndex();
-  std::stable_sort(entries_.begin(), entries_.end(), [](const BagEntry& a, const BagEntry& b) {
-    return std::tie(a.time, a.connection) < std::tie(b.time, b.connection);
+  std::sort(entries_.begin(), entries_.end(), [](const BagEntry& a, const BagEntry& b) {
+    return std::tie(a.time, a.chunk, a.offset) < std::tie(b.time, b.chunk, b.offset);
   });
   for (const BagEntry& entry : entries_) {
     topics_[topicOf(entry)].insert(connections_[entry.connection].type);

@@ -124,6 +124,25 @@ TEST_F(BagReaderTest, OrdersMessagesByTheTimeOfTheirRecording) {
   EXPECT_TRUE(std::is_sorted(messages.begin(), messages.end()));
 }
 
+// Also where they lie in compressed chunks, of which each is decompressed once then.
+TEST_F(BagReaderTest, OrdersMessagesOfOneTimeAsTheyLieInTheBag) {
+  rosbag::Bag bag(path_, rosbag::bagmode::Write);
+  bag.setChunkThreshold(1);
+  bag.setCompression(rosbag::compression::LZ4);
+  std::vector<std::string> topics;
+  for (int i = 0; i < 20; ++i) {
+    topics.emplace_back(i % 3 == 0 ? "/odd" : "/even");
+    bag.write(topics.back(), ros::Time(1), std_msgs::String());
+  }
+  bag.close();
+  const BagReader reader(path_);
+  std::vector<std::string> read;
+  for (const BagEntry& entry : reader.entries({"/even", "/odd"})) {
+    read.push_back(reader.topicOf(entry));
+  }
+  EXPECT_EQ(read, topics);
+}
+
 TEST_F(BagReaderTest, NamesOtherFormats) {
   const std::string whole = write();
   put(whole, 9, "1.2");

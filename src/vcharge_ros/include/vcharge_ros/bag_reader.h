@@ -100,7 +100,7 @@ class BagReader {
 
   /// Topics that have messages, with their types.
   const std::map<std::string, std::set<std::string>>& topics() const { return topics_; }
-  /// All messages of these topics in the order of their recording.
+  /// All messages of these topics by the time of their recording; those of one time as they lie in the bag.
   std::vector<BagEntry> entries(const std::set<std::string>& topics) const;
   const std::string& topicOf(const BagEntry& entry) const { return connections_[entry.connection].topic; }
   /// InputError where the message, or the chunk that it lies in, is damaged.
@@ -132,7 +132,7 @@ class BagReader {
   std::vector<Connection> connections_;
   std::map<uint32_t, uint32_t> connection_by_id_;
   std::vector<Chunk> chunks_;
-  std::vector<BagEntry> entries_;  // by time
+  std::vector<BagEntry> entries_;  // by time, then as they lie in the file
   std::map<std::string, std::set<std::string>> topics_;
   std::unique_ptr<internal::BagBytes> decompressed_;
   std::optional<uint32_t> decompressed_chunk_;
