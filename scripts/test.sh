@@ -12,7 +12,7 @@ folder=build
 if [ "${1:-}" = "--sanitize" ]; then
   shift
   folder=build_sanitize
-  set -- -R '_gtest_|rostest_(tools|offline|map|mapping|mapping_faults|faults|determinism)\.test' "$@"
+  set -- -R '_gtest_|rostest_(tools|offline|mapping|mapping_faults|faults|determinism)\.test' "$@"
   # Debian's libraries are not instrumented: containers that cross them would be reported, and what they keep is no leak.
   export ASAN_OPTIONS=${ASAN_OPTIONS:-detect_container_overflow=0:detect_leaks=0} UBSAN_OPTIONS=print_stacktrace=1
 elif [ "${1:-}" = "--sanitize-threads" ]; then
