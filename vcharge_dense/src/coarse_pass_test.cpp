@@ -176,8 +176,11 @@ TEST(CoarsePassTest, SweepsFewPlanesAmongThemTheRightOnes) {
   const Level setup;
   const SweepInput input = setup.input();
   const CoarsePass coarse(setup.level, setup.sequence.ground);
-  const SurfaceEstimate found = coarse.sweep(
-      halfInput(coarse.level(), input, setup.sequence.reference.pixels, setup.sequence.neighbours));
+  SweepPixels images{setup.sequence.reference.pixels, {}};
+  for (const SweepImage& image : setup.sequence.neighbours) {
+    images.neighbours.push_back(image.pixels);
+  }
+  const SurfaceEstimate found = coarse.sweep(halfInput(coarse.level(), input, halved(images)));
   EXPECT_EQ(found.score.size(), cv::Size(kSize.width / 2, kSize.height / 2));
   const std::vector<TilePlanes> choice = coarse.choosePlanes(found, setup.tiles);
   const Hypotheses& planes = setup.level->planes().front();

@@ -15,7 +15,6 @@ cv::Size halfSize(cv::Size size) {
   return {size.width / 2, size.height / 2};
 }
 
-/// Means of two by two pixels.
 cv::Mat halved(const cv::Mat& image) {
   const cv::Size size = halfSize(image.size());
   cv::Mat half;
@@ -23,7 +22,15 @@ cv::Mat halved(const cv::Mat& image) {
   return half;
 }
 
-/// Not 0 where all four pixels are valid.
+}  // namespace
+
+SweepPixels halved(const SweepPixels& pixels) {
+  SweepPixels half{halved(pixels.reference), std::vector<cv::Mat>(pixels.neighbours.size())};
+  tbb::parallel_for(size_t{0}, half.neighbours.size(),
+                    [&](size_t n) { half.neighbours[n] = halved(pixels.neighbours[n]); });
+  return half;
+}
+
 cv::Mat halvedMask(const cv::Mat& mask) {
   cv::Mat half(halfSize(mask.size()), CV_8UC1);
   for (int y = 0; y < half.rows; ++y) {
@@ -43,8 +50,6 @@ MeiCamera halved(const MeiCamera& camera) {
                    0.5 * camera.v0() - 0.25);
 }
 
-}  // namespace
-
 bool canBeHalved(cv::Size size) {
   return halfSize(size).width >= kMinWidth_px && halfSize(size).height > 0;
 }
@@ -55,13 +60,12 @@ std::unique_ptr<const SweepLevel> halfLevel(const SweepLevel& fine, const PlaneS
                                       ground_in_camera);
 }
 
-SweepInput halfInput(const SweepLevel& half, const SweepInput& fine, const cv::Mat& reference_pixels,
-                     const std::vector<SweepImage>& neighbours) {
-  SweepInput input = half.makeInput(halved(reference_pixels));
-  std::vector<std::optional<PackedImage>> images(neighbours.size());
-  tbb::parallel_for(size_t{0}, neighbours.size(),
-                    [&](size_t n) { images[n].emplace(halved(neighbours[n].pixels), half.validMask()); });
-  for (size_t n = 0; n < neighbours.size(); ++n) {
+SweepInput halfInput(const SweepLevel& half, const SweepInput& fine, const SweepPixels& half_pixels) {
+  SweepInput input = half.makeInput(half_pixels.reference);
+  std::vector<std::optional<PackedImage>> images(half_pixels.neighbours.size());
+  tbb::parallel_for(size_t{0}, images.size(),
+                    [&](size_t n) { images[n].emplace(half_pixels.neighbours[n], half.validMask()); });
+  for (size_t n = 0; n < images.size(); ++n) {
     const SweepNeighbour& from = fine.neighbours[n];
     input.neighbours.push_back({std::move(*images[n]), from.neighbour_from_reference, from.translation_m,
                                 from.after, from.rotation_variance_left, from.translation_variance_left});

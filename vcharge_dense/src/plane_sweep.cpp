@@ -1,5 +1,6 @@
 #include "vcharge_dense/plane_sweep.h"
 
+#include <cmath>
 #include <utility>
 
 #include <tbb/parallel_for.h>
@@ -49,6 +50,19 @@ void addNeighbours(const SweepLevel& level, const SweepImage& reference,
   }
 }
 
+/// Gives unknown pixels what the map of half the size has there.
+void fillUnknown(const RangeMap& half, RangeMap* map) {
+  for (int y = 0; y < half.range_m.rows * 2; ++y) {
+    for (int x = 0; x < half.range_m.cols * 2; ++x) {
+      if (std::isnan(map->range_m.at<float>(y, x))) {
+        map->range_m.at<float>(y, x) = half.range_m.at<float>(y / 2, x / 2);
+        map->standard_deviation_m.at<float>(y, x) = half.standard_deviation_m.at<float>(y / 2, x / 2);
+        map->confidence.at<float>(y, x) = half.confidence.at<float>(y / 2, x / 2);
+      }
+    }
+  }
+}
+
 }  // namespace
 
 PlaneSweep::PlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask, const PlaneSweepOptions& options,
@@ -64,6 +78,12 @@ PlaneSweep::PlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask, const
   if (options.half_resolution_beyond_m > 0.0 && canBeHalved(valid_mask.size())) {
     far_ = std::make_shared<FarPlanes>(level_, ground_in_camera);
   }
+  if (options.num_fill_levels > 0 && canBeHalved(valid_mask.size())) {
+    PlaneSweepOptions half_options = options;
+    --half_options.num_fill_levels;
+    half_ =
+        std::make_shared<PlaneSweep>(halved(camera), halvedMask(valid_mask), half_options, ground_in_camera);
+  }
 }
 
 const PlaneSweepOptions& PlaneSweep::options() const {
@@ -74,14 +94,12 @@ const std::vector<PlaneFamily>& PlaneSweep::families() const {
   return level_->families();
 }
 
-SurfaceEstimate PlaneSweep::sweepPlanes(const SweepInput& input, const cv::Mat& reference_pixels,
-                                        const std::vector<SweepImage>& neighbours,
+SurfaceEstimate PlaneSweep::sweepPlanes(const SweepInput& input, const SweepPixels& half_pixels,
                                         const std::vector<cv::Rect>& large_tiles) const {
   if (!coarse_ && !far_) {
     return level_->sweepPlanes(input, large_tiles, {});
   }
-  const SweepInput half_input =
-      halfInput(coarse_ ? coarse_->level() : far_->level(), input, reference_pixels, neighbours);
+  const SweepInput half_input = halfInput(coarse_ ? coarse_->level() : far_->level(), input, half_pixels);
   std::vector<cv::Rect> tiles = large_tiles;
   std::vector<TilePlanes> choice = allPlanes(*level_, tiles.size());
   std::optional<SurfaceEstimate> coarse;
@@ -108,29 +126,40 @@ RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepI
                            SweepDetails* details) const {
   const cv::Size size = level_->validMask().size();
   checkImage(reference, size);
+  SweepPixels pixels{reference.pixels, {}};
   for (const SweepImage& image : neighbours) {
     checkImage(image, size);
+    pixels.neighbours.push_back(image.pixels);
   }
   check(neighbours.size() <= 32, "PlaneSweep: at most 32 neighbours");
-
   SweepInput input = level_->makeInput(reference.pixels);
   addNeighbours(*level_, reference, neighbours, &input);
-  const int window_px = options().window_px;
+  RangeMap map = sweep(input, pixels, details);
+  map.stamp = reference.stamp;
+  return map;
+}
+
+RangeMap PlaneSweep::sweep(const SweepInput& input, const SweepPixels& pixels, SweepDetails* details) const {
+  const cv::Size size = level_->validMask().size();
+  const bool has_neighbours = !input.neighbours.empty();
+  SweepPixels half_pixels;
   std::vector<cv::Rect> tiles;
-  if (!neighbours.empty()) {
-    tiles = makeTiles(size, window_px);
-  }
   SurfaceEstimate estimate(size);
-  if (!neighbours.empty()) {
-    estimate = sweepPlanes(input, reference.pixels, neighbours, tiles);
+  if (has_neighbours) {
+    half_pixels = coarse_ || far_ || half_ ? halved(pixels) : SweepPixels();
+    tiles = makeTiles(size, options().window_px);
+    estimate = sweepPlanes(input, half_pixels, tiles);
   }
   const bool found = cv::countNonZero(estimate.plane >= 0) > 0;
   if (found && options().num_refinement_steps > 0) {
     level_->refineSurface(input, makeRefinement(input, level_->validWindows(), estimate), tiles, &estimate);
   }
 
-  RangeMap map{reference.stamp, "", "", level_->camera(), {}, {}, {}};
+  RangeMap map{Timestamp(), "", "", level_->camera(), {}, {}, {}};
   estimateRange(input, estimate, &map);
+  if (half_ && has_neighbours) {
+    fillUnknown(half_->sweep(halfInput(*half_->level_, input, half_pixels), half_pixels, nullptr), &map);
+  }
   if (details != nullptr) {
     details->score = estimate.score;
     details->plane = estimate.plane;

@@ -38,6 +38,8 @@ void PlaneSweepOptions::validate() const {
   requireField(num_ground_planes >= 3 && num_ground_planes <= 1024, "num_ground_planes",
                "must be in [3, 1024]", num_ground_planes);
   requireNotNegative("half_resolution_beyond_m", half_resolution_beyond_m);
+  requireField(num_fill_levels >= 0 && num_fill_levels <= 4, "num_fill_levels", "must be in [0, 4]",
+               num_fill_levels);
   requireField(smoothness_step >= 0.0 && smoothness_step <= smoothness_jump, "smoothness_step",
                "must be in [0, smoothness_jump]", smoothness_step);
   requireField(smoothness_jump <= 2.0, "smoothness_jump", "must be at most 2", smoothness_jump);

@@ -22,6 +22,7 @@ class FarPlanes;
 class SweepLevel;
 struct SurfaceEstimate;
 struct SweepInput;
+struct SweepPixels;
 
 /// One image of the swept camera and where it was taken.
 struct SweepImage {
@@ -70,13 +71,14 @@ class PlaneSweep {
   const std::vector<PlaneFamily>& families() const;
 
  private:
-  SurfaceEstimate sweepPlanes(const SweepInput& input, const cv::Mat& reference_pixels,
-                              const std::vector<SweepImage>& neighbours,
+  SurfaceEstimate sweepPlanes(const SweepInput& input, const SweepPixels& half_pixels,
                               const std::vector<cv::Rect>& large_tiles) const;
+  RangeMap sweep(const SweepInput& input, const SweepPixels& pixels, SweepDetails* details) const;
 
   std::shared_ptr<const SweepLevel> level_;
   std::shared_ptr<const CoarsePass> coarse_;  // null: all planes
   std::shared_ptr<const FarPlanes> far_;      // null: all at full resolution
+  std::shared_ptr<const PlaneSweep> half_;    // null: what is unknown stays so
 };
 
 }  // namespace vcharge

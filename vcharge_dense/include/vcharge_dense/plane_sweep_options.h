@@ -77,6 +77,11 @@ struct PlaneSweepOptions {
   /// refinement steps see the whole resolution.
   double half_resolution_beyond_m = 0.0;
 
+  /// Pixels that stay unknown take what a sweep at half the resolution finds there, what that leaves unknown
+  /// one at a quarter, and so on, this many times: windows that span more hold more texture (package README,
+  /// Filling).
+  int num_fill_levels = 0;
+
   /// Looks for the planes of all pixels together, see the package README (Settings): a step to the next plane
   /// between neighbouring pixels costs smoothness_step of correlation, any other jump smoothness_jump.
   bool semi_global_smoothing = false;
@@ -122,6 +127,7 @@ struct PlaneSweepOptions {
     visit("num_ground_planes", num_ground_planes);
     visit("coarse_pass", coarse_pass);
     visit("half_resolution_beyond_m", half_resolution_beyond_m);
+    visit("num_fill_levels", num_fill_levels);
     visit("semi_global_smoothing", semi_global_smoothing);
     visit("smoothness_step", smoothness_step);
     visit("smoothness_jump", smoothness_jump);
