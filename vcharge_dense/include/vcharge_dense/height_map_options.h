@@ -100,12 +100,15 @@ struct OctomapOptions {
   double resolution_m = 0.1;
   double max_range_m = 8.0;  ///< longer rays clear up to here and end nowhere
   int pixel_step = 2;        ///< every how many rows and columns a ray is cast
+  /// A range that is right less probably says nothing: an octree takes a hit for right with 0.7.
+  double min_confidence = 0.7;
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
     visit("resolution_m", resolution_m);
     visit("max_range_m", max_range_m);
     visit("pixel_step", pixel_step);
+    visit("min_confidence", min_confidence);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
 };

@@ -19,8 +19,8 @@ namespace vcharge {
 class VoxelBlocks;
 
 /// An octree of free and occupied space from range maps, by casting a ray for each pixel whose range has a
-/// sigma: free up to the surface, occupied there. Unknown pixels say nothing, and neither do ranges at the
-/// farthest plane, where everything ends up that lies beyond it.
+/// sigma and is sure enough: free up to the surface, occupied there. Others say nothing, and neither do
+/// ranges at the farthest plane, where everything ends up that lies beyond it.
 class OctomapBuilder {
  public:
   /// `farthest_m`: range from which on a range counts as that of the farthest plane.

@@ -59,6 +59,8 @@ void OctomapOptions::validate() const {
   requirePositive("resolution_m", resolution_m);
   requirePositive("max_range_m", max_range_m);
   requireField(pixel_step > 0, "pixel_step", "must be positive", pixel_step);
+  requireField(min_confidence >= 0.0 && min_confidence < 1.0, "min_confidence", "must be in [0, 1)",
+               min_confidence);
 }
 
 void HeightMapOptions::validate() const {

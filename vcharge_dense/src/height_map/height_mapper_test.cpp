@@ -289,6 +289,19 @@ TEST_F(OctomapBuilderTest, FileIsReadAsItWasWritten) {
   EXPECT_EQ(at(read, 1.05, 0.45, 1.05), "unknown");
 }
 
+TEST_F(OctomapBuilderTest, UnsureRangesSayNothing) {
+  RangeMap map = wall();
+  map.confidence.setTo(0.69F);
+  map.confidence(cv::Rect(0, 0, map.range_m.cols, 40)).setTo(0.71F);  // rays that do not sink
+  OctomapOptions options;
+  options.pixel_step = 1;
+  OctomapBuilder builder(options, 40.0);
+  builder.add(map, along_x_);
+  EXPECT_EQ(at(builder.tree(), 2.05, -0.45, 1.25), "occupied");
+  EXPECT_EQ(at(builder.tree(), 2.05, -0.45, 0.65), "unknown");
+  EXPECT_EQ(at(builder.tree(), 1.05, -0.25, 0.85), "unknown");
+}
+
 TEST_F(OctomapBuilderTest, FarthestPlaneAndRangesWithoutSigmaClearNothing) {
   OctomapBuilder builder(OctomapOptions(), 1.9);
   builder.add(wall(), along_x_);

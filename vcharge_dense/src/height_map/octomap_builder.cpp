@@ -61,6 +61,7 @@ std::vector<OctomapBuilder::Ray> OctomapBuilder::markEnds(const RangeMap& map,
     for (int x = 0; x < map.range_m.cols; x += options_.pixel_step) {
       const float range = map.range_m.at<float>(y, x), sigma = map.standard_deviation_m.at<float>(y, x);
       if (!std::isfinite(range) || !std::isfinite(sigma) || range <= 0.0F || range >= farthest_m_ ||
+          map.confidence.at<float>(y, x) < static_cast<float>(options_.min_confidence) ||
           !table.valid(x, y)) {
         continue;
       }
