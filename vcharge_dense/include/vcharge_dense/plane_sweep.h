@@ -31,7 +31,7 @@ struct SweepImage {
   RigidTransform world_from_camera;
 };
 
-/// What a sweep knows besides the range map.
+/// What a sweep knows besides the range map; of the sweep at full resolution alone.
 struct SweepDetails {
   cv::Mat score;   ///< CV_32FC1: aggregated correlation of the chosen plane; NaN where no plane was scored
   cv::Mat plane;   ///< CV_32SC1: index of the best plane of the first sweep over all families, -1 where none
@@ -49,7 +49,8 @@ struct SweepDetails {
 ///
 /// A range is also unknown where the window has no texture, where the best plane is the first or last of its
 /// family (the surface may lie beyond), where the score is low, and where the standard deviation is too
-/// large, as it is towards the direction of travel, where motion stereo is blind.
+/// large, as it is towards the direction of travel, where motion stereo is blind. With num_fill_levels such
+/// pixels take the range of a sweep at a lower resolution, where that has one.
 ///
 /// Immutable: one object serves any number of threads, and the result does not depend on theirs.
 class PlaneSweep {
