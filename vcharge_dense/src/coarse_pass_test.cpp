@@ -261,12 +261,8 @@ TEST(CoarsePassTest, OddAndSmallImagesWork) {
   for (const cv::Size size : {cv::Size(101, 77), cv::Size(20, 40)}) {
     const cv::Rect part(60, 60, size.width, size.height);
     Sequence s = makeSequence(lotScene(2), kLeft, 0.1, -2, 0);
-    s.reference.pixels = s.reference.pixels(part).clone();
-    for (SweepImage& image : s.neighbours) {
-      image.pixels = image.pixels(part).clone();
-    }
-    const MeiCamera camera(kCamera.xi(), kCamera.gamma1(), kCamera.gamma2(), kCamera.u0() - part.x,
-                           kCamera.v0() - part.y);
+    testing::crop(part, &s);
+    const MeiCamera camera = testing::croppedCamera(part);
     PlaneSweepOptions options;
     options.coarse_pass = true;
     const RangeMap map = PlaneSweep(camera, cv::Mat(size, CV_8UC1, cv::Scalar(255)), options, s.ground)

@@ -55,6 +55,18 @@ inline Sequence makeSequence(const AnalyticScene& scene, const RigidTransform& s
   return sequence;
 }
 
+/// A part of the test images, as a smaller camera sees it.
+inline void crop(const cv::Rect& part, Sequence* sequence) {
+  sequence->reference.pixels = sequence->reference.pixels(part).clone();
+  for (SweepImage& image : sequence->neighbours) {
+    image.pixels = image.pixels(part).clone();
+  }
+}
+inline MeiCamera croppedCamera(const cv::Rect& part) {
+  return MeiCamera(kCamera.xi(), kCamera.gamma1(), kCamera.gamma2(), kCamera.u0() - part.x,
+                   kCamera.v0() - part.y);
+}
+
 /// Moves the neighbours, which come in order of time, as odometry errs: its scale is off for the whole
 /// sequence, its pose walks at random from image to image, and the reference's own jitter is common to all
 /// pairs.
