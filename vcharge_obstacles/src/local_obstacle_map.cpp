@@ -169,6 +169,7 @@ struct LocalObstacleMap::GroundLook {
   int64_t x, y;  // of the cell
   CellLook look;
   bool in_shadow;  // of what other looks have found before it
+  bool may_free;   // seen near enough to the camera's axis
   bool explained;  // a change of its looks, by something that stands there
 };
 
@@ -212,7 +213,8 @@ std::vector<LocalObstacleMap::GroundLook> LocalObstacleMap::lookAtGround(
         continue;
       }
       const double angle_rad = std::remainder(std::atan2(offset_m.y(), offset_m.x()) - yaw_rad, 2.0 * M_PI);
-      const size_t index = grid.index(grid.rayOf(angle_rad), bin);
+      const int ray = grid.rayOf(angle_rad);
+      const size_t index = grid.index(ray, bin);
       const bool has_changed = !seen.changed_share.empty() && seen.changed_share[index] > 0.0F;
       if (seen.free_share[index] <= 0.0F && seen.hidden_share[index] <= 0.0F &&
           seen.unknown_share[index] <= 0.0F && !has_changed) {
@@ -226,7 +228,8 @@ std::vector<LocalObstacleMap::GroundLook> LocalObstacleMap::lookAtGround(
       }
       const bool explained =
           look.changed_share >= options_.min_changed_share && looker.isExplained(angle_rad, range_m);
-      looks.push_back({x, y, look, shadows.hides(offset_m), explained});
+      const bool may_free = seen.free_to_m.empty() || range_m <= seen.free_to_m[static_cast<size_t>(ray)];
+      looks.push_back({x, y, look, shadows.hides(offset_m), may_free, explained});
     }
   }
   return looks;
@@ -273,7 +276,10 @@ void LocalObstacleMap::addGroundLook(const GroundLook& ground, double weight, Ti
   const bool shows_ground = !look.blocked && look.free_share >= options_.min_free_share;
   if (shows_ground && !ground.in_shadow) {
     const double log_odds = cell->log_odds - weight * options_.free_log_odds * look.free_share;
-    const double least = stamp.nanoseconds() < cell->held_until_ns ? 0.0 : options_.min_log_odds;
+    const bool may_free =
+        stamp.nanoseconds() >= cell->held_until_ns && (ground.may_free || stateOf(*cell) == kCellFree);
+    const double least =
+        may_free ? options_.min_log_odds : std::min(0.0, static_cast<double>(cell->log_odds));
     cell->log_odds = static_cast<float>(std::max(least, log_odds));
     cell->last_seen_ns = stamp.nanoseconds();
     cell->travel_m = static_cast<float>(travel_m_);

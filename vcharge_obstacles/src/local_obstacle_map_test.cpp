@@ -222,6 +222,47 @@ TEST_F(LocalObstacleMapTest, GroundUnderABodyThatAnotherCameraSeesIsNotFree) {
   }
 }
 
+TEST_F(LocalObstacleMapTest, GroundSeenFarOffTheAxisKeepsWhatIsFreeAndMakesNothingFree) {
+  const double place_m = 2.05;
+  LocalObstacleMap map;
+  Timestamp stamp;
+  const auto look = [&](bool is_off_axis, int times) {
+    for (int i = 0; i < times; ++i) {
+      stamp = stamp + durationFromSeconds(0.08);
+      const RigidTransform pose = RigidTransform::planar(0.1 * i, 0.0, 0.0);
+      map.moveTo(stamp, pose);
+      CameraObstacles ground = makeLookAtGround(stamp, grid_);
+      ground.free_to_m.assign(static_cast<size_t>(grid_.numRays()),
+                              is_off_axis ? 1.5 : std::numeric_limits<double>::infinity());
+      map.add(ground, grid_, pose);
+    }
+    return map.snapshot();
+  };
+  ObstacleMap seen = look(true, 8);
+  EXPECT_EQ(stateIn(seen, 0.05, place_m), kCellUnobserved);
+  EXPECT_EQ(stateIn(seen, 0.05, 0.5 * place_m), kCellFree);  // near enough
+  seen = look(false, 8);
+  EXPECT_EQ(stateIn(seen, 0.05, place_m), kCellFree);
+  const int num_free = count(seen, kCellFree);
+  // Back and forth over so much way that a cell which is not seen is forgotten.
+  for (int times = 0; times < 20; ++times) {
+    seen = look(true, 8);
+  }
+  EXPECT_EQ(stateIn(seen, 0.05, place_m), kCellFree);
+  EXPECT_LE(count(seen, kCellFree), num_free);
+  // What was an obstacle is one no longer, but no free ground yet.
+  map.clear();
+  for (int i = 0; i < 8; ++i) {
+    const RigidTransform pose = RigidTransform::planar(0.1 * i, 0.0, 0.0);
+    stamp = stamp + durationFromSeconds(0.08);
+    map.moveTo(stamp, pose);
+    map.add(makeLookAtFlank(pose.translation().x(), 0.03, 0.0, grid_), grid_, pose);
+  }
+  ASSERT_EQ(stateIn(map.snapshot(), 0.05, kFlankY_m + 0.05), kCellOccupied);
+  seen = look(true, 16);
+  EXPECT_EQ(stateIn(seen, 0.05, kFlankY_m + 0.05), kCellUnobserved);
+}
+
 TEST_F(LocalObstacleMapTest, LooksOfLittleWeightNeedMoreOfThem) {
   const auto looksUntilOccupied = [&](double look_weight) {
     LocalObstacleMap map;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "pixel_rays.h"
@@ -52,6 +53,8 @@ struct ObstacleDetector::Implementation {
     for (int ray = 0; ray < grid.numRays(); ++ray) {
       const double off_axis_rad = std::abs(std::remainder(grid.angle_rad(ray) - axis_rad, 2.0 * M_PI));
       is_off_axis.push_back(off_axis_rad > options.max_off_axis_rad);
+      free_to_m.push_back(is_off_axis.back() ? options.max_off_axis_free_m
+                                             : std::numeric_limits<double>::infinity());
     }
   }
 
@@ -77,6 +80,7 @@ struct ObstacleDetector::Implementation {
   const ExpectedPixels expected;
   const std::vector<double> overseen_m;  // by sector
   std::vector<bool> is_off_axis;         // by sector
+  std::vector<double> free_to_m;         // by sector
 };
 
 void ObstacleDetectorOptions::validate() const {
@@ -104,6 +108,8 @@ void ObstacleDetectorOptions::validate() const {
   requireField(max_off_axis_rad > 0.0, "max_off_axis_rad", "must be positive", max_off_axis_rad);
   requireField(max_off_axis_range_m >= 0.0, "max_off_axis_range_m", "must not be negative",
                max_off_axis_range_m);
+  requireField(max_off_axis_free_m >= 0.0, "max_off_axis_free_m", "must not be negative",
+               max_off_axis_free_m);
   requireField(max_ramp_height_m >= 0.0, "max_ramp_height_m", "must not be negative", max_ramp_height_m);
   requireField(max_ramp_length_m >= 0.0, "max_ramp_length_m", "must not be negative", max_ramp_length_m);
   requireField(ramp_weight >= 0.0 && ramp_weight <= 1.0, "ramp_weight", "must be in [0, 1]", ramp_weight);
@@ -259,6 +265,7 @@ CameraObstacles ObstacleDetector::detect(const RangeMap& map) const {
   result.camera_name = map.camera_name;
   result.origin_m = self.position.head<2>().cast<double>();
   result.camera_height_m = self.position.z();
+  result.free_to_m = self.free_to_m;
   result.ground = fitGroundPlane(self.collectGround(map), self.options.ground);
   GroundEvidence evidence(self.grid);
   const PolarPoints points = self.collectPoints(map, result.ground, &evidence);

@@ -64,6 +64,13 @@ TEST_F(ObstacleDetectorTest, FarThingsAtTheRimOfTheLensAreOnlyForHiding) {
   }
   EXPECT_GT(marking, 90);
   EXPECT_GT(hiding, 10);
+  ASSERT_EQ(seen.free_to_m.size(), seen.scan.range_m.size());
+  for (size_t ray = 0; ray < seen.free_to_m.size(); ++ray) {
+    const double off_axis_rad = std::abs(std::remainder(seen.scan.angle_rad(ray) - 0.5 * M_PI, 2.0 * M_PI));
+    EXPECT_EQ(seen.free_to_m[ray], off_axis_rad > options_.max_off_axis_rad
+                                       ? options_.max_off_axis_free_m
+                                       : std::numeric_limits<double>::infinity());
+  }
   const BoxWorld near_box{{{{3.9, 1.2, 0.0}, {4.3, 1.6, 0.8}}}};  // beside the bumper, at the rim
   const CameraObstacles near_seen = detect(near_box, "left", {}, {0.01, 0.1, 7});
   ASSERT_FALSE(near_seen.obstacles.empty());

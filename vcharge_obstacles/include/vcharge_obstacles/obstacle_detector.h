@@ -34,6 +34,9 @@ struct ObstacleDetectorOptions {
   /// marks no obstacle in the map: there the lens resolves little, and another camera sees better.
   double max_off_axis_rad = 1.1;
   double max_off_axis_range_m = 2.5;
+  /// So far off the axis, and beyond this range, ground keeps free what is free and takes back what is
+  /// occupied, but makes nothing free: there ranges of a dark flank may be those of the ground.
+  double max_off_axis_free_m = 1.5;
   /// Between a low thing and a high one behind it the ranges leave a gap. Where they rise without one from a
   /// height up to max_ramp_height_m to something higher within max_ramp_length_m, windows of the range map
   /// saw the high thing, its shadow and the ground before it at once, and made a ramp of them.
@@ -69,6 +72,7 @@ struct ObstacleDetectorOptions {
     visit("max_obstacles_per_ray", max_obstacles_per_ray);
     visit("max_off_axis_rad", max_off_axis_rad);
     visit("max_off_axis_range_m", max_off_axis_range_m);
+    visit("max_off_axis_free_m", max_off_axis_free_m);
     visit("max_ramp_height_m", max_ramp_height_m);
     visit("max_ramp_length_m", max_ramp_length_m);
     visit("ramp_weight", ramp_weight);
@@ -106,6 +110,9 @@ struct CameraObstacles {
   GroundPlane ground;
   double known_share = 0.0;              ///< of the camera's valid pixels that have a range
   std::vector<PolarObstacle> obstacles;  ///< by ray, then by range
+  /// Range up to which bare ground makes a cell free, by ray; empty: everywhere. Beyond, seen too far off the
+  /// axis, it keeps free what is free, and takes back what is occupied.
+  std::vector<double> free_to_m;
   /// Evidence that the ground of a cell is bare, by PolarGrid::index: 0 none, 1 all of the pixels that show
   /// it lie on the ground.
   std::vector<float> free_share;
