@@ -26,6 +26,11 @@ Eigen::Vector2d transformed(const RigidTransform& transform, const Eigen::Vector
   return (transform * Eigen::Vector3d(point_m.x(), point_m.y(), 0.0)).head<2>();
 }
 
+LocalObstacleMapOptions validated(const LocalObstacleMapOptions& options) {
+  options.validate();
+  return options;
+}
+
 }  // namespace
 
 void LocalObstacleMapOptions::validate() const {
@@ -64,72 +69,28 @@ void LocalObstacleMapOptions::validate() const {
   requireField(scan_rays >= 8, "scan_rays", "must be at least 8", scan_rays);
 }
 
-LocalObstacleMap::LocalObstacleMap(const LocalObstacleMapOptions& options) : options_(options) {
-  options_.validate();
-  size_ = 2 * static_cast<int>(std::lround(options_.half_size_m / options_.cell_size_m));
-  clear();
-}
-
-int LocalObstacleMap::wrapped(int64_t index) const {
-  const auto remainder = static_cast<int>(index % size_);
-  return remainder < 0 ? remainder + size_ : remainder;
-}
-
-LocalObstacleMap::Cell& LocalObstacleMap::cellAt(int64_t x, int64_t y) {
-  return cells_[static_cast<size_t>(wrapped(y)) * static_cast<size_t>(size_) +
-                static_cast<size_t>(wrapped(x))];
-}
-
-const LocalObstacleMap::Cell& LocalObstacleMap::cellAt(int64_t x, int64_t y) const {
-  return cells_[static_cast<size_t>(wrapped(y)) * static_cast<size_t>(size_) +
-                static_cast<size_t>(wrapped(x))];
-}
-
-int64_t LocalObstacleMap::indexOf(double coordinate_m) const {
-  return static_cast<int64_t>(std::floor(coordinate_m / options_.cell_size_m));
-}
-
-bool LocalObstacleMap::isInside(int64_t x, int64_t y) const {
-  return x >= first_x_ && x < first_x_ + size_ && y >= first_y_ && y < first_y_ + size_;
-}
+LocalObstacleMap::LocalObstacleMap(const LocalObstacleMapOptions& options)
+    : options_(validated(options)),
+      cells_(2 * static_cast<int>(std::lround(options.half_size_m / options.cell_size_m)),
+             options.cell_size_m) {}
 
 void LocalObstacleMap::clear() {
-  cells_.assign(static_cast<size_t>(size_) * static_cast<size_t>(size_), Cell());
+  cells_.clear();
   last_camera_position_.clear();
-}
-
-void LocalObstacleMap::scroll(int64_t first_x, int64_t first_y) {
-  if (std::abs(first_x - first_x_) >= size_ || std::abs(first_y - first_y_) >= size_) {
-    clear();
-  } else {
-    // Columns and rows that come in take the place of those that go out.
-    for (int64_t x = std::min(first_x, first_x_); x < std::max(first_x, first_x_); ++x) {
-      for (int64_t y = 0; y < size_; ++y) {
-        cellAt(x, y) = Cell();
-      }
-    }
-    for (int64_t y = std::min(first_y, first_y_); y < std::max(first_y, first_y_); ++y) {
-      for (int64_t x = 0; x < size_; ++x) {
-        cellAt(x, y) = Cell();
-      }
-    }
-  }
-  first_x_ = first_x;
-  first_y_ = first_y;
 }
 
 void LocalObstacleMap::forget(double travelled_m) {
   const auto keep_occupied = static_cast<float>(std::exp(-travelled_m / options_.forget_occupied_m));
   const auto keep_free = static_cast<float>(std::exp(-travelled_m / options_.forget_free_m));
-  for (Cell& cell : cells_) {
+  for (Cell& cell : cells_.cells()) {
     cell.log_odds *= cell.log_odds > 0.0F ? keep_occupied : keep_free;
   }
 }
 
 void LocalObstacleMap::moveTo(Timestamp stamp, const RigidTransform& fixed_from_vehicle) {
   const RigidTransform level = levelled(fixed_from_vehicle);
-  const int64_t first_x = indexOf(level.translation().x()) - size_ / 2;
-  const int64_t first_y = indexOf(level.translation().y()) - size_ / 2;
+  const int64_t first_x = cells_.indexOf(level.translation().x()) - cells_.size() / 2;
+  const int64_t first_y = cells_.indexOf(level.translation().y()) - cells_.size() / 2;
   if (placed_) {
     const double travelled_m = (level.translation() - fixed_from_vehicle_.translation()).norm();
     if (travelled_m > 0.0) {
@@ -137,12 +98,9 @@ void LocalObstacleMap::moveTo(Timestamp stamp, const RigidTransform& fixed_from_
       travel_direction_ = (level.translation() - fixed_from_vehicle_.translation()).head<2>().normalized();
       travel_m_ += travelled_m;
     }
-    scroll(first_x, first_y);
-  } else {
-    first_x_ = first_x;
-    first_y_ = first_y;
-    placed_ = true;
   }
+  cells_.moveTo(first_x, first_y);
+  placed_ = true;
   stamp_ = stamp;
   fixed_from_vehicle_ = level;
 }
@@ -178,9 +136,9 @@ GroundShadows LocalObstacleMap::shadowsFor(const CameraObstacles& seen,
   GroundShadows shadows(seen.camera_height_m);
   const double cell_m = options_.cell_size_m;
   const int64_t since_ns = (seen.stamp - durationFromSeconds(options_.shadow_s)).nanoseconds();
-  for (int64_t y = first_y_; y < first_y_ + size_; ++y) {
-    for (int64_t x = first_x_; x < first_x_ + size_; ++x) {
-      const Cell& cell = cellAt(x, y);
+  for (int64_t y = cells_.firstY(); y < cells_.firstY() + cells_.size(); ++y) {
+    for (int64_t x = cells_.firstX(); x < cells_.firstX() + cells_.size(); ++x) {
+      const Cell& cell = cells_.at(x, y);
       if (cell.last_occupied_ns > since_ns && stateOf(cell) == kCellOccupied) {
         const Eigen::Vector2d middle_m((x + 0.5) * cell_m, (y + 0.5) * cell_m);
         shadows.add(middle_m - camera_m, cell_m, cell.height_m);
@@ -199,13 +157,13 @@ std::vector<LocalObstacleMap::GroundLook> LocalObstacleMap::lookAtGround(
   const double yaw_rad = yawOfRotation(fixed_from_vehicle.rotation());
   const GroundShadows shadows = shadowsFor(seen, camera_m);
   const auto reach = static_cast<int64_t>(std::ceil(options_.free_range_m / cell_m));
-  const int64_t middle_x = indexOf(camera_m.x());
-  const int64_t middle_y = indexOf(camera_m.y());
+  const int64_t middle_x = cells_.indexOf(camera_m.x());
+  const int64_t middle_y = cells_.indexOf(camera_m.y());
   std::vector<GroundLook> looks;
-  for (int64_t y = std::max(first_y_, middle_y - reach);
-       y <= std::min(first_y_ + size_ - 1, middle_y + reach); ++y) {
-    for (int64_t x = std::max(first_x_, middle_x - reach);
-         x <= std::min(first_x_ + size_ - 1, middle_x + reach); ++x) {
+  for (int64_t y = std::max(cells_.firstY(), middle_y - reach);
+       y <= std::min(cells_.firstY() + cells_.size() - 1, middle_y + reach); ++y) {
+    for (int64_t x = std::max(cells_.firstX(), middle_x - reach);
+         x <= std::min(cells_.firstX() + cells_.size() - 1, middle_x + reach); ++x) {
       const Eigen::Vector2d offset_m((x + 0.5) * cell_m - camera_m.x(), (y + 0.5) * cell_m - camera_m.y());
       const double range_m = offset_m.norm();
       const int bin = range_m > 0.0 ? grid.binOfInverse(static_cast<float>(1.0 / range_m)) : grid.numBins();
@@ -261,8 +219,8 @@ void LocalObstacleMap::hold(int64_t x, int64_t y, double radius_m, Timestamp sta
   for (int64_t row = y - reach; row <= y + reach; ++row) {
     for (int64_t column = x - reach; column <= x + reach; ++column) {
       const double distance = std::hypot(static_cast<double>(row - y), static_cast<double>(column - x));
-      if (distance <= radius && isInside(column, row)) {
-        Cell& cell = cellAt(column, row);
+      if (distance <= radius && cells_.isInside(column, row)) {
+        Cell& cell = cells_.at(column, row);
         cell.held_until_ns = std::max(cell.held_until_ns, until_ns);
         cell.log_odds = std::max(cell.log_odds, 0.0F);
       }
@@ -272,7 +230,7 @@ void LocalObstacleMap::hold(int64_t x, int64_t y, double radius_m, Timestamp sta
 
 void LocalObstacleMap::addGroundLook(const GroundLook& ground, double weight, Timestamp stamp) {
   const CellLook& look = ground.look;
-  Cell* cell = &cellAt(ground.x, ground.y);
+  Cell* cell = &cells_.at(ground.x, ground.y);
   const bool shows_ground = !look.blocked && look.free_share >= options_.min_free_share;
   if (shows_ground && !ground.in_shadow) {
     const double log_odds = cell->log_odds - weight * options_.free_log_odds * look.free_share;
@@ -292,12 +250,12 @@ void LocalObstacleMap::addGroundLook(const GroundLook& ground, double weight, Ti
 }
 
 void LocalObstacleMap::addLook(const Look& look, Timestamp stamp) {
-  const int64_t x = indexOf(look.point_m.x());
-  const int64_t y = indexOf(look.point_m.y());
-  if (!isInside(x, y) || look.mass <= 0.0) {
+  const int64_t x = cells_.indexOf(look.point_m.x());
+  const int64_t y = cells_.indexOf(look.point_m.y());
+  if (!cells_.isInside(x, y) || look.mass <= 0.0) {
     return;
   }
-  Cell& cell = cellAt(x, y);
+  Cell& cell = cells_.at(x, y);
   cell.log_odds = std::min(static_cast<float>(options_.max_log_odds),
                            cell.log_odds + static_cast<float>(options_.occupied_log_odds * look.mass));
   const double sigma_m = look.sigma_m;
@@ -390,30 +348,30 @@ void LocalObstacleMap::reanchor(const RigidTransform& new_from_old_fixed) {
   const auto oldCell = [&](int64_t x, int64_t y) -> const Cell* {
     const Eigen::Vector2d place =
         transformed(old_from_new, Eigen::Vector2d((x + 0.5) * cell_m, (y + 0.5) * cell_m));
-    const int64_t old_x = indexOf(place.x());
-    const int64_t old_y = indexOf(place.y());
-    return isInside(old_x, old_y) ? &cellAt(old_x, old_y) : nullptr;
+    const int64_t old_x = cells_.indexOf(place.x());
+    const int64_t old_y = cells_.indexOf(place.y());
+    return cells_.isInside(old_x, old_y) ? &cells_.at(old_x, old_y) : nullptr;
   };
-  for (int64_t y = moved.first_y_; y < moved.first_y_ + size_; ++y) {
-    for (int64_t x = moved.first_x_; x < moved.first_x_ + size_; ++x) {
+  for (int64_t y = moved.cells_.firstY(); y < moved.cells_.firstY() + cells_.size(); ++y) {
+    for (int64_t x = moved.cells_.firstX(); x < moved.cells_.firstX() + cells_.size(); ++x) {
       const Cell* old = oldCell(x, y);
       if (old != nullptr && old->log_odds <= 0.0F) {
-        moved.cellAt(x, y) = *old;
+        moved.cells_.at(x, y) = *old;
       }
     }
   }
   // Obstacles go where their points go, so that none falls between two cells.
-  for (int64_t y = first_y_; y < first_y_ + size_; ++y) {
-    for (int64_t x = first_x_; x < first_x_ + size_; ++x) {
-      const Cell& old = cellAt(x, y);
+  for (int64_t y = cells_.firstY(); y < cells_.firstY() + cells_.size(); ++y) {
+    for (int64_t x = cells_.firstX(); x < cells_.firstX() + cells_.size(); ++x) {
+      const Cell& old = cells_.at(x, y);
       const Eigen::Vector2d place =
           transformed(new_from_old, Eigen::Vector2d(x * cell_m + old.x_m, y * cell_m + old.y_m));
-      const int64_t new_x = indexOf(place.x());
-      const int64_t new_y = indexOf(place.y());
-      if (old.log_odds <= 0.0F || !moved.isInside(new_x, new_y)) {
+      const int64_t new_x = cells_.indexOf(place.x());
+      const int64_t new_y = cells_.indexOf(place.y());
+      if (old.log_odds <= 0.0F || !moved.cells_.isInside(new_x, new_y)) {
         continue;
       }
-      Cell& target = moved.cellAt(new_x, new_y);
+      Cell& target = moved.cells_.at(new_x, new_y);
       if (old.log_odds > target.log_odds) {
         target = old;
         target.x_m = static_cast<float>(place.x() - static_cast<double>(new_x) * cell_m);
@@ -432,14 +390,14 @@ void LocalObstacleMap::reanchor(const RigidTransform& new_from_old_fixed) {
 }
 
 ObstacleMap LocalObstacleMap::snapshot() const {
-  ObstacleMap map = ObstacleMap::unobserved({size_, size_}, options_.cell_size_m);
+  ObstacleMap map = ObstacleMap::unobserved({cells_.size(), cells_.size()}, options_.cell_size_m);
   map.stamp = stamp_;
   map.fixed_from_vehicle = fixed_from_vehicle_;
-  map.origin_m =
-      options_.cell_size_m * Eigen::Vector2d(static_cast<double>(first_x_), static_cast<double>(first_y_));
-  for (int row = 0; row < size_; ++row) {
-    for (int column = 0; column < size_; ++column) {
-      const Cell& cell = cellAt(first_x_ + column, first_y_ + row);
+  map.origin_m = options_.cell_size_m *
+                 Eigen::Vector2d(static_cast<double>(cells_.firstX()), static_cast<double>(cells_.firstY()));
+  for (int row = 0; row < cells_.size(); ++row) {
+    for (int column = 0; column < cells_.size(); ++column) {
+      const Cell& cell = cells_.at(cells_.firstX() + column, cells_.firstY() + row);
       if (cell.last_seen_ns == kNever) {
         continue;
       }

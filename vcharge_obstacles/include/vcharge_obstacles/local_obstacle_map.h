@@ -7,6 +7,7 @@
 
 #include "vcharge_core/obstacle_map.h"
 #include "vcharge_obstacles/obstacle_detector.h"
+#include "vcharge_obstacles/scrolling_grid.h"
 
 namespace vcharge {
 
@@ -135,12 +136,6 @@ class LocalObstacleMap {
   };
   static constexpr int64_t kNever = INT64_MIN;
 
-  int wrapped(int64_t index) const;
-  Cell& cellAt(int64_t x, int64_t y);
-  const Cell& cellAt(int64_t x, int64_t y) const;
-  int64_t indexOf(double coordinate_m) const;
-  bool isInside(int64_t x, int64_t y) const;
-  void scroll(int64_t first_x, int64_t first_y);
   void forget(double travelled_m);
   double weightOf(const CameraObstacles& seen, const RigidTransform& fixed_from_vehicle);
   void addGround(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle,
@@ -158,9 +153,7 @@ class LocalObstacleMap {
   int8_t stateOf(const Cell& cell) const;
 
   LocalObstacleMapOptions options_;
-  int size_ = 0;
-  int64_t first_x_ = 0, first_y_ = 0;  // cell of the lower corner, in cells of the fixed frame
-  std::vector<Cell> cells_;            // by index modulo size: scrolling moves nothing
+  ScrollingGrid<Cell> cells_;  // of the fixed frame
   bool placed_ = false;
   Timestamp stamp_;
   RigidTransform fixed_from_vehicle_;
