@@ -82,6 +82,13 @@ class MappingRealTest(unittest.TestCase):
         relative = [[rotation(poses[0, 4:]).T @ rotation(pose[4:]) for pose in poses] for poses in (path, given)]
         return [angle(estimate.T @ truth) for estimate, truth in zip(*relative)]
 
+    def judge(self, path):
+        length_error = length(path) / length(self.given_at(path[:, 0])) - 1
+        rotation_error_rad = max(self.rotation_errors(path))
+        print(f"length {100 * length_error:+.2f} %, rotation {math.degrees(rotation_error_rad):.2f} degrees")
+        self.assertLess(abs(length_error), MAX_LENGTH_ERROR)
+        self.assertLess(rotation_error_rad, MAX_ROTATION_ERROR_RAD)
+
     def bent(self):
         """The drive with a planar odometer that turns more than the car, in equal shares of the way."""
         path = self.folder / "bent.bag"
@@ -111,8 +118,7 @@ class MappingRealTest(unittest.TestCase):
     def test_the_path_is_as_long_and_turns_as_the_given_one(self):
         output, path = self.map(self.bag)
         self.assertEqual(len(path), 25)
-        self.assertLess(abs(length(path) / length(self.given_at(path[:, 0])) - 1), MAX_LENGTH_ERROR)
-        self.assertLess(max(self.rotation_errors(path)), MAX_ROTATION_ERROR_RAD)
+        self.judge(path)
         picture = self.folder / "landmarks.png"
         status, text, errors = run([tool("vcharge_mapping", "draw_landmarks"), "--map", output, "--bag", self.bag,
                                     "--camera", "left", "--output", picture])
@@ -128,8 +134,7 @@ class MappingRealTest(unittest.TestCase):
 
     def test_the_images_correct_an_odometer_that_turns_wrongly(self):
         _, path = self.map(self.bent())
-        self.assertLess(max(self.rotation_errors(path)), MAX_ROTATION_ERROR_RAD)
-        self.assertLess(abs(length(path) / length(self.given_at(path[:, 0])) - 1), MAX_LENGTH_ERROR)
+        self.judge(path)
 
 
 if __name__ == "__main__":
