@@ -39,7 +39,7 @@ DriveLocalizer::DriveLocalizer(std::shared_ptr<const SparseMap> map, std::shared
     : rig_(std::move(rig)),
       options_((options.validate(), options)),
       localizer_(std::move(map), rig_, options.localizer),
-      filter_(options.filter),
+      filter_(optionsForMapOf(localizer_.map().rig(), options.filter)),
       health_(rig_, options.health) {}
 
 void DriveLocalizer::seed(const PosePrior& pose) {

@@ -1,5 +1,6 @@
 #include "vcharge_localization/pose_filter.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <Eigen/Cholesky>
@@ -7,6 +8,7 @@
 
 #include "vcharge_core/cross_matrix.h"
 #include "vcharge_core/error.h"
+#include "vcharge_core/pixel_angle.h"
 
 namespace vcharge {
 namespace {
@@ -32,7 +34,21 @@ void PoseFilterOptions::validate() const {
                fix_covariance_factor);
   requireField(map_sigma_m >= 0.0, "map_sigma_m", "must not be negative", map_sigma_m);
   requireField(map_sigma_rad >= 0.0, "map_sigma_rad", "must not be negative", map_sigma_rad);
+  requireField(map_pixel_rad > 0.0, "map_pixel_rad", "must be positive", map_pixel_rad);
   requireField(gate > 0.0, "gate", "must be positive", gate);
+}
+
+PoseFilterOptions optionsForMapOf(const CameraRig& rig, const PoseFilterOptions& options) {
+  double sum_rad = 0.0;
+  for (const RigCamera& camera : rig.cameras) {
+    sum_rad += radiansPerPixel(camera);
+  }
+  const double pixel_rad = sum_rad / static_cast<double>(std::max<size_t>(1, rig.cameras.size()));
+  const double coarser = std::max(1.0, pixel_rad / options.map_pixel_rad);
+  PoseFilterOptions scaled = options;
+  scaled.map_sigma_m *= coarser;
+  scaled.map_sigma_rad *= coarser;
+  return scaled;
 }
 
 PoseFilter::PoseFilter(const PoseFilterOptions& options) : options_(options) {

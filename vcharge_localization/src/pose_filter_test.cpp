@@ -1,5 +1,6 @@
 #include "vcharge_localization/pose_filter.h"
 
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -155,6 +156,33 @@ TEST(PoseFilterTest, CovarianceStaysSymmetricAndPositive) {
   const Eigen::Matrix<double, 6, 6> covariance = filter.pose().covariance;
   EXPECT_LT((covariance - covariance.transpose()).norm(), 1e-12);
   EXPECT_EQ(covariance.llt().info(), Eigen::Success);
+}
+
+TEST(PoseFilterTest, MapsOfCoarseImagesErrMore) {
+  PoseFilterOptions options;
+  options.map_pixel_rad = 0.005;
+  // Width of a pixel, over which the map's errors are larger.
+  struct Case {
+    std::array<double, 2> pixels_rad;  // widths, of two cameras; their angles are a little less
+    double factor;                     // by which the map errs more
+  };
+  for (const auto& [pixels_rad, factor] : {Case{{0.0025, 0.0025}, 1.0}, Case{{0.005, 0.005}, 1.0},
+                                           Case{{0.01, 0.01}, 2.0}, Case{{0.01, 0.02}, 3.0}}) {
+    CameraRig rig;
+    for (const double pixel_rad : pixels_rad) {
+      const double focal_px = 1.0 / pixel_rad;
+      PinholeCamera::Parameters parameters;
+      parameters << focal_px, focal_px, 320.0, 200.0, Eigen::Vector4d::Zero();
+      rig.cameras.push_back(
+          {"camera", "camera_optical", {640, 400}, PinholeCamera(parameters), M_PI, "", {}, {}, {}});
+    }
+    const PoseFilterOptions scaled = optionsForMapOf(rig, options);
+    EXPECT_NEAR(scaled.map_sigma_m, factor * options.map_sigma_m, 1e-3 * options.map_sigma_m);
+    EXPECT_NEAR(scaled.map_sigma_rad, factor * options.map_sigma_rad, 1e-3 * options.map_sigma_rad);
+    PoseFilter filter(scaled);
+    filter.reset({});
+    EXPECT_NEAR(filter.pose().covariance(0, 0), scaled.map_sigma_m * scaled.map_sigma_m, 1e-12);
+  }
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "vcharge_core/camera_rig.h"
 #include "vcharge_core/options.h"
 #include "vcharge_core/rigid_transform.h"
 #include "vcharge_localization/map_localizer.h"
@@ -25,9 +26,12 @@ struct PoseFilterOptions {
   /// What a fix is good for: its own covariance takes all inliers to be right, and their errors to be
   /// independent.
   double fix_covariance_factor = 3.0;
-  // Errors of the map itself, which stay the same while the same landmarks are seen.
+  // Errors of the map itself, which stay the same while the same landmarks are seen: of maps made of images
+  // whose pixels are map_pixel_rad wide in their middle, or less. Those of coarser images err by as much
+  // more.
   double map_sigma_m = 0.005;
   double map_sigma_rad = 0.0004;
+  double map_pixel_rad = 0.005;
   double gate = 30.0;  ///< squared Mahalanobis distance (6 degrees of freedom) of a likely fix
 
   template <class Visitor>
@@ -45,10 +49,14 @@ struct PoseFilterOptions {
     visit("fix_covariance_factor", fix_covariance_factor);
     visit("map_sigma_m", map_sigma_m);
     visit("map_sigma_rad", map_sigma_rad);
+    visit("map_pixel_rad", map_pixel_rad);
     visit("gate", gate);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
+
+/// The same with the errors of a map that was made of a rig's images.
+PoseFilterOptions optionsForMapOf(const CameraRig& rig, const PoseFilterOptions& options);
 
 /// Fuses fixes with the odometer: an error-state Kalman filter over the vehicle's pose in the map and the
 /// odometer's factors, so that a bridged way is known as well as the odometer was while there were fixes.
