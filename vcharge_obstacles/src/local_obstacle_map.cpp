@@ -26,11 +26,6 @@ Eigen::Vector2d transformed(const RigidTransform& transform, const Eigen::Vector
   return (transform * Eigen::Vector3d(point_m.x(), point_m.y(), 0.0)).head<2>();
 }
 
-LocalObstacleMapOptions validated(const LocalObstacleMapOptions& options) {
-  options.validate();
-  return options;
-}
-
 }  // namespace
 
 void LocalObstacleMapOptions::validate() const {
@@ -70,7 +65,7 @@ void LocalObstacleMapOptions::validate() const {
 }
 
 LocalObstacleMap::LocalObstacleMap(const LocalObstacleMapOptions& options)
-    : options_(validated(options)),
+    : options_((options.validate(), options)),
       cells_(2 * static_cast<int>(std::lround(options.half_size_m / options.cell_size_m)),
              options.cell_size_m) {}
 
