@@ -14,7 +14,6 @@ import rosbag
 import rospy
 import rostest
 import yaml
-from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Path
 from sensor_msgs import point_cloud2
 from sensor_msgs.msg import PointCloud2
@@ -25,7 +24,8 @@ from visualization_msgs.msg import MarkerArray
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 import drawn_drive  # noqa: E402
 from drive_fixture import run, tool  # noqa: E402
-from nodelet_fixture import TIMEOUT_S, drive_publishers, manager_services, reach, wait_for, wait_until_gone  # noqa: E402
+from nodelet_fixture import (TIMEOUT_S, Diagnostics, drive_publishers, manager_services, reach, wait_for,  # noqa: E402
+                             wait_until_gone)
 
 OPTIONS = {"keyframe_distance_m": 0.9, "tracker": {"max_tracks_per_camera": 200}}  # sparse, to be quick
 CAMERAS = tuple(drawn_drive.CAMERAS)
@@ -49,7 +49,7 @@ class CalibrationNodeletTest(unittest.TestCase):
         with rosbag.Bag(str(cls.bag)) as bag:
             cls.messages = [(topic, message) for topic, message, _ in bag.read_messages()]
         cls.num_frames = sum(topic == "/camera/front/image_raw" for topic, _ in cls.messages)
-        cls.states, cls.received, cls.status = [], {}, {}
+        cls.states, cls.received = [], {}
 
         def keep(topic):
             return lambda message: cls.received.setdefault(topic, []).append(message)
@@ -59,18 +59,14 @@ class CalibrationNodeletTest(unittest.TestCase):
             ("/calibration/cameras", MarkerArray))]
         cls.subscribers.append(rospy.Subscriber("/calibration/status", CalibrationStatus, cls.states.append,
                                                 queue_size=1000))
-        cls.subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, cls.keep_diagnostics))
+        cls.diagnostics = Diagnostics()
+        cls.subscribers.append(cls.diagnostics.subscriber)
         cls.publishers = drive_publishers(CAMERAS)
         cls.load, cls.unload, cls.list = manager_services()
 
     @classmethod
     def tearDownClass(cls):
         shutil.rmtree(cls.folder)
-
-    @classmethod
-    def keep_diagnostics(cls, message):
-        for status in message.status:
-            cls.status[status.name] = status
 
     def setUp(self):
         self.work = self.folder / self.id().split(".")[-1]
@@ -86,9 +82,8 @@ class CalibrationNodeletTest(unittest.TestCase):
         self.calibrate = rospy.ServiceProxy("/calibration/calibrate", Trigger)
         self.reset = rospy.ServiceProxy("/calibration/reset", Trigger)
         self.calibrate.wait_for_service(TIMEOUT_S)
-        self.status.clear()
-        reach(self.publishers, lambda: {key for key, value in self.values("calibration: ").items()
-                                        if ", 0 bad" not in value})
+        self.diagnostics.clear()
+        reach(self.publishers, self.diagnostics.heard)
         self.states.clear()
         for kind in self.received.values():
             kind.clear()
@@ -99,11 +94,6 @@ class CalibrationNodeletTest(unittest.TestCase):
         wait_until_gone("/manager", self.subscribers)
         self.assertEqual(self.list().nodelets, [], "the manager outlives the nodelet")
         rospy.delete_param("/calibration")
-
-    def values(self, name):
-        """Keys and values of the newest status whose name has this in it."""
-        return next(({value.key: value.value for value in status.values}
-                     for key, status in list(self.status.items()) if name in key), {})
 
     def publish(self, share=1.0):
         """The first share of the drive; returns once the nodelet has followed all of it and rests: a nodelet that is
@@ -121,7 +111,7 @@ class CalibrationNodeletTest(unittest.TestCase):
                 break
 
     def num_followed(self):
-        return int(self.values("calibration/rig").get("frames", 0))
+        return int(self.diagnostics.values("calibration/rig").get("frames", 0))
 
     def wait_for_end(self):
         return wait_for(lambda: next((state for state in list(self.states) if state.state in ENDED), None),
@@ -219,7 +209,7 @@ class CalibrationNodeletTest(unittest.TestCase):
         self.assertEqual(self.output.read_text(), "an older rig\n")
         self.assertFalse((self.work / "room.vmap").exists())
         self.assertIn("turned only 0 degrees to the right", (self.work / "report" / "rig_report.html").read_text())
-        wait_for(lambda: any("turned only" in status.message for status in list(self.status.values())), "a diagnostic")
+        wait_for(lambda: self.diagnostics.tells("turned only"), "a diagnostic")
         self.states.clear()
         self.assertTrue(self.reset().success)
         state = wait_for(lambda: list(self.states), "a status")[-1]

@@ -11,13 +11,12 @@ import numpy as np
 import rospy
 import rostest
 import yaml
-from diagnostic_msgs.msg import DiagnosticArray
 from sensor_msgs.msg import Image, PointCloud2
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import CAMERAS, Drive  # noqa: E402
-from nodelet_fixture import (drive_publishers, expect_bad_rig_is_refused, manager_services, project_mei,  # noqa: E402
-                             reach, wait_for, wait_until_gone)
+from nodelet_fixture import (Diagnostics, drive_publishers, expect_bad_rig_is_refused, manager_services,  # noqa: E402
+                             project_mei, reach, wait_for, wait_until_gone)
 
 
 def rays_without_distortion(width, height, p):
@@ -40,8 +39,6 @@ class DepthNodeletTest(unittest.TestCase):
                         if topic == "/odom" or topic.endswith("/image_raw")]
         cls.received = {}
         cls.clouds = []
-        cls.reached = set()  # topics that brought the nodelet something
-        cls.told = []  # every message of /diagnostics since the test's begin
 
         def keep(topic):
             def callback(message):
@@ -52,7 +49,8 @@ class DepthNodeletTest(unittest.TestCase):
             rospy.Subscriber(f"/dense/{camera}/range/{kind}", Image, keep((camera, kind)), queue_size=100)
             for camera in CAMERAS for kind in ("image", "confidence", "standard_deviation")]
         cls.subscribers.append(rospy.Subscriber("/dense/left/points", PointCloud2, cls.clouds.append, queue_size=100))
-        cls.subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, cls.keep_diagnostics))
+        cls.diagnostics = Diagnostics()
+        cls.subscribers.append(cls.diagnostics.subscriber)
         cls.publishers = drive_publishers(CAMERAS)
 
         rospy.set_param("/depth/rig", str(cls.drive.rig))
@@ -64,19 +62,13 @@ class DepthNodeletTest(unittest.TestCase):
     def tearDownClass(cls):
         cls.drive.remove()
 
-    @classmethod
-    def keep_diagnostics(cls, message):
-        for status in message.status:
-            cls.told.append(status.message)
-            cls.reached.update(value.key for value in status.values if ", 0 bad" not in value.value)
-
     def setUp(self):
         self.assertTrue(self.load("/depth", "vcharge_dense/depth_nodelet", [], [], [], "").success)
-        self.reached.clear()
-        reach(self.publishers, lambda: self.reached)
+        self.diagnostics.clear()
+        reach(self.publishers, self.diagnostics.heard)
         for kinds in self.received.values():
             kinds.clear()
-        self.told.clear()
+        self.diagnostics.clear()
 
     def tearDown(self):
         self.assertTrue(self.unload("/depth").success)
@@ -97,10 +89,8 @@ class DepthNodeletTest(unittest.TestCase):
         return sorted(int(path.stem) for path in (self.offline / camera).glob("*.yaml"))
 
     def wait_for_message(self, *words):
-        def found():
-            return any(all(word in text for word in words) for text in list(self.told))
         # Every frame is processed in order: on a busy machine it takes long until the bad one's turn comes.
-        wait_for(found, f"a diagnostic with {words}")
+        wait_for(lambda: self.diagnostics.tells(*words), f"a diagnostic with {words}")
 
     def expect_recovery(self):
         """A good drive after whatever came before gives range maps."""

@@ -10,7 +10,6 @@ import numpy as np
 import rosbag
 import rospy
 import rostest
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import Image
@@ -20,7 +19,7 @@ from visualization_msgs.msg import Marker
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import content_hash  # noqa: E402
 from localization_fixture import CAMERAS, Place, count, rig_text, warnings  # noqa: E402
-from nodelet_fixture import drive_publishers, manager_services, reach, wait_for, wait_until_gone  # noqa: E402
+from nodelet_fixture import Diagnostics, drive_publishers, manager_services, reach, wait_for, wait_until_gone  # noqa: E402
 from vcharge_msgs.msg import LocalizationStatus  # noqa: E402
 
 MAX_ERROR_M = 0.1
@@ -47,7 +46,7 @@ class LocalizationTest(unittest.TestCase):
         cls.messages = [(topic, message) for topic, message in cls.messages_of(cls.place.bag)
                         if topic == "/odom" or topic.endswith("/image_raw")]
         cls.received = {}
-        cls.diagnostics, cls.told, cls.logged = {}, [], []
+        cls.logged = []
 
         def keep(topic):
             return lambda message: cls.received.setdefault(topic, []).append(message)
@@ -55,7 +54,8 @@ class LocalizationTest(unittest.TestCase):
         cls.subscribers = [rospy.Subscriber(topic, kind, keep(topic), queue_size=1000) for topic, kind in (
             ("/localization/pose", PoseWithCovarianceStamped), ("/localization/status", LocalizationStatus),
             ("/localization/sightings", Marker), ("/tf", TFMessage))]
-        cls.subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, cls.keep_diagnostics))
+        cls.diagnostics = Diagnostics()
+        cls.subscribers.append(cls.diagnostics.subscriber)
         cls.subscribers.append(rospy.Subscriber("/rosout", Log, lambda m: cls.logged.append(m.msg), queue_size=100))
         cls.publishers = drive_publishers(CAMERAS)
         cls.initial_pose = rospy.Publisher("/initialpose", PoseWithCovarianceStamped, queue_size=1)
@@ -69,12 +69,6 @@ class LocalizationTest(unittest.TestCase):
     def messages_of(cls, path):
         with rosbag.Bag(str(path)) as bag:
             return [(topic, message) for topic, message, _ in bag.read_messages()]
-
-    @classmethod
-    def keep_diagnostics(cls, message):
-        for status in message.status:
-            cls.diagnostics[status.name] = status
-            cls.told.append((status.level, status.message))
 
     # ---- the offline tool
 
@@ -168,8 +162,8 @@ class LocalizationTest(unittest.TestCase):
         self.assertTrue(self.load("/localization", NODELET, [], [], [], "").success)
         self.addCleanup(self.stop)
         self.diagnostics.clear()
-        reach(self.publishers, self.heard)
-        self.told.clear()
+        reach(self.publishers, self.diagnostics.heard)
+        self.diagnostics.clear()
         for messages in self.received.values():
             messages.clear()
 
@@ -177,11 +171,6 @@ class LocalizationTest(unittest.TestCase):
         self.assertTrue(self.unload("/localization").success)
         wait_until_gone("/manager", self.subscribers[:-1])  # the manager itself goes on writing to /rosout
         self.assertEqual(self.list().nodelets, [], "the manager outlives the nodelet")
-
-    def heard(self):
-        """Topics of which the nodelet says that something bad came."""
-        return {value.key for status in list(self.diagnostics.values()) for value in status.values
-                if ", 0 bad" not in value.value}
 
     def publish(self, change=lambda topic, message: message, pause_s=0.001):
         for topic, message in self.messages:
@@ -200,8 +189,7 @@ class LocalizationTest(unittest.TestCase):
         wait_for(lambda: len(self.statuses()) >= number, f"{number} frames")
 
     def wait_until_told(self, level, *words):
-        wait_for(lambda: any(at == level and all(word in text for word in words) for at, text in list(self.told)),
-                 f"a diagnostic with {words}")
+        wait_for(lambda: self.diagnostics.tells(*words, level=level), f"a diagnostic with {words}")
 
     def pose_errors_m(self, shift_s=0.0):
         return self.place.errors_m(

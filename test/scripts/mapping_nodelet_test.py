@@ -9,7 +9,6 @@ import unittest
 import numpy as np
 import rospy
 import rostest
-from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Path
 from sensor_msgs import point_cloud2
 from sensor_msgs.msg import PointCloud2
@@ -19,7 +18,8 @@ from visualization_msgs.msg import MarkerArray
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import Drive, content_hash, run, tool  # noqa: E402
 from mapping_fixture import numbers_of_map  # noqa: E402
-from nodelet_fixture import TIMEOUT_S, drive_publishers, manager_services, reach, wait_for, wait_until_gone  # noqa: E402
+from nodelet_fixture import (TIMEOUT_S, Diagnostics, drive_publishers, manager_services, reach, wait_for,  # noqa: E402
+                             wait_until_gone)
 
 CAMERAS = ("front", "left", "rear", "right")
 WORK_TIMEOUT_S = 150.0
@@ -40,27 +40,20 @@ class MappingNodeletTest(unittest.TestCase):
                         if topic == "/odom" or topic.endswith("/image_raw")]
         cls.num_frames = len({message.header.stamp.to_nsec() for topic, message in cls.messages if topic != "/odom"})
         cls.received = {}
-        cls.status = {}  # by name: the newest of /diagnostics
-        cls.told = []
 
         def keep(topic):
             return lambda message: cls.received.setdefault(topic, []).append(message)
 
         cls.subscribers = [rospy.Subscriber(topic, kind, keep(topic), queue_size=1000) for topic, kind in (
             ("/mapping/landmarks", PointCloud2), ("/mapping/trajectory", Path), ("/mapping/loop_edges", MarkerArray))]
-        cls.subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, cls.keep_diagnostics))
+        cls.diagnostics = Diagnostics()
+        cls.subscribers.append(cls.diagnostics.subscriber)
         cls.publishers = drive_publishers(CAMERAS)
         cls.load, cls.unload, cls.list = manager_services()
 
     @classmethod
     def tearDownClass(cls):
         cls.drive.remove()
-
-    @classmethod
-    def keep_diagnostics(cls, message):
-        for status in message.status:
-            cls.status[status.name] = status
-            cls.told.append(status.message)
 
     def setUp(self):
         self.output = self.drive.folder / f"{self.id().split('.')[-1]}.vmap"
@@ -71,24 +64,16 @@ class MappingNodeletTest(unittest.TestCase):
         self.finish = rospy.ServiceProxy("/mapping/finish", Trigger)
         self.save = rospy.ServiceProxy("/mapping/save", Trigger)
         self.finish.wait_for_service(TIMEOUT_S)
-        self.status.clear()
-        reach(self.publishers,
-              lambda: {key for key, value in self.values(False).items() if ", 0 bad" not in value})
+        self.diagnostics.clear()
+        reach(self.publishers, self.diagnostics.heard)
         for kind in self.received.values():
             kind.clear()
-        self.told.clear()
+        self.diagnostics.told.clear()
 
     def tearDown(self):
         self.assertTrue(self.unload("/mapping").success)
         wait_until_gone("/manager", self.subscribers)
         self.assertEqual(self.list().nodelets, [], "the manager outlives the nodelet")
-
-    def values(self, of_map):
-        """Keys and values of the nodelet's newest status: of the map, or of the topics."""
-        for name, status in list(self.status.items()):
-            if ("mapping/map" in name) == of_map:
-                return {value.key: value.value for value in status.values}
-        return {}
 
     def publish(self, change=lambda topic, message: message):
         for topic, message in self.messages:
@@ -98,10 +83,11 @@ class MappingNodeletTest(unittest.TestCase):
                 time.sleep(0.001)
 
     def message_of_map(self):
-        return next((status.message for name, status in list(self.status.items()) if "mapping/map" in name), "")
+        status = self.diagnostics.status_of("mapping/map")
+        return status.message if status else ""
 
     def wait_for_frames(self, count):
-        wait_for(lambda: int(self.values(True).get("frames", 0)) >= count, f"{count} frames", WORK_TIMEOUT_S)
+        wait_for(lambda: int(self.diagnostics.values("mapping/map").get("frames", 0)) >= count, f"{count} frames", WORK_TIMEOUT_S)
 
     def wait_until_finished(self):
         wait_for(lambda: self.message_of_map().startswith("finished"), "the map", WORK_TIMEOUT_S)
@@ -122,7 +108,7 @@ class MappingNodeletTest(unittest.TestCase):
         self.finish_good_drive()
         # Diagnostics come once a second: a map that is made sooner may tell no stage.
         took_long = time.monotonic() - start > 1.0 + 3.0 + self.num_frames * len(self.publishers) * 0.002
-        self.assertTrue(any(text.startswith("stage ") for text in self.told) or not took_long, "progress is told")
+        self.assertTrue(any(text.startswith("stage ") for _, text in self.diagnostics.told) or not took_long, "progress is told")
         self.assertIn(content_hash(self.offline), self.message_of_map())
         answer = self.save()
         self.assertTrue(answer.success, answer.message)
@@ -153,7 +139,7 @@ class MappingNodeletTest(unittest.TestCase):
         first = self.messages[0][1].header.stamp
         self.publish(lambda topic, message: (
             None if topic == "/odom" and (message.header.stamp - first).to_sec() > 0.1 else message))
-        wait_for(lambda: any("/odom: no data for" in text for text in list(self.told)), "the missing topic")
+        wait_for(lambda: self.diagnostics.tells("/odom: no data for"), "the missing topic")
         answer = self.finish()
         self.assertTrue(answer.success, answer.message)
         wait_for(lambda: "without odometry" in self.message_of_map(), "why there is no map", WORK_TIMEOUT_S)

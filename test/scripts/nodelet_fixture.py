@@ -3,6 +3,7 @@ import time
 
 import rosgraph
 import rospy
+from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from nodelet.srv import NodeletList, NodeletLoad, NodeletUnload
 from sensor_msgs.msg import Image
@@ -35,6 +36,40 @@ def drive_publishers(cameras):
         topic = f"/camera/{camera}/image_raw"
         publishers[topic] = rospy.Publisher(topic, Image, queue_size=10000)
     return publishers
+
+
+class Diagnostics:
+    """What /diagnostics tells: by name the newest status, and (level, message) of every one."""
+
+    def __init__(self):
+        self.status, self.told = {}, []
+        self.subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, self._keep, queue_size=100)
+
+    def _keep(self, message):
+        for status in message.status:
+            self.status[status.name] = status
+            self.told.append((status.level, status.message))
+
+    def clear(self):
+        self.status.clear()
+        self.told.clear()
+
+    def status_of(self, name):
+        """The newest status whose name has this in it, or none."""
+        return next((status for key, status in list(self.status.items()) if name in key), None)
+
+    def values(self, name):
+        """Its keys and values."""
+        status = self.status_of(name)
+        return {value.key: value.value for value in status.values} if status else {}
+
+    def heard(self):
+        """Topics of which a nodelet tells that something bad came; for reach()."""
+        return {value.key for status in list(self.status.values()) for value in status.values if ", 0 bad" not in value.value}
+
+    def tells(self, *words, level=None):
+        """Whether one message since the last clear() has all the words, at the level if one is given."""
+        return any((level is None or at == level) and all(word in text for word in words) for at, text in list(self.told))
 
 
 def reach(publishers, heard):

@@ -15,7 +15,6 @@ import numpy as np
 import rospy
 import rostest
 import yaml
-from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Vector3Stamped
 from nav_msgs.msg import OccupancyGrid, Odometry
 from octomap_msgs.msg import Octomap
@@ -25,8 +24,8 @@ from visualization_msgs.msg import MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import CAMERAS, Drive, run, tool  # noqa: E402
-from nodelet_fixture import (drive_publishers, expect_bad_rig_is_refused, manager_services, reach,  # noqa: E402
-                             wait_for, wait_until_connected, wait_until_gone)
+from nodelet_fixture import (Diagnostics, drive_publishers, expect_bad_rig_is_refused, manager_services,  # noqa: E402
+                             reach, wait_for, wait_until_connected, wait_until_gone)
 
 PARTS = {"image": Image, "standard_deviation": Image, "confidence": Image, "reference": Image, "camera_info": CameraInfo}
 FREE, OCCUPIED, UNOBSERVED = 0, 100, -1
@@ -73,7 +72,7 @@ class ObstacleNodeletTest(unittest.TestCase):
         cls.messages = cls.record_range_maps()
         cls.publishers = {topic: rospy.Publisher(topic, type(message), queue_size=10000)
                           for topic, message in {topic: message for topic, message in cls.messages}.items()}
-        cls.received, cls.status, cls.told, cls.log = {}, {}, [], []
+        cls.received, cls.log = {}, []
         topics = {"/obstacles/grid": OccupancyGrid, "/obstacles/scan": LaserScan, "/obstacles/markers": MarkerArray,
                   "/obstacles/octomap": Octomap}
         for camera in CAMERAS:
@@ -85,7 +84,8 @@ class ObstacleNodeletTest(unittest.TestCase):
 
         cls.subscribers = [rospy.Subscriber(topic, kind, keep(topic), queue_size=1000) for topic, kind in topics.items()]
         cls.topics = topics
-        cls.subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, cls.keep_diagnostics))
+        cls.diagnostics = Diagnostics()
+        cls.subscribers.append(cls.diagnostics.subscriber)
         rospy.Subscriber("/rosout", Log, lambda message: cls.log.append(message.msg), queue_size=1000)
 
     @classmethod
@@ -97,17 +97,12 @@ class ObstacleNodeletTest(unittest.TestCase):
                              lambda message, topic=f"/dense/{camera}/range/{part}": recorded.append((topic, message)),
                              queue_size=1000)
             for camera in CAMERAS for part, kind in PARTS.items()]
-        reached = set()
-
-        def hear(message):
-            for status in message.status:
-                reached.update(value.key for value in status.values if ", 0 bad" not in value.value)
-
-        subscribers.append(rospy.Subscriber("/diagnostics", DiagnosticArray, hear))
+        diagnostics = Diagnostics()
+        subscribers.append(diagnostics.subscriber)
         publishers = drive_publishers(CAMERAS)
         if not cls.load("/depth", "vcharge_dense/depth_nodelet", [], [], [], "").success:
             raise RuntimeError("the depth nodelet does not load")
-        reach(publishers, lambda: reached)
+        reach(publishers, diagnostics.heard)
         drive = [(topic, message) for topic, message in cls.drive.messages()
                  if topic == "/odom" or topic.endswith("/image_raw")]
         for topic, message in drive:
@@ -129,12 +124,6 @@ class ObstacleNodeletTest(unittest.TestCase):
     @classmethod
     def tearDownClass(cls):
         cls.drive.remove()
-
-    @classmethod
-    def keep_diagnostics(cls, message):
-        for status in message.status:
-            cls.status[status.name] = {value.key: value.value for value in status.values}
-            cls.told.append(status.message)
 
     def setUp(self):
         self.load_obstacles()
@@ -162,19 +151,19 @@ class ObstacleNodeletTest(unittest.TestCase):
 
     def reach(self):
         """Until the nodelet tells of odometry without a stamp, and all else is connected."""
-        self.told.clear()
+        self.diagnostics.clear()
 
         def heard():
             self.publishers["/odom"].publish(Odometry())
             time.sleep(0.3)
-            return any("/odom" in text for text in list(self.told))
+            return self.diagnostics.tells("/odom")
         wait_for(heard, "the nodelet to hear /odom")
         self.clear()
 
     def clear(self):
         for messages in self.received.values():
             messages.clear()
-        self.told.clear()
+        self.diagnostics.told.clear()
         self.log.clear()
 
     def wait_until_quiet(self):
@@ -201,7 +190,7 @@ class ObstacleNodeletTest(unittest.TestCase):
         return sorted(int(path.stem) for path in self.offline.glob("*.yaml"))
 
     def wait_for_message(self, *words):
-        wait_for(lambda: any(all(word in text for word in words) for text in list(self.told)), f"a diagnostic with {words}")
+        wait_for(lambda: self.diagnostics.tells(*words), f"a diagnostic with {words}")
 
     def expect_recovery(self):
         """A good drive after whatever came before gives a map."""
@@ -299,8 +288,7 @@ class ObstacleNodeletTest(unittest.TestCase):
         self.wait_for_message("/dense/left/range/camera_info", "expected camera 'left' of the rig", "320x200")
         errors = [text for text in list(self.log) if "expected camera 'left'" in text]
         self.assertEqual(len(errors), 1, errors)
-        maps = [int(values["range_maps"]) for name, values in self.status.items() if "obstacles/left" in name]
-        self.assertEqual(maps, [0])
+        self.assertEqual(int(self.diagnostics.values("obstacles/left")["range_maps"]), 0)
         self.expect_recovery()
 
     def test_images_of_another_kind_are_refused(self):
@@ -333,8 +321,8 @@ class ObstacleNodeletTest(unittest.TestCase):
                 time.sleep(0.002)
 
         def counts():
-            return next(({key: int(values[key]) for key in ("range_maps", "without_pose", "waiting_stamps")}
-                         for name, values in self.status.items() if "obstacles/left" in name), {})
+            values = self.diagnostics.values("obstacles/left")
+            return {key: int(values[key]) for key in ("range_maps", "without_pose", "waiting_stamps")} if values else {}
         wait_for(lambda: counts().get("range_maps") == 3 * stamps, "the range maps")
         self.assertGreater(3 * stamps, 2 * MAX_WAITING)
         self.assertLessEqual(counts()["waiting_stamps"], MAX_WAITING)
