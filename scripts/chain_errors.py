@@ -190,7 +190,8 @@ def localization_figures(result, csv, map_path, truths, picture):
                         "p95_m": float(np.percentile(errors.error_m[good], 95)),
                         "median_deg": float(np.median(errors.error_deg[good])),
                         "p95_deg": float(np.percentile(errors.error_deg[good], 95)), "wrong": errors.num_false(),
-                        "absolute_median_m": float(np.median(errors.absolute_m[good]))})
+                        "absolute_median_m": float(np.median(errors.absolute_m[good])),
+                        "normalized": float(np.mean(errors.normalized[good]))})
         errors.plot(picture)
     return figures
 
@@ -209,4 +210,5 @@ def judge_obstacles(output, truth, figures, folder):
     judged = errors["map"]["obstacles"]
     figures.update({"mean_m": fused["error_m"]["mean"], "p95_m": fused["error_m"]["percentile_95"],
                     "obstacles": len(judged), "missed": sum(not obstacle["reported"] for obstacle in judged),
-                    "false_per_10_m": errors["map"]["false_cells_per_10_m"], "free_inside": errors["map"]["free_inside"]})
+                    "false_per_10_m": errors["map"]["false_cells_per_10_m"], "free_inside": errors["map"]["free_inside"],
+                    "observed_inside": errors["map"]["observed_inside"]})

@@ -71,6 +71,9 @@ def summary_rows(figures):
         rows.append(("pose in the map: position, median, 95 %; angle, median",
                      f"{centimetres(pose['median_m'])}, {centimetres(pose['p95_m'])}; {pose['median_deg']:.3f} degrees; "
                      f"{pose['wrong']} wrong", "not given"))
+        if "normalized" in pose:
+            rows.append(("the same: normalized error squared per degree of freedom (1 where the covariance is right)",
+                         f"{pose['normalized']:.2f}", "no covariance"))
     obstacles = figures.get("obstacles", {})
     if "mean_m" in obstacles:
         rows.append(("obstacles of 20 cm and more within 5 m: range error, mean, 95 %",

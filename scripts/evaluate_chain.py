@@ -51,6 +51,10 @@ def added(cars):
     def row(name, step, key, text):
         return [name, *(text(figures[step][key]) if key in figures.get(step, {}) else "-" for figures in cars.values())]
 
+    def pair(name, step, part, whole):
+        return [name, *(f"{figures[step][part]} of {figures[step][whole]}" if part in figures.get(step, {}) else "-"
+                        for figures in cars.values())]
+
     def largest(values):
         return f"{max(values.values()):.3f}"
 
@@ -64,9 +68,23 @@ def added(cars):
         yield row(f"pose in the map, {title}: median", f"localization{suffix}", "median_m", centimetres)
         yield row(f"pose in the map, {title}: angle, median (degrees)", f"localization{suffix}", "median_deg",
                   lambda value: f"{value:.3f}")
+        yield row("the same: 95 %", f"localization{suffix}", "p95_m", centimetres)
+        yield pair("the same: frames localized", f"localization{suffix}", "localized", "frames")
+        yield row("the same: localized, but wrong", f"localization{suffix}", "wrong", str)
+        yield row("the same: normalized error squared per degree of freedom (all frames)", f"localization{suffix}", "normalized",
+                  lambda value: f"{value:.2f}")
         yield row(f"height map, {title}: mean", f"height_map{suffix}", "mean_m", centimetres)
+        yield row("the same: tape measures, mean", f"height_map{suffix}", "tape_m", centimetres)
+        yield pair("the same: tape measures shown", f"height_map{suffix}", "tapes", "all_tapes")
         yield row(f"obstacles, {title}: mean", f"obstacles{suffix}", "mean_m", centimetres)
+        yield row("the same: 95 %", f"obstacles{suffix}", "p95_m", centimetres)
+        yield pair("the same: obstacles missed", f"obstacles{suffix}", "missed", "obstacles")
+        yield row("the same: false cells per 10 m", f"obstacles{suffix}", "false_per_10_m", lambda value: f"{value:.1f}")
+        yield pair("the same: cells inside obstacles that were free for some frame", f"obstacles{suffix}", "free_inside",
+                   "observed_inside")
     yield row("height map, true rig and poses: mean", "height_map_truth", "mean_m", centimetres)
+    yield row("the same: tape measures, mean", "height_map_truth", "tape_m", centimetres)
+    yield pair("the same: tape measures shown", "height_map_truth", "tapes", "all_tapes")
 
 
 def print_table(title, headings, rows):

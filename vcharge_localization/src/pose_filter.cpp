@@ -44,10 +44,11 @@ PoseFilterOptions optionsForMapOf(const CameraRig& rig, const PoseFilterOptions&
     sum_rad += radiansPerPixel(camera);
   }
   const double pixel_rad = sum_rad / static_cast<double>(std::max<size_t>(1, rig.cameras.size()));
-  const double coarser = std::max(1.0, pixel_rad / options.map_pixel_rad);
+  constexpr double kFinest = 0.5;
+  const double factor = std::max(kFinest, pixel_rad / options.map_pixel_rad);
   PoseFilterOptions scaled = options;
-  scaled.map_sigma_m *= coarser;
-  scaled.map_sigma_rad *= coarser;
+  scaled.map_sigma_m *= factor;
+  scaled.map_sigma_rad *= factor;
   return scaled;
 }
 

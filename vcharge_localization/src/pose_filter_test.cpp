@@ -158,16 +158,16 @@ TEST(PoseFilterTest, CovarianceStaysSymmetricAndPositive) {
   EXPECT_EQ(covariance.llt().info(), Eigen::Success);
 }
 
-TEST(PoseFilterTest, MapsOfCoarseImagesErrMore) {
+TEST(PoseFilterTest, MapsErrInProportionToTheirImagesPixels) {
   PoseFilterOptions options;
   options.map_pixel_rad = 0.005;
-  // Width of a pixel, over which the map's errors are larger.
   struct Case {
     std::array<double, 2> pixels_rad;  // widths, of two cameras; their angles are a little less
     double factor;                     // by which the map errs more
   };
-  for (const auto& [pixels_rad, factor] : {Case{{0.0025, 0.0025}, 1.0}, Case{{0.005, 0.005}, 1.0},
-                                           Case{{0.01, 0.01}, 2.0}, Case{{0.01, 0.02}, 3.0}}) {
+  for (const auto& [pixels_rad, factor] :
+       {Case{{0.001, 0.001}, 0.5}, Case{{0.003, 0.005}, 0.8}, Case{{0.005, 0.005}, 1.0},
+        Case{{0.01, 0.01}, 2.0}, Case{{0.01, 0.02}, 3.0}}) {
     CameraRig rig;
     for (const double pixel_rad : pixels_rad) {
       const double focal_px = 1.0 / pixel_rad;

@@ -27,8 +27,8 @@ struct PoseFilterOptions {
   /// independent.
   double fix_covariance_factor = 3.0;
   // Errors of the map itself, which stay the same while the same landmarks are seen: of maps made of images
-  // whose pixels are map_pixel_rad wide in their middle, or less. Those of coarser images err by as much
-  // more.
+  // whose pixels are map_pixel_rad wide in their middle. Those of coarser and finer images err by as much
+  // more and less; those of pixels less than half as wide, of which nothing was measured, as those of half.
   double map_sigma_m = 0.005;
   double map_sigma_rad = 0.0004;
   double map_pixel_rad = 0.005;
@@ -55,7 +55,7 @@ struct PoseFilterOptions {
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
-/// The same with the errors of a map that was made of a rig's images.
+/// The same with the errors of a map that was made of a rig's images: in proportion to its pixels' width.
 PoseFilterOptions optionsForMapOf(const CameraRig& rig, const PoseFilterOptions& options);
 
 /// Fuses fixes with the odometer: an error-state Kalman filter over the vehicle's pose in the map and the
