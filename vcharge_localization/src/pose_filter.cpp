@@ -44,7 +44,7 @@ PoseFilterOptions optionsForMapOf(const CameraRig& rig, const PoseFilterOptions&
     sum_rad += radiansPerPixel(camera);
   }
   const double pixel_rad = sum_rad / static_cast<double>(std::max<size_t>(1, rig.cameras.size()));
-  constexpr double kFinest = 0.5;
+  constexpr double kFinest = 0.5;  // what finer images give was not measured
   const double factor = std::max(kFinest, pixel_rad / options.map_pixel_rad);
   PoseFilterOptions scaled = options;
   scaled.map_sigma_m *= factor;
