@@ -52,7 +52,7 @@ def added(cars):
         return [name, *(text(figures[step][key]) if key in figures.get(step, {}) else "-" for figures in cars.values())]
 
     def pair(name, step, part, whole):
-        return [name, *(f"{figures[step][part]} of {figures[step][whole]}" if part in figures.get(step, {}) else "-"
+        return [name, *(f"{figures[step][part]} of {figures[step][whole]}" if {part, whole} <= figures.get(step, {}).keys() else "-"
                         for figures in cars.values())]
 
     def largest(values):

@@ -40,7 +40,8 @@ scenario() {
 }
 
 for drive in $drives; do
-  read -r -a arguments <<<"$(scenario "$drive")"
+  words=$(scenario "$drive")
+  read -r -a arguments <<<"$words"
   name=${drive}_seed${seed}
   case "$drive" in
     *_other_day) name+=_rig$rig_seed ;;

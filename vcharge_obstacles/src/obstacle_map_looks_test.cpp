@@ -1,5 +1,8 @@
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -39,22 +42,33 @@ class ObstacleMapLooksTest : public ::testing::Test {
       const double sine = std::sin(grid_.angle_rad(ray));
       const double range_m = kFlankY_m / sine;
       if (sine > 0.0 && std::abs(x_m + range_m * std::cos(grid_.angle_rad(ray))) < 1.0) {
-        seen.obstacles.push_back(makeObstacle(grid_.angle_rad(ray), range_m + error_m, sigma_m));
-        seen.obstacles.back().ray = ray;
+        seen.obstacles.push_back(makeObstacle(ray, range_m + error_m, sigma_m));
       }
     }
     return seen;
   }
 
   /// Something 1 m high in one sector.
-  PolarObstacle makeObstacle(double angle_rad, double range_m, double range_sigma_m) const {
+  static PolarObstacle makeObstacle(int ray, double range_m, double range_sigma_m) {
     PolarObstacle obstacle;
-    obstacle.ray = grid_.rayOf(angle_rad);
+    obstacle.ray = ray;
     obstacle.range_m = range_m;
     obstacle.range_sigma_m = range_sigma_m;
     obstacle.height_m = 1.0;
     obstacle.support = 1.0;
     return obstacle;
+  }
+
+  /// How many looks, numbered from 1, it takes until the first cell is occupied; 200: more.
+  static int looksUntilOccupied(const std::function<void(int number, LocalObstacleMap* map)>& look) {
+    LocalObstacleMap map;
+    for (int number = 1; number < 200; ++number) {
+      look(number, &map);
+      if (countCells(map.snapshot(), kCellOccupied) > 0) {
+        return number;
+      }
+    }
+    return 200;
   }
 
   PolarGrid grid_{ObstacleDetectorOptions().grid};
@@ -64,7 +78,7 @@ class ObstacleMapLooksTest : public ::testing::Test {
 TEST_F(ObstacleMapLooksTest, LooksWithoutWeightLeaveNoTrace) {
   LocalObstacleMap map;
   CameraObstacles seen = makeLook("front", 0.6, 0.0F);
-  PolarObstacle wall = makeObstacle(0.0, 3.05, 0.03);
+  PolarObstacle wall = makeObstacle(grid_.rayOf(0.0), 3.05, 0.03);
   for (const double weight : {0.0, 1.0, 1.0, 1.0}) {
     wall.weight = weight;
     seen.obstacles = {wall};
@@ -182,48 +196,38 @@ TEST_F(ObstacleMapLooksTest, GroundSeenFarOffTheAxisKeepsWhatIsFreeAndMakesNothi
 }
 
 TEST_F(ObstacleMapLooksTest, LooksOfLittleWeightNeedMoreOfThem) {
-  const auto looksUntilOccupied = [&](double look_weight) {
-    LocalObstacleMap map;
-    for (int looks = 1; looks < 200; ++looks) {
-      const RigidTransform pose = RigidTransform::planar(-0.9 + 0.1 * (looks % 18), 0.0, 0.0);
-      map.moveTo(stamp_, pose);
+  const auto looksOfWeight = [&](double look_weight) {
+    return looksUntilOccupied([&](int number, LocalObstacleMap* map) {
+      const RigidTransform pose = RigidTransform::planar(-0.9 + 0.1 * (number % 18), 0.0, 0.0);
+      map->moveTo(stamp_, pose);
       CameraObstacles seen = makeLookAtFlank(pose.translation().x(), 0.03, 0.0);
       for (PolarObstacle& obstacle : seen.obstacles) {
         obstacle.weight = look_weight;
       }
-      map.add(seen, grid_, pose);
-      if (countCells(map.snapshot(), kCellOccupied) > 0) {
-        return looks;
-      }
-    }
-    return 200;
+      map->add(seen, grid_, pose);
+    });
   };
-  const int full = looksUntilOccupied(1.0);
-  const int ramp = looksUntilOccupied(0.25);
+  const int full = looksOfWeight(1.0);
+  const int ramp = looksOfWeight(0.25);
   EXPECT_LT(full, 6);
   EXPECT_GE(ramp, 3 * full);
   EXPECT_LT(ramp, 30);
 }
 
 TEST_F(ObstacleMapLooksTest, UncertainLooksMarkMoreCellsMoreSlowly) {
-  const auto looksUntilOccupied = [&](double sigma_m) {
-    LocalObstacleMap map;
+  const auto looksOfSigma = [&](double sigma_m) {
     CameraObstacles seen = makeLook("left", 0.9, 0.0F);
-    seen.obstacles = {makeObstacle(0.5 * M_PI, 3.02, sigma_m)};
-    for (int looks = 1; looks < 200; ++looks) {
-      const RigidTransform pose = RigidTransform::planar(0.1 * looks, 0.0, 0.0);
-      seen.origin_m.x() = 1.9 - 0.1 * looks;  // the camera sees the same place from the same place
-      map.moveTo(stamp_, RigidTransform());
-      map.add(seen, grid_, pose);
-      seen.camera_name = std::to_string(looks);  // each look counts in full
-      if (countCells(map.snapshot(), kCellOccupied) > 0) {
-        return looks;
-      }
-    }
-    return 200;
+    seen.obstacles = {makeObstacle(grid_.rayOf(0.5 * M_PI), 3.02, sigma_m)};
+    return looksUntilOccupied([&](int number, LocalObstacleMap* map) {
+      const RigidTransform pose = RigidTransform::planar(0.1 * number, 0.0, 0.0);
+      seen.origin_m.x() = 1.9 - 0.1 * number;  // the camera sees the same place from the same place
+      map->moveTo(stamp_, RigidTransform());
+      map->add(seen, grid_, pose);
+      seen.camera_name = std::to_string(number);  // each look counts in full
+    });
   };
-  const int sure = looksUntilOccupied(0.03);
-  const int unsure = looksUntilOccupied(0.3);
+  const int sure = looksOfSigma(0.03);
+  const int unsure = looksOfSigma(0.3);
   EXPECT_LT(sure, 8);
   EXPECT_GT(unsure, 3 * sure);
 }
@@ -232,7 +236,7 @@ TEST_F(ObstacleMapLooksTest, RangesAlongTheTravelAreUncertain) {
   const auto sigmaAt = [&](double angle_rad) {
     LocalObstacleMap map;
     CameraObstacles seen = makeLook("front", 0.6, 0.0F);
-    seen.obstacles = {makeObstacle(angle_rad, 3.0, 0.02)};
+    seen.obstacles = {makeObstacle(grid_.rayOf(angle_rad), 3.0, 0.02)};
     for (int looks = 0; looks < 40; ++looks) {
       const RigidTransform pose = RigidTransform::planar(0.1 * looks, 0.0, 0.0);
       map.moveTo(stamp_, pose);
