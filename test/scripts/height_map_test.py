@@ -10,7 +10,6 @@ import numpy as np
 import rospy
 import rostest
 import yaml
-from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import OccupancyGrid
 from octomap_msgs.msg import Octomap
 from std_srvs.srv import Trigger
@@ -19,7 +18,7 @@ from visualization_msgs.msg import Marker
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import Drive, content_hash, run, tool  # noqa: E402
-from nodelet_fixture import drive_publishers, manager_services, reach, wait_for  # noqa: E402
+from nodelet_fixture import Diagnostics, drive_publishers, manager_services, reach, wait_for  # noqa: E402
 
 CAMERA = "left"
 
@@ -96,14 +95,7 @@ class HeightMapTest(unittest.TestCase):
         rospy.set_param("/height_map/output", str(output))
         rospy.set_param("/height_map/options", self.options)
         rospy.set_param("/height_map/lossless_replay", True)
-        reached = {}
-
-        def keep(message):
-            for status in message.status:
-                reached.update({value.key: int(value.value.split(" good, ")[0]) for value in status.values
-                                if " good, " in value.value and ", 0 bad" not in value.value})
-
-        diagnostics = rospy.Subscriber("/diagnostics", DiagnosticArray, keep)
+        diagnostics = Diagnostics()
         publishers = drive_publishers((CAMERA,))
         self.assertTrue(self.load("/height_map", "vcharge_dense/height_map_nodelet", [], [], [], "").success)
         try:
@@ -112,7 +104,7 @@ class HeightMapTest(unittest.TestCase):
             self.assertFalse(early.success)
             self.assertIn("no range map could be made", early.message)
             self.assertFalse(output.exists())
-            reach(publishers, lambda: reached)
+            reach(publishers, diagnostics.heard)
             messages = [(topic, message) for topic, message in self.drive.messages() if topic in publishers]
             for topic, message in messages:
                 publishers[topic].publish(message)
@@ -120,14 +112,14 @@ class HeightMapTest(unittest.TestCase):
             # finish() ends the drive for all that came: it must be all.
             for topic in publishers:
                 count = sum(other == topic for other, _ in messages)
-                wait_for(lambda t=topic, c=count: reached.get(t, 0) >= c, f"{count} messages on {topic}", 120.0)
+                wait_for(lambda t=topic, c=count: diagnostics.num_good(t) >= c, f"{count} messages on {topic}", 120.0)
             answer = finish()
             self.assertTrue(answer.success, answer.message)
             self.assertIn(self.hash, answer.message)
             self.assertTrue((output / "octomap.bt").exists())
             self.assertEqual((output / "height_map.tiff").read_bytes(), (self.saved / "height_map.tiff").read_bytes())
         finally:
-            diagnostics.unregister()
+            diagnostics.subscriber.unregister()
             self.assertTrue(self.unload("/height_map").success)
 
     def test_saved_map_is_published(self):

@@ -67,6 +67,11 @@ class Diagnostics:
         """Topics of which a nodelet tells that something bad came; for reach()."""
         return {value.key for status in list(self.status.values()) for value in status.values if ", 0 bad" not in value.value}
 
+    def num_good(self, topic):
+        """Good messages of a topic by the nodelet that tells of it."""
+        told = next((value.value for status in list(self.status.values()) for value in status.values if value.key == topic), "")
+        return int(told.split(" good, ")[0]) if " good, " in told else 0
+
     def tells(self, *words, level=None):
         """Whether one message since the last clear() has all the words, at the level if one is given."""
         return any((level is None or at == level) and all(word in text for word in words) for at, text in list(self.told))
