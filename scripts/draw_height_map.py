@@ -61,7 +61,7 @@ def main():
     heights = cv2.imread(str(args.map / "height_map.tiff"), cv2.IMREAD_UNCHANGED)
     gray = cv2.imread(str(args.map / "height_map_gray.png"), cv2.IMREAD_GRAYSCALE)
     states = cv2.imread(str(args.map / "drivable.pgm"), cv2.IMREAD_GRAYSCALE)[::-1]
-    rows, columns = np.nonzero(np.isfinite(heights))
+    rows, columns = np.nonzero(np.isfinite(heights) | (states != 205))  # walls have no height
     if rows.size == 0:
         raise SystemExit(f"{args.map}: expected a height map with observed cells")
     part = np.s_[rows.min():rows.max() + 1, columns.min():columns.max() + 1]

@@ -6,6 +6,7 @@ import sys
 import time
 import unittest
 
+import cv2
 import numpy as np
 import rospy
 import rostest
@@ -135,7 +136,10 @@ class HeightMapTest(unittest.TestCase):
             heights = np.array(received["/dense/height_map"].height_m)
             size = yaml.safe_load((self.saved / "height_map.yaml").read_text())["size_cells"]
             self.assertEqual(heights.size, size[0] * size[1])
-            self.assertEqual(np.isfinite(heights).sum(), np.sum(np.array(received["/dense/height_map/grid"].data) >= 0))
+            drivable = cv2.imread(str(self.saved / "drivable.pgm"), cv2.IMREAD_UNCHANGED)[::-1]
+            states = np.select([drivable == 254, drivable == 0], [0, 100], -1)
+            np.testing.assert_array_equal(received["/dense/height_map/grid"].data, states.flatten())
+            self.assertGreater(np.sum(states == 0), 1000)
             self.assertGreater(len(received["/dense/height_map/mesh"].points), 1000)
             self.assertEqual(received["/dense/octomap"].id, "OcTree")
             self.assertGreater(len(received["/dense/octomap/occupied"].points), 100)

@@ -69,9 +69,9 @@ void print(const HeightMapResult& result) {
   addToHash(result.map, &hasher);
   std::printf("range maps: %zu (%zu of them from an earlier run)\n", statistics.num_views,
               statistics.num_reused);
-  std::printf("grid: %d x %d cells of %g m in the frame %s, %zu observed\n", result.map.height_m.cols,
-              result.map.height_m.rows, result.map.cell_size_m, result.map.frame_id.c_str(),
-              statistics.num_observed);
+  std::printf("grid: %d x %d cells of %g m in the frame %s, %zu observed, %zu solid\n",
+              result.map.height_m.cols, result.map.height_m.rows, result.map.cell_size_m,
+              result.map.frame_id.c_str(), statistics.num_observed, statistics.num_solid);
   std::printf("labelling: %d iterations, gap %.2g per cell; heights: %d iterations, gap %.2g m per cell%s\n",
               statistics.label_iterations, statistics.label_gap_per_cell, statistics.height_iterations,
               statistics.height_gap_per_cell, statistics.converged ? "" : " (stopped before it was reached)");

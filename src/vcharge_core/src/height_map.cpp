@@ -54,8 +54,10 @@ void addToHash(const HeightMap& map, ContentHasher* hasher) {
       }
     }
   }
-  for (int row = 0; row < map.gray.rows; ++row) {
-    hasher->addBytes(map.gray.ptr(row), static_cast<size_t>(map.gray.cols));
+  for (const cv::Mat* image : {&map.gray, &map.solid}) {
+    for (int row = 0; row < image->rows; ++row) {
+      hasher->addBytes(image->ptr(row), static_cast<size_t>(image->cols));
+    }
   }
 }
 
@@ -77,6 +79,8 @@ void DrivabilityOptions::validate() const {
   requireField(step_reach_m > 0.0, "step_reach_m", "must be positive", step_reach_m);
   requireField(max_slope > 0.0, "max_slope", "must be positive", max_slope);
   requireField(slope_reach_m > 0.0, "slope_reach_m", "must be positive", slope_reach_m);
+  requireField(min_confidence >= 0.0 && min_confidence <= 1.0, "min_confidence", "must be in [0, 1]",
+               min_confidence);
 }
 
 cv::Mat classifyCells(const HeightMap& map, const DrivabilityOptions& options) {
@@ -94,7 +98,11 @@ cv::Mat classifyCells(const HeightMap& map, const DrivabilityOptions& options) {
                                        slopeAlong(map.height_m, row, column, 0, slope_reach, run_m));
         const bool blocked =
             spread(map.height_m, row, column, reach) > options.max_step_m || slope > options.max_slope;
-        state = blocked ? CellState::kObstacle : CellState::kDrivable;
+        const bool is_sure =
+            map.confidence.empty() || map.confidence.at<float>(row, column) >= options.min_confidence;
+        state = blocked ? CellState::kObstacle : is_sure ? CellState::kDrivable : CellState::kUnobserved;
+      } else if (!map.solid.empty() && map.solid.at<uint8_t>(row, column) != 0) {
+        state = CellState::kObstacle;
       }
       states.at<uint8_t>(row, column) = static_cast<uint8_t>(state);
     }

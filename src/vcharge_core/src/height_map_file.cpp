@@ -75,6 +75,10 @@ void writeHeightMap(const HeightMap& map, const std::string& path_stem) {
     writeImage(map.gray, path_stem + "_gray.png");
     files += "gray_file: " + nameOf(path_stem) + "_gray.png\n";
   }
+  if (!map.solid.empty()) {
+    writeImage(map.solid, path_stem + "_solid.png");
+    files += "solid_file: " + nameOf(path_stem) + "_solid.png\n";
+  }
   ContentHasher hasher;
   addToHash(map, &hasher);
   std::array<char, 256> grid{};
@@ -119,6 +123,9 @@ HeightMap readHeightMap(const std::string& given_path) {
   }
   if (node["gray_file"]) {
     map.gray = readImage(fileOf("gray_file"), CV_8UC1, cells, "a gray picture");
+  }
+  if (node["solid_file"]) {
+    map.solid = readImage(fileOf("solid_file"), CV_8UC1, cells, "a gray picture");
   }
   return map;
 }

@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-/// Level ground with a kerb across it from column 20 on, and a hole.
+/// Level ground with a kerb across it from column 20 on, a hole, and a post.
 HeightMap makeMap() {
   HeightMap map;
   map.origin_m = {-1.0, 2.0};
@@ -35,6 +35,9 @@ HeightMap makeMap() {
   map.confidence = cv::Mat(30, 40, CV_32FC1, cv::Scalar(0.8));
   map.confidence.at<float>(5, 5) = 0.0F;
   map.gray = cv::Mat(30, 40, CV_8UC1, cv::Scalar(77));
+  map.height_m.at<float>(5, 9) = kNan;
+  map.solid = cv::Mat(30, 40, CV_8UC1, cv::Scalar(0));
+  map.solid.at<uint8_t>(5, 9) = 255;
   return map;
 }
 
@@ -93,6 +96,25 @@ TEST(HeightMapTest, KerbIsAnObstacleLevelGroundIsNotAndHolesAreUnknown) {
   EXPECT_EQ(stateOf(states, 5, 5), CellState::kUnobserved);
 }
 
+TEST(HeightMapTest, WhatIsNotSureIsNotDrivableButMayBeAnObstacle) {
+  HeightMap map = makeMap();
+  map.confidence.at<float>(10, 10) = map.confidence.at<float>(10, 20) = 0.001F;
+  const cv::Mat states = classifyCells(map, DrivabilityOptions());
+  EXPECT_EQ(stateOf(states, 10, 10), CellState::kUnobserved);
+  EXPECT_EQ(stateOf(states, 10, 11), CellState::kDrivable);
+  EXPECT_EQ(stateOf(states, 10, 20), CellState::kObstacle);
+  map.confidence = cv::Mat();
+  EXPECT_EQ(stateOf(classifyCells(map, DrivabilityOptions()), 10, 10), CellState::kDrivable);
+}
+
+TEST(HeightMapTest, WhatStandsWithoutAHeightIsAnObstacle) {
+  HeightMap map = makeMap();
+  EXPECT_EQ(stateOf(classifyCells(map, DrivabilityOptions()), 5, 9), CellState::kObstacle);
+  map.solid = cv::Mat();
+  EXPECT_EQ(stateOf(classifyCells(map, DrivabilityOptions()), 5, 9), CellState::kUnobserved);
+  EXPECT_NE(hashOf(map), hashOf(makeMap()));
+}
+
 TEST(HeightMapTest, RampIsDrivableUntilItIsTooSteep) {
   HeightMap map = makeMap();
   for (const double slope : {0.15, 0.35}) {
@@ -136,6 +158,9 @@ TEST_F(HeightMapFileTest, ErrorsNameFileAndKey) {
   writeHeightMap(makeMap(), folder_ + "/height_map");
   fs::resize_file(folder_ + "/height_map_gray.png", 20);
   expectError("height_map_gray.png");
+  writeHeightMap(makeMap(), folder_ + "/height_map");
+  fs::remove(folder_ + "/height_map_solid.png");
+  expectError("height_map_solid.png");
 }
 
 TEST_F(HeightMapFileTest, OccupancyPictureHasTheMapServersValuesNorthUp) {
@@ -155,10 +180,10 @@ TEST_F(HeightMapFileTest, OccupancyPictureHasTheMapServersValuesNorthUp) {
 TEST_F(HeightMapFileTest, MeshHasAVertexForEachObservedCell) {
   writeHeightMapMesh(makeMap(), folder_ + "/mesh.ply");
   const std::string text = readTextFile(folder_ + "/mesh.ply");
-  EXPECT_NE(text.find("element vertex 1199\n"), std::string::npos);
-  EXPECT_NE(text.find("element face " + std::to_string(2 * (29 * 39 - 4)) + "\n"), std::string::npos);
+  EXPECT_NE(text.find("element vertex 1198\n"), std::string::npos);
+  EXPECT_NE(text.find("element face " + std::to_string(2 * (29 * 39 - 8)) + "\n"), std::string::npos);
   const size_t body = text.find("end_header\n") + std::strlen("end_header\n");
-  EXPECT_EQ(text.size() - body, 1199U * 15 + 2U * (29 * 39 - 4) * 13);
+  EXPECT_EQ(text.size() - body, 1198U * 15 + 2U * (29 * 39 - 8) * 13);
   float first[3];
   std::memcpy(first, text.data() + body, sizeof(first));
   EXPECT_FLOAT_EQ(first[0], -1.0F);

@@ -53,6 +53,9 @@ vcharge_msgs::HeightMap toMessage(const HeightMap& map, Timestamp stamp) {
     for (int column = 0; column < map.height_m.cols; ++column) {
       message.height_m.push_back(map.height_m.at<float>(row, column));
       message.confidence.push_back(confidenceOf(map, row, column));
+      if (!map.solid.empty()) {
+        message.solid.push_back(map.solid.at<uint8_t>(row, column) != 0 ? 1 : 0);
+      }
     }
   }
   return message;
@@ -64,6 +67,10 @@ HeightMap fromMessage(const vcharge_msgs::HeightMap& message, const std::string&
     throw InputError(source + ": height_m, confidence: expected " + std::to_string(message.columns) + " x " +
                      std::to_string(message.rows) + " cells, got " + std::to_string(message.height_m.size()) +
                      " and " + std::to_string(message.confidence.size()));
+  }
+  if (!message.solid.empty() && message.solid.size() != cells) {
+    throw InputError(source + ": solid: expected no cell, or " + std::to_string(cells) + ", got " +
+                     std::to_string(message.solid.size()));
   }
   if (!std::isfinite(message.origin_x_m) || !std::isfinite(message.origin_y_m) ||
       !std::isfinite(message.cell_size_m) || message.cell_size_m <= 0.0) {
@@ -78,6 +85,10 @@ HeightMap fromMessage(const vcharge_msgs::HeightMap& message, const std::string&
   map.confidence.create(map.height_m.size(), CV_32FC1);
   std::copy(message.height_m.begin(), message.height_m.end(), map.height_m.begin<float>());
   std::copy(message.confidence.begin(), message.confidence.end(), map.confidence.begin<float>());
+  if (!message.solid.empty()) {
+    map.solid.create(map.height_m.size(), CV_8UC1);
+    std::copy(message.solid.begin(), message.solid.end(), map.solid.begin<uint8_t>());
+  }
   return map;
 }
 

@@ -18,6 +18,7 @@ HeightMap makeMap() {
   map.height_m = (cv::Mat_<float>(2, 3) << 0.1F, 0.2F, 0.3F, 0.4F, 0.5F, std::nanf(""));
   map.confidence = (cv::Mat_<float>(2, 3) << 0.9F, 0.8F, 0.7F, 0.6F, 0.5F, 0.0F);
   map.gray = (cv::Mat_<uint8_t>(2, 3) << 10, 20, 30, 40, 51, 0);
+  map.solid = (cv::Mat_<uint8_t>(2, 3) << 0, 0, 0, 0, 0, 1);
   return map;
 }
 
@@ -31,7 +32,10 @@ std::string hashOf(HeightMap map) {
 const Timestamp kStamp = Timestamp::fromNanoseconds(7);
 
 TEST(HeightMapConversionsTest, MessageKeepsEveryCell) {
-  EXPECT_EQ(hashOf(fromMessage(toMessage(makeMap(), kStamp), "/topic")), hashOf(makeMap()));
+  HeightMap map = makeMap();
+  EXPECT_EQ(hashOf(fromMessage(toMessage(map, kStamp), "/topic")), hashOf(map));
+  map.solid = cv::Mat();
+  EXPECT_EQ(hashOf(fromMessage(toMessage(map, kStamp), "/topic")), hashOf(map));
 }
 
 TEST(HeightMapConversionsTest, RefuseMessagesThatDoNotFit) {
@@ -40,6 +44,9 @@ TEST(HeightMapConversionsTest, RefuseMessagesThatDoNotFit) {
   EXPECT_THROW(fromMessage(message, "/topic"), InputError);
   message = toMessage(makeMap(), kStamp);
   message.cell_size_m = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(fromMessage(message, "/topic"), InputError);
+  message = toMessage(makeMap(), kStamp);
+  message.solid.pop_back();
   EXPECT_THROW(fromMessage(message, "/topic"), InputError);
   message = toMessage(makeMap(), kStamp);
   message.columns = 0;

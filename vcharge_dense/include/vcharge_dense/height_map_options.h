@@ -29,6 +29,9 @@ struct HeightFusionOptions {
   /// weights, times the height of a voxel, sum to this (0: one height parts what is occupied from what is
   /// free).
   double min_layer_weight_m = 0.2;
+  /// A cell is solid where a run of voxels of this height and that weight is occupied, although nobody saw
+  /// free space above it, as of walls and pillars, so that it has no height. None is without layers.
+  double min_solid_height_m = 0.5;
   double max_memory_gb = 4.0;  ///< a grid that needs more is refused
 
   template <class Visitor>
@@ -47,6 +50,7 @@ struct HeightFusionOptions {
     visit("reference_footprint_m", reference_footprint_m);
     visit("free_weight", free_weight);
     visit("min_layer_weight_m", min_layer_weight_m);
+    visit("min_solid_height_m", min_solid_height_m);
     visit("max_memory_gb", max_memory_gb);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field

@@ -22,6 +22,7 @@ struct HeightMapStatistics {
   size_t num_views = 0;     ///< range maps that were fused
   size_t num_reused = 0;    ///< of these, taken from an earlier run
   size_t num_observed = 0;  ///< cells
+  size_t num_solid = 0;     ///< cells without a height where something stands
   int label_iterations = 0, height_iterations = 0;
   double label_gap_per_cell = 0.0, height_gap_per_cell = 0.0;
   bool converged = false;                 ///< both passes, within max_iterations

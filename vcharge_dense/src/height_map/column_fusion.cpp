@@ -21,7 +21,7 @@ namespace {
 constexpr int kBlockCells = 512;          // side of a block of columns
 constexpr size_t kViewsAtOnce = 8;        // that are added to a block in one parallel loop
 constexpr size_t kKeptBytes = 600000000;  // of views in memory, the last ones that were used
-constexpr double kBytesPerCell = 92.0;    // of images and solvers, see primal_dual.h
+constexpr double kBytesPerCell = 94.0;    // of images and solvers, see primal_dual.h
 constexpr double kSupport_m = 0.1;        // above and below the best height, for the confidence
 // Sum of weights, times the height of a voxel, by which 1 - 1/e of full confidence is reached.
 constexpr double kFullSupport_m = 0.05;
@@ -109,6 +109,7 @@ class BlockFuser {
         profile_(options),
         min_layer_weight_(options.min_layer_weight_m > 0.0 ? options.min_layer_weight_m / grid.height_step_m
                                                            : std::numeric_limits<double>::infinity()),
+        min_solid_voxels_(options.min_solid_height_m / grid.height_step_m),
         padded_((grid.num_voxels + kVoxelLanes - 1) / kVoxelLanes * kVoxelLanes),
         kernel_(addColumnWeightsKernel()),
         images_(images),
@@ -158,6 +159,11 @@ class BlockFuser {
     }
   }
 
+  bool isSolid(const float* weights) const {
+    const VoxelRun run = heaviestRun(weights, 0, grid_.num_voxels);
+    return run.weight >= min_layer_weight_ && run.top - run.first >= min_solid_voxels_;
+  }
+
   void extractColumn(int column, int row, int grid_column, int grid_row) {
     const float* weights = columnWeights(column, row);
     const ColumnOptimum best = findColumnOptimum(weights, grid_.num_voxels, min_layer_weight_);
@@ -168,6 +174,7 @@ class BlockFuser {
     height = std::numeric_limits<float>::quiet_NaN();
     gain = static_cast<float>(best.occupied_cost - best.min_cost);
     support_below = support_above = 0.0F;
+    images_->solid.at<uint8_t>(grid_row, grid_column) = isSolid(weights) ? 255 : 0;
     if (best.has_surface) {
       height = static_cast<float>(grid_.bottom_m + best.height_index * grid_.height_step_m);
       const Supports supports = supportsOf(weights, grid_, best.height_index);
@@ -178,7 +185,7 @@ class BlockFuser {
 
   const VoxelGrid grid_;
   const WeightProfile profile_;
-  const double min_layer_weight_;
+  const double min_layer_weight_, min_solid_voxels_;
   const int padded_;  // voxels of a column, for the widest vectors
   const AddColumnWeights kernel_;
   ColumnImages* images_;
@@ -243,6 +250,7 @@ ColumnImages fuseColumns(const VoxelGrid& grid, const std::vector<Eigen::Vector3
        {&images.best_height_m, &images.occupied_gain, &images.support_below, &images.support_above}) {
     image->create(grid.rows, grid.columns, CV_32FC1);
   }
+  images.solid.create(grid.rows, grid.columns, CV_8UC1);
   BlockFuser fuser(grid, options, &images);
   ViewCache cache(load_view);
   const std::vector<Block> blocks = blocksOf(grid);

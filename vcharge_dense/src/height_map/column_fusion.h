@@ -33,6 +33,7 @@ struct ColumnImages {
   /// CV_32FC1, 0 to 1: how surely what lies just below the best height is occupied, and what lies just above
   /// it free. Of a car's side the one is seen, and not the other; 0 where no surface was seen.
   cv::Mat support_below, support_above;
+  cv::Mat solid;  ///< CV_8UC1, 255 where something high was seen occupied, whatever is above it
 
   /// Of the best height: as its weaker side.
   cv::Mat confidence() const { return cv::min(support_below, support_above); }

@@ -13,6 +13,31 @@ struct ColumnOptimum {
   double layer_weight = 0.0;   ///< of the layer whose top the best height is; 0: all below it is one layer
 };
 
+/// Voxels first to top - 1 of a column.
+struct VoxelRun {
+  int first = 0, top = 0;
+  double weight = 0.0;  ///< sum of theirs
+};
+
+/// The run of voxels from `begin` up whose weights sum to the most; of no voxel where none is positive.
+inline VoxelRun heaviestRun(const float* weights, int begin, int num_voxels) {
+  VoxelRun heaviest{begin, begin, 0.0};
+  double run = 0.0;
+  int first = begin;
+  for (int z = begin; z < num_voxels; ++z) {
+    if (!(run > 0.0)) {
+      run = 0.0;
+      first = z;
+    }
+    run += weights[z];
+    // A sum in another order may differ in its last bits: that is no heavier run.
+    if (run > heaviest.weight + 1e-6) {
+      heaviest = {first, z + 1, run};
+    }
+  }
+  return heaviest;
+}
+
 /// Height of least cost C(h) = - sum of the weights below h + sum of those from h up (paper, equation
 /// perColumnMin); the lowest one where several cost the same. Weights are negative where the data say free.
 ///
@@ -40,20 +65,12 @@ inline ColumnOptimum findColumnOptimum(const float* weights, int num_voxels,
       best.has_surface = occupied_below;
     }
   }
-  double run = 0.0, heaviest = 0.0;
-  int top = best.height_index;
-  for (int z = best.height_index; z < num_voxels; ++z) {
-    run = run > 0.0 ? run + weights[z] : weights[z];
-    if (run > heaviest + 1e-6) {
-      heaviest = run;
-      top = z + 1;
-    }
-  }
-  if (heaviest >= min_layer_weight) {
-    best.height_index = top;
-    best.min_cost -= 2.0 * heaviest;
+  const VoxelRun layer = heaviestRun(weights, best.height_index, num_voxels);
+  if (layer.weight >= min_layer_weight) {
+    best.height_index = layer.top;
+    best.min_cost -= 2.0 * layer.weight;
     best.has_surface = true;
-    best.layer_weight = heaviest;
+    best.layer_weight = layer.weight;
   }
   return best;
 }

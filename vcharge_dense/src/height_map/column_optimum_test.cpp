@@ -41,6 +41,28 @@ TEST(ColumnOptimumTest, IsTheLowestOfTheBestHeightsOfEveryColumn) {
   }
 }
 
+TEST(ColumnOptimumTest, HeaviestRunIsThatOfAllRuns) {
+  std::mt19937 random(11);
+  for (int trial = 0; trial < 2000; ++trial) {
+    std::vector<float> weights(1 + random() % 12);
+    for (float& weight : weights) {
+      weight = static_cast<float>(static_cast<int>(random() % 7) - 4);
+    }
+    const int size = static_cast<int>(weights.size()), begin = static_cast<int>(random() % 3) % size;
+    double heaviest = 0.0;
+    for (int first = begin; first < size; ++first) {
+      for (int top = first; top <= size; ++top) {
+        heaviest = std::max(heaviest, std::accumulate(weights.begin() + first, weights.begin() + top, 0.0));
+      }
+    }
+    const VoxelRun run = heaviestRun(weights.data(), begin, size);
+    EXPECT_GE(run.first, begin);
+    EXPECT_DOUBLE_EQ(run.weight, heaviest);
+    EXPECT_DOUBLE_EQ(std::accumulate(weights.begin() + run.first, weights.begin() + run.top, 0.0), heaviest);
+    EXPECT_EQ(run.top > run.first, heaviest > 0.0);
+  }
+}
+
 TEST(ColumnOptimumTest, LiesOnTopOfWhatIsOccupiedUnderUnseenSpace) {
   // Ground, nothing seen, free.
   const ColumnOptimum optimum = optimumOf({0, 2, 3, 0, 0, 0, -1, -4});

@@ -165,6 +165,33 @@ TEST(HeightFusionTest, ShowsABodyUnderWhichTheGroundIsSeen) {
   }
 }
 
+TEST(HeightFusionTest, PillarIsSolidAndTheGroundIsNot) {
+  BoxWorld pillar;
+  pillar.high.z() = 5.0;  // higher than the grid
+  const Drive drive(0.02, pillar);
+  const ColumnImages columns = drive.fuse();
+  PrimalDualReport report;
+  const cv::Mat observed = labelObserved(columns, HeightRegularizationOptions(), &report);
+  int num_faces = 0, num_open = 0;
+  for (int row = 0; row < drive.grid.rows; ++row) {
+    for (int column = 0; column < drive.grid.columns; ++column) {
+      const Eigen::Vector2d place = centreOf(drive.grid, column, row);
+      const double outside_m = std::max(std::abs(place.x() - 2.5), std::abs(place.y())) - 0.5;
+      const bool is_solid = columns.solid.at<uint8_t>(row, column) != 0;
+      if (outside_m > 0.05) {
+        EXPECT_FALSE(is_solid) << place.transpose();
+        ++num_open;
+      } else if (std::abs(place.x() - 2.5) < 0.3 && outside_m < -0.01 && outside_m > -0.1) {
+        EXPECT_TRUE(is_solid) << place.transpose();  // of the faces that the cameras drive along
+        EXPECT_EQ(observed.at<uint8_t>(row, column), 0) << place.transpose();
+        ++num_faces;
+      }
+    }
+  }
+  EXPECT_GT(num_faces, 20);
+  EXPECT_GT(num_open, 10000);
+}
+
 TEST(HeightFusionTest, DoesNotClaimWhatNobodySaw) {
   const Drive drive;
   PrimalDualReport report;

@@ -33,6 +33,7 @@ void HeightFusionOptions::validate() const {
   requireNotNegative("reference_footprint_m", reference_footprint_m);
   requirePositive("free_weight", free_weight);
   requireNotNegative("min_layer_weight_m", min_layer_weight_m);
+  requirePositive("min_solid_height_m", min_solid_height_m);
   requirePositive("max_memory_gb", max_memory_gb);
 }
 

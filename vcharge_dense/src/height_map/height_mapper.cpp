@@ -199,6 +199,9 @@ HeightMapResult HeightMapper::finish(const std::function<void(const std::string&
   }
   result.map.confidence = columns.confidence();
   result.map.confidence.setTo(0.0F, observed == 0);
+  result.map.solid = columns.solid;
+  result.map.solid.setTo(0, observed);
+  statistics.num_solid = static_cast<size_t>(cv::countNonZero(result.map.solid));
   result.states = classifyCells(result.map, options_.drivability);
   result.octomap = std::make_unique<OctomapBuilder>(
       options_.octomap, kFarthestShare * options_.range_maps.plane_sweep.max_distance_m);

@@ -19,6 +19,9 @@ struct HeightMap {
   cv::Mat height_m;    ///< CV_32FC1, metres; NaN: not observed
   cv::Mat confidence;  ///< CV_32FC1 of that size, 0 to 1, 0 where not observed; or empty: not told
   cv::Mat gray;        ///< CV_8UC1 of that size, brightness seen by the cameras; or empty: not told
+  /// CV_8UC1 of that size, not 0 where something stands that has no height, as nobody saw free space above it
+  /// (walls, pillars); or empty: not told.
+  cv::Mat solid;
 
   Eigen::Vector2d centreOf(int column, int row) const {
     return origin_m + cell_size_m * Eigen::Vector2d(column, row);
@@ -40,6 +43,8 @@ struct DrivabilityOptions {
   double step_reach_m = 0.1;   ///< cells this near to a step belong to it: smoothing spreads it over some
   double max_slope = 0.25;     ///< rise over run across slope_reach_m
   double slope_reach_m = 0.3;  ///< over which the slope is taken
+  /// Of a drivable cell: what is less sure is smoothed between its neighbours, as the ground under a car.
+  double min_confidence = 0.01;
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
@@ -47,13 +52,14 @@ struct DrivabilityOptions {
     visit("step_reach_m", step_reach_m);
     visit("max_slope", max_slope);
     visit("slope_reach_m", slope_reach_m);
+    visit("min_confidence", min_confidence);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
 /// CV_8UC1 of CellState. A cell is an obstacle where heights within step_reach_m differ by more than
-/// max_step_m, or the surface rises by more than max_slope over slope_reach_m; unobserved where the height
-/// is.
+/// max_step_m, or the surface rises by more than max_slope over slope_reach_m, or it is solid; else
+/// unobserved where the height is, or is not sure.
 cv::Mat classifyCells(const HeightMap& map, const DrivabilityOptions& options);
 
 }  // namespace vcharge

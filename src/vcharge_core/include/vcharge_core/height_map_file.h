@@ -6,9 +6,10 @@
 
 namespace vcharge {
 
-/// Writes STEM.tiff (heights), STEM_confidence.tiff and STEM_gray.png where the map has them, then STEM.yaml
-/// (file, frame, origin_m, cell_size_m, size_cells, confidence_file, gray_file, content_hash), so that a map
-/// whose YAML exists is complete. InputError naming the file that cannot be written.
+/// Writes STEM.tiff (heights), STEM_confidence.tiff, STEM_gray.png and STEM_solid.png where the map has them,
+/// then STEM.yaml (file, frame, origin_m, cell_size_m, size_cells, confidence_file, gray_file, solid_file,
+/// content_hash), so that a map whose YAML exists is complete. InputError naming the file that cannot be
+/// written.
 void writeHeightMap(const HeightMap& map, const std::string& path_stem);
 
 /// Reads what writeHeightMap() wrote, or a simulated drive's truth. `path` is the YAML file, or a folder
