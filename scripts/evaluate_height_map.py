@@ -65,6 +65,19 @@ def kerb_mark(errors):
     return mark(errors["num_kerbs"] > 0 and errors["kerb_height_m"]["mean"] <= 0.03) if errors["num_kerbs_seen"] else ""
 
 
+def drivability_rows(errors):
+    def percent(part, whole):
+        return f"{100 * part / max(1, whole):.1f} %"
+
+    faces = errors["num_faces"]
+    yield ("drivable grid: faces of rigid things over 30 cm, seen from in front, that are obstacles (open)", "",
+           f"{percent(errors['num_faces_blocked'], faces)} of {faces} places ({percent(len(errors['open_faces']), faces)})", "")
+    yield ("open ground that is seen: drivable", "", percent(errors["num_open_drivable"], errors["num_open_ground"]), "")
+    yield ("drivable cells inside of things over 30 cm", "",
+           f"{percent(errors['num_drivable_inside'], errors['num_drivable'])} of {errors['num_drivable']}", "")
+    yield ("solid cells, without a height (on open ground)", "", f"{errors['num_solid']} ({errors['num_solid_on_ground']})", "")
+
+
 def stage_times(output):
     counts = re.search(r"^range maps: (\d+) .*\ngrid: (.*) in the frame", output, re.MULTILINE)
     times = re.findall(r"^([a-z ]+): ([0-9.]+) s$", output, re.MULTILINE)
@@ -87,6 +100,7 @@ def table(scene, errors, made):
         ("tape measure: mean error of those that the map shows", "<= 5 cm",
          f"{centimetres(errors['mean_measurement_m'])} (largest {centimetres(errors['max_measurement_m'])}; shown: "
          f"{shown} of {len(errors['measurements'])})", mark(shown >= 20 and errors["mean_measurement_m"] <= 0.05)),
+        *drivability_rows(errors["drivability"]),
         ("peak memory", "< 2 GB", f"{made['peak_gb']:.2f} GB", mark(made["peak_gb"] < 2.0)),
         ("all: processor time, wall time", "", f"{made['cpu_s']:.0f} s, {made['wall_s']:.0f} s", ""),
         ("of these, wall time", "", stage_times(made["output"]), ""),

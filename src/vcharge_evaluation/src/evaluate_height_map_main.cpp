@@ -62,6 +62,16 @@ void print(const HeightMapErrors& errors) {
       "largest %.2f cm\n",
       errors.measurements.size(), errors.num_measurements_missing, 100.0 * errors.mean_measurement_m,
       100.0 * errors.max_measurement_m);
+  const DrivabilityErrors& drivability = errors.drivability;
+  std::printf(
+      "drivable grid: faces of rigid things over 30 cm, seen from in front: %zu places, obstacles %.1f %%, "
+      "open %.1f %%; open ground that is seen: drivable %.1f %%; drivable cells: inside of things over 30 cm "
+      "%.1f %%; solid cells: %zu, on open ground %zu\n",
+      drivability.num_faces, percent(drivability.num_faces_blocked, drivability.num_faces),
+      percent(drivability.open_faces.size(), drivability.num_faces),
+      percent(drivability.num_open_drivable, drivability.num_open_ground),
+      percent(drivability.num_drivable_inside, drivability.num_drivable), drivability.num_solid,
+      drivability.num_solid_on_ground);
   std::printf("  %3s %-7s %16s %16s %8s %8s %9s\n", "", "kind", "from x, y (m)", "to x, y (m)", "truth m",
               "map m", "error cm");
   int number = 0;
@@ -70,6 +80,24 @@ void print(const HeightMapErrors& errors) {
                 m.from_m.x(), m.from_m.y(), m.to_m.x(), m.to_m.y(), m.truth_m, m.map_m,
                 100.0 * (m.map_m - m.truth_m));
   }
+}
+
+nlohmann::json toJson(const DrivabilityErrors& errors) {
+  nlohmann::json open_faces = nlohmann::json::array();
+  for (const HeightStep& face : errors.open_faces) {
+    open_faces.push_back({{"place_m", {face.place_m.x(), face.place_m.y()}},
+                          {"direction", {face.direction.x(), face.direction.y()}},
+                          {"height_m", face.high_m - face.low_m}});
+  }
+  return {{"num_faces", errors.num_faces},
+          {"num_faces_blocked", errors.num_faces_blocked},
+          {"open_faces", open_faces},
+          {"num_drivable", errors.num_drivable},
+          {"num_drivable_inside", errors.num_drivable_inside},
+          {"num_open_ground", errors.num_open_ground},
+          {"num_open_drivable", errors.num_open_drivable},
+          {"num_solid", errors.num_solid},
+          {"num_solid_on_ground", errors.num_solid_on_ground}};
 }
 
 nlohmann::json toJson(const HeightMapErrors& errors) {
@@ -103,6 +131,7 @@ nlohmann::json toJson(const HeightMapErrors& errors) {
           {"mean_measurement_m", errors.mean_measurement_m},
           {"max_measurement_m", errors.max_measurement_m},
           {"num_measurements_missing", errors.num_measurements_missing},
+          {"drivability", toJson(errors.drivability)},
           {"measurements", measurements}};
 }
 

@@ -7,7 +7,9 @@
 
 #include <tbb/parallel_for.h>
 
+#include "drivability_errors.h"
 #include "height_steps.h"
+#include "map_in_world.h"
 #include "surface_visibility.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/quantile.h"
@@ -27,72 +29,11 @@ constexpr double kKerbTolerance_m = 0.03;
 constexpr double kOverGrass_m = 0.4;
 constexpr double kNotMapped = std::numeric_limits<double>::quiet_NaN();
 
-/// A map read in the world's frame.
-class MapInWorld {
- public:
-  MapInWorld(const HeightMap& map, const RigidTransform& world_from_map)
-      : map_(map), world_from_map_(world_from_map), map_from_world_(world_from_map.inverse()) {}
-
-  /// Height in the world at a place of the world, interpolated; NaN where it is not mapped. `about_m`: height
-  /// near which the surface is, for maps that are tilted.
-  double heightAt(const Eigen::Vector2d& place_m, double about_m) const {
-    const Eigen::Vector3d in_map = map_from_world_ * Eigen::Vector3d(place_m.x(), place_m.y(), about_m);
-    const double height = interpolateHeight(map_, in_map.head<2>());
-    return (world_from_map_ * Eigen::Vector3d(in_map.x(), in_map.y(), height)).z();
-  }
-
-  /// As heightAt(), of the cell there.
-  double cellHeightAt(const Eigen::Vector2d& place_m, double about_m) const {
-    const Eigen::Vector3d in_map = map_from_world_ * Eigen::Vector3d(place_m.x(), place_m.y(), about_m);
-    const Eigen::Vector2d cell = (in_map.head<2>() - map_.origin_m) / map_.cell_size_m;
-    const cv::Point at(static_cast<int>(std::lround(cell.x())), static_cast<int>(std::lround(cell.y())));
-    if (!cv::Rect(cv::Point(), map_.height_m.size()).contains(at)) {
-      return kNotMapped;
-    }
-    return (world_from_map_ * Eigen::Vector3d(in_map.x(), in_map.y(), map_.height_m.at<float>(at))).z();
-  }
-
-  /// Heights along a line over a step. The middle of the slope between two cells is where the edge is
-  /// likeliest to be; what is read a hand above the ground of a high step would lie up to half a cell before
-  /// it. So cells are taken as they are there: the edge is where the first one begins that rises.
-  HeightAt heightsOver(const HeightStep& step) const {
-    return [this, high = isHigh(step), about_m = step.low_m](const Eigen::Vector2d& place_m) {
-      return high ? cellHeightAt(place_m, about_m) : heightAt(place_m, about_m);
-    };
-  }
-
-  /// The centre of a cell on the map's surface, or near the ground where it is not observed.
-  Eigen::Vector3d cell(int column, int row, double ground_m) const {
-    const Eigen::Vector2d centre = map_.centreOf(column, row);
-    const float height = map_.height_m.at<float>(row, column);
-    return world_from_map_ *
-           Eigen::Vector3d(centre.x(), centre.y(), std::isfinite(height) ? height : ground_m);
-  }
-
- private:
-  const HeightMap& map_;
-  const RigidTransform world_from_map_, map_from_world_;
-};
-
-/// Difference of the highest and the lowest true cell within `reach_m`, along rows and columns.
-double spreadAround(const HeightMap& truth, const Eigen::Vector2d& place_m, double reach_m) {
-  const Eigen::Vector2d cell = (place_m - truth.origin_m) / truth.cell_size_m;
-  const auto column = static_cast<int>(std::lround(cell.x())), row = static_cast<int>(std::lround(cell.y()));
-  const auto reach = static_cast<int>(std::ceil(reach_m / truth.cell_size_m));
-  float low = std::numeric_limits<float>::infinity(), high = -low;
-  for (int r = std::max(0, row - reach); r <= std::min(truth.height_m.rows - 1, row + reach); ++r) {
-    for (int c = std::max(0, column - reach); c <= std::min(truth.height_m.cols - 1, column + reach); ++c) {
-      low = std::min(low, truth.height_m.at<float>(r, c));
-      high = std::max(high, truth.height_m.at<float>(r, c));
-    }
-  }
-  return high - low;
-}
-
-/// Errors of all cells that are seen, apart from steps. Row by row, so that threads change nothing.
-void judgeCells(const HeightMap& map, const MapInWorld& in_world, const HeightMap& truth, double ground_m,
-                const SurfaceVisibility& visibility, const HeightMapErrorOptions& options,
-                HeightMapErrors* errors) {
+/// Errors of all cells that are seen, apart from steps. Row by row, so that threads change nothing. CV_8UC1:
+/// which are.
+cv::Mat judgeCells(const HeightMap& map, const MapInWorld& in_world, const HeightMap& truth, double ground_m,
+                   const SurfaceVisibility& visibility, const HeightMapErrorOptions& options,
+                   HeightMapErrors* errors) {
   cv::Mat seen(map.height_m.size(), CV_8UC1, cv::Scalar(0));
   errors->error_m = cv::Mat(map.height_m.size(), CV_32FC1, cv::Scalar(kNotMapped));
   tbb::parallel_for(0, map.height_m.rows, [&](int row) {
@@ -131,6 +72,7 @@ void judgeCells(const HeightMap& map, const MapInWorld& in_world, const HeightMa
     errors->share_within_10_cm = static_cast<double>(within) / static_cast<double>(absolute.size());
   }
   errors->height_m = summarize(std::move(absolute));
+  return seen;
 }
 
 /// Whether the map has heights on both sides.
@@ -317,7 +259,7 @@ HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& wo
   HeightMapErrors errors;
   const double ground_m =
       (world_from_map.inverse() * world_from_vehicle.front().world_from_vehicle.translation()).z();
-  judgeCells(map, in_world, truth, ground_m, visibility, options, &errors);
+  const cv::Mat seen = judgeCells(map, in_world, truth, ground_m, visibility, options, &errors);
   std::vector<HeightStep> steps = findHeightSteps(truth, options, [&](const Eigen::Vector2d& place_m) {
     const double height = interpolateHeight(truth, place_m);
     return std::isfinite(height) &&
@@ -333,6 +275,8 @@ HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& wo
   errors.num_steps = steps.size();
   errors.num_kerbs_seen = static_cast<size_t>(std::count_if(
       steps.begin(), steps.end(), [&](const HeightStep& step) { return isKerb(step, options); }));
+  errors.drivability =
+      judgeDrivability(map, in_world, truth, world_from_vehicle, seen, steps, is_rigid, options.step_m);
   errors.measurements = pickMeasurements(truth, steps, is_rigid, options);
   measure(in_world, map.cell_size_m, steps, options, &errors);
   steps.erase(

@@ -140,6 +140,33 @@ TEST_F(HeightMapErrorsTest, HighEdgesAreNotReadBeforeTheCellThatRises) {
   }
 }
 
+TEST_F(HeightMapErrorsTest, TellsWhetherThePlannerSeesTheWall) {
+  const HeightMapErrors perfect = evaluate(world(0.05));
+  EXPECT_GT(perfect.drivability.num_faces, 50U);
+  EXPECT_EQ(perfect.drivability.num_faces_blocked, perfect.drivability.num_faces);
+  EXPECT_EQ(perfect.drivability.num_solid, 0U);
+  // The wall has no height: unobserved, until its face is solid. (Nor has the map the platform beside it.)
+  HeightMap map = world(0.05);
+  const cv::Mat is_wall = map.height_m > 1.0F;
+  map.height_m.setTo(0.0F);
+  map.height_m.setTo(std::numeric_limits<float>::quiet_NaN(), is_wall);
+  HeightMapErrors errors = evaluate(map);
+  EXPECT_EQ(errors.drivability.num_faces, perfect.drivability.num_faces);
+  EXPECT_EQ(errors.drivability.num_faces_blocked, 0U);
+  EXPECT_EQ(errors.drivability.open_faces.size(), 0U);
+  map.solid = is_wall.clone();
+  map.solid.at<uint8_t>(20, 20) = 1;  // open ground
+  map.height_m.at<float>(20, 20) = std::numeric_limits<float>::quiet_NaN();
+  errors = evaluate(map);
+  EXPECT_EQ(errors.drivability.num_faces_blocked, perfect.drivability.num_faces);
+  EXPECT_EQ(errors.drivability.num_solid, static_cast<size_t>(cv::countNonZero(is_wall)) + 1);
+  EXPECT_EQ(errors.drivability.num_solid_on_ground, 1U);
+  // A map that shows ground in the wall's place would be driven through.
+  map.solid = cv::Mat();
+  map.height_m.setTo(0.0F);
+  EXPECT_EQ(evaluate(map).drivability.open_faces.size(), perfect.drivability.num_faces);
+}
+
 TEST_F(HeightMapErrorsTest, LaysAMapOfAnotherFrameOverTheTruth) {
   // The map's frame is turned by 180 degrees, which keeps its cells on the grid, and lies elsewhere.
   const RigidTransform world_from_map(rotationFromYawPitchRoll(M_PI, 0.0, 0.0),

@@ -130,6 +130,10 @@ bool isHigh(const HeightStep& step) {
   return step.high_m - step.low_m > 2.0 * kHand_m;
 }
 
+bool isOnRigid(const HeightStep& step, const IsRigid& is_rigid) {
+  return is_rigid(step.place_m + kOverEdge_m * step.direction, step.high_m);
+}
+
 double stepLevel(const HeightStep& step) {
   return isHigh(step) ? kHand_m : 0.5 * (step.high_m - step.low_m);
 }
@@ -166,9 +170,8 @@ std::vector<TapeMeasurement> pickMeasurements(const HeightMap& truth,
                                               const std::vector<HeightStep>& all_steps,
                                               const IsRigid& is_rigid, const HeightMapErrorOptions& options) {
   std::vector<HeightStep> steps;
-  std::copy_if(all_steps.begin(), all_steps.end(), std::back_inserter(steps), [&](const HeightStep& step) {
-    return is_rigid(step.place_m + kOverEdge_m * step.direction, step.high_m);
-  });
+  std::copy_if(all_steps.begin(), all_steps.end(), std::back_inserter(steps),
+               [&](const HeightStep& step) { return isOnRigid(step, is_rigid); });
   std::vector<TapeMeasurement> heights, lengths;
   for (size_t i = 0; i < steps.size(); ++i) {
     if (steps[i].both_sides_seen && isLevel(truth, steps[i], options.plateau_m)) {

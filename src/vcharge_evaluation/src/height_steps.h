@@ -24,6 +24,9 @@ double stepLevel(const HeightStep& step);
 /// Whether the place of a step is read a hand above the ground, below half its height.
 bool isHigh(const HeightStep& step);
 
+/// Whether a step is the edge of something rigid: what lies a little over it is.
+bool isOnRigid(const HeightStep& step, const IsRigid& is_rigid);
+
 /// Steps of a true height map: jumps within a cell along rows and columns, between places that are flat over
 /// plateau_m, at edges that run across the line within 30 degrees. `isSeen` tells whether the surface at a
 /// place is seen: lower sides must be.

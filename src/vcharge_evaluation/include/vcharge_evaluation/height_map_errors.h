@@ -80,6 +80,19 @@ struct KerbError {
   double nearest_view_m = 0.0;  ///< distance of the nearest frame that saw its top
 };
 
+/// What a planner makes of the map's drivable cells.
+struct DrivabilityErrors {
+  size_t num_faces = 0;                ///< places on high rigid steps whose face was seen from in front
+  size_t num_faces_blocked = 0;        ///< of these, the map has an obstacle within a hand
+  std::vector<HeightStep> open_faces;  ///< of these, it has neither that there nor what is unobserved
+  size_t num_drivable = 0;             ///< cells that the map calls drivable
+  size_t num_drivable_inside = 0;      ///< of these, things of over 30 cm stand there and for a hand around
+  size_t num_open_ground = 0;          ///< cells that are seen, on ground that is level for two hands around
+  size_t num_open_drivable = 0;        ///< of these, the map calls them drivable
+  size_t num_solid = 0;                ///< cells that stand without a height
+  size_t num_solid_on_ground = 0;      ///< of these, the truth is ground that is level for two hands around
+};
+
 struct HeightMapErrors {
   size_t num_seen = 0;         ///< cells whose true surface is seen often enough, apart from steps
   size_t num_mapped = 0;       ///< of these, observed in the map
@@ -96,6 +109,7 @@ struct HeightMapErrors {
   std::vector<TapeMeasurement> measurements;
   double mean_measurement_m = 0.0, max_measurement_m = 0.0;  ///< absolute errors, of those the map shows
   size_t num_measurements_missing = 0;
+  DrivabilityErrors drivability;
   cv::Mat error_m;  ///< CV_32FC1 of the map's size: estimate less truth of the judged cells, NaN elsewhere
 };
 
