@@ -40,7 +40,7 @@ RATIOS = (
      "search/float128_avx512/1000"),
     ("float descriptors' search against OpenCV, AVX2", "features_benchmark", "searchByOpenCv/float128/1000",
      "search/float128_avx2/1000"),
-    ("Huber-TV iteration against the plain loop, one core", "height_map_benchmark", "BM_HuberIterationPlain",
+    ("eight Huber-TV iterations against the plain loop, one core", "height_map_benchmark", "BM_HuberIterationPlain",
      "BM_HuberIteration/1/process_time/real_time"),
     ("fusion of 300 range maps over 75 (linear: 4)", "height_map_benchmark",
      "BM_Fusion/300/60/iterations:1/process_time/real_time", "BM_Fusion/75/60/iterations:1/process_time/real_time"),
