@@ -83,7 +83,7 @@ class CalibrationNodeletTest(unittest.TestCase):
         self.reset = rospy.ServiceProxy("/calibration/reset", Trigger)
         self.calibrate.wait_for_service(TIMEOUT_S)
         self.diagnostics.clear()
-        reach(self.publishers, self.diagnostics.heard)
+        reach(self.publishers, self.diagnostics.heard, self.subscribers)
         self.states.clear()
         for kind in self.received.values():
             kind.clear()

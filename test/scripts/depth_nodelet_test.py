@@ -65,7 +65,7 @@ class DepthNodeletTest(unittest.TestCase):
     def setUp(self):
         self.assertTrue(self.load("/depth", "vcharge_dense/depth_nodelet", [], [], [], "").success)
         self.diagnostics.clear()
-        reach(self.publishers, self.diagnostics.heard)
+        reach(self.publishers, self.diagnostics.heard, self.subscribers)
         for kinds in self.received.values():
             kinds.clear()
         self.diagnostics.clear()

@@ -162,7 +162,7 @@ class LocalizationTest(unittest.TestCase):
         self.assertTrue(self.load("/localization", NODELET, [], [], [], "").success)
         self.addCleanup(self.stop)
         self.diagnostics.clear()
-        reach(self.publishers, self.diagnostics.heard)
+        reach(self.publishers, self.diagnostics.heard, self.subscribers)
         self.diagnostics.clear()
         for messages in self.received.values():
             messages.clear()

@@ -65,7 +65,7 @@ class MappingNodeletTest(unittest.TestCase):
         self.save = rospy.ServiceProxy("/mapping/save", Trigger)
         self.finish.wait_for_service(TIMEOUT_S)
         self.diagnostics.clear()
-        reach(self.publishers, self.diagnostics.heard)
+        reach(self.publishers, self.diagnostics.heard, self.subscribers)
         for kind in self.received.values():
             kind.clear()
         self.diagnostics.told.clear()

@@ -77,24 +77,21 @@ class Diagnostics:
         return any((level is None or at == level) and all(word in text for word in words) for at, text in list(self.told))
 
 
-def reach(publishers, heard):
-    """Publishes what a nodelet refuses (no stamp) until it tells so of every topic: a connection alone may be that of a
-    nodelet that is gone. `heard()` returns the topics of which it has told."""
-    def all_heard():
-        for topic in set(publishers) - set(heard()):
-            publishers[topic].publish(publishers[topic].data_class())
-        time.sleep(0.3)
-        return set(heard()) >= set(publishers)
-
-    wait_for(all_heard, "the nodelet to hear all topics")
+def connections_to(uri, subscriber):
+    """A subscriber's connections to a node. Takes those away that have ended: rospy keeps one that was refused because the
+    nodelet had given up the topic meanwhile, and then does not connect to its next publisher, being connected already."""
+    connections = [connection for connection in list(subscriber.impl.connections) if connection.endpoint_id == uri]
+    for connection in connections:
+        if connection.done:
+            subscriber.impl.remove_connection(connection)
+    return [connection for connection in connections if not connection.done]
 
 
 def wait_until_gone(manager, subscribers):
     """After unloading: returns once none of the subscribers is connected to the manager. A nodelet that advertises the same
     topics before that would not be heard: rospy takes the dying connection for the new one."""
     uri = rosgraph.Master("/" + __name__).lookupNode(manager)
-    wait_for(lambda: all(connection.endpoint_id != uri
-                         for subscriber in subscribers for connection in list(subscriber.impl.connections)),
+    wait_for(lambda: sum(len(connections_to(uri, subscriber)) for subscriber in subscribers) == 0,
              f"connections to {manager} to end")
 
 
@@ -104,12 +101,26 @@ def wait_until_connected(manager, subscribers):
 
     def all_connected():
         time.sleep(0.5)
-        missing = [subscriber for subscriber in subscribers
-                   if all(connection.endpoint_id != uri for connection in list(subscriber.impl.connections))]
+        missing = [subscriber for subscriber in subscribers if not connections_to(uri, subscriber)]
         for subscriber in missing:
             announce_again(subscriber.name, subscriber.data_class)
         return not missing
     wait_for(all_connected, f"connections to {manager}")
+
+
+def reach(publishers, heard, subscribers=()):
+    """After loading: returns once the subscribers are connected to the manager and the nodelet hears all topics. Publishes
+    what a nodelet refuses (no stamp) until it tells so of every topic: a connection alone may be that of a nodelet that is
+    gone. `heard()` returns the topics of which it has told."""
+    wait_until_connected("/manager", subscribers)
+
+    def all_heard():
+        for topic in set(publishers) - set(heard()):
+            publishers[topic].publish(publishers[topic].data_class())
+        time.sleep(0.3)
+        return set(heard()) >= set(publishers)
+
+    wait_for(all_heard, "the nodelet to hear all topics")
 
 
 def expect_bad_rig_is_refused(test, nodelet, rig):
