@@ -21,6 +21,19 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr uint8_t kFree = 254, kOccupied = 0, kUnknown = 205;  // of map_server's trinary pictures
+constexpr const char* kFloats = "a TIFF of 32-bit floats";
+
+/// An image that a map may have beside its heights.
+struct Layer {
+  cv::Mat HeightMap::*image;
+  const char *key, *ending;
+  int type;
+  const char* expected;
+};
+constexpr std::array<Layer, 3> kLayers{
+    {{&HeightMap::confidence, "confidence_file", "_confidence.tiff", CV_32FC1, kFloats},
+     {&HeightMap::gray, "gray_file", "_gray.png", CV_8UC1, "a gray picture"},
+     {&HeightMap::solid, "solid_file", "_solid.png", CV_8UC1, "a gray picture"}}};
 
 void writeImage(const cv::Mat& image, const std::string& path) {
   writeFileAtomically(path, [&](const std::string& temporary) {
@@ -67,17 +80,11 @@ void writeHeightMap(const HeightMap& map, const std::string& path_stem) {
   fs::remove(path_stem + ".yaml", ignored);  // an older map is incomplete while it is replaced
   writeImage(map.height_m, path_stem + ".tiff");
   std::string files = "file: " + nameOf(path_stem) + ".tiff\n";
-  if (!map.confidence.empty()) {
-    writeImage(map.confidence, path_stem + "_confidence.tiff");
-    files += "confidence_file: " + nameOf(path_stem) + "_confidence.tiff\n";
-  }
-  if (!map.gray.empty()) {
-    writeImage(map.gray, path_stem + "_gray.png");
-    files += "gray_file: " + nameOf(path_stem) + "_gray.png\n";
-  }
-  if (!map.solid.empty()) {
-    writeImage(map.solid, path_stem + "_solid.png");
-    files += "solid_file: " + nameOf(path_stem) + "_solid.png\n";
+  for (const Layer& layer : kLayers) {
+    if (const cv::Mat& image = map.*layer.image; !image.empty()) {
+      writeImage(image, path_stem + layer.ending);
+      files += std::string(layer.key) + ": " + nameOf(path_stem) + layer.ending + "\n";
+    }
   }
   ContentHasher hasher;
   addToHash(map, &hasher);
@@ -117,15 +124,11 @@ HeightMap readHeightMap(const std::string& given_path) {
     return (fs::path(folder) / required<std::string>(node, path, key, "the name of a file")).string();
   };
   const cv::Size cells(size[0], size[1]);
-  map.height_m = readImage(fileOf("file"), CV_32FC1, cells, "a TIFF of 32-bit floats");
-  if (node["confidence_file"]) {
-    map.confidence = readImage(fileOf("confidence_file"), CV_32FC1, cells, "a TIFF of 32-bit floats");
-  }
-  if (node["gray_file"]) {
-    map.gray = readImage(fileOf("gray_file"), CV_8UC1, cells, "a gray picture");
-  }
-  if (node["solid_file"]) {
-    map.solid = readImage(fileOf("solid_file"), CV_8UC1, cells, "a gray picture");
+  map.height_m = readImage(fileOf("file"), CV_32FC1, cells, kFloats);
+  for (const Layer& layer : kLayers) {
+    if (node[layer.key]) {
+      map.*layer.image = readImage(fileOf(layer.key), layer.type, cells, layer.expected);
+    }
   }
   return map;
 }
