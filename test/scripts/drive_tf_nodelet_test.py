@@ -85,9 +85,16 @@ class DriveTfNodeletTest(unittest.TestCase):
     def keep_statics(cls, message):
         cls.statics.update({transform.child_frame_id: transform for transform in message.transforms})
 
-    def setUp(self):
+    def start(self):
         self.assertTrue(self.load("/drive_tf", "vcharge_ros/drive_tf_nodelet", [], [], [], "").success)
         wait_until_connected("/manager", self.subscribers)
+
+    def stop(self):
+        self.assertTrue(self.unload("/drive_tf").success)
+        wait_until_gone("/manager", self.subscribers)
+
+    def setUp(self):
+        self.start()
         # Its diagnostics carry the clock that it lives by.
         wait_for(self.lives_by_the_clock, "diagnostics in the drive's time")
         mine = [self.odometry, self.tf, *self.images.values(), *self.compressed.values(), *self.drivers.values()]
@@ -104,8 +111,7 @@ class DriveTfNodeletTest(unittest.TestCase):
         return any(m.header.stamp == NOW for m in self.diagnostics)
 
     def tearDown(self):
-        self.assertTrue(self.unload("/drive_tf").success)
-        wait_until_gone("/manager", self.subscribers)
+        self.stop()
         self.diagnostics.clear()
 
     def settle(self):
@@ -157,11 +163,9 @@ class DriveTfNodeletTest(unittest.TestCase):
     def test_broadcasts_the_rigs_cameras_in_the_drives_time(self):
         frames = {camera["frame_id"]: camera["vehicle_from_camera"] for camera in self.cameras.values()}
         # Loaded again now that the manager knows the time for sure.
-        self.assertTrue(self.unload("/drive_tf").success)
-        wait_until_gone("/manager", self.subscribers)
+        self.stop()
         self.statics.clear()
-        self.assertTrue(self.load("/drive_tf", "vcharge_ros/drive_tf_nodelet", [], [], [], "").success)
-        wait_until_connected("/manager", self.subscribers)
+        self.start()
         wait_for(lambda: all(f in self.statics and self.statics[f].header.stamp == NOW for f in frames), "/tf_static")
         self.assertEqual(set(self.statics), set(frames))
         for frame, expected in frames.items():
