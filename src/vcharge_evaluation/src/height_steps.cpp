@@ -5,6 +5,8 @@
 #include <iterator>
 #include <random>
 
+#include "map_cells.h"
+
 namespace vcharge {
 namespace {
 
@@ -19,19 +21,11 @@ constexpr double kApart_m = 0.4;       // much, and again, down to this
 constexpr double kOverEdge_m = 0.05;   // from an edge onto what it is the edge of
 constexpr double kOnOneLine_m = 0.02;  // two steps are on one line
 
-double heightOf(const HeightMap& map, const Eigen::Vector2d& place_m) {
-  const Eigen::Vector2d cell = (place_m - map.origin_m) / map.cell_size_m;
-  const long column = std::lround(cell.x()), row = std::lround(cell.y());
-  return column < 0 || row < 0 || column >= map.height_m.cols || row >= map.height_m.rows
-             ? std::nan("")
-             : map.height_m.at<float>(static_cast<int>(row), static_cast<int>(column));
-}
-
 bool isFlat(const HeightMap& map, const Eigen::Vector2d& place_m, const Eigen::Vector2d& direction,
             double length_m) {
-  const double first = heightOf(map, place_m);
+  const double first = nearestHeight(map, place_m);
   for (double s = 0.0; s <= length_m; s += map.cell_size_m) {
-    if (!(std::abs(heightOf(map, place_m + s * direction) - first) <= kFlat_m)) {
+    if (!(std::abs(nearestHeight(map, place_m + s * direction) - first) <= kFlat_m)) {
       return false;
     }
   }
@@ -45,9 +39,9 @@ std::optional<HeightStep> stepBetween(const HeightMap& truth, const Eigen::Vecto
   HeightStep step;
   step.direction = direction;
   step.place_m = low_cell_m + 0.5 * truth.cell_size_m * direction;
-  step.low_m = heightOf(truth, low_cell_m);
+  step.low_m = nearestHeight(truth, low_cell_m);
   const Eigen::Vector2d high_cell_m = low_cell_m + truth.cell_size_m * direction;
-  step.high_m = heightOf(truth, high_cell_m);
+  step.high_m = nearestHeight(truth, high_cell_m);
   if (!(step.high_m - step.low_m > options.step_m) ||
       !isFlat(truth, low_cell_m, -direction, options.plateau_m)) {
     return std::nullopt;
@@ -55,7 +49,7 @@ std::optional<HeightStep> stepBetween(const HeightMap& truth, const Eigen::Vecto
   if (!isHigh(step) && !isFlat(truth, high_cell_m, direction, options.plateau_m)) {
     return std::nullopt;
   }
-  const HeightAt height = [&](const Eigen::Vector2d& place_m) { return heightOf(truth, place_m); };
+  const HeightAt height = [&](const Eigen::Vector2d& place_m) { return nearestHeight(truth, place_m); };
   const Eigen::Vector2d across(-direction.y(), direction.x());
   for (const double aside : {-kBeside_m, kBeside_m}) {
     const auto crossing = findCrossing(height, step.place_m + aside * across, direction, -0.2, 0.2,
@@ -178,7 +172,7 @@ std::vector<TapeMeasurement> pickMeasurements(const HeightMap& truth,
       const Eigen::Vector2d beside = options.plateau_m * steps[i].direction;
       const Eigen::Vector2d below = steps[i].place_m - beside, above = steps[i].place_m + beside;
       heights.push_back({TapeMeasurement::Kind::kHeight, below, above,
-                         heightOf(truth, above) - heightOf(truth, below), std::nan("")});
+                         nearestHeight(truth, above) - nearestHeight(truth, below), std::nan("")});
     }
     for (size_t k = i + 1; k < steps.size(); ++k) {
       addLength(steps[i], steps[k], options, &lengths);

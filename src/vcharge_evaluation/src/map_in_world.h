@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "height_steps.h"
+#include "map_cells.h"
 #include "vcharge_core/height_map.h"
 #include "vcharge_core/rigid_transform.h"
 
@@ -19,19 +20,16 @@ class MapInWorld {
   /// Height in the world at a place of the world, interpolated; NaN where it is not mapped. `about_m`: height
   /// near which the surface is, for maps that are tilted.
   double heightAt(const Eigen::Vector2d& place_m, double about_m) const {
-    const Eigen::Vector3d in_map = map_from_world_ * Eigen::Vector3d(place_m.x(), place_m.y(), about_m);
+    const Eigen::Vector3d in_map = inMap(place_m, about_m);
     const double height = interpolateHeight(map_, in_map.head<2>());
     return (world_from_map_ * Eigen::Vector3d(in_map.x(), in_map.y(), height)).z();
   }
 
   /// As heightAt(), of the cell there.
   double cellHeightAt(const Eigen::Vector2d& place_m, double about_m) const {
-    const cv::Point at = cellAt(place_m, about_m);
-    if (!cv::Rect(cv::Point(), map_.height_m.size()).contains(at)) {
-      return std::numeric_limits<double>::quiet_NaN();
-    }
-    const Eigen::Vector3d in_map = map_from_world_ * Eigen::Vector3d(place_m.x(), place_m.y(), about_m);
-    return (world_from_map_ * Eigen::Vector3d(in_map.x(), in_map.y(), map_.height_m.at<float>(at))).z();
+    const Eigen::Vector3d in_map = inMap(place_m, about_m);
+    const double height = nearestHeight(map_, in_map.head<2>());
+    return (world_from_map_ * Eigen::Vector3d(in_map.x(), in_map.y(), height)).z();
   }
 
   /// Heights along a line over a step. The middle of the slope between two cells is where the edge is
@@ -45,9 +43,7 @@ class MapInWorld {
 
   /// The cell at a place of the world, which may be outside of the map.
   cv::Point cellAt(const Eigen::Vector2d& place_m, double about_m) const {
-    const Eigen::Vector3d in_map = map_from_world_ * Eigen::Vector3d(place_m.x(), place_m.y(), about_m);
-    const Eigen::Vector2d cell = (in_map.head<2>() - map_.origin_m) / map_.cell_size_m;
-    return {static_cast<int>(std::lround(cell.x())), static_cast<int>(std::lround(cell.y()))};
+    return nearestCell(map_, inMap(place_m, about_m).head<2>());
   }
 
   /// The centre of a cell on the map's surface, or near the ground where it is not observed.
@@ -59,6 +55,10 @@ class MapInWorld {
   }
 
  private:
+  Eigen::Vector3d inMap(const Eigen::Vector2d& place_m, double about_m) const {
+    return map_from_world_ * Eigen::Vector3d(place_m.x(), place_m.y(), about_m);
+  }
+
   const HeightMap& map_;
   const RigidTransform world_from_map_, map_from_world_;
 };
@@ -69,12 +69,11 @@ struct HeightExtent {
 };
 
 inline HeightExtent extentAround(const HeightMap& truth, const Eigen::Vector2d& place_m, double reach_m) {
-  const Eigen::Vector2d cell = (place_m - truth.origin_m) / truth.cell_size_m;
-  const auto column = static_cast<int>(std::lround(cell.x())), row = static_cast<int>(std::lround(cell.y()));
+  const cv::Point cell = nearestCell(truth, place_m);
   const auto reach = static_cast<int>(std::ceil(reach_m / truth.cell_size_m));
   HeightExtent extent;
-  for (int r = std::max(0, row - reach); r <= std::min(truth.height_m.rows - 1, row + reach); ++r) {
-    for (int c = std::max(0, column - reach); c <= std::min(truth.height_m.cols - 1, column + reach); ++c) {
+  for (int r = std::max(0, cell.y - reach); r <= std::min(truth.height_m.rows - 1, cell.y + reach); ++r) {
+    for (int c = std::max(0, cell.x - reach); c <= std::min(truth.height_m.cols - 1, cell.x + reach); ++c) {
       extent.low = std::min(extent.low, truth.height_m.at<float>(r, c));
       extent.high = std::max(extent.high, truth.height_m.at<float>(r, c));
     }

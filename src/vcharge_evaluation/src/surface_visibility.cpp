@@ -4,21 +4,13 @@
 #include <cmath>
 #include <limits>
 
+#include "map_cells.h"
+
 namespace vcharge {
 namespace {
 
 constexpr double kClearance_m = 0.02;     // by which a line of sight may cut into the surface
 constexpr double kMinFaceCosine = 0.174;  // between a face's normal and who looks at it: 80 degrees
-
-/// NaN outside the map.
-float heightAt(const HeightMap& map, const Eigen::Vector2d& place_m) {
-  const Eigen::Vector2d cell = (place_m - map.origin_m) / map.cell_size_m;
-  const long column = std::lround(cell.x()), row = std::lround(cell.y());
-  if (column < 0 || row < 0 || column >= map.height_m.cols || row >= map.height_m.rows) {
-    return NAN;
-  }
-  return map.height_m.at<float>(static_cast<int>(row), static_cast<int>(column));
-}
 
 }  // namespace
 
@@ -62,7 +54,7 @@ bool SurfaceVisibility::sees(const View& view, const Eigen::Vector3d& point_in_w
   const int steps = static_cast<int>(std::ceil(to_camera.head<2>().norm() / (0.5 * surface_.cell_size_m)));
   for (int i = 2; i < steps; ++i) {
     const Eigen::Vector3d at = point_in_world + to_camera * (static_cast<double>(i) / steps);
-    if (heightAt(surface_, at.head<2>()) > at.z() + kClearance_m) {
+    if (nearestHeight(surface_, at.head<2>()) > at.z() + kClearance_m) {
       return false;
     }
   }
