@@ -1,16 +1,23 @@
 #!/usr/bin/env bash
-# Builds by clang into build_sanitize/ with AddressSanitizer, UndefinedBehaviorSanitizer and what libFuzzer needs, or into
-# build_sanitize_threads/ with ThreadSanitizer: build_sanitized.sh [--threads] TARGET... Further CMake options come through
-# VCHARGE_CMAKE_OPTIONS.
+# Builds by clang: build_sanitized.sh [--fuzz | --threads] TARGET...
+# into build_sanitize/ with AddressSanitizer and UndefinedBehaviorSanitizer; --fuzz: into build_fuzz/ with these and what
+# libFuzzer needs (a call at every branch and comparison: tests would take five times as long); --threads: into
+# build_sanitize_threads/ with ThreadSanitizer. Further CMake options come through VCHARGE_CMAKE_OPTIONS.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 command -v clang++ >/dev/null || { echo "build_sanitized.sh: clang is missing: scripts/install_dependencies.sh" >&2; exit 1; }
-folder=build_sanitize options=(-DVCHARGE_FUZZ=ON -DVCHARGE_SANITIZE=address,undefined,fuzzer-no-link)
-if [ "${1:-}" = --threads ]; then
-  shift
-  folder=build_sanitize_threads options=(-DVCHARGE_SANITIZE=thread "-DCMAKE_CXX_FLAGS=-I$PWD/test/thread_sanitizer")
-fi
+folder=build_sanitize options=(-DVCHARGE_SANITIZE=address,undefined)
+case "${1:-}" in
+  --fuzz)
+    shift
+    folder=build_fuzz options=(-DVCHARGE_FUZZ=ON -DVCHARGE_SANITIZE=address,undefined,fuzzer-no-link)
+    ;;
+  --threads)
+    shift
+    folder=build_sanitize_threads options=(-DVCHARGE_SANITIZE=thread "-DCMAKE_CXX_FLAGS=-I$PWD/test/thread_sanitizer")
+    ;;
+esac
 # shellcheck disable=SC2086 # the options are words
 cmake -S . -B "$folder" -G Ninja -DCMAKE_CXX_COMPILER=clang++ -DCMAKE_C_COMPILER=clang "${options[@]}" \
   ${VCHARGE_CMAKE_OPTIONS:-} >"${folder}_configure.log" 2>&1 || {

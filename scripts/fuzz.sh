@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
-# Fuzzes every reader of bytes from outside with libFuzzer, AddressSanitizer and UBSan (build_sanitize/):
+# Fuzzes every reader of bytes from outside with libFuzzer, AddressSanitizer and UBSan (build_fuzz/):
 #   fuzz.sh [--seconds N] [--corpus DIR] [TARGET...]        all targets by default, 60 s each; --list names them
-# What a reader found stays in DIR (build_sanitize/corpus), inputs that break one in build_sanitize/findings, and the exit status is 1 then.
+# What a reader found stays in DIR (build_fuzz/corpus), inputs that break one in build_fuzz/findings, and the exit status is 1 then.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 
-seconds=60 corpus=$PWD/build_sanitize/corpus list=false targets=()
+seconds=60 corpus=$PWD/build_fuzz/corpus list=false targets=()
 while [ $# -gt 0 ]; do
   case "$1" in
     --seconds) seconds=${2:?--seconds needs a number}; shift 2 ;;
@@ -18,14 +18,14 @@ while [ $# -gt 0 ]; do
   esac
 done
 
-scripts/build_sanitized.sh fuzz_reader
-reader=$(find build_sanitize/devel/lib -name fuzz_reader -type f)
+scripts/build_sanitized.sh --fuzz fuzz_reader
+reader=$(find build_fuzz/devel/lib -name fuzz_reader -type f)
 # Debian's libraries are not instrumented, which containers that cross them would be reported for.
 export ASAN_OPTIONS=detect_container_overflow=0:allocator_may_return_null=1:detect_leaks=0
 [ "$list" = false ] || { "$reader"; exit 0; }
 [ ${#targets[@]} -gt 0 ] || mapfile -t targets < <("$reader")
 
-findings=$PWD/build_sanitize/findings status=0
+findings=$PWD/build_fuzz/findings status=0
 mkdir -p "$findings"
 for target in "${targets[@]}"; do
   mkdir -p "$corpus/$target" "$findings/$target"

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Installs what is missing, builds, and runs every test: test.sh [--sanitize | --sanitize-threads] [ctest arguments, e.g. -R PlaneSweep].
 # Tests on real images look for them in $VCHARGE_DATA and are skipped, and counted as skipped, without it.
-# --sanitize: built by clang with AddressSanitizer and UndefinedBehaviorSanitizer (build_sanitize/, which scripts/fuzz.sh uses
-# too); all unit tests, and the integration tests that run tools. Debian's nodelet manager cannot load such libraries.
+# --sanitize: built by clang with AddressSanitizer and UndefinedBehaviorSanitizer (build_sanitize/); all unit
+# tests, and the integration tests that run tools. Debian's nodelet manager cannot load such libraries.
 # --sanitize-threads: all unit tests with ThreadSanitizer (build_sanitize_threads/; test/thread_sanitizer/README.md).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
