@@ -12,13 +12,14 @@ folder=build
 if [ "${1:-}" = "--sanitize" ]; then
   shift
   folder=build_sanitize
-  set -- -R '_gtest_|rostest_(tools|offline|mapping|mapping_faults|faults|determinism)\.test' "$@"
+  set -- --timeout 14400 -R '_gtest_|rostest_(tools|offline|mapping|mapping_faults|faults|determinism)\.test' "$@"
   # Debian's libraries are not instrumented: containers that cross them would be reported, and what they keep is no leak.
   export ASAN_OPTIONS=${ASAN_OPTIONS:-detect_container_overflow=0:detect_leaks=0} UBSAN_OPTIONS=print_stacktrace=1
+  export VCHARGE_TIME_LIMIT_FACTOR=10
 elif [ "${1:-}" = "--sanitize-threads" ]; then
   shift
   folder=build_sanitize_threads
-  set -- -R '_gtest_' "$@"
+  set -- --timeout 14400 -R '_gtest_' "$@"
   # What Debian's libraries do among themselves cannot be seen, and is not judged.
   export TSAN_OPTIONS=ignore_noninstrumented_modules=1:second_deadlock_stack=1
 fi
