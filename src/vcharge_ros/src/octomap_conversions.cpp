@@ -23,7 +23,8 @@ octomap_msgs::Octomap toMessage(const octomap::OcTree& tree, const std::string& 
   message.id = tree.getTreeType();
   message.resolution = tree.getResolution();
   std::ostringstream stream(std::ios::binary);
-  if (!tree.writeBinaryData(stream)) {
+  // As writeBinaryData(), which tells standard error about it.
+  if (const octomap::OcTreeNode* root = tree.getRoot(); root && !tree.writeBinaryNode(stream, root)) {
     throw std::runtime_error("octree: cannot be serialized");
   }
   const std::string bytes = stream.str();

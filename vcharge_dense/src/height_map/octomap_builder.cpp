@@ -129,13 +129,15 @@ void OctomapBuilder::write(const std::string& path) {
   tree_->prune();
   writeFileAtomically(path, [&](const std::string& temporary) {
     std::ofstream file(temporary, std::ios::binary);
-    // As OcTree::writeBinary(), which tells standard error about it.
+    // As OcTree::writeBinary() and its writeBinaryData(), which tell standard error about it.
     file.precision(17);
     file << "# Octomap OcTree binary file\n# free, occupied and unknown space\nid " << tree_->getTreeType()
          << "\nsize " << tree_->size() << "\nres " << tree_->getResolution() << "\ndata\n";
-    const bool written = static_cast<bool>(tree_->writeBinaryData(file));
+    if (const octomap::OcTreeNode* root = tree_->getRoot()) {
+      tree_->writeBinaryNode(file, root);
+    }
     file.close();
-    if (!written || !file) {
+    if (!file) {
       throw InputError(path + ": cannot be written (is the disk full?)");
     }
   });
