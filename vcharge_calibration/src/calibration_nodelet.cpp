@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include <nodelet/nodelet.h>
 #include <std_srvs/Trigger.h>
 #include <yaml-cpp/yaml.h>
 #include <pluginlib/class_list_macros.hpp>
@@ -14,6 +13,7 @@
 #include "vcharge_calibration/rig_calibration_session.h"
 #include "vcharge_core/sparse_map_file.h"
 #include "vcharge_ros/live_drive_source.h"
+#include "vcharge_ros/nodelet.h"
 #include "vcharge_ros/nodelet_support.h"
 #include "vcharge_ros/parameters.h"
 
@@ -28,7 +28,7 @@ namespace vcharge {
 /// ~options (RigCalibratorOptions), ~session (RigCalibrationSessionOptions), ~source
 /// (LiveDriveSourceOptions), ~lossless_replay (every image in order, as calibrate_rig; otherwise those that
 /// wait too long are dropped).
-class CalibrationNodelet : public nodelet::Nodelet {
+class CalibrationNodelet : public Nodelet {
  public:
   ~CalibrationNodelet() override {
     diagnostics_.clear();
@@ -40,7 +40,7 @@ class CalibrationNodelet : public nodelet::Nodelet {
   using Status = RigCalibrationSession::Status;
   using Response = std_srvs::TriggerResponse;
 
-  void onInit() override {
+  void initialize() override {
     ros::NodeHandle& node = getNodeHandle();
     ros::NodeHandle& private_node = getPrivateNodeHandle();
     const std::string rig_path = requireStringParameter(private_node, "rig", "the path of a rig.yaml");

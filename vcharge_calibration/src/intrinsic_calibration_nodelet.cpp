@@ -3,7 +3,6 @@
 #include <mutex>
 #include <string>
 
-#include <nodelet/nodelet.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <std_srvs/Trigger.h>
@@ -16,6 +15,7 @@
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/drive_topics.h"
 #include "vcharge_ros/image_conversions.h"
+#include "vcharge_ros/nodelet.h"
 #include "vcharge_ros/nodelet_support.h"
 #include "vcharge_ros/parameters.h"
 
@@ -26,11 +26,11 @@ namespace vcharge {
 /// ~calibrate. Parameters: ~camera, ~output (rig.yaml), ~board ("9x6") and ~square_m, or ~target (Kalibr's
 /// YAML); optional ~report (HTML), ~keep_others, ~field_of_view_rad, ~topic, ~compressed, ~collector
 /// (ViewCollectorOptions), ~options (IntrinsicCalibrationOptions).
-class IntrinsicCalibrationNodelet : public nodelet::Nodelet {
+class IntrinsicCalibrationNodelet : public Nodelet {
  private:
   using Status = vcharge_msgs::CalibrationStatus;
 
-  void onInit() override {
+  void initialize() override {
     ros::NodeHandle& node = getNodeHandle();
     ros::NodeHandle& private_node = getPrivateNodeHandle();
     output_.camera_name = requireStringParameter(private_node, "camera", "the camera's name");

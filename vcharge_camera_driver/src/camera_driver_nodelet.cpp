@@ -2,7 +2,6 @@
 #include <string>
 #include <thread>
 
-#include <nodelet/nodelet.h>
 #include <tf2_ros/static_transform_broadcaster.h>
 #include <pluginlib/class_list_macros.hpp>
 
@@ -15,6 +14,7 @@
 #include "vcharge_ros/camera_info.h"
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/drive_topics.h"
+#include "vcharge_ros/nodelet.h"
 #include "vcharge_ros/nodelet_support.h"
 #include "vcharge_ros/parameters.h"
 
@@ -23,7 +23,7 @@ namespace vcharge {
 /// The car's cameras and wheels: /camera/<name>/image_raw (mono8; one stamp per trigger pulse) and
 /// camera_info, /odom, odom -> base_link, the rig's cameras on /tf_static, /diagnostics. Parameters: ~rig
 /// (path), ~options (DriverOptions). Cameras and bus may come and go; options and rig must be right.
-class CameraDriverNodelet : public nodelet::Nodelet {
+class CameraDriverNodelet : public Nodelet {
  public:
   ~CameraDriverNodelet() override { shutDown(); }
 
@@ -34,7 +34,7 @@ class CameraDriverNodelet : public nodelet::Nodelet {
     sensor_msgs::CameraInfo camera_info;
   };
 
-  void onInit() override {
+  void initialize() override {
     try {
       start();
     } catch (...) {

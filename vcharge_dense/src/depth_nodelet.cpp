@@ -2,13 +2,13 @@
 #include <memory>
 #include <string>
 
-#include <nodelet/nodelet.h>
 #include <pluginlib/class_list_macros.hpp>
 
 #include "vcharge_core/camera_rig.h"
 #include "vcharge_core/newest_first_worker.h"
 #include "vcharge_dense/range_mapper.h"
 #include "vcharge_ros/live_drive_source.h"
+#include "vcharge_ros/nodelet.h"
 #include "vcharge_ros/nodelet_support.h"
 #include "vcharge_ros/parameters.h"
 #include "vcharge_ros/range_map_conversions.h"
@@ -21,7 +21,7 @@ namespace vcharge {
 /// while the vehicle stands.
 /// Parameters: ~rig (path), ~options (RangeMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay
 /// (every image in order, as compute_range_maps; otherwise the newest first, drops are counted).
-class DepthNodelet : public nodelet::Nodelet {
+class DepthNodelet : public Nodelet {
  public:
   ~DepthNodelet() override {
     diagnostics_.clear();
@@ -36,7 +36,7 @@ class DepthNodelet : public nodelet::Nodelet {
     ros::Publisher range, confidence, standard_deviation, reference, camera_info, points;
   };
 
-  void onInit() override {
+  void initialize() override {
     node_ = getNodeHandle();
     ros::NodeHandle& private_node = getPrivateNodeHandle();
     rig_ = std::make_shared<const CameraRig>(

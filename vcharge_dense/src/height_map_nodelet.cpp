@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include <nodelet/nodelet.h>
 #include <octomap/OcTree.h>
 #include <pluginlib/class_list_macros.hpp>
 
@@ -13,6 +12,7 @@
 #include "vcharge_dense/height_map_output.h"
 #include "vcharge_dense/height_mapper.h"
 #include "vcharge_ros/live_drive_source.h"
+#include "vcharge_ros/nodelet.h"
 #include "vcharge_ros/nodelet_support.h"
 #include "vcharge_ros/parameters.h"
 
@@ -23,7 +23,7 @@ namespace vcharge {
 /// HeightMapPublication says. Parameters: ~rig (path), ~output (folder), ~trajectory (TUM file of this drive,
 /// else odometry), ~options (HeightMapOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every
 /// image in order, as build_height_map; otherwise those that wait too long are dropped).
-class HeightMapNodelet : public nodelet::Nodelet, private DriveConsumer {
+class HeightMapNodelet : public Nodelet, private DriveConsumer {
  public:
   ~HeightMapNodelet() override {
     diagnostics_.clear();
@@ -33,7 +33,7 @@ class HeightMapNodelet : public nodelet::Nodelet, private DriveConsumer {
  private:
   using Response = std_srvs::TriggerResponse;
 
-  void onInit() override {
+  void initialize() override {
     ros::NodeHandle& private_node = getPrivateNodeHandle();
     const auto rig = std::make_shared<const CameraRig>(
         readCameraRig(requireStringParameter(private_node, "rig", "the path of a rig.yaml")));

@@ -1,13 +1,13 @@
 #include <memory>
 #include <string>
 
-#include <nodelet/nodelet.h>
 #include <octomap/OcTree.h>
 #include <pluginlib/class_list_macros.hpp>
 
 #include "height_map_publication.h"
 #include "vcharge_core/error.h"
 #include "vcharge_core/height_map_file.h"
+#include "vcharge_ros/nodelet.h"
 #include "vcharge_ros/parameters.h"
 
 namespace vcharge {
@@ -15,8 +15,8 @@ namespace vcharge {
 /// Publishes a saved height map once, latched: /dense/height_map with /points, /grid and /mesh, and
 /// /dense/octomap, in the map's frame. Does not load where the map cannot be read, and says why. Parameters:
 /// ~height_map (folder of build_height_map), ~drivability (DrivabilityOptions).
-class HeightMapPublisherNodelet : public nodelet::Nodelet {
-  void onInit() override {
+class HeightMapPublisherNodelet : public Nodelet {
+  void initialize() override {
     try {
       publishMap();
     } catch (const std::exception& error) {

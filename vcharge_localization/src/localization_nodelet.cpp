@@ -3,7 +3,6 @@
 #include <string>
 
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
-#include <nodelet/nodelet.h>
 #include <tf2_ros/transform_broadcaster.h>
 #include <pluginlib/class_list_macros.hpp>
 
@@ -15,6 +14,7 @@
 #include "vcharge_localization/drive_localizer.h"
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/live_drive_source.h"
+#include "vcharge_ros/nodelet.h"
 #include "vcharge_ros/nodelet_support.h"
 #include "vcharge_ros/parameters.h"
 
@@ -25,7 +25,7 @@ namespace vcharge {
 /// status in /diagnostics; /initialpose seeds it. Parameters: ~rig, ~map (paths), ~options
 /// (DriveLocalizerOptions), ~source (LiveDriveSourceOptions), ~topics, ~map_frame, ~odom_frame,
 /// ~lossless_replay (every frame in order, as localize_drive; otherwise the newest first, drops are counted).
-class LocalizationNodelet : public nodelet::Nodelet {
+class LocalizationNodelet : public Nodelet {
  public:
   ~LocalizationNodelet() override {
     diagnostics_.clear();
@@ -35,7 +35,7 @@ class LocalizationNodelet : public nodelet::Nodelet {
   }
 
  private:
-  void onInit() override {
+  void initialize() override {
     try {
       start();
     } catch (const std::exception& error) {

@@ -1,10 +1,10 @@
 #include <exception>
 #include <memory>
 
-#include <nodelet/nodelet.h>
 #include <pluginlib/class_list_macros.hpp>
 
 #include "vcharge_core/sparse_map_file.h"
+#include "vcharge_ros/nodelet.h"
 #include "vcharge_ros/parameters.h"
 #include "vcharge_ros/sparse_map_conversions.h"
 
@@ -12,8 +12,8 @@ namespace vcharge {
 
 /// Publishes a saved map once, latched: /mapping/landmarks, /mapping/trajectory and /mapping/loop_edges, in
 /// the frame `map`. Does not load where the map cannot be read, and says why. Parameters: ~map (path).
-class MapPublisherNodelet : public nodelet::Nodelet {
-  void onInit() override {
+class MapPublisherNodelet : public Nodelet {
+  void initialize() override {
     try {
       publishMap();
     } catch (const std::exception& error) {

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include <nav_msgs/Path.h>
-#include <nodelet/nodelet.h>
 #include <sensor_msgs/PointCloud2.h>
 #include <std_srvs/Trigger.h>
 #include <visualization_msgs/MarkerArray.h>
@@ -15,6 +14,7 @@
 #include "vcharge_mapping/live_view.h"
 #include "vcharge_mapping/mapping_session.h"
 #include "vcharge_ros/live_drive_source.h"
+#include "vcharge_ros/nodelet.h"
 #include "vcharge_ros/nodelet_support.h"
 #include "vcharge_ros/parameters.h"
 #include "vcharge_ros/sparse_map_conversions.h"
@@ -27,7 +27,7 @@ namespace vcharge {
 /// /diagnostics tells the rest; ~save writes it. Parameters: ~rig (path), ~output (path of the *.vmap),
 /// ~options (SparseMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every image in order,
 /// as build_map; otherwise those that wait too long are dropped).
-class MappingNodelet : public nodelet::Nodelet {
+class MappingNodelet : public Nodelet {
  public:
   ~MappingNodelet() override {
     diagnostics_.clear();
@@ -38,7 +38,7 @@ class MappingNodelet : public nodelet::Nodelet {
  private:
   using Response = std_srvs::TriggerResponse;
 
-  void onInit() override {
+  void initialize() override {
     ros::NodeHandle& node = getNodeHandle();
     ros::NodeHandle& private_node = getPrivateNodeHandle();
     rig_path_ = requireStringParameter(private_node, "rig", "the path of a rig.yaml");

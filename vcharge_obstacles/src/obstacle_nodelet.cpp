@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include <nodelet/nodelet.h>
 #include <octomap/OcTree.h>
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/static_transform_broadcaster.h>
@@ -19,6 +18,7 @@
 #include "vcharge_core/text_format.h"
 #include "vcharge_obstacles/obstacle_mapper.h"
 #include "vcharge_ros/conversions.h"
+#include "vcharge_ros/nodelet.h"
 #include "vcharge_ros/nodelet_support.h"
 #include "vcharge_ros/octomap_conversions.h"
 #include "vcharge_ros/parameters.h"
@@ -32,7 +32,7 @@ namespace vcharge {
 /// Parameters: ~rig (path), ~options (ObstacleMapperOptions; fixed_frame: map needs localization's map ->
 /// odom on /tf), ~odometry_topic, ~lossless_replay (every range map in order, however late, as
 /// detect_obstacles; otherwise those that wait too long are dropped).
-class ObstacleNodelet : public nodelet::Nodelet {
+class ObstacleNodelet : public Nodelet {
  public:
   ~ObstacleNodelet() override {
     diagnostics_.clear();
@@ -51,7 +51,7 @@ class ObstacleNodelet : public nodelet::Nodelet {
     ros::Publisher scan, ground;
   };
 
-  void onInit() override {
+  void initialize() override {
     try {
       start();
     } catch (const std::exception& error) {

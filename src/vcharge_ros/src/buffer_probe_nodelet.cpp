@@ -3,22 +3,23 @@
 #include <string>
 
 #include <diagnostic_msgs/KeyValue.h>
-#include <nodelet/nodelet.h>
 #include <ros/ros.h>
 #include <sensor_msgs/Image.h>
 #include <pluginlib/class_list_macros.hpp>
+
+#include "vcharge_ros/nodelet.h"
 
 namespace vcharge {
 
 /// Tells where the images of a topic lie in memory, to see whether nodelets of one manager share them or are
 /// given copies: subscribes to `image`, publishes on ~buffers a KeyValue of the stamp (nanoseconds) and the
 /// address of the first pixel. It keeps the last images, so that no address comes again by chance.
-class BufferProbeNodelet : public nodelet::Nodelet {
+class BufferProbeNodelet : public Nodelet {
  private:
   static constexpr uint32_t kQueueSize = 50;
   static constexpr size_t kKept = 20;
 
-  void onInit() override {
+  void initialize() override {
     buffers_ = getPrivateNodeHandle().advertise<diagnostic_msgs::KeyValue>("buffers", kQueueSize);
     images_ = getNodeHandle().subscribe<sensor_msgs::Image>(
         "image", kQueueSize,

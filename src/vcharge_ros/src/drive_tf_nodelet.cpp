@@ -2,7 +2,6 @@
 #include <optional>
 #include <vector>
 
-#include <nodelet/nodelet.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <tf2_msgs/TFMessage.h>
@@ -14,6 +13,7 @@
 #include "vcharge_ros/camera_info.h"
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/drive_topics.h"
+#include "vcharge_ros/nodelet.h"
 #include "vcharge_ros/nodelet_support.h"
 #include "vcharge_ros/parameters.h"
 
@@ -22,12 +22,12 @@ namespace vcharge {
 /// What a recorded drive needs beside its topics: odom -> base_link from the odometry, the rig's cameras on
 /// /tf_static, and camera_info with each image's stamp. Stands aside on /tf and on each camera_info where
 /// another node, or the bag, publishes the same. Parameters: ~rig (path), ~topics (DriveTopics).
-class DriveTfNodelet : public nodelet::Nodelet {
+class DriveTfNodelet : public Nodelet {
  private:
   using OdometryPtr = nav_msgs::OdometryConstPtr;
   static constexpr double kMaxSilence_s = 2.0;
 
-  void onInit() override {
+  void initialize() override {
     node_ = getNodeHandle();
     ros::NodeHandle& private_node = getPrivateNodeHandle();
     rig_ = readCameraRig(requireStringParameter(private_node, "rig", "the path of a rig.yaml"));
