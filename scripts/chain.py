@@ -5,6 +5,7 @@ nodelets. Ends with report.html. A step that an earlier run finished with the sa
 goes on. Truth of simulated drives is used to judge, and for the masks of the vehicle's own body, which are drawn by hand
 on a real car."""
 import argparse
+import concurrent.futures
 import hashlib
 import json
 import os
@@ -331,12 +332,20 @@ class Chain:
     def rviz(self, mapped, drive, rig, heights, needs):
         def work(folder):
             del folder
-            script = ROOT / "scripts" / "rviz_screenshot.sh"
-            log = self.work / "rviz" / "rviz.log"
-            run([script, drive / "drive.bag", rig, self.pictures / "rviz_ranges.png"], log)
-            run([script, drive / "drive.bag", rig, self.pictures / "rviz_pose.png", mapped / "map.vmap"], log)
-            run([script, drive / "drive.bag", rig, self.pictures / "rviz_obstacles.png", mapped / "map.vmap", "obstacles"], log)
-            run([script, heights / "map", self.pictures / "rviz_height_map.png"], log)
+
+            def take(view, before, after=()):
+                """The picture of a view, by rviz_screenshot.sh's words before and after the picture's path."""
+                picture = self.pictures / f"rviz_{view}.png"
+                run([ROOT / "scripts" / "rviz_screenshot.sh", *before, picture, *after], self.work / "rviz" / f"{view}.log")
+
+            replay = [drive / "drive.bag", rig]
+            # Mostly waits for rviz: the map's, which is drawn once, runs beside those of the drive.
+            with concurrent.futures.ThreadPoolExecutor(max_workers=1) as pool:
+                height_map = pool.submit(take, "height_map", [heights / "map"])
+                take("ranges", replay)
+                take("pose", replay, [mapped / "map.vmap"])
+                take("obstacles", replay, [mapped / "map.vmap", "obstacles"])
+                height_map.result()
             return {}
 
         return self.step("rviz", "pictures of rviz", needs, [], work)

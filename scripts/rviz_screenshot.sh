@@ -49,11 +49,12 @@ cleanup() {
 }
 trap cleanup EXIT
 
-display=":$((70 + RANDOM % 900))"
-Xvfb "$display" -screen 0 1600x1000x24 >"$scratch/xvfb.log" 2>&1 &
+Xvfb -displayfd 3 -screen 0 1600x1000x24 3>"$scratch/display" >"$scratch/xvfb.log" 2>&1 &
 pids+=($!)
-export DISPLAY=$display LIBGL_ALWAYS_SOFTWARE=1
-for _ in $(seq 50); do xdpyinfo >/dev/null 2>&1 && break; sleep 0.1; done
+display=
+for _ in $(seq 100); do { read -r display <"$scratch/display"; } 2>/dev/null && break; sleep 0.1; done
+[ -n "$display" ] || { cat "$scratch/xvfb.log" >&2; exit 1; }
+export DISPLAY=:$display LIBGL_ALWAYS_SOFTWARE=1
 
 roslaunch -p $((20000 + RANDOM % 20000)) vcharge_launch "${launch[@]}" rviz:=true >"$scratch/roslaunch.log" 2>&1 &
 pids+=($!)
