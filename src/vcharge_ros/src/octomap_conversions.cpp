@@ -67,10 +67,11 @@ visualization_msgs::Marker makeOctomapMarker(const octomap::OcTree& tree, const 
     const auto cells = static_cast<int>(std::lround(leaf.getSize() / edge));
     const double first = -0.5 * (cells - 1) * edge;
     for (int i = 0; i < cells * cells * cells; ++i) {
+      const int row = i / cells % cells, layer = i / (cells * cells);
       geometry_msgs::Point point;
       point.x = leaf.getX() + first + edge * (i % cells);
-      point.y = leaf.getY() + first + edge * (i / cells % cells);
-      point.z = leaf.getZ() + first + edge * (i / cells / cells);
+      point.y = leaf.getY() + first + edge * row;
+      point.z = leaf.getZ() + first + edge * layer;
       marker.points.push_back(point);
     }
   }
