@@ -1,5 +1,7 @@
 #include "vcharge_ros/nodelet_support.h"
 
+#include <stdexcept>
+
 namespace vcharge {
 namespace {
 
@@ -38,7 +40,12 @@ ros::ServiceServer advertiseTrigger(ros::NodeHandle* node, const std::string& na
         }
         return true;
       };
-  return node->advertiseService(name, call);
+  ros::ServiceServer server = node->advertiseService(name, call);
+  if (!server) {
+    throw std::runtime_error(node->resolveName(name) +
+                             ": is served already: does a nodelet of this name still end its work?");
+  }
+  return server;
 }
 
 NodeletDiagnostics::NodeletDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node,

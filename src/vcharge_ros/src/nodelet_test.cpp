@@ -5,9 +5,11 @@
 #include <future>
 #include <memory>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <utility>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nodelet/detail/callback_queue.h>
 #include <nodelet/loader.h>
@@ -15,6 +17,8 @@
 #include <ros/node_handle.h>
 #include <boost/make_shared.hpp>
 #include <boost/weak_ptr.hpp>
+
+#include "vcharge_ros/nodelet_support.h"
 
 namespace vcharge {
 namespace {
@@ -107,6 +111,21 @@ TEST_F(NodeletTest, FailingToInitializeItGoesBeforeItsQueues) {
   const End end = waitForEnd();
   EXPECT_TRUE(end.single_threaded_queue_lives);
   EXPECT_TRUE(end.multi_threaded_queue_lives);
+}
+
+TEST(AdvertiseTriggerTest, ANameThatIsServedAlreadyIsRefusedUntilItIsFree) {
+  ros::NodeHandle node("/trigger_test");
+  CallbackGuard guard("trigger_test");
+  const auto serve = [](std_srvs::TriggerResponse* response) { response->success = 1; };
+  ros::ServiceServer first = advertiseTrigger(&node, "finish", &guard, serve);
+  try {
+    advertiseTrigger(&node, "finish", &guard, serve);
+    FAIL() << "served twice";
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("/trigger_test/finish"));
+  }
+  first.shutdown();
+  EXPECT_TRUE(advertiseTrigger(&node, "finish", &guard, serve));
 }
 
 }  // namespace

@@ -52,7 +52,8 @@ class CallbackGuard {
 };
 
 /// Serves std_srvs/Trigger under `name`. What `serve` throws is the answer's text, without success. The guard
-/// must outlive the server.
+/// must outlive the server. Throws std::runtime_error naming the service if this process serves it already: a
+/// nodelet that was unloaded while it worked does so until it is done.
 ros::ServiceServer advertiseTrigger(ros::NodeHandle* node, const std::string& name, CallbackGuard* guard,
                                     std::function<void(std_srvs::TriggerResponse*)> serve);
 
