@@ -5,15 +5,15 @@
 #include <opencv2/core.hpp>
 
 #include "fuzz_target.h"
-#include "vcharge_core/analytic_map.h"
-#include "vcharge_core/camera_rig.h"
-#include "vcharge_core/file_io.h"
-#include "vcharge_core/height_map_file.h"
-#include "vcharge_core/range_map_file.h"
-#include "vcharge_core/sparse_map_file.h"
-#include "vcharge_core/trajectory.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/dense_maps/height_map_file.h"
+#include "vcharge_core/dense_maps/range_map_file.h"
+#include "vcharge_core/files/file_io.h"
+#include "vcharge_core/motion/trajectory.h"
+#include "vcharge_core/sparse_map/analytic_map.h"
+#include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_features/vocabulary_tree.h"
-#include "vcharge_geometry/pose_graph.h"
+#include "vcharge_geometry/pose_graph/pose_graph.h"
 
 namespace vcharge {
 namespace {

@@ -16,11 +16,11 @@
 #include "fuzz_target.h"
 #include "vcharge_camera_driver/can_wheel_decoder.h"
 #include "vcharge_camera_driver/gray_converter.h"
-#include "vcharge_core/error.h"
-#include "vcharge_core/recorded_drive.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/frames/recorded_drive.h"
+#include "vcharge_recordings/recorded_drive_reader.h"
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/image_conversions.h"
-#include "vcharge_ros/recorded_drive_reader.h"
 
 namespace vcharge {
 namespace {

@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "vcharge_core/error.h"
-#include "vcharge_core/file_io.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/files/file_io.h"
 
 namespace vcharge {
 namespace {

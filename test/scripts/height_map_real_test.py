@@ -31,7 +31,7 @@ class HeightMapRealTest(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="vcharge_tests_"))
         bag, rig, saved = cls.folder / "real.bag", cls.folder / "real.yaml", cls.folder / "map"
-        for words in ([tool("vcharge_ros", "import_vcharge_images"), "--folder", pathlib.Path(DATA) / "vcharge_left",
+        for words in ([tool("vcharge_recordings", "import_vcharge_images"), "--folder", pathlib.Path(DATA) / "vcharge_left",
                        "--output", bag, "--rig", rig],
                       [tool("vcharge_dense", "build_height_map"), "--bag", bag, "--rig", rig, "--output", saved]):
             status, output, errors = run(words)

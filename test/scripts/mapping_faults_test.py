@@ -98,7 +98,7 @@ class MappingFaultsTest(unittest.TestCase):
 
     def check_bag(self, bag, rig=None):
         """Exit status, the subjects of what did not pass with their grades, and the errors."""
-        status, output, errors = run([tool("vcharge_camera_driver", "check_bag"), "--bag", bag, "--rig",
+        status, output, errors = run([tool("vcharge_recordings", "check_bag"), "--bag", bag, "--rig",
                                       rig or self.drive.rig])
         found = dict(reversed(line.split("  ")[:2]) for line in output.splitlines() if not line.startswith("verdict"))
         return status, {subject: grade for subject, grade in found.items() if grade != "PASS"}, errors

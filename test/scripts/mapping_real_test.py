@@ -50,7 +50,7 @@ class MappingRealTest(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="vcharge_tests_"))
         cls.bag, cls.rig = cls.folder / "real.bag", cls.folder / "real.yaml"
-        status, output, errors = run([tool("vcharge_ros", "import_vcharge_images"), "--folder",
+        status, output, errors = run([tool("vcharge_recordings", "import_vcharge_images"), "--folder",
                                       pathlib.Path(DATA) / "vcharge_left", "--output", cls.bag, "--rig", cls.rig])
         if status != 0:
             raise RuntimeError(f"import_vcharge_images failed: {output} {errors}")

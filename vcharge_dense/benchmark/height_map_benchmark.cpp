@@ -7,8 +7,8 @@
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
-#include "height_map/height_regularization.h"
 #include "height_map/plain_height_map.h"
+#include "height_map/regularization/height_regularization.h"
 #include "height_map/test_views.h"
 
 namespace vcharge {

@@ -15,12 +15,12 @@
 #include <hwy/targets.h>
 #include <tbb/global_control.h>
 
-#include "analytic_scene.h"
 #include "machine_limits.h"
-#include "plain_plane_sweep.h"
-#include "surface_estimate.h"
-#include "sweep_input.h"
-#include "tile_scorer.h"
+#include "reference/analytic_scene.h"
+#include "reference/plain_plane_sweep.h"
+#include "refinement/surface_estimate.h"
+#include "sweep/sweep_input.h"
+#include "sweep/tile_scorer.h"
 #include "vcharge_dense/plane_sweep.h"
 
 namespace vcharge {

@@ -13,11 +13,11 @@
 #include <benchmark/benchmark.h>
 #include <opencv2/imgproc.hpp>
 
-#include "test_map.h"
-#include "vcharge_core/analytic_map.h"
-#include "vcharge_core/sparse_map_file.h"
+#include "vcharge_core/sparse_map/analytic_map.h"
+#include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_features/vocabulary_tree.h"
-#include "vcharge_localization/map_localizer.h"
+#include "vcharge_reconstruction/map_localizer.h"
+#include "vcharge_reconstruction/testing/test_map.h"
 
 namespace vcharge {
 namespace {

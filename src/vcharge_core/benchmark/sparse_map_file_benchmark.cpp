@@ -6,8 +6,8 @@
 
 #include <benchmark/benchmark.h>
 
-#include "vcharge_core/analytic_map.h"
-#include "vcharge_core/sparse_map_file.h"
+#include "vcharge_core/sparse_map/analytic_map.h"
+#include "vcharge_core/sparse_map/sparse_map_file.h"
 
 namespace vcharge {
 namespace {

@@ -9,6 +9,8 @@ macro(vcharge_build_settings)
   if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
     set(CMAKE_BUILD_TYPE Release)
   endif()
+  # Private headers are named by their folder below src.
+  include_directories(src)
   option(VCHARGE_WARNINGS_AS_ERRORS "Fail the build on compiler warnings" OFF)
   add_compile_options(-Wall -Wextra -Wno-missing-field-initializers -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
   if(VCHARGE_WARNINGS_AS_ERRORS)

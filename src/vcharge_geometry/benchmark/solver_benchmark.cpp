@@ -11,14 +11,14 @@
 #include <opengv/relative_pose/NoncentralRelativeAdapter.hpp>
 #include <opengv/relative_pose/methods.hpp>
 
-#include "random_problems.h"
-#include "vcharge_geometry/ackermann_two_point.h"
-#include "vcharge_geometry/generalized_three_point.h"
-#include "vcharge_geometry/known_vertical_four_point.h"
-#include "vcharge_geometry/linear_seventeen_point.h"
-#include "vcharge_geometry/perspective_three_point.h"
-#include "vcharge_geometry/planar_three_point.h"
-#include "vcharge_geometry/upright_two_point.h"
+#include "solvers/random_problems.h"
+#include "vcharge_geometry/solvers/ackermann_two_point.h"
+#include "vcharge_geometry/solvers/generalized_three_point.h"
+#include "vcharge_geometry/solvers/known_vertical_four_point.h"
+#include "vcharge_geometry/solvers/linear_seventeen_point.h"
+#include "vcharge_geometry/solvers/perspective_three_point.h"
+#include "vcharge_geometry/solvers/planar_three_point.h"
+#include "vcharge_geometry/solvers/upright_two_point.h"
 
 namespace vcharge {
 namespace {

@@ -6,9 +6,9 @@
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
-#include "vcharge_simulation/golf_rig.h"
-#include "vcharge_simulation/renderer.h"
-#include "vcharge_simulation/scene_catalogue.h"
+#include "vcharge_simulation/rendering/renderer.h"
+#include "vcharge_simulation/scenes/scene_catalogue.h"
+#include "vcharge_simulation/sensors/golf_rig.h"
 
 namespace vcharge {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/options.h"
-#include "vcharge_core/vehicle_odometry.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/motion/vehicle_odometry.h"
 
 namespace vcharge {
 

@@ -2,7 +2,7 @@
 
 #include <functional>
 
-#include "vcharge_core/timestamp.h"
+#include "vcharge_core/base/timestamp.h"
 
 namespace vcharge {
 

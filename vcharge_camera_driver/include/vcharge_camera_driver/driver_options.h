@@ -5,7 +5,7 @@
 
 #include "vcharge_camera_driver/can_wheel_decoder.h"
 #include "vcharge_camera_driver/v4l2_frame_source.h"
-#include "vcharge_camera_driver/wheel_odometry.h"
+#include "vcharge_wheel_odometry/wheel_odometry.h"
 
 namespace vcharge {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/image.h"
+#include "vcharge_core/frames/image.h"
 
 namespace vcharge {
 

@@ -4,7 +4,7 @@
 #include <mutex>
 #include <vector>
 
-#include "vcharge_core/image.h"
+#include "vcharge_core/frames/image.h"
 
 namespace vcharge {
 

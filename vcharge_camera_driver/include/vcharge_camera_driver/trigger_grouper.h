@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "vcharge_camera_driver/frame_source.h"
-#include "vcharge_core/multi_frame_synchronizer.h"
+#include "vcharge_core/frames/multi_frame_synchronizer.h"
 
 namespace vcharge {
 

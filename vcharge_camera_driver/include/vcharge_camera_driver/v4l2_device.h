@@ -9,8 +9,8 @@
 
 #include "vcharge_camera_driver/file_descriptor.h"
 #include "vcharge_camera_driver/gray_converter.h"
-#include "vcharge_core/options.h"
-#include "vcharge_core/timestamp.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/base/timestamp.h"
 
 namespace vcharge {
 

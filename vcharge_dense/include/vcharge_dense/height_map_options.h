@@ -1,7 +1,7 @@
 #pragma once
 
-#include "vcharge_core/height_map.h"
-#include "vcharge_core/options.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/dense_maps/height_map.h"
 #include "vcharge_dense/range_mapper.h"
 
 namespace vcharge {

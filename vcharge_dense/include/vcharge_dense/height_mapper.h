@@ -8,9 +8,9 @@
 
 #include <Eigen/Geometry>
 
-#include "vcharge_core/camera_rig.h"
-#include "vcharge_core/drive_source.h"
-#include "vcharge_core/height_map.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/dense_maps/height_map.h"
+#include "vcharge_core/frames/drive_source.h"
 #include "vcharge_dense/height_map_options.h"
 #include "vcharge_dense/octomap_builder.h"
 #include "vcharge_dense/range_mapper.h"

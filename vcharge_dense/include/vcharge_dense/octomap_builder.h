@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/range_map.h"
-#include "vcharge_core/ray_table.h"
-#include "vcharge_core/rigid_transform.h"
+#include "vcharge_core/camera/ray_table.h"
+#include "vcharge_core/dense_maps/range_map.h"
+#include "vcharge_core/motion/rigid_transform.h"
 #include "vcharge_dense/height_map_options.h"
 
 namespace octomap {

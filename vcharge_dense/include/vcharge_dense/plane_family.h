@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "vcharge_core/rigid_transform.h"
+#include "vcharge_core/motion/rigid_transform.h"
 #include "vcharge_dense/plane_sweep_options.h"
 
 namespace vcharge {

@@ -8,10 +8,10 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
-#include "vcharge_core/mei_camera.h"
-#include "vcharge_core/range_map.h"
-#include "vcharge_core/rigid_transform.h"
-#include "vcharge_core/timestamp.h"
+#include "vcharge_core/base/timestamp.h"
+#include "vcharge_core/camera/mei_camera.h"
+#include "vcharge_core/dense_maps/range_map.h"
+#include "vcharge_core/motion/rigid_transform.h"
 #include "vcharge_dense/plane_family.h"
 #include "vcharge_dense/plane_sweep_options.h"
 

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/options.h"
+#include "vcharge_core/base/options.h"
 
 namespace vcharge {
 

@@ -8,12 +8,12 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/camera_rig.h"
-#include "vcharge_core/drive_source.h"
-#include "vcharge_core/range_map.h"
-#include "vcharge_core/trajectory.h"
-#include "vcharge_core/vehicle_odometry.h"
-#include "vcharge_core/working_camera.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/camera/working_camera.h"
+#include "vcharge_core/dense_maps/range_map.h"
+#include "vcharge_core/frames/drive_source.h"
+#include "vcharge_core/motion/trajectory.h"
+#include "vcharge_core/motion/vehicle_odometry.h"
 #include "vcharge_dense/neighbour_selection.h"
 #include "vcharge_dense/plane_sweep.h"
 

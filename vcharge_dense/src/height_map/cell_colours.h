@@ -3,8 +3,8 @@
 #include <functional>
 #include <vector>
 
-#include "height_map/packed_range_map.h"
-#include "vcharge_core/height_map.h"
+#include "height_map/fusion/packed_range_map.h"
+#include "vcharge_core/dense_maps/height_map.h"
 
 namespace vcharge {
 

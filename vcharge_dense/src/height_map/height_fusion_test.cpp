@@ -7,9 +7,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "height_map/height_regularization.h"
+#include "height_map/regularization/height_regularization.h"
 #include "height_map/test_views.h"
-#include "vcharge_core/error.h"
+#include "vcharge_core/base/error.h"
 
 namespace vcharge {
 namespace {

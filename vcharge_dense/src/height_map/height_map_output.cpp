@@ -5,10 +5,10 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "vcharge_core/error.h"
-#include "vcharge_core/file_io.h"
-#include "vcharge_core/height_map_file.h"
-#include "vcharge_core/quantile.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/base/quantile.h"
+#include "vcharge_core/dense_maps/height_map_file.h"
+#include "vcharge_core/files/file_io.h"
 
 namespace vcharge {
 namespace {

@@ -9,12 +9,12 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "height_map/cell_colours.h"
-#include "height_map/height_regularization.h"
-#include "vcharge_core/error.h"
-#include "vcharge_core/file_io.h"
-#include "vcharge_core/range_map_file.h"
-#include "vcharge_core/stage_timer.h"
-#include "vcharge_core/text_format.h"
+#include "height_map/regularization/height_regularization.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/base/stage_timer.h"
+#include "vcharge_core/base/text_format.h"
+#include "vcharge_core/dense_maps/range_map_file.h"
+#include "vcharge_core/files/file_io.h"
 
 namespace vcharge {
 namespace fs = std::filesystem;

@@ -14,10 +14,10 @@
 #include <gtest/gtest.h>
 #include <octomap/OcTree.h>
 
-#include "analytic_scene.h"
 #include "height_map/test_views.h"
-#include "vcharge_core/error.h"
-#include "vcharge_core/range_map_file.h"
+#include "reference/analytic_scene.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/dense_maps/range_map_file.h"
 #include "vcharge_dense/height_map_output.h"
 
 namespace vcharge {

@@ -6,10 +6,10 @@
 
 #include <octomap/OcTree.h>
 
-#include "height_map/voxel_blocks.h"
-#include "vcharge_core/error.h"
-#include "vcharge_core/file_io.h"
-#include "vcharge_core/ray_table.h"
+#include "height_map/fusion/voxel_blocks.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/camera/ray_table.h"
+#include "vcharge_core/files/file_io.h"
 
 namespace vcharge {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <opencv2/core.hpp>
 
-#include "height_map/primal_dual.h"
-#include "height_map/weight_kernel.h"
+#include "height_map/fusion/weight_kernel.h"
+#include "height_map/regularization/primal_dual.h"
 
 namespace vcharge {
 

@@ -6,8 +6,8 @@
 
 #include <opencv2/core.hpp>
 
-#include "vcharge_core/range_map.h"
-#include "vcharge_core/rigid_transform.h"
+#include "vcharge_core/dense_maps/range_map.h"
+#include "vcharge_core/motion/rigid_transform.h"
 
 namespace vcharge::testing {
 

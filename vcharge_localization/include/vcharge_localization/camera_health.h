@@ -5,10 +5,10 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/camera_rig.h"
-#include "vcharge_core/options.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_localization/frame_assembler.h"
-#include "vcharge_localization/map_localizer.h"
+#include "vcharge_reconstruction/map_localizer.h"
 
 namespace vcharge {
 

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/options.h"
+#include "vcharge_core/base/options.h"
 #include "vcharge_localization/camera_health.h"
 #include "vcharge_localization/frame_assembler.h"
-#include "vcharge_localization/map_localizer.h"
 #include "vcharge_localization/pose_filter.h"
+#include "vcharge_reconstruction/map_localizer.h"
 
 namespace vcharge {
 

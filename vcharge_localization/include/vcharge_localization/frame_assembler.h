@@ -7,10 +7,10 @@
 #include <optional>
 #include <vector>
 
-#include "vcharge_core/camera_rig.h"
-#include "vcharge_core/drive_source.h"
-#include "vcharge_core/options.h"
-#include "vcharge_core/timestamp.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/base/timestamp.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/frames/drive_source.h"
 
 namespace vcharge {
 

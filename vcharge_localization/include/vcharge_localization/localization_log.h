@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/camera_rig.h"
+#include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_localization/drive_localizer.h"
 
 namespace vcharge {

@@ -4,10 +4,10 @@
 
 #include <Eigen/Core>
 
-#include "vcharge_core/camera_rig.h"
-#include "vcharge_core/options.h"
-#include "vcharge_core/rigid_transform.h"
-#include "vcharge_localization/map_localizer.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/motion/rigid_transform.h"
+#include "vcharge_reconstruction/map_localizer.h"
 
 namespace vcharge {
 

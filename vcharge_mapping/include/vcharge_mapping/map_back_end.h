@@ -5,20 +5,12 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/sparse_map.h"
-#include "vcharge_mapping/mapping_state.h"
+#include "vcharge_core/sparse_map/sparse_map.h"
 #include "vcharge_mapping/sparse_mapper_options.h"
+#include "vcharge_reconstruction/mapping_state.h"
+#include "vcharge_reconstruction/stage_progress.h"
 
 namespace vcharge {
-
-/// Where making a map has got to.
-struct StageProgress {
-  std::string stage;
-  int number = 1;  ///< of the stage, from 1
-  int num_stages = 1;
-  double fraction = 0.0;  ///< of the stage
-};
-using StageCallback = std::function<void(const StageProgress&)>;
 
 /// Called with the name of a stage that is done and what is known then.
 using CheckpointCallback = std::function<void(const std::string& stage, const MappingState&)>;

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "vcharge_core/sparse_map.h"
+#include "vcharge_core/sparse_map/sparse_map.h"
 
 namespace vcharge {
 

@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/equidistant_fit.h"
-#include "vcharge_core/sparse_map.h"
-#include "vcharge_core/trajectory.h"
+#include "vcharge_core/camera/equidistant_fit.h"
+#include "vcharge_core/motion/trajectory.h"
+#include "vcharge_core/sparse_map/sparse_map.h"
 
 namespace vcharge {
 

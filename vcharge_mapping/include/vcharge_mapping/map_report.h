@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/sparse_map.h"
-#include "vcharge_mapping/mapping_state.h"
+#include "vcharge_core/sparse_map/sparse_map.h"
+#include "vcharge_reconstruction/mapping_state.h"
 
 namespace vcharge {
 

@@ -4,9 +4,9 @@
 #include <optional>
 #include <string>
 
-#include "vcharge_core/camera_rig.h"
-#include "vcharge_mapping/mapping_state.h"
+#include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_mapping/sparse_mapper_options.h"
+#include "vcharge_reconstruction/mapping_state.h"
 
 namespace vcharge {
 

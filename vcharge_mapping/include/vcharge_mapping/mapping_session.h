@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "vcharge_core/drive_source.h"
+#include "vcharge_core/frames/drive_source.h"
 #include "vcharge_mapping/sparse_mapper.h"
 
 namespace vcharge {

@@ -7,15 +7,15 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/drive_source.h"
-#include "vcharge_core/sparse_map.h"
-#include "vcharge_core/trajectory.h"
+#include "vcharge_core/frames/drive_source.h"
+#include "vcharge_core/motion/trajectory.h"
+#include "vcharge_core/sparse_map/sparse_map.h"
 #include "vcharge_features/feature_extractor.h"
-#include "vcharge_mapping/frame_gatherer.h"
-#include "vcharge_mapping/frame_tracker.h"
 #include "vcharge_mapping/map_back_end.h"
-#include "vcharge_mapping/mapping_state.h"
 #include "vcharge_mapping/sparse_mapper_options.h"
+#include "vcharge_reconstruction/frame_gatherer.h"
+#include "vcharge_reconstruction/frame_tracker.h"
+#include "vcharge_reconstruction/mapping_state.h"
 
 namespace vcharge {
 

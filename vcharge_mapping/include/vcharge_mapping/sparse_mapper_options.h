@@ -1,13 +1,13 @@
 #pragma once
 
-#include "vcharge_core/options.h"
+#include "vcharge_core/base/options.h"
 #include "vcharge_features/feature_extractor.h"
-#include "vcharge_mapping/bundle_adjustment.h"
-#include "vcharge_mapping/ego_motion.h"
-#include "vcharge_mapping/frame_tracker.h"
-#include "vcharge_mapping/landmark_search.h"
-#include "vcharge_mapping/loop_closure.h"
-#include "vcharge_mapping/triangulation.h"
+#include "vcharge_reconstruction/bundle_adjustment.h"
+#include "vcharge_reconstruction/ego_motion.h"
+#include "vcharge_reconstruction/frame_tracker.h"
+#include "vcharge_reconstruction/landmark_search.h"
+#include "vcharge_reconstruction/loop_closure.h"
+#include "vcharge_reconstruction/triangulation.h"
 
 namespace vcharge {
 

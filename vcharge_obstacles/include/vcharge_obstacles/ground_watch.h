@@ -6,10 +6,10 @@
 
 #include <opencv2/core.hpp>
 
-#include "vcharge_core/options.h"
-#include "vcharge_core/rigid_transform.h"
-#include "vcharge_core/timestamp.h"
-#include "vcharge_core/working_camera.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/base/timestamp.h"
+#include "vcharge_core/camera/working_camera.h"
+#include "vcharge_core/motion/rigid_transform.h"
 #include "vcharge_obstacles/ground_plane.h"
 #include "vcharge_obstacles/polar_grid.h"
 

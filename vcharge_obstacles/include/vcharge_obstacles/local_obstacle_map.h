@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/obstacle_map.h"
+#include "vcharge_core/dense_maps/obstacle_map.h"
 #include "vcharge_obstacles/obstacle_detector.h"
 #include "vcharge_obstacles/scrolling_grid.h"
 

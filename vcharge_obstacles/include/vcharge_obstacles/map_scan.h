@@ -1,6 +1,6 @@
 #pragma once
 
-#include "vcharge_core/obstacle_map.h"
+#include "vcharge_core/dense_maps/obstacle_map.h"
 
 namespace vcharge {
 

@@ -6,9 +6,9 @@
 
 #include <Eigen/Core>
 
-#include "vcharge_core/obstacle_map.h"
-#include "vcharge_core/range_map.h"
-#include "vcharge_core/working_camera.h"
+#include "vcharge_core/camera/working_camera.h"
+#include "vcharge_core/dense_maps/obstacle_map.h"
+#include "vcharge_core/dense_maps/range_map.h"
 #include "vcharge_obstacles/ground_plane.h"
 #include "vcharge_obstacles/polar_grid.h"
 

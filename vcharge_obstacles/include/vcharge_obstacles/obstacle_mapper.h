@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/camera_rig.h"
-#include "vcharge_core/range_map.h"
-#include "vcharge_core/vehicle_odometry.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/dense_maps/range_map.h"
+#include "vcharge_core/motion/vehicle_odometry.h"
 #include "vcharge_obstacles/ground_watch.h"
 #include "vcharge_obstacles/local_obstacle_map.h"
 #include "vcharge_obstacles/obstacle_detector.h"

@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "vcharge_core/obstacle_map.h"
+#include "vcharge_core/dense_maps/obstacle_map.h"
 
 namespace vcharge {
 

@@ -4,11 +4,11 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/camera_rig.h"
-#include "vcharge_core/height_map.h"
-#include "vcharge_core/options.h"
-#include "vcharge_core/rigid_transform.h"
-#include "vcharge_core/trajectory.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/dense_maps/height_map.h"
+#include "vcharge_core/motion/rigid_transform.h"
+#include "vcharge_core/motion/trajectory.h"
 #include "vcharge_evaluation/error_distribution.h"
 #include "vcharge_evaluation/obstacle_truth.h"
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/options.h"
-#include "vcharge_core/sparse_map.h"
-#include "vcharge_core/trajectory.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/motion/trajectory.h"
+#include "vcharge_core/sparse_map/sparse_map.h"
 #include "vcharge_evaluation/error_distribution.h"
 #include "vcharge_evaluation/trajectory_errors.h"
 

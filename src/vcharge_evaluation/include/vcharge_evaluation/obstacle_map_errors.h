@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_core/obstacle_map.h"
+#include "vcharge_core/dense_maps/obstacle_map.h"
 #include "vcharge_evaluation/error_distribution.h"
 #include "vcharge_evaluation/obstacle_truth.h"
 

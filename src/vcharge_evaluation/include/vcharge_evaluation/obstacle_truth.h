@@ -9,9 +9,9 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
-#include "vcharge_core/camera_rig.h"
-#include "vcharge_core/ray_table.h"
-#include "vcharge_core/timestamp.h"
+#include "vcharge_core/base/timestamp.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/camera/ray_table.h"
 
 namespace vcharge {
 

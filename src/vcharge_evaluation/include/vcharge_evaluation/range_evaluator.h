@@ -6,7 +6,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "vcharge_core/range_map.h"
+#include "vcharge_core/dense_maps/range_map.h"
 #include "vcharge_evaluation/error_distribution.h"
 
 namespace vcharge {

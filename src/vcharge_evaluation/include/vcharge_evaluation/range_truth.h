@@ -4,8 +4,8 @@
 
 #include <opencv2/core.hpp>
 
-#include "vcharge_core/timestamp.h"
-#include "vcharge_core/working_camera.h"
+#include "vcharge_core/base/timestamp.h"
+#include "vcharge_core/camera/working_camera.h"
 
 namespace vcharge {
 

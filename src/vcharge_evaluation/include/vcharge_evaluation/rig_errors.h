@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "vcharge_core/camera_rig.h"
+#include "vcharge_core/camera/camera_rig.h"
 
 namespace vcharge {
 

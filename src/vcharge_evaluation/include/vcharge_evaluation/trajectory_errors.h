@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "vcharge_core/trajectory.h"
+#include "vcharge_core/motion/trajectory.h"
 #include "vcharge_evaluation/error_distribution.h"
 
 namespace vcharge {

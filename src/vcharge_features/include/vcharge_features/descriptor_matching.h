@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
-#include "vcharge_core/options.h"
+#include "vcharge_core/base/options.h"
 
 namespace vcharge {
 

@@ -4,7 +4,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "vcharge_core/options.h"
+#include "vcharge_core/base/options.h"
 
 namespace vcharge {
 

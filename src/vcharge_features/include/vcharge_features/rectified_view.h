@@ -10,9 +10,9 @@
 #include <Eigen/Geometry>
 #include <opencv2/core.hpp>
 
-#include "vcharge_core/camera_rig.h"
-#include "vcharge_core/options.h"
-#include "vcharge_core/pinhole_camera.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/camera/pinhole_camera.h"
 #include "vcharge_features/image_features.h"
 
 namespace vcharge {

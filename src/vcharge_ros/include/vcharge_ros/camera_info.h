@@ -4,8 +4,8 @@
 
 #include <sensor_msgs/CameraInfo.h>
 
-#include "vcharge_core/camera_rig.h"
-#include "vcharge_core/equidistant_fit.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/camera/equidistant_fit.h"
 
 namespace vcharge {
 

@@ -9,9 +9,9 @@
 #include <ros/time.h>
 #include <vcharge_msgs/WheelTicks.h>
 
-#include "vcharge_core/rigid_transform.h"
-#include "vcharge_core/timestamp.h"
-#include "vcharge_core/vehicle_odometry.h"
+#include "vcharge_core/base/timestamp.h"
+#include "vcharge_core/motion/rigid_transform.h"
+#include "vcharge_core/motion/vehicle_odometry.h"
 
 namespace vcharge {
 

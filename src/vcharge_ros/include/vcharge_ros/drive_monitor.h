@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "vcharge_core/timestamp.h"
+#include "vcharge_core/base/timestamp.h"
 
 namespace vcharge {
 

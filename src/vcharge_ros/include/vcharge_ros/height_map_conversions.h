@@ -5,8 +5,8 @@
 #include <vcharge_msgs/HeightMap.h>
 #include <visualization_msgs/Marker.h>
 
-#include "vcharge_core/height_map.h"
-#include "vcharge_core/timestamp.h"
+#include "vcharge_core/base/timestamp.h"
+#include "vcharge_core/dense_maps/height_map.h"
 
 namespace vcharge {
 

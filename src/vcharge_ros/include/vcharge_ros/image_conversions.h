@@ -5,8 +5,8 @@
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 
-#include "vcharge_core/image.h"
-#include "vcharge_core/timestamp.h"
+#include "vcharge_core/base/timestamp.h"
+#include "vcharge_core/frames/image.h"
 
 namespace vcharge {
 

@@ -6,9 +6,9 @@
 
 #include <ros/node_handle.h>
 
-#include "vcharge_core/camera_rig.h"
-#include "vcharge_core/drive_source.h"
-#include "vcharge_core/options.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/frames/drive_source.h"
 #include "vcharge_ros/drive_monitor.h"
 #include "vcharge_ros/drive_topics.h"
 

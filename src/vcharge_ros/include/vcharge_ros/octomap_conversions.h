@@ -5,7 +5,7 @@
 #include <octomap_msgs/Octomap.h>
 #include <visualization_msgs/Marker.h>
 
-#include "vcharge_core/timestamp.h"
+#include "vcharge_core/base/timestamp.h"
 
 namespace octomap {
 class OcTree;

@@ -6,7 +6,7 @@
 #include <xmlrpcpp/XmlRpcValue.h>
 #include <yaml-cpp/yaml.h>
 
-#include "vcharge_core/options.h"
+#include "vcharge_core/base/options.h"
 
 namespace vcharge {
 

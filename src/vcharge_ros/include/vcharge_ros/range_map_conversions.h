@@ -6,8 +6,8 @@
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/PointCloud2.h>
 
-#include "vcharge_core/range_map.h"
-#include "vcharge_core/ray_table.h"
+#include "vcharge_core/camera/ray_table.h"
+#include "vcharge_core/dense_maps/range_map.h"
 
 namespace vcharge {
 

@@ -7,8 +7,8 @@
 #include <sensor_msgs/PointCloud2.h>
 #include <visualization_msgs/MarkerArray.h>
 
-#include "vcharge_core/sparse_map.h"
-#include "vcharge_core/trajectory.h"
+#include "vcharge_core/motion/trajectory.h"
+#include "vcharge_core/sparse_map/sparse_map.h"
 
 namespace vcharge {
 

@@ -5,7 +5,7 @@
 #include <tuple>
 #include <vector>
 
-#include "vcharge_core/timestamp.h"
+#include "vcharge_core/base/timestamp.h"
 
 namespace vcharge {
 

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "vcharge_core/base/timestamp.h"
+
+namespace vcharge {
+
+/// 8-bit gray pixels (CV_8UC1) that are never written to once they are in here. `owner` keeps the memory
+/// alive where `pixels` is a view of a message's buffer; copying an Image copies no pixel.
+struct Image {
+  cv::Mat pixels;
+  std::shared_ptr<const void> owner;
+};
+
+/// The images of all cameras of a rig at one instant, in the rig's camera order. Whoever takes incomplete
+/// frames finds images without pixels in them.
+struct MultiFrame {
+  Timestamp stamp;
+  std::vector<Image> images;
+};
+
+}  // namespace vcharge

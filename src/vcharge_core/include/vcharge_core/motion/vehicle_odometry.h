@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "vcharge_core/base/timestamp.h"
+#include "vcharge_core/motion/rigid_transform.h"
+
+namespace vcharge {
+
+/// Dead reckoning of the vehicle at one instant. The vehicle frame (base_link) lies on the ground under the
+/// centre of the rear axle, x forward, y left, z up. From wheels alone the pose is planar (z, roll and pitch
+/// zero); a source that knows all six degrees of freedom may fill them in.
+struct VehicleOdometry {
+  Timestamp stamp;
+  RigidTransform odom_from_vehicle;
+  double forward_speed_m_per_s = 0.0;
+  double yaw_rate_rad_per_s = 0.0;
+};
+
+/// Raw counters of the rear wheels.
+struct WheelTicks {
+  Timestamp stamp;
+  int64_t left_ticks = 0;
+  int64_t right_ticks = 0;
+  double metres_per_tick = 0.01;
+  double steering_angle_rad = 0.0;  ///< of the virtual front wheel in the middle, positive to the left
+};
+
+struct OdometryBufferOptions {
+  double max_gap_s = 0.25;         ///< neighbours further apart are not interpolated
+  double history_s = 60.0;         ///< older entries are forgotten; infinity keeps all
+  double reset_backwards_s = 1.0;  ///< a stamp this far before the newest starts over (a replayed bag)
+
+  template <class Visitor>
+  void visitFields(Visitor&& visit) {
+    visit("max_gap_s", max_gap_s);
+    visit("history_s", history_s);
+    visit("reset_backwards_s", reset_backwards_s);
+  }
+  void validate() const;  ///< throws std::invalid_argument naming the field
+};
+
+/// Interpolates odometry between its stamps. Never extrapolates: a query outside, or inside a gap, says so.
+/// Not thread safe.
+class OdometryBuffer {
+ public:
+  enum class AddResult {
+    kAdded,
+    kAddedAfterGap,  ///< more than max_gap_s after the entry before it
+    kDuplicate,      ///< same stamp as an entry: ignored
+    kOutOfOrder,     ///< slightly older than the newest entry: ignored
+    kReset,          ///< time jumped back: all older entries dropped, this one kept
+  };
+  enum class LookupStatus { kOk, kEmpty, kBeforeFirst, kAfterLast, kInGap };
+  struct Lookup {
+    LookupStatus status = LookupStatus::kEmpty;
+    VehicleOdometry odometry;  ///< valid only when status is kOk
+    explicit operator bool() const { return status == LookupStatus::kOk; }
+  };
+  struct Counts {
+    uint64_t added = 0;
+    uint64_t gaps = 0;
+    uint64_t duplicates = 0;
+    uint64_t out_of_order = 0;
+    uint64_t resets = 0;
+  };
+
+  explicit OdometryBuffer(const OdometryBufferOptions& options = OdometryBufferOptions());
+
+  AddResult add(const VehicleOdometry& odometry);
+  /// Pose and velocities at `stamp`.
+  Lookup lookup(Timestamp stamp) const;
+
+  bool empty() const { return entries_.empty(); }
+  std::optional<Timestamp> newestStamp() const;
+  const Counts& counts() const { return counts_; }
+
+ private:
+  OdometryBufferOptions options_;
+  std::deque<VehicleOdometry> entries_;  // strictly increasing stamps
+  Counts counts_;
+};
+
+/// "no odometry yet", "before the first odometry", ...: ends a sentence in a message.
+std::string describe(OdometryBuffer::LookupStatus status);
+
+}  // namespace vcharge

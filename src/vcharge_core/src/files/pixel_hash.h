@@ -1,0 +1,12 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include "vcharge_core/files/content_hash.h"
+
+namespace vcharge {
+
+/// Size and all pixels of an image of 32-bit floats with any number of channels; every NaN counts the same.
+void addPixelsToHash(const cv::Mat& image, ContentHasher* hasher);
+
+}  // namespace vcharge

@@ -1,0 +1,114 @@
+#include "vcharge_core/frames/multi_frame_synchronizer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/base/options.h"
+
+namespace vcharge {
+
+void MultiFrameSynchronizerOptions::validate() const {
+  requireField(std::isfinite(tolerance_s) && tolerance_s >= 0.0, "tolerance_s",
+               "must be finite and not negative", tolerance_s);
+  requireField(max_pending_sets >= 1, "max_pending_sets", "must be at least 1", max_pending_sets);
+  requireField(reset_backwards_s > 0.0, "reset_backwards_s", "must be positive", reset_backwards_s);
+}
+
+MultiFrameSynchronizer::MultiFrameSynchronizer(size_t num_cameras,
+                                               const MultiFrameSynchronizerOptions& options)
+    : num_cameras_(num_cameras), options_(options), tolerance_(durationFromSeconds(options.tolerance_s)) {
+  check(num_cameras > 0, "MultiFrameSynchronizer: needs at least one camera");
+  options_.validate();
+  counts_.missing_per_camera.assign(num_cameras, 0);
+}
+
+void MultiFrameSynchronizer::giveUpOldest() {
+  PendingSet& oldest = pending_.front();
+  ++counts_.incomplete_sets;
+  for (size_t i = 0; i < num_cameras_; ++i) {
+    if (!oldest.present[i]) {
+      ++counts_.missing_per_camera[i];
+    }
+  }
+  last_closed_ = oldest.frame.stamp;
+  if (options_.keep_incomplete) {
+    incomplete_.push_back(std::make_shared<const MultiFrame>(std::move(oldest.frame)));
+  }
+  pending_.pop_front();
+}
+
+void MultiFrameSynchronizer::giveUpUntil(Timestamp stamp) {
+  while (!pending_.empty() && pending_.front().frame.stamp <= stamp) {
+    giveUpOldest();
+  }
+}
+
+std::vector<std::shared_ptr<const MultiFrame>> MultiFrameSynchronizer::takeIncomplete() {
+  return std::exchange(incomplete_, {});
+}
+
+std::shared_ptr<const MultiFrame> MultiFrameSynchronizer::add(size_t camera_index, Timestamp stamp,
+                                                              const Image& image) {
+  check(camera_index < num_cameras_, "MultiFrameSynchronizer::add: camera index out of range");
+  if (newest_ && toSeconds(*newest_ - stamp) >= options_.reset_backwards_s) {
+    while (!pending_.empty()) {
+      giveUpOldest();
+    }
+    last_closed_.reset();
+    newest_.reset();
+    ++counts_.resets;
+  }
+  newest_ = newest_ ? std::max(*newest_, stamp) : stamp;
+  if (last_closed_ && stamp <= *last_closed_ + tolerance_) {
+    ++counts_.late_images;
+    return nullptr;
+  }
+
+  // The pending set nearest in time, or a new one in its place. A set's distance is to its farthest image, so
+  // that no set spans more than the tolerance.
+  const auto distance = [&](const PendingSet& set) {
+    return std::max(std::chrono::abs(set.frame.stamp - stamp), std::chrono::abs(set.latest - stamp));
+  };
+  auto set = std::min_element(
+      pending_.begin(), pending_.end(),
+      [&](const PendingSet& left, const PendingSet& right) { return distance(left) < distance(right); });
+  if (set == pending_.end() || distance(*set) > tolerance_) {
+    const auto position = std::find_if(pending_.begin(), pending_.end(),
+                                       [&](const PendingSet& other) { return stamp < other.frame.stamp; });
+    set = pending_.insert(position, PendingSet());
+    set->frame.stamp = stamp;
+    set->latest = stamp;
+    set->frame.images.resize(num_cameras_);
+    set->present.assign(num_cameras_, false);
+  }
+  if (set->present[camera_index]) {
+    ++counts_.duplicate_images;
+    return nullptr;
+  }
+  set->present[camera_index] = true;
+  set->frame.images[camera_index] = image;
+  set->frame.stamp = std::min(set->frame.stamp, stamp);
+  set->latest = std::max(set->latest, stamp);
+  ++set->num_present;
+
+  if (set->num_present == num_cameras_) {
+    auto complete = std::make_shared<MultiFrame>(std::move(set->frame));
+    const auto num_overtaken = set - pending_.begin();
+    set->frame.stamp = complete->stamp;
+    for (auto i = 0; i < num_overtaken; ++i) {
+      giveUpOldest();
+    }
+    pending_.pop_front();
+    last_closed_ = complete->stamp;
+    ++counts_.complete_sets;
+    return complete;
+  }
+  if (pending_.size() > static_cast<size_t>(options_.max_pending_sets)) {
+    giveUpOldest();
+  }
+  return nullptr;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,112 @@
+#include "vcharge_core/motion/vehicle_odometry.h"
+
+#include <algorithm>
+
+#include "vcharge_core/base/options.h"
+
+namespace vcharge {
+
+void OdometryBufferOptions::validate() const {
+  requireField(max_gap_s > 0.0, "max_gap_s", "must be positive", max_gap_s);
+  requireField(history_s > 0.0, "history_s", "must be positive", history_s);
+  requireField(reset_backwards_s > 0.0, "reset_backwards_s", "must be positive", reset_backwards_s);
+}
+
+OdometryBuffer::OdometryBuffer(const OdometryBufferOptions& options) : options_(options) {
+  options_.validate();
+}
+
+OdometryBuffer::AddResult OdometryBuffer::add(const VehicleOdometry& odometry) {
+  AddResult result = AddResult::kAdded;
+  if (!entries_.empty()) {
+    const Timestamp newest = entries_.back().stamp;
+    if (odometry.stamp <= newest) {
+      if (toSeconds(newest - odometry.stamp) >= options_.reset_backwards_s) {
+        entries_.clear();
+        ++counts_.resets;
+        result = AddResult::kReset;
+      } else {
+        const auto entry =
+            std::lower_bound(entries_.begin(), entries_.end(), odometry.stamp,
+                             [](const VehicleOdometry& left, Timestamp stamp) { return left.stamp < stamp; });
+        const bool duplicate = entry != entries_.end() && entry->stamp == odometry.stamp;
+        ++(duplicate ? counts_.duplicates : counts_.out_of_order);
+        return duplicate ? AddResult::kDuplicate : AddResult::kOutOfOrder;
+      }
+    } else if (toSeconds(odometry.stamp - newest) > options_.max_gap_s) {
+      ++counts_.gaps;
+      result = AddResult::kAddedAfterGap;
+    }
+  }
+  entries_.push_back(odometry);
+  ++counts_.added;
+  while (toSeconds(odometry.stamp - entries_.front().stamp) > options_.history_s) {
+    entries_.pop_front();
+  }
+  return result;
+}
+
+OdometryBuffer::Lookup OdometryBuffer::lookup(Timestamp stamp) const {
+  Lookup result;
+  if (entries_.empty()) {
+    result.status = LookupStatus::kEmpty;
+    return result;
+  }
+  const auto after =
+      std::lower_bound(entries_.begin(), entries_.end(), stamp,
+                       [](const VehicleOdometry& left, Timestamp right) { return left.stamp < right; });
+  if (after == entries_.end()) {
+    result.status = LookupStatus::kAfterLast;
+    return result;
+  }
+  if (after->stamp == stamp) {
+    result.status = LookupStatus::kOk;
+    result.odometry = *after;
+    return result;
+  }
+  if (after == entries_.begin()) {
+    result.status = LookupStatus::kBeforeFirst;
+    return result;
+  }
+  const VehicleOdometry& before = *(after - 1);
+  const double interval_s = toSeconds(after->stamp - before.stamp);
+  if (interval_s > options_.max_gap_s) {
+    result.status = LookupStatus::kInGap;
+    return result;
+  }
+  const double fraction = toSeconds(stamp - before.stamp) / interval_s;
+  result.status = LookupStatus::kOk;
+  result.odometry.stamp = stamp;
+  result.odometry.odom_from_vehicle =
+      interpolate(before.odom_from_vehicle, after->odom_from_vehicle, fraction);
+  result.odometry.forward_speed_m_per_s =
+      (1.0 - fraction) * before.forward_speed_m_per_s + fraction * after->forward_speed_m_per_s;
+  result.odometry.yaw_rate_rad_per_s =
+      (1.0 - fraction) * before.yaw_rate_rad_per_s + fraction * after->yaw_rate_rad_per_s;
+  return result;
+}
+
+std::optional<Timestamp> OdometryBuffer::newestStamp() const {
+  if (entries_.empty()) {
+    return std::nullopt;
+  }
+  return entries_.back().stamp;
+}
+
+std::string describe(OdometryBuffer::LookupStatus status) {
+  switch (status) {
+    case OdometryBuffer::LookupStatus::kOk:
+      return "ok";
+    case OdometryBuffer::LookupStatus::kEmpty:
+      return "no odometry yet";
+    case OdometryBuffer::LookupStatus::kBeforeFirst:
+      return "before the first odometry";
+    case OdometryBuffer::LookupStatus::kAfterLast:
+      return "after the last odometry";
+    case OdometryBuffer::LookupStatus::kInGap:
+      return "inside a gap of the odometry";
+  }
+  return "unknown";
+}
+
+}  // namespace vcharge

@@ -1,0 +1,320 @@
+#include "vcharge_evaluation/height_map_errors.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "vcharge_core/base/error.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kKerb_m = 0.12;
+
+/// Ground with a platform of a kerb's height from x = 3 to 4 m, and a wall of 2 m from y = 2.5 m on.
+HeightMap world(double cell_size_m) {
+  HeightMap map;
+  map.frame_id = "world";
+  map.cell_size_m = cell_size_m;
+  map.origin_m = {-2.0 + 0.5 * cell_size_m, -3.0 + 0.5 * cell_size_m};
+  map.height_m.create(static_cast<int>(std::lround(6.0 / cell_size_m)),
+                      static_cast<int>(std::lround(10.0 / cell_size_m)), CV_32FC1);
+  for (int row = 0; row < map.height_m.rows; ++row) {
+    for (int column = 0; column < map.height_m.cols; ++column) {
+      const Eigen::Vector2d place = map.centreOf(column, row);
+      const bool on_platform = place.x() > 3.0 && place.x() < 4.0;
+      map.height_m.at<float>(row, column) = static_cast<float>(place.y() > 2.5 ? 2.0
+                                                               : on_platform   ? kKerb_m
+                                                                               : 0.0);
+    }
+  }
+  return map;
+}
+
+class HeightMapErrorsTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    for (const double yaw : {0.0, 1.57, -1.57}) {
+      rig_.cameras.push_back(
+          {"camera" + std::to_string(rig_.cameras.size()), "optical", cv::Size(200, 150),
+           MeiCamera(1.1, 120.0, 120.0, 99.5, 74.5), 3.1, "", cv::Mat(),
+           RigidTransform(rotationFromYawPitchRoll(yaw, 0.4, 0.0) * Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5),
+                          Eigen::Vector3d(0.0, 0.0, 1.0)),
+           std::nullopt});
+    }
+    for (int i = 0; i < 12; ++i) {
+      poses_.push_back(
+          {Timestamp::fromNanoseconds(1000 + i), RigidTransform::planar(0.4 * i - 1.0, 0.0, 0.0)});
+    }
+  }
+  HeightMapErrors evaluate(const HeightMap& map,
+                           const RigidTransform& world_from_map = RigidTransform()) const {
+    return evaluateHeightMap(map, world_from_map, world(0.025), poses_, rig_, everything_rigid_);
+  }
+
+  CameraRig rig_;
+  Trajectory poses_;
+  const IsRigid everything_rigid_ = rigidBy({});
+};
+
+TEST_F(HeightMapErrorsTest, ThereAreNoneOfThePerfectMap) {
+  const HeightMapErrors errors = evaluate(world(0.05));
+  EXPECT_GT(errors.num_seen, 10000U);
+  EXPECT_EQ(errors.num_mapped, errors.num_seen);
+  EXPECT_LT(errors.height_m.max, 1e-5);
+  EXPECT_GT(errors.num_steps_found, 80U);
+  EXPECT_EQ(errors.num_steps_found, errors.num_steps_mapped);
+  EXPECT_LT(errors.step_position_m.max, 0.026);  // half a cell
+  EXPECT_GT(errors.kerbs.size(), 50U);
+  EXPECT_EQ(errors.kerbs.size(), errors.num_kerbs_seen);
+  EXPECT_LT(errors.kerb_height_m.max, 1e-5);
+  EXPECT_EQ(errors.measurements.size(), 20U);
+  EXPECT_EQ(errors.num_measurements_missing, 0U);
+  EXPECT_LT(errors.max_measurement_m, 0.051);
+}
+
+TEST_F(HeightMapErrorsTest, TellsAMapThatIsTooHigh) {
+  HeightMap map = world(0.05);
+  map.height_m += 0.07F;
+  const HeightMapErrors errors = evaluate(map);
+  EXPECT_NEAR(errors.height_m.mean, 0.07, 1e-5);
+  EXPECT_NEAR(errors.mean_signed_m, 0.07, 1e-5);
+  EXPECT_EQ(errors.share_within_10_cm, 1.0);
+  EXPECT_LT(errors.kerb_height_m.max, 1e-5);  // heights of steps stay
+}
+
+TEST_F(HeightMapErrorsTest, TellsStepsThatAreAside) {
+  HeightMap map = world(0.05);
+  map.origin_m.x() += 0.1;
+  const HeightMapErrors errors = evaluate(map);
+  double kerbs = 0.0;
+  for (const TapeMeasurement& measurement : errors.measurements) {
+    kerbs += measurement.kind == TapeMeasurement::Kind::kLength ? 1.0 : 0.0;
+  }
+  EXPECT_GT(kerbs, 0.0);
+  EXPECT_NEAR(errors.step_position_m.max, 0.1, 0.026);
+  EXPECT_GT(errors.step_position_m.mean, 0.03);  // of all, the wall's lie right
+}
+
+TEST_F(HeightMapErrorsTest, EdgesAreWhereTheGroundEndsNotWhatIsMappedBehindAGap) {
+  // The platform's outermost cells have no height, nor has its middle: what lies between has its own ends.
+  HeightMap map = world(0.05);
+  for (int row = 0; row < map.height_m.rows; ++row) {
+    for (int column = 0; column < map.height_m.cols; ++column) {
+      const double inside_m = 0.5 - std::abs(map.centreOf(column, row).x() - 3.5);
+      if (inside_m > 0.0 && (inside_m < 0.05 || inside_m > 0.35)) {
+        map.height_m.at<float>(row, column) = std::numeric_limits<float>::quiet_NaN();
+      }
+    }
+  }
+  int num_lengths = 0;
+  for (const TapeMeasurement& measurement : evaluate(map).measurements) {
+    if (measurement.kind == TapeMeasurement::Kind::kLength) {
+      EXPECT_NEAR(measurement.map_m, measurement.truth_m, 0.051);
+      ++num_lengths;
+    }
+  }
+  EXPECT_GT(num_lengths, 0);
+}
+
+TEST_F(HeightMapErrorsTest, HighEdgesAreNotReadBeforeTheCellThatRises) {
+  // A pillar whose faces lie wherever they may in the map's cells, of which the truth's are a fifth.
+  for (const double offset_m : {0.0, 0.01, 0.02, 0.03, 0.04}) {
+    const auto withPillar = [&](double cell_size_m) {
+      HeightMap map = world(cell_size_m);
+      for (int row = 0; row < map.height_m.rows; ++row) {
+        for (int column = 0; column < map.height_m.cols; ++column) {
+          const Eigen::Vector2d place = map.centreOf(column, row);
+          if (std::abs(place.x() - 1.0 - offset_m) < 0.2 && std::abs(place.y() + 1.4) < 0.2) {
+            map.height_m.at<float>(row, column) = 2.0F;
+          }
+        }
+      }
+      return map;
+    };
+    const HeightMapErrors errors = evaluateHeightMap(withPillar(0.05), RigidTransform(), withPillar(0.01),
+                                                     poses_, rig_, everything_rigid_);
+    EXPECT_LT(errors.step_position_m.max, 0.036) << offset_m;  // half a cell, and a sample
+    EXPECT_GT(errors.step_position_m.count, 50U);
+  }
+}
+
+TEST_F(HeightMapErrorsTest, TellsWhetherThePlannerSeesTheWall) {
+  const HeightMapErrors perfect = evaluate(world(0.05));
+  EXPECT_GT(perfect.drivability.num_faces, 50U);
+  EXPECT_EQ(perfect.drivability.num_faces_blocked, perfect.drivability.num_faces);
+  EXPECT_EQ(perfect.drivability.num_solid, 0U);
+  // The wall has no height: unobserved, until its face is solid. (Nor has the map the platform beside it.)
+  HeightMap map = world(0.05);
+  const cv::Mat is_wall = map.height_m > 1.0F;
+  map.height_m.setTo(0.0F);
+  map.height_m.setTo(std::numeric_limits<float>::quiet_NaN(), is_wall);
+  HeightMapErrors errors = evaluate(map);
+  EXPECT_EQ(errors.drivability.num_faces, perfect.drivability.num_faces);
+  EXPECT_EQ(errors.drivability.num_faces_blocked, 0U);
+  EXPECT_EQ(errors.drivability.open_faces.size(), 0U);
+  map.solid = is_wall.clone();
+  map.solid.at<uint8_t>(20, 20) = 1;  // open ground
+  map.height_m.at<float>(20, 20) = std::numeric_limits<float>::quiet_NaN();
+  errors = evaluate(map);
+  EXPECT_EQ(errors.drivability.num_faces_blocked, perfect.drivability.num_faces);
+  EXPECT_EQ(errors.drivability.num_solid, static_cast<size_t>(cv::countNonZero(is_wall)) + 1);
+  EXPECT_EQ(errors.drivability.num_solid_on_ground, 1U);
+  // A map that shows ground in the wall's place would be driven through.
+  map.solid = cv::Mat();
+  map.height_m.setTo(0.0F);
+  EXPECT_EQ(evaluate(map).drivability.open_faces.size(), perfect.drivability.num_faces);
+}
+
+TEST_F(HeightMapErrorsTest, LaysAMapOfAnotherFrameOverTheTruth) {
+  // The map's frame is turned by 180 degrees, which keeps its cells on the grid, and lies elsewhere.
+  const RigidTransform world_from_map(rotationFromYawPitchRoll(M_PI, 0.0, 0.0),
+                                      Eigen::Vector3d(7.0, 1.0, 0.3));
+  HeightMap map = world(0.05);
+  cv::flip(map.height_m, map.height_m, -1);
+  map.height_m -= 0.3F;
+  const HeightMap upright = world(0.05);
+  const Eigen::Vector2d last = upright.centreOf(upright.height_m.cols - 1, upright.height_m.rows - 1);
+  map.origin_m = (world_from_map.inverse() * Eigen::Vector3d(last.x(), last.y(), 0.0)).head<2>();
+  Trajectory in_map = poses_;
+  for (StampedTransform& pose : in_map) {
+    pose.world_from_vehicle = world_from_map.inverse() * pose.world_from_vehicle;
+  }
+  const RigidTransform aligned = alignToTruth(in_map, poses_);  // from a straight drive
+  EXPECT_LT((aligned.translation() - world_from_map.translation()).norm(), 1e-6);
+  const HeightMapErrors errors = evaluate(map, aligned);
+  EXPECT_GT(errors.num_mapped, 10000U);
+  EXPECT_LT(errors.height_m.max, 1e-4);
+}
+
+TEST_F(HeightMapErrorsTest, UnmappedCellsAreCountedAndNotJudged) {
+  HeightMap map = world(0.05);
+  map.height_m.colRange(0, 100).setTo(std::numeric_limits<float>::quiet_NaN());
+  const HeightMapErrors errors = evaluate(map);
+  EXPECT_LT(errors.num_mapped, errors.num_seen);
+  EXPECT_GT(errors.num_mapped, 1000U);
+  EXPECT_LT(errors.height_m.max, 1e-5);
+  EXPECT_LT(errors.num_steps_mapped, errors.num_steps);
+}
+
+TEST_F(HeightMapErrorsTest, TellsHowFarTheKerbsWereSeen) {
+  const HeightMapErrors errors = evaluate(world(0.05));
+  for (const KerbError& kerb : errors.kerbs) {
+    // The path runs along y = 0 from x = -1 to 3.4 m, 1 m up; each camera looks down on all sides of it.
+    const double beside = std::hypot(kerb.place_m.y(), 1.0 - kKerb_m);
+    EXPECT_GT(kerb.nearest_view_m, beside - 1e-6);
+    EXPECT_LT(kerb.nearest_view_m, beside + 1.5);
+  }
+}
+
+TEST_F(HeightMapErrorsTest, TapeMeasurementsAreTheSameWhateverTheMapShows) {
+  const HeightMapErrors perfect = evaluate(world(0.05));
+  HeightMap map = world(0.05);
+  map.height_m.colRange(50, 120).setTo(std::numeric_limits<float>::quiet_NaN());
+  const HeightMapErrors errors = evaluate(map);
+  ASSERT_EQ(errors.measurements.size(), perfect.measurements.size());
+  for (size_t i = 0; i < errors.measurements.size(); ++i) {
+    EXPECT_EQ(errors.measurements[i].from_m, perfect.measurements[i].from_m);
+    EXPECT_EQ(errors.measurements[i].to_m, perfect.measurements[i].to_m);
+  }
+  EXPECT_GT(errors.num_measurements_missing, 5U);
+  EXPECT_LT(errors.max_measurement_m, 0.051);
+}
+
+TEST_F(HeightMapErrorsTest, NoTapeIsHeldToPlantsOrToGrassOnAnIsland) {
+  const auto rectangle = [](double x0, double y0, double x1, double y1) {
+    return std::vector<Eigen::Vector2d>{{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}};
+  };
+  const IsRigid is_rigid = rigidBy({{"kerb", rectangle(0, 0, 4, 4), 0.0, kKerb_m},
+                                    {"car", rectangle(10, 0, 14, 2), 0.0, 1.4},
+                                    {"hedge", rectangle(1, 3, 3, 3.5), kKerb_m, 1.0},
+                                    {"tree", rectangle(12, 5, 12.2, 5.2), 0.0, 1.8}});
+  EXPECT_TRUE(is_rigid({0.05, 1.0}, kKerb_m + 0.01));
+  EXPECT_FALSE(is_rigid({2.0, 1.0}, 0.25));  // grass
+  EXPECT_FALSE(is_rigid({2.0, 3.2}, 1.0));
+  EXPECT_FALSE(is_rigid({0.8, 3.2}, kKerb_m));  // leaves hang over
+  EXPECT_TRUE(is_rigid({10.05, 1.0}, 0.9));
+  EXPECT_TRUE(is_rigid({20.0, 1.0}, 2.0));   // a wall
+  EXPECT_FALSE(is_rigid({14.0, 6.0}, 2.5));  // a crown, of which the scene lists the stem alone
+  EXPECT_TRUE(is_rigid({14.0, 6.0}, 0.2));   // below it
+  EXPECT_TRUE(is_rigid({12.0, 1.95}, 1.4));  // the car under it
+  EXPECT_TRUE(is_rigid({16.0, 6.0}, 2.5));   // beside it
+
+  // Of the platform, half is a hedge's.
+  const HeightMapErrors errors =
+      evaluateHeightMap(world(0.05), RigidTransform(), world(0.025), poses_, rig_,
+                        rigidBy({{"hedge", rectangle(3, 0, 4, 2.4), 0.0, kKerb_m}}));
+  EXPECT_GT(errors.measurements.size(), 8U);  // in half the place there is no room for 20
+  for (const TapeMeasurement& measurement : errors.measurements) {
+    EXPECT_TRUE(measurement.from_m.y() < 0.0 || measurement.from_m.y() > 2.3)
+        << measurement.from_m.transpose();
+  }
+}
+
+TEST_F(HeightMapErrorsTest, NoTapeIsHeldToTheBackOfAThingThatNobodySees) {
+  // A pillar beside the path, which runs along y = 0: the cameras see the ground behind it aslant, and its
+  // back never.
+  HeightMap truth = world(0.025);
+  for (int row = 0; row < truth.height_m.rows; ++row) {
+    for (int column = 0; column < truth.height_m.cols; ++column) {
+      const Eigen::Vector2d place = truth.centreOf(column, row);
+      if (std::abs(place.x() - 1.0) < 0.2 && std::abs(place.y() + 1.4) < 0.2) {
+        truth.height_m.at<float>(row, column) = 2.0F;
+      }
+    }
+  }
+  HeightMapErrorOptions options;
+  options.num_measurements = 60;
+  const HeightMapErrors errors =
+      evaluateHeightMap(truth, RigidTransform(), truth, poses_, rig_, everything_rigid_, options);
+  const auto isAt = [](const Eigen::Vector2d& place, double y) {
+    return std::abs(place.x() - 1.0) < 0.2 && std::abs(place.y() - y) < 0.03;
+  };
+  size_t at_front = 0;
+  for (const TapeMeasurement& measurement : errors.measurements) {
+    EXPECT_FALSE(isAt(measurement.from_m, -1.6) || isAt(measurement.to_m, -1.6))
+        << measurement.from_m.transpose() << " to " << measurement.to_m.transpose();
+    at_front += isAt(measurement.from_m, -1.2) || isAt(measurement.to_m, -1.2) ? 1 : 0;
+  }
+  EXPECT_GT(at_front, 0U);
+}
+
+TEST_F(HeightMapErrorsTest, AWallIsWhereTheMapEnds) {
+  HeightMap map = world(0.05);
+  for (int row = 0; row < map.height_m.rows; ++row) {
+    if (map.centreOf(0, row).y() > 2.5) {
+      map.height_m.row(row).setTo(std::numeric_limits<float>::quiet_NaN());
+    }
+  }
+  // Of the lengths between the platform and the wall, the wall's end.
+  HeightMapErrorOptions options;
+  options.num_measurements = 60;
+  const HeightMapErrors errors =
+      evaluateHeightMap(map, RigidTransform(), world(0.025), poses_, rig_, everything_rigid_, options);
+  EXPECT_LT(errors.max_measurement_m, 0.051);
+  EXPECT_EQ(errors.num_measurements_missing, 0U);
+}
+
+TEST_F(HeightMapErrorsTest, NobodySeesBehindTheWall) {
+  HeightMap map = world(0.05);
+  const HeightMapErrors errors = evaluate(map);
+  for (int row = 0; row < map.height_m.rows; ++row) {
+    for (int column = 0; column < map.height_m.cols; ++column) {
+      if (map.centreOf(column, row).y() > 2.6) {
+        ASSERT_TRUE(std::isnan(errors.error_m.at<float>(row, column)));
+      }
+    }
+  }
+}
+
+TEST_F(HeightMapErrorsTest, RefusesTrajectoriesThatShareNoTime) {
+  Trajectory other = poses_;
+  for (StampedTransform& pose : other) {
+    pose.stamp = Timestamp::fromNanoseconds(pose.stamp.nanoseconds() + 5000000000);
+  }
+  EXPECT_THROW(alignToTruth(other, poses_), InputError);
+}
+
+}  // namespace
+}  // namespace vcharge

@@ -1,0 +1,132 @@
+#include "vcharge_evaluation/obstacle_scan_errors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "vcharge_core/base/options.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kNear_m = 2.0;
+
+/// What the points in one sector say.
+struct SectorTruth {
+  double range_m = std::numeric_limits<double>::infinity();         // nearest obstacle
+  double judged_range_m = std::numeric_limits<double>::infinity();  // nearest that is high enough
+  double from_travel_rad = 0.0;
+};
+
+std::vector<SectorTruth> collectTruth(const ObstacleScan& scan, const std::vector<SeenPoint>& points,
+                                      const RigidTransform& world_from_vehicle,
+                                      const ObstacleScanEvaluationOptions& options) {
+  const double yaw_rad = yawOfRotation(world_from_vehicle.rotation());
+  const RigidTransform level = RigidTransform::planar(world_from_vehicle.translation().x(),
+                                                      world_from_vehicle.translation().y(), yaw_rad);
+  const Eigen::Vector2f origin =
+      (level * Eigen::Vector3d(scan.origin_m.x(), scan.origin_m.y(), 0.0)).head<2>().cast<float>();
+  std::vector<SectorTruth> truth(scan.size());
+  for (const SeenPoint& point : points) {
+    const double height_m = point.world_m.z();
+    if (height_m < options.min_height_m || height_m > options.max_height_m) {
+      continue;
+    }
+    const Eigen::Vector2f offset = point.world_m.head<2>() - origin;
+    const double range_m = offset.norm();
+    const double angle_rad =
+        std::remainder(std::atan2(offset.y(), offset.x()) - yaw_rad - scan.angle_min_rad, 2.0 * M_PI);
+    const auto count = static_cast<int64_t>(scan.size());
+    const int64_t ray = (std::lround(angle_rad / scan.angle_increment_rad) % count + count) % count;
+    SectorTruth& sector = truth[static_cast<size_t>(ray)];
+    if (range_m < sector.range_m) {
+      sector.range_m = range_m;
+      sector.from_travel_rad = point.from_travel_rad;
+    }
+    if (height_m >= options.judged_height_m) {
+      sector.judged_range_m = std::min(sector.judged_range_m, range_m);
+    }
+  }
+  return truth;
+}
+
+}  // namespace
+
+void ObstacleScanEvaluationOptions::validate() const {
+  requireField(min_height_m > 0.0, "min_height_m", "must be positive", min_height_m);
+  requireField(judged_height_m >= min_height_m, "judged_height_m", "must not be below min_height_m",
+               judged_height_m);
+  requireField(max_height_m > judged_height_m, "max_height_m", "must be above judged_height_m", max_height_m);
+  requireField(rise_depth_m >= 0.0, "rise_depth_m", "must not be negative", rise_depth_m);
+  requireField(max_range_m > min_range_m, "max_range_m", "must be above min_range_m", max_range_m);
+  requireField(gate_m > 0.0, "gate_m", "must be positive", gate_m);
+}
+
+ObstacleScanEvaluator::ObstacleScanEvaluator(const ObstacleScanEvaluationOptions& options)
+    : options_(options) {
+  options_.validate();
+}
+
+void ObstacleScanEvaluator::addRay(double reported_m, double sigma_m, double truth_m, double nearest_truth_m,
+                                   double gate_m, Rays* rays) {
+  ++rays->judged;
+  const double error_m = reported_m - nearest_truth_m;
+  if (!(error_m <= gate_m)) {  // also where nothing is reported
+    ++rays->missed;
+  } else if (error_m < -gate_m) {
+    ++rays->nearer;
+  } else {
+    rays->errors_m.push_back(std::abs(error_m));
+    rays->own_errors_m.push_back(std::abs(reported_m - truth_m));
+    rays->sigmas.push_back(std::abs(error_m) / sigma_m);
+    rays->signed_sum_m += error_m;
+  }
+}
+
+void ObstacleScanEvaluator::add(const ObstacleScan& scan, const std::vector<SeenPoint>& points,
+                                const RigidTransform& world_from_vehicle) {
+  const std::vector<SectorTruth> truth = collectTruth(scan, points, world_from_vehicle, options_);
+  for (size_t i = 0; i < scan.size(); ++i) {
+    const double truth_m = truth[i].range_m;
+    if (!(truth_m >= options_.min_range_m && truth_m <= options_.max_range_m) ||
+        truth[i].judged_range_m > truth_m + options_.rise_depth_m) {
+      continue;
+    }
+    const double reported_m = scan.range_m[i];
+    double nearest_m = truth_m;
+    for (const size_t beside : {(i + 1) % scan.size(), (i + scan.size() - 1) % scan.size()}) {
+      if (std::abs(truth[beside].range_m - reported_m) < std::abs(nearest_m - reported_m)) {
+        nearest_m = truth[beside].range_m;
+      }
+    }
+    const bool is_aside = truth[i].from_travel_rad >= options_.min_angle_from_travel_rad;
+    addRay(reported_m, scan.range_sigma_m[i], truth_m, nearest_m, options_.gate_m,
+           is_aside ? &aside_ : &ahead_);
+    if (!is_aside && truth_m < kNear_m) {
+      addRay(reported_m, scan.range_sigma_m[i], truth_m, nearest_m, options_.gate_m, &ahead_near_);
+    }
+  }
+}
+
+RayErrors ObstacleScanEvaluator::summarizeRays(const Rays& rays) {
+  RayErrors errors;
+  errors.num_judged = rays.judged;
+  errors.num_missed = rays.missed;
+  errors.num_nearer = rays.nearer;
+  errors.error_m = summarize(rays.errors_m);
+  errors.error_own_ray_m = summarize(rays.own_errors_m);
+  if (!rays.errors_m.empty()) {
+    const auto count = static_cast<double>(rays.errors_m.size());
+    errors.mean_signed_m = rays.signed_sum_m / count;
+    const auto within = [&](double sigmas) {
+      return static_cast<double>(std::count_if(rays.sigmas.begin(), rays.sigmas.end(),
+                                               [&](double value) { return value <= sigmas; })) /
+             count;
+    };
+    errors.share_within_one_sigma = within(1.0);
+    errors.share_within_two_sigma = within(2.0);
+  }
+  return errors;
+}
+
+}  // namespace vcharge

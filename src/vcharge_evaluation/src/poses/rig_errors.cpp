@@ -1,0 +1,56 @@
+#include "vcharge_evaluation/rig_errors.h"
+
+#include <cmath>
+#include <utility>
+
+#include "vcharge_core/base/error.h"
+
+namespace vcharge {
+namespace {
+
+const RigidTransform& placeOf(const CameraRig& rig, const std::string& name, const char* which) {
+  const int index = rig.findCamera(name);
+  if (index < 0) {
+    throw InputError(std::string(which) + ": expected a camera '" + name + "'");
+  }
+  if (!rig.cameras[index].vehicle_from_camera) {
+    throw InputError(std::string(which) + ": cameras." + name + ": expected vehicle_from_camera");
+  }
+  return *rig.cameras[index].vehicle_from_camera;
+}
+
+}  // namespace
+
+RigErrors evaluateRig(const CameraRig& estimate, const CameraRig& truth) {
+  RigErrors result;
+  double product = 0.0, square = 0.0;
+  for (const RigCamera& camera : truth.cameras) {
+    const Eigen::Vector3d& estimated = placeOf(estimate, camera.name, "estimate").translation();
+    product += estimated.dot(placeOf(truth, camera.name, "truth").translation());
+    square += estimated.squaredNorm();
+  }
+  if (square > 0.0) {
+    result.scale = product / square;
+  }
+  const auto errorsAt = [&](double scale) {
+    std::vector<CameraErrors> errors;
+    for (const RigCamera& camera : truth.cameras) {
+      const RigidTransform& estimated = placeOf(estimate, camera.name, "estimate");
+      CameraErrors of_camera;
+      of_camera.name = camera.name;
+      of_camera.error << camera.vehicle_from_camera->translation() - scale * estimated.translation(),
+          vectorFromRotation(camera.vehicle_from_camera->rotation() * estimated.rotation().conjugate());
+      const auto& covariance = estimate.cameras[estimate.findCamera(camera.name)].covariance;
+      if (covariance) {
+        of_camera.normalized = of_camera.error.cwiseQuotient(covariance->diagonal().cwiseSqrt());
+      }
+      errors.push_back(of_camera);
+    }
+    return errors;
+  };
+  result.as_is = errorsAt(1.0);
+  result.without_scale = errorsAt(result.scale);
+  return result;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,63 @@
+#include <cmath>
+#include <cstdio>
+
+#include <nlohmann/json.hpp>
+
+#include "vcharge_core/base/command_line.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/files/file_io.h"
+#include "vcharge_evaluation/rig_errors.h"
+
+namespace {
+
+constexpr double kDegrees = 57.29577951308232;
+
+nlohmann::json print(const char* title, const std::vector<vcharge::CameraErrors>& errors) {
+  std::printf("%s\n  %-10s %8s %8s %8s %8s   %8s %8s %8s %8s   %s\n", title, "camera", "x (cm)", "y", "z",
+              "total", "x (deg)", "y", "z", "total", "in standard deviations");
+  nlohmann::json json = nlohmann::json::array();
+  for (const vcharge::CameraErrors& camera : errors) {
+    const Eigen::Vector3d shift_cm = 100.0 * camera.error.head<3>();
+    const Eigen::Vector3d turn_deg = kDegrees * camera.error.tail<3>();
+    std::printf("  %-10s %8.2f %8.2f %8.2f %8.2f   %8.3f %8.3f %8.3f %8.3f  ", camera.name.c_str(),
+                shift_cm.x(), shift_cm.y(), shift_cm.z(), shift_cm.norm(), turn_deg.x(), turn_deg.y(),
+                turn_deg.z(), turn_deg.norm());
+    nlohmann::json of_camera = {{"camera", camera.name},
+                                {"error_m", {camera.error[0], camera.error[1], camera.error[2]}},
+                                {"error_rad", {camera.error[3], camera.error[4], camera.error[5]}}};
+    if (camera.normalized) {
+      of_camera["normalized"] = nlohmann::json::array();
+      for (const double value : *camera.normalized) {
+        std::printf(" %5.1f", value);
+        of_camera["normalized"].push_back(value);
+      }
+    }
+    std::printf("\n");
+    json.push_back(of_camera);
+  }
+  return json;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Errors of a rig's extrinsics against the truth, per camera and degree of freedom (axes of the "
+      "vehicle), "
+      "as they are and without the common scale, which a calibration from a drive takes from the odometer.");
+  std::string estimate, truth, json_path;
+  app.add_option("--estimate", estimate, "rig.yaml to judge")->required();
+  app.add_option("--truth", truth, "true rig.yaml")->required();
+  app.add_option("--json", json_path, "file for the same figures as JSON")->check(vcharge::requireNotEmpty);
+  return vcharge::runTool(&app, argc, argv, [&] {
+    const vcharge::RigErrors errors =
+        vcharge::evaluateRig(vcharge::readCameraRig(estimate), vcharge::readCameraRig(truth));
+    nlohmann::json json = {{"kind", "rig"}, {"scale", errors.scale}};
+    json["as_is"] = print("as it is", errors.as_is);
+    std::printf("scale: x %.5f\n", errors.scale);
+    json["without_scale"] = print("without the common scale", errors.without_scale);
+    if (!json_path.empty()) {
+      vcharge::writeTextFileAtomically(json_path, json.dump(1) + "\n");
+    }
+  });
+}

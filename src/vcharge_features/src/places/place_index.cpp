@@ -1,0 +1,82 @@
+#include "vcharge_features/place_index.h"
+
+#include <algorithm>
+#include <cstddef>
+
+#include <tbb/parallel_for.h>
+
+#include "vcharge_core/base/error.h"
+
+namespace vcharge {
+
+PlaceIndex::PlaceIndex(std::shared_ptr<const VocabularyTree> vocabulary, int num_cameras)
+    : vocabulary_(std::move(vocabulary)), num_cameras_(num_cameras) {
+  check(vocabulary_ != nullptr, "PlaceIndex: needs a vocabulary");
+  check(num_cameras >= 1, "PlaceIndex: needs at least one camera");
+  postings_.resize(static_cast<size_t>(vocabulary_->numWords()));
+}
+
+int PlaceIndex::add(const std::vector<cv::Mat>& descriptors_by_camera) {
+  return addAll({descriptors_by_camera});
+}
+
+int PlaceIndex::addAll(const std::vector<std::vector<cv::Mat>>& descriptors_of_places) {
+  for (const std::vector<cv::Mat>& by_camera : descriptors_of_places) {
+    check(by_camera.size() == static_cast<size_t>(num_cameras_),
+          "PlaceIndex: one matrix of descriptors per camera");
+  }
+  const auto num_cameras = static_cast<size_t>(num_cameras_);
+  std::vector<BagOfWords> bags(descriptors_of_places.size() * num_cameras);
+  tbb::parallel_for(size_t{0}, bags.size(), [&](size_t i) {
+    bags[i] = vocabulary_->bagOfWords(descriptors_of_places[i / num_cameras][i % num_cameras]);
+  });
+  const int first_place = num_places_;
+  for (size_t i = 0; i < bags.size(); ++i) {
+    for (const WeightedWord& entry : bags[i]) {
+      postings_[entry.word].push_back({first_place * num_cameras_ + static_cast<int32_t>(i), entry.weight});
+    }
+  }
+  num_places_ += static_cast<int>(descriptors_of_places.size());
+  return first_place;
+}
+
+std::vector<PlaceMatch> PlaceIndex::query(const std::vector<cv::Mat>& descriptors_by_camera, int max_results,
+                                          int end_place) const {
+  check(descriptors_by_camera.size() == static_cast<size_t>(num_cameras_),
+        "PlaceIndex: one matrix of descriptors per camera");
+  const int num_candidates = std::clamp(end_place, 0, num_places_);
+  std::vector<PlaceMatch> matches(static_cast<size_t>(num_candidates));
+  for (int i = 0; i < num_candidates; ++i) {
+    matches[i].place = i;
+    matches[i].cameras.assign(static_cast<size_t>(num_cameras_), -1);
+  }
+  std::vector<float> common(static_cast<size_t>(num_candidates) * num_cameras_);
+  for (int camera = 0; camera < num_cameras_; ++camera) {
+    std::fill(common.begin(), common.end(), 0.0F);
+    for (const WeightedWord& entry : vocabulary_->bagOfWords(descriptors_by_camera[camera])) {
+      for (const Posting& posting : postings_[entry.word]) {
+        if (static_cast<size_t>(posting.image) >= common.size()) {
+          break;
+        }
+        common[posting.image] += std::min(entry.weight, posting.weight);
+      }
+    }
+    for (PlaceMatch& match : matches) {
+      const auto first = common.begin() + static_cast<ptrdiff_t>(match.place) * num_cameras_;
+      const auto best = std::max_element(first, first + num_cameras_);
+      if (*best > 0.0F) {
+        match.cameras[camera] = static_cast<int>(best - first);
+        match.score += *best;
+      }
+    }
+  }
+  matches.erase(std::remove_if(matches.begin(), matches.end(),
+                               [](const PlaceMatch& match) { return !(match.score > 0.0); }),
+                matches.end());
+  std::stable_sort(matches.begin(), matches.end(),
+                   [](const PlaceMatch& a, const PlaceMatch& b) { return a.score > b.score; });
+  matches.resize(std::min(matches.size(), static_cast<size_t>(std::max(max_results, 0))));
+  return matches;
+}
+
+}  // namespace vcharge

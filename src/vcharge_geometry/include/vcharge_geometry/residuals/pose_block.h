@@ -1,0 +1,27 @@
+#pragma once
+
+#include <array>
+#include <memory>
+
+#include "vcharge_core/motion/rigid_transform.h"
+
+namespace ceres {
+class Manifold;
+}
+
+namespace vcharge {
+
+/// A RigidTransform as a parameter block of Ceres: translation (m), then the quaternion's x, y, z, w.
+using PoseBlock = std::array<double, 7>;
+
+PoseBlock toPoseBlock(const RigidTransform& target_from_source);
+RigidTransform fromPoseBlock(const double* block);
+inline RigidTransform fromPoseBlock(const PoseBlock& block) {
+  return fromPoseBlock(block.data());
+}
+
+/// Manifold of a PoseBlock, with the suite's tangent [dt, dphi] in the target frame: t = t_hat + dt,
+/// R = Exp(dphi) R_hat. So ceres::Covariance in the tangent space is what rig.yaml and messages carry.
+std::unique_ptr<ceres::Manifold> makePoseManifold();
+
+}  // namespace vcharge

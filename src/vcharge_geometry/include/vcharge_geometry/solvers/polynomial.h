@@ -1,0 +1,427 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "vcharge_geometry/solvers/fixed_vector.h"
+
+namespace vcharge {
+
+/// c[0] + c[1] x + ... + c[Degree] x^Degree; read as a form in two variables (y, x) it is
+/// c[0] y^Degree + c[1] y^(Degree-1) x + ... + c[Degree] x^Degree.
+template <int Degree>
+using Polynomial = std::array<double, static_cast<size_t>(Degree) + 1>;
+
+template <size_t A, size_t B>
+std::array<double, A + B - 1> multiply(const std::array<double, A>& a, const std::array<double, B>& b) {
+  std::array<double, A + B - 1> product{};
+  for (size_t i = 0; i < A; ++i) {
+    for (size_t j = 0; j < B; ++j) {
+      product[i + j] += a[i] * b[j];
+    }
+  }
+  return product;
+}
+
+/// *sum += factor * term; the term may have a lower degree.
+template <size_t A, size_t B>
+void addScaled(const std::array<double, B>& term, double factor, std::array<double, A>* sum) {
+  static_assert(B <= A, "the sum must hold the term");
+  for (size_t i = 0; i < B; ++i) {
+    (*sum)[i] += factor * term[i];
+  }
+}
+
+template <size_t N>
+double evaluate(const std::array<double, N>& polynomial, double x) {
+  double value = polynomial[N - 1];
+  for (size_t i = N - 1; i-- > 0;) {
+    value = value * x + polynomial[i];
+  }
+  return value;
+}
+
+template <size_t N>
+void evaluateWithDerivative(const std::array<double, N>& polynomial, double x, double* value,
+                            double* derivative) {
+  double p = polynomial[N - 1];
+  double d = 0.0;
+  for (size_t i = N - 1; i-- > 0;) {
+    d = d * x + p;
+    p = p * x + polynomial[i];
+  }
+  *value = p;
+  *derivative = d;
+}
+
+template <size_t N>
+double largestMagnitude(const std::array<double, N>& polynomial) {
+  double largest = 0.0;
+  for (const double coefficient : polynomial) {
+    largest = std::max(largest, std::abs(coefficient));
+  }
+  return largest;
+}
+
+/// Finite when all coefficients are: one test instead of many.
+template <size_t N>
+bool allFinite(const std::array<double, N>& polynomial) {
+  double sum = 0.0;
+  for (const double coefficient : polynomial) {
+    sum += std::abs(coefficient);
+  }
+  return std::isfinite(sum);
+}
+
+namespace internal {
+
+/// Newton's method inside a bracket [low, high] at whose ends the polynomial's signs differ (low_value is the
+/// value at low); bisects where Newton leaves the bracket.
+template <size_t N>
+double rootInBracket(const std::array<double, N>& polynomial, double low, double high, bool low_is_negative,
+                     double guess) {
+  double x = guess;
+  for (int iteration = 0; iteration < 60; ++iteration) {
+    double value = 0.0;
+    double derivative = 0.0;
+    evaluateWithDerivative(polynomial, x, &value, &derivative);
+    if ((value < 0.0) == low_is_negative) {
+      low = x;
+    } else {
+      high = x;
+    }
+    double next = x - value / derivative;
+    // Also false for NaN, where the derivative vanishes.
+    if (!(next >= low && next <= high)) {
+      next = 0.5 * (low + high);
+    }
+    const double step = std::abs(next - x);
+    x = next;
+    // Newton converges quadratically: the next step would be below the rounding.
+    if (step <= 1e-9 * std::abs(x) || value == 0.0) {
+      evaluateWithDerivative(polynomial, x, &value, &derivative);
+      const double last = x - value / derivative;
+      return last >= low && last <= high ? last : x;
+    }
+  }
+  return x;
+}
+
+/// Where the polynomial is level, by Newton's method on its derivative.
+template <size_t N>
+double extremumFrom(const std::array<double, N>& polynomial, double x) {
+  std::array<double, N - 1> derivative;
+  for (size_t i = 1; i < N; ++i) {
+    derivative[i - 1] = static_cast<double>(i) * polynomial[i];
+  }
+  for (int iteration = 0; iteration < 6; ++iteration) {
+    double slope = 0.0;
+    double curvature = 0.0;
+    evaluateWithDerivative(derivative, x, &slope, &curvature);
+    x -= slope / curvature;
+  }
+  return x;
+}
+
+/// A stretch of the unit interval with the polynomial's Bernstein coefficients on it.
+template <size_t N>
+struct BernsteinPiece {
+  std::array<double, N> coefficients;
+  double low;
+  double width;
+  int depth;
+};
+
+template <size_t N>
+void splitInHalf(const BernsteinPiece<N>& piece, BernsteinPiece<N>* left, BernsteinPiece<N>* right) {
+  std::array<double, N> row = piece.coefficients;
+  for (size_t level = 0; level < N; ++level) {
+    left->coefficients[level] = row[0];
+    right->coefficients[N - 1 - level] = row[N - 1 - level];
+    for (size_t i = 0; i + 1 < N - level; ++i) {
+      row[i] = 0.5 * (row[i] + row[i + 1]);
+    }
+  }
+  left->low = piece.low;
+  left->width = right->width = 0.5 * piece.width;
+  right->low = piece.low + left->width;
+  left->depth = right->depth = piece.depth + 1;
+}
+
+constexpr double binomial(size_t n, size_t k) {
+  double value = 1.0;
+  for (size_t i = 0; i < k; ++i) {
+    value = value * static_cast<double>(n - i) / static_cast<double>(i + 1);
+  }
+  return value;
+}
+
+template <size_t N>
+constexpr std::array<double, N> inverseBinomials() {
+  std::array<double, N> inverse{};
+  for (size_t k = 0; k < N; ++k) {
+    inverse[k] = 1.0 / binomial(N - 1, k);
+  }
+  return inverse;
+}
+
+}  // namespace internal
+
+/// Calls visit(x) for each real root in [0, 1]. The roots are isolated by sign variations of Bernstein
+/// coefficients under bisection (Lane and Riesenfeld, "Bounds on a polynomial", BIT 1981), which needs no
+/// division and so bears vanishing leading coefficients; each is then found by Newton's method. Roots at 0, 1
+/// or at a dyadic point may be reported twice. Two roots closer than about 1e-6, or a complex pair that close
+/// to the axis, are reported as one: noise moves double roots off the real axis.
+template <size_t N, class Visitor>
+void visitRootsInUnitInterval(const std::array<double, N>& polynomial, const Visitor& visit) {
+  constexpr int kMaxDepth = 20;
+  constexpr int kDoubleRootDepth = 10;
+  static constexpr std::array<double, N> kInverseBinomials = internal::inverseBinomials<N>();
+  std::array<internal::BernsteinPiece<N>, kMaxDepth + 2> stack;
+  internal::BernsteinPiece<N>& whole = stack[0];
+  for (size_t i = 0; i < N; ++i) {
+    whole.coefficients[i] = polynomial[i] * kInverseBinomials[i];
+  }
+  for (size_t level = 1; level < N; ++level) {
+    for (size_t i = N - 1; i >= level; --i) {
+      whole.coefficients[i] += whole.coefficients[i - 1];
+    }
+  }
+  whole.low = 0.0;
+  whole.width = 1.0;
+  whole.depth = 0;
+  const double zero = 1e-15 * static_cast<double>(N) * largestMagnitude(polynomial);
+  double end_of_run = -1.0;
+  int top = 0;
+  while (top >= 0) {
+    const internal::BernsteinPiece<N> piece = stack[static_cast<size_t>(top--)];
+    const std::array<double, N>& b = piece.coefficients;
+    size_t first = 0;
+    size_t last = N - 1;
+    if (std::abs(b[0]) <= zero) {
+      visit(piece.low);
+      first = 1;
+    }
+    if (std::abs(b[N - 1]) <= zero) {
+      visit(piece.low + piece.width);
+      last = N - 2;
+    }
+    int variations = 0;
+    size_t crossing = 0;
+    for (size_t i = first; i < last; ++i) {
+      if ((b[i] < 0.0) != (b[i + 1] < 0.0)) {
+        ++variations;
+        crossing = i;
+      }
+    }
+    if (variations == 0) {
+      continue;
+    }
+    if (variations == 1 && first == 0 && last == N - 1) {
+      const double fraction = b[crossing] / (b[crossing] - b[crossing + 1]);
+      const double guess =
+          piece.low + piece.width * (static_cast<double>(crossing) + fraction) / static_cast<double>(N - 1);
+      visit(internal::rootInBracket(polynomial, piece.low, piece.low + piece.width, b[0] < 0.0, guess));
+      continue;
+    }
+    if (piece.depth >= kDoubleRootDepth) {
+      const double extremum = internal::extremumFrom(polynomial, piece.low + 0.5 * piece.width);
+      if (std::abs(extremum - piece.low - 0.5 * piece.width) <= 0.5 * piece.width) {
+        const double value = evaluate(polynomial, extremum);
+        const bool negative = b[0] < 0.0;
+        if (variations == 2 && first == 0 && last == N - 1 && (value < 0.0) != negative) {
+          visit(internal::rootInBracket(polynomial, piece.low, extremum, negative, extremum));
+          visit(internal::rootInBracket(polynomial, extremum, piece.low + piece.width, !negative, extremum));
+          continue;
+        }
+        if (std::abs(value) <= 100.0 * zero) {
+          if (piece.low - end_of_run > 4.0 * piece.width) {
+            visit(extremum);
+          }
+          end_of_run = piece.low + piece.width;
+          continue;
+        }
+      }
+    }
+    if (piece.depth == kMaxDepth) {
+      // Pieces come from left to right: a run of them is one root, blurred by rounding.
+      if (piece.low - end_of_run > 4.0 * piece.width) {
+        visit(piece.low + 0.5 * piece.width);
+      }
+      end_of_run = piece.low + piece.width;
+      continue;
+    }
+    top += 2;
+    internal::splitInHalf(piece, &stack[static_cast<size_t>(top)], &stack[static_cast<size_t>(top) - 1]);
+  }
+}
+
+/// Positive real roots, each once, in no order. Best conditioned where they are of the order of 1.
+template <size_t N>
+FixedVector<double, static_cast<int>(N) - 1> positiveRealRoots(const std::array<double, N>& polynomial) {
+  FixedVector<double, static_cast<int>(N) - 1> roots;
+  const auto add = [&roots](double root) {
+    for (const double other : roots) {
+      if (std::abs(root - other) <= 1e-12 * (root + other)) {
+        return;
+      }
+    }
+    roots.push_back(root);
+  };
+  std::array<double, N> reversed;
+  std::reverse_copy(polynomial.begin(), polynomial.end(), reversed.begin());
+  visitRootsInUnitInterval(polynomial, [&](double x) {
+    if (x > 0.0) {
+      add(x);
+    }
+  });
+  visitRootsInUnitInterval(reversed, [&](double x) {
+    if (x > 0.0) {
+      add(1.0 / x);
+    }
+  });
+  return roots;
+}
+
+/// A point of the projective line, cosine^2 + sine^2 = 1, cosine >= 0: half of a yaw angle.
+struct HalfAngle {
+  double cosine;
+  double sine;
+};
+
+namespace internal {
+
+template <int Capacity>
+void addHalfAngle(double cosine, double sine, FixedVector<HalfAngle, Capacity>* roots) {
+  const double scale = std::copysign(1.0 / std::sqrt(cosine * cosine + sine * sine), cosine);
+  const HalfAngle root{scale * cosine, scale * sine};
+  for (const HalfAngle& other : *roots) {
+    if (std::abs(root.sine * other.cosine - root.cosine * other.sine) <= 1e-12) {
+      return;
+    }
+  }
+  roots->push_back(root);
+}
+
+}  // namespace internal
+
+/// Real roots on the projective line of the form sum_i c[i] cosine^(Degree-i) sine^i, each once, in no order;
+/// so an angle of pi (cosine of half the angle 0) is a root like any other.
+template <size_t N>
+FixedVector<HalfAngle, static_cast<int>(N) - 1> halfAngleRoots(const std::array<double, N>& form) {
+  FixedVector<HalfAngle, static_cast<int>(N) - 1> roots;
+  std::array<double, N> mirrored = form;
+  for (size_t i = 1; i < N; i += 2) {
+    mirrored[i] = -mirrored[i];
+  }
+  std::array<double, N> reversed;
+  std::array<double, N> reversed_mirrored;
+  std::reverse_copy(form.begin(), form.end(), reversed.begin());
+  std::reverse_copy(mirrored.begin(), mirrored.end(), reversed_mirrored.begin());
+  visitRootsInUnitInterval(form, [&](double x) { internal::addHalfAngle(1.0, x, &roots); });
+  visitRootsInUnitInterval(mirrored, [&](double x) { internal::addHalfAngle(1.0, -x, &roots); });
+  visitRootsInUnitInterval(reversed, [&](double x) { internal::addHalfAngle(x, 1.0, &roots); });
+  visitRootsInUnitInterval(reversed_mirrored, [&](double x) { internal::addHalfAngle(x, -1.0, &roots); });
+  return roots;
+}
+
+/// Real roots of a x^2 + b x + c, without cancellation; a double root once.
+inline FixedVector<double, 2> quadraticRoots(double a, double b, double c) {
+  FixedVector<double, 2> roots;
+  const double half = -0.5 * b;
+  const double discriminant = half * half - a * c;
+  // A double root that rounding made complex is still a root.
+  if (discriminant < -1e-14 * half * half || (a == 0.0 && b == 0.0)) {
+    return roots;
+  }
+  const double q = half + std::copysign(std::sqrt(std::max(0.0, discriminant)), half);
+  if (q == 0.0) {
+    roots.push_back(0.0);
+    return roots;
+  }
+  roots.push_back(c / q);
+  if (a != 0.0 && discriminant > 0.0) {
+    roots.push_back(q / a);
+  }
+  return roots;
+}
+
+/// halfAngleRoots of a form of degree 2, in closed form.
+inline FixedVector<HalfAngle, 2> halfAngleRoots(const Polynomial<2>& form) {
+  FixedVector<HalfAngle, 2> roots;
+  const bool by_tangent = std::abs(form[2]) >= std::abs(form[0]);
+  const double a = by_tangent ? form[2] : form[0];
+  const double c = by_tangent ? form[0] : form[2];
+  if (a == 0.0) {
+    // c0 * cosine * sine
+    internal::addHalfAngle(1.0, 0.0, &roots);
+    internal::addHalfAngle(0.0, 1.0, &roots);
+    return roots;
+  }
+  for (const double x : quadraticRoots(a, form[1], c)) {
+    internal::addHalfAngle(by_tangent ? 1.0 : x, by_tangent ? x : 1.0, &roots);
+  }
+  return roots;
+}
+
+/// halfAngleRoots of a form of degree 3: the root farthest from the inflection by Newton's method from beyond
+/// it, where it converges monotonically, then a quadratic.
+inline FixedVector<HalfAngle, 3> halfAngleRoots(const Polynomial<3>& form) {
+  FixedVector<HalfAngle, 3> roots;
+  const bool by_tangent = std::abs(form[3]) >= std::abs(form[0]);
+  const auto add = [&](double x) {
+    internal::addHalfAngle(by_tangent ? 1.0 : x, by_tangent ? x : 1.0, &roots);
+  };
+  const double leading = by_tangent ? form[3] : form[0];
+  if (std::abs(leading) <= 1e-15 * std::max(std::abs(form[1]), std::abs(form[2]))) {
+    // cosine * sine * (c1 cosine + c2 sine)
+    internal::addHalfAngle(1.0, 0.0, &roots);
+    internal::addHalfAngle(0.0, 1.0, &roots);
+    internal::addHalfAngle(form[2], -form[1], &roots);
+    return roots;
+  }
+  const double inverse = 1.0 / leading;
+  const double c2 = inverse * (by_tangent ? form[2] : form[1]);
+  const double c1 = inverse * (by_tangent ? form[1] : form[2]);
+  const double c0 = inverse * (by_tangent ? form[0] : form[3]);
+  const double inflection = -c2 / 3.0;
+  const double value_there = ((inflection + c2) * inflection + c1) * inflection + c0;
+  // Distance from the inflection to where the curve is level; the outer of three real roots is at most twice
+  // as far. A single root is near the cube root of the value, or nearer where the curve is steep.
+  const double level_squared = inflection * inflection - c1 / 3.0;
+  double distance = 0.0;
+  if (value_there * value_there <= 4.0 * level_squared * level_squared * level_squared) {
+    distance = 2.0 * std::sqrt(level_squared);
+  } else if (level_squared > 0.0) {
+    distance = std::cbrt(std::abs(value_there)) + std::sqrt(level_squared);
+  } else {
+    distance = std::min(std::cbrt(std::abs(value_there)), std::abs(value_there) / (-3.0 * level_squared));
+  }
+  double x = inflection - std::copysign(distance, value_there);
+  for (int iteration = 0; iteration < 60; ++iteration) {
+    const double slope = (3.0 * x + 2.0 * c2) * x + c1;
+    const double value = ((x + c2) * x + c1) * x + c0;
+    if (slope == 0.0) {
+      break;
+    }
+    const double step = value / slope;
+    x -= step;
+    if (std::abs(step) <= 1e-9 * std::abs(x)) {
+      break;
+    }
+  }
+  const double slope = (3.0 * x + 2.0 * c2) * x + c1;
+  if (slope != 0.0) {
+    x -= (((x + c2) * x + c1) * x + c0) / slope;
+  }
+  add(x);
+  const double b = x + c2;
+  for (const double other : quadraticRoots(1.0, b, b * x + c1)) {
+    add(other);
+  }
+  return roots;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "vcharge_core/base/timestamp.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/motion/rigid_transform.h"
+#include "vcharge_features/image_features.h"
+
+namespace vcharge {
+
+/// What one camera saw at a keyframe.
+struct KeyframeImage {
+  ImageFeatures features;
+  Eigen::Matrix3Xd rays_in_camera;        ///< unit rays of the features
+  std::vector<int32_t> track_of_feature;  ///< -1: none
+};
+
+/// The vehicle at an instant that goes into the map.
+struct Keyframe {
+  Timestamp stamp;
+  RigidTransform odom_from_vehicle;   ///< as the odometer counted
+  RigidTransform map_from_vehicle;    ///< estimated
+  double travelled_m = 0.0;           ///< by the odometer, since the drive's start
+  std::vector<KeyframeImage> images;  ///< in the rig's order; without features where a camera sent no image
+};
+
+/// Where a camera saw the point of a track at a keyframe.
+struct TrackObservation {
+  int32_t keyframe = 0;
+  int32_t camera = 0;
+  int32_t feature = -1;  ///< of that image, whose descriptor describes it; -1: none
+  Eigen::Vector2d position_px = Eigen::Vector2d::Zero();
+  double sigma_px = 1.0;
+};
+
+/// A scene point seen several times.
+struct Track {
+  std::vector<TrackObservation> observations;  ///< in order of keyframes
+  std::optional<Eigen::Vector3d> position_m;   ///< in the map; absent where it was not triangulated
+  Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();
+};
+
+/// All that a map is being made of.
+struct MappingData {
+  std::shared_ptr<const CameraRig> rig;
+  std::vector<Keyframe> keyframes;
+  std::vector<Track> tracks;
+  double odometry_distance_scale = 1.0;
+  double odometry_turn_scale = 1.0;
+};
+
+}  // namespace vcharge

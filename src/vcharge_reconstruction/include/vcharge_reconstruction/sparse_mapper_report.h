@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "vcharge_reconstruction/ego_motion.h"
+#include "vcharge_reconstruction/loop_closure.h"
+
+namespace vcharge {
+
+/// Frames one after the other that were not used, or not as they should be, for one reason.
+struct SkippedFrames {
+  std::string reason;
+  Timestamp first, last;
+  int64_t num_frames = 0;
+};
+
+/// What became of a drive, in numbers.
+struct SparseMapperReport {
+  int64_t num_frames = 0;             ///< images of one stamp
+  int64_t num_incomplete_frames = 0;  ///< of these: a camera was missing
+  int64_t num_frames_without_odometry = 0;
+  int64_t num_standing_frames = 0;
+  int64_t num_odometry_resets = 0;
+  int64_t num_late_images = 0;              ///< came after their frame's turn
+  std::vector<int64_t> num_missing_images;  ///< by camera
+  std::vector<SkippedFrames> skipped;       ///< in the order of the drive
+  std::array<int64_t, 4> num_motions{};     ///< by MotionHypothesis
+  int64_t num_landmarks = 0;
+  int64_t num_observations = 0;
+  double rms_px = 0.0;
+  std::vector<LoopEdge> loop_edges;
+  std::map<std::string, double> stage_s;  ///< wall time
+};
+
+}  // namespace vcharge

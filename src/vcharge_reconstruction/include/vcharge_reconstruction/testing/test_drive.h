@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <random>
+
+#include "vcharge_reconstruction/mapping_data.h"
+
+namespace vcharge::testing {
+
+/// A front and a left fisheye camera on a car.
+std::shared_ptr<const CameraRig> makeTestRig();
+
+struct TestDriveOptions {
+  int num_keyframes = 40;
+  double step_m = 0.5;
+  double turn_rad = 0.05;       ///< per keyframe
+  double odometry_scale = 1.0;  ///< counted over true distance
+  double noise_px = 0.0;        ///< standard deviation of an observed position
+  int num_points = 600;
+  uint32_t seed = 1;
+};
+
+/// A drive along a circle among random points, with true poses, and exact (or noisy) observations of every
+/// point that a camera sees within 25 m, as tracks of consecutive keyframes with true positions.
+MappingData makeTestDrive(const TestDriveOptions& options);
+
+}  // namespace vcharge::testing

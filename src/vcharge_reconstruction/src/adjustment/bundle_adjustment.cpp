@@ -1,0 +1,210 @@
+#include "vcharge_reconstruction/bundle_adjustment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include <tbb/parallel_for.h>
+#include <Eigen/LU>
+
+#include "vcharge_core/base/error.h"
+#include "vcharge_reconstruction/triangulation.h"
+
+namespace vcharge {
+namespace {
+
+Eigen::Matrix<double, 6, 6> odometryInformation(const RigidTransform& motion,
+                                                const BundleAdjustmentOptions& options) {
+  const double distance_m = motion.translation().head<2>().norm();
+  const double sigma_m = options.odometry_sigma_m + options.odometry_distance_sigma * distance_m;
+  const double sigma_rad =
+      options.odometry_sigma_rad + options.odometry_turn_sigma * std::abs(yawOfRotation(motion.rotation()));
+  Eigen::Matrix<double, 6, 1> sigmas;
+  sigmas << sigma_m, sigma_m, options.height_sigma_m, options.tilt_sigma_rad, options.tilt_sigma_rad,
+      sigma_rad;
+  return sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
+}
+
+struct TrackCheck {
+  int64_t kept = 0, removed = 0;
+  double squares = 0.0;
+  bool was_landmark = false, is_landmark = false;
+};
+
+/// Residual of an observation over its standard deviation, and what it tells of the landmark's position.
+bool reproject(const MappingData& data, const Track& track, const TrackObservation& observation,
+               Eigen::Vector2d* error_px) {
+  const RigCamera& camera = data.rig->cameras[observation.camera];
+  const RigidTransform map_from_camera =
+      data.keyframes[observation.keyframe].map_from_vehicle * *camera.vehicle_from_camera;
+  Eigen::Vector2d pixel;
+  if (!camera.model.project(map_from_camera.inverse() * *track.position_m, &pixel)) {
+    return false;
+  }
+  *error_px = pixel - observation.position_px;
+  return true;
+}
+
+/// Of the landmark given the poses: every ray tells the position across it to its angle's deviation times
+/// range.
+Eigen::Matrix3d conditionalCovariance(const MappingData& data, const Track& track, double* max_parallax_rad) {
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  std::vector<Eigen::Vector3d> directions;
+  double min_cosine = 1.0;
+  for (const TrackObservation& observation : track.observations) {
+    const RigCamera& camera = data.rig->cameras[observation.camera];
+    const RigidTransform map_from_camera =
+        data.keyframes[observation.keyframe].map_from_vehicle * *camera.vehicle_from_camera;
+    const Eigen::Vector3d to_point = *track.position_m - map_from_camera.translation();
+    const Eigen::Vector3d direction = to_point.normalized();
+    Eigen::Vector3d ray, shifted_ray;
+    if (!camera.model.unproject(observation.position_px, &ray) ||
+        !camera.model.unproject(observation.position_px + Eigen::Vector2d(0.5, 0.5), &shifted_ray)) {
+      continue;
+    }
+    const double rad_per_px = (shifted_ray - ray).norm() / std::sqrt(0.5);
+    const double sigma_m = std::max(1e-6, observation.sigma_px * rad_per_px * to_point.norm());
+    information += (Eigen::Matrix3d::Identity() - direction * direction.transpose()) / (sigma_m * sigma_m);
+    for (const Eigen::Vector3d& other : directions) {
+      min_cosine = std::min(min_cosine, other.dot(direction));
+    }
+    directions.push_back(direction);
+  }
+  *max_parallax_rad = std::acos(std::max(-1.0, min_cosine));
+  const Eigen::Matrix3d covariance = information.inverse();
+  return covariance.allFinite() ? covariance : Eigen::Matrix3d::Zero();
+}
+
+TrackCheck checkTrack(const BundleAdjustmentOptions& options, const MappingData& data, Track* track) {
+  TrackCheck result;
+  result.was_landmark = true;
+  std::vector<TrackObservation> kept;
+  double min_range_m = INFINITY;
+  for (const TrackObservation& observation : track->observations) {
+    Eigen::Vector2d error_px;
+    if (!reproject(data, *track, observation, &error_px) ||
+        error_px.norm() > options.outlier_sigmas * observation.sigma_px) {
+      ++result.removed;
+      continue;
+    }
+    result.squares += error_px.squaredNorm();
+    min_range_m = std::min(
+        min_range_m,
+        (data.keyframes[observation.keyframe].map_from_vehicle.translation() - *track->position_m).norm());
+    kept.push_back(observation);
+  }
+  track->observations = std::move(kept);
+  double parallax_rad = 0.0;
+  if (static_cast<int>(track->observations.size()) >= options.min_observations) {
+    track->covariance_m2 = conditionalCovariance(data, *track, &parallax_rad);
+  }
+  result.is_landmark = parallax_rad >= options.min_parallax_rad && min_range_m <= options.max_range_m;
+  if (result.is_landmark) {
+    result.kept = static_cast<int64_t>(track->observations.size());
+  } else {
+    track->position_m.reset();
+    result.squares = 0.0;
+  }
+  return result;
+}
+
+}  // namespace
+
+void BundleAdjustmentOptions::validate() const {
+  requireField(max_iterations >= 1, "max_iterations", "must be 1 or more", max_iterations);
+  requireField(cost_tolerance > 0.0, "cost_tolerance", "must be positive", cost_tolerance);
+  requireField(loss_sigmas > 0.0, "loss_sigmas", "must be positive", loss_sigmas);
+  requireField(outlier_sigmas > 0.0, "outlier_sigmas", "must be positive", outlier_sigmas);
+  requireField(min_parallax_rad >= 0.0, "min_parallax_rad", "must not be negative", min_parallax_rad);
+  requireField(min_observations >= 1, "min_observations", "must be 1 or more", min_observations);
+  requireField(max_range_m > 0.0, "max_range_m", "must be positive", max_range_m);
+  requireField(odometer_scale_sigma > 0.0, "odometer_scale_sigma", "must be positive", odometer_scale_sigma);
+  requireField(odometer_turn_sigma > 0.0, "odometer_turn_sigma", "must be positive", odometer_turn_sigma);
+  requireField(odometry_distance_sigma >= 0.0, "odometry_distance_sigma", "must not be negative",
+               odometry_distance_sigma);
+  requireField(odometry_sigma_m > 0.0, "odometry_sigma_m", "must be positive", odometry_sigma_m);
+  requireField(odometry_turn_sigma >= 0.0, "odometry_turn_sigma", "must not be negative",
+               odometry_turn_sigma);
+  requireField(odometry_sigma_rad > 0.0, "odometry_sigma_rad", "must be positive", odometry_sigma_rad);
+  requireField(height_sigma_m > 0.0, "height_sigma_m", "must be positive", height_sigma_m);
+  requireField(tilt_sigma_rad > 0.0, "tilt_sigma_rad", "must be positive", tilt_sigma_rad);
+}
+
+BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const MappingData& data) {
+  BundleProblem problem;
+  problem.rig = data.rig;
+  problem.odometer = {data.odometry_distance_scale, data.odometry_turn_scale};
+  problem.odometer_sigmas = {options.odometer_scale_sigma, options.odometer_turn_sigma};
+  problem.loss_sigmas = options.loss_sigmas;
+  for (const Keyframe& keyframe : data.keyframes) {
+    problem.map_from_vehicle.push_back(keyframe.map_from_vehicle);
+  }
+  for (const Track& track : data.tracks) {
+    if (!track.position_m) {
+      continue;
+    }
+    problem.points_in_map.push_back(*track.position_m);
+    problem.first_observation.push_back(problem.observations.size());
+    for (const TrackObservation& observation : track.observations) {
+      problem.observations.push_back(
+          {observation.keyframe, observation.camera, observation.position_px, observation.sigma_px});
+    }
+  }
+  problem.first_observation.push_back(problem.observations.size());
+  for (size_t i = 1; i < data.keyframes.size(); ++i) {
+    const RigidTransform motion =
+        data.keyframes[i - 1].odom_from_vehicle.inverse() * data.keyframes[i].odom_from_vehicle;
+    problem.motions.push_back({static_cast<int32_t>(i), motion, odometryInformation(motion, options)});
+  }
+  return problem;
+}
+
+void writeBack(const BundleProblem& problem, MappingData* data) {
+  for (size_t i = 0; i < data->keyframes.size(); ++i) {
+    data->keyframes[i].map_from_vehicle = problem.map_from_vehicle[i];
+  }
+  auto point = problem.points_in_map.begin();
+  for (Track& track : data->tracks) {
+    if (track.position_m) {
+      track.position_m = *point++;
+    }
+  }
+  data->odometry_distance_scale = problem.odometer[0];
+  data->odometry_turn_scale = problem.odometer[1];
+}
+
+BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, MappingData* data) {
+  options.validate();
+  check(!data->keyframes.empty(), "adjustBundle: expected keyframes");
+  BundleProblem problem = makeBundleProblem(options, *data);
+  const BundleSolution solved = solveBundle(options.max_iterations, options.cost_tolerance, &problem);
+  writeBack(problem, data);
+  BundleAdjustmentSummary summary = removeOutliers(options, data);
+  summary.converged = solved.converged;
+  summary.num_iterations = solved.num_iterations;
+  return summary;
+}
+
+BundleAdjustmentSummary removeOutliers(const BundleAdjustmentOptions& options, MappingData* data) {
+  BundleAdjustmentSummary summary;
+  std::vector<TrackCheck> checks(data->tracks.size());
+  tbb::parallel_for(size_t{0}, data->tracks.size(), [&](size_t i) {
+    if (data->tracks[i].position_m) {
+      checks[i] = checkTrack(options, *data, &data->tracks[i]);
+    }
+  });
+  double squares = 0.0;
+  for (const TrackCheck& check_of_track : checks) {
+    summary.num_observations += check_of_track.kept;
+    summary.num_removed_landmarks += check_of_track.was_landmark && !check_of_track.is_landmark ? 1 : 0;
+    summary.num_removed_observations += check_of_track.removed;
+    squares += check_of_track.squares;
+  }
+  if (summary.num_observations > 0) {
+    summary.rms_px = std::sqrt(squares / (2.0 * static_cast<double>(summary.num_observations)));
+  }
+  return summary;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,92 @@
+#include "vcharge_reconstruction/bundle_adjustment.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "vcharge_reconstruction/testing/test_drive.h"
+
+namespace vcharge {
+namespace {
+
+/// Poses that bend away from the truth, as chained motions do, and points moved with them.
+void disturb(MappingData* data) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  for (size_t i = 1; i < data->keyframes.size(); ++i) {
+    const double share = static_cast<double>(i) / static_cast<double>(data->keyframes.size());
+    RigidTransform& pose = data->keyframes[i].map_from_vehicle;
+    Eigen::Vector3d shift(0.3 * share, -0.2 * share, 0.05 * share);
+    for (int axis = 0; axis < 3; ++axis) {
+      shift[axis] += 0.01 * noise(random);
+    }
+    pose = RigidTransform(rotationFromVector(Eigen::Vector3d(0.004, -0.005, 0.02) * share) * pose.rotation(),
+                          pose.translation() + shift);
+  }
+  for (Track& track : data->tracks) {
+    for (int axis = 0; axis < 3; ++axis) {
+      (*track.position_m)[axis] += 0.1 * noise(random);
+    }
+  }
+}
+
+double worstPositionError(const MappingData& a, const MappingData& b) {
+  double worst = 0.0;
+  for (size_t i = 0; i < a.keyframes.size(); ++i) {
+    worst = std::max(
+        worst, (a.keyframes[i].map_from_vehicle.translation() - b.keyframes[i].map_from_vehicle.translation())
+                   .norm());
+  }
+  return worst;
+}
+
+TEST(BundleAdjustmentTest, FindsPosesAndTheOdometersScale) {
+  testing::TestDriveOptions drive;
+  drive.odometry_scale = 1.02;
+  const MappingData truth = testing::makeTestDrive(drive);
+  MappingData data = truth;
+  disturb(&data);
+  EXPECT_GT(worstPositionError(data, truth), 0.2);
+  BundleAdjustmentOptions options;
+  options.max_iterations = 50;
+  const BundleAdjustmentSummary summary = adjustBundle(options, &data);
+  EXPECT_LT(worstPositionError(data, truth), 1e-3);
+  EXPECT_NEAR(data.odometry_distance_scale, 1.0 / 1.02, 5e-4);
+  EXPECT_LT(summary.rms_px, 0.01);
+  EXPECT_EQ(summary.num_removed_observations, 0);
+}
+
+TEST(BundleAdjustmentTest, RemovesWrongObservationsAndKeepsTheRest) {
+  testing::TestDriveOptions drive;
+  drive.noise_px = 0.3;
+  const MappingData truth = testing::makeTestDrive(drive);
+  MappingData data = truth;
+  int64_t num_wrong = 0;
+  for (size_t t = 0; t < data.tracks.size(); t += 5) {
+    for (size_t i = 0; i < data.tracks[t].observations.size(); i += 7) {
+      data.tracks[t].observations[i].position_px += Eigen::Vector2d(20.0, -12.0);
+      ++num_wrong;
+    }
+  }
+  disturb(&data);
+  BundleAdjustmentOptions options;
+  options.max_iterations = 50;
+  const BundleAdjustmentSummary summary = adjustBundle(options, &data);
+  EXPECT_LT(worstPositionError(data, truth), 0.05) << "a quarter of a percent of the way";
+  EXPECT_NEAR(summary.rms_px, drive.noise_px, 0.03);
+  EXPECT_GE(summary.num_removed_observations, num_wrong * 95 / 100);
+  EXPECT_LE(summary.num_removed_observations, num_wrong + summary.num_observations / 200);
+}
+
+TEST(BundleAdjustmentTest, GivesTheSameTwice) {
+  MappingData first = testing::makeTestDrive(testing::TestDriveOptions());
+  disturb(&first);
+  MappingData second = first;
+  adjustBundle(BundleAdjustmentOptions(), &first);
+  adjustBundle(BundleAdjustmentOptions(), &second);
+  EXPECT_EQ(worstPositionError(first, second), 0.0);
+}
+
+}  // namespace
+}  // namespace vcharge

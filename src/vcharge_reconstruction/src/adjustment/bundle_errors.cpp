@@ -1,0 +1,144 @@
+#include "adjustment/bundle_errors.h"
+
+#include <array>
+#include <cmath>
+
+#include <ceres/cost_function.h>
+#include <ceres/manifold.h>
+
+#include "landmarks/point_tasks.h"
+#include "vcharge_core/motion/cross_matrix.h"
+#include "vcharge_geometry/residuals/pose_block.h"
+#include "vcharge_geometry/residuals/rig_costs.h"
+
+namespace vcharge {
+
+BundleState BundleState::of(const BundleProblem& problem) {
+  BundleState state{problem.map_from_vehicle, problem.points_in_map, problem.odometer, {}, {}};
+  for (size_t i = 0; i < problem.rig->cameras.size(); ++i) {
+    state.vehicle_from_camera.push_back(problem.vehicle_from_camera.empty()
+                                            ? *problem.rig->cameras[i].vehicle_from_camera
+                                            : problem.vehicle_from_camera[i]);
+    state.camera_from_vehicle.push_back(state.vehicle_from_camera.back().inverse());
+  }
+  return state;
+}
+
+void BundleState::moveCamera(size_t camera, const Eigen::Matrix<double, 6, 1>& move) {
+  const RigidTransform& before = vehicle_from_camera[camera];
+  vehicle_from_camera[camera] = RigidTransform(rotationFromVector(move.tail<3>()) * before.rotation(),
+                                               before.translation() + move.head<3>());
+  camera_from_vehicle[camera] = vehicle_from_camera[camera].inverse();
+}
+
+BundleErrors::BundleErrors(const BundleProblem& problem)
+    : problem_(problem),
+      squared_loss_scale_(problem.loss_sigmas * problem.loss_sigmas),
+      manifold_(makePoseManifold()) {
+  for (const BundleMotion& motion : problem.motions) {
+    motion_costs_.push_back(makeOdometryCost(motion.previous_from_current, motion.information));
+  }
+}
+
+BundleErrors::~BundleErrors() = default;
+
+bool BundleErrors::ofObservation(const BundleState& state, size_t observation, const Eigen::Vector3d& point,
+                                 Eigen::Vector2d* error, Eigen::Matrix<double, 2, 3>* by_point) const {
+  const BundleObservation& observed = problem_.observations[observation];
+  const RigidTransform& pose = state.poses[observed.pose];
+  if (observed.camera == kGroundCamera) {
+    const Eigen::RowVector3d up = pose.rotationMatrix().col(2).transpose();
+    *error = Eigen::Vector2d(up.dot(point - pose.translation()) / observed.sigma_px, 0.0);
+    if (by_point != nullptr) {
+      *by_point << up / observed.sigma_px, Eigen::RowVector3d::Zero();
+    }
+    return true;
+  }
+  const RigidTransform& camera_from_vehicle = state.camera_from_vehicle[observed.camera];
+  const Eigen::Matrix3d camera_from_map =
+      (camera_from_vehicle.rotation() * pose.rotation().conjugate()).toRotationMatrix();
+  const Eigen::Vector3d in_camera =
+      camera_from_map * (point - pose.translation()) + camera_from_vehicle.translation();
+  Eigen::Vector2d pixel;
+  Eigen::Matrix<double, 2, 3> pixel_by_point;
+  const bool seen = problem_.rig->cameras[observed.camera].model.visit([&](const auto& model) {
+    return model.project(in_camera, &pixel, by_point == nullptr ? nullptr : &pixel_by_point);
+  });
+  if (!seen) {
+    error->setConstant(kNoImageResidual);
+    return false;
+  }
+  *error = (pixel - observed.position_px) / observed.sigma_px;
+  if (by_point != nullptr) {
+    *by_point = pixel_by_point * camera_from_map / observed.sigma_px;
+  }
+  return true;
+}
+
+double BundleErrors::robustCost(double square) const {
+  return 0.5 * squared_loss_scale_ * std::log1p(square / squared_loss_scale_);
+}
+
+MotionError BundleErrors::ofMotion(const BundleState& state, size_t motion) const {
+  const auto pose = static_cast<size_t>(problem_.motions[motion].pose);
+  const PoseBlock previous = toPoseBlock(state.poses[pose - 1]);
+  const PoseBlock current = toPoseBlock(state.poses[pose]);
+  const std::array<const double*, 3> blocks{previous.data(), current.data(), state.odometer.data()};
+  MotionError result;
+  Eigen::Matrix<double, 6, 7, Eigen::RowMajor> by_previous, by_current;
+  Eigen::Matrix<double, 6, 2, Eigen::RowMajor> by_odometer;
+  std::array<double*, 3> jacobians{by_previous.data(), by_current.data(), by_odometer.data()};
+  motion_costs_[motion]->Evaluate(blocks.data(), result.error.data(), jacobians.data());
+  Eigen::Matrix<double, 7, 6, Eigen::RowMajor> plus;
+  manifold_->PlusJacobian(previous.data(), plus.data());
+  result.by_previous = by_previous * plus;
+  manifold_->PlusJacobian(current.data(), plus.data());
+  result.by_current = by_current * plus;
+  result.by_odometer = by_odometer;
+  return result;
+}
+
+Eigen::Vector2d BundleErrors::ofOdometer(const BundleState& state) const {
+  return (state.odometer - Eigen::Vector2d::Ones()).cwiseQuotient(problem_.odometer_sigmas);
+}
+
+Eigen::Matrix<double, 6, 6> BundleErrors::commonMotionByCamera(size_t camera) const {
+  // A rig that turns by dphi about the vehicle's origin moves a camera at t by dphi x t.
+  Eigen::Matrix<double, 6, 6> derivative = Eigen::Matrix<double, 6, 6>::Identity();
+  derivative.topRightCorner<3, 3>() = crossMatrix(problem_.vehicle_from_camera[camera].translation());
+  return derivative / static_cast<double>(problem_.vehicle_from_camera.size());
+}
+
+Eigen::Matrix<double, 6, 1> BundleErrors::commonMotion(const BundleState& state) const {
+  Eigen::Matrix<double, 6, 1> common = Eigen::Matrix<double, 6, 1>::Zero();
+  for (size_t i = 0; i < problem_.vehicle_from_camera.size(); ++i) {
+    const RigidTransform& before = problem_.vehicle_from_camera[i];
+    const RigidTransform& now = state.vehicle_from_camera[i];
+    Eigen::Matrix<double, 6, 1> move;
+    move << now.translation() - before.translation(),
+        vectorFromRotation(now.rotation() * before.rotation().conjugate());
+    common += commonMotionByCamera(i) * move;
+  }
+  return common;
+}
+
+double BundleErrors::cost(const BundleState& state) const {
+  double cost = sumOverPoints(state.points.size(), [&](size_t point) {
+    const Eigen::Vector3d moved_m = state.points[point] - problem_.points_in_map[point];
+    double of_point = 0.5 * moved_m.dot(priorInformation(point) * moved_m);
+    for (size_t i = problem_.first_observation[point]; i < problem_.first_observation[point + 1]; ++i) {
+      Eigen::Vector2d error;
+      ofObservation(state, i, state.points[point], &error, nullptr);
+      of_point += robustCost(error.squaredNorm());
+    }
+    return of_point;
+  });
+  for (size_t i = 0; i < motion_costs_.size(); ++i) {
+    cost += 0.5 * ofMotion(state, i).error.squaredNorm();
+  }
+  const Eigen::Matrix<double, 6, 1> common = commonMotion(state);
+  return cost + 0.5 * ofOdometer(state).squaredNorm() +
+         0.5 * common.dot(problem_.common_information * common);
+}
+
+}  // namespace vcharge

@@ -1,0 +1,82 @@
+#include "vcharge_reconstruction/bundle_solver.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "adjustment/bundle_equations.h"
+#include "adjustment/bundle_errors.h"
+#include "vcharge_core/base/error.h"
+
+namespace vcharge {
+namespace {
+
+// The trust region of Levenberg-Marquardt as Ceres has it by default.
+constexpr double kFirstRadius = 1e4;
+constexpr double kMaxRadius = 1e16;
+constexpr double kMinRadius = 1e-32;
+constexpr double kMinGain = 1e-3;
+
+void checkProblem(const BundleProblem& problem) {
+  check(problem.first_observation.size() == problem.points_in_map.size() + 1 &&
+            problem.first_observation.back() == problem.observations.size(),
+        "BundleProblem: expected the observations grouped by point");
+  check(problem.point_information.empty() || problem.point_information.size() == problem.points_in_map.size(),
+        "BundleProblem: expected point_information of every point, or none");
+  check(problem.vehicle_from_camera.empty() ||
+            problem.vehicle_from_camera.size() == problem.rig->cameras.size(),
+        "BundleProblem: expected vehicle_from_camera of every camera, or none");
+}
+
+}  // namespace
+
+BundleSolution solveBundle(int max_iterations, double cost_tolerance, BundleProblem* problem) {
+  checkProblem(*problem);
+  const BundleErrors errors(*problem);
+  BundleEquations equations(*problem, errors);
+  BundleState state = BundleState::of(*problem);
+  BundleSolution solution;
+  solution.cost = errors.cost(state);
+  equations.linearize(state);
+  double radius = kFirstRadius;
+  double shrink = 2.0;
+  BundleState next;
+  while (solution.num_iterations < max_iterations && !solution.converged && radius > kMinRadius) {
+    ++solution.num_iterations;
+    const double expected = equations.step(1.0 / radius, &next);
+    const double cost = expected > 0.0 ? errors.cost(next) : std::numeric_limits<double>::infinity();
+    const double decrease = solution.cost - cost;
+    solution.converged = std::abs(decrease) <= cost_tolerance * solution.cost;
+    if (!(decrease > kMinGain * expected)) {
+      radius /= shrink;
+      shrink *= 2.0;
+      continue;
+    }
+    radius = std::min(kMaxRadius,
+                      radius / std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * decrease / expected - 1.0, 3)));
+    shrink = 2.0;
+    std::swap(state, next);
+    solution.cost = cost;
+    if (!solution.converged) {
+      equations.linearize(state);
+    }
+  }
+  problem->map_from_vehicle = std::move(state.poses);
+  problem->points_in_map = std::move(state.points);
+  problem->odometer = state.odometer;
+  if (!problem->vehicle_from_camera.empty()) {
+    problem->vehicle_from_camera = std::move(state.vehicle_from_camera);
+  }
+  return solution;
+}
+
+BundleCovariance bundleCovariance(const BundleProblem& problem) {
+  checkProblem(problem);
+  const BundleErrors errors(problem);
+  BundleEquations equations(problem, errors);
+  equations.linearize(BundleState::of(problem));
+  return equations.covariance();
+}
+
+}  // namespace vcharge

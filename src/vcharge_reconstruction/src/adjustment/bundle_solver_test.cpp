@@ -1,0 +1,178 @@
+#include "vcharge_reconstruction/bundle_solver.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include "adjustment/ceres_bundle.h"
+#include "vcharge_reconstruction/testing/test_drive.h"
+
+namespace vcharge {
+namespace {
+
+/// A noisy drive with some wrong observations, from disturbed poses and points.
+BundleProblem makeProblem() {
+  testing::TestDriveOptions drive;
+  drive.noise_px = 0.4;
+  drive.odometry_scale = 1.01;
+  const MappingData data = testing::makeTestDrive(drive);
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  BundleProblem problem;
+  problem.rig = data.rig;
+  problem.odometer_sigmas = {0.03, 0.05};
+  for (size_t i = 0; i < data.keyframes.size(); ++i) {
+    Eigen::Vector3d shift;
+    for (double& axis : shift) {
+      axis = i == 0 ? 0.0 : 0.03 * noise(random);
+    }
+    const RigidTransform& pose = data.keyframes[i].map_from_vehicle;
+    problem.map_from_vehicle.emplace_back(pose.rotation(), pose.translation() + shift);
+    if (i > 0) {
+      Eigen::Matrix<double, 6, 1> sigmas;
+      sigmas << 0.005, 0.005, 0.02, 0.01, 0.01, 0.002;
+      const RigidTransform motion =
+          data.keyframes[i - 1].odom_from_vehicle.inverse() * data.keyframes[i].odom_from_vehicle;
+      problem.motions.push_back(
+          {static_cast<int32_t>(i), motion, sigmas.cwiseAbs2().cwiseInverse().asDiagonal()});
+    }
+  }
+  for (const Track& track : data.tracks) {
+    Eigen::Vector3d shift;
+    for (double& axis : shift) {
+      axis = 0.05 * noise(random);
+    }
+    problem.points_in_map.push_back(*track.position_m + shift);
+    problem.first_observation.push_back(problem.observations.size());
+    for (const TrackObservation& observation : track.observations) {
+      const double wrong_px = problem.observations.size() % 17 == 0 ? 25.0 : 0.0;
+      problem.observations.push_back({observation.keyframe, observation.camera,
+                                      observation.position_px + Eigen::Vector2d(wrong_px, -wrong_px), 0.5});
+    }
+  }
+  problem.first_observation.push_back(problem.observations.size());
+  return problem;
+}
+
+double largestDifference_m(const BundleProblem& a, const BundleProblem& b) {
+  double largest = 0.0;
+  for (size_t i = 0; i < a.map_from_vehicle.size(); ++i) {
+    largest =
+        std::max(largest, (a.map_from_vehicle[i].translation() - b.map_from_vehicle[i].translation()).norm());
+  }
+  return largest;
+}
+
+TEST(BundleSolverTest, GoesThePathOfCeres) {
+  for (const int iterations : {1, 3, 40}) {
+    BundleProblem ours = makeProblem();
+    BundleProblem theirs = ours;
+    const BundleProblem before = ours;
+    const BundleSolution solution = solveBundle(iterations, 1e-9, &ours);
+    testing::solveWithCeres(iterations, 1e-9, &theirs);
+    EXPECT_GT(largestDifference_m(ours, before), 0.03) << "the problem should not be solved already";
+    // At the end rounding decides which of the last, tiny steps is still taken.
+    EXPECT_LT(largestDifference_m(ours, theirs), iterations < 40 ? 1e-9 : 1e-5)
+        << iterations << " iterations";
+    EXPECT_NEAR(ours.odometer[0], theirs.odometer[0], 1e-6);
+    EXPECT_LE(solution.num_iterations, iterations);
+  }
+}
+
+TEST(BundleSolverTest, MovesUnknownCamerasAsCeresDoes) {
+  BundleProblem ours = makeProblem();
+  for (const RigCamera& camera : ours.rig->cameras) {
+    const RigidTransform& place = *camera.vehicle_from_camera;
+    ours.vehicle_from_camera.emplace_back(
+        rotationFromVector(Eigen::Vector3d(0.004, -0.003, 0.005)) * place.rotation(),
+        place.translation() + Eigen::Vector3d(0.03, 0.02, -0.02));
+  }
+  BundleProblem theirs = ours;
+  const BundleProblem before = ours;
+  solveBundle(3, 1e-9, &ours);
+  testing::solveWithCeres(3, 1e-9, &theirs);
+  EXPECT_LT(largestDifference_m(ours, theirs), 1e-8);
+  for (size_t i = 0; i < ours.vehicle_from_camera.size(); ++i) {
+    const RigidTransform& camera = ours.vehicle_from_camera[i];
+    EXPECT_GT((camera.translation() - before.vehicle_from_camera[i].translation()).norm(), 0.01);
+    EXPECT_LT((camera.translation() - theirs.vehicle_from_camera[i].translation()).norm(), 1e-8);
+    EXPECT_LT(angleOfRotation(camera.rotation().conjugate() * theirs.vehicle_from_camera[i].rotation()),
+              1e-8);
+  }
+}
+
+TEST(BundleSolverTest, TakesPointsThatAreKnownBeforehandAsCeresDoes) {
+  BundleProblem ours = makeProblem();
+  Eigen::Matrix3d information;
+  information << 400.0, 50.0, -20.0, 50.0, 900.0, 30.0, -20.0, 30.0, 200.0;
+  ours.point_information.assign(ours.points_in_map.size(), information);
+  BundleProblem theirs = ours;
+  const BundleProblem before = ours;
+  solveBundle(3, 1e-9, &ours);
+  testing::solveWithCeres(3, 1e-9, &theirs);
+  EXPECT_GT(largestDifference_m(ours, before), 0.03);
+  EXPECT_LT(largestDifference_m(ours, theirs), 1e-8);
+  for (size_t i = 0; i < ours.points_in_map.size(); ++i) {
+    ASSERT_LT((ours.points_in_map[i] - theirs.points_in_map[i]).norm(), 1e-7) << i;
+  }
+  BundleProblem fixed = before;
+  fixed.point_information.assign(fixed.points_in_map.size(), 1e12 * Eigen::Matrix3d::Identity());
+  solveBundle(10, 1e-9, &fixed);
+  for (size_t i = 0; i < fixed.points_in_map.size(); ++i) {
+    ASSERT_LT((fixed.points_in_map[i] - before.points_in_map[i]).norm(), 1e-5) << i;
+  }
+}
+
+TEST(BundleSolverTest, PutsPointsOfTheGroundUnderTheVehicle) {
+  // One point that nothing sees, but that is said to lie on the ground at a pose.
+  BundleProblem problem = makeProblem();
+  problem.points_in_map = {problem.map_from_vehicle[3] * Eigen::Vector3d(1.0, 2.0, 0.3)};
+  problem.observations = {{3, kGroundCamera, Eigen::Vector2d::Zero(), 1e-3}};
+  problem.first_observation = {0, 1};
+  problem.loss_sigmas = 1e6;
+  solveBundle(30, 1e-12, &problem);
+  EXPECT_NEAR((problem.map_from_vehicle[3].inverse() * problem.points_in_map[0]).z(), 0.0, 1e-4);
+}
+
+TEST(BundleSolverTest, GivesTheSameBitsOnOneThread) {
+  BundleProblem parallel = makeProblem();
+  BundleProblem serial = parallel;
+  const BundleSolution of_parallel = solveBundle(10, 1e-9, &parallel);
+  const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
+  const BundleSolution of_serial = solveBundle(10, 1e-9, &serial);
+  EXPECT_EQ(largestDifference_m(parallel, serial), 0.0);
+  EXPECT_EQ(of_parallel.cost, of_serial.cost);
+  EXPECT_EQ(parallel.points_in_map, serial.points_in_map);
+}
+
+TEST(BundleSolverTest, LeavesWhatNothingSees) {
+  BundleProblem problem = makeProblem();
+  auto rig = std::make_shared<CameraRig>(*problem.rig);
+  rig->cameras[0].model = MeiCamera(1.2, 400.0, 400.0, 320.0, 200.0);
+  problem.rig = rig;
+  const RigidTransform map_from_camera =
+      problem.map_from_vehicle.front() * *problem.rig->cameras[0].vehicle_from_camera;
+  const Eigen::Vector3d unobserved(1.0, 2.0, 3.0);
+  const Eigen::Vector3d behind = map_from_camera * Eigen::Vector3d(0.0, 0.0, -30.0);
+  problem.points_in_map = {unobserved, behind};
+  problem.observations = {{0, 0, Eigen::Vector2d(330.0, 210.0), 0.5}};
+  problem.first_observation = {0, 0, 1};
+  const BundleSolution solution = solveBundle(10, 1e-6, &problem);
+  EXPECT_TRUE(std::isfinite(solution.cost));
+  EXPECT_LT((problem.points_in_map[0] - unobserved).norm(), 1e-9);
+  EXPECT_LT((problem.points_in_map[1] - behind).norm(), 1e-9);
+  for (const RigidTransform& pose : problem.map_from_vehicle) {
+    EXPECT_TRUE(pose.translation().allFinite());
+  }
+}
+
+TEST(BundleSolverTest, RefusesObservationsThatAreNotGrouped) {
+  BundleProblem problem = makeProblem();
+  problem.first_observation.pop_back();
+  EXPECT_THROW(solveBundle(1, 1e-3, &problem), std::logic_error);
+}
+
+}  // namespace
+}  // namespace vcharge

@@ -1,0 +1,317 @@
+#include "vcharge_reconstruction/landmark_search.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <set>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include <tbb/parallel_for.h>
+
+namespace vcharge {
+namespace {
+
+constexpr double kReferenceWidth_px = 1280.0;
+
+/// Where a landmark was seen before, as nearly as possible from where it is looked for now.
+struct Source {
+  int32_t track = -1;
+  const TrackObservation* observation = nullptr;
+  double cos_angle = -1.0;
+};
+
+/// A feature that shows a landmark.
+struct Proposal {
+  int32_t keyframe, camera, feature, track;
+};
+
+class LandmarkSearch {
+ public:
+  LandmarkSearch(const LandmarkSearchOptions& options, const MappingData& data)
+      : options_(options), data_(data), observed_(data.keyframes.size()) {
+    for (size_t t = 0; t < data.tracks.size(); ++t) {
+      if (!data.tracks[t].position_m) {
+        continue;
+      }
+      for (const TrackObservation& observation : data.tracks[t].observations) {
+        if (observation.feature >= 0) {
+          observed_[observation.keyframe].push_back({static_cast<int32_t>(t), &observation});
+        }
+      }
+    }
+  }
+
+  std::vector<Proposal> searchKeyframe(int32_t keyframe) const {
+    std::vector<Proposal> proposals;
+    const std::vector<size_t> neighbours = neighboursOf(keyframe);
+    for (int32_t camera = 0; camera < static_cast<int32_t>(data_.rig->cameras.size()); ++camera) {
+      if (!data_.keyframes[keyframe].images[camera].features.empty()) {
+        searchImage(keyframe, camera, neighbours, &proposals);
+      }
+    }
+    return proposals;
+  }
+
+ private:
+  std::vector<size_t> neighboursOf(int32_t keyframe) const {
+    std::vector<size_t> neighbours;
+    const Eigen::Vector3d& position = data_.keyframes[keyframe].map_from_vehicle.translation();
+    for (size_t i = 0; i < data_.keyframes.size(); ++i) {
+      if (static_cast<int32_t>(i) != keyframe &&
+          (data_.keyframes[i].map_from_vehicle.translation() - position).norm() <= options_.max_distance_m) {
+        neighbours.push_back(i);
+      }
+    }
+    return neighbours;
+  }
+
+  Eigen::Vector3d cameraCentre(int32_t keyframe, int32_t camera) const {
+    return data_.keyframes[keyframe].map_from_vehicle *
+           data_.rig->cameras[camera].vehicle_from_camera->translation();
+  }
+
+  void searchImage(int32_t keyframe, int32_t camera, const std::vector<size_t>& neighbours,
+                   std::vector<Proposal>* proposals) const {
+    const RigCamera& rig_camera = data_.rig->cameras[camera];
+    const RigidTransform map_from_camera =
+        data_.keyframes[keyframe].map_from_vehicle * *rig_camera.vehicle_from_camera;
+    const Eigen::Vector3d& centre = map_from_camera.translation();
+    const double min_cos_view = std::cos(options_.max_view_angle_rad);
+    std::unordered_map<int32_t, size_t> index_of_track;
+    std::vector<Source> sources;
+    for (const size_t neighbour : neighbours) {
+      for (const auto& [track, observation] : observed_[neighbour]) {
+        const Eigen::Vector3d& point = *data_.tracks[track].position_m;
+        const Eigen::Vector3d from_here = point - centre;
+        const Eigen::Vector3d from_there = point - cameraCentre(observation->keyframe, observation->camera);
+        const double range = from_here.norm(), other_range = from_there.norm();
+        if (range > options_.max_range_ratio * other_range ||
+            other_range > options_.max_range_ratio * range) {
+          continue;
+        }
+        const double cos_angle = from_here.dot(from_there) / (range * other_range);
+        if (cos_angle < min_cos_view) {
+          continue;
+        }
+        const auto [found, is_new] = index_of_track.emplace(track, sources.size());
+        if (is_new) {
+          sources.push_back({track, observation, cos_angle});
+        } else if (cos_angle > sources[found->second].cos_angle) {
+          sources[found->second] = {track, observation, cos_angle};
+        }
+      }
+    }
+    matchSources(keyframe, camera, map_from_camera.inverse(), sources, proposals);
+  }
+
+  void matchSources(int32_t keyframe, int32_t camera, const RigidTransform& camera_from_map,
+                    const std::vector<Source>& sources, std::vector<Proposal>* proposals) const {
+    const RigCamera& rig_camera = data_.rig->cameras[camera];
+    const KeyframeImage& image = data_.keyframes[keyframe].images[camera];
+    const double min_cos_field = std::cos(0.5 * rig_camera.field_of_view_rad);
+    std::vector<cv::Point2f> predictions;
+    std::vector<int32_t> tracks;
+    cv::Mat descriptors(0, image.features.descriptors.cols, image.features.descriptors.type());
+    descriptors.reserve(sources.size());
+    for (const Source& source : sources) {
+      const Eigen::Vector3d point = camera_from_map * *data_.tracks[source.track].position_m;
+      Eigen::Vector2d pixel;
+      if (point.z() < min_cos_field * point.norm() || !rig_camera.model.project(point, &pixel) ||
+          pixel.x() < 0.0 || pixel.y() < 0.0 || pixel.x() >= rig_camera.image_size_px.width ||
+          pixel.y() >= rig_camera.image_size_px.height) {
+        continue;
+      }
+      const TrackObservation& seen = *source.observation;
+      predictions.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
+      tracks.push_back(source.track);
+      descriptors.push_back(
+          data_.keyframes[seen.keyframe].images[seen.camera].features.descriptors.row(seen.feature));
+    }
+    if (tracks.empty()) {
+      return;
+    }
+    std::vector<cv::Point2f> positions;
+    for (const Keypoint& keypoint : image.features.keypoints) {
+      positions.push_back(keypoint.position_px);
+    }
+    const double radius_px = options_.radius_px * rig_camera.image_size_px.width / kReferenceWidth_px;
+    for (const FeatureMatch& match : matchNearPixels(descriptors, predictions, image.features.descriptors,
+                                                     positions, radius_px, options_.matching)) {
+      const int32_t track = tracks[match.first_index];
+      if (image.track_of_feature[match.second_index] != track) {
+        proposals->push_back({keyframe, camera, match.second_index, track});
+      }
+    }
+  }
+
+  const LandmarkSearchOptions& options_;
+  const MappingData& data_;
+  std::vector<std::vector<std::pair<int32_t, const TrackObservation*>>> observed_;
+};
+
+/// Union of tracks that are one landmark.
+class TrackGroups {
+ public:
+  explicit TrackGroups(size_t size) : parent_(size) { std::iota(parent_.begin(), parent_.end(), 0); }
+  int32_t find(int32_t track) {
+    while (parent_[track] != track) {
+      parent_[track] = parent_[parent_[track]];
+      track = parent_[track];
+    }
+    return track;
+  }
+  /// The lower number stands for both.
+  void merge(int32_t a, int32_t b) {
+    a = find(a);
+    b = find(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<int32_t> parent_;
+};
+
+/// In which images a landmark is seen. Two that are seen apart in one image are not one.
+class ImagesOfTracks {
+ public:
+  explicit ImagesOfTracks(const MappingData& data) : images_(data.tracks.size()) {
+    for (size_t t = 0; t < data.tracks.size(); ++t) {
+      for (const TrackObservation& observation : data.tracks[t].observations) {
+        images_[t].insert({observation.keyframe, observation.camera});
+      }
+    }
+  }
+  /// False where the track is seen in this image already.
+  bool add(int32_t track, int32_t keyframe, int32_t camera) {
+    return images_[track].insert({keyframe, camera}).second;
+  }
+  /// Of the tracks that stand for their groups; the lower number has both afterwards. False where they are
+  /// seen in one image.
+  bool merge(int32_t a, int32_t b) {
+    std::set<std::pair<int32_t, int32_t>>& to = images_[std::min(a, b)];
+    std::set<std::pair<int32_t, int32_t>>& from = images_[std::max(a, b)];
+    for (const auto& image : from) {
+      if (to.count(image) > 0) {
+        return false;
+      }
+    }
+    to.insert(from.begin(), from.end());
+    from.clear();
+    return true;
+  }
+
+ private:
+  std::vector<std::set<std::pair<int32_t, int32_t>>> images_;
+};
+
+/// Whether a track's own position, where it has one, is that of the landmark whose image it is said to be, as
+/// far as the camera can tell.
+bool arePointsOne(const LandmarkSearchOptions& options, const MappingData& data, int32_t track,
+                  const Proposal& proposal) {
+  const std::optional<Eigen::Vector3d>& own = data.tracks[track].position_m;
+  if (!own) {
+    return true;
+  }
+  const Eigen::Vector3d centre = data.keyframes[proposal.keyframe].map_from_vehicle *
+                                 data.rig->cameras[proposal.camera].vehicle_from_camera->translation();
+  const Eigen::Vector3d to_own = *own - centre;
+  const Eigen::Vector3d to_other = *data.tracks[proposal.track].position_m - centre;
+  const double ratio = to_own.norm() / to_other.norm();
+  return ratio < options.max_merge_ratio && 1.0 / ratio < options.max_merge_ratio;
+}
+
+/// Moves the observations of merged tracks to the one that stands for them; of two in one image the better
+/// stays.
+void joinTracks(TrackGroups* groups, MappingData* data) {
+  for (size_t t = 0; t < data->tracks.size(); ++t) {
+    const int32_t root = groups->find(static_cast<int32_t>(t));
+    if (root != static_cast<int32_t>(t)) {
+      std::vector<TrackObservation>& from = data->tracks[t].observations;
+      std::vector<TrackObservation>& to = data->tracks[root].observations;
+      to.insert(to.end(), from.begin(), from.end());
+      if (!data->tracks[root].position_m) {
+        data->tracks[root].position_m = data->tracks[t].position_m;
+      }
+      data->tracks[t] = Track();
+    }
+  }
+  for (Track& track : data->tracks) {
+    const auto key = [](const TrackObservation& o) {
+      return std::make_tuple(o.keyframe, o.camera, o.sigma_px, o.feature < 0, o.feature);
+    };
+    std::sort(track.observations.begin(), track.observations.end(),
+              [&](const TrackObservation& a, const TrackObservation& b) { return key(a) < key(b); });
+    track.observations.erase(std::unique(track.observations.begin(), track.observations.end(),
+                                         [](const TrackObservation& a, const TrackObservation& b) {
+                                           return a.keyframe == b.keyframe && a.camera == b.camera;
+                                         }),
+                             track.observations.end());
+  }
+  for (Keyframe& keyframe : data->keyframes) {
+    for (KeyframeImage& image : keyframe.images) {
+      for (int32_t& track : image.track_of_feature) {
+        track = track >= 0 ? groups->find(track) : -1;
+      }
+    }
+  }
+}
+
+}  // namespace
+
+MatchOptions LandmarkSearchOptions::closeMatches() {
+  MatchOptions options;
+  options.max_ratio = 0.8;
+  options.max_distance = 60.0;
+  return options;
+}
+
+void LandmarkSearchOptions::validate() const {
+  requireField(radius_px > 0.0, "radius_px", "must be positive", radius_px);
+  requireField(max_distance_m > 0.0, "max_distance_m", "must be positive", max_distance_m);
+  requireField(max_view_angle_rad > 0.0, "max_view_angle_rad", "must be positive", max_view_angle_rad);
+  requireField(max_range_ratio >= 1.0, "max_range_ratio", "must be 1 or more", max_range_ratio);
+  requireField(max_merge_ratio >= 1.0, "max_merge_ratio", "must be 1 or more", max_merge_ratio);
+  requireField(feature_sigma_px > 0.0, "feature_sigma_px", "must be positive", feature_sigma_px);
+  validateInner("matching", matching);
+}
+
+LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, MappingData* data) {
+  const auto num_keyframes = static_cast<int32_t>(data->keyframes.size());
+  std::vector<std::vector<Proposal>> proposals(num_keyframes);
+  const LandmarkSearch search(options, *data);
+  tbb::parallel_for(int32_t{0}, num_keyframes, [&](int32_t i) { proposals[i] = search.searchKeyframe(i); });
+
+  LandmarkSearchSummary summary;
+  TrackGroups groups(data->tracks.size());
+  ImagesOfTracks images(*data);
+  for (const std::vector<Proposal>& of_keyframe : proposals) {
+    for (const Proposal& proposal : of_keyframe) {
+      KeyframeImage& image = data->keyframes[proposal.keyframe].images[proposal.camera];
+      int32_t& track = image.track_of_feature[proposal.feature];
+      if (track < 0) {
+        if (!images.add(groups.find(proposal.track), proposal.keyframe, proposal.camera)) {
+          continue;  // seen elsewhere in this image
+        }
+        const cv::Point2f position = image.features.keypoints[proposal.feature].position_px;
+        track = proposal.track;
+        data->tracks[proposal.track].observations.push_back(
+            {proposal.keyframe, proposal.camera, proposal.feature, Eigen::Vector2d(position.x, position.y),
+             options.feature_sigma_px});
+        ++summary.num_new_observations;
+      } else if (groups.find(track) != groups.find(proposal.track) &&
+                 arePointsOne(options, *data, track, proposal) &&
+                 images.merge(groups.find(track), groups.find(proposal.track))) {
+        groups.merge(track, proposal.track);
+        ++summary.num_merged_tracks;
+      }
+    }
+  }
+  joinTracks(&groups, data);
+  return summary;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,330 @@
+#include "vcharge_reconstruction/loop_closure.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+#include <Eigen/LU>
+
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/motion/cross_matrix.h"
+#include "vcharge_features/place_index.h"
+#include "vcharge_geometry/pose_graph/pose_graph.h"
+#include "vcharge_geometry/robust/motion_estimation.h"
+#include "vcharge_geometry/robust/pose_estimation.h"
+
+namespace vcharge {
+namespace {
+
+std::vector<cv::Mat> descriptorsOf(const Keyframe& keyframe) {
+  std::vector<cv::Mat> descriptors;
+  for (const KeyframeImage& image : keyframe.images) {
+    descriptors.push_back(image.features.descriptors);
+  }
+  return descriptors;
+}
+
+Ray rayOf(const MappingData& data, int32_t keyframe, int camera, int feature) {
+  const RigidTransform& vehicle_from_camera = *data.rig->cameras[camera].vehicle_from_camera;
+  return {
+      vehicle_from_camera.translation(),
+      vehicle_from_camera.rotation() * data.keyframes[keyframe].images[camera].rays_in_camera.col(feature)};
+}
+
+/// Rays of both keyframes that look alike, and the landmark that the first sees along its ray.
+struct LoopMatches {
+  std::vector<RayMatch> rays;
+  /// What the first and the second see along their rays; -1: no track, or one without position.
+  std::vector<int32_t> first_tracks, second_tracks;
+};
+
+LoopMatches matchKeyframes(const LoopClosureOptions& options, const MappingData& data, int32_t first,
+                           int32_t second, const std::vector<std::pair<int, int>>& camera_pairs) {
+  LoopMatches result;
+  for (const auto& [first_camera, second_camera] : camera_pairs) {
+    const KeyframeImage& first_image = data.keyframes[first].images[first_camera];
+    const KeyframeImage& second_image = data.keyframes[second].images[second_camera];
+    if (first_image.features.empty() || second_image.features.empty()) {
+      continue;
+    }
+    for (const FeatureMatch& match : matchDescriptors(first_image.features.descriptors,
+                                                      second_image.features.descriptors, options.matching)) {
+      RayMatch rays;
+      rays.previous = rayOf(data, first, first_camera, match.first_index);
+      rays.current = rayOf(data, second, second_camera, match.second_index);
+      rays.previous_camera = first_camera;
+      rays.current_camera = second_camera;
+      rays.quality = -match.distance;
+      const auto landmarkOf = [&](int32_t track) {
+        return track >= 0 && data.tracks[track].position_m ? track : -1;
+      };
+      result.rays.push_back(rays);
+      result.first_tracks.push_back(landmarkOf(first_image.track_of_feature[match.first_index]));
+      result.second_tracks.push_back(landmarkOf(second_image.track_of_feature[match.second_index]));
+    }
+  }
+  return result;
+}
+
+/// Pose of one keyframe's rig in the vehicle's frame of the other, whose landmarks its rays meet.
+PoseEstimate poseAmongLandmarks(const LoopClosureOptions& options, const MappingData& data, int32_t reference,
+                                const LoopMatches& matches, const std::vector<int>& inliers,
+                                bool reference_is_second) {
+  const RigidTransform reference_from_map = data.keyframes[reference].map_from_vehicle.inverse();
+  const std::vector<int32_t>& tracks = reference_is_second ? matches.second_tracks : matches.first_tracks;
+  std::vector<PointMatch> points;
+  for (const int i : inliers) {
+    if (tracks[i] >= 0) {
+      PointMatch point;
+      point.ray = reference_is_second ? matches.rays[i].previous : matches.rays[i].current;
+      point.point_m = reference_from_map * *data.tracks[tracks[i]].position_m;
+      point.camera = reference_is_second ? matches.rays[i].previous_camera : matches.rays[i].current_camera;
+      point.quality = matches.rays[i].quality;
+      points.push_back(point);
+    }
+  }
+  return estimateAbsolutePose(points, options.robust);
+}
+
+/// Of target_from_source, over [dt, dphi] in the target's frame, to that of its inverse.
+Eigen::Matrix<double, 6, 6> covarianceOfInverse(const RigidTransform& target_from_source,
+                                                const Eigen::Matrix<double, 6, 6>& covariance) {
+  // source_from_target's translation is -R^T t: it moves by -R^T (dt - dphi x t), its rotation by -R^T dphi.
+  const Eigen::Matrix3d turn = target_from_source.rotationMatrix().transpose();
+  const Eigen::Matrix3d cross = crossMatrix(target_from_source.translation());
+  Eigen::Matrix<double, 6, 6> jacobian = Eigen::Matrix<double, 6, 6>::Zero();
+  jacobian.topLeftCorner<3, 3>() = -turn;
+  jacobian.topRightCorner<3, 3>() = -turn * cross;
+  jacobian.bottomRightCorner<3, 3>() = -turn;
+  return jacobian * covariance * jacobian.transpose();
+}
+
+/// Turns the vehicle's frame upright: what the map knows of roll and pitch.
+Eigen::Quaterniond uprightFromVehicle(const RigidTransform& map_from_vehicle) {
+  const double yaw_rad = yawOfRotation(map_from_vehicle.rotation());
+  return rotationFromYawPitchRoll(-yaw_rad, 0.0, 0.0) * map_from_vehicle.rotation();
+}
+
+Eigen::Matrix<double, 6, 6> diagonalInformation(double sigma_m, double sigma_rad) {
+  Eigen::Matrix<double, 6, 1> sigmas;
+  // The vector part of a quaternion is half an angle.
+  sigmas << sigma_m, sigma_m, sigma_m, 0.5 * sigma_rad, 0.5 * sigma_rad, 0.5 * sigma_rad;
+  return sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
+}
+
+/// Of a loop edge in g2o's error, whose translation is in the second's frame.
+Eigen::Matrix<double, 6, 6> loopInformation(const LoopEdge& edge, const LoopClosureOptions& options) {
+  Eigen::Matrix<double, 6, 6> first_from_error = Eigen::Matrix<double, 6, 6>::Zero();
+  const Eigen::Matrix3d turn = edge.first_from_second.rotationMatrix().transpose();
+  first_from_error.topLeftCorner<3, 3>() = turn;
+  first_from_error.bottomRightCorner<3, 3>() = 0.5 * turn;
+  Eigen::Matrix<double, 6, 6> covariance = edge.covariance;
+  covariance.diagonal().head<3>().array() += options.loop_sigma_m * options.loop_sigma_m;
+  covariance.diagonal().tail<3>().array() += options.loop_sigma_rad * options.loop_sigma_rad;
+  covariance = first_from_error * covariance * first_from_error.transpose();
+  const Eigen::Matrix<double, 6, 6> information = covariance.inverse();
+  return 0.5 * (information + information.transpose());
+}
+
+}  // namespace
+
+VocabularyTreeOptions LoopClosureOptions::smallVocabulary() {
+  VocabularyTreeOptions options;
+  options.max_iterations = 5;
+  return options;
+}
+
+RobustOptions LoopClosureOptions::defaultRobust() {
+  RobustOptions options;
+  options.max_error_rad = 0.005;
+  options.max_iterations = 1000;
+  options.min_inliers = 12;
+  return options;
+}
+
+void LoopClosureOptions::validate() const {
+  requireField(training_spacing_m > 0.0, "training_spacing_m", "must be positive", training_spacing_m);
+  requireField(min_travel_m >= 0.0, "min_travel_m", "must not be negative", min_travel_m);
+  requireField(max_candidates >= 1, "max_candidates", "must be 1 or more", max_candidates);
+  validateInner("matching", matching);
+  validateInner("robust", robust);
+  validateInner("vocabulary", vocabulary);
+  requireField(min_inliers >= 6, "min_inliers", "must be 6 or more", min_inliers);
+  requireField(min_inlier_ratio >= 0.0 && min_inlier_ratio <= 1.0, "min_inlier_ratio", "must be in [0, 1]",
+               min_inlier_ratio);
+  requireField(max_sigma_m > 0.0, "max_sigma_m", "must be positive", max_sigma_m);
+  requireField(max_disagreement_rad > 0.0, "max_disagreement_rad", "must be positive", max_disagreement_rad);
+  requireField(max_final_error_m > 0.0, "max_final_error_m", "must be positive", max_final_error_m);
+  requireField(max_final_error_rad > 0.0, "max_final_error_rad", "must be positive", max_final_error_rad);
+  requireField(step_sigma_m > 0.0, "step_sigma_m", "must be positive", step_sigma_m);
+  requireField(step_sigma_rad > 0.0, "step_sigma_rad", "must be positive", step_sigma_rad);
+  requireField(loop_sigma_m > 0.0, "loop_sigma_m", "must be positive", loop_sigma_m);
+  requireField(loop_sigma_rad > 0.0, "loop_sigma_rad", "must be positive", loop_sigma_rad);
+}
+
+std::shared_ptr<const VocabularyTree> trainVocabulary(const LoopClosureOptions& options,
+                                                      const MappingData& data) {
+  std::vector<cv::Mat> descriptors;
+  double last_m = -INFINITY;
+  bool has_features = false;
+  for (const Keyframe& keyframe : data.keyframes) {
+    if (keyframe.travelled_m - last_m < options.training_spacing_m) {
+      continue;
+    }
+    last_m = keyframe.travelled_m;
+    for (const cv::Mat& of_image : descriptorsOf(keyframe)) {
+      has_features |= !of_image.empty();
+      descriptors.push_back(of_image);
+    }
+  }
+  if (!has_features) {
+    throw InputError("no image features in the whole drive: nothing to recognize places by");
+  }
+  return std::make_shared<const VocabularyTree>(VocabularyTree::train(descriptors, options.vocabulary));
+}
+
+LoopEdge verifyLoop(const LoopClosureOptions& options, const MappingData& data, int32_t first, int32_t second,
+                    const std::vector<std::pair<int, int>>& camera_pairs) {
+  LoopEdge edge;
+  edge.first = first;
+  edge.second = second;
+  const LoopMatches matches = matchKeyframes(options, data, first, second, camera_pairs);
+  if (static_cast<int>(matches.rays.size()) < options.min_inliers) {
+    edge.reason = "too few matches";
+    return edge;
+  }
+  MotionEstimate motion = estimatePlanarMotion(matches.rays, options.robust);
+  const auto needed = std::max<size_t>(
+      options.min_inliers,
+      static_cast<size_t>(options.min_inlier_ratio * static_cast<double>(matches.rays.size())));
+  if (!isUsable(motion) || motion.inliers.size() < needed) {
+    motion = estimateKnownVerticalMotion(
+        matches.rays, uprightFromVehicle(data.keyframes[first].map_from_vehicle),
+        uprightFromVehicle(data.keyframes[second].map_from_vehicle), options.robust);
+    edge.is_planar = false;
+  }
+  if (!isUsable(motion) || motion.inliers.size() < needed) {
+    edge.reason = "no motion explains enough matches";
+    return edge;
+  }
+  // Metric, and free to move in all directions: one rig among the landmarks of the other.
+  const PoseEstimate first_from_second =
+      poseAmongLandmarks(options, data, first, matches, motion.inliers, false);
+  const PoseEstimate second_from_first =
+      poseAmongLandmarks(options, data, second, matches, motion.inliers, true);
+  edge.num_inliers =
+      static_cast<int>(std::max(first_from_second.inliers.size(), second_from_first.inliers.size()));
+  if (edge.num_inliers == 0) {
+    edge.reason = "too few landmarks agree";
+    return edge;
+  }
+  if (first_from_second.inliers.size() >= second_from_first.inliers.size()) {
+    edge.first_from_second = first_from_second.map_from_rig;
+    edge.covariance = first_from_second.covariance;
+  } else {
+    edge.first_from_second = second_from_first.map_from_rig.inverse();
+    edge.covariance = covarianceOfInverse(second_from_first.map_from_rig, second_from_first.covariance);
+  }
+  if (angleOfRotation(motion.previous_from_current.rotation().conjugate() *
+                      edge.first_from_second.rotation()) > options.max_disagreement_rad) {
+    edge.reason = "matches and landmarks disagree";
+  } else if (edge.covariance.topLeftCorner<3, 3>().trace() > options.max_sigma_m * options.max_sigma_m) {
+    edge.reason = "too uncertain";
+  }
+  return edge;
+}
+
+std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
+                                const std::shared_ptr<const VocabularyTree>& vocabulary,
+                                const MappingData& data, const LoopProgress& progress) {
+  const auto num_cameras = static_cast<int>(data.rig->cameras.size());
+  const auto num_keyframes = static_cast<int32_t>(data.keyframes.size());
+  PlaceIndex index(vocabulary, num_cameras);
+  std::vector<std::vector<PlaceMatch>> candidates(num_keyframes);
+  int32_t end = 0;
+  for (int32_t i = 0; i < num_keyframes; ++i) {
+    while (end < i &&
+           data.keyframes[i].travelled_m - data.keyframes[end].travelled_m > options.min_travel_m) {
+      ++end;
+    }
+    candidates[i] = index.query(descriptorsOf(data.keyframes[i]), options.max_candidates, end);
+    index.add(descriptorsOf(data.keyframes[i]));
+    progress(0.3 * i / num_keyframes);
+  }
+  std::vector<std::vector<LoopEdge>> edges_of(num_keyframes);
+  constexpr int32_t kBatch = 16;
+  for (int32_t begin = 0; begin < num_keyframes; begin += kBatch) {
+    tbb::parallel_for(begin, std::min(num_keyframes, begin + kBatch), [&](int32_t i) {
+      for (const PlaceMatch& candidate : candidates[i]) {
+        std::vector<std::pair<int, int>> pairs;
+        for (int camera = 0; camera < num_cameras; ++camera) {
+          if (candidate.cameras[camera] >= 0) {
+            pairs.emplace_back(candidate.cameras[camera], camera);
+          }
+        }
+        edges_of[i].push_back(verifyLoop(options, data, candidate.place, i, pairs));
+      }
+    });
+    progress(0.3 + 0.7 * begin / num_keyframes);
+  }
+  std::vector<LoopEdge> edges;
+  for (const std::vector<LoopEdge>& of_keyframe : edges_of) {
+    edges.insert(edges.end(), of_keyframe.begin(), of_keyframe.end());
+  }
+  return edges;
+}
+
+void closeLoops(const LoopClosureOptions& options, std::vector<LoopEdge>* edges, MappingData* data) {
+  PoseGraph graph;
+  for (size_t i = 0; i < data->keyframes.size(); ++i) {
+    graph.map_from_node[static_cast<int64_t>(i)] = data->keyframes[i].map_from_vehicle;
+    if (i > 0) {
+      PoseGraphEdge step;
+      step.first = static_cast<int64_t>(i) - 1;
+      step.second = static_cast<int64_t>(i);
+      step.first_from_second =
+          data->keyframes[i - 1].map_from_vehicle.inverse() * data->keyframes[i].map_from_vehicle;
+      step.information = diagonalInformation(options.step_sigma_m, options.step_sigma_rad);
+      graph.edges.push_back(step);
+    }
+  }
+  std::vector<size_t> loops;
+  for (size_t i = 0; i < edges->size(); ++i) {
+    const LoopEdge& edge = (*edges)[i];
+    if (edge.reason.empty()) {
+      loops.push_back(i);
+      graph.edges.push_back(
+          {edge.first, edge.second, edge.first_from_second, loopInformation(edge, options)});
+    }
+  }
+  if (loops.empty()) {
+    return;
+  }
+  const RobustPoseGraphSummary summary = optimizeRobustly(RobustPoseGraphOptions(), &graph);
+  const size_t num_steps = data->keyframes.size() - 1;
+  for (size_t i = 0; i < loops.size(); ++i) {
+    LoopEdge& edge = (*edges)[loops[i]];
+    edge.accepted = summary.accepted[num_steps + i];
+    if (!edge.accepted) {
+      edge.reason = "contradicts the other edges";
+    }
+  }
+  for (size_t i = 0; i < data->keyframes.size(); ++i) {
+    data->keyframes[i].map_from_vehicle = graph.map_from_node[static_cast<int64_t>(i)];
+  }
+}
+
+void checkLoops(const LoopClosureOptions& options, const MappingData& data, std::vector<LoopEdge>* edges) {
+  for (LoopEdge& edge : *edges) {
+    const RigidTransform adjusted =
+        data.keyframes[edge.first].map_from_vehicle.inverse() * data.keyframes[edge.second].map_from_vehicle;
+    const RigidTransform error = adjusted.inverse() * edge.first_from_second;
+    if (edge.accepted && (error.translation().norm() > options.max_final_error_m ||
+                          angleOfRotation(error.rotation()) > options.max_final_error_rad)) {
+      edge.accepted = false;
+      edge.reason = "contradicts the adjusted map";
+    }
+  }
+}
+
+}  // namespace vcharge

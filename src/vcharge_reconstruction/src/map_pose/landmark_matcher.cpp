@@ -1,0 +1,172 @@
+#include "map_pose/landmark_matcher.h"
+
+#include <algorithm>
+#include <random>
+#include <unordered_set>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+#include <opencv2/core.hpp>
+
+#include "map_pose/landmark_view.h"
+#include "vcharge_core/base/quantile.h"
+#include "vcharge_features/descriptor_matching.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kReferenceWidth_px = 1280.0;
+/// Of search: features of small images are no more exact.
+constexpr double kLeastRadius_px = 3.0;
+/// Of most lenses of such images, about.
+constexpr double kReferencePixelsPerRadian = 450.0;
+/// Keyframes beside a recognized one whose landmarks are looked for too.
+constexpr int kNeighbours = 2;
+constexpr int kUnrelatedPairs = 1001;
+
+double medianUnrelatedDistance(const SparseMap& map) {
+  const cv::Mat& descriptors = map.descriptors();
+  if (descriptors.rows < 2) {
+    return 0.0;
+  }
+  const int norm = descriptors.type() == CV_8UC1 ? cv::NORM_HAMMING : cv::NORM_L2;
+  const auto count = static_cast<uint32_t>(descriptors.rows);
+  std::mt19937 random(1);
+  std::vector<double> distances;
+  for (int i = 0; i < kUnrelatedPairs; ++i) {
+    const auto first = static_cast<int>(random() % count);
+    const auto second = static_cast<int>(random() % count);
+    const auto landmarkOf = [&](int row) { return map.observations()[static_cast<size_t>(row)].landmark; };
+    if (landmarkOf(first) != landmarkOf(second)) {
+      distances.push_back(cv::norm(descriptors.row(first), descriptors.row(second), norm));
+    }
+  }
+  return distances.empty() ? 0.0 : quantile(distances, 0.5);
+}
+
+}  // namespace
+
+void LandmarkMatches::append(const LandmarkMatches& other) {
+  sightings.insert(sightings.end(), other.sightings.begin(), other.sightings.end());
+  points.insert(points.end(), other.points.begin(), other.points.end());
+}
+
+LandmarkMatcher::LandmarkMatcher(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
+                                 const MapLocalizerOptions& options)
+    : map_(std::move(map)),
+      rig_(std::move(rig)),
+      options_(options),
+      unrelated_distance_(medianUnrelatedDistance(*map_)),
+      matching_(options.matching) {
+  if (unrelated_distance_ > 0.0) {
+    matching_.max_distance =
+        std::min(matching_.max_distance, options.max_relative_distance * unrelated_distance_);
+  }
+}
+
+cv::Mat LandmarkMatcher::descriptorsOf(const std::vector<size_t>& observations) const {
+  cv::Mat descriptors(static_cast<int>(observations.size()), map_->descriptors().cols,
+                      map_->descriptors().type());
+  for (size_t i = 0; i < observations.size(); ++i) {
+    map_->descriptors().row(static_cast<int>(observations[i])).copyTo(descriptors.row(static_cast<int>(i)));
+  }
+  return descriptors;
+}
+
+void LandmarkMatcher::add(const RigFeatures& features, size_t camera, size_t observation, int feature,
+                          float distance, LandmarkMatches* matches) const {
+  const Eigen::Vector3d ray = features.rays_in_camera[camera].col(feature);
+  if (ray.isZero()) {
+    return;
+  }
+  const RigidTransform& vehicle_from_camera = *rig_->cameras[camera].vehicle_from_camera;
+  const int32_t landmark = map_->observations()[observation].landmark;
+  PointMatch point;
+  point.ray = {vehicle_from_camera.translation(), vehicle_from_camera.rotation() * ray};
+  point.point_m = map_->landmarks()[static_cast<size_t>(landmark)].position_m;
+  point.camera = static_cast<int>(camera);
+  point.quality = -distance;
+  matches->points.push_back(point);
+  matches->sightings.push_back({landmark, static_cast<int32_t>(camera),
+                                features.images[camera].keypoints[static_cast<size_t>(feature)].position_px});
+}
+
+LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
+                                            const RigidTransform& map_from_vehicle, double sigma_m,
+                                            double sigma_rad) const {
+  const LandmarkView view(*map_, *rig_, options_, map_from_vehicle);
+  std::vector<LandmarkMatches> of_camera(rig_->cameras.size());
+  tbb::parallel_for(size_t{0}, of_camera.size(), [&](size_t camera) {
+    const ImageFeatures& image = features.images[camera];
+    if (image.empty()) {
+      return;
+    }
+    const ExpectedLandmarks expected = view.expectedIn(camera);
+    if (expected.observations.empty()) {
+      return;
+    }
+    std::vector<cv::Point2f> positions;
+    for (const Keypoint& keypoint : image.keypoints) {
+      positions.push_back(keypoint.position_px);
+    }
+    // How far a landmark in the middle of them may be from where it is expected.
+    const double angle_rad =
+        options_.radius_sigmas * (sigma_rad + sigma_m / quantile(expected.ranges_m, 0.5));
+    const double radius_px =
+        std::max(kLeastRadius_px, rig_->cameras[camera].image_size_px.width / kReferenceWidth_px *
+                                      std::clamp(kReferencePixelsPerRadian * angle_rad,
+                                                 options_.min_radius_px, options_.max_radius_px));
+    for (const FeatureMatch& match :
+         matchNearPixels(descriptorsOf(expected.observations), expected.positions_px, image.descriptors,
+                         positions, radius_px, matching_)) {
+      add(features, camera, expected.observations[static_cast<size_t>(match.first_index)], match.second_index,
+          match.distance, &of_camera[camera]);
+    }
+  });
+  LandmarkMatches matches;
+  for (const LandmarkMatches& found : of_camera) {
+    matches.append(found);
+  }
+  return matches;
+}
+
+std::vector<size_t> LandmarkMatcher::observationsAround(size_t keyframe, size_t camera) const {
+  // Each landmark once, as nearly from the place as possible.
+  std::vector<size_t> observations;
+  std::unordered_set<int32_t> landmarks;
+  const auto num_keyframes = static_cast<std::ptrdiff_t>(map_->keyframes().size());
+  for (int i = 0; i <= 2 * kNeighbours; ++i) {
+    const std::ptrdiff_t neighbour =
+        static_cast<std::ptrdiff_t>(keyframe) + (i % 2 == 0 ? i / 2 : -(i + 1) / 2);
+    if (neighbour < 0 || neighbour >= num_keyframes) {
+      continue;
+    }
+    const auto [begin, end] = map_->observationsOf(static_cast<size_t>(neighbour), camera);
+    for (size_t k = begin; k < end; ++k) {
+      if (landmarks.insert(map_->observations()[k].landmark).second) {
+        observations.push_back(k);
+      }
+    }
+  }
+  return observations;
+}
+
+LandmarkMatches LandmarkMatcher::searchAtPlace(const RigFeatures& features, const PlaceMatch& place) const {
+  LandmarkMatches matches;
+  for (size_t camera = 0; camera < rig_->cameras.size(); ++camera) {
+    const ImageFeatures& image = features.images[camera];
+    if (place.cameras[camera] < 0 || image.empty()) {
+      continue;
+    }
+    const std::vector<size_t> observations =
+        observationsAround(static_cast<size_t>(place.place), static_cast<size_t>(place.cameras[camera]));
+    for (const FeatureMatch& match :
+         matchDescriptors(image.descriptors, descriptorsOf(observations), options_.place_matching)) {
+      add(features, camera, observations[static_cast<size_t>(match.second_index)], match.first_index,
+          match.distance, &matches);
+    }
+  }
+  return matches;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,83 @@
+#include "map_pose/landmark_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <unordered_map>
+#include <utility>
+
+namespace vcharge {
+
+LandmarkView::LandmarkView(const SparseMap& map, const CameraRig& rig, const MapLocalizerOptions& options,
+                           const RigidTransform& map_from_vehicle)
+    : map_(map), rig_(rig), options_(options), map_from_vehicle_(map_from_vehicle) {
+  std::vector<std::pair<double, size_t>> by_distance;
+  for (size_t i = 0; i < map.keyframes().size(); ++i) {
+    const double distance_m =
+        (map.keyframes()[i].map_from_vehicle.translation() - map_from_vehicle.translation()).norm();
+    if (distance_m <= options.max_distance_m) {
+      by_distance.emplace_back(distance_m, i);
+    }
+  }
+  std::sort(by_distance.begin(), by_distance.end());
+  by_distance.resize(std::min(by_distance.size(), static_cast<size_t>(options.max_keyframes)));
+  for (const auto& [distance_m, keyframe] : by_distance) {
+    keyframes_.push_back(keyframe);
+  }
+}
+
+std::vector<LandmarkView::Source> LandmarkView::sourcesFor(const Eigen::Vector3d& camera_centre) const {
+  const double min_cos_view = std::cos(options_.max_view_angle_rad);
+  std::unordered_map<int32_t, size_t> index_of_landmark;
+  std::vector<Source> sources;
+  for (const size_t keyframe : keyframes_) {
+    for (size_t camera = 0; camera < map_.rig().cameras.size(); ++camera) {
+      const Eigen::Vector3d other_centre = map_.keyframes()[keyframe].map_from_vehicle *
+                                           map_.rig().cameras[camera].vehicle_from_camera->translation();
+      const auto [begin, end] = map_.observationsOf(keyframe, camera);
+      for (size_t i = begin; i < end; ++i) {
+        const int32_t landmark = map_.observations()[i].landmark;
+        const Eigen::Vector3d& point = map_.landmarks()[static_cast<size_t>(landmark)].position_m;
+        const Eigen::Vector3d from_here = point - camera_centre;
+        const Eigen::Vector3d from_there = point - other_centre;
+        const double range_m = from_here.norm(), other_range_m = from_there.norm();
+        const double cos_angle = from_here.dot(from_there) / (range_m * other_range_m);
+        if (!(cos_angle >= min_cos_view) || range_m > options_.max_range_ratio * other_range_m ||
+            other_range_m > options_.max_range_ratio * range_m) {
+          continue;
+        }
+        const auto [found, is_new] = index_of_landmark.emplace(landmark, sources.size());
+        if (is_new) {
+          sources.push_back({i, cos_angle});
+        } else if (cos_angle > sources[found->second].cos_angle) {
+          sources[found->second] = {i, cos_angle};
+        }
+      }
+    }
+  }
+  return sources;
+}
+
+ExpectedLandmarks LandmarkView::expectedIn(size_t camera) const {
+  const RigCamera& rig_camera = rig_.cameras[camera];
+  const RigidTransform map_from_camera = map_from_vehicle_ * *rig_camera.vehicle_from_camera;
+  const RigidTransform camera_from_map = map_from_camera.inverse();
+  const double min_cos_field = std::cos(0.5 * rig_camera.field_of_view_rad);
+  ExpectedLandmarks expected;
+  for (const Source& source : sourcesFor(map_from_camera.translation())) {
+    const int32_t landmark = map_.observations()[source.observation].landmark;
+    const Eigen::Vector3d point =
+        camera_from_map * map_.landmarks()[static_cast<size_t>(landmark)].position_m;
+    const double range_m = point.norm();
+    Eigen::Vector2d pixel;
+    if (point.z() >= min_cos_field * range_m && rig_camera.model.project(point, &pixel) && pixel.x() >= 0.0 &&
+        pixel.y() >= 0.0 && pixel.x() < rig_camera.image_size_px.width &&
+        pixel.y() < rig_camera.image_size_px.height) {
+      expected.observations.push_back(source.observation);
+      expected.positions_px.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
+      expected.ranges_m.push_back(range_m);
+    }
+  }
+  return expected;
+}
+
+}  // namespace vcharge

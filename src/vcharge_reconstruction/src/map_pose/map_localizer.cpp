@@ -1,0 +1,299 @@
+#include "vcharge_reconstruction/map_localizer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+#include <yaml-cpp/yaml.h>
+
+#include "map_pose/landmark_matcher.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/camera/pixel_angle.h"
+#include "vcharge_geometry/robust/pose_estimation.h"
+
+namespace vcharge {
+namespace {
+
+// What a pose of place recognition is good for, where the guided search about it begins.
+constexpr double kPlaceSigma_m = 0.2;
+constexpr double kPlaceSigma_rad = 0.02;
+/// Places that are asked for, to get as many candidates apart from each other.
+constexpr int kPlacesPerCandidate = 10;
+
+FeatureExtractorOptions extractorOptionsOf(const SparseMap& map) {
+  FeatureExtractorOptions options;
+  try {
+    readFields(YAML::Load(map.contents().feature_options), "map: feature_options", &options);
+  } catch (const YAML::Exception& error) {
+    throw InputError(std::string("map: feature_options: expected YAML: ") + error.what());
+  }
+  return options;
+}
+
+}  // namespace
+
+MatchOptions MapLocalizerOptions::closeMatches() {
+  MatchOptions options;
+  options.max_ratio = 0.85;
+  return options;
+}
+
+RobustOptions MapLocalizerOptions::defaultRobust() {
+  RobustOptions options;
+  options.max_error_rad = 0.004;
+  options.max_iterations = 500;
+  options.min_inliers = 12;
+  return options;
+}
+
+void MapLocalizerOptions::validate() const {
+  requireField(min_inliers >= 6, "min_inliers", "must be 6 or more", min_inliers);
+  requireField(min_inlier_ratio >= 0.0 && min_inlier_ratio <= 1.0, "min_inlier_ratio", "must be in [0, 1]",
+               min_inlier_ratio);
+  requireField(max_sigma_m > 0.0, "max_sigma_m", "must be positive", max_sigma_m);
+  requireField(max_sigma_rad > 0.0, "max_sigma_rad", "must be positive", max_sigma_rad);
+  requireField(max_distance_m > 0.0, "max_distance_m", "must be positive", max_distance_m);
+  requireField(max_keyframes >= 1, "max_keyframes", "must be 1 or more", max_keyframes);
+  requireField(max_view_angle_rad > 0.0, "max_view_angle_rad", "must be positive", max_view_angle_rad);
+  requireField(max_range_ratio >= 1.0, "max_range_ratio", "must be 1 or more", max_range_ratio);
+  requireField(min_radius_px > 0.0, "min_radius_px", "must be positive", min_radius_px);
+  requireField(max_radius_px >= min_radius_px, "max_radius_px", "must not be below min_radius_px",
+               max_radius_px);
+  requireField(radius_sigmas > 0.0, "radius_sigmas", "must be positive", radius_sigmas);
+  requireField(max_relative_distance > 0.0, "max_relative_distance", "must be positive",
+               max_relative_distance);
+  requireField(max_places >= 1, "max_places", "must be 1 or more", max_places);
+  requireField(min_inliers_without_prior >= 6, "min_inliers_without_prior", "must be 6 or more",
+               min_inliers_without_prior);
+  requireField(min_inliers_per_camera_without_prior >= 0, "min_inliers_per_camera_without_prior",
+               "must not be negative", min_inliers_per_camera_without_prior);
+  requireField(max_ambiguity > 0.0 && max_ambiguity <= 1.0, "max_ambiguity", "must be in (0, 1]",
+               max_ambiguity);
+  requireField(place_spacing_m >= 0.0, "place_spacing_m", "must not be negative", place_spacing_m);
+  requireField(place_spacing_rad >= 0.0, "place_spacing_rad", "must not be negative", place_spacing_rad);
+  requireField(place_max_error_rad > 0.0, "place_max_error_rad", "must be positive", place_max_error_rad);
+  requireField(other_place_m > 0.0, "other_place_m", "must be positive", other_place_m);
+  requireField(other_heading_rad > 0.0, "other_heading_rad", "must be positive", other_heading_rad);
+  validateInner("matching", matching);
+  validateInner("places", places);
+  validateInner("place_matching", place_matching);
+  validateInner("robust", robust);
+  requireField(min_error_px >= 0.0, "min_error_px", "must not be negative", min_error_px);
+}
+
+MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
+                           const MapLocalizerOptions& options)
+    : MapLocalizer(std::move(map), std::move(rig), options, nullptr) {}
+
+MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
+                           const MapLocalizerOptions& options, std::shared_ptr<const PlaceVotes> places)
+    : map_(std::move(map)),
+      rig_(std::move(rig)),
+      options_(options),
+      robust_(options.robust),
+      places_(std::move(places)) {
+  options_.validate();
+  check(map_ != nullptr && rig_ != nullptr, "MapLocalizer: expected a map and a rig");
+  if (!rig_->hasExtrinsics()) {
+    throw InputError("rig: expected vehicle_from_camera of every camera, which extrinsic calibration gives");
+  }
+  extractor_ = makeFeatureExtractor(extractorOptionsOf(*map_));
+  const cv::Mat& descriptors = map_->descriptors();
+  if (descriptors.type() != extractor_->descriptorType() ||
+      descriptors.cols != extractor_->descriptorColumns()) {
+    throw InputError("map: its descriptors are not those of its feature_options");
+  }
+  for (const RigCamera& camera : rig_->cameras) {
+    masks_.push_back(makeFeatureMask(camera));
+    robust_.max_error_rad = std::max(robust_.max_error_rad, options_.min_error_px * radiansPerPixel(camera));
+  }
+  matcher_ = std::make_unique<LandmarkMatcher>(map_, rig_, options_);
+  if (places_ != nullptr) {
+    return;
+  }
+  const size_t num_cameras = map_->rig().cameras.size();
+  std::vector<int32_t> images;
+  for (const MapObservation& observation : map_->observations()) {
+    images.push_back(observation.keyframe * static_cast<int32_t>(num_cameras) + observation.camera);
+  }
+  places_ =
+      std::make_shared<PlaceVotes>(descriptors, std::move(images), static_cast<int>(map_->keyframes().size()),
+                                   static_cast<int>(num_cameras), options_.places);
+}
+
+MapLocalizer::~MapLocalizer() = default;
+
+std::unique_ptr<MapLocalizer> MapLocalizer::forRig(std::shared_ptr<const CameraRig> rig) const {
+  return std::unique_ptr<MapLocalizer>(new MapLocalizer(map_, std::move(rig), options_, places_));
+}
+
+RigFeatures MapLocalizer::extract(const std::vector<Image>& images) const {
+  check(images.size() == rig_->cameras.size(), "MapLocalizer::extract: expected an image per camera");
+  RigFeatures features;
+  features.images.resize(images.size());
+  features.rays_in_camera.resize(images.size());
+  tbb::parallel_for(size_t{0}, images.size(), [&](size_t i) {
+    if (images[i].pixels.empty()) {
+      return;
+    }
+    features.images[i] = extractor_->extract(images[i].pixels, masks_[i]);
+    const std::vector<Keypoint>& keypoints = features.images[i].keypoints;
+    features.rays_in_camera[i].setZero(3, static_cast<Eigen::Index>(keypoints.size()));
+    for (size_t k = 0; k < keypoints.size(); ++k) {
+      Eigen::Vector3d ray;
+      if (rig_->cameras[i].model.unproject(
+              Eigen::Vector2d(keypoints[k].position_px.x, keypoints[k].position_px.y), &ray)) {
+        features.rays_in_camera[i].col(static_cast<Eigen::Index>(k)) = ray;
+      }
+    }
+  });
+  return features;
+}
+
+PoseFix MapLocalizer::fixWithoutPose(const LandmarkMatches& matches) const {
+  PoseFix fix;
+  fix.num_matches = static_cast<int>(matches.points.size());
+  fix.inliers_of_camera.assign(rig_->cameras.size(), 0);
+  fix.matches_of_camera.assign(rig_->cameras.size(), 0);
+  for (const LandmarkSighting& sighting : matches.sightings) {
+    ++fix.matches_of_camera[sighting.camera];
+  }
+  return fix;
+}
+
+PoseFix MapLocalizer::estimate(const LandmarkMatches& matches, int min_inliers,
+                               double min_inlier_ratio) const {
+  PoseFix fix = fixWithoutPose(matches);
+  if (fix.num_matches < min_inliers) {
+    return fix;
+  }
+  const PoseEstimate pose = estimateAbsolutePose(matches.points, robust_);
+  fix.status = LocalizationStatus::kNoConsensus;
+  if (pose.status != EstimationStatus::kOk) {
+    return fix;
+  }
+  for (const int i : pose.inliers) {
+    fix.inliers.push_back(matches.sightings[i]);
+    ++fix.inliers_of_camera[matches.sightings[i].camera];
+  }
+  fix.map_from_vehicle = pose.map_from_rig;
+  fix.covariance = pose.covariance;
+  if (fix.numInliers() >= min_inliers && fix.numInliers() >= min_inlier_ratio * fix.num_matches &&
+      fix.covariance.topLeftCorner<3, 3>().trace() <= options_.max_sigma_m * options_.max_sigma_m &&
+      fix.covariance.bottomRightCorner<3, 3>().trace() <= options_.max_sigma_rad * options_.max_sigma_rad) {
+    fix.status = LocalizationStatus::kLocalized;
+  }
+  return fix;
+}
+
+PoseFix MapLocalizer::localizeNear(const RigFeatures& features, const PosePrior& prior) const {
+  const double sigma_m = std::sqrt(prior.covariance.topLeftCorner<3, 3>().diagonal().maxCoeff());
+  const double sigma_rad = std::sqrt(prior.covariance.bottomRightCorner<3, 3>().diagonal().maxCoeff());
+  const PoseFix first = estimate(matcher_->searchNear(features, prior.map_from_vehicle, sigma_m, sigma_rad),
+                                 robust_.min_inliers, 0.0);
+  return first.inliers.empty() ? first : refine(features, first, options_.min_inliers);
+}
+
+PoseFix MapLocalizer::refine(const RigFeatures& features, const PoseFix& fix, int min_inliers) const {
+  return estimate(matcher_->searchNear(features, fix.map_from_vehicle, 0.0, 0.0), min_inliers,
+                  options_.min_inlier_ratio);
+}
+
+int MapLocalizer::minInliersWithoutPrior(const RigFeatures& features) const {
+  const auto num_cameras =
+      static_cast<int>(std::count_if(features.images.begin(), features.images.end(),
+                                     [](const ImageFeatures& image) { return !image.empty(); }));
+  return std::max(options_.min_inliers_without_prior,
+                  options_.min_inliers_per_camera_without_prior * num_cameras);
+}
+
+PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const {
+  const LandmarkMatches matches = matcher_->searchAtPlace(features, place);
+  // Few of these are right. A vehicle stands on the ground as the map's did: two matches tell its pose.
+  const RigidTransform& map_from_keyframe =
+      map_->keyframes()[static_cast<size_t>(place.place)].map_from_vehicle;
+  const Eigen::Quaterniond upright_from_vehicle =
+      rotationFromYawPitchRoll(-yawOfRotation(map_from_keyframe.rotation()), 0.0, 0.0) *
+      map_from_keyframe.rotation();
+  RobustOptions coarse = robust_;
+  coarse.max_error_rad = std::max(coarse.max_error_rad, options_.place_max_error_rad);
+  PoseEstimate pose;
+  if (options_.stands_upright) {
+    pose = estimateUprightPose(matches.points, upright_from_vehicle, coarse);
+  }
+  if (pose.status != EstimationStatus::kOk) {
+    pose = estimateAbsolutePose(matches.points, coarse);
+  }
+  if (pose.status != EstimationStatus::kOk) {
+    return fixWithoutPose(matches);
+  }
+  // The wide search tells right from wrong: hardly a wrong match fits a pose by chance there.
+  const PoseFix fix =
+      estimate(matcher_->searchNear(features, pose.map_from_rig, kPlaceSigma_m, kPlaceSigma_rad),
+               options_.min_inliers_without_prior, 0.0);
+  if (fix.status != LocalizationStatus::kLocalized) {
+    return fix;
+  }
+  return refine(features, fix, minInliersWithoutPrior(features));
+}
+
+bool MapLocalizer::isOtherPlace(const PoseFix& a, const PoseFix& b) const {
+  const RigidTransform between = a.map_from_vehicle.inverse() * b.map_from_vehicle;
+  return between.translation().norm() > options_.other_place_m ||
+         angleOfRotation(between.rotation()) > options_.other_heading_rad;
+}
+
+std::vector<PlaceMatch> MapLocalizer::recognizePlaces(const RigFeatures& features) const {
+  std::vector<cv::Mat> descriptors;
+  for (const ImageFeatures& image : features.images) {
+    descriptors.push_back(image.descriptors);
+  }
+  // Keyframes beside each other look alike: one of them stands for all, and leaves room for other places.
+  std::vector<PlaceMatch> places;
+  for (const PlaceMatch& match : places_->query(descriptors, kPlacesPerCandidate * options_.max_places)) {
+    const RigidTransform& pose = map_->keyframes()[static_cast<size_t>(match.place)].map_from_vehicle;
+    const bool is_new = std::none_of(places.begin(), places.end(), [&](const PlaceMatch& other) {
+      const RigidTransform between =
+          pose.inverse() * map_->keyframes()[static_cast<size_t>(other.place)].map_from_vehicle;
+      return between.translation().norm() < options_.place_spacing_m &&
+             angleOfRotation(between.rotation()) < options_.place_spacing_rad;
+    });
+    if (is_new) {
+      places.push_back(match);
+    }
+    if (static_cast<int>(places.size()) == options_.max_places) {
+      break;
+    }
+  }
+  return places;
+}
+
+PoseFix MapLocalizer::localizeAnywhere(const RigFeatures& features) const {
+  const std::vector<PlaceMatch> places = recognizePlaces(features);
+  std::vector<PoseFix> fixes(places.size());
+  tbb::parallel_for(size_t{0}, places.size(),
+                    [&](size_t i) { fixes[i] = localizeAtPlace(features, places[i]); });
+  PoseFix best = fixWithoutPose(LandmarkMatches());
+  for (const PoseFix& fix : fixes) {
+    const auto rank = [](const PoseFix& f) {
+      return std::make_pair(f.status == LocalizationStatus::kLocalized, f.numInliers());
+    };
+    if (rank(fix) > rank(best)) {
+      best = fix;
+    }
+  }
+  for (const PoseFix& fix : fixes) {
+    if (!fix.inliers.empty() && isOtherPlace(fix, best)) {
+      best.second_best_ratio = std::max(
+          best.second_best_ratio, static_cast<double>(fix.numInliers()) / std::max(1, best.numInliers()));
+    }
+  }
+  if (best.status == LocalizationStatus::kLocalized && best.second_best_ratio > options_.max_ambiguity) {
+    best.status = LocalizationStatus::kAmbiguous;
+  }
+  return best;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,72 @@
+#include "vcharge_reconstruction/map_assembly.h"
+
+#include <cstdlib>
+#include <sstream>
+#include <utility>
+
+#include "vcharge_core/base/options.h"
+
+namespace vcharge {
+namespace {
+
+/// The observation with a feature that is nearest in the drive; null where there is none.
+const TrackObservation* describedObservation(const Track& track, const TrackObservation& observation) {
+  const TrackObservation* best = nullptr;
+  for (const TrackObservation& other : track.observations) {
+    if (other.feature >= 0 && (best == nullptr || std::abs(other.keyframe - observation.keyframe) <
+                                                      std::abs(best->keyframe - observation.keyframe))) {
+      best = &other;
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+std::shared_ptr<const SparseMap> assembleMap(const MappingData& data, const std::vector<LoopEdge>& loop_edges,
+                                             const FeatureExtractorOptions& features,
+                                             const VocabularyTree& vocabulary) {
+  SparseMapContents contents;
+  contents.rig = *data.rig;
+  for (const Keyframe& keyframe : data.keyframes) {
+    contents.keyframes.push_back({keyframe.stamp, keyframe.map_from_vehicle});
+  }
+  std::vector<cv::Mat> descriptors;
+  for (const Track& track : data.tracks) {
+    if (!track.position_m) {
+      continue;
+    }
+    const auto landmark = static_cast<int32_t>(contents.landmarks.size());
+    bool is_described = false;
+    for (const TrackObservation& observation : track.observations) {
+      const TrackObservation* described =
+          observation.feature >= 0 ? &observation : describedObservation(track, observation);
+      if (described == nullptr) {
+        continue;
+      }
+      is_described = true;
+      contents.observations.push_back(
+          {observation.keyframe, observation.camera, landmark, observation.position_px.cast<float>()});
+      descriptors.push_back(
+          data.keyframes[described->keyframe].images[described->camera].features.descriptors.row(
+              described->feature));
+    }
+    if (is_described) {
+      contents.landmarks.push_back({*track.position_m, track.covariance_m2});
+    }
+  }
+  cv::vconcat(descriptors, contents.descriptors);
+  for (const LoopEdge& edge : loop_edges) {
+    contents.loop_edges.push_back(
+        {edge.first, edge.second, edge.first_from_second, edge.num_inliers, edge.accepted, edge.reason});
+  }
+  std::ostringstream feature_options;
+  feature_options << writeFields(features);
+  contents.feature_options = feature_options.str();
+  contents.vocabulary = vocabulary.serialize();
+  contents.odometry_distance_scale = data.odometry_distance_scale;
+  contents.odometry_turn_scale = data.odometry_turn_scale;
+  return std::make_shared<const SparseMap>(std::move(contents));
+}
+
+}  // namespace vcharge

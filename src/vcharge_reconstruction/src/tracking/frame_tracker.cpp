@@ -1,0 +1,282 @@
+#include "vcharge_reconstruction/frame_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <optional>
+#include <set>
+
+#include "vcharge_core/base/error.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kReferenceWidth_px = 1280.0;
+/// Points whose distance is unknown: on the ground, or this far.
+constexpr double kUsualRange_m = 10.0;
+constexpr double kMinRange_m = 1.0;
+
+/// Range at which a ray of the vehicle's frame is expected to meet something.
+double expectedRange(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction) {
+  if (direction.z() < 0.0 && origin_m.z() > 0.0) {
+    return std::clamp(-origin_m.z() / direction.z(), kMinRange_m, kUsualRange_m);
+  }
+  return kUsualRange_m;
+}
+
+/// Cells that hold points, to find those near a position.
+class OccupiedCells {
+ public:
+  OccupiedCells(cv::Size size, double spacing_px)
+      : cell_px_(spacing_px),
+        columns_(static_cast<int>(size.width / spacing_px) + 1),
+        rows_(static_cast<int>(size.height / spacing_px) + 1),
+        points_(static_cast<size_t>(columns_) * rows_) {}
+
+  void add(cv::Point2f point, int index) {
+    points_[cell(row(point), column(point))].push_back({point, index});
+  }
+
+  /// Index of the nearest point within the spacing, or -1.
+  int nearest(cv::Point2f point, double* distance_px) const {
+    int best = -1;
+    double best_squared = cell_px_ * cell_px_;
+    for (int y = std::max(0, row(point) - 1); y <= std::min(rows_ - 1, row(point) + 1); ++y) {
+      for (int x = std::max(0, column(point) - 1); x <= std::min(columns_ - 1, column(point) + 1); ++x) {
+        for (const auto& [other, index] : points_[cell(y, x)]) {
+          const cv::Point2f difference = other - point;
+          const double squared = difference.dot(difference);
+          if (squared < best_squared) {
+            best_squared = squared;
+            best = index;
+          }
+        }
+      }
+    }
+    *distance_px = std::sqrt(best_squared);
+    return best;
+  }
+
+ private:
+  int column(cv::Point2f point) const {
+    return std::clamp(static_cast<int>(point.x / cell_px_), 0, columns_ - 1);
+  }
+  int row(cv::Point2f point) const { return std::clamp(static_cast<int>(point.y / cell_px_), 0, rows_ - 1); }
+  size_t cell(int y, int x) const { return static_cast<size_t>(y) * columns_ + x; }
+
+  const double cell_px_;
+  const int columns_, rows_;
+  std::vector<std::vector<std::pair<cv::Point2f, int>>> points_;
+};
+
+}  // namespace
+
+PatchTrackerOptions FrameTrackerOptions::smallPatches() {
+  PatchTrackerOptions options;
+  options.window_px = 11;  // larger ones straddle what is near and what is far
+  options.max_forward_backward_px = 0.2;
+  options.max_iterations = 20;
+  return options;
+}
+
+void FrameTrackerOptions::validate() const {
+  requireField(max_tracks_per_camera >= 10, "max_tracks_per_camera", "must be 10 or more",
+               max_tracks_per_camera);
+  requireField(std::isfinite(min_spacing_px) && min_spacing_px >= 2.0, "min_spacing_px", "must be 2 or more",
+               min_spacing_px);
+  requireField(max_association_px >= 0.0 && max_association_px < 5.0, "max_association_px",
+               "must be in [0, 5)", max_association_px);
+  requireField(max_alignment_px >= 0.0, "max_alignment_px", "must not be negative", max_alignment_px);
+  requireField(tracking_sigma_px > 0.0 && tracking_sigma_px < 10.0, "tracking_sigma_px", "must be in (0, 10)",
+               tracking_sigma_px);
+  validateInner("patches", patches);
+  validateInner("alignment", alignment);
+}
+
+CameraTracker::CameraTracker(const RigCamera& camera, const FrameTrackerOptions& options)
+    : camera_(camera),
+      options_(options),
+      patch_tracker_(options.patches),
+      mask_(makeFeatureMask(camera)),
+      spacing_px_(std::max(4.0, options.min_spacing_px * camera.image_size_px.width / kReferenceWidth_px)) {}
+
+RigidTransform CameraTracker::vehicleFromCamera() const {
+  return camera_.vehicle_from_camera.value_or(RigidTransform());
+}
+
+cv::Point2f CameraTracker::predict(const LiveTrack& track,
+                                   const RigidTransform& current_from_previous) const {
+  if (!camera_.vehicle_from_camera) {
+    return track.position_px + track.last_step_px;
+  }
+  const RigidTransform& vehicle_from_camera = *camera_.vehicle_from_camera;
+  const Eigen::Vector3d direction = vehicle_from_camera.rotation() * track.ray_in_camera;
+  const Eigen::Vector3d point = vehicle_from_camera.translation() +
+                                expectedRange(vehicle_from_camera.translation(), direction) * direction;
+  Eigen::Vector2d pixel;
+  if (!camera_.model.project(vehicle_from_camera.inverse() * (current_from_previous * point), &pixel)) {
+    return track.position_px;
+  }
+  return cv::Point2f(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
+}
+
+void CameraTracker::track(const Image& image, const RigidTransform& previous_from_current, int camera_index,
+                          std::vector<RayMatch>* matches) {
+  image_ = image;
+  if (image.pixels.empty()) {
+    tracks_.clear();
+    anchors_.clear();
+    pyramid_ = ImagePyramid();
+    return;
+  }
+  ImagePyramid current = patch_tracker_.buildPyramid(image.pixels);
+  std::vector<LiveTrack> kept;
+  if (!tracks_.empty()) {
+    const RigidTransform current_from_previous = previous_from_current.inverse();
+    std::vector<cv::Point2f> points, predictions;
+    for (const LiveTrack& track : tracks_) {
+      points.push_back(track.position_px);
+      predictions.push_back(predict(track, current_from_previous));
+    }
+    const std::vector<TrackedPoint> tracked =
+        patch_tracker_.track(pyramid_, current, points, mask_, predictions);
+    const RigidTransform vehicle_from_camera = vehicleFromCamera();
+    const Ray camera_ray{vehicle_from_camera.translation(), Eigen::Vector3d::Zero()};
+    for (size_t i = 0; i < tracks_.size(); ++i) {
+      LiveTrack next = tracks_[i];
+      next.position_px = tracked[i].position_px;
+      next.last_step_px = next.position_px - tracks_[i].position_px;
+      if (tracked[i].status != TrackStatus::kTracked ||
+          !camera_.model.unproject(Eigen::Vector2d(next.position_px.x, next.position_px.y),
+                                   &next.ray_in_camera)) {
+        continue;
+      }
+      RayMatch match;
+      match.previous = match.current = camera_ray;
+      match.previous.direction = vehicle_from_camera.rotation() * tracks_[i].ray_in_camera;
+      match.current.direction = vehicle_from_camera.rotation() * next.ray_in_camera;
+      match.previous_camera = match.current_camera = camera_index;
+      matches->push_back(match);
+      kept.push_back(next);
+    }
+  }
+  tracks_ = std::move(kept);
+  pyramid_ = std::move(current);
+}
+
+void CameraTracker::keep(const std::vector<bool>& is_good) {
+  check(is_good.size() == tracks_.size(), "CameraTracker::keep: expected an entry per match");
+  size_t kept = 0;
+  for (size_t i = 0; i < tracks_.size(); ++i) {
+    if (is_good[i]) {
+      tracks_[kept++] = tracks_[i];
+    }
+  }
+  tracks_.resize(kept);
+}
+
+bool CameraTracker::isMasked(const Eigen::Vector2d& position_px) const {
+  return !mask_.empty() && mask_.at<uint8_t>(static_cast<int>(std::lround(position_px.y())),
+                                             static_cast<int>(std::lround(position_px.x()))) == 0;
+}
+
+void CameraTracker::alignWithAnchors(int32_t keyframe) {
+  for (LiveTrack& track : tracks_) {
+    const Eigen::Vector2d position_px(track.position_px.x, track.position_px.y);
+    const std::optional<PatchPlace> place =
+        alignPatch(anchors_.at(track.anchor_keyframe).pixels, image_.pixels,
+                   {track.anchor_px.x, track.anchor_px.y}, {position_px, track.shape}, options_.alignment);
+    if (place && (place->position_px - position_px).norm() <= options_.max_alignment_px &&
+        !isMasked(place->position_px) && camera_.model.unproject(place->position_px, &track.ray_in_camera)) {
+      track.position_px =
+          cv::Point2f(static_cast<float>(place->position_px.x()), static_cast<float>(place->position_px.y()));
+      track.shape = place->shape;
+    } else {
+      track.anchor_keyframe = keyframe;
+      track.anchor_px = track.position_px;
+      track.shape.setIdentity();
+    }
+  }
+}
+
+void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, const FeatureExtractor& extractor,
+                                MappingData* data) {
+  KeyframeImage& out = data->keyframes[keyframe].images[camera_index];
+  if (image_.pixels.empty()) {
+    return;
+  }
+  alignWithAnchors(keyframe);
+  out.features = extractor.extract(image_.pixels, mask_);
+  const size_t num_features = out.features.size();
+  out.track_of_feature.assign(num_features, -1);
+  out.rays_in_camera.resize(3, static_cast<Eigen::Index>(num_features));
+
+  OccupiedCells cells(camera_.image_size_px, spacing_px_);
+  std::vector<double> best_distance_px(tracks_.size(), options_.max_association_px);
+  std::vector<int> feature_of_track(tracks_.size(), -1);
+  for (size_t i = 0; i < tracks_.size(); ++i) {
+    cells.add(tracks_[i].position_px, static_cast<int>(i));
+  }
+  std::vector<size_t> free_features;
+  for (size_t i = 0; i < num_features; ++i) {
+    const cv::Point2f position = out.features.keypoints[i].position_px;
+    Eigen::Vector3d ray = Eigen::Vector3d::Zero();
+    camera_.model.unproject(Eigen::Vector2d(position.x, position.y), &ray);
+    out.rays_in_camera.col(static_cast<Eigen::Index>(i)) = ray;
+    double distance_px = 0.0;
+    const int track = cells.nearest(position, &distance_px);
+    if (track < 0) {
+      free_features.push_back(i);
+    } else if (distance_px <= best_distance_px[track]) {
+      best_distance_px[track] = distance_px;
+      feature_of_track[track] = static_cast<int>(i);
+    }
+  }
+  for (size_t i = 0; i < tracks_.size(); ++i) {
+    if (feature_of_track[i] >= 0) {
+      out.track_of_feature[feature_of_track[i]] = tracks_[i].track;
+    }
+    data->tracks[tracks_[i].track].observations.push_back(
+        {keyframe, camera_index, feature_of_track[i],
+         Eigen::Vector2d(tracks_[i].position_px.x, tracks_[i].position_px.y), options_.tracking_sigma_px});
+  }
+  // The most distinct features first.
+  std::stable_sort(free_features.begin(), free_features.end(), [&](size_t a, size_t b) {
+    return out.features.keypoints[a].response > out.features.keypoints[b].response;
+  });
+  const auto max_tracks = static_cast<size_t>(options_.max_tracks_per_camera);
+  for (const size_t feature : free_features) {
+    if (tracks_.size() >= max_tracks) {
+      break;
+    }
+    const cv::Point2f position = out.features.keypoints[feature].position_px;
+    double distance_px = 0.0;
+    if (cells.nearest(position, &distance_px) >= 0) {
+      continue;  // near a track that began at this keyframe
+    }
+    const auto track = static_cast<int32_t>(data->tracks.size());
+    data->tracks.emplace_back();
+    data->tracks.back().observations.push_back({keyframe, camera_index, static_cast<int32_t>(feature),
+                                                Eigen::Vector2d(position.x, position.y),
+                                                options_.tracking_sigma_px});
+    out.track_of_feature[feature] = track;
+    cells.add(position, static_cast<int>(tracks_.size()));
+    LiveTrack begun;
+    begun.track = track;
+    begun.position_px = begun.anchor_px = position;
+    begun.ray_in_camera = out.rays_in_camera.col(static_cast<Eigen::Index>(feature));
+    begun.anchor_keyframe = keyframe;
+    tracks_.push_back(begun);
+  }
+  anchors_.emplace(keyframe, image_);
+  std::set<int32_t> used;
+  for (const LiveTrack& track : tracks_) {
+    used.insert(track.anchor_keyframe);
+  }
+  for (auto anchor = anchors_.begin(); anchor != anchors_.end();) {
+    anchor = used.count(anchor->first) > 0 ? std::next(anchor) : anchors_.erase(anchor);
+  }
+}
+
+}  // namespace vcharge

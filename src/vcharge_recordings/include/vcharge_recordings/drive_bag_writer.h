@@ -1,0 +1,38 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <opencv2/core.hpp>
+
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/motion/vehicle_odometry.h"
+
+namespace vcharge {
+
+/// Writes a recorded drive on the suite's standard topics: images and camera_info of every camera, /odom,
+/// /wheel_ticks and, for simulated drives, /ground_truth. The bag appears under its name only once close()
+/// returned. A message's time of arrival in the bag is `received`, or its stamp where that is not given.
+class DriveBagWriter {
+ public:
+  /// InputError when the folder cannot be written.
+  DriveBagWriter(const std::string& path, const CameraRig& rig);
+  /// Removes the unfinished file unless close() was called.
+  ~DriveBagWriter();
+
+  /// CV_8UC1 of the rig's size.
+  void writeImage(size_t camera_index, Timestamp stamp, const cv::Mat& pixels,
+                  std::optional<Timestamp> received = std::nullopt);
+  void writeOdometry(const VehicleOdometry& odometry, std::optional<Timestamp> received = std::nullopt);
+  void writeWheelTicks(const WheelTicks& ticks, std::optional<Timestamp> received = std::nullopt);
+  /// `world` -> `base_link`, exact.
+  void writeGroundTruth(const VehicleOdometry& truth);
+  void close();
+
+ private:
+  struct Implementation;
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace vcharge

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/frames/recorded_drive.h"
+#include "vcharge_ros/drive_topics.h"
+
+namespace vcharge {
+
+/// Hands all images and the odometry of a bag over in the order in which they were recorded. Topics that the
+/// bag lacks bring nothing; messages that cannot be understood are told to the consumer. `progress` (may be
+/// empty) takes the share done. InputError for a file that is no bag, or that is truncated.
+void readRecordedDrive(const std::string& bag_path, const CameraRig& rig, const DriveTopics& topics,
+                       RecordedDriveConsumer* consumer, const std::function<void(double)>& progress);
+
+}  // namespace vcharge

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "vcharge_core/base/quantile.h"
+#include "vcharge_core/base/text_format.h"
+#include "vcharge_recordings/drive_check.h"
+
+namespace vcharge::internal {
+
+/// Collects what checks find.
+class CheckFindings {
+ public:
+  void add(const std::string& subject, CheckGrade grade, std::string what) {
+    findings_.push_back({subject, grade, std::move(what)});
+  }
+  /// A number that should be small.
+  void atMost(const std::string& subject, double value, double warn, double fail, const std::string& figure,
+              const std::string& advice) {
+    const CheckGrade grade = value > fail   ? CheckGrade::kFail
+                             : value > warn ? CheckGrade::kWarn
+                                            : CheckGrade::kPass;
+    add(subject, grade, grade == CheckGrade::kPass ? figure : figure + ": " + advice);
+  }
+  std::vector<CheckFinding> take() { return std::move(findings_); }
+
+ private:
+  std::vector<CheckFinding> findings_;
+};
+
+constexpr double kDegree = 3.14159265358979323846 / 180.0;
+
+inline std::string percentText(double share) {
+  return toText(100.0 * share, share < 0.01 ? 2 : 1) + " %";
+}
+
+inline double shareOf(int64_t part, int64_t whole) {
+  return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+}  // namespace vcharge::internal

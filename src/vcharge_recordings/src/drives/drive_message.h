@@ -1,0 +1,27 @@
+#pragma once
+
+#include <string>
+
+#include "vcharge_core/base/timestamp.h"
+#include "vcharge_recordings/bag_reader.h"
+#include "vcharge_ros/drive_item.h"
+
+namespace vcharge::internal {
+
+enum class DriveTopicKind { kImage, kCompressedImage, kOdometry, kWheelTicks };
+
+/// What a topic of a drive carries.
+struct DriveTopicRole {
+  DriveTopicKind kind;
+  size_t camera_index = 0;
+};
+
+/// "nav_msgs/Odometry"
+const char* expectedType(DriveTopicKind kind);
+
+/// The content of a bag's message and its stamp, whatever size an image has. InputError naming the bag and
+/// the topic for what cannot be understood.
+DriveItem convertDriveMessage(const BagMessage& message, const DriveTopicRole& role,
+                              const std::string& vehicle_frame, Timestamp* stamp);
+
+}  // namespace vcharge::internal

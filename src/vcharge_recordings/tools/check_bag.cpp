@@ -1,0 +1,58 @@
+#include <iomanip>
+#include <iostream>
+
+#include "vcharge_core/base/command_line.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/base/progress_bar.h"
+#include "vcharge_recordings/drive_check.h"
+#include "vcharge_recordings/recorded_drive_reader.h"
+
+namespace vcharge {
+namespace {
+
+void print(const std::vector<CheckFinding>& findings, bool quiet) {
+  size_t width = 0;
+  for (const CheckFinding& finding : findings) {
+    width = std::max(width, finding.subject.size());
+  }
+  for (const CheckFinding& finding : findings) {
+    if (!quiet || finding.grade != CheckGrade::kPass) {
+      std::cout << toString(finding.grade) << "  " << std::left << std::setw(static_cast<int>(width))
+                << finding.subject << "  " << finding.what << "\n";
+    }
+  }
+  std::cout << "verdict: " << toString(worstGrade(findings)) << std::endl;
+}
+
+}  // namespace
+}  // namespace vcharge
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Judges a recorded drive before hours are spent on it: PASS, WARN or FAIL of each check, with reasons. "
+      "The exit status is 0 unless something fails.");
+  std::string bag, rig_path;
+  bool quiet = false;
+  vcharge::DriveTopics topics;
+  app.add_option("--bag", bag, "the drive")->required()->check(vcharge::requireNotEmpty);
+  app.add_option("--rig", rig_path, "rig.yaml, with extrinsics or without")
+      ->required()
+      ->check(vcharge::requireNotEmpty);
+  app.add_option("--odometry-topic", topics.odometry, "topic of the odometry")->capture_default_str();
+  app.add_option("--image-topic", topics.image, "topic of the images")->capture_default_str();
+  app.add_flag("--quiet", quiet, "print only what does not pass");
+  return vcharge::runTool(&app, argc, argv, [&] {
+    topics.validate();
+    const auto rig = std::make_shared<const vcharge::CameraRig>(vcharge::readCameraRig(rig_path));
+    vcharge::DriveChecker checker(rig);
+    {
+      vcharge::ProgressBar progress("checking " + bag);
+      vcharge::readRecordedDrive(bag, *rig, topics, &checker, [&](double share) { progress.update(share); });
+    }
+    const std::vector<vcharge::CheckFinding> findings = checker.findings();
+    vcharge::print(findings, quiet);
+    if (vcharge::worstGrade(findings) == vcharge::CheckGrade::kFail) {
+      throw vcharge::InputError(bag + ": the drive is not fit for use");
+    }
+  });
+}

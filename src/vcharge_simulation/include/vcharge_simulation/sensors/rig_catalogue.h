@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_simulation/scenes/scene_catalogue.h"
+
+namespace vcharge {
+
+/// Name and one line about each rig.
+std::vector<CatalogueEntry> listRigs();
+
+/// A rig of the catalogue, without masks: the same arguments give the same rig. image_scale: size over
+/// 1280x800, at most 1. std::invalid_argument that lists the names there are for an unknown one, and for a
+/// scale outside (0, 1].
+CameraRig makeRig(const std::string& name, uint64_t seed, double image_scale);
+
+}  // namespace vcharge

@@ -1,0 +1,234 @@
+#include "drive/drive_recorder.h"
+
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "sensors/image_source.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/base/progress_bar.h"
+#include "vcharge_core/files/file_io.h"
+#include "vcharge_recordings/drive_bag_writer.h"
+#include "vcharge_simulation/drive/truth_maps.h"
+#include "vcharge_simulation/faults/fault_truth.h"
+#include "vcharge_simulation/faults/image_faults.h"
+#include "vcharge_simulation/rendering/renderer.h"
+#include "vcharge_simulation/scenes/scene_catalogue.h"
+#include "vcharge_simulation/sensors/recorded_cameras.h"
+
+namespace vcharge {
+
+namespace {
+
+DrivePlan planDriveOf(const DriveScenario& scenario) {
+  DrivePlan plan = planDrive(scenario.scene, scenario.drive);
+  if (scenario.duration_s > 0.0) {
+    plan.motion.duration_s = scenario.duration_s;
+  }
+  return plan;
+}
+
+// Leaves every step-th image.
+template <class T>
+void thin(int step, std::vector<T>* list) {
+  std::vector<T> kept;
+  for (size_t i = 0; i < list->size(); i += static_cast<size_t>(step)) {
+    kept.push_back(std::move((*list)[i]));
+  }
+  *list = std::move(kept);
+}
+
+// Faults that change what is rendered cannot come from images that were rendered without them.
+void checkImagesCanBeReused(const FaultOptions& faults, const std::string& images_from) {
+  for (const auto& [name, is_active] : {std::pair("bumped_camera", faults.bumped_camera.isActive()),
+                                        std::pair("motion_blur", faults.motion_blur.isActive())}) {
+    if (is_active) {
+      throw InputError("faults." + std::string(name) + ": has to be rendered, images of " + images_from +
+                       " cannot be used");
+    }
+  }
+}
+
+std::vector<ImageFaults::Camera> faultyCameras(const RecordedCameras& cameras) {
+  std::vector<ImageFaults::Camera> list;
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    list.push_back({cameras.name(i), cameras.index(i), cameras.rig().cameras[i].image_size_px});
+  }
+  return list;
+}
+
+// Odometry, counters and truth, in the order of their stamps.
+class MotionRecorder {
+ public:
+  MotionRecorder(const SimulatedDrive& drive, const OdometryStampShiftFault& shift, DriveBagWriter* writer)
+      : drive_(drive), shift_(shift), writer_(writer) {}
+
+  /// Up to and with `end`, or all that is left.
+  void writeUntil(std::optional<Timestamp> end) {
+    const auto isDue = [&](const auto& list, size_t i) {
+      return i < list.size() && (!end || list[i].stamp <= *end);
+    };
+    while (isDue(drive_.ground_truth, truth_)) {
+      const Timestamp stamp = drive_.ground_truth[truth_].stamp;
+      if (isDue(drive_.odometry, odometry_) && drive_.odometry[odometry_].stamp == stamp) {
+        VehicleOdometry odometry = drive_.odometry[odometry_++];
+        odometry.stamp = shifted(stamp);
+        writer_->writeOdometry(odometry, stamp);
+      }
+      writer_->writeGroundTruth(drive_.ground_truth[truth_++]);
+    }
+    for (; isDue(drive_.wheel_ticks, ticks_); ++ticks_) {
+      WheelTicks ticks = drive_.wheel_ticks[ticks_];
+      const Timestamp stamp = ticks.stamp;
+      ticks.stamp = shifted(stamp);
+      writer_->writeWheelTicks(ticks, stamp);
+    }
+  }
+
+ private:
+  Timestamp shifted(Timestamp stamp) const {
+    const bool acts = shift_.isActive() && shift_.actsAt(stamp - drive_.ground_truth.front().stamp);
+    return acts ? stamp + durationFromSeconds(shift_.shift_s) : stamp;
+  }
+
+  const SimulatedDrive& drive_;
+  const OdometryStampShiftFault shift_;
+  DriveBagWriter* writer_;
+  size_t odometry_ = 0, truth_ = 0, ticks_ = 0;
+};
+
+// A rig beside its masks.
+void writeTruthRig(CameraRig rig, const std::string& folder, const std::string& suffix) {
+  for (RigCamera& camera : rig.cameras) {
+    camera.mask_file = camera.name + "_mask" + suffix + ".png";
+  }
+  writeCameraRig(rig, folder + "/rig" + suffix + ".yaml");
+}
+
+void writeRange(const cv::Mat& range_m, const std::string& folder, Timestamp stamp) {
+  const std::string path = folder + "/" + std::to_string(stamp.nanoseconds()) + ".tiff";
+  if (!cv::imwrite(path, range_m)) {
+    throw InputError(path + ": cannot be written");
+  }
+}
+
+}  // namespace
+
+void RecordingOptions::validate() const {
+  requireField(std::isfinite(height_cell_m) && height_cell_m >= 0.01, "height_cell_m",
+               "must be at least 0.01", height_cell_m);
+  requireField(std::isfinite(height_limit_m), "height_limit_m", "must be a number", height_limit_m);
+}
+
+void recordDrive(const DriveScenario& scenario, const RecordingOptions& recording) {
+  scenario.validate();
+  recording.validate();
+  const DrivePlan plan = planDriveOf(scenario);
+  const std::filesystem::path bag(recording.bag);
+  const std::string truth_name = bag.stem().string() + "_truth";
+  const RecordedCameras cameras(scenario, "rig_truth_masks");
+  const CameraRig& rig = cameras.rig();
+  const FaultOptions& faults = scenario.faults;
+  SimulatedDrive drive =
+      simulateDrive(plan.path, plan.motion, scenario.odometer, static_cast<uint64_t>(scenario.seed),
+                    scenario.sensorSeed(), faults, plan.ground_height);
+  thin(scenario.image_step, &drive.world_from_vehicle);
+  thin(scenario.image_step, &drive.exposure_poses);
+  const Timestamp start = drive.ground_truth.front().stamp;
+
+  DriveBagWriter writer(recording.bag, rig);
+  FolderTransaction truth((bag.parent_path() / truth_name).string());
+
+  std::vector<Timestamp> stamps;
+  std::vector<double> scene_times_s;
+  for (const auto& [stamp, world_from_vehicle] : drive.world_from_vehicle) {
+    stamps.push_back(stamp);
+    scene_times_s.push_back(plan.start_s +
+                            1e-9 * static_cast<double>((stamp - drive.ground_truth.front().stamp).count()));
+  }
+  const CameraResponse response(scenario.response);
+  std::optional<Renderer> renderer;
+  std::unique_ptr<ImageSource> images;
+  writeTrajectory(drive.world_from_vehicle, truth.path() + "/trajectory.tum");
+  if (recording.images_from.empty()) {
+    SceneOptions scene;
+    scene.seed = scenario.scene_seed;
+    scene.day = plan.day;
+    scene.image_scale = scenario.image_scale;
+    scene.board = scenario.board;
+    scene.rig = scenario.rig;
+    scene.rig_seed = scenario.rig_seed;
+    renderer.emplace(buildScene(scenario.scene, scene));
+    images = renderImages(*renderer, cameras, response, drive, scene_times_s, faults.motion_blur);
+    writeHeightMap(computeHeightMap(*renderer, recording.height_cell_m, recording.height_limit_m),
+                   truth.path() + "/height_map");
+    writeObstacles(renderer->scene().obstacles, truth.path() + "/obstacles.yaml");
+    if (!renderer->scene().movers.empty()) {
+      writeMovers(renderer->scene().movers, stamps, scene_times_s, truth.path() + "/movers.yaml");
+    }
+  } else {
+    checkImagesCanBeReused(faults, recording.images_from);
+    images = readImages(recording.images_from, rig, drive);
+  }
+  if (scenario.scene == "chessboard") {
+    writeTextFileAtomically(truth.path() + "/board.yaml", boardTarget(scenario.board));
+  }
+  const bool truth_range = recording.truth_range && renderer.has_value();
+  for (const RigCamera& camera : rig.cameras) {
+    if (truth_range) {
+      createFolder(truth.path() + "/range/" + camera.name);
+    }
+  }
+
+  ImageFaults image_faults(faults, faultyCameras(cameras), response, start, scenario.sensorSeed());
+  MotionRecorder motion(drive, faults.odometry_stamp_shift, &writer);
+  ProgressBar progress("simulating " + scenario.drive);
+  for (size_t frame = 0; frame < drive.world_from_vehicle.size(); ++frame) {
+    const auto& [stamp, world_from_vehicle] = drive.world_from_vehicle[frame];
+    motion.writeUntil(stamp);
+    for (size_t camera = 0; camera < cameras.size(); ++camera) {
+      cv::Mat image = image_faults.throughLens(camera, stamp, images->image(camera, frame));
+      const double gain = image_faults.exposureGain(camera, stamp);
+      if (scenario.noise) {
+        image = response.addNoise(image, scenario.sensorSeed(), cameras.index(camera),
+                                  static_cast<int64_t>(frame), gain * scenario.exposure_gain);
+      } else if (gain != 1.0) {
+        image = response.expose(image, gain);
+      }
+      const size_t plug = cameras.plug(camera, stamp - start);
+      if (const std::optional<DeliveredImage> delivered = image_faults.deliver(camera, frame, stamp, image)) {
+        writer.writeImage(plug, delivered->stamp, delivered->pixels, delivered->received);
+      }
+      if (truth_range) {
+        writeRange(renderer->renderRange(cameras.view(camera, stamp - start), world_from_vehicle,
+                                         scene_times_s[frame]),
+                   truth.path() + "/range/" + cameras.name(plug), stamp);
+      }
+    }
+    progress.update(static_cast<double>(frame + 1) / static_cast<double>(drive.world_from_vehicle.size()));
+  }
+  motion.writeUntil(std::nullopt);
+  std::vector<std::string> names;
+  for (const RigCamera& camera : rig.cameras) {
+    names.push_back(camera.name);
+  }
+  writeFaults(faults, start, names, image_faults.hits(), truth.path() + "/faults.yaml");
+  writeTruthRig(rig, truth.path(), "");
+  if (cameras.isRigFaulty()) {
+    writeTruthRig(rig, truth.path(), "_before");
+    writeTruthRig(cameras.rigAfterFaults(), truth.path(), "_after");
+  }
+  writer.close();
+  truth.commit();
+  // A copy for many drives with one rig; its masks are its own, so that it outlives each drive.
+  createFolder((bag.parent_path() / "rig_truth_masks").string());
+  writeCameraRig(rig, (bag.parent_path() / "rig_truth.yaml").string());
+}
+
+}  // namespace vcharge

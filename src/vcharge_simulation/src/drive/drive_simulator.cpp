@@ -1,0 +1,85 @@
+#include "vcharge_simulation/drive/drive_simulator.h"
+
+#include <cmath>
+
+namespace vcharge {
+
+namespace {
+
+constexpr int kImagePeriod_ms = 80;
+constexpr int kImageOffset_ms = 7;
+constexpr int kOdometryPeriod_ms = 20;
+// An arbitrary date: stamps have as many digits as those of real drives.
+constexpr int64_t kStart_ns = 1'400'000'000'000'000'000;
+
+Timestamp stampAt(int milliseconds) {
+  return Timestamp::fromNanoseconds(kStart_ns + static_cast<int64_t>(milliseconds) * 1'000'000);
+}
+
+RigidTransform worldFromVehicleAt(const VehicleMotion& motion, double milliseconds) {
+  const double before = std::floor(milliseconds);
+  const int index = static_cast<int>(before);
+  return interpolate(motion.at(index).worldFromVehicle(), motion.at(index + 1).worldFromVehicle(),
+                     milliseconds - before);
+}
+
+std::vector<RigidTransform> exposurePoses(const VehicleMotion& motion, int middle_ms,
+                                          const MotionBlurFault& blur) {
+  std::vector<RigidTransform> poses;
+  for (int i = 0; i < blur.renderings; ++i) {
+    const double share = (i + 0.5) / blur.renderings - 0.5;
+    poses.push_back(worldFromVehicleAt(motion, middle_ms + 1000.0 * share * blur.exposure_time_s));
+  }
+  return poses;
+}
+
+}  // namespace
+
+SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& motion_options,
+                             const WheelOdometerOptions& odometer_options, uint64_t road_seed,
+                             uint64_t wheel_seed, const FaultOptions& faults,
+                             const GroundHeight& ground_height) {
+  VehicleMotionOptions faulty_motion = motion_options;
+  faulty_motion.pitch_rad_per_m_per_s2 *= faults.soft_suspension.pitch_factor;
+  const VehicleMotion motion(path, faulty_motion, road_seed, ground_height);
+  const WheelOdometer odometer(motion, odometer_options, wheel_seed + 1, faults);
+  const int duration_ms = static_cast<int>(std::floor(motion.duration() * 1000.0 + 0.5));
+  SimulatedDrive drive;
+  std::vector<int> odometry_ms;
+  for (int time_ms = 0; time_ms <= duration_ms; ++time_ms) {
+    const bool is_image = time_ms % kImagePeriod_ms == kImageOffset_ms;
+    const bool is_odometry = time_ms % kOdometryPeriod_ms == 0;
+    const bool is_missing =
+        faults.missing_ticks.isActive() && faults.missing_ticks.actsAt(std::chrono::milliseconds(time_ms));
+    if (is_image) {
+      drive.world_from_vehicle.push_back({stampAt(time_ms), motion.at(time_ms).worldFromVehicle()});
+      if (faults.motion_blur.isActive()) {
+        drive.exposure_poses.push_back(exposurePoses(motion, time_ms, faults.motion_blur));
+      }
+    }
+    if ((is_image || is_odometry) && !is_missing) {
+      odometry_ms.push_back(time_ms);
+    }
+    if (is_image || is_odometry) {
+      const MotionSample& sample = motion.at(time_ms);
+      VehicleOdometry truth;
+      truth.stamp = stampAt(time_ms);
+      truth.odom_from_vehicle = sample.worldFromVehicle();
+      truth.forward_speed_m_per_s = sample.speed_m_per_s;
+      truth.yaw_rate_rad_per_s = sample.speed_m_per_s * sample.curvature_per_m;
+      drive.ground_truth.push_back(truth);
+    }
+    if (is_odometry && !is_missing) {
+      WheelTicks ticks = odometer.ticks(time_ms);
+      ticks.stamp = stampAt(time_ms);
+      drive.wheel_ticks.push_back(ticks);
+    }
+  }
+  drive.odometry = odometer.deadReckoning(odometry_ms);
+  for (size_t i = 0; i < drive.odometry.size(); ++i) {
+    drive.odometry[i].stamp = stampAt(odometry_ms[i]);
+  }
+  return drive;
+}
+
+}  // namespace vcharge

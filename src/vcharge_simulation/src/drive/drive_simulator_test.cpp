@@ -1,0 +1,176 @@
+#include "vcharge_simulation/drive/drive_simulator.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "vcharge_simulation/scenes/lot_scene.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kDegree = 3.14159265358979323846 / 180.0;
+
+TEST(DriveSimulatorTest, ImagesComeEvery80Milliseconds) {
+  const DrivePlan plan = planLotDrive("short");
+  const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1);
+  ASSERT_GT(drive.world_from_vehicle.size(), 50U);
+  for (size_t i = 1; i < drive.world_from_vehicle.size(); ++i) {
+    EXPECT_EQ((drive.world_from_vehicle[i].stamp - drive.world_from_vehicle[i - 1].stamp).count(),
+              80'000'000);
+  }
+}
+
+TEST(DriveSimulatorTest, OdometryTurnsWithTruthWithinThreeHundredthsOfADegreePerFrame) {
+  for (const char* name : {"short", "figure_eight"}) {
+    const DrivePlan plan = planLotDrive(name);
+    WheelOdometerOptions options;
+    options.left_right_error = 0.0;
+    const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, options, 3, 3);
+    double worst_rad = 0.0;
+    size_t frames = 0;
+    const VehicleOdometry* last_odometry = nullptr;
+    const VehicleOdometry* last_truth = nullptr;
+    for (size_t i = 0; i < drive.odometry.size(); ++i) {
+      const bool is_image = drive.odometry[i].stamp.nanoseconds() / 1'000'000 % 10 == 7;
+      if (!is_image) {
+        continue;
+      }
+      if (last_odometry != nullptr) {
+        const double turn = yawOfRotation(
+            (last_odometry->odom_from_vehicle.inverse() * drive.odometry[i].odom_from_vehicle).rotation());
+        const double truth = yawOfRotation(
+            (last_truth->odom_from_vehicle.inverse() * drive.ground_truth[i].odom_from_vehicle).rotation());
+        worst_rad = std::max(worst_rad, std::abs(turn - truth * (1.0 + options.scale_error)));
+        ++frames;
+      }
+      last_odometry = &drive.odometry[i];
+      last_truth = &drive.ground_truth[i];
+    }
+    EXPECT_GT(frames, 50U);
+    EXPECT_LT(worst_rad, 0.03 * kDegree) << name;
+    RecordProperty(std::string("worst_mdeg_") + name, static_cast<int>(worst_rad / kDegree * 1000));
+  }
+}
+
+TEST(DriveSimulatorTest, OdometryScalesWithTheWheelRadiusError) {
+  const DrivePath straight(RigidTransform(), {{40.0, 0.0, 0.0}});
+  VehicleMotionOptions motion;
+  WheelOdometerOptions options;
+  options.scale_error = 0.02;
+  options.left_right_error = 0.0;
+  const SimulatedDrive drive = simulateDrive(straight, motion, options, 5, 5);
+  const double driven_m = (drive.ground_truth.back().odom_from_vehicle.translation() -
+                           drive.ground_truth.front().odom_from_vehicle.translation())
+                              .head<2>()
+                              .norm();
+  const double counted_m = drive.odometry.back().odom_from_vehicle.translation().norm();
+  EXPECT_NEAR(counted_m, 1.02 * driven_m, 0.005);
+  const auto ticks = static_cast<double>(drive.wheel_ticks.back().left_ticks);
+  EXPECT_NEAR(ticks * 0.01, 1.02 * driven_m,
+              0.01 + 2.7 * 0.02);  // ticks end at most 20 ms before the odometry
+}
+
+TEST(DriveSimulatorTest, StandsStillBeforeItStarts) {
+  DrivePlan plan = planLotDrive("loop");
+  plan.motion.duration_s = 0.5;
+  const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1);
+  EXPECT_EQ(drive.world_from_vehicle.front().world_from_vehicle.translation(),
+            drive.world_from_vehicle.back().world_from_vehicle.translation());
+  EXPECT_EQ(drive.wheel_ticks.back().left_ticks, 0);
+}
+
+TEST(DriveSimulatorTest, PlanarMotionObeysTheBicycleModelAndTheBodyTiltsALittle) {
+  const DrivePlan plan = planLotDrive("figure_eight");
+  const VehicleMotion motion(plan.path, plan.motion, 1);
+  double largest_tilt_rad = 0.0;
+  for (int ms = 0; ms < static_cast<int>(motion.duration() * 1000.0) - 1; ++ms) {
+    const MotionSample& now = motion.at(ms);
+    const MotionSample& next = motion.at(ms + 1);
+    const RigidTransform step = now.world_from_planar.inverse() * next.world_from_planar;
+    // The rear axle never slips sideways: the chord points along the mean heading.
+    EXPECT_NEAR(std::atan2(step.translation().y(), step.translation().x()),
+                0.5 * yawOfRotation(step.rotation()), 1e-8);
+    largest_tilt_rad = std::max(largest_tilt_rad, angleOfRotation(now.planar_from_body.rotation()));
+  }
+  EXPECT_GT(largest_tilt_rad, 0.1 * kDegree);
+  EXPECT_LT(largest_tilt_rad, 1.0 * kDegree);
+}
+
+TEST(DriveSimulatorTest, LoopEndsNearItsStart) {
+  const DrivePlan plan = planLotDrive("loop");
+  const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1);
+  EXPECT_LT((drive.world_from_vehicle.back().world_from_vehicle.translation() -
+             drive.world_from_vehicle.front().world_from_vehicle.translation())
+                .norm(),
+            1.0);
+}
+
+TEST(DriveSimulatorTest, BackwardsDriveReturnsToItsStart) {
+  const DrivePath path(RigidTransform::planar(1.0, 2.0, 0.5),
+                       {{5.0, 0.1, 0.1}, {5.0, 0.0, 0.0}, {5.0, 0.0, 0.0, true}, {5.0, 0.1, 0.1, true}});
+  VehicleMotionOptions options;
+  options.standstill_s = 0.5;
+  options.stop_at_end = true;
+  options.cruise_speed_m_per_s = 1.5;
+  const VehicleMotion motion(path, options, 1);
+  const MotionSample& end = motion.at(static_cast<int>(motion.duration() * 1000.0));
+  // It stops a little before each of its two ends.
+  EXPECT_LT((end.world_from_planar.translation() - path.worldFromStart().translation()).norm(), 0.7);
+  EXPECT_NEAR(yawOfRotation(end.world_from_planar.rotation()), 0.5, 0.1);
+  EXPECT_NEAR(end.left_wheel_m, 0.0, 0.7);
+  double slowest = 0.0;
+  double farthest_m = 0.0;
+  for (const MotionSample& sample : motion.samples()) {
+    slowest = std::min(slowest, sample.speed_m_per_s);
+    farthest_m = std::max(farthest_m, sample.left_wheel_m);
+  }
+  EXPECT_LT(slowest, -1.0);
+  EXPECT_GT(farthest_m, 8.5);
+}
+
+TEST(DriveSimulatorTest, StandsAtEachStopAsLongAsItShould) {
+  DrivePath path(RigidTransform(), {{20.0, 0.0, 0.0}});
+  path.addStop({6.0, 2.0});
+  path.addStop({12.0, 1.0});
+  VehicleMotionOptions options;
+  options.standstill_s = 0.5;
+  const VehicleMotion motion(path, options, 1);
+  int standing_ms = 0;
+  for (int ms = 1000; ms < static_cast<int>(motion.duration() * 1000.0); ++ms) {
+    standing_ms += motion.at(ms).speed_m_per_s == 0.0 ? 1 : 0;
+  }
+  EXPECT_NEAR(standing_ms, 3000, 5);
+}
+
+TEST(DriveSimulatorTest, CarStandsOnSlopingGroundAndItsWheelsCountTheWayOnIt) {
+  constexpr double kRise = 0.1;
+  const DrivePath path(RigidTransform::planar(3.0, -2.0, 0.0), {{30.0, 0.0, 0.0}});
+  VehicleMotionOptions options;
+  options.pitch_rad_per_m_per_s2 = options.road_noise_rad = options.road_heave_m = 0.0;
+  const VehicleMotion motion(path, options, 1, [](double x, double) { return kRise * x; });
+  const MotionSample& start = motion.at(0);
+  const MotionSample& end = motion.at(5000);
+  const RigidTransform world_from_vehicle = end.worldFromVehicle();
+  EXPECT_NEAR(world_from_vehicle.translation().z(), kRise * world_from_vehicle.translation().x(), 1e-9);
+  const Eigen::Vector3d forwards = world_from_vehicle.rotation() * Eigen::Vector3d::UnitX();
+  EXPECT_NEAR(forwards.z() / forwards.x(), kRise, 1e-9);
+  const double driven_m = (world_from_vehicle.translation() - start.worldFromVehicle().translation()).norm();
+  EXPECT_GT(driven_m, 8.0);
+  EXPECT_NEAR(end.left_wheel_m - start.left_wheel_m, driven_m, 1e-6);
+  // Its speed is along the slope.
+  EXPECT_NEAR((motion.at(5001).worldFromVehicle().translation() - world_from_vehicle.translation()).norm(),
+              1e-3 * end.speed_m_per_s, 1e-6);
+}
+
+TEST(DriveSimulatorTest, CarRollsOnGroundThatFallsToItsRight) {
+  const DrivePath path(RigidTransform(), {{30.0, 0.0, 0.0}});
+  VehicleMotionOptions options;
+  options.road_noise_rad = 0.0;
+  const VehicleMotion motion(path, options, 1, [](double, double y) { return 0.05 * y; });
+  const Eigen::Vector3d left = motion.at(2000).worldFromVehicle().rotation() * Eigen::Vector3d::UnitY();
+  EXPECT_NEAR(left.z() / left.y(), 0.05, 1e-9);
+}
+
+}  // namespace
+}  // namespace vcharge

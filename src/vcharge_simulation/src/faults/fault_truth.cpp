@@ -1,0 +1,72 @@
+#include "vcharge_simulation/faults/fault_truth.h"
+
+#include <type_traits>
+
+#include <yaml-cpp/yaml.h>
+
+#include "vcharge_core/files/file_io.h"
+
+namespace vcharge {
+
+namespace {
+
+struct FaultWriter {
+  Timestamp start;
+  const std::vector<std::string>& cameras;
+  const ImageFaults::Hits& hits;
+  YAML::Node list = YAML::Node(YAML::NodeType::Sequence);
+
+  int64_t stampAt(double time_s) const { return (start + durationFromSeconds(time_s)).nanoseconds(); }
+
+  YAML::Node stampsOf(const std::vector<std::vector<Timestamp>>& hits_of_camera) const {
+    YAML::Node node(YAML::NodeType::Map);
+    for (size_t i = 0; i < cameras.size(); ++i) {
+      for (const Timestamp stamp : hits_of_camera[i]) {
+        node[cameras[i]].push_back(stamp.nanoseconds());
+      }
+    }
+    return node;
+  }
+
+  template <class Fault>
+  void operator()(const char* name, Fault& fault) {
+    if (!fault.isActive()) {
+      return;
+    }
+    YAML::Node entry(YAML::NodeType::Map);
+    entry["kind"] = name;
+    fault.visitFields(internal::FieldWriter{entry});
+    if constexpr (std::is_base_of_v<FaultInterval, Fault>) {
+      entry["start_stamp_ns"] = stampAt(fault.start_s);
+      if (fault.end_s > 0.0) {
+        entry["end_stamp_ns"] = stampAt(fault.end_s);
+      }
+    }
+    if constexpr (std::is_same_v<Fault, CounterResetFault>) {
+      entry["start_stamp_ns"] = stampAt(fault.time_s);
+    }
+    if constexpr (std::is_same_v<Fault, DroppedImagesFault>) {
+      entry["images_ns"] = stampsOf(hits.dropped);
+    }
+    if constexpr (std::is_same_v<Fault, LateImagesFault>) {
+      entry["images_ns"] = stampsOf(hits.late);
+    }
+    list.push_back(entry);
+  }
+};
+
+}  // namespace
+
+void writeFaults(const FaultOptions& faults, Timestamp start, const std::vector<std::string>& cameras,
+                 const ImageFaults::Hits& hits, const std::string& path) {
+  FaultWriter writer{start, cameras, hits};
+  FaultOptions copy = faults;
+  copy.visitFields(writer);
+  YAML::Node root;
+  root["faults"] = writer.list;
+  YAML::Emitter emitter;
+  emitter << root;
+  writeTextFileAtomically(path, std::string(emitter.c_str()) + "\n");
+}
+
+}  // namespace vcharge

@@ -1,0 +1,181 @@
+#include "vcharge_simulation/faults/image_faults.h"
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "vcharge_simulation/rendering/noise.h"
+
+namespace vcharge {
+namespace {
+
+const cv::Size kSize(128, 80);
+constexpr int kPeriod_ms = 80;
+constexpr size_t kNumFrames = 100;
+
+Timestamp start() {
+  return Timestamp::fromNanoseconds(1'400'000'000'000'000'000);
+}
+
+Timestamp stampOf(size_t frame) {
+  return start() + std::chrono::milliseconds(7 + kPeriod_ms * static_cast<int>(frame));
+}
+
+std::vector<ImageFaults::Camera> cameras() {
+  return {{"front", 0, kSize}, {"left", 1, kSize}};
+}
+
+ImageFaults make(const FaultOptions& faults, uint64_t seed = 1) {
+  return ImageFaults(faults, cameras(), CameraResponse(), start(), seed);
+}
+
+FaultOptions read(const std::string& text) {
+  FaultOptions faults;
+  readFields(YAML::Load(text), "faults.yaml", &faults);
+  return faults;
+}
+
+// Another image for every frame.
+cv::Mat imageOf(size_t frame) {
+  cv::Mat image(kSize, CV_8UC1);
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) {
+      const uint32_t hash = hashCell(x, y, static_cast<uint32_t>(frame));
+      image.at<uint8_t>(y, x) = static_cast<uint8_t>(40 + hash % 100U);
+    }
+  }
+  return image;
+}
+
+bool equal(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && cv::norm(a, b, cv::NORM_INF) == 0.0;
+}
+
+constexpr size_t kFront = 0;
+constexpr size_t kLeft = 1;
+
+TEST(ImageFaultsTest, ImagesPassUnchangedWithoutAFault) {
+  ImageFaults faults = make({});
+  for (size_t frame = 0; frame < 5; ++frame) {
+    const cv::Mat image = imageOf(frame);
+    EXPECT_TRUE(equal(faults.throughLens(kLeft, stampOf(frame), image), image));
+    EXPECT_EQ(faults.exposureGain(kLeft, stampOf(frame)), 1.0);
+    const std::optional<DeliveredImage> delivered = faults.deliver(kLeft, frame, stampOf(frame), image);
+    ASSERT_TRUE(delivered.has_value());
+    EXPECT_EQ(delivered->stamp, stampOf(frame));
+    EXPECT_EQ(delivered->received, stampOf(frame));
+    EXPECT_TRUE(equal(delivered->pixels, image));
+  }
+}
+
+TEST(ImageFaultsTest, DeadCameraDeliversNothingOrBlackInItsInterval) {
+  ImageFaults none = make(read("dead_camera: {cameras: [left], start_s: 0.2, end_s: 0.4}"));
+  ImageFaults black = make(read("dead_camera: {cameras: [left], start_s: 0.2, black_images: true}"));
+  for (size_t frame = 0; frame < 8; ++frame) {
+    const bool dead = frame >= 3 && frame <= 4;  // 0.247 and 0.327 s
+    EXPECT_EQ(none.deliver(kLeft, frame, stampOf(frame), imageOf(frame)).has_value(), !dead) << frame;
+    EXPECT_TRUE(none.deliver(kFront, frame, stampOf(frame), imageOf(frame)).has_value());
+    const cv::Mat pixels = black.deliver(kLeft, frame, stampOf(frame), imageOf(frame))->pixels;
+    EXPECT_EQ(cv::countNonZero(pixels) == 0, frame >= 3);
+  }
+}
+
+TEST(ImageFaultsTest, FrozenCameraRepeatsTheImageBeforeTheFaultAndRecovers) {
+  ImageFaults faults = make(read("frozen_camera: {cameras: [left], start_s: 0.2, end_s: 0.4}"));
+  ImageFaults always = make(read("frozen_camera: {cameras: [left]}"));
+  for (size_t frame = 0; frame < 8; ++frame) {
+    const bool frozen = frame >= 3 && frame <= 4;
+    const std::optional<DeliveredImage> delivered =
+        faults.deliver(kLeft, frame, stampOf(frame), imageOf(frame));
+    EXPECT_TRUE(equal(delivered->pixels, imageOf(frozen ? 2 : frame))) << frame;
+    EXPECT_EQ(delivered->stamp, stampOf(frame));
+    EXPECT_TRUE(equal(faults.deliver(kFront, frame, stampOf(frame), imageOf(frame))->pixels, imageOf(frame)));
+    EXPECT_TRUE(equal(always.deliver(kLeft, frame, stampOf(frame), imageOf(frame))->pixels, imageOf(0)));
+  }
+}
+
+TEST(ImageFaultsTest, SunSaturatesItsDiskAndVeilsTheRestLessAndLess) {
+  const ImageFaults faults = make(read("sun_glare: {cameras: [left], start_s: 0.2, x: 0.25, y: 0.5}"));
+  const cv::Mat dark(kSize, CV_8UC1, cv::Scalar(30));
+  EXPECT_TRUE(equal(faults.throughLens(kLeft, stampOf(0), dark), dark));
+  EXPECT_TRUE(equal(faults.throughLens(kFront, stampOf(5), dark), dark));
+  const cv::Mat blinded = faults.throughLens(kLeft, stampOf(5), dark);
+  const auto gray = [&](int x) { return static_cast<int>(blinded.at<uint8_t>(40, x)); };
+  EXPECT_EQ(gray(32), 255);
+  EXPECT_LT(gray(60), 255);
+  EXPECT_GT(gray(60), gray(90));
+  EXPECT_GT(gray(90), gray(127));
+  EXPECT_GT(gray(127), 40);
+}
+
+TEST(ImageFaultsTest, DirtIsABrightLineAndBlobsThatStayInPlace) {
+  const FaultOptions options = read("dirty_lens: {cameras: [left], blobs: 6}");
+  const ImageFaults faults = make(options);
+  const cv::Mat gray(kSize, CV_8UC1, cv::Scalar(120));
+  const cv::Mat dirty = faults.throughLens(kLeft, stampOf(0), gray);
+  EXPECT_TRUE(equal(dirty, faults.throughLens(kLeft, stampOf(9), gray)));
+  EXPECT_TRUE(equal(dirty, make(options, 2).throughLens(kLeft, stampOf(0), gray)));
+  EXPECT_FALSE(equal(
+      dirty,
+      make(read("dirty_lens: {cameras: [left], blobs: 6, seed: 2}")).throughLens(kLeft, stampOf(0), gray)));
+  // The line crosses every column; blobs darken a part of the image.
+  for (int x = 0; x < kSize.width; ++x) {
+    double brightest = 0.0;
+    cv::minMaxLoc(dirty.col(x), nullptr, &brightest);
+    EXPECT_GT(brightest, 140.0) << x;
+  }
+  const double darkened = static_cast<double>(cv::countNonZero(dirty < 110)) / kSize.area();
+  EXPECT_GT(darkened, 0.002);
+  EXPECT_LT(darkened, 0.2);
+}
+
+TEST(ImageFaultsTest, ExposureStepsInItsInterval) {
+  const ImageFaults faults = make(read("exposure_step: {cameras: [all], start_s: 0.2, end_s: 0.4, gain: 4}"));
+  EXPECT_EQ(faults.exposureGain(kLeft, stampOf(2)), 1.0);
+  EXPECT_EQ(faults.exposureGain(kLeft, stampOf(3)), 4.0);
+  EXPECT_EQ(faults.exposureGain(kFront, stampOf(4)), 4.0);
+  EXPECT_EQ(faults.exposureGain(kLeft, stampOf(5)), 1.0);
+}
+
+TEST(ImageFaultsTest, DroppedImagesAreLostWithTheirProbabilityAndNoted) {
+  ImageFaults faults = make(read("dropped_images: {cameras: [left], probability: 0.3}"));
+  std::vector<Timestamp> lost;
+  for (size_t frame = 0; frame < kNumFrames; ++frame) {
+    EXPECT_TRUE(faults.deliver(kFront, frame, stampOf(frame), imageOf(0)).has_value());
+    if (!faults.deliver(kLeft, frame, stampOf(frame), imageOf(0))) {
+      lost.push_back(stampOf(frame));
+    }
+  }
+  // Within three standard deviations of the binomial distribution.
+  EXPECT_GT(lost.size(), 16U);
+  EXPECT_LT(lost.size(), 44U);
+  EXPECT_EQ(faults.hits().dropped[kLeft], lost);
+  EXPECT_TRUE(faults.hits().dropped[kFront].empty());
+}
+
+TEST(ImageFaultsTest, LateImagesArriveLateWithTheRightStamp) {
+  ImageFaults faults = make(read("late_images: {cameras: [left], probability: 0.3, delay_s: 0.2}"));
+  std::vector<Timestamp> late;
+  for (size_t frame = 0; frame < kNumFrames; ++frame) {
+    const std::optional<DeliveredImage> image = faults.deliver(kLeft, frame, stampOf(frame), imageOf(0));
+    EXPECT_EQ(image->stamp, stampOf(frame));
+    if (image->received != image->stamp) {
+      EXPECT_EQ(image->received - image->stamp, std::chrono::milliseconds(200));
+      late.push_back(stampOf(frame));
+    }
+  }
+  EXPECT_GT(late.size(), 16U);
+  EXPECT_LT(late.size(), 44U);
+  EXPECT_EQ(faults.hits().late[kLeft], late);
+}
+
+TEST(ImageFaultsTest, ShiftedStampsLeaveTheArrivalAsItIs) {
+  ImageFaults faults = make(read("image_stamp_shift: {cameras: [left], start_s: 0.2, shift_s: -0.03}"));
+  for (size_t frame = 0; frame < 6; ++frame) {
+    const std::optional<DeliveredImage> image = faults.deliver(kLeft, frame, stampOf(frame), imageOf(frame));
+    EXPECT_EQ(image->stamp - stampOf(frame), std::chrono::milliseconds(frame < 3 ? 0 : -30));
+    EXPECT_EQ(image->received, stampOf(frame));
+  }
+}
+
+}  // namespace
+}  // namespace vcharge

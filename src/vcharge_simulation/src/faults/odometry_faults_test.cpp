@@ -1,0 +1,186 @@
+#include <cmath>
+#include <map>
+
+#include <gtest/gtest.h>
+
+#include "vcharge_simulation/drive/drive_simulator.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kSpeed_m_per_s = 2.5;
+constexpr double kTick_m = 0.01;
+// The cruise speed swings by 5 %, and each counter is within a tick of the truth.
+constexpr double kTickTolerance = 2.5;
+
+// Two seconds straight on.
+SimulatedDrive simulate(const FaultOptions& faults) {
+  const DrivePath straight(RigidTransform(), {{40.0, 0.0, 0.0}});
+  VehicleMotionOptions motion;
+  motion.duration_s = 2.0;
+  WheelOdometerOptions odometer;
+  odometer.scale_error = 0.0;
+  odometer.left_right_error = 0.0;
+  return simulateDrive(straight, motion, odometer, 1, 1, faults);
+}
+
+double timeOf(const SimulatedDrive& drive, Timestamp stamp) {
+  return toSeconds(stamp - drive.ground_truth.front().stamp);
+}
+
+const VehicleOdometry& odometryAt(const SimulatedDrive& drive, double time_s) {
+  for (const VehicleOdometry& odometry : drive.odometry) {
+    if (std::abs(timeOf(drive, odometry.stamp) - time_s) < 1e-4) {
+      return odometry;
+    }
+  }
+  throw std::out_of_range("no odometry at this time");
+}
+
+const WheelTicks& ticksAt(const SimulatedDrive& drive, double time_s) {
+  for (const WheelTicks& ticks : drive.wheel_ticks) {
+    if (std::abs(timeOf(drive, ticks.stamp) - time_s) < 1e-4) {
+      return ticks;
+    }
+  }
+  throw std::out_of_range("no counters at this time");
+}
+
+void expectSameTruth(const SimulatedDrive& a, const SimulatedDrive& b) {
+  ASSERT_EQ(a.ground_truth.size(), b.ground_truth.size());
+  for (size_t i = 0; i < a.ground_truth.size(); ++i) {
+    EXPECT_EQ(a.ground_truth[i].odom_from_vehicle.matrix(), b.ground_truth[i].odom_from_vehicle.matrix());
+  }
+}
+
+TEST(OdometryFaultsTest, ScaleMultipliesCountersAndPathAlike) {
+  FaultOptions faults;
+  faults.odometry_scale.factor = 1.2;
+  const SimulatedDrive right = simulate({});
+  const SimulatedDrive wrong = simulate(faults);
+  expectSameTruth(right, wrong);
+  EXPECT_NEAR(static_cast<double>(ticksAt(wrong, 2.0).left_ticks),
+              1.2 * static_cast<double>(ticksAt(right, 2.0).left_ticks), 2.0);
+  EXPECT_NEAR(odometryAt(wrong, 2.0).odom_from_vehicle.translation().x(),
+              1.2 * odometryAt(right, 2.0).odom_from_vehicle.translation().x(), kTick_m);
+}
+
+TEST(OdometryFaultsTest, SlipChangesOnlyThatWheelInThatInterval) {
+  FaultOptions faults;
+  faults.wheel_slip.wheel = WheelSlipFault::Wheel::kRight;
+  faults.wheel_slip.ratio = 0.3;
+  faults.wheel_slip.start_s = 0.8;
+  faults.wheel_slip.end_s = 1.2;
+  const SimulatedDrive right = simulate({});
+  const SimulatedDrive wrong = simulate(faults);
+  expectSameTruth(right, wrong);
+  ASSERT_EQ(right.wheel_ticks.size(), wrong.wheel_ticks.size());
+  const double slipped_ticks = 0.3 * 0.4 * kSpeed_m_per_s / kTick_m;
+  for (size_t i = 0; i < right.wheel_ticks.size(); ++i) {
+    EXPECT_EQ(right.wheel_ticks[i].left_ticks, wrong.wheel_ticks[i].left_ticks);
+    const double time_s = timeOf(right, right.wheel_ticks[i].stamp);
+    const auto difference =
+        static_cast<double>(wrong.wheel_ticks[i].right_ticks - right.wheel_ticks[i].right_ticks);
+    if (time_s < 0.8) {
+      EXPECT_EQ(difference, 0.0);
+    } else if (time_s >= 1.2) {
+      EXPECT_NEAR(difference, slipped_ticks, kTickTolerance);
+    }
+  }
+  // The path turns by the difference of the wheels over the track.
+  EXPECT_NEAR(yawOfRotation(odometryAt(wrong, 2.0).odom_from_vehicle.rotation()),
+              slipped_ticks * kTick_m / VehicleMotionOptions().track_width_m, 0.02);
+}
+
+TEST(OdometryFaultsTest, BlockedWheelStandsStill) {
+  FaultOptions faults;
+  faults.wheel_slip.ratio = -1.0;
+  faults.wheel_slip.start_s = 1.0;
+  const SimulatedDrive drive = simulate(faults);
+  EXPECT_EQ(ticksAt(drive, 1.0).left_ticks, ticksAt(drive, 2.0).left_ticks);
+  EXPECT_GT(ticksAt(drive, 2.0).right_ticks, ticksAt(drive, 1.0).right_ticks + 200);
+}
+
+TEST(OdometryFaultsTest, MissingCountersLeaveAGapAndThePathGoesOnAfterIt) {
+  FaultOptions faults;
+  faults.missing_ticks.start_s = 0.8;
+  faults.missing_ticks.end_s = 1.2;
+  const SimulatedDrive right = simulate({});
+  const SimulatedDrive wrong = simulate(faults);
+  expectSameTruth(right, wrong);
+  std::map<int64_t, WheelTicks> ticks;
+  for (const WheelTicks& entry : right.wheel_ticks) {
+    ticks[entry.stamp.nanoseconds()] = entry;
+  }
+  for (const WheelTicks& entry : wrong.wheel_ticks) {
+    const double time_s = timeOf(wrong, entry.stamp);
+    EXPECT_TRUE(time_s < 0.8 || time_s >= 1.2) << time_s;
+    EXPECT_EQ(entry.left_ticks, ticks.at(entry.stamp.nanoseconds()).left_ticks);
+  }
+  EXPECT_EQ(right.wheel_ticks.size() - wrong.wheel_ticks.size(), 20U);
+  EXPECT_EQ(right.odometry.size() - wrong.odometry.size(), 25U);  // and five images
+  for (const VehicleOdometry& entry : wrong.odometry) {
+    const double time_s = timeOf(wrong, entry.stamp);
+    EXPECT_TRUE(time_s < 0.8 || time_s >= 1.2) << time_s;
+  }
+  EXPECT_NEAR(odometryAt(wrong, 2.0).odom_from_vehicle.translation().x(),
+              odometryAt(right, 2.0).odom_from_vehicle.translation().x(), kTick_m);
+}
+
+TEST(OdometryFaultsTest, ResetStartsCountersAndPathFromZero) {
+  FaultOptions faults;
+  faults.counter_reset.time_s = 1.0;
+  const SimulatedDrive right = simulate({});
+  const SimulatedDrive wrong = simulate(faults);
+  expectSameTruth(right, wrong);
+  EXPECT_EQ(ticksAt(wrong, 0.98).left_ticks, ticksAt(right, 0.98).left_ticks);
+  EXPECT_EQ(ticksAt(wrong, 1.0).left_ticks, 0);
+  EXPECT_EQ(ticksAt(wrong, 2.0).left_ticks, ticksAt(right, 2.0).left_ticks - ticksAt(right, 1.0).left_ticks);
+  EXPECT_EQ(odometryAt(wrong, 0.98).odom_from_vehicle.matrix(),
+            odometryAt(right, 0.98).odom_from_vehicle.matrix());
+  EXPECT_EQ(odometryAt(wrong, 1.0).odom_from_vehicle.matrix(), RigidTransform().matrix());
+  EXPECT_NEAR(odometryAt(wrong, 2.0).odom_from_vehicle.translation().x(), kSpeed_m_per_s, 0.15);
+}
+
+TEST(OdometryFaultsTest, SoftSuspensionDivesDeeperOnTheBrakes) {
+  const DrivePath straight(RigidTransform(), {{6.0, 0.0, 0.0}});
+  VehicleMotionOptions motion;
+  motion.stop_at_end = true;
+  motion.road_noise_rad = 0.0;
+  const auto deepest_rad = [&](double pitch_factor) {
+    FaultOptions faults;
+    faults.soft_suspension.pitch_factor = pitch_factor;
+    double deepest = 0.0;
+    for (const VehicleOdometry& truth :
+         simulateDrive(straight, motion, WheelOdometerOptions(), 1, 1, faults).ground_truth) {
+      const Eigen::Vector3d forward = truth.odom_from_vehicle.rotation() * Eigen::Vector3d::UnitX();
+      deepest = std::max(deepest, -std::asin(forward.z()));
+    }
+    return deepest;
+  };
+  const double usual_rad = deepest_rad(1.0);
+  EXPECT_GT(usual_rad, 0.002);
+  EXPECT_NEAR(deepest_rad(6.0), 6.0 * usual_rad, 0.01 * usual_rad);
+}
+
+TEST(OdometryFaultsTest, ExposurePosesAreSpreadOverTheExposureAboutTheStamp) {
+  FaultOptions faults;
+  faults.motion_blur.cameras = {"left"};
+  faults.motion_blur.exposure_time_s = 0.04;
+  faults.motion_blur.renderings = 4;
+  const SimulatedDrive drive = simulate(faults);
+  expectSameTruth(simulate({}), drive);
+  ASSERT_EQ(drive.exposure_poses.size(), drive.world_from_vehicle.size());
+  EXPECT_TRUE(simulate({}).exposure_poses.empty());
+  for (size_t i = 0; i < drive.exposure_poses.size(); ++i) {
+    const std::vector<RigidTransform>& poses = drive.exposure_poses[i];
+    ASSERT_EQ(poses.size(), 4U);
+    // Three quarters of the exposure lie between the first and the last rendering.
+    EXPECT_NEAR((poses[3].translation() - poses[0].translation()).norm(), 0.03 * kSpeed_m_per_s, 0.005);
+    const Eigen::Vector3d middle = 0.5 * (poses[1].translation() + poses[2].translation());
+    EXPECT_LT((middle - drive.world_from_vehicle[i].world_from_vehicle.translation()).norm(), 1e-3);
+  }
+}
+
+}  // namespace
+}  // namespace vcharge

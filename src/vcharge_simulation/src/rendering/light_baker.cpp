@@ -1,0 +1,153 @@
+#include "rendering/light_baker.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <tbb/parallel_for.h>
+#include <opencv2/imgproc.hpp>
+
+#include "vcharge_simulation/rendering/noise.h"
+
+namespace vcharge {
+
+namespace {
+
+constexpr float kTwoPi = 6.28318531F;
+constexpr float kSunRadius_rad = 0.0047F;
+constexpr float kLift_m = 0.012F;
+constexpr float kFar_m = 120.0F;
+// Surroundings change slowly: they are sampled on a coarser grid than the sun's shadows.
+constexpr int kSurroundingStride = 5;
+constexpr int kSurroundingRays = 32;
+constexpr int kWallRays = 8;
+
+// Direction about `normal` with density proportional to the cosine.
+Eigen::Vector3f cosineDirection(const Eigen::Vector3f& normal, float u, float v) {
+  const Eigen::Vector3f side = normal.unitOrthogonal();
+  const Eigen::Vector3f other = normal.cross(side);
+  const float r = std::sqrt(u);
+  return (r * std::cos(kTwoPi * v) * side + r * std::sin(kTwoPi * v) * other + std::sqrt(1.0F - u) * normal)
+      .normalized();
+}
+
+float freeSky(const RayTracer& tracer, const Eigen::Vector3f& position, const Eigen::Vector3f& normal,
+              int rays, uint32_t hash, float reach_m) {
+  int free = 0;
+  for (int i = 0; i < rays; ++i) {
+    const float u = (static_cast<float>(i) + unitFromBits(mixBits(hash + 2U * static_cast<uint32_t>(i)))) /
+                    static_cast<float>(rays);
+    const float v = std::fmod(0.61803399F * static_cast<float>(i) + unitFromBits(hash), 1.0F);
+    const Eigen::Vector3f direction = cosineDirection(normal, u, v);
+    free += tracer.occluded(position + kLift_m * normal, direction, reach_m) ? 0 : 1;
+  }
+  return static_cast<float>(free) / static_cast<float>(rays);
+}
+
+// The sun's disk, sampled.
+class SunDisk {
+ public:
+  explicit SunDisk(const Eigen::Vector3f& centre)
+      : centre_(centre), side_(centre.unitOrthogonal()), other_(centre.cross(side_)) {}
+
+  Eigen::Vector3f direction(uint32_t hash) const {
+    const float radius = kSunRadius_rad * std::sqrt(unitFromBits(hash));
+    const float angle = kTwoPi * unitFromBits(mixBits(hash + 1U));
+    return (centre_ + radius * std::cos(angle) * side_ + radius * std::sin(angle) * other_).normalized();
+  }
+
+ private:
+  Eigen::Vector3f centre_, side_, other_;
+};
+
+}  // namespace
+
+void bakeWallLight(const std::vector<Wall>& walls, double texel_m, Scene* scene) {
+  const RayTracer tracer(scene->mesh);
+  const SunDisk sun(scene->sky->directionToSun());
+  for (const Wall& wall : walls) {
+    const int width = std::max(1, static_cast<int>(std::lround(wall.along.norm() / texel_m)));
+    const int height = std::max(1, static_cast<int>(std::lround(wall.up.norm() / texel_m)));
+    const Eigen::Vector3f normal = wall.along.cross(wall.up).normalized();
+    cv::Mat image(height, width, CV_8UC1, cv::Scalar(0));
+    if (normal.dot(scene->sky->directionToSun()) > 0.0F) {
+      tbb::parallel_for(0, height, [&](int row) {
+        for (int column = 0; column < width; ++column) {
+          int lit = 0;
+          for (int i = 0; i < kWallRays; ++i) {
+            const uint32_t hash = hashCell(column * kWallRays + i, row, wall.material);
+            const float u =
+                (static_cast<float>(column) + unitFromBits(mixBits(hash + 2U))) / static_cast<float>(width);
+            const float v =
+                (static_cast<float>(row) + unitFromBits(mixBits(hash + 3U))) / static_cast<float>(height);
+            const Eigen::Vector3f place =
+                wall.foot + u * wall.along + (1.0F - v) * wall.up + kLift_m * normal;
+            lit += tracer.occluded(place, sun.direction(hash), kFar_m) ? 0 : 1;
+          }
+          image.at<uint8_t>(row, column) = static_cast<uint8_t>(255 * lit / kWallRays);
+        }
+      });
+    }
+    Material& material = scene->materials[wall.material];
+    material.sun_map = static_cast<int>(scene->textures.size());
+    material.sun_map_texels_per_m = static_cast<float>(1.0 / texel_m);
+    scene->textures.emplace_back(image, Texture::Border::kClamp);
+  }
+}
+
+void bakeGroundLight(const Eigen::Vector2d& min_m, const Eigen::Vector2d& max_m, double texel_m,
+                     const std::function<double(double, double)>& ground_height, Scene* scene) {
+  const RayTracer tracer(scene->mesh);
+  const int width = static_cast<int>(std::lround((max_m.x() - min_m.x()) / texel_m));
+  const int height = static_cast<int>(std::lround((max_m.y() - min_m.y()) / texel_m));
+  const SunDisk sun(scene->sky->directionToSun());
+  const auto placeAt = [&](double column, double row) {
+    const double x = min_m.x() + (column + 0.5) * texel_m;
+    const double y = min_m.y() + (row + 0.5) * texel_m;
+    return Eigen::Vector3d(x, y, ground_height(x, y) + kLift_m).cast<float>().eval();
+  };
+  cv::Mat sun_image(height, width, CV_8UC1);
+  tbb::parallel_for(0, height, [&](int row) {
+    for (int column = 0; column < width; ++column) {
+      const Eigen::Vector3f direction = sun.direction(hashCell(column, row, 77));
+      sun_image.at<uint8_t>(row, column) = tracer.occluded(placeAt(column, row), direction, kFar_m) ? 0 : 255;
+    }
+  });
+  cv::GaussianBlur(sun_image, sun_image, cv::Size(3, 3), 0.7);
+
+  cv::Mat sky_image(height / kSurroundingStride, width / kSurroundingStride, CV_8UC1);
+  tbb::parallel_for(0, sky_image.rows, [&](int row) {
+    for (int column = 0; column < sky_image.cols; ++column) {
+      const Eigen::Vector3f place =
+          placeAt((column + 0.5) * kSurroundingStride - 0.5, (row + 0.5) * kSurroundingStride - 0.5);
+      const float free = freeSky(tracer, place, Eigen::Vector3f::UnitZ(), kSurroundingRays,
+                                 hashCell(column, row, 78), 25.0F);
+      // What blocks the sky sends some light of its own.
+      sky_image.at<uint8_t>(row, column) = cv::saturate_cast<uint8_t>(255.0F * (0.15F + 0.85F * free));
+    }
+  });
+  cv::GaussianBlur(sky_image, sky_image, cv::Size(3, 3), 0.8);
+  const auto scale = static_cast<float>(1.0 / texel_m);
+  const auto x0 = static_cast<float>(min_m.x());
+  const auto y0 = static_cast<float>(min_m.y());
+  scene->ground.sun = std::make_unique<GroundTexture>(
+      GroundTexture{Texture(sun_image, Texture::Border::kClamp), x0, y0, scale});
+  scene->ground.surrounding = std::make_unique<GroundTexture>(
+      GroundTexture{Texture(sky_image, Texture::Border::kClamp), x0, y0, scale / kSurroundingStride});
+}
+
+void bakeVertexAmbient(int rays_per_vertex, TriangleMesh* mesh) {
+  TriangleMesh with_ground = *mesh;
+  addQuad({-50, -50, 0}, {50, -50, 0}, {50, 50, 0}, {-50, 50, 0}, 0, &with_ground);
+  const RayTracer tracer(with_ground);
+  tbb::parallel_for(size_t{0}, mesh->vertices.size(), [&](size_t i) {
+    MeshVertex& vertex = mesh->vertices[i];
+    const Eigen::Vector3f start = vertex.position + 0.02F * vertex.normal;
+    const float free =
+        freeSky(tracer, start, vertex.normal, rays_per_vertex, mixBits(static_cast<uint32_t>(i)), 3.0F);
+    // A wall sees the open ground in the lower half of its hemisphere: that is no occlusion.
+    const float expected = 0.5F + 0.5F * vertex.normal.z();
+    vertex.ambient = std::min(1.0F, free / std::max(0.1F, expected));
+  });
+}
+
+}  // namespace vcharge

@@ -1,0 +1,101 @@
+#include "scenes/board/board_scene.h"
+
+#include <algorithm>
+#include <memory>
+#include <stdexcept>
+
+#include "scenes/board/board_motion.h"
+#include "scenes/board/board_pattern.h"
+#include "scenes/lot/lot_variant.h"
+#include "scenes/scene_parts.h"
+#include "vcharge_simulation/sensors/golf_rig.h"
+#include "vcharge_simulation/sensors/rig_catalogue.h"
+
+namespace vcharge {
+
+namespace {
+
+constexpr double kFreeRadius_m = 9.0;
+
+const RigidTransform& worldFromVehicle() {
+  static const RigidTransform place = RigidTransform::planar(-5.0, 0.2, 0.1);
+  return place;
+}
+
+struct Board {
+  BoardPattern pattern;
+  BoardMotion motion;
+  uint32_t front, back;  // materials
+};
+
+MoverState boardAt(const Board& board, double time_s) {
+  constexpr double kThickness_m = 0.01;
+  const RigidTransform world_from_sheet = board.motion.worldFromSheet(time_s);
+  const Eigen::Vector2d half = 0.5 * board.pattern.size_m;
+  Eigen::AlignedBox3d box;
+  const auto corner = [&](double x, double y, double z) {
+    const Eigen::Vector3d place = world_from_sheet * Eigen::Vector3d(x * half.x(), y * half.y(), z);
+    box.extend(place);
+    return place.cast<float>().eval();
+  };
+  MoverState state;
+  // The viewer is at negative z, and image rows grow with y.
+  addQuad(corner(-1, 1, 0), corner(1, 1, 0), corner(1, -1, 0), corner(-1, -1, 0), board.front, &state.mesh);
+  addQuad(corner(1, 1, kThickness_m), corner(-1, 1, kThickness_m), corner(-1, -1, kThickness_m),
+          corner(1, -1, kThickness_m), board.back, &state.mesh);
+  state.world_from_mover = world_from_sheet * board.pattern.sheet_from_pattern;
+  state.obstacle = {"board", cornersOf({box.min().x(), box.min().y(), box.max().x(), box.max().y()}),
+                    box.min().z(), box.max().z()};
+  return state;
+}
+
+}  // namespace
+
+std::shared_ptr<const Scene> buildBoardScene(const SceneOptions& options) {
+  LotVariant variant;
+  variant.layout = makeLotLayout(static_cast<uint64_t>(options.seed), options.day, options.moved_cars);
+  // No car stands where the board is held.
+  const Eigen::Vector2d place = worldFromVehicle().translation().head<2>();
+  variant.layout.cars.erase(std::remove_if(variant.layout.cars.begin(), variant.layout.cars.end(),
+                                           [&](const ParkedCar& car) {
+                                             return (Eigen::Vector2d(car.x, car.y) - place).norm() <
+                                                    kFreeRadius_m;
+                                           }),
+                            variant.layout.cars.end());
+  const BoardPattern pattern = makeBoardPattern(options.board);
+  const auto seed = static_cast<uint64_t>(options.seed);
+  const BoardMotion motion(makeRig(options.rig, static_cast<uint64_t>(options.rig_seed), 1.0),
+                           *makeGolfBody(), pattern.size_m, worldFromVehicle(), seed);
+  variant.add_things = [&](SceneParts* parts) {
+    const uint32_t front = parts->textured(SurfaceKind::kOther, pattern.image, pattern.texels_per_m);
+    const uint32_t back = parts->plain(SurfaceKind::kOther, 0.3);
+    const auto board = std::make_shared<const Board>(Board{pattern, motion, front, back});
+    parts->scene().movers.push_back({"board", [board](double time_s) { return boardAt(*board, time_s); }});
+  };
+  return buildLotVariant(lotOptionsOf(options), variant);
+}
+
+std::vector<CatalogueEntry> listBoardDrives() {
+  std::vector<CatalogueEntry> drives;
+  for (const char* camera : {"front", "left", "rear", "right"}) {
+    const std::string name(camera);
+    drives.push_back({"board_" + name, "the car stands; 40 s of the board before the camera " + name});
+  }
+  return drives;
+}
+
+DrivePlan planBoardDrive(const std::string& name) {
+  const std::vector<CatalogueEntry> drives = listBoardDrives();
+  const auto found = std::find_if(drives.begin(), drives.end(),
+                                  [&](const CatalogueEntry& entry) { return entry.name == name; });
+  if (found == drives.end()) {
+    throw std::invalid_argument("drive: the scene chessboard has none of the name '" + name + "'");
+  }
+  VehicleMotionOptions motion;
+  motion.standstill_s = motion.duration_s = BoardMotion::kSpan_s;
+  return {name,    DrivePath(worldFromVehicle(), {{1.0, 0.0, 0.0}}),
+          motion,  0,
+          nullptr, BoardMotion::kSpan_s * static_cast<double>(found - drives.begin())};
+}
+
+}  // namespace vcharge

@@ -1,0 +1,87 @@
+#include "scenes/garage/garage_layout.h"
+
+#include <cmath>
+
+#include "vcharge_simulation/rendering/noise.h"
+
+namespace vcharge {
+
+namespace {
+
+constexpr double kHalfPi = 1.57079632679489661923;
+constexpr double kOccupiedBays = 0.6;
+constexpr double kFirstBay_m = -22.1;
+constexpr int kBaysPerRow = 17;
+constexpr int kBaysPerPillar = 3;
+constexpr double kLampHeight_m = 2.34;
+constexpr double kLampLength_m = 1.5;
+constexpr double kWallBays_m = 21.1;  // rows' middles on both sides of the garage
+constexpr double kOuterBays_m = 10.1;
+constexpr double kInnerBays_m = 5.3;
+constexpr double kWallPillars_m = 18.9;  // just behind the mouths of the bays
+constexpr double kMiddlePillars_m = 7.7;
+
+void addBays(GarageLayout* layout) {
+  int number = 1;
+  for (const double side : {-1.0, 1.0}) {
+    for (const double across : {kInnerBays_m, kOuterBays_m, kWallBays_m}) {
+      const double yaw_rad = across == kOuterBays_m ? -side * kHalfPi : side * kHalfPi;
+      for (int i = 0; i < kBaysPerRow; ++i) {
+        layout->bays.push_back({kFirstBay_m + (i + 0.5) * kBayWidth_m, side * across, yaw_rad, number++});
+      }
+    }
+  }
+}
+
+void addPillars(GarageLayout* layout) {
+  int column = 1;
+  for (int i = 0; i <= kBaysPerRow + 1; i += kBaysPerPillar, ++column) {
+    const double x = kFirstBay_m + i * kBayWidth_m;
+    layout->beam_x.push_back(x);
+    char row = 'A';
+    for (const double y : {-kWallPillars_m, -kMiddlePillars_m, kMiddlePillars_m, kWallPillars_m}) {
+      layout->pillars.push_back({x, y, row++ + std::to_string(column)});
+    }
+  }
+  layout->beam_y = {-kMiddlePillars_m, kMiddlePillars_m};
+}
+
+// Between the beams, over the lanes and here and there over the bays. Some are weak; on another day others.
+void addLamps(uint64_t seed, int day, GarageLayout* layout) {
+  Random random(seed * 17U + 3U + 1000U * static_cast<uint64_t>(day));
+  const auto add = [&](double x, double y, bool along_x) {
+    const double strength = random.uniform(2.2, 3.0) * (random.chance(0.1) ? 0.25 : 1.0);
+    const double half_m = 0.5 * kLampLength_m;
+    layout->lamps.push_back(
+        {Eigen::Vector3d(x, y, kLampHeight_m).cast<float>(),
+         Eigen::Vector3d(along_x ? half_m : 0.0, along_x ? 0.0 : half_m, 0.0).cast<float>(),
+         static_cast<float>(strength)});
+  };
+  const double spacing_m = kBaysPerPillar * kBayWidth_m;
+  for (int i = 0; i < kBaysPerRow / kBaysPerPillar + 1; ++i) {
+    const double x = kFirstBay_m + (i + 0.5) * spacing_m;
+    for (const double y : {-15.5, 0.0, 15.5}) {
+      add(x, y, true);
+    }
+    add(x, i % 2 == 0 ? 10.3 : -10.3, false);
+    add(x, i % 2 == 0 ? -21.0 : 21.0, false);
+  }
+  for (const double x : {-26.3, 26.3}) {
+    for (const double y : {-20.5, -11.0, -3.8, 3.8, 11.0, 20.5}) {
+      add(x, y, false);
+    }
+  }
+}
+
+}  // namespace
+
+GarageLayout makeGarageLayout(uint64_t seed, int day, double moved_cars) {
+  GarageLayout layout;
+  addBays(&layout);
+  addPillars(&layout);
+  addLamps(seed, day, &layout);
+  layout.cars = parkCars(layout.bays, kOccupiedBays, seed + 90U, day, moved_cars);
+  return layout;
+}
+
+}  // namespace vcharge

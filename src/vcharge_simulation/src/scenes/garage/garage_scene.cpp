@@ -1,0 +1,277 @@
+#include "scenes/garage/garage_scene.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <opencv2/imgproc.hpp>
+
+#include "scenes/garage/garage_fittings.h"
+#include "scenes/garage/garage_surfaces.h"
+#include "scenes/lot/lot_ground.h"
+#include "scenes/scene_parts.h"
+
+namespace vcharge {
+
+namespace {
+
+constexpr double kFloorTexel_m = 0.0125;
+constexpr double kDetailTexel_m = 0.0035;
+constexpr float kLampRadiance = 2.4F;
+constexpr double kCeilingTexel_m = 0.1;
+constexpr double kCeilingAlbedo = 0.6;
+// Of the share 1 of the baked light: the camera is exposed for the garage.
+constexpr double kFullIrradiance = 4.5;
+constexpr double kTypicalCeilingShare = 0.12;
+// Ducts and lamps hang above this.
+constexpr double kOverhead_m = 2.1;
+constexpr float kFloorReflectivity = 0.03F;
+// Lamps bake onto the corners of cells of this size.
+constexpr double kLightCell_m = 0.5;
+
+LightOptions lampLight() {
+  LightOptions light;
+  light.sun_irradiance = 0.0;
+  light.sky_irradiance = kFullIrradiance;
+  light.bounce_irradiance = kFullIrradiance;
+  return light;
+}
+
+Eigen::Vector3f vector(double x, double y, double z) {
+  return Eigen::Vector3d(x, y, z).cast<float>();
+}
+
+// Builds one garage; each step adds to the scene.
+class GarageBuilder {
+ public:
+  explicit GarageBuilder(const SceneOptions& options)
+      : options_(options),
+        seed_(static_cast<uint64_t>(options.seed)),
+        layout_(makeGarageLayout(seed_, options.day, options.moved_cars)),
+        parts_(seed_ * 53U + 7U, 1.0) {}
+
+  std::shared_ptr<const Scene> build() {
+    scene().sky = std::make_unique<Sky>(lampLight(), 1);
+    scene().min_m = {kGarageArea.min_x, kGarageArea.min_y};
+    scene().max_m = {kGarageArea.max_x, kGarageArea.max_y};
+    scene().overhead_m = kOverhead_m;
+    addFloor();
+    addWalls();
+    addCeiling();
+    addPillars();
+    addPipes();
+    addLamps();
+    addGarageFittings(layout_, kOverhead_m, &parts_);
+    parts_.addCars(layout_.cars);
+    LampOptions light;
+    light.floor_texel_m = 0.1 / options_.detail;
+    light.gathered_rays = static_cast<int>(std::lround(24 * options_.detail));
+    bakeLampLight(layout_.lamps, light, scene().min_m, scene().max_m, &scene());
+    addCeilingReflection();
+    return parts_.sharedScene();
+  }
+
+ private:
+  Scene& scene() { return parts_.scene(); }
+
+  void addFloor() {
+    const double texel_m = std::min(0.5, kFloorTexel_m / options_.image_scale);
+    Material floor;
+    floor.kind = SurfaceKind::kGround;
+    floor.mapping = Material::Mapping::kGround;
+    floor.texture = 0;
+    floor.reflectivity = kFloorReflectivity;
+    const uint32_t material = scene().addMaterial(floor);
+    scene().ground.layers.push_back(
+        {Texture(drawGarageFloor(layout_, texel_m, seed_), Texture::Border::kClamp),
+         static_cast<float>(kGarageArea.min_x), static_cast<float>(kGarageArea.min_y),
+         static_cast<float>(1.0 / texel_m)});
+    for (const double stretch : {1.0, 1.61803}) {
+      scene().ground.details.push_back({Texture(drawGroundDetail(1024, seed_ + 40), Texture::Border::kRepeat),
+                                        0.0F, 0.0F, static_cast<float>(1.0 / (kDetailTexel_m * stretch))});
+    }
+    parts_.addLevel(kGarageArea, 0.0, material);
+  }
+
+  // A flat panel in cells, so that the light on its corners is fine enough.
+  void addPanel(const Eigen::Vector3f& corner, const Eigen::Vector3f& along, const Eigen::Vector3f& up,
+                uint32_t material, const TextureWindow& window = TextureWindow()) {
+    const int columns = std::max(1, static_cast<int>(std::ceil(along.norm() / kLightCell_m)));
+    const int rows = std::max(1, static_cast<int>(std::ceil(up.norm() / kLightCell_m)));
+    for (int row = 0; row < rows; ++row) {
+      for (int column = 0; column < columns; ++column) {
+        const auto share = [](int i, int n) { return static_cast<float>(i) / static_cast<float>(n); };
+        const float s0 = share(column, columns);
+        const float s1 = share(column + 1, columns);
+        const float t0 = share(row, rows);
+        const float t1 = share(row + 1, rows);
+        const float width = window.u1 - window.u0;
+        const float height = window.v1 - window.v0;
+        const TextureWindow part{window.u0 + s0 * width, window.v1 - t1 * height, window.u0 + s1 * width,
+                                 window.v1 - t0 * height};
+        addQuad(corner + s0 * along + t0 * up, corner + s1 * along + t0 * up, corner + s1 * along + t1 * up,
+                corner + s0 * along + t1 * up, material, &scene().mesh, part);
+      }
+    }
+  }
+
+  void addWalls() {
+    const std::vector<Eigen::Vector2d> outline = cornersOf(kGarageArea);
+    for (size_t i = 0; i < outline.size(); ++i) {
+      // Seen from inside, the outline runs the other way.
+      const Eigen::Vector2d& from = outline[(i + 1) % outline.size()];
+      const Eigen::Vector2d edge = outline[i] - from;
+      const uint32_t wall =
+          parts_.textured(SurfaceKind::kBuilding,
+                          drawGarageWall(edge.norm(), kGarageHeight_m, static_cast<uint32_t>(seed_ * 9U + i)),
+                          kGarageTexelsPerM);
+      addPanel(vector(from.x(), from.y(), 0.0), vector(edge.x(), edge.y(), 0.0),
+               vector(0.0, 0.0, kGarageHeight_m), wall);
+    }
+  }
+
+  void addCeiling() {
+    constexpr double kTile_m = 16.0;
+    const int size = 1024;
+    const auto mean = static_cast<float>(kCeilingAlbedo);
+    const uint32_t concrete = parts_.textured(
+        SurfaceKind::kOther, drawFormedConcrete(size, size, mean, static_cast<uint32_t>(seed_ + 70U)),
+        kGarageTexelsPerM, 0.0, Texture::Border::kRepeat);
+    const GroundRectangle& area = kGarageArea;
+    const auto repeats_x = static_cast<float>(area.width() / kTile_m);
+    const auto repeats_y = static_cast<float>(area.depth() / kTile_m);
+    addPanel(vector(area.min_x, area.max_y, kGarageHeight_m), vector(area.width(), 0.0, 0.0),
+             vector(0.0, -area.depth(), 0.0), concrete, {0.0F, 0.0F, repeats_x, repeats_y});
+    const double height = kGarageHeight_m - kBeamHeight_m;
+    const auto beam = [&](double x, double y, double length, double width, bool along_x) {
+      const double dx = 0.5 * (along_x ? length : width);
+      const double dy = 0.5 * (along_x ? width : length);
+      const auto share = static_cast<float>((along_x ? length : width) / kTile_m);
+      const Eigen::Vector3f up = vector(0.0, 0.0, height);
+      addPanel(vector(x - dx, y - dy, kBeamHeight_m), vector(2.0 * dx, 0.0, 0.0), up, concrete,
+               {0.0F, 0.0F, share, 0.02F});
+      addPanel(vector(x + dx, y + dy, kBeamHeight_m), vector(-2.0 * dx, 0.0, 0.0), up, concrete,
+               {0.3F, 0.3F, 0.3F + share, 0.32F});
+      const auto depth_share = static_cast<float>(2.0 * dy / kTile_m);
+      addPanel(vector(x + dx, y - dy, kBeamHeight_m), vector(0.0, 2.0 * dy, 0.0), up, concrete,
+               {0.5F, 0.1F, 0.5F + depth_share, 0.12F});
+      addPanel(vector(x - dx, y + dy, kBeamHeight_m), vector(0.0, -2.0 * dy, 0.0), up, concrete,
+               {0.7F, 0.6F, 0.7F + depth_share, 0.62F});
+      addPanel(vector(x - dx, y + dy, kBeamHeight_m), vector(2.0 * dx, 0.0, 0.0), vector(0.0, -2.0 * dy, 0.0),
+               concrete, {0.2F, 0.2F, 0.2F + share, 0.2F + depth_share});
+    };
+    for (const double x : layout_.beam_x) {
+      beam(x, 0.0, area.depth(), 0.36, false);
+    }
+    // Flush beams would share a face: the ones along the garage are a little higher and narrower.
+    for (const double y : layout_.beam_y) {
+      beam(0.0, y, area.width(), 0.3, true);
+    }
+  }
+
+  void addPillars() {
+    uint32_t number = 0;
+    for (const GarageLayout::Pillar& pillar : layout_.pillars) {
+      const uint32_t material = parts_.textured(
+          SurfaceKind::kPole, drawGaragePillar(pillar.name, static_cast<uint32_t>(seed_ * 131U) + number++),
+          kGarageTexelsPerM);
+      const double half = 0.5 * kPillarWidth_m;
+      const std::vector<Eigen::Vector2d> corners =
+          orientedRectangle(pillar.x, pillar.y, 0.0, -half, half, half);
+      for (size_t i = 0; i < corners.size(); ++i) {
+        const Eigen::Vector2d edge = corners[(i + 1) % corners.size()] - corners[i];
+        const float u = 0.25F * static_cast<float>(i);
+        addPanel(vector(corners[i].x(), corners[i].y(), 0.0), vector(edge.x(), edge.y(), 0.0),
+                 vector(0.0, 0.0, kGarageHeight_m), material, {u, 0.0F, u + 0.25F, 1.0F});
+      }
+      // Seen from above without what hangs overhead, a pillar is solid.
+      parts_.addLevel({corners[0].x(), corners[0].y(), corners[2].x(), corners[2].y()}, kOverhead_m - 0.01,
+                      material);
+      scene().obstacles.push_back({"pillar", corners, 0.0, kGarageHeight_m});
+    }
+  }
+
+  // Sprinkler pipes and a duct under the beams, in pieces so that each gets its own light.
+  void addPipes() {
+    constexpr double kPiece_m = 2.0;
+    const auto pipe = [&](double y, double z, double radius, uint32_t material) {
+      for (double x = kGarageArea.min_x; x < kGarageArea.max_x - 1e-6; x += kPiece_m) {
+        addFrustum(vector(x, y, z), vector(x + kPiece_m, y, z), static_cast<float>(radius),
+                   static_cast<float>(radius), 8, false, material, &scene().mesh);
+      }
+    };
+    const uint32_t red = parts_.plain(SurfaceKind::kOther, 0.12, 0.03);
+    const uint32_t zinc = parts_.plain(SurfaceKind::kOther, 0.45, 0.05);
+    for (const double side : {-1.0, 1.0}) {
+      pipe(side * 12.0, 2.33, 0.05, red);
+      pipe(side * 18.2, 2.33, 0.04, red);
+      pipe(side * 3.4, 2.3, 0.09, zinc);
+    }
+    for (double x = kGarageArea.min_x; x < kGarageArea.max_x - 1e-6; x += kPiece_m) {
+      addBox(placement(x + 0.5 * kPiece_m, 22.9, 2.35, 0.0), vector(kPiece_m - 0.02, 0.6, 0.35), zinc,
+             &scene().mesh);
+      addQuad(vector(x, 23.2, 2.175), vector(x + kPiece_m, 23.2, 2.175), vector(x + kPiece_m, 22.6, 2.175),
+              vector(x, 22.6, 2.175), zinc, &scene().mesh);
+    }
+  }
+
+  void addLamps() {
+    const uint32_t housing = parts_.plain(SurfaceKind::kOther, 0.6);
+    for (const Lamp& lamp : layout_.lamps) {
+      Material tube;
+      tube.kind = SurfaceKind::kOther;
+      tube.albedo = 0.5F;
+      tube.emission = kLampRadiance * lamp.intensity / 3.0F;
+      const uint32_t light = scene().addMaterial(tube);
+      const bool along_x = std::abs(lamp.half_length.x()) > 0.1F;
+      const float length = 2.0F * lamp.half_length.norm();
+      const Eigen::Vector3f size(along_x ? length : 0.1F, along_x ? 0.1F : length, 0.07F);
+      addBox(placement(lamp.centre.x(), lamp.centre.y(), lamp.centre.z(), 0.0), size, light, &scene().mesh);
+      const Eigen::Vector3f half = 0.5F * size;
+      const float low = lamp.centre.z() - half.z();
+      addQuad({lamp.centre.x() - half.x(), lamp.centre.y() + half.y(), low},
+              {lamp.centre.x() + half.x(), lamp.centre.y() + half.y(), low},
+              {lamp.centre.x() + half.x(), lamp.centre.y() - half.y(), low},
+              {lamp.centre.x() - half.x(), lamp.centre.y() - half.y(), low}, light, &scene().mesh);
+      addBox(placement(lamp.centre.x(), lamp.centre.y(), lamp.centre.z() + 0.06, 0.0),
+             size + Eigen::Vector3f(0.06F, 0.06F, -0.02F), housing, &scene().mesh);
+      // It hangs from the ceiling.
+      addFrustum(lamp.centre, {lamp.centre.x(), lamp.centre.y(), static_cast<float>(kGarageHeight_m)}, 0.015F,
+                 0.015F, 5, false, housing, &scene().mesh);
+    }
+  }
+
+  void addCeilingReflection() {
+    const GroundRectangle& area = kGarageArea;
+    cv::Mat image(
+        static_cast<int>(area.depth() / kCeilingTexel_m), static_cast<int>(area.width() / kCeilingTexel_m),
+        CV_8UC1, cv::Scalar(255.0 * kCeilingAlbedo * kTypicalCeilingShare * kFullIrradiance / kLampRadiance));
+    for (const Lamp& lamp : layout_.lamps) {
+      const auto texel = [&](float metres, double origin_m) {
+        return static_cast<int>(std::lround((metres - origin_m) / kCeilingTexel_m * 8.0));
+      };
+      const Eigen::Vector3f from = lamp.centre - lamp.half_length;
+      const Eigen::Vector3f to = lamp.centre + lamp.half_length;
+      cv::line(image, {texel(from.x(), area.min_x), texel(from.y(), area.min_y)},
+               {texel(to.x(), area.min_x), texel(to.y(), area.min_y)},
+               cv::Scalar(255.0 * lamp.intensity / 3.0), 1, cv::LINE_8, 3);
+    }
+    scene().ceiling = std::make_unique<Ceiling>(
+        Ceiling{static_cast<float>(kGarageHeight_m),
+                kLampRadiance,
+                {Texture(image, Texture::Border::kClamp), static_cast<float>(area.min_x),
+                 static_cast<float>(area.min_y), static_cast<float>(1.0 / kCeilingTexel_m)}});
+  }
+
+  const SceneOptions options_;
+  const uint64_t seed_;
+  const GarageLayout layout_;
+  SceneParts parts_;
+};
+
+}  // namespace
+
+std::shared_ptr<const Scene> buildGarageScene(const SceneOptions& options) {
+  return GarageBuilder(options).build();
+}
+
+}  // namespace vcharge

@@ -1,0 +1,91 @@
+#include "scenes/lane_paths.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace vcharge {
+
+namespace {
+
+constexpr double kTransition_m = 3.0;
+constexpr double kStart_m = 12.0;  // open paths start and end this far from the middle
+
+// The curve into a bay and out of it.
+constexpr double kHalfPi = 1.57079632679489661923;
+constexpr double kBayCurvature_per_m = 0.2;
+constexpr double kTurnIn_m = 1.0;
+constexpr double kArc_m = kHalfPi / kBayCurvature_per_m - kTurnIn_m;
+constexpr double kTangent_m = 5.5;
+constexpr double kIntoBay_m = 1.5;
+
+}  // namespace
+
+DrivePath Lanes::through(const std::vector<Eigen::Vector2d>& waypoints, bool closed) const {
+  return DrivePath::throughWaypoints(waypoints, closed, corner_radius_m, kTransition_m);
+}
+
+DrivePath Lanes::loop(const Eigen::Vector2d& outwards_m, bool clockwise) const {
+  const double x = x_m + outwards_m.x();
+  const double y = y_m + outwards_m.y();
+  std::vector<Eigen::Vector2d> corners = {{x, -y}, {x, y}, {-x, y}, {-x, -y}};
+  if (clockwise) {
+    std::reverse(corners.begin(), corners.end());
+  }
+  return through(corners, true);
+}
+
+DrivePath Lanes::figureEight() const {
+  return through({{-kStart_m, 0.0},
+                  {x_m, 0.0},
+                  {x_m, y_m},
+                  {-x_m, y_m},
+                  {-x_m, 0.0},
+                  {x_m, 0.0},
+                  {x_m, -y_m},
+                  {-x_m, -y_m},
+                  {-x_m, 0.0},
+                  {-8.0, 0.0}},
+                 false);
+}
+
+DrivePath Lanes::bothDirections(const Eigen::Vector2d& outwards_m) const {
+  const double x = x_m + outwards_m.x();
+  const double y = y_m + outwards_m.y();
+  return through({{-kStart_m, -y},
+                  {x, -y},
+                  {x, y},
+                  {-x, y},
+                  {-x, -y},
+                  {x, -y},
+                  {x, 0.0},
+                  {-x, 0.0},
+                  {-x, y},
+                  {x, y},
+                  {x, -y},
+                  {-x, -y},
+                  {-x, 0.0},
+                  {kStart_m, 0.0}},
+                 false);
+}
+
+DrivePath reverseIntoBay(double bay_x_m, double lane_y_m, double approach_m) {
+  constexpr double k = kBayCurvature_per_m;
+  return DrivePath(RigidTransform::planar(bay_x_m + kTangent_m - approach_m, lane_y_m, 0.0),
+                   {{approach_m, 0.0, 0.0},
+                    {kTurnIn_m, 0.0, k, true},
+                    {kArc_m, k, k, true},
+                    {kTurnIn_m, k, 0.0, true},
+                    {kIntoBay_m, 0.0, 0.0, true}});
+}
+
+DrivePath leaveBayWestwards(double bay_x_m, double lane_y_m, double leave_m) {
+  constexpr double k = -kBayCurvature_per_m;
+  return DrivePath(RigidTransform::planar(bay_x_m, lane_y_m + kTangent_m + kIntoBay_m, -kHalfPi),
+                   {{kIntoBay_m, 0.0, 0.0},
+                    {kTurnIn_m, 0.0, k},
+                    {kArc_m, k, k},
+                    {kTurnIn_m, k, 0.0},
+                    {leave_m, 0.0, 0.0}});
+}
+
+}  // namespace vcharge

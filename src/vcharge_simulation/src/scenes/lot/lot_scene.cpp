@@ -1,0 +1,162 @@
+#include "vcharge_simulation/scenes/lot_scene.h"
+
+#include <algorithm>
+
+#include "rendering/light_baker.h"
+#include "scenes/lot/lot_ground.h"
+#include "scenes/lot/lot_layout.h"
+#include "scenes/lot/lot_variant.h"
+#include "scenes/scene_parts.h"
+#include "vcharge_core/base/options.h"
+
+namespace vcharge {
+
+namespace {
+
+constexpr double kFarGround_m = 280.0;
+constexpr double kFarTexel_m = 0.2;
+constexpr double kWallLightTexel_m = 0.12;
+constexpr double kDetailTexel_m = 0.0035;
+
+LightOptions lightOfDay(int day) {
+  LightOptions light;
+  if (day != 0) {
+    light.sun_azimuth_rad = 2.2 + 1.9 * day;
+    light.sun_elevation_rad = 0.55;
+    light.sun_irradiance = 0.8;
+    light.sky_irradiance = 0.5;
+    light.cloud_cover = 0.65;
+  }
+  return light;
+}
+
+// Builds one lot; each step adds to the scene.
+class LotBuilder {
+ public:
+  LotBuilder(const LotOptions& options, const LotVariant& variant)
+      : options_(options),
+        variant_(variant),
+        layout_(variant.layout),
+        parts_(options.seed * 77U + 1U, options.foliage_density) {}
+
+  std::shared_ptr<const Scene> build() {
+    scene().sky = std::make_unique<Sky>(
+        lightOfDay(options_.day),
+        static_cast<uint32_t>(options_.seed * 13U + static_cast<uint64_t>(options_.day)));
+    addGround();
+    parts_.addCars(layout_.cars);
+    parts_.addTrees(layout_.trees, options_.seed);
+    parts_.addBushes(layout_.bushes);
+    parts_.addHedges(layout_.hedges);
+    for (const GroundRectangle& island : layout_.islands) {
+      parts_.addGrassAlong(island, levelOf(island));
+    }
+    parts_.addHouses(layout_.buildings);
+    parts_.addPoles(layout_.poles);
+    parts_.addBins(layout_.bins);
+    for (const Fence& fence : layout_.fences) {
+      parts_.addFence(fence);
+    }
+    parts_.addSkyline();
+    if (variant_.add_things) {
+      variant_.add_things(&parts_);
+    }
+    scene().ground_height = variant_.ground_height;
+    bakeWallLight(parts_.walls(), kWallLightTexel_m, &scene());
+    bakeGroundLight(
+        {-44.0, -34.0}, {44.0, 34.0}, options_.light_texel_m,
+        [&](double x, double y) {
+          return layout_.groundHeight(x, y) + (variant_.ground_height ? variant_.ground_height(x, y) : 0.0);
+        },
+        &scene());
+    return parts_.sharedScene();
+  }
+
+ private:
+  Scene& scene() { return parts_.scene(); }
+
+  double levelOf(const GroundRectangle& island) const {
+    return variant_.ground_height ? variant_.ground_height(0.5 * (island.min_x + island.max_x),
+                                                           0.5 * (island.min_y + island.max_y))
+                                  : 0.0;
+  }
+
+  void addGround() {
+    Material ground;
+    ground.kind = SurfaceKind::kGround;
+    ground.mapping = Material::Mapping::kGround;
+    ground.texture = 0;
+    const uint32_t near_ground = scene().addMaterial(ground);
+    ground.texture = 1;
+    const uint32_t far_ground = scene().addMaterial(ground);
+    scene().ground.layers.push_back(
+        {Texture(drawLotGround(layout_, options_.ground_texel_m, options_.seed), Texture::Border::kClamp),
+         static_cast<float>(kLotArea.min_x), static_cast<float>(kLotArea.min_y),
+         static_cast<float>(1.0 / options_.ground_texel_m)});
+    scene().ground.layers.push_back(
+        {Texture(drawFarGround(-0.5 * kFarGround_m, kFarGround_m, kFarTexel_m, options_.seed),
+                 Texture::Border::kClamp),
+         static_cast<float>(-0.5 * kFarGround_m), static_cast<float>(-0.5 * kFarGround_m),
+         static_cast<float>(1.0 / kFarTexel_m)});
+    for (const double stretch : {1.0, 1.61803}) {
+      scene().ground.details.push_back(
+          {Texture(drawGroundDetail(1024, options_.seed + 40), Texture::Border::kRepeat), 0.0F, 0.0F,
+           static_cast<float>(1.0 / (kDetailTexel_m * stretch))});
+    }
+    if (variant_.add_ground) {
+      variant_.add_ground(near_ground, &parts_);
+    } else {
+      parts_.addLevel(kLotArea, 0.0, near_ground);
+    }
+    const double far = 0.5 * kFarGround_m;
+    parts_.addLevel({-far, kLotArea.max_y, far, far}, 0.0, far_ground);
+    parts_.addLevel({-far, -far, far, kLotArea.min_y}, 0.0, far_ground);
+    parts_.addLevel({-far, kLotArea.min_y, kLotArea.min_x, kLotArea.max_y}, 0.0, far_ground);
+    parts_.addLevel({kLotArea.max_x, kLotArea.min_y, far, kLotArea.max_y}, 0.0, far_ground);
+    for (const GroundRectangle& island : layout_.islands) {
+      parts_.addIsland(island, near_ground, levelOf(island));
+    }
+  }
+
+  const LotOptions options_;
+  const LotVariant& variant_;
+  const LotLayout& layout_;
+  SceneParts parts_;
+};
+
+}  // namespace
+
+void LotOptions::validate() const {
+  requireField(moved_cars >= 0.0 && moved_cars <= 1.0, "moved_cars", "must be in [0, 1]", moved_cars);
+  requireField(ground_texel_m >= 0.005 && ground_texel_m <= 0.5, "ground_texel_m", "must be in [0.005, 0.5]",
+               ground_texel_m);
+  requireField(light_texel_m >= 0.02 && light_texel_m <= 0.5, "light_texel_m", "must be in [0.02, 0.5]",
+               light_texel_m);
+  requireField(foliage_density >= 0.0 && foliage_density <= 5.0, "foliage_density", "must be in [0, 5]",
+               foliage_density);
+}
+
+std::shared_ptr<const Scene> buildLotVariant(const LotOptions& options, const LotVariant& variant) {
+  options.validate();
+  return LotBuilder(options, variant).build();
+}
+
+std::shared_ptr<const Scene> buildLotScene(const LotOptions& options) {
+  options.validate();
+  LotVariant lot;
+  lot.layout = makeLotLayout(options.seed, options.day, options.moved_cars);
+  return buildLotVariant(options, lot);
+}
+
+LotOptions lotOptionsOf(const SceneOptions& options) {
+  LotOptions lot;
+  lot.seed = static_cast<uint64_t>(options.seed);
+  lot.day = options.day;
+  lot.moved_cars = options.moved_cars;
+  lot.ground_texel_m = std::min(0.5, lot.ground_texel_m / options.image_scale);
+  lot.light_texel_m /= options.detail;
+  lot.foliage_density *= options.detail;
+  return lot;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,143 @@
+#include "vcharge_simulation/scenes/lot_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "vcharge_simulation/drive/truth_maps.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kCell_m = 0.1;
+
+LotOptions coarseLot(int day) {
+  LotOptions options;
+  options.day = day;
+  options.ground_texel_m = 0.2;
+  options.light_texel_m = 0.4;
+  options.foliage_density = 0.1;
+  return options;
+}
+
+const Renderer& lot() {
+  static const Renderer renderer(buildLotScene(coarseLot(0)));
+  return renderer;
+}
+
+const TruthHeightMap& heightMap() {
+  static const TruthHeightMap map = computeHeightMap(lot(), kCell_m, 2.5);
+  return map;
+}
+
+float heightAt(double x, double y) {
+  const TruthHeightMap& map = heightMap();
+  return map.height_m.at<float>(static_cast<int>(std::lround((y - map.origin_m.y()) / map.cell_size_m)),
+                                static_cast<int>(std::lround((x - map.origin_m.x()) / map.cell_size_m)));
+}
+
+Eigen::Vector2d middleOf(const Obstacle& obstacle) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& corner : obstacle.footprint_m) {
+    sum += corner;
+  }
+  return sum / static_cast<double>(obstacle.footprint_m.size());
+}
+
+TEST(LotSceneTest, LanesAreLevelAndFree) {
+  for (const double x : {-24.0, -10.0, 0.0, 12.0, 24.0}) {
+    for (const double y : {-15.0, 0.0, 15.0}) {
+      EXPECT_NEAR(heightAt(x, y), 0.0, 1e-4) << x << ", " << y;
+    }
+  }
+}
+
+TEST(LotSceneTest, HeightMapHoldsEveryObstacleAtItsHeight) {
+  std::map<std::string, int> seen;
+  for (const Obstacle& obstacle : lot().scene().obstacles) {
+    const Eigen::Vector2d middle = middleOf(obstacle);
+    if (middle.cwiseAbs().x() > 39.0 || middle.cwiseAbs().y() > 29.0) {
+      continue;
+    }
+    const float height_m = heightAt(middle.x(), middle.y());
+    if (obstacle.kind == "car") {
+      // The roof over the middle of the cabin, or the bonnet.
+      EXPECT_GT(height_m, 0.5 * obstacle.top_z_m);
+      EXPECT_LT(height_m, obstacle.top_z_m + 0.02);
+    } else if (obstacle.kind == "bin" || obstacle.kind == "hedge") {
+      EXPECT_NEAR(height_m, obstacle.top_z_m, 0.25) << obstacle.kind;
+    } else if (obstacle.kind == "kerb") {
+      // Its middle may carry a hedge.
+      EXPECT_GE(height_m, obstacle.top_z_m - 1e-4);
+    }
+    ++seen[obstacle.kind];
+  }
+  for (const char* kind : {"car", "kerb", "tree", "bush", "hedge", "pole", "bin"}) {
+    EXPECT_GT(seen[kind], 0) << kind;
+  }
+}
+
+TEST(LotSceneTest, WhatStandsOutOfTheGroundBelongsToAnObstacle) {
+  const TruthHeightMap& map = heightMap();
+  // Footprints drawn on the grid, grown by a cell and by the reach of leaves and mirrors.
+  cv::Mat covered = cv::Mat::zeros(map.height_m.size(), CV_8UC1);
+  for (const Obstacle& obstacle : lot().scene().obstacles) {
+    std::vector<cv::Point> polygon;
+    for (const Eigen::Vector2d& corner : obstacle.footprint_m) {
+      polygon.emplace_back(static_cast<int>(std::lround((corner.x() - map.origin_m.x()) / map.cell_size_m)),
+                           static_cast<int>(std::lround((corner.y() - map.origin_m.y()) / map.cell_size_m)));
+    }
+    cv::fillPoly(covered, std::vector<std::vector<cv::Point>>{polygon}, cv::Scalar(255));
+  }
+  cv::dilate(covered, covered, cv::Mat::ones(7, 7, CV_8UC1));
+  int standing = 0;
+  int unexplained = 0;
+  for (int row = 0; row < map.height_m.rows; ++row) {
+    for (int column = 0; column < map.height_m.cols; ++column) {
+      const float height_m = map.height_m.at<float>(row, column);
+      // Low branches of trees reach beyond the trunks that are their footprints.
+      if (height_m > 0.3F && height_m < 1.4F) {
+        ++standing;
+        unexplained += covered.at<uint8_t>(row, column) == 0 ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(standing, 20000);
+  EXPECT_LT(unexplained, standing / 200);
+}
+
+TEST(LotSceneTest, OnAnotherDaySomeCarsHaveMovedAndAllElseStands) {
+  const auto places = [](const Scene& scene, const std::string& kind) {
+    std::set<std::pair<int, int>> result;
+    for (const Obstacle& obstacle : scene.obstacles) {
+      if (obstacle.kind == kind) {
+        const Eigen::Vector2d middle = middleOf(obstacle);
+        result.emplace(static_cast<int>(std::lround(middle.x() * 1000.0)),
+                       static_cast<int>(std::lround(middle.y() * 1000.0)));
+      }
+    }
+    return result;
+  };
+  const std::shared_ptr<const Scene> other_day = buildLotScene(coarseLot(1));
+  for (const char* kind : {"tree", "bush", "hedge", "kerb", "pole", "building", "fence", "bin"}) {
+    EXPECT_EQ(places(lot().scene(), kind), places(*other_day, kind)) << kind;
+  }
+  const auto before = places(lot().scene(), "car");
+  const auto after = places(*other_day, "car");
+  int kept = 0;
+  for (const auto& place : before) {
+    kept += static_cast<int>(after.count(place));
+  }
+  const double share = static_cast<double>(kept) / static_cast<double>(before.size());
+  EXPECT_GT(share, 0.55);  // 30 % of the bays are drawn anew, binomially
+  EXPECT_LT(share, 0.85);
+  EXPECT_GT((lot().scene().sky->directionToSun() - other_day->sky->directionToSun()).norm(), 0.3F);
+}
+
+}  // namespace
+}  // namespace vcharge

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "objects/plants.h"
+#include "rendering/light_baker.h"
+#include "scenes/scene_things.h"
+#include "vcharge_simulation/objects/car_model.h"
+#include "vcharge_simulation/rendering/noise.h"
+#include "vcharge_simulation/scenes/scene.h"
+
+namespace vcharge {
+
+std::vector<Eigen::Vector2d> cornersOf(const GroundRectangle& area);
+/// Of a rectangle along `yaw_rad` around (x, y), counter-clockwise.
+std::vector<Eigen::Vector2d> orientedRectangle(double x, double y, double yaw_rad, double min_along,
+                                               double max_along, double half_width);
+std::vector<Eigen::Vector2d> circleAround(double x, double y, double radius);
+
+/// Puts things into a scene: each with its triangles, its materials and its entry among the obstacles. What
+/// builders of different scenes share; the random numbers depend on the order of the calls.
+class SceneParts {
+ public:
+  /// Makes an empty scene and the materials of plants, kerbs and metal. `foliage_density`: leaves over the
+  /// default.
+  SceneParts(uint64_t random_seed, double foliage_density);
+
+  Scene& scene() { return *scene_; }
+  const std::shared_ptr<Scene>& sharedScene() const { return scene_; }
+  Random& random() { return random_; }
+  uint32_t metal() const { return metal_; }
+  uint32_t darkMetal() const { return dark_metal_; }
+  uint32_t concrete() const { return concrete_; }
+
+  uint32_t plain(SurfaceKind kind, double albedo, double reflectivity = 0.0);
+  uint32_t textured(SurfaceKind kind, const cv::Mat& image, double texels_per_m, double reflectivity = 0.0,
+                    Texture::Border border = Texture::Border::kClamp);
+  /// CV_8UC1 of fractal noise around `mean`.
+  cv::Mat noiseImage(int width, int height, double mean, double contrast, double scale_x, double scale_y);
+
+  void addLevel(const GroundRectangle& area, double z, uint32_t material);
+  /// A raised area with a kerb of stones around it.
+  void addIsland(const GroundRectangle& area, uint32_t ground, double base_z_m = 0.0);
+  void addCars(const std::vector<ParkedCar>& cars);
+  void addTrees(const std::vector<Tree>& trees, uint64_t seed);
+  void addBushes(const std::vector<Bush>& bushes);
+  void addHedges(const std::vector<Hedge>& hedges);
+  /// Tufts of grass along the edge of a raised area.
+  void addGrassAlong(const GroundRectangle& area, double base_z_m = 0.0);
+  void addHouses(const std::vector<Building>& houses);
+  void addPoles(const std::vector<Pole>& poles);
+  void addBins(const std::vector<Bin>& bins);
+  void addFence(const Fence& fence);
+  /// Woods and roofs far away: a ring with a ragged upper edge.
+  void addSkyline();
+  /// Walls of addHouses, for bakeWallLight.
+  const std::vector<Wall>& walls() const { return walls_; }
+
+ private:
+  void addMaterials();
+  const CarMaterials& carMaterials(int shape_index, int paint_index);
+
+  const double foliage_density_;
+  Random random_;
+  std::shared_ptr<Scene> scene_;
+  PlantMaterials plants_{};
+  std::vector<Wall> walls_;
+  uint32_t concrete_ = 0, metal_ = 0, dark_metal_ = 0;
+  std::map<std::pair<int, int>, CarMaterials> car_materials_;
+};
+
+}  // namespace vcharge

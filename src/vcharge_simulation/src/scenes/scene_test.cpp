@@ -1,0 +1,291 @@
+#include "vcharge_simulation/scenes/scene_catalogue.h"
+
+#include <cmath>
+#include <map>
+#include <set>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+#include <opencv2/imgproc.hpp>
+
+#include "scenes/catalogue_cases.h"
+#include "scenes/lot/lot_layout.h"
+#include "scenes/scene_parts.h"
+#include "vcharge_simulation/drive/drive_simulator.h"
+#include "vcharge_simulation/drive/truth_maps.h"
+#include "vcharge_simulation/objects/car_model.h"
+#include "vcharge_simulation/sensors/golf_rig.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kImageScale = 0.3;
+constexpr double kCell_m = 0.1;
+
+class SceneTest : public testing::TestWithParam<SceneCase> {
+ protected:
+  const Renderer& renderer() const { return rendererOf(GetParam().scene); }
+};
+
+std::string sceneOf(const testing::TestParamInfo<SceneCase>& info) {
+  return info.param.scene;
+}
+INSTANTIATE_TEST_SUITE_P(Catalogue, SceneTest, testing::ValuesIn(kSceneCases), sceneOf);
+
+TEST_P(SceneTest, SameBytesOnAnyNumberOfThreads) {
+  const CameraView view(makeGolfRig(1, 0.15).cameras[1], makeGolfBody());
+  const auto render = [&](size_t threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    const Moment moment = momentOf(GetParam());
+    return renderer().renderLight(view, moment.world_from_vehicle, moment.time_s);
+  };
+  EXPECT_EQ(cv::norm(render(1), render(4), cv::NORM_INF), 0.0);
+}
+
+double groundAt(const Scene& scene, const Eigen::Vector2d& place_m) {
+  return scene.ground_height ? scene.ground_height(place_m.x(), place_m.y()) : 0.0;
+}
+
+TEST_P(SceneTest, WhatStandsOutOfTheGroundBelongsToAnObstacle) {
+  const Scene& scene = renderer().scene();
+  const TruthHeightMap map = computeHeightMap(renderer(), kCell_m, 2.4);
+  // Footprints drawn on the grid, grown by the reach of leaves and mirrors; walls around the scene stand on
+  // its border.
+  cv::Mat covered = cv::Mat::zeros(map.height_m.size(), CV_8UC1);
+  cv::rectangle(covered, cv::Rect(0, 0, covered.cols, covered.rows), cv::Scalar(255), 3);
+  for (const Obstacle& obstacle : scene.obstacles) {
+    std::vector<cv::Point> polygon;
+    for (const Eigen::Vector2d& corner : obstacle.footprint_m) {
+      polygon.emplace_back(static_cast<int>(std::lround((corner.x() - map.origin_m.x()) / kCell_m)),
+                           static_cast<int>(std::lround((corner.y() - map.origin_m.y()) / kCell_m)));
+    }
+    cv::fillPoly(covered, std::vector<std::vector<cv::Point>>{polygon}, cv::Scalar(255));
+  }
+  cv::dilate(covered, covered, cv::Mat::ones(7, 7, CV_8UC1));
+  int standing = 0;
+  int unexplained = 0;
+  for (int row = 0; row < map.height_m.rows; ++row) {
+    for (int column = 0; column < map.height_m.cols; ++column) {
+      const Eigen::Vector2d place_m = map.origin_m + kCell_m * Eigen::Vector2d(column, row);
+      const double height_m = map.height_m.at<float>(row, column) - groundAt(scene, place_m);
+      if (height_m > 0.3 && height_m < 1.4) {
+        ++standing;
+        unexplained += covered.at<uint8_t>(row, column) == 0 ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_GT(standing, 10000);
+  EXPECT_LT(unexplained, standing / 100);
+}
+
+TEST_P(SceneTest, HeightMapHoldsCarsPillarsAndThings) {
+  const Scene& scene = renderer().scene();
+  const TruthHeightMap map = computeHeightMap(renderer(), kCell_m, 2.8);
+  int seen = 0;
+  for (const Obstacle& obstacle : scene.obstacles) {
+    Eigen::Vector2d middle = Eigen::Vector2d::Zero();
+    for (const Eigen::Vector2d& corner : obstacle.footprint_m) {
+      middle += corner / static_cast<double>(obstacle.footprint_m.size());
+    }
+    const Eigen::Vector2d cell = (middle - map.origin_m) / kCell_m;
+    const bool is_solid = obstacle.kind == "car" || obstacle.kind == "box" || obstacle.kind == "trailer" ||
+                          obstacle.kind == "bin" || obstacle.kind == "pedestrian";
+    if (!is_solid || cell.minCoeff() < 1.0 || cell.x() > map.height_m.cols - 2 ||
+        cell.y() > map.height_m.rows - 2) {
+      continue;
+    }
+    const float height_m = map.height_m.at<float>(static_cast<int>(std::lround(cell.y())),
+                                                  static_cast<int>(std::lround(cell.x())));
+    EXPECT_GT(height_m, obstacle.base_z_m + 0.45 * (obstacle.top_z_m - obstacle.base_z_m)) << obstacle.kind;
+    EXPECT_LT(height_m, obstacle.top_z_m + 0.05) << obstacle.kind;
+    ++seen;
+  }
+  EXPECT_GT(seen, 20);
+}
+
+TEST(CatalogueTest, EveryDriveStaysInItsSceneAndLastsSomeSeconds) {
+  for (const CatalogueEntry& scene : listScenes()) {
+    for (const CatalogueEntry& entry : listDrives(scene.name)) {
+      const DrivePlan plan = planDrive(scene.name, entry.name);
+      const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1,
+                                                 FaultOptions(), plan.ground_height);
+      EXPECT_GT(drive.world_from_vehicle.size(), 50U) << scene.name << " " << entry.name;
+      for (const auto& [stamp, world_from_vehicle] : drive.world_from_vehicle) {
+        ASSERT_LT(std::abs(world_from_vehicle.translation().x()), 31.0) << scene.name << " " << entry.name;
+        ASSERT_LT(std::abs(world_from_vehicle.translation().y()), 21.0) << scene.name << " " << entry.name;
+      }
+    }
+  }
+}
+
+cv::Mat_<cv::Point2f> outlineOf(const std::vector<Eigen::Vector2d>& footprint_m) {
+  cv::Mat_<cv::Point2f> outline(static_cast<int>(footprint_m.size()), 1);
+  for (int i = 0; i < outline.rows; ++i) {
+    const Eigen::Vector2f corner = footprint_m[static_cast<size_t>(i)].cast<float>();
+    outline(i) = {corner.x(), corner.y()};
+  }
+  return outline;
+}
+
+// Names of what the own car would touch on a drive of the given scene.
+std::set<std::string> touchedOn(const DrivePlan& plan, const std::vector<Obstacle>& obstacles) {
+  constexpr double kMirror_m = 0.1;
+  const CarShape& golf = carShapes().front();
+  std::vector<cv::Mat_<cv::Point2f>> outlines;
+  for (const Obstacle& obstacle : obstacles) {
+    outlines.push_back(outlineOf(obstacle.footprint_m));
+  }
+  std::set<std::string> touched;
+  const VehicleMotion motion(plan.path, plan.motion, 1, plan.ground_height);
+  for (int ms = 0; ms < static_cast<int>(motion.duration() * 1000.0); ms += 250) {
+    const RigidTransform place = motion.at(ms).world_from_planar;
+    const cv::Mat_<cv::Point2f> own = outlineOf(
+        orientedRectangle(place.translation().x(), place.translation().y(), yawOfRotation(place.rotation()),
+                          golf.rear(), golf.front(), 0.5 * golf.width + kMirror_m));
+    for (size_t i = 0; i < outlines.size(); ++i) {
+      const cv::Point2f corner = outlines[i](0);
+      const bool is_far =
+          std::abs(corner.x - own(0).x) + std::abs(corner.y - own(0).y) > 12.0F && obstacles[i].kind == "car";
+      cv::Mat overlap;
+      if (!is_far && cv::intersectConvexConvex(outlines[i], own, overlap) > 0.0F) {
+        touched.insert(obstacles[i].kind + " at " + std::to_string(corner.x) + ", " +
+                       std::to_string(corner.y));
+      }
+    }
+  }
+  return touched;
+}
+
+TEST_P(SceneTest, DrivesKeepClearOfAllThatStands) {
+  for (const CatalogueEntry& entry : listDrives(GetParam().scene)) {
+    const DrivePlan plan = planDrive(GetParam().scene, entry.name);
+    if (plan.day == 0) {
+      EXPECT_THAT(touchedOn(plan, renderer().scene().obstacles), testing::IsEmpty()) << entry.name;
+    }
+  }
+}
+
+// Parked cars are all that differs between the lots of different seeds and days on the lanes and bays.
+TEST(CatalogueTest, DrivesOfTheLotKeepClearOfParkedCarsForEverySeed) {
+  for (uint64_t seed = 1; seed <= 12; ++seed) {
+    for (const int day : {0, 1}) {
+      std::vector<Obstacle> cars;
+      for (const ParkedCar& car : makeLotLayout(seed, day, 0.3).cars) {
+        const CarShape& shape = carShapes()[static_cast<size_t>(car.shape)];
+        cars.push_back(
+            {"car",
+             orientedRectangle(car.x, car.y, car.yaw_rad, shape.rear(), shape.front(), 0.5 * shape.width),
+             0.0, shape.height});
+      }
+      for (const CatalogueEntry& entry : listDrives("lot")) {
+        const DrivePlan plan = planDrive("lot", entry.name);
+        if (plan.day == day) {
+          EXPECT_THAT(touchedOn(plan, cars), testing::IsEmpty()) << entry.name << ", seed " << seed;
+        }
+      }
+    }
+  }
+}
+
+TEST(SlopeTest, ParkedCarsStandOnTheGroundWithAllFourWheels) {
+  const Scene& scene = rendererOf("two_levels").scene();
+  std::set<uint32_t> of_cars;
+  for (const MeshTriangle& triangle : scene.mesh.triangles) {
+    if (scene.materials[triangle.material].kind == SurfaceKind::kCar) {
+      of_cars.insert(triangle.vertices.begin(), triangle.vertices.end());
+    }
+  }
+  int cars = 0;
+  for (const Obstacle& obstacle : scene.obstacles) {
+    if (obstacle.kind != "car") {
+      continue;
+    }
+    const Eigen::Vector2d middle = 0.5 * (obstacle.footprint_m[0] + obstacle.footprint_m[2]);
+    const Eigen::Vector2d along = 0.5 * (obstacle.footprint_m[1] - obstacle.footprint_m[0]);
+    const Eigen::Vector2d across = 0.5 * (obstacle.footprint_m[3] - obstacle.footprint_m[0]);
+    // Over the ground, of the lowest part of each quarter of the car: a tyre.
+    std::map<std::pair<bool, bool>, double> lowest_m;
+    for (const uint32_t index : of_cars) {
+      const Eigen::Vector3d vertex = scene.mesh.vertices[index].position.cast<double>();
+      const double x = (vertex.head<2>() - middle).dot(along) / along.squaredNorm();
+      const double y = (vertex.head<2>() - middle).dot(across) / across.squaredNorm();
+      if (std::abs(x) < 1.0 && std::abs(y) < 1.0) {
+        const double height_m = vertex.z() - groundAt(scene, vertex.head<2>());
+        const auto [found, is_new] = lowest_m.emplace(std::pair(x > 0.0, y > 0.0), height_m);
+        found->second = std::min(found->second, height_m);
+      }
+    }
+    ASSERT_EQ(lowest_m.size(), 4U);
+    for (const auto& [quarter, height_m] : lowest_m) {
+      EXPECT_NEAR(height_m, 0.0, 0.015);
+    }
+    ++cars;
+  }
+  EXPECT_GT(cars, 20);
+}
+
+TEST(MoverTest, ChangesTheRangeOnlyWhereItsFootprintsAre) {
+  const Renderer& renderer = rendererOf("obstacles");
+  const CameraView view(makeGolfRig(1, kImageScale).cameras[1], nullptr);
+  const RigidTransform world_from_vehicle = RigidTransform::planar(1.0, 0.0, 0.0);
+  const RigidTransform world_from_camera = world_from_vehicle * *view.camera().vehicle_from_camera;
+  const Mover& walker = renderer.scene().movers.front();
+  constexpr double kTimes_s[] = {10.0, 12.0};
+  const cv::Mat ranges[] = {renderer.renderRange(view, world_from_vehicle, kTimes_s[0]),
+                            renderer.renderRange(view, world_from_vehicle, kTimes_s[1])};
+  int changed = 0;
+  for (int y = 0; y < view.size().height; ++y) {
+    for (int x = 0; x < view.size().width; ++x) {
+      const float before_m = ranges[0].at<float>(y, x);
+      const float after_m = ranges[1].at<float>(y, x);
+      if (before_m == after_m || (std::isnan(before_m) && std::isnan(after_m))) {
+        continue;
+      }
+      // The walker is what is nearer.
+      const bool is_before = std::isnan(after_m) || before_m < after_m;
+      const double range_m = is_before ? before_m : after_m;
+      const Eigen::Vector3d place = world_from_camera * (range_m * view.centreRay(x, y).cast<double>());
+      const MoverState state = walker.stateAt(kTimes_s[is_before ? 0 : 1]);
+      const double reach_m = (place - state.world_from_mover.translation()).head<2>().norm();
+      EXPECT_LT(reach_m, 0.75);  // a stride
+      EXPECT_LT(place.z(), state.obstacle.top_z_m + 0.05);
+      ++changed;
+    }
+  }
+  EXPECT_GT(changed, 200);
+}
+
+TEST(MoverTest, CameraSeesTheSquaresOfTheBoardWhereItsPoseSays) {
+  const Renderer& renderer = rendererOf("chessboard");
+  const DrivePlan plan = planDrive("chessboard", "board_left");
+  const CameraView view(makeGolfRig(1, 1.0).cameras[1], nullptr);
+  int poses = 0;
+  for (int pose = 0; pose < 3; ++pose) {
+    const double time_s = plan.start_s + pose + 0.1;
+    const cv::Mat light = renderer.renderLight(view, plan.path.worldFromStart(), time_s);
+    const RigidTransform camera_from_board =
+        (plan.path.worldFromStart() * *view.camera().vehicle_from_camera).inverse() *
+        renderer.scene().movers.front().stateAt(time_s).world_from_mover;
+    double dark = 0.0;
+    double bright = 0.0;
+    for (int row = 0; row < 7; ++row) {
+      for (int column = 0; column < 10; ++column) {
+        // The board's origin is the first inner corner.
+        const Eigen::Vector3d middle(0.1 * column - 0.05, 0.1 * row - 0.05, 0.0);
+        Eigen::Vector2d pixel;
+        ASSERT_TRUE(view.camera().model.project(camera_from_board * middle, &pixel));
+        const double value = light.at<float>(static_cast<int>(std::lround(pixel.y())),
+                                             static_cast<int>(std::lround(pixel.x())));
+        ((row + column) % 2 == 0 ? dark : bright) += value / 35.0;
+      }
+    }
+    EXPECT_LT(dark, 0.35 * bright) << "pose " << pose;
+    ++poses;
+  }
+  EXPECT_EQ(poses, 3);
+}
+
+}  // namespace
+}  // namespace vcharge

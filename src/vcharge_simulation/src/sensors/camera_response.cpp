@@ -1,0 +1,131 @@
+#include "vcharge_simulation/sensors/camera_response.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_simulation/rendering/noise.h"
+
+namespace vcharge {
+
+namespace {
+
+constexpr int kTableSize = 8192;
+constexpr int kNormalTableBits = 12;
+
+// Quantiles of the normal distribution by bisection of its distribution function.
+std::vector<float> makeNormalTable() {
+  std::vector<float> table(1U << kNormalTableBits);
+  for (size_t i = 0; i < table.size(); ++i) {
+    const double probability = (static_cast<double>(i) + 0.5) / static_cast<double>(table.size());
+    double low = -6.0;
+    double high = 6.0;
+    for (int step = 0; step < 60; ++step) {
+      const double middle = 0.5 * (low + high);
+      (0.5 * std::erfc(-middle / std::sqrt(2.0)) < probability ? low : high) = middle;
+    }
+    table[i] = static_cast<float>(0.5 * (low + high));
+  }
+  return table;
+}
+
+}  // namespace
+
+void CameraResponseOptions::validate() const {
+  requireField(exposure > 0.0, "exposure", "must be positive", exposure);
+  requireField(shoulder > 0.0, "shoulder", "must be positive", shoulder);
+  requireField(gamma > 0.0 && gamma <= 1.0, "gamma", "must be in (0, 1]", gamma);
+  requireField(photon_noise >= 0.0, "photon_noise", "must not be negative", photon_noise);
+  requireField(read_noise >= 0.0, "read_noise", "must not be negative", read_noise);
+}
+
+CameraResponse::CameraResponse(const CameraResponseOptions& options) : options_(options) {
+  options.validate();
+  gray_by_root_light_.resize(kTableSize + 1);
+  for (int i = 0; i <= kTableSize; ++i) {
+    const double root = static_cast<double>(i) / kTableSize;
+    gray_by_root_light_[static_cast<size_t>(i)] =
+        static_cast<uint8_t>(std::lround(grayFromLight(root * root / options_.exposure)));
+  }
+}
+
+double CameraResponse::grayFromLight(double light) const {
+  const double x = std::max(0.0, light * options_.exposure);
+  const double w = options_.shoulder;
+  return 255.0 * std::pow(std::min(1.0, x * (1.0 + w) / (x + w)), options_.gamma);
+}
+
+double CameraResponse::lightFromGray(double gray) const {
+  const double y = std::pow(std::clamp(gray / 255.0, 0.0, 1.0), 1.0 / options_.gamma);
+  const double w = options_.shoulder;
+  return y * w / (1.0 + w - y) / options_.exposure;
+}
+
+cv::Mat CameraResponse::develop(const cv::Mat& light) const {
+  check(light.type() == CV_32FC1, "CameraResponse::develop: expected CV_32FC1");
+  cv::Mat gray(light.size(), CV_8UC1);
+  const auto exposure = static_cast<float>(options_.exposure);
+  for (int y = 0; y < light.rows; ++y) {
+    const float* in = light.ptr<float>(y);
+    uint8_t* out = gray.ptr(y);
+    for (int x = 0; x < light.cols; ++x) {
+      const float root = std::sqrt(std::min(1.0F, std::max(0.0F, in[x] * exposure)));
+      out[x] = gray_by_root_light_[static_cast<size_t>(root * kTableSize + 0.5F)];  // NOLINT: not negative
+    }
+  }
+  return gray;
+}
+
+cv::Mat CameraResponse::expose(const cv::Mat& clean, double gain) const {
+  check(clean.type() == CV_8UC1, "CameraResponse::expose: expected CV_8UC1");
+  cv::Mat table(1, 256, CV_8UC1);
+  for (int gray = 0; gray < 256; ++gray) {
+    table.at<uint8_t>(gray) = static_cast<uint8_t>(std::lround(grayFromLight(gain * lightFromGray(gray))));
+  }
+  cv::Mat exposed;
+  cv::LUT(clean, table, exposed);
+  return exposed;
+}
+
+cv::Mat CameraResponse::addNoise(const cv::Mat& clean, uint64_t seed, int camera, int64_t frame,
+                                 double gain) const {
+  check(clean.type() == CV_8UC1, "CameraResponse::addNoise: expected CV_8UC1");
+  static const std::vector<float> normal_table = makeNormalTable();
+  std::array<float, 256> mean{};
+  std::array<float, 256> deviation{};
+  for (int gray = 0; gray < 256; ++gray) {
+    const double light = gain * lightFromGray(gray);
+    const double exposed = light * options_.exposure;
+    const double sigma_light =
+        std::sqrt(options_.photon_noise * exposed + options_.read_noise * options_.read_noise) /
+        options_.exposure;
+    const double value = grayFromLight(light);
+    const double slope =
+        (grayFromLight(light + sigma_light) - grayFromLight(std::max(0.0, light - sigma_light))) /
+        (light + sigma_light - std::max(0.0, light - sigma_light) + 1e-12);
+    mean[static_cast<size_t>(gray)] = static_cast<float>(value);
+    deviation[static_cast<size_t>(gray)] = static_cast<float>(slope * sigma_light);
+  }
+  // One key per image, then one hash per pixel: every pixel's noise depends on nothing but its place.
+  Random key_source(seed * 0x9E3779B97F4A7C15ULL + static_cast<uint64_t>(frame) * 64U +
+                    static_cast<uint64_t>(camera));
+  const auto key = static_cast<uint32_t>(key_source.bits());
+  cv::Mat noisy(clean.size(), CV_8UC1);
+  for (int y = 0; y < clean.rows; ++y) {
+    const uint8_t* in = clean.ptr(y);
+    uint8_t* out = noisy.ptr(y);
+    const uint32_t row_key = mixBits(key + static_cast<uint32_t>(y) * 0x9E3779B1U);
+    for (int x = 0; x < clean.cols; ++x) {
+      const uint32_t bits = mixBits(row_key ^ (static_cast<uint32_t>(x) * 0x85EBCA77U));
+      const float normal = normal_table[bits >> (32 - kNormalTableBits)];
+      const float value = mean[in[x]] + deviation[in[x]] * normal;
+      out[x] = static_cast<uint8_t>(std::min(255.0F, std::max(0.0F, value + 0.5F)));
+    }
+  }
+  return noisy;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,127 @@
+#include "vcharge_simulation/sensors/golf_rig.h"
+
+#include <cmath>
+#include <stdexcept>
+
+#include "vcharge_simulation/objects/car_model.h"
+#include "vcharge_simulation/rendering/noise.h"
+
+namespace vcharge {
+
+namespace {
+
+constexpr double kFieldOfView_rad = 3.2289;
+constexpr double kPi = 3.14159265358979323846;
+const cv::Size kFullSize(1280, 800);
+
+// The left mirror camera of the V-Charge car: lens, attitude, and place along the car and above the ground.
+// Its published place across the car (1.40 m) is relative to an origin that is not in the middle of the car;
+// the mirror of a Golf is 0.98 m from it.
+constexpr double kXi = 1.1584422115726898;
+constexpr double kGamma1 = 895.54818314068166;
+constexpr double kGamma2 = 894.74426130897348;
+constexpr double kU0 = 649.62356964542516;
+constexpr double kV0 = 398.71903485692013;
+constexpr double kK1 = -0.33084335078197569;
+constexpr double kK2 = 0.086519827528324378;
+constexpr double kP1 = -0.00067678740380559344;
+constexpr double kP2 = -0.000036412961593787842;
+const Eigen::Vector3d kLeftTranslation_m(1.9071, 0.98, 0.8994);
+
+Eigen::Matrix3d leftRotation() {
+  Eigen::Matrix3d rotation;
+  rotation << 0.9971696119, 0.0174865783, 0.0731230786,  //
+      -0.0428662883, -0.6667851656, 0.7440161452,        //
+      0.0617676807, -0.7450448058, -0.6641483201;
+  return rotation;
+}
+
+// Optical axis turned by yaw from straight ahead and by pitch below the horizon; image rows level.
+Eigen::Matrix3d lookingRotation(double yaw_rad, double down_rad) {
+  const Eigen::Vector3d z(std::cos(down_rad) * std::cos(yaw_rad), std::cos(down_rad) * std::sin(yaw_rad),
+                          -std::sin(down_rad));
+  const Eigen::Vector3d x(std::sin(yaw_rad), -std::cos(yaw_rad), 0.0);
+  Eigen::Matrix3d rotation;
+  rotation << x, z.cross(x), z;
+  return rotation;
+}
+
+RigidTransform disturbed(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation_m,
+                         Random* random) {
+  constexpr double kTilt_rad = 0.015;
+  constexpr double kShift_m = 0.01;
+  const auto small = [&](double size) {
+    const double x = random->uniform(-size, size);
+    const double y = random->uniform(-size, size);
+    const double z = random->uniform(-size, size);
+    return Eigen::Vector3d(x, y, z);
+  };
+  const Eigen::Quaterniond turn = rotationFromVector(small(kTilt_rad));
+  return RigidTransform(turn * Eigen::Quaterniond(rotation), translation_m + small(kShift_m));
+}
+
+MeiCamera makeLens(double scale, Random* random) {
+  MeiCamera::Parameters parameters;
+  const auto about = [&](double value, double spread) { return value + random->uniform(-spread, spread); };
+  parameters << about(kXi, 0.008), about(kGamma1, 3.0), about(kGamma2, 3.0), about(kU0, 5.0), about(kV0, 4.0),
+      about(kK1, 0.004), about(kK2, 0.003), about(kP1, 0.0005), about(kP2, 0.0005);
+  // Pixel centres are whole numbers: coordinates count from half a pixel outside the image.
+  parameters[1] *= scale;
+  parameters[2] *= scale;
+  parameters[3] = (parameters[3] + 0.5) * scale - 0.5;
+  parameters[4] = (parameters[4] + 0.5) * scale - 0.5;
+  return MeiCamera(parameters);
+}
+
+}  // namespace
+
+CameraRig makeGolfRig(uint64_t seed, double image_scale) {
+  if (!(image_scale > 0.0 && image_scale <= 1.0)) {
+    throw std::invalid_argument("image_scale: must be in (0, 1], is " + std::to_string(image_scale));
+  }
+  Random random(seed);
+  const Eigen::Matrix3d mirror_vehicle = Eigen::Vector3d(1.0, -1.0, 1.0).asDiagonal();
+  const Eigen::Matrix3d mirror_camera = Eigen::Vector3d(-1.0, 1.0, 1.0).asDiagonal();
+  const Eigen::Matrix3d right = mirror_vehicle * leftRotation() * mirror_camera;
+  const std::vector<std::pair<std::string, RigidTransform>> mountings = {
+      {"front", disturbed(lookingRotation(0.0, 0.35), {3.6, 0.0, 0.6}, &random)},
+      {"left", RigidTransform(Eigen::Quaterniond(leftRotation()), kLeftTranslation_m)},
+      {"rear", disturbed(lookingRotation(kPi, 0.45), {-0.9, 0.0, 0.8}, &random)},
+      {"right", disturbed(right, mirror_vehicle * kLeftTranslation_m, &random)}};
+  CameraRig rig;
+  for (const auto& [name, vehicle_from_camera] : mountings) {
+    RigCamera camera{name,
+                     "camera_" + name + "_optical",
+                     cv::Size(static_cast<int>(std::lround(kFullSize.width * image_scale)),
+                              static_cast<int>(std::lround(kFullSize.height * image_scale))),
+                     makeLens(image_scale, &random),
+                     kFieldOfView_rad,
+                     "",
+                     cv::Mat(),
+                     vehicle_from_camera,
+                     std::nullopt};
+    rig.cameras.push_back(camera);
+  }
+  return rig;
+}
+
+std::shared_ptr<const VehicleBody> makeGolfBody() {
+  std::vector<Material> materials;
+  const auto add = [&](float albedo, float reflectivity) {
+    Material material;
+    material.albedo = albedo;
+    material.reflectivity = reflectivity;
+    material.kind = SurfaceKind::kCar;
+    materials.push_back(material);
+    return static_cast<uint32_t>(materials.size() - 1);
+  };
+  CarMaterials car{};
+  car.paint = add(0.035F, 0.05F);
+  car.side = car.front = car.rear = car.plate = car.paint;
+  car.glass = add(0.02F, 0.05F);
+  car.trim = car.tyre = add(0.03F, 0.0F);
+  car.wheel = add(0.25F, 0.02F);
+  return std::make_shared<VehicleBody>(makeCarMesh(carShapes().front(), car, false), materials);
+}
+
+}  // namespace vcharge

@@ -1,0 +1,121 @@
+#include "sensors/image_source.h"
+
+#include <vector>
+
+#include <nav_msgs/Odometry.h>
+
+#include "vcharge_core/base/error.h"
+#include "vcharge_recordings/bag_reader.h"
+#include "vcharge_ros/conversions.h"
+#include "vcharge_ros/drive_topics.h"
+#include "vcharge_ros/image_conversions.h"
+
+namespace vcharge {
+
+namespace {
+
+// Poses of the same drive agree to the last bits that a message holds.
+constexpr double kSamePose_m = 1e-9;
+
+class RenderedImages : public ImageSource {
+ public:
+  RenderedImages(const Renderer& renderer, const RecordedCameras& cameras, const CameraResponse& response,
+                 const SimulatedDrive& drive, const std::vector<double>& scene_times_s,
+                 const MotionBlurFault& blur)
+      : renderer_(renderer),
+        cameras_(cameras),
+        response_(response),
+        drive_(drive),
+        scene_times_s_(scene_times_s),
+        blur_(blur) {}
+
+  cv::Mat image(size_t camera, size_t frame) override {
+    const StampedTransform& pose = drive_.world_from_vehicle[frame];
+    const Duration since_start = pose.stamp - drive_.ground_truth.front().stamp;
+    const CameraView& view = cameras_.view(camera, since_start);
+    if (!blur_.actsOn(cameras_.name(camera), since_start)) {
+      return response_.develop(renderer_.renderLight(view, pose.world_from_vehicle, scene_times_s_[frame]));
+    }
+    const std::vector<RigidTransform>& exposure = drive_.exposure_poses[frame];
+    cv::Mat light = cv::Mat::zeros(view.size(), CV_32FC1);
+    for (const RigidTransform& world_from_vehicle : exposure) {
+      light += renderer_.renderLight(view, world_from_vehicle, scene_times_s_[frame]);
+    }
+    return response_.develop(light / static_cast<double>(exposure.size()));
+  }
+
+ private:
+  const Renderer& renderer_;
+  const RecordedCameras& cameras_;
+  const CameraResponse& response_;
+  const SimulatedDrive& drive_;
+  const std::vector<double>& scene_times_s_;
+  const MotionBlurFault blur_;
+};
+
+class RecordedImages : public ImageSource {
+ public:
+  RecordedImages(const std::string& path, const CameraRig& rig, const SimulatedDrive& drive)
+      : rig_(rig), drive_(drive), bag_(path), next_(rig.cameras.size(), 0) {
+    checkPoses(path);
+    for (const RigCamera& camera : rig.cameras) {
+      const std::string topic = DriveTopics().imageTopic(camera.name);
+      entries_.push_back(bag_.entries({topic}));
+      if (entries_.back().size() < drive.world_from_vehicle.size()) {
+        throw InputError(path + ": " + topic + ": expected " +
+                         std::to_string(drive.world_from_vehicle.size()) + " images, got " +
+                         std::to_string(entries_.back().size()));
+      }
+    }
+  }
+
+  cv::Mat image(size_t camera, size_t frame) override {
+    const BagMessage recorded = bag_.read(entries_[camera].at(next_[camera]++));
+    const auto message = recorded.instantiate<sensor_msgs::Image>();
+    if (toTimestamp(message->header.stamp) != drive_.world_from_vehicle[frame].stamp) {
+      throw InputError(recorded.source() + ": expected the images of the same drive, image " +
+                       std::to_string(frame) + " has another stamp");
+    }
+    const Image image = toImage(message, recorded.source());
+    checkImageSize(rig_.cameras[camera], image.pixels.size(), recorded.source());
+    return image.pixels.clone();  // the view ends with its message
+  }
+
+ private:
+  void checkPoses(const std::string& path) {
+    const std::vector<BagEntry> entries = bag_.entries({"/ground_truth"});
+    bool same = entries.size() >= drive_.ground_truth.size();
+    for (size_t i = 0; same && i < drive_.ground_truth.size(); ++i) {
+      const auto message = bag_.read(entries[i]).instantiate<nav_msgs::Odometry>();
+      const VehicleOdometry& truth = drive_.ground_truth[i];
+      same = toTimestamp(message->header.stamp) == truth.stamp &&
+             (fromMessage(message->pose.pose, path).translation() - truth.odom_from_vehicle.translation())
+                     .norm() < kSamePose_m;
+    }
+    if (!same) {
+      throw InputError(path + ": /ground_truth: expected the poses of the same drive with the same seed");
+    }
+  }
+
+  const CameraRig& rig_;
+  const SimulatedDrive& drive_;
+  BagReader bag_;
+  std::vector<std::vector<BagEntry>> entries_;  // by camera
+  std::vector<size_t> next_;                    // by camera
+};
+
+}  // namespace
+
+std::unique_ptr<ImageSource> renderImages(const Renderer& renderer, const RecordedCameras& cameras,
+                                          const CameraResponse& response, const SimulatedDrive& drive,
+                                          const std::vector<double>& scene_times_s,
+                                          const MotionBlurFault& blur) {
+  return std::make_unique<RenderedImages>(renderer, cameras, response, drive, scene_times_s, blur);
+}
+
+std::unique_ptr<ImageSource> readImages(const std::string& bag, const CameraRig& rig,
+                                        const SimulatedDrive& drive) {
+  return std::make_unique<RecordedImages>(bag, rig, drive);
+}
+
+}  // namespace vcharge

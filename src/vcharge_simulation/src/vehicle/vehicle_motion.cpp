@@ -1,0 +1,235 @@
+#include "vcharge_simulation/vehicle/vehicle_motion.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "vcharge_core/base/options.h"
+#include "vcharge_simulation/rendering/noise.h"
+
+namespace vcharge {
+
+namespace {
+
+constexpr double kTwoPi = 6.28318530717958647692;
+constexpr double kStep_s = 1.0 / VehicleMotion::kStepsPerSecond;
+constexpr double kSpeedTimeConstant_s = 0.6;
+constexpr double kBraking_m_per_s2 = 0.8;
+constexpr double kLookAhead_m = 1.5;
+
+// A sum of sines over the distance driven, of standard deviation one: a road that shakes the car only while
+// it moves.
+class RoadNoise {
+ public:
+  explicit RoadNoise(Random* random) {
+    for (Wave& wave : waves_) {
+      wave.wavelength_m = 0.9 * std::pow(10.0, random->uniform());
+      wave.phase_rad = random->uniform(0.0, kTwoPi);
+    }
+  }
+  double at(double s_m) const {
+    double sum = 0.0;
+    for (const Wave& wave : waves_) {
+      sum += std::sin(kTwoPi * s_m / wave.wavelength_m + wave.phase_rad);
+    }
+    return sum * std::sqrt(2.0 / static_cast<double>(waves_.size()));
+  }
+
+ private:
+  struct Wave {
+    double wavelength_m, phase_rad;
+  };
+  std::array<Wave, 6> waves_;
+};
+
+// Critically damped second-order filter.
+class Spring {
+ public:
+  explicit Spring(double frequency_hz) : omega_(kTwoPi * frequency_hz) {}
+  double update(double target) {
+    const double acceleration = omega_ * omega_ * (target - value_) - 2.0 * omega_ * rate_;
+    rate_ += acceleration * kStep_s;
+    value_ += rate_ * kStep_s;
+    return value_;
+  }
+
+ private:
+  double omega_, value_ = 0.0, rate_ = 0.0;
+};
+
+// Where the four wheels stand.
+class WheelContacts {
+ public:
+  WheelContacts(const GroundHeight& ground_height, const VehicleMotionOptions& options,
+                const RigidTransform& world_from_planar)
+      : track_m_(options.track_width_m), wheelbase_m_(options.wheelbase_m) {
+    const auto height = [&](double x_m, double y_m) {
+      const Eigen::Vector3d place_m = world_from_planar * Eigen::Vector3d(x_m, y_m, 0.0);
+      return ground_height(place_m.x(), place_m.y());
+    };
+    rear_left_m = height(0.0, 0.5 * track_m_);
+    rear_right_m = height(0.0, -0.5 * track_m_);
+    front_left_m_ = height(wheelbase_m_, 0.5 * track_m_);
+    front_right_m_ = height(wheelbase_m_, -0.5 * track_m_);
+  }
+
+  double rear_left_m, rear_right_m;
+
+  /// Rise over distance towards the front.
+  double slope() const {
+    return 0.5 * (front_left_m_ + front_right_m_ - rear_left_m - rear_right_m) / wheelbase_m_;
+  }
+  RigidTransform planarFromGround() const {
+    const double bank = 0.5 * (rear_left_m + front_left_m_ - rear_right_m - front_right_m_) / track_m_;
+    return RigidTransform(rotationFromYawPitchRoll(0.0, -std::atan(slope()), std::atan(bank)),
+                          {0.0, 0.0, 0.5 * (rear_left_m + rear_right_m)});
+  }
+
+ private:
+  double track_m_, wheelbase_m_;
+  double front_left_m_, front_right_m_;
+};
+
+// Length of the way over ground that rises by `rise_m`, with the sign of the way seen from above.
+double alongSurface(double horizontal_m, double rise_m) {
+  return std::copysign(std::hypot(horizontal_m, rise_m), horizontal_m);
+}
+
+// Distance before a stop at which the car aims to stand: it follows the wanted speed with a delay.
+constexpr double kStopReserve_m = 0.4;
+constexpr double kStanding_m_per_s = 0.02;
+// A car that stands within this distance of the path's end has arrived.
+constexpr double kEnd_m = 1.0;
+
+double desiredSpeed(const DrivePath& path, const VehicleMotionOptions& options, double s_m,
+                    double wave_phase_rad) {
+  double curvature = 0.0;
+  for (double ahead = 0.0; ahead <= kLookAhead_m; ahead += 0.5) {
+    curvature = std::max(curvature, std::abs(path.curvature(s_m + ahead)));
+  }
+  double speed = options.cruise_speed_m_per_s * (1.0 + 0.05 * std::sin(kTwoPi * s_m / 11.0 + wave_phase_rad));
+  if (curvature > 0.0) {
+    speed = std::min(speed, std::sqrt(options.max_lateral_acceleration_m_per_s2 / curvature));
+  }
+  if (path.direction(s_m) < 0.0) {
+    speed = std::min(speed, options.max_backwards_speed_m_per_s);
+  }
+  if (options.stop_at_end) {
+    speed = std::min(speed, std::sqrt(2.0 * kBraking_m_per_s2 * std::max(0.0, path.length() - 0.2 - s_m)));
+  }
+  return speed;
+}
+
+}  // namespace
+
+void VehicleMotionOptions::validate() const {
+  requireField(cruise_speed_m_per_s > 0.0, "cruise_speed_m_per_s", "must be positive", cruise_speed_m_per_s);
+  requireField(max_backwards_speed_m_per_s > 0.0, "max_backwards_speed_m_per_s", "must be positive",
+               max_backwards_speed_m_per_s);
+  requireField(max_lateral_acceleration_m_per_s2 > 0.0, "max_lateral_acceleration_m_per_s2",
+               "must be positive", max_lateral_acceleration_m_per_s2);
+  requireField(max_acceleration_m_per_s2 > 0.0, "max_acceleration_m_per_s2", "must be positive",
+               max_acceleration_m_per_s2);
+  requireField(standstill_s >= 0.0, "standstill_s", "must not be negative", standstill_s);
+  requireField(track_width_m > 0.0, "track_width_m", "must be positive", track_width_m);
+  requireField(wheelbase_m > 0.0, "wheelbase_m", "must be positive", wheelbase_m);
+  requireField(spring_frequency_hz > 0.0, "spring_frequency_hz", "must be positive", spring_frequency_hz);
+  requireField(duration_s > 0.0, "duration_s", "must be positive", duration_s);
+}
+
+VehicleMotion::VehicleMotion(const DrivePath& path, const VehicleMotionOptions& options, uint64_t seed,
+                             const GroundHeight& ground_height)
+    : options_(options) {
+  options.validate();
+  Random random(seed);
+  const RoadNoise pitch_noise(&random);
+  const RoadNoise roll_noise(&random);
+  const RoadNoise heave_noise(&random);
+  const double wave_phase_rad = random.uniform(0.0, kTwoPi);
+  Spring pitch_spring(options.spring_frequency_hz);
+  Spring roll_spring(options.spring_frequency_hz);
+
+  const bool from_rest = options.standstill_s > 0.0;
+  double speed = from_rest ? 0.0 : desiredSpeed(path, options, 0.0, wave_phase_rad);
+  // A moving start has come along a straight line before the path.
+  double s_m = from_rest ? 0.0 : -speed * kMargin_s;
+  auto stop = path.stops().begin();
+  double stop_ends_s = -1.0;  // of the stop at which the car stands; negative: it drives
+  double direction = path.direction(s_m);
+  MotionSample sample;
+  sample.world_from_planar = path.worldFromStart() * arcMotion(direction * s_m, 0.0);
+  int remaining_after_end = 2 * marginSteps();
+  for (int step = -marginSteps(); remaining_after_end > 0; ++step) {
+    const double time_s = step * kStep_s;
+    const bool over = time_s >= options.duration_s || s_m >= path.length() ||
+                      (options.stop_at_end && path.length() - s_m < kEnd_m &&
+                       time_s > options.standstill_s + 2.0 && speed < 0.01);
+    if (over && duration_s_ == 0.0) {
+      duration_s_ = time_s;
+      remaining_after_end = marginSteps() + 1;
+    }
+    if (duration_s_ > 0.0) {
+      --remaining_after_end;
+    }
+    if (stop_ends_s >= 0.0 && time_s >= stop_ends_s) {
+      // It may stand a little short of its stop.
+      s_m = stop->at_m;
+      direction = path.direction(s_m);
+      ++stop;
+      stop_ends_s = -1.0;
+    }
+    double acceleration = 0.0;
+    if (time_s >= options.standstill_s && time_s >= 0.0 && stop_ends_s < 0.0) {
+      double wanted = desiredSpeed(path, options, s_m, wave_phase_rad);
+      if (stop != path.stops().end()) {
+        wanted = std::min(
+            wanted, std::sqrt(2.0 * kBraking_m_per_s2 * std::max(0.0, stop->at_m - kStopReserve_m - s_m)));
+      }
+      acceleration = std::clamp((wanted - speed) / kSpeedTimeConstant_s, -2.0 * kBraking_m_per_s2,
+                                options.max_acceleration_m_per_s2);
+    }
+    sample.speed_m_per_s = direction * speed;
+    sample.curvature_per_m = path.curvature(s_m);
+    const double lateral = speed * speed * sample.curvature_per_m;
+    const double pitch_rad =
+        pitch_spring.update(-options.pitch_rad_per_m_per_s2 * (direction * acceleration)) +
+        options.road_noise_rad * pitch_noise.at(s_m);
+    const double roll_rad = roll_spring.update(options.roll_rad_per_m_per_s2 * lateral) +
+                            options.road_noise_rad * roll_noise.at(s_m);
+    sample.planar_from_body = RigidTransform(rotationFromYawPitchRoll(0.0, pitch_rad, roll_rad),
+                                             {0.0, 0.0, options.road_heave_m * heave_noise.at(s_m)});
+    std::optional<WheelContacts> contacts;
+    if (ground_height) {
+      contacts.emplace(ground_height, options, sample.world_from_planar);
+      sample.planar_from_body = contacts->planarFromGround() * sample.planar_from_body;
+    }
+    samples_.push_back(sample);
+
+    double next_speed = std::max(0.0, speed + acceleration * kStep_s);
+    const double distance_m = 0.5 * (speed + next_speed) * kStep_s;
+    const double horizontal_m = contacts ? distance_m / std::hypot(1.0, contacts->slope()) : distance_m;
+    const double turn_rad = path.heading(s_m + horizontal_m) - path.heading(s_m);
+    sample.world_from_planar = sample.world_from_planar * arcMotion(direction * horizontal_m, turn_rad);
+    double left_m = direction * horizontal_m - 0.5 * options.track_width_m * turn_rad;
+    double right_m = direction * horizontal_m + 0.5 * options.track_width_m * turn_rad;
+    if (contacts) {
+      const WheelContacts next(ground_height, options, sample.world_from_planar);
+      left_m = alongSurface(left_m, next.rear_left_m - contacts->rear_left_m);
+      right_m = alongSurface(right_m, next.rear_right_m - contacts->rear_right_m);
+    }
+    sample.left_wheel_m += left_m;
+    sample.right_wheel_m += right_m;
+    s_m += horizontal_m;
+    const bool arrives =
+        stop != path.stops().end() && stop_ends_s < 0.0 && time_s > options.standstill_s &&
+        (s_m >= stop->at_m || (next_speed < kStanding_m_per_s && s_m > stop->at_m - 2.0 * kStopReserve_m));
+    if (arrives) {
+      next_speed = 0.0;
+      stop_ends_s = time_s + stop->wait_s;
+    }
+    speed = next_speed;
+  }
+}
+
+}  // namespace vcharge

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "vcharge_calibration/boards/calibration_board.h"
+
+namespace vcharge {
+
+/// Where in the image corners of boards were seen, in cells of a coarse grid.
+class ImageCoverage {
+ public:
+  static constexpr int kColumns = 8;
+  static constexpr int kRows = 5;
+
+  explicit ImageCoverage(cv::Size image_size_px)
+      : size_(image_size_px), counts_(static_cast<size_t>(kColumns) * kRows, 0) {}
+
+  void add(const BoardView& view);
+  /// Cells that a view would be the first to cover.
+  int numNewCells(const BoardView& view) const;
+  int count(int column, int row) const { return counts_[static_cast<size_t>(row * kColumns + column)]; }
+  double coveredShare() const;
+  /// Distance of the farthest corner from the middle, over half of the image's longer side.
+  double reach() const { return reach_; }
+  /// Parts of the image's rim without any corner: "left", "upper right" and so on.
+  std::vector<std::string> missingParts() const;
+
+ private:
+  size_t cellOf(const Eigen::Vector2d& pixel) const;
+
+  cv::Size size_;
+  std::vector<int> counts_;
+  double reach_ = 0.0;
+};
+
+}  // namespace vcharge

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+
+#include "vcharge_calibration/boards/calibration_board.h"
+#include "vcharge_core/camera/camera_model.h"
+
+namespace vcharge {
+
+/// Options of calibrateIntrinsics.
+struct IntrinsicCalibrationOptions {
+  std::string model = "mei";      ///< or kannala_brandt, pinhole
+  int min_views = 5;              ///< fewer boards are no calibration
+  double max_view_error = 6.0;    ///< RMS error of a view over the usual one; a view above is left out
+  double max_edge_width = 2.0;    ///< width of a view's edges over the usual one; a view above is blurred
+  double max_corner_error = 5.0;  ///< error of a corner over its view's; a corner above is left out
+  /// Part by which bent boards must explain the errors better than chance before boards count as bent.
+  double min_bending_significance = 3.0;
+  int cross_validation_folds = 10;  ///< parts into which the views are split
+
+  template <class Visitor>
+  void visitFields(Visitor&& visit) {
+    visit("model", model);
+    visit("min_views", min_views);
+    visit("max_view_error", max_view_error);
+    visit("max_edge_width", max_edge_width);
+    visit("max_corner_error", max_corner_error);
+    visit("min_bending_significance", min_bending_significance);
+    visit("cross_validation_folds", cross_validation_folds);
+  }
+  void validate() const;  ///< throws std::invalid_argument naming the field
+};
+
+/// A gray image to calibrate from.
+struct CalibrationImage {
+  std::string name;
+  cv::Mat pixels;  ///< CV_8UC1
+};
+
+/// A view that the calibration used.
+struct CalibratedView {
+  BoardView view;
+  PlacedBoard placed;
+  double rms_px = 0.0;  ///< per coordinate
+  double edge_width_px = 0.0;
+};
+
+/// An image that the calibration did not use, and why.
+struct RejectedImage {
+  std::string name, reason;
+};
+
+enum class Verdict { kPass, kWarn, kFail };
+/// "PASS", "WARN", "FAIL".
+std::string toString(Verdict verdict);
+
+/// What calibrateIntrinsics found. With the verdict kFail there is no model.
+struct IntrinsicCalibration {
+  Verdict verdict = Verdict::kFail;
+  std::vector<std::string> remarks;  ///< why not kPass, and which pictures are missing
+  cv::Size image_size_px;
+  std::optional<CameraModel> model;
+  /// Of the model's parameters, in their order, for errors that go together within a view (jackknife).
+  Eigen::VectorXd standard_deviations;
+  std::vector<CalibratedView> views;
+  std::vector<RejectedImage> rejected;
+  double rms_px = 0.0;              ///< per coordinate
+  double mean_error_px = 0.0;       ///< mean distance
+  double flat_rms_px = 0.0;         ///< as rms_px, of a fit with flat boards
+  bool bent_boards = false;         ///< boards were found to bend, and the fit takes it into account
+  double bending_m = 0.0;           ///< RMS of the boards' bending along their longer side
+  double cross_validated_px = 0.0;  ///< RMS per coordinate of views that the fit did not see
+  double covered_share = 0.0;       ///< share of the image in which corners were seen (cells)
+  double max_angle_rad = 0.0;       ///< farthest corner from the axis
+};
+
+/// Calibrates a camera from images of a board: finds the boards, guesses the camera, finds the boards that
+/// need the guess, fits, leaves out what does not fit, with the reason, and judges the result. `progress`
+/// takes the share done; calls are never concurrent. InputError for images of different sizes. Deterministic.
+IntrinsicCalibration calibrateIntrinsics(const CalibrationBoard& board,
+                                         const std::vector<CalibrationImage>& images,
+                                         const IntrinsicCalibrationOptions& options,
+                                         const std::function<void(double)>& progress);
+
+}  // namespace vcharge

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "vcharge_calibration/intrinsics/intrinsic_calibration.h"
+#include "vcharge_core/camera/camera_rig.h"
+
+namespace vcharge {
+
+/// The images of a folder (png, jpg, bmp, tif, pgm; other files are ignored), in the order of their names.
+/// InputError names a folder without images and an image that cannot be read.
+std::vector<CalibrationImage> readCalibrationImages(const std::string& folder);
+
+/// What is written of a calibration.
+struct CalibrationOutput {
+  std::string camera_name;
+  double field_of_view_rad = 0.0;  ///< full angle; 0: as far as corners were seen
+  std::string rig_file;            ///< rig.yaml
+  bool keep_others = false;        ///< other cameras that the file has already stay in it
+  std::string report_file;         ///< HTML; empty: none
+};
+
+/// Writes the report, and the rig.yaml unless the verdict is kFail. InputError for a camera name that is none
+/// or a file that cannot be written.
+void writeCalibration(const CalibrationOutput& output, const CalibrationBoard& board,
+                      const std::vector<CalibrationImage>& images, const IntrinsicCalibration& result);
+
+}  // namespace vcharge

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "vcharge_calibration/boards/calibration_board.h"
+#include "vcharge_calibration/intrinsics/intrinsic_calibration.h"
+#include "vcharge_core/camera/camera_model.h"
+#include "vcharge_core/motion/rigid_transform.h"
+
+namespace vcharge {
+
+// For tests: images of boards by the formulas of camera and board, without any of the calibration's code.
+
+/// Where boards are held.
+struct PoseRange {
+  double max_angle_rad = 1.2;  ///< of the board's middle from the axis
+  double distance_m = 0.5;
+  double min_share_seen = 1.0;  ///< of the corners
+};
+
+/// Random poses of a board, tilted and turned.
+std::vector<RigidTransform> boardPoses(const CalibrationBoard& board, const CameraModel& model,
+                                       cv::Size image_size_px, int count, const PoseRange& range,
+                                       uint32_t seed);
+
+/// Images of a board before a grey wall, 3 x 3 rays per pixel, with noise of two gray levels.
+std::vector<CalibrationImage> renderBoards(const CalibrationBoard& board, const CameraModel& model,
+                                           cv::Size image_size_px, const std::vector<RigidTransform>& poses);
+
+}  // namespace vcharge

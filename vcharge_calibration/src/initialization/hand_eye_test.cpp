@@ -1,0 +1,124 @@
+#include "vcharge_calibration/initialization/hand_eye.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace vcharge {
+namespace {
+
+constexpr double kDegree = 0.017453292519943295;
+
+struct Drive {
+  double turn_rad = 0.08;  ///< per motion, at most: to the left in the first half, to the right in the second
+  double noise_rad = 0.0;
+  double wrong_share = 0.0;
+  int num_motions = 200;
+  uint32_t seed = 1;
+};
+
+RigidTransform truePlace() {
+  return RigidTransform(rotationFromYawPitchRoll(1.4, 0.3, -1.9), Eigen::Vector3d(1.9, 0.95, 0.0));
+}
+
+/// Turns of a car, as a camera at truePlace() and half a metre up would see itself move.
+std::vector<MotionPair> makeMotions(const Drive& drive) {
+  std::mt19937 random(drive.seed);
+  std::normal_distribution<double> noise(0.0, drive.noise_rad);
+  std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+  const auto draw = [&](auto* distribution) {
+    Eigen::Vector3d vector;
+    for (double& axis : vector) {
+      axis = (*distribution)(random);
+    }
+    return vector;
+  };
+  const RigidTransform vehicle_from_camera(truePlace().rotation(),
+                                           truePlace().translation() + Eigen::Vector3d(0.0, 0.0, 0.5));
+  std::vector<MotionPair> motions;
+  for (int i = 0; i < drive.num_motions; ++i) {
+    // Circles of one radius would leave the place open.
+    const double turn_rad = drive.turn_rad * std::sin(6.283185 * i / drive.num_motions);
+    MotionPair motion;
+    motion.vehicle =
+        RigidTransform::planar(0.5 * std::cos(0.5 * turn_rad), 0.5 * std::sin(0.5 * turn_rad), turn_rad);
+    RigidTransform camera = vehicle_from_camera.inverse() * motion.vehicle * vehicle_from_camera;
+    if (uniform(random) < 2.0 * drive.wrong_share - 1.0) {
+      camera = RigidTransform(rotationFromVector(0.1 * draw(&uniform)), draw(&uniform));
+    }
+    motion.camera_rotation = camera.rotation();
+    motion.camera_direction = camera.translation().normalized();
+    if (drive.noise_rad > 0.0) {
+      motion.camera_rotation = rotationFromVector(0.1 * draw(&noise)) * motion.camera_rotation;
+      motion.camera_direction = rotationFromVector(draw(&noise)) * motion.camera_direction;
+    }
+    motion.direction_sigma_rad = std::max(1e-4, drive.noise_rad);
+    motion.rotation_sigma_rad = std::max(1e-5, 0.1 * drive.noise_rad);
+    motions.push_back(motion);
+  }
+  return motions;
+}
+
+double angleBetween(const RigidTransform& a, const RigidTransform& b) {
+  return angleOfRotation(a.rotation().conjugate() * b.rotation());
+}
+
+TEST(PlanarHandEyeTest, FindsTheTruthWithoutNoise) {
+  const HandEye found = solvePlanarHandEye(makeMotions(Drive()), HandEyeOptions());
+  ASSERT_EQ(found.status, HandEyeStatus::kOk);
+  EXPECT_LT(angleBetween(found.vehicle_from_camera, truePlace()), 1e-6);
+  EXPECT_LT((found.vehicle_from_camera.translation() - truePlace().translation()).norm(), 1e-6);
+  EXPECT_EQ(found.num_inliers, found.num_motions);
+}
+
+TEST(PlanarHandEyeTest, BearsNoiseAndWrongMotions) {
+  Drive drive;
+  drive.noise_rad = 0.01;
+  drive.wrong_share = 0.2;
+  const HandEye found = solvePlanarHandEye(makeMotions(drive), HandEyeOptions());
+  ASSERT_EQ(found.status, HandEyeStatus::kOk);
+  // 160 motions of 0.57 degrees: four standard deviations of the mean, and what the wrong ones pull.
+  EXPECT_LT(angleBetween(found.vehicle_from_camera, truePlace()), 0.4 * kDegree);
+  // A motion's direction tells the place to 0.01 x 0.5 m / 0.06 at best: 8 cm over the root of 160, six
+  // times.
+  EXPECT_LT((found.vehicle_from_camera.translation() - truePlace().translation()).norm(), 0.04);
+  EXPECT_LT(found.num_inliers, found.num_motions);
+}
+
+TEST(PlanarHandEyeTest, TellsStraightDrivesFromTurns) {
+  Drive drive;
+  drive.turn_rad = 0.0;
+  drive.noise_rad = 0.002;
+  const HandEye found = solvePlanarHandEye(makeMotions(drive), HandEyeOptions());
+  EXPECT_EQ(found.status, HandEyeStatus::kNoTurn);
+  // Straight ahead is seen all the same.
+  const Eigen::Vector3d ahead = truePlace().rotation().conjugate() * Eigen::Vector3d::UnitX();
+  EXPECT_LT(std::acos(found.travel_in_camera.dot(ahead)), 0.002);
+}
+
+TEST(PlanarHandEyeTest, TellsTooFewMotions) {
+  Drive drive;
+  drive.num_motions = 5;
+  EXPECT_EQ(solvePlanarHandEye(makeMotions(drive), HandEyeOptions()).status, HandEyeStatus::kTooFewMotions);
+}
+
+TEST(PlanarHandEyeTest, RefusesMotionsThatContradictTheOdometer) {
+  Drive drive;
+  drive.wrong_share = 1.0;
+  const HandEye found = solvePlanarHandEye(makeMotions(drive), HandEyeOptions());
+  EXPECT_NE(found.status, HandEyeStatus::kOk);
+}
+
+TEST(PlanarHandEyeTest, TurnsRoundWithAnOdometerThatCountsBackwards) {
+  std::vector<MotionPair> motions = makeMotions(Drive());
+  for (MotionPair& motion : motions) {
+    motion.vehicle = RigidTransform(motion.vehicle.rotation(), -motion.vehicle.translation());
+  }
+  const HandEye found = solvePlanarHandEye(motions, HandEyeOptions());
+  ASSERT_EQ(found.status, HandEyeStatus::kOk);
+  EXPECT_NEAR(angleBetween(found.vehicle_from_camera, truePlace()), 3.14159265, 1e-6);
+}
+
+}  // namespace
+}  // namespace vcharge

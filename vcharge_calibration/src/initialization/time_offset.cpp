@@ -1,0 +1,147 @@
+#include "initialization/time_offset.h"
+
+#include <algorithm>
+
+namespace vcharge {
+namespace {
+
+/// Of a step's distance and turn, where the drive's own deviations are not asked.
+constexpr double kDistanceSigma_m = 0.003;
+constexpr double kTurnSigma_rad = 0.001;
+constexpr double kLossSigmas = 2.0;
+/// To take a derivative by time.
+constexpr double kStep_s = 0.01;
+
+/// Forward distance and turn of a step.
+Eigen::Vector2d distanceAndTurn(const RigidTransform& motion) {
+  return {motion.translation().x(), yawOfRotation(motion.rotation())};
+}
+
+/// A part of a planar motion, along its arc.
+RigidTransform partOf(const RigidTransform& motion, double part) {
+  const double turn_rad = yawOfRotation(motion.rotation());
+  const Eigen::Rotation2Dd back(-0.5 * turn_rad);
+  const Eigen::Vector2d chord = back * motion.translation().head<2>();
+  const double shrink =
+      std::abs(turn_rad) < 1e-6 ? part : std::sin(0.5 * part * turn_rad) / std::sin(0.5 * turn_rad);
+  const Eigen::Vector2d place = Eigen::Rotation2Dd(0.5 * part * turn_rad) * (shrink * chord);
+  return RigidTransform::planar(place.x(), place.y(), part * turn_rad);
+}
+
+}  // namespace
+
+OdometrySeries::OdometrySeries(const MappingState& state) {
+  for (const FramePose& frame : state.frames) {
+    if (time_s_.empty()) {
+      first_ = frame.stamp;
+    }
+    time_s_.push_back(toSeconds(frame.stamp - first_));
+    odom_from_vehicle_.push_back(state.data.keyframes[frame.keyframe].odom_from_vehicle *
+                                 frame.keyframe_from_vehicle);
+  }
+}
+
+RigidTransform OdometrySeries::at(Timestamp stamp, double offset_s) const {
+  const double time_s = toSeconds(stamp - first_) + offset_s;
+  const auto after = std::upper_bound(time_s_.begin(), time_s_.end(), time_s);
+  const auto next =
+      std::clamp<std::ptrdiff_t>(after - time_s_.begin(), 1, static_cast<std::ptrdiff_t>(time_s_.size()) - 1);
+  const auto i = static_cast<size_t>(next);
+  const RigidTransform& previous = odom_from_vehicle_[i - 1];
+  const double part = (time_s - time_s_[i - 1]) / (time_s_[i] - time_s_[i - 1]);
+  return previous * partOf(previous.inverse() * odom_from_vehicle_[i], part);
+}
+
+void OdometrySeries::shift(double offset_s, MappingState* state) const {
+  if (time_s_.size() < 2) {
+    return;
+  }
+  for (Keyframe& keyframe : state->data.keyframes) {
+    keyframe.odom_from_vehicle = at(keyframe.stamp, offset_s);
+  }
+  for (FramePose& frame : state->frames) {
+    frame.keyframe_from_vehicle =
+        state->data.keyframes[frame.keyframe].odom_from_vehicle.inverse() * at(frame.stamp, offset_s);
+  }
+}
+
+TimeOffset estimateTimeOffset(const MappingState& state,
+                              const std::vector<std::vector<MotionPair>>& motions_of_camera,
+                              const std::vector<Eigen::Vector3d>& up_in_camera) {
+  // The odometer's yaw rate at each keyframe, from the frames around it.
+  const std::vector<Keyframe>& keyframes = state.data.keyframes;
+  const auto odom_from_vehicle = [&](const FramePose& frame) {
+    return keyframes[frame.keyframe].odom_from_vehicle * frame.keyframe_from_vehicle;
+  };
+  std::vector<double> rate_rad_per_s(keyframes.size(), 0.0);
+  for (size_t i = 1; i + 1 < state.frames.size(); ++i) {
+    const FramePose& frame = state.frames[i];
+    if (frame.stamp == keyframes[frame.keyframe].stamp) {
+      const RigidTransform motion =
+          odom_from_vehicle(state.frames[i - 1]).inverse() * odom_from_vehicle(state.frames[i + 1]);
+      rate_rad_per_s[frame.keyframe] =
+          yawOfRotation(motion.rotation()) / toSeconds(state.frames[i + 1].stamp - state.frames[i - 1].stamp);
+    }
+  }
+  // Odometry that is late lags behind the camera's turn by offset times the change of the rate.
+  TimeOffset result;
+  constexpr int kIterations = 10;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    double information = 0.0, right_side = 0.0;
+    for (size_t camera = 0; camera < motions_of_camera.size(); ++camera) {
+      for (const MotionPair& motion : motions_of_camera[camera]) {
+        const double change = rate_rad_per_s[motion.keyframe + 1] - rate_rad_per_s[motion.keyframe];
+        const double error_rad = vectorFromRotation(motion.camera_rotation).dot(up_in_camera[camera]) -
+                                 yawOfRotation(motion.vehicle.rotation());
+        const double sigma_rad = std::hypot(motion.rotation_sigma_rad, 0.001);
+        const double sigmas = (error_rad - result.offset_s * change) / sigma_rad;
+        const double weight = 1.0 / (1.0 + sigmas * sigmas / 4.0) / (sigma_rad * sigma_rad);
+        information += weight * change * change;
+        right_side += weight * change * error_rad;
+      }
+    }
+    if (!(information > 0.0)) {
+      return result;
+    }
+    result.offset_s = right_side / information;
+    result.sigma_s = 1.0 / std::sqrt(information);
+  }
+  return result;
+}
+
+TimeOffset refineTimeOffset(const OdometrySeries& series, double offset_s, const MappingData& data) {
+  TimeOffset result;
+  constexpr int kIterations = 10;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    double information = 0.0, right_side = 0.0;
+    for (size_t i = 1; i < data.keyframes.size(); ++i) {
+      const Keyframe& previous = data.keyframes[i - 1];
+      const Keyframe& current = data.keyframes[i];
+      const auto counted = [&](double shift_s) {
+        return distanceAndTurn(series.at(previous.stamp, offset_s + shift_s).inverse() *
+                               series.at(current.stamp, offset_s + shift_s));
+      };
+      const Eigen::Vector2d scales(data.odometry_distance_scale, data.odometry_turn_scale);
+      const Eigen::Vector2d seen =
+          distanceAndTurn(previous.map_from_vehicle.inverse() * current.map_from_vehicle);
+      const Eigen::Vector2d weights(1.0 / kDistanceSigma_m, 1.0 / kTurnSigma_rad);
+      const Eigen::Vector2d error = (seen - scales.cwiseProduct(counted(0.0))).cwiseProduct(weights);
+      const Eigen::Vector2d change =
+          (counted(kStep_s) - counted(-kStep_s)).cwiseProduct(scales).cwiseProduct(weights) / (2.0 * kStep_s);
+      for (int axis = 0; axis < 2; ++axis) {
+        const double sigmas = error[axis] - result.offset_s * change[axis];
+        const double weight = 1.0 / (1.0 + sigmas * sigmas / (kLossSigmas * kLossSigmas));
+        information += weight * change[axis] * change[axis];
+        right_side += weight * change[axis] * error[axis];
+      }
+    }
+    if (!(information > 0.0)) {
+      return result;
+    }
+    result.offset_s = right_side / information;
+    result.sigma_s = 1.0 / std::sqrt(information);
+  }
+  return result;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,323 @@
+#include "intrinsics/intrinsic_optimizer.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include <ceres/ceres.h>
+
+#include "boards/board_pose.h"
+#include "vcharge_geometry/residuals/pose_block.h"
+#include "vcharge_geometry/residuals/rig_costs.h"
+
+namespace vcharge {
+
+namespace {
+
+constexpr int kMaxIterations = 200;
+constexpr double kRobust_px = 1.0;
+// Usual bending of a board held by hand, over its diagonal.
+constexpr double kUsualBending = 0.003;
+// A guess is judged by views' errors up to this size.
+constexpr double kMaxGuessError_px = 20.0;
+constexpr size_t kMaxGuessViews = 20;
+constexpr size_t kFirstViews = 8;
+
+Eigen::VectorXd parametersFor(const std::string& model_name, cv::Size size, double focal_px) {
+  const double u0 = 0.5 * (size.width - 1);
+  const double v0 = 0.5 * (size.height - 1);
+  Eigen::VectorXd parameters =
+      Eigen::VectorXd::Zero(static_cast<Eigen::Index>(CameraModel::parameterNames(model_name).size()));
+  if (model_name == MeiCamera::kName) {
+    // Near the axis a Mei camera has the focal length gamma / (1 + xi).
+    parameters.head<5>() << 1.0, 2.0 * focal_px, 2.0 * focal_px, u0, v0;
+  } else {
+    parameters.head<4>() << focal_px, focal_px, u0, v0;
+  }
+  return parameters;
+}
+
+/// Reprojection error of a corner of a bent board. Blocks: pose, camera, intrinsics, bending (3).
+class BentCornerCost : public ceres::CostFunction {
+ public:
+  /// `flat` has a point (3) in the place of the bending.
+  BentCornerCost(std::unique_ptr<ceres::CostFunction> flat, const CalibrationBoard& board, int index)
+      : flat_(std::move(flat)),
+        corner_(board.corner(index)),
+        basis_(PlacedBoard::bendingBasis(board, corner_.head<2>())) {
+    set_num_residuals(2);
+    *mutable_parameter_block_sizes() = flat_->parameter_block_sizes();
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const Eigen::Map<const Eigen::Vector3d> bending(parameters[3]);
+    const Eigen::Vector3d point = corner_ + Eigen::Vector3d(0.0, 0.0, bending.dot(basis_));
+    const std::array<const double*, 4> flat_parameters = {parameters[0], parameters[1], parameters[2],
+                                                          point.data()};
+    if (jacobians == nullptr) {
+      return flat_->Evaluate(flat_parameters.data(), residuals, nullptr);
+    }
+    Eigen::Matrix<double, 2, 3, Eigen::RowMajor> by_point;
+    std::array<double*, 4> flat_jacobians = {jacobians[0], jacobians[1], jacobians[2], by_point.data()};
+    if (!flat_->Evaluate(flat_parameters.data(), residuals, flat_jacobians.data())) {
+      return false;
+    }
+    if (jacobians[3] != nullptr) {
+      Eigen::Map<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>> by_bending(jacobians[3]);
+      by_bending = by_point.col(2) * basis_.transpose();
+    }
+    return true;
+  }
+
+ private:
+  std::unique_ptr<ceres::CostFunction> flat_;
+  Eigen::Vector3d corner_, basis_;
+};
+
+/// A board is about flat: its bending over the usual one. Blocks: bending (3).
+class FlatnessCost : public ceres::SizedCostFunction<3, 3> {
+ public:
+  explicit FlatnessCost(double usual_m) : usual_m_(usual_m) {}
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    Eigen::Map<Eigen::Vector3d>(residuals, 3) = Eigen::Map<const Eigen::Vector3d>(parameters[0]) / usual_m_;
+    if (jacobians != nullptr && jacobians[0] != nullptr) {
+      Eigen::Map<Eigen::Matrix3d>(jacobians[0], 3, 3) = Eigen::Matrix3d::Identity() / usual_m_;
+    }
+    return true;
+  }
+
+ private:
+  const double usual_m_;
+};
+
+/// The bundle adjustment's blocks: inverse poses play the vehicle, the camera sits in its origin.
+class Adjustment {
+ public:
+  Adjustment(const CalibrationBoard& board, const std::vector<BoardView>& views, const FittedCamera& start,
+             const FitSettings& settings)
+      : manifold_(makePoseManifold()), problem_(ownership()), camera_(toPoseBlock(RigidTransform())) {
+    intrinsics_ = start.model.parameters();
+    for (int i = 0; i < board.numCorners(); ++i) {
+      corners_.push_back(board.corner(i));
+    }
+    for (const PlacedBoard& placed : start.boards) {
+      poses_.push_back(toPoseBlock(placed.camera_from_board.inverse()));
+      bendings_.push_back(placed.bending_m);
+    }
+    problem_.AddParameterBlock(camera_.data(), 7);
+    problem_.SetParameterBlockConstant(camera_.data());
+    problem_.AddParameterBlock(intrinsics_.data(), static_cast<int>(intrinsics_.size()));
+    if (!settings.bending) {
+      for (Eigen::Vector3d& corner : corners_) {
+        problem_.AddParameterBlock(corner.data(), 3);
+        problem_.SetParameterBlockConstant(corner.data());
+      }
+    }
+    const double usual_bending_m = kUsualBending * corners_.back().norm();
+    for (size_t v = 0; v < views.size(); ++v) {
+      const double sigma_px = settings.sigmas_px.empty() ? settings.sigma_px : settings.sigmas_px[v];
+      losses_.push_back(settings.loss == Loss::kRobust
+                            ? std::make_unique<ceres::HuberLoss>(kRobust_px / sigma_px)
+                            : nullptr);
+      problem_.AddParameterBlock(poses_[v].data(), 7, manifold_.get());
+      if (settings.bending) {
+        problem_.AddResidualBlock(new FlatnessCost(usual_bending_m), nullptr, bendings_[v].data());
+      }
+      for (const BoardCorner& corner : views[v].corners) {
+        auto cost = makeReprojectionCost(start.model, corner.pixel, sigma_px);
+        double* shape = corners_[static_cast<size_t>(corner.index)].data();
+        if (settings.bending) {
+          cost = std::make_unique<BentCornerCost>(std::move(cost), board, corner.index);
+          shape = bendings_[v].data();
+        }
+        problem_.AddResidualBlock(cost.release(), losses_.back().get(), poses_[v].data(), camera_.data(),
+                                  intrinsics_.data(), shape);
+      }
+    }
+    bending_ = settings.bending;
+  }
+
+  void holdIntrinsics() { problem_.SetParameterBlockConstant(intrinsics_.data()); }
+
+  bool solve() {
+    ceres::Solver::Options options;
+    // Exact: iterative solvers stop early on a problem this badly conditioned (xi against gamma).
+    options.linear_solver_type = ceres::DENSE_SCHUR;
+    options.max_num_iterations = kMaxIterations;
+    options.function_tolerance = 1e-12;
+    options.parameter_tolerance = 1e-12;
+    options.num_threads = 1;
+    options.logging_type = ceres::SILENT;
+    auto* ordering = new ceres::ParameterBlockOrdering;  // NOLINT: Ceres takes it
+    for (PoseBlock& pose : poses_) {
+      ordering->AddElementToGroup(pose.data(), 0);
+    }
+    ordering->AddElementToGroup(intrinsics_.data(), 1);
+    ordering->AddElementToGroup(camera_.data(), 1);
+    for (Eigen::Vector3d& shape : bending_ ? bendings_ : corners_) {
+      ordering->AddElementToGroup(shape.data(), 1);
+    }
+    options.linear_solver_ordering.reset(ordering);
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &problem_, &summary);
+    return summary.IsSolutionUsable();
+  }
+
+  std::vector<PlacedBoard> boards() const {
+    std::vector<PlacedBoard> boards;
+    for (size_t v = 0; v < poses_.size(); ++v) {
+      boards.push_back({fromPoseBlock(poses_[v]).inverse(), bendings_[v]});
+    }
+    return boards;
+  }
+  const Eigen::VectorXd& intrinsics() const { return intrinsics_; }
+
+  std::optional<Eigen::MatrixXd> covariance() {
+    ceres::Covariance::Options options;
+    options.num_threads = 1;
+    ceres::Covariance covariance(options);
+    const auto size = intrinsics_.size();
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> matrix(size, size);
+    const std::vector<std::pair<const double*, const double*>> blocks = {
+        {intrinsics_.data(), intrinsics_.data()}};
+    if (!covariance.Compute(blocks, &problem_) ||
+        !covariance.GetCovarianceBlock(intrinsics_.data(), intrinsics_.data(), matrix.data())) {
+      return std::nullopt;
+    }
+    return matrix;
+  }
+
+ private:
+  static ceres::Problem::Options ownership() {
+    ceres::Problem::Options options;
+    options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+    return options;
+  }
+
+  std::unique_ptr<ceres::Manifold> manifold_;
+  std::vector<std::unique_ptr<ceres::LossFunction>> losses_;  // per view
+  ceres::Problem problem_;
+  PoseBlock camera_;
+  Eigen::VectorXd intrinsics_;
+  std::vector<Eigen::Vector3d> corners_;
+  std::vector<PoseBlock> poses_;
+  std::vector<Eigen::Vector3d> bendings_;
+  bool bending_ = false;
+};
+
+}  // namespace
+
+Eigen::Vector2d reprojectionError(const CalibrationBoard& board, const BoardCorner& corner,
+                                  const PlacedBoard& placed, const CameraModel& model) {
+  Eigen::Vector2d pixel;
+  if (!model.project(placed.corner(board, corner.index), &pixel)) {
+    return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
+  return pixel - corner.pixel;
+}
+
+std::optional<CameraModel> guessCamera(const std::string& model_name, cv::Size image_size_px,
+                                       const CalibrationBoard& board, const std::vector<BoardView>& views) {
+  constexpr int kSteps = 40;
+  std::optional<CameraModel> best;
+  double best_error = std::numeric_limits<double>::infinity();
+  const size_t stride = std::max<size_t>(1, views.size() / kMaxGuessViews);
+  for (int step = 0; step <= kSteps; ++step) {
+    // From a fisheye of more than 180 degrees to a long lens.
+    const double focal_px = image_size_px.width * 0.15 * std::pow(20.0, static_cast<double>(step) / kSteps);
+    const CameraModel model =
+        CameraModel::create(model_name, parametersFor(model_name, image_size_px, focal_px));
+    double error = 0.0;
+    bool any = false;
+    for (size_t v = 0; v < views.size(); v += stride) {
+      const auto pose = boardPose(board, views[v].corners, model);
+      any = any || pose.has_value();
+      for (const BoardCorner& corner : views[v].corners) {
+        const double miss_px =
+            pose.has_value()
+                ? reprojectionError(board, corner, {*pose, Eigen::Vector3d::Zero()}, model).norm()
+                : kMaxGuessError_px;
+        error += std::isfinite(miss_px) ? std::min(miss_px, kMaxGuessError_px) : kMaxGuessError_px;
+      }
+    }
+    if (any && error < best_error) {
+      best_error = error;
+      best = model;
+    }
+  }
+  return best;
+}
+
+std::optional<FittedCamera> fitCamera(const CalibrationBoard& board, const std::vector<BoardView>& views,
+                                      const CameraModel& initial, const FitSettings& settings) {
+  FittedCamera start{initial, {}};
+  for (const BoardView& view : views) {
+    const auto pose = boardPose(board, view.corners, initial);
+    if (!pose.has_value()) {
+      return std::nullopt;
+    }
+    start.boards.push_back({*pose, Eigen::Vector3d::Zero()});
+  }
+  Adjustment adjustment(board, views, start, settings);
+  if (!adjustment.solve()) {
+    return std::nullopt;
+  }
+  return FittedCamera{CameraModel::create(initial.name(), adjustment.intrinsics()), adjustment.boards()};
+}
+
+std::optional<FittedCamera> fitFromScratch(const std::string& model_name, cv::Size image_size_px,
+                                           const CalibrationBoard& board,
+                                           const std::vector<BoardView>& views) {
+  const Eigen::Vector2d middle(0.5 * (image_size_px.width - 1), 0.5 * (image_size_px.height - 1));
+  const auto farthest_px = [&](const BoardView& view) {
+    double distance_px = 0.0;
+    for (const BoardCorner& corner : view.corners) {
+      distance_px = std::max(distance_px, (corner.pixel - middle).norm());
+    }
+    return distance_px;
+  };
+  std::vector<BoardView> sorted = views;
+  std::stable_sort(sorted.begin(), sorted.end(),
+                   [&](const BoardView& a, const BoardView& b) { return farthest_px(a) < farthest_px(b); });
+  std::optional<FittedCamera> fitted;
+  for (size_t count = std::min(kFirstViews, sorted.size()); !sorted.empty();
+       count = std::min(2 * count, sorted.size())) {
+    const std::vector<BoardView> part(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(count));
+    const auto start = fitted.has_value() ? std::optional<CameraModel>(fitted->model)
+                                          : guessCamera(model_name, image_size_px, board, part);
+    const auto next = start.has_value() ? fitCamera(board, part, *start, {Loss::kRobust}) : std::nullopt;
+    if (next.has_value()) {
+      fitted = next;
+    }
+    if (count == sorted.size()) {
+      return next;
+    }
+  }
+  return std::nullopt;
+}
+
+std::optional<PlacedBoard> fitBoard(const CalibrationBoard& board, const BoardView& view,
+                                    const CameraModel& model, const FitSettings& settings) {
+  const auto pose = boardPose(board, view.corners, model);
+  if (!pose.has_value()) {
+    return std::nullopt;
+  }
+  Adjustment adjustment(board, {view}, {model, {{*pose, Eigen::Vector3d::Zero()}}}, settings);
+  adjustment.holdIntrinsics();
+  if (!adjustment.solve()) {
+    return std::nullopt;
+  }
+  return adjustment.boards().front();
+}
+
+std::optional<Eigen::MatrixXd> intrinsicsCovariance(const CalibrationBoard& board,
+                                                    const std::vector<BoardView>& views,
+                                                    const FittedCamera& camera, const FitSettings& settings) {
+  return Adjustment(board, views, camera, settings).covariance();
+}
+
+}  // namespace vcharge

@@ -1,0 +1,291 @@
+#include "vcharge_calibration/live/rig_calibration_session.h"
+
+#include <atomic>
+#include <cmath>
+#include <exception>
+#include <optional>
+
+#include "live/live_motions.h"
+
+namespace vcharge {
+namespace {
+
+/// Thrown through the calibration when it is given up.
+struct Abandoned {};
+
+std::vector<std::string> namesOf(const CameraRig& rig) {
+  std::vector<std::string> names;
+  for (const RigCamera& camera : rig.cameras) {
+    names.push_back(camera.name);
+  }
+  return names;
+}
+
+CameraRig guessOf(const CameraRig& rig, const DriveOutlook& outlook) {
+  CameraRig guess = rig;
+  for (size_t i = 0; i < guess.cameras.size(); ++i) {
+    const HandEye& hand_eye = outlook.cameras[i].hand_eye;
+    guess.cameras[i].covariance.reset();
+    guess.cameras[i].vehicle_from_camera.reset();
+    if (hand_eye.status == HandEyeStatus::kOk) {
+      guess.cameras[i].vehicle_from_camera = hand_eye.vehicle_from_camera;
+    }
+  }
+  return guess;
+}
+
+std::vector<std::pair<std::string, int64_t>> countsOf(const MappingState& state) {
+  const SparseMapperReport& report = state.report;
+  return {{"frames", report.num_frames},
+          {"keyframes", static_cast<int64_t>(state.data.keyframes.size())},
+          {"frames that lack a camera", report.num_incomplete_frames},
+          {"frames without odometry", report.num_frames_without_odometry},
+          {"standing frames", report.num_standing_frames},
+          {"late images", report.num_late_images}};
+}
+
+std::string describe(const RigCalibration& result) {
+  std::string text = toString(result.verdict);
+  for (const std::string& remark : result.remarks) {
+    text += "; " + remark;
+  }
+  return text;
+}
+
+}  // namespace
+
+void RigCalibrationSessionOptions::validate() const {
+  requireField(retry_m >= 0.0, "retry_m", "must not be negative", retry_m);
+  requireField(outlook_m > 0.0, "outlook_m", "must be positive", outlook_m);
+  requireField(outlook_turn_rad > 0.0, "outlook_turn_rad", "must be positive", outlook_turn_rad);
+  requireField(max_keyframes >= 10, "max_keyframes", "must be 10 or more", max_keyframes);
+  validateInner("coach", coach);
+}
+
+/// What follows one drive.
+struct RigCalibrationSession::Follower {
+  RigCalibrator calibrator;
+  CalibrationCoach coach;
+  DriveOutlook outlook;
+  std::optional<Keyframe> last_look;  // without images
+  double next_try_m = 0.0;            // to calibrate by itself
+
+  Follower(const std::shared_ptr<const CameraRig>& rig, const RigCalibratorOptions& calibrator_options,
+           const CalibrationCoachOptions& coach_options)
+      : calibrator(rig, calibrator_options),
+        coach(namesOf(*rig), calibrator_options.hand_eye, coach_options),
+        outlook(coach.outlook()) {}
+
+  bool isTimeToLook(const RigCalibrationSessionOptions& options) const {
+    const std::vector<Keyframe>& keyframes = calibrator.state().data.keyframes;
+    if (keyframes.empty() || keyframes.size() == coach.numKeyframes()) {
+      return false;
+    }
+    if (!last_look) {
+      return true;
+    }
+    const double turn_rad = angleOfRotation(last_look->odom_from_vehicle.rotation().conjugate() *
+                                            keyframes.back().odom_from_vehicle.rotation());
+    return keyframes.back().travelled_m - last_look->travelled_m >= options.outlook_m ||
+           turn_rad >= options.outlook_turn_rad;
+  }
+
+  void look(const RobustOptions& camera_motion) {
+    const MappingState& state = calibrator.state();
+    tellCoach(state, camera_motion, &coach);
+    outlook = coach.outlook();
+    last_look.emplace();
+    last_look->odom_from_vehicle = state.data.keyframes.back().odom_from_vehicle;
+    last_look->travelled_m = state.data.keyframes.back().travelled_m;
+  }
+};
+
+/// A calibration that runs, or ran.
+struct RigCalibrationSession::Job {
+  FinishedCalibration work;
+  KeyframeImages all_images;
+  std::atomic<bool> is_abandoned{false}, is_done{false};
+};
+
+RigCalibrationSession::RigCalibrationSession(std::shared_ptr<const CameraRig> rig,
+                                             const RigCalibratorOptions& calibrator_options,
+                                             const RigCalibrationSessionOptions& options,
+                                             StatusCallback on_status, DriveCallback on_drive,
+                                             ResultCallback on_result)
+    : rig_(std::move(rig)),
+      calibrator_options_(calibrator_options),
+      options_(options),
+      on_status_(std::move(on_status)),
+      on_drive_(std::move(on_drive)),
+      on_result_(std::move(on_result)) {
+  options_.validate();
+  startOver();
+}
+
+RigCalibrationSession::~RigCalibrationSession() {
+  if (job_) {
+    job_->is_abandoned = true;
+  }
+  if (worker_.joinable()) {
+    worker_.join();
+  }
+}
+
+void RigCalibrationSession::tell(const std::function<void(Status*)>& change) {
+  Status told;
+  {
+    const std::lock_guard<std::mutex> lock(status_mutex_);
+    change(&status_);
+    told = status_;
+  }
+  on_status_(told);
+}
+
+template <class Feed>
+void RigCalibrationSession::follow(const Feed& feed) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const MappingState& state = follower_->calibrator.state();
+  if (state.data.keyframes.size() < static_cast<size_t>(options_.max_keyframes)) {
+    feed(&follower_->calibrator);
+  }
+  {
+    const std::lock_guard<std::mutex> status_lock(status_mutex_);
+    status_.counts = countsOf(state);
+  }
+  if (follower_->isTimeToLook(options_)) {
+    look();
+  }
+}
+
+void RigCalibrationSession::look() {
+  Follower& follower = *follower_;
+  follower.look(calibrator_options_.camera_motion);
+  const MappingState& state = follower.calibrator.state();
+  on_drive_(state, guessOf(*rig_, follower.outlook));
+  tell([&](Status* status) {
+    status->outlook = follower.outlook;
+    if (status->phase == Phase::kFailed) {
+      status->phase = Phase::kFollowing;  // the drive goes on
+    }
+    if (status->phase == Phase::kFollowing) {
+      status->message = follower.outlook.next;
+      status->progress = follower.outlook.progress;
+    }
+  });
+  if (options_.calibrates_itself && follower.outlook.isEnough() &&
+      follower.outlook.distance_m >= follower.next_try_m && status().phase != Phase::kCalibrated) {
+    std::string message;
+    if (begin(false, &message)) {
+      follower.next_try_m = follower.outlook.distance_m + options_.retry_m;
+    }
+  }
+}
+
+void RigCalibrationSession::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
+  follow([&](RigCalibrator* calibrator) { calibrator->addImage(camera_index, stamp, image); });
+}
+
+void RigCalibrationSession::addOdometry(const VehicleOdometry& odometry) {
+  follow([&](RigCalibrator* calibrator) { calibrator->addOdometry(odometry); });
+}
+
+bool RigCalibrationSession::calibrate(std::string* message) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return begin(true, message);
+}
+
+bool RigCalibrationSession::begin(bool flushes, std::string* message) {
+  if (job_ && !job_->is_done) {
+    *message = job_->is_abandoned ? "the calibration that was given up is just ending: try again"
+                                  : "it is being calibrated: " + status().message;
+    return false;
+  }
+  if (worker_.joinable()) {
+    worker_.join();  // it has returned, or is about to
+  }
+  job_ = std::make_shared<Job>();
+  if (flushes) {
+    follower_->calibrator.flush();
+  }
+  job_->work.state = follower_->calibrator.state();
+  job_->work.images = follower_->calibrator.images();
+  job_->all_images = follower_->calibrator.allImages();
+  *message = "calibrating by " + std::to_string(job_->work.state.data.keyframes.size()) + " keyframes";
+  tell([&](Status* status) {
+    status->phase = Phase::kCalibrating;
+    status->message = *message;
+    status->progress = 0.0;
+  });
+  worker_ = std::thread([this, job = job_] { run(job); });
+  return true;
+}
+
+void RigCalibrationSession::run(const std::shared_ptr<Job>& job) {
+  const auto tellOfJob = [&](const std::function<void(Status*)>& change) {
+    tell([&](Status* status) {
+      if (!job->is_abandoned) {  // otherwise the status is that of another drive
+        change(status);
+      }
+    });
+  };
+  Phase phase = Phase::kFailed;
+  std::string message;
+  try {
+    job->work.result = calibrateFollowedDrive(
+        calibrator_options_, job->all_images,
+        [&](const StageProgress& progress) {
+          if (job->is_abandoned) {
+            throw Abandoned();
+          }
+          tellOfJob([&](Status* status) {
+            status->message = "stage " + std::to_string(progress.number) + " of " +
+                              std::to_string(progress.num_stages) + ", " + progress.stage;
+            status->progress = (progress.number - 1 + progress.fraction) / progress.num_stages;
+          });
+        },
+        &job->work.state);
+    if (job->is_abandoned) {
+      throw Abandoned();
+    }
+    on_result_(job->work);
+    message = describe(job->work.result);
+    phase = job->work.result.verdict == Verdict::kFail ? Phase::kFailed : Phase::kCalibrated;
+  } catch (const Abandoned&) {
+    message = "given up";
+  } catch (const std::exception& error) {
+    message = error.what();
+  }
+  tellOfJob([&](Status* status) {
+    status->phase = phase;
+    status->message = message;
+    status->progress = 1.0;
+    status->result = std::make_shared<const RigCalibration>(job->work.result);
+  });
+  job->work.state = MappingState();
+  job->is_done = true;
+}
+
+void RigCalibrationSession::startOver() {
+  follower_ = std::make_unique<Follower>(rig_, calibrator_options_, options_.coach);
+  const std::lock_guard<std::mutex> lock(status_mutex_);
+  status_ = Status();
+  status_.outlook = follower_->outlook;
+  status_.message = "waiting for a drive";
+  status_.counts = countsOf(follower_->calibrator.state());
+}
+
+void RigCalibrationSession::reset() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (job_) {
+    job_->is_abandoned = true;
+  }
+  startOver();
+  tell([](Status* /*status*/) {});
+}
+
+RigCalibrationSession::Status RigCalibrationSession::status() const {
+  const std::lock_guard<std::mutex> lock(status_mutex_);
+  return status_;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,42 @@
+#include "vcharge_calibration/report/rig_calibration_files.h"
+
+#include <filesystem>
+
+#include "vcharge_calibration/report/rig_report.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/files/file_io.h"
+#include "vcharge_core/motion/trajectory.h"
+
+namespace vcharge {
+
+namespace fs = std::filesystem;
+
+void writeRigReport(const std::string& folder, const std::string& title, const RigCalibration& result,
+                    const MappingState& state, const KeyframeImages& images,
+                    const std::string& more_sections) {
+  if (!folder.empty()) {
+    createFolder(folder);
+    writeTextFileAtomically((fs::path(folder) / "rig_report.html").string(),
+                            makeRigReport(title, result, state, images, more_sections));
+  }
+}
+
+void writeRigAndTrajectory(const std::string& rig_file, const std::string& trajectory_file,
+                           const RigCalibration& result, const MappingState& state,
+                           const std::map<std::string, std::string>& provenance) {
+  check(result.rig != nullptr, "writeRigAndTrajectory: expected a calibration that did not fail");
+  if (!trajectory_file.empty()) {
+    writeTrajectory(trajectoryOf(state), trajectory_file);
+  }
+  const fs::path folder = fs::path(rig_file).parent_path();
+  for (const RigCamera& camera : result.rig->cameras) {
+    if (!camera.mask_file.empty()) {
+      createFolder((folder / camera.mask_file).parent_path().string());
+    }
+  }
+  CameraRig rig = *result.rig;
+  rig.provenance = provenance;
+  writeCameraRig(rig, rig_file);
+}
+
+}  // namespace vcharge

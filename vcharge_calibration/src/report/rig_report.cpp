@@ -1,0 +1,227 @@
+#include "vcharge_calibration/report/rig_report.h"
+
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "matching/rectified_matches.h"
+#include "report/bird_view.h"
+#include "report/report_pictures.h"
+#include "report/rig_pictures.h"
+#include "vcharge_calibration/rig/rig_calibration_text.h"
+#include "vcharge_core/base/text_format.h"
+#include "vcharge_core/files/html.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kDegrees = 57.29577951308232;
+constexpr int kPictureWidth_px = 450;
+constexpr int kPairWidth_px = 1120;
+constexpr double kVectorScale = 50.0;
+const std::vector<double> kSeamDistances_m = {2.0, 5.0, 10.0};
+
+std::string rowOf(const std::vector<std::string>& cells, bool is_head = false) {
+  std::string text = "<tr>";
+  for (const std::string& cell : cells) {
+    text += is_head ? "<th>" + escapeHtml(cell) + "</th>" : "<td>" + escapeHtml(cell) + "</td>";
+  }
+  return text + "</tr>";
+}
+
+std::string verdictOf(const RigCalibration& result) {
+  const std::string verdict = toString(result.verdict);
+  std::string text = "<p class=\"verdict " + verdict + "\"><b>" + verdict + "</b>";
+  for (const std::string& remark : result.remarks) {
+    text += "<br>" + escapeHtml(remark);
+  }
+  return text + "</p>";
+}
+
+std::string summaryOf(const RigCalibration& result) {
+  return "<table>" +
+         rowOf({"drive", toText(result.distance_m, 1) + " m, " + toText(kDegrees * result.left_turn_rad, 0) +
+                             " degrees to the left, " + toText(kDegrees * result.right_turn_rad, 0) +
+                             " to the right"}) +
+         rowOf({"map", std::to_string(result.num_keyframes) + " keyframes, " +
+                           std::to_string(result.num_landmarks) + " landmarks, " +
+                           std::to_string(result.num_loop_edges) + " loop edges"}) +
+         rowOf({"error of reprojection, RMS per coordinate", toText(result.rms_px, 3) + " px"}) +
+         rowOf({"odometer's turn, true over counted", toText(result.odometer_turn_scale, 5)}) +
+         rowOf({"odometer's stamps late by", toText(1000.0 * result.time_offset_s, 1) + " ms"}) +
+         rowOf({"height", result.height_source}) + "</table>";
+}
+
+/// Name, and each degree of freedom with its standard deviation: yaw, pitch and roll are those of a camera
+/// that was turned forwards.
+std::string parametersOf(const RigCalibration& result) {
+  std::string text =
+      "<h2>Places of the cameras</h2><p>Axes of the vehicle: x forwards, y to the left, z up. " +
+      std::string(result.is_from_map
+                      ? "All lengths are the map's."
+                      : "All lengths are the odometer's: an error of the wheels' size is in them.") +
+      " Yaw, pitch and roll are zero for a camera that looks ahead, upright; their deviations are about the "
+      "vehicle's z, y and x.</p><table>" +
+      rowOf({"camera", "x (cm)", "y (cm)", "z (cm)", "yaw (degrees)", "pitch", "roll", "least certain"},
+            true);
+  for (size_t i = 0; i < result.cameras.size(); ++i) {
+    const CameraCalibration& camera = result.cameras[i];
+    const Eigen::Matrix<double, 6, 1> values = placeAndAngles(*result.rig->cameras[i].vehicle_from_camera);
+    const Eigen::Matrix<double, 6, 1> sigmas = placeAndAngleSigmas(camera.covariance);
+    std::vector<std::string> cells{camera.name};
+    for (int k = 0; k < 6; ++k) {
+      const int digits = k < 3 ? 2 : 3;
+      cells.push_back(toText(values[k], digits) + " \u00b1 " + toText(sigmas[k], digits));
+    }
+    cells.push_back(camera.weakest_direction);
+    text += rowOf(cells);
+  }
+  return text + "</table>";
+}
+
+std::string checksOf(const RigCalibration& result) {
+  std::string text =
+      "<h2>Checks</h2><table>" +
+      rowOf({"camera", "observations followed", "that fit", "error (px RMS)",
+             "of it common to neighbours (px)", "landmarks shared with other cameras",
+             "halves of the drive differ by (cm)", "(degrees)", "jackknife over formula, largest"},
+            true);
+  for (const CameraCalibration& camera : result.cameras) {
+    text += rowOf({camera.name, std::to_string(camera.num_tracked), std::to_string(camera.num_observations),
+                   toText(camera.rms_px, 3), toText(camera.structure_px, 3),
+                   std::to_string(camera.num_shared_landmarks),
+                   toText(100.0 * camera.half_difference.head<3>().norm(), 2),
+                   toText(kDegrees * camera.half_difference.tail<3>().norm(), 3),
+                   toText(camera.inflation.maxCoeff(), 1)});
+  }
+  return text + "</table>";
+}
+
+std::string row(const std::string& figures) {
+  return "<div class=\"row\">" + figures + "</div>";
+}
+
+std::string mapsOf(const RigCalibration& result, const MappingState& state) {
+  std::string figures;
+  if (result.first_scene != nullptr) {
+    figures += htmlFigure(drawSparseMap(*result.first_scene),
+                          "Before: landmarks by the odometer's path and hand-eye's rig, in the colour of the "
+                          "camera that saw them first.");
+  }
+  return "<h2>Sparse map</h2>" + row(figures + htmlFigure(drawSparseMap(makeRigScene(state.data)),
+                                                          "After: landmarks by the adjusted path and rig."));
+}
+
+std::string seamsOf(const RigCalibration& result, const KeyframeImages& images) {
+  const CameraRig* before = result.first_scene != nullptr ? result.first_scene->rig.get() : nullptr;
+  const CameraRig& rig = *result.rig;
+  std::string text = "<h2>The ground from above</h2>";
+  const std::vector<int32_t> keyframes = images.keyframes();
+  if (!keyframes.empty()) {
+    std::vector<cv::Mat> shown;
+    for (size_t i = 0; i < rig.cameras.size(); ++i) {
+      shown.push_back(images.image(keyframes[keyframes.size() / 2], i));
+    }
+    std::string figures;
+    if (before != nullptr) {
+      figures +=
+          htmlFigure(embedPicture(makeBirdView(*before, shown, BirdViewArea()), kPictureWidth_px),
+                     "Before: by hand-eye's rig. Lines: where one camera's picture ends and the next "
+                     "begins; marks on the road go on across them where the cameras' places are right.");
+    }
+    text += row(figures + htmlFigure(embedPicture(makeBirdView(rig, shown, BirdViewArea()), kPictureWidth_px),
+                                     "After: by the calibrated rig. The vehicle drives upwards."));
+  }
+  text +=
+      "<p>How far apart two neighbouring cameras show a place on the ground that both see, half way between "
+      "their directions: \u00b1 one standard deviation after the calibration, the errors of the two taken "
+      "for "
+      "independent (height and tilt are largely common and cancel: an upper bound); in brackets, how far "
+      "apart they were by hand-eye.</p><table>";
+  std::vector<std::string> head{"cameras"};
+  for (const double distance_m : kSeamDistances_m) {
+    head.push_back("at " + toText(distance_m, 0) + " m (cm)");
+  }
+  text += rowOf(head, true);
+  std::vector<std::string> cells;
+  for (const SeamPoint& point : seamPoints(rig, before, kSeamDistances_m)) {
+    if (cells.empty()) {
+      cells.push_back(rig.cameras[point.first].name + ", " + rig.cameras[point.second].name);
+    }
+    cells.push_back(!point.is_seen                  ? "not seen by both"
+                    : !std::isfinite(point.sigma_m) ? "not known"
+                                                    : "\u00b1 " + toText(100.0 * point.sigma_m, 1));
+    if (point.is_seen && before != nullptr) {
+      cells.back() += " (" + toText(100.0 * point.before_m, 1) + ")";
+    }
+    if (cells.size() > kSeamDistances_m.size()) {
+      text += rowOf(cells);
+      cells.clear();
+    }
+  }
+  return text + "</table>";
+}
+
+std::string sharedOf(const MappingState& state, const KeyframeImages& images) {
+  std::string text;
+  for (const CameraPairView& pair : findCameraPairViews(state.data, images)) {
+    const auto nameOf = [&](size_t camera, int32_t keyframe) {
+      return state.data.rig->cameras[camera].name + " at keyframe " + std::to_string(keyframe);
+    };
+    text += htmlFigure(embedPicture(drawCameraPairView(state.data, images, pair), kPairWidth_px),
+                       nameOf(pair.first_camera, pair.first_keyframe) + ", " +
+                           nameOf(pair.second_camera, pair.second_keyframe) + ": " +
+                           std::to_string(pair.tracks.size()) + " landmarks in both views.");
+  }
+  return text.empty()
+             ? ""
+             : "<h2>Landmarks that cameras share</h2><p>Views rectified to the average rotation of the "
+               "two cameras; lines join the observations of a landmark.</p>" +
+                   row(text);
+}
+
+std::string errorsOf(const MappingState& state) {
+  std::string maps, vectors;
+  const std::vector<std::vector<CornerError>> errors = errorsByCamera(state.data);
+  for (size_t i = 0; i < errors.size(); ++i) {
+    const RigCamera& camera = state.data.rig->cameras[i];
+    maps += htmlFigure(drawErrorMap(camera.image_size_px, errors[i]),
+                       camera.name + ": RMS error per coordinate, pixels.");
+    vectors += htmlFigure(
+        drawErrorVectors(camera.image_size_px, meanErrors(camera.image_size_px, errors[i]), kVectorScale),
+        camera.name + ": mean errors, " + toText(kVectorScale, 0) +
+            " times as long as they are. Where neighbours point the same way, the lens is not as "
+            "its intrinsics say.");
+  }
+  return "<h2>Errors over the images</h2>" + row(maps) + row(vectors);
+}
+
+}  // namespace
+
+std::string makeRigReport(const std::string& title, const RigCalibration& result, const MappingState& state,
+                          const KeyframeImages& images, const std::string& more_sections) {
+  std::string body = verdictOf(result) + summaryOf(result);
+  if (result.rig != nullptr) {
+    body += parametersOf(result) +
+            row(htmlFigure(drawCameras(*result.rig),
+                           "Cameras and their directions from above; the vehicle drives to the right.")) +
+            checksOf(result);
+  }
+  // After a failure there may be poses and landmarks all the same, which show what is wrong.
+  if (state.data.rig != nullptr && state.data.rig->hasExtrinsics() && !state.data.keyframes.empty()) {
+    body += mapsOf(result, state);
+    body += result.rig != nullptr ? seamsOf(result, images) : "";
+    body += sharedOf(state, images) + errorsOf(state);
+  }
+  if (!state.data.keyframes.empty() && !result.is_from_map) {
+    body += "<h2>Loops</h2>" +
+            row(htmlFigure(drawLoopGraph(state), "Places that were passed again, on the vehicle's path."));
+  }
+  body += more_sections + "<h2>Times</h2><table>";
+  for (const auto& [stage, seconds] : state.report.stage_s) {
+    body += rowOf({stage, toText(seconds, 1) + " s"});
+  }
+  return htmlPage(title, body + "</table>");
+}
+
+}  // namespace vcharge

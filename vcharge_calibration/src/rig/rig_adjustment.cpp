@@ -1,0 +1,229 @@
+#include "rig/rig_adjustment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include "rig/ground.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/base/quantile.h"
+
+namespace vcharge {
+
+void RigAdjustmentOptions::validate() const {
+  requireField(max_ground_distance_m > 0.0, "max_ground_distance_m", "must be positive",
+               max_ground_distance_m);
+  requireField(ground_sigma_m > 0.0, "ground_sigma_m", "must be positive", ground_sigma_m);
+  requireField(segment_m > 0.0, "segment_m", "must be positive", segment_m);
+  requireField(common_error_px >= 0.0, "common_error_px", "must not be negative", common_error_px);
+  requireField(common_range_m > 0.0, "common_range_m", "must be positive", common_range_m);
+  validateInner("bundle", bundle);
+}
+
+namespace {
+
+/// How much less certain the odometer is where wheels slipped.
+constexpr double kSlipFactor = 20.0;
+constexpr double kSlipSigmas = 5.0;
+/// Of a keyframe to the next, to lean in.
+constexpr double kMinTurn_rad = 0.01;
+/// No odometer is taken for better.
+constexpr double kMinOdometrySigma_m = 0.0005;
+constexpr double kMinOdometrySigma_rad = 0.0002;
+constexpr double kMinHeightSigma_m = 0.001;
+constexpr double kMinTiltSigma_rad = 0.0005;
+
+/// Weights of what keyframes tell of the cameras' tilt. The body leans outwards in turns: with turns to both
+/// sides counting the same in sum that cancels, so the side with more of them counts less.
+std::vector<double> balanceTurns(const MappingData& data) {
+  std::vector<double> turns_rad(data.keyframes.size(), 0.0);
+  double left_rad = 0.0, right_rad = 0.0;
+  for (size_t i = 1; i < data.keyframes.size(); ++i) {
+    turns_rad[i] = yawOfRotation(data.keyframes[i - 1].odom_from_vehicle.rotation().conjugate() *
+                                 data.keyframes[i].odom_from_vehicle.rotation());
+    (turns_rad[i] > 0.0 ? left_rad : right_rad) += std::abs(turns_rad[i]);
+  }
+  const double less_rad = std::max(std::min(left_rad, right_rad), 1e-6);
+  std::vector<double> weights(data.keyframes.size(), 1.0);
+  for (size_t i = 0; i < weights.size(); ++i) {
+    if (std::abs(turns_rad[i]) > kMinTurn_rad) {
+      weights[i] = less_rad / std::max(less_rad, turns_rad[i] > 0.0 ? left_rad : right_rad);
+    }
+  }
+  return weights;
+}
+
+/// In a finished map no keyframe is held: the first pose of the problem becomes the map's frame, which
+/// nothing refers to.
+void freeAllKeyframes(BundleProblem* problem) {
+  problem->map_from_vehicle.insert(problem->map_from_vehicle.begin(), RigidTransform());
+  for (BundleObservation& observation : problem->observations) {
+    ++observation.pose;
+  }
+  for (BundleMotion& motion : problem->motions) {
+    ++motion.pose;
+  }
+}
+
+/// The problem of mapping, with the ground's observations put to their points.
+BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPriors& priors,
+                             const MappingData& data) {
+  const OdometryNoise& odometry = priors.odometry;
+  BundleAdjustmentOptions bundle = options.bundle;
+  if (odometry.sigma_m > 0.0) {
+    bundle.odometry_sigma_m = odometry.sigma_m;
+    bundle.odometry_sigma_rad = odometry.sigma_rad;
+    bundle.height_sigma_m = odometry.height_sigma_m;
+    bundle.tilt_sigma_rad = odometry.tilt_sigma_rad;
+    bundle.odometry_distance_sigma = bundle.odometry_turn_sigma = 0.0;
+  }
+  const BundleProblem mapping = makeBundleProblem(bundle, data);
+  BundleProblem problem = mapping;
+  const std::vector<double> weights = balanceTurns(data);
+  for (BundleMotion& motion : problem.motions) {
+    if (!odometry.has_slipped.empty() && odometry.has_slipped[motion.pose]) {
+      motion.information /= kSlipFactor * kSlipFactor;
+    }
+    motion.information.block<2, 2>(3, 3) *= weights[motion.pose];
+  }
+  for (const RigCamera& camera : data.rig->cameras) {
+    problem.vehicle_from_camera.push_back(*camera.vehicle_from_camera);
+  }
+  problem.observations.clear();
+  const std::vector<GroundPoint> ground = findGroundPoints(data, options.max_ground_distance_m);
+  auto next_ground = ground.begin();
+  size_t point = 0;
+  for (size_t t = 0; t < data.tracks.size(); ++t) {
+    if (!data.tracks[t].position_m) {
+      continue;
+    }
+    problem.first_observation[point] = problem.observations.size();
+    const bool is_ground = next_ground != ground.end() && next_ground->track == static_cast<int32_t>(t);
+    for (size_t i = mapping.first_observation[point]; i < mapping.first_observation[point + 1]; ++i) {
+      if (is_ground && mapping.observations[i].pose == next_ground->keyframe &&
+          (i == mapping.first_observation[point] ||
+           mapping.observations[i - 1].pose != next_ground->keyframe)) {
+        problem.observations.push_back({next_ground->keyframe, kGroundCamera, Eigen::Vector2d::Zero(),
+                                        options.ground_sigma_m / std::sqrt(weights[next_ground->keyframe])});
+      }
+      problem.observations.push_back(mapping.observations[i]);
+    }
+    next_ground += is_ground ? 1 : 0;
+    ++point;
+  }
+  problem.first_observation[point] = problem.observations.size();
+  if (priors.height_sigma_m > 0.0) {
+    problem.common_information(2, 2) = 1.0 / (priors.height_sigma_m * priors.height_sigma_m);
+  }
+  if (priors.hasMap()) {
+    for (size_t t = 0; t < data.tracks.size(); ++t) {
+      if (data.tracks[t].position_m) {
+        problem.point_information.push_back(priors.landmark_information[t]);
+      }
+    }
+    freeAllKeyframes(&problem);
+  }
+  return problem;
+}
+
+}  // namespace
+
+OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const MappingData& data) {
+  OdometryNoise noise;
+  std::vector<double> errors_m, errors_rad, heights_m, tilts_rad;
+  for (size_t i = 1; i < data.keyframes.size(); ++i) {
+    const RigidTransform counted =
+        data.keyframes[i - 1].odom_from_vehicle.inverse() * data.keyframes[i].odom_from_vehicle;
+    const RigidTransform seen =
+        data.keyframes[i - 1].map_from_vehicle.inverse() * data.keyframes[i].map_from_vehicle;
+    const Eigen::Vector2d error_m = (seen.translation() - counted.translation()).head<2>();
+    // Per axis, of a distance in two.
+    errors_m.push_back(error_m.norm() / std::sqrt(2.0));
+    errors_rad.push_back(std::abs(yawOfRotation(seen.rotation()) -
+                                  data.odometry_turn_scale * yawOfRotation(counted.rotation())));
+    heights_m.push_back(std::abs(seen.translation().z()));
+    tilts_rad.push_back(vectorFromRotation(seen.rotation()).head<2>().norm());
+  }
+  if (errors_m.size() < 10) {
+    return noise;
+  }
+  // Medians of a Rayleigh distribution and of the absolute value of a normal one.
+  constexpr double kRayleigh = 1.1774, kNormal = 0.6745;
+  const BundleAdjustmentOptions& bundle = options.bundle;
+  noise.sigma_m = std::clamp(quantile(errors_m, 0.5) * std::sqrt(2.0) / kRayleigh, kMinOdometrySigma_m,
+                             bundle.odometry_sigma_m);
+  noise.sigma_rad =
+      std::clamp(quantile(errors_rad, 0.5) / kNormal, kMinOdometrySigma_rad, bundle.odometry_sigma_rad);
+  noise.height_sigma_m =
+      std::clamp(quantile(heights_m, 0.5) / kNormal, kMinHeightSigma_m, bundle.height_sigma_m);
+  noise.tilt_sigma_rad =
+      std::clamp(quantile(tilts_rad, 0.5) / kRayleigh, kMinTiltSigma_rad, bundle.tilt_sigma_rad);
+  noise.has_slipped.push_back(false);
+  for (size_t i = 0; i < errors_m.size(); ++i) {
+    noise.has_slipped.push_back(errors_m[i] > kSlipSigmas * noise.sigma_m ||
+                                errors_rad[i] > kSlipSigmas * noise.sigma_rad);
+  }
+  return noise;
+}
+
+BundleAdjustmentSummary adjustRig(const RigAdjustmentOptions& options, const RigPriors& priors,
+                                  MappingData* data) {
+  check(!data->keyframes.empty(), "adjustRig: expected keyframes");
+  check(!priors.hasMap() || priors.landmark_information.size() == data->tracks.size(),
+        "adjustRig: expected landmark_information of every track");
+  BundleProblem problem = makeRigProblem(options, priors, *data);
+  const std::vector<Eigen::Vector3d> before =
+      priors.hasMap() ? problem.points_in_map : std::vector<Eigen::Vector3d>();
+  const BundleSolution solved =
+      solveBundle(options.bundle.max_iterations, options.bundle.cost_tolerance, &problem);
+  if (priors.hasMap()) {
+    problem.map_from_vehicle.erase(problem.map_from_vehicle.begin());
+    problem.points_in_map = before;
+  }
+  writeBack(problem, data);
+  auto rig = std::make_shared<CameraRig>(*data->rig);
+  for (size_t i = 0; i < rig->cameras.size(); ++i) {
+    rig->cameras[i].vehicle_from_camera = problem.vehicle_from_camera[i];
+  }
+  data->rig = rig;
+  BundleAdjustmentSummary summary = removeOutliers(options.bundle, data);
+  summary.converged = solved.converged;
+  summary.num_iterations = solved.num_iterations;
+  return summary;
+}
+
+RigUncertainty rigUncertainty(const RigAdjustmentOptions& options, const RigPriors& priors,
+                              const MappingData& data) {
+  RigUncertainty result;
+  const BundleCovariance tail = bundleCovariance(makeRigProblem(options, priors, data));
+  if (!tail.is_valid) {
+    return result;
+  }
+  const Eigen::Index first_keyframe = priors.hasMap() ? 1 : 0;
+  const Eigen::Index size = tail.covariance.rows() - 2;
+  result.is_valid = true;
+  result.covariance = tail.covariance.bottomRightCorner(size, size);
+  result.jackknife.setZero(size, size);
+  Eigen::VectorXd segment = Eigen::VectorXd::Zero(size);
+  int num_segments = 0;
+  double begin_m = 0.0;
+  const auto add = [&] {
+    result.jackknife += segment * segment.transpose();
+    segment.setZero();
+    ++num_segments;
+  };
+  for (size_t i = 0; i < data.keyframes.size(); ++i) {
+    if (data.keyframes[i].travelled_m - begin_m > options.segment_m) {
+      add();
+      begin_m = data.keyframes[i].travelled_m;
+    }
+    segment += tail.influence.col(static_cast<Eigen::Index>(i) + first_keyframe).tail(size);
+  }
+  add();
+  if (num_segments > 1) {
+    result.jackknife *= num_segments / (num_segments - 1.0);
+  }
+  return result;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,97 @@
+#include "vcharge_calibration/rig/rig_calibration_text.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include "vcharge_core/base/text_format.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kDegrees = 57.29577951308232;
+
+/// Numbers under each other, behind a name.
+std::string tableRow(const std::string& name, const Eigen::Matrix<double, 6, 1>& values) {
+  char text[128];
+  std::snprintf(text, sizeof(text), "%-10s %9.2f %9.2f %9.2f   %9.3f %9.3f %9.3f", name.c_str(), values[0],
+                values[1], values[2], values[3], values[4], values[5]);
+  return text;
+}
+
+std::string describeCamera(const CameraCalibration& camera, const RigidTransform& vehicle_from_camera) {
+  char counts[64];
+  std::snprintf(counts, sizeof(counts), "   %8lld %8lld", static_cast<long long>(camera.num_observations),
+                static_cast<long long>(camera.num_shared_landmarks));
+  std::string text = tableRow(camera.name, placeAndAngles(vehicle_from_camera)) + counts + "\n" +
+                     tableRow("  +-", placeAndAngleSigmas(camera.covariance)) +
+                     "   about z, y, x of the vehicle\n";
+  if (!camera.weakest_direction.empty()) {
+    text += "  least certain: " + camera.weakest_direction + "\n";
+  }
+  return text;
+}
+
+std::string describeDirection(const std::string& camera, const char* name, const Eigen::Vector3d& in_camera) {
+  if (in_camera.norm() == 0.0) {
+    return "";
+  }
+  return "camera '" + camera + "': " + name + " is (" + toText(in_camera.x(), 4) + ", " +
+         toText(in_camera.y(), 4) + ", " + toText(in_camera.z(), 4) + ") in its frame\n";
+}
+
+/// What is known of cameras whose places could not be told.
+std::string describeDirections(const RigCalibration& result) {
+  std::string text;
+  for (const CameraCalibration& camera : result.cameras) {
+    text += describeDirection(camera.name, "straight ahead", camera.initial.travel_in_camera) +
+            describeDirection(camera.name, "upwards", camera.up_in_camera);
+  }
+  return text;
+}
+
+}  // namespace
+
+Eigen::Matrix<double, 6, 1> placeAndAngles(const RigidTransform& vehicle_from_camera) {
+  Eigen::Matrix3d optical_from_body;
+  optical_from_body << 0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0;
+  const Eigen::Matrix3d body = vehicle_from_camera.rotationMatrix() * optical_from_body;
+  Eigen::Matrix<double, 6, 1> result;
+  result << 100.0 * vehicle_from_camera.translation(), kDegrees * std::atan2(body(1, 0), body(0, 0)),
+      kDegrees * std::asin(std::clamp(-body(2, 0), -1.0, 1.0)), kDegrees * std::atan2(body(2, 1), body(2, 2));
+  return result;
+}
+
+Eigen::Matrix<double, 6, 1> placeAndAngleSigmas(const Eigen::Matrix<double, 6, 6>& covariance) {
+  const Eigen::Matrix<double, 6, 1> sigmas = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
+  Eigen::Matrix<double, 6, 1> result;
+  result << 100.0 * sigmas.head<3>(), kDegrees * sigmas[5], kDegrees * sigmas[4], kDegrees * sigmas[3];
+  return result;
+}
+
+std::string describeCalibration(const RigCalibration& result) {
+  std::string text = toText(result.distance_m, 0) + " m, " + toText(kDegrees * result.left_turn_rad, 0) +
+                     " degrees of turn to the left, " + toText(kDegrees * result.right_turn_rad, 0) +
+                     " to the right; " + std::to_string(result.num_keyframes) + " keyframes, " +
+                     std::to_string(result.num_landmarks) + " landmarks, " +
+                     (result.is_from_map ? ""
+                                         : std::to_string(result.num_loop_edges) + " loop edges, " +
+                                               std::to_string(result.num_inter_camera_matches) +
+                                               " matches in rectified views, " +
+                                               std::to_string(result.num_aligned_observations) +
+                                               " observations aligned with their landmark's patch, ") +
+                     "error " + toText(result.rms_px, 3) + " px RMS per coordinate\n";
+  if (result.rig == nullptr) {
+    return text + describeDirections(result);
+  }
+  char heading[128];
+  std::snprintf(heading, sizeof(heading), "%-10s %9s %9s %9s   %9s %9s %9s   %8s %8s\n", "camera", "x (cm)",
+                "y (cm)", "z (cm)", "yaw (deg)", "pitch", "roll", "points", "shared");
+  text += heading;
+  for (size_t i = 0; i < result.cameras.size(); ++i) {
+    text += describeCamera(result.cameras[i], *result.rig->cameras[i].vehicle_from_camera);
+  }
+  return text + "height: " + result.height_source + "\n";
+}
+
+}  // namespace vcharge

@@ -1,0 +1,261 @@
+#include "rig/rig_judgement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <set>
+
+#include <Eigen/Eigenvalues>
+
+#include "rig/ground.h"
+#include "rig/rig_adjustment.h"
+#include "vcharge_core/base/text_format.h"
+#include "vcharge_core/camera/pixel_angle.h"
+
+namespace vcharge {
+namespace {
+
+// What counts as one: to compare metres with radians.
+constexpr double kUnit_m = 0.01;
+constexpr double kUnit_rad = 0.05 / 57.29577951308232;
+constexpr double kDegrees = 57.29577951308232;
+constexpr int kHalfIterations = 10;
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+/// RMS of the errors of a camera's landmarks, and of what neighbouring ones have in common.
+class ErrorStatistics {
+ public:
+  explicit ErrorStatistics(cv::Size image_size_px)
+      : size_px_(image_size_px),
+        sums_(kColumns * kRows, Eigen::Vector2d::Zero()),
+        counts_(kColumns * kRows, 0) {}
+
+  void add(const Eigen::Vector2d& position_px, const Eigen::Vector2d& error_px) {
+    const int column =
+        std::clamp(static_cast<int>(kColumns * position_px.x() / size_px_.width), 0, kColumns - 1);
+    const int row = std::clamp(static_cast<int>(kRows * position_px.y() / size_px_.height), 0, kRows - 1);
+    sums_[row * kColumns + column] += error_px;
+    ++counts_[row * kColumns + column];
+    squares_ += error_px.squaredNorm();
+    ++count_;
+  }
+  int64_t count() const { return count_; }
+  double rms() const { return count_ == 0 ? 0.0 : std::sqrt(squares_ / (2.0 * static_cast<double>(count_))); }
+  double structure() const {
+    double square = 0.0, weight = 0.0;
+    for (size_t i = 0; i < sums_.size(); ++i) {
+      if (counts_[i] >= kMinPerCell) {
+        // Without what independent errors leave of the mean.
+        square += std::max(0.0, sums_[i].squaredNorm() / counts_[i] - 2.0 * rms() * rms());
+        weight += 2.0 * counts_[i];
+      }
+    }
+    return weight == 0.0 ? 0.0 : std::sqrt(square / weight);
+  }
+
+ private:
+  static constexpr int kColumns = 16, kRows = 10, kMinPerCell = 30;
+  const cv::Size size_px_;
+  std::vector<Eigen::Vector2d> sums_;
+  std::vector<int> counts_;
+  double squares_ = 0.0;
+  int64_t count_ = 0;
+};
+
+void countObservations(const MappingData& data, RigCalibration* result) {
+  std::vector<ErrorStatistics> statistics;
+  std::vector<RigidTransform> camera_from_vehicle;
+  for (const RigCamera& camera : data.rig->cameras) {
+    statistics.emplace_back(camera.image_size_px);
+    camera_from_vehicle.push_back(camera.vehicle_from_camera->inverse());
+  }
+  for (const Track& track : data.tracks) {
+    if (!track.position_m) {
+      continue;
+    }
+    ++result->num_landmarks;
+    std::set<int32_t> cameras;
+    for (const TrackObservation& observation : track.observations) {
+      Eigen::Vector2d pixel;
+      const Eigen::Vector3d in_camera =
+          camera_from_vehicle[observation.camera] *
+          (data.keyframes[observation.keyframe].map_from_vehicle.inverse() * *track.position_m);
+      if (data.rig->cameras[observation.camera].model.project(in_camera, &pixel)) {
+        statistics[observation.camera].add(observation.position_px, pixel - observation.position_px);
+        cameras.insert(observation.camera);
+      }
+    }
+    for (const int32_t camera : cameras) {
+      result->cameras[camera].num_shared_landmarks += cameras.size() > 1 ? 1 : 0;
+    }
+  }
+  for (size_t i = 0; i < statistics.size(); ++i) {
+    result->cameras[i].num_observations = statistics[i].count();
+    result->cameras[i].rms_px = statistics[i].rms();
+    result->cameras[i].structure_px = statistics[i].structure();
+  }
+}
+
+/// The rig from the odd or the even parts of the drive alone; all keyframes stay, joined by odometry.
+std::shared_ptr<const CameraRig> calibrateHalf(const RigAdjustmentOptions& options, const RigPriors& priors,
+                                               const MappingData& data, bool odd) {
+  MappingData half;
+  half.rig = data.rig;
+  half.odometry_distance_scale = data.odometry_distance_scale;
+  half.odometry_turn_scale = data.odometry_turn_scale;
+  for (const Keyframe& keyframe : data.keyframes) {
+    half.keyframes.emplace_back();
+    half.keyframes.back().odom_from_vehicle = keyframe.odom_from_vehicle;
+    half.keyframes.back().map_from_vehicle = keyframe.map_from_vehicle;
+    half.keyframes.back().travelled_m = keyframe.travelled_m;
+  }
+  RigPriors half_priors;
+  half_priors.odometry = priors.odometry;
+  half_priors.height_sigma_m = priors.height_sigma_m;
+  for (size_t t = 0; t < data.tracks.size(); ++t) {
+    const Track& track = data.tracks[t];
+    if (track.position_m) {
+      const double travelled_m = data.keyframes[track.observations.front().keyframe].travelled_m;
+      if ((static_cast<int64_t>(travelled_m / options.segment_m) % 2 == 1) == odd) {
+        half.tracks.push_back(track);
+        if (!priors.landmark_information.empty()) {
+          half_priors.landmark_information.push_back(priors.landmark_information[t]);
+        }
+      }
+    }
+  }
+  RigAdjustmentOptions quick = options;
+  quick.bundle.max_iterations = kHalfIterations;
+  adjustRig(quick, half_priors, &half);
+  return half.rig;
+}
+
+Vector6d difference(const RigidTransform& a, const RigidTransform& b) {
+  Vector6d result;
+  result << a.translation() - b.translation(), vectorFromRotation(a.rotation() * b.rotation().conjugate());
+  return result;
+}
+
+Vector6d commonVariances(const RigAdjustmentOptions& options, const RigCamera& camera) {
+  const double sigma_rad = options.common_error_px * radiansPerPixel(camera);
+  Vector6d sigmas = Vector6d::Constant(sigma_rad);
+  sigmas.head<3>() *= options.common_range_m;
+  return sigmas.cwiseAbs2();
+}
+
+/// What can be told least of a camera: the longest axis of its uncertainty, in words.
+std::string describeWeakest(const Matrix6d& covariance) {
+  const char* const names[] = {"forwards", "sideways", "height", "roll", "pitch", "yaw"};
+  Vector6d units;
+  units << kUnit_m, kUnit_m, kUnit_m, kUnit_rad, kUnit_rad, kUnit_rad;
+  const Matrix6d scaled = units.cwiseInverse().asDiagonal() * covariance * units.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(scaled);
+  const Vector6d axis = eigen.eigenvectors().col(5);
+  std::string text;
+  for (int i = 0; i < 6; ++i) {
+    if (std::abs(axis[i]) > 0.4) {
+      const double sigma = std::sqrt(eigen.eigenvalues()[5]) * std::abs(axis[i]) * units[i];
+      text += (text.empty() ? "" : " together with ") + std::string(names[i]) + " (" +
+              (i < 3 ? toText(100.0 * sigma, 2) + " cm" : toText(kDegrees * sigma, 3) + " degrees") + ")";
+    }
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string describeFailure(const std::string& camera, const HandEye& initial, const RigCalibration& drive) {
+  const std::string who = "camera '" + camera + "'";
+  switch (initial.status) {
+    case HandEyeStatus::kTooFewMotions:
+      return who + ": too few images in which points could be followed (" +
+             std::to_string(initial.num_motions) + " motions of " + std::to_string(drive.num_keyframes) +
+             "): is it covered, dirty, or without light?";
+    case HandEyeStatus::kNoTurn:
+      return who + ": no turn: the drive turned " + toText(kDegrees * drive.left_turn_rad, 0) +
+             " degrees to the left and " + toText(kDegrees * drive.right_turn_rad, 0) +
+             " to the right; straight ahead shows neither where a camera is nor its roll. Drive a figure of "
+             "eight";
+    case HandEyeStatus::kNoAgreement:
+      return who + ": its motions contradict the odometer's (" + std::to_string(initial.num_inliers) +
+             " of " + std::to_string(initial.num_motions) +
+             " agree): check the intrinsics, the stamps, and the odometer's signs";
+    case HandEyeStatus::kOk:
+      break;
+  }
+  return who;
+}
+
+std::string findWrongSign(const CameraRig& rig) {
+  const std::pair<const char*, Eigen::Vector3d> expected[] = {{"front", Eigen::Vector3d::UnitX()},
+                                                              {"rear", -Eigen::Vector3d::UnitX()},
+                                                              {"left", Eigen::Vector3d::UnitY()},
+                                                              {"right", -Eigen::Vector3d::UnitY()}};
+  bool all_over = true;
+  int num_named = 0, num_round = 0;
+  for (const RigCamera& camera : rig.cameras) {
+    const Eigen::Matrix3d rotation = camera.vehicle_from_camera->rotationMatrix();
+    all_over = all_over && rotation(2, 1) > 0.0;
+    for (const auto& [name, direction] : expected) {
+      if (camera.name == name) {
+        ++num_named;
+        num_round += rotation.col(2).dot(direction) < -0.3 ? 1 : 0;
+      }
+    }
+  }
+  if (all_over) {
+    return "all cameras would hang upside down: the odometer's turns have the wrong sign";
+  }
+  if (num_named > 0 && num_round == num_named) {
+    return "all cameras would look the opposite way of their names: the odometer's direction of travel has "
+           "the "
+           "wrong sign";
+  }
+  return "";
+}
+
+void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, const MappingState& state,
+              RigCalibration* result) {
+  const MappingData& data = state.data;
+  result->rms_px = state.report.rms_px;
+  result->odometer_turn_scale = data.odometry_turn_scale;
+  for (const LoopEdge& edge : state.report.loop_edges) {
+    result->num_loop_edges += edge.accepted ? 1 : 0;
+  }
+  countObservations(data, result);
+  const auto num_ground = findGroundPoints(data, options.max_ground_distance_m).size();
+  result->height_source = "from " + std::to_string(num_ground) +
+                          " landmarks on the ground near the path, on which base_link stands in the mean";
+  if (result->is_from_map) {
+    result->height_source += ", and from the ground on which the map's vehicle stood";
+  }
+  auto rig = std::make_shared<CameraRig>(*data.rig);
+  const RigUncertainty uncertainty = rigUncertainty(options, priors, data);
+  const auto odd = calibrateHalf(options, priors, data, true);
+  const auto even = calibrateHalf(options, priors, data, false);
+  for (size_t i = 0; i < rig->cameras.size(); ++i) {
+    CameraCalibration& camera = result->cameras[i];
+    camera.half_difference =
+        difference(*odd->cameras[i].vehicle_from_camera, *even->cameras[i].vehicle_from_camera);
+    if (uncertainty.is_valid) {
+      const auto at = static_cast<Eigen::Index>(6 * i);
+      const Matrix6d schur = uncertainty.covariance.block<6, 6>(at, at);
+      const Vector6d ratio =
+          uncertainty.jackknife.block<6, 6>(at, at).diagonal().cwiseQuotient(schur.diagonal());
+      camera.inflation = ratio.cwiseMax(1.0).cwiseSqrt();
+      camera.covariance = camera.inflation.asDiagonal() * schur * camera.inflation.asDiagonal();
+      camera.covariance.diagonal() += commonVariances(options, rig->cameras[i]);
+      camera.weakest_direction = describeWeakest(camera.covariance);
+      rig->cameras[i].covariance = camera.covariance;
+    }
+  }
+  result->rig = rig;
+  findVerdict(result);
+  if (result->verdict == Verdict::kFail) {
+    result->rig.reset();
+  }
+}
+
+}  // namespace vcharge

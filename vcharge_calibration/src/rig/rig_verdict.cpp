@@ -1,0 +1,181 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "rig/rig_judgement.h"
+#include "vcharge_core/base/text_format.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kDegrees = 57.29577951308232;
+// Standard deviations with which a calibration is good, and with which it is of no use.
+constexpr double kGoodSigma_m = 0.01, kBadSigma_m = 0.05;
+constexpr double kGoodSigma_rad = 0.1 / kDegrees, kBadSigma_rad = 0.5 / kDegrees;
+// Between the halves of the drive.
+constexpr double kMaxHalfSigmas = 4.0;
+constexpr double kBadHalf_m = 0.10, kBadHalf_rad = 0.5 / kDegrees;
+// Share of the errors that neighbours have in common: lenses that are not as their parameters say.
+constexpr double kWarnStructure = 0.4, kFailStructure = 0.7;
+// Share of its points that fit, against the median of the other cameras.
+constexpr double kWarnFit = 0.75, kFailFit = 0.65;
+constexpr double kMinTurn_rad = 90.0 / kDegrees;
+constexpr double kMinDistance_m = 50.0;
+constexpr double kWarnOffset_s = 0.01, kFailOffset_s = 0.3;
+constexpr int64_t kMinShared = 20;
+
+class RigJudge {
+ public:
+  explicit RigJudge(RigCalibration* result) : result_(result) {}
+
+  void judge() {
+    judgeSigmas();
+    for (const CameraCalibration& camera : result_->cameras) {
+      judgeHalves(camera);
+      judgeErrors(camera);
+    }
+    judgeFit();
+    judgeDrive();
+    std::stable_sort(found_.begin(), found_.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+    result_->verdict = found_.empty() ? Verdict::kPass : found_.front().first;
+    for (auto& [grade, remark] : found_) {
+      result_->remarks.push_back(remark);
+    }
+  }
+
+ private:
+  void remark(Verdict grade, const std::string& text) { found_.emplace_back(grade, text); }
+
+  /// One remark per degree of freedom, of all cameras of which it is known too little.
+  void judgeSigmas() {
+    const char* const names[] = {"forwards", "sideways", "height", "roll", "pitch", "yaw"};
+    for (const CameraCalibration& camera : result_->cameras) {
+      if (!(camera.covariance.diagonal().minCoeff() > 0.0)) {
+        remark(Verdict::kFail, "camera '" + camera.name + "': its place cannot be told from this drive");
+        return;
+      }
+    }
+    for (int i = 0; i < 6; ++i) {
+      double worst = 0.0;
+      std::string who;
+      for (const CameraCalibration& camera : result_->cameras) {
+        const double sigma = std::sqrt(camera.covariance(i, i));
+        if (sigma > (i < 3 ? kGoodSigma_m : kGoodSigma_rad)) {
+          who += (who.empty() ? "'" : ", '") + camera.name + "'";
+          worst = std::max(worst, sigma);
+        }
+      }
+      if (!who.empty()) {
+        remark(worst > (i < 3 ? kBadSigma_m : kBadSigma_rad) ? Verdict::kFail : Verdict::kWarn,
+               who + ": " + names[i] + " is known to " + amount(i, worst) + " only: " +
+                   (i == 2 ? "they see too little ground, or share too little with the others"
+                           : "drive further, with tighter turns to both sides"));
+      }
+    }
+  }
+
+  void judgeHalves(const CameraCalibration& camera) {
+    for (int i = 0; i < 6; ++i) {
+      const double difference = std::abs(camera.half_difference[i]);
+      const double limit = i < 3 ? kGoodSigma_m : kGoodSigma_rad;
+      // Each half has twice the variance of the whole.
+      const double sigmas = difference / (2.0 * std::sqrt(std::max(1e-18, camera.covariance(i, i))));
+      if (difference > (i < 3 ? kBadHalf_m : kBadHalf_rad)) {
+        remark(Verdict::kFail,
+               "camera '" + camera.name + "': two halves of the drive differ by " + amount(i, difference));
+        return;
+      }
+      if (difference > limit && sigmas > kMaxHalfSigmas) {
+        remark(Verdict::kWarn, "camera '" + camera.name + "': two halves of the drive differ by " +
+                                   amount(i, difference) + ", " + toText(sigmas, 1) + " standard deviations");
+        return;
+      }
+    }
+  }
+
+  static std::string amount(int i, double value) {
+    return i < 3 ? toText(100.0 * value, 1) + " cm" : toText(kDegrees * value, 2) + " degrees";
+  }
+
+  void judgeErrors(const CameraCalibration& camera) {
+    const double share = camera.rms_px > 0.0 ? camera.structure_px / camera.rms_px : 0.0;
+    if (share > kWarnStructure) {
+      remark(share > kFailStructure ? Verdict::kFail : Verdict::kWarn,
+             "camera '" + camera.name + "': errors go together over the image (" + toText(100.0 * share, 0) +
+                 " % of them): its intrinsics are wrong. Calibrate the intrinsics anew");
+    }
+    // A map joins its cameras whatever they share.
+    if (camera.num_shared_landmarks < kMinShared && result_->cameras.size() > 1 && !result_->is_from_map) {
+      remark(Verdict::kWarn,
+             "camera '" + camera.name + "' shares only " + std::to_string(camera.num_shared_landmarks) +
+                 " landmarks with other cameras: pass the same places again, in both directions");
+    }
+  }
+
+  /// Wrong intrinsics bend the camera's place until what fits fits well: the rest was left out.
+  void judgeFit() {
+    const auto shareOf = [](const CameraCalibration& camera) {
+      return static_cast<double>(camera.num_observations) /
+             std::max(1.0, static_cast<double>(camera.num_tracked));
+    };
+    for (const CameraCalibration& camera : result_->cameras) {
+      std::vector<double> others;
+      for (const CameraCalibration& other : result_->cameras) {
+        if (&other != &camera) {
+          others.push_back(shareOf(other));
+        }
+      }
+      if (others.size() < 2) {
+        return;  // two cameras may differ by what they look at
+      }
+      std::sort(others.begin(), others.end());
+      const double usual = others[others.size() / 2];
+      const double share = shareOf(camera);
+      if (share < kWarnFit * usual) {
+        remark(
+            share < kFailFit * usual ? Verdict::kFail : Verdict::kWarn,
+            "camera '" + camera.name + "': of its points only " + toText(100.0 * share / usual, 0) +
+                " % as many fit as of the others': its intrinsics are wrong, or it moved during the drive");
+      }
+    }
+  }
+
+  void judgeDrive() {
+    const RigCalibration& drive = *result_;
+    for (const auto& [turn_rad, side] :
+         {std::make_pair(drive.left_turn_rad, "left"), std::make_pair(drive.right_turn_rad, "right")}) {
+      if (turn_rad < kMinTurn_rad) {
+        remark(Verdict::kWarn, std::string("the drive turned only ") + toText(kDegrees * turn_rad, 0) +
+                                   " degrees to the " + side +
+                                   ": turn to both sides, best a figure of eight");
+      }
+    }
+    if (drive.distance_m < kMinDistance_m && !drive.is_from_map) {
+      remark(Verdict::kWarn,
+             "the drive is only " + toText(drive.distance_m, 0) + " m long: drive 100 m or more");
+    }
+    if (drive.num_loop_edges == 0 && !drive.is_from_map) {
+      remark(Verdict::kWarn, "no place was passed twice: come back to where the drive began");
+    }
+    if (std::abs(drive.time_offset_s) > kWarnOffset_s) {
+      remark(std::abs(drive.time_offset_s) > kFailOffset_s ? Verdict::kFail : Verdict::kWarn,
+             "the odometer's stamps are " + toText(1000.0 * std::abs(drive.time_offset_s), 0) + " ms " +
+                 (drive.time_offset_s > 0.0 ? "late" : "early") +
+                 " against the images, which was corrected for here: correct the clocks, since every later "
+                 "stage "
+                 "believes the stamps");
+    }
+  }
+
+  RigCalibration* const result_;
+  std::vector<std::pair<Verdict, std::string>> found_;
+};
+
+}  // namespace
+
+void findVerdict(RigCalibration* result) {
+  RigJudge(result).judge();
+}
+
+}  // namespace vcharge

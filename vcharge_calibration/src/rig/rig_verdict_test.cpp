@@ -1,0 +1,114 @@
+#include <gtest/gtest.h>
+
+#include "intrinsics/test_camera.h"
+#include "rig/rig_judgement.h"
+
+namespace vcharge {
+namespace {
+
+/// A drive and three cameras without fault.
+RigCalibration makeGood() {
+  RigCalibration result;
+  result.distance_m = 150.0;
+  result.left_turn_rad = result.right_turn_rad = 6.0;
+  result.num_loop_edges = 50;
+  for (const char* name : {"front", "left", "rear"}) {
+    CameraCalibration camera;
+    camera.name = name;
+    camera.covariance.diagonal() << 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7;
+    camera.num_shared_landmarks = 500;
+    camera.num_tracked = camera.num_observations = 10000;
+    camera.rms_px = 0.5;
+    camera.structure_px = 0.03;
+    result.cameras.push_back(camera);
+  }
+  return result;
+}
+
+/// The verdict of a good calibration with one fault, and its first remark.
+template <class Spoil>
+std::string judge(const Spoil& spoil, Verdict* verdict) {
+  RigCalibration result = makeGood();
+  spoil(&result);
+  findVerdict(&result);
+  *verdict = result.verdict;
+  return result.remarks.empty() ? "" : result.remarks.front();
+}
+
+void expectRemark(const std::string& remark, const std::string& part) {
+  EXPECT_NE(remark.find(part), std::string::npos) << remark;
+}
+
+TEST(RigVerdictTest, PassesWhatIsGood) {
+  Verdict verdict = Verdict::kFail;
+  EXPECT_EQ(judge([](RigCalibration*) {}, &verdict), "");
+  EXPECT_EQ(verdict, Verdict::kPass);
+}
+
+TEST(RigVerdictTest, NamesWhatIsKnownTooLittle) {
+  Verdict verdict = Verdict::kPass;
+  expectRemark(judge([](RigCalibration* r) { r->cameras[1].covariance(2, 2) = 0.02 * 0.02; }, &verdict),
+               "'left': height is known to 2.0 cm only");
+  EXPECT_EQ(verdict, Verdict::kWarn);
+  judge([](RigCalibration* r) { r->cameras[1].covariance(2, 2) = 0.2 * 0.2; }, &verdict);
+  EXPECT_EQ(verdict, Verdict::kFail);
+  judge([](RigCalibration* r) { r->cameras[0].covariance.setZero(); }, &verdict);
+  EXPECT_EQ(verdict, Verdict::kFail);
+}
+
+TEST(RigVerdictTest, ComparesTheHalvesOfTheDrive) {
+  Verdict verdict = Verdict::kPass;
+  expectRemark(judge([](RigCalibration* r) { r->cameras[0].half_difference[1] = 0.05; }, &verdict),
+               "camera 'front': two halves of the drive differ by 5.0 cm");
+  EXPECT_EQ(verdict, Verdict::kWarn);
+  judge([](RigCalibration* r) { r->cameras[0].half_difference[1] = 0.3; }, &verdict);
+  EXPECT_EQ(verdict, Verdict::kFail);
+}
+
+TEST(RigVerdictTest, AsksForTheManoeuvreThatIsMissing) {
+  Verdict verdict = Verdict::kPass;
+  expectRemark(judge([](RigCalibration* r) { r->right_turn_rad = 0.5; }, &verdict), "degrees to the right");
+  EXPECT_EQ(verdict, Verdict::kWarn);
+  expectRemark(judge([](RigCalibration* r) { r->num_loop_edges = 0; }, &verdict),
+               "no place was passed twice");
+  expectRemark(judge([](RigCalibration* r) { r->distance_m = 20.0; }, &verdict), "drive 100 m or more");
+  expectRemark(judge([](RigCalibration* r) { r->cameras[0].num_shared_landmarks = 0; }, &verdict),
+               "camera 'front' shares only 0 landmarks");
+}
+
+TEST(RigVerdictTest, TellsLateStampsAndWrongLenses) {
+  Verdict verdict = Verdict::kPass;
+  expectRemark(judge([](RigCalibration* r) { r->time_offset_s = 0.1; }, &verdict), "100 ms late");
+  EXPECT_EQ(verdict, Verdict::kWarn) << "it is corrected for";
+  judge([](RigCalibration* r) { r->time_offset_s = -0.4; }, &verdict);
+  EXPECT_EQ(verdict, Verdict::kFail);
+  expectRemark(judge([](RigCalibration* r) { r->cameras[0].num_observations = 5000; }, &verdict),
+               "camera 'front': of its points only 50 % as many fit");
+  EXPECT_EQ(verdict, Verdict::kFail);
+  expectRemark(judge([](RigCalibration* r) { r->cameras[1].structure_px = 0.4; }, &verdict),
+               "camera 'left': errors go together over the image");
+  EXPECT_EQ(verdict, Verdict::kFail);
+}
+
+TEST(WrongSignTest, IsToldFromNamesAndFromWhatIsUp) {
+  const auto rigOf = [&](const RigidTransform& vehicle_from_wrong) {
+    KannalaBrandtCamera::Parameters parameters;
+    parameters << 200.0, 200.0, 319.5, 199.5, 0.0, 0.0, 0.0, 0.0;
+    CameraRig rig;
+    for (const auto& [name, yaw_rad] : {std::make_pair("front", 0.0), std::make_pair("left", 1.57)}) {
+      RigCamera camera{name, name, cv::Size(640, 400), KannalaBrandtCamera(parameters)};
+      camera.vehicle_from_camera =
+          vehicle_from_wrong * placeCamera(yaw_rad, 0.3, 0.0, Eigen::Vector3d::Zero());
+      rig.cameras.push_back(camera);
+    }
+    return rig;
+  };
+  EXPECT_EQ(findWrongSign(rigOf(RigidTransform())), "");
+  expectRemark(findWrongSign(rigOf(RigidTransform::planar(0.0, 0.0, 3.14159265))), "direction of travel");
+  expectRemark(findWrongSign(rigOf(
+                   RigidTransform(rotationFromVector({3.14159265, 0.0, 0.0}), Eigen::Vector3d::Zero()))),
+               "turns have the wrong sign");
+}
+
+}  // namespace
+}  // namespace vcharge

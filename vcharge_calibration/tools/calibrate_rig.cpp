@@ -1,0 +1,47 @@
+#include <memory>
+#include <string>
+
+#include "rig_tool.h"
+#include "vcharge_calibration/report/rig_calibration_files.h"
+#include "vcharge_calibration/rig/rig_calibrator.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/sparse_map/sparse_map_file.h"
+
+namespace {
+
+using namespace vcharge;
+
+void calibrate(const RigToolArguments& arguments, const std::string& map_file,
+               const RigCalibratorOptions& options, const std::string& option_text) {
+  const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
+  RigCalibrator calibrator(rig, options);
+  followDrive(arguments, rig, &calibrator);
+  const RigCalibration result = finishAndPrint(
+      arguments, calibrator.state(),
+      [&](const StageCallback& progress) { return calibrator.finish(progress); }, calibrator.images());
+  const auto provenance = provenanceOf(arguments, "calibrate_rig", option_text, result);
+  if (!map_file.empty()) {
+    writeSparseMap(*calibrator.map(), provenance, map_file);
+  }
+  writeRigAndTrajectory(arguments.output, arguments.trajectory, result, calibrator.state(), provenance);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Calibrates the places of a rig's cameras on the vehicle from a drive: images, /odom and the cameras' "
+      "intrinsics, without a guess, overlap or a board. Drive 100 m or more with turns to both sides and "
+      "come past the same places again, best a figure of eight. Prints every degree of freedom with its "
+      "standard deviation and a verdict: PASS, WARN with what is missing, or FAIL, which writes no file.");
+  RigToolArguments arguments;
+  addRigToolArguments(&app, &arguments);
+  std::string map_file;
+  app.add_option("--map", map_file, "sparse map to write (.vmap)")->check(requireNotEmpty);
+  return runTool(&app, argc, argv, [&] {
+    runWithOptions<RigCalibratorOptions>(
+        arguments, [&](const RigCalibratorOptions& options, const std::string& option_text) {
+          calibrate(arguments, map_file, options, option_text);
+        });
+  });
+}

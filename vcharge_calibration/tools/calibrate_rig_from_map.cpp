@@ -1,0 +1,52 @@
+#include <memory>
+#include <string>
+
+#include "rig_tool.h"
+#include "vcharge_calibration/from_map/map_rig_calibrator.h"
+#include "vcharge_calibration/report/rig_calibration_files.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/sparse_map/sparse_map_file.h"
+
+namespace {
+
+using namespace vcharge;
+
+void calibrate(const RigToolArguments& arguments, const std::string& map_file,
+               const MapRigCalibratorOptions& options, const std::string& option_text) {
+  const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
+  const std::shared_ptr<const SparseMap> map = readSparseMap(map_file);
+  MapRigCalibrator calibrator(map, *rig, options);
+  followDrive(arguments, rig, &calibrator);
+  const RigCalibration result = finishAndPrint(
+      arguments, calibrator.state(),
+      [&](const StageCallback& progress) { return calibrator.finish(progress); }, calibrator.images(),
+      [&] { return calibrator.reportSection(); });
+  auto provenance = provenanceOf(arguments, "calibrate_rig_from_map", option_text, result);
+  provenance["map"] = map_file;
+  provenance["map_hash"] = map->contentHash();
+  writeRigAndTrajectory(arguments.output, arguments.trajectory, result, calibrator.state(), provenance);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Calibrates the places of a rig's cameras on the vehicle from a drive in a finished map: images, "
+      "/odom, "
+      "the cameras' intrinsics, and the map, of whatever car. No guess, overlap, board or loop; some turns "
+      "to "
+      "both sides. The map is the measure of all lengths. Prints every degree of freedom with its standard "
+      "deviation and a verdict: PASS, WARN with what is missing, or FAIL, which writes no file.");
+  RigToolArguments arguments;
+  addRigToolArguments(&app, &arguments);
+  std::string map_file;
+  app.add_option("--map", map_file, "map of build_map or calibrate_rig (.vmap)")
+      ->required()
+      ->check(requireNotEmpty);
+  return runTool(&app, argc, argv, [&] {
+    runWithOptions<MapRigCalibratorOptions>(
+        arguments, [&](const MapRigCalibratorOptions& options, const std::string& option_text) {
+          calibrate(arguments, map_file, options, option_text);
+        });
+  });
+}

@@ -1,0 +1,64 @@
+#include <cstdio>
+#include <string>
+
+#include "vcharge_calibration/intrinsics/intrinsics_files.h"
+#include "vcharge_core/base/command_line.h"
+#include "vcharge_core/base/error.h"
+
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+struct Arguments {
+  std::string input, output, camera, model;
+  std::string format = "rig";
+  double field_of_view_rad = kPi;
+};
+
+void convert(const Arguments& arguments) {
+  const vcharge::IntrinsicsFormat format = vcharge::intrinsicsFormat(arguments.format);
+  vcharge::CameraRig rig = vcharge::readIntrinsics(arguments.input, arguments.field_of_view_rad);
+  if (!arguments.camera.empty()) {
+    const vcharge::RigCamera chosen = rig.cameras[rig.cameraIndex(arguments.camera)];
+    rig.cameras = {chosen};
+  }
+  for (vcharge::RigCamera& camera : rig.cameras) {
+    if (arguments.model.empty() || arguments.model == camera.model.name()) {
+      continue;
+    }
+    const vcharge::ConvertedCamera converted =
+        vcharge::convertCamera(camera.model, camera.image_size_px, camera.field_of_view_rad, arguments.model);
+    std::printf("%s: %s -> %s: %.4f px RMS, at most %.4f px, over %.1f %% of the field of view\n",
+                camera.name.c_str(), camera.model.name().c_str(), arguments.model.c_str(), converted.rms_px,
+                converted.max_px, 100.0 * converted.covered_share);
+    camera.model = converted.model;
+  }
+  vcharge::writeIntrinsics(rig, format, arguments.output);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Converts intrinsics between rig.yaml, Kalibr's camchain and CamOdoCal's files, and between camera "
+      "models, "
+      "whose difference in pixels it prints. The input's format is seen from its content.");
+  Arguments arguments;
+  app.add_option("--input", arguments.input, "rig.yaml, camchain.yaml or CamOdoCal's camera.yaml")
+      ->required();
+  app.add_option("--format", arguments.format, "of the output: rig, kalibr or camodocal")
+      ->capture_default_str();
+  app.add_option("--model", arguments.model, "mei, kannala_brandt or pinhole; default: as it is");
+  app.add_option("--camera", arguments.camera, "only this camera; default: all");
+  app.add_option("--field-of-view-rad", arguments.field_of_view_rad,
+                 "full angle, for files that have none (Kalibr, CamOdoCal)")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 2.0 * kPi));
+  app.add_option("--output", arguments.output, "file to write")->required()->check(vcharge::requireNotEmpty);
+  return vcharge::runTool(&app, argc, argv, [&] {
+    if (!arguments.model.empty()) {
+      vcharge::CameraModel::parameterNames(arguments.model);
+    }
+    convert(arguments);
+  });
+}

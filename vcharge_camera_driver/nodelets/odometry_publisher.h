@@ -1,0 +1,38 @@
+#pragma once
+
+#include <mutex>
+#include <string>
+
+#include <ros/node_handle.h>
+#include <tf2_ros/transform_broadcaster.h>
+
+#include "vcharge_ros/drive_monitor.h"
+#include "vcharge_wheel_odometry/wheel_odometry.h"
+
+namespace vcharge {
+
+/// Makes odometry of wheel ticks and publishes it as /odom and odom -> base_link, in order of stamps and with
+/// an estimate at each trigger. Thread safe.
+class OdometryPublisher {
+ public:
+  OdometryPublisher(ros::NodeHandle* node, const WheelOdometryOptions& options, double frame_rate_hz,
+                    const std::string& topic, std::string vehicle_frame);
+
+  void add(const WheelTicks& ticks);
+  void trigger(Timestamp stamp);
+  DriveMonitor::Report report();
+
+ private:
+  void publish(const std::vector<OdometryEstimate>& estimates);
+
+  const std::string vehicle_frame_;
+  ros::Publisher publisher_;
+  tf2_ros::TransformBroadcaster broadcaster_;
+  std::mutex mutex_;
+  WheelOdometry odometry_;
+  OdometryStream stream_;
+  uint64_t reported_ticks_ = 0;
+  uint64_t reported_slips_ = 0;
+};
+
+}  // namespace vcharge

@@ -1,0 +1,57 @@
+#include "kernels/packed_image.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "kernels/parallel_rows.h"
+#include "kernels/pooled_mat.h"
+#include "kernels/sweep_kernels.h"
+#include "vcharge_core/base/error.h"
+
+namespace vcharge {
+namespace {
+
+constexpr int kCellsPerLine = 16;  // of a cache line
+
+/// Cells of a row: an odd number of cache lines, for rows a power of two apart would share few places of the
+/// caches.
+int pitchOf(int width) {
+  const int lines = (width + kCellsPerLine - 1) / kCellsPerLine;
+  return kCellsPerLine * (lines | 1);
+}
+
+inline uint32_t signedByte(uint8_t gray) {
+  return static_cast<uint32_t>(std::max<uint8_t>(gray, 1)) ^ 0x80u;
+}
+
+}  // namespace
+
+PackedImage::PackedImage(const cv::Mat& pixels, const cv::Mat& valid_mask)
+    : size_(pixels.cols + 2 * kMargin, pixels.rows + 2 * kMargin), pitch_(pitchOf(size_.width)) {
+  check(std::max(pitch_, size_.height) <= std::numeric_limits<int16_t>::max(),
+        "PackedImage: an image may have at most 32,000 pixels a side");
+  const auto pitch = static_cast<size_t>(pitch_);
+  cells_ = pooledMat({pitch_, size_.height}, CV_32SC1);
+  forEachRow(size_.height, [&](int row) {
+    auto* cells = cells_.ptr<int32_t>(row);
+    std::fill_n(cells, pitch, kUnseenCell);
+    const int y = row - kMargin;
+    if (y < 0 || y + 1 >= pixels.rows) {
+      return;
+    }
+    const auto* top = pixels.ptr<uint8_t>(y);
+    const auto* bottom = pixels.ptr<uint8_t>(y + 1);
+    const auto* top_valid = valid_mask.ptr<uint8_t>(y);
+    const auto* bottom_valid = valid_mask.ptr<uint8_t>(y + 1);
+    cells += kMargin;
+    for (int x = 0; x + 1 < pixels.cols; ++x) {
+      const bool seen =
+          (top_valid[x] != 0) & (bottom_valid[x] != 0) & (top_valid[x + 1] != 0) & (bottom_valid[x + 1] != 0);
+      const uint32_t cell = signedByte(top[x]) | signedByte(bottom[x]) << 8 | signedByte(top[x + 1]) << 16 |
+                            signedByte(bottom[x + 1]) << 24;
+      cells[x] = seen ? static_cast<int32_t>(cell) : kUnseenCell;
+    }
+  });
+}
+
+}  // namespace vcharge

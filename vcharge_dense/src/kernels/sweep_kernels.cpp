@@ -1,0 +1,54 @@
+#include "kernels/sweep_kernels.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "kernels/sweep_kernels_internal.h"
+
+namespace vcharge {
+namespace {
+
+// A window whose gray levels have a smaller sum of squares about their mean counts as constant.
+constexpr float kMinSquares_gray2 = 1e-3f;
+constexpr int kLargestGray = 127;  // in magnitude, less 128
+
+}  // namespace
+
+SampleScale SampleScale::forWindow(int window_px) {
+  const double count = window_px * window_px;
+  const double full = kLargestGray * kWeightSum * kWeightSum;
+  SampleScale scale;
+  // n samples of at most m, one of which may be `unseen`: its square exceeds all of theirs, n m^2, and n of
+  // its squares fit into 32 bits.
+  const double unseen = std::floor(std::sqrt(4294967295.0 / count));
+  const auto largest = [&] { return full / (1 << scale.shift) + 1.0; };
+  const auto squaresOf = [&] { return count * largest() * largest(); };
+  // The least that an unseen sample adds to the squares about the mean.
+  const auto leastWithUnseen = [&] {
+    return (count - 1.0) / count * (unseen - largest()) * (unseen - largest());
+  };
+  scale.shift = 8;
+  while (unseen <= largest() || leastWithUnseen() <= 1.01 * squaresOf()) {
+    ++scale.shift;
+  }
+  scale.unseen = static_cast<int32_t>(unseen);
+  scale.max_squares = static_cast<float>(1.005 * squaresOf());
+  const auto per_gray = static_cast<float>(kWeightSum * kWeightSum) / static_cast<float>(1 << scale.shift);
+  scale.min_squares = kMinSquares_gray2 * per_gray * per_gray;
+  return scale;
+}
+
+int32_t SampleScale::sample(int gray) const {
+  return ((std::max(gray, 1) - 128) * kWeightSum * kWeightSum + (1 << (shift - 1))) >> shift;
+}
+
+SweepKernels sweepKernels() {
+  SweepKernels kernels{};
+  addWarpKernels(&kernels);
+  addCorrelationKernels(&kernels);
+  addVoteKernels(&kernels);
+  addUncertaintyKernels(&kernels);
+  return kernels;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,13 @@
+#pragma once
+
+#include "kernels/sweep_kernels.h"
+
+namespace vcharge {
+
+// Each fills in the kernels of its file.
+void addWarpKernels(SweepKernels* kernels);
+void addCorrelationKernels(SweepKernels* kernels);
+void addVoteKernels(SweepKernels* kernels);
+void addUncertaintyKernels(SweepKernels* kernels);
+
+}  // namespace vcharge

@@ -1,0 +1,251 @@
+// The parts of the sweep's inner loops, against formulas, on every instruction set of the machine.
+#include "kernels/sweep_kernels.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "kernels/packed_image.h"
+#include "reference/plane_sweep_test_support.h"
+#include "sweep/node_grid.h"
+#include "sweep/tile_layout.h"
+
+namespace vcharge {
+namespace {
+
+using testing::allValid;
+using testing::kCamera;
+using testing::kFront;
+using testing::kLeft;
+using testing::kSize;
+using testing::lotScene;
+using testing::makeSequence;
+using testing::onEveryTarget;
+using testing::Sequence;
+
+/// Of the grid's cells at a pixel of the tile, in pixels of the packed image.
+Eigen::Vector2d positionFromCells(const NodeGrid& grid, const AlignedArray<float>& cells,
+                                  const TileLayout& layout, int row, int column) {
+  const auto lanes = static_cast<size_t>(layout.lanes);
+  const int in_strip = column % layout.strip;
+  const size_t cell = static_cast<size_t>(in_strip >> grid.cellShift());
+  const float* at = cells.data() + grid.cellOffset(row) + cell * kCellCoefficients * lanes +
+                    static_cast<size_t>(column / layout.strip);
+  const double r = grid.rowInCell(row);
+  const double s = in_strip & ((1 << grid.cellShift()) - 1);
+  Eigen::Vector2d position;
+  for (size_t coordinate = 0; coordinate < 2; ++coordinate) {
+    double values[3];
+    for (size_t i = 0; i < 3; ++i) {
+      const float* c = at + (9 * coordinate + 3 * i) * lanes;
+      values[i] = c[0] + r * (c[lanes] + r * static_cast<double>(c[2 * lanes]));
+    }
+    position[static_cast<int>(coordinate)] =
+        (values[0] + s * values[1] + 0.5 * s * (s - 1.0) * values[2]) / (1 << kPositionBits);
+  }
+  return position;
+}
+
+TEST(NodeGridTest, InterpolatedWarpErrsNoMoreThanItSays) {
+  const PlaneSweepOptions options;
+  int judged = 0, within_tolerance = 0, all = 0;
+  for (const RigidTransform& camera_pose : {kLeft, kFront}) {
+    const Plane ground = groundInCamera(camera_pose);
+    for (const PlaneFamily& family : makePlaneFamilies(options, ground)) {
+      for (const double baseline_m : {0.1, 0.4, 0.8}) {
+        // The neighbour also turns, by half a degree per 0.1 m.
+        const RigidTransform neighbour(
+            camera_pose.rotation() * rotationFromVector(Eigen::Vector3d(0.02, -0.06, 0.03) * baseline_m),
+            camera_pose.translation() - Eigen::Vector3d(baseline_m, 0.0, 0.0));
+        const RigidTransform neighbour_from_reference = neighbour.inverse() * camera_pose;
+        const Eigen::Matrix3d rotation = neighbour_from_reference.rotationMatrix();
+        const Eigen::Vector3d& translation = neighbour_from_reference.translation();
+        Projection projection{224.0f, 223.5f, 194.0f, 131.5f, 1.158f, 4.0f, 4.0f, 379.0f, 259.0f, {}, {}};
+        for (int i = 0; i < 9; ++i) {
+          projection.rotation[i] = static_cast<float>(rotation(i / 3, i % 3));
+        }
+        for (int i = 0; i < 3; ++i) {
+          projection.translation[i] = static_cast<float>(translation[i]);
+        }
+        const SweepKernels kernels = sweepKernels();
+        const TileLayout layout{kernels.lanes, (kSize.width + kernels.lanes - 1) / kernels.lanes, 70};
+        const cv::Point origin(0, 60);
+        for (const int spacing : {8, 4}) {
+          NodeGrid grid(kCamera, allValid(), origin, layout, spacing);
+          grid.setNormal(family.normal.cast<float>());
+          for (size_t k = 0; k < family.inverse_distances_per_m.size(); k += 7) {
+            const double inverse_distance = family.inverse_distances_per_m[k];
+            AlignedArray<float> cells;
+            const float bound_px =
+                grid.makeCells(kernels, projection, family.inverse_distances_per_m[k], &cells);
+            ++all;
+            within_tolerance += bound_px <= options.warp_tolerance_px ? 1 : 0;
+            if (!(bound_px <= 0.25f)) {
+              continue;  // a finer grid or the exact projection would be used
+            }
+            double largest = 0.0;
+            for (int row = 0; row < layout.rows; row += 3) {
+              for (int column = 0; column < kSize.width; ++column) {
+                const Eigen::Vector2d position = positionFromCells(grid, cells, layout, row, column);
+                Eigen::Vector3d ray;
+                Eigen::Vector2d pixel;
+                if (position.isZero() || !kCamera.unproject({column, origin.y + row}, &ray)) {
+                  continue;  // unseen
+                }
+                const double inverse_range = -family.normal.dot(ray) * inverse_distance;
+                ASSERT_TRUE(kCamera.project(rotation * ray + inverse_range * translation, &pixel));
+                const Eigen::Vector2d exact = pixel + Eigen::Vector2d(32.0, 32.0);
+                largest = std::max(largest, (position - exact).cwiseAbs().maxCoeff());
+                ++judged;
+              }
+            }
+            EXPECT_LE(largest, 1.2 * bound_px + 0.002)
+                << "baseline " << baseline_m << ", plane " << k << ", spacing " << spacing;
+          }
+        }
+      }
+    }
+  }
+  EXPECT_GT(judged, 1000000);
+  EXPECT_GT(within_tolerance, 0.8 * all);
+}
+
+TEST(SampleScaleTest, OneUnseenSampleSpoilsAnyWindow) {
+  for (int window = 3; window <= 31; window += 2) {
+    const SampleScale scale = SampleScale::forWindow(window);
+    const int64_t count = window * window;
+    const int64_t low = scale.sample(0), high = scale.sample(255);
+    EXPECT_LE(static_cast<double>(count) * 0.25 * static_cast<double>((high - low) * (high - low)),
+              scale.max_squares)
+        << "any window of gray levels counts";
+    for (const int64_t gray : {low, high}) {
+      for (int64_t unseen = 1; unseen <= count; ++unseen) {
+        // In 32 bits, as the kernels add up.
+        const int64_t sum = unseen * scale.unseen + (count - unseen) * gray;
+        const int64_t exact = unseen * scale.unseen * scale.unseen + (count - unseen) * gray * gray;
+        const auto squares = static_cast<float>(static_cast<int32_t>(static_cast<uint32_t>(exact)));
+        const float about_mean =
+            squares - static_cast<float>(sum) / static_cast<float>(count) * static_cast<float>(sum);
+        EXPECT_FALSE(about_mean > scale.min_squares && about_mean < scale.max_squares)
+            << "window " << window << ", " << unseen << " unseen";
+      }
+    }
+  }
+}
+
+/// Expects the first sweep's scores on all instruction sets within a tolerance of each other.
+void expectAgreement(const PlaneSweepOptions& options, float tolerance) {
+  const Sequence s = makeSequence(lotScene(4), kLeft, 0.15, -4, 0, 1.0);
+  cv::Mat mask = allValid();
+  mask(cv::Rect(100, 150, 60, 50)).setTo(0);
+  SweepDetails first;
+  onEveryTarget([&] {
+    SweepDetails details;
+    PlaneSweep(kCamera, mask, options, s.ground).sweep(s.reference, s.neighbours, &details);
+    if (first.plane.empty()) {
+      first = details;
+      return;
+    }
+    const cv::Mat known = details.score == details.score;
+    EXPECT_EQ(cv::countNonZero(known != (first.score == first.score)), 0);
+    cv::Mat difference = cv::abs(details.score - first.score);
+    difference.setTo(0.0f, ~known);
+    EXPECT_LE(cv::countNonZero(difference > tolerance), 0.001 * kSize.area());
+    EXPECT_GE(cv::countNonZero(details.plane == first.plane), 0.998 * kSize.area());  // two may score alike
+    const cv::Mat other_voters = (details.voters != first.voters) & (details.plane == first.plane);
+    EXPECT_LE(cv::countNonZero(other_voters), 0.001 * kSize.area());
+  });
+}
+
+TEST(SweepKernelsTest, AllInstructionSetsAgree) {
+  PlaneSweepOptions options;
+  options.num_planes = 16;
+  options.num_ground_planes = 8;
+  options.num_refinement_steps = 0;  // it would start elsewhere where two planes score alike
+  for (const Aggregation aggregation :
+       {Aggregation::kMean, Aggregation::kReferenceSplit, Aggregation::kBestK}) {
+    options.aggregation = aggregation;
+    expectAgreement(options, 0.002f);  // vectors of another length have their nodes elsewhere
+  }
+  // With every pixel projected, sums are integers; reciprocal roots and roundings differ by 1e-4.
+  options.warp_tolerance_px = 0.0;
+  expectAgreement(options, 0.0002f);
+}
+
+TEST(SweepKernelsTest, LargestMotionIsTheProjectionsDerivative) {
+  const RigidTransform slow(rotationFromVector({0.01, -0.02, 0.01}), {0.1, 0.02, 0.05});
+  const RigidTransform fast(rotationFromVector({0.0, 0.03, 0.0}), {-0.4, 0.0, 0.1});
+  const std::vector<RigidTransform> poses = {slow, fast};
+  std::vector<NeighbourUncertainty> neighbours(2);
+  for (size_t n = 0; n < 2; ++n) {
+    Projection& p = neighbours[n].projection;
+    p = {224.0f, 223.5f, 162.0f, 99.5f, 1.158f, 0.0f, 0.0f, 319.0f, 199.0f, {}, {}};
+    for (int i = 0; i < 9; ++i) {
+      p.rotation[i] = static_cast<float>(poses[n].rotationMatrix()(i / 3, i % 3));
+    }
+    for (int i = 0; i < 3; ++i) {
+      p.translation[i] = static_cast<float>(poses[n].translation()[i]);
+    }
+  }
+  constexpr size_t kCount = 21;  // no multiple of any vector
+  std::vector<float> x(kCount), y(kCount), z(kCount), inverse_range(kCount), expected(kCount);
+  for (size_t i = 0; i < kCount; ++i) {
+    Eigen::Vector3d ray;
+    ASSERT_TRUE(kCamera.unproject({10.0 + 14.0 * static_cast<double>(i), 60.0}, &ray));
+    ray.normalize();
+    x[i] = static_cast<float>(ray.x());
+    y[i] = static_cast<float>(ray.y());
+    z[i] = static_cast<float>(ray.z());
+    const double here = 0.05 + 0.03 * static_cast<double>(i);
+    inverse_range[i] = static_cast<float>(here);
+    for (const RigidTransform& pose : poses) {
+      Eigen::Vector2d before, after;
+      ASSERT_TRUE(kCamera.project(pose.rotation() * ray + (here - 1e-5) * pose.translation(), &before));
+      ASSERT_TRUE(kCamera.project(pose.rotation() * ray + (here + 1e-5) * pose.translation(), &after));
+      expected[i] = std::max(expected[i], static_cast<float>((after - before).norm() / 2e-5));
+    }
+  }
+  onEveryTarget([&] {
+    std::vector<float> motion(kCount);
+    UncertaintyRow row;
+    row.count = kCount;
+    row.ray_x = x.data();
+    row.ray_y = y.data();
+    row.ray_z = z.data();
+    row.inverse_range = inverse_range.data();
+    row.neighbours = neighbours.data();
+    row.num_neighbours = 2;
+    sweepKernels().largestMotion(row, motion.data());
+    for (size_t i = 0; i < kCount; ++i) {
+      EXPECT_NEAR(motion[i], expected[i], 1e-3f * expected[i]) << i;
+    }
+  });
+}
+
+TEST(SweepKernelsTest, SumsOnlyNeighboursThatAgree) {
+  constexpr size_t kCount = 21, kMargin = 2;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  std::vector<float> values(kCount + 2 * kMargin, nan), middle(kCount), tolerance(kCount, 1.0f);
+  for (size_t i = 0; i < kCount; ++i) {
+    values[kMargin + i] = i < 10 ? 1.0f : 5.0f;
+  }
+  std::copy(values.begin() + kMargin, values.end() - kMargin, middle.begin());
+  const float* rows[] = {values.data() + kMargin};
+  onEveryTarget([&] {
+    std::vector<float> number(kCount), sum(kCount);
+    sweepKernels().sumAgreeing({kCount, rows, 1, 2, 1, middle.data(), tolerance.data()}, number.data(),
+                               sum.data());
+    EXPECT_EQ(number[0], 3.0f) << "a margin of NaN does not agree";
+    EXPECT_EQ(number[5], 5.0f);
+    EXPECT_EQ(number[9], 3.0f) << "beside the step";
+    EXPECT_EQ(sum[9], 3.0f);
+    EXPECT_EQ(sum[10], 15.0f);
+    EXPECT_EQ(sum[kCount - 1], 15.0f);
+  });
+}
+
+}  // namespace
+}  // namespace vcharge

@@ -1,0 +1,144 @@
+#include "sweep/coarse_pass.h"
+
+#include <algorithm>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+
+#include "kernels/half_resolution.h"
+
+namespace vcharge {
+namespace {
+
+// Chosen on two simulated drives other than those that the README judges by. Sizes are of the coarse image.
+// A pixel is sure where its score is high and leads the second peak.
+constexpr float kSureScore = 0.6f, kSureLead = 0.1f;
+constexpr double kMinSureShare = 0.3;  // of a tile's pixels with texture; less: all planes
+constexpr int kMinSure = 16, kReach_px = 2;
+constexpr int kMinCount = 8;      // sure pixels that name a plane
+constexpr int kMarginPlanes = 1;  // swept beyond the named planes
+
+/// Slots of the planes that are named often enough, widened by the margin; a gap where some are left out.
+std::vector<int> slotsOf(const std::vector<int>& counts) {
+  const int num_planes = static_cast<int>(counts.size());
+  std::vector<int> slots;
+  for (int plane = 0; plane < num_planes; ++plane) {
+    int named = 0;
+    for (int i = std::max(0, plane - kMarginPlanes); i <= std::min(num_planes - 1, plane + kMarginPlanes);
+         ++i) {
+      named = std::max(named, counts[static_cast<size_t>(i)]);
+    }
+    if (named >= kMinCount) {
+      slots.push_back(plane);
+    } else if (slots.empty() || slots.back() != kGap) {
+      slots.push_back(kGap);
+    }
+  }
+  return slots;
+}
+
+/// Index, with its fraction, of a value among the offsets of a family; beyond their ends it goes on.
+float placeOf(float value, const Hypotheses& family) {
+  const std::vector<float>& offsets = family.offsets;
+  if (family.are_uniform || !(value == value)) {  // NaN differs from itself
+    return (value - offsets.front()) * (1.0f / (offsets[1] - offsets[0]));
+  }
+  const auto after = std::upper_bound(offsets.begin() + 1, offsets.end() - 1, value);
+  const float before = *(after - 1);
+  return static_cast<float>(after - 1 - offsets.begin()) + (value - before) / (*after - before);
+}
+
+bool hasGaps(const TilePlanes& planes) {
+  return std::any_of(planes.begin(), planes.end(), [](const std::vector<int>& slots) {
+    return std::find(slots.begin(), slots.end(), kGap) != slots.end();
+  });
+}
+
+}  // namespace
+
+CoarsePass::CoarsePass(std::shared_ptr<const SweepLevel> fine, const std::optional<Plane>& ground_in_camera)
+    : fine_(std::move(fine)) {
+  PlaneSweepOptions options = fine_->options();
+  options.num_planes = std::max(3, (options.num_planes + 1) / 2);
+  options.num_ground_planes = std::max(3, (options.num_ground_planes + 1) / 2);
+  options.semi_global_smoothing = false;
+  level_ = halfLevel(*fine_, options, ground_in_camera);
+}
+
+SurfaceEstimate CoarsePass::sweep(const SweepInput& half_input) const {
+  const std::vector<cv::Rect> tiles =
+      makeTiles(level_->validMask().size(), level_->options().window_px, TileSize::kLarge);
+  return level_->sweepPlanes(half_input, tiles, {});
+}
+
+TilePlanes CoarsePass::choosePlanes(const SurfaceEstimate& coarse, const cv::Rect& tile) const {
+  const std::vector<Hypotheses>& planes = fine_->planes();
+  std::vector<std::vector<int>> counts;
+  for (const Hypotheses& family : planes) {
+    counts.emplace_back(family.offsets.size(), 0);
+  }
+  std::vector<int> sure;  // columns of a row
+  const cv::Rect around(tile.x / 2 - kReach_px, tile.y / 2 - kReach_px, tile.width / 2 + 2 * kReach_px,
+                        tile.height / 2 + 2 * kReach_px);
+  const cv::Rect region = around & cv::Rect(cv::Point(), coarse.score.size());
+  int num_textured = 0, num_sure = 0;
+  for (int y = region.y; y < region.br().y; ++y) {
+    const auto* plane = coarse.plane.ptr<int>(y);
+    const auto* score = coarse.score.ptr<float>(y);
+    const auto* second_score = coarse.second_score.ptr<float>(y);
+    const auto* inverse_range = coarse.inverse_range.ptr<float>(y);
+    sure.clear();
+    for (int x = region.x; x < region.br().x; ++x) {
+      num_textured += plane[x] >= 0 ? 1 : 0;
+      if (plane[x] >= 0 && score[x] >= kSureScore && score[x] - second_score[x] >= kSureLead) {
+        sure.push_back(x);
+      }
+    }
+    num_sure += static_cast<int>(sure.size());
+    for (size_t f = 0; f < planes.size(); ++f) {
+      const auto* weight = planes[f].weight.ptr<float>(2 * y);
+      const auto end = static_cast<float>(planes[f].offsets.size());
+      for (const int x : sure) {
+        const float index = placeOf(inverse_range[x] / weight[2 * x], planes[f]) + 0.5f;
+        if (index > 0.0f && index < end) {  // false for NaN
+          ++counts[f][static_cast<size_t>(index)];
+        }
+      }
+    }
+  }
+  TilePlanes result;
+  const bool is_sure = num_sure >= kMinSure && num_sure >= kMinSureShare * num_textured;
+  for (std::vector<int>& count : counts) {
+    if (!is_sure) {
+      std::fill(count.begin(), count.end(), kMinCount);
+    }
+    result.push_back(slotsOf(count));
+  }
+  return result;
+}
+
+std::vector<TilePlanes> CoarsePass::choosePlanes(const SurfaceEstimate& coarse,
+                                                 const std::vector<cv::Rect>& tiles) const {
+  std::vector<TilePlanes> choice(tiles.size());
+  tbb::parallel_for(size_t{0}, tiles.size(), [&](size_t i) { choice[i] = choosePlanes(coarse, tiles[i]); });
+  return choice;
+}
+
+void CoarsePass::addSecondPeaks(const SurfaceEstimate& coarse, const std::vector<cv::Rect>& tiles,
+                                const std::vector<TilePlanes>& choice, SurfaceEstimate* estimate) const {
+  const cv::Size size = coarse.score.size();
+  tbb::parallel_for(size_t{0}, tiles.size(), [&](size_t i) {
+    if (!hasGaps(choice[i])) {
+      return;
+    }
+    for (int y = tiles[i].y; y < tiles[i].br().y; ++y) {
+      const auto* from = coarse.second_score.ptr<float>(std::min(y / 2, size.height - 1));
+      auto* to = estimate->second_score.ptr<float>(y);
+      for (int x = tiles[i].x; x < tiles[i].br().x; ++x) {
+        to[x] = std::max(to[x], from[std::min(x / 2, size.width - 1)]);
+      }
+    }
+  });
+}
+
+}  // namespace vcharge

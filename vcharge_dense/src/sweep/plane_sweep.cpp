@@ -1,0 +1,171 @@
+#include "vcharge_dense/plane_sweep.h"
+
+#include <cmath>
+#include <utility>
+
+#include <tbb/parallel_for.h>
+
+#include "kernels/half_resolution.h"
+#include "range_mapping/pose_refinement.h"
+#include "refinement/range_uncertainty.h"
+#include "sweep/coarse_pass.h"
+#include "sweep/far_planes.h"
+#include "sweep/sweep_level.h"
+#include "sweep/tile_scorer.h"
+#include "vcharge_core/base/error.h"
+
+namespace vcharge {
+namespace {
+
+constexpr int kMinWidth_px = 16;  // the most lanes that a vector has
+
+void checkImage(const SweepImage& image, cv::Size size) {
+  check(image.pixels.type() == CV_8UC1 && image.pixels.size() == size,
+        "PlaneSweep: images must be CV_8UC1 of the working camera's size");
+}
+
+/// Packs the neighbours' images and finds their relative poses.
+void addNeighbours(const SweepLevel& level, const SweepImage& reference,
+                   const std::vector<SweepImage>& neighbours, SweepInput* input) {
+  std::optional<PoseRefinement> poses;
+  if (level.options().refine_poses) {
+    poses.emplace(level.camera(), reference.pixels, level.validMask(), level.options().pose_noise);
+  }
+  std::vector<std::optional<SweepNeighbour>> prepared(neighbours.size());
+  tbb::parallel_for(size_t{0}, neighbours.size(), [&](size_t n) {
+    const SweepImage& image = neighbours[n];
+    PoseRefinement::Result pose;
+    pose.neighbour_from_reference = image.world_from_camera.inverse() * reference.world_from_camera;
+    if (poses) {
+      pose = poses->refine(image.pixels, pose.neighbour_from_reference);
+    }
+    prepared[n].emplace(SweepNeighbour{
+        PackedImage(image.pixels, level.validMask()),
+        pose.neighbour_from_reference.rotationMatrix().cast<float>(),
+        pose.neighbour_from_reference.translation().cast<float>(), image.stamp > reference.stamp,
+        static_cast<float>(pose.rotation_variance_left), static_cast<float>(pose.translation_variance_left)});
+  });
+  for (std::optional<SweepNeighbour>& neighbour : prepared) {
+    input->neighbours.push_back(std::move(*neighbour));
+  }
+}
+
+/// Gives unknown pixels what the map of half the size has there.
+void fillUnknown(const RangeMap& half, RangeMap* map) {
+  for (int y = 0; y < half.range_m.rows * 2; ++y) {
+    for (int x = 0; x < half.range_m.cols * 2; ++x) {
+      if (std::isnan(map->range_m.at<float>(y, x))) {
+        map->range_m.at<float>(y, x) = half.range_m.at<float>(y / 2, x / 2);
+        map->standard_deviation_m.at<float>(y, x) = half.standard_deviation_m.at<float>(y / 2, x / 2);
+        map->confidence.at<float>(y, x) = half.confidence.at<float>(y / 2, x / 2);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+PlaneSweep::PlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask, const PlaneSweepOptions& options,
+                       const std::optional<Plane>& ground_in_camera) {
+  options.validate();
+  const MeiCamera::Parameters p = camera.parameters();
+  check(p.tail<4>().isZero(0.0), "PlaneSweep: the working camera must not have distortion");
+  check(valid_mask.cols >= kMinWidth_px, "PlaneSweep: images must be at least 16 pixels wide");
+  level_ = std::make_shared<SweepLevel>(camera, valid_mask, options, ground_in_camera);
+  if (options.coarse_pass && canBeHalved(valid_mask.size())) {
+    coarse_ = std::make_shared<CoarsePass>(level_, ground_in_camera);
+  }
+  if (options.half_resolution_beyond_m > 0.0 && canBeHalved(valid_mask.size())) {
+    far_ = std::make_shared<FarPlanes>(level_, ground_in_camera);
+  }
+  if (options.num_fill_levels > 0 && canBeHalved(valid_mask.size())) {
+    PlaneSweepOptions half_options = options;
+    --half_options.num_fill_levels;
+    half_ =
+        std::make_shared<PlaneSweep>(halved(camera), halvedMask(valid_mask), half_options, ground_in_camera);
+  }
+}
+
+const PlaneSweepOptions& PlaneSweep::options() const {
+  return level_->options();
+}
+
+const std::vector<PlaneFamily>& PlaneSweep::families() const {
+  return level_->families();
+}
+
+SurfaceEstimate PlaneSweep::sweepPlanes(const SweepInput& input, const SweepPixels& half_pixels,
+                                        const std::vector<cv::Rect>& large_tiles) const {
+  if (!coarse_ && !far_) {
+    return level_->sweepPlanes(input, large_tiles, {});
+  }
+  const SweepInput half_input = halfInput(coarse_ ? coarse_->level() : far_->level(), input, half_pixels);
+  std::vector<cv::Rect> tiles = large_tiles;
+  std::vector<TilePlanes> choice = allPlanes(*level_, tiles.size());
+  std::optional<SurfaceEstimate> coarse;
+  if (coarse_) {
+    coarse = coarse_->sweep(half_input);
+    tiles = makeTiles(level_->validMask().size(), options().window_px, TileSize::kSmall);
+    choice = coarse_->choosePlanes(*coarse, tiles);
+  }
+  SurfaceEstimate estimate =
+      level_->sweepPlanes(input, tiles, far_ && far_->any() ? far_->nearOf(choice) : choice);
+  if (far_ && far_->any()) {
+    const std::vector<TilePlanes> far_choice = coarse_ ? coarse_->choosePlanes(*coarse, far_->tilesOfFine())
+                                                       : allPlanes(*level_, far_->tiles().size());
+    far_->merge(input, far_->level().sweepPlanes(half_input, far_->tiles(), far_->farOf(far_choice)),
+                &estimate);
+  }
+  if (coarse_) {
+    coarse_->addSecondPeaks(*coarse, tiles, choice, &estimate);
+  }
+  return estimate;
+}
+
+RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepImage>& neighbours,
+                           SweepDetails* details) const {
+  const cv::Size size = level_->validMask().size();
+  checkImage(reference, size);
+  SweepPixels pixels{reference.pixels, {}};
+  for (const SweepImage& image : neighbours) {
+    checkImage(image, size);
+    pixels.neighbours.push_back(image.pixels);
+  }
+  check(neighbours.size() <= 32, "PlaneSweep: at most 32 neighbours");
+  SweepInput input = level_->makeInput(reference.pixels);
+  addNeighbours(*level_, reference, neighbours, &input);
+  RangeMap map = sweep(input, pixels, details);
+  map.stamp = reference.stamp;
+  return map;
+}
+
+RangeMap PlaneSweep::sweep(const SweepInput& input, const SweepPixels& pixels, SweepDetails* details) const {
+  const cv::Size size = level_->validMask().size();
+  const bool has_neighbours = !input.neighbours.empty();
+  SweepPixels half_pixels;
+  std::vector<cv::Rect> tiles;
+  SurfaceEstimate estimate(size);
+  if (has_neighbours) {
+    half_pixels = coarse_ || far_ || half_ ? halved(pixels) : SweepPixels();
+    tiles = makeTiles(size, options().window_px);
+    estimate = sweepPlanes(input, half_pixels, tiles);
+  }
+  const bool found = cv::countNonZero(estimate.plane >= 0) > 0;
+  if (found && options().num_refinement_steps > 0) {
+    level_->refineSurface(input, makeRefinement(input, level_->validWindows(), estimate), tiles, &estimate);
+  }
+
+  RangeMap map{Timestamp(), "", "", level_->camera(), {}, {}, {}};
+  estimateRange(input, estimate, &map);
+  if (half_ && has_neighbours) {
+    fillUnknown(half_->sweep(halfInput(*half_->level_, input, half_pixels), half_pixels, nullptr), &map);
+  }
+  if (details != nullptr) {
+    details->score = estimate.score;
+    details->plane = estimate.plane;
+    details->voters = estimate.voters;
+  }
+  return map;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+
+#include "kernels/packed_image.h"
+#include "kernels/sweep_kernels.h"
+#include "vcharge_core/camera/mei_camera.h"
+#include "vcharge_core/camera/ray_table.h"
+#include "vcharge_dense/plane_sweep_options.h"
+
+namespace vcharge {
+
+struct SweepNeighbour {
+  PackedImage image;
+  Eigen::Matrix3f neighbour_from_reference;  ///< rotation
+  Eigen::Vector3f translation_m;             ///< of the same transform
+  bool after = false;                        ///< taken after the reference
+  /// Of the variances that the options' noise expects; less where the pose was refined.
+  float rotation_variance_left = 1.0f, translation_variance_left = 1.0f;
+
+  Projection projectionOf(const MeiCamera& camera) const;
+};
+
+/// The reference image as the kernels use it.
+struct SweepReference {
+  cv::Mat samples;            ///< CV_16SC1, see SampleScale
+  cv::Mat mean;               ///< CV_32FC1: of the window around each pixel
+  cv::Mat inverse_deviation;  ///< CV_32FC1: 1 / sqrt(sum of squares about it), NaN where texture is missing
+
+  /// pixels: CV_8UC1. Windows that leave the image count as without texture.
+  SweepReference(const cv::Mat& pixels, const PlaneSweepOptions& options, const SampleScale& scale);
+};
+
+/// What all tiles of one sweep share. The pointers outlive the tiles.
+struct SweepInput {
+  MeiCamera camera;
+  const RayTable* rays;
+  const cv::Mat*
+      near_valid;  ///< CV_8UC1: not 0 where valid pixels are near (node grids need positions there)
+  const PlaneSweepOptions* options;
+  SweepKernels kernels;
+  SampleScale scale;
+  SweepReference reference;
+  std::vector<SweepNeighbour> neighbours;
+};
+
+/// A set of surfaces to score: pixel (x, y) on surface k has the inverse range base + offsets[k] * weight.
+/// For planes base is 0 and the weight is -normal . ray.
+struct Hypotheses {
+  bool are_planes = false;
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< of planes
+  cv::Mat base;                                      ///< CV_32FC1, empty for planes
+  cv::Mat weight;                                    ///< CV_32FC1, NaN where there is no surface
+  cv::Mat window_counts;  ///< CV_8UC1: not 0 where all pixels of the window are valid and have a surface
+  std::vector<float> offsets;
+  bool are_uniform = true;  ///< offsets are equally far apart
+
+  /// Distance of an offset from its neighbours.
+  float stepAt(size_t hypothesis) const {
+    const size_t last = offsets.size() - 1;
+    const size_t before = are_uniform ? 0 : hypothesis - (hypothesis > 0 ? 1 : 0);
+    const size_t after = are_uniform ? 1 : hypothesis + (hypothesis < last ? 1 : 0);
+    return (offsets[after] - offsets[before]) / static_cast<float>(after - before);
+  }
+};
+
+/// Not 0 where `counts` is nowhere 0 in the window around the pixel.
+cv::Mat windowsInside(const cv::Mat& counts, int window_px);
+
+}  // namespace vcharge

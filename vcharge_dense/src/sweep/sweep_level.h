@@ -1,0 +1,63 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "refinement/surface_estimate.h"
+#include "sweep/sweep_input.h"
+#include "vcharge_core/camera/mei_camera.h"
+#include "vcharge_core/camera/ray_table.h"
+#include "vcharge_dense/plane_family.h"
+#include "vcharge_dense/plane_sweep_options.h"
+
+namespace vcharge {
+
+/// The planes that a tile sweeps: per family, see TileScores::slots.
+using TilePlanes = std::vector<std::vector<int>>;
+
+/// What does not change from image to image: a camera without distortion and the planes swept in its images.
+/// Its inputs point into it. Any number of threads may use it at a time; it keeps the memory that tiles are
+/// computed in (a few megabytes a thread), for fresh pages cost more than what is done with them.
+class SweepLevel {
+ public:
+  SweepLevel(const MeiCamera& camera, const cv::Mat& valid_mask, const PlaneSweepOptions& options,
+             const std::optional<Plane>& ground_in_camera);
+  ~SweepLevel();
+  SweepLevel(const SweepLevel&) = delete;
+  SweepLevel& operator=(const SweepLevel&) = delete;
+
+  /// Without neighbours.
+  SweepInput makeInput(const cv::Mat& reference_pixels) const;
+
+  /// The surface that the planes explain best. The choice has an entry per tile, or none: all planes.
+  SurfaceEstimate sweepPlanes(const SweepInput& input, const std::vector<cv::Rect>& tiles,
+                              const std::vector<TilePlanes>& choice) const;
+  /// Looks for better peaks around an estimate, see PlaneSweepOptions.
+  void refineSurface(const SweepInput& input, const Hypotheses& refinement,
+                     const std::vector<cv::Rect>& tiles, SurfaceEstimate* estimate) const;
+
+  const MeiCamera& camera() const { return camera_; }
+  const cv::Mat& validMask() const { return valid_mask_; }
+  /// CV_8UC1: not 0 where all pixels of the window are valid.
+  const cv::Mat& validWindows() const { return valid_windows_; }
+  const PlaneSweepOptions& options() const { return options_; }
+  const std::vector<PlaneFamily>& families() const { return families_; }
+  const std::vector<Hypotheses>& planes() const { return planes_; }  ///< of the families
+
+ private:
+  class WorkerPool;
+
+  MeiCamera camera_;
+  cv::Mat valid_mask_, valid_windows_;
+  cv::Mat near_valid_;  // CV_8UC1: not 0 where valid pixels are near
+  PlaneSweepOptions options_;
+  RayTable rays_;
+  std::vector<PlaneFamily> families_;
+  std::vector<Hypotheses> planes_;
+  std::unique_ptr<WorkerPool> workers_;
+};
+
+}  // namespace vcharge

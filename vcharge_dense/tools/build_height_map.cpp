@@ -1,0 +1,186 @@
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "vcharge_core/base/command_line.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/base/progress_bar.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/files/content_hash.h"
+#include "vcharge_core/files/file_io.h"
+#include "vcharge_core/sparse_map/sparse_map_file.h"
+#include "vcharge_dense/height_map_output.h"
+#include "vcharge_dense/height_mapper.h"
+#include "vcharge_recordings/bag_drive_source.h"
+
+namespace {
+
+using namespace vcharge;
+
+struct Arguments {
+  std::string bag, rig, trajectory, map, options, output;
+  bool keep_range_maps = false;
+  bool show_options = false;
+};
+
+HeightMapOptions readOptions(const Arguments& arguments) {
+  HeightMapOptions options;
+  if (!arguments.trajectory.empty() || !arguments.map.empty()) {
+    options.range_maps.plane_sweep.pose_noise = PoseNoiseOptions::trajectory();
+  }
+  if (!arguments.options.empty()) {
+    readFieldsFromFile(arguments.options, &options);
+  }
+  return options;
+}
+
+/// Names the step that runs, each with a bar of its own.
+class Steps {
+ public:
+  void show(const std::string& step, double share) {
+    if (step != step_) {
+      bar_.reset();
+      bar_.emplace(step);
+      step_ = step;
+    }
+    bar_->update(share);
+  }
+  void end() { bar_.reset(); }
+
+ private:
+  std::string step_;
+  std::optional<ProgressBar> bar_;
+};
+
+Trajectory keyframesOf(const std::string& map_path) {
+  Trajectory trajectory;
+  for (const MapKeyframe& keyframe : readSparseMap(map_path)->keyframes()) {
+    trajectory.push_back({keyframe.stamp, keyframe.map_from_vehicle});
+  }
+  return trajectory;
+}
+
+void print(const HeightMapResult& result) {
+  const HeightMapStatistics& statistics = result.statistics;
+  ContentHasher hasher;
+  addToHash(result.map, &hasher);
+  std::printf("range maps: %zu (%zu of them from an earlier run)\n", statistics.num_views,
+              statistics.num_reused);
+  std::printf("grid: %d x %d cells of %g m in the frame %s, %zu observed, %zu solid\n",
+              result.map.height_m.cols, result.map.height_m.rows, result.map.cell_size_m,
+              result.map.frame_id.c_str(), statistics.num_observed, statistics.num_solid);
+  std::printf("labelling: %d iterations, gap %.2g per cell; heights: %d iterations, gap %.2g m per cell%s\n",
+              statistics.label_iterations, statistics.label_gap_per_cell, statistics.height_iterations,
+              statistics.height_gap_per_cell, statistics.converged ? "" : " (stopped before it was reached)");
+  for (const auto& [stage, time_s] : statistics.times_s) {
+    std::printf("%s: %.1f s\n", stage.c_str(), time_s);
+  }
+  std::printf("content hash: %s\n", hasher.hex().c_str());
+}
+
+/// The poses that the user gave, if any.
+std::optional<Trajectory> readPoses(const Arguments& arguments) {
+  if (!arguments.trajectory.empty()) {
+    return readTrajectory(arguments.trajectory);
+  }
+  if (!arguments.map.empty()) {
+    return keyframesOf(arguments.map);
+  }
+  return std::nullopt;
+}
+
+/// What the stage finds wrong with a drive, with the names of the files.
+template <class Work>
+void namingFiles(const Arguments& arguments, const Work& work) {
+  try {
+    work();
+  } catch (const InputError& error) {
+    const std::string poses = !arguments.trajectory.empty() ? arguments.trajectory
+                              : !arguments.map.empty()      ? arguments.map
+                                                            : arguments.bag + ": /odom";
+    throw InputError(arguments.bag + " with poses of " + poses + ": " + error.what());
+  }
+}
+
+/// Hands a drive to the stage.
+class NamingConsumer : public DriveConsumer {
+ public:
+  NamingConsumer(const Arguments& arguments, HeightMapper* mapper) : arguments_(arguments), mapper_(mapper) {}
+  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
+    namingFiles(arguments_, [&] { mapper_->addImage(camera_index, stamp, image); });
+  }
+  void addOdometry(const VehicleOdometry& odometry) override {
+    namingFiles(arguments_, [&] { mapper_->addOdometry(odometry); });
+  }
+
+ private:
+  const Arguments& arguments_;
+  HeightMapper* const mapper_;
+};
+
+void buildHeightMap(const Arguments& arguments) {
+  if (!arguments.trajectory.empty() && !arguments.map.empty()) {
+    throw InputError("--trajectory and --map: expected one of them");
+  }
+  const HeightMapOptions options = readOptions(arguments);
+  const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
+  std::string work = arguments.output;
+  while (work.size() > 1 && work.back() == '/') {
+    work.pop_back();
+  }
+  work += ".range_maps";
+  HeightMapper mapper(rig, options, work, fileHash(arguments.bag));
+  BagDriveSourceOptions source_options;
+  source_options.cameras = options.range_maps.cameras;
+  BagDriveSource source(arguments.bag, rig, source_options);
+  if (const std::optional<Trajectory> poses = readPoses(arguments)) {
+    const auto [first, last] = source.recordedSpan();
+    namingFiles(arguments, [&, first = first, last = last] { mapper.checkGrid(*poses, first, last); });
+    mapper.setTrajectory(*poses);
+  }
+  Steps steps;
+  NamingConsumer consumer(arguments, &mapper);
+  source.run(&consumer, [&](double share) { steps.show("range maps", share); });
+  HeightMapResult result;
+  namingFiles(arguments, [&] {
+    result = mapper.finish([&](const std::string& step, double share) { steps.show(step, share); });
+  });
+  steps.end();
+  writeHeightMapFolder(&result, arguments.output);
+  if (!arguments.keep_range_maps) {
+    removeFolder(work);
+  }
+  print(result);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Makes a height map of a recorded drive by fusing range maps: heights with confidence, a grid of "
+      "drivable "
+      "cells, a mesh and an OctoMap. The range maps lie in OUTPUT.range_maps until all is done: a run that "
+      "was "
+      "stopped goes on where it was.");
+  Arguments arguments;
+  app.add_option("--bag", arguments.bag, "the drive")->required();
+  app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
+  app.add_option("--trajectory", arguments.trajectory,
+                 "TUM file, e.g. of build_map; without it poses come from the drive's odometry");
+  app.add_option("--map", arguments.map, "sparse map of this drive (*.vmap): poses of its keyframes");
+  app.add_option("--options", arguments.options, "YAML with overrides of HeightMapOptions");
+  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireNotEmpty);
+  app.add_flag("--keep-range-maps", arguments.keep_range_maps, "do not remove OUTPUT.range_maps at the end");
+  app.add_flag("--show-options", arguments.show_options,
+               "print all options with their values, and do nothing else");
+  return runTool(&app, argc, argv, [&] {
+    if (arguments.show_options) {
+      std::cout << writeFields(readOptions(arguments)) << "\n";
+      return;
+    }
+    buildHeightMap(arguments);
+  });
+}

@@ -1,0 +1,156 @@
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "vcharge_core/base/command_line.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/base/progress_bar.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/dense_maps/range_map_file.h"
+#include "vcharge_core/files/content_hash.h"
+#include "vcharge_core/files/file_io.h"
+#include "vcharge_dense/range_mapper.h"
+#include "vcharge_recordings/bag_drive_source.h"
+
+namespace {
+
+using namespace vcharge;
+
+struct Arguments {
+  std::string bag, rig, trajectory, options, output;
+  std::string preset = "default";
+  std::vector<std::string> cameras;
+  bool online = false;
+  bool no_pictures = false;
+  bool show_options = false;
+};
+
+void writePicture(const RangeMap& map, const PlaneSweepOptions& options, const std::string& output) {
+  const std::string path =
+      output + "/" + map.camera_name + "/" + std::to_string(map.stamp.nanoseconds()) + "_range.png";
+  const cv::Mat picture = colourRange(map.range_m, options.min_distance_m, options.max_distance_m);
+  writeFileAtomically(path, [&](const std::string& temporary) {
+    if (!cv::imwrite(temporary, picture)) {
+      throw InputError(path + ": cannot be written");
+    }
+  });
+}
+
+RangeMapperOptions readOptions(const Arguments& arguments) {
+  RangeMapperOptions options = arguments.online ? RangeMapperOptions() : RangeMapperOptions::offline();
+  if (!arguments.trajectory.empty()) {
+    options.plane_sweep.pose_noise = PoseNoiseOptions::trajectory();
+  }
+  const std::vector<std::string> presets = enumNames<RangePreset>();
+  const auto preset = std::find(presets.begin(), presets.end(), arguments.preset);
+  options.usePreset(static_cast<RangePreset>(preset - presets.begin()));
+  if (!arguments.options.empty()) {
+    readFieldsFromFile(arguments.options, &options);
+  }
+  if (!arguments.cameras.empty()) {
+    options.cameras = arguments.cameras;
+  }
+  return options;
+}
+
+void printSummary(const RangeMapper& mapper, const std::vector<uint64_t>& maps,
+                  const std::vector<double>& known, const ContentHasher& hasher) {
+  const std::vector<RangeMapperStatus> all = mapper.status();
+  for (const RangeMapperStatus& status : all) {
+    std::cout << status.camera_name << ": " << status.references << " range maps from " << status.images
+              << " images (" << status.standing << " standing, " << status.without_pose << " without pose, "
+              << status.without_neighbours << " without neighbours, " << status.resets << " restarts)\n";
+  }
+  uint64_t num_maps = 0;
+  double sum_known = 0.0;
+  for (size_t i = 0; i < maps.size(); ++i) {
+    num_maps += maps[i];
+    sum_known += known[i];
+  }
+  std::cout << "range maps: " << num_maps
+            << ", known pixels: " << (num_maps > 0 ? 100.0 * sum_known / static_cast<double>(num_maps) : 0.0)
+            << " %\n"
+            << "content hash: " << hasher.hex() << "\n";
+}
+
+void computeRangeMaps(const Arguments& arguments) {
+  const RangeMapperOptions options = readOptions(arguments);
+  const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
+  ContentHasher hasher;
+  std::vector<uint64_t> maps(rig->cameras.size(), 0);
+  std::vector<double> known(rig->cameras.size(), 0.0);
+  RangeMapper* sweeper = nullptr;
+  RangeMapper mapper(rig, options, [&](const RangeTask& task) {
+    const RangeMap map = sweeper->sweep(task);
+    writeRangeMap(map, arguments.output);
+    if (!arguments.no_pictures) {
+      writePicture(map, options.plane_sweep, arguments.output);
+    }
+    addToHash(map, &hasher);
+    ++maps[task.camera_index];
+    known[task.camera_index] +=
+        cv::countNonZero(map.range_m == map.range_m) / static_cast<double>(map.range_m.total());
+  });
+  sweeper = &mapper;
+  if (!arguments.trajectory.empty()) {
+    mapper.setTrajectory(readTrajectory(arguments.trajectory));
+  }
+  BagDriveSourceOptions source_options;
+  source_options.cameras = options.cameras;
+  BagDriveSource source(arguments.bag, rig, source_options);
+  {
+    ProgressBar progress("range maps");
+    source.run(&mapper, [&](double fraction) { progress.update(fraction); });
+    mapper.finish();
+  }
+  printSummary(mapper, maps, known, hasher);
+  uint64_t num_maps = 0;
+  for (const uint64_t count : maps) {
+    num_maps += count;
+  }
+  if (num_maps == 0) {
+    std::string reasons;
+    for (const RangeMapperStatus& status : mapper.status()) {
+      reasons += (reasons.empty() ? "" : "; ") + status.camera_name + ": " + status.message;
+    }
+    throw InputError(arguments.bag + ": no range map could be made (" + reasons + ")");
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Computes range maps from a recorded drive by plane sweep on the fisheye images. Writes, per camera "
+      "and image, "
+      "range, standard deviation and confidence as float TIFF, and the range in colours as PNG.");
+  Arguments arguments;
+  app.add_option("--bag", arguments.bag, "the drive")->required();
+  app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
+  app.add_option("--trajectory", arguments.trajectory,
+                 "TUM file; without it poses come from the drive's odometry");
+  app.add_option("--options", arguments.options, "YAML with overrides of RangeMapperOptions");
+  app.add_option("--preset", arguments.preset, "speed against accuracy, before --options")
+      ->check(CLI::IsMember(enumNames<RangePreset>()))
+      ->capture_default_str();
+  app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
+  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireNotEmpty);
+  app.add_flag(
+      "--online", arguments.online,
+      "as the nodelet does: only images before the reference, averaged (default: before and after, split)");
+  app.add_flag("--no-pictures", arguments.no_pictures, "no PNG");
+  app.add_flag("--show-options", arguments.show_options,
+               "print all options with their values, and do nothing else");
+  return runTool(&app, argc, argv, [&] {
+    if (arguments.show_options) {
+      std::cout << writeFields(readOptions(arguments)) << "\n";
+      return;
+    }
+    computeRangeMaps(arguments);
+  });
+}

@@ -1,0 +1,140 @@
+#include "vcharge_localization/camera_health.h"
+
+#include <cmath>
+#include <cstring>
+#include <sstream>
+#include <utility>
+
+#include "vcharge_core/base/error.h"
+
+namespace vcharge {
+namespace {
+
+constexpr int kSampleStep_px = 16;
+constexpr double kMinMotion_m = 0.01;
+
+/// Pixels in a coarse grid: noise makes those of two images differ, whatever they show.
+cv::Mat sampleOf(const cv::Mat& image) {
+  cv::Mat sample(image.rows / kSampleStep_px + 1, image.cols / kSampleStep_px + 1, CV_8UC1, cv::Scalar(0));
+  for (int y = 0; y * kSampleStep_px < image.rows; ++y) {
+    for (int x = 0; x * kSampleStep_px < image.cols; ++x) {
+      sample.at<uchar>(y, x) = image.at<uchar>(y * kSampleStep_px, x * kSampleStep_px);
+    }
+  }
+  return sample;
+}
+
+bool isEqual(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && !a.empty() && std::memcmp(a.data, b.data, a.total()) == 0;
+}
+
+}  // namespace
+
+void CameraHealthOptions::validate() const {
+  requireField(min_features >= 0, "min_features", "must not be negative", min_features);
+  requireField(min_agreement >= 0.0 && min_agreement <= 1.0, "min_agreement", "must be in [0, 1]",
+               min_agreement);
+  requireField(min_found >= 0.0 && min_found <= 1.0, "min_found", "must be in [0, 1]", min_found);
+  requireField(memory_frames >= 1.0, "memory_frames", "must be 1 or more", memory_frames);
+  requireField(frozen_after_frames >= 1, "frozen_after_frames", "must be 1 or more", frozen_after_frames);
+}
+
+CameraHealth::CameraHealth(std::shared_ptr<const CameraRig> rig, const CameraHealthOptions& options)
+    : rig_(std::move(rig)), options_(options), cameras_(rig_->cameras.size()) {
+  options_.validate();
+}
+
+std::vector<Image> CameraHealth::withoutFrozen(const LocalizationFrame& frame) {
+  const bool moves =
+      frame.odom_from_vehicle && last_odom_from_vehicle_ &&
+      (frame.odom_from_vehicle->translation() - last_odom_from_vehicle_->translation()).norm() > kMinMotion_m;
+  last_odom_from_vehicle_ = frame.odom_from_vehicle;
+  std::vector<Image> images = frame.images;
+  for (size_t i = 0; i < images.size(); ++i) {
+    Camera& camera = cameras_[i];
+    camera.is_missing = images[i].pixels.empty();
+    if (camera.is_missing) {
+      continue;
+    }
+    cv::Mat sample = sampleOf(images[i].pixels);
+    if (!isEqual(sample, camera.sample)) {
+      camera.equal_images = 0;
+    } else if (moves) {
+      ++camera.equal_images;
+    }
+    camera.sample = std::move(sample);
+    if (camera.equal_images >= options_.frozen_after_frames) {
+      images[i] = Image();
+    }
+  }
+  return images;
+}
+
+void CameraHealth::average(double value, double* mean) const {
+  *mean += (value - *mean) / options_.memory_frames;
+}
+
+void CameraHealth::addFeatures(const RigFeatures& features) {
+  for (size_t i = 0; i < cameras_.size(); ++i) {
+    ++cameras_[i].frames;
+    average(static_cast<double>(features.images[i].size()), &cameras_[i].features);
+  }
+}
+
+void CameraHealth::addFix(const PoseFix& fix) {
+  for (size_t i = 0; i < cameras_.size(); ++i) {
+    ++cameras_[i].fixes;
+    average(fix.matches_of_camera[i], &cameras_[i].matches);
+    average(fix.inliers_of_camera[i], &cameras_[i].inliers);
+  }
+}
+
+std::string CameraHealth::contradictionOf(size_t index) const {
+  const Camera& camera = cameras_[index];
+  if (camera.fixes < options_.memory_frames) {
+    return "";
+  }
+  Camera others;
+  for (size_t i = 0; i < cameras_.size(); ++i) {
+    if (i != index) {
+      others.features += cameras_[i].features;
+      others.matches += cameras_[i].matches;
+      others.inliers += cameras_[i].inliers;
+    }
+  }
+  std::ostringstream text;
+  if (camera.inliers * others.features < options_.min_found * camera.features * others.inliers) {
+    text << "hardly any of its features (" << std::lround(camera.inliers) << " of "
+         << std::lround(camera.features) << ") fit the map: bumped, wrong intrinsics, or an unmapped side?";
+  } else if (camera.inliers * others.matches < options_.min_agreement * camera.matches * others.inliers) {
+    text << "only " << std::lround(100.0 * camera.inliers / camera.matches)
+         << " % of its matches fit the pose, " << std::lround(100.0 * others.inliers / others.matches)
+         << " % of the other cameras': bumped, or wrong intrinsics?";
+  }
+  return text.str();
+}
+
+std::vector<std::string> CameraHealth::warnings() const {
+  std::vector<std::string> warnings;
+  for (size_t i = 0; i < cameras_.size(); ++i) {
+    const Camera& camera = cameras_[i];
+    const std::string& name = rig_->cameras[i].name;
+    const std::string contradiction = contradictionOf(i);
+    std::ostringstream text;
+    if (camera.is_missing) {
+      text << name << ": no image";
+    } else if (camera.equal_images >= options_.frozen_after_frames) {
+      text << name << ": frozen, the same image again and again";
+    } else if (camera.frames >= options_.memory_frames && camera.features < options_.min_features) {
+      text << name << ": few features (" << std::lround(camera.features) << "): dark, blinded or covered?";
+    } else if (!contradiction.empty()) {
+      text << name << ": " << contradiction;
+    } else {
+      continue;
+    }
+    warnings.push_back(text.str());
+  }
+  return warnings;
+}
+
+}  // namespace vcharge

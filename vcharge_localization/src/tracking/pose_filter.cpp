@@ -1,0 +1,160 @@
+#include "vcharge_localization/pose_filter.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/camera/pixel_angle.h"
+#include "vcharge_core/motion/cross_matrix.h"
+
+namespace vcharge {
+namespace {
+
+double squared(double value) {
+  return value * value;
+}
+
+}  // namespace
+
+void PoseFilterOptions::validate() const {
+  requireField(scale_sigma >= 0.0, "scale_sigma", "must not be negative", scale_sigma);
+  requireField(turn_sigma >= 0.0, "turn_sigma", "must not be negative", turn_sigma);
+  requireField(scale_walk >= 0.0, "scale_walk", "must not be negative", scale_walk);
+  requireField(distance_sigma >= 0.0, "distance_sigma", "must not be negative", distance_sigma);
+  requireField(yaw_sigma_rad >= 0.0, "yaw_sigma_rad", "must not be negative", yaw_sigma_rad);
+  requireField(yaw_turn_sigma >= 0.0, "yaw_turn_sigma", "must not be negative", yaw_turn_sigma);
+  requireField(height_sigma_m >= 0.0, "height_sigma_m", "must not be negative", height_sigma_m);
+  requireField(tilt_sigma_rad >= 0.0, "tilt_sigma_rad", "must not be negative", tilt_sigma_rad);
+  requireField(time_sigma_m > 0.0, "time_sigma_m", "must be positive", time_sigma_m);
+  requireField(time_sigma_rad > 0.0, "time_sigma_rad", "must be positive", time_sigma_rad);
+  requireField(fix_covariance_factor > 0.0, "fix_covariance_factor", "must be positive",
+               fix_covariance_factor);
+  requireField(map_sigma_m >= 0.0, "map_sigma_m", "must not be negative", map_sigma_m);
+  requireField(map_sigma_rad >= 0.0, "map_sigma_rad", "must not be negative", map_sigma_rad);
+  requireField(map_pixel_rad > 0.0, "map_pixel_rad", "must be positive", map_pixel_rad);
+  requireField(gate > 0.0, "gate", "must be positive", gate);
+}
+
+PoseFilterOptions optionsForMapOf(const CameraRig& rig, const PoseFilterOptions& options) {
+  double sum_rad = 0.0;
+  for (const RigCamera& camera : rig.cameras) {
+    sum_rad += radiansPerPixel(camera);
+  }
+  const double pixel_rad = sum_rad / static_cast<double>(std::max<size_t>(1, rig.cameras.size()));
+  constexpr double kFinest = 0.5;  // what finer images give was not measured
+  const double factor = std::max(kFinest, pixel_rad / options.map_pixel_rad);
+  PoseFilterOptions scaled = options;
+  scaled.map_sigma_m *= factor;
+  scaled.map_sigma_rad *= factor;
+  return scaled;
+}
+
+PoseFilter::PoseFilter(const PoseFilterOptions& options) : options_(options) {
+  options_.validate();
+  covariance_(6, 6) = squared(options_.scale_sigma);
+  covariance_(7, 7) = squared(options_.turn_sigma);
+}
+
+PoseFilter::Matrix6d PoseFilter::mapCovariance() const {
+  Eigen::Matrix<double, 6, 1> sigmas;
+  sigmas << Eigen::Vector3d::Constant(options_.map_sigma_m),
+      Eigen::Vector3d::Constant(options_.map_sigma_rad);
+  return sigmas.cwiseAbs2().asDiagonal();
+}
+
+PosePrior PoseFilter::pose() const {
+  check(has_pose_, "PoseFilter::pose: nothing is known yet");
+  return {map_from_vehicle_, covariance_.topLeftCorner<6, 6>() + mapCovariance()};
+}
+
+void PoseFilter::reset(const PosePrior& pose) {
+  has_pose_ = true;
+  map_from_vehicle_ = pose.map_from_vehicle;
+  covariance_.topRows<6>().setZero();
+  covariance_.leftCols<6>().setZero();
+  covariance_.topLeftCorner<6, 6>() = pose.covariance;
+}
+
+void PoseFilter::predict(const RigidTransform& previous_from_current, double period_s) {
+  if (!has_pose_) {
+    return;
+  }
+  const double distance_m = previous_from_current.translation().norm();
+  const double turn_rad = yawOfRotation(previous_from_current.rotation());
+  // As in mapping: the chord turns by half of the turn's correction.
+  const Eigen::Matrix3d bend =
+      Eigen::AngleAxisd(0.5 * (factors_[1] - 1.0) * turn_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const Eigen::Vector3d counted = bend * previous_from_current.translation();
+  const Eigen::Vector3d moved = factors_[0] * counted;
+  const Eigen::Quaterniond turned =
+      previous_from_current.rotation() *
+      Eigen::AngleAxisd((factors_[1] - 1.0) * turn_rad, Eigen::Vector3d::UnitZ());
+  const Eigen::Matrix3d rotation = map_from_vehicle_.rotationMatrix();
+  const Eigen::Vector3d moved_in_map = rotation * moved;
+  map_from_vehicle_ =
+      RigidTransform(map_from_vehicle_.rotation() * turned, map_from_vehicle_.translation() + moved_in_map);
+
+  Matrix8d by_state = Matrix8d::Identity();
+  by_state.block<3, 3>(0, 3) = -crossMatrix(moved_in_map);
+  by_state.block<3, 1>(0, 6) = rotation * counted;
+  by_state.block<3, 1>(0, 7) = 0.5 * turn_rad * (rotation * Eigen::Vector3d(-moved.y(), moved.x(), 0.0));
+  by_state.block<3, 1>(3, 7) = turn_rad * rotation.col(2);
+  covariance_ = by_state * covariance_ * by_state.transpose();
+
+  Eigen::Matrix<double, 6, 1> variances;
+  const double planar = squared(options_.distance_sigma) * distance_m;
+  const double tilt = squared(options_.tilt_sigma_rad) * distance_m;
+  variances << planar, planar, squared(options_.height_sigma_m) * distance_m, tilt, tilt,
+      squared(options_.yaw_sigma_rad) * distance_m + squared(options_.yaw_turn_sigma) * std::abs(turn_rad);
+  variances.head<3>().array() += squared(options_.time_sigma_m) * period_s;
+  variances.tail<3>().array() += squared(options_.time_sigma_rad) * period_s;
+  covariance_.block<3, 3>(0, 0) += rotation * variances.head<3>().asDiagonal() * rotation.transpose();
+  covariance_.block<3, 3>(3, 3) += rotation * variances.tail<3>().asDiagonal() * rotation.transpose();
+  covariance_.diagonal().tail<2>().array() += squared(options_.scale_walk) * distance_m;
+}
+
+void PoseFilter::addNoise(double sigma_m, double sigma_rad) {
+  covariance_.diagonal().head<3>().array() += squared(sigma_m);
+  covariance_.diagonal().segment<3>(3).array() += squared(sigma_rad);
+}
+
+Eigen::Matrix<double, 6, 1> PoseFilter::differenceTo(const RigidTransform& map_from_vehicle) const {
+  Eigen::Matrix<double, 6, 1> difference;
+  difference << map_from_vehicle.translation() - map_from_vehicle_.translation(),
+      vectorFromRotation(map_from_vehicle.rotation() * map_from_vehicle_.rotation().conjugate());
+  return difference;
+}
+
+PoseFilter::Matrix6d PoseFilter::noiseOf(const PoseFix& fix) const {
+  return options_.fix_covariance_factor * fix.covariance + mapCovariance();
+}
+
+double PoseFilter::distanceOf(const PoseFix& fix) const {
+  const Matrix6d expected = covariance_.topLeftCorner<6, 6>() + noiseOf(fix);
+  const Eigen::Matrix<double, 6, 1> difference = differenceTo(fix.map_from_vehicle);
+  return difference.dot(expected.ldlt().solve(difference));
+}
+
+bool PoseFilter::update(const PoseFix& fix) {
+  check(has_pose_, "PoseFilter::update: nothing is known yet");
+  if (!(distanceOf(fix) <= options_.gate)) {
+    return false;
+  }
+  const Matrix6d noise = noiseOf(fix);
+  const Matrix6d expected = covariance_.topLeftCorner<6, 6>() + noise;
+  const Eigen::Matrix<double, 8, 6> gain = expected.ldlt().solve(covariance_.topRows<6>()).transpose();
+  const Eigen::Matrix<double, 8, 1> change = gain * differenceTo(fix.map_from_vehicle);
+  map_from_vehicle_ = RigidTransform(rotationFromVector(change.segment<3>(3)) * map_from_vehicle_.rotation(),
+                                     map_from_vehicle_.translation() + change.head<3>());
+  factors_ += change.tail<2>();
+  // Joseph's form stays symmetric and positive.
+  Matrix8d keep = Matrix8d::Identity();
+  keep.leftCols<6>() -= gain;
+  covariance_ = keep * covariance_ * keep.transpose() + gain * noise * gain.transpose();
+  return true;
+}
+
+}  // namespace vcharge

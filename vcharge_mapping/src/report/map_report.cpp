@@ -1,0 +1,167 @@
+#include "vcharge_mapping/map_report.h"
+
+#include <algorithm>
+#include <map>
+#include <sstream>
+
+#include "report/map_pictures.h"
+#include "vcharge_core/base/text_format.h"
+#include "vcharge_core/files/html.h"
+#include "vcharge_mapping/map_back_end.h"
+#include "vcharge_mapping/map_description.h"
+
+namespace vcharge {
+namespace {
+
+constexpr size_t kMaxSkippedRows = 30;
+
+std::string rowOf(const std::vector<std::string>& cells, bool is_head = false) {
+  std::string text = "<tr>";
+  for (const std::string& cell : cells) {
+    text += is_head ? "<th>" + escapeHtml(cell) + "</th>" : "<td>" + escapeHtml(cell) + "</td>";
+  }
+  return text + "</tr>";
+}
+
+std::string verdictOf(const MapVerdict& verdict) {
+  const std::string grade = toString(verdict.grade);
+  std::string text = "<p class=\"verdict " + grade + "\"><b>" + grade + "</b>";
+  for (const std::string& remark : verdict.remarks) {
+    text += "<br>" + escapeHtml(remark);
+  }
+  return text + "</p>";
+}
+
+std::string summaryOf(const SparseMap& map, const SparseMapperReport& report) {
+  double length_m = 0.0;
+  for (size_t k = 1; k < map.keyframes().size(); ++k) {
+    length_m += (map.keyframes()[k].map_from_vehicle.translation() -
+                 map.keyframes()[k - 1].map_from_vehicle.translation())
+                    .norm();
+  }
+  const double duration_s = toSeconds(map.keyframes().back().stamp - map.keyframes().front().stamp);
+  return "<table>" +
+         rowOf({"drive", toText(length_m, 1) + " m in " + toText(duration_s, 1) + " s, " +
+                             std::to_string(report.num_frames) + " frames"}) +
+         rowOf({"map", std::to_string(map.keyframes().size()) + " keyframes, " +
+                           std::to_string(map.landmarks().size()) + " landmarks, " +
+                           std::to_string(map.observations().size()) + " observations"}) +
+         rowOf({"error of reprojection, RMS per coordinate", toText(report.rms_px, 3) + " px"}) +
+         rowOf({"odometer: true over counted distance, and turn",
+                toText(map.contents().odometry_distance_scale, 5) + ", " +
+                    toText(map.contents().odometry_turn_scale, 5)}) +
+         rowOf({"content hash", map.contentHash()}) + "</table>";
+}
+
+std::string loopsOf(const SparseMap& map) {
+  std::map<std::string, int64_t> by_reason;
+  for (const MapLoopEdge& edge : map.contents().loop_edges) {
+    ++by_reason[edge.accepted ? std::string() : edge.reason];
+  }
+  std::string text = "<table>" + rowOf({"pairs of keyframes that looked alike", "edges"}, true) +
+                     rowOf({"accepted", std::to_string(by_reason[""])});
+  for (const auto& [reason, count] : by_reason) {
+    if (!reason.empty()) {
+      text += rowOf({"rejected: " + reason, std::to_string(count)});
+    }
+  }
+  return text + "</table>";
+}
+
+std::string motionsOf(const SparseMapperReport& report) {
+  static const char* const kMeanings[] = {"too few matches, or none that agree: as the odometer counted",
+                                          "a circle about a point on the rear axle's line",
+                                          "any motion in the plane: the wheels slipped",
+                                          "six degrees of freedom: a ramp, a bump"};
+  const std::vector<std::string> names = enumNames<MotionHypothesis>();
+  std::string text = "<table>" + rowOf({"motion between frames", "frames", "meaning"}, true);
+  for (size_t i = 0; i < names.size(); ++i) {
+    text += "<tr><td>" + names[i] + "</td><td>" + std::to_string(report.num_motions[i]) +
+            "</td><td class=\"text\">" + kMeanings[i] + "</td></tr>";
+  }
+  return text + "</table>";
+}
+
+std::string camerasOf(const SparseMap& map, const SparseMapperReport& report) {
+  std::string text =
+      "<table>" + rowOf({"camera", "observations", "error, RMS distance (px)", "images missing"}, true);
+  for (size_t i = 0; i < map.rig().cameras.size(); ++i) {
+    const ReprojectionErrors errors = measureReprojection(map, i);
+    text += rowOf({map.rig().cameras[i].name, std::to_string(errors.num_observations),
+                   toText(errors.rms_px, 3), std::to_string(report.num_missing_images[i])});
+  }
+  return text + "</table>";
+}
+
+std::string stagesOf(const SparseMapperReport& report) {
+  std::vector<std::string> order = {"following"};
+  order.insert(order.end(), backEndStages().begin(), backEndStages().end());
+  order.insert(order.end(), {"assembly", "checkpoints"});
+  double sum_s = 0.0;
+  std::string text = "<table>" + rowOf({"stage", "time (s)"}, true);
+  for (const std::string& stage : order) {
+    const auto found = report.stage_s.find(stage);
+    if (found != report.stage_s.end()) {
+      sum_s += found->second;
+      text += rowOf({stage, toText(found->second, 2)});
+    }
+  }
+  return text + rowOf({"sum", toText(sum_s, 2)}) + "</table>";
+}
+
+std::string skippedOf(const SparseMapperReport& report, Timestamp start) {
+  const auto count_row = [](const char* what, int64_t count) {
+    return count > 0 ? rowOf({what, std::to_string(count)}) : std::string();
+  };
+  std::string text =
+      count_row("frames without odometry: not used", report.num_frames_without_odometry) +
+      count_row("frames that lack a camera: used with the others", report.num_incomplete_frames) +
+      count_row("standing frames: not used", report.num_standing_frames) +
+      count_row("images that came too late: not used", report.num_late_images) +
+      count_row("times the odometer started over", report.num_odometry_resets);
+  if (text.empty()) {
+    return "<p>Nothing.</p>";
+  }
+  text = "<table>" + text + "</table>";
+  std::vector<SkippedFrames> longest = report.skipped;
+  std::stable_sort(longest.begin(), longest.end(), [](const SkippedFrames& a, const SkippedFrames& b) {
+    return a.num_frames > b.num_frames;
+  });
+  if (longest.size() > kMaxSkippedRows) {
+    longest.resize(kMaxSkippedRows);
+  }
+  std::stable_sort(longest.begin(), longest.end(),
+                   [](const SkippedFrames& a, const SkippedFrames& b) { return a.first < b.first; });
+  text += "<p>Longest, of " + std::to_string(report.skipped.size()) + ":</p><table>" +
+          rowOf({"reason", "from (s)", "to (s)", "frames"}, true);
+  for (const SkippedFrames& skipped : longest) {
+    text += rowOf({skipped.reason, toText(toSeconds(skipped.first - start), 2),
+                   toText(toSeconds(skipped.last - start), 2), std::to_string(skipped.num_frames)});
+  }
+  return text + "</table>";
+}
+
+}  // namespace
+
+std::string makeMapReport(const std::string& title, const SparseMap& map, const MappingState& state) {
+  const SparseMapperReport& report = state.report;
+  std::ostringstream out;
+  out << verdictOf(judgeMap(map, state)) << summaryOf(map, report) << "<h2>From above</h2>"
+      << htmlFigure(drawTopView(map), "Path and landmarks.") << "<h2>Loops</h2>" << loopsOf(map)
+      << htmlFigure(
+             drawLoops(map),
+             "Between the keyframes that each edge connects. Faint: pairs that looked alike and did not "
+             "pass verification.")
+      << "<h2>How the vehicle moved</h2>" << motionsOf(report)
+      << htmlFigure(drawMotions(state), "By frame; what is seldom is drawn over what is usual.")
+      << htmlFigure(drawHeights(state), "Height of the path in the map, over the same colours.")
+      << "<h2>Landmarks in view</h2>"
+      << htmlFigure(drawLandmarkCounts(map), "By keyframe. Places where there are few are hard to recognize.")
+      << "<h2>Errors</h2>" << camerasOf(map, report)
+      << htmlFigure(drawErrors(map), "Distance between observations and projected landmarks.")
+      << "<h2>Stages</h2>" << stagesOf(report) << "<h2>What was skipped</h2>"
+      << skippedOf(report, map.keyframes().front().stamp);
+  return htmlPage(title, out.str());
+}
+
+}  // namespace vcharge

@@ -1,0 +1,17 @@
+// For tests of what reads maps: writes the analytic map of vcharge_core/analytic_map.h.
+#include "vcharge_core/base/command_line.h"
+#include "vcharge_core/sparse_map/analytic_map.h"
+#include "vcharge_core/sparse_map/sparse_map_file.h"
+
+int main(int argc, char** argv) {
+  CLI::App app("Writes a small map whose every observation is exact, for tests.");
+  std::string path;
+  vcharge::AnalyticMapOptions options;
+  app.add_option("--output", path, "the map (*.vmap)")->required();
+  app.add_option("--keyframes", options.num_keyframes);
+  app.add_option("--landmarks", options.num_landmarks);
+  return vcharge::runTool(&app, argc, argv, [&] {
+    vcharge::writeSparseMap(vcharge::SparseMap(vcharge::makeAnalyticMap(options)),
+                            {{"bag", "analytic.bag"}, {"options", "a: 1\nb: 2\n"}}, path);
+  });
+}

@@ -1,0 +1,231 @@
+#include "obstacle_messages.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <octomap/OcTree.h>
+
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/base/text_format.h"
+#include "vcharge_core/camera/working_camera.h"
+#include "vcharge_obstacles/obstacle_outlines.h"
+#include "vcharge_ros/camera_info.h"
+#include "vcharge_ros/conversions.h"
+
+namespace vcharge {
+namespace {
+
+/// The message's own pixels.
+cv::Mat toFloatImage(const sensor_msgs::ImageConstPtr& message, const std::string& topic) {
+  const size_t row_bytes = message->width * sizeof(float);
+  if (message->encoding != "32FC1" || message->is_bigendian != 0 || message->step != row_bytes ||
+      message->data.size() != row_bytes * message->height || message->data.empty()) {
+    throw InputError(topic + ": expected 32FC1 images without padding, got " + message->encoding + " of " +
+                     std::to_string(message->width) + "x" + std::to_string(message->height));
+  }
+  return cv::Mat(static_cast<int>(message->height), static_cast<int>(message->width), CV_32FC1,
+                 const_cast<uint8_t*>(message->data.data()));  // nobody writes to it
+}
+
+cv::Mat toGrayImage(const sensor_msgs::ImageConstPtr& message, const std::string& topic) {
+  if (message->encoding != "mono8" || message->step != message->width || message->data.empty() ||
+      message->data.size() != static_cast<size_t>(message->step) * message->height) {
+    throw InputError(topic + ": expected mono8 images without padding, got " + message->encoding + " of " +
+                     std::to_string(message->width) + "x" + std::to_string(message->height));
+  }
+  return cv::Mat(static_cast<int>(message->height), static_cast<int>(message->width), CV_8UC1,
+                 const_cast<uint8_t*>(message->data.data()));  // nobody writes to it
+}
+
+/// Size, focal lengths and principal point, for errors.
+std::string describe(const sensor_msgs::CameraInfo& info) {
+  return std::to_string(info.width) + "x" + std::to_string(info.height) + " " + info.distortion_model +
+         " in " + info.header.frame_id + ", K " + toText(info.K[0], 2) + ", " + toText(info.K[4], 2) + ", " +
+         toText(info.K[2], 2) + ", " + toText(info.K[5], 2);
+}
+
+bool isSameCamera(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b) {
+  constexpr double kTolerance = 1e-3;  // pixels, and coefficients; a fit is as exact as its platform
+  const auto is_near = [](double x, double y) { return std::abs(x - y) <= kTolerance; };
+  return a.width == b.width && a.height == b.height && a.distortion_model == b.distortion_model &&
+         a.header.frame_id == b.header.frame_id && a.D.size() == b.D.size() &&
+         std::equal(a.D.begin(), a.D.end(), b.D.begin(), is_near) &&
+         std::equal(a.K.begin(), a.K.end(), b.K.begin(), is_near);
+}
+
+std_msgs::ColorRGBA colourOf(double height_m) {
+  std_msgs::ColorRGBA colour;  // yellow for kerbs to red for walls
+  colour.r = 1.0F;
+  colour.g = static_cast<float>(std::max(0.0, 1.0 - height_m));
+  colour.a = 0.6F;
+  return colour;
+}
+
+geometry_msgs::Point pointOf(const Eigen::Vector2d& place, double z_m) {
+  geometry_msgs::Point point;
+  point.x = place.x();
+  point.y = place.y();
+  point.z = z_m;
+  return point;
+}
+
+visualization_msgs::Marker makeMarker(const ObstacleMap& map, const char* name, int type, double scale) {
+  visualization_msgs::Marker marker;
+  marker.header.stamp = fromTimestamp(map.stamp);
+  marker.header.frame_id = map.frame_id;
+  marker.ns = name;
+  marker.type = type;
+  marker.action = visualization_msgs::Marker::ADD;
+  marker.pose.orientation.w = 1.0;
+  marker.scale.x = marker.scale.y = marker.scale.z = scale;
+  marker.color.r = marker.color.a = 1.0F;
+  return marker;
+}
+
+}  // namespace
+
+RangeMapReader::RangeMapReader(const RigCamera& camera, std::string topic)
+    : camera_(camera), topic_(std::move(topic)) {}
+
+void RangeMapReader::prepare(cv::Size size) {
+  if (size == size_) {
+    return;
+  }
+  WorkingCameraOptions options;
+  options.image_scale = static_cast<double>(size.width) / camera_.image_size_px.width;
+  const WorkingCamera working(camera_.model, camera_.image_size_px, camera_.field_of_view_rad, camera_.mask,
+                              options);
+  if (working.size() != size) {
+    throw InputError(topic_ + "/image: expected images with the sides of camera '" + camera_.name + "', as " +
+                     std::to_string(working.size().width) + "x" + std::to_string(working.size().height) +
+                     ", got " + std::to_string(size.width) + "x" + std::to_string(size.height));
+  }
+  model_ = working.model();
+  expected_ = makeCameraInfo(*model_, size, camera_.field_of_view_rad, camera_.frame_id);
+  size_ = size;
+}
+
+RangeMap RangeMapReader::read(const RangeMapParts& parts) {
+  const cv::Mat range_m = toFloatImage(parts.range, topic_ + "/image");
+  const cv::Mat sigma_m = toFloatImage(parts.standard_deviation, topic_ + "/standard_deviation");
+  const cv::Mat confidence = toFloatImage(parts.confidence, topic_ + "/confidence");
+  const cv::Mat reference = toGrayImage(parts.reference, topic_ + "/reference");
+  prepare(range_m.size());
+  if (sigma_m.size() != size_ || confidence.size() != size_ || reference.size() != size_) {
+    throw InputError(topic_ + ": expected four images of one size, got another than the range's " +
+                     std::to_string(size_.width) + "x" + std::to_string(size_.height));
+  }
+  if (!isSameCamera(*parts.camera_info, expected_)) {
+    throw InputError(topic_ + "/camera_info: expected camera '" + camera_.name + "' of the rig, " +
+                     describe(expected_) + "; got " + describe(*parts.camera_info));
+  }
+  return {toTimestamp(parts.range->header.stamp),
+          camera_.name,
+          camera_.frame_id,
+          *model_,
+          range_m,
+          sigma_m,
+          confidence,
+          reference};
+}
+
+nav_msgs::OccupancyGrid toMessage(const ObstacleMap& map) {
+  nav_msgs::OccupancyGrid grid;
+  grid.header.stamp = fromTimestamp(map.stamp);
+  grid.header.frame_id = map.frame_id;
+  grid.info.map_load_time = grid.header.stamp;
+  grid.info.resolution = static_cast<float>(map.cell_size_m);
+  grid.info.width = static_cast<uint32_t>(map.state.cols);
+  grid.info.height = static_cast<uint32_t>(map.state.rows);
+  grid.info.origin.position = pointOf(map.origin_m, 0.0);
+  grid.info.origin.orientation.w = 1.0;
+  grid.data.reserve(map.state.total());
+  for (int row = 0; row < map.state.rows; ++row) {
+    const int8_t* cells = map.state.ptr<int8_t>(row);
+    grid.data.insert(grid.data.end(), cells, cells + map.state.cols);
+  }
+  return grid;
+}
+
+sensor_msgs::LaserScan toMessage(const ObstacleScan& scan, const std::string& frame_id) {
+  sensor_msgs::LaserScan message;
+  message.header.stamp = fromTimestamp(scan.stamp);
+  message.header.frame_id = frame_id;
+  message.angle_min = static_cast<float>(scan.angle_min_rad);
+  message.angle_increment = static_cast<float>(scan.angle_increment_rad);
+  message.angle_max = static_cast<float>(scan.angle_rad(scan.size() - 1));
+  message.range_min = 0.05F;
+  message.range_max = static_cast<float>(scan.max_range_m);
+  for (size_t i = 0; i < scan.size(); ++i) {
+    const bool all_free = std::isnan(scan.range_m[i]) && scan.free_m[i] >= 0.95 * scan.max_range_m;
+    message.ranges.push_back(all_free ? std::numeric_limits<float>::infinity() : scan.range_m[i]);
+    message.intensities.push_back(std::isnan(scan.height_m[i]) ? 0.0F : scan.height_m[i]);
+  }
+  return message;
+}
+
+visualization_msgs::MarkerArray toMarkers(const ObstacleMap& map) {
+  visualization_msgs::Marker walls = makeMarker(map, "walls", visualization_msgs::Marker::TRIANGLE_LIST, 1.0);
+  visualization_msgs::Marker lines = makeMarker(map, "outlines", visualization_msgs::Marker::LINE_LIST, 0.03);
+  for (const ObstacleOutline& outline : findOutlines(map)) {
+    const std_msgs::ColorRGBA colour = colourOf(outline.height_m);
+    for (size_t i = 0; i < outline.corners_m.size(); ++i) {
+      const Eigen::Vector2d& a = outline.corners_m[i];
+      const Eigen::Vector2d& b = outline.corners_m[(i + 1) % outline.corners_m.size()];
+      const double top_m = outline.height_m;
+      for (const geometry_msgs::Point& corner : {pointOf(a, 0.0), pointOf(b, 0.0), pointOf(b, top_m),
+                                                 pointOf(a, 0.0), pointOf(b, top_m), pointOf(a, top_m)}) {
+        walls.points.push_back(corner);
+        walls.colors.push_back(colour);
+      }
+      lines.points.push_back(pointOf(a, 0.02));
+      lines.points.push_back(pointOf(b, 0.02));
+    }
+  }
+  visualization_msgs::MarkerArray markers;
+  for (visualization_msgs::Marker& marker : std::vector<visualization_msgs::Marker>{walls, lines}) {
+    if (marker.points.empty()) {  // rviz refuses markers without points
+      marker.action = visualization_msgs::Marker::DELETE;
+    }
+    markers.markers.push_back(marker);
+  }
+  return markers;
+}
+
+std::unique_ptr<octomap::OcTree> toOctree(const ObstacleMap& map) {
+  auto tree = std::make_unique<octomap::OcTree>(map.cell_size_m);
+  const auto setVoxel = [&](int column, int row, int layer, float log_odds) {
+    const Eigen::Vector2d middle = map.origin_m + map.cell_size_m * Eigen::Vector2d(column + 0.5, row + 0.5);
+    tree->setNodeValue(middle.x(), middle.y(), (layer + 0.5) * map.cell_size_m, log_odds, true);
+  };
+  for (int row = 0; row < map.state.rows; ++row) {
+    for (int column = 0; column < map.state.cols; ++column) {
+      const int8_t state = map.state.at<int8_t>(row, column);
+      if (state == kCellFree) {
+        setVoxel(column, row, 0, tree->getClampingThresMinLog());
+      } else if (state == kCellOccupied) {
+        const double layers = std::ceil(map.height_m.at<float>(row, column) / map.cell_size_m - 1e-3);
+        for (int layer = 0; layer < std::max(1, static_cast<int>(layers)); ++layer) {
+          setVoxel(column, row, layer, tree->getClampingThresMaxLog());
+        }
+      }
+    }
+  }
+  tree->updateInnerOccupancy();
+  return tree;
+}
+
+geometry_msgs::Vector3Stamped toMessage(const GroundPlane& ground, Timestamp stamp,
+                                        const std::string& vehicle_frame) {
+  geometry_msgs::Vector3Stamped message;
+  message.header.stamp = fromTimestamp(stamp);
+  message.header.frame_id = vehicle_frame;
+  message.vector.x = ground.roll_rad();
+  message.vector.y = ground.pitch_rad();
+  message.vector.z = ground.height_m();
+  return message;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,171 @@
+#include "vcharge_obstacles/ground_watch.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "detection/box_world.h"
+#include "vcharge_core/camera/ray_table.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kDegree = M_PI / 180.0;
+constexpr double kStep_s = 0.24;
+
+/// Brightness of a place, smooth over some centimetres: a sum of waves in random directions.
+class Pattern {
+ public:
+  Pattern(double mean, uint32_t seed) : mean_(mean) {
+    std::mt19937 generator(seed);
+    std::uniform_real_distribution<double> angle(0.0, 2.0 * M_PI), length(0.15, 0.6);
+    for (Eigen::Vector4d& wave : waves_) {
+      const double direction = angle(generator);
+      const double frequency = 2.0 * M_PI / length(generator);
+      wave = {frequency * std::cos(direction), frequency * std::sin(direction),
+              frequency * std::sin(direction + 1.0), angle(generator)};
+    }
+  }
+  double at(const Eigen::Vector3d& place) const {
+    double sum = mean_;
+    for (const Eigen::Vector4d& wave : waves_) {
+      sum += 6.0 * std::sin(wave.head<3>().dot(place) + wave.w());
+    }
+    return sum;
+  }
+
+ private:
+  double mean_;
+  std::array<Eigen::Vector4d, 6> waves_;
+};
+
+/// What a camera of the box world's rig sees of textured ground and boxes.
+class GroundWatchTest : public ::testing::Test {
+ protected:
+  GroundWatchTest()
+      : working_(camera_.model, camera_.image_size_px, camera_.field_of_view_rad, camera_.mask, scale()),
+        watch_(working_, *camera_.vehicle_from_camera, grid_) {}
+
+  static WorkingCameraOptions scale() {
+    WorkingCameraOptions options;
+    options.image_scale = 1.0;
+    return options;
+  }
+  cv::Mat takeImage(const BoxWorld& world, const RigidTransform& world_from_body) {
+    const RayTable rays(working_.model(), working_.size(), 2.0 * M_PI, working_.validMask());
+    const RigidTransform world_from_camera = world_from_body * *camera_.vehicle_from_camera;
+    cv::Mat image(working_.size(), CV_8UC1, cv::Scalar(0));
+    for (int y = 0; y < image.rows; ++y) {
+      for (int x = 0; x < image.cols; ++x) {
+        if (!rays.valid(x, y)) {
+          continue;
+        }
+        const Eigen::Vector3d direction = world_from_camera.rotation() * rays.ray(x, y).cast<double>();
+        const Eigen::Vector3d& origin = world_from_camera.translation();
+        const double range_m = world.castRay(origin, direction);
+        const Eigen::Vector3d place = origin + range_m * direction;
+        const double brightness =
+            !std::isfinite(range_m) ? 230.0 : (place.z() > 1e-6 ? thing_.at(place) : ground_.at(place));
+        image.at<uint8_t>(y, x) = cv::saturate_cast<uint8_t>(gain_ * brightness + noise_(generator_));
+      }
+    }
+    return image;
+  }
+  /// Changed shares after two images, the body tilted as the ground planes say.
+  std::vector<float> compare(const BoxWorld& first, const BoxWorld& second, double pitch_rad = 0.0) {
+    watch_.clear();
+    GroundPlane level;
+    level.state = GroundState::kMeasured;
+    EXPECT_TRUE(
+        watch_.compare(Timestamp(), takeImage(first, poseAt(0.0, 0.0)), level, poseAt(0.0, 0.0)).empty());
+    GroundPlane tilted = level;
+    tilted.slope.x() = std::tan(pitch_rad);
+    return watch_.compare(Timestamp() + durationFromSeconds(kStep_s),
+                          takeImage(second, poseAt(0.2, pitch_rad)), tilted, poseAt(0.2, 0.0));
+  }
+  static RigidTransform poseAt(double x_m, double pitch_rad) {
+    return RigidTransform(rotationFromYawPitchRoll(0.0, pitch_rad, 0.0), Eigen::Vector3d(x_m, 0.0, 0.0));
+  }
+  /// Of the cell at a place, from the second pose.
+  double shareAt(const std::vector<float>& share, double x_m, double y_m) const {
+    const Eigen::Vector2d offset =
+        Eigen::Vector2d(x_m - 0.2, y_m) - camera_.vehicle_from_camera->translation().head<2>();
+    const int bin = grid_.binOfInverse(static_cast<float>(1.0 / offset.norm()));
+    return share.at(grid_.index(grid_.rayOf(std::atan2(offset.y(), offset.x())), bin));
+  }
+  /// Mean over bare ground to the left, up to 3 m from the camera.
+  double meanShare(const std::vector<float>& share) const {
+    double sum = 0.0;
+    int count = 0;
+    for (double x = 1.0; x < 3.5; x += 0.1) {
+      for (double y = 1.5; y < 3.5; y += 0.1) {
+        sum += shareAt(share, x, y);
+        ++count;
+      }
+    }
+    return sum / count;
+  }
+
+  const RigCamera camera_ = makeBoxWorldRig().cameras[1];
+  const PolarGrid grid_{PolarGridOptions()};
+  const WorkingCamera working_;
+  GroundWatch watch_;
+  const Pattern ground_{110.0, 1}, thing_{60.0, 2};
+  double gain_ = 1.0;
+  std::mt19937 generator_{3};
+  std::normal_distribution<double> noise_{0.0, 2.0};
+};
+
+BoxWorld personAt(double x_m) {
+  return {{{{x_m - 0.2, 2.6, 0.0}, {x_m + 0.2, 3.0, 1.7}}}};
+}
+
+TEST_F(GroundWatchTest, BareGroundLooksAsItDid) {
+  const std::vector<float> share = compare({}, {});
+  ASSERT_EQ(share.size(), grid_.size());
+  EXPECT_LT(meanShare(share), 0.02);
+}
+
+TEST_F(GroundWatchTest, GroundUnderWhoStepsThereLooksOtherwise) {
+  const std::vector<float> share = compare({}, personAt(2.2));
+  for (const double y : {2.65, 2.8, 3.0, 3.4}) {  // under him, and hidden by him
+    EXPECT_GT(shareAt(share, 2.2 + 0.1 * (y - 2.65), y), 0.5) << y;
+  }
+  EXPECT_LT(shareAt(share, 2.2, 2.2), 0.1);  // before him
+}
+
+TEST_F(GroundWatchTest, WhoWalksAlongIsSeenWhereStereoCannotRangeHim) {
+  const std::vector<float> share = compare(personAt(2.2), personAt(2.4));  // as fast as the vehicle
+  EXPECT_GT(shareAt(share, 2.55, 2.65), 0.5);
+}
+
+TEST_F(GroundWatchTest, ExposureThatChangesIsNoChangeOfTheGround) {
+  GroundPlane level;
+  level.state = GroundState::kMeasured;
+  watch_.compare(Timestamp(), takeImage({}, poseAt(0.0, 0.0)), level, poseAt(0.0, 0.0));
+  gain_ = 1.3;
+  EXPECT_LT(meanShare(watch_.compare(Timestamp() + durationFromSeconds(kStep_s),
+                                     takeImage({}, poseAt(0.2, 0.0)), level, poseAt(0.2, 0.0))),
+            0.02);
+}
+
+TEST_F(GroundWatchTest, BrakingPitchThatTheGroundPlaneKnowsIsNoChange) {
+  EXPECT_LT(meanShare(compare({}, {}, 1.0 * kDegree)), 0.02);
+}
+
+TEST_F(GroundWatchTest, ImagesTooFarApartAreNotCompared) {
+  GroundPlane level;
+  level.state = GroundState::kMeasured;
+  const cv::Mat image = takeImage({}, poseAt(0.0, 0.0));
+  watch_.compare(Timestamp(), image, level, RigidTransform());
+  EXPECT_TRUE(watch_.compare(Timestamp() + durationFromSeconds(1.5), image, level, RigidTransform()).empty());
+  level.state = GroundState::kOutOfBounds;
+  EXPECT_TRUE(watch_.compare(Timestamp() + durationFromSeconds(1.6), image, level, RigidTransform()).empty());
+  EXPECT_THROW(watch_.compare(Timestamp() + durationFromSeconds(1.7), cv::Mat(10, 10, CV_8UC1), GroundPlane(),
+                              RigidTransform()),
+               std::logic_error);
+}
+
+}  // namespace
+}  // namespace vcharge

@@ -1,0 +1,243 @@
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "vcharge_core/base/command_line.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/base/progress_bar.h"
+#include "vcharge_core/base/text_format.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/dense_maps/obstacle_map_file.h"
+#include "vcharge_core/dense_maps/range_map_file.h"
+#include "vcharge_core/files/content_hash.h"
+#include "vcharge_core/files/file_io.h"
+#include "vcharge_dense/range_mapper.h"
+#include "vcharge_obstacles/obstacle_mapper.h"
+#include "vcharge_recordings/bag_drive_source.h"
+
+namespace {
+
+using namespace vcharge;
+
+struct Arguments {
+  std::string bag, rig, options, range_options, range, output;
+  std::vector<std::string> cameras;
+  bool show_options = false;
+};
+
+/// Processor time of the whole process, that is of all its threads, in parts of a run.
+class ProcessorTime {
+ public:
+  /// Runs and counts.
+  template <class Function>
+  auto add(const Function& function) {
+    const Count count{std::clock(), &ticks_};
+    return function();
+  }
+  double seconds() const { return static_cast<double>(ticks_) / CLOCKS_PER_SEC; }
+
+ private:
+  struct Count {
+    ~Count() { *sum += std::clock() - begin; }
+    std::clock_t begin;
+    std::clock_t* sum;
+  };
+  std::clock_t ticks_ = 0;
+};
+
+/// Hands odometry to both stages, and range maps from one to the other.
+class Pipeline : public DriveConsumer {
+ public:
+  Pipeline(const std::shared_ptr<const CameraRig>& rig, const RangeMapperOptions& range_options,
+           const std::string& range_folder, ObstacleMapper* obstacles)
+      : obstacles_(obstacles) {
+    if (range_folder.empty()) {
+      ranges_ = std::make_unique<RangeMapper>(rig, range_options, [this](const RangeTask& task) {
+        const RangeMap map = sweeping_.add([&] { return ranges_->sweep(task); });
+        detecting_.add([&] { obstacles_->addRangeMap(map); });
+        ++num_maps_;
+      });
+      return;
+    }
+    for (const std::string& camera : listRangeMapCameras(range_folder)) {
+      const size_t index = rig->cameraIndex(camera);
+      for (const Timestamp stamp : listRangeMaps(range_folder, camera)) {
+        stored_[stamp][index] = camera;
+      }
+    }
+    range_folder_ = range_folder;
+  }
+
+  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
+    if (ranges_) {
+      whole_.add([&] { ranges_->addImage(camera_index, stamp, image); });
+    }
+  }
+  void addOdometry(const VehicleOdometry& odometry) override {
+    detecting_.add([&] { obstacles_->addOdometry(odometry); });
+    if (ranges_) {
+      whole_.add([&] { ranges_->addOdometry(odometry); });
+      return;
+    }
+    while (!stored_.empty() && stored_.begin()->first <= odometry.stamp) {
+      for (const auto& [index, camera] : stored_.begin()->second) {
+        obstacles_->addRangeMap(readRangeMap(range_folder_, camera, stored_.begin()->first));
+      }
+      stored_.erase(stored_.begin());
+    }
+  }
+  void finish() {
+    if (ranges_) {
+      ranges_->finish();
+    }
+    obstacles_->finish();
+  }
+  /// What a core has to do per range map, without reading the bag and without writing the results, which is
+  /// part of detecting.
+  void printTiming(double writing_s) const {
+    if (num_maps_ == 0) {
+      return;
+    }
+    const double per_map_ms = 1000.0 / static_cast<double>(num_maps_);
+    const double sweep_ms = per_map_ms * sweeping_.seconds();
+    const double obstacles_ms = per_map_ms * (detecting_.seconds() - writing_s);
+    const double images_ms =
+        std::max(0.0, per_map_ms * (whole_.seconds() - writing_s) - sweep_ms - obstacles_ms);
+    std::cout << "processor time per range map: " << toText(images_ms + sweep_ms + obstacles_ms, 1)
+              << " ms (images " << toText(images_ms, 1) << ", ranges " << toText(sweep_ms, 1)
+              << ", obstacles " << toText(obstacles_ms, 1) << ")\n";
+  }
+
+ private:
+  ObstacleMapper* obstacles_;
+  ProcessorTime whole_, sweeping_, detecting_;  // the last two are nearly all parts of the first
+  uint64_t num_maps_ = 0;
+  std::unique_ptr<RangeMapper> ranges_;
+  std::string range_folder_;
+  std::map<Timestamp, std::map<size_t, std::string>> stored_;
+};
+
+/// What is written per frame, and counted for the summary.
+class Recorder {
+ public:
+  explicit Recorder(std::string folder) : folder_(std::move(folder)) {
+    table_ = "stamp_ns,camera,state,known_share,pitch_rad,roll_rad,height_m,ground_state,ground_points\n";
+  }
+
+  void add(const ObstacleFrame& frame) {
+    std::vector<ObstacleScan> scans = {frame.scan};
+    for (const CameraObstacles& camera : frame.cameras) {
+      scans.push_back(camera.scan);
+    }
+    writeObstacles(frame.map, scans, folder_);
+    addToHash(frame.map, &hasher_);
+    for (const ObstacleScan& scan : scans) {
+      addToHash(scan, &hasher_);
+    }
+    for (const ObstacleCameraStatus& status : frame.status) {
+      table_ += std::to_string(frame.map.stamp.nanoseconds()) + "," + status.camera_name + "," +
+                toString(status.state) + "," + toText(status.known_share, 4) + "," +
+                toText(status.ground.pitch_rad(), 5) + "," + toText(status.ground.roll_rad(), 5) + "," +
+                toText(status.ground.height_m(), 4) + "," + toString(status.ground.state) + "," +
+                std::to_string(status.ground.num_points) + "\n";
+    }
+    ++num_frames_;
+  }
+
+  void finish(const ObstacleMapper& mapper) const {
+    writeTextFileAtomically(folder_ + "/status.csv", table_);
+    for (const ObstacleCameraStatus& status : mapper.status()) {
+      std::cout << status.camera_name << ": " << status.range_maps << " range maps (" << status.without_pose
+                << " without pose, " << status.late << " late), " << status.message << "\n";
+    }
+    std::cout << "obstacle maps: " << num_frames_ << ", odometry jumps: " << mapper.numJumps() << "\n"
+              << "content hash: " << hasher_.hex() << "\n";
+  }
+  uint64_t numFrames() const { return num_frames_; }
+
+ private:
+  const std::string folder_;
+  std::string table_;
+  ContentHasher hasher_;
+  uint64_t num_frames_ = 0;
+};
+
+void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& options,
+                     const RangeMapperOptions& range_options) {
+  const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
+  if (!std::filesystem::exists(arguments.bag)) {
+    throw InputError(arguments.bag + ": no such file");  // before any folder is made
+  }
+  FolderTransaction output(arguments.output);
+  Recorder recorder(output.path());
+  ProcessorTime writing;
+  ObstacleMapper mapper(rig, options,
+                        [&](const ObstacleFrame& frame) { writing.add([&] { recorder.add(frame); }); });
+  Pipeline pipeline(rig, range_options, arguments.range, &mapper);
+  BagDriveSourceOptions source_options;
+  source_options.cameras = options.cameras;
+  source_options.max_image_gap_s = INFINITY;  // a camera that stops is borne, and told of
+  BagDriveSource source(arguments.bag, rig, source_options);
+  {
+    ProgressBar progress("obstacles");
+    source.run(&pipeline, [&](double fraction) { progress.update(fraction); });
+    pipeline.finish();
+  }
+  if (recorder.numFrames() == 0) {
+    std::string reasons;
+    for (const ObstacleCameraStatus& status : mapper.status()) {
+      reasons += (reasons.empty() ? "" : "; ") + status.camera_name + ": " + status.message;
+    }
+    throw InputError(arguments.bag + ": no obstacle map could be made (" + reasons + ")");
+  }
+  recorder.finish(mapper);
+  pipeline.printTiming(writing.seconds());
+  output.commit();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Finds obstacles and free ground around the vehicle in a recorded drive. Writes, per image stamp, the "
+      "fused map (PGM and YAML as of map_server, float TIFFs) and all scans (CSV), and the state of the "
+      "cameras (status.csv).");
+  Arguments arguments;
+  app.add_option("--bag", arguments.bag, "the drive")->required();
+  app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
+  app.add_option("--options", arguments.options, "YAML with overrides of ObstacleMapperOptions");
+  app.add_option("--range-options", arguments.range_options, "YAML with overrides of RangeMapperOptions");
+  app.add_option("--range", arguments.range,
+                 "folder that compute_range_maps wrote, instead of computing range maps");
+  app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
+  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireNotEmpty);
+  app.add_flag("--show-options", arguments.show_options,
+               "print all options with their values, and do nothing else");
+  return runTool(&app, argc, argv, [&] {
+    ObstacleMapperOptions options;
+    RangeMapperOptions range_options;
+    if (!arguments.options.empty()) {
+      readFieldsFromFile(arguments.options, &options);
+    }
+    if (!arguments.range_options.empty()) {
+      readFieldsFromFile(arguments.range_options, &range_options);
+    }
+    if (!arguments.cameras.empty()) {
+      options.cameras = arguments.cameras;
+    }
+    range_options.cameras = options.cameras;
+    if (arguments.show_options) {
+      std::cout << "# ObstacleMapperOptions\n"
+                << writeFields(options) << "\n# RangeMapperOptions\n"
+                << writeFields(range_options) << "\n";
+      return;
+    }
+    detectObstacles(arguments, options, range_options);
+  });
+}
