@@ -17,7 +17,7 @@ void describe(const std::vector<CatalogueEntry>& entries, const std::string& ind
   }
 }
 
-// Adds to each fault's line the keys that it has.
+// Appends the keys of each fault to its description.
 struct FaultDescriber {
   std::vector<CatalogueEntry> entries = listFaults();
   size_t next = 0;

@@ -34,7 +34,7 @@ DrivePlan planDriveOf(const DriveScenario& scenario) {
   return plan;
 }
 
-// Leaves every step-th image.
+// Keeps every step-th element.
 template <class T>
 void thin(int step, std::vector<T>* list) {
   std::vector<T> kept;
@@ -44,7 +44,7 @@ void thin(int step, std::vector<T>* list) {
   *list = std::move(kept);
 }
 
-// Faults that change what is rendered cannot come from images that were rendered without them.
+// These faults change what is rendered, so images rendered without them cannot be used.
 void checkImagesCanBeReused(const FaultOptions& faults, const std::string& images_from) {
   for (const auto& [name, is_active] : {std::pair("bumped_camera", faults.bumped_camera.isActive()),
                                         std::pair("motion_blur", faults.motion_blur.isActive())}) {
@@ -63,13 +63,13 @@ std::vector<ImageFaults::Camera> faultyCameras(const RecordedCameras& cameras) {
   return list;
 }
 
-// Odometry, counters and truth, in the order of their stamps.
+// Writes odometry, counters and true poses in the order of their stamps.
 class MotionRecorder {
  public:
   MotionRecorder(const SimulatedDrive& drive, const OdometryStampShiftFault& shift, DriveBagWriter* writer)
       : drive_(drive), shift_(shift), writer_(writer) {}
 
-  /// Up to and with `end`, or all that is left.
+  /// Writes everything up to and including `end`, or all that remains.
   void writeUntil(std::optional<Timestamp> end) {
     const auto isDue = [&](const auto& list, size_t i) {
       return i < list.size() && (!end || list[i].stamp <= *end);
@@ -103,7 +103,7 @@ class MotionRecorder {
   size_t odometry_ = 0, truth_ = 0, ticks_ = 0;
 };
 
-// A rig beside its masks.
+// Writes a rig with its masks beside it.
 void writeTruthRig(CameraRig rig, const std::string& folder, const std::string& suffix) {
   for (RigCamera& camera : rig.cameras) {
     camera.mask_file = camera.name + "_mask" + suffix + ".png";
@@ -226,7 +226,8 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   }
   writer.close();
   truth.commit();
-  // A copy for many drives with one rig; its masks are its own, so that it outlives each drive.
+  // Shared by all drives with this rig; it has its own copies of the masks, so it does not depend on the
+  // truth folder.
   createFolder((bag.parent_path() / "rig_truth_masks").string());
   writeCameraRig(rig, (bag.parent_path() / "rig_truth.yaml").string());
 }

@@ -39,7 +39,7 @@ double heightAt(const Renderer& renderer, const Eigen::Vector2d& place_m, double
   }
 }
 
-// Within a YAML map.
+// Writes the keys of an obstacle into an open YAML map.
 void emitObstacle(const Obstacle& obstacle, YAML::Emitter* yaml) {
   *yaml << YAML::Key << "kind" << YAML::Value << obstacle.kind;
   *yaml << YAML::Key << "base_z_m" << YAML::Value << obstacle.base_z_m;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kFullWidth_px = 1280.0;
 constexpr double kMaxBlobLight = 0.15;
-// Thinner lines would fall between the pixels of small images.
+// Thinner lines would fall between the pixels of scaled-down images.
 constexpr double kMinLineHalfWidth_px = 0.6;
 
 template <class Function>
@@ -39,7 +39,7 @@ struct Blob {
   Eigen::Vector2d centre_px;
   double radius_px, light;
 
-  // 1 in the middle, with a soft rim: dirt on the lens is far out of focus.
+  // 1 at the centre with a soft edge, because dirt on the lens is far out of focus.
   double weight(const Eigen::Vector2d& pixel) const {
     const double share = (pixel - centre_px).squaredNorm() / (radius_px * radius_px);
     return std::exp(-share * share);

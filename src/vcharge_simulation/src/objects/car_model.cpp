@@ -19,8 +19,7 @@ double smoothStep(double x) {
   return x * x * (3.0 - 2.0 * x);
 }
 
-// The outline of half a cross section, from the middle of the floor to the middle of the roof, and what is
-// glass in it.
+// Half a cross section, as an outline from the middle of the floor to the middle of the roof.
 struct Section {
   double x;
   std::array<Eigen::Vector2d, kNumProfilePoints> points;  // (y, z), y >= 0
@@ -133,7 +132,8 @@ std::vector<double> stationPositions(const CarShape& shape) {
   return distinct;
 }
 
-// The rings of the body: station by station, once around from the floor over the left side and back.
+// Lofts the body from one closed ring of points per station; each ring runs from the floor over the left side
+// and the roof back along the right side.
 class BodyLoft {
  public:
   BodyLoft(const CarShape& shape, const CarMaterials& materials, TriangleMesh* mesh)

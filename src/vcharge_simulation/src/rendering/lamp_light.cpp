@@ -14,9 +14,9 @@ namespace {
 
 constexpr float kTwoPi = 6.28318531F;
 constexpr float kLift_m = 0.012F;
-// A lamp's light fades to nothing at this distance, so that far lamps cost no rays.
+// The light of a lamp fades to zero at this distance, so that distant lamps need no rays.
 constexpr float kReach_m = 10.0F;
-// Shadow rays end before the lamp's own housing.
+// Shadow rays end before the housing of the lamp.
 constexpr float kHousing_m = 0.16F;
 constexpr float kUpwardShare = 0.2F;
 constexpr float kSidewardShare = 0.25F;
@@ -62,7 +62,7 @@ class LampBaker {
     return sum / static_cast<float>(options_.rays_per_lamp);
   }
 
-  // Light from the floor and everything else that the lamps shine on.
+  // Indirect light from the floor and other lit surfaces.
   float gathered(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, uint32_t hash,
                  const GroundTexture* floor) const {
     const Eigen::Vector3f side = normal.unitOrthogonal();
@@ -83,7 +83,7 @@ class LampBaker {
         continue;
       }
       const Eigen::Vector3f place = start + hit.distance_m * direction;
-      // The corner under a car or behind a pillar is dark itself.
+      // Nearby surfaces in corners under cars and behind pillars are dark themselves.
       const float nearness = std::min(1.0F, hit.distance_m / 0.5F);
       sum += floor != nullptr && place.z() < kFloor_m
                  ? static_cast<float>(options_.floor_albedo) * floor->sampleAt(place.x(), place.y(), 1.0F)

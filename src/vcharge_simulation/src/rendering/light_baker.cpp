@@ -16,7 +16,7 @@ constexpr float kTwoPi = 6.28318531F;
 constexpr float kSunRadius_rad = 0.0047F;
 constexpr float kLift_m = 0.012F;
 constexpr float kFar_m = 120.0F;
-// Surroundings change slowly: they are sampled on a coarser grid than the sun's shadows.
+// Ambient light varies slowly, so it is sampled on a coarser grid than the sun's shadows.
 constexpr int kSurroundingStride = 5;
 constexpr int kSurroundingRays = 32;
 constexpr int kWallRays = 8;
@@ -43,7 +43,7 @@ float freeSky(const RayTracer& tracer, const Eigen::Vector3f& position, const Ei
   return static_cast<float>(free) / static_cast<float>(rays);
 }
 
-// The sun's disk, sampled.
+// Samples directions to the disk of the sun.
 class SunDisk {
  public:
   explicit SunDisk(const Eigen::Vector3f& centre)
@@ -121,7 +121,7 @@ void bakeGroundLight(const Eigen::Vector2d& min_m, const Eigen::Vector2d& max_m,
           placeAt((column + 0.5) * kSurroundingStride - 0.5, (row + 0.5) * kSurroundingStride - 0.5);
       const float free = freeSky(tracer, place, Eigen::Vector3f::UnitZ(), kSurroundingRays,
                                  hashCell(column, row, 78), 25.0F);
-      // What blocks the sky sends some light of its own.
+      // Surfaces that block the sky reflect some light themselves.
       sky_image.at<uint8_t>(row, column) = cv::saturate_cast<uint8_t>(255.0F * (0.15F + 0.85F * free));
     }
   });
@@ -144,7 +144,7 @@ void bakeVertexAmbient(int rays_per_vertex, TriangleMesh* mesh) {
     const Eigen::Vector3f start = vertex.position + 0.02F * vertex.normal;
     const float free =
         freeSky(tracer, start, vertex.normal, rays_per_vertex, mixBits(static_cast<uint32_t>(i)), 3.0F);
-    // A wall sees the open ground in the lower half of its hemisphere: that is no occlusion.
+    // The open ground in the lower half of a wall's hemisphere does not count as occlusion.
     const float expected = 0.5F + 0.5F * vertex.normal.z();
     vertex.ambient = std::min(1.0F, free / std::max(0.1F, expected));
   });

@@ -16,7 +16,7 @@ namespace {
 constexpr int kTableSize = 8192;
 constexpr int kNormalTableBits = 12;
 
-// Quantiles of the normal distribution by bisection of its distribution function.
+// Quantiles of the normal distribution, by bisection of its distribution function.
 std::vector<float> makeNormalTable() {
   std::vector<float> table(1U << kNormalTableBits);
   for (size_t i = 0; i < table.size(); ++i) {
@@ -109,7 +109,7 @@ cv::Mat CameraResponse::addNoise(const cv::Mat& clean, uint64_t seed, int camera
     mean[static_cast<size_t>(gray)] = static_cast<float>(value);
     deviation[static_cast<size_t>(gray)] = static_cast<float>(slope * sigma_light);
   }
-  // One key per image, then one hash per pixel: every pixel's noise depends on nothing but its place.
+  // One key per image and one hash per pixel: noise depends only on the arguments and the pixel's position.
   Random key_source(seed * 0x9E3779B97F4A7C15ULL + static_cast<uint64_t>(frame) * 64U +
                     static_cast<uint64_t>(camera));
   const auto key = static_cast<uint32_t>(key_source.bits());

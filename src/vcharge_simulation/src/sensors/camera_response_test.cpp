@@ -38,7 +38,7 @@ TEST(CameraResponseTest, NoiseHasTheVarianceOfPhotonsAndReadout) {
     const double sigma = slope / options.exposure *
                          std::sqrt(options.photon_noise * exposed + options.read_noise * options.read_noise);
     EXPECT_NEAR(mean[0], gray, 0.15);
-    // Rounding to whole gray levels adds a twelfth.
+    // Rounding to whole gray levels adds a variance of 1/12.
     EXPECT_NEAR(deviation[0], std::sqrt(sigma * sigma + 1.0 / 12.0), 0.06 * sigma + 0.02);
   }
 }

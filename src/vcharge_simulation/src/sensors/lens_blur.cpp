@@ -12,8 +12,8 @@ namespace vcharge {
 
 namespace {
 
-// A step of the kernel [a, 1 - 2 a, a] adds a variance of 2 a; at a = 1/4 it removes the finest pattern
-// altogether, beyond that it would turn it over.
+// A step with the kernel [a, 1 - 2 a, a] adds the variance 2 a. At a = 1/4 it removes the highest frequency;
+// above, it would invert it.
 constexpr double kMaxSpread = 0.25;
 constexpr double kHalfPi = 1.57079632679489661923;
 

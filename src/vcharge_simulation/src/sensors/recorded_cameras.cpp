@@ -10,7 +10,7 @@ namespace vcharge {
 
 namespace {
 
-// Finds cameras of faults that would silently do nothing.
+// Rejects cameras of faults that would silently have no effect.
 struct CameraNameChecker {
   const CameraRig& rig;
   template <class Fault>

@@ -13,7 +13,7 @@ namespace {
 
 using Wheel = WheelSlipFault::Wheel;
 
-// How far the wheel turns, over how far the road asks it to.
+// Wheel rotation relative to the distance rolled on the road.
 double turnFactor(const FaultOptions& faults, Wheel wheel, Duration since_start) {
   double factor = 1.0;
   if (faults.odometry_scale.isActive() && faults.odometry_scale.actsAt(since_start)) {
@@ -26,7 +26,7 @@ double turnFactor(const FaultOptions& faults, Wheel wheel, Duration since_start)
   return factor;
 }
 
-// An odometer knows nothing of counters that never came: it takes them to have grown evenly.
+// Without counters an odometer assumes constant growth during the gap.
 void bridge(const MissingTicksFault& fault, std::vector<int64_t>* counter) {
   const auto indexAt = [&](double time_s) {
     const double index = std::ceil(time_s * VehicleMotion::kStepsPerSecond) + VehicleMotion::marginSteps();
@@ -107,15 +107,15 @@ WheelTicks WheelOdometer::ticks(int milliseconds) const {
 
 WheelOdometer::WheelState WheelOdometer::smoothed(const std::vector<int64_t>& counter,
                                                   int milliseconds) const {
-  // Least-squares parabola over a window that is symmetric about the instant (Savitzky and Golay): its value
-  // is a weighted mean of the counters with weights in closed form, and so is its slope.
+  // Least-squares parabola over a symmetric window (Savitzky and Golay). Its value and its slope at the
+  // centre are weighted sums of the counters with closed-form weights.
   const int half = static_cast<int>(std::lround(options_.smoothing_s * VehicleMotion::kStepsPerSecond));
   const int centre = milliseconds + VehicleMotion::marginSteps();
   const double n = 2.0 * half + 1.0;
   const double s2 = half * (half + 1.0) * n / 3.0;                      // sum of i^2
   const double s4 = s2 * (3.0 * half * half + 3.0 * half - 1.0) / 5.0;  // sum of i^4
   const double determinant = n * s4 - s2 * s2;
-  // Relative to the centre, so that sums stay exact far into a drive.
+  // Relative to the centre, so that the sums stay exact on long drives.
   const int64_t reference = counter.at(static_cast<size_t>(centre));
   double value = 0.0;
   double slope = 0.0;

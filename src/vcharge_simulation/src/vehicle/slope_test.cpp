@@ -16,7 +16,7 @@ TEST(SlopeTest, GroundIsAsBrightAsTheCosineOfTheSunsAngleToIt) {
   LightOptions light;
   light.sky_irradiance = 0.0;
   light.bounce_irradiance = 0.0;
-  // At one place straight below the camera, so that both planes are seen there alike.
+  // Compared at one point below the camera, which lies on both planes.
   const auto lightOn = [&](const Eigen::Vector3d& normal) {
     auto scene = std::make_shared<Scene>();
     scene->sky = std::make_unique<Sky>(light, 1);

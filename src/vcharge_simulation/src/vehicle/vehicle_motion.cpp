@@ -18,8 +18,8 @@ constexpr double kSpeedTimeConstant_s = 0.6;
 constexpr double kBraking_m_per_s2 = 0.8;
 constexpr double kLookAhead_m = 1.5;
 
-// A sum of sines over the distance driven, of standard deviation one: a road that shakes the car only while
-// it moves.
+// Road roughness: a sum of sines over the distance driven, with standard deviation one. The car shakes only
+// while it moves.
 class RoadNoise {
  public:
   explicit RoadNoise(Random* random) {
@@ -58,7 +58,7 @@ class Spring {
   double omega_, value_ = 0.0, rate_ = 0.0;
 };
 
-// Where the four wheels stand.
+// Ground heights under the four wheels.
 class WheelContacts {
  public:
   WheelContacts(const GroundHeight& ground_height, const VehicleMotionOptions& options,
@@ -76,7 +76,7 @@ class WheelContacts {
 
   double rear_left_m, rear_right_m;
 
-  /// Rise over distance towards the front.
+  /// Rise over distance along x.
   double slope() const {
     return 0.5 * (front_left_m_ + front_right_m_ - rear_left_m - rear_right_m) / wheelbase_m_;
   }
@@ -91,15 +91,15 @@ class WheelContacts {
   double front_left_m_, front_right_m_;
 };
 
-// Length of the way over ground that rises by `rise_m`, with the sign of the way seen from above.
+// Distance along the surface for a horizontal distance (which gives the sign) and a rise.
 double alongSurface(double horizontal_m, double rise_m) {
   return std::copysign(std::hypot(horizontal_m, rise_m), horizontal_m);
 }
 
-// Distance before a stop at which the car aims to stand: it follows the wanted speed with a delay.
+// The car aims to stop this far before a stop, because it follows the desired speed with a delay.
 constexpr double kStopReserve_m = 0.4;
 constexpr double kStanding_m_per_s = 0.02;
-// A car that stands within this distance of the path's end has arrived.
+// A car that stands within this distance of the end of the path has arrived.
 constexpr double kEnd_m = 1.0;
 
 double desiredSpeed(const DrivePath& path, const VehicleMotionOptions& options, double s_m,
@@ -152,10 +152,10 @@ VehicleMotion::VehicleMotion(const DrivePath& path, const VehicleMotionOptions& 
 
   const bool from_rest = options.standstill_s > 0.0;
   double speed = from_rest ? 0.0 : desiredSpeed(path, options, 0.0, wave_phase_rad);
-  // A moving start has come along a straight line before the path.
+  // A moving start arrives on a straight line before the path.
   double s_m = from_rest ? 0.0 : -speed * kMargin_s;
   auto stop = path.stops().begin();
-  double stop_ends_s = -1.0;  // of the stop at which the car stands; negative: it drives
+  double stop_ends_s = -1.0;  // end of the current stop; negative while driving
   double direction = path.direction(s_m);
   MotionSample sample;
   sample.world_from_planar = path.worldFromStart() * arcMotion(direction * s_m, 0.0);
@@ -173,7 +173,7 @@ VehicleMotion::VehicleMotion(const DrivePath& path, const VehicleMotionOptions& 
       --remaining_after_end;
     }
     if (stop_ends_s >= 0.0 && time_s >= stop_ends_s) {
-      // It may stand a little short of its stop.
+      // The car may stand slightly before the stop.
       s_m = stop->at_m;
       direction = path.direction(s_m);
       ++stop;

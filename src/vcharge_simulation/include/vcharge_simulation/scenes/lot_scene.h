@@ -20,13 +20,14 @@ struct LotOptions {
   void validate() const;           ///< throws std::invalid_argument naming the field
 };
 
-/// An outdoor parking lot of 80 x 60 m: lanes of asphalt and cobbles around two double rows of bays, parked
-/// cars, trees, hedges, kerbs, posts, fences and houses around it. The same options give the same scene.
+/// Builds an outdoor parking lot of 80 x 60 m: lanes of asphalt and cobbles around two double rows of bays,
+/// parked cars, trees, hedges, kerbs, posts and fences, with houses around it. The same options give the same
+/// scene.
 std::shared_ptr<const Scene> buildLotScene(const LotOptions& options);
 
-/// Drives through the lot: loops, short ones, and manoeuvres.
+/// Drives in the lot: loops, short drives and manoeuvres.
 std::vector<CatalogueEntry> listLotDrives();
-/// std::invalid_argument for a name that listLotDrives() does not have.
+/// Throws std::invalid_argument for a name that is not in listLotDrives().
 DrivePlan planLotDrive(const std::string& name);
 
 }  // namespace vcharge

@@ -26,28 +26,28 @@ struct SceneOptions {
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
-/// SceneOptions::board as a target file of Kalibr. std::invalid_argument for an unknown one.
+/// Kalibr target file of SceneOptions::board. Throws std::invalid_argument for an unknown board.
 std::string boardTarget(const std::string& board);
 
-/// A drive through a scene.
+/// A drive in a scene.
 struct DrivePlan {
   std::string name;
   DrivePath path;
   VehicleMotionOptions motion;
-  int day = 0;                           ///< on which the drive takes place
-  GroundHeight ground_height = nullptr;  ///< of the scene; null: level at z = 0
-  double start_s = 0.0;                  ///< time of the scene's movers when the drive starts
+  int day = 0;                           ///< SceneOptions::day of the drive
+  GroundHeight ground_height = nullptr;  ///< ground of the scene; null: level at z = 0
+  double start_s = 0.0;                  ///< scene time at the start of the drive
 };
 
-/// Name and one line about each scene, and each drive of a scene.
+/// Name and one-line description of a scene, drive, rig or fault.
 struct CatalogueEntry {
   std::string name, description;
 };
 std::vector<CatalogueEntry> listScenes();
 std::vector<CatalogueEntry> listDrives(const std::string& scene);
 
-/// std::invalid_argument that lists the names there are for an unknown one. The same options give the same
-/// scene.
+/// Both throw std::invalid_argument that lists the known names for an unknown one. The same options give the
+/// same scene.
 std::shared_ptr<const Scene> buildScene(const std::string& name, const SceneOptions& options);
 DrivePlan planDrive(const std::string& scene, const std::string& drive);
 

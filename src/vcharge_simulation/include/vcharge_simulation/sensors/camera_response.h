@@ -26,24 +26,23 @@ struct CameraResponseOptions {
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
-/// Gray curve: gray = 255 min(1, x (1 + w) / (x + w))^gamma with x = exposure * light and w = shoulder.
-/// Noise can be added to an image that was rendered without it, so that many noisy drives cost one rendering.
-/// Immutable, thread safe.
+/// Gray curve: gray = 255 min(1, x (1 + w) / (x + w))^gamma with x = exposure * light and w = shoulder. Noise
+/// is added to noise-free images, so that one rendering serves many noisy drives. Immutable, thread safe.
 class CameraResponse {
  public:
   explicit CameraResponse(const CameraResponseOptions& options = CameraResponseOptions());
 
-  /// CV_32FC1 light -> CV_8UC1 gray, without noise.
+  /// Converts light (CV_32FC1) to gray (CV_8UC1) without noise.
   cv::Mat develop(const cv::Mat& light) const;
 
-  /// The image as a sensor with photon and read noise would have seen it, at `gain` times the exposure.
-  /// Depends only on the arguments. `clean` is CV_8UC1.
+  /// Adds photon and read noise to a noise-free image (CV_8UC1) at `gain` times the exposure. The result
+  /// depends only on the arguments.
   cv::Mat addNoise(const cv::Mat& clean, uint64_t seed, int camera, int64_t frame, double gain = 1.0) const;
 
-  /// The image (CV_8UC1) at `gain` times the exposure, without noise.
+  /// Noise-free image (CV_8UC1) at `gain` times the exposure.
   cv::Mat expose(const cv::Mat& clean, double gain) const;
 
-  /// Gray value (0 to 255, not rounded) of an amount of light.
+  /// Gray value in [0, 255], not rounded, of an amount of light.
   double grayFromLight(double light) const;
   /// Inverse of grayFromLight, for gray in [0, 255].
   double lightFromGray(double gray) const;

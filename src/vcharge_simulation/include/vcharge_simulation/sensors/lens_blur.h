@@ -22,22 +22,22 @@ struct LensOptions {
   double blurAt(double angle_rad, double image_scale) const;
 };
 
-/// Blurs an image by a Gaussian of another width at every pixel: repeated steps of diffusion along rows and
-/// columns. Immutable, thread safe; same bytes on any number of threads.
+/// Blurs an image by a Gaussian whose width varies per pixel, by repeated diffusion steps along rows and
+/// columns. Immutable, thread safe; same bytes for any number of threads.
 class LensBlur {
  public:
   LensBlur() = default;
-  /// `sigma_px`: CV_32FC1, the standard deviation at each pixel, at most kMaxSigma_px.
+  /// `sigma_px` (CV_32FC1) is the standard deviation at each pixel, at most kMaxSigma_px.
   explicit LensBlur(const cv::Mat& sigma_px);
 
   static constexpr double kMaxSigma_px = 1.4;
 
-  /// In place; `light` is CV_32FC1 of the same size. Neighbours beyond the border repeat it.
+  /// Blurs in place; `light` is CV_32FC1 of the same size. The border is replicated.
   void apply(cv::Mat* light) const;
 
  private:
   int num_steps_ = 0;
-  cv::Mat spread_;  // share of each neighbour's difference that flows in per step
+  cv::Mat spread_;  // fraction of the difference to each neighbour that flows in per step
 };
 
 }  // namespace vcharge

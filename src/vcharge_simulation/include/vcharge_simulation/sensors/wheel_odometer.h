@@ -26,20 +26,19 @@ struct WheelOdometerOptions {
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
-/// Counters of the rear wheels, and the dead reckoning that a good odometer makes of them. Quantization is a
-/// bounded error of the counters, so the filter fits a parabola to the counters around each instant instead
-/// of summing noisy increments; a wrong wheel radius stays in the result as drift.
+/// Counters of the rear wheels, and dead reckoning from them. Quantization is a bounded error of each
+/// counter, so the filter fits a parabola to the counters around each instant (Savitzky and Golay) instead of
+/// summing noisy increments; a wrong wheel radius remains as drift.
 class WheelOdometer {
  public:
-  /// `seed` sets where in a tick the wheels stand at the start. Of the faults, those of wheels and counters
-  /// act.
+  /// `seed` selects the phase of the counters at the start. Only faults of wheels and counters act here.
   WheelOdometer(const VehicleMotion& motion, const WheelOdometerOptions& options, uint64_t seed,
                 const FaultOptions& faults = FaultOptions());
 
-  /// Raw counters at a whole millisecond of the drive, from zero at its start and at a reset.
+  /// Raw counters at a whole millisecond of the drive; zero at the start and at a reset.
   WheelTicks ticks(int milliseconds) const;
-  /// Planar dead reckoning at increasing milliseconds; the pose at the first one, and at the first one after
-  /// a reset, is the identity. Stamps are left to the caller.
+  /// Planar dead reckoning at increasing milliseconds. The first pose, and the first one after a reset, is
+  /// the identity. The caller sets the stamps.
   std::vector<VehicleOdometry> deadReckoning(const std::vector<int>& milliseconds) const;
 
  private:
@@ -52,7 +51,7 @@ class WheelOdometer {
   WheelOdometerOptions options_;
   FaultOptions faults_;
   const VehicleMotion& motion_;
-  std::vector<int64_t> left_, right_;  // one per millisecond
+  std::vector<int64_t> left_, right_;  // one value per millisecond
 };
 
 }  // namespace vcharge

@@ -48,33 +48,33 @@ struct VehicleMotionOptions {
 
 /// State of the vehicle at one instant.
 struct MotionSample {
-  RigidTransform world_from_planar;  ///< rear axle, in the plane z = 0
-  RigidTransform planar_from_body;   ///< the ground's height, pitch and roll, and those on the springs, about
-                                     ///< the vehicle frame's origin
-  double speed_m_per_s = 0.0;        ///< along the ground; negative backwards
+  RigidTransform world_from_planar;  ///< pose of the rear axle, projected to z = 0
+  RigidTransform planar_from_body;  ///< height, pitch and roll of the ground and of the suspension, about the
+                                    ///< vehicle origin
+  double speed_m_per_s = 0.0;       ///< along the ground, negative when driving backwards
   double curvature_per_m = 0.0;
-  double left_wheel_m = 0.0;  ///< distance that the rear wheels rolled
+  double left_wheel_m = 0.0;  ///< distance rolled by the rear wheels
   double right_wheel_m = 0.0;
 
   RigidTransform worldFromVehicle() const { return world_from_planar * planar_from_body; }
 };
 
-/// Millisecond-by-millisecond motion along a path: each step is an exact circular arc of the bicycle model,
-/// seen from above. On ground that is not level the four wheels lift, pitch and roll the car, and they roll
-/// as far as the ground's surface is long. Covers kMargin_s before time 0 and after duration(), so that
-/// filters can look both ways.
+/// Motion along a path in steps of one millisecond, each an exact circular arc of the bicycle model as seen
+/// from above. On uneven ground the four wheel contacts set height, pitch and roll, and the wheels roll along
+/// the ground's surface. Covers kMargin_s before time 0 and after duration(), so that filters can use samples
+/// on both sides.
 class VehicleMotion {
  public:
   static constexpr int kStepsPerSecond = 1000;
   static constexpr double kMargin_s = 0.5;
 
-  /// ground_height: null where the ground is level at z = 0.
+  /// A null `ground_height` means level ground at z = 0.
   VehicleMotion(const DrivePath& path, const VehicleMotionOptions& options, uint64_t seed,
                 const GroundHeight& ground_height = nullptr);
 
-  /// Until the end of the path, or options.duration_s.
+  /// Time of the end of the path, at most options.duration_s.
   double duration() const { return duration_s_; }
-  /// Steps before time 0.
+  /// Number of samples before time 0.
   static int marginSteps() { return static_cast<int>(kMargin_s * kStepsPerSecond); }
   const std::vector<MotionSample>& samples() const { return samples_; }
   /// State at a whole millisecond in [-margin, duration + margin].

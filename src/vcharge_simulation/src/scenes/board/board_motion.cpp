@@ -14,12 +14,14 @@ namespace vcharge {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kToRim_rad = 0.012;  // between the board's outermost corner and the field of view's end
+constexpr double kToRim_rad =
+    0.012;  // between the outermost corner of the board and the end of the field of view
 constexpr double kToBorder_px = 4.0;
 constexpr double kMinHeight_m = 0.08;
 constexpr double kMinDistance_m = 0.7;
 constexpr double kMaxDistance_m = 2.1;
-constexpr double kOuterShare = 0.6;  // of the places: the others come to the rim, one further than the other
+constexpr double kOuterShare =
+    0.6;  // fraction of poses sampled over the whole image; the rest have a corner at an angle near the rim
 
 class BoardPlacer {
  public:
@@ -29,7 +31,7 @@ class BoardPlacer {
         size_m_(size_m),
         max_angle_rad_(0.5 * camera.field_of_view_rad - kToRim_rad) {}
 
-  // In the camera's frame, from the middle of the image to its rim in no particular order.
+  // Poses in the camera frame, from the image centre to its rim in a fixed mixed order.
   std::vector<RigidTransform> place(uint64_t seed) const {
     constexpr int kTries = 600;
     Random random(seed);
@@ -49,7 +51,8 @@ class BoardPlacer {
   }
 
  private:
-  // At a direction from the camera, facing it but for a tilt. share 1: its corners come to the rim.
+  // Samples a pose in some direction from the camera, facing it up to a tilt. With `fraction` near 1 the
+  // corners reach the rim.
   RigidTransform sample(double share, Random* random) const {
     const double around_rad = random->uniform(0.0, 2.0 * kPi);
     const double distance_m = kMinDistance_m * std::pow(kMaxDistance_m / kMinDistance_m, random->uniform());
@@ -67,7 +70,7 @@ class BoardPlacer {
     if (share < kOuterShare) {
       return sheet;
     }
-    // Turned about the camera until its outermost corner lies where it should.
+    // Rotates the board about the camera until its outermost corner is at the desired angle.
     const double outwards_rad = max_angle_rad_ * std::sqrt(share) - outermostAngle(sheet);
     const Eigen::Vector3d axis(-std::sin(around_rad), std::cos(around_rad), 0.0);
     return RigidTransform(rotationFromVector(outwards_rad * axis), Eigen::Vector3d::Zero()) * sheet;

@@ -46,7 +46,7 @@ TEST(BoardMotionTest, ShowsEveryCameraOfAnyRigTheWholeBoardOutToTheRim) {
             EXPECT_GT((*seeing.vehicle_from_camera * in_camera).z(), 0.05) << label;
           }
         }
-        // The outer squares and the margin lie beyond the corners: 0.2 m along the diagonal, at 1.3 m or
+        // The outer squares and the margin extend 0.2 m along the diagonal beyond the corners, at 1.3 m or
         // more.
         EXPECT_GT(largest_rad, 0.5 * seeing.field_of_view_rad - 0.2 / 1.2) << label;
         EXPECT_LT(smallest_rad, 0.1) << label;
@@ -72,8 +72,8 @@ TEST(BoardPatternTest, TagsAreThoseOfTheFamilyWhereTheirCornersAre) {
                            corners, ids, parameters);
   ASSERT_EQ(ids.size(), 36U);
   for (size_t i = 0; i < ids.size(); ++i) {
-    // OpenCV starts at what it holds for the upper left corner and turns clockwise on the sheet; its tags
-    // stand on their heads, so that this is the lower right one.
+    // OpenCV lists corners clockwise from the upper left one. Its tags are rotated by half a turn, so its
+    // first corner is the lower right one on the sheet.
     constexpr size_t kFirst[] = {1, 0, 3, 2};
     for (size_t k = 0; k < 4; ++k) {
       const Eigen::Vector3d on_sheet =

@@ -54,7 +54,7 @@ MoverState boardAt(const Board& board, double time_s) {
 std::shared_ptr<const Scene> buildBoardScene(const SceneOptions& options) {
   LotVariant variant;
   variant.layout = makeLotLayout(static_cast<uint64_t>(options.seed), options.day, options.moved_cars);
-  // No car stands where the board is held.
+  // Keeps the area around the car free for the board.
   const Eigen::Vector2d place = worldFromVehicle().translation().head<2>();
   variant.layout.cars.erase(std::remove_if(variant.layout.cars.begin(), variant.layout.cars.end(),
                                            [&](const ParkedCar& car) {

@@ -19,13 +19,13 @@ constexpr double kDetailTexel_m = 0.0035;
 constexpr float kLampRadiance = 2.4F;
 constexpr double kCeilingTexel_m = 0.1;
 constexpr double kCeilingAlbedo = 0.6;
-// Of the share 1 of the baked light: the camera is exposed for the garage.
+// Irradiance at baked light 1; the camera's exposure is set for the garage.
 constexpr double kFullIrradiance = 4.5;
 constexpr double kTypicalCeilingShare = 0.12;
-// Ducts and lamps hang above this.
+// Ducts and lamps are above this height.
 constexpr double kOverhead_m = 2.1;
 constexpr float kFloorReflectivity = 0.03F;
-// Lamps bake onto the corners of cells of this size.
+// Panels are split into cells of this size, because lamp light is baked at their corners.
 constexpr double kLightCell_m = 0.5;
 
 LightOptions lampLight() {
@@ -92,7 +92,7 @@ class GarageBuilder {
     parts_.addLevel(kGarageArea, 0.0, material);
   }
 
-  // A flat panel in cells, so that the light on its corners is fine enough.
+  // Adds a flat panel, split into cells to resolve the light baked at their corners.
   void addPanel(const Eigen::Vector3f& corner, const Eigen::Vector3f& along, const Eigen::Vector3f& up,
                 uint32_t material, const TextureWindow& window = TextureWindow()) {
     const int columns = std::max(1, static_cast<int>(std::ceil(along.norm() / kLightCell_m)));
@@ -117,7 +117,7 @@ class GarageBuilder {
   void addWalls() {
     const std::vector<Eigen::Vector2d> outline = cornersOf(kGarageArea);
     for (size_t i = 0; i < outline.size(); ++i) {
-      // Seen from inside, the outline runs the other way.
+      // The outline is reversed so that the walls face inwards.
       const Eigen::Vector2d& from = outline[(i + 1) % outline.size()];
       const Eigen::Vector2d edge = outline[i] - from;
       const uint32_t wall =
@@ -162,7 +162,7 @@ class GarageBuilder {
     for (const double x : layout_.beam_x) {
       beam(x, 0.0, area.depth(), 0.36, false);
     }
-    // Flush beams would share a face: the ones along the garage are a little higher and narrower.
+    // Beams along the garage are slightly narrower, so that crossing beams do not share faces.
     for (const double y : layout_.beam_y) {
       beam(0.0, y, area.width(), 0.3, true);
     }
@@ -183,14 +183,14 @@ class GarageBuilder {
         addPanel(vector(corners[i].x(), corners[i].y(), 0.0), vector(edge.x(), edge.y(), 0.0),
                  vector(0.0, 0.0, kGarageHeight_m), material, {u, 0.0F, u + 0.25F, 1.0F});
       }
-      // Seen from above without what hangs overhead, a pillar is solid.
+      // A lid at the overhead limit, so that the height map sees a solid pillar.
       parts_.addLevel({corners[0].x(), corners[0].y(), corners[2].x(), corners[2].y()}, kOverhead_m - 0.01,
                       material);
       scene().obstacles.push_back({"pillar", corners, 0.0, kGarageHeight_m});
     }
   }
 
-  // Sprinkler pipes and a duct under the beams, in pieces so that each gets its own light.
+  // Sprinkler pipes and a duct under the beams, in pieces that each get their own baked light.
   void addPipes() {
     constexpr double kPiece_m = 2.0;
     const auto pipe = [&](double y, double z, double radius, uint32_t material) {
@@ -234,7 +234,7 @@ class GarageBuilder {
               {lamp.centre.x() - half.x(), lamp.centre.y() - half.y(), low}, light, &scene().mesh);
       addBox(placement(lamp.centre.x(), lamp.centre.y(), lamp.centre.z() + 0.06, 0.0),
              size + Eigen::Vector3f(0.06F, 0.06F, -0.02F), housing, &scene().mesh);
-      // It hangs from the ceiling.
+      // Rod to the ceiling.
       addFrustum(lamp.centre, {lamp.centre.x(), lamp.centre.y(), static_cast<float>(kGarageHeight_m)}, 0.015F,
                  0.015F, 5, false, housing, &scene().mesh);
     }

@@ -32,7 +32,7 @@ cv::Mat drawWall(double width_m, double height_m, bool bricks, double tone, uint
                                     (shifted - static_cast<float>(column)) * 0.25F);
         value *= edge < 0.02F ? 1.35F : 0.75F + 0.5F * cellValue(column, row, seed + 3);
       }
-      // Rain streaks below the roof, splashes above the ground.
+      // Rain streaks and splashes above the ground.
       const float streak = std::max(0.0F, valueNoise(u * 3.0F, v * 0.25F, seed + 5));
       value *= 1.0F - 0.25F * streak - 0.3F * std::max(0.0F, 1.0F - v / 0.7F);
       wall.at<uint8_t>(y, x) = cv::saturate_cast<uint8_t>(255.0F * value);

@@ -66,13 +66,13 @@ TEST(LotSceneTest, HeightMapHoldsEveryObstacleAtItsHeight) {
     }
     const float height_m = heightAt(middle.x(), middle.y());
     if (obstacle.kind == "car") {
-      // The roof over the middle of the cabin, or the bonnet.
+      // The roof above the middle of the cabin, or the bonnet.
       EXPECT_GT(height_m, 0.5 * obstacle.top_z_m);
       EXPECT_LT(height_m, obstacle.top_z_m + 0.02);
     } else if (obstacle.kind == "bin" || obstacle.kind == "hedge") {
       EXPECT_NEAR(height_m, obstacle.top_z_m, 0.25) << obstacle.kind;
     } else if (obstacle.kind == "kerb") {
-      // Its middle may carry a hedge.
+      // A hedge may stand in the middle of an island.
       EXPECT_GE(height_m, obstacle.top_z_m - 1e-4);
     }
     ++seen[obstacle.kind];
@@ -84,7 +84,7 @@ TEST(LotSceneTest, HeightMapHoldsEveryObstacleAtItsHeight) {
 
 TEST(LotSceneTest, WhatStandsOutOfTheGroundBelongsToAnObstacle) {
   const TruthHeightMap& map = heightMap();
-  // Footprints drawn on the grid, grown by a cell and by the reach of leaves and mirrors.
+  // Footprints on the grid, dilated by the reach of leaves and mirrors.
   cv::Mat covered = cv::Mat::zeros(map.height_m.size(), CV_8UC1);
   for (const Obstacle& obstacle : lot().scene().obstacles) {
     std::vector<cv::Point> polygon;
@@ -100,7 +100,7 @@ TEST(LotSceneTest, WhatStandsOutOfTheGroundBelongsToAnObstacle) {
   for (int row = 0; row < map.height_m.rows; ++row) {
     for (int column = 0; column < map.height_m.cols; ++column) {
       const float height_m = map.height_m.at<float>(row, column);
-      // Low branches of trees reach beyond the trunks that are their footprints.
+      // Low branches extend beyond the trunk that is the tree's footprint.
       if (height_m > 0.3F && height_m < 1.4F) {
         ++standing;
         unexplained += covered.at<uint8_t>(row, column) == 0 ? 1 : 0;
@@ -134,7 +134,7 @@ TEST(LotSceneTest, OnAnotherDaySomeCarsHaveMovedAndAllElseStands) {
     kept += static_cast<int>(after.count(place));
   }
   const double share = static_cast<double>(kept) / static_cast<double>(before.size());
-  EXPECT_GT(share, 0.55);  // 30 % of the bays are drawn anew, binomially
+  EXPECT_GT(share, 0.55);  // 30 % of the bays are redrawn at random
   EXPECT_LT(share, 0.85);
   EXPECT_GT((lot().scene().sky->directionToSun() - other_day->sky->directionToSun()).norm(), 0.3F);
 }

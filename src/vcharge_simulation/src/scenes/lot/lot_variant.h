@@ -10,13 +10,13 @@ namespace vcharge {
 
 class SceneParts;
 
-/// What another scene on the lot's ground changes about the lot.
+/// Changes that other scenes on the lot's ground make to the lot.
 struct LotVariant {
   LotLayout layout;
-  std::function<void(SceneParts*)> add_things;  ///< last of all, before light is baked; may be null
-  /// Replaces the level ground of kLotArea, given its material; may be null.
+  std::function<void(SceneParts*)> add_things;  ///< called last, before light is baked; may be null
+  /// Replaces the level ground of kLotArea; receives its material; may be null.
   std::function<void(uint32_t, SceneParts*)> add_ground;
-  GroundHeight ground_height;  ///< of the ground without islands; null: level
+  GroundHeight ground_height;  ///< ground without islands; null: level at z = 0
 };
 
 std::shared_ptr<const Scene> buildLotVariant(const LotOptions& options, const LotVariant& variant);

@@ -19,7 +19,7 @@ ParkedCar parkedCar(const ParkingBay& bay, Random* random) {
   car.yaw_rad = bay.yaw_rad + random->normal() * 0.02;
   car.yaw_rad += random->chance(0.5) ? kPi : 0.0;
   const CarShape& shape = carShapes()[static_cast<size_t>(car.shape)];
-  // The bay's centre is the car's centre, not its rear axle.
+  // The centre of the car, not its rear axle, is at the centre of the bay.
   const double middle = 0.5 * (shape.front() + shape.rear());
   const double along = random->normal() * 0.12;
   const double across = random->normal() * 0.1;
