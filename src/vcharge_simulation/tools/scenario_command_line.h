@@ -24,8 +24,7 @@ class ScenarioCommandLine {
 
  private:
   template <class T>
-  CLI::Option* add(CLI::App* app, const std::string& name, T DriveScenario::*field,
-                   const std::string& description);
+  CLI::Option* add(CLI::App* app, T DriveScenario::*field);
 
   std::string file_, noise_ = "on";
   std::vector<std::string> settings_;

@@ -26,6 +26,9 @@ namespace vcharge {
 
 namespace {
 
+// The height map leaves out tree crowns and lamps above this height over the ground.
+constexpr double kHeightLimit_m = 2.5;
+
 DrivePlan planDriveOf(const DriveScenario& scenario) {
   DrivePlan plan = planDrive(scenario.scene, scenario.drive);
   if (scenario.duration_s > 0.0) {
@@ -120,15 +123,8 @@ void writeRange(const cv::Mat& range_m, const std::string& folder, Timestamp sta
 
 }  // namespace
 
-void RecordingOptions::validate() const {
-  requireField(std::isfinite(height_cell_m) && height_cell_m >= 0.01, "height_cell_m",
-               "must be at least 0.01", height_cell_m);
-  requireField(std::isfinite(height_limit_m), "height_limit_m", "must be a number", height_limit_m);
-}
-
 void recordDrive(const DriveScenario& scenario, const RecordingOptions& recording) {
   scenario.validate();
-  recording.validate();
   const DrivePlan plan = planDriveOf(scenario);
   const std::filesystem::path bag(recording.bag);
   const std::string truth_name = bag.stem().string() + "_truth";
@@ -152,21 +148,21 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
     scene_times_s.push_back(plan.start_s +
                             1e-9 * static_cast<double>((stamp - drive.ground_truth.front().stamp).count()));
   }
-  const CameraResponse response(scenario.response);
+  const CameraResponse response;
   std::optional<Renderer> renderer;
   std::unique_ptr<ImageSource> images;
   writeTrajectory(drive.world_from_vehicle, truth.path() + "/trajectory.tum");
   if (recording.images_from.empty()) {
     SceneOptions scene;
-    scene.seed = scenario.scene_seed;
+    scene.seed = static_cast<uint64_t>(scenario.scene_seed);
     scene.day = plan.day;
     scene.image_scale = scenario.image_scale;
     scene.board = scenario.board;
     scene.rig = scenario.rig;
-    scene.rig_seed = scenario.rig_seed;
+    scene.rig_seed = static_cast<uint64_t>(scenario.rig_seed);
     renderer.emplace(buildScene(scenario.scene, scene));
     images = renderImages(*renderer, cameras, response, drive, scene_times_s, faults.motion_blur);
-    writeHeightMap(computeHeightMap(*renderer, recording.height_cell_m, recording.height_limit_m),
+    writeHeightMap(computeHeightMap(*renderer, recording.height_cell_m, kHeightLimit_m),
                    truth.path() + "/height_map");
     writeObstacles(renderer->scene().obstacles, truth.path() + "/obstacles.yaml");
     if (!renderer->scene().movers.empty()) {

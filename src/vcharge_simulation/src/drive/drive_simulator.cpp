@@ -27,8 +27,8 @@ std::vector<RigidTransform> exposurePoses(const VehicleMotion& motion, int middl
                                           const MotionBlurFault& blur) {
   std::vector<RigidTransform> poses;
   for (int i = 0; i < blur.renderings; ++i) {
-    const double share = (i + 0.5) / blur.renderings - 0.5;
-    poses.push_back(worldFromVehicleAt(motion, middle_ms + 1000.0 * share * blur.exposure_time_s));
+    const double fraction = (i + 0.5) / blur.renderings - 0.5;
+    poses.push_back(worldFromVehicleAt(motion, middle_ms + 1000.0 * fraction * blur.exposure_time_s));
   }
   return poses;
 }

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "vcharge_simulation/scenes/lot_scene.h"
+#include "scenes/lot/lot_scene.h"
 
 namespace vcharge {
 namespace {

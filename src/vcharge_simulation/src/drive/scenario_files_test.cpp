@@ -86,15 +86,15 @@ TEST(ScenarioFilesTest, MappingDrivesLastLongDriveLanesInBothDirectionsAndDrift)
     // Directions of travel (along x or y, to the nearest quarter turn) in each cell of 5 x 5 m.
     std::map<std::pair<int, int>, std::set<int>> directions;
     for (const VehicleOdometry& truth : simulated.ground_truth) {
-      const Eigen::Vector3d place_m = truth.odom_from_vehicle.translation();
+      const Eigen::Vector3d position_m = truth.odom_from_vehicle.translation();
       const double yaw_rad = yawOfRotation(truth.odom_from_vehicle.rotation());
       const int quarter = static_cast<int>(std::lround(yaw_rad / 1.57079632679)) & 3;
-      directions[{static_cast<int>(std::floor(place_m.x() / 5.0)),
-                  static_cast<int>(std::floor(place_m.y() / 5.0))}]
+      directions[{static_cast<int>(std::floor(position_m.x() / 5.0)),
+                  static_cast<int>(std::floor(position_m.y() / 5.0))}]
           .insert(quarter);
     }
     int both = 0;
-    for (const auto& [place, quarters] : directions) {
+    for (const auto& [cell, quarters] : directions) {
       both +=
           (quarters.count(0) + quarters.count(2) == 2 || quarters.count(1) + quarters.count(3) == 2) ? 1 : 0;
     }
@@ -119,8 +119,8 @@ TEST(ScenarioFilesTest, EveryMappedSceneHasAnotherDayBesideAndInTheOppositeDirec
       const auto southern_y = [](const SimulatedDrive& drive) {
         double y = 0.0;
         for (const VehicleOdometry& truth : drive.ground_truth) {
-          const Eigen::Vector3d place_m = truth.odom_from_vehicle.translation();
-          y = std::abs(place_m.x() - 5.0) < 1.0 && place_m.y() < -10.0 ? place_m.y() : y;
+          const Eigen::Vector3d position_m = truth.odom_from_vehicle.translation();
+          y = std::abs(position_m.x() - 5.0) < 1.0 && position_m.y() < -10.0 ? position_m.y() : y;
         }
         return y;
       };

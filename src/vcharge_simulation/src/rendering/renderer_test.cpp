@@ -6,7 +6,7 @@
 #include <tbb/global_control.h>
 #include <opencv2/imgproc.hpp>
 
-#include "vcharge_simulation/scenes/lot_scene.h"
+#include "scenes/lot/lot_scene.h"
 #include "vcharge_simulation/sensors/camera_response.h"
 #include "vcharge_simulation/sensors/golf_rig.h"
 
@@ -18,10 +18,8 @@ constexpr double kDegree = 3.14159265358979323846 / 180.0;
 // A lot with coarser maps than the default: quick to build, sharp enough for small images.
 std::shared_ptr<const Renderer> testLot() {
   static const std::shared_ptr<const Renderer> renderer = [] {
-    LotOptions options;
-    options.ground_texel_m = 0.025;
-    options.light_texel_m = 0.1;
-    options.foliage_density = 0.5;
+    SceneOptions options;
+    options.image_scale = options.detail = 0.5;
     return std::make_shared<const Renderer>(buildLotScene(options));
   }();
   return renderer;

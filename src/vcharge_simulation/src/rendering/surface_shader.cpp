@@ -63,16 +63,16 @@ float SurfaceShader::towardsSun(const Eigen::Vector3f& ground_normal) const {
   return std::max(0.0F, up * ground_normal.dot(sky_.directionToSun()));
 }
 
-float SurfaceShader::groundLight(const Eigen::Vector3f& position, float width_m, float sun_share) const {
+float SurfaceShader::groundLight(const Eigen::Vector3f& position, float width_m, float sun_fraction) const {
   float surrounding = 1.0F;
   if (scene_.ground.sun != nullptr) {
     const float level = fastLog2(width_m * scene_.ground.sun->texels_per_m);
-    sun_share *= scene_.ground.sun->sampleAt(position.x(), position.y(), level);
+    sun_fraction *= scene_.ground.sun->sampleAt(position.x(), position.y(), level);
   }
   if (scene_.ground.surrounding != nullptr) {
     surrounding = scene_.ground.surrounding->sampleAt(position.x(), position.y(), 0.0F);
   }
-  return static_cast<float>(sky_.light().sun_irradiance) * sun_share +
+  return static_cast<float>(sky_.light().sun_irradiance) * sun_fraction +
          static_cast<float>(sky_.light().sky_irradiance) * surrounding;
 }
 
@@ -106,8 +106,8 @@ float SurfaceShader::groundReflection(const Material& material, const Eigen::Vec
   }
   // A rough polish reflects grazing rays better than steep ones, but far less than glass does.
   const float m = 1.0F + std::min(0.0F, direction.z());
-  const float share = material.reflectivity * (1.0F + kGrazingGloss * m * m * m * m * m);
-  return share * surroundings(position, {direction.x(), direction.y(), -direction.z()});
+  const float reflected = material.reflectivity * (1.0F + kGrazingGloss * m * m * m * m * m);
+  return reflected * surroundings(position, {direction.x(), direction.y(), -direction.z()});
 }
 
 float SurfaceShader::shade(const SurfacePoint& point, float sun_visibility) const {

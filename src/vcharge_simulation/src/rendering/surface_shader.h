@@ -77,7 +77,7 @@ class SurfaceShader {
   float towardsSun(const Eigen::Vector3f& ground_normal) const;
   /// `sun_fraction` is the fraction of the sun's light left by the incidence angle and by shadows outside the
   /// light map.
-  float groundLight(const Eigen::Vector3f& position, float width_m, float sun_share) const;
+  float groundLight(const Eigen::Vector3f& position, float width_m, float sun_fraction) const;
   float ambient(const Eigen::Vector3f& normal) const;
   float groundReflection(const Material& material, const Eigen::Vector3f& position,
                          const Eigen::Vector3f& direction) const;

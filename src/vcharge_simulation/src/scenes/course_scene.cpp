@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "objects/figure.h"
-#include "scenes/lot/lot_variant.h"
+#include "scenes/lot/lot_scene.h"
 #include "scenes/scene_parts.h"
 #include "vcharge_simulation/objects/car_model.h"
 
@@ -130,7 +130,7 @@ ParkedCar parkedAcross(double x, double y, double yaw_rad, int shape, int paint)
 }
 
 LotLayout courseLayout(const SceneOptions& options) {
-  LotLayout layout = makeLotLayout(static_cast<uint64_t>(options.seed), options.day, options.moved_cars);
+  LotLayout layout = makeLotLayout(options.seed, options.day);
   layout.cars.erase(std::remove_if(layout.cars.begin(), layout.cars.end(),
                                    [](const ParkedCar& car) { return isOnCourse(car.x, car.y); }),
                     layout.cars.end());
@@ -159,7 +159,7 @@ std::shared_ptr<const Scene> buildCourseScene(const SceneOptions& options) {
     const FigureMaterials walker = addFigureMaterials(0.12, 0.2, parts);
     parts->scene().movers.push_back({"walker", [walker](double time_s) { return walkerAt(walker, time_s); }});
   };
-  return buildLotVariant(lotOptionsOf(options), course);
+  return buildLotVariant(options, course);
 }
 
 std::vector<CatalogueEntry> listCourseDrives() {

@@ -285,14 +285,13 @@ void SceneParts::addPoles(const std::vector<Pole>& poles) {
 }
 
 void SceneParts::addBins(const std::vector<Bin>& bins) {
-  const uint32_t bin = textured(SurfaceKind::kOther, noiseImage(64, 64, 0.16, 0.3, 0.1, 0.3), 80.0);
-  for (const Bin& place : bins) {
-    const double z = place.z;
-    addBox(placement(place.x, place.y, z + 0.5, place.yaw_rad), {0.55F, 0.6F, 1.0F}, bin, &scene_->mesh);
-    addBox(placement(place.x, place.y, z + 1.03, place.yaw_rad), {0.6F, 0.66F, 0.07F}, dark_metal_,
-           &scene_->mesh);
+  const uint32_t material = textured(SurfaceKind::kOther, noiseImage(64, 64, 0.16, 0.3, 0.1, 0.3), 80.0);
+  for (const Bin& bin : bins) {
+    const double z = bin.z;
+    addBox(placement(bin.x, bin.y, z + 0.5, bin.yaw_rad), {0.55F, 0.6F, 1.0F}, material, &scene_->mesh);
+    addBox(placement(bin.x, bin.y, z + 1.03, bin.yaw_rad), {0.6F, 0.66F, 0.07F}, dark_metal_, &scene_->mesh);
     scene_->obstacles.push_back(
-        {"bin", orientedRectangle(place.x, place.y, place.yaw_rad, -0.3, 0.3, 0.33), z, z + 1.06});
+        {"bin", orientedRectangle(bin.x, bin.y, bin.yaw_rad, -0.3, 0.3, 0.33), z, z + 1.06});
   }
 }
 

@@ -44,8 +44,8 @@ TEST_P(SceneTest, SameBytesOnAnyNumberOfThreads) {
   EXPECT_EQ(cv::norm(render(1), render(4), cv::NORM_INF), 0.0);
 }
 
-double groundAt(const Scene& scene, const Eigen::Vector2d& place_m) {
-  return scene.ground_height ? scene.ground_height(place_m.x(), place_m.y()) : 0.0;
+double groundAt(const Scene& scene, const Eigen::Vector2d& position_m) {
+  return scene.ground_height ? scene.ground_height(position_m.x(), position_m.y()) : 0.0;
 }
 
 TEST_P(SceneTest, WhatStandsOutOfTheGroundBelongsToAnObstacle) {
@@ -68,8 +68,8 @@ TEST_P(SceneTest, WhatStandsOutOfTheGroundBelongsToAnObstacle) {
   int unexplained = 0;
   for (int row = 0; row < map.height_m.rows; ++row) {
     for (int column = 0; column < map.height_m.cols; ++column) {
-      const Eigen::Vector2d place_m = map.origin_m + kCell_m * Eigen::Vector2d(column, row);
-      const double height_m = map.height_m.at<float>(row, column) - groundAt(scene, place_m);
+      const Eigen::Vector2d position_m = map.origin_m + kCell_m * Eigen::Vector2d(column, row);
+      const double height_m = map.height_m.at<float>(row, column) - groundAt(scene, position_m);
       if (height_m > 0.3 && height_m < 1.4) {
         ++standing;
         unexplained += covered.at<uint8_t>(row, column) == 0 ? 1 : 0;
@@ -140,9 +140,9 @@ std::set<std::string> touchedOn(const DrivePlan& plan, const std::vector<Obstacl
   std::set<std::string> touched;
   const VehicleMotion motion(plan.path, plan.motion, 1, plan.ground_height);
   for (int ms = 0; ms < static_cast<int>(motion.duration() * 1000.0); ms += 250) {
-    const RigidTransform place = motion.at(ms).world_from_planar;
+    const RigidTransform pose = motion.at(ms).world_from_planar;
     const cv::Mat_<cv::Point2f> own = outlineOf(
-        orientedRectangle(place.translation().x(), place.translation().y(), yawOfRotation(place.rotation()),
+        orientedRectangle(pose.translation().x(), pose.translation().y(), yawOfRotation(pose.rotation()),
                           golf.rear(), golf.front(), 0.5 * golf.width + kMirror_m));
     for (size_t i = 0; i < outlines.size(); ++i) {
       const cv::Point2f corner = outlines[i](0);
@@ -172,7 +172,7 @@ TEST(CatalogueTest, DrivesOfTheLotKeepClearOfParkedCarsForEverySeed) {
   for (uint64_t seed = 1; seed <= 12; ++seed) {
     for (const int day : {0, 1}) {
       std::vector<Obstacle> cars;
-      for (const ParkedCar& car : makeLotLayout(seed, day, 0.3).cars) {
+      for (const ParkedCar& car : makeLotLayout(seed, day).cars) {
         const CarShape& shape = carShapes()[static_cast<size_t>(car.shape)];
         cars.push_back(
             {"car",
@@ -246,11 +246,11 @@ TEST(MoverTest, ChangesTheRangeOnlyWhereItsFootprintsAre) {
       // The walker is in the image with the smaller range.
       const bool is_before = std::isnan(after_m) || before_m < after_m;
       const double range_m = is_before ? before_m : after_m;
-      const Eigen::Vector3d place = world_from_camera * (range_m * view.centreRay(x, y).cast<double>());
+      const Eigen::Vector3d position = world_from_camera * (range_m * view.centreRay(x, y).cast<double>());
       const MoverState state = walker.stateAt(kTimes_s[is_before ? 0 : 1]);
-      const double reach_m = (place - state.world_from_mover.translation()).head<2>().norm();
+      const double reach_m = (position - state.world_from_mover.translation()).head<2>().norm();
       EXPECT_LT(reach_m, 0.75);  // half a stride
-      EXPECT_LT(place.z(), state.obstacle.top_z_m + 0.05);
+      EXPECT_LT(position.z(), state.obstacle.top_z_m + 0.05);
       ++changed;
     }
   }

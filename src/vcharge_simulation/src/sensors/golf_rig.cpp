@@ -37,7 +37,7 @@ Eigen::Matrix3d leftRotation() {
 
 // Camera whose optical axis has a yaw from straight ahead and a pitch below the horizon, with level image
 // rows.
-Eigen::Matrix3d lookingRotation(double yaw_rad, double down_rad) {
+Eigen::Matrix3d rotationTowards(double yaw_rad, double down_rad) {
   const Eigen::Vector3d z(std::cos(down_rad) * std::cos(yaw_rad), std::cos(down_rad) * std::sin(yaw_rad),
                           -std::sin(down_rad));
   const Eigen::Vector3d x(std::sin(yaw_rad), -std::cos(yaw_rad), 0.0);
@@ -84,9 +84,9 @@ CameraRig makeGolfRig(uint64_t seed, double image_scale) {
   const Eigen::Matrix3d mirror_camera = Eigen::Vector3d(-1.0, 1.0, 1.0).asDiagonal();
   const Eigen::Matrix3d right = mirror_vehicle * leftRotation() * mirror_camera;
   const std::vector<std::pair<std::string, RigidTransform>> mountings = {
-      {"front", disturbed(lookingRotation(0.0, 0.35), {3.6, 0.0, 0.6}, &random)},
+      {"front", disturbed(rotationTowards(0.0, 0.35), {3.6, 0.0, 0.6}, &random)},
       {"left", RigidTransform(Eigen::Quaterniond(leftRotation()), kLeftTranslation_m)},
-      {"rear", disturbed(lookingRotation(kPi, 0.45), {-0.9, 0.0, 0.8}, &random)},
+      {"rear", disturbed(rotationTowards(kPi, 0.45), {-0.9, 0.0, 0.8}, &random)},
       {"right", disturbed(right, mirror_vehicle * kLeftTranslation_m, &random)}};
   CameraRig rig;
   for (const auto& [name, vehicle_from_camera] : mountings) {

@@ -6,7 +6,6 @@
 #include <tbb/parallel_for.h>
 
 #include "vcharge_core/base/error.h"
-#include "vcharge_core/base/options.h"
 
 namespace vcharge {
 
@@ -19,18 +18,14 @@ constexpr double kHalfPi = 1.57079632679489661923;
 
 }  // namespace
 
-void LensOptions::validate() const {
-  requireField(blur_axis_px >= 0.0 && blur_axis_px <= LensBlur::kMaxSigma_px, "blur_axis_px",
-               "must be in [0, 1.4]", blur_axis_px);
-  requireField(blur_rim_px >= blur_axis_px && blur_rim_px <= LensBlur::kMaxSigma_px, "blur_rim_px",
-               "must be in [blur_axis_px, 1.4]", blur_rim_px);
-  requireField(veil >= 0.0 && veil < 1.0, "veil", "must be in [0, 1)", veil);
+void LensOptions::checkFields() const {
+  requireField(blur_rim_px >= blur_axis_px, "blur_rim_px", "must be at least blur_axis_px", blur_rim_px);
 }
 
 double LensOptions::blurAt(double angle_rad, double image_scale) const {
-  const double share = std::min(1.2, std::pow(angle_rad / kHalfPi, 1.5));
+  const double fraction = std::min(1.2, std::pow(angle_rad / kHalfPi, 1.5));
   return std::min(LensBlur::kMaxSigma_px,
-                  image_scale * (blur_axis_px + (blur_rim_px - blur_axis_px) * share));
+                  image_scale * (blur_axis_px + (blur_rim_px - blur_axis_px) * fraction));
 }
 
 LensBlur::LensBlur(const cv::Mat& sigma_px) {

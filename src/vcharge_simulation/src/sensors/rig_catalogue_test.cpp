@@ -97,8 +97,8 @@ TEST(RandomRigTest, EveryDirectionOfTheFieldOfViewHasOneImageWithinTheWidth) {
       for (const RigCamera& camera : makeRig("random", seed, scale).cameras) {
         for (double around = 0.0; around < 2.0 * kPi; around += kPi / 8.0) {
           double last_radius_px = 0.0;
-          for (double share = 0.02; share <= 1.0; share += 0.02) {
-            const double angle = 0.5 * share * camera.field_of_view_rad;
+          for (double fraction = 0.02; fraction <= 1.0; fraction += 0.02) {
+            const double angle = 0.5 * fraction * camera.field_of_view_rad;
             const Eigen::Vector3d ray(std::sin(angle) * std::cos(around), std::sin(angle) * std::sin(around),
                                       std::cos(angle));
             Eigen::Vector2d pixel, centre;

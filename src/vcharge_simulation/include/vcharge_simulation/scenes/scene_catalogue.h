@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,20 +11,16 @@
 
 namespace vcharge {
 
-/// How a scene of the catalogue is built.
+/// How a scene is built.
 struct SceneOptions {
-  int seed = 1;             ///< of everything that stays from day to day
-  int day = 0;              ///< another day: other light and moved cars
-  double moved_cars = 0.3;  ///< share of the parked cars that differ from day 0
-  /// Size of the images that will be rendered, over 1280x800: smaller images need no finer textures.
-  double image_scale = 1.0;
-  /// Leaves and light maps over the default: less is quicker to build, for tests.
-  double detail = 1.0;
-  /// Of the scene "chessboard": what is held ("chessboard" or "aprilgrid"), and for the cameras of which rig.
+  uint64_t seed = 1;         ///< selects everything that does not change between days
+  int day = 0;               ///< other days have other light and moved cars
+  double image_scale = 1.0;  ///< size of the rendered images relative to 1280x800: coarser textures for less
+  double detail = 1.0;       ///< number of leaves and resolution of light maps; less is quicker to build
+  /// For the scene "chessboard": the board ("chessboard" or "aprilgrid") and the rig that it is shown to.
   std::string board = "chessboard";
   std::string rig = "golf";
-  int rig_seed = 1;
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  uint64_t rig_seed = 1;
 };
 
 /// Kalibr target file of SceneOptions::board. Throws std::invalid_argument for an unknown board.

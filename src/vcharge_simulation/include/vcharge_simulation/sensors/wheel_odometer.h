@@ -9,21 +9,14 @@
 
 namespace vcharge {
 
-/// Errors and filter of a wheel odometer.
+/// Errors of a wheel odometer.
 struct WheelOdometerOptions {
-  double metres_per_tick = 0.01;
-  double scale_error = 0.005;        ///< counted distance over true distance, minus 1
-  double left_right_error = 0.0003;  ///< the right wheel counts this share more than the left
-  double smoothing_s = 0.25;         ///< half width of the filter that tracks the counters
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("metres_per_tick", metres_per_tick);
-    visit("scale_error", scale_error);
-    visit("left_right_error", left_right_error);
-    visit("smoothing_s", smoothing_s);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(WheelOdometerOptions);
+  VCHARGE_OPTION(double, metres_per_tick, 0.01, positive(), "Distance per tick of the wheel counters.");
+  VCHARGE_OPTION(double, scale_error, 0.005, above(-0.5).below(0.5), "Counted over true distance, minus 1.");
+  VCHARGE_OPTION(double, left_right_error, 0.0003, above(-0.5).below(0.5),
+                 "Relative excess of the right wheel's count over the left wheel's.");
+  VCHARGE_END_OPTIONS();
 };
 
 /// Counters of the rear wheels, and dead reckoning from them. Quantization is a bounded error of each

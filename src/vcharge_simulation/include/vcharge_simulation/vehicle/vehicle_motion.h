@@ -9,41 +9,17 @@
 
 namespace vcharge {
 
-/// How the car drives along a path and how its body moves on its springs.
+/// How the car drives along a path and how its body moves on its springs. Set by the drives of the catalogue.
 struct VehicleMotionOptions {
   double cruise_speed_m_per_s = 2.5;
-  double max_backwards_speed_m_per_s = 1.2;
-  double max_lateral_acceleration_m_per_s2 = 1.2;
-  double max_acceleration_m_per_s2 = 1.0;
   double standstill_s = 0.0;  ///< at the start; 0: the drive starts at cruise speed
   bool stop_at_end = false;
+  double duration_s = 60.0;     ///< upper limit
   double track_width_m = 1.52;  ///< between the rear wheels
   double wheelbase_m = 2.58;
   double pitch_rad_per_m_per_s2 = 0.0045;  ///< nose up when accelerating
-  double roll_rad_per_m_per_s2 = 0.006;    ///< to the outside of a curve
-  double spring_frequency_hz = 1.6;
-  double road_noise_rad = 0.0012;  ///< standard deviation of pitch and roll from the road
-  double road_heave_m = 0.002;
-  double duration_s = 60.0;  ///< at most
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("cruise_speed_m_per_s", cruise_speed_m_per_s);
-    visit("max_backwards_speed_m_per_s", max_backwards_speed_m_per_s);
-    visit("max_lateral_acceleration_m_per_s2", max_lateral_acceleration_m_per_s2);
-    visit("max_acceleration_m_per_s2", max_acceleration_m_per_s2);
-    visit("standstill_s", standstill_s);
-    visit("stop_at_end", stop_at_end);
-    visit("track_width_m", track_width_m);
-    visit("wheelbase_m", wheelbase_m);
-    visit("pitch_rad_per_m_per_s2", pitch_rad_per_m_per_s2);
-    visit("roll_rad_per_m_per_s2", roll_rad_per_m_per_s2);
-    visit("spring_frequency_hz", spring_frequency_hz);
-    visit("road_noise_rad", road_noise_rad);
-    visit("road_heave_m", road_heave_m);
-    visit("duration_s", duration_s);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  double road_noise_rad = 0.0012;          ///< standard deviation of pitch and roll caused by the road
+  double road_heave_m = 0.002;             ///< standard deviation of the height caused by the road
 };
 
 /// State of the vehicle at one instant.

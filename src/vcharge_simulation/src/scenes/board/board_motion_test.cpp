@@ -26,13 +26,13 @@ TEST(BoardMotionTest, ShowsEveryCameraOfAnyRigTheWholeBoardOutToTheRim) {
         const RigCamera& seeing = rig.cameras[camera];
         double largest_rad = 0.0;
         double smallest_rad = 9.0;
-        std::vector<Eigen::Vector3d> places;
+        std::vector<Eigen::Vector3d> positions;
         for (int i = 0; i < BoardMotion::kPosesPerCamera; ++i) {
           const double time_s = static_cast<double>(camera) * BoardMotion::kSpan_s + i + 0.3;
           const RigidTransform camera_from_pattern = seeing.vehicle_from_camera->inverse() *
                                                      motion.worldFromSheet(time_s) *
                                                      pattern.sheet_from_pattern;
-          places.push_back(camera_from_pattern.translation());
+          positions.push_back(camera_from_pattern.translation());
           for (const Eigen::Vector3d& corner : pattern.corners_in_pattern_m) {
             const Eigen::Vector3d in_camera = camera_from_pattern * corner;
             const double angle_rad = std::atan2(in_camera.head<2>().norm(), in_camera.z());
@@ -50,11 +50,12 @@ TEST(BoardMotionTest, ShowsEveryCameraOfAnyRigTheWholeBoardOutToTheRim) {
         // more.
         EXPECT_GT(largest_rad, 0.5 * seeing.field_of_view_rad - 0.2 / 1.2) << label;
         EXPECT_LT(smallest_rad, 0.1) << label;
-        std::sort(places.begin(), places.end(), [](const auto& a, const auto& b) { return a.x() < b.x(); });
+        std::sort(positions.begin(), positions.end(),
+                  [](const auto& a, const auto& b) { return a.x() < b.x(); });
         const auto distinct =
-            std::unique(places.begin(), places.end(),
+            std::unique(positions.begin(), positions.end(),
                         [](const auto& a, const auto& b) { return (a - b).norm() < 1e-3; }) -
-            places.begin();
+            positions.begin();
         EXPECT_GE(distinct, 36) << label;
       }
     }

@@ -83,9 +83,9 @@ BoardPattern makeAprilGrid() {
   for (int id = 0; id < kTags * kTags; ++id) {
     const int column = id % kTags;
     const int row = id / kTags;  // counted from below
-    const cv::Rect place(kMargin + kGap + column * kPitch, kMargin + kGap + (kTags - 1 - row) * kPitch, kTag,
-                         kTag);
-    cv::Mat tag = pattern.image(place);
+    const cv::Rect area(kMargin + kGap + column * kPitch, kMargin + kGap + (kTags - 1 - row) * kPitch, kTag,
+                        kTag);
+    cv::Mat tag = pattern.image(area);
     tag.setTo(cv::Scalar(kBlack));
     cv::Mat bits;
     cv::resize(tagBits(id), bits, cv::Size(6 * kTexelsPerBit, 6 * kTexelsPerBit), 0, 0, cv::INTER_NEAREST);

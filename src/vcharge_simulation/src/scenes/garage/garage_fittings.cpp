@@ -69,12 +69,12 @@ cv::Mat drawBoard(const std::string& text, bool bright) {
 
 // Boards across the lanes, readable from both sides.
 void addBoards(double overhead_m, SceneParts* parts) {
-  struct Place {
+  struct Sign {
     double x, y;
     bool along_x;  // direction of the lane
     const char* text;
   };
-  static const std::vector<Place> kPlaces = {
+  static const std::vector<Sign> kSigns = {
       {-19.0, -15.5, true, "AUSFAHRT ->"}, {-3.5, -15.5, true, "P2 269 - 285"},
       {12.0, -15.5, true, "<- KASSE"},     {-19.0, 0.0, true, "P2 201 - 217"},
       {4.0, 0.0, true, "LIFT 3 ->"},       {19.5, 0.0, true, "EINBAHN"},
@@ -84,19 +84,19 @@ void addBoards(double overhead_m, SceneParts* parts) {
       {26.0, 9.0, false, "P3 P4 ->"}};
   const uint32_t rod = parts->plain(SurfaceKind::kOther, 0.3);
   bool bright = false;
-  for (const Place& place : kPlaces) {
+  for (const Sign& sign : kSigns) {
     bright = !bright;
     const uint32_t material =
-        parts->textured(SurfaceKind::kOther, drawBoard(place.text, bright), kTexelsPerM, 0.03);
+        parts->textured(SurfaceKind::kOther, drawBoard(sign.text, bright), kTexelsPerM, 0.03);
     const double low = overhead_m + 0.04;
     const auto at = [&](double across, double thickness, double z) {
-      return place.along_x ? vector(place.x + thickness, place.y + across, z)
-                           : vector(place.x + across, place.y + thickness, z);
+      return sign.along_x ? vector(sign.x + thickness, sign.y + across, z)
+                          : vector(sign.x + across, sign.y + thickness, z);
     };
     const double half = 0.5 * kBoardWidth_m;
     // For a viewer who looks along the lane's axis, left is at larger y in a lane along x and at smaller x in
     // one along y.
-    const double left = place.along_x ? half : -half;
+    const double left = sign.along_x ? half : -half;
     for (const double side : {-1.0, 1.0}) {
       const double start = -side * left;
       const double depth = 0.03 * side;

@@ -75,12 +75,12 @@ void addLamps(uint64_t seed, int day, GarageLayout* layout) {
 
 }  // namespace
 
-GarageLayout makeGarageLayout(uint64_t seed, int day, double moved_cars) {
+GarageLayout makeGarageLayout(uint64_t seed, int day) {
   GarageLayout layout;
   addBays(&layout);
   addPillars(&layout);
   addLamps(seed, day, &layout);
-  layout.cars = parkCars(layout.bays, kOccupiedBays, seed + 90U, day, moved_cars);
+  layout.cars = parkCars(layout.bays, kOccupiedBays, seed + 90U, day);
   return layout;
 }
 

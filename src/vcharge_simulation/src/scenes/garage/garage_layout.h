@@ -33,6 +33,6 @@ struct GarageLayout {
 
 inline constexpr double kPillarWidth_m = 0.5;
 
-GarageLayout makeGarageLayout(uint64_t seed, int day, double moved_cars);
+GarageLayout makeGarageLayout(uint64_t seed, int day);
 
 }  // namespace vcharge

@@ -5,7 +5,7 @@
 
 #include "scenes/garage/garage_surfaces.h"
 #include "scenes/lot/lot_ground.h"
-#include "scenes/lot/lot_variant.h"
+#include "scenes/lot/lot_scene.h"
 #include "scenes/scene_parts.h"
 
 namespace vcharge {
@@ -184,7 +184,7 @@ void standOnGround(ParkedCar* car) {
 }
 
 LotLayout twoLevelsLayout(const SceneOptions& options) {
-  LotLayout layout = makeLotLayout(static_cast<uint64_t>(options.seed), options.day, options.moved_cars);
+  LotLayout layout = makeLotLayout(options.seed, options.day);
   // Islands, hedges and fences are level, so they cannot stand on the ramps or across the walls.
   const auto is_outside = [](const GroundRectangle& area) {
     return area.max_x < -kInner_m || area.min_x > kInner_m;
@@ -237,7 +237,7 @@ std::shared_ptr<const Scene> buildTwoLevelsScene(const SceneOptions& options) {
   two_levels.add_ground = addGround;
   two_levels.add_things = addWalls;
   two_levels.ground_height = groundHeight;
-  return buildLotVariant(lotOptionsOf(options), two_levels);
+  return buildLotVariant(options, two_levels);
 }
 
 }  // namespace vcharge

@@ -41,24 +41,24 @@ cv::Mat drawWall(double width_m, double height_m, bool bricks, double tone, uint
   return wall;
 }
 
-void drawWindow(const cv::Rect& place, Random* random, cv::Mat* image) {
+void drawWindow(const cv::Rect& area, Random* random, cv::Mat* image) {
   const int glass = 12 + random->index(40);
-  cv::rectangle(*image, place, cv::Scalar(glass), cv::FILLED);
+  cv::rectangle(*image, area, cv::Scalar(glass), cv::FILLED);
   if (random->chance(0.5)) {
-    const int curtain = place.width / (3 + random->index(3));
-    cv::rectangle(*image, cv::Rect(place.x, place.y, curtain, place.height),
-                  cv::Scalar(100 + random->index(60)), cv::FILLED);
+    const int curtain = area.width / (3 + random->index(3));
+    cv::rectangle(*image, cv::Rect(area.x, area.y, curtain, area.height), cv::Scalar(100 + random->index(60)),
+                  cv::FILLED);
   }
   if (random->chance(0.25)) {
-    cv::rectangle(*image, cv::Rect(place.x, place.y, place.width, place.height / 2),
+    cv::rectangle(*image, cv::Rect(area.x, area.y, area.width, area.height / 2),
                   cv::Scalar(120 + random->index(50)), cv::FILLED);
   }
   const int frame = random->chance(0.7) ? 190 : 40;
-  cv::rectangle(*image, place, cv::Scalar(frame), 2);
-  cv::line(*image, {place.x + place.width / 2, place.y}, {place.x + place.width / 2, place.y + place.height},
+  cv::rectangle(*image, area, cv::Scalar(frame), 2);
+  cv::line(*image, {area.x + area.width / 2, area.y}, {area.x + area.width / 2, area.y + area.height},
            cv::Scalar(frame), 2);
   cv::rectangle(*image,
-                cv::Rect(place.x - 3, place.y + place.height, place.width + 6, 4) &
+                cv::Rect(area.x - 3, area.y + area.height, area.width + 6, 4) &
                     cv::Rect(0, 0, image->cols, image->rows),
                 cv::Scalar(150), cv::FILLED);
 }

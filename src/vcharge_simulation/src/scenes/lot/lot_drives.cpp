@@ -2,7 +2,7 @@
 
 #include "scenes/lane_paths.h"
 #include "scenes/lot/lot_layout.h"
-#include "vcharge_simulation/scenes/lot_scene.h"
+#include "scenes/lot/lot_scene.h"
 
 namespace vcharge {
 

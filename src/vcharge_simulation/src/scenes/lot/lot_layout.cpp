@@ -146,7 +146,7 @@ double LotLayout::groundHeight(double x, double y) const {
   return 0.0;
 }
 
-LotLayout makeLotLayout(uint64_t seed, int day, double moved_cars) {
+LotLayout makeLotLayout(uint64_t seed, int day) {
   LotLayout layout;
   Random random(seed);
   addBays(&layout);
@@ -155,7 +155,7 @@ LotLayout makeLotLayout(uint64_t seed, int day, double moved_cars) {
   addWoods(seed, &layout);
   addHouses(&layout);
   addStreetFurniture(&random, &layout);
-  layout.cars = parkCars(layout.bays, kOccupiedBays, seed, day, moved_cars);
+  layout.cars = parkCars(layout.bays, kOccupiedBays, seed, day);
   return layout;
 }
 

@@ -17,8 +17,8 @@ struct ParkingBay {
 };
 
 /// Parks cars on level ground at z = 0. Each bay has its own random generator, so that a day other than 0
-/// redraws only the fraction `moved_cars` of the bays and keeps the others.
-std::vector<ParkedCar> parkCars(const std::vector<ParkingBay>& bays, double occupied_share, uint64_t seed,
-                                int day, double moved_cars);
+/// redraws only some of the bays and keeps the others.
+std::vector<ParkedCar> parkCars(const std::vector<ParkingBay>& bays, double occupied_fraction, uint64_t seed,
+                                int day);
 
 }  // namespace vcharge
