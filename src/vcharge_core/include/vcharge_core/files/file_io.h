@@ -5,7 +5,7 @@
 
 namespace vcharge {
 
-/// Whole text of a file. InputError "<path>: <reason>" when it cannot be read.
+/// Reads a whole file. Throws InputError "<path>: <reason>" when it cannot be read.
 std::string readTextFile(const std::string& path);
 
 /// Throws InputError naming `path` unless a file can be written there: its folder exists or can be created
