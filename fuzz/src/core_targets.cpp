@@ -44,7 +44,7 @@ HeightMap smallHeightMap() {
   return map;
 }
 
-/// Files of a height map beside each other, of which one is replaced.
+/// Replaces one of the files of a height map.
 FuzzTarget heightMapTarget(const std::string& name, const std::string& replaced) {
   return {name,
           [replaced] {
