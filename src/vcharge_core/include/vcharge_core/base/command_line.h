@@ -12,14 +12,14 @@
 
 namespace vcharge {
 
-/// For CLI::Option::check(): an empty path is no path.
+/// For CLI::Option::check(): rejects an empty path.
 inline std::string requireNotEmpty(const std::string& value) {
   return value.empty() ? "expected a path, got ''" : "";
 }
 
-/// A tool's main(): parses its arguments, then calls `run`. Returns the exit status, which is 0 only for
-/// success. Asked for --show-options, a tool that has it requires nothing else. An error, of the arguments or
-/// thrown by `run`, is one line "<tool>: <what>" on standard error.
+/// The main() of a tool: parses the arguments, then calls `run`. Returns the exit status, 0 only for success.
+/// With --show-options, no other argument is required. Errors in the arguments and exceptions from `run` are
+/// printed as one line "<tool>: <reason>" on standard error.
 inline int runTool(CLI::App* app, int argc, char** argv, const std::function<void()>& run) {
   const std::string tool = std::filesystem::path(argv[0]).filename().string();
   if (std::find(argv, argv + argc, std::string_view("--show-options")) != argv + argc) {
