@@ -16,8 +16,8 @@ namespace hn = hwy::HWY_NAMESPACE;
 using DF = hn::ScalableTag<float>;
 using DI = hn::ScalableTag<int32_t>;
 
-/// On x86 a gather waits for what its register held before, even where all lanes are read: it has to start
-/// from zeros, and the compiler must not know that `lanes` are all.
+/// On x86 a gather depends on its register's old value even where all lanes are read, so it starts from
+/// zeros; the compiler must not know that `lanes` are all set.
 HWY_INLINE hn::VFromD<DI> gatherBytes(const int32_t* base, hn::VFromD<DI> offset,
                                       decltype(hn::Lt(offset, offset)) lanes) {
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3

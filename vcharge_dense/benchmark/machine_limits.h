@@ -5,15 +5,14 @@
 
 namespace vcharge {
 
-// What bounds the plane sweep on this machine, with the instruction set that Highway currently dispatches to.
+// Limits of this machine for the plane sweep, with the instruction set that Highway currently dispatches to.
 
-/// Gathers `rows` x `columns` 32-bit values, lane by lane along as many strips as there are lanes, as the
-/// sweep reads a neighbour's image. `image` has rows of 4096 bytes and at least rows + 8 of them. Returns a
-/// checksum.
+/// Gathers `rows` x `columns` 32-bit values along one strip per lane, like the sweep reads a neighbour's
+/// image. `image` has at least rows + 8 rows of 4096 bytes. Returns a checksum.
 int64_t gatherPixels(const int32_t* image, size_t rows, size_t columns);
 
-/// The same with the gather as compilers emit it: on x86 each waits for the one before, whose register it
-/// writes.
+/// The same with the gather as compilers emit it: on x86 each one waits for the previous one, whose register
+/// it overwrites.
 int64_t gatherPixelsInTurn(const int32_t* image, size_t rows, size_t columns);
 
 /// `count` vectors of independent multiply-adds in registers; returns a checksum.

@@ -1,6 +1,6 @@
-// The plane sweep beside the limits of the machine and the plain reference, in one run: 640x400, ZNCC 7x7, 64
-// planes, 4 neighbours. Every figure is the least of its repetitions; --benchmark_filter picks some. --smoke
-// does all of it once on a small image, and fails where a figure is missing.
+// Compares the plane sweep with the limits of the machine and the plain reference in one run: 640x400 pixels,
+// ZNCC 7x7, 64 planes, 4 neighbours. Each figure is the minimum over repetitions; --benchmark_filter selects
+// some. --smoke runs everything once on a small image and fails where a figure is missing.
 #include <algorithm>
 #include <cstdio>
 #include <ctime>
@@ -26,7 +26,7 @@
 namespace vcharge {
 namespace {
 
-/// What is measured: small and once for a smoke test.
+/// Sizes of the measurements, which a smoke test reduces.
 struct Sizes {
   cv::Size image = cv::Size(640, 400);
   int num_rounds = 10;
@@ -37,7 +37,7 @@ constexpr size_t kGatherRows = 64, kGatherColumns = 640;
 const MeiCamera kFisheye(1.158, 448.0, 447.0, 324.0, 199.0);
 const MeiCamera kPinhole(0.0, 330.0, 330.0, 324.0, 199.0);
 
-/// A side camera that passes a wall and a box, 0.2 m between images, all taken before the reference.
+/// A side camera that passes a wall and a box; images every 0.2 m, all taken before the reference.
 struct Scene {
   MeiCamera camera;
   SweepImage reference;
@@ -68,12 +68,12 @@ const Scene& scene(bool fisheye) {
 
 PlaneSweepOptions firstSweepOnly() {
   PlaneSweepOptions options;
-  options.families = PlaneFamilies::kFrontoParallel;
+  options.num_ground_planes = 0;
   options.num_refinement_steps = 0;
   return options;
 }
 
-/// While it lives only one instruction set is used; works() says whether the machine has it.
+/// Restricts Highway to one instruction set during its lifetime; works() is false where the machine lacks it.
 class OnlyTarget {
  public:
   OnlyTarget(benchmark::State* state, int64_t target) : works_((hwy::SupportedTargets() & target) != 0) {
@@ -122,7 +122,7 @@ void readL2(benchmark::State& state, int64_t target) {
   state.counters["items"] = static_cast<double>(count * repetitions);
 }
 
-/// Of a computation in laps that is done several times: the sum of each lap's least processor time.
+/// Times a repeated computation in laps and sums the minimum processor time of each lap.
 class LeastTimes {
  public:
   void start() {
@@ -163,13 +163,13 @@ void kernel(benchmark::State& state, int64_t target, bool fisheye) {
   const cv::Mat valid(sizes.image, CV_8UC1, cv::Scalar(255));
   const RayTable rays(s.camera, sizes.image, 6.283185307179586);
   const Hypotheses planes =
-      makePlaneHypotheses(makePlaneFamilies(options, std::nullopt).front(), rays, valid, options.window_px);
-  const SampleScale scale = SampleScale::forWindow(options.window_px);
-  // Tile by tile, and between them as many gathers as each needs; the least times over some rounds: short
-  // enough to fall between what else runs, and under the same conditions.
+      makePlaneHypotheses(makePlaneFamilies(options, std::nullopt).front(), rays, valid);
+  const SampleScale scale = SampleScale::forWindow(kMatchingWindow_px);
+  // Alternates tiles with as many gathers as each tile needs and takes minimum times over several rounds:
+  // laps are short enough to avoid other load, and both are measured under the same conditions.
   const std::vector<int32_t> gathered(1024 * (kGatherRows + 8), 1);
   const size_t num_hypotheses = planes.offsets.size() * s.neighbours.size();
-  const std::vector<cv::Rect> tiles = makeTiles(sizes.image, options.window_px);
+  const std::vector<cv::Rect> tiles = makeTiles(sizes.image);
   for (auto _ : state) {
     LeastTimes times, gathers;
     for (int round = 0; round < sizes.num_rounds; ++round) {
@@ -228,14 +228,14 @@ void plain(benchmark::State& state) {
       static_cast<double>(sizes.image.area()) * options.num_planes * static_cast<double>(s.neighbours.size());
 }
 
-/// A range map from the first image to the last, as the options of the vehicle make it.
-void rangeMap(benchmark::State& state, PlaneFamilies families, int refinement_steps, size_t num_neighbours,
+/// A complete range map, from images to ranges.
+void rangeMap(benchmark::State& state, int ground_planes, int refinement_steps, size_t num_neighbours,
               bool coarse_pass) {
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism,
                                     static_cast<size_t>(state.range(0)));
   const Scene& s = scene(true);
   PlaneSweepOptions options;
-  options.families = families;
+  options.num_ground_planes = ground_planes;
   options.num_refinement_steps = refinement_steps;
   options.coarse_pass = coarse_pass;
   const cv::Mat valid(sizes.image, CV_8UC1, cv::Scalar(255));
@@ -247,7 +247,7 @@ void rangeMap(benchmark::State& state, PlaneFamilies families, int refinement_st
   }
 }
 
-/// Prints the runs as usual, keeps the least times, and puts them in relation at the end.
+/// Prints the runs as usual, keeps minimum times and prints ratios at the end.
 class RatioReporter : public benchmark::ConsoleReporter {
  public:
   void ReportRuns(const std::vector<Run>& runs) override {
@@ -258,7 +258,7 @@ class RatioReporter : public benchmark::ConsoleReporter {
       }
       const std::string name =
           run.run_name.function_name + (run.run_name.args.empty() ? "" : "/" + run.run_name.args);
-      // Of one thread the processor's time, which a busy machine stretches least; else the clock's.
+      // Processor time for one thread, which other load affects least; otherwise wall time.
       const auto items = run.counters.find("items");
       const bool manual = run.run_name.time_type == "manual_time";
       const double per_iteration_s =
@@ -275,10 +275,10 @@ class RatioReporter : public benchmark::ConsoleReporter {
     }
   }
 
-  /// False where a figure is missing of those that the machine can measure.
+  /// Returns false where a figure is missing that this machine can measure.
   bool printRatios() const {
     missing_ = false;
-    std::printf("\nleast of the repetitions, per pixel, plane and image:\n");
+    std::printf("\nminimum over repetitions, per pixel, plane and image:\n");
     for (const auto& [name, target] :
          {std::pair<std::string, int64_t>{"avx3", HWY_AVX3}, {"avx2", HWY_AVX2}}) {
       if ((hwy::SupportedTargets() & target) == 0) {
@@ -350,16 +350,12 @@ BENCHMARK_CAPTURE(kernel, avx3_pinhole, HWY_AVX3, false)->Apply(byTheLaps);
 BENCHMARK_CAPTURE(kernel, avx2_fisheye, HWY_AVX2, true)->Apply(byTheLaps);
 BENCHMARK_CAPTURE(kernel, avx2_pinhole, HWY_AVX2, false)->Apply(byTheLaps);
 BENCHMARK(plain)->Iterations(1)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(rangeMap, first_sweep_of_4, PlaneFamilies::kFrontoParallel, 0, 4, false)
-    ->Apply(onOneAndTwoThreads);
-BENCHMARK_CAPTURE(rangeMap, first_sweep_of_2, PlaneFamilies::kFrontoParallel, 0, 2, false)
-    ->Apply(onOneAndTwoThreads);
-BENCHMARK_CAPTURE(rangeMap, whole_of_4, PlaneFamilies::kBoth, 16, 4, false)->Apply(onOneAndTwoThreads);
-BENCHMARK_CAPTURE(rangeMap, whole_of_2, PlaneFamilies::kBoth, 16, 2, false)->Apply(onOneAndTwoThreads);
-BENCHMARK_CAPTURE(rangeMap, coarse_and_whole_of_4, PlaneFamilies::kBoth, 16, 4, true)
-    ->Apply(onOneAndTwoThreads);
-BENCHMARK_CAPTURE(rangeMap, coarse_and_whole_of_2, PlaneFamilies::kBoth, 16, 2, true)
-    ->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, first_sweep_of_4, 0, 0, 4, false)->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, first_sweep_of_2, 0, 0, 2, false)->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, whole_of_4, 16, 16, 4, false)->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, whole_of_2, 16, 16, 2, false)->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, coarse_and_whole_of_4, 16, 16, 4, true)->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(rangeMap, coarse_and_whole_of_2, 16, 16, 2, true)->Apply(onOneAndTwoThreads);
 
 }  // namespace
 }  // namespace vcharge
@@ -375,7 +371,8 @@ int main(int argc, char** argv) {
     vcharge::sizes = {cv::Size(96, 80), 1};
     *smoke = min_time.data();
   }
-  arguments.insert(arguments.begin() + 1, repetitions.data());  // the user's own comes later and wins
+  arguments.insert(arguments.begin() + 1,
+                   repetitions.data());  // a user's own value comes later and overrides it
   auto count = static_cast<int>(arguments.size());
   benchmark::Initialize(&count, arguments.data());
   if (benchmark::ReportUnrecognizedArguments(count, arguments.data())) {

@@ -58,7 +58,7 @@ TEST(PoseRefinementTest, RangesOfJitteredPosesBecomeBetter) {
   for (uint32_t draw = 0; draw < 4; ++draw) {
     Sequence s = makeSequence(lotScene(40 + draw), kLeft, 0.2, -4, 0, 2.0);
     PlaneSweepOptions options;
-    options.gate = false;
+    options.min_confidence = 0.0;
     std::mt19937 generator(100 + draw);
     disturb(options.pose_noise, &generator, &s);
     for (const bool refine : {false, true}) {
@@ -79,8 +79,8 @@ TEST(PoseRefinementTest, RangesOfJitteredPosesBecomeBetter) {
   EXPECT_GT(right[1], right[0] + 0.05 * all);
 }
 
-TEST(PoseRefinementTest, StaysWithinThePosesNoise) {
-  // Poses that are wrong by far more than their noise says: what comes back is the given pose.
+TEST(PoseRefinementTest, KeepsTheGivenPoseWhereTheCorrectionExceedsItsNoise) {
+  // A pose that is wrong by much more than its noise is returned unchanged.
   const Sequence s = makeSequence(lotScene(50), kLeft, 0.2, -2, 0, 2.0);
   PoseNoiseOptions tight;
   tight.rotation_rad = tight.rotation_rad_per_sqrt_m = 1e-4;
@@ -94,7 +94,7 @@ TEST(PoseRefinementTest, StaysWithinThePosesNoise) {
   EXPECT_EQ(result.neighbour_from_reference.translation(), wrong.translation());
 }
 
-TEST(PoseRefinementTest, WithoutTracksTheGivenPoseStays) {
+TEST(PoseRefinementTest, KeepsTheGivenPoseWithoutTracks) {
   const Sequence s = makeSequence(lotScene(51), kLeft, 0.2, -1, 0);
   const cv::Mat gray(kSize, CV_8UC1, cv::Scalar(90));
   cv::Mat noise(kSize, CV_8UC1);

@@ -16,7 +16,7 @@ using testing::kSize;
 using testing::makeSequence;
 using testing::Sequence;
 
-/// Ground, and a wall of faint paint: small windows hold little of its texture.
+/// Ground and a wall with weak texture, of which small windows contain little.
 AnalyticScene faintScene() {
   return AnalyticScene(
       {{{0, 0, 0}, {0, 0, 1}}, {{0, 5.0, 0}, {0, -1, 0}, Eigen::Vector3d::Constant(1e6), 0.12}}, 3);
@@ -93,7 +93,7 @@ TEST(PlaneSweepFillTest, OddAndSmallImagesWork) {
     const MeiCamera camera = testing::croppedCamera(part);
     const PlaneSweep sweep(camera, cv::Mat(size, CV_8UC1, cv::Scalar(255)), filling(4), s.ground);
     EXPECT_EQ(sweep.sweep(s.reference, s.neighbours).range_m.size(), size);
-    EXPECT_EQ(cv::countNonZero(sweep.sweep(s.reference, {}).confidence), 0);  // nothing to compare with
+    EXPECT_EQ(cv::countNonZero(sweep.sweep(s.reference, {}).confidence), 0);  // no neighbours
   }
 }
 

@@ -21,8 +21,7 @@ namespace vcharge::testing {
 inline const cv::Size kSize(320, 200);
 inline const MeiCamera kCamera(1.158, 224.0, 223.5, 162.0, 99.5);
 
-/// A camera at the given place (vehicle axes: x forward, y left, z up) that looks along an azimuth, tilted
-/// downwards.
+/// Pose of a camera at a position (x forward, y left, z up) that faces an azimuth and is tilted downwards.
 inline RigidTransform cameraPose(const Eigen::Vector3d& position, double azimuth_rad, double down_rad) {
   const Eigen::Quaterniond vehicle_from_optical(0.5, -0.5, 0.5, -0.5);  // z forward, x right, y down
   return RigidTransform(rotationFromYawPitchRoll(azimuth_rad, down_rad, 0.0) * vehicle_from_optical,
@@ -55,7 +54,7 @@ inline Sequence makeSequence(const AnalyticScene& scene, const RigidTransform& s
   return sequence;
 }
 
-/// A part of the test images, as a smaller camera sees it.
+/// Crops the images of a sequence, as of a smaller camera.
 inline void crop(const cv::Rect& part, Sequence* sequence) {
   sequence->reference.pixels = sequence->reference.pixels(part).clone();
   for (SweepImage& image : sequence->neighbours) {
@@ -67,9 +66,8 @@ inline MeiCamera croppedCamera(const cv::Rect& part) {
                    kCamera.v0() - part.y);
 }
 
-/// Moves the neighbours, which come in order of time, as odometry errs: its scale is off for the whole
-/// sequence, its pose walks at random from image to image, and the reference's own jitter is common to all
-/// pairs.
+/// Disturbs the poses of the neighbours, which are in the order of time, by odometry errors: a common scale
+/// error, a random walk from image to image, and the jitter of the reference, which is common to all pairs.
 inline void disturb(const PoseNoiseOptions& noise, std::mt19937* generator, Sequence* sequence) {
   const auto randomVector = [&](double sigma) {
     Eigen::Vector3d vector;
@@ -104,7 +102,7 @@ inline void disturb(const PoseNoiseOptions& noise, std::mt19937* generator, Sequ
   walk(images.begin(), images.end(), [&](const SweepImage& image) { return image.stamp > now; });
 }
 
-/// Runs a function with only one instruction set after the other.
+/// Runs a function with each instruction set of this machine.
 template <class Function>
 void onEveryTarget(const Function& function) {
   for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
@@ -121,7 +119,7 @@ inline cv::Mat allValid() {
 
 inline PlaneSweepOptions plainOptions() {
   PlaneSweepOptions options;
-  options.families = PlaneFamilies::kFrontoParallel;
+  options.num_ground_planes = 0;
   options.num_refinement_steps = 0;
   return options;
 }

@@ -26,7 +26,7 @@ using testing::makeSequence;
 using testing::onEveryTarget;
 using testing::Sequence;
 
-/// The level and its input for a sequence.
+/// A sequence and the level that sweeps it.
 struct Level {
   Sequence sequence;
   std::shared_ptr<const SweepLevel> level;
@@ -35,7 +35,7 @@ struct Level {
   Level()
       : sequence(makeSequence(lotScene(2), kLeft, 0.2, -4, 0, 2.0)),
         level(std::make_shared<SweepLevel>(kCamera, allValid(), PlaneSweepOptions(), sequence.ground)),
-        tiles(makeTiles(kSize, PlaneSweepOptions().window_px, TileSize::kSmall)) {}
+        tiles(makeTiles(kSize, TileSize::kSmall)) {}
 
   SweepInput input() const {
     SweepInput input = level->makeInput(sequence.reference.pixels);
@@ -105,7 +105,7 @@ TEST(TileScorerTest, RowsWithoutTextureDoNotChangeOthers) {
   s.reference.pixels.rowRange(0, first).setTo(90);
   s.reference.pixels.rowRange(end, kSize.height).setTo(90);
   PlaneSweepOptions options;
-  options.warp_tolerance_px = 0.0;  // exact everywhere, whatever the tile
+  options.warp_tolerance_px = 0.0;  // exact everywhere, so that tiles do not matter
   const SweepLevel level(kCamera, allValid(), options, s.ground);
   SweepInput input = level.makeInput(s.reference.pixels);
   for (const SweepImage& image : s.neighbours) {
@@ -114,7 +114,7 @@ TEST(TileScorerTest, RowsWithoutTextureDoNotChangeOthers) {
                                 pose.rotationMatrix().cast<float>(), pose.translation().cast<float>(),
                                 false});
   }
-  const int radius = options.window_px / 2;
+  const int radius = kMatchingWindow_px / 2;
   const cv::Rect tight(40, first - radius, 100, end - first + 2 * radius);
   const cv::Rect wide(tight.x, tight.y - 20, tight.width, tight.height + 35);
   TileScorer scorer;
@@ -150,7 +150,7 @@ TEST(CoarsePassTest, EqualsTheFullSweepWhereAllPlanesAreChosen) {
   const Level setup;
   const SweepInput input = setup.input();
   const CoarsePass coarse(setup.level, setup.sequence.ground);
-  // Nothing found: nothing is sure.
+  // Without a coarse estimate no pixel is confident.
   const std::vector<TilePlanes> choice =
       coarse.choosePlanes(SurfaceEstimate(cv::Size(kSize.width / 2, kSize.height / 2)), setup.tiles);
   ASSERT_EQ(choice.size(), setup.tiles.size());
@@ -161,9 +161,9 @@ TEST(CoarsePassTest, EqualsTheFullSweepWhereAllPlanesAreChosen) {
   }
   const SurfaceEstimate full = setup.level->sweepPlanes(input, setup.tiles, {});
   SurfaceEstimate chosen = setup.level->sweepPlanes(input, setup.tiles, choice);
-  SurfaceEstimate doubtful(cv::Size(kSize.width / 2, kSize.height / 2));
-  doubtful.second_score.setTo(1.0f);
-  coarse.addSecondPeaks(doubtful, setup.tiles, choice, &chosen);
+  SurfaceEstimate uncertain(cv::Size(kSize.width / 2, kSize.height / 2));
+  uncertain.second_score.setTo(1.0f);
+  coarse.addSecondPeaks(uncertain, setup.tiles, choice, &chosen);
   EXPECT_TRUE(sameBytes(full.inverse_range, chosen.inverse_range));
   EXPECT_TRUE(sameBytes(full.score, chosen.score));
   EXPECT_TRUE(sameBytes(full.second_score, chosen.second_score));
