@@ -87,10 +87,9 @@ bool isLevel(const BoxWorld& world, const Eigen::Vector2d& point) {
   return true;
 }
 
-TEST(HeightFusionTest, FindsGroundAndBoxWithinAVoxel) {
-  const Drive drive;
-  const ColumnImages columns = drive.fuse();
-  int num_ground = 0, num_box = 0;
+/// Calls judge(cell, true height) for the cells around the box that all cameras pass, away from its edges.
+template <class Judge>
+void forEachLevelCell(const Drive& drive, const Judge& judge) {
   for (int row = 0; row < drive.grid.rows; ++row) {
     for (int column = 0; column < drive.grid.columns; ++column) {
       const Eigen::Vector2d centre = centreOf(drive.grid, column, row);
@@ -99,13 +98,21 @@ TEST(HeightFusionTest, FindsGroundAndBoxWithinAVoxel) {
         continue;
       }
       const double truth = drive.world.heightAt(centre.x(), centre.y());
-      EXPECT_NEAR(columns.best_height_m.at<float>(row, column), truth, drive.grid.height_step_m + 1e-4)
-          << centre.transpose();
-      EXPECT_GT(columns.support_below.at<float>(row, column), 0.5F);
-      EXPECT_GT(columns.support_above.at<float>(row, column), 0.5F);
-      ++(truth > 0.0 ? num_box : num_ground);
+      judge(cv::Point(column, row), truth);
     }
   }
+}
+
+TEST(HeightFusionTest, FindsGroundAndBoxWithinAVoxel) {
+  const Drive drive;
+  const ColumnImages columns = drive.fuse();
+  int num_ground = 0, num_box = 0;
+  forEachLevelCell(drive, [&](const cv::Point& cell, double truth) {
+    EXPECT_NEAR(columns.best_height_m.at<float>(cell), truth, drive.grid.height_step_m + 1e-4) << cell;
+    EXPECT_GT(columns.support_below.at<float>(cell), 0.5F);
+    EXPECT_GT(columns.support_above.at<float>(cell), 0.5F);
+    ++(truth > 0.0 ? num_box : num_ground);
+  });
   EXPECT_GT(num_box, 250);
   EXPECT_GT(num_ground, 3000);
 }
@@ -120,19 +127,11 @@ TEST(HeightFusionTest, SmoothedHeightsOfNoisyRangesAreFlatAndKeepTheEdge) {
   EXPECT_TRUE(report.converged);
   double sum = 0.0;
   int num = 0;
-  for (int row = 0; row < drive.grid.rows; ++row) {
-    for (int column = 0; column < drive.grid.columns; ++column) {
-      const Eigen::Vector2d centre = centreOf(drive.grid, column, row);
-      if (centre.x() < 0.5 || centre.x() > 4.5 || std::abs(centre.y()) > 1.5 ||
-          !isLevel(drive.world, centre)) {
-        continue;
-      }
-      const double truth = drive.world.heightAt(centre.x(), centre.y());
-      ASSERT_TRUE(std::isfinite(heights.at<float>(row, column))) << centre.transpose();
-      sum += std::abs(heights.at<float>(row, column) - truth);
-      ++num;
-    }
-  }
+  forEachLevelCell(drive, [&](const cv::Point& cell, double truth) {
+    ASSERT_TRUE(std::isfinite(heights.at<float>(cell))) << cell;
+    sum += std::abs(heights.at<float>(cell) - truth);
+    ++num;
+  });
   EXPECT_LT(sum / num, 0.0125);  // half a voxel
   EXPECT_GT(num, 3000);
 }

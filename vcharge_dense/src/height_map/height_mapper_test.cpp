@@ -254,6 +254,11 @@ class OctomapBuilderTest : public ::testing::Test {
     }
     return map;
   }
+  static OctomapOptions everyPixel() {
+    OctomapOptions options;
+    options.pixel_step = 1;
+    return options;
+  }
   static std::string at(const octomap::OcTree& tree, double x, double y, double z) {
     const octomap::OcTreeNode* node = tree.search(x, y, z);
     return node == nullptr ? "unknown" : tree.isNodeOccupied(node) ? "occupied" : "free";
@@ -262,9 +267,7 @@ class OctomapBuilderTest : public ::testing::Test {
 };
 
 TEST_F(OctomapBuilderTest, ClearsToTheSurfaceOnlyWhereARangeIsKnown) {
-  OctomapOptions options;
-  options.pixel_step = 1;
-  OctomapBuilder builder(options, kMaxRange_m, 40.0);
+  OctomapBuilder builder(everyPixel(), kMaxRange_m, 40.0);
   builder.add(wall(), along_x_);
   EXPECT_EQ(at(builder.tree(), 2.05, -0.45, 1.05), "occupied");  // right half: y < 0
   EXPECT_EQ(at(builder.tree(), 1.05, -0.25, 1.05), "free");
@@ -274,9 +277,7 @@ TEST_F(OctomapBuilderTest, ClearsToTheSurfaceOnlyWhereARangeIsKnown) {
 }
 
 TEST_F(OctomapBuilderTest, FileIsReadAsItWasWritten) {
-  OctomapOptions options;
-  options.pixel_step = 1;
-  OctomapBuilder builder(options, kMaxRange_m, 40.0);
+  OctomapBuilder builder(everyPixel(), kMaxRange_m, 40.0);
   builder.add(wall(), along_x_);
   const std::string path = ::testing::TempDir() + "octomap_builder_test.bt";
   builder.write(path);
@@ -294,9 +295,7 @@ TEST_F(OctomapBuilderTest, LeavesOutRangesOfLowConfidence) {
   RangeMap map = wall();
   map.confidence.setTo(0.69F);
   map.confidence(cv::Rect(0, 0, map.range_m.cols, 40)).setTo(0.71F);  // rays that do not point downwards
-  OctomapOptions options;
-  options.pixel_step = 1;
-  OctomapBuilder builder(options, kMaxRange_m, 40.0);
+  OctomapBuilder builder(everyPixel(), kMaxRange_m, 40.0);
   builder.add(map, along_x_);
   EXPECT_EQ(at(builder.tree(), 2.05, -0.45, 1.25), "occupied");
   EXPECT_EQ(at(builder.tree(), 2.05, -0.45, 0.65), "unknown");
@@ -374,9 +373,7 @@ TEST_F(OctomapBuilderTest, EqualsAnOctreeThatIsUpdatedRayByRay) {
 }
 
 TEST_F(OctomapBuilderTest, RangesBeyondTheLimitClearUpToItAndEndNowhere) {
-  OctomapOptions options;
-  options.pixel_step = 1;
-  OctomapBuilder builder(options, 1.0, 40.0);
+  OctomapBuilder builder(everyPixel(), 1.0, 40.0);
   builder.add(wall(), along_x_);
   EXPECT_EQ(at(builder.tree(), 0.75, -0.15, 1.05), "free");
   EXPECT_EQ(at(builder.tree(), 2.05, -0.45, 1.05), "unknown");

@@ -2,7 +2,6 @@
 #include "kernels/sweep_kernels.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -15,16 +14,6 @@
 
 namespace vcharge {
 namespace {
-
-using testing::allValid;
-using testing::kCamera;
-using testing::kFront;
-using testing::kLeft;
-using testing::kSize;
-using testing::lotScene;
-using testing::makeSequence;
-using testing::onEveryTarget;
-using testing::Sequence;
 
 /// Position in the packed image that the grid's cells give for a pixel of the tile.
 Eigen::Vector2d positionFromCells(const NodeGrid& grid, const AlignedArray<float>& cells,
@@ -144,7 +133,7 @@ void expectAgreement(const PlaneSweepOptions& options, float tolerance) {
   SweepDetails first;
   onEveryTarget([&] {
     SweepDetails details;
-    PlaneSweep(kCamera, mask, options, s.ground).sweep(s.reference, s.neighbours, &details);
+    sweepOf(s, options, &details, mask);
     if (first.plane.empty()) {
       first = details;
       return;

@@ -7,6 +7,7 @@
 
 #include <limits>
 
+#include "kernels/lane_operations-inl.h"
 #include "kernels/sweep_kernels.h"
 #include "kernels/sweep_kernels_internal.h"
 
@@ -15,11 +16,6 @@ namespace vcharge {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using DF = hn::ScalableTag<float>;
-using DI = hn::ScalableTag<int32_t>;
-using VF = hn::VFromD<DF>;
-using VI = hn::VFromD<DI>;
 using MF = decltype(hn::Lt(VF(), VF()));
 
 HWY_INLINE VF set(float value) {

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "kernels/lane_operations-inl.h"
 #include "kernels/sweep_kernels.h"
 #include "kernels/sweep_kernels_internal.h"
 
@@ -16,12 +17,6 @@ HWY_BEFORE_NAMESPACE();
 namespace vcharge {
 namespace HWY_NAMESPACE {
 namespace {
-
-namespace hn = hwy::HWY_NAMESPACE;
-using DF = hn::ScalableTag<float>;
-using DI = hn::ScalableTag<int32_t>;
-using VF = hn::VFromD<DF>;
-using VI = hn::VFromD<DI>;
 
 constexpr float kOne = static_cast<float>(1 << kPositionBits);
 

@@ -15,18 +15,6 @@
 namespace vcharge {
 namespace {
 
-using testing::allValid;
-using testing::cameraPose;
-using testing::disturb;
-using testing::kCamera;
-using testing::kFront;
-using testing::kLeft;
-using testing::kSize;
-using testing::lotScene;
-using testing::makeSequence;
-using testing::plainOptions;
-using testing::Sequence;
-
 /// Fractions of the pixels inside a border of 8 pixels.
 struct Score {
   double known = 0.0;         // of all pixels
@@ -69,10 +57,10 @@ TEST(PlaneSweepAccuracyTest, FindsFrontoParallelWallWithinOnePlaneSpacing) {
   // Optical axis along +y, wall at y = 4: every pixel lies on the plane at distance 4.
   const AnalyticScene scene({{{0, 4, 0}, {0, -1, 0}}}, 3);
   const Sequence s = makeSequence(scene, cameraPose({0, 0, 1}, 1.5707963267948966, 0.0), 0.1, -2, 2);
-  const PlaneSweep sweep(kCamera, allValid(), plainOptions());
   SweepDetails details;
-  sweep.sweep(s.reference, s.neighbours, &details);
-  const std::vector<float>& planes = sweep.families()[0].inverse_distances_per_m;
+  sweepOf(s, plainOptions(), &details);
+  const std::vector<float> planes =
+      makePlaneFamilies(plainOptions(), std::nullopt)[0].inverse_distances_per_m;
   int right = 0, all = 0;
   for (int y = 20; y < 180; ++y) {
     for (int x = 40; x < 280; ++x) {
@@ -89,16 +77,13 @@ TEST(PlaneSweepAccuracyTest, FindsFrontoParallelWallWithinOnePlaneSpacing) {
 TEST(PlaneSweepAccuracyTest, SubPlaneInterpolationAndRefinementImprove) {
   const Sequence s = makeSequence(lotScene(1), kLeft, 0.1, -2, 2);
   PlaneSweepOptions options = plainOptions();
-  const PlaneSweep first_sweep(kCamera, allValid(), options, s.ground);
   SweepDetails details;
-  RangeMap map = first_sweep.sweep(s.reference, s.neighbours, &details);
+  RangeMap map = sweepOf(s, options, &details);
   const double interpolated = judge(map, s.truth, 0.05, kEverywhere).median_error;
   options.num_refinement_steps = 16;
-  const RangeMap refined_map =
-      PlaneSweep(kCamera, allValid(), options, s.ground).sweep(s.reference, s.neighbours);
-  const double refined = judge(refined_map, s.truth, 0.05, kEverywhere).median_error;
+  const double refined = judge(sweepOf(s, options), s.truth, 0.05, kEverywhere).median_error;
   // Moves each range to the plane that was found.
-  const PlaneFamily& family = first_sweep.families().front();
+  const PlaneFamily family = makePlaneFamilies(options, std::nullopt).front();
   const RayTable rays(kCamera, kSize, 6.283185307179586);
   for (int y = 0; y < kSize.height; ++y) {
     for (int x = 0; x < kSize.width; ++x) {
@@ -120,12 +105,9 @@ TEST(PlaneSweepAccuracyTest, GroundParallelPlanesImproveTheGround) {
   const Sequence s = makeSequence(ground_only, kLeft, 0.2, -4, 0);
   PlaneSweepOptions options = plainOptions();
   const auto near = [&](int x, int y) { return s.truth.at<double>(y, x) < 4.0; };
-  const Score fronto =
-      judge(PlaneSweep(kCamera, allValid(), options).sweep(s.reference, s.neighbours), s.truth, 0.02, near);
+  const Score fronto = judge(sweepOf(s, options), s.truth, 0.02, near);
   options.num_ground_planes = PlaneSweepOptions().num_ground_planes;
-  const Score both =
-      judge(PlaneSweep(kCamera, allValid(), options, s.ground).sweep(s.reference, s.neighbours), s.truth,
-            0.02, near);
+  const Score both = judge(sweepOf(s, options), s.truth, 0.02, near);
   EXPECT_GT(both.known * both.right, 0.97);
   EXPECT_LT(both.median_error, fronto.median_error);
 }
@@ -135,7 +117,7 @@ TEST(PlaneSweepAccuracyTest, DirectionOfTravelIsUncertainOrUnobserved) {
   const Sequence s = makeSequence(wall, cameraPose({0, 0, 1}, 0.0, 0.0), 0.2, -4, 0, 1.0);
   PlaneSweepOptions options = plainOptions();
   options.num_refinement_steps = 16;
-  const RangeMap map = PlaneSweep(kCamera, allValid(), options).sweep(s.reference, s.neighbours);
+  const RangeMap map = sweepOf(s, options);
   int known_at_epipole = 0;
   double sigma_near = 0.0, sigma_far = 0.0;
   int near = 0, far = 0;
@@ -172,7 +154,7 @@ TEST(PlaneSweepAccuracyTest, OcclusionHandlingHelpsBehindAnOccluder) {
   const auto rightFraction = [&](Aggregation aggregation) {
     options.aggregation = aggregation;
     options.min_confidence = 0.0;
-    const RangeMap map = PlaneSweep(kCamera, allValid(), options).sweep(s.reference, s.neighbours);
+    const RangeMap map = sweepOf(s, options);
     const Score score = judge(map, s.truth, 0.1, besideBoard);
     return score.known * score.right;
   };
@@ -189,7 +171,7 @@ TEST(PlaneSweepAccuracyTest, StandardDeviationMatchesErrorsUnderPixelAndPoseNois
     const PlaneSweepOptions options;
     std::mt19937 generator(draw);
     disturb(options.pose_noise, &generator, &s);
-    const RangeMap map = PlaneSweep(kCamera, allValid(), options, s.ground).sweep(s.reference, s.neighbours);
+    const RangeMap map = sweepOf(s, options);
     const Score score = judge(map, s.truth, 0.05, kEverywhere);
     within_sigma += score.within_sigma * score.known;
     known += score.known;
@@ -212,8 +194,7 @@ TEST(PlaneSweepAccuracyTest, MostConfidentPixelsAreRight) {
       if (!true_poses) {
         disturb(options.pose_noise, &generator, &s);
       }
-      const RangeMap map =
-          PlaneSweep(kCamera, allValid(), options, s.ground).sweep(s.reference, s.neighbours);
+      const RangeMap map = sweepOf(s, options);
       std::vector<std::pair<float, bool>> pixels;  // negative confidence, right
       for (int y = 0; y < kSize.height; ++y) {
         for (int x = 0; x < kSize.width; ++x) {

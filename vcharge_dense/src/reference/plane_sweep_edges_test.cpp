@@ -13,14 +13,6 @@
 namespace vcharge {
 namespace {
 
-using testing::allValid;
-using testing::expectTheSameOnAnyNumberOfThreads;
-using testing::kCamera;
-using testing::kLeft;
-using testing::kSize;
-using testing::makeSequence;
-using testing::Sequence;
-
 constexpr double kEdge_m = 4.0;  // y of the kerb; the left camera is at y = 1 and faces it
 constexpr double kHeight_m = 0.12;
 
@@ -87,20 +79,21 @@ double relativeErrorOf(double pixels) {
 }
 
 /// In the farthest neighbour 64 fronto-parallel planes are 4.4 pixels apart, 256 planes 1.1 pixels.
-RangeMap sweepOf(const Sequence& s, int num_planes, double near_spacing = 1.0) {
+RangeMap sweepPlanes(const Sequence& s, int num_planes, double near_spacing = 1.0) {
   PlaneSweepOptions options;
   options.aggregation = Aggregation::kReferenceSplit;
   options.pose_noise = PoseNoiseOptions::trajectory();
   options.num_planes = num_planes;
   options.near_spacing = near_spacing;
-  return PlaneSweep(kCamera, allValid(), options, s.ground).sweep(s.reference, s.neighbours);
+  return sweepOf(s, options);
 }
 
 TEST(PlaneSweepEdgesTest, PlanesAPixelApartFindAKerbsFaceWithinAQuarterOfAPixel) {
   for (const uint32_t seed : {1u, 2u, 3u}) {
     SCOPED_TRACE(seed);
     const Sequence s = fourNeighbours(seed);
-    const Errors coarse = errorsOf(sweepOf(s, 64), s, kFace), fine = errorsOf(sweepOf(s, 256), s, kFace);
+    const Errors coarse = errorsOf(sweepPlanes(s, 64), s, kFace),
+                 fine = errorsOf(sweepPlanes(s, 256), s, kFace);
     EXPECT_LE(fine.median_absolute, relativeErrorOf(0.25));
     EXPECT_LE(std::abs(fine.median), relativeErrorOf(0.1));
     EXPECT_LE(fine.median_absolute, 0.5 * coarse.median_absolute);
@@ -112,8 +105,8 @@ TEST(PlaneSweepEdgesTest, MoreOfThePlanesFarAwayFindAKerbsFaceBetter) {
     SCOPED_TRACE(seed);
     const Sequence s = fourNeighbours(seed);
     // At the kerb the spacing of the planes falls to 0.45 of that of uniform ones.
-    const Errors uniform = errorsOf(sweepOf(s, 64), s, kFace),
-                 spaced = errorsOf(sweepOf(s, 64, 6.0), s, kFace);
+    const Errors uniform = errorsOf(sweepPlanes(s, 64), s, kFace),
+                 spaced = errorsOf(sweepPlanes(s, 64, 6.0), s, kFace);
     EXPECT_LE(spaced.median_absolute, 0.7 * uniform.median_absolute);
   }
 }
@@ -143,14 +136,14 @@ TEST(PlaneSweepEdgesTest, UnevenPlanesGiveTheSameBytesOnAnyNumberOfThreads) {
   PlaneSweepOptions options;
   options.near_spacing = 6.0;
   options.coarse_pass = true;
-  expectTheSameOnAnyNumberOfThreads(PlaneSweep(kCamera, allValid(), options, s.ground), s);
+  expectTheSameOnAnyNumberOfThreads(options, s);
 }
 
 TEST(PlaneSweepEdgesTest, TheRoadBeforeAKerbIsWithinTwoMillimetresOfItsHeight) {
   for (const uint32_t seed : {1u, 2u, 3u}) {
     SCOPED_TRACE(seed);
     const Sequence s = fourNeighbours(seed);
-    const Errors road = errorsOf(sweepOf(s, 256), s, kRoadBefore);
+    const Errors road = errorsOf(sweepPlanes(s, 256), s, kRoadBefore);
     // A relative range error raises or lowers the ground by the same fraction of the camera's height.
     EXPECT_LE(std::abs(road.median) * s.ground.distance_m, 0.002);
     EXPECT_GE(road.known, 0.95);

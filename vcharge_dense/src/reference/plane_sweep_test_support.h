@@ -16,7 +16,7 @@
 #include "vcharge_core/motion/rigid_transform.h"
 #include "vcharge_dense/plane_sweep.h"
 
-namespace vcharge::testing {
+namespace vcharge {
 
 inline const cv::Size kSize(320, 200);
 inline const MeiCamera kCamera(1.158, 224.0, 223.5, 162.0, 99.5);
@@ -135,16 +135,44 @@ inline AnalyticScene lotScene(uint32_t seed) {
 inline const RigidTransform kLeft = cameraPose({0.0, 1.0, 0.9}, 1.5, 0.6);
 inline const RigidTransform kFront = cameraPose({3.6, 0.0, 0.7}, 0.0, 0.2);
 
-inline void expectTheSameOnAnyNumberOfThreads(const PlaneSweep& sweep, const Sequence& sequence) {
+/// Hash of a range map's contents.
+inline std::string hashOf(const RangeMap& map) {
+  ContentHasher hasher;
+  addToHash(map, &hasher);
+  return hasher.hex();
+}
+
+/// Range map of a sequence of test images.
+inline RangeMap sweepOf(const Sequence& sequence, const PlaneSweepOptions& options,
+                        SweepDetails* details = nullptr, const cv::Mat& valid_mask = allValid()) {
+  const PlaneSweep sweep(kCamera, valid_mask, options, sequence.ground);
+  return sweep.sweep(sequence.reference, sequence.neighbours, details);
+}
+
+inline int countKnown(const RangeMap& map) {
+  return cv::countNonZero(map.range_m == map.range_m);
+}
+
+/// Number of pixels inside a border whose relative range error is within the tolerance.
+inline int countRight(const RangeMap& map, const cv::Mat& truth, double tolerance, int border = 0) {
+  int right = 0;
+  for (int y = border; y < truth.rows - border; ++y) {
+    for (int x = border; x < truth.cols - border; ++x) {
+      const double true_range = truth.at<double>(y, x);
+      right += std::abs(map.range_m.at<float>(y, x) - true_range) <= tolerance * true_range ? 1 : 0;
+    }
+  }
+  return right;
+}
+
+inline void expectTheSameOnAnyNumberOfThreads(const PlaneSweepOptions& options, const Sequence& sequence) {
   std::vector<std::string> hashes;
   for (const size_t threads : {1u, 2u, 5u}) {
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    ContentHasher hasher;
-    addToHash(sweep.sweep(sequence.reference, sequence.neighbours), &hasher);
-    hashes.push_back(hasher.hex());
+    hashes.push_back(hashOf(sweepOf(sequence, options)));
   }
   EXPECT_EQ(hashes[0], hashes[1]);
   EXPECT_EQ(hashes[0], hashes[2]);
 }
 
-}  // namespace vcharge::testing
+}  // namespace vcharge

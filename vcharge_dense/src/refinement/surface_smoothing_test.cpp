@@ -1,6 +1,5 @@
 #include "refinement/surface_smoothing.h"
 
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <random>

@@ -15,17 +15,6 @@
 namespace vcharge {
 namespace {
 
-using testing::allValid;
-using testing::kCamera;
-using testing::kFront;
-using testing::kLeft;
-using testing::kSize;
-using testing::lotScene;
-using testing::makeSequence;
-using testing::onEveryTarget;
-using testing::plainOptions;
-using testing::Sequence;
-
 // Samples are rounded to 1/256 pixel and 1/8 gray level, and the warp is interpolated between nodes: scores
 // and the parabolas' maxima (in planes) differ by thousandths.
 TEST(PlaneSweepTest, EqualsThePlainReference) {
@@ -74,8 +63,7 @@ TEST(PlaneSweepTest, GivesTheSameBytesOnAnyNumberOfThreads) {
   const Sequence s = makeSequence(lotScene(2), kLeft, 0.2, -4, 0, 2.0);
   PlaneSweepOptions options;
   options.refine_poses = true;
-  const PlaneSweep sweep(kCamera, allValid(), options, s.ground);
-  testing::expectTheSameOnAnyNumberOfThreads(sweep, s);
+  expectTheSameOnAnyNumberOfThreads(options, s);
 }
 
 TEST(PlaneSweepTest, ResultsDoNotDependOnEarlierSweeps) {
@@ -83,13 +71,7 @@ TEST(PlaneSweepTest, ResultsDoNotDependOnEarlierSweeps) {
   const Sequence other = makeSequence(lotScene(3), kFront, 0.2, -3, 0, 2.0);
   PlaneSweepOptions options;
   options.coarse_pass = true;
-  const auto hashOf = [](const RangeMap& map) {
-    ContentHasher hasher;
-    addToHash(map, &hasher);
-    return hasher.hex();
-  };
-  const std::string fresh =
-      hashOf(PlaneSweep(kCamera, allValid(), options, s.ground).sweep(s.reference, s.neighbours));
+  const std::string fresh = hashOf(sweepOf(s, options));
   const PlaneSweep sweep(kCamera, allValid(), options, s.ground);
   EXPECT_NE(hashOf(sweep.sweep(other.reference, other.neighbours)), fresh);
   EXPECT_EQ(hashOf(sweep.sweep(s.reference, s.neighbours)), fresh);
@@ -105,30 +87,25 @@ TEST(PlaneSweepTest, MaskedPixelsAreUnknownAndDoNotVote) {
     image.pixels(hole).setTo(255);
   }
   painted.reference.pixels(hole).setTo(0);
-  const PlaneSweep sweep(kCamera, mask, PlaneSweepOptions(), s.ground);
-  const RangeMap map = sweep.sweep(s.reference, s.neighbours);
-  ContentHasher plain_hash, painted_hash;
-  addToHash(map, &plain_hash);
-  addToHash(sweep.sweep(painted.reference, painted.neighbours), &painted_hash);
-  EXPECT_EQ(plain_hash.hex(), painted_hash.hex());
+  const RangeMap map = sweepOf(s, PlaneSweepOptions(), nullptr, mask);
+  EXPECT_EQ(hashOf(map), hashOf(sweepOf(painted, PlaneSweepOptions(), nullptr, mask)));
   const cv::Rect touched(hole.x - 3, hole.y - 3, hole.width + 6, hole.height + 6);
   EXPECT_EQ(cv::countNonZero(map.range_m(touched) == map.range_m(touched)), 0);
-  EXPECT_GT(cv::countNonZero(map.range_m == map.range_m), 0.8 * (kSize.area() - touched.area()));
+  EXPECT_GT(countKnown(map), 0.8 * (kSize.area() - touched.area()));
 }
 
 TEST(PlaneSweepTest, PixelsWithoutTextureAreUnknown) {
   const AnalyticScene bare({{{0, 0, 0}, {0, 0, 1}, Eigen::Vector3d::Constant(1e6), 0.0}}, 1);
   const Sequence s = makeSequence(bare, kLeft, 0.2, -4, 0, 1.0);
-  const RangeMap map =
-      PlaneSweep(kCamera, allValid(), PlaneSweepOptions(), s.ground).sweep(s.reference, s.neighbours);
-  EXPECT_LE(cv::countNonZero(map.range_m == map.range_m), 0.001 * kSize.area());
+  const RangeMap map = sweepOf(s, PlaneSweepOptions());
+  EXPECT_LE(countKnown(map), 0.001 * kSize.area());
 }
 
 TEST(PlaneSweepTest, NoNeighbourLeavesEverythingUnknown) {
   const Sequence s = makeSequence(lotScene(1), kLeft, 0.2, 0, 0);
-  const RangeMap map = PlaneSweep(kCamera, allValid(), PlaneSweepOptions(), s.ground).sweep(s.reference, {});
+  const RangeMap map = sweepOf(s, PlaneSweepOptions());
   EXPECT_EQ(map.range_m.size(), kSize);
-  EXPECT_EQ(cv::countNonZero(map.range_m == map.range_m), 0);
+  EXPECT_EQ(countKnown(map), 0);
   EXPECT_EQ(cv::countNonZero(map.confidence), 0);
 }
 
