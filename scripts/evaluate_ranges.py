@@ -18,8 +18,6 @@ SETTINGS = {
     "`fast`": ("fast", {}),
     "`default`": ("default", {}),
     "`accurate`": ("accurate", {}),
-    "`default`, semi-global smoothing": ("default", {"semi_global_smoothing": True}),
-    "`default`, half resolution beyond 2 m": ("default", {"half_resolution_beyond_m": 2.0}),
     "`default`, filled from two levels": ("default", {"num_fill_levels": 2}),
     "`default`, all planes": ("default", {"coarse_pass": False}),
 }
