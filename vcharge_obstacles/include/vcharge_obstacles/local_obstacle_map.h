@@ -74,8 +74,6 @@ class LocalObstacleMap {
   /// The map at the last moveTo(); frame_id is left empty.
   ObstacleMap snapshot() const;
 
-  const LocalObstacleMapOptions& options() const { return options_; }
-
  private:
   struct Cell {
     float log_odds = 0.0F;

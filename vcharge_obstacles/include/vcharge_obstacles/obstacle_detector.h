@@ -101,8 +101,6 @@ class ObstacleDetector {
   /// std::logic_error for a range map of another size than the camera's.
   CameraObstacles detect(const RangeMap& map) const;
 
-  const PolarGrid& grid() const;
-
  private:
   struct Implementation;
   std::shared_ptr<const Implementation> implementation_;

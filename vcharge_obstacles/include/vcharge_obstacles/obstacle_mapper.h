@@ -107,8 +107,6 @@ class ObstacleMapper {
   uint64_t numJumps() const { return num_jumps_; }
   /// Number of stamps that wait for range maps or odometry.
   size_t numWaiting() const { return waiting_.size(); }
-  const PolarGrid& grid() const { return grid_; }
-  const ObstacleMapperOptions& options() const { return options_; }
 
  private:
   struct Camera;

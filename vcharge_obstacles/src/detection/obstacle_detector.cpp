@@ -100,10 +100,6 @@ ObstacleDetector::ObstacleDetector(const WorkingCamera& camera, const RigidTrans
   implementation_ = std::make_shared<const Implementation>(camera, vehicle_from_camera, options);
 }
 
-const PolarGrid& ObstacleDetector::grid() const {
-  return implementation_->grid;
-}
-
 GroundCandidates ObstacleDetector::Implementation::collectGround(const RangeMap& map) const {
   GroundCandidates candidates;
   const auto* range_m = map.range_m.ptr<float>();

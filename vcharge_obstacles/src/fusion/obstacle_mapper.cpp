@@ -37,23 +37,9 @@ struct ObstacleMapper::Camera {
 };
 
 std::string toString(ObstacleCameraState state) {
-  switch (state) {
-    case ObstacleCameraState::kNoRangeMaps:
-      return "no range maps";
-    case ObstacleCameraState::kNoPose:
-      return "no pose";
-    case ObstacleCameraState::kStanding:
-      return "standing";
-    case ObstacleCameraState::kHardlySees:
-      return "hardly sees";
-    case ObstacleCameraState::kGroundLost:
-      return "ground lost";
-    case ObstacleCameraState::kGroundUnsure:
-      return "ground unsure";
-    case ObstacleCameraState::kMapping:
-      break;
-  }
-  return "mapping";
+  constexpr const char* kNames[] = {"no range maps", "no pose",       "standing", "hardly sees",
+                                    "ground lost",   "ground unsure", "mapping"};
+  return kNames[static_cast<size_t>(state)];
 }
 
 ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const ObstacleMapperOptions& options,

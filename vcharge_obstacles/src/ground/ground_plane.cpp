@@ -68,15 +68,8 @@ GroundPlane nominalPlane(GroundState state, int num_points) {
 }  // namespace
 
 std::string toString(GroundState state) {
-  switch (state) {
-    case GroundState::kMeasured:
-      return "measured";
-    case GroundState::kFewPoints:
-      return "few ground points";
-    case GroundState::kOutOfBounds:
-      break;
-  }
-  return "out of bounds";
+  constexpr const char* kNames[] = {"measured", "few ground points", "out of bounds"};
+  return kNames[static_cast<size_t>(state)];
 }
 
 double GroundPlane::pitch_rad() const {
