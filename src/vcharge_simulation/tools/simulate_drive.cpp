@@ -1,5 +1,6 @@
 #include <iostream>
 #include <optional>
+#include <sstream>
 #include <string>
 
 #include <tbb/global_control.h>
@@ -24,7 +25,7 @@ int main(int argc, char** argv) {
   bool show_options = false;
   int threads = 0;
   const CLI::Option* output =
-      app.add_option("--output", recording.bag, "bag to write")->check(vcharge::requireNotEmpty);
+      app.add_option("--output", recording.bag, "bag to write")->check(vcharge::requireOutput);
   app.add_option(
       "--images-from", recording.images_from,
       "bag of the same drive with the same --seed and --noise off: its images get noise, exposure, faults "
@@ -37,16 +38,16 @@ int main(int argc, char** argv) {
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app.add_flag("--list", list, "print scenes, drives, rigs and faults, and do nothing else");
-  app.add_flag("--show-options", show_options,
-               "print all fields of the scenario with their values, and do nothing else");
-  return vcharge::runTool(&app, argc, argv, [&] {
+  vcharge::addShowOptions(&app, &show_options);
+  app.footer("Keys of --json: scenario (all its options).");
+  return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (list) {
       std::cout << vcharge::describeCatalogue();
       return;
     }
     const vcharge::DriveScenario scenario = command_line.scenario();
     if (show_options) {
-      std::cout << vcharge::writeFields(scenario) << "\n";
+      std::cout << vcharge::showOptions(scenario);
       return;
     }
     if (output->count() == 0) {
@@ -57,5 +58,8 @@ int main(int argc, char** argv) {
       limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
     }
     vcharge::recordDrive(scenario, recording);
+    std::ostringstream text;
+    text << vcharge::writeFields(scenario);
+    (*found)["scenario"] = text.str();
   });
 }
