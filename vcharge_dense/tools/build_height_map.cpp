@@ -182,7 +182,7 @@ int main(int argc, char** argv) {
                  "TUM file, e.g. of build_map; without it poses come from the drive's odometry");
   app.add_option("--map", arguments.map, "sparse map of this drive (*.vmap): poses of its keyframes");
   app.add_option("--options", arguments.options, "YAML with overrides of HeightMapOptions");
-  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutput);
+  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
   app.add_flag("--keep-range-maps", arguments.keep_range_maps, "do not remove OUTPUT.range_maps at the end");
   addShowOptions(&app, &arguments.show_options);
   app.footer(

@@ -147,7 +147,7 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember(enumNames<RangePreset>()))
       ->capture_default_str();
   app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
-  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutput);
+  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
   app.add_flag(
       "--online", arguments.online,
       "as the nodelet does: only images before the reference, averaged (default: before and after, split)");

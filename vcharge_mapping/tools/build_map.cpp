@@ -275,7 +275,7 @@ int main(int argc, char** argv) {
   app.add_option("--trajectory", arguments.trajectory, "TUM file to write: the pose of every frame")
       ->check(requireOutput);
   app.add_option("--report", arguments.report, "folder for map_report.html: pictures, numbers and a verdict")
-      ->check(requireOutput);
+      ->check(requireOutputFolder);
   app.add_option("--options", arguments.options, "YAML with overrides of SparseMapperOptions");
   app.add_flag("--fresh", arguments.fresh, "do not go on from OUTPUT.work, which an earlier run left");
   app.add_flag("--no-checkpoint", arguments.no_checkpoint, "leave no OUTPUT.work to go on from");

@@ -57,7 +57,7 @@ int main(int argc, char** argv) {
       ->check(vcharge::requireOutput);
   app.add_option("--export-colmap", colmap_folder,
                  "folder for COLMAP's text model, each camera as the closest OPENCV_FISHEYE")
-      ->check(vcharge::requireOutput);
+      ->check(vcharge::requireOutputFolder);
   app.add_option("--trajectory", trajectory_path, "keyframe poses as TUM text")
       ->check(vcharge::requireOutput);
   app.footer(

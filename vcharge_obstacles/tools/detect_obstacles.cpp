@@ -228,7 +228,7 @@ int main(int argc, char** argv) {
   app.add_option("--range", arguments.range,
                  "folder that compute_range_maps wrote, instead of computing range maps");
   app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
-  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutput);
+  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
   addShowOptions(&app, &arguments.show_options);
   app.footer(
       "Keys of --json: num_maps, num_odometry_jumps, cameras (name, num_range_maps, num_without_pose, "

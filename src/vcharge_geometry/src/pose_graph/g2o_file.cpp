@@ -11,14 +11,14 @@
 namespace vcharge {
 namespace {
 
-/// Rows of the 6x6 information that a file of either dimension holds.
+/// Rows of the 6x6 information matrix that a file of this dimension contains.
 const std::vector<int>& informationRows(bool planar) {
   static const std::vector<int> planar_rows{0, 1, 5};
   static const std::vector<int> spatial_rows{0, 1, 2, 3, 4, 5};
   return planar ? planar_rows : spatial_rows;
 }
 
-/// Reads the fields of one line; every error names file and line.
+/// Reads the fields of a line; every error names the file and the line.
 class LineReader {
  public:
   LineReader(const std::string& path, int line_number, const std::string& line)

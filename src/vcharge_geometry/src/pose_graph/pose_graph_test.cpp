@@ -19,7 +19,7 @@
 namespace vcharge {
 namespace {
 
-/// A file of the given text, removed with the object.
+/// A file with the given text, removed by the destructor.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& text)
@@ -115,7 +115,7 @@ TEST(PoseGraphTest, SurvivesDamagedFiles) {
       EXPECT_THAT(error.what(), testing::HasSubstr(file.path()));
     }
   }
-  // Both kinds occur.
+  // Both outcomes occur.
   EXPECT_GT(num_read, 10);
   EXPECT_LT(num_read, 2990);
 }
@@ -131,7 +131,7 @@ TEST_P(KnownOptimumTest, IsReached) {
   const PoseGraphSummary summary = optimizePoseGraph({}, 100, &graph);
   EXPECT_TRUE(summary.converged);
   EXPECT_NEAR(summary.final_chi_squared, GetParam().second, 1e-3 * GetParam().second);
-  // The cost that Ceres sees is the error defined in pose_graph.h.
+  // The cost minimized by Ceres is the error defined in pose_graph.h.
   EXPECT_NEAR(chiSquared(graph), summary.final_chi_squared, 1e-6 * summary.final_chi_squared);
 }
 

@@ -11,11 +11,11 @@
 namespace vcharge {
 namespace {
 
-/// A file of which the last num_false edges are false.
+/// A file whose last num_false edges are false.
 struct FileWithFalseLoops {
   const char* name;
   size_t num_false;
-  double optimal_chi_squared;  ///< of the others
+  double optimal_chi_squared;  ///< of the true edges
 };
 
 class FalseLoopsTest : public testing::TestWithParam<FileWithFalseLoops> {};

@@ -21,10 +21,22 @@ inline std::string requireNotEmpty(const std::string& value) {
   return value.empty() ? "expected a path, got ''" : "";
 }
 
-/// For CLI::Option::check() of a file or folder to write: a tool learns before its work that it cannot be
-/// written. Throws InputError naming the path.
+/// For CLI::Option::check() of a file to write: reports before the work starts that it cannot be written.
+/// Throws InputError naming the path.
 inline std::string requireOutput(const std::string& value) {
-  return requireNotEmpty(value);
+  const std::string error = requireNotEmpty(value);
+  if (error.empty()) {
+    requireWritable(value);
+  }
+  return error;
+}
+/// The same for a folder to write.
+inline std::string requireOutputFolder(const std::string& value) {
+  const std::string error = requireNotEmpty(value);
+  if (error.empty()) {
+    requireWritableFolder(value);
+  }
+  return error;
 }
 
 /// Adds --show-options to a tool. runTool() then requires nothing else.
