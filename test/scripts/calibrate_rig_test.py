@@ -8,7 +8,7 @@ import unittest
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from drive_fixture import Drive, run, tool  # noqa: E402
+from drive_fixture import Drive, run, run_tool, tool  # noqa: E402
 
 
 class CalibrateRigTest(unittest.TestCase):
@@ -100,11 +100,11 @@ class CalibrateRigTest(unittest.TestCase):
         status, output, _ = run([compare, self.drive.rig, moved])
         self.assertEqual(status, 0)
         self.assertIn("forwards     2.000 cm", output)
-        status, output, _ = run([tool("vcharge_evaluation", "evaluate_rig"), "--estimate", moved, "--truth",
-                                 self.drive.rig])
+        status, found, _ = run_tool([tool("vcharge_evaluation", "evaluate_rig"), "--estimate", moved, "--truth",
+                                     self.drive.rig])
         self.assertEqual(status, 0)
-        row = next(line for line in output.splitlines() if line.split()[:1] == ["front"]).split()
-        self.assertEqual(row[1], "-2.00")
+        front = next(camera for camera in found["as_is"] if camera["camera"] == "front")
+        self.assertAlmostEqual(front["error_m"][0], -0.02, places=6)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
-"""The simulated drive of the integration tests, the suite's tools, and what the tests do to a bag."""
+"""The simulated drive of the integration tests, how they run tools, and how they change bags."""
+import json
 import os
 import pathlib
 import shutil
@@ -20,6 +21,14 @@ def run(command):
     result = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
     errors = [line for line in result.stderr.splitlines() if line.strip() and not is_progress(line)]
     return result.returncode, result.stdout, errors
+
+
+def run_tool(command):
+    """Runs a tool with --json; returns exit status, what it found, and the lines of standard error without progress."""
+    with tempfile.TemporaryDirectory(prefix="vcharge_tests_") as folder:
+        report = pathlib.Path(folder) / "found.json"
+        status, _, errors = run([*command, "--json", report])
+        return status, json.loads(report.read_text()) if report.exists() else {}, errors
 
 
 def is_progress(line):
@@ -62,15 +71,8 @@ class Drive:
         return path
 
     def compute_range_maps(self, output, bag=None, rig=None, extra=()):
-        return run([tool("vcharge_dense", "compute_range_maps"), "--bag", bag or self.bag, "--rig", rig or self.rig,
-                    "--output", output, "--no-pictures", *extra])
-
-
-def content_hash(output):
-    for line in output.splitlines():
-        if line.startswith("content hash: "):
-            return line.split(": ")[1]
-    raise AssertionError(f"no content hash in: {output}")
+        return run_tool([tool("vcharge_dense", "compute_range_maps"), "--bag", bag or self.bag, "--rig", rig or self.rig,
+                         "--output", output, "--no-pictures", *extra])
 
 
 def files_below(folder):

@@ -206,8 +206,10 @@ void buildMap(const Arguments& arguments, const SparseMapperOptions& options, nl
     earlier = checkpoint.read(rig);
   }
   StageBars bars;
+  std::string resumed_after;
   if (earlier) {
-    std::cout << "going on after the stage '" << nameOfStage(*earlier) << "' of an earlier run\n";
+    resumed_after = nameOfStage(*earlier);
+    std::cout << "going on after the stage '" << resumed_after << "' of an earlier run\n";
     mapper.resume(std::move(*earlier));
   } else {
     const int num_stages = static_cast<int>(backEndStages().size()) + 2;
@@ -256,6 +258,7 @@ void buildMap(const Arguments& arguments, const SparseMapperOptions& options, nl
   *found = toJson(mapper.report(), *map);
   (*found)["verdict"] = toString(verdict.grade);
   (*found)["remarks"] = verdict.remarks;
+  (*found)["resumed_after"] = resumed_after;
   std::cout << "verdict: " << toString(verdict.grade);
   for (const std::string& remark : verdict.remarks) {
     std::cout << "\n  " << remark;
@@ -285,7 +288,9 @@ int main(int argc, char** argv) {
       "num_missing_images (by camera), num_frames_without_odometry, num_standing_frames, "
       "num_odometry_resets, num_late_images, num_motions (by hypothesis), num_keyframes, num_landmarks, "
       "num_observations, rms_px, num_loop_edges, num_rejected_loop_edges (by reason), "
-      "odometry_distance_scale, odometry_turn_scale, stage_s (wall time), content_hash.");
+      "odometry_distance_scale, odometry_turn_scale, stage_s (wall time), resumed_after (stage of an earlier "
+      "run; empty: none), "
+      "content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     SparseMapperOptions options;
     if (!arguments.options.empty()) {
