@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""calibrate_rig on drives that do not suffice: the right reason, and no file; compare_rigs and evaluate_rig."""
+"""calibrate_rig on insufficient drives gives the right reason and no file; compare_rigs and evaluate_rig."""
 import copy
 import os
 import sys
@@ -21,7 +21,7 @@ class CalibrateRigTest(unittest.TestCase):
         cls.drive.remove()
 
     def calibrate(self, bag, *extra, program="calibrate_rig"):
-        """Expects a failure that leaves the old file as it is; returns what was printed and the line of the error."""
+        """Expects a failure that leaves the old file as it is; returns the printed text and the error line."""
         output = self.drive.write_text("rig.yaml", "an older rig\n")
         status, printed, errors = run([tool("vcharge_calibration", program), "--bag", bag, "--rig",
                                        self.drive.rig, "--output", output, *extra])

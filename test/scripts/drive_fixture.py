@@ -36,7 +36,7 @@ def is_progress(line):
 
 
 class Drive:
-    """A drive at half resolution with truth: two cameras on the first 1.6 s of the short drive, if not said otherwise."""
+    """A drive at half resolution with truth: two cameras on the first 1.6 s of the short drive by default."""
 
     def __init__(self, drive="short", duration_s=1.6, cameras=CAMERAS, extra=("--truth-range",), image_scale=0.5):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="vcharge_tests_"))

@@ -110,7 +110,7 @@ class HeightMapTest(unittest.TestCase):
             for topic, message in messages:
                 publishers[topic].publish(message)
                 time.sleep(0.002)
-            # finish() ends the drive for all that came: it must be all.
+            # finish() ends the drive, so everything must have arrived.
             for topic in publishers:
                 count = sum(other == topic for other, _ in messages)
                 wait_for(lambda t=topic, c=count: diagnostics.num_good(t) >= c, f"{count} messages on {topic}", 120.0)

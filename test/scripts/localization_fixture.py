@@ -88,7 +88,7 @@ class Place:
                              [[float(row[key]) for key in ("tx", "ty", "tz")] for row in posed])
 
     def bad_inputs(self):
-        """Name, map, rig, options, and the words of the error."""
+        """Name, map, rig, options, and expected words of the error."""
         folder = self.folder
         cut = folder / "cut.vmap"
         cut.write_bytes(self.map.read_bytes()[:50000])

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Another day's drive in a mapped place: right poses, offline as online, and everything that is wrong has a name."""
+"""Another day's drive in a map: accurate poses, the same offline and online, and every fault is reported."""
 import copy
 import os
 import sys
@@ -69,8 +69,6 @@ class LocalizationTest(unittest.TestCase):
         with rosbag.Bag(str(path)) as bag:
             return [(topic, message) for topic, message, _ in bag.read_messages()]
 
-    # ---- the offline tool
-
     def expect_right(self, rows, min_localized=0.9, max_error_m=MAX_ERROR_M):
         self.assertEqual(len(rows), len(self.rows))
         self.assertGreaterEqual(count(rows, "localized"), min_localized * len(rows))
@@ -108,7 +106,7 @@ class LocalizationTest(unittest.TestCase):
                                         (None, wrong, ("right",), "intrinsics")):
             status, found, errors, rows = self.place.localize(bag=bag, rig=rig)
             self.assertEqual((status, errors), (0, []))
-            # At this size a frame has some 80 inliers of the 20 that it needs: each lost camera costs frames.
+            # With these small images a frame has about 80 inliers and needs 20: each lost camera costs frames.
             self.expect_right(rows, min_localized=0.9 - 0.1 * len(blamed))
             told = warnings(found)
             self.assertEqual({text.split(":")[0] for _, text in told}, set(blamed), told)
@@ -151,8 +149,6 @@ class LocalizationTest(unittest.TestCase):
                 self.assertIn(word, errors[0])
             self.assertEqual(rows, [])
             self.assertFalse((self.place.folder / "localized.tum").exists())
-
-    # ---- the nodelet
 
     def start(self, lossless=True):
         rospy.set_param("/localization/rig", str(self.place.rig))
@@ -224,7 +220,7 @@ class LocalizationTest(unittest.TestCase):
         self.wait_until_told(0, "localized")
 
     def check_tf(self):
-        """map_from_odom * odom_from_vehicle = map_from_vehicle, by positions; /odom comes often enough for lines between."""
+        """map_from_odom * odom_from_vehicle = map_from_vehicle, compared by positions; /odom is frequent enough for linear interpolation."""
         odometry = [message for topic, message in self.messages if topic == "/odom"]
         stamps = [message.header.stamp.to_sec() for message in odometry]
         way = np.array([[getattr(message.pose.pose.position, axis) for axis in "xyz"] for message in odometry])

@@ -27,7 +27,7 @@ def is_image(topic):
 
 
 def limited_to(kilobytes):
-    """Prefix of a command that can write no file larger than this, as on a full disk, and is told so by an error."""
+    """Prefix that lets a command write no larger file: writing fails with an error, as on a full disk."""
     return ("bash", "-c", f'trap "" XFSZ; ulimit -f {kilobytes}; exec "$@"', "bash")
 
 
@@ -60,7 +60,7 @@ class MappingFaultsTest(unittest.TestCase):
         return run_tool([*prefix, *cls.command(bag, output, *extra, rig=rig)])
 
     def rewritten(self, change):
-        """The drive's bag, as change(seconds since the start, topic, message) makes each message one or more."""
+        """The drive's bag with each message replaced by change(seconds since the start, topic, message)."""
         return self.drive.rewrite(f"{self.name}.bag", lambda topic, message: change(
             message.header.stamp.to_sec() - self.start_s, topic, message))
 
@@ -77,7 +77,7 @@ class MappingFaultsTest(unittest.TestCase):
         return found
 
     def image_stamps(self, bag=None):
-        """By topic: the set of stamps of a bag's images."""
+        """Stamps of a bag's images, a set by topic."""
         stamps = {}
         for topic, message in self.drive.messages() if bag is None else self.read(bag):
             if is_image(topic):
@@ -90,7 +90,7 @@ class MappingFaultsTest(unittest.TestCase):
             return [(topic, message) for topic, message, _ in opened.read_messages()]
 
     def check_bag(self, bag, rig=None):
-        """Exit status, the subjects of what did not pass with their grades, and the errors."""
+        """Exit status, grades of the subjects that did not pass, and the errors."""
         status, found, errors = run_tool([tool("vcharge_recordings", "check_bag"), "--bag", bag, "--rig",
                                           rig or self.drive.rig])
         return status, {finding["subject"]: finding["grade"] for finding in found.get("findings", [])
@@ -257,7 +257,7 @@ class MappingFaultsTest(unittest.TestCase):
         return output.with_name(output.name + ".work")
 
     def build_killed(self, after):
-        """Kills a run once it is inside a stage; what it leaves is there."""
+        """Kills a run inside a stage; its checkpoint stays."""
         process = subprocess.Popen(self.command(self.drive.bag, self.output_map), stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, text=True)
         try:

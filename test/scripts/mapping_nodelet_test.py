@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The mapping nodelet on a simulated drive: it makes the map of build_map, shows it, and outlives bad input."""
+"""The mapping nodelet on a simulated drive: it makes the map of build_map, publishes it, and survives bad input."""
 import copy
 import os
 import sys
@@ -94,7 +94,7 @@ class MappingNodeletTest(unittest.TestCase):
 
     def finish_good_drive(self):
         self.publish()
-        # The last of the odometry still waits to be sorted, and with it the last frames: finish() takes them too.
+        # The last frames still wait for odometry to be sorted; finish() processes them.
         self.wait_for_frames(self.num_frames - 10)
         time.sleep(1.0)
         answer = self.finish()
@@ -106,7 +106,7 @@ class MappingNodeletTest(unittest.TestCase):
         self.assertFalse(self.output.exists())
         start = time.monotonic()
         self.finish_good_drive()
-        # Diagnostics come once a second: a map that is made sooner may tell no stage.
+        # Diagnostics come once a second: a faster map may report no stage.
         took_long = time.monotonic() - start > 1.0 + 3.0 + self.num_frames * len(self.publishers) * 0.002
         self.assertTrue(any(text.startswith("stage ") for _, text in self.diagnostics.told) or not took_long, "progress is told")
         self.assertIn(self.offline["content_hash"], self.message_of_map())
@@ -129,7 +129,7 @@ class MappingNodeletTest(unittest.TestCase):
         clouds = self.received["/mapping/landmarks"]
         self.assertEqual(clouds[-1].width, len(offline["landmark.x_m"]))
         self.assertEqual(clouds[-1].header.frame_id, "map")
-        # What is shown while driving lies about where the map has it in the end: within the drive's extent and 60 m.
+        # Landmarks shown while driving are near those of the final map: within the drive's extent and 60 m.
         points = np.array(list(point_cloud2.read_points(clouds[-2], field_names=("x", "y", "z"))))
         self.assertGreater(len(points), 100)
         self.assertTrue(np.isfinite(points).all())

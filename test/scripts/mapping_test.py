@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""build_map on a simulated drive: accurate, the same on any number of threads, blind to the truth, hard to break."""
+"""build_map on a simulated drive: accurate, the same on any number of threads, independent of the truth, and robust."""
 import os
 import pathlib
 import random
@@ -44,7 +44,7 @@ class MappingTest(unittest.TestCase):
     def test_the_path_is_right_to_centimetres(self):
         errors = self.errors_m(self.trajectory)
         self.assertGreater(len(errors), 50)
-        # Half-size images over some 20 m of the way; the bar for a whole drive at full size is 5 cm.
+        # Half-size images over about 20 m; the goal for a whole drive at full size is 5 cm.
         self.assertLess(np.sqrt(np.mean(errors ** 2)), 0.05)
 
     def test_the_map_holds_landmarks_of_all_cameras(self):

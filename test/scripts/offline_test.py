@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The tools on a simulated drive: reproducible, blind to the truth, and one clear error for each bad input."""
+"""The tools on a simulated drive: reproducible, independent of the truth, and one clear error for each bad input."""
 import copy
 import json
 import os
@@ -58,8 +58,6 @@ class OfflineTest(unittest.TestCase):
         # The drive has a quarter of the sensor's pixels, and short baselines in its first half.
         self.assertGreater(right, 0.8)
         self.assertIn("range_errors_accuracy.png", files_below(report))
-
-    # --- bad input: one message that names file, key or topic and what was expected; nothing half-written
 
     def expect_error(self, words, bag=None, rig=None, extra=()):
         output = self.drive.folder / "bad_output"
@@ -135,7 +133,7 @@ class OfflineTest(unittest.TestCase):
             message.header.stamp = message.header.stamp - rospy.Duration(5.0)
             return [(topic, message)]
 
-        # In the order of the recording, as a recorder with a stepped clock leaves it.
+        # Messages keep their recorded order, as after a clock step while recording.
         path = self.drive.folder / "jump.bag"
         with rosbag.Bag(str(path), "w") as bag:
             for topic, message in self.drive.messages():
