@@ -45,12 +45,13 @@ void print(const vcharge::IntrinsicCalibration& result) {
   }
   std::printf(
       "%zu images used, %zu left out; error %.3f px RMS per coordinate, %.3f px mean distance, %.3f px in "
-      "views that the fit did not see; corners up to %.0f degrees from the axis on %.0f %% of the image\n",
+      "views excluded from the fit; corners up to %.0f degrees from the axis on %.0f %% of the image\n",
       result.views.size(), result.rejected.size(), result.rms_px, result.mean_error_px,
       result.cross_validated_px, kDegrees * result.max_angle_rad, 100.0 * result.covered_share);
   if (result.bent_boards) {
-    std::printf("the board bends by %.1f mm (RMS); taken for flat, the error is %.3f px RMS per coordinate\n",
-                1000.0 * result.bending_m, result.flat_rms_px);
+    std::printf(
+        "the board bends by %.1f mm (RMS); with flat boards, the error is %.3f px RMS per coordinate\n",
+        1000.0 * result.bending_m, result.flat_rms_px);
   }
 }
 
@@ -127,12 +128,14 @@ int main(int argc, char** argv) {
   auto* images = app.add_option("--images", arguments.images, "folder of images");
   auto* bag = app.add_option("--bag", arguments.bag, "bag with the camera's images");
   images->excludes(bag);
-  app.add_option("--topic", arguments.topic, "of the bag; default: /camera/CAMERA/image_raw")->needs(bag);
-  app.add_option("--max-images", arguments.max_images, "of the bag, evenly spread")
+  app.add_option("--topic", arguments.topic,
+                 "topic of the images in the bag; default: /camera/CAMERA/image_raw")
+      ->needs(bag);
+  app.add_option("--max-images", arguments.max_images, "number of images taken from the bag, evenly spread")
       ->needs(bag)
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
-  app.add_option("--board", arguments.board, "chessboard's inner corners, COLUMNSxROWS")
+  app.add_option("--board", arguments.board, "inner corners of the chessboard, COLUMNSxROWS")
       ->capture_default_str();
   app.add_option("--square_m,--square-m", arguments.square_m, "side of a square")->capture_default_str();
   app.add_option("--target", arguments.target,
@@ -141,19 +144,19 @@ int main(int argc, char** argv) {
   app.add_option("--model", options.model, "mei, kannala_brandt or pinhole")->capture_default_str();
   app.add_option("--options", arguments.options, "YAML with other options of the calibration");
   app.add_option("--field-of-view-rad", arguments.output.field_of_view_rad,
-                 "full angle; 0: as far as corners were seen")
+                 "full field of view; 0: as far as corners were detected")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 6.28));
   app.add_option("--output", arguments.output.rig_file, "rig.yaml to write")
       ->required()
       ->check(vcharge::requireOutput);
-  app.add_flag("--keep-others", arguments.output.keep_others, "keep the other cameras that the rig.yaml has");
+  app.add_flag("--keep-others", arguments.output.keep_others,
+               "keep the other cameras of an existing rig.yaml");
   app.add_option("--report", arguments.output.report_file, "HTML report to write")
       ->check(vcharge::requireOutput);
   app.footer(
       "Keys of --json: verdict (PASS, WARN, FAIL), remarks, num_images, rejected (name, reason), parameters "
-      "and "
-      "standard_deviations (by name), rms_px (per coordinate), mean_error_px, cross_validated_px, "
+      "and standard_deviations (by name), rms_px (per coordinate), mean_error_px, cross_validated_px, "
       "covered_ratio, max_angle_rad, bending_m and flat_rms_px (where the board bends).");
   return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (arguments.images.empty() && arguments.bag.empty()) {

@@ -49,13 +49,13 @@ int main(int argc, char** argv) {
   CLI::App app(
       "Converts intrinsics between rig.yaml, Kalibr's camchain and CamOdoCal's files, and between camera "
       "models, "
-      "whose difference in pixels it prints. The input's format is seen from its content.");
+      "and prints their difference in pixels. The input's format is detected from its content.");
   Arguments arguments;
   app.add_option("--input", arguments.input, "rig.yaml, camchain.yaml or CamOdoCal's camera.yaml")
       ->required();
-  app.add_option("--format", arguments.format, "of the output: rig, kalibr or camodocal")
+  app.add_option("--format", arguments.format, "format of the output: rig, kalibr or camodocal")
       ->capture_default_str();
-  app.add_option("--model", arguments.model, "mei, kannala_brandt or pinhole; default: as it is");
+  app.add_option("--model", arguments.model, "mei, kannala_brandt or pinhole; default: unchanged");
   app.add_option("--camera", arguments.camera, "only this camera; default: all");
   app.add_option("--field-of-view-rad", arguments.field_of_view_rad,
                  "full angle, for files that have none (Kalibr, CamOdoCal)")

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "pose_graph/g2o_file.h"
 #include "vcharge_core/base/error.h"
 
 namespace vcharge {

@@ -199,29 +199,6 @@ class OdometryCost : public ceres::SizedCostFunction<6, 7, 7, 2> {
   const Matrix6d square_root_;
 };
 
-class PosePriorCost : public ceres::SizedCostFunction<6, 7> {
- public:
-  PosePriorCost(const RigidTransform& target_from_source, const Matrix6d& information)
-      : known_(target_from_source), square_root_(squareRootOf(information)) {}
-
-  bool Evaluate(double const* const* blocks, double* residuals, double** jacobians) const override {
-    const Pose pose(blocks[0]);
-    Eigen::Matrix<double, 6, 1> error;
-    error << pose.translation - known_.translation(),
-        vectorFromRotation(Eigen::Quaterniond(pose.quaternion) * known_.rotation().conjugate());
-    Eigen::Map<Eigen::Matrix<double, 6, 1>>(residuals, 6) = square_root_ * error;
-    if (double* jacobian = blockOf(jacobians, 0); jacobian != nullptr) {
-      writeByPose<6>(square_root_.leftCols<3>(),
-                     square_root_.rightCols<3>() * leftJacobianInverse(error.tail<3>()), blocks[0], jacobian);
-    }
-    return true;
-  }
-
- private:
-  const RigidTransform known_;
-  const Matrix6d square_root_;
-};
-
 }  // namespace
 
 std::unique_ptr<ceres::CostFunction> makeReprojectionCost(const CameraModel& model,
@@ -241,11 +218,6 @@ std::unique_ptr<ceres::CostFunction> makeReprojectionCost(std::shared_ptr<const 
 std::unique_ptr<ceres::CostFunction> makeOdometryCost(const RigidTransform& previous_from_current,
                                                       const Eigen::Matrix<double, 6, 6>& information) {
   return std::make_unique<OdometryCost>(previous_from_current, information);
-}
-
-std::unique_ptr<ceres::CostFunction> makePosePriorCost(const RigidTransform& target_from_source,
-                                                       const Eigen::Matrix<double, 6, 6>& information) {
-  return std::make_unique<PosePriorCost>(target_from_source, information);
 }
 
 }  // namespace vcharge

@@ -202,28 +202,6 @@ TEST_F(RigCostsTest, OdometryAgreesWithAnArcAndItsJacobiansAreRight) {
   }
 }
 
-TEST_F(RigCostsTest, PriorMeasuresTheStepOfTheManifoldAndItsJacobianIsRight) {
-  const std::unique_ptr<ceres::Manifold> manifold = makePoseManifold();
-  for (int i = 0; i < 100; ++i) {
-    const RigidTransform known = pose(10.0, 1.5);
-    Eigen::Matrix<double, 6, 1> step;
-    step << vector(1.0), vector(0.8);
-    PoseBlock moved;
-    const PoseBlock start = toPoseBlock(known);
-    manifold->Plus(start.data(), step.data(), moved.data());
-    const auto cost = makePosePriorCost(known, Matrix6d::Identity());
-    const std::vector<const double*> pointers = {moved.data()};
-    Eigen::Matrix<double, 6, 1> residuals;
-    ASSERT_TRUE(cost->Evaluate(pointers.data(), residuals.data(), nullptr));
-    // The root of the information turns residuals, which keeps their length.
-    EXPECT_NEAR(residuals.norm(), step.norm(), 1e-9);
-    Eigen::Matrix<double, 6, 1> back;
-    manifold->Minus(moved.data(), start.data(), back.data());
-    EXPECT_LT((back - step).norm(), 1e-9);
-    EXPECT_LT(jacobianError(*makePosePriorCost(known, information()), {block(fromPoseBlock(moved))}), 1e-5);
-  }
-}
-
 TEST_F(RigCostsTest, BundleAdjustmentFindsPosesAndExtrinsicsAgain) {
   // Two cameras, five poses, and points around them; the first pose and the distance to the second fix the
   // gauge.
@@ -314,7 +292,6 @@ TEST_F(RigCostsTest, BadInformationIsACallersBug) {
   Matrix6d lopsided = Matrix6d::Identity();
   lopsided(0, 1) = 0.5;
   for (const Matrix6d& bad : {negative, lopsided}) {
-    EXPECT_THROW(makePosePriorCost(RigidTransform(), bad), std::logic_error);
     EXPECT_THROW(makeOdometryCost(RigidTransform(), bad), std::logic_error);
   }
   EXPECT_THROW(makeReprojectionCost(models()[0], {1.0, 2.0}, 0.0), std::logic_error);

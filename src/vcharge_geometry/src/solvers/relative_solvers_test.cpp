@@ -8,7 +8,6 @@
 #include "solvers/random_problems.h"
 #include "vcharge_geometry/solvers/ackermann_two_point.h"
 #include "vcharge_geometry/solvers/known_vertical_four_point.h"
-#include "vcharge_geometry/solvers/linear_seventeen_point.h"
 #include "vcharge_geometry/solvers/planar_three_point.h"
 
 namespace vcharge {
@@ -234,39 +233,6 @@ TYPED_TEST(RelativeSolverTest, RejectsWhatHasNoAnswer) {
   zero.fill({{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()},
              {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()}});
   EXPECT_EQ(TypeParam::solve(zero, &motions), SolverStatus::kDegenerate);
-}
-
-TEST(LinearSeventeenPointTest, SolvesRandomProblems) {
-  for (const double same_camera : {0.0, 1.0}) {
-    RandomProblems random(8);
-    std::vector<double> errors;
-    for (int i = 0; i < kNumProblems; ++i) {
-      const RigidTransform truth(random.rotation(1.0), random.direction());
-      const std::array<LineMatch, 17> problem = random.lineMatches<17>(truth, same_camera);
-      RigidTransform found;
-      if (solveLinearSeventeenPoint({problem.begin(), problem.end()}, &found) == SolverStatus::kOk) {
-        errors.push_back(transformError(found, truth));
-      }
-    }
-    // One camera gives at most 8 independent equations: with 10 of 17 matches in it, E is not unique.
-    EXPECT_GE(errors.size(), static_cast<size_t>((same_camera == 0.0 ? 0.9999 : 0.98) * kNumProblems));
-    EXPECT_LE(quantile(errors, 0.5), 1e-11);
-    EXPECT_LE(quantile(errors, 0.98), 1e-8);
-  }
-}
-
-TEST(LinearSeventeenPointTest, RejectsWhatHasNoAnswer) {
-  RandomProblems random(9);
-  const RigidTransform truth(random.rotation(1.0), random.direction());
-  const std::array<LineMatch, 17> good = random.lineMatches<17>(truth, 0.0);
-  RigidTransform found;
-  std::vector<LineMatch> matches(good.begin(), good.end());
-  matches.pop_back();
-  EXPECT_EQ(solveLinearSeventeenPoint(matches, &found), SolverStatus::kDegenerate);
-  matches.push_back(matches.front());
-  EXPECT_EQ(solveLinearSeventeenPoint(matches, &found), SolverStatus::kDegenerate);
-  matches.back().current.direction.x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(solveLinearSeventeenPoint(matches, &found), SolverStatus::kNotFinite);
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <map>
-#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -34,14 +33,6 @@ Eigen::Matrix<double, 6, 1> errorOfEdge(const PoseGraph& graph, const PoseGraphE
 /// Squared error of an edge, e^T information e, or the sum over all edges.
 double chiSquared(const PoseGraph& graph, const PoseGraphEdge& edge);
 double chiSquared(const PoseGraph& graph);
-
-/// Reads VERTEX_SE2 and EDGE_SE2, or VERTEX_SE3:QUAT and EDGE_SE3:QUAT; FIX lines are ignored, as the
-/// optimizer holds the first node. Nodes without a VERTEX line are placed along the edges. InputError
-/// "<path>:<line>: <reason>" for anything else, for numbers that are missing or not finite, edges between a
-/// node and itself, information matrices that are not positive semidefinite, both dimensions in one file, and
-/// nodes that no edge connects to the first.
-PoseGraph readG2o(const std::string& path);
-void writeG2o(const PoseGraph& graph, const std::string& path);
 
 /// Replaces all poses by those along a spanning tree of the edges (breadth first from the first node).
 /// Returns false if the edges do not connect all nodes.

@@ -38,8 +38,4 @@ std::unique_ptr<ceres::CostFunction> makeReprojectionCost(std::shared_ptr<const 
 std::unique_ptr<ceres::CostFunction> makeOdometryCost(const RigidTransform& previous_from_current,
                                                       const Eigen::Matrix<double, 6, 6>& information);
 
-/// A pose that is known beforehand (6 residuals): [dt, dphi] from `target_from_source`. Blocks: the pose (7).
-std::unique_ptr<ceres::CostFunction> makePosePriorCost(const RigidTransform& target_from_source,
-                                                       const Eigen::Matrix<double, 6, 6>& information);
-
 }  // namespace vcharge
