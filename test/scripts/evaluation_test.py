@@ -5,6 +5,7 @@ import io
 import json
 import pathlib
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from nav_msgs.msg import Odometry
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "src" / "vcharge_evaluation" / "python"))
+from vcharge_evaluation import __main__ as evaluation_main  # noqa: E402
 from vcharge_evaluation import page, poses, results, spoiled_drives  # noqa: E402
 from vcharge_evaluation.camera_models import project  # noqa: E402
 
@@ -85,6 +87,20 @@ class PageTest(unittest.TestCase):
     def test_results_page_is_made_from_the_results(self):
         self.assertEqual(page.PAGE.read_text(encoding="utf-8"), page.make_page(),
                          "doc/results.md is stale or edited by hand: run scripts/in_build.sh python3 -m vcharge_evaluation.page")
+
+    def test_figures_of_the_readme_are_results(self):
+        rows = (ROOT / "README.md").read_text().split("A few [results]")[1].split("##")[0].splitlines()
+        quoted = [row.split("|")[2] for row in rows if row.startswith("|")][2:]
+        self.assertGreater(len(quoted), 3)
+        text = page.PAGE.read_text(encoding="utf-8")
+        for number in re.findall(r"\d+(?:\.\d+)?", " ".join(quoted)):
+            self.assertRegex(text, rf"(?<![\d.]){re.escape(number)}(?![\d.]*\d)", f"README.md quotes {number}")
+
+    def test_pages_are_short(self):
+        for name, limit in (("README.md", 900), ("doc/architecture.md", 1500), ("doc/bring_up.md", 1150),
+                            ("doc/faults.md", 1000), ("test/README.md", 200), ("launch/README.md", 200),
+                            ("config/README.md", 200)):
+            self.assertLessEqual(len((ROOT / name).read_text().split()), limit, name)
 
     def test_every_figure_has_command_date_and_commit(self):
         for path in results.RESULTS.glob("*.json"):
@@ -177,9 +193,13 @@ class ArgumentsTest(FolderTest):
     def test_every_stage_has_help(self):
         for stage in ("calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "faults", "chain",
                       "latency", "soak"):
-            status, output, errors = run_module("__main__", stage, "--help")
-            self.assertEqual(status, 0, errors)
-            self.assertIn(f"evaluate.sh {stage}", output)
+            output, arguments = io.StringIO(), sys.argv
+            self.addCleanup(setattr, sys, "argv", arguments)
+            sys.argv = ["evaluate.sh", stage, "--help"]
+            with contextlib.redirect_stdout(output), self.assertRaises(SystemExit) as end:
+                evaluation_main.main()
+            self.assertEqual(end.exception.code, 0)
+            self.assertIn(f"evaluate.sh {stage}", output.getvalue())
 
     def test_an_unknown_stage_is_refused(self):
         status, _, errors = run_module("__main__", "no_such_stage")
