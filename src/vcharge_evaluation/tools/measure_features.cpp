@@ -31,7 +31,7 @@ constexpr double kMaxError_rad = 0.2 * 3.14159265358979 / 180.0;
 
 struct Arguments {
   std::string bag, rig, camera = "left", options;
-  std::vector<std::string> types = {"fast_brief", "orb", "sift", "root_sift"};
+  std::vector<std::string> types = {"fast_brief", "root_sift"};
   std::vector<int> frames = {1, 5, 10, 20};
   int num_pairs = 5;
   double max_ratio = 0.8;
