@@ -1,5 +1,6 @@
 #include <iostream>
 #include <optional>
+#include <sstream>
 #include <string>
 
 #include <tbb/global_control.h>
@@ -23,10 +24,11 @@ int main(int argc, char** argv) {
   bool show_options = false;
   int threads = 0;
   const CLI::Option* output =
-      app.add_option("--output", recording.bag, "bag to write")->check(vcharge::requireNotEmpty);
-  app.add_option("--images-from", recording.images_from,
-                 "bag of the same drive with the same --seed and --noise off, whose images are used instead "
-                 "of rendering");
+      app.add_option("--output", recording.bag, "bag to write")->check(vcharge::requireOutput);
+  app.add_option(
+      "--images-from", recording.images_from,
+      "bag of the same drive with the same --seed and --noise off: its images get noise, exposure, faults "
+      "and ticks instead of being rendered again");
   app.add_flag("--truth-range", recording.truth_range, "write the range of every pixel");
   app.add_option("--height-cell-m", recording.height_cell_m, "cell size of the height map")
       ->check(CLI::Range(0.01, 10.0))
@@ -34,9 +36,10 @@ int main(int argc, char** argv) {
   app.add_option("--threads", threads, "number of threads; 0: one per core")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_flag("--list", list, "print scenes, drives, rigs and faults, and exit");
-  app.add_flag("--show-options", show_options, "print the scenario with all options as YAML, and exit");
-  return vcharge::runTool(&app, argc, argv, [&] {
+  app.add_flag("--list", list, "print scenes, drives, rigs and faults, and do nothing else");
+  vcharge::addShowOptions(&app, &show_options);
+  app.footer("Keys of --json: scenario (all its options).");
+  return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (list) {
       std::cout << vcharge::describeCatalogue();
       return;
@@ -54,5 +57,8 @@ int main(int argc, char** argv) {
       limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
     }
     vcharge::recordDrive(scenario, recording);
+    std::ostringstream text;
+    text << vcharge::writeFields(scenario);
+    (*found)["scenario"] = text.str();
   });
 }
