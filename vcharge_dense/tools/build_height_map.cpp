@@ -63,7 +63,8 @@ Trajectory keyframesOf(const std::string& map_path) {
   return trajectory;
 }
 
-void print(const HeightMapResult& result) {
+/// Prints a summary; returns the same for --json.
+nlohmann::json report(const HeightMapResult& result) {
   const HeightMapStatistics& statistics = result.statistics;
   ContentHasher hasher;
   addToHash(result.map, &hasher);
@@ -79,6 +80,15 @@ void print(const HeightMapResult& result) {
     std::printf("%s: %.1f s\n", stage.c_str(), time_s);
   }
   std::printf("content hash: %s\n", hasher.hex().c_str());
+  return {{"num_range_maps", statistics.num_views},
+          {"num_reused_range_maps", statistics.num_reused},
+          {"size_cells", {result.map.height_m.cols, result.map.height_m.rows}},
+          {"cell_size_m", result.map.cell_size_m},
+          {"num_observed_cells", statistics.num_observed},
+          {"num_solid_cells", statistics.num_solid},
+          {"converged", statistics.converged},
+          {"stage_s", statistics.times_s},
+          {"content_hash", hasher.hex()}};
 }
 
 /// The poses from --trajectory or --map, if given.
@@ -121,7 +131,7 @@ class NamingConsumer : public DriveConsumer {
   HeightMapper* const mapper_;
 };
 
-void buildHeightMap(const Arguments& arguments) {
+void buildHeightMap(const Arguments& arguments, nlohmann::json* found) {
   if (!arguments.trajectory.empty() && !arguments.map.empty()) {
     throw InputError("--trajectory and --map: expected one of them");
   }
@@ -153,7 +163,7 @@ void buildHeightMap(const Arguments& arguments) {
   if (!arguments.keep_range_maps) {
     removeFolder(work);
   }
-  print(result);
+  *found = report(result);
 }
 
 }  // namespace
@@ -171,14 +181,17 @@ int main(int argc, char** argv) {
                  "TUM file, e.g. from build_map; without it poses come from the odometry");
   app.add_option("--map", arguments.map, "sparse map of this drive (*.vmap), whose keyframe poses are used");
   app.add_option("--options", arguments.options, "YAML with overrides of HeightMapOptions");
-  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireNotEmpty);
-  app.add_flag("--keep-range-maps", arguments.keep_range_maps, "keep OUTPUT.range_maps at the end");
-  app.add_flag("--show-options", arguments.show_options, "print all options and exit");
-  return runTool(&app, argc, argv, [&] {
+  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
+  app.add_flag("--keep-range-maps", arguments.keep_range_maps, "do not remove OUTPUT.range_maps at the end");
+  addShowOptions(&app, &arguments.show_options);
+  app.footer(
+      "Keys of --json: num_range_maps, num_reused_range_maps, size_cells, cell_size_m, num_observed_cells, "
+      "num_solid_cells, converged, stage_s (wall time), content_hash.");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (arguments.show_options) {
       std::cout << showOptions(readOptions(arguments));
       return;
     }
-    buildHeightMap(arguments);
+    buildHeightMap(arguments, found);
   });
 }
