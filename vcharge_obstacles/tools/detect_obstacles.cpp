@@ -235,7 +235,7 @@ int main(int argc, char** argv) {
     if (arguments.show_options) {
       std::cout << "# ObstacleMapperOptions\n"
                 << showOptions(options) << "\n# RangeMapperOptions\n"
-                << showOptions(range_options);
+                << showOptions(range_options) << "\n";
       return;
     }
     detectObstacles(arguments, options, range_options);

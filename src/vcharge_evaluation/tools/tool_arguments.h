@@ -76,7 +76,7 @@ class OptionsArgument {
   /// Whether the options were printed, so that the tool has nothing else to do.
   bool shown() const {
     if (show_) {
-      std::cout << showOptions(read());
+      std::cout << showOptions(read()) << "\n";
     }
     return show_;
   }
