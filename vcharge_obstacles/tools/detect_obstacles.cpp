@@ -98,8 +98,9 @@ class Pipeline : public DriveConsumer {
     }
     obstacles_->finish();
   }
-  /// Processor time without reading the bag and writing the results; writing is part of detecting.
-  void printTiming(double writing_s) const {
+  /// What a core has to do per range map, without reading the bag and without writing the results, which is
+  /// part of detecting.
+  void reportTiming(double writing_s, nlohmann::json* found) const {
     if (num_maps_ == 0) {
       return;
     }
@@ -111,6 +112,8 @@ class Pipeline : public DriveConsumer {
     std::cout << "processor time per range map: " << toText(images_ms + sweep_ms + obstacles_ms, 1)
               << " ms (images " << toText(images_ms, 1) << ", ranges " << toText(sweep_ms, 1)
               << ", obstacles " << toText(obstacles_ms, 1) << ")\n";
+    (*found)["processor_ms_per_range_map"] = {
+        {"images", images_ms}, {"ranges", sweep_ms}, {"obstacles", obstacles_ms}};
   }
 
  private:
@@ -149,12 +152,22 @@ class Recorder {
     ++num_frames_;
   }
 
-  void finish(const ObstacleMapper& mapper) const {
+  void finish(const ObstacleMapper& mapper, nlohmann::json* found) const {
     writeTextFileAtomically(folder_ + "/status.csv", table_);
+    nlohmann::json cameras = nlohmann::json::array();
     for (const ObstacleCameraStatus& status : mapper.status()) {
       std::cout << status.camera_name << ": " << status.range_maps << " range maps (" << status.without_pose
                 << " without pose, " << status.late << " late), " << status.message << "\n";
+      cameras.push_back({{"name", status.camera_name},
+                         {"num_range_maps", status.range_maps},
+                         {"num_without_pose", status.without_pose},
+                         {"num_late", status.late},
+                         {"message", status.message}});
     }
+    *found = {{"num_maps", num_frames_},
+              {"num_odometry_jumps", mapper.numJumps()},
+              {"cameras", cameras},
+              {"content_hash", hasher_.hex()}};
     std::cout << "obstacle maps: " << num_frames_ << ", odometry jumps: " << mapper.numJumps() << "\n"
               << "content hash: " << hasher_.hex() << "\n";
   }
@@ -168,7 +181,7 @@ class Recorder {
 };
 
 void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& options,
-                     const RangeMapperOptions& range_options) {
+                     const RangeMapperOptions& range_options, nlohmann::json* found) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   if (!std::filesystem::exists(arguments.bag)) {
     throw InputError(arguments.bag + ": no such file");  // before the output is created
@@ -195,8 +208,8 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
     }
     throw InputError(arguments.bag + ": no obstacle map could be made (" + reasons + ")");
   }
-  recorder.finish(mapper);
-  pipeline.printTiming(writing.seconds());
+  recorder.finish(mapper, found);
+  pipeline.reportTiming(writing.seconds(), found);
   output.commit();
 }
 
@@ -216,10 +229,13 @@ int main(int argc, char** argv) {
   app.add_option("--range", arguments.range,
                  "folder that compute_range_maps wrote, instead of computing range maps");
   app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
-  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireNotEmpty);
-  app.add_flag("--show-options", arguments.show_options,
-               "print all options with their values, and do nothing else");
-  return runTool(&app, argc, argv, [&] {
+  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
+  addShowOptions(&app, &arguments.show_options);
+  app.footer(
+      "Keys of --json: num_maps, num_odometry_jumps, cameras (name, num_range_maps, num_without_pose, "
+      "num_late, "
+      "message), processor_ms_per_range_map (images, ranges, obstacles), content_hash.");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     ObstacleMapperOptions options;
     RangeMapperOptions range_options;
     if (!arguments.options.empty()) {
@@ -233,11 +249,11 @@ int main(int argc, char** argv) {
     }
     range_options.cameras = options.cameras;
     if (arguments.show_options) {
-      std::cout << "# ObstacleMapperOptions\n"
-                << showOptions(options) << "\n# RangeMapperOptions\n"
-                << showOptions(range_options) << "\n";
+      std::cout << "# For --options\n"
+                << showOptions(options) << "\n# For --range-options\n"
+                << showOptions(range_options);
       return;
     }
-    detectObstacles(arguments, options, range_options);
+    detectObstacles(arguments, options, range_options, found);
   });
 }

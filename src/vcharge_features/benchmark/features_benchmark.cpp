@@ -10,7 +10,7 @@
 #include "vcharge_features/patch_tracker.h"
 #include "vcharge_features/vocabulary_tree.h"
 
-// Everything on one thread. Searches of descriptors: two nearest and reverse, 1000 x 1000, beside OpenCV's in
+// All on one thread. Descriptor searches: the two nearest and the reverse, 1000 x 1000, beside OpenCV's in
 // the same run.
 namespace vcharge {
 namespace {

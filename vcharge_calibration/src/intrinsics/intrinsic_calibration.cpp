@@ -22,10 +22,10 @@ namespace vcharge {
 
 namespace {
 
-// Share of the work: finding boards without and with a camera, the rest is the fit.
+// Fraction of the work spent on detecting boards without and with a camera; the rest is the fit.
 constexpr double kFindShare = 0.5;
 constexpr double kFindAgainShare = 0.3;
-// Errors above this, or views that do not fit, are reason enough to ask whether images are turned.
+// Larger errors, or views that do not fit, cause a check for turned images.
 constexpr double kSuspiciousError_px = 0.5;
 
 class Calibration {
@@ -64,7 +64,7 @@ class Calibration {
     }
     if (!rough.has_value()) {
       return fail("no camera of the model " + options_.model +
-                  " explains the corners: is the board's size right?");
+                  " explains the corners: is the size of the board correct?");
     }
     const auto fit = fitViews(board_, images_, views, rough->model, options_);
     progress_(0.95);
@@ -81,7 +81,7 @@ class Calibration {
       }
     }
     if (!fit.has_value()) {
-      return fail("the views contradict each other: fewer than " + std::to_string(options_.min_views) +
+      return fail("the views are inconsistent: fewer than " + std::to_string(options_.min_views) +
                   " fit one camera");
     }
     judgeCalibration(options_, &result_);
@@ -94,7 +94,7 @@ class Calibration {
     return std::to_string(size.width) + "x" + std::to_string(size.height);
   }
 
-  // Those that fit worst, up to some; a few show whether images are turned.
+  // A few of the worst fitting views suffice to detect turned images.
   std::vector<BoardView> worstViews(const std::vector<BoardView>& views, const CameraModel& camera) const {
     constexpr size_t kMaxViews = 24;
     std::vector<std::pair<double, size_t>> order(views.size());
@@ -144,7 +144,7 @@ class Calibration {
     return failed;
   }
 
-  // Boards that are not found yet, on all cores.
+  // Detects the remaining boards, on all cores.
   void findBoards(const CameraModel* model, double progress_start, double progress_share) {
     const BoardDetector detector(board_);
     std::mutex mutex;
@@ -208,8 +208,8 @@ class Calibration {
     crossValidate(fit);
   }
 
-  // The views fall into parts; a fit without each shows how well it does on views it did not see, and how
-  // much the parameters depend on the choice of views.
+  // Splits the views into parts; a fit without each part shows the error on unseen views, and how much the
+  // parameters depend on the choice of views.
   void crossValidate(const ViewFit& fit) {
     const auto views = fit.views.size();
     const auto folds =
@@ -258,9 +258,9 @@ class Calibration {
       return;
     }
     const Eigen::VectorXd formal = covariance->diagonal().cwiseMax(0.0).cwiseSqrt();
-    // Jackknife. The errors of a view go together where boards or the lens are not quite as modelled; by the
-    // formula, which takes corners for independent, parameters would then seem better known than they are.
-    // A few parts give an uncertain variance of each parameter, hence the mean over all.
+    // Jackknife. Errors within a view are correlated if the model of boards or lens is not exact; the usual
+    // formula assumes independent corners and would underestimate the deviations. A few parts give an
+    // uncertain variance of each parameter, hence the mean over all parameters.
     Eigen::VectorXd mean = Eigen::VectorXd::Zero(size);
     for (const auto& fold : parameters) {
       mean += *fold / static_cast<double>(folds);

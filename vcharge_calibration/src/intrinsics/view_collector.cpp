@@ -16,9 +16,9 @@ namespace vcharge {
 
 namespace {
 
-// Opposite sides of a board seen straight on are equally long, and so are the diagonals of its outline.
+// Opposite sides of a board parallel to the image are equally long, and so are its diagonals.
 constexpr double kMinTiltRatio = 1.15;
-// A rough camera is fitted whenever so many views more are there.
+// An approximate camera is fitted after every so many views.
 constexpr size_t kFitEvery = 8;
 
 }  // namespace
@@ -51,8 +51,8 @@ std::optional<BoardView> ViewCollector::detect(const CalibrationImage& image) co
   return view;
 }
 
-// RMS distance of common corners over the image's longer side; infinite where there are none. A chessboard
-// may be counted from either end.
+// RMS distance of common corners relative to the image's longer side; infinite if there are none. A
+// chessboard may be numbered from either end.
 double ViewCollector::difference(const BoardView& a, const BoardView& b) const {
   std::map<int, Eigen::Vector2d> in_b;
   for (const BoardCorner& corner : b.corners) {
@@ -76,7 +76,7 @@ double ViewCollector::difference(const BoardView& a, const BoardView& b) const {
   return best;
 }
 
-// Without a camera: by the lengths of the outline's opposite sides.
+// Without a camera, tilt is measured by the lengths of opposite sides of the outline.
 bool ViewCollector::isTilted(const BoardView& view) const {
   std::map<int, Eigen::Vector2d> pixels;
   for (const BoardCorner& corner : view.corners) {
@@ -137,7 +137,7 @@ std::vector<std::string> ViewCollector::missing() const {
   std::vector<std::string> missing;
   const int more = options_.enough_views - static_cast<int>(views_.size());
   if (more > 0) {
-    missing.push_back(std::to_string(more) + " more pictures");
+    missing.push_back(std::to_string(more) + " more images");
   }
   if (coveredShare() < options_.enough_coverage) {
     std::string parts;
@@ -151,7 +151,7 @@ std::vector<std::string> ViewCollector::missing() const {
   const auto tilted =
       std::count_if(views_.begin(), views_.end(), [this](const BoardView& view) { return isTilted(view); });
   if (tilted < options_.enough_tilted) {
-    missing.push_back(std::to_string(options_.enough_tilted - tilted) + " pictures of the tilted board");
+    missing.push_back(std::to_string(options_.enough_tilted - tilted) + " images of the tilted board");
   }
   return missing;
 }
@@ -161,13 +161,13 @@ std::string toString(ViewCollector::Outcome outcome) {
     case ViewCollector::Outcome::kTaken:
       return "taken";
     case ViewCollector::Outcome::kNoBoard:
-      return "the board is not seen";
+      return "the board is not visible";
     case ViewCollector::Outcome::kMoving:
       return "the board moves: hold it still";
     case ViewCollector::Outcome::kNothingNew:
-      return "the board was seen here before: move or tilt it";
+      return "the board was here before: move or tilt it";
     default:
-      return "enough pictures: nothing more is taken";
+      return "enough images: no more are collected";
   }
 }
 

@@ -26,9 +26,9 @@ struct CanFrame {
   std::array<uint8_t, 8> data{};
 };
 
-/// Where a number stands in a message, as DBC files say it: little endian signals begin at their lowest bit,
-/// big endian (Motorola) ones at their highest, bits are counted from the lowest of byte 0. value = raw scale
-/// + offset.
+/// Position and scaling of a number in a message, as in DBC files: the start bit of a little endian signal is
+/// its lowest bit, that of a big endian (Motorola) signal its highest; bits are counted from the lowest of
+/// byte 0. value = raw * scale + offset.
 struct CanSignal {
   int id = -1;  ///< of the message; negative: the car does not send it; above 0x7ff: an extended one
   int start_bit = 0;
@@ -52,9 +52,9 @@ struct CanSignal {
 
   bool isUsed() const { return id >= 0; }
   bool isIn(const CanFrame& frame) const;
-  /// The signal's bits; nothing where the frame is too short. The frame's id is not looked at.
+  /// The raw bits of the signal; empty if the frame is too short. Ignores the frame's id.
   std::optional<uint64_t> rawBits(const CanFrame& frame) const;
-  /// With sign, scale and offset.
+  /// The value with sign, scale and offset.
   std::optional<double> value(const CanFrame& frame) const;
 };
 
@@ -86,21 +86,20 @@ struct CanWheelOptions {
 
 struct CanWheelCounts {
   uint64_t frames = 0;
-  uint64_t too_short = 0;  ///< messages that end before a signal of theirs
+  uint64_t too_short = 0;  ///< messages that end before one of their signals
   uint64_t wraps = 0;
-  uint64_t resets =
-      0;  ///< counters that jumped, or were silent for so long that they may have wrapped unseen
+  uint64_t resets = 0;  ///< counters that jumped, or were silent so long that they may have wrapped
 };
 
-/// Makes WheelTicks, unwrapped and continuous, of a car's messages. Where they hold speeds, ticks are these
-/// integrated, in steps of kSpeedTick_m. Not thread safe.
+/// Converts a car's messages to WheelTicks with unwrapped, continuous counters. Speeds are integrated to
+/// ticks of kSpeedTick_m. Not thread safe.
 class CanWheelDecoder {
  public:
   static constexpr double kSpeedTick_m = 1e-4;
 
   explicit CanWheelDecoder(const CanWheelOptions& options);
-  /// The ticks that this frame completes, at `stamp`: those of the message with the counters; where each
-  /// wheel has its own, of the later one. Nothing for other frames.
+  /// Returns the ticks completed by this frame, at `stamp`: those of the message with both counters, or of
+  /// the later message if each wheel has its own. Empty for other frames.
   std::optional<WheelTicks> add(const CanFrame& frame, Timestamp stamp);
   const CanWheelCounts& counts() const { return counts_; }
 
@@ -111,7 +110,7 @@ class CanWheelDecoder {
     std::optional<uint64_t> raw;
     Timestamp stamp;
     double speed_m_per_s = 0.0;
-    double speed_error_m_per_s = 0.0;  // at most
+    double speed_error_m_per_s = 0.0;  // upper bound
     double remainder_m = 0.0;
     int64_t ticks = 0;
   };

@@ -45,45 +45,46 @@ struct V4l2Options {
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
-/// A control of a camera, menus and buttons left out.
+/// A control of a camera, except menus and buttons.
 struct V4l2Control {
   uint32_t id = 0;
-  std::string name;  ///< as v4l2-ctl writes it: "Exposure Time, Absolute" is exposure_time_absolute
+  std::string name;  ///< in the notation of v4l2-ctl: "Exposure Time, Absolute" is exposure_time_absolute
   int32_t minimum = 0, maximum = 0, step = 0, default_value = 0, value = 0;
 };
 
-/// A frame in the kernel's buffer; valid until it is given back.
+/// A frame in a buffer of the kernel; valid until enqueue().
 struct V4l2Frame {
   uint32_t buffer_index = 0;
   uint32_t sequence = 0;
-  /// Of the kernel's CLOCK_MONOTONIC; at the end of the frame, or at the start of its exposure where the
-  /// driver says so.
+  /// Time of the kernel's CLOCK_MONOTONIC at the end of the frame, or at the start of its exposure, depending
+  /// on the driver.
   Timestamp monotonic_stamp;
-  bool has_kernel_stamp = true;  ///< false: the driver's clock is unknown, the stamp is that of dequeuing
+  bool has_kernel_stamp = true;  ///< false: the driver's clock is unknown, the stamp is that of dequeue()
   bool is_damaged = false;       ///< V4L2_BUF_FLAG_ERROR
   const uint8_t* data = nullptr;
   size_t size_bytes = 0;
 };
 
-/// One V4L2 capture device, opened and streaming. Everything that fails throws InputError
-/// "<device>: <what>: <reason>"; the destructor stops and closes. Not thread safe.
+/// An open, streaming V4L2 capture device. All failures throw InputError "<device>: <what>: <reason>"; the
+/// destructor stops streaming and closes the device. Not thread safe.
 class V4l2Device {
  public:
-  /// Opens, checks that it captures and streams, agrees on format and rate, sets the controls, and starts.
+  /// Opens the device, checks that it captures and streams, negotiates format and rate, sets the controls,
+  /// and starts.
   V4l2Device(const std::string& path, const V4l2Options& options);
   ~V4l2Device();
   V4l2Device(const V4l2Device&) = delete;
   V4l2Device& operator=(const V4l2Device&) = delete;
 
   const std::string& path() const { return path_; }
-  int fileDescriptor() const { return fd_.get(); }  ///< readable (poll) when a frame is there
+  int fileDescriptor() const { return fd_.get(); }  ///< readable (poll) when a frame is available
   PixelFormat pixelFormat() const { return format_; }
   cv::Size size() const { return size_; }
   size_t strideBytes() const { return stride_bytes_; }
 
-  /// Takes the oldest filled buffer. False where none is there (never waits).
+  /// Takes the oldest filled buffer. Returns false if there is none; does not wait.
   bool dequeue(V4l2Frame* frame);
-  /// Gives the frame's buffer back to the kernel.
+  /// Returns the frame's buffer to the kernel.
   void enqueue(const V4l2Frame& frame);
 
   std::vector<V4l2Control> controls() const;
@@ -98,7 +99,7 @@ class V4l2Device {
   void allocate(const V4l2Options& options);
   void start();
   V4l2Control findControl(const std::string& name) const;
-  [[noreturn]] void fail(const std::string& what) const;  // with errno's text
+  [[noreturn]] void fail(const std::string& what) const;  // adds the text of errno
 
   const std::string path_;
   FileDescriptor fd_;
@@ -111,18 +112,18 @@ class V4l2Device {
   bool streaming_ = false;
 };
 
-/// What a device node is and can, for list_cameras.
+/// Description of a device node for list_cameras.
 struct V4l2Description {
   std::string path, card, driver, bus;
   bool captures = false;
   std::vector<std::string>
-      formats;  ///< "GREY 1280x800 (12.5, 25 Hz)", a trailing '*' where it is not understood
+      formats;  ///< "GREY 1280x800 (12.5, 25 Hz)", with a trailing '*' if the driver does not support it
   std::vector<V4l2Control> controls;
 };
 
-/// InputError when it cannot be opened or is no V4L2 device.
+/// Throws InputError if it cannot be opened or is not a V4L2 device.
 V4l2Description describeV4l2Device(const std::string& path);
-/// "name=value" taken apart. InputError for anything else.
+/// Splits "name=value". Throws InputError for anything else.
 std::pair<std::string, int32_t> parseControl(const std::string& text);
 
 }  // namespace vcharge

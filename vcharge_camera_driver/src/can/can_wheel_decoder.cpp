@@ -8,12 +8,12 @@ namespace {
 constexpr int kMaxStandardId = 0x7ff;
 constexpr int kMaxExtendedId = 0x1fffffff;
 constexpr int kMaxBits = 64;
-constexpr double kMaxIntegration_s = 0.5;           // a speed is not believed for longer
-constexpr double kSlackTicks = 4.0;                 // of stamps that are a little off
-constexpr double kMaxAcceleration_m_per_s2 = 50.0;  // of a wheel that begins to spin
+constexpr double kMaxIntegration_s = 0.5;           // longest interval over which a speed is integrated
+constexpr double kSlackTicks = 4.0;                 // tolerance for inaccurate stamps
+constexpr double kMaxAcceleration_m_per_s2 = 50.0;  // of a wheel that starts to spin
 
-// Index of the i-th bit (0 the lowest) of a big endian signal that starts at its highest: the bits of a byte
-// from the highest to the lowest, then those of the next byte.
+// Index of the i-th bit (0 is the lowest) of a big endian signal that starts at its highest bit: the bits of
+// a byte from highest to lowest, then those of the next byte.
 int bigEndianBit(const CanSignal& signal, int i) {
   const int from_top = signal.length - 1 - i;
   const int position = 8 * (signal.start_bit / 8) + (7 - signal.start_bit % 8) + from_top;
@@ -106,8 +106,8 @@ CanWheelDecoder::CanWheelDecoder(const CanWheelOptions& options)
 
 void CanWheelDecoder::count(uint64_t raw, Timestamp stamp, Wheel* wheel) {
   if (wheel->raw) {
-    // Of all changes that the counter's bits allow, the one nearest to what the last speed makes expected;
-    // how far it may be from that is known, hence whether it is the only one.
+    // Chooses, among all changes that the counter's bits allow, the one closest to the prediction from the
+    // last speed. The prediction's maximum error tells whether it is the only one.
     const double elapsed_s = std::max(0.0, toSeconds(stamp - wheel->stamp));
     const double tick_m = options_.metres_per_tick;
     const auto range = static_cast<double>(int64_t{1} << wheel->signal->length);

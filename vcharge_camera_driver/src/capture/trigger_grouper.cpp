@@ -10,7 +10,7 @@ namespace vcharge {
 namespace {
 
 constexpr double kToleranceInPeriods = 0.5;
-// Over more pulses than this a rate that is not quite the nominal one could miscount them.
+// Over more pulses, a small deviation from the nominal rate could cause a miscount.
 constexpr int64_t kMaxPulsesBetweenFrames = 100;
 constexpr size_t kRecentSpans = 16;
 
@@ -41,7 +41,7 @@ bool TriggerGrouper::align(const CapturedFrame& frame) {
   Camera& camera = cameras_[frame.camera_index];
   ++camera.counts.frames;
   if (camera.sequence) {
-    // The difference of unsigned numbers is right across their wrap-around.
+    // The difference of unsigned numbers is correct across their wrap-around.
     const auto by_number = static_cast<int64_t>(frame.sequence - *camera.sequence);
     const auto by_stamp =
         static_cast<int64_t>(std::llround(toSeconds(frame.stamp - camera.stamp) * options_.frame_rate_hz));

@@ -28,7 +28,7 @@ V4l2Options smallImages() {
   return options;
 }
 
-// Sleeps in poll() until a frame is there.
+// Sleeps in poll() until a frame is available.
 V4l2Frame nextFrame(V4l2Device* device) {
   V4l2Frame frame;
   while (!device->dequeue(&frame)) {
@@ -75,7 +75,7 @@ TEST_P(V4l2DeviceTest, StreamsFramesInOrderWithTheKernelsStamps) {
     EXPECT_TRUE(frame.has_kernel_stamp);
     EXPECT_EQ(gray.at<uint8_t>(100, 200), 200) << "the ramp below the pulse's number";
     if (last) {
-      // A loaded machine may lose frames: number and stamp count them alike.
+      // A loaded machine may lose frames; number and stamp count them equally.
       const auto pulses = (frame.monotonic_stamp - last->monotonic_stamp).count() / 10000000;
       EXPECT_GE(pulses, 1);
       EXPECT_EQ(frame.sequence - last->sequence, pulses);
@@ -126,7 +126,7 @@ TEST_F(V4l2DeviceTest, NamesWhatTheCameraHasWhereThereIsNoAgreement) {
 TEST_F(V4l2DeviceTest, SaysWhyADeviceIsNoCamera) {
   EXPECT_THAT(errorOf(cameras_.path(7), smallImages()),
               AllOf(StartsWith(cameras_.path(7)), HasSubstr("No such file")));
-  EXPECT_THAT(errorOf("/dev/null", smallImages()), HasSubstr("is no V4L2 device: Inappropriate ioctl"));
+  EXPECT_THAT(errorOf("/dev/null", smallImages()), HasSubstr("is not a V4L2 device: Inappropriate ioctl"));
   EXPECT_THAT(errorOf(cameras_.plug(0, "capabilities=output\n"), smallImages()), HasSubstr("is no"));
   EXPECT_THAT(errorOf(cameras_.plug(1, "capabilities=no_streaming\n"), smallImages()),
               HasSubstr("cannot stream"));

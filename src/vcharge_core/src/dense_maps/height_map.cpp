@@ -11,13 +11,13 @@
 namespace vcharge {
 namespace {
 
-/// Largest minus smallest known height within `reach` cells of a cell, along rows and columns.
+/// Difference between the largest and smallest known heights within `reach` cells, along rows and columns.
 float spread(const cv::Mat& height_m, int row, int column, int reach) {
   float low = height_m.at<float>(row, column), high = low;
   const auto take = [&](int r, int c) {
     if (r >= 0 && r < height_m.rows && c >= 0 && c < height_m.cols) {
       const float height = height_m.at<float>(r, c);
-      low = height < low ? height : low;  // passes over NaN
+      low = height < low ? height : low;  // ignores NaN
       high = height > high ? height : high;
     }
   };
@@ -28,7 +28,7 @@ float spread(const cv::Mat& height_m, int row, int column, int reach) {
   return high - low;
 }
 
-/// Rise over run between the known cells `reach` before and behind; 0 where one is not known.
+/// Slope between the known cells `reach` before and after; 0 if one of them is unknown.
 float slopeAlong(const cv::Mat& height_m, int row, int column, int row_step, int column_step, float run_m) {
   const int r0 = row - row_step, r1 = row + row_step, c0 = column - column_step, c1 = column + column_step;
   if (r0 < 0 || c0 < 0 || r1 >= height_m.rows || c1 >= height_m.cols) {

@@ -121,10 +121,10 @@ TEST(OdometryBufferTest, KnowsItsNewestStamp) {
   EXPECT_EQ(buffer.newestStamp(), std::nullopt);
   buffer.add(odometryAt(100.0));
   buffer.add(odometryAt(100.1));
-  buffer.add(odometryAt(100.05));  // ignored
+  buffer.add(odometryAt(100.05));  // too old, ignored
   EXPECT_FALSE(buffer.empty());
   EXPECT_EQ(buffer.newestStamp(), at(100.1));
-  buffer.add(odometryAt(1.0));  // starts over
+  buffer.add(odometryAt(1.0));  // jump backwards, resets the buffer
   EXPECT_EQ(buffer.newestStamp(), at(1.0));
 }
 

@@ -15,8 +15,8 @@ struct Offset {
 };
 using Pattern = std::array<std::array<Offset, 2>, BriefDescriptor::kBits>;
 
-/// Sum of four uniform numbers: close to a normal distribution with a standard deviation of 6.0, and made of
-/// integers only. (Calonder's fifth of the patch would be 6.2.)
+/// Sum of four uniform integers: close to a normal distribution with a standard deviation of 6.0. (Calonder's
+/// fifth of the patch size would be 6.2.)
 int drawCoordinate(std::mt19937* generator) {
   int sum = 0;
   for (int i = 0; i < 4; ++i) {

@@ -15,10 +15,10 @@ class BriefDescriptor {
  public:
   static constexpr int kBytes = 32;
   static constexpr int kBits = 8 * kBytes;
-  static constexpr int kRadius_px = 15;  ///< of the circle that holds every compared pixel
+  static constexpr int kRadius_px = 15;  ///< radius of the circle that contains all compared pixels
   static constexpr int kNumAngles = 32;
 
-  /// For smoothed images whose rows are `step` bytes apart.
+  /// `step`: distance between rows of the smoothed image in bytes.
   explicit BriefDescriptor(int64_t step);
 
   /// Writes kBytes at `descriptor` for the patch about `centre`, which lies kRadius_px or more inside the

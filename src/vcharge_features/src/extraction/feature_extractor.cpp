@@ -68,7 +68,7 @@ ImageFeatures FeatureExtractor::extract(const cv::Mat& image, const cv::Mat& mas
   }
   ImageFeatures features = extractChecked(image, mask);
   if (features.empty()) {
-    // An empty matrix that still says what kind of descriptors it lacks.
+    // An empty matrix of the right type and number of columns.
     features.descriptors.create(0, descriptorColumns(), descriptorType());
   }
   return features;

@@ -75,7 +75,7 @@ TEST_P(FeatureExtractorTest, StaysInsideTheMaskAndTheMaximum) {
 }
 
 TEST_P(FeatureExtractorTest, SpreadsFeaturesOverTheImage) {
-  // The left half has the stronger contrast, and would get nearly all.
+  // The left half has the stronger contrast and would otherwise get nearly all features.
   cv::Mat image = randomTexture({640, 400}, 3);
   cv::Mat right_half = image(cv::Rect(320, 0, 320, 400));
   right_half.convertTo(right_half, -1, 0.6, 50.0);

@@ -6,7 +6,7 @@
 
 namespace vcharge {
 
-// One maker per implementation; options were validated.
+// One function per implementation, for options that were validated.
 std::unique_ptr<FeatureExtractor> makeFastBriefExtractor(const FeatureExtractorOptions& options);
 std::unique_ptr<FeatureExtractor> makeOrbExtractor(const FeatureExtractorOptions& options);
 /// kSift or kRootSift.

@@ -15,10 +15,10 @@ namespace {
 constexpr size_t kPieceBytes = 2;
 constexpr size_t kNumValues = size_t{1} << (8 * kPieceBytes);
 constexpr int kMaxPieces = static_cast<int>(kBinaryDescriptorBytes / kPieceBytes);
-/// However few descriptors there are: so many cost nothing.
+/// Buckets of this size are always searched, since they cost nothing.
 constexpr int32_t kSmallBucket = 64;
 
-/// The same on machines of any byte order.
+/// Does not depend on the machine's byte order.
 size_t pieceOf(const uint8_t* descriptor, size_t piece) {
   return static_cast<size_t>(descriptor[kPieceBytes * piece]) |
          (static_cast<size_t>(descriptor[kPieceBytes * piece + 1]) << 8);
@@ -77,7 +77,7 @@ std::vector<DescriptorNeighbour> HammingIndex::near(const uint8_t* query, int ma
       found.push_back({candidates[i], distances[i]});
     }
   }
-  // Those with several equal pieces came several times.
+  // Descriptors with several equal pieces are found several times.
   const auto byIndex = [](const DescriptorNeighbour& a, const DescriptorNeighbour& b) {
     return a.index < b.index;
   };

@@ -23,7 +23,7 @@ cv::Mat randomDescriptors(int count, unsigned seed) {
   return descriptors;
 }
 
-/// With `count` different bits flipped.
+/// A copy with `count` different bits flipped.
 cv::Mat withFlips(const cv::Mat& descriptor, int count, std::mt19937* random) {
   cv::Mat flipped = descriptor.clone();
   std::vector<int> bits(kBits);
@@ -39,7 +39,7 @@ cv::Mat withFlips(const cv::Mat& descriptor, int count, std::mt19937* random) {
   return flipped;
 }
 
-/// Share of flipped descriptors whose original is found.
+/// Fraction of flipped descriptors whose original is found.
 double shareFound(int num_flips, int num_pieces) {
   const cv::Mat descriptors = randomDescriptors(5000, 1);
   HammingIndexOptions options;
@@ -66,7 +66,7 @@ TEST(HammingIndexTest, FindsAllThatLeaveOnePieceEqual) {
 }
 
 TEST(HammingIndexTest, FindsTheShareOfFartherOnesThatItNames) {
-  // One piece is equal with probability C(240, n) / C(256, n).
+  // At least one piece is equal with probability 1 - (1 - C(240, n) / C(256, n))^pieces, approximately.
   EXPECT_NEAR(shareFound(20, 8), 0.93, 0.03);
   EXPECT_NEAR(shareFound(30, 8), 0.68, 0.04);
   EXPECT_GT(shareFound(30, 16), shareFound(30, 8) + 0.1);
@@ -82,7 +82,7 @@ TEST(HammingIndexTest, LeavesOutWhatIsTooFar) {
 }
 
 TEST(HammingIndexTest, PiecesThatAllHaveAreNotLookedUp) {
-  // The first two pieces of all are equal: nothing is found by them.
+  // The first two pieces of all descriptors are equal, so they find nothing.
   cv::Mat descriptors = randomDescriptors(1000, 1);
   descriptors.colRange(0, 4).setTo(7);
   HammingIndexOptions options;

@@ -53,7 +53,7 @@ RectifiedView::RectifiedView(const RigCamera& camera, const Eigen::Quaterniond& 
       view_from_camera_(view_from_camera.normalized()),
       model_(makePinhole(options)),
       valid_mask_(cv::Mat::zeros(options.height_px, options.width_px, CV_8UC1)) {
-  // Pixels without a place in the image get one outside, where remap() writes 0.
+  // Pixels without a sensor pixel map outside the image, where remap() writes 0.
   cv::Mat map(valid_mask_.size(), CV_32FC2, cv::Scalar(-10.0, -10.0));
   for (int y = 0; y < map.rows; ++y) {
     for (int x = 0; x < map.cols; ++x) {

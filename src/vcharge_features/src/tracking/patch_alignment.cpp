@@ -13,10 +13,10 @@ namespace {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-/// Patches of less contrast (standard deviation in gray levels) have no texture.
+/// Patches with less contrast (standard deviation in gray levels) have no texture.
 constexpr float kMinContrast = 2.0F;
 
-/// Whether the deformed square of this radius, and a pixel around it, is in the image.
+/// Whether the deformed square of this radius lies inside the image, with a margin of one pixel.
 bool isInside(const cv::Mat& image, const PatchPlace& place, double radius_px) {
   const Eigen::Vector2d reach_px = place.shape.cwiseAbs() * Eigen::Vector2d::Constant(radius_px);
   const Eigen::Vector2d low_px = place.position_px - reach_px, high_px = place.position_px + reach_px;
@@ -28,7 +28,7 @@ class Alignment {
   Alignment(const PatchAlignmentOptions& options, const cv::Mat& current)
       : options_(options), current_(current), side_(2 * options.radius_px + 1), size_(side_ * side_) {}
 
-  /// False where the patch leaves the image or has no texture.
+  /// False if the patch leaves the image or has no texture.
   bool setAnchor(const cv::Mat& image, const Eigen::Vector2d& anchor_px) {
     const PatchPlace place{anchor_px, Eigen::Matrix2d::Identity()};
     if (!isInside(image, place, options_.radius_px + 1.0)) {
@@ -50,7 +50,7 @@ class Alignment {
       jacobian_.row(i) << by_x, by_y, by_x * offset.x(), by_x * offset.y(), by_y * offset.x(),
           by_y * offset.y();
     }
-    // What only changes brightness or contrast is free.
+    // Changes of brightness and contrast are projected out.
     jacobian_.rowwise() -= jacobian_.colwise().mean().eval();
     const Eigen::Matrix<float, 1, 6> as_contrast =
         anchor_.transpose() * jacobian_ / static_cast<float>(size_);
@@ -73,7 +73,7 @@ class Alignment {
         return std::nullopt;
       }
       const Vector6 step = stepFor(patch, start_inverse * place.shape - Eigen::Matrix2d::Identity());
-      // The step deforms the anchor: its inverse deforms the place.
+      // The step deforms the anchor; the current patch is deformed by its inverse.
       const Eigen::Matrix2d change = Eigen::Matrix2d::Identity() + shapeOf(step);
       if (!step.allFinite() || change.determinant() < 0.1) {
         return std::nullopt;
@@ -116,7 +116,7 @@ class Alignment {
     return patch;
   }
 
-  /// To mean 0 and standard deviation 1; returns the latter as it was.
+  /// Normalizes to mean 0 and standard deviation 1; returns the original standard deviation.
   static float normalize(Eigen::VectorXf* patch) {
     patch->array() -= patch->mean();
     const float contrast = std::sqrt(patch->squaredNorm() / static_cast<float>(patch->size()));
@@ -141,7 +141,7 @@ class Alignment {
   const cv::Mat& current_;
   const int side_, size_;
   Eigen::VectorXf anchor_;  // normalized
-  float contrast_ = 0.0F;   // of the anchor, gray levels
+  float contrast_ = 0.0F;   // standard deviation of the anchor in gray levels
   Eigen::Matrix<float, Eigen::Dynamic, 6>
       jacobian_;  // gray levels by position and shape in the anchor's image
   Eigen::LDLT<Matrix6> solver_;

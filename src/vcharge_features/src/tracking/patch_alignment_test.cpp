@@ -13,7 +13,7 @@
 namespace vcharge {
 namespace {
 
-/// An image and what it becomes when the scene is deformed around its middle.
+/// An image, and the same scene deformed around its middle.
 class PatchAlignmentTest : public ::testing::Test {
  protected:
   PatchAlignmentTest() { cv::GaussianBlur(randomTexture({400, 300}, 1), first_, cv::Size(5, 5), 1.2); }
@@ -39,7 +39,7 @@ class PatchAlignmentTest : public ::testing::Test {
     return points;
   }
 
-  /// Errors of the patches that are found, begun half a pixel away, without a guess of the shape.
+  /// Position errors of aligned patches, started half a pixel away without a guess of the shape.
   std::vector<double> errorsOfAlignment() const {
     std::vector<double> errors_px;
     for (const Eigen::Vector2d& point : points()) {
@@ -93,7 +93,7 @@ TEST_F(PatchAlignmentTest, ScaleAndSlantPullNothingAside) {
                                     << turn_rad);
     EXPECT_GT(errors_px.size(), 0.9 * static_cast<double>(points().size()));
     EXPECT_LT(quantile(errors_px, 0.5),
-              0.06);  // interpolation between pixels costs this much without any scale
+              0.06);  // interpolation between pixels causes this error even without scaling
     EXPECT_LT(quantile(errors_px, 0.95), 0.1);
   }
   EXPECT_GT(quantile(errorsOfTracker(), 0.5), 0.2) << "a patch that is moved alone does as well";

@@ -45,7 +45,7 @@ ImagePyramid PatchTracker::buildPyramid(const cv::Mat& image) const {
               std::to_string(image.rows) + " " + cv::typeToString(image.type()));
   ImagePyramid pyramid;
   pyramid.size_px = image.size();
-  // OpenCV would read what surrounds an image that is a part of another.
+  // Otherwise OpenCV would read pixels outside of a sub-image.
   const cv::Mat isolated = image.isSubmatrix() ? image.clone() : image;
   constexpr bool kWithGradients = true;
   constexpr bool kReuseImage = false;
@@ -87,7 +87,7 @@ std::vector<TrackedPoint> PatchTracker::track(const ImagePyramid& previous, cons
   cv::calcOpticalFlowPyrLK(previous.levels, current.levels, start, found, forward, ignored, window,
                            options_.num_levels - 1, criteria, cv::OPTFLOW_USE_INITIAL_FLOW,
                            options_.min_eigenvalue);
-  // The way back is short when the way there was right: it starts at its end.
+  // Tracking backwards starts at the original point, since the way back is short for a correct track.
   std::vector<cv::Point2f> returned = start;
   cv::calcOpticalFlowPyrLK(current.levels, previous.levels, found, returned, backward, ignored, window,
                            options_.num_levels - 1, criteria, cv::OPTFLOW_USE_INITIAL_FLOW,

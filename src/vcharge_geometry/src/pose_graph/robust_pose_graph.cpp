@@ -17,15 +17,15 @@ bool isOdometry(const PoseGraphEdge& edge) {
   return std::abs(edge.first - edge.second) == 1;
 }
 
-/// Two loop edges whose ends are close to each other along the odometry, and the error of the cycle they form
-/// in units of the information of the first, per edge of the cycle.
+/// Two loop edges whose ends are close to each other along the odometry, and the error of the cycle that they
+/// form, in units of the first edge's information, per edge of the cycle.
 struct LoopPair {
   size_t first;
   size_t second;
   double chi_squared_per_edge;
 };
 
-/// The odometry alone, nodes placed along it.
+/// The graph without loop edges, with nodes placed along the odometry.
 PoseGraph odometryOf(const PoseGraph& graph) {
   PoseGraph odometry = graph;
   odometry.edges.clear();
@@ -36,10 +36,10 @@ PoseGraph odometryOf(const PoseGraph& graph) {
   return odometry;
 }
 
-/// All pairs of loop edges with cycles of few steps. Loop edges are indices into graph.edges.
+/// All pairs of loop edges whose cycles have few odometry steps. Loop edges are indices into graph.edges.
 std::vector<LoopPair> nearbyPairs(const PoseGraph& graph, const PoseGraph& odometry,
                                   const std::vector<size_t>& loops, int64_t max_steps) {
-  // By the lower node, so that only neighbours in this order need to be looked at.
+  // Sorted by the lower node, so that only neighbours need to be compared.
   struct Oriented {
     int64_t low;
     int64_t high;
@@ -81,7 +81,7 @@ std::vector<LoopPair> nearbyPairs(const PoseGraph& graph, const PoseGraph& odome
   return pairs;
 }
 
-/// Weights 1 for odometry and Cauchy's for the loop edges in `members`, 0 for the rest.
+/// Weights: 1 for odometry, Cauchy's for the loop edges in `members`, 0 for the others.
 std::vector<double> cauchyWeights(const PoseGraph& graph, const std::vector<bool>& members,
                                   double c_squared) {
   std::vector<double> weights(graph.edges.size(), 0.0);
@@ -95,7 +95,7 @@ std::vector<double> cauchyWeights(const PoseGraph& graph, const std::vector<bool
   return weights;
 }
 
-/// Cauchy weights with c^2 falling from the largest error to a tenth of the threshold.
+/// Optimizes with Cauchy weights while c^2 falls from the largest error to a tenth of the threshold.
 void expectationMaximization(const std::vector<bool>& members, const std::vector<size_t>& loops,
                              double threshold, PoseGraph* graph) {
   constexpr int kSteps = 10;
@@ -137,12 +137,13 @@ RobustPoseGraphSummary optimizeRobustly(const RobustPoseGraphOptions& options, P
     for (const LoopPair& pair : pairs) {
       errors.push_back(pair.chi_squared_per_edge);
     }
-    // The lower quartile, for which up to three quarters of the pairs may contain a false edge.
+    // The lower quartile is robust if up to three quarters of the pairs contain a false edge.
     std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 4),
                      errors.end());
     summary.noise_scale = std::min(1.0, errors[errors.size() / 4] / dimensions);
   }
-  // Consistent: within 12 standard deviations of the noise, as odometry's lever arms are neglected.
+  // Pairs are consistent within 12 standard deviations of the noise, a wide bound since the error of the
+  // odometry between their ends is neglected.
   const double max_pair_error = std::min(1.0, 50.0 * summary.noise_scale) * dimensions * 3.0;
   std::vector<bool> members(num_edges, pairs.empty());
   for (const LoopPair& pair : pairs) {
@@ -160,7 +161,7 @@ RobustPoseGraphSummary optimizeRobustly(const RobustPoseGraphOptions& options, P
     expectationMaximization(members, loops, threshold, graph);
   }
   std::vector<double> weights(num_edges, 0.0);
-  // Wide at first: a true edge that is missing may hold others beyond the threshold.
+  // Starts with a wide threshold: a missing true edge may keep others beyond it.
   double widening = kWidening;
   for (int round = 0; round < kMaxRounds; ++round) {
     std::vector<double> next(num_edges, 1.0);

@@ -6,16 +6,17 @@
 
 #include <gtest/gtest.h>
 
+#include "pose_graph/g2o_file.h"
 #include "vcharge_core/base/error.h"
 
 namespace vcharge {
 namespace {
 
-/// A file of which the last num_false edges are false.
+/// A file whose last num_false edges are false.
 struct FileWithFalseLoops {
   const char* name;
   size_t num_false;
-  double optimal_chi_squared;  ///< of the others
+  double optimal_chi_squared;  ///< of the true edges
 };
 
 class FalseLoopsTest : public testing::TestWithParam<FileWithFalseLoops> {};

@@ -46,7 +46,7 @@ struct CentralSolver {
   }
 };
 
-/// A Problem of estimateRobustly; see there.
+/// A problem for estimateRobustly().
 template <class Solver, class Parameters>
 class MotionProblem {
  public:
@@ -124,7 +124,7 @@ bool isUsable(const Ray& ray) {
   return ray.origin_m.allFinite() && std::abs(ray.direction.squaredNorm() - 1.0) < 2e-6;
 }
 
-/// The status of the input: kOk, kTooFewMatches or kNotFinite.
+/// Status of the input: kOk, kTooFewMatches or kNotFinite.
 EstimationStatus statusOfMatches(const std::vector<RayMatch>& matches, int sample_size) {
   if (static_cast<int>(matches.size()) < sample_size) {
     return EstimationStatus::kTooFewMatches;
@@ -137,7 +137,7 @@ EstimationStatus statusOfMatches(const std::vector<RayMatch>& matches, int sampl
   return EstimationStatus::kOk;
 }
 
-/// Motion, covariance and status from the model and its sums.
+/// Fills motion, covariance and status from the model and its sums.
 template <class Parameters>
 void describeModel(const RobustSums& sums, const RotationTranslation& model,
                    double max_relative_scale_deviation, MotionEstimate* estimate) {

@@ -44,7 +44,7 @@ struct CalibrationImage {
   cv::Mat pixels;  ///< CV_8UC1
 };
 
-/// A view that the calibration used.
+/// A view used by the calibration.
 struct CalibratedView {
   BoardView view;
   PlacedBoard placed;
@@ -52,7 +52,7 @@ struct CalibratedView {
   double edge_width_px = 0.0;
 };
 
-/// An image that the calibration did not use, and why.
+/// An image not used by the calibration, and the reason.
 struct RejectedImage {
   std::string name, reason;
 };
@@ -61,29 +61,31 @@ enum class Verdict { kPass, kWarn, kFail };
 /// "PASS", "WARN", "FAIL".
 std::string toString(Verdict verdict);
 
-/// What calibrateIntrinsics found. With the verdict kFail there is no model.
+/// Result of calibrateIntrinsics(). Without a model if the verdict is kFail.
 struct IntrinsicCalibration {
   Verdict verdict = Verdict::kFail;
-  std::vector<std::string> remarks;  ///< why not kPass, and which pictures are missing
+  std::vector<std::string> remarks;  ///< reasons of the verdict, and which images are missing
   cv::Size image_size_px;
   std::optional<CameraModel> model;
-  /// Of the model's parameters, in their order, for errors that go together within a view (jackknife).
+  /// Standard deviations of the model's parameters, in their order, for errors that are correlated within a
+  /// view (jackknife).
   Eigen::VectorXd standard_deviations;
   std::vector<CalibratedView> views;
   std::vector<RejectedImage> rejected;
   double rms_px = 0.0;              ///< per coordinate
   double mean_error_px = 0.0;       ///< mean distance
-  double flat_rms_px = 0.0;         ///< as rms_px, of a fit with flat boards
-  bool bent_boards = false;         ///< boards were found to bend, and the fit takes it into account
+  double flat_rms_px = 0.0;         ///< like rms_px, with flat boards
+  bool bent_boards = false;         ///< boards were found to bend, and the fit models it
   double bending_m = 0.0;           ///< RMS of the boards' bending along their longer side
-  double cross_validated_px = 0.0;  ///< RMS per coordinate of views that the fit did not see
-  double covered_share = 0.0;       ///< share of the image in which corners were seen (cells)
-  double max_angle_rad = 0.0;       ///< farthest corner from the axis
+  double cross_validated_px = 0.0;  ///< RMS per coordinate of views that were excluded from the fit
+  double covered_share = 0.0;       ///< fraction of the image's cells in which corners were detected
+  double max_angle_rad = 0.0;       ///< angle of the farthest corner from the axis
 };
 
-/// Calibrates a camera from images of a board: finds the boards, guesses the camera, finds the boards that
-/// need the guess, fits, leaves out what does not fit, with the reason, and judges the result. `progress`
-/// takes the share done; calls are never concurrent. InputError for images of different sizes. Deterministic.
+/// Calibrates a camera from images of a board: detects the boards, estimates a first camera, detects further
+/// boards with it, fits the camera, removes outliers with a reason, and judges the result. `progress`
+/// receives the completed fraction; calls are never concurrent. Throws InputError for images of different
+/// sizes. Deterministic.
 IntrinsicCalibration calibrateIntrinsics(const CalibrationBoard& board,
                                          const std::vector<CalibrationImage>& images,
                                          const IntrinsicCalibrationOptions& options,

@@ -33,8 +33,8 @@ struct ViewCollectorOptions {
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
-/// Picks, from a stream of images, those that show the board held still where or how it was not seen yet, and
-/// says when they are enough to calibrate from. Not thread safe.
+/// Selects from a stream of images those that show a static board in a new pose, until there are enough to
+/// calibrate. Not thread safe.
 class ViewCollector {
  public:
   enum class Outcome { kTaken, kNoBoard, kMoving, kNothingNew, kFull };
@@ -42,15 +42,15 @@ class ViewCollector {
   ViewCollector(const CalibrationBoard& board, std::string model_name,
                 const ViewCollectorOptions& options = ViewCollectorOptions());
 
-  /// Copies the image where it is taken. InputError for an image of another size than the first.
+  /// Copies the image if it is selected. Throws InputError for an image of another size than the first.
   Outcome add(const CalibrationImage& image);
 
   const std::vector<CalibrationImage>& images() const { return images_; }
   const std::vector<BoardView>& views() const { return views_; }
-  /// The board in the last image added, where it was found.
+  /// The board in the last image, if it was detected.
   const std::optional<BoardView>& lastView() const { return last_view_; }
   double coveredShare() const { return coverage_.has_value() ? coverage_->coveredShare() : 0.0; }
-  /// Which pictures are missing; empty: there are enough.
+  /// Which images are still missing; empty if there are enough.
   std::vector<std::string> missing() const;
 
  private:
@@ -70,7 +70,7 @@ class ViewCollector {
   cv::Size size_;
 };
 
-/// What became of an image, in words.
+/// The outcome in words.
 std::string toString(ViewCollector::Outcome outcome);
 
 }  // namespace vcharge

@@ -10,17 +10,17 @@
 
 namespace vcharge {
 
-/// Height of the ground and of what stands on it, on a regular grid seen from above. Column c, row r is the
-/// cell whose centre is origin_m + cell_size_m * (c, r) in the map's frame: columns along x, rows along y.
+/// Height of the surface seen from above, on a regular grid. The cell in column c, row r has its centre at
+/// origin_m + cell_size_m * (c, r) in the map frame: columns along x, rows along y.
 struct HeightMap {
   std::string frame_id = "map";
   Eigen::Vector2d origin_m{0.0, 0.0};  ///< centre of the cell in column 0, row 0
   double cell_size_m = 0.05;
   cv::Mat height_m;    ///< CV_32FC1, metres; NaN: not observed
-  cv::Mat confidence;  ///< CV_32FC1 of that size, 0 to 1, 0 where not observed; or empty: not told
-  cv::Mat gray;        ///< CV_8UC1 of that size, brightness seen by the cameras; or empty: not told
-  /// CV_8UC1 of that size, not 0 where something stands that has no height, as nobody saw free space above it
-  /// (walls, pillars); or empty: not told.
+  cv::Mat confidence;  ///< CV_32FC1 of the same size, 0 to 1, 0 where not observed; may be empty
+  cv::Mat gray;        ///< CV_8UC1 of the same size, brightness seen by the cameras; may be empty
+  /// CV_8UC1 of the same size, not 0 for obstacles without a known height, because no free space was observed
+  /// above them (walls, pillars); may be empty.
   cv::Mat solid;
 
   Eigen::Vector2d centreOf(int column, int row) const {
@@ -28,14 +28,14 @@ struct HeightMap {
   }
 };
 
-/// Adds frame, grid and all cells; every NaN counts the same.
+/// Adds frame, grid and all cells; all NaNs are equal.
 void addToHash(const HeightMap& map, ContentHasher* hasher);
 
-/// Height at a place by bilinear interpolation between the four cells around it. NaN where one of them is
+/// Height at a position by bilinear interpolation between the four surrounding cells. NaN if one of them is
 /// outside or not observed.
 double interpolateHeight(const HeightMap& map, const Eigen::Vector2d& place_m);
 
-/// What a vehicle may do with a cell.
+/// Whether a vehicle can drive over a cell.
 enum class CellState : uint8_t { kDrivable, kObstacle, kUnobserved };
 
 struct DrivabilityOptions {
@@ -57,9 +57,9 @@ struct DrivabilityOptions {
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
-/// CV_8UC1 of CellState. A cell is an obstacle where heights within step_reach_m differ by more than
-/// max_step_m, or the surface rises by more than max_slope over slope_reach_m, or it is solid; else
-/// unobserved where the height is, or is not sure.
+/// CV_8UC1 of CellState. A cell is an obstacle if it is solid, if heights within step_reach_m differ by more
+/// than max_step_m, or if the surface rises by more than max_slope over slope_reach_m; otherwise it is
+/// unobserved if its height is unknown or its confidence too low.
 cv::Mat classifyCells(const HeightMap& map, const DrivabilityOptions& options);
 
 }  // namespace vcharge

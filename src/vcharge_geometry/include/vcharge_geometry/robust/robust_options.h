@@ -32,13 +32,12 @@ struct RobustOptions {
   void validate() const;
 };
 
-/// What became of a robust estimation. Everything but the status is filled for kOk and, as far as each
-/// estimator says, kScaleUnobservable; nothing for the rest.
+/// Status of a robust estimation. Results are valid for kOk and, in part, for kScaleUnobservable.
 enum class EstimationStatus {
   kOk,
-  kScaleUnobservable,  ///< rotation and direction of the translation are known, its length is not
-  kTooFewMatches,      ///< fewer than a minimal sample needs
-  kNotFinite,          ///< NaN or infinity in a match, or a ray without direction
+  kScaleUnobservable,  ///< rotation and direction of the translation are known, but not its length
+  kTooFewMatches,      ///< fewer than a minimal sample
+  kNotFinite,          ///< NaN or infinity in a match, or a ray without a direction
   kNoConsensus,        ///< no model has min_inliers inliers
 };
 
