@@ -15,7 +15,8 @@ struct Arguments {
   double field_of_view_rad = kPi;
 };
 
-void convert(const Arguments& arguments) {
+void convert(const Arguments& arguments, nlohmann::json* found) {
+  (*found)["cameras"] = nlohmann::json::array();
   const vcharge::IntrinsicsFormat format = vcharge::intrinsicsFormat(arguments.format);
   vcharge::CameraRig rig = vcharge::readIntrinsics(arguments.input, arguments.field_of_view_rad);
   if (!arguments.camera.empty()) {
@@ -31,6 +32,12 @@ void convert(const Arguments& arguments) {
     std::printf("%s: %s -> %s: %.4f px RMS, at most %.4f px, over %.1f %% of the field of view\n",
                 camera.name.c_str(), camera.model.name().c_str(), arguments.model.c_str(), converted.rms_px,
                 converted.max_px, 100.0 * converted.covered_share);
+    (*found)["cameras"].push_back({{"name", camera.name},
+                                   {"from", camera.model.name()},
+                                   {"to", arguments.model},
+                                   {"rms_px", converted.rms_px},
+                                   {"max_px", converted.max_px},
+                                   {"covered_ratio", converted.covered_share}});
     camera.model = converted.model;
   }
   vcharge::writeIntrinsics(rig, format, arguments.output);
@@ -54,11 +61,12 @@ int main(int argc, char** argv) {
                  "full angle, for files that have none (Kalibr, CamOdoCal)")
       ->capture_default_str()
       ->check(CLI::Range(0.1, 2.0 * kPi));
-  app.add_option("--output", arguments.output, "file to write")->required()->check(vcharge::requireNotEmpty);
-  return vcharge::runTool(&app, argc, argv, [&] {
+  app.add_option("--output", arguments.output, "file to write")->required()->check(vcharge::requireOutput);
+  app.footer("Keys of --json: cameras that changed model (name, from, to, rms_px, max_px, covered_ratio).");
+  return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (!arguments.model.empty()) {
       vcharge::CameraModel::parameterNames(arguments.model);
     }
-    convert(arguments);
+    convert(arguments, found);
   });
 }
