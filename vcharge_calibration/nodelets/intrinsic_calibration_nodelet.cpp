@@ -78,7 +78,7 @@ class IntrinsicCalibrationNodelet : public Nodelet {
       const ViewCollector::Outcome outcome = collector_->add({toString(stamp), image.pixels});
       const bool enough = collector_->missing().empty();
       publish(enough ? Status::READY : Status::COLLECTING, toString(outcome),
-              std::min(1.0, collector_->coveredShare()));
+              std::min(1.0, collector_->coveredFraction()));
       if (image_publisher_.getNumSubscribers() > 0) {
         image_publisher_.publish(
             toImageMessage(drawCollected(image.pixels, *collector_), stamp, message->header.frame_id));
@@ -116,7 +116,7 @@ class IntrinsicCalibrationNodelet : public Nodelet {
     status_.progress = progress;
     status_.missing = collector_->missing();
     status_.num_views = static_cast<uint32_t>(collector_->images().size());
-    status_.covered_share = collector_->coveredShare();
+    status_.covered_fraction = collector_->coveredFraction();
     status_publisher_.publish(status_);
   }
 
@@ -132,7 +132,7 @@ class IntrinsicCalibrationNodelet : public Nodelet {
                                                                : "missing: " + status_.missing.front();
     reported_failures_ = guard_.numFailures();
     report.values = {{"views", std::to_string(status_.num_views)},
-                     {"covered_share", std::to_string(status_.covered_share)},
+                     {"covered_fraction", std::to_string(status_.covered_fraction)},
                      {"last image", status_.message}};
     return report;
   }

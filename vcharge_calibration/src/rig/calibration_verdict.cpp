@@ -55,8 +55,8 @@ void judgeCalibration(const IntrinsicCalibrationOptions& options, IntrinsicCalib
     return fail("no camera of the model " + options.model +
                 " explains the corners: " + toText(result->rms_px, 1) + " px RMS");
   }
-  if (coverage.coveredShare() < kFailCoverage || coverage.reach() < kFailReach) {
-    return fail("the board was only seen in the middle, on " + toText(100.0 * coverage.coveredShare(), 0) +
+  if (coverage.coveredFraction() < kFailCoverage || coverage.reach() < kFailReach) {
+    return fail("the board was only seen in the middle, on " + toText(100.0 * coverage.coveredFraction(), 0) +
                 " % of the image: pictures with the board at the image's " + join(coverage.missingParts()) +
                 " are missing");
   }
@@ -66,8 +66,8 @@ void judgeCalibration(const IntrinsicCalibrationOptions& options, IntrinsicCalib
     result->remarks.push_back(remark);
   };
   const std::vector<std::string> missing = coverage.missingParts();
-  if (coverage.coveredShare() < kWarnCoverage || !missing.empty()) {
-    warn("corners cover only " + toText(100.0 * coverage.coveredShare(), 0) + " % of the image: " +
+  if (coverage.coveredFraction() < kWarnCoverage || !missing.empty()) {
+    warn("corners cover only " + toText(100.0 * coverage.coveredFraction(), 0) + " % of the image: " +
          (missing.empty() ? "hold the board also at its sides and in its corners"
                           : "pictures with the board at the image's " + join(missing) + " are missing"));
   }
