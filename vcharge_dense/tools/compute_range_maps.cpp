@@ -134,16 +134,14 @@ void computeRangeMaps(const Arguments& arguments, nlohmann::json* found) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Computes range maps from a recorded drive by plane sweep on the fisheye images. Writes, per camera "
-      "and image, "
-      "range, standard deviation and confidence as float TIFF, and the range in colours as PNG.");
+      "Computes range maps of a recorded drive by plane sweep on the fisheye images. Writes for each camera "
+      "and image range, standard deviation and confidence as float TIFF, and the range in colours as PNG.");
   Arguments arguments;
-  app.add_option("--bag", arguments.bag, "the drive")->required();
-  app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
-  app.add_option("--trajectory", arguments.trajectory,
-                 "TUM file; without it poses come from the drive's odometry");
+  app.add_option("--bag", arguments.bag, "bag of the drive")->required();
+  app.add_option("--rig", arguments.rig, "rig.yaml with extrinsics")->required();
+  app.add_option("--trajectory", arguments.trajectory, "TUM file; without it poses come from the odometry");
   app.add_option("--options", arguments.options, "YAML with overrides of RangeMapperOptions");
-  app.add_option("--preset", arguments.preset, "speed against accuracy, before --options")
+  app.add_option("--preset", arguments.preset, "speed or accuracy; --options overrides it")
       ->check(CLI::IsMember(enumNames<RangePreset>()))
       ->capture_default_str();
   app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");

@@ -67,14 +67,14 @@ class MatPool : public cv::MatAllocator {
   }
 
   mutable std::mutex mutex_;
-  mutable std::map<size_t, std::vector<void*>> idle_;  // by size
+  mutable std::map<size_t, std::vector<void*>> idle_;  // unused blocks, indexed by their size
   mutable size_t idle_bytes_ = 0;
 };
 
 }  // namespace
 
 cv::Mat pooledMat(cv::Size size, int type) {
-  // Never destroyed: matrices may live as long as the process.
+  // Never destroyed, because matrices may live as long as the process.
   static auto* const pool = new MatPool;
   cv::Mat mat;
   mat.allocator = pool;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "vcharge_core/base/error.h"
@@ -10,14 +11,21 @@
 namespace vcharge {
 namespace {
 
-// Images that wait for odometry that may still come; two seconds at 12.5 Hz.
+// Images that wait for odometry: two seconds at 12.5 Hz.
 constexpr size_t kMaxWaitingImages = 25;
-// A stamp this far before the newest means that the drive started over; a smaller step back is ignored.
+// A stamp this far before the newest one means that a drive is replayed; images that are less late are
+// ignored.
 constexpr double kReplay_s = 1.0;
+// A camera that moved less than this since its last image stands: there is no parallax.
+constexpr double kMinMotion_m = 0.03;
+// Poses that move faster than this have jumped.
+constexpr double kMaxSpeed_m_per_s = 60.0;
+// A camera whose newest image is older than this, against the other cameras, has stopped.
+constexpr double kMaxImageGap_s = 1.0;
 
 struct Frame {
   SweepImage image;
-  double path_m;  // along the camera's way
+  double path_m;  // length of the camera's path up to this frame
 };
 
 struct WaitingImage {
@@ -56,16 +64,15 @@ void RangeMapperOptions::usePreset(RangePreset new_preset) {
   }
 }
 
-void RangeMapperOptions::validate() const {
-  requireField(min_motion_m > 0.0, "min_motion_m", "must be positive", min_motion_m);
-  requireField(max_speed_m_per_s > 0.0, "max_speed_m_per_s", "must be positive", max_speed_m_per_s);
-  requireField(max_image_gap_s > 0.0, "max_image_gap_s", "must be positive", max_image_gap_s);
+void RangeMapperOptions::fieldWasRead(const char* field) {
+  if (std::string_view(field) == "preset") {
+    usePreset(preset);
+  }
+}
+
+void RangeMapperOptions::checkFields() const {
   requireField(!use_later_images || neighbours.num_neighbours % 2 == 0, "neighbours.num_neighbours",
                "must be even where later images are used", neighbours.num_neighbours);
-  validateInner("working_camera", working_camera);
-  validateInner("neighbours", neighbours);
-  validateInner("plane_sweep", plane_sweep);
-  validateInner("odometry", odometry);
 }
 
 struct RangeMapper::Camera {
@@ -75,7 +82,7 @@ struct RangeMapper::Camera {
   PlaneSweep plane_sweep;
   std::deque<WaitingImage> waiting;
   std::deque<Frame> frames;
-  size_t next_reference = 0;  // the first frame that was not yet handed out
+  size_t next_reference = 0;  // the first frame that was not yet passed on
   std::optional<Timestamp> newest;
   RangeMapperStatus status;
 };
@@ -101,7 +108,7 @@ RangeMapper::RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapper
     const WorkingCamera working(camera.model, camera.image_size_px, camera.field_of_view_rad, camera.mask,
                                 options_.working_camera);
     std::optional<Plane> ground;
-    if (options_.plane_sweep.families != PlaneFamilies::kFrontoParallel) {
+    if (options_.plane_sweep.num_ground_planes > 0) {
       ground = groundInCamera(*camera.vehicle_from_camera);
     }
     cameras_[index].reset(
@@ -134,18 +141,18 @@ void RangeMapper::setTrajectory(const Trajectory& world_from_vehicle) {
   poses_are_given_ = true;
 }
 
-void RangeMapper::startOver(Camera* camera, const std::string& reason) {
+void RangeMapper::restart(Camera* camera, const std::string& reason) {
   camera->waiting.clear();
   camera->frames.clear();
   camera->next_reference = 0;
   camera->newest.reset();
   ++camera->status.resets;
   camera->status.state = RangeMapperState::kFewNeighbours;
-  camera->status.message = "started over: " + reason;
+  camera->status.message = "restarted: " + reason;
 }
 
 void RangeMapper::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
-  check(camera_index < cameras_.size(), "RangeMapper::addImage: no such camera");
+  check(camera_index < cameras_.size(), "RangeMapper::addImage: unknown camera");
   Camera* camera = cameras_[camera_index].get();
   if (camera == nullptr) {
     return;
@@ -155,14 +162,14 @@ void RangeMapper::addImage(size_t camera_index, Timestamp stamp, const Image& im
       ++camera->status.ignored_images;
       return;
     }
-    startOver(camera, "stamps jumped back");
+    restart(camera, "stamps jumped back");
     newest_image_.reset();
   }
   camera->newest = stamp;
   newest_image_ = newest_image_ ? std::max(*newest_image_, stamp) : stamp;
   ++camera->status.images;
   camera->waiting.push_back({stamp, image});
-  placeWaiting(camera);
+  processWaiting(camera);
 }
 
 void RangeMapper::addOdometry(const VehicleOdometry& odometry) {
@@ -175,25 +182,25 @@ void RangeMapper::addOdometry(const VehicleOdometry& odometry) {
       continue;
     }
     if (result == OdometryBuffer::AddResult::kAddedAfterGap) {
-      placeWaiting(camera.get());  // images in the gap are reported as such
-      // What was before the gap can still be matched with what was before it, not with what comes.
+      processWaiting(camera.get());  // counts images in the gap as without a pose
+      // Images before the gap can still be matched with each other, but not with images after it.
       emitReferences(camera.get(), true);
       const std::optional<Timestamp> newest = camera->newest;
       const std::deque<WaitingImage> waiting = camera->waiting;
-      startOver(camera.get(), "gap in the odometry");
+      restart(camera.get(), "gap in the odometry");
       camera->newest = newest;
       camera->waiting = waiting;
     } else if (result == OdometryBuffer::AddResult::kReset) {
-      startOver(camera.get(), "odometry's stamps jumped back");
+      restart(camera.get(), "stamps of the odometry jumped back");
     }
-    placeWaiting(camera.get());
+    processWaiting(camera.get());
   }
 }
 
-void RangeMapper::placeWaiting(Camera* camera) {
+void RangeMapper::processWaiting(Camera* camera) {
   while (!camera->waiting.empty()) {
     const WaitingImage& first = camera->waiting.front();
-    if (!placeImage(camera, first.stamp, first.image)) {
+    if (!addPosedImage(camera, first.stamp, first.image)) {
       if (camera->waiting.size() <= kMaxWaitingImages) {
         return;
       }
@@ -203,13 +210,12 @@ void RangeMapper::placeWaiting(Camera* camera) {
   }
 }
 
-/// False when the pose may still come.
-bool RangeMapper::placeImage(Camera* camera, Timestamp stamp, const Image& image) {
+/// Returns false where the pose may still arrive.
+bool RangeMapper::addPosedImage(Camera* camera, Timestamp stamp, const Image& image) {
   const OdometryBuffer::Lookup lookup = poses_.lookup(stamp);
   if (!lookup) {
     camera->status.state = RangeMapperState::kNoPose;
-    camera->status.message =
-        "no pose at the image's stamp " + toString(stamp) + ": " + describe(lookup.status);
+    camera->status.message = "no pose at the image stamp " + toString(stamp) + ": " + describe(lookup.status);
     const bool may_come = !poses_are_given_ && (lookup.status == OdometryBuffer::LookupStatus::kEmpty ||
                                                 lookup.status == OdometryBuffer::LookupStatus::kAfterLast);
     if (!may_come) {
@@ -221,13 +227,13 @@ bool RangeMapper::placeImage(Camera* camera, Timestamp stamp, const Image& image
   if (!camera->frames.empty()) {
     const SweepImage& last = camera->frames.back().image;
     const double motion_m = (world_from_camera.translation() - last.world_from_camera.translation()).norm();
-    if (motion_m < options_.min_motion_m) {
+    if (motion_m < kMinMotion_m) {
       ++camera->status.standing;
       camera->status.state = RangeMapperState::kStanding;
-      camera->status.message = "the camera does not move: no range from motion";
+      camera->status.message = "the camera does not move: there is no parallax";
       return true;
     }
-    if (motion_m > options_.max_speed_m_per_s * toSeconds(stamp - last.stamp)) {
+    if (motion_m > kMaxSpeed_m_per_s * toSeconds(stamp - last.stamp)) {
       emitReferences(camera, true);
       camera->frames.clear();
       camera->next_reference = 0;
@@ -247,7 +253,7 @@ void RangeMapper::addFrame(Camera* camera, const SweepImage& frame) {
   }
   camera->frames.push_back({frame, path_m});
   emitReferences(camera, false);
-  // Forget what lies further back than any baseline from the next reference.
+  // Drops frames that are further back than any baseline of the next reference.
   const double reach_m = 1.5 * options_.neighbours.max_forward_baseline_m;
   const double needed_m =
       (camera->next_reference < camera->frames.size() ? camera->frames[camera->next_reference].path_m
@@ -289,8 +295,7 @@ void RangeMapper::emitReference(Camera* camera, size_t index) {
     for (size_t i = first; i < last; ++i) {
       baselines_m.push_back((camera->frames[i].image.world_from_camera.translation() - position).norm());
     }
-    for (size_t i : selectNeighbours(options_.neighbours, baselines_m,
-                                     options_.neighbours.num_neighbours / sides, longest_m)) {
+    for (size_t i : selectNeighbours(baselines_m, options_.neighbours.num_neighbours / sides, longest_m)) {
       task.neighbours.push_back(camera->frames[first + i].image);
     }
   }
@@ -318,7 +323,7 @@ void RangeMapper::finish() {
 
 RangeMap RangeMapper::sweep(const RangeTask& task) const {
   check(task.camera_index < cameras_.size() && cameras_[task.camera_index],
-        "RangeMapper::sweep: no such camera");
+        "RangeMapper::sweep: unknown camera");
   RangeMap map = cameras_[task.camera_index]->plane_sweep.sweep(task.reference, task.neighbours);
   map.camera_name = rig_->cameras[task.camera_index].name;
   map.frame_id = rig_->cameras[task.camera_index].frame_id;
@@ -333,8 +338,7 @@ std::vector<RangeMapperStatus> RangeMapper::status() const {
       continue;
     }
     all.push_back(camera->status);
-    if (camera->newest && newest_image_ &&
-        toSeconds(*newest_image_ - *camera->newest) > options_.max_image_gap_s) {
+    if (camera->newest && newest_image_ && toSeconds(*newest_image_ - *camera->newest) > kMaxImageGap_s) {
       all.back().state = RangeMapperState::kNoImages;
       all.back().message = "no image since " + toString(*camera->newest);
     }

@@ -15,7 +15,6 @@ SETTINGS = {
     "fast": ("fast", {}),
     "default": ("default", {}),
     "accurate": ("accurate", {}),
-    "half resolution beyond 2 m": ("default", {"half_resolution_beyond_m": 2.0}),
     "filled from two levels": ("default", {"num_fill_levels": 2}),
     "all planes": ("default", {"coarse_pass": False}),
 }
