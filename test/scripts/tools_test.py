@@ -155,7 +155,7 @@ class ToolsTest(unittest.TestCase):
     def test_options_are_shown_without_any_other_argument(self):
         for package, program in (("vcharge_calibration", "calibrate_rig"), ("vcharge_calibration", "calibrate_rig_from_map"),
                                  ("vcharge_dense", "build_height_map"), ("vcharge_dense", "compute_range_maps"),
-                                 ("vcharge_evaluation", "train_vocabulary"), ("vcharge_localization", "localize_drive"),
+                                 ("vcharge_localization", "localize_drive"),
                                  ("vcharge_mapping", "build_map"), ("vcharge_obstacles", "detect_obstacles"),
                                  ("vcharge_simulation", "simulate_drive")):
             status, output, errors = run([tool(package, program), "--show-options"])

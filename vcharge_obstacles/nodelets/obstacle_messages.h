@@ -22,21 +22,21 @@ class OcTree;
 
 namespace vcharge {
 
-/// What depth_nodelet publishes of one camera at one stamp.
+/// The messages of depth_nodelet for one camera and stamp.
 struct RangeMapParts {
   sensor_msgs::ImageConstPtr range, standard_deviation, confidence, reference;
   sensor_msgs::CameraInfoConstPtr camera_info;
   bool complete() const { return range && standard_deviation && confidence && reference && camera_info; }
 };
 
-/// Turns them into range maps; the working camera is built once for all images of a size. Not thread safe.
+/// Converts RangeMapParts to range maps; the working camera is built once per image size. Not thread safe.
 class RangeMapReader {
  public:
-  /// `topic` stands in errors: that of the parts without their own names.
+  /// `topic`: common prefix of the parts' topics, for errors.
   RangeMapReader(const RigCamera& camera, std::string topic);
 
-  /// The range map's pixels are those of the messages, which must outlive it. InputError "<topic>/...: ..."
-  /// for another encoding, images of unlike size, or a camera that is not the rig's at that size.
+  /// The range map refers to the pixels of the messages, which must outlive it. InputError "<topic>/...: ..."
+  /// for another encoding, images of different sizes, or a camera that is not the rig's at that size.
   RangeMap read(const RangeMapParts& parts);
 
  private:
@@ -44,27 +44,27 @@ class RangeMapReader {
 
   const RigCamera camera_;
   const std::string topic_;
-  cv::Size size_;  // of the two below
+  cv::Size size_;  // of the images that the members below belong to
   std::optional<MeiCamera> model_;
   sensor_msgs::CameraInfo expected_;
 };
 
-/// -1 unobserved, 0 free, 100 occupied; frame_id and stamp of the map.
+/// Cells: -1 unobserved, 0 free, 100 occupied. The frame_id and stamp are the map's.
 nav_msgs::OccupancyGrid toMessage(const ObstacleMap& map);
 
-/// Ranges: of an obstacle; +infinity where all is free up to the maximum; NaN where nothing is known.
-/// Intensities: height of the obstacle in metres, 0 without. `frame_id`: at the scan's origin on the ground,
+/// Ranges are infinite for rays that are free up to the maximum, NaN for unknown ones. Intensities are
+/// heights of the obstacles in metres, 0 without one. `frame_id`: frame at the scan's origin on the ground,
 /// with the vehicle's axes.
 sensor_msgs::LaserScan toMessage(const ObstacleScan& scan, const std::string& frame_id);
 
-/// Outlines of the occupied cells as walls up to their heights, and as lines; replaces those before.
+/// Outlines of the occupied cells as walls of their heights and as lines; replaces earlier markers.
 visualization_msgs::MarkerArray toMarkers(const ObstacleMap& map);
 
-/// Occupied cells as columns of voxels from the ground up to their height, free ones as one voxel on the
-/// ground, unobserved ones as nothing. Voxels are as large as cells, and lie in their places.
+/// An occupied cell becomes a column of voxels from the ground up to its height, a free one a voxel on the
+/// ground. Voxels have the cells' size and alignment.
 std::unique_ptr<octomap::OcTree> toOctree(const ObstacleMap& map);
 
-/// x: roll, y: pitch (rad), z: height (m) of the body over the ground.
+/// Body over the ground as x: roll (rad), y: pitch (rad), z: height (m).
 geometry_msgs::Vector3Stamped toMessage(const GroundPlane& ground, Timestamp stamp,
                                         const std::string& vehicle_frame);
 

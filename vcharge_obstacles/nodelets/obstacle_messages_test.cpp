@@ -15,7 +15,7 @@
 namespace vcharge {
 namespace {
 
-/// What depth_nodelet would publish of one camera.
+/// Messages that depth_nodelet would publish for one camera.
 class RangeMapReaderTest : public ::testing::Test {
  protected:
   RangeMapReaderTest() : converter_(camera_.field_of_view_rad) {
@@ -50,7 +50,7 @@ class RangeMapReaderTest : public ::testing::Test {
   sensor_msgs::CameraInfoPtr info_;
 };
 
-TEST_F(RangeMapReaderTest, GivesBackWhatWasPublished) {
+TEST_F(RangeMapReaderTest, RestoresThePublishedRangeMap) {
   const RangeMap map = read();
   ContentHasher expected, got;
   addToHash(map_, &expected);
@@ -60,7 +60,7 @@ TEST_F(RangeMapReaderTest, GivesBackWhatWasPublished) {
   EXPECT_EQ(cv::countNonZero(map.reference == 77), map.range_m.rows * map.range_m.cols);
 }
 
-TEST_F(RangeMapReaderTest, RefusesACameraUnlikeTheRigsByTopicAndExpectation) {
+TEST_F(RangeMapReaderTest, RefusesAnotherCameraNamingTopicAndExpectation) {
   const sensor_msgs::CameraInfo right = *info_;
   info_->K[0] *= 1.01;
   expectError({"/dense/left/range/camera_info", "expected camera 'left'"});
@@ -77,7 +77,7 @@ TEST_F(RangeMapReaderTest, RefusesACameraUnlikeTheRigsByTopicAndExpectation) {
   EXPECT_NO_THROW(read());
 }
 
-TEST_F(RangeMapReaderTest, RefusesImagesUnlikeEachOtherOrTheCamera) {
+TEST_F(RangeMapReaderTest, RefusesImagesOfOtherSizesOrEncodings) {
   sigma_->encoding = "mono8";
   expectError({"/dense/left/range/standard_deviation", "32FC1", "mono8"});
   sigma_->encoding = "32FC1";
@@ -86,7 +86,7 @@ TEST_F(RangeMapReaderTest, RefusesImagesUnlikeEachOtherOrTheCamera) {
   expectError({"/dense/left/range", "one size"});
   range_->height -= 1;
   range_->data.resize(range_->data.size() - range_->step);
-  expectError({"/dense/left/range/image", "sides of camera 'left'"});
+  expectError({"/dense/left/range/image", "aspect ratio of camera 'left'"});
 }
 
 TEST(ToOctreeTest, VoxelsLieWhereTheCellsLie) {
@@ -105,7 +105,7 @@ TEST(ToOctreeTest, VoxelsLieWhereTheCellsLie) {
       EXPECT_EQ(stateAt(-0.15 + 0.1 * column, 5.05 + 0.1 * row, 0.05), map.state.at<int8_t>(row, column));
     }
   }
-  EXPECT_EQ(stateAt(-0.05, 5.05, 0.15), kCellUnobserved);  // of free ground nothing above is known
+  EXPECT_EQ(stateAt(-0.05, 5.05, 0.15), kCellUnobserved);  // nothing is known above free ground
   EXPECT_EQ(stateAt(0.15, 5.25, 0.35), kCellOccupied);
   EXPECT_EQ(stateAt(0.15, 5.25, 0.45), kCellUnobserved);
 }

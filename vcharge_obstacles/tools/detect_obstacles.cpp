@@ -31,10 +31,10 @@ struct Arguments {
   bool show_options = false;
 };
 
-/// Processor time of the whole process, that is of all its threads, in parts of a run.
+/// Processor time of all threads of the process during parts of a run.
 class ProcessorTime {
  public:
-  /// Runs and counts.
+  /// Calls the function and adds the time that it takes.
   template <class Function>
   auto add(const Function& function) {
     const Count count{std::clock(), &ticks_};
@@ -51,7 +51,7 @@ class ProcessorTime {
   std::clock_t ticks_ = 0;
 };
 
-/// Hands odometry to both stages, and range maps from one to the other.
+/// Feeds odometry to both stages, and the range maps of one to the other.
 class Pipeline : public DriveConsumer {
  public:
   Pipeline(const std::shared_ptr<const CameraRig>& rig, const RangeMapperOptions& range_options,
@@ -118,18 +118,18 @@ class Pipeline : public DriveConsumer {
 
  private:
   ObstacleMapper* obstacles_;
-  ProcessorTime whole_, sweeping_, detecting_;  // the last two are nearly all parts of the first
+  ProcessorTime whole_, sweeping_, detecting_;  // the last two are mostly parts of the first
   uint64_t num_maps_ = 0;
   std::unique_ptr<RangeMapper> ranges_;
   std::string range_folder_;
   std::map<Timestamp, std::map<size_t, std::string>> stored_;
 };
 
-/// What is written per frame, and counted for the summary.
+/// Writes each frame, and collects what the summary needs.
 class Recorder {
  public:
   explicit Recorder(std::string folder) : folder_(std::move(folder)) {
-    table_ = "stamp_ns,camera,state,known_share,pitch_rad,roll_rad,height_m,ground_state,ground_points\n";
+    table_ = "stamp_ns,camera,state,known_fraction,pitch_rad,roll_rad,height_m,ground_state,ground_points\n";
   }
 
   void add(const ObstacleFrame& frame) {
@@ -144,7 +144,7 @@ class Recorder {
     }
     for (const ObstacleCameraStatus& status : frame.status) {
       table_ += std::to_string(frame.map.stamp.nanoseconds()) + "," + status.camera_name + "," +
-                toString(status.state) + "," + toText(status.known_share, 4) + "," +
+                toString(status.state) + "," + toText(status.known_fraction, 4) + "," +
                 toText(status.ground.pitch_rad(), 5) + "," + toText(status.ground.roll_rad(), 5) + "," +
                 toText(status.ground.height_m(), 4) + "," + toString(status.ground.state) + "," +
                 std::to_string(status.ground.num_points) + "\n";
@@ -184,7 +184,7 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
                      const RangeMapperOptions& range_options, nlohmann::json* found) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   if (!std::filesystem::exists(arguments.bag)) {
-    throw InputError(arguments.bag + ": no such file");  // before any folder is made
+    throw InputError(arguments.bag + ": no such file");  // before the output is created
   }
   FolderTransaction output(arguments.output);
   Recorder recorder(output.path());
@@ -194,7 +194,7 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
   Pipeline pipeline(rig, range_options, arguments.range, &mapper);
   BagDriveSourceOptions source_options;
   source_options.cameras = options.cameras;
-  source_options.max_image_gap_s = INFINITY;  // a camera that stops is borne, and told of
+  source_options.max_image_gap_s = INFINITY;  // a camera that stops is reported, not an error
   BagDriveSource source(arguments.bag, rig, source_options);
   {
     ProgressBar progress("obstacles");
@@ -217,9 +217,10 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Finds obstacles and free ground around the vehicle in a recorded drive. Writes, per image stamp, the "
-      "fused map (PGM and YAML as of map_server, float TIFFs) and all scans (CSV), and the state of the "
-      "cameras (status.csv).");
+      "Detects obstacles and free ground around the vehicle in a recorded drive. Writes the fused map (PGM "
+      "and "
+      "YAML of map_server, float TIFFs) and all scans (CSV) per image stamp, and the state of the cameras "
+      "(status.csv).");
   Arguments arguments;
   app.add_option("--bag", arguments.bag, "the drive")->required();
   app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();

@@ -17,8 +17,8 @@
 
 namespace vcharge {
 
-/// Where the map's cells stay: in odometry's frame, or in the map's, which they follow when localization
-/// moves it.
+/// Frame in which the map's cells are fixed: the odometry's, or the sparse map's, in which localization
+/// corrects them.
 enum class FixedFrame { kOdom, kMap };
 template <>
 inline std::vector<std::string> enumNames<FixedFrame>() {
@@ -26,46 +26,32 @@ inline std::vector<std::string> enumNames<FixedFrame>() {
 }
 
 struct ObstacleMapperOptions {
-  std::vector<std::string> cameras;  ///< of the rig, by name; empty: all
-  FixedFrame fixed_frame = FixedFrame::kOdom;
-  ObstacleDetectorOptions detector;
-  GroundWatchOptions watch;
-  LocalObstacleMapOptions map;
-  OdometryBufferOptions odometry;
-  double max_wait_s = 0.15;      ///< for a camera's range map once another has delivered its stamp
-  double silent_s = 0.5;         ///< without any range map for so long, the map comes all the same
-  double max_silence_s = 1.0;    ///< a camera without range maps for longer, while driving, has stopped
-  double min_known_share = 0.1;  ///< of a camera's pixels with a range; with less it hardly sees
-  double max_step_m = 0.15;      ///< change of odometry's way from message to message: more is a jump
-  double max_step_rad = 0.05;
-  double anchor_step_m = 0.03;  ///< map -> odom moves the cells once it has changed by so much
-  double anchor_step_rad = 0.003;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("cameras", cameras);
-    visit("fixed_frame", fixed_frame);
-    visit("detector", detector);
-    visit("watch", watch);
-    visit("map", map);
-    visit("odometry", odometry);
-    visit("max_wait_s", max_wait_s);
-    visit("silent_s", silent_s);
-    visit("max_silence_s", max_silence_s);
-    visit("min_known_share", min_known_share);
-    visit("max_step_m", max_step_m);
-    visit("max_step_rad", max_step_rad);
-    visit("anchor_step_m", anchor_step_m);
-    visit("anchor_step_rad", anchor_step_rad);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(ObstacleMapperOptions);
+  VCHARGE_OPTION(std::vector<std::string>, cameras, {}, anyValue(),
+                 "Cameras of the rig by name; empty: all.");
+  VCHARGE_OPTION(FixedFrame, fixed_frame, FixedFrame::kOdom, anyValue(),
+                 "Frame in which the cells are fixed.");
+  VCHARGE_OPTION_GROUP(ObstacleDetectorOptions, detector, {}, "Obstacles in one range map.");
+  VCHARGE_OPTION_GROUP(GroundWatchOptions, watch, {}, "Ground whose appearance changes.");
+  VCHARGE_OPTION_GROUP(LocalObstacleMapOptions, map, {}, "Fusion over time and cameras.");
+  VCHARGE_OPTION_GROUP(OdometryBufferOptions, odometry, {}, "Interpolation of the odometry.");
+  VCHARGE_OPTION(double, max_wait_s, 0.15, notNegative(),
+                 "Time to wait for the other cameras' range maps of a stamp.");
+  VCHARGE_OPTION(double, max_silence_s, 1.0, positive(),
+                 "Time without range maps after which a camera has stopped.");
+  VCHARGE_OPTION(double, min_known_fraction, 0.1, atLeast(0.0).below(1.0),
+                 "Fraction of pixels with a range below which a camera hardly sees.");
+  VCHARGE_OPTION(double, max_step_m, 0.15, positive(),
+                 "Largest deviation of the odometry from constant velocity between two messages.");
+  VCHARGE_OPTION(double, max_step_rad, 0.05, positive(), "Largest such deviation of the heading.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// What a camera adds to the map at present.
+/// What a camera contributes to the map at present.
 enum class ObstacleCameraState {
   kNoRangeMaps,   ///< none yet, or they stopped while the vehicle drives
-  kNoPose,        ///< range maps come, but there is no odometry at their stamps
-  kStanding,      ///< the vehicle stands: motion stereo sees nothing
+  kNoPose,        ///< there is no odometry at the range maps' stamps
+  kStanding,      ///< the vehicle stands: motion stereo measures nothing
   kHardlySees,    ///< few ranges: night, dirt, no texture
   kGroundLost,    ///< the ground is tilted beyond the bounds: nothing is cleared
   kGroundUnsure,  ///< few ground points: nothing is cleared
@@ -76,62 +62,60 @@ std::string toString(ObstacleCameraState state);
 struct ObstacleCameraStatus {
   std::string camera_name;
   ObstacleCameraState state = ObstacleCameraState::kNoRangeMaps;
-  std::string message;  ///< one line for people
+  std::string message;  ///< one line for the user
   GroundPlane ground;   ///< of the last range map
-  double known_share = 0.0;
+  double known_fraction = 0.0;
   uint64_t range_maps = 0;
   uint64_t without_pose = 0;
-  uint64_t late = 0;  ///< came after their stamp had been fused, and were left out
+  uint64_t late = 0;  ///< ignored, because their stamp was fused before
 };
 
-/// The map after all range maps of one stamp; where none come, from time to time; empty, where odometry
-/// jumped. Stamps grow from frame to frame, until the drive starts over: range maps of a stamp that is no
-/// later than the last frame's are fused without a frame of their own.
+/// The map after all range maps of one stamp. Without range maps a frame is emitted from time to time, and
+/// after a jump of the odometry an empty one at once. Stamps increase until the drive starts over: range maps
+/// that are not newer than the last frame are fused without a frame of their own.
 struct ObstacleFrame {
   ObstacleMap map;
-  ObstacleScan scan;                     ///< of the fused map
-  std::vector<CameraObstacles> cameras;  ///< that were added at this stamp, in the rig's order
+  ObstacleScan scan;                     ///< through the fused map
+  std::vector<CameraObstacles> cameras;  ///< added at this stamp, in the rig's order
   std::vector<ObstacleCameraStatus> status;
 };
 
-/// Turns range maps and odometry into obstacle maps: one front for the nodelet and the offline tool. Range
-/// maps of one stamp are fused together, in the rig's order, once odometry has come to it; no more
-/// than 25 stamps wait for odometry, or for a camera. Not thread safe.
+/// Turns range maps and odometry into obstacle maps, for the nodelet and the offline tool alike. Range maps
+/// of one stamp are fused together, in the rig's order, once odometry has reached the stamp. At most 25
+/// stamps wait for odometry or for a camera. Not thread safe.
 class ObstacleMapper {
  public:
   using FrameCallback = std::function<void(const ObstacleFrame&)>;
 
-  /// InputError when the rig lacks a camera of the options or the pose of one on the vehicle;
-  /// std::invalid_argument for bad options.
+  /// InputError if the rig lacks a camera of the options, or its extrinsics; std::invalid_argument for bad
+  /// options.
   ObstacleMapper(std::shared_ptr<const CameraRig> rig, const ObstacleMapperOptions& options,
                  FrameCallback on_frame);
   ~ObstacleMapper();
 
   void addOdometry(const VehicleOdometry& odometry);
-  /// From localization; needed for, and only heard with, fixed_frame: map.
+  /// Localization's correction. Required with fixed_frame: map, ignored otherwise.
   void setMapFromOdom(const RigidTransform& map_from_odom);
-  /// InputError for a map of no camera in use, or made with another rig.
+  /// InputError for a range map of a camera that is not in use, or that was made with another rig.
   void addRangeMap(const RangeMap& map);
-  /// Fuses what still waits: the drive is over.
+  /// Fuses what still waits at the end of the drive.
   void finish();
 
-  /// Of the cameras in use, in the rig's order.
+  /// One entry per camera in use, in the rig's order.
   std::vector<ObstacleCameraStatus> status() const;
-  /// How often odometry jumped, and the map was emptied for it.
+  /// Number of times that the map was emptied because the odometry jumped.
   uint64_t numJumps() const { return num_jumps_; }
-  /// Stamps whose range maps wait for others, or for odometry.
+  /// Number of stamps that wait for range maps or odometry.
   size_t numWaiting() const { return waiting_.size(); }
-  const PolarGrid& grid() const { return grid_; }
-  const ObstacleMapperOptions& options() const { return options_; }
 
  private:
   struct Camera;
-  struct Look {
+  struct Observation {
     CameraObstacles seen;
-    cv::Mat reference;  // the image, where the range map brought it
+    cv::Mat reference;  // the image of the range map; may be empty
   };
   struct Group {  // range maps of one stamp, by camera
-    std::map<size_t, Look> cameras;
+    std::map<size_t, Observation> cameras;
     std::optional<Timestamp> first_heard;  // odometry's stamp when the first of them came
   };
 

@@ -11,59 +11,35 @@
 namespace vcharge {
 namespace {
 
-// A stamp this far before the newest means that the drive started over.
+// A stamp this much older than the newest one means that the drive started over.
 constexpr double kReplay_s = 1.0;
 // Below this speed the vehicle stands.
 constexpr double kStanding_m_per_s = 0.02;
-// Stamps that wait for odometry or a camera that may still come; two seconds at 12.5 Hz.
+// Stamps that wait for odometry or a late camera: two seconds at 12.5 Hz.
 constexpr size_t kMaxWaiting = 25;
+// After this time without any range map a map is emitted all the same, and a camera is no longer waited for.
+constexpr double kSilence_s = 0.5;
+// Corrections of map -> odom below these bounds are smaller than a cell and not applied. The bound on the
+// angle is low because a turn moves cells far from the origin of the map.
+constexpr double kMinAnchorStep_m = 0.03;
+constexpr double kMinAnchorStep_rad = 0.003;
 
 }  // namespace
 
 struct ObstacleMapper::Camera {
   size_t index = 0;
-  std::unique_ptr<ObstacleDetector> detector;  // of the range maps' camera, which is known with the first one
+  std::unique_ptr<ObstacleDetector> detector;  // null before the first range map
   std::unique_ptr<GroundWatch> watch;
-  MeiCamera::Parameters parameters = MeiCamera::Parameters::Zero();  // of that camera
+  MeiCamera::Parameters parameters = MeiCamera::Parameters::Zero();  // of the range maps' camera
   cv::Size size;
   std::optional<Timestamp> newest;
   ObstacleCameraStatus status;
 };
 
 std::string toString(ObstacleCameraState state) {
-  switch (state) {
-    case ObstacleCameraState::kNoRangeMaps:
-      return "no range maps";
-    case ObstacleCameraState::kNoPose:
-      return "no pose";
-    case ObstacleCameraState::kStanding:
-      return "standing";
-    case ObstacleCameraState::kHardlySees:
-      return "hardly sees";
-    case ObstacleCameraState::kGroundLost:
-      return "ground lost";
-    case ObstacleCameraState::kGroundUnsure:
-      return "ground unsure";
-    case ObstacleCameraState::kMapping:
-      break;
-  }
-  return "mapping";
-}
-
-void ObstacleMapperOptions::validate() const {
-  validateInner("detector", detector);
-  validateInner("watch", watch);
-  validateInner("map", map);
-  validateInner("odometry", odometry);
-  requireField(max_wait_s >= 0.0, "max_wait_s", "must not be negative", max_wait_s);
-  requireField(silent_s > 0.0, "silent_s", "must be positive", silent_s);
-  requireField(max_silence_s > 0.0, "max_silence_s", "must be positive", max_silence_s);
-  requireField(min_known_share >= 0.0 && min_known_share < 1.0, "min_known_share", "must be in [0, 1)",
-               min_known_share);
-  requireField(max_step_m > 0.0, "max_step_m", "must be positive", max_step_m);
-  requireField(max_step_rad > 0.0, "max_step_rad", "must be positive", max_step_rad);
-  requireField(anchor_step_m >= 0.0, "anchor_step_m", "must not be negative", anchor_step_m);
-  requireField(anchor_step_rad >= 0.0, "anchor_step_rad", "must not be negative", anchor_step_rad);
+  constexpr const char* kNames[] = {"no range maps", "no pose",       "standing", "hardly sees",
+                                    "ground lost",   "ground unsure", "mapping"};
+  return kNames[static_cast<size_t>(state)];
 }
 
 ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const ObstacleMapperOptions& options,
@@ -84,7 +60,7 @@ ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const Obsta
   for (const std::string& name : names) {
     const size_t index = rig_->cameraIndex(name);
     if (!rig_->cameras[index].vehicle_from_camera) {
-      throw InputError("rig: cameras." + name + ": vehicle_from_camera is missing: obstacles need it");
+      throw InputError("rig: cameras." + name + ": expected vehicle_from_camera");
     }
     cameras_[index] = std::make_unique<Camera>();
     cameras_[index]->index = index;
@@ -121,8 +97,8 @@ void ObstacleMapper::watchForJumps(const VehicleOdometry& odometry) {
         std::remainder(yawOfRotation(to.rotation()) - yawOfRotation(from.rotation()), 2.0 * M_PI);
     const Eigen::Vector3d step(to.translation().x() - from.translation().x(),
                                to.translation().y() - from.translation().y(), turn_rad);
-    // Against going on as before: a car's speed changes little between two messages. How fast it is at first
-    // is not known.
+    // Deviation from constant velocity, which changes little between two messages. The first velocity is
+    // unknown.
     const Eigen::Vector3d change =
         last_velocity_ ? Eigen::Vector3d(step - *last_velocity_ * dt) : Eigen::Vector3d::Zero();
     if (dt <= options_.odometry.max_gap_s &&
@@ -137,7 +113,7 @@ void ObstacleMapper::watchForJumps(const VehicleOdometry& odometry) {
 }
 
 void ObstacleMapper::addOdometry(const VehicleOdometry& odometry) {
-  emitWhenSilent();  // until now: range maps of the odometry before have had their turn
+  emitWhenSilent();  // range maps of earlier odometry have been added by now
   const OdometryBuffer::AddResult result = poses_.add(odometry);
   if (result == OdometryBuffer::AddResult::kDuplicate || result == OdometryBuffer::AddResult::kOutOfOrder) {
     return;
@@ -148,7 +124,7 @@ void ObstacleMapper::addOdometry(const VehicleOdometry& odometry) {
     last_velocity_.reset();
     emitAt(odometry.stamp);
   } else if (result == OdometryBuffer::AddResult::kAddedAfterGap) {
-    // How far the vehicle went meanwhile is what the odometry says it is: not to be relied on.
+    // The motion during the gap is not known reliably.
     last_odometry_.reset();
     jump(odometry.stamp);
   }
@@ -156,7 +132,7 @@ void ObstacleMapper::addOdometry(const VehicleOdometry& odometry) {
   fuseWaiting(false);
 }
 
-/// Nothing in the map is where it was: all learn it at once.
+/// Empties the map after a jump of the odometry and emits the empty map at once.
 void ObstacleMapper::jump(Timestamp stamp) {
   ++num_jumps_;
   startOver();
@@ -171,9 +147,8 @@ void ObstacleMapper::setMapFromOdom(const RigidTransform& map_from_odom) {
   }
   map_from_odom_ = map_from_odom;
   const RigidTransform moved = map_from_odom * anchor_.inverse();
-  if (has_anchor_ && moved.translation().norm() < options_.anchor_step_m &&
-      angleOfRotation(moved.rotation()) < options_.anchor_step_rad) {
-    // Less than the cells can tell. Translation far from the map's origin stands for small turns, too.
+  if (has_anchor_ && moved.translation().norm() < kMinAnchorStep_m &&
+      angleOfRotation(moved.rotation()) < kMinAnchorStep_rad) {
     return;
   }
   map_.reanchor(moved);
@@ -193,7 +168,7 @@ void ObstacleMapper::addRangeMap(const RangeMap& map) {
   const int found = rig_->findCamera(map.camera_name);
   Camera* camera = found < 0 ? nullptr : cameras_[static_cast<size_t>(found)].get();
   if (camera == nullptr) {
-    throw InputError("range map of camera '" + map.camera_name + "': not one of the cameras in use");
+    throw InputError("range map of camera '" + map.camera_name + "': expected one of the cameras in use");
   }
   const RigCamera& rig_camera = rig_->cameras[camera->index];
   if (!camera->detector || camera->size != map.range_m.size() ||
@@ -201,8 +176,8 @@ void ObstacleMapper::addRangeMap(const RangeMap& map) {
     const WorkingCamera working = rebuildWorkingCamera(map.camera, map.range_m.size(), rig_camera);
     camera->detector =
         std::make_unique<ObstacleDetector>(working, *rig_camera.vehicle_from_camera, options_.detector);
-    camera->watch =
-        std::make_unique<GroundWatch>(working, *rig_camera.vehicle_from_camera, grid_, options_.watch);
+    camera->watch = std::make_unique<GroundWatch>(working, *rig_camera.vehicle_from_camera, grid_,
+                                                  options_.map.free_range_m, options_.watch);
     camera->size = map.range_m.size();
     camera->parameters = map.camera.parameters();
   }
@@ -228,33 +203,33 @@ void ObstacleMapper::updateStatus(Camera* camera, const CameraObstacles& seen) c
   ObstacleCameraStatus& status = camera->status;
   ++status.range_maps;
   status.ground = seen.ground;
-  status.known_share = seen.known_share;
-  const std::string known = toText(100.0 * seen.known_share, 0) + " % of the pixels have a range";
-  if (seen.known_share < options_.min_known_share) {
+  status.known_fraction = seen.known_fraction;
+  const std::string known = toText(100.0 * seen.known_fraction, 0) + " % of the pixels have a range";
+  if (seen.known_fraction < options_.min_known_fraction) {
     status.state = ObstacleCameraState::kHardlySees;
     status.message = "hardly sees: " + known;
   } else if (seen.ground.state == GroundState::kOutOfBounds) {
     status.state = ObstacleCameraState::kGroundLost;
-    status.message = "the ground is tilted beyond the bounds: nothing is taken for free";
+    status.message = "the ground is tilted beyond the bounds: no cell becomes free";
   } else if (seen.ground.state == GroundState::kFewPoints) {
     status.state = ObstacleCameraState::kGroundUnsure;
     status.message =
-        "only " + std::to_string(seen.ground.num_points) + " ground points: nothing is taken for free";
+        "only " + std::to_string(seen.ground.num_points) + " ground points: no cell becomes free";
   } else {
     status.state = ObstacleCameraState::kMapping;
     status.message = "mapping: " + known;
   }
 }
 
-/// Whether every camera that delivers has come to this stamp. A camera is waited for from when the first one
-/// came, however late range maps are by then.
+/// Whether every active camera has delivered this stamp, or has been waited for long enough since the first
+/// one did.
 bool ObstacleMapper::isComplete(Timestamp stamp, const Group& group) const {
   const Timestamp heard = group.first_heard.value_or(stamp);
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (!camera || (camera->newest && *camera->newest >= stamp)) {
       continue;
     }
-    const bool delivers = !camera->newest || toSeconds(stamp - *camera->newest) < options_.silent_s;
+    const bool delivers = !camera->newest || toSeconds(stamp - *camera->newest) < kSilence_s;
     const bool may_come = !last_odometry_ || toSeconds(last_odometry_->stamp - heard) < options_.max_wait_s;
     if (delivers && may_come) {
       return false;
@@ -266,7 +241,7 @@ bool ObstacleMapper::isComplete(Timestamp stamp, const Group& group) const {
 void ObstacleMapper::fuseWaiting(bool all) {
   while (!waiting_.empty()) {
     const Timestamp stamp = waiting_.begin()->first;
-    const bool must_go = all || waiting_.size() > kMaxWaiting;  // a camera, or odometry, does not come
+    const bool must_go = all || waiting_.size() > kMaxWaiting;  // stop waiting for a camera or odometry
     if (!must_go && !isComplete(stamp, waiting_.begin()->second)) {
       return;
     }
@@ -290,10 +265,10 @@ void ObstacleMapper::fuseWaiting(bool all) {
   }
 }
 
-/// There is no pose for it.
+/// Drops the first waiting stamp, for which there is no pose.
 void ObstacleMapper::loseFirstWaiting() {
   const auto first = waiting_.begin();
-  for (const auto& [index, look] : first->second.cameras) {
+  for (const auto& [index, observation] : first->second.cameras) {
     ObstacleCameraStatus& status = cameras_[index]->status;
     ++status.without_pose;
     status.state = ObstacleCameraState::kNoPose;
@@ -306,16 +281,16 @@ void ObstacleMapper::loseFirstWaiting() {
 void ObstacleMapper::fuse(Timestamp stamp, Group* group, const RigidTransform& fixed_from_vehicle) {
   map_.moveTo(stamp, fixed_from_vehicle);
   std::vector<const CameraObstacles*> cameras;
-  for (auto& [index, look] : group->cameras) {
-    CameraObstacles& seen = look.seen;
-    if (!look.reference.empty()) {
-      seen.changed_share =
-          cameras_[index]->watch->compare(stamp, look.reference, seen.ground, fixed_from_vehicle);
+  for (auto& [index, observation] : group->cameras) {
+    CameraObstacles& seen = observation.seen;
+    if (!observation.reference.empty()) {
+      seen.changed_fraction =
+          cameras_[index]->watch->compare(stamp, observation.reference, seen.ground, fixed_from_vehicle);
     }
     map_.add(seen, grid_, fixed_from_vehicle);
     cameras.push_back(&seen);
   }
-  if (!last_emitted_ || stamp > *last_emitted_) {  // else the next map shows what it adds
+  if (!last_emitted_ || stamp > *last_emitted_) {  // otherwise the next map shows it
     emit(map_, cameras);
   }
 }
@@ -324,7 +299,7 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const std::vector<const C
   ObstacleFrame frame;
   frame.map = map.snapshot();
   frame.map.frame_id = enumNames<FixedFrame>()[static_cast<size_t>(options_.fixed_frame)];
-  frame.scan = makeScan(frame.map, options_.map.scan_rays, options_.map.scan_depth_m);
+  frame.scan = makeScan(frame.map, options_.detector.grid.num_rays);
   for (const CameraObstacles* camera : cameras) {
     frame.cameras.push_back(*camera);
   }
@@ -333,20 +308,20 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const std::vector<const C
   on_frame_(frame);
 }
 
-/// Silence is told by when range maps come, not by their stamps: those that are late are no silence. Who
-/// waits for every range map cannot tell the two apart, and hears of the range maps' stamps alone.
+/// Silence is measured by the arrival of range maps, not by their stamps, so that a lag is no silence. With
+/// an infinite max_wait_s the two cannot be told apart, and maps are emitted at range maps' stamps only.
 void ObstacleMapper::emitWhenSilent() {
   if (!last_odometry_ || !last_emitted_ || !waiting_.empty() || std::isinf(options_.max_wait_s)) {
     return;
   }
   const Timestamp last = last_heard_ ? std::max(*last_heard_, *last_emitted_) : *last_emitted_;
-  if (toSeconds(last_odometry_->stamp - last) >= options_.silent_s) {
+  if (toSeconds(last_odometry_->stamp - last) >= kSilence_s) {
     emitAt(last_odometry_->stamp);
   }
 }
 
-/// What the map would be at a stamp of which there are no range maps (yet). The map itself stays as it is: it
-/// depends on the range maps alone, and not on when they come.
+/// Emits a moved copy of the map at a stamp without range maps. The map itself must not change, so that it
+/// depends on the range maps alone and not on when they arrive.
 void ObstacleMapper::emitAt(Timestamp stamp) {
   const std::optional<RigidTransform> fixed_from_vehicle = fixedFromVehicle(stamp);
   if (fixed_from_vehicle) {
@@ -374,7 +349,7 @@ std::vector<ObstacleCameraStatus> ObstacleMapper::status() const {
       continue;
     }
     all.back().state = stands ? ObstacleCameraState::kStanding : ObstacleCameraState::kNoRangeMaps;
-    all.back().message = stands ? "the vehicle stands: nothing new is seen, the map keeps what it has"
+    all.back().message = stands ? "the vehicle stands: nothing is measured, the map keeps its state"
                                 : "no range map since " + toString(*camera->newest);
   }
   return all;
