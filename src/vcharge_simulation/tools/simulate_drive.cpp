@@ -12,13 +12,12 @@
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Simulates a drive of a car with four fisheye cameras and writes it as a bag, with rig_truth.yaml "
-      "beside it and the truth in a folder BAG_truth: rig.yaml with masks, trajectory.tum, height_map.tiff "
-      "and "
-      ".yaml, obstacles.yaml, movers.yaml, faults.yaml, range/CAMERA/STAMP_NS.tiff, board.yaml in the scene "
-      "chessboard, and rig_before.yaml and rig_after.yaml where a fault changes the rig. rig_truth.yaml is "
-      "that "
-      "of the last drive in its folder.");
+      "Simulates a drive of a car with four fisheye cameras and writes it as a bag. Beside it are written "
+      "rig_truth.yaml and the folder BAG_truth with rig.yaml and masks, trajectory.tum, height_map.tiff and "
+      ".yaml, "
+      "obstacles.yaml, movers.yaml, faults.yaml and, depending on options and scene, "
+      "range/CAMERA/STAMP_NS.tiff, "
+      "board.yaml, and rig_before.yaml and rig_after.yaml of a fault that changes the rig.");
   const vcharge::ScenarioCommandLine command_line(&app);
   vcharge::RecordingOptions recording;
   bool list = false;
@@ -31,10 +30,10 @@ int main(int argc, char** argv) {
       "bag of the same drive with the same --seed and --noise off: its images get noise, exposure, faults "
       "and ticks instead of being rendered again");
   app.add_flag("--truth-range", recording.truth_range, "write the range of every pixel");
-  app.add_option("--height-cell-m", recording.height_cell_m, "cell of the height map")->capture_default_str();
-  app.add_option("--height-limit-m", recording.height_limit_m, "crowns and lamps above this are left out")
+  app.add_option("--height-cell-m", recording.height_cell_m, "cell size of the height map")
+      ->check(CLI::Range(0.01, 10.0))
       ->capture_default_str();
-  app.add_option("--threads", threads, "0: one per core")
+  app.add_option("--threads", threads, "number of threads; 0: one per core")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app.add_flag("--list", list, "print scenes, drives, rigs and faults, and do nothing else");
