@@ -53,19 +53,25 @@ std::vector<double> balanceTurns(const MappingData& data) {
   return weights;
 }
 
-/// In a finished map no keyframe is held: the first pose of the problem becomes the map's frame, which
-/// nothing refers to.
-void freeAllKeyframes(BundleProblem* problem) {
-  problem->map_from_vehicle.insert(problem->map_from_vehicle.begin(), RigidTransform());
-  for (BundleObservation& observation : problem->observations) {
-    ++observation.pose;
+/// Landmarks on the ground: planar motion shows neither the height of the cameras nor, well, their tilt.
+std::vector<GroundObservation> makeGroundObservations(const RigAdjustmentOptions& options,
+                                                      const std::vector<double>& weights,
+                                                      const MappingData& data) {
+  std::vector<int32_t> point_of_track(data.tracks.size(), 0);
+  int32_t num_points = 0;
+  for (size_t t = 0; t < data.tracks.size(); ++t) {
+    point_of_track[t] = num_points;
+    num_points += data.tracks[t].position_m ? 1 : 0;
   }
-  for (BundleMotion& motion : problem->motions) {
-    ++motion.pose;
+  std::vector<GroundObservation> observations;
+  for (const GroundPoint& ground : findGroundPoints(data, options.max_ground_distance_m)) {
+    observations.push_back({point_of_track[ground.track], ground.keyframe,
+                            options.ground_sigma_m / std::sqrt(weights[ground.keyframe])});
   }
+  return observations;
 }
 
-/// The problem of mapping, with the ground's observations put to their points.
+/// The problem of mapping with unknown extrinsics, ground observations and the priors.
 BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPriors& priors,
                              const MappingData& data) {
   const OdometryNoise& odometry = priors.odometry;
@@ -77,51 +83,28 @@ BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPrior
     bundle.tilt_sigma_rad = odometry.tilt_sigma_rad;
     bundle.odometry_distance_sigma = bundle.odometry_turn_sigma = 0.0;
   }
-  const BundleProblem mapping = makeBundleProblem(bundle, data);
-  BundleProblem problem = mapping;
+  BundleProblem problem = makeBundleProblem(bundle, data);
   const std::vector<double> weights = balanceTurns(data);
-  for (BundleMotion& motion : problem.motions) {
-    if (!odometry.has_slipped.empty() && odometry.has_slipped[motion.pose]) {
-      motion.information /= kSlipFactor * kSlipFactor;
+  for (OdometerFactor& factor : problem.odometer_factors) {
+    if (!odometry.has_slipped.empty() && odometry.has_slipped[factor.pose]) {
+      factor.information /= kSlipFactor * kSlipFactor;
     }
-    motion.information.block<2, 2>(3, 3) *= weights[motion.pose];
+    factor.information.block<2, 2>(3, 3) *= weights[factor.pose];
   }
   for (const RigCamera& camera : data.rig->cameras) {
     problem.vehicle_from_camera.push_back(*camera.vehicle_from_camera);
   }
-  problem.observations.clear();
-  const std::vector<GroundPoint> ground = findGroundPoints(data, options.max_ground_distance_m);
-  auto next_ground = ground.begin();
-  size_t point = 0;
-  for (size_t t = 0; t < data.tracks.size(); ++t) {
-    if (!data.tracks[t].position_m) {
-      continue;
-    }
-    problem.first_observation[point] = problem.observations.size();
-    const bool is_ground = next_ground != ground.end() && next_ground->track == static_cast<int32_t>(t);
-    for (size_t i = mapping.first_observation[point]; i < mapping.first_observation[point + 1]; ++i) {
-      if (is_ground && mapping.observations[i].pose == next_ground->keyframe &&
-          (i == mapping.first_observation[point] ||
-           mapping.observations[i - 1].pose != next_ground->keyframe)) {
-        problem.observations.push_back({next_ground->keyframe, kGroundCamera, Eigen::Vector2d::Zero(),
-                                        options.ground_sigma_m / std::sqrt(weights[next_ground->keyframe])});
-      }
-      problem.observations.push_back(mapping.observations[i]);
-    }
-    next_ground += is_ground ? 1 : 0;
-    ++point;
-  }
-  problem.first_observation[point] = problem.observations.size();
+  problem.ground_observations = makeGroundObservations(options, weights, data);
   if (priors.height_sigma_m > 0.0) {
     problem.common_information(2, 2) = 1.0 / (priors.height_sigma_m * priors.height_sigma_m);
   }
   if (priors.hasMap()) {
+    problem.is_first_pose_fixed = false;
     for (size_t t = 0; t < data.tracks.size(); ++t) {
       if (data.tracks[t].position_m) {
         problem.point_information.push_back(priors.landmark_information[t]);
       }
     }
-    freeAllKeyframes(&problem);
   }
   return problem;
 }
@@ -177,7 +160,6 @@ BundleAdjustmentSummary adjustRig(const RigAdjustmentOptions& options, const Rig
   const BundleSolution solved =
       solveBundle(options.bundle.max_iterations, options.bundle.cost_tolerance, &problem);
   if (priors.hasMap()) {
-    problem.map_from_vehicle.erase(problem.map_from_vehicle.begin());
     problem.points_in_map = before;
   }
   writeBack(problem, data);
@@ -199,7 +181,6 @@ RigUncertainty rigUncertainty(const RigAdjustmentOptions& options, const RigPrio
   if (!tail.is_valid) {
     return result;
   }
-  const Eigen::Index first_keyframe = priors.hasMap() ? 1 : 0;
   const Eigen::Index size = tail.covariance.rows() - 2;
   result.is_valid = true;
   result.covariance = tail.covariance.bottomRightCorner(size, size);
@@ -217,7 +198,7 @@ RigUncertainty rigUncertainty(const RigAdjustmentOptions& options, const RigPrio
       add();
       begin_m = data.keyframes[i].travelled_m;
     }
-    segment += tail.influence.col(static_cast<Eigen::Index>(i) + first_keyframe).tail(size);
+    segment += tail.influence.col(static_cast<Eigen::Index>(i)).tail(size);
   }
   add();
   if (num_segments > 1) {

@@ -155,7 +155,8 @@ BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const Ma
   for (size_t i = 1; i < data.keyframes.size(); ++i) {
     const RigidTransform motion =
         data.keyframes[i - 1].odom_from_vehicle.inverse() * data.keyframes[i].odom_from_vehicle;
-    problem.motions.push_back({static_cast<int32_t>(i), motion, odometryInformation(motion, options)});
+    problem.odometer_factors.push_back(
+        {static_cast<int32_t>(i), motion, odometryInformation(motion, options)});
   }
   return problem;
 }
