@@ -63,7 +63,7 @@ def build_map(folder, name, rig, args, prefix=()):
     say(f"{folder}: building the map {name}")
     output, trajectory = folder / f"{name}.vmap", folder / f"{name}.tum"
     figures = run([*prefix, TOOLS / "vcharge_mapping" / "build_map", "--bag", folder / "drive.bag", "--rig", rig,
-                   "--output", output, "--trajectory", trajectory, "--options", args.options, "--fresh",
+                   "--output", output, "--trajectory", trajectory, "--options", args.options,
                    "--report", folder / f"{name}_report"], folder / f"{name}.log")
     truth, report = folder / "drive_truth" / "trajectory.tum", folder / f"{name}_report"
     run([TOOLS / "vcharge_evaluation" / "evaluate_trajectory", "--estimate", trajectory, "--truth", truth,
@@ -189,7 +189,7 @@ def evaluate_real(args):
          folder / "drive.bag", "--rig", folder / "rig.yaml"], folder / "import.log")
     poses_of_odometry(folder / "drive.bag", folder / "odometry.tum")
     run([TOOLS / "vcharge_mapping" / "build_map", "--bag", folder / "drive.bag", "--rig", folder / "rig.yaml",
-         "--output", folder / "real.vmap", "--trajectory", folder / "real.tum", "--options", args.options, "--fresh"],
+         "--output", folder / "real.vmap", "--trajectory", folder / "real.tum", "--options", args.options],
         folder / "build.log")
     run([TOOLS / "vcharge_mapping" / "draw_landmarks", "--map", folder / "real.vmap", "--bag", folder / "drive.bag",
          "--camera", "left", "--output", folder / "landmarks.png"], folder / "draw.log")

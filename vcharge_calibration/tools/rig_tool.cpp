@@ -15,7 +15,7 @@ namespace vcharge {
 
 void addRigToolArguments(CLI::App* app, RigToolArguments* arguments) {
   app->add_option("--bag", arguments->bag, "drive with images and /odom")->required();
-  app->add_option("--rig", arguments->rig, "rig.yaml with intrinsics; extrinsics that it has are not used")
+  app->add_option("--rig", arguments->rig, "rig.yaml with intrinsics; its extrinsics are ignored")
       ->required();
   app->add_option("--output", arguments->output, "rig.yaml to write")->required()->check(requireNotEmpty);
   app->add_option("--trajectory", arguments->trajectory, "poses of all frames to write (.tum)")
@@ -30,12 +30,12 @@ void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const 
                  DriveConsumer* consumer) {
   ProgressBar bar("following the drive");
   BagDriveSourceOptions options;
-  options.max_image_gap_s = INFINITY;  // a camera that pauses is borne, and told of
+  options.max_image_gap_s = INFINITY;  // frames without a camera are used and counted
   BagDriveSource source(arguments.bag, rig, options);
   source.run(consumer, [&](double fraction) { bar.update(fraction); });
 }
 
-RigCalibration finishAndPrint(const RigToolArguments& arguments, const MappingState& state,
+RigCalibration finishAndPrint(const RigToolArguments& arguments, const ReconstructionState& state,
                               const std::function<RigCalibration(const StageCallback&)>& finish,
                               const KeyframeImages& images,
                               const std::function<std::string()>& more_sections) {

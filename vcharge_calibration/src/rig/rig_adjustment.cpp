@@ -10,32 +10,22 @@
 
 namespace vcharge {
 
-void RigAdjustmentOptions::validate() const {
-  requireField(max_ground_distance_m > 0.0, "max_ground_distance_m", "must be positive",
-               max_ground_distance_m);
-  requireField(ground_sigma_m > 0.0, "ground_sigma_m", "must be positive", ground_sigma_m);
-  requireField(segment_m > 0.0, "segment_m", "must be positive", segment_m);
-  requireField(common_error_px >= 0.0, "common_error_px", "must not be negative", common_error_px);
-  requireField(common_range_m > 0.0, "common_range_m", "must be positive", common_range_m);
-  validateInner("bundle", bundle);
-}
-
 namespace {
 
-/// How much less certain the odometer is where wheels slipped.
+/// Factor on the odometer's deviation where the wheels slipped.
 constexpr double kSlipFactor = 20.0;
 constexpr double kSlipSigmas = 5.0;
-/// Of a keyframe to the next, to lean in.
+/// Turn between keyframes in which the body leans.
 constexpr double kMinTurn_rad = 0.01;
-/// No odometer is taken for better.
+// Least deviations of an odometer.
 constexpr double kMinOdometrySigma_m = 0.0005;
 constexpr double kMinOdometrySigma_rad = 0.0002;
 constexpr double kMinHeightSigma_m = 0.001;
 constexpr double kMinTiltSigma_rad = 0.0005;
 
-/// Weights of what keyframes tell of the cameras' tilt. The body leans outwards in turns: with turns to both
-/// sides counting the same in sum that cancels, so the side with more of them counts less.
-std::vector<double> balanceTurns(const MappingData& data) {
+/// Weights of the keyframes for the cameras' tilt. The body leans outwards in turns, which cancels if both
+/// sides have the same sum of weights: the side with more turns gets less weight.
+std::vector<double> balanceTurns(const ReconstructionData& data) {
   std::vector<double> turns_rad(data.keyframes.size(), 0.0);
   double left_rad = 0.0, right_rad = 0.0;
   for (size_t i = 1; i < data.keyframes.size(); ++i) {
@@ -56,7 +46,7 @@ std::vector<double> balanceTurns(const MappingData& data) {
 /// Landmarks on the ground: planar motion shows neither the height of the cameras nor, well, their tilt.
 std::vector<GroundObservation> makeGroundObservations(const RigAdjustmentOptions& options,
                                                       const std::vector<double>& weights,
-                                                      const MappingData& data) {
+                                                      const ReconstructionData& data) {
   std::vector<int32_t> point_of_track(data.tracks.size(), 0);
   int32_t num_points = 0;
   for (size_t t = 0; t < data.tracks.size(); ++t) {
@@ -73,7 +63,7 @@ std::vector<GroundObservation> makeGroundObservations(const RigAdjustmentOptions
 
 /// The problem of mapping with unknown extrinsics, ground observations and the priors.
 BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPriors& priors,
-                             const MappingData& data) {
+                             const ReconstructionData& data) {
   const OdometryNoise& odometry = priors.odometry;
   BundleAdjustmentOptions bundle = options.bundle;
   if (odometry.sigma_m > 0.0) {
@@ -111,7 +101,7 @@ BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPrior
 
 }  // namespace
 
-OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const MappingData& data) {
+OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const ReconstructionData& data) {
   OdometryNoise noise;
   std::vector<double> errors_m, errors_rad, heights_m, tilts_rad;
   for (size_t i = 1; i < data.keyframes.size(); ++i) {
@@ -120,7 +110,7 @@ OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const M
     const RigidTransform seen =
         data.keyframes[i - 1].map_from_vehicle.inverse() * data.keyframes[i].map_from_vehicle;
     const Eigen::Vector2d error_m = (seen.translation() - counted.translation()).head<2>();
-    // Per axis, of a distance in two.
+    // Deviation per axis of a distance in two dimensions.
     errors_m.push_back(error_m.norm() / std::sqrt(2.0));
     errors_rad.push_back(std::abs(yawOfRotation(seen.rotation()) -
                                   data.odometry_turn_scale * yawOfRotation(counted.rotation())));
@@ -130,7 +120,7 @@ OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const M
   if (errors_m.size() < 10) {
     return noise;
   }
-  // Medians of a Rayleigh distribution and of the absolute value of a normal one.
+  // Medians of a Rayleigh distribution and of the absolute value of a normal distribution.
   constexpr double kRayleigh = 1.1774, kNormal = 0.6745;
   const BundleAdjustmentOptions& bundle = options.bundle;
   noise.sigma_m = std::clamp(quantile(errors_m, 0.5) * std::sqrt(2.0) / kRayleigh, kMinOdometrySigma_m,
@@ -150,7 +140,7 @@ OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const M
 }
 
 BundleAdjustmentSummary adjustRig(const RigAdjustmentOptions& options, const RigPriors& priors,
-                                  MappingData* data) {
+                                  ReconstructionData* data) {
   check(!data->keyframes.empty(), "adjustRig: expected keyframes");
   check(!priors.hasMap() || priors.landmark_information.size() == data->tracks.size(),
         "adjustRig: expected landmark_information of every track");
@@ -175,7 +165,7 @@ BundleAdjustmentSummary adjustRig(const RigAdjustmentOptions& options, const Rig
 }
 
 RigUncertainty rigUncertainty(const RigAdjustmentOptions& options, const RigPriors& priors,
-                              const MappingData& data) {
+                              const ReconstructionData& data) {
   RigUncertainty result;
   const BundleCovariance tail = bundleCovariance(makeRigProblem(options, priors, data));
   if (!tail.is_valid) {

@@ -17,7 +17,7 @@ BundleProblem makeProblem() {
   testing::TestDriveOptions drive;
   drive.noise_px = 0.4;
   drive.odometry_scale = 1.01;
-  const MappingData data = testing::makeTestDrive(drive);
+  const ReconstructionData data = testing::makeTestDrive(drive);
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0.0, 1.0);
   BundleProblem problem;
@@ -73,7 +73,7 @@ TEST(BundleSolverTest, GoesThePathOfCeres) {
     const BundleSolution solution = solveBundle(iterations, 1e-9, &ours);
     testing::solveWithCeres(iterations, 1e-9, &theirs);
     EXPECT_GT(largestDifference_m(ours, before), 0.03) << "the problem should not be solved already";
-    // At the end rounding decides which of the last, tiny steps is still taken.
+    // Rounding decides which of the last, tiny steps are accepted.
     EXPECT_LT(largestDifference_m(ours, theirs), iterations < 40 ? 1e-9 : 1e-5)
         << iterations << " iterations";
     EXPECT_NEAR(ours.odometer[0], theirs.odometer[0], 1e-6);
