@@ -180,7 +180,7 @@ void collectRows(const Options& options, const std::string& prefix, std::vector<
 }
 
 std::string showRows(const std::vector<OptionRow>& rows);
-std::string tableOfRows(const std::vector<OptionRow>& rows);
+std::string listRows(const std::vector<OptionRow>& rows);
 
 }  // namespace internal
 
@@ -232,12 +232,12 @@ std::string showOptions(const Options& options) {
   return internal::showRows(rows);
 }
 
-/// A Markdown table of all options with default, unit, allowed values and meaning.
+/// A Markdown list of all options with default, meaning and allowed values.
 template <class Options>
-std::string optionTable(const Options& options) {
+std::string optionList(const Options& options) {
   std::vector<internal::OptionRow> rows;
   internal::collectRows(options, "", &rows);
-  return internal::tableOfRows(rows);
+  return internal::listRows(rows);
 }
 
 /// std::invalid_argument "<field>: <requirement>, is <value>" unless the condition holds; for validate().
