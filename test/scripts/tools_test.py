@@ -248,7 +248,7 @@ class ToolsTest(unittest.TestCase):
         for value in ("nan", "-1", "0", "inf"):
             self.fail_with("import", ["field_of_view_rad", value], field_of_view_rad=value)
         for key, value in (("duration_s", "nan"), ("duration_s", "-1"), ("image_scale", "2"), ("seed", "-1"),
-                           ("exposure_gain", "0"), ("height_cell_m", "nan"), ("height_limit_m", "inf")):
+                           ("exposure_gain", "0"), ("height_cell_m", "nan")):
             self.fail_with("simulate", [key, value], **{key: value})
         self.fail_with("import", ["ground_height_m", "nan"], ground_height_m="nan")
         self.fail_with("import", ["ground_slope_x", "-2"], ground_slope_x="-2")
