@@ -67,12 +67,11 @@ class CameraDriverNodelet : public Nodelet {
         readCameraRig(requireStringParameter(private_node, "rig", "the path of a rig.yaml")));
     readFieldsFromParameters(private_node, "options", &options_);
     const cv::Size size = checkCameras(private_node.resolveName("options"));
-    options_.v4l2.capture.width_px = size.width;
-    options_.v4l2.capture.height_px = size.height;
+    options_.v4l2.capture.image_size_px = size;
     const double rate_hz = options_.v4l2.capture.frame_rate_hz;
-    sink_ = std::make_unique<MessageSink>(
-        options_.cameras.size(), TriggerGrouperOptions{rate_hz, options_.realign_frames},
-        options_.stamp_offset_s, [this](const MultiFrame& group) { publish(group); });
+    sink_ = std::make_unique<MessageSink>(options_.cameras.size(), TriggerGrouperOptions{rate_hz},
+                                          options_.stamp_offset_s,
+                                          [this](const MultiFrame& group) { publish(group); });
     makeSource(size);
     // All that may be refused is above: topics that come and go at once confuse those who listen.
     addOutputs(&node);

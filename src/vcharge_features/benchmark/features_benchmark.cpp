@@ -85,7 +85,7 @@ void extract(benchmark::State& state, FeatureType type) {
   }
 }
 BENCHMARK_CAPTURE(extract, fast_brief, FeatureType::kFastBrief)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(extract, orb, FeatureType::kOrb)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(extract, root_sift, FeatureType::kRootSift)->Unit(benchmark::kMillisecond);
 
 void track500Points(benchmark::State& state) {
   cv::setNumThreads(1);

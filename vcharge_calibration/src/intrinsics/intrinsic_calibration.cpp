@@ -23,7 +23,9 @@ namespace vcharge {
 namespace {
 
 // Fraction of the work spent on detecting boards without and with a camera; the rest is the fit.
-constexpr double kFindShare = 0.5;
+constexpr double kFindFraction = 0.5;
+// Parts into which the views are split for cross-validation.
+constexpr int kCrossValidationFolds = 10;
 constexpr double kFindAgainShare = 0.3;
 // Larger errors, or views that do not fit, cause a check for turned images.
 constexpr double kSuspiciousError_px = 0.5;
@@ -42,14 +44,14 @@ class Calibration {
                          " px as " + images_.front().name + ", got " + sizeText(image.pixels.size()));
       }
     }
-    findBoards(nullptr, 0.0, kFindShare);
+    findBoards(nullptr, 0.0, kFindFraction);
     std::vector<BoardView> views = foundViews();
     if (views.empty()) {
       return fail(nothingFound());
     }
     const auto rough = fitFromScratch(options_.model, result_.image_size_px, board_, views);
     if (rough.has_value()) {
-      findBoards(&rough->model, kFindShare, kFindAgainShare);
+      findBoards(&rough->model, kFindFraction, kFindAgainShare);
       views = foundViews();
     }
     for (size_t i = 0; i < images_.size(); ++i) {
@@ -212,8 +214,7 @@ class Calibration {
   // parameters depend on the choice of views.
   void crossValidate(const ViewFit& fit) {
     const auto views = fit.views.size();
-    const auto folds =
-        static_cast<size_t>(std::min(options_.cross_validation_folds, static_cast<int>(views)));
+    const auto folds = static_cast<size_t>(std::min(kCrossValidationFolds, static_cast<int>(views)));
     const auto size = fit.camera.model.parameters().size();
     std::vector<double> sums(folds, 0.0);
     std::vector<size_t> counts(folds, 0);
@@ -285,18 +286,6 @@ class Calibration {
 
 std::string toString(Verdict verdict) {
   return verdict == Verdict::kPass ? "PASS" : verdict == Verdict::kWarn ? "WARN" : "FAIL";
-}
-
-void IntrinsicCalibrationOptions::validate() const {
-  CameraModel::parameterNames(model);
-  requireField(min_views >= 3, "min_views", "must be at least 3", min_views);
-  requireField(max_view_error > 1.0, "max_view_error", "must be above 1", max_view_error);
-  requireField(max_edge_width > 1.0, "max_edge_width", "must be above 1", max_edge_width);
-  requireField(max_corner_error > 1.0, "max_corner_error", "must be above 1", max_corner_error);
-  requireField(min_bending_significance >= 1.0, "min_bending_significance", "must be at least 1",
-               min_bending_significance);
-  requireField(cross_validation_folds >= 2, "cross_validation_folds", "must be at least 2",
-               cross_validation_folds);
 }
 
 IntrinsicCalibration calibrateIntrinsics(const CalibrationBoard& board,

@@ -20,18 +20,15 @@ namespace {
 constexpr double kMinTiltRatio = 1.15;
 // An approximate camera is fitted after every so many views.
 constexpr size_t kFitEvery = 8;
+// Largest motion of the board's corners between images of a static board, relative to the image's longer
+// side.
+constexpr double kMaxMotion = 0.004;
+// Smallest difference of the corners from those of every collected view, unless the view covers a new part.
+constexpr double kMinDifference = 0.06;
+// Collection stops at this multiple of enough_views.
+constexpr int kMaxViewsRatio = 4;
 
 }  // namespace
-
-void ViewCollectorOptions::validate() const {
-  requireField(max_motion > 0.0, "max_motion", "must be positive", max_motion);
-  requireField(min_difference > 0.0, "min_difference", "must be positive", min_difference);
-  requireField(enough_views >= 5, "enough_views", "must be at least 5", enough_views);
-  requireField(enough_coverage > 0.0 && enough_coverage <= 1.0, "enough_coverage", "must be in (0, 1]",
-               enough_coverage);
-  requireField(enough_tilted >= 0, "enough_tilted", "must not be negative", enough_tilted);
-  requireField(max_views >= enough_views, "max_views", "must not be below enough_views", max_views);
-}
 
 ViewCollector::ViewCollector(const CalibrationBoard& board, std::string model_name,
                              const ViewCollectorOptions& options)
@@ -111,14 +108,14 @@ ViewCollector::Outcome ViewCollector::add(const CalibrationImage& image) {
   if (!last_view_.has_value()) {
     return Outcome::kNoBoard;
   }
-  if (!before.has_value() || difference(*before, *last_view_) > options_.max_motion) {
+  if (!before.has_value() || difference(*before, *last_view_) > kMaxMotion) {
     return Outcome::kMoving;
   }
-  if (static_cast<int>(views_.size()) >= options_.max_views) {
+  if (static_cast<int>(views_.size()) >= kMaxViewsRatio * options_.enough_views) {
     return Outcome::kFull;
   }
   const bool differs = std::all_of(views_.begin(), views_.end(), [this](const BoardView& view) {
-    return difference(view, *last_view_) > options_.min_difference;
+    return difference(view, *last_view_) > kMinDifference;
   });
   if (!differs && coverage_->numNewCells(*last_view_) == 0) {
     return Outcome::kNothingNew;

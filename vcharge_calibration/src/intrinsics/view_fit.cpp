@@ -21,6 +21,13 @@ namespace {
 constexpr int kMaxRounds = 6;
 // The bending of boards is judged after this round, when wrong corners have been removed.
 constexpr int kBendingRound = 1;
+// Factor by which bent boards must explain the errors better than random parameters.
+constexpr double kMinBendingSignificance = 3.0;
+// Largest ratio of a corner's error to the usual one of its view.
+constexpr double kMaxCornerError = 5.0;
+// Largest ratios of a view's RMS error and edge width to the usual ones; views beyond are removed.
+constexpr double kMaxViewError = 6.0;
+constexpr double kMaxEdgeWidth = 2.0;
 // Corners that move less between rounds have converged.
 constexpr double kSettled_px = 0.02;
 
@@ -122,8 +129,7 @@ class ViewFitter {
     const double rest = sumOfSquares(*bent, fit_.views, &count);
     const double parameters = 3.0 * static_cast<double>(fit_.views.size());
     const double freedom = static_cast<double>(count) - 3.0 * parameters;
-    if (freedom > parameters &&
-        (flat - rest) / parameters > options_.min_bending_significance * rest / freedom) {
+    if (freedom > parameters && (flat - rest) / parameters > kMinBendingSignificance * rest / freedom) {
       bending.sigma_px = std::sqrt(rest / freedom);
       fit_.settings = bending;
       return refit(bent->model);
@@ -198,7 +204,7 @@ class ViewFitter {
     tbb::parallel_for(size_t{0}, count, [&](size_t v) {
       widths_px[v] = widthOf(v);
       // The corners of a noisy view are judged by its own noise.
-      refined[v] = refineView(v, options_.max_corner_error * std::max(usual_corner_px, view_medians_px[v]));
+      refined[v] = refineView(v, kMaxCornerError * std::max(usual_corner_px, view_medians_px[v]));
       errors_px[v] = rmsError(board_, refined[v], fit_.camera.boards[v], fit_.camera.model);
     });
     const double usual_px = median(errors_px);
@@ -206,8 +212,8 @@ class ViewFitter {
     bool changed = false;
     std::vector<BoardView> kept;
     for (size_t v = 0; v < count; ++v) {
-      const bool blurred = widths_px[v] > options_.max_edge_width * usual_width_px;
-      if (blurred || !(errors_px[v] <= options_.max_view_error * usual_px)) {
+      const bool blurred = widths_px[v] > kMaxEdgeWidth * usual_width_px;
+      if (blurred || !(errors_px[v] <= kMaxViewError * usual_px)) {
         fit_.rejected.push_back(
             {fit_.views[v].image, blurred ? "blurred: its edges are " + toText(widths_px[v], 1) +
                                                 " px wide, usual are " + toText(usual_width_px, 1) + " px"

@@ -30,25 +30,17 @@ struct CanFrame {
 /// its lowest bit, that of a big endian (Motorola) signal its highest; bits are counted from the lowest of
 /// byte 0. value = raw * scale + offset.
 struct CanSignal {
-  int id = -1;  ///< of the message; negative: the car does not send it; above 0x7ff: an extended one
-  int start_bit = 0;
-  int length = 0;  ///< bits
-  ByteOrder endianness = ByteOrder::kLittle;
-  bool is_signed = false;
-  double scale = 1.0;
-  double offset = 0.0;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("id", id);
-    visit("start_bit", start_bit);
-    visit("length", length);
-    visit("endianness", endianness);
-    visit("signed", is_signed);
-    visit("scale", scale);
-    visit("offset", offset);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(CanSignal);
+  VCHARGE_OPTION(int, id, -1, anyValue().upTo(0x1fffffff),
+                 "Identifier of the message, extended above 0x7ff; negative: the car does not send it.");
+  VCHARGE_OPTION(int, start_bit, 0, between(0, 63), "First bit, as in DBC files.");
+  VCHARGE_OPTION(int, length, 0, between(0, 64), "Number of bits.");
+  VCHARGE_OPTION(ByteOrder, endianness, ByteOrder::kLittle, anyValue(), "Byte order.");
+  VCHARGE_OPTION(bool, is_signed, false, anyValue(), "Whether the number is signed (two's complement).");
+  VCHARGE_OPTION(double, scale, 1.0, anyValue(), "Factor of the raw number.");
+  VCHARGE_OPTION(double, offset, 0.0, anyValue(), "Added to the scaled number.");
+  VCHARGE_END_OPTIONS();
+  void checkFields() const;
 
   bool isUsed() const { return id >= 0; }
   bool isIn(const CanFrame& frame) const;
@@ -58,29 +50,27 @@ struct CanSignal {
   std::optional<double> value(const CanFrame& frame) const;
 };
 
-/// The car's messages: counters of both rear wheels, or their speeds; the steering angle if it is sent.
+/// The car's messages: counters of both rear wheels, or their speeds, and optionally the steering angle.
 struct CanWheelOptions {
-  CanSignal left_ticks, right_ticks;                  ///< counters that wrap at their length
-  CanSignal left_speed_m_per_s, right_speed_m_per_s;  ///< instead of counters
-  CanSignal backwards;  ///< not 0: the car rolls backwards, of which counters or speeds tell nothing
-  CanSignal
-      steering_angle_rad;  ///< of the virtual front wheel in the middle: the scale includes the steering gear
-  double metres_per_tick = 0.01;
-  double max_speed_m_per_s = 60.0;  ///< a counter that goes faster was reset
+  VCHARGE_BEGIN_OPTIONS(CanWheelOptions);
+  VCHARGE_OPTION_GROUP(CanSignal, left_ticks, {},
+                       "Counter of the left rear wheel, which wraps at its length.");
+  VCHARGE_OPTION_GROUP(CanSignal, right_ticks, {}, "Counter of the right rear wheel.");
+  VCHARGE_OPTION_GROUP(CanSignal, left_speed_m_per_s, {},
+                       "Speed of the left rear wheel, instead of its counter.");
+  VCHARGE_OPTION_GROUP(CanSignal, right_speed_m_per_s, {}, "Speed of the right rear wheel.");
+  VCHARGE_OPTION_GROUP(CanSignal, backwards, {},
+                       "Not 0 if the car rolls backwards, for counters without sign.");
+  VCHARGE_OPTION_GROUP(CanSignal, steering_angle_rad, {},
+                       "Angle of a virtual front wheel in the middle; the scale includes the steering gear.");
+  VCHARGE_OPTION(double, metres_per_tick, 0.01, above(0.0).upTo(100.0), "Distance per tick of the counters.");
+  VCHARGE_OPTION(double, max_speed_m_per_s, 60.0, above(0.0).upTo(1000.0),
+                 "Speed beyond which a counter was reset.");
+  VCHARGE_END_OPTIONS();
+  void checkFields() const;
 
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("left_ticks", left_ticks);
-    visit("right_ticks", right_ticks);
-    visit("left_speed_m_per_s", left_speed_m_per_s);
-    visit("right_speed_m_per_s", right_speed_m_per_s);
-    visit("backwards", backwards);
-    visit("steering_angle_rad", steering_angle_rad);
-    visit("metres_per_tick", metres_per_tick);
-    visit("max_speed_m_per_s", max_speed_m_per_s);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
-
+  /// False by default, when the car sends no wheel data.
+  bool isUsed() const { return left_ticks.isUsed() || left_speed_m_per_s.isUsed(); }
   bool hasTicks() const { return left_ticks.isUsed(); }
 };
 

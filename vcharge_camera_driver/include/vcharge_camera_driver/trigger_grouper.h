@@ -7,23 +7,18 @@
 #include <vector>
 
 #include "vcharge_camera_driver/frame_source.h"
+#include "vcharge_core/base/options.h"
 #include "vcharge_core/frames/multi_frame_synchronizer.h"
 
 namespace vcharge {
 
 struct TriggerGrouperOptions {
-  double frame_rate_hz = 12.5;  ///< of the trigger
-  /// After its start, and whenever its frame numbers and stamps disagree, a camera must bring so many frames
-  /// in which they agree before its images are used: a frame that comes late, with the stamp of the next
-  /// pulse, is recognized by it when the camera catches up within so many frames.
-  int realign_frames = 5;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("frame_rate_hz", frame_rate_hz);
-    visit("realign_frames", realign_frames);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(TriggerGrouperOptions);
+  VCHARGE_OPTION(double, frame_rate_hz, 12.5, above(0.0).upTo(1000.0), "Rate of the trigger.");
+  VCHARGE_OPTION(
+      int, realign_frames, 5, atLeast(1),
+      "Consistent frames of a camera before its images are used, after a start or a disagreement.");
+  VCHARGE_END_OPTIONS();
 };
 
 /// Statistics of a camera's frames.

@@ -21,28 +21,19 @@ inline std::vector<std::string> enumNames<BufferMemory>() {
   return {"mmap", "userptr"};
 }
 
-/// What is asked of every camera.
+/// Configuration of a camera.
 struct V4l2Options {
-  int width_px = 1280;
-  int height_px = 800;
-  double frame_rate_hz = 12.5;  ///< of the trigger; also asked of the camera, where it has a rate
-  std::vector<std::string>
-      pixel_formats;  ///< tried in this order; empty: all that are known, least work first
-  BufferMemory memory = BufferMemory::kMmap;
-  int num_buffers = 4;                ///< frames that the kernel may be ahead
-  std::vector<std::string> controls;  ///< "name=value", by the names that list_cameras prints
+  VCHARGE_BEGIN_OPTIONS(V4l2Options);
+  VCHARGE_OPTION(double, frame_rate_hz, 12.5, above(0.0).upTo(1000.0), "Rate of the trigger and the camera.");
+  VCHARGE_OPTION(std::vector<std::string>, pixel_formats, {}, anyValue(),
+                 "Formats in order of preference; empty: all supported ones, fastest conversion first.");
+  VCHARGE_OPTION(BufferMemory, memory, BufferMemory::kMmap, anyValue(), "Owner of the memory of frames.");
+  VCHARGE_OPTION(std::vector<std::string>, controls, {}, anyValue(),
+                 "Controls to set, as name=value with the names printed by list_cameras.");
+  VCHARGE_END_OPTIONS();
+  void checkFields() const;
 
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("width_px", width_px);
-    visit("height_px", height_px);
-    visit("frame_rate_hz", frame_rate_hz);
-    visit("pixel_formats", pixel_formats);
-    visit("memory", memory);
-    visit("num_buffers", num_buffers);
-    visit("controls", controls);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  cv::Size image_size_px{1280, 800};  ///< set from the rig
 };
 
 /// A control of a camera, except menus and buttons.
@@ -96,7 +87,7 @@ class V4l2Device {
 
   void checkCapabilities() const;
   void negotiate(const V4l2Options& options);
-  void allocate(const V4l2Options& options);
+  void allocate();
   void start();
   V4l2Control findControl(const std::string& name) const;
   [[noreturn]] void fail(const std::string& what) const;  // adds the text of errno

@@ -11,17 +11,13 @@
 namespace vcharge {
 
 struct V4l2FrameSourceOptions {
-  V4l2Options capture;
-  double timeout_s = 1.0;    ///< a camera silent for longer is opened anew
-  double reconnect_s = 0.5;  ///< between attempts to open a camera
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("capture", capture);
-    visit("timeout_s", timeout_s);
-    visit("reconnect_s", reconnect_s);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(V4l2FrameSourceOptions);
+  VCHARGE_OPTION_GROUP(V4l2Options, capture, {}, "Configuration of every camera.");
+  VCHARGE_OPTION(double, timeout_s, 1.0, above(0.0).upTo(3600.0),
+                 "Time without a frame after which a camera is reopened.");
+  VCHARGE_OPTION(double, reconnect_s, 0.5, above(0.0).upTo(3600.0),
+                 "Time between attempts to open a camera.");
+  VCHARGE_END_OPTIONS();
 };
 
 /// Frames of several V4L2 cameras, all processed by the thread that calls run(): it sleeps in poll() until a

@@ -28,10 +28,11 @@ CanFrame frameOf(uint32_t id, std::array<uint8_t, 8> data, uint8_t size = 8) {
 CanWheelOptions ticksOptions() {
   CanWheelOptions options;
   readFields(
-      YAML::Load("{left_ticks: {id: 0x1a0, start_bit: 0, length: 10}, "
-                 "right_ticks: {id: 0x1a0, start_bit: 16, length: 10}, "
-                 "steering_angle_rad: {id: 0x0c2, start_bit: 7, length: 16, endianness: big, signed: true, "
-                 "scale: 0.0001}, metres_per_tick: 0.02}"),
+      YAML::Load(
+          "{left_ticks: {id: 0x1a0, start_bit: 0, length: 10}, "
+          "right_ticks: {id: 0x1a0, start_bit: 16, length: 10}, "
+          "steering_angle_rad: {id: 0x0c2, start_bit: 7, length: 16, endianness: big, is_signed: true, "
+          "scale: 0.0001}, metres_per_tick: 0.02}"),
       "can.yaml", &options);
   return options;
 }

@@ -24,12 +24,6 @@ MultiFrameSynchronizerOptions synchronizerOptions(const TriggerGrouperOptions& o
 
 }  // namespace
 
-void TriggerGrouperOptions::validate() const {
-  requireField(std::isfinite(frame_rate_hz) && frame_rate_hz > 0.0 && frame_rate_hz <= 1000.0,
-               "frame_rate_hz", "must be in (0, 1000]", frame_rate_hz);
-  requireField(realign_frames >= 1, "realign_frames", "must be at least 1", realign_frames);
-}
-
 TriggerGrouper::TriggerGrouper(size_t num_cameras, const TriggerGrouperOptions& options)
     : options_(options),
       period_(durationFromSeconds(1.0 / options.frame_rate_hz)),

@@ -17,7 +17,8 @@
 namespace vcharge {
 namespace {
 
-constexpr int kMaxSide_px = 16384;
+/// Frames that the kernel may be ahead.
+constexpr uint32_t kNumBuffers = 4;
 constexpr long kPageBytes = 4096;
 
 bool hasFlag(uint32_t flags, uint32_t flag) {
@@ -30,12 +31,7 @@ std::string sizeText(uint32_t width, uint32_t height) {
 
 }  // namespace
 
-void V4l2Options::validate() const {
-  requireField(width_px >= 1 && width_px <= kMaxSide_px, "width_px", "must be in [1, 16384]", width_px);
-  requireField(height_px >= 1 && height_px <= kMaxSide_px, "height_px", "must be in [1, 16384]", height_px);
-  requireField(std::isfinite(frame_rate_hz) && frame_rate_hz > 0.0 && frame_rate_hz <= 1000.0,
-               "frame_rate_hz", "must be in (0, 1000]", frame_rate_hz);
-  requireField(num_buffers >= 2 && num_buffers <= 32, "num_buffers", "must be in [2, 32]", num_buffers);
+void V4l2Options::checkFields() const {
   const std::vector<std::string> known = pixelFormatNames();
   for (const std::string& name : pixel_formats) {
     if (std::find(known.begin(), known.end(), name) == known.end()) {
@@ -81,7 +77,7 @@ V4l2Device::V4l2Device(const std::string& path, const V4l2Options& options)
     const auto [name, value] = parseControl(text);
     setControl(name, value);
   }
-  allocate(options);
+  allocate();
   start();
 }
 
@@ -130,8 +126,8 @@ void V4l2Device::negotiate(const V4l2Options& options) {
     }
     v4l2_format request{};
     request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-    request.fmt.pix.width = static_cast<uint32_t>(options.width_px);
-    request.fmt.pix.height = static_cast<uint32_t>(options.height_px);
+    request.fmt.pix.width = static_cast<uint32_t>(options.image_size_px.width);
+    request.fmt.pix.height = static_cast<uint32_t>(options.image_size_px.height);
     request.fmt.pix.pixelformat = fourccOf(format);
     request.fmt.pix.field = V4L2_FIELD_NONE;
     if (v4l2Ioctl(fd_.get(), VIDIOC_S_FMT, &request) != 0) {
@@ -140,16 +136,18 @@ void V4l2Device::negotiate(const V4l2Options& options) {
     }
     // The driver answers with the nearest supported format.
     const v4l2_pix_format& answer = request.fmt.pix;
-    if (answer.pixelformat != fourccOf(format) || answer.width != static_cast<uint32_t>(options.width_px) ||
-        answer.height != static_cast<uint32_t>(options.height_px)) {
+    if (answer.pixelformat != fourccOf(format) ||
+        answer.width != static_cast<uint32_t>(options.image_size_px.width) ||
+        answer.height != static_cast<uint32_t>(options.image_size_px.height)) {
       refused += "; " + name + ": offers " + fourccText(answer.pixelformat) + " " +
                  sizeText(answer.width, answer.height);
       continue;
     }
     format_ = format;
-    size_ = cv::Size(options.width_px, options.height_px);
-    stride_bytes_ = std::max<size_t>(answer.bytesperline, bytesPerRow(format, options.width_px));
-    image_bytes_ = std::max<size_t>(answer.sizeimage, stride_bytes_ * static_cast<size_t>(options.height_px));
+    size_ = options.image_size_px;
+    stride_bytes_ = std::max<size_t>(answer.bytesperline, bytesPerRow(format, options.image_size_px.width));
+    image_bytes_ =
+        std::max<size_t>(answer.sizeimage, stride_bytes_ * static_cast<size_t>(options.image_size_px.height));
     if (image_bytes_ == 0) {
       throw InputError(path_ + ": the driver reports no image size");
     }
@@ -164,16 +162,16 @@ void V4l2Device::negotiate(const V4l2Options& options) {
   for (const uint32_t fourcc : offered) {
     names += (names.empty() ? "" : ", ") + fourccText(fourcc);
   }
-  throw InputError(
-      path_ + ": no agreement on " +
-      sizeText(static_cast<uint32_t>(options.width_px), static_cast<uint32_t>(options.height_px)) +
-      " pixels in a supported and requested format; the camera has " + (names.empty() ? "none" : names) +
-      refused);
+  throw InputError(path_ + ": no agreement on " +
+                   sizeText(static_cast<uint32_t>(options.image_size_px.width),
+                            static_cast<uint32_t>(options.image_size_px.height)) +
+                   " pixels in a supported and requested format; the camera has " +
+                   (names.empty() ? "none" : names) + refused);
 }
 
-void V4l2Device::allocate(const V4l2Options& options) {
+void V4l2Device::allocate() {
   v4l2_requestbuffers request{};
-  request.count = static_cast<uint32_t>(options.num_buffers);
+  request.count = kNumBuffers;
   request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   request.memory = memory_ == BufferMemory::kMmap ? V4L2_MEMORY_MMAP : V4L2_MEMORY_USERPTR;
   if (v4l2Ioctl(fd_.get(), VIDIOC_REQBUFS, &request) != 0) {

@@ -24,13 +24,6 @@ int toPollTimeout(Duration wait) {
 
 }  // namespace
 
-void V4l2FrameSourceOptions::validate() const {
-  validateInner("capture", capture);
-  requireField(std::isfinite(timeout_s) && timeout_s > 0.0, "timeout_s", "must be positive", timeout_s);
-  requireField(std::isfinite(reconnect_s) && reconnect_s > 0.0, "reconnect_s", "must be positive",
-               reconnect_s);
-}
-
 struct V4l2FrameSource::Camera {
   std::unique_ptr<V4l2Device> device;
   GrayConverter converter;

@@ -22,8 +22,7 @@ constexpr auto kPatience = std::chrono::seconds(30);
 
 V4l2FrameSourceOptions smallImages() {
   V4l2FrameSourceOptions options;
-  options.capture.width_px = 320;
-  options.capture.height_px = 240;
+  options.capture.image_size_px = {320, 240};
   options.capture.frame_rate_hz = 50.0;
   options.timeout_s = 0.3;
   options.reconnect_s = 0.05;

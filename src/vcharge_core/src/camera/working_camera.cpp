@@ -100,12 +100,6 @@ float blockCoordinate(float pixel, int block, int num_blocks) {
 
 }  // namespace
 
-void WorkingCameraOptions::validate() const {
-  requireField(image_scale > 0.0 && image_scale <= 1.0, "image_scale", "must be in (0, 1]", image_scale);
-  requireField(width_px >= 0, "width_px", "must not be negative", width_px);
-  requireField(focal_scale > 0.0 && focal_scale <= 4.0, "focal_scale", "must be in (0, 4]", focal_scale);
-}
-
 double WorkingCameraOptions::scaleOf(cv::Size sensor_size_px) const {
   return width_px > 0 ? std::min(1.0, static_cast<double>(width_px) / sensor_size_px.width) : image_scale;
 }

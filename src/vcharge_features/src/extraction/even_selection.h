@@ -6,6 +6,11 @@
 
 namespace vcharge {
 
+/// The grid of the extractors. Much finer grids spread features more evenly, but select weaker ones that
+/// match worse.
+constexpr int kGridColumns = 4;
+constexpr int kGridRows = 3;
+
 /// A feature to be selected or not.
 struct SelectionCandidate {
   cv::Point2f position_px;

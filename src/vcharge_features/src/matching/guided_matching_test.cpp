@@ -73,7 +73,7 @@ std::vector<FeatureMatch> matchPlainly(const Problem& problem, const MatchOption
         is_mutual &= !(other_distance < distance || (other_distance == distance && other < i));
       }
     }
-    if (j >= 0 && (is_mutual || !options.mutual)) {
+    if (j >= 0 && is_mutual) {
       matches.push_back({i, j, static_cast<float>(distance)});
     }
   }
@@ -98,7 +98,6 @@ TEST(GuidedMatchingTest, EqualsAnExhaustiveSearchThatLeavesOutWhatIsTooFar) {
         const Problem problem = randomProblem(37, 61, binary, ++seed);
         MatchOptions options;
         options.max_ratio = max_ratio;
-        options.mutual = seed % 4 < 2;
         const std::vector<FeatureMatch> found = matchNearPixels(
             problem.first, problem.predicted, problem.second, problem.positions, radius_px, options);
         expectEqual(matchPlainly(problem, options,

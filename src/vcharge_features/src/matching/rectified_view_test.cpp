@@ -163,9 +163,9 @@ TEST(RectifiedViewCacheTest, MakesAPairOnceAndForgetsTheOldest) {
   options.max_pairs = 2;
   RectifiedViewCache cache(makeRig(), options);
   const auto pair = cache.pair(0, 1, 0.0);
-  EXPECT_EQ(cache.pair(0, 1, 0.3 * options.yaw_step_rad)->first, pair->first);
+  EXPECT_EQ(cache.pair(0, 1, 0.3 * RectifiedViewCache::kYawStep_rad)->first, pair->first);
   EXPECT_EQ(cache.pair(0, 1, 2.0 * kPi)->first, pair->first);
-  EXPECT_NE(cache.pair(0, 1, options.yaw_step_rad)->first, pair->first);
+  EXPECT_NE(cache.pair(0, 1, RectifiedViewCache::kYawStep_rad)->first, pair->first);
   EXPECT_EQ(cache.pair(0, 1, 0.0)->first, pair->first);
   EXPECT_NE(cache.pair(1, 2, 0.0)->first, pair->first);
   EXPECT_EQ(cache.numPairs(), 2U);
@@ -175,7 +175,7 @@ TEST(RectifiedViewCacheTest, MakesAPairOnceAndForgetsTheOldest) {
 TEST(RectifiedViewCacheTest, PlanesAreParallelWhenTheVehicleTurned) {
   const auto rig = makeRig();
   RectifiedViewCache cache(rig);
-  const double yaw_rad = 10 * RectifiedViewCacheOptions().yaw_step_rad;
+  const double yaw_rad = 10 * RectifiedViewCache::kYawStep_rad;
   const auto pair = cache.pair(0, 1, yaw_rad);
   const Eigen::Quaterniond start_from_first =
       rig->cameras[0].vehicle_from_camera->rotation() * pair->first->viewFromCamera().conjugate();

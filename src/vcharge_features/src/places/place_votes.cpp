@@ -20,13 +20,6 @@ constexpr int kBlock = 64;
 
 }  // namespace
 
-void PlaceVotesOptions::validate() const {
-  requireField(max_distance_bits >= 0 && max_distance_bits <= 256, "max_distance_bits", "must be in [0, 256]",
-               max_distance_bits);
-  requireField(sigma_bits > 0.0, "sigma_bits", "must be positive", sigma_bits);
-  validateInner("index", index);
-}
-
 PlaceVotes::PlaceVotes(const cv::Mat& descriptors, std::vector<int32_t> images, int num_places,
                        int num_cameras, const PlaceVotesOptions& options)
     : options_((options.validate(), options)),
@@ -45,7 +38,7 @@ PlaceVotes::PlaceVotes(const cv::Mat& descriptors, std::vector<int32_t> images, 
   if (!is_binary) {
     mean_ = meanDescriptor(descriptors);
   }
-  index_ = std::make_unique<HammingIndex>(signaturesOf(descriptors), options_.index);
+  index_ = std::make_unique<HammingIndex>(signaturesOf(descriptors));
 }
 
 cv::Mat PlaceVotes::signaturesOf(const cv::Mat& descriptors) const {

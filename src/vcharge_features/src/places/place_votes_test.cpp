@@ -31,11 +31,11 @@ class AlikePlaces {
 
   /// The image on another day: the given fraction of its features again, slightly changed, and others of the
   /// same kinds.
-  cv::Mat onAnotherDay(int image, double share_seen_again) const {
+  cv::Mat onAnotherDay(int image, double fraction_seen_again) const {
     std::mt19937 random(static_cast<unsigned>(5000 + image));
     cv::Mat descriptors;
     for (int i = 0; i < kFeatures; ++i) {
-      const bool is_seen_again = i < share_seen_again * kFeatures;
+      const bool is_seen_again = i < fraction_seen_again * kFeatures;
       descriptors.push_back(is_seen_again
                                 ? varied(feature(image, i), 12, 0.1F, &random)
                                 : varied(kind((image % kCameras) * 100 + i % 6), 40, 0.5F, &random));

@@ -22,8 +22,9 @@ struct OpenNode {
 };
 
 /// Differs between nodes and does not depend on the order of processing.
-uint64_t seedOf(int seed, size_t node) {
-  return (static_cast<uint64_t>(static_cast<uint32_t>(seed)) << 32) ^ static_cast<uint64_t>(node);
+uint64_t seedOf(size_t node) {
+  constexpr uint64_t kSeed = 1;
+  return (kSeed << 32) ^ static_cast<uint64_t>(node);
 }
 
 cv::Mat joinDescriptors(const std::vector<cv::Mat>& descriptors_of_images) {
@@ -48,13 +49,6 @@ cv::Mat joinDescriptors(const std::vector<cv::Mat>& descriptors_of_images) {
 
 }  // namespace
 
-void VocabularyTreeOptions::validate() const {
-  requireField(branching >= 2 && branching <= 1000, "branching", "must be in [2, 1000]", branching);
-  requireField(depth >= 1 && depth <= 20, "depth", "must be in [1, 20]", depth);
-  requireField(max_iterations >= 1 && max_iterations <= 1000, "max_iterations", "must be in [1, 1000]",
-               max_iterations);
-}
-
 VocabularyTree VocabularyTree::train(const std::vector<cv::Mat>& descriptors_of_images,
                                      const VocabularyTreeOptions& options) {
   options.validate();
@@ -70,7 +64,7 @@ VocabularyTree VocabularyTree::train(const std::vector<cv::Mat>& descriptors_of_
     std::vector<DescriptorClusters> clusters(open.size());
     tbb::parallel_for(size_t{0}, open.size(), [&](size_t i) {
       clusters[i] = clusterDescriptors(all, open[i].members, options.branching, options.max_iterations,
-                                       seedOf(options.seed, open[i].node));
+                                       seedOf(open[i].node));
     });
     std::vector<OpenNode> next;
     for (size_t i = 0; i < open.size(); ++i) {

@@ -7,11 +7,18 @@
 #include <utility>
 
 #include "vcharge_core/base/error.h"
-#include "vcharge_core/base/options.h"
 #include "vcharge_geometry/pose_graph/pose_graph_optimizer.h"
 
 namespace vcharge {
 namespace {
+
+/// Odometry steps, at either end, between two loop edges that are compared.
+constexpr int64_t kMaxCycleSteps = 5;
+/// A loop edge above this is false if the information matrices are right.
+constexpr double kMaxEdgeChiSquared = 16.0;
+/// Where the information matrices understate the accuracy of edges, the threshold is this many times the
+/// noise that consistent loop edges show per degree of freedom.
+constexpr double kNoiseFactor = 1600.0;
 
 bool isOdometry(const PoseGraphEdge& edge) {
   return std::abs(edge.first - edge.second) == 1;
@@ -110,14 +117,7 @@ void expectationMaximization(const std::vector<bool>& members, const std::vector
 
 }  // namespace
 
-void RobustPoseGraphOptions::validate() const {
-  requireField(max_cycle_steps >= 0, "max_cycle_steps", "must not be negative", max_cycle_steps);
-  requireField(max_edge_chi_squared > 0.0, "max_edge_chi_squared", "must be positive", max_edge_chi_squared);
-  requireField(noise_factor > 0.0, "noise_factor", "must be positive", noise_factor);
-}
-
-RobustPoseGraphSummary optimizeRobustly(const RobustPoseGraphOptions& options, PoseGraph* graph) {
-  options.validate();
+RobustPoseGraphSummary optimizeRobustly(PoseGraph* graph) {
   constexpr int kSteps = 10;
   constexpr int kMaxRounds = 15;
   constexpr double kWidening = 2.0;
@@ -130,7 +130,7 @@ RobustPoseGraphSummary optimizeRobustly(const RobustPoseGraphOptions& options, P
     }
   }
   const PoseGraph odometry = odometryOf(*graph);
-  const std::vector<LoopPair> pairs = nearbyPairs(*graph, odometry, loops, options.max_cycle_steps);
+  const std::vector<LoopPair> pairs = nearbyPairs(*graph, odometry, loops, kMaxCycleSteps);
   RobustPoseGraphSummary summary;
   if (!pairs.empty()) {
     std::vector<double> errors;
@@ -151,7 +151,7 @@ RobustPoseGraphSummary optimizeRobustly(const RobustPoseGraphOptions& options, P
       members[pair.first] = members[pair.second] = true;
     }
   }
-  const double threshold = std::min(options.max_edge_chi_squared, options.noise_factor * summary.noise_scale);
+  const double threshold = std::min(kMaxEdgeChiSquared, kNoiseFactor * summary.noise_scale);
   optimizePoseGraph({}, 5 * kSteps, graph);
   const bool contradiction = std::any_of(loops.begin(), loops.end(), [&](size_t i) {
     return !(chiSquared(*graph, graph->edges[i]) < kWidening * threshold);

@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "vcharge_geometry/solvers/half_angle_roots.h"
+
 namespace vcharge {
 namespace {
 

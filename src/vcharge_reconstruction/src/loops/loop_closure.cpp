@@ -292,7 +292,7 @@ void closeLoops(std::vector<LoopEdge>* edges, ReconstructionData* data) {
   if (loops.empty()) {
     return;
   }
-  const RobustPoseGraphSummary summary = optimizeRobustly(RobustPoseGraphOptions(), &graph);
+  const RobustPoseGraphSummary summary = optimizeRobustly(&graph);
   const size_t num_steps = data->keyframes.size() - 1;
   for (size_t i = 0; i < loops.size(); ++i) {
     LoopEdge& edge = (*edges)[loops[i]];

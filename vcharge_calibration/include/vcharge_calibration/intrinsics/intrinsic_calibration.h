@@ -10,32 +10,18 @@
 #include <opencv2/core.hpp>
 
 #include "vcharge_calibration/boards/calibration_board.h"
+#include "vcharge_core/base/options.h"
 #include "vcharge_core/camera/camera_model.h"
 
 namespace vcharge {
 
-/// Options of calibrateIntrinsics.
+/// Options of calibrateIntrinsics().
 struct IntrinsicCalibrationOptions {
-  std::string model = "mei";      ///< or kannala_brandt, pinhole
-  int min_views = 5;              ///< fewer boards are no calibration
-  double max_view_error = 6.0;    ///< RMS error of a view over the usual one; a view above is left out
-  double max_edge_width = 2.0;    ///< width of a view's edges over the usual one; a view above is blurred
-  double max_corner_error = 5.0;  ///< error of a corner over its view's; a corner above is left out
-  /// Part by which bent boards must explain the errors better than chance before boards count as bent.
-  double min_bending_significance = 3.0;
-  int cross_validation_folds = 10;  ///< parts into which the views are split
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("model", model);
-    visit("min_views", min_views);
-    visit("max_view_error", max_view_error);
-    visit("max_edge_width", max_edge_width);
-    visit("max_corner_error", max_corner_error);
-    visit("min_bending_significance", min_bending_significance);
-    visit("cross_validation_folds", cross_validation_folds);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(IntrinsicCalibrationOptions);
+  VCHARGE_OPTION(std::string, model, "mei", anyValue(), "Camera model: mei, kannala_brandt or pinhole.");
+  VCHARGE_OPTION(int, min_views, 5, atLeast(3), "Smallest number of images with a board.");
+  VCHARGE_END_OPTIONS();
+  void checkFields() const { CameraModel::parameterNames(model); }
 };
 
 /// A gray image to calibrate from.

@@ -8,29 +8,17 @@
 #include "vcharge_calibration/boards/calibration_board.h"
 #include "vcharge_calibration/intrinsics/image_coverage.h"
 #include "vcharge_calibration/intrinsics/intrinsic_calibration.h"
+#include "vcharge_core/base/options.h"
 #include "vcharge_core/camera/camera_model.h"
 
 namespace vcharge {
 
-/// Options of ViewCollector. Lengths in the image are over its longer side.
 struct ViewCollectorOptions {
-  double max_motion = 0.004;     ///< of the board's corners since the last image: it must be held still
-  double min_difference = 0.06;  ///< of the corners from those of any view taken, unless it shows a new part
-  int enough_views = 25;
-  double enough_coverage = 0.7;  ///< share of the image
-  int enough_tilted = 6;         ///< views in which the board is tilted
-  int max_views = 100;           ///< then nothing more is taken
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("max_motion", max_motion);
-    visit("min_difference", min_difference);
-    visit("enough_views", enough_views);
-    visit("enough_coverage", enough_coverage);
-    visit("enough_tilted", enough_tilted);
-    visit("max_views", max_views);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(ViewCollectorOptions);
+  VCHARGE_OPTION(int, enough_views, 25, atLeast(5), "Number of images to collect.");
+  VCHARGE_OPTION(double, enough_coverage, 0.7, above(0.0).upTo(1.0), "Fraction of the image to cover.");
+  VCHARGE_OPTION(int, enough_tilted, 6, notNegative(), "Number of images of the tilted board to collect.");
+  VCHARGE_END_OPTIONS();
 };
 
 /// Selects from a stream of images those that show a static board in a new pose, until there are enough to

@@ -2,6 +2,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "vcharge_core/base/options.h"
 #include "vcharge_core/camera/camera_model.h"
 #include "vcharge_core/camera/camera_rig.h"
 
@@ -9,17 +10,15 @@ namespace vcharge {
 
 /// Size and focal length of the working camera.
 struct WorkingCameraOptions {
-  double image_scale = 0.5;  ///< size of the working image over the size of the sensor's
-  int width_px = 0;          ///< its width, whatever the sensor's, but no larger; 0: image_scale counts
-  double focal_scale = 1.0;  ///< below 1 keeps more of the rim that undistortion pushes outwards
+  VCHARGE_BEGIN_OPTIONS(WorkingCameraOptions);
+  VCHARGE_OPTION(double, image_scale, 0.5, above(0.0).upTo(1.0),
+                 "Ratio of the working image's size to the sensor's; unused if width_px is set.");
+  VCHARGE_OPTION(int, width_px, 0, notNegative(),
+                 "Largest width of the working image; 0: set by image_scale.");
+  VCHARGE_OPTION(double, focal_scale, 1.0, above(0.0).upTo(4.0),
+                 "Factor of the focal length; below 1, more of the rim is kept.");
+  VCHARGE_END_OPTIONS();
 
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("image_scale", image_scale);
-    visit("width_px", width_px);
-    visit("focal_scale", focal_scale);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
   /// Ratio of the working image's size to the sensor's, in (0, 1].
   double scaleOf(cv::Size sensor_size_px) const;
 };

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
+#include "vcharge_core/base/options.h"
 #include "vcharge_core/files/content_hash.h"
 
 namespace vcharge {
@@ -39,27 +40,16 @@ double interpolateHeight(const HeightMap& map, const Eigen::Vector2d& place_m);
 enum class CellState : uint8_t { kDrivable, kObstacle, kUnobserved };
 
 struct DrivabilityOptions {
-  double max_step_m = 0.08;    ///< between neighbouring cells; a higher one is an obstacle
-  double step_reach_m = 0.1;   ///< cells this near to a step belong to it: smoothing spreads it over some
-  double max_slope = 0.25;     ///< rise over run across slope_reach_m
-  double slope_reach_m = 0.3;  ///< over which the slope is taken
-  /// Of a drivable cell: what is less sure is smoothed between its neighbours, as the ground under a car.
-  double min_confidence = 0.01;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("max_step_m", max_step_m);
-    visit("step_reach_m", step_reach_m);
-    visit("max_slope", max_slope);
-    visit("slope_reach_m", slope_reach_m);
-    visit("min_confidence", min_confidence);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(DrivabilityOptions);
+  VCHARGE_OPTION(double, max_step_m, 0.08, positive(), "Highest step that the vehicle can drive over.");
+  VCHARGE_OPTION(double, max_slope, 0.25, positive(),
+                 "Steepest slope that the vehicle can drive, rise over run.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// CV_8UC1 of CellState. A cell is an obstacle if it is solid, if heights within step_reach_m differ by more
-/// than max_step_m, or if the surface rises by more than max_slope over slope_reach_m; otherwise it is
-/// unobserved if its height is unknown or its confidence too low.
+/// CV_8UC1 of CellState. A cell is an obstacle if it is solid, if heights near it differ by more than
+/// max_step_m, or if the surface rises by more than max_slope; otherwise it is unobserved if its height is
+/// unknown or its confidence too low.
 cv::Mat classifyCells(const HeightMap& map, const DrivabilityOptions& options);
 
 }  // namespace vcharge

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "vcharge_core/base/options.h"
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/motion/rigid_transform.h"
 
@@ -30,17 +31,12 @@ struct WheelTicks {
 };
 
 struct OdometryBufferOptions {
-  double max_gap_s = 0.25;         ///< neighbours further apart are not interpolated
-  double history_s = 60.0;         ///< older entries are forgotten; infinity keeps all
-  double reset_backwards_s = 1.0;  ///< a stamp this far before the newest starts over (a replayed bag)
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("max_gap_s", max_gap_s);
-    visit("history_s", history_s);
-    visit("reset_backwards_s", reset_backwards_s);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(OdometryBufferOptions);
+  VCHARGE_OPTION(double, max_gap_s, 0.25, positive(),
+                 "Longest interval between entries that is interpolated.");
+  VCHARGE_OPTION(double, history_s, 60.0, positive(),
+                 "Age at which entries are dropped; infinity keeps all.");
+  VCHARGE_END_OPTIONS();
 };
 
 /// Interpolates odometry between its stamps. Does not extrapolate: lookups outside the buffer or inside a gap

@@ -6,17 +6,6 @@
 
 namespace vcharge {
 
-/// Options of optimizeRobustly.
-struct RobustPoseGraphOptions {
-  int max_cycle_steps = 5;  ///< odometry steps between two loop edges that are compared, at either end
-  double max_edge_chi_squared =
-      16.0;  ///< a loop edge above is false, where the information matrices are right
-  /// The threshold is lowered to this many times the noise that consistent loop edges show, per degree of
-  /// freedom, where the information matrices understate how exact the edges are.
-  double noise_factor = 1600.0;
-  void validate() const;  ///< throws std::invalid_argument naming the field
-};
-
 /// Result of optimizeRobustly().
 struct RobustPoseGraphSummary {
   std::vector<bool> accepted;  ///< one per edge
@@ -35,6 +24,6 @@ struct RobustPoseGraphSummary {
 /// Fraundorfer, Pollefeys, "Robust pose-graph loop-closures with expectation-maximization", IROS 2013).
 /// 4. Least squares on all loop edges below a threshold, which is tightened until the set is stable.
 /// Throws InputError if the odometry does not connect all nodes. Deterministic.
-RobustPoseGraphSummary optimizeRobustly(const RobustPoseGraphOptions& options, PoseGraph* graph);
+RobustPoseGraphSummary optimizeRobustly(PoseGraph* graph);
 
 }  // namespace vcharge

@@ -21,8 +21,7 @@ struct MotionEstimate {
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   std::vector<int> inliers;  ///< indices of matches, ascending
   int num_iterations = 0;
-  double noise_rad = 0.0;                 ///< standard deviation of a ray's direction, from the inliers
-  double relative_scale_deviation = 0.0;  ///< standard deviation of the translation's length, relative to it
+  double noise_rad = 0.0;  ///< standard deviation of a ray's direction, from the inliers
 };
 
 /// True if at least the rotation and the direction of the motion are known.

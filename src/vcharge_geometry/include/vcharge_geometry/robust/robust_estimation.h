@@ -82,9 +82,11 @@ RobustResult estimateRobustly(const Problem& problem, const RobustOptions& optio
     takeIfBetter(problem.refined(wide, options.max_error_rad, max_steps));
     takeIfBetter(problem.refined(start, options.max_error_rad, max_steps));
   };
+  // A few more samples protect against a first model with many inliers by chance.
+  constexpr int kMinIterations = 10;
   double needed = options.max_iterations;
   while (best.num_iterations < options.max_iterations &&
-         (best.num_iterations < options.min_iterations || best.num_iterations < needed)) {
+         (best.num_iterations < kMinIterations || best.num_iterations < needed)) {
     ++best.num_iterations;
     std::array<int, static_cast<size_t>(Problem::kSampleSize)> sample;
     sampler.draw(sample.data());

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "vcharge_geometry/solvers/half_angle_roots.h"
 #include "vcharge_geometry/solvers/pluecker_line.h"
 #include "vcharge_geometry/solvers/polynomial.h"
 
