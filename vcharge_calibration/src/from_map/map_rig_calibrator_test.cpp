@@ -1,5 +1,4 @@
-// Calibration in an analytic map: a front and a left camera whose places nobody told, on a car that weaves
-// along the map's circle.
+// Calibration of a front and a left camera in an analytic map, on a car that weaves along the map's circle.
 #include "vcharge_calibration/from_map/map_rig_calibrator.h"
 
 #include <cmath>
@@ -23,7 +22,7 @@ constexpr double kDegree = 0.017453292519943295;
 
 struct TestDrive {
   int num_keyframes = 110;
-  double weave_rad = 0.5;       ///< of the heading, to both sides of the circle's
+  double weave_rad = 0.5;       ///< amplitude of the heading
   double odometry_scale = 1.0;  ///< counted over true distance
   int covered_camera = -1;
   bool is_elsewhere = false;
@@ -39,7 +38,7 @@ class MapRigCalibratorTest : public ::testing::Test {
   }
   static void TearDownTestSuite() { delete map_; }
 
-  /// The map's rig without its extrinsics: those are to be found.
+  /// The map's rig without extrinsics.
   static CameraRig bareRig() {
     CameraRig rig = (*map_)->rig();
     for (RigCamera& camera : rig.cameras) {

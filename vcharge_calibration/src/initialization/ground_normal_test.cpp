@@ -16,7 +16,7 @@ constexpr int kNumKeyframes = 10;
 constexpr double kStep_m = 0.5;
 
 struct StraightDrive {
-  MappingData data;
+  ReconstructionData data;
   std::vector<MotionPair> motions;
   Eigen::Vector3d up_in_camera;
 };

@@ -78,10 +78,9 @@ TEST(PlanarHandEyeTest, BearsNoiseAndWrongMotions) {
   drive.wrong_share = 0.2;
   const HandEye found = solvePlanarHandEye(makeMotions(drive), HandEyeOptions());
   ASSERT_EQ(found.status, HandEyeStatus::kOk);
-  // 160 motions of 0.57 degrees: four standard deviations of the mean, and what the wrong ones pull.
+  // 160 motions of 0.57 degrees: four standard deviations of the mean, and the bias of outliers.
   EXPECT_LT(angleBetween(found.vehicle_from_camera, truePlace()), 0.4 * kDegree);
-  // A motion's direction tells the place to 0.01 x 0.5 m / 0.06 at best: 8 cm over the root of 160, six
-  // times.
+  // A direction gives the position to 0.01 x 0.5 m / 0.06 = 8 cm at best; over the root of 160, six times.
   EXPECT_LT((found.vehicle_from_camera.translation() - truePlace().translation()).norm(), 0.04);
   EXPECT_LT(found.num_inliers, found.num_motions);
 }
@@ -92,7 +91,7 @@ TEST(PlanarHandEyeTest, TellsStraightDrivesFromTurns) {
   drive.noise_rad = 0.002;
   const HandEye found = solvePlanarHandEye(makeMotions(drive), HandEyeOptions());
   EXPECT_EQ(found.status, HandEyeStatus::kNoTurn);
-  // Straight ahead is seen all the same.
+  // The direction of travel needs no turn.
   const Eigen::Vector3d ahead = truePlace().rotation().conjugate() * Eigen::Vector3d::UnitX();
   EXPECT_LT(std::acos(found.travel_in_camera.dot(ahead)), 0.002);
 }

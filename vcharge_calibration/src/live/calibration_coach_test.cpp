@@ -225,9 +225,6 @@ TEST(CalibrationCoachTest, RefusesBadOptionsByName) {
     }
   };
   refuse("enough_turn_rad", [](auto* options) { options->enough_turn_rad = 0.0; });
-  refuse("revisit_gap_m", [](auto* options) { options->revisit_gap_m = options->revisit_radius_m; });
-  refuse("min_seen_share", [](auto* options) { options->min_seen_share = 1.5; });
-  refuse("num_groups", [](auto* options) { options->num_groups = 3; });
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ std::shared_ptr<const CameraRig> oneCamera() {
   return std::make_shared<const CameraRig>(rig);
 }
 
-/// A session without images: all its calibrations fail, at once.
+/// A session without images, whose calibrations fail at once.
 class RigCalibrationSessionTest : public testing::Test {
  protected:
   std::unique_ptr<RigCalibrationSession> makeSession(
@@ -41,7 +41,7 @@ class RigCalibrationSessionTest : public testing::Test {
     return std::make_unique<RigCalibrationSession>(
         oneCamera(), RigCalibratorOptions(), options,
         [this](const RigCalibrationSession::Status& /*status*/) { ++num_told_; },
-        [](const MappingState& /*state*/, const CameraRig& /*guess*/) {},
+        [](const ReconstructionState& /*state*/, const CameraRig& /*guess*/) {},
         [this](const FinishedCalibration& work) { on_result_(work); });
   }
 
@@ -53,7 +53,7 @@ class RigCalibrationSessionTest : public testing::Test {
     return session.status().phase;
   }
 
-  /// Until what ran before lets it.
+  /// Retries until the previous calibration has ended.
   static bool beginToCalibrate(RigCalibrationSession* session) {
     std::string message;
     for (int i = 0; i < 1000; ++i) {

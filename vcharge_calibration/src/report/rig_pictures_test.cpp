@@ -169,7 +169,7 @@ TEST(BirdViewTest, SeamsAreBetweenNeighboursAndGrowWithDistance) {
 
 /// Two cameras at one keyframe that see points as far away as the sky.
 struct FarPoints {
-  MappingData data;
+  ReconstructionData data;
   KeyframeImages images;
 
   FarPoints() {
@@ -249,11 +249,11 @@ TEST(RigPicturesTest, MeanErrorsAreThoseOfTheirCells) {
   EXPECT_LT((means[0].error_px - Eigen::Vector2d(0.5, 0.0)).norm(), 1e-9);
 }
 
-TEST(RigPicturesTest, SightingsHaveALinePerCameraThatSeesALandmark) {
-  const std::vector<LandmarkSightings> landmarks = {{{5.0, 5.0, 0.0}, 0, {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0}}},
-                                                    {{6.0, 5.0, 0.0}, 1, {}}};
+TEST(RigPicturesTest, DrawsALineFromEachLandmarkToItsCameras) {
+  const std::vector<LandmarkViews> landmarks = {{{5.0, 5.0, 0.0}, 0, {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0}}},
+                                                {{6.0, 5.0, 0.0}, 1, {}}};
   const std::string picture =
-      drawSightings(landmarks, {{0.0, 0.0, 0.0}, {2.0, 0.0, 0.0}}, {"front", "<left>"});
+      drawLandmarkViews(landmarks, {{0.0, 0.0, 0.0}, {2.0, 0.0, 0.0}}, {"front", "<left>"});
   const auto count = [&](const std::string& text) {
     size_t found = 0;
     for (size_t at = picture.find(text); at != std::string::npos; at = picture.find(text, at + 1)) {
@@ -269,7 +269,7 @@ TEST(RigPicturesTest, SightingsHaveALinePerCameraThatSeesALandmark) {
 /// A page of a drive that passed or failed.
 std::string makePage(bool passed) {
   FarPoints scene;
-  MappingState state;
+  ReconstructionState state;
   state.data = scene.data;
   state.data.keyframes.resize(2);
   state.data.keyframes[1].map_from_vehicle = RigidTransform::planar(5.0, 0.0, 0.0);

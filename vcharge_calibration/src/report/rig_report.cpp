@@ -52,8 +52,8 @@ std::string summaryOf(const RigCalibration& result) {
          rowOf({"height", result.height_source}) + "</table>";
 }
 
-/// Name, and each degree of freedom with its standard deviation: yaw, pitch and roll are those of a camera
-/// that was turned forwards.
+/// A row with each degree of freedom and its standard deviation; the angles are zero for an upright camera
+/// that looks forward.
 std::string parametersOf(const RigCalibration& result) {
   std::string text =
       "<h2>Places of the cameras</h2><p>Axes of the vehicle: x forwards, y to the left, z up. " +
@@ -66,8 +66,8 @@ std::string parametersOf(const RigCalibration& result) {
             true);
   for (size_t i = 0; i < result.cameras.size(); ++i) {
     const CameraCalibration& camera = result.cameras[i];
-    const Eigen::Matrix<double, 6, 1> values = placeAndAngles(*result.rig->cameras[i].vehicle_from_camera);
-    const Eigen::Matrix<double, 6, 1> sigmas = placeAndAngleSigmas(camera.covariance);
+    const Eigen::Matrix<double, 6, 1> values = positionAndAngles(*result.rig->cameras[i].vehicle_from_camera);
+    const Eigen::Matrix<double, 6, 1> sigmas = positionAndAngleSigmas(camera.covariance);
     std::vector<std::string> cells{camera.name};
     for (int k = 0; k < 6; ++k) {
       const int digits = k < 3 ? 2 : 3;
@@ -101,7 +101,7 @@ std::string row(const std::string& figures) {
   return "<div class=\"row\">" + figures + "</div>";
 }
 
-std::string mapsOf(const RigCalibration& result, const MappingState& state) {
+std::string mapsOf(const RigCalibration& result, const ReconstructionState& state) {
   std::string figures;
   if (result.first_scene != nullptr) {
     figures += htmlFigure(drawSparseMap(*result.first_scene),
@@ -162,7 +162,7 @@ std::string seamsOf(const RigCalibration& result, const KeyframeImages& images) 
   return text + "</table>";
 }
 
-std::string sharedOf(const MappingState& state, const KeyframeImages& images) {
+std::string sharedOf(const ReconstructionState& state, const KeyframeImages& images) {
   std::string text;
   for (const CameraPairView& pair : findCameraPairViews(state.data, images)) {
     const auto nameOf = [&](size_t camera, int32_t keyframe) {
@@ -180,7 +180,7 @@ std::string sharedOf(const MappingState& state, const KeyframeImages& images) {
                    row(text);
 }
 
-std::string errorsOf(const MappingState& state) {
+std::string errorsOf(const ReconstructionState& state) {
   std::string maps, vectors;
   const std::vector<std::vector<CornerError>> errors = errorsByCamera(state.data);
   for (size_t i = 0; i < errors.size(); ++i) {
@@ -198,8 +198,9 @@ std::string errorsOf(const MappingState& state) {
 
 }  // namespace
 
-std::string makeRigReport(const std::string& title, const RigCalibration& result, const MappingState& state,
-                          const KeyframeImages& images, const std::string& more_sections) {
+std::string makeRigReport(const std::string& title, const RigCalibration& result,
+                          const ReconstructionState& state, const KeyframeImages& images,
+                          const std::string& more_sections) {
   std::string body = verdictOf(result) + summaryOf(result);
   if (result.rig != nullptr) {
     body += parametersOf(result) +
@@ -207,7 +208,7 @@ std::string makeRigReport(const std::string& title, const RigCalibration& result
                            "Cameras and their directions from above; the vehicle drives to the right.")) +
             checksOf(result);
   }
-  // After a failure there may be poses and landmarks all the same, which show what is wrong.
+  // After a failure existing poses and landmarks help to find the reason.
   if (state.data.rig != nullptr && state.data.rig->hasExtrinsics() && !state.data.keyframes.empty()) {
     body += mapsOf(result, state);
     body += result.rig != nullptr ? seamsOf(result, images) : "";

@@ -9,15 +9,15 @@ namespace vcharge {
 namespace {
 
 constexpr double kDegrees = 57.29577951308232;
-// Standard deviations with which a calibration is good, and with which it is of no use.
+// Standard deviations of a good and of a useless calibration.
 constexpr double kGoodSigma_m = 0.01, kBadSigma_m = 0.05;
 constexpr double kGoodSigma_rad = 0.1 / kDegrees, kBadSigma_rad = 0.5 / kDegrees;
-// Between the halves of the drive.
+// Differences between the halves of the drive.
 constexpr double kMaxHalfSigmas = 4.0;
 constexpr double kBadHalf_m = 0.10, kBadHalf_rad = 0.5 / kDegrees;
-// Share of the errors that neighbours have in common: lenses that are not as their parameters say.
+// Ratio of the errors that neighbours have in common: wrong intrinsics.
 constexpr double kWarnStructure = 0.4, kFailStructure = 0.7;
-// Share of its points that fit, against the median of the other cameras.
+// Ratio of a camera's observations that fit, over the median of the other cameras.
 constexpr double kWarnFit = 0.75, kFailFit = 0.65;
 constexpr double kMinTurn_rad = 90.0 / kDegrees;
 constexpr double kMinDistance_m = 50.0;
@@ -47,7 +47,7 @@ class RigJudge {
  private:
   void remark(Verdict grade, const std::string& text) { found_.emplace_back(grade, text); }
 
-  /// One remark per degree of freedom, of all cameras of which it is known too little.
+  /// One remark per degree of freedom with all cameras where it is too uncertain.
   void judgeSigmas() {
     const char* const names[] = {"forwards", "sideways", "height", "roll", "pitch", "yaw"};
     for (const CameraCalibration& camera : result_->cameras) {
@@ -79,7 +79,7 @@ class RigJudge {
     for (int i = 0; i < 6; ++i) {
       const double difference = std::abs(camera.half_difference[i]);
       const double limit = i < 3 ? kGoodSigma_m : kGoodSigma_rad;
-      // Each half has twice the variance of the whole.
+      // Each half has twice the variance of the whole drive.
       const double sigmas = difference / (2.0 * std::sqrt(std::max(1e-18, camera.covariance(i, i))));
       if (difference > (i < 3 ? kBadHalf_m : kBadHalf_rad)) {
         remark(Verdict::kFail,
@@ -105,7 +105,7 @@ class RigJudge {
              "camera '" + camera.name + "': errors go together over the image (" + toText(100.0 * share, 0) +
                  " % of them): its intrinsics are wrong. Calibrate the intrinsics anew");
     }
-    // A map joins its cameras whatever they share.
+    // A map connects the cameras even without shared landmarks.
     if (camera.num_shared_landmarks < kMinShared && result_->cameras.size() > 1 && !result_->is_from_map) {
       remark(Verdict::kWarn,
              "camera '" + camera.name + "' shares only " + std::to_string(camera.num_shared_landmarks) +
@@ -113,7 +113,7 @@ class RigJudge {
     }
   }
 
-  /// Wrong intrinsics bend the camera's place until what fits fits well: the rest was left out.
+  /// With wrong intrinsics few observations fit, and those fit well: the others were removed.
   void judgeFit() {
     const auto shareOf = [](const CameraCalibration& camera) {
       return static_cast<double>(camera.num_observations) /
@@ -127,7 +127,7 @@ class RigJudge {
         }
       }
       if (others.size() < 2) {
-        return;  // two cameras may differ by what they look at
+        return;  // two cameras may differ by what they see
       }
       std::sort(others.begin(), others.end());
       const double usual = others[others.size() / 2];

@@ -6,7 +6,7 @@
 namespace vcharge {
 namespace {
 
-/// A drive and three cameras without fault.
+/// A good calibration of three cameras.
 RigCalibration makeGood() {
   RigCalibration result;
   result.distance_m = 150.0;

@@ -37,7 +37,7 @@ TEST(TriangulationTest, RefusesRaysThatAreParallelMeetBehindMissEachOtherOrTooFe
 }
 
 TEST(TriangulationTest, TracksBearAnObservationThatSlippedAway) {
-  MappingData data = testing::makeTestDrive(testing::TestDriveOptions());
+  ReconstructionData data = testing::makeTestDrive(testing::TestDriveOptions());
   const std::vector<Track> truth = data.tracks;
   for (Track& track : data.tracks) {
     track.position_m.reset();

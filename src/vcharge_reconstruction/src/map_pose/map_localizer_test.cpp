@@ -16,7 +16,7 @@ std::shared_ptr<const CameraRig> rigOf(const std::shared_ptr<const SparseMap>& m
   return std::shared_ptr<const CameraRig>(map, &map->rig());
 }
 
-/// Half way between two keyframes, a little beside.
+/// A pose half way between two keyframes, slightly beside the path.
 RigidTransform posesBetween(const SparseMap& map, size_t keyframe) {
   const RigidTransform between = interpolate(map.keyframes()[keyframe].map_from_vehicle,
                                              map.keyframes()[keyframe + 1].map_from_vehicle, 0.5);
@@ -47,7 +47,7 @@ class MapLocalizerTest : public ::testing::Test {
 TEST_F(MapLocalizerTest, FindsThePoseNearAnExpectedOne) {
   for (const double wrong : {0.0, 0.4}) {
     testing::TestViewOptions view;
-    view.share_of_wrong = wrong;
+    view.wrong_ratio = wrong;
     for (size_t keyframe = 2; keyframe + 2 < map_->keyframes().size(); keyframe += 5) {
       const RigidTransform truth = posesBetween(*map_, keyframe);
       const PoseFix fix =
@@ -155,13 +155,13 @@ TEST(MapLocalizerTwinsTest, TwoPlacesThatLookAlikeAreAmbiguous) {
   const PoseFix fix = localizer.localizeAnywhere(features);
   EXPECT_EQ(fix.status, LocalizationStatus::kAmbiguous);
   EXPECT_GT(fix.second_best_ratio, 0.7);
-  // Who knows where it is, is not confused.
+  // A prior resolves the ambiguity.
   const PoseFix expected = localizer.localizeNear(features, priorAbout(truth, 0.1, 0.0));
   EXPECT_EQ(expected.status, LocalizationStatus::kLocalized);
   EXPECT_LT(positionError(expected, truth), 0.02);
 }
 
-/// A quarter of the size: a pixel is four times as wide, and features are found to half a pixel as ever.
+/// A quarter of the image size: pixels are four times as wide, features still accurate to half a pixel.
 TEST(MapLocalizerSizeTest, SmallImagesAreGivenTheirPixels) {
   SparseMapContents contents = testing::makeTestMap({})->contents();
   contents.rig = parseCameraRig(R"(cameras:
@@ -192,7 +192,7 @@ TEST(MapLocalizerSizeTest, SmallImagesAreGivenTheirPixels) {
   }
 }
 
-/// What a view of the map with bits shows, where the descriptors are the bits as numbers 0 and `one`.
+/// A view of the map with the bits of the descriptors as numbers 0 and `one`.
 RigFeatures withNumbers(RigFeatures features, float one) {
   for (ImageFeatures& image : features.images) {
     image.descriptors = testing::descriptorsAsNumbers(image.descriptors, one);
@@ -200,12 +200,12 @@ RigFeatures withNumbers(RigFeatures features, float one) {
   return features;
 }
 
-/// Descriptors of numbers have other distances: those of SIFT are hundreds, those of RootSIFT about 1.
+/// Distances depend on the descriptor: hundreds for SIFT, about 1 for RootSIFT.
 TEST(MapLocalizerDescriptorTest, NumbersLocalizeAsBitsDo) {
   const auto map = testing::makeTestMap({});
   const RigidTransform truth = posesBetween(*map, 8);
   testing::TestViewOptions view;
-  view.share_of_wrong = 0.3;
+  view.wrong_ratio = 0.3;
   const RigFeatures bits = testing::makeTestView(*map, truth, view);
   const PoseFix by_bits = MapLocalizer(map, rigOf(map)).localizeNear(bits, priorAbout(truth, 0.1, 0.0));
   ASSERT_EQ(by_bits.status, LocalizationStatus::kLocalized);
@@ -224,7 +224,7 @@ TEST(MapLocalizerDescriptorTest, NumbersLocalizeAsBitsDo) {
     EXPECT_LT(positionError(anywhere, truth), 0.03);
     const RigFeatures foreign = withNumbers(testing::makeForeignView(*map, 3), one);
     EXPECT_NE(localizer.localizeAnywhere(foreign).status, LocalizationStatus::kLocalized);
-    // The limit counts: what differs as much as two landmarks do is no match.
+    // Descriptors as different as those of two landmarks are no match.
     EXPECT_LT(localizer.localizeNear(foreign, priorAbout(truth, 0.0, 0.0)).num_matches, 10);
   }
 }
