@@ -79,7 +79,7 @@ class MapRigCalibratorTest : public ::testing::Test {
 };
 std::shared_ptr<const SparseMap>* MapRigCalibratorTest::map_ = nullptr;
 
-TEST_F(MapRigCalibratorTest, FindsTheCamerasWithTheMapsScaleWhateverTheOdometerCounts) {
+TEST_F(MapRigCalibratorTest, FindsTheExtrinsicsInTheScaleOfTheMap) {
   TestDrive weaving;
   weaving.odometry_scale = 1.02;
   const auto calibrator = drive(weaving);
@@ -112,7 +112,7 @@ TEST_F(MapRigCalibratorTest, GivesTheSameBitsOnOneThread) {
   }
 }
 
-TEST_F(MapRigCalibratorTest, NamesTheCameraThatIsCovered) {
+TEST_F(MapRigCalibratorTest, NamesACoveredCamera) {
   TestDrive covered;
   covered.covered_camera = 1;
   covered.num_keyframes = 30;
@@ -123,7 +123,7 @@ TEST_F(MapRigCalibratorTest, NamesTheCameraThatIsCovered) {
   EXPECT_EQ(result.rig, nullptr);
 }
 
-TEST_F(MapRigCalibratorTest, RefusesADriveElsewhere) {
+TEST_F(MapRigCalibratorTest, RefusesADriveInAnotherPlace) {
   TestDrive elsewhere;
   elsewhere.is_elsewhere = true;
   elsewhere.num_keyframes = 30;
@@ -147,7 +147,7 @@ TEST_F(MapRigCalibratorTest, AsksForTurns) {
   EXPECT_THAT(result.remarks.at(0), HasSubstr("no turn"));
 }
 
-TEST_F(MapRigCalibratorTest, AnEmptyDriveIsToldAsSuch) {
+TEST_F(MapRigCalibratorTest, ReportsAnEmptyDrive) {
   MapRigCalibrator calibrator(*map_, bareRig(), MapRigCalibratorOptions());
   const RigCalibration result = calibrator.finish(nullptr);
   EXPECT_EQ(result.verdict, Verdict::kFail);

@@ -84,7 +84,7 @@ TEST(GroundNormalTest, IsFoundBesideAWallWithMorePoints) {
       << up->transpose() << ", expected " << drive.up_in_camera.transpose();
 }
 
-TEST(GroundNormalTest, IsNotMadeUpWithoutGround) {
+TEST(GroundNormalTest, IsEmptyWithoutGround) {
   SceneOptions scene;
   scene.num_ground = 0;
   const StraightDrive wall = makeStraightDrive(scene);

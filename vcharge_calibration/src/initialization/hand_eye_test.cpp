@@ -72,7 +72,7 @@ TEST(PlanarHandEyeTest, FindsTheTruthWithoutNoise) {
   EXPECT_EQ(found.num_inliers, found.num_motions);
 }
 
-TEST(PlanarHandEyeTest, BearsNoiseAndWrongMotions) {
+TEST(PlanarHandEyeTest, HandlesNoiseAndOutliers) {
   Drive drive;
   drive.noise_rad = 0.01;
   drive.wrong_share = 0.2;
@@ -85,7 +85,7 @@ TEST(PlanarHandEyeTest, BearsNoiseAndWrongMotions) {
   EXPECT_LT(found.num_inliers, found.num_motions);
 }
 
-TEST(PlanarHandEyeTest, TellsStraightDrivesFromTurns) {
+TEST(PlanarHandEyeTest, DetectsALackOfTurns) {
   Drive drive;
   drive.turn_rad = 0.0;
   drive.noise_rad = 0.002;
@@ -96,7 +96,7 @@ TEST(PlanarHandEyeTest, TellsStraightDrivesFromTurns) {
   EXPECT_LT(std::acos(found.travel_in_camera.dot(ahead)), 0.002);
 }
 
-TEST(PlanarHandEyeTest, TellsTooFewMotions) {
+TEST(PlanarHandEyeTest, DetectsTooFewMotions) {
   Drive drive;
   drive.num_motions = 5;
   EXPECT_EQ(solvePlanarHandEye(makeMotions(drive), HandEyeOptions()).status, HandEyeStatus::kTooFewMotions);
@@ -109,7 +109,7 @@ TEST(PlanarHandEyeTest, RefusesMotionsThatContradictTheOdometer) {
   EXPECT_NE(found.status, HandEyeStatus::kOk);
 }
 
-TEST(PlanarHandEyeTest, TurnsRoundWithAnOdometerThatCountsBackwards) {
+TEST(PlanarHandEyeTest, FacesBackwardsWithAReversedOdometer) {
   std::vector<MotionPair> motions = makeMotions(Drive());
   for (MotionPair& motion : motions) {
     motion.vehicle = RigidTransform(motion.vehicle.rotation(), -motion.vehicle.translation());

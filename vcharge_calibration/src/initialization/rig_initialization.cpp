@@ -74,10 +74,10 @@ void describeDrive(const ReconstructionState& state, RigCalibration* result) {
   const ReconstructionReport& report = state.report;
   if (2 * report.num_frames_without_odometry > report.num_frames) {
     throw NotCalibrated{
-        {"most images have no odometry at their time: are the clocks of cameras and odometer the same?"}};
+        {"most images have no odometry at their stamps: do cameras and odometer use the same clock?"}};
   }
   if (keyframes.empty()) {
-    throw NotCalibrated{{"no images came with the drive"}};
+    throw NotCalibrated{{"no images in the drive"}};
   }
   if (result->distance_m < kMinDistance_m) {
     throw NotCalibrated{{"the vehicle stood: by the odometer it moved " + toText(result->distance_m, 1) +

@@ -44,7 +44,7 @@ ReconstructionState makeState(double late_s, int num_frames) {
   return state;
 }
 
-TEST(OdometrySeriesTest, ReadsBetweenFrames) {
+TEST(OdometrySeriesTest, InterpolatesBetweenFrames) {
   const ReconstructionState state = makeState(0.0, 60);
   const OdometrySeries series(state);
   const Timestamp stamp = state.frames[20].stamp;
@@ -87,7 +87,7 @@ TEST(TimeOffsetTest, IsFoundFromAdjustedKeyframes) {
   }
 }
 
-TEST(TimeOffsetTest, StraightAheadAtOneSpeedTellsNothing) {
+TEST(TimeOffsetTest, IsUnknownAtConstantSpeed) {
   ReconstructionState state;
   for (int i = 0; i < 50; ++i) {
     Keyframe keyframe;

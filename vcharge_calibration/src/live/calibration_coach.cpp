@@ -17,9 +17,8 @@ namespace {
 /// A revisit is nearer than the radius to an earlier part, after at least the gap in between.
 constexpr double kRevisitRadius_m = 4.0;
 constexpr double kRevisitGap_m = 25.0;
-/// Ratio of the steps in which a camera must see its motion, once there are this many steps.
+/// Ratio of the steps in which the motion of a camera must be known.
 constexpr double kMinSeenRatio = 0.3;
-constexpr int kMinSteps = 20;
 /// Jackknife: length of parts with independent errors, and groups of parts that are left out once each.
 constexpr double kSegment_m = 5.0;
 constexpr int kNumGroups = 10;
@@ -185,10 +184,9 @@ void CalibrationCoach::judgeSigmas(DriveOutlook* outlook, std::vector<double>* s
   outlook->missing.push_back(
       "turn tightly to both sides: " +
       (!std::isfinite(sigma)
-           ? "the place of " + who + " cannot be told yet"
-           : who + ", " + names[what] + ", is known to " +
-                 (what < 3 ? toText(100.0 * sigma, 0) + " cm" : toText(kDegrees * sigma, 1) + " degrees") +
-                 " only"));
+           ? "the position of " + who + " is still unknown"
+           : who + ", " + names[what] + ", is known only to " +
+                 (what < 3 ? toText(100.0 * sigma, 0) + " cm" : toText(kDegrees * sigma, 1) + " degrees")));
 }
 
 /// Requirements in order of importance: blind cameras, which no manoeuvre helps, then turns, distance,
@@ -203,7 +201,7 @@ void CalibrationCoach::judge(DriveOutlook* outlook) const {
   drive.num_keyframes = num_steps + 1;
   for (const CameraOutlook& camera : outlook->cameras) {
     HandEye hand_eye = camera.hand_eye;
-    if (num_steps >= kMinSteps && hand_eye.num_motions < kMinSeenRatio * num_steps) {
+    if (num_steps >= options_.min_steps && hand_eye.num_motions < kMinSeenRatio * num_steps) {
       hand_eye.status = HandEyeStatus::kTooFewMotions;
     } else if (hand_eye.status != HandEyeStatus::kNoAgreement) {
       continue;
@@ -226,11 +224,11 @@ void CalibrationCoach::judge(DriveOutlook* outlook) const {
                       " m more");
   }
   if (revisited_m_ < options_.enough_revisited_m) {
-    missing.push_back("come past a place again" +
-                      (places_.empty()
-                           ? ""
-                           : ": where the drive began is " + directionTo(places_.back().odom_from_vehicle,
-                                                                         places_.front().odom_from_vehicle)));
+    missing.push_back(
+        "revisit a place" +
+        (places_.empty() ? ""
+                         : ": the start of the drive is " + directionTo(places_.back().odom_from_vehicle,
+                                                                        places_.front().odom_from_vehicle)));
     shares.push_back(revisited_m_ / options_.enough_revisited_m);
   }
   judgeSigmas(outlook, &shares);

@@ -19,7 +19,7 @@ InterCameraOptions makeOptions() {
   return options;
 }
 
-TEST(InterCameraMatchingTest, FindsWhatTheNeighbourSawNowAndBefore) {
+TEST(InterCameraMatchingTest, FindsLandmarksOfTheNeighbour) {
   WallScene scene;
   const int64_t num_found = matchBetweenCameras(makeOptions(), scene.images, &scene.data);
   EXPECT_GT(num_found, 60);
@@ -46,7 +46,7 @@ TEST(InterCameraMatchingTest, FindsWhatTheNeighbourSawNowAndBefore) {
   }
 }
 
-TEST(InterCameraMatchingTest, FindsThemWhereTheRigIsSomewhatWrong) {
+TEST(InterCameraMatchingTest, FindsLandmarksWithAnInaccurateRig) {
   WallScene scene;
   const auto truth = scene.data.rig;
   auto wrong = std::make_shared<CameraRig>(*truth);
@@ -68,7 +68,7 @@ TEST(InterCameraMatchingTest, FindsThemWhereTheRigIsSomewhatWrong) {
   EXPECT_LT(quantile(errors_px, 0.9), 0.8);
 }
 
-TEST(InterCameraMatchingTest, MissingImagesAndOneCameraAreBorne) {
+TEST(InterCameraMatchingTest, HandlesMissingImagesAndASingleCamera) {
   WallScene scene;
   EXPECT_EQ(matchBetweenCameras(makeOptions(), KeyframeImages::ofAllKeyframes(), &scene.data), 0);
   auto one = std::make_shared<CameraRig>();

@@ -89,7 +89,7 @@ TEST(LandmarkAlignmentTest, LeavesAWrongObservationWithLessWeight) {
   EXPECT_EQ(last.sigma_px, 0.8);
 }
 
-TEST(LandmarkAlignmentTest, WithoutImagesNothingMoves) {
+TEST(LandmarkAlignmentTest, ChangesNothingWithoutImages) {
   WallScene scene = makeScene();
   const std::vector<double> before_px = differencesOf(scene);
   EXPECT_EQ(alignLandmarks(LandmarkAlignmentOptions(), KeyframeImages::ofAllKeyframes(), &scene.data), 0);

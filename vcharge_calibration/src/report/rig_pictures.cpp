@@ -60,10 +60,9 @@ std::string drawLoopGraph(const ReconstructionState& state) {
     Segments edges;
   };
   // Accepted edges are drawn last.
-  Kind kinds[] = {
-      {"looked alike only", R"(stroke="#bbb" stroke-width="0.4" stroke-opacity="0.5")", "#bbb", {}},
-      {"accepted", R"(stroke="#2c8c4a" stroke-width="1.2")", "#2c8c4a", {}},
-      {"contradict the others", R"(stroke="#b3261e" stroke-width="1.4")", "#b3261e", {}}};
+  Kind kinds[] = {{"not verified", R"(stroke="#bbb" stroke-width="0.4" stroke-opacity="0.5")", "#bbb", {}},
+                  {"accepted", R"(stroke="#2c8c4a" stroke-width="1.2")", "#2c8c4a", {}},
+                  {"contradicting", R"(stroke="#b3261e" stroke-width="1.4")", "#b3261e", {}}};
   Points path;
   for (const Keyframe& keyframe : state.data.keyframes) {
     path.emplace_back(keyframe.map_from_vehicle.translation().head<2>());

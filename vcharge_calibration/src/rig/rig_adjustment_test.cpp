@@ -132,7 +132,7 @@ TEST(RigAdjustmentTest, FindsTheCamerasOfAKnownDrive) {
   }
 }
 
-TEST(RigAdjustmentTest, KnowsItsUncertainty) {
+TEST(RigAdjustmentTest, CovarianceMatchesTheErrors) {
   // Errors over their standard deviations, squared: mean of many drives near 1.
   Vector6d sum = Vector6d::Zero();
   constexpr int kDrives = 5;
@@ -177,7 +177,7 @@ TEST(RigAdjustmentTest, GivesTheSameBitsOnOneThread) {
   }
 }
 
-TEST(OdometryNoiseTest, IsThatOfTheDrive) {
+TEST(OdometryNoiseTest, MatchesTheDrive) {
   const ReconstructionData data = makeDrive(3, kNoise_px);
   RigAdjustmentOptions loose;
   const OdometryNoise noise = estimateOdometryNoise(loose, data);
@@ -185,7 +185,7 @@ TEST(OdometryNoiseTest, IsThatOfTheDrive) {
   EXPECT_NEAR(noise.sigma_rad, 0.0005, 0.00015);
 }
 
-TEST(OdometryNoiseTest, FindsTheWheelThatSlipped) {
+TEST(OdometryNoiseTest, DetectsSlippingWheels) {
   ReconstructionData data = makeDrive(3, kNoise_px);
   for (size_t i = 60; i < data.keyframes.size(); ++i) {
     RigidTransform& pose = data.keyframes[i].odom_from_vehicle;
@@ -215,7 +215,7 @@ TEST(GroundTest, FindsTheHeightOfACameraPutAtZero) {
   EXPECT_NEAR(*height_m, 0.9, 0.01);
 }
 
-TEST(GroundTest, TakesThePointsUnderThePathAlone) {
+TEST(GroundTest, UsesOnlyPointsUnderThePath) {
   const ReconstructionData data = makeDrive(5, 0.0);
   const std::vector<GroundPoint> ground = findGroundPoints(data, 0.15);
   EXPECT_GT(ground.size(), 100U);

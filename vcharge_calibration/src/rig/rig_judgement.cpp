@@ -170,14 +170,14 @@ std::string describeFailure(const std::string& camera, const HandEye& initial, c
   const std::string who = "camera '" + camera + "'";
   switch (initial.status) {
     case HandEyeStatus::kTooFewMotions:
-      return who + ": too few images in which points could be followed (" +
-             std::to_string(initial.num_motions) + " motions of " + std::to_string(drive.num_keyframes) +
+      return who + ": too few images with tracked points (" + std::to_string(initial.num_motions) +
+             " motions of " + std::to_string(drive.num_keyframes) +
              "): is it covered, dirty, or without light?";
     case HandEyeStatus::kNoTurn:
       return who + ": no turn: the drive turned " + toText(kDegrees * drive.left_turn_rad, 0) +
              " degrees to the left and " + toText(kDegrees * drive.right_turn_rad, 0) +
-             " to the right; straight ahead shows neither where a camera is nor its roll. Drive a figure of "
-             "eight";
+             " to the right; a straight drive shows neither the position of a camera nor its roll. "
+             "Drive a figure of eight";
     case HandEyeStatus::kNoAgreement:
       return who + ": its motions contradict the odometer's (" + std::to_string(initial.num_inliers) +
              " of " + std::to_string(initial.num_motions) +
@@ -209,9 +209,8 @@ std::string findWrongSign(const CameraRig& rig) {
     return "all cameras would hang upside down: the odometer's turns have the wrong sign";
   }
   if (num_named > 0 && num_round == num_named) {
-    return "all cameras would look the opposite way of their names: the odometer's direction of travel has "
-           "the "
-           "wrong sign";
+    return "all cameras would look opposite to their names: the odometer's direction of travel has the wrong "
+           "sign";
   }
   return "";
 }
@@ -226,10 +225,9 @@ void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, cons
   }
   countObservations(data, result);
   const auto num_ground = findGroundPoints(data, options.max_ground_distance_m).size();
-  result->height_source = "from " + std::to_string(num_ground) +
-                          " landmarks on the ground near the path, on which base_link stands in the mean";
+  result->height_source = "from " + std::to_string(num_ground) + " landmarks on the ground near the path";
   if (result->is_from_map) {
-    result->height_source += ", and from the ground on which the map's vehicle stood";
+    result->height_source += ", and from the ground of the map";
   }
   auto rig = std::make_shared<CameraRig>(*data.rig);
   const RigUncertainty uncertainty = rigUncertainty(options, priors, data);

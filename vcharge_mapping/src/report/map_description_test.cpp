@@ -20,7 +20,7 @@ TEST(MapDescriptionTest, TrajectoryHasThePosesOfTheKeyframes) {
             map.keyframes()[7].map_from_vehicle.translation());
 }
 
-TEST(MapDescriptionTest, CountsWhatTheMapHolds) {
+TEST(MapDescriptionTest, CountsTheContents) {
   const SparseMap map(makeAnalyticMap());
   const std::string text = describeMap(map, {{"bag", "drive.bag"}, {"options", "a: 1\nb: 2\n"}});
   EXPECT_THAT(text, HasSubstr("content hash  " + map.contentHash()));
@@ -49,7 +49,7 @@ TEST(MapDescriptionTest, MeasuresTheReprojectionError) {
             map.observations().size());
 }
 
-TEST(MapDescriptionTest, TellsOfAnEmptyMap) {
+TEST(MapDescriptionTest, DescribesAnEmptyMap) {
   SparseMapContents contents;
   contents.rig = makeAnalyticMap().rig;
   const SparseMap map(contents);

@@ -64,7 +64,7 @@ TEST_F(MapReportTest, AGoodMapHasNoRemarks) {
   EXPECT_THAT(judge().remarks, IsEmpty());
 }
 
-TEST_F(MapReportTest, RemarksOnEachFaultByItself) {
+TEST_F(MapReportTest, RemarksOnEachDefect) {
   contents_.loop_edges.clear();
   expect(MapGrade::kCheck, "no loop");
   contents_.loop_edges.assign(4, {0, 39, RigidTransform(), 30, true, ""});
@@ -100,7 +100,7 @@ TEST_F(MapReportTest, RemarksOnEachFaultByItself) {
   expect(MapGrade::kCheck, "odometer was reset");
 }
 
-TEST_F(MapReportTest, RemarksOnPlacesWithFewLandmarks) {
+TEST_F(MapReportTest, RemarksOnKeyframesWithFewLandmarks) {
   const SparseMapContents whole = contents_;
   for (const auto& [num_left, grade] : {std::make_pair(59, MapGrade::kCheck), {19, MapGrade::kBad}}) {
     // Limits the observations of the last 10 of 40 keyframes.
@@ -126,7 +126,7 @@ TEST_F(MapReportTest, RemarksOnPlacesWithFewLandmarks) {
   }
 }
 
-TEST_F(MapReportTest, ThePageShowsAllPartsAndNeedsNothingBesideIt) {
+TEST_F(MapReportTest, ThePageIsCompleteAndSelfContained) {
   contents_.loop_edges.push_back({3, 30, RigidTransform(), 10, false, "too uncertain"});
   state_.report.skipped = {
       {"without camera left", contents_.keyframes[3].stamp, contents_.keyframes[6].stamp, 4}};
@@ -149,7 +149,7 @@ TEST_F(MapReportTest, ThePageShowsAllPartsAndNeedsNothingBesideIt) {
   EXPECT_THAT(text, Not(HasSubstr("inf")));
 }
 
-TEST_F(MapReportTest, AVehicleThatStaysInOnePlaceMakesAPageToo) {
+TEST_F(MapReportTest, MakesAPageOfAStandingVehicle) {
   for (MapKeyframe& keyframe : contents_.keyframes) {
     keyframe.map_from_vehicle = RigidTransform();
   }

@@ -57,7 +57,7 @@ TEST(BundleAdjustmentTest, FindsPosesAndTheOdometersScale) {
   EXPECT_EQ(summary.num_removed_observations, 0);
 }
 
-TEST(BundleAdjustmentTest, RemovesWrongObservationsAndKeepsTheRest) {
+TEST(BundleAdjustmentTest, RemovesWrongObservationsOnly) {
   testing::TestDriveOptions drive;
   drive.noise_px = 0.3;
   const ReconstructionData truth = testing::makeTestDrive(drive);

@@ -65,7 +65,7 @@ double largestDifference_m(const BundleProblem& a, const BundleProblem& b) {
   return largest;
 }
 
-TEST(BundleSolverTest, GoesThePathOfCeres) {
+TEST(BundleSolverTest, TakesTheStepsOfCeres) {
   for (const int iterations : {1, 3, 40}) {
     BundleProblem ours = makeProblem();
     BundleProblem theirs = ours;
@@ -81,7 +81,7 @@ TEST(BundleSolverTest, GoesThePathOfCeres) {
   }
 }
 
-TEST(BundleSolverTest, MovesUnknownCamerasAsCeresDoes) {
+TEST(BundleSolverTest, AdjustsExtrinsicsAsCeresDoes) {
   BundleProblem ours = makeProblem();
   for (const RigCamera& camera : ours.rig->cameras) {
     const RigidTransform& place = *camera.vehicle_from_camera;
@@ -103,7 +103,7 @@ TEST(BundleSolverTest, MovesUnknownCamerasAsCeresDoes) {
   }
 }
 
-TEST(BundleSolverTest, TakesPointsThatAreKnownBeforehandAsCeresDoes) {
+TEST(BundleSolverTest, UsesPriorsOfPointsAsCeresDoes) {
   BundleProblem ours = makeProblem();
   Eigen::Matrix3d information;
   information << 400.0, 50.0, -20.0, 50.0, 900.0, 30.0, -20.0, 30.0, 200.0;
@@ -125,7 +125,7 @@ TEST(BundleSolverTest, TakesPointsThatAreKnownBeforehandAsCeresDoes) {
   }
 }
 
-TEST(BundleSolverTest, PutsPointsOfTheGroundUnderTheVehicle) {
+TEST(BundleSolverTest, MovesGroundPointsToTheGround) {
   // One point that no camera sees, with a ground observation.
   BundleProblem problem = makeProblem();
   problem.points_in_map = {problem.map_from_vehicle[3] * Eigen::Vector3d(1.0, 2.0, 0.3)};
@@ -148,7 +148,7 @@ TEST(BundleSolverTest, GivesTheSameBitsOnOneThread) {
   EXPECT_EQ(parallel.points_in_map, serial.points_in_map);
 }
 
-TEST(BundleSolverTest, LeavesWhatNothingSees) {
+TEST(BundleSolverTest, KeepsUnobservedPoints) {
   BundleProblem problem = makeProblem();
   auto rig = std::make_shared<CameraRig>(*problem.rig);
   rig->cameras[0].model = MeiCamera(1.2, 400.0, 400.0, 320.0, 200.0);
@@ -169,7 +169,7 @@ TEST(BundleSolverTest, LeavesWhatNothingSees) {
   }
 }
 
-TEST(BundleSolverTest, RefusesObservationsThatAreNotGrouped) {
+TEST(BundleSolverTest, RefusesUngroupedObservations) {
   BundleProblem problem = makeProblem();
   problem.first_observation.pop_back();
   EXPECT_THROW(solveBundle(1, 1e-3, &problem), std::logic_error);

@@ -19,7 +19,7 @@ LoopEdge edgeBetween(const ReconstructionData& data, int32_t first, int32_t seco
   return edge;
 }
 
-TEST(LoopClosureTest, TheAdjustedMapRejectsEdgesThatItContradicts) {
+TEST(LoopClosureTest, RejectsEdgesThatContradictTheAdjustedMap) {
   const ReconstructionData data = testing::makeTestDrive({});
   std::vector<LoopEdge> edges = {
       edgeBetween(data, 0, 30, RigidTransform::planar(0.05, 0.02, 0.005)),
@@ -38,7 +38,7 @@ TEST(LoopClosureTest, TheAdjustedMapRejectsEdgesThatItContradicts) {
   EXPECT_EQ(edges[3].reason, "too few landmarks agree") << "a reason that is there stays";
 }
 
-TEST(LoopClosureTest, ClosingLoopsMovesTheKeyframesAndRejectsAWrongEdge) {
+TEST(LoopClosureTest, MovesTheKeyframesAndRejectsAWrongEdge) {
   const ReconstructionData truth = testing::makeTestDrive({});
   ReconstructionData data = truth;
   // Chained motions that turn a little too much.

@@ -62,7 +62,7 @@ TEST_F(MapLocalizerTest, FindsThePoseNearAnExpectedOne) {
   }
 }
 
-TEST_F(MapLocalizerTest, CovarianceTellsTheError) {
+TEST_F(MapLocalizerTest, CovarianceMatchesTheError) {
   double sum = 0.0;
   int count = 0;
   for (uint32_t seed = 1; seed <= 40; ++seed) {
@@ -82,7 +82,7 @@ TEST_F(MapLocalizerTest, CovarianceTellsTheError) {
   EXPECT_LT(sum / count, 1.6);
 }
 
-TEST_F(MapLocalizerTest, OneCameraIsEnoughAndIsCounted) {
+TEST_F(MapLocalizerTest, LocalizesWithOneCamera) {
   const RigidTransform truth = posesBetween(*map_, 8);
   testing::TestViewOptions view;
   view.camera_without_image = 1;
@@ -94,7 +94,7 @@ TEST_F(MapLocalizerTest, OneCameraIsEnoughAndIsCounted) {
   EXPECT_LT(positionError(fix, truth), 0.03);
 }
 
-TEST_F(MapLocalizerTest, FindsThePoseFromNothing) {
+TEST_F(MapLocalizerTest, RelocalizesWithoutAPrior) {
   for (size_t keyframe = 2; keyframe + 2 < map_->keyframes().size(); keyframe += 4) {
     const RigidTransform truth = posesBetween(*map_, keyframe);
     const PoseFix fix = localizer_.localizeAnywhere(testing::makeTestView(*map_, truth, {}));
@@ -104,7 +104,7 @@ TEST_F(MapLocalizerTest, FindsThePoseFromNothing) {
   }
 }
 
-TEST_F(MapLocalizerTest, FewerThanItWantsOfEachCameraAreNotEnoughFromNothing) {
+TEST_F(MapLocalizerTest, RelocalizationNeedsInliersPerCamera) {
   const RigidTransform truth = posesBetween(*map_, 8);
   const RigFeatures view = testing::makeTestView(*map_, truth, {});
   const PoseFix fix = localizer_.localizeAnywhere(view);
@@ -116,7 +116,7 @@ TEST_F(MapLocalizerTest, FewerThanItWantsOfEachCameraAreNotEnoughFromNothing) {
   EXPECT_EQ(stricter.localizeNear(view, priorAbout(truth, 0.1, 0.0)).status, LocalizationStatus::kLocalized);
 }
 
-TEST_F(MapLocalizerTest, RefusesWhatIsNotInTheMap) {
+TEST_F(MapLocalizerTest, RefusesViewsOfAnotherPlace) {
   for (uint32_t seed = 1; seed <= 10; ++seed) {
     const RigFeatures foreign = testing::makeForeignView(*map_, seed);
     EXPECT_NE(localizer_.localizeAnywhere(foreign).status, LocalizationStatus::kLocalized);
@@ -125,7 +125,7 @@ TEST_F(MapLocalizerTest, RefusesWhatIsNotInTheMap) {
   }
 }
 
-TEST_F(MapLocalizerTest, NothingToSeeIsTooFewMatches) {
+TEST_F(MapLocalizerTest, ReportsTooFewMatchesWithoutFeatures) {
   RigFeatures nothing;
   nothing.images.resize(2);
   nothing.rays_in_camera.resize(2);
@@ -144,7 +144,7 @@ TEST_F(MapLocalizerTest, GivesTheSameOnOneThread) {
   EXPECT_EQ(parallel.numInliers(), serial.numInliers());
 }
 
-TEST(MapLocalizerTwinsTest, TwoPlacesThatLookAlikeAreAmbiguous) {
+TEST(MapLocalizerTwinsTest, ReportsTwoEqualPlacesAsAmbiguous) {
   testing::TestMapOptions options;
   options.twin_offset_m = 100.0;
   const auto map = testing::makeTestMap(options);
@@ -162,7 +162,7 @@ TEST(MapLocalizerTwinsTest, TwoPlacesThatLookAlikeAreAmbiguous) {
 }
 
 /// A quarter of the image size: pixels are four times as wide, features still accurate to half a pixel.
-TEST(MapLocalizerSizeTest, SmallImagesAreGivenTheirPixels) {
+TEST(MapLocalizerSizeTest, AcceptsThePixelErrorsOfSmallImages) {
   SparseMapContents contents = testing::makeTestMap({})->contents();
   contents.rig = parseCameraRig(R"(cameras:
   front:
@@ -201,7 +201,7 @@ RigFeatures withNumbers(RigFeatures features, float one) {
 }
 
 /// Distances depend on the descriptor: hundreds for SIFT, about 1 for RootSIFT.
-TEST(MapLocalizerDescriptorTest, NumbersLocalizeAsBitsDo) {
+TEST(MapLocalizerDescriptorTest, LocalizesWithRealDescriptorsAsWithBinaryOnes) {
   const auto map = testing::makeTestMap({});
   const RigidTransform truth = posesBetween(*map, 8);
   testing::TestViewOptions view;
@@ -240,7 +240,7 @@ TEST(MapLocalizerDescriptorTest, NeedsNoVocabulary) {
   EXPECT_EQ(fix.status, LocalizationStatus::kLocalized);
 }
 
-TEST(MapLocalizerInputTest, NamesWhatIsWrongWithAMap) {
+TEST(MapLocalizerInputTest, NamesTheDefectOfAMap) {
   const auto map = testing::makeTestMap({});
   const auto expectError = [&](const char* text, const auto& change) {
     SparseMapContents contents = map->contents();

@@ -9,7 +9,7 @@
 namespace vcharge {
 namespace {
 
-TEST(LiveViewTest, ShowsThePathAndWhatTheLastKeyframesSawWhereItIs) {
+TEST(LiveViewTest, ShowsThePathAndRecentLandmarks) {
   ReconstructionState state;
   state.data = testing::makeTestDrive(testing::TestDriveOptions());
   std::vector<Eigen::Vector3d> truth;

@@ -21,6 +21,7 @@ struct CalibrationCoachOptions {
   VCHARGE_OPTION(double, enough_sigma_m, 0.08, positive(), "Sufficient deviation of positions by hand-eye.");
   VCHARGE_OPTION(double, enough_sigma_rad, 0.008, positive(),
                  "Sufficient deviation of rotations by hand-eye.");
+  VCHARGE_OPTION(int, min_steps, 20, atLeast(1), "Keyframes before a camera counts as blind.");
   VCHARGE_END_OPTIONS();
 };
 
