@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -11,9 +10,8 @@
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/camera/working_camera.h"
 #include "vcharge_core/dense_maps/range_map.h"
-#include "vcharge_core/frames/drive_source.h"
+#include "vcharge_core/frames/frame_assembler.h"
 #include "vcharge_core/motion/trajectory.h"
-#include "vcharge_core/motion/vehicle_odometry.h"
 #include "vcharge_dense/neighbour_selection.h"
 #include "vcharge_dense/plane_sweep.h"
 
@@ -32,14 +30,13 @@ struct RangeMapperOptions {
   bool use_later_images =
       false;                   ///< neighbours on both sides: needs images from after the reference (offline)
   double min_motion_m = 0.03;  ///< of a camera between two references; below it the vehicle stands
-  double max_speed_m_per_s = 60.0;  ///< faster than this the poses have jumped: starts over
-  double max_image_gap_s = 1.0;     ///< a camera silent for longer, while the drive goes on, has stopped
   WorkingCameraOptions working_camera;
   NeighbourOptions neighbours;
   PlaneSweepOptions plane_sweep;
-  OdometryBufferOptions odometry;
+  FrameAssemblerOptions frames;
 
   RangeMapperOptions() {
+    frames.max_speed_m_per_s = 60.0;
     plane_sweep.refine_poses = true;  // a drive's poses are odometry's, as a rule
     plane_sweep.coarse_pass = true;
   }
@@ -60,12 +57,10 @@ struct RangeMapperOptions {
     visit("cameras", cameras);
     visit("use_later_images", use_later_images);
     visit("min_motion_m", min_motion_m);
-    visit("max_speed_m_per_s", max_speed_m_per_s);
-    visit("max_image_gap_s", max_image_gap_s);
     visit("working_camera", working_camera);
     visit("neighbours", neighbours);
     visit("plane_sweep", plane_sweep);
-    visit("odometry", odometry);
+    visit("frames", frames);
   }
   void validate() const;  ///< throws std::invalid_argument naming the field
 };
@@ -84,7 +79,7 @@ struct RangeMapperStatus {
   RangeMapperState state = RangeMapperState::kNoImages;
   std::string message;          ///< one line for people
   uint64_t images = 0;          ///< taken in
-  uint64_t ignored_images = 0;  ///< stamp not after the one before
+  uint64_t ignored_images = 0;  ///< repeated, or too late for their frame
   uint64_t without_pose = 0;
   uint64_t standing = 0;
   uint64_t without_neighbours = 0;
@@ -100,7 +95,7 @@ struct RangeTask {
 };
 
 /// Turns the images and odometry of a drive into sweeps: undistorts, keeps the last images of each camera,
-/// finds their poses and picks neighbours by baseline. The one front of the nodelet and the offline tool.
+/// and picks neighbours by baseline. The one front of the nodelet and the offline tool.
 ///
 /// add...() do cheap work and hand each reference to `on_task`, per camera in order of stamps; who gets it
 /// calls sweep(), at once (nothing is lost) or later from another thread (only sweep() may be called
@@ -116,8 +111,7 @@ class RangeMapper : public DriveConsumer {
   RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapperOptions& options, TaskCallback on_task);
   ~RangeMapper() override;
 
-  /// Takes poses from here instead of from odometry (interpolated; max_gap_s of the odometry's options
-  /// applies).
+  /// Takes poses from here instead of from odometry; frames.max_odometry_gap_s applies.
   void setTrajectory(const Trajectory& world_from_vehicle);
 
   /// std::logic_error for an image of another size or type than the rig's.
@@ -131,13 +125,14 @@ class RangeMapper : public DriveConsumer {
 
   /// Of the cameras in use, in the rig's order.
   std::vector<RangeMapperStatus> status() const;
+  const FrameCounters& counters() const { return assembler_->counters(); }
 
  private:
   struct Camera;
 
-  bool placeImage(Camera* camera, Timestamp stamp, const Image& image);
-  void placeWaiting(Camera* camera);
-  void startOver(Camera* camera, const std::string& reason);
+  void process(const ImageFrame& frame);
+  void placeImage(Camera* camera, const ImageFrame& frame);
+  void startOver(DriveBreak drive_break);
   void addFrame(Camera* camera, const SweepImage& frame);
   void emitReferences(Camera* camera, bool drive_is_over);
   void emitReference(Camera* camera, size_t index);
@@ -145,10 +140,8 @@ class RangeMapper : public DriveConsumer {
   const std::shared_ptr<const CameraRig> rig_;
   const RangeMapperOptions options_;
   const TaskCallback on_task_;
-  OdometryBuffer poses_;
-  bool poses_are_given_ = false;
   std::vector<std::unique_ptr<Camera>> cameras_;  // by index in the rig; null where not in use
-  std::optional<Timestamp> newest_image_;
+  std::unique_ptr<ImageFrameAssembler> assembler_;
 };
 
 }  // namespace vcharge

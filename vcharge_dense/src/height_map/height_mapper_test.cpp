@@ -157,7 +157,7 @@ TEST_F(HeightMapperTest, SaysThatPosesDoNotCoverTheDrive) {
 }
 
 TEST_F(HeightMapperTest, SaysThatThereIsNoOverlap) {
-  options_.range_maps.max_speed_m_per_s = 1e9;
+  options_.range_maps.frames.max_speed_m_per_s = 1e9;
   HeightMapper mapper(rig_, options_, folder_, "");
   Trajectory apart;
   for (int i = 0; i < kNumImages; ++i) {

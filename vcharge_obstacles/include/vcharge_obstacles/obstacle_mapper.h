@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,7 +9,7 @@
 
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/dense_maps/range_map.h"
-#include "vcharge_core/motion/vehicle_odometry.h"
+#include "vcharge_core/frames/frame_assembler.h"
 #include "vcharge_obstacles/ground_watch.h"
 #include "vcharge_obstacles/local_obstacle_map.h"
 #include "vcharge_obstacles/obstacle_detector.h"
@@ -31,15 +30,18 @@ struct ObstacleMapperOptions {
   ObstacleDetectorOptions detector;
   GroundWatchOptions watch;
   LocalObstacleMapOptions map;
-  OdometryBufferOptions odometry;
-  double max_wait_s = 0.15;      ///< for a camera's range map once another has delivered its stamp
-  double silent_s = 0.5;         ///< without any range map for so long, the map comes all the same
+  FrameAssemblerOptions frames;
+  double silent_s = 0.5;         ///< after this time without any range map the map is shown all the same
   double max_silence_s = 1.0;    ///< a camera without range maps for longer, while driving, has stopped
   double min_known_share = 0.1;  ///< of a camera's pixels with a range; with less it hardly sees
-  double max_step_m = 0.15;      ///< change of odometry's way from message to message: more is a jump
-  double max_step_rad = 0.05;
-  double anchor_step_m = 0.03;  ///< map -> odom moves the cells once it has changed by so much
+  double anchor_step_m = 0.03;   ///< map -> odom moves the cells once it has changed by so much
   double anchor_step_rad = 0.003;
+
+  ObstacleMapperOptions() {
+    frames.max_speed_m_per_s = 60.0;
+    frames.max_step_m = 0.15;  // the map's cells show errors that other stages do not
+    frames.max_step_rad = 0.05;
+  }
 
   template <class Visitor>
   void visitFields(Visitor&& visit) {
@@ -48,13 +50,10 @@ struct ObstacleMapperOptions {
     visit("detector", detector);
     visit("watch", watch);
     visit("map", map);
-    visit("odometry", odometry);
-    visit("max_wait_s", max_wait_s);
+    visit("frames", frames);
     visit("silent_s", silent_s);
     visit("max_silence_s", max_silence_s);
     visit("min_known_share", min_known_share);
-    visit("max_step_m", max_step_m);
-    visit("max_step_rad", max_step_rad);
     visit("anchor_step_m", anchor_step_m);
     visit("anchor_step_rad", anchor_step_rad);
   }
@@ -95,8 +94,7 @@ struct ObstacleFrame {
 };
 
 /// Turns range maps and odometry into obstacle maps: one front for the nodelet and the offline tool. Range
-/// maps of one stamp are fused together, in the rig's order, once odometry has come to it; no more
-/// than 25 stamps wait for odometry, or for a camera. Not thread safe.
+/// maps of one stamp are fused together, in the rig's order. Not thread safe.
 class ObstacleMapper {
  public:
   using FrameCallback = std::function<void(const ObstacleFrame&)>;
@@ -120,46 +118,39 @@ class ObstacleMapper {
   /// How often odometry jumped, and the map was emptied for it.
   uint64_t numJumps() const { return num_jumps_; }
   /// Stamps whose range maps wait for others, or for odometry.
-  size_t numWaiting() const { return waiting_.size(); }
+  size_t numWaiting() const { return assembler_->numWaiting(); }
+  const FrameCounters& counters() const { return assembler_->counters(); }
   const PolarGrid& grid() const { return grid_; }
   const ObstacleMapperOptions& options() const { return options_; }
 
  private:
   struct Camera;
-  struct Look {
-    CameraObstacles seen;
+  struct Observation {  // by one camera
+    CameraObstacles obstacles;
     cv::Mat reference;  // the image, where the range map brought it
   };
-  struct Group {  // range maps of one stamp, by camera
-    std::map<size_t, Look> cameras;
-    std::optional<Timestamp> first_heard;  // odometry's stamp when the first of them came
-  };
+  using Frame = AssembledFrame<Observation>;
 
-  std::optional<RigidTransform> fixedFromVehicle(Timestamp stamp) const;
-  void watchForJumps(const VehicleOdometry& odometry);
-  bool isComplete(Timestamp stamp, const Group& group) const;
-  void fuseWaiting(bool all);
-  void fuse(Timestamp stamp, Group* group, const RigidTransform& fixed_from_vehicle);
-  void loseFirstWaiting();
+  std::optional<RigidTransform> fixedFromVehicle(
+      const std::optional<RigidTransform>& odom_from_vehicle) const;
+  void process(Frame frame);
+  void fuse(Frame* frame, const RigidTransform& fixed_from_vehicle);
+  void noteWithoutPose(const Frame& frame);
   void emit(const LocalObstacleMap& map, const std::vector<const CameraObstacles*>& cameras);
   void emitAt(Timestamp stamp);
   void emitWhenSilent();
   void updateStatus(Camera* camera, const CameraObstacles& seen) const;
-  void startOver();
-  void jump(Timestamp stamp);
+  void startOver(DriveBreak drive_break, Timestamp stamp);
 
   const std::shared_ptr<const CameraRig> rig_;
   const ObstacleMapperOptions options_;
   const FrameCallback on_frame_;
   const PolarGrid grid_;
   std::vector<std::unique_ptr<Camera>> cameras_;  // by index in the rig; null where not in use
-  OdometryBuffer poses_;
+  std::unique_ptr<FrameAssembler<Observation>> assembler_;
   LocalObstacleMap map_;
-  std::map<Timestamp, Group> waiting_;
-  std::optional<Timestamp> last_fused_, last_emitted_, last_jump_;
+  std::optional<Timestamp> last_emitted_;
   std::optional<Timestamp> last_heard_;  // odometry's stamp when the last range map came
-  std::optional<VehicleOdometry> last_odometry_;
-  std::optional<Eigen::Vector3d> last_velocity_;  // x, y, yaw per second
   RigidTransform map_from_odom_, anchor_;
   bool has_anchor_ = false;
   uint64_t num_jumps_ = 0;

@@ -239,7 +239,7 @@ TEST_F(ObstacleMapperTest, RangeMapsWithoutOdometryDoNotPileUp) {
 }
 
 TEST_F(ObstacleMapperTest, CameraThatNeverComesIsNotWaitedForWithoutEnd) {
-  options_.max_wait_s = std::numeric_limits<double>::infinity();  // as in a replay without loss
+  options_.frames.waitForEverything();  // as in a replay without loss
   dead_camera_ = "left";
   start();
   drive(0, 240);
@@ -250,7 +250,7 @@ TEST_F(ObstacleMapperTest, CameraThatNeverComesIsNotWaitedForWithoutEnd) {
 
 TEST_F(ObstacleMapperTest, MapsDoNotDependOnHowLateRangeMapsCome) {
   const auto run = [&](int delay_ticks) {
-    options_.max_wait_s = std::numeric_limits<double>::infinity();
+    options_.frames.waitForEverything();
     start();
     std::map<Timestamp, std::string> hashes;
     for (int tick = 0; tick < 60 + delay_ticks; ++tick) {
@@ -281,7 +281,7 @@ TEST_F(ObstacleMapperTest, MapsDoNotDependOnHowLateRangeMapsCome) {
 
 TEST_F(ObstacleMapperTest, RangeMapsThatLagAreNoSilence) {
   start();
-  constexpr int kDelayTicks = 41;  // 0.8 s: longer than silent_s and max_wait_s
+  constexpr int kDelayTicks = 41;  // 0.8 s: longer than the waiting times
   for (int tick = 0; tick < 100; ++tick) {
     VehicleOdometry odometry;
     odometry.stamp = stampAt(tick);
