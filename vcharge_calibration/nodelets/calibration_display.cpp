@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kFrame = "map";
 constexpr int kShownKeyframes = 20;  // while driving
 
-/// Poses and places are not adjusted yet.
+/// Poses and extrinsics are not adjusted yet.
 TriangulationOptions lenientTriangulation(const RigCalibratorOptions& options) {
   TriangulationOptions lenient = options.triangulation;
   lenient.max_error_rad = options.first_max_error_rad;

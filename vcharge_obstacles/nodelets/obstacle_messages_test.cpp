@@ -9,13 +9,14 @@
 #include <octomap/OcTree.h>
 
 #include "detection/box_world.h"
+#include "range_map_reader.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_ros/range_map_conversions.h"
 
 namespace vcharge {
 namespace {
 
-/// What depth_nodelet would publish of one camera.
+/// The messages of depth_nodelet for one camera.
 class RangeMapReaderTest : public ::testing::Test {
  protected:
   RangeMapReaderTest() : converter_(camera_.field_of_view_rad) {
@@ -105,7 +106,7 @@ TEST(ToOctreeTest, VoxelsLieWhereTheCellsLie) {
       EXPECT_EQ(stateAt(-0.15 + 0.1 * column, 5.05 + 0.1 * row, 0.05), map.state.at<int8_t>(row, column));
     }
   }
-  EXPECT_EQ(stateAt(-0.05, 5.05, 0.15), kCellUnobserved);  // of free ground nothing above is known
+  EXPECT_EQ(stateAt(-0.05, 5.05, 0.15), kCellUnobserved);  // nothing is known above free ground
   EXPECT_EQ(stateAt(0.15, 5.25, 0.35), kCellOccupied);
   EXPECT_EQ(stateAt(0.15, 5.25, 0.45), kCellUnobserved);
 }
