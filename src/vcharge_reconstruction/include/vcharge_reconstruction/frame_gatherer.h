@@ -9,58 +9,50 @@
 #include <vector>
 
 #include "vcharge_core/camera/camera_rig.h"
-#include "vcharge_core/frames/drive_source.h"
-#include "vcharge_core/motion/vehicle_odometry.h"
+#include "vcharge_core/frames/frame_assembler.h"
 #include "vcharge_reconstruction/sparse_mapper_report.h"
 
 namespace vcharge {
 
-/// Puts images of one stamp together with the vehicle's pose by the odometer, in order, and counts in a
-/// report what was not as it should be. Odometers that start over are joined to what they counted before.
+/// The frames of a drive for mapping and calibration: a FrameAssembler that waits for everything, and a
+/// report of the frames that are skipped. Frames without odometry are not used; resets of the odometer are
+/// bridged.
 class FrameGatherer : public DriveConsumer {
  public:
   /// Images in the rig's order; empty where a camera sent none.
   using FrameCallback =
       std::function<void(Timestamp, const std::vector<Image>&, const RigidTransform& odom_from_vehicle)>;
 
-  /// The report must outlive this object. `max_speed_m_per_s`: faster odometry is a reset of the counters.
+  /// The report must outlive this object. `max_speed_m_per_s`: faster odometry is a reset of the odometer.
   FrameGatherer(std::shared_ptr<const CameraRig> rig, double max_speed_m_per_s, SparseMapperReport* report,
                 FrameCallback on_frame);
 
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
-  /// Hands out what waits.
-  void finish() { processFrames(true); }
-  /// Notes that a frame was not used, or not as it should be.
+  /// Hands out what waits: the drive is over.
+  void finish() { assembler_.finish(); }
+  /// Reports that a frame was not used, or not completely.
   void noteSkipped(Timestamp stamp, const std::string& reason);
 
-  bool isIdle() const { return pending_.empty(); }
-  /// As if the frames until this stamp had been handed out.
-  void resumeAfter(std::optional<Timestamp> stamp) { last_stamp_ = stamp; }
+  bool isIdle() const { return assembler_.numWaiting() == 0; }
+  /// Ignores images up to this stamp: they were used before.
+  void resumeAfter(std::optional<Timestamp> stamp) { resumed_after_ = stamp; }
 
  private:
-  struct PendingFrame {
-    std::vector<Image> images;
-    size_t num_present = 0;
-  };
-  /// Which entry of the report a reason has last, and the number of the frame that it ends with.
+  /// The report's last entry for a reason, and the number of the frame that it ends with.
   struct LastSkipped {
     size_t entry = 0;
     int64_t frame = 0;
   };
-  void processFrames(bool all);
-  std::string missingCameras(const PendingFrame& frame);
+  void process(const ImageFrame& frame);
+  std::string missingCameras(const ImageFrame& frame);
 
   const std::shared_ptr<const CameraRig> rig_;
-  const double max_speed_m_per_s_;
   SparseMapperReport* const report_;
   const FrameCallback on_frame_;
-  OdometryBuffer odometry_;
-  RigidTransform corrected_from_raw_odom_;
-  std::optional<VehicleOdometry> last_raw_odometry_;
-  std::map<Timestamp, PendingFrame> pending_;
-  std::optional<Timestamp> last_stamp_;              // of a frame that had its turn
+  std::optional<Timestamp> resumed_after_;
   std::map<std::string, LastSkipped> last_skipped_;  // by reason
+  FrameAssembler<Image> assembler_;
 };
 
 }  // namespace vcharge
