@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs the Debian 12 packages of debian_packages.txt. Does nothing, and needs no network, when all are there.
+# Installs the Debian 12 packages of debian_packages.txt. Needs no network if all are installed.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 

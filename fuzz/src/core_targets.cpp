@@ -13,16 +13,10 @@
 #include "vcharge_core/sparse_map/analytic_map.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_features/vocabulary_tree.h"
-#include "vcharge_geometry/pose_graph/pose_graph.h"
 
 namespace vcharge {
 namespace {
 
-constexpr char kGraph2d[] =
-    "VERTEX_SE2 0 0 0 0\nVERTEX_SE2 1 1 0 0.1\nFIX 0\nEDGE_SE2 0 1 1.0 0.0 0.1 100 0 0 100 0 500\n";
-constexpr char kGraph3d[] =
-    "VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 1 1 0 0 0 0 0 1\n"
-    "EDGE_SE3:QUAT 0 1 1 0 0 0 0 0 1 100 0 0 0 0 0 100 0 0 0 0 100 0 0 0 400 0 0 400 0 400\n";
 constexpr char kTrajectory[] =
     "# time x y z q\n1.0 0 0 0 0 0 0 1\n1.080000001 0.1 -1e-3 0 0 0 0.1 0.99498743710662\n";
 
@@ -50,7 +44,7 @@ HeightMap smallHeightMap() {
   return map;
 }
 
-/// Files of a height map beside each other, of which one is replaced.
+/// Replaces one of the files of a height map.
 FuzzTarget heightMapTarget(const std::string& name, const std::string& replaced) {
   return {name,
           [replaced] {
@@ -86,8 +80,6 @@ std::vector<FuzzTarget> coreTargets() {
          formatCameraRig(parseCameraRig(bytes, "rig.yaml", folder.path()));
        }},
       fileTarget("trajectory", "a.tum", {kTrajectory}, [](const std::string& path) { readTrajectory(path); }),
-      fileTarget("pose_graph", "a.g2o", {kGraph2d, kGraph3d},
-                 [](const std::string& path) { chiSquared(readG2o(path)); }),
       fileTarget("sparse_map", "a.vmap", {sparseMapBytes()},
                  [](const std::string& path) { readSparseMap(path)->contentHash(); }),
       heightMapTarget("height_map_yaml", "height_map.yaml"),

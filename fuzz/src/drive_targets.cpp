@@ -48,7 +48,7 @@ std::string serialized(const Message& message) {
   return bytes;
 }
 
-/// As a bag or a connection brings it; InputError where the bytes are no such message.
+/// Deserializes a message like a bag or a connection. Throws InputError if the bytes are not such a message.
 template <class Message>
 boost::shared_ptr<const Message> deserialized(std::string bytes) {
   const auto message = boost::make_shared<Message>();
@@ -64,8 +64,9 @@ boost::shared_ptr<const Message> deserialized(std::string bytes) {
 
 constexpr size_t kImageFields = 13;
 
-/// Height, width and step (32 bits each), a byte for the encoding, and the data: roscpp makes room for
-/// whatever length a serialized message claims, up to 4 GB, before it looks whether the bytes are there.
+/// Height, width and step (32 bits each), a byte for the encoding, and the data. These fields are set
+/// directly, since roscpp allocates whatever length a serialized message claims, up to 4 GB, before it checks
+/// the available bytes.
 std::string imageFields() {
   std::string bytes(kImageFields, '\0');
   const std::array<uint32_t, 3> sizes = {kHeight_px, kWidth_px, kWidth_px};
@@ -98,7 +99,7 @@ void takeCompressedImage(const std::string& bytes) {
   toImage(message, "/camera/front/image_raw/compressed");
 }
 
-/// The first byte chooses the format, the second adds to the stride.
+/// The first byte selects the format, the second adds to the stride.
 void convertFrame(const std::string& bytes) {
   if (bytes.size() < 2) {
     return;
@@ -107,7 +108,7 @@ void convertFrame(const std::string& bytes) {
   const std::vector<PixelFormat>& formats = allPixelFormats();
   const PixelFormat format = formats[data[0] % formats.size()];
   cv::Mat gray(kHeight_px, kWidth_px, CV_8UC1);
-  // A copy of its own: what is read behind the frame's end is seen.
+  // A separate copy, so that reading past the end of the frame is detected.
   const std::vector<uint8_t> frame(data + 2, data + bytes.size());
   GrayConverter().convert(format, frame.data(), frame.size(), bytesPerRow(format, kWidth_px) + data[1] % 5,
                           &gray);
@@ -126,7 +127,7 @@ std::vector<std::string> frames() {
   return seeds;
 }
 
-/// Signals that cross bytes, both orders, and frames of 12 bytes each: id, size, data, time.
+/// Signals that cross bytes, in both byte orders, and frames of 12 bytes each: id, size, data, time.
 void decodeCan(const std::string& bytes) {
   CanWheelOptions options;
   options.left_ticks = {0x101, 3, 13, ByteOrder::kLittle, false, 1.0, 0.0};

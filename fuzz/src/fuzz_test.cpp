@@ -1,5 +1,4 @@
-// Every reader of bytes from outside takes what is right, and takes or refuses, but never crashes on, what is
-// damaged.
+// Every reader of untrusted bytes accepts valid input, and accepts or rejects damaged input without crashing.
 #include <random>
 #include <string>
 
@@ -12,7 +11,7 @@ namespace {
 
 constexpr int kDamagedPerSeed = 150;
 
-/// Damage as disks, cables and hands do it: bits, bytes, cut and doubled pieces, numbers that explode.
+/// Typical damage: flipped bits, wrong bytes, missing or repeated parts, huge numbers.
 std::string damage(std::string bytes, std::mt19937* generator) {
   const auto below = [&](size_t size) { return size == 0 ? 0 : (*generator)() % size; };
   static const char* const kPieces[] = {"-1",
@@ -72,7 +71,7 @@ TEST_P(FuzzTest, TakesWhatIsRightAndSurvivesWhatIsDamaged) {
       }
     }
   }
-  // Those without a checksum or a syntax have nothing to refuse.
+  // Readers without a checksum or a syntax accept anything.
   if (target.name != "can" && target.name != "camera_frame") {
     EXPECT_GT(num_refused, 0) << target.name;
   }

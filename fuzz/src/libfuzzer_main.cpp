@@ -1,5 +1,5 @@
-// libFuzzer's entry points: FUZZ_TARGET=NAME chooses the reader; FUZZ_SEEDS=FOLDER makes it write its seeds
-// and leave.
+// Entry points of libFuzzer. FUZZ_TARGET=NAME selects the reader; with FUZZ_SEEDS=FOLDER, it only writes its
+// seeds.
 #include <cstdlib>
 #include <fstream>
 #include <iostream>

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""calibrate_rig on drives that do not suffice: the right reason, and no file; compare_rigs and evaluate_rig."""
+"""calibrate_rig on insufficient drives gives the right reason and no file; compare_rigs and evaluate_rig."""
 import copy
 import os
 import sys
@@ -8,7 +8,7 @@ import unittest
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from drive_fixture import Drive, run, tool  # noqa: E402
+from drive_fixture import Drive, run, run_tool, tool  # noqa: E402
 
 
 class CalibrateRigTest(unittest.TestCase):
@@ -21,7 +21,7 @@ class CalibrateRigTest(unittest.TestCase):
         cls.drive.remove()
 
     def calibrate(self, bag, *extra, program="calibrate_rig"):
-        """Expects a failure that leaves the old file as it is; returns what was printed and the line of the error."""
+        """Expects a failure that leaves the old file as it is; returns the printed text and the error line."""
         output = self.drive.write_text("rig.yaml", "an older rig\n")
         status, printed, errors = run([tool("vcharge_calibration", program), "--bag", bag, "--rig",
                                        self.drive.rig, "--output", output, *extra])
@@ -100,11 +100,11 @@ class CalibrateRigTest(unittest.TestCase):
         status, output, _ = run([compare, self.drive.rig, moved])
         self.assertEqual(status, 0)
         self.assertIn("forwards     2.000 cm", output)
-        status, output, _ = run([tool("vcharge_evaluation", "evaluate_rig"), "--estimate", moved, "--truth",
-                                 self.drive.rig])
+        status, found, _ = run_tool([tool("vcharge_evaluation", "evaluate_rig"), "--estimate", moved, "--truth",
+                                     self.drive.rig])
         self.assertEqual(status, 0)
-        row = next(line for line in output.splitlines() if line.split()[:1] == ["front"]).split()
-        self.assertEqual(row[1], "-2.00")
+        front = next(camera for camera in found["as_is"] if camera["camera"] == "front")
+        self.assertAlmostEqual(front["error_m"][0], -0.02, places=6)
 
 
 if __name__ == "__main__":

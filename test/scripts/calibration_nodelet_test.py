@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The calibration nodelet on a drawn drive: it coaches, finds the rig of calibrate_rig, and outlives what does not suffice."""
+"""The calibration nodelet on a drawn drive: it reports missing manoeuvres, finds the rig of calibrate_rig, and survives insufficient drives."""
 import math
 import os
 import pathlib
@@ -96,8 +96,8 @@ class CalibrationNodeletTest(unittest.TestCase):
         rospy.delete_param("/calibration")
 
     def publish(self, share=1.0):
-        """The first share of the drive; returns once the nodelet has followed all of it and rests: a nodelet that is
-        unloaded inside a callback outlives its queues."""
+        """Publishes the first part of the drive; returns when the nodelet has processed it and is idle, since unloading
+        a nodelet inside a callback destroys its queues first."""
         count = int(share * len(self.messages))
         for topic, message in self.messages[:count]:
             self.publishers[topic].publish(message)
@@ -152,7 +152,7 @@ class CalibrationNodeletTest(unittest.TestCase):
         truth, found = rig_of(self.truth)["cameras"], rig_of(self.output)["cameras"]
         for camera in end.cameras:
             there, here = (rig[camera.camera]["vehicle_from_camera"] for rig in (truth, found))
-            # Four standard deviations of what the nodelet tells; that is a few centimetres for images this small.
+            # Four reported standard deviations: a few centimetres for images this small.
             for axis, sigma_m in enumerate((camera.x_m, camera.y_m, camera.z_m)):
                 self.assertLess(sigma_m, 0.05)
                 self.assertLess(abs(there["translation_m"][axis] - here["translation_m"][axis]), 4 * sigma_m + 0.01, camera)
@@ -170,13 +170,13 @@ class CalibrationNodeletTest(unittest.TestCase):
         lengths = [len(path.poses) for path in paths]
         self.assertGreater(len(lengths), 5, "the path is shown while it grows")
         self.assertEqual(lengths, sorted(lengths))
-        # The landmarks of the calibrated rig may come later than the word that it is done.
+        # The landmarks may arrive after the status "calibrated".
         wait_for(lambda: self.received["/calibration/landmarks"][-1].width > 1000, "the map's landmarks")
         cloud = self.received["/calibration/landmarks"][-1]
         self.assertEqual(cloud.header.frame_id, "map")
         points = np.array(list(point_cloud2.read_points(cloud, field_names=("x", "y", "z", "rgb"))))
         self.assertEqual(len(np.unique(points[:, 3])), len(CAMERAS), "a colour per camera")
-        # The floor is the map's ground, the ceiling 5 m above it.
+        # The map's ground is the floor; the ceiling is 5 m above it.
         self.assertLess(np.quantile(np.abs(points[:, 2][points[:, 2] < 0.5]), 0.5), 0.05)
         markers = self.received["/calibration/cameras"][-1].markers
         self.assertEqual({marker.text.split()[0] for marker in markers if marker.ns == "names"}, set(CAMERAS))

@@ -33,7 +33,7 @@ def rotation(axis, angle):
 
 
 def render(camera_from_board, middle):
-    """A chessboard of 9x6 inner corners, its middle at `middle`, by an equidistant lens; 2 x 2 rays per pixel."""
+    """Draws a chessboard of 9x6 inner corners centred at `middle` through an equidistant lens, with 2 x 2 rays per pixel."""
     u, v = np.meshgrid((np.arange(2 * WIDTH) + 0.5) / 2 - 0.5, (np.arange(2 * HEIGHT) + 0.5) / 2 - 0.5)
     x, y = (u - CENTRE[0]) / FOCAL_PX, (v - CENTRE[1]) / FOCAL_PX
     theta = np.hypot(x, y)
@@ -99,7 +99,7 @@ class CalibrationTest(unittest.TestCase):
         return run([self.tool, "--square-m", SQUARE_M, "--model", "kannala_brandt", "--output", self.rig, *arguments])
 
     def check_rig(self, path, tolerance_px=0.1):
-        """RMS per coordinate over the image, up to a rotation: compared by the angles between pixels' rays."""
+        """RMS per coordinate over the image, up to a rotation: from the angles between the pixels' rays."""
         camera = yaml.safe_load(path.read_text())["cameras"]["front"]
         self.assertEqual(camera["image_size_px"], [WIDTH, HEIGHT])
         p = camera["intrinsics"]

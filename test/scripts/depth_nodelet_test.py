@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The depth nodelet on a simulated drive: it equals the offline tool and the truth, and outlives bad input."""
+"""The depth nodelet on a simulated drive: it equals the offline tool, agrees with the truth, and survives bad input."""
 import copy
 import os
 import sys
@@ -89,11 +89,11 @@ class DepthNodeletTest(unittest.TestCase):
         return sorted(int(path.stem) for path in (self.offline / camera).glob("*.yaml"))
 
     def wait_for_message(self, *words):
-        # Every frame is processed in order: on a busy machine it takes long until the bad one's turn comes.
+        # Frames are processed in order: on a busy machine the bad one waits for those before it.
         wait_for(lambda: self.diagnostics.tells(*words), f"a diagnostic with {words}")
 
     def expect_recovery(self):
-        """A good drive after whatever came before gives range maps."""
+        """A good drive gives range maps after bad input."""
         for kinds in self.received.values():
             kinds.clear()
         self.publish()
@@ -126,7 +126,7 @@ class DepthNodeletTest(unittest.TestCase):
         self.assertEqual(self.clouds[-1].header.frame_id, "camera_left_optical")
 
     def relative_errors(self, camera, stamp, intrinsics, images):
-        """Of the confident pixels, against the truth at the nearest sensor pixel."""
+        """Errors of the confident pixels against the truth at the nearest sensor pixel."""
         working = yaml.safe_load((self.offline / camera / f"{stamp}.yaml").read_text())["mei"]
         truth = cv2.imread(str(self.drive.truth / "range" / camera / f"{stamp}.tiff"), cv2.IMREAD_UNCHANGED)
         height, width = images["range"].shape

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The same bag gives the same content hash at every stage, on one core and on all."""
+"""The same bag gives the same content hash at every stage, on one core and on all of them."""
 import os
 import sys
 import unittest
@@ -7,7 +7,7 @@ import unittest
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from drive_fixture import content_hash, run  # noqa: E402
+from drive_fixture import run_tool  # noqa: E402
 from whole_chain import WholeChain  # noqa: E402
 
 
@@ -26,23 +26,23 @@ class DeterminismTest(unittest.TestCase):
             output = self.chain.folder / cores
             output.mkdir()
             for name in WholeChain.TOOLS:
-                status, text, errors = run([*prefix, *self.chain.words(name, output, output)])
+                status, found, errors = run_tool([*prefix, *self.chain.words(name, output, output)])
                 self.assertEqual((status, errors), (0, []), name)
-                hashes.setdefault(name, []).append(content_hash(text))
+                hashes.setdefault(name, []).append(found["content_hash"])
         for name, (with_all, with_one) in hashes.items():
             self.assertEqual(with_all, with_one, name)
-        self.assertEqual(len(set(with_all for with_all, _ in hashes.values())), len(hashes), "hashes that tell nothing")
+        self.assertEqual(len(set(with_all for with_all, _ in hashes.values())), len(hashes), "different results have the same hash")
 
     def test_another_drive_has_other_hashes(self):
-        """A hash that is always the same would pass the test above."""
+        """A constant hash would pass the test above."""
         output = self.chain.folder / "shorter"
         (output / "other").mkdir(parents=True)
         other = WholeChain(duration_s=3.2)
         try:
             for name in ("build_map", "compute_range_maps", "detect_obstacles"):
-                whole = run(self.chain.words(name, output, output))
-                part = run(other.words(name, output / "other", output / "other"))
-                self.assertNotEqual(content_hash(whole[1]), content_hash(part[1]), name)
+                _, whole, _ = run_tool(self.chain.words(name, output, output))
+                _, part, _ = run_tool(other.words(name, output / "other", output / "other"))
+                self.assertNotEqual(whole["content_hash"], part["content_hash"], name)
         finally:
             other.remove()
 

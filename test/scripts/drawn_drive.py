@@ -14,26 +14,26 @@ TEXELS_PER_M, FLOOR_TEXELS_PER_M, TEXTURE = 12.0, 30.0, 1024
 SOFT_TEXELS = 5.0  # pixels that see so much of a surface see no texture
 FRAME_M, FRAME_S = 0.3, 0.1
 ODOMETRY_PER_FRAME = 5
-# name: x, y, z of the camera on the vehicle, and where it looks: yaw, and down, radians
+# name: x, y, z of the camera on the vehicle (m), yaw and downward pitch of its axis (rad)
 CAMERAS = {"front": (2.9, 0.1, 0.9, 0.05, 0.45), "left": (1.5, 0.8, 1.1, 1.5, 0.5)}
 
 
 def camera_rotation(yaw, down):
-    """vehicle_from_camera of a camera (z forward, x right, y down) that looks to yaw, and down."""
+    """Rotation vehicle_from_camera of a camera (z forward, x right, y down) with this yaw and downward pitch."""
     forward = np.array([np.cos(yaw) * np.cos(down), np.sin(yaw) * np.cos(down), -np.sin(down)])
     right = np.array([np.sin(yaw), -np.cos(yaw), 0.0])
     return np.stack([right, np.cross(forward, right), forward], axis=1)
 
 
 def quaternion(rotation):
-    """x, y, z, w."""
+    """Quaternion x, y, z, w."""
     vector = cv2.Rodrigues(rotation)[0].ravel()
     angle = np.linalg.norm(vector)
     return [*(np.sin(angle / 2) / angle * vector), np.cos(angle / 2)]
 
 
 def path(step_m):
-    """Poses (x, y, yaw) every step_m along an eight whose loops begin and end gently, more than once around."""
+    """Poses (x, y, yaw) every step_m along a figure of eight with gradual curvature, more than one round."""
     loop_m = 32.0
     s = np.arange(0.0, 2.0 * loop_m + 16.0, step_m)
     side = np.where((s // loop_m) % 2 == 0, 1.0, -1.0)
@@ -46,7 +46,7 @@ def path(step_m):
 
 
 def make_texture(seed):
-    """Blobs of a few sizes around zero; what leaves on one side comes in on the other."""
+    """Periodic texture of blobs of several sizes, with mean zero."""
     random = np.random.default_rng(seed)
     frequency = np.fft.fftfreq(TEXTURE)
     square = frequency[:, None] ** 2 + frequency[None, :] ** 2
@@ -67,7 +67,7 @@ def camera_rays():
 
 
 def draw(eye, rays, texture):
-    """Image of the room for rays (3 x ..., in the room) from a point in it; what is too far for the pixels is gray."""
+    """Image of the room for rays (3 x ..., in the room) from a point in it; texture too fine for the pixels is gray."""
     rays = rays + np.float32(1e-9)
     ends = [np.where(rays[i] > 0, ROOM_M[i][1] - eye[i], ROOM_M[i][0] - eye[i]).astype(np.float32) for i in range(3)]
     distances = np.stack([ends[i] / rays[i] for i in range(3)])
@@ -99,7 +99,7 @@ def write_rig(file, with_extrinsics):
 
 
 def write_bag(file, duration_share=1.0):
-    """Images of all cameras and ten times as often odometry, without errors but the noise of pixels."""
+    """Images of all cameras, and odometry ten times as often. Only pixels have noise."""
     rays, inside = camera_rays()
     texture = make_texture(1)
     random = np.random.default_rng(2)

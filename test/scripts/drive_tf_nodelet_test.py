@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""drive_tf_nodelet under a simulated clock: TF and camera_info of a replayed drive, and when it leaves them alone."""
+"""drive_tf_nodelet under a simulated clock: TF and camera_info of a replayed drive, and when it does not publish them."""
 import math
 import os
 import pathlib
@@ -95,11 +95,11 @@ class DriveTfNodeletTest(unittest.TestCase):
 
     def setUp(self):
         self.start()
-        # Its diagnostics carry the clock that it lives by.
+        # Its diagnostics show which clock it uses.
         wait_for(self.lives_by_the_clock, "diagnostics in the drive's time")
         mine = [self.odometry, self.tf, *self.images.values(), *self.compressed.values(), *self.drivers.values()]
         wait_for(lambda: all(p.get_num_connections() > 0 for p in mine), "connections to the nodelet")
-        # This script listens on these topics too.
+        # This script subscribes to these topics too.
         wait_for(lambda: all(p.get_num_connections() > 1 for p in [self.tf, *self.drivers.values()]), "both listeners")
         self.settle()
         self.transforms.clear()
@@ -115,7 +115,7 @@ class DriveTfNodeletTest(unittest.TestCase):
         self.diagnostics.clear()
 
     def settle(self):
-        """Returns once what the nodelet publishes reaches this script."""
+        """Returns when messages of the nodelet reach this script."""
         def heard():
             self.odometry.publish(odometry(-60.0 - time.monotonic() % 1.0))
             for publisher in self.images.values():
@@ -162,7 +162,7 @@ class DriveTfNodeletTest(unittest.TestCase):
 
     def test_broadcasts_the_rigs_cameras_in_the_drives_time(self):
         frames = {camera["frame_id"]: camera["vehicle_from_camera"] for camera in self.cameras.values()}
-        # Loaded again now that the manager knows the time for sure.
+        # Load again now that the manager has received the time.
         self.stop()
         self.statics.clear()
         self.start()
@@ -217,7 +217,7 @@ class DriveTfNodeletTest(unittest.TestCase):
         distorted = theta * (1 + sum(d * theta ** (2 * (k + 1)) for k, d in enumerate(info.D)))
         fitted_u = info.K[0] * distorted * np.cos(phi) + info.K[2]
         fitted_v = info.K[4] * distorted * np.sin(phi) + info.K[5]
-        # Tangential distortion, 3 |p1| r^2 focal lengths or 1.8 px at r = 1, is what an equidistant model cannot say.
+        # Tangential distortion, 3 |p1| r^2 focal lengths or 1.8 px at r = 1, cannot be represented by an equidistant model.
         np.testing.assert_allclose(np.hypot(fitted_u - u, fitted_v - v)[inside], 0.0, atol=1.5)
 
     def test_camera_info_comes_with_compressed_images_and_once_where_there_are_both(self):
@@ -233,7 +233,7 @@ class DriveTfNodeletTest(unittest.TestCase):
         driver = CameraInfo(width=1280, height=800, distortion_model="the driver's")
 
         def heard(seconds):
-            """What comes on camera_info for an image of the left and of the front camera."""
+            """The camera_info messages for an image of the left and of the front camera."""
             for infos in self.infos.values():
                 infos.clear()
             for camera in ("left", "front"):
@@ -243,7 +243,7 @@ class DriveTfNodeletTest(unittest.TestCase):
             return [info.distortion_model for info in self.infos["left"]]
 
         def stands_aside(t=iter(range(1, 10000))):
-            # That it has come here does not mean that the nodelet has it already. A stamp again would tell it nothing.
+            # The nodelet may receive it later than this script; it ignores a repeated stamp.
             self.drivers["left"].publish(driver)
             wait_for(lambda: self.infos["left"], "the driver's camera_info")
             return heard(0.001 * next(t)) == []
@@ -259,7 +259,7 @@ class DriveTfNodeletTest(unittest.TestCase):
         other.transform.rotation.w = 1.0
 
         def own_transforms(seconds):
-            """Whether the nodelet still broadcasts; waits for what it cannot suppress, camera_info."""
+            """Whether the nodelet still broadcasts TF; waits for camera_info, which it always publishes."""
             self.transforms.clear()
             self.infos["front"].clear()
             self.odometry.publish(odometry(seconds))
@@ -274,7 +274,7 @@ class DriveTfNodeletTest(unittest.TestCase):
         other.header.frame_id, other.child_frame_id = "odom", "base_link"
 
         def stands_aside(t=iter(range(1, 10000))):
-            # That it has come here does not mean that the nodelet has it already.
+            # The nodelet may receive it later than this script.
             self.transforms.clear()
             self.tf.publish([other])
             wait_for(lambda: self.transforms, "the other transform")

@@ -81,7 +81,7 @@ class DriverTest(unittest.TestCase):
 
     @classmethod
     def drive(cls):
-        """Straight ahead at 2 m/s, told 50 times a second."""
+        """Publishes wheel ticks of straight driving at 2 m/s, 50 times a second."""
         start = rospy.Time.now()
         while not cls.stop.wait(0.02):
             message = WheelTicks(metres_per_tick=0.01)
@@ -122,7 +122,7 @@ class DriverTest(unittest.TestCase):
             return False
 
     def unload(self):
-        """False where it was not loaded."""
+        """False if it was not loaded."""
         try:
             return self.unload_service("/driver").success
         except rospy.ServiceException:
@@ -162,7 +162,7 @@ class DriverTest(unittest.TestCase):
         wait_for(lambda: all(self.level(name) == 0 for name in (*CAMERAS, "sync", "odometry")), "good diagnostics")
 
     def test_nodelets_of_the_manager_share_the_drivers_images(self):
-        """What depth, localization and obstacles are given is the driver's own buffer: one address for all of them."""
+        """Depth, localization and obstacles receive the driver's own buffer: its address is the same for all."""
         probes = {name: {} for name in ("probe_of_depth", "probe_of_localization")}
         for name, buffers in probes.items():
             rospy.Subscriber(f"/{name}/buffers", KeyValue, lambda m, b=buffers: b.__setitem__(m.key, m.value), queue_size=100)
@@ -259,7 +259,7 @@ class DriverTest(unittest.TestCase):
         self.assertEqual({round((b - a).to_sec() * RATE_HZ, 3) for a, b in zip(stamps, stamps[1:])}, {1.0})
         gray = [self.images["left"][stamp].data[0] for stamp in stamps]
         self.assertEqual(gray, list(range(gray[0], gray[0] + 5 * len(gray), 5)))
-        # The wheels' stamps are not shifted: each image lies beside a tick of its instant, where odometry is published too.
+        # The wheels' stamps are not shifted: every image has a tick and an odometry message of its instant.
         told = {message.header.stamp for message in self.odometry}
         beside = [stamp for stamp in stamps[5:-5] if stamp - rospy.Duration(offset_s) in told]
         self.assertGreater(len(beside), 15)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every fault of the simulator measured in the bag: there in its interval, on its camera, and nowhere else."""
+"""Every fault of the simulator, measured in the bag: it affects its interval and its camera, and nothing else."""
 import os
 import pathlib
 import shutil
@@ -89,7 +89,7 @@ class FaultsTest(unittest.TestCase):
             raise RuntimeError(f"simulate_drive failed: {output} {errors}")
 
     def fault(self, kind, *settings):
-        """A recording with the fault, made of the base's noise-free images, and the fault's truth."""
+        """A recording with the fault from the base drive's noise-free images, and the fault's truth."""
         self.simulate(kind, [f"faults.{kind}.{setting}" for setting in settings],
                       images_from=self.folder / "clean.bag")
         recording = Recording(self.folder / f"{kind}.bag")
@@ -97,7 +97,7 @@ class FaultsTest(unittest.TestCase):
         return recording, recording.faults[0]
 
     def assert_same(self, recording, *, cameras=CAMERAS, motion=True):
-        """The cameras' images, and odometry and counters, are the base's."""
+        """Asserts that images, odometry and counters equal the base drive's."""
         for camera in cameras:
             self.assertEqual(recording.stamps(camera), self.base.stamps(camera), camera)
             for (_, received, pixels), (_, base_received, base_pixels) in zip(recording.images[camera],
@@ -110,7 +110,7 @@ class FaultsTest(unittest.TestCase):
         self.assertEqual(recording.truth, self.base.truth)
 
     def differing(self, recording, camera):
-        """Stamps at which the camera's pixels are not the base's."""
+        """Stamps at which the camera's pixels differ from the base drive's."""
         base = self.base.pixels(camera)
         return [stamp for stamp, pixels in recording.pixels(camera).items() if (pixels != base[stamp]).any()]
 
@@ -155,7 +155,7 @@ class FaultsTest(unittest.TestCase):
         self.assertEqual(self.differing(recording, "left"), self.base.stamps("left"))
         difference = np.array([recording.pixels("left")[stamp] - self.base.pixels("left")[stamp]
                                for stamp in self.base.stamps("left")])
-        # The line is where dark pixels brighten, in every image in the same place.
+        # The line brightens dark pixels at the same position in every image.
         always_brighter = (difference > 15).all(axis=0)
         self.assertGreater(always_brighter.any(axis=0).mean(), 0.5)
         self.assertLess(always_brighter.mean(), 0.3)
@@ -260,7 +260,7 @@ class FaultsTest(unittest.TestCase):
         self.assertEqual(recording.odometry[480], self.base.odometry[480])
 
     def test_faults_that_change_what_is_rendered(self):
-        """One rendering for both: somebody turns the left camera about its axis, the front camera's images blur."""
+        """Both faults in one rendering: the left camera is turned about its axis, the front camera's images blur."""
         angle_rad = 0.2
         settings = ["faults.bumped_camera.cameras=[left]", "faults.bumped_camera.start_s=0.5",
                     f"faults.bumped_camera.rotation_rad=[0, 0, {angle_rad}]",
@@ -289,7 +289,7 @@ class FaultsTest(unittest.TestCase):
             self.assertEqual(rigs[0][camera]["vehicle_from_camera"], rigs[1][camera]["vehicle_from_camera"])
 
     def turn_about_axis(self, before, after):
-        """Angle that brings the one image onto the other, about where the optical axis meets the image."""
+        """Rotation angle about the principal point that aligns the two images."""
         rig = yaml.safe_load((self.folder / "rig_truth.yaml").read_text())["cameras"]["left"]["intrinsics"]
         centre = np.array([rig["u0"], rig["v0"]])
         rows, columns = np.indices(before.shape)

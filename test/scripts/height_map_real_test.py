@@ -19,7 +19,7 @@ from drive_fixture import run, tool  # noqa: E402
 
 DATA = os.environ.get("VCHARGE_DATA")
 FLAT_M = 0.03
-# Where things are in the images: metres ahead of and to the left of the vehicle where it took the middle one.
+# Areas in metres ahead and to the left of the vehicle at the middle image.
 COBBLES = (-2.0, 4.0, 1.25, 3.4)
 PAVEMENT = (-3.0, -0.5, 4.25, 5.5)
 HEDGE = (2.0, 5.5, 3.9, 5.0)
@@ -64,7 +64,7 @@ class HeightMapRealTest(unittest.TestCase):
         return np.stack([cls.ahead[chosen], cls.left[chosen], np.ones(chosen.sum())], 1)
 
     def above_cobbles(self, area):
-        """Heights over the cobbles' plane, of the cells in an area; most of the area must be in the map."""
+        """Heights of an area's cells over the cobbles' plane; most of the area must be in the map."""
         chosen = self.inside(area)
         self.assertGreater(chosen.sum(), 0.6 * (area[1] - area[0]) * (area[3] - area[2]) / 0.05**2)
         return self.height[chosen] - self.plane_terms(chosen) @ self.plane

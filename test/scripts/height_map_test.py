@@ -18,7 +18,7 @@ from vcharge_msgs.msg import HeightMap
 from visualization_msgs.msg import Marker
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from drive_fixture import Drive, content_hash, run, tool  # noqa: E402
+from drive_fixture import Drive, run_tool, tool  # noqa: E402
 from nodelet_fixture import Diagnostics, drive_publishers, manager_services, reach, wait_for  # noqa: E402
 
 CAMERA = "left"
@@ -32,10 +32,10 @@ class HeightMapTest(unittest.TestCase):
                        "fusion": {"max_range_m": 4.0}}
         cls.options_path = cls.drive.write_text("height_map.yaml", yaml.safe_dump(cls.options))
         cls.saved = cls.drive.folder / "saved"
-        status, output, errors = cls.build(cls.saved)
+        status, found, errors = cls.build(cls.saved)
         if status != 0:
-            raise RuntimeError(f"build_height_map failed: {output} {errors}")
-        cls.hash = content_hash(output)
+            raise RuntimeError(f"build_height_map failed: {errors}")
+        cls.hash = found["content_hash"]
         cls.load, cls.unload, cls.list = manager_services()
 
     @classmethod
@@ -44,8 +44,8 @@ class HeightMapTest(unittest.TestCase):
 
     @classmethod
     def build(cls, output, options=None, extra=()):
-        return run([tool("vcharge_dense", "build_height_map"), "--bag", cls.drive.bag, "--rig", cls.drive.rig,
-                    "--options", options or cls.options_path, "--output", output, *extra])
+        return run_tool([tool("vcharge_dense", "build_height_map"), "--bag", cls.drive.bag, "--rig", cls.drive.rig,
+                         "--options", options or cls.options_path, "--output", output, *extra])
 
     def expect_failure(self, words, **arguments):
         output = self.drive.folder / "failed"
@@ -110,7 +110,7 @@ class HeightMapTest(unittest.TestCase):
             for topic, message in messages:
                 publishers[topic].publish(message)
                 time.sleep(0.002)
-            # finish() ends the drive for all that came: it must be all.
+            # finish() ends the drive, so everything must have arrived.
             for topic in publishers:
                 count = sum(other == topic for other, _ in messages)
                 wait_for(lambda t=topic, c=count: diagnostics.num_good(t) >= c, f"{count} messages on {topic}", 120.0)

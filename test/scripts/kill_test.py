@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Tools that are killed (SIGKILL) at any moment leave what was there before, or their whole result; never a part of it.
-$VCHARGE_KILLS: how often each is killed (3)."""
+"""Tools killed (SIGKILL) at any moment leave either the older result or the complete new one.
+$VCHARGE_KILLS: kills per tool (3)."""
 import os
 import random
 import shutil
@@ -17,7 +17,7 @@ from drive_fixture import run, tool  # noqa: E402
 from whole_chain import CAMERAS, WholeChain, digest  # noqa: E402
 
 KILLS = int(os.environ.get("VCHARGE_KILLS", "3"))
-# What appears under its name as a whole. Range maps are files of their own, each with a YAML that is written last.
+# Outputs that appear as a whole. A range map is a set of files whose YAML is written last.
 RESULTS = {
     "build_map": ("lot.vmap", "lot.tum"),
     "localize_drive": ("poses.tum", "poses.tum.csv"),
@@ -74,7 +74,7 @@ class KillTest(unittest.TestCase):
         self.assertTrue(all(whole[0][part] != whole[1][part] for part in RESULTS[name]), "two runs with one result")
         moments = random.Random(name)
         for i in range(KILLS):
-            # Most of them late, when results are written.
+            # Mostly late, when results are written.
             after_s = took_s * (1.0 - 0.6 * moments.random() ** 2)
             process = subprocess.Popen([str(word) for word in (second, first)[i % 2]], stdout=subprocess.DEVNULL,
                                        stderr=subprocess.DEVNULL)

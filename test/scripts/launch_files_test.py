@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every launch file and every shipped YAML: they parse, and what they name exists."""
+"""Every launch file and every shipped YAML parses, and the nodes, files and topics that it names exist."""
 import pathlib
 import re
 import sys
@@ -183,7 +183,7 @@ class LaunchFilesTest(unittest.TestCase):
                    "obstacles": [tool("vcharge_obstacles", "detect_obstacles")]}
         dense = [tool("vcharge_dense", "compute_range_maps")]
         for rig, option in [(rig, options[0]) for rig in rigs] + [(rigs[0], option) for option in options]:
-            # Bag and map are read last: an error about them says that rig and options were taken.
+            # Bag and map are read last: an error about them shows that rig and options were accepted.
             status, _, errors = run([*readers.get(option.stem, dense), "--bag", "/nowhere/drive.bag", "--rig", rig, "--options", option,
                                      "--output", "/nowhere/output"])
             self.assertGreater(status, 0)

@@ -1,12 +1,11 @@
-"""What the tests of localization share: a mapped stretch of road, another day's drive over it, and what may befall that."""
+"""What the tests of localization share: a mapped part of a road, another day's drive there, and faults of this drive."""
 import csv
-import re
 import sqlite3
 
 import numpy as np
 import yaml
 
-from drive_fixture import Drive, run, tool
+from drive_fixture import Drive, run, run_tool, tool
 from mapping_fixture import positions, rigid_transform
 
 CAMERAS = ("front", "left", "rear", "right")
@@ -16,7 +15,7 @@ MAP_DURATION_S, DURATION_S, SCALE = 5, 4, 0.25
 
 
 class Place:
-    """A map, and another day's drive through it, both at a quarter of the size; faults of that drive cost no rendering."""
+    """A map, and another day's drive through it, both with images of a quarter of the size. Faults need no new rendering."""
 
     def __init__(self):
         self.map_drive = Drive(drive="figure_eight", duration_s=MAP_DURATION_S, cameras=CAMERAS,
@@ -63,21 +62,22 @@ class Place:
         return folder / "drive.bag"
 
     def localize(self, bag=None, rig=None, place=None, words=(), prefix=()):
-        """Exit status, output and errors of localize_drive, and the rows of its table."""
+        """Exit status, findings and errors of localize_drive, and the rows of its table."""
         output = self.folder / "localized.tum"
         table = self.folder / "localized.tum.csv"
         for path in (output, table):
             path.unlink(missing_ok=True)
-        status, text, errors = run([*prefix, tool("vcharge_localization", "localize_drive"), "--bag", bag or self.bag,
-                                    "--rig", rig or self.rig, "--map", place or self.map, "--output", output, *words])
+        status, found, errors = run_tool([
+            *prefix, tool("vcharge_localization", "localize_drive"), "--bag", bag or self.bag, "--rig", rig or self.rig,
+            "--map", place or self.map, "--output", output, *words])
         rows = []
         if table.exists():
             with open(table, encoding="utf-8") as file:
                 rows = list(csv.DictReader(file))
-        return status, text, errors, rows
+        return status, found, errors, rows
 
     def errors_m(self, stamps, points):
-        """Of positions in the map, against the truth at the same stamps."""
+        """Errors of positions in the map against the truth at the same stamps."""
         rotation, shift = self.world_from_map
         nearest = np.abs(self.stamps[None, :] - np.asarray(stamps)[:, None]).argmin(axis=1)
         return np.linalg.norm(np.asarray(points) @ rotation.T + shift - self.truth[nearest], axis=1)
@@ -88,7 +88,7 @@ class Place:
                              [[float(row[key]) for key in ("tx", "ty", "tz")] for row in posed])
 
     def bad_inputs(self):
-        """Name, map, rig, options, and the words of the error."""
+        """Name, map, rig, options, and expected words of the error."""
         folder = self.folder
         cut = folder / "cut.vmap"
         cut.write_bytes(self.map.read_bytes()[:50000])
@@ -115,9 +115,9 @@ def count(rows, status):
     return sum(row["status"] == status for row in rows)
 
 
-def warnings(output):
-    """The lines of localize_drive's output that name a camera: (frames, text)."""
-    return [(int(frames), text) for frames, text in re.findall(r"warning in (\d+) frames: (.*)", output)]
+def warnings(found):
+    """The warnings about cameras that localize_drive found: (frames, text)."""
+    return [(warning["num_frames"], warning["text"]) for warning in found["warnings"]]
 
 
 def rig_text(rig, change):

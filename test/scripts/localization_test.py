@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Another day's drive in a mapped place: right poses, offline as online, and everything that is wrong has a name."""
+"""Another day's drive in a map: accurate poses, the same offline and online, and every fault is reported."""
 import copy
 import os
 import sys
@@ -17,7 +17,6 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from drive_fixture import content_hash  # noqa: E402
 from localization_fixture import CAMERAS, Place, count, rig_text, warnings  # noqa: E402
 from nodelet_fixture import Diagnostics, drive_publishers, manager_services, reach, wait_for, wait_until_gone  # noqa: E402
 from vcharge_msgs.msg import LocalizationStatus  # noqa: E402
@@ -40,7 +39,7 @@ class LocalizationTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.place = Place()
-        status, cls.output, errors, cls.rows = cls.place.localize()
+        status, cls.found, errors, cls.rows = cls.place.localize()
         if status != 0:
             raise RuntimeError(f"localize_drive failed: {errors}")
         cls.messages = [(topic, message) for topic, message in cls.messages_of(cls.place.bag)
@@ -70,8 +69,6 @@ class LocalizationTest(unittest.TestCase):
         with rosbag.Bag(str(path)) as bag:
             return [(topic, message) for topic, message, _ in bag.read_messages()]
 
-    # ---- the offline tool
-
     def expect_right(self, rows, min_localized=0.9, max_error_m=MAX_ERROR_M):
         self.assertEqual(len(rows), len(self.rows))
         self.assertGreaterEqual(count(rows, "localized"), min_localized * len(rows))
@@ -81,7 +78,7 @@ class LocalizationTest(unittest.TestCase):
         self.assertGreater(len(self.rows), 40)
         self.expect_right(self.rows)
         self.assertEqual(self.rows[0]["status"], "lost", "one recognized place alone is not believed")
-        self.assertEqual(warnings(self.output), [])
+        self.assertEqual(warnings(self.found), [])
 
     def test_is_the_same_on_one_thread_and_without_the_truth(self):
         blind = self.place.map_drive.folder / "blind.bag"
@@ -89,9 +86,9 @@ class LocalizationTest(unittest.TestCase):
             for topic, message in self.messages_of(self.place.bag):
                 if topic != "/ground_truth":
                     bag.write(topic, message, message.header.stamp)
-        status, output, _, _ = self.place.localize(bag=blind, prefix=("taskset", "-c", "0"))
+        status, found, _, _ = self.place.localize(bag=blind, prefix=("taskset", "-c", "0"))
         self.assertEqual(status, 0)
-        self.assertEqual(content_hash(output), content_hash(self.output))
+        self.assertEqual(found["content_hash"], self.found["content_hash"])
 
     def test_faults_of_cameras_are_named_and_the_pose_stays_right(self):
         frozen = self.place.drive("frozen", "faults.frozen_camera.cameras=[left]", "faults.frozen_camera.start_s=1.5")
@@ -107,11 +104,11 @@ class LocalizationTest(unittest.TestCase):
         for bag, rig, blamed, words in ((frozen, None, ("left",), "frozen"), (dead, None, ("rear",), "no image"),
                                         (swapped, None, ("left", "right"), "intrinsics"),
                                         (None, wrong, ("right",), "intrinsics")):
-            status, output, errors, rows = self.place.localize(bag=bag, rig=rig)
+            status, found, errors, rows = self.place.localize(bag=bag, rig=rig)
             self.assertEqual((status, errors), (0, []))
-            # At this size a frame has some 80 inliers of the 20 that it needs: each lost camera costs frames.
+            # With these small images a frame has about 80 inliers and needs 20: each lost camera costs frames.
             self.expect_right(rows, min_localized=0.9 - 0.1 * len(blamed))
-            told = warnings(output)
+            told = warnings(found)
             self.assertEqual({text.split(":")[0] for _, text in told}, set(blamed), told)
             self.assertTrue(all(words in text for _, text in told), told)
             self.assertGreater(min(frames for frames, _ in told), 10)
@@ -121,10 +118,10 @@ class LocalizationTest(unittest.TestCase):
                                 ("gap", "faults.missing_ticks.start_s=1.5", "faults.missing_ticks.end_s=2.5"),
                                 ("late", "faults.late_images.cameras=[rear]", "faults.late_images.probability=0.5",
                                  "faults.late_images.delay_s=0.17")):
-            status, output, errors, rows = self.place.localize(bag=self.place.drive(name, *settings))
+            status, found, errors, rows = self.place.localize(bag=self.place.drive(name, *settings))
             self.assertEqual((status, errors), (0, []), name)
             self.expect_right(rows)
-            self.assertEqual(warnings(output), [], name)
+            self.assertEqual(warnings(found), [], name)
 
     def test_a_rig_with_other_cameras_and_a_map_of_other_features_work(self):
         two = self.place.rig.parent / "two.yaml"
@@ -152,8 +149,6 @@ class LocalizationTest(unittest.TestCase):
                 self.assertIn(word, errors[0])
             self.assertEqual(rows, [])
             self.assertFalse((self.place.folder / "localized.tum").exists())
-
-    # ---- the nodelet
 
     def start(self, lossless=True):
         rospy.set_param("/localization/rig", str(self.place.rig))
@@ -225,7 +220,7 @@ class LocalizationTest(unittest.TestCase):
         self.wait_until_told(0, "localized")
 
     def check_tf(self):
-        """map_from_odom * odom_from_vehicle = map_from_vehicle, by positions; /odom comes often enough for lines between."""
+        """map_from_odom * odom_from_vehicle = map_from_vehicle, compared by positions; /odom is frequent enough for linear interpolation."""
         odometry = [message for topic, message in self.messages if topic == "/odom"]
         stamps = [message.header.stamp.to_sec() for message in odometry]
         way = np.array([[getattr(message.pose.pose.position, axis) for axis in "xyz"] for message in odometry])

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A saved map: what map_info tells of it and exports, and what map_publisher_nodelet publishes of it."""
+"""map_info and map_publisher_nodelet on a saved map."""
 import math
 import os
 import pathlib

@@ -1,9 +1,8 @@
 #!/usr/bin/env python3
-"""build_map on drives with faults: what was skipped is told, and a run that was killed goes on where it was."""
+"""build_map on drives with faults: it reports what was skipped, and an interrupted run is resumed."""
 import copy
 import os
 import random
-import re
 import signal
 import subprocess
 import sys
@@ -15,7 +14,7 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from drive_fixture import Drive, content_hash, run, tool  # noqa: E402
+from drive_fixture import Drive, run_tool, tool  # noqa: E402
 from mapping_fixture import errors_m, numbers_of_map  # noqa: E402
 
 CAMERAS = ("front", "left", "rear", "right")
@@ -28,7 +27,7 @@ def is_image(topic):
 
 
 def limited_to(kilobytes):
-    """Prefix of a command that can write no file larger than this, as on a full disk, and is told so by an error."""
+    """Prefix that lets a command write no larger file: writing fails with an error, as on a full disk."""
     return ("bash", "-c", f'trap "" XFSZ; ulimit -f {kilobytes}; exec "$@"', "bash")
 
 
@@ -39,9 +38,9 @@ class MappingFaultsTest(unittest.TestCase):
                           image_scale=0.25)
         cls.start_s = cls.drive.messages()[0][1].header.stamp.to_sec()
         cls.map = cls.drive.folder / "lot.vmap"
-        status, cls.output, errors = cls.build(cls.drive.bag, cls.map)
+        status, cls.found, errors = cls.build(cls.drive.bag, cls.map)
         if (status, errors) != (0, []):
-            raise RuntimeError(f"build_map failed: {cls.output} {errors}")
+            raise RuntimeError(f"build_map failed: {errors}")
 
     @classmethod
     def tearDownClass(cls):
@@ -58,33 +57,27 @@ class MappingFaultsTest(unittest.TestCase):
 
     @classmethod
     def build(cls, bag, output, *extra, prefix=(), rig=None):
-        return run([*prefix, *cls.command(bag, output, *extra, rig=rig)])
+        return run_tool([*prefix, *cls.command(bag, output, *extra, rig=rig)])
 
     def rewritten(self, change):
-        """The drive's bag, as change(seconds since the start, topic, message) makes each message one or more."""
+        """The drive's bag with each message replaced by change(seconds since the start, topic, message)."""
         return self.drive.rewrite(f"{self.name}.bag", lambda topic, message: change(
             message.header.stamp.to_sec() - self.start_s, topic, message))
 
     def build_bad(self, bag, max_error_m=0.15):
-        """Builds a map, which must be finite and right all the same; returns what the tool told."""
+        """Builds a map, which must still be finite and accurate; returns what the tool found."""
         trajectory = self.drive.folder / f"{self.name}.tum"
-        status, output, errors = self.build(bag, self.output_map, "--trajectory", trajectory)
-        self.assertEqual((status, errors), (0, []), output)
+        status, found, errors = self.build(bag, self.output_map, "--trajectory", trajectory)
+        self.assertEqual((status, errors), (0, []))
         for column, values in numbers_of_map(self.output_map).items():
             self.assertTrue(np.isfinite(values).all(), column)
         self.assertTrue(np.isfinite(np.loadtxt(trajectory)).all())
         errors = errors_m(trajectory, self.drive.truth / "trajectory.tum")
         self.assertLess(np.sqrt(np.mean(errors ** 2)), max_error_m)
-        return output
-
-    def told(self, output, pattern):
-        """The number before a text of the report."""
-        found = re.search(rf"(\d+) {pattern}", output)
-        self.assertIsNotNone(found, f"'{pattern}' in: {output}")
-        return int(found.group(1))
+        return found
 
     def image_stamps(self, bag=None):
-        """By topic: the set of stamps of a bag's images."""
+        """Stamps of a bag's images, a set by topic."""
         stamps = {}
         for topic, message in self.drive.messages() if bag is None else self.read(bag):
             if is_image(topic):
@@ -97,11 +90,11 @@ class MappingFaultsTest(unittest.TestCase):
             return [(topic, message) for topic, message, _ in opened.read_messages()]
 
     def check_bag(self, bag, rig=None):
-        """Exit status, the subjects of what did not pass with their grades, and the errors."""
-        status, output, errors = run([tool("vcharge_recordings", "check_bag"), "--bag", bag, "--rig",
-                                      rig or self.drive.rig])
-        found = dict(reversed(line.split("  ")[:2]) for line in output.splitlines() if not line.startswith("verdict"))
-        return status, {subject: grade for subject, grade in found.items() if grade != "PASS"}, errors
+        """Exit status, grades of the subjects that did not pass, and the errors."""
+        status, found, errors = run_tool([tool("vcharge_recordings", "check_bag"), "--bag", bag, "--rig",
+                                          rig or self.drive.rig])
+        return status, {finding["subject"]: finding["grade"] for finding in found.get("findings", [])
+                        if finding["grade"] != "PASS"}, errors
 
     def test_check_bag_judges_a_recording_before_it_is_used(self):
         self.assertEqual(self.check_bag(self.drive.bag), (0, {}, []))
@@ -139,10 +132,9 @@ class MappingFaultsTest(unittest.TestCase):
         before, after = (stamps["/camera/left/image_raw"] for stamps in (self.image_stamps(), self.image_stamps(bag)))
         missing = len(before) - len(after)
         self.assertGreater(missing, 10)
-        output = self.build_bad(bag)
-        self.assertEqual(self.told(output, "lack a camera"), missing)
-        self.assertEqual(self.told(output, "of them left"), missing)
-        self.assertNotIn("of them front", output)
+        found = self.build_bad(bag)
+        self.assertEqual(found["num_incomplete_frames"], missing)
+        self.assertEqual(found["num_missing_images"], {"front": 0, "left": missing, "rear": 0, "right": 0})
 
     def test_a_tenth_of_all_frames_and_images_may_be_lost(self):
         chance = random.Random(3)
@@ -159,9 +151,9 @@ class MappingFaultsTest(unittest.TestCase):
         frames = set().union(*left.values())
         incomplete = sum(1 for stamp in frames if any(stamp not in of_camera for of_camera in left.values()))
         self.assertLess(len(frames), len(stamps))
-        output = self.build_bad(bag)
-        self.assertIn(f"frames: {len(frames)} (", output)
-        self.assertEqual(self.told(output, "lack a camera"), incomplete)
+        found = self.build_bad(bag)
+        self.assertEqual(found["num_frames"], len(frames))
+        self.assertEqual(found["num_incomplete_frames"], incomplete)
 
     def test_frames_in_gaps_of_the_odometry_are_counted(self):
         gaps = ((2.0, 2.7), (6.0, 6.9))
@@ -175,14 +167,14 @@ class MappingFaultsTest(unittest.TestCase):
             inside = 0 < after < len(odometry) and odometry[after] != stamp
             without += bool(inside and odometry[after] - odometry[after - 1] > MAX_ODOMETRY_GAP_S * 1e9)
         self.assertGreater(without, 5)
-        self.assertEqual(self.told(self.build_bad(bag), "without odometry"), without)
+        self.assertEqual(self.build_bad(bag)["num_frames_without_odometry"], without)
 
     def test_odometry_that_ends_early_leaves_a_map_of_what_it_covers(self):
         bag = self.rewritten(lambda time_s, topic, message: (
             [] if topic == "/odom" and time_s > 6.0 else [(topic, message)]))
         uncovered = sum(1 for stamp in set().union(*self.image_stamps().values())
                         if stamp * 1e-9 - self.start_s > 6.03)
-        self.assertGreaterEqual(self.told(self.build_bad(bag), "without odometry"), uncovered)
+        self.assertGreaterEqual(self.build_bad(bag)["num_frames_without_odometry"], uncovered)
 
     def test_standing_for_long_is_told_and_changes_little(self):
         stand_s = 4.0
@@ -213,9 +205,9 @@ class MappingFaultsTest(unittest.TestCase):
 
         bag = self.rewritten(change)
         trajectory = self.drive.folder / "standing.tum"
-        status, output, errors = self.build(bag, self.output_map, "--trajectory", trajectory)
-        self.assertEqual((status, errors), (0, []), output)
-        self.assertGreater(self.told(output, "standing"), 0.9 * STANDING_S / for_images)
+        status, found, errors = self.build(bag, self.output_map, "--trajectory", trajectory)
+        self.assertEqual((status, errors), (0, []))
+        self.assertGreater(found["num_standing_frames"], 0.9 * STANDING_S / for_images)
         keyframes = len(numbers_of_map(self.output_map)["keyframe.x_m"])
         self.assertLessEqual(abs(keyframes - len(numbers_of_map(self.map)["keyframe.x_m"])), 2)
         for column, values in numbers_of_map(self.output_map).items():
@@ -234,7 +226,7 @@ class MappingFaultsTest(unittest.TestCase):
             position.x, position.y = position.x - origin[0], position.y - origin[1]
             return [(topic, message)]
 
-        self.assertIn("odometer: started over 1 times", self.build_bad(self.rewritten(change)))
+        self.assertEqual(self.build_bad(self.rewritten(change))["num_odometry_resets"], 1)
 
     def test_a_drive_without_odometry_or_without_motion_makes_no_map(self):
         before = self.map.read_bytes()
@@ -265,7 +257,7 @@ class MappingFaultsTest(unittest.TestCase):
         return output.with_name(output.name + ".work")
 
     def build_killed(self, after):
-        """Kills a run once it is inside a stage; what it leaves is there."""
+        """Kills a run inside a stage; its checkpoint stays."""
         process = subprocess.Popen(self.command(self.drive.bag, self.output_map), stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, text=True)
         try:
@@ -281,39 +273,35 @@ class MappingFaultsTest(unittest.TestCase):
         self.assertTrue(self.work(self.output_map).exists())
 
     def expect_whole(self, *extra):
-        """A run gives the map of the uninterrupted one and leaves nothing but it; returns both its outputs."""
-        status, output, errors = self.build(self.drive.bag, self.output_map, *extra)
+        """A run gives the map of the uninterrupted one and leaves nothing else; returns the stage after which it resumed."""
+        status, found, errors = self.build(self.drive.bag, self.output_map, *extra)
         self.assertEqual(status, 0, errors)
-        self.assertEqual(content_hash(output), content_hash(self.output))
+        self.assertEqual(found["content_hash"], self.found["content_hash"])
         self.assertFalse(self.work(self.output_map).exists())
-        return output, errors
+        return found["resumed_after"], errors
 
     def test_a_killed_run_goes_on_from_its_last_stage(self):
         self.build_killed(" first adjustment   0 %")
-        output, errors = self.expect_whole()
-        self.assertEqual(errors, [])
-        self.assertIn("after the stage 'following the drive'", output)
+        self.assertEqual(self.expect_whole(), ("following the drive", []))
         self.output_map.unlink()
         self.build_killed(" second landmark search   0 %")
-        self.assertIn("after the stage 'adjustment'", self.expect_whole()[0])
+        self.assertEqual(self.expect_whole()[0], "adjustment")
 
     def test_fresh_does_not_go_on(self):
         self.build_killed(" loops   0 %")
-        output, errors = self.expect_whole("--fresh")
-        self.assertEqual(errors, [])
-        self.assertNotIn("going on", output)
+        self.assertEqual(self.expect_whole("--fresh"), ("", []))
 
     def test_what_other_options_or_damage_left_is_refused_and_told(self):
         self.build_killed(" loops   0 %")
         kept = self.work(self.output_map).read_bytes()
         options = self.drive.write_text("other.yaml", "keyframe_distance_m: 0.6\n")
-        status, output, errors = self.build(self.drive.bag, self.output_map, "--options", options)
+        status, found, errors = self.build(self.drive.bag, self.output_map, "--options", options)
         self.assertEqual((status, len(errors)), (0, 1), errors)
         self.assertIn("other options", errors[0])
-        self.assertNotIn("going on", output)
+        self.assertEqual(found["resumed_after"], "")
         for bytes_left in (kept[:len(kept) // 2], kept[:100] + b"\0" + kept[101:], b"SQLite format 3"):
             self.work(self.output_map).write_bytes(bytes_left)
-            output, errors = self.expect_whole()
+            _, errors = self.expect_whole()
             self.assertEqual(len(errors), 1, errors)
             for word in (self.work(self.output_map).name, "starting anew"):
                 self.assertIn(word, errors[0])
@@ -328,11 +316,13 @@ class MappingFaultsTest(unittest.TestCase):
             self.assertEqual(self.map.read_bytes(), before)
         self.assertEqual([path.name for path in self.drive.folder.iterdir() if ".tmp" in path.name], [])
 
-    def test_a_trajectory_that_cannot_be_written_costs_no_work(self):
-        status, _, errors = self.build(self.drive.bag, self.output_map, "--trajectory", "/no/such/folder/lot.tum")
+    def test_a_trajectory_that_cannot_be_written_is_refused_before_the_work(self):
+        trajectory = self.drive.bag / "lot.tum"
+        status, _, errors = self.build(self.drive.bag, self.output_map, "--trajectory", trajectory)
         self.assertNotEqual(status, 0)
         self.assertEqual(len(errors), 1, errors)
-        self.assertIn("after the stage 'last adjustment'", self.expect_whole()[0])
+        self.assertIn(str(trajectory), errors[0])
+        self.assertFalse(self.work(self.output_map).exists())
 
 
 if __name__ == "__main__":

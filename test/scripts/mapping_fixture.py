@@ -11,7 +11,7 @@ def positions(path):
 
 
 def rigid_transform(points, targets):
-    """Rotation and shift that move points to lie nearest to their targets (Umeyama 1991, without scale)."""
+    """Rotation and translation that align points with targets (Umeyama 1991, without scale)."""
     centre, target_centre = points.mean(axis=0), targets.mean(axis=0)
     u, _, v = np.linalg.svd((targets - target_centre).T @ (points - centre))
     rotation = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
@@ -24,7 +24,7 @@ def align(points, targets):
 
 
 def errors_m(trajectory, truth):
-    """Of the positions of a TUM file, aligned with the truth at the same stamps."""
+    """Position errors of a TUM file after alignment with the truth at the same stamps."""
     stamps, estimate = positions(trajectory)
     truth_stamps, true_positions = positions(truth)
     nearest = np.abs(truth_stamps[None, :] - stamps[:, None]).argmin(axis=1)
@@ -32,7 +32,7 @@ def errors_m(trajectory, truth):
 
 
 def numbers_of_map(path):
-    """All that a map says in numbers that must be finite: an array per column."""
+    """All columns of a map whose numbers must be finite, as arrays."""
     poses = "x_m y_m z_m qx qy qz qw"
     columns = {}
     with sqlite3.connect(str(path)) as connection:

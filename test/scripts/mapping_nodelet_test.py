@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The mapping nodelet on a simulated drive: it makes the map of build_map, shows it, and outlives bad input."""
+"""The mapping nodelet on a simulated drive: it makes the map of build_map, publishes it, and survives bad input."""
 import copy
 import os
 import sys
@@ -16,7 +16,7 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from drive_fixture import Drive, content_hash, run, tool  # noqa: E402
+from drive_fixture import Drive, run_tool, tool  # noqa: E402
 from mapping_fixture import numbers_of_map  # noqa: E402
 from nodelet_fixture import (TIMEOUT_S, Diagnostics, drive_publishers, manager_services, reach, wait_for,  # noqa: E402
                              wait_until_gone)
@@ -31,7 +31,7 @@ class MappingNodeletTest(unittest.TestCase):
         cls.drive = Drive(drive="figure_eight", duration_s=7, cameras=CAMERAS, extra=("--image-step", "2"),
                           image_scale=0.25)
         cls.offline_map = cls.drive.folder / "offline.vmap"
-        status, cls.offline, errors = run([
+        status, cls.offline, errors = run_tool([
             tool("vcharge_mapping", "build_map"), "--bag", cls.drive.bag, "--rig", cls.drive.rig, "--output",
             cls.offline_map])
         if status != 0:
@@ -94,7 +94,7 @@ class MappingNodeletTest(unittest.TestCase):
 
     def finish_good_drive(self):
         self.publish()
-        # The last of the odometry still waits to be sorted, and with it the last frames: finish() takes them too.
+        # The last frames still wait for odometry to be sorted; finish() processes them.
         self.wait_for_frames(self.num_frames - 10)
         time.sleep(1.0)
         answer = self.finish()
@@ -106,13 +106,13 @@ class MappingNodeletTest(unittest.TestCase):
         self.assertFalse(self.output.exists())
         start = time.monotonic()
         self.finish_good_drive()
-        # Diagnostics come once a second: a map that is made sooner may tell no stage.
+        # Diagnostics come once a second: a faster map may report no stage.
         took_long = time.monotonic() - start > 1.0 + 3.0 + self.num_frames * len(self.publishers) * 0.002
         self.assertTrue(any(text.startswith("stage ") for _, text in self.diagnostics.told) or not took_long, "progress is told")
-        self.assertIn(content_hash(self.offline), self.message_of_map())
+        self.assertIn(self.offline["content_hash"], self.message_of_map())
         answer = self.save()
         self.assertTrue(answer.success, answer.message)
-        self.assertIn(content_hash(self.offline), answer.message)
+        self.assertIn(self.offline["content_hash"], answer.message)
         saved, offline = numbers_of_map(self.output), numbers_of_map(self.offline_map)
         for column, values in offline.items():
             np.testing.assert_array_equal(saved[column], values, column)
@@ -129,7 +129,7 @@ class MappingNodeletTest(unittest.TestCase):
         clouds = self.received["/mapping/landmarks"]
         self.assertEqual(clouds[-1].width, len(offline["landmark.x_m"]))
         self.assertEqual(clouds[-1].header.frame_id, "map")
-        # What is shown while driving lies about where the map has it in the end: within the drive's extent and 60 m.
+        # Landmarks shown while driving are near those of the final map: within the drive's extent and 60 m.
         points = np.array(list(point_cloud2.read_points(clouds[-2], field_names=("x", "y", "z"))))
         self.assertGreater(len(points), 100)
         self.assertTrue(np.isfinite(points).all())
@@ -161,10 +161,10 @@ class MappingNodeletTest(unittest.TestCase):
 
     def test_a_map_that_cannot_be_written_is_told_and_may_be_written_elsewhere(self):
         self.finish_good_drive()
-        rospy.set_param("/mapping/output", "/no/such/folder/lot.vmap")
+        rospy.set_param("/mapping/output", str(self.drive.bag / "lot.vmap"))
         answer = self.save()
         self.assertFalse(answer.success)
-        self.assertIn("/no/such/folder", answer.message)
+        self.assertIn(str(self.drive.bag), answer.message)
         rospy.set_param("/mapping/output", str(self.output))
         self.assertTrue(self.save().success)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The published images of one camera as a drive: the path of build_map against the poses that come with them."""
+"""The published images of one camera as a drive: the path of build_map against the published poses."""
 import copy
 import math
 import os
@@ -77,7 +77,7 @@ class MappingRealTest(unittest.TestCase):
         return self.given[nearest]
 
     def rotation_errors(self, path):
-        """Of each pose relative to the first."""
+        """Rotation of each pose relative to the first."""
         given = self.given_at(path[:, 0])
         relative = [[rotation(poses[0, 4:]).T @ rotation(pose[4:]) for pose in poses] for poses in (path, given)]
         return [angle(estimate.T @ truth) for estimate, truth in zip(*relative)]
@@ -90,7 +90,7 @@ class MappingRealTest(unittest.TestCase):
         self.assertLess(rotation_error_rad, MAX_ROTATION_ERROR_RAD)
 
     def bent(self):
-        """The drive with a planar odometer that turns more than the car, in equal shares of the way."""
+        """The drive with a planar odometer that turns more than the car, in proportion to the distance."""
         path = self.folder / "bent.bag"
         whole_m = length(self.given)
         before, x, y, heading = None, 0.0, 0.0, 0.0

@@ -22,7 +22,7 @@ def wait_for(condition, what, timeout_s=TIMEOUT_S):
 
 
 def manager_services(manager="/manager"):
-    """The manager's services to load and unload a nodelet and to list them, once they are there."""
+    """The manager's services to load, unload and list nodelets; waits for them."""
     services = (("load_nodelet", NodeletLoad), ("unload_nodelet", NodeletUnload), ("list", NodeletList))
     for name, _ in services:
         rospy.wait_for_service(f"{manager}/{name}", TIMEOUT_S)
@@ -39,7 +39,7 @@ def drive_publishers(cameras):
 
 
 class Diagnostics:
-    """What /diagnostics tells: by name the newest status, and (level, message) of every one."""
+    """Collects /diagnostics: the newest status by name, and (level, message) of all."""
 
     def __init__(self):
         self.status, self.told = {}, []
@@ -55,31 +55,31 @@ class Diagnostics:
         self.told.clear()
 
     def status_of(self, name):
-        """The newest status whose name has this in it, or none."""
+        """The newest status whose name contains this, or None."""
         return next((status for key, status in list(self.status.items()) if name in key), None)
 
     def values(self, name):
-        """Its keys and values."""
+        """Keys and values of this status."""
         status = self.status_of(name)
         return {value.key: value.value for value in status.values} if status else {}
 
     def heard(self):
-        """Topics of which a nodelet tells that something bad came; for reach()."""
+        """Topics about which a nodelet reported bad messages; for reach()."""
         return {value.key for status in list(self.status.values()) for value in status.values if ", 0 bad" not in value.value}
 
     def num_good(self, topic):
-        """Good messages of a topic by the nodelet that tells of it."""
+        """Number of good messages of a topic that the nodelet reports."""
         told = next((value.value for status in list(self.status.values()) for value in status.values if value.key == topic), "")
         return int(told.split(" good, ")[0]) if " good, " in told else 0
 
     def tells(self, *words, level=None):
-        """Whether one message since the last clear() has all the words, at the level if one is given."""
+        """Whether a message since the last clear() has all the words, and the level if given."""
         return any((level is None or at == level) and all(word in text for word in words) for at, text in list(self.told))
 
 
 def connections_to(uri, subscriber):
-    """A subscriber's connections to a node. Takes those away that have ended: rospy keeps one that was refused because the
-    nodelet had given up the topic meanwhile, and then does not connect to its next publisher, being connected already."""
+    """A subscriber's connections to a node. Removes ended ones: rospy keeps a connection that the node refused because the
+    nodelet had stopped publishing, and then does not connect to the node's next publisher."""
     connections = [connection for connection in list(subscriber.impl.connections) if connection.endpoint_id == uri]
     for connection in connections:
         if connection.done:
@@ -88,15 +88,15 @@ def connections_to(uri, subscriber):
 
 
 def wait_until_gone(manager, subscribers):
-    """After unloading: returns once none of the subscribers is connected to the manager. A nodelet that advertises the same
-    topics before that would not be heard: rospy takes the dying connection for the new one."""
+    """Call after unloading: returns when no subscriber is connected to the manager. Otherwise rospy would keep the ending
+    connection instead of connecting to the next nodelet on the same topics."""
     uri = rosgraph.Master("/" + __name__).lookupNode(manager)
     wait_for(lambda: sum(len(connections_to(uri, subscriber)) for subscriber in subscribers) == 0,
              f"connections to {manager} to end")
 
 
 def wait_until_connected(manager, subscribers):
-    """After loading: returns once each of the subscribers is connected to the manager, to which rospy may need to be led."""
+    """Call after loading: returns when all subscribers are connected to the manager; announces its topics again if needed."""
     uri = rosgraph.Master("/" + __name__).lookupNode(manager)
 
     def all_connected():
@@ -109,9 +109,9 @@ def wait_until_connected(manager, subscribers):
 
 
 def reach(publishers, heard, subscribers=()):
-    """After loading: returns once the subscribers are connected to the manager and the nodelet hears all topics. Publishes
-    what a nodelet refuses (no stamp) until it tells so of every topic: a connection alone may be that of a nodelet that is
-    gone. `heard()` returns the topics of which it has told."""
+    """Call after loading: returns when the subscribers are connected to the manager and the nodelet receives all topics.
+    Publishes messages without a stamp until the nodelet reports them for every topic, since a connection may belong to an
+    unloaded nodelet. `heard()` returns the topics with reports."""
     wait_until_connected("/manager", subscribers)
 
     def all_heard():
@@ -124,7 +124,7 @@ def reach(publishers, heard, subscribers=()):
 
 
 def expect_bad_rig_is_refused(test, nodelet, rig):
-    """The nodelet does not load with a rig that is not there, and the manager goes on with what it has."""
+    """Asserts that the nodelet does not load with a missing rig file, and that the manager keeps its other nodelets."""
     loaded = test.list().nodelets
     rospy.set_param("/other/rig", str(rig))
     with test.assertRaises(rospy.ServiceException):
@@ -133,9 +133,9 @@ def expect_bad_rig_is_refused(test, nodelet, rig):
 
 
 def announce_again(topic, kind):
-    """Has the master tell all subscribers of a topic who publishes on it. rospy takes the last such news for the newest;
-    where a nodelet goes and comes again at once, that may be the news that it went. By a name of its own: this script may
-    publish on the topic, too, and its registration has to stay."""
+    """Makes the master send all subscribers the publishers of a topic again. When a nodelet is unloaded and loaded at once,
+    rospy may receive the two updates in the wrong order. Uses a node name of its own, so that this script's own
+    registration as a publisher stays."""
     master = rosgraph.Master(rospy.get_name() + "_announcer")
     master.registerPublisher(topic, kind._type, rospy.get_node_uri())
     master.unregisterPublisher(topic, rospy.get_node_uri())

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The obstacle nodelet on a simulated drive: it equals the offline tool and the truth, and outlives bad input."""
+"""The obstacle nodelet on a simulated drive: it equals the offline tool, agrees with the truth, and survives bad input."""
 import collections
 import copy
 import csv
@@ -37,7 +37,7 @@ def cells_of(grid):
 
 
 def places_of(grid, state):
-    """Middles of the cells of a state in the fixed frame (N x 2)."""
+    """Centres (N x 2) of the cells with a state, in the fixed frame."""
     rows, columns = np.nonzero(cells_of(grid) == state)
     origin = grid.info.origin.position
     return np.stack([origin.x + (columns + 0.5) * grid.info.resolution,
@@ -90,7 +90,7 @@ class ObstacleNodeletTest(unittest.TestCase):
 
     @classmethod
     def record_range_maps(cls):
-        """The drive's odometry and what the depth nodelet makes of its images, by stamp."""
+        """The drive's odometry and the depth nodelet's range maps of its images, by stamp."""
         recorded = []
         subscribers = [
             rospy.Subscriber(f"/dense/{camera}/range/{part}", kind,
@@ -143,14 +143,14 @@ class ObstacleNodeletTest(unittest.TestCase):
         wait_until_connected("/manager", self.subscribers)
 
     def unload_obstacles(self):
-        """Until no connection is left that would be taken for one of the next nodelet's."""
+        """Waits until no connection to the unloaded nodelet is left."""
         self.assertTrue(self.unload("/obstacles").success)
         wait_until_gone("/manager", self.subscribers)
         wait_for(lambda: all(publisher.get_num_connections() == 0 for publisher in self.publishers.values()),
                  "the nodelet's subscriptions to end")
 
     def reach(self):
-        """Until the nodelet tells of odometry without a stamp, and all else is connected."""
+        """Waits until the nodelet reports odometry without a stamp, and all topics are connected."""
         self.diagnostics.clear()
 
         def heard():
@@ -193,7 +193,7 @@ class ObstacleNodeletTest(unittest.TestCase):
         wait_for(lambda: self.diagnostics.tells(*words), f"a diagnostic with {words}")
 
     def expect_recovery(self):
-        """A good drive after whatever came before gives a map."""
+        """A good drive gives a map after bad input."""
         self.clear()
         self.publish()
         wait_for(lambda: len(self.grids()) >= len(self.offline_stamps()) - 3, "maps of a good drive")
@@ -232,7 +232,7 @@ class ObstacleNodeletTest(unittest.TestCase):
         np.testing.assert_allclose(ranges, expected, atol=2e-4)  # the file has four digits
 
     def check_against_truth(self, grid):
-        """Odometry begins where the drive begins: its frame is the world's, turned and moved."""
+        """fixed_from_world: the odometry frame has its origin at the start of the drive."""
         world_from_odom = self.world_from_odom()
         meta = yaml.safe_load((self.drive.truth / "height_map.yaml").read_text())
         heights = cv2.imread(str(self.drive.truth / meta["file"]), cv2.IMREAD_UNCHANGED)
@@ -252,7 +252,7 @@ class ObstacleNodeletTest(unittest.TestCase):
         self.assertGreaterEqual(np.mean(at(highest, occupied) > 0.08), 0.7)
 
     def world_from_odom(self):
-        """2 x 3, by the pose at the first image."""
+        """2 x 3 transform by the pose at the first image."""
         truth = np.loadtxt(self.drive.truth / "trajectory.tum")[0]
         odometry = min((message for topic, message in self.messages if topic == "/odom"),
                        key=lambda message: abs(message.header.stamp.to_sec() - truth[0])).pose.pose
@@ -274,7 +274,7 @@ class ObstacleNodeletTest(unittest.TestCase):
         for camera in CAMERAS:
             planes = np.array([[m.vector.x, m.vector.y, m.vector.z]
                                for m in self.received[f"/obstacles/{camera}/ground_plane"]])
-            # The ground is level, and the suspension gives way by less than a degree and 3 cm.
+            # The ground is level, and the suspension moves by less than a degree and 3 cm.
             self.assertLess(np.abs(np.median(planes[:, :2], axis=0)).max(), math.radians(1.0))
             self.assertLess(abs(np.median(planes[:, 2])), 0.03)
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Bad arguments and bad files of every tool: one line that names what is wrong, and nothing left or destroyed."""
+"""Bad arguments and bad files of every tool: one line that names the mistake; no file is written, changed or removed."""
 import os
 import pathlib
 import shutil
@@ -22,7 +22,7 @@ GARBAGE = bytes(range(1, 256)) * 8
 
 
 def write_recording(folder):
-    """A small recording as import_vcharge_images takes it: a textured wall passes by at 2.5 m/s."""
+    """Writes a small recording for import_vcharge_images: a textured wall passes by at 2.5 m/s."""
     folder.mkdir()
     (folder / "calib.txt").write_text("89 0 39.5 89 24.5 1.15 -0.33 0.086 -0.0006 -0.00003\n"
                                       "1 0 0 1.9\n0 0 1 1.4\n0 -1 0 0.067\n")
@@ -155,7 +155,7 @@ class ToolsTest(unittest.TestCase):
     def test_options_are_shown_without_any_other_argument(self):
         for package, program in (("vcharge_calibration", "calibrate_rig"), ("vcharge_calibration", "calibrate_rig_from_map"),
                                  ("vcharge_dense", "build_height_map"), ("vcharge_dense", "compute_range_maps"),
-                                 ("vcharge_evaluation", "train_vocabulary"), ("vcharge_localization", "localize_drive"),
+                                 ("vcharge_localization", "localize_drive"),
                                  ("vcharge_mapping", "build_map"), ("vcharge_obstacles", "detect_obstacles"),
                                  ("vcharge_simulation", "simulate_drive")):
             status, output, errors = run([tool(package, program), "--show-options"])
@@ -252,7 +252,7 @@ class ToolsTest(unittest.TestCase):
             self.fail_with("simulate", [key, value], **{key: value})
         self.fail_with("import", ["ground_height_m", "nan"], ground_height_m="nan")
         self.fail_with("import", ["ground_slope_x", "-2"], ground_slope_x="-2")
-        for key, value in (("min_motion_m", ".nan"), ("frames.max_speed_m_per_s", "-1"),
+        for key, value in (("frames.max_camera_wait_s", ".nan"), ("frames.max_speed_m_per_s", "-1"),
                            ("plane_sweep.min_distance_m", "-0.3"), ("plane_sweep.max_distance_m", ".inf"),
                            ("working_camera.focal_scale", ".nan"), ("neighbours.num_neighbours", "-4"),
                            ("frames.max_odometry_gap_s", "0"), ("plane_sweep.num_planes", "many")):

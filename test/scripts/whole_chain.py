@@ -1,4 +1,4 @@
-"""The offline tools in their order on one short drive, for the tests that look at all of them."""
+"""The offline tools in order on one short drive, for tests of all of them."""
 import hashlib
 
 from drive_fixture import Drive, tool
@@ -9,7 +9,7 @@ HEIGHTS = "fusion: {cell_size_m: 0.1}\nrange_maps: {working_camera: {image_scale
 
 
 class WholeChain:
-    """A drive at a quarter of the size, and what each tool is called with; a tool's outputs are below a folder."""
+    """A drive with images of a quarter of the size, and the arguments of each tool."""
 
     def __init__(self, duration_s=4.0, image_step=2):
         self.drive = Drive(drive="figure_eight", duration_s=duration_s, cameras=CAMERAS, extra=("--image-step", image_step),
@@ -18,7 +18,7 @@ class WholeChain:
         self.ranges = self.drive.write_text("ranges.yaml", OBSTACLE_RANGES)
 
     def words(self, name, output, source):
-        """The command of a tool that writes below `output` and takes what it needs from below `source`."""
+        """Command of a tool that writes below `output` and reads earlier results below `source`."""
         given = ["--bag", self.drive.bag, "--rig", self.drive.rig]
         heights = self.drive.write_text("heights.yaml", HEIGHTS)
         return {
@@ -41,7 +41,7 @@ class WholeChain:
 
 
 def digest(path):
-    """Of a file, or of a folder's names and files; nothing where there is none."""
+    """Hash of a file, or of a folder's names and files; None if it does not exist."""
     if not path.exists():
         return None
     hasher = hashlib.sha1()
@@ -53,7 +53,7 @@ def digest(path):
 
 
 def without_times(file):
-    """A localization log's last column says how long each frame took."""
+    """Content without a localization log's last column, the time of each frame."""
     data = file.read_bytes()
     if file.suffix != ".csv" or b"latency_s" not in data.split(b"\n", 1)[0]:
         return data

@@ -30,7 +30,7 @@ std::vector<vcharge::CalibrationImage> readBag(const Arguments& arguments) {
   vcharge::ProgressBar progress("reading " + topic);
   std::vector<vcharge::CalibrationImage> images;
   for (const vcharge::StampedImage& image : vcharge::readBagImages(
-           arguments.bag, topic, arguments.max_images, [&](double share) { progress.update(share); })) {
+           arguments.bag, topic, arguments.max_images, [&](double fraction) { progress.update(fraction); })) {
     images.push_back({toString(image.stamp), image.image.pixels.clone()});
   }
   return images;
@@ -45,16 +45,48 @@ void print(const vcharge::IntrinsicCalibration& result) {
   }
   std::printf(
       "%zu images used, %zu left out; error %.3f px RMS per coordinate, %.3f px mean distance, %.3f px in "
-      "views that the fit did not see; corners up to %.0f degrees from the axis on %.0f %% of the image\n",
+      "views excluded from the fit; corners up to %.0f degrees from the axis on %.0f %% of the image\n",
       result.views.size(), result.rejected.size(), result.rms_px, result.mean_error_px,
       result.cross_validated_px, kDegrees * result.max_angle_rad, 100.0 * result.covered_share);
   if (result.bent_boards) {
-    std::printf("the board bends by %.1f mm (RMS); taken for flat, the error is %.3f px RMS per coordinate\n",
-                1000.0 * result.bending_m, result.flat_rms_px);
+    std::printf(
+        "the board bends by %.1f mm (RMS); with flat boards, the error is %.3f px RMS per coordinate\n",
+        1000.0 * result.bending_m, result.flat_rms_px);
   }
 }
 
-void calibrate(const Arguments& arguments, const vcharge::IntrinsicCalibrationOptions& options) {
+nlohmann::json toJson(const vcharge::IntrinsicCalibration& result) {
+  nlohmann::json json = {{"verdict", toString(result.verdict)},
+                         {"remarks", result.remarks},
+                         {"num_images", result.views.size()},
+                         {"rejected", nlohmann::json::array()},
+                         {"rms_px", result.rms_px},
+                         {"mean_error_px", result.mean_error_px},
+                         {"cross_validated_px", result.cross_validated_px},
+                         {"covered_ratio", result.covered_share},
+                         {"max_angle_rad", result.max_angle_rad}};
+  for (const vcharge::RejectedImage& image : result.rejected) {
+    json["rejected"].push_back({{"name", image.name}, {"reason", image.reason}});
+  }
+  if (result.bent_boards) {
+    json["bending_m"] = result.bending_m;
+    json["flat_rms_px"] = result.flat_rms_px;
+  }
+  if (result.model) {
+    const std::vector<std::string> names = result.model->parameterNames();
+    const Eigen::VectorXd values = result.model->parameters();
+    for (Eigen::Index i = 0; i < values.size(); ++i) {
+      json["parameters"][names[static_cast<size_t>(i)]] = values[i];
+      if (i < result.standard_deviations.size()) {
+        json["standard_deviations"][names[static_cast<size_t>(i)]] = result.standard_deviations[i];
+      }
+    }
+  }
+  return json;
+}
+
+void calibrate(const Arguments& arguments, const vcharge::IntrinsicCalibrationOptions& options,
+               nlohmann::json* found) {
   const vcharge::CalibrationBoard board =
       arguments.target.empty() ? vcharge::CalibrationBoard::parse(arguments.board, arguments.square_m)
                                : vcharge::readCalibrationBoard(arguments.target);
@@ -63,12 +95,13 @@ void calibrate(const Arguments& arguments, const vcharge::IntrinsicCalibrationOp
   vcharge::IntrinsicCalibration result;
   {
     vcharge::ProgressBar progress("calibrating " + arguments.output.camera_name);
-    result =
-        vcharge::calibrateIntrinsics(board, images, options, [&](double share) { progress.update(share); });
+    result = vcharge::calibrateIntrinsics(board, images, options,
+                                          [&](double fraction) { progress.update(fraction); });
   }
   for (const vcharge::RejectedImage& image : result.rejected) {
     std::printf("left out %s: %s\n", image.name.c_str(), image.reason.c_str());
   }
+  *found = toJson(result);
   vcharge::writeCalibration(arguments.output, board, images, result);
   if (result.verdict == vcharge::Verdict::kFail) {
     throw vcharge::InputError((arguments.bag.empty() ? arguments.images : arguments.bag) +
@@ -95,12 +128,14 @@ int main(int argc, char** argv) {
   auto* images = app.add_option("--images", arguments.images, "folder of images");
   auto* bag = app.add_option("--bag", arguments.bag, "bag with the camera's images");
   images->excludes(bag);
-  app.add_option("--topic", arguments.topic, "of the bag; default: /camera/CAMERA/image_raw")->needs(bag);
-  app.add_option("--max-images", arguments.max_images, "of the bag, evenly spread")
+  app.add_option("--topic", arguments.topic,
+                 "topic of the images in the bag; default: /camera/CAMERA/image_raw")
+      ->needs(bag);
+  app.add_option("--max-images", arguments.max_images, "number of images taken from the bag, evenly spread")
       ->needs(bag)
       ->check(CLI::Range(1, 10000))
       ->capture_default_str();
-  app.add_option("--board", arguments.board, "chessboard's inner corners, COLUMNSxROWS")
+  app.add_option("--board", arguments.board, "inner corners of the chessboard, COLUMNSxROWS")
       ->capture_default_str();
   app.add_option("--square_m,--square-m", arguments.square_m, "side of a square")->capture_default_str();
   app.add_option("--target", arguments.target,
@@ -109,16 +144,21 @@ int main(int argc, char** argv) {
   app.add_option("--model", options.model, "mei, kannala_brandt or pinhole")->capture_default_str();
   app.add_option("--options", arguments.options, "YAML with other options of the calibration");
   app.add_option("--field-of-view-rad", arguments.output.field_of_view_rad,
-                 "full angle; 0: as far as corners were seen")
+                 "full field of view; 0: as far as corners were detected")
       ->capture_default_str()
       ->check(CLI::Range(0.0, 6.28));
   app.add_option("--output", arguments.output.rig_file, "rig.yaml to write")
       ->required()
-      ->check(vcharge::requireNotEmpty);
-  app.add_flag("--keep-others", arguments.output.keep_others, "keep the other cameras that the rig.yaml has");
+      ->check(vcharge::requireOutput);
+  app.add_flag("--keep-others", arguments.output.keep_others,
+               "keep the other cameras of an existing rig.yaml");
   app.add_option("--report", arguments.output.report_file, "HTML report to write")
-      ->check(vcharge::requireNotEmpty);
-  return vcharge::runTool(&app, argc, argv, [&] {
+      ->check(vcharge::requireOutput);
+  app.footer(
+      "Keys of --json: verdict (PASS, WARN, FAIL), remarks, num_images, rejected (name, reason), parameters "
+      "and standard_deviations (by name), rms_px (per coordinate), mean_error_px, cross_validated_px, "
+      "covered_ratio, max_angle_rad, bending_m and flat_rms_px (where the board bends).");
+  return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (arguments.images.empty() && arguments.bag.empty()) {
       throw vcharge::InputError("--images or --bag is required");
     }
@@ -133,6 +173,6 @@ int main(int argc, char** argv) {
         options.model = model;
       }
     }
-    calibrate(arguments, options);
+    calibrate(arguments, options, found);
   });
 }

@@ -42,8 +42,9 @@ void print(const vcharge::RigComparison& comparison) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Compares the extrinsics of two rigs camera by camera (axes of the vehicle): the second against the "
-      "first, and which differences are more than their standard deviations explain.");
+      "Compares the extrinsics of two rigs camera by camera (axes of the vehicle), the second relative to "
+      "the "
+      "first, and tells which differences exceed their standard deviations.");
   std::string first, second;
   app.add_option("first", first, "rig.yaml")->required();
   app.add_option("second", second, "rig.yaml")->required();

@@ -15,7 +15,8 @@ struct Arguments {
   double field_of_view_rad = kPi;
 };
 
-void convert(const Arguments& arguments) {
+void convert(const Arguments& arguments, nlohmann::json* found) {
+  (*found)["cameras"] = nlohmann::json::array();
   const vcharge::IntrinsicsFormat format = vcharge::intrinsicsFormat(arguments.format);
   vcharge::CameraRig rig = vcharge::readIntrinsics(arguments.input, arguments.field_of_view_rad);
   if (!arguments.camera.empty()) {
@@ -31,6 +32,12 @@ void convert(const Arguments& arguments) {
     std::printf("%s: %s -> %s: %.4f px RMS, at most %.4f px, over %.1f %% of the field of view\n",
                 camera.name.c_str(), camera.model.name().c_str(), arguments.model.c_str(), converted.rms_px,
                 converted.max_px, 100.0 * converted.covered_share);
+    (*found)["cameras"].push_back({{"name", camera.name},
+                                   {"from", camera.model.name()},
+                                   {"to", arguments.model},
+                                   {"rms_px", converted.rms_px},
+                                   {"max_px", converted.max_px},
+                                   {"covered_ratio", converted.covered_share}});
     camera.model = converted.model;
   }
   vcharge::writeIntrinsics(rig, format, arguments.output);
@@ -42,23 +49,24 @@ int main(int argc, char** argv) {
   CLI::App app(
       "Converts intrinsics between rig.yaml, Kalibr's camchain and CamOdoCal's files, and between camera "
       "models, "
-      "whose difference in pixels it prints. The input's format is seen from its content.");
+      "and prints their difference in pixels. The input's format is detected from its content.");
   Arguments arguments;
   app.add_option("--input", arguments.input, "rig.yaml, camchain.yaml or CamOdoCal's camera.yaml")
       ->required();
-  app.add_option("--format", arguments.format, "of the output: rig, kalibr or camodocal")
+  app.add_option("--format", arguments.format, "format of the output: rig, kalibr or camodocal")
       ->capture_default_str();
-  app.add_option("--model", arguments.model, "mei, kannala_brandt or pinhole; default: as it is");
+  app.add_option("--model", arguments.model, "mei, kannala_brandt or pinhole; default: unchanged");
   app.add_option("--camera", arguments.camera, "only this camera; default: all");
   app.add_option("--field-of-view-rad", arguments.field_of_view_rad,
                  "full angle, for files that have none (Kalibr, CamOdoCal)")
       ->capture_default_str()
       ->check(CLI::Range(0.1, 2.0 * kPi));
-  app.add_option("--output", arguments.output, "file to write")->required()->check(vcharge::requireNotEmpty);
-  return vcharge::runTool(&app, argc, argv, [&] {
+  app.add_option("--output", arguments.output, "file to write")->required()->check(vcharge::requireOutput);
+  app.footer("Keys of --json: cameras that changed model (name, from, to, rms_px, max_px, covered_ratio).");
+  return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (!arguments.model.empty()) {
       vcharge::CameraModel::parameterNames(arguments.model);
     }
-    convert(arguments);
+    convert(arguments, found);
   });
 }

@@ -53,7 +53,7 @@ uint32_t bytesPerPixel(uint32_t fourcc) {
   }
 }
 
-// The same number for the same pulse and camera, anywhere in [-limit, limit].
+// A pseudo-random number in [-limit, limit], always the same for a pulse and camera.
 int64_t jitterOf(uint64_t pulse, const std::string& path, int64_t limit) {
   uint64_t hash = pulse * 0x9e3779b97f4a7c15ULL;
   for (const char character : path) {
@@ -225,7 +225,7 @@ int EmulatedCamera::enumerateRate(v4l2_frmivalenum* rate) const {
   return 0;
 }
 
-// As drivers do: whatever is asked, the nearest that there is.
+// Like a driver, replaces the requested format by the nearest supported one.
 void EmulatedCamera::agree(v4l2_format* format) {
   v4l2_pix_format& pixels = format->fmt.pix;
   fourcc_ = fourccOf(config_.formats.front());
@@ -333,7 +333,7 @@ int64_t EmulatedCamera::nextDelivery() const {
 void EmulatedCamera::work(int64_t now_ns) {
   if (!unplugged_ && !isFile()) {
     unplugged_ = true;
-    shutdown(hardware_fd_, SHUT_RDWR);  // poll() tells POLLHUP from now on
+    shutdown(hardware_fd_, SHUT_RDWR);  // from now on, poll() reports POLLHUP
   }
   while (nextDelivery() <= now_ns) {
     deliver(next_pulse_++);
@@ -367,7 +367,8 @@ uint8_t* EmulatedCamera::memory(uint32_t index) {
   return slots_[index].data != nullptr ? slots_[index].data : mapped_ + mapped_bytes_ / slots_.size() * index;
 }
 
-// A gray ramp, once; then, in its first pixels, the pulse's number: white for a one, the lowest bit first.
+// Paints a gray ramp once; encodes the number of the pulse in the first pixels: white for a one, lowest bit
+// first.
 void EmulatedCamera::paint(uint32_t index, uint64_t pulse) {
   uint8_t* data = memory(index);
   if (fourcc_ == V4L2_PIX_FMT_MJPEG) {

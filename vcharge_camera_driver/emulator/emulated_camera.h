@@ -14,25 +14,25 @@ namespace vcharge::emulator {
 struct CameraConfig {
   uint32_t width = 1280, height = 800;
   std::vector<std::string> formats = {"GREY"};  ///< four character codes
-  double rate_hz = 12.5;                        ///< of the trigger; pulses are at multiples of its period
+  double rate_hz = 12.5;                        ///< of the trigger; pulses are at multiples of the period
   std::string capabilities = "capture";         ///< or "output", "no_streaming"
   int64_t exposure_us = 5000;                   ///< from the pulse to the frame's stamp
-  int64_t readout_us = 20000;                   ///< from the pulse to the frame's delivery
-  int64_t jitter_us = 0;                        ///< the stamps are off by at most this
-  uint64_t drop_every = 0;              ///< of so many frames the first is lost (its number is counted)
-  uint64_t damage_every = 0;            ///< of so many frames the first is flagged as damaged
-  uint64_t short_every = 0;             ///< of so many frames the first has half its bytes
-  uint64_t silent_after = 0;            ///< no frames after so many; 0: always
-  std::map<std::string, int> failures;  ///< errno that an ioctl ends with, by "STREAMON"...: fail=STREAMON:5
+  int64_t readout_us = 20000;                   ///< from the pulse to the delivery of the frame
+  int64_t jitter_us = 0;                        ///< largest error of the stamps
+  uint64_t drop_every = 0;                      ///< loses one frame in so many (its number is counted)
+  uint64_t damage_every = 0;                    ///< flags one frame in so many as damaged
+  uint64_t short_every = 0;                     ///< delivers only half of the bytes of one frame in so many
+  uint64_t silent_after = 0;                    ///< stops after so many frames; 0: never
+  std::map<std::string, int> failures;          ///< errno with which an ioctl fails, by name: fail=STREAMON:5
   bool unknown_clock = false;
 };
 
 CameraConfig readCameraConfig(const std::string& path);
 
-/// State behind one open file of an emulated camera. Guarded by the emulator's mutex.
+/// State of one open file of an emulated camera. Protected by the emulator's mutex.
 class EmulatedCamera {
  public:
-  /// `application_fd` is what open() returned, `hardware_fd` the other end of its socket pair; `memory_fd`
+  /// `application_fd` is returned by open(), `hardware_fd` is the other end of its socket pair; `memory_fd`
   /// holds the frames.
   EmulatedCamera(std::string path, const CameraConfig& config, int application_fd, int hardware_fd,
                  int memory_fd);
@@ -40,18 +40,18 @@ class EmulatedCamera {
   EmulatedCamera(const EmulatedCamera&) = delete;
   EmulatedCamera& operator=(const EmulatedCamera&) = delete;
 
-  /// As the kernel answers: 0, or an errno.
+  /// Handles an ioctl. Returns 0 or an errno.
   int control(unsigned long request, void* argument);
   int memoryFd() const { return memory_fd_; }
 
-  /// Nanoseconds of CLOCK_MONOTONIC when the next frame is delivered; INT64_MAX when it does not stream.
+  /// Time of the next frame in nanoseconds of CLOCK_MONOTONIC; INT64_MAX if not streaming.
   int64_t nextDelivery() const;
-  /// Delivers what is due; notices when the device's file went away.
+  /// Delivers due frames; detects that the device's file was removed.
   void work(int64_t now_ns);
 
  private:
   struct Slot {
-    uint8_t* data = nullptr;  // user pointer, or null: in memory_fd_
+    uint8_t* data = nullptr;  // user pointer; null if the buffer is in memory_fd_
     bool painted = false;
   };
   struct Done {

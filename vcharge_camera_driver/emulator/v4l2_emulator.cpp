@@ -1,8 +1,7 @@
-// Cameras for tests, without hardware and kernel modules: put before libc, by linking or LD_PRELOAD. A file
-// in the folder $VCHARGE_EMULATED_CAMERAS stands for the device node of a camera (its lines "key=value" say
-// which); the camera is unplugged when the file is removed. open(), ioctl(), mmap() and close() on it are
-// answered here; poll() is the kernel's own, since the file descriptor is one end of a socket pair whose
-// other end the emulated hardware holds.
+// Emulated cameras for tests, without hardware and kernel modules: linked or preloaded before libc. A file in
+// the folder $VCHARGE_EMULATED_CAMERAS represents the device node of a camera, configured by its lines
+// "key=value"; removing the file unplugs the camera. open(), ioctl(), mmap() and close() of such files are
+// handled here; poll() is the kernel's, since the file descriptor is one end of a socket pair.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -38,7 +37,7 @@ int64_t nanoseconds(clockid_t clock) {
   return 1000000000LL * now.tv_sec + now.tv_nsec;
 }
 
-// The hardware: one thread that lives while a camera is open.
+// The emulated hardware: a thread that lives while a camera is open.
 class Hardware {
  public:
   static Hardware& instance() {
@@ -75,7 +74,7 @@ class Hardware {
 
   bool isCamera(int fd) {
     if (num_open_ == 0) {
-      return false;  // without the lock: nearly every call in a process comes here
+      return false;  // checked without the lock, since nearly every call of a process ends here
     }
     const std::lock_guard<std::recursive_mutex> lock(mutex_);
     return cameras_.count(fd) != 0;
@@ -123,7 +122,7 @@ class Hardware {
     const int64_t cpu_before_ns = cpu_ns_;
     std::unique_lock<std::recursive_mutex> lock(mutex_);
     while (!stop_) {
-      int64_t next_ns = nanoseconds(CLOCK_MONOTONIC) + 20000000;  // unplugging is noticed this often
+      int64_t next_ns = nanoseconds(CLOCK_MONOTONIC) + 20000000;  // period of the check for unplugged cameras
       for (const auto& [fd, camera] : cameras_) {
         next_ns = std::min(next_ns, camera->nextDelivery());
       }
@@ -135,9 +134,9 @@ class Hardware {
     }
   }
 
-  std::recursive_mutex mutex_;  // a camera's own mmap() and close() come here again
+  std::recursive_mutex mutex_;  // recursive, since a camera's own mmap() and close() are handled here too
   std::condition_variable_any changed_;
-  std::map<int, std::shared_ptr<EmulatedCamera>> cameras_;  // by the application's file descriptor
+  std::map<int, std::shared_ptr<EmulatedCamera>> cameras_;  // by file descriptor of the application
   std::atomic<size_t> num_open_{0};
   bool stop_ = false;
   std::thread thread_;
@@ -174,7 +173,7 @@ using vcharge::emulator::Hardware;
 
 extern "C" {
 
-/// Of the emulated hardware, in this process: not the driver's.
+/// CPU time of the emulated hardware in this process, to subtract from the driver's.
 double vchargeEmulatorCpuSeconds() {
   return Hardware::instance().cpuSeconds();
 }

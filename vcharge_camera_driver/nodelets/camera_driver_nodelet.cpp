@@ -42,9 +42,9 @@ class CameraDriverNodelet : public Nodelet {
     readOptions("options", &options);
     options_ = completeOptions(options, *rig_, privateNode().resolveName("options"));
     const double rate_hz = options_.v4l2.capture.frame_rate_hz;
-    sink_ = std::make_unique<MessageSink>(
-        options_.cameras.size(), TriggerGrouperOptions{rate_hz, options_.realign_frames},
-        options_.stamp_offset_s, [this](const MultiFrame& group) { publish(group); });
+    sink_ = std::make_unique<MessageSink>(options_.cameras.size(), TriggerGrouperOptions{rate_hz},
+                                          options_.stamp_offset_s,
+                                          [this](const MultiFrame& group) { publish(group); });
     source_ = makeFrameSource(options_, rig_, now, [this](const WheelTicks& ticks) { addTicks(ticks); });
     // Nothing below is refused: topics that appear and vanish at once confuse their subscribers.
     images_ = std::make_unique<ImagePublisher>(&node(), *rig_, options_.cameras, topics_);

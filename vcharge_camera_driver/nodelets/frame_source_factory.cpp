@@ -24,8 +24,7 @@ DriverOptions completeOptions(const DriverOptions& options, const CameraRig& rig
     checkImageSize(rig.cameras[rig.cameraIndex(name)], size,
                    "parameter " + source + ": cameras: " + complete.cameras.front());
   }
-  complete.v4l2.capture.width_px = size.width;
-  complete.v4l2.capture.height_px = size.height;
+  complete.v4l2.capture.image_size_px = size;
   return complete;
 }
 
@@ -38,8 +37,7 @@ std::unique_ptr<FrameSource> makeFrameSource(const DriverOptions& options,
     case FrameSourceKind::kV4l2:
       return std::make_unique<V4l2FrameSource>(options.devices, options.v4l2, std::move(now));
     case FrameSourceKind::kFolder:
-      return std::make_unique<FolderFrameSource>(options.folder, options.cameras,
-                                                 cv::Size(capture.width_px, capture.height_px),
+      return std::make_unique<FolderFrameSource>(options.folder, options.cameras, capture.image_size_px,
                                                  capture.frame_rate_hz, options.loop, std::move(now));
     case FrameSourceKind::kBag:
       break;

@@ -33,20 +33,36 @@ void print(const V4l2Description& camera) {
   }
 }
 
+nlohmann::json toJson(const V4l2Description& camera) {
+  nlohmann::json controls = nlohmann::json::object();
+  for (const V4l2Control& control : camera.controls) {
+    controls[control.name] = {{"value", control.value},
+                              {"minimum", control.minimum},
+                              {"maximum", control.maximum},
+                              {"default", control.default_value}};
+  }
+  return {{"path", camera.path}, {"card", camera.card},         {"driver", camera.driver},
+          {"bus", camera.bus},   {"captures", camera.captures}, {"formats", camera.formats},
+          {"controls", controls}};
+}
+
 }  // namespace
 }  // namespace vcharge
 
 int main(int argc, char** argv) {
-  CLI::App app("Lists V4L2 devices with their formats ('*': not understood by the driver) and controls.");
+  CLI::App app("Lists V4L2 devices with their formats ('*': not supported by the driver) and controls.");
   std::vector<std::string> devices;
-  app.add_option("devices", devices, "device nodes; all of /dev/video* where none is named");
-  return vcharge::runTool(&app, argc, argv, [&] {
+  app.add_option("devices", devices, "device nodes; default: all of /dev/video*");
+  app.footer("Keys of --json: devices (path, card, driver, bus, captures, formats, controls by name).");
+  return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     const std::vector<std::string> paths = devices.empty() ? vcharge::videoDevices() : devices;
     if (paths.empty()) {
       throw vcharge::InputError("/dev/video*: there is no video device");
     }
     for (const std::string& path : paths) {
-      vcharge::print(vcharge::describeV4l2Device(path));
+      const vcharge::V4l2Description camera = vcharge::describeV4l2Device(path);
+      vcharge::print(camera);
+      (*found)["devices"].push_back(vcharge::toJson(camera));
     }
   });
 }

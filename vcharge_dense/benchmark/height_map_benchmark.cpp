@@ -1,5 +1,5 @@
-// Fusion and regularization of a height map: Huber-TV iterations against the plain loop, the columns' fusion
-// against their area and the number of range maps.
+// Times the fusion and regularization of a height map: Huber-TV iterations of the kernel and the plain loop,
+// and the fusion of columns for several areas and numbers of range maps.
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -32,7 +32,7 @@ struct HuberCase {
   }
 };
 
-/// As many iterations as the kernel does at once.
+/// As many iterations as one call of PrimalDualSolver::iterate() does.
 void BM_HuberIterationPlain(benchmark::State& state) {
   const HuberCase huber;
   PlainPrimalDual plain(huber.problem, huber.start, 0.1);
@@ -45,7 +45,7 @@ void BM_HuberIterationPlain(benchmark::State& state) {
 }
 BENCHMARK(BM_HuberIterationPlain)->Unit(benchmark::kMillisecond);
 
-/// Argument: threads.
+/// Argument: number of threads.
 void BM_HuberIteration(benchmark::State& state) {
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
                                     static_cast<size_t>(state.range(0)));
@@ -63,8 +63,8 @@ BENCHMARK(BM_HuberIteration)
     ->MeasureProcessCPUTime()
     ->UseRealTime();
 
-/// Arguments: range maps, metres that they are spread over. Two cameras look to the sides from a vehicle that
-/// drives to and fro over 60 x 40 m.
+/// Arguments: number of range maps, width of the area in metres. Two cameras face both sides of a vehicle
+/// that drives back and forth over an area 40 m high.
 void BM_Fusion(benchmark::State& state) {
   const testing::BoxWorld world;
   HeightFusionOptions options;
@@ -77,12 +77,12 @@ void BM_Fusion(benchmark::State& state) {
   for (int i = 0; i < count; ++i) {
     const double lane = std::floor(4.0 * i / count);
     const double along = 4.0 * i / count - lane;
-    const Eigen::Vector3d place(width_m * along, height_m * lane / 3.0, 1.0);
-    const RigidTransform pose = testing::lookFrom(place, i % 2 == 0 ? 1.57 : -1.57, 0.5);
-    positions.push_back(place);
-    extent_m.extend(Eigen::Vector3d(place.x(), place.y(), 0.0));
+    const Eigen::Vector3d position(width_m * along, height_m * lane / 3.0, 1.0);
+    const RigidTransform pose = testing::cameraPose(position, i % 2 == 0 ? 1.57 : -1.57, 0.5);
+    positions.push_back(position);
+    extent_m.extend(Eigen::Vector3d(position.x(), position.y(), 0.0));
     maps.push_back(std::make_shared<const PackedRangeMap>(
-        packRangeMap(testing::renderView(world, pose, cv::Size(320, 200)), pose, options)));
+        packRangeMap(testing::renderView(world, pose, cv::Size(320, 200)), pose)));
   }
   const VoxelGrid grid = makeVoxelGrid(extent_m, options);
   for (auto _ : state) {

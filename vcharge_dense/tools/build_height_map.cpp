@@ -37,16 +37,16 @@ HeightMapOptions readOptions(const Arguments& arguments) {
   return options;
 }
 
-/// Names the step that runs, each with a bar of its own.
+/// Shows a progress bar for each step.
 class Steps {
  public:
-  void show(const std::string& step, double share) {
+  void show(const std::string& step, double fraction) {
     if (step != step_) {
       bar_.reset();
       bar_.emplace(step);
       step_ = step;
     }
-    bar_->update(share);
+    bar_->update(fraction);
   }
   void end() { bar_.reset(); }
 
@@ -63,7 +63,8 @@ Trajectory keyframesOf(const std::string& map_path) {
   return trajectory;
 }
 
-void print(const HeightMapResult& result) {
+/// Prints a summary; returns the same for --json.
+nlohmann::json report(const HeightMapResult& result) {
   const HeightMapStatistics& statistics = result.statistics;
   ContentHasher hasher;
   addToHash(result.map, &hasher);
@@ -74,14 +75,23 @@ void print(const HeightMapResult& result) {
               result.map.frame_id.c_str(), statistics.num_observed, statistics.num_solid);
   std::printf("labelling: %d iterations, gap %.2g per cell; heights: %d iterations, gap %.2g m per cell%s\n",
               statistics.label_iterations, statistics.label_gap_per_cell, statistics.height_iterations,
-              statistics.height_gap_per_cell, statistics.converged ? "" : " (stopped before it was reached)");
+              statistics.height_gap_per_cell, statistics.converged ? "" : " (not converged)");
   for (const auto& [stage, time_s] : statistics.times_s) {
     std::printf("%s: %.1f s\n", stage.c_str(), time_s);
   }
   std::printf("content hash: %s\n", hasher.hex().c_str());
+  return {{"num_range_maps", statistics.num_views},
+          {"num_reused_range_maps", statistics.num_reused},
+          {"size_cells", {result.map.height_m.cols, result.map.height_m.rows}},
+          {"cell_size_m", result.map.cell_size_m},
+          {"num_observed_cells", statistics.num_observed},
+          {"num_solid_cells", statistics.num_solid},
+          {"converged", statistics.converged},
+          {"stage_s", statistics.times_s},
+          {"content_hash", hasher.hex()}};
 }
 
-/// The poses that the user gave, if any.
+/// The poses from --trajectory or --map, if given.
 std::optional<Trajectory> readPoses(const Arguments& arguments) {
   if (!arguments.trajectory.empty()) {
     return readTrajectory(arguments.trajectory);
@@ -92,28 +102,28 @@ std::optional<Trajectory> readPoses(const Arguments& arguments) {
   return std::nullopt;
 }
 
-/// What the stage finds wrong with a drive, with the names of the files.
+/// Adds the names of the files to the errors of the stage.
 template <class Work>
-void namingFiles(const Arguments& arguments, const Work& work) {
+void nameFilesInErrors(const Arguments& arguments, const Work& work) {
   try {
     work();
   } catch (const InputError& error) {
     const std::string poses = !arguments.trajectory.empty() ? arguments.trajectory
                               : !arguments.map.empty()      ? arguments.map
                                                             : arguments.bag + ": /odom";
-    throw InputError(arguments.bag + " with poses of " + poses + ": " + error.what());
+    throw InputError(arguments.bag + " with poses from " + poses + ": " + error.what());
   }
 }
 
-/// Hands a drive to the stage.
+/// Passes a drive on to the stage.
 class NamingConsumer : public DriveConsumer {
  public:
   NamingConsumer(const Arguments& arguments, HeightMapper* mapper) : arguments_(arguments), mapper_(mapper) {}
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
-    namingFiles(arguments_, [&] { mapper_->addImage(camera_index, stamp, image); });
+    nameFilesInErrors(arguments_, [&] { mapper_->addImage(camera_index, stamp, image); });
   }
   void addOdometry(const VehicleOdometry& odometry) override {
-    namingFiles(arguments_, [&] { mapper_->addOdometry(odometry); });
+    nameFilesInErrors(arguments_, [&] { mapper_->addOdometry(odometry); });
   }
 
  private:
@@ -121,7 +131,7 @@ class NamingConsumer : public DriveConsumer {
   HeightMapper* const mapper_;
 };
 
-void buildHeightMap(const Arguments& arguments) {
+void buildHeightMap(const Arguments& arguments, nlohmann::json* found) {
   if (!arguments.trajectory.empty() && !arguments.map.empty()) {
     throw InputError("--trajectory and --map: expected one of them");
   }
@@ -138,49 +148,50 @@ void buildHeightMap(const Arguments& arguments) {
   BagDriveSource source(arguments.bag, rig, source_options);
   if (const std::optional<Trajectory> poses = readPoses(arguments)) {
     const auto [first, last] = source.recordedSpan();
-    namingFiles(arguments, [&, first = first, last = last] { mapper.checkGrid(*poses, first, last); });
+    nameFilesInErrors(arguments, [&, first = first, last = last] { mapper.checkGrid(*poses, first, last); });
     mapper.setTrajectory(*poses);
   }
   Steps steps;
   NamingConsumer consumer(arguments, &mapper);
-  source.run(&consumer, [&](double share) { steps.show("range maps", share); });
+  source.run(&consumer, [&](double fraction) { steps.show("range maps", fraction); });
   HeightMapResult result;
-  namingFiles(arguments, [&] {
-    result = mapper.finish([&](const std::string& step, double share) { steps.show(step, share); });
+  nameFilesInErrors(arguments, [&] {
+    result = mapper.finish([&](const std::string& step, double fraction) { steps.show(step, fraction); });
   });
   steps.end();
   writeHeightMapFolder(&result, arguments.output);
   if (!arguments.keep_range_maps) {
     removeFolder(work);
   }
-  print(result);
+  *found = report(result);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Makes a height map of a recorded drive by fusing range maps: heights with confidence, a grid of "
-      "drivable "
-      "cells, a mesh and an OctoMap. The range maps lie in OUTPUT.range_maps until all is done: a run that "
-      "was "
-      "stopped goes on where it was.");
+      "Builds a height map of a recorded drive by fusing range maps: heights with confidence, a grid of "
+      "drivable cells, a mesh and an OctoMap. Range maps are kept in OUTPUT.range_maps until the end, so "
+      "that "
+      "an interrupted run can resume.");
   Arguments arguments;
-  app.add_option("--bag", arguments.bag, "the drive")->required();
-  app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
+  app.add_option("--bag", arguments.bag, "bag of the drive")->required();
+  app.add_option("--rig", arguments.rig, "rig.yaml with extrinsics")->required();
   app.add_option("--trajectory", arguments.trajectory,
-                 "TUM file, e.g. of build_map; without it poses come from the drive's odometry");
-  app.add_option("--map", arguments.map, "sparse map of this drive (*.vmap): poses of its keyframes");
+                 "TUM file, e.g. from build_map; without it poses come from the odometry");
+  app.add_option("--map", arguments.map, "sparse map of this drive (*.vmap), whose keyframe poses are used");
   app.add_option("--options", arguments.options, "YAML with overrides of HeightMapOptions");
-  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireNotEmpty);
+  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
   app.add_flag("--keep-range-maps", arguments.keep_range_maps, "do not remove OUTPUT.range_maps at the end");
-  app.add_flag("--show-options", arguments.show_options,
-               "print all options with their values, and do nothing else");
-  return runTool(&app, argc, argv, [&] {
+  addShowOptions(&app, &arguments.show_options);
+  app.footer(
+      "Keys of --json: num_range_maps, num_reused_range_maps, size_cells, cell_size_m, num_observed_cells, "
+      "num_solid_cells, converged, stage_s (wall time), content_hash.");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (arguments.show_options) {
-      std::cout << writeFields(readOptions(arguments)) << "\n";
+      std::cout << showOptions(readOptions(arguments));
       return;
     }
-    buildHeightMap(arguments);
+    buildHeightMap(arguments, found);
   });
 }

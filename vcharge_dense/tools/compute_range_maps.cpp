@@ -58,10 +58,19 @@ RangeMapperOptions readOptions(const Arguments& arguments) {
   return options;
 }
 
-void printSummary(const RangeMapper& mapper, const std::vector<uint64_t>& maps,
-                  const std::vector<double>& known, const ContentHasher& hasher) {
-  const std::vector<RangeMapperStatus> all = mapper.status();
-  for (const RangeMapperStatus& status : all) {
+/// Prints a summary; returns the same for --json.
+nlohmann::json report(const RangeMapper& mapper, const std::vector<uint64_t>& maps,
+                      const std::vector<double>& known, const ContentHasher& hasher) {
+  nlohmann::json cameras = nlohmann::json::array();
+  for (const RangeMapperStatus& status : mapper.status()) {
+    cameras.push_back({{"name", status.camera_name},
+                       {"num_range_maps", status.references},
+                       {"num_images", status.images},
+                       {"num_standing", status.standing},
+                       {"num_without_pose", status.without_pose},
+                       {"num_without_neighbours", status.without_neighbours},
+                       {"num_resets", status.resets},
+                       {"message", status.message}});
     std::cout << status.camera_name << ": " << status.references << " range maps from " << status.images
               << " images (" << status.standing << " standing, " << status.without_pose << " without pose, "
               << status.without_neighbours << " without neighbours, " << status.resets << " restarts)\n";
@@ -72,13 +81,16 @@ void printSummary(const RangeMapper& mapper, const std::vector<uint64_t>& maps,
     num_maps += maps[i];
     sum_known += known[i];
   }
-  std::cout << "range maps: " << num_maps
-            << ", known pixels: " << (num_maps > 0 ? 100.0 * sum_known / static_cast<double>(num_maps) : 0.0)
-            << " %\n"
+  const double known_ratio = num_maps > 0 ? sum_known / static_cast<double>(num_maps) : 0.0;
+  std::cout << "range maps: " << num_maps << ", known pixels: " << 100.0 * known_ratio << " %\n"
             << "content hash: " << hasher.hex() << "\n";
+  return {{"num_range_maps", num_maps},
+          {"known_ratio", known_ratio},
+          {"cameras", cameras},
+          {"content_hash", hasher.hex()}};
 }
 
-void computeRangeMaps(const Arguments& arguments) {
+void computeRangeMaps(const Arguments& arguments, nlohmann::json* found) {
   const RangeMapperOptions options = readOptions(arguments);
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   ContentHasher hasher;
@@ -108,12 +120,8 @@ void computeRangeMaps(const Arguments& arguments) {
     source.run(&mapper, [&](double fraction) { progress.update(fraction); });
     mapper.finish();
   }
-  printSummary(mapper, maps, known, hasher);
-  uint64_t num_maps = 0;
-  for (const uint64_t count : maps) {
-    num_maps += count;
-  }
-  if (num_maps == 0) {
+  *found = report(mapper, maps, known, hasher);
+  if ((*found)["num_range_maps"] == 0) {
     std::string reasons;
     for (const RangeMapperStatus& status : mapper.status()) {
       reasons += (reasons.empty() ? "" : "; ") + status.camera_name + ": " + status.message;
@@ -126,31 +134,32 @@ void computeRangeMaps(const Arguments& arguments) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Computes range maps from a recorded drive by plane sweep on the fisheye images. Writes, per camera "
-      "and image, "
-      "range, standard deviation and confidence as float TIFF, and the range in colours as PNG.");
+      "Computes range maps of a recorded drive by plane sweep on the fisheye images. Writes for each camera "
+      "and image range, standard deviation and confidence as float TIFF, and the range in colours as PNG.");
   Arguments arguments;
-  app.add_option("--bag", arguments.bag, "the drive")->required();
-  app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
-  app.add_option("--trajectory", arguments.trajectory,
-                 "TUM file; without it poses come from the drive's odometry");
+  app.add_option("--bag", arguments.bag, "bag of the drive")->required();
+  app.add_option("--rig", arguments.rig, "rig.yaml with extrinsics")->required();
+  app.add_option("--trajectory", arguments.trajectory, "TUM file; without it poses come from the odometry");
   app.add_option("--options", arguments.options, "YAML with overrides of RangeMapperOptions");
-  app.add_option("--preset", arguments.preset, "speed against accuracy, before --options")
+  app.add_option("--preset", arguments.preset, "speed or accuracy; --options overrides it")
       ->check(CLI::IsMember(enumNames<RangePreset>()))
       ->capture_default_str();
   app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
-  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireNotEmpty);
+  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
   app.add_flag(
       "--online", arguments.online,
       "as the nodelet does: only images before the reference, averaged (default: before and after, split)");
   app.add_flag("--no-pictures", arguments.no_pictures, "no PNG");
-  app.add_flag("--show-options", arguments.show_options,
-               "print all options with their values, and do nothing else");
-  return runTool(&app, argc, argv, [&] {
+  addShowOptions(&app, &arguments.show_options);
+  app.footer(
+      "Keys of --json: num_range_maps, known_ratio (of their pixels), cameras (name, num_range_maps, "
+      "num_images, "
+      "num_standing, num_without_pose, num_without_neighbours, num_resets, message), content_hash.");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (arguments.show_options) {
-      std::cout << writeFields(readOptions(arguments)) << "\n";
+      std::cout << showOptions(readOptions(arguments));
       return;
     }
-    computeRangeMaps(arguments);
+    computeRangeMaps(arguments, found);
   });
 }

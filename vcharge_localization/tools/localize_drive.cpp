@@ -46,15 +46,15 @@ DriveExperiment makeExperiment(const Arguments& arguments, const CameraRig& rig)
   return DriveExperiment(options);
 }
 
-void localizeDrive(const Arguments& arguments, const DriveLocalizerOptions& options) {
+void localizeDrive(const Arguments& arguments, const DriveLocalizerOptions& options, nlohmann::json* found) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   if (!rig->hasExtrinsics()) {
     throw InputError(arguments.rig + ": expected vehicle_from_camera of every camera");
   }
   const auto start = std::chrono::steady_clock::now();
   DriveLocalizer localizer(readSparseMap(arguments.map), rig, options);
-  std::cout << "map ready after "
-            << std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() << " s\n";
+  const double map_ready_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  std::cout << "map ready after " << map_ready_s << " s\n";
   DriveExperiment experiment = makeExperiment(arguments, *rig);
   Trajectory trajectory;
   std::ostringstream log;
@@ -92,6 +92,19 @@ void localizeDrive(const Arguments& arguments, const DriveLocalizerOptions& opti
   }
   writeTrajectory(trajectory, arguments.output);
   writeTextFileAtomically(arguments.output + ".csv", log.str());
+  nlohmann::json statuses = nlohmann::json::object();
+  for (const auto& [status, count] : summary.numFramesByStatus()) {
+    statuses[enumNames<LocalizationStatus>()[static_cast<size_t>(status)]] = count;
+  }
+  nlohmann::json warnings = nlohmann::json::array();
+  for (const auto& [count, text] : summary.warnings()) {
+    warnings.push_back({{"num_frames", count}, {"text", text}});
+  }
+  *found = {{"num_frames", summary.numFrames()},
+            {"num_frames_by_status", statuses},
+            {"map_ready_s", map_ready_s},
+            {"warnings", warnings},
+            {"content_hash", hasher.hex()}};
   std::cout << summary.text() << "content hash: " << hasher.hex() << "\n";
 }
 
@@ -106,7 +119,7 @@ int main(int argc, char** argv) {
   app.add_option("--bag", arguments.bag, "the drive")->required();
   app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
   app.add_option("--map", arguments.map, "map of build_map (*.vmap)")->required();
-  app.add_option("--output", arguments.output, "TUM file to write")->required()->check(requireNotEmpty);
+  app.add_option("--output", arguments.output, "TUM file to write")->required()->check(requireOutput);
   app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
   app.add_option("--options", arguments.options, "YAML with overrides of DriveLocalizerOptions");
   app.add_option("--cover-s", arguments.cover_s,
@@ -118,18 +131,20 @@ int main(int argc, char** argv) {
   app.add_option("--forget-every", arguments.forget_every,
                  "start from nothing again after so many frames, to see how soon a place is found; 0: never")
       ->check(CLI::NonNegativeNumber);
-  app.add_flag("--show-options", arguments.show_options,
-               "print all options with their values, and do nothing else");
-  return runTool(&app, argc, argv, [&] {
+  addShowOptions(&app, &arguments.show_options);
+  app.footer(
+      "Keys of --json: num_frames, num_frames_by_status, map_ready_s (time to read and prepare the map), "
+      "warnings (text, num_frames), content_hash.");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     DriveLocalizerOptions options;
     options.frames.waitForEverything();
     if (!arguments.options.empty()) {
       readFieldsFromFile(arguments.options, &options);
     }
     if (arguments.show_options) {
-      std::cout << writeFields(options) << "\n";
+      std::cout << showOptions(options);
       return;
     }
-    localizeDrive(arguments, options);
+    localizeDrive(arguments, options, found);
   });
 }

@@ -82,6 +82,44 @@ void printReport(const SparseMapperReport& report, const SparseMap& map) {
   std::cout << "\n";
 }
 
+nlohmann::json toJson(const SparseMapperReport& report, const SparseMap& map) {
+  nlohmann::json missing = nlohmann::json::object();
+  for (size_t i = 0; i < report.num_missing_images.size(); ++i) {
+    missing[map.rig().cameras[i].name] = report.num_missing_images[i];
+  }
+  nlohmann::json motions = nlohmann::json::object();
+  const std::vector<std::string> hypotheses = enumNames<MotionHypothesis>();
+  for (size_t i = 0; i < hypotheses.size(); ++i) {
+    motions[hypotheses[i]] = report.num_motions[i];
+  }
+  std::map<std::string, int> rejected;
+  int num_accepted = 0;
+  for (const LoopEdge& edge : report.loop_edges) {
+    num_accepted += edge.accepted ? 1 : 0;
+    if (!edge.accepted) {
+      ++rejected[edge.reason];
+    }
+  }
+  return {{"num_frames", report.num_frames},
+          {"num_incomplete_frames", report.num_incomplete_frames},
+          {"num_missing_images", missing},
+          {"num_frames_without_odometry", report.num_frames_without_odometry},
+          {"num_standing_frames", report.num_standing_frames},
+          {"num_odometry_resets", report.num_odometry_resets},
+          {"num_late_images", report.num_late_images},
+          {"num_motions", motions},
+          {"num_keyframes", map.keyframes().size()},
+          {"num_landmarks", map.landmarks().size()},
+          {"num_observations", map.observations().size()},
+          {"rms_px", report.rms_px},
+          {"num_loop_edges", num_accepted},
+          {"num_rejected_loop_edges", rejected},
+          {"odometry_distance_scale", map.contents().odometry_distance_scale},
+          {"odometry_turn_scale", map.contents().odometry_turn_scale},
+          {"stage_s", report.stage_s},
+          {"content_hash", map.contentHash()}};
+}
+
 /// A line per frame that was followed, for scripts.
 std::string listFrames(const MappingState& state) {
   const std::vector<std::string> motions = enumNames<MotionHypothesis>();
@@ -158,7 +196,7 @@ std::string nameOfStage(const MappingState& state) {
                                         : backEndStages()[state.num_finished_stages - 1];
 }
 
-void buildMap(const Arguments& arguments, const SparseMapperOptions& options) {
+void buildMap(const Arguments& arguments, const SparseMapperOptions& options, nlohmann::json* found) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   SparseMapper mapper(rig, options);
   const std::string bag_hash = fileHash(arguments.bag);
@@ -168,8 +206,10 @@ void buildMap(const Arguments& arguments, const SparseMapperOptions& options) {
     earlier = checkpoint.read(rig);
   }
   StageBars bars;
+  std::string resumed_after;
   if (earlier) {
-    std::cout << "going on after the stage '" << nameOfStage(*earlier) << "' of an earlier run\n";
+    resumed_after = nameOfStage(*earlier);
+    std::cout << "going on after the stage '" << resumed_after << "' of an earlier run\n";
     mapper.resume(std::move(*earlier));
   } else {
     const int num_stages = static_cast<int>(backEndStages().size()) + 2;
@@ -215,6 +255,10 @@ void buildMap(const Arguments& arguments, const SparseMapperOptions& options) {
   checkpoint.remove();
   printReport(mapper.report(), *map);
   const MapVerdict verdict = judgeMap(*map, mapper.state());
+  *found = toJson(mapper.report(), *map);
+  (*found)["verdict"] = toString(verdict.grade);
+  (*found)["remarks"] = verdict.remarks;
+  (*found)["resumed_after"] = resumed_after;
   std::cout << "verdict: " << toString(verdict.grade);
   for (const std::string& remark : verdict.remarks) {
     std::cout << "\n  " << remark;
@@ -230,24 +274,32 @@ int main(int argc, char** argv) {
   Arguments arguments;
   app.add_option("--bag", arguments.bag, "the drive")->required();
   app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
-  app.add_option("--output", arguments.output, "map to write (*.vmap)")->required()->check(requireNotEmpty);
-  app.add_option("--trajectory", arguments.trajectory, "TUM file to write: the pose of every frame");
+  app.add_option("--output", arguments.output, "map to write (*.vmap)")->required()->check(requireOutput);
+  app.add_option("--trajectory", arguments.trajectory, "TUM file to write: the pose of every frame")
+      ->check(requireOutput);
   app.add_option("--report", arguments.report, "folder for map_report.html: pictures, numbers and a verdict")
-      ->check(requireNotEmpty);
+      ->check(requireOutputFolder);
   app.add_option("--options", arguments.options, "YAML with overrides of SparseMapperOptions");
   app.add_flag("--fresh", arguments.fresh, "do not go on from OUTPUT.work, which an earlier run left");
   app.add_flag("--no-checkpoint", arguments.no_checkpoint, "leave no OUTPUT.work to go on from");
-  app.add_flag("--show-options", arguments.show_options,
-               "print all options with their values, and do nothing else");
-  return runTool(&app, argc, argv, [&] {
+  addShowOptions(&app, &arguments.show_options);
+  app.footer(
+      "Keys of --json: verdict (GOOD, CHECK, BAD), remarks, num_frames, num_incomplete_frames, "
+      "num_missing_images (by camera), num_frames_without_odometry, num_standing_frames, "
+      "num_odometry_resets, num_late_images, num_motions (by hypothesis), num_keyframes, num_landmarks, "
+      "num_observations, rms_px, num_loop_edges, num_rejected_loop_edges (by reason), "
+      "odometry_distance_scale, odometry_turn_scale, stage_s (wall time), resumed_after (stage of an earlier "
+      "run; empty: none), "
+      "content_hash.");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     SparseMapperOptions options;
     if (!arguments.options.empty()) {
       readFieldsFromFile(arguments.options, &options);
     }
     if (arguments.show_options) {
-      std::cout << writeFields(options) << "\n";
+      std::cout << showOptions(options);
       return;
     }
-    buildMap(arguments, options);
+    buildMap(arguments, options, found);
   });
 }

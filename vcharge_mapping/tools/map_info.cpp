@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 
 #include "vcharge_core/base/command_line.h"
@@ -24,6 +25,26 @@ void printColmap(const vcharge::SparseMap& map, const vcharge::ColmapExport& res
   }
 }
 
+nlohmann::json toJson(const vcharge::SparseMap& map, const vcharge::MapProvenance& provenance) {
+  nlohmann::json cameras = nlohmann::json::array();
+  for (size_t i = 0; i < map.rig().cameras.size(); ++i) {
+    const vcharge::ReprojectionErrors errors = vcharge::measureReprojection(map, i);
+    cameras.push_back({{"name", map.rig().cameras[i].name},
+                       {"num_observations", errors.num_observations},
+                       {"rms_px", errors.rms_px}});
+  }
+  const auto& edges = map.contents().loop_edges;
+  const auto num_accepted = std::count_if(edges.begin(), edges.end(),
+                                          [](const vcharge::MapLoopEdge& edge) { return edge.accepted; });
+  return {{"num_keyframes", map.keyframes().size()},
+          {"num_landmarks", map.landmarks().size()},
+          {"num_observations", map.observations().size()},
+          {"num_loop_edges", num_accepted},
+          {"cameras", cameras},
+          {"provenance", provenance},
+          {"content_hash", map.contentHash()}};
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -33,16 +54,21 @@ int main(int argc, char** argv) {
   app.add_option("--map", map_path, "the map (*.vmap)")->required()->check(vcharge::requireNotEmpty);
   app.add_flag("--loop-edges", list_loop_edges, "name every loop edge");
   app.add_option("--export-ply", ply_path, "landmarks and keyframe poses as PLY")
-      ->check(vcharge::requireNotEmpty);
+      ->check(vcharge::requireOutput);
   app.add_option("--export-colmap", colmap_folder,
                  "folder for COLMAP's text model, each camera as the closest OPENCV_FISHEYE")
-      ->check(vcharge::requireNotEmpty);
+      ->check(vcharge::requireOutputFolder);
   app.add_option("--trajectory", trajectory_path, "keyframe poses as TUM text")
-      ->check(vcharge::requireNotEmpty);
-  return vcharge::runTool(&app, argc, argv, [&] {
+      ->check(vcharge::requireOutput);
+  app.footer(
+      "Keys of --json: num_keyframes, num_landmarks, num_observations, num_loop_edges (accepted), cameras "
+      "(name, "
+      "num_observations, rms_px), provenance, content_hash.");
+  return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     vcharge::MapProvenance provenance;
     const auto map = vcharge::readSparseMap(map_path, &provenance);
     std::fputs(vcharge::describeMap(*map, provenance, list_loop_edges).c_str(), stdout);
+    *found = toJson(*map, provenance);
     if (!ply_path.empty()) {
       vcharge::exportPly(*map, ply_path);
       std::printf("written: %s\n", ply_path.c_str());

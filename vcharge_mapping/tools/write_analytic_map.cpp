@@ -1,4 +1,4 @@
-// For tests of what reads maps: writes the analytic map of vcharge_core/analytic_map.h.
+// Writes the analytic map of vcharge_core/sparse_map/analytic_map.h, for tests of programs that read maps.
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/sparse_map/analytic_map.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
@@ -7,7 +7,7 @@ int main(int argc, char** argv) {
   CLI::App app("Writes a small map whose every observation is exact, for tests.");
   std::string path;
   vcharge::AnalyticMapOptions options;
-  app.add_option("--output", path, "the map (*.vmap)")->required();
+  app.add_option("--output", path, "the map (*.vmap)")->required()->check(vcharge::requireOutput);
   app.add_option("--keyframes", options.num_keyframes);
   app.add_option("--landmarks", options.num_landmarks);
   return vcharge::runTool(&app, argc, argv, [&] {

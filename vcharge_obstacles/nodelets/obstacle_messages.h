@@ -33,7 +33,7 @@ visualization_msgs::MarkerArray toMarkers(const ObstacleMap& map);
 /// ground, nothing for unobserved cells. Voxels are aligned with the cells and have their size.
 std::unique_ptr<octomap::OcTree> toOctree(const ObstacleMap& map);
 
-/// x: roll, y: pitch (rad), z: height (m) of the body over the ground.
+/// Body over the ground as x: roll (rad), y: pitch (rad), z: height (m).
 geometry_msgs::Vector3Stamped toMessage(const GroundPlane& ground, Timestamp stamp,
                                         const std::string& vehicle_frame);
 

@@ -16,7 +16,7 @@
 namespace vcharge {
 namespace {
 
-/// The messages of depth_nodelet for one camera.
+/// Messages that depth_nodelet would publish for one camera.
 class RangeMapReaderTest : public ::testing::Test {
  protected:
   RangeMapReaderTest() : converter_(camera_.field_of_view_rad) {
@@ -51,7 +51,7 @@ class RangeMapReaderTest : public ::testing::Test {
   sensor_msgs::CameraInfoPtr info_;
 };
 
-TEST_F(RangeMapReaderTest, GivesBackWhatWasPublished) {
+TEST_F(RangeMapReaderTest, RestoresThePublishedRangeMap) {
   const RangeMap map = read();
   ContentHasher expected, got;
   addToHash(map_, &expected);
@@ -61,7 +61,7 @@ TEST_F(RangeMapReaderTest, GivesBackWhatWasPublished) {
   EXPECT_EQ(cv::countNonZero(map.reference == 77), map.range_m.rows * map.range_m.cols);
 }
 
-TEST_F(RangeMapReaderTest, RefusesACameraUnlikeTheRigsByTopicAndExpectation) {
+TEST_F(RangeMapReaderTest, RefusesAnotherCameraNamingTopicAndExpectation) {
   const sensor_msgs::CameraInfo right = *info_;
   info_->K[0] *= 1.01;
   expectError({"/dense/left/range/camera_info", "expected camera 'left'"});
@@ -78,7 +78,7 @@ TEST_F(RangeMapReaderTest, RefusesACameraUnlikeTheRigsByTopicAndExpectation) {
   EXPECT_NO_THROW(read());
 }
 
-TEST_F(RangeMapReaderTest, RefusesImagesUnlikeEachOtherOrTheCamera) {
+TEST_F(RangeMapReaderTest, RefusesImagesOfOtherSizesOrEncodings) {
   sigma_->encoding = "mono8";
   expectError({"/dense/left/range/standard_deviation", "32FC1", "mono8"});
   sigma_->encoding = "32FC1";
@@ -87,7 +87,7 @@ TEST_F(RangeMapReaderTest, RefusesImagesUnlikeEachOtherOrTheCamera) {
   expectError({"/dense/left/range", "one size"});
   range_->height -= 1;
   range_->data.resize(range_->data.size() - range_->step);
-  expectError({"/dense/left/range/image", "sides of camera 'left'"});
+  expectError({"/dense/left/range/image", "aspect ratio of camera 'left'"});
 }
 
 TEST(ToOctreeTest, VoxelsLieWhereTheCellsLie) {

@@ -15,29 +15,21 @@ namespace {
 
 constexpr size_t kMaxIncomplete = 20;
 
-/// A view of the message's pixels.
-cv::Mat toFloatImage(const sensor_msgs::ImageConstPtr& message, const std::string& topic) {
-  const size_t row_bytes = message->width * sizeof(float);
-  if (message->encoding != "32FC1" || message->is_bigendian != 0 || message->step != row_bytes ||
-      message->data.size() != row_bytes * message->height || message->data.empty()) {
-    throw InputError(topic + ": expected 32FC1 images without padding, got " + message->encoding + " of " +
-                     std::to_string(message->width) + "x" + std::to_string(message->height));
+/// An image that refers to the message's pixels, which must not be written.
+cv::Mat toImage(const sensor_msgs::ImageConstPtr& message, const std::string& encoding, int type,
+                const std::string& topic) {
+  const size_t row_bytes = message->width * CV_ELEM_SIZE(type);
+  if (message->encoding != encoding || (CV_ELEM_SIZE1(type) > 1 && message->is_bigendian != 0) ||
+      message->step != row_bytes || message->data.size() != row_bytes * message->height ||
+      message->data.empty()) {
+    throw InputError(topic + ": expected " + encoding + " images without padding, got " + message->encoding +
+                     " of " + std::to_string(message->width) + "x" + std::to_string(message->height));
   }
-  return cv::Mat(static_cast<int>(message->height), static_cast<int>(message->width), CV_32FC1,
-                 const_cast<uint8_t*>(message->data.data()));  // never written to
+  return cv::Mat(static_cast<int>(message->height), static_cast<int>(message->width), type,
+                 const_cast<uint8_t*>(message->data.data()));
 }
 
-cv::Mat toGrayImage(const sensor_msgs::ImageConstPtr& message, const std::string& topic) {
-  if (message->encoding != "mono8" || message->step != message->width || message->data.empty() ||
-      message->data.size() != static_cast<size_t>(message->step) * message->height) {
-    throw InputError(topic + ": expected mono8 images without padding, got " + message->encoding + " of " +
-                     std::to_string(message->width) + "x" + std::to_string(message->height));
-  }
-  return cv::Mat(static_cast<int>(message->height), static_cast<int>(message->width), CV_8UC1,
-                 const_cast<uint8_t*>(message->data.data()));  // never written to
-}
-
-/// Size, focal lengths and principal point, for errors.
+/// Text for errors: size, model, frame and intrinsics.
 std::string describe(const sensor_msgs::CameraInfo& info) {
   return std::to_string(info.width) + "x" + std::to_string(info.height) + " " + info.distortion_model +
          " in " + info.header.frame_id + ", K " + toText(info.K[0], 2) + ", " + toText(info.K[4], 2) + ", " +
@@ -45,7 +37,7 @@ std::string describe(const sensor_msgs::CameraInfo& info) {
 }
 
 bool isSameCamera(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b) {
-  constexpr double kTolerance = 1e-3;  // pixels, and coefficients; fits differ between platforms
+  constexpr double kTolerance = 1e-3;  // pixels and coefficients: fits differ a little between platforms
   const auto is_near = [](double x, double y) { return std::abs(x - y) <= kTolerance; };
   return a.width == b.width && a.height == b.height && a.distortion_model == b.distortion_model &&
          a.header.frame_id == b.header.frame_id && a.D.size() == b.D.size() &&
@@ -67,7 +59,7 @@ void RangeMapReader::prepare(cv::Size size) {
   const WorkingCamera working(camera_.model, camera_.image_size_px, camera_.field_of_view_rad, camera_.mask,
                               options);
   if (working.size() != size) {
-    throw InputError(topic_ + "/image: expected images with the sides of camera '" + camera_.name + "', as " +
+    throw InputError(topic_ + "/image: expected the aspect ratio of camera '" + camera_.name + "', as " +
                      std::to_string(working.size().width) + "x" + std::to_string(working.size().height) +
                      ", got " + std::to_string(size.width) + "x" + std::to_string(size.height));
   }
@@ -77,13 +69,14 @@ void RangeMapReader::prepare(cv::Size size) {
 }
 
 RangeMap RangeMapReader::read(const RangeMapParts& parts) {
-  const cv::Mat range_m = toFloatImage(parts.range, topic_ + "/image");
-  const cv::Mat sigma_m = toFloatImage(parts.standard_deviation, topic_ + "/standard_deviation");
-  const cv::Mat confidence = toFloatImage(parts.confidence, topic_ + "/confidence");
-  const cv::Mat reference = toGrayImage(parts.reference, topic_ + "/reference");
+  const cv::Mat range_m = toImage(parts.range, "32FC1", CV_32FC1, topic_ + "/image");
+  const cv::Mat sigma_m =
+      toImage(parts.standard_deviation, "32FC1", CV_32FC1, topic_ + "/standard_deviation");
+  const cv::Mat confidence = toImage(parts.confidence, "32FC1", CV_32FC1, topic_ + "/confidence");
+  const cv::Mat reference = toImage(parts.reference, "mono8", CV_8UC1, topic_ + "/reference");
   prepare(range_m.size());
   if (sigma_m.size() != size_ || confidence.size() != size_ || reference.size() != size_) {
-    throw InputError(topic_ + ": expected four images of one size, got another than the range's " +
+    throw InputError(topic_ + ": expected four images of one size; not all have the range image's " +
                      std::to_string(size_.width) + "x" + std::to_string(size_.height));
   }
   if (!isSameCamera(*parts.camera_info, expected_)) {

@@ -31,10 +31,10 @@ struct Arguments {
   bool show_options = false;
 };
 
-/// Processor time of the whole process, that is of all its threads, in parts of a run.
+/// Processor time of all threads of the process during parts of a run.
 class ProcessorTime {
  public:
-  /// Runs and counts.
+  /// Calls the function and adds the time that it takes.
   template <class Function>
   auto add(const Function& function) {
     const Count count{std::clock(), &ticks_};
@@ -51,7 +51,7 @@ class ProcessorTime {
   std::clock_t ticks_ = 0;
 };
 
-/// Hands odometry to both stages, and range maps from one to the other.
+/// Feeds odometry to both stages, and the range maps of one to the other.
 class Pipeline : public DriveConsumer {
  public:
   Pipeline(const std::shared_ptr<const CameraRig>& rig, const RangeMapperOptions& range_options,
@@ -100,7 +100,7 @@ class Pipeline : public DriveConsumer {
   }
   /// What a core has to do per range map, without reading the bag and without writing the results, which is
   /// part of detecting.
-  void printTiming(double writing_s) const {
+  void reportTiming(double writing_s, nlohmann::json* found) const {
     if (num_maps_ == 0) {
       return;
     }
@@ -112,22 +112,24 @@ class Pipeline : public DriveConsumer {
     std::cout << "processor time per range map: " << toText(images_ms + sweep_ms + obstacles_ms, 1)
               << " ms (images " << toText(images_ms, 1) << ", ranges " << toText(sweep_ms, 1)
               << ", obstacles " << toText(obstacles_ms, 1) << ")\n";
+    (*found)["processor_ms_per_range_map"] = {
+        {"images", images_ms}, {"ranges", sweep_ms}, {"obstacles", obstacles_ms}};
   }
 
  private:
   ObstacleMapper* obstacles_;
-  ProcessorTime whole_, sweeping_, detecting_;  // the last two are nearly all parts of the first
+  ProcessorTime whole_, sweeping_, detecting_;  // the last two are mostly parts of the first
   uint64_t num_maps_ = 0;
   std::unique_ptr<RangeMapper> ranges_;
   std::string range_folder_;
   std::map<Timestamp, std::map<size_t, std::string>> stored_;
 };
 
-/// What is written per frame, and counted for the summary.
+/// Writes each frame, and collects what the summary needs.
 class Recorder {
  public:
   explicit Recorder(std::string folder) : folder_(std::move(folder)) {
-    table_ = "stamp_ns,camera,state,known_share,pitch_rad,roll_rad,height_m,ground_state,ground_points\n";
+    table_ = "stamp_ns,camera,state,known_fraction,pitch_rad,roll_rad,height_m,ground_state,ground_points\n";
   }
 
   void add(const ObstacleFrame& frame) {
@@ -142,7 +144,7 @@ class Recorder {
     }
     for (const ObstacleCameraStatus& status : frame.status) {
       table_ += std::to_string(frame.map.stamp.nanoseconds()) + "," + status.camera_name + "," +
-                toString(status.state) + "," + toText(status.known_share, 4) + "," +
+                toString(status.state) + "," + toText(status.known_fraction, 4) + "," +
                 toText(status.ground.pitch_rad(), 5) + "," + toText(status.ground.roll_rad(), 5) + "," +
                 toText(status.ground.height_m(), 4) + "," + toString(status.ground.state) + "," +
                 std::to_string(status.ground.num_points) + "\n";
@@ -150,12 +152,22 @@ class Recorder {
     ++num_frames_;
   }
 
-  void finish(const ObstacleMapper& mapper) const {
+  void finish(const ObstacleMapper& mapper, nlohmann::json* found) const {
     writeTextFileAtomically(folder_ + "/status.csv", table_);
+    nlohmann::json cameras = nlohmann::json::array();
     for (const ObstacleCameraStatus& status : mapper.status()) {
       std::cout << status.camera_name << ": " << status.range_maps << " range maps (" << status.without_pose
                 << " without pose, " << status.late << " late), " << status.message << "\n";
+      cameras.push_back({{"name", status.camera_name},
+                         {"num_range_maps", status.range_maps},
+                         {"num_without_pose", status.without_pose},
+                         {"num_late", status.late},
+                         {"message", status.message}});
     }
+    *found = {{"num_maps", num_frames_},
+              {"num_odometry_jumps", mapper.numJumps()},
+              {"cameras", cameras},
+              {"content_hash", hasher_.hex()}};
     std::cout << "obstacle maps: " << num_frames_ << ", odometry jumps: " << mapper.numJumps() << "\n"
               << "content hash: " << hasher_.hex() << "\n";
   }
@@ -169,10 +181,10 @@ class Recorder {
 };
 
 void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& options,
-                     const RangeMapperOptions& range_options) {
+                     const RangeMapperOptions& range_options, nlohmann::json* found) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   if (!std::filesystem::exists(arguments.bag)) {
-    throw InputError(arguments.bag + ": no such file");  // before any folder is made
+    throw InputError(arguments.bag + ": no such file");  // before the output is created
   }
   FolderTransaction output(arguments.output);
   Recorder recorder(output.path());
@@ -182,7 +194,7 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
   Pipeline pipeline(rig, range_options, arguments.range, &mapper);
   BagDriveSourceOptions source_options;
   source_options.cameras = options.cameras;
-  source_options.max_image_gap_s = INFINITY;  // a camera that stops is borne, and told of
+  source_options.max_image_gap_s = INFINITY;  // a camera that stops is reported, not an error
   BagDriveSource source(arguments.bag, rig, source_options);
   {
     ProgressBar progress("obstacles");
@@ -196,8 +208,8 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
     }
     throw InputError(arguments.bag + ": no obstacle map could be made (" + reasons + ")");
   }
-  recorder.finish(mapper);
-  pipeline.printTiming(writing.seconds());
+  recorder.finish(mapper, found);
+  pipeline.reportTiming(writing.seconds(), found);
   output.commit();
 }
 
@@ -205,9 +217,10 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Finds obstacles and free ground around the vehicle in a recorded drive. Writes, per image stamp, the "
-      "fused map (PGM and YAML as of map_server, float TIFFs) and all scans (CSV), and the state of the "
-      "cameras (status.csv).");
+      "Detects obstacles and free ground around the vehicle in a recorded drive. Writes the fused map (PGM "
+      "and "
+      "YAML of map_server, float TIFFs) and all scans (CSV) per image stamp, and the state of the cameras "
+      "(status.csv).");
   Arguments arguments;
   app.add_option("--bag", arguments.bag, "the drive")->required();
   app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
@@ -216,10 +229,13 @@ int main(int argc, char** argv) {
   app.add_option("--range", arguments.range,
                  "folder that compute_range_maps wrote, instead of computing range maps");
   app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
-  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireNotEmpty);
-  app.add_flag("--show-options", arguments.show_options,
-               "print all options with their values, and do nothing else");
-  return runTool(&app, argc, argv, [&] {
+  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
+  addShowOptions(&app, &arguments.show_options);
+  app.footer(
+      "Keys of --json: num_maps, num_odometry_jumps, cameras (name, num_range_maps, num_without_pose, "
+      "num_late, "
+      "message), processor_ms_per_range_map (images, ranges, obstacles), content_hash.");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     ObstacleMapperOptions options;
     RangeMapperOptions range_options;
     if (!arguments.options.empty()) {
@@ -233,11 +249,11 @@ int main(int argc, char** argv) {
     }
     range_options.cameras = options.cameras;
     if (arguments.show_options) {
-      std::cout << "# ObstacleMapperOptions\n"
-                << writeFields(options) << "\n# RangeMapperOptions\n"
-                << writeFields(range_options) << "\n";
+      std::cout << "# For --options\n"
+                << showOptions(options) << "\n# For --range-options\n"
+                << showOptions(range_options);
       return;
     }
-    detectObstacles(arguments, options, range_options);
+    detectObstacles(arguments, options, range_options, found);
   });
 }

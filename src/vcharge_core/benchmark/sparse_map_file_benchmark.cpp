@@ -1,5 +1,5 @@
-// Writing and reading a map of a long drive: 200,000 landmarks, 1.5 million observations. What reading is
-// made of stands beside it: the copy into a SparseMap and the content hash.
+// Times of writing and reading the map of a long drive (200,000 landmarks, 1.5 million observations), and of
+// two parts of reading: the copy into a SparseMap and the content hash.
 
 #include <filesystem>
 #include <string>

@@ -1,16 +1,11 @@
-#include <cmath>
 #include <cstdio>
 #include <string>
 
-#include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "vcharge_core/base/command_line.h"
-#include "vcharge_core/base/error.h"
+#include "tool_arguments.h"
 #include "vcharge_core/dense_maps/height_map_file.h"
-#include "vcharge_core/files/file_io.h"
 #include "vcharge_evaluation/height_map_errors.h"
-#include "vcharge_evaluation/report.h"
 
 namespace {
 
@@ -24,49 +19,34 @@ double percent(size_t part, size_t whole) {
   return whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
 }
 
-void printKerbs(const HeightMapErrors& errors) {
-  std::printf(
-      "heights of kerbs: %zu places seen, %zu of them in the map, error mean %.2f cm, 95 %% within %.2f cm\n",
-      errors.num_kerbs_seen, errors.kerbs.size(), 100.0 * errors.kerb_height_m.mean,
-      100.0 * errors.kerb_height_m.percentile_95);
-  for (const double reach_m : {2.0, 3.0, 4.0, 5.0, 6.0}) {
-    std::vector<double> near;
-    for (const KerbError& kerb : errors.kerbs) {
-      if (kerb.nearest_view_m <= reach_m) {
-        near.push_back(std::abs(kerb.error_m));
-      }
-    }
-    const size_t count = near.size();
-    std::printf("  that some frame saw from %.0f m or nearer: %zu places, error mean %.2f cm\n", reach_m,
-                count, 100.0 * summarize(std::move(near)).mean);
-  }
-}
-
 void print(const HeightMapErrors& errors) {
-  std::printf("cells seen in the drive, apart from steps: %zu, %.1f %% of them in the map\n", errors.num_seen,
+  std::printf("visible cells away from steps: %zu, %.1f %% of them in the map\n", errors.num_seen,
               percent(errors.num_mapped, errors.num_seen));
   std::printf("height error: mean %.2f cm, 95 %% within %.2f cm, %.1f %% within 10 cm, signed mean %.2f cm\n",
               100.0 * errors.height_m.mean, 100.0 * errors.height_m.percentile_95,
-              100.0 * errors.share_within_10_cm, 100.0 * errors.mean_signed_m);
+              100.0 * errors.fraction_within_10_cm, 100.0 * errors.mean_signed_m);
   std::printf(
-      "steps: %zu places, %.1f %% of them mapped on both sides, %.1f %% of these found; horizontal error: "
-      "mean "
-      "%.2f cm, 95 %% within %.2f cm\n",
+      "steps: %zu points, %.1f %% of them mapped on both sides, %.1f %% of these found; horizontal error: "
+      "mean %.2f cm, 95 %% within %.2f cm\n",
       errors.num_steps, percent(errors.num_steps_mapped, errors.num_steps),
       percent(errors.num_steps_found, errors.num_steps_mapped), 100.0 * errors.step_position_m.mean,
       100.0 * errors.step_position_m.percentile_95);
-  printKerbs(errors);
   std::printf(
-      "tape measure: %zu distances on rigid things, %zu not shown by the map, error of the others mean %.2f "
-      "cm, "
+      "heights of kerbs: %zu points visible, %zu of them in the map, error mean %.2f cm, 95 %% within %.2f "
+      "cm\n",
+      errors.num_kerbs_seen, errors.kerbs.size(), 100.0 * errors.kerb_height_m.mean,
+      100.0 * errors.kerb_height_m.percentile_95);
+  std::printf(
+      "tape measure: %zu distances on rigid objects, %zu not in the map, error of the others mean %.2f cm, "
       "largest %.2f cm\n",
       errors.measurements.size(), errors.num_measurements_missing, 100.0 * errors.mean_measurement_m,
       100.0 * errors.max_measurement_m);
   const DrivabilityErrors& drivability = errors.drivability;
   std::printf(
-      "drivable grid: faces of rigid things over 30 cm, seen from in front: %zu places, obstacles %.1f %%, "
-      "open %.1f %%; open ground that is seen: drivable %.1f %%; drivable cells: inside of things over 30 cm "
-      "%.1f %%; solid cells: %zu, on open ground %zu\n",
+      "drivable grid: visible faces of rigid objects over 30 cm: %zu points, obstacles %.1f %%, open %.1f "
+      "%%; "
+      "visible open ground: drivable %.1f %%; drivable cells: inside objects over 30 cm %.1f %%; solid "
+      "cells: %zu, on open ground %zu\n",
       drivability.num_faces, percent(drivability.num_faces_blocked, drivability.num_faces),
       percent(drivability.open_faces.size(), drivability.num_faces),
       percent(drivability.num_open_drivable, drivability.num_open_ground),
@@ -85,7 +65,7 @@ void print(const HeightMapErrors& errors) {
 nlohmann::json toJson(const DrivabilityErrors& errors) {
   nlohmann::json open_faces = nlohmann::json::array();
   for (const HeightStep& face : errors.open_faces) {
-    open_faces.push_back({{"place_m", {face.place_m.x(), face.place_m.y()}},
+    open_faces.push_back({{"position_m", {face.position_m.x(), face.position_m.y()}},
                           {"direction", {face.direction.x(), face.direction.y()}},
                           {"height_m", face.high_m - face.low_m}});
   }
@@ -103,7 +83,7 @@ nlohmann::json toJson(const DrivabilityErrors& errors) {
 nlohmann::json toJson(const HeightMapErrors& errors) {
   nlohmann::json measurements = nlohmann::json::array(), kerbs = nlohmann::json::array();
   for (const KerbError& kerb : errors.kerbs) {
-    kerbs.push_back({{"place_m", {kerb.place_m.x(), kerb.place_m.y()}},
+    kerbs.push_back({{"position_m", {kerb.position_m.x(), kerb.position_m.y()}},
                      {"error_m", kerb.error_m},
                      {"nearest_view_m", kerb.nearest_view_m}});
   }
@@ -119,7 +99,7 @@ nlohmann::json toJson(const HeightMapErrors& errors) {
           {"num_mapped", errors.num_mapped},
           {"height_m", errors.height_m},
           {"mean_signed_m", errors.mean_signed_m},
-          {"share_within_10_cm", errors.share_within_10_cm},
+          {"share_within_10_cm", errors.fraction_within_10_cm},
           {"num_steps", errors.num_steps},
           {"num_steps_mapped", errors.num_steps_mapped},
           {"num_steps_found", errors.num_steps_found},
@@ -151,10 +131,10 @@ void writeErrorPicture(const HeightMap& map, const HeightMapErrors& errors, cons
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Errors of a height map against the truth of a simulated drive: heights of the cells that were seen, "
-      "places "
-      "of steps, heights of kerbs, and distances as a tape measure would find them.");
-  std::string map_path, truth_path, rig_path, trajectory_path, options_path, report;
+      "Errors of a height map against the truth of a simulated drive: heights of the cells that were "
+      "visible, positions "
+      "of steps, heights of kerbs, tape-measure distances, and the drivable grid.");
+  std::string map_path, truth_path, rig_path, trajectory_path;
   app.add_option("--map", map_path, "folder of build_height_map")->required()->check(requireNotEmpty);
   app.add_option("--truth", truth_path,
                  "the drive's truth folder (height_map.yaml, obstacles.yaml, trajectory.tum)")
@@ -162,16 +142,23 @@ int main(int argc, char** argv) {
   app.add_option("--rig", rig_path, "rig.yaml of the drive")->required();
   app.add_option(
       "--trajectory", trajectory_path,
-      "TUM file: the poses that the map was made with, to lay it over the truth; without it the map is "
-      "in the world's frame");
-  app.add_option("--options", options_path, "YAML with overrides of HeightMapErrorOptions");
-  app.add_option("--report", report, "folder for height_map_errors.json and its pictures")
-      ->check(requireNotEmpty);
+      "poses with which the map was made (TUM), to align it with the truth; without them the map must be in "
+      "the world's frame");
+  const OptionsArgument<HeightMapErrorOptions> options(&app);
+  const OutputArguments output(
+      &app, R"(kind: "height_map"; num_seen, num_mapped: cells; mean_signed_m; share_within_10_cm;
+num_steps, num_steps_mapped, num_steps_found; num_kerbs_seen, num_kerbs; error distributions height_m,
+step_position_m, kerb_height_m; kerbs: [{position_m [x, y], error_m, nearest_view_m}]; measurements:
+[{kind, from_m, to_m, truth_m, map_m}]; mean_measurement_m, max_measurement_m, num_measurements_missing;
+drivability: {num_faces, num_faces_blocked, open_faces [{position_m, direction, height_m}], num_drivable,
+num_drivable_inside, num_open_ground, num_open_drivable, num_solid, num_solid_on_ground}.)",
+      "height_map_errors");
   return runTool(&app, argc, argv, [&] {
-    HeightMapErrorOptions options;
-    if (!options_path.empty()) {
-      readFieldsFromFile(options_path, &options);
+    if (options.shown()) {
+      return;
     }
+    output.check();
+    const HeightMapErrorOptions error_options = options.read();
     const HeightMap map = readHeightMap(map_path);
     const HeightMap truth = readHeightMap(truth_path);
     const Trajectory true_poses = readTrajectory(truth_path + "/trajectory.tum");
@@ -190,14 +177,14 @@ int main(int argc, char** argv) {
     }
     const IsRigid is_rigid = rigidBy(readTruthObstacles(truth_path + "/obstacles.yaml"));
     const HeightMapErrors errors =
-        evaluateHeightMap(map, world_from_map, truth, true_poses, rig, is_rigid, options);
+        evaluateHeightMap(map, world_from_map, truth, true_poses, rig, is_rigid, error_options);
     if (errors.num_seen == 0) {
-      throw InputError(map_path + ": no cell of it was seen in the drive of " + truth_path);
+      throw InputError(map_path + ": none of its cells was visible in the drive of " + truth_path);
     }
     print(errors);
-    if (!report.empty()) {
-      writeReport(toJson(errors), report, "height_map_errors");
-      writeErrorPicture(map, errors, report);
+    output.write(toJson(errors));
+    if (!output.report().empty()) {
+      writeErrorPicture(map, errors, output.report());
     }
   });
 }

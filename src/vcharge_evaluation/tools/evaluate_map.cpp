@@ -2,13 +2,9 @@
 #include <cstdio>
 #include <vector>
 
-#include <nlohmann/json.hpp>
-
-#include "vcharge_core/base/command_line.h"
-#include "vcharge_core/base/error.h"
+#include "tool_arguments.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_evaluation/map_errors.h"
-#include "vcharge_evaluation/report.h"
 
 namespace {
 
@@ -18,13 +14,13 @@ constexpr double kDegreesPerRadian = 57.29577951308232;
 constexpr size_t kMaxDrawnLandmarks = 20000;
 
 void printRevisits(const char* label, const RevisitCount& count) {
-  std::printf("  %-34s %6lld of %6lld  %6.2f %%\n", label, static_cast<long long>(count.num_found),
-              static_cast<long long>(count.num_keyframes), 100.0 * count.share());
+  std::printf("  %-34s %6d of %6d  %6.2f %%\n", label, count.num_found, count.num_keyframes,
+              100.0 * count.fraction());
 }
 
 void print(const MapErrors& errors) {
-  std::printf("keyframes: %zu over %.1f m, %lld without truth\n", errors.keyframes.poses.size(),
-              errors.keyframes.truth_length_m, static_cast<long long>(errors.num_keyframes_without_truth));
+  std::printf("keyframes: %zu over %.1f m, %d without truth\n", errors.keyframes.poses.size(),
+              errors.keyframes.truth_length_m, errors.num_keyframes_without_truth);
   std::printf("  position (m), aligned: rms %.4f, 50 %% %.4f, 90 %% %.4f, max %.4f\n",
               errors.keyframes.position_m.root_mean_square, errors.keyframes.position_m.percentile_50,
               errors.keyframes.position_m.percentile_90, errors.keyframes.position_m.max);
@@ -32,26 +28,25 @@ void print(const MapErrors& errors) {
               kDegreesPerRadian * errors.keyframes.rotation_rad.root_mean_square,
               kDegreesPerRadian * errors.keyframes.rotation_rad.max);
   std::printf("  scale: %+.4f %%\n", 100.0 * errors.scale_error);
-  std::printf("accepted loop edges: %lld, of these wrong: %lld\n",
-              static_cast<long long>(errors.num_accepted), static_cast<long long>(errors.num_wrong));
+  std::printf("accepted loop edges: %d, of these wrong: %d\n", errors.num_accepted, errors.num_wrong);
   std::printf("  error: 50 %% %.4f m and %.4f deg, 90 %% %.4f m and %.4f deg, max %.4f m and %.4f deg\n",
               errors.accepted_m.percentile_50, kDegreesPerRadian * errors.accepted_rad.percentile_50,
               errors.accepted_m.percentile_90, kDegreesPerRadian * errors.accepted_rad.percentile_90,
               errors.accepted_m.max, kDegreesPerRadian * errors.accepted_rad.max);
-  std::printf("keyframes at a place passed before that got a right edge:\n");
+  std::printf("keyframes at a position passed before, with a correct edge:\n");
   printRevisits("in any heading", errors.revisits);
   printRevisits("same heading", errors.same);
   printRevisits("opposite heading", errors.opposite);
   printRevisits("opposite heading alone, any edge", errors.only_opposite);
   std::printf("rejected loop edges:\n");
   for (const auto& [reason, edges] : errors.rejected) {
-    std::printf("  %6lld, of these right: %6lld  %s\n", static_cast<long long>(edges.num_edges),
-                static_cast<long long>(edges.num_right), reason.c_str());
+    std::printf("  %6d, of these correct: %6d  %s\n", edges.num_edges, edges.num_right, reason.c_str());
   }
 }
 
 nlohmann::json toJson(const RevisitCount& count) {
-  return {{"num_keyframes", count.num_keyframes}, {"num_found", count.num_found}, {"share", count.share()}};
+  return {
+      {"num_keyframes", count.num_keyframes}, {"num_found", count.num_found}, {"share", count.fraction()}};
 }
 
 nlohmann::json positionsFromAbove(const Trajectory& trajectory) {
@@ -127,29 +122,36 @@ nlohmann::json toJson(const SparseMap& map, const MapErrors& errors, const Traje
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Errors of a sparse map against the true trajectory: its keyframes, and its loop edges, accepted and "
-      "rejected.");
-  std::string map_path, truth_path, options_path, report;
+      "Errors of a sparse map against the true trajectory: its keyframes, and its accepted and rejected loop "
+      "edges.");
+  std::string map_path, truth_path;
   app.add_option("--map", map_path, "map to judge (.vmap)")->required()->check(requireNotEmpty);
   app.add_option("--truth", truth_path, "true trajectory (.tum)")->required();
-  app.add_option("--options", options_path, "YAML with overrides of MapErrorOptions");
-  app.add_option("--report", report, "folder for map_errors.json and its plots")->check(requireNotEmpty);
+  const OptionsArgument<MapErrorOptions> options(&app);
+  const OutputArguments output(&app,
+                               R"(kind: "map"; content_hash; num_keyframes, num_landmarks, num_observations;
+truth_length_m; scale_error; error distributions of the aligned keyframes position_m, rotation_rad, and
+of the accepted edges accepted_m, accepted_rad; num_accepted, num_wrong; revisits, same_heading,
+opposite_heading, only_opposite_heading: keyframes at a position passed before {num_keyframes, num_found,
+share}; rejected: per reason {num_edges, num_right}; edges: [{first, second, accepted, reason,
+num_inliers, has_truth, right, opposite, distance_m, error_m, error_rad}]; keyframes: [{x_m, y_m, z_m,
+revisit, found}]; landmarks, truth_path: [[x_m, y_m]].)",
+                               "map_errors");
   return runTool(&app, argc, argv, [&] {
-    MapErrorOptions options;
-    if (!options_path.empty()) {
-      readFieldsFromFile(options_path, &options);
+    if (options.shown()) {
+      return;
     }
+    output.check();
+    const MapErrorOptions error_options = options.read();
     const auto map = readSparseMap(map_path);
     const Trajectory truth = readTrajectory(truth_path);
     MapErrors errors;
     try {
-      errors = evaluateMap(*map, truth, options);
+      errors = evaluateMap(*map, truth, error_options);
     } catch (const InputError& error) {
       throw InputError(map_path + " against " + truth_path + ": " + error.what());
     }
     print(errors);
-    if (!report.empty()) {
-      writeReport(toJson(*map, errors, truth), report, "map_errors");
-    }
+    output.write(toJson(*map, errors, truth));
   });
 }

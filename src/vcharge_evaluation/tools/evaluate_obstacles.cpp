@@ -1,46 +1,30 @@
+#include <algorithm>
 #include <cstdio>
 #include <map>
 #include <memory>
 
-#include <nlohmann/json.hpp>
-
-#include "vcharge_core/base/command_line.h"
-#include "vcharge_core/base/error.h"
-#include "vcharge_core/base/options.h"
+#include "tool_arguments.h"
 #include "vcharge_core/base/progress_bar.h"
 #include "vcharge_core/dense_maps/obstacle_map_file.h"
 #include "vcharge_core/motion/trajectory.h"
 #include "vcharge_evaluation/obstacle_map_errors.h"
 #include "vcharge_evaluation/obstacle_scan_errors.h"
 #include "vcharge_evaluation/range_truth.h"
-#include "vcharge_evaluation/report.h"
 
 namespace {
 
 using namespace vcharge;
 
 struct Options {
-  int frame_step = 1;  ///< every how many maps one is judged
-  int pixel_step = 2;  ///< of the true ranges
-  ObstacleScanEvaluationOptions scan;
-  ObstacleMapEvaluationOptions map;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("frame_step", frame_step);
-    visit("pixel_step", pixel_step);
-    visit("scan", scan);
-    visit("map", map);
-  }
-  void validate() const {
-    requireField(frame_step > 0, "frame_step", "must be positive", frame_step);
-    requireField(pixel_step > 0, "pixel_step", "must be positive", pixel_step);
-    validateInner("scan", scan);
-    validateInner("map", map);
-  }
+  VCHARGE_BEGIN_OPTIONS(Options);
+  VCHARGE_OPTION(int, frame_step, 1, positive(), "Every how many maps one is judged.");
+  VCHARGE_OPTION(int, pixel_step, 2, positive(), "Every how many columns and rows a true range is used.");
+  VCHARGE_OPTION_GROUP(ObstacleScanEvaluationOptions, scan, {}, "Ranges of the scans.");
+  VCHARGE_OPTION_GROUP(ObstacleMapEvaluationOptions, map, {}, "Cells of the fused map.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// A simulated drive's truth.
+/// The truth of a simulated drive.
 class Truth {
  public:
   Truth(const std::string& folder, CameraRig rig)
@@ -51,7 +35,7 @@ class Truth {
     for (const RigCamera& camera : rig_.cameras) {
       rays_.push_back(nullptr);
       if (!camera.vehicle_from_camera) {
-        throw InputError(folder + "/rig.yaml: cameras." + camera.name + ": vehicle_from_camera is missing");
+        throw InputError(folder + "/rig.yaml: cameras." + camera.name + ": expected vehicle_from_camera");
       }
     }
   }
@@ -67,7 +51,7 @@ class Truth {
     }
     return path;
   }
-  /// Of the camera at that index; empty without a true range image.
+  /// Points visible to a camera; empty without a true range image.
   std::vector<SeenPoint> pointsOf(size_t index, Timestamp stamp, int step) {
     const RigCamera& camera = rig_.cameras[index];
     const cv::Mat range_m = readRangeTruth(folder_ + "/range", camera.name, stamp);
@@ -93,7 +77,7 @@ class Truth {
   const CameraRig& rig() const { return rig_; }
 
  private:
-  /// Motion of a camera around a stamp; zero where it stands.
+  /// Direction of a camera's motion at a stamp; zero if it stands.
   Eigen::Vector2d travelAt(Timestamp stamp, const RigidTransform& vehicle_from_camera) const {
     const auto here = poses_.find(stamp);
     const auto next = std::next(here) == poses_.end() ? here : std::next(here);
@@ -112,23 +96,22 @@ class Truth {
 };
 
 nlohmann::json raysToJson(const char* what, const RayErrors& errors) {
-  const auto judged = static_cast<double>(std::max<uint64_t>(1, errors.num_judged));
+  const auto judged = static_cast<double>(std::max<size_t>(1, errors.num_judged));
   std::printf(
-      "  %-12s %6llu rays, missed %.1f %%, nearer %.1f %%; error mean %.1f cm (signed %+.1f), 95 %% %.1f cm; "
+      "  %-12s %6zu rays, missed %.1f %%, nearer %.1f %%; error mean %.1f cm (signed %+.1f), 95 %% %.1f cm; "
       "own ray mean %.1f cm, 95 %% %.1f cm; within 1, 2 sigma %.0f, %.0f %%\n",
-      what, static_cast<unsigned long long>(errors.num_judged), 100.0 * errors.num_missed / judged,
-      100.0 * errors.num_nearer / judged, 100.0 * errors.error_m.mean, 100.0 * errors.mean_signed_m,
-      100.0 * errors.error_m.percentile_95, 100.0 * errors.error_own_ray_m.mean,
-      100.0 * errors.error_own_ray_m.percentile_95, 100.0 * errors.share_within_one_sigma,
-      100.0 * errors.share_within_two_sigma);
+      what, errors.num_judged, 100.0 * errors.num_missed / judged, 100.0 * errors.num_nearer / judged,
+      100.0 * errors.error_m.mean, 100.0 * errors.mean_signed_m, 100.0 * errors.error_m.percentile_95,
+      100.0 * errors.error_own_ray_m.mean, 100.0 * errors.error_own_ray_m.percentile_95,
+      100.0 * errors.fraction_within_one_sigma, 100.0 * errors.fraction_within_two_sigma);
   return {{"rays", errors.num_judged},
           {"missed", errors.num_missed},
           {"nearer", errors.num_nearer},
           {"error_m", errors.error_m},
           {"error_own_ray_m", errors.error_own_ray_m},
           {"mean_signed_m", errors.mean_signed_m},
-          {"share_within_one_sigma", errors.share_within_one_sigma},
-          {"share_within_two_sigma", errors.share_within_two_sigma}};
+          {"share_within_one_sigma", errors.fraction_within_one_sigma},
+          {"share_within_two_sigma", errors.fraction_within_two_sigma}};
 }
 
 nlohmann::json scanToJson(const std::string& name, const ObstacleScanEvaluator& evaluator) {
@@ -139,68 +122,25 @@ nlohmann::json scanToJson(const std::string& name, const ObstacleScanEvaluator& 
           {"ahead_within_2_m", raysToJson("ahead < 2 m", evaluator.aheadNear())}};
 }
 
-/// Missed obstacles by distance from the driven ground and by height.
-void printObstacles(const ObstacleMapErrors& errors) {
-  constexpr double kDistances_m[] = {0.0, 1.0, 2.0, 4.0};
-  constexpr double kHeights_m[] = {0.3, 0.6, 1.2, 100.0};
-  std::printf("obstacles missed / judged, by distance (rows) and height:\n%18s", "");
-  for (int column = 0; column < 3; ++column) {
-    std::printf("  %.1f-%.1f m", kHeights_m[column], kHeights_m[column + 1]);
-  }
-  std::printf("\n");
-  for (int row = 0; row < 3; ++row) {
-    std::printf("  %.0f to %.0f m        ", kDistances_m[row], kDistances_m[row + 1]);
-    for (int column = 0; column < 3; ++column) {
-      int judged = 0;
-      int missed = 0;
-      for (const ObstacleOutcome& outcome : errors.obstacles) {
-        const bool here = outcome.distance_m >= kDistances_m[row] && outcome.height_m >= kHeights_m[column] &&
-                          (outcome.distance_m < kDistances_m[row + 1] || row == 2) &&
-                          outcome.height_m < kHeights_m[column + 1];
-        judged += here ? 1 : 0;
-        missed += here && !outcome.reported ? 1 : 0;
-      }
-      std::printf("  %4d / %-4d", missed, judged);
-    }
-    std::printf("\n");
-  }
-  for (const ObstacleOutcome& outcome : errors.obstacles) {
+/// Prints how many obstacles were missed, and those that were not reported in all maps.
+void printObstacles(const std::vector<ObstacleOutcome>& outcomes) {
+  const auto missed = std::count_if(outcomes.begin(), outcomes.end(),
+                                    [](const ObstacleOutcome& outcome) { return !outcome.reported; });
+  std::printf("obstacles missed: %d of %zu\n", static_cast<int>(missed), outcomes.size());
+  for (const ObstacleOutcome& outcome : outcomes) {
     if (!outcome.reported || outcome.frames_reported < outcome.frames) {
       std::printf(
-          "  %s at (%.1f, %.1f), %.2f m high, %.2f m wide, %.1f m away: %s, then reported in %llu of %llu "
+          "  %s at (%.1f, %.1f), %.2f m high, %.2f m wide, %.1f m away: %s, then reported in %zu of %zu "
           "maps\n",
           outcome.kind.c_str(), outcome.middle_m.x(), outcome.middle_m.y(), outcome.height_m, outcome.width_m,
-          outcome.distance_m, outcome.reported ? "reported" : "MISSED",
-          static_cast<unsigned long long>(outcome.frames_reported),
-          static_cast<unsigned long long>(outcome.frames));
+          outcome.distance_m, outcome.reported ? "reported" : "MISSED", outcome.frames_reported,
+          outcome.frames);
     }
-  }
-}
-
-/// By how near the vehicle's middle came: what is only seen from afar has few pixels on its face.
-void printKerbs(const ObstacleMapErrors& errors) {
-  std::printf("kerbs: %llu of %llu places reported, height error mean %.1f cm, 95 %% %.1f cm\n",
-              static_cast<unsigned long long>(errors.num_kerb_reported),
-              static_cast<unsigned long long>(errors.num_kerb_points),
-              100.0 * errors.kerb_height_error_m.mean, 100.0 * errors.kerb_height_error_m.percentile_95);
-  const double bands_m[] = {0.0, 2.5, 3.5, 100.0};
-  for (int band = 0; band < 3; ++band) {
-    int places = 0;
-    int reported = 0;
-    int ever = 0;
-    for (const KerbOutcome& kerb : errors.kerbs) {
-      const bool here = kerb.nearest_m >= bands_m[band] && kerb.nearest_m < bands_m[band + 1];
-      places += here ? 1 : 0;
-      reported += here && kerb.reported ? 1 : 0;
-      ever += here && kerb.ever_reported ? 1 : 0;
-    }
-    std::printf("  nearest at %.1f to %.1f m: %d of %d, at any time %d\n", bands_m[band], bands_m[band + 1],
-                reported, places, ever);
   }
 }
 
 nlohmann::json mapToJson(const ObstacleMapErrors& errors) {
-  printObstacles(errors);
+  printObstacles(errors.obstacles);
   nlohmann::json obstacles = nlohmann::json::array();
   for (const ObstacleOutcome& outcome : errors.obstacles) {
     obstacles.push_back({{"kind", outcome.kind},
@@ -212,24 +152,22 @@ nlohmann::json mapToJson(const ObstacleMapErrors& errors) {
                          {"maps_reported", outcome.frames_reported}});
   }
   std::printf(
-      "false: %llu cells over %.1f m, %.2f per 10 m; left occupied behind the vehicle: %llu, %.2f per 10 m; "
-      "%.2f in a map; %llu more where no camera saw the ground\n",
-      static_cast<unsigned long long>(errors.num_false_cells), errors.driven_m, errors.false_cells_per_10_m,
-      static_cast<unsigned long long>(errors.num_false_left),
+      "false: %zu cells over %.1f m, %.2f per 10 m; left occupied behind the vehicle: %zu, %.2f per 10 m; "
+      "%.2f in a map; %zu more on ground that was never visible\n",
+      errors.num_false_cells, errors.driven_m, errors.false_cells_per_10_m, errors.num_false_left,
       10.0 * static_cast<double>(errors.num_false_left) / std::max(0.1, errors.driven_m),
-      errors.false_cells_per_map, static_cast<unsigned long long>(errors.num_false_hidden));
-  std::printf("inside true obstacles: %llu of %llu observed cells were ever free\n",
-              static_cast<unsigned long long>(errors.num_free_inside),
-              static_cast<unsigned long long>(errors.num_observed_inside));
-  printKerbs(errors);
-  std::printf("moving things: reported in %llu of %llu maps; %llu of %llu cells under them free\n",
-              static_cast<unsigned long long>(errors.num_mover_reported),
-              static_cast<unsigned long long>(errors.num_mover_frames),
-              static_cast<unsigned long long>(errors.num_mover_free),
-              static_cast<unsigned long long>(errors.num_mover_cells));
+      errors.false_cells_per_map, errors.num_false_hidden);
+  std::printf("inside true obstacles: %zu of %zu observed cells were ever free\n", errors.num_free_inside,
+              errors.num_observed_inside);
+  std::printf("kerbs: %zu of %zu points reported, height error mean %.1f cm, 95 %% %.1f cm\n",
+              errors.num_kerb_reported, errors.num_kerb_points, 100.0 * errors.kerb_height_error_m.mean,
+              100.0 * errors.kerb_height_error_m.percentile_95);
+  std::printf("moving objects: reported in %zu of %zu maps; %zu of %zu cells under them free\n",
+              errors.num_mover_reported, errors.num_mover_frames, errors.num_mover_free,
+              errors.num_mover_cells);
   nlohmann::json kerbs = nlohmann::json::array();
   for (const KerbOutcome& kerb : errors.kerbs) {
-    kerbs.push_back({{"place_m", {kerb.place_m.x(), kerb.place_m.y()}},
+    kerbs.push_back({{"position_m", {kerb.position_m.x(), kerb.position_m.y()}},
                      {"nearest_m", kerb.nearest_m},
                      {"reported", kerb.reported},
                      {"ever_reported", kerb.ever_reported}});
@@ -254,7 +192,7 @@ nlohmann::json mapToJson(const ObstacleMapErrors& errors) {
           {"false_cell_list", false_cells},
           {"observed_inside", errors.num_observed_inside},
           {"free_inside", errors.num_free_inside},
-          {"kerb_places", errors.num_kerb_points},
+          {"kerb_points", errors.num_kerb_points},
           {"kerb_reported", errors.num_kerb_reported},
           {"kerb_height_error_m", errors.kerb_height_error_m},
           {"kerbs", kerbs},
@@ -265,7 +203,7 @@ nlohmann::json mapToJson(const ObstacleMapErrors& errors) {
 }
 
 struct Arguments {
-  std::string obstacles, truth, options, report;
+  std::string obstacles, truth;
 };
 
 nlohmann::json evaluate(const Arguments& arguments, const Options& options) {
@@ -275,13 +213,13 @@ nlohmann::json evaluate(const Arguments& arguments, const Options& options) {
                                      options.map);
   std::map<std::string, ObstacleScanEvaluator> scan_evaluators;
   const std::vector<Timestamp> stamps = listObstacles(arguments.obstacles);
-  uint64_t judged = 0;
+  size_t judged = 0;
   ProgressBar progress("evaluating");
   for (size_t i = 0; i < stamps.size(); i += static_cast<size_t>(options.frame_step)) {
     progress.update(static_cast<double>(i) / static_cast<double>(stamps.size()));
     const RigidTransform* pose = truth.poseAt(stamps[i]);
     if (pose == nullptr) {
-      continue;  // a map from between two images
+      continue;  // no image has this stamp
     }
     const std::vector<ObstacleScan> scans = readObstacleScans(arguments.obstacles, stamps[i]);
     std::vector<SeenPoint> all;
@@ -305,8 +243,9 @@ nlohmann::json evaluate(const Arguments& arguments, const Options& options) {
                       truth.moversBetween(stamps[i] - durationFromSeconds(1.0), stamps[i]));
   }
   if (judged == 0) {
-    throw InputError(arguments.truth + "/range: no true ranges for any of the obstacle maps (" +
-                     std::to_string(stamps.size()) + " there; simulate the drive with --truth-range)");
+    throw InputError(arguments.truth + "/range: no true ranges for any of the " +
+                     std::to_string(stamps.size()) +
+                     " obstacle maps (simulate the drive with --truth-range)");
   }
   nlohmann::json json = {{"kind", "obstacles"}, {"scans", nlohmann::json::array()}};
   for (const auto& [name, evaluator] : scan_evaluators) {
@@ -325,16 +264,23 @@ int main(int argc, char** argv) {
   app.add_option("--truth", arguments.truth,
                  "folder of the drive's truth (range/, rig.yaml, trajectory.tum, obstacles.yaml, ...)")
       ->required();
-  app.add_option("--options", arguments.options, "YAML with overrides of the evaluation's options");
-  app.add_option("--report", arguments.report, "folder for obstacle_errors.json")->check(requireNotEmpty);
+  const OptionsArgument<Options> options(&app);
+  const OutputArguments output(
+      &app,
+      R"(kind: "obstacles"; scans: per scan {name, and for rays off the direction of travel
+(aside), along it (ahead) and along it within 2 m (ahead_within_2_m) {rays, missed, nearer,
+mean_signed_m, share_within_one_sigma, share_within_two_sigma, error distributions error_m,
+error_own_ray_m}}; map: {maps, driven_m, obstacles [{kind, height_m, width_m, distance_m, reported, maps,
+maps_reported}], false_cells, false_cells_per_10_m, false_left, false_cells_per_map, false_cells_hidden,
+false_cell_list [{x_m, y_m, first_seen_ns, maps, left, on_open_ground}], observed_inside, free_inside:
+cells inside obstacles, kerb_points, kerb_reported, error distribution kerb_height_error_m, kerbs
+[{position_m, nearest_m, reported, ever_reported}], mover_maps, mover_reported, mover_cells, mover_free}.)",
+      "obstacle_errors");
   return runTool(&app, argc, argv, [&] {
-    Options options;
-    if (!arguments.options.empty()) {
-      readFieldsFromFile(arguments.options, &options);
+    if (options.shown()) {
+      return;
     }
-    const nlohmann::json json = evaluate(arguments, options);
-    if (!arguments.report.empty()) {
-      writeReport(json, arguments.report, "obstacle_errors");
-    }
+    output.check();
+    output.write(evaluate(arguments, options.read()));
   });
 }

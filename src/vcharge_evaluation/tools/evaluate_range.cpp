@@ -4,30 +4,24 @@
 #include <optional>
 #include <set>
 
-#include <nlohmann/json.hpp>
-
-#include "vcharge_core/base/command_line.h"
-#include "vcharge_core/base/error.h"
-#include "vcharge_core/base/options.h"
+#include "tool_arguments.h"
 #include "vcharge_core/base/progress_bar.h"
 #include "vcharge_core/camera/working_camera.h"
 #include "vcharge_core/dense_maps/range_map_file.h"
 #include "vcharge_core/motion/trajectory.h"
 #include "vcharge_evaluation/range_evaluator.h"
 #include "vcharge_evaluation/range_truth.h"
-#include "vcharge_evaluation/report.h"
 #include "vcharge_recordings/bag_drive_source.h"
 
 namespace {
 
-using vcharge::RigidTransform;
-using vcharge::Timestamp;
+using namespace vcharge;
 
-/// Judges every range map whose image passes by in the bag.
-class Judge : public vcharge::DriveConsumer {
+/// Judges every range map whose image is in the bag.
+class Judge : public DriveConsumer {
  public:
-  Judge(const vcharge::CameraRig& rig, std::string range_folder, std::string truth_folder,
-        const vcharge::Trajectory& truth, const vcharge::RangeEvaluationOptions& options)
+  Judge(const CameraRig& rig, std::string range_folder, std::string truth_folder, const Trajectory& truth,
+        const RangeEvaluationOptions& options)
       : rig_(rig),
         range_folder_(std::move(range_folder)),
         truth_folder_(std::move(truth_folder)),
@@ -38,54 +32,54 @@ class Judge : public vcharge::DriveConsumer {
     for (size_t i = 0; i < rig.cameras.size(); ++i) {
       cameras_.emplace_back(options);
       if (std::filesystem::is_directory(std::filesystem::path(range_folder_) / rig.cameras[i].name)) {
-        const auto stamps = vcharge::listRangeMaps(range_folder_, rig.cameras[i].name);
+        const auto stamps = listRangeMaps(range_folder_, rig.cameras[i].name);
         cameras_.back().stamps.insert(stamps.begin(), stamps.end());
       }
     }
   }
 
-  void addImage(size_t camera_index, Timestamp stamp, const vcharge::Image& image) override {
+  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
     PerCamera& camera = cameras_[camera_index];
-    const vcharge::RigCamera& rig_camera = rig_.cameras[camera_index];
+    const RigCamera& rig_camera = rig_.cameras[camera_index];
     if (camera.stamps.count(stamp) == 0) {
       return;
     }
-    const cv::Mat truth = vcharge::readRangeTruth(truth_folder_, rig_camera.name, stamp);
+    const cv::Mat truth = readRangeTruth(truth_folder_, rig_camera.name, stamp);
     if (truth.empty()) {
       ++num_without_truth_;
       return;
     }
-    vcharge::checkImageSize(rig_camera, truth.size(), truth_folder_ + "/" + rig_camera.name);
-    const vcharge::RangeMap map = vcharge::readRangeMap(range_folder_, rig_camera.name, stamp);
+    checkImageSize(rig_camera, truth.size(), truth_folder_ + "/" + rig_camera.name);
+    const RangeMap map = readRangeMap(range_folder_, rig_camera.name, stamp);
     if (!camera.working) {
-      camera.working = vcharge::rebuildWorkingCamera(map.camera, map.range_m.size(), rig_camera);
+      camera.working = rebuildWorkingCamera(map.camera, map.range_m.size(), rig_camera);
     }
     const cv::Mat working_image = camera.working->undistort(image.pixels);
-    const cv::Mat working_truth = vcharge::resampleRangeTruth(truth, *camera.working);
+    const cv::Mat working_truth = resampleRangeTruth(truth, *camera.working);
     const auto travel = travelDirection(rig_camera, stamp);
-    for (vcharge::RangeEvaluator* evaluator : {&camera.evaluator, &total_}) {
+    for (RangeEvaluator* evaluator : {&camera.evaluator, &total_}) {
       evaluator->add(map, working_image, working_truth, camera.working->validMask(), travel);
     }
   }
-  void addOdometry(const vcharge::VehicleOdometry&) override {}
+  void addOdometry(const VehicleOdometry&) override {}
 
-  const vcharge::RangeEvaluator& total() const { return total_; }
-  const vcharge::RangeEvaluator& camera(size_t index) const { return cameras_[index].evaluator; }
+  const RangeEvaluator& total() const { return total_; }
+  const RangeEvaluator& camera(size_t index) const { return cameras_[index].evaluator; }
   size_t numWithoutTruth() const { return num_without_truth_; }
 
  private:
   struct PerCamera {
-    explicit PerCamera(const vcharge::RangeEvaluationOptions& options) : evaluator(options) {}
+    explicit PerCamera(const RangeEvaluationOptions& options) : evaluator(options) {}
     std::set<Timestamp> stamps;
-    std::optional<vcharge::WorkingCamera> working;
-    vcharge::RangeEvaluator evaluator;
+    std::optional<WorkingCamera> working;
+    RangeEvaluator evaluator;
   };
 
-  /// Motion of the camera between the neighbouring true poses, in its own frame; none below 1 cm.
-  std::optional<Eigen::Vector3d> travelDirection(const vcharge::RigCamera& camera, Timestamp stamp) const {
+  /// Motion of the camera between the neighbouring true poses, in its own frame; absent below 1 cm.
+  std::optional<Eigen::Vector3d> travelDirection(const RigCamera& camera, Timestamp stamp) const {
     const auto here = truth_.find(stamp);
     if (here == truth_.end()) {
-      throw vcharge::InputError(truth_folder_ + ": no true pose at " + vcharge::toString(stamp));
+      throw InputError(truth_folder_ + ": no true pose at " + toString(stamp));
     }
     const RigidTransform vehicle_from_camera = *camera.vehicle_from_camera;
     const auto next = std::next(here) == truth_.end() ? here : std::next(here);
@@ -98,52 +92,51 @@ class Judge : public vcharge::DriveConsumer {
     return (here->second * vehicle_from_camera).rotation().conjugate() * motion_in_world;
   }
 
-  const vcharge::CameraRig& rig_;
+  const CameraRig& rig_;
   std::string range_folder_;
   std::string truth_folder_;
   std::map<Timestamp, RigidTransform> truth_;
   std::vector<PerCamera> cameras_;
-  vcharge::RangeEvaluator total_;
+  RangeEvaluator total_;
   size_t num_without_truth_ = 0;
 };
 
-nlohmann::json binsToJson(const std::vector<vcharge::RangeBin>& bins) {
+nlohmann::json binsToJson(const std::vector<RangeBin>& bins) {
   nlohmann::json json = nlohmann::json::array();
-  for (const vcharge::RangeBin& bin : bins) {
+  for (const RangeBin& bin : bins) {
     json.push_back({{"low", bin.low},
                     {"high", bin.high},
                     {"count", bin.count},
-                    {"share_within_tolerance", bin.share_within_tolerance},
+                    {"share_within_tolerance", bin.fraction_within_tolerance},
                     {"median_relative_error", bin.median_relative_error},
-                    {"share_within_one_sigma", bin.share_within_one_sigma}});
+                    {"share_within_one_sigma", bin.fraction_within_one_sigma}});
   }
   return json;
 }
 
-nlohmann::json reportErrors(const std::string& label, const vcharge::RangeErrors& errors) {
-  std::printf("%s: %llu frames, %llu pixels judged, %.1f %% with a range\n", label.c_str(),
-              static_cast<unsigned long long>(errors.num_frames),
-              static_cast<unsigned long long>(errors.num_judged),
+nlohmann::json reportErrors(const std::string& label, const RangeErrors& errors) {
+  std::printf("%s: %zu frames, %zu pixels judged, %.1f %% with a range\n", label.c_str(), errors.num_frames,
+              errors.num_judged,
               100.0 * static_cast<double>(errors.num_known) /
-                  static_cast<double>(std::max<uint64_t>(1, errors.num_judged)));
+                  static_cast<double>(std::max<size_t>(1, errors.num_judged)));
   nlohmann::json accuracies = nlohmann::json::array();
-  for (const vcharge::RangeAccuracy& accuracy : errors.accuracy) {
+  for (const RangeAccuracy& accuracy : errors.accuracy) {
     std::printf("  %3.0f %% most confident: %5.1f %% right, median error %.2f %%\n", 100.0 * accuracy.density,
-                100.0 * accuracy.share_within_tolerance, 100.0 * accuracy.median_relative_error);
+                100.0 * accuracy.fraction_within_tolerance, 100.0 * accuracy.median_relative_error);
     accuracies.push_back({{"density", accuracy.density},
-                          {"share_within_tolerance", accuracy.share_within_tolerance},
+                          {"share_within_tolerance", accuracy.fraction_within_tolerance},
                           {"median_relative_error", accuracy.median_relative_error},
-                          {"share_known", accuracy.share_known}});
+                          {"share_known", accuracy.fraction_known}});
   }
   std::printf("  within one sigma: %.1f %% of the ranges, within two: %.1f %%\n",
-              100.0 * errors.share_within_one_sigma, 100.0 * errors.share_within_two_sigma);
+              100.0 * errors.fraction_within_one_sigma, 100.0 * errors.fraction_within_two_sigma);
   return {{"label", label},
           {"num_frames", errors.num_frames},
           {"num_judged", errors.num_judged},
           {"num_known", errors.num_known},
           {"accuracy", accuracies},
-          {"share_within_one_sigma", errors.share_within_one_sigma},
-          {"share_within_two_sigma", errors.share_within_two_sigma},
+          {"share_within_one_sigma", errors.fraction_within_one_sigma},
+          {"share_within_two_sigma", errors.fraction_within_two_sigma},
           {"by_truth", binsToJson(errors.by_truth)},
           {"by_confidence", binsToJson(errors.by_confidence)}};
 }
@@ -152,50 +145,55 @@ nlohmann::json reportErrors(const std::string& label, const vcharge::RangeErrors
 
 int main(int argc, char** argv) {
   CLI::App app("Errors of range maps against the truth of a simulated drive, at fixed density.");
-  std::string range_folder, truth_folder, bag, rig_path, options_path, report;
+  std::string range_folder, truth_folder, bag, rig_path;
   app.add_option("--range", range_folder, "folder that compute_range_maps wrote")->required();
   app.add_option("--truth", truth_folder, "folder of the drive's truth (range/ and trajectory.tum)")
       ->required();
   app.add_option("--bag", bag, "the drive")->required();
   app.add_option("--rig", rig_path, "rig.yaml that the range maps were made with")->required();
-  app.add_option("--options", options_path, "YAML with overrides of RangeEvaluationOptions");
-  app.add_option("--report", report, "folder for range_errors.json and its plots")
-      ->check(vcharge::requireNotEmpty);
-  return vcharge::runTool(&app, argc, argv, [&] {
-    vcharge::RangeEvaluationOptions options;
-    if (!options_path.empty()) {
-      vcharge::readFieldsFromFile(options_path, &options);
+  const OptionsArgument<RangeEvaluationOptions> options(&app);
+  const OutputArguments output(
+      &app,
+      R"(kind: "range"; tolerance: relative; sets: for all cameras and for each one {label,
+num_frames, num_judged, num_known, share_within_one_sigma, share_within_two_sigma, accuracy [{density,
+share_within_tolerance, median_relative_error, share_known}] of the most confident fraction, and by_truth
+(m) and by_confidence [{low, high, count, share_within_tolerance, median_relative_error,
+share_within_one_sigma}] of the known ranges}.)",
+      "range_errors");
+  return runTool(&app, argc, argv, [&] {
+    if (options.shown()) {
+      return;
     }
-    const auto rig = std::make_shared<const vcharge::CameraRig>(vcharge::readCameraRig(rig_path));
+    output.check();
+    const RangeEvaluationOptions evaluation_options = options.read();
+    const auto rig = std::make_shared<const CameraRig>(readCameraRig(rig_path));
     if (!rig->hasExtrinsics()) {
-      throw vcharge::InputError(rig_path + ": vehicle_from_camera: missing for at least one camera");
+      throw InputError(rig_path + ": vehicle_from_camera: missing for at least one camera");
     }
-    vcharge::BagDriveSourceOptions source_options;
-    source_options.cameras = vcharge::listRangeMapCameras(range_folder);
+    BagDriveSourceOptions source_options;
+    source_options.cameras = listRangeMapCameras(range_folder);
     if (source_options.cameras.empty()) {
-      throw vcharge::InputError(range_folder + ": no range maps in it");
+      throw InputError(range_folder + ": expected range maps in it");
     }
-    const vcharge::Trajectory truth = vcharge::readTrajectory(truth_folder + "/trajectory.tum");
-    Judge judge(*rig, range_folder, truth_folder + "/range", truth, options);
+    const Trajectory truth = readTrajectory(truth_folder + "/trajectory.tum");
+    Judge judge(*rig, range_folder, truth_folder + "/range", truth, evaluation_options);
     {
-      vcharge::ProgressBar progress("evaluating");
-      vcharge::BagDriveSource(bag, rig, source_options).run(&judge, [&](double share) {
-        progress.update(share);
+      ProgressBar progress("evaluating");
+      BagDriveSource(bag, rig, source_options).run(&judge, [&](double fraction) {
+        progress.update(fraction);
       });
     }
-    const vcharge::RangeErrors total = judge.total().errors();
+    const RangeErrors total = judge.total().errors();
     if (total.num_frames == 0) {
-      throw vcharge::InputError(truth_folder + "/range: no truth for any of the range maps (" +
-                                std::to_string(judge.numWithoutTruth()) + " looked for)");
+      throw InputError(truth_folder + "/range: no truth for any of the " +
+                       std::to_string(judge.numWithoutTruth()) + " range maps");
     }
-    nlohmann::json json = {{"kind", "range"}, {"tolerance", options.tolerance}};
+    nlohmann::json json = {{"kind", "range"}, {"tolerance", evaluation_options.tolerance}};
     json["sets"] = nlohmann::json::array();
     json["sets"].push_back(reportErrors("all cameras", total));
     for (const std::string& name : source_options.cameras) {
       json["sets"].push_back(reportErrors(name, judge.camera(rig->cameraIndex(name)).errors()));
     }
-    if (!report.empty()) {
-      vcharge::writeReport(json, report, "range_errors");
-    }
+    output.write(json);
   });
 }

@@ -1,22 +1,20 @@
-#include <cmath>
 #include <cstdio>
 
-#include <nlohmann/json.hpp>
-
-#include "vcharge_core/base/command_line.h"
+#include "tool_arguments.h"
 #include "vcharge_core/camera/camera_rig.h"
-#include "vcharge_core/files/file_io.h"
 #include "vcharge_evaluation/rig_errors.h"
 
 namespace {
 
+using namespace vcharge;
+
 constexpr double kDegrees = 57.29577951308232;
 
-nlohmann::json print(const char* title, const std::vector<vcharge::CameraErrors>& errors) {
+nlohmann::json print(const char* title, const std::vector<CameraErrors>& errors) {
   std::printf("%s\n  %-10s %8s %8s %8s %8s   %8s %8s %8s %8s   %s\n", title, "camera", "x (cm)", "y", "z",
               "total", "x (deg)", "y", "z", "total", "in standard deviations");
   nlohmann::json json = nlohmann::json::array();
-  for (const vcharge::CameraErrors& camera : errors) {
+  for (const CameraErrors& camera : errors) {
     const Eigen::Vector3d shift_cm = 100.0 * camera.error.head<3>();
     const Eigen::Vector3d turn_deg = kDegrees * camera.error.tail<3>();
     std::printf("  %-10s %8.2f %8.2f %8.2f %8.2f   %8.3f %8.3f %8.3f %8.3f  ", camera.name.c_str(),
@@ -42,22 +40,24 @@ nlohmann::json print(const char* title, const std::vector<vcharge::CameraErrors>
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Errors of a rig's extrinsics against the truth, per camera and degree of freedom (axes of the "
-      "vehicle), "
-      "as they are and without the common scale, which a calibration from a drive takes from the odometer.");
-  std::string estimate, truth, json_path;
+      "Errors of a rig's extrinsics against the truth, per camera and degree of freedom in the axes of the "
+      "vehicle. "
+      "The common scale, which a calibration from a drive takes from the odometer, is judged apart.");
+  std::string estimate, truth;
   app.add_option("--estimate", estimate, "rig.yaml to judge")->required();
   app.add_option("--truth", truth, "true rig.yaml")->required();
-  app.add_option("--json", json_path, "file for the same figures as JSON")->check(vcharge::requireNotEmpty);
-  return vcharge::runTool(&app, argc, argv, [&] {
-    const vcharge::RigErrors errors =
-        vcharge::evaluateRig(vcharge::readCameraRig(estimate), vcharge::readCameraRig(truth));
+  const OutputArguments output(
+      &app,
+      R"(kind: "rig"; scale: factor on the translations that fits the truth best; as_is,
+without_scale: per camera {camera, error_m [x, y, z], error_rad [x, y, z], normalized [6]: errors over
+their standard deviations, if there are covariances}.)");
+  return runTool(&app, argc, argv, [&] {
+    output.check();
+    const RigErrors errors = evaluateRig(readCameraRig(estimate), readCameraRig(truth));
     nlohmann::json json = {{"kind", "rig"}, {"scale", errors.scale}};
     json["as_is"] = print("as it is", errors.as_is);
     std::printf("scale: x %.5f\n", errors.scale);
     json["without_scale"] = print("without the common scale", errors.without_scale);
-    if (!json_path.empty()) {
-      vcharge::writeTextFileAtomically(json_path, json.dump(1) + "\n");
-    }
+    output.write(json);
   });
 }

@@ -10,7 +10,7 @@
 #include "vcharge_features/patch_tracker.h"
 #include "vcharge_features/vocabulary_tree.h"
 
-// Everything on one thread. Searches of descriptors: two nearest and reverse, 1000 x 1000, beside OpenCV's in
+// All on one thread. Descriptor searches: the two nearest and the reverse, 1000 x 1000, beside OpenCV's in
 // the same run.
 namespace vcharge {
 namespace {
@@ -85,7 +85,7 @@ void extract(benchmark::State& state, FeatureType type) {
   }
 }
 BENCHMARK_CAPTURE(extract, fast_brief, FeatureType::kFastBrief)->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(extract, orb, FeatureType::kOrb)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(extract, root_sift, FeatureType::kRootSift)->Unit(benchmark::kMillisecond);
 
 void track500Points(benchmark::State& state) {
   cv::setNumThreads(1);

@@ -15,7 +15,6 @@
 #include "vcharge_geometry/solvers/ackermann_two_point.h"
 #include "vcharge_geometry/solvers/generalized_three_point.h"
 #include "vcharge_geometry/solvers/known_vertical_four_point.h"
-#include "vcharge_geometry/solvers/linear_seventeen_point.h"
 #include "vcharge_geometry/solvers/perspective_three_point.h"
 #include "vcharge_geometry/solvers/planar_three_point.h"
 #include "vcharge_geometry/solvers/upright_two_point.h"
@@ -234,23 +233,6 @@ void uprightTwoPoint(benchmark::State& state) {
       });
 }
 
-void linearSeventeenPoint(benchmark::State& state) {
-  std::vector<std::vector<LineMatch>> problems;
-  for (const std::array<LineMatch, 17>& matches : freeProblems().matches) {
-    problems.emplace_back(matches.begin(), matches.end());
-  }
-  measure(
-      state, problems,
-      [](const std::vector<LineMatch>& matches) {
-        RigidTransform motion;
-        solveLinearSeventeenPoint(matches, &motion);
-        return motion;
-      },
-      [](const RigidTransform& motion, size_t i) {
-        return transformError(motion, freeProblems().truths[i]);
-      });
-}
-
 std::vector<OpengvRelative<17>> opengvFreeProblems() {
   return {freeProblems().matches.begin(), freeProblems().matches.end()};
 }
@@ -316,7 +298,6 @@ BENCHMARK(knownVerticalFourPoint);
 BENCHMARK(generalizedThreePoint);
 BENCHMARK(perspectiveThreePoint);
 BENCHMARK(uprightTwoPoint);
-BENCHMARK(linearSeventeenPoint);
 BENCHMARK(opengvSeventeenPoint);
 BENCHMARK(opengvSixPoint);
 BENCHMARK(opengvGeneralizedThreePoint);
@@ -357,6 +338,5 @@ int main(int argc, char** argv) {
   printRatio("opengvSeventeenPoint", "ackermannTwoPoint");
   printRatio("opengvSixPoint", "ackermannTwoPoint");
   printRatio("opengvGeneralizedThreePoint", "generalizedThreePoint");
-  printRatio("opengvSeventeenPoint", "linearSeventeenPoint");
   return 0;
 }

@@ -41,16 +41,23 @@ int main(int argc, char** argv) {
   app.add_option("--odometry-topic", topics.odometry, "topic of the odometry")->capture_default_str();
   app.add_option("--image-topic", topics.image, "topic of the images")->capture_default_str();
   app.add_flag("--quiet", quiet, "print only what does not pass");
-  return vcharge::runTool(&app, argc, argv, [&] {
+  app.footer("Keys of --json: verdict (PASS, WARN, FAIL), findings (subject, grade, text).");
+  return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     topics.validate();
     const auto rig = std::make_shared<const vcharge::CameraRig>(vcharge::readCameraRig(rig_path));
     vcharge::DriveChecker checker(rig);
     {
       vcharge::ProgressBar progress("checking " + bag);
-      vcharge::readRecordedDrive(bag, *rig, topics, &checker, [&](double share) { progress.update(share); });
+      vcharge::readRecordedDrive(bag, *rig, topics, &checker,
+                                 [&](double fraction) { progress.update(fraction); });
     }
     const std::vector<vcharge::CheckFinding> findings = checker.findings();
     vcharge::print(findings, quiet);
+    *found = {{"verdict", toString(vcharge::worstGrade(findings))}, {"findings", nlohmann::json::array()}};
+    for (const vcharge::CheckFinding& finding : findings) {
+      (*found)["findings"].push_back(
+          {{"subject", finding.subject}, {"grade", toString(finding.grade)}, {"text", finding.what}});
+    }
     if (vcharge::worstGrade(findings) == vcharge::CheckGrade::kFail) {
       throw vcharge::InputError(bag + ": the drive is not fit for use");
     }

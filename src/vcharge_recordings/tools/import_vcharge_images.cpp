@@ -52,10 +52,10 @@ int main(int argc, char** argv) {
   vcharge::VchargeRecordingOptions options;
   bool no_mask = false;
   app.add_option("--folder", folder, "folder of the images")->required();
-  app.add_option("--output", output, "bag to write")->required()->check(vcharge::requireNotEmpty);
+  app.add_option("--output", output, "bag to write")->required()->check(vcharge::requireOutput);
   app.add_option("--rig", rig, "rig.yaml to write; the mask goes beside it")
       ->required()
-      ->check(vcharge::requireNotEmpty);
+      ->check(vcharge::requireOutput);
   app.add_option("--camera", options.camera_name, "name of the camera")->capture_default_str();
   app.add_option("--field-of-view-rad", options.field_of_view_rad, "full angle")->capture_default_str();
   app.add_option("--ground-height-m", options.ground_height_m,
@@ -64,8 +64,11 @@ int main(int argc, char** argv) {
   app.add_option("--ground-slope-x", options.ground_slope_x)->capture_default_str();
   app.add_option("--ground-slope-y", options.ground_slope_y)->capture_default_str();
   app.add_flag("--no-mask", no_mask, "do not mask the car's body");
-  return vcharge::runTool(&app, argc, argv, [&] {
+  app.footer("Keys of --json: num_images, num_odometry.");
+  return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     options.mask_vehicle = !no_mask;
-    writeDriveAndRig(vcharge::readVchargeRecording(folder, options), output, rig);
+    const vcharge::VchargeRecording recording = vcharge::readVchargeRecording(folder, options);
+    writeDriveAndRig(recording, output, rig);
+    *found = {{"num_images", recording.images.size()}, {"num_odometry", recording.odometry.size()}};
   });
 }

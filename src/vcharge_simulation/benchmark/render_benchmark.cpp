@@ -24,7 +24,7 @@ const Renderer& rendererOf(const std::string& scene) {
   return *renderer;
 }
 
-// One 1280x800 image at four rays per pixel, on one core, at the start of a drive.
+// Renders one 1280x800 image at four rays per pixel on one core, at the start of a drive.
 void renderImage(benchmark::State& state, const std::string& scene, const std::string& drive) {
   const Renderer& renderer = rendererOf(scene);
   const auto body = makeGolfBody();
@@ -40,7 +40,7 @@ void renderImage(benchmark::State& state, const std::string& scene, const std::s
     benchmark::DoNotOptimize(renderer.renderLight(view, world_from_vehicle, plan.start_s).data);
   }
 }
-// Other work on the machine only ever adds time.
+// The minimum is reported because other load on the machine only adds time.
 double minimum(const std::vector<double>& times) {
   return *std::min_element(times.begin(), times.end());
 }

@@ -1,6 +1,8 @@
 #include "scenario_command_line.h"
 
+#include <algorithm>
 #include <sstream>
+#include <type_traits>
 
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/options.h"
@@ -17,40 +19,37 @@ void describe(const std::vector<CatalogueEntry>& entries, const std::string& ind
   }
 }
 
-// Adds to each fault's line the keys that it has.
-struct FaultDescriber {
-  std::vector<CatalogueEntry> entries = listFaults();
-  size_t next = 0;
-  template <class Fault>
-  void operator()(const char*, Fault& fault) {
-    internal::NameCollector keys;
-    fault.visitFields(keys);
-    std::string list;
-    for (const std::string& key : keys.names) {
-      list += (list.empty() ? "" : ", ") + key;
-    }
-    entries.at(next++).description += " [" + list + "]";
-  }
-};
+std::vector<CatalogueEntry> listFaults() {
+  std::vector<CatalogueEntry> entries;
+  const FaultOptions faults;
+  forEachOption(faults, [&](const OptionDeclaration& fault, const auto& options) {
+    std::string keys;
+    forEachOption(options, [&](const OptionDeclaration& option, const auto& /*value*/) {
+      keys += (keys.empty() ? "" : ", ") + std::string(option.name);
+    });
+    entries.push_back({fault.name, std::string(fault.meaning) + " [" + keys + "]"});
+  });
+  return entries;
+}
 
 }  // namespace
 
 ScenarioCommandLine::ScenarioCommandLine(CLI::App* app) {
   app->add_option("--scenario", file_, "YAML file of the scenario; options override it");
-  add(app, "--scene", &DriveScenario::scene, "see --list");
-  add(app, "--drive", &DriveScenario::drive, "see --list");
-  add(app, "--rig", &DriveScenario::rig, "see --list");
-  add(app, "--board", &DriveScenario::board, "chessboard or aprilgrid, in the scene chessboard");
-  add(app, "--scene-seed", &DriveScenario::scene_seed, "of the scene");
-  add(app, "--rig-seed", &DriveScenario::rig_seed, "of the lenses and how they are mounted");
-  add(app, "--seed", &DriveScenario::seed, "of the road, and of wheels and noise too");
-  add(app, "--sensor-seed", &DriveScenario::sensor_seed, "of wheels and noise, where it is not --seed");
-  add(app, "--exposure-gain", &DriveScenario::exposure_gain, "of the images");
-  add(app, "--image-scale", &DriveScenario::image_scale, "image size over 1280x800");
-  add(app, "--image-step", &DriveScenario::image_step, "only every so many of the 12.5 images a second");
-  add(app, "--duration-s", &DriveScenario::duration_s, "end the drive early; 0: at the end of its path");
-  add(app, "--cameras", &DriveScenario::cameras, "cameras to render, all by default")->delimiter(',');
-  const CLI::Option* noise = app->add_option("--noise", noise_, "on or off")
+  add(app, &DriveScenario::scene);
+  add(app, &DriveScenario::drive);
+  add(app, &DriveScenario::rig);
+  add(app, &DriveScenario::board);
+  add(app, &DriveScenario::scene_seed);
+  add(app, &DriveScenario::rig_seed);
+  add(app, &DriveScenario::seed);
+  add(app, &DriveScenario::sensor_seed);
+  add(app, &DriveScenario::exposure_gain);
+  add(app, &DriveScenario::image_scale);
+  add(app, &DriveScenario::image_step);
+  add(app, &DriveScenario::duration_s);
+  add(app, &DriveScenario::cameras)->delimiter(',');
+  const CLI::Option* noise = app->add_option("--noise", noise_, "Add sensor noise to the images: on or off.")
                                  ->check(CLI::IsMember({"on", "off"}))
                                  ->capture_default_str();
   overrides_.emplace_back([this, noise](DriveScenario* scenario) {
@@ -59,13 +58,21 @@ ScenarioCommandLine::ScenarioCommandLine(CLI::App* app) {
     }
   });
   app->add_option("--set", settings_,
-                  "KEY=VALUE for any field that --show-options shows, as faults.dead_camera.cameras=[left]");
+                  "KEY=VALUE for any key of --show-options, as in faults.dead_camera.cameras=[left]");
 }
 
 template <class T>
-CLI::Option* ScenarioCommandLine::add(CLI::App* app, const std::string& name, T DriveScenario::*field,
-                                      const std::string& description) {
-  CLI::Option* option = app->add_option(name, given_.*field, description)->capture_default_str();
+CLI::Option* ScenarioCommandLine::add(CLI::App* app, T DriveScenario::*field) {
+  CLI::Option* option = nullptr;
+  forEachOption(given_, [&](const OptionDeclaration& declared, auto& value) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(value)>, T>) {
+      if (&value == &(given_.*field)) {
+        std::string name = declared.name;
+        std::replace(name.begin(), name.end(), '_', '-');
+        option = app->add_option("--" + name, value, declared.meaning)->capture_default_str();
+      }
+    }
+  });
   overrides_.emplace_back([this, option, field](DriveScenario* scenario) {
     if (option->count() > 0) {
       scenario->*field = given_.*field;
@@ -121,9 +128,7 @@ std::string describeCatalogue() {
   text << "rigs (--rig):\n";
   describe(listRigs(), "  ", &text);
   text << "faults (--set faults.NAME.KEY=VALUE):\n";
-  FaultDescriber faults;
-  FaultOptions().visitFields(faults);
-  describe(faults.entries, "  ", &text);
+  describe(listFaults(), "  ", &text);
   return text.str();
 }
 

@@ -10,35 +10,33 @@
 
 namespace vcharge {
 
-/// The options of a command line that make up a scenario: --scenario FILE.yaml, an option for each field that
-/// is often changed, and --set KEY=VALUE for every field. What is later in this list overrides what is
-/// before.
+/// Command-line options that define a scenario: --scenario FILE.yaml, an option for each common field, and
+/// --set KEY=VALUE for any field. Later ones in this list override earlier ones.
 class ScenarioCommandLine {
  public:
-  /// Adds the options to `app`, which must outlive this object and must parse before scenario().
+  /// Adds the options to `app`, which must outlive this object and be parsed before scenario().
   explicit ScenarioCommandLine(CLI::App* app);
   ScenarioCommandLine(const ScenarioCommandLine&) = delete;
   ScenarioCommandLine& operator=(const ScenarioCommandLine&) = delete;
 
-  /// InputError naming the file or option and the key: unknown keys, wrong types and values.
+  /// Throws InputError naming the file or option and the key for unknown keys and invalid values.
   DriveScenario scenario() const;
 
  private:
   template <class T>
-  CLI::Option* add(CLI::App* app, const std::string& name, T DriveScenario::*field,
-                   const std::string& description);
+  CLI::Option* add(CLI::App* app, T DriveScenario::*field);
 
   std::string file_, noise_ = "on";
   std::vector<std::string> settings_;
-  DriveScenario given_;  // by options of their own
+  DriveScenario given_;  // values of the options other than --scenario and --set
   std::vector<std::function<void(DriveScenario*)>> overrides_;
 };
 
-/// "faults.dead_camera.cameras=[left]" overrides that field. InputError naming --set and the key for anything
-/// else than a field of a scenario and a value of its kind.
+/// Sets a field as in "faults.dead_camera.cameras=[left]". Throws InputError naming --set and the key for an
+/// unknown field or an invalid value.
 void setField(const std::string& setting, DriveScenario* scenario);
 
-/// Scenes with their drives, rigs and faults, one line each.
+/// One line for each scene, drive, rig and fault.
 std::string describeCatalogue();
 
 }  // namespace vcharge

@@ -87,7 +87,7 @@ TEST(ScenarioCommandLineTest, CatalogueShowsScenesDrivesRigsAndFaultsInOneLineEa
                            "\n  dead_camera: ", "\n  soft_suspension: "}) {
     EXPECT_NE(text.find(line), std::string::npos) << line;
   }
-  EXPECT_NE(text.find("[wheel, start_s, end_s, ratio]"), std::string::npos) << text;
+  EXPECT_NE(text.find("[start_s, end_s, wheel, ratio]"), std::string::npos) << text;
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include <iostream>
 #include <optional>
+#include <sstream>
 #include <string>
 
 #include <tbb/global_control.h>
@@ -11,42 +12,41 @@
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Simulates a drive of a car with four fisheye cameras and writes it as a bag, with rig_truth.yaml "
-      "beside it and the truth in a folder BAG_truth: rig.yaml with masks, trajectory.tum, height_map.tiff "
-      "and "
-      ".yaml, obstacles.yaml, movers.yaml, faults.yaml, range/CAMERA/STAMP_NS.tiff, board.yaml in the scene "
-      "chessboard, and rig_before.yaml and rig_after.yaml where a fault changes the rig. rig_truth.yaml is "
-      "that "
-      "of the last drive in its folder.");
+      "Simulates a drive of a car with four fisheye cameras and writes it as a bag. Beside it are written "
+      "rig_truth.yaml and the folder BAG_truth with rig.yaml and masks, trajectory.tum, height_map.tiff and "
+      ".yaml, "
+      "obstacles.yaml, movers.yaml, faults.yaml and, depending on options and scene, "
+      "range/CAMERA/STAMP_NS.tiff, "
+      "board.yaml, and rig_before.yaml and rig_after.yaml of a fault that changes the rig.");
   const vcharge::ScenarioCommandLine command_line(&app);
   vcharge::RecordingOptions recording;
   bool list = false;
   bool show_options = false;
   int threads = 0;
   const CLI::Option* output =
-      app.add_option("--output", recording.bag, "bag to write")->check(vcharge::requireNotEmpty);
+      app.add_option("--output", recording.bag, "bag to write")->check(vcharge::requireOutput);
   app.add_option(
       "--images-from", recording.images_from,
       "bag of the same drive with the same --seed and --noise off: its images get noise, exposure, faults "
       "and ticks instead of being rendered again");
   app.add_flag("--truth-range", recording.truth_range, "write the range of every pixel");
-  app.add_option("--height-cell-m", recording.height_cell_m, "cell of the height map")->capture_default_str();
-  app.add_option("--height-limit-m", recording.height_limit_m, "crowns and lamps above this are left out")
+  app.add_option("--height-cell-m", recording.height_cell_m, "cell size of the height map")
+      ->check(CLI::Range(0.01, 10.0))
       ->capture_default_str();
-  app.add_option("--threads", threads, "0: one per core")
+  app.add_option("--threads", threads, "number of threads; 0: one per core")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   app.add_flag("--list", list, "print scenes, drives, rigs and faults, and do nothing else");
-  app.add_flag("--show-options", show_options,
-               "print all fields of the scenario with their values, and do nothing else");
-  return vcharge::runTool(&app, argc, argv, [&] {
+  vcharge::addShowOptions(&app, &show_options);
+  app.footer("Keys of --json: scenario (all its options).");
+  return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (list) {
       std::cout << vcharge::describeCatalogue();
       return;
     }
     const vcharge::DriveScenario scenario = command_line.scenario();
     if (show_options) {
-      std::cout << vcharge::writeFields(scenario) << "\n";
+      std::cout << vcharge::showOptions(scenario);
       return;
     }
     if (output->count() == 0) {
@@ -57,5 +57,8 @@ int main(int argc, char** argv) {
       limit.emplace(tbb::global_control::max_allowed_parallelism, static_cast<size_t>(threads));
     }
     vcharge::recordDrive(scenario, recording);
+    std::ostringstream text;
+    text << vcharge::writeFields(scenario);
+    (*found)["scenario"] = text.str();
   });
 }

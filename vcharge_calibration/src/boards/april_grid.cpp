@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kKalibrBorder_cells = 2;
 constexpr int kUsualBorder_cells = 1;
-// Mean cosine between where a tag's sides point and where its neighbours lie.
+// Minimum mean cosine between the directions of a tag's sides and of its neighbours.
 constexpr double kMinAgreement = 0.8;
 
 std::map<int, std::vector<cv::Point2f>> detect(const cv::Mat& image, int num_tags, int border_cells) {
@@ -38,8 +38,7 @@ double cosine(const cv::Point2f& a, const cv::Point2f& b) {
   return a.dot(b) / std::max(1e-9, cv::norm(a) * cv::norm(b));
 }
 
-// The detector counts corners clockwise from one of the four; the board counter-clockwise from the lower
-// left.
+// The detector lists corners clockwise from any of the four; the board counter-clockwise from the lower left.
 std::vector<cv::Point2f> reordered(const std::vector<cv::Point2f>& corners, int first) {
   std::vector<cv::Point2f> result;
   for (int i = 0; i < 4; ++i) {
@@ -63,7 +62,7 @@ std::vector<SeenTag> findTags(const cv::Mat& image, const CalibrationBoard& boar
   if (tags.size() < 2) {
     tags = detect(image, num_tags, kUsualBorder_cells);
   }
-  // All tags are printed the same way round: the one in which their sides point to their neighbours.
+  // All tags have the same orientation: the one in which their sides point to their neighbours.
   int best_first = 0;
   double best_agreement = -1.0;
   for (int first = 0; first < 4; ++first) {

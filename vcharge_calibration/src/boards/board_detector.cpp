@@ -23,18 +23,18 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kViewWidth_rad = 1.75;
 constexpr int kViewSize_px = 420;
-// Of a board completed by prediction, so many corners may be hidden.
+// Fraction of corners that must be visible on a board completed by prediction.
 constexpr double kMinShareSeen = 0.9;
-// An AprilGrid needs not be seen whole: so many corners (four tags) give its pose.
+// An AprilGrid may be partly visible: this many corners (four tags) determine its pose.
 constexpr size_t kMinTagCorners = 16;
-// Of a tag's corners, over their distance to edges that are not their own.
+// Window at a tag's corner, relative to the distance to the next edges.
 constexpr double kTagWindow = 0.7;
 
-// Of a board that is not found whole.
+// Part of a board that is detected first if the whole is not found.
 const cv::Size kPart(4, 3);
-// In reduced images the search is faster and finds as many boards; the corners are refined afterwards.
+// The search is faster in reduced images and finds as many boards; corners are refined afterwards.
 constexpr int kSearchWidth_px = 640;
-// Smaller images are also searched enlarged.
+// Smaller images are also searched at a larger scale.
 constexpr int kSmallWidth_px = 500;
 
 std::optional<std::vector<cv::Point2f>> findGrid(const cv::Mat& image, int columns, int rows) {
@@ -46,7 +46,7 @@ std::optional<std::vector<cv::Point2f>> findGrid(const cv::Mat& image, int colum
   return corners;
 }
 
-/// OpenCV's older detector: quick, and better at large squares that a lens bends.
+/// OpenCV's older detector: fast, and better for large squares that the lens distorts.
 std::optional<std::vector<cv::Point2f>> findQuads(const cv::Mat& image, int columns, int rows) {
   std::vector<cv::Point2f> corners;
   const int flags = cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK;
@@ -56,14 +56,14 @@ std::optional<std::vector<cv::Point2f>> findQuads(const cv::Mat& image, int colu
   return corners;
 }
 
-/// camera_from_view of a pinhole view into a direction: `angle_rad` from the axis, towards `azimuth_rad`.
+/// camera_from_view of a pinhole view in the direction `angle_rad` from the axis, towards `azimuth_rad`.
 Eigen::Matrix3d rotationOfView(double angle_rad, double azimuth_rad) {
   return (Eigen::AngleAxisd(azimuth_rad, Eigen::Vector3d::UnitZ()) *
           Eigen::AngleAxisd(angle_rad, Eigen::Vector3d::UnitY()))
       .toRotationMatrix();
 }
 
-/// A pinhole view into a direction: how its pixels lie in the fisheye image.
+/// A pinhole view of the fisheye image in some direction.
 class View {
  public:
   View(const cv::Mat& image, const CameraModel& model, double angle_rad, double azimuth_rad)
@@ -107,7 +107,7 @@ bool isPixel(const cv::Point2f& point, Eigen::Vector2d* pixel) {
   return true;
 }
 
-/// Adds the corners of tags that were not seen before, refined in the image.
+/// Adds new tags, with corners refined in the image.
 void addTags(const cv::Mat& image, const CalibrationBoard& board, const std::vector<SeenTag>& tags,
              const ToImage& toImage, std::map<int, Eigen::Vector2d>* corners) {
   for (const SeenTag& tag : tags) {
@@ -180,7 +180,7 @@ std::optional<BoardView> BoardDetector::detect(const cv::Mat& image) const {
     }
     BoardView view;
     for (size_t i = 0; i < points->size(); ++i) {
-      // Pixel centres are whole numbers: coordinates scale about half a pixel outside the image.
+      // Pixel centres have integer coordinates, so scaling is relative to half a pixel outside the image.
       const double across = static_cast<double>(scaled.cols) / image.cols;
       const double down = static_cast<double>(scaled.rows) / image.rows;
       view.corners.push_back({static_cast<int>(i),
@@ -222,7 +222,7 @@ std::optional<BoardView> BoardDetector::detect(const cv::Mat& image, const Camer
     }
   }
   if (board_.pattern == BoardPattern::kAprilGrid) {
-    // Parts of the grid from all views, and tags that are distorted least from the image itself.
+    // Combines parts of the grid from all views, and the least distorted tags of the image itself.
     std::map<int, Eigen::Vector2d> corners;
     addTags(image, board_, findTags(image, board_), isPixel, &corners);
     for (const View& view : views) {
@@ -298,7 +298,7 @@ std::string BoardDetector::describeOther(const cv::Mat& image) const {
   if (!cv::findChessboardCornersSB(image, cv::Size(3, 3), corners, flags, meta) || meta.empty()) {
     return "";
   }
-  // How the board lies says nothing about which side its maker calls the columns.
+  // The orientation of a board does not tell which side is called columns.
   return "a chessboard of " + std::to_string(std::max(meta.cols, meta.rows)) + "x" +
          std::to_string(std::min(meta.cols, meta.rows)) + " inner corners";
 }

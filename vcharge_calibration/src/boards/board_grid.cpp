@@ -11,22 +11,22 @@
 namespace vcharge {
 namespace {
 
-// A corner is there when the squares around it correlate at least so well with a perfect corner.
+// Minimum correlation of the image around a corner with an ideal corner.
 constexpr double kMinCorrelation = 0.75;
-// Window and largest step of a corner that was predicted, over the squares' size.
+// Window and largest step for a predicted corner, relative to the squares' size.
 constexpr double kGrowWindow = 0.3;
 constexpr double kMaxGrowMove = 0.3;
 constexpr int kMaxRounds = 20;
-// A row or column beyond the board in which more of the corners are seen belongs to a larger board.
+// A row or column outside of the board with a larger fraction of corners belongs to a larger board.
 constexpr double kMaxShareBeyond = 0.6;
 
-/// Grows a part of a board, square by square, as far as there are corners.
+/// Extends a part of a board, square by square, while there are corners.
 class GridGrower {
  public:
   GridGrower(const cv::Mat& image, const CameraModel& model, CornerGrid grid)
       : image_(image), model_(model), grid_(std::move(grid)) {}
 
-  /// False when the corners do not lie on a plane.
+  /// Returns false if the corners are not on a plane.
   bool grow() {
     if (!locate()) {
       return false;
@@ -73,12 +73,12 @@ class GridGrower {
     return true;
   }
 
-  /// Pixel where a place should be; false where the camera does not see it.
+  /// Predicted pixel of a grid position; false if the camera does not see it.
   bool predict(double column, double row, Eigen::Vector2d* pixel) const {
     return model_.project(camera_from_board_ * Eigen::Vector3d(column, row, 0.0), pixel);
   }
 
-  // To the saddle point nearby; false, and the pixel stays, where there is none.
+  // Moves the pixel to the nearby saddle point; false, with the pixel unchanged, if there is none.
   bool refine(const std::pair<int, int>& place, Eigen::Vector2d* pixel) const {
     Eigen::Vector2d right;
     Eigen::Vector2d below;
@@ -91,8 +91,8 @@ class GridGrower {
     return refineCorner(image_, kGrowWindow * spacing_px, kMaxGrowMove * spacing_px, pixel);
   }
 
-  // How well the image around a pixel fits a corner at this place. Positive where the square towards +x, +y
-  // is bright and (column + row) is even.
+  // Correlation of the image around a pixel with a corner. Positive if the square towards +x, +y is bright
+  // and (column + row) is even.
   double signedCorrelation(const std::pair<int, int>& place, const Eigen::Vector2d& at) const {
     Eigen::Vector2d predicted;
     if (!predict(place.first, place.second, &predicted)) {
@@ -128,7 +128,7 @@ class GridGrower {
     }
     const double variance = sum_squared / count - sum * sum / (count * count);
     if (variance < 9.0) {
-      return 0.0;  // nothing but noise
+      return 0.0;  // only noise
     }
     const double sign = (place.first + place.second) % 2 == 0 ? 1.0 : -1.0;
     return sign * product / count / std::sqrt(variance);
@@ -145,7 +145,8 @@ class GridGrower {
             !predict(next.first, next.second, &at)) {
           continue;
         }
-        // Off by about as much as its neighbour, where camera or board are not quite as thought.
+        // The prediction has about the same error as at the neighbour, if the camera or board model is
+        // inaccurate.
         at += pixel - here;
         if (refine(next, &at) && polarity_ * signedCorrelation(next, at) > kMinCorrelation) {
           found[next] = at;
@@ -162,7 +163,7 @@ class GridGrower {
   double polarity_ = 1.0;
 };
 
-/// A rectangle of places on a grid.
+/// A rectangle of grid positions.
 struct Extent {
   int column, row, width, height;
   bool contains(const std::pair<int, int>& place) const {
@@ -176,7 +177,7 @@ int countInside(const CornerGrid& grid, const Extent& extent) {
                                         [&](const auto& entry) { return extent.contains(entry.first); }));
 }
 
-/// Whether a line of corners goes on beyond a rectangle: then the board is a larger one.
+/// Whether a line of corners continues outside of a rectangle, which means a larger board.
 bool goesOn(const CornerGrid& grid, const Extent& extent) {
   const std::array<Extent, 4> beyond = {{{extent.column - 1, extent.row, 1, extent.height},
                                          {extent.column + extent.width, extent.row, 1, extent.height},
@@ -235,7 +236,7 @@ std::optional<std::vector<BoardCorner>> boardOnGrid(const CornerGrid& grid, cons
     }
     const int column = place.first - best->column;
     const int row = place.second - best->row;
-    // A quarter turn keeps the board's handedness.
+    // A quarter turn preserves the board's handedness.
     const int index =
         upright ? row * board.columns + column : (best->width - 1 - column) * board.columns + row;
     corners.push_back({index, pixel});

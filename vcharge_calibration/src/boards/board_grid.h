@@ -12,16 +12,15 @@
 
 namespace vcharge {
 
-/// Corners of a chessboard in the image by their place (column, row) on a grid whose origin is anywhere on
-/// it.
+/// Corners of a chessboard in the image by their position (column, row) on a grid with any origin.
 using CornerGrid = std::map<std::pair<int, int>, Eigen::Vector2d>;
 
-/// Grows a part of a board in an image (CV_8UC1), square by square, as far as there are corners. False, and
-/// the grid stays, when the corners do not lie on a plane.
+/// Extends a part of a board in an image (CV_8UC1), square by square, while there are corners. Returns false
+/// and leaves the grid unchanged if the corners are not on a plane.
 bool growGrid(const cv::Mat& image, const CameraModel& model, CornerGrid* grid);
 
-/// The grid as corners of the board, by index; nothing where the board fits on it in no place or in several,
-/// or where the grid goes on beyond it: that is a larger board.
+/// Converts the grid to corners of the board. Empty if the board fits in no or several positions, or if the
+/// grid continues outside of it, which means a larger board.
 std::optional<std::vector<BoardCorner>> boardOnGrid(const CornerGrid& grid, const CalibrationBoard& board);
 
 }  // namespace vcharge

@@ -12,7 +12,7 @@ std::optional<RigidTransform> boardPoseFromRays(const std::vector<BoardRay>& ray
   if (rays.size() < 4) {
     return std::nullopt;
   }
-  // Centred and scaled points keep the linear system well conditioned.
+  // Centring and scaling keep the linear system well conditioned.
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const BoardRay& entry : rays) {
     mean += entry.point_m / static_cast<double>(rays.size());
@@ -24,7 +24,8 @@ std::optional<RigidTransform> boardPoseFromRays(const std::vector<BoardRay>& ray
   if (!(scale > 0.0)) {
     return std::nullopt;
   }
-  // ray x (H [x y 1]) = 0: of its three rows, all, weighted alike whatever the ray's direction.
+  // ray x (H [x y 1]) = 0. All three rows are used, so that the weight does not depend on the ray's
+  // direction.
   Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
   for (const BoardRay& entry : rays) {
     const Eigen::Vector2d p = (entry.point_m - mean) / scale;
@@ -39,7 +40,7 @@ std::optional<RigidTransform> boardPoseFromRays(const std::vector<BoardRay>& ray
   }
   const Eigen::Matrix<double, 9, 1> h = svd.matrixV().col(8);
   Eigen::Matrix3d homography = Eigen::Map<const Eigen::Matrix3d>(h.data());
-  // The points lie in the direction of their rays, not opposite.
+  // The points must lie in the direction of their rays, not opposite.
   double forward = 0.0;
   for (const BoardRay& entry : rays) {
     const Eigen::Vector2d p = (entry.point_m - mean) / scale;
@@ -60,7 +61,7 @@ std::optional<RigidTransform> boardPoseFromRays(const std::vector<BoardRay>& ray
   if (rotation.determinant() < 0.0 || !rotation.allFinite()) {
     return std::nullopt;
   }
-  // Undo the centring: the origin of the board is -mean in the scaled frame.
+  // Reverts the centring: the origin of the board is at -mean in the scaled frame.
   const Eigen::Vector3d translation =
       scale * homography.col(2) - rotation * Eigen::Vector3d(mean.x(), mean.y(), 0.0);
   return RigidTransform(Eigen::Quaterniond(rotation), translation);

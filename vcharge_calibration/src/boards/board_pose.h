@@ -15,11 +15,12 @@ struct BoardRay {
   Eigen::Vector3d ray;
 };
 
-/// Pose of a board from four or more rays, which may point anywhere, also beyond 90 degrees from the axis:
-/// the homography from the plane to the rays, made a rotation. Empty where the rays do not determine it.
+/// Pose of a board from at least four rays, which may be more than 90 degrees from the axis: the homography
+/// from the plane to the rays, converted to a rotation and translation. Empty if the rays do not determine
+/// it.
 std::optional<RigidTransform> boardPoseFromRays(const std::vector<BoardRay>& rays);
 
-/// The same for corners in an image; those without a ray are left out.
+/// The same for corners in an image; ignores those without a ray.
 std::optional<RigidTransform> boardPose(const CalibrationBoard& board,
                                         const std::vector<BoardCorner>& corners, const CameraModel& model);
 

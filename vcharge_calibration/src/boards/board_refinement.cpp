@@ -11,14 +11,14 @@ namespace vcharge {
 
 namespace {
 
-// Half of the window over the distance to the next edge that is not the corner's: the widest that fits.
+// Half widths of the window relative to the distance to the next foreign edge; the widest that fits is used.
 constexpr std::array<double, 3> kWindows = {0.5, 0.35, 0.25};
 constexpr int kMinSteps = 4;
 constexpr int kMaxSteps = 40;
 constexpr int kMaxIterations = 30;
 constexpr double kConverged_px = 1e-3;
 constexpr double kMinCorrelation = 0.6;
-constexpr double kMinContrast = 3.0;  // standard deviation of gray values: below is nothing but noise
+constexpr double kMinContrast = 3.0;  // standard deviation of gray levels below which there is only noise
 
 cv::Mat toFloat(const cv::Mat& image) {
   cv::Mat result;
@@ -28,13 +28,13 @@ cv::Mat toFloat(const cv::Mat& image) {
 
 }  // namespace
 
-/// Samples of the board's plane around a corner, about a pixel apart: (2 nx + 1) x (2 ny + 1), with one more
-/// on each side for gradients.
+/// Samples of the board's plane around a corner, about a pixel apart: (2 nx + 1) x (2 ny + 1), plus one on
+/// each side for gradients.
 struct BoardRefiner::Patch {
   int nx = 0, ny = 0;
   double step_x_m = 0.0, step_y_m = 0.0;
   cv::Mat map;                  // CV_32FC2, pixels
-  Eigen::Vector2d predicted;    // the corner
+  Eigen::Vector2d predicted;    // corner
   Eigen::Matrix2d pixels_by_m;  // at the corner
 };
 

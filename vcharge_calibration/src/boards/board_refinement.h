@@ -10,22 +10,21 @@
 
 namespace vcharge {
 
-/// Finds the corners of a board to sub-pixel accuracy where the camera and the board's place are about known.
-/// The image around a corner is looked at in the board's plane: there the corner's edges are straight and
-/// perpendicular however the lens bends them, so that the window reaches over half of each adjoining square,
-/// along x and along y, and is the same for near and far, tilted and distorted squares. The corner is the
-/// point to whose lines the gradients are perpendicular; camera and place only say how the neighbourhood is
-/// bent, not where it lies.
+/// Refines corners of a board to sub-pixel accuracy, given approximate camera and board pose. The image
+/// around a corner is resampled in the board's plane, where its edges are straight and perpendicular
+/// regardless of the lens: the window covers half of each adjacent square, equally for near and far, tilted
+/// and distorted squares. The corner is the point to which all gradients are perpendicular; camera and pose
+/// only determine the local deformation, not the position.
 class BoardRefiner {
  public:
   /// `image` is CV_8UC1. References must outlive this object.
   BoardRefiner(const cv::Mat& image, const CalibrationBoard& board, const CameraModel& model,
                const PlacedBoard& placed);
 
-  /// Corner `index` near `start`. Empty where the window leaves the image, where the corner would move
-  /// further than `max_move_px`, and where the quarters around it are not black and white in turns.
+  /// Refines corner `index` near `start`. Empty if the window leaves the image, the corner would move further
+  /// than `max_move_px`, or the quarters around it are not alternately black and white.
   std::optional<Eigen::Vector2d> refine(int index, const Eigen::Vector2d& start, double max_move_px) const;
-  /// Where camera and place put a corner. Empty where the camera does not see it.
+  /// Pixel of a corner according to camera and pose. Empty if the camera does not see it.
   std::optional<Eigen::Vector2d> predict(int index) const;
 
  private:

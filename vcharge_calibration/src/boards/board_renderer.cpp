@@ -64,7 +64,7 @@ class AprilGridTexture {
       if (column < 0 || row < 0 || column >= tag_columns || row >= tag_rows) {
         return kBright;
       }
-      // The board's y axis points up, the tag's rows down.
+      // The board's y axis points up, the rows of the tag down.
       const cv::Mat& tag = tags_[static_cast<size_t>(row * tag_columns + column)];
       const int cell_row = std::clamp(static_cast<int>((1.0 - v) * kTagCells), 0, kTagCells - 1);
       const int cell_column = std::clamp(static_cast<int>(u * kTagCells), 0, kTagCells - 1);
@@ -80,7 +80,7 @@ class AprilGridTexture {
   std::vector<cv::Mat> tags_;
 };
 
-/// The rays of an image's pixels, kRays x kRays of each, in the order of rows; zero where there is none.
+/// kRays x kRays rays for each pixel of an image, in row-major order; zero where there is none.
 std::vector<Eigen::Vector3f> raysOf(const CameraModel& model, cv::Size size) {
   std::vector<Eigen::Vector3f> rays;
   rays.reserve(static_cast<size_t>(size.area()) * kRays * kRays);

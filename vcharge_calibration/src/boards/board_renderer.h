@@ -11,21 +11,22 @@
 
 namespace vcharge {
 
-// For tests: images of boards by the formulas of camera and board, without any of the calibration's code.
+// Images of boards for tests, from the formulas of camera and board and independent of the calibration's
+// code.
 
-/// Where boards are held.
+/// Range of board poses.
 struct PoseRange {
-  double max_angle_rad = 1.2;  ///< of the board's middle from the axis
+  double max_angle_rad = 1.2;  ///< angle of the board's middle from the axis
   double distance_m = 0.5;
-  double min_share_seen = 1.0;  ///< of the corners
+  double min_share_seen = 1.0;  ///< fraction of visible corners
 };
 
-/// Random poses of a board, tilted and turned.
+/// Random poses of a board, tilted and rotated.
 std::vector<RigidTransform> boardPoses(const CalibrationBoard& board, const CameraModel& model,
                                        cv::Size image_size_px, int count, const PoseRange& range,
                                        uint32_t seed);
 
-/// Images of a board before a grey wall, 3 x 3 rays per pixel, with noise of two gray levels.
+/// Images of a board in front of a gray wall, 3 x 3 rays per pixel, with noise of two gray levels.
 std::vector<CalibrationImage> renderBoards(const CalibrationBoard& board, const CameraModel& model,
                                            cv::Size image_size_px, const std::vector<RigidTransform>& poses);
 

@@ -21,42 +21,36 @@ void requirePositive(const char* name, double value) {
 }
 
 struct AprilGridFile {
-  std::string target_type;
-  int tag_columns = 0, tag_rows = 0;
-  double tag_m = 0.0, tag_spacing = 0.0;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("target_type", target_type);
-    visit("tagCols", tag_columns);
-    visit("tagRows", tag_rows);
-    visit("tagSize", tag_m);
-    visit("tagSpacing", tag_spacing);
+  VCHARGE_BEGIN_OPTIONS(AprilGridFile);
+  VCHARGE_OPTION(std::string, target_type, "", anyValue(), "Always aprilgrid.");
+  VCHARGE_OPTION(int, tagCols, 0, anyValue(), "Columns of tags.");
+  VCHARGE_OPTION(int, tagRows, 0, anyValue(), "Rows of tags.");
+  VCHARGE_OPTION(double, tagSize, 0.0, anyValue(), "Side of a tag in metres.");
+  VCHARGE_OPTION(double, tagSpacing, 0.0, anyValue(), "Ratio of the gap between tags to their side.");
+  VCHARGE_END_OPTIONS();
+  void checkFields() const { board(); }
+  CalibrationBoard board() const {
+    return CalibrationBoard::aprilGrid(tagCols, tagRows, tagSize, tagSpacing);
   }
-  void validate() const { CalibrationBoard::aprilGrid(tag_columns, tag_rows, tag_m, tag_spacing); }
 };
 
 struct CheckerboardFile {
-  std::string target_type;
-  int columns = 0, rows = 0;
-  double row_spacing_m = 0.0, column_spacing_m = 0.0;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("target_type", target_type);
-    visit("targetCols", columns);
-    visit("targetRows", rows);
-    visit("rowSpacingMeters", row_spacing_m);
-    visit("colSpacingMeters", column_spacing_m);
-  }
+  VCHARGE_BEGIN_OPTIONS(CheckerboardFile);
+  VCHARGE_OPTION(std::string, target_type, "", anyValue(), "Always checkerboard.");
+  VCHARGE_OPTION(int, targetCols, 0, anyValue(), "Columns of inner corners.");
+  VCHARGE_OPTION(int, targetRows, 0, anyValue(), "Rows of inner corners.");
+  VCHARGE_OPTION(double, rowSpacingMeters, 0.0, anyValue(), "Distance between rows.");
+  VCHARGE_OPTION(double, colSpacingMeters, 0.0, anyValue(), "Distance between columns.");
+  VCHARGE_END_OPTIONS();
   CalibrationBoard board() const {
-    return CalibrationBoard::parse(std::to_string(columns) + "x" + std::to_string(rows), row_spacing_m);
+    return CalibrationBoard::parse(std::to_string(targetCols) + "x" + std::to_string(targetRows),
+                                   rowSpacingMeters);
   }
-  void validate() const {
+  void checkFields() const {
     board();
-    if (row_spacing_m != column_spacing_m) {
+    if (rowSpacingMeters != colSpacingMeters) {
       throw std::invalid_argument("colSpacingMeters: must equal rowSpacingMeters, is " +
-                                  std::to_string(column_spacing_m));
+                                  std::to_string(colSpacingMeters));
     }
   }
 };
@@ -82,7 +76,7 @@ CalibrationBoard CalibrationBoard::parse(const std::string& size, double square_
 
 CalibrationBoard CalibrationBoard::aprilGrid(int tag_columns, int tag_rows, double tag_m,
                                              double tag_spacing) {
-  constexpr int kMaxTags = 587;  // of the family 36h11
+  constexpr int kMaxTags = 587;  // size of the family 36h11
   if (tag_columns < 1 || tag_rows < 1 || tag_columns > kMaxTags || tag_rows > kMaxTags ||
       tag_columns * tag_rows < 4 || tag_columns * tag_rows > kMaxTags) {
     throw std::invalid_argument("tagCols, tagRows: expected 4 to " + std::to_string(kMaxTags) +
@@ -113,7 +107,7 @@ CalibrationBoard readCalibrationBoard(const std::string& path) {
   if (type == "aprilgrid") {
     AprilGridFile file;
     readFields(node, path, &file);
-    return CalibrationBoard::aprilGrid(file.tag_columns, file.tag_rows, file.tag_m, file.tag_spacing);
+    return file.board();
   }
   if (type == "checkerboard") {
     CheckerboardFile file;

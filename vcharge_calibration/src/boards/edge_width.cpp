@@ -30,8 +30,8 @@ double sample(const cv::Mat& image, const Eigen::Vector2d& pixel) {
 
 namespace {
 
-// Width of the edge through `middle` (on the board, metres) that runs along `along`; 0 where it cannot be
-// told.
+// Width of the edge through `middle` (metres on the board) in the direction `along`; 0 if it cannot be
+// measured.
 double widthAt(const cv::Mat& image, const CalibrationBoard& board, const PlacedBoard& placed,
                const CameraModel& model, const Eigen::Vector2d& middle, const Eigen::Vector2d& across_m) {
   Eigen::Vector2d at;
@@ -78,7 +78,7 @@ double medianOf(const std::vector<double>& values) {
 
 double edgeWidth(const cv::Mat& image, const CalibrationBoard& board, const BoardView& view,
                  const PlacedBoard& placed, const CameraModel& model) {
-  // Motion blurs the edges of one direction only.
+  // Motion blurs only edges of one direction.
   std::vector<double> along_rows;
   std::vector<double> along_columns;
   const double step_m = 0.1 * board.clearance_m();

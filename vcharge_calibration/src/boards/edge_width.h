@@ -7,9 +7,9 @@
 
 namespace vcharge {
 
-/// How wide the edges between the board's squares are in an image: twice the standard deviation of the step's
-/// slope, in pixels, median over the board, of the edges along rows or along columns, whichever are
-/// wider. About 2 for a sharp image; 0 where nothing could be measured.
+/// Width of the edges between the board's squares in the image: twice the standard deviation of the step's
+/// slope, in pixels. The median over the edges along rows or along columns, whichever is wider. About 2 for a
+/// sharp image; 0 if nothing could be measured.
 double edgeWidth(const cv::Mat& image, const CalibrationBoard& board, const BoardView& view,
                  const PlacedBoard& placed, const CameraModel& model);
 

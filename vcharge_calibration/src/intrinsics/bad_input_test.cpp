@@ -17,7 +17,7 @@ namespace {
 const cv::Size kSize(640, 400);
 const auto kNoProgress = [](double /*share*/) {};
 
-// A lens of 170 degrees whose principal point is some pixels off the middle, as usual.
+// A lens of 170 degrees with a typical offset of the principal point.
 CameraModel camera() {
   Eigen::Matrix<double, 8, 1> parameters;
   parameters << 212.0, 212.5, 326.0, 194.0, 0.01, -0.004, 0.001, -0.0002;
@@ -35,7 +35,7 @@ const CalibrationBoard& board() {
   return kBoard;
 }
 
-/// 16 images of a board all over the image, rendered once.
+/// 16 images of a board in all parts of the image, rendered once.
 const std::vector<CalibrationImage>& goodImages() {
   static const std::vector<CalibrationImage> kImages =
       renderBoards(board(), camera(), kSize, boardPoses(board(), camera(), kSize, 16, {1.3, 0.35, 1.0}, 1));
@@ -60,7 +60,7 @@ TEST(BadInputTest, GoodImagesPassSoThatTheOthersFailForTheirReason) {
   const std::string report = makeIntrinsicReport("title", board(), goodImages(), result);
   EXPECT_NE(report.find(toString(result.verdict)), std::string::npos);
   EXPECT_NE(report.find("image15"), std::string::npos);
-  EXPECT_EQ(report.find("http://"), report.find("http://www.w3.org"));  // nothing from elsewhere
+  EXPECT_EQ(report.find("http://"), report.find("http://www.w3.org"));  // no external resources
 }
 
 TEST(BadInputTest, AnotherBoardIsNamed) {
@@ -126,7 +126,7 @@ TEST(BadInputTest, ABlurredImageAndAWrongOneAreNamedAndLeftOut) {
   images[5].pixels = blurred;
   cv::Mat warped;
   cv::resize(images[7].pixels, warped, cv::Size(), 1.0, 1.06, cv::INTER_CUBIC);
-  // Stretched: no view of the board by this camera.
+  // A stretched image, which no view of this camera can be.
   images[7].pixels = warped(cv::Rect(0, 0, kSize.width, kSize.height)).clone();
   const IntrinsicCalibration result = calibrateIntrinsics(board(), images, options(), kNoProgress);
   ASSERT_TRUE(result.model.has_value());

@@ -14,10 +14,11 @@ namespace {
 
 constexpr int kSamplesAcross = 60;
 constexpr size_t kMinSamples = 50;
-// A plane image of more is mostly rim.
+// Beyond this angle, a plane image is mostly rim.
 constexpr double kMaxPinholeAngle_rad = 1.2217;
 constexpr int kMaxIterations = 500;
-// In steps from the middle outwards, where a start without distortion is about right.
+// Fitted in steps from the centre outwards, since an initial camera without distortion is valid near the
+// axis.
 constexpr double kAngleSteps_rad[] = {0.5, 0.9, 1.3, 4.0};
 
 struct Sample {
@@ -25,7 +26,7 @@ struct Sample {
   Eigen::Vector2d pixel;
 };
 
-/// Pixel of a ray by the new model, minus the old model's (2 residuals).
+/// Difference of a ray's pixel in the new and the old model (2 residuals).
 template <class Model>
 class SampleCost : public ceres::SizedCostFunction<2, Model::kNumParameters> {
  public:
@@ -98,7 +99,7 @@ Eigen::VectorXd fit(const std::vector<Sample>& samples, const Eigen::VectorXd& s
   return parameters;
 }
 
-// Focal length and centre near the axis, without distortion.
+// Initial focal length and centre near the axis, without distortion.
 Eigen::VectorXd startFor(const std::string& model_name, const CameraModel& camera) {
   const double small = 1e-3;
   Eigen::Vector2d middle;

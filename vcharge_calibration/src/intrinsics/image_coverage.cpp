@@ -41,7 +41,8 @@ std::vector<std::string> ImageCoverage::missingParts() const {
     const char* name;
     cv::Rect cells;
   };
-  // The image's corners are often dark on a fisheye: a part is a side's middle or a quarter's outer cells.
+  // Corners of fisheye images are often dark, so a part is the middle of a side or the outer cells of a
+  // quarter.
   static const std::array<Part, 8> kParts = {{{"left", {0, 1, 2, 3}},
                                               {"right", {6, 1, 2, 3}},
                                               {"upper", {2, 0, 4, 1}},

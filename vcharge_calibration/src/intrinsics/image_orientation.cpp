@@ -21,12 +21,12 @@ constexpr std::array<Turn, 3> kTurns = {{{"mirrored left-right", true, false},
                                          {"mirrored up-down", false, true},
                                          {"turned by 180 degrees", true, true}}};
 constexpr int kMaxIterations = 4;
-// A turned view fits so many times better the other way about.
+// A turned view must fit this many times better after turning it back.
 constexpr double kMinGain = 2.0;
-// And then as well as the others, up to this factor.
+// After that, its error must not exceed the usual one by more than this factor.
 constexpr double kMaxUsual = 3.0;
-// Where turned and upright images hold each other the balance, the principal point of the fit is in the
-// middle: it starts from beside it, by this share of the image.
+// If turned and upright images balance, the principal point of the fit is in the middle. The search therefore
+// starts this fraction of the image beside it.
 constexpr double kStartShift = 0.01;
 
 BoardView turned(const BoardView& view, const Turn& turn, cv::Size size) {
@@ -54,7 +54,7 @@ CameraModel shifted(const CameraModel& model, const Turn& turn, cv::Size size) {
   return CameraModel::create(model.name(), parameters);
 }
 
-// Which views are turned, by turns with the camera that follows from it.
+// Finds the turned views by alternating between the assignment and the camera that follows from it.
 std::vector<bool> assign(const CalibrationBoard& board, const std::vector<BoardView>& views, cv::Size size,
                          const Turn& turn, CameraModel model, std::vector<double>* as_is_px,
                          std::vector<double>* turned_px) {

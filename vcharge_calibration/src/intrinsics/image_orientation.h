@@ -9,15 +9,15 @@
 
 namespace vcharge {
 
-/// An image that shows the camera's picture mirrored or turned.
+/// A mirrored or turned image.
 struct TurnedImage {
   std::string image;
   std::string how;  ///< "mirrored left-right", "mirrored up-down", "turned by 180 degrees"
 };
 
-/// Views that fit the camera of the other views only when their image is mirrored or turned. A chessboard is
-/// its own mirror image: where all images are mirrored alike, they fit a camera, mirrored too, and nothing
-/// can be seen. The fewer ones are named. `fitted` is a camera fitted to the views as they are.
+/// Finds views that fit the camera of the other views only after mirroring or turning their image; names the
+/// smaller group. A chessboard equals its mirror image: if all images are mirrored alike, they fit a mirrored
+/// camera, and nothing can be detected. `fitted` is a camera fitted to the unmodified views.
 std::vector<TurnedImage> findTurnedImages(const CalibrationBoard& board, const std::vector<BoardView>& views,
                                           cv::Size image_size_px, const CameraModel& fitted);
 

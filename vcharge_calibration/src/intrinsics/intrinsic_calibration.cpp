@@ -22,10 +22,12 @@ namespace vcharge {
 
 namespace {
 
-// Share of the work: finding boards without and with a camera, the rest is the fit.
-constexpr double kFindShare = 0.5;
+// Fraction of the work spent on detecting boards without and with a camera; the rest is the fit.
+constexpr double kFindFraction = 0.5;
+// Parts into which the views are split for cross-validation.
+constexpr int kCrossValidationFolds = 10;
 constexpr double kFindAgainShare = 0.3;
-// Errors above this, or views that do not fit, are reason enough to ask whether images are turned.
+// Larger errors, or views that do not fit, cause a check for turned images.
 constexpr double kSuspiciousError_px = 0.5;
 
 class Calibration {
@@ -42,14 +44,14 @@ class Calibration {
                          " px as " + images_.front().name + ", got " + sizeText(image.pixels.size()));
       }
     }
-    findBoards(nullptr, 0.0, kFindShare);
+    findBoards(nullptr, 0.0, kFindFraction);
     std::vector<BoardView> views = foundViews();
     if (views.empty()) {
       return fail(nothingFound());
     }
     const auto rough = fitFromScratch(options_.model, result_.image_size_px, board_, views);
     if (rough.has_value()) {
-      findBoards(&rough->model, kFindShare, kFindAgainShare);
+      findBoards(&rough->model, kFindFraction, kFindAgainShare);
       views = foundViews();
     }
     for (size_t i = 0; i < images_.size(); ++i) {
@@ -64,7 +66,7 @@ class Calibration {
     }
     if (!rough.has_value()) {
       return fail("no camera of the model " + options_.model +
-                  " explains the corners: is the board's size right?");
+                  " explains the corners: is the size of the board correct?");
     }
     const auto fit = fitViews(board_, images_, views, rough->model, options_);
     progress_(0.95);
@@ -81,7 +83,7 @@ class Calibration {
       }
     }
     if (!fit.has_value()) {
-      return fail("the views contradict each other: fewer than " + std::to_string(options_.min_views) +
+      return fail("the views are inconsistent: fewer than " + std::to_string(options_.min_views) +
                   " fit one camera");
     }
     judgeCalibration(options_, &result_);
@@ -94,7 +96,7 @@ class Calibration {
     return std::to_string(size.width) + "x" + std::to_string(size.height);
   }
 
-  // Those that fit worst, up to some; a few show whether images are turned.
+  // A few of the worst fitting views suffice to detect turned images.
   std::vector<BoardView> worstViews(const std::vector<BoardView>& views, const CameraModel& camera) const {
     constexpr size_t kMaxViews = 24;
     std::vector<std::pair<double, size_t>> order(views.size());
@@ -144,7 +146,7 @@ class Calibration {
     return failed;
   }
 
-  // Boards that are not found yet, on all cores.
+  // Detects the remaining boards, on all cores.
   void findBoards(const CameraModel* model, double progress_start, double progress_share) {
     const BoardDetector detector(board_);
     std::mutex mutex;
@@ -208,12 +210,11 @@ class Calibration {
     crossValidate(fit);
   }
 
-  // The views fall into parts; a fit without each shows how well it does on views it did not see, and how
-  // much the parameters depend on the choice of views.
+  // Splits the views into parts; a fit without each part shows the error on unseen views, and how much the
+  // parameters depend on the choice of views.
   void crossValidate(const ViewFit& fit) {
     const auto views = fit.views.size();
-    const auto folds =
-        static_cast<size_t>(std::min(options_.cross_validation_folds, static_cast<int>(views)));
+    const auto folds = static_cast<size_t>(std::min(kCrossValidationFolds, static_cast<int>(views)));
     const auto size = fit.camera.model.parameters().size();
     std::vector<double> sums(folds, 0.0);
     std::vector<size_t> counts(folds, 0);
@@ -258,9 +259,9 @@ class Calibration {
       return;
     }
     const Eigen::VectorXd formal = covariance->diagonal().cwiseMax(0.0).cwiseSqrt();
-    // Jackknife. The errors of a view go together where boards or the lens are not quite as modelled; by the
-    // formula, which takes corners for independent, parameters would then seem better known than they are.
-    // A few parts give an uncertain variance of each parameter, hence the mean over all.
+    // Jackknife. Errors within a view are correlated if the model of boards or lens is not exact; the usual
+    // formula assumes independent corners and would underestimate the deviations. A few parts give an
+    // uncertain variance of each parameter, hence the mean over all parameters.
     Eigen::VectorXd mean = Eigen::VectorXd::Zero(size);
     for (const auto& fold : parameters) {
       mean += *fold / static_cast<double>(folds);
@@ -285,18 +286,6 @@ class Calibration {
 
 std::string toString(Verdict verdict) {
   return verdict == Verdict::kPass ? "PASS" : verdict == Verdict::kWarn ? "WARN" : "FAIL";
-}
-
-void IntrinsicCalibrationOptions::validate() const {
-  CameraModel::parameterNames(model);
-  requireField(min_views >= 3, "min_views", "must be at least 3", min_views);
-  requireField(max_view_error > 1.0, "max_view_error", "must be above 1", max_view_error);
-  requireField(max_edge_width > 1.0, "max_edge_width", "must be above 1", max_edge_width);
-  requireField(max_corner_error > 1.0, "max_corner_error", "must be above 1", max_corner_error);
-  requireField(min_bending_significance >= 1.0, "min_bending_significance", "must be at least 1",
-               min_bending_significance);
-  requireField(cross_validation_folds >= 2, "cross_validation_folds", "must be at least 2",
-               cross_validation_folds);
 }
 
 IntrinsicCalibration calibrateIntrinsics(const CalibrationBoard& board,

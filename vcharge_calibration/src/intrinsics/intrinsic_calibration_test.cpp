@@ -43,7 +43,7 @@ std::vector<BoardView> randomViews(const CalibrationBoard& board, const CameraMo
     const Eigen::Vector3d middle =
         distance_m * Eigen::Vector3d(std::sin(angle_rad) * std::cos(azimuth_rad),
                                      std::sin(angle_rad) * std::sin(azimuth_rad), std::cos(angle_rad));
-    // Facing the camera, then turned about and tilted.
+    // The board faces the camera, then is rotated and tilted.
     const Eigen::Quaterniond facing = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), middle);
     const double turn_rad = uniform(-0.6, 0.6);
     const double tilt_x_rad = uniform(-0.5, 0.5);
@@ -64,7 +64,7 @@ std::vector<BoardView> randomViews(const CalibrationBoard& board, const CameraMo
         view.corners.push_back({i, pixel + Eigen::Vector2d(x, y)});
       }
     }
-    // Boards that reach over the image's border show how the camera is at its rim.
+    // Boards that extend beyond the image show the camera at its rim.
     if (2 * static_cast<int>(view.corners.size()) >= board.numCorners()) {
       views.push_back(view);
       if (poses != nullptr) {
@@ -75,9 +75,9 @@ std::vector<BoardView> randomViews(const CalibrationBoard& board, const CameraMo
   return views;
 }
 
-/// RMS difference per coordinate between the images of two cameras of the same rays, over the whole image,
-/// pixels. The cameras' frames may differ by a rotation, which boards in unknown poses cannot tell from a
-/// shifted principal point.
+/// RMS difference per coordinate, in pixels, between the images of the same rays in two cameras over the
+/// whole image. The camera frames may differ by a rotation, which boards in unknown poses cannot distinguish
+/// from a shifted principal point.
 double projectionDifference(const CameraModel& truth, const CameraModel& fitted) {
   Eigen::Matrix3d correlation = Eigen::Matrix3d::Zero();
   std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>> pixels;
@@ -140,7 +140,7 @@ TEST(IntrinsicOptimizerTest, FindsEveryModelWithoutAFocalGuess) {
 }
 
 TEST(IntrinsicOptimizerTest, KnowsItsErrors) {
-  // Normalized error squared over 20 seeds: chi-squared with 9 x 20 degrees of freedom.
+  // Normalized squared error over 20 seeds: chi-squared with 9 x 20 degrees of freedom.
   const CalibrationBoard board{9, 6, 0.1};
   const CameraModel truth = meiCamera();
   constexpr double kNoise_px = 0.15;
@@ -234,7 +234,7 @@ TEST(CalibrateIntrinsicsTest, FindsTheBoardsOfAPublishedFisheyeAndBeatsItsError)
         std::count_if(result.views.begin(), result.views.end(),
                       [](const CalibratedView& view) { return view.view.corners.size() == 48; });
     EXPECT_GE(complete, 14) << model;
-    EXPECT_LE(result.rms_px, 0.2838) << model;  // published
+    EXPECT_LE(result.rms_px, 0.2838) << model;  // published result
     EXPECT_LE(result.cross_validated_px, 1.2 * result.rms_px) << model;
     std::printf("%s: %td complete boards of %zu, %.4f px RMS per coordinate, %.4f px unseen\n", model,
                 complete, images.size(), result.rms_px, result.cross_validated_px);

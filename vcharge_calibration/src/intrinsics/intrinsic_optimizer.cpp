@@ -19,9 +19,9 @@ namespace {
 
 constexpr int kMaxIterations = 200;
 constexpr double kRobust_px = 1.0;
-// Usual bending of a board held by hand, over its diagonal.
+// Typical bending of a hand-held board, relative to its diagonal.
 constexpr double kUsualBending = 0.003;
-// A guess is judged by views' errors up to this size.
+// Largest error of a view when a first camera is judged.
 constexpr double kMaxGuessError_px = 20.0;
 constexpr size_t kMaxGuessViews = 20;
 constexpr size_t kFirstViews = 8;
@@ -32,7 +32,7 @@ Eigen::VectorXd parametersFor(const std::string& model_name, cv::Size size, doub
   Eigen::VectorXd parameters =
       Eigen::VectorXd::Zero(static_cast<Eigen::Index>(CameraModel::parameterNames(model_name).size()));
   if (model_name == MeiCamera::kName) {
-    // Near the axis a Mei camera has the focal length gamma / (1 + xi).
+    // Near the axis, a Mei camera has the focal length gamma / (1 + xi).
     parameters.head<5>() << 1.0, 2.0 * focal_px, 2.0 * focal_px, u0, v0;
   } else {
     parameters.head<4>() << focal_px, focal_px, u0, v0;
@@ -43,7 +43,7 @@ Eigen::VectorXd parametersFor(const std::string& model_name, cv::Size size, doub
 /// Reprojection error of a corner of a bent board. Blocks: pose, camera, intrinsics, bending (3).
 class BentCornerCost : public ceres::CostFunction {
  public:
-  /// `flat` has a point (3) in the place of the bending.
+  /// `flat` has a point (3) instead of the bending.
   BentCornerCost(std::unique_ptr<ceres::CostFunction> flat, const CalibrationBoard& board, int index)
       : flat_(std::move(flat)),
         corner_(board.corner(index)),
@@ -77,7 +77,7 @@ class BentCornerCost : public ceres::CostFunction {
   Eigen::Vector3d corner_, basis_;
 };
 
-/// A board is about flat: its bending over the usual one. Blocks: bending (3).
+/// Prior of a nearly flat board: bending over the typical one. Blocks: bending (3).
 class FlatnessCost : public ceres::SizedCostFunction<3, 3> {
  public:
   explicit FlatnessCost(double usual_m) : usual_m_(usual_m) {}
@@ -93,7 +93,8 @@ class FlatnessCost : public ceres::SizedCostFunction<3, 3> {
   const double usual_m_;
 };
 
-/// The bundle adjustment's blocks: inverse poses play the vehicle, the camera sits in its origin.
+/// Adjustment in the blocks of the bundle adjustment: the inverse poses of boards replace the vehicle's, with
+/// the camera at its origin.
 class Adjustment {
  public:
   Adjustment(const CalibrationBoard& board, const std::vector<BoardView>& views, const FittedCamera& start,
@@ -144,7 +145,7 @@ class Adjustment {
 
   bool solve() {
     ceres::Solver::Options options;
-    // Exact: iterative solvers stop early on a problem this badly conditioned (xi against gamma).
+    // A direct solver, since iterative ones stop early on this badly conditioned problem (xi against gamma).
     options.linear_solver_type = ceres::DENSE_SCHUR;
     options.max_num_iterations = kMaxIterations;
     options.function_tolerance = 1e-12;
@@ -227,7 +228,7 @@ std::optional<CameraModel> guessCamera(const std::string& model_name, cv::Size i
   double best_error = std::numeric_limits<double>::infinity();
   const size_t stride = std::max<size_t>(1, views.size() / kMaxGuessViews);
   for (int step = 0; step <= kSteps; ++step) {
-    // From a fisheye of more than 180 degrees to a long lens.
+    // Focal lengths from a fisheye lens of more than 180 degrees to a long lens.
     const double focal_px = image_size_px.width * 0.15 * std::pow(20.0, static_cast<double>(step) / kSteps);
     const CameraModel model =
         CameraModel::create(model_name, parametersFor(model_name, image_size_px, focal_px));

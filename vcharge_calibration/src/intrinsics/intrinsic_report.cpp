@@ -60,11 +60,12 @@ class Report {
                            std::to_string(result_.views.size() + result_.rejected.size()));
     row("error, RMS per coordinate", toText(result_.rms_px, 3) + " px");
     row("error, mean distance", toText(result_.mean_error_px, 3) + " px");
-    row("error of views that the fit did not see, RMS", toText(result_.cross_validated_px, 3) + " px");
+    row("error of views excluded from the fit (cross-validation), RMS",
+        toText(result_.cross_validated_px, 3) + " px");
     if (result_.bent_boards) {
       row("boards bend by (RMS)", toText(1000.0 * result_.bending_m, 1) +
-                                      " mm; taken for flat, the error is " + toText(result_.flat_rms_px, 3) +
-                                      " px RMS");
+                                      " mm; with flat boards, the error is " +
+                                      toText(result_.flat_rms_px, 3) + " px RMS");
     }
     row("image covered", toText(100.0 * result_.covered_share, 0) + " %, up to " +
                              toText(kDegrees * result_.max_angle_rad, 0) + " degrees from the axis");
@@ -96,20 +97,20 @@ class Report {
         errors.push_back({corner.pixel, reprojectionError(board_, corner, view.placed, *result_.model)});
       }
     }
-    out_ << "<h2>Where the board was seen</h2><div class=\"row\">"
+    out_ << "<h2>Coverage of the image</h2><div class=\"row\">"
          << htmlFigure(drawCoverage(result_.image_size_px, views),
-                       "Corners of all images used. Red: no picture shows the board there.");
+                       "Corners of all used images. Red: no image shows the board there.");
     if (!result_.model.has_value()) {
       out_ << "</div>";
       return;
     }
     out_ << htmlFigure(drawErrorMap(result_.image_size_px, errors), "RMS error per coordinate, pixels.")
          << "</div><h2>Errors</h2><div class=\"row\">"
-         << htmlFigure(
-                drawErrorVectors(result_.image_size_px, errors, kVectorScale),
-                "Errors of all corners, " + toText(kVectorScale, 0) +
-                    " times as long as they are. Where neighbours point the same way, lens or board are "
-                    "not quite as modelled.");
+         << htmlFigure(drawErrorVectors(result_.image_size_px, errors, kVectorScale),
+                       "Errors of all corners, " + toText(kVectorScale, 0) +
+                           " times enlarged. Where neighbours point in the same direction, the model of lens "
+                           "or board "
+                           "is not exact.");
     const CalibratedView& shown = *std::max_element(result_.views.begin(), result_.views.end(),
                                                     [](const CalibratedView& a, const CalibratedView& b) {
                                                       return a.view.corners.size() < b.view.corners.size();

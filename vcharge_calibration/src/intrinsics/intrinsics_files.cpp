@@ -16,7 +16,8 @@ namespace vcharge {
 
 namespace {
 
-/// How a model is called elsewhere, and where its parameters stand there, in the order of parameterNames().
+/// Name of a model in other formats, and the positions of its parameters there, in the order of
+/// parameterNames().
 struct CamodocalParameter {
   const char* section;
   const char* key;
@@ -86,7 +87,7 @@ const ForeignModel& foreignModel(const std::string& name) {
   throw std::logic_error("intrinsics_files: a camera model without a foreign name");
 }
 
-// Exact to the last bit.
+// Formats a number exactly to the last bit.
 std::string exact(double value) {
   std::array<char, 40> text{};
   std::snprintf(text.data(), text.size(), "%.17g", value);
@@ -102,7 +103,7 @@ std::string listOf(const std::vector<double>& values) {
   return "[" + text + "]";
 }
 
-/// A map of a foreign file; `key` says where it stands.
+/// A map in Kalibr's or CamOdoCal's file; `key` is its path in errors.
 class Section {
  public:
   Section(const YAML::Node& node, std::string source, std::string key)
@@ -294,7 +295,7 @@ IntrinsicsFormat intrinsicsFormat(const std::string& name) {
 
 CameraRig readIntrinsics(const std::string& path, double field_of_view_rad) {
   std::string text = readTextFile(path);
-  // OpenCV's first line is not what YAML 1.2 takes for a directive.
+  // OpenCV's first line is not a valid directive of YAML 1.2.
   if (text.rfind("%YAML:", 0) == 0) {
     text.erase(0, text.find('\n') == std::string::npos ? text.size() : text.find('\n') + 1);
   }

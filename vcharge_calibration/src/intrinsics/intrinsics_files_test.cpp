@@ -77,7 +77,7 @@ TEST_F(IntrinsicsFilesTest, EveryModelSurvivesEveryFormatToTheLastBit) {
 }
 
 TEST_F(IntrinsicsFilesTest, KalibrsCamchainIsReadAsKalibrDefinesIt) {
-  // A camchain as Kalibr writes it, with everything that this project has no use for.
+  // A camchain as written by Kalibr, including keys that are not used here.
   const CameraRig rig = readIntrinsics(write("camchain.yaml", R"(cam0:
   cam_overlaps: [1]
   camera_model: omni
@@ -177,7 +177,7 @@ TEST_F(IntrinsicsFilesTest, KalibrsExtrinsicsLeadFromThePreviousCamera) {
   writeIntrinsics(rig, IntrinsicsFormat::kKalibr, path("camchain.yaml"));
   std::ifstream file(path("camchain.yaml"));
   const std::string text((std::istreambuf_iterator<char>(file)), {});
-  // A point of the left camera lies 0.25 m further along y in the right one.
+  // A point of the left camera is 0.25 m further along y in the right one.
   EXPECT_NE(text.find("- [0.0, 1.0, 0.0, 0.25]"), std::string::npos) << text;
   EXPECT_EQ(readIntrinsics(path("camchain.yaml"), 3.0).cameras.size(), 2U);
 }
@@ -222,7 +222,7 @@ TEST(ConvertCameraTest, StatesWhatTheNewModelLeavesOver) {
       EXPECT_LT(converted.rms_px, 0.5) << from << " " << to;
       EXPECT_LE(converted.rms_px, converted.max_px);
       EXPECT_GT(converted.covered_share, 0.99);
-      // The residual by hand, on rays between the samples.
+      // Computes the residual directly, on rays between the samples.
       double worst_px = 0.0;
       for (double theta = 0.013; theta < 1.3; theta += 0.1) {
         const Eigen::Vector3d ray(std::sin(theta), 0.0, std::cos(theta));

@@ -16,22 +16,19 @@ namespace vcharge {
 
 namespace {
 
-// Opposite sides of a board seen straight on are equally long, and so are the diagonals of its outline.
+// Opposite sides of a board parallel to the image are equally long, and so are its diagonals.
 constexpr double kMinTiltRatio = 1.15;
-// A rough camera is fitted whenever so many views more are there.
+// An approximate camera is fitted after every so many views.
 constexpr size_t kFitEvery = 8;
+// Largest motion of the board's corners between images of a static board, relative to the image's longer
+// side.
+constexpr double kMaxMotion = 0.004;
+// Smallest difference of the corners from those of every collected view, unless the view covers a new part.
+constexpr double kMinDifference = 0.06;
+// Collection stops at this multiple of enough_views.
+constexpr int kMaxViewsRatio = 4;
 
 }  // namespace
-
-void ViewCollectorOptions::validate() const {
-  requireField(max_motion > 0.0, "max_motion", "must be positive", max_motion);
-  requireField(min_difference > 0.0, "min_difference", "must be positive", min_difference);
-  requireField(enough_views >= 5, "enough_views", "must be at least 5", enough_views);
-  requireField(enough_coverage > 0.0 && enough_coverage <= 1.0, "enough_coverage", "must be in (0, 1]",
-               enough_coverage);
-  requireField(enough_tilted >= 0, "enough_tilted", "must not be negative", enough_tilted);
-  requireField(max_views >= enough_views, "max_views", "must not be below enough_views", max_views);
-}
 
 ViewCollector::ViewCollector(const CalibrationBoard& board, std::string model_name,
                              const ViewCollectorOptions& options)
@@ -51,8 +48,8 @@ std::optional<BoardView> ViewCollector::detect(const CalibrationImage& image) co
   return view;
 }
 
-// RMS distance of common corners over the image's longer side; infinite where there are none. A chessboard
-// may be counted from either end.
+// RMS distance of common corners relative to the image's longer side; infinite if there are none. A
+// chessboard may be numbered from either end.
 double ViewCollector::difference(const BoardView& a, const BoardView& b) const {
   std::map<int, Eigen::Vector2d> in_b;
   for (const BoardCorner& corner : b.corners) {
@@ -76,7 +73,7 @@ double ViewCollector::difference(const BoardView& a, const BoardView& b) const {
   return best;
 }
 
-// Without a camera: by the lengths of the outline's opposite sides.
+// Without a camera, tilt is measured by the lengths of opposite sides of the outline.
 bool ViewCollector::isTilted(const BoardView& view) const {
   std::map<int, Eigen::Vector2d> pixels;
   for (const BoardCorner& corner : view.corners) {
@@ -111,14 +108,14 @@ ViewCollector::Outcome ViewCollector::add(const CalibrationImage& image) {
   if (!last_view_.has_value()) {
     return Outcome::kNoBoard;
   }
-  if (!before.has_value() || difference(*before, *last_view_) > options_.max_motion) {
+  if (!before.has_value() || difference(*before, *last_view_) > kMaxMotion) {
     return Outcome::kMoving;
   }
-  if (static_cast<int>(views_.size()) >= options_.max_views) {
+  if (static_cast<int>(views_.size()) >= kMaxViewsRatio * options_.enough_views) {
     return Outcome::kFull;
   }
   const bool differs = std::all_of(views_.begin(), views_.end(), [this](const BoardView& view) {
-    return difference(view, *last_view_) > options_.min_difference;
+    return difference(view, *last_view_) > kMinDifference;
   });
   if (!differs && coverage_->numNewCells(*last_view_) == 0) {
     return Outcome::kNothingNew;
@@ -137,7 +134,7 @@ std::vector<std::string> ViewCollector::missing() const {
   std::vector<std::string> missing;
   const int more = options_.enough_views - static_cast<int>(views_.size());
   if (more > 0) {
-    missing.push_back(std::to_string(more) + " more pictures");
+    missing.push_back(std::to_string(more) + " more images");
   }
   if (coveredShare() < options_.enough_coverage) {
     std::string parts;
@@ -151,7 +148,7 @@ std::vector<std::string> ViewCollector::missing() const {
   const auto tilted =
       std::count_if(views_.begin(), views_.end(), [this](const BoardView& view) { return isTilted(view); });
   if (tilted < options_.enough_tilted) {
-    missing.push_back(std::to_string(options_.enough_tilted - tilted) + " pictures of the tilted board");
+    missing.push_back(std::to_string(options_.enough_tilted - tilted) + " images of the tilted board");
   }
   return missing;
 }
@@ -161,13 +158,13 @@ std::string toString(ViewCollector::Outcome outcome) {
     case ViewCollector::Outcome::kTaken:
       return "taken";
     case ViewCollector::Outcome::kNoBoard:
-      return "the board is not seen";
+      return "the board is not visible";
     case ViewCollector::Outcome::kMoving:
       return "the board moves: hold it still";
     case ViewCollector::Outcome::kNothingNew:
-      return "the board was seen here before: move or tilt it";
+      return "the board was here before: move or tilt it";
     default:
-      return "enough pictures: nothing more is taken";
+      return "enough images: no more are collected";
   }
 }
 

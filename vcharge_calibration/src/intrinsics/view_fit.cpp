@@ -19,9 +19,16 @@ namespace vcharge {
 namespace {
 
 constexpr int kMaxRounds = 6;
-// The round after which the boards' shape is judged: by then wrong corners are out.
+// The bending of boards is judged after this round, when wrong corners have been removed.
 constexpr int kBendingRound = 1;
-// Corners that move less from round to round are found.
+// Factor by which bent boards must explain the errors better than random parameters.
+constexpr double kMinBendingSignificance = 3.0;
+// Largest ratio of a corner's error to the usual one of its view.
+constexpr double kMaxCornerError = 5.0;
+// Largest ratios of a view's RMS error and edge width to the usual ones; views beyond are removed.
+constexpr double kMaxViewError = 6.0;
+constexpr double kMaxEdgeWidth = 2.0;
+// Corners that move less between rounds have converged.
 constexpr double kSettled_px = 0.02;
 
 bool sameCorners(const BoardView& a, const BoardView& b) {
@@ -57,7 +64,7 @@ class ViewFitter {
         break;
       }
     }
-    // The last word has least squares, in which noisy views weigh less.
+    // The final fit uses least squares, in which noisy views have less weight.
     fit_.settings.loss = Loss::kSquared;
     if (!fitted || !refit(fit_.camera.model)) {
       return std::nullopt;
@@ -107,7 +114,7 @@ class ViewFitter {
     return sum;
   }
 
-  // F-test: what three more parameters a view explain, over what as many would by chance.
+  // F-test: the improvement by three more parameters per view, relative to that of as many random ones.
   bool judgeBending() {
     size_t count = 0;
     const double flat = sumOfSquares(fit_.camera, fit_.views, &count);
@@ -117,13 +124,12 @@ class ViewFitter {
     bending.sigma_px = sigma_px;
     const auto bent = fitCamera(board_, fit_.views, fit_.camera.model, bending);
     if (!bent.has_value()) {
-      return true;  // stays flat
+      return true;  // boards stay flat
     }
     const double rest = sumOfSquares(*bent, fit_.views, &count);
     const double parameters = 3.0 * static_cast<double>(fit_.views.size());
     const double freedom = static_cast<double>(count) - 3.0 * parameters;
-    if (freedom > parameters &&
-        (flat - rest) / parameters > options_.min_bending_significance * rest / freedom) {
+    if (freedom > parameters && (flat - rest) / parameters > kMinBendingSignificance * rest / freedom) {
       bending.sigma_px = std::sqrt(rest / freedom);
       fit_.settings = bending;
       return refit(bent->model);
@@ -154,8 +160,8 @@ class ViewFitter {
     }
   }
 
-  // Every corner of the board, found anew in the board's plane near where it was seen or, where it was missed
-  // or went astray, near where the camera predicts it.
+  // Detects every corner of the board again in its plane, near its previous position, or near the predicted
+  // one if it was missing or an outlier.
   BoardView refineView(size_t v, double max_error_px) const {
     const BoardView& view = fit_.views[v];
     const BoardRefiner refiner(imageOf(v), board_, fit_.camera.model, fit_.camera.boards[v]);
@@ -173,11 +179,11 @@ class ViewFitter {
         refined.corners.push_back({index, *pixel});
       }
     }
-    // A view most of whose corners are off is judged by what it showed.
+    // A view with mostly wrong corners is judged by its original detections.
     return 2 * refined.corners.size() < view.corners.size() ? view : refined;
   }
 
-  // True where anything changed.
+  // Returns true if anything changed.
   bool removeOutliers() {
     const size_t count = fit_.views.size();
     std::vector<double> widths_px(count);
@@ -197,8 +203,8 @@ class ViewFitter {
     std::vector<double> errors_px(count);
     tbb::parallel_for(size_t{0}, count, [&](size_t v) {
       widths_px[v] = widthOf(v);
-      // A noisy view's corners are judged by their own noise.
-      refined[v] = refineView(v, options_.max_corner_error * std::max(usual_corner_px, view_medians_px[v]));
+      // The corners of a noisy view are judged by its own noise.
+      refined[v] = refineView(v, kMaxCornerError * std::max(usual_corner_px, view_medians_px[v]));
       errors_px[v] = rmsError(board_, refined[v], fit_.camera.boards[v], fit_.camera.model);
     });
     const double usual_px = median(errors_px);
@@ -206,8 +212,8 @@ class ViewFitter {
     bool changed = false;
     std::vector<BoardView> kept;
     for (size_t v = 0; v < count; ++v) {
-      const bool blurred = widths_px[v] > options_.max_edge_width * usual_width_px;
-      if (blurred || !(errors_px[v] <= options_.max_view_error * usual_px)) {
+      const bool blurred = widths_px[v] > kMaxEdgeWidth * usual_width_px;
+      if (blurred || !(errors_px[v] <= kMaxViewError * usual_px)) {
         fit_.rejected.push_back(
             {fit_.views[v].image, blurred ? "blurred: its edges are " + toText(widths_px[v], 1) +
                                                 " px wide, usual are " + toText(usual_width_px, 1) + " px"

@@ -10,8 +10,8 @@
 
 namespace vcharge {
 
-/// A raw SocketCAN socket of an interface ("can0") that also tells errors of the bus and when frames came.
-/// InputError naming the interface where there is none.
+/// Opens a raw SocketCAN socket of an interface ("can0") that also reports bus errors and reception times.
+/// Throws InputError naming the interface if there is none.
 FileDescriptor openCanSocket(const std::string& interface);
 
 /// State of the bus for /diagnostics.
@@ -22,28 +22,28 @@ struct CanStatus {
   std::string message;
   uint64_t connections = 0;
   uint64_t error_frames = 0;
-  uint64_t bad_frames = 0;  ///< not of a CAN frame's size
+  uint64_t bad_frames = 0;  ///< frames whose size is not that of a CAN frame
   uint64_t ticks = 0;
   CanWheelCounts decoded;
 };
 
-/// Reads wheel data from a socket that carries Linux' `struct can_frame`, asleep between frames. A socket
-/// that ends or fails is opened anew.
+/// Reads wheel data from a socket with Linux' `struct can_frame`, sleeping between frames. Reopens a socket
+/// that ends or fails.
 class CanReader {
  public:
   using Open = std::function<FileDescriptor()>;
   using TicksCallback = std::function<void(const WheelTicks&)>;
 
-  /// `open` throws InputError where there is no bus. `drive_clock` stamps frames whose socket does not.
+  /// `open` throws InputError if there is no bus. `drive_clock` provides the stamps if the socket does not.
   CanReader(Open open, const CanWheelOptions& options, ClockMap::Clock drive_clock, double timeout_s = 0.5);
 
-  /// Until stop().
+  /// Blocks until stop().
   void run(const TicksCallback& callback);
   void stop();               ///< thread safe
   CanStatus status() const;  ///< thread safe
 
  private:
-  /// False when the socket is at its end.
+  /// Returns false at the end of the socket.
   bool readFrames(int fd, const TicksCallback& callback);
   void setMessage(bool connected, const std::string& message);
 

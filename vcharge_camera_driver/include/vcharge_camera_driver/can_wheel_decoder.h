@@ -26,81 +26,70 @@ struct CanFrame {
   std::array<uint8_t, 8> data{};
 };
 
-/// Where a number stands in a message, as DBC files say it: little endian signals begin at their lowest bit,
-/// big endian (Motorola) ones at their highest, bits are counted from the lowest of byte 0. value = raw scale
-/// + offset.
+/// Position and scaling of a number in a message, as in DBC files: the start bit of a little endian signal is
+/// its lowest bit, that of a big endian (Motorola) signal its highest; bits are counted from the lowest of
+/// byte 0. value = raw * scale + offset.
 struct CanSignal {
-  int id = -1;  ///< of the message; negative: the car does not send it; above 0x7ff: an extended one
-  int start_bit = 0;
-  int length = 0;  ///< bits
-  ByteOrder endianness = ByteOrder::kLittle;
-  bool is_signed = false;
-  double scale = 1.0;
-  double offset = 0.0;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("id", id);
-    visit("start_bit", start_bit);
-    visit("length", length);
-    visit("endianness", endianness);
-    visit("signed", is_signed);
-    visit("scale", scale);
-    visit("offset", offset);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(CanSignal);
+  VCHARGE_OPTION(int, id, -1, anyValue().upTo(0x1fffffff),
+                 "Identifier of the message, extended above 0x7ff; negative: the car does not send it.");
+  VCHARGE_OPTION(int, start_bit, 0, between(0, 63), "First bit, as in DBC files.");
+  VCHARGE_OPTION(int, length, 0, between(0, 64), "Number of bits.");
+  VCHARGE_OPTION(ByteOrder, endianness, ByteOrder::kLittle, anyValue(), "Byte order.");
+  VCHARGE_OPTION(bool, is_signed, false, anyValue(), "Whether the number is signed (two's complement).");
+  VCHARGE_OPTION(double, scale, 1.0, anyValue(), "Factor of the raw number.");
+  VCHARGE_OPTION(double, offset, 0.0, anyValue(), "Added to the scaled number.");
+  VCHARGE_END_OPTIONS();
+  void checkFields() const;
 
   bool isUsed() const { return id >= 0; }
   bool isIn(const CanFrame& frame) const;
-  /// The signal's bits; nothing where the frame is too short. The frame's id is not looked at.
+  /// The raw bits of the signal; empty if the frame is too short. Ignores the frame's id.
   std::optional<uint64_t> rawBits(const CanFrame& frame) const;
-  /// With sign, scale and offset.
+  /// The value with sign, scale and offset.
   std::optional<double> value(const CanFrame& frame) const;
 };
 
-/// The car's messages: counters of both rear wheels, or their speeds; the steering angle if it is sent.
+/// The car's messages: counters of both rear wheels, or their speeds, and optionally the steering angle.
 struct CanWheelOptions {
-  CanSignal left_ticks, right_ticks;                  ///< counters that wrap at their length
-  CanSignal left_speed_m_per_s, right_speed_m_per_s;  ///< instead of counters
-  CanSignal backwards;  ///< not 0: the car rolls backwards, of which counters or speeds tell nothing
-  CanSignal
-      steering_angle_rad;  ///< of the virtual front wheel in the middle: the scale includes the steering gear
-  double metres_per_tick = 0.01;
-  double max_speed_m_per_s = 60.0;  ///< a counter that goes faster was reset
+  VCHARGE_BEGIN_OPTIONS(CanWheelOptions);
+  VCHARGE_OPTION_GROUP(CanSignal, left_ticks, {},
+                       "Counter of the left rear wheel, which wraps at its length.");
+  VCHARGE_OPTION_GROUP(CanSignal, right_ticks, {}, "Counter of the right rear wheel.");
+  VCHARGE_OPTION_GROUP(CanSignal, left_speed_m_per_s, {},
+                       "Speed of the left rear wheel, instead of its counter.");
+  VCHARGE_OPTION_GROUP(CanSignal, right_speed_m_per_s, {}, "Speed of the right rear wheel.");
+  VCHARGE_OPTION_GROUP(CanSignal, backwards, {},
+                       "Not 0 if the car rolls backwards, for counters without sign.");
+  VCHARGE_OPTION_GROUP(CanSignal, steering_angle_rad, {},
+                       "Angle of a virtual front wheel in the middle; the scale includes the steering gear.");
+  VCHARGE_OPTION(double, metres_per_tick, 0.01, above(0.0).upTo(100.0), "Distance per tick of the counters.");
+  VCHARGE_OPTION(double, max_speed_m_per_s, 60.0, above(0.0).upTo(1000.0),
+                 "Speed beyond which a counter was reset.");
+  VCHARGE_END_OPTIONS();
+  void checkFields() const;
 
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("left_ticks", left_ticks);
-    visit("right_ticks", right_ticks);
-    visit("left_speed_m_per_s", left_speed_m_per_s);
-    visit("right_speed_m_per_s", right_speed_m_per_s);
-    visit("backwards", backwards);
-    visit("steering_angle_rad", steering_angle_rad);
-    visit("metres_per_tick", metres_per_tick);
-    visit("max_speed_m_per_s", max_speed_m_per_s);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
-
+  /// False by default, when the car sends no wheel data.
+  bool isUsed() const { return left_ticks.isUsed() || left_speed_m_per_s.isUsed(); }
   bool hasTicks() const { return left_ticks.isUsed(); }
 };
 
 struct CanWheelCounts {
   uint64_t frames = 0;
-  uint64_t too_short = 0;  ///< messages that end before a signal of theirs
+  uint64_t too_short = 0;  ///< messages that end before one of their signals
   uint64_t wraps = 0;
-  uint64_t resets =
-      0;  ///< counters that jumped, or were silent for so long that they may have wrapped unseen
+  uint64_t resets = 0;  ///< counters that jumped, or were silent so long that they may have wrapped
 };
 
-/// Makes WheelTicks, unwrapped and continuous, of a car's messages. Where they hold speeds, ticks are these
-/// integrated, in steps of kSpeedTick_m. Not thread safe.
+/// Converts a car's messages to WheelTicks with unwrapped, continuous counters. Speeds are integrated to
+/// ticks of kSpeedTick_m. Not thread safe.
 class CanWheelDecoder {
  public:
   static constexpr double kSpeedTick_m = 1e-4;
 
   explicit CanWheelDecoder(const CanWheelOptions& options);
-  /// The ticks that this frame completes, at `stamp`: those of the message with the counters; where each
-  /// wheel has its own, of the later one. Nothing for other frames.
+  /// Returns the ticks completed by this frame, at `stamp`: those of the message with both counters, or of
+  /// the later message if each wheel has its own. Empty for other frames.
   std::optional<WheelTicks> add(const CanFrame& frame, Timestamp stamp);
   const CanWheelCounts& counts() const { return counts_; }
 
@@ -111,7 +100,7 @@ class CanWheelDecoder {
     std::optional<uint64_t> raw;
     Timestamp stamp;
     double speed_m_per_s = 0.0;
-    double speed_error_m_per_s = 0.0;  // at most
+    double speed_error_m_per_s = 0.0;  // upper bound
     double remainder_m = 0.0;
     int64_t ticks = 0;
   };

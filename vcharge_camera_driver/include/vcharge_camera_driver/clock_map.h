@@ -6,19 +6,19 @@
 
 namespace vcharge {
 
-/// Maps the kernel's CLOCK_MONOTONIC to the drive's clock (ROS time). The offset is that of the tightest of
-/// several readings of both clocks. It follows slow changes (NTP slews the clock of the day) at no more than
-/// kMaxSlew; a larger one is a step of the clock, taken at once and counted. Not thread safe.
+/// Maps the kernel's CLOCK_MONOTONIC to the drive's clock (ROS time). The offset comes from the tightest of
+/// several readings of both clocks. It follows slow changes (NTP slews the system clock) with at most
+/// kMaxSlew; larger changes are counted as steps and applied at once. Not thread safe.
 class ClockMap {
  public:
   using Clock = std::function<Timestamp()>;
-  static constexpr double kMaxSlew = 1e-3;  ///< seconds per second; NTP keeps to half of it
+  static constexpr double kMaxSlew = 1e-3;  ///< seconds per second, twice NTP's limit
   static constexpr double kStep_s = 0.01;
 
-  /// Reads both clocks. `monotonic` may be empty: the kernel's.
+  /// Reads both clocks. An empty `monotonic` means the kernel's clock.
   explicit ClockMap(Clock drive_clock, Clock monotonic = Clock());
 
-  /// Reads both clocks again; to be called every second or so.
+  /// Reads both clocks again; call it about once per second.
   void update();
   Timestamp toDriveTime(Timestamp monotonic) const { return monotonic + offset_; }
   uint64_t numSteps() const { return num_steps_; }
@@ -34,7 +34,7 @@ class ClockMap {
 
 /// The kernel's CLOCK_MONOTONIC.
 Timestamp monotonicNow();
-/// The clock of the day, which is ROS time where no clock is simulated.
+/// The system clock, which equals ROS time unless a clock is simulated.
 Timestamp systemNow();
 
 }  // namespace vcharge

@@ -21,39 +21,29 @@ inline std::vector<std::string> enumNames<OdometrySourceKind>() {
   return {"none", "can", "wheel_ticks"};
 }
 
-/// All that the driver needs to know beside the rig.
+/// Configuration of the driver beside the rig.
 struct DriverOptions {
-  std::vector<std::string> cameras;  ///< of the rig, by name; empty: all
-  FrameSourceKind source = FrameSourceKind::kV4l2;
-  std::vector<std::string> devices;  ///< v4l2: one device node per camera
-  std::string folder;                ///< folder: images NAME/STAMP_NS.png of a drive, shown in real time
-  std::string bag;                   ///< bag: a drive, shown in real time
-  bool loop = false;                 ///< folder: from the start again at the end
-  V4l2FrameSourceOptions v4l2;       ///< the size of the images is the rig's
-  int realign_frames = 5;            ///< see TriggerGrouperOptions
-  double stamp_offset_s = 0.0;       ///< added to the cameras' stamps, e.g. minus half the exposure
-  OdometrySourceKind odometry_source = OdometrySourceKind::kWheelTicks;  ///< can: needs `can`
-  std::string can_interface = "can0";
-  CanWheelOptions can;  ///< the car's messages
-  WheelOdometryOptions odometry;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("cameras", cameras);
-    visit("source", source);
-    visit("devices", devices);
-    visit("folder", folder);
-    visit("bag", bag);
-    visit("loop", loop);
-    visit("v4l2", v4l2);
-    visit("realign_frames", realign_frames);
-    visit("stamp_offset_s", stamp_offset_s);
-    visit("odometry_source", odometry_source);
-    visit("can_interface", can_interface);
-    visit("can", can);
-    visit("odometry", odometry);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(DriverOptions);
+  VCHARGE_OPTION(std::vector<std::string>, cameras, {}, anyValue(),
+                 "Names of cameras of the rig; empty: all.");
+  VCHARGE_OPTION(FrameSourceKind, source, FrameSourceKind::kV4l2, anyValue(), "Source of the images.");
+  VCHARGE_OPTION(std::vector<std::string>, devices, {}, anyValue(),
+                 "Device node of each camera (source v4l2).");
+  VCHARGE_OPTION(std::string, folder, "", anyValue(),
+                 "Folder of recorded images NAME/STAMP_NS.png, played in real time (source folder).");
+  VCHARGE_OPTION(std::string, bag, "", anyValue(), "Recorded drive, played in real time (source bag).");
+  VCHARGE_OPTION(bool, loop, false, anyValue(), "Whether the images of a folder repeat.");
+  VCHARGE_OPTION_GROUP(V4l2FrameSourceOptions, v4l2, {},
+                       "Capture from the cameras; the rig sets the image size.");
+  VCHARGE_OPTION(double, stamp_offset_s, 0.0, between(-1.0, 1.0),
+                 "Added to the cameras' stamps, for example minus half the exposure.");
+  VCHARGE_OPTION(OdometrySourceKind, odometry_source, OdometrySourceKind::kWheelTicks, anyValue(),
+                 "Source of the wheel data.");
+  VCHARGE_OPTION(std::string, can_interface, "can0", anyValue(), "Network interface of the CAN bus.");
+  VCHARGE_OPTION_GROUP(CanWheelOptions, can, {}, "Messages of the car (odometry source can).");
+  VCHARGE_OPTION_GROUP(WheelOdometryOptions, odometry, {}, "Odometry from the wheel data.");
+  VCHARGE_END_OPTIONS();
+  void checkFields() const;
 };
 
 }  // namespace vcharge

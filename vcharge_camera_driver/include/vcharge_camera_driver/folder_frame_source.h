@@ -10,11 +10,11 @@
 
 namespace vcharge {
 
-/// Lets a caller sleep until a time or until it is stopped. Thread safe.
+/// Sleeps until a given time or until it is stopped. Thread safe.
 class Pacer {
  public:
   Pacer();
-  /// False when stopped.
+  /// Returns false when stopped.
   bool sleepUntil(Timestamp monotonic);
   void stop();
 
@@ -22,11 +22,11 @@ class Pacer {
   FileDescriptor wake_;
 };
 
-/// Images FOLDER/CAMERA/STAMP_NS.png (or .jpg, .pgm), shown in real time as if cameras made them now: the
-/// first pulse is when run() begins. Images of the cameras with the same stamp are of one pulse.
+/// Plays images FOLDER/CAMERA/STAMP_NS.png (or .jpg, .pgm) in real time as if cameras recorded them now; the
+/// first pulse is at the start of run(). Images with the same stamp belong to the same pulse.
 class FolderFrameSource : public FrameSource {
  public:
-  /// InputError naming the folder or file, where a camera has no images or a name is no stamp.
+  /// Throws InputError naming the folder or file if a camera has no images or a name is not a stamp.
   FolderFrameSource(const std::string& folder, std::vector<std::string> cameras, cv::Size size_px,
                     double frame_rate_hz, bool loop, ClockMap::Clock drive_clock);
 

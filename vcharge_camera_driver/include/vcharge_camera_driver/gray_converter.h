@@ -10,7 +10,7 @@
 
 namespace vcharge {
 
-/// How a camera delivers its pixels; names as the V4L2 documentation has them.
+/// Pixel formats of cameras, with the names of the V4L2 documentation.
 enum class PixelFormat {
   kGrey,   ///< 8 bit
   kY10,    ///< 10 bit in the lower bits of 16, little endian
@@ -18,28 +18,28 @@ enum class PixelFormat {
   kY16,    ///< 16 bit little endian
   kYuyv,   ///< 4:2:2, luminance first
   kUyvy,   ///< 4:2:2, luminance second
-  kBggr8,  ///< Bayer patterns, named by their first two rows
+  kBggr8,  ///< Bayer patterns, named after their first two rows
   kGbrg8,
   kGrbg8,
   kRggb8,
   kMjpeg,
 };
 
-/// All formats, in the order in which they are preferred when the options name none: least work first.
+/// All formats, ordered by the work to convert them; the order of preference if the options name none.
 const std::vector<PixelFormat>& allPixelFormats();
-/// V4L2's four character code.
+/// The four character code of V4L2.
 uint32_t fourccOf(PixelFormat format);
 /// "GREY", "Y10", "YUYV"...
 std::string toString(PixelFormat format);
-/// Every name, in the order of allPixelFormats().
+/// All names, in the order of allPixelFormats().
 std::vector<std::string> pixelFormatNames();
-/// The characters of a code, without trailing blanks.
+/// The characters of a code without trailing blanks.
 std::string fourccText(uint32_t fourcc);
-/// Bytes of one row without padding; 0 for kMjpeg, which has none.
+/// Bytes of one row without padding; 0 for kMjpeg.
 size_t bytesPerRow(PixelFormat format, int width_px);
 
-/// Converts a frame as a camera delivered it to 8-bit gray, straight into the caller's memory. Not thread
-/// safe; one per camera.
+/// Converts camera frames to 8-bit gray directly into the caller's memory. Not thread safe; use one per
+/// camera.
 class GrayConverter {
  public:
   GrayConverter();
@@ -47,15 +47,15 @@ class GrayConverter {
   GrayConverter(GrayConverter&& other) noexcept;
   GrayConverter& operator=(GrayConverter&& other) noexcept;
 
-  /// `data` holds `size_bytes` bytes of rows `stride_bytes` apart (ignored for kMjpeg); `gray` is CV_8UC1 of
-  /// the frame's size. Returns an empty text, or why the frame is bad (too short, not a JPEG, a JPEG of
-  /// another size or a damaged one); `gray` then holds no image.
+  /// `data` holds `size_bytes` bytes in rows `stride_bytes` apart (ignored for kMjpeg); `gray` is CV_8UC1 of
+  /// the frame's size. Returns an empty text, or the reason why the frame is bad (too short, not a JPEG, a
+  /// JPEG of another size, damaged); `gray` is then undefined.
   std::string convert(PixelFormat format, const uint8_t* data, size_t size_bytes, size_t stride_bytes,
                       cv::Mat* gray);
 
  private:
   struct Jpeg;
-  std::unique_ptr<Jpeg> jpeg_;  // made when the first JPEG comes
+  std::unique_ptr<Jpeg> jpeg_;  // created for the first JPEG
 };
 
 }  // namespace vcharge

@@ -8,12 +8,12 @@
 
 namespace vcharge {
 
-/// Gives out memory for images and takes it back when the last Image that holds it is gone, so that no frame
-/// costs an allocation. Thread safe; images may outlive the pool.
+/// Reuses the memory of images: a buffer returns to the pool with the last Image that holds it, so frames
+/// need no allocation. Thread safe; images may outlive the pool.
 template <class Buffer>
 class BufferPool {
  public:
-  /// A buffer that nobody holds, as it was left, or a new one.
+  /// A free buffer with its old content, or a new one.
   std::shared_ptr<Buffer> acquire() {
     std::unique_ptr<Buffer> buffer;
     {
@@ -36,7 +36,7 @@ class BufferPool {
   }
 
  private:
-  static constexpr size_t kMaxFree = 64;  // a burst's worth
+  static constexpr size_t kMaxFree = 64;  // enough for a burst of frames
   struct State {
     std::mutex mutex;
     std::vector<std::unique_ptr<Buffer>> free;

@@ -7,60 +7,55 @@
 #include <vector>
 
 #include "vcharge_camera_driver/frame_source.h"
+#include "vcharge_core/base/options.h"
 #include "vcharge_core/frames/multi_frame_synchronizer.h"
 
 namespace vcharge {
 
 struct TriggerGrouperOptions {
-  double frame_rate_hz = 12.5;  ///< of the trigger
-  /// After its start, and whenever its frame numbers and stamps disagree, a camera must bring so many frames
-  /// in which they agree before its images are used: a frame that comes late, with the stamp of the next
-  /// pulse, is recognized by it when the camera catches up within so many frames.
-  int realign_frames = 5;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("frame_rate_hz", frame_rate_hz);
-    visit("realign_frames", realign_frames);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(TriggerGrouperOptions);
+  VCHARGE_OPTION(double, frame_rate_hz, 12.5, above(0.0).upTo(1000.0), "Rate of the trigger.");
+  VCHARGE_OPTION(
+      int, realign_frames, 5, atLeast(1),
+      "Consistent frames of a camera before its images are used, after a start or a disagreement.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// What became of a camera's frames.
+/// Statistics of a camera's frames.
 struct TriggerCameraCounts {
   bool aligned = false;
   uint64_t frames = 0;
-  uint64_t lost = 0;       ///< by number, while aligned
-  uint64_t slips = 0;      ///< numbers and stamps disagreed
-  uint64_t unaligned = 0;  ///< frames not used since
+  uint64_t lost = 0;       ///< according to sequence numbers, while aligned
+  uint64_t slips = 0;      ///< disagreements of sequence numbers and stamps
+  uint64_t unaligned = 0;  ///< frames that were not used after a slip
   uint64_t missing = 0;    ///< groups without this camera
 };
 
 struct TriggerGrouperCounts {
   uint64_t complete = 0;
   uint64_t incomplete = 0;
-  uint64_t late = 0;          ///< frames whose group was gone
+  uint64_t late = 0;          ///< frames that arrived after their group was complete or expired
   double max_spread_s = 0.0;  ///< between the stamps of one group
   double mean_spread_s = 0.0;
   std::vector<TriggerCameraCounts> cameras;
 };
 
-/// Groups the frames of cameras that one trigger fires. A frame's number and its stamp must tell the same
-/// story: so many pulses since the camera's last frame. Where they do, frames whose stamps lie within half a
-/// period are of one pulse. Groups come out in order of time, complete ones at once, those that lack a camera
-/// half a period after their first frame came. Their stamp is the earliest of their frames. Not thread safe.
+/// Groups the frames of cameras with a common trigger. The sequence number and the stamp of a frame must
+/// agree on the number of pulses since the camera's previous frame. If they do, frames whose stamps differ by
+/// less than half a period belong to the same pulse. Groups are returned in the order of time: complete ones
+/// at once, others half a period after their first frame. The stamp of a group is the earliest of its frames.
+/// Not thread safe.
 class TriggerGrouper {
  public:
   using Groups = std::vector<std::shared_ptr<const MultiFrame>>;
 
   TriggerGrouper(size_t num_cameras, const TriggerGrouperOptions& options);
 
-  /// Takes one frame at time `now` (of any clock that does not jump); returns the groups that are ready by
-  /// it.
+  /// Adds a frame at time `now` (of any steady clock); returns the groups that became ready.
   Groups add(const CapturedFrame& frame, Timestamp now);
-  /// The groups whose time is over at `now`.
+  /// Returns the groups whose time has expired at `now`.
   Groups expire(Timestamp now);
-  /// When expire() has work to do next.
+  /// Time of the next call to expire(), if any.
   std::optional<Timestamp> nextDeadline() const;
 
   TriggerGrouperCounts counts() const;
@@ -72,7 +67,7 @@ class TriggerGrouper {
     int consistent = 0;
     TriggerCameraCounts counts;
   };
-  /// True when the frame may be grouped.
+  /// Returns true if the frame may be grouped.
   bool align(const CapturedFrame& frame);
   void collect(Groups groups, Groups* ready);
 
@@ -81,7 +76,7 @@ class TriggerGrouper {
   MultiFrameSynchronizer synchronizer_;
   std::vector<Camera> cameras_;
   std::deque<std::pair<Timestamp, Timestamp>> arrivals_;  // now, stamp
-  std::deque<std::pair<Timestamp, Timestamp>> spans_;     // recent stamps: earliest, latest of a pulse
+  std::deque<std::pair<Timestamp, Timestamp>> spans_;     // earliest and latest stamp of recent pulses
   uint64_t num_spreads_ = 0;
   double sum_spread_s_ = 0.0;
   double max_spread_s_ = 0.0;

@@ -21,69 +21,61 @@ inline std::vector<std::string> enumNames<BufferMemory>() {
   return {"mmap", "userptr"};
 }
 
-/// What is asked of every camera.
+/// Configuration of a camera.
 struct V4l2Options {
-  int width_px = 1280;
-  int height_px = 800;
-  double frame_rate_hz = 12.5;  ///< of the trigger; also asked of the camera, where it has a rate
-  std::vector<std::string>
-      pixel_formats;  ///< tried in this order; empty: all that are known, least work first
-  BufferMemory memory = BufferMemory::kMmap;
-  int num_buffers = 4;                ///< frames that the kernel may be ahead
-  std::vector<std::string> controls;  ///< "name=value", by the names that list_cameras prints
+  VCHARGE_BEGIN_OPTIONS(V4l2Options);
+  VCHARGE_OPTION(double, frame_rate_hz, 12.5, above(0.0).upTo(1000.0), "Rate of the trigger and the camera.");
+  VCHARGE_OPTION(std::vector<std::string>, pixel_formats, {}, anyValue(),
+                 "Formats in order of preference; empty: all supported ones, fastest conversion first.");
+  VCHARGE_OPTION(BufferMemory, memory, BufferMemory::kMmap, anyValue(), "Owner of the memory of frames.");
+  VCHARGE_OPTION(std::vector<std::string>, controls, {}, anyValue(),
+                 "Controls to set, as name=value with the names printed by list_cameras.");
+  VCHARGE_END_OPTIONS();
+  void checkFields() const;
 
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("width_px", width_px);
-    visit("height_px", height_px);
-    visit("frame_rate_hz", frame_rate_hz);
-    visit("pixel_formats", pixel_formats);
-    visit("memory", memory);
-    visit("num_buffers", num_buffers);
-    visit("controls", controls);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  cv::Size image_size_px{1280, 800};  ///< set from the rig
 };
 
-/// A control of a camera, menus and buttons left out.
+/// A control of a camera, except menus and buttons.
 struct V4l2Control {
   uint32_t id = 0;
-  std::string name;  ///< as v4l2-ctl writes it: "Exposure Time, Absolute" is exposure_time_absolute
+  std::string name;  ///< in the notation of v4l2-ctl: "Exposure Time, Absolute" is exposure_time_absolute
   int32_t minimum = 0, maximum = 0, step = 0, default_value = 0, value = 0;
 };
 
-/// A frame in the kernel's buffer; valid until it is given back.
+/// A frame in a buffer of the kernel; valid until enqueue().
 struct V4l2Frame {
   uint32_t buffer_index = 0;
   uint32_t sequence = 0;
-  /// Of the kernel's CLOCK_MONOTONIC; at the end of the frame, or at the start of its exposure where the
-  /// driver says so.
+  /// Time of the kernel's CLOCK_MONOTONIC at the end of the frame, or at the start of its exposure, depending
+  /// on the driver.
   Timestamp monotonic_stamp;
-  bool has_kernel_stamp = true;  ///< false: the driver's clock is unknown, the stamp is that of dequeuing
+  bool has_kernel_stamp = true;  ///< false: the driver's clock is unknown, the stamp is that of dequeue()
   bool is_damaged = false;       ///< V4L2_BUF_FLAG_ERROR
   const uint8_t* data = nullptr;
   size_t size_bytes = 0;
 };
 
-/// One V4L2 capture device, opened and streaming. Everything that fails throws InputError
-/// "<device>: <what>: <reason>"; the destructor stops and closes. Not thread safe.
+/// An open, streaming V4L2 capture device. All failures throw InputError "<device>: <what>: <reason>"; the
+/// destructor stops streaming and closes the device. Not thread safe.
 class V4l2Device {
  public:
-  /// Opens, checks that it captures and streams, agrees on format and rate, sets the controls, and starts.
+  /// Opens the device, checks that it captures and streams, negotiates format and rate, sets the controls,
+  /// and starts.
   V4l2Device(const std::string& path, const V4l2Options& options);
   ~V4l2Device();
   V4l2Device(const V4l2Device&) = delete;
   V4l2Device& operator=(const V4l2Device&) = delete;
 
   const std::string& path() const { return path_; }
-  int fileDescriptor() const { return fd_.get(); }  ///< readable (poll) when a frame is there
+  int fileDescriptor() const { return fd_.get(); }  ///< readable (poll) when a frame is available
   PixelFormat pixelFormat() const { return format_; }
   cv::Size size() const { return size_; }
   size_t strideBytes() const { return stride_bytes_; }
 
-  /// Takes the oldest filled buffer. False where none is there (never waits).
+  /// Takes the oldest filled buffer. Returns false if there is none; does not wait.
   bool dequeue(V4l2Frame* frame);
-  /// Gives the frame's buffer back to the kernel.
+  /// Returns the frame's buffer to the kernel.
   void enqueue(const V4l2Frame& frame);
 
   std::vector<V4l2Control> controls() const;
@@ -95,10 +87,10 @@ class V4l2Device {
 
   void checkCapabilities() const;
   void negotiate(const V4l2Options& options);
-  void allocate(const V4l2Options& options);
+  void allocate();
   void start();
   V4l2Control findControl(const std::string& name) const;
-  [[noreturn]] void fail(const std::string& what) const;  // with errno's text
+  [[noreturn]] void fail(const std::string& what) const;  // adds the text of errno
 
   const std::string path_;
   FileDescriptor fd_;
@@ -111,18 +103,18 @@ class V4l2Device {
   bool streaming_ = false;
 };
 
-/// What a device node is and can, for list_cameras.
+/// Description of a device node for list_cameras.
 struct V4l2Description {
   std::string path, card, driver, bus;
   bool captures = false;
   std::vector<std::string>
-      formats;  ///< "GREY 1280x800 (12.5, 25 Hz)", a trailing '*' where it is not understood
+      formats;  ///< "GREY 1280x800 (12.5, 25 Hz)", with a trailing '*' if the driver does not support it
   std::vector<V4l2Control> controls;
 };
 
-/// InputError when it cannot be opened or is no V4L2 device.
+/// Throws InputError if it cannot be opened or is not a V4L2 device.
 V4l2Description describeV4l2Device(const std::string& path);
-/// "name=value" taken apart. InputError for anything else.
+/// Splits "name=value". Throws InputError for anything else.
 std::pair<std::string, int32_t> parseControl(const std::string& text);
 
 }  // namespace vcharge

@@ -11,23 +11,19 @@
 namespace vcharge {
 
 struct V4l2FrameSourceOptions {
-  V4l2Options capture;
-  double timeout_s = 1.0;    ///< a camera silent for longer is opened anew
-  double reconnect_s = 0.5;  ///< between attempts to open a camera
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("capture", capture);
-    visit("timeout_s", timeout_s);
-    visit("reconnect_s", reconnect_s);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(V4l2FrameSourceOptions);
+  VCHARGE_OPTION_GROUP(V4l2Options, capture, {}, "Configuration of every camera.");
+  VCHARGE_OPTION(double, timeout_s, 1.0, above(0.0).upTo(3600.0),
+                 "Time without a frame after which a camera is reopened.");
+  VCHARGE_OPTION(double, reconnect_s, 0.5, above(0.0).upTo(3600.0),
+                 "Time between attempts to open a camera.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// Frames of several V4L2 cameras, all served by the thread that calls run(): it sleeps in poll() until a
-/// frame, a deadline or stop() is there. A camera that cannot be opened, fails or is unplugged is reported in
-/// its status, tried again every reconnect_s, and disturbs no other. Each frame is converted once, from the
-/// kernel's buffer into the sink's memory.
+/// Frames of several V4L2 cameras, all processed by the thread that calls run(): it sleeps in poll() until a
+/// frame, a deadline or stop(). A camera that cannot be opened, fails or is unplugged is reported in its
+/// status and retried periodically, without affecting the others. Each frame is converted once, from the
+/// kernel's buffer to the sink's memory.
 class V4l2FrameSource : public FrameSource {
  public:
   /// `devices`: one path per camera.
@@ -46,13 +42,13 @@ class V4l2FrameSource : public FrameSource {
   void disconnect(Camera* camera, const std::string& reason, Timestamp now);
   void readFrames(size_t index, FrameSink* sink, Timestamp now);
   bool take(size_t index, const V4l2Frame& frame, FrameSink* sink);
-  /// Opens what is due and closes what is silent; returns how long nothing else is due.
+  /// Opens due cameras and closes silent ones; returns the time until the next deadline.
   Duration maintain(Timestamp now);
 
   const V4l2FrameSourceOptions options_;
   ClockMap clock_;
   FileDescriptor wake_;
-  mutable std::mutex mutex_;  // guards the cameras' status
+  mutable std::mutex mutex_;  // protects the cameras' status
   std::vector<std::unique_ptr<Camera>> cameras_;
 };
 

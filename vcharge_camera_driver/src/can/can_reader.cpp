@@ -64,11 +64,11 @@ FileDescriptor openCanSocket(const std::string& interface) {
   }
   ifreq request{};
   if (interface.size() >= sizeof(request.ifr_name)) {
-    throw InputError(interface + ": is no name of a network interface");
+    throw InputError(interface + ": expected the name of a network interface");
   }
   std::strncpy(request.ifr_name, interface.c_str(), sizeof(request.ifr_name) - 1);
   if (ioctl(fd.get(), SIOCGIFINDEX, &request) != 0) {
-    fail("is no CAN interface");
+    fail("is not a CAN interface");
   }
   const can_err_mask_t errors = CAN_ERR_MASK;
   const int on = 1;
@@ -138,7 +138,7 @@ bool CanReader::readFrames(int fd, const TicksCallback& callback) {
       if ((raw.can_id & CAN_RTR_FLAG) != 0) {
         continue;
       }
-      if (status_.bus_off) {  // data again
+      if (status_.bus_off) {  // data was received again
         status_.bus_off = false;
         status_.message = "reading";
       }
@@ -174,7 +174,7 @@ void CanReader::run(const TicksCallback& callback) {
       }
     }
     pollfd waiting[2] = {{wake_.get(), POLLIN, 0},
-                         {bus.get(), POLLIN, 0}};  // poll() skips a descriptor of -1
+                         {bus.get(), POLLIN, 0}};  // poll() ignores a descriptor of -1
     const auto timeout_ms =
         static_cast<int>(std::chrono::duration_cast<std::chrono::milliseconds>(timeout_).count());
     const int ready = poll(waiting, 2, bus ? timeout_ms + 1 : kReconnect_ms);

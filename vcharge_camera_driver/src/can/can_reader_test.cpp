@@ -26,14 +26,14 @@ CanWheelOptions wheels() {
   return options;
 }
 
-// A bus of which the test holds the other end; each open() of the reader makes a new one.
+// A bus whose other end belongs to the test; each open() of the reader creates a new one.
 class Bus {
  public:
   CanReader::Open opener() {
     return [this] {
       const std::lock_guard<std::mutex> lock(mutex_);
       if (!there_) {
-        throw InputError("can0: is no CAN interface");
+        throw InputError("can0: is not a CAN interface");
       }
       int ends[2];
       check(socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) == 0, "no socket pair");
@@ -135,7 +135,7 @@ TEST_F(CanReaderTest, OpensABusAnewThatWasGone) {
   bus_.sendTicks(10, 10);
   waitFor([&] { return received().size() == 1; }, "ticks");
   bus_.setThere(false);
-  waitFor([&] { return reader_.status().message == "can0: is no CAN interface"; }, "its end");
+  waitFor([&] { return reader_.status().message == "can0: is not a CAN interface"; }, "its end");
   bus_.setThere(true);
   waitFor([&] { return reader_.status().connected; }, "the bus again");
   bus_.sendTicks(13, 13);
@@ -160,7 +160,7 @@ TEST_F(CanReaderTest, FuzzedDataNeverCrashesIt) {
   }
   waitFor([&] { return reader_.status().decoded.frames > 10 && reader_.status().bad_frames > 1000; },
           "the fuzz");
-  // Whatever is still in the socket comes before these; a wild counter may have made them a reset.
+  // Frames that are still in the socket precede these; a random counter may have caused a reset.
   const size_t before = received().size();
   bus_.sendTicks(1, 1);
   bus_.sendTicks(2, 2);

@@ -6,14 +6,13 @@ namespace vcharge {
 namespace {
 
 constexpr int kMaxStandardId = 0x7ff;
-constexpr int kMaxExtendedId = 0x1fffffff;
 constexpr int kMaxBits = 64;
-constexpr double kMaxIntegration_s = 0.5;           // a speed is not believed for longer
-constexpr double kSlackTicks = 4.0;                 // of stamps that are a little off
-constexpr double kMaxAcceleration_m_per_s2 = 50.0;  // of a wheel that begins to spin
+constexpr double kMaxIntegration_s = 0.5;           // longest interval over which a speed is integrated
+constexpr double kSlackTicks = 4.0;                 // tolerance for inaccurate stamps
+constexpr double kMaxAcceleration_m_per_s2 = 50.0;  // of a wheel that starts to spin
 
-// Index of the i-th bit (0 the lowest) of a big endian signal that starts at its highest: the bits of a byte
-// from the highest to the lowest, then those of the next byte.
+// Index of the i-th bit (0 is the lowest) of a big endian signal that starts at its highest bit: the bits of
+// a byte from highest to lowest, then those of the next byte.
 int bigEndianBit(const CanSignal& signal, int i) {
   const int from_top = signal.length - 1 - i;
   const int position = 8 * (signal.start_bit / 8) + (7 - signal.start_bit % 8) + from_top;
@@ -27,13 +26,11 @@ int lastByte(const CanSignal& signal) {
 
 }  // namespace
 
-void CanSignal::validate() const {
+void CanSignal::checkFields() const {
   if (!isUsed()) {
     return;
   }
-  requireField(id <= kMaxExtendedId, "id", "must be at most 0x1fffffff", id);
-  requireField(length >= 1 && length <= kMaxBits, "length", "must be in [1, 64]", length);
-  requireField(start_bit >= 0 && start_bit < kMaxBits, "start_bit", "must be in [0, 63]", start_bit);
+  requireField(length >= 1, "length", "must be in [1, 64]", length);
   requireField(lastByte(*this) < 8, "length", "the signal must end within 8 bytes", length);
   requireField(std::isfinite(scale) && scale != 0.0, "scale", "must be finite and not 0", scale);
   requireField(std::isfinite(offset), "offset", "must be finite", offset);
@@ -68,37 +65,29 @@ std::optional<double> CanSignal::value(const CanFrame& frame) const {
   return number * scale + offset;
 }
 
-void CanWheelOptions::validate() const {
-  validateInner("left_ticks", left_ticks);
-  validateInner("right_ticks", right_ticks);
-  validateInner("left_speed_m_per_s", left_speed_m_per_s);
-  validateInner("right_speed_m_per_s", right_speed_m_per_s);
-  validateInner("backwards", backwards);
-  validateInner("steering_angle_rad", steering_angle_rad);
+void CanWheelOptions::checkFields() const {
   const bool ticks = left_ticks.isUsed() && right_ticks.isUsed();
   const bool speeds = left_speed_m_per_s.isUsed() && right_speed_m_per_s.isUsed();
   const bool some_ticks = left_ticks.isUsed() || right_ticks.isUsed();
   const bool some_speeds = left_speed_m_per_s.isUsed() || right_speed_m_per_s.isUsed();
-  if (ticks == speeds || some_ticks != ticks || some_speeds != speeds) {
+  if ((ticks && speeds) || some_ticks != ticks || some_speeds != speeds) {
     throw std::invalid_argument(
         "left_ticks: both wheels must have a message, either with ticks or with speeds; its id is " +
         std::to_string(left_ticks.id));
   }
   for (const CanSignal* signal : {&left_ticks, &right_ticks}) {
-    requireField(!signal->isUsed() || signal->length <= 32, "left_ticks.length",
-                 "counters have at most 32 bits", signal->length);
+    requireField(signal->length <= 32, "left_ticks.length", "counters have at most 32 bits", signal->length);
     requireField(signal->scale == 1.0 && signal->offset == 0.0, "left_ticks.scale",
                  "counters are not scaled (metres_per_tick does that)", signal->scale);
   }
-  requireField(std::isfinite(metres_per_tick) && metres_per_tick > 0.0, "metres_per_tick", "must be positive",
-               metres_per_tick);
-  requireField(std::isfinite(max_speed_m_per_s) && max_speed_m_per_s > 0.0, "max_speed_m_per_s",
-               "must be positive", max_speed_m_per_s);
 }
 
 CanWheelDecoder::CanWheelDecoder(const CanWheelOptions& options)
     : options_(options), metres_per_tick_(options.hasTicks() ? options.metres_per_tick : kSpeedTick_m) {
   options.validate();
+  if (!options.isUsed()) {
+    throw std::invalid_argument("left_ticks: expected a message with ticks or speeds");
+  }
   left_.signal = options_.hasTicks() ? &options_.left_ticks : &options_.left_speed_m_per_s;
   left_.speed_error_m_per_s = right_.speed_error_m_per_s = options_.max_speed_m_per_s;
   right_.signal = options_.hasTicks() ? &options_.right_ticks : &options_.right_speed_m_per_s;
@@ -106,8 +95,8 @@ CanWheelDecoder::CanWheelDecoder(const CanWheelOptions& options)
 
 void CanWheelDecoder::count(uint64_t raw, Timestamp stamp, Wheel* wheel) {
   if (wheel->raw) {
-    // Of all changes that the counter's bits allow, the one nearest to what the last speed makes expected;
-    // how far it may be from that is known, hence whether it is the only one.
+    // Chooses, among all changes that the counter's bits allow, the one closest to the prediction from the
+    // last speed. The prediction's maximum error tells whether it is the only one.
     const double elapsed_s = std::max(0.0, toSeconds(stamp - wheel->stamp));
     const double tick_m = options_.metres_per_tick;
     const auto range = static_cast<double>(int64_t{1} << wheel->signal->length);

@@ -28,10 +28,11 @@ CanFrame frameOf(uint32_t id, std::array<uint8_t, 8> data, uint8_t size = 8) {
 CanWheelOptions ticksOptions() {
   CanWheelOptions options;
   readFields(
-      YAML::Load("{left_ticks: {id: 0x1a0, start_bit: 0, length: 10}, "
-                 "right_ticks: {id: 0x1a0, start_bit: 16, length: 10}, "
-                 "steering_angle_rad: {id: 0x0c2, start_bit: 7, length: 16, endianness: big, signed: true, "
-                 "scale: 0.0001}, metres_per_tick: 0.02}"),
+      YAML::Load(
+          "{left_ticks: {id: 0x1a0, start_bit: 0, length: 10}, "
+          "right_ticks: {id: 0x1a0, start_bit: 16, length: 10}, "
+          "steering_angle_rad: {id: 0x0c2, start_bit: 7, length: 16, endianness: big, is_signed: true, "
+          "scale: 0.0001}, metres_per_tick: 0.02}"),
       "can.yaml", &options);
   return options;
 }
@@ -117,7 +118,7 @@ TEST(CanWheelDecoderTest, CountersWrapForwardsAndBackwards) {
     left += 11;
     right -= 7;
   }
-  EXPECT_EQ(decoder.counts().wraps, 6u + 4u);  // 1000 + 499 x 11 and 5 - 499 x 7, in turns of 1024
+  EXPECT_EQ(decoder.counts().wraps, 6u + 4u);  // 1000 + 499 x 11 and 5 - 499 x 7, modulo 1024
   EXPECT_EQ(decoder.counts().resets, 0u);
 }
 
@@ -142,7 +143,7 @@ TEST(CanWheelDecoderTest, AResetOfTheCountersIsNoMotion) {
   const auto after = decoder.add(ticksFrame(0, 0), at(0.04));
   EXPECT_EQ(after->left_ticks, 10);
   EXPECT_EQ(decoder.counts().resets, 2u);
-  // Silent for longer than a counter at full speed takes to wrap: nobody knows how far the car went.
+  // The silence is longer than a counter at full speed needs to wrap, so the distance is unknown.
   const auto later = decoder.add(ticksFrame(20, 20), at(60.0));
   EXPECT_EQ(later->left_ticks, 10);
   EXPECT_EQ(decoder.counts().resets, 4u);
@@ -179,7 +180,8 @@ TEST(CanWheelDecoderTest, IntegratesSpeeds) {
              "can.yaml", &options);
   CanWheelDecoder decoder(options);
   std::optional<WheelTicks> ticks;
-  for (int i = 0; i <= 500; ++i) {  // 10 s: the left wheel accelerates by 0.5 m/s^2, the right one goes 3 m/s
+  // 10 s: the left wheel accelerates by 0.5 m/s^2, the right one moves at 3 m/s
+  for (int i = 0; i <= 500; ++i) {
     const int left = i;
     ticks = decoder.add(frameOf(1, {static_cast<uint8_t>(left & 255), static_cast<uint8_t>(left >> 8),
                                     300 & 255, 1, 0, 0, 0, 0}),
@@ -194,7 +196,7 @@ TEST(CanWheelDecoderTest, FuzzedFramesNeverCrashItNorMoveTheCarFasterThanItCan) 
   CanWheelDecoder decoder(ticksOptions());
   double time_s = 0.0;
   std::optional<WheelTicks> last;
-  double forwards_s = 0.0;  // since the last ticks, as are the frames
+  double forwards_s = 0.0;  // since the last ticks
   int num_frames = 0;
   for (int i = 0; i < 20000; ++i) {
     CanFrame frame;

@@ -5,7 +5,7 @@
 namespace vcharge {
 namespace {
 
-// Two clocks that a test turns on by hand.
+// Two clocks set by the test.
 struct Clocks {
   Timestamp monotonic = Timestamp::fromSeconds(100.0);
   Timestamp drive = Timestamp::fromSeconds(1000.0);
@@ -33,7 +33,7 @@ TEST(ClockMapTest, FollowsASlewedClockWithinAMicrosecondAndNoFasterThanItMay) {
     EXPECT_LT(std::abs(toSeconds(map.toDriveTime(clocks.monotonic) - clocks.drive)), 1e-6);
   }
   const Timestamp before = map.toDriveTime(clocks.monotonic);
-  clocks.drive = clocks.drive + durationFromSeconds(0.009);  // below a step: taken bit by bit
+  clocks.drive = clocks.drive + durationFromSeconds(0.009);  // smaller than a step: followed gradually
   clocks.advance(1.0);
   map.update();
   EXPECT_LE(toSeconds(map.toDriveTime(clocks.monotonic) - before), 1.0 + ClockMap::kMaxSlew + 1e-9);
@@ -53,7 +53,7 @@ TEST(ClockMapTest, TakesAStepAtOnceAndCountsIt) {
 TEST(ClockMapTest, TakesTheTightestOfItsReadings) {
   Timestamp monotonic = Timestamp::fromSeconds(0.0);
   int reading = 0;
-  // The clocks agree; reading the drive's takes 1 ms, but once 10 us.
+  // The clocks agree; a reading of the drive's clock takes 1 ms, but once 10 us.
   const ClockMap map(
       [&] {
         const Timestamp value = monotonic;

@@ -9,12 +9,12 @@
 #include <stdexcept>
 #include <string>
 
-/// CPU time of the emulated hardware's thread in this process, up to its last turn.
+/// CPU time of the emulated hardware's thread in this process.
 extern "C" double vchargeEmulatorCpuSeconds();
 
 namespace vcharge {
 
-/// A folder in which files stand for the device nodes of emulated cameras (emulator/v4l2_emulator.cpp).
+/// A folder whose files represent the device nodes of emulated cameras (emulator/v4l2_emulator.cpp).
 class EmulatedCameras {
  public:
   EmulatedCameras() {
@@ -37,7 +37,7 @@ class EmulatedCameras {
   std::string plug(int number, const std::string& config) const {
     const std::string temporary = (folder_ / "new").string();
     std::ofstream(temporary) << config;
-    std::filesystem::rename(temporary, path(number));  // appears as a whole
+    std::filesystem::rename(temporary, path(number));  // so that the file appears complete
     return path(number);
   }
   void unplug(int number) const { std::filesystem::remove(path(number)); }
@@ -46,7 +46,7 @@ class EmulatedCameras {
   std::filesystem::path folder_;
 };
 
-/// The trigger pulse's number that the emulator wrote into a frame's first pixels.
+/// Number of the trigger pulse that the emulator encoded in a frame's first pixels.
 template <class Mat>
 uint64_t pulseIn(const Mat& gray) {
   uint64_t pulse = 0;

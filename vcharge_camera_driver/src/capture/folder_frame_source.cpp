@@ -68,7 +68,7 @@ FolderFrameSource::FolderFrameSource(const std::string& folder, std::vector<std:
     if (files_.size() == before) {
       throw InputError(path.string() + ": expected images STAMP_NS.png, found none");
     }
-    state_->status.push_back({path.string(), false, "not begun yet"});
+    state_->status.push_back({path.string(), false, "not started yet"});
   }
   std::sort(files_.begin(), files_.end(), [](const File& a, const File& b) {
     return std::make_pair(a.stamp_ns, a.camera_index) < std::make_pair(b.stamp_ns, b.camera_index);

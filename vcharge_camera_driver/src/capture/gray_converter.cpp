@@ -19,7 +19,7 @@ struct FormatRule {
   uint32_t fourcc;
   const char* name;
   int bytes_per_pixel;  // 0: compressed
-  int bayer_to_gray;    // OpenCV's conversion; OpenCV names a pattern by the pixels 1 and 2 of its second row
+  int bayer_to_gray;    // OpenCV's conversion; OpenCV names a pattern after pixels 1 and 2 of its second row
 };
 
 constexpr std::array<FormatRule, 11> kRules = {{
@@ -45,14 +45,14 @@ const FormatRule& ruleOf(PixelFormat format) {
   throw std::logic_error("unknown pixel format");
 }
 
-// One of two bytes, of every pixel.
+// Takes one of the two bytes of every pixel.
 void takeEverySecondByte(const uint8_t* row, int first, int width, uint8_t* out) {
   for (int x = 0; x < width; ++x) {
     out[x] = row[2 * x + first];
   }
 }
 
-// The upper 8 of `bits` bits.
+// Takes the upper 8 of `bits` bits.
 void takeUpperBits(const uint8_t* row, int bits, int width, uint8_t* out) {
   for (int x = 0; x < width; ++x) {
     const int value = (row[2 * x] | (row[2 * x + 1] << 8)) >> (bits - 8);
@@ -124,7 +124,7 @@ struct GrayConverter::Jpeg {
       return "a JPEG of " + std::to_string(width) + "x" + std::to_string(height) + " pixels where " +
              std::to_string(gray->cols) + "x" + std::to_string(gray->rows) + " were agreed";
     }
-    // A warning is a damaged picture: of a camera's frame nothing is kept then.
+    // A warning means a damaged image, which is dropped as a whole.
     if (tjDecompress2(handle, data, size_bytes, gray->data, width, static_cast<int>(gray->step), height,
                       TJPF_GRAY, TJFLAG_STOPONWARNING) != 0) {
       return std::string("a damaged JPEG: ") + tjGetErrorStr2(handle);
@@ -149,7 +149,7 @@ std::string GrayConverter::convert(PixelFormat format, const uint8_t* data, size
     }
     std::string problem = jpeg_->decode(data, size_bytes, gray);
     if (!problem.empty()) {
-      jpeg_.reset();  // after some errors a decoder goes on in the middle of the next picture
+      jpeg_.reset();  // after some errors, a decoder would continue in the middle of the next image
     }
     return problem;
   }
@@ -161,7 +161,7 @@ std::string GrayConverter::convert(PixelFormat format, const uint8_t* data, size
     return std::to_string(size_bytes) + " bytes, expected " + std::to_string(needed);
   }
   if (rule.bayer_to_gray >= 0) {
-    // cvtColor() only reads its source.
+    // cvtColor() does not modify its source.
     const cv::Mat mosaic(gray->rows, gray->cols, CV_8UC1, const_cast<uint8_t*>(data), stride_bytes);
     cv::cvtColor(mosaic, *gray, rule.bayer_to_gray);
     return "";

@@ -42,8 +42,8 @@ cv::Mat blank() {
 TEST(GrayConverterTest, TakesTheLuminanceOfEveryFormatWithRowsThatArePadded) {
   struct Case {
     PixelFormat format;
-    int low_shift;  // of the value in a pixel's bytes
-    int offset;     // of the luminance byte, for formats with colour
+    int low_shift;  // shift of the value in a pixel's bytes
+    int offset;     // offset of the luminance byte in formats with colour
   };
   for (const Case& c :
        {Case{PixelFormat::kGrey, 0, 0}, Case{PixelFormat::kY10, 2, 0}, Case{PixelFormat::kY12, 4, 0},
@@ -80,9 +80,9 @@ TEST(GrayConverterTest, TakesTheLuminanceOfEveryFormatWithRowsThatArePadded) {
 TEST(GrayConverterTest, WeighsTheColoursOfABayerPattern) {
   struct Case {
     PixelFormat format;
-    const char* colours;  // of the first two rows
+    const char* colours;  // colours of the first two rows
   };
-  // ITU-R BT.601.
+  // Luminance of ITU-R BT.601.
   const auto expected = [](double r, double g, double b) { return 0.299 * r + 0.587 * g + 0.114 * b; };
   for (const Case& c : {Case{PixelFormat::kBggr8, "BGGR"}, Case{PixelFormat::kGbrg8, "GBRG"},
                         Case{PixelFormat::kGrbg8, "GRBG"}, Case{PixelFormat::kRggb8, "RGGB"}}) {

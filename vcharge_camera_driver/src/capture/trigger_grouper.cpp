@@ -10,7 +10,7 @@ namespace vcharge {
 namespace {
 
 constexpr double kToleranceInPeriods = 0.5;
-// Over more pulses than this a rate that is not quite the nominal one could miscount them.
+// Over more pulses, a small deviation from the nominal rate could cause a miscount.
 constexpr int64_t kMaxPulsesBetweenFrames = 100;
 constexpr size_t kRecentSpans = 16;
 
@@ -24,12 +24,6 @@ MultiFrameSynchronizerOptions synchronizerOptions(const TriggerGrouperOptions& o
 
 }  // namespace
 
-void TriggerGrouperOptions::validate() const {
-  requireField(std::isfinite(frame_rate_hz) && frame_rate_hz > 0.0 && frame_rate_hz <= 1000.0,
-               "frame_rate_hz", "must be in (0, 1000]", frame_rate_hz);
-  requireField(realign_frames >= 1, "realign_frames", "must be at least 1", realign_frames);
-}
-
 TriggerGrouper::TriggerGrouper(size_t num_cameras, const TriggerGrouperOptions& options)
     : options_(options),
       period_(durationFromSeconds(1.0 / options.frame_rate_hz)),
@@ -41,7 +35,7 @@ bool TriggerGrouper::align(const CapturedFrame& frame) {
   Camera& camera = cameras_[frame.camera_index];
   ++camera.counts.frames;
   if (camera.sequence) {
-    // The difference of unsigned numbers is right across their wrap-around.
+    // The difference of unsigned numbers is correct across their wrap-around.
     const auto by_number = static_cast<int64_t>(frame.sequence - *camera.sequence);
     const auto by_stamp =
         static_cast<int64_t>(std::llround(toSeconds(frame.stamp - camera.stamp) * options_.frame_rate_hz));

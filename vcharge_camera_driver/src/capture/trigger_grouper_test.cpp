@@ -33,13 +33,14 @@ struct Arrival {
   CapturedFrame frame;
 };
 
-// What a camera does at each pulse.
+// Faults of a camera.
 struct CameraFaults {
-  double jitter_periods = 0.0;  // of the stamps, to either side
+  double jitter_periods = 0.0;  // largest error of the stamps
   double loses = 0.0;           // probability that a frame is lost between camera and driver
-  double misses = 0.0;          // that the camera does not see a pulse
-  double delays = 0.0;          // that it begins to be late by a frame, stamp and all, for up to 5 frames
-  double resets = 0.0;          // that it starts counting anew
+  double misses = 0.0;          // probability that the camera misses a pulse
+  // probability that its frames and stamps start to be late by one pulse, for up to 5 frames
+  double delays = 0.0;
+  double resets = 0.0;  // probability that its sequence numbers restart
 };
 
 std::vector<Arrival> simulate(int num_pulses, const CameraFaults& faults, uint32_t seed) {
@@ -69,7 +70,7 @@ std::vector<Arrival> simulate(int num_pulses, const CameraFaults& faults, uint32
       Arrival arrival;
       const double delay_s = late_frames > 0 ? kPeriod_s : 0.0;
       arrival.frame = {camera, sequence, at(pulse * kPeriod_s + jitter_s + delay_s), imageOf(pulse)};
-      // A camera's frames come in order.
+      // Frames of a camera arrive in order.
       arrival.when = std::max(arrival.frame.stamp + durationFromSeconds(transfer_s),
                               last_arrival + durationFromSeconds(1e-6));
       last_arrival = arrival.when;
@@ -81,7 +82,7 @@ std::vector<Arrival> simulate(int num_pulses, const CameraFaults& faults, uint32
   return arrivals;
 }
 
-// Feeds the frames as a driver does, which wakes at each deadline. Checks all that must hold of every group.
+// Feeds the frames like a driver that wakes up at each deadline, and checks all properties of every group.
 struct GroupingRun {
   int complete = 0;
   int incomplete = 0;
@@ -137,9 +138,9 @@ TEST(TriggerGrouperTest, GroupsEveryPulseOfFaultlessCamerasOnceTheyAgree) {
 TEST(TriggerGrouperTest, EveryPublishedGroupIsRightWhateverTheCamerasDo) {
   const std::vector<CameraFaults> all = {
       {0.2, 0.03, 0.0, 0.0, 0.0},         // jitter and lost frames
-      {0.2, 0.0, 0.004, 0.0, 0.0},        // pulses that a camera misses
-      {0.1, 0.0, 0.0, 0.004, 0.0},        // one camera late by a frame
-      {0.1, 0.0, 0.0, 0.0, 0.002},        // numbers that start anew
+      {0.2, 0.0, 0.004, 0.0, 0.0},        // pulses missed by a camera
+      {0.1, 0.0, 0.0, 0.004, 0.0},        // a camera late by one frame
+      {0.1, 0.0, 0.0, 0.0, 0.002},        // restarting sequence numbers
       {0.2, 0.02, 0.001, 0.001, 0.0005},  // all of them
   };
   for (size_t i = 0; i < all.size(); ++i) {
@@ -169,7 +170,7 @@ TEST(TriggerGrouperTest, ACameraThatIsGoneDelaysTheOthersByHalfAPeriodAtMost) {
   const GroupingRun run(arrivals, 0.05);  // checks the delay of each group
   EXPECT_EQ(run.wrong, 0);
   EXPECT_EQ(run.complete, 95);
-  EXPECT_GE(run.incomplete, 99);  // the last one's time is not over
+  EXPECT_GE(run.incomplete, 99);  // the last group has not expired yet
   EXPECT_EQ(run.counts.cameras[2].missing, static_cast<uint64_t>(run.incomplete));
   EXPECT_EQ(run.counts.cameras[0].missing, 0u);
 }

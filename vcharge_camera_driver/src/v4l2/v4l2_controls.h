@@ -6,7 +6,7 @@
 
 namespace vcharge {
 
-/// The controls of an open device that hold a number, a truth value or a choice, with their values.
+/// Integer, boolean and menu controls of an open device with their values.
 std::vector<V4l2Control> listControls(int fd);
 
 }  // namespace vcharge

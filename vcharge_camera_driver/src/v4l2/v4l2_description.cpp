@@ -19,7 +19,7 @@ std::string textOf(const __u8 (&field)[kSize]) {
   return std::string(text, strnlen(text, kSize));
 }
 
-// As v4l2-ctl does: letters and digits, anything between them an underscore.
+// Letters and digits, with an underscore for anything between them, like v4l2-ctl.
 std::string controlName(const std::string& title) {
   std::string name;
   bool gap = false;
@@ -85,7 +85,7 @@ std::vector<V4l2Control> listControls(int fd) {
   std::vector<V4l2Control> controls;
   v4l2_queryctrl query{};
   query.id = V4L2_CTRL_FLAG_NEXT_CTRL;
-  // Drivers list a few dozen; the limit ends a list that a broken one never does.
+  // Drivers list a few dozen; the limit ends the endless list of a broken driver.
   for (int i = 0; i < 1024 && v4l2Ioctl(fd, VIDIOC_QUERYCTRL, &query) == 0; ++i) {
     const bool has_value = query.type == V4L2_CTRL_TYPE_INTEGER || query.type == V4L2_CTRL_TYPE_BOOLEAN ||
                            query.type == V4L2_CTRL_TYPE_MENU || query.type == V4L2_CTRL_TYPE_INTEGER_MENU;
@@ -111,7 +111,7 @@ V4l2Description describeV4l2Device(const std::string& path) {
   const FileDescriptor fd(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
   v4l2_capability capability{};
   if (!fd || v4l2Ioctl(fd.get(), VIDIOC_QUERYCAP, &capability) != 0) {
-    throw InputError(path + ": " + (fd ? "is no V4L2 device: " : "cannot be opened: ") +
+    throw InputError(path + ": " + (fd ? "is not a V4L2 device: " : "cannot be opened: ") +
                      std::strerror(errno));
   }
   V4l2Description description;
@@ -138,7 +138,7 @@ std::pair<std::string, int32_t> parseControl(const std::string& text) {
     if (equals > 0 && used == number.size()) {
       return {text.substr(0, equals), value};
     }
-  } catch (const std::logic_error&) {  // no number, or too large: told below
+  } catch (const std::logic_error&) {  // not a number, or too large: reported below
   }
   throw InputError("expected 'name=whole number', got '" + text + "'");
 }

@@ -17,7 +17,8 @@
 namespace vcharge {
 namespace {
 
-constexpr int kMaxSide_px = 16384;
+/// Frames that the kernel may be ahead.
+constexpr uint32_t kNumBuffers = 4;
 constexpr long kPageBytes = 4096;
 
 bool hasFlag(uint32_t flags, uint32_t flag) {
@@ -30,12 +31,7 @@ std::string sizeText(uint32_t width, uint32_t height) {
 
 }  // namespace
 
-void V4l2Options::validate() const {
-  requireField(width_px >= 1 && width_px <= kMaxSide_px, "width_px", "must be in [1, 16384]", width_px);
-  requireField(height_px >= 1 && height_px <= kMaxSide_px, "height_px", "must be in [1, 16384]", height_px);
-  requireField(std::isfinite(frame_rate_hz) && frame_rate_hz > 0.0 && frame_rate_hz <= 1000.0,
-               "frame_rate_hz", "must be in (0, 1000]", frame_rate_hz);
-  requireField(num_buffers >= 2 && num_buffers <= 32, "num_buffers", "must be in [2, 32]", num_buffers);
+void V4l2Options::checkFields() const {
   const std::vector<std::string> known = pixelFormatNames();
   for (const std::string& name : pixel_formats) {
     if (std::find(known.begin(), known.end(), name) == known.end()) {
@@ -51,7 +47,7 @@ void V4l2Options::validate() const {
   }
 }
 
-// Memory of one frame: mapped from the kernel, or of this process.
+// Memory of one frame, mapped from the kernel or allocated by this process.
 struct V4l2Device::Buffer {
   Buffer(void* start, size_t size, bool mapped) : data(start), size_bytes(size), is_mapped(mapped) {}
   ~Buffer() {
@@ -81,14 +77,14 @@ V4l2Device::V4l2Device(const std::string& path, const V4l2Options& options)
     const auto [name, value] = parseControl(text);
     setControl(name, value);
   }
-  allocate(options);
+  allocate();
   start();
 }
 
 V4l2Device::~V4l2Device() {
   if (streaming_) {
     int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-    v4l2Ioctl(fd_.get(), VIDIOC_STREAMOFF, &type);  // of an unplugged camera it fails: nothing to do then
+    v4l2Ioctl(fd_.get(), VIDIOC_STREAMOFF, &type);  // fails for an unplugged camera, which needs no stop
   }
 }
 
@@ -99,12 +95,12 @@ void V4l2Device::fail(const std::string& what) const {
 void V4l2Device::checkCapabilities() const {
   v4l2_capability capability{};
   if (v4l2Ioctl(fd_.get(), VIDIOC_QUERYCAP, &capability) != 0) {
-    fail("is no V4L2 device");
+    fail("is not a V4L2 device");
   }
   const uint32_t flags = hasFlag(capability.capabilities, V4L2_CAP_DEVICE_CAPS) ? capability.device_caps
                                                                                 : capability.capabilities;
   if (!hasFlag(flags, V4L2_CAP_VIDEO_CAPTURE)) {
-    throw InputError(path_ + ": is no (single-planar) video capture device");
+    throw InputError(path_ + ": is not a (single-planar) video capture device");
   }
   if (!hasFlag(flags, V4L2_CAP_STREAMING)) {
     throw InputError(path_ + ": cannot stream");
@@ -130,30 +126,32 @@ void V4l2Device::negotiate(const V4l2Options& options) {
     }
     v4l2_format request{};
     request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-    request.fmt.pix.width = static_cast<uint32_t>(options.width_px);
-    request.fmt.pix.height = static_cast<uint32_t>(options.height_px);
+    request.fmt.pix.width = static_cast<uint32_t>(options.image_size_px.width);
+    request.fmt.pix.height = static_cast<uint32_t>(options.image_size_px.height);
     request.fmt.pix.pixelformat = fourccOf(format);
     request.fmt.pix.field = V4L2_FIELD_NONE;
     if (v4l2Ioctl(fd_.get(), VIDIOC_S_FMT, &request) != 0) {
       refused += "; " + name + ": " + std::strerror(errno);
       continue;
     }
-    // A driver answers with the nearest that it can do.
+    // The driver answers with the nearest supported format.
     const v4l2_pix_format& answer = request.fmt.pix;
-    if (answer.pixelformat != fourccOf(format) || answer.width != static_cast<uint32_t>(options.width_px) ||
-        answer.height != static_cast<uint32_t>(options.height_px)) {
+    if (answer.pixelformat != fourccOf(format) ||
+        answer.width != static_cast<uint32_t>(options.image_size_px.width) ||
+        answer.height != static_cast<uint32_t>(options.image_size_px.height)) {
       refused += "; " + name + ": offers " + fourccText(answer.pixelformat) + " " +
                  sizeText(answer.width, answer.height);
       continue;
     }
     format_ = format;
-    size_ = cv::Size(options.width_px, options.height_px);
-    stride_bytes_ = std::max<size_t>(answer.bytesperline, bytesPerRow(format, options.width_px));
-    image_bytes_ = std::max<size_t>(answer.sizeimage, stride_bytes_ * static_cast<size_t>(options.height_px));
+    size_ = options.image_size_px;
+    stride_bytes_ = std::max<size_t>(answer.bytesperline, bytesPerRow(format, options.image_size_px.width));
+    image_bytes_ =
+        std::max<size_t>(answer.sizeimage, stride_bytes_ * static_cast<size_t>(options.image_size_px.height));
     if (image_bytes_ == 0) {
-      throw InputError(path_ + ": the driver tells no size of its images");
+      throw InputError(path_ + ": the driver reports no image size");
     }
-    v4l2_streamparm rate{};  // best effort: a triggered camera may have none
+    v4l2_streamparm rate{};  // best effort: a triggered camera may have no rate
     rate.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     rate.parm.capture.timeperframe = {1000,
                                       static_cast<uint32_t>(std::lround(1000.0 * options.frame_rate_hz))};
@@ -164,20 +162,20 @@ void V4l2Device::negotiate(const V4l2Options& options) {
   for (const uint32_t fourcc : offered) {
     names += (names.empty() ? "" : ", ") + fourccText(fourcc);
   }
-  throw InputError(
-      path_ + ": no agreement on " +
-      sizeText(static_cast<uint32_t>(options.width_px), static_cast<uint32_t>(options.height_px)) +
-      " pixels in a format that is understood and asked for; the camera has " +
-      (names.empty() ? "none" : names) + refused);
+  throw InputError(path_ + ": no agreement on " +
+                   sizeText(static_cast<uint32_t>(options.image_size_px.width),
+                            static_cast<uint32_t>(options.image_size_px.height)) +
+                   " pixels in a supported and requested format; the camera has " +
+                   (names.empty() ? "none" : names) + refused);
 }
 
-void V4l2Device::allocate(const V4l2Options& options) {
+void V4l2Device::allocate() {
   v4l2_requestbuffers request{};
-  request.count = static_cast<uint32_t>(options.num_buffers);
+  request.count = kNumBuffers;
   request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   request.memory = memory_ == BufferMemory::kMmap ? V4L2_MEMORY_MMAP : V4L2_MEMORY_USERPTR;
   if (v4l2Ioctl(fd_.get(), VIDIOC_REQBUFS, &request) != 0) {
-    fail("gives no buffers (memory: " + enumNames<BufferMemory>()[static_cast<size_t>(memory_)] + ")");
+    fail("provides no buffers (memory: " + enumNames<BufferMemory>()[static_cast<size_t>(memory_)] + ")");
   }
   if (request.count < 2) {
     throw InputError(path_ + ": gives " + std::to_string(request.count) + " buffers, needed are 2");
@@ -195,7 +193,7 @@ void V4l2Device::allocate(const V4l2Options& options) {
     buffer.memory = V4L2_MEMORY_MMAP;
     buffer.index = i;
     if (v4l2Ioctl(fd_.get(), VIDIOC_QUERYBUF, &buffer) != 0) {
-      fail("does not tell where buffer " + std::to_string(i) + " is");
+      fail("does not report the location of buffer " + std::to_string(i) + " is");
     }
     void* start =
         mmap(nullptr, buffer.length, PROT_READ | PROT_WRITE, MAP_SHARED, fd_.get(), buffer.m.offset);
@@ -230,7 +228,7 @@ bool V4l2Device::dequeue(V4l2Frame* frame) {
     fail("gives no frame");
   }
   if (buffer.index >= buffers_.size()) {
-    throw InputError(path_ + ": gives a buffer " + std::to_string(buffer.index) + " that it does not have");
+    throw InputError(path_ + ": returns a buffer " + std::to_string(buffer.index) + " that it does not have");
   }
   const Buffer& memory = *buffers_[buffer.index];
   frame->buffer_index = buffer.index;

@@ -16,20 +16,13 @@ constexpr Duration kClockPeriod = std::chrono::seconds(1);
 constexpr Duration kLongestWait = std::chrono::seconds(1);
 
 int toPollTimeout(Duration wait) {
-  // Rounded up: woken a moment too early, the loop would turn until the moment comes.
+  // Rounded up: waking up a moment too early would cause a busy loop until the deadline.
   const auto milliseconds =
       std::chrono::ceil<std::chrono::milliseconds>(std::clamp(wait, Duration(0), kLongestWait));
   return static_cast<int>(milliseconds.count());
 }
 
 }  // namespace
-
-void V4l2FrameSourceOptions::validate() const {
-  validateInner("capture", capture);
-  requireField(std::isfinite(timeout_s) && timeout_s > 0.0, "timeout_s", "must be positive", timeout_s);
-  requireField(std::isfinite(reconnect_s) && reconnect_s > 0.0, "reconnect_s", "must be positive",
-               reconnect_s);
-}
 
 struct V4l2FrameSource::Camera {
   std::unique_ptr<V4l2Device> device;
@@ -124,7 +117,7 @@ bool V4l2FrameSource::take(size_t index, const V4l2Frame& frame, FrameSink* sink
                                        camera.device->strideBytes(), &captured.image.pixels);
   }
   const std::string format = toString(camera.device->pixelFormat());
-  camera.device->enqueue(frame);  // before the sink works with the image: the camera needs its buffers
+  camera.device->enqueue(frame);  // before the sink processes the image, since the camera needs its buffers
 
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -135,7 +128,7 @@ bool V4l2FrameSource::take(size_t index, const V4l2Frame& frame, FrameSink* sink
     }
     status.message = problem.empty() ? "streaming " + format +
                                            (frame.has_kernel_stamp ? "" : ", without the kernel's stamps")
-                                     : status.device + ": a frame is bad: " + problem;
+                                     : status.device + ": bad frame: " + problem;
   }
   camera.last_sequence = frame.sequence;
   if (problem.empty()) {

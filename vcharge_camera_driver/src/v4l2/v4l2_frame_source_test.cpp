@@ -22,8 +22,7 @@ constexpr auto kPatience = std::chrono::seconds(30);
 
 V4l2FrameSourceOptions smallImages() {
   V4l2FrameSourceOptions options;
-  options.capture.width_px = 320;
-  options.capture.height_px = 240;
+  options.capture.image_size_px = {320, 240};
   options.capture.frame_rate_hz = 50.0;
   options.timeout_s = 0.3;
   options.reconnect_s = 0.05;
@@ -31,7 +30,7 @@ V4l2FrameSourceOptions smallImages() {
 }
 const char* const kSmall = "width=320\nheight=240\nrate_hz=50\nexposure_us=1000\nreadout_us=2000\n";
 
-// Groups what comes and keeps the groups' numbers.
+// Groups frames and records the numbers of the groups.
 class GroupingSink : public FrameSink {
  public:
   GroupingSink(size_t num_cameras, double frame_rate_hz) : grouper_(num_cameras, {frame_rate_hz, 3}) {}
@@ -58,7 +57,7 @@ class GroupingSink : public FrameSink {
       ADD_FAILURE() << "waited in vain for " << what;
     }
   }
-  // Guarded by mutex_, or read after the end:
+  // Protected by mutex_, or read after the end.
   int complete = 0;
   int incomplete = 0;
   int wrong = 0;
@@ -93,7 +92,7 @@ class GroupingSink : public FrameSink {
   std::map<const cv::Mat*, int> buffers_;
 };
 
-// Runs a source in its thread.
+// Runs a source in a thread.
 class Running {
  public:
   Running(FrameSource* source, FrameSink* sink) : source_(source), thread_([=] { source->run(sink); }) {}

@@ -6,7 +6,7 @@
 
 namespace vcharge {
 
-/// ioctl() that a signal does not end.
+/// ioctl() that is repeated when interrupted by a signal.
 template <class Argument>
 int v4l2Ioctl(int fd, unsigned long request, Argument* argument) {
   int result = 0;

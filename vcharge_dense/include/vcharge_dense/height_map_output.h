@@ -6,9 +6,9 @@
 
 namespace vcharge {
 
-/// Writes a folder that appears as a whole or not at all: height_map.{tiff,yaml} with confidence and gray,
-/// drivable.{pgm,yaml} (map_server), mesh.ply, octomap.bt, height_map.png and drivable.png. InputError naming
-/// the file that cannot be written.
+/// Writes a folder atomically: height_map.{tiff,yaml} with confidence and gray levels, drivable.{pgm,yaml}
+/// for map_server, mesh.ply, octomap.bt and height_map.png. Throws InputError that names a file that cannot
+/// be written.
 void writeHeightMapFolder(HeightMapResult* result, const std::string& folder);
 
 }  // namespace vcharge

@@ -17,15 +17,15 @@
 
 namespace vcharge {
 
-/// How the two passes converged, and what went in.
+/// Input and convergence of a height map.
 struct HeightMapStatistics {
-  size_t num_views = 0;     ///< range maps that were fused
-  size_t num_reused = 0;    ///< of these, taken from an earlier run
+  size_t num_views = 0;     ///< fused range maps
+  size_t num_reused = 0;    ///< fused range maps taken from an earlier run
   size_t num_observed = 0;  ///< cells
-  size_t num_solid = 0;     ///< cells without a height where something stands
+  size_t num_solid = 0;     ///< cells with an obstacle but without a height
   int label_iterations = 0, height_iterations = 0;
   double label_gap_per_cell = 0.0, height_gap_per_cell = 0.0;
-  bool converged = false;                 ///< both passes, within max_iterations
+  bool converged = false;                 ///< both passes reached their duality gap
   std::map<std::string, double> times_s;  ///< wall time by stage
 };
 
@@ -36,34 +36,34 @@ struct HeightMapResult {
   HeightMapStatistics statistics;
 };
 
-/// A drive becomes a height map: range maps on the way, kept in a folder so that no drive is too long and a
-/// run that was stopped goes on where it was, and their fusion at the end (paper, section Height Map Fusion).
-/// The one stage of build_height_map and height_map_nodelet. Not thread safe.
+/// Turns a drive into a height map (paper, section Height Map Fusion). Range maps are computed during the
+/// drive and kept in a folder, so that memory does not limit the drive and an interrupted run can resume;
+/// finish() fuses them. Used by build_height_map and height_map_nodelet. Not thread safe.
 class HeightMapper : public DriveConsumer {
  public:
-  /// `work_folder` holds the range maps; those of the same drive, rig, poses and options are taken from it
-  /// (`drive_name` tells drives apart, e.g. the bag's hash; empty: nothing is taken). InputError as
-  /// RangeMapper's; std::invalid_argument for bad options.
+  /// `work_folder` holds the range maps; those of the same drive, rig, poses and options are used again.
+  /// `drive_name` identifies the drive, e.g. by the bag's hash; with an empty name nothing is used again.
+  /// Throws InputError like RangeMapper, and std::invalid_argument for bad options.
   HeightMapper(std::shared_ptr<const CameraRig> rig, const HeightMapOptions& options, std::string work_folder,
                const std::string& drive_name);
   ~HeightMapper() override;
 
-  /// Poses in place of odometry's; the map is then in the frame `frame_id`, else in "odom".
+  /// Replaces the poses of the odometry. The map is then in the frame `frame_id`, otherwise in "odom".
   void setTrajectory(const Trajectory& map_from_vehicle, const std::string& frame_id = "map");
 
-  /// Whether the grid over these poses fits into memory, told before any work: those of the drive's time,
-  /// from `first` to `last`. The grid of the cameras' positions is checked before each range map, too.
-  /// InputError with the numbers where it does not fit.
+  /// Throws InputError where the grid over the poses from `first` to `last` would need too much memory, so
+  /// that a run fails before it starts. The grid over the cameras' positions is checked before each range map
+  /// too.
   void checkGrid(const Trajectory& world_from_vehicle, Timestamp first, Timestamp last) const;
 
-  /// InputError as soon as the grid over the views so far is too large.
+  /// Throws InputError as soon as the grid over the views so far is too large.
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
 
-  /// Fuses what was seen. May be called again, after more images. `progress` (may be empty) takes the name of
-  /// a step and the share of it that is done. InputError when too many images had no pose, no range map could
-  /// be made, the grid is too large, or no cell was observed; texts name numbers and reasons.
-  HeightMapResult finish(const std::function<void(const std::string& step, double share)>& progress);
+  /// Fuses all range maps; may be called again after more images. `progress` (may be empty) receives the name
+  /// of a step and the completed fraction of it. Throws InputError with numbers and reasons where too many
+  /// images had no pose, no range map could be made, the grid is too large, or no cell was observed.
+  HeightMapResult finish(const std::function<void(const std::string& step, double fraction)>& progress);
 
   std::vector<RangeMapperStatus> status() const { return range_mapper_->status(); }
   size_t numViews() const { return views_.size(); }
@@ -86,10 +86,10 @@ class HeightMapper : public DriveConsumer {
   std::string trajectory_hash_ = "odometry";
   std::unique_ptr<RangeMapper> range_mapper_;
   std::vector<View> views_;
-  std::map<size_t, Eigen::Vector3d> last_position_m_;  // by camera, of its newest view
+  std::map<size_t, Eigen::Vector3d> last_position_m_;  // of the newest view of each camera
   std::map<std::string, double> times_s_;
   size_t num_reused_ = 0;
-  Eigen::AlignedBox3d extent_m_;  // in x and y of the views, in z of the vehicle's poses
+  Eigen::AlignedBox3d extent_m_;  // x and y: camera positions; z: vehicle poses
 };
 
 }  // namespace vcharge

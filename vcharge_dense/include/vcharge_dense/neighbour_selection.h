@@ -8,34 +8,30 @@
 
 namespace vcharge {
 
-/// Which images around the reference it is matched with. Baselines are distances between camera positions.
-struct NeighbourOptions {
-  int num_neighbours = 4;        ///< half of them on each side where later images are used, too
-  double min_baseline_m = 0.08;  ///< nearer ones show too little parallax
-  double max_baseline_m = 0.8;   ///< of a camera that looks across the direction of travel
-  /// Of a camera that looks along it. Longer ones measure far points better, but the ground nearby then
-  /// changes its scale too much between the images to be matched.
-  double max_forward_baseline_m = 0.8;
+/// A shorter baseline shows too little parallax.
+constexpr double kMinBaseline_m = 0.08;
 
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("num_neighbours", num_neighbours);
-    visit("min_baseline_m", min_baseline_m);
-    visit("max_baseline_m", max_baseline_m);
-    visit("max_forward_baseline_m", max_forward_baseline_m);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+/// Options of neighbour selection. Baselines are distances between camera positions.
+struct NeighbourOptions {
+  VCHARGE_BEGIN_OPTIONS(NeighbourOptions);
+  VCHARGE_OPTION(int, num_neighbours, 4, between(1, 32),
+                 "Neighbours of a reference, half of them on each side where later images are used.");
+  VCHARGE_OPTION(double, max_baseline_m, 0.8, between(kMinBaseline_m, 100.0),
+                 "Longest baseline of a camera that looks across the direction of travel.");
+  VCHARGE_OPTION(double, max_forward_baseline_m, 0.8, between(kMinBaseline_m, 100.0),
+                 "Longest baseline of a camera that looks along it; longer ones lose the ground nearby.");
+  VCHARGE_END_OPTIONS();
+
+  void checkFields() const;
 };
 
-/// Longest baseline for a camera whose optical axis and direction of travel (both unit, in one frame) are
-/// given.
+/// Longest baseline for a camera with this optical axis and direction of travel (unit vectors in one frame).
 double longestBaseline(const NeighbourOptions& options, const Eigen::Vector3d& optical_axis,
                        const Eigen::Vector3d& travel_direction);
 
-/// Up to `count` of the candidates on one side of the reference, so that their baselines come closest to
-/// count equal steps up to `longest_m`; none nearer than min_baseline_m or much further than longest_m.
-/// Ascending indices.
-std::vector<size_t> selectNeighbours(const NeighbourOptions& options, const std::vector<double>& baselines_m,
-                                     int count, double longest_m);
+/// Selects up to `count` candidates on one side of the reference whose baselines are closest to `count` equal
+/// steps up to `longest_m`. Baselines below kMinBaseline_m or above 1.25 longest_m are left out. Returns
+/// ascending indices into `baselines_m`.
+std::vector<size_t> selectNeighbours(const std::vector<double>& baselines_m, int count, double longest_m);
 
 }  // namespace vcharge

@@ -18,20 +18,22 @@ namespace vcharge {
 
 class VoxelBlocks;
 
-/// An octree of free and occupied space from range maps, by casting a ray for each pixel whose range has a
-/// sigma and is sure enough: free up to the surface, occupied there. Others say nothing, and neither do
-/// ranges at the farthest plane, where everything ends up that lies beyond it.
+/// Builds an octree of free and occupied space from range maps (Hornung et al. 2013). A ray is cast for each
+/// pixel whose range is confident and has a standard deviation: voxels in front of the surface are free, the
+/// voxel at the surface is occupied. Ranges on the farthest plane are left out, because surfaces beyond it
+/// are assigned to it. Not thread safe.
 class OctomapBuilder {
  public:
-  /// `farthest_m`: range from which on a range counts as that of the farthest plane.
-  OctomapBuilder(const OctomapOptions& options, double farthest_m);
+  /// `max_range_m`: longer rays clear up to here and mark no end as occupied. `farthest_m`: ranges from here
+  /// on lie on the farthest plane.
+  OctomapBuilder(const OctomapOptions& options, double max_range_m, double farthest_m);
   ~OctomapBuilder();
 
   void add(const RangeMap& map, const RigidTransform& world_from_camera);
-  /// Of what was added so far, not pruned.
+  /// Octree of everything added so far, not pruned.
   const octomap::OcTree& tree();
-  /// Writes a .bt file, whole or not at all; the tree then knows free and occupied alone. InputError naming
-  /// the file.
+  /// Writes a .bt file atomically; afterwards the octree only distinguishes free and occupied. Throws
+  /// InputError that names a file that cannot be written.
   void write(const std::string& path);
 
  private:
@@ -41,11 +43,11 @@ class OctomapBuilder {
   void update(float* log_odds, float change) const;
 
   const OctomapOptions options_;
-  const double farthest_m_;
+  const double max_range_m_, farthest_m_;
   std::unique_ptr<octomap::OcTree> tree_;
-  std::unique_ptr<VoxelBlocks> voxels_;  // log odds, which the tree gets all at once
+  std::unique_ptr<VoxelBlocks> voxels_;  // log odds, copied into the octree by tree()
   bool tree_is_current_ = true;
-  std::map<std::vector<double>, std::unique_ptr<RayTable>> rays_;  // by camera model and size
+  std::map<std::vector<double>, std::unique_ptr<RayTable>> rays_;  // by camera parameters and image size
 };
 
 }  // namespace vcharge

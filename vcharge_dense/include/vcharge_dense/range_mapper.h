@@ -17,7 +17,7 @@
 
 namespace vcharge {
 
-/// Settings of neighbours and planes that trade accuracy for time (package README, Settings).
+/// Numbers of planes, neighbours and refinement steps that trade accuracy for time.
 enum class RangePreset { kFast, kDefault, kAccurate };
 template <>
 inline std::vector<std::string> enumNames<RangePreset>() {
@@ -25,105 +25,95 @@ inline std::vector<std::string> enumNames<RangePreset>() {
 }
 
 struct RangeMapperOptions {
-  RangePreset preset = RangePreset::kDefault;  ///< where it is read, it comes before all other fields
-  std::vector<std::string> cameras;            ///< of the rig, by name; empty: all
-  bool use_later_images =
-      false;                   ///< neighbours on both sides: needs images from after the reference (offline)
-  double min_motion_m = 0.03;  ///< of a camera between two references; below it the vehicle stands
-  WorkingCameraOptions working_camera;
-  NeighbourOptions neighbours;
-  PlaneSweepOptions plane_sweep;
-  FrameAssemblerOptions frames;
+  VCHARGE_BEGIN_OPTIONS(RangeMapperOptions);
+  VCHARGE_OPTION(RangePreset, preset, RangePreset::kDefault, anyValue(),
+                 "Numbers of planes, neighbours and refinement steps, which options after it override.");
+  VCHARGE_OPTION(std::vector<std::string>, cameras, {}, anyValue(),
+                 "Cameras of the rig by name; empty: all.");
+  VCHARGE_OPTION(bool, use_later_images, false, anyValue(),
+                 "Neighbours are also taken from after the reference, which delays range maps.");
+  VCHARGE_OPTION_GROUP(WorkingCameraOptions, working_camera, {}, "Undistorted images that are swept.");
+  VCHARGE_OPTION_GROUP(NeighbourOptions, neighbours, {}, "Images that a reference is matched with.");
+  VCHARGE_OPTION_GROUP(PlaneSweepOptions, plane_sweep, {}, "Plane sweep.");
+  VCHARGE_OPTION_GROUP(FrameAssemblerOptions, frames, {}, "Images of one stamp, and odometry.");
+  VCHARGE_END_OPTIONS();
 
   RangeMapperOptions() {
     frames.max_speed_m_per_s = 60.0;
-    plane_sweep.refine_poses = true;  // a drive's poses are odometry's, as a rule
+    plane_sweep.refine_poses = true;  // the poses of a drive usually come from odometry
     plane_sweep.coarse_pass = true;
   }
 
   /// Neighbours before and after the reference, aggregated by reference-split.
   static RangeMapperOptions offline();
 
-  /// Sets the fields that the preset stands for, and leaves the others.
+  /// Sets the fields that the preset stands for and leaves the others.
   void usePreset(RangePreset new_preset);
 
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    const RangePreset before = preset;
-    visit("preset", preset);
-    if (preset != before) {
-      usePreset(preset);
-    }
-    visit("cameras", cameras);
-    visit("use_later_images", use_later_images);
-    visit("min_motion_m", min_motion_m);
-    visit("working_camera", working_camera);
-    visit("neighbours", neighbours);
-    visit("plane_sweep", plane_sweep);
-    visit("frames", frames);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  void fieldWasRead(const char* field);
+  void checkFields() const;
 };
 
 enum class RangeMapperState {
-  kNoImages,       ///< none yet, or the camera stopped
-  kNoPose,         ///< images come, but there is no odometry at their stamps
-  kStanding,       ///< the camera does not move: motion stereo sees nothing
+  kNoImages,       ///< no image yet, or the camera stopped sending
+  kNoPose,         ///< there is no odometry at the images' stamps
+  kStanding,       ///< the camera does not move: there is no parallax
   kFewNeighbours,  ///< moving, but no image with enough baseline yet
   kMapping,
 };
 
-/// One camera's state, as plain data.
+/// State and counters of one camera.
 struct RangeMapperStatus {
   std::string camera_name;
   RangeMapperState state = RangeMapperState::kNoImages;
-  std::string message;          ///< one line for people
-  uint64_t images = 0;          ///< taken in
+  std::string message;          ///< one line for the user
+  uint64_t images = 0;          ///< received
   uint64_t ignored_images = 0;  ///< repeated, or too late for their frame
   uint64_t without_pose = 0;
   uint64_t standing = 0;
   uint64_t without_neighbours = 0;
-  uint64_t references = 0;  ///< handed out to be swept
-  uint64_t resets = 0;      ///< started over: time or poses jumped, or odometry had a gap
+  uint64_t references = 0;  ///< passed on to be swept
+  uint64_t resets = 0;      ///< restarts because time or poses jumped or odometry had a gap
 };
 
-/// A reference and its neighbours, ready to be swept. Shares the pixels, which nobody changes any more.
+/// A reference and its neighbours, ready to be swept. The pixels are shared and never changed.
 struct RangeTask {
-  size_t camera_index = 0;  ///< of the rig
+  size_t camera_index = 0;  ///< in the rig
   SweepImage reference;
   std::vector<SweepImage> neighbours;
 };
 
-/// Turns the images and odometry of a drive into sweeps: undistorts, keeps the last images of each camera,
-/// and picks neighbours by baseline. The one front of the nodelet and the offline tool.
+/// Turns the images and odometry of a drive into sweeps: undistorts images, keeps the latest of each camera,
+/// interpolates their poses and selects neighbours by baseline. Used by nodelets and offline tools.
 ///
-/// add...() do cheap work and hand each reference to `on_task`, per camera in order of stamps; who gets it
-/// calls sweep(), at once (nothing is lost) or later from another thread (only sweep() may be called
-/// concurrently). References come once their neighbours have: with use_later_images after the vehicle has
-/// moved on, or at finish(). While a camera stands nothing comes; status() says so. Stamps that jump back,
-/// gaps of the odometry and poses that jump start the cameras over.
+/// addImage() and addOdometry() pass each reference to `on_task`, per camera in the order of stamps. The
+/// callback calls sweep() at once or later from another thread; only sweep() may be called concurrently. A
+/// reference is passed on once its neighbours are known: with use_later_images after the vehicle has moved
+/// on, or in finish(). While a camera stands still there are no references, see status(). A camera restarts,
+/// forgetting its images, where stamps jump back, odometry has a gap or poses jump.
 class RangeMapper : public DriveConsumer {
  public:
   using TaskCallback = std::function<void(RangeTask)>;
 
-  /// InputError when the rig lacks a camera of the options or the pose of one on the vehicle;
-  /// std::invalid_argument for bad options.
+  /// Throws InputError where the rig lacks a camera of the options or its extrinsics, std::invalid_argument
+  /// for bad options.
   RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapperOptions& options, TaskCallback on_task);
   ~RangeMapper() override;
 
-  /// Takes poses from here instead of from odometry; frames.max_odometry_gap_s applies.
+  /// Uses these poses instead of odometry, interpolated over gaps of at most frames.max_odometry_gap_s.
   void setTrajectory(const Trajectory& world_from_vehicle);
 
-  /// std::logic_error for an image of another size or type than the rig's.
+  /// Throws std::logic_error for an image of another size or type than the rig's.
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
-  /// Hands out what still waits for later images: the drive is over.
+  /// Ends the drive: passes on the references that still wait for later images.
   void finish();
 
-  /// Thread safe. camera_name and frame_id of the map are those of the rig; its reference is the task's.
+  /// Thread safe. Camera name and frame of the range map come from the rig, its reference image from the
+  /// task.
   RangeMap sweep(const RangeTask& task) const;
 
-  /// Of the cameras in use, in the rig's order.
+  /// Status of the cameras in use, in the rig's order.
   std::vector<RangeMapperStatus> status() const;
   const FrameCounters& counters() const { return assembler_->counters(); }
 
@@ -140,7 +130,7 @@ class RangeMapper : public DriveConsumer {
   const std::shared_ptr<const CameraRig> rig_;
   const RangeMapperOptions options_;
   const TaskCallback on_task_;
-  std::vector<std::unique_ptr<Camera>> cameras_;  // by index in the rig; null where not in use
+  std::vector<std::unique_ptr<Camera>> cameras_;  // by index in the rig; null: not in use
   std::unique_ptr<ImageFrameAssembler> assembler_;
 };
 

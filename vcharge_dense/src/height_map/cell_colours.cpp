@@ -8,10 +8,11 @@
 namespace vcharge {
 namespace {
 
-constexpr double kSameSurface = 0.05;   // a range within this share of the distance, and
-constexpr double kSameSurface_m = 0.1;  // this much, is that of the cell
+// A range belongs to a cell where it differs from the cell's distance by less than the sum of both.
+constexpr double kSameSurface = 0.05;  // times the distance
+constexpr double kSameSurface_m = 0.1;
 
-/// Pixel of a point of the world; false where the camera does not see it.
+/// Projects a point, given by its offset from the camera in the world; returns false where it is not visible.
 bool project(const PackedRangeMap& camera, const Eigen::Vector3f& offset, float distance, int* x, int* y) {
   const Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>> rotation(camera.rotation);
   const Eigen::Vector3f point = rotation * offset;
@@ -24,7 +25,7 @@ bool project(const PackedRangeMap& camera, const Eigen::Vector3f& offset, float 
   return *x >= 0 && *y >= 0 && *x < camera.width && *y < camera.height;
 }
 
-/// Sum of weights and of weighted gray levels of each cell.
+/// Adds a view to the sums of weights and of weighted gray levels of each cell.
 void addView(const HeightMap& map, const PackedRangeMap& camera, const cv::Mat& image, double max_range_m,
              cv::Mat* sums) {
   const Eigen::Vector2d from = (camera.position_m.head<2>() - map.origin_m) / map.cell_size_m;
@@ -39,9 +40,9 @@ void addView(const HeightMap& map, const PackedRangeMap& camera, const cv::Mat& 
       if (!std::isfinite(height)) {
         continue;
       }
-      const Eigen::Vector2d place = map.centreOf(column, row);
+      const Eigen::Vector2d centre = map.centreOf(column, row);
       const Eigen::Vector3f offset =
-          (Eigen::Vector3d(place.x(), place.y(), height) - camera.position_m).cast<float>();
+          (Eigen::Vector3d(centre.x(), centre.y(), height) - camera.position_m).cast<float>();
       const float distance = offset.norm();
       int x = 0, y = 0;
       if (distance > max_range_m || !project(camera, offset, distance, &x, &y)) {

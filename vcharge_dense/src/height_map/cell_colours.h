@@ -8,8 +8,9 @@
 
 namespace vcharge {
 
-/// Brightness of each observed cell (CV_8UC1; 0 elsewhere), as the mean over the views that see its surface,
-/// nearer ones counting more. `images`: the undistorted image (CV_8UC1) of a view, in the views' order.
+/// Gray level of each cell with a height (CV_8UC1; 0 elsewhere): mean over the views that see its surface,
+/// nearer views weighted more. `load_view` returns a view's range map and undistorted image (CV_8UC1); views
+/// are loaded in order.
 cv::Mat colourCells(const HeightMap& map, size_t num_views,
                     const std::function<void(size_t view, PackedRangeMap* range, cv::Mat* image)>& load_view,
                     double max_range_m);

@@ -16,7 +16,9 @@ namespace {
 
 using testing::BoxWorld;
 
-/// A camera that drives along x beside a box, looking to it and downwards.
+const double kGamma = HeightMapOptions().label_gamma;
+
+/// Cameras that drive along x on both sides of a box and face it.
 struct Drive {
   BoxWorld world;
   std::vector<RigidTransform> poses;
@@ -25,7 +27,7 @@ struct Drive {
   HeightFusionOptions options;
   VoxelGrid grid;
 
-  /// `matched_up_to_m`: what is higher has no range, as paint without texture.
+  /// `matched_up_to_m`: points above this height have no range, like paint without texture.
   explicit Drive(double noise_m = 0.0, const BoxWorld& box = BoxWorld(),
                  double matched_up_to_m = std::numeric_limits<double>::infinity())
       : world(box) {
@@ -33,16 +35,16 @@ struct Drive {
     cv::RNG random(5);
     for (int i = 0; i < 14; ++i) {
       for (const double side : {-1.0, 1.0}) {
-        const Eigen::Vector3d place(0.4 * i, side * -2.0, 1.0);
-        poses.push_back(testing::lookFrom(place, side * 1.57, 0.6));
-        positions.push_back(place);
+        const Eigen::Vector3d position(0.4 * i, side * -2.0, 1.0);
+        poses.push_back(testing::cameraPose(position, side * 1.57, 0.6));
+        positions.push_back(position);
         RangeMap map = testing::renderView(world, poses.back(), cv::Size(320, 200));
         leaveOut(matched_up_to_m, &map);
         cv::Mat noise(map.range_m.size(), CV_32FC1);
         random.fill(noise, cv::RNG::NORMAL, 0.0, noise_m > 0.0 ? noise_m : 1e-12);
         map.range_m += noise;
         map.standard_deviation_m.setTo(std::max(0.01, noise_m));
-        maps.push_back(std::make_shared<const PackedRangeMap>(packRangeMap(map, poses.back(), options)));
+        maps.push_back(std::make_shared<const PackedRangeMap>(packRangeMap(map, poses.back())));
       }
     }
     Eigen::AlignedBox3d extent_m;
@@ -73,11 +75,11 @@ Eigen::Vector2d centreOf(const VoxelGrid& grid, int column, int row) {
   return grid.origin_m + grid.cell_size_m * Eigen::Vector2d(column, row);
 }
 
-/// Whether a cell's height is level around it.
-bool isLevel(const BoxWorld& world, const Eigen::Vector2d& place) {
+/// Whether the true height is constant around a cell's centre.
+bool isLevel(const BoxWorld& world, const Eigen::Vector2d& point) {
   for (const double dx : {-0.06, 0.06}) {
     for (const double dy : {-0.06, 0.06}) {
-      if (world.heightAt(place.x() + dx, place.y() + dy) != world.heightAt(place.x(), place.y())) {
+      if (world.heightAt(point.x() + dx, point.y() + dy) != world.heightAt(point.x(), point.y())) {
         return false;
       }
     }
@@ -85,24 +87,32 @@ bool isLevel(const BoxWorld& world, const Eigen::Vector2d& place) {
   return true;
 }
 
+/// Calls judge(cell, true height) for the cells around the box that all cameras pass, away from its edges.
+template <class Judge>
+void forEachLevelCell(const Drive& drive, const Judge& judge) {
+  for (int row = 0; row < drive.grid.rows; ++row) {
+    for (int column = 0; column < drive.grid.columns; ++column) {
+      const Eigen::Vector2d centre = centreOf(drive.grid, column, row);
+      if (centre.x() < 0.5 || centre.x() > 4.5 || std::abs(centre.y()) > 1.5 ||
+          !isLevel(drive.world, centre)) {
+        continue;
+      }
+      const double truth = drive.world.heightAt(centre.x(), centre.y());
+      judge(cv::Point(column, row), truth);
+    }
+  }
+}
+
 TEST(HeightFusionTest, FindsGroundAndBoxWithinAVoxel) {
   const Drive drive;
   const ColumnImages columns = drive.fuse();
   int num_ground = 0, num_box = 0;
-  for (int row = 0; row < drive.grid.rows; ++row) {
-    for (int column = 0; column < drive.grid.columns; ++column) {
-      const Eigen::Vector2d place = centreOf(drive.grid, column, row);
-      if (place.x() < 0.5 || place.x() > 4.5 || std::abs(place.y()) > 1.5 || !isLevel(drive.world, place)) {
-        continue;
-      }
-      const double truth = drive.world.heightAt(place.x(), place.y());
-      EXPECT_NEAR(columns.best_height_m.at<float>(row, column), truth, drive.grid.height_step_m + 1e-4)
-          << place.transpose();
-      EXPECT_GT(columns.support_below.at<float>(row, column), 0.5F);
-      EXPECT_GT(columns.support_above.at<float>(row, column), 0.5F);
-      ++(truth > 0.0 ? num_box : num_ground);
-    }
-  }
+  forEachLevelCell(drive, [&](const cv::Point& cell, double truth) {
+    EXPECT_NEAR(columns.best_height_m.at<float>(cell), truth, drive.grid.height_step_m + 1e-4) << cell;
+    EXPECT_GT(columns.support_below.at<float>(cell), 0.5F);
+    EXPECT_GT(columns.support_above.at<float>(cell), 0.5F);
+    ++(truth > 0.0 ? num_box : num_ground);
+  });
   EXPECT_GT(num_box, 250);
   EXPECT_GT(num_ground, 3000);
 }
@@ -111,52 +121,43 @@ TEST(HeightFusionTest, SmoothedHeightsOfNoisyRangesAreFlatAndKeepTheEdge) {
   const Drive drive(0.08);
   const ColumnImages columns = drive.fuse();
   PrimalDualReport report;
-  const HeightRegularizationOptions options;
-  const cv::Mat observed = labelObserved(columns, options, &report);
+  const cv::Mat observed = labelObserved(columns, kGamma, &report);
   EXPECT_TRUE(report.converged);
-  const cv::Mat heights = smoothHeights(columns, observed, drive.grid, options, &report);
+  const cv::Mat heights = smoothHeights(columns, observed, drive.grid, &report);
   EXPECT_TRUE(report.converged);
   double sum = 0.0;
   int num = 0;
-  for (int row = 0; row < drive.grid.rows; ++row) {
-    for (int column = 0; column < drive.grid.columns; ++column) {
-      const Eigen::Vector2d place = centreOf(drive.grid, column, row);
-      if (place.x() < 0.5 || place.x() > 4.5 || std::abs(place.y()) > 1.5 || !isLevel(drive.world, place)) {
-        continue;
-      }
-      const double truth = drive.world.heightAt(place.x(), place.y());
-      ASSERT_TRUE(std::isfinite(heights.at<float>(row, column))) << place.transpose();
-      sum += std::abs(heights.at<float>(row, column) - truth);
-      ++num;
-    }
-  }
+  forEachLevelCell(drive, [&](const cv::Point& cell, double truth) {
+    ASSERT_TRUE(std::isfinite(heights.at<float>(cell))) << cell;
+    sum += std::abs(heights.at<float>(cell) - truth);
+    ++num;
+  });
   EXPECT_LT(sum / num, 0.0125);  // half a voxel
   EXPECT_GT(num, 3000);
 }
 
-TEST(HeightFusionTest, ShowsABodyUnderWhichTheGroundIsSeen) {
+TEST(HeightFusionTest, MapsABodyUnderWhichTheGroundIsVisible) {
   BoxWorld car;
   car.low.z() = 0.35;
   car.high.z() = 1.4;
   Drive drive(0.0, car, 0.5);
-  const auto cellOf = [&](const Eigen::Vector2d& place) {
-    const Eigen::Vector2d cell = (place - drive.grid.origin_m) / drive.grid.cell_size_m;
+  const auto cellOf = [&](const Eigen::Vector2d& point) {
+    const Eigen::Vector2d cell = (point - drive.grid.origin_m) / drive.grid.cell_size_m;
     return cv::Point(static_cast<int>(std::lround(cell.x())), static_cast<int>(std::lround(cell.y())));
   };
   const ColumnImages layered = drive.fuse();
-  drive.options.min_layer_weight_m = 0.0;
+  drive.options.min_layer_weight_m = 1e9;
   const ColumnImages single = drive.fuse();
   PrimalDualReport report;
-  const HeightRegularizationOptions options;
   const cv::Mat heights =
-      smoothHeights(layered, labelObserved(layered, options, &report), drive.grid, options, &report);
+      smoothHeights(layered, labelObserved(layered, kGamma, &report), drive.grid, &report);
   for (const double side : {-1.0, 1.0}) {
     for (double x = 2.1; x < 2.9; x += 0.1) {
       const cv::Point inside = cellOf({x, side * 0.45}), before = cellOf({x, side * 0.6});
       EXPECT_NEAR(single.best_height_m.at<float>(inside), 0.0, 0.03) << x;
       EXPECT_GT(layered.best_height_m.at<float>(inside), 0.45) << x;
       EXPECT_LT(layered.best_height_m.at<float>(inside), 0.6) << x;
-      // Nothing was seen above the strip: its height is held from below alone.
+      // Nothing was observed above: only the support from below holds the height.
       EXPECT_GT(layered.support_below.at<float>(inside), 0.5F) << x;
       EXPECT_LT(layered.support_above.at<float>(inside), 0.1F) << x;
       EXPECT_GT(heights.at<float>(inside), 0.4) << x;
@@ -167,23 +168,23 @@ TEST(HeightFusionTest, ShowsABodyUnderWhichTheGroundIsSeen) {
 
 TEST(HeightFusionTest, PillarIsSolidAndTheGroundIsNot) {
   BoxWorld pillar;
-  pillar.high.z() = 5.0;  // higher than the grid
+  pillar.high.z() = 5.0;  // above the grid
   const Drive drive(0.02, pillar);
   const ColumnImages columns = drive.fuse();
   PrimalDualReport report;
-  const cv::Mat observed = labelObserved(columns, HeightRegularizationOptions(), &report);
+  const cv::Mat observed = labelObserved(columns, kGamma, &report);
   int num_faces = 0, num_open = 0;
   for (int row = 0; row < drive.grid.rows; ++row) {
     for (int column = 0; column < drive.grid.columns; ++column) {
-      const Eigen::Vector2d place = centreOf(drive.grid, column, row);
-      const double outside_m = std::max(std::abs(place.x() - 2.5), std::abs(place.y())) - 0.5;
+      const Eigen::Vector2d centre = centreOf(drive.grid, column, row);
+      const double outside_m = std::max(std::abs(centre.x() - 2.5), std::abs(centre.y())) - 0.5;
       const bool is_solid = columns.solid.at<uint8_t>(row, column) != 0;
       if (outside_m > 0.05) {
-        EXPECT_FALSE(is_solid) << place.transpose();
+        EXPECT_FALSE(is_solid) << centre.transpose();
         ++num_open;
-      } else if (std::abs(place.x() - 2.5) < 0.3 && outside_m < -0.01 && outside_m > -0.1) {
-        EXPECT_TRUE(is_solid) << place.transpose();  // of the faces that the cameras drive along
-        EXPECT_EQ(observed.at<uint8_t>(row, column), 0) << place.transpose();
+      } else if (std::abs(centre.x() - 2.5) < 0.3 && outside_m < -0.01 && outside_m > -0.1) {
+        EXPECT_TRUE(is_solid) << centre.transpose();  // the faces beside the cameras' paths
+        EXPECT_EQ(observed.at<uint8_t>(row, column), 0) << centre.transpose();
         ++num_faces;
       }
     }
@@ -192,10 +193,10 @@ TEST(HeightFusionTest, PillarIsSolidAndTheGroundIsNot) {
   EXPECT_GT(num_open, 10000);
 }
 
-TEST(HeightFusionTest, DoesNotClaimWhatNobodySaw) {
+TEST(HeightFusionTest, CellsThatNoViewSeesAreNotObserved) {
   const Drive drive;
   PrimalDualReport report;
-  const cv::Mat observed = labelObserved(drive.fuse(), HeightRegularizationOptions(), &report);
+  const cv::Mat observed = labelObserved(drive.fuse(), kGamma, &report);
   EXPECT_EQ(observed.at<uint8_t>(0, 0), 0);
   EXPECT_EQ(observed.at<uint8_t>(drive.grid.rows - 1, drive.grid.columns - 1), 0);
   EXPECT_GT(cv::countNonZero(observed), 5000);
@@ -207,11 +208,11 @@ TEST(HeightFusionTest, RangesThatAreNotFiniteChangeNothing) {
   int number = 0;
   for (const float value : {std::nanf(""), std::numeric_limits<float>::infinity(), 0.0F, -1.0F}) {
     for (const bool in_sigma : {false, true}) {
-      // Beside the box, where all others see the same.
+      // Beside the box, where other views see the same ground.
       const RigidTransform pose = other.poses[static_cast<size_t>(8 + number++)];
       RangeMap map = testing::renderView(other.world, pose, cv::Size(320, 200));
       (in_sigma ? map.standard_deviation_m : map.range_m).setTo(value);
-      other.maps.push_back(std::make_shared<const PackedRangeMap>(packRangeMap(map, pose, other.options)));
+      other.maps.push_back(std::make_shared<const PackedRangeMap>(packRangeMap(map, pose)));
       other.positions.push_back(pose.translation());
     }
   }

@@ -13,7 +13,7 @@
 namespace vcharge {
 namespace {
 
-constexpr double kPictureSpan_m = 1.8;  // of the colours, from a little below most of the ground
+constexpr double kPictureSpan_m = 1.8;  // heights that the colours span, from slightly below the ground
 
 void writePicture(const cv::Mat& picture, const std::string& path) {
   if (!cv::imwrite(path, picture)) {

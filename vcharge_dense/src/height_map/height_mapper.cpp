@@ -20,8 +20,10 @@ namespace vcharge {
 namespace fs = std::filesystem;
 namespace {
 
-// Ranges beyond this share of the farthest plane's distance count as lying on it.
-constexpr double kFarthestShare = 0.95;
+// Ranges beyond this fraction of the farthest plane's distance may belong to any surface beyond it.
+constexpr double kFarthestFraction = 0.95;
+// A drive is refused where fewer of its images have a pose.
+constexpr double kMinCoveredImages = 0.9;
 
 std::string imagePath(const std::string& folder, const std::string& camera, Timestamp stamp) {
   return folder + "/" + camera + "/" + std::to_string(stamp.nanoseconds()) + "_image.png";
@@ -106,8 +108,7 @@ void HeightMapper::addTask(const RangeTask& task) {
   const RigidTransform world_from_vehicle =
       task.reference.world_from_camera * camera.vehicle_from_camera->inverse();
   extent_m_.extend(Eigen::Vector3d(position.x(), position.y(), world_from_vehicle.translation().z()));
-  makeVoxelGrid(extent_m_,
-                options_.fusion);  // one that is too large is refused before more range maps are made
+  makeVoxelGrid(extent_m_, options_.fusion);  // refuses a grid that is too large before more range maps
   const StageTimer timer("range maps", &times_s_);
   if (!drive_name_.empty() && isKept(folder(), camera.name, task.reference.stamp)) {
     ++num_reused_;
@@ -120,8 +121,8 @@ void HeightMapper::addTask(const RangeTask& task) {
       }
     });
     RangeMap map = range_mapper_->sweep(task);
-    map.reference.release();       // it is there already, and is read once, not whenever ranges are
-    writeRangeMap(map, folder());  // its YAML comes last: all is there
+    map.reference.release();       // already written as an image of its own
+    writeRangeMap(map, folder());  // writes its YAML last, which isKept() looks for
   }
   views_.push_back({task.camera_index, task.reference.stamp, task.reference.world_from_camera});
 }
@@ -140,10 +141,10 @@ void HeightMapper::checkCoverage() const {
   }
   const double covered =
       images == 0 ? 0.0 : 1.0 - static_cast<double>(without_pose) / static_cast<double>(images);
-  if (images > 0 && covered < options_.min_covered_images) {
+  if (images > 0 && covered < kMinCoveredImages) {
     throw InputError("poses cover " + toText(100.0 * covered, 1) + " % of the drive's " +
                      std::to_string(images) + " images, expected at least " +
-                     toText(100.0 * options_.min_covered_images, 1) + " % (" + reasons + ")");
+                     toText(100.0 * kMinCoveredImages, 1) + " % (" + reasons + ")");
   }
   if (views_.empty()) {
     throw InputError("no range map could be made (" + (reasons.empty() ? "no image" : reasons) + ")");
@@ -154,9 +155,9 @@ HeightMapResult HeightMapper::finish(const std::function<void(const std::string&
   range_mapper_->finish();
   checkCoverage();
   const auto report = [&](const char* step) {
-    return [&progress, step](double share) {
+    return [&progress, step](double fraction) {
       if (progress) {
-        progress(step, share);
+        progress(step, fraction);
       }
     };
   };
@@ -170,7 +171,7 @@ HeightMapResult HeightMapper::finish(const std::function<void(const std::string&
   const VoxelGrid grid = makeVoxelGrid(extent_m_, fusion);
   const auto pack = [&](size_t i) {
     return std::make_shared<const PackedRangeMap>(
-        packRangeMap(readView(views_[i]), views_[i].world_from_camera, fusion));
+        packRangeMap(readView(views_[i]), views_[i].world_from_camera));
   };
   ColumnImages columns;
   {
@@ -181,13 +182,13 @@ HeightMapResult HeightMapper::finish(const std::function<void(const std::string&
   cv::Mat observed;
   {
     const StageTimer timer("labelling", &times_s_);
-    observed = labelObserved(columns, options_.regularization, &labelling);
+    observed = labelObserved(columns, options_.label_gamma, &labelling);
   }
   statistics.num_observed = static_cast<size_t>(cv::countNonZero(observed));
   if (statistics.num_observed == 0) {
     throw InputError(
         "no cell was observed: the " + std::to_string(views_.size()) +
-        " range maps have no sure range on a surface within fusion.max_range_m and the grid's heights " +
+        " range maps have no confident range within fusion.max_range_m and the heights of the grid, " +
         toText(grid.bottom_m, 2) + " to " + toText(grid.top_m(), 2) + " m, or their poses do not overlap");
   }
   result.map.frame_id = frame_id_;
@@ -195,7 +196,7 @@ HeightMapResult HeightMapper::finish(const std::function<void(const std::string&
   result.map.cell_size_m = grid.cell_size_m;
   {
     const StageTimer timer("smoothing", &times_s_);
-    result.map.height_m = smoothHeights(columns, observed, grid, options_.regularization, &smoothing);
+    result.map.height_m = smoothHeights(columns, observed, grid, &smoothing);
   }
   result.map.confidence = columns.confidence();
   result.map.confidence.setTo(0.0F, observed == 0);
@@ -203,12 +204,13 @@ HeightMapResult HeightMapper::finish(const std::function<void(const std::string&
   result.map.solid.setTo(0, observed);
   statistics.num_solid = static_cast<size_t>(cv::countNonZero(result.map.solid));
   result.states = classifyCells(result.map, options_.drivability);
-  result.octomap = std::make_unique<OctomapBuilder>(
-      options_.octomap, kFarthestShare * options_.range_maps.plane_sweep.max_distance_m);
+  result.octomap =
+      std::make_unique<OctomapBuilder>(options_.octomap, fusion.max_range_m,
+                                       kFarthestFraction * options_.range_maps.plane_sweep.max_distance_m);
   {
     const StageTimer timer("colours and octomap", &times_s_);
     const auto show = report("colours and octomap");
-    tbb::task_group rays;  // of one view after the other, while the next one is read and coloured
+    tbb::task_group rays;  // casts a view's rays while the next view is read and coloured
     result.map.gray = colourCells(
         result.map, views_.size(),
         [&](size_t i, PackedRangeMap* range, cv::Mat* image) {
@@ -216,7 +218,7 @@ HeightMapResult HeightMapper::finish(const std::function<void(const std::string&
           const auto map = std::make_shared<const RangeMap>(readView(view));
           rays.wait();
           rays.run([&octomap = *result.octomap, map, &view] { octomap.add(*map, view.world_from_camera); });
-          *range = packRangeMap(*map, view.world_from_camera, fusion);
+          *range = packRangeMap(*map, view.world_from_camera);
           const std::string path = imagePath(folder(), rig_->cameras[view.camera_index].name, view.stamp);
           *image = cv::imread(path, cv::IMREAD_GRAYSCALE);
           if (image->size() != map->range_m.size()) {

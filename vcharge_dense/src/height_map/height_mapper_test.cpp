@@ -26,9 +26,10 @@ namespace {
 namespace fs = std::filesystem;
 constexpr int kNumImages = 9;
 constexpr double kStep_m = 0.25;
+constexpr double kMaxRange_m = 8.0;  // of rays in the OctoMap
 const cv::Size kSize(240, 150);
 
-/// A camera that looks to the left and down, on a vehicle that drives along x over textured ground.
+/// A vehicle drives along x over textured ground, with a camera that faces left and downwards.
 class HeightMapperTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -36,7 +37,8 @@ class HeightMapperTest : public ::testing::Test {
     fs::remove_all(folder_);
     auto rig = std::make_shared<CameraRig>();
     rig->cameras.push_back({"left", "camera_left_optical", kSize, MeiCamera(1.1, 150.0, 150.0, 119.5, 74.5),
-                            2.6, "", cv::Mat(), testing::lookFrom({1.5, 0.9, 1.0}, 1.57, 0.7), std::nullopt});
+                            2.6, "", cv::Mat(), testing::cameraPose({1.5, 0.9, 1.0}, 1.57, 0.7),
+                            std::nullopt});
     rig_ = rig;
     options_.range_maps.working_camera.image_scale = 1.0;
     options_.min_view_distance_m = 0.2;
@@ -88,7 +90,7 @@ class HeightMapperTest : public ::testing::Test {
   HeightMapOptions options_;
 };
 
-TEST_F(HeightMapperTest, MapsLevelGroundAndGoesOnWhereItWasStopped) {
+TEST_F(HeightMapperTest, MapsLevelGroundAndResumesAnInterruptedRun) {
   std::string hash;
   {
     HeightMapper mapper(rig_, options_, folder_ + "/work", "drive");
@@ -120,7 +122,7 @@ TEST_F(HeightMapperTest, MapsLevelGroundAndGoesOnWhereItWasStopped) {
       EXPECT_TRUE(fs::exists(folder_ + "/map/" + name)) << name;
     }
   }
-  // A run that was stopped: one map is missing, another has no YAML yet.
+  // An interrupted run: one range map is missing, another has no YAML yet.
   const fs::path maps = fs::directory_iterator(folder_ + "/work")->path();
   const std::vector<Timestamp> stamps = listRangeMaps(maps.string(), "left");
   ASSERT_GT(stamps.size(), 4U);
@@ -134,7 +136,7 @@ TEST_F(HeightMapperTest, MapsLevelGroundAndGoesOnWhereItWasStopped) {
   const HeightMapResult result = again.finish({});
   EXPECT_EQ(result.statistics.num_reused, stamps.size() - 2);
   EXPECT_EQ(hashOf(result.map), hash);
-  // Other poses are another run.
+  // With other poses nothing is used again.
   HeightMapper other(rig_, options_, folder_ + "/work", "drive");
   Trajectory moved = poses(kNumImages);
   moved[0].world_from_vehicle = RigidTransform::planar(0.001, 0.0, 0.0);
@@ -143,7 +145,7 @@ TEST_F(HeightMapperTest, MapsLevelGroundAndGoesOnWhereItWasStopped) {
   EXPECT_EQ(other.finish({}).statistics.num_reused, 0U);
 }
 
-TEST_F(HeightMapperTest, SaysThatPosesDoNotCoverTheDrive) {
+TEST_F(HeightMapperTest, ReportsThatPosesDoNotCoverTheDrive) {
   HeightMapper mapper(rig_, options_, folder_, "");
   mapper.setTrajectory(poses(5));
   drive(&mapper);
@@ -156,7 +158,7 @@ TEST_F(HeightMapperTest, SaysThatPosesDoNotCoverTheDrive) {
   EXPECT_NE(errorOf(&without).find("no odometry"), std::string::npos);
 }
 
-TEST_F(HeightMapperTest, SaysThatThereIsNoOverlap) {
+TEST_F(HeightMapperTest, ReportsThatViewsDoNotOverlap) {
   options_.range_maps.frames.max_speed_m_per_s = 1e9;
   HeightMapper mapper(rig_, options_, folder_, "");
   Trajectory apart;
@@ -170,7 +172,7 @@ TEST_F(HeightMapperTest, SaysThatThereIsNoOverlap) {
       << error;
 }
 
-TEST_F(HeightMapperTest, SaysThatNothingSureWasSeen) {
+TEST_F(HeightMapperTest, ReportsThatNoRangeIsConfident) {
   HeightMapper mapper(rig_, options_, folder_, "");
   mapper.setTrajectory(poses(kNumImages));
   drive(&mapper, true);  // no texture: every range is NaN
@@ -193,9 +195,9 @@ TEST_F(HeightMapperTest, RefusesAGridThatIsTooLargeBeforeAnyRangeMap) {
   EXPECT_NE(errorOf(&mapper).find("max_memory_gb"), std::string::npos);
 }
 
-TEST_F(HeightMapperTest, RefusesPosesTooFarApartBeforeTheDriveAndTakesNoOthersIntoAccount) {
+TEST_F(HeightMapperTest, ChecksTheGridOfThePosesDuringTheDriveOnly) {
   const HeightMapper mapper(rig_, options_, folder_, "");
-  const Trajectory apart = poses(kNumImages, 5e5);  // from the sixth on
+  const Trajectory apart = poses(kNumImages, 5e5);  // from the sixth pose on
   EXPECT_THROW(mapper.checkGrid(apart, stampOf(0), stampOf(kNumImages)), InputError);
   EXPECT_NO_THROW(mapper.checkGrid(apart, stampOf(0), stampOf(4)));
   EXPECT_NO_THROW(mapper.checkGrid(apart, stampOf(kNumImages), stampOf(kNumImages + 1)));
@@ -228,12 +230,12 @@ TEST_F(HeightMapperTest, LeavesNoFolderOnAFullDisk) {
 }
 
 TEST_F(HeightMapperTest, RefusesBadOptionsAndARigWithoutExtrinsics) {
-  options_.fusion.band_m = 0.0;
+  options_.fusion.free_weight = 0.0;
   try {
     HeightMapper mapper(rig_, options_, folder_, "");
     FAIL();
   } catch (const std::invalid_argument& error) {
-    EXPECT_NE(std::string(error.what()).find("fusion.band_m"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("fusion.free_weight"), std::string::npos);
   }
   auto rig = std::make_shared<CameraRig>(*rig_);
   rig->cameras[0].vehicle_from_camera.reset();
@@ -242,7 +244,7 @@ TEST_F(HeightMapperTest, RefusesBadOptionsAndARigWithoutExtrinsics) {
 
 class OctomapBuilderTest : public ::testing::Test {
  protected:
-  /// A wall at x = 2 seen along x; its left half is not known.
+  /// A wall at x = 2 that a camera faces along x; its left half is unknown.
   RangeMap wall() const {
     RangeMap map = testing::blankView(cv::Size(101, 75));
     for (int y = 0; y < map.range_m.rows; ++y) {
@@ -253,17 +255,20 @@ class OctomapBuilderTest : public ::testing::Test {
     }
     return map;
   }
+  static OctomapOptions everyPixel() {
+    OctomapOptions options;
+    options.pixel_step = 1;
+    return options;
+  }
   static std::string at(const octomap::OcTree& tree, double x, double y, double z) {
     const octomap::OcTreeNode* node = tree.search(x, y, z);
     return node == nullptr ? "unknown" : tree.isNodeOccupied(node) ? "occupied" : "free";
   }
-  const RigidTransform along_x_ = testing::lookFrom({0.05, 0.05, 1.05}, 0.0, 0.0);
+  const RigidTransform along_x_ = testing::cameraPose({0.05, 0.05, 1.05}, 0.0, 0.0);
 };
 
 TEST_F(OctomapBuilderTest, ClearsToTheSurfaceOnlyWhereARangeIsKnown) {
-  OctomapOptions options;
-  options.pixel_step = 1;
-  OctomapBuilder builder(options, 40.0);
+  OctomapBuilder builder(everyPixel(), kMaxRange_m, 40.0);
   builder.add(wall(), along_x_);
   EXPECT_EQ(at(builder.tree(), 2.05, -0.45, 1.05), "occupied");  // right half: y < 0
   EXPECT_EQ(at(builder.tree(), 1.05, -0.25, 1.05), "free");
@@ -273,9 +278,7 @@ TEST_F(OctomapBuilderTest, ClearsToTheSurfaceOnlyWhereARangeIsKnown) {
 }
 
 TEST_F(OctomapBuilderTest, FileIsReadAsItWasWritten) {
-  OctomapOptions options;
-  options.pixel_step = 1;
-  OctomapBuilder builder(options, 40.0);
+  OctomapBuilder builder(everyPixel(), kMaxRange_m, 40.0);
   builder.add(wall(), along_x_);
   const std::string path = ::testing::TempDir() + "octomap_builder_test.bt";
   builder.write(path);
@@ -289,24 +292,22 @@ TEST_F(OctomapBuilderTest, FileIsReadAsItWasWritten) {
   EXPECT_EQ(at(read, 1.05, 0.45, 1.05), "unknown");
 }
 
-TEST_F(OctomapBuilderTest, UnsureRangesSayNothing) {
+TEST_F(OctomapBuilderTest, LeavesOutRangesOfLowConfidence) {
   RangeMap map = wall();
   map.confidence.setTo(0.69F);
-  map.confidence(cv::Rect(0, 0, map.range_m.cols, 40)).setTo(0.71F);  // rays that do not sink
-  OctomapOptions options;
-  options.pixel_step = 1;
-  OctomapBuilder builder(options, 40.0);
+  map.confidence(cv::Rect(0, 0, map.range_m.cols, 40)).setTo(0.71F);  // rays that do not point downwards
+  OctomapBuilder builder(everyPixel(), kMaxRange_m, 40.0);
   builder.add(map, along_x_);
   EXPECT_EQ(at(builder.tree(), 2.05, -0.45, 1.25), "occupied");
   EXPECT_EQ(at(builder.tree(), 2.05, -0.45, 0.65), "unknown");
   EXPECT_EQ(at(builder.tree(), 1.05, -0.25, 0.85), "unknown");
 }
 
-TEST_F(OctomapBuilderTest, FarthestPlaneAndRangesWithoutSigmaClearNothing) {
-  OctomapBuilder builder(OctomapOptions(), 1.9);
+TEST_F(OctomapBuilderTest, LeavesOutTheFarthestPlaneAndRangesWithoutSigma) {
+  OctomapBuilder builder(OctomapOptions(), kMaxRange_m, 1.9);
   builder.add(wall(), along_x_);
   EXPECT_EQ(builder.tree().size(), 0U);
-  OctomapBuilder other(OctomapOptions(), 40.0);
+  OctomapBuilder other(OctomapOptions(), kMaxRange_m, 40.0);
   RangeMap map = wall();
   map.standard_deviation_m.setTo(std::nanf(""));
   other.add(map, along_x_);
@@ -317,13 +318,14 @@ TEST_F(OctomapBuilderTest, FarthestPlaneAndRangesWithoutSigmaClearNothing) {
 }
 
 TEST_F(OctomapBuilderTest, EqualsAnOctreeThatIsUpdatedRayByRay) {
-  OctomapOptions options;
-  options.max_range_m = 3.0;
+  const OctomapOptions options;
+  const double max_range_m = 3.0;
   octomap::OcTree plain(options.resolution_m);
-  OctomapBuilder builder(options, 40.0);
+  OctomapBuilder builder(options, max_range_m, 40.0);
   const RangeMap map = wall();
-  for (int view = 0; view < 7; ++view) {  // enough for voxels to be as sure as they can get
-    const RigidTransform pose = testing::lookFrom({0.05, 0.05 + 0.11 * view, 1.05}, 0.4 * view, 0.05 * view);
+  for (int view = 0; view < 7; ++view) {  // enough for voxels to reach the limits of their log odds
+    const RigidTransform pose =
+        testing::cameraPose({0.05, 0.05 + 0.11 * view, 1.05}, 0.4 * view, 0.05 * view);
     octomap::KeySet ends, free, occupied;
     octomap::KeyRay passed;
     const auto toOctomap = [](const Eigen::Vector3d& p) {
@@ -338,8 +340,8 @@ TEST_F(OctomapBuilderTest, EqualsAnOctreeThatIsUpdatedRayByRay) {
         }
         const Eigen::Vector3d ray = testing::rayOf(map, x, y).cast<float>().normalized().cast<double>();
         const octomap::point3d end =
-            toOctomap(pose.translation() + std::min(range, options.max_range_m) * (pose.rotation() * ray));
-        if (range <= options.max_range_m) {
+            toOctomap(pose.translation() + std::min(range, max_range_m) * (pose.rotation() * ray));
+        if (range <= max_range_m) {
           occupied.insert(plain.coordToKey(end));
         }
         if (ends.insert(plain.coordToKey(end)).second) {
@@ -372,10 +374,7 @@ TEST_F(OctomapBuilderTest, EqualsAnOctreeThatIsUpdatedRayByRay) {
 }
 
 TEST_F(OctomapBuilderTest, RangesBeyondTheLimitClearUpToItAndEndNowhere) {
-  OctomapOptions options;
-  options.max_range_m = 1.0;
-  options.pixel_step = 1;
-  OctomapBuilder builder(options, 40.0);
+  OctomapBuilder builder(everyPixel(), 1.0, 40.0);
   builder.add(wall(), along_x_);
   EXPECT_EQ(at(builder.tree(), 0.75, -0.15, 1.05), "free");
   EXPECT_EQ(at(builder.tree(), 2.05, -0.45, 1.05), "unknown");

@@ -16,7 +16,10 @@ namespace {
 
 constexpr double kWholeSphere_rad = 6.2831853;
 
-// Marks of voxels in the view that is added.
+// Less confident ranges are left out: the octree takes a hit as right with a probability of 0.7.
+constexpr float kMinConfidence = 0.7F;
+
+// Marks of a voxel in the current view.
 constexpr uint8_t kEnd = 1, kOccupied = 2, kFree = 4;
 
 octomap::point3d toOctomap(const Eigen::Vector3d& point) {
@@ -25,8 +28,9 @@ octomap::point3d toOctomap(const Eigen::Vector3d& point) {
 
 }  // namespace
 
-OctomapBuilder::OctomapBuilder(const OctomapOptions& options, double farthest_m)
+OctomapBuilder::OctomapBuilder(const OctomapOptions& options, double max_range_m, double farthest_m)
     : options_(options),
+      max_range_m_(max_range_m),
       farthest_m_(farthest_m),
       tree_(std::make_unique<octomap::OcTree>(options.resolution_m)),
       voxels_(std::make_unique<VoxelBlocks>()) {
@@ -61,20 +65,19 @@ std::vector<OctomapBuilder::Ray> OctomapBuilder::markEnds(const RangeMap& map,
     for (int x = 0; x < map.range_m.cols; x += options_.pixel_step) {
       const float range = map.range_m.at<float>(y, x), sigma = map.standard_deviation_m.at<float>(y, x);
       if (!std::isfinite(range) || !std::isfinite(sigma) || range <= 0.0F || range >= farthest_m_ ||
-          map.confidence.at<float>(y, x) < static_cast<float>(options_.min_confidence) ||
-          !table.valid(x, y)) {
+          map.confidence.at<float>(y, x) < kMinConfidence || !table.valid(x, y)) {
         continue;
       }
-      const bool ends_here = range <= options_.max_range_m;
-      const double length = ends_here ? range : options_.max_range_m;
+      const bool ends_here = range <= max_range_m_;
+      const double length = ends_here ? range : max_range_m_;
       Ray ray;
       ray.end = toOctomap(origin + length * (world_from_camera.rotation() * table.ray(x, y).cast<double>()));
       if (!tree_->coordToKeyChecked(ray.end, ray.end_key)) {
-        continue;  // beyond what an octree holds
+        continue;  // outside the octree
       }
       uint8_t& marks = *voxels_->at(ray.end_key).marks;
       if ((marks & kEnd) == 0) {
-        rays.push_back(ray);  // rays to one voxel clear much the same: the first one stands for all
+        rays.push_back(ray);  // further rays to the same voxel would clear nearly the same voxels
       }
       marks |= ends_here ? kEnd | kOccupied : kEnd;
     }
@@ -96,7 +99,7 @@ void OctomapBuilder::add(const RangeMap& map, const RigidTransform& world_from_c
     if (tree_->computeRayKeys(origin, ray.end, passed)) {
       for (const octomap::OcTreeKey& key : passed) {
         const VoxelBlocks::Voxel voxel = voxels_->at(key);
-        // Voxels on the surface are occupied although rays to the surface behind graze them.
+        // Voxels on a surface stay occupied although rays to surfaces behind pass through them.
         if ((*voxel.marks & (kFree | kOccupied)) == 0) {
           *voxel.marks |= kFree;
           update(voxel.value, tree_->getProbMissLog());
@@ -129,7 +132,7 @@ void OctomapBuilder::write(const std::string& path) {
   tree_->prune();
   writeFileAtomically(path, [&](const std::string& temporary) {
     std::ofstream file(temporary, std::ios::binary);
-    // As OcTree::writeBinary() and its writeBinaryData(), which tell standard error about it.
+    // The format of OcTree::writeBinary(), which would also print to standard error.
     file.precision(17);
     file << "# Octomap OcTree binary file\n# free, occupied and unknown space\nid " << tree_->getTreeType()
          << "\nsize " << tree_->size() << "\nres " << tree_->getResolution() << "\ndata\n";

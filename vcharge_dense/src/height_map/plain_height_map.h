@@ -7,12 +7,12 @@
 
 namespace vcharge {
 
-/// AddColumnWeights voxel by voxel in plain C++: the reference of tests and benchmark.
+/// AddColumnWeights voxel by voxel in plain C++, as a reference for tests and benchmarks.
 void addColumnWeightsPlain(const PackedRangeMap& map, const WeightProfile& profile, const VoxelColumn& column,
                            float* weights);
 
-/// The primal-dual algorithm as the formulas say, one pass over all duals and one over all values: the
-/// reference of tests and benchmark.
+/// The primal-dual algorithm as in its formulas, one pass over all duals and one over all values, as a
+/// reference for tests and benchmarks.
 class PlainPrimalDual {
  public:
   PlainPrimalDual(const VariationalProblem& problem, const cv::Mat& start, double step_ratio);
@@ -25,7 +25,7 @@ class PlainPrimalDual {
   cv::Mat value_, extrapolated_, dual_x_, dual_y_;
 };
 
-/// Energy of a solution, summed in the order of the cells.
+/// Energy of a solution.
 double plainEnergy(const VariationalProblem& problem, const cv::Mat& values);
 
 }  // namespace vcharge

@@ -11,7 +11,7 @@
 
 namespace vcharge::testing {
 
-/// A range map of one range, sure and exact, of a fisheye camera.
+/// A range map of a fisheye camera with one confident, accurate range in all pixels.
 inline RangeMap blankView(cv::Size size) {
   return {Timestamp::fromNanoseconds(1),
           "left",
@@ -28,8 +28,8 @@ inline Eigen::Vector3d rayOf(const RangeMap& map, int x, int y) {
   return ray;
 }
 
-/// A camera at a place of the world that looks along an azimuth, tilted downwards.
-inline RigidTransform lookFrom(const Eigen::Vector3d& position_m, double azimuth_rad, double down_rad) {
+/// Pose of a camera that faces an azimuth and is tilted downwards.
+inline RigidTransform cameraPose(const Eigen::Vector3d& position_m, double azimuth_rad, double down_rad) {
   const Eigen::Quaterniond vehicle_from_optical(0.5, -0.5, 0.5, -0.5);  // z forward, x right, y down
   return RigidTransform(rotationFromYawPitchRoll(azimuth_rad, down_rad, 0.0) * vehicle_from_optical,
                         position_m);
@@ -42,7 +42,7 @@ struct BoxWorld {
   double heightAt(double x, double y) const {
     return x >= low.x() && x <= high.x() && y >= low.y() && y <= high.y() ? high.z() : 0.0;
   }
-  /// Distance along a ray, NaN where it meets nothing.
+  /// Distance along a ray to the first surface, NaN where there is none.
   double castRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
     double nearest = direction.z() < -1e-9 ? -origin.z() / direction.z() : std::nan("");
     double enter = 0.0, leave = 1e9;

@@ -6,8 +6,8 @@
 
 namespace vcharge {
 
-/// Memory of plain numbers that any vector can be loaded from. Grows, and keeps its room for the next use;
-/// the values are then undefined.
+/// Array of numbers that is aligned for every vector size. Keeps its memory when it shrinks; resize() leaves
+/// values undefined.
 template <class T>
 class AlignedArray {
  public:

@@ -39,7 +39,7 @@ struct Sampler {
   }
   HWY_INLINE VI operator()(VI u, VI v) const {
     const VI cells = gather(image, index(u, v), all_lanes);
-    // Weights 255 - f and f, with f the fraction's highest eight bits.
+    // Weights 255 - f and f, where f is the highest eight bits of the fraction.
     const VI weights_y = hn::Xor(fractionBytes(v), flip_bytes);
     const VI weights_x = hn::Xor(fractionHalves(u), flip_low);
     const VI columns = multiplyBytes(weights_y, cells);
@@ -67,7 +67,7 @@ struct Sums {
   }
 };
 
-/// 1 / sqrt, to 14 bits at least.
+/// 1 / sqrt with at least 14 correct bits.
 HWY_INLINE VF reciprocalRoot(VF value) {
   const DF df;
   const VF estimate = hn::ApproximateReciprocalSqrt(value);
@@ -80,7 +80,7 @@ HWY_INLINE VF reciprocalRoot(VF value) {
 #endif
 }
 
-/// Votes by zero-mean normalized cross correlation from a window's sums.
+/// Computes votes by zero-mean normalized cross-correlation from the sums of windows.
 struct Correlator {
   const float* HWY_RESTRICT mean;
   const float* HWY_RESTRICT vote_per_covariance;
@@ -113,9 +113,9 @@ struct Correlator {
   }
 };
 
-constexpr size_t kMaxBlock = 16;  // vectors that are sampled at a time; no cell is wider
+constexpr size_t kMaxBlock = 16;  // vectors sampled at a time; at least the width of a cell
 
-/// Positions along a row of one cell after the other.
+/// Steps through the positions along a row, cell by cell.
 struct CellWalk {
   const float* cell;
   VF row;
@@ -156,12 +156,12 @@ HWY_INLINE VI samplePairs(const int16_t* now, const int16_t* old) {
 }
 #else
 using D16 = hn::Repartition<int16_t, DI>;
-/// Packs two vectors of samples into one: of each block of 128 bits first the first vector's lanes.
+/// Packs two vectors of samples into one; each block of 128 bits holds the first vector's lanes first.
 HWY_INLINE void storeSamples(VI even, VI odd, int16_t* to) {
   const D16 d16;
   hn::Store(hn::ReorderDemote2To(d16, even, odd), d16, to);
 }
-/// Of one of two vectors that were packed: samples of two rows as the low and the high halves of lanes.
+/// Unpacks one of two packed vectors: samples of two rows become the low and the high halves of lanes.
 template <int kVector>
 HWY_INLINE VI samplePairs(const int16_t* now, const int16_t* old) {
   const D16 d16;
@@ -171,8 +171,8 @@ HWY_INLINE VI samplePairs(const int16_t* now, const int16_t* old) {
 }
 #endif
 
-/// Samples of a row, kept two vectors at a time (see storeSamples()).
-/// Apart from what is done with them, lest all of that waits in the processor's queues for a gather.
+/// Samples a row, two vectors at a time (see storeSamples()). Separate from the sums, which would otherwise
+/// wait in the processor's queues for a gather.
 template <bool kFromCells>
 class BlockSampler {
  public:
@@ -183,7 +183,7 @@ class BlockSampler {
         samples_(row.samples),
         walk_{row.cells, hn::Set(DF(), static_cast<float>(row.row_in_cell)), {}, {}, {}, {}, {}, {}} {}
 
-  /// Vectors `first` to `end`, of which there is an even number, from the next cell.
+  /// Samples the vectors `first` to `end`, an even number of them, from the next cell.
   HWY_INLINE void sample(size_t first, size_t end) {
     const DI di;
     const size_t lanes = hn::Lanes(di);
@@ -214,7 +214,7 @@ class BlockSampler {
   CellWalk walk_;
 };
 
-/// Running sums along a row of windows that end in it.
+/// Running sums along a row, over the windows that end in it.
 template <bool kWithVotes>
 class RowSums {
  public:
@@ -226,7 +226,7 @@ class RowSums {
         strip_(static_cast<size_t>(row.strip)),
         sums_{hn::Zero(DI()), hn::Zero(DI()), hn::Zero(DI())} {}
 
-  /// A column's new sample, and the one that lies a window above and leaves its sums, as a pair of halves.
+  /// Adds the new sample of a column and subtracts the one that is a window above: the halves of `pair`.
   HWY_INLINE void add(size_t s, VI pair) {
     const DI di;
     const size_t lanes = hn::Lanes(di);
@@ -249,7 +249,7 @@ class RowSums {
       }
     }
   }
-  /// The windows over the end of a strip reach into the next lane's: its first columns, one lane on.
+  /// Windows across the end of a strip continue in the first columns of the next lane's strip.
   HWY_INLINE void finish() {
     const size_t lanes = hn::Lanes(DI());
     for (size_t s = 0; kWithVotes && s + 1 < window_; ++s) {

@@ -9,7 +9,7 @@
 namespace vcharge {
 namespace {
 
-constexpr int kMinWidth_px = 16;  // the most lanes that a vector has
+constexpr int kMinWidth_px = 16;  // most lanes of a vector
 
 cv::Size halfSize(cv::Size size) {
   return {size.width / 2, size.height / 2};

@@ -11,29 +11,29 @@
 
 namespace vcharge {
 
-/// False for images too small to be swept at half their size.
+/// Whether images of this size are large enough to be swept at half their size.
 bool canBeHalved(cv::Size size);
 
-/// What a sweep compares: the reference's image and those of its neighbours.
+/// The images of a sweep.
 struct SweepPixels {
   cv::Mat reference;
   std::vector<cv::Mat> neighbours;
 };
 
-/// Means of two by two pixels.
+/// Halves images by means of two by two pixels.
 SweepPixels halved(const SweepPixels& pixels);
 
-/// Of images whose pixels are means of two by two.
+/// Camera of images that were halved by means of two by two pixels.
 MeiCamera halved(const MeiCamera& camera);
 
-/// Not 0 where all four pixels are valid.
+/// Halves a mask: not 0 where all of two by two pixels are.
 cv::Mat halvedMask(const cv::Mat& mask);
 
-/// A level for images of half the size, whose pixels are valid where all four are that they are the mean of.
+/// A level for halved images, with other options.
 std::unique_ptr<const SweepLevel> halfLevel(const SweepLevel& fine, const PlaneSweepOptions& options,
                                             const std::optional<Plane>& ground_in_camera);
 
-/// Input of a level of half the size. half_pixels: neighbours in the order of the fine input's.
+/// Input for a level of half the size, with the poses of `fine`. `half_pixels`: halved images in its order.
 SweepInput halfInput(const SweepLevel& half, const SweepInput& fine, const SweepPixels& half_pixels);
 
 }  // namespace vcharge

@@ -1,4 +1,4 @@
-// Operations on the parts of 32-bit lanes. Included once per instruction set by the kernels' files.
+// Operations on the parts of 32-bit lanes. Kernel files include this once per instruction set.
 #if defined(VCHARGE_LANE_OPERATIONS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef VCHARGE_LANE_OPERATIONS_INL_H_
 #undef VCHARGE_LANE_OPERATIONS_INL_H_
@@ -21,13 +21,14 @@ using VI = hn::VFromD<DI>;
 using MI = decltype(hn::Lt(VI(), VI()));
 
 // multiplyHalves  sum of the products of the signed 16-bit halves
-// multiplyBytes   the same of unsigned bytes with signed ones, into the halves that the bytes lie in
-// gather          on x86 a gather waits for what its register held before, even where all
-//                 lanes are read: it starts from zeros, and the compiler must not know that `lanes` are all
-// negateHighHalf  the low half stays
-// fractionBytes   byte 1, the highest bits of a position's fraction, in all bytes
-// fractionHalves  the same in the low byte of both halves
-// nearest         of floats that fit into integers
+// multiplyBytes   for each half, sum of the products of its unsigned with its signed bytes
+// gather          reads 32-bit values. On x86 a gather depends on its register's old value even where all
+// lanes
+//                 are read, so it starts from zeros; the compiler must not know that `lanes` are all set
+// negateHighHalf  negates the high half and keeps the low one
+// fractionBytes   copies byte 1, the highest bits of a position's fraction, into all bytes
+// fractionHalves  copies byte 1 into the low byte of both halves
+// nearest         rounds floats that fit into integers
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSSE3
 #if HWY_TARGET <= HWY_AVX3
 HWY_INLINE VI nearest(VF a) {

@@ -11,10 +11,10 @@
 namespace vcharge {
 namespace {
 
-constexpr int kCellsPerLine = 16;  // of a cache line
+constexpr int kCellsPerLine = 16;  // cells per cache line
 
-/// Cells of a row: an odd number of cache lines, for rows a power of two apart would share few places of the
-/// caches.
+/// Cells per row: an odd number of cache lines, because rows a power of two apart would compete for few cache
+/// sets.
 int pitchOf(int width) {
   const int lines = (width + kCellsPerLine - 1) / kCellsPerLine;
   return kCellsPerLine * (lines | 1);

@@ -8,7 +8,7 @@
 
 namespace vcharge {
 
-/// Calls function(row) for every row; the calls must not depend on each other.
+/// Calls function(row) for every row in parallel; the calls must not depend on each other.
 template <class Function>
 void forEachRow(int rows, const Function& function) {
   tbb::parallel_for(tbb::blocked_range<int>(0, rows, 16), [&](const tbb::blocked_range<int>& range) {
@@ -18,7 +18,8 @@ void forEachRow(int rows, const Function& function) {
   });
 }
 
-/// Calls function(begin, end) for bands of rows, the same ones on any number of threads.
+/// Calls function(begin, end) for bands of rows in parallel; the bands do not depend on the number of
+/// threads.
 template <class Function>
 void forEachBand(int rows, const Function& function) {
   constexpr int kBandRows = 32;
@@ -26,7 +27,7 @@ void forEachBand(int rows, const Function& function) {
                     [&](int band) { function(band * kBandRows, std::min(rows, (band + 1) * kBandRows)); });
 }
 
-/// Copies a row into the middle of one with NaN in `margin` columns on both sides.
+/// Copies a row and adds `margin` columns of NaN on both sides.
 inline void copyPadded(const float* row, int columns, int margin, float* padded) {
   std::fill_n(padded, margin, std::numeric_limits<float>::quiet_NaN());
   std::copy_n(row, columns, padded + margin);

@@ -74,7 +74,7 @@ class MatPool : public cv::MatAllocator {
 }  // namespace
 
 cv::Mat pooledMat(cv::Size size, int type) {
-  // Never destroyed: matrices may live as long as the process.
+  // Never destroyed, because matrices may live as long as the process.
   static auto* const pool = new MatPool;
   cv::Mat mat;
   mat.allocator = pool;

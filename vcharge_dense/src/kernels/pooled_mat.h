@@ -4,9 +4,9 @@
 
 namespace vcharge {
 
-/// A matrix whose values are undefined and whose memory, once it is released, serves the next one of its
-/// size, on any thread: the images of a sweep come and go in the same sizes, and fresh pages cost more time
-/// than what is written into them. A bounded amount of memory is kept.
+/// A matrix with undefined values. Its memory is reused after release by the next matrix of the same size,
+/// because new memory pages cost more time than filling them. At most 96 MB of unused memory are kept. Thread
+/// safe.
 cv::Mat pooledMat(cv::Size size, int type);
 
 }  // namespace vcharge

@@ -8,9 +8,9 @@
 namespace vcharge {
 namespace {
 
-// A window whose gray levels have a smaller sum of squares about their mean counts as constant.
+// A window with a smaller sum of squares about its mean is constant.
 constexpr float kMinSquares_gray2 = 1e-3f;
-constexpr int kLargestGray = 127;  // in magnitude, less 128
+constexpr int kLargestGray = 127;  // magnitude of a gray level minus 128
 
 }  // namespace
 
@@ -18,12 +18,12 @@ SampleScale SampleScale::forWindow(int window_px) {
   const double count = window_px * window_px;
   const double full = kLargestGray * kWeightSum * kWeightSum;
   SampleScale scale;
-  // n samples of at most m, one of which may be `unseen`: its square exceeds all of theirs, n m^2, and n of
-  // its squares fit into 32 bits.
+  // The square of `unseen` must exceed the squares of all n samples of a window, and n of it must fit into 32
+  // bits.
   const double unseen = std::floor(std::sqrt(4294967295.0 / count));
   const auto largest = [&] { return full / (1 << scale.shift) + 1.0; };
   const auto squaresOf = [&] { return count * largest() * largest(); };
-  // The least that an unseen sample adds to the squares about the mean.
+  // Least sum of squares about the mean of a window with an unseen sample.
   const auto leastWithUnseen = [&] {
     return (count - 1.0) / count * (unseen - largest()) * (unseen - largest());
   };

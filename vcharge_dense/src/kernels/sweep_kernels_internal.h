@@ -4,7 +4,7 @@
 
 namespace vcharge {
 
-// Each fills in the kernels of its file.
+// Each sets the kernels of its file.
 void addWarpKernels(SweepKernels* kernels);
 void addCorrelationKernels(SweepKernels* kernels);
 void addVoteKernels(SweepKernels* kernels);

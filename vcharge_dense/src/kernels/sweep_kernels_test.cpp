@@ -1,8 +1,7 @@
-// The parts of the sweep's inner loops, against formulas, on every instruction set of the machine.
+// Tests of the sweep's inner loops against formulas, on every instruction set of the machine.
 #include "kernels/sweep_kernels.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -16,17 +15,7 @@
 namespace vcharge {
 namespace {
 
-using testing::allValid;
-using testing::kCamera;
-using testing::kFront;
-using testing::kLeft;
-using testing::kSize;
-using testing::lotScene;
-using testing::makeSequence;
-using testing::onEveryTarget;
-using testing::Sequence;
-
-/// Of the grid's cells at a pixel of the tile, in pixels of the packed image.
+/// Position in the packed image that the grid's cells give for a pixel of the tile.
 Eigen::Vector2d positionFromCells(const NodeGrid& grid, const AlignedArray<float>& cells,
                                   const TileLayout& layout, int row, int column) {
   const auto lanes = static_cast<size_t>(layout.lanes);
@@ -49,14 +38,14 @@ Eigen::Vector2d positionFromCells(const NodeGrid& grid, const AlignedArray<float
   return position;
 }
 
-TEST(NodeGridTest, InterpolatedWarpErrsNoMoreThanItSays) {
+TEST(NodeGridTest, ErrorOfTheInterpolatedWarpIsWithinItsBound) {
   const PlaneSweepOptions options;
   int judged = 0, within_tolerance = 0, all = 0;
   for (const RigidTransform& camera_pose : {kLeft, kFront}) {
     const Plane ground = groundInCamera(camera_pose);
     for (const PlaneFamily& family : makePlaneFamilies(options, ground)) {
       for (const double baseline_m : {0.1, 0.4, 0.8}) {
-        // The neighbour also turns, by half a degree per 0.1 m.
+        // The neighbour also rotates, by half a degree per 0.1 m.
         const RigidTransform neighbour(
             camera_pose.rotation() * rotationFromVector(Eigen::Vector3d(0.02, -0.06, 0.03) * baseline_m),
             camera_pose.translation() - Eigen::Vector3d(baseline_m, 0.0, 0.0));
@@ -113,7 +102,7 @@ TEST(NodeGridTest, InterpolatedWarpErrsNoMoreThanItSays) {
   EXPECT_GT(within_tolerance, 0.8 * all);
 }
 
-TEST(SampleScaleTest, OneUnseenSampleSpoilsAnyWindow) {
+TEST(SampleScaleTest, OneUnseenSampleInvalidatesAnyWindow) {
   for (int window = 3; window <= 31; window += 2) {
     const SampleScale scale = SampleScale::forWindow(window);
     const int64_t count = window * window;
@@ -123,7 +112,7 @@ TEST(SampleScaleTest, OneUnseenSampleSpoilsAnyWindow) {
         << "any window of gray levels counts";
     for (const int64_t gray : {low, high}) {
       for (int64_t unseen = 1; unseen <= count; ++unseen) {
-        // In 32 bits, as the kernels add up.
+        // Sums in 32 bits, as in the kernels.
         const int64_t sum = unseen * scale.unseen + (count - unseen) * gray;
         const int64_t exact = unseen * scale.unseen * scale.unseen + (count - unseen) * gray * gray;
         const auto squares = static_cast<float>(static_cast<int32_t>(static_cast<uint32_t>(exact)));
@@ -136,7 +125,7 @@ TEST(SampleScaleTest, OneUnseenSampleSpoilsAnyWindow) {
   }
 }
 
-/// Expects the first sweep's scores on all instruction sets within a tolerance of each other.
+/// Expects that scores of the first sweep agree within a tolerance on all instruction sets.
 void expectAgreement(const PlaneSweepOptions& options, float tolerance) {
   const Sequence s = makeSequence(lotScene(4), kLeft, 0.15, -4, 0, 1.0);
   cv::Mat mask = allValid();
@@ -144,7 +133,7 @@ void expectAgreement(const PlaneSweepOptions& options, float tolerance) {
   SweepDetails first;
   onEveryTarget([&] {
     SweepDetails details;
-    PlaneSweep(kCamera, mask, options, s.ground).sweep(s.reference, s.neighbours, &details);
+    sweepOf(s, options, &details, mask);
     if (first.plane.empty()) {
       first = details;
       return;
@@ -154,7 +143,8 @@ void expectAgreement(const PlaneSweepOptions& options, float tolerance) {
     cv::Mat difference = cv::abs(details.score - first.score);
     difference.setTo(0.0f, ~known);
     EXPECT_LE(cv::countNonZero(difference > tolerance), 0.001 * kSize.area());
-    EXPECT_GE(cv::countNonZero(details.plane == first.plane), 0.998 * kSize.area());  // two may score alike
+    EXPECT_GE(cv::countNonZero(details.plane == first.plane),
+              0.998 * kSize.area());  // two planes may have equal scores
     const cv::Mat other_voters = (details.voters != first.voters) & (details.plane == first.plane);
     EXPECT_LE(cv::countNonZero(other_voters), 0.001 * kSize.area());
   });
@@ -164,13 +154,12 @@ TEST(SweepKernelsTest, AllInstructionSetsAgree) {
   PlaneSweepOptions options;
   options.num_planes = 16;
   options.num_ground_planes = 8;
-  options.num_refinement_steps = 0;  // it would start elsewhere where two planes score alike
-  for (const Aggregation aggregation :
-       {Aggregation::kMean, Aggregation::kReferenceSplit, Aggregation::kBestK}) {
+  options.num_refinement_steps = 0;  // it would start elsewhere where two planes have equal scores
+  for (const Aggregation aggregation : {Aggregation::kMean, Aggregation::kReferenceSplit}) {
     options.aggregation = aggregation;
-    expectAgreement(options, 0.002f);  // vectors of another length have their nodes elsewhere
+    expectAgreement(options, 0.002f);  // nodes depend on the length of vectors
   }
-  // With every pixel projected, sums are integers; reciprocal roots and roundings differ by 1e-4.
+  // With every pixel projected sums are equal integers; reciprocal roots and rounding differ by 1e-4.
   options.warp_tolerance_px = 0.0;
   expectAgreement(options, 0.0002f);
 }
@@ -190,7 +179,7 @@ TEST(SweepKernelsTest, LargestMotionIsTheProjectionsDerivative) {
       p.translation[i] = static_cast<float>(poses[n].translation()[i]);
     }
   }
-  constexpr size_t kCount = 21;  // no multiple of any vector
+  constexpr size_t kCount = 21;  // not a multiple of any vector
   std::vector<float> x(kCount), y(kCount), z(kCount), inverse_range(kCount), expected(kCount);
   for (size_t i = 0; i < kCount; ++i) {
     Eigen::Vector3d ray;

@@ -7,6 +7,7 @@
 
 #include <limits>
 
+#include "kernels/lane_operations-inl.h"
 #include "kernels/sweep_kernels.h"
 #include "kernels/sweep_kernels_internal.h"
 
@@ -15,11 +16,6 @@ namespace vcharge {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using DF = hn::ScalableTag<float>;
-using DI = hn::ScalableTag<int32_t>;
-using VF = hn::VFromD<DF>;
-using VI = hn::VFromD<DI>;
 using MF = decltype(hn::Lt(VF(), VF()));
 
 HWY_INLINE VF set(float value) {
@@ -41,10 +37,10 @@ struct Vector3 {
   }
 };
 
-/// How the image of a point in a neighbour reacts to errors, by the unified projection's derivative.
+/// Sensitivity of a point's image in a neighbour, from the derivative of the unified projection.
 struct Sensitivity {
-  VF pixels_per_inverse_range;  // 0 where the neighbour does not see the point
-  VF pixels_per_radian;         // along that same direction, of a rotation of the neighbour (worst axis)
+  VF pixels_per_inverse_range;  // 0 where the point is not visible
+  VF pixels_per_radian;         // in the same direction, for a rotation about the worst axis
   VF range_ratio;               // range from the neighbour over range from the reference
 };
 
@@ -65,7 +61,7 @@ HWY_INLINE Sensitivity sensitivityOf(const Projection& camera, const Vector3& ra
                           hn::Gt(direction.z, set(min_cosine)));
   const VF per_denominator = hn::Div(one, denominator);
   const VF plane_x = hn::Mul(direction.x, per_denominator), plane_y = hn::Mul(direction.y, per_denominator);
-  // Of the direction, hence of the pixel.
+  // Derivative of the direction, then of the pixel.
   const Vector3 turn = t.plus(hn::Neg(direction.dot(t)), direction).times(per_norm);
   const VF motion_x = hn::Mul(hn::Mul(fx, per_denominator), hn::NegMulAdd(plane_x, turn.z, turn.x));
   const VF motion_y = hn::Mul(hn::Mul(fy, per_denominator), hn::NegMulAdd(plane_y, turn.z, turn.y));
@@ -94,7 +90,7 @@ void largestMotionTarget(const UncertaintyRow& row, float* motion) {
     for (int n = 0; n < row.num_neighbours; ++n) {
       const VF pixels =
           sensitivityOf(row.neighbours[n].projection, ray, inverse_range).pixels_per_inverse_range;
-      largest = hn::IfThenElse(hn::Gt(pixels, largest), pixels, largest);  // passes over NaN
+      largest = hn::IfThenElse(hn::Gt(pixels, largest), pixels, largest);  // ignores NaN
     }
     hn::StoreU(largest, df, motion + at);
   }
@@ -124,7 +120,7 @@ void inverseRangeSigmaTarget(const UncertaintyRow& row, float* sigma) {
       const VF shift = hn::Div(inverse_range, s.range_ratio);
       const VF pose = hn::Sqrt(hn::MulAdd(set(neighbour.translation_variance_m2), square(shift),
                                           set(neighbour.rotation_variance_rad2)));
-      // Windows seen at another scale differ by more than a shift.
+      // Windows at different scales differ by more than a shift.
       const VF scale = hn::Max(s.range_ratio, hn::Div(one, s.range_ratio));
       const VF matching = hn::Mul(hn::Mul(motion, set(row.matching_noise_px)), square(scale));
       VF& errors = neighbour.after ? errors_after : errors_before;

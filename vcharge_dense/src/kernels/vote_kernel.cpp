@@ -1,4 +1,3 @@
-// Votes are kept in arrays of vectors here, which SVE and RVV cannot have.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/vote_kernel.cpp"
@@ -19,11 +18,9 @@ using DI16 = hn::ScalableTag<int16_t>;
 using MF = decltype(hn::Lt(VF(), VF()));
 using V16 = hn::VFromD<DI16>;
 
-constexpr int kMaxNeighbours = 32;
-
-/// Sum of some neighbours' votes at one vector of pixels, hence their mean.
+/// Mean of votes at one vector of pixels, from their sum.
 struct Mean {
-  VF value;  // in units of 1 / kVoteScale; meaningless where nobody votes
+  VF value;  // in units of 1 / kVoteScale; undefined where no neighbour votes
   MF known;
 
   explicit HWY_INLINE Mean(VI sum) {
@@ -42,7 +39,7 @@ struct Mean {
 };
 
 struct Pixels {
-  const VoteRow row;  // a copy: what a reference names is read again after every byte that is stored
+  const VoteRow row;  // a copy, because members of a reference are read again after each stored byte
   size_t vector;
 
   HWY_INLINE VI vote(int n) const {
@@ -81,7 +78,7 @@ HWY_INLINE Mean meanOfAll(const Pixels& pixels) {
   return Mean(sum);
 }
 
-/// The better of the means before and after the reference.
+/// Larger one of the means before and after the reference.
 HWY_INLINE Mean meanOfBetterSide(const Pixels& pixels) {
   const DI di;
   const bool* after = pixels.row.after;
@@ -101,34 +98,6 @@ HWY_INLINE Mean meanOfBetterSide(const Pixels& pixels) {
           hn::Or(mean_before.known, mean_after.known)};
 }
 
-/// Mean of the best_k best votes, or of all where there are fewer.
-HWY_INLINE Mean meanOfBest(const Pixels& pixels) {
-  const DI di;
-  VI open[kMaxNeighbours];
-  const int num_neighbours = pixels.row.num_neighbours;
-  for (int n = 0; n < num_neighbours; ++n) {
-    open[n] = pixels.vote(n);
-  }
-  VI sum = hn::Zero(di);
-  for (int k = 0; k < pixels.row.best_k; ++k) {
-    VI best = hn::Zero(di);
-    for (int n = 0; n < num_neighbours; ++n) {
-      best = hn::Max(best, open[n]);
-    }
-    sum = hn::Add(sum, best);
-    auto wanted = hn::Gt(best, hn::Zero(di));
-    for (int n = 0; n < num_neighbours; ++n) {
-      const auto chosen = hn::And(wanted, hn::Eq(open[n], best));
-      open[n] = hn::IfThenZeroElse(chosen, open[n]);
-      wanted = hn::AndNot(chosen, wanted);
-    }
-  }
-  for (int n = 0; n < num_neighbours; ++n) {
-    pixels.storeVoters(n, hn::AndNot(votes(open[n]), votes(pixels.vote(n))));
-  }
-  return Mean(sum);
-}
-
 template <class Aggregate>
 HWY_INLINE void voteAll(const VoteRow& row, const Aggregate& aggregate) {
   for (size_t s = 0; s < static_cast<size_t>(row.strip); ++s) {
@@ -143,12 +112,10 @@ void voteTarget(const VoteRow& row) {
       return voteAll(row, [](const Pixels& pixels) HWY_ATTR { return meanOfAll(pixels); });
     case Aggregation::kReferenceSplit:
       return voteAll(row, [](const Pixels& pixels) HWY_ATTR { return meanOfBetterSide(pixels); });
-    case Aggregation::kBestK:
-      return voteAll(row, [](const Pixels& pixels) HWY_ATTR { return meanOfBest(pixels); });
   }
 }
 
-/// The two highest peaks so far; `current` and `previous` are the last two scores.
+/// Finds the two highest peaks; `current` and `previous` are the last two scores.
 struct PeakSearch {
   V16 previous, current, best, score, before, after, second, second_score;
 
@@ -189,7 +156,7 @@ void findPeaksTarget(const int16_t* scores, size_t stride, int num_hypotheses, s
   const V16 none = hn::Set(d, kNoScore);
   const size_t lanes = hn::Lanes(d);
   for (size_t first = 0; first < num_pixels; first += lanes) {
-    // The last vector overlaps the one before where the pixels do not fill it.
+    // The last vector overlaps the previous one where pixels do not fill it.
     const size_t i = HWY_MIN(first, num_pixels - lanes);
     PeakSearch search(hn::LoadU(d, scores + i));
     const int16_t* next = scores + i;

@@ -1,4 +1,4 @@
-// Cells are kept in arrays of vectors of one size here, which SVE and RVV cannot have.
+// Arrays of vectors do not exist for SVE and RVV, whose vectors have no fixed size.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "kernels/warp_kernel.cpp"
@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include "kernels/lane_operations-inl.h"
 #include "kernels/sweep_kernels.h"
 #include "kernels/sweep_kernels_internal.h"
 
@@ -17,16 +18,10 @@ namespace vcharge {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-using DF = hn::ScalableTag<float>;
-using DI = hn::ScalableTag<int32_t>;
-using VF = hn::VFromD<DF>;
-using VI = hn::VFromD<DI>;
-
 constexpr float kOne = static_cast<float>(1 << kPositionBits);
 
-// Roots and reciprocals to 22 bits at least (0.0002 pixels), without the processor's slow division where its
-// estimates have 11 bits or more: one step of Newton's method doubles them.
+// Roots and reciprocals with at least 22 correct bits (0.0002 pixels). Where the processor's estimates have
+// 11 bits or more, one step of Newton's method doubles them, which is faster than division.
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
 HWY_INLINE VF root(VF value) {
   const DF df;
@@ -150,7 +145,7 @@ void makeCellsTarget(const float* const* u_rows, const float* const* v_rows, int
   }
 }
 
-/// Larger of both, passing over NaN in `value`.
+/// Larger one of both, ignoring NaN in `value`.
 HWY_INLINE VF maxOfKnown(VF value, VF largest) {
   return hn::IfThenElse(hn::Gt(value, largest), value, largest);
 }
@@ -160,7 +155,7 @@ NodeDifferences nodeDifferencesTarget(const float* u, const float* v, int node_r
   const size_t lanes = hn::Lanes(df);
   const size_t row_size = static_cast<size_t>(nodes) * lanes;
   VF second = hn::Zero(df), third = hn::Zero(df);
-  // Along `count` values, `step` floats apart.
+  // Updates the differences along `count` values, `step` floats apart.
   const auto consider = [&](const float* values, size_t step, int count) HWY_ATTR {
     VF last = hn::Load(df, values + step);
     VF slope = hn::Sub(last, hn::Load(df, values)), last_bend = slope;

@@ -5,14 +5,9 @@
 
 namespace vcharge {
 
-void NeighbourOptions::validate() const {
-  requireField(num_neighbours >= 1 && num_neighbours <= 32, "num_neighbours", "must be in [1, 32]",
-               num_neighbours);
-  requireField(min_baseline_m > 0.0, "min_baseline_m", "must be positive", min_baseline_m);
-  requireField(max_baseline_m >= min_baseline_m && max_baseline_m <= 100.0, "max_baseline_m",
-               "must be in [min_baseline_m, 100]", max_baseline_m);
-  requireField(max_forward_baseline_m >= max_baseline_m && max_forward_baseline_m <= 100.0,
-               "max_forward_baseline_m", "must be in [max_baseline_m, 100]", max_forward_baseline_m);
+void NeighbourOptions::checkFields() const {
+  requireField(max_forward_baseline_m >= max_baseline_m, "max_forward_baseline_m",
+               "must not be below max_baseline_m", max_forward_baseline_m);
 }
 
 double longestBaseline(const NeighbourOptions& options, const Eigen::Vector3d& optical_axis,
@@ -21,15 +16,14 @@ double longestBaseline(const NeighbourOptions& options, const Eigen::Vector3d& o
   return options.max_baseline_m + along * (options.max_forward_baseline_m - options.max_baseline_m);
 }
 
-std::vector<size_t> selectNeighbours(const NeighbourOptions& options, const std::vector<double>& baselines_m,
-                                     int count, double longest_m) {
+std::vector<size_t> selectNeighbours(const std::vector<double>& baselines_m, int count, double longest_m) {
   std::vector<size_t> chosen;
   for (int k = count; k >= 1; --k) {
     const double target_m = longest_m * k / count;
     bool found = false;
     size_t best = 0;
     for (size_t i = 0; i < baselines_m.size(); ++i) {
-      const bool usable = baselines_m[i] >= options.min_baseline_m && baselines_m[i] <= 1.25 * longest_m &&
+      const bool usable = baselines_m[i] >= kMinBaseline_m && baselines_m[i] <= 1.25 * longest_m &&
                           std::find(chosen.begin(), chosen.end(), i) == chosen.end();
       if (usable &&
           (!found || std::abs(baselines_m[i] - target_m) < std::abs(baselines_m[best] - target_m))) {

@@ -18,13 +18,13 @@ const cv::Size kTrackWindow_px(15, 15);
 constexpr float kMaxReturnError_px = 0.5f;
 constexpr double kTrackNoise_px = 0.2;
 constexpr int kMinTracks = 30;
-// Tracks start where a point at this inverse range would be.
+// Initial guess of a track: where a point at this inverse range would be.
 constexpr double kGuess_per_m = 0.15;
-// Rays closer to the direction of travel (sine) say nothing about epipolar planes.
+// Rays closer to the direction of travel (sine of the angle) do not determine an epipolar plane.
 constexpr double kMinSine = 0.1;
 constexpr int kMaxSteps = 10;
-constexpr double kSettled = 1e-3;       // of the noise's standard deviations
-constexpr double kMaxDeviations = 4.0;  // of each axis from the given pose
+constexpr double kConverged = 1e-3;     // largest step, in standard deviations of the noise
+constexpr double kMaxDeviations = 4.0;  // largest correction of an axis
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
@@ -33,13 +33,13 @@ struct Track {
   Eigen::Vector3d from, to;  // unit rays
 };
 
-/// Corrected by a rotation vector and a translation, both in the neighbour's frame.
+/// Applies a correction: rotation vector and translation in the neighbour's frame.
 RigidTransform corrected(const RigidTransform& pose, const Vector6& correction) {
   return RigidTransform(rotationFromVector(correction.head<3>()) * pose.rotation(),
                         pose.translation() + correction.tail<3>());
 }
 
-/// Sine of a track's angle to its epipolar plane; false where it has none.
+/// Sine of a track's angle to its epipolar plane; returns false where the plane is not determined.
 bool epipolarError(const RigidTransform& pose, const Track& track, double* sine) {
   const Eigen::Vector3d normal = pose.translation().cross(pose.rotation() * track.from);
   const double length = normal.norm();
@@ -108,20 +108,20 @@ PoseRefinement::Result PoseRefinement::refine(const cv::Mat& pixels,
     return result;
   }
 
-  const auto deviation = [&](double of_any_pair, double per_sqrt_m) {
-    return std::sqrt(of_any_pair * of_any_pair + per_sqrt_m * per_sqrt_m * baseline_m);
+  const auto deviation = [&](double constant, double per_sqrt_m) {
+    return std::sqrt(constant * constant + per_sqrt_m * per_sqrt_m * baseline_m);
   };
   Vector6 sigma;
   sigma << Eigen::Vector3d::Constant(deviation(noise_.rotation_rad, noise_.rotation_rad_per_sqrt_m)),
       Eigen::Vector3d::Constant(deviation(noise_.translation_m, noise_.translation_m_per_sqrt_m));
-  // A pixel's angle, at least: the unified camera's resolution is highest at the centre.
+  // Angle of a pixel in the middle of the image, where the unified camera has its highest resolution.
   const double noise = kTrackNoise_px * (1.0 + camera_.xi()) / camera_.gamma1();
-  // Gauss-Newton with Cauchy's weights; unknowns in the pose's standard deviations.
+  // Gauss-Newton with Cauchy weights; the unknowns are in units of the pose's standard deviations.
   Vector6 x = Vector6::Zero();
   Matrix6 hessian;
-  bool settled = false;
+  bool converged = false;
   int agreeing = 0;
-  for (int step = 0; step < kMaxSteps && !settled; ++step) {
+  for (int step = 0; step < kMaxSteps && !converged; ++step) {
     hessian.setIdentity();
     Vector6 gradient = x;
     agreeing = 0;
@@ -151,9 +151,9 @@ PoseRefinement::Result PoseRefinement::refine(const cv::Mat& pixels,
     }
     const Vector6 change = -hessian.ldlt().solve(gradient);
     x += change;
-    settled = change.cwiseAbs().maxCoeff() < kSettled;
+    converged = change.cwiseAbs().maxCoeff() < kConverged;
   }
-  if (settled && 2 * agreeing >= result.num_tracks && agreeing >= kMinTracks &&
+  if (converged && 2 * agreeing >= result.num_tracks && agreeing >= kMinTracks &&
       x.cwiseAbs().maxCoeff() <= kMaxDeviations) {
     result.neighbour_from_reference = corrected(neighbour_from_reference, x.cwiseProduct(sigma));
     result.is_refined = true;

@@ -10,27 +10,27 @@
 
 namespace vcharge {
 
-/// Corrects poses of neighbours relative to one reference by tracks of image points: odometry's jitter
-/// becomes a range error sideways, and points that are tracked to a fraction of a pixel see it.
+/// Corrects the poses of neighbours relative to one reference by tracked image points. Odometry's jitter
+/// causes range errors of cameras that look sideways, and tracks with subpixel accuracy reveal it.
 ///
-/// Each relative pose is estimated by itself: robust least squares over the tracks' angles to their epipolar
-/// planes and the given pose with its noise (PoseNoiseOptions), which alone holds the length of the baseline.
-/// Where the tracks are few, the estimate does not settle or it leaves the pose's noise far behind, the given
-/// pose stays.
+/// Each relative pose is estimated separately: robust least squares over the tracks' angles to their epipolar
+/// planes, with the given pose and its noise (PoseNoiseOptions) as prior; only the prior constrains the
+/// length of the baseline. The given pose is kept where there are few tracks, the estimate does not converge
+/// or it differs from the given pose by much more than the noise. Thread safe.
 class PoseRefinement {
  public:
-  /// camera: without distortion; reference and valid_mask: CV_8UC1 of its size.
+  /// `camera` has no distortion; `reference` and `valid_mask`: CV_8UC1 of its size.
   PoseRefinement(const MeiCamera& camera, const cv::Mat& reference, const cv::Mat& valid_mask,
                  const PoseNoiseOptions& noise);
 
   struct Result {
     RigidTransform neighbour_from_reference;
     bool is_refined = false;
-    int num_tracks = 0;  ///< that came back to where they started
-    /// What the tracks leave of the given pose's variances, mean over the axes.
+    int num_tracks = 0;  ///< tracks that also lead back to where they started
+    /// Remaining fraction of the given pose's variances, mean over the axes.
     double rotation_variance_left = 1.0, translation_variance_left = 1.0;
   };
-  /// `pixels` as the reference.
+  /// Refines the pose of a neighbour with these pixels (CV_8UC1, size of the reference).
   Result refine(const cv::Mat& pixels, const RigidTransform& neighbour_from_reference) const;
 
  private:
@@ -39,7 +39,7 @@ class PoseRefinement {
   PoseNoiseOptions noise_;
   std::vector<cv::Mat> pyramid_;
   std::vector<cv::Point2f> corners_;
-  std::vector<Eigen::Vector3d> rays_;  // of the corners
+  std::vector<Eigen::Vector3d> rays_;  // unit rays of the corners
 };
 
 }  // namespace vcharge

@@ -11,16 +11,6 @@
 namespace vcharge {
 namespace {
 
-using testing::allValid;
-using testing::disturb;
-using testing::kCamera;
-using testing::kFront;
-using testing::kLeft;
-using testing::kSize;
-using testing::lotScene;
-using testing::makeSequence;
-using testing::Sequence;
-
 RigidTransform relativePose(const Sequence& s, size_t n) {
   return s.neighbours[n].world_from_camera.inverse() * s.reference.world_from_camera;
 }
@@ -54,24 +44,18 @@ TEST(PoseRefinementTest, RemovesMostOfTheOdometrysJitter) {
 }
 
 TEST(PoseRefinementTest, RangesOfJitteredPosesBecomeBetter) {
+  constexpr int kBorder = 8;
   int right[2] = {0, 0}, all = 0;
   for (uint32_t draw = 0; draw < 4; ++draw) {
     Sequence s = makeSequence(lotScene(40 + draw), kLeft, 0.2, -4, 0, 2.0);
     PlaneSweepOptions options;
-    options.gate = false;
+    options.min_confidence = 0.0;
     std::mt19937 generator(100 + draw);
     disturb(options.pose_noise, &generator, &s);
+    all += (kSize.width - 2 * kBorder) * (kSize.height - 2 * kBorder);
     for (const bool refine : {false, true}) {
       options.refine_poses = refine;
-      const RangeMap map =
-          PlaneSweep(kCamera, allValid(), options, s.ground).sweep(s.reference, s.neighbours);
-      for (int y = 8; y < kSize.height - 8; ++y) {
-        for (int x = 8; x < kSize.width - 8; ++x) {
-          const double truth = s.truth.at<double>(y, x);
-          right[refine ? 1 : 0] += std::abs(map.range_m.at<float>(y, x) - truth) <= 0.01 * truth ? 1 : 0;
-          all += refine ? 0 : 1;
-        }
-      }
+      right[refine ? 1 : 0] += countRight(sweepOf(s, options), s.truth, 0.01, kBorder);
     }
   }
   RecordProperty("within_1_percent", std::to_string(static_cast<double>(right[0]) / all));
@@ -79,8 +63,8 @@ TEST(PoseRefinementTest, RangesOfJitteredPosesBecomeBetter) {
   EXPECT_GT(right[1], right[0] + 0.05 * all);
 }
 
-TEST(PoseRefinementTest, StaysWithinThePosesNoise) {
-  // Poses that are wrong by far more than their noise says: what comes back is the given pose.
+TEST(PoseRefinementTest, KeepsTheGivenPoseWhereTheCorrectionExceedsItsNoise) {
+  // A pose that is wrong by much more than its noise is returned unchanged.
   const Sequence s = makeSequence(lotScene(50), kLeft, 0.2, -2, 0, 2.0);
   PoseNoiseOptions tight;
   tight.rotation_rad = tight.rotation_rad_per_sqrt_m = 1e-4;
@@ -94,7 +78,7 @@ TEST(PoseRefinementTest, StaysWithinThePosesNoise) {
   EXPECT_EQ(result.neighbour_from_reference.translation(), wrong.translation());
 }
 
-TEST(PoseRefinementTest, WithoutTracksTheGivenPoseStays) {
+TEST(PoseRefinementTest, KeepsTheGivenPoseWithoutTracks) {
   const Sequence s = makeSequence(lotScene(51), kLeft, 0.2, -1, 0);
   const cv::Mat gray(kSize, CV_8UC1, cv::Scalar(90));
   cv::Mat noise(kSize, CV_8UC1);

@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "vcharge_core/base/error.h"
@@ -9,12 +10,14 @@
 namespace vcharge {
 namespace {
 
-// A camera silent for longer, while the drive goes on, has stopped.
+// A camera that moved less than this since its last image stands: there is no parallax.
+constexpr double kMinMotion_m = 0.03;
+// A camera whose newest image is older than this, against the other cameras, has stopped.
 constexpr double kMaxImageGap_s = 1.0;
 
 struct Frame {
   SweepImage image;
-  double path_m;  // along the camera's way
+  double path_m;  // length of the camera's path up to this frame
 };
 
 }  // namespace
@@ -49,14 +52,15 @@ void RangeMapperOptions::usePreset(RangePreset new_preset) {
   }
 }
 
-void RangeMapperOptions::validate() const {
-  requireField(min_motion_m > 0.0, "min_motion_m", "must be positive", min_motion_m);
+void RangeMapperOptions::fieldWasRead(const char* field) {
+  if (std::string_view(field) == "preset") {
+    usePreset(preset);
+  }
+}
+
+void RangeMapperOptions::checkFields() const {
   requireField(!use_later_images || neighbours.num_neighbours % 2 == 0, "neighbours.num_neighbours",
                "must be even where later images are used", neighbours.num_neighbours);
-  validateInner("working_camera", working_camera);
-  validateInner("neighbours", neighbours);
-  validateInner("plane_sweep", plane_sweep);
-  validateInner("frames", frames);
 }
 
 struct RangeMapper::Camera {
@@ -65,7 +69,7 @@ struct RangeMapper::Camera {
   WorkingCamera working_camera;
   PlaneSweep plane_sweep;
   std::deque<Frame> frames;
-  size_t next_reference = 0;  // the first frame that was not yet handed out
+  size_t next_reference = 0;  // the first frame that was not yet passed on
   RangeMapperStatus status;
 };
 
@@ -90,7 +94,7 @@ RangeMapper::RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapper
     const WorkingCamera working(camera.model, camera.image_size_px, camera.field_of_view_rad, camera.mask,
                                 options_.working_camera);
     std::optional<Plane> ground;
-    if (options_.plane_sweep.families != PlaneFamilies::kFrontoParallel) {
+    if (options_.plane_sweep.num_ground_planes > 0) {
       ground = groundInCamera(*camera.vehicle_from_camera);
     }
     cameras_[index].reset(
@@ -166,13 +170,13 @@ void RangeMapper::placeImage(Camera* camera, const ImageFrame& frame) {
   if (!camera->frames.empty()) {
     const SweepImage& last = camera->frames.back().image;
     const double motion_m = (world_from_camera.translation() - last.world_from_camera.translation()).norm();
-    if (motion_m < options_.min_motion_m) {
+    if (motion_m < kMinMotion_m) {
       ++camera->status.standing;
       camera->status.state = RangeMapperState::kStanding;
-      camera->status.message = "the camera does not move: no range from motion";
+      camera->status.message = "the camera does not move: there is no parallax";
       return;
     }
-    // Odometry that jumps is found before; a trajectory's poses may jump, too.
+    // Jumps of the odometry are found by the assembler, those of a given trajectory here.
     if (motion_m > options_.frames.max_speed_m_per_s * toSeconds(stamp - last.stamp)) {
       emitReferences(camera, true);
       camera->frames.clear();
@@ -193,7 +197,7 @@ void RangeMapper::addFrame(Camera* camera, const SweepImage& frame) {
   }
   camera->frames.push_back({frame, path_m});
   emitReferences(camera, false);
-  // Forget what lies further back than any baseline from the next reference.
+  // Drops frames that are further back than any baseline of the next reference.
   const double reach_m = 1.5 * options_.neighbours.max_forward_baseline_m;
   const double needed_m =
       (camera->next_reference < camera->frames.size() ? camera->frames[camera->next_reference].path_m
@@ -235,8 +239,7 @@ void RangeMapper::emitReference(Camera* camera, size_t index) {
     for (size_t i = first; i < last; ++i) {
       baselines_m.push_back((camera->frames[i].image.world_from_camera.translation() - position).norm());
     }
-    for (size_t i : selectNeighbours(options_.neighbours, baselines_m,
-                                     options_.neighbours.num_neighbours / sides, longest_m)) {
+    for (size_t i : selectNeighbours(baselines_m, options_.neighbours.num_neighbours / sides, longest_m)) {
       task.neighbours.push_back(camera->frames[first + i].image);
     }
   }
@@ -263,7 +266,7 @@ void RangeMapper::finish() {
 
 RangeMap RangeMapper::sweep(const RangeTask& task) const {
   check(task.camera_index < cameras_.size() && cameras_[task.camera_index],
-        "RangeMapper::sweep: no such camera");
+        "RangeMapper::sweep: unknown camera");
   RangeMap map = cameras_[task.camera_index]->plane_sweep.sweep(task.reference, task.neighbours);
   map.camera_name = rig_->cameras[task.camera_index].name;
   map.frame_id = rig_->cameras[task.camera_index].frame_id;

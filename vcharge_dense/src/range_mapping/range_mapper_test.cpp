@@ -38,7 +38,7 @@ std::shared_ptr<const CameraRig> makeRig() {
   return rig;
 }
 
-/// A small image; only where it was taken matters to most tests.
+/// A small image, for tests where only poses matter.
 Image blankImage() {
   return Image{cv::Mat(80, 128, CV_8UC1, cv::Scalar(100)), nullptr};
 }
@@ -67,7 +67,7 @@ struct Recorder {
   }
 };
 
-/// Odometry and one image of each camera, `step_m` apart.
+/// Sends odometry and one image per camera every `step_m`.
 void drive(RangeMapper* mapper, int images, double step_m, int64_t start_s = 100) {
   for (int i = 0; i < images; ++i) {
     mapper->addOdometry(odometryAt(stampOf(i, start_s), i * step_m));
@@ -83,10 +83,9 @@ double baseline(const RangeTask& task, size_t n) {
 }
 
 TEST(NeighbourSelectionTest, TakesEqualStepsUpToTheLongestBaseline) {
-  const NeighbourOptions options;
   const std::vector<double> baselines_m = {1.2, 0.8, 0.7, 0.6, 0.41, 0.3, 0.19, 0.05};
-  EXPECT_EQ(selectNeighbours(options, baselines_m, 4, 0.8), (std::vector<size_t>{1, 3, 4, 6}));
-  EXPECT_EQ(selectNeighbours(options, {0.05, 5.0}, 4, 0.8), (std::vector<size_t>{}));
+  EXPECT_EQ(selectNeighbours(baselines_m, 4, 0.8), (std::vector<size_t>{1, 3, 4, 6}));
+  EXPECT_EQ(selectNeighbours({0.05, 5.0}, 4, 0.8), (std::vector<size_t>{}));
 }
 
 TEST(RangeMapperTest, OnlineUsesEarlierImagesWithLongerBaselinesForwards) {
@@ -111,7 +110,7 @@ TEST(RangeMapperTest, OnlineUsesEarlierImagesWithLongerBaselinesForwards) {
   EXPECT_EQ(front.reference.stamp, stampOf(19));
 }
 
-TEST(RangeMapperTest, OfflineUsesBothSidesAndHandsOutEveryImage) {
+TEST(RangeMapperTest, OfflineUsesBothSidesAndSweepsEveryImage) {
   Recorder recorder;
   RangeMapperOptions options = RangeMapperOptions::offline();
   options.working_camera.image_scale = 1.0;
@@ -130,7 +129,7 @@ TEST(RangeMapperTest, OfflineUsesBothSidesAndHandsOutEveryImage) {
   EXPECT_GE(two_sided, 48);
 }
 
-TEST(RangeMapperTest, StandingVehicleGivesOnlyAStatus) {
+TEST(RangeMapperTest, ReportsAStandingVehicle) {
   Recorder recorder;
   RangeMapper mapper(makeRig(), smallOptions(), recorder.callback());
   drive(&mapper, 10, 0.2);
@@ -168,16 +167,16 @@ TEST(RangeMapperTest, ReportsACameraThatStops) {
   EXPECT_EQ(mapper.status()[1].state, RangeMapperState::kMapping);  // recovered
 }
 
-TEST(RangeMapperTest, StartsOverWhenStampsJumpBack) {
+TEST(RangeMapperTest, RestartsWhenStampsJumpBack) {
   Recorder recorder;
   RangeMapper mapper(makeRig(), smallOptions(), recorder.callback());
   drive(&mapper, 20, 0.2, 200);
   const size_t first = recorder.tasks.size();
-  drive(&mapper, 20, 0.2, 100);  // a replayed bag
+  drive(&mapper, 20, 0.2, 100);  // as if the bag is replayed
   EXPECT_EQ(recorder.tasks.size(), 2 * first);
   for (size_t i = first; i < recorder.tasks.size(); ++i) {
     for (const SweepImage& neighbour : recorder.tasks[i].neighbours) {
-      EXPECT_LT(neighbour.stamp, stampOf(0, 150));  // nothing of the first pass
+      EXPECT_LT(neighbour.stamp, stampOf(0, 150));  // not from the first pass
     }
   }
   EXPECT_GE(mapper.status()[0].resets, 1u);
@@ -202,7 +201,7 @@ TEST(RangeMapperTest, DoesNotMatchAcrossAGapOfTheOdometry) {
   }
 }
 
-TEST(RangeMapperTest, WaitsForOdometryAndSaysSo) {
+TEST(RangeMapperTest, WaitsForOdometryAndReportsIt) {
   Recorder recorder;
   RangeMapper mapper(makeRig(), smallOptions(), recorder.callback());
   for (int i = 0; i < 5; ++i) {
@@ -216,7 +215,7 @@ TEST(RangeMapperTest, WaitsForOdometryAndSaysSo) {
   EXPECT_EQ(recorder.tasks.size(), 4u);
 }
 
-TEST(RangeMapperTest, TakesPosesFromATrajectory) {
+TEST(RangeMapperTest, UsesPosesOfATrajectory) {
   Recorder recorder;
   RangeMapper mapper(makeRig(), smallOptions(), recorder.callback());
   Trajectory trajectory;
@@ -224,7 +223,7 @@ TEST(RangeMapperTest, TakesPosesFromATrajectory) {
     trajectory.push_back({stampOf(i), RigidTransform::planar(0.0, 0.3 * i, 0.0)});
   }
   mapper.setTrajectory(trajectory);
-  drive(&mapper, 10, 0.2);  // its odometry is not used
+  drive(&mapper, 10, 0.2);  // with odometry that must not be used
   ASSERT_FALSE(recorder.tasks.empty());
   const Eigen::Vector3d motion = recorder.tasks.back().reference.world_from_camera.translation() -
                                  recorder.tasks.back().neighbours.back().world_from_camera.translation();
@@ -268,7 +267,7 @@ TEST(RangeMapperTest, MeasuresASceneThroughTheWholePath) {
 }
 
 TEST(RangeMapperTest, MeasuresTheSameSceneAtAnyFocalScale) {
-  // A lens with distortion, which pushes the rim outwards: how much of it stays is the options' choice.
+  // A distorted lens, whose border is cropped or kept depending on the focal scale.
   MeiCamera::Parameters parameters;
   parameters << 1.158, 224.0, 223.5, 162.0, 99.5, -0.33, 0.0865, -0.00067, -0.00004;
   const MeiCamera lens(parameters);

@@ -78,7 +78,7 @@ cv::Mat AnalyticScene::render(const MeiCamera& camera, cv::Size size, const Rigi
         const Hit hit = intersect(world_from_camera.translation(), direction);
         if (std::isfinite(hit.range_m) && hit.contrast > 0.0) {
           const Eigen::Vector3d point = world_from_camera.translation() + hit.range_m * direction;
-          // A Gaussian pixel of half a pixel's width, drawn out where the surface is seen at an angle.
+          // Gaussian pixel footprint of half a pixel's width, longer on slanted surfaces.
           const double width_m = 0.5 * hit.range_m * pixel_rad / std::sqrt(std::max(0.05, hit.cos_incidence));
           for (const Wave& wave : waves_) {
             const double fade = std::exp(-0.5 * wave.frequency.squaredNorm() * width_m * width_m);

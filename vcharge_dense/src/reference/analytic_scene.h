@@ -12,26 +12,25 @@
 
 namespace vcharge {
 
-/// A flat piece of surface: points p with normal . (p - centre) = 0 and |p - centre| within `half_size_m` per
+/// A flat surface: the points p with normal . (p - centre) = 0 and |p - centre| within `half_size_m` per
 /// axis.
 struct Patch {
   Eigen::Vector3d centre;
   Eigen::Vector3d normal;
   Eigen::Vector3d half_size_m = Eigen::Vector3d::Constant(1e6);
-  double contrast = 1.0;  ///< of the texture; 0: one gray level
+  double contrast = 1.0;  ///< contrast of the texture; 0: one gray level
 };
 
-/// Patches painted with a band-limited texture that is a formula of the point in space, seen by exact
-/// projection.
+/// Patches with a band-limited texture that is a formula of the point in space, rendered by exact projection.
 class AnalyticScene {
  public:
   AnalyticScene(std::vector<Patch> patches, uint32_t seed);
 
   /// Gray image (CV_8UC1) of a camera, with Gaussian noise of the given standard deviation before rounding.
-  /// The texture's waves fade out where a pixel covers them.
+  /// Waves of the texture that are shorter than a pixel fade out.
   cv::Mat render(const MeiCamera& camera, cv::Size size, const RigidTransform& world_from_camera,
                  double noise_gray_levels = 0.0, uint32_t noise_seed = 1) const;
-  /// Distance along each pixel's ray (CV_64FC1), NaN where it meets nothing.
+  /// Distance along each pixel's ray (CV_64FC1), NaN where there is no surface.
   cv::Mat range(const MeiCamera& camera, cv::Size size, const RigidTransform& world_from_camera) const;
 
  private:
@@ -51,7 +50,7 @@ class AnalyticScene {
   std::vector<Wave> waves_;
 };
 
-/// Standard normal numbers that are the same with every library.
+/// A standard normal number; the same with every standard library.
 double normalNumber(std::mt19937* generator);
 
 }  // namespace vcharge

@@ -19,7 +19,7 @@ int wrap(int value, int size) {
   return ((value % size) + size) % size;
 }
 
-/// Bilinear sample; NaN where one of the four pixels may not be used.
+/// Bilinear sample; NaN where one of the four pixels must not be used.
 double sample(const cv::Mat& pixels, const cv::Mat& valid_mask, const Eigen::Vector2d& at,
               PlainBorder border) {
   const int x = static_cast<int>(std::floor(at.x()));
@@ -43,7 +43,7 @@ double sample(const cv::Mat& pixels, const cv::Mat& valid_mask, const Eigen::Vec
          fy * ((1 - fx) * values[1][0] + fx * values[1][1]);
 }
 
-/// Sum over the window around each pixel; NaN where it leaves the image.
+/// Sum over the window around each pixel; NaN where the window leaves the image.
 cv::Mat windowSum(const cv::Mat& values, int radius) {
   const auto sumAlong = [&](const cv::Mat& from, int step_x, int step_y) {
     cv::Mat sum(from.size(), CV_64FC1);
@@ -63,7 +63,7 @@ cv::Mat windowSum(const cv::Mat& values, int radius) {
   return sumAlong(sumAlong(values, 1, 0), 0, 1);
 }
 
-/// Neighbour warped into the reference, whose rays are given, over a plane (paper, equation (warping)).
+/// Warps a neighbour into the reference, whose rays are given, over a plane (paper, equation (warping)).
 cv::Mat warp(const MeiCamera& camera, const cv::Mat& valid_mask, const RayTable& rays, const Plane& plane,
              const SweepImage& reference, const SweepImage& neighbour, PlainBorder border) {
   const RigidTransform neighbour_from_reference =
@@ -88,15 +88,13 @@ double aggregate(const PlaneSweepOptions& options, const std::vector<double>& sc
                  const std::vector<bool>& after) {
   double sum[2] = {0.0, 0.0};
   int votes[2] = {0, 0};
-  std::vector<double> known;
   for (size_t n = 0; n < scores.size(); ++n) {
     if (!std::isnan(scores[n])) {
       sum[after[n] ? 1 : 0] += scores[n];
       ++votes[after[n] ? 1 : 0];
-      known.push_back(scores[n]);
     }
   }
-  if (known.empty()) {
+  if (votes[0] + votes[1] == 0) {
     return kNaN;
   }
   switch (options.aggregation) {
@@ -106,15 +104,6 @@ double aggregate(const PlaneSweepOptions& options, const std::vector<double>& sc
       const double before_mean = votes[0] > 0 ? sum[0] / votes[0] : -2.0;
       const double after_mean = votes[1] > 0 ? sum[1] / votes[1] : -2.0;
       return std::max(before_mean, after_mean);
-    }
-    case Aggregation::kBestK: {
-      std::sort(known.rbegin(), known.rend());
-      known.resize(std::min(known.size(), static_cast<size_t>(options.best_k)));
-      double total = 0.0;
-      for (double score : known) {
-        total += score;
-      }
-      return total / static_cast<double>(known.size());
     }
   }
   return kNaN;
@@ -126,10 +115,10 @@ PlainResult plainPlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask,
                             const std::vector<PlaneFamily>& families, const PlaneSweepOptions& options,
                             const SweepImage& reference, const std::vector<SweepImage>& neighbours,
                             PlainBorder border) {
-  const int radius = options.window_px / 2;
-  const double count = options.window_px * options.window_px;
-  // Windows over the border: the reference repeats its last pixel, while the neighbours are warped to what
-  // the pixels outside the image would see.
+  const int radius = kMatchingWindow_px / 2;
+  const double count = kMatchingWindow_px * kMatchingWindow_px;
+  // For windows across the border the authors repeat the reference's last pixel, but warp the neighbours to
+  // the rays of the pixels outside the image.
   const double without_texture = border == PlainBorder::kAsTheAuthors ? 0.0 : kNaN;
   const int margin = border == PlainBorder::kAsTheAuthors ? radius : 0;
   cv::Mat pixels;
@@ -192,7 +181,7 @@ PlainResult plainPlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask,
         }
       }
     }
-    // The best plane of the family, and between planes the maximum of the parabola through three scores.
+    // The best plane of the family, and the maximum of the parabola through its score and those beside it.
     for (int y = 0; y < size.height; ++y) {
       for (int x = 0; x < size.width; ++x) {
         size_t best = num_planes;
@@ -209,7 +198,7 @@ PlainResult plainPlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask,
         }
         const double score = scores[best].at<double>(y, x);
         double offset = 0.0;
-        if (options.sub_plane_interpolation && !at_limit) {
+        if (!at_limit) {
           const double before = scores[best - 1].at<double>(y, x), behind = scores[best + 1].at<double>(y, x);
           const double curvature = 2 * score - before - behind;
           if (curvature > 1e-6) {

@@ -12,22 +12,20 @@
 
 namespace vcharge {
 
-/// What happens where an image does not tell. kUnknown leaves out what is not seen. kAsTheAuthors, for
-/// comparison with their results: neighbours are read beyond their border from the opposite one, a window
-/// over the reference's border repeats its last pixel (and meets what the pixels outside the image would
-/// see), and the correlation of a window without texture is 0.
+/// Treatment of image borders and windows without texture. kUnknown leaves them out. kAsTheAuthors reproduces
+/// the authors' results: reads beyond a neighbour's border wrap around to the opposite one, the reference
+/// repeats its last pixel beyond its border, and the correlation of a window without texture is 0.
 enum class PlainBorder { kUnknown, kAsTheAuthors };
 
 struct PlainResult {
-  cv::Mat plane;             ///< CV_32SC1, over all families; -1 where none
-  cv::Mat inverse_distance;  ///< CV_64FC1: of the plane, by the parabola where the options ask for it; NaN
-                             ///< where none
+  cv::Mat plane;             ///< CV_32SC1: best plane, counted over all families; -1 where none
+  cv::Mat inverse_distance;  ///< CV_64FC1: distance of the plane, interpolated by a parabola; NaN where none
   cv::Mat inverse_range;     ///< CV_64FC1
   cv::Mat score;             ///< CV_64FC1, NaN where none
 };
 
-/// The plane sweep written down as plainly as possible, in double precision and without tiles, threads,
-/// refinement, gates or uncertainty: what PlaneSweep's first sweep has to equal.
+/// The plane sweep in its simplest form: double precision, without tiles, threads, refinement or uncertainty.
+/// The reference for PlaneSweep's first sweep.
 PlainResult plainPlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask,
                             const std::vector<PlaneFamily>& families, const PlaneSweepOptions& options,
                             const SweepImage& reference, const std::vector<SweepImage>& neighbours,

@@ -12,7 +12,7 @@
 namespace vcharge {
 namespace {
 
-/// As the authors undistort: reads wrap around at the borders, and gray levels are truncated to 8 bits.
+/// Undistorts like the authors: reads wrap around at the borders, and gray levels are truncated to 8 bits.
 cv::Mat undistortAsTheAuthors(const CameraModel& sensor, const WorkingCamera& working,
                               const cv::Mat& pixels) {
   const auto at = [&](int x, int y) {
@@ -38,12 +38,12 @@ cv::Mat undistortAsTheAuthors(const CameraModel& sensor, const WorkingCamera& wo
   return undistorted;
 }
 
-/// Share of all pixels whose plane is within one of the authors' 255 steps from theirs.
+/// Fraction of all pixels whose plane is within one of the authors' 255 steps of their plane.
 double agreementWithTheAuthors(const RealImages& images, Aggregation aggregation,
                                const std::string& index_file) {
   const WorkingCamera working(images.camera, cv::Size(1280, 800), 6.283185307179586, cv::Mat());
   PlaneSweepOptions options;
-  options.families = PlaneFamilies::kFrontoParallel;
+  options.num_ground_planes = 0;
   options.min_distance_m = 0.4;
   options.max_distance_m = 5000.0;
   options.num_planes = 256;
@@ -74,15 +74,15 @@ double agreementWithTheAuthors(const RealImages& images, Aggregation aggregation
       agree += std::abs(std::round(steps) - index.at<uint8_t>(y, x)) <= 1.0 ? 1 : 0;
     }
   }
-  const double share = static_cast<double>(agree) / index.size().area();
-  std::printf("%s: within 1 of 255 steps on %.4f of all pixels\n", index_file.c_str(), share);
-  return share;
+  const double fraction = static_cast<double>(agree) / index.size().area();
+  std::printf("%s: within 1 of 255 steps on %.4f of all pixels\n", index_file.c_str(), fraction);
+  return fraction;
 }
 
 TEST(PlainPlaneSweepTest, EqualsTheAuthorsResultWithoutOcclusionHandling) {
   const auto images = readRealImages();
   if (!images) {
-    GTEST_SKIP() << "VCHARGE_DATA is not set: the real images are not compared with";
+    GTEST_SKIP() << "VCHARGE_DATA is not set: needs the real images";
   }
   EXPECT_GE(agreementWithTheAuthors(*images, Aggregation::kMean, "ZNCC_NoOcclusionHandling_index.png"), 0.98);
 }
@@ -90,7 +90,7 @@ TEST(PlainPlaneSweepTest, EqualsTheAuthorsResultWithoutOcclusionHandling) {
 TEST(PlainPlaneSweepTest, EqualsTheAuthorsResultWithReferenceSplit) {
   const auto images = readRealImages();
   if (!images) {
-    GTEST_SKIP() << "VCHARGE_DATA is not set: the real images are not compared with";
+    GTEST_SKIP() << "VCHARGE_DATA is not set: needs the real images";
   }
   EXPECT_GE(agreementWithTheAuthors(*images, Aggregation::kReferenceSplit, "ZNCC_RefSplit_index.png"), 0.975);
 }

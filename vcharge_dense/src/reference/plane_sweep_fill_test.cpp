@@ -9,14 +9,7 @@
 namespace vcharge {
 namespace {
 
-using testing::allValid;
-using testing::kCamera;
-using testing::kLeft;
-using testing::kSize;
-using testing::makeSequence;
-using testing::Sequence;
-
-/// Ground, and a wall of faint paint: small windows hold little of its texture.
+/// Ground and a wall with weak texture, of which small windows contain little.
 AnalyticScene faintScene() {
   return AnalyticScene(
       {{{0, 0, 0}, {0, 0, 1}}, {{0, 5.0, 0}, {0, -1, 0}, Eigen::Vector3d::Constant(1e6), 0.12}}, 3);
@@ -30,10 +23,6 @@ PlaneSweepOptions filling(int num_levels) {
   PlaneSweepOptions options;
   options.num_fill_levels = num_levels;
   return options;
-}
-
-RangeMap sweepOf(const Sequence& s, const PlaneSweepOptions& options) {
-  return PlaneSweep(kCamera, allValid(), options, s.ground).sweep(s.reference, s.neighbours);
 }
 
 TEST(PlaneSweepFillTest, UnknownPixelsTakeRightRangesAndKnownOnesStay) {
@@ -82,18 +71,18 @@ TEST(PlaneSweepFillTest, WithRefinedPosesAndACoarsePassToo) {
 
 TEST(PlaneSweepFillTest, GivesTheSameBytesOnAnyNumberOfThreads) {
   const Sequence s = faintSequence();
-  testing::expectTheSameOnAnyNumberOfThreads(PlaneSweep(kCamera, allValid(), filling(2), s.ground), s);
+  expectTheSameOnAnyNumberOfThreads(filling(2), s);
 }
 
 TEST(PlaneSweepFillTest, OddAndSmallImagesWork) {
   for (const cv::Size size : {cv::Size(101, 77), cv::Size(35, 40), cv::Size(16, 40)}) {
     const cv::Rect part(60, 60, size.width, size.height);
     Sequence s = faintSequence();
-    testing::crop(part, &s);
-    const MeiCamera camera = testing::croppedCamera(part);
+    crop(part, &s);
+    const MeiCamera camera = croppedCamera(part);
     const PlaneSweep sweep(camera, cv::Mat(size, CV_8UC1, cv::Scalar(255)), filling(4), s.ground);
     EXPECT_EQ(sweep.sweep(s.reference, s.neighbours).range_m.size(), size);
-    EXPECT_EQ(cv::countNonZero(sweep.sweep(s.reference, {}).confidence), 0);  // nothing to compare with
+    EXPECT_EQ(cv::countNonZero(sweep.sweep(s.reference, {}).confidence), 0);  // no neighbours
   }
 }
 
@@ -101,7 +90,7 @@ TEST(PlaneSweepFillTest, InvalidPixelsStayUnknown) {
   const Sequence s = faintSequence();
   cv::Mat valid = allValid();
   valid(cv::Rect(100, 0, 61, 101)).setTo(0);
-  const RangeMap map = PlaneSweep(kCamera, valid, filling(2), s.ground).sweep(s.reference, s.neighbours);
+  const RangeMap map = sweepOf(s, filling(2), nullptr, valid);
   EXPECT_EQ(cv::countNonZero(map.confidence(cv::Rect(100, 0, 61, 101))), 0);
   EXPECT_GT(cv::countNonZero(map.confidence), 10000);
 }

@@ -16,13 +16,12 @@
 #include "vcharge_core/motion/rigid_transform.h"
 #include "vcharge_dense/plane_sweep.h"
 
-namespace vcharge::testing {
+namespace vcharge {
 
 inline const cv::Size kSize(320, 200);
 inline const MeiCamera kCamera(1.158, 224.0, 223.5, 162.0, 99.5);
 
-/// A camera at the given place (vehicle axes: x forward, y left, z up) that looks along an azimuth, tilted
-/// downwards.
+/// Pose of a camera at a position (x forward, y left, z up) that faces an azimuth and is tilted downwards.
 inline RigidTransform cameraPose(const Eigen::Vector3d& position, double azimuth_rad, double down_rad) {
   const Eigen::Quaterniond vehicle_from_optical(0.5, -0.5, 0.5, -0.5);  // z forward, x right, y down
   return RigidTransform(rotationFromYawPitchRoll(azimuth_rad, down_rad, 0.0) * vehicle_from_optical,
@@ -55,7 +54,7 @@ inline Sequence makeSequence(const AnalyticScene& scene, const RigidTransform& s
   return sequence;
 }
 
-/// A part of the test images, as a smaller camera sees it.
+/// Crops the images of a sequence, as of a smaller camera.
 inline void crop(const cv::Rect& part, Sequence* sequence) {
   sequence->reference.pixels = sequence->reference.pixels(part).clone();
   for (SweepImage& image : sequence->neighbours) {
@@ -67,9 +66,8 @@ inline MeiCamera croppedCamera(const cv::Rect& part) {
                    kCamera.v0() - part.y);
 }
 
-/// Moves the neighbours, which come in order of time, as odometry errs: its scale is off for the whole
-/// sequence, its pose walks at random from image to image, and the reference's own jitter is common to all
-/// pairs.
+/// Disturbs the poses of the neighbours, which are in the order of time, by odometry errors: a common scale
+/// error, a random walk from image to image, and the jitter of the reference, which is common to all pairs.
 inline void disturb(const PoseNoiseOptions& noise, std::mt19937* generator, Sequence* sequence) {
   const auto randomVector = [&](double sigma) {
     Eigen::Vector3d vector;
@@ -104,7 +102,7 @@ inline void disturb(const PoseNoiseOptions& noise, std::mt19937* generator, Sequ
   walk(images.begin(), images.end(), [&](const SweepImage& image) { return image.stamp > now; });
 }
 
-/// Runs a function with only one instruction set after the other.
+/// Runs a function with each instruction set of this machine.
 template <class Function>
 void onEveryTarget(const Function& function) {
   for (const int64_t target : hwy::SupportedAndGeneratedTargets()) {
@@ -121,7 +119,7 @@ inline cv::Mat allValid() {
 
 inline PlaneSweepOptions plainOptions() {
   PlaneSweepOptions options;
-  options.families = PlaneFamilies::kFrontoParallel;
+  options.num_ground_planes = 0;
   options.num_refinement_steps = 0;
   return options;
 }
@@ -137,16 +135,44 @@ inline AnalyticScene lotScene(uint32_t seed) {
 inline const RigidTransform kLeft = cameraPose({0.0, 1.0, 0.9}, 1.5, 0.6);
 inline const RigidTransform kFront = cameraPose({3.6, 0.0, 0.7}, 0.0, 0.2);
 
-inline void expectTheSameOnAnyNumberOfThreads(const PlaneSweep& sweep, const Sequence& sequence) {
+/// Hash of a range map's contents.
+inline std::string hashOf(const RangeMap& map) {
+  ContentHasher hasher;
+  addToHash(map, &hasher);
+  return hasher.hex();
+}
+
+/// Range map of a sequence of test images.
+inline RangeMap sweepOf(const Sequence& sequence, const PlaneSweepOptions& options,
+                        SweepDetails* details = nullptr, const cv::Mat& valid_mask = allValid()) {
+  const PlaneSweep sweep(kCamera, valid_mask, options, sequence.ground);
+  return sweep.sweep(sequence.reference, sequence.neighbours, details);
+}
+
+inline int countKnown(const RangeMap& map) {
+  return cv::countNonZero(map.range_m == map.range_m);
+}
+
+/// Number of pixels inside a border whose relative range error is within the tolerance.
+inline int countRight(const RangeMap& map, const cv::Mat& truth, double tolerance, int border = 0) {
+  int right = 0;
+  for (int y = border; y < truth.rows - border; ++y) {
+    for (int x = border; x < truth.cols - border; ++x) {
+      const double true_range = truth.at<double>(y, x);
+      right += std::abs(map.range_m.at<float>(y, x) - true_range) <= tolerance * true_range ? 1 : 0;
+    }
+  }
+  return right;
+}
+
+inline void expectTheSameOnAnyNumberOfThreads(const PlaneSweepOptions& options, const Sequence& sequence) {
   std::vector<std::string> hashes;
   for (const size_t threads : {1u, 2u, 5u}) {
     const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    ContentHasher hasher;
-    addToHash(sweep.sweep(sequence.reference, sequence.neighbours), &hasher);
-    hashes.push_back(hasher.hex());
+    hashes.push_back(hashOf(sweepOf(sequence, options)));
   }
   EXPECT_EQ(hashes[0], hashes[1]);
   EXPECT_EQ(hashes[0], hashes[2]);
 }
 
-}  // namespace vcharge::testing
+}  // namespace vcharge

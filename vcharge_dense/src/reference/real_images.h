@@ -13,11 +13,10 @@
 
 namespace vcharge {
 
-/// The real images of the V-Charge car's left camera that tests compare with (see SOURCE.txt in their
-/// folder).
+/// Published images of the V-Charge car's left camera, see SOURCE.txt in their folder.
 struct RealImages {
   CameraModel camera;
-  RigidTransform vehicle_from_camera;  ///< their vehicle frame is not on the ground
+  RigidTransform vehicle_from_camera;  ///< the origin of this vehicle frame is above the ground
   Plane ground_in_vehicle;             ///< fitted to the ground around the reference image
   std::vector<Timestamp> stamps;
   std::vector<cv::Mat> pixels;
@@ -27,8 +26,8 @@ struct RealImages {
   Plane groundInCamera() const;
 };
 
-/// $VCHARGE_DATA/vcharge_left, or nothing where the variable is not set. InputError for files that cannot be
-/// read.
+/// Reads $VCHARGE_DATA/vcharge_left; returns nothing where the variable is not set. Throws InputError for
+/// files that cannot be read.
 std::optional<RealImages> readRealImages();
 
 }  // namespace vcharge

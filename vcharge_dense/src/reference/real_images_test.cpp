@@ -20,10 +20,10 @@ constexpr double kWholeSphere_rad = 6.283185307179586;
 constexpr double kAuthorsNear_m = 0.4;
 constexpr double kAuthorsFar_m = 5000.0;
 
-/// The defaults with the authors' planes, which are fine enough to do without a second sweep.
+/// Options with the authors' planes, which are so close together that no second sweep is needed.
 PlaneSweepOptions authorsPlanes() {
   PlaneSweepOptions options;
-  options.families = PlaneFamilies::kFrontoParallel;
+  options.num_ground_planes = 0;
   options.min_distance_m = kAuthorsNear_m;
   options.max_distance_m = kAuthorsFar_m;
   options.num_planes = 256;
@@ -36,7 +36,7 @@ class RealImagesTest : public ::testing::Test {
   void SetUp() override {
     const auto images = readRealImages();
     if (!images) {
-      GTEST_SKIP() << "VCHARGE_DATA is not set: the real images are not compared with";
+      GTEST_SKIP() << "VCHARGE_DATA is not set: needs the real images";
     }
     images_ = std::make_unique<RealImages>(*images);
     working_ =
@@ -44,7 +44,7 @@ class RealImagesTest : public ::testing::Test {
     ASSERT_EQ(working_->size(), kSize);
   }
 
-  /// Frames 0 to 4 around frame 2, as the authors' results without and with reference-split.
+  /// Loads frames 0 to 4 with frame 2 as the reference, as for the authors' results.
   void load(SweepImage* reference, std::vector<SweepImage>* neighbours) const {
     for (size_t i = 0; i < 5; ++i) {
       const SweepImage image{images_->stamps[i], working_->undistort(images_->pixels[i]),
@@ -72,8 +72,8 @@ class RealImagesTest : public ::testing::Test {
     return image;
   }
 
-  /// Share of the pixels of ground_mask.png whose inverse depth lies within 0.02 1/m of the ground's.
-  double shareOnGround(const RangeMap& map) const {
+  /// Fraction of the pixels of ground_mask.png whose inverse depth is within 0.02 1/m of the ground's.
+  double fractionOnGround(const RangeMap& map) const {
     const cv::Mat mask = read("ground_mask.png");
     const Plane ground = images_->groundInCamera();
     const RayTable rays(working_->model(), kSize, kWholeSphere_rad);
@@ -106,7 +106,7 @@ TEST_F(RealImagesTest, KernelAgreesWithTheAuthorsWhereWindowsCorrelate) {
   for (int y = 0; y < kSize.height; ++y) {
     for (int x = 0; x < kSize.width; ++x) {
       const float score = details.score.at<float>(y, x);
-      // Known, and the cost 1 - ZNCC below 0.2.
+      // Only known pixels with a cost 1 - ZNCC below 0.2.
       if (!(score > 0.8f) || std::isnan(map.range_m.at<float>(y, x))) {
         continue;
       }
@@ -126,9 +126,9 @@ TEST_F(RealImagesTest, CobblesLieOnTheGround) {
   PlaneSweepOptions options;
   for (const Aggregation aggregation : {Aggregation::kMean, Aggregation::kReferenceSplit}) {
     options.aggregation = aggregation;
-    const double share = shareOnGround(sweep(options));
-    std::printf("on the ground, aggregation %d: %.4f\n", static_cast<int>(aggregation), share);
-    EXPECT_GE(share, 0.94);
+    const double fraction = fractionOnGround(sweep(options));
+    std::printf("on the ground, aggregation %d: %.4f\n", static_cast<int>(aggregation), fraction);
+    EXPECT_GE(fraction, 0.94);
   }
 }
 

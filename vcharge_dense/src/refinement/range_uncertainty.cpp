@@ -14,31 +14,37 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-// Noise of a window that the score leaves unexplained, against what its curvature says about one pixel: the
-// samples of a window are interpolated, hence not independent.
+// Image noise over what independent samples would have: the samples of a window are interpolated and
+// therefore correlated.
 constexpr float kImageNoiseFactor = 0.5f;
 
-// Standard deviation over the mean second difference of neighbouring estimates, which are correlated where
-// their windows overlap. Fitted, with the two noises above and in the options, on simulated drives.
+// Error of a match that does not average out over neighbours.
+constexpr float kMatchingNoise_px = 0.035f;
+
+// A range is unknown where the correlation is lower, or its standard deviation over the range larger.
+constexpr float kMinScore = 0.3f, kMaxRelativeSigma = 0.5f;
+
+// Standard deviation over the mean second difference of neighbouring estimates, whose windows overlap. Fitted
+// on simulated drives, together with the two noises above.
 constexpr float kRoughnessFactor = 0.8f;
 
-// Share of right ranges (within 5 %) at products of the confidence's factors, fitted on simulated drives
-// other than those that the README judges it by.
+// Calibration of the confidence: fraction of ranges within 5 % of the truth by the product of the
+// confidence's factors. Fitted on simulated drives that are not used for evaluation.
 constexpr float kFactors[] = {0.0f,  0.0625f, 0.0875f, 0.125f, 0.175f, 0.25f,  0.35f,
                               0.45f, 0.55f,   0.65f,   0.75f,  0.85f,  0.925f, 1.0f};
-constexpr float kShareRight[] = {0.0f,   0.33f,  0.42f,  0.53f,  0.65f,  0.75f,  0.84f,
-                                 0.895f, 0.933f, 0.964f, 0.983f, 0.996f, 0.999f, 1.0f};
+constexpr float kRightFraction[] = {0.0f,   0.33f,  0.42f,  0.53f,  0.65f,  0.75f,  0.84f,
+                                    0.895f, 0.933f, 0.964f, 0.983f, 0.996f, 0.999f, 1.0f};
 
 float square(float value) {
   return value * value;
 }
 
-/// Turns a row of products of confidence's factors into the probability that each range is right.
+/// Turns a row of products of the confidence's factors into probabilities that the ranges are right.
 void calibrate(std::vector<float>* confidence) {
-  std::vector<float> calibrated(confidence->size(), kShareRight[0]);
+  std::vector<float> calibrated(confidence->size(), kRightFraction[0]);
   for (size_t i = 1; i < std::size(kFactors); ++i) {
     const float length = kFactors[i] - kFactors[i - 1];
-    const float slope = (kShareRight[i] - kShareRight[i - 1]) / length;
+    const float slope = (kRightFraction[i] - kRightFraction[i - 1]) / length;
     for (size_t x = 0; x < calibrated.size(); ++x) {
       calibrated[x] += slope * std::min(std::max((*confidence)[x] - kFactors[i - 1], 0.0f), length);
     }
@@ -48,8 +54,8 @@ void calibrate(std::vector<float>* confidence) {
 
 constexpr int kSupportRadius_px = 3;
 
-/// Of one row: the share of the neighbouring pixels in the image that found the same surface. `padded`: the
-/// inverse ranges with a margin of kSupportRadius_px columns.
+/// Fraction of the neighbouring pixels inside the image that found the same surface, for the pixels of row y.
+/// `padded`: inverse ranges with a margin of kSupportRadius_px columns.
 std::vector<float> neighbourhoodSupport(const SweepKernels& kernels, const cv::Mat& padded,
                                         const cv::Mat& sigma, int y) {
   const int columns = sigma.cols;
@@ -74,8 +80,8 @@ std::vector<float> neighbourhoodSupport(const SweepKernels& kernels, const cv::M
   return agree;
 }
 
-/// Of one row: the confidence of each pixel, from its score, its lead over the second peak, its deviation and
-/// its support.
+/// Confidence of the pixels of row y from their score, its lead over the second peak, the standard deviation
+/// and the support of the neighbourhood.
 std::vector<float> rowConfidence(const SweepInput& input, const SurfaceEstimate& estimate,
                                  const cv::Mat& padded, const cv::Mat& sigma, int y) {
   std::vector<float> confidence = neighbourhoodSupport(input.kernels, padded, sigma, y);
@@ -83,10 +89,9 @@ std::vector<float> rowConfidence(const SweepInput& input, const SurfaceEstimate&
   const auto* score = estimate.score.ptr<float>(y);
   const auto* second = estimate.second_score.ptr<float>(y);
   const auto* deviation = sigma.ptr<float>(y);
-  const auto min_score = static_cast<float>(input.options->min_score);
-  const float per_height = 1.0f / (1.0f - min_score);
+  constexpr float per_height = 1.0f / (1.0f - kMinScore);
   for (size_t x = 0; x < confidence.size(); ++x) {
-    const float height = std::min(std::max(per_height * (score[x] - min_score), 0.0f), 1.0f);
+    const float height = std::min(std::max(per_height * (score[x] - kMinScore), 0.0f), 1.0f);
     const float lead = std::min(std::max((score[x] - std::max(second[x], 0.0f)) / 0.3f, 0.0f), 1.0f);
     const float precision = 1.0f / (1.0f + square(deviation[x] / (0.05f * inverse_range[x])));
     const float factors = confidence[x] * height * (0.2f + 0.8f * lead) * precision;
@@ -96,8 +101,8 @@ std::vector<float> rowConfidence(const SweepInput& input, const SurfaceEstimate&
   return confidence;
 }
 
-/// Of one row: mean second difference of inverse ranges over their neighbourhood, as the standard deviation
-/// of independent values would make it; 0 where neighbours are unknown.
+/// Mean second difference of the inverse ranges around the pixels of row y, divided by the one that
+/// independent values with a standard deviation of 1 have; 0 where neighbours are unknown.
 std::vector<float> neighbourhoodRoughness(const cv::Mat& inverse_range, int y) {
   constexpr int kSteps[][2] = {{2, 0}, {0, 2}, {2, 2}, {2, -2}, {4, 0}, {0, 4}, {4, 4}, {4, -4}};
   constexpr float kPerDeviation = 2.45f;  // square root of 1 + 1 + 4
@@ -132,8 +137,8 @@ std::vector<NeighbourUncertainty> neighbourUncertainties(const SweepInput& input
   std::vector<NeighbourUncertainty> result;
   for (const SweepNeighbour& neighbour : input.neighbours) {
     const float baseline_m = neighbour.translation_m.norm();
-    const auto variance = [baseline_m](double of_any_pair, double per_sqrt_m) {
-      return static_cast<float>(of_any_pair * of_any_pair + per_sqrt_m * per_sqrt_m * baseline_m);
+    const auto variance = [baseline_m](double constant, double per_sqrt_m) {
+      return static_cast<float>(constant * constant + per_sqrt_m * per_sqrt_m * baseline_m);
     };
     result.push_back(
         {neighbour.projectionOf(input.camera),
@@ -160,6 +165,7 @@ UncertaintyRow uncertaintyRow(const SweepInput& input, const std::vector<Neighbo
 
 void estimateRange(const SweepInput& input, const SurfaceEstimate& estimate, RangeMap* map) {
   const PlaneSweepOptions& options = *input.options;
+  const bool keeps_all = options.min_confidence == 0.0;
   const cv::Size size = estimate.score.size();
   map->range_m = pooledMat(size, CV_32FC1);
   map->standard_deviation_m = pooledMat(size, CV_32FC1);
@@ -172,25 +178,24 @@ void estimateRange(const SweepInput& input, const SurfaceEstimate& estimate, Ran
     row.voters = estimate.voters.ptr<int32_t>(y);
     row.score = estimate.score.ptr<float>(y);
     row.curvature = estimate.curvature.ptr<float>(y);
-    row.noise_factor = kImageNoiseFactor / static_cast<float>(options.window_px * options.window_px);
-    row.matching_noise_px = static_cast<float>(options.matching_noise_px);
+    row.noise_factor = kImageNoiseFactor / static_cast<float>(kMatchingWindow_px * kMatchingWindow_px);
+    row.matching_noise_px = kMatchingNoise_px;
     row.scale_noise = static_cast<float>(options.pose_noise.scale);
     input.kernels.inverseRangeSigma(row, sigma.ptr<float>(y));
     copyPadded(row.inverse_range, size.width, kSupportRadius_px, padded.ptr<float>(y));
   });
-  // What is accepted by itself, then its deviation with what its neighbourhood says.
+  // Selects the ranges to be kept; the roughness of their neighbourhood then adds to the standard deviation.
   forEachRow(size.height, [&](int y) {
     const std::vector<float> confidence = rowConfidence(input, estimate, padded, sigma, y);
     const auto* inverse_range = estimate.inverse_range.ptr<float>(y);
     const auto* score = estimate.score.ptr<float>(y);
     const auto* at_limit = estimate.at_limit.ptr<uint8_t>(y);
     auto* out = accepted.ptr<float>(y);
-    const auto min_score = static_cast<float>(options.min_score);
     const auto min_confidence = static_cast<float>(options.min_confidence);
     for (int x = 0; x < size.width; ++x) {
-      const bool passes = (at_limit[x] == 0) & (score[x] >= min_score) &
+      const bool passes = (at_limit[x] == 0) & (score[x] >= kMinScore) &
                           (confidence[static_cast<size_t>(x)] >= min_confidence);
-      const bool is_accepted = (inverse_range[x] > 0.0f) & (passes | !options.gate);
+      const bool is_accepted = (inverse_range[x] > 0.0f) & (passes | keeps_all);
       out[x] = is_accepted ? inverse_range[x] : kNaN;
     }
     std::copy(confidence.begin(), confidence.end(), map->confidence.ptr<float>(y));
@@ -202,11 +207,10 @@ void estimateRange(const SweepInput& input, const SurfaceEstimate& estimate, Ran
     auto* range = map->range_m.ptr<float>(y);
     auto* range_deviation = map->standard_deviation_m.ptr<float>(y);
     auto* confidence = map->confidence.ptr<float>(y);
-    const auto max_relative_sigma = static_cast<float>(options.max_relative_sigma);
     for (int x = 0; x < size.width; ++x) {
       const float rough = kRoughnessFactor * roughness[static_cast<size_t>(x)];
       const float relative_sigma = std::sqrt(square(deviation[x]) + square(rough)) / inverse_range[x];
-      const bool known = (inverse_range[x] > 0.0f) & !(options.gate & (relative_sigma > max_relative_sigma));
+      const bool known = (inverse_range[x] > 0.0f) & (keeps_all | !(relative_sigma > kMaxRelativeSigma));
       range[x] = known ? 1.0f / inverse_range[x] : kNaN;
       range_deviation[x] = known ? relative_sigma / inverse_range[x] : kNaN;
       confidence[x] = known ? confidence[x] : 0.0f;

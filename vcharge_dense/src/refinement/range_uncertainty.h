@@ -10,23 +10,23 @@
 
 namespace vcharge {
 
-/// The neighbours with the errors of their poses that the options expect.
+/// The neighbours' projections with the variances of their relative poses.
 std::vector<NeighbourUncertainty> neighbourUncertainties(const SweepInput& input);
 
-/// Row y of `inverse_range` (CV_32FC1) and of the rays for the kernels.
+/// Kernel input for row y of `inverse_range` (CV_32FC1).
 UncertaintyRow uncertaintyRow(const SweepInput& input, const std::vector<NeighbourUncertainty>& neighbours,
                               const cv::Mat& inverse_range, int y);
 
-/// Range, standard deviation and confidence from what the sweep found; applies the options' gates. The
-/// confidence is the probability that the range is within 5 %, as calibrated on simulated drives.
+/// Computes range, standard deviation and confidence from the sweep's estimate; uncertain ranges become
+/// unknown. The confidence is the probability that the range is within 5 % of the truth, calibrated on
+/// simulated drives.
 ///
-/// The variance in inverse range has four parts: image noise, from the height and the curvature of the
-/// score's peak (a peak of height 1 - e leaves noise e times the window's contrast, and the curvature says
-/// how fast the windows disagree); matching_noise_px over the motion of the neighbours' pixels, which does
-/// not average out; the relative poses' errors, taken as common to all neighbours; and how rough the
-/// neighbouring estimates are: at edges and on slanted surfaces windows do not fit, and estimates scatter
-/// more than noise makes them. Where the point hardly moves in the image (towards the direction of travel)
-/// all of them grow without bound.
+/// The variance of the inverse range has four parts: image noise, from the height and curvature of the
+/// score's peak (a peak of height 1 - e leaves noise of e times the window's contrast, and the curvature says
+/// how fast windows disagree); matching noise over the motion of the neighbours' pixels, which does not
+/// average out; the errors of the relative poses, taken as common to all neighbours; and the roughness of
+/// neighbouring estimates, which scatter more than noise explains at edges and on slanted surfaces. All parts
+/// grow without bound where points hardly move in the image, towards the direction of travel.
 void estimateRange(const SweepInput& input, const SurfaceEstimate& estimate, RangeMap* map);
 
 }  // namespace vcharge

@@ -16,7 +16,11 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 constexpr float kPerScore = 1.0f / kScoreScale;
 
-/// A tile's scores as they are read along its rows, pixel by pixel, which the layout spreads.
+// Step of the refinement in the neighbour that moves most: samples the peak of the score finely whatever the
+// baseline.
+constexpr float kRefinementStep_px = 0.5f;
+
+/// Reads a tile's scores pixel by pixel along its rows, although the layout interleaves pixels.
 class RowReader {
  public:
   RowReader(const Hypotheses& hypotheses, const TileScores& scores, int first_plane)
@@ -33,7 +37,7 @@ class RowReader {
     first_ = row_ * scores_.layout.rowSize();
     weight_ = hypotheses_.weight.ptr<float>(scores_.tile.y + row) + scores_.tile.x;
   }
-  // Of the row's pixels: by their place in the layout's row.
+  // `pixel`: index in the layout's row.
   int best(size_t pixel) const { return scores_.best[first_ + pixel]; }
   int score(size_t pixel) const { return scores_.best_score[first_ + pixel]; }
   Parabola parabola(size_t pixel) const {
@@ -53,8 +57,8 @@ class RowReader {
   bool isInside(int slot) const { return inside_[static_cast<size_t>(slot)] != 0; }
   int plane(int slot) const { return first_plane_ + scores_.slots[static_cast<size_t>(slot)]; }
 
-  /// Score of the best of the two highest peaks that lies further than `separation` from `inverse_range`; -1
-  /// where there is none.
+  /// Score of the higher one of the two best peaks that is further than `separation` from `inverse_range`; -1
+  /// where neither is.
   float bestPeakApart(size_t pixel, int column, float inverse_range, float separation) const {
     const auto is_apart = [&](int slot) {
       return slot >= 0 && std::abs(offset(slot) * weight(column) - inverse_range) > separation;
@@ -75,13 +79,13 @@ class RowReader {
   const float* weight_ = nullptr;
 };
 
-/// Of each column of a tile its place in the rows of the layout.
-std::vector<size_t> placesOf(const TileScores& scores) {
-  std::vector<size_t> places(static_cast<size_t>(scores.tile.width));
+/// Index in the layout's row of each column of a tile.
+std::vector<size_t> layoutIndices(const TileScores& scores) {
+  std::vector<size_t> indices(static_cast<size_t>(scores.tile.width));
   for (int column = 0; column < scores.tile.width; ++column) {
-    places[static_cast<size_t>(column)] = scores.layout.index(0, column);
+    indices[static_cast<size_t>(column)] = scores.layout.index(0, column);
   }
-  return places;
+  return indices;
 }
 
 /// The rows of an estimate that start at a tile's column.
@@ -134,8 +138,7 @@ SurfaceEstimate::SurfaceEstimate(cv::Size size)
   });
 }
 
-Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays, const cv::Mat& valid_mask,
-                               int window_px) {
+Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays, const cv::Mat& valid_mask) {
   Hypotheses hypotheses;
   hypotheses.are_planes = true;
   hypotheses.normal = family.normal.cast<float>();
@@ -151,12 +154,12 @@ Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays, 
       counts.at<uint8_t>(y, x) = meets && valid_mask.at<uint8_t>(y, x) != 0 ? 255 : 0;
     }
   }
-  hypotheses.window_counts = windowsInside(counts, window_px);
+  hypotheses.window_counts = windowsInside(counts, kMatchingWindow_px);
   return hypotheses;
 }
 
 void readPeaks(const std::vector<Hypotheses>& hypotheses, const std::vector<TileScores>& scores,
-               bool interpolate, SurfaceEstimate* estimate) {
+               SurfaceEstimate* estimate) {
   std::vector<RowReader> families;
   int first_plane = 0;
   for (size_t f = 0; f < hypotheses.size(); ++f) {
@@ -164,14 +167,14 @@ void readPeaks(const std::vector<Hypotheses>& hypotheses, const std::vector<Tile
     first_plane += static_cast<int>(hypotheses[f].offsets.size());
   }
   const cv::Rect tile = scores.front().tile;
-  const std::vector<size_t> places = placesOf(scores.front());
+  const std::vector<size_t> indices = layoutIndices(scores.front());
   for (int row = 0; row < tile.height; ++row) {
     for (RowReader& family : families) {
       family.setRow(row);
     }
     const EstimateRow out(estimate, tile.x, tile.y + row);
     for (int column = 0; column < tile.width; ++column) {
-      const size_t pixel = places[static_cast<size_t>(column)];
+      const size_t pixel = indices[static_cast<size_t>(column)];
       const RowReader* chosen = nullptr;
       int best_score = kNoScore;
       for (const RowReader& family : families) {
@@ -196,7 +199,7 @@ void readPeaks(const std::vector<Hypotheses>& hypotheses, const std::vector<Tile
           second = std::max(second, family.bestPeakApart(pixel, column, inverse_range, 2.0f * step));
         }
       }
-      out.inverse_range[column] = inverse_range + (interpolate ? parabola.offset * step : 0.0f);
+      out.inverse_range[column] = inverse_range + parabola.offset * step;
       out.step[column] = step;
       out.score[column] = kPerScore * static_cast<float>(best_score);
       out.curvature[column] = parabola.curvature / (step * step);
@@ -226,10 +229,8 @@ Hypotheses makeRefinement(const SweepInput& input, const cv::Mat& window_counts,
     const auto* coarse_row = step.ptr<float>(y);
     auto* weight_row = refinement.weight.ptr<float>(y);
     for (int x = 0; x < step.cols; ++x) {
-      const float fine = static_cast<float>(input.options->refinement_step_px) /
-                         std::max(motion[static_cast<size_t>(x)], 1e-6f);
-      // Fine enough for the neighbour that moves most, wide enough to reach half way to the next plane and
-      // back.
+      const float fine = kRefinementStep_px / std::max(motion[static_cast<size_t>(x)], 1e-6f);
+      // Fine for the neighbour that moves most, but wide enough to reach half way to the next plane.
       const float coarse = coarse_row[x] / static_cast<float>(half);
       weight_row[x] = std::clamp(fine, 0.75f * coarse, 2.0f * coarse);
     }
@@ -237,17 +238,16 @@ Hypotheses makeRefinement(const SweepInput& input, const cv::Mat& window_counts,
   return refinement;
 }
 
-void readRefinement(const Hypotheses& refinement, const TileScores& scores, bool interpolate,
-                    SurfaceEstimate* estimate) {
+void readRefinement(const Hypotheses& refinement, const TileScores& scores, SurfaceEstimate* estimate) {
   const int last = static_cast<int>(refinement.offsets.size()) - 1;
   RowReader reader(refinement, scores, 0);
-  const std::vector<size_t> places = placesOf(scores);
+  const std::vector<size_t> indices = layoutIndices(scores);
   for (int row = 0; row < scores.tile.height; ++row) {
     reader.setRow(row);
     const EstimateRow out(estimate, scores.tile.x, scores.tile.y + row);
     const auto* base = refinement.base.ptr<float>(scores.tile.y + row) + scores.tile.x;
     for (int column = 0; column < scores.tile.width; ++column) {
-      const size_t pixel = places[static_cast<size_t>(column)];
+      const size_t pixel = indices[static_cast<size_t>(column)];
       const int best = reader.best(pixel);
       if (best <= 0 || best == last) {
         continue;
@@ -255,12 +255,12 @@ void readRefinement(const Hypotheses& refinement, const TileScores& scores, bool
       const float best_score = kPerScore * static_cast<float>(reader.score(pixel));
       const float weight = reader.weight(column);
       const float peak = base[column] + reader.offset(best) * weight;
-      // The first sweep's winner is another peak when the refinement ended far from it and scores less.
+      // A lower score far from the first sweep's result is another peak.
       if (best_score < out.score[column] && std::abs(peak - out.inverse_range[column]) > out.step[column]) {
         continue;
       }
       const Parabola parabola = reader.parabola(pixel);
-      out.inverse_range[column] = peak + (interpolate ? parabola.offset * weight : 0.0f);
+      out.inverse_range[column] = peak + parabola.offset * weight;
       out.step[column] = weight;
       out.score[column] = best_score;
       out.curvature[column] = parabola.curvature / (weight * weight);

@@ -10,46 +10,41 @@
 
 namespace vcharge {
 
-/// What a sweep found per pixel, as inverse range along the ray. CV_32FC1 unless said otherwise.
+/// Surface that a sweep found, per pixel, as inverse range along the ray. CV_32FC1 unless stated otherwise.
 struct SurfaceEstimate {
   explicit SurfaceEstimate(cv::Size size);
 
   cv::Mat inverse_range;  ///< NaN where no plane was scored
-  cv::Mat step;           ///< distance of neighbouring hypotheses in inverse range
+  cv::Mat step;           ///< spacing of neighbouring hypotheses in inverse range
   cv::Mat score;
-  cv::Mat
-      curvature;  ///< negative second derivative of the score by inverse range at its peak; NaN where none
-  cv::Mat second_score;  ///< of the next best separate peak, -1 where there is none
-  cv::Mat plane;         ///< CV_32SC1: over all families, -1 where none
-  cv::Mat voters;        ///< CV_32SC1: bit n for neighbour n
-  cv::Mat at_limit;      ///< CV_8UC1: not 0 where the planes on both sides of the best one were not scored
+  cv::Mat curvature;     ///< negative second derivative of the score at its peak; NaN where unknown
+  cv::Mat second_score;  ///< score of the next best separate peak, -1 where there is none
+  cv::Mat plane;         ///< CV_32SC1: best plane, counted over all families; -1 where none
+  cv::Mat voters;        ///< CV_32SC1: bit n: neighbour n contributed
+  cv::Mat at_limit;      ///< CV_8UC1: not 0 where a plane beside the best one was not scored
 };
 
 struct Parabola {
-  float offset = 0.0f;                                        ///< of the maximum, in hypotheses
+  float offset = 0.0f;  ///< of the maximum from the middle, in hypotheses
   float curvature = std::numeric_limits<float>::quiet_NaN();  ///< negative second difference of correlations
 };
 
-/// Parabola through three scores whose middle one is the highest (Tian and Huhns 1986); scores as in
-/// TileScores.
+/// Parabola through three scores (as in TileScores), the middle one being the highest (Tian and Huhns 1986).
 Parabola fitParabola(int before, int middle, int after);
 
-/// The planes of a family as hypotheses: base 0, weight -normal . ray, NaN where a ray does not meet them.
-Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays, const cv::Mat& valid_mask,
-                               int window_px);
+/// The planes of a family as hypotheses: base 0, weight -normal . ray, NaN where the ray does not meet them.
+Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays, const cv::Mat& valid_mask);
 
-/// Reads one tile's scores of all families into the estimate. A family beyond the first one only counts where
-/// its best plane lies inside the planes that were scored: those beyond belong to the first one.
+/// Reads one tile's scores of all families into the estimate. Families after the first one only count where
+/// their best plane is not their outermost scored one: surfaces beyond it belong to the first family.
 void readPeaks(const std::vector<Hypotheses>& hypotheses, const std::vector<TileScores>& scores,
-               bool interpolate, SurfaceEstimate* estimate);
+               SurfaceEstimate* estimate);
 
-/// Hypotheses around the smoothed estimate, closely spaced (SweepInput's options); see PlaneSweepOptions.
+/// Closely spaced hypotheses around the smoothed estimate, see PlaneSweepOptions::num_refinement_steps.
 Hypotheses makeRefinement(const SweepInput& input, const cv::Mat& window_counts,
                           const SurfaceEstimate& estimate);
 
-/// Replaces the estimate of a tile where the refinement's scores have a peak; elsewhere the first sweep's
-/// stays.
-void readRefinement(const Hypotheses& refinement, const TileScores& scores, bool interpolate,
-                    SurfaceEstimate* estimate);
+/// Replaces the estimate of a tile where the refinement's scores have a peak.
+void readRefinement(const Hypotheses& refinement, const TileScores& scores, SurfaceEstimate* estimate);
 
 }  // namespace vcharge

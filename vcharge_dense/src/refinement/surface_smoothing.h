@@ -6,12 +6,12 @@
 
 namespace vcharge {
 
-/// Values with the unknown ones (NaN) filled from the mean of the smallest block of pixels around each that
-/// knows any; NaN only where nothing is known. CV_32FC1.
+/// Fills unknown values (NaN) with the mean of the smallest block of an image pyramid that contains known
+/// ones. CV_32FC1; stays NaN only where all values are unknown.
 cv::Mat fillUnknown(const cv::Mat& values);
 
-/// A surface without outliers and plane steps: the median of 5 x 5 pixels, then the mean of those neighbours
-/// that lie within one step of it. CV_32FC1; step: per pixel.
+/// Removes outliers and steps between planes: a median of 5 x 5 pixels, then the mean of the neighbours
+/// within one step of it. CV_32FC1; `step`: spacing of the planes at each pixel.
 cv::Mat smoothSurface(const SweepKernels& kernels, const cv::Mat& inverse_range, const cv::Mat& step);
 
 }  // namespace vcharge

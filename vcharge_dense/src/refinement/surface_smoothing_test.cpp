@@ -1,6 +1,5 @@
 #include "refinement/surface_smoothing.h"
 
-#include <cmath>
 #include <cstring>
 #include <limits>
 #include <random>
@@ -16,13 +15,13 @@ namespace vcharge {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-const cv::Size kSize(101, 75);  // odd, and not a multiple of a band
+const cv::Size kSize(101, 75);  // odd and not a multiple of a band
 
 bool sameBytes(const cv::Mat& a, const cv::Mat& b) {
   return a.size() == b.size() && std::memcmp(a.data, b.data, a.total() * a.elemSize()) == 0;
 }
 
-TEST(SurfaceSmoothingTest, FillsWhatIsUnknownFromAround) {
+TEST(SurfaceSmoothingTest, FillsUnknownValuesFromTheirNeighbourhood) {
   cv::Mat values(kSize, CV_32FC1);
   for (int y = 0; y < values.rows; ++y) {
     for (int x = 0; x < values.cols; ++x) {
@@ -42,7 +41,7 @@ TEST(SurfaceSmoothingTest, FillsWhatIsUnknownFromAround) {
       }
     }
   }
-  // Beside the hole's sides.
+  // At the left and right ends of the hole.
   EXPECT_EQ(filled.at<float>(35, 30), 1.0f);
   EXPECT_EQ(filled.at<float>(35, 59), 3.0f);
 }
@@ -54,7 +53,7 @@ TEST(SurfaceSmoothingTest, OneKnownValueFillsAllAndNoneFillsNothing) {
   EXPECT_EQ(cv::countNonZero(fillUnknown(values) == 0.25f), kSize.area());
 }
 
-TEST(SurfaceSmoothingTest, BandsDoNotShowInTheMedian) {
+TEST(SurfaceSmoothingTest, MedianDoesNotDependOnBands) {
   std::mt19937 generator(1);
   std::uniform_real_distribution<float> uniform(0.1f, 2.0f);
   cv::Mat values(kSize, CV_32FC1);
@@ -65,7 +64,7 @@ TEST(SurfaceSmoothingTest, BandsDoNotShowInTheMedian) {
   }
   cv::Mat median;
   cv::medianBlur(values, median, 5);
-  // With steps this small no neighbour but an equal one takes part in the mean.
+  // With such small steps only equal neighbours contribute to the mean.
   const cv::Mat smooth = smoothSurface(sweepKernels(), values, cv::Mat(kSize, CV_32FC1, cv::Scalar(1e-12f)));
   EXPECT_LT(cv::norm(smooth, median, cv::NORM_INF), 1e-6);
   EXPECT_GT(cv::norm(values, median, cv::NORM_INF), 0.5);
@@ -85,7 +84,7 @@ TEST(PooledMatTest, NoTwoMatricesShareMemoryAtATime) {
   });
 }
 
-TEST(PooledMatTest, MemoryServesAgain) {
+TEST(PooledMatTest, MemoryIsReused) {
   const cv::Size unusual(53, 17);
   const uint8_t* first = nullptr;
   {

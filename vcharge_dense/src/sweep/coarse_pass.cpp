@@ -10,25 +10,27 @@
 namespace vcharge {
 namespace {
 
-// Chosen on two simulated drives other than those that the README judges by. Sizes are of the coarse image.
-// A pixel is sure where its score is high and leads the second peak.
-constexpr float kSureScore = 0.6f, kSureLead = 0.1f;
-constexpr double kMinSureShare = 0.3;  // of a tile's pixels with texture; less: all planes
-constexpr int kMinSure = 16, kReach_px = 2;
-constexpr int kMinCount = 8;      // sure pixels that name a plane
-constexpr int kMarginPlanes = 1;  // swept beyond the named planes
+// Chosen on two simulated drives that are not used for evaluation. Sizes are those of the coarse image.
+// A pixel is confident where its score is high and well above the second peak.
+constexpr float kConfidentScore = 0.6f, kConfidentLead = 0.1f;
+// All planes are swept where fewer of a tile's pixels with texture are confident.
+constexpr double kMinConfidentFraction = 0.3;
+constexpr int kMinConfident = 16;
+constexpr int kReach_px = 2;      // pixels around a tile that count for it
+constexpr int kMinCount = 8;      // confident pixels that select a plane
+constexpr int kMarginPlanes = 1;  // planes on both sides of a selected one that are swept too
 
-/// Slots of the planes that are named often enough, widened by the margin; a gap where some are left out.
+/// Slots of the selected planes and their margin, with a gap where planes are left out.
 std::vector<int> slotsOf(const std::vector<int>& counts) {
   const int num_planes = static_cast<int>(counts.size());
   std::vector<int> slots;
   for (int plane = 0; plane < num_planes; ++plane) {
-    int named = 0;
+    int count = 0;
     for (int i = std::max(0, plane - kMarginPlanes); i <= std::min(num_planes - 1, plane + kMarginPlanes);
          ++i) {
-      named = std::max(named, counts[static_cast<size_t>(i)]);
+      count = std::max(count, counts[static_cast<size_t>(i)]);
     }
-    if (named >= kMinCount) {
+    if (count >= kMinCount) {
       slots.push_back(plane);
     } else if (slots.empty() || slots.back() != kGap) {
       slots.push_back(kGap);
@@ -37,8 +39,8 @@ std::vector<int> slotsOf(const std::vector<int>& counts) {
   return slots;
 }
 
-/// Index, with its fraction, of a value among the offsets of a family; beyond their ends it goes on.
-float placeOf(float value, const Hypotheses& family) {
+/// Fractional index of a value among the offsets of a family, extrapolated beyond their ends.
+float fractionalIndex(float value, const Hypotheses& family) {
   const std::vector<float>& offsets = family.offsets;
   if (family.are_uniform || !(value == value)) {  // NaN differs from itself
     return (value - offsets.front()) * (1.0f / (offsets[1] - offsets[0]));
@@ -61,13 +63,11 @@ CoarsePass::CoarsePass(std::shared_ptr<const SweepLevel> fine, const std::option
   PlaneSweepOptions options = fine_->options();
   options.num_planes = std::max(3, (options.num_planes + 1) / 2);
   options.num_ground_planes = std::max(3, (options.num_ground_planes + 1) / 2);
-  options.semi_global_smoothing = false;
   level_ = halfLevel(*fine_, options, ground_in_camera);
 }
 
 SurfaceEstimate CoarsePass::sweep(const SweepInput& half_input) const {
-  const std::vector<cv::Rect> tiles =
-      makeTiles(level_->validMask().size(), level_->options().window_px, TileSize::kLarge);
+  const std::vector<cv::Rect> tiles = makeTiles(level_->validMask().size(), TileSize::kLarge);
   return level_->sweepPlanes(half_input, tiles, {});
 }
 
@@ -77,29 +77,29 @@ TilePlanes CoarsePass::choosePlanes(const SurfaceEstimate& coarse, const cv::Rec
   for (const Hypotheses& family : planes) {
     counts.emplace_back(family.offsets.size(), 0);
   }
-  std::vector<int> sure;  // columns of a row
+  std::vector<int> confident;  // columns of a row
   const cv::Rect around(tile.x / 2 - kReach_px, tile.y / 2 - kReach_px, tile.width / 2 + 2 * kReach_px,
                         tile.height / 2 + 2 * kReach_px);
   const cv::Rect region = around & cv::Rect(cv::Point(), coarse.score.size());
-  int num_textured = 0, num_sure = 0;
+  int num_textured = 0, num_confident = 0;
   for (int y = region.y; y < region.br().y; ++y) {
     const auto* plane = coarse.plane.ptr<int>(y);
     const auto* score = coarse.score.ptr<float>(y);
     const auto* second_score = coarse.second_score.ptr<float>(y);
     const auto* inverse_range = coarse.inverse_range.ptr<float>(y);
-    sure.clear();
+    confident.clear();
     for (int x = region.x; x < region.br().x; ++x) {
       num_textured += plane[x] >= 0 ? 1 : 0;
-      if (plane[x] >= 0 && score[x] >= kSureScore && score[x] - second_score[x] >= kSureLead) {
-        sure.push_back(x);
+      if (plane[x] >= 0 && score[x] >= kConfidentScore && score[x] - second_score[x] >= kConfidentLead) {
+        confident.push_back(x);
       }
     }
-    num_sure += static_cast<int>(sure.size());
+    num_confident += static_cast<int>(confident.size());
     for (size_t f = 0; f < planes.size(); ++f) {
       const auto* weight = planes[f].weight.ptr<float>(2 * y);
       const auto end = static_cast<float>(planes[f].offsets.size());
-      for (const int x : sure) {
-        const float index = placeOf(inverse_range[x] / weight[2 * x], planes[f]) + 0.5f;
+      for (const int x : confident) {
+        const float index = fractionalIndex(inverse_range[x] / weight[2 * x], planes[f]) + 0.5f;
         if (index > 0.0f && index < end) {  // false for NaN
           ++counts[f][static_cast<size_t>(index)];
         }
@@ -107,9 +107,10 @@ TilePlanes CoarsePass::choosePlanes(const SurfaceEstimate& coarse, const cv::Rec
     }
   }
   TilePlanes result;
-  const bool is_sure = num_sure >= kMinSure && num_sure >= kMinSureShare * num_textured;
+  const bool is_confident =
+      num_confident >= kMinConfident && num_confident >= kMinConfidentFraction * num_textured;
   for (std::vector<int>& count : counts) {
-    if (!is_sure) {
+    if (!is_confident) {
       std::fill(count.begin(), count.end(), kMinCount);
     }
     result.push_back(slotsOf(count));

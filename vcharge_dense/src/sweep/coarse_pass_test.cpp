@@ -17,16 +17,18 @@
 namespace vcharge {
 namespace {
 
-using testing::allValid;
-using testing::kCamera;
-using testing::kLeft;
-using testing::kSize;
-using testing::lotScene;
-using testing::makeSequence;
-using testing::onEveryTarget;
-using testing::Sequence;
+SweepInput inputOf(const SweepLevel& level, const Sequence& sequence) {
+  SweepInput input = level.makeInput(sequence.reference.pixels);
+  for (const SweepImage& image : sequence.neighbours) {
+    const RigidTransform pose = image.world_from_camera.inverse() * sequence.reference.world_from_camera;
+    input.neighbours.push_back({PackedImage(image.pixels, level.validMask()),
+                                pose.rotationMatrix().cast<float>(), pose.translation().cast<float>(),
+                                false});
+  }
+  return input;
+}
 
-/// The level and its input for a sequence.
+/// A sequence and the level that sweeps it.
 struct Level {
   Sequence sequence;
   std::shared_ptr<const SweepLevel> level;
@@ -35,18 +37,9 @@ struct Level {
   Level()
       : sequence(makeSequence(lotScene(2), kLeft, 0.2, -4, 0, 2.0)),
         level(std::make_shared<SweepLevel>(kCamera, allValid(), PlaneSweepOptions(), sequence.ground)),
-        tiles(makeTiles(kSize, PlaneSweepOptions().window_px, TileSize::kSmall)) {}
+        tiles(makeTiles(kSize, TileSize::kSmall)) {}
 
-  SweepInput input() const {
-    SweepInput input = level->makeInput(sequence.reference.pixels);
-    for (const SweepImage& image : sequence.neighbours) {
-      const RigidTransform pose = image.world_from_camera.inverse() * sequence.reference.world_from_camera;
-      input.neighbours.push_back({PackedImage(image.pixels, level->validMask()),
-                                  pose.rotationMatrix().cast<float>(), pose.translation().cast<float>(),
-                                  false});
-    }
-    return input;
-  }
+  SweepInput input() const { return inputOf(*level, sequence); }
 };
 
 bool sameBytes(const cv::Mat& a, const cv::Mat& b) {
@@ -105,16 +98,10 @@ TEST(TileScorerTest, RowsWithoutTextureDoNotChangeOthers) {
   s.reference.pixels.rowRange(0, first).setTo(90);
   s.reference.pixels.rowRange(end, kSize.height).setTo(90);
   PlaneSweepOptions options;
-  options.warp_tolerance_px = 0.0;  // exact everywhere, whatever the tile
+  options.warp_tolerance_px = 0.0;  // exact everywhere, so that tiles do not matter
   const SweepLevel level(kCamera, allValid(), options, s.ground);
-  SweepInput input = level.makeInput(s.reference.pixels);
-  for (const SweepImage& image : s.neighbours) {
-    const RigidTransform pose = image.world_from_camera.inverse() * s.reference.world_from_camera;
-    input.neighbours.push_back({PackedImage(image.pixels, level.validMask()),
-                                pose.rotationMatrix().cast<float>(), pose.translation().cast<float>(),
-                                false});
-  }
-  const int radius = options.window_px / 2;
+  const SweepInput input = inputOf(level, s);
+  const int radius = kMatchingWindow_px / 2;
   const cv::Rect tight(40, first - radius, 100, end - first + 2 * radius);
   const cv::Rect wide(tight.x, tight.y - 20, tight.width, tight.height + 35);
   TileScorer scorer;
@@ -150,7 +137,7 @@ TEST(CoarsePassTest, EqualsTheFullSweepWhereAllPlanesAreChosen) {
   const Level setup;
   const SweepInput input = setup.input();
   const CoarsePass coarse(setup.level, setup.sequence.ground);
-  // Nothing found: nothing is sure.
+  // Without a coarse estimate no pixel is confident.
   const std::vector<TilePlanes> choice =
       coarse.choosePlanes(SurfaceEstimate(cv::Size(kSize.width / 2, kSize.height / 2)), setup.tiles);
   ASSERT_EQ(choice.size(), setup.tiles.size());
@@ -161,9 +148,9 @@ TEST(CoarsePassTest, EqualsTheFullSweepWhereAllPlanesAreChosen) {
   }
   const SurfaceEstimate full = setup.level->sweepPlanes(input, setup.tiles, {});
   SurfaceEstimate chosen = setup.level->sweepPlanes(input, setup.tiles, choice);
-  SurfaceEstimate doubtful(cv::Size(kSize.width / 2, kSize.height / 2));
-  doubtful.second_score.setTo(1.0f);
-  coarse.addSecondPeaks(doubtful, setup.tiles, choice, &chosen);
+  SurfaceEstimate uncertain(cv::Size(kSize.width / 2, kSize.height / 2));
+  uncertain.second_score.setTo(1.0f);
+  coarse.addSecondPeaks(uncertain, setup.tiles, choice, &chosen);
   EXPECT_TRUE(sameBytes(full.inverse_range, chosen.inverse_range));
   EXPECT_TRUE(sameBytes(full.score, chosen.score));
   EXPECT_TRUE(sameBytes(full.second_score, chosen.second_score));
@@ -232,27 +219,15 @@ TEST(CoarsePassTest, GivesTheSameBytesOnAnyNumberOfThreads) {
   const Sequence s = makeSequence(lotScene(2), kLeft, 0.2, -4, 0, 2.0);
   PlaneSweepOptions options;
   options.coarse_pass = true;
-  const PlaneSweep sweep(kCamera, allValid(), options, s.ground);
-  testing::expectTheSameOnAnyNumberOfThreads(sweep, s);
+  expectTheSameOnAnyNumberOfThreads(options, s);
 }
 
 TEST(CoarsePassTest, KeepsWhatTheFullSweepFinds) {
   const Sequence s = makeSequence(lotScene(20), kLeft, 0.2, -4, 0, 2.0);
   PlaneSweepOptions options;
-  const auto countRight = [&] {
-    const RangeMap map = PlaneSweep(kCamera, allValid(), options, s.ground).sweep(s.reference, s.neighbours);
-    int right = 0;
-    for (int y = 0; y < kSize.height; ++y) {
-      for (int x = 0; x < kSize.width; ++x) {
-        const double truth = s.truth.at<double>(y, x);
-        right += std::abs(map.range_m.at<float>(y, x) - truth) <= 0.05 * truth ? 1 : 0;
-      }
-    }
-    return right;
-  };
-  const int full = countRight();
+  const int full = countRight(sweepOf(s, options), s.truth, 0.05);
   options.coarse_pass = true;
-  const int chosen = countRight();
+  const int chosen = countRight(sweepOf(s, options), s.truth, 0.05);
   EXPECT_GT(full, 0.7 * kSize.area());
   EXPECT_GE(chosen, 0.99 * full);
 }
@@ -261,13 +236,13 @@ TEST(CoarsePassTest, OddAndSmallImagesWork) {
   for (const cv::Size size : {cv::Size(101, 77), cv::Size(20, 40)}) {
     const cv::Rect part(60, 60, size.width, size.height);
     Sequence s = makeSequence(lotScene(2), kLeft, 0.1, -2, 0);
-    testing::crop(part, &s);
-    const MeiCamera camera = testing::croppedCamera(part);
+    crop(part, &s);
+    const MeiCamera camera = croppedCamera(part);
     PlaneSweepOptions options;
     options.coarse_pass = true;
     const RangeMap map = PlaneSweep(camera, cv::Mat(size, CV_8UC1, cv::Scalar(255)), options, s.ground)
                              .sweep(s.reference, s.neighbours);
-    EXPECT_GT(cv::countNonZero(map.range_m == map.range_m), 0.3 * size.area()) << size;
+    EXPECT_GT(countKnown(map), 0.3 * size.area()) << size;
   }
 }
 

@@ -8,11 +8,11 @@ namespace vcharge {
 
 namespace {
 
-// A quadratic through three nodes leaves their range by no more than an eighth of their second difference, in
-// each direction: with this, positions stay in the packed image (see kInset_px in sweep_input.cpp).
+// In each direction a quadratic through three nodes exceeds their range by at most an eighth of their second
+// difference. With this limit positions stay in the packed image (see kInset_px in sweep_input.cpp).
 constexpr float kMaxSecondDifference_px = 12.0f;
 
-/// Nodes that cover `pixels` with whole cells, at least two for a third difference.
+/// Number of nodes that cover `pixels` with whole cells, at least two cells for a third difference.
 int countNodes(int pixels, int spacing) {
   return 2 * std::max(2, (pixels + 2 * spacing - 1) / (2 * spacing)) + 1;
 }
@@ -36,7 +36,7 @@ NodeGrid::NodeGrid(const MeiCamera& camera, const cv::Mat& near_valid, cv::Point
   while ((1 << cell_shift_) < 2 * spacing) {
     ++cell_shift_;
   }
-  nodes_ = countNodes(layout.strip + layout.strip % 2, spacing);  // samples come in twos
+  nodes_ = countNodes(layout.strip + layout.strip % 2, spacing);  // samples are computed in pairs
   node_rows_ = countNodes(layout.rows, spacing);
   const size_t size =
       static_cast<size_t>(node_rows_) * static_cast<size_t>(nodes_) * static_cast<size_t>(layout.lanes);

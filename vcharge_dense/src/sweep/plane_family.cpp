@@ -5,8 +5,11 @@
 namespace vcharge {
 namespace {
 
-/// `count` inverse distances from 1 / far_m to 1 / near_m; their differences grow evenly, to `growth` times
-/// the first one.
+// The planes parallel to the ground lie within this height above and below it.
+constexpr double kMaxGroundHeight_m = 0.3;
+
+/// `count` inverse distances from 1 / far_m to 1 / near_m whose steps grow linearly, up to `growth` times the
+/// first step.
 std::vector<float> inverseDistances(double far_m, double near_m, int count, double growth) {
   const double linear = 2.0 / (1.0 + growth);
   std::vector<float> inverse(static_cast<size_t>(count));
@@ -33,21 +36,21 @@ Plane groundInCamera(const RigidTransform& vehicle_from_camera) {
 std::vector<PlaneFamily> makePlaneFamilies(const PlaneSweepOptions& options,
                                            const std::optional<Plane>& ground_in_camera) {
   std::vector<PlaneFamily> families;
-  if (options.families != PlaneFamilies::kGroundParallel) {
-    families.push_back({-Eigen::Vector3d::UnitZ(),
-                        inverseDistances(options.max_distance_m, options.min_distance_m, options.num_planes,
-                                         options.near_spacing),
-                        options.near_spacing == 1.0});
-  }
-  if (options.families != PlaneFamilies::kFrontoParallel) {
+  families.push_back({-Eigen::Vector3d::UnitZ(),
+                      inverseDistances(options.max_distance_m, options.min_distance_m, options.num_planes,
+                                       options.near_spacing),
+                      options.near_spacing == 1.0});
+  if (options.num_ground_planes > 0) {
     if (!ground_in_camera) {
-      throw std::invalid_argument("families: ground-parallel planes need the camera's pose on the vehicle");
+      throw std::invalid_argument(
+          "num_ground_planes: planes parallel to the ground need the camera's pose on the vehicle");
     }
-    const double far_m = ground_in_camera->distance_m - options.ground_min_height_m;
-    const double near_m = ground_in_camera->distance_m - options.ground_max_height_m;
+    const double far_m = ground_in_camera->distance_m + kMaxGroundHeight_m;
+    const double near_m = ground_in_camera->distance_m - kMaxGroundHeight_m;
     if (!(near_m > 0.0)) {
-      throw std::invalid_argument("ground_max_height_m: must be below the camera, which is at " +
-                                  std::to_string(ground_in_camera->distance_m) + " m");
+      throw std::invalid_argument(
+          "num_ground_planes: a camera must be more than 0.3 m above the ground, is at " +
+          std::to_string(ground_in_camera->distance_m) + " m");
     }
     families.push_back({ground_in_camera->normal.normalized(),
                         inverseDistances(far_m, near_m, options.num_ground_planes, 1.0), true});

@@ -9,7 +9,6 @@
 #include "range_mapping/pose_refinement.h"
 #include "refinement/range_uncertainty.h"
 #include "sweep/coarse_pass.h"
-#include "sweep/far_planes.h"
 #include "sweep/sweep_level.h"
 #include "sweep/tile_scorer.h"
 #include "vcharge_core/base/error.h"
@@ -17,14 +16,14 @@
 namespace vcharge {
 namespace {
 
-constexpr int kMinWidth_px = 16;  // the most lanes that a vector has
+constexpr int kMinWidth_px = 16;  // most lanes of a vector
 
 void checkImage(const SweepImage& image, cv::Size size) {
   check(image.pixels.type() == CV_8UC1 && image.pixels.size() == size,
         "PlaneSweep: images must be CV_8UC1 of the working camera's size");
 }
 
-/// Packs the neighbours' images and finds their relative poses.
+/// Packs the neighbours' images and computes their relative poses.
 void addNeighbours(const SweepLevel& level, const SweepImage& reference,
                    const std::vector<SweepImage>& neighbours, SweepInput* input) {
   std::optional<PoseRefinement> poses;
@@ -50,7 +49,7 @@ void addNeighbours(const SweepLevel& level, const SweepImage& reference,
   }
 }
 
-/// Gives unknown pixels what the map of half the size has there.
+/// Fills unknown pixels from the map of half the size.
 void fillUnknown(const RangeMap& half, RangeMap* map) {
   for (int y = 0; y < half.range_m.rows * 2; ++y) {
     for (int x = 0; x < half.range_m.cols * 2; ++x) {
@@ -75,9 +74,6 @@ PlaneSweep::PlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask, const
   if (options.coarse_pass && canBeHalved(valid_mask.size())) {
     coarse_ = std::make_shared<CoarsePass>(level_, ground_in_camera);
   }
-  if (options.half_resolution_beyond_m > 0.0 && canBeHalved(valid_mask.size())) {
-    far_ = std::make_shared<FarPlanes>(level_, ground_in_camera);
-  }
   if (options.num_fill_levels > 0 && canBeHalved(valid_mask.size())) {
     PlaneSweepOptions half_options = options;
     --half_options.num_fill_levels;
@@ -96,29 +92,14 @@ const std::vector<PlaneFamily>& PlaneSweep::families() const {
 
 SurfaceEstimate PlaneSweep::sweepPlanes(const SweepInput& input, const SweepPixels& half_pixels,
                                         const std::vector<cv::Rect>& large_tiles) const {
-  if (!coarse_ && !far_) {
+  if (!coarse_) {
     return level_->sweepPlanes(input, large_tiles, {});
   }
-  const SweepInput half_input = halfInput(coarse_ ? coarse_->level() : far_->level(), input, half_pixels);
-  std::vector<cv::Rect> tiles = large_tiles;
-  std::vector<TilePlanes> choice = allPlanes(*level_, tiles.size());
-  std::optional<SurfaceEstimate> coarse;
-  if (coarse_) {
-    coarse = coarse_->sweep(half_input);
-    tiles = makeTiles(level_->validMask().size(), options().window_px, TileSize::kSmall);
-    choice = coarse_->choosePlanes(*coarse, tiles);
-  }
-  SurfaceEstimate estimate =
-      level_->sweepPlanes(input, tiles, far_ && far_->any() ? far_->nearOf(choice) : choice);
-  if (far_ && far_->any()) {
-    const std::vector<TilePlanes> far_choice = coarse_ ? coarse_->choosePlanes(*coarse, far_->tilesOfFine())
-                                                       : allPlanes(*level_, far_->tiles().size());
-    far_->merge(input, far_->level().sweepPlanes(half_input, far_->tiles(), far_->farOf(far_choice)),
-                &estimate);
-  }
-  if (coarse_) {
-    coarse_->addSecondPeaks(*coarse, tiles, choice, &estimate);
-  }
+  const SurfaceEstimate coarse = coarse_->sweep(halfInput(coarse_->level(), input, half_pixels));
+  const std::vector<cv::Rect> tiles = makeTiles(level_->validMask().size(), TileSize::kSmall);
+  const std::vector<TilePlanes> choice = coarse_->choosePlanes(coarse, tiles);
+  SurfaceEstimate estimate = level_->sweepPlanes(input, tiles, choice);
+  coarse_->addSecondPeaks(coarse, tiles, choice, &estimate);
   return estimate;
 }
 
@@ -146,8 +127,8 @@ RangeMap PlaneSweep::sweep(const SweepInput& input, const SweepPixels& pixels, S
   std::vector<cv::Rect> tiles;
   SurfaceEstimate estimate(size);
   if (has_neighbours) {
-    half_pixels = coarse_ || far_ || half_ ? halved(pixels) : SweepPixels();
-    tiles = makeTiles(size, options().window_px);
+    half_pixels = coarse_ || half_ ? halved(pixels) : SweepPixels();
+    tiles = makeTiles(size);
     estimate = sweepPlanes(input, half_pixels, tiles);
   }
   const bool found = cv::countNonZero(estimate.plane >= 0) > 0;

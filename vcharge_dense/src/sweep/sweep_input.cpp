@@ -13,18 +13,18 @@
 namespace vcharge {
 namespace {
 
-// Nodes this far from the packed image's ends count as unseen: interpolated positions lie between them, or a
-// little beyond.
+// Nodes closer than this to the packed image's borders are unseen, because interpolated positions may lie a
+// little outside their nodes.
 constexpr float kInset_px = 4.0f;
 
-/// Finds the reference's mean and inverse deviation in the rows `begin` to `end`.
+/// Computes the reference's mean and inverse deviation in the rows `begin` to `end`.
 void findMoments(int begin, int end, int window, double min_squares, SweepReference* reference) {
   const cv::Mat& samples = reference->samples;
   const int radius = window / 2;
   const double count = window * window;
   const auto per_count = static_cast<float>(1.0 / count);
   const auto columns = static_cast<size_t>(samples.cols);
-  // Sums over a window of rows, per column; then over a window of columns, per first one.
+  // Sums over a window of rows for each column, then over a window of columns for each first column.
   std::vector<int32_t> sums(columns, 0), squares(columns, 0), sum(columns), square(columns);
   const auto addRow = [&](int y, int sign) {
     const auto* row = samples.ptr<int16_t>(y);
@@ -110,7 +110,7 @@ SweepReference::SweepReference(const cv::Mat& pixels, const PlaneSweepOptions& o
       to[x] = table[from[x]];
     }
   });
-  const int window = options.window_px;
+  const int window = kMatchingWindow_px;
   const int count = window * window;
   const double per_gray = static_cast<double>(kWeightSum * kWeightSum) / (1 << scale.shift);
   const double min_squares =

@@ -16,30 +16,29 @@ namespace vcharge {
 struct SweepNeighbour {
   PackedImage image;
   Eigen::Matrix3f neighbour_from_reference;  ///< rotation
-  Eigen::Vector3f translation_m;             ///< of the same transform
+  Eigen::Vector3f translation_m;             ///< translation of the same transform
   bool after = false;                        ///< taken after the reference
-  /// Of the variances that the options' noise expects; less where the pose was refined.
+  /// Remaining fraction of the variances of PoseNoiseOptions; less than 1 where the pose was refined.
   float rotation_variance_left = 1.0f, translation_variance_left = 1.0f;
 
   Projection projectionOf(const MeiCamera& camera) const;
 };
 
-/// The reference image as the kernels use it.
+/// The reference image in the form that the kernels use.
 struct SweepReference {
   cv::Mat samples;            ///< CV_16SC1, see SampleScale
-  cv::Mat mean;               ///< CV_32FC1: of the window around each pixel
-  cv::Mat inverse_deviation;  ///< CV_32FC1: 1 / sqrt(sum of squares about it), NaN where texture is missing
+  cv::Mat mean;               ///< CV_32FC1: mean of the window around each pixel
+  cv::Mat inverse_deviation;  ///< CV_32FC1: 1 / sqrt(sum of squares about the mean), NaN without texture
 
-  /// pixels: CV_8UC1. Windows that leave the image count as without texture.
+  /// `pixels`: CV_8UC1. Windows that leave the image have no texture.
   SweepReference(const cv::Mat& pixels, const PlaneSweepOptions& options, const SampleScale& scale);
 };
 
-/// What all tiles of one sweep share. The pointers outlive the tiles.
+/// Input that all tiles of one sweep share. The pointers must outlive it.
 struct SweepInput {
   MeiCamera camera;
   const RayTable* rays;
-  const cv::Mat*
-      near_valid;  ///< CV_8UC1: not 0 where valid pixels are near (node grids need positions there)
+  const cv::Mat* near_valid;  ///< CV_8UC1: not 0 near valid pixels, where node grids need positions
   const PlaneSweepOptions* options;
   SweepKernels kernels;
   SampleScale scale;
@@ -47,18 +46,18 @@ struct SweepInput {
   std::vector<SweepNeighbour> neighbours;
 };
 
-/// A set of surfaces to score: pixel (x, y) on surface k has the inverse range base + offsets[k] * weight.
-/// For planes base is 0 and the weight is -normal . ray.
+/// A set of surfaces to be scored: on surface k a pixel has the inverse range base + offsets[k] * weight. For
+/// planes base is 0 and weight is -normal . ray.
 struct Hypotheses {
   bool are_planes = false;
-  Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< of planes
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< only for planes
   cv::Mat base;                                      ///< CV_32FC1, empty for planes
   cv::Mat weight;                                    ///< CV_32FC1, NaN where there is no surface
   cv::Mat window_counts;  ///< CV_8UC1: not 0 where all pixels of the window are valid and have a surface
   std::vector<float> offsets;
-  bool are_uniform = true;  ///< offsets are equally far apart
+  bool are_uniform = true;  ///< offsets are equally spaced
 
-  /// Distance of an offset from its neighbours.
+  /// Mean distance of an offset from its neighbours.
   float stepAt(size_t hypothesis) const {
     const size_t last = offsets.size() - 1;
     const size_t before = are_uniform ? 0 : hypothesis - (hypothesis > 0 ? 1 : 0);
@@ -67,7 +66,7 @@ struct Hypotheses {
   }
 };
 
-/// Not 0 where `counts` is nowhere 0 in the window around the pixel.
+/// CV_8UC1: not 0 where all pixels of the window around a pixel are not 0 in `counts`.
 cv::Mat windowsInside(const cv::Mat& counts, int window_px);
 
 }  // namespace vcharge

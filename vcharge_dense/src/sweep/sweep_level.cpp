@@ -9,7 +9,6 @@
 #include <tbb/parallel_for.h>
 #include <opencv2/imgproc.hpp>
 
-#include "refinement/plane_smoothing.h"
 #include "sweep/tile_scorer.h"
 
 namespace vcharge {
@@ -21,7 +20,7 @@ constexpr int kNearValid_px = 17;
 
 }  // namespace
 
-/// What a tile is computed in, one per thread that does so at the same time.
+/// Working memory of tiles, one worker per concurrent thread.
 class SweepLevel::WorkerPool {
  public:
   struct Worker {
@@ -29,12 +28,12 @@ class SweepLevel::WorkerPool {
     std::vector<TileScores> scores;
   };
 
-  /// Calls function(tile's index, worker) with the tile set and as many scores as there are families. Tiles
-  /// are independent of each other, hence of who computes them.
+  /// Calls function(tile index, worker) for each tile, with the worker's tile set and one TileScores per
+  /// family. Tiles are independent of each other, so that results do not depend on the threads.
   template <class Function>
   void forEachTile(const SweepInput& input, const std::vector<cv::Rect>& tiles, size_t num_families,
                    const Function& function) {
-    std::atomic<size_t> next{0};  // not the loop's own index: tiles are taken in their order
+    std::atomic<size_t> next{0};  // takes tiles in their order, unlike the loop's index
     tbb::parallel_for(
         tbb::blocked_range<size_t>(0, tiles.size(), 1),
         [&](const tbb::blocked_range<size_t>& range) {
@@ -73,13 +72,13 @@ SweepLevel::SweepLevel(const MeiCamera& camera, const cv::Mat& valid_mask, const
                        const std::optional<Plane>& ground_in_camera)
     : camera_(camera),
       valid_mask_(valid_mask.clone()),
-      valid_windows_(windowsInside(valid_mask_, options.window_px)),
+      valid_windows_(windowsInside(valid_mask_, kMatchingWindow_px)),
       options_(options),
       rays_(camera, valid_mask.size(), kWholeSphere_rad, valid_mask),
       families_(makePlaneFamilies(options, ground_in_camera)),
       workers_(std::make_unique<WorkerPool>()) {
   for (const PlaneFamily& family : families_) {
-    planes_.push_back(makePlaneHypotheses(family, rays_, valid_mask_, options_.window_px));
+    planes_.push_back(makePlaneHypotheses(family, rays_, valid_mask_));
   }
   cv::dilate(valid_mask_, near_valid_, cv::Mat::ones(2 * kNearValid_px + 1, 2 * kNearValid_px + 1, CV_8UC1));
 }
@@ -87,7 +86,7 @@ SweepLevel::SweepLevel(const MeiCamera& camera, const cv::Mat& valid_mask, const
 SweepLevel::~SweepLevel() = default;
 
 SweepInput SweepLevel::makeInput(const cv::Mat& reference_pixels) const {
-  const SampleScale scale = SampleScale::forWindow(options_.window_px);
+  const SampleScale scale = SampleScale::forWindow(kMatchingWindow_px);
   return {camera_,
           &rays_,
           &near_valid_,
@@ -100,12 +99,7 @@ SweepInput SweepLevel::makeInput(const cv::Mat& reference_pixels) const {
 
 SurfaceEstimate SweepLevel::sweepPlanes(const SweepInput& input, const std::vector<cv::Rect>& tiles,
                                         const std::vector<TilePlanes>& choice) const {
-  const cv::Size size = input.reference.samples.size();
-  SurfaceEstimate estimate(size);
-  std::optional<PlaneSmoothing> smoothing;
-  if (options_.semi_global_smoothing) {
-    smoothing.emplace(size, planes_, options_);
-  }
+  SurfaceEstimate estimate(input.reference.samples.size());
   workers_->forEachTile(input, tiles, planes_.size(), [&](size_t tile, WorkerPool::Worker* worker) {
     for (size_t f = 0; f < planes_.size(); ++f) {
       if (choice.empty()) {
@@ -114,14 +108,8 @@ SurfaceEstimate SweepLevel::sweepPlanes(const SweepInput& input, const std::vect
         worker->scorer.score(planes_[f], choice[tile][f], &worker->scores[f]);
       }
     }
-    readPeaks(planes_, worker->scores, options_.sub_plane_interpolation, &estimate);
-    if (smoothing) {
-      smoothing->addTile(worker->scores);
-    }
+    readPeaks(planes_, worker->scores, &estimate);
   });
-  if (smoothing) {
-    smoothing->smooth(options_.sub_plane_interpolation, &estimate);
-  }
   return estimate;
 }
 
@@ -129,7 +117,7 @@ void SweepLevel::refineSurface(const SweepInput& input, const Hypotheses& refine
                                const std::vector<cv::Rect>& tiles, SurfaceEstimate* estimate) const {
   workers_->forEachTile(input, tiles, 1, [&](size_t, WorkerPool::Worker* worker) {
     worker->scorer.score(refinement, &worker->scores.front());
-    readRefinement(refinement, worker->scores.front(), options_.sub_plane_interpolation, estimate);
+    readRefinement(refinement, worker->scores.front(), estimate);
   });
 }
 

@@ -15,12 +15,12 @@
 
 namespace vcharge {
 
-/// The planes that a tile sweeps: per family, see TileScores::slots.
+/// The planes that are swept in a tile, per family, see TileScores::slots.
 using TilePlanes = std::vector<std::vector<int>>;
 
-/// What does not change from image to image: a camera without distortion and the planes swept in its images.
-/// Its inputs point into it. Any number of threads may use it at a time; it keeps the memory that tiles are
-/// computed in (a few megabytes a thread), for fresh pages cost more than what is done with them.
+/// What all images of a camera have in common: its model without distortion and the planes to be swept.
+/// Inputs point into it. Thread safe. Keeps the working memory of tiles, a few megabytes per thread, because
+/// new memory pages cost more time than the computation in them.
 class SweepLevel {
  public:
   SweepLevel(const MeiCamera& camera, const cv::Mat& valid_mask, const PlaneSweepOptions& options,
@@ -29,13 +29,14 @@ class SweepLevel {
   SweepLevel(const SweepLevel&) = delete;
   SweepLevel& operator=(const SweepLevel&) = delete;
 
-  /// Without neighbours.
+  /// Makes an input without neighbours.
   SweepInput makeInput(const cv::Mat& reference_pixels) const;
 
-  /// The surface that the planes explain best. The choice has an entry per tile, or none: all planes.
+  /// The surface on the planes with the best scores. `choice` has one entry per tile, or is empty: all
+  /// planes.
   SurfaceEstimate sweepPlanes(const SweepInput& input, const std::vector<cv::Rect>& tiles,
                               const std::vector<TilePlanes>& choice) const;
-  /// Looks for better peaks around an estimate, see PlaneSweepOptions.
+  /// Searches for better peaks around an estimate, see makeRefinement().
   void refineSurface(const SweepInput& input, const Hypotheses& refinement,
                      const std::vector<cv::Rect>& tiles, SurfaceEstimate* estimate) const;
 
@@ -45,14 +46,14 @@ class SweepLevel {
   const cv::Mat& validWindows() const { return valid_windows_; }
   const PlaneSweepOptions& options() const { return options_; }
   const std::vector<PlaneFamily>& families() const { return families_; }
-  const std::vector<Hypotheses>& planes() const { return planes_; }  ///< of the families
+  const std::vector<Hypotheses>& planes() const { return planes_; }  ///< of families()
 
  private:
   class WorkerPool;
 
   MeiCamera camera_;
   cv::Mat valid_mask_, valid_windows_;
-  cv::Mat near_valid_;  // CV_8UC1: not 0 where valid pixels are near
+  cv::Mat near_valid_;  // CV_8UC1: not 0 near valid pixels
   PlaneSweepOptions options_;
   RayTable rays_;
   std::vector<PlaneFamily> families_;

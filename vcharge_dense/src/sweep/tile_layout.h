@@ -4,12 +4,12 @@
 
 namespace vcharge {
 
-/// How the kernels keep the pixels of a tile: its columns are cut into one strip per lane of a vector, and
-/// the pixels at the same place of all strips lie together. A sum that runs along the columns is then a plain
-/// loop over vectors, without shuffles, and only the last columns of a strip need those of the next lane.
+/// Order of a tile's pixels in the kernels' memory: its columns are cut into one strip per lane of a vector,
+/// and the pixels at the same position of all strips are adjacent. A running sum along the columns is then a
+/// loop over vectors without shuffles; only the last columns of a strip need those of the next lane.
 struct TileLayout {
   int lanes = 1;
-  int strip = 1;  ///< columns of a strip
+  int strip = 1;  ///< columns per strip
   int rows = 0;
 
   int columns() const { return lanes * strip; }

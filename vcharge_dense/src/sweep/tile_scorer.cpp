@@ -9,13 +9,14 @@ namespace vcharge {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-// A tile's reference, its neighbours' footprints and one hypothesis's sums fit into a megabyte of L2.
-constexpr int kTileRows = 64;  // about
+// Sizes at which a tile's reference, the neighbours' pixels that it maps to and the sums of one hypothesis
+// fit into 1 MB of L2 cache.
+constexpr int kTileRows = 64;
 constexpr int kMaxTileColumns = 215;
 constexpr int kSmallTileRows = 32, kMaxSmallTileColumns = 107;
 constexpr int kNodeSpacings_px[] = {8, 4};
 
-/// Copies the part of an image around (x, y) into the order of a layout.
+/// Copies the part of an image that begins at `origin` into the order of a layout.
 template <class To, class From>
 void copyIntoLayout(const cv::Mat& image, cv::Point origin, const TileLayout& layout, From outside, To* to) {
   std::vector<From> line(static_cast<size_t>(layout.columns()));
@@ -57,8 +58,8 @@ bool TileScores::isInside(int slot) const {
   return slot > 0 && s + 1 < slots.size() && slots[s - 1] != kGap && slots[s + 1] != kGap;
 }
 
-std::vector<cv::Rect> makeTiles(cv::Size image, int window_px, TileSize size) {
-  const int radius = window_px / 2;
+std::vector<cv::Rect> makeTiles(cv::Size image, TileSize size) {
+  const int radius = kMatchingWindow_px / 2;
   const cv::Rect all(radius, radius, image.width - 2 * radius, image.height - 2 * radius);
   std::vector<cv::Rect> tiles;
   if (all.width <= 0 || all.height <= 0) {
@@ -71,7 +72,7 @@ std::vector<cv::Rect> makeTiles(cv::Size image, int window_px, TileSize size) {
   const int bands = std::max(1, (all.height + rows / 2) / rows);
   const int height = (all.height + bands - 1) / bands;
   for (int y = 0; y < all.height;) {
-    // The last tiles are less high, lest one thread waits long for another.
+    // The last tiles are lower, so that threads finish at about the same time.
     const int band = y + height < all.height || bands == 1 ? height : (height + 1) / 2;
     for (int x = 0; x < all.width; x += width) {
       tiles.push_back(cv::Rect(all.x + x, all.y + y, width, band) & all);
@@ -83,7 +84,6 @@ std::vector<cv::Rect> makeTiles(cv::Size image, int window_px, TileSize size) {
 
 void TileScorer::setInput(const SweepInput& input) {
   input_ = &input;
-  radius_ = input.options->window_px / 2;
   after_.resize(input.neighbours.size());
   neighbours_.resize(input.neighbours.size());
   for (size_t n = 0; n < input.neighbours.size(); ++n) {
@@ -96,24 +96,24 @@ void TileScorer::setInput(const SweepInput& input) {
 void TileScorer::setTile(const SweepInput& input, const cv::Rect& tile) {
   setInput(input);
   tile_ = tile;
-  const int columns = tile.width + 2 * radius_;
+  const int columns = tile.width + 2 * kRadius_px;
   halo_.lanes = input_->kernels.lanes;
-  halo_.strip = std::max((columns + halo_.lanes - 1) / halo_.lanes, 2 * radius_ + 1);
-  halo_.rows = tile.height + 2 * radius_;
+  halo_.strip = std::max((columns + halo_.lanes - 1) / halo_.lanes, 2 * kRadius_px + 1);
+  halo_.rows = tile.height + 2 * kRadius_px;
   grids_.clear();
   has_rays_ = false;
   const size_t row_size = halo_.rowSize();
-  const cv::Point origin(tile.x - radius_, tile.y - radius_);
+  const cv::Point origin(tile.x - kRadius_px, tile.y - kRadius_px);
   for (Neighbour& neighbour : neighbours_) {
     neighbour.samples.resize(ringRows() * rowSamples(halo_.lanes, halo_.strip));
     neighbour.column_sums.resize(3 * row_size);
   }
-  // A sample and, negated, the one a window above.
+  // Each sample paired with the negated sample one window above, which leaves the running sum.
   AlignedArray<int32_t> samples;
   samples.resize(halo_.size());
   copyIntoLayout<int32_t, int16_t>(input_->reference.samples, origin, halo_, 0, samples.data());
   reference_pairs_.resize(halo_.size());
-  const size_t window_above = static_cast<size_t>(input_->options->window_px) * row_size;
+  const size_t window_above = static_cast<size_t>(kMatchingWindow_px) * row_size;
   for (size_t i = 0; i < halo_.size(); ++i) {
     const int32_t old = i >= window_above ? -samples[i - window_above] : 0;
     reference_pairs_[i] = static_cast<int32_t>((static_cast<uint32_t>(samples[i]) & 0xffffu) |
@@ -124,7 +124,7 @@ void TileScorer::setTile(const SweepInput& input, const cv::Rect& tile) {
   mean_.resize(windows.size());
   vote_per_covariance_.resize(windows.size());
   copyIntoLayout<float, float>(input_->reference.mean, tile.tl(), windows, 0.0f, mean_.data());
-  // One vector more than a row of an odd number has, for samples come in twos.
+  // One vector more than a row has, because samples are computed in pairs.
   u_.assign(row_size + static_cast<size_t>(halo_.lanes), 0);
   v_.assign(row_size + static_cast<size_t>(halo_.lanes), 0);
   votes_.resize(std::max<size_t>(1, neighbours_.size()) * row_size);
@@ -145,7 +145,7 @@ void TileScorer::loadSurface(const Hypotheses& hypotheses) {
   for (const std::unique_ptr<NodeGrid>& grid : grids_) {
     grid->setNormal(hypotheses.normal);
   }
-  // Rows without a window that counts at either end need no score.
+  // Rows without windows that count, at the top and the bottom, need no score.
   const auto counts_in_row = [&](int row) {
     const float* begin = vote_per_covariance_.data() + static_cast<size_t>(row) * windows.rowSize();
     return std::any_of(begin, begin + windows.rowSize(), [](float value) { return value > 0.0f; });
@@ -158,13 +158,13 @@ void TileScorer::loadSurface(const Hypotheses& hypotheses) {
   while (end_row_ > first_row_ && !counts_in_row(end_row_ - 1)) {
     --end_row_;
   }
-  base_.resize(0);  // see placeNeighbour()
+  base_.resize(0);  // set by prepareWarp()
   weight_.resize(0);
 }
 
-/// Finds the coarsest grid that is exact enough, or else prepares the projection of every pixel.
-void TileScorer::placeNeighbour(const Hypotheses& hypotheses, float offset, Neighbour* neighbour) {
-  const cv::Point origin(tile_.x - radius_, tile_.y - radius_);
+/// Selects the coarsest grid that is accurate enough, or prepares the projection of every pixel.
+void TileScorer::prepareWarp(const Hypotheses& hypotheses, float offset, Neighbour* neighbour) {
+  const cv::Point origin(tile_.x - kRadius_px, tile_.y - kRadius_px);
   neighbour->grid = nullptr;
   const auto tolerance_px = static_cast<float>(input_->options->warp_tolerance_px);
   for (size_t level = 0; hypotheses.are_planes && tolerance_px > 0.0f && level < std::size(kNodeSpacings_px);
@@ -207,7 +207,7 @@ void TileScorer::placeNeighbour(const Hypotheses& hypotheses, float offset, Neig
 void TileScorer::scoreSlot(const Hypotheses& hypotheses, size_t slot, TileScores* result) {
   const SweepKernels& kernels = input_->kernels;
   const size_t row_size = halo_.rowSize();
-  const int window = input_->options->window_px;
+  const int window = kMatchingWindow_px;
   const size_t ring_row = rowSamples(halo_.lanes, halo_.strip);
   const size_t num_slots = result->slots.size();
   if (result->slots[slot] == kGap) {
@@ -219,7 +219,7 @@ void TileScorer::scoreSlot(const Hypotheses& hypotheses, size_t slot, TileScores
   }
   const float offset = hypotheses.offsets[static_cast<size_t>(result->slots[slot])];
   for (Neighbour& neighbour : neighbours_) {
-    placeNeighbour(hypotheses, offset, &neighbour);
+    prepareWarp(hypotheses, offset, &neighbour);
     std::fill_n(neighbour.samples.data(), neighbour.samples.size(), int16_t{0});
     std::fill_n(neighbour.column_sums.data(), neighbour.column_sums.size(), 0);
   }
@@ -229,7 +229,6 @@ void TileScorer::scoreSlot(const Hypotheses& hypotheses, size_t slot, TileScores
   row.scale = input_->scale;
   VoteRow vote;
   vote.aggregation = input_->options->aggregation;
-  vote.best_k = input_->options->best_k;
   vote.num_neighbours = static_cast<int>(neighbours_.size());
   vote.after = after_.data();
   vote.votes = votes_.data();
@@ -237,7 +236,7 @@ void TileScorer::scoreSlot(const Hypotheses& hypotheses, size_t slot, TileScores
   vote.strip = halo_.strip;
   vote.voter_stride = rowVoterBytes(halo_.lanes, halo_.strip);
   for (int y = first_row_; y < end_row_ + window - 1; ++y) {
-    const int window_row = y - (window - 1);  // of the windows that end here
+    const int window_row = y - (window - 1);  // first row of the windows that end in this row
     const bool ends_windows = window_row >= first_row_;
     const size_t at = static_cast<size_t>(y) * row_size;
     const size_t window_at = static_cast<size_t>(std::max(0, window_row)) * row_size;

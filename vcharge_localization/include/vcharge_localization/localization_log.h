@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "vcharge_core/camera/camera_rig.h"
@@ -24,6 +25,9 @@ class LocalizationSummary {
   void add(const LocalizationResult& result);
   std::string text() const;
   int64_t numFrames() const;
+  const std::map<LocalizationStatus, int64_t>& numFramesByStatus() const { return num_frames_; }
+  /// Each kind of warning: number of frames that had it, and its last text.
+  std::vector<std::pair<int64_t, std::string>> warnings() const;
 
  private:
   std::map<LocalizationStatus, int64_t> num_frames_;

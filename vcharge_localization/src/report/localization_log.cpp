@@ -101,6 +101,14 @@ int64_t LocalizationSummary::numFrames() const {
   return static_cast<int64_t>(latencies_s_.size());
 }
 
+std::vector<std::pair<int64_t, std::string>> LocalizationSummary::warnings() const {
+  std::vector<std::pair<int64_t, std::string>> result;
+  for (const auto& [kind, warning] : warnings_) {
+    result.emplace_back(warning.num_frames, warning.last_text);
+  }
+  return result;
+}
+
 std::string LocalizationSummary::text() const {
   std::ostringstream text;
   text << "frames: " << numFrames() << std::fixed << std::setprecision(1) << "\n";

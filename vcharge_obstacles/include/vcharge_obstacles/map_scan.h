@@ -4,11 +4,10 @@
 
 namespace vcharge {
 
-/// The nearest obstacle of a map in each of `num_rays` sectors of the full circle around the vehicle frame's
-/// origin, and how far all cells in the sector are free from the nearest free one on. A range is the mean of
-/// the occupied cells from the first one to `depth_m` behind it, or of the first one alone where it is as low
-/// as a kerb, whose top lies behind its edge; cells within half a cell of a sector's border speak for both
-/// its sides.
-ObstacleScan makeScan(const ObstacleMap& map, int num_rays, double depth_m);
+/// Scan through a map: the nearest obstacle in each of `num_rays` sectors around the vehicle frame's origin,
+/// and how far the cells of the sector are free without a gap. A range is the mean of the occupied cells
+/// within 0.2 m of the first one; for obstacles as low as a kerb it is that of the first cell, as the cells
+/// behind it are the kerb's top. A cell within half a cell of a sector's border counts in both sectors.
+ObstacleScan makeScan(const ObstacleMap& map, int num_rays);
 
 }  // namespace vcharge

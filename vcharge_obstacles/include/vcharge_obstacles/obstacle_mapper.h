@@ -16,8 +16,8 @@
 
 namespace vcharge {
 
-/// Where the map's cells stay: in odometry's frame, or in the map's, which they follow when localization
-/// moves it.
+/// Frame in which the map's cells are fixed: the odometry's, or the sparse map's, in which localization
+/// corrects them.
 enum class FixedFrame { kOdom, kMap };
 template <>
 inline std::vector<std::string> enumNames<FixedFrame>() {
@@ -25,46 +25,33 @@ inline std::vector<std::string> enumNames<FixedFrame>() {
 }
 
 struct ObstacleMapperOptions {
-  std::vector<std::string> cameras;  ///< of the rig, by name; empty: all
-  FixedFrame fixed_frame = FixedFrame::kOdom;
-  ObstacleDetectorOptions detector;
-  GroundWatchOptions watch;
-  LocalObstacleMapOptions map;
-  FrameAssemblerOptions frames;
-  double silent_s = 0.5;         ///< after this time without any range map the map is shown all the same
-  double max_silence_s = 1.0;    ///< a camera without range maps for longer, while driving, has stopped
-  double min_known_share = 0.1;  ///< of a camera's pixels with a range; with less it hardly sees
-  double anchor_step_m = 0.03;   ///< map -> odom moves the cells once it has changed by so much
-  double anchor_step_rad = 0.003;
+  VCHARGE_BEGIN_OPTIONS(ObstacleMapperOptions);
+  VCHARGE_OPTION(std::vector<std::string>, cameras, {}, anyValue(),
+                 "Cameras of the rig by name; empty: all.");
+  VCHARGE_OPTION(FixedFrame, fixed_frame, FixedFrame::kOdom, anyValue(),
+                 "Frame in which the cells are fixed.");
+  VCHARGE_OPTION_GROUP(ObstacleDetectorOptions, detector, {}, "Obstacles in one range map.");
+  VCHARGE_OPTION_GROUP(GroundWatchOptions, watch, {}, "Ground whose appearance changes.");
+  VCHARGE_OPTION_GROUP(LocalObstacleMapOptions, map, {}, "Fusion over time and cameras.");
+  VCHARGE_OPTION_GROUP(FrameAssemblerOptions, frames, {}, "Range maps of one stamp, and odometry.");
+  VCHARGE_OPTION(double, max_silence_s, 1.0, positive(),
+                 "Time without range maps after which a camera has stopped.");
+  VCHARGE_OPTION(double, min_known_fraction, 0.1, atLeast(0.0).below(1.0),
+                 "Fraction of pixels with a range below which a camera hardly sees.");
+  VCHARGE_END_OPTIONS();
 
   ObstacleMapperOptions() {
     frames.max_speed_m_per_s = 60.0;
-    frames.max_step_m = 0.15;  // the map's cells show errors that other stages do not
+    frames.max_step_m = 0.15;  // smaller jumps than in other stages are visible in the cells
     frames.max_step_rad = 0.05;
   }
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("cameras", cameras);
-    visit("fixed_frame", fixed_frame);
-    visit("detector", detector);
-    visit("watch", watch);
-    visit("map", map);
-    visit("frames", frames);
-    visit("silent_s", silent_s);
-    visit("max_silence_s", max_silence_s);
-    visit("min_known_share", min_known_share);
-    visit("anchor_step_m", anchor_step_m);
-    visit("anchor_step_rad", anchor_step_rad);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
-/// What a camera adds to the map at present.
+/// What a camera contributes to the map at present.
 enum class ObstacleCameraState {
   kNoRangeMaps,   ///< none yet, or they stopped while the vehicle drives
-  kNoPose,        ///< range maps come, but there is no odometry at their stamps
-  kStanding,      ///< the vehicle stands: motion stereo sees nothing
+  kNoPose,        ///< there is no odometry at the range maps' stamps
+  kStanding,      ///< the vehicle stands: motion stereo measures nothing
   kHardlySees,    ///< few ranges: night, dirt, no texture
   kGroundLost,    ///< the ground is tilted beyond the bounds: nothing is cleared
   kGroundUnsure,  ///< few ground points: nothing is cleared
@@ -75,59 +62,57 @@ std::string toString(ObstacleCameraState state);
 struct ObstacleCameraStatus {
   std::string camera_name;
   ObstacleCameraState state = ObstacleCameraState::kNoRangeMaps;
-  std::string message;  ///< one line for people
+  std::string message;  ///< one line for the user
   GroundPlane ground;   ///< of the last range map
-  double known_share = 0.0;
+  double known_fraction = 0.0;
   uint64_t range_maps = 0;
   uint64_t without_pose = 0;
-  uint64_t late = 0;  ///< came after their stamp had been fused, and were left out
+  uint64_t late = 0;  ///< ignored, because their stamp was fused before
 };
 
-/// The map after all range maps of one stamp; where none come, from time to time; empty, where odometry
-/// jumped. Stamps grow from frame to frame, until the drive starts over: range maps of a stamp that is no
-/// later than the last frame's are fused without a frame of their own.
+/// The map after all range maps of one stamp. Without range maps a frame is emitted from time to time, and
+/// after a jump of the odometry an empty one at once. Stamps increase until the drive starts over: range maps
+/// that are not newer than the last frame are fused without a frame of their own.
 struct ObstacleFrame {
   ObstacleMap map;
-  ObstacleScan scan;                     ///< of the fused map
-  std::vector<CameraObstacles> cameras;  ///< that were added at this stamp, in the rig's order
+  ObstacleScan scan;                     ///< through the fused map
+  std::vector<CameraObstacles> cameras;  ///< added at this stamp, in the rig's order
   std::vector<ObstacleCameraStatus> status;
 };
 
-/// Turns range maps and odometry into obstacle maps: one front for the nodelet and the offline tool. Range
-/// maps of one stamp are fused together, in the rig's order. Not thread safe.
+/// Turns range maps and odometry into obstacle maps, for the nodelet and the offline tool alike. Range maps
+/// of one stamp are fused together, in the rig's order. Not thread safe.
 class ObstacleMapper {
  public:
   using FrameCallback = std::function<void(const ObstacleFrame&)>;
 
-  /// InputError when the rig lacks a camera of the options or the pose of one on the vehicle;
-  /// std::invalid_argument for bad options.
+  /// InputError if the rig lacks a camera of the options, or its extrinsics; std::invalid_argument for bad
+  /// options.
   ObstacleMapper(std::shared_ptr<const CameraRig> rig, const ObstacleMapperOptions& options,
                  FrameCallback on_frame);
   ~ObstacleMapper();
 
   void addOdometry(const VehicleOdometry& odometry);
-  /// From localization; needed for, and only heard with, fixed_frame: map.
+  /// Localization's correction. Required with fixed_frame: map, ignored otherwise.
   void setMapFromOdom(const RigidTransform& map_from_odom);
-  /// InputError for a map of no camera in use, or made with another rig.
+  /// InputError for a range map of a camera that is not in use, or that was made with another rig.
   void addRangeMap(const RangeMap& map);
-  /// Fuses what still waits: the drive is over.
+  /// Fuses what still waits at the end of the drive.
   void finish();
 
-  /// Of the cameras in use, in the rig's order.
+  /// One entry per camera in use, in the rig's order.
   std::vector<ObstacleCameraStatus> status() const;
-  /// How often odometry jumped, and the map was emptied for it.
+  /// Number of times that the map was emptied because the odometry jumped.
   uint64_t numJumps() const { return num_jumps_; }
-  /// Stamps whose range maps wait for others, or for odometry.
+  /// Number of stamps that wait for range maps or odometry.
   size_t numWaiting() const { return assembler_->numWaiting(); }
   const FrameCounters& counters() const { return assembler_->counters(); }
-  const PolarGrid& grid() const { return grid_; }
-  const ObstacleMapperOptions& options() const { return options_; }
 
  private:
   struct Camera;
-  struct Observation {  // by one camera
+  struct Observation {
     CameraObstacles obstacles;
-    cv::Mat reference;  // the image, where the range map brought it
+    cv::Mat reference;  // the image of the range map; may be empty
   };
   using Frame = AssembledFrame<Observation>;
 

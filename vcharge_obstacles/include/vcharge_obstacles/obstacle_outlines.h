@@ -14,7 +14,7 @@ struct ObstacleOutline {
   double height_m = 0.0;                   ///< of the highest cell
 };
 
-/// Outlines of all groups of occupied cells that touch, also by corners. Every occupied cell lies in one.
+/// Outlines of all groups of occupied cells that touch by a side or a corner.
 std::vector<ObstacleOutline> findOutlines(const ObstacleMap& map);
 
 }  // namespace vcharge

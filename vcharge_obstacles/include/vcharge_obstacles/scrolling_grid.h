@@ -8,8 +8,8 @@
 
 namespace vcharge {
 
-/// A square window of cells in an endless grid. Cells lie in memory by their index modulo the window's size,
-/// so that moving the window moves none of them.
+/// A square window of cells in an infinite grid. Cells are stored at their index modulo the window's size, so
+/// that moving the window copies none of them.
 template <class Cell>
 class ScrollingGrid {
  public:
@@ -25,19 +25,28 @@ class ScrollingGrid {
   bool isInside(int64_t x, int64_t y) const {
     return x >= first_x_ && x < first_x_ + size_ && y >= first_y_ && y < first_y_ + size_;
   }
-  /// Of an index inside the window.
-  Cell& at(int64_t x, int64_t y) { return cells_[place(x, y)]; }
-  const Cell& at(int64_t x, int64_t y) const { return cells_[place(x, y)]; }
-  /// All cells, in no particular order.
+  /// The cell of an index inside the window.
+  Cell& at(int64_t x, int64_t y) { return cells_[slot(x, y)]; }
+  const Cell& at(int64_t x, int64_t y) const { return cells_[slot(x, y)]; }
+  /// Calls visit(x, y, cell) for all cells, row by row.
+  template <class Visitor>
+  void forEach(Visitor&& visit) const {
+    for (int64_t y = first_y_; y < first_y_ + size_; ++y) {
+      for (int64_t x = first_x_; x < first_x_ + size_; ++x) {
+        visit(x, y, at(x, y));
+      }
+    }
+  }
+  /// All cells, in unspecified order.
   std::vector<Cell>& cells() { return cells_; }
 
   void clear() { cells_.assign(static_cast<size_t>(size_) * static_cast<size_t>(size_), Cell()); }
-  /// Cells that come in are new; those that stay are as they were.
+  /// Cells inside both the old and the new window keep their content; the others are reset.
   void moveTo(int64_t first_x, int64_t first_y) {
     if (std::abs(first_x - first_x_) >= size_ || std::abs(first_y - first_y_) >= size_) {
       clear();
     } else {
-      // Columns and rows that come in take the place of those that go out.
+      // Incoming columns and rows reuse the storage of outgoing ones.
       for (int64_t x = std::min(first_x, first_x_); x < std::max(first_x, first_x_); ++x) {
         for (int64_t y = 0; y < size_; ++y) {
           at(x, y) = Cell();
@@ -58,7 +67,7 @@ class ScrollingGrid {
     const auto remainder = static_cast<int>(index % size_);
     return remainder < 0 ? remainder + size_ : remainder;
   }
-  size_t place(int64_t x, int64_t y) const {
+  size_t slot(int64_t x, int64_t y) const {
     return static_cast<size_t>(wrapped(y)) * static_cast<size_t>(size_) + static_cast<size_t>(wrapped(x));
   }
 

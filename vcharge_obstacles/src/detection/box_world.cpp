@@ -14,7 +14,8 @@ namespace {
 constexpr double kMaxRange_m = 30.0;
 constexpr double kSmallestSigma_m = 0.005;
 
-/// Sum of four, nearly normal, of variance one: the same with every library.
+/// Nearly normal number of variance one: a sum of four uniform ones, which every standard library computes
+/// alike.
 double normalNumber(std::mt19937* generator) {
   double sum = -2.0;
   for (int i = 0; i < 4; ++i) {
@@ -84,7 +85,7 @@ RangeMap measureBoxWorld(const BoxWorld& world, const RigCamera& camera,
   std::mt19937 generator(noise.seed);
   for (int y = 0; y < working.size().height; ++y) {
     for (int x = 0; x < working.size().width; ++x) {
-      const bool unknown = generator() < noise.unknown_share * 4294967296.0;
+      const bool unknown = generator() < noise.unknown_fraction * 4294967296.0;
       const double error = normalNumber(&generator);
       if (!rays.valid(x, y) || unknown) {
         continue;

@@ -11,30 +11,30 @@
 
 namespace vcharge {
 
-/// A box whose sides run along the axes of the world.
+/// An axis-aligned box.
 struct WorldBox {
   Eigen::Vector3d min_m, max_m;
 };
 
-/// Level ground at z = 0 with boxes on it (or above it), and what cameras measure of it.
+/// Level ground at z = 0 with boxes on or above it.
 struct BoxWorld {
   std::vector<WorldBox> boxes;
 
-  /// Distance along a unit ray; infinity where it meets nothing.
+  /// Distance along a unit ray to the first surface; infinity without one.
   double castRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
 };
 
-/// How range maps of a BoxWorld are made.
+/// Errors of simulated range maps.
 struct BoxWorldNoise {
-  double relative_sigma = 0.0;  ///< of ranges, reported as it is
-  double unknown_share = 0.0;   ///< of the pixels, at random
+  double relative_sigma = 0.0;    ///< of the ranges, also reported as their standard deviation
+  double unknown_fraction = 0.0;  ///< of the pixels, chosen at random
   uint32_t seed = 1;
 };
 
 /// A rig of ideal cameras (256x160, 185 degrees): front, left and right, mounted as on a car.
 CameraRig makeBoxWorldRig();
 
-/// What a camera of the rig measures; ranges beyond 30 m are unknown.
+/// Range map of a camera of the rig; ranges beyond 30 m are unknown.
 RangeMap measureBoxWorld(const BoxWorld& world, const RigCamera& camera,
                          const RigidTransform& world_from_vehicle, Timestamp stamp,
                          const BoxWorldNoise& noise = {});

@@ -12,8 +12,14 @@
 namespace vcharge {
 namespace {
 
-// Ground points are looked for in every so many-th column and row of the pixels in use: they are plenty.
+// Every so many-th pixel is a candidate for the ground plane.
 constexpr size_t kGroundStride = 7;
+// Ranges with a larger relative standard deviation are not used.
+constexpr float kMaxRelativeSigma = 0.3F;
+// A ground point lies at least so many standard deviations below min_height_m.
+constexpr float kSureGroundSigmas = 1.0F;
+// Points deeper below the ground are wrong ranges.
+constexpr float kBelowGround_m = 0.08F;
 
 /// The plane and its covariance in single precision, for the loop over pixels.
 struct PlaneTerms {
@@ -30,7 +36,7 @@ struct PlaneTerms {
   Eigen::Matrix3f covariance;
 };
 
-/// What pixels that look at the ground of a cell show.
+/// Weights of the pixels that would show the ground of each cell, by what they show.
 struct GroundEvidence {
   explicit GroundEvidence(const PolarGrid& grid) : bare(grid), hidden(grid), unknown(grid) {}
   StripSum bare, hidden, unknown;
@@ -45,22 +51,21 @@ struct ObstacleDetector::Implementation {
         grid(options.grid),
         size(camera.size()),
         position(vehicle_from_camera.translation().cast<float>()),
-        rays(camera, vehicle_from_camera, grid, options.pixel_step),
-        expected(rays, grid, position.z(), options.min_height_m, options.reference_height_m),
+        rays(camera, vehicle_from_camera, grid),
+        expected(rays, grid, position.z(), options.min_height_m, kReferenceHeight_m),
         overseen_m(overseenRange(rays, grid, position.z())) {
     const Eigen::Vector3d axis = vehicle_from_camera.rotation() * Eigen::Vector3d::UnitZ();
     const double axis_rad = std::atan2(axis.y(), axis.x());
     for (int ray = 0; ray < grid.numRays(); ++ray) {
       const double off_axis_rad = std::abs(std::remainder(grid.angle_rad(ray) - axis_rad, 2.0 * M_PI));
       is_off_axis.push_back(off_axis_rad > options.max_off_axis_rad);
-      free_to_m.push_back(is_off_axis.back() ? options.max_off_axis_free_m
-                                             : std::numeric_limits<double>::infinity());
+      free_to_m.push_back(is_off_axis.back() ? kMaxOffAxisFree_m : std::numeric_limits<double>::infinity());
     }
   }
 
   bool usable(float range_m, float sigma_m, float confidence) const {
     return range_m > 0.0F && confidence >= static_cast<float>(options.min_confidence) &&
-           sigma_m <= static_cast<float>(options.max_relative_sigma) * range_m;  // false for NaN
+           sigma_m <= kMaxRelativeSigma * range_m;  // false for NaN
   }
   bool isOwnVehicle(float x_m, float y_m) const {
     return x_m < options.vehicle_front_m && x_m > options.vehicle_rear_m &&
@@ -69,8 +74,8 @@ struct ObstacleDetector::Implementation {
   GroundCandidates collectGround(const RangeMap& map) const;
   PolarPoints collectPoints(const RangeMap& map, const GroundPlane& ground, GroundEvidence* evidence) const;
   void addGroundStrip(size_t i, const GroundPlane& ground, float weight, StripSum* sum) const;
-  std::vector<float> shareOf(const std::vector<float>& weights) const;
-  void dropOverhungGround(std::vector<float>* free_share) const;
+  std::vector<float> fractionOf(const std::vector<float>& weights) const;
+  void dropOverhungGround(std::vector<float>* free_fraction) const;
 
   const ObstacleDetectorOptions options;
   const PolarGrid grid;
@@ -83,59 +88,16 @@ struct ObstacleDetector::Implementation {
   std::vector<double> free_to_m;         // by sector
 };
 
-void ObstacleDetectorOptions::validate() const {
-  validateInner("grid", grid);
-  validateInner("ground", ground);
-  requireField(pixel_step >= 1 && pixel_step <= 8, "pixel_step", "must be in [1, 8]", pixel_step);
-  requireField(min_height_m > 0.0, "min_height_m", "must be positive", min_height_m);
-  requireField(reference_height_m > min_height_m, "reference_height_m", "must be above min_height_m",
-               reference_height_m);
-  requireField(max_height_m > reference_height_m, "max_height_m", "must be above reference_height_m",
-               max_height_m);
-  requireField(min_confidence >= 0.0 && min_confidence < 1.0, "min_confidence", "must be in [0, 1)",
-               min_confidence);
-  requireField(reference_confidence > 0.5 && reference_confidence < 1.0, "reference_confidence",
-               "must be in (0.5, 1)", reference_confidence);
-  requireField(max_relative_sigma > 0.0, "max_relative_sigma", "must be positive", max_relative_sigma);
-  requireField(min_support > 0.0 && min_support <= 1.0, "min_support", "must be in (0, 1]", min_support);
-  requireField(min_support_behind >= min_support, "min_support_behind", "must not be below min_support",
-               min_support_behind);
-  requireField(min_points > 0.0, "min_points", "must be positive", min_points);
-  requireField(min_ratio > 0.0 && min_ratio < 1.0, "min_ratio", "must be in (0, 1)", min_ratio);
-  requireField(min_separation_m > 0.0, "min_separation_m", "must be positive", min_separation_m);
-  requireField(max_obstacles_per_ray >= 1, "max_obstacles_per_ray", "must be positive",
-               max_obstacles_per_ray);
-  requireField(max_off_axis_rad > 0.0, "max_off_axis_rad", "must be positive", max_off_axis_rad);
-  requireField(max_off_axis_range_m >= 0.0, "max_off_axis_range_m", "must not be negative",
-               max_off_axis_range_m);
-  requireField(max_off_axis_free_m >= 0.0, "max_off_axis_free_m", "must not be negative",
-               max_off_axis_free_m);
-  requireField(max_ramp_height_m >= 0.0, "max_ramp_height_m", "must not be negative", max_ramp_height_m);
-  requireField(max_ramp_length_m >= 0.0, "max_ramp_length_m", "must not be negative", max_ramp_length_m);
-  requireField(ramp_weight >= 0.0 && ramp_weight <= 1.0, "ramp_weight", "must be in [0, 1]", ramp_weight);
-  requireField(sure_ground_sigmas >= 0.0, "sure_ground_sigmas", "must not be negative", sure_ground_sigmas);
-  requireField(below_ground_m > 0.0, "below_ground_m", "must be positive", below_ground_m);
-  requireField(lost_ground_tilt_rad > ground.max_tilt_rad, "lost_ground_tilt_rad",
-               "must be above ground.max_tilt_rad", lost_ground_tilt_rad);
-  requireField(vehicle_front_m > vehicle_rear_m, "vehicle_front_m", "must be above vehicle_rear_m",
-               vehicle_front_m);
-  requireField(vehicle_half_width_m > 0.0, "vehicle_half_width_m", "must be positive", vehicle_half_width_m);
-}
-
 ObstacleDetector::ObstacleDetector(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera,
                                    const ObstacleDetectorOptions& options) {
   options.validate();
   const double height_m = vehicle_from_camera.translation().z();
-  if (!(height_m > options.reference_height_m + 0.05)) {
+  if (!(height_m > kReferenceHeight_m + 0.05)) {
     throw std::invalid_argument(
-        "vehicle_from_camera: the camera must stand above reference_height_m, is at " +
+        "vehicle_from_camera: expected a camera more than 0.25 m above the ground, is at " +
         std::to_string(height_m) + " m");
   }
   implementation_ = std::make_shared<const Implementation>(camera, vehicle_from_camera, options);
-}
-
-const PolarGrid& ObstacleDetector::grid() const {
-  return implementation_->grid;
 }
 
 GroundCandidates ObstacleDetector::Implementation::collectGround(const RangeMap& map) const {
@@ -143,7 +105,7 @@ GroundCandidates ObstacleDetector::Implementation::collectGround(const RangeMap&
   const auto* range_m = map.range_m.ptr<float>();
   const auto* sigma_m = map.standard_deviation_m.ptr<float>();
   const auto* confidence = map.confidence.ptr<float>();
-  // Wider than the bounds, so that a ground beyond them is found and told.
+  // Wider than the bounds, so that ground beyond them is detected.
   const double steepest = 2.5 * options.ground.max_tilt_rad;
   for (size_t i = 0; i < rays.size(); i += kGroundStride) {
     const int pixel = rays.pixel[i];
@@ -162,7 +124,7 @@ GroundCandidates ObstacleDetector::Implementation::collectGround(const RangeMap&
   return candidates;
 }
 
-/// The ground that a pixel would show if nothing stood on it.
+/// Adds the strip of ground that a pixel would show if nothing stood on it.
 void ObstacleDetector::Implementation::addGroundStrip(size_t i, const GroundPlane& ground, float weight,
                                                       StripSum* sum) const {
   if (rays.z[i] < 0.0F) {
@@ -181,7 +143,7 @@ PolarPoints ObstacleDetector::Implementation::collectPoints(const RangeMap& map,
   const auto* confidence = map.confidence.ptr<float>();
   const PlaneTerms plane(ground);
   const bool lost = ground.state == GroundState::kOutOfBounds;
-  const auto lost_slope = static_cast<float>(options.lost_ground_tilt_rad);
+  const auto lost_slope = static_cast<float>(kLostGroundTilt_rad);
   const auto min_height = static_cast<float>(options.min_height_m);
   const auto max_height = static_cast<float>(options.max_height_m);
   const auto roughness = static_cast<float>(options.ground.roughness_m * options.ground.roughness_m);
@@ -216,9 +178,9 @@ PolarPoints ObstacleDetector::Implementation::collectPoints(const RangeMap& map,
       addGroundStrip(i, ground, confidence[pixel], &evidence->hidden);
       continue;
     }
-    const bool sure = height + static_cast<float>(options.sure_ground_sigmas) * height_sigma < threshold &&
-                      height > -static_cast<float>(options.below_ground_m) - 2.0F * height_sigma;
-    if (height < -static_cast<float>(options.below_ground_m) - 2.0F * height_sigma) {
+    const bool sure = height + kSureGroundSigmas * height_sigma < threshold &&
+                      height > -kBelowGround_m - 2.0F * height_sigma;
+    if (height < -kBelowGround_m - 2.0F * height_sigma) {
       addGroundStrip(i, ground, confidence[pixel], &evidence->hidden);
     }
     if (!sure || lost || ground.state == GroundState::kFewPoints) {
@@ -235,21 +197,21 @@ PolarPoints ObstacleDetector::Implementation::collectPoints(const RangeMap& map,
   return points;
 }
 
-std::vector<float> ObstacleDetector::Implementation::shareOf(const std::vector<float>& weights) const {
-  std::vector<float> share(weights.size(), 0.0F);
+std::vector<float> ObstacleDetector::Implementation::fractionOf(const std::vector<float>& weights) const {
+  std::vector<float> fraction(weights.size(), 0.0F);
   for (size_t i = 0; i < weights.size(); ++i) {
-    // One pixel more: a cell that hardly any pixel shows is not free by one of them.
-    share[i] = std::min(1.0F, weights[i] / (expected.ground[i] + 1.0F));
+    // The additional pixel keeps one pixel from freeing a cell that hardly any pixel shows.
+    fraction[i] = std::min(1.0F, weights[i] / (expected.ground[i] + 1.0F));
   }
-  return share;
+  return fraction;
 }
 
-/// Ground over which the image ends too low is no evidence: the body under which it shows may lie outside.
-void ObstacleDetector::Implementation::dropOverhungGround(std::vector<float>* free_share) const {
+/// Removes evidence for ground whose body above, if any, would lie outside the image.
+void ObstacleDetector::Implementation::dropOverhungGround(std::vector<float>* free_fraction) const {
   for (int ray = 0; ray < grid.numRays(); ++ray) {
-    const double from_m = std::max(options.max_off_axis_range_m, overseen_m[static_cast<size_t>(ray)]);
+    const double from_m = std::max(kMaxOffAxisRange_m, overseen_m[static_cast<size_t>(ray)]);
     for (int bin = 0; bin < grid.numBins() && grid.range_m(bin) > from_m; ++bin) {
-      (*free_share)[grid.index(ray, bin)] = 0.0F;
+      (*free_fraction)[grid.index(ray, bin)] = 0.0F;
     }
   }
 }
@@ -269,17 +231,16 @@ CameraObstacles ObstacleDetector::detect(const RangeMap& map) const {
   result.ground = fitGroundPlane(self.collectGround(map), self.options.ground);
   GroundEvidence evidence(self.grid);
   const PolarPoints points = self.collectPoints(map, result.ground, &evidence);
-  result.free_share = self.shareOf(evidence.bare.finish());
-  self.dropOverhungGround(&result.free_share);
-  result.hidden_share = self.shareOf(evidence.hidden.finish());
-  result.unknown_share = self.shareOf(evidence.unknown.finish());
-  result.occupied_share = points.occupiedShare();
-  result.obstacles = findPolarObstacles(points, self.expected.obstacle, self.options);
+  result.free_fraction = self.fractionOf(evidence.bare.finish());
+  self.dropOverhungGround(&result.free_fraction);
+  result.hidden_fraction = self.fractionOf(evidence.hidden.finish());
+  result.unknown_fraction = self.fractionOf(evidence.unknown.finish());
+  result.obstacles = findPolarObstacles(points, self.expected.obstacle, self.options.min_support);
   for (PolarObstacle& obstacle : result.obstacles) {
-    obstacle.is_off_axis = self.is_off_axis[static_cast<size_t>(obstacle.ray)] &&
-                           obstacle.range_m > self.options.max_off_axis_range_m;
+    obstacle.is_off_axis =
+        self.is_off_axis[static_cast<size_t>(obstacle.ray)] && obstacle.range_m > kMaxOffAxisRange_m;
   }
-  result.scan = makePolarScan(self.grid, result.obstacles, result.free_share, self.expected.ground);
+  result.scan = makePolarScan(self.grid, result.obstacles, result.free_fraction, self.expected.ground);
   result.scan.stamp = map.stamp;
   result.scan.name = map.camera_name;
   result.scan.origin_m = result.origin_m;
@@ -288,7 +249,7 @@ CameraObstacles ObstacleDetector::detect(const RangeMap& map) const {
   for (const int pixel : self.rays.pixel) {
     known += std::isfinite(range_m[pixel]) ? 1 : 0;
   }
-  result.known_share =
+  result.known_fraction =
       static_cast<double>(known) / static_cast<double>(std::max<size_t>(1, self.rays.size()));
   return result;
 }

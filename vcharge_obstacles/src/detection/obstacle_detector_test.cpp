@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "detection/box_world.h"
+#include "detection/polar_obstacles.h"
 #include "vcharge_core/camera/ray_table.h"
 
 namespace vcharge {
@@ -28,7 +29,7 @@ class ObstacleDetectorTest : public ::testing::Test {
                             *camera.vehicle_from_camera, options_)
         .detect(map);
   }
-  /// The scan's ray that looks in a direction from the camera.
+  /// The scan's ray in a direction from the camera.
   static size_t rayTo(const CameraObstacles& seen, double angle_rad) {
     return static_cast<size_t>(
         std::lround((angle_rad - seen.scan.angle_min_rad) / seen.scan.angle_increment_rad));
@@ -49,8 +50,8 @@ TEST_F(ObstacleDetectorTest, BareGroundIsFreeAndHasNoObstacle) {
   EXPECT_GT(seen.scan.free_m[rayTo(seen, 0.5 * M_PI)], 4.0F);
 }
 
-TEST_F(ObstacleDetectorTest, FarThingsAtTheRimOfTheLensAreOnlyForHiding) {
-  // A wall along the vehicle: before the left camera, and from there to the rim of its image.
+TEST_F(ObstacleDetectorTest, FarObstaclesAtTheRimOfTheImageOnlyHideGround) {
+  // A wall along the vehicle, from the middle of the left image to its rim.
   const BoxWorld world{{{{-20.0, 2.98, 0.0}, {20.0, 3.2, 0.8}}}};
   const CameraObstacles seen = detect(world, "left", {}, {0.01, 0.1, 7});
   int marking = 0;
@@ -58,7 +59,7 @@ TEST_F(ObstacleDetectorTest, FarThingsAtTheRimOfTheLensAreOnlyForHiding) {
   for (const PolarObstacle& obstacle : seen.obstacles) {
     const double off_axis_rad = std::abs(seen.scan.angle_rad(static_cast<size_t>(obstacle.ray)) - 0.5 * M_PI);
     const bool expected =
-        off_axis_rad > options_.max_off_axis_rad && obstacle.range_m > options_.max_off_axis_range_m;
+        off_axis_rad > options_.max_off_axis_rad && obstacle.range_m > ObstacleDetector::kMaxOffAxisRange_m;
     EXPECT_EQ(obstacle.is_off_axis, expected) << off_axis_rad << " " << obstacle.range_m;
     ++(expected ? hiding : marking);
   }
@@ -68,7 +69,7 @@ TEST_F(ObstacleDetectorTest, FarThingsAtTheRimOfTheLensAreOnlyForHiding) {
   for (size_t ray = 0; ray < seen.free_to_m.size(); ++ray) {
     const double off_axis_rad = std::abs(std::remainder(seen.scan.angle_rad(ray) - 0.5 * M_PI, 2.0 * M_PI));
     EXPECT_EQ(seen.free_to_m[ray], off_axis_rad > options_.max_off_axis_rad
-                                       ? options_.max_off_axis_free_m
+                                       ? ObstacleDetector::kMaxOffAxisFree_m
                                        : std::numeric_limits<double>::infinity());
   }
   const BoxWorld near_box{{{{3.9, 1.2, 0.0}, {4.3, 1.6, 0.8}}}};  // beside the bumper, at the rim
@@ -101,7 +102,7 @@ TEST_F(ObstacleDetectorTest, KerbIsReportedWithItsHeight) {
   EXPECT_NEAR(seen.scan.height_m[ray], 0.12, 0.03);
 }
 
-/// What the left camera sees straight aside, nearest first.
+/// Obstacles on a ray, nearest first.
 std::vector<PolarObstacle> onRay(const CameraObstacles& seen, size_t ray) {
   std::vector<PolarObstacle> found;
   std::copy_if(seen.obstacles.begin(), seen.obstacles.end(), std::back_inserter(found),
@@ -109,10 +110,9 @@ std::vector<PolarObstacle> onRay(const CameraObstacles& seen, size_t ray) {
   return found;
 }
 
-TEST_F(ObstacleDetectorTest, HighThingsWeighByTheLogOddsOfTheirConfidence) {
+TEST_F(ObstacleDetectorTest, HighObstaclesAreWeightedByTheLogOddsOfTheirConfidence) {
   const BoxWorld wall{{{{-20.0, 2.98, 0.0}, {20.0, 3.2, 0.8}}}};
   const BoxWorld kerb{{{{-20.0, 2.5, 0.0}, {20.0, 3.2, 0.12}}}};
-  options_.reference_confidence = 0.9;
   const RigCamera& camera = rig_.cameras[rig_.cameraIndex("left")];
   const auto weightAt = [&](const BoxWorld& world, double confidence) {
     RangeMap map = measureBoxWorld(world, camera, {}, Timestamp(), {0.005, 0.0, 3});
@@ -124,15 +124,16 @@ TEST_F(ObstacleDetectorTest, HighThingsWeighByTheLogOddsOfTheirConfidence) {
   EXPECT_NEAR(weightAt(wall, 0.95), 1.0, 1e-6);
   EXPECT_NEAR(weightAt(wall, 0.75), std::log(3.0) / std::log(9.0), 1e-3);
   EXPECT_NEAR(weightAt(wall, 0.45), 0.0,
-              1e-6);  // rather wrong than right; hides the ground behind all the same
+              1e-6);  // probably wrong, but hides the ground behind all the same
   EXPECT_NEAR(weightAt(wall, 0.85), std::log(0.85 / 0.15) / std::log(9.0), 1e-3);
   EXPECT_NEAR(weightAt(kerb, 0.85), 1.0, 1e-6);
 }
 
-TEST_F(ObstacleDetectorTest, GroundOverWhichTheImageEndsIsNotFree) {
+TEST_F(ObstacleDetectorTest, GroundAboveWhichTheImageEndsIsNotFree) {
   const PolarGrid grid(options_.grid);
-  /// Of bare ground straight aside of the left camera, whose image ends at rays that fall so much per metre.
-  const auto freeShare = [&](double fall, double range_m) {
+  // Bare ground to the left of the left camera, whose image is masked above rays with the given fall per
+  // metre.
+  const auto freeFraction = [&](double fall, double range_m) {
     RigCamera camera = rig_.cameras[rig_.cameraIndex("left")];
     const RayTable rays(camera.model, camera.image_size_px, 2.0 * M_PI, camera.mask);
     camera.mask = cv::Mat(camera.image_size_px, CV_8UC1, cv::Scalar(255));
@@ -146,18 +147,18 @@ TEST_F(ObstacleDetectorTest, GroundOverWhichTheImageEndsIsNotFree) {
     }
     const CameraObstacles seen = detectIn(measureBoxWorld({}, camera, {}, Timestamp()), camera);
     const int bin = grid.binOfInverse(static_cast<float>(1.0 / range_m));
-    return seen.free_share[grid.index(grid.rayOf(0.5 * M_PI), bin)];
+    return seen.free_fraction[grid.index(grid.rayOf(0.5 * M_PI), bin)];
   };
-  EXPECT_GT(freeShare(-1.0, 3.6), 0.5F);  // no end
-  // From 0.9 m height a ray that falls by 0.2 passes 0.25 m above the ground 3.25 m away, and meets it at 4.5
+  EXPECT_GT(freeFraction(-1.0, 3.6), 0.5F);  // not masked
+  // From 0.9 m height a ray that falls by 0.2 is 0.25 m above the ground at 3.25 m and meets it at 4.5 m.
+  EXPECT_GT(freeFraction(0.2, 2.9), 0.5F);
+  EXPECT_EQ(freeFraction(0.2, 3.6), 0.0F);
+  // Nearby ground is free, as another camera would observe a body there: 0.25 m at 1.6 m, the ground at 2.25
   // m.
-  EXPECT_GT(freeShare(0.2, 2.9), 0.5F);
-  EXPECT_EQ(freeShare(0.2, 3.6), 0.0F);
-  // So near, another camera sees what stands there, if any: 0.25 m at 1.6 m, the ground at 2.25 m.
-  EXPECT_GT(freeShare(0.4, 2.0), 0.5F);
+  EXPECT_GT(freeFraction(0.4, 2.0), 0.5F);
 }
 
-TEST_F(ObstacleDetectorTest, RampOfRangesUpToAWallCountsForLess) {
+TEST_F(ObstacleDetectorTest, RampOfRangesUpToAWallHasALowWeight) {
   // From 9 to 25 cm within 0.8 m, in steps of 1 cm: a slope of 0.2.
   BoxWorld world{{{{-20.0, 3.2, 0.0}, {20.0, 3.4, 1.2}}}};
   for (int step = 0; step <= 16; ++step) {
@@ -168,16 +169,16 @@ TEST_F(ObstacleDetectorTest, RampOfRangesUpToAWallCountsForLess) {
   ASSERT_GE(found.size(), 2U);
   EXPECT_LT(found.front().height_m, 0.3);
   EXPECT_TRUE(found.front().is_ramp);
-  EXPECT_EQ(found.front().weight, options_.ramp_weight);
+  EXPECT_EQ(found.front().weight, kRampWeight);
   EXPECT_GT(found.back().height_m, 0.8);
   EXPECT_FALSE(found.back().is_ramp);
   EXPECT_EQ(found.back().weight, 1.0);
 }
 
-TEST_F(ObstacleDetectorTest, LowThingsBeforeAWallAreNoRamps) {
+TEST_F(ObstacleDetectorTest, LowObstaclesInFrontOfAWallAreNoRamps) {
   const WorldBox wall{{-20.0, 3.4, 0.0}, {20.0, 3.6, 1.2}};
-  const WorldBox pavement{{1.0, 2.4, 0.0}, {2.8, 3.4, 0.12}};  // no gap, but flat
-  const WorldBox box{{-20.0, 2.4, 0.0}, {20.0, 2.5, 0.25}};    // as high as a ramp, but hides what is behind
+  const WorldBox pavement{{1.0, 2.4, 0.0}, {2.8, 3.4, 0.12}};  // no gap, but a flat top
+  const WorldBox box{{-20.0, 2.4, 0.0}, {20.0, 2.5, 0.25}};    // as high as a ramp, but leaves a gap
   for (const WorldBox& low : {pavement, box}) {
     const CameraObstacles seen = detect({{wall, low}}, "left", {}, {0.005, 0.0, 3});
     const std::vector<PolarObstacle> found = onRay(seen, rayTo(seen, 0.5 * M_PI));
@@ -188,7 +189,7 @@ TEST_F(ObstacleDetectorTest, LowThingsBeforeAWallAreNoRamps) {
   }
 }
 
-TEST_F(ObstacleDetectorTest, WhatLiesLowerThanTheMinimumIsGround) {
+TEST_F(ObstacleDetectorTest, SurfaceBelowTheMinimumHeightIsGround) {
   const BoxWorld world{{{{-20.0, 2.5, 0.0}, {20.0, 3.2, 0.04}}}};
   EXPECT_EQ(countObstacles(detect(world, "left")), 0);
 }
@@ -200,7 +201,7 @@ TEST_F(ObstacleDetectorTest, ThinPostIsReported) {
   EXPECT_NEAR(seen.scan.range_m[ray], 2.02, 0.05);
 }
 
-TEST_F(ObstacleDetectorTest, BarThatHangsLowIsAnObstacleAndAPortalIsNot) {
+TEST_F(ObstacleDetectorTest, LowBarIsAnObstacleAndAPortalIsNot) {
   const BoxWorld bar{{{{-1.0, 2.5, 0.4}, {5.0, 2.57, 0.47}}}};
   EXPECT_NEAR(detect(bar, "left").scan.range_m[rayTo(detect(bar, "left"), 0.5 * M_PI)], 1.52, 0.05);
   const BoxWorld portal{{{{-1.0, 2.5, 2.3}, {5.0, 2.7, 2.6}}}};
@@ -220,14 +221,14 @@ TEST_F(ObstacleDetectorTest, PitchOfTheBodyIsCorrected) {
   }
 }
 
-TEST_F(ObstacleDetectorTest, GroundTiltedByThreeDegreesIsToldAndClearsNothing) {
+TEST_F(ObstacleDetectorTest, GroundTiltedByThreeDegreesIsReportedAndClearsNothing) {
   const BoxWorld world{{{{-20.0, 3.0, 0.0}, {20.0, 3.3, 1.5}}}};
   for (const double roll_rad : {-3.0 * kDegree, 3.0 * kDegree}) {
     const RigidTransform pose(rotationFromYawPitchRoll(0.0, 0.0, roll_rad), Eigen::Vector3d::Zero());
     const CameraObstacles seen = detect(world, "left", pose, {0.01, 0.0, 4});
     EXPECT_EQ(seen.ground.state, GroundState::kOutOfBounds);
-    EXPECT_EQ(*std::max_element(seen.free_share.begin(), seen.free_share.end()), 0.0F);
-    // A wall is one all the same, ground is none.
+    EXPECT_EQ(*std::max_element(seen.free_fraction.begin(), seen.free_fraction.end()), 0.0F);
+    // A wall is still an obstacle, ground is not.
     EXPECT_NEAR(seen.scan.range_m[rayTo(seen, 0.5 * M_PI)], 2.02, 0.1);
     EXPECT_EQ(countObstacles(detect({}, "left", pose)), 0);
   }
@@ -240,14 +241,14 @@ TEST_F(ObstacleDetectorTest, UnknownRangesAreNeitherFreeNorOccupied) {
   night.standard_deviation_m.setTo(std::numeric_limits<float>::quiet_NaN());
   night.confidence.setTo(0.0);
   const CameraObstacles seen = detectIn(night, camera);
-  EXPECT_EQ(seen.known_share, 0.0);
+  EXPECT_EQ(seen.known_fraction, 0.0);
   EXPECT_EQ(seen.ground.state, GroundState::kFewPoints);
-  EXPECT_EQ(*std::max_element(seen.free_share.begin(), seen.free_share.end()), 0.0F);
+  EXPECT_EQ(*std::max_element(seen.free_fraction.begin(), seen.free_fraction.end()), 0.0F);
   EXPECT_EQ(countObstacles(seen), 0);
 }
 
 TEST_F(ObstacleDetectorTest, SkyAndFarWallsClearNothing) {
-  // Of the left half only what lies far or above the horizon has a range.
+  // In the left half of the image only far surfaces have a range.
   const RigCamera& camera = rig_.cameras[rig_.cameraIndex("left")];
   const BoxWorld world{{{{-30.0, 12.5, 0.0}, {30.0, 13.0, 8.0}}}};
   RangeMap map = measureBoxWorld(world, camera, {}, Timestamp());
@@ -259,14 +260,14 @@ TEST_F(ObstacleDetectorTest, SkyAndFarWallsClearNothing) {
   }
   const CameraObstacles seen = detectIn(map, camera);
   ASSERT_EQ(seen.ground.state, GroundState::kMeasured);
-  const size_t unknown_ray = rayTo(seen, 0.35 * M_PI);  // columns from the left run forwards
+  const size_t unknown_ray = rayTo(seen, 0.35 * M_PI);  // the left columns show the forward side
   const size_t known_ray = rayTo(seen, 0.65 * M_PI);
   EXPECT_GT(std::max(seen.scan.free_m[unknown_ray], seen.scan.free_m[known_ray]), 3.0F);
   EXPECT_EQ(std::min(seen.scan.free_m[unknown_ray], seen.scan.free_m[known_ray]), 0.0F);
 }
 
-TEST_F(ObstacleDetectorTest, BrightLineOfADirtyLensThatLooksFarIsNotGround) {
-  // Dirt has no parallax: the planes furthest away fit it, which lie below the ground on rays that fall.
+TEST_F(ObstacleDetectorTest, DirtOnTheLensWithFarRangesIsNotGround) {
+  // Dirt has no parallax and gets the largest ranges, which lie below the ground on descending rays.
   const RigCamera& camera = rig_.cameras[rig_.cameraIndex("left")];
   RangeMap map = measureBoxWorld({}, camera, {}, Timestamp());
   map.range_m.rowRange(80, 88).setTo(40.0F);
@@ -276,9 +277,9 @@ TEST_F(ObstacleDetectorTest, BrightLineOfADirtyLensThatLooksFarIsNotGround) {
   EXPECT_EQ(countObstacles(dirty), 0);
   double more = 0.0;
   double less = 0.0;
-  for (size_t i = 0; i < clean.free_share.size(); ++i) {
-    more = std::max<double>(more, dirty.free_share[i] - clean.free_share[i]);
-    less = std::max<double>(less, clean.free_share[i] - dirty.free_share[i]);
+  for (size_t i = 0; i < clean.free_fraction.size(); ++i) {
+    more = std::max<double>(more, dirty.free_fraction[i] - clean.free_fraction[i]);
+    less = std::max<double>(less, clean.free_fraction[i] - dirty.free_fraction[i]);
   }
   EXPECT_LT(more, 0.01);
   EXPECT_GT(less, 0.5);
@@ -297,7 +298,7 @@ TEST_F(ObstacleDetectorTest, OptionsNameTheField) {
     options_.validate();
     ADD_FAILURE();
   } catch (const std::invalid_argument& error) {
-    EXPECT_NE(std::string(error.what()).find("reference_height_m"), std::string::npos);
+    EXPECT_NE(std::string(error.what()).find("min_height_m"), std::string::npos);
   }
 }
 

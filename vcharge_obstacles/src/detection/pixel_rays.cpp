@@ -9,12 +9,12 @@
 namespace vcharge {
 
 PixelRays::PixelRays(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera,
-                     const PolarGrid& grid, int pixel_step) {
+                     const PolarGrid& grid) {
   const cv::Size size = camera.size();
   const RayTable table(camera.model(), size, 2.0 * M_PI, camera.validMask());
   const Eigen::Matrix3f rotation = vehicle_from_camera.rotationMatrix().cast<float>();
-  for (int row = 0; row < size.height; row += pixel_step) {
-    for (int column = 0; column < size.width; column += pixel_step) {
+  for (int row = 0; row < size.height; ++row) {
+    for (int column = 0; column < size.width; ++column) {
       if (!table.valid(column, row)) {
         continue;
       }

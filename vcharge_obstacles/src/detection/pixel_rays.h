@@ -10,23 +10,21 @@
 
 namespace vcharge {
 
-/// The valid pixels of a camera, every step-th column and row: where each looks, in the vehicle's axes.
-/// Structure of arrays.
+/// Directions of the valid pixels of a camera in the vehicle's axes, as a structure of arrays.
 struct PixelRays {
-  PixelRays(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera, const PolarGrid& grid,
-            int pixel_step);
+  PixelRays(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera, const PolarGrid& grid);
 
   size_t size() const { return x.size(); }
 
   std::vector<int32_t> pixel;      ///< row * columns + column
   std::vector<float> x, y, z;      ///< unit ray
-  std::vector<float> horizontal;   ///< its length along the ground
+  std::vector<float> horizontal;   ///< its length projected on the ground
   std::vector<int16_t> polar_ray;  ///< sector of the grid
 };
 
-/// How many of a camera's pixels show what, per cell of the grid, where the ground is level.
+/// Number of pixels of a camera that show each cell of the grid, for level ground.
 struct ExpectedPixels {
-  /// low_m: heights up to which a ground point clears; reference_m: height of the reference obstacle.
+  /// low_m: height below which a ray clears the ground; reference_m: height of the reference obstacle.
   ExpectedPixels(const PixelRays& rays, const PolarGrid& grid, double camera_height_m, double low_m,
                  double reference_m);
 
@@ -34,22 +32,21 @@ struct ExpectedPixels {
   std::vector<float> obstacle;  ///< rays that would hit an obstacle between low_m and reference_m
 };
 
-/// Bodies may hang so high over ground that shows under them.
+/// Height up to which the underside of a body may hang over visible ground.
 constexpr double kClearance_m = 0.25;
 
-/// How far, by sector, a camera sees not the ground alone but also up to kClearance_m over it: beyond, the
-/// body under which ground shows may lie outside the image.
+/// Range by sector up to which the image shows the space kClearance_m above the ground. Beyond it, a body
+/// over visible ground may lie outside the image.
 std::vector<double> overseenRange(const PixelRays& rays, const PolarGrid& grid, double camera_height_m);
 
-/// Adds `weight` to all cells of a sector whose middle lies between two inverse ranges. Sums up when
-/// finished: cheap for long strips.
+/// Accumulates weights of strips between two inverse ranges of a sector, in constant time per strip.
 class StripSum {
  public:
   explicit StripSum(const PolarGrid& grid)
       : grid_(grid), difference_(static_cast<size_t>(grid.numRays()) * (grid.numBins() + 1), 0.0F) {}
 
   void add(int ray, float from_inverse, float to_inverse, float weight) {
-    // A bin's middle lies half a bin above its lower end.
+    // The strip covers the bins whose middles lie in it.
     int from = grid_.binOfInverse(from_inverse + half_);
     int to = grid_.binOfInverse(to_inverse + half_) - 1;
     from = from < 0 ? 0 : from;
@@ -61,7 +58,7 @@ class StripSum {
     row[from] += weight;
     row[to + 1] -= weight;
   }
-  /// By PolarGrid::index.
+  /// Sums by PolarGrid::index.
   std::vector<float> finish() const;
 
  private:

@@ -10,16 +10,27 @@
 namespace vcharge {
 namespace {
 
-// The highest part of an obstacle, but for single wrong points.
-constexpr double kTopShare = 0.9;
-// A ray's ground counts as bare where this share of its pixels lies on it.
-constexpr float kBareShare = 0.4F;
-// A ramp of ranges has no larger gap than this, rises at least so steeply, where a kerb's top is flat, and
-// ends at points that are so much higher than its own at most.
+// Quantile of the points' heights that is the obstacle's height, robust to single wrong points.
+constexpr double kTopFraction = 0.9;
+// Ground is bare if this fraction of its pixels lies on it.
+constexpr float kBareFraction = 0.4F;
+// An obstacle behind another one on its ray needs this support.
+constexpr double kMinSupportBehind = 0.5;
+// Weighted number of points of an obstacle, and their fraction of all points of the cell.
+constexpr double kMinPoints = 3.0;
+constexpr double kMinObstacleFraction = 0.4;
+// Obstacles on one ray.
+constexpr double kMinSeparation_m = 0.4;
+constexpr int kMaxObstaclesPerRay = 3;
+// A ramp begins at an obstacle up to this height, rises to something higher within this length, has no larger
+// gap, and is steeper than the flat top of a kerb.
+constexpr double kMaxRampHeight_m = 0.3;
+constexpr double kMaxRampLength_m = 1.3;
 constexpr double kRampGap_m = 0.4;
 constexpr double kRampSlope = 0.05;
+// Points higher than a ramp by this belong to the obstacle behind it.
 constexpr double kRampRise_m = 0.05;
-// It is so long at least, else it is the foot of the high thing, which reaches so far before that.
+// A shorter one is the foot of the high obstacle, which begins this far in front of it.
 constexpr double kRampLength_m = 0.3;
 constexpr double kRampFoot_m = 0.1;
 constexpr size_t kFewPoints = 4;
@@ -33,12 +44,12 @@ double medianOf(const std::vector<PolarPoint>& points, float PolarPoint::*member
   return quantile(std::move(values), 0.5);
 }
 
-/// What a look of this confidence, which is the probability that its ranges are right, weighs: points of one
-/// window are right or wrong together, so that their number does not make them surer.
-double weightOfConfidence(double confidence, double reference) {
+/// Weight of an observation by its confidence, the probability that its ranges are correct. The points of a
+/// matching window are correct or wrong together, so their number does not count.
+double weightOfConfidence(double confidence) {
   const auto logOdds = [](double probability) { return std::log(probability / (1.0 - probability)); };
   constexpr double kCertain = 0.999;
-  return std::clamp(logOdds(std::min(confidence, kCertain)) / logOdds(reference), 0.0, 1.0);
+  return std::clamp(logOdds(std::min(confidence, kCertain)) / logOdds(kReferenceConfidence), 0.0, 1.0);
 }
 
 double meanConfidence(const std::vector<PolarPoint>& points) {
@@ -72,42 +83,42 @@ PolarObstacle refine(int ray, const std::vector<PolarPoint>& points, double supp
   const double mean = sum_range / sum;
   const double spread_square = std::max(0.0, sum_square / sum - mean * mean);
   obstacle.range_m = middle_m + mean;
-  // Neighbouring ranges err together (shared windows, shared poses): their number does not average that out.
+  // Errors of neighbouring ranges are correlated, so the sigma is not divided by their number.
   obstacle.range_sigma_m = std::sqrt(sigma_m * sigma_m + spread_square);
   std::vector<double> heights;
   for (const PolarPoint& point : points) {
     heights.push_back(point.height_m);
   }
-  obstacle.bottom_m = quantile(heights, 1.0 - kTopShare);
-  obstacle.height_m = quantile(std::move(heights), kTopShare);
+  obstacle.bottom_m = quantile(heights, 1.0 - kTopFraction);
+  obstacle.height_m = quantile(std::move(heights), kTopFraction);
   obstacle.height_sigma_m = medianOf(points, &PolarPoint::height_sigma_m);
   return obstacle;
 }
 
-/// Support of a cell with the two beside it, over the reference obstacle's; none where it is too little.
+/// Points in a cell and its two neighbours over those of the reference obstacle; absent if there are too few.
 std::optional<double> supportOf(const PolarPoints& points, int ray, int bin, float expected,
-                                const ObstacleDetectorOptions& options) {
+                                double min_support) {
   const float here = points.obstacleWeight(ray, bin);
   const float nearer = points.obstacleWeight(ray, bin + 1);
   const float further = points.obstacleWeight(ray, bin - 1);
   if (here <= 0.0F || here < nearer || here <= further) {
-    return std::nullopt;  // not the middle of a group
+    return std::nullopt;  // no local maximum
   }
   const float obstacle = here + nearer + further;
   const float ground = points.groundWeight(ray, bin) +
                        0.5F * (points.groundWeight(ray, bin + 1) + points.groundWeight(ray, bin - 1));
   const double support = obstacle / std::max(1.0F, expected);
-  if (obstacle < options.min_points || support < options.min_support ||
-      obstacle < options.min_ratio * (obstacle + ground)) {
+  if (obstacle < kMinPoints || support < min_support ||
+      obstacle < kMinObstacleFraction * (obstacle + ground)) {
     return std::nullopt;
   }
   return support;
 }
 
-/// Share of the pixels around a cell that show bare ground: single cells have few pixels, and one wrong one
-/// among them says little. Negative where there are hardly any.
-float bareShareAround(const PolarGrid& grid, const std::vector<float>& free_share,
-                      const std::vector<float>& expected_ground, int ray, int bin) {
+/// Fraction of the pixels around a cell that show bare ground, as a single cell has few. Negative with hardly
+/// any pixel.
+float bareFractionAround(const PolarGrid& grid, const std::vector<float>& free_fraction,
+                         const std::vector<float>& expected_ground, int ray, int bin) {
   constexpr int kRays = 1;
   constexpr int kBins = 2;
   constexpr float kFewPixels = 5.0F;
@@ -116,14 +127,15 @@ float bareShareAround(const PolarGrid& grid, const std::vector<float>& free_shar
   for (int r = ray - kRays; r <= ray + kRays; ++r) {
     for (int b = std::max(0, bin - kBins); b <= std::min(grid.numBins() - 1, bin + kBins); ++b) {
       const size_t index = grid.index(grid.wrap(r), b);
-      bare += free_share[index] * (expected_ground[index] + 1.0F);  // shares are over one pixel more
+      bare += free_fraction[index] *
+              (expected_ground[index] + 1.0F);  // undoes the additional pixel of fractionOf()
       expected += expected_ground[index];
     }
   }
   return expected < kFewPixels ? -1.0F : bare / expected;
 }
 
-/// Slope of heights over ranges; zero where the ranges do not tell.
+/// Slope of heights over ranges.
 double slopeOf(const std::vector<PolarPoint>& points) {
   double range_m = 0.0;
   double height_m = 0.0;
@@ -140,18 +152,18 @@ double slopeOf(const std::vector<PolarPoint>& points) {
   return covariance / variance;
 }
 
-/// Whether the points of a sector rise from a low obstacle to something higher behind it, without a gap.
-bool isRamp(const PolarPoints& points, const PolarObstacle& low, const ObstacleDetectorOptions& options) {
-  if (low.height_m > options.max_ramp_height_m) {
+/// Whether the points of a sector rise without a gap from a low obstacle to a higher one behind it.
+bool isRamp(const PolarPoints& points, const PolarObstacle& low) {
+  if (low.height_m > kMaxRampHeight_m) {
     return false;
   }
   const PolarGrid& grid = points.grid();
-  const auto furthest_m = static_cast<float>(low.range_m + options.max_ramp_length_m);
+  const auto furthest_m = static_cast<float>(low.range_m + kMaxRampLength_m);
   std::vector<PolarPoint> run = points.pointsOf(low.ray, grid.binOfInverse(1.0F / furthest_m),
                                                 grid.binOfInverse(1.0F / static_cast<float>(low.range_m)));
   std::vector<double> high_m;
   for (const PolarPoint& point : run) {
-    if (point.height_m > options.max_ramp_height_m + kRampRise_m) {
+    if (point.height_m > kMaxRampHeight_m + kRampRise_m) {
       high_m.push_back(point.range_m);
     }
   }
@@ -162,11 +174,11 @@ bool isRamp(const PolarPoints& points, const PolarObstacle& low, const ObstacleD
   if (end_m < low.range_m + kRampLength_m) {
     return false;
   }
-  // The low part of the high thing does not belong to it.
+  // Points of the higher obstacle do not belong to the ramp.
   run.erase(std::remove_if(run.begin(), run.end(),
                            [&](const PolarPoint& point) {
                              return point.range_m < low.range_m || point.range_m > end_m - kRampFoot_m ||
-                                    point.height_m > options.max_ramp_height_m + kRampRise_m;
+                                    point.height_m > kMaxRampHeight_m + kRampRise_m;
                            }),
             run.end());
   std::sort(run.begin(), run.end(),
@@ -184,14 +196,12 @@ bool isRamp(const PolarPoints& points, const PolarObstacle& low, const ObstacleD
   return end_m - last_m <= kRampGap_m;
 }
 
-double weightOf(const PolarObstacle& obstacle, const std::vector<PolarPoint>& points,
-                const ObstacleDetectorOptions& options) {
+/// Kerbs have low confidence too, so only high obstacles are weighted by it.
+double weightOf(const PolarObstacle& obstacle, const std::vector<PolarPoint>& points) {
   if (obstacle.is_ramp) {
-    return options.ramp_weight;
+    return kRampWeight;
   }
-  return obstacle.height_m <= options.max_ramp_height_m
-             ? 1.0
-             : weightOfConfidence(meanConfidence(points), options.reference_confidence);
+  return obstacle.height_m <= kMaxRampHeight_m ? 1.0 : weightOfConfidence(meanConfidence(points));
 }
 
 }  // namespace
@@ -219,36 +229,24 @@ std::vector<PolarPoint> PolarPoints::pointsOf(int ray, int from_bin, int to_bin)
   return found;
 }
 
-std::vector<float> PolarPoints::occupiedShare() const {
-  std::vector<float> share(grid_.size(), std::numeric_limits<float>::quiet_NaN());
-  for (size_t i = 0; i < share.size(); ++i) {
-    const float all = obstacle_weight_[i] + ground_weight_[i];
-    if (all > 0.0F) {
-      share[i] = obstacle_weight_[i] / all;
-    }
-  }
-  return share;
-}
-
 std::vector<PolarObstacle> findPolarObstacles(const PolarPoints& points,
-                                              const std::vector<float>& expected_pixels,
-                                              const ObstacleDetectorOptions& options) {
+                                              const std::vector<float>& expected_pixels, double min_support) {
   const PolarGrid& grid = points.grid();
   std::vector<PolarObstacle> found;
   for (int ray = 0; ray < grid.numRays(); ++ray) {
     int count = 0;
     double last_range_m = -std::numeric_limits<double>::infinity();
-    for (int bin = grid.numBins() - 1; bin >= 0 && count < options.max_obstacles_per_ray; --bin) {
-      if (grid.range_m(bin) < last_range_m + options.min_separation_m) {
+    for (int bin = grid.numBins() - 1; bin >= 0 && count < kMaxObstaclesPerRay; --bin) {
+      if (grid.range_m(bin) < last_range_m + kMinSeparation_m) {
         continue;
       }
       const std::optional<double> support =
-          supportOf(points, ray, bin, expected_pixels[grid.index(ray, bin)], options);
-      if (support && (count == 0 || *support >= options.min_support_behind)) {
+          supportOf(points, ray, bin, expected_pixels[grid.index(ray, bin)], min_support);
+      if (support && (count == 0 || *support >= kMinSupportBehind)) {
         const std::vector<PolarPoint> here = points.pointsOf(ray, bin - 1, bin + 1);
         found.push_back(refine(ray, here, *support));
-        found.back().is_ramp = isRamp(points, found.back(), options);
-        found.back().weight = weightOf(found.back(), here, options);
+        found.back().is_ramp = isRamp(points, found.back());
+        found.back().weight = weightOf(found.back(), here);
         last_range_m = found.back().range_m;
         ++count;
       }
@@ -258,10 +256,11 @@ std::vector<PolarObstacle> findPolarObstacles(const PolarPoints& points,
 }
 
 ObstacleScan makePolarScan(const PolarGrid& grid, const std::vector<PolarObstacle>& obstacles,
-                           const std::vector<float>& free_share, const std::vector<float>& expected_ground) {
+                           const std::vector<float>& free_fraction,
+                           const std::vector<float>& expected_ground) {
   ObstacleScan scan = ObstacleScan::unknown(static_cast<size_t>(grid.numRays()), grid.maxRange_m());
   for (auto obstacle = obstacles.rbegin(); obstacle != obstacles.rend(); ++obstacle) {
-    const auto ray = static_cast<size_t>(obstacle->ray);  // the first one of a ray is written last
+    const auto ray = static_cast<size_t>(obstacle->ray);  // so that the first one of a ray is written last
     scan.range_m[ray] = static_cast<float>(obstacle->range_m);
     scan.range_sigma_m[ray] = static_cast<float>(obstacle->range_sigma_m);
     scan.height_m[ray] = static_cast<float>(obstacle->height_m);
@@ -270,12 +269,12 @@ ObstacleScan makePolarScan(const PolarGrid& grid, const std::vector<PolarObstacl
   for (int ray = 0; ray < grid.numRays(); ++ray) {
     const float range_m = scan.range_m[static_cast<size_t>(ray)];
     for (int bin = grid.numBins() - 1; bin >= 0; --bin) {
-      const float bare_share = bareShareAround(grid, free_share, expected_ground, ray, bin);
+      const float bare_fraction = bareFractionAround(grid, free_fraction, expected_ground, ray, bin);
       const double bin_range_m = grid.range_m(bin);
-      if (bare_share < 0.0F) {
-        continue;  // too near to be seen
+      if (bare_fraction < 0.0F) {
+        continue;  // nearer than the image shows
       }
-      if (bare_share < kBareShare || bin_range_m >= range_m) {
+      if (bare_fraction < kBareFraction || bin_range_m >= range_m) {
         break;
       }
       scan.free_m[static_cast<size_t>(ray)] = static_cast<float>(bin_range_m);

@@ -7,6 +7,12 @@
 
 namespace vcharge {
 
+/// Ranges interpolated between a high obstacle and the ground before it form a ramp, whose observations have
+/// this weight: it may be a kerb after all.
+constexpr double kRampWeight = 0.25;
+/// Obstacles with this mean confidence have full weight.
+constexpr double kReferenceConfidence = 0.9;
+
 /// A point that rises above the ground, in a cell of the polar grid.
 struct PolarPoint {
   int16_t ray, bin;
@@ -27,16 +33,14 @@ class PolarPoints {
     obstacle_weight_[grid_.index(point.ray, point.bin)] += point.weight;
   }
   void addGround(int ray, int bin, float weight) { ground_weight_[grid_.index(ray, bin)] += weight; }
-  /// Call once all are added.
+  /// Must be called after the last point was added.
   void sortByRay();
 
   const PolarGrid& grid() const { return grid_; }
   float obstacleWeight(int ray, int bin) const { return weightAt(obstacle_weight_, ray, bin); }
   float groundWeight(int ray, int bin) const { return weightAt(ground_weight_, ray, bin); }
-  /// Obstacle points of a sector in bins from..to.
+  /// Obstacle points of a sector in the bins from_bin to to_bin.
   std::vector<PolarPoint> pointsOf(int ray, int from_bin, int to_bin) const;
-  /// By PolarGrid::index; NaN without points.
-  std::vector<float> occupiedShare() const;
 
  private:
   float weightAt(const std::vector<float>& weights, int ray, int bin) const {
@@ -49,14 +53,14 @@ class PolarPoints {
   std::vector<size_t> first_of_ray_;
 };
 
-/// Cells with enough obstacle points, nearest first on each ray, refined by the points in them.
-/// expected_pixels: of the reference obstacle, by PolarGrid::index.
+/// Cells with enough obstacle points, nearest first on each ray, refined by their points. expected_pixels:
+/// number that a reference obstacle would have, by PolarGrid::index.
 std::vector<PolarObstacle> findPolarObstacles(const PolarPoints& points,
-                                              const std::vector<float>& expected_pixels,
-                                              const ObstacleDetectorOptions& options);
+                                              const std::vector<float>& expected_pixels, double min_support);
 
-/// The first obstacle on each ray, and how far its ground is seen bare without a gap.
+/// The first obstacle on each ray, and the range up to which its ground is bare without a gap.
 ObstacleScan makePolarScan(const PolarGrid& grid, const std::vector<PolarObstacle>& obstacles,
-                           const std::vector<float>& free_share, const std::vector<float>& expected_ground);
+                           const std::vector<float>& free_fraction,
+                           const std::vector<float>& expected_ground);
 
 }  // namespace vcharge

@@ -6,11 +6,12 @@
 
 #include "detection/box_world.h"
 #include "fusion/obstacle_map_cells.h"
+#include "vcharge_obstacles/map_scan.h"
 
 namespace vcharge {
 namespace {
 
-/// Drives a rig through a world straight along x and fuses what the cameras see.
+/// Drives a rig straight along x through a world and fuses its range maps.
 class LocalObstacleMapTest : public ::testing::Test {
  protected:
   LocalObstacleMapTest() : grid_(detector_options_.grid) {
@@ -21,21 +22,21 @@ class LocalObstacleMapTest : public ::testing::Test {
     }
   }
 
-  /// One look of all cameras from x, 80 ms after the one before.
-  void look(const BoxWorld& world, double x_m, const BoxWorldNoise& noise = {0.01, 0.1, 1}) {
+  /// One observation of all cameras from x, 80 ms after the previous one.
+  void observe(const BoxWorld& world, double x_m, const BoxWorldNoise& noise = {0.01, 0.1, 1}) {
     stamp_ = stamp_ + durationFromSeconds(0.08);
-    const RigidTransform pose = RigidTransform::planar(x_m, 0.0, 0.0);
-    pose_ = pose;
-    map_.moveTo(stamp_, pose);
+    pose_ = RigidTransform::planar(x_m, 0.0, 0.0);
+    map_.moveTo(stamp_, pose_);
     for (size_t i = 0; i < detectors_.size(); ++i) {
       BoxWorldNoise own = noise;
       own.seed = static_cast<uint32_t>(1000 * i) + static_cast<uint32_t>(stamp_.nanoseconds() / 80000000);
-      map_.add(detectors_[i].detect(measureBoxWorld(world, rig_.cameras[i], pose, stamp_, own)), grid_, pose);
+      map_.add(detectors_[i].detect(measureBoxWorld(world, rig_.cameras[i], pose_, stamp_, own)), grid_,
+               pose_);
     }
   }
   void drive(const BoxWorld& world, double from_m, double to_m, double step_m = 0.1) {
     for (double x = from_m; x <= to_m + 1e-9; x += step_m) {
-      look(world, x);
+      observe(world, x);
     }
   }
   int8_t stateAt(double x_m, double y_m) const { return stateIn(map_.snapshot(), x_m, y_m); }
@@ -68,10 +69,10 @@ TEST_F(LocalObstacleMapTest, KeepsFreeOccupiedAndUnobservedApart) {
   }
 }
 
-TEST_F(LocalObstacleMapTest, ScanMeetsThePersonWithinItsSigmas) {
+TEST_F(LocalObstacleMapTest, ScanReportsThePersonWithinItsSigmas) {
   drive(kPerson, 0.0, 0.8);
-  const ObstacleScan scan = map_.scan();
-  // The side towards the path, from (0.8, 0).
+  const ObstacleScan scan = makeScan(map_.snapshot(), 360);
+  // The near side of the person, from (0.8, 0).
   const double angle_rad = std::atan2(2.8, 1.9 - 0.8);
   const auto ray =
       static_cast<size_t>(std::lround((angle_rad - scan.angle_min_rad) / scan.angle_increment_rad));
@@ -81,10 +82,10 @@ TEST_F(LocalObstacleMapTest, ScanMeetsThePersonWithinItsSigmas) {
   EXPECT_GT(scan.height_m[ray], 0.8F);
 }
 
-TEST_F(LocalObstacleMapTest, WhoWalksAwayIsClearedWithinASecondOnceSeenFree) {
+TEST_F(LocalObstacleMapTest, PersonWhoLeftIsClearedWithinASecond) {
   drive(kPerson, 0.0, 0.8);
   ASSERT_EQ(stateAt(1.9, 2.85), kCellOccupied);
-  drive({}, 0.9, 0.9 + 11 * 0.1);  // 12 looks: 0.96 s
+  drive({}, 0.9, 0.9 + 11 * 0.1);  // 12 observations: 0.96 s
   EXPECT_EQ(stateAt(1.9, 2.85), kCellFree);
   EXPECT_EQ(stateAt(1.9, 2.95), kCellFree);
 }
@@ -100,10 +101,10 @@ TEST_F(LocalObstacleMapTest, StandingKeepsStatesAndTheirAgeGrows) {
   EXPECT_GE(youngest, 600.0);
 }
 
-TEST_F(LocalObstacleMapTest, WhatIsNotSeenAgainIsForgottenNeverFreed) {
+TEST_F(LocalObstacleMapTest, UnobservedCellsDecayAndAreNeverFreed) {
   drive(kPerson, 0.0, 0.8);
   const ObstacleMap before = map_.snapshot();
-  // Blind for 6 m: the person's cell is still in the map.
+  // Without observations for 6 m; the person is still within the map.
   for (int i = 1; i <= 60; ++i) {
     map_.moveTo(stamp_, RigidTransform::planar(0.8 + 0.1 * i, 0.0, 0.0));
   }
@@ -114,11 +115,11 @@ TEST_F(LocalObstacleMapTest, WhatIsNotSeenAgainIsForgottenNeverFreed) {
   EXPECT_EQ(countCells(after, kCellFree), 0);
 }
 
-TEST_F(LocalObstacleMapTest, UnknownRangesNeverFreeAndDoubtWhatWasFree) {
+TEST_F(LocalObstacleMapTest, UnknownRangesFreeNothingAndLetFreeCellsDecay) {
   drive({}, 0.0, 0.8);
   const ObstacleMap before = map_.snapshot();
   for (double x = 0.9; x < 1.7; x += 0.1) {
-    look({}, x, {0.01, 1.0, 1});  // no range at all: night
+    observe({}, x, {0.01, 1.0, 1});  // no range at all, as at night
     const ObstacleMap now = map_.snapshot();
     EXPECT_LE(countCells(now, kCellFree), countCells(before, kCellFree));
     EXPECT_EQ(countCells(now, kCellOccupied), 0);
@@ -126,7 +127,7 @@ TEST_F(LocalObstacleMapTest, UnknownRangesNeverFreeAndDoubtWhatWasFree) {
   EXPECT_EQ(stateAt(1.9, 2.2), kCellUnobserved);
 }
 
-TEST_F(LocalObstacleMapTest, WhoStepsIntoFreeGroundMakesItAtLeastUnsure) {
+TEST_F(LocalObstacleMapTest, PersonEnteringFreeGroundMakesItNotFree) {
   drive({}, 0.0, 0.8);
   ASSERT_EQ(stateAt(1.9, 3.0), kCellFree);
   drive(kPerson, 0.9, 1.2);
@@ -135,40 +136,40 @@ TEST_F(LocalObstacleMapTest, WhoStepsIntoFreeGroundMakesItAtLeastUnsure) {
   EXPECT_NE(stateAt(1.9, 3.3), kCellFree);  // hidden behind
 }
 
-TEST_F(LocalObstacleMapTest, GroundThatLooksOtherwiseIsTakenBackAtOnceAndHeld) {
+TEST_F(LocalObstacleMapTest, ChangedGroundIsResetAtOnceAndHeld) {
   drive({}, 0.0, 0.8);
   ASSERT_EQ(stateAt(1.9, 3.0), kCellFree);
   ASSERT_EQ(stateAt(1.9, 2.7), kCellFree);
-  // The range map still says that all is bare ground, as where a window matches the ground beside a foot.
-  const auto lookAtChange = [&](double x_m, bool changed) {
+  // The range map still shows bare ground, as if windows matched the ground beside a foot.
+  const auto observeChange = [&](double x_m, bool changed) {
     stamp_ = stamp_ + durationFromSeconds(0.08);
     const RigidTransform pose = RigidTransform::planar(x_m, 0.0, 0.0);
     map_.moveTo(stamp_, pose);
     CameraObstacles seen = detectors_[1].detect(measureBoxWorld({}, rig_.cameras[1], pose, stamp_));
     const Eigen::Vector2d offset = Eigen::Vector2d(1.9 - x_m, 3.0) - seen.origin_m;
-    seen.changed_share.assign(grid_.size(), 0.0F);
+    seen.changed_fraction.assign(grid_.size(), 0.0F);
     for (int side = -2; side <= 2 && changed; ++side) {
       const int ray = grid_.wrap(grid_.rayOf(std::atan2(offset.y(), offset.x())) + side);
       const int bin = grid_.binOfInverse(static_cast<float>(1.0 / offset.norm()));
-      seen.changed_share[grid_.index(ray, bin)] = seen.changed_share[grid_.index(ray, bin + 1)] = 1.0F;
+      seen.changed_fraction[grid_.index(ray, bin)] = seen.changed_fraction[grid_.index(ray, bin + 1)] = 1.0F;
     }
     map_.add(seen, grid_, pose);
   };
-  lookAtChange(0.9, true);
+  observeChange(0.9, true);
   EXPECT_EQ(stateAt(1.9, 3.0), kCellUnobserved);
   EXPECT_EQ(stateAt(1.9, 2.7), kCellUnobserved);  // within the margin
   EXPECT_EQ(stateAt(1.9, 2.2), kCellFree);
   for (int i = 1; i <= 3; ++i) {
-    lookAtChange(0.9 + 0.1 * i, false);
+    observeChange(0.9 + 0.1 * i, false);
     EXPECT_EQ(stateAt(1.9, 3.0), kCellUnobserved);
   }
   for (int i = 4; i <= 10; ++i) {
-    lookAtChange(0.9 + 0.1 * i, false);
+    observeChange(0.9 + 0.1 * i, false);
   }
   EXPECT_EQ(stateAt(1.9, 3.0), kCellFree);  // within a second
 }
 
-TEST_F(LocalObstacleMapTest, ScrollingKeepsPlacesInTheFixedFrame) {
+TEST_F(LocalObstacleMapTest, ScrollingKeepsPositionsInTheFixedFrame) {
   const BoxWorld world{{{{4.0, 3.0, 0.0}, {4.4, 3.4, 1.0}}}};
   drive(world, 0.0, 3.3);  // crosses many cells
   EXPECT_EQ(stateAt(4.2, 3.05), kCellOccupied);
@@ -185,7 +186,7 @@ TEST_F(LocalObstacleMapTest, ReanchoringMovesObstaclesWithTheirFrame) {
   map_.reanchor(moved);
   const ObstacleMap map = map_.snapshot();
   const Eigen::Vector3d person = moved * Eigen::Vector3d(1.9, 2.85, 0.0);
-  bool found = false;  // in its cell, or the one beside it
+  bool found = false;  // in its cell or a neighbour
   for (const double x : {-0.1, 0.0, 0.1}) {
     for (const double y : {-0.1, 0.0, 0.1}) {
       found = found || stateIn(map, person.x() + x, person.y() + y) == kCellOccupied;
@@ -200,11 +201,11 @@ TEST_F(LocalObstacleMapTest, ReanchoringMovesObstaclesWithTheirFrame) {
               1e-9);
 }
 
-TEST_F(LocalObstacleMapTest, LooksFromTheSamePlaceCountOnce) {
-  look(kPerson, 0.0);
+TEST_F(LocalObstacleMapTest, ObservationsFromTheSamePositionCountOnce) {
+  observe(kPerson, 0.0);
   const ObstacleMap first = map_.snapshot();
   for (int i = 0; i < 50; ++i) {
-    look(kPerson, 0.0);
+    observe(kPerson, 0.0);
   }
   EXPECT_EQ(countCells(map_.snapshot(), kCellFree), countCells(first, kCellFree));
   EXPECT_EQ(countCells(map_.snapshot(), kCellOccupied), countCells(first, kCellOccupied));

@@ -13,49 +13,28 @@ namespace {
 
 // Below this speed the vehicle stands.
 constexpr double kStanding_m_per_s = 0.02;
+// After this time without any range map a map is emitted all the same.
+constexpr double kSilence_s = 0.5;
+// Corrections of map -> odom below these bounds are smaller than a cell and not applied. The bound on the
+// angle is low because a turn moves cells far from the origin of the map.
+constexpr double kMinAnchorStep_m = 0.03;
+constexpr double kMinAnchorStep_rad = 0.003;
 
 }  // namespace
 
 struct ObstacleMapper::Camera {
   size_t index = 0;
-  std::unique_ptr<ObstacleDetector> detector;  // of the range maps' camera, which is known with the first one
+  std::unique_ptr<ObstacleDetector> detector;  // null before the first range map
   std::unique_ptr<GroundWatch> watch;
-  MeiCamera::Parameters parameters = MeiCamera::Parameters::Zero();  // of that camera
+  MeiCamera::Parameters parameters = MeiCamera::Parameters::Zero();  // of the range maps' camera
   cv::Size size;
   ObstacleCameraStatus status;
 };
 
 std::string toString(ObstacleCameraState state) {
-  switch (state) {
-    case ObstacleCameraState::kNoRangeMaps:
-      return "no range maps";
-    case ObstacleCameraState::kNoPose:
-      return "no pose";
-    case ObstacleCameraState::kStanding:
-      return "standing";
-    case ObstacleCameraState::kHardlySees:
-      return "hardly sees";
-    case ObstacleCameraState::kGroundLost:
-      return "ground lost";
-    case ObstacleCameraState::kGroundUnsure:
-      return "ground unsure";
-    case ObstacleCameraState::kMapping:
-      break;
-  }
-  return "mapping";
-}
-
-void ObstacleMapperOptions::validate() const {
-  validateInner("detector", detector);
-  validateInner("watch", watch);
-  validateInner("map", map);
-  validateInner("frames", frames);
-  requireField(silent_s > 0.0, "silent_s", "must be positive", silent_s);
-  requireField(max_silence_s > 0.0, "max_silence_s", "must be positive", max_silence_s);
-  requireField(min_known_share >= 0.0 && min_known_share < 1.0, "min_known_share", "must be in [0, 1)",
-               min_known_share);
-  requireField(anchor_step_m >= 0.0, "anchor_step_m", "must not be negative", anchor_step_m);
-  requireField(anchor_step_rad >= 0.0, "anchor_step_rad", "must not be negative", anchor_step_rad);
+  constexpr const char* kNames[] = {"no range maps", "no pose",       "standing", "hardly sees",
+                                    "ground lost",   "ground unsure", "mapping"};
+  return kNames[static_cast<size_t>(state)];
 }
 
 ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const ObstacleMapperOptions& options,
@@ -75,7 +54,7 @@ ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const Obsta
   for (const std::string& name : names) {
     const size_t index = rig_->cameraIndex(name);
     if (!rig_->cameras[index].vehicle_from_camera) {
-      throw InputError("rig: cameras." + name + ": vehicle_from_camera is missing: obstacles need it");
+      throw InputError("rig: cameras." + name + ": expected vehicle_from_camera");
     }
     cameras_[index] = std::make_unique<Camera>();
     cameras_[index]->index = index;
@@ -108,7 +87,7 @@ void ObstacleMapper::startOver(DriveBreak drive_break, Timestamp stamp) {
 }
 
 void ObstacleMapper::addOdometry(const VehicleOdometry& odometry) {
-  emitWhenSilent();  // until now: range maps of the odometry before have had their turn
+  emitWhenSilent();  // range maps of earlier odometry have been added by now
   assembler_->addOdometry(odometry);
 }
 
@@ -118,9 +97,8 @@ void ObstacleMapper::setMapFromOdom(const RigidTransform& map_from_odom) {
   }
   map_from_odom_ = map_from_odom;
   const RigidTransform moved = map_from_odom * anchor_.inverse();
-  if (has_anchor_ && moved.translation().norm() < options_.anchor_step_m &&
-      angleOfRotation(moved.rotation()) < options_.anchor_step_rad) {
-    // Less than the cells can tell. Translation far from the map's origin stands for small turns, too.
+  if (has_anchor_ && moved.translation().norm() < kMinAnchorStep_m &&
+      angleOfRotation(moved.rotation()) < kMinAnchorStep_rad) {
     return;
   }
   map_.reanchor(moved);
@@ -140,7 +118,7 @@ void ObstacleMapper::addRangeMap(const RangeMap& map) {
   const int found = rig_->findCamera(map.camera_name);
   Camera* camera = found < 0 ? nullptr : cameras_[static_cast<size_t>(found)].get();
   if (camera == nullptr) {
-    throw InputError("range map of camera '" + map.camera_name + "': not one of the cameras in use");
+    throw InputError("range map of camera '" + map.camera_name + "': expected one of the cameras in use");
   }
   const RigCamera& rig_camera = rig_->cameras[camera->index];
   if (!camera->detector || camera->size != map.range_m.size() ||
@@ -148,8 +126,8 @@ void ObstacleMapper::addRangeMap(const RangeMap& map) {
     const WorkingCamera working = rebuildWorkingCamera(map.camera, map.range_m.size(), rig_camera);
     camera->detector =
         std::make_unique<ObstacleDetector>(working, *rig_camera.vehicle_from_camera, options_.detector);
-    camera->watch =
-        std::make_unique<GroundWatch>(working, *rig_camera.vehicle_from_camera, grid_, options_.watch);
+    camera->watch = std::make_unique<GroundWatch>(working, *rig_camera.vehicle_from_camera, grid_,
+                                                  options_.map.free_range_m, options_.watch);
     camera->size = map.range_m.size();
     camera->parameters = map.camera.parameters();
   }
@@ -166,18 +144,18 @@ void ObstacleMapper::updateStatus(Camera* camera, const CameraObstacles& seen) c
   ObstacleCameraStatus& status = camera->status;
   ++status.range_maps;
   status.ground = seen.ground;
-  status.known_share = seen.known_share;
-  const std::string known = toText(100.0 * seen.known_share, 0) + " % of the pixels have a range";
-  if (seen.known_share < options_.min_known_share) {
+  status.known_fraction = seen.known_fraction;
+  const std::string known = toText(100.0 * seen.known_fraction, 0) + " % of the pixels have a range";
+  if (seen.known_fraction < options_.min_known_fraction) {
     status.state = ObstacleCameraState::kHardlySees;
     status.message = "hardly sees: " + known;
   } else if (seen.ground.state == GroundState::kOutOfBounds) {
     status.state = ObstacleCameraState::kGroundLost;
-    status.message = "the ground is tilted beyond the bounds: nothing is taken for free";
+    status.message = "the ground is tilted beyond the bounds: no cell becomes free";
   } else if (seen.ground.state == GroundState::kFewPoints) {
     status.state = ObstacleCameraState::kGroundUnsure;
     status.message =
-        "only " + std::to_string(seen.ground.num_points) + " ground points: nothing is taken for free";
+        "only " + std::to_string(seen.ground.num_points) + " ground points: no cell becomes free";
   } else {
     status.state = ObstacleCameraState::kMapping;
     status.message = "mapping: " + known;
@@ -211,13 +189,13 @@ void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle
     }
     auto& [obstacles, reference] = frame->images[camera->index];
     if (!reference.empty()) {
-      obstacles.changed_share =
+      obstacles.changed_fraction =
           camera->watch->compare(frame->stamp, reference, obstacles.ground, fixed_from_vehicle);
     }
     map_.add(obstacles, grid_, fixed_from_vehicle);
     cameras.push_back(&obstacles);
   }
-  if (!last_emitted_ || frame->stamp > *last_emitted_) {  // else the next map shows what it adds
+  if (!last_emitted_ || frame->stamp > *last_emitted_) {  // otherwise the next map shows it
     emit(map_, cameras);
   }
 }
@@ -226,7 +204,7 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const std::vector<const C
   ObstacleFrame frame;
   frame.map = map.snapshot();
   frame.map.frame_id = enumNames<FixedFrame>()[static_cast<size_t>(options_.fixed_frame)];
-  frame.scan = makeScan(frame.map, options_.map.scan_rays, options_.map.scan_depth_m);
+  frame.scan = makeScan(frame.map, options_.detector.grid.num_rays);
   for (const CameraObstacles* camera : cameras) {
     frame.cameras.push_back(*camera);
   }
@@ -235,20 +213,22 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const std::vector<const C
   on_frame_(frame);
 }
 
-/// Shows the map while no range maps come. Silence is measured by when range maps arrive: late ones are no
-/// silence. A stage that waits for everything cannot tell the two apart, and shows only frames.
+/// Emits the map while no range maps come. Silence is measured by the arrival of range maps, not by their
+/// stamps, so that a lag is no silence. A stage that waits for everything cannot tell the two apart, and
+/// emits maps at range maps' stamps only.
 void ObstacleMapper::emitWhenSilent() {
   const std::optional<VehicleOdometry>& odometry = assembler_->odometry().last();
   if (!odometry || !last_emitted_ || numWaiting() > 0 || options_.frames.waitsForEverything()) {
     return;
   }
   const Timestamp last = last_heard_ ? std::max(*last_heard_, *last_emitted_) : *last_emitted_;
-  if (toSeconds(odometry->stamp - last) >= options_.silent_s) {
+  if (toSeconds(odometry->stamp - last) >= kSilence_s) {
     emitAt(odometry->stamp);
   }
 }
 
-/// Shows what the map would be at a stamp without range maps. The map itself depends on range maps alone.
+/// Emits a moved copy of the map at a stamp without range maps. The map itself must not change, so that it
+/// depends on the range maps alone and not on when they arrive.
 void ObstacleMapper::emitAt(Timestamp stamp) {
   const OdometryBuffer::Lookup pose = assembler_->odometry().lookup(stamp);
   const std::optional<RigidTransform> fixed_from_vehicle =
@@ -277,7 +257,7 @@ std::vector<ObstacleCameraStatus> ObstacleMapper::status() const {
     const std::optional<Timestamp> newest = assembler_->newestImage(camera->index);
     if (odometry.last() && newest && toSeconds(odometry.last()->stamp - *newest) >= options_.max_silence_s) {
       status.state = stands ? ObstacleCameraState::kStanding : ObstacleCameraState::kNoRangeMaps;
-      status.message = stands ? "the vehicle stands: nothing new is seen, the map keeps what it has"
+      status.message = stands ? "the vehicle stands: nothing is measured, the map keeps its state"
                               : "no range map since " + toString(*newest);
     }
     all.push_back(status);

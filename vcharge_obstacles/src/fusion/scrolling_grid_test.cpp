@@ -7,7 +7,7 @@ namespace {
 
 constexpr int kSize = 7;
 
-/// A number that tells a cell of the endless grid from all others nearby.
+/// A number that is unique among the cells nearby.
 int markOf(int64_t x, int64_t y) {
   return static_cast<int>(1 + 1000 * (x + 100) + (y + 100));
 }
@@ -20,7 +20,7 @@ void markAll(ScrollingGrid<int>* grid) {
   }
 }
 
-TEST(ScrollingGridTest, CellsThatStayKeepTheirContentAndThoseThatComeInAreNew) {
+TEST(ScrollingGridTest, RemainingCellsKeepTheirContentAndNewOnesAreReset) {
   const int64_t moves[][2] = {{1, 0},      {0, -1},        {-3, 2},  {6, -6},
                               {-kSize, 0}, {0, kSize + 1}, {40, 40}, {0, 0}};
   ScrollingGrid<int> grid(kSize, 0.1);

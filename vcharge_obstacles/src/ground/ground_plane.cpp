@@ -5,38 +5,43 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
-#include "vcharge_core/base/options.h"
-
 namespace vcharge {
 namespace {
 
-// Widths of the kernel. The first spans what a tilt at the bounds does to far points, so that no start value
-// is needed; the last is that of what ground points scatter by.
+// Widths of the kernel. The first covers the residuals of far points at the largest tilt, so that no initial
+// value is needed; the last is the scatter of ground points.
 constexpr double kKernelWidths_m[] = {0.15, 0.10, 0.07, 0.05, 0.035, 0.025, 0.025, 0.025};
-// Of the last width: what lies within counts as ground.
+// Points within so many of the last widths are inliers.
 constexpr double kInlierWidths = 2.0;
+// Fewer inliers are no measurement.
+constexpr int kMinInliers = 200;
+// Standard deviations of a car body on its suspension.
+constexpr double kPriorTiltSigma_rad = 0.012;
+constexpr double kPriorOffsetSigma_m = 0.02;
+// Fraction of the points that are independent: matching windows overlap.
+constexpr double kIndependentFraction = 0.02;
 
 struct NormalEquations {
   Eigen::Matrix3d information;
   Eigen::Vector3d vector;
 };
 
-Eigen::Vector3d priorInformation(const GroundPlaneOptions& options) {
-  const double tilt = 1.0 / (options.prior_tilt_sigma_rad * options.prior_tilt_sigma_rad);
-  return {1.0 / (options.prior_offset_sigma_m * options.prior_offset_sigma_m), tilt, tilt};
+Eigen::Vector3d priorInformation() {
+  const double tilt = 1.0 / (kPriorTiltSigma_rad * kPriorTiltSigma_rad);
+  return {1.0 / (kPriorOffsetSigma_m * kPriorOffsetSigma_m), tilt, tilt};
 }
 
 NormalEquations accumulate(const GroundCandidates& points, const GroundPlaneOptions& options,
                            const Eigen::Vector3d& plane, double kernel_m) {
-  NormalEquations equations{priorInformation(options).asDiagonal(), Eigen::Vector3d::Zero()};
+  NormalEquations equations{priorInformation().asDiagonal(), Eigen::Vector3d::Zero()};
   const double inverse_square = 1.0 / (kernel_m * kernel_m);
   const double roughness = options.roughness_m * options.roughness_m;
   for (size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d row(1.0, points.x_m[i], points.y_m[i]);
     const double error_m = points.z_m[i] - row.dot(plane);
     const double variance = points.sigma_m[i] * points.sigma_m[i] + roughness;
-    const double weight = options.noise_correlation * points.weight[i] /
-                          (variance * (1.0 + error_m * error_m * inverse_square));
+    const double weight =
+        kIndependentFraction * points.weight[i] / (variance * (1.0 + error_m * error_m * inverse_square));
     equations.information.noalias() += weight * row * row.transpose();
     equations.vector += weight * points.z_m[i] * row;
   }
@@ -52,26 +57,19 @@ int countInliers(const GroundCandidates& points, const Eigen::Vector3d& plane, d
   return count;
 }
 
-GroundPlane nominalPlane(GroundState state, int num_points, const GroundPlaneOptions& options) {
+GroundPlane nominalPlane(GroundState state, int num_points) {
   GroundPlane plane;
   plane.state = state;
   plane.num_points = num_points;
-  plane.covariance = priorInformation(options).cwiseInverse().asDiagonal();
+  plane.covariance = priorInformation().cwiseInverse().asDiagonal();
   return plane;
 }
 
 }  // namespace
 
 std::string toString(GroundState state) {
-  switch (state) {
-    case GroundState::kMeasured:
-      return "measured";
-    case GroundState::kFewPoints:
-      return "few ground points";
-    case GroundState::kOutOfBounds:
-      break;
-  }
-  return "out of bounds";
+  constexpr const char* kNames[] = {"measured", "few ground points", "out of bounds"};
+  return kNames[static_cast<size_t>(state)];
 }
 
 double GroundPlane::pitch_rad() const {
@@ -89,18 +87,6 @@ double GroundPlane::heightOf(const Eigen::Vector3d& point_in_vehicle) const {
 double GroundPlane::sigmaAt_m(double x_m, double y_m) const {
   const Eigen::Vector3d row(1.0, x_m, y_m);
   return std::sqrt(std::max(0.0, row.dot(covariance * row)));
-}
-
-void GroundPlaneOptions::validate() const {
-  requireField(max_tilt_rad > 0.0 && max_tilt_rad < 0.2, "max_tilt_rad", "must be in (0, 0.2)", max_tilt_rad);
-  requireField(max_offset_m > 0.0, "max_offset_m", "must be positive", max_offset_m);
-  requireField(prior_tilt_sigma_rad > 0.0, "prior_tilt_sigma_rad", "must be positive", prior_tilt_sigma_rad);
-  requireField(prior_offset_sigma_m > 0.0, "prior_offset_sigma_m", "must be positive", prior_offset_sigma_m);
-  requireField(max_distance_m > 0.0, "max_distance_m", "must be positive", max_distance_m);
-  requireField(roughness_m > 0.0, "roughness_m", "must be positive", roughness_m);
-  requireField(noise_correlation > 0.0 && noise_correlation <= 1.0, "noise_correlation", "must be in (0, 1]",
-               noise_correlation);
-  requireField(min_points > 0, "min_points", "must be positive", min_points);
 }
 
 void GroundCandidates::clear() {
@@ -127,15 +113,15 @@ GroundPlane fitGroundPlane(const GroundCandidates& candidates, const GroundPlane
     parameters = equations.information.ldlt().solve(equations.vector);
   }
   const int num_points = countInliers(candidates, parameters, kernel_m);
-  if (num_points < options.min_points) {
-    return nominalPlane(GroundState::kFewPoints, num_points, options);
+  if (num_points < kMinInliers) {
+    return nominalPlane(GroundState::kFewPoints, num_points);
   }
   GroundPlane plane;
   plane.offset_m = parameters[0];
   plane.slope = parameters.tail<2>();
   if (std::abs(plane.pitch_rad()) > options.max_tilt_rad ||
       std::abs(plane.roll_rad()) > options.max_tilt_rad || std::abs(plane.offset_m) > options.max_offset_m) {
-    return nominalPlane(GroundState::kOutOfBounds, num_points, options);
+    return nominalPlane(GroundState::kOutOfBounds, num_points);
   }
   plane.state = GroundState::kMeasured;
   plane.num_points = num_points;

@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kDegree = M_PI / 180.0;
 
-/// Ground beside the vehicle with the given share of points on a wall that stands on it.
-GroundCandidates makeGround(double offset_m, double slope_x, double slope_y, double wall_share = 0.0) {
+/// Ground beside the vehicle, with a fraction of the points on a wall that stands on it.
+GroundCandidates makeGround(double offset_m, double slope_x, double slope_y, double wall_fraction = 0.0) {
   GroundCandidates points;
   std::mt19937 generator(3);
   const auto uniform = [&](double low, double high) {
@@ -21,7 +21,7 @@ GroundCandidates makeGround(double offset_m, double slope_x, double slope_y, dou
   for (int i = 0; i < 4000; ++i) {
     const double x = uniform(-2.0, 6.0);
     const double y = uniform(1.2, 5.0);
-    const double above = uniform(0.0, 1.0) < wall_share ? uniform(0.0, 0.5) : uniform(-0.01, 0.01);
+    const double above = uniform(0.0, 1.0) < wall_fraction ? uniform(0.0, 0.5) : uniform(-0.01, 0.01);
     const double z = offset_m + slope_x * x + slope_y * y + above;
     points.add(Eigen::Vector3d(x, y, z).cast<float>(), 0.01F, 0.9F);
   }
@@ -35,7 +35,6 @@ TEST(GroundPlaneTest, FindsPitchRollAndHeight) {
   EXPECT_NEAR(plane.pitch_rad(), 1.0 * kDegree, 0.05 * kDegree);
   EXPECT_NEAR(plane.roll_rad(), 0.7 * kDegree, 0.1 * kDegree);
   EXPECT_NEAR(plane.height_m(), 0.02, 0.004);
-  // A point on that ground.
   EXPECT_NEAR(
       plane.heightOf({4.0, 3.0, -0.02 + 4.0 * std::tan(1.0 * kDegree) - 3.0 * std::tan(0.7 * kDegree)}), 0.0,
       0.005);
@@ -48,7 +47,7 @@ TEST(GroundPlaneTest, WallsOnTheGroundDoNotTiltIt) {
   EXPECT_LT(std::abs(plane.heightOf({3.0, 3.0, 0.0})), 0.015);
 }
 
-TEST(GroundPlaneTest, ThreeDegreesAreOutOfBounds) {
+TEST(GroundPlaneTest, TiltOfThreeDegreesIsOutOfBounds) {
   for (const double tilt_rad : {3.0 * kDegree, -3.0 * kDegree}) {
     EXPECT_EQ(fitGroundPlane(makeGround(0.0, std::tan(tilt_rad), 0.0), {}).state, GroundState::kOutOfBounds);
     EXPECT_EQ(fitGroundPlane(makeGround(0.0, 0.0, std::tan(tilt_rad)), {}).state, GroundState::kOutOfBounds);
@@ -80,7 +79,7 @@ TEST(GroundPlaneTest, OptionsNameTheField) {
   options.max_tilt_rad = 0.5;
   EXPECT_THROW(options.validate(), std::invalid_argument);
   options = {};
-  options.noise_correlation = 0.0;
+  options.max_offset_m = 0.0;
   EXPECT_THROW(options.validate(), std::invalid_argument);
 }
 

@@ -23,9 +23,9 @@ int GroundShadows::directionOf(double angle_rad) {
 void GroundShadows::add(const Eigen::Vector2d& offset_m, double cell_m, double height_m) {
   const double range_m = offset_m.norm();
   if (range_m < cell_m) {
-    return;  // all directions
+    return;  // the camera stands over the cell
   }
-  // Not the cell itself, whose ground may be seen before what stands on it.
+  // The cell itself is left out: ground may be visible in front of its obstacle.
   const double from_m = range_m + 0.75 * cell_m;
   const double to_m = height_m < camera_height_m_ ? range_m * camera_height_m_ / (camera_height_m_ - height_m)
                                                   : std::numeric_limits<double>::infinity();

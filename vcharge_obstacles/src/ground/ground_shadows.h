@@ -7,16 +7,16 @@
 
 namespace vcharge {
 
-/// Which ground a camera cannot have seen for the obstacles that stand before it, as far as others know of
-/// them. Stereo may say otherwise: under the body of a car, which stands on its wheels, the ground does show.
+/// Ground that obstacles in the map hide from a camera. Range maps may contradict it: under the body of a car
+/// ground is visible, although nothing there is free.
 class GroundShadows {
  public:
-  /// Height of the camera above the ground.
-  explicit GroundShadows(double camera_height_m);
+  explicit GroundShadows(double camera_height_m);  ///< above the ground
 
-  /// A square cell with something on it; offset_m: of its middle from the camera, in the axes of all offsets.
+  /// Adds an obstacle in a square cell. offset_m: from the camera to the cell's middle; all offsets share
+  /// axes.
   void add(const Eigen::Vector2d& offset_m, double cell_m, double height_m);
-  /// Whether the sight to the ground at an offset passes through something.
+  /// Whether the line of sight to the ground at an offset passes through an obstacle.
   bool hides(const Eigen::Vector2d& offset_m) const;
 
  private:

@@ -12,20 +12,27 @@
 namespace vcharge {
 namespace {
 
-// Windows of the image: noise is smoothed over so many pixels before the comparison.
+// Images are smoothed over this window before they are compared.
 constexpr int kSmoothing_px = 3;
-// With fewer pixels to compare the brightness of the two images is not known.
+// Error of the warp that is tolerated.
+constexpr int kSlack_px = 1;
+// Age of the image that is compared with the present one: the nearest one up to the maximum is taken.
+constexpr double kInterval_s = 0.24;
+constexpr double kMaxInterval_s = 1.0;
+// Differences below this fraction of the brightness are noise.
+constexpr float kRelativeDifference = 0.05F;
+// The gain between two images is estimated from at least so many pixels of at least this brightness.
 constexpr size_t kMinCompared = 200;
 constexpr float kMinBrightness = 8.0F;
 
-/// An image as later ones are compared with it.
+/// An image with which later ones are compared.
 struct View {
   Timestamp stamp;
   RigidTransform fixed_from_body;
-  cv::Mat smooth, lowest, highest;  // over the slack
+  cv::Mat smooth, lowest, highest;  // extremes within the slack
 };
 
-/// The body stands tilted over the level ground.
+/// Pose of the tilted body over level ground.
 RigidTransform levelFromBody(const GroundPlane& ground) {
   const Eigen::Vector3d normal(-ground.slope.x(), -ground.slope.y(), 1.0);
   const Eigen::Quaterniond rotation =
@@ -33,36 +40,27 @@ RigidTransform levelFromBody(const GroundPlane& ground) {
   return RigidTransform(rotation, Eigen::Vector3d(0.0, 0.0, -ground.offset_m / normal.norm()));
 }
 
-/// What a pixel shows now, and what it would show if it were the ground that was seen before.
+/// Brightness of a pixel now, and of the same ground in the earlier image.
 struct Comparison {
   size_t ray;
-  float from_inverse, to_inverse;  // the strip of ground that the pixel speaks for
+  float from_inverse, to_inverse;  // strip of ground that the pixel covers, as inverse ranges
   float now, before, lowest, highest;
 };
 
 }  // namespace
 
-void GroundWatchOptions::validate() const {
-  requireField(interval_s > 0.0, "interval_s", "must be positive", interval_s);
-  requireField(max_interval_s > interval_s, "max_interval_s", "must be above interval_s", max_interval_s);
-  requireField(max_distance_m > 0.0, "max_distance_m", "must be positive", max_distance_m);
-  requireField(min_difference > 0.0, "min_difference", "must be positive", min_difference);
-  requireField(relative_difference >= 0.0, "relative_difference", "must not be negative",
-               relative_difference);
-  requireField(slack_px >= 0 && slack_px <= 5, "slack_px", "must be in [0, 5]", slack_px);
-}
-
 struct GroundWatch::Implementation {
   Implementation(const WorkingCamera& camera, const RigidTransform& body_from_camera,
-                 const PolarGrid& polar_grid, const GroundWatchOptions& watch_options)
+                 const PolarGrid& polar_grid, double furthest_m, const GroundWatchOptions& watch_options)
       : options((watch_options.validate(), watch_options)),
+        max_distance_m(furthest_m),
         grid(polar_grid),
         model(camera.model()),
         vehicle_from_camera(body_from_camera),
         size(camera.size()),
-        rays(camera, body_from_camera, grid, 1) {
-    // Neither smoothing nor slack may reach beyond what the camera sees.
-    const int reach = 2 * (kSmoothing_px / 2 + options.slack_px) + 3;
+        rays(camera, body_from_camera, grid) {
+    // Smoothing and slack must not reach invalid pixels.
+    const int reach = 2 * (kSmoothing_px / 2 + kSlack_px) + 3;
     cv::erode(camera.validMask(), valid, cv::Mat::ones(reach, reach, CV_8U), cv::Point(-1, -1), 1,
               cv::BORDER_CONSTANT, cv::Scalar(0));
   }
@@ -70,7 +68,7 @@ struct GroundWatch::Implementation {
   View makeView(Timestamp stamp, const cv::Mat& image, const RigidTransform& fixed_from_body) const {
     View view{stamp, fixed_from_body, {}, {}, {}};
     cv::blur(image, view.smooth, cv::Size(kSmoothing_px, kSmoothing_px));
-    const int side = 2 * options.slack_px + 1;
+    constexpr int side = 2 * kSlack_px + 1;
     const cv::Mat window = cv::Mat::ones(side, side, CV_8U);
     cv::erode(view.smooth, view.lowest, window);
     cv::dilate(view.smooth, view.highest, window);
@@ -78,9 +76,10 @@ struct GroundWatch::Implementation {
   }
   const View* viewBefore(Timestamp stamp) const;
   std::vector<Comparison> comparePixels(const View& now, const View& before, const GroundPlane& ground) const;
-  std::vector<float> changedShare(const std::vector<Comparison>& pixels) const;
+  std::vector<float> changedFraction(const std::vector<Comparison>& pixels) const;
 
   const GroundWatchOptions options;
+  const double max_distance_m;
   const PolarGrid grid;
   const MeiCamera model;
   const RigidTransform vehicle_from_camera;
@@ -90,15 +89,14 @@ struct GroundWatch::Implementation {
   std::deque<View> views;
 };
 
-/// The one whose age is nearest to the interval.
+/// The view whose age is nearest to the interval; null without one.
 const View* GroundWatch::Implementation::viewBefore(Timestamp stamp) const {
   const View* best = nullptr;
   for (const View& view : views) {
     const double age_s = toSeconds(stamp - view.stamp);
-    const bool is_better =
-        best == nullptr ||
-        std::abs(age_s - options.interval_s) < std::abs(toSeconds(stamp - best->stamp) - options.interval_s);
-    if (age_s > 0.0 && age_s <= options.max_interval_s && is_better) {
+    const bool is_better = best == nullptr || std::abs(age_s - kInterval_s) <
+                                                  std::abs(toSeconds(stamp - best->stamp) - kInterval_s);
+    if (age_s > 0.0 && age_s <= kMaxInterval_s && is_better) {
       best = &view;
     }
   }
@@ -117,8 +115,8 @@ std::vector<Comparison> GroundWatch::Implementation::comparePixels(const View& n
   const float height =
       camera.z() - static_cast<float>(ground.offset_m) - slope_x * camera.x() - slope_y * camera.y();
   const auto xi = static_cast<float>(model.xi());
-  const auto max_distance = static_cast<float>(options.max_distance_m);
-  // Ground is seen up to here, and hides what is lower: as a pixel's ground is judged by the detector.
+  const auto max_distance = static_cast<float>(max_distance_m);
+  // The detector's default min_height_m: a pixel covers the strip in which its ray is lower.
   constexpr float kLow_m = 0.08F;
   std::vector<Comparison> pixels;
   pixels.reserve(rays.size() / 2);
@@ -155,8 +153,8 @@ std::vector<Comparison> GroundWatch::Implementation::comparePixels(const View& n
   return pixels;
 }
 
-std::vector<float> GroundWatch::Implementation::changedShare(const std::vector<Comparison>& pixels) const {
-  // Exposure follows the light: most of the ground is what it was.
+std::vector<float> GroundWatch::Implementation::changedFraction(const std::vector<Comparison>& pixels) const {
+  // The exposure may have changed; most of the ground has not, so the median ratio is the gain.
   std::vector<float> ratios;
   ratios.reserve(pixels.size());
   for (const Comparison& pixel : pixels) {
@@ -172,8 +170,7 @@ std::vector<float> GroundWatch::Implementation::changedShare(const std::vector<C
   const float gain = *middle;
   StripSum changed(grid), compared(grid);
   for (const Comparison& pixel : pixels) {
-    const auto tolerance = static_cast<float>(options.min_difference) +
-                           static_cast<float>(options.relative_difference) * pixel.now;
+    const auto tolerance = static_cast<float>(options.min_difference) + kRelativeDifference * pixel.now;
     const bool differs =
         pixel.now < gain * pixel.lowest - tolerance || pixel.now > gain * pixel.highest + tolerance;
     const int ray = rays.polar_ray[pixel.ray];
@@ -182,17 +179,18 @@ std::vector<float> GroundWatch::Implementation::changedShare(const std::vector<C
       changed.add(ray, pixel.from_inverse, pixel.to_inverse, 1.0F);
     }
   }
-  std::vector<float> share = changed.finish();
+  std::vector<float> fraction = changed.finish();
   const std::vector<float> all = compared.finish();
-  for (size_t i = 0; i < share.size(); ++i) {
-    share[i] /= all[i] + 1.0F;  // one more: a single pixel says little
+  for (size_t i = 0; i < fraction.size(); ++i) {
+    fraction[i] /= all[i] + 1.0F;  // the additional pixel keeps single pixels from deciding
   }
-  return share;
+  return fraction;
 }
 
 GroundWatch::GroundWatch(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera,
-                         const PolarGrid& grid, const GroundWatchOptions& options)
-    : implementation_(std::make_unique<Implementation>(camera, vehicle_from_camera, grid, options)) {}
+                         const PolarGrid& grid, double max_distance_m, const GroundWatchOptions& options)
+    : implementation_(
+          std::make_unique<Implementation>(camera, vehicle_from_camera, grid, max_distance_m, options)) {}
 
 GroundWatch::~GroundWatch() = default;
 
@@ -204,7 +202,7 @@ std::vector<float> GroundWatch::compare(Timestamp stamp, const cv::Mat& image, c
   if (ground.state == GroundState::kOutOfBounds) {
     return {};
   }
-  while (!self.views.empty() && toSeconds(stamp - self.views.front().stamp) > self.options.max_interval_s) {
+  while (!self.views.empty() && toSeconds(stamp - self.views.front().stamp) > kMaxInterval_s) {
     self.views.pop_front();
   }
   const RigidTransform planar =
@@ -213,7 +211,7 @@ std::vector<float> GroundWatch::compare(Timestamp stamp, const cv::Mat& image, c
   self.views.push_back(self.makeView(stamp, image, planar * levelFromBody(ground)));
   const View* before = self.viewBefore(stamp);
   return before == nullptr ? std::vector<float>()
-                           : self.changedShare(self.comparePixels(self.views.back(), *before, ground));
+                           : self.changedFraction(self.comparePixels(self.views.back(), *before, ground));
 }
 
 void GroundWatch::clear() {

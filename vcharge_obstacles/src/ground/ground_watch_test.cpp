@@ -14,7 +14,7 @@ namespace {
 constexpr double kDegree = M_PI / 180.0;
 constexpr double kStep_s = 0.24;
 
-/// Brightness of a place, smooth over some centimetres: a sum of waves in random directions.
+/// Brightness pattern, smooth over some centimetres: a sum of waves in random directions.
 class Pattern {
  public:
   Pattern(double mean, uint32_t seed) : mean_(mean) {
@@ -27,10 +27,10 @@ class Pattern {
               frequency * std::sin(direction + 1.0), angle(generator)};
     }
   }
-  double at(const Eigen::Vector3d& place) const {
+  double at(const Eigen::Vector3d& point_m) const {
     double sum = mean_;
     for (const Eigen::Vector4d& wave : waves_) {
-      sum += 6.0 * std::sin(wave.head<3>().dot(place) + wave.w());
+      sum += 6.0 * std::sin(wave.head<3>().dot(point_m) + wave.w());
     }
     return sum;
   }
@@ -40,12 +40,12 @@ class Pattern {
   std::array<Eigen::Vector4d, 6> waves_;
 };
 
-/// What a camera of the box world's rig sees of textured ground and boxes.
+/// Images of textured ground and boxes from a camera of the box world's rig.
 class GroundWatchTest : public ::testing::Test {
  protected:
   GroundWatchTest()
       : working_(camera_.model, camera_.image_size_px, camera_.field_of_view_rad, camera_.mask, scale()),
-        watch_(working_, *camera_.vehicle_from_camera, grid_) {}
+        watch_(working_, *camera_.vehicle_from_camera, grid_, 7.0) {}
 
   static WorkingCameraOptions scale() {
     WorkingCameraOptions options;
@@ -64,15 +64,15 @@ class GroundWatchTest : public ::testing::Test {
         const Eigen::Vector3d direction = world_from_camera.rotation() * rays.ray(x, y).cast<double>();
         const Eigen::Vector3d& origin = world_from_camera.translation();
         const double range_m = world.castRay(origin, direction);
-        const Eigen::Vector3d place = origin + range_m * direction;
+        const Eigen::Vector3d point_m = origin + range_m * direction;
         const double brightness =
-            !std::isfinite(range_m) ? 230.0 : (place.z() > 1e-6 ? thing_.at(place) : ground_.at(place));
+            !std::isfinite(range_m) ? 230.0 : (point_m.z() > 1e-6 ? box_.at(point_m) : ground_.at(point_m));
         image.at<uint8_t>(y, x) = cv::saturate_cast<uint8_t>(gain_ * brightness + noise_(generator_));
       }
     }
     return image;
   }
-  /// Changed shares after two images, the body tilted as the ground planes say.
+  /// Changed fractions after two images, with the body pitched in the second one.
   std::vector<float> compare(const BoxWorld& first, const BoxWorld& second, double pitch_rad = 0.0) {
     watch_.clear();
     GroundPlane level;
@@ -87,20 +87,20 @@ class GroundWatchTest : public ::testing::Test {
   static RigidTransform poseAt(double x_m, double pitch_rad) {
     return RigidTransform(rotationFromYawPitchRoll(0.0, pitch_rad, 0.0), Eigen::Vector3d(x_m, 0.0, 0.0));
   }
-  /// Of the cell at a place, from the second pose.
-  double shareAt(const std::vector<float>& share, double x_m, double y_m) const {
+  /// Changed fraction of the ground at a point, seen from the second pose.
+  double fractionAt(const std::vector<float>& changed, double x_m, double y_m) const {
     const Eigen::Vector2d offset =
         Eigen::Vector2d(x_m - 0.2, y_m) - camera_.vehicle_from_camera->translation().head<2>();
     const int bin = grid_.binOfInverse(static_cast<float>(1.0 / offset.norm()));
-    return share.at(grid_.index(grid_.rayOf(std::atan2(offset.y(), offset.x())), bin));
+    return changed.at(grid_.index(grid_.rayOf(std::atan2(offset.y(), offset.x())), bin));
   }
-  /// Mean over bare ground to the left, up to 3 m from the camera.
-  double meanShare(const std::vector<float>& share) const {
+  /// Mean changed fraction of bare ground to the left, up to 3 m from the camera.
+  double meanFraction(const std::vector<float>& changed) const {
     double sum = 0.0;
     int count = 0;
     for (double x = 1.0; x < 3.5; x += 0.1) {
       for (double y = 1.5; y < 3.5; y += 0.1) {
-        sum += shareAt(share, x, y);
+        sum += fractionAt(changed, x, y);
         ++count;
       }
     }
@@ -111,7 +111,7 @@ class GroundWatchTest : public ::testing::Test {
   const PolarGrid grid_{PolarGridOptions()};
   const WorkingCamera working_;
   GroundWatch watch_;
-  const Pattern ground_{110.0, 1}, thing_{60.0, 2};
+  const Pattern ground_{110.0, 1}, box_{60.0, 2};
   double gain_ = 1.0;
   std::mt19937 generator_{3};
   std::normal_distribution<double> noise_{0.0, 2.0};
@@ -121,37 +121,38 @@ BoxWorld personAt(double x_m) {
   return {{{{x_m - 0.2, 2.6, 0.0}, {x_m + 0.2, 3.0, 1.7}}}};
 }
 
-TEST_F(GroundWatchTest, BareGroundLooksAsItDid) {
-  const std::vector<float> share = compare({}, {});
-  ASSERT_EQ(share.size(), grid_.size());
-  EXPECT_LT(meanShare(share), 0.02);
+TEST_F(GroundWatchTest, BareGroundIsUnchanged) {
+  const std::vector<float> changed = compare({}, {});
+  ASSERT_EQ(changed.size(), grid_.size());
+  EXPECT_LT(meanFraction(changed), 0.02);
 }
 
-TEST_F(GroundWatchTest, GroundUnderWhoStepsThereLooksOtherwise) {
-  const std::vector<float> share = compare({}, personAt(2.2));
-  for (const double y : {2.65, 2.8, 3.0, 3.4}) {  // under him, and hidden by him
-    EXPECT_GT(shareAt(share, 2.2 + 0.1 * (y - 2.65), y), 0.5) << y;
+TEST_F(GroundWatchTest, GroundUnderAnArrivingPersonIsChanged) {
+  const std::vector<float> changed = compare({}, personAt(2.2));
+  for (const double y : {2.65, 2.8, 3.0, 3.4}) {  // under the person, and hidden by the person
+    EXPECT_GT(fractionAt(changed, 2.2 + 0.1 * (y - 2.65), y), 0.5) << y;
   }
-  EXPECT_LT(shareAt(share, 2.2, 2.2), 0.1);  // before him
+  EXPECT_LT(fractionAt(changed, 2.2, 2.2), 0.1);  // in front of the person
 }
 
-TEST_F(GroundWatchTest, WhoWalksAlongIsSeenWhereStereoCannotRangeHim) {
-  const std::vector<float> share = compare(personAt(2.2), personAt(2.4));  // as fast as the vehicle
-  EXPECT_GT(shareAt(share, 2.55, 2.65), 0.5);
+TEST_F(GroundWatchTest, PersonWalkingAlongsideIsDetectedWithoutARange) {
+  const std::vector<float> changed =
+      compare(personAt(2.2), personAt(2.4));  // as fast as the vehicle, without parallax
+  EXPECT_GT(fractionAt(changed, 2.55, 2.65), 0.5);
 }
 
-TEST_F(GroundWatchTest, ExposureThatChangesIsNoChangeOfTheGround) {
+TEST_F(GroundWatchTest, ChangeOfExposureIsNoChangeOfTheGround) {
   GroundPlane level;
   level.state = GroundState::kMeasured;
   watch_.compare(Timestamp(), takeImage({}, poseAt(0.0, 0.0)), level, poseAt(0.0, 0.0));
   gain_ = 1.3;
-  EXPECT_LT(meanShare(watch_.compare(Timestamp() + durationFromSeconds(kStep_s),
-                                     takeImage({}, poseAt(0.2, 0.0)), level, poseAt(0.2, 0.0))),
+  EXPECT_LT(meanFraction(watch_.compare(Timestamp() + durationFromSeconds(kStep_s),
+                                        takeImage({}, poseAt(0.2, 0.0)), level, poseAt(0.2, 0.0))),
             0.02);
 }
 
-TEST_F(GroundWatchTest, BrakingPitchThatTheGroundPlaneKnowsIsNoChange) {
-  EXPECT_LT(meanShare(compare({}, {}, 1.0 * kDegree)), 0.02);
+TEST_F(GroundWatchTest, MeasuredPitchIsNoChangeOfTheGround) {
+  EXPECT_LT(meanFraction(compare({}, {}, 1.0 * kDegree)), 0.02);
 }
 
 TEST_F(GroundWatchTest, ImagesTooFarApartAreNotCompared) {

@@ -7,9 +7,10 @@
 namespace vcharge {
 namespace {
 
-// Cells behind the first one of something so low are its top, which lies behind its edge; those of something
-// higher are where ranges of one upright surface scatter.
+// Cells behind the first one are the top of an obstacle lower than this, and the range noise of a higher one.
 constexpr float kLow_m = 0.2F;
+// Cells up to this far behind the first one contribute to the range of a higher obstacle.
+constexpr double kDepth_m = 0.2;
 
 struct Hit {
   double range_m;
@@ -17,7 +18,7 @@ struct Hit {
   float sigma_m, height_m, height_sigma_m;
 };
 
-/// Where the vehicle stands and looks, on the plane.
+/// The vehicle's pose on the ground.
 struct Viewpoint {
   explicit Viewpoint(const ObstacleMap& map)
       : position_m(map.fixed_from_vehicle.translation().head<2>()),
@@ -53,7 +54,7 @@ std::vector<std::vector<Hit>> collectHits(const ObstacleMap& map, const Viewpoin
   return hits;
 }
 
-void setRay(const std::vector<Hit>& hits, double depth_m, double cell_m, size_t ray, ObstacleScan* scan) {
+void setRay(const std::vector<Hit>& hits, double cell_m, size_t ray, ObstacleScan* scan) {
   if (hits.empty()) {
     return;
   }
@@ -62,13 +63,13 @@ void setRay(const std::vector<Hit>& hits, double depth_m, double cell_m, size_t 
   double weight = 0.0;
   double range_m = 0.0;
   double square_m2 = 0.0;
-  const double furthest_m = nearest->range_m + (nearest->height_m < kLow_m ? 0.0 : depth_m);
+  const double furthest_m = nearest->range_m + (nearest->height_m < kLow_m ? 0.0 : kDepth_m);
   for (const Hit& hit : hits) {
     if (hit.range_m <= furthest_m) {
       weight += hit.weight;
       range_m += hit.weight * hit.range_m;
       square_m2 += hit.weight * hit.range_m * hit.range_m;
-      // The highest of them is the obstacle's height.
+      // The obstacle's height is that of its highest cell.
       if (!(hit.height_m <= scan->height_m[ray])) {
         scan->height_m[ray] = hit.height_m;
         scan->height_sigma_m[ray] = hit.height_sigma_m;
@@ -77,12 +78,12 @@ void setRay(const std::vector<Hit>& hits, double depth_m, double cell_m, size_t 
   }
   const double mean_m = range_m / weight;
   scan->range_m[ray] = static_cast<float>(mean_m);
-  // Which of the cells the ray meets first is not known, nor where in its cell.
+  // The position within a cell is uncertain too.
   const double spread_m2 = std::max(0.0, square_m2 / weight - mean_m * mean_m) + cell_m * cell_m / 12.0;
   scan->range_sigma_m[ray] = static_cast<float>(std::sqrt(nearest->sigma_m * nearest->sigma_m + spread_m2));
 }
 
-/// How far the ray is free, from the first free cell on: cells under and beside the vehicle are never seen.
+/// End of the first run of free cells: those under and beside the vehicle are never observed.
 float freeRange(const ObstacleMap& map, const Viewpoint& viewpoint, double angle_in_fixed_rad, double max_m) {
   const Eigen::Vector2d direction(std::cos(angle_in_fixed_rad), std::sin(angle_in_fixed_rad));
   const double step_m = 0.5 * map.cell_size_m;
@@ -107,7 +108,7 @@ float freeRange(const ObstacleMap& map, const Viewpoint& viewpoint, double angle
 
 }  // namespace
 
-ObstacleScan makeScan(const ObstacleMap& map, int num_rays, double depth_m) {
+ObstacleScan makeScan(const ObstacleMap& map, int num_rays) {
   const Viewpoint viewpoint(map);
   const double max_range_m = 0.5 * map.cell_size_m * std::min(map.state.cols, map.state.rows);
   ObstacleScan scan = ObstacleScan::unknown(static_cast<size_t>(num_rays), max_range_m);
@@ -115,7 +116,7 @@ ObstacleScan makeScan(const ObstacleMap& map, int num_rays, double depth_m) {
   scan.name = "fused";
   const auto hits = collectHits(map, viewpoint, num_rays);
   for (size_t ray = 0; ray < scan.size(); ++ray) {
-    setRay(hits[ray], depth_m, map.cell_size_m, ray, &scan);
+    setRay(hits[ray], map.cell_size_m, ray, &scan);
     scan.free_m[ray] = freeRange(map, viewpoint, viewpoint.yaw_rad + scan.angle_rad(ray), max_range_m);
   }
   return scan;

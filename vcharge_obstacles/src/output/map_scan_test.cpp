@@ -9,7 +9,7 @@
 namespace vcharge {
 namespace {
 
-/// 4 m x 4 m around the origin, all free, the vehicle in the middle looking along x.
+/// Free map of 4 m x 4 m around the origin; the vehicle is in the middle and points along x.
 ObstacleMap makeMap() {
   ObstacleMap map = ObstacleMap::unobserved({40, 40}, 0.1);
   map.origin_m = {-2.0, -2.0};
@@ -26,18 +26,18 @@ void occupy(ObstacleMap* map, int column, int row, float height_m) {
   map->height_sigma_m.at<float>(row, column) = 0.02F;
 }
 
-// Of a cell whose middle lies a little off the axis.
+// Angle between the y axis and the middle of the cell beside it, 1.05 m away.
 constexpr double kAside_rad = 0.0476;
 
 size_t rayTo(const ObstacleScan& scan, double angle_rad) {
   return static_cast<size_t>(std::lround((angle_rad - scan.angle_min_rad) / scan.angle_increment_rad));
 }
 
-TEST(MapScanTest, RangeIsThatOfTheNearestCellInEachDirection) {
+TEST(MapScanTest, RangeIsThatOfTheNearestCell) {
   ObstacleMap map = makeMap();
   occupy(&map, 20, 30, 0.5F);  // at (0.05, 1.05)
   occupy(&map, 20, 36, 1.5F);  // behind it
-  const ObstacleScan scan = makeScan(map, 360, 0.2);
+  const ObstacleScan scan = makeScan(map, 360);
   const size_t ray = rayTo(scan, 0.5 * M_PI - kAside_rad);
   EXPECT_NEAR(scan.range_m[ray], 1.05, 0.01);
   EXPECT_FLOAT_EQ(scan.height_m[ray], 0.5F);
@@ -51,21 +51,20 @@ TEST(MapScanTest, DirectionsTurnWithTheVehicle) {
   ObstacleMap map = makeMap();
   occupy(&map, 20, 30, 0.5F);
   map.fixed_from_vehicle = RigidTransform::planar(0.0, 0.0, 0.5 * M_PI);
-  const ObstacleScan scan = makeScan(map, 360, 0.2);
+  const ObstacleScan scan = makeScan(map, 360);
   EXPECT_NEAR(scan.range_m[rayTo(scan, -kAside_rad)], 1.05, 0.01);
   EXPECT_TRUE(std::isnan(scan.range_m[rayTo(scan, 0.5 * M_PI)]));
 }
 
-TEST(MapScanTest, SigmaCountsTheCellAndHowFarItsCellsLieApart) {
+TEST(MapScanTest, SigmaIncludesTheCellSizeAndTheSpreadOfTheCells) {
   ObstacleMap one = makeMap();
   occupy(&one, 20, 30, 0.5F);
-  const size_t ray = rayTo(makeScan(one, 360, 0.2), 0.5 * M_PI - kAside_rad);
+  const size_t ray = rayTo(makeScan(one, 360), 0.5 * M_PI - kAside_rad);
   const double cell_sigma_m = 0.1 / std::sqrt(12.0);
-  EXPECT_NEAR(makeScan(one, 360, 0.2).range_sigma_m[ray], std::hypot(0.03, cell_sigma_m), 1e-4);
+  EXPECT_NEAR(makeScan(one, 360).range_sigma_m[ray], std::hypot(0.03, cell_sigma_m), 1e-4);
   ObstacleMap two = one;
-  occupy(&two, 20, 31, 0.5F);  // 0.1 m behind: the mean of both is 0.05 m from each
-  EXPECT_NEAR(makeScan(two, 360, 0.2).range_sigma_m[ray], std::hypot(std::hypot(0.03, cell_sigma_m), 0.05),
-              2e-3);
+  occupy(&two, 20, 31, 0.5F);  // 0.1 m behind: both are 0.05 m from their mean
+  EXPECT_NEAR(makeScan(two, 360).range_sigma_m[ray], std::hypot(std::hypot(0.03, cell_sigma_m), 0.05), 2e-3);
 }
 
 TEST(MapScanTest, TopOfAKerbDoesNotPullItsEdgeBack) {
@@ -73,22 +72,22 @@ TEST(MapScanTest, TopOfAKerbDoesNotPullItsEdgeBack) {
     ObstacleMap map = makeMap();
     occupy(&map, 20, 30, height_m);
     occupy(&map, 20, 31, height_m);
-    const ObstacleScan scan = makeScan(map, 360, 0.2);
+    const ObstacleScan scan = makeScan(map, 360);
     const size_t ray = rayTo(scan, 0.5 * M_PI - kAside_rad);
-    // Two cells of an upright surface are its scatter, two of a kerb are its edge and its top.
+    // Two cells of an upright surface are averaged; of a kerb, the second one is its top.
     EXPECT_NEAR(scan.range_m[ray], height_m < 0.2F ? 1.05 : 1.10, 0.01);
   }
 }
 
-TEST(MapScanTest, UnobservedGroundEndsWhatIsFree) {
+TEST(MapScanTest, FreeRangeEndsAtUnobservedGround) {
   ObstacleMap map = makeMap();
   map.state.colRange(30, 40).setTo(kCellUnobserved);
-  const ObstacleScan scan = makeScan(map, 360, 0.2);
+  const ObstacleScan scan = makeScan(map, 360);
   EXPECT_LT(scan.free_m[rayTo(scan, 0.0)], 1.01F);
   EXPECT_TRUE(std::isnan(scan.range_m[rayTo(scan, 0.0)]));
 }
 
-TEST(OutlinesTest, GroupsOfCellsAreSurroundedEachByOne) {
+TEST(OutlinesTest, EachGroupOfCellsHasOneOutline) {
   ObstacleMap map = makeMap();
   for (int column = 10; column < 15; ++column) {
     occupy(&map, column, 10, 0.3F);
@@ -112,7 +111,7 @@ TEST(OutlinesTest, GroupsOfCellsAreSurroundedEachByOne) {
   }
 }
 
-TEST(OutlinesTest, MapWithoutObstaclesHasNone) {
+TEST(OutlinesTest, MapWithoutObstaclesHasNoOutline) {
   EXPECT_TRUE(findOutlines(makeMap()).empty());
 }
 

@@ -8,7 +8,7 @@
 namespace vcharge {
 namespace {
 
-// Contours run through the middles of pixels: at three pixels a cell they come close to the cells' borders.
+// Contours run through pixel middles; with three pixels per cell they lie near the cells' borders.
 constexpr int kPixelsPerCell = 3;
 
 }  // namespace
@@ -35,11 +35,11 @@ std::vector<ObstacleOutline> findOutlines(const ObstacleMap& map) {
     const cv::Rect box = cv::boundingRect(contour);
     const Eigen::Vector2d middle(box.x + 0.5 * (box.width - 1), box.y + 0.5 * (box.height - 1));
     for (const cv::Point& pixel : contour) {
-      // From a pixel's middle to its outer corner, so that the outline goes around the cells.
+      // Move from the pixel's middle to its outer corner, so that the outline encloses the cells.
       const Eigen::Vector2d outward((pixel.x > middle.x()) - (pixel.x < middle.x()),
                                     (pixel.y > middle.y()) - (pixel.y < middle.y()));
-      const Eigen::Vector2d place = Eigen::Vector2d(pixel.x + 0.5, pixel.y + 0.5) + 0.5 * outward;
-      outline.corners_m.push_back(map.origin_m + map.cell_size_m / kPixelsPerCell * place);
+      const Eigen::Vector2d corner = Eigen::Vector2d(pixel.x + 0.5, pixel.y + 0.5) + 0.5 * outward;
+      outline.corners_m.push_back(map.origin_m + map.cell_size_m / kPixelsPerCell * corner);
     }
     const int label = labels.at<int>(contour[0].y / kPixelsPerCell, contour[0].x / kPixelsPerCell);
     outline.height_m = heights_m[static_cast<size_t>(label)];

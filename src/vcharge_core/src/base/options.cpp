@@ -123,11 +123,15 @@ std::string showRows(const std::vector<OptionRow>& rows) {
   return text;
 }
 
-std::string tableOfRows(const std::vector<OptionRow>& rows) {
-  std::string text = "| option | default | allowed | meaning |\n|---|---|---|---|\n";
+std::string listRows(const std::vector<OptionRow>& rows) {
+  std::string text;
   for (const OptionRow& row : rows) {
-    text += "| `" + row.key + "` | " + (row.is_group ? "" : "`" + oneLine(row.value) + "`") + " | ";
-    text += (row.is_group ? "" : row.allowed.empty() ? row.type : row.allowed) + " | " + row.meaning + " |\n";
+    const auto depth = static_cast<size_t>(std::count(row.key.begin(), row.key.end(), '.'));
+    const size_t dot = row.key.rfind('.');
+    text += std::string(2 * depth, ' ') + "- **" +
+            (dot == std::string::npos ? row.key : row.key.substr(dot + 1)) + "**";
+    text += (row.is_group ? ": " : " `" + oneLine(row.value) + "`: ") + row.meaning;
+    text += (row.allowed.empty() ? "" : " (" + row.allowed + ")") + "\n";
   }
   return text;
 }

@@ -140,8 +140,8 @@ TEST(OptionsTest, ShownOptionsReadBackAndTellTheirMeaning) {
   TestOptions copy;
   readFields(YAML::Load(shown), "shown", &copy);
   EXPECT_EQ(copy.inner.scale, 0.1);
-  EXPECT_THAT(optionTable(options),
-              HasSubstr("| `inner.scale` | `0.1` | must be positive | Factor of all lengths. |"));
+  EXPECT_THAT(optionList(options),
+              HasSubstr("  - **scale** `0.1`: Factor of all lengths. (must be positive)\n"));
 }
 
 TEST(OptionsTest, BadYamlNamesFileAndLine) {

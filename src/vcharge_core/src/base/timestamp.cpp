@@ -53,7 +53,7 @@ Timestamp timestampFromString(const std::string& text) {
   int64_t seconds = 0;
   for (; isDigit(i); ++i) {
     seconds = seconds * 10 + (text[i] - '0');
-    if (seconds > 9000000000) {  // beyond what 64 bits of nanoseconds hold
+    if (seconds > 9000000000) {  // more than 64 bits of nanoseconds can hold
       return fail();
     }
   }

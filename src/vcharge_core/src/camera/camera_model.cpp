@@ -5,7 +5,7 @@
 namespace vcharge {
 namespace {
 
-/// Calls `function` with the type of the model called `name`, as a null pointer of that type.
+/// Calls `function` with a null pointer whose type is the model called `name`.
 template <class Function>
 auto visitModelType(const std::string& name, Function&& function) {
   if (name == MeiCamera::kName) {

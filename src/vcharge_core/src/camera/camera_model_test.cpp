@@ -1,4 +1,4 @@
-// One property suite over all camera models.
+// Property tests that every camera model passes.
 #include "vcharge_core/camera/camera_model.h"
 
 #include <cmath>
@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// A camera and the largest angle from the axis that the suite demands of it.
+/// A camera and the largest angle from the axis at which it is tested.
 struct TestCamera {
   std::string label;
   CameraModel camera;

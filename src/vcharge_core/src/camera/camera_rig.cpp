@@ -22,7 +22,7 @@ using internal::throwBadField;
 
 constexpr double kFullCircle = 6.283185307179587;
 
-/// A node with the name of its file and its key, so that every error can name both.
+/// A node with its file and key, so that every error names both.
 struct Entry {
   YAML::Node node;
   std::string source;
@@ -94,19 +94,19 @@ RigidTransform readExtrinsics(const Entry& entry, std::optional<Eigen::Matrix<do
     const Eigen::Matrix<double, 6, 6> matrix =
         Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(values.data());
     if (!matrix.isApprox(matrix.transpose(), 1e-6) || (matrix.diagonal().array() < 0.0).any()) {
-      covariance_entry.fail("a symmetric 6x6 matrix with a diagonal that is not negative");
+      covariance_entry.fail("a symmetric 6x6 matrix with a non-negative diagonal");
     }
     *covariance = matrix;
   }
   const Eigen::Vector3d translation_m(t[0], t[1], t[2]);
-  // Scaling anew what was written as a unit quaternion would change its last bits.
+  // Normalizing a written unit quaternion again would change its last bits.
   return std::abs(rotation.norm() - 1.0) <= 1e-12 ? RigidTransform::fromUnit(rotation, translation_m)
                                                   : RigidTransform(rotation, translation_m);
 }
 
 cv::Mat readMask(const Entry& entry, const std::string& folder, cv::Size size) {
   const std::string path = (fs::path(folder) / entry.text()).string();
-  // OpenCV would print a warning of its own for a file that is not there.
+  // OpenCV would print its own warning about a missing file.
   cv::Mat mask = fs::is_regular_file(path) ? cv::imread(path, cv::IMREAD_GRAYSCALE) : cv::Mat();
   if (mask.empty()) {
     throw InputError(entry.source + ": " + entry.key + ": the image " + path + " cannot be read");
@@ -222,7 +222,7 @@ size_t CameraRig::cameraIndex(const std::string& name) const {
     for (const RigCamera& camera : cameras) {
       names += (names.empty() ? "" : ", ") + camera.name;
     }
-    throw InputError("camera '" + name + "': not in the rig, which has " + names);
+    throw InputError("camera '" + name + "': not in the rig, whose cameras are " + names);
   }
   return static_cast<size_t>(index);
 }
@@ -270,7 +270,7 @@ CameraRig parseCameraRig(const std::string& text, const std::string& source, con
     }
     const std::string name = item.first.Scalar();
     if (rig.findCamera(name) >= 0) {
-      throw InputError(source + ": cameras." + name + ": the name is there twice");
+      throw InputError(source + ": cameras." + name + ": the name is given twice");
     }
     if (!isCameraName(name)) {
       throw InputError(source + ": cameras." + name + ": expected a name of letters, digits and underscores");
@@ -343,7 +343,7 @@ void writeCameraRig(const CameraRig& rig, const std::string& path) {
 void checkImageSize(const RigCamera& camera, cv::Size size, const std::string& source) {
   if (size != camera.image_size_px) {
     throw InputError(source + ": expected images of " + std::to_string(camera.image_size_px.width) + "x" +
-                     std::to_string(camera.image_size_px.height) + " px as the rig says of camera '" +
+                     std::to_string(camera.image_size_px.height) + " px as in the rig for camera '" +
                      camera.name + "', got " + std::to_string(size.width) + "x" +
                      std::to_string(size.height));
   }

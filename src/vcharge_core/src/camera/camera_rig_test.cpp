@@ -48,6 +48,21 @@ std::string errorOf(const std::string& text) {
   return "no error";
 }
 
+TEST(CameraRigTest, MasksAreWrittenBesideARelativeFile) {
+  const std::string folder = ::testing::TempDir() + "camera_rig_relative_test";
+  const std::filesystem::path before = std::filesystem::current_path();
+  createFolder(folder);
+  std::filesystem::current_path(folder);
+  CameraRig rig = parseCameraRig(kRig, "rig.yaml", ".");
+  for (const std::string mask_file : {"", "masks/front.png"}) {
+    rig.cameras[0].mask = cv::Mat(rig.cameras[0].image_size_px, CV_8UC1, cv::Scalar(255));
+    rig.cameras[0].mask_file = mask_file;
+    writeCameraRig(rig, "rig.yaml");
+    EXPECT_FALSE(readCameraRig("rig.yaml").cameras[0].mask.empty());
+  }
+  std::filesystem::current_path(before);
+}
+
 TEST(CameraRigTest, ReadsTheDocumentedFile) {
   const CameraRig rig = parseCameraRig(kRig, "rig.yaml", ".");
   ASSERT_EQ(rig.cameras.size(), 2U);

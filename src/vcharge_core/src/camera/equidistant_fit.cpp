@@ -14,7 +14,7 @@ constexpr int kMinSamples = 50;
 constexpr double kTargetSamples = 3000.0;
 constexpr int kMaxIterations = 30;
 
-// A pixel and the direction of its ray: angle from the axis, and the unit vector in the image plane.
+// A pixel and the direction of its ray: the angle from the axis, and the unit vector in the image plane.
 struct Sample {
   Eigen::Vector2d pixel;
   Eigen::Vector2d direction;

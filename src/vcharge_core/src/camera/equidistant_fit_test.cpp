@@ -44,11 +44,11 @@ TEST(EquidistantFitTest, ResidualIsTheDistanceBetweenTheTwoModels) {
       max_px = std::max(max_px, (pixel - truth).norm());
     }
   }
-  // The maximum is taken over other pixels here and there.
+  // The two maxima are taken over different pixels.
   EXPECT_NEAR(fit.max_px, max_px, 0.2 * max_px + 1e-3);
   EXPECT_LT(fit.rms_px, fit.max_px);
-  // Four coefficients follow the tangent's series to the term of theta^9; the next is 2 f (theta / 2)^11 *
-  // 1382/155925.
+  // The four coefficients match the series of the tangent up to theta^9; the next term is 2 f (theta / 2)^11
+  // * 1382/155925.
   EXPECT_LT(fit.max_px, 2.0 * focal * std::pow(0.25 * kFieldOfView_rad, 11) * 1382.0 / 155925.0);
 }
 

@@ -70,7 +70,7 @@ bool KannalaBrandtCamera::project(const Eigen::Vector3d& point_in_camera, Eigen:
   const double fx = parameters_[0];
   const double fy = parameters_[1];
   const double radius = radiusOfAngle(parameters_, angle);
-  // On the axis the image is that of a pinhole camera to first order.
+  // Near the axis, the model equals a pinhole camera to first order.
   const bool on_axis = lateral < 1e-12 * z;
   const double radius_over_lateral = on_axis ? 1.0 / z : radius / lateral;
   const Eigen::Vector2d image(radius_over_lateral * x, radius_over_lateral * y);

@@ -32,7 +32,7 @@ TEST(MeiCameraTest, AgreesWithOpenCvOmnidirInBothDirections) {
   std::vector<cv::Vec2d> theirs;
   cv::omnidir::projectPoints(points, theirs, cv::Vec3d(0, 0, 0), cv::Vec3d(0, 0, 0), cv::Mat(k), camera.xi(),
                              cv::Mat(distortion));
-  // OpenCV's own undistortion iterates a fixed number of times, exact only where the distortion is weak.
+  // OpenCV's undistortion runs a fixed number of iterations, which is exact only for weak distortion.
   std::vector<cv::Vec2d> undistorted;
   cv::omnidir::undistortPoints(theirs, undistorted, cv::Mat(k), cv::Mat(distortion),
                                cv::Mat(cv::Vec<double, 1>(camera.xi())), cv::Mat::eye(3, 3, CV_64F));
@@ -73,7 +73,7 @@ TEST(MeiCameraTest, SeesBeyondNinetyDegreesUpToItsLimit) {
   Eigen::Vector2d pixel;
   EXPECT_TRUE(camera.project(ray(limit - 1e-3), &pixel));
   EXPECT_FALSE(camera.project(ray(limit + 1e-3), &pixel));
-  // Beyond r_u^2 = 1 / (xi^2 - 1) no ray has that pixel.
+  // No ray has a pixel beyond r_u^2 = 1 / (xi^2 - 1).
   const double max_radius = 1.0 / std::sqrt(1.25 * 1.25 - 1.0);
   Eigen::Vector3d back;
   EXPECT_TRUE(camera.unproject(Eigen::Vector2d(640 + 400 * (max_radius - 1e-6), 400), &back));
@@ -85,7 +85,7 @@ TEST(MeiCameraTest, SeesBeyondNinetyDegreesUpToItsLimit) {
 }
 
 TEST(MeiCameraTest, StopsWhereTheDistortionFoldsBack) {
-  // k1 = -1 alone: x_d = x - x^3 turns at x = 1 / sqrt(3).
+  // With k1 = -1 alone, x_d = x - x^3 has its maximum at x = 1 / sqrt(3).
   const MeiCamera camera((MeiCamera::Parameters() << 0.0, 100, 100, 0, 0, -1.0, 0, 0, 0).finished());
   EXPECT_NEAR(camera.distortion().maxRadius(), 1.0 / std::sqrt(3.0), 1e-12);
   Eigen::Vector2d pixel;

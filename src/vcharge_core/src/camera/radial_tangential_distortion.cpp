@@ -10,8 +10,8 @@
 namespace vcharge {
 namespace {
 
-/// Smallest positive root of 1 + 3 k1 r + 5 k2 r^2 (the derivative of the radial part by the radius, r the
-/// squared radius); infinity without one.
+/// Smallest positive root of 1 + 3 k1 r + 5 k2 r^2, the derivative of the radial part (r is the squared
+/// radius); infinity if there is none.
 double squaredRadiusOfFold(double k1, double k2) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const double a = 5.0 * k2;
@@ -23,7 +23,7 @@ double squaredRadiusOfFold(double k1, double k2) {
   if (discriminant < 0.0) {
     return kInfinity;
   }
-  // Numerically stable pair of roots.
+  // Numerically stable formula for both roots.
   const double q = -0.5 * (b + (b < 0.0 ? -1.0 : 1.0) * std::sqrt(discriminant));
   double smallest = kInfinity;
   for (const double root : {q / a, q != 0.0 ? 1.0 / q : kInfinity}) {
@@ -78,8 +78,8 @@ bool RadialTangentialDistortion::undistort(const Eigen::Vector2d& distorted,
   if (!std::isfinite(distorted_radius)) {
     return false;
   }
-  // The radial part alone grows up to max_radius_, so bisection brackets a start from which Newton's method
-  // on the whole model converges.
+  // The radial part alone grows up to max_radius_, so bisection finds a start from which Newton's method on
+  // the full model converges.
   const auto radialPart = [&](double radius) {
     const double r = radius * radius;
     return radius * (1.0 + r * (k1_ + k2_ * r));

@@ -12,7 +12,7 @@ namespace vcharge {
 namespace {
 
 /// The unified model (xi and a factor on the focal lengths) whose radius g sin / (cos + xi) is closest to
-/// that of a Kannala-Brandt camera over its field of view: a scan over xi, with g in closed form.
+/// that of a Kannala-Brandt camera over its field of view: a search over xi, with g in closed form.
 MeiCamera fitUnifiedModel(const KannalaBrandtCamera& camera, double field_of_view_rad) {
   const auto& p = camera.parameters();
   const KannalaBrandtCamera unit(
@@ -65,7 +65,7 @@ MeiCamera makeWorkingModel(const CameraModel& camera, double field_of_view_rad, 
       camera.visit([&](const auto& model) { return withoutDistortion(model, field_of_view_rad); });
   const double scale = options.scaleOf(image_size_px);
   const double focal_scale = scale * options.focal_scale;
-  // Pixel centres are at whole coordinates, so corners are at halves.
+  // Pixel centres have integer coordinates, so image corners lie at half pixels.
   return MeiCamera(unified.xi(), unified.gamma1() * focal_scale, unified.gamma2() * focal_scale,
                    (unified.u0() + 0.5) * scale - 0.5, (unified.v0() + 0.5) * scale - 0.5);
 }
@@ -75,15 +75,15 @@ cv::Size scaledSize(cv::Size size, double scale) {
                   std::max(1, static_cast<int>(std::lround(size.height * scale))));
 }
 
-/// Bilinear sampling averages over two pixels; where samples lie further apart, as many have to be averaged
-/// before it, or what is finer than they turns into a pattern that moves otherwise than the things it is on.
+/// Bilinear sampling averages over two pixels. When samples are further apart, that many pixels are averaged
+/// first to avoid aliasing: patterns that move differently from the objects that they show.
 int averagedPixels(cv::Size image_size, const WorkingCameraOptions& options) {
   const double samples_per_pixel = options.scaleOf(image_size) * options.focal_scale;
   const double block_px = std::ceil(0.5 / samples_per_pixel - 1e-9);
   return static_cast<int>(std::clamp(block_px, 1.0, 1.0 * std::min(image_size.width, image_size.height)));
 }
 
-/// Mean over whole blocks of `block` pixels each way.
+/// Mean over whole blocks of `block` x `block` pixels.
 cv::Mat averageBlocks(const cv::Mat& pixels, int block) {
   const cv::Size size(pixels.cols / block, pixels.rows / block);
   cv::Mat averaged;
@@ -92,19 +92,13 @@ cv::Mat averageBlocks(const cv::Mat& pixels, int block) {
   return averaged;
 }
 
-/// Of a sensor's coordinate, among the means of blocks; not beyond the first and the last one.
+/// Maps a sensor pixel to the coordinate in the block-averaged image, clamped to its first and last block.
 float blockCoordinate(float pixel, int block, int num_blocks) {
   const float coordinate = (pixel + 0.5F) / static_cast<float>(block) - 0.5F;
   return std::clamp(coordinate, 0.0F, static_cast<float>(num_blocks - 1));
 }
 
 }  // namespace
-
-void WorkingCameraOptions::validate() const {
-  requireField(image_scale > 0.0 && image_scale <= 1.0, "image_scale", "must be in (0, 1]", image_scale);
-  requireField(width_px >= 0, "width_px", "must not be negative", width_px);
-  requireField(focal_scale > 0.0 && focal_scale <= 4.0, "focal_scale", "must be in (0, 4]", focal_scale);
-}
 
 double WorkingCameraOptions::scaleOf(cv::Size sensor_size_px) const {
   return width_px > 0 ? std::min(1.0, static_cast<double>(width_px) / sensor_size_px.width) : image_scale;
@@ -120,7 +114,7 @@ WorkingCamera::WorkingCamera(const CameraModel& camera, cv::Size image_size_px, 
       sensor_pixels_(size_, CV_32FC2, cv::Scalar(-1.0, -1.0)) {
   check(mask.empty() || (mask.size() == image_size_px && mask.type() == CV_8UC1),
         "WorkingCamera: the mask must be CV_8UC1 of the image's size");
-  // A mean is valid where all of its pixels are.
+  // A block is valid if all of its pixels are.
   cv::Mat valid_blocks;
   if (!mask.empty()) {
     cv::compare(averageBlocks(mask != 0, block_px_), 255, valid_blocks, cv::CMP_EQ);
@@ -148,7 +142,7 @@ WorkingCamera::WorkingCamera(const CameraModel& camera, cv::Size image_size_px, 
   });
 }
 
-/// Whether all that bilinear sampling takes in at a sensor's pixel is valid.
+/// Whether all blocks that bilinear sampling uses at a sensor pixel are valid.
 bool WorkingCamera::isValid(const cv::Mat& valid_blocks, const cv::Vec2f& sensor_pixel) const {
   const int x = static_cast<int>(blockCoordinate(sensor_pixel[0], block_px_, valid_blocks.cols));
   const int y = static_cast<int>(blockCoordinate(sensor_pixel[1], block_px_, valid_blocks.rows));
@@ -161,7 +155,7 @@ bool WorkingCamera::isValid(const cv::Mat& valid_blocks, const cv::Vec2f& sensor
 cv::Mat WorkingCamera::undistort(const cv::Mat& pixels) const {
   check(pixels.size() == sensor_size_ && pixels.type() == CV_8UC1,
         "WorkingCamera::undistort: expected CV_8UC1 of the sensor's size");
-  // Own bilinear sampling: cv::remap rounds coordinates to 1/32 pixel, which stereo would see.
+  // cv::remap rounds coordinates to 1/32 pixel, which would show up in stereo.
   cv::Mat undistorted(size_, CV_8UC1);
   const cv::Mat source = block_px_ > 1 ? averageBlocks(pixels, block_px_) : pixels;
   for (int y = 0; y < size_.height; ++y) {

@@ -57,7 +57,7 @@ TEST(WorkingCameraTest, UndistortedImageShowsTheSameRays) {
         if (working.validMask().at<uint8_t>(y, x) == 0) {
           continue;
         }
-        // Rounding to whole gray levels, twice.
+        // Gray levels are rounded twice.
         ASSERT_NEAR(undistorted.at<uint8_t>(y, x), skyLevel(rays.ray(x, y).cast<double>()), 1.6)
             << camera.name() << " at " << x << ", " << y;
         ++compared;
@@ -86,7 +86,7 @@ TEST(WorkingCameraTest, PatternFinerThanTheWorkingPixelsBecomesGray) {
 }
 
 TEST(WorkingCameraTest, AveragedPixelsShowTheSameRaysAndNothingMasked) {
-  // Bright beside the mask: where it is taken in, a pixel is brighter than what it shows.
+  // Pixels beside the mask are bright: a result that uses masked pixels would be too bright.
   cv::Mat image(kSize, CV_8UC1, cv::Scalar(255));
   cv::Mat mask(kSize, CV_8UC1, cv::Scalar(0));
   for (int y = 0; y < kSize.height; ++y) {

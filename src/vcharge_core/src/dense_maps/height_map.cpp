@@ -11,13 +11,20 @@
 namespace vcharge {
 namespace {
 
-/// Largest minus smallest known height within `reach` cells of a cell, along rows and columns.
+/// Smoothing spreads a step over cells up to this distance.
+constexpr double kStepReach_m = 0.1;
+/// Length over which the slope is measured.
+constexpr double kSlopeReach_m = 0.3;
+/// Cells with a lower confidence are interpolated from their neighbours, for example under a parked car.
+constexpr double kMinConfidence = 0.01;
+
+/// Difference between the largest and smallest known heights within `reach` cells, along rows and columns.
 float spread(const cv::Mat& height_m, int row, int column, int reach) {
   float low = height_m.at<float>(row, column), high = low;
   const auto take = [&](int r, int c) {
     if (r >= 0 && r < height_m.rows && c >= 0 && c < height_m.cols) {
       const float height = height_m.at<float>(r, c);
-      low = height < low ? height : low;  // passes over NaN
+      low = height < low ? height : low;  // ignores NaN
       high = height > high ? height : high;
     }
   };
@@ -28,7 +35,7 @@ float spread(const cv::Mat& height_m, int row, int column, int reach) {
   return high - low;
 }
 
-/// Rise over run between the known cells `reach` before and behind; 0 where one is not known.
+/// Slope between the known cells `reach` before and after; 0 if one of them is unknown.
 float slopeAlong(const cv::Mat& height_m, int row, int column, int row_step, int column_step, float run_m) {
   const int r0 = row - row_step, r1 = row + row_step, c0 = column - column_step, c1 = column + column_step;
   if (r0 < 0 || c0 < 0 || r1 >= height_m.rows || c1 >= height_m.cols) {
@@ -74,20 +81,10 @@ double interpolateHeight(const HeightMap& map, const Eigen::Vector2d& place_m) {
   return (1.0 - y) * ((1.0 - x) * low[0] + x * low[1]) + y * ((1.0 - x) * high[0] + x * high[1]);
 }
 
-void DrivabilityOptions::validate() const {
-  requireField(max_step_m > 0.0, "max_step_m", "must be positive", max_step_m);
-  requireField(step_reach_m > 0.0, "step_reach_m", "must be positive", step_reach_m);
-  requireField(max_slope > 0.0, "max_slope", "must be positive", max_slope);
-  requireField(slope_reach_m > 0.0, "slope_reach_m", "must be positive", slope_reach_m);
-  requireField(min_confidence >= 0.0 && min_confidence <= 1.0, "min_confidence", "must be in [0, 1]",
-               min_confidence);
-}
-
 cv::Mat classifyCells(const HeightMap& map, const DrivabilityOptions& options) {
   options.validate();
-  const int reach = std::max(1, static_cast<int>(std::lround(options.step_reach_m / map.cell_size_m)));
-  const int slope_reach =
-      std::max(1, static_cast<int>(std::lround(0.5 * options.slope_reach_m / map.cell_size_m)));
+  const int reach = std::max(1, static_cast<int>(std::lround(kStepReach_m / map.cell_size_m)));
+  const int slope_reach = std::max(1, static_cast<int>(std::lround(0.5 * kSlopeReach_m / map.cell_size_m)));
   const auto run_m = static_cast<float>(2.0 * slope_reach * map.cell_size_m);
   cv::Mat states(map.height_m.size(), CV_8UC1);
   for (int row = 0; row < states.rows; ++row) {
@@ -99,7 +96,7 @@ cv::Mat classifyCells(const HeightMap& map, const DrivabilityOptions& options) {
         const bool blocked =
             spread(map.height_m, row, column, reach) > options.max_step_m || slope > options.max_slope;
         const bool is_sure =
-            map.confidence.empty() || map.confidence.at<float>(row, column) >= options.min_confidence;
+            map.confidence.empty() || map.confidence.at<float>(row, column) >= kMinConfidence;
         state = blocked ? CellState::kObstacle : is_sure ? CellState::kDrivable : CellState::kUnobserved;
       } else if (!map.solid.empty() && map.solid.at<uint8_t>(row, column) != 0) {
         state = CellState::kObstacle;

@@ -20,10 +20,10 @@ namespace vcharge {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr uint8_t kFree = 254, kOccupied = 0, kUnknown = 205;  // of map_server's trinary pictures
+constexpr uint8_t kFree = 254, kOccupied = 0, kUnknown = 205;  // values of map_server's trinary images
 constexpr const char* kFloats = "a TIFF of 32-bit floats";
 
-/// An image that a map may have beside its heights.
+/// An optional image of a map beside its heights.
 struct Layer {
   cv::Mat HeightMap::*image;
   const char *key, *ending;
@@ -32,8 +32,8 @@ struct Layer {
 };
 constexpr std::array<Layer, 3> kLayers{
     {{&HeightMap::confidence, "confidence_file", "_confidence.tiff", CV_32FC1, kFloats},
-     {&HeightMap::gray, "gray_file", "_gray.png", CV_8UC1, "a gray picture"},
-     {&HeightMap::solid, "solid_file", "_solid.png", CV_8UC1, "a gray picture"}}};
+     {&HeightMap::gray, "gray_file", "_gray.png", CV_8UC1, "a gray image"},
+     {&HeightMap::solid, "solid_file", "_solid.png", CV_8UC1, "a gray image"}}};
 
 void writeImage(const cv::Mat& image, const std::string& path) {
   writeFileAtomically(path, [&](const std::string& temporary) {
@@ -43,7 +43,7 @@ void writeImage(const cv::Mat& image, const std::string& path) {
     } catch (const cv::Exception&) {
       written = false;
     }
-    // OpenCV may not notice that the disk is full.
+    // OpenCV may not report a full disk.
     if (!written || cv::imread(temporary, cv::IMREAD_UNCHANGED).size() != image.size()) {
       throw InputError(path + ": cannot be written (is the disk full?)");
     }
@@ -77,7 +77,7 @@ std::string nameOf(const std::string& path) {
 void writeHeightMap(const HeightMap& map, const std::string& path_stem) {
   check(map.height_m.type() == CV_32FC1 && !map.height_m.empty(), "writeHeightMap: expected CV_32FC1");
   std::error_code ignored;
-  fs::remove(path_stem + ".yaml", ignored);  // an older map is incomplete while it is replaced
+  fs::remove(path_stem + ".yaml", ignored);  // so that a partly replaced map counts as incomplete
   writeImage(map.height_m, path_stem + ".tiff");
   std::string files = "file: " + nameOf(path_stem) + ".tiff\n";
   for (const Layer& layer : kLayers) {
@@ -214,7 +214,7 @@ cv::Mat colourHeight(const HeightMap& map, double low_m, double high_m) {
       }
       const double share = (height - low_m) / (high_m - low_m);
       level.at<uint8_t>(row, column) = cv::saturate_cast<uint8_t>(255.0 * std::clamp(share, 0.0, 1.0));
-      // Light from the lower left.
+      // The light comes from the lower left.
       const float beside = row > 0 && column > 0 ? map.height_m.at<float>(row - 1, column - 1) : height;
       const double slope = std::isfinite(beside) ? (height - beside) / map.cell_size_m : 0.0;
       shade.at<float>(row, column) = static_cast<float>(std::clamp(0.85 + 0.3 * slope, 0.4, 1.0));

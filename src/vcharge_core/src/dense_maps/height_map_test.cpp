@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-/// Level ground with a kerb across it from column 20 on, a hole, and a post.
+/// Level ground with a kerb from column 20 on, a hole, and a post.
 HeightMap makeMap() {
   HeightMap map;
   map.origin_m = {-1.0, 2.0};

@@ -113,7 +113,7 @@ std::string formatScans(const std::vector<ObstacleScan>& scans) {
   return text.str();
 }
 
-/// One line of the scans' file: the name, then numbers.
+/// One line of the file of scans: the name, then numbers.
 struct ScanLine {
   std::string name;
   std::array<double, kScanColumns - 1> numbers{};
@@ -155,7 +155,7 @@ void writeObstacles(const ObstacleMap& map, const std::vector<ObstacleScan>& sca
   const std::string stem = stemOf(folder, map.stamp);
   createFolder(folder);
   std::error_code ignored;
-  fs::remove(stem + ".yaml", ignored);  // an older stamp is incomplete while it is replaced
+  fs::remove(stem + ".yaml", ignored);  // so that a partly replaced stamp counts as incomplete
   std::vector<cv::Mat> coordinates;
   cv::split(map.point_m, coordinates);
   writeFloatTiff(coordinates[0], stem + "_x.tiff");
@@ -198,7 +198,7 @@ ObstacleMap readObstacleMap(const std::string& folder, Timestamp stamp) {
     map.fixed_from_vehicle =
         RigidTransform(Eigen::Quaterniond(rotation.at(3), rotation.at(0), rotation.at(1), rotation.at(2)),
                        Eigen::Vector3d(translation.at(0), translation.at(1), translation.at(2)));
-  } catch (const std::exception&) {  // of yaml-cpp, at() and RigidTransform alike
+  } catch (const std::exception&) {  // from yaml-cpp, at() or RigidTransform
     throw InputError(stem + ".yaml: expected stamp_ns, frame_id, resolution, origin and the pose");
   }
   const cv::Mat gray =

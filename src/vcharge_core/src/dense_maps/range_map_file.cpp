@@ -20,7 +20,7 @@ namespace vcharge {
 namespace fs = std::filesystem;
 namespace {
 
-/// The stamp that a file's name says, if it is nothing but one.
+/// The stamp in a file name that consists of nothing else.
 std::optional<Timestamp> stampOfName(const std::string& name) {
   int64_t nanoseconds = 0;
   const char* end = name.data() + name.size();
@@ -45,7 +45,7 @@ void writeRangeMap(const RangeMap& map, const std::string& folder) {
   const std::string stem = stemOf(folder, map.camera_name, map.stamp);
   createFolder(fs::path(stem).parent_path().string());
   std::error_code ignored;
-  fs::remove(stem + ".yaml", ignored);  // an older map is incomplete while it is replaced
+  fs::remove(stem + ".yaml", ignored);  // so that a partly replaced map counts as incomplete
   writeFloatTiff(map.range_m, stem + "_range.tiff");
   writeFloatTiff(map.standard_deviation_m, stem + "_sigma.tiff");
   writeFloatTiff(map.confidence, stem + "_confidence.tiff");
@@ -151,7 +151,7 @@ cv::Mat colourRange(const cv::Mat& range_m, double min_range_m, double max_range
       const bool known = std::isfinite(range) && range > 0.0F;
       unknown.at<uint8_t>(y, x) = known ? 0 : 255;
       const double share = known ? (1.0 / range - far) / (near - far) : 0.0;
-      // The root spreads the far half, which inverse range squeezes.
+      // The square root spreads far ranges, which inverse range compresses.
       level.at<uint8_t>(y, x) = cv::saturate_cast<uint8_t>(255.0 * std::sqrt(std::clamp(share, 0.0, 1.0)));
     }
   }

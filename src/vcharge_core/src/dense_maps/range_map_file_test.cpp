@@ -61,7 +61,7 @@ TEST_F(RangeMapFileTest, KeepsTheReferenceWhereThereIsOne) {
   const RangeMap read = readRangeMap(folder_, "left", map.stamp);
   ASSERT_EQ(read.reference.size(), map.reference.size());
   EXPECT_EQ(cv::countNonZero(read.reference != map.reference), 0);
-  writeRangeMap(makeMap(1), folder_);  // replaced by one without
+  writeRangeMap(makeMap(1), folder_);  // replaced by a map without a reference
   EXPECT_TRUE(readRangeMap(folder_, "left", map.stamp).reference.empty());
   map.reference = cv::Mat(10, 32, CV_8UC1, cv::Scalar(7));
   EXPECT_THROW(writeRangeMap(map, folder_), std::logic_error);

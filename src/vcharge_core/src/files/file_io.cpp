@@ -3,16 +3,53 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
-#include <utility>
 
 #include "vcharge_core/base/error.h"
 
 namespace vcharge {
 namespace fs = std::filesystem;
+namespace {
+
+/// The folder that holds `path`: "." for a name without a folder.
+fs::path parentOf(const fs::path& path) {
+  return path.has_parent_path() ? path.parent_path() : fs::path(".");
+}
+
+/// `path` in its shortest form without a slash at its end, so that a name can be appended to it.
+std::string pathWithoutSlash(const std::string& path) {
+  std::string folder = fs::path(path).lexically_normal().string();
+  while (folder.size() > 1 && folder.back() == '/') {
+    folder.pop_back();
+  }
+  return folder;
+}
+
+/// Creates and removes a file in `folder`, or in its nearest existing parent: permissions alone do not show
+/// whether the file system accepts new files. Errors name `path`.
+void requireNewFiles(fs::path folder, const std::string& path) {
+  std::error_code error;
+  while (!fs::exists(folder, error)) {
+    folder = parentOf(folder);
+  }
+  if (!fs::is_directory(folder)) {
+    throw InputError(path + ": cannot be written: " + folder.string() + " is not a folder");
+  }
+  std::string probe = (folder / ".writable.XXXXXX").string();
+  const int descriptor = mkstemp(probe.data());
+  if (descriptor < 0) {
+    throw InputError(path + ": cannot be written: the folder " + folder.string() +
+                     " accepts no new file: " + std::strerror(errno));
+  }
+  close(descriptor);
+  unlink(probe.c_str());
+}
+
+}  // namespace
 
 std::string readTextFile(const std::string& path) {
   if (fs::is_directory(path)) {
@@ -27,12 +64,30 @@ std::string readTextFile(const std::string& path) {
   return text.str();
 }
 
+void requireWritable(const std::string& path) {
+  if (fs::path(path).filename().empty() || fs::is_directory(path)) {
+    throw InputError(path + ": expected the name of a file, is a folder");
+  }
+  requireNewFiles(parentOf(path), path);
+}
+
+void requireWritableFolder(const std::string& path) {
+  const fs::path folder = pathWithoutSlash(path);
+  if (fs::exists(folder) && !fs::is_directory(folder)) {
+    throw InputError(path + ": expected a folder, is a file");
+  }
+  requireNewFiles(folder, path);
+}
+
 void writeFileAtomically(const std::string& path,
                          const std::function<void(const std::string& temporary)>& write) {
   const fs::path target(path);
-  const fs::path folder = target.has_parent_path() ? target.parent_path() : fs::path(".");
-  if (!fs::is_directory(folder)) {
-    throw InputError(path + ": the folder " + folder.string() + " does not exist");
+  const fs::path folder = parentOf(target);
+  std::error_code folder_error;
+  fs::create_directories(folder, folder_error);
+  if (folder_error) {
+    throw InputError(path + ": the folder " + folder.string() +
+                     " cannot be created: " + folder_error.message());
   }
   if (access(folder.c_str(), W_OK) != 0) {
     throw InputError(path + ": the folder " + folder.string() +
@@ -65,12 +120,12 @@ void writeTextFileAtomically(const std::string& path, const std::string& text) {
   });
 }
 
-FolderTransaction::FolderTransaction(std::string path) : final_(std::move(path)) {
-  while (final_.size() > 1 && final_.back() == '/') {
-    final_.pop_back();  // the temporary folder stands beside, not inside
-  }
+FolderTransaction::FolderTransaction(const std::string& path) : final_(pathWithoutSlash(path)) {
   if (fs::exists(final_) && !fs::is_directory(final_)) {
     throw InputError(final_ + ": expected a folder, is a file");
+  }
+  if (fs::exists(final_) && fs::equivalent(final_, fs::current_path())) {
+    throw InputError(final_ + ": the current folder cannot be replaced; name a folder in it");
   }
   const fs::path target(final_);
   temporary_ =
@@ -104,6 +159,9 @@ void FolderTransaction::commit() {
 }
 
 void createFolder(const std::string& path) {
+  if (path.empty()) {
+    return;  // the folder of a file name without a folder is the current one
+  }
   std::error_code error;
   fs::create_directories(path, error);
   if (error || !fs::is_directory(path)) {

@@ -66,6 +66,44 @@ TEST_F(FileIoTest, FolderAppearsAsAWholeOrNotAtAll) {
   EXPECT_EQ(countFiles(), 1);
 }
 
+TEST_F(FileIoTest, WritesRelativePathsInTheCurrentFolder) {
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder_);
+  for (const std::string path : {"a.txt", "./b.txt", "new/c.txt"}) {
+    EXPECT_NO_THROW(requireWritable(path));
+    createFolder(std::filesystem::path(path).parent_path().string());
+    EXPECT_NO_THROW(writeTextFileAtomically(path, "x"));
+    EXPECT_EQ(readTextFile(path), "x");
+  }
+  for (const std::string path : {"results", "./more/"}) {
+    EXPECT_NO_THROW(requireWritableFolder(path));
+    FolderTransaction(path).commit();
+    EXPECT_TRUE(std::filesystem::is_directory(path));
+  }
+  EXPECT_NO_THROW(requireWritableFolder("."));
+  EXPECT_THROW(FolderTransaction("."), InputError);
+  std::filesystem::current_path(before);
+}
+
+TEST_F(FileIoTest, CheckOfAnOutputLeavesNothingBehind) {
+  requireWritable(folder_ + "/a.txt");
+  requireWritable(folder_ + "/new/folder/a.txt");
+  requireWritableFolder(folder_ + "/results/");
+  EXPECT_EQ(countFiles(), 0);
+  writeTextFileAtomically(folder_ + "/a.txt", "old");
+  requireWritable(folder_ + "/a.txt");
+  EXPECT_EQ(readTextFile(folder_ + "/a.txt"), "old");
+  EXPECT_EQ(countFiles(), 1);
+}
+
+TEST_F(FileIoTest, OutputOfTheWrongKindIsAnError) {
+  writeTextFileAtomically(folder_ + "/file", "x");
+  EXPECT_THROW(requireWritable(folder_), InputError);
+  EXPECT_THROW(requireWritable(folder_ + "/"), InputError);
+  EXPECT_THROW(requireWritable(""), InputError);
+  EXPECT_THROW(requireWritableFolder(folder_ + "/file"), InputError);
+}
+
 TEST_F(FileIoTest, FolderMayBeNamedWithASlashAtItsEnd) {
   for (const char* text : {"new", "newer"}) {
     FolderTransaction transaction(folder_ + "/results//");
@@ -89,13 +127,14 @@ TEST_F(FileIoTest, FolderInPlaceOfAFileIsAnError) {
 }
 
 TEST_F(FileIoTest, ErrorsNameThePath) {
+  writeTextFileAtomically(folder_ + "/file", "");
   for (const auto& action :
        {std::function<void()>([&] { readTextFile(folder_ + "/missing.txt"); }),
-        std::function<void()>([&] { writeTextFileAtomically(folder_ + "/no/missing.txt", ""); }),
-        std::function<void()>([&] {
-          writeTextFileAtomically(folder_ + "/file", "");
-          createFolder(folder_ + "/file/missing.txt");
-        })}) {
+        std::function<void()>([&] { writeTextFileAtomically(folder_ + "/file/missing.txt", ""); }),
+        std::function<void()>([&] { createFolder(folder_ + "/file/missing.txt"); }),
+        std::function<void()>([&] { requireWritable(folder_ + "/file/missing.txt"); }),
+        std::function<void()>([&] { requireWritable("/proc/missing.txt"); }),
+        std::function<void()>([&] { requireWritableFolder("/proc/missing.txt/results"); })}) {
     try {
       action();
       FAIL() << "no error";

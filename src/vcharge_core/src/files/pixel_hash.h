@@ -6,7 +6,7 @@
 
 namespace vcharge {
 
-/// Size and all pixels of an image of 32-bit floats with any number of channels; every NaN counts the same.
+/// Adds the size and all pixels of an image of 32-bit floats with any number of channels; all NaNs are equal.
 void addPixelsToHash(const cv::Mat& image, ContentHasher* hasher);
 
 }  // namespace vcharge

@@ -15,7 +15,7 @@ constexpr double kLeft = 70.0, kRight = 15.0, kTop = 12.0, kBottom = 45.0;
 constexpr double kLegendRow = 20.0, kLegendMark = 36.0, kLetter = 7.0;
 constexpr double kMinHeight = 250.0, kMaxHeight = 900.0;
 
-/// 1, 2 or 5 times a power of ten, so that about `count` fit into the range.
+/// 1, 2 or 5 times a power of ten, so that about `count` steps fit into the range.
 double tickStep(double range, int count) {
   const double raw = range / count;
   const double power = std::pow(10.0, std::floor(std::log10(raw)));
@@ -48,7 +48,7 @@ SvgPlot::SvgPlot(Range x, Range y, double height, bool is_metric, const std::str
   const double inner_width = width_ - kLeft - kRight;
   const double wanted = inner_width * (y_.max - y_.min) / (x_.max - x_.min) + kTop + kBottom;
   height_ = std::clamp(wanted, kMinHeight, kMaxHeight);
-  // Where that does not fit, one of the axes goes on further on both sides.
+  // If the metric scale leaves room, one of the axes is extended on both sides.
   const double inner_height = height_ - kTop - kBottom;
   const double scale =
       std::max((x_.max - x_.min) / inner_width, (y_.max - y_.min) / inner_height);  // units per pixel
@@ -105,7 +105,7 @@ void SvgPlot::addBand(double x_min, double x_max, const std::string& colour) {
 }
 
 void SvgPlot::addLegend(const std::string& colour, const std::string& text) {
-  // In rows above the plot, from the topmost downwards; make() makes room for them.
+  // The legend stands in rows above the plot; make() reserves the height.
   const double width = kLegendMark + kLetter * static_cast<double>(text.size());
   if (legend_x_ > kLeft && legend_x_ + width > width_ - kRight) {
     legend_x_ = kLeft;

@@ -10,7 +10,7 @@ namespace vcharge {
 
 Eigen::Quaterniond rotationFromVector(const Eigen::Vector3d& rotation_vector) {
   const double angle = rotation_vector.norm();
-  // sin(angle / 2) / angle, with its series near zero.
+  // sin(angle / 2) / angle, as a series near zero.
   const double scale = angle < 1e-6 ? 0.5 - angle * angle / 48.0 : std::sin(0.5 * angle) / angle;
   const Eigen::Vector3d imaginary = scale * rotation_vector;
   return Eigen::Quaterniond(std::cos(0.5 * angle), imaginary.x(), imaginary.y(), imaginary.z());

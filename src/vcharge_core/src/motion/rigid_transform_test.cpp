@@ -68,7 +68,7 @@ TEST(RigidTransformTest, InterpolatesAlongTheShortWay) {
 }
 
 TEST(RigidTransformTest, TakesAUnitQuaternionAsItIs) {
-  // Scaling such a quaternion anew changes a bit here and there.
+  // Normalizing such quaternions again would change their last bits.
   for (int i = 0; i < 1000; ++i) {
     const RigidTransform product = RigidTransform(rotationFromYawPitchRoll(0.1 * i, 0.03 * i, -0.7 * i),
                                                   Eigen::Vector3d(i, 1.0 / 3.0, -0.0));

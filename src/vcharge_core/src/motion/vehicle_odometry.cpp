@@ -5,12 +5,12 @@
 #include "vcharge_core/base/options.h"
 
 namespace vcharge {
+namespace {
 
-void OdometryBufferOptions::validate() const {
-  requireField(max_gap_s > 0.0, "max_gap_s", "must be positive", max_gap_s);
-  requireField(history_s > 0.0, "history_s", "must be positive", history_s);
-  requireField(reset_backwards_s > 0.0, "reset_backwards_s", "must be positive", reset_backwards_s);
-}
+/// A stamp this far before the newest entry means that a bag was restarted.
+constexpr double kResetBackwards_s = 1.0;
+
+}  // namespace
 
 OdometryBuffer::OdometryBuffer(const OdometryBufferOptions& options) : options_(options) {
   options_.validate();
@@ -21,7 +21,7 @@ OdometryBuffer::AddResult OdometryBuffer::add(const VehicleOdometry& odometry) {
   if (!entries_.empty()) {
     const Timestamp newest = entries_.back().stamp;
     if (odometry.stamp <= newest) {
-      if (toSeconds(newest - odometry.stamp) >= options_.reset_backwards_s) {
+      if (toSeconds(newest - odometry.stamp) >= kResetBackwards_s) {
         entries_.clear();
         ++counts_.resets;
         result = AddResult::kReset;

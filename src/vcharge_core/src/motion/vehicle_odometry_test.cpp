@@ -121,20 +121,18 @@ TEST(OdometryBufferTest, KnowsItsNewestStamp) {
   EXPECT_EQ(buffer.newestStamp(), std::nullopt);
   buffer.add(odometryAt(100.0));
   buffer.add(odometryAt(100.1));
-  buffer.add(odometryAt(100.05));  // ignored
+  buffer.add(odometryAt(100.05));  // too old, ignored
   EXPECT_FALSE(buffer.empty());
   EXPECT_EQ(buffer.newestStamp(), at(100.1));
-  buffer.add(odometryAt(1.0));  // starts over
+  buffer.add(odometryAt(1.0));  // jump backwards, resets the buffer
   EXPECT_EQ(buffer.newestStamp(), at(1.0));
 }
 
-TEST(OdometryBufferTest, StartsOverAtExactlyTheStepThatItsOptionsName) {
-  OdometryBufferOptions options;
-  options.reset_backwards_s = 0.5;
-  OdometryBuffer buffer(options);
+TEST(OdometryBufferTest, StartsOverAfterAJumpOfOneSecond) {
+  OdometryBuffer buffer;
   buffer.add(odometryAt(10.0));
-  EXPECT_EQ(buffer.add(odometryAt(9.51)), AddResult::kOutOfOrder);
-  EXPECT_EQ(buffer.add(odometryAt(9.5)), AddResult::kReset);
+  EXPECT_EQ(buffer.add(odometryAt(9.01)), AddResult::kOutOfOrder);
+  EXPECT_EQ(buffer.add(odometryAt(9.0)), AddResult::kReset);
 }
 
 TEST(OdometryBufferTest, DescribesEachStatusInWordsOfItsOwn) {
@@ -159,7 +157,6 @@ TEST(OdometryBufferTest, RejectsBadOptionsByName) {
     using ::testing::StartsWith;
     EXPECT_THAT(errorOf(&OdometryBufferOptions::max_gap_s), StartsWith("max_gap_s: "));
     EXPECT_THAT(errorOf(&OdometryBufferOptions::history_s), StartsWith("history_s: "));
-    EXPECT_THAT(errorOf(&OdometryBufferOptions::reset_backwards_s), StartsWith("reset_backwards_s: "));
   }
 }
 

@@ -74,7 +74,7 @@ void sortObservations(SparseMapContents* contents) {
   const auto isBefore = [&](size_t a, size_t b) { return key(a) < key(b); };
   const auto isNotBefore = [&](size_t a, size_t b) { return !isBefore(a, b); };
   if (std::adjacent_find(order.begin(), order.end(), isNotBefore) == order.end()) {
-    return;  // as in every map that was saved
+    return;  // already in order, as in every saved map
   }
   std::sort(order.begin(), order.end(), isBefore);
   std::vector<MapObservation> observations;

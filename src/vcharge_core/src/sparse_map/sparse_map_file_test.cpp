@@ -32,13 +32,13 @@ class SparseMapFileTest : public ::testing::Test {
     folder_ = ::testing::TempDir() + "sparse_map_file_test";
     fs::remove_all(folder_);
     createFolder(folder_);
-    path_ = folder_ + "/a%20b?.vmap";  // characters that mean something in a URI
+    path_ = folder_ + "/a%20b?.vmap";  // characters with a special meaning in a URI
     writeSparseMap(map_, kProvenance, path_);
     bytes_ = readTextFile(path_);
   }
   void TearDown() override { fs::remove_all(folder_); }
 
-  /// Why a file of these bytes is not read; empty where it is.
+  /// The error of reading a file with these bytes; empty on success.
   std::string errorOf(const std::string& bytes) const {
     const std::string path = folder_ + "/changed.vmap";
     std::ofstream(path, std::ios::binary) << bytes;
@@ -53,7 +53,7 @@ class SparseMapFileTest : public ::testing::Test {
     }
     return "";
   }
-  /// Why the map is not read after SQL changed it.
+  /// The error of reading the map after SQL changed it.
   std::string errorAfter(const std::string& sql) const {
     const std::string path = folder_ + "/changed.vmap";
     std::ofstream(path, std::ios::binary) << bytes_;
@@ -87,7 +87,7 @@ class SparseMapFileTest : public ::testing::Test {
 };
 
 TEST_F(SparseMapFileTest, GivesBackEveryBit) {
-  // Transforms that are products of others, whose quaternions are not of norm 1 to the last bit.
+  // Products of transforms have quaternions whose norm is not 1 to the last bit.
   SparseMapContents contents = makeAnalyticMap();
   contents.rig.cameras[1].mask_file = "masks/left.png";
   contents.rig.cameras[1].mask = cv::Mat(480, 640, CV_8UC1, cv::Scalar(7));
@@ -118,7 +118,7 @@ TEST_F(SparseMapFileTest, GivesBackEveryBit) {
   EXPECT_EQ(read->contents().vocabulary, contents.vocabulary);
   EXPECT_EQ(read->contents().feature_options, contents.feature_options);
   EXPECT_EQ(read->contents().loop_edges[1].reason, contents.loop_edges[1].reason);
-  // What the content hash leaves out.
+  // The content hash does not cover these.
   for (size_t i = 0; i < 2; ++i) {
     const RigCamera& camera = read->rig().cameras[i];
     EXPECT_EQ(camera.image_size_px, contents.rig.cameras[i].image_size_px);
@@ -186,7 +186,7 @@ TEST_F(SparseMapFileTest, EveryPrefixIsTruncated) {
     const std::string error = errorOf(bytes_.substr(0, length));
     EXPECT_THAT(error, HasSubstr("truncated")) << length;
   }
-  // Even where the header tells the shorter length.
+  // Also detected if the header states the shorter length.
   constexpr size_t kPageSize = 16384;
   for (size_t pages = 1; pages < bytes_.size() / kPageSize; ++pages) {
     std::string shorter = bytes_.substr(0, pages * kPageSize);
@@ -196,7 +196,7 @@ TEST_F(SparseMapFileTest, EveryPrefixIsTruncated) {
   }
 }
 
-// Any byte: either it means nothing or the file is refused; never a crash, never another map.
+// A changed byte either has no meaning or is rejected: it never causes a crash or another map.
 TEST_F(SparseMapFileTest, NoChangedByteGivesAnotherMap) {
   std::mt19937 generator(1);
   std::uniform_int_distribution<size_t> any_position(0, bytes_.size() - 1);
@@ -206,7 +206,7 @@ TEST_F(SparseMapFileTest, NoChangedByteGivesAnotherMap) {
   constexpr int kNumTrials = 600;
   for (int trial = 0; trial < kNumTrials; ++trial) {
     std::string changed = bytes_;
-    // Half of the trials in the first page, which holds the header and the tables' definitions.
+    // Half of the trials change the first page, which holds the header and the table definitions.
     const size_t position = any_position(generator);
     char& byte = changed[trial % 2 == 0 ? position : position % 8192];
     byte = static_cast<char>(byte ^ any_byte(generator));
@@ -262,7 +262,7 @@ TEST_F(SparseMapFileTest, RefusesBlobsThatDoNotFit) {
               HasSubstr("5 bytes, expected"));
   EXPECT_THAT(errorAfter("UPDATE image SET positions_px_f32 = zeroblob(100000000) WHERE id = 1"),
               HasSubstr("bytes, expected"));
-  // 0x7fffffff, -1, NaN in their places of the blobs.
+  // 0x7fffffff, -1 and NaN at the start of the blobs.
   const auto replaced = [](const char* column, const char* bytes) {
     return std::string("UPDATE image SET ") + column + " = CAST(" + bytes + " || substr(" + column +
            ", 5) AS BLOB) WHERE id = 0";
@@ -279,12 +279,12 @@ TEST_F(SparseMapFileTest, KeepsTheOldMapWhenTheNewOneCannotBeWritten) {
   AnalyticMapOptions options;
   options.num_landmarks = 3000;
   const SparseMap larger(makeAnalyticMap(options));
-  // A disk that fills up, at any point of the work: a child whose files may only grow to a limit.
+  // Simulates a disk that fills up: a child process with a limit on its file size.
   for (const rlim_t limit : {0, 4096, 20000, 200000, 600000}) {
     const pid_t child = fork();
     ASSERT_GE(child, 0);
     if (child == 0) {
-      std::signal(SIGXFSZ, SIG_IGN);  // the write fails instead
+      std::signal(SIGXFSZ, SIG_IGN);  // makes the write fail instead of killing the process
       const rlimit size{limit, limit};
       setrlimit(RLIMIT_FSIZE, &size);
       try {

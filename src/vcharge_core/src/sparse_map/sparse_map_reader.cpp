@@ -31,7 +31,7 @@ uint32_t bigEndian(const char* bytes, int count) {
   return value;
 }
 
-/// Tells what is wrong with a file before SQLite looks at it (SQLite's file format, section 1.3).
+/// Checks the header before SQLite opens the file (SQLite's file format, section 1.3).
 void checkHeader(const std::string& path) {
   if (fs::is_directory(path)) {
     throw InputError(path + ": expected a map file, is a folder");
@@ -77,7 +77,7 @@ void checkHeader(const std::string& path) {
   }
 }
 
-/// Reads one file; throws InputError and std::invalid_argument, which the caller completes.
+/// Reads one file. Throws InputError and std::invalid_argument, to which the caller adds the file name.
 class Reader {
  public:
   explicit Reader(const std::string& path)
@@ -117,7 +117,7 @@ class Reader {
   }
 
  private:
-  /// SQLite's own check finds what no hash covers, and tells where.
+  /// SQLite's own check covers what no hash covers, and locates the damage.
   void checkIntegrity() {
     SqliteStatement check(database_, "PRAGMA integrity_check(1)");
     if (!check.step() || check.text(0) != "ok") {
@@ -125,7 +125,7 @@ class Reader {
     }
   }
 
-  /// Only tables just as they were created are read: no views, no generated columns.
+  /// Accepts only tables exactly as they were created: no views, no generated columns.
   void checkTables() {
     for (const Table& table : tables()) {
       SqliteStatement find(database_, "SELECT sql FROM sqlite_schema WHERE type = 'table' AND name = ?");
@@ -173,7 +173,7 @@ class Reader {
       mask_pngs.emplace_back(png, png + select.blobSize(2));
     }
     if (attachmentsHash(text, mask_files, mask_pngs, provenance) != meta("attachments_hash")) {
-      damaged("rig, masks or provenance are not what was written");
+      damaged("rig, masks or provenance differ from what was written");
     }
     *rig = parseCameraRig(text, path_ + ": rig", "");
     if (rig->cameras.size() != names.size()) {
@@ -186,7 +186,7 @@ class Reader {
         camera.mask = cv::imdecode(mask_pngs[i], cv::IMREAD_GRAYSCALE);
       }
       if (camera.name != names[i] || (!mask_pngs[i].empty() && camera.mask.size() != camera.image_size_px)) {
-        damaged("camera " + std::to_string(i) + ": name or mask do not fit the rig");
+        damaged("camera " + std::to_string(i) + ": name or mask differ from the rig");
       }
     }
   }
@@ -204,7 +204,7 @@ class Reader {
     }
   }
 
-  /// An index or count; SparseMap checks its range.
+  /// Reads an index or count; SparseMap checks its range.
   int32_t index(const SqliteStatement& select, int column, const char* table) const {
     const int64_t value = select.integer(column);
     if (value < 0 || value > std::numeric_limits<int32_t>::max()) {
@@ -271,7 +271,7 @@ class Reader {
     }
   }
 
-  /// Rows and columns of the descriptors, before anything is allocated for them.
+  /// Checks the size of the descriptors before allocating them.
   cv::Mat allocateDescriptors() {
     const std::string type = meta("descriptor_type");
     int64_t size = 0;
@@ -284,7 +284,7 @@ class Reader {
     while (select.step()) {
       num_rows += static_cast<uint64_t>(index(select, 0, "image"));
     }
-    // An observation takes at least its index and position.
+    // An observation needs at least an index and a position.
     constexpr uint64_t kMinObservationSize = sizeof(int32_t) + 2 * sizeof(float);
     const uint64_t element_size = type == "uint8" ? 1 : sizeof(float);
     if (num_rows > file_size_ / (kMinObservationSize + static_cast<uint64_t>(size) * element_size) ||
@@ -354,13 +354,13 @@ std::shared_ptr<const SparseMap> readSparseMap(const std::string& path, MapProve
     MapProvenance read_provenance;
     auto map = std::make_shared<const SparseMap>(reader.read(&read_provenance));
     if (map->contentHash() != reader.meta("content_hash")) {
-      reader.damaged("its content does not have the hash that was written with it");
+      reader.damaged("its content does not match the written hash");
     }
     if (provenance != nullptr) {
       *provenance = std::move(read_provenance);
     }
     return map;
-  } catch (const std::logic_error& error) {  // SparseMap and its parts about what they were given
+  } catch (const std::logic_error& error) {  // from SparseMap and its parts about their arguments
     reader.damaged(error.what());
   } catch (const cv::Exception& error) {
     reader.damaged(error.what());

@@ -8,16 +8,16 @@
 
 #include "vcharge_core/sparse_map/sparse_map.h"
 
-// Blobs are copied as they are in memory.
+// Blobs are copied from memory without conversion.
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "blobs of a map file are little-endian");
 
 namespace vcharge::map_file {
 
 /// "vcmp", at byte 68 of the file: PRAGMA application_id.
 constexpr uint32_t kApplicationId = 0x76636d70;
-/// PRAGMA user_version. Raise it with every change of the tables, and keep reading the older ones.
+/// PRAGMA user_version. Raise it with every change of the tables; keep reading older versions.
 constexpr uint32_t kSchemaVersion = 1;
-/// Large pages: a map is read as a whole, and its blobs are large.
+/// Large pages, since a map is read as a whole and its blobs are large.
 constexpr int kPageSize_bytes = 16384;
 
 struct Table {
@@ -25,7 +25,7 @@ struct Table {
   const char* sql;
 };
 
-/// Blobs hold little-endian numbers. Covariances are row-major as MapKeyframe and MapLandmark say, NULL where
+/// Blobs hold little-endian numbers. Covariances are row-major as in MapKeyframe and MapLandmark, NULL if
 /// unknown. Transforms are target_from_source as in the structs.
 inline const std::vector<Table>& tables() {
   static const std::vector<Table> kTables = {
@@ -57,13 +57,13 @@ inline const std::vector<Table>& tables() {
   return kTables;
 }
 
-/// Boxes of landmarks: SELECT id FROM landmark_index WHERE min_x <= ... AND max_x >= ... Derived, hence not
-/// read back and covered by no hash.
+/// Bounding boxes of landmarks: SELECT id FROM landmark_index WHERE min_x <= ... AND max_x >= ... Derived
+/// data, which is not read back and not covered by a hash.
 constexpr const char* kLandmarkIndexSql =
     "CREATE VIRTUAL TABLE landmark_index USING rtree(id, min_x, max_x, min_y, max_y, min_z, max_z)";
 
-/// What SparseMap::contentHash() leaves out and a damaged file must not change: the whole rig and its masks,
-/// and the provenance.
+/// Hash of what SparseMap::contentHash() excludes but must be protected from damage: the rig, its masks, and
+/// the provenance.
 std::string attachmentsHash(const std::string& rig_text, const std::vector<std::string>& mask_files,
                             const std::vector<std::vector<uint8_t>>& mask_pngs,
                             const MapProvenance& provenance);

@@ -22,7 +22,7 @@ void createTables(SqliteDatabase* database) {
   }
 }
 
-/// Binds x, y, z, qx, qy, qz, qw from `parameter` on.
+/// Binds x, y, z, qx, qy, qz, qw to the parameters from `parameter` on.
 void bindTransform(const RigidTransform& transform, int parameter, SqliteStatement* statement) {
   for (int i = 0; i < 3; ++i) {
     statement->bind(parameter + i, transform.translation()[i]);
@@ -32,7 +32,7 @@ void bindTransform(const RigidTransform& transform, int parameter, SqliteStateme
   }
 }
 
-/// Row-major, NULL where all is zero. `storage` must outlive the statement's next step.
+/// Row-major; NULL if all entries are zero. `storage` must outlive the statement's next step.
 template <int kSize>
 void bindCovariance(const Eigen::Matrix<double, kSize, kSize>& covariance, int parameter,
                     Eigen::Matrix<double, kSize, kSize, Eigen::RowMajor>* storage,
@@ -57,7 +57,8 @@ void writeRig(const CameraRig& rig, const MapProvenance& provenance, SqliteDatab
     mask_files.push_back(camera.mask_file);
     mask_pngs.emplace_back();
     if (!camera.mask.empty()) {
-      check(cv::imencode(".png", camera.mask, mask_pngs.back()), "writeSparseMap: a mask is no PNG");
+      check(cv::imencode(".png", camera.mask, mask_pngs.back()),
+            "writeSparseMap: cannot encode a mask as PNG");
     }
     insert.bind(0, static_cast<int64_t>(i));
     insert.bind(1, camera.name);
@@ -145,7 +146,7 @@ void writeLandmarkIndex(const SparseMap& map, SqliteDatabase* database) {
   for (size_t i = 0; i < map.landmarks().size(); ++i) {
     insert.bind(0, static_cast<int64_t>(i));
     for (int k = 0; k < 6; ++k) {
-      insert.bind(1 + k, map.landmarks()[i].position_m[k / 2]);  // SQLite rounds the box outwards
+      insert.bind(1 + k, map.landmarks()[i].position_m[k / 2]);  // SQLite rounds boxes outwards
     }
     insert.run();
   }

@@ -10,7 +10,7 @@
 namespace vcharge {
 namespace {
 
-/// A file as SQLite's URI, with the characters that mean something there written as %xx.
+/// The file as a URI of SQLite, with special characters escaped as %xx.
 std::string uriOf(const std::string& path) {
   static const char* const kDigits = "0123456789abcdef";
   std::string uri = "file://";
@@ -37,7 +37,7 @@ SqliteDatabase::SqliteDatabase(const std::string& path, const std::string& name,
       fail();
     }
     if (reads) {
-      // What a file says of itself is not trusted.
+      // The schema stored in a file is not trusted.
       sqlite3_db_config(handle_, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
       sqlite3_db_config(handle_, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
       execute("PRAGMA cell_size_check = ON");
@@ -134,7 +134,7 @@ double SqliteStatement::number(int column) const {
 }
 
 std::string SqliteStatement::text(int column) const {
-  const void* bytes = sqlite3_column_blob(handle_, column);  // a text may hold zeros
+  const void* bytes = sqlite3_column_blob(handle_, column);  // the text may contain zero bytes
   const auto size = static_cast<size_t>(sqlite3_column_bytes(handle_, column));
   return bytes == nullptr ? std::string() : std::string(static_cast<const char*>(bytes), size);
 }

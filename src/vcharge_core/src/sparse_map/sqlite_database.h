@@ -8,23 +8,23 @@ struct sqlite3_stmt;
 
 namespace vcharge {
 
-/// One SQLite file. Every failure is an InputError that names the file.
+/// An SQLite file. Every failure is an InputError that names the file.
 class SqliteDatabase {
  public:
   enum class Access {
-    kReadOnly,  ///< nothing is written, not even beside the file, and no journal is looked for
-    kCreate     ///< without a rollback journal: for a temporary file that is thrown away if anything fails
+    kReadOnly,  ///< writes nothing, not even beside the file, and ignores journals
+    kCreate     ///< no rollback journal: for a temporary file that is deleted on failure
   };
 
-  /// `name` is what errors call the file.
+  /// `name` is the file's name in errors.
   SqliteDatabase(const std::string& path, const std::string& name, Access access);
   ~SqliteDatabase();
   SqliteDatabase(const SqliteDatabase&) = delete;
   SqliteDatabase& operator=(const SqliteDatabase&) = delete;
 
-  /// Statements without results, separated by ';'.
+  /// Executes statements without results, separated by ';'.
   void execute(const std::string& sql);
-  /// InputError with SQLite's reason, and the system's where there is one.
+  /// Throws InputError with SQLite's reason and the system's, if any.
   [[noreturn]] void fail() const;
 
  private:
@@ -36,7 +36,7 @@ class SqliteDatabase {
   sqlite3* handle_ = nullptr;
 };
 
-/// A prepared statement; the database must outlive it. Parameters and columns count from 0.
+/// A prepared statement; the database must outlive it. Parameters and columns are numbered from 0.
 class SqliteStatement {
  public:
   SqliteStatement(const SqliteDatabase& database, const char* sql);
@@ -51,16 +51,16 @@ class SqliteStatement {
   void bindBlob(int parameter, const void* data, size_t size);
   void bindNull(int parameter);
 
-  /// True while there is a row.
+  /// Returns true while there is a row.
   bool step();
-  /// For a statement without rows: executes it and makes it ready for the next parameters.
+  /// Executes a statement without rows and resets it for the next parameters.
   void run();
 
   int64_t integer(int column) const;
   double number(int column) const;
   std::string text(int column) const;
   bool isNull(int column) const;
-  /// Valid until the next step(); null where empty.
+  /// Valid until the next step(); null if empty.
   const void* blob(int column) const;
   size_t blobSize(int column) const;
 

@@ -16,7 +16,7 @@ namespace {
 
 using Tasks = std::vector<std::string>;
 
-/// A worker that waits in its first task, "begin" of channel 0, until it is let go, and notes its tasks.
+/// A worker whose first task, "begin" of channel 0, blocks until letGo(); records all tasks.
 class HeldWorker {
  public:
   HeldWorker() {
@@ -26,12 +26,12 @@ class HeldWorker {
   }
 
   NewestFirstWorker<std::string>& worker() { return *worker_; }
-  /// While `task` is worked on, the next one comes.
+  /// Pushes `next` while `task` is processed.
   void follow(const std::string& task, size_t channel, const std::string& next) {
     next_[task] = {channel, next};
   }
   void letGo() { released_.set_value(); }
-  /// All tasks in order, once "end" is done.
+  /// Waits for the task "end" and returns all tasks in order.
   Tasks tasks() {
     ended_.get_future().wait();
     return tasks_;
@@ -55,7 +55,7 @@ class HeldWorker {
   std::promise<void> began_, released_, ended_;
   Tasks tasks_;
   std::map<std::string, std::pair<size_t, std::string>> next_;
-  std::optional<NewestFirstWorker<std::string>> worker_;  // last: its thread uses the others
+  std::optional<NewestFirstWorker<std::string>> worker_;  // last, since its thread uses the other members
 };
 
 TEST(NewestFirstWorkerTest, ANewerTaskReplacesOneThatWaitsAndTheDropIsCounted) {

@@ -50,7 +50,7 @@ TEST(OrderedWorkerTest, DropsTheOldestThatMayBeDroppedAndKeepsAllOthers) {
   worker.push(0, true);
   begun.get_future().wait();
   for (int i = 1; i < 10; ++i) {
-    worker.push(i, i % 2 == 0);  // 2, 4, 6, 8 may be dropped: 6 and 8 stay
+    worker.push(i, i % 2 == 0);  // 2, 4, 6, 8 are droppable; 6 and 8 remain
   }
   EXPECT_EQ(worker.numDropped(), 2U);
   go_on.set_value();
@@ -72,7 +72,8 @@ TEST(OrderedWorkerTest, EndsWithTheTaskInWorkAndBeginsNoOther) {
   worker->push(1, false);
   in_work.get_future().wait();
   std::thread end([&] { worker.reset(); });
-  std::this_thread::sleep_for(std::chrono::milliseconds(50));  // so that it stops before the task ends
+  // so that the destructor runs before the task ends
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
   go_on.set_value();
   end.join();
   EXPECT_EQ(begun, 1);

@@ -7,7 +7,7 @@
 
 namespace vcharge {
 
-/// Summary of a set of errors; all zero when count is 0.
+/// Summary of a set of errors; all zero if count is 0.
 struct ErrorDistribution {
   size_t count = 0;
   double mean = 0.0;
@@ -20,9 +20,10 @@ struct ErrorDistribution {
   double max = 0.0;
 };
 
-/// Percentile p (0 to 100) of a sorted set, linear between ranks. std::logic_error for an empty set.
+/// Percentile p (0 to 100) of a sorted set, interpolated between ranks. std::logic_error for an empty set.
 double percentileOfSorted(const std::vector<double>& sorted, double p);
 ErrorDistribution summarize(std::vector<double> errors);
+/// JSON with the members of ErrorDistribution as keys.
 void to_json(nlohmann::json& json, const ErrorDistribution& distribution);
 
 }  // namespace vcharge

@@ -13,71 +13,66 @@
 
 namespace vcharge {
 
+/// Options of evaluateMap().
 struct MapErrorOptions {
-  double max_edge_error_m = 0.3;           ///< a loop edge that is further off is wrong
-  double max_edge_error_rad = 0.05235988;  ///< and one that is turned by more: 3 degrees
-  double revisit_distance_m = 3.0;  ///< a place is visited again when the vehicle comes this near to it
-  double min_travel_m = 10.0;       ///< after driving on by more than this
-  double opposite_rad = 2.0943951;  ///< headings that differ by more are opposite: 120 degrees
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("max_edge_error_m", max_edge_error_m);
-    visit("max_edge_error_rad", max_edge_error_rad);
-    visit("revisit_distance_m", revisit_distance_m);
-    visit("min_travel_m", min_travel_m);
-    visit("opposite_rad", opposite_rad);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(MapErrorOptions);
+  VCHARGE_OPTION(double, max_edge_error_m, 0.3, positive(), "Error up to which a loop edge is correct.");
+  VCHARGE_OPTION(double, max_edge_error_rad, 0.05235988, positive(), "Rotation error of such an edge.");
+  VCHARGE_OPTION(double, revisit_distance_m, 3.0, positive(),
+                 "Distance within which a position is revisited.");
+  VCHARGE_OPTION(double, opposite_rad, 2.0943951, above(0.0).below(3.14159265358979),
+                 "Difference above which two headings are opposite.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// What is true of one of the map's loop edges.
+/// One of the map's loop edges against the truth.
 struct LoopEdgeJudgement {
-  bool has_truth = false;    ///< at both keyframes; nothing below is meant where it is false
-  bool is_opposite = false;  ///< the true headings
-  double distance_m = 0.0;   ///< between the true places
-  double error_m = 0.0;      ///< of the measured transform against the true one
+  bool has_truth = false;    ///< at both keyframes; otherwise the other members are not set
+  bool is_opposite = false;  ///< whether the true headings are opposite
+  double distance_m = 0.0;   ///< between the true positions
+  double error_m = 0.0;      ///< of the measured transform
   double error_rad = 0.0;
-  bool is_right = false;
+  bool is_right = false;  ///< both errors are within the bounds
 };
 
-/// Keyframes that came to a place again.
+/// Keyframes at a position that was passed before.
 struct RevisitCount {
-  int64_t num_keyframes = 0;
-  int64_t num_found = 0;  ///< of these: the later end of an accepted right edge
+  int num_keyframes = 0;
+  int num_found = 0;  ///< those that are the later end of an accepted correct edge
 
-  double share() const {
+  double fraction() const {
     return num_keyframes == 0 ? 0.0 : static_cast<double>(num_found) / static_cast<double>(num_keyframes);
   }
 };
 
 struct RejectedEdges {
-  int64_t num_edges = 0;
-  int64_t num_right = 0;  ///< the measured transform is right all the same
+  int num_edges = 0;
+  int num_right = 0;  ///< edges whose measured transform is correct
 };
 
 struct MapErrors {
-  TrajectoryErrors keyframes;  ///< aligned over all keyframes by a rigid motion
-  double scale_error = 0.0;    ///< of similarity: 0.01 where the map is 1 % too large
+  TrajectoryErrors keyframes;  ///< aligned over all keyframes by a rigid transform
+  double scale_error = 0.0;    ///< 0.01 if the map is 1 % too large
   RigidTransform truth_from_map;
-  int64_t num_keyframes_without_truth = 0;
+  int num_keyframes_without_truth = 0;
 
   std::vector<LoopEdgeJudgement> edges;  ///< in the map's order
-  int64_t num_accepted = 0;              ///< with truth
-  int64_t num_wrong = 0;                 ///< of these
+  int num_accepted = 0;                  ///< accepted edges with truth
+  int num_wrong = 0;                     ///< accepted edges that are not correct
   ErrorDistribution accepted_m, accepted_rad;
   std::map<std::string, RejectedEdges> rejected;  ///< by reason
 
   std::vector<bool> is_revisit, is_found;  ///< by keyframe
   RevisitCount revisits;                   ///< in any heading
-  /// Places passed before in this heading, that got a right edge of this kind; a keyframe may count in both.
+  /// Keyframes passed before in the same or opposite heading, with an edge of that kind; one may count in
+  /// both.
   RevisitCount same, opposite;
-  /// Places passed before in the opposite heading alone, that got any right edge.
+  /// Keyframes passed before in the opposite heading only, with any correct edge.
   RevisitCount only_opposite;
 };
 
-/// Judges a map's keyframes and loop edges by the true trajectory, which is interpolated to the keyframes'
-/// stamps. InputError when fewer than three keyframes have truth.
+/// Compares a map's keyframes and loop edges with the true trajectory, interpolated to the keyframes' stamps.
+/// InputError if fewer than three keyframes have truth.
 MapErrors evaluateMap(const SparseMap& map, const Trajectory& truth,
                       const MapErrorOptions& options = MapErrorOptions());
 

@@ -15,7 +15,7 @@
 
 namespace vcharge {
 
-/// A solid thing of a simulated scene, in the world frame.
+/// A solid object of a simulated scene, in the world frame.
 struct TruthObstacle {
   std::string kind;
   std::vector<Eigen::Vector2d> footprint_m;  ///< polygon
@@ -31,43 +31,42 @@ struct TruthObstacle {
 /// Distance of a point from a polygon; 0 inside it.
 double distanceToPolygon(const Eigen::Vector2d& point_m, const std::vector<Eigen::Vector2d>& polygon_m);
 
-/// obstacles.yaml of a simulated drive. InputError naming file and key.
+/// Reads obstacles.yaml of a simulated drive. InputError naming file and key.
 std::vector<TruthObstacle> readTruthObstacles(const std::string& path);
-/// movers.yaml of a simulated drive, by stamp; empty when there is no such file.
+/// Reads the moving objects in movers.yaml of a simulated drive, by stamp; empty without such a file.
 std::map<Timestamp, std::vector<TruthObstacle>> readTruthMovers(const std::string& path);
 
 /// Heights of a simulated scene on a grid.
 struct TruthHeights {
-  cv::Mat height_m;  ///< CV_32FC1; NaN where nothing is
+  cv::Mat height_m;  ///< CV_32FC1; NaN without a surface
   Eigen::Vector2d origin_m{0.0, 0.0};
   double cell_size_m = 0.1;
 
-  /// Of an image on the same grid, at the nearest cell; 0 outside.
+  /// Value of an image on the same grid at the nearest cell; 0 outside.
   float at(const cv::Mat& image, const Eigen::Vector2d& point_m) const;
 };
-/// height_map.yaml and the TIFF it names. InputError naming file and key.
+/// Reads height_map.yaml and the TIFF that it names. InputError naming file and key.
 TruthHeights readTruthHeights(const std::string& yaml_path);
 
-/// A surface point that a camera saw, in the world frame.
+/// A surface point visible to a camera, in the world frame.
 struct SeenPoint {
   Eigen::Vector3f world_m;
-  float from_travel_rad =
-      0.0F;  ///< angle to the nearer end of the camera's direction of travel, on the ground
+  float from_travel_rad = 0.0F;  ///< horizontal angle to the line of the camera's travel
 };
 
-/// All points of an image's true ranges, every `step`-th column and row.
+/// Points of every `step`-th column and row of a true range image.
 std::vector<SeenPoint> makeSeenPoints(const cv::Mat& range_m, const RayTable& rays,
                                       const RigidTransform& world_from_camera,
                                       const Eigen::Vector2d& travel_in_world, int step);
 
-/// How many seen points lie in each 10 cm cell of the world.
+/// Number of visible points in each 10 cm cell of the world.
 class SeenCells {
  public:
   static constexpr double kCell_m = 0.1;
   static int64_t keyOf(const Eigen::Vector2d& point_m);
   static Eigen::Vector2d middleOf(int64_t key);
   void add(const Eigen::Vector2d& point_m, int count = 1) { counts_[keyOf(point_m)] += count; }
-  /// In the cell of a point and the eight around it.
+  /// Number of points in the cell of a point and the eight around it.
   int countAround(const Eigen::Vector2d& point_m) const;
   const std::unordered_map<int64_t, int>& counts() const { return counts_; }
 

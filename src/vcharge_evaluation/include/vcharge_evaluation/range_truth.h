@@ -9,13 +9,13 @@
 
 namespace vcharge {
 
-/// Reads FOLDER/<camera>/<stamp_ns>.tiff: metres along the ray of each sensor pixel, NaN where nothing was
-/// hit. CV_32FC1. InputError naming the file; an empty image when there is none for this stamp.
+/// Reads FOLDER/<camera>/<stamp_ns>.tiff: CV_32FC1, metres along the ray of each sensor pixel, NaN without a
+/// surface. An empty image if the file does not exist; InputError naming the file if it is damaged.
 cv::Mat readRangeTruth(const std::string& folder, const std::string& camera_name, Timestamp stamp);
 
-/// Truth at the pixels of a working camera. Inside a surface (the four sensor pixels around agree within 5 %)
-/// inverse range is interpolated, which is exact on planes for a pinhole and nearly so here; at an edge the
-/// nearest pixel decides. NaN where there is none. CV_32FC1 of the working camera's size.
+/// True ranges at the pixels of a working camera: CV_32FC1, NaN without a surface. Inverse range is
+/// interpolated where the four sensor pixels around agree within 5 %, which is exact on planes for a pinhole;
+/// at edges the nearest pixel is taken.
 cv::Mat resampleRangeTruth(const cv::Mat& sensor_range_m, const WorkingCamera& working_camera);
 
 }  // namespace vcharge

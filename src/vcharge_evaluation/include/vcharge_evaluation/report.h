@@ -6,8 +6,11 @@
 
 namespace vcharge {
 
-/// Writes `json` to FOLDER/NAME.json and lets the plotting script draw FOLDER/NAME*.png from it. The folder
-/// is created. InputError when that fails; plots that cannot be drawn (no matplotlib) only warn on stderr.
+/// Writes `json` to FOLDER/NAME.json and lets plot_evaluation draw FOLDER/NAME_*.png from it. The folder is
+/// created. InputError if that fails; plots that cannot be drawn (no matplotlib) only warn on stderr.
 void writeReport(const nlohmann::json& json, const std::string& folder, const std::string& name);
+
+/// Writes `json` to a file, replacing it only when it is complete. InputError if that fails.
+void writeJson(const nlohmann::json& json, const std::string& path);
 
 }  // namespace vcharge

@@ -8,8 +8,8 @@
 namespace vcharge {
 namespace {
 
-constexpr double kHand_m = 0.1;
-constexpr double kOverGround_m = 0.3;  // what is higher is no ground
+constexpr double kMargin_m = 0.1;
+constexpr double kOverGround_m = 0.3;  // higher surfaces are no ground
 
 void judgeFaces(const cv::Mat& states, double cell_size_m, const MapInWorld& in_world,
                 const std::vector<HeightStep>& steps, const IsRigid& is_rigid, DrivabilityErrors* errors) {
@@ -18,8 +18,8 @@ void judgeFaces(const cv::Mat& states, double cell_size_m, const MapInWorld& in_
       continue;
     }
     bool blocked = false, unobserved = false;
-    for (double s = -kHand_m; s <= kHand_m; s += 0.5 * cell_size_m) {
-      const cv::Point at = in_world.cellAt(step.place_m + s * step.direction, step.low_m);
+    for (double s = -kMargin_m; s <= kMargin_m; s += 0.5 * cell_size_m) {
+      const cv::Point at = in_world.cellAt(step.position_m + s * step.direction, step.low_m);
       const auto state = cv::Rect(cv::Point(), states.size()).contains(at)
                              ? static_cast<CellState>(states.at<uint8_t>(at))
                              : CellState::kUnobserved;
@@ -34,10 +34,10 @@ void judgeFaces(const cv::Mat& states, double cell_size_m, const MapInWorld& in_
   }
 }
 
-/// Height of the ground on which the vehicle came nearest to a place.
-double groundNear(const Trajectory& world_from_vehicle, const Eigen::Vector2d& place_m) {
+/// Height of the ground at the vehicle's nearest pose to a point.
+double groundNear(const Trajectory& world_from_vehicle, const Eigen::Vector2d& position_m) {
   const auto distance = [&](const StampedTransform& pose) {
-    return (pose.world_from_vehicle.translation().head<2>() - place_m).squaredNorm();
+    return (pose.world_from_vehicle.translation().head<2>() - position_m).squaredNorm();
   };
   return std::min_element(
              world_from_vehicle.begin(), world_from_vehicle.end(),
@@ -59,8 +59,8 @@ DrivabilityErrors judgeDrivability(const HeightMap& map, const MapInWorld& in_wo
   tbb::parallel_for(0, states.rows, [&](int row) {
     DrivabilityErrors& sum = of_row[static_cast<size_t>(row)];
     for (int column = 0; column < states.cols; ++column) {
-      const Eigen::Vector2d place = in_world.cell(column, row, 0.0).head<2>();
-      const double height = interpolateHeight(truth, place);
+      const Eigen::Vector2d position = in_world.cell(column, row, 0.0).head<2>();
+      const double height = interpolateHeight(truth, position);
       const bool is_drivable = states.at<uint8_t>(row, column) == static_cast<uint8_t>(CellState::kDrivable);
       const bool is_solid = !map.solid.empty() && map.solid.at<uint8_t>(row, column) != 0;
       const bool is_seen = seen.at<uint8_t>(row, column) != 0;
@@ -68,13 +68,14 @@ DrivabilityErrors judgeDrivability(const HeightMap& map, const MapInWorld& in_wo
       if (!std::isfinite(height) || !(is_drivable || is_solid || is_seen)) {
         continue;
       }
-      const double limit_m = groundNear(world_from_vehicle, place) + kOverGround_m;
-      const bool is_open = height < limit_m && spreadAround(truth, place, 2.0 * kHand_m) <= step_m;
+      const double limit_m = groundNear(world_from_vehicle, position) + kOverGround_m;
+      const bool is_open = height < limit_m && spreadAround(truth, position, 2.0 * kMargin_m) <= step_m;
       sum.num_solid_on_ground += is_solid && is_open ? 1 : 0;
       sum.num_open_ground += is_seen && is_open ? 1 : 0;
       sum.num_open_drivable += is_seen && is_open && is_drivable ? 1 : 0;
       sum.num_drivable += is_drivable ? 1 : 0;
-      sum.num_drivable_inside += is_drivable && extentAround(truth, place, kHand_m).low > limit_m ? 1 : 0;
+      sum.num_drivable_inside +=
+          is_drivable && extentAround(truth, position, kMargin_m).low > limit_m ? 1 : 0;
     }
   });
   for (const DrivabilityErrors& row : of_row) {

@@ -8,9 +8,8 @@
 
 namespace vcharge {
 
-/// What a planner makes of a map, with the default DrivabilityOptions: of the faces of high things, of what
-/// is inside of them, and of open ground. `seen`: CV_8UC1 of the map's cells, not 0 where the true surface
-/// is.
+/// Errors of the drivable grid of a map with the default DrivabilityOptions. `seen`: CV_8UC1 of the map's
+/// size, not 0 where the true surface is visible.
 DrivabilityErrors judgeDrivability(const HeightMap& map, const MapInWorld& in_world, const HeightMap& truth,
                                    const Trajectory& world_from_vehicle, const cv::Mat& seen,
                                    const std::vector<HeightStep>& steps, const IsRigid& is_rigid,

@@ -18,19 +18,24 @@
 namespace vcharge {
 namespace {
 
-constexpr double kLever_m = 5.0;           // of the points by which poses are laid over each other
-constexpr double kAboveSurface_m = 0.005;  // of the point that is looked for
-constexpr double kBeforeFoot_m = 0.05;     // where the foot of a face is looked for
+constexpr double kLever_m = 5.0;           // distance of the points by which two poses are aligned
+constexpr double kAboveSurface_m = 0.005;  // height over the surface of the point whose visibility is tested
+constexpr double kBeforeFoot_m = 0.05;     // distance from a face at which its foot's visibility is tested
+constexpr double kSearch_m = 0.4;          // distance within which a step is searched in the map
+constexpr double kKerbLow_m = 0.1;         // heights of steps that are kerbs
+constexpr double kKerbHigh_m = 0.14;
 constexpr double kFromPlants_m = 0.3;
-constexpr double kCrownReach_m = 3.5;   // leaves of a tree, from its stem
-constexpr double kUnderCrowns_m = 0.3;  // up to here above its foot there are none
+constexpr double kCrownReach_m = 3.5;   // of a tree's leaves from its stem
+constexpr double kUnderCrowns_m = 0.3;  // height above its foot up to which there are no leaves
 constexpr double kOnFootprint_m = 0.1;
 constexpr double kKerbTolerance_m = 0.03;
 constexpr double kOverGrass_m = 0.4;
 constexpr double kNotMapped = std::numeric_limits<double>::quiet_NaN();
+// A surface is judged if it is visible in so many frames, 0.3 m apart.
+constexpr int kMinViews = 3;
 
-/// Errors of all cells that are seen, apart from steps. Row by row, so that threads change nothing. CV_8UC1:
-/// which are.
+/// Errors of all visible cells away from steps, summed row by row for determinism. Returns a mask (CV_8UC1)
+/// of these cells.
 cv::Mat judgeCells(const HeightMap& map, const MapInWorld& in_world, const HeightMap& truth, double ground_m,
                    const SurfaceVisibility& visibility, const HeightMapErrorOptions& options,
                    HeightMapErrors* errors) {
@@ -42,8 +47,7 @@ cv::Mat judgeCells(const HeightMap& map, const MapInWorld& in_world, const Heigh
       const double height = interpolateHeight(truth, cell.head<2>());
       if (!std::isfinite(height) ||
           !(spreadAround(truth, cell.head<2>(), map.cell_size_m) <= options.step_m) ||
-          visibility.countViews({cell.x(), cell.y(), height + kAboveSurface_m}, options.min_views) <
-              options.min_views) {
+          visibility.countViews({cell.x(), cell.y(), height + kAboveSurface_m}, kMinViews) < kMinViews) {
         continue;
       }
       seen.at<uint8_t>(row, column) = 1;
@@ -69,43 +73,42 @@ cv::Mat judgeCells(const HeightMap& map, const MapInWorld& in_world, const Heigh
   errors->num_mapped = absolute.size();
   if (!absolute.empty()) {
     errors->mean_signed_m = sum / static_cast<double>(absolute.size());
-    errors->share_within_10_cm = static_cast<double>(within) / static_cast<double>(absolute.size());
+    errors->fraction_within_10_cm = static_cast<double>(within) / static_cast<double>(absolute.size());
   }
   errors->height_m = summarize(std::move(absolute));
   return seen;
 }
 
-/// Whether the map has heights on both sides.
-bool isMapped(const MapInWorld& in_world, const HeightStep& step, double beside_m) {
-  const Eigen::Vector2d beside = beside_m * step.direction;
-  return std::isfinite(in_world.heightAt(step.place_m - beside, step.low_m)) &&
-         std::isfinite(in_world.heightAt(step.place_m + beside, step.low_m));
+/// Whether the map has heights on both sides of a step.
+bool isMapped(const MapInWorld& in_world, const HeightStep& step) {
+  const Eigen::Vector2d beside = kPlateau_m * step.direction;
+  return std::isfinite(in_world.heightAt(step.position_m - beside, step.low_m)) &&
+         std::isfinite(in_world.heightAt(step.position_m + beside, step.low_m));
 }
 
-bool isKerb(const HeightStep& step, const HeightMapErrorOptions& options) {
+bool isKerb(const HeightStep& step) {
   const double rise = step.high_m - step.low_m;
-  return step.both_sides_seen && rise >= options.kerb_low_m && rise <= options.kerb_high_m;
+  return step.both_sides_seen && rise >= kKerbLow_m && rise <= kKerbHigh_m;
 }
 
 void judgeSteps(const MapInWorld& in_world, const SurfaceVisibility& visibility,
-                const std::vector<HeightStep>& steps, const HeightMapErrorOptions& options,
-                HeightMapErrors* errors) {
+                const std::vector<HeightStep>& steps, HeightMapErrors* errors) {
   std::vector<double> positions, kerbs;
   for (const HeightStep& step : steps) {
-    const Eigen::Vector2d beside = options.plateau_m * step.direction;
-    const double low = in_world.heightAt(step.place_m - beside, step.low_m);
-    const double high = in_world.heightAt(step.place_m + beside, step.low_m);
-    const auto crossing = findCrossing(in_world.heightsOver(step), step.place_m, step.direction,
-                                       -options.search_m, options.search_m, step.low_m + stepLevel(step));
+    const Eigen::Vector2d beside = kPlateau_m * step.direction;
+    const double low = in_world.heightAt(step.position_m - beside, step.low_m);
+    const double high = in_world.heightAt(step.position_m + beside, step.low_m);
+    const auto crossing = findCrossing(in_world.heightsOver(step), step.position_m, step.direction,
+                                       -kSearch_m, kSearch_m, step.low_m + stepLevel(step));
     if (crossing) {
       ++errors->num_steps_found;
       positions.push_back(std::abs(*crossing));
     }
-    if (isKerb(step, options) && std::isfinite(high - low)) {
+    if (isKerb(step) && std::isfinite(high - low)) {
       const double error = high - low - (step.high_m - step.low_m);
-      const Eigen::Vector2d top = step.place_m + beside;
-      errors->kerbs.push_back(
-          {step.place_m, error, visibility.nearestView({top.x(), top.y(), step.high_m + kAboveSurface_m})});
+      const Eigen::Vector2d top = step.position_m + beside;
+      errors->kerbs.push_back({step.position_m, error,
+                               visibility.nearestView({top.x(), top.y(), step.high_m + kAboveSurface_m})});
       kerbs.push_back(std::abs(error));
     }
   }
@@ -113,39 +116,37 @@ void judgeSteps(const MapInWorld& in_world, const SurfaceVisibility& visibility,
   errors->kerb_height_m = summarize(std::move(kerbs));
 }
 
-/// Where the map's ground, which is below a level, ends along a line, if it ends near 0 and no ground is
-/// mapped for a hand beyond: behind the face of a wall or a pillar no camera sees free space, so that the map
-/// has no height there. What is mapped above the level, as the roof of a car behind cells of its side without
-/// a height, is no ground.
+/// Distance along a line at which the map's ground ends, if no ground is mapped for 0.1 m beyond. Behind the
+/// face of a wall or pillar the map has no height, as no camera sees it. Heights above the level are no
+/// ground, such as the roof of a car behind a side without heights.
 std::optional<double> findEnd(const HeightAt& height, const Eigen::Vector2d& start_m,
-                              const Eigen::Vector2d& direction, double search_m, double level_m,
-                              double cell_size_m) {
-  constexpr double kSample_m = 0.01, kHand_m = 0.1;
+                              const Eigen::Vector2d& direction, double level_m, double cell_size_m) {
+  constexpr double kSample_m = 0.01, kBeyond_m = 0.1;
   std::optional<double> end;
-  for (double s = -search_m; s <= search_m + kHand_m; s += kSample_m) {
+  for (double s = -kSearch_m; s <= kSearch_m + kBeyond_m; s += kSample_m) {
     if (height(start_m + s * direction) < level_m) {  // false for NaN
       end = s;
     }
   }
   // Heights are interpolated up to the middle of the last cell.
-  return end && *end <= search_m ? std::optional<double>(*end + 0.5 * cell_size_m) : std::nullopt;
+  return end && *end <= kSearch_m ? std::optional<double>(*end + 0.5 * cell_size_m) : std::nullopt;
 }
 
-/// The edge near a true one as somebody reads it from the map, where it rises or else ends: the middle one of
-/// five lines.
-double readEdge(const MapInWorld& in_world, const HeightStep& step, double search_m, double cell_size_m) {
+/// Distance of an edge in the map from the true one, where the map rises or ends: the median of five lines.
+/// NaN if at most two lines show it.
+double readEdge(const MapInWorld& in_world, const HeightStep& step, double cell_size_m) {
   const Eigen::Vector2d across(-step.direction.y(), step.direction.x());
-  const HeightAt interpolated = [&](const Eigen::Vector2d& place_m) {
-    return in_world.heightAt(place_m, step.low_m);
+  const HeightAt interpolated = [&](const Eigen::Vector2d& position_m) {
+    return in_world.heightAt(position_m, step.low_m);
   };
   const double level_m = step.low_m + stepLevel(step);
   std::vector<double> crossings;
   for (const double aside : {-0.1, -0.05, 0.0, 0.05, 0.1}) {
-    const Eigen::Vector2d start = step.place_m + aside * across;
+    const Eigen::Vector2d start = step.position_m + aside * across;
     std::optional<double> crossing =
-        findCrossing(in_world.heightsOver(step), start, step.direction, -search_m, search_m, level_m);
+        findCrossing(in_world.heightsOver(step), start, step.direction, -kSearch_m, kSearch_m, level_m);
     if (!crossing) {
-      crossing = findEnd(interpolated, start, step.direction, search_m, level_m, cell_size_m);
+      crossing = findEnd(interpolated, start, step.direction, level_m, cell_size_m);
     }
     if (crossing) {
       crossings.push_back(*crossing);
@@ -154,13 +155,13 @@ double readEdge(const MapInWorld& in_world, const HeightStep& step, double searc
   return crossings.size() < 3 ? kNotMapped : quantile(crossings, 0.5);
 }
 
-const HeightStep& stepAt(const std::vector<HeightStep>& steps, const Eigen::Vector2d& place_m) {
+const HeightStep& stepAt(const std::vector<HeightStep>& steps, const Eigen::Vector2d& position_m) {
   return *std::find_if(steps.begin(), steps.end(),
-                       [&](const HeightStep& step) { return step.place_m == place_m; });
+                       [&](const HeightStep& step) { return step.position_m == position_m; });
 }
 
 void measure(const MapInWorld& in_world, double cell_size_m, const std::vector<HeightStep>& steps,
-             const HeightMapErrorOptions& options, HeightMapErrors* errors) {
+             HeightMapErrors* errors) {
   double sum = 0.0;
   size_t shown = 0;
   for (TapeMeasurement& measurement : errors->measurements) {
@@ -169,10 +170,8 @@ void measure(const MapInWorld& in_world, double cell_size_m, const std::vector<H
           in_world.heightAt(measurement.to_m, 0.0) - in_world.heightAt(measurement.from_m, 0.0);
     } else {
       const HeightStep &a = stepAt(steps, measurement.from_m), &b = stepAt(steps, measurement.to_m);
-      const Eigen::Vector2d from =
-          a.place_m + readEdge(in_world, a, options.search_m, cell_size_m) * a.direction;
-      const Eigen::Vector2d to =
-          b.place_m + readEdge(in_world, b, options.search_m, cell_size_m) * b.direction;
+      const Eigen::Vector2d from = a.position_m + readEdge(in_world, a, cell_size_m) * a.direction;
+      const Eigen::Vector2d to = b.position_m + readEdge(in_world, b, cell_size_m) * b.direction;
       measurement.map_m = (to - from).norm();
     }
     const double error = std::abs(measurement.map_m - measurement.truth_m);
@@ -189,39 +188,25 @@ void measure(const MapInWorld& in_world, double cell_size_m, const std::vector<H
 
 }  // namespace
 
-void HeightMapErrorOptions::validate() const {
-  requireField(view_distance_m > 0.0, "view_distance_m", "must be positive", view_distance_m);
-  requireField(max_view_range_m > 0.0, "max_view_range_m", "must be positive", max_view_range_m);
-  requireField(min_views > 0, "min_views", "must be positive", min_views);
-  requireField(step_m > 0.0, "step_m", "must be positive", step_m);
-  requireField(kerb_low_m > 0.0, "kerb_low_m", "must be positive", kerb_low_m);
-  requireField(kerb_high_m > kerb_low_m, "kerb_high_m", "must be above kerb_low_m", kerb_high_m);
-  requireField(search_m > 0.0, "search_m", "must be positive", search_m);
-  requireField(plateau_m > 0.0, "plateau_m", "must be positive", plateau_m);
-  requireField(num_measurements >= 0, "num_measurements", "must not be negative", num_measurements);
-  requireField(min_length_m > 0.0, "min_length_m", "must be positive", min_length_m);
-  requireField(max_length_m > min_length_m, "max_length_m", "must be above min_length_m", max_length_m);
-}
-
 IsRigid rigidBy(const std::vector<TruthObstacle>& obstacles) {
   const auto isPlant = [](const TruthObstacle& obstacle) {
     return obstacle.kind == "tree" || obstacle.kind == "bush" || obstacle.kind == "hedge";
   };
-  return [obstacles, isPlant](const Eigen::Vector2d& place_m, double high_m) {
-    const bool is_on_thing =
+  return [obstacles, isPlant](const Eigen::Vector2d& position_m, double high_m) {
+    const bool is_on_object =
         std::any_of(obstacles.begin(), obstacles.end(), [&](const TruthObstacle& obstacle) {
           return !isPlant(obstacle) && obstacle.kind != "kerb" &&
-                 distanceToPolygon(place_m, obstacle.footprint_m) < kOnFootprint_m;
+                 distanceToPolygon(position_m, obstacle.footprint_m) < kOnFootprint_m;
         });
     return std::all_of(obstacles.begin(), obstacles.end(), [&](const TruthObstacle& obstacle) {
-      const double distance = distanceToPolygon(place_m, obstacle.footprint_m);
+      const double distance = distanceToPolygon(position_m, obstacle.footprint_m);
       if (isPlant(obstacle)) {
-        // The footprint is the stem's: leaves hang over what is around it.
-        const bool is_crown = obstacle.kind == "tree" && !is_on_thing && distance < kCrownReach_m &&
+        // The footprint is that of the stem; leaves hang over its surroundings.
+        const bool is_crown = obstacle.kind == "tree" && !is_on_object && distance < kCrownReach_m &&
                               high_m > obstacle.base_z_m + kUnderCrowns_m;
         return distance > kFromPlants_m && !is_crown;
       }
-      // What is lower or a little higher than a kerb, on its island, is grass.
+      // A surface on a kerb's island that is lower or a little higher than the kerb is grass.
       const double over_kerb = high_m - obstacle.top_z_m;
       return obstacle.kind != "kerb" || distance > 0.0 || std::abs(over_kerb) < kKerbTolerance_m ||
              over_kerb > kOverGrass_m;
@@ -232,8 +217,8 @@ IsRigid rigidBy(const std::vector<TruthObstacle>& obstacles) {
 RigidTransform alignToTruth(const Trajectory& estimate, const Trajectory& truth) {
   const AssociatedTrajectories pairs = associateWithTruth(estimate, truth);
   if (pairs.estimate.size() < 2) {
-    throw InputError("the trajectory and the true one share " + std::to_string(pairs.estimate.size()) +
-                     " stamps, expected at least 2");
+    throw InputError("the trajectory and the true one have " + std::to_string(pairs.estimate.size()) +
+                     " common stamps, expected at least 2");
   }
   std::vector<Eigen::Vector3d> from, to;
   for (size_t i = 0; i < pairs.estimate.size(); ++i) {
@@ -253,38 +238,36 @@ HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& wo
   options.validate();
   check(rig.hasExtrinsics(), "evaluateHeightMap: expected vehicle_from_camera of every camera");
   check(!world_from_vehicle.empty(), "evaluateHeightMap: expected poses");
-  const SurfaceVisibility visibility(truth, world_from_vehicle, rig, options.view_distance_m,
-                                     options.max_view_range_m);
+  const SurfaceVisibility visibility(truth, world_from_vehicle, rig, options.max_view_range_m);
   const MapInWorld in_world(map, world_from_map);
   HeightMapErrors errors;
   const double ground_m =
       (world_from_map.inverse() * world_from_vehicle.front().world_from_vehicle.translation()).z();
   const cv::Mat seen = judgeCells(map, in_world, truth, ground_m, visibility, options, &errors);
-  std::vector<HeightStep> steps = findHeightSteps(truth, options, [&](const Eigen::Vector2d& place_m) {
-    const double height = interpolateHeight(truth, place_m);
+  std::vector<HeightStep> steps = findHeightSteps(truth, options, [&](const Eigen::Vector2d& position_m) {
+    const double height = interpolateHeight(truth, position_m);
     return std::isfinite(height) &&
-           visibility.countViews({place_m.x(), place_m.y(), height + kAboveSurface_m}, options.min_views) >=
-               options.min_views;
+           visibility.countViews({position_m.x(), position_m.y(), height + kAboveSurface_m}, kMinViews) >=
+               kMinViews;
   });
   for (HeightStep& step : steps) {
-    const Eigen::Vector2d foot = step.place_m - kBeforeFoot_m * step.direction;
-    step.foot_seen = visibility.countFaceViews({foot.x(), foot.y(), step.low_m + kAboveSurface_m},
-                                               {-step.direction.x(), -step.direction.y(), 0.0},
-                                               options.min_views) >= options.min_views;
+    const Eigen::Vector2d foot = step.position_m - kBeforeFoot_m * step.direction;
+    step.foot_seen =
+        visibility.countFaceViews({foot.x(), foot.y(), step.low_m + kAboveSurface_m},
+                                  {-step.direction.x(), -step.direction.y(), 0.0}, kMinViews) >= kMinViews;
   }
   errors.num_steps = steps.size();
-  errors.num_kerbs_seen = static_cast<size_t>(std::count_if(
-      steps.begin(), steps.end(), [&](const HeightStep& step) { return isKerb(step, options); }));
+  errors.num_kerbs_seen = static_cast<size_t>(
+      std::count_if(steps.begin(), steps.end(), [&](const HeightStep& step) { return isKerb(step); }));
   errors.drivability =
       judgeDrivability(map, in_world, truth, world_from_vehicle, seen, steps, is_rigid, options.step_m);
   errors.measurements = pickMeasurements(truth, steps, is_rigid, options);
-  measure(in_world, map.cell_size_m, steps, options, &errors);
-  steps.erase(
-      std::remove_if(steps.begin(), steps.end(),
-                     [&](const HeightStep& step) { return !isMapped(in_world, step, options.plateau_m); }),
-      steps.end());
+  measure(in_world, map.cell_size_m, steps, &errors);
+  steps.erase(std::remove_if(steps.begin(), steps.end(),
+                             [&](const HeightStep& step) { return !isMapped(in_world, step); }),
+              steps.end());
   errors.num_steps_mapped = steps.size();
-  judgeSteps(in_world, visibility, steps, options, &errors);
+  judgeSteps(in_world, visibility, steps, &errors);
   return errors;
 }
 

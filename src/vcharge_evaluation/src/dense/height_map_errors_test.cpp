@@ -11,24 +11,39 @@ namespace vcharge {
 namespace {
 
 constexpr double kKerb_m = 0.12;
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-/// Ground with a platform of a kerb's height from x = 3 to 4 m, and a wall of 2 m from y = 2.5 m on.
+/// Sets the height of the cells whose centres meet a condition.
+template <class Condition>
+void setHeights(HeightMap* map, float height_m, const Condition& isChosen) {
+  for (int row = 0; row < map->height_m.rows; ++row) {
+    for (int column = 0; column < map->height_m.cols; ++column) {
+      if (isChosen(map->centreOf(column, row))) {
+        map->height_m.at<float>(row, column) = height_m;
+      }
+    }
+  }
+}
+
+/// Ground with a platform as high as a kerb from x = 3 to 4 m, and a wall of 2 m from y = 2.5 m on.
 HeightMap world(double cell_size_m) {
   HeightMap map;
   map.frame_id = "world";
   map.cell_size_m = cell_size_m;
   map.origin_m = {-2.0 + 0.5 * cell_size_m, -3.0 + 0.5 * cell_size_m};
-  map.height_m.create(static_cast<int>(std::lround(6.0 / cell_size_m)),
-                      static_cast<int>(std::lround(10.0 / cell_size_m)), CV_32FC1);
-  for (int row = 0; row < map.height_m.rows; ++row) {
-    for (int column = 0; column < map.height_m.cols; ++column) {
-      const Eigen::Vector2d place = map.centreOf(column, row);
-      const bool on_platform = place.x() > 3.0 && place.x() < 4.0;
-      map.height_m.at<float>(row, column) = static_cast<float>(place.y() > 2.5 ? 2.0
-                                                               : on_platform   ? kKerb_m
-                                                                               : 0.0);
-    }
-  }
+  map.height_m = cv::Mat(static_cast<int>(std::lround(6.0 / cell_size_m)),
+                         static_cast<int>(std::lround(10.0 / cell_size_m)), CV_32FC1, cv::Scalar(0.0));
+  setHeights(&map, kKerb_m, [](const Eigen::Vector2d& at) { return at.x() > 3.0 && at.x() < 4.0; });
+  setHeights(&map, 2.0F, [](const Eigen::Vector2d& at) { return at.y() > 2.5; });
+  return map;
+}
+
+/// The same with a pillar of 0.4 m at (x_m, -1.4).
+HeightMap worldWithPillar(double cell_size_m, double x_m) {
+  HeightMap map = world(cell_size_m);
+  setHeights(&map, 2.0F, [&](const Eigen::Vector2d& at) {
+    return std::abs(at.x() - x_m) < 0.2 && std::abs(at.y() + 1.4) < 0.2;
+  });
   return map;
 }
 
@@ -58,7 +73,7 @@ class HeightMapErrorsTest : public ::testing::Test {
   const IsRigid everything_rigid_ = rigidBy({});
 };
 
-TEST_F(HeightMapErrorsTest, ThereAreNoneOfThePerfectMap) {
+TEST_F(HeightMapErrorsTest, PerfectMapHasNoErrors) {
   const HeightMapErrors errors = evaluate(world(0.05));
   EXPECT_GT(errors.num_seen, 10000U);
   EXPECT_EQ(errors.num_mapped, errors.num_seen);
@@ -74,17 +89,17 @@ TEST_F(HeightMapErrorsTest, ThereAreNoneOfThePerfectMap) {
   EXPECT_LT(errors.max_measurement_m, 0.051);
 }
 
-TEST_F(HeightMapErrorsTest, TellsAMapThatIsTooHigh) {
+TEST_F(HeightMapErrorsTest, MapThatIsTooHighHasThatError) {
   HeightMap map = world(0.05);
   map.height_m += 0.07F;
   const HeightMapErrors errors = evaluate(map);
   EXPECT_NEAR(errors.height_m.mean, 0.07, 1e-5);
   EXPECT_NEAR(errors.mean_signed_m, 0.07, 1e-5);
-  EXPECT_EQ(errors.share_within_10_cm, 1.0);
-  EXPECT_LT(errors.kerb_height_m.max, 1e-5);  // heights of steps stay
+  EXPECT_EQ(errors.fraction_within_10_cm, 1.0);
+  EXPECT_LT(errors.kerb_height_m.max, 1e-5);  // heights of steps are unchanged
 }
 
-TEST_F(HeightMapErrorsTest, TellsStepsThatAreAside) {
+TEST_F(HeightMapErrorsTest, ShiftedStepsHaveThatError) {
   HeightMap map = world(0.05);
   map.origin_m.x() += 0.1;
   const HeightMapErrors errors = evaluate(map);
@@ -94,20 +109,17 @@ TEST_F(HeightMapErrorsTest, TellsStepsThatAreAside) {
   }
   EXPECT_GT(kerbs, 0.0);
   EXPECT_NEAR(errors.step_position_m.max, 0.1, 0.026);
-  EXPECT_GT(errors.step_position_m.mean, 0.03);  // of all, the wall's lie right
+  EXPECT_GT(errors.step_position_m.mean, 0.03);  // the steps of the wall are not shifted
 }
 
-TEST_F(HeightMapErrorsTest, EdgesAreWhereTheGroundEndsNotWhatIsMappedBehindAGap) {
-  // The platform's outermost cells have no height, nor has its middle: what lies between has its own ends.
+TEST_F(HeightMapErrorsTest, EdgesAreAtTheEndOfTheGroundNotBehindAGap) {
+  // The outermost cells and the middle of the platform have no height, so that the cells between have ends
+  // too.
   HeightMap map = world(0.05);
-  for (int row = 0; row < map.height_m.rows; ++row) {
-    for (int column = 0; column < map.height_m.cols; ++column) {
-      const double inside_m = 0.5 - std::abs(map.centreOf(column, row).x() - 3.5);
-      if (inside_m > 0.0 && (inside_m < 0.05 || inside_m > 0.35)) {
-        map.height_m.at<float>(row, column) = std::numeric_limits<float>::quiet_NaN();
-      }
-    }
-  }
+  setHeights(&map, kNan, [](const Eigen::Vector2d& at) {
+    const double inside_m = 0.5 - std::abs(at.x() - 3.5);
+    return inside_m > 0.0 && (inside_m < 0.05 || inside_m > 0.35);
+  });
   int num_lengths = 0;
   for (const TapeMeasurement& measurement : evaluate(map).measurements) {
     if (measurement.kind == TapeMeasurement::Kind::kLength) {
@@ -118,57 +130,46 @@ TEST_F(HeightMapErrorsTest, EdgesAreWhereTheGroundEndsNotWhatIsMappedBehindAGap)
   EXPECT_GT(num_lengths, 0);
 }
 
-TEST_F(HeightMapErrorsTest, HighEdgesAreNotReadBeforeTheCellThatRises) {
-  // A pillar whose faces lie wherever they may in the map's cells, of which the truth's are a fifth.
+TEST_F(HeightMapErrorsTest, HighEdgesAreNotReadInFrontOfTheFirstHighCell) {
+  // A pillar with faces at varying positions within the map's cells; the truth's cells are a fifth as large.
   for (const double offset_m : {0.0, 0.01, 0.02, 0.03, 0.04}) {
-    const auto withPillar = [&](double cell_size_m) {
-      HeightMap map = world(cell_size_m);
-      for (int row = 0; row < map.height_m.rows; ++row) {
-        for (int column = 0; column < map.height_m.cols; ++column) {
-          const Eigen::Vector2d place = map.centreOf(column, row);
-          if (std::abs(place.x() - 1.0 - offset_m) < 0.2 && std::abs(place.y() + 1.4) < 0.2) {
-            map.height_m.at<float>(row, column) = 2.0F;
-          }
-        }
-      }
-      return map;
-    };
-    const HeightMapErrors errors = evaluateHeightMap(withPillar(0.05), RigidTransform(), withPillar(0.01),
-                                                     poses_, rig_, everything_rigid_);
-    EXPECT_LT(errors.step_position_m.max, 0.036) << offset_m;  // half a cell, and a sample
+    const HeightMapErrors errors =
+        evaluateHeightMap(worldWithPillar(0.05, 1.0 + offset_m), RigidTransform(),
+                          worldWithPillar(0.01, 1.0 + offset_m), poses_, rig_, everything_rigid_);
+    EXPECT_LT(errors.step_position_m.max, 0.036) << offset_m;  // half a cell and a sample
     EXPECT_GT(errors.step_position_m.count, 50U);
   }
 }
 
-TEST_F(HeightMapErrorsTest, TellsWhetherThePlannerSeesTheWall) {
+TEST_F(HeightMapErrorsTest, DrivableGridIsJudgedAtTheWall) {
   const HeightMapErrors perfect = evaluate(world(0.05));
   EXPECT_GT(perfect.drivability.num_faces, 50U);
   EXPECT_EQ(perfect.drivability.num_faces_blocked, perfect.drivability.num_faces);
   EXPECT_EQ(perfect.drivability.num_solid, 0U);
-  // The wall has no height: unobserved, until its face is solid. (Nor has the map the platform beside it.)
+  // Without a height the wall is unobserved until it is solid. The platform is removed as well.
   HeightMap map = world(0.05);
   const cv::Mat is_wall = map.height_m > 1.0F;
   map.height_m.setTo(0.0F);
-  map.height_m.setTo(std::numeric_limits<float>::quiet_NaN(), is_wall);
+  map.height_m.setTo(kNan, is_wall);
   HeightMapErrors errors = evaluate(map);
   EXPECT_EQ(errors.drivability.num_faces, perfect.drivability.num_faces);
   EXPECT_EQ(errors.drivability.num_faces_blocked, 0U);
   EXPECT_EQ(errors.drivability.open_faces.size(), 0U);
   map.solid = is_wall.clone();
   map.solid.at<uint8_t>(20, 20) = 1;  // open ground
-  map.height_m.at<float>(20, 20) = std::numeric_limits<float>::quiet_NaN();
+  map.height_m.at<float>(20, 20) = kNan;
   errors = evaluate(map);
   EXPECT_EQ(errors.drivability.num_faces_blocked, perfect.drivability.num_faces);
   EXPECT_EQ(errors.drivability.num_solid, static_cast<size_t>(cv::countNonZero(is_wall)) + 1);
   EXPECT_EQ(errors.drivability.num_solid_on_ground, 1U);
-  // A map that shows ground in the wall's place would be driven through.
+  // A map with ground instead of the wall has open faces.
   map.solid = cv::Mat();
   map.height_m.setTo(0.0F);
   EXPECT_EQ(evaluate(map).drivability.open_faces.size(), perfect.drivability.num_faces);
 }
 
-TEST_F(HeightMapErrorsTest, LaysAMapOfAnotherFrameOverTheTruth) {
-  // The map's frame is turned by 180 degrees, which keeps its cells on the grid, and lies elsewhere.
+TEST_F(HeightMapErrorsTest, MapOfAnotherFrameIsAligned) {
+  // The map's frame is shifted and turned by 180 degrees, which keeps its cells on the grid.
   const RigidTransform world_from_map(rotationFromYawPitchRoll(M_PI, 0.0, 0.0),
                                       Eigen::Vector3d(7.0, 1.0, 0.3));
   HeightMap map = world(0.05);
@@ -190,7 +191,7 @@ TEST_F(HeightMapErrorsTest, LaysAMapOfAnotherFrameOverTheTruth) {
 
 TEST_F(HeightMapErrorsTest, UnmappedCellsAreCountedAndNotJudged) {
   HeightMap map = world(0.05);
-  map.height_m.colRange(0, 100).setTo(std::numeric_limits<float>::quiet_NaN());
+  map.height_m.colRange(0, 100).setTo(kNan);
   const HeightMapErrors errors = evaluate(map);
   EXPECT_LT(errors.num_mapped, errors.num_seen);
   EXPECT_GT(errors.num_mapped, 1000U);
@@ -198,20 +199,20 @@ TEST_F(HeightMapErrorsTest, UnmappedCellsAreCountedAndNotJudged) {
   EXPECT_LT(errors.num_steps_mapped, errors.num_steps);
 }
 
-TEST_F(HeightMapErrorsTest, TellsHowFarTheKerbsWereSeen) {
+TEST_F(HeightMapErrorsTest, DistanceOfTheNearestViewOfAKerbIsGiven) {
   const HeightMapErrors errors = evaluate(world(0.05));
   for (const KerbError& kerb : errors.kerbs) {
-    // The path runs along y = 0 from x = -1 to 3.4 m, 1 m up; each camera looks down on all sides of it.
-    const double beside = std::hypot(kerb.place_m.y(), 1.0 - kKerb_m);
+    // The cameras move along y = 0 from x = -1 to 3.4 m, 1 m above the ground, and see both sides.
+    const double beside = std::hypot(kerb.position_m.y(), 1.0 - kKerb_m);
     EXPECT_GT(kerb.nearest_view_m, beside - 1e-6);
     EXPECT_LT(kerb.nearest_view_m, beside + 1.5);
   }
 }
 
-TEST_F(HeightMapErrorsTest, TapeMeasurementsAreTheSameWhateverTheMapShows) {
+TEST_F(HeightMapErrorsTest, TapeMeasurementsDoNotDependOnTheMap) {
   const HeightMapErrors perfect = evaluate(world(0.05));
   HeightMap map = world(0.05);
-  map.height_m.colRange(50, 120).setTo(std::numeric_limits<float>::quiet_NaN());
+  map.height_m.colRange(50, 120).setTo(kNan);
   const HeightMapErrors errors = evaluate(map);
   ASSERT_EQ(errors.measurements.size(), perfect.measurements.size());
   for (size_t i = 0; i < errors.measurements.size(); ++i) {
@@ -222,7 +223,7 @@ TEST_F(HeightMapErrorsTest, TapeMeasurementsAreTheSameWhateverTheMapShows) {
   EXPECT_LT(errors.max_measurement_m, 0.051);
 }
 
-TEST_F(HeightMapErrorsTest, NoTapeIsHeldToPlantsOrToGrassOnAnIsland) {
+TEST_F(HeightMapErrorsTest, PlantsAndGrassOnAnIslandAreNotRigid) {
   const auto rectangle = [](double x0, double y0, double x1, double y1) {
     return std::vector<Eigen::Vector2d>{{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}};
   };
@@ -233,43 +234,34 @@ TEST_F(HeightMapErrorsTest, NoTapeIsHeldToPlantsOrToGrassOnAnIsland) {
   EXPECT_TRUE(is_rigid({0.05, 1.0}, kKerb_m + 0.01));
   EXPECT_FALSE(is_rigid({2.0, 1.0}, 0.25));  // grass
   EXPECT_FALSE(is_rigid({2.0, 3.2}, 1.0));
-  EXPECT_FALSE(is_rigid({0.8, 3.2}, kKerb_m));  // leaves hang over
+  EXPECT_FALSE(is_rigid({0.8, 3.2}, kKerb_m));  // overhanging leaves
   EXPECT_TRUE(is_rigid({10.05, 1.0}, 0.9));
   EXPECT_TRUE(is_rigid({20.0, 1.0}, 2.0));   // a wall
-  EXPECT_FALSE(is_rigid({14.0, 6.0}, 2.5));  // a crown, of which the scene lists the stem alone
+  EXPECT_FALSE(is_rigid({14.0, 6.0}, 2.5));  // in the crown of the tree, whose footprint is the stem
   EXPECT_TRUE(is_rigid({14.0, 6.0}, 0.2));   // below it
   EXPECT_TRUE(is_rigid({12.0, 1.95}, 1.4));  // the car under it
   EXPECT_TRUE(is_rigid({16.0, 6.0}, 2.5));   // beside it
 
-  // Of the platform, half is a hedge's.
+  // Half of the platform belongs to a hedge.
   const HeightMapErrors errors =
       evaluateHeightMap(world(0.05), RigidTransform(), world(0.025), poses_, rig_,
                         rigidBy({{"hedge", rectangle(3, 0, 4, 2.4), 0.0, kKerb_m}}));
-  EXPECT_GT(errors.measurements.size(), 8U);  // in half the place there is no room for 20
+  EXPECT_GT(errors.measurements.size(), 8U);  // half of the scene has no room for 20
   for (const TapeMeasurement& measurement : errors.measurements) {
     EXPECT_TRUE(measurement.from_m.y() < 0.0 || measurement.from_m.y() > 2.3)
         << measurement.from_m.transpose();
   }
 }
 
-TEST_F(HeightMapErrorsTest, NoTapeIsHeldToTheBackOfAThingThatNobodySees) {
-  // A pillar beside the path, which runs along y = 0: the cameras see the ground behind it aslant, and its
-  // back never.
-  HeightMap truth = world(0.025);
-  for (int row = 0; row < truth.height_m.rows; ++row) {
-    for (int column = 0; column < truth.height_m.cols; ++column) {
-      const Eigen::Vector2d place = truth.centreOf(column, row);
-      if (std::abs(place.x() - 1.0) < 0.2 && std::abs(place.y() + 1.4) < 0.2) {
-        truth.height_m.at<float>(row, column) = 2.0F;
-      }
-    }
-  }
+TEST_F(HeightMapErrorsTest, HiddenBackOfAnObjectIsNotMeasured) {
+  // A pillar beside the path along y = 0: the ground behind it is visible at an angle, its back never.
+  const HeightMap truth = worldWithPillar(0.025, 1.0);
   HeightMapErrorOptions options;
   options.num_measurements = 60;
   const HeightMapErrors errors =
       evaluateHeightMap(truth, RigidTransform(), truth, poses_, rig_, everything_rigid_, options);
-  const auto isAt = [](const Eigen::Vector2d& place, double y) {
-    return std::abs(place.x() - 1.0) < 0.2 && std::abs(place.y() - y) < 0.03;
+  const auto isAt = [](const Eigen::Vector2d& position, double y) {
+    return std::abs(position.x() - 1.0) < 0.2 && std::abs(position.y() - y) < 0.03;
   };
   size_t at_front = 0;
   for (const TapeMeasurement& measurement : errors.measurements) {
@@ -280,14 +272,10 @@ TEST_F(HeightMapErrorsTest, NoTapeIsHeldToTheBackOfAThingThatNobodySees) {
   EXPECT_GT(at_front, 0U);
 }
 
-TEST_F(HeightMapErrorsTest, AWallIsWhereTheMapEnds) {
+TEST_F(HeightMapErrorsTest, WallIsLocatedAtTheEndOfTheMap) {
   HeightMap map = world(0.05);
-  for (int row = 0; row < map.height_m.rows; ++row) {
-    if (map.centreOf(0, row).y() > 2.5) {
-      map.height_m.row(row).setTo(std::numeric_limits<float>::quiet_NaN());
-    }
-  }
-  // Of the lengths between the platform and the wall, the wall's end.
+  setHeights(&map, kNan, [](const Eigen::Vector2d& at) { return at.y() > 2.5; });
+  // Lengths between the platform and the wall end where the map ends.
   HeightMapErrorOptions options;
   options.num_measurements = 60;
   const HeightMapErrors errors =
@@ -296,7 +284,7 @@ TEST_F(HeightMapErrorsTest, AWallIsWhereTheMapEnds) {
   EXPECT_EQ(errors.num_measurements_missing, 0U);
 }
 
-TEST_F(HeightMapErrorsTest, NobodySeesBehindTheWall) {
+TEST_F(HeightMapErrorsTest, SurfaceBehindTheWallIsNotJudged) {
   HeightMap map = world(0.05);
   const HeightMapErrors errors = evaluate(map);
   for (int row = 0; row < map.height_m.rows; ++row) {
@@ -308,7 +296,7 @@ TEST_F(HeightMapErrorsTest, NobodySeesBehindTheWall) {
   }
 }
 
-TEST_F(HeightMapErrorsTest, RefusesTrajectoriesThatShareNoTime) {
+TEST_F(HeightMapErrorsTest, TrajectoriesWithoutCommonTimeAreRefused) {
   Trajectory other = poses_;
   for (StampedTransform& pose : other) {
     pose.stamp = Timestamp::fromNanoseconds(pose.stamp.nanoseconds() + 5000000000);

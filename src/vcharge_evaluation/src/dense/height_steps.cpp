@@ -10,49 +10,50 @@
 namespace vcharge {
 namespace {
 
-constexpr double kSample_m = 0.01;     // along a line
-constexpr double kFlat_m = 0.03;       // heights beside a step differ by no more
-constexpr double kHand_m = 0.15;       // above the ground: where the place of a high step is read
-constexpr double kBeside_m = 0.1;      // from a line to those beside it
-constexpr double kMaxSkew_m = 0.058;   // of the edge on them: 30 degrees
-constexpr double kSpacing_m = 0.1;     // between the lines that are looked along
-constexpr double kFarApart_m = 12.8;   // between measurements of one kind, where there is room; else half as
-constexpr double kApart_m = 0.4;       // much, and again, down to this
-constexpr double kOverEdge_m = 0.05;   // from an edge onto what it is the edge of
-constexpr double kOnOneLine_m = 0.02;  // two steps are on one line
+constexpr double kSample_m = 0.01;      // along a line
+constexpr double kFlat_m = 0.03;        // largest difference of heights on a plateau
+constexpr double kReadHeight_m = 0.15;  // height above the ground at which a high step is located
+constexpr double kBeside_m = 0.1;       // from a line to those beside it
+constexpr double kMaxSkew_m = 0.058;    // of the edge on those lines: 30 degrees
+constexpr double kSpacing_m = 0.1;      // between the lines that are searched
+constexpr double kMinLength_m = 0.5;    // of a tape-measure distance
+constexpr double kMaxLength_m = 6.0;
+constexpr double kFarApart_m = 12.8;   // between measurements of one kind; halved repeatedly
+constexpr double kApart_m = 0.4;       // down to this if there is too little room
+constexpr double kOverEdge_m = 0.05;   // from an edge onto the object that it belongs to
+constexpr double kOnOneLine_m = 0.02;  // offset of two steps on one line
 
-bool isFlat(const HeightMap& map, const Eigen::Vector2d& place_m, const Eigen::Vector2d& direction,
+bool isFlat(const HeightMap& map, const Eigen::Vector2d& position_m, const Eigen::Vector2d& direction,
             double length_m) {
-  const double first = nearestHeight(map, place_m);
+  const double first = nearestHeight(map, position_m);
   for (double s = 0.0; s <= length_m; s += map.cell_size_m) {
-    if (!(std::abs(nearestHeight(map, place_m + s * direction) - first) <= kFlat_m)) {
+    if (!(std::abs(nearestHeight(map, position_m + s * direction) - first) <= kFlat_m)) {
       return false;
     }
   }
   return true;
 }
 
-/// The step whose edge lies between two neighbouring cells, if it is one that can be measured.
+/// The step between two neighbouring cells; absent if its height or edge is not well defined.
 std::optional<HeightStep> stepBetween(const HeightMap& truth, const Eigen::Vector2d& low_cell_m,
                                       const Eigen::Vector2d& direction,
                                       const HeightMapErrorOptions& options) {
   HeightStep step;
   step.direction = direction;
-  step.place_m = low_cell_m + 0.5 * truth.cell_size_m * direction;
+  step.position_m = low_cell_m + 0.5 * truth.cell_size_m * direction;
   step.low_m = nearestHeight(truth, low_cell_m);
   const Eigen::Vector2d high_cell_m = low_cell_m + truth.cell_size_m * direction;
   step.high_m = nearestHeight(truth, high_cell_m);
-  if (!(step.high_m - step.low_m > options.step_m) ||
-      !isFlat(truth, low_cell_m, -direction, options.plateau_m)) {
+  if (!(step.high_m - step.low_m > options.step_m) || !isFlat(truth, low_cell_m, -direction, kPlateau_m)) {
     return std::nullopt;
   }
-  if (!isHigh(step) && !isFlat(truth, high_cell_m, direction, options.plateau_m)) {
+  if (!isHigh(step) && !isFlat(truth, high_cell_m, direction, kPlateau_m)) {
     return std::nullopt;
   }
-  const HeightAt height = [&](const Eigen::Vector2d& place_m) { return nearestHeight(truth, place_m); };
+  const HeightAt height = [&](const Eigen::Vector2d& position_m) { return nearestHeight(truth, position_m); };
   const Eigen::Vector2d across(-direction.y(), direction.x());
   for (const double aside : {-kBeside_m, kBeside_m}) {
-    const auto crossing = findCrossing(height, step.place_m + aside * across, direction, -0.2, 0.2,
+    const auto crossing = findCrossing(height, step.position_m + aside * across, direction, -0.2, 0.2,
                                        step.low_m + stepLevel(step));
     if (!crossing || std::abs(*crossing) > kMaxSkew_m) {
       return std::nullopt;
@@ -61,30 +62,31 @@ std::optional<HeightStep> stepBetween(const HeightMap& truth, const Eigen::Vecto
   return step;
 }
 
-void addLength(const HeightStep& a, const HeightStep& b, const HeightMapErrorOptions& options,
-               std::vector<TapeMeasurement>* lengths) {
-  // From behind, the edge of what is low is seen over its top.
+void addLength(const HeightStep& a, const HeightStep& b, std::vector<TapeMeasurement>* lengths) {
+  // The edge of a low object is visible over its top from behind.
   const auto isSeen = [](const HeightStep& step) { return step.foot_seen || step.both_sides_seen; };
   if (!isSeen(a) || !isSeen(b)) {
     return;
   }
   const bool along_x = std::abs(a.direction.x()) > 0.5;
   const bool same_axis = along_x == (std::abs(b.direction.x()) > 0.5);
-  const Eigen::Vector2d between = b.place_m - a.place_m;
+  const Eigen::Vector2d between = b.position_m - a.position_m;
   const double aside = std::abs(along_x ? between.y() : between.x());
   const double length = between.norm();
-  if (same_axis && aside < kOnOneLine_m && length >= options.min_length_m && length <= options.max_length_m) {
-    lengths->push_back({TapeMeasurement::Kind::kLength, a.place_m, b.place_m, length, std::nan("")});
+  if (same_axis && aside < kOnOneLine_m && length >= kMinLength_m && length <= kMaxLength_m) {
+    lengths->push_back({TapeMeasurement::Kind::kLength, a.position_m, b.position_m, length, std::nan("")});
   }
 }
 
-/// Whether a tape can be held over the step: both sides are level.
-bool isLevel(const HeightMap& truth, const HeightStep& step, double plateau_m) {
-  return isFlat(truth, step.place_m - 0.5 * truth.cell_size_m * step.direction, -step.direction, plateau_m) &&
-         isFlat(truth, step.place_m + 0.5 * truth.cell_size_m * step.direction, step.direction, plateau_m);
+/// Whether both sides of a step are level, so that its height can be measured.
+bool isLevel(const HeightMap& truth, const HeightStep& step) {
+  return isFlat(truth, step.position_m - 0.5 * truth.cell_size_m * step.direction, -step.direction,
+                kPlateau_m) &&
+         isFlat(truth, step.position_m + 0.5 * truth.cell_size_m * step.direction, step.direction,
+                kPlateau_m);
 }
 
-/// Some of the candidates in the order given, as far apart as there is room for so many.
+/// Selects up to `count` candidates in the given order, as far apart as possible.
 std::vector<TapeMeasurement> spread(const std::vector<TapeMeasurement>& candidates, size_t count) {
   std::vector<TapeMeasurement> chosen;
   for (double apart_m = kFarApart_m; apart_m >= kApart_m; apart_m *= 0.5) {
@@ -121,15 +123,15 @@ std::optional<double> findCrossing(const HeightAt& height, const Eigen::Vector2d
 }
 
 bool isHigh(const HeightStep& step) {
-  return step.high_m - step.low_m > 2.0 * kHand_m;
+  return step.high_m - step.low_m > 2.0 * kReadHeight_m;
 }
 
 bool isOnRigid(const HeightStep& step, const IsRigid& is_rigid) {
-  return is_rigid(step.place_m + kOverEdge_m * step.direction, step.high_m);
+  return is_rigid(step.position_m + kOverEdge_m * step.direction, step.high_m);
 }
 
 double stepLevel(const HeightStep& step) {
-  return isHigh(step) ? kHand_m : 0.5 * (step.high_m - step.low_m);
+  return isHigh(step) ? kReadHeight_m : 0.5 * (step.high_m - step.low_m);
 }
 
 std::vector<HeightStep> findHeightSteps(const HeightMap& truth, const HeightMapErrorOptions& options,
@@ -137,12 +139,13 @@ std::vector<HeightStep> findHeightSteps(const HeightMap& truth, const HeightMapE
   std::vector<HeightStep> steps;
   const int stride = std::max(1, static_cast<int>(std::lround(kSpacing_m / truth.cell_size_m)));
   const auto consider = [&](int column, int row, const Eigen::Vector2d& axis) {
-    const Eigen::Vector2d place = truth.centreOf(column, row);
+    const Eigen::Vector2d position = truth.centreOf(column, row);
     for (const double side : {1.0, -1.0}) {
-      auto step = stepBetween(truth, side > 0.0 ? place : Eigen::Vector2d(place + truth.cell_size_m * axis),
-                              side * axis, options);
-      if (step && isSeen(step->place_m - options.plateau_m * step->direction)) {
-        step->both_sides_seen = isSeen(step->place_m + options.plateau_m * step->direction);
+      auto step =
+          stepBetween(truth, side > 0.0 ? position : Eigen::Vector2d(position + truth.cell_size_m * axis),
+                      side * axis, options);
+      if (step && isSeen(step->position_m - kPlateau_m * step->direction)) {
+        step->both_sides_seen = isSeen(step->position_m + kPlateau_m * step->direction);
         steps.push_back(*step);
       }
     }
@@ -168,14 +171,14 @@ std::vector<TapeMeasurement> pickMeasurements(const HeightMap& truth,
                [&](const HeightStep& step) { return isOnRigid(step, is_rigid); });
   std::vector<TapeMeasurement> heights, lengths;
   for (size_t i = 0; i < steps.size(); ++i) {
-    if (steps[i].both_sides_seen && isLevel(truth, steps[i], options.plateau_m)) {
-      const Eigen::Vector2d beside = options.plateau_m * steps[i].direction;
-      const Eigen::Vector2d below = steps[i].place_m - beside, above = steps[i].place_m + beside;
+    if (steps[i].both_sides_seen && isLevel(truth, steps[i])) {
+      const Eigen::Vector2d beside = kPlateau_m * steps[i].direction;
+      const Eigen::Vector2d below = steps[i].position_m - beside, above = steps[i].position_m + beside;
       heights.push_back({TapeMeasurement::Kind::kHeight, below, above,
                          nearestHeight(truth, above) - nearestHeight(truth, below), std::nan("")});
     }
     for (size_t k = i + 1; k < steps.size(); ++k) {
-      addLength(steps[i], steps[k], options, &lengths);
+      addLength(steps[i], steps[k], &lengths);
     }
   }
   std::mt19937 random(static_cast<uint32_t>(options.seed));

@@ -8,36 +8,38 @@
 
 namespace vcharge {
 
-/// Height at a place of the world, NaN where there is none.
-using HeightAt = std::function<double(const Eigen::Vector2d& place_m)>;
+/// Height at a point of the world; NaN without one.
+using HeightAt = std::function<double(const Eigen::Vector2d& point_m)>;
 
-/// Where the heights first exceed `level_m` along the line through `start_m`, looked for from `from_m` to
-/// `to_m` (along the unit `direction`), nearest to 0. Absent where they never cross it upwards.
+/// Distance from `start_m` along the unit `direction`, between `from_m` and `to_m`, at which the heights rise
+/// above `level_m`; the one nearest to 0. Absent if they never do.
 std::optional<double> findCrossing(const HeightAt& height, const Eigen::Vector2d& start_m,
                                    const Eigen::Vector2d& direction, double from_m, double to_m,
                                    double level_m);
 
-/// Height above the lower side at which a step's place is read: half a low step, and a hand above the ground
-/// of a high one, whose top no camera may see.
+/// Height above the lower side at which a step is located: half of a low step, and 0.15 m above the ground
+/// for a high one, whose top may not be visible.
 double stepLevel(const HeightStep& step);
 
-/// Whether the place of a step is read a hand above the ground, below half its height.
+/// Whether a step is higher than 0.3 m.
 bool isHigh(const HeightStep& step);
 
-/// Whether a step is the edge of something rigid: what lies a little over it is.
+/// Whether a step is the edge of a rigid object.
 bool isOnRigid(const HeightStep& step, const IsRigid& is_rigid);
 
-/// Steps of a true height map: jumps within a cell along rows and columns, between places that are flat over
-/// plateau_m, at edges that run across the line within 30 degrees. `isSeen` tells whether the surface at a
-/// place is seen: lower sides must be.
-std::vector<HeightStep> findHeightSteps(const HeightMap& truth, const HeightMapErrorOptions& options,
-                                        const std::function<bool(const Eigen::Vector2d& place_m)>& isSeen);
+/// Length of the flat plateaus beside a step, at whose ends heights are read.
+constexpr double kPlateau_m = 0.15;
 
-/// Tape-measure distances as somebody would take them in the scene itself, whatever a map shows of it:
-/// between edges of rigid things that the cameras saw, from in front of the face or over its top, and over
-/// such edges, spread over the place, picked by the options' seed. Half of them are heights of steps that are
-/// flat over plateau_m on both sides, half lengths between two edges on a line; where there are too few of
-/// one kind the other fills up.
+/// Finds steps of a true height map: jumps within a cell along rows and columns, between flat plateaus, at
+/// edges within 30 degrees of the perpendicular. `isSeen`: whether the surface at a point is visible; the
+/// lower side must be.
+std::vector<HeightStep> findHeightSteps(const HeightMap& truth, const HeightMapErrorOptions& options,
+                                        const std::function<bool(const Eigen::Vector2d& point_m)>& isSeen);
+
+/// Selects tape-measure distances in the true scene, independently of any map: half of them heights of steps
+/// between flat plateaus, half lengths between two edges on a line; if there are too few of one kind, more of
+/// the other. Edges are of rigid objects and were visible from the front or over their top. The selection is
+/// spread over the scene and depends on the options' seed.
 std::vector<TapeMeasurement> pickMeasurements(const HeightMap& truth, const std::vector<HeightStep>& steps,
                                               const IsRigid& is_rigid, const HeightMapErrorOptions& options);
 

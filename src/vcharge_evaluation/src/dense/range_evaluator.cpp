@@ -6,13 +6,17 @@
 #include <opencv2/imgproc.hpp>
 
 #include "vcharge_core/base/error.h"
-#include "vcharge_core/base/options.h"
 #include "vcharge_core/camera/ray_table.h"
+#include "vcharge_evaluation/travel_angle.h"
 
 namespace vcharge {
 namespace {
 
 constexpr double kFullCircle = 6.283185307179587;
+constexpr double kMinTruth_m = 0.5;
+// A pixel has texture if the image's standard deviation in this window reaches this number of gray levels.
+constexpr int kTextureWindow_px = 7;
+constexpr double kMinTexture = 4.0;
 
 /// Standard deviation of the image in a square window around each pixel, in gray levels.
 cv::Mat localStandardDeviation(const cv::Mat& image, int window_px) {
@@ -25,22 +29,11 @@ cv::Mat localStandardDeviation(const cv::Mat& image, int window_px) {
   return variance;
 }
 
-}  // namespace
-
-void RangeEvaluationOptions::validate() const {
-  requireField(pixel_step >= 1, "pixel_step", "must be at least 1", pixel_step);
-  requireField(texture_window_px >= 1 && texture_window_px % 2 == 1, "texture_window_px",
-               "must be odd and positive", texture_window_px);
-  requireField(min_texture_gray >= 0.0, "min_texture_gray", "must be at least 0", min_texture_gray);
-  requireField(min_truth_m >= 0.0, "min_truth_m", "must be at least 0", min_truth_m);
-  requireField(max_truth_m > min_truth_m, "max_truth_m", "must exceed min_truth_m", max_truth_m);
-  requireField(min_angle_from_travel_rad >= 0.0 && min_angle_from_travel_rad < 0.25 * kFullCircle,
-               "min_angle_from_travel_rad", "must be in [0, pi/2)", min_angle_from_travel_rad);
-  requireField(tolerance > 0.0, "tolerance", "must be positive", tolerance);
-  for (const double density : densities) {
-    requireField(density > 0.0 && density <= 1.0, "densities", "must be in (0, 1]", density);
-  }
+double fractionOf(size_t part, size_t whole) {
+  return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
 }
+
+}  // namespace
 
 RangeEvaluator::RangeEvaluator(const RangeEvaluationOptions& options) : options_(options) {
   options_.validate();
@@ -55,8 +48,8 @@ void RangeEvaluator::add(const RangeMap& map, const cv::Mat& image, const cv::Ma
   check(image.size() == size && truth_m.size() == size && valid.size() == size,
         "RangeEvaluator::add: expected images of the range map's size");
   const RayTable rays(map.camera, size, kFullCircle);
-  const cv::Mat texture = localStandardDeviation(image, options_.texture_window_px);
-  const float max_cosine = static_cast<float>(std::cos(options_.min_angle_from_travel_rad));
+  const cv::Mat texture = localStandardDeviation(image, kTextureWindow_px);
+  const float max_cosine = static_cast<float>(std::cos(kMinAngleFromTravel_rad));
   Eigen::Vector3f travel = Eigen::Vector3f::Zero();
   if (travel_direction_in_camera) {
     travel = travel_direction_in_camera->normalized().cast<float>();
@@ -64,8 +57,8 @@ void RangeEvaluator::add(const RangeMap& map, const cv::Mat& image, const cv::Ma
   for (int y = 0; y < size.height; y += options_.pixel_step) {
     for (int x = 0; x < size.width; x += options_.pixel_step) {
       const float truth = truth_m.at<float>(y, x);
-      if (valid.at<uint8_t>(y, x) == 0 || !(truth >= options_.min_truth_m && truth <= options_.max_truth_m) ||
-          texture.at<double>(y, x) < options_.min_texture_gray || !rays.valid(x, y) ||
+      if (valid.at<uint8_t>(y, x) == 0 || !(truth >= kMinTruth_m && truth <= options_.max_truth_m) ||
+          texture.at<double>(y, x) < kMinTexture || !rays.valid(x, y) ||
           std::abs(rays.ray(x, y).dot(travel)) > max_cosine) {
         continue;
       }
@@ -76,87 +69,76 @@ void RangeEvaluator::add(const RangeMap& map, const cv::Mat& image, const cv::Ma
   ++num_frames_;
 }
 
+/// The known ranges of a set of samples.
+struct RangeEvaluator::Known {
+  double tolerance;
+  std::vector<double> relative_errors;
+  size_t within_tolerance = 0, within_one_sigma = 0, within_two_sigma = 0;
+
+  void add(const Sample& sample) {
+    if (!std::isfinite(sample.range_m)) {
+      return;
+    }
+    const float error_m = std::abs(sample.range_m - sample.truth_m);
+    relative_errors.push_back(error_m / static_cast<double>(sample.truth_m));
+    within_tolerance += relative_errors.back() <= tolerance ? 1 : 0;
+    within_one_sigma += error_m <= sample.sigma_m ? 1 : 0;
+    within_two_sigma += error_m <= 2.0F * sample.sigma_m ? 1 : 0;
+  }
+  size_t count() const { return relative_errors.size(); }
+};
+
+RangeBin RangeEvaluator::makeBin(double low, double high, float Sample::*criterion) const {
+  Known known{options_.tolerance};
+  for (const Sample& sample : samples_) {
+    if (sample.*criterion >= low && sample.*criterion < high) {
+      known.add(sample);
+    }
+  }
+  RangeBin bin{low, high, known.count()};
+  bin.fraction_within_tolerance = fractionOf(known.within_tolerance, known.count());
+  bin.fraction_within_one_sigma = fractionOf(known.within_one_sigma, known.count());
+  bin.median_relative_error = summarize(std::move(known.relative_errors)).percentile_50;
+  return bin;
+}
+
 RangeErrors RangeEvaluator::errors() const {
   RangeErrors errors;
   errors.num_frames = num_frames_;
   errors.num_judged = samples_.size();
-  const auto isKnown = [](const Sample& sample) { return std::isfinite(sample.range_m); };
-  const auto relativeError = [](const Sample& sample) {
-    return std::abs(sample.range_m - sample.truth_m) / static_cast<double>(sample.truth_m);
-  };
-
-  // Most confident first, unknown last; stable, so that ties keep the order of the pixels.
+  // Most confident first and unknown last; a stable sort makes ties deterministic.
   std::vector<Sample> ranked = samples_;
-  std::stable_sort(ranked.begin(), ranked.end(), [&](const Sample& left, const Sample& right) {
-    return isKnown(left) != isKnown(right) ? isKnown(left) : left.confidence > right.confidence;
+  std::stable_sort(ranked.begin(), ranked.end(), [](const Sample& left, const Sample& right) {
+    const bool is_left_known = std::isfinite(left.range_m);
+    return is_left_known != std::isfinite(right.range_m) ? is_left_known : left.confidence > right.confidence;
   });
   for (const double density : options_.densities) {
     const auto count = static_cast<size_t>(std::lround(density * static_cast<double>(ranked.size())));
+    Known known{options_.tolerance};
+    std::for_each_n(ranked.begin(), count, [&](const Sample& sample) { known.add(sample); });
     RangeAccuracy accuracy;
     accuracy.density = density;
-    std::vector<double> known_errors;
-    uint64_t within = 0;
-    for (size_t i = 0; i < count; ++i) {
-      if (isKnown(ranked[i])) {
-        known_errors.push_back(relativeError(ranked[i]));
-        within += known_errors.back() <= options_.tolerance ? 1 : 0;
-      }
-    }
-    if (count > 0) {
-      accuracy.share_known = static_cast<double>(known_errors.size()) / static_cast<double>(count);
-      accuracy.share_within_tolerance = static_cast<double>(within) / static_cast<double>(count);
-    }
-    accuracy.median_relative_error = summarize(std::move(known_errors)).percentile_50;
+    accuracy.fraction_known = fractionOf(known.count(), count);
+    accuracy.fraction_within_tolerance = fractionOf(known.within_tolerance, count);
+    accuracy.median_relative_error = summarize(std::move(known.relative_errors)).percentile_50;
     errors.accuracy.push_back(accuracy);
   }
-
-  const auto makeBin = [&](double low, double high, const auto& criterion) {
-    RangeBin bin{low, high};
-    std::vector<double> known_errors;
-    uint64_t within = 0;
-    uint64_t within_sigma = 0;
-    for (const Sample& sample : samples_) {
-      if (isKnown(sample) && criterion(sample) >= low && criterion(sample) < high) {
-        known_errors.push_back(relativeError(sample));
-        within += known_errors.back() <= options_.tolerance ? 1 : 0;
-        within_sigma += std::abs(sample.range_m - sample.truth_m) <= sample.sigma_m ? 1 : 0;
-      }
-    }
-    bin.count = known_errors.size();
-    if (bin.count > 0) {
-      bin.share_within_tolerance = static_cast<double>(within) / static_cast<double>(bin.count);
-      bin.share_within_one_sigma = static_cast<double>(within_sigma) / static_cast<double>(bin.count);
-    }
-    bin.median_relative_error = summarize(std::move(known_errors)).percentile_50;
-    return bin;
-  };
-  const auto truthOf = [](const Sample& sample) { return static_cast<double>(sample.truth_m); };
-  const auto confidenceOf = [](const Sample& sample) { return static_cast<double>(sample.confidence); };
   const std::vector<double> edges_m = {0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 1e9};
   for (size_t i = 0; i + 1 < edges_m.size(); ++i) {
-    errors.by_truth.push_back(makeBin(edges_m[i], edges_m[i + 1], truthOf));
+    errors.by_truth.push_back(makeBin(edges_m[i], edges_m[i + 1], &Sample::truth_m));
   }
   constexpr int kConfidenceBins = 10;
   for (int i = 0; i < kConfidenceBins; ++i) {
     // The last bin includes a confidence of 1.
     const double high = i + 1 == kConfidenceBins ? 1.0 + 1e-6 : static_cast<double>(i + 1) / kConfidenceBins;
-    errors.by_confidence.push_back(makeBin(static_cast<double>(i) / kConfidenceBins, high, confidenceOf));
+    errors.by_confidence.push_back(
+        makeBin(static_cast<double>(i) / kConfidenceBins, high, &Sample::confidence));
   }
-
-  uint64_t within_one = 0;
-  uint64_t within_two = 0;
-  for (const Sample& sample : samples_) {
-    if (isKnown(sample)) {
-      ++errors.num_known;
-      const float error = std::abs(sample.range_m - sample.truth_m);
-      within_one += error <= sample.sigma_m ? 1 : 0;
-      within_two += error <= 2.0F * sample.sigma_m ? 1 : 0;
-    }
-  }
-  if (errors.num_known > 0) {
-    errors.share_within_one_sigma = static_cast<double>(within_one) / static_cast<double>(errors.num_known);
-    errors.share_within_two_sigma = static_cast<double>(within_two) / static_cast<double>(errors.num_known);
-  }
+  Known all{options_.tolerance};
+  std::for_each(samples_.begin(), samples_.end(), [&](const Sample& sample) { all.add(sample); });
+  errors.num_known = all.count();
+  errors.fraction_within_one_sigma = fractionOf(all.within_one_sigma, all.count());
+  errors.fraction_within_two_sigma = fractionOf(all.within_two_sigma, all.count());
   return errors;
 }
 

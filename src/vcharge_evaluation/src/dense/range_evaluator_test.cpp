@@ -12,7 +12,7 @@ namespace {
 const cv::Size kSize(160, 100);
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
-/// A drive frame with texture everywhere and truth 4 m, to be spoiled by the test.
+/// A frame with texture everywhere and a true range of 4 m, which the test modifies.
 struct Frame {
   Frame()
       : map{Timestamp(),
@@ -51,14 +51,14 @@ const RangeAccuracy& at(const RangeErrors& errors, double density) {
   throw std::logic_error("density was not evaluated");
 }
 
-TEST(RangeEvaluatorTest, PerfectMapIsAllRight) {
+TEST(RangeEvaluatorTest, PerfectMapIsCorrect) {
   const RangeErrors errors = Frame().evaluate();
   EXPECT_EQ(errors.num_judged, static_cast<uint64_t>(kSize.area()));
   EXPECT_EQ(errors.num_known, errors.num_judged);
-  EXPECT_DOUBLE_EQ(at(errors, 1.0).share_within_tolerance, 1.0);
+  EXPECT_DOUBLE_EQ(at(errors, 1.0).fraction_within_tolerance, 1.0);
 }
 
-TEST(RangeEvaluatorTest, JudgesEverySecondColumnAndRowAsToldTo) {
+TEST(RangeEvaluatorTest, PixelStepSelectsColumnsAndRows) {
   Frame frame;
   frame.pixel_step = 2;
   EXPECT_EQ(frame.evaluate().num_judged, static_cast<uint64_t>(kSize.area() / 4));
@@ -68,23 +68,23 @@ TEST(RangeEvaluatorTest, UnknownRangesCountAsWrongAtFixedDensity) {
   Frame frame;
   frame.map.range_m.rowRange(0, 50).setTo(kNan);
   const RangeErrors errors = frame.evaluate();
-  EXPECT_DOUBLE_EQ(at(errors, 0.4).share_within_tolerance, 1.0);
-  EXPECT_NEAR(at(errors, 1.0).share_within_tolerance, 0.5, 1e-9);
-  EXPECT_NEAR(at(errors, 0.8).share_within_tolerance, 0.5 / 0.8, 1e-9);
+  EXPECT_DOUBLE_EQ(at(errors, 0.4).fraction_within_tolerance, 1.0);
+  EXPECT_NEAR(at(errors, 1.0).fraction_within_tolerance, 0.5, 1e-9);
+  EXPECT_NEAR(at(errors, 0.8).fraction_within_tolerance, 0.5 / 0.8, 1e-9);
   EXPECT_EQ(errors.num_known, errors.num_judged / 2);
 }
 
-TEST(RangeEvaluatorTest, TakesTheMostConfidentFirst) {
+TEST(RangeEvaluatorTest, MostConfidentPixelsAreTakenFirst) {
   Frame frame;
   frame.map.range_m.rowRange(0, 60).setTo(4.3);  // 7.5 % off
   frame.map.confidence.rowRange(0, 60).setTo(0.2);
-  EXPECT_DOUBLE_EQ(at(frame.evaluate(), 0.4).share_within_tolerance, 1.0);
+  EXPECT_DOUBLE_EQ(at(frame.evaluate(), 0.4).fraction_within_tolerance, 1.0);
   frame.map.confidence.rowRange(0, 60).setTo(0.9);
-  EXPECT_DOUBLE_EQ(at(frame.evaluate(), 0.6).share_within_tolerance, 0.0);
+  EXPECT_DOUBLE_EQ(at(frame.evaluate(), 0.6).fraction_within_tolerance, 0.0);
   EXPECT_NEAR(at(frame.evaluate(), 0.6).median_relative_error, 0.075, 1e-6);
 }
 
-TEST(RangeEvaluatorTest, JudgesOnlyTexturedSeenPixelsInRange) {
+TEST(RangeEvaluatorTest, OnlyTexturedValidPixelsInRangeAreJudged) {
   Frame frame;
   frame.image.colRange(0, 40).setTo(100);  // flat: the window of 7 px reaches 3 px into it
   EXPECT_EQ(frame.evaluate().num_judged, static_cast<uint64_t>((160 - 37) * 100));
@@ -98,9 +98,9 @@ TEST(RangeEvaluatorTest, JudgesOnlyTexturedSeenPixelsInRange) {
   EXPECT_EQ(far.evaluate().num_judged, static_cast<uint64_t>(40 * 100));
 }
 
-TEST(RangeEvaluatorTest, LeavesOutRaysNearTheDirectionOfTravel) {
+TEST(RangeEvaluatorTest, RaysNearTheDirectionOfTravelAreNotJudged) {
   const Frame frame;
-  // Pinhole of 80 px focal length: 20 degrees around the axis are a disc of 80 tan 20 = 29.1 px.
+  // With a focal length of 80 px, 20 degrees around the axis are a disc of radius 80 tan 20 = 29.1 px.
   const double disc = M_PI * std::pow(80.0 * std::tan(20.0 * M_PI / 180.0), 2.0);
   for (const double sign : {1.0, -1.0}) {
     const auto judged = frame.evaluate(Eigen::Vector3d(0.0, 0.0, 3.0 * sign)).num_judged;
@@ -108,7 +108,7 @@ TEST(RangeEvaluatorTest, LeavesOutRaysNearTheDirectionOfTravel) {
   }
 }
 
-TEST(RangeEvaluatorTest, SharesWithinSigmaFollowTheNormalDistribution) {
+TEST(RangeEvaluatorTest, FractionsWithinSigmaFollowTheNormalDistribution) {
   Frame frame;
   std::mt19937 generator(2);
   std::normal_distribution<float> normal(0.0F, 0.05F);
@@ -118,11 +118,11 @@ TEST(RangeEvaluatorTest, SharesWithinSigmaFollowTheNormalDistribution) {
     }
   }
   frame.map.standard_deviation_m.setTo(0.05);
-  EXPECT_NEAR(frame.evaluate().share_within_one_sigma, 0.683, 0.012);
-  EXPECT_NEAR(frame.evaluate().share_within_two_sigma, 0.954, 0.008);
+  EXPECT_NEAR(frame.evaluate().fraction_within_one_sigma, 0.683, 0.012);
+  EXPECT_NEAR(frame.evaluate().fraction_within_two_sigma, 0.954, 0.008);
 }
 
-TEST(RangeEvaluatorTest, RejectsBadOptionsAndUnlikeSizes) {
+TEST(RangeEvaluatorTest, BadOptionsAndOtherSizesAreRefused) {
   RangeEvaluationOptions options;
   options.densities = {1.5};
   EXPECT_THROW(RangeEvaluator{options}, std::invalid_argument);

@@ -7,15 +7,15 @@
 
 namespace vcharge {
 
-/// The cell whose centre is nearest to a place of the map's frame; it may be outside of the map.
-inline cv::Point nearestCell(const HeightMap& map, const Eigen::Vector2d& place_m) {
-  const Eigen::Vector2d cell = (place_m - map.origin_m) / map.cell_size_m;
+/// The cell whose centre is nearest to a point in the map's frame; it may be outside the map.
+inline cv::Point nearestCell(const HeightMap& map, const Eigen::Vector2d& point_m) {
+  const Eigen::Vector2d cell = (point_m - map.origin_m) / map.cell_size_m;
   return {static_cast<int>(std::lround(cell.x())), static_cast<int>(std::lround(cell.y()))};
 }
 
 /// Height of the nearest cell; NaN outside the map.
-inline double nearestHeight(const HeightMap& map, const Eigen::Vector2d& place_m) {
-  const cv::Point at = nearestCell(map, place_m);
+inline double nearestHeight(const HeightMap& map, const Eigen::Vector2d& point_m) {
+  const cv::Point at = nearestCell(map, point_m);
   return cv::Rect(cv::Point(), map.height_m.size()).contains(at) ? map.height_m.at<float>(at)
                                                                  : std::numeric_limits<double>::quiet_NaN();
 }

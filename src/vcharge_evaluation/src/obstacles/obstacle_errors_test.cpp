@@ -9,7 +9,7 @@
 namespace vcharge {
 namespace {
 
-/// A wall along x at y = 3, of the given height, as cameras would see it.
+/// Visible points of a wall along x of the given height.
 std::vector<SeenPoint> makeWall(double height_m, double y_m = 3.0) {
   std::vector<SeenPoint> points;
   for (double x = -6.0; x < 6.0; x += 0.01) {
@@ -39,11 +39,11 @@ TEST(ObstacleScanErrorsTest, KnownErrorIsFound) {
   EXPECT_GT(errors.num_judged, 80U);
   EXPECT_NEAR(errors.mean_signed_m, 0.1, 0.05);
   EXPECT_NEAR(errors.error_own_ray_m.percentile_50, 0.1, 0.03);
-  EXPECT_LT(errors.share_within_one_sigma, 0.6);
+  EXPECT_LT(errors.fraction_within_one_sigma, 0.6);
   EXPECT_EQ(evaluator.ahead().num_judged, 0U);
 }
 
-TEST(ObstacleScanErrorsTest, NothingReportedAndWallsBehindAreMissed) {
+TEST(ObstacleScanErrorsTest, UnreportedAndTooDistantWallsAreMissed) {
   ObstacleScanEvaluator evaluator;
   evaluator.add(ObstacleScan::unknown(360, 10.0), makeWall(1.0), RigidTransform());
   EXPECT_EQ(evaluator.aside().num_missed, evaluator.aside().num_judged);
@@ -58,7 +58,7 @@ TEST(ObstacleScanErrorsTest, KerbsAreNotJudgedAsWalls) {
   EXPECT_EQ(evaluator.aside().num_judged, 0U);
 }
 
-/// One box of 0.4 m beside a path along x; height map of the same.
+/// A box of 0.4 m beside a path along x, with its height map.
 class ObstacleMapErrorsTest : public ::testing::Test {
  protected:
   ObstacleMapErrorsTest() {
@@ -73,7 +73,7 @@ class ObstacleMapErrorsTest : public ::testing::Test {
     for (double x = 0.0; x < 3.0; x += 0.1) {
       path_.push_back(RigidTransform::planar(x, 0.0, 0.0));
     }
-    for (double x = -1.0; x < 4.0; x += 0.05) {  // ground on both sides, not that behind the box
+    for (double x = -1.0; x < 4.0; x += 0.05) {  // visible ground on both sides, but not behind the box
       for (double y = -3.0; y < 2.5; y += 0.05) {
         points_.push_back({Eigen::Vector3d(x, y, 0.0).cast<float>(), 1.0F});
       }
@@ -88,15 +88,15 @@ class ObstacleMapErrorsTest : public ::testing::Test {
                       const std::vector<Eigen::Vector2d>& free) const {
     ObstacleMap map = ObstacleMap::unobserved({160, 160}, 0.1);
     map.origin_m = {-8.0, -8.0};
-    const auto set = [&](const Eigen::Vector2d& place, int8_t state) {
-      map.state.at<int8_t>(static_cast<int>(std::floor((place.y() + 8.0) / 0.1)),
-                           static_cast<int>(std::floor((place.x() + 8.0) / 0.1))) = state;
+    const auto set = [&](const Eigen::Vector2d& position, int8_t state) {
+      map.state.at<int8_t>(static_cast<int>(std::floor((position.y() + 8.0) / 0.1)),
+                           static_cast<int>(std::floor((position.x() + 8.0) / 0.1))) = state;
     };
-    for (const auto& place : occupied) {
-      set(place, kCellOccupied);
+    for (const auto& position : occupied) {
+      set(position, kCellOccupied);
     }
-    for (const auto& place : free) {
-      set(place, kCellFree);
+    for (const auto& position : free) {
+      set(position, kCellFree);
     }
     return map;
   }
@@ -117,7 +117,7 @@ class ObstacleMapErrorsTest : public ::testing::Test {
   std::vector<SeenPoint> points_;
 };
 
-TEST_F(ObstacleMapErrorsTest, ReportedMissedAndTooEarlyToTell) {
+TEST_F(ObstacleMapErrorsTest, ObstaclesAreReportedMissedOrNotYetDue) {
   const ObstacleMapErrors reported = judge({{1.05, 2.55}}, {});
   ASSERT_EQ(reported.obstacles.size(), 1U);
   EXPECT_TRUE(reported.obstacles[0].reported);
@@ -126,7 +126,7 @@ TEST_F(ObstacleMapErrorsTest, ReportedMissedAndTooEarlyToTell) {
   const ObstacleMapErrors missed = judge({{1.05, 3.55}}, {});
   ASSERT_EQ(missed.obstacles.size(), 1U);
   EXPECT_FALSE(missed.obstacles[0].reported);
-  EXPECT_TRUE(judge({}, {}, 8).obstacles.empty());  // less than the grace
+  EXPECT_TRUE(judge({}, {}, 8).obstacles.empty());  // not yet due
 }
 
 TEST_F(ObstacleMapErrorsTest, FalseCellsAndFreeCellsInsideObstaclesAreCounted) {
@@ -138,7 +138,7 @@ TEST_F(ObstacleMapErrorsTest, FalseCellsAndFreeCellsInsideObstaclesAreCounted) {
   EXPECT_EQ(errors.num_observed_inside, 1U);
 }
 
-TEST_F(ObstacleMapErrorsTest, PlacesOfKerbsAreJudgedOnceAndToldByHowNearTheyWere) {
+TEST_F(ObstacleMapErrorsTest, PointsOfKerbsAreJudgedOnceWithTheirLeastDistance) {
   TruthObstacle kerb;
   kerb.kind = "kerb";
   kerb.footprint_m = {{1.0, -2.5}, {2.0, -2.5}, {2.0, -2.0}, {1.0, -2.0}};
@@ -146,14 +146,14 @@ TEST_F(ObstacleMapErrorsTest, PlacesOfKerbsAreJudgedOnceAndToldByHowNearTheyWere
   for (int row = 75; row < 80; ++row) {
     heights_.height_m.row(row).colRange(110, 120).setTo(0.12F);
   }
-  for (double x = 1.0; x < 2.0; x += 0.01) {  // the side towards the path
+  for (double x = 1.0; x < 2.0; x += 0.01) {  // the side facing the path
     for (const double z : {0.05, 0.08, 0.11}) {
       points_.push_back({Eigen::Vector3d(x, -2.0, z).cast<float>(), 1.0F});
     }
   }
   ObstacleMapEvaluator evaluator({kerb}, heights_, path_);
   for (size_t i = 0; i < path_.size(); ++i) {
-    // One place when it has to be reported, another one too late.
+    // One point is reported in time, another one too late.
     std::vector<Eigen::Vector2d> occupied = {{1.25, -2.05}};
     if (i > 15) {
       occupied.push_back({1.75, -2.05});
@@ -168,12 +168,12 @@ TEST_F(ObstacleMapErrorsTest, PlacesOfKerbsAreJudgedOnceAndToldByHowNearTheyWere
   EXPECT_EQ(errors.kerbs.size(), errors.num_kerb_points);
   uint64_t reported = 0;
   uint64_t ever = 0;
-  for (const KerbOutcome& place : errors.kerbs) {
-    // The middle of the vehicle, 1.4 m before the rear axle, passes all of it.
-    EXPECT_NEAR(place.nearest_m, -place.place_m.y(), 0.05);
-    EXPECT_TRUE(place.ever_reported || !place.reported);
-    reported += place.reported ? 1 : 0;
-    ever += place.ever_reported ? 1 : 0;
+  for (const KerbOutcome& kerb_point : errors.kerbs) {
+    // The middle of the vehicle, 1.4 m in front of the rear axle, passes all points.
+    EXPECT_NEAR(kerb_point.nearest_m, -kerb_point.position_m.y(), 0.05);
+    EXPECT_TRUE(kerb_point.ever_reported || !kerb_point.reported);
+    reported += kerb_point.reported ? 1 : 0;
+    ever += kerb_point.ever_reported ? 1 : 0;
   }
   EXPECT_EQ(reported, errors.num_kerb_reported);
   EXPECT_GT(reported, 0U);
@@ -182,8 +182,9 @@ TEST_F(ObstacleMapErrorsTest, PlacesOfKerbsAreJudgedOnceAndToldByHowNearTheyWere
   EXPECT_NEAR(errors.kerb_height_error_m.mean, 0.02, 1e-3);
 }
 
-TEST_F(ObstacleMapErrorsTest, GroundIsOpenWhereItWasSeenAndNothingIsNear) {
-  // 0.25 m before the box a range may err so much; 0.35 m before it no more; behind it nobody sees.
+TEST_F(ObstacleMapErrorsTest, OpenGroundIsVisibleAndFarFromObstacles) {
+  // 0.25 m in front of the box is within the allowed range error, 0.35 m is not; behind it nothing is
+  // visible.
   const ObstacleMapErrors errors = judge({{1.25, 2.25}, {1.25, 2.15}, {1.25, 3.35}}, {});
   EXPECT_EQ(errors.num_false_cells, 1U);
   EXPECT_EQ(errors.num_false_hidden, 1U);
@@ -194,13 +195,13 @@ TEST_F(ObstacleMapErrorsTest, GroundIsOpenWhereItWasSeenAndNothingIsNear) {
   EXPECT_EQ(errors.false_cells[0].frames, 30U);
 }
 
-TEST_F(ObstacleMapErrorsTest, FalseCellCountsOnceAndAsLeftOnlyWhileItIsOccupied) {
+TEST_F(ObstacleMapErrorsTest, FalseCellCountsOnceAndIsLeftOnlyWhileOccupied) {
   ObstacleMapEvaluator evaluator({box_}, heights_, path_);
   for (size_t i = 0; i < path_.size(); ++i) {
     ObstacleMap map =
         mapWith(i < 10 ? std::vector<Eigen::Vector2d>{{1.55, -2.0}} : std::vector<Eigen::Vector2d>{}, {});
     map.fixed_from_vehicle = path_[i];
-    // Odometry that drifts across the borders of the world's cells: the map's cell stays the same.
+    // The odometry drifts across cells of the world, but the map's cell stays the same.
     evaluator.add(map, points_, RigidTransform::planar(0.1 * i, 0.01 * i, 0.0), {}, {});
   }
   EXPECT_EQ(evaluator.errors().num_false_cells, 1U);
@@ -214,7 +215,7 @@ TEST(ObstacleTruthTest, DistanceToAPolygon) {
   EXPECT_DOUBLE_EQ(distanceToPolygon({-3.0, -4.0}, square), 5.0);
 }
 
-TEST(ObstacleTruthTest, CellsOfTheWorldHaveTheirOwnKeys) {
+TEST(ObstacleTruthTest, CellsOfTheWorldHaveUniqueKeys) {
   SeenCells cells;
   cells.add({-0.05, -3.25}, 3);
   cells.add({-0.15, -3.25}, 2);

@@ -6,24 +6,41 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "vcharge_core/base/options.h"
+#include "vcharge_evaluation/travel_angle.h"
 
 namespace vcharge {
 namespace {
 
-constexpr double kKerbStep_m = 0.1;
+// The vehicle, from its rear axle: front axle, middle, and half its width.
 constexpr double kWheelbase_m = 2.6;
-// Half the vehicle's length before the rear axle: its middle.
 constexpr double kMiddle_m = 1.4;
-// Seen points from here up belong to an obstacle.
+constexpr double kHalfWidth_m = 0.9;
+// An obstacle is at least this wide. It is visible with so many points between these heights, must be
+// reported after this travel, and is reported by an occupied cell within this distance.
+constexpr double kMinWidth_m = 0.1;
+constexpr int kMinSeenPoints = 15;
 constexpr double kSeenHeight_m = 0.1;
 constexpr double kMaxHeight_m = 2.0;
+constexpr double kGrace_m = 1.0;
+constexpr double kTolerance_m = 0.25;
+// Ground is open if nothing of this height stands within this distance: the allowed range error of 15 cm and
+// the diagonal of a cell. Cells further from the vehicle's middle are not judged.
+constexpr double kFalseHeight_m = 0.08;
+constexpr double kFalseRadius_m = 0.29;
+constexpr double kFalseRange_m = 5.0;
+// A cell lies inside an obstacle if everything around it has this height.
+constexpr float kInsideHeight_m = 0.2F;
+// Points on the outlines of kerbs between these heights are judged.
+constexpr double kKerbMin_m = 0.1;
+constexpr double kKerbMax_m = 0.16;
+constexpr double kSeenKerbHeight_m = 0.04;  // of a visible point of a kerb
+constexpr double kKerbStep_m = 0.1;
 constexpr double kKerbTolerance_m = 0.15;
 constexpr double kKerbWidth_m = 0.2;
 
-/// From the ground between the wheels, over all poses.
-double distanceFromPath(const std::vector<Eigen::Vector2d>& points_m, const std::vector<RigidTransform>& path,
-                        double half_width_m) {
+/// Distance of points from the ground between the wheels, over all poses.
+double distanceFromPath(const std::vector<Eigen::Vector2d>& points_m,
+                        const std::vector<RigidTransform>& path) {
   double nearest = std::numeric_limits<double>::infinity();
   for (const RigidTransform& pose : path) {
     for (const double x : {0.0, kWheelbase_m}) {
@@ -33,7 +50,7 @@ double distanceFromPath(const std::vector<Eigen::Vector2d>& points_m, const std:
       }
     }
   }
-  return std::max(0.0, nearest - half_width_m);
+  return std::max(0.0, nearest - kHalfWidth_m);
 }
 
 cv::Mat withoutNaN(const cv::Mat& image) {
@@ -42,12 +59,19 @@ cv::Mat withoutNaN(const cv::Mat& image) {
   return known;
 }
 
-/// False for what is surely further from a place.
-bool isNear(const TruthObstacle& obstacle, const Eigen::Vector2d& place_m, double distance_m) {
-  return (obstacle.middle_m() - place_m).norm() <= distance_m + obstacle.width_m();
+/// False if the obstacle is certainly further away.
+bool isNear(const TruthObstacle& obstacle, const Eigen::Vector2d& position_m, double distance_m) {
+  return (obstacle.middle_m() - position_m).norm() <= distance_m + obstacle.width_m();
 }
 
-/// An occupied cell as the world has it.
+bool isNearAny(const std::vector<TruthObstacle>& obstacles, const Eigen::Vector2d& position_m,
+               double distance_m) {
+  return std::any_of(obstacles.begin(), obstacles.end(), [&](const TruthObstacle& obstacle) {
+    return distanceToPolygon(position_m, obstacle.footprint_m) <= distance_m;
+  });
+}
+
+/// An occupied cell in the world frame.
 struct OccupiedCell {
   Eigen::Vector2d world_m;
   double height_m;
@@ -60,10 +84,19 @@ struct ObstacleMapEvaluator::Frame {
   RigidTransform world_from_fixed;
   Eigen::Vector2d vehicle_middle_m;
   std::vector<OccupiedCell> occupied;
-  SeenCells seen_high, seen_low;  // surfaces aside of the travel, within the view range
+  SeenCells seen_high, seen_low;  // visible surfaces off the direction of travel, within the view range
   const std::vector<TruthObstacle>& movers;
   const std::vector<TruthObstacle>& earlier_movers;
 
+  /// Calls visit(column, row, state) for all cells.
+  template <class Visitor>
+  void forEachCell(Visitor&& visit) const {
+    for (int row = 0; row < map.state.rows; ++row) {
+      for (int column = 0; column < map.state.cols; ++column) {
+        visit(column, row, map.state.at<int8_t>(row, column));
+      }
+    }
+  }
   Eigen::Vector2d fixedOf(int column, int row) const {
     return map.origin_m + map.cell_size_m * Eigen::Vector2d(column + 0.5, row + 0.5);
   }
@@ -79,28 +112,12 @@ struct ObstacleMapEvaluator::Frame {
     }
     return sum;
   }
-  bool reports(const TruthObstacle& obstacle, double tolerance_m) const {
+  bool reports(const TruthObstacle& obstacle) const {
     return std::any_of(occupied.begin(), occupied.end(), [&](const OccupiedCell& cell) {
-      return distanceToPolygon(cell.world_m, obstacle.footprint_m) <= tolerance_m;
+      return distanceToPolygon(cell.world_m, obstacle.footprint_m) <= kTolerance_m;
     });
   }
 };
-
-void ObstacleMapEvaluationOptions::validate() const {
-  for (const auto& [name, value] : {std::pair("min_height_m", min_height_m),
-                                    {"min_width_m", min_width_m},
-                                    {"corridor_m", corridor_m},
-                                    {"view_range_m", view_range_m},
-                                    {"tolerance_m", tolerance_m},
-                                    {"false_radius_m", false_radius_m},
-                                    {"false_height_m", false_height_m},
-                                    {"false_range_m", false_range_m}}) {
-    requireField(value > 0.0, name, "must be positive", value);
-  }
-  requireField(grace_m >= 0.0, "grace_m", "must not be negative", grace_m);
-  requireField(min_seen_points > 0, "min_seen_points", "must be positive", min_seen_points);
-  requireField(kerb_max_m > kerb_min_m, "kerb_max_m", "must be above kerb_min_m", kerb_max_m);
-}
 
 ObstacleMapEvaluator::ObstacleMapEvaluator(const std::vector<TruthObstacle>& obstacles,
                                            const TruthHeights& heights,
@@ -115,31 +132,32 @@ ObstacleMapEvaluator::ObstacleMapEvaluator(const std::vector<TruthObstacle>& obs
     cv::dilate(known, highest, cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
     return highest;
   };
-  highest_around_ = highestWithin(options_.false_radius_m);
+  highest_around_ = highestWithin(kFalseRadius_m);
   const cv::Mat highest_on_kerbs = highestWithin(kKerbWidth_m);
   cv::erode(known, lowest_around_, cv::getStructuringElement(cv::MORPH_RECT, {3, 3}));
   for (const TruthObstacle& obstacle : obstacles) {
-    if (obstacle.top_z_m >= options_.false_height_m && obstacle.base_z_m < kMaxHeight_m) {
+    if (obstacle.top_z_m >= kFalseHeight_m && obstacle.base_z_m < kMaxHeight_m) {
       standing_.push_back(obstacle);
     }
     std::vector<Eigen::Vector2d> outline = obstacle.footprint_m;
     if (obstacle.kind == "kerb") {
       addKerbPoints(obstacle, highest_on_kerbs, path);
     }
-    for (size_t i = 0; i < obstacle.footprint_m.size(); ++i) {  // long walls have their corners far away
+    for (size_t i = 0; i < obstacle.footprint_m.size(); ++i) {  // a long wall may be near without its corners
       const Eigen::Vector2d& a = obstacle.footprint_m[i];
       const Eigen::Vector2d& b = obstacle.footprint_m[(i + 1) % obstacle.footprint_m.size()];
-      for (double share = 0.1; share < 0.95; share += 0.1) {
-        outline.push_back(a + share * (b - a));
+      for (double fraction = 0.1; fraction < 0.95; fraction += 0.1) {
+        outline.push_back(a + fraction * (b - a));
       }
     }
-    const double distance_m = distanceFromPath(outline, path, options_.vehicle_half_width_m);
-    if (obstacle.height_m() >= options_.min_height_m && obstacle.width_m() >= options_.min_width_m &&
+    const double distance_m = distanceFromPath(outline, path);
+    if (obstacle.height_m() >= options_.min_height_m && obstacle.width_m() >= kMinWidth_m &&
         obstacle.base_z_m < kMaxHeight_m && distance_m <= options_.corridor_m) {
-      Tracked tracked{obstacle, distance_m, std::nullopt, false, {}};
-      tracked.outcome = {obstacle.kind, obstacle.middle_m(), obstacle.height_m(), obstacle.width_m(),
-                         distance_m};
-      tracked_.push_back(tracked);
+      tracked_.push_back(
+          {obstacle,
+           std::nullopt,
+           false,
+           {obstacle.kind, obstacle.middle_m(), obstacle.height_m(), obstacle.width_m(), distance_m}});
     }
   }
 }
@@ -152,12 +170,12 @@ void ObstacleMapEvaluator::addKerbPoints(const TruthObstacle& kerb, const cv::Ma
     const int steps = static_cast<int>((b - a).norm() / kKerbStep_m);
     for (int step = 0; step < steps; ++step) {
       const Eigen::Vector2d point = a + (step + 0.5) / steps * (b - a);
-      // Grass and bushes on the island hide what the kerb itself rises to.
+      // Grass and bushes on the island may hide the height of the kerb itself.
       const double height_m = heights_.at(highest_m, point);
-      if (height_m >= options_.kerb_min_m && height_m <= options_.kerb_max_m &&
-          distanceFromPath({point}, path, options_.vehicle_half_width_m) <= options_.corridor_m) {
+      if (height_m >= kKerbMin_m && height_m <= kKerbMax_m &&
+          distanceFromPath({point}, path) <= options_.corridor_m) {
         KerbOutcome outcome;
-        outcome.place_m = point;
+        outcome.position_m = point;
         outcome.nearest_m = std::numeric_limits<double>::infinity();
         kerb_points_.push_back({height_m, std::nullopt, false, outcome});
       }
@@ -170,9 +188,9 @@ void ObstacleMapEvaluator::add(const ObstacleMap& map, const std::vector<SeenPoi
                                const std::vector<TruthObstacle>& movers,
                                const std::vector<TruthObstacle>& earlier_movers) {
   const Eigen::Vector2d position = world_from_vehicle.translation().head<2>();
-  driven_m_ += last_position_m_ ? (position - *last_position_m_).norm() : 0.0;
+  sums_.driven_m += last_position_m_ ? (position - *last_position_m_).norm() : 0.0;
   last_position_m_ = position;
-  ++num_frames_;
+  ++sums_.num_frames;
   const RigidTransform level =
       RigidTransform::planar(position.x(), position.y(), yawOfRotation(world_from_vehicle.rotation()));
   Frame frame{map,
@@ -183,29 +201,26 @@ void ObstacleMapEvaluator::add(const ObstacleMap& map, const std::vector<SeenPoi
               {},
               movers,
               earlier_movers};
-  for (int row = 0; row < map.state.rows; ++row) {
-    for (int column = 0; column < map.state.cols; ++column) {
-      if (map.state.at<int8_t>(row, column) == kCellOccupied) {
-        frame.occupied.push_back({frame.worldOf(column, row), map.height_m.at<float>(row, column)});
-      }
+  frame.forEachCell([&](int column, int row, int8_t state) {
+    if (state == kCellOccupied) {
+      frame.occupied.push_back({frame.worldOf(column, row), map.height_m.at<float>(row, column)});
     }
-  }
+  });
   for (const SeenPoint& point : points) {
-    const Eigen::Vector2d place = point.world_m.head<2>().cast<double>();
+    const Eigen::Vector2d point_m = point.world_m.head<2>().cast<double>();
     const double height_m = point.world_m.z();
-    if (height_m < options_.false_height_m &&
-        (place - frame.vehicle_middle_m).norm() <= options_.false_range_m) {
-      seen_ground_.add(place);
+    const double distance_m = (point_m - frame.vehicle_middle_m).norm();
+    if (height_m < kFalseHeight_m && distance_m <= kFalseRange_m) {
+      seen_ground_.add(point_m);
     }
-    if (point.from_travel_rad < options_.min_angle_from_travel_rad ||
-        (place - frame.vehicle_middle_m).norm() > options_.view_range_m) {
+    if (point.from_travel_rad < kMinAngleFromTravel_rad || distance_m > options_.view_range_m) {
       continue;
     }
     if (height_m >= kSeenHeight_m && height_m <= kMaxHeight_m) {
-      frame.seen_high.add(place);
+      frame.seen_high.add(point_m);
     }
-    if (height_m >= 0.04 && height_m <= options_.kerb_max_m) {
-      frame.seen_low.add(place);
+    if (height_m >= kSeenKerbHeight_m && height_m <= kKerbMax_m) {
+      frame.seen_low.add(point_m);
     }
   }
   judgeObstacles(frame);
@@ -217,16 +232,16 @@ void ObstacleMapEvaluator::add(const ObstacleMap& map, const std::vector<SeenPoi
 void ObstacleMapEvaluator::judgeObstacles(const Frame& frame) {
   for (Tracked& tracked : tracked_) {
     if (!isNear(tracked.obstacle, frame.vehicle_middle_m, options_.view_range_m + 1.0) ||
-        frame.seenPointsOf(tracked.obstacle) < options_.min_seen_points) {
+        frame.seenPointsOf(tracked.obstacle) < kMinSeenPoints) {
       continue;
     }
     if (!tracked.first_view_m) {
-      tracked.first_view_m = driven_m_;
+      tracked.first_view_m = sums_.driven_m;
     }
-    if (driven_m_ < *tracked.first_view_m + options_.grace_m) {
+    if (sums_.driven_m < *tracked.first_view_m + kGrace_m) {
       continue;
     }
-    const bool reported = frame.reports(tracked.obstacle, options_.tolerance_m);
+    const bool reported = frame.reports(tracked.obstacle);
     if (!tracked.judged) {
       tracked.judged = true;
       tracked.outcome.reported = reported;
@@ -236,12 +251,12 @@ void ObstacleMapEvaluator::judgeObstacles(const Frame& frame) {
   }
 }
 
-/// Of the occupied cell that reports the place.
+/// Height error of the nearest occupied cell that reports a kerb point; absent without one.
 std::optional<double> ObstacleMapEvaluator::kerbHeightError(const Frame& frame, const KerbPoint& point) {
   std::optional<double> error_m;
   double nearest_m = kKerbTolerance_m;
   for (const OccupiedCell& cell : frame.occupied) {
-    const double distance_m = (cell.world_m - point.outcome.place_m).norm();
+    const double distance_m = (cell.world_m - point.outcome.position_m).norm();
     if (distance_m <= nearest_m) {
       nearest_m = distance_m;
       error_m = std::abs(cell.height_m - point.height_m);
@@ -253,15 +268,15 @@ std::optional<double> ObstacleMapEvaluator::kerbHeightError(const Frame& frame, 
 void ObstacleMapEvaluator::judgeKerbs(const Frame& frame) {
   for (KerbPoint& point : kerb_points_) {
     KerbOutcome& outcome = point.outcome;
-    const double distance_m = (outcome.place_m - frame.vehicle_middle_m).norm();
-    if (!point.first_view_m && frame.seen_low.countAround(outcome.place_m) >= options_.min_seen_points) {
-      point.first_view_m = driven_m_;
+    const double distance_m = (outcome.position_m - frame.vehicle_middle_m).norm();
+    if (!point.first_view_m && frame.seen_low.countAround(outcome.position_m) >= kMinSeenPoints) {
+      point.first_view_m = sums_.driven_m;
     }
     if (!point.first_view_m) {
       continue;
     }
     outcome.nearest_m = std::min(outcome.nearest_m, distance_m);
-    const bool is_due = !point.judged && driven_m_ >= *point.first_view_m + options_.grace_m;
+    const bool is_due = !point.judged && sums_.driven_m >= *point.first_view_m + kGrace_m;
     if (!is_due && (outcome.ever_reported || distance_m > options_.view_range_m)) {
       continue;
     }
@@ -276,63 +291,41 @@ void ObstacleMapEvaluator::judgeKerbs(const Frame& frame) {
 }
 
 void ObstacleMapEvaluator::judgeCells(const Frame& frame) {
-  const ObstacleMap& map = frame.map;
-  const auto isNearMover = [&](const Eigen::Vector2d& place) {
-    return std::any_of(frame.earlier_movers.begin(), frame.earlier_movers.end(),
-                       [&](const TruthObstacle& mover) {
-                         return distanceToPolygon(place, mover.footprint_m) <= options_.tolerance_m;
-                       });
-  };
   std::vector<TruthObstacle> nearby;
   std::copy_if(standing_.begin(), standing_.end(), std::back_inserter(nearby),
                [&](const TruthObstacle& obstacle) {
-                 return isNear(obstacle, frame.vehicle_middle_m, options_.false_range_m + 1.0);
+                 return isNear(obstacle, frame.vehicle_middle_m, kFalseRange_m + 1.0);
                });
-  // Posts may stand between the cells of the height map.
-  const auto isNearObstacle = [&](const Eigen::Vector2d& place) {
-    return std::any_of(nearby.begin(), nearby.end(), [&](const TruthObstacle& obstacle) {
-      return distanceToPolygon(place, obstacle.footprint_m) <= options_.false_radius_m;
-    });
-  };
-  for (int row = 0; row < map.state.rows; ++row) {
-    for (int column = 0; column < map.state.cols; ++column) {
-      const int8_t state = map.state.at<int8_t>(row, column);
-      const int64_t fixed_key = SeenCells::keyOf(frame.fixedOf(column, row));
-      const auto known = false_cells_.find(fixed_key);
-      if (known != false_cells_.end() && state != kCellOccupied) {
-        known->second.is_left = false;
-      }
-      const Eigen::Vector2d place = frame.worldOf(column, row);
-      if (state == kCellUnobserved || (place - frame.vehicle_middle_m).norm() > options_.false_range_m) {
-        continue;
-      }
-      const int64_t key = SeenCells::keyOf(place);
-      if (heights_.at(lowest_around_, place) >= 0.2F) {
-        observed_inside_.insert(key);
-        if (state == kCellFree) {
-          free_inside_.insert(key);
-        }
-      } else if (state == kCellOccupied && !isNearMover(place) && !isNearObstacle(place) &&
-                 heights_.at(highest_around_, place) < static_cast<float>(options_.false_height_m)) {
-        addFalseCell(frame, fixed_key, place);
-      }
+  frame.forEachCell([&](int column, int row, int8_t state) {
+    const int64_t fixed_key = SeenCells::keyOf(frame.fixedOf(column, row));
+    const auto known = false_cells_.find(fixed_key);
+    if (known != false_cells_.end() && state != kCellOccupied) {
+      known->second.is_left = false;
     }
-  }
-}
+    const Eigen::Vector2d position = frame.worldOf(column, row);
+    if (state == kCellUnobserved || (position - frame.vehicle_middle_m).norm() > kFalseRange_m) {
+      return;
+    }
+    const int64_t key = SeenCells::keyOf(position);
+    if (heights_.at(lowest_around_, position) >= kInsideHeight_m) {
+      observed_inside_.insert(key);
+      if (state == kCellFree) {
+        free_inside_.insert(key);
+      }
+    } else if (state == kCellOccupied && !isNearAny(frame.earlier_movers, position, kTolerance_m) &&
+               !isNearAny(nearby, position, kFalseRadius_m) &&  // the height map may miss thin posts
 
-void ObstacleMapEvaluator::addFalseCell(const Frame& frame, int64_t key, const Eigen::Vector2d& place_m) {
-  const auto [entry, is_new] = false_cells_.try_emplace(key);
-  FalseCell& cell = entry->second;
-  if (is_new) {
-    cell.world_m = place_m;
-    cell.first_seen = frame.map.stamp;
-  }
-  ++cell.frames;
-  cell.is_left = true;
+               heights_.at(highest_around_, position) < static_cast<float>(kFalseHeight_m)) {
+      FalseCell& cell =
+          false_cells_.try_emplace(fixed_key, FalseCell{position, frame.map.stamp}).first->second;
+      ++cell.frames;
+      cell.is_left = true;
+    }
+  });
 }
 
 void ObstacleMapEvaluator::addFalseCellsTo(ObstacleMapErrors* errors) const {
-  uint64_t maps = 0;
+  size_t maps = 0;
   for (const auto& entry : false_cells_) {
     FalseCell cell = entry.second;
     cell.is_on_open = seen_ground_.countAround(cell.world_m) > 0;
@@ -345,34 +338,32 @@ void ObstacleMapEvaluator::addFalseCellsTo(ObstacleMapErrors* errors) const {
     errors->num_false_left += cell.is_left ? 1 : 0;
     maps += cell.frames;
   }
-  errors->false_cells_per_10_m =
-      driven_m_ > 0.0 ? 10.0 * static_cast<double>(errors->num_false_cells) / driven_m_ : 0.0;
-  errors->false_cells_per_map =
-      num_frames_ > 0 ? static_cast<double>(maps) / static_cast<double>(num_frames_) : 0.0;
+  if (errors->driven_m > 0.0) {
+    errors->false_cells_per_10_m = 10.0 * static_cast<double>(errors->num_false_cells) / errors->driven_m;
+  }
+  if (errors->num_frames > 0) {
+    errors->false_cells_per_map = static_cast<double>(maps) / static_cast<double>(errors->num_frames);
+  }
 }
 
 void ObstacleMapEvaluator::judgeMovers(const Frame& frame) {
   for (const TruthObstacle& mover : frame.movers) {
-    if (frame.seenPointsOf(mover) >= options_.min_seen_points) {
-      ++num_mover_frames_;
-      num_mover_reported_ += frame.reports(mover, options_.tolerance_m) ? 1 : 0;
-      for (int row = 0; row < frame.map.state.rows; ++row) {
-        for (int column = 0; column < frame.map.state.cols; ++column) {
-          if (distanceToPolygon(frame.worldOf(column, row), mover.footprint_m) > 0.0) {
-            continue;
-          }
-          ++num_mover_cells_;
-          num_mover_free_ += frame.map.state.at<int8_t>(row, column) == kCellFree ? 1 : 0;
-        }
-      }
+    if (frame.seenPointsOf(mover) < kMinSeenPoints) {
+      continue;
     }
+    ++sums_.num_mover_frames;
+    sums_.num_mover_reported += frame.reports(mover) ? 1 : 0;
+    frame.forEachCell([&](int column, int row, int8_t state) {
+      if (distanceToPolygon(frame.worldOf(column, row), mover.footprint_m) <= 0.0) {
+        ++sums_.num_mover_cells;
+        sums_.num_mover_free += state == kCellFree ? 1 : 0;
+      }
+    });
   }
 }
 
 ObstacleMapErrors ObstacleMapEvaluator::errors() const {
-  ObstacleMapErrors errors;
-  errors.num_frames = num_frames_;
-  errors.driven_m = driven_m_;
+  ObstacleMapErrors errors = sums_;
   for (const Tracked& tracked : tracked_) {
     if (tracked.judged) {
       errors.obstacles.push_back(tracked.outcome);
@@ -394,10 +385,6 @@ ObstacleMapErrors ObstacleMapEvaluator::errors() const {
     }
   }
   errors.kerb_height_error_m = summarize(height_errors_m);
-  errors.num_mover_frames = num_mover_frames_;
-  errors.num_mover_reported = num_mover_reported_;
-  errors.num_mover_cells = num_mover_cells_;
-  errors.num_mover_free = num_mover_free_;
   return errors;
 }
 

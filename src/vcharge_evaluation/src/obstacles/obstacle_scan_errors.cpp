@@ -4,17 +4,25 @@
 #include <cmath>
 #include <limits>
 
-#include "vcharge_core/base/options.h"
+#include "vcharge_evaluation/travel_angle.h"
 
 namespace vcharge {
 namespace {
 
 constexpr double kNear_m = 2.0;
+constexpr double kMinRange_m = 0.5;
+// Surfaces between these heights are obstacles.
+constexpr double kMinHeight_m = 0.1;
+constexpr double kMaxHeight_m = 2.0;
+// An obstacle reaches the judged height within this distance behind its nearest point.
+constexpr double kRiseDepth_m = 0.3;
+// A reported range further off belongs to another obstacle or to none.
+constexpr double kGate_m = 0.5;
 
-/// What the points in one sector say.
+/// True obstacles in one sector.
 struct SectorTruth {
   double range_m = std::numeric_limits<double>::infinity();         // nearest obstacle
-  double judged_range_m = std::numeric_limits<double>::infinity();  // nearest that is high enough
+  double judged_range_m = std::numeric_limits<double>::infinity();  // nearest one that is high enough
   double from_travel_rad = 0.0;
 };
 
@@ -29,7 +37,7 @@ std::vector<SectorTruth> collectTruth(const ObstacleScan& scan, const std::vecto
   std::vector<SectorTruth> truth(scan.size());
   for (const SeenPoint& point : points) {
     const double height_m = point.world_m.z();
-    if (height_m < options.min_height_m || height_m > options.max_height_m) {
+    if (height_m < kMinHeight_m || height_m > kMaxHeight_m) {
       continue;
     }
     const Eigen::Vector2f offset = point.world_m.head<2>() - origin;
@@ -52,28 +60,18 @@ std::vector<SectorTruth> collectTruth(const ObstacleScan& scan, const std::vecto
 
 }  // namespace
 
-void ObstacleScanEvaluationOptions::validate() const {
-  requireField(min_height_m > 0.0, "min_height_m", "must be positive", min_height_m);
-  requireField(judged_height_m >= min_height_m, "judged_height_m", "must not be below min_height_m",
-               judged_height_m);
-  requireField(max_height_m > judged_height_m, "max_height_m", "must be above judged_height_m", max_height_m);
-  requireField(rise_depth_m >= 0.0, "rise_depth_m", "must not be negative", rise_depth_m);
-  requireField(max_range_m > min_range_m, "max_range_m", "must be above min_range_m", max_range_m);
-  requireField(gate_m > 0.0, "gate_m", "must be positive", gate_m);
-}
-
 ObstacleScanEvaluator::ObstacleScanEvaluator(const ObstacleScanEvaluationOptions& options)
     : options_(options) {
   options_.validate();
 }
 
 void ObstacleScanEvaluator::addRay(double reported_m, double sigma_m, double truth_m, double nearest_truth_m,
-                                   double gate_m, Rays* rays) {
+                                   Rays* rays) {
   ++rays->judged;
   const double error_m = reported_m - nearest_truth_m;
-  if (!(error_m <= gate_m)) {  // also where nothing is reported
+  if (!(error_m <= kGate_m)) {  // true for NaN, if nothing is reported
     ++rays->missed;
-  } else if (error_m < -gate_m) {
+  } else if (error_m < -kGate_m) {
     ++rays->nearer;
   } else {
     rays->errors_m.push_back(std::abs(error_m));
@@ -88,8 +86,8 @@ void ObstacleScanEvaluator::add(const ObstacleScan& scan, const std::vector<Seen
   const std::vector<SectorTruth> truth = collectTruth(scan, points, world_from_vehicle, options_);
   for (size_t i = 0; i < scan.size(); ++i) {
     const double truth_m = truth[i].range_m;
-    if (!(truth_m >= options_.min_range_m && truth_m <= options_.max_range_m) ||
-        truth[i].judged_range_m > truth_m + options_.rise_depth_m) {
+    if (!(truth_m >= kMinRange_m && truth_m <= options_.max_range_m) ||
+        truth[i].judged_range_m > truth_m + kRiseDepth_m) {
       continue;
     }
     const double reported_m = scan.range_m[i];
@@ -99,11 +97,10 @@ void ObstacleScanEvaluator::add(const ObstacleScan& scan, const std::vector<Seen
         nearest_m = truth[beside].range_m;
       }
     }
-    const bool is_aside = truth[i].from_travel_rad >= options_.min_angle_from_travel_rad;
-    addRay(reported_m, scan.range_sigma_m[i], truth_m, nearest_m, options_.gate_m,
-           is_aside ? &aside_ : &ahead_);
+    const bool is_aside = truth[i].from_travel_rad >= kMinAngleFromTravel_rad;
+    addRay(reported_m, scan.range_sigma_m[i], truth_m, nearest_m, is_aside ? &aside_ : &ahead_);
     if (!is_aside && truth_m < kNear_m) {
-      addRay(reported_m, scan.range_sigma_m[i], truth_m, nearest_m, options_.gate_m, &ahead_near_);
+      addRay(reported_m, scan.range_sigma_m[i], truth_m, nearest_m, &ahead_near_);
     }
   }
 }
@@ -123,8 +120,8 @@ RayErrors ObstacleScanEvaluator::summarizeRays(const Rays& rays) {
                                                [&](double value) { return value <= sigmas; })) /
              count;
     };
-    errors.share_within_one_sigma = within(1.0);
-    errors.share_within_two_sigma = within(2.0);
+    errors.fraction_within_one_sigma = within(1.0);
+    errors.fraction_within_two_sigma = within(2.0);
   }
   return errors;
 }

@@ -33,9 +33,9 @@ TruthObstacle readObstacle(const YAML::Node& node) {
 double distanceToSegment(const Eigen::Vector2d& point, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   const Eigen::Vector2d along = b - a;
   const double length_square = along.squaredNorm();
-  const double share =
+  const double fraction =
       length_square > 0.0 ? std::clamp((point - a).dot(along) / length_square, 0.0, 1.0) : 0.0;
-  return (point - a - share * along).norm();
+  return (point - a - fraction * along).norm();
 }
 
 }  // namespace
@@ -146,7 +146,7 @@ std::vector<SeenPoint> makeSeenPoints(const cv::Mat& range_m, const RayTable& ra
         continue;
       }
       const Eigen::Vector3f offset = range * (rotation * rays.ray(x, y));
-      float angle = static_cast<float>(0.5 * M_PI);  // where the vehicle stands no ray is near its travel
+      float angle = static_cast<float>(0.5 * M_PI);  // a standing vehicle has no direction of travel
       if (travel.squaredNorm() > 0.0F) {
         const float along = std::abs(offset.head<2>().dot(travel));
         const float across = std::abs(offset.x() * travel.y() - offset.y() * travel.x());

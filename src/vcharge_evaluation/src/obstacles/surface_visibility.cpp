@@ -9,18 +9,20 @@
 namespace vcharge {
 namespace {
 
-constexpr double kClearance_m = 0.02;     // by which a line of sight may cut into the surface
-constexpr double kMinFaceCosine = 0.174;  // between a face's normal and who looks at it: 80 degrees
+constexpr double kViewDistance_m = 0.3;  // travel between two views
+constexpr double kClearance_m = 0.02;    // depth to which a line of sight may cut into the surface
+constexpr double kMinFaceCosine =
+    0.174;  // between a face's normal and the direction to the camera: 80 degrees
 
 }  // namespace
 
 SurfaceVisibility::SurfaceVisibility(const HeightMap& surface, const Trajectory& world_from_vehicle,
-                                     const CameraRig& rig, double view_distance_m, double max_range_m)
+                                     const CameraRig& rig, double max_range_m)
     : surface_(surface), rig_(rig), max_range_m_(max_range_m) {
   const RigidTransform* last = nullptr;
   for (const StampedTransform& pose : world_from_vehicle) {
     if (last != nullptr &&
-        (pose.world_from_vehicle.translation() - last->translation()).norm() < view_distance_m) {
+        (pose.world_from_vehicle.translation() - last->translation()).norm() < kViewDistance_m) {
       continue;
     }
     last = &pose.world_from_vehicle;
@@ -35,7 +37,7 @@ SurfaceVisibility::SurfaceVisibility(const HeightMap& surface, const Trajectory&
 bool SurfaceVisibility::sees(const View& view, const Eigen::Vector3d& point_in_world) const {
   const Eigen::Vector3d to_camera = view.position_m - point_in_world;
   const double distance = to_camera.norm();
-  // What heights describe faces up: nobody sees it from below, as the top of a wall over the camera.
+  // A height map describes upward surfaces, which are not visible from below.
   if (distance > max_range_m_ || to_camera.z() <= 0.0) {
     return false;
   }

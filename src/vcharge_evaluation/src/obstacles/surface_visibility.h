@@ -8,20 +8,20 @@
 
 namespace vcharge {
 
-/// Where the cameras of a drive stood, and what they could see of a surface given by its heights.
+/// Visibility of a surface, given by its heights, from the cameras of a drive.
 class SurfaceVisibility {
  public:
-  /// A view each `view_distance_m` of travel, from each camera.
+  /// Takes a view from each camera every 0.3 m of travel.
   SurfaceVisibility(const HeightMap& surface, const Trajectory& world_from_vehicle, const CameraRig& rig,
-                    double view_distance_m, double max_range_m);
+                    double max_range_m);
 
-  /// In how many views a point a little above the surface is in the image, below the camera, not behind the
-  /// own vehicle, and not hidden; counting ends at `enough`. Thread safe.
+  /// Number of views in which a point a little above the surface is visible: in the image, below the camera,
+  /// not masked and not hidden. Counting ends at `enough`. Thread safe.
   int countViews(const Eigen::Vector3d& point_in_world, int enough) const;
-  /// The same, of the views that look at an upright face there, by 10 degrees or more. `normal`: unit, out of
-  /// the face. Thread safe.
+  /// The same for views that are at least 10 degrees in front of an upright face. `normal`: unit, out of the
+  /// face. Thread safe.
   int countFaceViews(const Eigen::Vector3d& point_in_world, const Eigen::Vector3d& normal, int enough) const;
-  /// Distance of the nearest of these views; infinite where there is none. Thread safe.
+  /// Distance of the nearest view in which the point is visible; infinite without one. Thread safe.
   double nearestView(const Eigen::Vector3d& point_in_world) const;
 
  private:

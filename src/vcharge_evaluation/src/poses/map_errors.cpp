@@ -8,6 +8,8 @@ namespace vcharge {
 namespace {
 
 constexpr double kPi = 3.14159265358979;
+// Travel after which a position counts as revisited.
+constexpr double kMinTravel_m = 10.0;
 
 /// The truth at one of the map's keyframes.
 struct TruePose {
@@ -15,7 +17,7 @@ struct TruePose {
   double travelled_m = 0.0;
 };
 
-/// By keyframe; absent where the truth does not reach.
+/// The truth by keyframe; absent outside the true trajectory.
 std::vector<std::optional<TruePose>> truthAtKeyframes(const SparseMap& map, const Trajectory& estimate,
                                                       const Trajectory& truth) {
   const AssociatedTrajectories pairs = associateWithTruth(estimate, truth);
@@ -43,7 +45,7 @@ std::vector<std::optional<TruePose>> truthAtKeyframes(const SparseMap& map, cons
   return result;
 }
 
-/// Between the directions in which two vehicles look, in [0, pi].
+/// Angle between the headings of two poses, in [0, pi].
 double headingDifference(const TruePose& first, const TruePose& second) {
   const double difference_rad =
       yawOfRotation(first.world_from_vehicle.rotation().conjugate() * second.world_from_vehicle.rotation());
@@ -111,7 +113,7 @@ void countRevisits(const SparseMap& map, const std::vector<std::optional<TruePos
   for (size_t k = 0; k < num_keyframes; ++k) {
     bool same = false, opposite = false;
     for (size_t earlier = 0; truth[k] && earlier < k; ++earlier) {
-      if (truth[earlier] && truth[k]->travelled_m - truth[earlier]->travelled_m > options.min_travel_m &&
+      if (truth[earlier] && truth[k]->travelled_m - truth[earlier]->travelled_m > kMinTravel_m &&
           (truth[k]->world_from_vehicle.translation() - truth[earlier]->world_from_vehicle.translation())
                   .norm() < options.revisit_distance_m) {
         (headingDifference(*truth[earlier], *truth[k]) > options.opposite_rad ? opposite : same) = true;
@@ -137,14 +139,6 @@ void countRevisits(const SparseMap& map, const std::vector<std::optional<TruePos
 
 }  // namespace
 
-void MapErrorOptions::validate() const {
-  requireField(max_edge_error_m > 0.0, "max_edge_error_m", "must be positive", max_edge_error_m);
-  requireField(max_edge_error_rad > 0.0, "max_edge_error_rad", "must be positive", max_edge_error_rad);
-  requireField(revisit_distance_m > 0.0, "revisit_distance_m", "must be positive", revisit_distance_m);
-  requireField(min_travel_m > 0.0, "min_travel_m", "must be positive", min_travel_m);
-  requireField(opposite_rad > 0.0 && opposite_rad < kPi, "opposite_rad", "must be in (0, pi)", opposite_rad);
-}
-
 MapErrors evaluateMap(const SparseMap& map, const Trajectory& truth, const MapErrorOptions& options) {
   options.validate();
   Trajectory estimate;
@@ -153,7 +147,7 @@ MapErrors evaluateMap(const SparseMap& map, const Trajectory& truth, const MapEr
   }
   MapErrors errors;
   errors.keyframes = evaluateTrajectory(estimate, truth, TrajectoryAlignment::kSe3);
-  errors.num_keyframes_without_truth = static_cast<int64_t>(errors.keyframes.num_without_truth);
+  errors.num_keyframes_without_truth = static_cast<int>(errors.keyframes.num_without_truth);
   errors.scale_error = evaluateScaleError(estimate, truth).value_or(0.0);
   const AssociatedTrajectories pairs = associateWithTruth(estimate, truth);
   std::vector<Eigen::Vector3d> in_map, in_truth;

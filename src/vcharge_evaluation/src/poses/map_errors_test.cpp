@@ -16,8 +16,8 @@ Timestamp at(int i) {
   return Timestamp::fromNanoseconds(1'000'000'000'000LL + 500'000'000LL * i);
 }
 
-/// 20 m ahead, a turn on the spot far away, the same lane back, and the lane once more: keyframe k of the
-/// first pass is at (k, 0), that of the second at (19 - k, 1) looking back, of the third at (k, -1).
+/// Three passes of a lane of 20 m: keyframe k of the first pass is at (k, 0), of the second at (19 - k, 1) in
+/// the opposite heading, of the third at (k, -1).
 Trajectory thereBackAndThere() {
   Trajectory truth;
   for (int i = 0; i < 3 * kLane; ++i) {
@@ -49,7 +49,7 @@ class MapErrorsTest : public ::testing::Test {
     }
   }
 
-  /// An edge that is off by `error` in the second's frame.
+  /// Adds an edge with an error in the frame of the second keyframe.
   void addEdge(int first, int second, const RigidTransform& error, const std::string& reason = "") {
     const RigidTransform first_from_second =
         truth_[first].world_from_vehicle.inverse() * truth_[second].world_from_vehicle;
@@ -63,14 +63,14 @@ class MapErrorsTest : public ::testing::Test {
   SparseMapContents contents_;
 };
 
-TEST_F(MapErrorsTest, AMapThatWasMovedAsAWholeHasNoError) {
+TEST_F(MapErrorsTest, RigidlyMovedMapHasNoError) {
   const MapErrors errors = evaluate();
   EXPECT_LE(errors.keyframes.position_m.max, 1e-9);
   EXPECT_NEAR(errors.scale_error, 0.0, 1e-12);
   EXPECT_LE((errors.truth_from_map.matrix() - map_from_truth_.inverse().matrix()).norm(), 1e-9);
 }
 
-TEST_F(MapErrorsTest, TellsAMapThatIsTooLarge) {
+TEST_F(MapErrorsTest, ScaleErrorOfALargerMapIsFound) {
   for (MapKeyframe& keyframe : contents_.keyframes) {
     keyframe.map_from_vehicle =
         RigidTransform(keyframe.map_from_vehicle.rotation(), 1.01 * keyframe.map_from_vehicle.translation());
@@ -78,7 +78,7 @@ TEST_F(MapErrorsTest, TellsAMapThatIsTooLarge) {
   EXPECT_NEAR(evaluate().scale_error, 0.01, 1e-9);
 }
 
-TEST_F(MapErrorsTest, WrongEdgesAreThoseFurtherOffThanTheBounds) {
+TEST_F(MapErrorsTest, EdgesBeyondTheBoundsAreWrong) {
   addEdge(5, 45, RigidTransform::planar(0.29, 0.0, 0.0));
   addEdge(6, 46, RigidTransform::planar(0.0, 0.31, 0.0));
   addEdge(7, 47, RigidTransform::planar(0.0, 0.0, 0.051));
@@ -97,14 +97,14 @@ TEST_F(MapErrorsTest, WrongEdgesAreThoseFurtherOffThanTheBounds) {
   EXPECT_EQ(errors.rejected.at("too uncertain").num_right, 1);
 }
 
-TEST_F(MapErrorsTest, CountsPlacesPassedBeforeByHeading) {
-  // The second pass is opposite to the first. Its keyframe j, at 19 - j, has driven 2 j + 1 m (and the way
-  // between the lanes, about 1 m) since it was there; so the first few have no earlier pass 10 m ago within
-  // 3 m. The third pass has both.
+TEST_F(MapErrorsTest, PositionsPassedBeforeAreCountedByHeading) {
+  // The second pass is opposite to the first. The vehicle has driven about 2 j + 2 m since it was near
+  // keyframe j of the second pass, so that the first few have no pass within 3 m that is more than 10 m ago.
+  // The third pass has both.
   const MapErrors none = evaluate();
   EXPECT_EQ(none.revisits.num_found, 0);
   EXPECT_EQ(none.same.num_keyframes, kLane);
-  int expected = 0;  // of the second pass, counted from the formula
+  int expected = 0;  // keyframes of the second pass, by that formula
   for (int j = 0; j < kLane; ++j) {
     bool any = false;
     for (int k = 0; k < kLane; ++k) {

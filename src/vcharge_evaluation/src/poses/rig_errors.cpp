@@ -8,7 +8,7 @@
 namespace vcharge {
 namespace {
 
-const RigidTransform& placeOf(const CameraRig& rig, const std::string& name, const char* which) {
+const RigidTransform& extrinsicsOf(const CameraRig& rig, const std::string& name, const char* which) {
   const int index = rig.findCamera(name);
   if (index < 0) {
     throw InputError(std::string(which) + ": expected a camera '" + name + "'");
@@ -25,8 +25,8 @@ RigErrors evaluateRig(const CameraRig& estimate, const CameraRig& truth) {
   RigErrors result;
   double product = 0.0, square = 0.0;
   for (const RigCamera& camera : truth.cameras) {
-    const Eigen::Vector3d& estimated = placeOf(estimate, camera.name, "estimate").translation();
-    product += estimated.dot(placeOf(truth, camera.name, "truth").translation());
+    const Eigen::Vector3d& estimated = extrinsicsOf(estimate, camera.name, "estimate").translation();
+    product += estimated.dot(extrinsicsOf(truth, camera.name, "truth").translation());
     square += estimated.squaredNorm();
   }
   if (square > 0.0) {
@@ -35,7 +35,7 @@ RigErrors evaluateRig(const CameraRig& estimate, const CameraRig& truth) {
   const auto errorsAt = [&](double scale) {
     std::vector<CameraErrors> errors;
     for (const RigCamera& camera : truth.cameras) {
-      const RigidTransform& estimated = placeOf(estimate, camera.name, "estimate");
+      const RigidTransform& estimated = extrinsicsOf(estimate, camera.name, "estimate");
       CameraErrors of_camera;
       of_camera.name = camera.name;
       of_camera.error << camera.vehicle_from_camera->translation() - scale * estimated.translation(),

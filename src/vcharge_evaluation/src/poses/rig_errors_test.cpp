@@ -21,7 +21,7 @@ CameraRig makeRig() {
   return rig;
 }
 
-TEST(RigErrorsTest, FindsTheScaleAndWhatItDoesNotExplain) {
+TEST(RigErrorsTest, ScaleAndRemainingErrorsAreFound) {
   const CameraRig truth = makeRig();
   CameraRig estimate = truth;
   for (RigCamera& camera : estimate.cameras) {
@@ -39,7 +39,7 @@ TEST(RigErrorsTest, FindsTheScaleAndWhatItDoesNotExplain) {
   EXPECT_NEAR(errors.without_scale[1].error[5], -0.002, 1e-9);
 }
 
-TEST(RigErrorsTest, NamesTheCameraThatIsMissing) {
+TEST(RigErrorsTest, MissingCameraIsNamed) {
   CameraRig estimate = makeRig();
   estimate.cameras.pop_back();
   try {

@@ -40,7 +40,7 @@ TEST(TrajectoryErrorsTest, ConstantOffsetIsAnErrorUnlessAligned) {
   EXPECT_LE(evaluateTrajectory(estimate, truth, TrajectoryAlignment::kSe3).position_m.max, 1e-9);
 }
 
-TEST(TrajectoryErrorsTest, ErrorsAreGivenInTheVehiclesAxes) {
+TEST(TrajectoryErrorsTest, ErrorsAreInTheAxesOfTheVehicle) {
   const Trajectory truth = circle(50);
   Trajectory estimate = truth;
   for (StampedTransform& entry : estimate) {
@@ -64,7 +64,7 @@ TEST(TrajectoryErrorsTest, TruthIsInterpolatedAndNeverExtrapolated) {
   EXPECT_THROW(evaluateTrajectory({estimate[0]}, truth, TrajectoryAlignment::kNone), InputError);
 }
 
-TEST(TrajectoryErrorsTest, DriftOfAWrongScaleIsItsShare) {
+TEST(TrajectoryErrorsTest, DriftOfAWrongScaleIsItsPercentage) {
   const Trajectory truth = circle(400);
   Trajectory estimate = truth;
   for (StampedTransform& entry : estimate) {
@@ -73,13 +73,13 @@ TEST(TrajectoryErrorsTest, DriftOfAWrongScaleIsItsShare) {
   }
   const DriftErrors drift = evaluateDrift(estimate, truth, 5.0);
   EXPECT_GT(drift.translation_percent.count, 100U);
-  // 2 % of the chord, which is a little shorter than the way.
+  // 2 % of the chord, which is a little shorter than the path.
   EXPECT_NEAR(drift.translation_percent.percentile_50, 2.0, 0.03);
   EXPECT_LE(drift.rotation_rad.max, 1e-9);
   EXPECT_EQ(evaluateDrift(estimate, truth, 1e6).translation_percent.count, 0U);
 }
 
-TEST(TrajectoryErrorsTest, ScaleErrorIsThatOfAnEnlargedPathWhereverItLies) {
+TEST(TrajectoryErrorsTest, ScaleErrorDoesNotDependOnThePose) {
   const Trajectory truth = circle(400);
   Trajectory estimate = truth;
   for (StampedTransform& entry : estimate) {
@@ -104,7 +104,7 @@ TEST(AlignPointsTest, RecoversARandomTransform) {
     const RigidTransform target_from_source(Eigen::Quaterniond(next(), next(), next(), next()),
                                             Eigen::Vector3d(next(), next(), next()));
     std::vector<Eigen::Vector3d> source, target;
-    const bool planar = trial % 2 == 0;  // a reflection must not be taken for a rotation
+    const bool planar = trial % 2 == 0;  // planar points also allow a reflection, which is no rotation
     for (int i = 0; i < 10; ++i) {
       source.emplace_back(next(), next(), planar ? 0.0 : next());
       target.push_back(target_from_source * source.back());

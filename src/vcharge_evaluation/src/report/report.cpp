@@ -17,9 +17,9 @@ namespace fs = std::filesystem;
 void writeReport(const nlohmann::json& json, const std::string& folder, const std::string& name) {
   createFolder(folder);
   const std::string json_path = (fs::path(folder) / (name + ".json")).string();
-  writeTextFileAtomically(json_path, json.dump(2) + "\n");
+  writeJson(json, json_path);
 
-  // The script lies beside the tools, in the build as in an installation.
+  // The script is installed beside the tools.
   const std::string script = (fs::read_symlink("/proc/self/exe").parent_path() / "plot_evaluation").string();
   std::string arguments[] = {script, json_path};
   char* argv[] = {arguments[0].data(), arguments[1].data(), nullptr};
@@ -29,6 +29,10 @@ void writeReport(const nlohmann::json& json, const std::string& folder, const st
       waitpid(child, &status, 0) != child || status != 0) {
     std::cerr << json_path << ": written, but " << script << " could not draw its plots\n";
   }
+}
+
+void writeJson(const nlohmann::json& json, const std::string& path) {
+  writeTextFileAtomically(path, json.dump(2) + "\n");
 }
 
 }  // namespace vcharge

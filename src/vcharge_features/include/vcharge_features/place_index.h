@@ -13,46 +13,44 @@ namespace vcharge {
 
 /// A place that looks like the query.
 struct PlaceMatch {
-  int place = -1;      ///< as add() numbered it
-  double score = 0.0;  ///< higher is better; PlaceIndex: in [0, number of cameras]
-  /// Per camera of the query: the place's camera that looks most alike (-1: none). A place passed in the
-  /// opposite direction is seen by another camera.
+  int place = -1;      ///< number of the place
+  double score = 0.0;  ///< higher is better; in [0, number of cameras] for PlaceIndex
+  /// The most similar camera of the place for each camera of the query (-1: none). They differ if the vehicle
+  /// passes the place in another direction.
   std::vector<int> cameras;
 };
 
-/// Finds places again by what the cameras of a rig see there: an inverted file from words to images (Nister
-/// and Stewenius, CVPR 2006). A place's score adds up, over the query's cameras, the similarity to the most
-/// similar image of the place. Not thread safe while places are added.
+/// Recognizes places by the images of a rig, with an inverted file from words to images (Nister and
+/// Stewenius, CVPR 2006). The score of a place is the sum, over the query's cameras, of the similarity to the
+/// most similar image of the place. Not thread safe while places are added.
 class PlaceIndex {
  public:
-  /// std::logic_error for no vocabulary or fewer than one camera.
+  /// Throws std::logic_error without a vocabulary or a camera.
   PlaceIndex(std::shared_ptr<const VocabularyTree> vocabulary, int num_cameras);
 
-  /// Adds a place from the descriptors of each camera (empty: the camera saw nothing); returns its number,
-  /// which counts from 0. std::logic_error for another number of cameras; std::invalid_argument for
-  /// descriptors of another kind than the vocabulary's.
+  /// Adds a place with the descriptors of each camera (which may be empty) and returns its number, from 0.
+  /// Throws std::logic_error for another number of cameras, std::invalid_argument for descriptors of another
+  /// kind than the vocabulary's.
   int add(const std::vector<cv::Mat>& descriptors_by_camera);
-
-  /// Adds many places as add() does one after the other, their descriptors quantized in parallel: the same
-  /// index on any number of threads. Returns the first one's number. Errors as add(), and then none is added.
+  /// Adds several places like add(), and quantizes their descriptors in parallel: the same index on any
+  /// number of threads. Returns the number of the first. Throws like add(), and then adds none.
   int addAll(const std::vector<std::vector<cv::Mat>>& descriptors_of_places);
-
-  /// At most `max_results` places with a score above 0, the best first, ties by number; only places below
-  /// `end_place` count: a drive should not find what it saw just before. Errors as add().
+  /// At most `max_results` places with a positive score, best first, ties by number. Only places below
+  /// `end_place` are considered, to exclude those passed just before. Throws like add().
   std::vector<PlaceMatch> query(const std::vector<cv::Mat>& descriptors_by_camera, int max_results,
                                 int end_place = std::numeric_limits<int>::max()) const;
-
   int numPlaces() const { return num_places_; }
 
  private:
   struct Posting {
-    int32_t image;  ///< place times number of cameras plus camera
+    int32_t image;  ///< place * number of cameras + camera
     float weight;
   };
+
   const std::shared_ptr<const VocabularyTree> vocabulary_;
   const int num_cameras_;
   int num_places_ = 0;
-  std::vector<std::vector<Posting>> postings_;  // per word, images ascending
+  std::vector<std::vector<Posting>> postings_;  // per word, ascending by image
 };
 
 }  // namespace vcharge

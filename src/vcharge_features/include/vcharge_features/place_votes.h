@@ -6,40 +6,37 @@
 
 #include <opencv2/core.hpp>
 
+#include "vcharge_core/base/options.h"
 #include "vcharge_features/hamming_index.h"
 #include "vcharge_features/place_index.h"
 
 namespace vcharge {
 
 struct PlaceVotesOptions {
-  int max_distance_bits = 32;  ///< between a feature and what it votes for
-  double sigma_bits = 20.0;    ///< a vote's weight falls off as a normal distribution of the distance
-  HammingIndexOptions index;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("max_distance_bits", max_distance_bits);
-    visit("sigma_bits", sigma_bits);
-    visit("index", index);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(PlaceVotesOptions);
+  VCHARGE_OPTION(int, max_distance_bits, 32, between(0, 256),
+                 "Largest distance between a feature and one that it votes for.");
+  VCHARGE_OPTION(double, sigma_bits, 20.0, positive(),
+                 "Standard deviation of the normal distribution that weights a vote by its distance.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// Finds places of a map again, on another day too, by single features: each votes for the places where
-/// nearly the same was seen, the less the more places there are (ln(N / n), inverse document frequency).
-/// Nothing is quantized, so what only resembles adds nothing: where much of a scene looks alike, as parked
-/// cars and marked bays do, the words of a vocabulary tree are the same everywhere, and PlaceIndex (which is
-/// faster, and grows) ranks the right place behind many others. Immutable.
+/// Recognizes places of a map, also on another day, by single features: each votes for the places that have
+/// nearly the same feature, with less weight the more places have it (ln(N / n), inverse document frequency).
+/// Features are not quantized: in repetitive scenes such as parked cars and marked bays, the words of a
+/// vocabulary tree are the same everywhere, and PlaceIndex, which is faster and can grow, ranks the right
+/// place behind many others. Immutable.
 class PlaceVotes {
  public:
-  /// Descriptor i was seen in image images[i] = place * num_cameras + camera. Numbers are compared by 256
-  /// bits that tell which of two of them is larger. std::logic_error for counts or images that do not fit;
-  /// std::invalid_argument for bad options or descriptors.
+  /// Descriptor i belongs to image images[i] = place * num_cameras + camera. Descriptors of numbers are
+  /// compared by 256 bits that tell which of two numbers is larger. Throws std::logic_error for inconsistent
+  /// counts or images, std::invalid_argument for bad options or descriptors.
   PlaceVotes(const cv::Mat& descriptors, std::vector<int32_t> images, int num_places, int num_cameras,
              const PlaceVotesOptions& options = PlaceVotesOptions());
 
-  /// At most `max_results` places with a vote, the best first, ties by number. The query may have any number
-  /// of cameras. The same on any number of threads. std::invalid_argument for descriptors of another kind.
+  /// At most `max_results` places with votes, best first, ties by number. The query may have any number of
+  /// cameras. The same on any number of threads. Throws std::invalid_argument for descriptors of another
+  /// kind.
   std::vector<PlaceMatch> query(const std::vector<cv::Mat>& descriptors_by_camera, int max_results) const;
 
  private:
@@ -54,7 +51,7 @@ class PlaceVotes {
   const int num_places_, num_cameras_;
   const int type_, columns_;
   const std::vector<int32_t> images_;
-  cv::Mat mean_;  // of descriptors that are numbers
+  cv::Mat mean_;  // of descriptors of numbers
   std::unique_ptr<HammingIndex> index_;
 };
 

@@ -18,41 +18,34 @@
 namespace vcharge {
 
 struct RectifiedViewOptions {
-  int width_px = 800;
-  int height_px = 600;
-  double horizontal_field_of_view_rad = 1.5708;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("width_px", width_px);
-    visit("height_px", height_px);
-    visit("horizontal_field_of_view_rad", horizontal_field_of_view_rad);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(RectifiedViewOptions);
+  VCHARGE_OPTION(int, width_px, 800, between(16, 10000), "Width of the view.");
+  VCHARGE_OPTION(int, height_px, 600, between(16, 10000), "Height of the view.");
+  VCHARGE_OPTION(double, horizontal_field_of_view_rad, 1.5708, above(0.01).below(3.0),
+                 "Horizontal field of view.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// What a pinhole camera at the place of a fisheye camera, turned elsewhere, would see. Immutable.
+/// View of a virtual pinhole camera with the centre of a fisheye camera and another orientation. Immutable.
 class RectifiedView {
  public:
-  /// std::invalid_argument for bad options.
+  /// Throws std::invalid_argument for bad options.
   RectifiedView(const RigCamera& camera, const Eigen::Quaterniond& view_from_camera,
                 const RectifiedViewOptions& options = RectifiedViewOptions());
 
   const PinholeCamera& model() const { return model_; }
   const Eigen::Quaterniond& viewFromCamera() const { return view_from_camera_; }
-  /// CV_8UC1: 255 where the pixel's ray is inside the camera's field of view, image and mask; else 0.
+  /// CV_8UC1: 255 where the ray is inside the camera's field of view, image and mask; otherwise 0.
   const cv::Mat& validMask() const { return valid_mask_; }
-
-  /// The view of an image (CV_8UC1 of the camera's size): bilinear between pixels, at 1/32 px; 0 where
-  /// validMask() is. std::invalid_argument for another image.
+  /// Renders the view from an image (CV_8UC1 of the camera's size): bilinear, at 1/32 px; 0 where validMask()
+  /// is 0. Throws std::invalid_argument for another image.
   cv::Mat rectify(const cv::Mat& image) const;
 
-  /// Pixel of the fisheye image that shows what a pixel of the view shows, by the camera models themselves.
-  /// False (output untouched) where the view is not valid.
+  /// Exact pixel of the fisheye image for a pixel of the view. Returns false and leaves the output unchanged
+  /// where the view is not valid.
   bool toSensor(const Eigen::Vector2d& view_px, Eigen::Vector2d* sensor_px) const;
-
-  /// Moves features found in the view to the fisheye image, positions only: size and angle stay those of the
-  /// view, in which the descriptors were made. Features without a place there are left out.
+  /// Converts positions of features found in the view to the fisheye image; size and angle remain those of
+  /// the view, like the descriptors. Features outside of the fisheye image are left out.
   ImageFeatures toSensor(const ImageFeatures& in_view) const;
 
  private:
@@ -62,52 +55,44 @@ class RectifiedView {
   const Eigen::Quaterniond view_from_camera_;
   const PinholeCamera model_;
   cv::Mat valid_mask_;
-  cv::Mat integer_map_, fraction_map_;  // as cv::convertMaps makes them
+  cv::Mat integer_map_, fraction_map_;  // from cv::convertMaps
 };
 
-/// Orientation in a common frame of a view that looks midway between two cameras, upright: its x axis is
-/// level with respect to `up`. Empty where the cameras' axes are more than `max_angle_rad` apart, or the view
-/// would look along `up`. Rotations are frame_from_camera.
+/// Orientation of an upright view midway between two cameras, in a common frame: its x axis is perpendicular
+/// to `up`. Empty if the cameras' axes differ by more than `max_angle_rad`, or the view would point along
+/// `up`. Rotations are frame_from_camera.
 std::optional<Eigen::Quaterniond> commonViewOrientation(const Eigen::Quaterniond& frame_from_first,
                                                         const Eigen::Quaterniond& frame_from_second,
                                                         const Eigen::Vector3d& up_in_frame,
                                                         double max_angle_rad);
 
 struct RectifiedViewCacheOptions {
-  RectifiedViewOptions view;
-  /// The vehicle's turn between the two images counts in steps, so that views can be used again.
-  double yaw_step_rad = 0.0436;
-  double max_axis_angle_rad = 2.4;  ///< cameras whose axes are further apart see nothing in common
-  int max_pairs = 32;               ///< kept; the pair not used for the longest time goes first
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("view", view);
-    visit("yaw_step_rad", yaw_step_rad);
-    visit("max_axis_angle_rad", max_axis_angle_rad);
-    visit("max_pairs", max_pairs);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(RectifiedViewCacheOptions);
+  VCHARGE_OPTION_GROUP(RectifiedViewOptions, view, {}, "The views.");
+  VCHARGE_OPTION(int, max_pairs, 32, atLeast(1), "Number of pairs of views that are kept in memory.");
+  VCHARGE_END_OPTIONS();
 };
 
 struct RectifiedPair {
   std::shared_ptr<const RectifiedView> first, second;
 };
 
-/// Pairs of views on a common image plane of two cameras of a rig, at two times of a drive (paper, section
-/// Inter-Camera Feature Matching): features that the fisheye images show turned and squeezed differently look
-/// alike there. Keeps what it made. Not thread safe.
+/// Pairs of views on a common image plane of two cameras of a rig at two times of a drive (paper, section
+/// Inter-Camera Feature Matching): in them, features look alike that the fisheye images show rotated and
+/// distorted differently. Keeps the most recent pairs. Not thread safe.
 class RectifiedViewCache {
  public:
-  /// std::invalid_argument for bad options; std::logic_error for a rig without extrinsics.
+  /// The vehicle's yaw between both images is rounded to this step, so that views can be reused.
+  static constexpr double kYawStep_rad = 0.0436;
+
+  /// Throws std::invalid_argument for bad options, std::logic_error for a rig without extrinsics.
   explicit RectifiedViewCache(std::shared_ptr<const CameraRig> rig,
                               const RectifiedViewCacheOptions& options = RectifiedViewCacheOptions());
 
-  /// Views of cameras `first` and `second` (of the rig), when the vehicle's yaw at the second image is
-  /// `yaw_rad` ahead of that at the first. Their planes are parallel but for half a yaw step, roll and pitch.
-  /// Empty where the cameras look too far apart. std::logic_error for a bad index or yaw.
+  /// Views of cameras `first` and `second` of the rig, where the vehicle's yaw at the second image is
+  /// `yaw_rad` ahead of that at the first. Their planes are parallel except for half a yaw step, roll and
+  /// pitch. Empty if the cameras have no common view. Throws std::logic_error for a bad index or yaw.
   std::optional<RectifiedPair> pair(size_t first, size_t second, double yaw_rad);
-
   size_t numPairs() const { return pairs_.size(); }
 
  private:
@@ -116,9 +101,10 @@ class RectifiedViewCache {
     int yaw_steps;
     RectifiedPair pair;
   };
+
   const std::shared_ptr<const CameraRig> rig_;
   const RectifiedViewCacheOptions options_;
-  std::list<Entry> pairs_;  // the one used last comes first
+  std::list<Entry> pairs_;  // most recently used first
 };
 
 }  // namespace vcharge

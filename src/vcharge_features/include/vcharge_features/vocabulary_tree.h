@@ -11,19 +11,12 @@
 namespace vcharge {
 
 struct VocabularyTreeOptions {
-  int branching = 10;       ///< children of a node, at most
-  int depth = 4;            ///< levels below the root: at most branching^depth words
-  int max_iterations = 10;  ///< of the clustering of one node
-  int seed = 1;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("branching", branching);
-    visit("depth", depth);
-    visit("max_iterations", max_iterations);
-    visit("seed", seed);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(VocabularyTreeOptions);
+  VCHARGE_OPTION(int, branching, 10, between(2, 1000), "Largest number of children of a node.");
+  VCHARGE_OPTION(int, depth, 4, between(1, 20), "Levels below the root: at most branching^depth words.");
+  VCHARGE_OPTION(int, max_iterations, 10, between(1, 1000),
+                 "Largest number of iterations to cluster a node.");
+  VCHARGE_END_OPTIONS();
 };
 
 /// A word of the vocabulary and its weight.
@@ -32,27 +25,27 @@ struct WeightedWord {
   float weight = 0.0F;
 };
 
-/// The words of an image in ascending order, each once, with positive weights that add up to 1 (empty where
-/// no word tells images apart).
+/// The words of an image in ascending order, each once, with positive weights that add up to 1. Empty if no
+/// word distinguishes images.
 using BagOfWords = std::vector<WeightedWord>;
 
 /// Quantizes descriptors by hierarchical clustering (Nister and Stewenius, CVPR 2006): k-means for CV_32FC1,
 /// k-medians by the majority of each bit for binary descriptors. The leaves are the words, weighted by the
-/// inverse document frequency ln(N / N_w) over the N training images, N_w of which hold the word. Immutable.
+/// inverse document frequency ln(N / N_w), where N_w of the N training images contain the word. Immutable.
 class VocabularyTree {
  public:
-  /// One matrix of descriptors per training image, all of one kind; empty ones count as images without
-  /// words. The same input gives the same tree on any number of threads. std::invalid_argument for bad
-  /// options, no descriptors at all, or descriptors that findDescriptorNeighbours() would not take.
+  /// Expects a matrix of descriptors per training image, all of one kind; empty ones count as images without
+  /// words. The same input gives the same tree on any number of threads. Throws std::invalid_argument for bad
+  /// options, no descriptors at all, or descriptors that findDescriptorNeighbours() rejects.
   static VocabularyTree train(const std::vector<cv::Mat>& descriptors_of_images,
                               const VocabularyTreeOptions& options = VocabularyTreeOptions());
 
-  /// Reads what write() wrote. InputError naming the file when it is missing, truncated, corrupt, of another
-  /// version, or no vocabulary.
+  /// Reads the file of write(). Throws InputError naming the file when it is missing, truncated, corrupt, of
+  /// another version, or not a vocabulary.
   static VocabularyTree read(const std::string& path);
-  /// Replaces the file only once it is complete. InputError when it cannot be written.
+  /// Replaces an older file only when the new one is complete. Throws InputError when it cannot be written.
   void write(const std::string& path) const;
-  /// The bytes of such a file, to be kept inside another; `source` names them in errors, as a path does.
+  /// The vocabulary as bytes, to be stored in a map; `source` names them in errors.
   std::string serialize() const;
   static VocabularyTree parse(const std::string& text, const std::string& source);
 
@@ -60,13 +53,13 @@ class VocabularyTree {
   int descriptorType() const { return centres_.type(); }
   int descriptorColumns() const { return centres_.cols; }
 
-  /// Word of each descriptor. std::invalid_argument for descriptors of another kind than the vocabulary's.
+  /// Word of each descriptor. Throws std::invalid_argument for descriptors of another kind.
   std::vector<int32_t> words(const cv::Mat& descriptors) const;
-  /// Term frequency times inverse document frequency, scaled to a sum of 1. Errors as words().
+  /// Term frequency times inverse document frequency, scaled to a sum of 1. Throws like words().
   BagOfWords bagOfWords(const cv::Mat& descriptors) const;
 
  private:
-  /// Children are consecutive nodes; a leaf has none, and a word.
+  /// Children are consecutive nodes; a leaf has a word instead.
   struct Node {
     int32_t first_child = 0;
     int32_t num_children = 0;

@@ -25,7 +25,8 @@ std::vector<int> selectEvenly(const std::vector<SelectionCandidate>& candidates,
     const int row = std::clamp(static_cast<int>(p.y * grid_rows / size.height), 0, grid_rows - 1);
     cells[static_cast<size_t>(row) * grid_columns + column].push_back(static_cast<int>(i));
   }
-  // The number of full turns, from the cells' sizes alone: only as much must be sorted as is taken.
+  // The number of complete rounds follows from the sizes of the cells, so only the selected candidates need
+  // to be sorted.
   size_t turns = 0;
   const auto takenAfter = [&](size_t count) {
     size_t taken = 0;

@@ -42,7 +42,7 @@ TEST(EvenSelectionTest, NoCellGetsMoreThanOneAboveAnotherThatHasMoreToGive) {
     return static_cast<int>(p.x / 100) + 5 * static_cast<int>(p.y / 100);
   };
   for (int i = 0; i < 3000; ++i) {
-    // Denser towards the origin.
+    // The density increases towards the origin.
     const auto draw = [&] { return static_cast<float>(std::min(generator() % 500, generator() % 500)); };
     const cv::Point2f position(draw(), draw());
     candidates.push_back({position, static_cast<float>(generator() % 50)});

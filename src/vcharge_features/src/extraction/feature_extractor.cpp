@@ -16,41 +16,11 @@ std::string describeMat(const cv::Mat& mat) {
 
 }  // namespace
 
-void FastBriefOptions::validate() const {
-  requireField(threshold >= 1 && threshold <= 254, "threshold", "must be in [1, 254]", threshold);
-  requireField(num_levels >= 1 && num_levels <= 12, "num_levels", "must be in [1, 12]", num_levels);
-  requireField(level_scale > 1.0 && level_scale <= 4.0, "level_scale", "must be in (1, 4]", level_scale);
-}
-
-void SiftOptions::validate() const {
-  requireField(contrast_threshold >= 0.0 && contrast_threshold <= 1.0, "contrast_threshold",
-               "must be in [0, 1]", contrast_threshold);
-  requireField(edge_threshold > 1.0 && std::isfinite(edge_threshold), "edge_threshold",
-               "must be finite and larger than 1", edge_threshold);
-  requireField(sigma_px > 0.5 && sigma_px <= 10.0, "sigma_px", "must be in (0.5, 10]", sigma_px);
-  requireField(octave_layers >= 1 && octave_layers <= 16, "octave_layers", "must be in [1, 16]",
-               octave_layers);
-}
-
 FeatureExtractorOptions FeatureExtractorOptions::mapping() {
   FeatureExtractorOptions options;
   options.type = FeatureType::kRootSift;
   options.max_features = 4000;
   return options;
-}
-
-void FeatureExtractorOptions::validate() const {
-  requireField(max_features >= 1 && max_features <= 1000000, "max_features", "must be in [1, 1000000]",
-               max_features);
-  requireField(grid_columns >= 1 && grid_columns <= 1000, "grid_columns", "must be in [1, 1000]",
-               grid_columns);
-  requireField(grid_rows >= 1 && grid_rows <= 1000, "grid_rows", "must be in [1, 1000]", grid_rows);
-  validateInner("fast_brief", fast_brief);
-  validateInner("sift", sift);
-  requireField(orb_threshold >= 1 && orb_threshold <= 254, "orb_threshold", "must be in [1, 254]",
-               orb_threshold);
-  requireField(surf_threshold >= 0.0 && std::isfinite(surf_threshold), "surf_threshold",
-               "must be finite and not negative", surf_threshold);
 }
 
 FeatureExtractor::FeatureExtractor(const FeatureExtractorOptions& options) : options_(options) {
@@ -68,7 +38,7 @@ ImageFeatures FeatureExtractor::extract(const cv::Mat& image, const cv::Mat& mas
   }
   ImageFeatures features = extractChecked(image, mask);
   if (features.empty()) {
-    // An empty matrix that still says what kind of descriptors it lacks.
+    // An empty matrix of the right type and number of columns.
     features.descriptors.create(0, descriptorColumns(), descriptorType());
   }
   return features;
@@ -79,13 +49,8 @@ std::unique_ptr<FeatureExtractor> makeFeatureExtractor(const FeatureExtractorOpt
   switch (options.type) {
     case FeatureType::kFastBrief:
       return makeFastBriefExtractor(options);
-    case FeatureType::kOrb:
-      return makeOrbExtractor(options);
-    case FeatureType::kSift:
     case FeatureType::kRootSift:
-      return makeSiftExtractor(options);
-    case FeatureType::kSurf:
-      return makeSurfExtractor(options);
+      return makeRootSiftExtractor(options);
   }
   throw std::invalid_argument("type: unknown feature type " + std::to_string(static_cast<int>(options.type)));
 }

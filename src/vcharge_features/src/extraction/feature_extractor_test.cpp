@@ -15,15 +15,6 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-std::vector<FeatureType> availableTypes() {
-  std::vector<FeatureType> types = {FeatureType::kFastBrief, FeatureType::kOrb, FeatureType::kSift,
-                                    FeatureType::kRootSift};
-#ifdef VCHARGE_HAS_DLIB
-  types.push_back(FeatureType::kSurf);
-#endif
-  return types;
-}
-
 class FeatureExtractorTest : public ::testing::TestWithParam<FeatureType> {
  protected:
   static FeatureExtractorOptions options(int max_features = 500) {
@@ -51,8 +42,7 @@ TEST_P(FeatureExtractorTest, FindsAShiftedImageAgain) {
   for (const FeatureMatch& match : matches) {
     const cv::Point2f offset =
         a.keypoints[match.first_index].position_px - b.keypoints[match.second_index].position_px;
-    // A pixel of the level it was found on; ORB's coarsest is 3.6 of the image's.
-    right += cv::norm(offset - cv::Point2f(shift)) < (GetParam() == FeatureType::kOrb ? 3.6 : 1.0) ? 1 : 0;
+    right += cv::norm(offset - cv::Point2f(shift)) < 1.0 ? 1 : 0;
   }
   EXPECT_GT(matches.size(), a.size() / 3);
   EXPECT_GT(right, 0.95 * static_cast<double>(matches.size()));
@@ -75,7 +65,7 @@ TEST_P(FeatureExtractorTest, StaysInsideTheMaskAndTheMaximum) {
 }
 
 TEST_P(FeatureExtractorTest, SpreadsFeaturesOverTheImage) {
-  // The left half has the stronger contrast, and would get nearly all.
+  // The left half has the stronger contrast and would otherwise get nearly all features.
   cv::Mat image = randomTexture({640, 400}, 3);
   cv::Mat right_half = image(cv::Rect(320, 0, 320, 400));
   right_half.convertTo(right_half, -1, 0.6, 50.0);
@@ -139,7 +129,8 @@ TEST_P(FeatureExtractorTest, BadImagesAreNamed) {
   EXPECT_THAT([&] { extractor->extract(image, cv::Mat::zeros(80, 100, CV_32FC1)); }, throwing("mask"));
 }
 
-INSTANTIATE_TEST_SUITE_P(AllTypes, FeatureExtractorTest, ::testing::ValuesIn(availableTypes()),
+INSTANTIATE_TEST_SUITE_P(AllTypes, FeatureExtractorTest,
+                         ::testing::Values(FeatureType::kFastBrief, FeatureType::kRootSift),
                          [](const auto& parameter) {
                            return enumNames<FeatureType>()[static_cast<size_t>(parameter.param)];
                          });
@@ -161,55 +152,10 @@ TEST(FeatureExtractorOptionsTest, BadFieldsAreNamed) {
     return "";
   };
   EXPECT_THAT(errorOf([](auto* o) { o->max_features = 0; }), HasSubstr("max_features"));
-  EXPECT_THAT(errorOf([](auto* o) { o->grid_rows = -1; }), HasSubstr("grid_rows"));
-  EXPECT_THAT(errorOf([](auto* o) { o->sift.sigma_px = std::nan(""); }), HasSubstr("sift.sigma_px"));
-  EXPECT_THAT(errorOf([](auto* o) { o->sift.contrast_threshold = std::nan(""); }),
-              HasSubstr("sift.contrast_threshold"));
-  EXPECT_THAT(errorOf([](auto* o) { o->fast_brief.level_scale = std::nan(""); }),
-              HasSubstr("fast_brief.level_scale"));
-  EXPECT_THAT(errorOf([](auto* o) { o->surf_threshold = INFINITY; }), HasSubstr("surf_threshold"));
+  EXPECT_THAT(errorOf([](auto* o) { o->fast_threshold = 255; }), HasSubstr("fast_threshold"));
+  EXPECT_THAT(errorOf([](auto* o) { o->sift_contrast_threshold = std::nan(""); }),
+              HasSubstr("sift_contrast_threshold"));
   EXPECT_THAT(errorOf([](auto* o) { o->type = static_cast<FeatureType>(17); }), HasSubstr("type"));
-#ifndef VCHARGE_HAS_DLIB
-  EXPECT_THAT(errorOf([](auto* o) { o->type = FeatureType::kSurf; }), HasSubstr("dlib"));
-#endif
-}
-
-TEST(FastBriefTest, TurnedPatchesAreFoundAgainUnlessUpright) {
-  const cv::Mat image = randomTexture({400, 400}, 5);
-  cv::Mat turned;
-  cv::rotate(image, turned, cv::ROTATE_90_CLOCKWISE);
-  for (const bool upright : {false, true}) {
-    FeatureExtractorOptions options;
-    options.fast_brief.upright = upright;
-    const auto extractor = makeFeatureExtractor(options);
-    const ImageFeatures a = extractor->extract(image);
-    const ImageFeatures b = extractor->extract(turned);
-    int right = 0;
-    for (const FeatureMatch& match : matchDescriptors(a.descriptors, b.descriptors)) {
-      const cv::Point2f p = a.keypoints[match.first_index].position_px;
-      right += cv::norm(cv::Point2f(399.0F - p.y, p.x) - b.keypoints[match.second_index].position_px) < 2.0;
-    }
-    EXPECT_EQ(right > static_cast<int>(a.size()) / 2, !upright) << right;
-  }
-}
-
-TEST(FastBriefTest, LevelsFindAnImageOfHalfTheSize) {
-  const cv::Mat image = randomTexture({600, 480}, 6);
-  cv::Mat half;
-  cv::resize(image, half, cv::Size(), 0.5, 0.5, cv::INTER_AREA);
-  FeatureExtractorOptions options;
-  options.fast_brief.num_levels = 3;
-  options.fast_brief.level_scale = 2.0;
-  const auto extractor = makeFeatureExtractor(options);
-  const ImageFeatures a = extractor->extract(image);
-  const ImageFeatures b = extractor->extract(half);
-  int right = 0;
-  for (const FeatureMatch& match : matchDescriptors(a.descriptors, b.descriptors)) {
-    const cv::Point2f p = b.keypoints[match.second_index].position_px;
-    const cv::Point2f expected(2.0F * p.x + 0.5F, 2.0F * p.y + 0.5F);
-    right += cv::norm(expected - a.keypoints[match.first_index].position_px) < 2.5;
-  }
-  EXPECT_GT(right, 50);
 }
 
 TEST(FeatureMaskTest, IsWhereTheCameraSeesAndTheMaskAllows) {

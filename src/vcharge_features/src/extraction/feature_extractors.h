@@ -6,12 +6,8 @@
 
 namespace vcharge {
 
-// One maker per implementation; options were validated.
+// One function per implementation, for options that were validated.
 std::unique_ptr<FeatureExtractor> makeFastBriefExtractor(const FeatureExtractorOptions& options);
-std::unique_ptr<FeatureExtractor> makeOrbExtractor(const FeatureExtractorOptions& options);
-/// kSift or kRootSift.
-std::unique_ptr<FeatureExtractor> makeSiftExtractor(const FeatureExtractorOptions& options);
-/// std::invalid_argument in a build without dlib.
-std::unique_ptr<FeatureExtractor> makeSurfExtractor(const FeatureExtractorOptions& options);
+std::unique_ptr<FeatureExtractor> makeRootSiftExtractor(const FeatureExtractorOptions& options);
 
 }  // namespace vcharge

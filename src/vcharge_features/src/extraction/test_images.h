@@ -5,7 +5,7 @@
 
 namespace vcharge {
 
-/// CV_8UC1 of random blobs of many sizes: corners everywhere.
+/// A CV_8UC1 texture of random blobs of many sizes, with corners everywhere.
 inline cv::Mat randomTexture(cv::Size size, uint64_t seed) {
   cv::RNG random(seed);
   cv::Mat sum = cv::Mat::zeros(size, CV_32FC1);

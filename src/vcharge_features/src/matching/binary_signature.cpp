@@ -14,14 +14,14 @@ namespace {
 
 constexpr size_t kBits = 8 * kBinaryDescriptorBytes;
 
-/// The two numbers that each bit compares.
+/// The two columns that each bit compares.
 std::array<std::pair<int, int>, kBits> pairsOf(int columns) {
   std::mt19937 random(1);
   std::array<std::pair<int, int>, kBits> pairs;
   const auto count = static_cast<uint32_t>(columns);
   for (auto& [first, second] : pairs) {
     first = static_cast<int>(random() % count);
-    // Another than the first, where there is another.
+    // A column different from the first, if there is one.
     const uint32_t step = count > 1 ? 1 + static_cast<uint32_t>(random() % (count - 1)) : 0;
     second = static_cast<int>((static_cast<uint32_t>(first) + step) % count);
   }

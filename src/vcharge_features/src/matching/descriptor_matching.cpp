@@ -73,18 +73,13 @@ DescriptorNeighbours findDescriptorNeighbours(const cv::Mat& first, const cv::Ma
   return neighbours;
 }
 
-void MatchOptions::validate() const {
-  requireField(max_ratio > 0.0 && max_ratio <= 1.0, "max_ratio", "must be in (0, 1]", max_ratio);
-  requireField(max_distance >= 0.0, "max_distance", "must not be negative", max_distance);
-}
-
 std::vector<FeatureMatch> selectMatches(const DescriptorNeighbours& neighbours, const MatchOptions& options) {
   std::vector<FeatureMatch> matches;
   for (size_t i = 0; i < neighbours.of_first.size(); ++i) {
     const DescriptorNeighbour& best = neighbours.of_first[i].best;
     const DescriptorNeighbour& second = neighbours.of_first[i].second;
     if (best.index < 0 || best.distance > options.max_distance ||
-        (options.mutual && neighbours.of_second[best.index].index != static_cast<int>(i))) {
+        neighbours.of_second[best.index].index != static_cast<int>(i)) {
       continue;
     }
     const bool distinct =

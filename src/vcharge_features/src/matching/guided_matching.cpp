@@ -19,7 +19,7 @@ void checkCount(size_t positions, const cv::Mat& descriptors, const char* source
 }
 
 void insert(int index, float distance, TwoNearestDescriptors* nearest) {
-  // Candidates come in order of their index: only a nearer one comes before what is there.
+  // Candidates come in the order of their index, so a tie keeps the earlier one.
   if (nearest->best.index < 0 || distance < nearest->best.distance) {
     nearest->second = nearest->best;
     nearest->best = {index, distance};
@@ -96,7 +96,7 @@ std::vector<FeatureMatch> matchNearRays(const cv::Mat& first, const Eigen::Matri
     throw std::invalid_argument("matchNearRays: radius_rad: must be in (0, pi), is " +
                                 std::to_string(radius_rad));
   }
-  // The chord between unit rays grows with their angle.
+  // The chord between unit rays increases with their angle.
   return matchNearPoints(first, predicted_rays, second, second_rays, 2.0 * std::sin(0.5 * radius_rad),
                          options, "matchNearRays");
 }

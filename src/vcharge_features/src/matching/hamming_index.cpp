@@ -15,10 +15,12 @@ namespace {
 constexpr size_t kPieceBytes = 2;
 constexpr size_t kNumValues = size_t{1} << (8 * kPieceBytes);
 constexpr int kMaxPieces = static_cast<int>(kBinaryDescriptorBytes / kPieceBytes);
-/// However few descriptors there are: so many cost nothing.
+/// A piece that this many times more descriptors have than on average is not distinctive and not looked up.
+constexpr double kMaxCrowding = 16.0;
+/// Buckets of this size are always searched, since they cost nothing.
 constexpr int32_t kSmallBucket = 64;
 
-/// The same on machines of any byte order.
+/// Does not depend on the machine's byte order.
 size_t pieceOf(const uint8_t* descriptor, size_t piece) {
   return static_cast<size_t>(descriptor[kPieceBytes * piece]) |
          (static_cast<size_t>(descriptor[kPieceBytes * piece + 1]) << 8);
@@ -26,21 +28,15 @@ size_t pieceOf(const uint8_t* descriptor, size_t piece) {
 
 }  // namespace
 
-void HammingIndexOptions::validate() const {
+HammingIndex::HammingIndex(const cv::Mat& descriptors, int num_pieces) : descriptors_(descriptors) {
   requireField(num_pieces >= 1 && num_pieces <= kMaxPieces, "num_pieces", "must be in [1, 16]", num_pieces);
-  requireField(max_crowding >= 1.0, "max_crowding", "must be 1 or more", max_crowding);
-}
-
-HammingIndex::HammingIndex(const cv::Mat& descriptors, const HammingIndexOptions& options)
-    : descriptors_(descriptors) {
-  options.validate();
   if (descriptors.rows > 0 && !checkDescriptors(descriptors, "HammingIndex", "descriptors")) {
     throw std::invalid_argument("HammingIndex: descriptors: expected binary ones");
   }
   const auto count = static_cast<size_t>(descriptors_.rows);
   const double average = static_cast<double>(count) / kNumValues;
-  max_bucket_ = std::max(kSmallBucket, static_cast<int32_t>(options.max_crowding * average));
-  tables_.resize(static_cast<size_t>(options.num_pieces));
+  max_bucket_ = std::max(kSmallBucket, static_cast<int32_t>(kMaxCrowding * average));
+  tables_.resize(static_cast<size_t>(num_pieces));
   tbb::parallel_for(size_t{0}, tables_.size(), [&](size_t piece) {
     Table& table = tables_[piece];
     table.begin.assign(kNumValues + 1, 0);
@@ -77,7 +73,7 @@ std::vector<DescriptorNeighbour> HammingIndex::near(const uint8_t* query, int ma
       found.push_back({candidates[i], distances[i]});
     }
   }
-  // Those with several equal pieces came several times.
+  // Descriptors with several equal pieces are found several times.
   const auto byIndex = [](const DescriptorNeighbour& a, const DescriptorNeighbour& b) {
     return a.index < b.index;
   };

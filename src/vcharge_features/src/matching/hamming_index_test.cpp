@@ -23,7 +23,7 @@ cv::Mat randomDescriptors(int count, unsigned seed) {
   return descriptors;
 }
 
-/// With `count` different bits flipped.
+/// A copy with `count` different bits flipped.
 cv::Mat withFlips(const cv::Mat& descriptor, int count, std::mt19937* random) {
   cv::Mat flipped = descriptor.clone();
   std::vector<int> bits(kBits);
@@ -39,12 +39,10 @@ cv::Mat withFlips(const cv::Mat& descriptor, int count, std::mt19937* random) {
   return flipped;
 }
 
-/// Share of flipped descriptors whose original is found.
-double shareFound(int num_flips, int num_pieces) {
+/// Fraction of flipped descriptors whose original is found.
+double fractionFound(int num_flips, int num_pieces) {
   const cv::Mat descriptors = randomDescriptors(5000, 1);
-  HammingIndexOptions options;
-  options.num_pieces = num_pieces;
-  const HammingIndex index(descriptors, options);
+  const HammingIndex index(descriptors, num_pieces);
   std::mt19937 random(2);
   int found = 0;
   const int trials = 2000;
@@ -60,16 +58,16 @@ double shareFound(int num_flips, int num_pieces) {
 }
 
 TEST(HammingIndexTest, FindsAllThatLeaveOnePieceEqual) {
-  EXPECT_EQ(shareFound(0, 8), 1.0);
-  EXPECT_EQ(shareFound(7, 8), 1.0);
-  EXPECT_EQ(shareFound(15, 16), 1.0);
+  EXPECT_EQ(fractionFound(0, 8), 1.0);
+  EXPECT_EQ(fractionFound(7, 8), 1.0);
+  EXPECT_EQ(fractionFound(15, 16), 1.0);
 }
 
-TEST(HammingIndexTest, FindsTheShareOfFartherOnesThatItNames) {
-  // One piece is equal with probability C(240, n) / C(256, n).
-  EXPECT_NEAR(shareFound(20, 8), 0.93, 0.03);
-  EXPECT_NEAR(shareFound(30, 8), 0.68, 0.04);
-  EXPECT_GT(shareFound(30, 16), shareFound(30, 8) + 0.1);
+TEST(HammingIndexTest, FindsTheDocumentedFractionOfFartherOnes) {
+  // At least one piece is equal with probability 1 - (1 - C(240, n) / C(256, n))^pieces, approximately.
+  EXPECT_NEAR(fractionFound(20, 8), 0.93, 0.03);
+  EXPECT_NEAR(fractionFound(30, 8), 0.68, 0.04);
+  EXPECT_GT(fractionFound(30, 16), fractionFound(30, 8) + 0.1);
 }
 
 TEST(HammingIndexTest, LeavesOutWhatIsTooFar) {
@@ -82,14 +80,11 @@ TEST(HammingIndexTest, LeavesOutWhatIsTooFar) {
 }
 
 TEST(HammingIndexTest, PiecesThatAllHaveAreNotLookedUp) {
-  // The first two pieces of all are equal: nothing is found by them.
+  // The first two pieces of all descriptors are equal, so they find nothing.
   cv::Mat descriptors = randomDescriptors(1000, 1);
   descriptors.colRange(0, 4).setTo(7);
-  HammingIndexOptions options;
-  options.num_pieces = 2;
-  EXPECT_TRUE(HammingIndex(descriptors, options).near(descriptors.ptr(3), 0).empty());
-  options.num_pieces = 3;
-  EXPECT_EQ(HammingIndex(descriptors, options).near(descriptors.ptr(3), 0).size(), 1U);
+  EXPECT_TRUE(HammingIndex(descriptors, 2).near(descriptors.ptr(3), 0).empty());
+  EXPECT_EQ(HammingIndex(descriptors, 3).near(descriptors.ptr(3), 0).size(), 1U);
 }
 
 TEST(HammingIndexTest, NoDescriptorsAndBadOnes) {
@@ -97,9 +92,7 @@ TEST(HammingIndexTest, NoDescriptorsAndBadOnes) {
   EXPECT_TRUE(HammingIndex(cv::Mat()).near(query.ptr(), 256).empty());
   EXPECT_THROW(HammingIndex(cv::Mat::zeros(3, 128, CV_32FC1)), std::invalid_argument);
   EXPECT_THROW(HammingIndex(cv::Mat::zeros(3, 16, CV_8UC1)), std::invalid_argument);
-  HammingIndexOptions options;
-  options.num_pieces = 17;
-  EXPECT_THROW(HammingIndex(query, options), std::invalid_argument);
+  EXPECT_THROW(HammingIndex(query, 17), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
-// AVX-512 with its population count is a target of its own.
+// AVX-512 with its population count is a separate target.
 #define HWY_WANT_AVX3_DL
-// Vectors are kept in arrays here, which those of unknown size cannot be.
+// The code keeps vectors in arrays, which is impossible for vectors of unknown size.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "matching/hamming_kernel.cpp"
@@ -21,7 +21,7 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// `found` lies behind all that `nearest` holds, hence must be strictly nearer to come before it.
+/// `found` has a larger index than all in `nearest`, so it must be strictly nearer to precede them.
 void mergeForward(const DescriptorNeighbour& found, TwoNearestDescriptors* nearest) {
   if (found.index < 0) {
     return;
@@ -35,7 +35,7 @@ void mergeForward(const DescriptorNeighbour& found, TwoNearestDescriptors* neare
 }
 
 #if HWY_TARGET == HWY_SCALAR
-// For processors without vectors: one pair after the other.
+// Fallback for processors without vector instructions.
 
 float hammingDistance(const uint8_t* a, const uint8_t* b) {
   size_t distance = 0;
@@ -78,15 +78,15 @@ using V16 = hn::VFromD<D16>;
 using V32 = hn::VFromD<D32>;
 
 constexpr size_t kWords = kBinaryDescriptorBytes / 4;
-/// Distances (up to 256) and the number of a query or group inside its block share 16 bits.
+/// A key of 16 bits holds the distance (up to 256) and the number of a query or group within its block.
 constexpr size_t kBlockBits = 7;
 constexpr size_t kBlock = size_t{1} << kBlockBits;
 constexpr uint16_t kNone = 0xFFFF;
-/// At most 32 lanes of 16 bits.
+/// At most 32 lanes with 16 bits.
 constexpr size_t kLaneBits = 5;
 
-/// Distances of one query to a group of trains: lane i of 16 bits is train i. The words of even trains come
-/// first in `trains`, those of odd ones after them, both in lanes of 32 bits.
+/// Distances of one query to a group of trains: 16-bit lane i belongs to train i. In `trains`, the words of
+/// even trains come first, then those of odd ones, both in 32-bit lanes.
 HWY_INLINE V16 groupDistances(const V32* HWY_RESTRICT trains, const uint32_t* HWY_RESTRICT query) {
   const D16 d16;
   const D32 d32;
@@ -101,7 +101,7 @@ HWY_INLINE V16 groupDistances(const V32* HWY_RESTRICT trains, const uint32_t* HW
   return hn::BitCast(d16, hn::Or(even, hn::ShiftLeft<16>(odd)));
 #else
   const D8 d8;
-  // Counts of bytes stay below 256 over all words, so that they are summed across bytes only once.
+  // Byte counts stay below 256 over all words, so one sum across bytes at the end suffices.
   auto even = hn::Zero(d8);
   auto odd = hn::Zero(d8);
   for (size_t w = 0; w < kWords; ++w) {
@@ -120,7 +120,7 @@ HWY_INLINE V16 groupDistances(const V32* HWY_RESTRICT trains, const uint32_t* HW
 #endif
 }
 
-/// Trains in the order that groupDistances() reads; those past the end are zero.
+/// Arranges trains in the order in which groupDistances() reads them; those past the end are zero.
 void packTrains(const uint8_t* trains, size_t stride, size_t num_trains, uint32_t* packed) {
   const size_t lanes = hn::Lanes(D32());
   const size_t group_size = 2 * lanes;
@@ -148,7 +148,7 @@ DescriptorNeighbour unpackKey(uint32_t key, size_t first_train) {
   return {static_cast<int32_t>(first_train + group * hn::Lanes(D16()) + lane), static_cast<float>(distance)};
 }
 
-/// The two smallest keys over all lanes, made unique and ordered by train through group and lane.
+/// The two smallest keys over all lanes, made unique and ordered by train using group and lane.
 void foldForward(const uint16_t* best_keys, const uint16_t* second_keys, size_t first_train,
                  TwoNearestDescriptors* nearest) {
   const D32 d32;

@@ -8,14 +8,14 @@
 
 namespace vcharge {
 
-/// Whether the rows are binary descriptors, else they are numbers. std::invalid_argument "<source>:
+/// Returns true for binary descriptors, false for numbers. Throws std::invalid_argument "<source>:
 /// <argument>: ..." for descriptors that are neither CV_8UC1 with 32 columns nor CV_32FC1, or not finite.
 bool checkDescriptors(const cv::Mat& descriptors, const char* source, const char* argument);
 
-/// std::invalid_argument naming both unless they may be compared. True for binary ones.
+/// Returns true for binary descriptors. Throws std::invalid_argument unless both can be compared.
 bool checkComparable(const cv::Mat& first, const cv::Mat& second, const char* source);
 
-/// The pairs of neighbours that pass the options' tests, in order of first_index.
+/// Pairs of neighbours that pass the tests of the options, ordered by first_index.
 std::vector<FeatureMatch> selectMatches(const DescriptorNeighbours& neighbours, const MatchOptions& options);
 
 }  // namespace vcharge

@@ -9,7 +9,8 @@ namespace vcharge {
 namespace {
 
 constexpr int kKeyBits = 21;
-/// Cells along the longest side: finer ones would be empty, and their numbers must fit a key.
+/// Maximum number of cells along the longest side: smaller cells would be empty, and cell numbers must fit a
+/// key.
 constexpr double kMaxCells = 1000.0;
 
 }  // namespace
@@ -47,7 +48,7 @@ uint64_t RadiusSearch::keyOf(const Cell& cell) {
 
 void RadiusSearch::find(const Eigen::Vector3d& centre, std::vector<int32_t>* indices) const {
   indices->clear();
-  // Far outside, cell numbers could overflow.
+  // Cell numbers could overflow far outside.
   if (!centre.allFinite() || (centre - centre.cwiseMax(min_).cwiseMin(max_)).norm() > radius_) {
     return;
   }

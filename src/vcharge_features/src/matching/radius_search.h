@@ -8,13 +8,14 @@
 
 namespace vcharge {
 
-/// Finds the points within a fixed radius of another, by a grid of cells as wide as the radius. Immutable.
+/// Finds the points within a fixed radius of a position, using a grid with cells of that size. Immutable.
 class RadiusSearch {
  public:
-  /// Points that are not finite are never found. std::logic_error unless the radius is finite and positive.
+  /// Points that are not finite are never found. Throws std::logic_error unless the radius is finite and
+  /// positive.
   RadiusSearch(const Eigen::Matrix3Xd& points, double radius);
 
-  /// Indices of the points at most the radius away, ascending. None for a `centre` that is not finite.
+  /// Indices of the points within the radius, ascending. None if `centre` is not finite.
   void find(const Eigen::Vector3d& centre, std::vector<int32_t>* indices) const;
 
  private:
@@ -26,7 +27,7 @@ class RadiusSearch {
   const double radius_;
   Eigen::Vector3d min_ = Eigen::Vector3d::Zero(), max_ = Eigen::Vector3d::Zero();
   double cell_size_ = 1.0;
-  std::vector<std::pair<uint64_t, int32_t>> sorted_;  // by cell, then index
+  std::vector<std::pair<uint64_t, int32_t>> sorted_;  // by cell, then by index
 };
 
 }  // namespace vcharge

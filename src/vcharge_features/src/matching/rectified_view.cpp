@@ -13,6 +13,8 @@ namespace vcharge {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
+/// Cameras whose axes differ by more have no common view.
+constexpr double kMaxAxisAngle_rad = 2.4;
 
 PinholeCamera makePinhole(const RectifiedViewOptions& options) {
   options.validate();
@@ -29,22 +31,6 @@ bool isInside(const Eigen::Vector2d& pixel, cv::Size size) {
 
 }  // namespace
 
-void RectifiedViewOptions::validate() const {
-  requireField(width_px >= 16 && width_px <= 10000, "width_px", "must be in [16, 10000]", width_px);
-  requireField(height_px >= 16 && height_px <= 10000, "height_px", "must be in [16, 10000]", height_px);
-  requireField(horizontal_field_of_view_rad > 0.01 && horizontal_field_of_view_rad < 3.0,
-               "horizontal_field_of_view_rad", "must be in (0.01, 3)", horizontal_field_of_view_rad);
-}
-
-void RectifiedViewCacheOptions::validate() const {
-  validateInner("view", view);
-  requireField(yaw_step_rad >= 1e-4 && yaw_step_rad <= 1.0, "yaw_step_rad", "must be in [0.0001, 1]",
-               yaw_step_rad);
-  requireField(max_axis_angle_rad > 0.0 && max_axis_angle_rad < kPi, "max_axis_angle_rad",
-               "must be in (0, pi)", max_axis_angle_rad);
-  requireField(max_pairs >= 1, "max_pairs", "must be at least 1", max_pairs);
-}
-
 RectifiedView::RectifiedView(const RigCamera& camera, const Eigen::Quaterniond& view_from_camera,
                              const RectifiedViewOptions& options)
     : camera_(camera.model),
@@ -53,7 +39,7 @@ RectifiedView::RectifiedView(const RigCamera& camera, const Eigen::Quaterniond& 
       view_from_camera_(view_from_camera.normalized()),
       model_(makePinhole(options)),
       valid_mask_(cv::Mat::zeros(options.height_px, options.width_px, CV_8UC1)) {
-  // Pixels without a place in the image get one outside, where remap() writes 0.
+  // Pixels without a sensor pixel map outside the image, where remap() writes 0.
   cv::Mat map(valid_mask_.size(), CV_32FC2, cv::Scalar(-10.0, -10.0));
   for (int y = 0; y < map.rows; ++y) {
     for (int x = 0; x < map.cols; ++x) {
@@ -152,8 +138,7 @@ std::optional<RectifiedPair> RectifiedViewCache::pair(size_t first, size_t secon
   check(first < rig_->cameras.size() && second < rig_->cameras.size(),
         "RectifiedViewCache: no camera of this index");
   check(std::isfinite(yaw_rad), "RectifiedViewCache: the yaw must be finite");
-  const int yaw_steps =
-      static_cast<int>(std::lround(std::remainder(yaw_rad, 2.0 * kPi) / options_.yaw_step_rad));
+  const int yaw_steps = static_cast<int>(std::lround(std::remainder(yaw_rad, 2.0 * kPi) / kYawStep_rad));
   const auto cached = std::find_if(pairs_.begin(), pairs_.end(), [&](const Entry& entry) {
     return entry.first == first && entry.second == second && entry.yaw_steps == yaw_steps;
   });
@@ -161,14 +146,13 @@ std::optional<RectifiedPair> RectifiedViewCache::pair(size_t first, size_t secon
     pairs_.splice(pairs_.begin(), pairs_, cached);
     return pairs_.front().pair;
   }
-  const Eigen::Quaterniond turn(
-      Eigen::AngleAxisd(yaw_steps * options_.yaw_step_rad, Eigen::Vector3d::UnitZ()));
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(yaw_steps * kYawStep_rad, Eigen::Vector3d::UnitZ()));
   const RigCamera& first_camera = rig_->cameras[first];
   const RigCamera& second_camera = rig_->cameras[second];
   const Eigen::Quaterniond frame_from_first = first_camera.vehicle_from_camera->rotation();
   const Eigen::Quaterniond frame_from_second = turn * second_camera.vehicle_from_camera->rotation();
-  const auto frame_from_view = commonViewOrientation(frame_from_first, frame_from_second,
-                                                     Eigen::Vector3d::UnitZ(), options_.max_axis_angle_rad);
+  const auto frame_from_view =
+      commonViewOrientation(frame_from_first, frame_from_second, Eigen::Vector3d::UnitZ(), kMaxAxisAngle_rad);
   if (!frame_from_view) {
     return std::nullopt;
   }

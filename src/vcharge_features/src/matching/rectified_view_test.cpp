@@ -16,7 +16,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 
-/// vehicle_from_camera of a camera that looks `yaw_rad` to the left of the vehicle's x axis, and down.
+/// vehicle_from_camera of a camera that points `yaw_rad` to the left of the vehicle's x axis and `down_rad`
+/// down.
 Eigen::Quaterniond lookingAt(double yaw_rad, double down_rad) {
   Eigen::Matrix3d forward;
   forward << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -39,7 +40,7 @@ RigCamera makeCamera(const std::string& name, double yaw_rad, double down_rad) {
   return camera;
 }
 
-/// What a camera sees of a texture painted on a sphere around it (longitude and latitude).
+/// Image of a texture painted on a sphere around the camera (longitude and latitude).
 cv::Mat render(const RigCamera& camera) {
   static const cv::Mat texture = randomTexture({2200, 1100}, 4);
   cv::Mat image = cv::Mat::zeros(camera.image_size_px, CV_8UC1);
@@ -162,9 +163,9 @@ TEST(RectifiedViewCacheTest, MakesAPairOnceAndForgetsTheOldest) {
   options.max_pairs = 2;
   RectifiedViewCache cache(makeRig(), options);
   const auto pair = cache.pair(0, 1, 0.0);
-  EXPECT_EQ(cache.pair(0, 1, 0.3 * options.yaw_step_rad)->first, pair->first);
+  EXPECT_EQ(cache.pair(0, 1, 0.3 * RectifiedViewCache::kYawStep_rad)->first, pair->first);
   EXPECT_EQ(cache.pair(0, 1, 2.0 * kPi)->first, pair->first);
-  EXPECT_NE(cache.pair(0, 1, options.yaw_step_rad)->first, pair->first);
+  EXPECT_NE(cache.pair(0, 1, RectifiedViewCache::kYawStep_rad)->first, pair->first);
   EXPECT_EQ(cache.pair(0, 1, 0.0)->first, pair->first);
   EXPECT_NE(cache.pair(1, 2, 0.0)->first, pair->first);
   EXPECT_EQ(cache.numPairs(), 2U);
@@ -174,7 +175,7 @@ TEST(RectifiedViewCacheTest, MakesAPairOnceAndForgetsTheOldest) {
 TEST(RectifiedViewCacheTest, PlanesAreParallelWhenTheVehicleTurned) {
   const auto rig = makeRig();
   RectifiedViewCache cache(rig);
-  const double yaw_rad = 10 * RectifiedViewCacheOptions().yaw_step_rad;
+  const double yaw_rad = 10 * RectifiedViewCache::kYawStep_rad;
   const auto pair = cache.pair(0, 1, yaw_rad);
   const Eigen::Quaterniond start_from_first =
       rig->cameras[0].vehicle_from_camera->rotation() * pair->first->viewFromCamera().conjugate();

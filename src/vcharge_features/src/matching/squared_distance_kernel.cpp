@@ -1,4 +1,4 @@
-// Vectors are kept in arrays here, which those of unknown size cannot be.
+// The code keeps vectors in arrays, which is impossible for vectors of unknown size.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "matching/squared_distance_kernel.cpp"
@@ -24,11 +24,11 @@ using DI = hn::ScalableTag<int32_t>;
 using VF = hn::VFromD<DF>;
 using VI = hn::VFromD<DI>;
 
-/// Queries that share each load of a train, and hide the latency of its sum.
+/// Queries that use each loaded train together, which hides the latency of the sums.
 constexpr size_t kTile = 8;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// Column k of all trains of a group lies together; trains past the end are zero.
+/// Stores column k of all trains of a group together; trains past the end are zero.
 void packTrains(const float* trains, size_t stride, size_t num_trains, size_t columns, float* packed) {
   const size_t lanes = hn::Lanes(DF());
   const size_t num_groups = (num_trains + lanes - 1) / lanes;
@@ -40,7 +40,7 @@ void packTrains(const float* trains, size_t stride, size_t num_trains, size_t co
   }
 }
 
-/// Two nearest of each lane, over groups that come in order.
+/// The two nearest per lane, over groups in ascending order.
 struct LaneNearest {
   float* best_distance;
   float* second_distance;
@@ -81,7 +81,7 @@ void insertNearest(const DescriptorNeighbour& found, TwoNearestDescriptors* near
   }
 }
 
-/// Distances of `tile` (1 to kTile) queries to a group.
+/// Distances of 1 to kTile queries to a group.
 template <size_t tile>
 HWY_INLINE void tileDistances(const float* HWY_RESTRICT queries, size_t stride,
                               const float* HWY_RESTRICT group, size_t columns, VF* HWY_RESTRICT sums) {

@@ -11,7 +11,7 @@
 namespace vcharge {
 namespace {
 
-/// To rows [0, count) of `rows`: Hamming or squared Euclidean.
+/// Hamming or squared Euclidean distances to rows [0, count) of `rows`.
 void distancesToRows(const cv::Mat& descriptors, int32_t query, const cv::Mat& rows, int count,
                      float* distances) {
   if (descriptors.type() == CV_8UC1) {
@@ -23,7 +23,7 @@ void distancesToRows(const cv::Mat& descriptors, int32_t query, const cv::Mat& r
   }
 }
 
-/// In [0, 1), alike with every standard library.
+/// Uniform in [0, 1), identical with every standard library.
 double drawUnit(std::mt19937_64* generator) {
   return std::ldexp(static_cast<double>((*generator)() >> 11), -53);
 }
@@ -46,7 +46,7 @@ cv::Mat drawCentres(const cv::Mat& descriptors, const std::vector<int32_t>& rows
       distancesToRows(descriptors, rows[i], centres.row(count - 1), 1, &distance);
       to_nearest[i] = std::min(to_nearest[i], distance);
     });
-    // Drawn in proportion to the distance (bits) or squared distance.
+    // Sampled in proportion to the distance (bits) or squared distance.
     double sum = 0.0;
     for (const float distance : to_nearest) {
       sum += distance;

@@ -15,17 +15,10 @@
 namespace vcharge {
 namespace {
 
-/// Features that one thread takes at a time.
+/// Number of features that a thread processes at a time.
 constexpr int kBlock = 64;
 
 }  // namespace
-
-void PlaceVotesOptions::validate() const {
-  requireField(max_distance_bits >= 0 && max_distance_bits <= 256, "max_distance_bits", "must be in [0, 256]",
-               max_distance_bits);
-  requireField(sigma_bits > 0.0, "sigma_bits", "must be positive", sigma_bits);
-  validateInner("index", index);
-}
 
 PlaceVotes::PlaceVotes(const cv::Mat& descriptors, std::vector<int32_t> images, int num_places,
                        int num_cameras, const PlaceVotesOptions& options)
@@ -45,7 +38,7 @@ PlaceVotes::PlaceVotes(const cv::Mat& descriptors, std::vector<int32_t> images, 
   if (!is_binary) {
     mean_ = meanDescriptor(descriptors);
   }
-  index_ = std::make_unique<HammingIndex>(signaturesOf(descriptors), options_.index);
+  index_ = std::make_unique<HammingIndex>(signaturesOf(descriptors));
 }
 
 cv::Mat PlaceVotes::signaturesOf(const cv::Mat& descriptors) const {
@@ -54,7 +47,7 @@ cv::Mat PlaceVotes::signaturesOf(const cv::Mat& descriptors) const {
 
 std::vector<PlaceVotes::Vote> PlaceVotes::votesOf(const uint8_t* signature,
                                                   std::vector<Vote>* best_of_place) const {
-  // The nearest of each place: a place counts once however often it shows the same.
+  // Only the nearest feature of each place votes, so repeated structure counts once per place.
   std::vector<int32_t> places;
   for (const DescriptorNeighbour& neighbour : index_->near(signature, options_.max_distance_bits)) {
     const int32_t image = images_[static_cast<size_t>(neighbour.index)];
@@ -107,7 +100,7 @@ std::vector<PlaceMatch> PlaceVotes::query(const std::vector<cv::Mat>& descriptor
         votes[static_cast<size_t>(i)] = votesOf(signatures.ptr(i), &best_of_place);
       }
     });
-    // One after the other: the same sums on any number of threads.
+    // Sums in a fixed order, so the result does not depend on the number of threads.
     std::fill(of_image.begin(), of_image.end(), 0.0);
     for (const std::vector<Vote>& of_feature : votes) {
       for (const Vote& vote : of_feature) {

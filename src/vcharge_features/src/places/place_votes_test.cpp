@@ -14,27 +14,28 @@ namespace {
 
 constexpr int kPlaces = 40;
 constexpr int kCameras = 2;
-constexpr int kFeatures = 60;  ///< of an image
+constexpr int kFeatures = 60;  ///< features of an image
 
-/// Places that look alike: the features of all are variations of a few kinds, as corners of parked cars are.
-/// The second camera's kinds are others than the first's.
+/// Places that look alike: the features of all are variations of a few kinds, like corners of parked cars.
+/// The second camera's kinds differ from the first's.
 class AlikePlaces {
  public:
   explicit AlikePlaces(int type) : type_(type) {}
 
-  /// Feature `i` of an image, always the same.
+  /// Feature `i` of an image; deterministic.
   cv::Mat feature(int image, int i) const {
     cv::Mat row = kind((image % kCameras) * 100 + i % 6);
     std::mt19937 random(static_cast<unsigned>(1000 * image + i));
     return varied(row, 40, 0.5F, &random);
   }
 
-  /// The image on another day: some of its features again, a little changed, and others of the same kinds.
-  cv::Mat onAnotherDay(int image, double share_seen_again) const {
+  /// The image on another day: the given fraction of its features again, slightly changed, and others of the
+  /// same kinds.
+  cv::Mat onAnotherDay(int image, double fraction_seen_again) const {
     std::mt19937 random(static_cast<unsigned>(5000 + image));
     cv::Mat descriptors;
     for (int i = 0; i < kFeatures; ++i) {
-      const bool is_seen_again = i < share_seen_again * kFeatures;
+      const bool is_seen_again = i < fraction_seen_again * kFeatures;
       descriptors.push_back(is_seen_again
                                 ? varied(feature(image, i), 12, 0.1F, &random)
                                 : varied(kind((image % kCameras) * 100 + i % 6), 40, 0.5F, &random));
@@ -101,7 +102,8 @@ TEST_P(PlaceVotesTest, FindsThePlaceAmongManyThatLookAlike) {
 TEST_P(PlaceVotesTest, AnotherCameraMayHaveSeenIt) {
   const AlikePlaces places(GetParam());
   const PlaceVotes votes = places.votes();
-  // Turned round, with a third camera that the places do not know, and one that sees nothing.
+  // The vehicle faces the opposite direction; a third camera is unknown to the places, and one has no
+  // features.
   const std::vector<PlaceMatch> matches =
       votes.query({places.onAnotherDay(2 * 7 + 1, 0.5), places.onAnotherDay(2 * 7, 0.5), cv::Mat(),
                    places.onAnotherDay(2 * 7 + 1, 0.5)},

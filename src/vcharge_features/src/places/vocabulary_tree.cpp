@@ -15,15 +15,16 @@
 namespace vcharge {
 namespace {
 
-/// A node whose members are still to be clustered.
+/// A node whose members must still be clustered.
 struct OpenNode {
   size_t node;
   std::vector<int32_t> members;
 };
 
-/// Different for every node, whatever the order in which nodes are worked on.
-uint64_t seedOf(int seed, size_t node) {
-  return (static_cast<uint64_t>(static_cast<uint32_t>(seed)) << 32) ^ static_cast<uint64_t>(node);
+/// Differs between nodes and does not depend on the order of processing.
+uint64_t seedOf(size_t node) {
+  constexpr uint64_t kSeed = 1;
+  return (kSeed << 32) ^ static_cast<uint64_t>(node);
 }
 
 cv::Mat joinDescriptors(const std::vector<cv::Mat>& descriptors_of_images) {
@@ -48,13 +49,6 @@ cv::Mat joinDescriptors(const std::vector<cv::Mat>& descriptors_of_images) {
 
 }  // namespace
 
-void VocabularyTreeOptions::validate() const {
-  requireField(branching >= 2 && branching <= 1000, "branching", "must be in [2, 1000]", branching);
-  requireField(depth >= 1 && depth <= 20, "depth", "must be in [1, 20]", depth);
-  requireField(max_iterations >= 1 && max_iterations <= 1000, "max_iterations", "must be in [1, 1000]",
-               max_iterations);
-}
-
 VocabularyTree VocabularyTree::train(const std::vector<cv::Mat>& descriptors_of_images,
                                      const VocabularyTreeOptions& options) {
   options.validate();
@@ -70,19 +64,19 @@ VocabularyTree VocabularyTree::train(const std::vector<cv::Mat>& descriptors_of_
     std::vector<DescriptorClusters> clusters(open.size());
     tbb::parallel_for(size_t{0}, open.size(), [&](size_t i) {
       clusters[i] = clusterDescriptors(all, open[i].members, options.branching, options.max_iterations,
-                                       seedOf(options.seed, open[i].node));
+                                       seedOf(open[i].node));
     });
     std::vector<OpenNode> next;
     for (size_t i = 0; i < open.size(); ++i) {
       const size_t num_children = clusters[i].members.size();
       if (num_children < 2) {
-        continue;  // all alike: a leaf
+        continue;  // all descriptors are alike: a leaf
       }
       tree.nodes_[open[i].node].first_child = static_cast<int32_t>(tree.nodes_.size());
       tree.nodes_[open[i].node].num_children = static_cast<int32_t>(num_children);
       tree.centres_.push_back(clusters[i].centres);
       for (std::vector<int32_t>& members : clusters[i].members) {
-        // Clustering what would give each descriptor a word of its own tells nothing.
+        // Smaller clusters would give each descriptor its own word, which is useless.
         if (members.size() > static_cast<size_t>(options.branching)) {
           next.push_back({tree.nodes_.size(), std::move(members)});
         }
@@ -113,7 +107,7 @@ void VocabularyTree::setWeights(const std::vector<cv::Mat>& descriptors_of_image
     }
   }
   for (size_t i = 0; i < word_weights_.size(); ++i) {
-    // A word that no descriptor reaches (its cluster moved away) counts as seen once.
+    // A word without descriptors (its cluster moved away) counts as observed once.
     word_weights_[i] = static_cast<float>(
         std::log(static_cast<double>(descriptors_of_images.size()) / std::max(images_with_word[i], 1)));
   }
@@ -176,7 +170,7 @@ BagOfWords VocabularyTree::bagOfWords(const cv::Mat& descriptors) const {
 }
 
 double bagOfWordsSimilarity(const BagOfWords& a, const BagOfWords& b) {
-  // Of weights that add up to 1 each, |a - b|_1 / 2 is 1 less what both have.
+  // For weights that add up to 1, |a - b|_1 / 2 is 1 minus the common weight.
   double common = 0.0;
   for (auto i = a.begin(), j = b.begin(); i != a.end() && j != b.end();) {
     if (i->word == j->word) {

@@ -1,7 +1,7 @@
-// The file of a vocabulary, little-endian:
+// Format of a serialized vocabulary, little-endian:
 //   8 bytes "VCHVOCAB", int32 version, descriptor type (0 CV_8UC1, 1 CV_32FC1), columns, nodes, words;
 //   per node int32 first child, number of children, word; the centres row by row; float weight per word;
-//   32 hexadecimal digits: XXH3-128 of everything before them.
+//   32 hexadecimal digits: XXH3-128 of all preceding bytes.
 #include <cmath>
 #include <cstring>
 
@@ -87,7 +87,7 @@ VocabularyTree VocabularyTree::parse(const std::string& text, const std::string&
       throw InputError(source + ": " + message);
     }
   };
-  require(text.compare(0, kMagicSize, kMagic) == 0, "expected a vocabulary, starts with other bytes");
+  require(text.compare(0, kMagicSize, kMagic) == 0, "expected a vocabulary, found other bytes at its start");
   require(text.size() >= kHeaderSize + kHashSize, "vocabulary is truncated");
   Reader reader(text);
   reader.skip(kMagicSize);
@@ -108,7 +108,7 @@ VocabularyTree VocabularyTree::parse(const std::string& text, const std::string&
   require(text.size() >= expected, "vocabulary is truncated: expected " + std::to_string(expected) +
                                        " bytes, got " + std::to_string(text.size()));
   require(text.size() == expected && text.substr(expected - kHashSize) == hashOf(text, expected - kHashSize),
-          "vocabulary is corrupt: its checksum does not fit");
+          "vocabulary is corrupt: wrong checksum");
   VocabularyTree tree;
   tree.nodes_.resize(static_cast<size_t>(num_nodes));
   for (Node& node : tree.nodes_) {
@@ -122,7 +122,7 @@ VocabularyTree VocabularyTree::parse(const std::string& text, const std::string&
   }
   tree.word_weights_.resize(static_cast<size_t>(num_words));
   reader.read(tree.word_weights_.data(), tree.word_weights_.size() * sizeof(float));
-  require(tree.isValid(), "vocabulary is corrupt: its nodes make no tree, or numbers are not finite");
+  require(tree.isValid(), "vocabulary is corrupt: its nodes are not a tree, or numbers are not finite");
   return tree;
 }
 
@@ -132,7 +132,7 @@ bool VocabularyTree::isValid() const {
   for (size_t i = 0; i < nodes_.size(); ++i) {
     const Node& node = nodes_[i];
     const bool leaf = node.num_children == 0;
-    // Children in the order of their parents: every node but the root has one parent before it.
+    // Children are in the order of their parents: every node except the root has one parent before it.
     const bool right = leaf ? node.word == next_word
                             : node.word == -1 && node.num_children > 0 && node.first_child == next_child &&
                                   node.first_child > static_cast<int64_t>(i);

@@ -23,7 +23,7 @@ using ::testing::ThrowsMessage;
 
 constexpr int kNumTopics = 60;
 
-/// Descriptors around kNumTopics centres far apart: "topics" are what a vocabulary should find.
+/// Descriptors around kNumTopics distant centres ("topics"), which a vocabulary should find.
 cv::Mat descriptorsOf(const std::vector<int>& topics, int type, unsigned seed) {
   cv::Mat descriptors(0, type == CV_8UC1 ? 32 : 64, type);
   std::mt19937 noise(seed);
@@ -46,7 +46,7 @@ cv::Mat descriptorsOf(const std::vector<int>& topics, int type, unsigned seed) {
   return descriptors;
 }
 
-/// Twelve topics of the sixty per image.
+/// Twelve of the sixty topics per image.
 std::vector<int> topicsOfImage(int image) {
   std::mt19937 generator(static_cast<unsigned>(image));
   std::vector<int> topics;
@@ -67,7 +67,7 @@ class VocabularyTreeTest : public ::testing::TestWithParam<int> {
   }
   static VocabularyTreeOptions options() {
     VocabularyTreeOptions options;
-    // About as many words as topics: more would split topics by their noise.
+    // About as many words as topics: more words would split topics by their noise.
     options.branching = 8;
     options.depth = 2;
     return options;
@@ -93,7 +93,7 @@ TEST_P(VocabularyTreeTest, GivesDescriptorsOfOneTopicOneWord) {
     same += std::set<int32_t>(words.begin(), words.end()).size() == 1 ? 1 : 0;
     different.insert(words[0]);
   }
-  // Some clusters hold parts of a topic or two topics.
+  // Some clusters contain part of a topic or two topics.
   EXPECT_GT(same, 0.8 * kNumTopics);
   EXPECT_GT(different.size(), 0.6 * kNumTopics);
 }
@@ -114,7 +114,7 @@ TEST_P(VocabularyTreeTest, FindsThePlaceOfEachImageAgain) {
   EXPECT_GT(right, 180);
 }
 
-TEST_P(VocabularyTreeTest, IsTheSameForASeedOnAnyNumberOfThreadsAndAfterReading) {
+TEST_P(VocabularyTreeTest, IsTheSameOnAnyNumberOfThreadsAndAfterReading) {
   const std::vector<cv::Mat> images = trainingImages();
   std::string texts[3];
   for (const int threads : {1, 4}) {
@@ -126,7 +126,7 @@ TEST_P(VocabularyTreeTest, IsTheSameForASeedOnAnyNumberOfThreadsAndAfterReading)
   VocabularyTree::read(path()).write(path());
   EXPECT_EQ(texts[0], readTextFile(path()));
   VocabularyTreeOptions other = options();
-  other.seed = 2;
+  other.max_iterations = 1;
   VocabularyTree::train(images, other).write(path());
   EXPECT_NE(texts[0], readTextFile(path()));
   std::filesystem::remove(path());
@@ -165,7 +165,7 @@ TEST_P(VocabularyTreeTest, FilesWithARightChecksumOverWrongNumbersAreReadOrNamed
   int named = 0;
   for (int i = 0; i < 500; ++i) {
     std::string broken = text.substr(0, text.size() - 32);
-    // Mostly in the header and the nodes, which could send a search anywhere.
+    // Mostly in the header and the nodes, where damage could cause invalid accesses.
     broken[8 + generator() % 300] = static_cast<char>(generator());
     ContentHasher hasher;
     hasher.addBytes(broken.data(), broken.size());
@@ -232,7 +232,7 @@ TEST(BagOfWordsTest, SimilarityIsOneLessHalfTheL1Distance) {
 }
 
 TEST(BagOfWordsTest, WeightsAreTermTimesInverseDocumentFrequency) {
-  // Topic 0 is in both images, 1 in the first alone, 2 in the second alone.
+  // Topic 0 is in both images, topic 1 only in the first, topic 2 only in the second.
   const std::vector<cv::Mat> images = {descriptorsOf({0, 0, 1, 1, 1}, CV_32FC1, 1),
                                        descriptorsOf({0, 2}, CV_32FC1, 2)};
   VocabularyTreeOptions options;
@@ -240,7 +240,7 @@ TEST(BagOfWordsTest, WeightsAreTermTimesInverseDocumentFrequency) {
   options.depth = 1;
   const VocabularyTree tree = VocabularyTree::train(images, options);
   ASSERT_EQ(tree.numWords(), 3);
-  // ln(2/2) = 0 for topic 0; of the others, ln(2/1) each, two of three are topic 1.
+  // Weights: ln(2/2) = 0 for topic 0, ln(2/1) for the others, of which two of three are topic 1.
   const BagOfWords bag = tree.bagOfWords(descriptorsOf({0, 1, 2, 1}, CV_32FC1, 3));
   ASSERT_EQ(bag.size(), 2U);
   EXPECT_NEAR(std::max(bag[0].weight, bag[1].weight), 2.0 / 3.0, 1e-6);
@@ -260,7 +260,7 @@ TEST(PlaceIndexTest, ScoreAddsTheMostSimilarCamerasAndIsThatOfTheBags) {
   index.add({image(1), image(2)});
   index.add({image(3), cv::Mat()});
   index.add({image(5), image(6)});
-  // Passed in the opposite direction: what the first camera saw, the second sees now.
+  // In the opposite direction, the second camera observes what the first one did.
   const auto matches = index.query({image(6), image(5)}, 10);
   ASSERT_FALSE(matches.empty());
   EXPECT_EQ(matches[0].place, 2);

@@ -13,11 +13,18 @@ namespace {
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 
-/// Patches of less contrast (standard deviation in gray levels) have no texture.
+/// Patches with less contrast (standard deviation in gray levels) have no texture.
 constexpr float kMinContrast = 2.0F;
+constexpr int kMaxIterations = 20;
+/// Smaller steps end the iterations.
+constexpr double kMinStep_px = 0.005;
+/// Standard deviation of the difference between pixels, which weights the prior of the shape.
+constexpr double kNoise_gray = 4.0;
+/// Largest factor by which a patch may grow or shrink in any direction.
+constexpr double kMaxScale = 2.0;
 
-/// Whether the deformed square of this radius, and a pixel around it, is in the image.
-bool isInside(const cv::Mat& image, const PatchPlace& place, double radius_px) {
+/// Whether the deformed square of this radius lies inside the image, with a margin of one pixel.
+bool isInside(const cv::Mat& image, const PatchWarp& place, double radius_px) {
   const Eigen::Vector2d reach_px = place.shape.cwiseAbs() * Eigen::Vector2d::Constant(radius_px);
   const Eigen::Vector2d low_px = place.position_px - reach_px, high_px = place.position_px + reach_px;
   return low_px.minCoeff() >= 1.0 && high_px.x() < image.cols - 2.0 && high_px.y() < image.rows - 2.0;
@@ -28,9 +35,9 @@ class Alignment {
   Alignment(const PatchAlignmentOptions& options, const cv::Mat& current)
       : options_(options), current_(current), side_(2 * options.radius_px + 1), size_(side_ * side_) {}
 
-  /// False where the patch leaves the image or has no texture.
+  /// False if the patch leaves the image or has no texture.
   bool setAnchor(const cv::Mat& image, const Eigen::Vector2d& anchor_px) {
-    const PatchPlace place{anchor_px, Eigen::Matrix2d::Identity()};
+    const PatchWarp place{anchor_px, Eigen::Matrix2d::Identity()};
     if (!isInside(image, place, options_.radius_px + 1.0)) {
       return false;
     }
@@ -50,7 +57,7 @@ class Alignment {
       jacobian_.row(i) << by_x, by_y, by_x * offset.x(), by_x * offset.y(), by_y * offset.x(),
           by_y * offset.y();
     }
-    // What only changes brightness or contrast is free.
+    // Changes of brightness and contrast are projected out.
     jacobian_.rowwise() -= jacobian_.colwise().mean().eval();
     const Eigen::Matrix<float, 1, 6> as_contrast =
         anchor_.transpose() * jacobian_ / static_cast<float>(size_);
@@ -61,10 +68,10 @@ class Alignment {
     return solver_.info() == Eigen::Success && solver_.rcond() > 1e-9;
   }
 
-  std::optional<PatchPlace> align(const PatchPlace& start) const {
-    PatchPlace place = start;
+  std::optional<PatchWarp> align(const PatchWarp& start) const {
+    PatchWarp place = start;
     const Eigen::Matrix2d start_inverse = start.shape.inverse();
-    for (int iteration = 0; iteration < options_.max_iterations; ++iteration) {
+    for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
       if (!isInside(current_, place, options_.radius_px)) {
         return std::nullopt;
       }
@@ -73,7 +80,7 @@ class Alignment {
         return std::nullopt;
       }
       const Vector6 step = stepFor(patch, start_inverse * place.shape - Eigen::Matrix2d::Identity());
-      // The step deforms the anchor: its inverse deforms the place.
+      // The step deforms the anchor; the current patch is deformed by its inverse.
       const Eigen::Matrix2d change = Eigen::Matrix2d::Identity() + shapeOf(step);
       if (!step.allFinite() || change.determinant() < 0.1) {
         return std::nullopt;
@@ -82,7 +89,7 @@ class Alignment {
       const Eigen::Vector2d move_px = place.shape * step.head<2>();
       place.position_px -= move_px;
       const double rim_move_px = options_.radius_px * step.tail<4>().norm();
-      if (move_px.norm() < options_.min_step_px && rim_move_px < 4.0 * options_.min_step_px) {
+      if (move_px.norm() < kMinStep_px && rim_move_px < 4.0 * kMinStep_px) {
         return isGood(patch, place) ? std::make_optional(place) : std::nullopt;
       }
     }
@@ -101,11 +108,11 @@ class Alignment {
   }
 
   double shapeWeight() const {
-    const double ratio = options_.noise_gray_levels / options_.shape_sigma;
+    const double ratio = kNoise_gray / options_.shape_sigma;
     return ratio * ratio;
   }
 
-  Eigen::VectorXf read(const cv::Mat& image, const PatchPlace& place) const {
+  Eigen::VectorXf read(const cv::Mat& image, const PatchWarp& place) const {
     Eigen::VectorXf patch(size_);
     const Eigen::Matrix2f shape = place.shape.cast<float>();
     const Eigen::Vector2f center = place.position_px.cast<float>();
@@ -116,7 +123,7 @@ class Alignment {
     return patch;
   }
 
-  /// To mean 0 and standard deviation 1; returns the latter as it was.
+  /// Normalizes to mean 0 and standard deviation 1; returns the original standard deviation.
   static float normalize(Eigen::VectorXf* patch) {
     patch->array() -= patch->mean();
     const float contrast = std::sqrt(patch->squaredNorm() / static_cast<float>(patch->size()));
@@ -131,17 +138,17 @@ class Alignment {
     return solver_.solve(gradient);
   }
 
-  bool isGood(const Eigen::VectorXf& patch, const PatchPlace& place) const {
+  bool isGood(const Eigen::VectorXf& patch, const PatchWarp& place) const {
     const Eigen::Vector2d scales = Eigen::JacobiSVD<Eigen::Matrix2d>(place.shape).singularValues();
     return anchor_.dot(patch) / static_cast<float>(size_) >= options_.min_correlation &&
-           scales[0] <= options_.max_scale && scales[1] * options_.max_scale >= 1.0;
+           scales[0] <= kMaxScale && scales[1] * kMaxScale >= 1.0;
   }
 
   const PatchAlignmentOptions& options_;
   const cv::Mat& current_;
   const int side_, size_;
   Eigen::VectorXf anchor_;  // normalized
-  float contrast_ = 0.0F;   // of the anchor, gray levels
+  float contrast_ = 0.0F;   // standard deviation of the anchor in gray levels
   Eigen::Matrix<float, Eigen::Dynamic, 6>
       jacobian_;  // gray levels by position and shape in the anchor's image
   Eigen::LDLT<Matrix6> solver_;
@@ -149,22 +156,9 @@ class Alignment {
 
 }  // namespace
 
-void PatchAlignmentOptions::validate() const {
-  requireField(radius_px >= 2 && radius_px <= 50, "radius_px", "must be in [2, 50]", radius_px);
-  requireField(max_iterations >= 1 && max_iterations <= 100, "max_iterations", "must be in [1, 100]",
-               max_iterations);
-  requireField(min_step_px > 0.0 && min_step_px <= 1.0, "min_step_px", "must be in (0, 1]", min_step_px);
-  requireField(shape_sigma > 0.0 && shape_sigma <= 10.0, "shape_sigma", "must be in (0, 10]", shape_sigma);
-  requireField(noise_gray_levels > 0.0 && std::isfinite(noise_gray_levels), "noise_gray_levels",
-               "must be positive", noise_gray_levels);
-  requireField(min_correlation >= 0.0 && min_correlation < 1.0, "min_correlation", "must be in [0, 1)",
-               min_correlation);
-  requireField(max_scale > 1.0 && std::isfinite(max_scale), "max_scale", "must be more than 1", max_scale);
-}
-
-std::optional<PatchPlace> alignPatch(const cv::Mat& anchor, const cv::Mat& current,
-                                     const Eigen::Vector2d& anchor_px, const PatchPlace& start,
-                                     const PatchAlignmentOptions& options) {
+std::optional<PatchWarp> alignPatch(const cv::Mat& anchor, const cv::Mat& current,
+                                    const Eigen::Vector2d& anchor_px, const PatchWarp& start,
+                                    const PatchAlignmentOptions& options) {
   if (anchor.empty() || current.empty()) {
     return std::nullopt;
   }

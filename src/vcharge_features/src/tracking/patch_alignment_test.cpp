@@ -13,7 +13,7 @@
 namespace vcharge {
 namespace {
 
-/// An image and what it becomes when the scene is deformed around its middle.
+/// An image, and the same scene deformed around its middle.
 class PatchAlignmentTest : public ::testing::Test {
  protected:
   PatchAlignmentTest() { cv::GaussianBlur(randomTexture({400, 300}, 1), first_, cv::Size(5, 5), 1.2); }
@@ -39,11 +39,11 @@ class PatchAlignmentTest : public ::testing::Test {
     return points;
   }
 
-  /// Errors of the patches that are found, begun half a pixel away, without a guess of the shape.
+  /// Position errors of aligned patches, started half a pixel away without a guess of the shape.
   std::vector<double> errorsOfAlignment() const {
     std::vector<double> errors_px;
     for (const Eigen::Vector2d& point : points()) {
-      const PatchPlace start{warped(point) + Eigen::Vector2d(0.4, -0.3), Eigen::Matrix2d::Identity()};
+      const PatchWarp start{warped(point) + Eigen::Vector2d(0.4, -0.3), Eigen::Matrix2d::Identity()};
       if (const auto place = alignPatch(first_, second_, point, start, options_)) {
         errors_px.push_back((place->position_px - warped(point)).norm());
       }
@@ -93,7 +93,7 @@ TEST_F(PatchAlignmentTest, ScaleAndSlantPullNothingAside) {
                                     << turn_rad);
     EXPECT_GT(errors_px.size(), 0.9 * static_cast<double>(points().size()));
     EXPECT_LT(quantile(errors_px, 0.5),
-              0.06);  // interpolation between pixels costs this much without any scale
+              0.06);  // interpolation between pixels causes this error even without scaling
     EXPECT_LT(quantile(errors_px, 0.95), 0.1);
   }
   EXPECT_GT(quantile(errorsOfTracker(), 0.5), 0.2) << "a patch that is moved alone does as well";
@@ -124,11 +124,11 @@ TEST_F(PatchAlignmentTest, BrightnessAndContrastDoNotMatter) {
 
 TEST_F(PatchAlignmentTest, NothingIsFoundWhereThereIsNothing) {
   deform(1.0, 1.0, 0.0);
-  const auto found = [&](const cv::Mat& current, Eigen::Vector2d anchor_px, const PatchPlace& start) {
+  const auto found = [&](const cv::Mat& current, Eigen::Vector2d anchor_px, const PatchWarp& start) {
     return alignPatch(first_, current, anchor_px, start, options_).has_value();
   };
   const Eigen::Vector2d middle(200.0, 150.0);
-  const PatchPlace there{warped(middle), Eigen::Matrix2d::Identity()};
+  const PatchWarp there{warped(middle), Eigen::Matrix2d::Identity()};
   ASSERT_TRUE(found(second_, middle, there));
   EXPECT_FALSE(found(cv::Mat(), middle, there));
   EXPECT_FALSE(found(cv::Mat(second_.size(), CV_8UC1, cv::Scalar(99)), middle, there)) << "no texture";
@@ -145,10 +145,6 @@ TEST_F(PatchAlignmentTest, BadOptionsAreNamed) {
   options.radius_px = 0;
   EXPECT_THAT([&] { options.validate(); },
               testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("radius_px")));
-  options = PatchAlignmentOptions();
-  options.max_scale = 1.0;
-  EXPECT_THAT([&] { options.validate(); },
-              testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("max_scale")));
 }
 
 }  // namespace

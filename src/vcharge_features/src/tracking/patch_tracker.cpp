@@ -9,6 +9,12 @@
 namespace vcharge {
 namespace {
 
+/// A smaller step ends the iterations.
+constexpr double kMinStep_px = 0.01;
+/// A patch has no texture if the smaller eigenvalue of its gradients (per pixel, gray levels over 255) is
+/// below.
+constexpr double kMinEigenvalue = 1e-4;
+
 void require(bool condition, const std::string& message) {
   if (!condition) {
     throw std::invalid_argument("PatchTracker: " + message);
@@ -22,17 +28,8 @@ bool isInside(const cv::Point2f& point, cv::Size size) {
 
 }  // namespace
 
-void PatchTrackerOptions::validate() const {
-  requireField(window_px >= 5 && window_px <= 101 && window_px % 2 == 1, "window_px",
-               "must be odd and in [5, 101]", window_px);
-  requireField(num_levels >= 1 && num_levels <= 10, "num_levels", "must be in [1, 10]", num_levels);
-  requireField(max_iterations >= 1 && max_iterations <= 100, "max_iterations", "must be in [1, 100]",
-               max_iterations);
-  requireField(min_step_px > 0.0 && min_step_px <= 1.0, "min_step_px", "must be in (0, 1]", min_step_px);
-  requireField(min_eigenvalue >= 0.0 && std::isfinite(min_eigenvalue), "min_eigenvalue",
-               "must be finite and not negative", min_eigenvalue);
-  requireField(max_forward_backward_px > 0.0, "max_forward_backward_px", "must be positive",
-               max_forward_backward_px);
+void PatchTrackerOptions::checkFields() const {
+  requireField(window_px % 2 == 1, "window_px", "must be odd", window_px);
 }
 
 PatchTracker::PatchTracker(const PatchTrackerOptions& options) : options_(options) {
@@ -45,7 +42,7 @@ ImagePyramid PatchTracker::buildPyramid(const cv::Mat& image) const {
               std::to_string(image.rows) + " " + cv::typeToString(image.type()));
   ImagePyramid pyramid;
   pyramid.size_px = image.size();
-  // OpenCV would read what surrounds an image that is a part of another.
+  // Otherwise OpenCV would read pixels outside of a sub-image.
   const cv::Mat isolated = image.isSubmatrix() ? image.clone() : image;
   constexpr bool kWithGradients = true;
   constexpr bool kReuseImage = false;
@@ -81,17 +78,15 @@ std::vector<TrackedPoint> PatchTracker::track(const ImagePyramid& previous, cons
   }
   const cv::Size window(options_.window_px, options_.window_px);
   const cv::TermCriteria criteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, options_.max_iterations,
-                                  options_.min_step_px);
+                                  kMinStep_px);
   std::vector<uint8_t> forward, backward;
   std::vector<float> ignored;
   cv::calcOpticalFlowPyrLK(previous.levels, current.levels, start, found, forward, ignored, window,
-                           options_.num_levels - 1, criteria, cv::OPTFLOW_USE_INITIAL_FLOW,
-                           options_.min_eigenvalue);
-  // The way back is short when the way there was right: it starts at its end.
+                           options_.num_levels - 1, criteria, cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
+  // Tracking backwards starts at the original point, since the way back is short for a correct track.
   std::vector<cv::Point2f> returned = start;
   cv::calcOpticalFlowPyrLK(current.levels, previous.levels, found, returned, backward, ignored, window,
-                           options_.num_levels - 1, criteria, cv::OPTFLOW_USE_INITIAL_FLOW,
-                           options_.min_eigenvalue);
+                           options_.num_levels - 1, criteria, cv::OPTFLOW_USE_INITIAL_FLOW, kMinEigenvalue);
   for (size_t k = 0; k < sources.size(); ++k) {
     TrackedPoint& point = tracked[sources[k]];
     point.position_px = found[k];

@@ -48,7 +48,7 @@ TEST_F(PatchTrackerTest, FollowsAKnownWarpToAFifthOfAPixel) {
   int right = 0;
   for (size_t i = 0; i < points.size(); ++i) {
     if (tracked[i].status == TrackStatus::kTracked) {
-      // The patch moves as one: its scale of 1 % is a tenth of a pixel at its rim.
+      // The patch is tracked as a rigid window: its scale of 1 % is a tenth of a pixel at its rim.
       EXPECT_LT(cv::norm(tracked[i].position_px - warped(points[i])), 0.2) << points[i];
       ++right;
     }
@@ -79,7 +79,7 @@ TEST_F(PatchTrackerTest, APredictionBridgesAMotionTooLargeForThePyramid) {
 }
 
 TEST_F(PatchTrackerTest, ChangedPartsAreNotTracked) {
-  // The right half shows something else.
+  // The right half shows a different scene.
   randomTexture({200, 300}, 77).copyTo(second_(cv::Rect(200, 0, 200, 300)));
   int left = 0, right = 0;
   const std::vector<cv::Point2f> points = gridOfPoints(first_.size(), 11, 20);

@@ -1,24 +1,24 @@
+#include "pose_graph/g2o_file.h"
+
 #include <cmath>
-#include <iomanip>
 #include <sstream>
 
 #include <Eigen/Eigenvalues>
 
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/files/file_io.h"
-#include "vcharge_geometry/pose_graph/pose_graph.h"
 
 namespace vcharge {
 namespace {
 
-/// Rows of the 6x6 information that a file of either dimension holds.
+/// Rows of the 6x6 information matrix that a file of this dimension contains.
 const std::vector<int>& informationRows(bool planar) {
   static const std::vector<int> planar_rows{0, 1, 5};
   static const std::vector<int> spatial_rows{0, 1, 2, 3, 4, 5};
   return planar ? planar_rows : spatial_rows;
 }
 
-/// Reads the fields of one line; every error names file and line.
+/// Reads the fields of a line; every error names the file and the line.
 class LineReader {
  public:
   LineReader(const std::string& path, int line_number, const std::string& line)
@@ -91,17 +91,6 @@ class LineReader {
   std::istringstream stream_;
 };
 
-void writeTransform(const RigidTransform& transform, bool planar, std::ostream* stream) {
-  const Eigen::Vector3d& t = transform.translation();
-  const Eigen::Quaterniond& q = transform.rotation();
-  if (planar) {
-    *stream << ' ' << t.x() << ' ' << t.y() << ' ' << yawOfRotation(q);
-  } else {
-    *stream << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << ' ' << q.x() << ' ' << q.y() << ' ' << q.z()
-            << ' ' << q.w();
-  }
-}
-
 }  // namespace
 
 PoseGraph readG2o(const std::string& path) {
@@ -152,28 +141,6 @@ PoseGraph readG2o(const std::string& path) {
   }
   graph.map_from_node.insert(placed.map_from_node.begin(), placed.map_from_node.end());
   return graph;
-}
-
-void writeG2o(const PoseGraph& graph, const std::string& path) {
-  std::ostringstream text;
-  text << std::setprecision(17);
-  for (const auto& [node, map_from_node] : graph.map_from_node) {
-    text << (graph.planar ? "VERTEX_SE2 " : "VERTEX_SE3:QUAT ") << node;
-    writeTransform(map_from_node, graph.planar, &text);
-    text << '\n';
-  }
-  for (const PoseGraphEdge& edge : graph.edges) {
-    text << (graph.planar ? "EDGE_SE2 " : "EDGE_SE3:QUAT ") << edge.first << ' ' << edge.second;
-    writeTransform(edge.first_from_second, graph.planar, &text);
-    const std::vector<int>& rows = informationRows(graph.planar);
-    for (size_t i = 0; i < rows.size(); ++i) {
-      for (size_t j = i; j < rows.size(); ++j) {
-        text << ' ' << edge.information(rows[i], rows[j]);
-      }
-    }
-    text << '\n';
-  }
-  writeTextFileAtomically(path, text.str());
 }
 
 }  // namespace vcharge

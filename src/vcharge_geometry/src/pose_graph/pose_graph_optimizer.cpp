@@ -20,7 +20,7 @@ Matrix6d squareRoot(const Matrix6d& information) {
   return eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.eigenvectors().transpose();
 }
 
-/// Parameters [x, y, yaw].
+/// Cost over [x, y, yaw] of both nodes.
 class PlanarCost {
  public:
   PlanarCost(const RigidTransform& measured, const Matrix6d& square_root)
@@ -33,7 +33,7 @@ class PlanarCost {
     using std::sin;
     const T dx = second[0] - first[0];
     const T dy = second[1] - first[1];
-    // Into the first frame, then into the measured frame of the second.
+    // The difference in the first frame, then in the measured frame of the second.
     const T x = cos(first[2]) * dx + sin(first[2]) * dy - measured_.translation().x();
     const T y = -sin(first[2]) * dx + cos(first[2]) * dy - measured_.translation().y();
     const T turn = second[2] - first[2] - measured_yaw_;
@@ -53,7 +53,7 @@ class PlanarCost {
   Matrix6d square_root_;
 };
 
-/// Parameters [x, y, z] and the quaternion's [x, y, z, w].
+/// Cost over [x, y, z] and the quaternion [x, y, z, w] of both nodes.
 class SpatialCost {
  public:
   SpatialCost(const RigidTransform& measured, const Matrix6d& square_root)
@@ -82,7 +82,7 @@ class SpatialCost {
   Matrix6d square_root_;
 };
 
-/// A node's parameters: [x, y, yaw] or [x, y, z] and [qx, qy, qz, qw].
+/// Parameters of a node: [x, y, yaw], or [x, y, z] and [qx, qy, qz, qw].
 using NodeParameters = std::array<double, 7>;
 
 NodeParameters parametersOf(const RigidTransform& pose, bool planar) {
@@ -157,7 +157,7 @@ PoseGraphSummary optimizePoseGraph(const std::vector<double>& weights, int max_i
     graph->map_from_node[node] = poseOf(parameters, graph->planar);
   }
   summary.converged = solved.termination_type == ceres::CONVERGENCE;
-  // Ceres halves.
+  // Ceres' cost is half the sum of squares.
   summary.initial_chi_squared = 2.0 * solved.initial_cost;
   summary.final_chi_squared = 2.0 * solved.final_cost;
   summary.num_iterations = static_cast<int>(solved.iterations.size());

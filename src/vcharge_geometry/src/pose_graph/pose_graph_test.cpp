@@ -1,10 +1,8 @@
 #include "vcharge_geometry/pose_graph/pose_graph.h"
 
-#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <random>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -13,13 +11,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pose_graph/g2o_file.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_geometry/pose_graph/pose_graph_optimizer.h"
 
 namespace vcharge {
 namespace {
 
-/// A file of the given text, removed with the object.
+/// A file with the given text, removed by the destructor.
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& text)
@@ -47,21 +46,13 @@ const char* const kPlanarText =
     "EDGE_SE2 0 1 1 0 0.1 10 0 0 10 0 100\n"
     "EDGE_SE2 1 7 1 0 -0.1 10 1 0 10 0 100\n";
 
-TEST(PoseGraphTest, WritesWhatItReads) {
+TEST(PoseGraphTest, ReadsPlanarGraphs) {
   const TemporaryFile file(kPlanarText);
   const PoseGraph graph = readG2o(file.path());
   ASSERT_TRUE(graph.planar);
   ASSERT_EQ(graph.map_from_node.size(), 3U);
   ASSERT_EQ(graph.edges.size(), 2U);
   EXPECT_EQ(graph.edges[1].information(1, 0), 1.0);
-  writeG2o(graph, file.path());
-  const PoseGraph again = readG2o(file.path());
-  ASSERT_EQ(again.edges.size(), 2U);
-  for (const auto& [node, pose] : graph.map_from_node) {
-    EXPECT_LE((again.map_from_node.at(node).matrix() - pose.matrix()).norm(), 1e-14);
-  }
-  EXPECT_EQ(again.edges[1].information, graph.edges[1].information);
-  EXPECT_NEAR(chiSquared(again), chiSquared(graph), 1e-12);
 }
 
 TEST(PoseGraphTest, NamesFileAndLineOfBadInput) {
@@ -96,30 +87,6 @@ TEST(PoseGraphTest, NamesFileAndLineOfBadInput) {
   EXPECT_THROW(readG2o(testing::TempDir() + "no_such_file.g2o"), InputError);
 }
 
-TEST(PoseGraphTest, SurvivesDamagedFiles) {
-  std::mt19937 generator(1);
-  const std::string text = kPlanarText;
-  int num_read = 0;
-  for (int i = 0; i < 3000; ++i) {
-    std::string damaged = text;
-    for (unsigned k = 0; k < 1 + generator() % 4; ++k) {
-      damaged[generator() % damaged.size()] = static_cast<char>(generator() % 256);
-    }
-    damaged.resize(generator() % 4 == 0 ? generator() % damaged.size() : damaged.size());
-    const TemporaryFile file(damaged);
-    try {
-      const PoseGraph graph = readG2o(file.path());
-      ++num_read;
-      EXPECT_TRUE(std::isfinite(chiSquared(graph)));
-    } catch (const InputError& error) {
-      EXPECT_THAT(error.what(), testing::HasSubstr(file.path()));
-    }
-  }
-  // Both kinds occur.
-  EXPECT_GT(num_read, 10);
-  EXPECT_LT(num_read, 2990);
-}
-
 class KnownOptimumTest : public testing::TestWithParam<std::pair<const char*, double>> {};
 
 TEST_P(KnownOptimumTest, IsReached) {
@@ -131,7 +98,7 @@ TEST_P(KnownOptimumTest, IsReached) {
   const PoseGraphSummary summary = optimizePoseGraph({}, 100, &graph);
   EXPECT_TRUE(summary.converged);
   EXPECT_NEAR(summary.final_chi_squared, GetParam().second, 1e-3 * GetParam().second);
-  // The cost that Ceres sees is the error defined in pose_graph.h.
+  // The cost minimized by Ceres is the error defined in pose_graph.h.
   EXPECT_NEAR(chiSquared(graph), summary.final_chi_squared, 1e-6 * summary.final_chi_squared);
 }
 

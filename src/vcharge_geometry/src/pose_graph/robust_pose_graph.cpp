@@ -7,25 +7,32 @@
 #include <utility>
 
 #include "vcharge_core/base/error.h"
-#include "vcharge_core/base/options.h"
 #include "vcharge_geometry/pose_graph/pose_graph_optimizer.h"
 
 namespace vcharge {
 namespace {
 
+/// Odometry steps, at either end, between two loop edges that are compared.
+constexpr int64_t kMaxCycleSteps = 5;
+/// A loop edge above this is false if the information matrices are right.
+constexpr double kMaxEdgeChiSquared = 16.0;
+/// Where the information matrices understate the accuracy of edges, the threshold is this many times the
+/// noise that consistent loop edges show per degree of freedom.
+constexpr double kNoiseFactor = 1600.0;
+
 bool isOdometry(const PoseGraphEdge& edge) {
   return std::abs(edge.first - edge.second) == 1;
 }
 
-/// Two loop edges whose ends are close to each other along the odometry, and the error of the cycle they form
-/// in units of the information of the first, per edge of the cycle.
+/// Two loop edges whose ends are close to each other along the odometry, and the error of the cycle that they
+/// form, in units of the first edge's information, per edge of the cycle.
 struct LoopPair {
   size_t first;
   size_t second;
   double chi_squared_per_edge;
 };
 
-/// The odometry alone, nodes placed along it.
+/// The graph without loop edges, with nodes placed along the odometry.
 PoseGraph odometryOf(const PoseGraph& graph) {
   PoseGraph odometry = graph;
   odometry.edges.clear();
@@ -36,10 +43,10 @@ PoseGraph odometryOf(const PoseGraph& graph) {
   return odometry;
 }
 
-/// All pairs of loop edges with cycles of few steps. Loop edges are indices into graph.edges.
+/// All pairs of loop edges whose cycles have few odometry steps. Loop edges are indices into graph.edges.
 std::vector<LoopPair> nearbyPairs(const PoseGraph& graph, const PoseGraph& odometry,
                                   const std::vector<size_t>& loops, int64_t max_steps) {
-  // By the lower node, so that only neighbours in this order need to be looked at.
+  // Sorted by the lower node, so that only neighbours need to be compared.
   struct Oriented {
     int64_t low;
     int64_t high;
@@ -81,7 +88,7 @@ std::vector<LoopPair> nearbyPairs(const PoseGraph& graph, const PoseGraph& odome
   return pairs;
 }
 
-/// Weights 1 for odometry and Cauchy's for the loop edges in `members`, 0 for the rest.
+/// Weights: 1 for odometry, Cauchy's for the loop edges in `members`, 0 for the others.
 std::vector<double> cauchyWeights(const PoseGraph& graph, const std::vector<bool>& members,
                                   double c_squared) {
   std::vector<double> weights(graph.edges.size(), 0.0);
@@ -95,7 +102,7 @@ std::vector<double> cauchyWeights(const PoseGraph& graph, const std::vector<bool
   return weights;
 }
 
-/// Cauchy weights with c^2 falling from the largest error to a tenth of the threshold.
+/// Optimizes with Cauchy weights while c^2 falls from the largest error to a tenth of the threshold.
 void expectationMaximization(const std::vector<bool>& members, const std::vector<size_t>& loops,
                              double threshold, PoseGraph* graph) {
   constexpr int kSteps = 10;
@@ -110,14 +117,7 @@ void expectationMaximization(const std::vector<bool>& members, const std::vector
 
 }  // namespace
 
-void RobustPoseGraphOptions::validate() const {
-  requireField(max_cycle_steps >= 0, "max_cycle_steps", "must not be negative", max_cycle_steps);
-  requireField(max_edge_chi_squared > 0.0, "max_edge_chi_squared", "must be positive", max_edge_chi_squared);
-  requireField(noise_factor > 0.0, "noise_factor", "must be positive", noise_factor);
-}
-
-RobustPoseGraphSummary optimizeRobustly(const RobustPoseGraphOptions& options, PoseGraph* graph) {
-  options.validate();
+RobustPoseGraphSummary optimizeRobustly(PoseGraph* graph) {
   constexpr int kSteps = 10;
   constexpr int kMaxRounds = 15;
   constexpr double kWidening = 2.0;
@@ -130,19 +130,20 @@ RobustPoseGraphSummary optimizeRobustly(const RobustPoseGraphOptions& options, P
     }
   }
   const PoseGraph odometry = odometryOf(*graph);
-  const std::vector<LoopPair> pairs = nearbyPairs(*graph, odometry, loops, options.max_cycle_steps);
+  const std::vector<LoopPair> pairs = nearbyPairs(*graph, odometry, loops, kMaxCycleSteps);
   RobustPoseGraphSummary summary;
   if (!pairs.empty()) {
     std::vector<double> errors;
     for (const LoopPair& pair : pairs) {
       errors.push_back(pair.chi_squared_per_edge);
     }
-    // The lower quartile, for which up to three quarters of the pairs may contain a false edge.
+    // The lower quartile is robust if up to three quarters of the pairs contain a false edge.
     std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 4),
                      errors.end());
     summary.noise_scale = std::min(1.0, errors[errors.size() / 4] / dimensions);
   }
-  // Consistent: within 12 standard deviations of the noise, as odometry's lever arms are neglected.
+  // Pairs are consistent within 12 standard deviations of the noise, a wide bound since the error of the
+  // odometry between their ends is neglected.
   const double max_pair_error = std::min(1.0, 50.0 * summary.noise_scale) * dimensions * 3.0;
   std::vector<bool> members(num_edges, pairs.empty());
   for (const LoopPair& pair : pairs) {
@@ -150,7 +151,7 @@ RobustPoseGraphSummary optimizeRobustly(const RobustPoseGraphOptions& options, P
       members[pair.first] = members[pair.second] = true;
     }
   }
-  const double threshold = std::min(options.max_edge_chi_squared, options.noise_factor * summary.noise_scale);
+  const double threshold = std::min(kMaxEdgeChiSquared, kNoiseFactor * summary.noise_scale);
   optimizePoseGraph({}, 5 * kSteps, graph);
   const bool contradiction = std::any_of(loops.begin(), loops.end(), [&](size_t i) {
     return !(chiSquared(*graph, graph->edges[i]) < kWidening * threshold);
@@ -160,7 +161,7 @@ RobustPoseGraphSummary optimizeRobustly(const RobustPoseGraphOptions& options, P
     expectationMaximization(members, loops, threshold, graph);
   }
   std::vector<double> weights(num_edges, 0.0);
-  // Wide at first: a true edge that is missing may hold others beyond the threshold.
+  // Starts with a wide threshold: a missing true edge may keep others beyond it.
   double widening = kWidening;
   for (int round = 0; round < kMaxRounds; ++round) {
     std::vector<double> next(num_edges, 1.0);

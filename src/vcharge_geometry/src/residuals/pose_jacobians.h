@@ -9,7 +9,7 @@
 
 namespace vcharge {
 
-/// Derivative of Exp(dphi) q by dphi at 0; q as x, y, z, w.
+/// Derivative of Exp(dphi) q with respect to dphi at 0; q is x, y, z, w.
 inline Eigen::Matrix<double, 4, 3> quaternionByTurn(const double* q) {
   const Eigen::Map<const Eigen::Vector3d> vector(q);
   Eigen::Matrix<double, 4, 3> jacobian;
@@ -18,8 +18,8 @@ inline Eigen::Matrix<double, 4, 3> quaternionByTurn(const double* q) {
   return jacobian;
 }
 
-/// Pseudoinverse of quaternionByTurn: turns a derivative by dphi into one by the quaternion that is the same
-/// on the manifold. The columns of quaternionByTurn are orthogonal with a squared length of 1/4.
+/// Pseudoinverse of quaternionByTurn(): converts a derivative by dphi to one by the quaternion, equivalent on
+/// the manifold. The columns of quaternionByTurn() are orthogonal with squared length 1/4.
 inline Eigen::Matrix<double, 3, 4> turnByQuaternion(const double* q) {
   return 4.0 * quaternionByTurn(q).transpose();
 }
@@ -28,7 +28,7 @@ inline Eigen::Matrix<double, 3, 4> turnByQuaternion(const double* q) {
 inline Eigen::Matrix3d leftJacobianInverse(const Eigen::Vector3d& phi) {
   const double angle = phi.norm();
   const Eigen::Matrix3d cross = crossMatrix(phi);
-  // (1 - (angle / 2) cot(angle / 2)) / angle^2, whose series starts 1/12 + angle^2 / 720.
+  // (1 - (angle / 2) cot(angle / 2)) / angle^2 = 1/12 + angle^2 / 720 + ...
   const double factor = angle < 1e-3 ? 1.0 / 12.0 + angle * angle / 720.0
                                      : (1.0 - 0.5 * angle / std::tan(0.5 * angle)) / (angle * angle);
   return Eigen::Matrix3d::Identity() - 0.5 * cross + factor * cross * cross;

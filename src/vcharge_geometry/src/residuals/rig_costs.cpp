@@ -17,7 +17,7 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 template <int kRows, int kColumns>
 using RowMajor = Eigen::Matrix<double, kRows, kColumns, Eigen::RowMajor>;
 
-/// A pose block taken apart.
+/// Parts of a pose block.
 struct Pose {
   explicit Pose(const double* block)
       : translation(block),
@@ -28,17 +28,17 @@ struct Pose {
   Eigen::Matrix3d rotation;
 };
 
-/// Writes a derivative by [dt, dphi] as one by the pose block.
+/// Converts a derivative by [dt, dphi] to one by the pose block.
 template <int kRows>
 void writeByPose(const Eigen::Matrix<double, kRows, 3>& by_translation,
                  const Eigen::Matrix<double, kRows, 3>& by_turn, const double* block, double* jacobian) {
-  // Eigen wants a column vector to be column-major: all of these have more than one column.
+  // Eigen requires column vectors to be column-major; these matrices have several columns.
   Eigen::Map<RowMajor<kRows, 7>> matrix(jacobian);
   matrix.template leftCols<3>() = by_translation;
   matrix.template rightCols<4>() = by_turn * turnByQuaternion(block + 3);
 }
 
-/// What both reprojection costs share. Jacobians may be null.
+/// Common part of both reprojection costs. Jacobians may be null.
 template <class Model>
 void reproject(const Model& model, const Eigen::Vector2d& pixel, double weight,
                const double* map_from_vehicle, const double* vehicle_from_camera, const double* point,
@@ -128,7 +128,7 @@ class KnownCameraReprojectionCost : public ceres::SizedCostFunction<2, 7, 7, 3> 
   const double weight_;
 };
 
-/// A with A^T A = information. std::logic_error unless it is symmetric and positive semidefinite.
+/// A with A^T A = information. Throws std::logic_error unless it is symmetric and positive semidefinite.
 Matrix6d squareRootOf(const Matrix6d& information) {
   check(information.allFinite() && information.isApprox(information.transpose(), 1e-9),
         "information: expected a finite, symmetric matrix");
@@ -150,7 +150,8 @@ class OdometryCost : public ceres::SizedCostFunction<6, 7, 7, 2> {
     const Pose current(blocks[1]);
     const double distance_scale = blocks[2][0];
     const double turn_scale = blocks[2][1];
-    // Measured motion as the odometer's states correct it: the chord turns by half of the turn's correction.
+    // The measured motion, corrected by the odometer scales: the chord rotates by half of the correction of
+    // the turn.
     const Eigen::Rotation2Dd bend(0.5 * (turn_scale - 1.0) * measured_yaw_rad_);
     const Eigen::Vector2d chord = bend * measured_m_;
     const Eigen::Vector2d chord_by_bend(-chord.y(), chord.x());
@@ -168,7 +169,7 @@ class OdometryCost : public ceres::SizedCostFunction<6, 7, 7, 2> {
     if (jacobians == nullptr) {
       return true;
     }
-    // A turn of either pose in the map acts on the error from the right; Log(E Exp(d)) = e + Jl(-e)^-1 d.
+    // Rotating either pose in the map multiplies the error from the right; Log(E Exp(d)) = e + Jl(-e)^-1 d.
     const Eigen::Matrix3d error_by_turn = leftJacobianInverse(-turn_error) * current.rotation.transpose();
     Eigen::Matrix<double, 6, 3> by_translation = Eigen::Matrix<double, 6, 3>::Zero();
     Eigen::Matrix<double, 6, 3> by_turn = Eigen::Matrix<double, 6, 3>::Zero();
@@ -198,29 +199,6 @@ class OdometryCost : public ceres::SizedCostFunction<6, 7, 7, 2> {
   const Matrix6d square_root_;
 };
 
-class PosePriorCost : public ceres::SizedCostFunction<6, 7> {
- public:
-  PosePriorCost(const RigidTransform& target_from_source, const Matrix6d& information)
-      : known_(target_from_source), square_root_(squareRootOf(information)) {}
-
-  bool Evaluate(double const* const* blocks, double* residuals, double** jacobians) const override {
-    const Pose pose(blocks[0]);
-    Eigen::Matrix<double, 6, 1> error;
-    error << pose.translation - known_.translation(),
-        vectorFromRotation(Eigen::Quaterniond(pose.quaternion) * known_.rotation().conjugate());
-    Eigen::Map<Eigen::Matrix<double, 6, 1>>(residuals, 6) = square_root_ * error;
-    if (double* jacobian = blockOf(jacobians, 0); jacobian != nullptr) {
-      writeByPose<6>(square_root_.leftCols<3>(),
-                     square_root_.rightCols<3>() * leftJacobianInverse(error.tail<3>()), blocks[0], jacobian);
-    }
-    return true;
-  }
-
- private:
-  const RigidTransform known_;
-  const Matrix6d square_root_;
-};
-
 }  // namespace
 
 std::unique_ptr<ceres::CostFunction> makeReprojectionCost(const CameraModel& model,
@@ -240,11 +218,6 @@ std::unique_ptr<ceres::CostFunction> makeReprojectionCost(std::shared_ptr<const 
 std::unique_ptr<ceres::CostFunction> makeOdometryCost(const RigidTransform& previous_from_current,
                                                       const Eigen::Matrix<double, 6, 6>& information) {
   return std::make_unique<OdometryCost>(previous_from_current, information);
-}
-
-std::unique_ptr<ceres::CostFunction> makePosePriorCost(const RigidTransform& target_from_source,
-                                                       const Eigen::Matrix<double, 6, 6>& information) {
-  return std::make_unique<PosePriorCost>(target_from_source, information);
 }
 
 }  // namespace vcharge

@@ -9,7 +9,7 @@
 namespace vcharge {
 namespace {
 
-/// R = Exp(dphi) R_hat, t = t_hat + dt, the convention of covariances.
+/// Applies R = Exp(dphi) R_hat, t = t_hat + dt, the convention of covariances.
 RotationTranslation moved(const RotationTranslation& model, int parameter, double step) {
   RotationTranslation result = model;
   Eigen::Vector3d change = Eigen::Vector3d::Zero();
@@ -87,7 +87,7 @@ TEST(AngularErrorTest, ErrorsHaveTheDeviationOfARay) {
     const RigidTransform pose = random.pose();
     pointing += squaredPointingError(random.pointMatches<1>(pose, 1.0, kSigma)[0], RotationTranslation(pose));
   }
-  // One component and two; the deviation of a mean of squares is sqrt(2 / n), times 5.
+  // The errors have one and two components; the deviation of a mean of squares is sqrt(2 / n), times 5.
   EXPECT_NEAR(epipolar / kNum / (kSigma * kSigma), 1.0, 5.0 * std::sqrt(2.0 / kNum));
   EXPECT_NEAR(pointing / kNum / (2.0 * kSigma * kSigma), 1.0, 5.0 * std::sqrt(2.0 / kNum));
 }

@@ -14,7 +14,7 @@
 namespace vcharge {
 namespace {
 
-/// Matches of which the first num_wrong are wrong: their points have nothing to do with each other.
+/// Matches of which the first num_wrong are wrong: their two points are unrelated.
 std::vector<RayMatch> rayMatches(RandomProblems* random, const RigidTransform& previous_from_current,
                                  int num_matches, int num_wrong, double sigma_rad, double same_camera = 0.8) {
   std::vector<RayMatch> matches;
@@ -47,7 +47,7 @@ std::vector<PointMatch> pointMatches(RandomProblems* random, const RigidTransfor
   return matches;
 }
 
-/// [dt, dphi] of the truth as seen from the estimate.
+/// Error of an estimate as [dt, dphi].
 Eigen::Matrix<double, 6, 1> errorOf(const RigidTransform& estimate, const RigidTransform& truth) {
   Eigen::Matrix<double, 6, 1> error;
   error << truth.translation() - estimate.translation(),
@@ -71,23 +71,25 @@ RigidTransform randomAckermannMotion(RandomProblems* random) {
 constexpr int kNumMatches = 400;
 
 TEST(EstimatorsTest, ReproduceTheIterationTable) {
-  // For 99 % at 50 % inliers: 16, 34-35, 72 iterations for 2, 3, 4 matches (and 292, 603606 for 6, 17).
+  // For a confidence of 99 % at an inlier ratio of 50 %: 16, 34-35 and 72 iterations for 2, 3 and 4 matches
+  // (292 and 603606 for 6 and 17).
   EXPECT_EQ(std::lround(iterationsForConfidence(0.5, 2, 0.99)), 16);
   EXPECT_EQ(std::floor(iterationsForConfidence(0.5, 3, 0.99)), 34);
   EXPECT_EQ(std::ceil(iterationsForConfidence(0.5, 3, 0.99)), 35);
   EXPECT_EQ(std::lround(iterationsForConfidence(0.5, 6, 0.99)), 292);
   EXPECT_EQ(std::floor(iterationsForConfidence(0.5, 17, 0.99)), 603606);
-  // And measured: noise-free matches, that many iterations, is the best model the right one?
+  // Runs exactly that many iterations on noise-free matches and counts how often the best model is right.
   constexpr int kTrials = 2000;
   RobustOptions options;
   options.max_error_rad = 1e-6;
+  options.confidence = 1.0 - 1e-15;  // never stops early
   options.refine_best_models = false;
   RandomProblems random(1);
   std::vector<double> successes(5, 0.0);
   for (int trial = 0; trial < kTrials; ++trial) {
     options.seed = trial;
     const auto withIterations = [&options](int iterations) {
-      options.min_iterations = options.max_iterations = iterations;
+      options.max_iterations = iterations;
       return options;
     };
     const auto succeeded = [](const RigidTransform& found, const RigidTransform& truth) {
@@ -119,7 +121,7 @@ TEST(EstimatorsTest, ReproduceTheIterationTable) {
             .map_from_rig,
         upright_pose);
   }
-  // 0.99, less what drawing without replacement from 200 costs, with a binomial deviation of 0.0022 times 4.
+  // 0.99, minus the effect of drawing without replacement from 200, with 4 binomial deviations of 0.0022.
   for (const double success : successes) {
     EXPECT_GE(success / kTrials, 0.978);
     EXPECT_LE(success / kTrials, 0.999);
@@ -145,7 +147,7 @@ TEST_P(EstimatorAccuracyTest, EstimatesAreRightAndKnowTheirError) {
   const auto judge = [](const RigidTransform& found, const Eigen::Matrix<double, 6, 6>& covariance,
                         const RigidTransform& truth, Model* model) {
     const Eigen::Matrix<double, 6, 1> error = errorOf(found, truth);
-    // Only the directions in which the model can move.
+    // Uses only the degrees of freedom of the motion model.
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(covariance);
     double nees = 0.0;
     for (int i = 6 - model->degrees_of_freedom; i < 6; ++i) {
@@ -168,7 +170,7 @@ TEST_P(EstimatorAccuracyTest, EstimatesAreRightAndKnowTheirError) {
         estimatePlanarMotion(rayMatches(&random, planar, kNumMatches, num_wrong, kSigma), options);
     ASSERT_EQ(three_point.status, EstimationStatus::kOk) << trial;
     judge(three_point.previous_from_current, three_point.covariance, planar, &models[1]);
-    // On a ramp: roll and pitch differ between the frames.
+    // On a ramp, roll and pitch differ between the frames.
     const RigidTransform upright = randomUprightMotion(&random);
     const Eigen::Quaterniond previous_tilt = random.rotation(0.3);
     const Eigen::Quaterniond current_tilt = random.rotation(0.3);
@@ -196,7 +198,7 @@ TEST_P(EstimatorAccuracyTest, EstimatesAreRightAndKnowTheirError) {
     judge(two_point_pose.map_from_rig, two_point_pose.covariance, tilted_pose, &models[5]);
   }
   for (const Model& model : models) {
-    // Normalized error squared per degree of freedom: 1 on average for a right covariance, 90 % below 2.3.
+    // Normalized squared error per degree of freedom: mean 1 for a correct covariance, 90 % below 2.3.
     if (num_wrong == 0) {
       double mean = 0.0;
       for (const double nees : model.nees) {
@@ -204,8 +206,7 @@ TEST_P(EstimatorAccuracyTest, EstimatesAreRightAndKnowTheirError) {
       }
       EXPECT_NEAR(mean, 1.0, 0.25) << model.name;
     }
-    // Wrong matches that happen to lie near their epipolar planes and close to a camera pull some estimates
-    // away.
+    // Wrong matches near their epipolar planes and close to a camera bias some estimates.
     EXPECT_LT(quantile(model.nees, 0.5), 1.3) << model.name;
     EXPECT_LT(quantile(model.nees, 0.85), 3.0) << model.name;
     EXPECT_LT(quantile(model.errors, 0.5), 0.01) << model.name;
@@ -229,7 +230,7 @@ TEST(EstimatorsTest, SayThatStraightMotionWithinCamerasHidesTheScale) {
       EXPECT_GT(estimate.previous_from_current.translation().x() * distance_m, 0.49);
       EXPECT_LT(angleOfRotation(estimate.previous_from_current.rotation()), 5e-3);
     }
-    // Matches across cameras bring the scale back, with its sign.
+    // Matches across cameras make the scale and its sign observable.
     const MotionEstimate estimate =
         estimateAckermannMotion(rayMatches(&random, truth, kNumMatches, kNumMatches / 4, 1e-3, 0.5), options);
     ASSERT_EQ(estimate.status, EstimationStatus::kOk);
@@ -240,14 +241,13 @@ TEST(EstimatorsTest, SayThatStraightMotionWithinCamerasHidesTheScale) {
 TEST(EstimatorsTest, OrderingByQualitySavesIterations) {
   RandomProblems random(4);
   RobustOptions options;
-  options.min_iterations = 1;
   int ordered = 0;
   int unordered = 0;
   for (int trial = 0; trial < 100; ++trial) {
     const RigidTransform truth = random.pose();
     std::vector<PointMatch> matches = pointMatches(&random, truth, kNumMatches, 3 * kNumMatches / 4, 1e-3);
     for (size_t i = 0; i < matches.size(); ++i) {
-      // The last quarter is right, and more often of good quality.
+      // The last quarter is right and has a higher quality on average.
       matches[i].quality = random.uniform(0.0, 1.0) + (i >= 3 * matches.size() / 4 ? 0.5 : 0.0);
     }
     const auto iterationsUntilRight = [&](bool by_quality) {
@@ -320,7 +320,7 @@ TEST(EstimatorsTest, BadInputGivesAStatus) {
   for (const EstimationStatus status : poseStatuses(pointMatches(&random, truth, 12, 12, 0.0))) {
     EXPECT_EQ(status, EstimationStatus::kNoConsensus);
   }
-  // All equal: every sample is degenerate.
+  // If all matches are equal, every sample is degenerate.
   for (const EstimationStatus status : poseStatuses(std::vector<PointMatch>(50, good_points[0]))) {
     EXPECT_EQ(status, EstimationStatus::kNoConsensus);
   }

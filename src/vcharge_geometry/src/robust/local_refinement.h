@@ -14,13 +14,13 @@ namespace vcharge {
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-/// Sums over all matches under Tukey's biweight with the truncation c: rho(e) = c^2/6 (1 - (1 - u)^3), u =
-/// e^2/c^2 below 1; each residual has `dimensions` components of equal, independent noise.
+/// Sums over all matches for Tukey's biweight with truncation c: rho(e) = c^2/6 (1 - (1 - u)^3), u = e^2/c^2
+/// below 1. Each residual has `dimensions` components with equal, independent noise.
 class RobustSums {
  public:
   explicit RobustSums(double truncation) : truncation_squared_(truncation * truncation) {}
 
-  /// Weight of a residual in the normal equations; 0 from the truncation on.
+  /// Weight of a residual in the normal equations; 0 beyond the truncation.
   double addResidual(double squared, int dimensions) {
     const double u = squared / truncation_squared_;
     if (!(u < 1.0)) {
@@ -38,10 +38,10 @@ class RobustSums {
   }
 
   double cost = 0.0;
-  int num_components = 0;                  ///< of the inliers' residuals
-  double squared_sum = 0.0;                ///< of the inliers
-  double influence_squared_sum = 0.0;      ///< of the derivative of rho
-  double influence_slope_sum = 0.0;        ///< of the trace of its derivative
+  int num_components = 0;                  ///< components of the inliers' residuals
+  double squared_sum = 0.0;                ///< over the inliers
+  double influence_squared_sum = 0.0;      ///< of the first derivative of rho
+  double influence_slope_sum = 0.0;        ///< of the trace of its second derivative
   Matrix6d weighted = Matrix6d::Zero();    ///< sum of w J^T J
   Matrix6d unweighted = Matrix6d::Zero();  ///< sum of J^T J over the inliers
   Vector6d gradient = Vector6d::Zero();    ///< sum of w J^T e
@@ -50,7 +50,7 @@ class RobustSums {
   double truncation_squared_;
 };
 
-/// Motions on a circle about the rear axle's normal: parameters [distance, yaw].
+/// Motion on a circle around a point on the rear axle: parameters [distance, yaw].
 struct AckermannParameters {
   static constexpr int kSize = 2;
   static Eigen::Matrix<double, 6, 2> basis(const RotationTranslation& model) {
@@ -72,7 +72,7 @@ struct AckermannParameters {
   }
 };
 
-/// Parameters [x, y, yaw], [x, y, z, yaw] or [x, y, z, phi]: rows of [dt, dphi].
+/// Parameters [x, y, yaw], [x, y, z, yaw] or [x, y, z, phi], which are rows of [dt, dphi].
 template <int Size>
 struct CartesianParameters {
   static_assert(Size == 3 || Size == 4 || Size == 6, "planar, upright or free motion");
@@ -97,7 +97,7 @@ struct CartesianParameters {
 };
 
 /// Levenberg-Marquardt on the robust cost. `sums(model)` returns RobustSums with Jacobians over [dt, dphi],
-/// and `cost(model)` the cost alone. Never returns a model of higher cost.
+/// and `cost(model)` the cost alone. Never returns a model of higher cost than the initial one.
 template <class Parameters, class Sums, class Cost>
 RotationTranslation refineLocally(const RotationTranslation& start, int max_steps, const Sums& sums,
                                   const Cost& cost) {
@@ -113,7 +113,7 @@ RotationTranslation refineLocally(const RotationTranslation& start, int max_step
     bool converged = false;
     for (int attempt = 0; attempt < 5 && !improved && !converged; ++attempt) {
       Eigen::Matrix<double, kSize, kSize> damped = hessian;
-      // The absolute term keeps an unobservable scale where it is.
+      // The absolute term keeps an unobservable scale unchanged.
       damped.diagonal() += damping * hessian.diagonal() +
                            Eigen::Matrix<double, kSize, 1>::Constant(1e-12 * hessian.trace() + 1e-300);
       const Eigen::Matrix<double, kSize, 1> change = -damped.ldlt().solve(gradient);
@@ -140,8 +140,8 @@ RotationTranslation refineLocally(const RotationTranslation& start, int max_step
 }
 
 /// Covariance of the M-estimate over [dt, dphi] (Huber, "Robust Statistics", 1981, section 7.6): the mean
-/// squared influence over its squared mean slope, times the inverse of J^T J. Zero in the directions that the
-/// parameters exclude, 1e12 in those that nothing observes.
+/// squared influence over its squared mean slope, times the inverse of J^T J. Zero in directions that the
+/// parameters exclude, 1e12 in unobserved directions.
 template <class Parameters>
 Matrix6d estimateCovariance(const RobustSums& sums, const RotationTranslation& model) {
   const Eigen::Matrix<double, 6, Parameters::kSize> basis = Parameters::basis(model);

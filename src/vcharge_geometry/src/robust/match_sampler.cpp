@@ -33,7 +33,7 @@ MatchSampler::MatchSampler(const std::vector<double>& qualities, const std::vect
 }
 
 int MatchSampler::randomBelow(int limit) {
-  // SplitMix64 (Steele, Lea, Flood, OOPSLA 2014): the standard library's distributions differ between
+  // SplitMix64 (Steele, Lea, Flood, OOPSLA 2014), since the standard library's distributions differ between
   // implementations.
   state_ += 0x9E3779B97F4A7C15ULL;
   uint64_t mixed = state_;
@@ -63,7 +63,7 @@ void MatchSampler::draw(int* sample) {
   ++num_drawn_;
   int count = 0;
   if (pool_size_ > old_pool_size) {
-    // The newest member of the pool is in the first sample drawn from it.
+    // The first sample after the pool has grown contains its newest member.
     sample[count++] = order_[static_cast<size_t>(pool_size_ - 1)];
   }
   while (count < sample_size_) {
@@ -77,7 +77,7 @@ void MatchSampler::draw(int* sample) {
   if (std::any_of(sample, sample + sample_size_, [&](int match) { return groupOf(match) != group; })) {
     return;
   }
-  // A few tries: the pool may hold few matches of other groups, or none.
+  // Limited to a few attempts, since the pool may hold few or no matches of other groups.
   for (int attempt = 0; attempt < 10; ++attempt) {
     const int match = order_[static_cast<size_t>(randomBelow(pool_size_))];
     if (groupOf(match) != group) {

@@ -25,7 +25,7 @@ TEST(MatchSamplerTest, DrawsDifferentMatchesUniformly) {
       ++counts[static_cast<size_t>(match)];
     }
   }
-  // 3000 each, binomial deviation 50.
+  // The expected count is 3000 with a binomial deviation of 50.
   EXPECT_GE(*std::min_element(counts.begin(), counts.end()), 2700);
   EXPECT_LE(*std::max_element(counts.begin(), counts.end()), 3300);
 }
@@ -61,7 +61,7 @@ TEST(MatchSamplerTest, MixesCamerasWhereThereAreSeveral) {
     sampler.draw(sample.data());
     num_mixed += groups[static_cast<size_t>(sample[0])] != groups[static_cast<size_t>(sample[1])] ? 1 : 0;
   }
-  // Ten tries miss 30 of 100 with probability 0.03.
+  // Ten attempts fail with probability 0.03 at 30 of 100 matches.
   EXPECT_GE(num_mixed, 950);
 }
 

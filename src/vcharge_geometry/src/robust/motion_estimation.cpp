@@ -14,6 +14,9 @@
 namespace vcharge {
 namespace {
 
+/// Standard deviation of a translation's length, relative to it, above which only its direction is reported.
+constexpr double kMaxRelativeScaleDeviation = 0.5;
+
 struct AckermannSolver {
   static constexpr int kSampleSize = 2;
   using Motions = FixedVector<YawMotion, 3>;
@@ -46,7 +49,7 @@ struct CentralSolver {
   }
 };
 
-/// A Problem of estimateRobustly; see there.
+/// A problem for estimateRobustly().
 template <class Solver, class Parameters>
 class MotionProblem {
  public:
@@ -124,7 +127,7 @@ bool isUsable(const Ray& ray) {
   return ray.origin_m.allFinite() && std::abs(ray.direction.squaredNorm() - 1.0) < 2e-6;
 }
 
-/// The status of the input: kOk, kTooFewMatches or kNotFinite.
+/// Status of the input: kOk, kTooFewMatches or kNotFinite.
 EstimationStatus statusOfMatches(const std::vector<RayMatch>& matches, int sample_size) {
   if (static_cast<int>(matches.size()) < sample_size) {
     return EstimationStatus::kTooFewMatches;
@@ -137,19 +140,17 @@ EstimationStatus statusOfMatches(const std::vector<RayMatch>& matches, int sampl
   return EstimationStatus::kOk;
 }
 
-/// Motion, covariance and status from the model and its sums.
+/// Fills motion, covariance and status from the model and its sums.
 template <class Parameters>
-void describeModel(const RobustSums& sums, const RotationTranslation& model,
-                   double max_relative_scale_deviation, MotionEstimate* estimate) {
+void describeModel(const RobustSums& sums, const RotationTranslation& model, MotionEstimate* estimate) {
   Eigen::Vector3d translation = model.translation_m;
   Matrix6d covariance = estimateCovariance<Parameters>(sums, model);
   const double length = translation.norm();
   const Eigen::Vector3d direction =
       length > 0.0 ? Eigen::Vector3d(translation / length) : Eigen::Vector3d(Eigen::Vector3d::UnitX());
   const double variance_along = direction.dot(covariance.topLeftCorner<3, 3>() * direction);
-  estimate->relative_scale_deviation = std::sqrt(std::max(0.0, variance_along)) / std::max(1e-12, length);
   estimate->status = EstimationStatus::kOk;
-  if (estimate->relative_scale_deviation > max_relative_scale_deviation) {
+  if (std::sqrt(std::max(0.0, variance_along)) > kMaxRelativeScaleDeviation * std::max(1e-12, length)) {
     estimate->status = EstimationStatus::kScaleUnobservable;
     translation = direction;
     Matrix6d by_direction = Matrix6d::Identity();
@@ -179,8 +180,7 @@ MotionEstimate estimateMotion(const std::vector<RayMatch>& matches, const Robust
     return estimate;
   }
   estimate.inliers = std::move(result.inliers);
-  describeModel<Parameters>(problem.sums(result.model, options.max_error_rad), result.model,
-                            options.max_relative_scale_deviation, &estimate);
+  describeModel<Parameters>(problem.sums(result.model, options.max_error_rad), result.model, &estimate);
   return estimate;
 }
 
@@ -243,8 +243,7 @@ MotionEstimate refineMotion(const std::vector<RayMatch>& matches,
     estimate.status = EstimationStatus::kNoConsensus;
     return estimate;
   }
-  describeModel<CartesianParameters<6>>(problem.sums(model, options.max_error_rad), model,
-                                        options.max_relative_scale_deviation, &estimate);
+  describeModel<CartesianParameters<6>>(problem.sums(model, options.max_error_rad), model, &estimate);
   return estimate;
 }
 

@@ -28,7 +28,7 @@ struct UprightSolver {
   }
 };
 
-/// A Problem of estimateRobustly; see there.
+/// A problem for estimateRobustly().
 template <class Solver, class Parameters>
 class PoseProblem {
  public:
@@ -149,7 +149,7 @@ PoseEstimate estimateUprightPose(const std::vector<PointMatch>& matches,
   }
   PoseEstimate estimate = estimatePose<UprightSolver, CartesianParameters<4>>(upright, options);
   if (estimate.status == EstimationStatus::kOk) {
-    // The covariance is over the map's frame and stays.
+    // The covariance refers to the map frame and does not change.
     estimate.map_from_rig = estimate.map_from_rig * turn;
   }
   return estimate;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kNumProblems = 10000;
 
-/// Largest angle between a ray and its point seen from a solution: no solution may miss its own points.
+/// Largest angle between a ray and the direction to its point under a pose.
 template <class Matches>
 double largestAngle(const Matches& matches, const RotationTranslation& map_from_rig) {
   double largest = 0.0;
@@ -30,7 +30,7 @@ double largestAngle(const Matches& matches, const RotationTranslation& map_from_
 }
 
 TEST(GeneralizedThreePointTest, SolvesRandomProblemsForEverySpreadOfTheCentres) {
-  // From a car's rig to one centre, through everything that is nearly one centre.
+  // Camera centres from the spread of a car's rig down to a single centre.
   for (const double spread : {1.0, 1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13, 1e-14, 1e-15, 0.0}) {
     RandomProblems random(1);
     std::vector<double> errors;
@@ -57,7 +57,7 @@ TEST(GeneralizedThreePointTest, SolvesRandomProblemsForEverySpreadOfTheCentres) 
 }
 
 TEST(GeneralizedThreePointTest, FindsBothPosesOfSymmetricTriangles) {
-  // An isosceles triangle about the y-z plane: two poses share the depth of the first point.
+  // An isosceles triangle symmetric to the y-z plane: two poses have the same depth of the first point.
   const std::array<Eigen::Vector3d, 3> points{Eigen::Vector3d(0.0, -0.5, 5.0), Eigen::Vector3d(1.0, 1.0, 6.0),
                                               Eigen::Vector3d(-1.0, 1.0, 6.0)};
   for (const double spread : {0.0, 1e-9, 1e-3}) {
@@ -94,7 +94,7 @@ TEST(GeneralizedThreePointTest, ErrorGrowsInProportionToNoise) {
 }
 
 TEST(GeneralizedThreePointTest, AcceptsParallelRays) {
-  // Two parallel rays from different cameras: the pair's mixed term is extreme, the pose is not.
+  // Two parallel rays of different cameras: the mixed term of the pair is extreme, but the pose is not.
   RandomProblems random(3);
   std::vector<double> errors;
   for (int i = 0; i < 1000; ++i) {

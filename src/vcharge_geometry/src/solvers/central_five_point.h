@@ -8,17 +8,17 @@
 
 namespace vcharge {
 
-/// A motion of one camera; the translation is a unit vector.
+/// Motion of one camera; the translation is a unit vector.
 struct CentralMotion {
   RigidTransform previous_from_current;
   const RigidTransform& transform() const { return previous_from_current; }
 };
-/// Ten essential matrices at most, each of which stands for four motions.
+/// At most ten essential matrices with four motions each.
 using CentralMotions = FixedVector<CentralMotion, 40>;
 
-/// Motions of a camera in the origin that five matches allow (Nister, "An efficient solution to the
-/// five-point relative pose problem", PAMI 2004). Which of the four motions of an essential matrix has the
-/// points before the camera is left to the caller's errors.
+/// All motions of a camera at the origin from five matches (Nister, "An efficient solution to the five-point
+/// relative pose problem", PAMI 2004). The caller chooses, among the four motions of each essential matrix,
+/// the one with points in front of the camera.
 void solveCentralFivePoint(const std::array<LineMatch, 5>& matches, CentralMotions* motions);
 
 }  // namespace vcharge

@@ -7,6 +7,8 @@
 
 #include <gtest/gtest.h>
 
+#include "vcharge_geometry/solvers/half_angle_roots.h"
+
 namespace vcharge {
 namespace {
 
@@ -34,7 +36,7 @@ Polynomial<Degree> fromRoots(const std::vector<double>& real_roots, double compl
     ++degree;
   }
   while (degree < Degree) {
-    // Distinct pairs: a multiple one is close to being real.
+    // Avoids multiple pairs, which are close to being real.
     complex_imag += 0.3;
     multiplyBy(complex_real * complex_real + complex_imag * complex_imag, -2.0 * complex_real, 1.0);
     degree += 2;
@@ -42,7 +44,7 @@ Polynomial<Degree> fromRoots(const std::vector<double>& real_roots, double compl
   return polynomial;
 }
 
-/// All roots found, no other, to 1e-6 (closer roots are ill conditioned in degree 8).
+/// Checks that exactly the true roots are found, to 1e-6 (closer roots are ill conditioned in degree 8).
 template <int Degree>
 void findsRandomRoots(unsigned seed) {
   std::mt19937 generator(seed);
@@ -57,7 +59,7 @@ void findsRandomRoots(unsigned seed) {
       value = angle(generator);
     }
     std::sort(angles.begin(), angles.end());
-    // The projective line is closed: -90 and 90 degrees are one point.
+    // The projective line is closed: -90 and 90 degrees are the same point.
     bool distinct = angles.empty() || angles.back() - angles.front() < M_PI - 0.15;
     std::vector<double> roots;
     for (size_t i = 0; i < angles.size(); ++i) {

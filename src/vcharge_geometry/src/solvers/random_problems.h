@@ -14,7 +14,7 @@
 
 namespace vcharge {
 
-/// Random problems with known answer, for tests and benchmarks: the four cameras of a car, points 2 to 20 m
+/// Random problems with known solution, for tests and benchmarks: four cameras of a car, points 2 to 20 m
 /// away in all directions.
 class RandomProblems {
  public:
@@ -40,7 +40,7 @@ class RandomProblems {
     return rotationFromVector(uniform(0.0, largest_angle_rad) * direction());
   }
 
-  /// previous_from_current on a circle about the rear axle: yaw and distance along the chord.
+  /// previous_from_current on a circle around a point on the rear axle, from yaw and chord length.
   static RigidTransform ackermannMotion(double yaw_rad, double distance_m) {
     return RigidTransform::planar(distance_m * std::cos(0.5 * yaw_rad), distance_m * std::sin(0.5 * yaw_rad),
                                   yaw_rad);
@@ -50,7 +50,7 @@ class RandomProblems {
     return {cameraCentre(camera), (point - cameraCentre(camera)).normalized()};
   }
 
-  /// The ray turned by a normal error in two directions, sigma_rad in each.
+  /// Rotates a ray by normally distributed angles about two axes, sigma_rad each.
   Ray disturbed(const Ray& ray, double sigma_rad) {
     const Eigen::Vector3d side = ray.direction.unitOrthogonal();
     const Eigen::Vector3d other = ray.direction.cross(side);
@@ -72,8 +72,8 @@ class RandomProblems {
     return {lineOfRay(previous), lineOfRay(current)};
   }
 
-  /// Matches of random cameras, the same camera in both frames with the given probability, but never all of
-  /// the same pair of cameras: those are one central camera, which does not see the scale.
+  /// Matches of random cameras, with the given probability within one camera; never all of the same pair of
+  /// cameras, which would be a central camera without scale.
   template <size_t N>
   std::array<LineMatch, N> lineMatches(const RigidTransform& previous_from_current, double same_camera,
                                        double sigma_rad = 0.0) {
@@ -88,7 +88,8 @@ class RandomProblems {
     return matches;
   }
 
-  /// Points seen by random cameras of a rig at map_from_rig; centres spread by `scale` (0: one centre).
+  /// Points observed by random cameras of a rig at map_from_rig. `scale` multiplies the spread of the centres
+  /// (0: a single centre).
   template <size_t N>
   std::array<PointMatch, N> pointMatches(const RigidTransform& map_from_rig, double scale = 1.0,
                                          double sigma_rad = 0.0) {
@@ -117,13 +118,13 @@ class RandomProblems {
   std::mt19937 generator_;
 };
 
-/// Radians plus metres between two transforms.
+/// Difference of two transforms in radians plus metres.
 inline double transformError(const RigidTransform& a, const RigidTransform& b) {
   return angleOfRotation(a.rotation().conjugate() * b.rotation()) +
          (a.translation() - b.translation()).norm();
 }
 
-/// Smallest transformError of all solutions; infinite without any.
+/// Smallest transformError() of all solutions; infinite if there is none.
 template <class Solutions>
 double smallestError(const Solutions& solutions, const RigidTransform& truth) {
   double smallest = INFINITY;
@@ -133,10 +134,10 @@ double smallestError(const Solutions& solutions, const RigidTransform& truth) {
   return smallest;
 }
 
-/// The given share of the values is at most what this returns.
-inline double quantile(std::vector<double> values, double share) {
+/// The value below which the given fraction of values lies.
+inline double quantile(std::vector<double> values, double fraction) {
   std::sort(values.begin(), values.end());
-  return values[static_cast<size_t>(share * static_cast<double>(values.size() - 1))];
+  return values[static_cast<size_t>(fraction * static_cast<double>(values.size() - 1))];
 }
 
 }  // namespace vcharge

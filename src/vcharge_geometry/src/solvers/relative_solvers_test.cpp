@@ -8,7 +8,6 @@
 #include "solvers/random_problems.h"
 #include "vcharge_geometry/solvers/ackermann_two_point.h"
 #include "vcharge_geometry/solvers/known_vertical_four_point.h"
-#include "vcharge_geometry/solvers/linear_seventeen_point.h"
 #include "vcharge_geometry/solvers/planar_three_point.h"
 
 namespace vcharge {
@@ -16,7 +15,7 @@ namespace {
 
 constexpr int kNumProblems = 10000;
 
-/// The relative solvers behind one face, so that every property is tested on all of them.
+/// Common interface of the relative solvers, so that every property is tested on each.
 struct AckermannSolver {
   static constexpr size_t kNumMatches = 2;
   static constexpr int kMaxSolutions = 3;
@@ -85,7 +84,7 @@ TYPED_TEST(RelativeSolverTest, SolvesRandomProblemsToRounding) {
       ASSERT_EQ(TypeParam::solve(matches, &motions), SolverStatus::kOk);
       errors.push_back(smallestError(motions, truth));
       most_solutions = std::max(most_solutions, motions.size());
-      // Every solution satisfies the generalized epipolar constraint, not only the true one.
+      // Every solution must satisfy the generalized epipolar constraint, not only the true one.
       for (const YawMotion& motion : motions) {
         const RigidTransform transform = motion.transform();
         const double size = 1.0 + transform.translation().norm();
@@ -100,13 +99,13 @@ TYPED_TEST(RelativeSolverTest, SolvesRandomProblemsToRounding) {
     EXPECT_LE(quantile(errors, 1.0), 1e-3) << "same camera: " << same_camera;
     EXPECT_LE(largest_constraint, 1e-4) << "same camera: " << same_camera;
     EXPECT_LE(most_solutions, TypeParam::kMaxSolutions);
-    // Same-camera problems have lost the trivial root.
+    // Problems within one camera have no trivial root.
     EXPECT_EQ(most_solutions, TypeParam::kMaxSolutions - (same_camera == 1.0 ? 1 : 0));
   }
 }
 
 TYPED_TEST(RelativeSolverTest, ErrorGrowsInProportionToNoise) {
-  // Enough for a bound that a wrong equation would break: the median error follows the noise.
+  // The median error must be proportional to the noise, which a wrong equation would violate.
   std::vector<double> medians;
   for (const double sigma_rad : {1e-7, 1e-5}) {
     RandomProblems random(2);
@@ -137,14 +136,14 @@ TYPED_TEST(RelativeSolverTest, SaysThatStraightMotionWithinCamerasHidesTheScale)
     for (const YawMotion& motion : motions) {
       if (!motion.scale_observable) {
         ++num_hidden;
-        // The direction has length 1; its sign comes from the points lying in front of the cameras.
+        // The direction has length 1; its sign is known because points lie in front of the cameras.
         right = right && std::abs(motion.yaw()) < 1e-6 &&
                 (motion.transform().translation() - truth.translation().normalized()).norm() < 1e-3;
       }
     }
     num_right += right && num_hidden == 1 ? 1 : 0;
   }
-  // The rest are problems with rows that are nearly parallel for any yaw.
+  // The others are problems with nearly parallel rows for any yaw.
   EXPECT_GE(num_right, static_cast<int>(0.999 * kNumProblems));
 }
 
@@ -160,7 +159,7 @@ TYPED_TEST(RelativeSolverTest, FindsStraightMotionWithScaleAcrossCameras) {
     errors.push_back(smallestError(motions, truth));
   }
   EXPECT_LE(quantile(errors, 0.5), 1e-10);
-  // One match across cameras makes the scale observable, and zero yaw a root of the polynomial twice.
+  // One match across cameras makes the scale observable, and zero yaw a double root of the polynomial.
   EXPECT_LE(quantile(errors, 0.99), 1e-3);
 }
 
@@ -173,7 +172,7 @@ TYPED_TEST(RelativeSolverTest, FindsHalfTurnsAndCoplanarPoints) {
         is_ackermann ? TypeParam::motion(&random) : RigidTransform::planar(random.normal(1.0), 2.0, M_PI);
     typename TestFixture::Matches matches;
     for (size_t k = 0; k < matches.size(); ++k) {
-      // On the ground.
+      // Points on the ground.
       const Eigen::Vector3d point(random.uniform(-8.0, 8.0), random.uniform(-8.0, 8.0), 0.0);
       const int camera = static_cast<int>(k);
       matches[k] = {lineOfRay(RandomProblems::rayTo(point, camera)),
@@ -188,7 +187,7 @@ TYPED_TEST(RelativeSolverTest, FindsHalfTurnsAndCoplanarPoints) {
 }
 
 TYPED_TEST(RelativeSolverTest, KnowsForwardFromBackward) {
-  // The inverse of an Ackermann motion has the same form: only the sign tells a transform from its inverse.
+  // The inverse of an Ackermann motion has the same form and differs only in the sign.
   RandomProblems random(6);
   for (int i = 0; i < 1000; ++i) {
     const RigidTransform truth =
@@ -234,39 +233,6 @@ TYPED_TEST(RelativeSolverTest, RejectsWhatHasNoAnswer) {
   zero.fill({{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()},
              {Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()}});
   EXPECT_EQ(TypeParam::solve(zero, &motions), SolverStatus::kDegenerate);
-}
-
-TEST(LinearSeventeenPointTest, SolvesRandomProblems) {
-  for (const double same_camera : {0.0, 1.0}) {
-    RandomProblems random(8);
-    std::vector<double> errors;
-    for (int i = 0; i < kNumProblems; ++i) {
-      const RigidTransform truth(random.rotation(1.0), random.direction());
-      const std::array<LineMatch, 17> problem = random.lineMatches<17>(truth, same_camera);
-      RigidTransform found;
-      if (solveLinearSeventeenPoint({problem.begin(), problem.end()}, &found) == SolverStatus::kOk) {
-        errors.push_back(transformError(found, truth));
-      }
-    }
-    // One camera gives at most 8 independent equations: with 10 of 17 matches in it, E is not unique.
-    EXPECT_GE(errors.size(), static_cast<size_t>((same_camera == 0.0 ? 0.9999 : 0.98) * kNumProblems));
-    EXPECT_LE(quantile(errors, 0.5), 1e-11);
-    EXPECT_LE(quantile(errors, 0.98), 1e-8);
-  }
-}
-
-TEST(LinearSeventeenPointTest, RejectsWhatHasNoAnswer) {
-  RandomProblems random(9);
-  const RigidTransform truth(random.rotation(1.0), random.direction());
-  const std::array<LineMatch, 17> good = random.lineMatches<17>(truth, 0.0);
-  RigidTransform found;
-  std::vector<LineMatch> matches(good.begin(), good.end());
-  matches.pop_back();
-  EXPECT_EQ(solveLinearSeventeenPoint(matches, &found), SolverStatus::kDegenerate);
-  matches.push_back(matches.front());
-  EXPECT_EQ(solveLinearSeventeenPoint(matches, &found), SolverStatus::kDegenerate);
-  matches.back().current.direction.x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_EQ(solveLinearSeventeenPoint(matches, &found), SolverStatus::kNotFinite);
 }
 
 }  // namespace

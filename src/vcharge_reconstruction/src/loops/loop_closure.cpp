@@ -300,7 +300,7 @@ void closeLoops(const LoopClosureOptions& options, std::vector<LoopEdge>* edges,
   if (loops.empty()) {
     return;
   }
-  const RobustPoseGraphSummary summary = optimizeRobustly(RobustPoseGraphOptions(), &graph);
+  const RobustPoseGraphSummary summary = optimizeRobustly(&graph);
   const size_t num_steps = data->keyframes.size() - 1;
   for (size_t i = 0; i < loops.size(); ++i) {
     LoopEdge& edge = (*edges)[loops[i]];

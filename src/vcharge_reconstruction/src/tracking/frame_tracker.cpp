@@ -184,7 +184,7 @@ bool CameraTracker::isMasked(const Eigen::Vector2d& position_px) const {
 void CameraTracker::alignWithAnchors(int32_t keyframe) {
   for (LiveTrack& track : tracks_) {
     const Eigen::Vector2d position_px(track.position_px.x, track.position_px.y);
-    const std::optional<PatchPlace> place =
+    const std::optional<PatchWarp> place =
         alignPatch(anchors_.at(track.anchor_keyframe).pixels, image_.pixels,
                    {track.anchor_px.x, track.anchor_px.y}, {position_px, track.shape}, options_.alignment);
     if (place && (place->position_px - position_px).norm() <= options_.max_alignment_px &&

@@ -26,6 +26,9 @@ namespace vcharge {
 
 namespace {
 
+// The height map leaves out tree crowns and lamps above this height over the ground.
+constexpr double kHeightLimit_m = 2.5;
+
 DrivePlan planDriveOf(const DriveScenario& scenario) {
   DrivePlan plan = planDrive(scenario.scene, scenario.drive);
   if (scenario.duration_s > 0.0) {
@@ -34,7 +37,7 @@ DrivePlan planDriveOf(const DriveScenario& scenario) {
   return plan;
 }
 
-// Leaves every step-th image.
+// Keeps every step-th element.
 template <class T>
 void thin(int step, std::vector<T>* list) {
   std::vector<T> kept;
@@ -44,7 +47,7 @@ void thin(int step, std::vector<T>* list) {
   *list = std::move(kept);
 }
 
-// Faults that change what is rendered cannot come from images that were rendered without them.
+// These faults change what is rendered, so images rendered without them cannot be used.
 void checkImagesCanBeReused(const FaultOptions& faults, const std::string& images_from) {
   for (const auto& [name, is_active] : {std::pair("bumped_camera", faults.bumped_camera.isActive()),
                                         std::pair("motion_blur", faults.motion_blur.isActive())}) {
@@ -63,13 +66,13 @@ std::vector<ImageFaults::Camera> faultyCameras(const RecordedCameras& cameras) {
   return list;
 }
 
-// Odometry, counters and truth, in the order of their stamps.
+// Writes odometry, counters and true poses in the order of their stamps.
 class MotionRecorder {
  public:
   MotionRecorder(const SimulatedDrive& drive, const OdometryStampShiftFault& shift, DriveBagWriter* writer)
       : drive_(drive), shift_(shift), writer_(writer) {}
 
-  /// Up to and with `end`, or all that is left.
+  /// Writes everything up to and including `end`, or all that remains.
   void writeUntil(std::optional<Timestamp> end) {
     const auto isDue = [&](const auto& list, size_t i) {
       return i < list.size() && (!end || list[i].stamp <= *end);
@@ -103,7 +106,7 @@ class MotionRecorder {
   size_t odometry_ = 0, truth_ = 0, ticks_ = 0;
 };
 
-// A rig beside its masks.
+// Writes a rig with its masks beside it.
 void writeTruthRig(CameraRig rig, const std::string& folder, const std::string& suffix) {
   for (RigCamera& camera : rig.cameras) {
     camera.mask_file = camera.name + "_mask" + suffix + ".png";
@@ -120,15 +123,8 @@ void writeRange(const cv::Mat& range_m, const std::string& folder, Timestamp sta
 
 }  // namespace
 
-void RecordingOptions::validate() const {
-  requireField(std::isfinite(height_cell_m) && height_cell_m >= 0.01, "height_cell_m",
-               "must be at least 0.01", height_cell_m);
-  requireField(std::isfinite(height_limit_m), "height_limit_m", "must be a number", height_limit_m);
-}
-
 void recordDrive(const DriveScenario& scenario, const RecordingOptions& recording) {
   scenario.validate();
-  recording.validate();
   const DrivePlan plan = planDriveOf(scenario);
   const std::filesystem::path bag(recording.bag);
   const std::string truth_name = bag.stem().string() + "_truth";
@@ -152,21 +148,21 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
     scene_times_s.push_back(plan.start_s +
                             1e-9 * static_cast<double>((stamp - drive.ground_truth.front().stamp).count()));
   }
-  const CameraResponse response(scenario.response);
+  const CameraResponse response;
   std::optional<Renderer> renderer;
   std::unique_ptr<ImageSource> images;
   writeTrajectory(drive.world_from_vehicle, truth.path() + "/trajectory.tum");
   if (recording.images_from.empty()) {
     SceneOptions scene;
-    scene.seed = scenario.scene_seed;
+    scene.seed = static_cast<uint64_t>(scenario.scene_seed);
     scene.day = plan.day;
     scene.image_scale = scenario.image_scale;
     scene.board = scenario.board;
     scene.rig = scenario.rig;
-    scene.rig_seed = scenario.rig_seed;
+    scene.rig_seed = static_cast<uint64_t>(scenario.rig_seed);
     renderer.emplace(buildScene(scenario.scene, scene));
     images = renderImages(*renderer, cameras, response, drive, scene_times_s, faults.motion_blur);
-    writeHeightMap(computeHeightMap(*renderer, recording.height_cell_m, recording.height_limit_m),
+    writeHeightMap(computeHeightMap(*renderer, recording.height_cell_m, kHeightLimit_m),
                    truth.path() + "/height_map");
     writeObstacles(renderer->scene().obstacles, truth.path() + "/obstacles.yaml");
     if (!renderer->scene().movers.empty()) {
@@ -226,7 +222,8 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   }
   writer.close();
   truth.commit();
-  // A copy for many drives with one rig; its masks are its own, so that it outlives each drive.
+  // Shared by all drives with this rig; it has its own copies of the masks, so it does not depend on the
+  // truth folder.
   createFolder((bag.parent_path() / "rig_truth_masks").string());
   writeCameraRig(rig, (bag.parent_path() / "rig_truth.yaml").string());
 }

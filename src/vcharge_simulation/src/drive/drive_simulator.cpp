@@ -9,7 +9,7 @@ namespace {
 constexpr int kImagePeriod_ms = 80;
 constexpr int kImageOffset_ms = 7;
 constexpr int kOdometryPeriod_ms = 20;
-// An arbitrary date: stamps have as many digits as those of real drives.
+// Arbitrary date with as many digits as the stamps of real drives.
 constexpr int64_t kStart_ns = 1'400'000'000'000'000'000;
 
 Timestamp stampAt(int milliseconds) {
@@ -27,8 +27,8 @@ std::vector<RigidTransform> exposurePoses(const VehicleMotion& motion, int middl
                                           const MotionBlurFault& blur) {
   std::vector<RigidTransform> poses;
   for (int i = 0; i < blur.renderings; ++i) {
-    const double share = (i + 0.5) / blur.renderings - 0.5;
-    poses.push_back(worldFromVehicleAt(motion, middle_ms + 1000.0 * share * blur.exposure_time_s));
+    const double fraction = (i + 0.5) / blur.renderings - 0.5;
+    poses.push_back(worldFromVehicleAt(motion, middle_ms + 1000.0 * fraction * blur.exposure_time_s));
   }
   return poses;
 }

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "vcharge_simulation/scenes/lot_scene.h"
+#include "scenes/lot/lot_scene.h"
 
 namespace vcharge {
 namespace {
@@ -68,7 +68,7 @@ TEST(DriveSimulatorTest, OdometryScalesWithTheWheelRadiusError) {
   EXPECT_NEAR(counted_m, 1.02 * driven_m, 0.005);
   const auto ticks = static_cast<double>(drive.wheel_ticks.back().left_ticks);
   EXPECT_NEAR(ticks * 0.01, 1.02 * driven_m,
-              0.01 + 2.7 * 0.02);  // ticks end at most 20 ms before the odometry
+              0.01 + 2.7 * 0.02);  // the last ticks are at most 20 ms older than the last odometry
 }
 
 TEST(DriveSimulatorTest, StandsStillBeforeItStarts) {
@@ -88,7 +88,7 @@ TEST(DriveSimulatorTest, PlanarMotionObeysTheBicycleModelAndTheBodyTiltsALittle)
     const MotionSample& now = motion.at(ms);
     const MotionSample& next = motion.at(ms + 1);
     const RigidTransform step = now.world_from_planar.inverse() * next.world_from_planar;
-    // The rear axle never slips sideways: the chord points along the mean heading.
+    // The rear axle does not slip sideways, so the chord points along the mean heading.
     EXPECT_NEAR(std::atan2(step.translation().y(), step.translation().x()),
                 0.5 * yawOfRotation(step.rotation()), 1e-8);
     largest_tilt_rad = std::max(largest_tilt_rad, angleOfRotation(now.planar_from_body.rotation()));
@@ -115,7 +115,7 @@ TEST(DriveSimulatorTest, BackwardsDriveReturnsToItsStart) {
   options.cruise_speed_m_per_s = 1.5;
   const VehicleMotion motion(path, options, 1);
   const MotionSample& end = motion.at(static_cast<int>(motion.duration() * 1000.0));
-  // It stops a little before each of its two ends.
+  // The car stops slightly before each of the two ends.
   EXPECT_LT((end.world_from_planar.translation() - path.worldFromStart().translation()).norm(), 0.7);
   EXPECT_NEAR(yawOfRotation(end.world_from_planar.rotation()), 0.5, 0.1);
   EXPECT_NEAR(end.left_wheel_m, 0.0, 0.7);
@@ -158,7 +158,7 @@ TEST(DriveSimulatorTest, CarStandsOnSlopingGroundAndItsWheelsCountTheWayOnIt) {
   const double driven_m = (world_from_vehicle.translation() - start.worldFromVehicle().translation()).norm();
   EXPECT_GT(driven_m, 8.0);
   EXPECT_NEAR(end.left_wheel_m - start.left_wheel_m, driven_m, 1e-6);
-  // Its speed is along the slope.
+  // The speed is measured along the slope.
   EXPECT_NEAR((motion.at(5001).worldFromVehicle().translation() - world_from_vehicle.translation()).norm(),
               1e-3 * end.speed_m_per_s, 1e-6);
 }

@@ -34,7 +34,7 @@ double durationOf(const SimulatedDrive& drive) {
          static_cast<double>((drive.ground_truth.back().stamp - drive.ground_truth.front().stamp).count());
 }
 
-// Mean error of the way that odometry gives over stretches of 100 m, over their length.
+// Mean position error of odometry over stretches of 100 m, relative to their length.
 double driftOf(const SimulatedDrive& drive) {
   constexpr double kStretch_m = 100.0;
   std::vector<double> travelled_m(1, 0.0);
@@ -83,18 +83,18 @@ TEST(ScenarioFilesTest, MappingDrivesLastLongDriveLanesInBothDirectionsAndDrift)
     RecordProperty(name + "_drift_per_mille", static_cast<int>(1000.0 * drift));
     EXPECT_GE(drift, 0.01) << name;
     EXPECT_LE(drift, 0.04) << name;
-    // Places of 5 x 5 m that the car passes along x or y, and in which of both directions.
+    // Directions of travel (along x or y, to the nearest quarter turn) in each cell of 5 x 5 m.
     std::map<std::pair<int, int>, std::set<int>> directions;
     for (const VehicleOdometry& truth : simulated.ground_truth) {
-      const Eigen::Vector3d place_m = truth.odom_from_vehicle.translation();
+      const Eigen::Vector3d position_m = truth.odom_from_vehicle.translation();
       const double yaw_rad = yawOfRotation(truth.odom_from_vehicle.rotation());
       const int quarter = static_cast<int>(std::lround(yaw_rad / 1.57079632679)) & 3;
-      directions[{static_cast<int>(std::floor(place_m.x() / 5.0)),
-                  static_cast<int>(std::floor(place_m.y() / 5.0))}]
+      directions[{static_cast<int>(std::floor(position_m.x() / 5.0)),
+                  static_cast<int>(std::floor(position_m.y() / 5.0))}]
           .insert(quarter);
     }
     int both = 0;
-    for (const auto& [place, quarters] : directions) {
+    for (const auto& [cell, quarters] : directions) {
       both +=
           (quarters.count(0) + quarters.count(2) == 2 || quarters.count(1) + quarters.count(3) == 2) ? 1 : 0;
     }
@@ -114,13 +114,13 @@ TEST(ScenarioFilesTest, EveryMappedSceneHasAnotherDayBesideAndInTheOppositeDirec
       EXPECT_NE(scenario.seed, scenarios.at(std::string("mapping_") + scene).seed);
       const SimulatedDrive simulated = drive(scenario);
       EXPECT_GE(driftOf(simulated), 0.01) << scene;
-      // Beside the mapped loop, in the middle of the southern lane.
+      // The drive runs beside the mapped loop; measured in the middle of the southern lane.
       const SimulatedDrive mapped = drive(scenarios.at(std::string("mapping_") + scene));
       const auto southern_y = [](const SimulatedDrive& drive) {
         double y = 0.0;
         for (const VehicleOdometry& truth : drive.ground_truth) {
-          const Eigen::Vector3d place_m = truth.odom_from_vehicle.translation();
-          y = std::abs(place_m.x() - 5.0) < 1.0 && place_m.y() < -10.0 ? place_m.y() : y;
+          const Eigen::Vector3d position_m = truth.odom_from_vehicle.translation();
+          y = std::abs(position_m.x() - 5.0) < 1.0 && position_m.y() < -10.0 ? position_m.y() : y;
         }
         return y;
       };

@@ -19,15 +19,15 @@ namespace {
 constexpr double kTop_m = 60.0;
 constexpr double kStep_m = 1e-3;
 
-double heightAt(const Renderer& renderer, const Eigen::Vector2d& place_m, double max_height_m) {
+double heightAt(const Renderer& renderer, const Eigen::Vector2d& position_m, double max_height_m) {
   const GroundHeight& ground_height = renderer.scene().ground_height;
   max_height_m = std::min(max_height_m, renderer.scene().overhead_m);
-  max_height_m += ground_height ? ground_height(place_m.x(), place_m.y()) : 0.0;
+  max_height_m += ground_height ? ground_height(position_m.x(), position_m.y()) : 0.0;
   double travelled_m = 0.0;
   for (;;) {
     SurfaceKind kind = SurfaceKind::kOther;
     const auto distance_m =
-        renderer.castRay({place_m.x(), place_m.y(), kTop_m}, {0.0, 0.0, -1.0}, travelled_m, &kind);
+        renderer.castRay({position_m.x(), position_m.y(), kTop_m}, {0.0, 0.0, -1.0}, travelled_m, &kind);
     if (!distance_m) {
       return std::numeric_limits<double>::quiet_NaN();
     }
@@ -39,7 +39,7 @@ double heightAt(const Renderer& renderer, const Eigen::Vector2d& place_m, double
   }
 }
 
-// Within a YAML map.
+// Writes the keys of an obstacle into an open YAML map.
 void emitObstacle(const Obstacle& obstacle, YAML::Emitter* yaml) {
   *yaml << YAML::Key << "kind" << YAML::Value << obstacle.kind;
   *yaml << YAML::Key << "base_z_m" << YAML::Value << obstacle.base_z_m;
@@ -64,8 +64,8 @@ TruthHeightMap computeHeightMap(const Renderer& renderer, double cell_size_m, do
                       static_cast<int>(std::floor(size_m.x() / cell_size_m + 1e-9)), CV_32FC1);
   tbb::parallel_for(0, map.height_m.rows, [&](int row) {
     for (int column = 0; column < map.height_m.cols; ++column) {
-      const Eigen::Vector2d place_m = map.origin_m + cell_size_m * Eigen::Vector2d(column, row);
-      map.height_m.at<float>(row, column) = static_cast<float>(heightAt(renderer, place_m, max_height_m));
+      const Eigen::Vector2d position_m = map.origin_m + cell_size_m * Eigen::Vector2d(column, row);
+      map.height_m.at<float>(row, column) = static_cast<float>(heightAt(renderer, position_m, max_height_m));
     }
   });
   return map;

@@ -23,20 +23,11 @@ void expectRejected(const std::string& text, const std::string& key) {
 }
 
 TEST(FaultOptionsTest, NothingIsWrongByDefault) {
-  FaultOptions faults;
+  const FaultOptions faults;
   faults.validate();
-  faults.visitFields([](const char* name, auto& fault) { EXPECT_FALSE(fault.isActive()) << name; });
-}
-
-TEST(FaultOptionsTest, TheListNamesEveryFaultInOrder) {
-  internal::NameCollector collector;
-  FaultOptions().visitFields(collector);
-  std::vector<std::string> listed;
-  for (const CatalogueEntry& entry : listFaults()) {
-    listed.push_back(entry.name);
-    EXPECT_FALSE(entry.description.empty());
-  }
-  EXPECT_EQ(listed, collector.names);
+  forEachOption(faults, [](const OptionDeclaration& option, const auto& fault) {
+    EXPECT_FALSE(fault.isActive()) << option.name;
+  });
 }
 
 TEST(FaultOptionsTest, ActFromTheStartUntilBeforeTheEnd) {

@@ -8,17 +8,10 @@
 
 namespace vcharge {
 
-namespace {
-
-struct FaultWriter {
-  Timestamp start;
-  const std::vector<std::string>& cameras;
-  const ImageFaults::Hits& hits;
-  YAML::Node list = YAML::Node(YAML::NodeType::Sequence);
-
-  int64_t stampAt(double time_s) const { return (start + durationFromSeconds(time_s)).nanoseconds(); }
-
-  YAML::Node stampsOf(const std::vector<std::vector<Timestamp>>& hits_of_camera) const {
+void writeFaults(const FaultOptions& faults, Timestamp start, const std::vector<std::string>& cameras,
+                 const ImageFaults::Hits& hits, const std::string& path) {
+  const auto stampAt = [&](double time_s) { return (start + durationFromSeconds(time_s)).nanoseconds(); };
+  const auto stampsOf = [&](const std::vector<std::vector<Timestamp>>& hits_of_camera) {
     YAML::Node node(YAML::NodeType::Map);
     for (size_t i = 0; i < cameras.size(); ++i) {
       for (const Timestamp stamp : hits_of_camera[i]) {
@@ -26,16 +19,19 @@ struct FaultWriter {
       }
     }
     return node;
-  }
-
-  template <class Fault>
-  void operator()(const char* name, Fault& fault) {
+  };
+  YAML::Node root;
+  root["faults"] = YAML::Node(YAML::NodeType::Sequence);
+  forEachOption(faults, [&](const OptionDeclaration& option, const auto& fault) {
+    using Fault = std::decay_t<decltype(fault)>;
     if (!fault.isActive()) {
       return;
     }
     YAML::Node entry(YAML::NodeType::Map);
-    entry["kind"] = name;
-    fault.visitFields(internal::FieldWriter{entry});
+    entry["kind"] = option.name;
+    for (const auto& field : writeFields(fault)) {
+      entry[field.first] = field.second;
+    }
     if constexpr (std::is_base_of_v<FaultInterval, Fault>) {
       entry["start_stamp_ns"] = stampAt(fault.start_s);
       if (fault.end_s > 0.0) {
@@ -51,19 +47,8 @@ struct FaultWriter {
     if constexpr (std::is_same_v<Fault, LateImagesFault>) {
       entry["images_ns"] = stampsOf(hits.late);
     }
-    list.push_back(entry);
-  }
-};
-
-}  // namespace
-
-void writeFaults(const FaultOptions& faults, Timestamp start, const std::vector<std::string>& cameras,
-                 const ImageFaults::Hits& hits, const std::string& path) {
-  FaultWriter writer{start, cameras, hits};
-  FaultOptions copy = faults;
-  copy.visitFields(writer);
-  YAML::Node root;
-  root["faults"] = writer.list;
+    root["faults"].push_back(entry);
+  });
   YAML::Emitter emitter;
   emitter << root;
   writeTextFileAtomically(path, std::string(emitter.c_str()) + "\n");

@@ -12,8 +12,15 @@ namespace vcharge {
 namespace {
 
 constexpr double kFullWidth_px = 1280.0;
+// Lengths are for images that are 1280 wide; light is relative to white in the sun.
+constexpr double kSunLight = 25.0;      // at the centre of the sun
+constexpr double kSunRadius_px = 40.0;  // at which the light is half as strong
+constexpr double kMaxBlobRadius_px = 45.0;
 constexpr double kMaxBlobLight = 0.15;
-// Thinner lines would fall between the pixels of small images.
+constexpr double kBlobTransmission = 0.35;  // at the centre of a blob
+constexpr double kLineLight = 0.5;
+constexpr double kLineHalfWidth_px = 2.5;
+// Thinner lines would fall between the pixels of scaled-down images.
 constexpr double kMinLineHalfWidth_px = 0.6;
 
 template <class Function>
@@ -29,9 +36,9 @@ cv::Mat mapOfPixels(cv::Size size, Function&& value) {
 
 cv::Mat sunLight(const SunGlareFault& fault, cv::Size size) {
   const Eigen::Vector2d sun(fault.x * size.width - 0.5, fault.y * size.height - 0.5);
-  const double radius_px = fault.radius_px * size.width / kFullWidth_px;
+  const double radius_px = kSunRadius_px * size.width / kFullWidth_px;
   return mapOfPixels(size, [&](const Eigen::Vector2d& pixel) {
-    return fault.light / (1.0 + (pixel - sun).squaredNorm() / (radius_px * radius_px));
+    return kSunLight / (1.0 + (pixel - sun).squaredNorm() / (radius_px * radius_px));
   });
 }
 
@@ -39,10 +46,10 @@ struct Blob {
   Eigen::Vector2d centre_px;
   double radius_px, light;
 
-  // 1 in the middle, with a soft rim: dirt on the lens is far out of focus.
+  // 1 at the centre with a soft edge, because dirt on the lens is far out of focus.
   double weight(const Eigen::Vector2d& pixel) const {
-    const double share = (pixel - centre_px).squaredNorm() / (radius_px * radius_px);
-    return std::exp(-share * share);
+    const double squared = (pixel - centre_px).squaredNorm() / (radius_px * radius_px);
+    return std::exp(-squared * squared);
   }
 };
 
@@ -55,23 +62,23 @@ void makeDirt(const DirtyLensFault& fault, const ImageFaults::Camera& camera, cv
   for (Blob& blob : blobs) {
     blob.centre_px.x() = random.uniform(0.0, size.width);
     blob.centre_px.y() = random.uniform(0.0, size.height);
-    blob.radius_px = scale * fault.blob_radius_px * random.uniform(0.3, 1.0);
+    blob.radius_px = scale * kMaxBlobRadius_px * random.uniform(0.3, 1.0);
     blob.light = random.uniform(0.0, kMaxBlobLight);
   }
   const double left_y = size.height * random.uniform(0.2, 0.8);
   const double right_y = size.height * random.uniform(0.2, 0.8);
   const Eigen::Vector2d along = Eigen::Vector2d(size.width, right_y - left_y).normalized();
-  const double half_width_px = std::max(kMinLineHalfWidth_px, scale * fault.line_half_width_px);
+  const double half_width_px = std::max(kMinLineHalfWidth_px, scale * kLineHalfWidth_px);
   *transmission = mapOfPixels(size, [&](const Eigen::Vector2d& pixel) {
-    double share = 1.0;
+    double passed = 1.0;
     for (const Blob& blob : blobs) {
-      share *= 1.0 - (1.0 - fault.blob_transmission) * blob.weight(pixel);
+      passed *= 1.0 - (1.0 - kBlobTransmission) * blob.weight(pixel);
     }
-    return share;
+    return passed;
   });
   *light = mapOfPixels(size, [&](const Eigen::Vector2d& pixel) {
     const double across = (along.x() * (pixel.y() - left_y) - along.y() * pixel.x()) / half_width_px;
-    double sum = fault.line_light * std::exp(-0.5 * across * across);
+    double sum = kLineLight * std::exp(-0.5 * across * across);
     for (const Blob& blob : blobs) {
       sum += blob.light * blob.weight(pixel);
     }

@@ -34,7 +34,7 @@ FaultOptions read(const std::string& text) {
   return faults;
 }
 
-// Another image for every frame.
+// A different image for every frame.
 cv::Mat imageOf(size_t frame) {
   cv::Mat image(kSize, CV_8UC1);
   for (int y = 0; y < kSize.height; ++y) {

@@ -10,10 +10,10 @@ namespace {
 
 constexpr double kSpeed_m_per_s = 2.5;
 constexpr double kTick_m = 0.01;
-// The cruise speed swings by 5 %, and each counter is within a tick of the truth.
+// The cruise speed varies by 5 %, and each counter is within a tick of the truth.
 constexpr double kTickTolerance = 2.5;
 
-// Two seconds straight on.
+// Two seconds straight ahead.
 SimulatedDrive simulate(const FaultOptions& faults) {
   const DrivePath straight(RigidTransform(), {{40.0, 0.0, 0.0}});
   VehicleMotionOptions motion;
@@ -87,7 +87,7 @@ TEST(OdometryFaultsTest, SlipChangesOnlyThatWheelInThatInterval) {
       EXPECT_NEAR(difference, slipped_ticks, kTickTolerance);
     }
   }
-  // The path turns by the difference of the wheels over the track.
+  // The heading changes by the difference of the wheel distances over the track width.
   EXPECT_NEAR(yawOfRotation(odometryAt(wrong, 2.0).odom_from_vehicle.rotation()),
               slipped_ticks * kTick_m / VehicleMotionOptions().track_width_m, 0.02);
 }
@@ -118,7 +118,7 @@ TEST(OdometryFaultsTest, MissingCountersLeaveAGapAndThePathGoesOnAfterIt) {
     EXPECT_EQ(entry.left_ticks, ticks.at(entry.stamp.nanoseconds()).left_ticks);
   }
   EXPECT_EQ(right.wheel_ticks.size() - wrong.wheel_ticks.size(), 20U);
-  EXPECT_EQ(right.odometry.size() - wrong.odometry.size(), 25U);  // and five images
+  EXPECT_EQ(right.odometry.size() - wrong.odometry.size(), 25U);  // 20 regular samples and those of 5 images
   for (const VehicleOdometry& entry : wrong.odometry) {
     const double time_s = timeOf(wrong, entry.stamp);
     EXPECT_TRUE(time_s < 0.8 || time_s >= 1.2) << time_s;
@@ -175,7 +175,7 @@ TEST(OdometryFaultsTest, ExposurePosesAreSpreadOverTheExposureAboutTheStamp) {
   for (size_t i = 0; i < drive.exposure_poses.size(); ++i) {
     const std::vector<RigidTransform>& poses = drive.exposure_poses[i];
     ASSERT_EQ(poses.size(), 4U);
-    // Three quarters of the exposure lie between the first and the last rendering.
+    // The first and the last rendering are three quarters of the exposure apart.
     EXPECT_NEAR((poses[3].translation() - poses[0].translation()).norm(), 0.03 * kSpeed_m_per_s, 0.005);
     const Eigen::Vector3d middle = 0.5 * (poses[1].translation() + poses[2].translation());
     EXPECT_LT((middle - drive.world_from_vehicle[i].world_from_vehicle.translation()).norm(), 1e-3);

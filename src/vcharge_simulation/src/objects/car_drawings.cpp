@@ -10,7 +10,7 @@ namespace vcharge {
 
 namespace {
 
-// A canvas in metres: x to the right, z up from the ground.
+// Canvas in metres: x to the right, z up from the ground.
 class Canvas {
  public:
   Canvas(double width_m, double height_m, double background)
@@ -35,7 +35,7 @@ class Canvas {
                          static_cast<int>(half_height * kCarTexelsPerM)),
                 0, 0, 360, gray(value), cv::FILLED, cv::LINE_AA);
   }
-  // Dirt that collects near the ground.
+  // Adds dirt near the ground and returns the image.
   cv::Mat finish(uint32_t seed) {
     for (int y = 0; y < image_.rows; ++y) {
       const double z_m = height_m_ - (y + 0.5) / kCarTexelsPerM;

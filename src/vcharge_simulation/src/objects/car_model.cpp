@@ -19,8 +19,7 @@ double smoothStep(double x) {
   return x * x * (3.0 - 2.0 * x);
 }
 
-// The outline of half a cross section, from the middle of the floor to the middle of the roof, and what is
-// glass in it.
+// Half a cross section, as an outline from the middle of the floor to the middle of the roof.
 struct Section {
   double x;
   std::array<Eigen::Vector2d, kNumProfilePoints> points;  // (y, z), y >= 0
@@ -133,7 +132,8 @@ std::vector<double> stationPositions(const CarShape& shape) {
   return distinct;
 }
 
-// The rings of the body: station by station, once around from the floor over the left side and back.
+// Lofts the body from one closed ring of points per station; each ring runs from the floor over the left side
+// and the roof back along the right side.
 class BodyLoft {
  public:
   BodyLoft(const CarShape& shape, const CarMaterials& materials, TriangleMesh* mesh)
@@ -304,65 +304,15 @@ void addMirrorsAndPlates(const CarShape& shape, const CarMaterials& materials, T
 }  // namespace
 
 const std::vector<CarShape>& carShapes() {
-  static const std::vector<CarShape> shapes = [] {
-    CarShape hatchback;
-    hatchback.name = "hatchback";
-    CarShape saloon = hatchback;
-    saloon.name = "saloon";
-    saloon.length = 4.65;
-    saloon.wheelbase = 2.75;
-    saloon.front_overhang = 0.9;
-    saloon.height = 1.43;
-    saloon.windscreen_base = 2.25;
-    saloon.roof_front = 1.5;
-    saloon.roof_rear = 0.1;
-    saloon.rear_window_base = -0.5;
-    CarShape estate = saloon;
-    estate.name = "estate";
-    estate.height = 1.47;
-    estate.roof_rear = -0.65;
-    estate.rear_window_base = -0.95;
-    CarShape van = hatchback;
-    van.name = "van";
-    van.length = 4.6;
-    van.width = 1.85;
-    van.height = 1.9;
-    van.wheelbase = 2.9;
-    van.front_overhang = 0.9;
-    van.bonnet_front = 0.85;
-    van.bonnet_rear = 1.1;
-    van.belt_rear = 1.12;
-    van.windscreen_base = 2.95;
-    van.roof_front = 2.2;
-    van.roof_rear = -0.65;
-    van.rear_window_base = -0.76;
-    CarShape small = hatchback;
-    small.name = "small";
-    small.length = 3.55;
-    small.width = 1.64;
-    small.wheelbase = 2.35;
-    small.front_overhang = 0.7;
-    small.wheel_radius = 0.28;
-    small.windscreen_base = 2.1;
-    small.roof_front = 1.4;
-    small.roof_rear = -0.15;
-    small.rear_window_base = -0.42;
-    CarShape off_roader = hatchback;
-    off_roader.name = "off-roader";
-    off_roader.length = 4.5;
-    off_roader.width = 1.86;
-    off_roader.height = 1.68;
-    off_roader.wheelbase = 2.65;
-    off_roader.front_overhang = 0.92;
-    off_roader.wheel_radius = 0.36;
-    off_roader.sill = 0.3;
-    off_roader.bonnet_front = 0.88;
-    off_roader.bonnet_rear = 1.08;
-    off_roader.belt_rear = 1.12;
-    off_roader.roof_rear = -0.5;
-    off_roader.rear_window_base = -0.78;
-    return std::vector<CarShape>{hatchback, saloon, estate, van, small, off_roader};
-  }();
+  // In the order of the fields of CarShape.
+  static const std::vector<CarShape> shapes = {
+      {"hatchback", 4.2, 1.77, 1.48, 2.58, 0.88, 0.31, 0.2, 0.68, 0.93, 0.98, 2.15, 1.45, -0.35, -0.68, 0.25},
+      {"saloon", 4.65, 1.77, 1.43, 2.75, 0.9, 0.31, 0.2, 0.68, 0.93, 0.98, 2.25, 1.5, 0.1, -0.5, 0.25},
+      {"estate", 4.65, 1.77, 1.47, 2.75, 0.9, 0.31, 0.2, 0.68, 0.93, 0.98, 2.25, 1.5, -0.65, -0.95, 0.25},
+      {"van", 4.6, 1.85, 1.9, 2.9, 0.9, 0.31, 0.2, 0.85, 1.1, 1.12, 2.95, 2.2, -0.65, -0.76, 0.25},
+      {"small", 3.55, 1.64, 1.48, 2.35, 0.7, 0.28, 0.2, 0.68, 0.93, 0.98, 2.1, 1.4, -0.15, -0.42, 0.25},
+      {"off-roader", 4.5, 1.86, 1.68, 2.65, 0.92, 0.36, 0.3, 0.88, 1.08, 1.12, 2.15, 1.45, -0.5, -0.78,
+       0.25}};
   return shapes;
 }
 

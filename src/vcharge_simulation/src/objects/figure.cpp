@@ -15,13 +15,13 @@ constexpr double kHipSwing_rad = 0.45;
 constexpr double kKneeBend_rad = 0.9;
 constexpr int kSides = 12;
 
-// Where a limb that hangs down and is turned forwards by an angle ends.
+// End of a limb that hangs from `from`, rotated forwards by an angle.
 Eigen::Vector3f hang(const Eigen::Vector3f& from, double forwards_rad, float length_m) {
   return from + length_m * Eigen::Vector3f(static_cast<float>(std::sin(forwards_rad)), 0.0F,
                                            -static_cast<float>(std::cos(forwards_rad)));
 }
 
-// Frustums through (height, radius), flattened to `depth` times their width from front to back.
+// Frustums through (height, radius), scaled by `depth` from front to back.
 void addRounded(const std::vector<Eigen::Vector2f>& profile, const Eigen::Vector3f& foot, float depth,
                 uint32_t material, TriangleMesh* mesh) {
   const size_t first = mesh->vertices.size();

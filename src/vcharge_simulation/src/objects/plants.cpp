@@ -12,8 +12,8 @@ namespace {
 
 constexpr double kLeaf_m = 0.075;
 constexpr double kTwoPi = 6.28318530717958647692;
-// Leaves in a ball of foliage, times the square of leaf length over radius: enough to hide most of what is
-// behind.
+// Number of leaves in a ball of foliage times (leaf length / radius)^2, so that the leaves hide most of what
+// is behind.
 constexpr double kLeafAreaPerBall = 13.0;
 
 Eigen::Vector3d randomDirection(Random* random) {
@@ -23,9 +23,9 @@ Eigen::Vector3d randomDirection(Random* random) {
   return {r * std::cos(azimuth), r * std::sin(azimuth), z};
 }
 
-// A leaf is one triangle that points and faces anywhere near `outwards`. `ambient` is the light that reaches
-// it; its u coordinate picks its tone from the leaves' texture, dark to bright. A triangle larger than a leaf
-// stands for as many leaves as it covers: their tones and shades average.
+// Adds a leaf: one triangle that faces roughly along `outwards`. `ambient` is the light that reaches it, and
+// its u coordinate selects a tone of the leaf texture, dark to bright. A triangle larger than a leaf stands
+// for several leaves, so its tone and shading vary less.
 void addLeaf(const Eigen::Vector3d& position, const Eigen::Vector3d& outwards, double size_m, double ambient,
              uint32_t material, Random* random, TriangleMesh* mesh) {
   const double averaging = std::max(1.0, size_m / kLeaf_m);
@@ -35,7 +35,7 @@ void addLeaf(const Eigen::Vector3d& position, const Eigen::Vector3d& outwards, d
   const Eigen::Vector3d across = normal.cross(along) * 0.42;
   const auto first = static_cast<uint32_t>(mesh->vertices.size());
   MeshVertex vertex;
-  // Shading follows the crown as a whole more than the single leaf: leaves scatter light among each other.
+  // Shading follows the crown more than the single leaf, because leaves scatter light among each other.
   const Eigen::Vector3d mean_normal = (outwards + scatter / averaging).normalized();
   vertex.normal = (0.6 * outwards + mean_normal).normalized().cast<float>();
   vertex.ambient = static_cast<float>(ambient);
@@ -50,7 +50,7 @@ void addLeaf(const Eigen::Vector3d& position, const Eigen::Vector3d& outwards, d
   mesh->triangles.push_back({{first, first + 1, first + 2}, material});
 }
 
-// Leaves in a ball, most of them near its surface.
+// Adds leaves in a ball, most of them near its surface.
 void addLeafBall(const Eigen::Vector3d& centre, const Eigen::Vector3d& radii, int count, double leaf_m,
                  double shade, uint32_t material, Random* random, TriangleMesh* mesh) {
   for (int i = 0; i < count; ++i) {

@@ -10,8 +10,8 @@ struct PlantMaterials {
   uint32_t bark, leaves, dark_core;
 };
 
-/// A tree about 6 m high at the origin; every leaf is a triangle of the given length, and there are as many
-/// as fill the crown. `density` scales their number.
+/// A tree about 6 m high at the origin. Each leaf is a triangle of length `leaf_m`, and there are enough to
+/// fill the crown; `density` scales their number.
 TriangleMesh makeTree(const PlantMaterials& materials, double leaf_m, double density, uint64_t seed);
 /// A bush of the given radius and height at the origin.
 TriangleMesh makeBush(const PlantMaterials& materials, double radius_m, double height_m, double density,
@@ -19,7 +19,7 @@ TriangleMesh makeBush(const PlantMaterials& materials, double radius_m, double h
 /// A clipped hedge: a box of `size_m` whose base is centred at the origin.
 TriangleMesh makeHedge(const PlantMaterials& materials, const Eigen::Vector3d& size_m, double density,
                        uint64_t seed);
-/// `count` blades of grass around the origin, within `radius_m`.
+/// Adds `count` blades of grass within `radius_m` of `base`.
 void addGrassTuft(const Eigen::Vector3f& base, double radius_m, int count, uint32_t material, uint64_t seed,
                   TriangleMesh* mesh);
 

@@ -18,13 +18,14 @@ constexpr double kDegree = 3.14159265358979323846 / 180.0;
 constexpr double kImageScale = 0.4;
 constexpr LensOptions kLensWithoutVeil{0.35, 0.8, 0.0};
 
-// Gray levels, of means over 3x3 pixels and of single ones.
+// Limits in gray levels, for means over 3x3 pixels and for single pixels.
 constexpr double kMaxDifference = 2.0;
 constexpr double kMaxPixelDifference = 3.0;
-// Frames see a place alike; two cameras see it at different angles, and few such places.
+// Consecutive frames see a surface at nearly the same angle; two cameras see it at different angles, on few
+// pixels.
 constexpr double kMaxShiftOfFrames_px = 0.05;
 constexpr double kMaxShiftOfCameras_px = 0.1;
-// Means that a comparison needs.
+// Number of 3x3 means needed for a comparison.
 constexpr int kMinOfFrames = 20000;
 constexpr int kMinOfCameras = 100;
 constexpr int kMinForShift = 500;
@@ -48,7 +49,7 @@ std::vector<CameraView> viewsOf(const CameraRig& rig) {
   return views;
 }
 
-// 0: the Golf's rig; else the random one of this seed.
+// Seed 0 is the Golf's rig, others are random rigs.
 CameraRig rigOf(uint64_t seed) {
   return seed == 0 ? makeRig("golf", 1, kImageScale) : makeRig("random", seed, kImageScale);
 }
@@ -80,7 +81,8 @@ TEST_P(ConsistencyTest, ExactRangeReproducesTheNextFrameAndTheNeighbouringCamera
     EXPECT_LE(result.shift_px.norm(), kMaxShiftOfFrames_px) << rig.cameras[i].name;
   }
   for (size_t i = 0; i < num_cameras; ++i) {
-    // Around the car. The view that sees a place coarser is compared with the finer one.
+    // Neighbouring cameras around the car. Pixels are compared only where the second view is not coarser, so
+    // both orders are needed.
     const size_t j = (i + 1) % num_cameras;
     bool compared = false;
     for (const auto& [from, to] : {std::pair(i, j), std::pair(j, i)}) {
@@ -110,12 +112,12 @@ TEST(RandomRigsOfTheConsistencyTest, HaveLensesOfBothModels) {
   EXPECT_EQ(models.size(), 2U);
 }
 
-// What the check must find: a wrong place of the image, a wrong pose, a wrong lens.
+// Defects that the comparison must detect: a shifted image, a wrong pose, a wrong lens.
 class DefectTest : public testing::TestWithParam<uint64_t> {
  protected:
   DefectTest() : pictures_(takePictures(scene_case_, viewsOf(rigOf(GetParam())), 0)) {}
 
-  // Of the two pairs of cameras that see most of the walls.
+  // Uses the two camera pairs that see most of the walls.
   void expectFound(const std::string& defect, const std::function<void(Picture*)>& disturb) const {
     for (const auto& [from, to] : {std::pair<size_t, size_t>(3, 0), std::pair<size_t, size_t>(3, 2)}) {
       Picture disturbed = pictures_[to];

@@ -14,12 +14,12 @@ namespace {
 
 constexpr float kTwoPi = 6.28318531F;
 constexpr float kLift_m = 0.012F;
-// A lamp's light fades to nothing at this distance, so that far lamps cost no rays.
+// The light of a lamp fades to zero at this distance, so that distant lamps need no rays.
 constexpr float kReach_m = 10.0F;
-// Shadow rays end before the lamp's own housing.
+// Shadow rays end before the housing of the lamp.
 constexpr float kHousing_m = 0.16F;
-constexpr float kUpwardShare = 0.2F;
-constexpr float kSidewardShare = 0.25F;
+constexpr float kUpwardFraction = 0.2F;
+constexpr float kSidewardFraction = 0.25F;
 constexpr float kFloor_m = 0.03F;
 constexpr int kGatherStride = 5;
 
@@ -50,8 +50,9 @@ class LampBaker {
         }
         const float near = std::max(distance, 0.4F);
         const float fade = 1.0F - distance * distance / (kReach_m * kReach_m);
-        const float downward =
-            direction.z() > 0.0F ? kSidewardShare + (1.0F - kSidewardShare) * direction.z() : kUpwardShare;
+        const float downward = direction.z() > 0.0F
+                                   ? kSidewardFraction + (1.0F - kSidewardFraction) * direction.z()
+                                   : kUpwardFraction;
         const float irradiance = lamp.intensity * downward * cosine * fade * fade / (near * near);
         if (!tracer_.occluded(position + kLift_m * normal, direction,
                               std::max(0.01F, distance - kHousing_m))) {
@@ -62,7 +63,7 @@ class LampBaker {
     return sum / static_cast<float>(options_.rays_per_lamp);
   }
 
-  // Light from the floor and everything else that the lamps shine on.
+  // Indirect light from the floor and other lit surfaces.
   float gathered(const Eigen::Vector3f& position, const Eigen::Vector3f& normal, uint32_t hash,
                  const GroundTexture* floor) const {
     const Eigen::Vector3f side = normal.unitOrthogonal();
@@ -82,11 +83,11 @@ class LampBaker {
       if (!tracer_.cast(start, direction, &hit)) {
         continue;
       }
-      const Eigen::Vector3f place = start + hit.distance_m * direction;
-      // The corner under a car or behind a pillar is dark itself.
+      const Eigen::Vector3f point = start + hit.distance_m * direction;
+      // Nearby surfaces in corners under cars and behind pillars are dark themselves.
       const float nearness = std::min(1.0F, hit.distance_m / 0.5F);
-      sum += floor != nullptr && place.z() < kFloor_m
-                 ? static_cast<float>(options_.floor_albedo) * floor->sampleAt(place.x(), place.y(), 1.0F)
+      sum += floor != nullptr && point.z() < kFloor_m
+                 ? static_cast<float>(options_.floor_albedo) * floor->sampleAt(point.x(), point.y(), 1.0F)
                  : static_cast<float>(options_.other_radiance) * nearness;
     }
     return sum / static_cast<float>(rays);
@@ -113,7 +114,7 @@ void bakeLampLight(const std::vector<Lamp>& lamps, const LampOptions& options, c
   const double texel_m = options.floor_texel_m;
   const int width = static_cast<int>(std::lround((max_m.x() - min_m.x()) / texel_m));
   const int height = static_cast<int>(std::lround((max_m.y() - min_m.y()) / texel_m));
-  const auto placeAt = [&](int column, int row, double stride) {
+  const auto positionAt = [&](int column, int row, double stride) {
     return Eigen::Vector3d(min_m.x() + (column + 0.5) * stride * texel_m,
                            min_m.y() + (row + 0.5) * stride * texel_m, 0.0)
         .cast<float>()
@@ -123,7 +124,7 @@ void bakeLampLight(const std::vector<Lamp>& lamps, const LampOptions& options, c
   tbb::parallel_for(0, height, [&](int row) {
     for (int column = 0; column < width; ++column) {
       floor.at<float>(row, column) =
-          baker.direct(placeAt(column, row, 1.0), Eigen::Vector3f::UnitZ(), hashCell(column, row, 91));
+          baker.direct(positionAt(column, row, 1.0), Eigen::Vector3f::UnitZ(), hashCell(column, row, 91));
     }
   });
   cv::GaussianBlur(floor, floor, cv::Size(5, 5), 1.0);
@@ -131,8 +132,9 @@ void bakeLampLight(const std::vector<Lamp>& lamps, const LampOptions& options, c
   cv::Mat gathered(height / kGatherStride, width / kGatherStride, CV_32FC1);
   tbb::parallel_for(0, gathered.rows, [&](int row) {
     for (int column = 0; column < gathered.cols; ++column) {
-      gathered.at<float>(row, column) = baker.gathered(
-          placeAt(column, row, kGatherStride), Eigen::Vector3f::UnitZ(), hashCell(column, row, 92), nullptr);
+      gathered.at<float>(row, column) =
+          baker.gathered(positionAt(column, row, kGatherStride), Eigen::Vector3f::UnitZ(),
+                         hashCell(column, row, 92), nullptr);
     }
   });
   cv::GaussianBlur(gathered, gathered, cv::Size(3, 3), 0.8);

@@ -16,7 +16,7 @@ constexpr float kTwoPi = 6.28318531F;
 constexpr float kSunRadius_rad = 0.0047F;
 constexpr float kLift_m = 0.012F;
 constexpr float kFar_m = 120.0F;
-// Surroundings change slowly: they are sampled on a coarser grid than the sun's shadows.
+// Ambient light varies slowly, so it is sampled on a coarser grid than the sun's shadows.
 constexpr int kSurroundingStride = 5;
 constexpr int kSurroundingRays = 32;
 constexpr int kWallRays = 8;
@@ -43,7 +43,7 @@ float freeSky(const RayTracer& tracer, const Eigen::Vector3f& position, const Ei
   return static_cast<float>(free) / static_cast<float>(rays);
 }
 
-// The sun's disk, sampled.
+// Samples directions to the disk of the sun.
 class SunDisk {
  public:
   explicit SunDisk(const Eigen::Vector3f& centre)
@@ -79,9 +79,9 @@ void bakeWallLight(const std::vector<Wall>& walls, double texel_m, Scene* scene)
                 (static_cast<float>(column) + unitFromBits(mixBits(hash + 2U))) / static_cast<float>(width);
             const float v =
                 (static_cast<float>(row) + unitFromBits(mixBits(hash + 3U))) / static_cast<float>(height);
-            const Eigen::Vector3f place =
+            const Eigen::Vector3f point =
                 wall.foot + u * wall.along + (1.0F - v) * wall.up + kLift_m * normal;
-            lit += tracer.occluded(place, sun.direction(hash), kFar_m) ? 0 : 1;
+            lit += tracer.occluded(point, sun.direction(hash), kFar_m) ? 0 : 1;
           }
           image.at<uint8_t>(row, column) = static_cast<uint8_t>(255 * lit / kWallRays);
         }
@@ -100,7 +100,7 @@ void bakeGroundLight(const Eigen::Vector2d& min_m, const Eigen::Vector2d& max_m,
   const int width = static_cast<int>(std::lround((max_m.x() - min_m.x()) / texel_m));
   const int height = static_cast<int>(std::lround((max_m.y() - min_m.y()) / texel_m));
   const SunDisk sun(scene->sky->directionToSun());
-  const auto placeAt = [&](double column, double row) {
+  const auto pointAt = [&](double column, double row) {
     const double x = min_m.x() + (column + 0.5) * texel_m;
     const double y = min_m.y() + (row + 0.5) * texel_m;
     return Eigen::Vector3d(x, y, ground_height(x, y) + kLift_m).cast<float>().eval();
@@ -109,7 +109,7 @@ void bakeGroundLight(const Eigen::Vector2d& min_m, const Eigen::Vector2d& max_m,
   tbb::parallel_for(0, height, [&](int row) {
     for (int column = 0; column < width; ++column) {
       const Eigen::Vector3f direction = sun.direction(hashCell(column, row, 77));
-      sun_image.at<uint8_t>(row, column) = tracer.occluded(placeAt(column, row), direction, kFar_m) ? 0 : 255;
+      sun_image.at<uint8_t>(row, column) = tracer.occluded(pointAt(column, row), direction, kFar_m) ? 0 : 255;
     }
   });
   cv::GaussianBlur(sun_image, sun_image, cv::Size(3, 3), 0.7);
@@ -117,11 +117,11 @@ void bakeGroundLight(const Eigen::Vector2d& min_m, const Eigen::Vector2d& max_m,
   cv::Mat sky_image(height / kSurroundingStride, width / kSurroundingStride, CV_8UC1);
   tbb::parallel_for(0, sky_image.rows, [&](int row) {
     for (int column = 0; column < sky_image.cols; ++column) {
-      const Eigen::Vector3f place =
-          placeAt((column + 0.5) * kSurroundingStride - 0.5, (row + 0.5) * kSurroundingStride - 0.5);
-      const float free = freeSky(tracer, place, Eigen::Vector3f::UnitZ(), kSurroundingRays,
+      const Eigen::Vector3f point =
+          pointAt((column + 0.5) * kSurroundingStride - 0.5, (row + 0.5) * kSurroundingStride - 0.5);
+      const float free = freeSky(tracer, point, Eigen::Vector3f::UnitZ(), kSurroundingRays,
                                  hashCell(column, row, 78), 25.0F);
-      // What blocks the sky sends some light of its own.
+      // Surfaces that block the sky reflect some light themselves.
       sky_image.at<uint8_t>(row, column) = cv::saturate_cast<uint8_t>(255.0F * (0.15F + 0.85F * free));
     }
   });
@@ -144,7 +144,7 @@ void bakeVertexAmbient(int rays_per_vertex, TriangleMesh* mesh) {
     const Eigen::Vector3f start = vertex.position + 0.02F * vertex.normal;
     const float free =
         freeSky(tracer, start, vertex.normal, rays_per_vertex, mixBits(static_cast<uint32_t>(i)), 3.0F);
-    // A wall sees the open ground in the lower half of its hemisphere: that is no occlusion.
+    // The open ground in the lower half of a wall's hemisphere does not count as occlusion.
     const float expected = 0.5F + 0.5F * vertex.normal.z();
     vertex.ambient = std::min(1.0F, free / std::max(0.1F, expected));
   });

@@ -14,19 +14,19 @@ struct Wall {
   uint32_t material;
 };
 
-/// Gives the walls' materials a sun map: how much of the sun (a disk) reaches each place of them. Behind
-/// leaves a few shadow rays per pixel would make a speckle that differs from view to view. Each wall needs a
-/// material of its own.
+/// Bakes a sun map for each wall's material: the fraction of the sun's disk visible from each point. Tracing
+/// a few shadow rays per pixel behind leaves instead would give noise that differs between views. Each wall
+/// needs its own material.
 void bakeWallLight(const std::vector<Wall>& walls, double texel_m, Scene* scene);
 
-/// Fills scene->ground.sun and .surrounding: how much of the sun (a disk) and of the sky reaches each place
-/// of the ground in [min_m, max_m], whose height is `ground_height(x, y)`. The same scene gives the same
+/// Fills scene->ground.sun and .surrounding: the fraction of the sun's disk and of the sky visible from each
+/// point of the ground in [min_m, max_m], at height `ground_height(x, y)`. The same scene gives the same
 /// maps.
 void bakeGroundLight(const Eigen::Vector2d& min_m, const Eigen::Vector2d& max_m, double texel_m,
                      const std::function<double(double, double)>& ground_height, Scene* scene);
 
-/// Sets the vertices' ambient to the share of a cosine-weighted hemisphere that is free, above ground at z =
-/// 0.
+/// Sets the ambient light of each vertex to the unoccluded fraction of its cosine-weighted hemisphere, above
+/// ground at z = 0.
 void bakeVertexAmbient(int rays_per_vertex, TriangleMesh* mesh);
 
 }  // namespace vcharge

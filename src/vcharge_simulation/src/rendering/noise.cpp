@@ -30,7 +30,7 @@ float fractalNoise(float x, float y, int octaves, float gain, uint32_t seed) {
   for (int octave = 0; octave < octaves; ++octave) {
     sum += amplitude * valueNoise(x, y, seed + static_cast<uint32_t>(octave) * 101U);
     total += amplitude * amplitude;
-    // Not exactly two, so that the lattices of the octaves do not line up.
+    // The factor differs from 2 so that the lattices of the octaves do not align.
     x = x * 2.03F + 17.3F;
     y = y * 2.03F + 5.7F;
     amplitude *= gain;

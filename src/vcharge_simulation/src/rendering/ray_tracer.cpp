@@ -8,9 +8,9 @@
 namespace vcharge {
 
 RayTracer::RayTracer(const TriangleMesh& mesh, unsigned geometry_id) {
-  // One build thread: the hierarchy, and so which of two coincident surfaces is hit, must not depend on the
-  // machine. Embree's own setting of threads would hold for all of the process, and as long as the device
-  // lives.
+  // A single build thread makes the hierarchy, and with it the choice between coincident surfaces,
+  // independent of the machine. TBB limits the threads because Embree's own setting applies to the whole
+  // process.
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   device_ = rtcNewDevice("set_affinity=0");
   if (device_ == nullptr) {

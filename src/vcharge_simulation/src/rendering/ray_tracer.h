@@ -11,7 +11,7 @@ namespace vcharge {
 /// Embree's acceleration structure over one mesh, which must outlive it. Queries are thread safe.
 class RayTracer {
  public:
-  /// geometry_id: what Embree's hits name the mesh.
+  /// `geometry_id` identifies the mesh in Embree's hits.
   explicit RayTracer(const TriangleMesh& mesh, unsigned geometry_id = 0);
   ~RayTracer();
   RayTracer(const RayTracer&) = delete;
@@ -25,10 +25,10 @@ class RayTracer {
     float u, v;  ///< barycentric: the weights of the triangle's second and third vertex
     Eigen::Vector3f normal(const TriangleMesh& mesh) const;  ///< interpolated, unit
   };
-  /// First surface beyond min_distance_m along a unit direction; false when there is none.
+  /// First surface beyond min_distance_m along a unit direction; false if there is none.
   bool cast(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, Hit* hit,
             float min_distance_m = 0.0F) const;
-  /// Whether anything lies within max_distance_m.
+  /// True if any surface lies within max_distance_m.
   bool occluded(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float max_distance_m) const;
 
  private:

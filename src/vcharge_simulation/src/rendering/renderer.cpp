@@ -20,10 +20,10 @@ namespace {
 constexpr int kSamples = CameraView::kSamplesPerBlock;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kMaxShadow_m = 150.0F;
-// Shadow rays start this far above their surface.
+// Offset of shadow ray origins from their surface.
 constexpr float kShadowOffset_m = 0.01F;
 
-// Renders the blocks of one image. Everything that does not change from block to block lives here.
+// Renders blocks of one image; holds what all blocks share.
 class BlockRenderer {
  public:
   BlockRenderer(const Scene& scene, const SceneInstant& instant, const CameraView& view,
@@ -101,7 +101,7 @@ class BlockRenderer {
     return origin_ + rays.ray.tfar[i] * direction(rays, i);
   }
 
-  // The first and the last of a pixel's samples lie opposite each other about its middle.
+  // The first and the last sample of a pixel are opposite each other about its centre.
   Eigen::Vector3f middleOfPixel(const RTCRayHit16& rays, int p) const {
     return 0.5F * (positionOf(rays, 4 * p) + positionOf(rays, 4 * p + 3));
   }
@@ -130,7 +130,7 @@ class BlockRenderer {
   void renderGround(int block_x, int block_y, const GroundFinder::Plane& plane, cv::Mat* light) const {
     const float* rays = view_.blockRays(static_cast<size_t>(block_y) * view_.blocksPerRow() + block_x);
     const Material& material = shader_.materialOf(plane.triangle);
-    // In the camera frame, where the rays are given.
+    // The rays are given in the camera frame.
     const Eigen::Vector3f normal = rotation_.transpose() * plane.normal;
     const float distance = plane.offset - plane.normal.dot(origin_);
     for (int p = 0; p < 4; ++p) {
@@ -180,8 +180,8 @@ class BlockRenderer {
     instant_.intersect(active, rays);
   }
 
-  // One shadow ray for each pixel: from its middle where one surface fills it, else from its first sample
-  // that needs one.
+  // Traces one shadow ray per pixel: from its centre if one triangle fills it, otherwise from the first
+  // sample that needs one.
   void traceShadows(const RTCRayHit16& rays, uint8_t pixels, uint32_t body_mask,
                     std::array<float, 4>* sun_visibility) const {
     if (!has_sun_) {
@@ -238,7 +238,7 @@ class BlockRenderer {
     }
   }
 
-  // By what no light map knows: the own car and movers.
+  // Shadows that no light map contains: those of the own car and of movers.
   bool isShadowed(const Eigen::Vector3f& position) const {
     return has_sun_ && (isShadowedByBody(position) || instant_.isShadowedByMover(position, sun_));
   }
@@ -248,7 +248,7 @@ class BlockRenderer {
       return false;
     }
     const Eigen::Vector3f in_vehicle = vehicle_rotation_.transpose() * (position - vehicle_origin_);
-    // Only where the line to the sun passes within the body's radius.
+    // The shadow ray must pass within the body's radius.
     const float along = -in_vehicle.dot(sun_in_vehicle_);
     const float radius = view_.body()->radius();
     if (along < -radius || (in_vehicle + along * sun_in_vehicle_).squaredNorm() > radius * radius) {
@@ -271,7 +271,7 @@ class BlockRenderer {
   const bool has_sun_;
   const Eigen::Matrix3f vehicle_rotation_;
   const Eigen::Vector3f vehicle_origin_, sun_in_vehicle_;
-  const Eigen::Matrix3f rotation_;  // of the camera
+  const Eigen::Matrix3f rotation_;  // world_from_camera
   const Eigen::Vector3f origin_;
   const GroundFinder ground_;
 };

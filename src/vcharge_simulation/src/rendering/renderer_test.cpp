@@ -6,7 +6,7 @@
 #include <tbb/global_control.h>
 #include <opencv2/imgproc.hpp>
 
-#include "vcharge_simulation/scenes/lot_scene.h"
+#include "scenes/lot/lot_scene.h"
 #include "vcharge_simulation/sensors/camera_response.h"
 #include "vcharge_simulation/sensors/golf_rig.h"
 
@@ -18,10 +18,8 @@ constexpr double kDegree = 3.14159265358979323846 / 180.0;
 // A lot with coarser maps than the default: quick to build, sharp enough for small images.
 std::shared_ptr<const Renderer> testLot() {
   static const std::shared_ptr<const Renderer> renderer = [] {
-    LotOptions options;
-    options.ground_texel_m = 0.025;
-    options.light_texel_m = 0.1;
-    options.foliage_density = 0.5;
+    SceneOptions options;
+    options.image_scale = options.detail = 0.5;
     return std::make_shared<const Renderer>(buildLotScene(options));
   }();
   return renderer;
@@ -107,7 +105,8 @@ TEST(RendererTest, LensBlursAnEdgeByItsPointSpread) {
     const double sigma_px = lens.blurAt(angle_rad, 1.0);
     cv::Mat blurred = edge.clone();
     LensBlur(cv::Mat(edge.size(), CV_32FC1, cv::Scalar(sigma_px))).apply(&blurred);
-    // The slope of the edge is the point spread: its sum is 1, its variance that of the blur.
+    // The derivative of the blurred edge is the point spread function: it sums to 1 and has the variance of
+    // the blur.
     double sum = 0.0;
     double variance = 0.0;
     for (int x = 1; x < edge.cols; ++x) {
@@ -125,7 +124,7 @@ TEST(RendererTest, LensBlursAnEdgeByItsPointSpread) {
 constexpr int kDarkSquare = 60;
 constexpr int kBrightSquare = 200;
 
-// A checkerboard of 1 m squares on the ground, with a post.
+// A checkerboard of 1 m squares on the ground.
 std::shared_ptr<Scene> checkerboardScene() {
   constexpr int kTexelsPerM = 16;
   constexpr int kWidth_m = 64;
@@ -148,7 +147,7 @@ std::shared_ptr<Scene> checkerboardScene() {
   return scene;
 }
 
-// Also where the ground is so plain that its samples are not traced.
+// Also covers ground blocks whose samples are not traced individually.
 TEST(RendererTest, CheckerboardKeepsItsSquaresNearbyAndItsMeanFarAway) {
   const Renderer renderer(checkerboardScene());
   const CameraView view(makeGolfRig(1, 0.5).cameras[1], nullptr, kIdealLens);
@@ -188,7 +187,7 @@ TEST(RendererTest, CheckerboardKeepsItsSquaresNearbyAndItsMeanFarAway) {
   EXPECT_NEAR(far_albedo / far_pixels, 0.5 * (kDarkSquare + kBrightSquare), 8.0);
 }
 
-// The edge of the light on a wall, between rows of the image, is where the range says.
+// The edge of the light on a wall appears at the same subpixel row as in the range image.
 TEST(RendererTest, LightLiesWhereItsSurfaceIs) {
   constexpr int kTexels = 256;
   constexpr float kHalf_m = 2.0F;
@@ -196,7 +195,7 @@ TEST(RendererTest, LightLiesWhereItsSurfaceIs) {
   light_map.rowRange(0, kTexels / 2).setTo(255);
   auto scene = std::make_shared<Scene>();
   Material material;
-  material.translucency = 1.0F;  // wherever the sun is
+  material.translucency = 1.0F;  // lit from any direction of the sun
   material.sun_map = 0;
   material.sun_map_texels_per_m = kTexels / (2.0F * kHalf_m);
   scene->textures.emplace_back(light_map, Texture::Border::kClamp);
@@ -219,7 +218,7 @@ TEST(RendererTest, LightLiesWhereItsSurfaceIs) {
   int columns = 0;
   double mean_error_px = 0.0;
   for (int x = 0; x < light.cols; ++x) {
-    // Rows about the edge, all on the wall.
+    // Rows around the edge that all lie on the wall.
     constexpr int kReach = 8;
     int first_below = 0;
     while (first_below < light.rows && !(height(x, first_below) < kEdge_m)) {

@@ -22,14 +22,14 @@ namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
 const double kMinIncidenceCosine = std::cos(75.0 * kDegree);
-const double kMinAxisCosine = std::cos(85.0 * kDegree);  // the image fades at the rim, from 89 degrees
+const double kMinAxisCosine = std::cos(85.0 * kDegree);  // the image fades at the rim, from 89 degrees on
 constexpr double kMinResolution = 0.8;
-constexpr double kMaxRangeError = 0.03;  // share of the range
-constexpr double kMaxRelief_px = 0.25;   // of `first`
+constexpr double kMaxRangeError = 0.03;  // relative to the range
+constexpr double kMaxRelief_px = 0.25;   // pixels of `first`
 constexpr int kSamples = 4;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-// Of one picture's pixels in another one.
+// Compares the pixels of one picture with another picture.
 class Comparison {
  public:
   Comparison(const Picture& first, const Picture& second)
@@ -37,7 +37,7 @@ class Comparison {
         second_(second),
         second_from_first_(second.world_from_camera.inverse() * first.world_from_camera) {}
 
-  // Gray of `second` over the part of the surface that a pixel of `first` (not on its border) shows.
+  // Mean gray of `second` over the surface patch seen by a pixel of `first` (not on its border).
   std::optional<double> grayOfSecond(int x, int y) const {
     const Eigen::Vector3d here = point(x, y);
     const Eigen::Vector3d normal =
@@ -76,7 +76,7 @@ class Comparison {
     return first_.points[static_cast<size_t>(y) * first_.gray.cols + x].cast<double>();
   }
 
-  // What one pixel of `first` covers in `second`, where its neighbours are parts of the same surface.
+  // Jacobian from pixels of `first` to pixels of `second`, if the neighbours belong to the same surface.
   std::optional<Eigen::Matrix2d> findFootprint(int x, int y, const Eigen::Vector2d& pixel) const {
     Eigen::Matrix<double, 2, 9> around;
     for (int k = 0; k < 9; ++k) {
@@ -99,7 +99,7 @@ class Comparison {
     return footprint;
   }
 
-  // Between the four pixels about a place in `second`, if all of them see the surface at `range_m`.
+  // Bilinear interpolation in `second`, if all four pixels see the surface at `range_m`.
   std::optional<double> interpolate(const Eigen::Vector2d& at, double range_m) const {
     const int column = static_cast<int>(std::floor(at.x()));
     const int row = static_cast<int>(std::floor(at.y()));
@@ -137,7 +137,7 @@ bool showsCar(const Renderer& renderer, const Picture& picture, int x, int y) {
 Picture takePicture(const Renderer& renderer, const CameraView& view,
                     const RigidTransform& world_from_vehicle, double time_s) {
   check(view.lens().veil == 0.0, "takePicture: expected a lens without veil");
-  // The same surface passes other parts of each lens.
+  // The vignette is removed, since a surface passes different parts of the two lenses.
   cv::Mat flat;
   cv::divide(renderer.renderLight(view, world_from_vehicle, time_s), cv::max(view.vignette(), 0.05), flat);
   Picture picture{CameraResponse().develop(flat),
@@ -166,7 +166,7 @@ Reprojection reproject(const Renderer& renderer, const Picture& first, const Pic
                        Surfaces surfaces) {
   const Comparison comparison(first, second);
   const cv::Size size = first.gray.size();
-  cv::Mat moved(size, CV_32FC1, cv::Scalar(kNaN));  // `second` as `first` would see it
+  cv::Mat moved(size, CV_32FC1, cv::Scalar(kNaN));  // `second` as seen from `first`
   tbb::parallel_for(1, std::max(1, size.height - 1), [&](int y) {
     for (int x = 1; x + 1 < size.width; ++x) {
       const std::optional<double> gray = comparison.grayOfSecond(x, y);
@@ -176,7 +176,7 @@ Reprojection reproject(const Renderer& renderer, const Picture& first, const Pic
     }
   });
   Reprojection result;
-  // Of the fit difference = gradient * shift + brightness.
+  // Normal equations of the fit difference = gradient * shift + brightness.
   Eigen::Matrix3d normal_matrix = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right_side = Eigen::Vector3d::Zero();
   for (int y = 1; y + 1 < size.height; ++y) {

@@ -9,8 +9,8 @@
 
 namespace vcharge {
 
-/// A noise-free image without the vignette, with its exact range, and what is claimed of its camera: a test
-/// of the check claims something wrong.
+/// A noise-free image without vignette, with its exact range and the assumed camera model and pose. Tests
+/// disturb the model and pose.
 struct Picture {
   cv::Mat gray;                         ///< CV_8UC1
   cv::Mat range_m;                      ///< CV_32FC1, see Renderer::renderRange
@@ -18,35 +18,32 @@ struct Picture {
   CameraModel camera;
   RigidTransform world_from_camera;
 };
-/// The light that a lens scatters over the whole image differs from camera to camera: `view` needs a lens
-/// without veil.
+/// `view` needs a lens without veil, since the light scattered over the whole image differs between cameras.
 Picture takePicture(const Renderer& renderer, const CameraView& view,
                     const RigidTransform& world_from_vehicle, double time_s);
 
-/// How well `first`, moved by its exact range, agrees with `second`.
+/// Agreement of `first`, warped by its exact range, with `second`.
 ///
-/// Compared are pixels of `first` that both see, at less than 75 degrees from the surface's normal and 85
-/// from the optical axis, where `second` is no coarser than `first`, and that belong to one surface: their
-/// neighbours lie in `second` where the surface's slope puts them, to a quarter of a pixel. (Elsewhere, at
-/// outlines and in leaves finer than a pixel, one pixel shows things at several depths, and each camera
-/// others of them.)
+/// Compared are pixels of `first` that both views see at less than 75 degrees from the surface normal and
+/// less than 85 degrees from the optical axis, where `second` is not coarser than `first`, and whose
+/// neighbours lie on one surface: in `second` they are within a quarter of a pixel of the position predicted
+/// by the slope of the surface. Elsewhere, at outlines and in leaves finer than a pixel, one pixel shows
+/// several depths.
 ///
-/// Two cameras put their pixels differently on a pattern as fine as these pixels, and interpolation of
-/// `second` levels it: what they have in common is coarser. So the mean over 3x3 such pixels is compared with
-/// the mean of `second` over the same surface.
+/// Patterns as fine as the pixels are sampled differently by the two views and smoothed by interpolation in
+/// `second`, so means over 3x3 pixels are compared with the mean of `second` over the same surface.
 struct Reprojection {
-  double mean_difference = 0.0;  ///< of the means over 3x3 pixels, absolute, gray levels
-  /// Of single pixels, which fine patterns dominate: for comparison.
+  double mean_difference = 0.0;  ///< mean absolute difference of 3x3 means, gray levels
+  /// Mean absolute difference of single pixels, which is dominated by fine patterns.
   double mean_pixel_difference = 0.0;
-  /// By which `second` would have to move, in pixels of `first`, for the best agreement (least squares over
-  /// the gradients): zero but for the error of sampling. It finds errors of geometry that change grays
-  /// little.
+  /// Shift of `second`, in pixels of `first`, for the best agreement (least squares over the gradients);
+  /// ideally zero. It detects geometric errors that change gray levels only slightly.
   Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();
-  int count = 0;  ///< of means
+  int count = 0;  ///< number of 3x3 means
 };
 std::string toString(const Reprojection& result);
-/// Paint and glass mirror other surroundings into each camera, by physics (4 to 12 gray levels); kNoCars
-/// leaves cars out.
+/// kNoCars excludes cars: paint and glass reflect different surroundings into each camera (4 to 12 gray
+/// levels).
 enum class Surfaces { kAll, kNoCars };
 Reprojection reproject(const Renderer& renderer, const Picture& first, const Picture& second,
                        Surfaces surfaces = Surfaces::kAll);

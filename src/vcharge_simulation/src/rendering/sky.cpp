@@ -10,8 +10,8 @@ namespace vcharge {
 namespace {
 
 constexpr int kCloudTextureSize = 1024;
-// A hazy sky is brighter to the camera than the light that it gives to the ground says: as in the real
-// images, it nearly saturates where the ground is well exposed.
+// Ratio of the sky's radiance seen by the camera to its light on the ground. As in the real images, the sky
+// nearly saturates where the ground is well exposed.
 constexpr float kGlare = 2.8F;
 
 // Noise on a torus: blends four shifted copies so that the texture repeats without a seam.
@@ -53,7 +53,7 @@ float Sky::radiance(const Eigen::Vector3f& direction) const {
   const float z = std::max(direction.z(), 0.0F);
   const float inverse = 1.0F / (z + 0.12F);
   const float scale = 0.11F * kCloudTextureSize;
-  // The cloud layer recedes towards the horizon, and so does the level of detail.
+  // The level of detail grows towards the horizon, where the cloud layer is far away.
   const float level = 2.0F * fastLog2(1.0F + 0.35F * inverse);
   const float cloud = clouds_.sample(direction.x() * inverse * scale, direction.y() * inverse * scale, level);
   const float haze = (1.0F - z) * (1.0F - z) * (1.0F - z);

@@ -8,33 +8,33 @@ namespace vcharge {
 namespace {
 
 constexpr float kDetailContrast = 0.75F;
-// Coarser levels of the details are even.
+// Coarser levels of the detail textures are uniform.
 constexpr float kMaxDetailLevel = 4.0F;
 
-// Reflections see trees and houses, not sky, below this elevation (its sine).
+// Sine of the elevation below which reflections show trees and houses instead of the sky.
 constexpr float kSkylineSine = 0.22F;
 constexpr float kSkylineLight = 0.10F;
-// Of rough polish: what flat rays reflect more than steep ones.
+// Additional reflectivity of a rough polish at grazing incidence.
 constexpr float kGrazingGloss = 4.0F;
-constexpr float kFlattestCeilingRay = 0.12F;  // its sine
+constexpr float kFlattestCeilingRay = 0.12F;  // sine of the elevation
 
-// Length over width of what a round cone of rays covers on level ground.
+// Aspect ratio of the footprint of a round cone of rays on level ground.
 float stretchOf(const Eigen::Vector3f& direction) {
   return 1.0F / std::max(0.02F, std::abs(direction.z()));
 }
 
-// The first and the last of a pixel's samples lie opposite each other about its middle.
+// The first and the last sample of a pixel are opposite each other about its centre.
 SurfacePoint middleOf(const std::array<SurfacePoint, 4>& points) {
   SurfacePoint middle = points[0];
   middle.position = 0.5F * (points[0].position + points[3].position);
-  middle.direction = 0.5F * (points[0].direction + points[3].direction);  // unit to within a millionth
+  middle.direction = 0.5F * (points[0].direction + points[3].direction);  // unit length to within 1e-6
   middle.u = 0.5F * (points[0].u + points[3].u);
   middle.v = 0.5F * (points[0].v + points[3].v);
   return middle;
 }
 
-// The four samples of a pixel lie in four rows and columns: along a stretched footprint they are taps a
-// quarter of the pixel apart, so that only the part between them has to be averaged by the pyramid.
+// The four samples of a pixel lie in four rows and columns. Along a stretched footprint they are a quarter of
+// the pixel apart, so the pyramid only has to average over that distance.
 float groundSampleWidth(float footprint_m, float stretch) {
   return std::max(footprint_m * 0.6F * std::sqrt(stretch), footprint_m * 0.2F * stretch);
 }
@@ -63,16 +63,16 @@ float SurfaceShader::towardsSun(const Eigen::Vector3f& ground_normal) const {
   return std::max(0.0F, up * ground_normal.dot(sky_.directionToSun()));
 }
 
-float SurfaceShader::groundLight(const Eigen::Vector3f& position, float width_m, float sun_share) const {
+float SurfaceShader::groundLight(const Eigen::Vector3f& position, float width_m, float sun_fraction) const {
   float surrounding = 1.0F;
   if (scene_.ground.sun != nullptr) {
     const float level = fastLog2(width_m * scene_.ground.sun->texels_per_m);
-    sun_share *= scene_.ground.sun->sampleAt(position.x(), position.y(), level);
+    sun_fraction *= scene_.ground.sun->sampleAt(position.x(), position.y(), level);
   }
   if (scene_.ground.surrounding != nullptr) {
     surrounding = scene_.ground.surrounding->sampleAt(position.x(), position.y(), 0.0F);
   }
-  return static_cast<float>(sky_.light().sun_irradiance) * sun_share +
+  return static_cast<float>(sky_.light().sun_irradiance) * sun_fraction +
          static_cast<float>(sky_.light().sky_irradiance) * surrounding;
 }
 
@@ -84,7 +84,7 @@ float SurfaceShader::shadeGroundPixel(const Material& material,
   const GroundTexture& texture = scene_.ground.layers[static_cast<size_t>(material.texture)];
   const float level = fastLog2(groundSampleWidth(footprint_m, stretch) * texture.texels_per_m);
   const float albedo = texture.sampleMeanAt(positions, level);
-  // The finer details at the middles of the two halves of the pixel, cut across its longer side.
+  // Fine details are sampled at the centres of two halves of the pixel, split across its longer side.
   const Eigen::Vector3f upper = 0.5F * (positions[0] + positions[1]);
   const Eigen::Vector3f lower = 0.5F * (positions[2] + positions[3]);
   const Eigen::Vector3f left = 0.5F * (positions[0] + positions[2]);
@@ -104,10 +104,10 @@ float SurfaceShader::groundReflection(const Material& material, const Eigen::Vec
   if (material.reflectivity <= 0.0F) {
     return 0.0F;
   }
-  // A rough polish mirrors flat rays better than steep ones, but by far not as well as glass.
+  // A rough polish reflects grazing rays better than steep ones, but far less than glass does.
   const float m = 1.0F + std::min(0.0F, direction.z());
-  const float share = material.reflectivity * (1.0F + kGrazingGloss * m * m * m * m * m);
-  return share * surroundings(position, {direction.x(), direction.y(), -direction.z()});
+  const float reflected = material.reflectivity * (1.0F + kGrazingGloss * m * m * m * m * m);
+  return reflected * surroundings(position, {direction.x(), direction.y(), -direction.z()});
 }
 
 float SurfaceShader::shade(const SurfacePoint& point, float sun_visibility) const {
@@ -136,7 +136,7 @@ float SurfaceShader::shadePixel(const std::array<SurfacePoint, 4>& points, float
         points[0].geometric_normal.normalized(), 0.5F * (points[0].direction + points[3].direction),
         points[0].footprint_m, sun_visibility);
   }
-  // Light, like texture, is that of the whole pixel: of its middle, where no sample is.
+  // Light is evaluated at the centre of the pixel, consistent with the mean of the texture.
   const SurfacePoint middle = middleOf(points);
   const Interpolated surface = interpolate(middle);
   const float albedo =
@@ -224,7 +224,7 @@ float SurfaceShader::lightOf(const SurfacePoint& point, const Interpolated& surf
   if (material.reflectivity <= 0.0F) {
     return light;
   }
-  // Under a ceiling the share tells how much light there is, not how much of the surroundings is seen.
+  // Under a ceiling, the ambient value is the amount of light and not the visible part of the surroundings.
   const float seen = scene_.ceiling != nullptr ? 1.0F : surface.occlusion;
   return light + seen * reflection(material, point.position, surface.normal, point.direction);
 }
@@ -240,10 +240,10 @@ float SurfaceShader::reflection(const Material& material, const Eigen::Vector3f&
 
 float SurfaceShader::ceilingRadiance(const Eigen::Vector3f& position,
                                      const Eigen::Vector3f& direction) const {
-  // Flatter rays end at a wall before they reach the ceiling.
+  // Flatter rays meet a wall before the ceiling.
   const float distance =
       (scene_.ceiling->height_m - position.z()) / std::max(direction.z(), kFlattestCeilingRay);
-  // Polish is not perfect.
+  // Imperfect polish blurs the reflection with distance.
   const float level = fastLog2((0.1F + 0.06F * distance) * scene_.ceiling->radiance.texels_per_m);
   return scene_.ceiling->scale * scene_.ceiling->radiance.sampleAt(position.x() + distance * direction.x(),
                                                                    position.y() + distance * direction.y(),
@@ -264,7 +264,7 @@ float SurfaceShader::surroundings(const Eigen::Vector3f& position, const Eigen::
   const float distance = position.z() / -direction.z();
   const float x = position.x() + distance * direction.x();
   const float y = position.y() + distance * direction.y();
-  // Curved paint blurs what it mirrors.
+  // Curved paint blurs the reflection.
   const GroundTexture& texture = scene_.ground.layers.front();
   const float level = fastLog2((0.04F + 0.05F * distance) * texture.texels_per_m);
   const float albedo = kGroundLayerAlbedo * texture.sampleAt(x, y, level);
@@ -279,7 +279,7 @@ float SurfaceShader::surroundings(const Eigen::Vector3f& position, const Eigen::
 float SurfaceShader::shadePlain(const Material& material, const Eigen::Vector3f& position,
                                 const Eigen::Vector3f& normal, const Eigen::Vector3f& direction) const {
   const float to_sun = std::max(0.0F, normal.dot(sky_.directionToSun()));
-  // Under a ceiling the light on the floor tells how bright the place is.
+  // Under a ceiling, the baked light of the floor gives the local brightness.
   const float surrounding = scene_.ceiling != nullptr ? groundLight(position, 0.5F, 0.0F) : ambient(normal);
   const float diffuse =
       material.albedo * (static_cast<float>(sky_.light().sun_irradiance) * to_sun + surrounding);

@@ -7,7 +7,7 @@
 
 namespace vcharge {
 
-/// A scene of the catalogue, and where and when tests look at it.
+/// A scene of the catalogue with the drive and frame at which tests render it.
 struct SceneCase {
   const char* scene;
   const char* drive;
@@ -19,10 +19,10 @@ inline constexpr SceneCase kSceneCases[] = {{"lot", "short", 10},
                                             {"two_levels", "up_and_down", 100},
                                             {"chessboard", "board_front", 30}};
 
-/// A scene of the catalogue, sharp enough for small images and quick to build; it is built once.
+/// Renderer of a scene that is quick to build and sharp enough for small images; built once per process.
 const Renderer& rendererOf(const std::string& scene);
 
-/// Where the case's vehicle is, and the time of the scene's movers, some frames later than its own.
+/// Vehicle pose and scene time of a case, optionally some frames later.
 struct Moment {
   RigidTransform world_from_vehicle;
   double time_s;

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "objects/figure.h"
-#include "scenes/lot/lot_variant.h"
+#include "scenes/lot/lot_scene.h"
 #include "scenes/scene_parts.h"
 #include "vcharge_simulation/objects/car_model.h"
 
@@ -14,8 +14,8 @@ namespace vcharge {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kWalkLine_m = 3.6;    // y of the walker's way
-constexpr double kWalkReach_m = 15.0;  // he turns around there
+constexpr double kWalkLine_m = 3.6;    // y of the walker's line
+constexpr double kWalkReach_m = 15.0;  // the walker turns around there
 constexpr double kWalkSpeed_m_per_s = 1.2;
 constexpr double kTurn_s = 0.8;
 
@@ -55,7 +55,7 @@ void addBoxes(SceneParts* parts) {
   }
 }
 
-// Diameters of 5 to 15 cm.
+// Posts with diameters of 5 to 15 cm.
 void addPosts(SceneParts* parts) {
   parts->addPoles({{-17.5, -1.7, 0.0, 1.0, 0.025, false},
                    {-12.2, 1.5, 0.0, 0.9, 0.03, false},
@@ -66,7 +66,7 @@ void addPosts(SceneParts* parts) {
                    {14.5, 1.5, 0.0, 0.5, 0.075, false}});
 }
 
-// A cart with its bar towards the lane, 0.4 m above the ground: its shadow is not where it is.
+// A trailer whose bar hangs over the lane at a height of 0.4 m, so that its shadow is beside it.
 void addTrailer(SceneParts* parts) {
   constexpr double kX_m = 5.5;
   const uint32_t paint = parts->plain(SurfaceKind::kOther, 0.3, 0.03);
@@ -98,7 +98,7 @@ void addStandingFigure(SceneParts* parts) {
 }
 
 MoverState walkerAt(const FigureMaterials& materials, double time_s) {
-  // Back and forth, with a turn at each end.
+  // The walker goes back and forth with a turn at each end.
   const double leg_s = 2.0 * kWalkReach_m / kWalkSpeed_m_per_s;
   const double period_s = 2.0 * (leg_s + kTurn_s);
   const double in_period_s = time_s - period_s * std::floor(time_s / period_s);
@@ -108,7 +108,7 @@ MoverState walkerAt(const FigureMaterials& materials, double time_s) {
   const double turned = std::max(0.0, (in_leg_s - leg_s) / kTurn_s);
   const double x = returns ? walked_m - kWalkReach_m : kWalkReach_m - walked_m;
   const double yaw_rad = kPi * ((returns ? 0.0 : 1.0) + turned);
-  // A turn on the spot ends the swing of arms and legs.
+  // Arms and legs stop swinging for the turn.
   const double swing = std::clamp(2.0 * std::min(in_leg_s, leg_s - in_leg_s), 0.0, 1.0);
   MoverState state;
   state.world_from_mover = RigidTransform::planar(x, kWalkLine_m, yaw_rad);
@@ -130,11 +130,11 @@ ParkedCar parkedAcross(double x, double y, double yaw_rad, int shape, int paint)
 }
 
 LotLayout courseLayout(const SceneOptions& options) {
-  LotLayout layout = makeLotLayout(static_cast<uint64_t>(options.seed), options.day, options.moved_cars);
+  LotLayout layout = makeLotLayout(options.seed, options.day);
   layout.cars.erase(std::remove_if(layout.cars.begin(), layout.cars.end(),
                                    [](const ParkedCar& car) { return isOnCourse(car.x, car.y); }),
                     layout.cars.end());
-  // Corners towards the lane.
+  // Cars with a corner towards the lane.
   layout.cars.push_back(parkedAcross(-9.0, -5.2, 0.9, 1, 3));
   layout.cars.push_back(parkedAcross(11.5, -3.6, 2.7, 4, 2));
   layout.cars.push_back(parkedAcross(0.5, -6.3, 1.1, 0, 4));
@@ -159,7 +159,7 @@ std::shared_ptr<const Scene> buildCourseScene(const SceneOptions& options) {
     const FigureMaterials walker = addFigureMaterials(0.12, 0.2, parts);
     parts->scene().movers.push_back({"walker", [walker](double time_s) { return walkerAt(walker, time_s); }});
   };
-  return buildLotVariant(lotOptionsOf(options), course);
+  return buildLotVariant(options, course);
 }
 
 std::vector<CatalogueEntry> listCourseDrives() {

@@ -8,10 +8,10 @@
 
 namespace vcharge {
 
-/// The lot with a course of small obstacles in its middle lane and two people, one of them walking.
+/// The lot with small obstacles in its middle lane, a standing and a walking person.
 std::shared_ptr<const Scene> buildCourseScene(const SceneOptions& options);
 std::vector<CatalogueEntry> listCourseDrives();
-/// std::invalid_argument for a name that listCourseDrives() does not have.
+/// Throws std::invalid_argument for a name that is not in listCourseDrives().
 DrivePlan planCourseDrive(const std::string& name);
 
 }  // namespace vcharge

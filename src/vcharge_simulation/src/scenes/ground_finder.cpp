@@ -12,9 +12,9 @@ namespace {
 
 constexpr int kPacket = 16;
 constexpr uint32_t kNoGround = std::numeric_limits<uint32_t>::max();
-// Of a block's 16 samples, the one nearest to its middle.
+// The sample of a block that is nearest to its centre.
 constexpr int kMiddleSample = 3;
-// Neighbours lie in one plane when they are off by less than this.
+// Largest distance of neighbouring points from a common plane.
 constexpr float kPlaneTolerance_m = 0.001F;
 
 }  // namespace
@@ -56,7 +56,7 @@ void GroundFinder::probeRow(int block_y) {
       rays.ray.flags[i] = 0;
       rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
       rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-      // Only blocks that lie wholly in the field of view and show nothing of the own car.
+      // Only blocks that are entirely in the field of view and do not show the own car.
       active[i] = inside && view_.blockPixels(block) == 0xF && view_.blockBodyMask(block) == 0 ? -1 : 0;
     }
     instant_.intersect(active, &rays);

@@ -9,10 +9,10 @@
 
 namespace vcharge {
 
-/// Finds the blocks of an image that see nothing but one plane of the ground, so that their samples need no
-/// ray each: one ray is traced per block, and a block is plain when it and all its neighbours meet the same
-/// ground material in one plane. Something on the ground can hide from that only if it is narrower than the
-/// distance between two blocks; so blocks whose rays land more than kMaxSpacing_m apart are never plain.
+/// Finds the blocks of an image that show only one plane of the ground, so that their samples need not be
+/// traced individually. One ray per block is traced; a block is plain if it and all its neighbours meet the
+/// same ground material in one plane. Only objects narrower than the distance between two rays could be
+/// missed, so blocks whose rays land more than kMaxSpacing_m apart are never plain.
 class GroundFinder {
  public:
   GroundFinder(const SceneInstant& instant, const SurfaceShader& shader, const CameraView& view,
@@ -20,13 +20,13 @@ class GroundFinder {
 
   static constexpr float kMaxSpacing_m = 0.03F;
 
-  /// Plane n.x = offset with n along the triangle's normal (not unit).
+  /// Plane normal.dot(point) = offset, with the unit normal of the triangle.
   struct Plane {
     Eigen::Vector3f normal;
     float offset;
     uint32_t triangle;
   };
-  /// Null where the block sees anything else or may do so.
+  /// Plane seen by a plain block, null for other blocks.
   const Plane* planeOf(size_t block) const { return plain_[block] != 0 ? &planes_[block] : nullptr; }
 
  private:

@@ -8,9 +8,9 @@ namespace vcharge {
 namespace {
 
 constexpr double kTransition_m = 3.0;
-constexpr double kStart_m = 12.0;  // open paths start and end this far from the middle
+constexpr double kStart_m = 12.0;  // distance of the ends of open paths from the middle
 
-// The curve into a bay and out of it.
+// Curve into a bay and out of it.
 constexpr double kHalfPi = 1.57079632679489661923;
 constexpr double kBayCurvature_per_m = 0.2;
 constexpr double kTurnIn_m = 1.0;

@@ -9,9 +9,8 @@
 #include "scenes/course_scene.h"
 #include "scenes/garage/garage_scene.h"
 #include "scenes/garage/two_levels_scene.h"
-#include "scenes/lot/lot_variant.h"
-#include "vcharge_core/base/options.h"
-#include "vcharge_simulation/scenes/lot_scene.h"
+#include "scenes/lot/lot_scene.h"
+#include "vcharge_core/base/error.h"
 
 namespace vcharge {
 
@@ -24,13 +23,9 @@ struct CatalogueScene {
   std::function<DrivePlan(const std::string&)> plan;
 };
 
-std::shared_ptr<const Scene> buildLot(const SceneOptions& options) {
-  return buildLotScene(lotOptionsOf(options));
-}
-
 const std::vector<CatalogueScene>& catalogue() {
   static const std::vector<CatalogueScene> scenes = {
-      {{"lot", "parking lot of 80 x 60 m in the sun"}, buildLot, listLotDrives, planLotDrive},
+      {{"lot", "parking lot of 80 x 60 m in the sun"}, buildLotScene, listLotDrives, planLotDrive},
       {{"garage", "underground garage of 64 x 47 m, lit by lamps"},
        buildGarageScene,
        listGarageDrives,
@@ -69,16 +64,6 @@ const CatalogueScene& findScene(const std::string& name) {
 
 }  // namespace
 
-void SceneOptions::validate() const {
-  makeBoardPattern(board);
-  requireField(rig_seed >= 0, "rig_seed", "must not be negative", rig_seed);
-  requireField(seed >= 0, "seed", "must not be negative", seed);
-  requireField(day >= 0, "day", "must not be negative", day);
-  requireField(moved_cars >= 0.0 && moved_cars <= 1.0, "moved_cars", "must be in [0, 1]", moved_cars);
-  requireField(detail >= 0.1 && detail <= 1.0, "detail", "must be in [0.1, 1]", detail);
-  requireField(image_scale >= 0.05 && image_scale <= 1.0, "image_scale", "must be in [0.05, 1]", image_scale);
-}
-
 std::string boardTarget(const std::string& board) {
   return makeBoardPattern(board).target_yaml;
 }
@@ -96,7 +81,8 @@ std::vector<CatalogueEntry> listDrives(const std::string& scene) {
 }
 
 std::shared_ptr<const Scene> buildScene(const std::string& name, const SceneOptions& options) {
-  options.validate();
+  check(options.image_scale > 0.0 && options.detail > 0.0,
+        "buildScene: image_scale and detail must be positive");
   return findScene(name).build(options);
 }
 

@@ -39,7 +39,7 @@ void SceneInstant::intersect(const int* active, RTCRayHit16* rays) const {
   if (!moving_tracer_) {
     return;
   }
-  // Rays end at what they have met, so that only nearer movers replace it.
+  // The first query set tfar, so only nearer movers replace its hits.
   rtcIntersect16(active, moving_tracer_->scene(), &context, rays);
   for (int i = 0; i < 16; ++i) {
     if (active[i] != 0 && rays->hit.geomID[i] == kMovingGeometry) {
@@ -76,7 +76,7 @@ bool SceneInstant::isShadowedByMover(const Eigen::Vector3f& position,
   if (!moving_tracer_) {
     return false;
   }
-  // Only where the line to the sun passes the sphere around all movers.
+  // The ray to the sun must pass within the sphere around all movers.
   const Eigen::Vector3f to_centre = centre_ - position;
   const float along = to_centre.dot(direction_to_sun);
   if (along < -radius_m_ || (to_centre - along * direction_to_sun).squaredNorm() > radius_m_ * radius_m_) {

@@ -7,24 +7,24 @@
 
 namespace vcharge {
 
-/// A scene at one time: its fixed mesh, and its movers as they stand then. The movers' triangles count on
-/// after those of the fixed mesh. Queries are thread safe.
+/// A scene at one time: its static mesh and the movers' meshes. The movers' triangles are numbered after
+/// those of the static mesh. Queries are thread safe.
 class SceneInstant {
  public:
-  /// `fixed` is over scene.mesh; both must outlive this.
+  /// `fixed` traces scene.mesh; both arguments must outlive this object.
   SceneInstant(const Scene& scene, const RayTracer& fixed, double time_s);
   SceneInstant(const SceneInstant&) = delete;
   SceneInstant& operator=(const SceneInstant&) = delete;
 
-  /// The movers' triangles in the world frame.
+  /// Triangles of the movers in the world frame.
   const TriangleMesh& moving() const { return moving_; }
 
-  /// First surface along each active ray.
+  /// Finds the first surface along each active ray.
   void intersect(const int* active, RTCRayHit16* rays) const;
-  /// As Embree: sets tfar of the active rays that meet anything below zero.
+  /// Sets tfar of the active rays that are occluded to a negative value, as Embree does.
   void findOccluded(const int* active, RTCRay4* rays) const;
   bool cast(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, RayTracer::Hit* hit) const;
-  /// Whether a mover stands between a place and the sun.
+  /// True if a mover occludes the sun.
   bool isShadowedByMover(const Eigen::Vector3f& position, const Eigen::Vector3f& direction_to_sun) const;
 
  private:
@@ -32,7 +32,7 @@ class SceneInstant {
   const uint32_t num_fixed_triangles_;
   TriangleMesh moving_;
   std::optional<RayTracer> moving_tracer_;
-  Eigen::Vector3f centre_ = Eigen::Vector3f::Zero();  // of a sphere around all movers
+  Eigen::Vector3f centre_ = Eigen::Vector3f::Zero();  // sphere around all movers
   float radius_m_ = 0.0F;
 };
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kSmallTreeLeaf_m = 0.12;
-constexpr double kTallTreeLeaf_m = 0.17;  // times the tree's scale
+constexpr double kTallTreeLeaf_m = 0.17;  // multiplied by the scale of the tree
 constexpr std::array<double, kNumPaints> kPaints = {0.025, 0.07, 0.18, 0.4, 0.72};
 
 }  // namespace
@@ -84,7 +84,7 @@ void SceneParts::addMaterials() {
   leaves.kind = SurfaceKind::kPlant;
   leaves.two_sided = true;
   leaves.translucency = 0.35F;
-  // One tone per leaf: u is random, and the level of detail must not average the tones.
+  // Each leaf has one tone (u is random), so the level of detail must not average the texture.
   leaves.texels_per_m = 0.0F;
   cv::Mat tones(1, 64, CV_8UC1);
   for (int i = 0; i < tones.cols; ++i) {
@@ -124,7 +124,7 @@ void SceneParts::addIsland(const GroundRectangle& area, uint32_t ground, double 
       const size_t first = scene_->mesh.vertices.size();
       addBox(pose, Eigen::Vector3d(length - 0.01, kKerbWidth_m, kKerbHeight_m + 0.012).cast<float>(),
              concrete_, &scene_->mesh);
-      // Each stone shows another part of the texture.
+      // Each stone shows a different part of the texture.
       const auto shift = static_cast<float>(random_.uniform(0.0, 0.8));
       for (size_t v = first; v < scene_->mesh.vertices.size(); ++v) {
         scene_->mesh.vertices[v].u = shift + 0.2F * scene_->mesh.vertices[v].u;
@@ -285,14 +285,13 @@ void SceneParts::addPoles(const std::vector<Pole>& poles) {
 }
 
 void SceneParts::addBins(const std::vector<Bin>& bins) {
-  const uint32_t bin = textured(SurfaceKind::kOther, noiseImage(64, 64, 0.16, 0.3, 0.1, 0.3), 80.0);
-  for (const Bin& place : bins) {
-    const double z = place.z;
-    addBox(placement(place.x, place.y, z + 0.5, place.yaw_rad), {0.55F, 0.6F, 1.0F}, bin, &scene_->mesh);
-    addBox(placement(place.x, place.y, z + 1.03, place.yaw_rad), {0.6F, 0.66F, 0.07F}, dark_metal_,
-           &scene_->mesh);
+  const uint32_t material = textured(SurfaceKind::kOther, noiseImage(64, 64, 0.16, 0.3, 0.1, 0.3), 80.0);
+  for (const Bin& bin : bins) {
+    const double z = bin.z;
+    addBox(placement(bin.x, bin.y, z + 0.5, bin.yaw_rad), {0.55F, 0.6F, 1.0F}, material, &scene_->mesh);
+    addBox(placement(bin.x, bin.y, z + 1.03, bin.yaw_rad), {0.6F, 0.66F, 0.07F}, dark_metal_, &scene_->mesh);
     scene_->obstacles.push_back(
-        {"bin", orientedRectangle(place.x, place.y, place.yaw_rad, -0.3, 0.3, 0.33), z, z + 1.06});
+        {"bin", orientedRectangle(bin.x, bin.y, bin.yaw_rad, -0.3, 0.3, 0.33), z, z + 1.06});
   }
 }
 

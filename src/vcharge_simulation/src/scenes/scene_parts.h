@@ -15,17 +15,17 @@
 namespace vcharge {
 
 std::vector<Eigen::Vector2d> cornersOf(const GroundRectangle& area);
-/// Of a rectangle along `yaw_rad` around (x, y), counter-clockwise.
+/// Corners of a rectangle with yaw about (x, y), counter-clockwise.
 std::vector<Eigen::Vector2d> orientedRectangle(double x, double y, double yaw_rad, double min_along,
                                                double max_along, double half_width);
 std::vector<Eigen::Vector2d> circleAround(double x, double y, double radius);
 
-/// Puts things into a scene: each with its triangles, its materials and its entry among the obstacles. What
-/// builders of different scenes share; the random numbers depend on the order of the calls.
+/// Adds objects to a scene, each with triangles, materials and obstacles. Used by the builders of all scenes.
+/// Random numbers depend on the order of the calls.
 class SceneParts {
  public:
-  /// Makes an empty scene and the materials of plants, kerbs and metal. `foliage_density`: leaves over the
-  /// default.
+  /// Creates an empty scene with the materials of plants, kerbs and metal. `foliage_density` scales the
+  /// number of leaves.
   SceneParts(uint64_t random_seed, double foliage_density);
 
   Scene& scene() { return *scene_; }
@@ -38,11 +38,11 @@ class SceneParts {
   uint32_t plain(SurfaceKind kind, double albedo, double reflectivity = 0.0);
   uint32_t textured(SurfaceKind kind, const cv::Mat& image, double texels_per_m, double reflectivity = 0.0,
                     Texture::Border border = Texture::Border::kClamp);
-  /// CV_8UC1 of fractal noise around `mean`.
+  /// Fractal noise around `mean`, CV_8UC1.
   cv::Mat noiseImage(int width, int height, double mean, double contrast, double scale_x, double scale_y);
 
   void addLevel(const GroundRectangle& area, double z, uint32_t material);
-  /// A raised area with a kerb of stones around it.
+  /// A raised area surrounded by kerb stones.
   void addIsland(const GroundRectangle& area, uint32_t ground, double base_z_m = 0.0);
   void addCars(const std::vector<ParkedCar>& cars);
   void addTrees(const std::vector<Tree>& trees, uint64_t seed);
@@ -54,9 +54,9 @@ class SceneParts {
   void addPoles(const std::vector<Pole>& poles);
   void addBins(const std::vector<Bin>& bins);
   void addFence(const Fence& fence);
-  /// Woods and roofs far away: a ring with a ragged upper edge.
+  /// Distant woods and roofs: a ring with an irregular upper edge.
   void addSkyline();
-  /// Walls of addHouses, for bakeWallLight.
+  /// Walls added by addHouses, for bakeWallLight.
   const std::vector<Wall>& walls() const { return walls_; }
 
  private:

@@ -44,15 +44,15 @@ TEST_P(SceneTest, SameBytesOnAnyNumberOfThreads) {
   EXPECT_EQ(cv::norm(render(1), render(4), cv::NORM_INF), 0.0);
 }
 
-double groundAt(const Scene& scene, const Eigen::Vector2d& place_m) {
-  return scene.ground_height ? scene.ground_height(place_m.x(), place_m.y()) : 0.0;
+double groundAt(const Scene& scene, const Eigen::Vector2d& position_m) {
+  return scene.ground_height ? scene.ground_height(position_m.x(), position_m.y()) : 0.0;
 }
 
 TEST_P(SceneTest, WhatStandsOutOfTheGroundBelongsToAnObstacle) {
   const Scene& scene = renderer().scene();
   const TruthHeightMap map = computeHeightMap(renderer(), kCell_m, 2.4);
-  // Footprints drawn on the grid, grown by the reach of leaves and mirrors; walls around the scene stand on
-  // its border.
+  // Footprints on the grid, dilated by the reach of leaves and mirrors. Walls around the scene stand on its
+  // border.
   cv::Mat covered = cv::Mat::zeros(map.height_m.size(), CV_8UC1);
   cv::rectangle(covered, cv::Rect(0, 0, covered.cols, covered.rows), cv::Scalar(255), 3);
   for (const Obstacle& obstacle : scene.obstacles) {
@@ -68,8 +68,8 @@ TEST_P(SceneTest, WhatStandsOutOfTheGroundBelongsToAnObstacle) {
   int unexplained = 0;
   for (int row = 0; row < map.height_m.rows; ++row) {
     for (int column = 0; column < map.height_m.cols; ++column) {
-      const Eigen::Vector2d place_m = map.origin_m + kCell_m * Eigen::Vector2d(column, row);
-      const double height_m = map.height_m.at<float>(row, column) - groundAt(scene, place_m);
+      const Eigen::Vector2d position_m = map.origin_m + kCell_m * Eigen::Vector2d(column, row);
+      const double height_m = map.height_m.at<float>(row, column) - groundAt(scene, position_m);
       if (height_m > 0.3 && height_m < 1.4) {
         ++standing;
         unexplained += covered.at<uint8_t>(row, column) == 0 ? 1 : 0;
@@ -129,7 +129,7 @@ cv::Mat_<cv::Point2f> outlineOf(const std::vector<Eigen::Vector2d>& footprint_m)
   return outline;
 }
 
-// Names of what the own car would touch on a drive of the given scene.
+// Obstacles that the own car would touch on a drive.
 std::set<std::string> touchedOn(const DrivePlan& plan, const std::vector<Obstacle>& obstacles) {
   constexpr double kMirror_m = 0.1;
   const CarShape& golf = carShapes().front();
@@ -140,9 +140,9 @@ std::set<std::string> touchedOn(const DrivePlan& plan, const std::vector<Obstacl
   std::set<std::string> touched;
   const VehicleMotion motion(plan.path, plan.motion, 1, plan.ground_height);
   for (int ms = 0; ms < static_cast<int>(motion.duration() * 1000.0); ms += 250) {
-    const RigidTransform place = motion.at(ms).world_from_planar;
+    const RigidTransform pose = motion.at(ms).world_from_planar;
     const cv::Mat_<cv::Point2f> own = outlineOf(
-        orientedRectangle(place.translation().x(), place.translation().y(), yawOfRotation(place.rotation()),
+        orientedRectangle(pose.translation().x(), pose.translation().y(), yawOfRotation(pose.rotation()),
                           golf.rear(), golf.front(), 0.5 * golf.width + kMirror_m));
     for (size_t i = 0; i < outlines.size(); ++i) {
       const cv::Point2f corner = outlines[i](0);
@@ -167,12 +167,12 @@ TEST_P(SceneTest, DrivesKeepClearOfAllThatStands) {
   }
 }
 
-// Parked cars are all that differs between the lots of different seeds and days on the lanes and bays.
+// On lanes and bays, lots with different seeds and days differ only in the parked cars.
 TEST(CatalogueTest, DrivesOfTheLotKeepClearOfParkedCarsForEverySeed) {
   for (uint64_t seed = 1; seed <= 12; ++seed) {
     for (const int day : {0, 1}) {
       std::vector<Obstacle> cars;
-      for (const ParkedCar& car : makeLotLayout(seed, day, 0.3).cars) {
+      for (const ParkedCar& car : makeLotLayout(seed, day).cars) {
         const CarShape& shape = carShapes()[static_cast<size_t>(car.shape)];
         cars.push_back(
             {"car",
@@ -205,7 +205,7 @@ TEST(SlopeTest, ParkedCarsStandOnTheGroundWithAllFourWheels) {
     const Eigen::Vector2d middle = 0.5 * (obstacle.footprint_m[0] + obstacle.footprint_m[2]);
     const Eigen::Vector2d along = 0.5 * (obstacle.footprint_m[1] - obstacle.footprint_m[0]);
     const Eigen::Vector2d across = 0.5 * (obstacle.footprint_m[3] - obstacle.footprint_m[0]);
-    // Over the ground, of the lowest part of each quarter of the car: a tyre.
+    // Lowest vertex in each quarter of the car, relative to the ground: a tyre.
     std::map<std::pair<bool, bool>, double> lowest_m;
     for (const uint32_t index : of_cars) {
       const Eigen::Vector3d vertex = scene.mesh.vertices[index].position.cast<double>();
@@ -243,14 +243,14 @@ TEST(MoverTest, ChangesTheRangeOnlyWhereItsFootprintsAre) {
       if (before_m == after_m || (std::isnan(before_m) && std::isnan(after_m))) {
         continue;
       }
-      // The walker is what is nearer.
+      // The walker is in the image with the smaller range.
       const bool is_before = std::isnan(after_m) || before_m < after_m;
       const double range_m = is_before ? before_m : after_m;
-      const Eigen::Vector3d place = world_from_camera * (range_m * view.centreRay(x, y).cast<double>());
+      const Eigen::Vector3d position = world_from_camera * (range_m * view.centreRay(x, y).cast<double>());
       const MoverState state = walker.stateAt(kTimes_s[is_before ? 0 : 1]);
-      const double reach_m = (place - state.world_from_mover.translation()).head<2>().norm();
-      EXPECT_LT(reach_m, 0.75);  // a stride
-      EXPECT_LT(place.z(), state.obstacle.top_z_m + 0.05);
+      const double reach_m = (position - state.world_from_mover.translation()).head<2>().norm();
+      EXPECT_LT(reach_m, 0.75);  // half a stride
+      EXPECT_LT(position.z(), state.obstacle.top_z_m + 0.05);
       ++changed;
     }
   }
@@ -272,7 +272,7 @@ TEST(MoverTest, CameraSeesTheSquaresOfTheBoardWhereItsPoseSays) {
     double bright = 0.0;
     for (int row = 0; row < 7; ++row) {
       for (int column = 0; column < 10; ++column) {
-        // The board's origin is the first inner corner.
+        // The origin of the board is its first inner corner.
         const Eigen::Vector3d middle(0.1 * column - 0.05, 0.1 * row - 0.05, 0.0);
         Eigen::Vector2d pixel;
         ASSERT_TRUE(view.camera().model.project(camera_from_board * middle, &pixel));

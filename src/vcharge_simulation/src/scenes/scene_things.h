@@ -15,19 +15,19 @@ struct GroundRectangle {
 
 inline constexpr double kKerbHeight_m = 0.12;
 
-// Tree::variant: small trees come first, then tall ones.
+// Values of Tree::variant below kNumSmallTrees are small trees, the others tall ones.
 constexpr int kNumSmallTrees = 4;
 constexpr int kNumTallTrees = 3;
 
-/// Things that stand in a scene: metres, x and y in the world, z of their foot.
+/// Objects of a scene. Metres; x and y in the world frame, z of the lowest point.
 struct ParkedCar {
-  double x, y, yaw_rad;  ///< rear axle
-  int shape;             ///< into carShapes()
-  int paint;             ///< 0 to kNumPaints - 1, dark to bright
-  uint32_t seed;         ///< of its number plate
+  double x, y, yaw_rad;  ///< of the rear axle
+  int shape;             ///< index into carShapes()
+  int paint;             ///< 0 to kNumPaints - 1, from dark to bright
+  uint32_t seed;         ///< for the number plate
   double z = 0.0;
-  double pitch_rad = 0.0;  ///< of the ground along the car: positive where its nose points down
-  double roll_rad = 0.0;   ///< positive where its left side is up
+  double pitch_rad = 0.0;  ///< slope of the ground along the car, positive if the nose points down
+  double roll_rad = 0.0;   ///< positive if the left side is higher
 };
 inline constexpr int kNumPaints = 5;
 struct Tree {

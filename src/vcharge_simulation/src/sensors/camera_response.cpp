@@ -6,7 +6,6 @@
 #include <cstring>
 
 #include "vcharge_core/base/error.h"
-#include "vcharge_core/base/options.h"
 #include "vcharge_simulation/rendering/noise.h"
 
 namespace vcharge {
@@ -16,7 +15,7 @@ namespace {
 constexpr int kTableSize = 8192;
 constexpr int kNormalTableBits = 12;
 
-// Quantiles of the normal distribution by bisection of its distribution function.
+// Quantiles of the normal distribution, by bisection of its distribution function.
 std::vector<float> makeNormalTable() {
   std::vector<float> table(1U << kNormalTableBits);
   for (size_t i = 0; i < table.size(); ++i) {
@@ -34,40 +33,31 @@ std::vector<float> makeNormalTable() {
 
 }  // namespace
 
-void CameraResponseOptions::validate() const {
-  requireField(exposure > 0.0, "exposure", "must be positive", exposure);
-  requireField(shoulder > 0.0, "shoulder", "must be positive", shoulder);
-  requireField(gamma > 0.0 && gamma <= 1.0, "gamma", "must be in (0, 1]", gamma);
-  requireField(photon_noise >= 0.0, "photon_noise", "must not be negative", photon_noise);
-  requireField(read_noise >= 0.0, "read_noise", "must not be negative", read_noise);
-}
-
-CameraResponse::CameraResponse(const CameraResponseOptions& options) : options_(options) {
-  options.validate();
+CameraResponse::CameraResponse() {
   gray_by_root_light_.resize(kTableSize + 1);
   for (int i = 0; i <= kTableSize; ++i) {
     const double root = static_cast<double>(i) / kTableSize;
     gray_by_root_light_[static_cast<size_t>(i)] =
-        static_cast<uint8_t>(std::lround(grayFromLight(root * root / options_.exposure)));
+        static_cast<uint8_t>(std::lround(grayFromLight(root * root / kExposure)));
   }
 }
 
 double CameraResponse::grayFromLight(double light) const {
-  const double x = std::max(0.0, light * options_.exposure);
-  const double w = options_.shoulder;
-  return 255.0 * std::pow(std::min(1.0, x * (1.0 + w) / (x + w)), options_.gamma);
+  const double x = std::max(0.0, light * kExposure);
+  const double w = kShoulder;
+  return 255.0 * std::pow(std::min(1.0, x * (1.0 + w) / (x + w)), kGamma);
 }
 
 double CameraResponse::lightFromGray(double gray) const {
-  const double y = std::pow(std::clamp(gray / 255.0, 0.0, 1.0), 1.0 / options_.gamma);
-  const double w = options_.shoulder;
-  return y * w / (1.0 + w - y) / options_.exposure;
+  const double y = std::pow(std::clamp(gray / 255.0, 0.0, 1.0), 1.0 / kGamma);
+  const double w = kShoulder;
+  return y * w / (1.0 + w - y) / kExposure;
 }
 
 cv::Mat CameraResponse::develop(const cv::Mat& light) const {
   check(light.type() == CV_32FC1, "CameraResponse::develop: expected CV_32FC1");
   cv::Mat gray(light.size(), CV_8UC1);
-  const auto exposure = static_cast<float>(options_.exposure);
+  const auto exposure = static_cast<float>(kExposure);
   for (int y = 0; y < light.rows; ++y) {
     const float* in = light.ptr<float>(y);
     uint8_t* out = gray.ptr(y);
@@ -98,10 +88,8 @@ cv::Mat CameraResponse::addNoise(const cv::Mat& clean, uint64_t seed, int camera
   std::array<float, 256> deviation{};
   for (int gray = 0; gray < 256; ++gray) {
     const double light = gain * lightFromGray(gray);
-    const double exposed = light * options_.exposure;
-    const double sigma_light =
-        std::sqrt(options_.photon_noise * exposed + options_.read_noise * options_.read_noise) /
-        options_.exposure;
+    const double exposed = light * kExposure;
+    const double sigma_light = std::sqrt(kPhotonNoise * exposed + kReadNoise * kReadNoise) / kExposure;
     const double value = grayFromLight(light);
     const double slope =
         (grayFromLight(light + sigma_light) - grayFromLight(std::max(0.0, light - sigma_light))) /
@@ -109,7 +97,7 @@ cv::Mat CameraResponse::addNoise(const cv::Mat& clean, uint64_t seed, int camera
     mean[static_cast<size_t>(gray)] = static_cast<float>(value);
     deviation[static_cast<size_t>(gray)] = static_cast<float>(slope * sigma_light);
   }
-  // One key per image, then one hash per pixel: every pixel's noise depends on nothing but its place.
+  // One key per image and one hash per pixel: noise depends only on the arguments and the pixel's position.
   Random key_source(seed * 0x9E3779B97F4A7C15ULL + static_cast<uint64_t>(frame) * 64U +
                     static_cast<uint64_t>(camera));
   const auto key = static_cast<uint32_t>(key_source.bits());

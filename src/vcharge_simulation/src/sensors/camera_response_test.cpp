@@ -26,19 +26,19 @@ TEST(CameraResponseTest, NoiseDependsOnSeedCameraAndFrameOnly) {
 }
 
 TEST(CameraResponseTest, NoiseHasTheVarianceOfPhotonsAndReadout) {
-  CameraResponseOptions options;
-  const CameraResponse response(options);
+  const CameraResponse response;
   for (const int gray : {40, 90, 160}) {
     const cv::Mat noisy = response.addNoise(cv::Mat(200, 300, CV_8UC1, cv::Scalar(gray)), 7, 0, 0);
     cv::Scalar mean, deviation;
     cv::meanStdDev(noisy, mean, deviation);
     const double light = response.lightFromGray(gray);
     const double slope = (response.grayFromLight(light + 1e-5) - response.grayFromLight(light - 1e-5)) / 2e-5;
-    const double exposed = options.exposure * light;
-    const double sigma = slope / options.exposure *
-                         std::sqrt(options.photon_noise * exposed + options.read_noise * options.read_noise);
+    const double exposed = CameraResponse::kExposure * light;
+    const double sigma = slope / CameraResponse::kExposure *
+                         std::sqrt(CameraResponse::kPhotonNoise * exposed +
+                                   CameraResponse::kReadNoise * CameraResponse::kReadNoise);
     EXPECT_NEAR(mean[0], gray, 0.15);
-    // Rounding to whole gray levels adds a twelfth.
+    // Rounding to whole gray levels adds a variance of 1/12.
     EXPECT_NEAR(deviation[0], std::sqrt(sigma * sigma + 1.0 / 12.0), 0.06 * sigma + 0.02);
   }
 }

@@ -15,13 +15,13 @@ namespace vcharge {
 
 namespace {
 
-// A rotated grid: four samples in four rows and four columns of the pixel.
+// Rotated grid: four samples in four different rows and columns of the pixel.
 constexpr std::array<std::array<double, 2>, 4> kSampleOffsets = {
     {{-0.125, -0.375}, {0.375, -0.125}, {-0.375, 0.125}, {0.125, 0.375}}};
-// The rim of the image circle fades over this angle inside the field of view.
+// Width of the fading rim of the image circle.
 constexpr double kRimFade_rad = 0.045;
 constexpr double kFullWidth_px = 1280.0;
-// The lens blurs the own car over its outline.
+// The lens blurs the own car beyond its outline.
 constexpr int kMaskMargin_px = 2;
 
 float lensTransmission(double cos_angle, double angle_rad, double half_field_of_view_rad) {
@@ -109,7 +109,7 @@ void CameraView::computePixelAngles() {
       if (ray.isZero()) {
         continue;
       }
-      // Towards the image's centre, where there certainly is a neighbour.
+      // Towards the image centre, where a neighbour always exists.
       const Eigen::Vector3f beside = centreRay(x + (x < size().width / 2 ? 1 : -1), y);
       const Eigen::Vector3f below = centreRay(x, y + (y < size().height / 2 ? 1 : -1));
       pixel_angle_rad_[static_cast<size_t>(y) * size().width + x] =

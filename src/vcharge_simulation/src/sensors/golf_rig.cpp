@@ -14,9 +14,8 @@ constexpr double kFieldOfView_rad = 3.2289;
 constexpr double kPi = 3.14159265358979323846;
 const cv::Size kFullSize(1280, 800);
 
-// The left mirror camera of the V-Charge car: lens, attitude, and place along the car and above the ground.
-// Its published place across the car (1.40 m) is relative to an origin that is not in the middle of the car;
-// the mirror of a Golf is 0.98 m from it.
+// Left mirror camera of the V-Charge car. Its published lateral position (1.40 m) refers to an origin off the
+// car's middle plane, so the mirror of a Golf (0.98 m) is used instead.
 constexpr double kXi = 1.1584422115726898;
 constexpr double kGamma1 = 895.54818314068166;
 constexpr double kGamma2 = 894.74426130897348;
@@ -36,8 +35,9 @@ Eigen::Matrix3d leftRotation() {
   return rotation;
 }
 
-// Optical axis turned by yaw from straight ahead and by pitch below the horizon; image rows level.
-Eigen::Matrix3d lookingRotation(double yaw_rad, double down_rad) {
+// Camera whose optical axis has a yaw from straight ahead and a pitch below the horizon, with level image
+// rows.
+Eigen::Matrix3d rotationTowards(double yaw_rad, double down_rad) {
   const Eigen::Vector3d z(std::cos(down_rad) * std::cos(yaw_rad), std::cos(down_rad) * std::sin(yaw_rad),
                           -std::sin(down_rad));
   const Eigen::Vector3d x(std::sin(yaw_rad), -std::cos(yaw_rad), 0.0);
@@ -65,7 +65,7 @@ MeiCamera makeLens(double scale, Random* random) {
   const auto about = [&](double value, double spread) { return value + random->uniform(-spread, spread); };
   parameters << about(kXi, 0.008), about(kGamma1, 3.0), about(kGamma2, 3.0), about(kU0, 5.0), about(kV0, 4.0),
       about(kK1, 0.004), about(kK2, 0.003), about(kP1, 0.0005), about(kP2, 0.0005);
-  // Pixel centres are whole numbers: coordinates count from half a pixel outside the image.
+  // Pixel centres have integer coordinates, so the image starts at -0.5.
   parameters[1] *= scale;
   parameters[2] *= scale;
   parameters[3] = (parameters[3] + 0.5) * scale - 0.5;
@@ -84,9 +84,9 @@ CameraRig makeGolfRig(uint64_t seed, double image_scale) {
   const Eigen::Matrix3d mirror_camera = Eigen::Vector3d(-1.0, 1.0, 1.0).asDiagonal();
   const Eigen::Matrix3d right = mirror_vehicle * leftRotation() * mirror_camera;
   const std::vector<std::pair<std::string, RigidTransform>> mountings = {
-      {"front", disturbed(lookingRotation(0.0, 0.35), {3.6, 0.0, 0.6}, &random)},
+      {"front", disturbed(rotationTowards(0.0, 0.35), {3.6, 0.0, 0.6}, &random)},
       {"left", RigidTransform(Eigen::Quaterniond(leftRotation()), kLeftTranslation_m)},
-      {"rear", disturbed(lookingRotation(kPi, 0.45), {-0.9, 0.0, 0.8}, &random)},
+      {"rear", disturbed(rotationTowards(kPi, 0.45), {-0.9, 0.0, 0.8}, &random)},
       {"right", disturbed(right, mirror_vehicle * kLeftTranslation_m, &random)}};
   CameraRig rig;
   for (const auto& [name, vehicle_from_camera] : mountings) {

@@ -14,7 +14,7 @@ namespace vcharge {
 
 namespace {
 
-// Poses of the same drive agree to the last bits that a message holds.
+// Positions of the same drive agree to the precision of the message.
 constexpr double kSamePose_m = 1e-9;
 
 class RenderedImages : public ImageSource {
@@ -78,7 +78,7 @@ class RecordedImages : public ImageSource {
     }
     const Image image = toImage(message, recorded.source());
     checkImageSize(rig_.cameras[camera], image.pixels.size(), recorded.source());
-    return image.pixels.clone();  // the view ends with its message
+    return image.pixels.clone();  // the view refers to the message
   }
 
  private:
@@ -100,8 +100,8 @@ class RecordedImages : public ImageSource {
   const CameraRig& rig_;
   const SimulatedDrive& drive_;
   BagReader bag_;
-  std::vector<std::vector<BagEntry>> entries_;  // by camera
-  std::vector<size_t> next_;                    // by camera
+  std::vector<std::vector<BagEntry>> entries_;  // per camera
+  std::vector<size_t> next_;                    // per camera
 };
 
 }  // namespace

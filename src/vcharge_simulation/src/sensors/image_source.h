@@ -11,22 +11,22 @@
 
 namespace vcharge {
 
-/// Hands out the noise-free images of a drive, frame by frame and in each frame camera by camera.
+/// Noise-free images of a drive, to be read frame by frame and, within a frame, camera by camera.
 class ImageSource {
  public:
   virtual ~ImageSource() = default;
   virtual cv::Mat image(size_t camera, size_t frame) = 0;
 };
 
-/// Renders the images; the arguments must outlive the source. Things that move stand still during an
-/// exposure. `scene_times_s`: one per frame.
+/// Renders the images; the arguments must outlive the source. Movers do not move during an exposure.
+/// `scene_times_s` has one entry per frame.
 std::unique_ptr<ImageSource> renderImages(const Renderer& renderer, const RecordedCameras& cameras,
                                           const CameraResponse& response, const SimulatedDrive& drive,
                                           const std::vector<double>& scene_times_s,
                                           const MotionBlurFault& blur);
 
-/// Takes the images of a bag; the arguments must outlive the source. InputError, also while reading, for a
-/// bag that cannot be read or is not one of the same drive and cameras.
+/// Reads the images of a bag; the arguments must outlive the source. Throws InputError, also while reading,
+/// if the bag cannot be read or is of another drive or of other cameras.
 std::unique_ptr<ImageSource> readImages(const std::string& bag, const CameraRig& rig,
                                         const SimulatedDrive& drive);
 

@@ -6,31 +6,26 @@
 #include <tbb/parallel_for.h>
 
 #include "vcharge_core/base/error.h"
-#include "vcharge_core/base/options.h"
 
 namespace vcharge {
 
 namespace {
 
-// A step of the kernel [a, 1 - 2 a, a] adds a variance of 2 a; at a = 1/4 it removes the finest pattern
-// altogether, beyond that it would turn it over.
+// A step with the kernel [a, 1 - 2 a, a] adds the variance 2 a. At a = 1/4 it removes the highest frequency;
+// above, it would invert it.
 constexpr double kMaxSpread = 0.25;
 constexpr double kHalfPi = 1.57079632679489661923;
 
 }  // namespace
 
-void LensOptions::validate() const {
-  requireField(blur_axis_px >= 0.0 && blur_axis_px <= LensBlur::kMaxSigma_px, "blur_axis_px",
-               "must be in [0, 1.4]", blur_axis_px);
-  requireField(blur_rim_px >= blur_axis_px && blur_rim_px <= LensBlur::kMaxSigma_px, "blur_rim_px",
-               "must be in [blur_axis_px, 1.4]", blur_rim_px);
-  requireField(veil >= 0.0 && veil < 1.0, "veil", "must be in [0, 1)", veil);
+void LensOptions::checkFields() const {
+  requireField(blur_rim_px >= blur_axis_px, "blur_rim_px", "must be at least blur_axis_px", blur_rim_px);
 }
 
 double LensOptions::blurAt(double angle_rad, double image_scale) const {
-  const double share = std::min(1.2, std::pow(angle_rad / kHalfPi, 1.5));
+  const double fraction = std::min(1.2, std::pow(angle_rad / kHalfPi, 1.5));
   return std::min(LensBlur::kMaxSigma_px,
-                  image_scale * (blur_axis_px + (blur_rim_px - blur_axis_px) * share));
+                  image_scale * (blur_axis_px + (blur_rim_px - blur_axis_px) * fraction));
 }
 
 LensBlur::LensBlur(const cv::Mat& sigma_px) {

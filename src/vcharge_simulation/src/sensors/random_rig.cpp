@@ -14,11 +14,11 @@ constexpr double kMaxShift_m = 0.1;
 constexpr double kMaxTurn_rad = 10.0 * kDegree;
 constexpr double kMeiView_rad = 185.0 * kDegree;
 constexpr double kKannalaBrandtView_rad = 190.0 * kDegree;
-// Of 1280x800 images.
+// For 1280x800 images.
 constexpr double kCentreX_px = 639.5;
 constexpr double kCentreY_px = 399.5;
-// The golf's lens has 634. With the largest shift of the principal point and the tangential distortion the
-// circle still ends inside the image.
+// The Golf's lens has 634. These circles fit the image even with the largest shift of the principal point and
+// the tangential distortion.
 constexpr double kMinCircleRadius_px = 590.0;
 constexpr double kMaxCircleRadius_px = 628.0;
 
@@ -38,8 +38,7 @@ Eigen::Vector3d inBall(double radius, Random* random) {
   return radius * point;
 }
 
-// Where the optical axis meets the image, in pixels of the scaled image. Pixel centres are whole numbers:
-// coordinates count from half a pixel outside the image.
+// Principal point in the scaled image. Pixel centres have integer coordinates, so the image starts at -0.5.
 Eigen::Vector2d principalPoint(double scale, Random* random) {
   const double u0 = kCentreX_px + random->uniform(-5.0, 5.0);
   const double v0 = kCentreY_px + random->uniform(-5.0, 5.0);
@@ -49,8 +48,9 @@ Eigen::Vector2d principalPoint(double scale, Random* random) {
 Lens makeMeiLens(double scale, Random* random) {
   const double half_view_rad = 0.5 * kMeiView_rad;
   const double xi = random->uniform(0.9, 1.6);
-  // Fisheye lenses lie between the equisolid and the equidistant projection: the distortion brings the rim of
-  // the unified projection there, as a share of its radius, the rest of it following in even powers.
+  // Fisheye lenses lie between the equisolid and the equidistant projection. The radial distortion scales the
+  // rim of the unified projection to such a radius; `shrinkage` is the relative change at the rim, split
+  // between the second and the fourth power.
   const double rim = std::sin(half_view_rad) / (std::cos(half_view_rad) + xi);
   const double target = random->uniform(1.50, half_view_rad);
   const double shrinkage = target / (rim * (1.0 + xi)) - 1.0;
@@ -69,7 +69,7 @@ Lens makeMeiLens(double scale, Random* random) {
 }
 
 Lens makeKannalaBrandtLens(double scale, Random* random) {
-  // k1 = -1/24 is the first term of the equisolid projection, 0 the equidistant one.
+  // k1 = -1/24 is the first term of the equisolid projection, 0 that of the equidistant one.
   const double k1 = random->uniform(-0.04, 0.0);
   const double k2 = random->uniform(-0.002, 0.002);
   const double k3 = random->uniform(-0.0005, 0.0005);
@@ -85,7 +85,7 @@ Lens makeKannalaBrandtLens(double scale, Random* random) {
   return {KannalaBrandtCamera(parameters), kKannalaBrandtView_rad};
 }
 
-// Moves and turns a camera; it never moves towards the car's middle plane or middle, where the body is.
+// Moves and rotates a camera, but never towards the body of the car.
 RigidTransform moved(const std::string& name, const RigidTransform& vehicle_from_camera, Random* random) {
   Eigen::Vector3d shift_m = inBall(kMaxShift_m, random);
   const Eigen::Quaterniond turn = rotationFromVector(inBall(kMaxTurn_rad, random));
@@ -99,7 +99,7 @@ RigidTransform moved(const std::string& name, const RigidTransform& vehicle_from
 
 CameraRig makeRandomRig(uint64_t seed, double image_scale) {
   CameraRig rig = makeGolfRig(seed, image_scale);
-  // Another sequence than the one that made the Golf's rig.
+  // Independent of the random sequence of the Golf's rig.
   Random random(seed ^ 0xD1B54A32D192ED03ULL);
   for (RigCamera& camera : rig.cameras) {
     camera.vehicle_from_camera = moved(camera.name, *camera.vehicle_from_camera, &random);

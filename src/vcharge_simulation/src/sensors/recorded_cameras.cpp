@@ -10,22 +10,21 @@ namespace vcharge {
 
 namespace {
 
-// Finds cameras of faults that would silently do nothing.
-struct CameraNameChecker {
-  const CameraRig& rig;
-  template <class Fault>
-  void operator()(const char* name, const Fault& fault) const {
+// Rejects cameras of faults that would silently have no effect.
+void checkCamerasOfFaults(const FaultOptions& faults, const CameraRig& rig) {
+  forEachOption(faults, [&](const OptionDeclaration& option, const auto& fault) {
+    using Fault = std::decay_t<decltype(fault)>;
     if constexpr (std::is_base_of_v<CameraFault, Fault>) {
       const bool all_allowed = !std::is_same_v<Fault, SwappedCamerasFault>;
       for (const std::string& camera : fault.cameras) {
         if (rig.findCamera(camera) < 0 && !(all_allowed && camera == "all")) {
-          throw InputError("faults." + std::string(name) + ".cameras: expected recorded cameras" +
+          throw InputError("faults." + std::string(option.name) + ".cameras: expected recorded cameras" +
                            (all_allowed ? " or all" : "") + ", got '" + camera + "'");
         }
       }
     }
-  }
-};
+  });
+}
 
 RigCamera bumped(RigCamera camera, const BumpedCameraFault& fault) {
   if (fault.actsOn(camera.name)) {
@@ -54,7 +53,7 @@ RecordedCameras::RecordedCameras(const DriveScenario& scenario, const std::strin
     rig_.cameras.push_back(whole.cameras[index]);
     indices_.push_back(static_cast<int>(index));
   }
-  faults_.visitFields(CameraNameChecker{rig_});
+  checkCamerasOfFaults(faults_, rig_);
   const auto body = makeGolfBody();
   for (RigCamera& camera : rig_.cameras) {
     views_.emplace_back(camera, body, scenario.lens);

@@ -48,7 +48,7 @@ TEST(RecordedCamerasTest, BumpTurnsTheCameraByItsAngleFromItsTimeOn) {
     EXPECT_EQ(mounting(i, kBefore).matrix() == mounting(i, kAfter).matrix(), i != left);
     EXPECT_EQ(cv::norm(after.cameras[i].mask, cameras.rig().cameras[i].mask, cv::NORM_INF) > 0.0, i == left);
   }
-  // Every pixel looks into a direction that is turned by the same rotation.
+  // Every ray of a pixel is rotated by the same angle.
   Eigen::Vector3d ray;
   ASSERT_TRUE(after.cameras[left].model.unproject(Eigen::Vector2d(64.0, 40.0), &ray));
   const Eigen::Vector3d seen_before = truth.rotation() * ray;

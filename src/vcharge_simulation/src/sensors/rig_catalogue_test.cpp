@@ -62,7 +62,7 @@ TEST(RandomRigTest, CamerasAreMountedWithinTenCentimetresAndTenDegreesOfTheGolfs
   }
   EXPECT_LE(largest_shift_m, 0.1);
   EXPECT_LE(largest_turn_rad, 10.0 * kDegree);
-  // The range is used.
+  // The whole range is used.
   EXPECT_GT(largest_shift_m, 0.09);
   EXPECT_GT(largest_turn_rad, 9.0 * kDegree);
 }
@@ -97,8 +97,8 @@ TEST(RandomRigTest, EveryDirectionOfTheFieldOfViewHasOneImageWithinTheWidth) {
       for (const RigCamera& camera : makeRig("random", seed, scale).cameras) {
         for (double around = 0.0; around < 2.0 * kPi; around += kPi / 8.0) {
           double last_radius_px = 0.0;
-          for (double share = 0.02; share <= 1.0; share += 0.02) {
-            const double angle = 0.5 * share * camera.field_of_view_rad;
+          for (double fraction = 0.02; fraction <= 1.0; fraction += 0.02) {
+            const double angle = 0.5 * fraction * camera.field_of_view_rad;
             const Eigen::Vector3d ray(std::sin(angle) * std::cos(around), std::sin(angle) * std::sin(around),
                                       std::cos(angle));
             Eigen::Vector2d pixel, centre;
@@ -112,7 +112,8 @@ TEST(RandomRigTest, EveryDirectionOfTheFieldOfViewHasOneImageWithinTheWidth) {
             ASSERT_TRUE(camera.model.unproject(pixel, &back));
             EXPECT_LT((back - ray).norm(), 1e-7);
           }
-          // As real lenses of this kind: the circle nearly fills the width and is cut at the top and bottom.
+          // As with real lenses of this kind, the circle nearly fills the width and is cut off at top and
+          // bottom.
           EXPECT_GT(last_radius_px, 0.45 * camera.image_size_px.width);
         }
       }

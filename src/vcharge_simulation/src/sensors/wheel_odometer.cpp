@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "vcharge_core/base/error.h"
-#include "vcharge_core/base/options.h"
 #include "vcharge_simulation/rendering/noise.h"
 
 namespace vcharge {
@@ -13,7 +12,11 @@ namespace {
 
 using Wheel = WheelSlipFault::Wheel;
 
-// How far the wheel turns, over how far the road asks it to.
+// Half width of the filter window: long enough to average the quantization of the counters.
+constexpr double kSmoothing_s = 0.25;
+static_assert(kSmoothing_s <= VehicleMotion::kMargin_s, "the window must fit the margin of the motion");
+
+// Wheel rotation relative to the distance rolled on the road.
 double turnFactor(const FaultOptions& faults, Wheel wheel, Duration since_start) {
   double factor = 1.0;
   if (faults.odometry_scale.isActive() && faults.odometry_scale.actsAt(since_start)) {
@@ -26,7 +29,7 @@ double turnFactor(const FaultOptions& faults, Wheel wheel, Duration since_start)
   return factor;
 }
 
-// An odometer knows nothing of counters that never came: it takes them to have grown evenly.
+// Without counters an odometer assumes constant growth during the gap.
 void bridge(const MissingTicksFault& fault, std::vector<int64_t>* counter) {
   const auto indexAt = [&](double time_s) {
     const double index = std::ceil(time_s * VehicleMotion::kStepsPerSecond) + VehicleMotion::marginSteps();
@@ -37,21 +40,12 @@ void bridge(const MissingTicksFault& fault, std::vector<int64_t>* counter) {
   const int64_t start = (*counter)[first];
   const auto growth = static_cast<double>((*counter)[last] - start);
   for (size_t i = first + 1; i < last; ++i) {
-    const double share = static_cast<double>(i - first) / static_cast<double>(last - first);
-    (*counter)[i] = start + std::llround(share * growth);
+    const double fraction = static_cast<double>(i - first) / static_cast<double>(last - first);
+    (*counter)[i] = start + std::llround(fraction * growth);
   }
 }
 
 }  // namespace
-
-void WheelOdometerOptions::validate() const {
-  requireField(metres_per_tick > 0.0, "metres_per_tick", "must be positive", metres_per_tick);
-  requireField(std::abs(scale_error) < 0.5, "scale_error", "must be in (-0.5, 0.5)", scale_error);
-  requireField(std::abs(left_right_error) < 0.5, "left_right_error", "must be in (-0.5, 0.5)",
-               left_right_error);
-  requireField(smoothing_s > 0.0 && smoothing_s <= VehicleMotion::kMargin_s, "smoothing_s",
-               "must be in (0, 0.5]", smoothing_s);
-}
 
 WheelOdometer::WheelOdometer(const VehicleMotion& motion, const WheelOdometerOptions& options, uint64_t seed,
                              const FaultOptions& faults)
@@ -107,15 +101,15 @@ WheelTicks WheelOdometer::ticks(int milliseconds) const {
 
 WheelOdometer::WheelState WheelOdometer::smoothed(const std::vector<int64_t>& counter,
                                                   int milliseconds) const {
-  // Least-squares parabola over a window that is symmetric about the instant (Savitzky and Golay): its value
-  // is a weighted mean of the counters with weights in closed form, and so is its slope.
-  const int half = static_cast<int>(std::lround(options_.smoothing_s * VehicleMotion::kStepsPerSecond));
+  // Least-squares parabola over a symmetric window (Savitzky and Golay). Its value and its slope at the
+  // centre are weighted sums of the counters with closed-form weights.
+  const int half = static_cast<int>(std::lround(kSmoothing_s * VehicleMotion::kStepsPerSecond));
   const int centre = milliseconds + VehicleMotion::marginSteps();
   const double n = 2.0 * half + 1.0;
   const double s2 = half * (half + 1.0) * n / 3.0;                      // sum of i^2
   const double s4 = s2 * (3.0 * half * half + 3.0 * half - 1.0) / 5.0;  // sum of i^4
   const double determinant = n * s4 - s2 * s2;
-  // Relative to the centre, so that sums stay exact far into a drive.
+  // Relative to the centre, so that the sums stay exact on long drives.
   const int64_t reference = counter.at(static_cast<size_t>(centre));
   double value = 0.0;
   double slope = 0.0;

@@ -11,7 +11,7 @@ namespace vcharge {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-// Step of the numeric integration that finds how long the edge is that a corner replaces.
+// Step of the numeric integration over a corner.
 constexpr double kIntegrationStep_m = 1e-3;
 
 double wrapAngle(double angle_rad) {
@@ -20,7 +20,7 @@ double wrapAngle(double angle_rad) {
 
 std::vector<DrivePath::Segment> makeCorner(double turn_rad, double radius_m, double transition_m) {
   const double sign = turn_rad < 0.0 ? -1.0 : 1.0;
-  // Each clothoid turns by half of what an arc of its length would.
+  // A clothoid turns by half the angle of an arc of its length.
   const double arc_m = std::abs(turn_rad) * radius_m - transition_m;
   if (arc_m < 0.0) {
     throw std::invalid_argument("DrivePath: transition_m is longer than the corner turns");
@@ -29,7 +29,7 @@ std::vector<DrivePath::Segment> makeCorner(double turn_rad, double radius_m, dou
   return {{transition_m, 0.0, curvature}, {arc_m, curvature, curvature}, {transition_m, curvature, 0.0}};
 }
 
-// Length of the straight edge before the vertex that a corner replaces.
+// Length of the straight edge before the vertex that is replaced by the corner.
 double cornerTangent(const std::vector<DrivePath::Segment>& corner, double turn_rad) {
   const DrivePath path(RigidTransform(), corner);
   RigidTransform start_from_here;
@@ -84,7 +84,7 @@ void DrivePath::append(const DrivePath& next) {
   for (const Segment& segment : next.segments_) {
     appendSegment(segment);
   }
-  // The stops where the next path turns around came with its segments.
+  // appendSegment() has already added the stops at which the next path changes its direction of travel.
   for (const Stop& stop : next.stops_) {
     const Stop shifted{joint_m + stop.at_m, stop.wait_s};
     if (std::none_of(stops_.begin(), stops_.end(),
@@ -145,7 +145,7 @@ DrivePath DrivePath::throughWaypoints(const std::vector<Eigen::Vector2d>& waypoi
     points.push_back(middle);
   }
   std::vector<Segment> segments;
-  double used_m = 0.0;  // of the present edge, by the corner before it
+  double used_m = 0.0;  // length of the current edge used by the corner before it
   for (size_t i = 0; i + 1 < points.size(); ++i) {
     const Eigen::Vector2d edge = points[i + 1] - points[i];
     std::vector<Segment> corner;

@@ -16,7 +16,7 @@ TEST(SlopeTest, GroundIsAsBrightAsTheCosineOfTheSunsAngleToIt) {
   LightOptions light;
   light.sky_irradiance = 0.0;
   light.bounce_irradiance = 0.0;
-  // At one place straight below the camera, so that both planes are seen there alike.
+  // Compared at one point below the camera, which lies on both planes.
   const auto lightOn = [&](const Eigen::Vector3d& normal) {
     auto scene = std::make_shared<Scene>();
     scene->sky = std::make_unique<Sky>(light, 1);
@@ -26,16 +26,16 @@ TEST(SlopeTest, GroundIsAsBrightAsTheCosineOfTheSunsAngleToIt) {
     ground.texture = 0;
     scene->ground.layers.push_back(
         {Texture(cv::Mat(4, 4, CV_8UC1, cv::Scalar(100)), Texture::Border::kClamp), -100.0F, -100.0F, 0.02F});
-    const Eigen::Vector3d place_m(1.9, 2.5, 0.0);
+    const Eigen::Vector3d point_m(1.9, 2.5, 0.0);
     const auto on_plane = [&](double x, double y) {
-      const double z = -(normal.x() * (x - place_m.x()) + normal.y() * (y - place_m.y())) / normal.z();
+      const double z = -(normal.x() * (x - point_m.x()) + normal.y() * (y - point_m.y())) / normal.z();
       return Eigen::Vector3d(x, y, z).cast<float>().eval();
     };
     addQuad(on_plane(-50, -50), on_plane(50, -50), on_plane(50, 50), on_plane(-50, 50),
             scene->addMaterial(ground), &scene->mesh);
     const Renderer renderer(scene);
     Eigen::Vector2d pixel;
-    EXPECT_TRUE(view.camera().model.project(view.camera().vehicle_from_camera->inverse() * place_m, &pixel));
+    EXPECT_TRUE(view.camera().model.project(view.camera().vehicle_from_camera->inverse() * point_m, &pixel));
     return static_cast<double>(
         renderer.renderLight(view, RigidTransform())
             .at<float>(static_cast<int>(std::lround(pixel.y())), static_cast<int>(std::lround(pixel.x()))));

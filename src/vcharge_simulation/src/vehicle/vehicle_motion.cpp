@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "vcharge_core/base/options.h"
+#include "vcharge_core/base/error.h"
 #include "vcharge_simulation/rendering/noise.h"
 
 namespace vcharge {
@@ -16,10 +16,15 @@ constexpr double kTwoPi = 6.28318530717958647692;
 constexpr double kStep_s = 1.0 / VehicleMotion::kStepsPerSecond;
 constexpr double kSpeedTimeConstant_s = 0.6;
 constexpr double kBraking_m_per_s2 = 0.8;
+constexpr double kMaxAcceleration_m_per_s2 = 1.0;
+constexpr double kMaxLateralAcceleration_m_per_s2 = 1.2;
+constexpr double kMaxBackwardsSpeed_m_per_s = 1.2;
+constexpr double kSpringFrequency_hz = 1.6;
+constexpr double kRoll_rad_per_m_per_s2 = 0.006;  // per lateral acceleration, to the outside of a curve
 constexpr double kLookAhead_m = 1.5;
 
-// A sum of sines over the distance driven, of standard deviation one: a road that shakes the car only while
-// it moves.
+// Road roughness: a sum of sines over the distance driven, with standard deviation one. The car shakes only
+// while it moves.
 class RoadNoise {
  public:
   explicit RoadNoise(Random* random) {
@@ -46,27 +51,27 @@ class RoadNoise {
 // Critically damped second-order filter.
 class Spring {
  public:
-  explicit Spring(double frequency_hz) : omega_(kTwoPi * frequency_hz) {}
   double update(double target) {
-    const double acceleration = omega_ * omega_ * (target - value_) - 2.0 * omega_ * rate_;
+    const double acceleration = kOmega * kOmega * (target - value_) - 2.0 * kOmega * rate_;
     rate_ += acceleration * kStep_s;
     value_ += rate_ * kStep_s;
     return value_;
   }
 
  private:
-  double omega_, value_ = 0.0, rate_ = 0.0;
+  static constexpr double kOmega = kTwoPi * kSpringFrequency_hz;
+  double value_ = 0.0, rate_ = 0.0;
 };
 
-// Where the four wheels stand.
+// Ground heights under the four wheels.
 class WheelContacts {
  public:
   WheelContacts(const GroundHeight& ground_height, const VehicleMotionOptions& options,
                 const RigidTransform& world_from_planar)
       : track_m_(options.track_width_m), wheelbase_m_(options.wheelbase_m) {
     const auto height = [&](double x_m, double y_m) {
-      const Eigen::Vector3d place_m = world_from_planar * Eigen::Vector3d(x_m, y_m, 0.0);
-      return ground_height(place_m.x(), place_m.y());
+      const Eigen::Vector3d position_m = world_from_planar * Eigen::Vector3d(x_m, y_m, 0.0);
+      return ground_height(position_m.x(), position_m.y());
     };
     rear_left_m = height(0.0, 0.5 * track_m_);
     rear_right_m = height(0.0, -0.5 * track_m_);
@@ -76,7 +81,7 @@ class WheelContacts {
 
   double rear_left_m, rear_right_m;
 
-  /// Rise over distance towards the front.
+  /// Rise over distance along x.
   double slope() const {
     return 0.5 * (front_left_m_ + front_right_m_ - rear_left_m - rear_right_m) / wheelbase_m_;
   }
@@ -91,15 +96,15 @@ class WheelContacts {
   double front_left_m_, front_right_m_;
 };
 
-// Length of the way over ground that rises by `rise_m`, with the sign of the way seen from above.
+// Distance along the surface for a horizontal distance (which gives the sign) and a rise.
 double alongSurface(double horizontal_m, double rise_m) {
   return std::copysign(std::hypot(horizontal_m, rise_m), horizontal_m);
 }
 
-// Distance before a stop at which the car aims to stand: it follows the wanted speed with a delay.
+// The car aims to stop this far before a stop, because it follows the desired speed with a delay.
 constexpr double kStopReserve_m = 0.4;
 constexpr double kStanding_m_per_s = 0.02;
-// A car that stands within this distance of the path's end has arrived.
+// A car that stands within this distance of the end of the path has arrived.
 constexpr double kEnd_m = 1.0;
 
 double desiredSpeed(const DrivePath& path, const VehicleMotionOptions& options, double s_m,
@@ -110,10 +115,10 @@ double desiredSpeed(const DrivePath& path, const VehicleMotionOptions& options, 
   }
   double speed = options.cruise_speed_m_per_s * (1.0 + 0.05 * std::sin(kTwoPi * s_m / 11.0 + wave_phase_rad));
   if (curvature > 0.0) {
-    speed = std::min(speed, std::sqrt(options.max_lateral_acceleration_m_per_s2 / curvature));
+    speed = std::min(speed, std::sqrt(kMaxLateralAcceleration_m_per_s2 / curvature));
   }
   if (path.direction(s_m) < 0.0) {
-    speed = std::min(speed, options.max_backwards_speed_m_per_s);
+    speed = std::min(speed, kMaxBackwardsSpeed_m_per_s);
   }
   if (options.stop_at_end) {
     speed = std::min(speed, std::sqrt(2.0 * kBraking_m_per_s2 * std::max(0.0, path.length() - 0.2 - s_m)));
@@ -123,39 +128,25 @@ double desiredSpeed(const DrivePath& path, const VehicleMotionOptions& options, 
 
 }  // namespace
 
-void VehicleMotionOptions::validate() const {
-  requireField(cruise_speed_m_per_s > 0.0, "cruise_speed_m_per_s", "must be positive", cruise_speed_m_per_s);
-  requireField(max_backwards_speed_m_per_s > 0.0, "max_backwards_speed_m_per_s", "must be positive",
-               max_backwards_speed_m_per_s);
-  requireField(max_lateral_acceleration_m_per_s2 > 0.0, "max_lateral_acceleration_m_per_s2",
-               "must be positive", max_lateral_acceleration_m_per_s2);
-  requireField(max_acceleration_m_per_s2 > 0.0, "max_acceleration_m_per_s2", "must be positive",
-               max_acceleration_m_per_s2);
-  requireField(standstill_s >= 0.0, "standstill_s", "must not be negative", standstill_s);
-  requireField(track_width_m > 0.0, "track_width_m", "must be positive", track_width_m);
-  requireField(wheelbase_m > 0.0, "wheelbase_m", "must be positive", wheelbase_m);
-  requireField(spring_frequency_hz > 0.0, "spring_frequency_hz", "must be positive", spring_frequency_hz);
-  requireField(duration_s > 0.0, "duration_s", "must be positive", duration_s);
-}
-
 VehicleMotion::VehicleMotion(const DrivePath& path, const VehicleMotionOptions& options, uint64_t seed,
                              const GroundHeight& ground_height)
     : options_(options) {
-  options.validate();
+  check(options.cruise_speed_m_per_s > 0.0 && options.duration_s > 0.0,
+        "VehicleMotion: cruise speed and duration must be positive");
   Random random(seed);
   const RoadNoise pitch_noise(&random);
   const RoadNoise roll_noise(&random);
   const RoadNoise heave_noise(&random);
   const double wave_phase_rad = random.uniform(0.0, kTwoPi);
-  Spring pitch_spring(options.spring_frequency_hz);
-  Spring roll_spring(options.spring_frequency_hz);
+  Spring pitch_spring;
+  Spring roll_spring;
 
   const bool from_rest = options.standstill_s > 0.0;
   double speed = from_rest ? 0.0 : desiredSpeed(path, options, 0.0, wave_phase_rad);
-  // A moving start has come along a straight line before the path.
+  // A moving start arrives on a straight line before the path.
   double s_m = from_rest ? 0.0 : -speed * kMargin_s;
   auto stop = path.stops().begin();
-  double stop_ends_s = -1.0;  // of the stop at which the car stands; negative: it drives
+  double stop_ends_s = -1.0;  // end of the current stop; negative while driving
   double direction = path.direction(s_m);
   MotionSample sample;
   sample.world_from_planar = path.worldFromStart() * arcMotion(direction * s_m, 0.0);
@@ -173,7 +164,7 @@ VehicleMotion::VehicleMotion(const DrivePath& path, const VehicleMotionOptions& 
       --remaining_after_end;
     }
     if (stop_ends_s >= 0.0 && time_s >= stop_ends_s) {
-      // It may stand a little short of its stop.
+      // The car may stand slightly before the stop.
       s_m = stop->at_m;
       direction = path.direction(s_m);
       ++stop;
@@ -187,7 +178,7 @@ VehicleMotion::VehicleMotion(const DrivePath& path, const VehicleMotionOptions& 
             wanted, std::sqrt(2.0 * kBraking_m_per_s2 * std::max(0.0, stop->at_m - kStopReserve_m - s_m)));
       }
       acceleration = std::clamp((wanted - speed) / kSpeedTimeConstant_s, -2.0 * kBraking_m_per_s2,
-                                options.max_acceleration_m_per_s2);
+                                kMaxAcceleration_m_per_s2);
     }
     sample.speed_m_per_s = direction * speed;
     sample.curvature_per_m = path.curvature(s_m);
@@ -195,8 +186,8 @@ VehicleMotion::VehicleMotion(const DrivePath& path, const VehicleMotionOptions& 
     const double pitch_rad =
         pitch_spring.update(-options.pitch_rad_per_m_per_s2 * (direction * acceleration)) +
         options.road_noise_rad * pitch_noise.at(s_m);
-    const double roll_rad = roll_spring.update(options.roll_rad_per_m_per_s2 * lateral) +
-                            options.road_noise_rad * roll_noise.at(s_m);
+    const double roll_rad =
+        roll_spring.update(kRoll_rad_per_m_per_s2 * lateral) + options.road_noise_rad * roll_noise.at(s_m);
     sample.planar_from_body = RigidTransform(rotationFromYawPitchRoll(0.0, pitch_rad, roll_rad),
                                              {0.0, 0.0, options.road_heave_m * heave_noise.at(s_m)});
     std::optional<WheelContacts> contacts;

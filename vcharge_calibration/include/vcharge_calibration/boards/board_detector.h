@@ -12,27 +12,26 @@
 
 namespace vcharge {
 
-/// Finds a chessboard or an AprilGrid in fisheye images. Immutable, thread safe.
+/// Detects a chessboard or an AprilGrid in fisheye images. Immutable, thread safe.
 class BoardDetector {
  public:
   explicit BoardDetector(const CalibrationBoard& board) : board_(board) {}
 
-  /// The whole board, without knowing the camera: by two detectors, at two scales of the image. `image` is
-  /// CV_8UC1.
+  /// Detects a complete board without a camera model, using two detectors at two scales. `image` is CV_8UC1.
   std::optional<BoardView> detect(const cv::Mat& image) const;
 
-  /// With a camera model that is about right: pinhole views of the image in many directions, up to the rim,
-  /// show the board undistorted; where a view holds only a part of it, the rest is predicted and checked
-  /// corner by corner. Boards whose outline is not certain are not returned. Of an AprilGrid, four tags
-  /// suffice.
+  /// Detects a board with an approximate camera model: pinhole views of the image in many directions show the
+  /// board without distortion, up to the rim. If a view contains only a part of the board, the rest is
+  /// predicted and verified corner by corner. Boards with an uncertain outline are not returned. Four tags of
+  /// an AprilGrid suffice.
   std::optional<BoardView> detect(const cv::Mat& image, const CameraModel& model) const;
 
-  /// The same, but for boards of which a part is found in the image itself: tenths of a second where the
-  /// other takes seconds.
+  /// The same for boards of which a part is detected in the image itself; takes tenths of a second instead of
+  /// seconds.
   std::optional<BoardView> detectQuickly(const cv::Mat& image, const CameraModel& model) const;
 
-  /// What an image shows instead of the board: "a chessboard of 8x6 inner corners", "the board mirrored".
-  /// Empty where nothing of the kind is seen.
+  /// Describes what the image shows instead of the board, for example "a chessboard of 8x6 inner corners" or
+  /// "the board mirrored". Empty if nothing similar is visible.
   std::string describeOther(const cv::Mat& image) const;
 
  private:

@@ -6,8 +6,8 @@
 
 namespace vcharge {
 
-/// The image (CV_8UC1) with the board's corners as rings, the corners of all views taken as dots, and the
-/// parts of the image that no view shows darkened.
+/// The image (CV_8UC1) with rings at the board's corners and dots at the corners of all collected views;
+/// regions without any view are darkened.
 cv::Mat drawCollected(const cv::Mat& image, const ViewCollector& collector);
 
 }  // namespace vcharge

@@ -9,7 +9,7 @@
 
 namespace vcharge {
 
-/// Where in the image corners of boards were seen, in cells of a coarse grid.
+/// Parts of the image in which corners were detected, as cells of a coarse grid.
 class ImageCoverage {
  public:
   static constexpr int kColumns = 8;
@@ -19,13 +19,13 @@ class ImageCoverage {
       : size_(image_size_px), counts_(static_cast<size_t>(kColumns) * kRows, 0) {}
 
   void add(const BoardView& view);
-  /// Cells that a view would be the first to cover.
+  /// Number of cells that only this view covers.
   int numNewCells(const BoardView& view) const;
   int count(int column, int row) const { return counts_[static_cast<size_t>(row * kColumns + column)]; }
   double coveredShare() const;
-  /// Distance of the farthest corner from the middle, over half of the image's longer side.
+  /// Distance of the farthest corner from the image centre, relative to half of the longer side.
   double reach() const { return reach_; }
-  /// Parts of the image's rim without any corner: "left", "upper right" and so on.
+  /// Parts of the image's rim without any corner, for example "left" or "upper right".
   std::vector<std::string> missingParts() const;
 
  private:

@@ -10,32 +10,18 @@
 #include <opencv2/core.hpp>
 
 #include "vcharge_calibration/boards/calibration_board.h"
+#include "vcharge_core/base/options.h"
 #include "vcharge_core/camera/camera_model.h"
 
 namespace vcharge {
 
-/// Options of calibrateIntrinsics.
+/// Options of calibrateIntrinsics().
 struct IntrinsicCalibrationOptions {
-  std::string model = "mei";      ///< or kannala_brandt, pinhole
-  int min_views = 5;              ///< fewer boards are no calibration
-  double max_view_error = 6.0;    ///< RMS error of a view over the usual one; a view above is left out
-  double max_edge_width = 2.0;    ///< width of a view's edges over the usual one; a view above is blurred
-  double max_corner_error = 5.0;  ///< error of a corner over its view's; a corner above is left out
-  /// Part by which bent boards must explain the errors better than chance before boards count as bent.
-  double min_bending_significance = 3.0;
-  int cross_validation_folds = 10;  ///< parts into which the views are split
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("model", model);
-    visit("min_views", min_views);
-    visit("max_view_error", max_view_error);
-    visit("max_edge_width", max_edge_width);
-    visit("max_corner_error", max_corner_error);
-    visit("min_bending_significance", min_bending_significance);
-    visit("cross_validation_folds", cross_validation_folds);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(IntrinsicCalibrationOptions);
+  VCHARGE_OPTION(std::string, model, "mei", anyValue(), "Camera model: mei, kannala_brandt or pinhole.");
+  VCHARGE_OPTION(int, min_views, 5, atLeast(3), "Smallest number of images with a board.");
+  VCHARGE_END_OPTIONS();
+  void checkFields() const { CameraModel::parameterNames(model); }
 };
 
 /// A gray image to calibrate from.
@@ -44,7 +30,7 @@ struct CalibrationImage {
   cv::Mat pixels;  ///< CV_8UC1
 };
 
-/// A view that the calibration used.
+/// A view used by the calibration.
 struct CalibratedView {
   BoardView view;
   PlacedBoard placed;
@@ -52,7 +38,7 @@ struct CalibratedView {
   double edge_width_px = 0.0;
 };
 
-/// An image that the calibration did not use, and why.
+/// An image not used by the calibration, and the reason.
 struct RejectedImage {
   std::string name, reason;
 };
@@ -61,29 +47,31 @@ enum class Verdict { kPass, kWarn, kFail };
 /// "PASS", "WARN", "FAIL".
 std::string toString(Verdict verdict);
 
-/// What calibrateIntrinsics found. With the verdict kFail there is no model.
+/// Result of calibrateIntrinsics(). Without a model if the verdict is kFail.
 struct IntrinsicCalibration {
   Verdict verdict = Verdict::kFail;
-  std::vector<std::string> remarks;  ///< why not kPass, and which pictures are missing
+  std::vector<std::string> remarks;  ///< reasons of the verdict, and which images are missing
   cv::Size image_size_px;
   std::optional<CameraModel> model;
-  /// Of the model's parameters, in their order, for errors that go together within a view (jackknife).
+  /// Standard deviations of the model's parameters, in their order, for errors that are correlated within a
+  /// view (jackknife).
   Eigen::VectorXd standard_deviations;
   std::vector<CalibratedView> views;
   std::vector<RejectedImage> rejected;
   double rms_px = 0.0;              ///< per coordinate
   double mean_error_px = 0.0;       ///< mean distance
-  double flat_rms_px = 0.0;         ///< as rms_px, of a fit with flat boards
-  bool bent_boards = false;         ///< boards were found to bend, and the fit takes it into account
+  double flat_rms_px = 0.0;         ///< like rms_px, with flat boards
+  bool bent_boards = false;         ///< boards were found to bend, and the fit models it
   double bending_m = 0.0;           ///< RMS of the boards' bending along their longer side
-  double cross_validated_px = 0.0;  ///< RMS per coordinate of views that the fit did not see
-  double covered_share = 0.0;       ///< share of the image in which corners were seen (cells)
-  double max_angle_rad = 0.0;       ///< farthest corner from the axis
+  double cross_validated_px = 0.0;  ///< RMS per coordinate of views that were excluded from the fit
+  double covered_share = 0.0;       ///< fraction of the image's cells in which corners were detected
+  double max_angle_rad = 0.0;       ///< angle of the farthest corner from the axis
 };
 
-/// Calibrates a camera from images of a board: finds the boards, guesses the camera, finds the boards that
-/// need the guess, fits, leaves out what does not fit, with the reason, and judges the result. `progress`
-/// takes the share done; calls are never concurrent. InputError for images of different sizes. Deterministic.
+/// Calibrates a camera from images of a board: detects the boards, estimates a first camera, detects further
+/// boards with it, fits the camera, removes outliers with a reason, and judges the result. `progress`
+/// receives the completed fraction; calls are never concurrent. Throws InputError for images of different
+/// sizes. Deterministic.
 IntrinsicCalibration calibrateIntrinsics(const CalibrationBoard& board,
                                          const std::vector<CalibrationImage>& images,
                                          const IntrinsicCalibrationOptions& options,

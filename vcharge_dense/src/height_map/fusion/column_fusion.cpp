@@ -19,14 +19,17 @@ namespace vcharge {
 namespace {
 
 constexpr int kBlockCells = 512;          // side of a block of columns
-constexpr size_t kViewsAtOnce = 8;        // that are added to a block in one parallel loop
-constexpr size_t kKeptBytes = 600000000;  // of views in memory, the last ones that were used
-constexpr double kBytesPerCell = 94.0;    // of images and solvers, see primal_dual.h
-constexpr double kSupport_m = 0.1;        // above and below the best height, for the confidence
-// Sum of weights, times the height of a voxel, by which 1 - 1/e of full confidence is reached.
+constexpr size_t kViewsAtOnce = 8;        // views added to a block in one parallel loop
+constexpr size_t kKeptBytes = 600000000;  // recently used views in memory
+constexpr double kBytesPerCell = 94.0;    // images and solvers, see primal_dual.h
+constexpr double kSupport_m = 0.1;        // reach above and below the best height for the supports
+// Sum of weights, times the voxel height, at which the support reaches 1 - 1/e.
 constexpr double kFullSupport_m = 0.05;
+// A column is solid where a run of occupied voxels is this high: no camera sees free space above walls and
+// pillars that reach out of the grid, so that they have no height.
+constexpr double kMinSolidHeight_m = 0.5;
 
-/// Keeps the views that were used last.
+/// Keeps recently used views in memory.
 class ViewCache {
  public:
   explicit ViewCache(LoadView load) : load_(std::move(load)) {}
@@ -64,7 +67,7 @@ class ViewCache {
   const LoadView load_;
   std::map<size_t, std::shared_ptr<const PackedRangeMap>> kept_;
   size_t kept_bytes_ = 0;
-  std::list<size_t> order_;  // oldest use first
+  std::list<size_t> order_;  // least recently used first
 };
 
 /// Columns that are fused together, in cells of the grid.
@@ -76,15 +79,15 @@ double distanceToBlock(const VoxelGrid& grid, const Block& block, const Eigen::V
   const Eigen::Vector2d low =
       grid.origin_m + grid.cell_size_m * Eigen::Vector2d(block.first_column, block.first_row);
   const Eigen::Vector2d high = low + grid.cell_size_m * Eigen::Vector2d(block.columns - 1, block.rows - 1);
-  const Eigen::Vector2d place = position_m.head<2>();
-  return (place - place.cwiseMax(low).cwiseMin(high)).norm();
+  const Eigen::Vector2d position = position_m.head<2>();
+  return (position - position.cwiseMax(low).cwiseMin(high)).norm();
 }
 
 struct Supports {
   double below, above;
 };
 
-/// How surely a best height has something occupied below it and free space above.
+/// Evidence for occupied space below a best height and free space above it.
 Supports supportsOf(const float* weights, const VoxelGrid& grid, int height_index) {
   const int reach = std::max(1, static_cast<int>(std::lround(kSupport_m / grid.height_step_m)));
   double above = 0.0, below = 0.0, contrary = 0.0;
@@ -101,15 +104,14 @@ Supports supportsOf(const float* weights, const VoxelGrid& grid, int height_inde
   return {supportBy(below), supportBy(above)};
 }
 
-/// Fuses one block after the other.
+/// Fuses blocks one after the other.
 class BlockFuser {
  public:
   BlockFuser(const VoxelGrid& grid, const HeightFusionOptions& options, ColumnImages* images)
       : grid_(grid),
         profile_(options),
-        min_layer_weight_(options.min_layer_weight_m > 0.0 ? options.min_layer_weight_m / grid.height_step_m
-                                                           : std::numeric_limits<double>::infinity()),
-        min_solid_voxels_(options.min_solid_height_m / grid.height_step_m),
+        min_layer_weight_(options.min_layer_weight_m / grid.height_step_m),
+        min_solid_voxels_(kMinSolidHeight_m / grid.height_step_m),
         padded_((grid.num_voxels + kVoxelLanes - 1) / kVoxelLanes * kVoxelLanes),
         kernel_(addColumnWeightsKernel()),
         images_(images),
@@ -144,10 +146,10 @@ class BlockFuser {
     const double bottom = grid_.bottom_m + 0.5 * grid_.height_step_m;
     const double reach2 = static_cast<double>(profile_.max_range_m) * profile_.max_range_m;
     for (int column = 0; column < block.columns; ++column) {
-      const Eigen::Vector2d place =
+      const Eigen::Vector2d centre =
           grid_.origin_m +
           grid_.cell_size_m * Eigen::Vector2d(block.first_column + column, block.first_row + row);
-      const Eigen::Vector3d offset(place.x() - map.position_m.x(), place.y() - map.position_m.y(),
+      const Eigen::Vector3d offset(centre.x() - map.position_m.x(), centre.y() - map.position_m.y(),
                                    bottom - map.position_m.z());
       if (offset.head<2>().squaredNorm() > reach2) {
         continue;
@@ -186,7 +188,7 @@ class BlockFuser {
   const VoxelGrid grid_;
   const WeightProfile profile_;
   const double min_layer_weight_, min_solid_voxels_;
-  const int padded_;  // voxels of a column, for the widest vectors
+  const int padded_;  // voxels per column, for the widest vectors
   const AddColumnWeights kernel_;
   ColumnImages* images_;
   std::vector<float> weights_;
@@ -202,7 +204,7 @@ std::vector<Block> blocksOf(const VoxelGrid& grid) {
                       std::min(kBlockCells, grid.rows - row)});
     }
     if (!forwards) {
-      std::reverse(line.begin(), line.end());  // neighbours see the same views
+      std::reverse(line.begin(), line.end());  // so that consecutive blocks need the same views
     }
     blocks.insert(blocks.end(), line.begin(), line.end());
   }
@@ -226,7 +228,7 @@ VoxelGrid makeVoxelGrid(const Eigen::AlignedBox3d& extent_m, const HeightFusionO
     std::array<char, 320> text{};
     std::snprintf(
         text.data(), text.size(),
-        "the grid of %.0f x %.0f cells of %g m, %.0f voxels high, would take %.1f GB, over max_memory_gb = "
+        "the grid of %.0f x %.0f cells of %g m, %.0f voxels high, would need %.1f GB, over max_memory_gb = "
         "%g: expected poses that lie closer together, larger cells or a larger limit",
         columns, rows, cell, voxels, 1e-9 * bytes, options.max_memory_gb);
     throw InputError(text.data());

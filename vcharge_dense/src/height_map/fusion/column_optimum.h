@@ -4,22 +4,22 @@
 
 namespace vcharge {
 
-/// What is kept of a column of voxels.
+/// Best height of a column of voxels.
 struct ColumnOptimum {
-  int height_index = 0;        ///< of the best height: voxels 0 to height_index - 1 lie below it
+  int height_index = 0;        ///< number of voxels below the best height
   double min_cost = 0.0;       ///< C^min
-  double occupied_cost = 0.0;  ///< C^occ: of the column filled to its top
-  bool has_surface = false;    ///< something occupied was seen below the best height
-  double layer_weight = 0.0;   ///< of the layer whose top the best height is; 0: all below it is one layer
+  double occupied_cost = 0.0;  ///< C^occ: cost of the column filled to its top
+  bool has_surface = false;    ///< a voxel below the best height is occupied
+  double layer_weight = 0.0;   ///< weight of the layer that ends at the best height; 0: no layer
 };
 
-/// Voxels first to top - 1 of a column.
+/// The voxels first to top - 1 of a column.
 struct VoxelRun {
   int first = 0, top = 0;
-  double weight = 0.0;  ///< sum of theirs
+  double weight = 0.0;  ///< sum of the voxels' weights
 };
 
-/// The run of voxels from `begin` up whose weights sum to the most; of no voxel where none is positive.
+/// The run of voxels from `begin` up with the largest sum of weights; empty where no weight is positive.
 inline VoxelRun heaviestRun(const float* weights, int begin, int num_voxels) {
   VoxelRun heaviest{begin, begin, 0.0};
   double run = 0.0;
@@ -30,7 +30,7 @@ inline VoxelRun heaviestRun(const float* weights, int begin, int num_voxels) {
       first = z;
     }
     run += weights[z];
-    // A sum in another order may differ in its last bits: that is no heavier run.
+    // The margin exceeds rounding errors of sums in another order.
     if (run > heaviest.weight + 1e-6) {
       heaviest = {first, z + 1, run};
     }
@@ -38,13 +38,13 @@ inline VoxelRun heaviestRun(const float* weights, int begin, int num_voxels) {
   return heaviest;
 }
 
-/// Height of least cost C(h) = - sum of the weights below h + sum of those from h up (paper, equation
-/// perColumnMin); the lowest one where several cost the same. Weights are negative where the data say free.
+/// Height of least cost C(h) = - sum of the weights below h + sum of the weights from h up (paper, equation
+/// perColumnMin); the lowest one of equal costs. Weights are negative where space is free.
 ///
-/// One height cannot show what stands over free space: cameras look under a car's body, and where its paint
-/// is hardly matched the free space outweighs it. So a column may have layers (Gallup et al. 2010, 3D
-/// reconstruction using an n-layer heightmap): a run of voxels above the best height whose weights sum to
-/// `min_layer_weight` or more is one, and the height is its top.
+/// One height cannot represent an object over free space: cameras see under a car's body, and where its paint
+/// has few matches the free space outweighs it. Therefore a run of voxels above the best height whose weights
+/// sum to at least `min_layer_weight` is a layer, and its top is the height (Gallup et al. 2010, 3D
+/// reconstruction using an n-layer heightmap).
 inline ColumnOptimum findColumnOptimum(const float* weights, int num_voxels,
                                        double min_layer_weight = std::numeric_limits<double>::infinity()) {
   double cost = 0.0;
@@ -58,7 +58,7 @@ inline ColumnOptimum findColumnOptimum(const float* weights, int num_voxels,
   for (int z = 0; z < num_voxels; ++z) {
     cost -= 2.0 * weights[z];
     occupied_below = occupied_below || weights[z] > 0.0F;
-    // A sum in another order may differ in its last bits: that is no better height.
+    // The margin exceeds rounding errors of sums in another order.
     if (cost < best.min_cost - 1e-6) {
       best.height_index = z + 1;
       best.min_cost = cost;

@@ -10,7 +10,7 @@
 namespace vcharge {
 namespace {
 
-/// Equation perColumnMin as it is printed.
+/// Equation perColumnMin as in the paper.
 double costOf(const std::vector<float>& weights, int height) {
   double cost = 0.0;
   for (int z = 0; z < static_cast<int>(weights.size()); ++z) {
@@ -28,7 +28,8 @@ TEST(ColumnOptimumTest, IsTheLowestOfTheBestHeightsOfEveryColumn) {
   for (int trial = 0; trial < 2000; ++trial) {
     std::vector<float> weights(1 + random() % 12);
     for (float& weight : weights) {
-      weight = static_cast<float>(static_cast<int>(random() % 5) - 2);  // zeros make intervals
+      weight = static_cast<float>(static_cast<int>(random() % 5) -
+                                  2);  // with zeros several heights have equal costs
     }
     int best = 0;
     for (int height = 1; height <= static_cast<int>(weights.size()); ++height) {
@@ -41,7 +42,7 @@ TEST(ColumnOptimumTest, IsTheLowestOfTheBestHeightsOfEveryColumn) {
   }
 }
 
-TEST(ColumnOptimumTest, HeaviestRunIsThatOfAllRuns) {
+TEST(ColumnOptimumTest, HeaviestRunIsTheHeaviestOfAllRuns) {
   std::mt19937 random(11);
   for (int trial = 0; trial < 2000; ++trial) {
     std::vector<float> weights(1 + random() % 12);
@@ -63,14 +64,14 @@ TEST(ColumnOptimumTest, HeaviestRunIsThatOfAllRuns) {
   }
 }
 
-TEST(ColumnOptimumTest, LiesOnTopOfWhatIsOccupiedUnderUnseenSpace) {
-  // Ground, nothing seen, free.
+TEST(ColumnOptimumTest, LiesOnTopOfOccupiedVoxelsUnderUnknownSpace) {
+  // Ground, unknown, free.
   const ColumnOptimum optimum = optimumOf({0, 2, 3, 0, 0, 0, -1, -4});
   EXPECT_EQ(optimum.height_index, 3);
   EXPECT_TRUE(optimum.has_surface);
 }
 
-TEST(ColumnOptimumTest, KnowsThatFreeSpaceAloneIsNoSurface) {
+TEST(ColumnOptimumTest, FreeSpaceAloneIsNoSurface) {
   EXPECT_FALSE(optimumOf({0, 0, 0, -1, -4}).has_surface);
   EXPECT_EQ(optimumOf({0, 0, 0, -1, -4}).height_index, 0);
   EXPECT_FALSE(optimumOf({0, 0, 0}).has_surface);
@@ -81,8 +82,8 @@ TEST(ColumnOptimumTest, TakesTheStrongerOfTwoSurfaces) {
   EXPECT_EQ(optimumOf({3, -1, 2, -1}).height_index, 3);
 }
 
-TEST(ColumnOptimumTest, HasALayerThatTheFreeSpaceUnderItOutweighs) {
-  // The ground, a gap, a car's body of which little is seen, nothing above.
+TEST(ColumnOptimumTest, FindsALayerAlthoughTheFreeSpaceUnderItOutweighsIt) {
+  // Ground, a gap, a car's body with little evidence, unknown.
   const std::vector<float> weights = {3, -4, -4, 2, 2, 0, 0};
   const auto optimum = [&](double min_layer_weight) {
     return findColumnOptimum(weights.data(), static_cast<int>(weights.size()), min_layer_weight);
@@ -92,7 +93,7 @@ TEST(ColumnOptimumTest, HasALayerThatTheFreeSpaceUnderItOutweighs) {
   EXPECT_EQ(optimum(4.5).layer_weight, 0.0);
   EXPECT_EQ(optimum(4.0).height_index, 5);
   EXPECT_EQ(optimum(4.0).layer_weight, 4.0);
-  EXPECT_EQ(optimum(4.0).min_cost, -15.0);  // nothing speaks against ground, gap and body
+  EXPECT_EQ(optimum(4.0).min_cost, -15.0);  // as if ground, gap and body had no contrary evidence
   EXPECT_EQ(optimum(4.0).occupied_cost, optimumOf(weights).occupied_cost);
 }
 

@@ -8,10 +8,14 @@
 namespace vcharge {
 namespace {
 
-// Pixels of one surface differ by less than this share of their inverse range.
+// Neighbouring pixels belong to one surface where their inverse ranges differ by less than this fraction.
 constexpr float kMaxRelativeChange = 0.15F;
 
-/// Half the difference between the neighbours on both sides, or the difference to the one that is near.
+// Ranges of a lower confidence or a larger standard deviation over range are left out. A confidence of 0.7
+// left gaps without making distances in the map more accurate.
+constexpr float kMinConfidence = 0.5F, kMaxRelativeSigma = 0.08F;
+
+/// Change of the inverse range per pixel, from the neighbours that belong to the same surface.
 float changeAcross(float before, float here, float after) {
   const float limit = kMaxRelativeChange * here;
   const bool has_before = before > 0.0F && std::abs(here - before) < limit;
@@ -26,25 +30,21 @@ float squared(float value) {
   return value * value;
 }
 
-// A range more confident than this one counts no more.
+// The weight does not grow beyond this confidence.
 constexpr float kFullConfidence = 0.99F;
 
 float logOdds(float confidence) {
   return std::log(confidence / (1.0F - confidence));
 }
 
-/// Weight of a range by its sigma, its confidence and by how much of the surface its pixel spans.
-/// `pixel_rad`: angle of a pixel; changes of the inverse range to the neighbours.
+/// Weight of a range from its standard deviation, its confidence and the length of surface that its pixel
+/// spans. `pixel_rad`: angle of a pixel; `by_column` and `by_row`: changes of the inverse range per pixel.
 class RangeWeight {
  public:
-  RangeWeight(const HeightFusionOptions& options, float pixel_rad)
-      : inverse_sigma_(static_cast<float>(1.0 / options.reference_sigma_m)),
-        inverse_footprint_(options.reference_footprint_m > 0.0
-                               ? static_cast<float>(1.0 / options.reference_footprint_m)
-                               : 0.0F),
-        inverse_log_odds_(options.reference_confidence > 0.0
-                              ? 1.0F / logOdds(static_cast<float>(options.reference_confidence))
-                              : 0.0F),
+  RangeWeight(const RangeWeighting& weighting, float pixel_rad)
+      : inverse_sigma_(static_cast<float>(1.0 / weighting.reference_sigma_m)),
+        inverse_footprint_(static_cast<float>(1.0 / weighting.reference_footprint_m)),
+        inverse_log_odds_(1.0F / logOdds(static_cast<float>(weighting.reference_confidence))),
         pixel_rad_(pixel_rad) {}
 
   float operator()(float inverse_range, float sigma_m, float confidence, float by_column,
@@ -52,18 +52,16 @@ class RangeWeight {
     const float range = 1.0F / inverse_range;
     const float along = range * range * std::max(std::abs(by_column), std::abs(by_row));
     const float footprint_squared = squared(range * pixel_rad_) + squared(along);
-    const float sure = inverse_log_odds_ > 0.0F
-                           ? inverse_log_odds_ * logOdds(std::clamp(confidence, 0.5F, kFullConfidence))
-                           : 1.0F;
-    return sure / ((1.0F + squared(sigma_m * inverse_sigma_)) *
-                   (1.0F + footprint_squared * squared(inverse_footprint_)));
+    const float confident = inverse_log_odds_ * logOdds(std::clamp(confidence, 0.5F, kFullConfidence));
+    return confident / ((1.0F + squared(sigma_m * inverse_sigma_)) *
+                        (1.0F + footprint_squared * squared(inverse_footprint_)));
   }
 
  private:
   const float inverse_sigma_, inverse_footprint_, inverse_log_odds_, pixel_rad_;
 };
 
-cv::Mat inverseRange(const RangeMap& map, const HeightFusionOptions& options, size_t* num_known) {
+cv::Mat inverseRange(const RangeMap& map, size_t* num_known) {
   cv::Mat inverse(map.range_m.size(), CV_32FC1, cv::Scalar(0));
   for (int y = 0; y < inverse.rows; ++y) {
     const auto* range = map.range_m.ptr<float>(y);
@@ -72,9 +70,8 @@ cv::Mat inverseRange(const RangeMap& map, const HeightFusionOptions& options, si
     auto* out = inverse.ptr<float>(y);
     for (int x = 0; x < inverse.cols; ++x) {
       const bool known = std::isfinite(range[x]) && range[x] > 0.0F && std::isfinite(sigma[x]) &&
-                         sigma[x] > 0.0F &&
-                         sigma[x] <= static_cast<float>(options.max_relative_sigma) * range[x] &&
-                         confidence[x] >= static_cast<float>(options.min_confidence);
+                         sigma[x] > 0.0F && sigma[x] <= kMaxRelativeSigma * range[x] &&
+                         confidence[x] >= kMinConfidence;
       if (known) {
         out[x] = 1.0F / range[x];
         ++*num_known;
@@ -87,7 +84,7 @@ cv::Mat inverseRange(const RangeMap& map, const HeightFusionOptions& options, si
 }  // namespace
 
 PackedRangeMap packRangeMap(const RangeMap& map, const RigidTransform& world_from_camera,
-                            const HeightFusionOptions& options) {
+                            const RangeWeighting& weighting) {
   check(map.range_m.type() == CV_32FC1 && map.standard_deviation_m.size() == map.range_m.size() &&
             map.confidence.size() == map.range_m.size(),
         "packRangeMap: expected three CV_32FC1 images of one size");
@@ -106,8 +103,8 @@ PackedRangeMap packRangeMap(const RangeMap& map, const RigidTransform& world_fro
   }
   packed.position_m = world_from_camera.translation();
 
-  const RangeWeight weightOf(options, (1.0F + packed.xi) / packed.fx);  // of a pixel in the middle
-  const cv::Mat inverse = inverseRange(map, options, &packed.num_known);
+  const RangeWeight weightOf(weighting, (1.0F + packed.xi) / packed.fx);  // angle of a pixel in the middle
+  const cv::Mat inverse = inverseRange(map, &packed.num_known);
   packed.values.resize(inverse.total() * PackedRangeMap::kValues);
   float* out = packed.values.data();
   for (int y = 0; y < inverse.rows; ++y) {

@@ -6,7 +6,7 @@
 namespace vcharge {
 namespace {
 
-constexpr int kKeyBits = 16;  // of each axis of an octree's key
+constexpr int kKeyBits = 16;  // bits per axis of an octree's key
 
 }  // namespace
 

@@ -11,21 +11,21 @@
 
 namespace vcharge {
 
-/// Values of voxels in cubes of 16 x 16 x 16, so that most accesses along a ray find the cube of the one
-/// before: a tenth of the time of a descent in an octree or of a set of keys. Each voxel has marks besides,
-/// which belong to one view and are gone with the next.
+/// Values of voxels in cubes of 16 x 16 x 16 voxels. Most accesses along a ray hit the cube of the previous
+/// access, which takes a tenth of the time of a descent in an octree. Each voxel also has marks that
+/// startView() clears.
 class VoxelBlocks {
  public:
   struct Voxel {
-    float* value;  ///< NaN until somebody sets it
+    float* value;  ///< NaN until it is set
     uint8_t* marks;
   };
 
-  /// Forgets all marks.
+  /// Clears all marks.
   void startView() { ++view_; }
-  /// Valid until the next call of startView().
+  /// The marks are valid until the next call of startView().
   Voxel at(const octomap::OcTreeKey& key);
-  /// Calls with each voxel that has a value, in no certain order.
+  /// Calls visit(key, value) for each voxel with a value, in an unspecified order.
   void forEach(const std::function<void(const octomap::OcTreeKey& key, float value)>& visit) const;
 
  private:
@@ -35,7 +35,7 @@ class VoxelBlocks {
   struct Block {
     std::array<float, kVoxels> values;
     std::array<uint8_t, kVoxels> marks;
-    uint64_t view;  // that the marks belong to
+    uint64_t view;  // view that the marks belong to
   };
 
   std::unordered_map<uint64_t, std::unique_ptr<Block>> blocks_;

@@ -102,8 +102,6 @@ AddColumnWeights addColumnWeightsKernel() {
 
 WeightProfile::WeightProfile(const HeightFusionOptions& options)
     : max_range_m(static_cast<float>(options.max_range_m)),
-      band_m(static_cast<float>(options.band_m)),
-      min_ramp_m(static_cast<float>(options.min_ramp_m)),
       free_weight(static_cast<float>(options.free_weight)) {}
 
 }  // namespace vcharge

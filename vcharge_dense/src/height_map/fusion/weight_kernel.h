@@ -1,31 +1,35 @@
 #pragma once
 
 #include "height_map/fusion/packed_range_map.h"
+#include "vcharge_dense/height_map_options.h"
 
 namespace vcharge {
 
-/// How a ray's weight runs along it: see HeightFusionOptions.
+/// How a range's weight varies along its ray.
 struct WeightProfile {
-  float max_range_m, band_m, min_ramp_m, free_weight;
+  float max_range_m;
+  float band_m = 0.15F;      ///< behind the surface voxels are occupied this far, beyond they are unknown
+  float min_ramp_m = 0.01F;  ///< the weight runs from free to occupied over sigma, but over no less than this
+  float free_weight;
 
   explicit WeightProfile(const HeightFusionOptions& options);
 };
 
-/// The voxels of one column as seen from a camera.
+/// The voxels of one column in a camera's frame.
 struct VoxelColumn {
   float first[3];  ///< centre of the lowest voxel in the camera's frame, metres
   float step[3];   ///< from a voxel to the one above it
-  int count;       ///< of voxels, a multiple of kVoxelLanes
+  int count;       ///< number of voxels, a multiple of kVoxelLanes
 };
 
-constexpr int kVoxelLanes = 16;  // of the widest vectors
+constexpr int kVoxelLanes = 16;  // lanes of the widest vectors
 
 /// Adds a range map's weight to each voxel of a column: negative in front of the surface on the voxel's ray,
-/// rising over sigma to positive in a band behind it, zero beyond; times the range's weight.
+/// rising over sigma to positive in a band behind it and zero beyond, times the weight of the range.
 using AddColumnWeights = void (*)(const PackedRangeMap& map, const WeightProfile& profile,
                                   const VoxelColumn& column, float* weights);
 
-/// The best one for this machine.
+/// The kernel of the best instruction set of this machine.
 AddColumnWeights addColumnWeightsKernel();
 
 }  // namespace vcharge

@@ -13,15 +13,23 @@
 namespace vcharge {
 namespace {
 
-HeightFusionOptions fusionOptions() {
-  HeightFusionOptions options;
-  options.min_ramp_m = 0.02;
-  options.reference_footprint_m = 0.0;
-  options.reference_confidence = 0.0;
-  return options;
+constexpr float kScale = 1.0F / (1.0F + 0.16F);  // of a sigma of 0.02 m over the reference sigma, squared
+
+/// Ranges count by their standard deviation alone: those of blankView() have a confidence of 1.
+RangeWeighting weightingBySigma() {
+  RangeWeighting weighting;
+  weighting.reference_footprint_m = 1e9;
+  weighting.reference_confidence = 0.99;
+  return weighting;
 }
 
-/// Weights along the optical axis, 5 cm apart, in front of a wall at 2 m.
+WeightProfile profileWithRamp() {
+  WeightProfile profile{HeightFusionOptions()};
+  profile.min_ramp_m = 0.02F;
+  return profile;
+}
+
+/// Weights every 5 cm along the optical axis in front of and behind a wall at 2 m.
 std::vector<float> alongAxis(float sigma_m) {
   RangeMap map = testing::blankView(cv::Size(64, 48));
   for (int y = 0; y < map.range_m.rows; ++y) {
@@ -30,22 +38,20 @@ std::vector<float> alongAxis(float sigma_m) {
     }
   }
   map.standard_deviation_m.setTo(sigma_m);
-  const PackedRangeMap packed = packRangeMap(map, RigidTransform(), fusionOptions());
+  const PackedRangeMap packed = packRangeMap(map, RigidTransform(), weightingBySigma());
   std::vector<float> weights(64, 0.0F);
-  addColumnWeightsKernel()(packed, WeightProfile(fusionOptions()), {{0, 0, 0.525F}, {0, 0, 0.05F}, 64},
-                           weights.data());
+  addColumnWeightsKernel()(packed, profileWithRamp(), {{0, 0, 0.525F}, {0, 0, 0.05F}, 64}, weights.data());
   return weights;
 }
 
 TEST(WeightKernelTest, IsFreeInFrontOccupiedInABandBehindAndNothingBeyond) {
   const std::vector<float> weights = alongAxis(0.02F);
-  const float scale = 1.0F / (1.0F + 0.16F);  // sigma over reference sigma, squared
   for (int z = 0; z < 64; ++z) {
     const double behind = 0.525 + 0.05 * z - 2.0;
     if (behind < -0.021) {
-      EXPECT_NEAR(weights[z], -scale, 1e-3) << behind;
+      EXPECT_NEAR(weights[z], -kScale, 1e-3) << behind;
     } else if (behind > 0.021 && behind < 0.169) {
-      EXPECT_NEAR(weights[z], scale, 1e-3) << behind;
+      EXPECT_NEAR(weights[z], kScale, 1e-3) << behind;
     } else if (behind > 0.171) {
       EXPECT_EQ(weights[z], 0.0F) << behind;
     }
@@ -58,24 +64,22 @@ TEST(WeightKernelTest, CountsUncertainRangesLess) {
 }
 
 TEST(WeightKernelTest, CountsRangesByTheLogOddsOfTheirConfidence) {
-  HeightFusionOptions options = fusionOptions();
+  RangeWeighting weighting = weightingBySigma();
+  weighting.reference_confidence = 0.9;
   const auto weightAt = [&](double confidence) {
     RangeMap map = testing::blankView(cv::Size(64, 48));
     map.confidence.setTo(confidence);
-    return packRangeMap(map, RigidTransform(), options).values[4];
+    return packRangeMap(map, RigidTransform(), weighting).values[4];
   };
-  const float alike = weightAt(0.7);
-  EXPECT_EQ(weightAt(0.95), alike);
-  options.reference_confidence = 0.9;
-  EXPECT_NEAR(weightAt(0.9), alike, 1e-5);
+  EXPECT_NEAR(weightAt(0.9), kScale, 1e-5);
   EXPECT_NEAR(weightAt(0.5), 0.0, 1e-5);
-  EXPECT_NEAR(weightAt(0.99) / alike, std::log(99.0) / std::log(9.0), 1e-3);
+  EXPECT_NEAR(weightAt(0.99) / kScale, std::log(99.0) / std::log(9.0), 1e-3);
   EXPECT_EQ(weightAt(1.0), weightAt(0.99));  // finite
 }
 
 TEST(WeightKernelTest, CountsRangesLessWhosePixelSpansMoreOfTheSurface) {
-  // Level ground 1 m below a camera that looks to the horizon: on the axis' column a pixel at range r spans
-  // r * r / 1 m of it for each radian.
+  // Level ground 1 m below a camera that faces the horizon: in the middle column a pixel at range r spans
+  // r * r / 1 m of ground per radian.
   RangeMap map = testing::blankView(cv::Size(640, 400));
   for (int y = 0; y < map.range_m.rows; ++y) {
     for (int x = 0; x < map.range_m.cols; ++x) {
@@ -83,19 +87,19 @@ TEST(WeightKernelTest, CountsRangesLessWhosePixelSpansMoreOfTheSurface) {
       map.range_m.at<float>(y, x) = down > 0.05 ? static_cast<float>(1.0 / down) : std::nanf("");
     }
   }
-  HeightFusionOptions options = fusionOptions();
-  const PackedRangeMap without = packRangeMap(map, RigidTransform(), options);
-  options.reference_footprint_m = 0.05;
-  const PackedRangeMap with = packRangeMap(map, RigidTransform(), options);
+  RangeWeighting weighting = weightingBySigma();
+  const PackedRangeMap without = packRangeMap(map, RigidTransform(), weighting);
+  weighting.reference_footprint_m = 0.05;
+  const PackedRangeMap with = packRangeMap(map, RigidTransform(), weighting);
   const double pixel_rad = 2.1 / 320.0;
   int num = 0;
   for (int y = 210; y < 300; y += 10) {
     const size_t at = (static_cast<size_t>(y) * 640 + 320) * PackedRangeMap::kValues;
     const double range = map.range_m.at<float>(y, 320);
     if (!(range > 2.0)) {
-      continue;  // nearer, pixels away from the middle are wider
+      continue;  // closer ground is imaged far from the middle, where pixels are wider
     }
-    const double relative = range * range * pixel_rad / options.reference_footprint_m;
+    const double relative = range * range * pixel_rad / weighting.reference_footprint_m;
     EXPECT_NEAR(with.values[at + 4] / without.values[at + 4], 1.0 / (1.0 + relative * relative),
                 0.2 / (1.0 + relative * relative))
         << range;
@@ -114,10 +118,10 @@ TEST(WeightKernelTest, EqualsThePlainReference) {
       map.standard_deviation_m.at<float>(y, x) = 0.3F * uniform(random);
     }
   }
-  HeightFusionOptions options = fusionOptions();
-  options.reference_footprint_m = 0.1;
-  const PackedRangeMap packed = packRangeMap(map, RigidTransform(), options);
-  const WeightProfile profile(options);
+  RangeWeighting weighting = weightingBySigma();
+  weighting.reference_footprint_m = 0.1;
+  const PackedRangeMap packed = packRangeMap(map, RigidTransform(), weighting);
+  const WeightProfile profile = profileWithRamp();
   size_t num_different = 0, num_touched = 0;
   for (int trial = 0; trial < 3000; ++trial) {
     const auto spread = [&](float width) { return width * (2.0F * uniform(random) - 1.0F); };
@@ -132,22 +136,22 @@ TEST(WeightKernelTest, EqualsThePlainReference) {
     }
   }
   EXPECT_GT(num_touched, 20000U);
-  // A pixel's border and the band's end may fall to either side by rounding.
+  // Rounding may shift the border of a pixel and the end of the band.
   EXPECT_LE(num_different, num_touched / 1000);
 }
 
-TEST(WeightKernelTest, TakesNothingFromRangesThatAreNotSure) {
+TEST(WeightKernelTest, LeavesOutUnknownAndUncertainRanges) {
   for (const float range : {std::nanf(""), std::numeric_limits<float>::infinity(), -1.0F, 0.0F}) {
     RangeMap map = testing::blankView(cv::Size(64, 48));
     map.range_m.setTo(range);
-    EXPECT_EQ(packRangeMap(map, RigidTransform(), fusionOptions()).num_known, 0U) << range;
+    EXPECT_EQ(packRangeMap(map, RigidTransform()).num_known, 0U) << range;
   }
   RangeMap map = testing::blankView(cv::Size(64, 48));
   map.confidence.setTo(0.1F);
-  EXPECT_EQ(packRangeMap(map, RigidTransform(), fusionOptions()).num_known, 0U);
+  EXPECT_EQ(packRangeMap(map, RigidTransform()).num_known, 0U);
   map = testing::blankView(cv::Size(64, 48));
   map.standard_deviation_m.setTo(std::nanf(""));
-  EXPECT_EQ(packRangeMap(map, RigidTransform(), fusionOptions()).num_known, 0U);
+  EXPECT_EQ(packRangeMap(map, RigidTransform()).num_known, 0U);
 }
 
 }  // namespace

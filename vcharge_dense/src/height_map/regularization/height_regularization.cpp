@@ -9,10 +9,17 @@ namespace {
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinite = std::numeric_limits<float>::infinity();
 
+// Weights of the data in the paper's two energies; alpha_1 and alpha_2 are 1. Gradients are differences
+// between neighbouring cells, so that all three are per cell.
+constexpr double kLabelLambda = 0.1;
+constexpr float kHeightLambda = 2.0F;
+constexpr float kHuberEpsilon_m = 0.002F;  // larger values draw ramps before distant kerbs
+
+constexpr PrimalDualSettings kLabelSolver{1e-3, 4000, 1.0};
+
 }  // namespace
 
-cv::Mat labelObserved(const ColumnImages& columns, const HeightRegularizationOptions& options,
-                      PrimalDualReport* report) {
+cv::Mat labelObserved(const ColumnImages& columns, double gamma, PrimalDualReport* report) {
   const cv::Size size = columns.best_height_m.size();
   VariationalProblem problem;
   problem.floor = cv::Mat(size, CV_32FC1, cv::Scalar(-kInfinite));
@@ -21,31 +28,29 @@ cv::Mat labelObserved(const ColumnImages& columns, const HeightRegularizationOpt
   cv::Mat start(size, CV_32FC1);
   for (int row = 0; row < size.height; ++row) {
     for (int column = 0; column < size.width; ++column) {
-      // l (C^min + gamma) + (1 - l) C^occ, less what does not depend on l.
+      // Cost l (C^min + gamma) + (1 - l) C^occ without its part that does not depend on the label l.
       const bool has_surface = !std::isnan(columns.best_height_m.at<float>(row, column));
       const float gain = has_surface ? columns.occupied_gain.at<float>(row, column) : 0.0F;
-      const auto slope = static_cast<float>(options.label_lambda * (options.label_gamma - gain));
+      const auto slope = static_cast<float>(kLabelLambda * (gamma - gain));
       problem.slope.at<float>(row, column) = slope;
       start.at<float>(row, column) = slope < 0.0F ? 1.0F : 0.0F;
     }
   }
-  const cv::Mat label = solveVariational(problem, start, options.label_solver, report);
+  const cv::Mat label = solveVariational(problem, start, kLabelSolver, report);
   return label > 0.5;
 }
 
 cv::Mat smoothHeights(const ColumnImages& columns, const cv::Mat& observed, const VoxelGrid& grid,
-                      const HeightRegularizationOptions& options, PrimalDualReport* report) {
+                      PrimalDualReport* report) {
   const cv::Size size = columns.best_height_m.size();
   const auto delta = static_cast<float>(0.5 * grid.height_step_m);
   VariationalProblem problem;
   problem.floor.create(size, CV_32FC1);
   problem.ceiling.create(size, CV_32FC1);
-  problem.below = static_cast<float>(options.height_lambda * options.alpha_up);
-  problem.above = static_cast<float>(options.height_lambda * options.alpha_down);
-  problem.epsilon = static_cast<float>(options.huber_epsilon_m);
-  const double share = options.confidence_weighting;
-  problem.weight_below = cv::Mat(columns.support_below * share + (1.0 - share));
-  problem.weight_above = cv::Mat(columns.support_above * share + (1.0 - share));
+  problem.below = problem.above = kHeightLambda;
+  problem.epsilon = kHuberEpsilon_m;
+  problem.weight_below = columns.support_below;
+  problem.weight_above = columns.support_above;
   problem.low = static_cast<float>(grid.bottom_m);
   problem.high = static_cast<float>(grid.top_m());
   for (int row = 0; row < size.height; ++row) {
@@ -57,7 +62,7 @@ cv::Mat smoothHeights(const ColumnImages& columns, const cv::Mat& observed, cons
       problem.ceiling.at<float>(row, column) = !is_observed ? kNan : has_surface ? best + delta : kInfinite;
     }
   }
-  return solveVariational(problem, columns.best_height_m, options.height_solver, report);
+  return solveVariational(problem, columns.best_height_m, PrimalDualSettings(), report);
 }
 
 }  // namespace vcharge

@@ -5,16 +5,14 @@
 
 namespace vcharge {
 
-/// First pass: which cells were observed (paper, E^Labeling). A cell is observed where that is cheaper than
-/// not: where the free space above its best height outweighs gamma, but for the boundary's length. CV_8UC1,
-/// 255 where observed.
-cv::Mat labelObserved(const ColumnImages& columns, const HeightRegularizationOptions& options,
-                      PrimalDualReport* report);
+/// First pass: finds the observed cells (paper, E^Labeling), where the evidence for free space above the best
+/// height exceeds gamma, with a cost for the length of the boundary. Returns CV_8UC1, 255 where observed.
+cv::Mat labelObserved(const ColumnImages& columns, double gamma, PrimalDualReport* report);
 
-/// Second pass: heights of the observed cells (paper, E^Height), with the flat-bottomed cost about each
-/// column's best height, delta half a voxel. Observed cells that saw no surface follow their neighbours.
-/// CV_32FC1, NaN elsewhere.
+/// Second pass: smooths the heights of the observed cells (paper, E^Height). Heights within half a voxel
+/// (delta) of a column's best height cost nothing; observed cells without a surface follow their neighbours.
+/// Returns CV_32FC1, NaN elsewhere.
 cv::Mat smoothHeights(const ColumnImages& columns, const cv::Mat& observed, const VoxelGrid& grid,
-                      const HeightRegularizationOptions& options, PrimalDualReport* report);
+                      PrimalDualReport* report);
 
 }  // namespace vcharge

@@ -15,7 +15,7 @@ namespace vcharge {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr int kBandRows = 128;  // that a thread takes at once, with as many beside as it runs iterations
+constexpr int kBandRows = 128;  // rows per task, plus one more on both sides for each iteration
 constexpr int kIterationsPerCheck = 48;
 
 size_t strideFor(int columns) {
@@ -23,7 +23,8 @@ size_t strideFor(int columns) {
   return padded + 2 * kRowPadding;
 }
 
-/// Into rows of `stride` that begin after kRowPadding elements, with a row before and one after.
+/// Copies an image into rows of `stride` elements that begin after kRowPadding elements, with one row before
+/// and one after them.
 AlignedArray<float> padded(const cv::Mat& image, size_t stride, int rows, float outside) {
   AlignedArray<float> array;
   array.assign(stride * static_cast<size_t>(rows + 2), outside);
@@ -44,7 +45,7 @@ PrimalDualSolver::PrimalDualSolver(const VariationalProblem& problem, const cv::
             (problem.weight_below.empty() || problem.weight_below.size() == start.size()) &&
             (problem.weight_above.empty() || problem.weight_above.size() == start.size()),
         "PrimalDualSolver: expected CV_32FC1 images of one size");
-  // The gradient's norm is below sqrt(8): the product of the steps must not exceed 1/8.
+  // The norm of the gradient is below sqrt(8), so the product of the steps must not exceed 1/8.
   primal_step_ = static_cast<float>(step_ratio / std::sqrt(8.0));
   dual_step_ = static_cast<float>(1.0 / (step_ratio * std::sqrt(8.0)));
   floor_ = padded(problem.floor, stride_, rows_, kNan);
@@ -70,7 +71,7 @@ PrimalDualSolver::PrimalDualSolver(const VariationalProblem& problem, const cv::
 }
 
 void PrimalDualSolver::iterateBand(int first_row, int last_row, const Fields& from, Fields* to) const {
-  // Rows beside the band go wrong from the outside, one with each iteration, and are thrown away.
+  // Each iteration invalidates one more row beside the band; those rows are discarded.
   const int begin = std::max(0, first_row - kIterationsAtOnce);
   const int end = std::min(rows_, last_row + kIterationsAtOnce);
   thread_local Fields scratch;
@@ -91,7 +92,7 @@ void PrimalDualSolver::iterateBand(int first_row, int last_row, const Fields& fr
   static const IterateRow iterateRow = iterateRowKernel();
   const int count = end - begin;
   for (int front = 0; front < count + kIterationsAtOnce - 1; ++front) {
-    // Each iteration follows a row behind the one before it.
+    // Each iteration follows one row behind the previous one.
     for (int behind = 0; behind < kIterationsAtOnce; ++behind) {
       const int row = front - behind;
       if (row < 0 || row >= count) {
@@ -144,7 +145,7 @@ double PrimalDualSolver::rowEnergy(int row, double* dual) const {
     const double by_y = std::isnan(next_row[i]) ? 0.0 : next_row[i] - value[i];
     const double norm = std::hypot(by_x, by_y);
     primal += (norm < epsilon ? norm * norm / (2.0 * epsilon) : norm - 0.5 * epsilon) + cost(value[i]);
-    // The conjugate of the Huber norm, and the least of the data's cost plus the divergence's line.
+    // Conjugate of the Huber norm, and minimum of the data cost plus the linear term of the divergence.
     const double line = -(static_cast<double>(dual_x[i]) - dual_x[i - 1] + dual_y[i] -
                           dual_y[static_cast<std::ptrdiff_t>(i) - static_cast<std::ptrdiff_t>(stride_)]);
     const auto lagrangian = [&](double u) { return cost(u) + line * u; };
@@ -180,11 +181,11 @@ cv::Mat PrimalDualSolver::values() const {
 }
 
 cv::Mat solveVariational(const VariationalProblem& problem, const cv::Mat& start,
-                         const PrimalDualOptions& options, PrimalDualReport* report) {
-  PrimalDualSolver solver(problem, start, options.step_ratio);
-  const double enough = options.max_gap_per_cell * std::max(1, solver.numCells());
+                         const PrimalDualSettings& settings, PrimalDualReport* report) {
+  PrimalDualSolver solver(problem, start, settings.step_ratio);
+  const double enough = settings.max_gap_per_cell * std::max(1, solver.numCells());
   *report = solver.evaluate();
-  while (report->gap > enough && report->iterations < options.max_iterations) {
+  while (report->gap > enough && report->iterations < settings.max_iterations) {
     for (int i = 0; i < kIterationsPerCheck; i += PrimalDualSolver::kIterationsAtOnce) {
       solver.iterate();
     }

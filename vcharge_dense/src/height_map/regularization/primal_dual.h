@@ -6,18 +6,17 @@
 #include <opencv2/core.hpp>
 
 #include "kernels/aligned_array.h"
-#include "vcharge_dense/height_map_options.h"
 
 namespace vcharge {
 
-/// min over u of  sum |grad u|_eps + sum of the data's cost,  low <= u <= high, on the cells of the domain;
-/// gradients are forward differences between neighbours of the domain, |.|_eps is the Huber norm of the paper
-/// (eps = 0: total variation). A cell's cost is
+/// Minimizes  sum |grad u|_eps + sum of the data costs  over low <= u <= high on the cells of a domain.
+/// Gradients are forward differences between neighbouring cells of the domain, |.|_eps is the Huber norm of
+/// the paper (total variation for eps = 0). The data cost of a cell is
 ///   weight_below * below * [floor - u]_+  +  weight_above * above * [u - ceiling]_+  +  slope * u.
 struct VariationalProblem {
-  cv::Mat floor;         ///< CV_32FC1; NaN outside the domain, -inf where nothing pulls up
-  cv::Mat ceiling;       ///< CV_32FC1; +inf where nothing pulls down
-  cv::Mat slope;         ///< CV_32FC1, or empty: none
+  cv::Mat floor;         ///< CV_32FC1; NaN outside the domain, -inf: no cost below
+  cv::Mat ceiling;       ///< CV_32FC1; +inf: no cost above
+  cv::Mat slope;         ///< CV_32FC1, or empty: 0
   cv::Mat weight_below;  ///< CV_32FC1, not negative, or empty: 1
   cv::Mat weight_above;  ///< the same
   float below = 0.0F, above = 0.0F;
@@ -25,28 +24,35 @@ struct VariationalProblem {
   float low = 0.0F, high = 1.0F;
 };
 
+/// When the iterations stop, and their step.
+struct PrimalDualSettings {
+  double max_gap_per_cell = 2e-4;  ///< duality gap over the number of cells, in the energy's unit
+  int max_iterations = 4000;
+  double step_ratio = 0.1;  ///< primal over dual step: about the distance that values change by
+};
+
 /// Convergence of a solution.
 struct PrimalDualReport {
   int iterations = 0;
   double primal_energy = 0.0;
-  double gap = 0.0;  ///< duality gap: the energy is no more than this above the least one
+  double gap = 0.0;  ///< duality gap: upper bound of the energy above the minimum
   bool converged = false;
 };
 
-/// First-order primal-dual algorithm (Chambolle and Pock 2011, algorithm 1) in blocks of rows that run
-/// several iterations each while they are in the cache. The same result on any number of threads.
+/// First-order primal-dual algorithm (Chambolle and Pock 2011, algorithm 1) in bands of rows that do several
+/// iterations while they are in the cache. Results do not depend on the number of threads.
 class PrimalDualSolver {
  public:
-  /// `start`: CV_32FC1, the first values; those of the domain are clamped to [low, high].
+  /// `start`: CV_32FC1, initial values, which are clamped to [low, high].
   PrimalDualSolver(const VariationalProblem& problem, const cv::Mat& start, double step_ratio);
 
-  /// kIterationsAtOnce iterations.
+  /// Does kIterationsAtOnce iterations.
   void iterate();
   static constexpr int kIterationsAtOnce = 8;
 
-  /// Energy and duality gap of the present values.
+  /// Energy and duality gap of the current values.
   PrimalDualReport evaluate() const;
-  /// CV_32FC1: the present values, NaN outside the domain.
+  /// Current values, CV_32FC1, NaN outside the domain.
   cv::Mat values() const;
   int numCells() const { return num_cells_; }
 
@@ -68,9 +74,8 @@ class PrimalDualSolver {
   Fields now_, next_;
 };
 
-/// Iterates until the duality gap is small enough, or max_iterations are done. `progress` (may be empty) is
-/// called now and then.
+/// Iterates until the duality gap is small enough or max_iterations are done.
 cv::Mat solveVariational(const VariationalProblem& problem, const cv::Mat& start,
-                         const PrimalDualOptions& options, PrimalDualReport* report);
+                         const PrimalDualSettings& settings, PrimalDualReport* report);
 
 }  // namespace vcharge

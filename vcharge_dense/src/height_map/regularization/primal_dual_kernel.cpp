@@ -20,7 +20,7 @@ HWY_INLINE VF set(float value) {
   return hn::Set(DF(), value);
 }
 
-/// 0 in place of NaN: no gradient reaches out of the domain.
+/// Replaces NaN by 0: there are no gradients across the border of the domain.
 HWY_INLINE VF orZero(VF value) {
   return hn::IfThenElseZero(hn::Eq(value, value), value);
 }
@@ -53,7 +53,7 @@ HWY_INLINE void updateValues(const PrimalDualRow& row, const PrimalDualSteps& st
     const VF divergence = hn::Add(hn::Sub(hn::Load(df, row.dual_x + i), hn::LoadU(df, row.dual_x + i - 1)),
                                   hn::Sub(hn::Load(df, row.dual_y + i), hn::Load(df, row.dual_y_above + i)));
     const VF moved = hn::MulAdd(step, hn::Sub(divergence, hn::Load(df, row.slope + i)), before);
-    // Proximal map of the flat-bottomed cost: towards the bottom, not beyond its edge.
+    // Proximal map of the data cost: moves towards [floor, ceiling], but not into it.
     const VF weight_below = hn::Load(df, row.weight_below + i);
     const VF weight_above = hn::Load(df, row.weight_above + i);
     const VF raised = hn::Min(hn::MulAdd(weight_below, below, moved), floor);

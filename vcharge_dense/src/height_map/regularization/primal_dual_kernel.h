@@ -4,15 +4,15 @@
 
 namespace vcharge {
 
-/// One row of the fields. All rows begin at an aligned element with kRowPadding elements before and after
-/// them in memory, which are NaN (values) or 0 (duals).
+/// One row of the fields. Rows begin at an aligned element and have kRowPadding elements before and after
+/// them, which are NaN (values) or 0 (duals).
 struct PrimalDualRow {
   float* value;
   float* extrapolated;
-  const float* extrapolated_below;  ///< of the next row
+  const float* extrapolated_below;  ///< the next row
   float* dual_x;
   float* dual_y;
-  const float* dual_y_above;  ///< of the row before
+  const float* dual_y_above;  ///< the previous row
   const float* floor;
   const float* ceiling;
   const float* slope;
@@ -21,16 +21,16 @@ struct PrimalDualRow {
   size_t padded_columns;  ///< a multiple of kRowPadding
 };
 
-constexpr size_t kRowPadding = 16;  // elements, of the widest vectors
+constexpr size_t kRowPadding = 16;  // elements of the widest vectors
 
 struct PrimalDualSteps {
   float primal, dual;
   float dual_shrink;   ///< 1 / (1 + dual * epsilon)
-  float below, above;  ///< the data's slopes times the primal step
+  float below, above;  ///< slopes of the data cost times the primal step
   float low, high;
 };
 
-/// One iteration on one row: its duals from the extrapolated values, then its values from the duals.
+/// One iteration on one row: updates its duals, then its values.
 using IterateRow = void (*)(const PrimalDualRow& row, const PrimalDualSteps& steps);
 IterateRow iterateRowKernel();
 

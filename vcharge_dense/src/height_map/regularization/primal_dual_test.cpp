@@ -83,7 +83,7 @@ double largestDifference(const cv::Mat& a, const cv::Mat& b) {
 }
 
 TEST(PrimalDualTest, EqualsThePlainLoop) {
-  // More than one band of rows, and columns that fill no vector.
+  // More than one band of rows, and columns that do not fill a vector.
   for (const Case& c : {heightCase({77, 300}, 1), heightCase({5, 3}, 2), labelCase({130, 140}, 3)}) {
     PrimalDualSolver solver(c.problem, c.start, 0.1);
     PlainPrimalDual plain(c.problem, c.start, 0.1);
@@ -111,11 +111,10 @@ TEST(PrimalDualTest, IsTheSameOnAnyNumberOfThreads) {
   EXPECT_EQ(largestDifference(results[0], results[1]), 0.0);
 }
 
-/// No value of a small grid can be changed, alone or together with a rectangle of others, so that the energy
-/// falls by more than the gap says.
+/// Expects that no change of a rectangle of cells lowers the energy by more than the duality gap.
 void expectOptimal(const Case& c, double max_gap) {
   PrimalDualReport report;
-  PrimalDualOptions options;
+  PrimalDualSettings options;
   options.max_gap_per_cell = max_gap;
   options.max_iterations = 200000;
   const cv::Mat solution = solveVariational(c.problem, c.start, options, &report);
@@ -124,7 +123,7 @@ void expectOptimal(const Case& c, double max_gap) {
   EXPECT_NEAR(report.primal_energy, energy, 1e-4 * (1.0 + std::abs(energy)));
   EXPECT_GE(report.gap, -1e-4);
 
-  // The slow way: many more plain iterations from another start reach the same energy.
+  // Many plain iterations from another start reach the same energy.
   cv::Mat other(c.start.size(), CV_32FC1, cv::Scalar(c.problem.high));
   PlainPrimalDual plain(c.problem, other, 0.3);
   for (int i = 0; i < 60000; ++i) {
@@ -161,15 +160,14 @@ TEST(PrimalDualTest, FindsTheLeastEnergyOfSmallLabellings) {
   expectOptimal(labelCase({9, 8}, 13), 1e-5);
 }
 
-TEST(PrimalDualTest, LabelsAsTryingAllOfThemDoes) {
-  // The relaxed solution at one half is a best labelling of the cells in 0 and 1 (Chan, Esedoglu, Nikolova)
-  // where the variation is a sum over the two directions; with the isotropic one of these differences it is
-  // no worse than the best one along a line.
+TEST(PrimalDualTest, LabelsLikeAnExhaustiveSearch) {
+  // Thresholding the relaxed solution gives an optimal labelling where the total variation is anisotropic
+  // (Chan, Esedoglu and Nikolova 2006). Along a line of cells the isotropic variation is the same.
   const int num_cells = 14;
   for (uint32_t seed = 20; seed < 26; ++seed) {
     const Case c = labelCase({num_cells, 1}, seed);
     PrimalDualReport report;
-    PrimalDualOptions options;
+    PrimalDualSettings options;
     options.max_gap_per_cell = 1e-6;
     options.max_iterations = 100000;
     const cv::Mat solution = solveVariational(c.problem, c.start, options, &report);
@@ -194,7 +192,7 @@ TEST(PrimalDualTest, LeavesAFlatBottomAlone) {
   c.problem.ceiling = cv::Mat(20, 20, CV_32FC1, cv::Scalar(0.3));
   c.start = cv::Mat(20, 20, CV_32FC1, cv::Scalar(0.2));
   PrimalDualReport report;
-  const cv::Mat solution = solveVariational(c.problem, c.start, PrimalDualOptions(), &report);
+  const cv::Mat solution = solveVariational(c.problem, c.start, PrimalDualSettings(), &report);
   EXPECT_EQ(report.iterations, 0);
   EXPECT_NEAR(report.gap, 0.0, 1e-9);
   EXPECT_LT(largestDifference(solution, c.start), 1e-9);
@@ -208,16 +206,16 @@ TEST(PrimalDualTest, StaysWithinTheGridsHeights) {
   c.problem.weight_below.setTo(1.0F);
   c.problem.weight_above.setTo(1.0F);
   PrimalDualReport report;
-  const cv::Mat solution = solveVariational(c.problem, c.start, PrimalDualOptions(), &report);
+  const cv::Mat solution = solveVariational(c.problem, c.start, PrimalDualSettings(), &report);
   EXPECT_TRUE(report.converged);
   EXPECT_LT(largestDifference(solution, cv::Mat(20, 20, CV_32FC1, cv::Scalar(1.0))), 1e-6);
 }
 
-TEST(PrimalDualTest, ManagesADomainWithoutCells) {
+TEST(PrimalDualTest, AcceptsADomainWithoutCells) {
   Case c = heightCase({20, 20}, 9);
   c.problem.floor.setTo(kNan);
   PrimalDualReport report;
-  const cv::Mat solution = solveVariational(c.problem, c.start, PrimalDualOptions(), &report);
+  const cv::Mat solution = solveVariational(c.problem, c.start, PrimalDualSettings(), &report);
   EXPECT_EQ(cv::countNonZero(solution == solution), 0);
   EXPECT_EQ(report.gap, 0.0);
 }

@@ -7,20 +7,48 @@
 #include <iostream>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "vcharge_core/files/file_io.h"
 
 namespace vcharge {
 
-/// For CLI::Option::check(): an empty path is no path.
+/// For CLI::Option::check() of a path to read.
 inline std::string requireNotEmpty(const std::string& value) {
   return value.empty() ? "expected a path, got ''" : "";
 }
 
-/// A tool's main(): parses its arguments, then calls `run`. Returns the exit status, which is 0 only for
-/// success. Asked for --show-options, a tool that has it requires nothing else. An error, of the arguments or
-/// thrown by `run`, is one line "<tool>: <what>" on standard error.
-inline int runTool(CLI::App* app, int argc, char** argv, const std::function<void()>& run) {
+/// For CLI::Option::check() of a file to write: reports before the work starts that it cannot be written.
+/// Throws InputError naming the path.
+inline std::string requireOutput(const std::string& value) {
+  const std::string error = requireNotEmpty(value);
+  if (error.empty()) {
+    requireWritable(value);
+  }
+  return error;
+}
+/// The same for a folder to write.
+inline std::string requireOutputFolder(const std::string& value) {
+  const std::string error = requireNotEmpty(value);
+  if (error.empty()) {
+    requireWritableFolder(value);
+  }
+  return error;
+}
+
+/// Adds --show-options to a tool. runTool() then requires nothing else.
+inline void addShowOptions(CLI::App* app, bool* show_options) {
+  app->add_flag("--show-options", *show_options,
+                "print all options with their values, units and meaning, and do nothing else");
+}
+
+namespace internal {
+
+/// Parses the arguments, runs, and turns an error into one line and an exit status.
+inline int parseAndRun(CLI::App* app, int argc, char** argv, const std::function<void()>& run) {
   const std::string tool = std::filesystem::path(argv[0]).filename().string();
   if (std::find(argv, argv + argc, std::string_view("--show-options")) != argv + argc) {
     for (CLI::Option* option : app->get_options()) {
@@ -41,6 +69,43 @@ inline int runTool(CLI::App* app, int argc, char** argv, const std::function<voi
     return 1;
   }
   return 0;
+}
+
+inline void writeJson(const nlohmann::json& found, const std::string& path) {
+  if (!path.empty()) {
+    writeTextFileAtomically(path, found.dump(1) + "\n");
+  }
+}
+
+}  // namespace internal
+
+/// A tool's main(): parses its arguments, then calls `run`. Returns the exit status, which is 0 only for
+/// success. With --show-options, a tool that has it requires nothing else. An error, of the arguments or
+/// thrown by `run`, is one line "<tool>: <what>" on standard error.
+///
+/// Where `run` takes a `nlohmann::json*`, the tool also gets `--json FILE`: what `run` puts into this object
+/// is written there when it returns, and when it throws, then with the error's text as "error". The tool
+/// documents the keys in `app->footer("Keys of --json: ...")`. Not a number is written as null.
+template <class Run>
+int runTool(CLI::App* app, int argc, char** argv, const Run& run) {
+  if constexpr (std::is_invocable_v<const Run&, nlohmann::json*>) {
+    std::string path;
+    app->add_option("--json", path, "file for what the tool measured or found (keys below)")
+        ->check(requireOutput);
+    return internal::parseAndRun(app, argc, argv, [&] {
+      nlohmann::json found = nlohmann::json::object();
+      try {
+        run(&found);
+      } catch (const std::exception& error) {
+        found["error"] = error.what();
+        internal::writeJson(found, path);
+        throw;
+      }
+      internal::writeJson(found, path);
+    });
+  } else {
+    return internal::parseAndRun(app, argc, argv, run);
+  }
 }
 
 }  // namespace vcharge

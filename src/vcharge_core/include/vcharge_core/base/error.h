@@ -11,7 +11,8 @@ class InputError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Throws std::logic_error with `message` unless `condition` holds: for a caller's bug, not for bad input.
+/// Throws std::logic_error with `message` unless `condition` holds. For bugs of the caller, not for bad
+/// input.
 inline void check(bool condition, const char* message) {
   if (!condition) {
     throw std::logic_error(message);

@@ -7,7 +7,7 @@
 
 namespace vcharge {
 
-/// The values that a numeric option may have. Built by the functions below, as in `above(0.0).upTo(1.0)`.
+/// Allowed values of a numeric option. Built by the functions below, for example `above(0.0).upTo(1.0)`.
 struct OptionRange {
   double min = -std::numeric_limits<double>::infinity();
   double max = std::numeric_limits<double>::infinity();
@@ -16,9 +16,9 @@ struct OptionRange {
 
   constexpr OptionRange upTo(double value) const { return {min, value, includes_min, true}; }
   constexpr OptionRange below(double value) const { return {min, value, includes_min, false}; }
-  /// False for NaN.
+  /// Always false for NaN.
   bool contains(double value) const;
-  /// "must be positive", "must be in (0, 1]"; empty where every value is allowed.
+  /// For example "must be positive" or "must be in (0, 1]"; empty if every value is allowed.
   std::string requirement() const;
 };
 
@@ -41,7 +41,7 @@ constexpr OptionRange between(double min, double max) {
   return atLeast(min).upTo(max);
 }
 
-/// What is declared of an option beside its type and default.
+/// Declaration of an option: everything except its type and default.
 struct OptionDeclaration {
   const char* name;
   OptionRange range;
@@ -94,7 +94,7 @@ void visitLines(Self& self, Visitor& visit, std::integer_sequence<int, offsets..
   static void visitInherited(Self& /*self*/, Visitor&& /*visit*/) {} \
   static constexpr int kFirstOptionLine = __LINE__
 
-/// The same for a struct that has the options of `Base` before its own.
+/// The same for a struct that inherits the options of `Base` and lists them before its own.
 #define VCHARGE_BEGIN_DERIVED_OPTIONS(Struct, Base)         \
   using OptionsStruct = Struct;                             \
   void validate() const {                                   \
@@ -114,7 +114,7 @@ void visitLines(Self& self, Visitor& visit, std::integer_sequence<int, offsets..
   }                                                                                                 \
   type name = default_value
 
-/// Options of a part, as a map in YAML.
+/// A nested options struct; a map in YAML.
 #define VCHARGE_OPTION_GROUP(type, name, default_value, meaning) \
   VCHARGE_OPTION(type, name, default_value, ::vcharge::anyValue(), meaning)
 

@@ -13,21 +13,21 @@
 
 namespace vcharge {
 
-/// Name of each value of an option's enum, in order from 0; specialize for every enum used as a field:
+/// Names of the values of an enum, in order from 0; specialize it for every enum used as an option:
 ///   template <> inline std::vector<std::string> enumNames<Aggregation>() { return {"mean", "best_k"}; }
 template <class Enum>
 std::vector<std::string> enumNames();
 
-/// Calls visit(const OptionDeclaration&, field) for every field of an options struct, in order.
+/// Calls visit(const OptionDeclaration&, field) for every option of a struct, in order.
 template <class Options, class Visitor>
 void forEachOption(Options& options, Visitor&& visit);
 
 namespace internal {
 
-/// InputError: "<source>: <key>: expected <expected>, got '<node>'".
+/// Throws InputError "<source>: <key>: expected <expected>, got '<node>'".
 [[noreturn]] void throwBadField(const std::string& source, const std::string& key,
                                 const std::string& expected, const YAML::Node& node);
-/// InputError unless `node` is a map (or absent) all of whose keys are in `known`.
+/// Throws InputError unless `node` is absent or a map whose keys are all in `known`.
 void checkKeys(const YAML::Node& node, const std::string& source, const std::string& prefix,
                const std::vector<std::string>& known);
 void readValue(const YAML::Node& node, const std::string& source, const std::string& key, bool* value);
@@ -102,7 +102,7 @@ inline const char* typeName(const std::vector<std::string>& /*value*/) {
   return "texts";
 }
 
-/// std::invalid_argument where a value of the option is not allowed.
+/// Throws std::invalid_argument unless the value is in the option's range.
 void checkValue(const OptionDeclaration& option, double value);
 inline void checkValue(const OptionDeclaration& /*option*/, const std::string& /*value*/) {}
 inline void checkValue(const OptionDeclaration& /*option*/, const std::vector<std::string>& /*value*/) {}
@@ -138,12 +138,12 @@ void readStruct(const YAML::Node& node, const std::string& source, const std::st
   });
 }
 
-/// How an option is shown to a user.
+/// One row of the table that --show-options and the option reference print.
 struct OptionRow {
-  std::string key;  ///< with those of the groups around it, as in "tracker.max_features"
+  std::string key;  ///< including the groups around it, for example "tracker.max_features"
   std::string type;
   YAML::Node value;
-  std::string allowed;  ///< values, in words; empty: any
+  std::string allowed;  ///< the allowed values in words; empty if any value is allowed
   std::string meaning;
   bool is_group = false;
 };
@@ -180,14 +180,13 @@ void collectRows(const Options& options, const std::string& prefix, std::vector<
 }
 
 std::string showRows(const std::vector<OptionRow>& rows);
-std::string tableOfRows(const std::vector<OptionRow>& rows);
+std::string listRows(const std::vector<OptionRow>& rows);
 
 }  // namespace internal
 
-/// Overrides the fields of an options struct by the keys of a YAML map; fields without a key keep their
-/// value. The same function serves a YAML file and, through vcharge_ros, the parameter server. `source` names
-/// the file or namespace in errors. Throws InputError for unknown keys, values of a wrong type, and what
-/// validate() rejects; `options` is then unchanged.
+/// Overrides options by the keys of a YAML map; options without a key keep their value. Serves YAML files
+/// and, through vcharge_ros, the parameter server. `source` names the file or namespace in errors. Throws
+/// InputError for unknown keys, wrong types and values that validate() rejects; `options` is then unchanged.
 template <class Options>
 void readFields(const YAML::Node& node, const std::string& source, Options* options) {
   Options read = *options;
@@ -200,14 +199,14 @@ void readFields(const YAML::Node& node, const std::string& source, Options* opti
   *options = read;
 }
 
-/// readFields from a file. InputError when the file cannot be read or is no YAML.
+/// Reads options from a file. Throws InputError when the file cannot be read or is not YAML.
 YAML::Node loadYamlFile(const std::string& path);
 template <class Options>
 void readFieldsFromFile(const std::string& path, Options* options) {
   readFields(loadYamlFile(path), path, options);
 }
 
-/// All fields with their values, as a YAML map: for provenance.
+/// All options with their values as a YAML map, for provenance.
 template <class Options>
 YAML::Node writeFields(const Options& options) {
   YAML::Node node(YAML::NodeType::Map);
@@ -224,7 +223,7 @@ YAML::Node writeFields(const Options& options) {
   return node;
 }
 
-/// The same as YAML text with every option's meaning and allowed values beside it, for `--show-options`.
+/// The same as YAML text, with the meaning and allowed values of each option as comments, for --show-options.
 template <class Options>
 std::string showOptions(const Options& options) {
   std::vector<internal::OptionRow> rows;
@@ -232,18 +231,19 @@ std::string showOptions(const Options& options) {
   return internal::showRows(rows);
 }
 
-/// A Markdown table of all options with default, unit, allowed values and meaning.
+/// A Markdown list of all options with default, meaning and allowed values.
 template <class Options>
-std::string optionTable(const Options& options) {
+std::string optionList(const Options& options) {
   std::vector<internal::OptionRow> rows;
   internal::collectRows(options, "", &rows);
-  return internal::tableOfRows(rows);
+  return internal::listRows(rows);
 }
 
-/// std::invalid_argument "<field>: <requirement>, is <value>" unless the condition holds; for validate().
+/// Throws std::invalid_argument "<field>: <requirement>, is <value>" unless the condition holds. For
+/// checkFields().
 void requireField(bool condition, const char* field, const char* requirement, double value);
 
-/// validate() of an options struct inside another; errors name "<field>.<inner field>".
+/// Validates a nested options struct; errors name "<field>.<inner field>".
 template <class Options>
 void validateInner(const char* field, const Options& options) {
   try {
@@ -253,7 +253,7 @@ void validateInner(const char* field, const Options& options) {
   }
 }
 
-/// What validate() of an options struct does: checks every range, every group, then checkFields().
+/// The body of validate(): checks every range and every group, then calls checkFields().
 template <class Options>
 void validateOptions(const Options& options) {
   forEachOption(options, [](const OptionDeclaration& option, const auto& field) {

@@ -5,17 +5,17 @@
 
 namespace vcharge {
 
-/// A progress line on stderr for command-line tools: redrawn in place on a terminal, one line every ten
-/// percent elsewhere. Not thread safe.
+/// A progress line of a command-line tool on standard error: redrawn in place on a terminal, otherwise a new
+/// line every ten percent. Not thread safe.
 class ProgressBar {
  public:
   explicit ProgressBar(std::string label);
-  /// Ends the line where the work was left.
+  /// Ends the current line.
   ~ProgressBar();
   ProgressBar(const ProgressBar&) = delete;
   ProgressBar& operator=(const ProgressBar&) = delete;
 
-  /// fraction in [0, 1], clamped.
+  /// `fraction` is clamped to [0, 1].
   void update(double fraction);
 
  private:

@@ -7,7 +7,7 @@
 
 namespace vcharge {
 
-/// Adds the wall time of its life to that of a stage.
+/// Measures the wall time until its destruction and adds it to the entry `name` of a map.
 class StageTimer {
  public:
   StageTimer(std::string name, std::map<std::string, double>* times)

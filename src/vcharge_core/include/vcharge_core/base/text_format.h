@@ -6,7 +6,7 @@
 
 namespace vcharge {
 
-/// With so many digits after the point.
+/// The number with `digits` digits after the decimal point.
 inline std::string toText(double value, int digits) {
   std::array<char, 64> text{};
   std::snprintf(text.data(), text.size(), "%.*f", digits, value);

@@ -11,7 +11,7 @@ namespace vcharge {
 /// Difference of two Timestamps, in integer nanoseconds.
 using Duration = std::chrono::nanoseconds;
 
-/// Nearest whole number of nanoseconds.
+/// Rounds to whole nanoseconds.
 Duration durationFromSeconds(double seconds);
 
 inline double toSeconds(Duration duration) {
@@ -23,7 +23,7 @@ class Timestamp {
  public:
   constexpr Timestamp() = default;
   static constexpr Timestamp fromNanoseconds(int64_t nanoseconds) { return Timestamp(nanoseconds); }
-  /// Exact to about 0.2 microseconds for present-day dates; prefer integers where they are at hand.
+  /// Exact to about 0.2 microseconds for present-day dates; prefer integers where available.
   static Timestamp fromSeconds(double seconds);
 
   constexpr int64_t nanoseconds() const { return nanoseconds_; }
@@ -54,7 +54,7 @@ class Timestamp {
 std::string toString(Timestamp stamp);
 std::ostream& operator<<(std::ostream& stream, Timestamp stamp);
 
-/// Reads what toString writes, with up to nine decimals, without going through a double. Throws InputError.
+/// Parses the text of toString() without going through a double. Throws InputError.
 Timestamp timestampFromString(const std::string& text);
 
 }  // namespace vcharge

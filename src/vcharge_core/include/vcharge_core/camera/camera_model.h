@@ -16,8 +16,9 @@
 
 namespace vcharge {
 
-/// A calibrated central camera of one of the supported models: z forward, x right, y down; pixel centres at
-/// whole coordinates. A value type; the concrete model is visited once per array of points, never per pixel:
+/// A calibrated central camera of one of the supported models. Camera frame: z forward, x right, y down;
+/// pixel centres have integer coordinates. A value type. Visit the concrete model once per array of points,
+/// not per pixel:
 ///   camera.visit([&](const auto& model) { for (...) model.project(point, &pixel); });
 /// Every model has kNumParameters, kName, parameterNames(), parameters(), project() and unproject().
 class CameraModel {
@@ -27,10 +28,11 @@ class CameraModel {
   CameraModel(const MeiCamera& model) : model_(model) {}            // NOLINT: implicit by design
   CameraModel(const KannalaBrandtCamera& model) : model_(model) {}  // NOLINT
   CameraModel(const PinholeCamera& model) : model_(model) {}        // NOLINT
-  /// By name ("mei", "kannala_brandt", "pinhole") and parameters in the order of parameterNames().
-  /// std::invalid_argument for an unknown name, a wrong count, or values outside the model's domain.
+  /// Creates a model by its name ("mei", "kannala_brandt", "pinhole") and its parameters in the order of
+  /// parameterNames(). Throws std::invalid_argument for an unknown name, a wrong number of parameters, or
+  /// values outside the model's domain.
   static CameraModel create(const std::string& name, const Eigen::VectorXd& parameters);
-  /// Names of the parameters of a model, in order. std::invalid_argument for an unknown model.
+  /// Names of a model's parameters, in order. Throws std::invalid_argument for an unknown model.
   static std::vector<std::string> parameterNames(const std::string& model_name);
 
   template <class Function>
@@ -43,15 +45,15 @@ class CameraModel {
   std::vector<std::string> parameterNames() const { return parameterNames(name()); }
   Eigen::VectorXd parameters() const;
 
-  /// Pixel of a point in the camera frame (3 x N, any scale > 0); valid[i] is 0 where the model has no image
-  /// of it.
+  /// Projects points in the camera frame (3 x N, any positive scale) to pixels; valid[i] is 0 where the model
+  /// has no image of the point.
   void project(const Eigen::Matrix3Xd& points_in_camera, Eigen::Matrix2Xd* pixels,
                std::vector<uint8_t>* valid) const;
-  /// Unit rays of pixels (2 x N); valid[i] is 0 where no ray of the model meets the pixel.
+  /// Unit rays of pixels (2 x N); valid[i] is 0 where the model has no ray for the pixel.
   void unproject(const Eigen::Matrix2Xd& pixels, Eigen::Matrix3Xd* rays_in_camera,
                  std::vector<uint8_t>* valid) const;
 
-  /// Single point, for code where speed does not matter.
+  /// For single points, where speed does not matter.
   bool project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel) const {
     return visit([&](const auto& model) { return model.project(point_in_camera, pixel); });
   }

@@ -22,44 +22,45 @@ struct RigCamera {
   CameraModel model;
   double field_of_view_rad =
       3.14159265358979;   ///< pixels whose ray leaves this cone (full angle) are not used
-  std::string mask_file;  ///< as in the file; empty without a mask
+  std::string mask_file;  ///< as written in rig.yaml; empty without a mask
   cv::Mat mask;           ///< CV_8UC1 of image_size_px, 0 where the vehicle is seen; empty without a mask
   std::optional<RigidTransform> vehicle_from_camera;  ///< absent before extrinsic calibration
-  /// Of vehicle_from_camera, over [dt, dphi] in the vehicle frame: t = t_hat + dt, R = Exp(dphi) R_hat.
+  /// Covariance of vehicle_from_camera, over [dt, dphi] in the vehicle frame: t = t_hat + dt, R = Exp(dphi)
+  /// R_hat.
   std::optional<Eigen::Matrix<double, 6, 6>> covariance;
 };
 
-/// A letter, then letters, digits and underscores: names make topics and files.
+/// True for a letter followed by letters, digits and underscores, since names become topics and files.
 bool isCameraName(const std::string& name);
 
-/// The cameras of a vehicle, in the order of the file. Shared as shared_ptr<const CameraRig>.
+/// The cameras of a vehicle, in the order of rig.yaml. Shared as shared_ptr<const CameraRig>.
 class CameraRig {
  public:
   std::string vehicle_frame = "base_link";
   std::vector<RigCamera> cameras;
-  /// How the rig came to be, by keys like `program`: for people, nothing depends on it.
+  /// How the rig was made, by keys such as `program`. For people only: nothing depends on it.
   std::map<std::string, std::string> provenance;
 
-  /// Index of a camera by name, or -1.
+  /// Index of the camera with this name, or -1.
   int findCamera(const std::string& name) const;
-  /// As findCamera; InputError that lists the names there are.
+  /// Index of the camera with this name. Throws an InputError that lists the available names.
   size_t cameraIndex(const std::string& name) const;
   /// True when every camera has vehicle_from_camera.
   bool hasExtrinsics() const;
 };
 
-/// Reads rig.yaml and the masks it names (relative to its folder). Throws InputError naming file, key and
-/// what was expected: unknown keys, non-finite numbers, a rotation whose norm is off by more than 1e-3, a
-/// mask of another size.
+/// Reads rig.yaml and its masks (paths relative to the file). Throws InputError naming the file, the key and
+/// what was expected: for unknown keys, non-finite numbers, a rotation whose norm differs from 1 by more than
+/// 1e-3, a mask of another size.
 CameraRig readCameraRig(const std::string& path);
-/// As readCameraRig from a text; `source` names it in errors, masks are looked up in `mask_folder`.
+/// Reads a rig from text; `source` names it in errors, and mask paths are relative to `mask_folder`.
 CameraRig parseCameraRig(const std::string& text, const std::string& source, const std::string& mask_folder);
-/// The text of rig.yaml, numbers exact to the last bit; masks are named, not written.
+/// The text of rig.yaml, with numbers exact to the last bit. Masks are named but not written.
 std::string formatCameraRig(const CameraRig& rig);
-/// Writes rig.yaml, numbers exact to the last bit, and the masks beside it. Replaces the file only once it is
-/// complete.
+/// Writes rig.yaml, with numbers exact to the last bit, and the masks. Replaces an older file only when the
+/// new one is complete.
 void writeCameraRig(const CameraRig& rig, const std::string& path);
-/// InputError naming `source` (a file or topic) when `size` is not the camera's image size.
+/// Throws InputError naming `source` (a file or topic) unless `size` is the camera's image size.
 void checkImageSize(const RigCamera& camera, cv::Size size, const std::string& source);
 
 }  // namespace vcharge

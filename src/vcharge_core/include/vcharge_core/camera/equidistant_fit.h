@@ -7,7 +7,7 @@
 
 namespace vcharge {
 
-/// The Kannala-Brandt camera closest to another model, and what it leaves over.
+/// The Kannala-Brandt camera closest to another camera, and the remaining error.
 struct EquidistantFit {
   KannalaBrandtCamera camera;
   double rms_px = 0.0;
@@ -16,9 +16,9 @@ struct EquidistantFit {
 };
 
 /// Least squares of the pixel distance between `camera` and the fit, over a regular grid of pixels whose rays
-/// lie within field_of_view_rad / 2 of the axis: a linear start, then Gauss-Newton on focal lengths, centre
-/// and k1..k4. std::invalid_argument where fewer than 50 pixels have a ray or the fit is not one-to-one over
-/// the field of view.
+/// lie within field_of_view_rad / 2 of the axis: a linear solution, refined by Gauss-Newton over focal
+/// lengths, centre and k1..k4. Throws std::invalid_argument if fewer than 50 pixels have a ray or the fit is
+/// not one-to-one over the field of view.
 EquidistantFit fitEquidistant(const CameraModel& camera, cv::Size image_size_px, double field_of_view_rad);
 
 }  // namespace vcharge

@@ -18,17 +18,17 @@ class KannalaBrandtCamera {
     return {"fx", "fy", "cx", "cy", "k1", "k2", "k3", "k4"};
   }
 
-  /// std::invalid_argument when a focal length is not positive or anything is not finite.
+  /// Throws std::invalid_argument unless focal lengths are positive and all parameters are finite.
   explicit KannalaBrandtCamera(const Parameters& parameters);
 
   const Parameters& parameters() const { return parameters_; }
   double maxAngle() const { return max_angle_rad_; }
 
-  /// As MeiCamera::project.
+  /// See MeiCamera::project.
   bool project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel,
                Eigen::Matrix<double, 2, 3>* pixel_by_point = nullptr,
                Eigen::Matrix<double, 2, kNumParameters>* pixel_by_parameters = nullptr) const;
-  /// As MeiCamera::unproject; Newton's method, with bisection as its safeguard.
+  /// See MeiCamera::unproject. Newton's method, safeguarded by bisection.
   bool unproject(const Eigen::Vector2d& pixel, Eigen::Vector3d* ray_in_camera) const;
 
  private:

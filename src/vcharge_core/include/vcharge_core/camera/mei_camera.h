@@ -9,11 +9,10 @@
 namespace vcharge {
 
 /// Unified projection with radial-tangential distortion (Mei and Rives, ICRA 2007; paper, section Camera
-/// Model): the point on the unit sphere is seen from `xi` behind the sphere's centre, distorted in the
-/// normalized plane and scaled by gamma. In the distortion `r` is the squared radius.
-///
+/// Model): a point on the unit sphere is projected from a centre `xi` behind the sphere's centre, distorted
+/// in the normalized plane and scaled by gamma. In the distortion, `r` is the squared radius.
 /// A point at angle theta from the axis has an image while cos(theta) > -1/xi (xi > 1) or > -xi (xi <= 1),
-/// and while the radial distortion still grows with the radius; beyond that project() returns false.
+/// and while the radial distortion grows with the radius; project() returns false beyond that.
 class MeiCamera {
  public:
   static constexpr int kNumParameters = 9;
@@ -23,9 +22,9 @@ class MeiCamera {
     return {"xi", "gamma1", "gamma2", "u0", "v0", "k1", "k2", "p1", "p2"};
   }
 
-  /// std::invalid_argument when gamma is not positive, xi is negative, or anything is not finite.
+  /// Throws std::invalid_argument unless gamma is positive, xi is not negative and all parameters are finite.
   explicit MeiCamera(const Parameters& parameters);
-  /// Without distortion.
+  /// A camera without distortion.
   MeiCamera(double xi, double gamma1, double gamma2, double u0, double v0);
 
   Parameters parameters() const;
@@ -36,14 +35,15 @@ class MeiCamera {
   double v0() const { return v0_; }
   const RadialTangentialDistortion& distortion() const { return distortion_; }
 
-  /// Pixel of a point; false (outputs untouched) where the model has no image of it. Optional Jacobians of
-  /// the pixel by the point and by the parameters.
+  /// Pixel of a point; returns false and leaves the outputs unchanged where the model has no image of it.
+  /// Optional Jacobians of the pixel with respect to the point and the parameters.
   bool project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel,
                Eigen::Matrix<double, 2, 3>* pixel_by_point = nullptr,
                Eigen::Matrix<double, 2, kNumParameters>* pixel_by_parameters = nullptr) const;
 
-  /// Unit ray of a pixel, by Newton's method on the distortion and the closed inverse of the unified
-  /// projection, which exists for r_u^2 <= 1 / (xi^2 - 1) when xi > 1. False (output untouched) elsewhere.
+  /// Unit ray of a pixel, by Newton's method on the distortion and the closed-form inverse of the unified
+  /// projection, which exists for r_u^2 <= 1 / (xi^2 - 1) if xi > 1. Returns false and leaves the output
+  /// unchanged elsewhere.
   bool unproject(const Eigen::Vector2d& pixel, Eigen::Vector3d* ray_in_camera) const;
 
  private:

@@ -8,7 +8,7 @@
 
 namespace vcharge {
 
-/// Perspective projection with radial-tangential distortion; points in front of the camera only.
+/// Perspective projection with radial-tangential distortion, for points in front of the camera only.
 class PinholeCamera {
  public:
   static constexpr int kNumParameters = 8;
@@ -18,17 +18,17 @@ class PinholeCamera {
     return {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"};
   }
 
-  /// std::invalid_argument when a focal length is not positive or anything is not finite.
+  /// Throws std::invalid_argument unless focal lengths are positive and all parameters are finite.
   explicit PinholeCamera(const Parameters& parameters);
 
   Parameters parameters() const;
   const RadialTangentialDistortion& distortion() const { return distortion_; }
 
-  /// As MeiCamera::project.
+  /// See MeiCamera::project.
   bool project(const Eigen::Vector3d& point_in_camera, Eigen::Vector2d* pixel,
                Eigen::Matrix<double, 2, 3>* pixel_by_point = nullptr,
                Eigen::Matrix<double, 2, kNumParameters>* pixel_by_parameters = nullptr) const;
-  /// As MeiCamera::unproject.
+  /// See MeiCamera::unproject.
   bool unproject(const Eigen::Vector2d& pixel, Eigen::Vector3d* ray_in_camera) const;
 
  private:

@@ -8,8 +8,8 @@
 
 namespace vcharge {
 
-/// How far apart, in radians, two neighbouring pixels in the middle of a camera's image look; 0 where the
-/// camera has no rays there.
+/// Angle in radians between the rays of two neighbouring pixels in the middle of the image; 0 if the camera
+/// has no rays there.
 inline double radiansPerPixel(const RigCamera& camera) {
   const Eigen::Vector2d middle(0.5 * camera.image_size_px.width, 0.5 * camera.image_size_px.height);
   Eigen::Vector3d ray, next;

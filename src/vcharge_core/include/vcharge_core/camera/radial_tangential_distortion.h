@@ -6,13 +6,12 @@
 
 namespace vcharge {
 
-/// Radial (k1, k2) and tangential (p1, p2) distortion of a point in the normalized image plane
-/// (paper, section Camera Model). One-to-one only inside maxRadius(): there the radial part grows with the
-/// radius.
+/// Radial (k1, k2) and tangential (p1, p2) distortion of a point in the normalized image plane (paper,
+/// section Camera Model). One-to-one only within maxRadius(), where the radial part grows with the radius.
 class RadialTangentialDistortion {
  public:
   RadialTangentialDistortion() = default;
-  /// std::invalid_argument when anything is not finite.
+  /// Throws std::invalid_argument unless all parameters are finite.
   RadialTangentialDistortion(double k1, double k2, double p1, double p2);
 
   double k1() const { return k1_; }
@@ -21,15 +20,16 @@ class RadialTangentialDistortion {
   double p2() const { return p2_; }
   bool isZero() const { return k1_ == 0.0 && k2_ == 0.0 && p1_ == 0.0 && p2_ == 0.0; }
 
-  /// Radius (undistorted) at which the radial part stops growing; infinity where it never does.
+  /// Undistorted radius at which the radial part stops growing; infinity if it always grows.
   double maxRadius() const { return max_radius_; }
 
-  /// Distorted point. Optional derivatives by the point and by (k1, k2, p1, p2). False beyond maxRadius().
+  /// Distorted point, with optional derivatives with respect to the point and (k1, k2, p1, p2). False beyond
+  /// maxRadius().
   bool distort(const Eigen::Vector2d& undistorted, Eigen::Vector2d* distorted,
                Eigen::Matrix2d* by_point = nullptr,
                Eigen::Matrix<double, 2, 4>* by_parameters = nullptr) const;
 
-  /// Inverse of distort() by Newton's method; false where none exists inside maxRadius().
+  /// Inverse of distort() by Newton's method; false if none exists within maxRadius().
   bool undistort(const Eigen::Vector2d& distorted, Eigen::Vector2d* undistorted) const;
 
  private:

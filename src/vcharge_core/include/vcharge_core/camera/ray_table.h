@@ -10,17 +10,17 @@
 
 namespace vcharge {
 
-/// The unit ray of every pixel of a camera, computed once. Structure of arrays, row-major; immutable.
+/// Precomputed unit rays of all pixels of a camera, as a structure of arrays in row-major order. Immutable.
 class RayTable {
  public:
-  /// A pixel is valid where the model has a ray, the ray is within field_of_view_rad / 2 of the optical axis,
-  /// and the mask (empty, or CV_8UC1 of `size`) is not 0. std::logic_error for a mask of another size.
+  /// A pixel is valid if the model has a ray, the ray lies within field_of_view_rad / 2 of the optical axis,
+  /// and the mask (empty, or CV_8UC1 of `size`) is not 0. Throws std::logic_error for a mask of another size.
   RayTable(const CameraModel& camera, cv::Size size, double field_of_view_rad,
            const cv::Mat& mask = cv::Mat());
 
   cv::Size size() const { return size_; }
   bool valid(int x, int y) const { return valid_[index(x, y)] != 0; }
-  /// Zero where not valid.
+  /// Zero for pixels that are not valid.
   Eigen::Vector3f ray(int x, int y) const {
     const size_t i = index(x, y);
     return Eigen::Vector3f(x_[i], y_[i], z_[i]);

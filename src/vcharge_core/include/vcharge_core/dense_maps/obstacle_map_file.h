@@ -19,11 +19,11 @@ void writeObstacles(const ObstacleMap& map, const std::vector<ObstacleScan>& sca
 /// Stamps in a folder, ascending. InputError when there is no such folder.
 std::vector<Timestamp> listObstacles(const std::string& folder);
 
-/// InputError naming the file for anything that is missing, malformed or of unlike size.
+/// Throws InputError naming the file that is missing, malformed or has a different size.
 ObstacleMap readObstacleMap(const std::string& folder, Timestamp stamp);
 std::vector<ObstacleScan> readObstacleScans(const std::string& folder, Timestamp stamp);
 
-/// The grid alone, as map_server reads it: PATH_STEM.pgm and PATH_STEM.yaml.
+/// Writes only the occupancy grid in the format of map_server: PATH_STEM.pgm and PATH_STEM.yaml.
 void writeOccupancyGrid(const ObstacleMap& map, const std::string& path_stem);
 
 }  // namespace vcharge

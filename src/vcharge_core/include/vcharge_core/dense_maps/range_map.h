@@ -10,20 +10,20 @@
 
 namespace vcharge {
 
-/// Distance along the ray of each pixel of a working camera. The first three images have one size and are
-/// CV_32FC1.
+/// Distance along the ray of each pixel of a working camera. The first three images have the same size and
+/// are CV_32FC1.
 struct RangeMap {
   Timestamp stamp;
   std::string camera_name;
   std::string frame_id;          ///< optical frame of the camera
   MeiCamera camera;              ///< without distortion; pixel -> ray
   cv::Mat range_m;               ///< metres along the ray (not depth along the axis); NaN where unknown
-  cv::Mat standard_deviation_m;  ///< one sigma of range_m; NaN where unknown
+  cv::Mat standard_deviation_m;  ///< one standard deviation of range_m; NaN where unknown
   cv::Mat confidence;            ///< 0 (no support) to 1; 0 where unknown
-  cv::Mat reference;             ///< CV_8UC1 of that size: what the camera saw; empty where it is not kept
+  cv::Mat reference;             ///< CV_8UC1 of the same size: the camera image; may be empty
 };
 
-/// Adds stamp, camera and all pixels but the reference's; every NaN counts the same.
+/// Adds stamp, camera and all pixels except the reference's; all NaNs are equal.
 void addToHash(const RangeMap& map, ContentHasher* hasher);
 
 }  // namespace vcharge

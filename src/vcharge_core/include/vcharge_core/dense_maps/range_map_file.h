@@ -16,7 +16,7 @@ void writeRangeMap(const RangeMap& map, const std::string& folder);
 std::vector<std::string> listRangeMapCameras(const std::string& folder);
 /// Stamps of one camera's maps, sorted.
 std::vector<Timestamp> listRangeMaps(const std::string& folder, const std::string& camera_name);
-/// InputError naming the file for anything missing or of unlike size.
+/// Throws InputError naming the file that is missing or has a different size.
 RangeMap readRangeMap(const std::string& folder, const std::string& camera_name, Timestamp stamp);
 
 /// Colours by inverse range, red near to blue far; black where unknown. CV_8UC3 (BGR).

@@ -7,8 +7,8 @@
 
 namespace vcharge {
 
-/// 128-bit hash (XXH3) of a result's content, to show that two runs agree. Provenance (time, host) never
-/// enters it.
+/// 128-bit hash (XXH3) of the content of a result, to show that two runs agree. Excludes provenance (time,
+/// host).
 class ContentHasher {
  public:
   ContentHasher();
@@ -18,11 +18,11 @@ class ContentHasher {
 
   void addBytes(const void* data, size_t size);
   void add(int64_t value) { addBytes(&value, sizeof(value)); }
-  /// By bit pattern, except that every NaN counts the same and -0 is 0.
+  /// Adds the bit pattern, except that all NaNs are equal and -0 equals 0.
   void add(double value);
   void add(const std::string& text);
 
-  /// 32 hexadecimal digits of all that was added so far.
+  /// 32 hexadecimal digits for everything added so far.
   std::string hex() const;
 
  private:
@@ -30,7 +30,8 @@ class ContentHasher {
   std::unique_ptr<State> state_;
 };
 
-/// Of a whole file: tells two recordings of one name apart. InputError when it cannot be read.
+/// Hash of a whole file, which distinguishes recordings of the same name. Throws InputError if it cannot be
+/// read.
 std::string fileHash(const std::string& path);
 
 }  // namespace vcharge

@@ -5,39 +5,45 @@
 
 namespace vcharge {
 
-/// Whole text of a file. InputError "<path>: <reason>" when it cannot be read.
+/// Reads a whole file. Throws InputError "<path>: <reason>" when it cannot be read.
 std::string readTextFile(const std::string& path);
 
-/// Calls `write` with a temporary path beside `path` (same extension) and moves the result over `path` once
-/// it returned: what was there stays as it is when `write` throws. InputError when the folder cannot be
-/// written.
+/// Throws InputError naming `path` unless a file can be written there: its folder exists or can be created
+/// and accepts new files, and `path` is not a folder. Leaves nothing behind. Tools call it before long work.
+void requireWritable(const std::string& path);
+/// The same for a folder of results, which may exist.
+void requireWritableFolder(const std::string& path);
+
+/// Calls `write` with a temporary path beside `path` (same extension) and moves the result over `path` after
+/// it returned; an older file stays unchanged when `write` throws. Creates missing folders. InputError when
+/// the folder cannot be written.
 void writeFileAtomically(const std::string& path,
                          const std::function<void(const std::string& temporary)>& write);
 void writeTextFileAtomically(const std::string& path, const std::string& text);
 
-/// A folder of results that appears as a whole or not at all: write into path(), then commit(). Until then
-/// whatever stands under the final name stays; without commit() what was written is removed.
+/// Replaces a folder of results in one step: write into path(), then call commit(). Before that, an older
+/// folder stays under the final name; without commit() the new folder is removed.
 class FolderTransaction {
  public:
-  /// InputError when the folder beside `path` cannot be written, or `path` is a file.
-  explicit FolderTransaction(std::string path);
+  /// InputError when the folder that will hold `path` cannot be written, or `path` is a file or the current
+  /// folder.
+  explicit FolderTransaction(const std::string& path);
   ~FolderTransaction();
   FolderTransaction(const FolderTransaction&) = delete;
   FolderTransaction& operator=(const FolderTransaction&) = delete;
 
   const std::string& path() const { return temporary_; }
-  /// Moves the folder to its final name, in place of what stands there.
+  /// Moves the new folder to its final name and removes the older one.
   void commit();
 
  private:
   std::string final_, temporary_;
 };
 
-/// Creates a folder and its parents. InputError when that fails.
+/// Creates a folder and its parents; an empty path is the current folder. InputError when that fails.
 void createFolder(const std::string& path);
-/// Removes a folder that goes on being used should it stay: it is gone under its name before its first file
-/// is, so that being killed leaves no part of it there, and what an earlier kill left is removed too. Errors
-/// are ignored.
+/// Removes a folder. It is renamed first, so that a process killed meanwhile leaves no half-removed folder
+/// under its name; the remains of an earlier interrupted removal are removed too. Ignores errors.
 void removeFolder(const std::string& path);
 
 }  // namespace vcharge

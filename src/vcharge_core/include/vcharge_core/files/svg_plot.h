@@ -8,17 +8,17 @@
 
 namespace vcharge {
 
-/// A picture with axes, as an <svg> element. Points are in the plot's units; y points up.
+/// A plot with axes, as an <svg> element. Points are in the plot's units; y points up.
 class SvgPlot {
  public:
   struct Range {
     double min = 0.0, max = 1.0;
   };
-  /// `is_metric`: x and y have one scale, and the picture is as high as that takes, within bounds.
+  /// With `is_metric`, x and y have the same scale and the height follows from it, within bounds.
   SvgPlot(Range x, Range y, double height, bool is_metric, const std::string& x_label,
           const std::string& y_label);
 
-  /// `css`: presentation attributes, as in "stroke=\"#c00\" stroke-width=\"2\"".
+  /// `css`: presentation attributes, for example "stroke=\"#c00\" stroke-width=\"2\"".
   void addLine(const std::vector<Eigen::Vector2d>& points, const std::string& css);
   void addSegments(const std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>>& segments,
                    const std::string& css);

@@ -21,13 +21,12 @@ double yawOfRotation(const Eigen::Quaterniond& rotation);
 class RigidTransform {
  public:
   RigidTransform() : rotation_(Eigen::Quaterniond::Identity()), translation_(Eigen::Vector3d::Zero()) {}
-  /// Normalizes the rotation; std::logic_error when it is zero or anything is not finite.
+  /// Normalizes the rotation. Throws std::logic_error when it is zero or anything is not finite.
   RigidTransform(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation_m);
-  /// Takes a unit quaternion as it is, to the last bit: for what rotation() gave and a file kept.
-  /// std::logic_error unless its norm is 1 within 1e-12 and all is finite.
+  /// Keeps a unit quaternion exactly, to the last bit, so that files can be read back unchanged. Throws
+  /// std::logic_error unless its norm is 1 within 1e-12 and everything is finite.
   static RigidTransform fromUnit(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation_m);
-  /// From the upper three rows [R|t]; R is replaced by the nearest rotation. std::logic_error when not
-  /// finite.
+  /// From a 3x4 matrix [R|t]; R is replaced by the nearest rotation. Throws std::logic_error when not finite.
   static RigidTransform fromMatrix(const Eigen::Matrix<double, 3, 4>& matrix);
   /// Planar motion: x, y in metres, yaw in radians about z.
   static RigidTransform planar(double x_m, double y_m, double yaw_rad);
@@ -48,7 +47,7 @@ class RigidTransform {
   Eigen::Vector3d translation_;
 };
 
-/// Linear in translation, spherical-linear in rotation; fraction 0 gives `from`, 1 gives `to`.
+/// Interpolates translation linearly and rotation spherically; fraction 0 gives `from`, 1 gives `to`.
 RigidTransform interpolate(const RigidTransform& from, const RigidTransform& to, double fraction);
 
 }  // namespace vcharge

@@ -13,13 +13,14 @@ struct StampedTransform {
   RigidTransform world_from_vehicle;
 };
 
-/// Strictly increasing stamps.
+/// Stamps are strictly increasing.
 using Trajectory = std::vector<StampedTransform>;
 
-/// TUM text: "time_s tx ty tz qx qy qz qw" per line, '#' starts a comment. InputError naming file and line
-/// for anything else, for stamps that do not increase and for rotations whose norm is off by more than 1e-3.
+/// Reads TUM text: "time_s tx ty tz qx qy qz qw" per line; '#' starts a comment. Throws InputError naming the
+/// file and the line for anything else, for stamps that do not increase and for rotations whose norm differs
+/// from 1 by more than 1e-3.
 Trajectory readTrajectory(const std::string& path);
-/// Exact in time to the nanosecond; replaces the file only once it is complete.
+/// Writes stamps exact to the nanosecond. Replaces an older file only when the new one is complete.
 void writeTrajectory(const Trajectory& trajectory, const std::string& path);
 
 }  // namespace vcharge

@@ -5,14 +5,15 @@
 #include <optional>
 #include <string>
 
+#include "vcharge_core/base/options.h"
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/motion/rigid_transform.h"
 
 namespace vcharge {
 
-/// Dead reckoning of the vehicle at one instant. The vehicle frame (base_link) lies on the ground under the
-/// centre of the rear axle, x forward, y left, z up. From wheels alone the pose is planar (z, roll and pitch
-/// zero); a source that knows all six degrees of freedom may fill them in.
+/// Dead-reckoned state of the vehicle at one instant. The vehicle frame (base_link) lies on the ground under
+/// the centre of the rear axle: x forward, y left, z up. Odometry from wheels alone is planar (z, roll and
+/// pitch zero); sources that know all six degrees of freedom may fill them in.
 struct VehicleOdometry {
   Timestamp stamp;
   RigidTransform odom_from_vehicle;
@@ -26,25 +27,20 @@ struct WheelTicks {
   int64_t left_ticks = 0;
   int64_t right_ticks = 0;
   double metres_per_tick = 0.01;
-  double steering_angle_rad = 0.0;  ///< of the virtual front wheel in the middle, positive to the left
+  double steering_angle_rad = 0.0;  ///< of a virtual front wheel in the middle, positive to the left
 };
 
 struct OdometryBufferOptions {
-  double max_gap_s = 0.25;         ///< neighbours further apart are not interpolated
-  double history_s = 60.0;         ///< older entries are forgotten; infinity keeps all
-  double reset_backwards_s = 1.0;  ///< a stamp this far before the newest starts over (a replayed bag)
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("max_gap_s", max_gap_s);
-    visit("history_s", history_s);
-    visit("reset_backwards_s", reset_backwards_s);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(OdometryBufferOptions);
+  VCHARGE_OPTION(double, max_gap_s, 0.25, positive(),
+                 "Longest interval between entries that is interpolated.");
+  VCHARGE_OPTION(double, history_s, 60.0, positive(),
+                 "Age at which entries are dropped; infinity keeps all.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// Interpolates odometry between its stamps. Never extrapolates: a query outside, or inside a gap, says so.
-/// Not thread safe.
+/// Interpolates odometry between its stamps. Does not extrapolate: lookups outside the buffer or inside a gap
+/// return a status. Not thread safe.
 class OdometryBuffer {
  public:
   enum class AddResult {
@@ -52,7 +48,7 @@ class OdometryBuffer {
     kAddedAfterGap,  ///< more than max_gap_s after the entry before it
     kDuplicate,      ///< same stamp as an entry: ignored
     kOutOfOrder,     ///< slightly older than the newest entry: ignored
-    kReset,          ///< time jumped back: all older entries dropped, this one kept
+    kReset,          ///< time jumped backwards: all older entries were dropped, this one was kept
   };
   enum class LookupStatus { kOk, kEmpty, kBeforeFirst, kAfterLast, kInGap };
   struct Lookup {
@@ -71,7 +67,7 @@ class OdometryBuffer {
   explicit OdometryBuffer(const OdometryBufferOptions& options = OdometryBufferOptions());
 
   AddResult add(const VehicleOdometry& odometry);
-  /// Pose and velocities at `stamp`.
+  /// Interpolated pose and velocities at `stamp`.
   Lookup lookup(Timestamp stamp) const;
 
   bool empty() const { return entries_.empty(); }
@@ -84,7 +80,7 @@ class OdometryBuffer {
   Counts counts_;
 };
 
-/// "no odometry yet", "before the first odometry", ...: ends a sentence in a message.
+/// The status in words, for example "before the first odometry", to end a sentence in a message.
 std::string describe(OdometryBuffer::LookupStatus status);
 
 }  // namespace vcharge

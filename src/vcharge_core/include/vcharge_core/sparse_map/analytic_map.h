@@ -11,20 +11,20 @@
 
 namespace vcharge {
 
-/// Size and seed of makeAnalyticMap.
+/// Size and seed of a synthetic map.
 struct AnalyticMapOptions {
   int num_keyframes = 24;
   int num_landmarks = 300;
-  int num_neighbours = 3;  ///< keyframes before and behind a landmark's own that may see it
+  int num_neighbours = 3;  ///< keyframes before and after a landmark's own from which it can be observed
   int descriptor_size = 61;
   bool float_descriptors = false;
   uint32_t seed = 1;
 };
 
-/// A sparse map whose every observation is the exact projection of its landmark, for tests and benchmarks: a
-/// vehicle with a Mei camera to the front (with a mask) and a Kannala-Brandt camera to the left drives
-/// counter-clockwise around a circle of 20 m radius through the origin, a keyframe each 0.5 s. The second
-/// loop edge was rejected. Landmarks that nobody would see are left out.
+/// A sparse map in which every observation is the exact projection of its landmark, for tests and benchmarks:
+/// a vehicle with a Mei camera at the front (with a mask) and a Kannala-Brandt camera on the left drives
+/// counter-clockwise around a circle of 20 m radius through the origin, with a keyframe every 0.5 s. The
+/// second loop edge is rejected. Landmarks without observations are left out.
 inline SparseMapContents makeAnalyticMap(const AnalyticMapOptions& options = {}) {
   constexpr double kRadius_m = 20.0;
   constexpr double kTurn = 6.283185307179586;

@@ -17,22 +17,22 @@
 
 namespace vcharge {
 
-/// The vehicle's pose at an instant at which the images of all cameras went into the map.
+/// Pose of the vehicle at an instant whose images are part of the map.
 struct MapKeyframe {
   Timestamp stamp;
   RigidTransform map_from_vehicle;
-  /// Over [dt, dphi] in the map's frame: t = t_hat + dt, R = Exp(dphi) R_hat; zero where unknown.
+  /// Covariance over [dt, dphi] in the map frame: t = t_hat + dt, R = Exp(dphi) R_hat; zero if unknown.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
 };
 
-/// A point of the world.
+/// A 3D point.
 struct MapLandmark {
-  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();     ///< in the map's frame
-  Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();  ///< zero where unknown
+  Eigen::Vector3d position_m = Eigen::Vector3d::Zero();     ///< in the map frame
+  Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();  ///< zero if unknown
 };
 
-/// Where a camera saw a landmark. Members are indices into the map's keyframes and landmarks and the rig's
-/// cameras.
+/// Observation of a landmark in an image. Members are indices into the map's keyframes and landmarks and the
+/// rig's cameras.
 struct MapObservation {
   int32_t keyframe = 0;
   int32_t camera = 0;
@@ -40,38 +40,38 @@ struct MapObservation {
   Eigen::Vector2f position_px = Eigen::Vector2f::Zero();
 };
 
-/// A place that was passed twice, and what became of this loop edge.
+/// A loop closure candidate: two keyframes at the same location, and whether it was accepted.
 struct MapLoopEdge {
   int32_t first = 0;  ///< keyframes
   int32_t second = 0;
-  RigidTransform first_from_second;  ///< as measured
+  RigidTransform first_from_second;  ///< as measured, before optimization
   int32_t num_inliers = 0;
   bool accepted = false;
-  std::string reason;  ///< why it was rejected; empty where accepted
+  std::string reason;  ///< reason of the rejection; empty if accepted
 };
 
-/// What a SparseMap is made of. Plain data; the map checks it.
+/// Content of a SparseMap. Plain data; the constructor of SparseMap checks it.
 struct SparseMapContents {
   CameraRig rig;                       ///< with extrinsics
   std::vector<MapKeyframe> keyframes;  ///< stamps strictly increasing
   std::vector<MapLandmark> landmarks;
-  std::vector<MapObservation> observations;  ///< any order; at most one per keyframe, camera and landmark
-  /// Row i describes observation i: CV_8UC1 or CV_32FC1, all of one kind.
+  std::vector<MapObservation> observations;  ///< in any order; at most one per keyframe, camera and landmark
+  /// Row i describes observation i. CV_8UC1 or CV_32FC1.
   cv::Mat descriptors;
   std::vector<MapLoopEdge> loop_edges;
-  std::string feature_options;  ///< YAML of the extractor's options that made the descriptors
-  std::string vocabulary;       ///< bytes of the vocabulary tree that recognizes places; may be empty
-  double odometry_distance_scale = 1.0;  ///< true over counted distance of the drive's odometer
-  double odometry_turn_scale = 1.0;      ///< true over counted turn
+  std::string feature_options;           ///< YAML of the options of the extractor that made the descriptors
+  std::string vocabulary;                ///< bytes of the vocabulary tree for place recognition; may be empty
+  double odometry_distance_scale = 1.0;  ///< true distance over the distance counted by the odometer
+  double odometry_turn_scale = 1.0;      ///< true turn over counted turn
 };
 
-/// A metric map of landmarks, frozen once built, shared as shared_ptr<const SparseMap>. Its frame is that of
-/// the first keyframe's vehicle, unless it was placed elsewhere. Observations are ordered by keyframe, camera
+/// An immutable metric map of landmarks, shared as shared_ptr<const SparseMap>. Its frame is the vehicle
+/// frame at the first keyframe, unless the map was transformed. Observations are ordered by keyframe, camera
 /// and landmark.
 class SparseMap {
  public:
-  /// std::invalid_argument naming the member for contents that do not fit together: indices out of range,
-  /// numbers that are not finite, stamps that do not increase, a rig without extrinsics, landmarks without
+  /// Throws std::invalid_argument naming the member for inconsistent contents: indices out of range, numbers
+  /// that are not finite, stamps that do not increase, a rig without extrinsics, landmarks without an
   /// observation, descriptors of another count or type.
   explicit SparseMap(SparseMapContents contents);
 
@@ -82,22 +82,22 @@ class SparseMap {
   const cv::Mat& descriptors() const { return contents_.descriptors; }
   const SparseMapContents& contents() const { return contents_; }
 
-  /// Observations [first, second) of one camera at one keyframe.
+  /// Range [first, second) of the observations in one camera at one keyframe.
   std::pair<size_t, size_t> observationsOf(size_t keyframe, size_t camera) const;
-  /// Indices of the observations of a landmark, ascending.
+  /// Indices of the observations of a landmark, in ascending order.
   std::pair<const int32_t*, const int32_t*> observationsOfLandmark(size_t landmark) const;
 
-  /// Over all of the contents: the same on any number of threads.
+  /// Hash of all contents; does not depend on the number of threads.
   std::string contentHash() const;
 
  private:
   SparseMapContents contents_;
-  std::vector<size_t> begin_of_image_;     // keyframe * cameras + camera; one more than images
-  std::vector<size_t> begin_of_landmark_;  // into observations_by_landmark_
+  std::vector<size_t> begin_of_image_;     // index keyframe * cameras + camera, plus the end
+  std::vector<size_t> begin_of_landmark_;  // indices into observations_by_landmark_
   std::vector<int32_t> observations_by_landmark_;
 };
 
-/// How a map came to be: never part of its content hash.
+/// How a map was made. Not part of its content hash.
 using MapProvenance = std::map<std::string, std::string>;
 
 }  // namespace vcharge

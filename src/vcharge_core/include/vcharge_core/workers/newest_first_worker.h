@@ -9,8 +9,8 @@
 
 namespace vcharge {
 
-/// A task that has not been begun when its channel (a camera, say) brings a newer one is dropped and counted.
-/// Channels take turns.
+/// Keeps the newest task of each channel (for example, a camera): a waiting task is dropped and counted when
+/// its channel brings a newer one. Channels take turns.
 template <class TaskType>
 class NewestFirstQueue {
  public:
@@ -42,7 +42,7 @@ class NewestFirstQueue {
   size_t last_channel_ = 0;
 };
 
-/// For live use; replay without loss calls the work directly.
+/// For live use; lossless replay calls the work directly.
 template <class Task>
 using NewestFirstWorker = QueueWorker<NewestFirstQueue<Task>>;
 

@@ -9,14 +9,14 @@
 
 namespace vcharge {
 
-/// Tasks in the order in which they came. Of those that may be dropped no more than max_droppable wait: a
-/// newer one takes the place of the oldest, which is counted.
+/// Keeps tasks in the order of their arrival. At most max_droppable droppable tasks wait: a newer one
+/// replaces the oldest, which is counted.
 template <class TaskType>
 class OrderedQueue {
  public:
   using Task = TaskType;
 
-  /// 0: nothing is ever dropped.
+  /// With max_droppable = 0, nothing is dropped.
   explicit OrderedQueue(size_t max_droppable = 0) : max_droppable_(max_droppable) {}
 
   void push(Task task, bool is_droppable) {

@@ -8,9 +8,9 @@
 
 namespace vcharge {
 
-/// Works on the tasks of a queue in a thread of its own, one after the other. The queue decides what comes
-/// next and what is dropped; it has a type Task, push(...), isEmpty(), pop() and numDropped(...), and is only
-/// used under a lock.
+/// Processes the tasks of a queue one after the other in its own thread. The queue decides which task comes
+/// next and which is dropped; it has a type Task, push(...), isEmpty(), pop() and numDropped(...), and is
+/// only used under a lock.
 template <class Queue>
 class QueueWorker {
  public:
@@ -19,7 +19,7 @@ class QueueWorker {
   /// `work` must not throw.
   explicit QueueWorker(std::function<void(const Task&)> work, Queue queue = Queue())
       : work_(std::move(work)), queue_(std::move(queue)), thread_([this] { run(); }) {}
-  /// Waits for the task in work; those that wait are not begun.
+  /// Waits for the current task; discards those that wait.
   ~QueueWorker() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <map>
-#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -16,8 +15,8 @@ struct PoseGraphEdge {
   int64_t first = 0;
   int64_t second = 0;
   RigidTransform first_from_second;
-  /// Of g2o's error over [translation (m), vector part of the quaternion]; in planar graphs rows and columns
-  /// 0, 1 and 5 are those of [x, y, yaw (rad)], the others zero.
+  /// Information matrix of g2o's error [translation (m), vector part of the quaternion]. In planar graphs,
+  /// rows and columns 0, 1 and 5 belong to [x, y, yaw (rad)]; the others are zero.
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
 };
 
@@ -28,23 +27,15 @@ struct PoseGraph {
   std::vector<PoseGraphEdge> edges;
 };
 
-/// g2o's error of an edge, Z^-1 X_first^-1 X_second as [translation, vector part of the quaternion, w >= 0],
-/// or as [x, y, 0, 0, 0, yaw] in planar graphs.
+/// g2o's error of an edge, Z^-1 X_first^-1 X_second as [translation, vector part of the quaternion with w >=
+/// 0], or [x, y, 0, 0, 0, yaw] in planar graphs.
 Eigen::Matrix<double, 6, 1> errorOfEdge(const PoseGraph& graph, const PoseGraphEdge& edge);
-/// e^T information e.
+/// Squared error of an edge, e^T information e, or the sum over all edges.
 double chiSquared(const PoseGraph& graph, const PoseGraphEdge& edge);
 double chiSquared(const PoseGraph& graph);
 
-/// Reads VERTEX_SE2 and EDGE_SE2, or VERTEX_SE3:QUAT and EDGE_SE3:QUAT; FIX lines are ignored, as the
-/// optimizer holds the first node. Nodes without a VERTEX line are placed along the edges. InputError
-/// "<path>:<line>: <reason>" for anything else, for numbers that are missing or not finite, edges between a
-/// node and itself, information matrices that are not positive semidefinite, both dimensions in one file, and
-/// nodes that no edge connects to the first.
-PoseGraph readG2o(const std::string& path);
-void writeG2o(const PoseGraph& graph, const std::string& path);
-
-/// Poses along a spanning tree (breadth first from the first node) of the edges; existing ones are replaced.
-/// False where the edges do not connect all nodes.
+/// Replaces all poses by those along a spanning tree of the edges (breadth first from the first node).
+/// Returns false if the edges do not connect all nodes.
 bool placeNodesAlongEdges(PoseGraph* graph);
 
 }  // namespace vcharge

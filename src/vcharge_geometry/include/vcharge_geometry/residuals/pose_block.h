@@ -20,8 +20,9 @@ inline RigidTransform fromPoseBlock(const PoseBlock& block) {
   return fromPoseBlock(block.data());
 }
 
-/// Manifold of a PoseBlock, with the suite's tangent [dt, dphi] in the target frame: t = t_hat + dt,
-/// R = Exp(dphi) R_hat. So ceres::Covariance in the tangent space is what rig.yaml and messages carry.
+/// Manifold of a PoseBlock with tangent [dt, dphi] in the target frame: t = t_hat + dt, R = Exp(dphi) R_hat.
+/// Covariances of ceres::Covariance in the tangent space therefore have the convention of rig.yaml and
+/// messages.
 std::unique_ptr<ceres::Manifold> makePoseManifold();
 
 }  // namespace vcharge

@@ -12,12 +12,12 @@
 
 namespace vcharge {
 
-// Errors of viewing rays as angles, with Jacobians over [dt, dphi] of a transform target_from_source in the
+// Angular errors of viewing rays, with Jacobians over [dt, dphi] of a transform target_from_source in the
 // target frame: t = t_hat + dt, R = Exp(dphi) R_hat.
 
-/// Where both rays of a match and the baseline between the two cameras lie, in the previous frame.
+/// Geometry of both rays of a match and the baseline between the cameras, in the previous frame.
 struct EpipolarGeometry {
-  Eigen::Vector3d arm;              ///< previous_from_current rotation times the current camera's centre
+  Eigen::Vector3d arm;              ///< the current camera's centre, rotated into the previous frame
   Eigen::Vector3d current;          ///< direction of the current ray
   Eigen::Vector3d baseline;         ///< from the previous camera's centre to the current one's
   Eigen::Vector3d across;           ///< previous x current direction
@@ -34,19 +34,19 @@ struct EpipolarGeometry {
         previous_normal(baseline.cross(rays.previous.direction)),
         normals_squared(current_normal.squaredNorm() + previous_normal.squaredNorm()) {}
 
-  /// No baseline: the epipolar plane is not defined, and the rays should be parallel.
+  /// False without a baseline: the epipolar plane is undefined, and the rays should be parallel.
   bool hasBaseline() const { return normals_squared > 1e-18; }
 };
 
-/// Signed angle by which two rays miss a common epipolar plane, radians, shared between both rays: with b the
-/// baseline, g = b . (q x q') over the norm of its derivative by both directions, sqrt(|b x q'|^2 + |b x
-/// q|^2) (Sampson's approximation). Its standard deviation is that of one ray's direction.
+/// Signed angle (radians) by which each of two rays misses a common epipolar plane, in Sampson's
+/// approximation: b . (q x q') / sqrt(|b x q'|^2 + |b x q|^2), where b is the baseline. Its standard
+/// deviation is that of a ray's direction.
 inline double epipolarAngle(const EpipolarGeometry& geometry) {
   return geometry.baseline.dot(geometry.across) / std::sqrt(geometry.normals_squared);
 }
 
-/// Squared epipolarAngle; half the squared angle between the rays where there is no baseline; infinite where
-/// the rays meet behind a camera at a parallax that is clearly larger than the errors (3 max_error_rad).
+/// Squared epipolarAngle(). Without a baseline, half the squared angle between the rays. Infinite if the rays
+/// meet behind a camera although their parallax clearly exceeds the errors (3 max_error_rad).
 inline double squaredEpipolarAngle(const RayMatch& rays, const RotationTranslation& previous_from_current,
                                    double max_error_rad) {
   const EpipolarGeometry geometry(rays, previous_from_current);
@@ -54,7 +54,7 @@ inline double squaredEpipolarAngle(const RayMatch& rays, const RotationTranslati
   if (!geometry.hasBaseline()) {
     return 0.5 * across_squared;
   }
-  // The depths times across_squared.
+  // The signs of the depths are those of these products.
   if ((geometry.current_normal.dot(geometry.across) < 0.0 ||
        geometry.previous_normal.dot(geometry.across) < 0.0) &&
       across_squared > 9.0 * max_error_rad * max_error_rad) {
@@ -64,12 +64,12 @@ inline double squaredEpipolarAngle(const RayMatch& rays, const RotationTranslati
   return triple * triple / geometry.normals_squared;
 }
 
-/// epipolarAngle and its Jacobian; needs a baseline.
+/// epipolarAngle() and its Jacobian; requires a baseline.
 inline double epipolarAngleWithJacobian(const EpipolarGeometry& geometry, const Eigen::Vector3d& previous,
                                         Eigen::Matrix<double, 1, 6>* jacobian) {
   const double inverse_norm = 1.0 / std::sqrt(geometry.normals_squared);
   const double angle = geometry.baseline.dot(geometry.across) * inverse_norm;
-  // Of the triple product and of half the squared norm.
+  // Derivatives of the triple product and of half the squared norm.
   const Eigen::Vector3d triple_by_turn =
       geometry.arm.cross(geometry.across) + geometry.current.cross(geometry.previous_normal);
   const Eigen::Vector3d norm_by_shift =
@@ -83,8 +83,8 @@ inline double epipolarAngleWithJacobian(const EpipolarGeometry& geometry, const 
   return angle;
 }
 
-/// Direction of the ray x direction to the point, in the map's frame: its length is the sine of the angle
-/// between them. Writes the Jacobian over [dt, dphi] of map_from_rig where wanted.
+/// Cross product of the ray's direction and the direction to the point, in the map frame; its length is the
+/// sine of the angle between them. Optional Jacobian over [dt, dphi] of map_from_rig.
 inline Eigen::Vector3d pointingError(const PointMatch& match, const RotationTranslation& map_from_rig,
                                      Eigen::Matrix<double, 3, 6>* jacobian = nullptr) {
   const Eigen::Vector3d direction = map_from_rig.rotation * match.ray.direction;
@@ -102,7 +102,7 @@ inline Eigen::Vector3d pointingError(const PointMatch& match, const RotationTran
   return direction.cross(unit);
 }
 
-/// Squared sine of the angle between the ray and its point; infinite where the point lies behind.
+/// Squared sine of the angle between a ray and its point; infinite if the point lies behind the camera.
 inline double squaredPointingError(const PointMatch& match, const RotationTranslation& map_from_rig) {
   const Eigen::Vector3d to_point =
       map_from_rig.rotation.transpose() * (match.point_m - map_from_rig.translation_m) - match.ray.origin_m;

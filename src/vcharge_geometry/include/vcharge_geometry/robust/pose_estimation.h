@@ -11,25 +11,26 @@
 
 namespace vcharge {
 
-/// Pose of a rig in a map. Filled for kOk only.
+/// Pose of a rig in a map. Valid for kOk only.
 struct PoseEstimate {
   EstimationStatus status = EstimationStatus::kNoConsensus;
   RigidTransform map_from_rig;
-  /// Over [dt, dphi] in the map's frame, metres and radians.
+  /// Covariance over [dt, dphi] in the map frame (m, rad).
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   std::vector<int> inliers;  ///< indices of matches, ascending
   int num_iterations = 0;
   double noise_rad = 0.0;  ///< standard deviation of a ray's direction, from the inliers
 };
 
-// Robust (robust_estimation.h) on the angles between rays and points, deterministic, thread-safe. Directions
-// of rays must be unit vectors to 1e-6 (kNotFinite else). std::invalid_argument for invalid options.
+// Robust estimators (robust_estimation.h) that minimize the angles between rays and points. Deterministic and
+// thread-safe. Ray directions must be unit vectors within 1e-6, otherwise kNotFinite. Throw
+// std::invalid_argument for invalid options.
 
-/// Any pose: three matches a sample (generalized_three_point.h), refined in 6 degrees of freedom.
+/// Any pose, from samples of three matches (generalized_three_point.h), refined in 6 degrees of freedom.
 PoseEstimate estimateAbsolutePose(const std::vector<PointMatch>& matches, const RobustOptions& options);
 
-/// Pose with known roll and pitch: two matches a sample (upright_two_point.h), refined in 4 degrees of
-/// freedom. upright_from_rig turns the rig's frame so that its z axis is vertical, as the map's is.
+/// Pose with known roll and pitch, from samples of two matches (upright_two_point.h), refined in 4 degrees of
+/// freedom. upright_from_rig rotates the rig frame so that its z axis is vertical like the map's.
 PoseEstimate estimateUprightPose(const std::vector<PointMatch>& matches,
                                  const Eigen::Quaterniond& upright_from_rig, const RobustOptions& options);
 

@@ -11,7 +11,7 @@
 
 namespace vcharge {
 
-/// The best model of estimateRobustly.
+/// Best model found by estimateRobustly().
 struct RobustResult {
   bool found = false;
   RotationTranslation model;
@@ -20,7 +20,8 @@ struct RobustResult {
   int num_iterations = 0;
 };
 
-/// Samples that contain no outlier with the given confidence: ln(1 - confidence) / ln(1 - inlier_ratio^size).
+/// Number of samples after which one is free of outliers with the given confidence: ln(1 - confidence) / ln(1
+/// - inlier_ratio^sample_size).
 inline double iterationsForConfidence(double inlier_ratio, int sample_size, double confidence) {
   const double good_sample = std::pow(inlier_ratio, sample_size);
   if (good_sample >= 1.0) {
@@ -30,17 +31,13 @@ inline double iterationsForConfidence(double inlier_ratio, int sample_size, doub
 }
 
 /// Locally optimized RANSAC (Chum, Matas, Kittler, DAGM 2003; Lebeda, Matas, Chum, BMVC 2012) with truncated
-/// squared errors (MSAC: Torr and Zisserman, CVIU 2000), samples from MatchSampler, and a stop as soon as the
-/// confidence is reached. A Problem has
-///   static constexpr int kSampleSize;
-///   const std::vector<double>& qualities() const;  const std::vector<int>& groups() const;
-///   template <class Visitor> void solve(const std::array<int, kSampleSize>& sample, const Visitor& visit)
-///   const;
-///       calls visit(RotationTranslation) for each solution
-///   double squaredError(const RotationTranslation& model, int match) const;   // rad^2
-///   RotationTranslation refined(const RotationTranslation& model, double truncation_rad, int max_steps)
-///   const;
-/// The number of matches must be at least kSampleSize. Deterministic.
+/// squared errors (MSAC: Torr and Zisserman, CVIU 2000) and samples from MatchSampler; stops when the
+/// confidence is reached. Deterministic. A Problem has
+///   static constexpr int kSampleSize, of which there must be at least as many matches;
+///   qualities() and groups(), vectors with an entry per match (see MatchSampler);
+///   solve(sample, visit), which calls visit(RotationTranslation) for each solution of a sample of indices;
+///   squaredError(model, match) in rad^2;
+///   refined(model, truncation_rad, max_steps), a locally optimized model.
 template <class Problem>
 RobustResult estimateRobustly(const Problem& problem, const RobustOptions& options) {
   const int num_matches = static_cast<int>(problem.qualities().size());
@@ -50,7 +47,7 @@ RobustResult estimateRobustly(const Problem& problem, const RobustOptions& optio
   RobustResult best;
   best.score = INFINITY;
   int best_num_inliers = 0;
-  // Score of a model, given up when it exceeds the best one.
+  // Score of a model; stops early when it exceeds the best score.
   const auto scoreOf = [&](const RotationTranslation& model, int* num_inliers) {
     double score = 0.0;
     *num_inliers = 0;
@@ -78,16 +75,18 @@ RobustResult estimateRobustly(const Problem& problem, const RobustOptions& optio
   };
   constexpr int kLocalSteps = 4;
   constexpr int kFinalSteps = 20;
-  // A minimal sample carries its noise: the wide truncation takes in what a slightly wrong model misses.
+  // Models from minimal samples are noisy. The wider truncation includes inliers that such a model misses.
   const auto refineBest = [&](int max_steps) {
     const RotationTranslation start = best.model;
     const RotationTranslation wide = problem.refined(start, 3.0 * options.max_error_rad, max_steps);
     takeIfBetter(problem.refined(wide, options.max_error_rad, max_steps));
     takeIfBetter(problem.refined(start, options.max_error_rad, max_steps));
   };
+  // A few more samples protect against a first model with many inliers by chance.
+  constexpr int kMinIterations = 10;
   double needed = options.max_iterations;
   while (best.num_iterations < options.max_iterations &&
-         (best.num_iterations < options.min_iterations || best.num_iterations < needed)) {
+         (best.num_iterations < kMinIterations || best.num_iterations < needed)) {
     ++best.num_iterations;
     std::array<int, static_cast<size_t>(Problem::kSampleSize)> sample;
     sampler.draw(sample.data());

@@ -1,44 +1,32 @@
 #pragma once
 
+#include "vcharge_core/base/options.h"
+
 namespace vcharge {
 
 /// Options of the robust estimators. Errors are angles of viewing rays.
 struct RobustOptions {
-  double max_error_rad = 0.005;  ///< a match with a larger error is an outlier; about 3 standard deviations
-  double confidence = 0.99;      ///< wanted probability of one sample without outliers
-  int min_iterations = 10;
-  int max_iterations = 2000;
-  int min_inliers = 10;            ///< fewer mean that there is no consensus
-  bool order_by_quality = true;    ///< draw from the best matches first (PROSAC)
-  bool refine_best_models = true;  ///< local optimization within the loop (LO-RANSAC)
-  /// A translation whose length has a larger standard deviation, relative to it, is reported as a direction
-  /// only.
-  double max_relative_scale_deviation = 0.5;
-  int seed = 1;  ///< same seed, same matches: same result
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("max_error_rad", max_error_rad);
-    visit("confidence", confidence);
-    visit("min_iterations", min_iterations);
-    visit("max_iterations", max_iterations);
-    visit("min_inliers", min_inliers);
-    visit("order_by_quality", order_by_quality);
-    visit("refine_best_models", refine_best_models);
-    visit("max_relative_scale_deviation", max_relative_scale_deviation);
-    visit("seed", seed);
-  }
-  /// Throws std::invalid_argument naming the field.
-  void validate() const;
+  VCHARGE_BEGIN_OPTIONS(RobustOptions);
+  VCHARGE_OPTION(double, max_error_rad, 0.005, above(0.0).below(0.5),
+                 "Error beyond which a match is an outlier, about 3 standard deviations.");
+  VCHARGE_OPTION(double, confidence, 0.99, above(0.0).below(1.0),
+                 "Probability that at least one sample is free of outliers.");
+  VCHARGE_OPTION(int, max_iterations, 2000, atLeast(1), "Largest number of samples.");
+  VCHARGE_OPTION(int, min_inliers, 10, atLeast(1), "Number of inliers below which there is no consensus.");
+  VCHARGE_OPTION(bool, order_by_quality, true, anyValue(),
+                 "Whether the best matches are sampled first (PROSAC).");
+  VCHARGE_OPTION(bool, refine_best_models, true, anyValue(),
+                 "Whether the best models are optimized locally (LO-RANSAC).");
+  VCHARGE_OPTION(int, seed, 1, anyValue(), "Seed of the random samples.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// What became of a robust estimation. Everything but the status is filled for kOk and, as far as each
-/// estimator says, kScaleUnobservable; nothing for the rest.
+/// Status of a robust estimation. Results are valid for kOk and, in part, for kScaleUnobservable.
 enum class EstimationStatus {
   kOk,
-  kScaleUnobservable,  ///< rotation and direction of the translation are known, its length is not
-  kTooFewMatches,      ///< fewer than a minimal sample needs
-  kNotFinite,          ///< NaN or infinity in a match, or a ray without direction
+  kScaleUnobservable,  ///< rotation and direction of the translation are known, but not its length
+  kTooFewMatches,      ///< fewer than a minimal sample
+  kNotFinite,          ///< NaN or infinity in a match, or a ray without a direction
   kNoConsensus,        ///< no model has min_inliers inliers
 };
 

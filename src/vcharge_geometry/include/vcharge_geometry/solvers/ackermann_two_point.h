@@ -9,17 +9,14 @@ namespace vcharge {
 
 /// Motion of a car without slip from two line matches: Lee, Fraundorfer, Pollefeys, "Motion estimation for
 /// self-driving cars with a generalized camera", CVPR 2013.
-///
-/// The vehicle frame lies at the centre of the non-steered axle, x forward, z up. The car moves on a circle:
-/// previous_from_current turns by theta about z and moves by rho in the direction (c, s, 0), c =
-/// cos(theta/2), s = sin(theta/2). Each match reads rotation(c, s) + rho * along(c, s) = 0
-/// (yaw_epipolar_constraint.h, degrees 2 and 1), so two give a homogeneous cubic, rotation_1 along_2 -
-/// rotation_2 along_1 = 0: at most 3 motions. `along` > 0 of a solution is forward motion; `across` and `up`
-/// are 0.
-///
-/// Where both matches see their point by the same camera in both frames, no motion is always a solution and
-/// is left out; the car driving straight then leaves rho free (scale_observable false, along = +-1 by the
-/// sign of the depths): take it from odometry.
+/// The origin of the vehicle frame is the centre of the non-steered axle, x forward, z up. The car moves on a
+/// circle: previous_from_current rotates by theta about z and translates by rho in the direction (c, s, 0), c
+/// = cos(theta/2), s = sin(theta/2). The constraint of each match is rotation(c, s) + rho * along(c, s) = 0
+/// (yaw_epipolar_constraint.h, degrees 2 and 1). Two matches give the homogeneous cubic rotation_1 along_2 -
+/// rotation_2 along_1 = 0: at most 3 motions. `along` > 0 is forward motion; `across` and `up` are 0.
+/// If both matches stay within one camera, zero motion is always a solution and is left out. Straight motion
+/// then leaves rho undetermined (scale_observable is false, along = +-1 by the sign of the depths); take it
+/// from odometry.
 inline SolverStatus solveAckermannTwoPoint(const std::array<LineMatch, 2>& matches,
                                            FixedVector<YawMotion, 3>* motions) {
   motions->clear();

@@ -5,7 +5,7 @@
 
 namespace vcharge {
 
-/// Up to `Capacity` values without heap memory: what a minimal solver returns.
+/// Up to `Capacity` values without heap memory, returned by minimal solvers.
 template <class T, int Capacity>
 class FixedVector {
  public:
@@ -14,7 +14,7 @@ class FixedVector {
   int size() const { return size_; }
   bool empty() const { return size_ == 0; }
   void clear() { size_ = 0; }
-  /// Ignored when full.
+  /// Ignored if full.
   void push_back(const T& value) {
     if (size_ < Capacity) {
       values_[static_cast<size_t>(size_++)] = value;

@@ -53,7 +53,7 @@ inline SolverStatus solveGeneralizedThreePoint(const std::array<PointMatch, 3>& 
       PairDistance(matches[0].ray, matches[1].ray, 1.0 / unit, squared[0] / unit_squared),
       PairDistance(matches[0].ray, matches[2].ray, 1.0 / unit, squared[1] / unit_squared),
       PairDistance(matches[1].ray, matches[2].ray, 1.0 / unit, squared[2] / unit_squared)};
-  // Polynomials in lambda_1.
+  // Coefficients are polynomials in lambda_1.
   const Polynomial<1> b2{pairs[0].second, pairs[0].mixed};
   const Polynomial<2> c2{pairs[0].constant, pairs[0].first, 1.0};
   const Polynomial<1> b3{pairs[1].second, pairs[1].mixed};
@@ -106,7 +106,7 @@ inline SolverStatus solveGeneralizedThreePoint(const std::array<PointMatch, 3>& 
     const double slope_value = evaluate(slope, depth);
     if (std::abs(slope_value) <= slope_size * (1.0 + depth * depth * depth) ||
         !addByDepth(-evaluate(offset, depth) / slope_value)) {
-      // Two poses share this depth, as with symmetric triangles or parallel rays.
+      // Two poses have the same depth, as for symmetric triangles or parallel rays.
       for (const double second_depth : quadraticRoots(1.0, evaluate(b2, depth), evaluate(c2, depth))) {
         addByDepth(second_depth);
       }

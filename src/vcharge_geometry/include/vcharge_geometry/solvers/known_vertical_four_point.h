@@ -9,15 +9,12 @@ namespace vcharge {
 
 /// Motion with known vertical from four line matches: Lee, Pollefeys, Fraundorfer, "Relative pose estimation
 /// for a multi-camera system with known vertical direction", CVPR 2014.
-///
-/// Both lines of each match are given in frames whose z axis is vertical (the rig's, turned by its roll and
-/// pitch), so the motion turns by theta about z and moves by any (x, y, z). Each match reads rotation +
-/// along * u + across * w + up * z = 0 (yaw_epipolar_constraint.h, degrees 2, 1, 1, 2); the determinant of
-/// four is a form of degree 6 in cos(theta/2), sin(theta/2): at most 6 motions.
-///
-/// Where all matches see their point by the same camera in both frames and roll and pitch did not change, no
-/// motion is always a solution and is left out; a rig that does not turn then leaves the length of the
-/// translation free (scale_observable).
+/// Both lines of each match are given in frames whose z axis is vertical (the rig frames, rotated by their
+/// roll and pitch), so the motion is a rotation by theta about z and any translation. The constraint of each
+/// match is rotation + along * u + across * w + up * z = 0 (yaw_epipolar_constraint.h, degrees 2, 1, 1, 2);
+/// the determinant of four of them is a form of degree 6 in cos(theta/2), sin(theta/2): at most 6 motions.
+/// If all matches stay within one camera, and roll and pitch did not change, zero motion is always a solution
+/// and is left out. Without rotation, the length of the translation is then undetermined (scale_observable).
 inline SolverStatus solveKnownVerticalFourPoint(const std::array<LineMatch, 4>& matches,
                                                 FixedVector<YawMotion, 6>* motions) {
   motions->clear();
@@ -32,7 +29,7 @@ inline SolverStatus solveKnownVerticalFourPoint(const std::array<LineMatch, 4>& 
     return determinant(constraints[i].rotation, constraints[i].up, constraints[j].rotation,
                        constraints[j].up);
   };
-  // Laplace expansion by the columns (along, across) and (rotation, up).
+  // Laplace expansion along the columns (along, across) and (rotation, up).
   Polynomial<6> sextic{};
   addScaled(multiply(horizontalMinor(0, 1), otherMinor(2, 3)), 1.0, &sextic);
   addScaled(multiply(horizontalMinor(0, 2), otherMinor(1, 3)), -1.0, &sextic);
@@ -60,7 +57,7 @@ inline SolverStatus solveKnownVerticalFourPoint(const std::array<LineMatch, 4>& 
                                 valueAt(constraints[i].up, half));
       rotation[static_cast<Eigen::Index>(i)] = valueAt(constraints[i].rotation, half);
     }
-    // The three best conditioned of four equations give the translation.
+    // The translation follows from the three best conditioned of the four equations.
     std::array<size_t, 3> best{0, 1, 2};
     double best_determinant = 0.0;
     constexpr std::array<std::array<size_t, 3>, 4> kTriples{{{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}}};
@@ -83,7 +80,7 @@ inline SolverStatus solveKnownVerticalFourPoint(const std::array<LineMatch, 4>& 
                       rotation[static_cast<Eigen::Index>(best[2])] * a.cross(b)) /
                     best_determinant;
     } else {
-      // The rows span a plane: the translation is along its normal, its length is free.
+      // The rows span a plane: the translation has the direction of its normal and an undetermined length.
       translation.setZero();
       for (size_t i = 0; i < 4; ++i) {
         for (size_t j = i + 1; j < 4; ++j) {

@@ -78,7 +78,7 @@ inline SolverStatus solvePerspectiveThreePoint(const std::array<PointMatch, 3>& 
     };
     const double slope_value = evaluate(slope, x);
     if (std::abs(slope_value) <= slope_size * (1.0 + x) || !addByRatio(-evaluate(offset, x) / slope_value)) {
-      // Two poses share this depth, as with symmetric triangles.
+      // Two poses have the same depth, as for symmetric triangles.
       for (const double u : quadraticRoots(1.0, b2, evaluate(c2, x))) {
         addByRatio(u);
       }

@@ -9,14 +9,12 @@ namespace vcharge {
 
 /// Planar motion from three line matches: Lee, Fraundorfer, Pollefeys, "Structureless pose-graph loop-closure
 /// with a multi-camera system on a self-driving car", IROS 2013.
-///
-/// The rig turns by theta about z and moves by (x, y, 0). With the translation in the half-turned basis each
-/// match reads rotation + along * u + across * w = 0 (yaw_epipolar_constraint.h, degrees 2, 1, 1 in
-/// cos(theta/2), sin(theta/2)); the determinant of three is a form of degree 4: at most 4 motions, any yaw,
-/// pi included.
-///
-/// Where all matches see their point by the same camera in both frames, no motion is always a solution and is
-/// left out; a rig that does not turn then leaves the length of the translation free (scale_observable).
+/// The rig rotates by theta about z and translates by (x, y, 0). With the translation in the half-rotated
+/// basis, the constraint of each match is rotation + along * u + across * w = 0 (yaw_epipolar_constraint.h,
+/// degrees 2, 1, 1 in cos(theta/2), sin(theta/2)); the determinant of three of them is a form of degree 4: at
+/// most 4 motions, with any yaw including pi.
+/// If all matches stay within one camera, zero motion is always a solution and is left out. Without rotation,
+/// the length of the translation is then undetermined (scale_observable).
 inline SolverStatus solvePlanarThreePoint(const std::array<LineMatch, 3>& matches,
                                           FixedVector<YawMotion, 4>* motions) {
   motions->clear();
@@ -43,7 +41,7 @@ inline SolverStatus solvePlanarThreePoint(const std::array<LineMatch, 3>& matche
     return SolverStatus::kDegenerate;
   }
   const auto addMotion = [&](const HalfAngle& half) {
-    // The two best conditioned of three equations give the translation.
+    // The translation follows from the two best conditioned of the three equations.
     size_t best = 0;
     double best_minor = 0.0;
     for (size_t i = 0; i < 3; ++i) {
@@ -67,7 +65,8 @@ inline SolverStatus solvePlanarThreePoint(const std::array<LineMatch, 3>& matche
       motion.along = (a_across * b_rotation - b_across * a_rotation) / best_minor;
       motion.across = (b_along * a_rotation - a_along * b_rotation) / best_minor;
     } else {
-      // The rows are parallel: the translation is perpendicular to the longest, its length is free.
+      // The rows are parallel: the translation is perpendicular to the longest and has an undetermined
+      // length.
       double along = 0.0;
       double across = 0.0;
       for (const YawEpipolarConstraint& constraint : constraints) {

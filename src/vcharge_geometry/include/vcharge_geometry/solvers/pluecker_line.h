@@ -7,14 +7,14 @@
 
 namespace vcharge {
 
-/// A camera's viewing ray in the frame of the rig: all points origin + depth * direction, depth > 0.
+/// Viewing ray of a camera in the rig frame: all points origin + depth * direction, depth > 0.
 struct Ray {
   Eigen::Vector3d origin_m;   ///< centre of the camera
   Eigen::Vector3d direction;  ///< unit vector
 };
 
-/// A line by its direction q (unit vector) and moment q' = point x q (metres), the same for every point of
-/// it. Pless, "Using many cameras as one", CVPR 2003.
+/// A line with direction q (unit vector) and moment q' = point x q (metres), which is the same for all of its
+/// points. Pless, "Using many cameras as one", CVPR 2003.
 struct PlueckerLine {
   Eigen::Vector3d direction;
   Eigen::Vector3d moment_m;
@@ -34,15 +34,15 @@ inline PlueckerLine operator*(const RigidTransform& target_from_source, const Pl
           target_from_source.rotation() * line.moment_m + target_from_source.translation().cross(direction)};
 }
 
-/// The same scene point seen at two instants, each line in the rig's frame of its instant.
+/// Lines of sight to a scene point at two instants, each in the rig frame of its instant.
 struct LineMatch {
   PlueckerLine previous;
   PlueckerLine current;
 };
 
 /// Generalized epipolar constraint (Pless 2003): q^T R m' + q^T [t]x R q' + m^T R q', where (q, m) is the
-/// previous line, (q', m') the current one and (R, t) = previous_from_current. Zero when the lines meet; else
-/// their distance times the sine of the angle between them, metres.
+/// previous line, (q', m') the current one and (R, t) = previous_from_current. Zero if the lines meet;
+/// otherwise their distance (metres) times the sine of the angle between them.
 inline double generalizedEpipolarConstraint(const LineMatch& match,
                                             const RigidTransform& previous_from_current) {
   const PlueckerLine current_in_previous = previous_from_current * match.current;

@@ -10,15 +10,15 @@
 
 namespace vcharge {
 
-/// Where a ray of the rig meets a known point of the map.
+/// Match between a ray of the rig and a known point of the map.
 struct PointMatch {
-  Ray ray;                  ///< in the frame of the rig
-  Eigen::Vector3d point_m;  ///< in the frame of the map
-  int camera = 0;           ///< which camera the ray belongs to, any label; used to draw samples
-  double quality = 1.0;     ///< higher for matches more likely to be right; used to draw samples
+  Ray ray;                  ///< in the rig frame
+  Eigen::Vector3d point_m;  ///< in the map frame
+  int camera = 0;           ///< any label; used to draw samples across cameras
+  double quality = 1.0;     ///< higher for more reliable matches; used to draw samples
 };
 
-/// Axes of a triangle: along its first side, in its plane, and normal to it. False where it has no area.
+/// Axes of a triangle: along its first side, in its plane, and normal to it. False if its area is zero.
 inline bool triangleAxes(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
                          Eigen::Matrix3d* axes) {
   const Eigen::Vector3d side = b - a;

@@ -9,8 +9,8 @@
 
 namespace vcharge {
 
-/// c[0] + c[1] x + ... + c[Degree] x^Degree; read as a form in two variables (y, x) it is
-/// c[0] y^Degree + c[1] y^(Degree-1) x + ... + c[Degree] x^Degree.
+/// c[0] + c[1] x + ... + c[Degree] x^Degree. As a form in two variables (y, x): c[0] y^Degree + c[1]
+/// y^(Degree-1) x + ... + c[Degree] x^Degree.
 template <int Degree>
 using Polynomial = std::array<double, static_cast<size_t>(Degree) + 1>;
 
@@ -25,7 +25,7 @@ std::array<double, A + B - 1> multiply(const std::array<double, A>& a, const std
   return product;
 }
 
-/// *sum += factor * term; the term may have a lower degree.
+/// *sum += factor * term, where the term may have a lower degree.
 template <size_t A, size_t B>
 void addScaled(const std::array<double, B>& term, double factor, std::array<double, A>* sum) {
   static_assert(B <= A, "the sum must hold the term");
@@ -65,7 +65,7 @@ double largestMagnitude(const std::array<double, N>& polynomial) {
   return largest;
 }
 
-/// Finite when all coefficients are: one test instead of many.
+/// True if all coefficients are finite.
 template <size_t N>
 bool allFinite(const std::array<double, N>& polynomial) {
   double sum = 0.0;
@@ -77,8 +77,8 @@ bool allFinite(const std::array<double, N>& polynomial) {
 
 namespace internal {
 
-/// Newton's method inside a bracket [low, high] at whose ends the polynomial's signs differ (low_value is the
-/// value at low); bisects where Newton leaves the bracket.
+/// Newton's method in the bracket [low, high], at whose ends the signs of the polynomial differ; bisects when
+/// a step leaves the bracket.
 template <size_t N>
 double rootInBracket(const std::array<double, N>& polynomial, double low, double high, bool low_is_negative,
                      double guess) {
@@ -93,13 +93,13 @@ double rootInBracket(const std::array<double, N>& polynomial, double low, double
       high = x;
     }
     double next = x - value / derivative;
-    // Also false for NaN, where the derivative vanishes.
+    // The condition is also false for NaN, where the derivative vanishes.
     if (!(next >= low && next <= high)) {
       next = 0.5 * (low + high);
     }
     const double step = std::abs(next - x);
     x = next;
-    // Newton converges quadratically: the next step would be below the rounding.
+    // Newton's method converges quadratically: one more step reaches rounding precision.
     if (step <= 1e-9 * std::abs(x) || value == 0.0) {
       evaluateWithDerivative(polynomial, x, &value, &derivative);
       const double last = x - value / derivative;
@@ -109,7 +109,7 @@ double rootInBracket(const std::array<double, N>& polynomial, double low, double
   return x;
 }
 
-/// Where the polynomial is level, by Newton's method on its derivative.
+/// An extremum near x, by Newton's method on the derivative.
 template <size_t N>
 double extremumFrom(const std::array<double, N>& polynomial, double x) {
   std::array<double, N - 1> derivative;
@@ -125,7 +125,7 @@ double extremumFrom(const std::array<double, N>& polynomial, double x) {
   return x;
 }
 
-/// A stretch of the unit interval with the polynomial's Bernstein coefficients on it.
+/// A part of the unit interval with the polynomial's Bernstein coefficients on it.
 template <size_t N>
 struct BernsteinPiece {
   std::array<double, N> coefficients;
@@ -169,11 +169,11 @@ constexpr std::array<double, N> inverseBinomials() {
 
 }  // namespace internal
 
-/// Calls visit(x) for each real root in [0, 1]. The roots are isolated by sign variations of Bernstein
-/// coefficients under bisection (Lane and Riesenfeld, "Bounds on a polynomial", BIT 1981), which needs no
-/// division and so bears vanishing leading coefficients; each is then found by Newton's method. Roots at 0, 1
-/// or at a dyadic point may be reported twice. Two roots closer than about 1e-6, or a complex pair that close
-/// to the axis, are reported as one: noise moves double roots off the real axis.
+/// Calls visit(x) for each real root in [0, 1]. Bisection isolates roots by the sign variations of Bernstein
+/// coefficients (Lane and Riesenfeld, "Bounds on a polynomial", BIT 1981), which needs no division and
+/// tolerates vanishing leading coefficients; Newton's method then refines each. Roots at 0, 1 or a dyadic
+/// point may be reported twice. Two roots closer than about 1e-6, or a complex pair that close to the real
+/// axis, are reported as one, since noise moves double roots off the axis.
 template <size_t N, class Visitor>
 void visitRootsInUnitInterval(const std::array<double, N>& polynomial, const Visitor& visit) {
   constexpr int kMaxDepth = 20;
@@ -246,7 +246,7 @@ void visitRootsInUnitInterval(const std::array<double, N>& polynomial, const Vis
       }
     }
     if (piece.depth == kMaxDepth) {
-      // Pieces come from left to right: a run of them is one root, blurred by rounding.
+      // Pieces are visited from left to right; a sequence of them is one root, blurred by rounding.
       if (piece.low - end_of_run > 4.0 * piece.width) {
         visit(piece.low + 0.5 * piece.width);
       }
@@ -258,7 +258,7 @@ void visitRootsInUnitInterval(const std::array<double, N>& polynomial, const Vis
   }
 }
 
-/// Positive real roots, each once, in no order. Best conditioned where they are of the order of 1.
+/// Positive real roots, each once, in no particular order. Best conditioned if they are near 1.
 template <size_t N>
 FixedVector<double, static_cast<int>(N) - 1> positiveRealRoots(const std::array<double, N>& polynomial) {
   FixedVector<double, static_cast<int>(N) - 1> roots;
@@ -285,54 +285,12 @@ FixedVector<double, static_cast<int>(N) - 1> positiveRealRoots(const std::array<
   return roots;
 }
 
-/// A point of the projective line, cosine^2 + sine^2 = 1, cosine >= 0: half of a yaw angle.
-struct HalfAngle {
-  double cosine;
-  double sine;
-};
-
-namespace internal {
-
-template <int Capacity>
-void addHalfAngle(double cosine, double sine, FixedVector<HalfAngle, Capacity>* roots) {
-  const double scale = std::copysign(1.0 / std::sqrt(cosine * cosine + sine * sine), cosine);
-  const HalfAngle root{scale * cosine, scale * sine};
-  for (const HalfAngle& other : *roots) {
-    if (std::abs(root.sine * other.cosine - root.cosine * other.sine) <= 1e-12) {
-      return;
-    }
-  }
-  roots->push_back(root);
-}
-
-}  // namespace internal
-
-/// Real roots on the projective line of the form sum_i c[i] cosine^(Degree-i) sine^i, each once, in no order;
-/// so an angle of pi (cosine of half the angle 0) is a root like any other.
-template <size_t N>
-FixedVector<HalfAngle, static_cast<int>(N) - 1> halfAngleRoots(const std::array<double, N>& form) {
-  FixedVector<HalfAngle, static_cast<int>(N) - 1> roots;
-  std::array<double, N> mirrored = form;
-  for (size_t i = 1; i < N; i += 2) {
-    mirrored[i] = -mirrored[i];
-  }
-  std::array<double, N> reversed;
-  std::array<double, N> reversed_mirrored;
-  std::reverse_copy(form.begin(), form.end(), reversed.begin());
-  std::reverse_copy(mirrored.begin(), mirrored.end(), reversed_mirrored.begin());
-  visitRootsInUnitInterval(form, [&](double x) { internal::addHalfAngle(1.0, x, &roots); });
-  visitRootsInUnitInterval(mirrored, [&](double x) { internal::addHalfAngle(1.0, -x, &roots); });
-  visitRootsInUnitInterval(reversed, [&](double x) { internal::addHalfAngle(x, 1.0, &roots); });
-  visitRootsInUnitInterval(reversed_mirrored, [&](double x) { internal::addHalfAngle(x, -1.0, &roots); });
-  return roots;
-}
-
-/// Real roots of a x^2 + b x + c, without cancellation; a double root once.
+/// Real roots of a x^2 + b x + c without cancellation; a double root is returned once.
 inline FixedVector<double, 2> quadraticRoots(double a, double b, double c) {
   FixedVector<double, 2> roots;
   const double half = -0.5 * b;
   const double discriminant = half * half - a * c;
-  // A double root that rounding made complex is still a root.
+  // Accepts a double root that became complex by rounding.
   if (discriminant < -1e-14 * half * half || (a == 0.0 && b == 0.0)) {
     return roots;
   }
@@ -344,82 +302,6 @@ inline FixedVector<double, 2> quadraticRoots(double a, double b, double c) {
   roots.push_back(c / q);
   if (a != 0.0 && discriminant > 0.0) {
     roots.push_back(q / a);
-  }
-  return roots;
-}
-
-/// halfAngleRoots of a form of degree 2, in closed form.
-inline FixedVector<HalfAngle, 2> halfAngleRoots(const Polynomial<2>& form) {
-  FixedVector<HalfAngle, 2> roots;
-  const bool by_tangent = std::abs(form[2]) >= std::abs(form[0]);
-  const double a = by_tangent ? form[2] : form[0];
-  const double c = by_tangent ? form[0] : form[2];
-  if (a == 0.0) {
-    // c0 * cosine * sine
-    internal::addHalfAngle(1.0, 0.0, &roots);
-    internal::addHalfAngle(0.0, 1.0, &roots);
-    return roots;
-  }
-  for (const double x : quadraticRoots(a, form[1], c)) {
-    internal::addHalfAngle(by_tangent ? 1.0 : x, by_tangent ? x : 1.0, &roots);
-  }
-  return roots;
-}
-
-/// halfAngleRoots of a form of degree 3: the root farthest from the inflection by Newton's method from beyond
-/// it, where it converges monotonically, then a quadratic.
-inline FixedVector<HalfAngle, 3> halfAngleRoots(const Polynomial<3>& form) {
-  FixedVector<HalfAngle, 3> roots;
-  const bool by_tangent = std::abs(form[3]) >= std::abs(form[0]);
-  const auto add = [&](double x) {
-    internal::addHalfAngle(by_tangent ? 1.0 : x, by_tangent ? x : 1.0, &roots);
-  };
-  const double leading = by_tangent ? form[3] : form[0];
-  if (std::abs(leading) <= 1e-15 * std::max(std::abs(form[1]), std::abs(form[2]))) {
-    // cosine * sine * (c1 cosine + c2 sine)
-    internal::addHalfAngle(1.0, 0.0, &roots);
-    internal::addHalfAngle(0.0, 1.0, &roots);
-    internal::addHalfAngle(form[2], -form[1], &roots);
-    return roots;
-  }
-  const double inverse = 1.0 / leading;
-  const double c2 = inverse * (by_tangent ? form[2] : form[1]);
-  const double c1 = inverse * (by_tangent ? form[1] : form[2]);
-  const double c0 = inverse * (by_tangent ? form[0] : form[3]);
-  const double inflection = -c2 / 3.0;
-  const double value_there = ((inflection + c2) * inflection + c1) * inflection + c0;
-  // Distance from the inflection to where the curve is level; the outer of three real roots is at most twice
-  // as far. A single root is near the cube root of the value, or nearer where the curve is steep.
-  const double level_squared = inflection * inflection - c1 / 3.0;
-  double distance = 0.0;
-  if (value_there * value_there <= 4.0 * level_squared * level_squared * level_squared) {
-    distance = 2.0 * std::sqrt(level_squared);
-  } else if (level_squared > 0.0) {
-    distance = std::cbrt(std::abs(value_there)) + std::sqrt(level_squared);
-  } else {
-    distance = std::min(std::cbrt(std::abs(value_there)), std::abs(value_there) / (-3.0 * level_squared));
-  }
-  double x = inflection - std::copysign(distance, value_there);
-  for (int iteration = 0; iteration < 60; ++iteration) {
-    const double slope = (3.0 * x + 2.0 * c2) * x + c1;
-    const double value = ((x + c2) * x + c1) * x + c0;
-    if (slope == 0.0) {
-      break;
-    }
-    const double step = value / slope;
-    x -= step;
-    if (std::abs(step) <= 1e-9 * std::abs(x)) {
-      break;
-    }
-  }
-  const double slope = (3.0 * x + 2.0 * c2) * x + c1;
-  if (slope != 0.0) {
-    x -= (((x + c2) * x + c1) * x + c0) / slope;
-  }
-  add(x);
-  const double b = x + c2;
-  for (const double other : quadraticRoots(1.0, b, b * x + c1)) {
-    add(other);
   }
   return roots;
 }

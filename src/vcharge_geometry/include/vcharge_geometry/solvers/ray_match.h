@@ -4,13 +4,13 @@
 
 namespace vcharge {
 
-/// The same scene point seen at two instants, each ray in the rig's frame of its instant.
+/// Rays to a scene point at two instants, each in the rig frame of its instant.
 struct RayMatch {
   Ray previous;
   Ray current;
   int previous_camera = 0;  ///< any label; used to draw samples across cameras
   int current_camera = 0;
-  double quality = 1.0;  ///< higher for matches more likely to be right; used to draw samples
+  double quality = 1.0;  ///< higher for more reliable matches; used to draw samples
 };
 
 }  // namespace vcharge

@@ -7,7 +7,7 @@
 
 namespace vcharge {
 
-/// A transform as solvers and inner loops use it: a rotation matrix, not checked, and a translation in
+/// A transform for solvers and inner loops: a rotation matrix, which is not checked, and a translation in
 /// metres.
 struct RotationTranslation {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();

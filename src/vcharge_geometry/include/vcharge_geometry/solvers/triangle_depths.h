@@ -7,10 +7,11 @@
 
 namespace vcharge {
 
-/// The three equations that any three-point pose obeys: with p_i = o_i + lambda_i d_i in the rig's frame,
-///   |p_i - p_j|^2 = |X_i - X_j|^2 for the pairs (1,2), (1,3), (2,3).
-/// As a quadratic in both depths: lambda_i^2 + lambda_j^2 + mixed lambda_i lambda_j + first lambda_i +
-/// second lambda_j + constant = 0. Lengths are in units of the longest side.
+/// The three equations of every three-point pose: with p_i = o_i + lambda_i d_i in the rig frame,
+/// |p_i - p_j|^2 = |X_i - X_j|^2 for the pairs (1,2), (1,3), (2,3).
+/// As a quadratic in both depths:
+/// lambda_i^2 + lambda_j^2 + mixed lambda_i lambda_j + first lambda_i + second lambda_j + constant = 0.
+/// Lengths are in units of the longest side.
 struct PairDistance {
   double mixed;
   double first;
@@ -35,7 +36,8 @@ struct PairDistance {
 /// Pairs (1,2), (1,3), (2,3).
 using TriangleDistances = std::array<PairDistance, 3>;
 
-/// Newton's method on the three equations. False unless it ends at depths that satisfy them, of any sign.
+/// Refines depths by Newton's method on the three equations. Returns false unless the result satisfies them.
+/// Depths may have any sign.
 inline bool polishDepths(const TriangleDistances& pairs, Eigen::Vector3d* depths) {
   Eigen::Vector3d& d = *depths;
   for (int iteration = 0; iteration < 5; ++iteration) {
@@ -56,7 +58,7 @@ inline bool polishDepths(const TriangleDistances& pairs, Eigen::Vector3d* depths
     const double e = pairs[1].bySecond(d[0], d[2]);
     const double f = pairs[2].byFirst(d[1], d[2]);
     const double g = pairs[2].bySecond(d[1], d[2]);
-    // Rows (a b 0), (c 0 e), (0 f g).
+    // The rows are (a b 0), (c 0 e), (0 f g).
     const double determinant = -a * e * f - b * c * g;
     if (determinant == 0.0) {
       break;
@@ -71,7 +73,7 @@ inline bool polishDepths(const TriangleDistances& pairs, Eigen::Vector3d* depths
   return error <= 1e-9 * (1.0 + d.squaredNorm());
 }
 
-/// Pose from the depths along the three rays, metres; none unless all points lie in front.
+/// Adds the pose for the depths (metres) along the three rays if all points lie in front of their cameras.
 template <int Capacity>
 void addPoseOfDepths(const std::array<PointMatch, 3>& matches, const Eigen::Matrix3d& map_axes,
                      const Eigen::Vector3d& depths_m, FixedVector<RotationTranslation, Capacity>* poses) {

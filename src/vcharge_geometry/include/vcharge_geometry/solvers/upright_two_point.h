@@ -9,15 +9,15 @@
 
 namespace vcharge {
 
-/// Pose of a generalized camera whose roll and pitch are known, from two points; for a single camera:
-/// Kukelova, Bujnak, Pajdla, "Closed-form solutions to minimal absolute pose problems with known vertical
-/// direction", ACCV 2010; for rigs: Sweeney et al., "Solving for relative pose with a partially known
-/// rotation is a quadratic eigenvalue problem", 3DV 2014, treats the general case.
-///
-/// The rays are given in a frame of the rig whose z axis is vertical, as the map's is: X_i = R_z(yaw)(o_i +
-/// lambda_i d_i) + t. The difference of two such equations has a height, linear in the lambdas and free of
-/// the yaw, and a horizontal length, quadratic and also free of it: a line meets a quadric, at most 2 poses.
-/// Both points must lie in front of their cameras. Two horizontal rays leave the depths free: kDegenerate.
+/// Pose of a generalized camera with known roll and pitch from two points. For a single camera: Kukelova,
+/// Bujnak, Pajdla, "Closed-form solutions to minimal absolute pose problems with known vertical direction",
+/// ACCV 2010. For rigs: Sweeney et al., "Solving for relative pose with a partially known rotation is a
+/// quadratic eigenvalue problem", 3DV 2014, treats the general case.
+/// The rays are given in a rig frame whose z axis is vertical like the map's: X_i = R_z(yaw)(o_i + lambda_i
+/// d_i) + t. The difference of both equations does not depend on the yaw in its height, which is linear in
+/// the lambdas, nor in its horizontal length, which is quadratic: intersecting a line and a quadric gives at
+/// most 2 poses. Both points must lie in front of their cameras. Two horizontal rays leave the depths
+/// undetermined: kDegenerate.
 inline SolverStatus solveUprightTwoPoint(const std::array<PointMatch, 2>& matches,
                                          FixedVector<RotationTranslation, 2>* poses) {
   poses->clear();
@@ -36,11 +36,11 @@ inline SolverStatus solveUprightTwoPoint(const std::array<PointMatch, 2>& matche
   if (norm_squared < 1e-12 || horizontal_squared <= 1e-24 * points.z() * points.z()) {
     return SolverStatus::kDegenerate;
   }
-  // Depths along the line of equal heights: nearest_i + step * along_i.
+  // Depths on the line of equal heights: nearest_i + step * along_i.
   const double height = (points.z() - origins.z()) / norm_squared;
   const double first_nearest = height * first_z;
   const double second_nearest = -height * second_z;
-  // Horizontal difference in the rig: base + step * slope.
+  // Horizontal difference in the rig frame: base + step * slope.
   const double base_x =
       origins.x() + first_nearest * first.direction.x() - second_nearest * second.direction.x();
   const double base_y =
@@ -49,7 +49,7 @@ inline SolverStatus solveUprightTwoPoint(const std::array<PointMatch, 2>& matche
   const double slope_y = second_z * first.direction.y() - first_z * second.direction.y();
   const double slope_squared = slope_x * slope_x + slope_y * slope_y;
   if (slope_squared < 1e-24) {
-    // Parallel rays: moving along both changes nothing.
+    // Parallel rays: any step along both gives the same difference.
     return SolverStatus::kDegenerate;
   }
   for (const double step : quadraticRoots(slope_squared, 2.0 * (base_x * slope_x + base_y * slope_y),

@@ -2,18 +2,19 @@
 
 #include <cmath>
 
+#include "vcharge_geometry/solvers/half_angle_roots.h"
 #include "vcharge_geometry/solvers/pluecker_line.h"
 #include "vcharge_geometry/solvers/polynomial.h"
 
 namespace vcharge {
 
-/// The generalized epipolar constraint of one match for a rotation by the yaw theta about z:
-///   rotation(c, s) + along * u(c, s) + across * w(c, s) + up * z(c, s) = 0,  c = cos(theta/2), s =
-///   sin(theta/2),
-/// with the translation written in the directions (c, s, 0), (-s, c, 0) and (0, 0, 1). In this basis, that
-/// turns by half the yaw, u and w are linear in (c, s) where x and y would be quadratic, so determinants have
-/// no factor c^2 + s^2 = 1 (the (1+q^2) of Lee et al.) to be divided out. Coefficients are those of the forms
-/// in (c, s), highest power of c first.
+/// Generalized epipolar constraint of a match for a rotation by the yaw theta about z:
+/// rotation(c, s) + along * u(c, s) + across * w(c, s) + up * z(c, s) = 0, c = cos(theta/2), s =
+/// sin(theta/2),
+/// with the translation in the basis (c, s, 0), (-s, c, 0), (0, 0, 1), which is rotated by half the yaw. In
+/// this basis, u and w are linear in (c, s) instead of quadratic, so determinants have no factor c^2 + s^2 =
+/// 1 (the (1+q^2) of Lee et al.) that must be divided out. Coefficients are those of forms in (c, s), highest
+/// power of c first.
 struct YawEpipolarConstraint {
   Polynomial<2> rotation;  ///< metres
   Polynomial<1> along;
@@ -36,15 +37,15 @@ struct YawEpipolarConstraint {
     moment_scale_m_ = m.lpNorm<1>() + n.lpNorm<1>();
   }
 
-  /// Whether no rotation and no translation satisfy the constraint whatever the match, as for the same camera
-  /// in both frames: then sine = 0 is a trivial root of every solver's polynomial.
+  /// True if zero motion satisfies the constraint for any match, as within one camera. Then sine = 0 is a
+  /// trivial root of every solver's polynomial.
   bool holdsWithoutMotion() const { return std::abs(rotation[0]) <= 1e-13 * moment_scale_m_; }
 
  private:
   double moment_scale_m_;
 };
 
-/// Value of a form of degree 1 or 2 in (cosine, sine).
+/// Value of a form of degree 1 or 2 at (cosine, sine).
 inline double valueAt(const Polynomial<1>& form, const HalfAngle& half) {
   return form[0] * half.cosine + form[1] * half.sine;
 }
@@ -52,8 +53,7 @@ inline double valueAt(const Polynomial<2>& form, const HalfAngle& half) {
   return (form[0] * half.cosine + form[1] * half.sine) * half.cosine + form[2] * half.sine * half.sine;
 }
 
-/// a c^2 + b cs + ... of two linear forms: a[0] b[1] - a[1] b[0] products, as for a 2x2 determinant
-/// first.a * second.b - second.a * first.b.
+/// Determinant first.a * second.b - second.a * first.b of forms.
 template <size_t A, size_t B>
 std::array<double, A + B - 1> determinant(const std::array<double, A>& first_a,
                                           const std::array<double, B>& first_b,
@@ -67,13 +67,13 @@ std::array<double, A + B - 1> determinant(const std::array<double, A>& first_a,
   return value;
 }
 
-/// Yaw rotation and translation from the half angle and the translation in the half-turned basis.
+/// Rotation by a yaw given as half angle, and translation in the half-rotated basis.
 struct YawMotion {
   HalfAngle half_yaw{1.0, 0.0};
   double along = 0.0;   ///< metres, in the direction (cos(yaw/2), sin(yaw/2), 0)
-  double across = 0.0;  ///< metres, to the left of it
+  double across = 0.0;  ///< metres, to the left of this direction
   double up = 0.0;      ///< metres
-  /// False where the matches leave the length of the translation free; the translation is then a unit vector.
+  /// False if the length of the translation is undetermined; the translation is then a unit vector.
   bool scale_observable = true;
 
   double yaw() const { return 2.0 * std::atan2(half_yaw.sine, half_yaw.cosine); }
@@ -84,14 +84,14 @@ struct YawMotion {
   }
 };
 
-/// Which of t and -t puts the matched points in front of the cameras, where only the direction of the
-/// translation is known and the rotation is small: the sign of the depths along both rays.
+/// Sign of a translation known up to its length, for small rotations: +1 or -1, such that the matched points
+/// lie in front of both cameras.
 inline double directionSign(const LineMatch* matches, int num_matches, const RigidTransform& motion) {
   double vote = 0.0;
   for (int i = 0; i < num_matches; ++i) {
     const Eigen::Vector3d& previous = matches[i].previous.direction;
     const Eigen::Vector3d current = motion.rotation() * matches[i].current.direction;
-    // depth (previous x current) = t x current.
+    // From depth (previous x current) = t x current.
     vote += motion.translation().cross(current).dot(previous.cross(current));
   }
   return vote < 0.0 ? -1.0 : 1.0;

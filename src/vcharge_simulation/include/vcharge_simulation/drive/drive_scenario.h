@@ -3,57 +3,37 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_simulation/drive/drive_simulator.h"
+#include "vcharge_core/base/options.h"
 #include "vcharge_simulation/faults/fault_options.h"
-#include "vcharge_simulation/sensors/camera_response.h"
 #include "vcharge_simulation/sensors/lens_blur.h"
 #include "vcharge_simulation/sensors/wheel_odometer.h"
 
 namespace vcharge {
 
-/// All that a simulated drive depends on. The same scenario gives the same bytes.
+/// Everything that determines a simulated drive. The same scenario gives the same bytes.
 struct DriveScenario {
-  std::string scene = "lot";
-  std::string drive = "short";
-  std::string rig = "golf";
-  std::string board = "chessboard";  ///< or aprilgrid: what the scene chessboard shows
-  int scene_seed = 1;                ///< of the scene
-  int rig_seed = 1;                  ///< of the lenses and how they are mounted
-  int seed = 1;                      ///< of the road under the car
-  int sensor_seed = -1;              ///< of wheels and image noise; negative: as `seed`
-  double duration_s = 0.0;           ///< the drive ends early; 0: where its path ends
-  double image_scale = 1.0;          ///< image size over 1280x800
-  int image_step = 1;                ///< only every so many of the 12.5 images a second
-  double exposure_gain = 1.0;        ///< of the images over the camera's normal exposure
-  bool noise = true;
-  std::vector<std::string> cameras;  ///< by name; empty: all
-  WheelOdometerOptions odometer;
-  LensOptions lens;
-  CameraResponseOptions response;
-  FaultOptions faults;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("scene", scene);
-    visit("drive", drive);
-    visit("rig", rig);
-    visit("board", board);
-    visit("scene_seed", scene_seed);
-    visit("rig_seed", rig_seed);
-    visit("seed", seed);
-    visit("sensor_seed", sensor_seed);
-    visit("duration_s", duration_s);
-    visit("image_scale", image_scale);
-    visit("image_step", image_step);
-    visit("exposure_gain", exposure_gain);
-    visit("noise", noise);
-    visit("cameras", cameras);
-    visit("odometer", odometer);
-    visit("lens", lens);
-    visit("response", response);
-    visit("faults", faults);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(DriveScenario);
+  VCHARGE_OPTION(std::string, scene, "lot", anyValue(), "Name of the scene, see --list.");
+  VCHARGE_OPTION(std::string, drive, "short", anyValue(), "Name of the drive in the scene, see --list.");
+  VCHARGE_OPTION(std::string, rig, "golf", anyValue(), "Name of the rig, see --list.");
+  VCHARGE_OPTION(std::string, board, "chessboard", anyValue(),
+                 "Board in the scene chessboard: chessboard or aprilgrid.");
+  VCHARGE_OPTION(int, scene_seed, 1, notNegative(), "Seed of the scene.");
+  VCHARGE_OPTION(int, rig_seed, 1, notNegative(), "Seed of lenses and mountings.");
+  VCHARGE_OPTION(int, seed, 1, notNegative(), "Seed of the road roughness, and by default of the sensors.");
+  VCHARGE_OPTION(int, sensor_seed, -1, atLeast(-1), "Seed of wheels and image noise; -1: the same as seed.");
+  VCHARGE_OPTION(double, duration_s, 0.0, between(0.0, 1e6), "End of the drive; 0: the end of its path.");
+  VCHARGE_OPTION(double, image_scale, 1.0, between(0.05, 1.0), "Image size relative to 1280x800.");
+  VCHARGE_OPTION(int, image_step, 1, atLeast(1), "Keep every n-th of the 12.5 images per second.");
+  VCHARGE_OPTION(double, exposure_gain, 1.0, between(0.01, 100.0),
+                 "Exposure relative to the normal exposure.");
+  VCHARGE_OPTION(bool, noise, true, anyValue(), "Add sensor noise to the images.");
+  VCHARGE_OPTION(std::vector<std::string>, cameras, {}, anyValue(),
+                 "Cameras to record, by name; empty: all.");
+  VCHARGE_OPTION_GROUP(WheelOdometerOptions, odometer, {}, "Errors of the wheel odometer.");
+  VCHARGE_OPTION_GROUP(LensOptions, lens, {}, "Blur of the lenses.");
+  VCHARGE_OPTION_GROUP(FaultOptions, faults, {}, "Faults of sensors, wheels and suspension.");
+  VCHARGE_END_OPTIONS();
 
   uint64_t sensorSeed() const { return static_cast<uint64_t>(sensor_seed < 0 ? seed : sensor_seed); }
 };

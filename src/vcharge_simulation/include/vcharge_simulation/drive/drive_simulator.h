@@ -10,20 +10,21 @@
 
 namespace vcharge {
 
-/// All of a drive but its images.
+/// Everything recorded on a drive except the images.
 struct SimulatedDrive {
-  Trajectory world_from_vehicle;              ///< truth at every image's stamp
-  std::vector<VehicleOdometry> ground_truth;  ///< truth (in the world frame) at every odometry stamp
-  std::vector<VehicleOdometry> odometry;      ///< 50 Hz, and at every image's stamp
-  std::vector<WheelTicks> wheel_ticks;        ///< 50 Hz
-  /// world_from_vehicle at the renderings that make each image; empty without motion blur.
+  Trajectory world_from_vehicle;  ///< true pose at every image stamp
+  std::vector<VehicleOdometry>
+      ground_truth;                       ///< true pose in the world frame at every odometry and image stamp
+  std::vector<VehicleOdometry> odometry;  ///< at 50 Hz and at every image stamp
+  std::vector<WheelTicks> wheel_ticks;    ///< at 50 Hz
+  /// Poses of the renderings that are averaged into each image; empty without motion blur.
   std::vector<std::vector<RigidTransform>> exposure_poses;
 };
 
-/// Simulates a drive along a path: images every 80 ms, 7 ms after an odometry sample. `road_seed` shakes the
-/// car, `wheel_seed` sets where in a tick the wheels stand at the start. Of the faults, those of wheels,
-/// counters and suspension act, and the poses for motion blur are given; stamps are the true ones. The same
-/// arguments give the same bits. std::invalid_argument for bad options.
+/// Simulates a drive along a path. Images come every 80 ms, 7 ms after an odometry sample. `road_seed`
+/// selects the road roughness, `wheel_seed` the phase of the wheel counters at the start. Applies the faults
+/// of wheels, counters and suspension, and returns the poses for motion blur; all stamps are the true ones.
+/// The same arguments give bit-identical results. Throws std::invalid_argument for invalid options.
 SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& motion_options,
                              const WheelOdometerOptions& odometer_options, uint64_t road_seed,
                              uint64_t wheel_seed, const FaultOptions& faults = FaultOptions(),

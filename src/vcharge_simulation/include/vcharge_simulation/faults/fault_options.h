@@ -5,297 +5,190 @@
 
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/base/timestamp.h"
-#include "vcharge_simulation/scenes/scene_catalogue.h"
 
 namespace vcharge {
 
-/// When a fault acts, in seconds since the start of the drive: from start_s on and before end_s.
+/// Seconds since the start of the drive between which a fault acts: [start_s, end_s).
 struct FaultInterval {
-  double start_s = 0.0;  ///< 0: it has always been there
-  double end_s = 0.0;    ///< 0: it never ends
+  VCHARGE_BEGIN_OPTIONS(FaultInterval);
+  VCHARGE_OPTION(double, start_s, 0.0, between(0.0, 1e6),
+                 "Start of the fault; 0: it acts from the beginning.");
+  VCHARGE_OPTION(double, end_s, 0.0, between(0.0, 1e6), "End of the fault; 0: it does not end.");
+  VCHARGE_END_OPTIONS();
 
   bool actsAt(Duration since_start) const;
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("start_s", start_s);
-    visit("end_s", end_s);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  void checkFields() const;
 };
 
-/// A fault of cameras, by name or "all"; no camera: no fault. It stays with the camera where plugs are
-/// swapped.
+/// A fault of cameras. It stays with the camera if the plugs of cameras are swapped.
 struct CameraFault : FaultInterval {
-  std::vector<std::string> cameras;
+  VCHARGE_BEGIN_DERIVED_OPTIONS(CameraFault, FaultInterval);
+  VCHARGE_OPTION(std::vector<std::string>, cameras, {}, anyValue(),
+                 "Cameras by name, or all; empty: no fault.");
+  VCHARGE_END_OPTIONS();
 
   bool isActive() const { return !cameras.empty(); }
   bool actsOn(const std::string& camera) const;
   bool actsOn(const std::string& camera, Duration since_start) const {
     return actsOn(camera) && actsAt(since_start);
   }
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("cameras", cameras);
-    FaultInterval::visitFields(visit);
-  }
 };
 
-/// Images come no more, or black ones.
 struct DeadCameraFault : CameraFault {
-  bool black_images = false;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    CameraFault::visitFields(visit);
-    visit("black_images", black_images);
-  }
+  VCHARGE_BEGIN_DERIVED_OPTIONS(DeadCameraFault, CameraFault);
+  VCHARGE_OPTION(bool, black_images, false, anyValue(), "Deliver black images instead of none.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// The last image before the fault comes again and again, with new stamps.
 struct FrozenCameraFault : CameraFault {};
 
-/// A low sun shines into the lens: a white disk, and veiling glare that falls with the squared distance from
-/// it.
 struct SunGlareFault : CameraFault {
-  double x = 0.5;  ///< place of the sun as a share of the image's width and height, from its corner
-  double y = 0.4;
-  double light = 25.0;      ///< in the middle of the sun, where 1 is white in the sun
-  double radius_px = 40.0;  ///< at which light has fallen to half; in an image that is 1280 wide
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    CameraFault::visitFields(visit);
-    visit("x", x);
-    visit("y", y);
-    visit("light", light);
-    visit("radius_px", radius_px);
-  }
-  void validate() const;
+  VCHARGE_BEGIN_DERIVED_OPTIONS(SunGlareFault, CameraFault);
+  VCHARGE_OPTION(double, x, 0.5, between(-10.0, 10.0),
+                 "Position of the sun, as a fraction of the image width.");
+  VCHARGE_OPTION(double, y, 0.4, between(-10.0, 10.0),
+                 "Position of the sun, as a fraction of the image height.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// Dirt that stays in its place in the image: a bright line across it, and blurred blobs that keep light away
-/// and scatter light of their own.
 struct DirtyLensFault : CameraFault {
-  int blobs = 8;
-  double blob_radius_px = 45.0;     ///< of the largest one; in an image that is 1280 wide
-  double blob_transmission = 0.35;  ///< share of the light that passes the middle of a blob
-  double line_light = 0.5;          ///< where 1 is white in the sun
-  double line_half_width_px = 2.5;  ///< in an image that is 1280 wide
-  int seed = 1;                     ///< of the places; each camera has dirt of its own
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    CameraFault::visitFields(visit);
-    visit("blobs", blobs);
-    visit("blob_radius_px", blob_radius_px);
-    visit("blob_transmission", blob_transmission);
-    visit("line_light", line_light);
-    visit("line_half_width_px", line_half_width_px);
-    visit("seed", seed);
-  }
-  void validate() const;
+  VCHARGE_BEGIN_DERIVED_OPTIONS(DirtyLensFault, CameraFault);
+  VCHARGE_OPTION(int, blobs, 8, between(0, 1000), "Number of blurred blobs of dirt on each lens.");
+  VCHARGE_OPTION(int, seed, 1, notNegative(), "Seed of the positions; each camera has its own dirt.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// The camera is knocked: vehicle_from_camera becomes vehicle_from_camera * (rotation, translation).
+/// vehicle_from_camera becomes vehicle_from_camera * (rotation, translation).
 struct BumpedCameraFault : CameraFault {
-  std::vector<double> rotation_rad = {0.0, 0.05, 0.0};  ///< rotation vector in the camera's frame
-  std::vector<double> translation_m = {0.0, 0.0, 0.0};  ///< in the camera's frame
+  VCHARGE_BEGIN_DERIVED_OPTIONS(BumpedCameraFault, CameraFault);
+  VCHARGE_OPTION(std::vector<double>, rotation_rad, (std::vector<double>{0.0, 0.05, 0.0}),
+                 between(-10.0, 10.0), "Rotation vector in the camera frame.");
+  VCHARGE_OPTION(std::vector<double>, translation_m, std::vector<double>(3, 0.0), between(-10.0, 10.0),
+                 "Translation in the camera frame.");
+  VCHARGE_END_OPTIONS();
 
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    CameraFault::visitFields(visit);
-    visit("rotation_rad", rotation_rad);
-    visit("translation_m", translation_m);
-  }
-  void validate() const;
+  void checkFields() const;
 };
 
-/// The plugs of two cameras are swapped: each delivers its images under the other's name.
 struct SwappedCamerasFault : CameraFault {
   void validate() const;
 };
 
-/// Images that never arrive, each independently of the others.
+/// Each image is hit independently of the others.
 struct DroppedImagesFault : CameraFault {
-  double probability = 0.2;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    CameraFault::visitFields(visit);
-    visit("probability", probability);
-  }
-  void validate() const;
+  VCHARGE_BEGIN_DERIVED_OPTIONS(DroppedImagesFault, CameraFault);
+  VCHARGE_OPTION(double, probability, 0.2, between(0.0, 1.0), "Probability that an image is hit.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// Images with the right stamp that arrive late, each independently of the others.
 struct LateImagesFault : DroppedImagesFault {
-  double delay_s = 0.15;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    DroppedImagesFault::visitFields(visit);
-    visit("delay_s", delay_s);
-  }
-  void validate() const;
+  VCHARGE_BEGIN_DERIVED_OPTIONS(LateImagesFault, DroppedImagesFault);
+  VCHARGE_OPTION(double, delay_s, 0.15, positive().upTo(10.0), "Delay of the arrival; the stamp is right.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// Stamps that are off; images arrive when they always do.
 struct ImageStampShiftFault : CameraFault {
-  double shift_s = 0.02;  ///< later than the truth where positive
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    CameraFault::visitFields(visit);
-    visit("shift_s", shift_s);
-  }
-  void validate() const;
+  VCHARGE_BEGIN_DERIVED_OPTIONS(ImageStampShiftFault, CameraFault);
+  VCHARGE_OPTION(double, shift_s, 0.02, between(-10.0, 10.0),
+                 "Stamp minus true time; the arrival is unchanged.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// The exposure steps to a multiple of what it was.
 struct ExposureStepFault : CameraFault {
-  double gain = 2.5;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    CameraFault::visitFields(visit);
-    visit("gain", gain);
-  }
-  void validate() const;
+  VCHARGE_BEGIN_DERIVED_OPTIONS(ExposureStepFault, CameraFault);
+  VCHARGE_OPTION(double, gain, 2.5, between(0.01, 100.0), "Exposure relative to the normal exposure.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// A long exposure, centred on the stamp: the mean light of renderings at equal distances of time.
+/// An image is the mean light of renderings at equal time steps, centred on its stamp.
 struct MotionBlurFault : CameraFault {
-  double exposure_time_s = 0.02;
-  int renderings = 8;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    CameraFault::visitFields(visit);
-    visit("exposure_time_s", exposure_time_s);
-    visit("renderings", renderings);
-  }
-  void validate() const;
+  VCHARGE_BEGIN_DERIVED_OPTIONS(MotionBlurFault, CameraFault);
+  VCHARGE_OPTION(double, exposure_time_s, 0.02, positive().upTo(0.08),
+                 "Exposure time, centred on the stamp.");
+  VCHARGE_OPTION(int, renderings, 8, between(2, 64), "Renderings that are averaged into an image.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// Stamps of odometry and wheel counters that are off; 0: no fault.
 struct OdometryStampShiftFault : FaultInterval {
-  double shift_s = 0.0;  ///< later than the truth where positive
+  VCHARGE_BEGIN_DERIVED_OPTIONS(OdometryStampShiftFault, FaultInterval);
+  VCHARGE_OPTION(double, shift_s, 0.0, between(-10.0, 10.0), "Stamp minus true time; 0: no fault.");
+  VCHARGE_END_OPTIONS();
 
   bool isActive() const { return shift_s != 0.0; }
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    FaultInterval::visitFields(visit);
-    visit("shift_s", shift_s);
-  }
-  void validate() const;
 };
 
-/// Both wheels count a multiple of what they should (a wrong tyre); 1: no fault.
 struct OdometryScaleFault : FaultInterval {
-  double factor = 1.0;
+  VCHARGE_BEGIN_DERIVED_OPTIONS(OdometryScaleFault, FaultInterval);
+  VCHARGE_OPTION(double, factor, 1.0, positive().upTo(10.0), "Counted over true distance; 1: no fault.");
+  VCHARGE_END_OPTIONS();
 
   bool isActive() const { return factor != 1.0; }
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    FaultInterval::visitFields(visit);
-    visit("factor", factor);
-  }
-  void validate() const;
 };
 
-/// One rear wheel spins or blocks: it turns by (1 + ratio) times what the road asks; 0: no fault.
 struct WheelSlipFault : FaultInterval {
   enum class Wheel { kLeft, kRight };
-  Wheel wheel = Wheel::kLeft;
-  double ratio = 0.0;  ///< positive spins, -1 is a blocked wheel
+
+  VCHARGE_BEGIN_DERIVED_OPTIONS(WheelSlipFault, FaultInterval);
+  VCHARGE_OPTION(Wheel, wheel, Wheel::kLeft, anyValue(), "The rear wheel that slips.");
+  VCHARGE_OPTION(double, ratio, 0.0, between(-1.0, 10.0),
+                 "Additional rotation over rolled distance; -1: blocked.");
+  VCHARGE_END_OPTIONS();
 
   bool isActive() const { return ratio != 0.0; }
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("wheel", wheel);
-    FaultInterval::visitFields(visit);
-    visit("ratio", ratio);
-  }
-  void validate() const;
 };
 
-/// Neither counters nor odometry come in the interval; afterwards both go on with the distance in between.
-/// An interval without an end: no fault.
+/// After the interval the counters contain the distance driven meanwhile. Without an end: no fault.
 struct MissingTicksFault : FaultInterval {
   bool isActive() const { return end_s > 0.0; }
 };
 
-/// At this time counters and dead reckoning start again from zero; 0: no fault.
 struct CounterResetFault {
-  double time_s = 0.0;
+  VCHARGE_BEGIN_OPTIONS(CounterResetFault);
+  VCHARGE_OPTION(double, time_s, 0.0, between(0.0, 1e6), "Time of the reset since the start; 0: no fault.");
+  VCHARGE_END_OPTIONS();
 
   bool isActive() const { return time_s > 0.0; }
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("time_s", time_s);
-  }
-  void validate() const;
 };
 
-/// The nose dives by a multiple of its angle when the car brakes, and lifts by it when the car accelerates;
-/// 1: no fault.
 struct SoftSuspensionFault {
-  double pitch_factor = 1.0;
+  VCHARGE_BEGIN_OPTIONS(SoftSuspensionFault);
+  VCHARGE_OPTION(double, pitch_factor, 1.0, between(0.0, 50.0), "Factor on the pitch angle; 1: no fault.");
+  VCHARGE_END_OPTIONS();
 
   bool isActive() const { return pitch_factor != 1.0; }
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("pitch_factor", pitch_factor);
-  }
-  void validate() const;
 };
 
-/// What is wrong with a drive's sensors; nothing by default. Every fault has isActive(), visitFields() and
-/// validate().
+/// Faults of the sensors of a drive; none by default. Every fault has isActive().
 struct FaultOptions {
-  DeadCameraFault dead_camera;
-  FrozenCameraFault frozen_camera;
-  SunGlareFault sun_glare;
-  DirtyLensFault dirty_lens;
-  BumpedCameraFault bumped_camera;
-  SwappedCamerasFault swapped_cameras;
-  DroppedImagesFault dropped_images;
-  LateImagesFault late_images;
-  ImageStampShiftFault image_stamp_shift;
-  ExposureStepFault exposure_step;
-  MotionBlurFault motion_blur;
-  OdometryStampShiftFault odometry_stamp_shift;
-  OdometryScaleFault odometry_scale;
-  WheelSlipFault wheel_slip;
-  MissingTicksFault missing_ticks;
-  CounterResetFault counter_reset;
-  SoftSuspensionFault soft_suspension;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("dead_camera", dead_camera);
-    visit("frozen_camera", frozen_camera);
-    visit("sun_glare", sun_glare);
-    visit("dirty_lens", dirty_lens);
-    visit("bumped_camera", bumped_camera);
-    visit("swapped_cameras", swapped_cameras);
-    visit("dropped_images", dropped_images);
-    visit("late_images", late_images);
-    visit("image_stamp_shift", image_stamp_shift);
-    visit("exposure_step", exposure_step);
-    visit("motion_blur", motion_blur);
-    visit("odometry_stamp_shift", odometry_stamp_shift);
-    visit("odometry_scale", odometry_scale);
-    visit("wheel_slip", wheel_slip);
-    visit("missing_ticks", missing_ticks);
-    visit("counter_reset", counter_reset);
-    visit("soft_suspension", soft_suspension);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(FaultOptions);
+  VCHARGE_OPTION_GROUP(DeadCameraFault, dead_camera, {}, "Cameras deliver no images, or black ones.");
+  VCHARGE_OPTION_GROUP(FrozenCameraFault, frozen_camera, {},
+                       "Cameras repeat their last image with new stamps.");
+  VCHARGE_OPTION_GROUP(SunGlareFault, sun_glare, {},
+                       "A low sun in the image: a white disk and veiling glare.");
+  VCHARGE_OPTION_GROUP(DirtyLensFault, dirty_lens, {},
+                       "A bright line and dirt blobs at fixed image positions.");
+  VCHARGE_OPTION_GROUP(BumpedCameraFault, bumped_camera, {}, "A bump rotates and moves cameras.");
+  VCHARGE_OPTION_GROUP(SwappedCamerasFault, swapped_cameras, {},
+                       "Two cameras deliver under each other's name.");
+  VCHARGE_OPTION_GROUP(DroppedImagesFault, dropped_images, {}, "Images are lost at random.");
+  VCHARGE_OPTION_GROUP(LateImagesFault, late_images, {},
+                       "Images with the right stamp arrive late, at random.");
+  VCHARGE_OPTION_GROUP(ImageStampShiftFault, image_stamp_shift, {}, "Stamps of cameras are wrong.");
+  VCHARGE_OPTION_GROUP(ExposureStepFault, exposure_step, {}, "The exposure changes abruptly.");
+  VCHARGE_OPTION_GROUP(MotionBlurFault, motion_blur, {}, "Long exposures blur the images.");
+  VCHARGE_OPTION_GROUP(OdometryStampShiftFault, odometry_stamp_shift, {},
+                       "Stamps of odometry and ticks are wrong.");
+  VCHARGE_OPTION_GROUP(OdometryScaleFault, odometry_scale, {}, "Both wheels count too much or too little.");
+  VCHARGE_OPTION_GROUP(WheelSlipFault, wheel_slip, {}, "A rear wheel spins (ratio above 0) or blocks (-1).");
+  VCHARGE_OPTION_GROUP(MissingTicksFault, missing_ticks, {},
+                       "Neither ticks nor odometry from start_s to end_s.");
+  VCHARGE_OPTION_GROUP(CounterResetFault, counter_reset, {},
+                       "Wheel counters and odometry restart from zero.");
+  VCHARGE_OPTION_GROUP(SoftSuspensionFault, soft_suspension, {},
+                       "The body pitches more on brakes and throttle.");
+  VCHARGE_END_OPTIONS();
 };
-
-/// Name and one line about each fault, in the order of FaultOptions.
-std::vector<CatalogueEntry> listFaults();
 
 template <>
 inline std::vector<std::string> enumNames<WheelSlipFault::Wheel>() {

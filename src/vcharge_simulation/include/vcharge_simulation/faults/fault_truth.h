@@ -8,10 +8,10 @@
 
 namespace vcharge {
 
-/// Writes a YAML map whose list `faults` has an entry per active fault: its `kind`, all its options, the
-/// stamps at which it starts and ends (start_stamp_ns, end_stamp_ns; no end: end_stamp_ns is absent), and for
-/// random faults of images the true stamps of those they hit (images_ns: camera: stamps). Replaces the file
-/// only once it is complete; InputError when it cannot be written.
+/// Writes a YAML map whose list `faults` has one entry per active fault: its `kind`, all its options, the
+/// stamps between which it acts (start_stamp_ns, end_stamp_ns; the latter is absent for a fault without end),
+/// and, for randomly dropped or late images, their true stamps per camera (images_ns). The file is replaced
+/// atomically. Throws InputError if it cannot be written.
 void writeFaults(const FaultOptions& faults, Timestamp start, const std::vector<std::string>& cameras,
                  const ImageFaults::Hits& hits, const std::string& path);
 

@@ -13,39 +13,39 @@
 
 namespace vcharge {
 
-/// An image as it reaches a recorder.
+/// An image as the recorder receives it.
 struct DeliveredImage {
-  Timestamp stamp;     ///< that the image carries
-  Timestamp received;  ///< when it arrives
+  Timestamp stamp;     ///< stamp in the message header
+  Timestamp received;  ///< arrival time
   cv::Mat pixels;      ///< CV_8UC1
 };
 
-/// What faults do to images between the lens and the recorder. Call, for every camera and frame in order,
-/// throughLens() with the noise-free image, then the sensor (noise and exposure), then deliver(). Without a
-/// fault images pass unchanged. Not thread safe.
+/// Applies camera faults between lens and recorder. For every camera and frame, in order, call throughLens()
+/// with the noise-free image, then apply noise and exposure, then call deliver(). Images pass unchanged
+/// without a fault. Not thread safe.
 class ImageFaults {
  public:
   struct Camera {
     std::string name;
-    int index;  ///< in the whole rig: what is random does not depend on which cameras are recorded
+    int index;  ///< in the whole rig, so that random faults do not depend on which cameras are recorded
     cv::Size size_px;
   };
-  /// Stamps (true ones) of the images that a random fault hit, per camera.
+  /// True stamps of the images hit by a random fault, per camera.
   struct Hits {
     std::vector<std::vector<Timestamp>> dropped, late;
   };
 
-  /// `start` is the drive's; `seed` decides which images are dropped or late.
+  /// `start` is the start of the drive; `seed` selects the dropped and late images.
   ImageFaults(const FaultOptions& faults, const std::vector<Camera>& cameras, const CameraResponse& response,
               Timestamp start, uint64_t seed);
 
-  /// The noise-free image (CV_8UC1) with the sun and the dirt on the lens. `stamp` is the true one.
+  /// Adds sun glare and lens dirt to the noise-free image (CV_8UC1); `stamp` is the true stamp.
   cv::Mat throughLens(size_t camera, Timestamp stamp, const cv::Mat& clean) const;
 
-  /// Exposure over the normal one.
+  /// Exposure relative to the normal exposure.
   double exposureGain(size_t camera, Timestamp stamp) const;
 
-  /// What arrives of the sensor's image; nothing where it gets lost.
+  /// The image that arrives at the recorder; std::nullopt if it is lost.
   std::optional<DeliveredImage> deliver(size_t camera, size_t frame, Timestamp stamp, const cv::Mat& image);
 
   const Hits& hits() const { return hits_; }
@@ -60,10 +60,10 @@ class ImageFaults {
   CameraResponse response_;
   Timestamp start_;
   uint64_t seed_;
-  /// Per camera, CV_32FC1: light of the sun, share of the scene's light that passes the dirt, light of the
-  /// dirt. Empty without the fault.
+  /// Per camera, CV_32FC1: light added by the sun, fraction of the scene's light that passes the dirt, light
+  /// scattered by the dirt. Empty without the fault.
   std::vector<cv::Mat> sun_light_, dirt_transmission_, dirt_light_;
-  std::vector<cv::Mat> last_image_;  ///< that a frozen camera repeats
+  std::vector<cv::Mat> last_image_;  ///< last image before the camera froze
   Hits hits_;
 };
 

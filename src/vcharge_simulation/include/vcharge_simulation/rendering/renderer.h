@@ -13,9 +13,9 @@ namespace vcharge {
 
 class RayTracer;
 
-/// Ray traces a scene: four visibility samples per pixel, textures averaged over each sample's footprint,
-/// sun, sky and bounced light. The same scene, view and pose give the same bytes on any number of threads
-/// (TBB over image rows).
+/// Ray traces a scene with four visibility samples per pixel; textures are averaged over the footprint of
+/// each sample, and light comes from sun, sky and ground. The same scene, view and pose give the same bytes
+/// for any number of threads (TBB over image rows).
 class Renderer {
  public:
   explicit Renderer(std::shared_ptr<const Scene> scene);
@@ -23,20 +23,19 @@ class Renderer {
 
   const Scene& scene() const { return *scene_; }
 
-  /// time_s: of the scene, for its movers.
-  ///
-  /// Light on the sensor (CV_32FC1, 1 is white in the sun), blurred by the lens; outside the field of view
-  /// only the light that the lens scatters.
+  /// Light on the sensor (CV_32FC1, where 1 is white in the sun), blurred by the lens. Pixels outside the
+  /// field of view hold only the light scattered by the lens. `time_s` is the scene time and determines the
+  /// movers' poses.
   cv::Mat renderLight(const CameraView& view, const RigidTransform& world_from_vehicle,
                       double time_s = 0.0) const;
 
-  /// Distance in metres along the ray through each pixel's centre (CV_32FC1): NaN where it meets nothing of
-  /// the scene, meets the own car, or is outside the field of view.
+  /// Distance in metres along the ray through each pixel centre (CV_32FC1); NaN where the ray meets no
+  /// surface, meets the own car, or lies outside the field of view.
   cv::Mat renderRange(const CameraView& view, const RigidTransform& world_from_vehicle,
                       double time_s = 0.0) const;
 
-  /// Distance along a unit direction in the world to the first surface beyond min_distance_m; movers are not
-  /// seen.
+  /// Distance along a unit direction in the world frame to the first surface beyond min_distance_m. Movers
+  /// are ignored.
   std::optional<double> castRay(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction,
                                 double min_distance_m = 0.0, SurfaceKind* kind = nullptr) const;
 

@@ -8,22 +8,22 @@
 
 namespace vcharge {
 
-/// What light comes from where, in units of the sun's irradiance on a surface that faces it.
+/// Sun, sky and ground light, relative to the sun's irradiance on a surface perpendicular to it.
 struct LightOptions {
   double sun_azimuth_rad = 2.2;
   double sun_elevation_rad = 0.75;
   double sun_irradiance = 1.0;
-  double sky_irradiance = 0.42;     ///< of the whole sky on level ground
-  double bounce_irradiance = 0.12;  ///< from the ground on a surface that faces down
-  double cloud_cover = 0.45;        ///< 0 clear, 1 closed
+  double sky_irradiance = 0.42;     ///< irradiance from the whole sky on level ground
+  double bounce_irradiance = 0.12;  ///< irradiance from the ground on a surface that faces down
+  double cloud_cover = 0.45;        ///< 0 clear, 1 overcast
 };
 
-/// A sky with a gradient, a layer of clouds seen in perspective, and a glow around the sun.
+/// Sky with a vertical gradient, a cloud layer in perspective, and a glow around the sun.
 class Sky {
  public:
   Sky(const LightOptions& options, uint32_t seed);
 
-  /// Radiance from a direction (unit, z >= 0).
+  /// Radiance from a unit direction with z >= 0.
   float radiance(const Eigen::Vector3f& direction) const;
   const Eigen::Vector3f& directionToSun() const { return direction_to_sun_; }
   const LightOptions& light() const { return light_; }

@@ -10,22 +10,22 @@
 
 namespace vcharge {
 
-/// An 8-bit reflectance image with its pyramid of half-size averages, sampled at the level of detail that
-/// fits the pixel's footprint. Immutable and safe to read from many threads.
+/// An 8-bit reflectance image with a mipmap pyramid, sampled at the level of detail that fits the pixel
+/// footprint. Immutable; reads are thread safe.
 class Texture {
  public:
   enum class Border { kClamp, kRepeat };
 
-  /// From a CV_8UC1 image; kRepeat needs sides that are powers of two. std::logic_error otherwise.
+  /// Takes a CV_8UC1 image; with kRepeat its sides must be powers of two. Throws std::logic_error otherwise.
   Texture(const cv::Mat& image, Border border);
 
   int width() const { return levels_.front().width; }
   int height() const { return levels_.front().height; }
   int numLevels() const { return static_cast<int>(levels_.size()); }
 
-  /// Value in [0, 1] at (x, y) in texels of the full-size image, whose first texel is centred at (0.5, 0.5);
-  /// linear in x, y and between the two nearest levels. Level 0 is the full-size image, each further one
-  /// halves it.
+  /// Value in [0, 1] at (x, y) in texels of the full-size image, whose first texel is centred at (0.5, 0.5).
+  /// Interpolates linearly in x, in y and between the two nearest levels; level 0 is the full-size image and
+  /// each further level halves it.
   float sample(float x, float y, float level) const {
     if (level <= 0.0F) {
       return bilinear(0, x, y);
@@ -43,8 +43,8 @@ class Texture {
     return value + weight * (bilinear(lower + 1, x, y) - value);
   }
 
-  /// Mean of four samples of one pixel. Of the coarser level, whose texels are wider than the samples lie
-  /// apart, the middles of the first and of the last two are enough.
+  /// Mean of the four samples of one pixel. The coarser level is sampled only twice, between the first two
+  /// and between the last two samples, because its texels are wider than the sample spacing.
   float sampleMean(const std::array<float, 4>& x, const std::array<float, 4>& y, float level) const {
     const float last = static_cast<float>(levels_.size() - 1);
     level = level <= 0.0F ? 0.0F : (level >= last ? last : level);
@@ -94,7 +94,7 @@ class Texture {
     const float v1 = static_cast<float>(row1[x0]) + wx * static_cast<float>(row1[x1] - row1[x0]);
     return (v0 + wy * (v1 - v0)) * (1.0F / 255.0F);
   }
-  // std::floor is a call into the C library on a baseline x86-64.
+  // Faster than std::floor, which is a library call on baseline x86-64.
   static int floorToInt(float value) {
     const int truncated = static_cast<int>(value);
     return truncated - (value < static_cast<float>(truncated) ? 1 : 0);
@@ -106,18 +106,18 @@ class Texture {
   std::vector<uint8_t> texels_;
 };
 
-/// A texture that lies on the ground plane, addressed by world coordinates in metres.
+/// A texture on the ground plane, addressed by world coordinates in metres.
 struct GroundTexture {
   Texture texture;
   float min_x_m, min_y_m;  ///< corner of the first texel
   float texels_per_m;
 
-  /// level: as in Texture::sample.
+  /// See Texture::sample.
   float sampleAt(float x_m, float y_m, float level) const {
     return texture.sample((x_m - min_x_m) * texels_per_m, (y_m - min_y_m) * texels_per_m, level);
   }
 
-  /// As Texture::sampleMean.
+  /// See Texture::sampleMean.
   float sampleMeanAt(const std::array<Eigen::Vector3f, 4>& positions_m, float level) const {
     std::array<float, 4> x;
     std::array<float, 4> y;
@@ -129,7 +129,7 @@ struct GroundTexture {
   }
 };
 
-/// log2 to about 0.01, for levels of detail; `value` > 0.
+/// Approximates log2 to about 0.01, for levels of detail; `value` must be positive.
 inline float fastLog2(float value) {
   uint32_t bits;
   std::memcpy(&bits, &value, sizeof(bits));
@@ -137,7 +137,7 @@ inline float fastLog2(float value) {
   bits = (bits & 0x007FFFFFU) | 0x3F800000U;
   float mantissa;
   std::memcpy(&mantissa, &bits, sizeof(mantissa));
-  // Quadratic through log2 at 1, sqrt(2) and 2.
+  // Quadratic that interpolates log2 at 1, sqrt(2) and 2.
   return exponent + (-0.3431457F * mantissa + 2.0294373F) * mantissa - 1.6862915F;
 }
 

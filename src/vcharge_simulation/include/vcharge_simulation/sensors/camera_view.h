@@ -12,23 +12,23 @@
 
 namespace vcharge {
 
-/// All about one camera of a vehicle that stays the same from frame to frame: the rays of every pixel's four
-/// samples, the samples that meet the own car, the vignette and the lens' blur. Immutable, thread safe.
+/// Everything about one camera that does not change from frame to frame: the rays of the four samples of
+/// every pixel, the samples that meet the own car, vignette and lens blur. Immutable, thread safe.
 ///
-/// Pixels are grouped in blocks of 2x2; sample 4 * p + s of a block is sample s (of a rotated grid) of pixel
+/// Pixels are grouped in blocks of 2x2. Sample 4 * p + s of a block is sample s, on a rotated grid, of pixel
 /// p (row-major).
 class CameraView {
  public:
   static constexpr int kSamplesPerPixel = 4;
   static constexpr int kSamplesPerBlock = 16;
 
-  /// A place on the own car's surface, in the vehicle frame.
+  /// A point on the surface of the own car, in the vehicle frame.
   struct BodySample {
     Eigen::Vector3f position, normal;
     uint32_t material;
   };
 
-  /// The camera must have vehicle_from_camera (std::logic_error otherwise); `body` may be null.
+  /// Throws std::logic_error if the camera has no vehicle_from_camera; `body` may be null.
   CameraView(const RigCamera& camera, std::shared_ptr<const VehicleBody> body,
              const LensOptions& lens = LensOptions());
 
@@ -38,27 +38,27 @@ class CameraView {
   int blocksPerRow() const { return blocks_per_row_; }
   int blockRows() const { return block_rows_; }
 
-  /// Unit rays of a block's samples in the camera frame: 16 x, 16 y, 16 z.
+  /// Unit rays of the samples of a block in the camera frame: 16 x, 16 y, 16 z.
   const float* blockRays(size_t block) const { return &sample_rays_[block * 3 * kSamplesPerBlock]; }
   /// Bit p is set where pixel p of the block is inside the field of view.
   uint8_t blockPixels(size_t block) const { return block_pixels_[block]; }
-  /// Bit i is set where sample i meets the own car; its samples start at
+  /// Bit i is set where sample i meets the own car; these samples start at
   /// bodySamples()[blockBodyStart(block)].
   uint16_t blockBodyMask(size_t block) const { return block_body_mask_[block]; }
   size_t blockBodyStart(size_t block) const { return block_body_start_[block]; }
   const std::vector<BodySample>& bodySamples() const { return body_samples_; }
 
-  /// Unit ray through a pixel's centre; zero outside the field of view.
+  /// Unit ray through a pixel centre in the camera frame; zero outside the field of view.
   Eigen::Vector3f centreRay(int x, int y) const {
     return centre_rays_[static_cast<size_t>(y) * size().width + x];
   }
-  /// Angle between neighbouring pixels (geometric mean of both directions).
+  /// Angle between neighbouring pixels (geometric mean over both directions).
   float pixelAngle(int x, int y) const { return pixel_angle_rad_[static_cast<size_t>(y) * size().width + x]; }
-  /// CV_32FC1 share of the light that the lens lets through.
+  /// CV_32FC1, fraction of the light transmitted by the lens.
   const cv::Mat& vignette() const { return vignette_; }
   const LensOptions& lens() const { return lens_; }
   const LensBlur& blur() const { return blur_; }
-  /// CV_8UC1: 0 where any sample of the pixel or of one within two pixels meets the own car, 255 elsewhere.
+  /// CV_8UC1, 0 within two pixels of a sample that meets the own car, 255 elsewhere.
   const cv::Mat& mask() const { return mask_; }
 
  private:

@@ -8,13 +8,13 @@
 
 namespace vcharge {
 
-/// Four 185-degree fisheye cameras (front, left, rear, right) as a VW Golf carries them: the lens and the
-/// attitude and height of the left one are those of a real car (V-Charge), the right one is its mirror image;
-/// each lens and each mounting but the left one's differs a little by `seed`. image_scale: size over
-/// 1280x800, at most 1. Without masks. std::invalid_argument for a scale outside (0, 1].
+/// Four 185-degree fisheye cameras (front, left, rear, right) on a VW Golf. Lens, attitude and height of the
+/// left camera are those of the V-Charge car; the right camera mirrors it. Except for the left mounting,
+/// lenses and mountings vary slightly with `seed`. `image_scale` is the image size relative to 1280x800. The
+/// rig has no masks. Throws std::invalid_argument for a scale outside (0, 1].
 CameraRig makeGolfRig(uint64_t seed, double image_scale);
 
-/// The body of the Golf that carries the cameras, dark and glossy.
+/// Body of the Golf that carries the cameras, dark and glossy.
 std::shared_ptr<const VehicleBody> makeGolfBody();
 
 }  // namespace vcharge

@@ -9,12 +9,12 @@
 
 namespace vcharge {
 
-/// Name and one line about each rig.
+/// Name and one-line description of each rig.
 std::vector<CatalogueEntry> listRigs();
 
-/// A rig of the catalogue, without masks: the same arguments give the same rig. image_scale: size over
-/// 1280x800, at most 1. std::invalid_argument that lists the names there are for an unknown one, and for a
-/// scale outside (0, 1].
+/// A rig of the catalogue, without masks; the same arguments give the same rig. `image_scale` is the image
+/// size relative to 1280x800. Throws std::invalid_argument for an unknown name, listing the known ones, and
+/// for a scale outside (0, 1].
 CameraRig makeRig(const std::string& name, uint64_t seed, double image_scale);
 
 }  // namespace vcharge

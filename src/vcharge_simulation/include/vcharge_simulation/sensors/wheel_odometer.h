@@ -9,37 +9,29 @@
 
 namespace vcharge {
 
-/// Errors and filter of a wheel odometer.
+/// Errors of a wheel odometer.
 struct WheelOdometerOptions {
-  double metres_per_tick = 0.01;
-  double scale_error = 0.005;        ///< counted distance over true distance, minus 1
-  double left_right_error = 0.0003;  ///< the right wheel counts this share more than the left
-  double smoothing_s = 0.25;         ///< half width of the filter that tracks the counters
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("metres_per_tick", metres_per_tick);
-    visit("scale_error", scale_error);
-    visit("left_right_error", left_right_error);
-    visit("smoothing_s", smoothing_s);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(WheelOdometerOptions);
+  VCHARGE_OPTION(double, metres_per_tick, 0.01, positive(), "Distance per tick of the wheel counters.");
+  VCHARGE_OPTION(double, scale_error, 0.005, above(-0.5).below(0.5), "Counted over true distance, minus 1.");
+  VCHARGE_OPTION(double, left_right_error, 0.0003, above(-0.5).below(0.5),
+                 "Relative excess of the right wheel's count over the left wheel's.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// Counters of the rear wheels, and the dead reckoning that a good odometer makes of them. Quantization is a
-/// bounded error of the counters, so the filter fits a parabola to the counters around each instant instead
-/// of summing noisy increments; a wrong wheel radius stays in the result as drift.
+/// Counters of the rear wheels, and dead reckoning from them. Quantization is a bounded error of each
+/// counter, so the filter fits a parabola to the counters around each instant (Savitzky and Golay) instead of
+/// summing noisy increments; a wrong wheel radius remains as drift.
 class WheelOdometer {
  public:
-  /// `seed` sets where in a tick the wheels stand at the start. Of the faults, those of wheels and counters
-  /// act.
+  /// `seed` selects the phase of the counters at the start. Only faults of wheels and counters act here.
   WheelOdometer(const VehicleMotion& motion, const WheelOdometerOptions& options, uint64_t seed,
                 const FaultOptions& faults = FaultOptions());
 
-  /// Raw counters at a whole millisecond of the drive, from zero at its start and at a reset.
+  /// Raw counters at a whole millisecond of the drive; zero at the start and at a reset.
   WheelTicks ticks(int milliseconds) const;
-  /// Planar dead reckoning at increasing milliseconds; the pose at the first one, and at the first one after
-  /// a reset, is the identity. Stamps are left to the caller.
+  /// Planar dead reckoning at increasing milliseconds. The first pose, and the first one after a reset, is
+  /// the identity. The caller sets the stamps.
   std::vector<VehicleOdometry> deadReckoning(const std::vector<int>& milliseconds) const;
 
  private:
@@ -52,7 +44,7 @@ class WheelOdometer {
   WheelOdometerOptions options_;
   FaultOptions faults_;
   const VehicleMotion& motion_;
-  std::vector<int64_t> left_, right_;  // one per millisecond
+  std::vector<int64_t> left_, right_;  // one value per millisecond
 };
 
 }  // namespace vcharge

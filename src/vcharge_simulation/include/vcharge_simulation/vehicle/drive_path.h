@@ -8,32 +8,30 @@
 
 namespace vcharge {
 
-/// Pose after driving `distance_m` along a circular arc that turns by `turn_rad` (positive to the left), from
-/// the origin along x; exact, also for straight lines. The point that moves along the arc is the centre of
-/// the rear axle.
+/// Motion of the centre of the rear axle over `distance_m` along a circular arc that turns by `turn_rad`
+/// (positive to the left), starting along x. Exact, also for straight lines.
 RigidTransform arcMotion(double distance_m, double turn_rad);
 
-/// A path whose curvature is piecewise linear in arc length: straight lines, arcs, and clothoids between
-/// them, as a car with a continuous steering angle drives it, forwards or backwards. Arc length grows either
-/// way.
+/// A path with piecewise linear curvature in arc length: straight lines, circular arcs and clothoids, driven
+/// forwards or backwards. Arc length increases in both directions of travel.
 class DrivePath {
  public:
   struct Segment {
     double length_m;
-    double start_curvature_per_m;  ///< of the steering: positive to the left, also when driving backwards
+    double start_curvature_per_m;  ///< steering curvature: positive to the left, also when driving backwards
     double end_curvature_per_m;
     bool backwards = false;
   };
 
-  /// Where the car stands for a while.
+  /// A standstill on the path.
   struct Stop {
     double at_m;
     double wait_s;
   };
 
-  /// Path through `waypoints` with rounded corners: clothoid, arc of `radius_m`, clothoid, the clothoids each
-  /// `transition_m` long. A closed path starts and ends in the middle of the edge from the last to the first
-  /// waypoint. std::invalid_argument when an edge is too short for its corners.
+  /// Path through `waypoints` with rounded corners: a clothoid of `transition_m`, an arc of `radius_m`, and
+  /// another clothoid. A closed path starts and ends in the middle of the edge from the last to the first
+  /// waypoint. Throws std::invalid_argument if an edge is too short for its corners.
   static DrivePath throughWaypoints(const std::vector<Eigen::Vector2d>& waypoints, bool closed,
                                     double radius_m, double transition_m);
 
@@ -41,16 +39,17 @@ class DrivePath {
 
   const RigidTransform& worldFromStart() const { return world_from_start_; }
   double length() const { return length_m_; }
-  /// Curvature at arc length s; before the start and after the end the path goes straight on.
+  /// Curvature at arc length s; zero before the start and after the end.
   double curvature(double s_m) const;
-  /// 1 forwards, -1 backwards.
+  /// 1 when driving forwards, -1 backwards.
   double direction(double s_m) const;
-  /// Heading relative to the start: the exact integral of the curvature.
+  /// Heading relative to the start, the exact integral of the curvature.
   double heading(double s_m) const;
-  /// In order of arc length; the car also stops for kTurnaround_s wherever it changes its direction.
+  /// In order of arc length, including a stop of kTurnaround_s wherever the direction of travel changes.
   const std::vector<Stop>& stops() const { return stops_; }
   void addStop(const Stop& stop);
-  /// Goes on along another path from here, wherever that one starts; with a stop where the direction changes.
+  /// Appends another path, which then starts at the end of this one; adds a stop if the direction of travel
+  /// changes.
   void append(const DrivePath& next);
 
   static constexpr double kTurnaround_s = 1.0;
@@ -62,7 +61,7 @@ class DrivePath {
   RigidTransform world_from_start_;
   std::vector<Segment> segments_;
   std::vector<Stop> stops_;
-  std::vector<double> start_m_, start_heading_rad_;  // of each segment
+  std::vector<double> start_m_, start_heading_rad_;  // per segment
   double length_m_ = 0.0;
   double end_heading_rad_ = 0.0;
 };

@@ -10,8 +10,8 @@ namespace vcharge {
 
 class RayTracer;
 
-/// The body of the car that carries the cameras, in the vehicle frame. Seen by its own cameras, it casts a
-/// shadow, but is no part of the scene.
+/// Body of the car that carries the cameras, in the vehicle frame. It is visible to the cameras and casts a
+/// shadow, but is not part of the scene.
 class VehicleBody {
  public:
   VehicleBody(TriangleMesh mesh, std::vector<Material> materials);
@@ -22,7 +22,7 @@ class VehicleBody {
   const TriangleMesh& mesh() const { return mesh_; }
   const std::vector<Material>& materials() const { return materials_; }
   const RayTracer& tracer() const { return *tracer_; }
-  /// Radius about the vehicle origin that holds the body's shadow-casting parts.
+  /// Radius about the vehicle origin that contains the whole body.
   float radius() const { return radius_m_; }
 
  private:

@@ -14,31 +14,33 @@ namespace vcharge {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kToRim_rad = 0.012;  // between the board's outermost corner and the field of view's end
+constexpr double kToRim_rad =
+    0.012;  // between the outermost corner of the board and the end of the field of view
 constexpr double kToBorder_px = 4.0;
 constexpr double kMinHeight_m = 0.08;
 constexpr double kMinDistance_m = 0.7;
 constexpr double kMaxDistance_m = 2.1;
-constexpr double kOuterShare = 0.6;  // of the places: the others come to the rim, one further than the other
+constexpr double kInnerFraction =
+    0.6;  // fraction of poses sampled over the whole image; the rest have a corner at an angle near the rim
 
-class BoardPlacer {
+class BoardPoseSampler {
  public:
-  BoardPlacer(const RigCamera& camera, const VehicleBody& body, const Eigen::Vector2d& size_m)
+  BoardPoseSampler(const RigCamera& camera, const VehicleBody& body, const Eigen::Vector2d& size_m)
       : camera_(camera),
         body_(body),
         size_m_(size_m),
         max_angle_rad_(0.5 * camera.field_of_view_rad - kToRim_rad) {}
 
-  // In the camera's frame, from the middle of the image to its rim in no particular order.
-  std::vector<RigidTransform> place(uint64_t seed) const {
+  // Poses in the camera frame, from the image centre to its rim in a fixed mixed order.
+  std::vector<RigidTransform> samplePoses(uint64_t seed) const {
     constexpr int kTries = 600;
     Random random(seed);
     std::vector<RigidTransform> sheets;
     for (int i = 0; i < BoardMotion::kPosesPerCamera; ++i) {
       for (int attempt = 0; attempt < kTries; ++attempt) {
-        const double share =
+        const double fraction =
             (i * 17 % BoardMotion::kPosesPerCamera + random.uniform()) / BoardMotion::kPosesPerCamera;
-        const RigidTransform sheet = sample(share, &random);
+        const RigidTransform sheet = sample(fraction, &random);
         if (isVisible(sheet)) {
           sheets.push_back(sheet);
           break;
@@ -49,26 +51,27 @@ class BoardPlacer {
   }
 
  private:
-  // At a direction from the camera, facing it but for a tilt. share 1: its corners come to the rim.
-  RigidTransform sample(double share, Random* random) const {
+  // Samples a pose in some direction from the camera, facing it up to a tilt. With `fraction` near 1 the
+  // corners reach the rim.
+  RigidTransform sample(double fraction, Random* random) const {
     const double around_rad = random->uniform(0.0, 2.0 * kPi);
     const double distance_m = kMinDistance_m * std::pow(kMaxDistance_m / kMinDistance_m, random->uniform());
     const double roll_rad = random->uniform(-0.6, 0.6);
     const double tilt_x = random->uniform(-0.6, 0.6);
     const double tilt_y = random->uniform(-0.6, 0.6);
     const double extent_rad = std::atan(0.5 * size_m_.norm() / distance_m);
-    const double angle_rad = std::max(0.0, max_angle_rad_ - 0.8 * extent_rad) * std::sqrt(share);
+    const double angle_rad = std::max(0.0, max_angle_rad_ - 0.8 * extent_rad) * std::sqrt(fraction);
     const Eigen::Vector3d direction(std::sin(angle_rad) * std::cos(around_rad),
                                     std::sin(angle_rad) * std::sin(around_rad), std::cos(angle_rad));
     const Eigen::Quaterniond facing = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), direction);
     const Eigen::Quaterniond rotation = facing * rotationFromVector(Eigen::Vector3d(tilt_x, tilt_y, 0.0)) *
                                         rotationFromVector(Eigen::Vector3d(0.0, 0.0, roll_rad));
     const RigidTransform sheet(rotation, distance_m * direction);
-    if (share < kOuterShare) {
+    if (fraction < kInnerFraction) {
       return sheet;
     }
-    // Turned about the camera until its outermost corner lies where it should.
-    const double outwards_rad = max_angle_rad_ * std::sqrt(share) - outermostAngle(sheet);
+    // Rotates the board about the camera until its outermost corner is at the desired angle.
+    const double outwards_rad = max_angle_rad_ * std::sqrt(fraction) - outermostAngle(sheet);
     const Eigen::Vector3d axis(-std::sin(around_rad), std::cos(around_rad), 0.0);
     return RigidTransform(rotationFromVector(outwards_rad * axis), Eigen::Vector3d::Zero()) * sheet;
   }
@@ -122,9 +125,10 @@ BoardMotion::BoardMotion(const CameraRig& rig, const VehicleBody& body, const Ei
                          const RigidTransform& world_from_vehicle, uint64_t seed) {
   uint64_t number = 0;
   for (const RigCamera& camera : rig.cameras) {
-    std::vector<RigidTransform> sheets = BoardPlacer(camera, body, board_size_m).place(seed * 10U + number++);
+    std::vector<RigidTransform> sheets =
+        BoardPoseSampler(camera, body, board_size_m).samplePoses(seed * 10U + number++);
     if (sheets.empty()) {
-      throw std::logic_error("BoardMotion: no place for the board is visible to the camera " + camera.name);
+      throw std::logic_error("BoardMotion: no pose of the board is visible to the camera " + camera.name);
     }
     for (RigidTransform& sheet : sheets) {
       sheet = world_from_vehicle * *camera.vehicle_from_camera * sheet;
@@ -143,11 +147,11 @@ RigidTransform BoardMotion::worldFromSheet(double time_s) const {
   const RigidTransform& here = sheets[index % sheets.size()];
   const RigidTransform& next = sheets[(index + 1) % sheets.size()];
   const double held_s = kPose_s - kMove_s;
-  const double share = (in_span_s - static_cast<double>(index) * kPose_s - held_s) / kMove_s;
-  if (share <= 0.0) {
+  const double fraction = (in_span_s - static_cast<double>(index) * kPose_s - held_s) / kMove_s;
+  if (fraction <= 0.0) {
     return here;
   }
-  const double eased = share * share * (3.0 - 2.0 * share);
+  const double eased = fraction * fraction * (3.0 - 2.0 * fraction);
   return RigidTransform(here.rotation().slerp(eased, next.rotation()),
                         here.translation() + eased * (next.translation() - here.translation()));
 }

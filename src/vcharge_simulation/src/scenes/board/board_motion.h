@@ -9,26 +9,27 @@
 
 namespace vcharge {
 
-/// A board that is held before one camera of the standing car after the other, at kPosesPerCamera places
-/// each, out to the rim of the image. At every place all of the board is in the image, stands free of the
-/// ground, and nothing of the car is before it.
+/// A calibration board held in front of each camera of the standing car in turn, at kPosesPerCamera poses
+/// each, out to the rim of the image. In every pose the whole board is in the image, above the ground, and
+/// not occluded by the car.
 class BoardMotion {
  public:
   static constexpr int kPosesPerCamera = 40;
   static constexpr double kPose_s = 1.0;
-  static constexpr double kMove_s = 0.4;  ///< of a pose's second; it is held for the rest
+  static constexpr double kMove_s =
+      0.4;  ///< time between two poses; the board stands still for the rest of kPose_s
   static constexpr double kSpan_s = kPosesPerCamera * kPose_s;
 
-  /// Cameras need full-size images (1280x800), for the places to be the same at every scale. The same
-  /// arguments give the same places. std::logic_error where a camera sees no place for the board.
+  /// `rig` must be for full-size images (1280x800), so that poses do not depend on the image scale. The same
+  /// arguments give the same poses. Throws std::logic_error if a camera has no visible pose.
   BoardMotion(const CameraRig& rig, const VehicleBody& body, const Eigen::Vector2d& board_size_m,
               const RigidTransform& world_from_vehicle, uint64_t seed);
 
-  /// Camera i has its poses from i kSpan_s on.
+  /// The poses for camera i start at time i * kSpan_s.
   RigidTransform worldFromSheet(double time_s) const;
 
  private:
-  std::vector<std::vector<RigidTransform>> world_from_sheet_;  // of each camera, one after the other
+  std::vector<std::vector<RigidTransform>> world_from_sheet_;  // per camera
 };
 
 }  // namespace vcharge

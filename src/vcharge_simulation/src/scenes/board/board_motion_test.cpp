@@ -26,13 +26,13 @@ TEST(BoardMotionTest, ShowsEveryCameraOfAnyRigTheWholeBoardOutToTheRim) {
         const RigCamera& seeing = rig.cameras[camera];
         double largest_rad = 0.0;
         double smallest_rad = 9.0;
-        std::vector<Eigen::Vector3d> places;
+        std::vector<Eigen::Vector3d> positions;
         for (int i = 0; i < BoardMotion::kPosesPerCamera; ++i) {
           const double time_s = static_cast<double>(camera) * BoardMotion::kSpan_s + i + 0.3;
           const RigidTransform camera_from_pattern = seeing.vehicle_from_camera->inverse() *
                                                      motion.worldFromSheet(time_s) *
                                                      pattern.sheet_from_pattern;
-          places.push_back(camera_from_pattern.translation());
+          positions.push_back(camera_from_pattern.translation());
           for (const Eigen::Vector3d& corner : pattern.corners_in_pattern_m) {
             const Eigen::Vector3d in_camera = camera_from_pattern * corner;
             const double angle_rad = std::atan2(in_camera.head<2>().norm(), in_camera.z());
@@ -46,15 +46,16 @@ TEST(BoardMotionTest, ShowsEveryCameraOfAnyRigTheWholeBoardOutToTheRim) {
             EXPECT_GT((*seeing.vehicle_from_camera * in_camera).z(), 0.05) << label;
           }
         }
-        // The outer squares and the margin lie beyond the corners: 0.2 m along the diagonal, at 1.3 m or
+        // The outer squares and the margin extend 0.2 m along the diagonal beyond the corners, at 1.3 m or
         // more.
         EXPECT_GT(largest_rad, 0.5 * seeing.field_of_view_rad - 0.2 / 1.2) << label;
         EXPECT_LT(smallest_rad, 0.1) << label;
-        std::sort(places.begin(), places.end(), [](const auto& a, const auto& b) { return a.x() < b.x(); });
+        std::sort(positions.begin(), positions.end(),
+                  [](const auto& a, const auto& b) { return a.x() < b.x(); });
         const auto distinct =
-            std::unique(places.begin(), places.end(),
+            std::unique(positions.begin(), positions.end(),
                         [](const auto& a, const auto& b) { return (a - b).norm() < 1e-3; }) -
-            places.begin();
+            positions.begin();
         EXPECT_GE(distinct, 36) << label;
       }
     }
@@ -72,8 +73,8 @@ TEST(BoardPatternTest, TagsAreThoseOfTheFamilyWhereTheirCornersAre) {
                            corners, ids, parameters);
   ASSERT_EQ(ids.size(), 36U);
   for (size_t i = 0; i < ids.size(); ++i) {
-    // OpenCV starts at what it holds for the upper left corner and turns clockwise on the sheet; its tags
-    // stand on their heads, so that this is the lower right one.
+    // OpenCV lists corners clockwise from the upper left one. Its tags are rotated by half a turn, so its
+    // first corner is the lower right one on the sheet.
     constexpr size_t kFirst[] = {1, 0, 3, 2};
     for (size_t k = 0; k < 4; ++k) {
       const Eigen::Vector3d on_sheet =

@@ -13,7 +13,7 @@ constexpr int kWhite = 200;
 constexpr int kBlack = 12;
 
 BoardPattern makeChessboard() {
-  constexpr int kColumns = 10;  // of squares
+  constexpr int kColumns = 10;  // squares
   constexpr int kRows = 7;
   constexpr double kSquare_m = 0.1;
   constexpr double kMargin_m = 0.04;
@@ -46,8 +46,8 @@ BoardPattern makeChessboard() {
   return pattern;
 }
 
-// Six by six bits, 255 where white, upright as in AprilTag's own images: OpenCV has them turned by half a
-// turn.
+// Bits of a tag, 6 x 6, 255 where white, upright as in AprilTag's own images (OpenCV's are rotated by half a
+// turn).
 cv::Mat tagBits(int id) {
   static const cv::Ptr<cv::aruco::Dictionary> dictionary =
       cv::aruco::getPredefinedDictionary(cv::aruco::DICT_APRILTAG_36h11);
@@ -57,13 +57,13 @@ cv::Mat tagBits(int id) {
 }
 
 BoardPattern makeAprilGrid() {
-  constexpr int kTags = 6;   // in each row and column
-  constexpr int kBits = 10;  // across a tag, two of them border on either side
+  constexpr int kTags = 6;   // per row and column
+  constexpr int kBits = 10;  // across a tag, including a border of two bits on either side
   constexpr double kTag_m = 0.088;
-  constexpr double kSpacing = 0.3;  // over the tag's width
+  constexpr double kSpacing = 0.3;  // relative to the tag's width
   constexpr int kTexelsPerBit = 8;
   constexpr int kTag = kBits * kTexelsPerBit;
-  constexpr int kGap = 24;  // texels: kSpacing of kTag
+  constexpr int kGap = 24;  // texels, kSpacing * kTag
   constexpr int kMargin = 32;
   constexpr double kTexel_m = kTag_m / kTag;
   static_assert(kGap * 10 == kTag * 3, "the gap is 0.3 of a tag");
@@ -82,10 +82,10 @@ BoardPattern makeAprilGrid() {
   }
   for (int id = 0; id < kTags * kTags; ++id) {
     const int column = id % kTags;
-    const int row = id / kTags;  // from below
-    const cv::Rect place(kMargin + kGap + column * kPitch, kMargin + kGap + (kTags - 1 - row) * kPitch, kTag,
-                         kTag);
-    cv::Mat tag = pattern.image(place);
+    const int row = id / kTags;  // counted from below
+    const cv::Rect area(kMargin + kGap + column * kPitch, kMargin + kGap + (kTags - 1 - row) * kPitch, kTag,
+                        kTag);
+    cv::Mat tag = pattern.image(area);
     tag.setTo(cv::Scalar(kBlack));
     cv::Mat bits;
     cv::resize(tagBits(id), bits, cv::Size(6 * kTexelsPerBit, 6 * kTexelsPerBit), 0, 0, cv::INTER_NEAREST);

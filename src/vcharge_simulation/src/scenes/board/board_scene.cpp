@@ -6,7 +6,7 @@
 
 #include "scenes/board/board_motion.h"
 #include "scenes/board/board_pattern.h"
-#include "scenes/lot/lot_variant.h"
+#include "scenes/lot/lot_scene.h"
 #include "scenes/scene_parts.h"
 #include "vcharge_simulation/sensors/golf_rig.h"
 #include "vcharge_simulation/sensors/rig_catalogue.h"
@@ -18,8 +18,8 @@ namespace {
 constexpr double kFreeRadius_m = 9.0;
 
 const RigidTransform& worldFromVehicle() {
-  static const RigidTransform place = RigidTransform::planar(-5.0, 0.2, 0.1);
-  return place;
+  static const RigidTransform pose = RigidTransform::planar(-5.0, 0.2, 0.1);
+  return pose;
 }
 
 struct Board {
@@ -34,9 +34,9 @@ MoverState boardAt(const Board& board, double time_s) {
   const Eigen::Vector2d half = 0.5 * board.pattern.size_m;
   Eigen::AlignedBox3d box;
   const auto corner = [&](double x, double y, double z) {
-    const Eigen::Vector3d place = world_from_sheet * Eigen::Vector3d(x * half.x(), y * half.y(), z);
-    box.extend(place);
-    return place.cast<float>().eval();
+    const Eigen::Vector3d position = world_from_sheet * Eigen::Vector3d(x * half.x(), y * half.y(), z);
+    box.extend(position);
+    return position.cast<float>().eval();
   };
   MoverState state;
   // The viewer is at negative z, and image rows grow with y.
@@ -53,26 +53,25 @@ MoverState boardAt(const Board& board, double time_s) {
 
 std::shared_ptr<const Scene> buildBoardScene(const SceneOptions& options) {
   LotVariant variant;
-  variant.layout = makeLotLayout(static_cast<uint64_t>(options.seed), options.day, options.moved_cars);
-  // No car stands where the board is held.
-  const Eigen::Vector2d place = worldFromVehicle().translation().head<2>();
+  variant.layout = makeLotLayout(options.seed, options.day);
+  // Keeps the area around the car free for the board.
+  const Eigen::Vector2d position = worldFromVehicle().translation().head<2>();
   variant.layout.cars.erase(std::remove_if(variant.layout.cars.begin(), variant.layout.cars.end(),
                                            [&](const ParkedCar& car) {
-                                             return (Eigen::Vector2d(car.x, car.y) - place).norm() <
+                                             return (Eigen::Vector2d(car.x, car.y) - position).norm() <
                                                     kFreeRadius_m;
                                            }),
                             variant.layout.cars.end());
   const BoardPattern pattern = makeBoardPattern(options.board);
-  const auto seed = static_cast<uint64_t>(options.seed);
-  const BoardMotion motion(makeRig(options.rig, static_cast<uint64_t>(options.rig_seed), 1.0),
-                           *makeGolfBody(), pattern.size_m, worldFromVehicle(), seed);
+  const BoardMotion motion(makeRig(options.rig, options.rig_seed, 1.0), *makeGolfBody(), pattern.size_m,
+                           worldFromVehicle(), options.seed);
   variant.add_things = [&](SceneParts* parts) {
     const uint32_t front = parts->textured(SurfaceKind::kOther, pattern.image, pattern.texels_per_m);
     const uint32_t back = parts->plain(SurfaceKind::kOther, 0.3);
     const auto board = std::make_shared<const Board>(Board{pattern, motion, front, back});
     parts->scene().movers.push_back({"board", [board](double time_s) { return boardAt(*board, time_s); }});
   };
-  return buildLotVariant(lotOptionsOf(options), variant);
+  return buildLotVariant(options, variant);
 }
 
 std::vector<CatalogueEntry> listBoardDrives() {

@@ -10,7 +10,7 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr Lanes kLanes{26.0, 15.5, 5.0};
 
-// Mapped paths and those of another day lie 2 m apart in the long lanes, where there is room.
+// Offsets from the loop: in the long lanes, mapping drives and drives of the other day are 2 m apart.
 const Eigen::Vector2d kMapped_m(0.24, 0.8);
 const Eigen::Vector2d kOtherDay_m(-0.36, -1.2);
 

@@ -13,18 +13,18 @@ namespace {
 constexpr double kStopLength_m = 1.7;
 constexpr double kStopWidth_m = 0.14;
 constexpr double kStopHeight_m = 0.1;
-constexpr double kStopToEnd_m = 0.38;  // of the bay
+constexpr double kStopToEnd_m = 0.38;  // to the end of the bay
 constexpr double kBoardHeight_m = 0.28;
 constexpr double kBoardWidth_m = 1.7;
 constexpr double kTexelsPerM = 150.0;
 constexpr double kPipeRadius_m = 0.055;
-constexpr double kPiece_m = 2.0;  // long things come in pieces, each with its own light
+constexpr double kPiece_m = 2.0;  // long objects are split into pieces, each with its own baked light
 
 Eigen::Vector3f vector(double x, double y, double z) {
   return Eigen::Vector3d(x, y, z).cast<float>();
 }
 
-// Rubber with reflecting stripes, scuffed by tyres.
+// Draws rubber with reflecting stripes, scuffed by tyres.
 cv::Mat drawStop(Random* random) {
   cv::Mat image(16, 192, CV_8UC1, cv::Scalar(28));
   for (int x = 8; x < image.cols; x += 48) {
@@ -67,14 +67,14 @@ cv::Mat drawBoard(const std::string& text, bool bright) {
   return image;
 }
 
-// Across the lane, to be read from both sides.
+// Boards across the lanes, readable from both sides.
 void addBoards(double overhead_m, SceneParts* parts) {
-  struct Place {
+  struct Sign {
     double x, y;
-    bool along_x;  // the lane
+    bool along_x;  // direction of the lane
     const char* text;
   };
-  static const std::vector<Place> kPlaces = {
+  static const std::vector<Sign> kSigns = {
       {-19.0, -15.5, true, "AUSFAHRT ->"}, {-3.5, -15.5, true, "P2 269 - 285"},
       {12.0, -15.5, true, "<- KASSE"},     {-19.0, 0.0, true, "P2 201 - 217"},
       {4.0, 0.0, true, "LIFT 3 ->"},       {19.5, 0.0, true, "EINBAHN"},
@@ -84,18 +84,19 @@ void addBoards(double overhead_m, SceneParts* parts) {
       {26.0, 9.0, false, "P3 P4 ->"}};
   const uint32_t rod = parts->plain(SurfaceKind::kOther, 0.3);
   bool bright = false;
-  for (const Place& place : kPlaces) {
+  for (const Sign& sign : kSigns) {
     bright = !bright;
     const uint32_t material =
-        parts->textured(SurfaceKind::kOther, drawBoard(place.text, bright), kTexelsPerM, 0.03);
+        parts->textured(SurfaceKind::kOther, drawBoard(sign.text, bright), kTexelsPerM, 0.03);
     const double low = overhead_m + 0.04;
     const auto at = [&](double across, double thickness, double z) {
-      return place.along_x ? vector(place.x + thickness, place.y + across, z)
-                           : vector(place.x + across, place.y + thickness, z);
+      return sign.along_x ? vector(sign.x + thickness, sign.y + across, z)
+                          : vector(sign.x + across, sign.y + thickness, z);
     };
     const double half = 0.5 * kBoardWidth_m;
-    // Seen from where the lane's coordinate is smaller, a lane along x has its left at greater y.
-    const double left = place.along_x ? half : -half;
+    // For a viewer who looks along the lane's axis, left is at larger y in a lane along x and at smaller x in
+    // one along y.
+    const double left = sign.along_x ? half : -half;
     for (const double side : {-1.0, 1.0}) {
       const double start = -side * left;
       const double depth = 0.03 * side;
@@ -116,7 +117,7 @@ cv::Mat drawLadder() {
   for (int x = 6; x < image.cols; x += 32) {
     cv::rectangle(image, cv::Rect(x, 0, 5, 32), cv::Scalar(140), cv::FILLED);
   }
-  // Cables lie on the rungs.
+  // Cables on the rungs.
   for (const int y : {8, 12, 19, 22}) {
     cv::line(image, {0, y}, {255, y + y % 3 - 1}, cv::Scalar(20 + 10 * (y % 4)), 2);
   }
@@ -145,7 +146,7 @@ void addDownPipes(const std::vector<GarageLayout::Pillar>& pillars, double overh
   const uint32_t zinc = parts->plain(SurfaceKind::kPole, 0.4, 0.04);
   const uint32_t clamp = parts->plain(SurfaceKind::kPole, 0.08);
   for (const GarageLayout::Pillar& pillar : pillars) {
-    // On the side away from the lanes that cross.
+    // The pipe is on the side away from the crossing lane.
     const double side = pillar.x > 0.0 ? -1.0 : 1.0;
     if (!parts->random().chance(0.3)) {
       continue;
@@ -160,7 +161,7 @@ void addDownPipes(const std::vector<GarageLayout::Pillar>& pillars, double overh
     }
     addFrustum(vector(x, pillar.y, 2.2), vector(x, pillar.y, kGarageHeight_m), radius, radius, 10, false,
                zinc, &parts->scene().mesh);
-    // Seen from above without what hangs overhead, it is solid.
+    // Closed at the overhead limit, so that the height map sees it as solid.
     addFrustum(vector(x, pillar.y, overhead_m - 0.02), vector(x, pillar.y, overhead_m - 0.01), radius, radius,
                10, true, zinc, &parts->scene().mesh);
     parts->scene().obstacles.push_back(

@@ -5,8 +5,8 @@
 
 namespace vcharge {
 
-/// What a garage has besides its walls: wheel stops in the bays, boards that hang over the lanes, cable trays
-/// under the beams and down pipes at some pillars. All that hangs does so above `overhead_m`.
+/// Adds wheel stops in the bays, boards over the lanes, cable trays under the beams and down pipes at some
+/// pillars. Everything that hangs is above `overhead_m`.
 void addGarageFittings(const GarageLayout& layout, double overhead_m, SceneParts* parts);
 
 }  // namespace vcharge

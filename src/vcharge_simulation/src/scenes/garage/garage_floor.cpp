@@ -42,7 +42,7 @@ cv::Mat drawMarkings(const GarageLayout& layout, double texel_m) {
     painter.arrow(x + 1.4, -7.0, kHalfPi);
     painter.arrow(x - 1.4, 8.0, -kHalfPi);
     painter.dashed(x, -11.0, x, 11.0, kLine_m, 1.5, 3.0);
-    // A footpath along the wall.
+    // Footpath along the wall.
     const double side = x > 0.0 ? 1.0 : -1.0;
     painter.line(side * 29.4, -22.0, side * 29.4, 22.0, 0.1);
     for (double y = -21.5; y < 22.0; y += 0.9) {
@@ -61,14 +61,14 @@ class FloorPainter {
  public:
   explicit FloorPainter(uint64_t seed) : seed_(static_cast<uint32_t>(seed * 6151U + 11U)) {}
 
-  /// `stains`: reflectance over that of the clean floor; `marking`: share of paint.
+  /// `stains` multiplies the reflectance of the clean floor; `marking` is the coverage of paint.
   float albedo(float x, float y, float stains, float marking) const {
     float value = 0.27F;
     value *= 1.0F + 0.16F * fractalNoise(x * 0.18F, y * 0.18F, 3, 0.6F, seed_) +
              0.16F * fractalNoise(x * 1.3F, y * 1.3F, 4, 0.8F, seed_ + 2) +
              0.15F * fractalNoise(x * 6.0F, y * 6.0F, 2, 0.8F, seed_ + 7) +
              0.10F * fractalNoise(x * 17.0F, y * 17.0F, 3, 0.85F, seed_ + 3);
-    // The coating has come off in chips, down to bright concrete or to the dark of an older coat.
+    // The coating has chipped off, down to bright concrete or to a darker older coat.
     const float wear = fractalNoise(x * 4.5F, y * 4.5F, 5, 0.75F, seed_ + 4) +
                        0.4F * valueNoise(x * 0.35F, y * 0.35F, seed_ + 8);
     value *= 1.0F + 0.3F * ramp(wear, 0.95F, 1.02F) - 0.34F * ramp(-wear, 0.98F, 1.05F);
@@ -86,7 +86,7 @@ class FloorPainter {
   }
 
  private:
-  // Rubber along the lanes' wheel tracks.
+  // Rubber along the wheel tracks of the lanes.
   float tyreFactor(float x, float y) const {
     const float wander = 0.25F * valueNoise(x * 0.11F, y * 0.11F, seed_ + 5);
     float rubber = 0.0F;

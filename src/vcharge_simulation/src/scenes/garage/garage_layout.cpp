@@ -15,10 +15,10 @@ constexpr int kBaysPerRow = 17;
 constexpr int kBaysPerPillar = 3;
 constexpr double kLampHeight_m = 2.34;
 constexpr double kLampLength_m = 1.5;
-constexpr double kWallBays_m = 21.1;  // rows' middles on both sides of the garage
+constexpr double kWallBays_m = 21.1;  // centres of the rows along the northern and southern wall
 constexpr double kOuterBays_m = 10.1;
 constexpr double kInnerBays_m = 5.3;
-constexpr double kWallPillars_m = 18.9;  // just behind the mouths of the bays
+constexpr double kWallPillars_m = 18.9;  // slightly inside the open end of the bays
 constexpr double kMiddlePillars_m = 7.7;
 
 void addBays(GarageLayout* layout) {
@@ -46,7 +46,7 @@ void addPillars(GarageLayout* layout) {
   layout->beam_y = {-kMiddlePillars_m, kMiddlePillars_m};
 }
 
-// Between the beams, over the lanes and here and there over the bays. Some are weak; on another day others.
+// Lamps between the beams, over the lanes and some bays. A few are weak; which ones depends on the day.
 void addLamps(uint64_t seed, int day, GarageLayout* layout) {
   Random random(seed * 17U + 3U + 1000U * static_cast<uint64_t>(day));
   const auto add = [&](double x, double y, bool along_x) {
@@ -75,12 +75,12 @@ void addLamps(uint64_t seed, int day, GarageLayout* layout) {
 
 }  // namespace
 
-GarageLayout makeGarageLayout(uint64_t seed, int day, double moved_cars) {
+GarageLayout makeGarageLayout(uint64_t seed, int day) {
   GarageLayout layout;
   addBays(&layout);
   addPillars(&layout);
   addLamps(seed, day, &layout);
-  layout.cars = parkCars(layout.bays, kOccupiedBays, seed + 90U, day, moved_cars);
+  layout.cars = parkCars(layout.bays, kOccupiedBays, seed + 90U, day);
   return layout;
 }
 

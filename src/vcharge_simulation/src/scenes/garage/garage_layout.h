@@ -10,13 +10,13 @@
 
 namespace vcharge {
 
-/// The garage's inner faces. Lanes run along y = -15.5, 0 and 15.5 and x = -26 and 26.
+/// Inner faces of the garage. Lanes run along y = -15.5, 0 and 15.5 and along x = -26 and 26.
 inline constexpr GroundRectangle kGarageArea{-32.0, -23.5, 32.0, 23.5};
 inline constexpr double kGarageHeight_m = 2.75;
-inline constexpr double kBeamHeight_m = 2.42;  ///< of the beams' lower edge
+inline constexpr double kBeamHeight_m = 2.42;  ///< lower edge of the beams
 inline constexpr double kGarageBayLength_m = 4.8;
 
-/// Where everything stands in the garage.
+/// Positions of everything in the garage.
 struct GarageLayout {
   struct Pillar {
     double x, y;
@@ -26,13 +26,13 @@ struct GarageLayout {
   std::vector<ParkingBay> bays;
   std::vector<ParkedCar> cars;
   std::vector<Pillar> pillars;
-  std::vector<double> beam_x;  ///< of the beams across the garage
-  std::vector<double> beam_y;  ///< of the beams along it
+  std::vector<double> beam_x;  ///< beams across the garage
+  std::vector<double> beam_y;  ///< beams along the garage
   std::vector<Lamp> lamps;
 };
 
 inline constexpr double kPillarWidth_m = 0.5;
 
-GarageLayout makeGarageLayout(uint64_t seed, int day, double moved_cars);
+GarageLayout makeGarageLayout(uint64_t seed, int day);
 
 }  // namespace vcharge

@@ -19,13 +19,13 @@ constexpr double kDetailTexel_m = 0.0035;
 constexpr float kLampRadiance = 2.4F;
 constexpr double kCeilingTexel_m = 0.1;
 constexpr double kCeilingAlbedo = 0.6;
-// Of the share 1 of the baked light: the camera is exposed for the garage.
+// Irradiance at baked light 1; the camera's exposure is set for the garage.
 constexpr double kFullIrradiance = 4.5;
-constexpr double kTypicalCeilingShare = 0.12;
-// Ducts and lamps hang above this.
+constexpr double kTypicalCeilingLight = 0.12;
+// Ducts and lamps are above this height.
 constexpr double kOverhead_m = 2.1;
 constexpr float kFloorReflectivity = 0.03F;
-// Lamps bake onto the corners of cells of this size.
+// Panels are split into cells of this size, because lamp light is baked at their corners.
 constexpr double kLightCell_m = 0.5;
 
 LightOptions lampLight() {
@@ -45,8 +45,8 @@ class GarageBuilder {
  public:
   explicit GarageBuilder(const SceneOptions& options)
       : options_(options),
-        seed_(static_cast<uint64_t>(options.seed)),
-        layout_(makeGarageLayout(seed_, options.day, options.moved_cars)),
+        seed_(options.seed),
+        layout_(makeGarageLayout(seed_, options.day)),
         parts_(seed_ * 53U + 7U, 1.0) {}
 
   std::shared_ptr<const Scene> build() {
@@ -92,18 +92,18 @@ class GarageBuilder {
     parts_.addLevel(kGarageArea, 0.0, material);
   }
 
-  // A flat panel in cells, so that the light on its corners is fine enough.
+  // Adds a flat panel, split into cells to resolve the light baked at their corners.
   void addPanel(const Eigen::Vector3f& corner, const Eigen::Vector3f& along, const Eigen::Vector3f& up,
                 uint32_t material, const TextureWindow& window = TextureWindow()) {
     const int columns = std::max(1, static_cast<int>(std::ceil(along.norm() / kLightCell_m)));
     const int rows = std::max(1, static_cast<int>(std::ceil(up.norm() / kLightCell_m)));
     for (int row = 0; row < rows; ++row) {
       for (int column = 0; column < columns; ++column) {
-        const auto share = [](int i, int n) { return static_cast<float>(i) / static_cast<float>(n); };
-        const float s0 = share(column, columns);
-        const float s1 = share(column + 1, columns);
-        const float t0 = share(row, rows);
-        const float t1 = share(row + 1, rows);
+        const auto fraction = [](int i, int n) { return static_cast<float>(i) / static_cast<float>(n); };
+        const float s0 = fraction(column, columns);
+        const float s1 = fraction(column + 1, columns);
+        const float t0 = fraction(row, rows);
+        const float t1 = fraction(row + 1, rows);
         const float width = window.u1 - window.u0;
         const float height = window.v1 - window.v0;
         const TextureWindow part{window.u0 + s0 * width, window.v1 - t1 * height, window.u0 + s1 * width,
@@ -117,7 +117,7 @@ class GarageBuilder {
   void addWalls() {
     const std::vector<Eigen::Vector2d> outline = cornersOf(kGarageArea);
     for (size_t i = 0; i < outline.size(); ++i) {
-      // Seen from inside, the outline runs the other way.
+      // The outline is reversed so that the walls face inwards.
       const Eigen::Vector2d& from = outline[(i + 1) % outline.size()];
       const Eigen::Vector2d edge = outline[i] - from;
       const uint32_t wall =
@@ -145,24 +145,24 @@ class GarageBuilder {
     const auto beam = [&](double x, double y, double length, double width, bool along_x) {
       const double dx = 0.5 * (along_x ? length : width);
       const double dy = 0.5 * (along_x ? width : length);
-      const auto share = static_cast<float>((along_x ? length : width) / kTile_m);
+      const auto repeats = static_cast<float>((along_x ? length : width) / kTile_m);
       const Eigen::Vector3f up = vector(0.0, 0.0, height);
       addPanel(vector(x - dx, y - dy, kBeamHeight_m), vector(2.0 * dx, 0.0, 0.0), up, concrete,
-               {0.0F, 0.0F, share, 0.02F});
+               {0.0F, 0.0F, repeats, 0.02F});
       addPanel(vector(x + dx, y + dy, kBeamHeight_m), vector(-2.0 * dx, 0.0, 0.0), up, concrete,
-               {0.3F, 0.3F, 0.3F + share, 0.32F});
-      const auto depth_share = static_cast<float>(2.0 * dy / kTile_m);
+               {0.3F, 0.3F, 0.3F + repeats, 0.32F});
+      const auto depth_repeats = static_cast<float>(2.0 * dy / kTile_m);
       addPanel(vector(x + dx, y - dy, kBeamHeight_m), vector(0.0, 2.0 * dy, 0.0), up, concrete,
-               {0.5F, 0.1F, 0.5F + depth_share, 0.12F});
+               {0.5F, 0.1F, 0.5F + depth_repeats, 0.12F});
       addPanel(vector(x - dx, y + dy, kBeamHeight_m), vector(0.0, -2.0 * dy, 0.0), up, concrete,
-               {0.7F, 0.6F, 0.7F + depth_share, 0.62F});
+               {0.7F, 0.6F, 0.7F + depth_repeats, 0.62F});
       addPanel(vector(x - dx, y + dy, kBeamHeight_m), vector(2.0 * dx, 0.0, 0.0), vector(0.0, -2.0 * dy, 0.0),
-               concrete, {0.2F, 0.2F, 0.2F + share, 0.2F + depth_share});
+               concrete, {0.2F, 0.2F, 0.2F + repeats, 0.2F + depth_repeats});
     };
     for (const double x : layout_.beam_x) {
       beam(x, 0.0, area.depth(), 0.36, false);
     }
-    // Flush beams would share a face: the ones along the garage are a little higher and narrower.
+    // Beams along the garage are slightly narrower, so that crossing beams do not repeats faces.
     for (const double y : layout_.beam_y) {
       beam(0.0, y, area.width(), 0.3, true);
     }
@@ -183,14 +183,14 @@ class GarageBuilder {
         addPanel(vector(corners[i].x(), corners[i].y(), 0.0), vector(edge.x(), edge.y(), 0.0),
                  vector(0.0, 0.0, kGarageHeight_m), material, {u, 0.0F, u + 0.25F, 1.0F});
       }
-      // Seen from above without what hangs overhead, a pillar is solid.
+      // A lid at the overhead limit, so that the height map sees a solid pillar.
       parts_.addLevel({corners[0].x(), corners[0].y(), corners[2].x(), corners[2].y()}, kOverhead_m - 0.01,
                       material);
       scene().obstacles.push_back({"pillar", corners, 0.0, kGarageHeight_m});
     }
   }
 
-  // Sprinkler pipes and a duct under the beams, in pieces so that each gets its own light.
+  // Sprinkler pipes and a duct under the beams, in pieces that each get their own baked light.
   void addPipes() {
     constexpr double kPiece_m = 2.0;
     const auto pipe = [&](double y, double z, double radius, uint32_t material) {
@@ -234,7 +234,7 @@ class GarageBuilder {
               {lamp.centre.x() - half.x(), lamp.centre.y() - half.y(), low}, light, &scene().mesh);
       addBox(placement(lamp.centre.x(), lamp.centre.y(), lamp.centre.z() + 0.06, 0.0),
              size + Eigen::Vector3f(0.06F, 0.06F, -0.02F), housing, &scene().mesh);
-      // It hangs from the ceiling.
+      // Rod to the ceiling.
       addFrustum(lamp.centre, {lamp.centre.x(), lamp.centre.y(), static_cast<float>(kGarageHeight_m)}, 0.015F,
                  0.015F, 5, false, housing, &scene().mesh);
     }
@@ -244,7 +244,7 @@ class GarageBuilder {
     const GroundRectangle& area = kGarageArea;
     cv::Mat image(
         static_cast<int>(area.depth() / kCeilingTexel_m), static_cast<int>(area.width() / kCeilingTexel_m),
-        CV_8UC1, cv::Scalar(255.0 * kCeilingAlbedo * kTypicalCeilingShare * kFullIrradiance / kLampRadiance));
+        CV_8UC1, cv::Scalar(255.0 * kCeilingAlbedo * kTypicalCeilingLight * kFullIrradiance / kLampRadiance));
     for (const Lamp& lamp : layout_.lamps) {
       const auto texel = [&](float metres, double origin_m) {
         return static_cast<int>(std::lround((metres - origin_m) / kCeilingTexel_m * 8.0));

@@ -13,19 +13,21 @@ namespace vcharge {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kTrack_m = 1.5;  // between the wheels that leave rubber
+constexpr double kTrack_m = 1.5;  // track width of the cars that leave tyre marks
 constexpr double kLanes_m[] = {-15.5, 0.0, 15.5};
 
 float ramp(float value, float low, float high) {
   return std::clamp((value - low) / (high - low), 0.0F, 1.0F);
 }
 
-// A seed from coordinates, negative ones too: these have no unsigned value, but their integers wrap.
+// Seed from a coordinate that may be negative; goes through int64_t because converting a negative double to
+// unsigned is undefined.
 uint32_t wrapped(double value) {
   return static_cast<uint32_t>(static_cast<int64_t>(value));
 }
 
-// An ellipse with a ragged border. Reflectance within changes by `strength`, on its border by `rim` more.
+// An ellipse with a ragged border: reflectance changes by the fraction `strength` inside and additionally by
+// `rim` at the border.
 struct Blob {
   double x, y, half_length, half_width, yaw_rad;
   double strength;
@@ -44,7 +46,7 @@ class StainPainter {
   const cv::Mat& image() const { return image_; }
 
   void addOil(const std::vector<ParkingBay>& bays) {
-    // Engines drip where they stand: pools, and drops around them.
+    // Oil drips from parked engines: pools with drops around them.
     for (const ParkingBay& bay : bays) {
       for (int i = random_.index(4); i > 0; --i) {
         const double x = bay.x + random_.uniform(-0.6, 0.6);
@@ -63,7 +65,7 @@ class StainPainter {
   }
 
   void addStains() {
-    // Rust, dirt and cleaned places of all sizes.
+    // Rust, dirt and cleaned spots of all sizes.
     anywhere(220, [&](double x, double y) {
       const double size_m = 0.05 * std::pow(20.0, random_.uniform());
       blob(x, y, size_m, random_.uniform(0.4, 1.0), random_.uniform(-0.45, 0.3));
@@ -77,7 +79,7 @@ class StainPainter {
     });
   }
 
-  // Chewing gum and drops, dark when old; stones and bits of leaves and paper that tyres and people bring.
+  // Chewing gum and drops, dark when old; stones, leaves and bits of paper.
   void addSpecks() {
     anywhere(9000, [&](double x, double y) {
       const double size_m = 0.010 * std::pow(2.5, random_.uniform());
@@ -106,7 +108,7 @@ class StainPainter {
     });
   }
 
-  // Rubber of cars that turned from the lane into their bay or out of it.
+  // Tyre marks of cars that turned from the lane into a bay or out of it.
   void addTyreMarks(const std::vector<ParkingBay>& bays) {
     for (const ParkingBay& bay : bays) {
       const double lane_y = nearestLane(bay);
@@ -138,7 +140,7 @@ class StainPainter {
   }
 
   static double nearestLane(const ParkingBay& bay) {
-    // Cars enter bays from the side that the bay's yaw points away from.
+    // Bays are open at the end that their yaw points away from.
     const double mouth_y = bay.y - (bay.yaw_rad > 0.0 ? 0.5 : -0.5) * kGarageBayLength_m;
     return *std::min_element(std::begin(kLanes_m), std::end(kLanes_m), [&](double a, double b) {
       return std::abs(a - mouth_y) < std::abs(b - mouth_y);
@@ -167,7 +169,7 @@ class StainPainter {
     const auto half_length = static_cast<float>(blob.half_length);
     const auto half_width = static_cast<float>(blob.half_width);
     const uint32_t seed = mixBits(seed_ + wrapped(1000.0 * (blob.x + 100.0 * blob.y)));
-    // Borders are as sharp as a texel is wide.
+    // The border is at least one texel wide.
     const float soft = std::max(0.3F, static_cast<float>(texel_m_) / half_width);
     for (int row = box.y; row < box.y + box.height; ++row) {
       const auto dy = static_cast<float>(kGarageArea.min_y + (row + 0.5) * texel_m_ - blob.y);
@@ -188,7 +190,7 @@ class StainPainter {
     }
   }
 
-  // A quarter circle from the lane (angle 0) into the bay, with the tread's streaks along it.
+  // A quarter circle from the lane (angle 0) into the bay, with streaks of the tread along it.
   void arc(double middle_x, double middle_y, double radius_m, double side, double towards, double from_rad,
            double to_rad, double strength) {
     const double step_rad = 0.5 * texel_m_ / radius_m;
@@ -208,7 +210,7 @@ class StainPainter {
         const float streak =
             0.6F + 0.6F * fractalNoise(along * 1.5F, static_cast<float>(across) * 30.0F, 3, 0.8F, seed);
         const float edge = 1.0F - ramp(static_cast<float>(std::abs(across)), 0.06F, 0.09F);
-        // Half-texel steps both ways meet each texel about four times.
+        // Half-texel steps in both directions visit each texel about four times.
         const float change = 0.25F * static_cast<float>(strength * std::min(1.0, end_m / 0.6)) * edge *
                              std::clamp(streak, 0.0F, 1.4F);
         image_.at<float>(texel.y, texel.x) *= 1.0F - change;

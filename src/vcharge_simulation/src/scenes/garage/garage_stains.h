@@ -8,9 +8,9 @@
 
 namespace vcharge {
 
-/// What years of use leave on a garage's floor: oil that dripped from engines, drops, chewing gum, grit,
-/// rubber of tyres that turned into the bays, lime around dried puddles, patches of mortar, litter. CV_32FC1:
-/// the floor's reflectance over that of the clean one; row 0 is at min_y of kGarageArea.
+/// Draws wear on the garage floor: oil, drops, chewing gum, grit, tyre marks, lime around dried puddles,
+/// mortar patches and litter. Returns CV_32FC1, a factor on the reflectance of the clean floor; row 0 is at
+/// min_y of kGarageArea.
 cv::Mat drawGarageStains(const GarageLayout& layout, double texel_m, uint64_t seed);
 
 }  // namespace vcharge

@@ -29,7 +29,7 @@ void writeSign(const std::string& text, const cv::Point& corner, double scale, i
               cv::Scalar(ink), 2, cv::LINE_AA);
 }
 
-// A poster or a notice: a picture of a few shapes, a headline and lines of text.
+// Draws a poster: some shapes, a headline and lines of text.
 void drawPoster(const cv::Point& corner, Random* random, cv::Mat* image) {
   const int width = texels(random->uniform(0.5, 0.9));
   const int height = texels(random->uniform(0.7, 1.1));
@@ -58,8 +58,8 @@ void drawPoster(const cv::Point& corner, Random* random, cv::Mat* image) {
   poster.copyTo((*image)(sheet));
 }
 
-// What hangs on a wall at `x`: an exit sign, a door, a fire extinguisher, a parking deck's name, a vent,
-// a poster, a cable in its duct.
+// Draws a random fixture at `x`: an exit sign, a door, a fire extinguisher, the name of the deck, a vent, a
+// poster or a cable duct.
 void drawFixture(int x, Random* random, cv::Mat* image) {
   const int top = texels(0.45 + 0.25 * random->uniform());
   const int kind = random->index(8);
@@ -101,8 +101,8 @@ void drawFixture(int x, Random* random, cv::Mat* image) {
   }
 }
 
-// Bare concrete: boards of the form 0.25 m high with fins between them, holes of its ties, pores, gravel
-// where it was not shaken well, cracks, and rust that ran out of it.
+// Reflectance of bare concrete: formwork boards 0.25 m high with seams, tie holes, pores, exposed gravel and
+// cracks.
 float concrete(float u, float v, float mean, uint32_t seed) {
   constexpr float kBoard_m = 0.25F;
   const int board = static_cast<int>(std::floor(v / kBoard_m));
@@ -117,7 +117,7 @@ float concrete(float u, float v, float mean, uint32_t seed) {
   }
   value *= 1.0F + 0.14F * fractalNoise(u * 0.8F, v * 0.8F, 4, 0.7F, seed) +
            0.06F * fractalNoise(u * 13.0F, v * 13.0F, 2, 0.8F, seed + 7);
-  // Ties every 1.25 m in two rows, some of them plugged with mortar.
+  // Tie holes every 1.25 m in two rows, some plugged with mortar.
   const float tie_u = 1.25F * std::round(u / 1.25F);
   const float tie_v = 1.0F * std::round((v - 0.62F) / 1.0F) + 0.62F;
   const float to_tie_m = std::hypot(u - tie_u, v - tie_v);
@@ -168,7 +168,7 @@ cv::Mat drawGarageWall(double width_m, double height_m, uint32_t seed) {
       if (v < kBand_m + 0.01F * valueNoise(u * 3.0F, 0.0F, seed + 1)) {
         value *= 0.55F;
       }
-      // Water that ran down from joints above, and dirt that splashed up.
+      // Water stains from joints above and splashed dirt below.
       const float leak = valueNoise(u * 1.4F, 0.1F * v, seed + 2) + 0.5F * valueNoise(u * 6.0F, v, seed + 4);
       value *= 1.0F - 0.35F * std::clamp(2.0F * (leak - 0.55F), 0.0F, 1.0F);
       value *= 1.0F - 0.35F * std::max(0.0F, 1.0F - v / 0.35F) *

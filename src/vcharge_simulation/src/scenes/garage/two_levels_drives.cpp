@@ -11,12 +11,12 @@ namespace {
 constexpr double kHalfPi = 1.57079632679489661923;
 constexpr double kTransition_m = 3.0;
 constexpr Lanes kLanes{26.5, 15.0, 5.2};
-constexpr double kBeside_m = 1.0;  // to either side, along the long lanes
+constexpr double kBeside_m = 1.0;  // to either side in the long lanes
 
-// Once around, backwards into a bay, out of it the other way and once around in that direction: no lane of
-// two levels leads from one direction into the other.
+// Once around, backwards into a bay, out of it the other way and around in that direction: in this scene no
+// lane connects the two directions.
 DrivePath bothDirectionsPath() {
-  constexpr double kCurve_m = 5.5;  // from the bay to where the car leaves the lane and comes back to it
+  constexpr double kCurve_m = 5.5;  // from the bay to where the car leaves the lane and enters it again
   const double x = kLanes.x_m;
   const double y = kLanes.y_m + kBeside_m;
   const auto through = [](const std::vector<Eigen::Vector2d>& waypoints) {

@@ -5,7 +5,7 @@
 
 #include "scenes/garage/garage_surfaces.h"
 #include "scenes/lot/lot_ground.h"
-#include "scenes/lot/lot_variant.h"
+#include "scenes/lot/lot_scene.h"
 #include "scenes/scene_parts.h"
 
 namespace vcharge {
@@ -13,14 +13,14 @@ namespace vcharge {
 namespace {
 
 constexpr double kSlope = 0.10510423526567646;  // tan(6 degrees)
-constexpr double kRampFoot_m = -12.0;           // y where the ramp starts
+constexpr double kRampFoot_m = -12.0;           // y of the lower end of the ramps
 constexpr double kRampHead_m = 12.0;
-constexpr double kRounding_m = 3.0;  // at the foot and the head, along y
-constexpr double kInner_m = 22.9;    // the levels reach to here in x, the ramps lie outside
+constexpr double kRounding_m = 3.0;  // at both ends of the ramp, along y
+constexpr double kInner_m = 22.9;    // largest |x| of the two levels; the ramps are outside
 constexpr double kCell_m = 0.5;
 constexpr double kRadPerM = 6.28318530717958647692;
 
-// Gentle bumps: a few centimetres over metres.
+// Bumps with amplitudes of a few centimetres and wavelengths of some metres.
 double bumps(double x, double y) {
   const auto wave = [](double along, double length_m, double phase) {
     return std::sin(kRadPerM * along / length_m + phase);
@@ -29,7 +29,7 @@ double bumps(double x, double y) {
          0.005 * wave(x - y, 4.7, 0.7);
 }
 
-// The slope grows and ends evenly, so that the height is made of parabolas and a line.
+// The slope changes linearly at both ends, so the height profile consists of parabolas and a line.
 double rampHeight(double y) {
   const auto rise = [](double along_m) {
     const double in_rounding_m = std::clamp(along_m, 0.0, kRounding_m);
@@ -87,7 +87,8 @@ void addTerrain(const GroundRectangle& area, const GroundHeight& height, uint32_
   }
 }
 
-// A wall along the line from `from` to `to`, seen from its right, between two heights that follow the line.
+// Adds a wall along the line from `from` to `to`, visible from its right, between two heights that may vary
+// along the line.
 void addWall(const Eigen::Vector2d& from, const Eigen::Vector2d& to, const GroundHeight& low,
              const GroundHeight& high, double thickness_m, SceneParts* parts) {
   const Eigen::Vector2d edge = to - from;
@@ -137,7 +138,7 @@ void addWalls(SceneParts* parts) {
   addWall({-kInner_m, 0.0}, {kInner_m, 0.0}, lower, upper, kThickness_m, parts);
   for (const double side : {-1.0, 1.0}) {
     const double x = side * kInner_m;
-    // Seen from the lower level beside the ramp, and from the ramp below the upper level.
+    // One wall visible from the lower level beside the ramp, one visible from the ramp below the upper level.
     addWall({x, side > 0.0 ? 0.0 : kRampFoot_m}, {x, side > 0.0 ? kRampFoot_m : 0.0}, lower, outerHeight,
             kThickness_m, parts);
     addWall({x, side > 0.0 ? 0.0 : kRampHead_m}, {x, side > 0.0 ? kRampHead_m : 0.0}, outerHeight, upper,
@@ -148,7 +149,7 @@ void addWalls(SceneParts* parts) {
     parts->addFence({x, 0.1, x, kRampHead_m - 3.0, upperLevel()});
   }
   parts->addFence({-kInner_m, 0.1, kInner_m, 0.1, upperLevel()});
-  // Around the lot, down to the surrounding ground.
+  // Walls around the lot, down to the surrounding ground.
   const GroundRectangle& lot = kLotArea;
   const GroundHeight level = [](double, double) { return -0.1; };
   const std::vector<Eigen::Vector2d> corners = cornersOf(lot);
@@ -164,7 +165,7 @@ void lift(std::vector<Thing>* things) {
   }
 }
 
-// As its four wheels stand.
+// Places the car on the ground with its four wheels.
 void standOnGround(ParkedCar* car) {
   const CarShape& shape = carShapes()[static_cast<size_t>(car->shape)];
   const double c = std::cos(car->yaw_rad);
@@ -183,8 +184,8 @@ void standOnGround(ParkedCar* car) {
 }
 
 LotLayout twoLevelsLayout(const SceneOptions& options) {
-  LotLayout layout = makeLotLayout(static_cast<uint64_t>(options.seed), options.day, options.moved_cars);
-  // Level islands, hedges and fences cannot lie on the ramps, nor may anything stand where walls are.
+  LotLayout layout = makeLotLayout(options.seed, options.day);
+  // Islands, hedges and fences are level, so they cannot stand on the ramps or across the walls.
   const auto is_outside = [](const GroundRectangle& area) {
     return area.max_x < -kInner_m || area.min_x > kInner_m;
   };
@@ -203,7 +204,8 @@ LotLayout twoLevelsLayout(const SceneOptions& options) {
   for (Fence& fence : layout.fences) {
     fence.z += groundHeight(0.0, fence.y0);
   }
-  // Grown for the lot's islands: what stands beside them now stands on the ground itself.
+  // Objects of the lot may stand on raised islands; here their height is set again from the clipped islands
+  // and the uneven ground.
   const auto settle = [&](auto* things) {
     for (auto& thing : *things) {
       thing.z = layout.groundHeight(thing.x, thing.y);
@@ -235,7 +237,7 @@ std::shared_ptr<const Scene> buildTwoLevelsScene(const SceneOptions& options) {
   two_levels.add_ground = addGround;
   two_levels.add_things = addWalls;
   two_levels.ground_height = groundHeight;
-  return buildLotVariant(lotOptionsOf(options), two_levels);
+  return buildLotVariant(options, two_levels);
 }
 
 }  // namespace vcharge

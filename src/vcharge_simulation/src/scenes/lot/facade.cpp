@@ -32,7 +32,7 @@ cv::Mat drawWall(double width_m, double height_m, bool bricks, double tone, uint
                                     (shifted - static_cast<float>(column)) * 0.25F);
         value *= edge < 0.02F ? 1.35F : 0.75F + 0.5F * cellValue(column, row, seed + 3);
       }
-      // Rain streaks below the roof, splashes above the ground.
+      // Rain streaks and splashes above the ground.
       const float streak = std::max(0.0F, valueNoise(u * 3.0F, v * 0.25F, seed + 5));
       value *= 1.0F - 0.25F * streak - 0.3F * std::max(0.0F, 1.0F - v / 0.7F);
       wall.at<uint8_t>(y, x) = cv::saturate_cast<uint8_t>(255.0F * value);
@@ -41,24 +41,24 @@ cv::Mat drawWall(double width_m, double height_m, bool bricks, double tone, uint
   return wall;
 }
 
-void drawWindow(const cv::Rect& place, Random* random, cv::Mat* image) {
+void drawWindow(const cv::Rect& area, Random* random, cv::Mat* image) {
   const int glass = 12 + random->index(40);
-  cv::rectangle(*image, place, cv::Scalar(glass), cv::FILLED);
+  cv::rectangle(*image, area, cv::Scalar(glass), cv::FILLED);
   if (random->chance(0.5)) {
-    const int curtain = place.width / (3 + random->index(3));
-    cv::rectangle(*image, cv::Rect(place.x, place.y, curtain, place.height),
-                  cv::Scalar(100 + random->index(60)), cv::FILLED);
+    const int curtain = area.width / (3 + random->index(3));
+    cv::rectangle(*image, cv::Rect(area.x, area.y, curtain, area.height), cv::Scalar(100 + random->index(60)),
+                  cv::FILLED);
   }
   if (random->chance(0.25)) {
-    cv::rectangle(*image, cv::Rect(place.x, place.y, place.width, place.height / 2),
+    cv::rectangle(*image, cv::Rect(area.x, area.y, area.width, area.height / 2),
                   cv::Scalar(120 + random->index(50)), cv::FILLED);
   }
   const int frame = random->chance(0.7) ? 190 : 40;
-  cv::rectangle(*image, place, cv::Scalar(frame), 2);
-  cv::line(*image, {place.x + place.width / 2, place.y}, {place.x + place.width / 2, place.y + place.height},
+  cv::rectangle(*image, area, cv::Scalar(frame), 2);
+  cv::line(*image, {area.x + area.width / 2, area.y}, {area.x + area.width / 2, area.y + area.height},
            cv::Scalar(frame), 2);
   cv::rectangle(*image,
-                cv::Rect(place.x - 3, place.y + place.height, place.width + 6, 4) &
+                cv::Rect(area.x - 3, area.y + area.height, area.width + 6, 4) &
                     cv::Rect(0, 0, image->cols, image->rows),
                 cv::Scalar(150), cv::FILLED);
 }

@@ -2,14 +2,14 @@
 
 #include "scenes/lane_paths.h"
 #include "scenes/lot/lot_layout.h"
-#include "vcharge_simulation/scenes/lot_scene.h"
+#include "scenes/lot/lot_scene.h"
 
 namespace vcharge {
 
 namespace {
 
-// Outwards from the loop in the middle of the lanes: the drive that maps are built from and those of another
-// day lie 2 m apart, as far as parked cars allow.
+// Offsets outwards from the loop in the middle of the lanes: mapping drives and drives of the other day are 2
+// m apart, as far as parked cars allow.
 const Eigen::Vector2d kMapped_m(-0.3, -1.1);
 const Eigen::Vector2d kOtherDay_m(0.9, 0.9);
 
@@ -88,7 +88,7 @@ DrivePlan planLotDrive(const std::string& name) {
   if (name == "approach") {
     motion.standstill_s = 0.5;
     motion.stop_at_end = true;
-    // Straight at the bushes and trees that border the lot in the west.
+    // Towards the bushes and trees at the western border.
     return {name, DrivePath(RigidTransform::planar(-8.0, 0.0, 3.14159265358979323846), {{15.0, 0.0, 0.0}}),
             motion, 0};
   }

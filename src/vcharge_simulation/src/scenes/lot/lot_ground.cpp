@@ -22,7 +22,7 @@ float ramp(float value, float low, float high) {
   return clampUnit((value - low) / (high - low));
 }
 
-/// A mark on the ground: oil, tar, repaired asphalt.
+/// Oil, tar or a patch of repaired asphalt.
 struct Stain {
   float x, y, half_length, half_width, cosine, sine, strength;
   bool is_patch;
@@ -69,7 +69,7 @@ class GroundPainter {
 
   float albedo(float x, float y, float marking) const {
     float value = 0.0F;
-    // Zone borders wander by a few centimetres.
+    // Zone borders vary by a few centimetres.
     const float wander = 0.04F * valueNoise(x * 2.1F, y * 2.1F, seed_ + 1);
     const Zone zone = zoneAt(x + wander, y - wander);
     switch (zone) {
@@ -88,7 +88,7 @@ class GroundPainter {
       case Zone::kGrass:
         return grass(x, y);
     }
-    // Weather: large slow changes, so that no two places look alike.
+    // Large-scale weathering makes every part of the ground distinct.
     value *= 1.0F + 0.20F * fractalNoise(x * 0.13F, y * 0.13F, 3, 0.6F, seed_ + 2) +
              0.12F * fractalNoise(x * 1.1F, y * 1.1F, 3, 0.7F, seed_ + 3);
     value *= stainFactor(x, y);
@@ -100,7 +100,7 @@ class GroundPainter {
     const float grain = fractalNoise(x * 38.0F, y * 38.0F, 2, 0.9F, seed_ + 10);
     const float mottle = fractalNoise(x * 7.0F, y * 7.0F, 3, 0.7F, seed_ + 11);
     float value = 0.21F * (1.0F + 0.17F * grain + 0.13F * mottle);
-    // Bright and dark stones in the binder.
+    // Bright and dark stones in the asphalt.
     const CellNoise stones = cellNoise(x * 26.0F, y * 26.0F, seed_ + 12);
     const float stone = unitFromBits(mixBits(stones.cell));
     if (stone > 0.86F) {
@@ -125,7 +125,7 @@ class GroundPainter {
     return 1.0F - 0.62F * (1.0F - ramp(distance_m, 0.4F * width_m, 1.6F * width_m));
   }
 
-  // Rows of stones of random length. Stones differ in brightness by `contrast`, and have worn edges.
+  // Rows of stones of random length with worn edges; brightness varies by `contrast`.
   float blocks(float x, float y, float row_m, float length_m, float joint_m, float base,
                float contrast) const {
     const float warp = row_m * 0.16F;
@@ -159,7 +159,7 @@ class GroundPainter {
              0.07F * valueNoise(x * 55.0F, y * 55.0F + offset, seed_ + 40);
     const float lichen = fractalNoise(x * 5.0F, y * 5.0F, 3, 0.7F, seed_ + 37);
     value *= 1.0F + 0.9F * ramp(lichen, 0.75F, 1.3F);
-    // Joints hold dark soil here and bright sand there; edges are rubbed a little brighter.
+    // Joints contain dark soil or bright sand, and edges are slightly brighter.
     const float sand =
         valueNoise(x * 0.6F, y * 0.6F, seed_ + 38) + 0.6F * valueNoise(x * 6.0F, y * 6.0F, seed_ + 41);
     const float joint = base * (0.55F + 0.75F * ramp(sand, 0.1F, 1.0F));
@@ -266,7 +266,7 @@ cv::Mat drawFarGround(double min_m, double size_m, double texel_m, uint64_t seed
 }
 
 cv::Mat drawGroundDetail(int size, uint64_t seed) {
-  // Blue-ish noise: white noise less its own blur, wrapped around the tile's borders.
+  // High-pass noise: white noise minus its blur, periodic at the borders of the tile.
   cv::Mat white(size, size, CV_32FC1);
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {

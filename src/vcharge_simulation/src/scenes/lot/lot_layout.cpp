@@ -23,8 +23,8 @@ void addBays(LotLayout* layout) {
   };
   for (const double side : {-1.0, 1.0}) {
     addRow(side * 5.05, side * kHalfPi, -20.8, 16);                    // along the middle lane
-    addRow(side * std::abs(kFreeBayY_m), -side * kHalfPi, -20.8, 16);  // along the outer lanes, from inside
-    addRow(side * 20.3, side * kHalfPi, -23.4, 18);                    // and from outside
+    addRow(side * std::abs(kFreeBayY_m), -side * kHalfPi, -20.8, 16);  // along the outer lanes, inner side
+    addRow(side * 20.3, side * kHalfPi, -23.4, 18);                    // along the outer lanes, outer side
   }
 }
 
@@ -35,7 +35,7 @@ void addIslands(LotLayout* layout) {
           {min_x, std::min(side * near_y, side * far_y), max_x, std::max(side * near_y, side * far_y)});
     };
     row(7.2, 7.8, -20.8, 20.8);  // between the double rows
-    row(3.0, 12.0, 20.9, 22.9);  // at their ends
+    row(3.0, 12.0, 20.9, 22.9);  // at the ends of the double rows
     row(3.0, 12.0, -22.9, -20.9);
     row(22.7, 29.0, -38.0, 38.0);  // around the lot
   }
@@ -80,7 +80,7 @@ void addPlants(Random* random, LotLayout* layout) {
   }
 }
 
-// Tall trees beyond the lot's fence, which hide much of the houses behind them.
+// Tall trees behind the lot's fence, which hide most of the houses.
 void addWoods(uint64_t seed, LotLayout* layout) {
   Random random(seed * 69U + 5U);
   const auto tree = [&](double x, double y) {
@@ -127,7 +127,7 @@ void addStreetFurniture(Random* random, LotLayout* layout) {
     }
   }
   for (double y = -20.0; y <= 20.0; y += 2.5) {
-    layout->poles.push_back({30.2, y, 0.0, 0.9, 0.06, false});  // bollards before the plaza
+    layout->poles.push_back({30.2, y, 0.0, 0.9, 0.06, false});  // bollards in front of the plaza
   }
   for (const double y : {-12.0, 6.5}) {
     bin(31.4, y, 0.3);
@@ -146,7 +146,7 @@ double LotLayout::groundHeight(double x, double y) const {
   return 0.0;
 }
 
-LotLayout makeLotLayout(uint64_t seed, int day, double moved_cars) {
+LotLayout makeLotLayout(uint64_t seed, int day) {
   LotLayout layout;
   Random random(seed);
   addBays(&layout);
@@ -155,7 +155,7 @@ LotLayout makeLotLayout(uint64_t seed, int day, double moved_cars) {
   addWoods(seed, &layout);
   addHouses(&layout);
   addStreetFurniture(&random, &layout);
-  layout.cars = parkCars(layout.bays, kOccupiedBays, seed, day, moved_cars);
+  layout.cars = parkCars(layout.bays, kOccupiedBays, seed, day);
   return layout;
 }
 

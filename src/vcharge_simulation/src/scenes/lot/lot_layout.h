@@ -10,7 +10,7 @@
 
 namespace vcharge {
 
-/// Where everything stands on the lot. The lanes run along y = -15, 0 and 15 and x = -26 and 26.
+/// Positions of everything on the lot. Lanes run along y = -15, 0 and 15 and along x = -26 and 26.
 struct LotLayout {
   using Bay = ParkingBay;
 
@@ -29,10 +29,10 @@ struct LotLayout {
 };
 
 inline constexpr double kBayLength_m = 4.3;
-/// The bay here, north of the southern lane, is kept free for manoeuvres.
+/// This bay, north of the southern lane, is kept free for manoeuvres.
 inline constexpr double kFreeBayX_m = -9.1;
 inline constexpr double kFreeBayY_m = -9.95;
 
-LotLayout makeLotLayout(uint64_t seed, int day, double moved_cars);
+LotLayout makeLotLayout(uint64_t seed, int day);
 
 }  // namespace vcharge

@@ -1,18 +1,19 @@
-#include "vcharge_simulation/scenes/lot_scene.h"
+#include "scenes/lot/lot_scene.h"
 
 #include <algorithm>
 
 #include "rendering/light_baker.h"
 #include "scenes/lot/lot_ground.h"
 #include "scenes/lot/lot_layout.h"
-#include "scenes/lot/lot_variant.h"
 #include "scenes/scene_parts.h"
-#include "vcharge_core/base/options.h"
 
 namespace vcharge {
 
 namespace {
 
+constexpr double kGroundTexel_m = 0.0125;
+constexpr double kMaxGroundTexel_m = 0.5;
+constexpr double kLightTexel_m = 0.05;  // of the baked shadows
 constexpr double kFarGround_m = 280.0;
 constexpr double kFarTexel_m = 0.2;
 constexpr double kWallLightTexel_m = 0.12;
@@ -33,11 +34,11 @@ LightOptions lightOfDay(int day) {
 // Builds one lot; each step adds to the scene.
 class LotBuilder {
  public:
-  LotBuilder(const LotOptions& options, const LotVariant& variant)
+  LotBuilder(const SceneOptions& options, const LotVariant& variant)
       : options_(options),
         variant_(variant),
         layout_(variant.layout),
-        parts_(options.seed * 77U + 1U, options.foliage_density) {}
+        parts_(options.seed * 77U + 1U, options.detail) {}
 
   std::shared_ptr<const Scene> build() {
     scene().sky = std::make_unique<Sky>(
@@ -64,7 +65,7 @@ class LotBuilder {
     scene().ground_height = variant_.ground_height;
     bakeWallLight(parts_.walls(), kWallLightTexel_m, &scene());
     bakeGroundLight(
-        {-44.0, -34.0}, {44.0, 34.0}, options_.light_texel_m,
+        {-44.0, -34.0}, {44.0, 34.0}, kLightTexel_m / options_.detail,
         [&](double x, double y) {
           return layout_.groundHeight(x, y) + (variant_.ground_height ? variant_.ground_height(x, y) : 0.0);
         },
@@ -82,6 +83,7 @@ class LotBuilder {
   }
 
   void addGround() {
+    const double texel_m = std::min(kMaxGroundTexel_m, kGroundTexel_m / options_.image_scale);
     Material ground;
     ground.kind = SurfaceKind::kGround;
     ground.mapping = Material::Mapping::kGround;
@@ -90,9 +92,9 @@ class LotBuilder {
     ground.texture = 1;
     const uint32_t far_ground = scene().addMaterial(ground);
     scene().ground.layers.push_back(
-        {Texture(drawLotGround(layout_, options_.ground_texel_m, options_.seed), Texture::Border::kClamp),
+        {Texture(drawLotGround(layout_, texel_m, options_.seed), Texture::Border::kClamp),
          static_cast<float>(kLotArea.min_x), static_cast<float>(kLotArea.min_y),
-         static_cast<float>(1.0 / options_.ground_texel_m)});
+         static_cast<float>(1.0 / texel_m)});
     scene().ground.layers.push_back(
         {Texture(drawFarGround(-0.5 * kFarGround_m, kFarGround_m, kFarTexel_m, options_.seed),
                  Texture::Border::kClamp),
@@ -118,7 +120,7 @@ class LotBuilder {
     }
   }
 
-  const LotOptions options_;
+  const SceneOptions options_;
   const LotVariant& variant_;
   const LotLayout& layout_;
   SceneParts parts_;
@@ -126,37 +128,14 @@ class LotBuilder {
 
 }  // namespace
 
-void LotOptions::validate() const {
-  requireField(moved_cars >= 0.0 && moved_cars <= 1.0, "moved_cars", "must be in [0, 1]", moved_cars);
-  requireField(ground_texel_m >= 0.005 && ground_texel_m <= 0.5, "ground_texel_m", "must be in [0.005, 0.5]",
-               ground_texel_m);
-  requireField(light_texel_m >= 0.02 && light_texel_m <= 0.5, "light_texel_m", "must be in [0.02, 0.5]",
-               light_texel_m);
-  requireField(foliage_density >= 0.0 && foliage_density <= 5.0, "foliage_density", "must be in [0, 5]",
-               foliage_density);
-}
-
-std::shared_ptr<const Scene> buildLotVariant(const LotOptions& options, const LotVariant& variant) {
-  options.validate();
+std::shared_ptr<const Scene> buildLotVariant(const SceneOptions& options, const LotVariant& variant) {
   return LotBuilder(options, variant).build();
 }
 
-std::shared_ptr<const Scene> buildLotScene(const LotOptions& options) {
-  options.validate();
+std::shared_ptr<const Scene> buildLotScene(const SceneOptions& options) {
   LotVariant lot;
-  lot.layout = makeLotLayout(options.seed, options.day, options.moved_cars);
+  lot.layout = makeLotLayout(options.seed, options.day);
   return buildLotVariant(options, lot);
-}
-
-LotOptions lotOptionsOf(const SceneOptions& options) {
-  LotOptions lot;
-  lot.seed = static_cast<uint64_t>(options.seed);
-  lot.day = options.day;
-  lot.moved_cars = options.moved_cars;
-  lot.ground_texel_m = std::min(0.5, lot.ground_texel_m / options.image_scale);
-  lot.light_texel_m /= options.detail;
-  lot.foliage_density *= options.detail;
-  return lot;
 }
 
 }  // namespace vcharge

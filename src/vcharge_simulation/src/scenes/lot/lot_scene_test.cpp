@@ -1,4 +1,4 @@
-#include "vcharge_simulation/scenes/lot_scene.h"
+#include "scenes/lot/lot_scene.h"
 
 #include <algorithm>
 #include <cmath>
@@ -16,12 +16,11 @@ namespace {
 
 constexpr double kCell_m = 0.1;
 
-LotOptions coarseLot(int day) {
-  LotOptions options;
+SceneOptions coarseLot(int day) {
+  SceneOptions options;
   options.day = day;
-  options.ground_texel_m = 0.2;
-  options.light_texel_m = 0.4;
-  options.foliage_density = 0.1;
+  options.image_scale = 0.0625;
+  options.detail = 0.1;
   return options;
 }
 
@@ -66,13 +65,13 @@ TEST(LotSceneTest, HeightMapHoldsEveryObstacleAtItsHeight) {
     }
     const float height_m = heightAt(middle.x(), middle.y());
     if (obstacle.kind == "car") {
-      // The roof over the middle of the cabin, or the bonnet.
+      // The roof above the middle of the cabin, or the bonnet.
       EXPECT_GT(height_m, 0.5 * obstacle.top_z_m);
       EXPECT_LT(height_m, obstacle.top_z_m + 0.02);
     } else if (obstacle.kind == "bin" || obstacle.kind == "hedge") {
       EXPECT_NEAR(height_m, obstacle.top_z_m, 0.25) << obstacle.kind;
     } else if (obstacle.kind == "kerb") {
-      // Its middle may carry a hedge.
+      // A hedge may stand in the middle of an island.
       EXPECT_GE(height_m, obstacle.top_z_m - 1e-4);
     }
     ++seen[obstacle.kind];
@@ -84,7 +83,7 @@ TEST(LotSceneTest, HeightMapHoldsEveryObstacleAtItsHeight) {
 
 TEST(LotSceneTest, WhatStandsOutOfTheGroundBelongsToAnObstacle) {
   const TruthHeightMap& map = heightMap();
-  // Footprints drawn on the grid, grown by a cell and by the reach of leaves and mirrors.
+  // Footprints on the grid, dilated by the reach of leaves and mirrors.
   cv::Mat covered = cv::Mat::zeros(map.height_m.size(), CV_8UC1);
   for (const Obstacle& obstacle : lot().scene().obstacles) {
     std::vector<cv::Point> polygon;
@@ -100,7 +99,7 @@ TEST(LotSceneTest, WhatStandsOutOfTheGroundBelongsToAnObstacle) {
   for (int row = 0; row < map.height_m.rows; ++row) {
     for (int column = 0; column < map.height_m.cols; ++column) {
       const float height_m = map.height_m.at<float>(row, column);
-      // Low branches of trees reach beyond the trunks that are their footprints.
+      // Low branches extend beyond the trunk that is the tree's footprint.
       if (height_m > 0.3F && height_m < 1.4F) {
         ++standing;
         unexplained += covered.at<uint8_t>(row, column) == 0 ? 1 : 0;
@@ -112,7 +111,7 @@ TEST(LotSceneTest, WhatStandsOutOfTheGroundBelongsToAnObstacle) {
 }
 
 TEST(LotSceneTest, OnAnotherDaySomeCarsHaveMovedAndAllElseStands) {
-  const auto places = [](const Scene& scene, const std::string& kind) {
+  const auto positions = [](const Scene& scene, const std::string& kind) {
     std::set<std::pair<int, int>> result;
     for (const Obstacle& obstacle : scene.obstacles) {
       if (obstacle.kind == kind) {
@@ -125,17 +124,17 @@ TEST(LotSceneTest, OnAnotherDaySomeCarsHaveMovedAndAllElseStands) {
   };
   const std::shared_ptr<const Scene> other_day = buildLotScene(coarseLot(1));
   for (const char* kind : {"tree", "bush", "hedge", "kerb", "pole", "building", "fence", "bin"}) {
-    EXPECT_EQ(places(lot().scene(), kind), places(*other_day, kind)) << kind;
+    EXPECT_EQ(positions(lot().scene(), kind), positions(*other_day, kind)) << kind;
   }
-  const auto before = places(lot().scene(), "car");
-  const auto after = places(*other_day, "car");
+  const auto before = positions(lot().scene(), "car");
+  const auto after = positions(*other_day, "car");
   int kept = 0;
-  for (const auto& place : before) {
-    kept += static_cast<int>(after.count(place));
+  for (const auto& position : before) {
+    kept += static_cast<int>(after.count(position));
   }
-  const double share = static_cast<double>(kept) / static_cast<double>(before.size());
-  EXPECT_GT(share, 0.55);  // 30 % of the bays are drawn anew, binomially
-  EXPECT_LT(share, 0.85);
+  const double fraction = static_cast<double>(kept) / static_cast<double>(before.size());
+  EXPECT_GT(fraction, 0.55);  // 30 % of the bays are redrawn at random
+  EXPECT_LT(fraction, 0.85);
   EXPECT_GT((lot().scene().sky->directionToSun() - other_day->sky->directionToSun()).norm(), 0.3F);
 }
 

@@ -13,7 +13,7 @@ MarkingPainter::MarkingPainter(const GroundRectangle& area, double texel_m)
                             static_cast<int>(std::lround(area.width() / texel_m)), CV_8UC1)) {}
 
 cv::Point MarkingPainter::at(double x, double y) const {
-  // Three fractional bits keep line ends off the texel grid.
+  // Three fractional bits allow line ends between texels.
   return {static_cast<int>(std::lround((x - area_.min_x) / texel_m_ * 8.0)),
           static_cast<int>(std::lround((y - area_.min_y) / texel_m_ * 8.0))};
 }
@@ -64,8 +64,7 @@ void MarkingPainter::text(const std::string& text, double x, double y, double ya
   const double scale = height_m / size.height / texel_m_;
   const double c = std::cos(yaw_rad) * scale;
   const double s = std::sin(yaw_rad) * scale;
-  // Image x runs to the right of the reading direction, image y against it; rows of the ground count up
-  // with y.
+  // Image x runs to the right of the reading direction, image y against it; rows of the ground grow with y.
   const double cx = (x - area_.min_x) / texel_m_;
   const double cy = (y - area_.min_y) / texel_m_;
   const double gx = 0.5 * glyphs.cols;

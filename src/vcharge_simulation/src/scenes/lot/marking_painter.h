@@ -10,7 +10,7 @@
 
 namespace vcharge {
 
-/// Paints road markings in metres, antialiased, on an image (CV_8UC1, 255 is paint) whose row 0 is at the
+/// Paints antialiased road markings, in metres, on an image (CV_8UC1, 255 is paint) whose row 0 is at the
 /// area's min_y and column 0 at its min_x.
 class MarkingPainter {
  public:
@@ -20,7 +20,7 @@ class MarkingPainter {
   void line(double x0, double y0, double x1, double y1, double width);
   void dashed(double x0, double y0, double x1, double y1, double width, double dash, double gap);
   void arrow(double x, double y, double yaw_rad);
-  /// Text of the given height that reads from the side that `yaw_rad` points away from.
+  /// Text of the given height whose upward direction is along `yaw_rad`.
   void text(const std::string& text, double x, double y, double yaw_rad, double height_m);
   void manhole(double x, double y, double radius);
   const cv::Mat& image() const { return image_; }

@@ -10,6 +10,7 @@ namespace vcharge {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
+constexpr double kMovedCars = 0.3;  // fraction of the bays that another day redraws
 
 ParkedCar parkedCar(const ParkingBay& bay, Random* random) {
   ParkedCar car{};
@@ -19,7 +20,7 @@ ParkedCar parkedCar(const ParkingBay& bay, Random* random) {
   car.yaw_rad = bay.yaw_rad + random->normal() * 0.02;
   car.yaw_rad += random->chance(0.5) ? kPi : 0.0;
   const CarShape& shape = carShapes()[static_cast<size_t>(car.shape)];
-  // The bay's centre is the car's centre, not its rear axle.
+  // The centre of the car, not its rear axle, is at the centre of the bay.
   const double middle = 0.5 * (shape.front() + shape.rear());
   const double along = random->normal() * 0.12;
   const double across = random->normal() * 0.1;
@@ -32,17 +33,17 @@ ParkedCar parkedCar(const ParkingBay& bay, Random* random) {
 
 }  // namespace
 
-std::vector<ParkedCar> parkCars(const std::vector<ParkingBay>& bays, double occupied_share, uint64_t seed,
-                                int day, double moved_cars) {
+std::vector<ParkedCar> parkCars(const std::vector<ParkingBay>& bays, double occupied_fraction, uint64_t seed,
+                                int day) {
   std::vector<ParkedCar> cars;
   for (const ParkingBay& bay : bays) {
     const uint64_t bay_seed = seed * 1000003U + static_cast<uint64_t>(bay.number);
     Random random(bay_seed);
-    bool occupied = random.chance(occupied_share);
+    bool occupied = random.chance(occupied_fraction);
     if (day != 0) {
       Random other_day(bay_seed * 31U + static_cast<uint64_t>(day));
-      if (other_day.chance(moved_cars)) {
-        occupied = other_day.chance(occupied_share);
+      if (other_day.chance(kMovedCars)) {
+        occupied = other_day.chance(occupied_fraction);
         random = other_day;
       }
     }

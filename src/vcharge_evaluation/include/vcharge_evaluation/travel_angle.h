@@ -1,0 +1,9 @@
+#pragma once
+
+namespace vcharge {
+
+/// Rays closer than 20 degrees to the direction of travel, or its opposite, are judged apart or not at all:
+/// motion stereo has little parallax there.
+constexpr double kMinAngleFromTravel_rad = 0.3490658503988659;
+
+}  // namespace vcharge

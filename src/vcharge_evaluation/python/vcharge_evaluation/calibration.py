@@ -1,0 +1,216 @@
+"""Extrinsic calibration: accuracy by rig and by noise, consistency of its covariances, time, the influence of wheel
+errors, calibration in a map, verdicts on spoiled drives, and the published images."""
+import argparse
+import math
+
+import numpy as np
+import yaml
+
+from vcharge_evaluation import spoiled_drives
+from vcharge_evaluation.poses import rotations
+from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
+from vcharge_evaluation.tools import CONFIG, import_published_images, judge_rig, run_tool, say, simulate
+
+MAX_ROTATION_DEG, MAX_TRANSLATION_M = 0.05, 0.01
+AXES = ("forwards", "sideways", "height", "roll", "pitch", "yaw")
+SCENARIO = CONFIG / "scenarios" / "calibration_figure_eight.yaml"
+USUAL_WHEELS = ("--set", "odometer.scale_error=0.0005", "--set", "odometer.left_right_error=0.0002")
+OPTIONS = {"calibrate_rig": "calibration.yaml", "calibrate_rig_from_map": "calibration_in_map.yaml"}
+PARTS = ("rigs", "seeds", "wheels", "map", "faults", "real")
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__)
+    add_arguments(parser, "calibration_evaluation")
+    parser.add_argument("--parts", nargs="*", default=list(PARTS), choices=PARTS)
+    parser.add_argument("--rigs", nargs="*", default=["lot:11", "lot:12", "garage:13", "garage:14"],
+                        help="scene:rig-seed of each random rig; the scene's seed is --scene-seed")
+    parser.add_argument("--scene-seed", type=int, default=71)
+    parser.add_argument("--image-scale", type=float, default=1.0, help="image size of the rigs' drives over 1280x800")
+    parser.add_argument("--image-step", type=int, default=2,
+                        help="use every n-th of 12.5 images a second: 2 gives 500 frames in 80 s")
+    parser.add_argument("--duration-s", type=float, default=80.0)
+    parser.add_argument("--seeds", type=int, default=10, help="number of noise seeds, on one drive of half-size images")
+    return parser.parse_args()
+
+
+class Drive:
+    """A drive that was rendered without noise; read() adds noise and faults to it."""
+
+    def __init__(self, args, rig, image_scale):
+        self.scene, rig_seed = rig.split(":")
+        self.folder = args.work / f"{self.scene}_rig{rig_seed}_scale{image_scale:g}"
+        self.words = ["--scenario", SCENARIO, "--scene", self.scene, "--scene-seed", args.scene_seed, "--rig", "random",
+                      "--rig-seed", rig_seed, "--seed", 1000 + int(rig_seed), "--image-scale", image_scale,
+                      "--image-step", args.image_step, "--duration-s", args.duration_s]
+        simulate(self.folder, [*self.words, "--noise", "off"])
+
+    def read(self, name, *words):
+        folder = self.folder / name
+        simulate(folder, [*self.words, "--images-from", self.folder / "drive.bag", *words])
+        return folder
+
+
+class Calibration:
+    """A rig that a tool calibrated, with its errors where it wrote one."""
+
+    def __init__(self, folder, rig, *words, tool="calibrate_rig", name="rig"):
+        self.output = folder / f"{name}.yaml"
+        self.output.unlink(missing_ok=True)
+        say(f"{folder}: {tool} {name}")
+        self.run = run_tool(tool, folder / f"{name}.log", "--bag", folder / "drive.bag", "--rig", rig, "--output",
+                            self.output, "--options", CONFIG / OPTIONS[tool], *words, may_fail=True)
+        self.verdict = self.run.found.get("verdict", "none")
+        self.remarks = self.run.found.get("remarks") or [self.run.error() or ""]
+        self.stage_s = self.run.found.get("stage_s", {})
+        self.has_rig = self.output.exists()
+        self.errors = judge_rig(self.output, folder / "rig_truth.yaml", folder / f"{name}_errors.json") if (
+            self.has_rig) else None
+
+    def sizes(self, kind="as_is"):
+        """Translation (m) and rotation error (degrees) of each camera."""
+        return [(float(np.linalg.norm(camera["error_m"])), math.degrees(np.linalg.norm(camera["error_rad"])))
+                for camera in self.errors[kind]] if self.errors else []
+
+    def figures(self):
+        yield Figure("verdict", self.verdict)
+        if self.errors is None:
+            yield Figure("reason", "; ".join(self.remarks[:1]))
+            return
+        yield Figure("largest translation error", 100 * max(shift for shift, _ in self.sizes()), "cm")
+        yield Figure("largest rotation error", max(turn for _, turn in self.sizes()), "degrees")
+        yield Figure("largest translation error without the common scale",
+                     100 * max(shift for shift, _ in self.sizes("without_scale")), "cm")
+        yield Figure("error of the common scale", 100 * (self.errors["scale"] - 1), "%")
+        yield Figure("wall time", self.run.wall_s, "s")
+        yield Figure("processor time", self.run.cpu_s, "s")
+
+
+def judged(calibrations):
+    """The goals, over all cameras of all calibrations. Four cameras count as missed where there is no rig."""
+    sizes = [size for one in calibrations for size in one.sizes()]
+    missing = 4 * sum(one.errors is None for one in calibrations)
+    good = sum(shift <= MAX_TRANSLATION_M and turn <= MAX_ROTATION_DEG for shift, turn in sizes)
+    far = sum(shift > 2 * MAX_TRANSLATION_M or turn > 2 * MAX_ROTATION_DEG for shift, turn in sizes)
+    yield figure("cameras within 0.05 degrees and 1 cm", percent(good, len(sizes) + missing), "%", at_least=95)
+    yield figure("cameras beyond twice that, or without result", far + missing, equal=0)
+    rows = [camera["normalized"] for one in calibrations if one.errors for camera in one.errors["without_scale"]]
+    squares = np.mean(np.square(rows), axis=0) if rows else [None] * len(AXES)
+    for axis, square in zip(AXES, squares):
+        yield figure(f"mean normalized squared error, {axis}", None if square is None else float(square), at_least=0.3,
+                     at_most=2.5)
+
+
+def evaluate_rigs(args, results):
+    calibrations = {}
+    for rig in args.rigs:
+        folder = Drive(args, rig, args.image_scale).read("right_wheels", *USUAL_WHEELS)
+        calibrations[rig] = Calibration(folder, folder / "rig_truth.yaml", "--report", folder / "report", "--map",
+                                        folder / "lot.vmap")
+    size = f"image scale {args.image_scale:g}"
+    results.add(f"Random rigs (scene:rig), {size}", *((rig, one.figures()) for rig, one in calibrations.items()))
+    results.add("Wall time by stage", *((rig, [Figure(stage, seconds, "s") for stage, seconds in one.stage_s.items()])
+                                        for rig, one in calibrations.items()))
+    results.add(f"Random rigs, goals, {size}", (" ".join(args.rigs), judged(calibrations.values())))
+
+
+def evaluate_seeds(args, results):
+    drive = Drive(args, args.rigs[0], 0.5)
+    calibrations = []
+    for seed in range(1, args.seeds + 1):
+        folder = drive.read(f"seed{seed}", *USUAL_WHEELS, "--sensor-seed", seed)
+        calibrations.append(Calibration(folder, folder / "rig_truth.yaml"))
+        (folder / "drive.bag").unlink()
+        (folder / "simulated.txt").unlink()
+    results.add("Noise seeds, goals, half-size images", (f"{args.rigs[0]}, {args.seeds} seeds", judged(calibrations)))
+
+
+def evaluate_wheels(args, results):
+    drive = Drive(args, args.rigs[0], 0.5)
+    columns = []
+    for scale_error in (0.0, 0.003, -0.003):
+        folder = drive.read(f"wheels{scale_error:g}", "--set", f"odometer.scale_error={scale_error}", "--set",
+                            "odometer.left_right_error=0.0002")
+        columns.append((f"wheels {100 * scale_error:+.1f} %", Calibration(folder, folder / "rig_truth.yaml").figures()))
+    results.add("Common error of the wheels, half-size images", *columns)
+
+
+def evaluate_map(args, results):
+    """Calibrates the second rig in the map of the first, whose odometer counts 0.2 % more."""
+    first, second = args.rigs[:2]
+    mapped = Drive(args, first, args.image_scale).read(
+        "map_wheels", "--set", "odometer.scale_error=0.002", "--set", "odometer.left_right_error=0.0002")
+    built = Calibration(mapped, mapped / "rig_truth.yaml", "--map", mapped / "lot.vmap")
+    folder = Drive(args, second, args.image_scale).read("right_wheels", *USUAL_WHEELS)
+    result = Calibration(folder, folder / "rig_truth.yaml", "--map", mapped / "lot.vmap", "--report",
+                         folder / "map_report", tool="calibrate_rig_from_map", name="rig_from_map")
+    results.add("In a map of another rig with another odometer scale", (f"{first}, builds the map", built.figures()),
+                (f"{second}, in this map", result.figures()))
+    results.add("In a map, goals", (second, [
+        *judged([result]), figure("wall time over the drive's", result.run.wall_s / args.duration_s, at_most=1.0)]))
+
+
+def evaluate_faults(args, results):
+    drive = Drive(args, args.rigs[0], 0.5)
+
+    def verdict(name, goals, one):
+        right = one.verdict in goals and one.has_rig == (one.verdict != "FAIL")
+        return Figure(name, f"{one.verdict}: {'; '.join(one.remarks[:2])}", "", " or ".join(goals), right)
+
+    figures = []
+    for name, changes, goals in (
+            ("20 % of the images dropped", ["dropped_images.cameras=[all]", "dropped_images.probability=0.2"], ["PASS"]),
+            ("odometer 100 ms late", ["odometry_stamp_shift.shift_s=0.1"], ["WARN", "FAIL"]),
+            ("left camera covered", ["dead_camera.cameras=[left]", "dead_camera.black_images=true"], ["FAIL"])):
+        words = [word for change in changes for word in ("--set", f"faults.{change}")]
+        folder = drive.read(changes[0].split(".")[0], *USUAL_WHEELS, *words)
+        figures.append(verdict(name, goals, Calibration(folder, folder / "rig_truth.yaml")))
+    sound = drive.read("right", *USUAL_WHEELS)
+    truth = sound / "rig_truth.yaml"
+    figures.append(verdict("no fault", ["PASS", "WARN"], Calibration(sound, truth)))
+    spoiled_drives.write_wrong_focal(truth, sound / "wrong_focal.yaml")
+    figures.append(verdict("left focal length 5 % too long", ["FAIL"],
+                           Calibration(sound, sound / "wrong_focal.yaml", name="rig_wrong_focal")))
+    for field in ("turn", "distance"):
+        folder = sound / f"negative_{field}"
+        folder.mkdir(exist_ok=True)
+        spoiled_drives.write_negative_odometry(sound / "drive.bag", folder / "drive.bag", field)
+        figures.append(verdict(f"odometer's {field} with the wrong sign", ["FAIL"], Calibration(folder, truth)))
+        (folder / "drive.bag").unlink()
+    for name in ("straight", "standing"):
+        folder = args.work / name
+        simulate(folder, ["--drive", name, "--image-scale", 0.5, "--image-step", args.image_step, "--duration-s", 12])
+        figures.append(verdict(f"{name} only", ["FAIL"], Calibration(folder, folder / "rig_truth.yaml")))
+    results.add("Spoiled drives, half-size images", (args.rigs[0], figures))
+
+
+def evaluate_real(args, results):
+    """The published images: too short and straight for a rig, but the direction of travel can be compared."""
+    folder = args.work / "real"
+    if not import_published_images(folder):
+        return
+    given = folder / "rig.yaml"
+    one = Calibration(folder, given, name="calibrated")
+    camera = next(iter(yaml.safe_load(given.read_text())["cameras"].values()))
+    camera_from_vehicle = rotations([camera["vehicle_from_camera"]["rotation_xyzw"]])[0].T
+    found = next(iter(one.run.found.get("cameras", [])), {})
+    figures = [figure("verdict", one.verdict, equal="FAIL")]
+    for name, axis, key, limit in (("direction of travel", 0, "travel_in_camera", 0.5),
+                                   ("ground's normal", 2, "up_in_camera", 1.0)):
+        seen, wanted = np.array(found.get(key) or [0, 0, 0], float), camera_from_vehicle[:, axis]
+        angle = math.degrees(math.atan2(np.linalg.norm(np.cross(seen, wanted)), seen @ wanted)) if seen.any() else None
+        figures.append(figure(f"{name} against the published calibration", angle, "degrees", at_most=limit))
+    results.add("Published images", ("one camera", figures))
+
+
+def main():
+    args = arguments()
+    args.work.mkdir(parents=True, exist_ok=True)
+    results = Results("calibration", "Extrinsic calibration", args)
+    for part in args.parts:
+        globals()[f"evaluate_{part}"](args, results)
+    results.end()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,127 @@
+"""The simulator's fault drives through check_bag, localization and obstacle detection: what each reports and when, and
+that no wrong pose is reported as localized and no cell inside an obstacle as free."""
+import argparse
+import collections
+import csv
+
+from vcharge_evaluation import tools
+from vcharge_evaluation.localization_errors import LocalizationErrors, Map
+from vcharge_evaluation.results import Figure, Results, add_arguments, figure
+from vcharge_evaluation.tools import CONFIG, judge, run_tool, say, simulate
+
+SCENARIOS = CONFIG / "scenarios"
+# The fault changes the light or the camera's pose: these drives cannot reuse the images of the sound drive.
+RENDERED = ("motion_blur", "sun_glare", "bumped_camera", "soft_suspension")
+MAX_LISTED_STATES = 5
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__)
+    add_arguments(parser, "fault_evaluation")
+    parser.add_argument("--faults", nargs="*", default=sorted(path.stem[len("fault_"):] for path in
+                                                              SCENARIOS.glob("fault_*.yaml")))
+    parser.add_argument("--seed", type=int, default=120, help="seed of the scene; its drives have the next two")
+    return parser.parse_args()
+
+
+class Scene:
+    """A part of the lot with its map, and a drive through it with faults."""
+
+    def __init__(self, args):
+        self.args = args
+        self.common = ["--scene-seed", args.seed, "--image-scale", 0.5]
+        self.sound_words = ["--scene", "lot", "--drive", "short", *self.common]
+        mapping = args.work / "mapping"
+        simulate(mapping, [*self.sound_words, "--seed", args.seed + 1])
+        self.map = mapping / "lot.vmap"
+        if not self.map.exists():
+            tools.build_map(mapping, "lot")
+        self.mapped = Map(self.map, mapping / "drive_truth" / "trajectory.tum")
+        self.sound = args.work / "sound_rendered"
+        simulate(self.sound, [*self.sound_words, "--seed", args.seed + 2, "--truth-range", "--noise", "off"])
+
+    def drive(self, fault):
+        """Folder of the drive with a fault ("none": without), and folder of its truth."""
+        folder, seed = self.args.work / fault, ["--seed", self.args.seed + 2]
+        reused = ["--images-from", self.sound / "drive.bag"]
+        if fault == "none":
+            simulate(folder, [*self.sound_words, *seed, *reused])
+            return folder, self.sound / "drive_truth"
+        words = ["--scenario", SCENARIOS / f"fault_{fault}.yaml", *seed, *self.common]
+        if fault in RENDERED:
+            simulate(folder, [*words, "--truth-range"])
+            return folder, folder / "drive_truth"
+        simulate(folder, [*words, *reused])
+        return folder, self.sound / "drive_truth"
+
+
+def check(folder):
+    """check_bag's verdict, with the subjects that do not pass."""
+    found = run_tool("check_bag", folder / "check.log", "--bag", folder / "drive.bag", "--rig", folder / "rig_truth.yaml",
+                     may_fail=True).found
+    subjects = [finding["subject"] for finding in found.get("findings", []) if finding["grade"] != "PASS"]
+    return found.get("verdict", found.get("error")) + (f": {'; '.join(subjects)}" if subjects else "")
+
+
+def localize(folder, scene):
+    """Figures of localization, and how many poses were wrong."""
+    result = run_tool("localize_drive", folder / "localize.log", "--bag", folder / "drive.bag", "--rig",
+                      folder / "rig_truth.yaml", "--map", scene.map, "--options", CONFIG / "localization.yaml", "--output",
+                      folder / "poses.tum", may_fail=True)
+    if result.error():
+        return [Figure("localization reports", result.error())]
+    errors = LocalizationErrors(folder / "poses.tum.csv", folder / "drive_truth" / "trajectory.tum", scene.mapped)
+    good = errors.localized()
+    states, last = [], None
+    for time_s, status in zip(errors.time_s, errors.status):
+        if status != last:
+            states.append(f"{status} from {time_s - errors.time_s[0]:.1f} s")
+            last = status
+    if len(states) > MAX_LISTED_STATES:
+        states = [f"{len(states)} changes of state"]
+    warnings = [f"{one['num_frames']} frames: {one['text']}" for one in result.found["warnings"]]
+    median = float(sorted(errors.error_m[good])[good.sum() // 2]) if good.any() else None
+    return [Figure("frames localized", 100 * errors.ratio(), "%"),
+            Figure("position error, median", None if median is None else 100 * median, "cm"),
+            figure("wrong poses reported as localized", errors.num_false(), equal=0),
+            Figure("localization reports", "; ".join([*states, *warnings]))]
+
+
+def obstacles(folder, truth):
+    output = folder / "obstacles"
+    result = run_tool("detect_obstacles", folder / "obstacles.log", "--bag", folder / "drive.bag", "--rig",
+                      folder / "rig_truth.yaml", "--options", CONFIG / "obstacles.yaml", "--range-options",
+                      CONFIG / "dense_obstacles.yaml", "--output", output, may_fail=True)
+    if result.error():
+        return [Figure("obstacle detection reports", result.error())]
+    with open(output / "status.csv", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    start_ns, seen = int(rows[0]["stamp_ns"]), collections.OrderedDict()
+    for row in rows:
+        for state in (row["state"], f"ground {row['ground_state']}"):
+            if state not in ("mapping", "ground measured"):
+                seen.setdefault((row["camera"], state), (int(row["stamp_ns"]) - start_ns) * 1e-9)
+    reports = [f"{camera} {state} at {time_s:.1f} s" for (camera, state), time_s in seen.items()]
+    if result.found["num_odometry_jumps"]:
+        reports.append(f"{result.found['num_odometry_jumps']} odometry jumps")
+    judged = judge("obstacles", folder / "obstacle_report", "--obstacles", output, "--truth", truth)["map"]
+    return [figure("cells inside obstacles that were free", judged["free_inside"], equal=0),
+            Figure("cells inside obstacles that were observed", judged["observed_inside"]),
+            Figure("obstacle detection reports", "; ".join(reports) or "-")]
+
+
+def main():
+    args = arguments()
+    args.work.mkdir(parents=True, exist_ok=True)
+    results = Results("faults", "Faults", args)
+    scene = Scene(args)
+    for fault in ["none", *args.faults]:
+        say(fault)
+        folder, truth = scene.drive(fault)
+        results.add("Faults through the online path",
+                    (fault, [Figure("check_bag", check(folder)), *localize(folder, scene), *obstacles(folder, truth)]))
+    results.end()
+
+
+if __name__ == "__main__":
+    main()

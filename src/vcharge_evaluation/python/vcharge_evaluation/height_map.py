@@ -1,0 +1,96 @@
+"""Height maps: heights, kerbs, steps, tape-measure distances, drivable cells, time and memory."""
+import argparse
+import pathlib
+
+from vcharge_evaluation import tools
+from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
+from vcharge_evaluation.tools import CONFIG, judge, run_tool, say, simulate
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__)
+    add_arguments(parser, "height_map_evaluation")
+    parser.add_argument("--scenes", nargs="*", default=["lot", "garage"])
+    parser.add_argument("--drive", default="loop")
+    parser.add_argument("--seed", type=int, default=101,
+                        help="seed of scene and drive; those below 100 serve to choose options")
+    parser.add_argument("--duration-s", type=float, default=25.0)
+    parser.add_argument("--image-scale", type=float, default=1.0, help="image size over 1280x800")
+    parser.add_argument("--image-step", type=int, default=1)
+    parser.add_argument("--options", type=pathlib.Path, default=CONFIG / "height_map.yaml")
+    parser.add_argument("--true-poses", action="store_true", help="use the truth's poses in place of build_map's")
+    return parser.parse_args()
+
+
+def evaluate(args, scene):
+    """Errors of a scene's height map, and the run that made it."""
+    folder = args.work / f"{scene}_seed{args.seed}_scale{args.image_scale:g}_{args.duration_s:g}s"
+    simulate(folder, ["--scene", scene, "--drive", args.drive, "--seed", args.seed, "--image-scale", args.image_scale,
+                      "--image-step", args.image_step, "--duration-s", args.duration_s, "--height-cell-m", 0.025])
+    bag, rig, truth = folder / "drive.bag", folder / "rig_truth.yaml", folder / "drive_truth"
+    trajectory = truth / "trajectory.tum"
+    if not args.true_poses:
+        tools.build_map(folder, "lot")
+        trajectory = folder / "lot.tum"
+    say(f"{folder}: height map")
+    made = run_tool("build_height_map", folder / "height_map.log", "--bag", bag, "--rig", rig, "--trajectory", trajectory,
+                    "--options", args.options, "--output", folder / "height_map")
+    errors = judge("height_map", folder / "report", "--map", folder / "height_map", "--truth", truth, "--rig", rig,
+                   "--trajectory", trajectory)
+    return errors, made
+
+
+def kerb_figures(errors):
+    """None where the scene has no kerbs."""
+    if not errors["num_kerbs_seen"]:
+        return
+    mean_m = errors["kerb_height_m"]["mean"] if errors["num_kerbs"] else None
+    yield figure("kerbs: mean error of the height", None if mean_m is None else 100 * mean_m, "cm", at_most=3)
+    yield Figure("kerbs in the map", percent(errors["num_kerbs"], errors["num_kerbs_seen"]), "%")
+    for reach_m in (3, 5):
+        near = [abs(kerb["error_m"]) for kerb in errors["kerbs"] if kerb["nearest_view_m"] <= reach_m]
+        if near:
+            yield Figure(f"kerbs seen from {reach_m} m or nearer: mean error", 100 * sum(near) / len(near), "cm")
+
+
+def drivability_figures(errors):
+    yield Figure("faces over 30 cm seen from in front that are obstacles",
+                 percent(errors["num_faces_blocked"], errors["num_faces"]), "%")
+    yield Figure("open ground that is drivable", percent(errors["num_open_drivable"], errors["num_open_ground"]), "%")
+    yield Figure("drivable cells inside things over 30 cm", percent(errors["num_drivable_inside"], errors["num_drivable"]),
+                 "%")
+
+
+def figures(errors, made):
+    shown = len(errors["measurements"]) - errors["num_measurements_missing"]
+    return [
+        figure("mean height error of cells seen in 3 frames, apart from steps", 100 * errors["height_m"]["mean"], "cm",
+               at_most=4),
+        figure("cells within 10 cm", 100 * errors["share_within_10_cm"], "%", at_least=95),
+        Figure("cells mapped", percent(errors["num_mapped"], errors["num_seen"]), "%"),
+        *kerb_figures(errors),
+        figure("steps: mean horizontal error", 100 * errors["step_position_m"]["mean"], "cm", at_most=5),
+        figure("tape measures: mean error", 100 * errors["mean_measurement_m"], "cm", at_most=5),
+        Figure("tape measures: largest error", 100 * errors["max_measurement_m"], "cm"),
+        figure(f"tape measures shown, of {len(errors['measurements'])}", shown, at_least=20),
+        *drivability_figures(errors["drivability"]),
+        figure("peak memory", made.peak_gb, "GB", at_most=2.0),
+        Figure("processor time", made.cpu_s, "s"),
+        Figure("wall time", made.wall_s, "s"),
+        *(Figure(f"wall time, {stage}", seconds, "s") for stage, seconds in made.found["stage_s"].items()),
+    ]
+
+
+def main():
+    args = arguments()
+    args.work.mkdir(parents=True, exist_ok=True)
+    results = Results("height_map", "Height maps", args)
+    poses = "true poses" if args.true_poses else "poses of build_map"
+    for scene in args.scenes:
+        results.add(f"Height maps, {poses}, image scale {args.image_scale:g}",
+                    (f"{scene}, seed {args.seed}", figures(*evaluate(args, scene))))
+    results.end()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,57 @@
+"""Makes doc/results.md from doc/results/*.json: python3 -m vcharge_evaluation.page [--check]."""
+import argparse
+import sys
+
+from vcharge_evaluation import results
+from vcharge_evaluation.tools import ROOT
+
+PAGE = ROOT / "doc" / "results.md"
+# In the order of the pipeline; other stages follow by name.
+ORDER = ("chain", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "faults", "latency",
+         "real_images", "foundations", "speed")
+INTRODUCTION = """# Results
+
+Made by `python3 -m vcharge_evaluation.page` from `doc/results/*.json`: do not edit. A figure that misses its goal is
+**bold**. Each table names the command that measured it, the date and the commit. `scripts/evaluate.sh STAGE --publish`
+measures again.
+"""
+
+
+def origin(one):
+    return f"`{one.command}` ({one.date}, {one.commit})"
+
+
+def show(measurements):
+    """The table of measurements with one title, with its command; where there are several commands, each in its row."""
+    origins = list(dict.fromkeys(origin(one) for one in measurements))
+    if len(origins) == 1:
+        return f"{results.table(measurements)}\n\n{origins[0]}"
+    rows = [f"| {one.condition + ': ' if one.condition else ''}{figure.name} | {figure.text()} | {figure.goal} | {origin(one)} |"
+            for one in measurements for figure in one.figures]
+    return "\n".join(["| what | figure | goal | command |", "|---|---|---|---|", *rows])
+
+
+def make_page(folder=results.RESULTS):
+    parts = [INTRODUCTION]
+    paths = {path.stem: path for path in folder.glob("*.json")}
+    for name in sorted(paths, key=lambda name: (ORDER.index(name) if name in ORDER else len(ORDER), name)):
+        title, measurements = results.read(paths[name])
+        parts.append(f"## {title}\n")
+        for heading, group in results.by_title(measurements).items():
+            parts.append(f"### {heading}\n\n{show(group)}\n")
+    return "\n".join(parts)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--check", action="store_true", help="write nothing; exit status 1 where the page is stale")
+    args = parser.parse_args()
+    page = make_page()
+    if not args.check:
+        PAGE.write_text(page, encoding="utf-8")
+    elif not PAGE.exists() or PAGE.read_text(encoding="utf-8") != page:
+        sys.exit(f"{PAGE}: stale; python3 -m vcharge_evaluation.page makes it")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,154 @@
+"""Figures of an evaluation: measured values with their goals, as tables and as JSON.
+
+doc/results/STAGE.json holds {"title", "measurements"}; each measurement has a title, the condition under which it was
+made, command, date, commit, and its figures: name, value, unit, goal and whether it was reached (null without a goal).
+"""
+import dataclasses
+import datetime
+import json
+import os
+import pathlib
+import subprocess
+import sys
+
+from vcharge_evaluation.tools import ROOT, say
+
+RESULTS = ROOT / "doc" / "results"
+
+
+@dataclasses.dataclass
+class Figure:
+    name: str
+    value: object  # a number or text; None: not measured
+    unit: str = ""
+    goal: str = ""
+    reached: object = None  # True, False, or None without a goal
+
+    def text(self):
+        """Value and unit for a table; bold where the goal is missed."""
+        value = number_text(self.value) + (f" {self.unit}" if self.unit and self.value is not None else "")
+        return f"**{value}**" if self.reached is False else value
+
+
+def number_text(value):
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
+    return str(value)
+
+
+def figure(name, value, unit="", at_most=None, at_least=None, equal=None):
+    """A figure whose goal is a bound, a range, or a value. None as the value misses every goal."""
+    goals, reached = [], True
+    for sign, bound, fulfils in (("<=", at_most, lambda: value <= at_most), (">=", at_least, lambda: value >= at_least),
+                                 ("", equal, lambda: value == equal)):
+        if bound is not None:
+            goals.append(f"{sign} {number_text(bound)}".strip())
+            reached = reached and value is not None and bool(fulfils())
+    if isinstance(value, float) and value != value:
+        value = None
+    return Figure(name, value, unit, " and ".join(goals), reached if goals else None)
+
+
+@dataclasses.dataclass
+class Measurement:
+    title: str
+    condition: str
+    figures: list
+    command: str = ""
+    date: str = ""
+    commit: str = ""
+
+
+def table(measurements):
+    """Markdown table of measurements with one title: a column per condition."""
+    columns = {}
+    for one in measurements:
+        columns.setdefault(one.condition, {}).update({figure.name: figure for figure in one.figures})
+    names = list(dict.fromkeys(figure.name for one in measurements for figure in one.figures))
+    has_goals = any(figure.goal for one in measurements for figure in one.figures)
+    heads = ["what", *(["goal"] if has_goals else []), *(condition or "figure" for condition in columns)]
+    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    for name in names:
+        goals = [column[name].goal for column in columns.values() if name in column and column[name].goal]
+        cells = [column[name].text() if name in column else "-" for column in columns.values()]
+        lines.append("| " + " | ".join([name, *([goals[0] if goals else ""] if has_goals else []), *cells]) + " |")
+    return "\n".join(lines)
+
+
+def by_title(measurements):
+    """Lists of measurements with the same title, in order."""
+    groups = {}
+    for one in measurements:
+        groups.setdefault(one.title, []).append(one)
+    return groups
+
+
+def read(path):
+    """Title of the stage and its measurements."""
+    stage = json.loads(path.read_text(encoding="utf-8"))
+    return stage["title"], [Measurement(**{**one, "figures": [Figure(**entry) for entry in one["figures"]]})
+                            for one in stage["measurements"]]
+
+
+def write(path, title, measurements):
+    text = json.dumps({"title": title, "measurements": [dataclasses.asdict(one) for one in measurements]}, indent=1,
+                      ensure_ascii=False)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.tmp")
+    temporary.write_text(text + "\n", encoding="utf-8")
+    os.replace(temporary, path)
+
+
+def merge(old, new):
+    """`new` in place of older measurements with the same title and condition; the others stay."""
+    replaced = {(one.title, one.condition): one for one in new}
+    kept = [replaced.pop((one.title, one.condition), one) for one in old]
+    return kept + list(replaced.values())
+
+
+def commit():
+    done = subprocess.run(["git", "-C", str(ROOT), "describe", "--always", "--dirty"], capture_output=True, text=True,
+                          check=False)
+    return done.stdout.strip()
+
+
+class Results:
+    """What a stage's evaluation measures: printed as it comes, and kept in WORK/STAGE.json. With `publish` it also goes
+    into doc/results/STAGE.json."""
+
+    def __init__(self, stage, title, args):
+        self.stage, self.title = stage, title
+        self.path, self.publish = args.work / f"{stage}.json", args.publish
+        self.measurements = []
+        words = [os.path.relpath(word, ROOT) if os.path.isabs(word) else word for word in sys.argv[1:]]
+        self.command = " ".join(["scripts/evaluate.sh", stage, *(word for word in words if word != "--publish")])
+
+    def add(self, title, *columns):
+        """Adds and prints a table; a column is (condition, figures)."""
+        now = datetime.date.today().isoformat()
+        new = [Measurement(title, condition, list(figures), self.command, now, commit()) for condition, figures in columns]
+        self.measurements += new
+        print(f"\n### {title}\n\n{table(new)}", flush=True)
+        write(self.path, self.title, self.measurements)
+        if self.publish:
+            path = RESULTS / f"{self.stage}.json"
+            write(path, self.title, merge(read(path)[1] if path.exists() else [], new))
+
+    def end(self):
+        say(f"written: {self.path}")
+
+
+def add_arguments(parser, work):
+    """What every evaluation takes."""
+    parser.add_argument("--work", type=pathlib.Path, default=pathlib.Path("build") / work,
+                        help="folder for drives and results; complete drives in it are used again")
+    parser.add_argument("--publish", action="store_true",
+                        help="put the figures into doc/results too (then run python3 -m vcharge_evaluation.page)")
+
+
+def percent(part, whole):
+    return 100.0 * part / max(1, whole)
