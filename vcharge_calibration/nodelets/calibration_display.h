@@ -17,7 +17,7 @@ class CalibrationDisplay {
   void tell(const RigCalibrationSession::Status& status);
 
   /// The drive so far, with the camera poses from hand-eye calibration.
-  void showDrive(const RigCalibrationSession::Status& status, const MappingState& state,
+  void showDrive(const RigCalibrationSession::Status& status, const ReconstructionState& state,
                  const CameraRig& guess);
   /// The calibrated drive.
   void showResult(RigCalibrationSession::Status status, const FinishedCalibration& work);

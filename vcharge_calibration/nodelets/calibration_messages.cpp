@@ -70,7 +70,7 @@ vcharge_msgs::CalibrationStatus toStatusMessage(const RigCalibrationSession::Sta
   message.state = stateOf(status);
   message.message = status.message;
   message.missing = status.outlook.missing;
-  message.covered_share = kNaN;
+  message.covered_fraction = kNaN;
   message.progress = status.progress;
   message.rms_px = is_done ? status.result->rms_px : kNaN;
   message.next = status.outlook.next;

@@ -32,7 +32,7 @@ class CollectionStatus {
     message_.progress = progress;
     message_.missing = collector.missing();
     message_.num_views = static_cast<uint32_t>(collector.images().size());
-    message_.covered_share = collector.coveredShare();
+    message_.covered_fraction = collector.coveredFraction();
     publisher_.publish(message_);
   }
 
@@ -50,7 +50,7 @@ class CollectionStatus {
                                                      : DriveMonitor::Level::kWarn;
     report.message = message_.missing.empty() ? message_.message : "missing: " + message_.missing.front();
     report.values = {{"views", std::to_string(message_.num_views)},
-                     {"covered_share", std::to_string(message_.covered_share)},
+                     {"covered_fraction", std::to_string(message_.covered_fraction)},
                      {"last image", message_.message}};
     return report;
   }

@@ -72,7 +72,7 @@ class IntrinsicCalibrationNodelet : public Nodelet {
     const Timestamp stamp = toTimestamp(message->header.stamp);
     const ViewCollector::Outcome outcome = collector_->add({toString(stamp), image.pixels});
     publish(collector_->missing().empty() ? Status::READY : Status::COLLECTING, toString(outcome),
-            std::min(1.0, collector_->coveredShare()));
+            std::min(1.0, collector_->coveredFraction()));
     if (image_publisher_.getNumSubscribers() > 0) {
       image_publisher_.publish(
           toImageMessage(drawCollected(image.pixels, *collector_), stamp, message->header.frame_id));

@@ -47,7 +47,7 @@ void print(const vcharge::IntrinsicCalibration& result) {
       "%zu images used, %zu left out; error %.3f px RMS per coordinate, %.3f px mean distance, %.3f px in "
       "views excluded from the fit; corners up to %.0f degrees from the axis on %.0f %% of the image\n",
       result.views.size(), result.rejected.size(), result.rms_px, result.mean_error_px,
-      result.cross_validated_px, kDegrees * result.max_angle_rad, 100.0 * result.covered_share);
+      result.cross_validated_px, kDegrees * result.max_angle_rad, 100.0 * result.covered_fraction);
   if (result.bent_boards) {
     std::printf(
         "the board bends by %.1f mm (RMS); with flat boards, the error is %.3f px RMS per coordinate\n",
@@ -63,7 +63,7 @@ nlohmann::json toJson(const vcharge::IntrinsicCalibration& result) {
                          {"rms_px", result.rms_px},
                          {"mean_error_px", result.mean_error_px},
                          {"cross_validated_px", result.cross_validated_px},
-                         {"covered_ratio", result.covered_share},
+                         {"covered_ratio", result.covered_fraction},
                          {"max_angle_rad", result.max_angle_rad}};
   for (const vcharge::RejectedImage& image : result.rejected) {
     json["rejected"].push_back({{"name", image.name}, {"reason", image.reason}});

@@ -31,13 +31,13 @@ void convert(const Arguments& arguments, nlohmann::json* found) {
         vcharge::convertCamera(camera.model, camera.image_size_px, camera.field_of_view_rad, arguments.model);
     std::printf("%s: %s -> %s: %.4f px RMS, at most %.4f px, over %.1f %% of the field of view\n",
                 camera.name.c_str(), camera.model.name().c_str(), arguments.model.c_str(), converted.rms_px,
-                converted.max_px, 100.0 * converted.covered_share);
+                converted.max_px, 100.0 * converted.covered_fraction);
     (*found)["cameras"].push_back({{"name", camera.name},
                                    {"from", camera.model.name()},
                                    {"to", arguments.model},
                                    {"rms_px", converted.rms_px},
                                    {"max_px", converted.max_px},
-                                   {"covered_ratio", converted.covered_share}});
+                                   {"covered_ratio", converted.covered_fraction}});
     camera.model = converted.model;
   }
   vcharge::writeIntrinsics(rig, format, arguments.output);

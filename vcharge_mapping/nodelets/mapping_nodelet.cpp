@@ -37,7 +37,7 @@ class MappingNodelet : public Nodelet {
     const std::shared_ptr<const CameraRig> rig = readRig();
     readOptions("options", &options_);
     session_ = std::make_unique<MappingSession>(
-        rig, options_, [this](const MappingState& state) { publish(state); },
+        rig, options_, [this](const ReconstructionState& state) { publish(state); },
         [this](const SparseMap& map) { publish(map); });
     openSource(rig);
     landmarks_ = advertiseLatched<sensor_msgs::PointCloud2>("/mapping/landmarks");
@@ -71,7 +71,7 @@ class MappingNodelet : public Nodelet {
   }
 
   /// While driving; at most twice a second, so that showing costs little.
-  void publish(const MappingState& state) {
+  void publish(const ReconstructionState& state) {
     if ((ros::WallTime::now() - last_shown_).toSec() >= kShowPeriod_s) {
       last_shown_ = ros::WallTime::now();
       trajectory_.publish(makePath(keyframePath(state)));

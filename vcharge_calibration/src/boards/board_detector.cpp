@@ -24,7 +24,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kViewWidth_rad = 1.75;
 constexpr int kViewSize_px = 420;
 // Fraction of corners that must be visible on a board completed by prediction.
-constexpr double kMinShareSeen = 0.9;
+constexpr double kMinVisibleFraction = 0.9;
 // An AprilGrid may be partly visible: this many corners (four tags) determine its pose.
 constexpr size_t kMinTagCorners = 16;
 // Window at a tag's corner, relative to the distance to the next edges.
@@ -146,7 +146,7 @@ std::optional<BoardView> viewOfTags(const std::map<int, Eigen::Vector2d>& corner
 }
 
 bool isComplete(const std::vector<BoardCorner>& corners, const CalibrationBoard& board) {
-  return static_cast<double>(corners.size()) >= kMinShareSeen * board.numCorners();
+  return static_cast<double>(corners.size()) >= kMinVisibleFraction * board.numCorners();
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ constexpr double kGrowWindow = 0.3;
 constexpr double kMaxGrowMove = 0.3;
 constexpr int kMaxRounds = 20;
 // A row or column outside of the board with a larger fraction of corners belongs to a larger board.
-constexpr double kMaxShareBeyond = 0.6;
+constexpr double kMaxFractionBeyond = 0.6;
 
 /// Extends a part of a board, square by square, while there are corners.
 class GridGrower {
@@ -184,7 +184,7 @@ bool goesOn(const CornerGrid& grid, const Extent& extent) {
                                          {extent.column, extent.row - 1, extent.width, 1},
                                          {extent.column, extent.row + extent.height, extent.width, 1}}};
   return std::any_of(beyond.begin(), beyond.end(), [&](const Extent& line) {
-    return countInside(grid, line) > kMaxShareBeyond * line.width * line.height;
+    return countInside(grid, line) > kMaxFractionBeyond * line.width * line.height;
   });
 }
 

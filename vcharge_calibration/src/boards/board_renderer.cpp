@@ -162,7 +162,7 @@ std::vector<RigidTransform> boardPoses(const CalibrationBoard& board, const Came
                   ? 1
                   : 0;
     }
-    if (seen >= range.min_share_seen * board.numCorners()) {
+    if (seen >= range.min_visible_fraction * board.numCorners()) {
       poses.push_back(pose);
     }
   }

@@ -18,7 +18,7 @@ namespace vcharge {
 struct PoseRange {
   double max_angle_rad = 1.2;  ///< angle of the board's middle from the axis
   double distance_m = 0.5;
-  double min_share_seen = 1.0;  ///< fraction of visible corners
+  double min_visible_fraction = 1.0;  ///< fraction of visible corners
 };
 
 /// Random poses of a board, tilted and rotated.

@@ -160,7 +160,7 @@ ConvertedCamera convertCamera(const CameraModel& camera, cv::Size image_size_px,
     }
   }
   result.rms_px = std::sqrt(sum / std::max<double>(1.0, static_cast<double>(count)));
-  result.covered_share = static_cast<double>(count) / static_cast<double>(all.size());
+  result.covered_fraction = static_cast<double>(count) / static_cast<double>(all.size());
   return result;
 }
 

@@ -31,7 +31,7 @@ int ImageCoverage::numNewCells(const BoardView& view) const {
   return static_cast<int>(cells.size());
 }
 
-double ImageCoverage::coveredShare() const {
+double ImageCoverage::coveredFraction() const {
   const auto covered = std::count_if(counts_.begin(), counts_.end(), [](int count) { return count > 0; });
   return static_cast<double>(covered) / static_cast<double>(counts_.size());
 }

@@ -26,7 +26,7 @@ namespace {
 constexpr double kFindFraction = 0.5;
 // Parts into which the views are split for cross-validation.
 constexpr int kCrossValidationFolds = 10;
-constexpr double kFindAgainShare = 0.3;
+constexpr double kFindAgainFraction = 0.3;
 // Larger errors, or views that do not fit, cause a check for turned images.
 constexpr double kSuspiciousError_px = 0.5;
 
@@ -51,7 +51,7 @@ class Calibration {
     }
     const auto rough = fitFromScratch(options_.model, result_.image_size_px, board_, views);
     if (rough.has_value()) {
-      findBoards(&rough->model, kFindFraction, kFindAgainShare);
+      findBoards(&rough->model, kFindFraction, kFindAgainFraction);
       views = foundViews();
     }
     for (size_t i = 0; i < images_.size(); ++i) {
@@ -147,7 +147,7 @@ class Calibration {
   }
 
   // Detects the remaining boards, on all cores.
-  void findBoards(const CameraModel* model, double progress_start, double progress_share) {
+  void findBoards(const CameraModel* model, double progress_start, double progress_fraction) {
     const BoardDetector detector(board_);
     std::mutex mutex;
     size_t done = 0;
@@ -162,7 +162,7 @@ class Calibration {
       }
       const std::lock_guard<std::mutex> lock(mutex);
       progress_(progress_start +
-                progress_share * static_cast<double>(++done) / static_cast<double>(images_.size()));
+                progress_fraction * static_cast<double>(++done) / static_cast<double>(images_.size()));
     });
   }
 
@@ -206,7 +206,7 @@ class Calibration {
     result_.flat_rms_px = fit.flat_rms_px;
     result_.bent_boards = fit.settings.bending;
     result_.bending_m = std::sqrt(sum_bending);
-    result_.covered_share = coverage.coveredShare();
+    result_.covered_fraction = coverage.coveredFraction();
     crossValidate(fit);
   }
 

@@ -67,7 +67,7 @@ class Report {
                                       " mm; with flat boards, the error is " +
                                       toText(result_.flat_rms_px, 3) + " px RMS");
     }
-    row("image covered", toText(100.0 * result_.covered_share, 0) + " %, up to " +
+    row("image covered", toText(100.0 * result_.covered_fraction, 0) + " %, up to " +
                              toText(kDegrees * result_.max_angle_rad, 0) + " degrees from the axis");
     out_ << "</table>";
   }

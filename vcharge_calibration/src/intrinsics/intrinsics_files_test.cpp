@@ -221,7 +221,7 @@ TEST(ConvertCameraTest, StatesWhatTheNewModelLeavesOver) {
       EXPECT_EQ(converted.model.name(), to);
       EXPECT_LT(converted.rms_px, 0.5) << from << " " << to;
       EXPECT_LE(converted.rms_px, converted.max_px);
-      EXPECT_GT(converted.covered_share, 0.99);
+      EXPECT_GT(converted.covered_fraction, 0.99);
       // Computes the residual directly, on rays between the samples.
       double worst_px = 0.0;
       for (double theta = 0.013; theta < 1.3; theta += 0.1) {
@@ -245,11 +245,11 @@ TEST(ConvertCameraTest, OfTheSameModelIsTheCameraItself) {
 TEST(ConvertCameraTest, APinholeCameraTakesTheMiddleOfAFisheye) {
   const ConvertedCamera middle = convertCamera(modelOf("mei"), {1280, 800}, 1.6, "pinhole");
   EXPECT_LT(middle.rms_px, 1.0);
-  EXPECT_GT(middle.covered_share, 0.99);
+  EXPECT_GT(middle.covered_fraction, 0.99);
   const ConvertedCamera all = convertCamera(modelOf("mei"), {1280, 800}, 3.2, "pinhole");
   EXPECT_GT(all.rms_px, middle.rms_px);
-  EXPECT_LT(all.covered_share, 0.95);
-  EXPECT_GT(all.covered_share, 0.5);
+  EXPECT_LT(all.covered_fraction, 0.95);
+  EXPECT_GT(all.covered_fraction, 0.5);
 }
 
 }  // namespace

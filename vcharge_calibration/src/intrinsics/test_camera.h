@@ -9,12 +9,12 @@ namespace vcharge {
 
 /// vehicle_from_camera of a camera that looks ahead, rotated by these angles.
 inline RigidTransform placeCamera(double yaw_rad, double pitch_rad, double roll_rad,
-                                  const Eigen::Vector3d& place_m) {
+                                  const Eigen::Vector3d& position_m) {
   Eigen::Matrix3d forward_from_optical;
   forward_from_optical << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
   return RigidTransform(
       rotationFromYawPitchRoll(yaw_rad, pitch_rad, roll_rad) * Eigen::Quaterniond(forward_from_optical),
-      place_m);
+      position_m);
 }
 
 /// An equidistant fisheye camera of 640x400 pixels.

@@ -136,7 +136,7 @@ std::vector<std::string> ViewCollector::missing() const {
   if (more > 0) {
     missing.push_back(std::to_string(more) + " more images");
   }
-  if (coveredShare() < options_.enough_coverage) {
+  if (coveredFraction() < options_.enough_coverage) {
     std::string parts;
     if (coverage_.has_value()) {
       for (const std::string& part : coverage_->missingParts()) {

@@ -12,13 +12,12 @@ namespace {
 
 constexpr double kWarnCoverage = 0.6;
 constexpr double kFailCoverage = 0.35;
-// Of half of the image's longer side: boards that stay within are all in the middle.
+// Fraction of half the longer image side: boards within this radius are all in the middle.
 constexpr double kFailReach = 0.7;
 constexpr double kWarnError_px = 0.5;
 constexpr double kFailError_px = 3.0;
 constexpr double kWarnUnseen = 1.5;
-// Of views, at least so many should be tilted against the line of sight by so much: without, focal length
-// and distance go together.
+// Least number and tilt of views against the line of sight: without them focal length and distance correlate.
 constexpr double kMinTilt_rad = 0.25;
 constexpr double kMinTiltedShare = 0.2;
 
@@ -55,8 +54,8 @@ void judgeCalibration(const IntrinsicCalibrationOptions& options, IntrinsicCalib
     return fail("no camera of the model " + options.model +
                 " explains the corners: " + toText(result->rms_px, 1) + " px RMS");
   }
-  if (coverage.coveredShare() < kFailCoverage || coverage.reach() < kFailReach) {
-    return fail("the board was only seen in the middle, on " + toText(100.0 * coverage.coveredShare(), 0) +
+  if (coverage.coveredFraction() < kFailCoverage || coverage.reach() < kFailReach) {
+    return fail("the board was only seen in the middle, on " + toText(100.0 * coverage.coveredFraction(), 0) +
                 " % of the image: pictures with the board at the image's " + join(coverage.missingParts()) +
                 " are missing");
   }
@@ -66,8 +65,8 @@ void judgeCalibration(const IntrinsicCalibrationOptions& options, IntrinsicCalib
     result->remarks.push_back(remark);
   };
   const std::vector<std::string> missing = coverage.missingParts();
-  if (coverage.coveredShare() < kWarnCoverage || !missing.empty()) {
-    warn("corners cover only " + toText(100.0 * coverage.coveredShare(), 0) + " % of the image: " +
+  if (coverage.coveredFraction() < kWarnCoverage || !missing.empty()) {
+    warn("corners cover only " + toText(100.0 * coverage.coveredFraction(), 0) + " % of the image: " +
          (missing.empty() ? "hold the board also at its sides and in its corners"
                           : "pictures with the board at the image's " + join(missing) + " are missing"));
   }

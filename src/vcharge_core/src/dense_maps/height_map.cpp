@@ -68,8 +68,8 @@ void addToHash(const HeightMap& map, ContentHasher* hasher) {
   }
 }
 
-double interpolateHeight(const HeightMap& map, const Eigen::Vector2d& place_m) {
-  const Eigen::Vector2d cell = (place_m - map.origin_m) / map.cell_size_m;
+double interpolateHeight(const HeightMap& map, const Eigen::Vector2d& position_m) {
+  const Eigen::Vector2d cell = (position_m - map.origin_m) / map.cell_size_m;
   const double column = std::floor(cell.x()), row = std::floor(cell.y());
   if (!(column >= 0.0 && row >= 0.0 && column + 1.0 < map.height_m.cols && row + 1.0 < map.height_m.rows)) {
     return std::numeric_limits<double>::quiet_NaN();

@@ -212,8 +212,8 @@ cv::Mat colourHeight(const HeightMap& map, double low_m, double high_m) {
       if (!std::isfinite(height)) {
         continue;
       }
-      const double share = (height - low_m) / (high_m - low_m);
-      level.at<uint8_t>(row, column) = cv::saturate_cast<uint8_t>(255.0 * std::clamp(share, 0.0, 1.0));
+      const double fraction = (height - low_m) / (high_m - low_m);
+      level.at<uint8_t>(row, column) = cv::saturate_cast<uint8_t>(255.0 * std::clamp(fraction, 0.0, 1.0));
       // The light comes from the lower left.
       const float beside = row > 0 && column > 0 ? map.height_m.at<float>(row - 1, column - 1) : height;
       const double slope = std::isfinite(beside) ? (height - beside) / map.cell_size_m : 0.0;

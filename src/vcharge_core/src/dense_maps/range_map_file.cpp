@@ -150,9 +150,9 @@ cv::Mat colourRange(const cv::Mat& range_m, double min_range_m, double max_range
       const float range = range_m.at<float>(y, x);
       const bool known = std::isfinite(range) && range > 0.0F;
       unknown.at<uint8_t>(y, x) = known ? 0 : 255;
-      const double share = known ? (1.0 / range - far) / (near - far) : 0.0;
+      const double fraction = known ? (1.0 / range - far) / (near - far) : 0.0;
       // The square root spreads far ranges, which inverse range compresses.
-      level.at<uint8_t>(y, x) = cv::saturate_cast<uint8_t>(255.0 * std::sqrt(std::clamp(share, 0.0, 1.0)));
+      level.at<uint8_t>(y, x) = cv::saturate_cast<uint8_t>(255.0 * std::sqrt(std::clamp(fraction, 0.0, 1.0)));
     }
   }
   cv::Mat coloured;

@@ -71,9 +71,9 @@ class PatchAlignmentTest : public ::testing::Test {
     return errors_px;
   }
 
-  static double quantile(std::vector<double> values, double share) {
+  static double quantile(std::vector<double> values, double fraction) {
     std::sort(values.begin(), values.end());
-    return values[static_cast<size_t>(share * static_cast<double>(values.size() - 1))];
+    return values[static_cast<size_t>(fraction * static_cast<double>(values.size() - 1))];
   }
 
   PatchAlignmentOptions options_;

@@ -4,13 +4,12 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/frames/frame_assembler.h"
-#include "vcharge_reconstruction/sparse_mapper_report.h"
+#include "vcharge_reconstruction/reconstruction_report.h"
 
 namespace vcharge {
 
@@ -24,7 +23,7 @@ class FrameGatherer : public DriveConsumer {
       std::function<void(Timestamp, const std::vector<Image>&, const RigidTransform& odom_from_vehicle)>;
 
   /// The report must outlive this object. `max_speed_m_per_s`: faster odometry is a reset of the odometer.
-  FrameGatherer(std::shared_ptr<const CameraRig> rig, double max_speed_m_per_s, SparseMapperReport* report,
+  FrameGatherer(std::shared_ptr<const CameraRig> rig, double max_speed_m_per_s, ReconstructionReport* report,
                 FrameCallback on_frame);
 
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
@@ -33,10 +32,6 @@ class FrameGatherer : public DriveConsumer {
   void finish() { assembler_.finish(); }
   /// Reports that a frame was not used, or not completely.
   void noteSkipped(Timestamp stamp, const std::string& reason);
-
-  bool isIdle() const { return assembler_.numWaiting() == 0; }
-  /// Ignores images up to this stamp: they were used before.
-  void resumeAfter(std::optional<Timestamp> stamp) { resumed_after_ = stamp; }
 
  private:
   /// The report's last entry for a reason, and the number of the frame that it ends with.
@@ -48,9 +43,8 @@ class FrameGatherer : public DriveConsumer {
   std::string missingCameras(const ImageFrame& frame);
 
   const std::shared_ptr<const CameraRig> rig_;
-  SparseMapperReport* const report_;
+  ReconstructionReport* const report_;
   const FrameCallback on_frame_;
-  std::optional<Timestamp> resumed_after_;
   std::map<std::string, LastSkipped> last_skipped_;  // by reason
   FrameAssembler<Image> assembler_;
 };

@@ -15,7 +15,7 @@ FrameAssemblerOptions assemblerOptions(double max_speed_m_per_s) {
 }  // namespace
 
 FrameGatherer::FrameGatherer(std::shared_ptr<const CameraRig> rig, double max_speed_m_per_s,
-                             SparseMapperReport* report, FrameCallback on_frame)
+                             ReconstructionReport* report, FrameCallback on_frame)
     : rig_(std::move(rig)),
       report_(report),
       on_frame_(std::move(on_frame)),
@@ -31,7 +31,7 @@ void FrameGatherer::addOdometry(const VehicleOdometry& odometry) {
 }
 
 void FrameGatherer::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
-  if ((resumed_after_ && stamp <= *resumed_after_) || !assembler_.addImage(camera_index, stamp, image)) {
+  if (!assembler_.addImage(camera_index, stamp, image)) {
     ++report_->num_late_images;
   }
 }

@@ -60,15 +60,15 @@ struct PlacedBoard {
   Eigen::Vector3d bending_m = Eigen::Vector3d::Zero();
 
   /// x^2, x y and y^2 at a position on the board (metres).
-  static Eigen::Vector3d bendingBasis(const CalibrationBoard& board, const Eigen::Vector2d& place_m) {
+  static Eigen::Vector3d bendingBasis(const CalibrationBoard& board, const Eigen::Vector2d& position_m) {
     const Eigen::Vector2d last = board.corner(board.numCorners() - 1).head<2>();
-    const Eigen::Vector2d p = 2.0 * place_m.cwiseQuotient(last) - Eigen::Vector2d::Ones();
+    const Eigen::Vector2d p = 2.0 * position_m.cwiseQuotient(last) - Eigen::Vector2d::Ones();
     return {p.x() * p.x(), p.x() * p.y(), p.y() * p.y()};
   }
   /// Point in the camera frame.
-  Eigen::Vector3d point(const CalibrationBoard& board, const Eigen::Vector2d& place_m) const {
+  Eigen::Vector3d point(const CalibrationBoard& board, const Eigen::Vector2d& position_m) const {
     return camera_from_board *
-           Eigen::Vector3d(place_m.x(), place_m.y(), bending_m.dot(bendingBasis(board, place_m)));
+           Eigen::Vector3d(position_m.x(), position_m.y(), bending_m.dot(bendingBasis(board, position_m)));
   }
   Eigen::Vector3d corner(const CalibrationBoard& board, int index) const {
     return point(board, board.corner(index).head<2>());

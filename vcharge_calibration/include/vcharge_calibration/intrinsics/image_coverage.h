@@ -22,7 +22,7 @@ class ImageCoverage {
   /// Number of cells that only this view covers.
   int numNewCells(const BoardView& view) const;
   int count(int column, int row) const { return counts_[static_cast<size_t>(row * kColumns + column)]; }
-  double coveredShare() const;
+  double coveredFraction() const;
   /// Distance of the farthest corner from the image centre, relative to half of the longer side.
   double reach() const { return reach_; }
   /// Parts of the image's rim without any corner, for example "left" or "upper right".

@@ -64,7 +64,7 @@ struct IntrinsicCalibration {
   bool bent_boards = false;         ///< boards were found to bend, and the fit models it
   double bending_m = 0.0;           ///< RMS of the boards' bending along their longer side
   double cross_validated_px = 0.0;  ///< RMS per coordinate of views that were excluded from the fit
-  double covered_share = 0.0;       ///< fraction of the image's cells in which corners were detected
+  double covered_fraction = 0.0;    ///< fraction of the image's cells in which corners were detected
   double max_angle_rad = 0.0;       ///< angle of the farthest corner from the axis
 };
 

@@ -40,7 +40,7 @@ struct ConvertedCamera {
   double rms_px = 0.0;  ///< distance
   double max_px = 0.0;
   /// Fraction of the pixels within the field of view that the new model can image.
-  double covered_share = 0.0;
+  double covered_fraction = 0.0;
 };
 
 /// The camera of model `model_name` closest to `camera`, by least squares of the pixel distance over a grid

@@ -37,7 +37,7 @@ class ViewCollector {
   const std::vector<BoardView>& views() const { return views_; }
   /// The board in the last image, if it was detected.
   const std::optional<BoardView>& lastView() const { return last_view_; }
-  double coveredShare() const { return coverage_.has_value() ? coverage_->coveredShare() : 0.0; }
+  double coveredFraction() const { return coverage_.has_value() ? coverage_->coveredFraction() : 0.0; }
   /// Which images are still missing; empty if there are enough.
   std::vector<std::string> missing() const;
 

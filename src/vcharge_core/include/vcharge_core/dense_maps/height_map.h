@@ -34,7 +34,7 @@ void addToHash(const HeightMap& map, ContentHasher* hasher);
 
 /// Height at a position by bilinear interpolation between the four surrounding cells. NaN if one of them is
 /// outside or not observed.
-double interpolateHeight(const HeightMap& map, const Eigen::Vector2d& place_m);
+double interpolateHeight(const HeightMap& map, const Eigen::Vector2d& position_m);
 
 /// Whether a vehicle can drive over a cell.
 enum class CellState : uint8_t { kDrivable, kObstacle, kUnobserved };
