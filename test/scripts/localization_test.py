@@ -52,7 +52,7 @@ class LocalizationTest(unittest.TestCase):
 
         cls.subscribers = [rospy.Subscriber(topic, kind, keep(topic), queue_size=1000) for topic, kind in (
             ("/localization/pose", PoseWithCovarianceStamped), ("/localization/status", LocalizationStatus),
-            ("/localization/sightings", Marker), ("/tf", TFMessage))]
+            ("/localization/observations", Marker), ("/tf", TFMessage))]
         cls.diagnostics = Diagnostics()
         cls.subscribers.append(cls.diagnostics.subscriber)
         cls.subscribers.append(rospy.Subscriber("/rosout", Log, lambda m: cls.logged.append(m.msg), queue_size=100))
@@ -216,7 +216,7 @@ class LocalizationTest(unittest.TestCase):
                     numbers.append(message.pose.covariance[6 * i + k])
             self.assertEqual([row[key] for key in keys], [f"{number:.9g}" for number in numbers])
         self.check_tf()
-        self.check_sightings()
+        self.check_observations()
         self.wait_until_told(0, "localized")
 
     def check_tf(self):
@@ -237,8 +237,8 @@ class LocalizationTest(unittest.TestCase):
             expected = [getattr(pose.pose.pose.position, axis) for axis in "xyz"]
             np.testing.assert_allclose(found, expected, atol=2e-3)
 
-    def check_sightings(self):
-        shown = [marker for marker in self.received["/localization/sightings"] if marker.action == Marker.ADD]
+    def check_observations(self):
+        shown = [marker for marker in self.received["/localization/observations"] if marker.action == Marker.ADD]
         inliers = {status.header.stamp: status.num_inliers for status in self.statuses()}
         self.assertGreater(len(shown), 0.8 * len(self.rows))
         for marker in shown:

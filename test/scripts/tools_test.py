@@ -252,10 +252,10 @@ class ToolsTest(unittest.TestCase):
             self.fail_with("simulate", [key, value], **{key: value})
         self.fail_with("import", ["ground_height_m", "nan"], ground_height_m="nan")
         self.fail_with("import", ["ground_slope_x", "-2"], ground_slope_x="-2")
-        for key, value in (("plane_sweep.min_texture", ".nan"), ("neighbours.max_baseline_m", "-1"),
+        for key, value in (("plane_sweep.min_texture", ".nan"), ("frames.max_speed_m_per_s", "-1"),
                            ("plane_sweep.min_distance_m", "-0.3"), ("plane_sweep.max_distance_m", ".inf"),
                            ("working_camera.focal_scale", ".nan"), ("neighbours.num_neighbours", "-4"),
-                           ("odometry.max_gap_s", "0"), ("plane_sweep.num_planes", "many")):
+                           ("frames.max_odometry_gap_s", "0"), ("plane_sweep.num_planes", "many")):
             outer, _, inner = key.rpartition(".")
             line = f"{outer}: {{{inner}: {value}}}\n" if outer else f"{inner}: {value}\n"
             options = self.text("options.yaml", line)

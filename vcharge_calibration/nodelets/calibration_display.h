@@ -16,10 +16,10 @@ class CalibrationDisplay {
 
   void tell(const RigCalibrationSession::Status& status);
 
-  /// The drive so far, by the places that hand-eye gives the cameras.
+  /// The drive so far, with the camera poses from hand-eye calibration.
   void showDrive(const RigCalibrationSession::Status& status, const ReconstructionState& state,
                  const CameraRig& guess);
-  /// The drive as it was calibrated.
+  /// The calibrated drive.
   void showResult(RigCalibrationSession::Status status, const FinishedCalibration& work);
 
  private:

@@ -12,15 +12,15 @@
 
 namespace vcharge {
 
-/// A session's status; the header's stamp is left to the caller. Cameras have the standard deviations of the
-/// calibration where it is done, otherwise those that hand-eye is predicted to have.
+/// A session's status; the caller sets the header's stamp. Standard deviations of the cameras are those of
+/// the calibration once it is done, otherwise predictions for hand-eye.
 vcharge_msgs::CalibrationStatus toStatusMessage(const RigCalibrationSession::Status& status);
 
 /// Landmarks as x, y, z (metres, FLOAT32) and rgb, in their camera's colour.
 sensor_msgs::PointCloud2 toCloud(const LandmarksByCamera& landmarks, const std::string& frame_id);
 
-/// The cameras on a vehicle: a pyramid along each camera's view in its colour, and its name with what is
-/// known of its place. Cameras without a place are deleted from what was shown before.
+/// The cameras on a vehicle: a pyramid along each camera's view in its colour, and its name with the accuracy
+/// of its extrinsics. Markers of cameras without extrinsics are deleted.
 visualization_msgs::MarkerArray toCameraMarkers(const CameraRig& rig, const RigidTransform& map_from_vehicle,
                                                 const vcharge_msgs::CalibrationStatus& status,
                                                 const std::string& frame_id);

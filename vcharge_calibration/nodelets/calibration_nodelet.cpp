@@ -1,10 +1,7 @@
-#include <functional>
 #include <map>
 #include <memory>
 #include <string>
-#include <vector>
 
-#include <std_srvs/Trigger.h>
 #include <yaml-cpp/yaml.h>
 #include <pluginlib/class_list_macros.hpp>
 
@@ -12,16 +9,13 @@
 #include "vcharge_calibration/live/rig_calibration_session.h"
 #include "vcharge_calibration/report/rig_calibration_files.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
-#include "vcharge_ros/live_drive_source.h"
 #include "vcharge_ros/nodelet.h"
-#include "vcharge_ros/nodelet_support.h"
-#include "vcharge_ros/parameters.h"
 
 namespace vcharge {
 
 /// Calibrates the extrinsics of a rig from a live or replayed drive as calibrate_rig does, and coaches the
-/// driver: /calibration/status tells what to drive next, how well each camera's place is known, and when to
-/// stop. Shows the drive on /calibration/trajectory, /calibration/landmarks (by camera) and
+/// driver: /calibration/status says what to drive next, how well each camera's extrinsics are known, and when
+/// to stop. Shows the drive on /calibration/trajectory, /calibration/landmarks (by camera) and
 /// /calibration/cameras, in the frame `map`. Services: ~calibrate begins to calibrate by the drive so far and
 /// returns; ~reset begins a new drive. Files are written after PASS and WARN, the report always. Parameters:
 /// ~rig (path), ~output (rig.yaml to write), optional ~map (*.vmap), ~trajectory (*.tum), ~report (folder),
@@ -30,65 +24,49 @@ namespace vcharge {
 /// wait too long are dropped).
 class CalibrationNodelet : public Nodelet {
  public:
+  CalibrationNodelet() : Nodelet("calibration") {}
   ~CalibrationNodelet() override {
-    diagnostics_.clear();
-    source_.reset();  // no callback any more
-    session_.reset();
+    end();
+    session_.reset();  // its thread publishes
   }
 
  private:
   using Status = RigCalibrationSession::Status;
   using Response = std_srvs::TriggerResponse;
 
-  void initialize() override {
-    ros::NodeHandle& node = getNodeHandle();
-    ros::NodeHandle& private_node = getPrivateNodeHandle();
-    const std::string rig_path = requireStringParameter(private_node, "rig", "the path of a rig.yaml");
-    const auto rig = std::make_shared<const CameraRig>(readCameraRig(rig_path));
-    output_ = requireStringParameter(private_node, "output", "the path of the rig.yaml to write");
-    private_node.param("map", map_, map_);
-    private_node.param("trajectory", trajectory_, trajectory_);
-    private_node.param("report", report_, report_);
-    readFieldsFromParameters(private_node, "options", &options_);
-    provenance_ = {{"rig", rig_path},
+  void start() override {
+    const std::shared_ptr<const CameraRig> rig = readRig();
+    output_ = requireParameter("output", "the path of the rig.yaml to write");
+    map_ = parameter<std::string>("map", "");
+    trajectory_ = parameter<std::string>("trajectory", "");
+    report_ = parameter<std::string>("report", "");
+    readOptions("options", &options_);
+    provenance_ = {{"rig", parameter<std::string>("rig", "")},
                    {"options", YAML::Dump(writeFields(options_))},
                    {"program", "calibration_nodelet 0.1.0"}};
     RigCalibrationSessionOptions session_options;
-    readFieldsFromParameters(private_node, "session", &session_options);
-    LiveDriveSourceOptions source_options;
-    if (private_node.param("lossless_replay", false)) {
-      source_options.takeEverything();
-    }
-    readFieldsFromParameters(private_node, "source", &source_options);
-    source_ = std::make_unique<LiveDriveSource>(node, rig, source_options);
+    readOptions("session", &session_options);
+    openSource(rig);
     session_ = std::make_unique<RigCalibrationSession>(
         rig, options_, session_options, [this](const Status& status) { display_->tell(status); },
         [this](const ReconstructionState& state, const CameraRig& guess) { watch(state, guess); },
         [this](const FinishedCalibration& work) { finish(work); });
-    // Nothing throws any more: a nodelet that does not load must leave no publisher behind.
-    display_ = std::make_unique<CalibrationDisplay>(&node, options_);
+    display_ = std::make_unique<CalibrationDisplay>(&node(), options_);
     display_->tell(session_->status());
-    addDiagnostics("", [this] { return source_->report(); });
-    addDiagnostics("/rig", [this] { return report(); });
-    calibrate_ = advertiseTrigger(&private_node, "calibrate", &guard_,
-                                  [this](Response* response) { calibrate(response); });
-    reset_ =
-        advertiseTrigger(&private_node, "reset", &guard_, [this](Response* response) { reset(response); });
-    source_->run(session_.get(), DriveSource::ProgressCallback());
-  }
-
-  void addDiagnostics(const std::string& name, std::function<DriveMonitor::Report()> report) {
-    diagnostics_.push_back(std::make_unique<NodeletDiagnostics>(getMTNodeHandle(), getMTPrivateNodeHandle(),
-                                                                getName() + name, std::move(report)));
+    addDiagnostics(
+        "/rig", [this] { return report(); }, Threads::kSeveral);
+    serve("calibrate", [this](Response* response) { calibrate(response); });
+    serve("reset", [this](Response* response) { reset(response); });
+    runSource(session_.get());
   }
 
   void calibrate(Response* response) {
-    source_->flush();
+    flushSource();
     response->success = session_->calibrate(&response->message) ? 1 : 0;
   }
 
   void reset(Response* response) {
-    source_->flush();  // of the drive that is forgotten
+    flushSource();  // belongs to the drive before
     session_->reset();
     response->success = 1;
     response->message = "a new drive begins";
@@ -96,7 +74,7 @@ class CalibrationNodelet : public Nodelet {
 
   void watch(const ReconstructionState& state, const CameraRig& guess) {
     const Status status = session_->status();
-    if (status.phase != RigCalibrationSession::Phase::kCalibrated) {  // what was found stays to be seen
+    if (status.phase != RigCalibrationSession::Phase::kCalibrated) {  // otherwise the result stays visible
       display_->showDrive(status, state, guess);
     }
   }
@@ -130,12 +108,8 @@ class CalibrationNodelet : public Nodelet {
   RigCalibratorOptions options_;
   std::string output_, map_, trajectory_, report_;  // paths
   std::map<std::string, std::string> provenance_;
-  CallbackGuard guard_{"calibration"};
   std::unique_ptr<CalibrationDisplay> display_;
   std::unique_ptr<RigCalibrationSession> session_;
-  std::unique_ptr<LiveDriveSource> source_;
-  std::vector<std::unique_ptr<NodeletDiagnostics>> diagnostics_;
-  ros::ServiceServer calibrate_, reset_;
 };
 
 }  // namespace vcharge

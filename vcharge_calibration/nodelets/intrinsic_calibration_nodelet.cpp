@@ -1,14 +1,13 @@
+#include <algorithm>
 #include <limits>
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
-#include <std_srvs/Trigger.h>
-#include <vcharge_msgs/CalibrationStatus.h>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "collection_status.h"
 #include "vcharge_calibration/intrinsics/collector_picture.h"
 #include "vcharge_calibration/intrinsics/view_collector.h"
 #include "vcharge_calibration/report/calibration_files.h"
@@ -16,78 +15,72 @@
 #include "vcharge_ros/drive_topics.h"
 #include "vcharge_ros/image_conversions.h"
 #include "vcharge_ros/nodelet.h"
-#include "vcharge_ros/nodelet_support.h"
-#include "vcharge_ros/parameters.h"
 
 namespace vcharge {
 
-/// Collects views of a board from a camera's images, says on /calibration/status and /diagnostics what is
+/// Collects views of a board from a camera's images, reports on /calibration/status and /diagnostics what is
 /// still missing, shows on /calibration/image where the board was seen, and calibrates on the service
 /// ~calibrate. Parameters: ~camera, ~output (rig.yaml), ~board ("9x6") and ~square_m, or ~target (Kalibr's
 /// YAML); optional ~report (HTML), ~keep_others, ~field_of_view_rad, ~topic, ~compressed, ~collector
 /// (ViewCollectorOptions), ~options (IntrinsicCalibrationOptions).
 class IntrinsicCalibrationNodelet : public Nodelet {
- private:
-  using Status = vcharge_msgs::CalibrationStatus;
+ public:
+  IntrinsicCalibrationNodelet() : Nodelet("intrinsic_calibration") {}
+  ~IntrinsicCalibrationNodelet() override { end(); }
 
-  void initialize() override {
-    ros::NodeHandle& node = getNodeHandle();
-    ros::NodeHandle& private_node = getPrivateNodeHandle();
-    output_.camera_name = requireStringParameter(private_node, "camera", "the camera's name");
-    output_.rig_file = requireStringParameter(private_node, "output", "the path of the rig.yaml to write");
-    output_.report_file = private_node.param<std::string>("report", "");
-    output_.keep_others = private_node.param("keep_others", false);
-    output_.field_of_view_rad = private_node.param("field_of_view_rad", 0.0);
-    const auto target = private_node.param<std::string>("target", "");
-    board_ = target.empty() ? CalibrationBoard::parse(private_node.param<std::string>("board", "9x6"),
-                                                      private_node.param("square_m", 0.1))
-                            : readCalibrationBoard(target);
-    readFieldsFromParameters(private_node, "options", &options_);
+ private:
+  using Status = CollectionStatus::Message;
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+  void start() override {
+    output_.camera_name = requireParameter("camera", "the camera's name");
+    output_.rig_file = requireParameter("output", "the path of the rig.yaml to write");
+    output_.report_file = parameter<std::string>("report", "");
+    output_.keep_others = parameter("keep_others", false);
+    output_.field_of_view_rad = parameter("field_of_view_rad", 0.0);
+    const auto target = parameter<std::string>("target", "");
+    board_ = target.empty()
+                 ? CalibrationBoard::parse(parameter<std::string>("board", "9x6"), parameter("square_m", 0.1))
+                 : readCalibrationBoard(target);
+    readOptions("options", &options_);
     ViewCollectorOptions collector_options;
-    readFieldsFromParameters(private_node, "collector", &collector_options);
+    readOptions("collector", &collector_options);
     collector_ = std::make_unique<ViewCollector>(board_, options_.model, collector_options);
 
-    status_.subject = "intrinsics of " + output_.camera_name;
-    status_.rms_px = std::numeric_limits<double>::quiet_NaN();
-    status_publisher_ = node.advertise<Status>("/calibration/status", 10, true);
-    image_publisher_ = node.advertise<sensor_msgs::Image>("/calibration/image", 1);
-    topic_ = private_node.param("topic", DriveTopics().imageTopic(output_.camera_name));
-    // The newest image only: looking for the board takes longer than the next image.
-    if (private_node.param("compressed", false)) {
-      topic_ += "/compressed";
-      images_ = node.subscribe<sensor_msgs::CompressedImage>(
+    status_ = std::make_unique<CollectionStatus>(&node(), "intrinsics of " + output_.camera_name);
+    image_publisher_ = node().advertise<sensor_msgs::Image>("/calibration/image", 1);
+    const bool is_compressed = parameter("compressed", false);
+    topic_ = parameter("topic", DriveTopics().imageTopic(output_.camera_name)) +
+             (is_compressed ? "/compressed" : "");
+    serve("calibrate", [this](std_srvs::TriggerResponse* response) { calibrate(response); });
+    addDiagnostics(
+        "", [this] { return status_->report(); }, Threads::kSeveral);
+    publish(Status::COLLECTING, "waiting for images on " + topic_, 0.0);
+    // Only the newest image waits: finding the board takes longer than an image period.
+    if (is_compressed) {
+      subscribe<sensor_msgs::CompressedImage>(
           topic_, 1, [this](const sensor_msgs::CompressedImageConstPtr& message) { take(message); });
     } else {
-      images_ = node.subscribe<sensor_msgs::Image>(
-          topic_, 1, [this](const sensor_msgs::ImageConstPtr& message) { take(message); });
+      subscribe<sensor_msgs::Image>(topic_, 1,
+                                    [this](const sensor_msgs::ImageConstPtr& message) { take(message); });
     }
-    service_ = private_node.advertiseService(
-        "calibrate", boost::function<bool(std_srvs::Trigger::Request&, std_srvs::Trigger::Response&)>(
-                         [this](std_srvs::Trigger::Request& /*request*/,
-                                std_srvs::Trigger::Response& response) { return calibrate(&response); }));
-    publish(Status::COLLECTING, "waiting for images on " + topic_, 0.0);
-    diagnostics_ = std::make_unique<NodeletDiagnostics>(getMTNodeHandle(), getMTPrivateNodeHandle(),
-                                                        getName(), [this] { return report(); });
   }
 
   template <class Message>
   void take(const boost::shared_ptr<const Message>& message) {
-    guard_.run([&] {
-      const Image image = toImage(message, topic_);
-      const Timestamp stamp = toTimestamp(message->header.stamp);
-      const ViewCollector::Outcome outcome = collector_->add({toString(stamp), image.pixels});
-      const bool enough = collector_->missing().empty();
-      publish(enough ? Status::READY : Status::COLLECTING, toString(outcome),
-              std::min(1.0, collector_->coveredFraction()));
-      if (image_publisher_.getNumSubscribers() > 0) {
-        image_publisher_.publish(
-            toImageMessage(drawCollected(image.pixels, *collector_), stamp, message->header.frame_id));
-      }
-    });
+    const Image image = toImage(message, topic_);
+    const Timestamp stamp = toTimestamp(message->header.stamp);
+    const ViewCollector::Outcome outcome = collector_->add({toString(stamp), image.pixels});
+    publish(collector_->missing().empty() ? Status::READY : Status::COLLECTING, toString(outcome),
+            std::min(1.0, collector_->coveredFraction()));
+    if (image_publisher_.getNumSubscribers() > 0) {
+      image_publisher_.publish(
+          toImageMessage(drawCollected(image.pixels, *collector_), stamp, message->header.frame_id));
+    }
   }
 
-  bool calibrate(std_srvs::Trigger::Response* response) {
-    const bool done = guard_.run([&] {
+  void calibrate(std_srvs::TriggerResponse* response) {
+    const bool is_done = guard().run([&] {
       const IntrinsicCalibration result =
           calibrateIntrinsics(board_, collector_->images(), options_,
                               [this](double share) { publish(Status::CALIBRATING, "calibrating", share); });
@@ -97,44 +90,17 @@ class IntrinsicCalibrationNodelet : public Nodelet {
       for (const std::string& remark : result.remarks) {
         response->message += "; " + remark;
       }
-      const std::lock_guard<std::mutex> lock(mutex_);
-      status_.rms_px = response->success != 0 ? result.rms_px : std::numeric_limits<double>::quiet_NaN();
+      status_->setRms(response->success != 0 ? result.rms_px : kUnknown);
     });
-    if (!done) {
+    if (!is_done) {
       response->success = 0;
-      response->message = guard_.lastError();
+      response->message = guard().lastError();
     }
     publish(response->success != 0 ? Status::DONE : Status::FAILED, response->message, 1.0);
-    return true;
   }
 
-  void publish(uint8_t state, const std::string& message, double progress) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    status_.header.stamp = ros::Time::now();
-    status_.state = state;
-    status_.message = message;
-    status_.progress = progress;
-    status_.missing = collector_->missing();
-    status_.num_views = static_cast<uint32_t>(collector_->images().size());
-    status_.covered_fraction = collector_->coveredFraction();
-    status_publisher_.publish(status_);
-  }
-
-  DriveMonitor::Report report() {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    DriveMonitor::Report report;
-    const bool bad = status_.state == Status::FAILED || guard_.numFailures() > reported_failures_;
-    report.level = bad                       ? DriveMonitor::Level::kError
-                   : status_.missing.empty() ? DriveMonitor::Level::kOk
-                                             : DriveMonitor::Level::kWarn;
-    report.message = guard_.numFailures() > reported_failures_ ? guard_.lastError()
-                     : status_.missing.empty()                 ? status_.message
-                                                               : "missing: " + status_.missing.front();
-    reported_failures_ = guard_.numFailures();
-    report.values = {{"views", std::to_string(status_.num_views)},
-                     {"covered_fraction", std::to_string(status_.covered_fraction)},
-                     {"last image", status_.message}};
-    return report;
+  void publish(uint8_t state, const std::string& text, double progress) {
+    status_->publish(state, text, progress, *collector_);
   }
 
   CalibrationBoard board_;
@@ -142,14 +108,8 @@ class IntrinsicCalibrationNodelet : public Nodelet {
   IntrinsicCalibrationOptions options_;
   std::unique_ptr<ViewCollector> collector_;
   std::string topic_;
-  CallbackGuard guard_{"intrinsic_calibration"};
-  std::mutex mutex_;  // diagnostics come from another thread
-  Status status_;
-  uint64_t reported_failures_ = 0;
-  ros::Publisher status_publisher_, image_publisher_;
-  ros::Subscriber images_;
-  ros::ServiceServer service_;
-  std::unique_ptr<NodeletDiagnostics> diagnostics_;
+  std::unique_ptr<CollectionStatus> status_;
+  ros::Publisher image_publisher_;
 };
 
 }  // namespace vcharge

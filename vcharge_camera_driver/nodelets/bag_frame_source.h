@@ -13,10 +13,10 @@
 
 namespace vcharge {
 
-/// A recorded or simulated drive, shown in real time as if cameras and wheels made it now.
+/// A recorded or simulated drive in real time, with current stamps.
 class BagFrameSource : public FrameSource, private DriveConsumer {
  public:
-  /// `ticks` takes the bag's wheel ticks, with their new stamps.
+  /// `ticks` receives the bag's wheel ticks with their new stamps.
   BagFrameSource(std::string bag, std::shared_ptr<const CameraRig> rig, std::vector<std::string> cameras,
                  double frame_rate_hz, ClockMap::Clock drive_clock,
                  std::function<void(const WheelTicks&)> ticks);
@@ -29,7 +29,7 @@ class BagFrameSource : public FrameSource, private DriveConsumer {
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& /*odometry*/) override {}
   void addWheelTicks(const WheelTicks& ticks) override;
-  /// Waits for the time of `stamp` and returns it in the drive's clock now.
+  /// Waits until the time of `stamp` and returns it on the current clock.
   Timestamp wait(Timestamp stamp);
   void end(const std::string& message);
 

@@ -7,12 +7,12 @@
 
 namespace vcharge {
 
-/// Of one camera.
+/// State of one camera.
 DriveMonitor::Report reportCamera(const std::string& name, const CameraStatus& status,
                                   const TriggerCameraCounts& counts);
-/// Of the groups; `before` holds the counts of the last report.
+/// State of the synchronization; `before`: the counts of the last report.
 DriveMonitor::Report reportSync(const TriggerGrouperCounts& now, const TriggerGrouperCounts& before);
-/// Of the bus.
+/// State of the CAN bus.
 DriveMonitor::Report reportCan(const CanStatus& status);
 
 }  // namespace vcharge

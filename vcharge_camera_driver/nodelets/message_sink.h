@@ -13,7 +13,7 @@
 
 namespace vcharge {
 
-/// Groups frames that lie in pooled messages, and passes the groups on.
+/// Groups frames whose pixels are in pooled messages, and passes the groups on.
 class MessageSink : public FrameSink {
  public:
   using GroupCallback = std::function<void(const MultiFrame&)>;
@@ -26,7 +26,8 @@ class MessageSink : public FrameSink {
   Duration idle() override;
   TriggerGrouperCounts counts() const;  ///< thread safe
 
-  /// The message in which an image of a group lies: mono8, complete but for its header, to be published once.
+  /// The message with the pixels of a group's image: mono8, complete except for its header, to be published
+  /// once.
   static sensor_msgs::ImagePtr messageOf(const Image& image);
 
  private:

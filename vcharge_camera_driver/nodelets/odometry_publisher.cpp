@@ -7,9 +7,9 @@
 namespace vcharge {
 namespace {
 
-constexpr double kHoldInPeriods = 1.5;  // an estimate waits for the next trigger, not for the one after it
+constexpr double kHoldInPeriods = 1.5;  // an estimate waits for the next trigger only
 constexpr double kMaxExtrapolation_s = 0.1;
-constexpr double kUnknownVariance = 1e6;  // of what wheels do not tell: height, roll, pitch
+constexpr double kUnknownVariance = 1e6;  // wheels do not measure height, roll and pitch
 
 nav_msgs::Odometry toMessage(const OdometryEstimate& estimate, const std::string& vehicle_frame) {
   nav_msgs::Odometry message = vcharge::toMessage(estimate.odometry, "odom", vehicle_frame);

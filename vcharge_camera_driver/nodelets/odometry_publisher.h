@@ -11,8 +11,8 @@
 
 namespace vcharge {
 
-/// Makes odometry of wheel ticks and publishes it as /odom and odom -> base_link, in order of stamps and with
-/// an estimate at each trigger. Thread safe.
+/// Computes odometry from wheel ticks and publishes it as /odom and odom -> base_link, in order of stamps and
+/// with an estimate at each trigger. Thread safe.
 class OdometryPublisher {
  public:
   OdometryPublisher(ros::NodeHandle* node, const WheelOdometryOptions& options, double frame_rate_hz,

@@ -8,7 +8,6 @@
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/dense_maps/height_map_file.h"
 #include "vcharge_ros/nodelet.h"
-#include "vcharge_ros/parameters.h"
 
 namespace vcharge {
 
@@ -16,27 +15,21 @@ namespace vcharge {
 /// /dense/octomap, in the map's frame. Does not load where the map cannot be read, and says why. Parameters:
 /// ~height_map (folder of build_height_map), ~drivability (DrivabilityOptions).
 class HeightMapPublisherNodelet : public Nodelet {
-  void initialize() override {
-    try {
-      publishMap();
-    } catch (const std::exception& error) {
-      NODELET_FATAL_STREAM(error.what());  // the manager would only tell that it did not load
-      throw;
-    }
-  }
+ public:
+  HeightMapPublisherNodelet() : Nodelet("height_map_publisher") {}
 
-  void publishMap() {
-    const std::string folder =
-        requireStringParameter(getPrivateNodeHandle(), "height_map", "the folder of a height map");
+ private:
+  void start() override {
+    const std::string folder = requireParameter("height_map", "the folder of a height map");
     DrivabilityOptions options;
-    readFieldsFromParameters(getPrivateNodeHandle(), "drivability", &options);
+    readOptions("drivability", &options);
     const HeightMap map = readHeightMap(folder);
     octomap::OcTree tree(1.0);
     const std::string tree_path = folder + "/octomap.bt";
     if (!tree.readBinary(tree_path)) {
       throw InputError(tree_path + ": expected an OctoMap (.bt)");
     }
-    publication_ = std::make_unique<HeightMapPublication>(&getNodeHandle());
+    publication_ = std::make_unique<HeightMapPublication>(&node());
     publication_->publish(map, classifyCells(map, options), tree);
     NODELET_INFO_STREAM(folder << ": " << map.height_m.cols << " x " << map.height_m.rows << " cells of "
                                << map.cell_size_m << " m");

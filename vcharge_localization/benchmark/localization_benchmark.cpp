@@ -1,5 +1,5 @@
-// The stages of a frame by four cameras in a map of 200,000 landmarks and 3.4 million observations, and
-// how long it takes until such a map is ready. Everything on as many threads as there are cores.
+// Times of the stages of a frame of four cameras in a map of 200,000 landmarks and 3.4 million observations,
+// and the time to load such a map. Uses all cores.
 
 #include <algorithm>
 #include <cmath>
@@ -22,14 +22,14 @@
 namespace vcharge {
 namespace {
 
-constexpr int kRounds = 68;  // circles of the vehicle, beside each other
+constexpr int kRounds = 68;  // circles of the vehicle, side by side
 constexpr int kKeyframesPerRound = 60;
 constexpr int kLandmarksPerRound = 3000;
-constexpr int kNeighbours = 5;  // keyframes before and behind its own that see a landmark
+constexpr int kNeighbours = 5;  // keyframes before and after its own that observe a landmark
 constexpr double kRadius_m = 20.0, kSpacing_m = 100.0;
 constexpr double kPi = 3.14159265358979323846;
 
-/// Four times the analytic map's front camera, to all sides.
+/// Four copies of the analytic map's front camera, one to each side.
 CameraRig makeRig() {
   AnalyticMapOptions options;
   options.num_keyframes = options.num_landmarks = 1;
@@ -53,7 +53,7 @@ RigidTransform poseOf(int round, double angle) {
                                 kRadius_m * (1.0 - std::cos(angle)), angle);
 }
 
-/// Adds a landmark where keyframes of its round see it.
+/// Adds a landmark that keyframes of its round observe.
 void addLandmark(int round, std::mt19937* random, SparseMapContents* contents) {
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   const int own = std::min(kKeyframesPerRound - 1, static_cast<int>(unit(*random) * kKeyframesPerRound));
@@ -89,7 +89,7 @@ void addLandmark(int round, std::mt19937* random, SparseMapContents* contents) {
   }
 }
 
-/// Each landmark's own descriptor, with other bits flipped in every observation.
+/// The descriptor of each landmark, with different bits flipped in every observation.
 void addDescriptors(SparseMapContents* contents) {
   const int num_landmarks = static_cast<int>(contents->landmarks.size());
   cv::Mat of_landmarks(num_landmarks, 32, CV_8UC1);
@@ -227,7 +227,7 @@ void prepareMap(benchmark::State& state) {
 }
 BENCHMARK(prepareMap)->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
 
-/// All that happens between the start and the first frame.
+/// Everything between the start and the first frame.
 void readAndPrepareMap(benchmark::State& state) {
   const auto rig = largeRig();
   writeSparseMap(*largeMap(), {}, mapPath());

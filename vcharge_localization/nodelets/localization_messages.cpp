@@ -74,12 +74,12 @@ vcharge_msgs::LocalizationStatus toStatusMessage(const LocalizationResult& resul
   return message;
 }
 
-visualization_msgs::Marker toSightingMarker(const LocalizationResult& result, const CameraRig& rig,
-                                            const SparseMap& map, const std::string& map_frame) {
+visualization_msgs::Marker toObservationMarker(const LocalizationResult& result, const CameraRig& rig,
+                                               const SparseMap& map, const std::string& map_frame) {
   visualization_msgs::Marker marker;
   marker.header.stamp = fromTimestamp(result.stamp);
   marker.header.frame_id = map_frame;
-  marker.ns = "sightings";
+  marker.ns = "observations";
   marker.type = visualization_msgs::Marker::LINE_LIST;
   marker.pose.orientation.w = 1.0;
   marker.scale.x = 0.01;
@@ -87,11 +87,11 @@ visualization_msgs::Marker toSightingMarker(const LocalizationResult& result, co
     marker.action = visualization_msgs::Marker::DELETE;
     return marker;
   }
-  for (const LandmarkObservation& sighting : result.fix.inliers) {
-    const auto camera = static_cast<size_t>(sighting.camera);
+  for (const auto& observation : result.fix.inliers) {
+    const auto camera = static_cast<size_t>(observation.camera);
     marker.points.push_back(
         toPoint(result.pose->map_from_vehicle * rig.cameras[camera].vehicle_from_camera->translation()));
-    marker.points.push_back(toPoint(map.landmarks()[static_cast<size_t>(sighting.landmark)].position_m));
+    marker.points.push_back(toPoint(map.landmarks()[static_cast<size_t>(observation.landmark)].position_m));
     marker.colors.insert(marker.colors.end(), 2, colourOf(camera));
   }
   return marker;
@@ -112,7 +112,7 @@ PosePrior fromMessage(const geometry_msgs::PoseWithCovarianceStamped& message, c
   if (!prior.covariance.allFinite() || prior.covariance.diagonal().minCoeff() < 0.0) {
     throw InputError(source + ": expected a finite covariance");
   }
-  // rviz tells x, y and yaw alone.
+  // rviz sets the variances of x, y and yaw only.
   for (int i = 0; i < 6; ++i) {
     if (prior.covariance(i, i) == 0.0) {
       const double sigma = i < 3 ? kInitialSigma_m : kInitialSigma_rad;

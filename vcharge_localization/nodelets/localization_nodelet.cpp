@@ -1,6 +1,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <tf2_ros/transform_broadcaster.h>
@@ -10,109 +11,76 @@
 #include "localization_report.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
-#include "vcharge_core/workers/newest_first_worker.h"
 #include "vcharge_localization/drive_localizer.h"
 #include "vcharge_ros/conversions.h"
-#include "vcharge_ros/live_drive_source.h"
+#include "vcharge_ros/live_queue.h"
 #include "vcharge_ros/nodelet.h"
-#include "vcharge_ros/nodelet_support.h"
-#include "vcharge_ros/parameters.h"
 
 namespace vcharge {
 
 /// The vehicle's pose in a map, of a live or replayed drive. Publishes /localization/pose (while it is
-/// known), /localization/status (every frame), /localization/sightings (markers), map -> odom on /tf, and a
-/// status in /diagnostics; /initialpose seeds it. Parameters: ~rig, ~map (paths), ~options
-/// (DriveLocalizerOptions), ~source (LiveDriveSourceOptions), ~topics, ~map_frame, ~odom_frame,
-/// ~lossless_replay (every frame in order, as localize_drive; otherwise the newest first, drops are counted).
+/// known), /localization/status (every frame), /localization/observations (markers), map -> odom on /tf, and
+/// a status in /diagnostics; /initialpose seeds it. Parameters: ~rig, ~map (paths), ~options
+/// (DriveLocalizerOptions), ~source (LiveDriveSourceOptions), ~map_frame, ~odom_frame, ~lossless_replay
+/// (every frame in order, as localize_drive; otherwise the newest first, and drops are counted).
 class LocalizationNodelet : public Nodelet {
  public:
-  ~LocalizationNodelet() override {
-    diagnostics_.clear();
-    initial_pose_subscriber_.shutdown();
-    source_.reset();  // no callback any more, hence no frame
-    worker_.reset();
-  }
+  LocalizationNodelet() : Nodelet("localization") {}
+  ~LocalizationNodelet() override { end(); }
 
  private:
-  void initialize() override {
-    try {
-      start();
-    } catch (const std::exception& error) {
-      NODELET_FATAL_STREAM(error.what());  // the manager would only tell that it did not load
-      throw;
-    }
-  }
+  using InitialPose = geometry_msgs::PoseWithCovarianceStamped;
 
-  void start() {
-    node_ = getNodeHandle();
-    ros::NodeHandle& private_node = getPrivateNodeHandle();
-    const std::string rig_path = requireStringParameter(private_node, "rig", "the path of a rig.yaml");
-    rig_ = std::make_shared<const CameraRig>(readCameraRig(rig_path));
+  void start() override {
+    rig_ = readRig();
     if (!rig_->hasExtrinsics()) {
-      throw InputError(rig_path + ": expected vehicle_from_camera of every camera");
+      throw InputError(requireParameter("rig", "") + ": expected vehicle_from_camera of every camera");
     }
-    const std::string map_path = requireStringParameter(private_node, "map", "the path of a map (*.vmap)");
-    private_node.param("map_frame", map_frame_, map_frame_);
-    private_node.param("odom_frame", odom_frame_, odom_frame_);
-    const bool lossless = private_node.param("lossless_replay", false);
+    const std::string map_path = requireParameter("map", "the path of a map (*.vmap)");
+    map_frame_ = parameter("map_frame", map_frame_);
+    odom_frame_ = parameter("odom_frame", odom_frame_);
     DriveLocalizerOptions options;
-    readFieldsFromParameters(private_node, "options", &options);
-    LiveDriveSourceOptions source_options;
-    if (lossless) {
-      source_options.takeEverything();
+    if (isLossless()) {
+      options.frames.waitForEverything();
     }
-    readFieldsFromParameters(private_node, "source", &source_options);
+    readOptions("options", &options);
+    openSource(rig_);
     localizer_ = std::make_unique<DriveLocalizer>(readSparseMap(map_path), rig_, options);
 
-    pose_ = node_.advertise<geometry_msgs::PoseWithCovarianceStamped>("/localization/pose", 10);
-    status_ = node_.advertise<vcharge_msgs::LocalizationStatus>("/localization/status", 10);
-    sightings_ = node_.advertise<visualization_msgs::Marker>("/localization/sightings", 2);
+    pose_ = node().advertise<geometry_msgs::PoseWithCovarianceStamped>("/localization/pose", 10);
+    status_ = node().advertise<vcharge_msgs::LocalizationStatus>("/localization/status", 10);
+    observations_ = node().advertise<visualization_msgs::Marker>("/localization/observations", 2);
     broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
-    if (!lossless) {
-      worker_ = std::make_unique<NewestFirstWorker<LocalizationFrame>>(
-          [this](const LocalizationFrame& frame) { localize(frame); });
-    }
-    assembler_ = std::make_unique<FrameAssembler>(rig_->cameras.size(), options.frames,
-                                                  [this](LocalizationFrame frame) {
-                                                    if (worker_) {
-                                                      worker_->push(0, std::move(frame));
-                                                    } else {
-                                                      localize(frame);
-                                                    }
-                                                  });
-    source_ = std::make_unique<LiveDriveSource>(node_, rig_, source_options);
-    diagnostics_.push_back(std::make_unique<NodeletDiagnostics>(node_, private_node, getName(),
-                                                                [this] { return source_->report(); }));
-    diagnostics_.push_back(std::make_unique<NodeletDiagnostics>(
-        node_, private_node, getName() + "/pose",
-        [this] { return report_.report(guard_, worker_ ? worker_->numDropped(0) : 0); }));
-    source_->run(assembler_.get(), DriveSource::ProgressCallback());
-    initial_pose_subscriber_ = node_.subscribe<geometry_msgs::PoseWithCovarianceStamped>(
-        "/initialpose", 1,
-        boost::function<void(const geometry_msgs::PoseWithCovarianceStampedConstPtr&)>(
-            [this](const geometry_msgs::PoseWithCovarianceStampedConstPtr& message) {
-              guard_.run([&] {
-                const PosePrior prior = fromMessage(*message, "/initialpose", map_frame_);
-                const std::lock_guard<std::mutex> lock(mutex_);
-                localizer_->seed(prior);
-              });
-            }));
+    queue_ = std::make_unique<LiveQueue<ImageFrame>>(
+        isLossless(), [this](const ImageFrame& frame) { guard().run([&] { localize(frame); }); });
+    assembler_ = std::make_unique<ImageFrameAssembler>(
+        rig_->cameras.size(), options.frames,
+        [this](ImageFrame frame) { queue_->push(0, std::move(frame)); });
+    addDiagnostics(
+        "/pose", [this] { return report_.report(queue_->numDropped(0), assembler_->counters()); },
+        Threads::kOne);
+    subscribe<InitialPose>("/initialpose", 1,
+                           [this](const InitialPose::ConstPtr& message) { seed(*message); });
+    runSource(assembler_.get());
   }
 
-  void localize(const LocalizationFrame& frame) {
-    guard_.run([&] {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      publish(localizer_->process(frame));
-    });
+  void seed(const InitialPose& message) {
+    const PosePrior prior = fromMessage(message, "/initialpose", map_frame_);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    localizer_->seed(prior);
+  }
+
+  void localize(const ImageFrame& frame) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    publish(localizer_->process(frame));
   }
 
   void publish(const LocalizationResult& result) {
     const vcharge_msgs::LocalizationStatus status = toStatusMessage(result, *rig_, map_frame_);
     status_.publish(status);
     report_.add(status);
-    if (sightings_.getNumSubscribers() > 0) {
-      sightings_.publish(toSightingMarker(result, *rig_, localizer_->localizer().map(), map_frame_));
+    if (observations_.getNumSubscribers() > 0) {
+      observations_.publish(toObservationMarker(result, *rig_, localizer_->localizer().map(), map_frame_));
     }
     if (!result.pose) {
       return;
@@ -125,20 +93,15 @@ class LocalizationNodelet : public Nodelet {
     }
   }
 
-  ros::NodeHandle node_;
   std::shared_ptr<const CameraRig> rig_;
   std::string map_frame_ = "map", odom_frame_ = "odom";
-  CallbackGuard guard_{"localization"};
-  std::mutex mutex_;  // of the localizer
+  std::mutex mutex_;  // guards the localizer
   std::unique_ptr<DriveLocalizer> localizer_;
-  std::unique_ptr<FrameAssembler> assembler_;
-  std::unique_ptr<NewestFirstWorker<LocalizationFrame>> worker_;
-  std::unique_ptr<LiveDriveSource> source_;
+  std::unique_ptr<ImageFrameAssembler> assembler_;
   std::unique_ptr<tf2_ros::TransformBroadcaster> broadcaster_;
-  ros::Publisher pose_, status_, sightings_;
-  ros::Subscriber initial_pose_subscriber_;
+  ros::Publisher pose_, status_, observations_;
   LocalizationReport report_;
-  std::vector<std::unique_ptr<NodeletDiagnostics>> diagnostics_;
+  std::unique_ptr<LiveQueue<ImageFrame>> queue_;
 };
 
 }  // namespace vcharge

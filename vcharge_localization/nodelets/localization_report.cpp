@@ -12,7 +12,7 @@ void LocalizationReport::add(const vcharge_msgs::LocalizationStatus& status) {
   ++num_frames_;
 }
 
-DriveMonitor::Report LocalizationReport::report(const CallbackGuard& guard, uint64_t num_dropped) {
+DriveMonitor::Report LocalizationReport::report(uint64_t num_dropped, const FrameCounters& counters) {
   const std::lock_guard<std::mutex> lock(mutex_);
   DriveMonitor::Report report;
   report.level = DriveMonitor::Level::kWarn;
@@ -29,15 +29,11 @@ DriveMonitor::Report LocalizationReport::report(const CallbackGuard& guard, uint
       report.message += "; " + warning;
     }
   }
-  if (guard.numFailures() > reported_failures_) {
-    reported_failures_ = guard.numFailures();
-    report.level = DriveMonitor::Level::kError;
-    report.message = guard.lastError();
-  }
   report.values.emplace_back("frames", std::to_string(num_frames_));
   report.values.emplace_back("dropped", std::to_string(num_dropped));
   report.values.emplace_back("inliers", std::to_string(last_.num_inliers));
   report.values.emplace_back("position_sigma_m", std::to_string(last_.position_sigma_m));
+  addCounters(counters, &report);
   return report;
 }
 

@@ -10,18 +10,17 @@
 
 namespace vcharge {
 
-/// What /diagnostics tells of the pose: good while it is localized and no camera is blamed. Thread safe.
+/// The status of the pose on /diagnostics: good while it is localized and no camera has a warning. Thread
+/// safe.
 class LocalizationReport {
  public:
   void add(const vcharge_msgs::LocalizationStatus& status);
-
-  /// Of the frames so far; an error of the callbacks is reported once.
-  DriveMonitor::Report report(const CallbackGuard& guard, uint64_t num_dropped);
+  DriveMonitor::Report report(uint64_t num_dropped, const FrameCounters& counters);
 
  private:
   std::mutex mutex_;
   vcharge_msgs::LocalizationStatus last_;
-  uint64_t num_frames_ = 0, reported_failures_ = 0;
+  uint64_t num_frames_ = 0;
 };
 
 }  // namespace vcharge

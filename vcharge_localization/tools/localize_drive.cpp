@@ -61,7 +61,7 @@ void localizeDrive(const Arguments& arguments, const DriveLocalizerOptions& opti
   log << localizationHeader(*rig) << "\n";
   LocalizationSummary summary;
   ContentHasher hasher;
-  FrameAssembler assembler(rig->cameras.size(), options.frames, [&](LocalizationFrame frame) {
+  ImageFrameAssembler assembler(rig->cameras.size(), options.frames, [&](ImageFrame frame) {
     if (!experiment.apply(&frame)) {
       return;
     }
@@ -80,7 +80,7 @@ void localizeDrive(const Arguments& arguments, const DriveLocalizerOptions& opti
     }
   });
   BagDriveSourceOptions source_options;
-  source_options.max_image_gap_s = INFINITY;  // a camera that stops is borne, and told of
+  source_options.max_image_gap_s = INFINITY;  // a camera that stops is reported, but is no error
   BagDriveSource source(arguments.bag, rig, source_options);
   {
     ProgressBar progress("localizing");
@@ -137,6 +137,7 @@ int main(int argc, char** argv) {
       "warnings (text, num_frames), content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     DriveLocalizerOptions options;
+    options.frames.waitForEverything();
     if (!arguments.options.empty()) {
       readFieldsFromFile(arguments.options, &options);
     }

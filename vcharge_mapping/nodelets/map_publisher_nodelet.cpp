@@ -1,11 +1,9 @@
-#include <exception>
 #include <memory>
 
 #include <pluginlib/class_list_macros.hpp>
 
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_ros/nodelet.h"
-#include "vcharge_ros/parameters.h"
 #include "vcharge_ros/sparse_map_conversions.h"
 
 namespace vcharge {
@@ -13,25 +11,18 @@ namespace vcharge {
 /// Publishes a saved map once, latched: /mapping/landmarks, /mapping/trajectory and /mapping/loop_edges, in
 /// the frame `map`. Does not load where the map cannot be read, and says why. Parameters: ~map (path).
 class MapPublisherNodelet : public Nodelet {
-  void initialize() override {
-    try {
-      publishMap();
-    } catch (const std::exception& error) {
-      NODELET_FATAL_STREAM(error.what());  // the manager would only tell that it did not load
-      throw;
-    }
-  }
+ public:
+  MapPublisherNodelet() : Nodelet("map_publisher") {}
 
-  void publishMap() {
-    const std::string path =
-        requireStringParameter(getPrivateNodeHandle(), "map", "the path of a map (*.vmap)");
+ private:
+  void start() override {
+    const std::string path = requireParameter("map", "the path of a map (*.vmap)");
     const auto map = readSparseMap(path);
-    ros::NodeHandle& node = getNodeHandle();
-    landmarks_ = node.advertise<sensor_msgs::PointCloud2>("/mapping/landmarks", 1, true);
+    landmarks_ = advertiseLatched<sensor_msgs::PointCloud2>("/mapping/landmarks");
     landmarks_.publish(makeLandmarkCloud(*map));
-    trajectory_ = node.advertise<nav_msgs::Path>("/mapping/trajectory", 1, true);
+    trajectory_ = advertiseLatched<nav_msgs::Path>("/mapping/trajectory");
     trajectory_.publish(makePath(*map));
-    loop_edges_ = node.advertise<visualization_msgs::MarkerArray>("/mapping/loop_edges", 1, true);
+    loop_edges_ = advertiseLatched<visualization_msgs::MarkerArray>("/mapping/loop_edges");
     loop_edges_.publish(makeLoopEdgeMarkers(*map));
     NODELET_INFO_STREAM(path << ": " << map->keyframes().size() << " keyframes, " << map->landmarks().size()
                              << " landmarks, content hash " << map->contentHash());

@@ -9,6 +9,7 @@
 #include <octomap/OcTree.h>
 
 #include "detection/box_world.h"
+#include "range_map_reader.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_ros/range_map_conversions.h"
 

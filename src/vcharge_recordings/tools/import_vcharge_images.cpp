@@ -19,7 +19,7 @@ cv::Mat readGray(const vcharge::VchargeRecording::ImageFile& file, const vcharge
   return image;
 }
 
-/// Both files or none: the bag appears once the rig could be written.
+/// Writes both files or none: the bag gets its name once the rig is written.
 void writeDriveAndRig(const vcharge::VchargeRecording& recording, const std::string& path,
                       const std::string& rig_path) {
   vcharge::DriveBagWriter writer(path, recording.rig);

@@ -11,23 +11,25 @@
 
 namespace vcharge {
 
-/// Tells where the images of a topic lie in memory, to see whether nodelets of one manager share them or are
-/// given copies: subscribes to `image`, publishes on ~buffers a KeyValue of the stamp (nanoseconds) and the
-/// address of the first pixel. It keeps the last images, so that no address comes again by chance.
+/// Test tool: shows whether nodelets of one manager share images or get copies. Subscribes to `image` and
+/// publishes on ~buffers a KeyValue of the stamp (nanoseconds) and the address of the first pixel. Keeps the
+/// last images so that no address is used twice.
 class BufferProbeNodelet : public Nodelet {
+ public:
+  BufferProbeNodelet() : Nodelet("buffer_probe") {}
+  ~BufferProbeNodelet() override { end(); }
+
  private:
   static constexpr uint32_t kQueueSize = 50;
   static constexpr size_t kKept = 20;
 
-  void initialize() override {
-    buffers_ = getPrivateNodeHandle().advertise<diagnostic_msgs::KeyValue>("buffers", kQueueSize);
-    images_ = getNodeHandle().subscribe<sensor_msgs::Image>(
-        "image", kQueueSize,
-        boost::function<void(const sensor_msgs::ImageConstPtr&)>(
-            [this](const sensor_msgs::ImageConstPtr& image) { tell(image); }));
+  void start() override {
+    buffers_ = privateNode().advertise<diagnostic_msgs::KeyValue>("buffers", kQueueSize);
+    subscribe<sensor_msgs::Image>("image", kQueueSize,
+                                  [this](const sensor_msgs::ImageConstPtr& image) { publish(image); });
   }
 
-  void tell(const sensor_msgs::ImageConstPtr& image) {
+  void publish(const sensor_msgs::ImageConstPtr& image) {
     kept_[next_++ % kKept] = image;
     diagnostic_msgs::KeyValue message;
     message.key = std::to_string(image->header.stamp.toNSec());
@@ -38,7 +40,6 @@ class BufferProbeNodelet : public Nodelet {
   std::array<sensor_msgs::ImageConstPtr, kKept> kept_;
   size_t next_ = 0;
   ros::Publisher buffers_;
-  ros::Subscriber images_;
 };
 
 }  // namespace vcharge

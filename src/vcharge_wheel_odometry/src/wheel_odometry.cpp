@@ -8,16 +8,20 @@
 namespace vcharge {
 namespace {
 
-// Errors of neighbouring counts are alike: so many of them are worth one.
+// Errors of successive counts are correlated: this many of them count as one measurement.
 constexpr double kCountsPerIndependentOne = 4.0;
-// Straight ahead both wheels tick alike: the error of their difference changes over about this time.
+// Straight ahead both wheels tick alike, so the error of their difference changes over about this time.
 constexpr double kDifferenceCorrelation_s = 1.0;
-constexpr double kYawNoise_rad = 2e-4;           // per root of a second, of the bicycle model
-constexpr double kZeroNoise_per_m = 3e-5;        // drift of the steering's zero, per root of a second
-constexpr double kZeroSigma_per_m = 0.01;        // at the start: 1.5 degrees of steering
-constexpr double kSteeredYawAcceleration = 1.0;  // rad/s^2 per root of a second: steering tells the rest
-constexpr double kMaxSpeed_m_per_s = 60.0;       // a counter that goes faster was reset
+constexpr double kYawNoise_rad = 2e-4;     // per root of a second; error of the bicycle model
+constexpr double kZeroNoise_per_m = 3e-5;  // drift of the steering's zero, per root of a second
+constexpr double kZeroSigma_per_m = 0.01;  // at the start: 1.5 degrees of steering
+constexpr double kSteeredYawAcceleration =
+    1.0;                                    // rad/s^2 per root of a second, beside what steering explains
+constexpr double kMaxSpeed_m_per_s = 60.0;  // a counter that goes faster was reset
 constexpr double kYawRateFloor_rad_per_s = 1e-3;
+constexpr double kSlipWindow_s = 0.5;   // period in which wheels and steering are compared
+constexpr double kSlipFraction = 0.25;  // of the turn: steering angles are less exact in tight turns
+constexpr double kStandstill_s = 0.3;   // without a tick
 
 double square(double value) {
   return value * value;
@@ -42,23 +46,6 @@ void kalmanUpdate(const Eigen::Matrix<double, 1, kSize>& row, double innovation,
 }
 
 }  // namespace
-
-void WheelOdometryOptions::validate() const {
-  const auto positive = [](const char* field, double value) {
-    requireField(std::isfinite(value) && value > 0.0, field, "must be positive", value);
-  };
-  positive("track_width_m", track_width_m);
-  positive("wheelbase_m", wheelbase_m);
-  positive("max_acceleration_m_per_s2", max_acceleration_m_per_s2);
-  positive("max_yaw_acceleration_rad_per_s2", max_yaw_acceleration_rad_per_s2);
-  positive("steering_noise_per_m", steering_noise_per_m);
-  positive("slip_window_s", slip_window_s);
-  positive("slip_yaw_rad", slip_yaw_rad);
-  positive("slip_share", slip_share);
-  positive("distance_error_share", distance_error_share);
-  positive("yaw_error_rad_per_m", yaw_error_rad_per_m);
-  positive("standstill_s", standstill_s);
-}
 
 WheelOdometry::WheelOdometry(const WheelOdometryOptions& options) : options_(options) {
   options.validate();
@@ -94,7 +81,7 @@ void WheelOdometry::predict(double dt_s, double steered_curvature) {
 
 void WheelOdometry::checkSlip(const Sample& sample) {
   window_.push_back(sample);
-  while (toSeconds(sample.stamp - window_.front().stamp) > options_.slip_window_s) {
+  while (toSeconds(sample.stamp - window_.front().stamp) > kSlipWindow_s) {
     window_.pop_front();
   }
   const Sample& first = window_.front();
@@ -103,10 +90,10 @@ void WheelOdometry::checkSlip(const Sample& sample) {
   const double steered_rad = sample.steered_yaw_rad - first.steered_yaw_rad;
   const double wheels_rad = (right_m - left_m) / options_.track_width_m;
   const bool slips = std::abs(wheels_rad - steered_rad) >
-                     std::max(options_.slip_yaw_rad, options_.slip_share * std::abs(steered_rad));
+                     std::max(options_.slip_yaw_rad, kSlipFraction * std::abs(steered_rad));
   if (slips && !counts_.slipping) {
     ++counts_.slips;
-    // The one that changed its speed more than the car could.
+    // The slipping wheel changed its speed more than a car can.
     const double before_m = first.speed_m_per_s * toSeconds(sample.stamp - first.stamp);
     const double half_turn_m = 0.5 * steered_rad * options_.track_width_m;
     left_slips_ = std::abs(left_m - (before_m - half_turn_m)) > std::abs(right_m - (before_m + half_turn_m));
@@ -118,7 +105,7 @@ void WheelOdometry::correct(double dt_s, double tick_m, double steered_curvature
   const double left_m = left_m_;
   const double right_m = right_m_;
   if (counts_.slipping) {
-    // The wheel that slips is where the other one and the steering put it.
+    // The position of the slipping wheel follows from the other wheel and the steering.
     const double apart_m = options_.track_width_m * turn_[0];
     (left_slips_ ? left_excess_m_ : right_excess_m_) = left_slips_
                                                            ? left_m - (right_m - right_excess_m_ - apart_m)
@@ -144,31 +131,31 @@ void WheelOdometry::correct(double dt_s, double tick_m, double steered_curvature
   }
 }
 
-// No tick for a while: wherever in their ticks the wheels are, they do not move.
+// Without ticks for a while the wheels stand, at an unknown position within their ticks.
 void WheelOdometry::stand() {
   along_[1] = 0.0;
   turn_[1] = 0.0;
   along_covariance_(0, 1) = along_covariance_(1, 0) = 0.0;
-  along_covariance_(1, 1) = 1.0;  // it may start at any moment
+  along_covariance_(1, 1) = 1.0;  // the vehicle may start at any moment
   turn_covariance_.row(1).setZero();
   turn_covariance_.col(1).setZero();
   turn_covariance_(1, 1) = 0.1;
 }
 
 OdometryEstimate WheelOdometry::estimate(Timestamp stamp, double distance_m, double turn_rad) {
-  // Errors of the arc in the vehicle's frame, carried on by the pose (first order).
+  // First-order propagation of the errors of the arc.
   const double heading = yaw_rad_ + 0.5 * turn_rad;
-  Eigen::Matrix3d carry = Eigen::Matrix3d::Identity();
-  carry(0, 2) = -distance_m * std::sin(heading);
-  carry(1, 2) = distance_m * std::cos(heading);
+  Eigen::Matrix3d propagation = Eigen::Matrix3d::Identity();
+  propagation(0, 2) = -distance_m * std::sin(heading);
+  propagation(1, 2) = distance_m * std::cos(heading);
   const Eigen::Vector3d along(std::cos(heading), std::sin(heading), 0.0);
   const double slip_factor = counts_.slipping ? 10.0 : 1.0;
-  // A wrong radius goes one way: its variance grows with the distance times the distance since the start,
-  // here bounded by a random walk in steps of a metre.
-  const double distance_variance = square(slip_factor * options_.distance_error_share) * std::abs(distance_m);
+  // The error of a wrong radius grows linearly with the distance; it is modelled as a random walk with steps
+  // of a metre.
+  const double distance_variance = square(slip_factor * options_.distance_error_ratio) * std::abs(distance_m);
   const double yaw_variance = square(slip_factor * options_.yaw_error_rad_per_m) * std::abs(distance_m);
-  pose_covariance_ =
-      carry * pose_covariance_ * carry.transpose() + distance_variance * along * along.transpose();
+  pose_covariance_ = propagation * pose_covariance_ * propagation.transpose() +
+                     distance_variance * along * along.transpose();
   pose_covariance_(2, 2) += yaw_variance;
   odom_from_vehicle_ = odom_from_vehicle_ * arc(distance_m, turn_rad);
   yaw_rad_ += turn_rad;
@@ -208,7 +195,7 @@ std::optional<OdometryEstimate> WheelOdometry::add(const WheelTicks& ticks) {
           tick_m >
       kMaxSpeed_m_per_s * dt_s + 4.0 * tick_m;
   last_ = ticks;
-  if (jumped) {  // the counters began anew: how far the car went meanwhile only its speed can say
+  if (jumped) {  // the counters were reset: the distance in between follows from the speed
     ++counts_.resets;
     left_m_ = along_[0] + along_[1] * dt_s - 0.5 * options_.track_width_m * (turn_[0] + turn_[1] * dt_s) +
               left_excess_m_;
@@ -222,7 +209,7 @@ std::optional<OdometryEstimate> WheelOdometry::add(const WheelTicks& ticks) {
   if (left_change != 0 || right_change != 0) {
     last_motion_ = ticks.stamp;
   }
-  counts_.standing = toSeconds(ticks.stamp - last_motion_) >= options_.standstill_s;
+  counts_.standing = toSeconds(ticks.stamp - last_motion_) >= kStandstill_s;
   if (counts_.standing) {
     stand();
     window_.clear();

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -11,9 +10,8 @@
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/camera/working_camera.h"
 #include "vcharge_core/dense_maps/range_map.h"
-#include "vcharge_core/frames/drive_source.h"
+#include "vcharge_core/frames/frame_assembler.h"
 #include "vcharge_core/motion/trajectory.h"
-#include "vcharge_core/motion/vehicle_odometry.h"
 #include "vcharge_dense/neighbour_selection.h"
 #include "vcharge_dense/plane_sweep.h"
 
@@ -38,10 +36,11 @@ struct RangeMapperOptions {
   VCHARGE_OPTION_GROUP(WorkingCameraOptions, working_camera, {}, "Undistorted images that are swept.");
   VCHARGE_OPTION_GROUP(NeighbourOptions, neighbours, {}, "Images that a reference is matched with.");
   VCHARGE_OPTION_GROUP(PlaneSweepOptions, plane_sweep, {}, "Planes, scores and limits of reported ranges.");
-  VCHARGE_OPTION_GROUP(OdometryBufferOptions, odometry, {}, "Interpolation of the vehicle's poses.");
+  VCHARGE_OPTION_GROUP(FrameAssemblerOptions, frames, {}, "Images of one stamp, and odometry.");
   VCHARGE_END_OPTIONS();
 
   RangeMapperOptions() {
+    frames.max_speed_m_per_s = 60.0;
     plane_sweep.refine_poses = true;  // the poses of a drive usually come from odometry
     plane_sweep.coarse_pass = true;
   }
@@ -70,7 +69,7 @@ struct RangeMapperStatus {
   RangeMapperState state = RangeMapperState::kNoImages;
   std::string message;          ///< one line for the user
   uint64_t images = 0;          ///< received
-  uint64_t ignored_images = 0;  ///< stamp not after the previous one
+  uint64_t ignored_images = 0;  ///< repeated, or too late for their frame
   uint64_t without_pose = 0;
   uint64_t standing = 0;
   uint64_t without_neighbours = 0;
@@ -102,7 +101,7 @@ class RangeMapper : public DriveConsumer {
   RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapperOptions& options, TaskCallback on_task);
   ~RangeMapper() override;
 
-  /// Uses these poses instead of odometry, interpolated over gaps of at most odometry.max_gap_s.
+  /// Uses these poses instead of odometry, interpolated over gaps of at most frames.max_odometry_gap_s.
   void setTrajectory(const Trajectory& world_from_vehicle);
 
   /// Throws std::logic_error for an image of another size or type than the rig's.
@@ -117,13 +116,14 @@ class RangeMapper : public DriveConsumer {
 
   /// Status of the cameras in use, in the rig's order.
   std::vector<RangeMapperStatus> status() const;
+  const FrameCounters& counters() const { return assembler_->counters(); }
 
  private:
   struct Camera;
 
-  bool addPosedImage(Camera* camera, Timestamp stamp, const Image& image);
-  void processWaiting(Camera* camera);
-  void restart(Camera* camera, const std::string& reason);
+  void process(const ImageFrame& frame);
+  void placeImage(Camera* camera, const ImageFrame& frame);
+  void startOver(DriveBreak drive_break);
   void addFrame(Camera* camera, const SweepImage& frame);
   void emitReferences(Camera* camera, bool drive_is_over);
   void emitReference(Camera* camera, size_t index);
@@ -131,10 +131,8 @@ class RangeMapper : public DriveConsumer {
   const std::shared_ptr<const CameraRig> rig_;
   const RangeMapperOptions options_;
   const TaskCallback on_task_;
-  OdometryBuffer poses_;
-  bool poses_are_given_ = false;
   std::vector<std::unique_ptr<Camera>> cameras_;  // indexed as in the rig; null: not in use
-  std::optional<Timestamp> newest_image_;
+  std::unique_ptr<ImageFrameAssembler> assembler_;
 };
 
 }  // namespace vcharge

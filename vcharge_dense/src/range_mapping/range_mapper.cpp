@@ -1,7 +1,6 @@
 #include "vcharge_dense/range_mapper.h"
 
-#include <algorithm>
-#include <limits>
+#include <deque>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -11,15 +10,8 @@
 namespace vcharge {
 namespace {
 
-// Images that wait for odometry: two seconds at 12.5 Hz.
-constexpr size_t kMaxWaitingImages = 25;
-// A stamp this far before the newest one means that a drive is replayed; images that are less late are
-// ignored.
-constexpr double kReplay_s = 1.0;
 // A camera that moved less than this since its last image stands: there is no parallax.
 constexpr double kMinMotion_m = 0.03;
-// Poses that move faster than this have jumped.
-constexpr double kMaxSpeed_m_per_s = 60.0;
 // A camera whose newest image is older than this, against the other cameras, has stopped.
 constexpr double kMaxImageGap_s = 1.0;
 
@@ -28,15 +20,11 @@ struct Frame {
   double path_m;  // length of the camera's path up to this frame
 };
 
-struct WaitingImage {
-  Timestamp stamp;
-  Image image;
-};
-
 }  // namespace
 
 RangeMapperOptions RangeMapperOptions::offline() {
   RangeMapperOptions options;
+  options.frames.waitForEverything();
   options.use_later_images = true;
   options.plane_sweep.aggregation = Aggregation::kReferenceSplit;
   return options;
@@ -80,16 +68,14 @@ struct RangeMapper::Camera {
   RigidTransform vehicle_from_camera;
   WorkingCamera working_camera;
   PlaneSweep plane_sweep;
-  std::deque<WaitingImage> waiting;
   std::deque<Frame> frames;
   size_t next_reference = 0;  // the first frame that was not yet passed on
-  std::optional<Timestamp> newest;
   RangeMapperStatus status;
 };
 
 RangeMapper::RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapperOptions& options,
                          TaskCallback on_task)
-    : rig_(std::move(rig)), options_(options), on_task_(std::move(on_task)), poses_(options.odometry) {
+    : rig_(std::move(rig)), options_(options), on_task_(std::move(on_task)) {
   options_.validate();
   cameras_.resize(rig_->cameras.size());
   std::vector<size_t> used;
@@ -117,113 +103,70 @@ RangeMapper::RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapper
                    working,
                    PlaneSweep(working.model(), working.validMask(), options_.plane_sweep, ground),
                    {},
-                   {},
                    0,
-                   std::nullopt,
                    {}});
     cameras_[index]->status.camera_name = camera.name;
     cameras_[index]->status.message = "no image yet";
   }
+  std::vector<bool> is_used;
+  for (const std::unique_ptr<Camera>& camera : cameras_) {
+    is_used.push_back(camera != nullptr);
+  }
+  assembler_ = std::make_unique<ImageFrameAssembler>(
+      cameras_.size(), options_.frames, [this](const ImageFrame& frame) { process(frame); },
+      [this](DriveBreak drive_break, Timestamp /*stamp*/) { startOver(drive_break); }, is_used);
 }
 
 RangeMapper::~RangeMapper() = default;
 
 void RangeMapper::setTrajectory(const Trajectory& world_from_vehicle) {
-  OdometryBufferOptions buffer_options = options_.odometry;
-  buffer_options.history_s = std::numeric_limits<double>::infinity();
-  poses_ = OdometryBuffer(buffer_options);
-  for (const StampedTransform& stamped : world_from_vehicle) {
-    VehicleOdometry odometry;
-    odometry.stamp = stamped.stamp;
-    odometry.odom_from_vehicle = stamped.world_from_vehicle;
-    poses_.add(odometry);
-  }
-  poses_are_given_ = true;
+  assembler_->setTrajectory(world_from_vehicle);
 }
 
-void RangeMapper::restart(Camera* camera, const std::string& reason) {
-  camera->waiting.clear();
-  camera->frames.clear();
-  camera->next_reference = 0;
-  camera->newest.reset();
-  ++camera->status.resets;
-  camera->status.state = RangeMapperState::kFewNeighbours;
-  camera->status.message = "restarted: " + reason;
+void RangeMapper::startOver(DriveBreak drive_break) {
+  for (const std::unique_ptr<Camera>& camera : cameras_) {
+    if (camera) {
+      // Images before the break can still be matched with each other, not with those after it.
+      emitReferences(camera.get(), true);
+      camera->frames.clear();
+      camera->next_reference = 0;
+      ++camera->status.resets;
+      camera->status.state = RangeMapperState::kFewNeighbours;
+      camera->status.message = "started over: " + describe(drive_break);
+    }
+  }
 }
 
 void RangeMapper::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
-  check(camera_index < cameras_.size(), "RangeMapper::addImage: unknown camera");
-  Camera* camera = cameras_[camera_index].get();
-  if (camera == nullptr) {
-    return;
+  check(camera_index < cameras_.size(), "RangeMapper::addImage: no such camera");
+  if (cameras_[camera_index]) {
+    ++cameras_[camera_index]->status.images;
+    assembler_->addImage(camera_index, stamp, image);
   }
-  if (camera->newest && stamp <= *camera->newest) {
-    if (toSeconds(*camera->newest - stamp) < kReplay_s) {
-      ++camera->status.ignored_images;
-      return;
-    }
-    restart(camera, "stamps jumped back");
-    newest_image_.reset();
-  }
-  camera->newest = stamp;
-  newest_image_ = newest_image_ ? std::max(*newest_image_, stamp) : stamp;
-  ++camera->status.images;
-  camera->waiting.push_back({stamp, image});
-  processWaiting(camera);
 }
 
 void RangeMapper::addOdometry(const VehicleOdometry& odometry) {
-  if (poses_are_given_) {
+  assembler_->addOdometry(odometry);
+}
+
+void RangeMapper::process(const ImageFrame& frame) {
+  for (const std::unique_ptr<Camera>& camera : cameras_) {
+    if (camera && frame.has_image[camera->index]) {
+      placeImage(camera.get(), frame);
+    }
+  }
+}
+
+void RangeMapper::placeImage(Camera* camera, const ImageFrame& frame) {
+  if (!frame.odom_from_vehicle) {
+    ++camera->status.without_pose;
+    camera->status.state = RangeMapperState::kNoPose;
+    camera->status.message =
+        "no pose at the image's stamp " + toString(frame.stamp) + ": " + describe(frame.odometry_status);
     return;
   }
-  const OdometryBuffer::AddResult result = poses_.add(odometry);
-  for (const std::unique_ptr<Camera>& camera : cameras_) {
-    if (!camera) {
-      continue;
-    }
-    if (result == OdometryBuffer::AddResult::kAddedAfterGap) {
-      processWaiting(camera.get());  // counts images in the gap as without a pose
-      // Images before the gap can still be matched with each other, but not with images after it.
-      emitReferences(camera.get(), true);
-      const std::optional<Timestamp> newest = camera->newest;
-      const std::deque<WaitingImage> waiting = camera->waiting;
-      restart(camera.get(), "gap in the odometry");
-      camera->newest = newest;
-      camera->waiting = waiting;
-    } else if (result == OdometryBuffer::AddResult::kReset) {
-      restart(camera.get(), "stamps of the odometry jumped back");
-    }
-    processWaiting(camera.get());
-  }
-}
-
-void RangeMapper::processWaiting(Camera* camera) {
-  while (!camera->waiting.empty()) {
-    const WaitingImage& first = camera->waiting.front();
-    if (!addPosedImage(camera, first.stamp, first.image)) {
-      if (camera->waiting.size() <= kMaxWaitingImages) {
-        return;
-      }
-      ++camera->status.without_pose;
-    }
-    camera->waiting.pop_front();
-  }
-}
-
-/// Returns false where the pose may still arrive.
-bool RangeMapper::addPosedImage(Camera* camera, Timestamp stamp, const Image& image) {
-  const OdometryBuffer::Lookup lookup = poses_.lookup(stamp);
-  if (!lookup) {
-    camera->status.state = RangeMapperState::kNoPose;
-    camera->status.message = "no pose at the image stamp " + toString(stamp) + ": " + describe(lookup.status);
-    const bool may_come = !poses_are_given_ && (lookup.status == OdometryBuffer::LookupStatus::kEmpty ||
-                                                lookup.status == OdometryBuffer::LookupStatus::kAfterLast);
-    if (!may_come) {
-      ++camera->status.without_pose;
-    }
-    return !may_come;
-  }
-  const RigidTransform world_from_camera = lookup.odometry.odom_from_vehicle * camera->vehicle_from_camera;
+  const Timestamp stamp = frame.stamp;
+  const RigidTransform world_from_camera = *frame.odom_from_vehicle * camera->vehicle_from_camera;
   if (!camera->frames.empty()) {
     const SweepImage& last = camera->frames.back().image;
     const double motion_m = (world_from_camera.translation() - last.world_from_camera.translation()).norm();
@@ -231,17 +174,18 @@ bool RangeMapper::addPosedImage(Camera* camera, Timestamp stamp, const Image& im
       ++camera->status.standing;
       camera->status.state = RangeMapperState::kStanding;
       camera->status.message = "the camera does not move: there is no parallax";
-      return true;
+      return;
     }
-    if (motion_m > kMaxSpeed_m_per_s * toSeconds(stamp - last.stamp)) {
+    // Jumps of the odometry are found by the assembler, those of a given trajectory here.
+    if (motion_m > options_.frames.max_speed_m_per_s * toSeconds(stamp - last.stamp)) {
       emitReferences(camera, true);
       camera->frames.clear();
       camera->next_reference = 0;
       ++camera->status.resets;
     }
   }
-  addFrame(camera, {stamp, camera->working_camera.undistort(image.pixels), world_from_camera});
-  return true;
+  addFrame(camera,
+           {stamp, camera->working_camera.undistort(frame.images[camera->index].pixels), world_from_camera});
 }
 
 void RangeMapper::addFrame(Camera* camera, const SweepImage& frame) {
@@ -312,10 +256,9 @@ void RangeMapper::emitReference(Camera* camera, size_t index) {
 }
 
 void RangeMapper::finish() {
+  assembler_->finish();
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (camera) {
-      camera->status.without_pose += camera->waiting.size();
-      camera->waiting.clear();
       emitReferences(camera.get(), true);
     }
   }
@@ -337,11 +280,18 @@ std::vector<RangeMapperStatus> RangeMapper::status() const {
     if (!camera) {
       continue;
     }
-    all.push_back(camera->status);
-    if (camera->newest && newest_image_ && toSeconds(*newest_image_ - *camera->newest) > kMaxImageGap_s) {
-      all.back().state = RangeMapperState::kNoImages;
-      all.back().message = "no image since " + toString(*camera->newest);
+    RangeMapperStatus status = camera->status;
+    status.ignored_images = static_cast<uint64_t>(assembler_->counters().late_images[camera->index]);
+    const std::optional<Timestamp> newest = assembler_->newestImage(camera->index);
+    const std::optional<Timestamp> lacking = assembler_->lacksOdometryAt();
+    if (newest && toSeconds(*assembler_->newestImage() - *newest) > kMaxImageGap_s) {
+      status.state = RangeMapperState::kNoImages;
+      status.message = "no image since " + toString(*newest);
+    } else if (newest && lacking) {
+      status.state = RangeMapperState::kNoPose;
+      status.message = "no odometry yet at the image's stamp " + toString(*lacking);
     }
+    all.push_back(status);
   }
   return all;
 }

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "vcharge_localization/frame_assembler.h"
+#include "vcharge_core/frames/frame_assembler.h"
 
 namespace vcharge {
 
@@ -24,7 +24,7 @@ class DriveExperiment {
   explicit DriveExperiment(DriveExperimentOptions options);
 
   /// False for a frame that is left out.
-  bool apply(LocalizationFrame* frame);
+  bool apply(ImageFrame* frame);
 
  private:
   const DriveExperimentOptions options_;

@@ -7,80 +7,59 @@
 #include <vector>
 
 #include "vcharge_core/base/options.h"
+#include "vcharge_core/frames/frame_assembler.h"
 #include "vcharge_localization/camera_health.h"
-#include "vcharge_localization/frame_assembler.h"
 #include "vcharge_localization/pose_filter.h"
 #include "vcharge_reconstruction/map_localizer.h"
 
 namespace vcharge {
 
 struct DriveLocalizerOptions {
-  FrameAssemblerOptions frames;
-  MapLocalizerOptions localizer;
-  PoseFilterOptions filter;
-  CameraHealthOptions health;
-  double lost_sigma_m = 1.0;  ///< a pose whose position is less certain is lost
-  double lost_sigma_rad = 0.1;
-  /// Frames in a row without a fix that fits, before the whole map is searched, and between such searches.
-  int max_frames_without_fix = 5;
-  /// Poses of place recognition are believed once two frames agree, but for this much.
-  double confirmation_m = 0.3;
-  double confirmation_rad = 0.03;
-  double max_confirmation_s = 1.0;  ///< between the two
-  // Motion that no odometer counted: besides going on as before, it may differ by this much.
-  double unknown_motion_m_per_s = 1.0;
-  double unknown_turn_rad_per_s = 0.3;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("frames", frames);
-    visit("localizer", localizer);
-    visit("filter", filter);
-    visit("health", health);
-    visit("lost_sigma_m", lost_sigma_m);
-    visit("lost_sigma_rad", lost_sigma_rad);
-    visit("max_frames_without_fix", max_frames_without_fix);
-    visit("confirmation_m", confirmation_m);
-    visit("confirmation_rad", confirmation_rad);
-    visit("max_confirmation_s", max_confirmation_s);
-    visit("unknown_motion_m_per_s", unknown_motion_m_per_s);
-    visit("unknown_turn_rad_per_s", unknown_turn_rad_per_s);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(DriveLocalizerOptions);
+  VCHARGE_OPTION_GROUP(FrameAssemblerOptions, frames, FrameAssemblerOptions::waiting(0.2, 0.3), "Frames.");
+  VCHARGE_OPTION_GROUP(MapLocalizerOptions, localizer, {}, "Pose from one frame.");
+  VCHARGE_OPTION_GROUP(PoseFilterOptions, filter, {}, "Fusion with the odometry.");
+  VCHARGE_OPTION_GROUP(CameraHealthOptions, health, {}, "Warnings about cameras.");
+  VCHARGE_OPTION(double, lost_sigma_m, 1.0, positive(), "A less certain position is lost.");
+  VCHARGE_OPTION(double, lost_sigma_rad, 0.1, positive(), "A less certain rotation is lost.");
+  VCHARGE_OPTION(int, max_frames_without_fix, 5, atLeast(1), "Frames without a fix until relocalization.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// What is known at a frame, from that frame and those before it alone.
+/// The pose at a frame, from this frame and earlier ones only.
 struct LocalizationResult {
   Timestamp stamp;
   LocalizationStatus status = LocalizationStatus::kLost;
   std::optional<PosePrior> pose;  ///< for kLocalized and kBridgedByOdometry
-  PoseFix fix;                    ///< by this frame's images alone
+  PoseFix fix;                    ///< from this frame's images only
   bool searched_whole_map = false;
-  double fix_distance = 0.0;  ///< squared Mahalanobis distance of the fix to what was expected
+  double fix_distance = 0.0;  ///< squared Mahalanobis distance of the fix to the prediction
   double since_fix_s = 0.0;   ///< 0 for kLocalized; infinite before the first
   std::optional<RigidTransform> odom_from_vehicle;
-  std::string message;  ///< for people: what happens, and why
+  std::string message;  ///< one line: what happens, and why
   std::vector<std::string> camera_warnings;
   std::map<std::string, double> stage_s;
 };
 
-/// Follows a vehicle through a map, frame by frame: images fix its pose where they can, the odometer bridges
-/// the rest, and where both have failed place recognition finds it again. Not thread safe.
+/// Localizes a vehicle in a map, frame by frame (paper, section Localization). Tracking: the pose is
+/// predicted by the odometer and corrected by a fix from the images; frames without a fix are bridged.
+/// Relocalization: a lost vehicle is searched in the whole map, and a pose is accepted once two frames agree.
+/// Not thread safe.
 class DriveLocalizer {
  public:
   /// Errors as MapLocalizer.
   DriveLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
                  const DriveLocalizerOptions& options = DriveLocalizerOptions());
 
-  LocalizationResult process(const LocalizationFrame& frame);
-  /// The same where the frame's features are known; its images are not looked at.
-  LocalizationResult process(const LocalizationFrame& frame, const RigFeatures& features);
+  LocalizationResult process(const ImageFrame& frame);
+  /// The same with features that were extracted before; the images are not used.
+  LocalizationResult process(const ImageFrame& frame, const RigFeatures& features);
 
-  /// Somebody says where the vehicle is now; the next frames tell whether that is right, and until then there
-  /// is no pose. After max_frames_without_fix the whole map is searched.
+  /// A pose from outside, as by a user. There is no result until a frame confirms it; after
+  /// max_frames_without_fix the whole map is searched.
   void seed(const PosePrior& pose);
 
-  /// As if this were the first frame.
+  /// Starts anew, as before the first frame.
   void forget();
 
   const MapLocalizer& localizer() const { return localizer_; }
@@ -91,14 +70,13 @@ class DriveLocalizer {
     RigidTransform map_from_vehicle;
     std::optional<RigidTransform> odom_from_vehicle;
   };
-  void localize(const LocalizationFrame& frame, const RigFeatures& features, LocalizationResult* result);
-  void predict(const LocalizationFrame& frame);
+  void localize(const ImageFrame& frame, const RigFeatures& features, LocalizationResult* result);
+  void predict(const ImageFrame& frame);
   bool isLost() const;
   void track(const RigFeatures& features, LocalizationResult* result);
-  void searchWholeMap(const LocalizationFrame& frame, const RigFeatures& features,
-                      LocalizationResult* result);
-  /// Where the vehicle is by a recognized place that is not confirmed yet; none, or too old: nothing.
-  std::optional<RigidTransform> candidateNow(const LocalizationFrame& frame) const;
+  void searchWholeMap(const ImageFrame& frame, const RigFeatures& features, LocalizationResult* result);
+  /// The unconfirmed pose of a relocalization, moved to this frame; none where there is no recent one.
+  std::optional<RigidTransform> candidateNow(const ImageFrame& frame) const;
   bool isConfirmed(const RigidTransform& expected, const PoseFix& fix) const;
   PoseFix searchFrom(const std::optional<RigidTransform>& expected, const RigFeatures& features) const;
   void takeFix(const PoseFix& fix, LocalizationResult* result);
@@ -114,7 +92,7 @@ class DriveLocalizer {
   RigidTransform last_motion_;
   double last_period_s_ = 0.0;
   int frames_without_fix_ = 0;
-  bool is_seed_ = false;  // what the filter has was told, and no image confirmed it
+  bool is_seed_ = false;  // the filter's pose is from seed(), and no image has confirmed it
   std::optional<Candidate> candidate_;
 };
 

@@ -14,7 +14,7 @@ bool isWithin(const std::optional<std::pair<double, double>>& period_s, double t
 
 DriveExperiment::DriveExperiment(DriveExperimentOptions options) : options_(std::move(options)) {}
 
-bool DriveExperiment::apply(LocalizationFrame* frame) {
+bool DriveExperiment::apply(ImageFrame* frame) {
   if (!first_) {
     first_ = frame->stamp;
   }

@@ -12,8 +12,12 @@ namespace {
 
 constexpr int kSampleStep_px = 16;
 constexpr double kMinMotion_m = 0.01;
+constexpr double kMemory_frames = 12.0;  // time constant of the averages: one second
+// Fraction of a camera's features that fit the map, over that of the others: less means another view
+// direction.
+constexpr double kMinFound = 0.1;
 
-/// Pixels in a coarse grid: noise makes those of two images differ, whatever they show.
+/// Pixels on a coarse grid. Noise makes the samples of two different images differ.
 cv::Mat sampleOf(const cv::Mat& image) {
   cv::Mat sample(image.rows / kSampleStep_px + 1, image.cols / kSampleStep_px + 1, CV_8UC1, cv::Scalar(0));
   for (int y = 0; y * kSampleStep_px < image.rows; ++y) {
@@ -30,21 +34,12 @@ bool isEqual(const cv::Mat& a, const cv::Mat& b) {
 
 }  // namespace
 
-void CameraHealthOptions::validate() const {
-  requireField(min_features >= 0, "min_features", "must not be negative", min_features);
-  requireField(min_agreement >= 0.0 && min_agreement <= 1.0, "min_agreement", "must be in [0, 1]",
-               min_agreement);
-  requireField(min_found >= 0.0 && min_found <= 1.0, "min_found", "must be in [0, 1]", min_found);
-  requireField(memory_frames >= 1.0, "memory_frames", "must be 1 or more", memory_frames);
-  requireField(frozen_after_frames >= 1, "frozen_after_frames", "must be 1 or more", frozen_after_frames);
-}
-
 CameraHealth::CameraHealth(std::shared_ptr<const CameraRig> rig, const CameraHealthOptions& options)
     : rig_(std::move(rig)), options_(options), cameras_(rig_->cameras.size()) {
   options_.validate();
 }
 
-std::vector<Image> CameraHealth::withoutFrozen(const LocalizationFrame& frame) {
+std::vector<Image> CameraHealth::withoutFrozen(const ImageFrame& frame) {
   const bool moves =
       frame.odom_from_vehicle && last_odom_from_vehicle_ &&
       (frame.odom_from_vehicle->translation() - last_odom_from_vehicle_->translation()).norm() > kMinMotion_m;
@@ -71,7 +66,7 @@ std::vector<Image> CameraHealth::withoutFrozen(const LocalizationFrame& frame) {
 }
 
 void CameraHealth::average(double value, double* mean) const {
-  *mean += (value - *mean) / options_.memory_frames;
+  *mean += (value - *mean) / kMemory_frames;
 }
 
 void CameraHealth::addFeatures(const RigFeatures& features) {
@@ -91,7 +86,7 @@ void CameraHealth::addFix(const PoseFix& fix) {
 
 std::string CameraHealth::contradictionOf(size_t index) const {
   const Camera& camera = cameras_[index];
-  if (camera.fixes < options_.memory_frames) {
+  if (camera.fixes < kMemory_frames) {
     return "";
   }
   Camera others;
@@ -103,7 +98,7 @@ std::string CameraHealth::contradictionOf(size_t index) const {
     }
   }
   std::ostringstream text;
-  if (camera.inliers * others.features < options_.min_found * camera.features * others.inliers) {
+  if (camera.inliers * others.features < kMinFound * camera.features * others.inliers) {
     text << "hardly any of its features (" << std::lround(camera.inliers) << " of "
          << std::lround(camera.features) << ") fit the map: bumped, wrong intrinsics, or an unmapped side?";
   } else if (camera.inliers * others.matches < options_.min_agreement * camera.matches * others.inliers) {
@@ -124,8 +119,8 @@ std::vector<std::string> CameraHealth::warnings() const {
     if (camera.is_missing) {
       text << name << ": no image";
     } else if (camera.equal_images >= options_.frozen_after_frames) {
-      text << name << ": frozen, the same image again and again";
-    } else if (camera.frames >= options_.memory_frames && camera.features < options_.min_features) {
+      text << name << ": frozen, it repeats one image";
+    } else if (camera.frames >= kMemory_frames && camera.features < options_.min_features) {
       text << name << ": few features (" << std::lround(camera.features) << "): dark, blinded or covered?";
     } else if (!contradiction.empty()) {
       text << name << ": " << contradiction;

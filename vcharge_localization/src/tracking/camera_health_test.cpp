@@ -9,8 +9,8 @@ namespace {
 
 class CameraHealthTest : public ::testing::Test {
  protected:
-  LocalizationFrame frameAt(double x_m, int gray_of_first, int gray_of_second) const {
-    LocalizationFrame frame;
+  ImageFrame frameAt(double x_m, int gray_of_first, int gray_of_second) const {
+    ImageFrame frame;
     frame.odom_from_vehicle = RigidTransform::planar(x_m, 0.0, 0.0);
     frame.images = {{cv::Mat(64, 64, CV_8UC1, cv::Scalar(gray_of_first)), nullptr},
                     {cv::Mat(64, 64, CV_8UC1, cv::Scalar(gray_of_second)), nullptr}};
@@ -92,7 +92,7 @@ TEST_F(CameraHealthTest, ABumpedCameraIsNamedWithinThreeMemories) {
   addFeatures(60, 500);
   addFixes(24, 40, 40, 100);
   EXPECT_TRUE(health_.warnings().empty());
-  addFixes(32, 0, 40, 30);  // what lies near by chance still looks alike, and fits no pose
+  addFixes(32, 0, 40, 30);  // features near a projection by chance match, but fit no pose
   ASSERT_EQ(health_.warnings().size(), 1u);
   EXPECT_EQ(health_.warnings()[0].find("left: hardly any"), 0u) << health_.warnings()[0];
 }
@@ -113,7 +113,7 @@ TEST_F(CameraHealthTest, ACameraAloneContradictsNobody) {
 }
 
 TEST_F(CameraHealthTest, AMissingImageIsNamed) {
-  LocalizationFrame frame = frameAt(0.0, 1, 2);
+  ImageFrame frame = frameAt(0.0, 1, 2);
   frame.images[0] = Image();
   health_.withoutFrozen(frame);
   ASSERT_EQ(health_.warnings().size(), 1u);

@@ -10,29 +10,19 @@
 namespace vcharge {
 namespace {
 
+// A relocalization is accepted once two frames agree within these bounds.
+constexpr double kConfirmation_m = 0.3;
+constexpr double kConfirmation_rad = 0.03;
+constexpr double kMaxConfirmation_s = 1.0;
+// Uncertainty of motion without odometry, beside that of going on as before.
+constexpr double kUnknownMotion_m_per_s = 1.0;
+constexpr double kUnknownTurn_rad_per_s = 0.3;
+
 double squared(double value) {
   return value * value;
 }
 
 }  // namespace
-
-void DriveLocalizerOptions::validate() const {
-  validateInner("frames", frames);
-  validateInner("localizer", localizer);
-  validateInner("filter", filter);
-  validateInner("health", health);
-  requireField(lost_sigma_m > 0.0, "lost_sigma_m", "must be positive", lost_sigma_m);
-  requireField(lost_sigma_rad > 0.0, "lost_sigma_rad", "must be positive", lost_sigma_rad);
-  requireField(max_frames_without_fix >= 1, "max_frames_without_fix", "must be 1 or more",
-               max_frames_without_fix);
-  requireField(confirmation_m > 0.0, "confirmation_m", "must be positive", confirmation_m);
-  requireField(confirmation_rad > 0.0, "confirmation_rad", "must be positive", confirmation_rad);
-  requireField(max_confirmation_s > 0.0, "max_confirmation_s", "must be positive", max_confirmation_s);
-  requireField(unknown_motion_m_per_s > 0.0, "unknown_motion_m_per_s", "must be positive",
-               unknown_motion_m_per_s);
-  requireField(unknown_turn_rad_per_s > 0.0, "unknown_turn_rad_per_s", "must be positive",
-               unknown_turn_rad_per_s);
-}
 
 DriveLocalizer::DriveLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
                                const DriveLocalizerOptions& options)
@@ -49,7 +39,7 @@ void DriveLocalizer::seed(const PosePrior& pose) {
   frames_without_fix_ = 0;
 }
 
-void DriveLocalizer::predict(const LocalizationFrame& frame) {
+void DriveLocalizer::predict(const ImageFrame& frame) {
   const double period_s = last_stamp_ ? toSeconds(frame.stamp - *last_stamp_) : 0.0;
   const bool is_counted = last_odom_from_vehicle_ && frame.odom_from_vehicle && period_s > 0.0 &&
                           frame.num_resets == last_num_resets_;
@@ -58,14 +48,14 @@ void DriveLocalizer::predict(const LocalizationFrame& frame) {
     last_period_s_ = period_s;
     filter_.predict(last_motion_, period_s);
   } else if (period_s > 0.0) {
-    // On as before, but who knows.
-    const double share = last_period_s_ > 0.0 ? period_s / last_period_s_ : 0.0;
-    if (share > 0.0 && share < 10.0) {
-      filter_.predict(interpolate(RigidTransform(), last_motion_, share), period_s);
+    // Without odometry the vehicle is assumed to go on as before.
+    const double ratio = last_period_s_ > 0.0 ? period_s / last_period_s_ : 0.0;
+    if (ratio > 0.0 && ratio < 10.0) {
+      filter_.predict(interpolate(RigidTransform(), last_motion_, ratio), period_s);
     }
-    filter_.addNoise(options_.unknown_motion_m_per_s * period_s, options_.unknown_turn_rad_per_s * period_s);
+    filter_.addNoise(kUnknownMotion_m_per_s * period_s, kUnknownTurn_rad_per_s * period_s);
   } else if (period_s < 0.0) {
-    forget();  // a replay that started over
+    forget();  // a replay
   }
   last_stamp_ = frame.stamp;
   last_num_resets_ = frame.num_resets;
@@ -77,7 +67,7 @@ bool DriveLocalizer::isLost() const {
     return true;
   }
   if (is_seed_) {
-    return false;  // however uncertain: the next frames look there
+    return false;  // however uncertain: the next frames search there
   }
   const Eigen::Matrix<double, 6, 6> covariance = filter_.pose().covariance;
   return covariance.topLeftCorner<3, 3>().trace() > options_.lost_sigma_m * options_.lost_sigma_m ||
@@ -103,17 +93,17 @@ void DriveLocalizer::track(const RigFeatures& features, LocalizationResult* resu
       takeFix(result->fix, result);
       return;
     }
-    result->message = "the images contradict the pose so far";
+    result->message = "the images contradict the predicted pose";
   } else {
     result->message = result->fix.status == LocalizationStatus::kTooFewMatches
-                          ? "too little of the map found in the images"
-                          : "no pose explains enough of what was found in the images";
+                          ? "too few landmarks found in the images"
+                          : "no pose explains enough of the matches";
   }
   ++frames_without_fix_;
 }
 
-std::optional<RigidTransform> DriveLocalizer::candidateNow(const LocalizationFrame& frame) const {
-  if (!candidate_ || toSeconds(frame.stamp - candidate_->stamp) > options_.max_confirmation_s) {
+std::optional<RigidTransform> DriveLocalizer::candidateNow(const ImageFrame& frame) const {
+  if (!candidate_ || toSeconds(frame.stamp - candidate_->stamp) > kMaxConfirmation_s) {
     return std::nullopt;
   }
   RigidTransform moved;
@@ -125,17 +115,16 @@ std::optional<RigidTransform> DriveLocalizer::candidateNow(const LocalizationFra
 
 bool DriveLocalizer::isConfirmed(const RigidTransform& expected, const PoseFix& fix) const {
   const RigidTransform difference = expected.inverse() * fix.map_from_vehicle;
-  return fix.status == LocalizationStatus::kLocalized &&
-         difference.translation().norm() <= options_.confirmation_m &&
-         angleOfRotation(difference.rotation()) <= options_.confirmation_rad;
+  return fix.status == LocalizationStatus::kLocalized && difference.translation().norm() <= kConfirmation_m &&
+         angleOfRotation(difference.rotation()) <= kConfirmation_rad;
 }
 
 PoseFix DriveLocalizer::searchFrom(const std::optional<RigidTransform>& expected,
                                    const RigFeatures& features) const {
   if (expected) {
     PosePrior prior{*expected, Eigen::Matrix<double, 6, 6>::Zero()};
-    prior.covariance.diagonal() << Eigen::Vector3d::Constant(squared(options_.confirmation_m) / 9.0),
-        Eigen::Vector3d::Constant(squared(options_.confirmation_rad) / 9.0);
+    prior.covariance.diagonal() << Eigen::Vector3d::Constant(squared(kConfirmation_m) / 9.0),
+        Eigen::Vector3d::Constant(squared(kConfirmation_rad) / 9.0);
     const PoseFix fix = localizer_.localizeNear(features, prior);
     if (isConfirmed(*expected, fix) && fix.numInliers() >= localizer_.minInliersWithoutPrior(features)) {
       return fix;
@@ -144,7 +133,7 @@ PoseFix DriveLocalizer::searchFrom(const std::optional<RigidTransform>& expected
   return localizer_.localizeAnywhere(features);
 }
 
-void DriveLocalizer::searchWholeMap(const LocalizationFrame& frame, const RigFeatures& features,
+void DriveLocalizer::searchWholeMap(const ImageFrame& frame, const RigFeatures& features,
                                     LocalizationResult* result) {
   result->searched_whole_map = true;
   const std::optional<RigidTransform> expected = candidateNow(frame);
@@ -156,7 +145,7 @@ void DriveLocalizer::searchWholeMap(const LocalizationFrame& frame, const RigFea
   }
   if (fix.status != LocalizationStatus::kLocalized) {
     if (!expected) {
-      candidate_.reset();  // else it may yet be confirmed
+      candidate_.reset();  // otherwise the next frame may confirm it
     }
     if (!tracks) {
       result->message = fix.status == LocalizationStatus::kAmbiguous ? "two places of the map look alike"
@@ -187,7 +176,7 @@ void DriveLocalizer::forget() {
   frames_without_fix_ = 0;
 }
 
-LocalizationResult DriveLocalizer::process(const LocalizationFrame& frame) {
+LocalizationResult DriveLocalizer::process(const ImageFrame& frame) {
   LocalizationResult result;
   RigFeatures features;
   {
@@ -198,13 +187,13 @@ LocalizationResult DriveLocalizer::process(const LocalizationFrame& frame) {
   return result;
 }
 
-LocalizationResult DriveLocalizer::process(const LocalizationFrame& frame, const RigFeatures& features) {
+LocalizationResult DriveLocalizer::process(const ImageFrame& frame, const RigFeatures& features) {
   LocalizationResult result;
   localize(frame, features, &result);
   return result;
 }
 
-void DriveLocalizer::localize(const LocalizationFrame& frame, const RigFeatures& features,
+void DriveLocalizer::localize(const ImageFrame& frame, const RigFeatures& features,
                               LocalizationResult* result) {
   result->stamp = frame.stamp;
   result->odom_from_vehicle = frame.odom_from_vehicle;
@@ -221,7 +210,7 @@ void DriveLocalizer::localize(const LocalizationFrame& frame, const RigFeatures&
     search_whole_map = is_stuck || (frames_without_fix_ > 0 && candidate_);
     if (is_seed_) {
       result->status = LocalizationStatus::kLost;
-      result->message = "the images do not show the place that was told: " + result->message;
+      result->message = "the images do not confirm the given pose: " + result->message;
       if (is_stuck) {
         forget();
       }

@@ -13,7 +13,7 @@ constexpr double kPeriod_s = 0.08;
 constexpr double kStep_m = 0.2;
 constexpr double kRadius_m = 20.0;  // of the test map's circle
 
-/// A drive along the test map's circle with an odometer that counts 1 % too much.
+/// A drive along the test map's circle with an odometer that measures 1 % too much.
 class DriveLocalizerTest : public ::testing::Test {
  protected:
   RigidTransform truthAt(double way_m) const {
@@ -31,9 +31,9 @@ class DriveLocalizerTest : public ::testing::Test {
     features.rays_in_camera.resize(2);
     return features;
   }
-  /// The next frame, `way_m` along the circle by truth; the odometer saw it go a step.
+  /// The next frame, `way_m` further along the circle; the odometer measures one step.
   LocalizationResult next(double way_m, const RigFeatures& features) {
-    LocalizationFrame frame;
+    ImageFrame frame;
     frame.stamp = Timestamp::fromNanoseconds(1'000'000'000'000LL + 80'000'000LL * num_frames_++);
     frame.images.resize(2);
     odom_from_vehicle_ =
@@ -73,7 +73,7 @@ TEST_F(DriveLocalizerTest, StartsFromNothingOnceTwoFramesAgree) {
   EXPECT_TRUE(std::isinf(first.since_fix_s));
   const LocalizationResult second = drive(1);
   ASSERT_EQ(second.status, LocalizationStatus::kLocalized);
-  // A single fix is worse than its covariance tells; later ones are averaged.
+  // The error of a single fix exceeds its covariance; later ones are averaged.
   EXPECT_GT(second.pose->covariance(0, 0), 2.9 * second.fix.covariance(0, 0));
   for (int i = 0; i < 40; ++i) {
     const LocalizationResult result = drive(1);

@@ -13,30 +13,24 @@
 namespace vcharge {
 namespace {
 
+// Noise of the odometer that depends little on the car: random walk of the factors and heights and tilts of
+// the road per metre, heading noise per radian of turn, and drift per second, all per square root.
+constexpr double kFactorWalk = 0.001;
+constexpr double kYawTurnSigma = 0.01;
+constexpr double kHeightSigma_m = 0.01;
+constexpr double kTiltSigma_rad = 0.003;
+constexpr double kTimeSigma_m = 0.002;
+constexpr double kTimeSigma_rad = 0.0005;
+
+constexpr double kReferencePixel_rad =
+    0.005;                            // map_sigma_m and map_sigma_rad were measured with these pixels
+constexpr double kFinestPixel = 0.5;  // relative to the reference; finer images were not measured
+
 double squared(double value) {
   return value * value;
 }
 
 }  // namespace
-
-void PoseFilterOptions::validate() const {
-  requireField(scale_sigma >= 0.0, "scale_sigma", "must not be negative", scale_sigma);
-  requireField(turn_sigma >= 0.0, "turn_sigma", "must not be negative", turn_sigma);
-  requireField(scale_walk >= 0.0, "scale_walk", "must not be negative", scale_walk);
-  requireField(distance_sigma >= 0.0, "distance_sigma", "must not be negative", distance_sigma);
-  requireField(yaw_sigma_rad >= 0.0, "yaw_sigma_rad", "must not be negative", yaw_sigma_rad);
-  requireField(yaw_turn_sigma >= 0.0, "yaw_turn_sigma", "must not be negative", yaw_turn_sigma);
-  requireField(height_sigma_m >= 0.0, "height_sigma_m", "must not be negative", height_sigma_m);
-  requireField(tilt_sigma_rad >= 0.0, "tilt_sigma_rad", "must not be negative", tilt_sigma_rad);
-  requireField(time_sigma_m > 0.0, "time_sigma_m", "must be positive", time_sigma_m);
-  requireField(time_sigma_rad > 0.0, "time_sigma_rad", "must be positive", time_sigma_rad);
-  requireField(fix_covariance_factor > 0.0, "fix_covariance_factor", "must be positive",
-               fix_covariance_factor);
-  requireField(map_sigma_m >= 0.0, "map_sigma_m", "must not be negative", map_sigma_m);
-  requireField(map_sigma_rad >= 0.0, "map_sigma_rad", "must not be negative", map_sigma_rad);
-  requireField(map_pixel_rad > 0.0, "map_pixel_rad", "must be positive", map_pixel_rad);
-  requireField(gate > 0.0, "gate", "must be positive", gate);
-}
 
 PoseFilterOptions optionsForMapOf(const CameraRig& rig, const PoseFilterOptions& options) {
   double sum_rad = 0.0;
@@ -44,8 +38,7 @@ PoseFilterOptions optionsForMapOf(const CameraRig& rig, const PoseFilterOptions&
     sum_rad += radiansPerPixel(camera);
   }
   const double pixel_rad = sum_rad / static_cast<double>(std::max<size_t>(1, rig.cameras.size()));
-  constexpr double kFinest = 0.5;  // what finer images give was not measured
-  const double factor = std::max(kFinest, pixel_rad / options.map_pixel_rad);
+  const double factor = std::max(kFinestPixel, pixel_rad / kReferencePixel_rad);
   PoseFilterOptions scaled = options;
   scaled.map_sigma_m *= factor;
   scaled.map_sigma_rad *= factor;
@@ -84,7 +77,7 @@ void PoseFilter::predict(const RigidTransform& previous_from_current, double per
   }
   const double distance_m = previous_from_current.translation().norm();
   const double turn_rad = yawOfRotation(previous_from_current.rotation());
-  // As in mapping: the chord turns by half of the turn's correction.
+  // A correction of the turn rotates the chord by half of it, as in the adjustment of the map.
   const Eigen::Matrix3d bend =
       Eigen::AngleAxisd(0.5 * (factors_[1] - 1.0) * turn_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   const Eigen::Vector3d counted = bend * previous_from_current.translation();
@@ -106,14 +99,14 @@ void PoseFilter::predict(const RigidTransform& previous_from_current, double per
 
   Eigen::Matrix<double, 6, 1> variances;
   const double planar = squared(options_.distance_sigma) * distance_m;
-  const double tilt = squared(options_.tilt_sigma_rad) * distance_m;
-  variances << planar, planar, squared(options_.height_sigma_m) * distance_m, tilt, tilt,
-      squared(options_.yaw_sigma_rad) * distance_m + squared(options_.yaw_turn_sigma) * std::abs(turn_rad);
-  variances.head<3>().array() += squared(options_.time_sigma_m) * period_s;
-  variances.tail<3>().array() += squared(options_.time_sigma_rad) * period_s;
+  const double tilt = squared(kTiltSigma_rad) * distance_m;
+  variances << planar, planar, squared(kHeightSigma_m) * distance_m, tilt, tilt,
+      squared(options_.yaw_sigma_rad) * distance_m + squared(kYawTurnSigma) * std::abs(turn_rad);
+  variances.head<3>().array() += squared(kTimeSigma_m) * period_s;
+  variances.tail<3>().array() += squared(kTimeSigma_rad) * period_s;
   covariance_.block<3, 3>(0, 0) += rotation * variances.head<3>().asDiagonal() * rotation.transpose();
   covariance_.block<3, 3>(3, 3) += rotation * variances.tail<3>().asDiagonal() * rotation.transpose();
-  covariance_.diagonal().tail<2>().array() += squared(options_.scale_walk) * distance_m;
+  covariance_.diagonal().tail<2>().array() += squared(kFactorWalk) * distance_m;
 }
 
 void PoseFilter::addNoise(double sigma_m, double sigma_rad) {
@@ -150,7 +143,7 @@ bool PoseFilter::update(const PoseFix& fix) {
   map_from_vehicle_ = RigidTransform(rotationFromVector(change.segment<3>(3)) * map_from_vehicle_.rotation(),
                                      map_from_vehicle_.translation() + change.head<3>());
   factors_ += change.tail<2>();
-  // Joseph's form stays symmetric and positive.
+  // Joseph's form keeps the covariance symmetric and positive.
   Matrix8d keep = Matrix8d::Identity();
   keep.leftCols<6>() -= gain;
   covariance_ = keep * covariance_ * keep.transpose() + gain * noise * gain.transpose();

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kPeriod_s = 0.08;
 
-/// A drive in a gentle curve, as it is and as an odometer with wrong factors counts it.
+/// A drive in a gentle curve: the truth, and an odometer with wrong factors.
 struct Drive {
   RigidTransform map_from_vehicle;
   double counted_per_true_distance = 0.98, counted_per_true_turn = 1.01;
@@ -71,10 +71,10 @@ TEST(PoseFilterTest, LearnsTheOdometersFactorsAndBridgesByThem) {
   EXPECT_LT(error_m, 3.0 * std::sqrt(after.covariance.topLeftCorner<3, 3>().trace()));
 }
 
-TEST(PoseFilterTest, ErrorIsAsTheCovarianceTells) {
-  // What is wrong with a map, no number of fixes tells.
+TEST(PoseFilterTest, ErrorAgreesWithTheCovariance) {
+  // Fixes cannot reveal the error of the map itself.
   PoseFilterOptions options;
-  options.fix_covariance_factor = 1.0;  // fixes here are as good as they say
+  options.fix_covariance_factor = 1.0;  // the covariances of these fixes are true
   double sum = 0.0;
   int count = 0;
   for (uint32_t seed = 1; seed <= 60; ++seed) {
@@ -158,12 +158,11 @@ TEST(PoseFilterTest, CovarianceStaysSymmetricAndPositive) {
   EXPECT_EQ(covariance.llt().info(), Eigen::Success);
 }
 
-TEST(PoseFilterTest, MapsErrInProportionToTheirImagesPixels) {
-  PoseFilterOptions options;
-  options.map_pixel_rad = 0.005;
+TEST(PoseFilterTest, ErrorsOfMapsAreProportionalToTheAngleOfPixels) {
+  const PoseFilterOptions options;
   struct Case {
-    std::array<double, 2> pixels_rad;  // widths, of two cameras; their angles are a little less
-    double factor;                     // by which the map errs more
+    std::array<double, 2> pixels_rad;  // widths for two cameras; their angles are a little smaller
+    double factor;                     // on the map's errors
   };
   for (const auto& [pixels_rad, factor] :
        {Case{{0.001, 0.001}, 0.5}, Case{{0.003, 0.005}, 0.8}, Case{{0.005, 0.005}, 1.0},

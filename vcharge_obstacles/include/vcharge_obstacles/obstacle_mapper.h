@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,7 +9,7 @@
 
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/dense_maps/range_map.h"
-#include "vcharge_core/motion/vehicle_odometry.h"
+#include "vcharge_core/frames/frame_assembler.h"
 #include "vcharge_obstacles/ground_watch.h"
 #include "vcharge_obstacles/local_obstacle_map.h"
 #include "vcharge_obstacles/obstacle_detector.h"
@@ -34,17 +33,18 @@ struct ObstacleMapperOptions {
   VCHARGE_OPTION_GROUP(ObstacleDetectorOptions, detector, {}, "Obstacles in one range map.");
   VCHARGE_OPTION_GROUP(GroundWatchOptions, watch, {}, "Ground whose appearance changes.");
   VCHARGE_OPTION_GROUP(LocalObstacleMapOptions, map, {}, "Fusion over time and cameras.");
-  VCHARGE_OPTION_GROUP(OdometryBufferOptions, odometry, {}, "Interpolation of the odometry.");
-  VCHARGE_OPTION(double, max_wait_s, 0.15, notNegative(),
-                 "Time to wait for the other cameras' range maps of a stamp.");
+  VCHARGE_OPTION_GROUP(FrameAssemblerOptions, frames, {}, "Range maps of one stamp, and odometry.");
   VCHARGE_OPTION(double, max_silence_s, 1.0, positive(),
                  "Time without range maps after which a camera has stopped.");
   VCHARGE_OPTION(double, min_known_fraction, 0.1, atLeast(0.0).below(1.0),
                  "Fraction of pixels with a range below which a camera hardly sees.");
-  VCHARGE_OPTION(double, max_step_m, 0.15, positive(),
-                 "Largest deviation of the odometry from constant velocity between two messages.");
-  VCHARGE_OPTION(double, max_step_rad, 0.05, positive(), "Largest such deviation of the heading.");
   VCHARGE_END_OPTIONS();
+
+  ObstacleMapperOptions() {
+    frames.max_speed_m_per_s = 60.0;
+    frames.max_step_m = 0.15;  // smaller jumps than in other stages are visible in the cells
+    frames.max_step_rad = 0.05;
+  }
 };
 
 /// What a camera contributes to the map at present.
@@ -81,8 +81,7 @@ struct ObstacleFrame {
 };
 
 /// Turns range maps and odometry into obstacle maps, for the nodelet and the offline tool alike. Range maps
-/// of one stamp are fused together, in the rig's order, once odometry has reached the stamp. At most 25
-/// stamps wait for odometry or for a camera. Not thread safe.
+/// of one stamp are fused together, in the rig's order. Not thread safe.
 class ObstacleMapper {
  public:
   using FrameCallback = std::function<void(const ObstacleFrame&)>;
@@ -106,44 +105,37 @@ class ObstacleMapper {
   /// Number of times that the map was emptied because the odometry jumped.
   uint64_t numJumps() const { return num_jumps_; }
   /// Number of stamps that wait for range maps or odometry.
-  size_t numWaiting() const { return waiting_.size(); }
+  size_t numWaiting() const { return assembler_->numWaiting(); }
+  const FrameCounters& counters() const { return assembler_->counters(); }
 
  private:
   struct Camera;
   struct Observation {
-    CameraObstacles seen;
+    CameraObstacles obstacles;
     cv::Mat reference;  // the image of the range map; may be empty
   };
-  struct Group {  // range maps of one stamp, by camera
-    std::map<size_t, Observation> cameras;
-    std::optional<Timestamp> first_heard;  // odometry's stamp when the first of them came
-  };
+  using Frame = AssembledFrame<Observation>;
 
-  std::optional<RigidTransform> fixedFromVehicle(Timestamp stamp) const;
-  void watchForJumps(const VehicleOdometry& odometry);
-  bool isComplete(Timestamp stamp, const Group& group) const;
-  void fuseWaiting(bool all);
-  void fuse(Timestamp stamp, Group* group, const RigidTransform& fixed_from_vehicle);
-  void loseFirstWaiting();
+  std::optional<RigidTransform> fixedFromVehicle(
+      const std::optional<RigidTransform>& odom_from_vehicle) const;
+  void process(Frame frame);
+  void fuse(Frame* frame, const RigidTransform& fixed_from_vehicle);
+  void noteWithoutPose(const Frame& frame);
   void emit(const LocalObstacleMap& map, const std::vector<const CameraObstacles*>& cameras);
   void emitAt(Timestamp stamp);
   void emitWhenSilent();
   void updateStatus(Camera* camera, const CameraObstacles& seen) const;
-  void startOver();
-  void jump(Timestamp stamp);
+  void startOver(DriveBreak drive_break, Timestamp stamp);
 
   const std::shared_ptr<const CameraRig> rig_;
   const ObstacleMapperOptions options_;
   const FrameCallback on_frame_;
   const PolarGrid grid_;
   std::vector<std::unique_ptr<Camera>> cameras_;  // by index in the rig; null where not in use
-  OdometryBuffer poses_;
+  std::unique_ptr<FrameAssembler<Observation>> assembler_;
   LocalObstacleMap map_;
-  std::map<Timestamp, Group> waiting_;
-  std::optional<Timestamp> last_fused_, last_emitted_, last_jump_;
+  std::optional<Timestamp> last_emitted_;
   std::optional<Timestamp> last_heard_;  // odometry's stamp when the last range map came
-  std::optional<VehicleOdometry> last_odometry_;
-  std::optional<Eigen::Vector3d> last_velocity_;  // x, y, yaw per second
   RigidTransform map_from_odom_, anchor_;
   bool has_anchor_ = false;
   uint64_t num_jumps_ = 0;

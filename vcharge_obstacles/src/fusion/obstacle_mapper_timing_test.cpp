@@ -67,7 +67,7 @@ TEST_F(ObstacleMapperTest, RangeMapsWithoutOdometryAreBounded) {
 }
 
 TEST_F(ObstacleMapperTest, WaitingForAMissingCameraEnds) {
-  options_.max_wait_s = std::numeric_limits<double>::infinity();  // as in a lossless replay
+  options_.frames.waitForEverything();  // as in a lossless replay
   dead_camera_ = "left";
   start();
   drive(0, 240);
@@ -78,7 +78,7 @@ TEST_F(ObstacleMapperTest, WaitingForAMissingCameraEnds) {
 
 TEST_F(ObstacleMapperTest, MapsDoNotDependOnTheLagOfRangeMaps) {
   const auto run = [&](int delay_ticks) {
-    options_.max_wait_s = std::numeric_limits<double>::infinity();
+    options_.frames.waitForEverything();
     start();
     std::map<Timestamp, std::string> hashes;
     for (int tick = 0; tick < 60 + delay_ticks; ++tick) {
@@ -104,7 +104,7 @@ TEST_F(ObstacleMapperTest, MapsDoNotDependOnTheLagOfRangeMaps) {
 
 TEST_F(ObstacleMapperTest, LagOfRangeMapsIsNoSilence) {
   start();
-  constexpr int kDelayTicks = 41;  // 0.8 s: longer than the silence and max_wait_s
+  constexpr int kDelayTicks = 41;  // 0.8 s: longer than the waiting times
   for (int tick = 0; tick < 100; ++tick) {
     addOdometry(tick);
     if (tick >= kDelayTicks && (tick - kDelayTicks) % 4 == 0) {

@@ -1,20 +1,11 @@
 #include "vcharge_core/frames/multi_frame_synchronizer.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "vcharge_core/base/error.h"
-#include "vcharge_core/base/options.h"
 
 namespace vcharge {
-
-void MultiFrameSynchronizerOptions::validate() const {
-  requireField(std::isfinite(tolerance_s) && tolerance_s >= 0.0, "tolerance_s",
-               "must be finite and not negative", tolerance_s);
-  requireField(max_pending_sets >= 1, "max_pending_sets", "must be at least 1", max_pending_sets);
-  requireField(reset_backwards_s > 0.0, "reset_backwards_s", "must be positive", reset_backwards_s);
-}
 
 MultiFrameSynchronizer::MultiFrameSynchronizer(size_t num_cameras,
                                                const MultiFrameSynchronizerOptions& options)
@@ -66,7 +57,7 @@ std::shared_ptr<const MultiFrame> MultiFrameSynchronizer::add(size_t camera_inde
     return nullptr;
   }
 
-  // The pending set nearest in time, or a new one in its place. A set's distance is to its farthest image, so
+  // The pending set nearest in time, or a new one. The distance is that to the farthest image of the set, so
   // that no set spans more than the tolerance.
   const auto distance = [&](const PendingSet& set) {
     return std::max(std::chrono::abs(set.frame.stamp - stamp), std::chrono::abs(set.latest - stamp));

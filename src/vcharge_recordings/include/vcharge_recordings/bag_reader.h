@@ -27,8 +27,8 @@ class BagBytes;
 class BagFile;
 struct BagRecord;
 
-/// roscpp makes room for whatever length an array claims, up to 4 GB, before it looks whether the bytes are
-/// there: StreamOverrunException where those of an image are not.
+/// Throws StreamOverrunException if an image's array is longer than the message. roscpp would first allocate
+/// the claimed length, up to 4 GB.
 template <class Message>
 void requireWholeArrays(ros::serialization::IStream /*stream*/) {}
 template <>
@@ -38,7 +38,7 @@ void requireWholeArrays<sensor_msgs::CompressedImage>(ros::serialization::IStrea
 
 }  // namespace internal
 
-/// Where a message of a bag lies, and when it was recorded.
+/// The position of a message in a bag, and when it was recorded.
 struct BagEntry {
   ros::Time time;
   uint32_t connection;  ///< in the reader's list
@@ -46,14 +46,14 @@ struct BagEntry {
   uint32_t offset;      ///< in its chunk, after decompression
 };
 
-/// A message as it was recorded. Holds until the reader reads the next one.
+/// A message as it was recorded. Valid until the reader reads the next one.
 class BagMessage {
  public:
   /// "<bag>: <topic>"
   const std::string& source() const { return source_; }
 
-  /// InputError naming bag and topic where the message was recorded with another definition than this program
-  /// was built with, or the bytes are no such message.
+  /// InputError naming bag and topic if the message was recorded with another definition than this program
+  /// was built with, or is damaged.
   template <class Message>
   boost::shared_ptr<Message> instantiate() const {
     const char* const type = ros::message_traits::datatype<Message>();
@@ -86,9 +86,9 @@ class BagMessage {
 };
 
 /// Reads bags of format 2.0 (http://wiki.ros.org/Bags/Format/2.0), plain or with chunks compressed by bz2 or
-/// lz4. librosbag believes every length and position that a bag names, and reads beyond its buffers where one
-/// is damaged; here each is checked before it is followed. Opening reads the index and the headers of chunks,
-/// never their messages; at most one message, or one decompressed chunk, is held.
+/// lz4. Every length and position in the file is checked before it is used; librosbag reads beyond its
+/// buffers in a damaged bag. Opening reads the index and the headers of chunks, not the messages; at most one
+/// message, or one decompressed chunk, is in memory.
 class BagReader {
  public:
   /// InputError naming the bag, the byte and what was expected there, for a bag that is damaged, encrypted,
@@ -100,10 +100,10 @@ class BagReader {
 
   /// Topics that have messages, with their types.
   const std::map<std::string, std::set<std::string>>& topics() const { return topics_; }
-  /// All messages of these topics by the time of their recording; those of one time as they lie in the bag.
+  /// All messages of these topics by the time of their recording; equal times in the order of the bag.
   std::vector<BagEntry> entries(const std::set<std::string>& topics) const;
   const std::string& topicOf(const BagEntry& entry) const { return connections_[entry.connection].topic; }
-  /// InputError where the message, or the chunk that it lies in, is damaged.
+  /// InputError if the message or its chunk is damaged.
   BagMessage read(const BagEntry& entry);
 
  private:
@@ -112,7 +112,7 @@ class BagReader {
     std::string topic, type, md5sum;
   };
   struct Chunk {
-    uint64_t offset;       ///< of its data
+    uint64_t offset;       ///< position of its data
     uint32_t stored_size;  ///< in the file
     uint32_t size;         ///< after decompression
     std::string compression;
@@ -132,7 +132,7 @@ class BagReader {
   std::vector<Connection> connections_;
   std::map<uint32_t, uint32_t> connection_by_id_;
   std::vector<Chunk> chunks_;
-  std::vector<BagEntry> entries_;  // by time, then as they lie in the file
+  std::vector<BagEntry> entries_;  // by time, then in the order of the file
   std::map<std::string, std::set<std::string>> topics_;
   std::unique_ptr<internal::BagBytes> decompressed_;
   std::optional<uint32_t> decompressed_chunk_;

@@ -12,8 +12,8 @@
 namespace vcharge {
 
 /// Writes a recorded drive on the suite's standard topics: images and camera_info of every camera, /odom,
-/// /wheel_ticks and, for simulated drives, /ground_truth. The bag appears under its name only once close()
-/// returned. A message's time of arrival in the bag is `received`, or its stamp where that is not given.
+/// /wheel_ticks and, for simulated drives, /ground_truth. The bag has its name only after close().
+/// `received` is the recording time of a message, by default its stamp.
 class DriveBagWriter {
  public:
   /// InputError when the folder cannot be written.

@@ -18,17 +18,17 @@ const char* toString(CheckGrade grade);
 struct CheckFinding {
   std::string subject;  ///< "sync", "front: exposure"
   CheckGrade grade = CheckGrade::kPass;
-  std::string what;  ///< the figure, and for what does not pass what it may come from
+  std::string what;  ///< the measured value, and the likely cause of a failure
 };
 
 /// The worst of them; kPass without any.
 CheckGrade worstGrade(const std::vector<CheckFinding>& findings);
 
-/// Judges a recorded drive before hours are spent on it: are the four cameras and the odometry complete, in
-/// step, well exposed, and do they tell of the same motion? The rig may lack extrinsics; where it has them,
-/// the images' motion is compared with them as well. Turns are compared by the angle about the axis that each
-/// camera's rotations have in common, so no calibration of the mounting is needed. Deterministic. Keeps
-/// times, odometry and a few figures per pair of images, no images but the last ones. Not thread safe.
+/// Checks a recorded drive before it is processed: are the cameras and the odometry complete, synchronous and
+/// well exposed, and do they agree on the motion? Turns are compared by the angle about the common axis of
+/// each camera's rotations, so the rig needs no extrinsics; where it has them, the images' motion is compared
+/// with them, too. Deterministic. Keeps times, odometry and a few numbers per pair of images. Not thread
+/// safe.
 class DriveChecker : public RecordedDriveConsumer {
  public:
   explicit DriveChecker(std::shared_ptr<const CameraRig> rig);

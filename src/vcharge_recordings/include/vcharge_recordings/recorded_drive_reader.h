@@ -9,9 +9,9 @@
 
 namespace vcharge {
 
-/// Hands all images and the odometry of a bag over in the order in which they were recorded. Topics that the
-/// bag lacks bring nothing; messages that cannot be understood are told to the consumer. `progress` (may be
-/// empty) takes the share done. InputError for a file that is no bag, or that is truncated.
+/// Delivers all images and the odometry of a bag in the order of recording. Missing topics deliver nothing;
+/// messages that cannot be read are reported to the consumer. `progress` (may be empty) receives the fraction
+/// done. InputError for a file that is no bag, or that is truncated.
 void readRecordedDrive(const std::string& bag_path, const CameraRig& rig, const DriveTopics& topics,
                        RecordedDriveConsumer* consumer, const std::function<void(double)>& progress);
 

@@ -8,13 +8,13 @@
 
 namespace vcharge {
 
-/// How the published V-Charge images become a drive. The recording's vehicle frame lies above the ground.
+/// Conversion of the published V-Charge images to a drive. The recording's vehicle frame is above the ground.
 struct VchargeRecordingOptions {
   std::string camera_name = "left";
   double field_of_view_rad = 3.2288591161895095;  ///< 185 degrees
-  /// Ground in the recording's vehicle frame: z = height + slope_x x + slope_y y, by default the plane that
-  /// is fitted to the ground around the reference frame of the recording. base_link is put on it, z along its
-  /// normal.
+  /// The ground in the recording's vehicle frame: z = height + slope_x x + slope_y y. base_link is on it,
+  /// with z along its normal. The default was fitted to the ground around the reference frame of the
+  /// recording.
   double ground_height_m = -0.832;
   double ground_slope_x = 0.0036;
   double ground_slope_y = -0.0045;

@@ -18,7 +18,7 @@ constexpr size_t kFirstRoom = 1 << 20;
                    ", got damaged ones after " + std::to_string(num_bytes));
 }
 
-/// Calls step(in, out) until it says that the stream is over; step moves both views' beginnings.
+/// Calls step(in, out) until it returns that the stream has ended; step advances both views.
 template <class Step>
 std::vector<char> decompress(const char* compression, std::string_view in, uint32_t size, Step&& step) {
   std::vector<char> out;
@@ -51,7 +51,7 @@ std::vector<char> decompressBz2(std::string_view compressed, uint32_t size) {
   }
   const std::unique_ptr<bz_stream, int (*)(bz_stream*)> end(&stream, BZ2_bzDecompressEnd);
   return decompress("bz2", compressed, size, [&](std::string_view* in, char* out, size_t* room) {
-    stream.next_in = const_cast<char*>(in->data());  // is only read
+    stream.next_in = const_cast<char*>(in->data());  // read only
     stream.avail_in = static_cast<unsigned>(in->size());
     stream.next_out = out;
     stream.avail_out = static_cast<unsigned>(*room);

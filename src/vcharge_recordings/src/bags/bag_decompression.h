@@ -7,12 +7,12 @@
 
 namespace vcharge::internal {
 
-/// True for the compressions of a bag's chunks that decompressChunk() knows: "bz2" and "lz4".
+/// Whether decompressChunk() supports this compression of a bag's chunks: "bz2" or "lz4".
 bool isChunkCompression(const std::string& name);
 
-/// The `size` bytes of a chunk that was compressed. Memory grows with what comes out, whatever size a damaged
-/// bag claims. InputError, whose text continues "expected ...", for bytes that are no such stream (both kinds
-/// have checksums) or hold another number of bytes.
+/// Decompresses a chunk of `size` bytes. Memory grows with the output, not with the size that a damaged bag
+/// claims. InputError, whose text continues "expected ...", for bytes that are no such stream (both kinds
+/// have checksums) or decompress to another number of bytes.
 std::vector<char> decompressChunk(const std::string& compression, std::string_view compressed, uint32_t size);
 
 }  // namespace vcharge::internal

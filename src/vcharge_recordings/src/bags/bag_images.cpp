@@ -15,7 +15,7 @@ StampedImage convert(const BagMessage& recorded) {
   return {toTimestamp(message->header.stamp), toImage(message, recorded.source())};
 }
 
-// The topic that has the images and its type: the given one or its compressed copy.
+// The topic with the images and its type: the given one or its compressed copy.
 std::pair<std::string, std::string> findImageTopic(const BagReader& bag, const std::string& path,
                                                    const std::string& topic) {
   for (const auto& candidate : {std::pair<std::string, std::string>{topic, kRaw},

@@ -73,7 +73,7 @@ void BagReader::readVersion() const {
   }
 }
 
-// The file's header tells where the index lies: a record of each connection, and of each chunk where it is.
+// The file's header has the position of the index: one record per connection and per chunk.
 void BagReader::readIndex() {
   const BagRecord header = readBagRecord(file_.get(), kVersion.size(), file_->size(), Kind::kFileHeader);
   const auto index_offset = header.fields.number<uint64_t>("index_pos");
@@ -173,7 +173,7 @@ uint64_t BagReader::readChunkIndex(uint64_t offset, uint64_t index_offset) {
       file_->fail(at, "a time and the place of a message in a chunk of " +
                           std::to_string(chunks_.back().size) + " bytes");
     }
-    if (sec > 0 || nsec > 0) {  // rosbag too leaves out what was recorded before there was a clock
+    if (sec > 0 || nsec > 0) {  // rosbag, too, skips what was recorded before the clock started
       entries_.push_back({ros::Time(sec, nsec), connection, chunk, message_offset});
     }
   }

@@ -64,7 +64,7 @@ class BagReaderTest : public ::testing::Test {
   }
 
   void save(const std::string& bytes) const {
-    std::filesystem::remove(path_);  // to write over a file makes some file systems wait for the disk
+    std::filesystem::remove(path_);  // overwriting a file is slow on some file systems
     std::ofstream(path_, std::ios::binary) << bytes;
   }
   void put(std::string bytes, size_t at, const std::string& piece) const {
@@ -85,6 +85,12 @@ class BagReaderTest : public ::testing::Test {
     std::vector<std::string> all = parts;
     all.push_back(path_);
     expectInputError([&] { read(); }, all);
+  }
+  /// Replaces some of the bytes before the bag is read.
+  void expectErrorAfter(std::string bytes, size_t at, const std::string& piece,
+                        const std::vector<std::string>& parts) const {
+    put(std::move(bytes), at, piece);
+    expectError(parts);
   }
 };
 
@@ -124,7 +130,7 @@ TEST_F(BagReaderTest, OrdersMessagesByTheTimeOfTheirRecording) {
   EXPECT_TRUE(std::is_sorted(messages.begin(), messages.end()));
 }
 
-// Also where they lie in compressed chunks, of which each is decompressed once then.
+// Also in compressed chunks, each of which is decompressed only once.
 TEST_F(BagReaderTest, OrdersMessagesOfOneTimeAsTheyLieInTheBag) {
   rosbag::Bag bag(path_, rosbag::bagmode::Write);
   bag.setChunkThreshold(1);
@@ -145,15 +151,14 @@ TEST_F(BagReaderTest, OrdersMessagesOfOneTimeAsTheyLieInTheBag) {
 
 TEST_F(BagReaderTest, NamesOtherFormats) {
   const std::string whole = write();
-  put(whole, 9, "1.2");
-  expectError({"expected a ROS bag of format 2.0"});
+  expectErrorAfter(whole, 9, "1.2", {"expected a ROS bag of format 2.0"});
   save("#ROS" + std::string(900, 'x') + " V2.0\n" + whole.substr(kVersionSize));
   expectError({"expected a ROS bag of format 2.0"});
 }
 
 TEST_F(BagReaderTest, NamesAnEncryptedBag) {
   std::string bytes = write();
-  // One more field in the file's header, at the expense of the padding behind it.
+  // One more field in the file's header, which replaces some of the padding behind it.
   const std::string field = "encryptor=rosbag/AesCbcEncryptor";
   const std::string added = bytesOf(static_cast<uint32_t>(field.size())) + field;
   const auto header_size = numberAt<uint32_t>(bytes, kVersionSize);
@@ -162,100 +167,84 @@ TEST_F(BagReaderTest, NamesAnEncryptedBag) {
   bytes.replace(padding, 4, bytesOf(static_cast<uint32_t>(padding_size - added.size())));
   bytes.erase(padding + 4, added.size());
   bytes.insert(padding, added);
-  put(bytes, kVersionSize, bytesOf(static_cast<uint32_t>(header_size + added.size())));
-  expectError({"without encryption", "rosbag/AesCbcEncryptor", "rosbag decrypt"});
+  expectErrorAfter(bytes, kVersionSize, bytesOf(static_cast<uint32_t>(header_size + added.size())),
+                   {"without encryption", "rosbag/AesCbcEncryptor", "rosbag decrypt"});
 }
 
 TEST_F(BagReaderTest, NamesAHeaderThatDoesNotEndInTheFile) {
   const std::string whole = write();
   for (const uint32_t length : {0xffffffffU, 0x7fffffffU, static_cast<uint32_t>(whole.size())}) {
-    put(whole, kVersionSize, bytesOf(length));
-    expectError({"byte 13", "header of at most", std::to_string(length)});
+    expectErrorAfter(whole, kVersionSize, bytesOf(length),
+                     {"byte 13", "header of at most", std::to_string(length)});
   }
-  // In a file that is large enough for it: no header is so long.
-  put(whole + std::string(20 << 20, ' '), kVersionSize, bytesOf(17U << 20));
-  expectError({"byte 13", "header of at most 16777216", std::to_string(17 << 20)});
+  // The file is large enough for this length, but no header is so long.
+  expectErrorAfter(whole + std::string(20 << 20, ' '), kVersionSize, bytesOf(17U << 20),
+                   {"byte 13", "header of at most 16777216", std::to_string(17 << 20)});
 }
 
 TEST_F(BagReaderTest, NamesAFieldThatDoesNotEndInItsHeader) {
   const std::string whole = write();
   const auto header_size = numberAt<uint32_t>(whole, kVersionSize);
   for (const uint32_t length : {header_size - 3, 1000000U, 0xfffffffcU}) {
-    put(whole, kVersionSize + 4, bytesOf(length));
-    expectError({"byte 21", "the " + std::to_string(header_size - 4) + " bytes that are left of its header",
-                 std::to_string(length)});
+    expectErrorAfter(
+        whole, kVersionSize + 4, bytesOf(length),
+        {"byte 21", "the " + std::to_string(header_size - 4) + " bytes that are left of its header",
+         std::to_string(length)});
   }
-  // The header ends within the field's length.
-  put(whole, kVersionSize, bytesOf(uint32_t{2}));
-  expectError({"byte 17", "field's length within its header"});
+  // The header ends inside the field's length.
+  expectErrorAfter(whole, kVersionSize, bytesOf(uint32_t{2}),
+                   {"byte 17", "field's length within its header"});
 }
 
 TEST_F(BagReaderTest, NamesFieldsThatAreNone) {
   const std::string whole = write();
-  put(whole, valueOf(whole, "op") - 1, "x");
-  expectError({"a field with '='"});
-  put(whole, valueOf(whole, "op") - 2, "q");
-  expectError({"byte 17", "field 'op'"});
-  put(whole, valueOf(whole, "op"), "\x05");
-  expectError({"byte 13", "file header (op 3)", "op 5"});
-  // A message's record has conn, op and time: a second "conn" of 8 bytes takes the place of the first.
-  put(whole, valueOf(whole, "time") - 5, "conn");
-  expectError({"field 'conn' of 4 bytes, got 8"});
+  expectErrorAfter(whole, valueOf(whole, "op") - 1, "x", {"a field with '='"});
+  expectErrorAfter(whole, valueOf(whole, "op") - 2, "q", {"byte 17", "field 'op'"});
+  expectErrorAfter(whole, valueOf(whole, "op"), "\x05", {"byte 13", "file header (op 3)", "op 5"});
+  // A message's record has conn, op and time. A second "conn" of 8 bytes replaces the first.
+  expectErrorAfter(whole, valueOf(whole, "time") - 5, "conn", {"field 'conn' of 4 bytes, got 8"});
 }
 
 TEST_F(BagReaderTest, NamesAnIndexThatIsNotThere) {
   const std::string whole = write();
   const size_t at = valueOf(whole, "index_pos");
-  put(whole, at, bytesOf(uint64_t{0}));
-  expectError({"no index", "rosbag reindex"});
+  expectErrorAfter(whole, at, bytesOf(uint64_t{0}), {"no index", "rosbag reindex"});
   for (const uint64_t position : {uint64_t{1}, uint64_t{4000}, uint64_t{whole.size() + 1}, ~uint64_t{0}}) {
-    put(whole, at, bytesOf(position));
-    expectError({"byte 13", "index's position", std::to_string(position)});
+    expectErrorAfter(whole, at, bytesOf(position), {"byte 13", "index's position", std::to_string(position)});
   }
-  put(whole, at, bytesOf(uint64_t{whole.size()}));
-  expectError({"the length of the header of a record (connection)"});
-  put(whole, valueOf(whole, "conn_count"), bytesOf(~uint32_t{0}));
-  expectError({"record of kind connection"});
-  put(whole, valueOf(whole, "chunk_count"), bytesOf(~uint32_t{0}));
-  expectError({"record (chunk info)"});
+  expectErrorAfter(whole, at, bytesOf(uint64_t{whole.size()}),
+                   {"the length of the header of a record (connection)"});
+  expectErrorAfter(whole, valueOf(whole, "conn_count"), bytesOf(~uint32_t{0}), {"record of kind connection"});
+  expectErrorAfter(whole, valueOf(whole, "chunk_count"), bytesOf(~uint32_t{0}), {"record (chunk info)"});
 }
 
 TEST_F(BagReaderTest, NamesAConnectionWhoseDefinitionIsDamaged) {
   const std::string whole = write();
   const auto index = numberAt<uint64_t>(whole, valueOf(whole, "index_pos"));
-  // The record: its header's length, header, length of its data and the data's first field.
+  // A record: length of its header, header, length of its data, and the first field of the data.
   const size_t data = index + 8 + numberAt<uint32_t>(whole, index);
-  put(whole, data, bytesOf(uint32_t{900000}));
-  expectError({"left of its header", "900000"});
-  put(whole, data - 4, bytesOf(~uint32_t{0}));
-  expectError({"data of at most", "4294967295"});
-  put(whole, whole.find("md5sum=", index), "md6sum");
-  expectError({"field 'md5sum'"});
+  expectErrorAfter(whole, data, bytesOf(uint32_t{900000}), {"left of its header", "900000"});
+  expectErrorAfter(whole, data - 4, bytesOf(~uint32_t{0}), {"data of at most", "4294967295"});
+  expectErrorAfter(whole, whole.find("md5sum=", index), "md6sum", {"field 'md5sum'"});
 }
 
 TEST_F(BagReaderTest, NamesAChunkThatIsNotThere) {
   const std::string whole = write();
   const size_t at = valueOf(whole, "chunk_pos");
   for (const uint64_t position : {uint64_t{whole.size()}, ~uint64_t{0}, ~uint64_t{3}}) {
-    put(whole, at, bytesOf(position));
-    expectError({"a chunk before the index", std::to_string(position)});
+    expectErrorAfter(whole, at, bytesOf(position), {"a chunk before the index", std::to_string(position)});
   }
-  put(whole, at, bytesOf(numberAt<uint64_t>(whole, at) + 1));
-  expectError({"expected"});
-  put(whole, at, bytesOf(uint64_t{kVersionSize}));
-  expectError({"byte 13", "chunk (op 5)", "op 3"});
+  expectErrorAfter(whole, at, bytesOf(numberAt<uint64_t>(whole, at) + 1), {"expected"});
+  expectErrorAfter(whole, at, bytesOf(uint64_t{kVersionSize}), {"byte 13", "chunk (op 5)", "op 3"});
 }
 
 TEST_F(BagReaderTest, NamesChunksThatAreDamaged) {
   const std::string whole = write();
-  put(whole, valueOf(whole, "compression"), "nonf");
-  expectError({"compression none, bz2 or lz4"});
+  expectErrorAfter(whole, valueOf(whole, "compression"), "nonf", {"compression none, bz2 or lz4"});
   const size_t size = valueOf(whole, "size");
-  put(whole, size, bytesOf(uint32_t{7}));
-  expectError({"a chunk of the size of its data", "got 7"});
+  expectErrorAfter(whole, size, bytesOf(uint32_t{7}), {"a chunk of the size of its data", "got 7"});
   // The length of its data follows its last field, the size.
-  put(whole, size + 4, bytesOf(~uint32_t{0}));
-  expectError({"data of at most", "4294967295"});
+  expectErrorAfter(whole, size + 4, bytesOf(~uint32_t{0}), {"data of at most", "4294967295"});
 }
 
 TEST_F(BagReaderTest, NamesCountsThatAreNotWhatFollows) {
@@ -263,13 +252,12 @@ TEST_F(BagReaderTest, NamesCountsThatAreNotWhatFollows) {
   // Counts, in order: index of the first chunk, ..., chunk infos. 12 and 8 bytes for each: these products
   // are the true ones modulo 2^32.
   const size_t index_count = valueOf(whole, "count", 2);  // after conn_count and chunk_count
-  put(whole, index_count, bytesOf(numberAt<uint32_t>(whole, index_count) + (1U << 30)));
-  expectError({"an index of version 1 with 12 bytes for each"});
+  expectErrorAfter(whole, index_count, bytesOf(numberAt<uint32_t>(whole, index_count) + (1U << 30)),
+                   {"an index of version 1 with 12 bytes for each"});
   const size_t info_count = whole.find("count=", whole.find("chunk_pos=")) + 6;
-  put(whole, info_count, bytesOf(numberAt<uint32_t>(whole, info_count) + (1U << 29)));
-  expectError({"a chunk info of version 1 with 8 bytes for each"});
-  put(whole, valueOf(whole, "ver"), bytesOf(uint32_t{2}));
-  expectError({"an index of version 1"});
+  expectErrorAfter(whole, info_count, bytesOf(numberAt<uint32_t>(whole, info_count) + (1U << 29)),
+                   {"a chunk info of version 1 with 8 bytes for each"});
+  expectErrorAfter(whole, valueOf(whole, "ver"), bytesOf(uint32_t{2}), {"an index of version 1"});
 }
 
 TEST_F(BagReaderTest, NamesIndicesThatAreDamaged) {
@@ -279,30 +267,28 @@ TEST_F(BagReaderTest, NamesIndicesThatAreDamaged) {
   const auto offset = numberAt<uint32_t>(whole, entry + 8);
   const auto chunk_size = numberAt<uint32_t>(whole, valueOf(whole, "size"));
   for (const uint32_t beyond : {chunk_size, ~uint32_t{0}}) {
-    put(whole, entry + 8, bytesOf(beyond));
-    expectError({"byte " + std::to_string(entry), "in a chunk of " + std::to_string(chunk_size)});
+    expectErrorAfter(whole, entry + 8, bytesOf(beyond),
+                     {"byte " + std::to_string(entry), "in a chunk of " + std::to_string(chunk_size)});
   }
   for (const uint32_t inside : {offset + 1, offset + 4, chunk_size - 1, chunk_size - 5, uint32_t{0}}) {
     SCOPED_TRACE(inside);
-    put(whole, entry + 8, bytesOf(inside));
-    expectError({"expected"});
+    expectErrorAfter(whole, entry + 8, bytesOf(inside), {"expected"});
   }
-  put(whole, entry + 4, bytesOf(uint32_t{1000000000}));
-  expectError({"byte " + std::to_string(entry), "a time"});
+  expectErrorAfter(whole, entry + 4, bytesOf(uint32_t{1000000000}),
+                   {"byte " + std::to_string(entry), "a time"});
   // Fields come in the order of their names: conn, count, op, ver.
   const size_t connection = whole.rfind("conn=", entry) + 5;
-  put(whole, connection, bytesOf(uint32_t{77}));
-  expectError({"a connection of the index, got connection 77"});
-  put(whole, connection, bytesOf(uint32_t{1}));
-  expectError({"a message on /odd, as the index says"});
+  expectErrorAfter(whole, connection, bytesOf(uint32_t{77}),
+                   {"a connection of the index, got connection 77"});
+  expectErrorAfter(whole, connection, bytesOf(uint32_t{1}), {"a message on /odd, as the index says"});
 }
 
 TEST_F(BagReaderTest, NamesAMessageThatDoesNotEndInItsChunk) {
   const std::string whole = write();
   const size_t length = valueOf(whole, "time") + 8;  // the last field of its header
   for (const uint32_t value : {numberAt<uint32_t>(whole, length) + 1, ~uint32_t{0}}) {
-    put(whole, length, bytesOf(value));
-    expectError({"byte " + std::to_string(length), "data of at most", std::to_string(value)});
+    expectErrorAfter(whole, length, bytesOf(value),
+                     {"byte " + std::to_string(length), "data of at most", std::to_string(value)});
   }
 }
 
@@ -319,7 +305,7 @@ TEST_F(BagReaderTest, NamesCompressedChunksThatAreDamaged) {
       for (const char bit : {'\x01', '\x10', '\x80'}) {
         put(whole, at, std::string(1, static_cast<char>(whole[at] ^ bit)));
         try {
-          EXPECT_EQ(read(), recorded);  // a few bits mean nothing
+          EXPECT_EQ(read(), recorded);  // a few bits have no meaning
         } catch (const InputError& error) {
           ++num_errors;
           EXPECT_THAT(error.what(), ::testing::HasSubstr(path_));
@@ -328,27 +314,26 @@ TEST_F(BagReaderTest, NamesCompressedChunksThatAreDamaged) {
     }
     EXPECT_GT(num_errors, static_cast<int>(data_size) * 3 - 40);
     for (const uint32_t other : {true_size - 1, true_size + 1, 0x7fffffffU, ~uint32_t{0}}) {
-      put(whole, size, bytesOf(other));
-      expectError({"chunk with data at byte " + std::to_string(data), std::to_string(other) + " bytes"});
+      expectErrorAfter(whole, size, bytesOf(other),
+                       {"chunk with data at byte " + std::to_string(data), std::to_string(other) + " bytes"});
     }
   }
 }
 
-// A block longer than lz4's buffer for it: librosbag copies it nevertheless.
+// A block longer than lz4's buffer, which librosbag would copy.
 TEST_F(BagReaderTest, NamesALz4BlockThatIsTooLong) {
   const std::string whole = write(rosbag::compression::LZ4, 1);
   const size_t block_length = valueOf(whole, "size") + 8 + 7;  // after the stream's header of 7 bytes
   for (const uint32_t length : {0x7fffffffU, 0xffffffffU, 0x00500000U, 0x80500000U}) {
-    put(whole, block_length, bytesOf(length));
-    expectError({"compressed by lz4"});
+    expectErrorAfter(whole, block_length, bytesOf(length), {"compressed by lz4"});
   }
 }
 
 TEST_F(BagReaderTest, NamesTheChunkOfADamagedIndexAfterDecompression) {
   const std::string whole = write(rosbag::compression::LZ4, 1);
   const size_t entry = valueOf(whole, "ver") + 8;
-  put(whole, entry + 8, bytesOf(numberAt<uint32_t>(whole, entry + 8) + 3));
-  expectError({"chunk with data at byte", "corrupt or truncated at byte"});
+  expectErrorAfter(whole, entry + 8, bytesOf(numberAt<uint32_t>(whole, entry + 8) + 3),
+                   {"chunk with data at byte", "corrupt or truncated at byte"});
 }
 
 TEST_F(BagReaderTest, NamesMessagesThatAreNone) {
@@ -387,7 +372,7 @@ TEST_F(BagReaderTest, MakesNoRoomForPixelsThatAreNotThere) {
   expectNoRoomForImages<sensor_msgs::CompressedImage>(path_);
 }
 
-// What a sanitizer sees: no byte, whatever it becomes, leads out of a buffer.
+// For the sanitizers: no changed byte makes the reader leave a buffer.
 TEST_F(BagReaderTest, EndsInAnErrorOrInMessagesWhateverByteIsDamaged) {
   for (const auto compression : {rosbag::compression::Uncompressed, rosbag::compression::LZ4}) {
     const std::string whole = write(compression, 2, 1000000);

@@ -9,7 +9,7 @@ namespace vcharge::internal {
 namespace {
 
 constexpr size_t kPage = 4096;
-// The largest field is a message's definition, of some 10 kB: a longer header is a damaged length.
+// The largest field is a message's definition, of about 10 kB: a longer header has a damaged length.
 constexpr uint32_t kMaxHeader = 16 << 20;
 
 const char* nameOf(BagRecordKind kind) {
@@ -48,7 +48,7 @@ BagFile::BagFile(const std::string& path) : BagBytes(path) {
   if (!std::filesystem::is_regular_file(path, error)) {
     throw InputError(path + ": no such file; expected a ROS bag");
   }
-  // Unbuffered: the window is the buffer.
+  // Unbuffered, since the window is the buffer.
   file_.rdbuf()->pubsetbuf(nullptr, 0);
   file_.open(path, std::ios::binary);
   size_ = std::filesystem::file_size(path, error);

@@ -10,14 +10,14 @@
 
 namespace vcharge::internal {
 
-/// What the records of a bag are read from: its file, or one of its chunks after decompression.
+/// Bytes from which records are read: the bag's file, or one of its chunks after decompression.
 class BagBytes {
  public:
   virtual ~BagBytes() = default;
   virtual uint64_t size() const = 0;
-  /// The bytes [offset, offset + size), which hold until the next call. InputError where they are not there.
+  /// The bytes [offset, offset + size), valid until the next call. InputError beyond the end.
   std::string_view view(uint64_t offset, uint64_t size);
-  /// A number as it stands in the file (little endian).
+  /// A little-endian number.
   template <class Number>
   Number number(uint64_t offset) {
     Number value;
@@ -36,10 +36,10 @@ class BagBytes {
   const std::string name_;
 };
 
-/// The file of a bag. Holds no more of it than was asked for last, or one page.
+/// The file of a bag. Only the bytes that were read last, or one page, are in memory.
 class BagFile : public BagBytes {
  public:
-  /// InputError where there is no such file.
+  /// InputError if there is no such file.
   explicit BagFile(const std::string& path);
   uint64_t size() const override { return size_; }
 
@@ -72,7 +72,7 @@ class BagFields {
  public:
   BagFields(BagBytes* bytes, uint64_t offset, uint32_t size);
 
-  /// A field of exactly that many bytes; InputError where it is missing or has another size.
+  /// A field of exactly that many bytes; InputError if it is missing or has another size.
   template <class Number>
   Number number(const std::string& name) const {
     const std::string& value = text(name);
@@ -84,7 +84,7 @@ class BagFields {
     std::memcpy(&number, value.data(), sizeof(number));
     return number;
   }
-  /// InputError where it is missing.
+  /// InputError if it is missing.
   const std::string& text(const std::string& name) const;
   bool has(const std::string& name) const { return values_.count(name) > 0; }
 
@@ -94,7 +94,7 @@ class BagFields {
   std::map<std::string, std::string> values_;
 };
 
-/// What a record is, as its field "op" says.
+/// Kind of a record, from its field "op".
 enum class BagRecordKind : uint8_t {
   kMessage = 2,
   kFileHeader = 3,
@@ -104,7 +104,7 @@ enum class BagRecordKind : uint8_t {
   kConnection = 7
 };
 
-/// A record: its fields, and where its data lie.
+/// A record: its fields, and the position of its data.
 struct BagRecord {
   BagFields fields;
   uint64_t data_offset;
@@ -112,7 +112,7 @@ struct BagRecord {
   uint64_t end() const { return data_offset + data_size; }
 };
 
-/// The record at `offset`, which must end at or before `end`. InputError where it does not, or is of another
+/// The record at `offset`, which must end at or before `end`. InputError if it does not, or is of another
 /// kind.
 BagRecord readBagRecord(BagBytes* bytes, uint64_t offset, uint64_t end, BagRecordKind kind);
 

@@ -11,7 +11,7 @@
 
 namespace vcharge::internal {
 
-/// Collects what checks find.
+/// Collects the findings of checks.
 class CheckFindings {
  public:
   void add(const std::string& subject, CheckGrade grade, std::string what) {

@@ -17,7 +17,7 @@ using internal::CheckFindings;
 
 constexpr double kMaxImageGap_s = 2.0;
 constexpr double kMaxOdometryGap_s = 0.25;
-/// Way in the image after which a static edge is one of the vehicle's own.
+/// Motion in the image after which a static edge belongs to the vehicle.
 constexpr double kMoved_px = 3.0;
 
 }  // namespace
@@ -98,7 +98,7 @@ std::vector<CheckFinding> DriveChecker::findings() const {
                  std::to_string(broken.count) + " messages cannot be understood, the first: " + broken.first);
   }
   std::vector<std::vector<Timestamp>> stamps_by_camera;
-  std::vector<Timestamp> most_stamps;  // of the camera that has most
+  std::vector<Timestamp> most_stamps;  // of the camera with the most images
   double period_s = 0.0;
   for (size_t i = 0; i < state_->times.size(); ++i) {
     const std::string& name = state_->rig->cameras[i].name;

@@ -15,7 +15,7 @@ constexpr int kFrames = 130;
 constexpr double kSpeed_m_per_s = 1.5;
 const Timestamp kStart = Timestamp::fromSeconds(1000.0);
 
-/// Weaves to both sides; curvature and so the yaw rate change all the time.
+/// Weaves to both sides, so that the yaw rate changes all the time.
 double yawAt(double time_s) {
   return 0.9 * std::sin(0.55 * time_s) + 0.25 * std::sin(1.7 * time_s);
 }
@@ -30,7 +30,7 @@ RigidTransform worldFromVehicle(double time_s) {
   return RigidTransform::planar(position.x(), position.y(), yawAt(time_s));
 }
 
-/// A wall of blotches all around, 15 m away, and such a ground.
+/// A textured wall all around, 15 m away, and a textured ground.
 double brightness(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray) {
   const Eigen::Vector2d from = origin.head<2>() - Eigen::Vector2d(10.0, 0.0), along = ray.head<2>();
   const double a = along.squaredNorm(), b = from.dot(along), c = from.squaredNorm() - 15.0 * 15.0;
@@ -94,7 +94,7 @@ cv::Mat render(const RigCamera& camera, const RigidTransform& world_from_vehicle
   return image;
 }
 
-/// A drive, and what is done to it before it is checked.
+/// A drive, and the faults that are added before it is checked.
 struct Drive {
   CameraRig rig = twoCameras();
   /// Returns false for an image that was lost.
@@ -173,7 +173,7 @@ TEST_F(DriveCheckerTest, PassesAHealthyDrive) {
   const std::vector<CheckFinding> findings = check(Drive());
   EXPECT_EQ(notPassed(findings), "");
   EXPECT_EQ(worstGrade(findings), CheckGrade::kPass);
-  // All comparisons were made.
+  // No comparison was skipped.
   for (const char* subject : {"images and odometry: turns", "images and odometry: time", "left: direction",
                               "right: vertical", "left: mask", "sync"}) {
     EXPECT_EQ(whatOf(findings, subject).find("no finding"), std::string::npos) << subject;
@@ -330,7 +330,7 @@ TEST_F(DriveCheckerTest, FindsBadExposureAndFrozenImages) {
 }
 
 TEST_F(DriveCheckerTest, FindsTheVehicleInImagesUnlessAMaskHidesIt) {
-  // The bonnet: stripes at the image's lower rim.
+  // The bonnet: stripes at the lower edge of the image.
   Drive drive;
   drive.change_image = [](size_t camera, int, Timestamp*, cv::Mat* pixels) {
     for (int y = 150; camera == 0 && y < pixels->rows; ++y) {

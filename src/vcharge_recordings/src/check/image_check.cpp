@@ -14,20 +14,20 @@ constexpr int kExposureEvery = 5;
 constexpr double kManyRepeated = 0.01;
 constexpr double kTooManyRepeated = 0.2;
 constexpr int kDark = 4, kBright = 251;
-/// Shares of the image.
+/// Fractions of the image.
 constexpr double kManySaturated = 0.15;
 constexpr double kTooManySaturated = 0.5;
 /// Standard deviation of the gray levels.
 constexpr double kLowContrast = 12.0;
 constexpr double kTooLowContrast = 5.0;
-/// Relative change of the mean from one looked-at image to the next.
+/// Relative change of the mean from one examined image to the next.
 constexpr double kExposureStep = 0.35;
-/// Edges that stay where they are while the vehicle moves.
+/// Edges that do not move in the image while the vehicle moves.
 constexpr int kMinMoved = 12;
 constexpr float kMinGradient = 6.0F;
-constexpr float kStaticShare = 0.75F;  // of the gradients' sum to the sum of their lengths
+constexpr float kStaticShare = 0.75F;  // length of the gradients' sum over the sum of their lengths
 constexpr float kSteady = 0.35F;       // standard deviation of their lengths over the mean
-/// The world's own edges stay by chance, the less the more images there are.
+/// Edges of the scene stay by chance, the less often the more images there are.
 constexpr double kManyStatic = 0.003, kChanceOfOneImage = 0.4;
 constexpr double kTooManyStatic = 0.3;
 
@@ -62,7 +62,7 @@ void ImageCheck::add(const cv::Mat& pixels) {
     wrong_size_px_ = pixels.size();
     return;
   }
-  // Sensor noise alone makes each image another one.
+  // Sensor noise makes all images differ.
   num_repeated_ += !last_.empty() && cv::norm(pixels, last_, cv::NORM_INF) == 0.0 ? 1 : 0;
   pixels.copyTo(last_);
   if (num_images_ % kExposureEvery != 1) {
@@ -152,11 +152,11 @@ void ImageCheck::judgeMask(CheckFindings* findings) const {
   cv::Mat sum_length_of_mean;
   cv::magnitude(sum_x_, sum_y_, sum_length_of_mean);
   const cv::Mat has_edge = sum_length_ > kMinGradient * static_cast<float>(num_moved_);
-  // A horizon keeps its place and direction, but not its strength.
+  // A horizon keeps its position and direction, but not its strength.
   const cv::Mat is_steady =
       num_moved_ * sum_square_ < (1.0F + kSteady * kSteady) * sum_length_.mul(sum_length_);
   const cv::Mat stays = (sum_length_of_mean > kStaticShare * sum_length_) & has_edge & is_steady;
-  // The rim of the field of view and of the mask is no edge of the world's.
+  // The borders of the field of view and of the mask are no edges of the scene.
   cv::Mat inside;
   cv::erode(valid_, inside, cv::Mat::ones(7, 7, CV_8U), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT,
             cv::Scalar(0));

@@ -18,7 +18,7 @@ constexpr int kMaxCorners = 250;
 constexpr double kCornerQuality = 0.01;
 constexpr int kMinTracks = 30;
 constexpr double kMinInlierShare = 0.5;
-/// Of the ray to the optical axis: rays further out are too long on the image plane at depth 1.
+/// Largest angle to the optical axis: rays further out are too long on the image plane at depth 1.
 constexpr double kMinCosine = 0.35;
 constexpr double kThreshold = 0.003;
 
@@ -98,7 +98,7 @@ void ImageMotionMeter::estimate(const std::vector<cv::Point2f>& from_px,
   if (essential.rows != 3 || cv::countNonZero(inliers) < kMinInlierShare * static_cast<double>(from.size())) {
     return;
   }
-  // Of the two rotations that fit, the other turns by half a circle about the direction of motion.
+  // Two rotations fit; the wrong one differs by half a turn about the direction of motion.
   cv::Mat rotations[2], translation;
   cv::decomposeEssentialMat(essential, rotations[0], rotations[1], translation);
   Eigen::Matrix3d begin_from_end;
@@ -115,7 +115,7 @@ void ImageMotionMeter::estimate(const std::vector<cv::Point2f>& from_px,
     }
   }
   motion->rotation_rad = vectorFromRotation(Eigen::Quaterniond(begin_from_end));
-  // The sense of the direction: points that are near move against it.
+  // The sign of the direction: near points move against it.
   Eigen::Vector3d direction(translation.at<double>(0), translation.at<double>(1), translation.at<double>(2));
   direction = -(begin_from_end * direction).normalized();
   int64_t votes = 0;

@@ -11,14 +11,14 @@
 
 namespace vcharge::internal {
 
-/// How a camera moved from one image to a later one, as far as the images alone tell.
+/// A camera's motion from one image to a later one, from the images only.
 struct ImageMotion {
   Timestamp begin, end;
-  double flow_px = 0.0;  ///< median way of a point in the sensor's image
-  /// Of the camera, over [begin, end], in its own frame; absent where too few points agree on one.
+  double flow_px = 0.0;  ///< median motion of a point in the sensor's image
+  /// Rotation of the camera over [begin, end], in its own frame; absent if too few points agree.
   std::optional<Eigen::Vector3d> rotation_rad;
-  /// Unit vector in the camera's frame at `begin`, where rotation_rad is; without meaning where the camera
-  /// only turns.
+  /// Unit vector in the camera's frame at `begin`, if rotation_rad is present; meaningless if the camera only
+  /// turns.
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
 };
 
@@ -28,7 +28,7 @@ class ImageMotionMeter {
  public:
   explicit ImageMotionMeter(const RigCamera& camera);
 
-  /// The motion since the last image that was looked at; nothing for images in between.
+  /// The motion since the last examined image; nothing for images in between.
   std::optional<ImageMotion> add(Timestamp stamp, const cv::Mat& pixels);
 
  private:
@@ -38,8 +38,8 @@ class ImageMotionMeter {
 
   const CameraModel model_;
   const cv::Size size_px_;
-  double scale_;  // of the small images over the sensor's
-  cv::Mat mask_;  // of the small images
+  double scale_;  // small images over the sensor's size
+  cv::Mat mask_;  // for the small images
   PatchTracker tracker_;
   ImagePyramid last_;
   cv::Mat last_small_;

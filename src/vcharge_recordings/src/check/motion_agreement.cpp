@@ -7,24 +7,24 @@
 namespace vcharge::internal {
 namespace {
 
-/// Ways in the image of a vehicle that stands and of one that moves.
+/// Image motion of a standing and of a moving vehicle.
 constexpr double kStill_px = 0.4;
 constexpr double kMoves_px = 1.5;
-/// The same by the odometry.
+/// The same for the odometry.
 constexpr double kStill_m = 0.005, kStill_rad = 0.0005;
 constexpr double kMoves_m = 0.1;
-/// Other cars may move by, hence shares and not counts.
+/// Ratios instead of counts, since other cars may drive past.
 constexpr double kManyContradict = 0.05, kTooManyContradict = 0.3;
 constexpr size_t kMinMotions = 20;  // with a rotation each
-constexpr int kMinPairs = 5;        // that anything is said at all
+constexpr int kMinPairs = 5;        // fewer pairs give no finding
 
 constexpr double kMaxOffset_s = 0.5, kOffsetStep_s = 0.005;
 constexpr double kTrimmed = 0.2;
-/// Without so much of a turn nothing is said about turns.
+/// Drives with a smaller turn give no finding about turns.
 constexpr double kMinTurn_rad = 0.3;
 constexpr double kMaxOffsetSigma_s = 0.005;
 constexpr double kOffset_s = 0.02, kLargeOffset_s = 0.05;
-/// Rotations from pairs of images are some percent wrong.
+/// Rotations from pairs of images have errors of some percent.
 constexpr double kTurnError = 0.06, kLargeTurnError = 0.25;
 
 constexpr double kMaxTurnOfStraight_rad = 2.0 * kDegree;
@@ -33,15 +33,15 @@ constexpr double kMaxAxisSigma_rad = 3.0 * kDegree;
 constexpr size_t kMinDirections = 10;
 constexpr double kDirectionError_deg = 10.0, kLargeDirectionError_deg = 30.0;
 
-/// A turn about the camera's vertical, as its images show it.
+/// A turn about the camera's vertical, from its images.
 struct Turn {
   double begin_s, end_s, turn_rad;
 };
 
-/// A camera's motion with what the odometry says of the same time.
+/// A camera's motion and the odometry of the same time.
 struct ComparedMotion {
   const ImageMotion* motion;
-  double begin_s, end_s;  // of the odometry's path
+  double begin_s, end_s;  // on the odometry's path
   double distance_m, turn_rad;
 };
 
@@ -58,8 +58,8 @@ std::vector<ComparedMotion> compareMotions(const OdometryPath& path,
   return compared;
 }
 
-/// Axis of the vehicle's turns in the camera, upwards: that about which the camera turns as the odometry
-/// does. Nothing where it turns too little to tell.
+/// Axis of the vehicle's turns in the camera's frame, upwards: the common axis of rotations that agree with
+/// the odometry's turns. Nothing if the vehicle turns too little.
 std::optional<Eigen::Vector3d> turnAxis(const std::vector<ComparedMotion>& motions) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double square = 0.0;
@@ -83,17 +83,17 @@ std::optional<Eigen::Vector3d> turnAxis(const std::vector<ComparedMotion>& motio
       quantile(residuals_rad, 0.7) / std::sqrt(square) > kMaxAxisSigma_rad * axis.norm()) {
     return std::nullopt;
   }
-  // A camera is not mounted upside down: y points down in its images.
+  // No camera is mounted upside down: y points down in its images.
   return (axis.y() < 0.0 ? axis : Eigen::Vector3d(-axis)).normalized();
 }
 
 struct TurnFit {
-  double cost = 0.0;   // mean square of what is not explained, without the worst
-  double ratio = 0.0;  // of the odometry's turn to the images'
+  double cost = 0.0;   // mean squared residual, without the worst ones
+  double ratio = 0.0;  // odometry's turn over the images' turn
 };
 
 TurnFit fitTurns(const OdometryPath& path, const std::vector<Turn>& turns, double offset_s) {
-  std::vector<std::array<double, 2>> pairs;  // by the images, by the odometry
+  std::vector<std::array<double, 2>> pairs;  // from the images, from the odometry
   for (const Turn& turn : turns) {
     pairs.push_back(
         {turn.turn_rad, path.yaw_rad(turn.end_s + offset_s) - path.yaw_rad(turn.begin_s + offset_s)});
@@ -121,7 +121,7 @@ TurnFit fitTurns(const OdometryPath& path, const std::vector<Turn>& turns, doubl
   return fit;
 }
 
-/// How much later than the images' stamps the odometry's are, with standard deviation.
+/// Delay of the odometry's stamps behind the images', with standard deviation.
 struct OffsetFit {
   double offset_s = 0.0, sigma_s = 1.0;
   TurnFit turns;
@@ -139,9 +139,9 @@ OffsetFit fitOffset(const OdometryPath& path, const std::vector<Turn>& turns) {
   result.turns = fits[static_cast<size_t>(best)];
   result.offset_s = (best - num_steps) * kOffsetStep_s;
   if (best == 0 || best == 2 * num_steps) {
-    return result;  // beyond what was looked at
+    return result;  // outside the examined range
   }
-  // A parabola through points that lie far enough apart to be no noise.
+  // A parabola through points that are far enough apart not to fit noise.
   const int reach = std::min({8, best, 2 * num_steps - best});
   const double before = fits[static_cast<size_t>(best - reach)].cost,
                after = fits[static_cast<size_t>(best + reach)].cost;
@@ -228,7 +228,7 @@ void judgeTurns(const OdometryPath& path, const CameraRig& rig,
   }
 }
 
-/// Of straight motion with known extrinsics: does each camera move to where the odometry says it does?
+/// Straight motion with known extrinsics: does each camera move in the direction that the odometry predicts?
 void judgeDirections(const CameraRig& rig, const std::vector<std::vector<ComparedMotion>>& motions,
                      CheckFindings* findings) {
   for (size_t camera = 0; camera < motions.size(); ++camera) {
@@ -250,7 +250,7 @@ void judgeDirections(const CameraRig& rig, const std::vector<std::vector<Compare
     if (errors_deg.size() < kMinDirections) {
       continue;
     }
-    // Single directions may be far off; a wrong rig or odometry puts all of them aside.
+    // Single directions may be far off; a wrong rig or odometry shifts all of them.
     const double usual_deg = quantile(errors_deg, 0.5), best_deg = quantile(errors_deg, 0.2);
     const std::string figure = "moves " + toText(usual_deg, 1) +
                                " degrees beside where odometry and rig.yaml say (median of " +

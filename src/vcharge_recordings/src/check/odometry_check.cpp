@@ -8,13 +8,13 @@ namespace {
 
 constexpr double kManyUncovered = 0.01;
 constexpr double kTooManyUncovered = 0.2;
-/// Faster than a car in a car park, and than any car.
+/// Speeds above that of a car in a car park, and of any car.
 constexpr double kFast_m_per_s = 15.0;
 constexpr double kTooFast_m_per_s = 60.0;
-/// The centre of the rear axle moves along the vehicle's axis.
+/// Sideways motion is implausible: the rear axle's centre moves along the vehicle's axis.
 constexpr double kManySideways = 0.05;
 constexpr double kTooManySideways = 0.3;
-/// Of the yaw from image to image, beyond what smooth motion explains.
+/// Noise of the yaw from image to image, beyond smooth motion.
 constexpr double kYawJitter_deg = 0.06;
 constexpr double kTooMuchYawJitter_deg = 0.5;
 constexpr double kDistanceJitter_m = 0.02;
@@ -29,8 +29,8 @@ std::string degrees(double rad, int digits = 0) {
   return toText(rad / kDegree, digits) + " degrees";
 }
 
-/// Root of the mean of the squared noise of values at even times, as their third differences show it; motion
-/// with a constant acceleration has none. Where the times are not even nothing is taken.
+/// Root mean square of the noise of values at even times, from their third differences, which vanish for
+/// constant acceleration. Uneven times are skipped.
 double jitter(const std::vector<double>& times_s, const std::vector<double>& values) {
   std::vector<double> squares;
   for (size_t i = 3; i < values.size(); ++i) {
@@ -42,7 +42,7 @@ double jitter(const std::vector<double>& times_s, const std::vector<double>& val
     const double third = values[i] - 3.0 * values[i - 1] + 3.0 * values[i - 2] - values[i - 3];
     squares.push_back(third * third / 20.0);
   }
-  // A tenth may be real jerks: starting, stopping.
+  // A tenth may be real jerks from starting and stopping.
   std::sort(squares.begin(), squares.end());
   squares.resize(squares.size() - squares.size() / 10);
   double sum = 0.0;
@@ -84,7 +84,7 @@ void judgeResolution(const OdometryPath& path, const std::vector<Timestamp>& ima
       distances.push_back(path.distance_m(time_s));
     }
   }
-  // From one image to the next two of the errors differ.
+  // The change from image to image has two of these errors.
   const double yaw_deg = std::sqrt(2.0) * jitter(times_s, yaws) / kDegree,
                distance_m = std::sqrt(2.0) * jitter(times_s, distances);
   const std::string advice =

@@ -9,10 +9,10 @@
 
 namespace vcharge::internal {
 
-/// The path that the odometry tells, to be asked at any time.
+/// The path of the odometry, interpolated at any time.
 class OdometryPath {
  public:
-  /// In any order; of those with one stamp the first counts.
+  /// In any order; of equal stamps the first is used.
   explicit OdometryPath(std::vector<VehicleOdometry> odometry);
 
   bool empty() const { return stamps_s_.empty(); }
@@ -20,12 +20,12 @@ class OdometryPath {
   double end_s() const { return stamps_s_.back(); }
   size_t size() const { return stamps_s_.size(); }
   double stamp_s(size_t i) const { return stamps_s_[i]; }
-  /// The same, relative to the first, for what is asked below.
+  /// The same relative to the first, as argument of the functions below.
   double secondsOf(Timestamp stamp) const { return toSeconds(stamp - origin_); }
   bool covers(double time_s) const { return begin_s() <= time_s && time_s <= end_s(); }
-  /// Yaw without jumps at half turns; linear between the stamps, the ends' beyond them.
+  /// Yaw without jumps at half turns; linear between the stamps, constant beyond the ends.
   double yaw_rad(double time_s) const { return at(yaws_rad_, time_s); }
-  /// Metres driven, less what was driven backwards.
+  /// Metres driven forwards minus metres driven backwards.
   double distance_m(double time_s) const { return at(distances_m_, time_s); }
   const std::vector<Eigen::Vector2d>& stepsInVehicle() const { return steps_; }
 
@@ -34,15 +34,15 @@ class OdometryPath {
 
   Timestamp origin_;
   std::vector<double> stamps_s_, yaws_rad_, distances_m_;
-  std::vector<Eigen::Vector2d> steps_;  // from the entry before, in the frame half way
+  std::vector<Eigen::Vector2d> steps_;  // from the previous entry, in the frame half way
 };
 
-/// Is the odometry alone plausible: coverage of the images, jumps, wheels that roll sideways, resolution; and
-/// what the drive contains. `image_stamps`: of one camera, in increasing order.
+/// Checks the odometry alone: coverage of the images, jumps, sideways motion, resolution; and what the drive
+/// contains. `image_stamps`: of one camera, in increasing order.
 void judgeOdometry(const OdometryPath& path, const std::vector<Timestamp>& image_stamps,
                    CheckFindings* findings);
 
-/// Does it move as the images do? Motions by camera of the rig.
+/// Checks whether odometry and images agree on the motion. Motions by camera of the rig.
 void judgeAgreement(const OdometryPath& path, const CameraRig& rig,
                     const std::vector<std::vector<ImageMotion>>& motions, CheckFindings* findings);
 

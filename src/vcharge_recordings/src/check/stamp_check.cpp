@@ -9,9 +9,9 @@ namespace {
 
 constexpr double kManyLost = 0.005;
 constexpr double kTooManyLost = 0.25;
-/// Of what lies between the 5 % and the 95 % of the delays from stamp to recording.
+/// Bounds of the span from the 5 % to the 95 % quantile of the delays from stamp to recording.
 constexpr double kUnevenDelay_s = 0.5;
-/// A stamp that is so much later than its recording is of another clock.
+/// A stamp that is this much later than its recording is from another clock.
 constexpr double kFuture_s = 0.05;
 constexpr double kManyDisordered = 0.0;
 constexpr double kTooManyDisordered = 0.3;
@@ -117,7 +117,7 @@ void TopicTimes::judgeRate(const std::string& subject, double max_gap_s, CheckFi
 
 void judgeSync(const std::vector<std::vector<Timestamp>>& stamps_by_camera, double period_s,
                CheckFindings* findings) {
-  // Of the time in which all cameras run; those that never do have a finding of their own.
+  // Only in the time in which all cameras run; silent cameras have a finding of their own.
   std::vector<const std::vector<Timestamp>*> cameras;
   for (const std::vector<Timestamp>& stamps : stamps_by_camera) {
     if (!stamps.empty()) {

@@ -15,11 +15,11 @@ class TopicTimes {
   void add(Timestamp stamp, Timestamp recorded);
 
   bool empty() const { return stamps_.empty(); }
-  /// In increasing order, each once.
+  /// In increasing order, without repetitions.
   std::vector<Timestamp> sortedStamps() const;
   /// Median distance of neighbouring stamps; 0 for fewer than two.
   double period_s() const;
-  /// Order of stamps, and how they fit the times of recording.
+  /// Order of stamps, and their delays to the times of recording.
   void judgeOrder(const std::string& subject, CheckFindings* findings) const;
   /// Rate, lost messages, longest gap. A gap above `max_gap_s` fails.
   void judgeRate(const std::string& subject, double max_gap_s, CheckFindings* findings) const;
@@ -30,7 +30,7 @@ class TopicTimes {
   int64_t num_backwards_ = 0, num_repeated_ = 0, num_unstamped_ = 0;
 };
 
-/// Do the cameras' images of one instant have one stamp?
+/// Checks whether the cameras' images of one instant have the same stamp.
 void judgeSync(const std::vector<std::vector<Timestamp>>& stamps_by_camera, double period_s,
                CheckFindings* findings);
 

@@ -30,7 +30,7 @@ std::string seconds(double value) {
   return text.str();
 }
 
-/// One reading of a bag, from its first message to its last.
+/// Reads a bag once from its first message to its last.
 class BagReading {
  public:
   BagReading(const std::string& path, const CameraRig& rig, const BagDriveSourceOptions& options,
@@ -146,8 +146,8 @@ std::string BagReading::topicName(size_t camera_index) const {
   return options_.topics.imageTopic(rig_.cameras[camera_index].name);
 }
 
-// A camera is silent since its last image, or since the first image of any camera. Judged when some camera
-// brings an image: where all end together and odometry runs on, the drive's images are over.
+// A camera is silent since its last image, or since the first image of any camera. This is checked when an
+// image comes: if all cameras end together and only odometry continues, the drive's images are complete.
 void BagReading::checkCameras(Timestamp stamp) const {
   if (!first_image_) {
     return;
@@ -203,13 +203,6 @@ void BagReading::run(const DriveSource::ProgressCallback& progress) {
 }
 
 }  // namespace
-
-void BagDriveSourceOptions::validate() const {
-  validateInner("topics", topics);
-  requireField(std::isfinite(sort_window_s) && sort_window_s >= 0.0, "sort_window_s",
-               "must be finite and not negative", sort_window_s);
-  requireField(max_image_gap_s > 0.0, "max_image_gap_s", "must be positive", max_image_gap_s);
-}
 
 BagDriveSource::BagDriveSource(std::string bag_path, std::shared_ptr<const CameraRig> rig,
                                const BagDriveSourceOptions& options)

@@ -1,4 +1,4 @@
-// What is wrong with a bag, and how BagDriveSource says it.
+// Errors of BagDriveSource for faulty bags.
 #include <fstream>
 #include <limits>
 #include <random>
@@ -42,7 +42,7 @@ TEST_F(BagDriveSourceTest, NamesABagThatIsCutOffAnywhere) {
 TEST_F(BagDriveSourceTest, NamesABagThatWasNotFinished) {
   writeDrive(1);
   std::filesystem::copy_file(path_, folder_ / "whole.bag");
-  // What a recorder that is killed leaves: the index position in the file's header is still 0.
+  // A recorder that was killed: the index position in the file's header is still 0.
   std::string bytes = readTextFile(path_);
   const size_t field = bytes.find("index_pos=");
   ASSERT_NE(field, std::string::npos);

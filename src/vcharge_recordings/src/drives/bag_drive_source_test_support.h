@@ -40,7 +40,7 @@ class BagDriveSourceTest : public ::testing::Test {
     writer.close();
   }
 
-  /// Writes single messages, in the order given, whatever their stamps.
+  /// Writes single messages in the given order, with any stamps.
   template <class Function>
   void writeBag(Function&& function) {
     rosbag::Bag bag(path_, rosbag::bagmode::Write);

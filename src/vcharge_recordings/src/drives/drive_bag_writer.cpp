@@ -22,7 +22,7 @@ constexpr char kGroundTruthTopic[] = "/ground_truth";
 
 struct DriveBagWriter::Implementation {
   std::string path;
-  std::string unfinished_path;  // as rosbag record names a bag that is not complete yet
+  std::string unfinished_path;  // the name that rosbag record gives an incomplete bag
   CameraRig rig;
   DriveTopics topics;
   std::vector<sensor_msgs::CameraInfo> camera_infos;
@@ -65,7 +65,7 @@ DriveBagWriter::~DriveBagWriter() {
   try {
     implementation_->bag.close();
   } catch (const std::exception&) {
-    // The file goes anyway.
+    // The file is removed anyway.
   }
   std::error_code ignored;
   std::filesystem::remove(implementation_->unfinished_path, ignored);

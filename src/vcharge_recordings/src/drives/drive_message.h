@@ -10,7 +10,7 @@ namespace vcharge::internal {
 
 enum class DriveTopicKind { kImage, kCompressedImage, kOdometry, kWheelTicks };
 
-/// What a topic of a drive carries.
+/// The content of a drive's topic.
 struct DriveTopicRole {
   DriveTopicKind kind;
   size_t camera_index = 0;
@@ -19,8 +19,8 @@ struct DriveTopicRole {
 /// "nav_msgs/Odometry"
 const char* expectedType(DriveTopicKind kind);
 
-/// The content of a bag's message and its stamp, whatever size an image has. InputError naming the bag and
-/// the topic for what cannot be understood.
+/// The content and stamp of a bag's message; images may have any size. InputError naming the bag and the
+/// topic for a message that cannot be read.
 DriveItem convertDriveMessage(const BagMessage& message, const DriveTopicRole& role,
                               const std::string& vehicle_frame, Timestamp* stamp);
 

@@ -27,7 +27,7 @@ std::map<std::string, DriveTopicRole> rolesOf(const BagReader& bag, const Camera
       roles.insert(*found);
     }
   }
-  // A topic that is there raw is not read a second time.
+  // A topic with raw images is not read again compressed.
   for (const RigCamera& camera : rig.cameras) {
     if (roles.count(topics.imageTopic(camera.name)) > 0) {
       roles.erase(topics.compressedImageTopic(camera.name));

@@ -19,8 +19,8 @@ namespace {
 
 constexpr int64_t kNanosecondsPerMicrosecond = 1000;
 constexpr double kMaxSkew_px = 1e-6;
-// What the left mirror's camera sees of the car and of its own housing, drawn by eye on the mean of the
-// images with a few pixels to spare.
+// Outlines of the car's body and of the housing in the left mirror camera's image, drawn by hand on the mean
+// of the images with a margin of a few pixels.
 const cv::Size kOutlineImageSize(1280, 800);
 const std::vector<std::vector<cv::Point>> kVehicleOutlines = {
     // Fender and door handle below, the housing's rim up the left side.

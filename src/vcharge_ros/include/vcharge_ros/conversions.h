@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include <geometry_msgs/Pose.h>
 #include <geometry_msgs/Transform.h>
@@ -10,6 +11,7 @@
 #include <vcharge_msgs/WheelTicks.h>
 
 #include "vcharge_core/base/timestamp.h"
+#include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/motion/rigid_transform.h"
 #include "vcharge_core/motion/vehicle_odometry.h"
 
@@ -29,6 +31,8 @@ RigidTransform fromMessage(const geometry_msgs::Transform& transform, const std:
 geometry_msgs::TransformStamped toTransformStamped(const RigidTransform& target_from_source, Timestamp stamp,
                                                    const std::string& target_frame,
                                                    const std::string& source_frame);
+/// vehicle_frame -> each camera whose extrinsics are known.
+std::vector<geometry_msgs::TransformStamped> cameraTransforms(const CameraRig& rig, Timestamp stamp);
 
 /// Speed is twist.linear.x, yaw rate twist.angular.z, both in the child frame.
 nav_msgs::Odometry toMessage(const VehicleOdometry& odometry, const std::string& odom_frame,

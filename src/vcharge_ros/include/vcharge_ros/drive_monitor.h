@@ -13,9 +13,9 @@
 
 namespace vcharge {
 
-/// What arrives on a drive's topics, judged for /diagnostics: which topic is silent, which brought something
-/// bad and why, where time jumped back. A topic is well again once it brings good data. Knows no clock:
-/// callers pass a steady one. Thread safe: /diagnostics go on while data is processed.
+/// State of a drive's topics for /diagnostics: which topic is silent, which had bad data and why, where
+/// stamps jumped back. A topic has recovered once good data comes. Callers pass the time of a steady clock.
+/// Thread safe: reports are made while data is processed.
 class DriveMonitor {
  public:
   using SteadyTime = std::chrono::steady_clock::time_point;
@@ -29,19 +29,19 @@ class DriveMonitor {
 
   DriveMonitor(double max_silence_s, SteadyTime now);
 
-  /// A topic that must bring data; silence on others is no fault.
+  /// A topic that must have data; silence of other topics is no fault.
   void expectTopic(const std::string& topic);
-  /// Good data. A stamp (if it has one) before the topic's newest is counted as a jump back and reported for
-  /// some seconds, and once however late the next report is. kRecovered when the topic was in fault.
+  /// Good data. A stamp before the topic's newest is counted as a jump back and reported for some seconds, at
+  /// least in the next report. kRecovered when the topic was in fault.
   Change addGood(const std::string& topic, std::optional<Timestamp> stamp, SteadyTime now);
-  /// Bad data, and why. kFailed when the text is news for this topic: worth one line in the log.
+  /// Bad data, and why. kFailed when the text is new for this topic and should be logged.
   Change addBad(const std::string& topic, const std::string& error, SteadyTime now);
 
-  /// Nothing is taken from any topic from beginWork() to endWork(): that time counts as nobody's silence.
+  /// No topic is read from beginWork() to endWork(): that time is no silence.
   void beginWork(SteadyTime now);
   void endWork(SteadyTime now);
 
-  /// The state now. An error stays until it was reported once and good data came after it.
+  /// The state at `now`. An error is kept until it was reported once and good data came after it.
   Report report(SteadyTime now);
 
  private:

@@ -2,25 +2,22 @@
 
 #include <string>
 
+#include "vcharge_core/base/options.h"
+
 namespace vcharge {
 
-/// Topics of a drive. Images come raw or, where a drive has only that, from <image topic>/compressed.
+/// Topics of a drive. Images are raw or, where a drive has only that, compressed on <image topic>/compressed.
 struct DriveTopics {
-  std::string image = "/camera/{camera}/image_raw";  ///< {camera}: the camera's name in the rig
-  std::string odometry = "/odom";
-  std::string wheel_ticks = "/wheel_ticks";  ///< optional in a drive; empty: not read
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("image", image);
-    visit("odometry", odometry);
-    visit("wheel_ticks", wheel_ticks);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(DriveTopics);
+  VCHARGE_OPTION(std::string, image, "/camera/{camera}/image_raw", anyValue(), "Images of a camera.");
+  VCHARGE_OPTION(std::string, odometry, "/odom", anyValue(), "Odometry.");
+  VCHARGE_OPTION(std::string, wheel_ticks, "/wheel_ticks", anyValue(), "Wheel ticks; empty: not read.");
+  VCHARGE_END_OPTIONS();
+  void checkFields() const;
 
   std::string imageTopic(const std::string& camera_name) const;
   std::string compressedImageTopic(const std::string& camera_name) const;
-  /// Beside the image topic, as image_transport has it.
+  /// Beside the image topic, as image_transport expects it.
   std::string cameraInfoTopic(const std::string& camera_name) const;
 };
 

@@ -14,7 +14,7 @@
 
 namespace vcharge {
 
-/// How images travel. kAuto: raw, and compressed from cameras that send nothing raw, or nothing any more for
+/// How images are transported. kAuto: raw, and compressed from cameras without raw images during
 /// max_silence_s of the drive's time.
 enum class ImageTransport { kAuto, kRaw, kCompressed };
 
@@ -23,56 +23,47 @@ inline std::vector<std::string> enumNames<ImageTransport>() {
   return {"auto", "raw", "compressed"};
 }
 
+/// A queue that is full drops its oldest message; a size of 0 drops nothing. With a sort window messages are
+/// delivered in the order of a bag, delayed by the window; what waits is delivered once nothing has come for
+/// idle_flush_s.
 struct LiveDriveSourceOptions {
-  DriveTopics topics;
-  std::vector<std::string> cameras;  ///< of the rig, by name; empty: all
-  ImageTransport image_transport = ImageTransport::kAuto;
-  int image_queue_size = 4;       ///< per camera; the oldest is dropped; 0: none ever (replay without loss)
-  int odometry_queue_size = 200;  ///< 0: none is ever dropped
-  /// Messages are delivered in the order in which a bag's are, delayed by this much drive time, and whatever
-  /// waits is delivered once nothing has come for idle_flush_s. 0: delivered as they arrive.
-  double sort_window_s = 0.0;
-  double idle_flush_s = 1.0;
-  double max_silence_s = 2.0;  ///< wall time without data on a topic before it is reported
+  VCHARGE_BEGIN_OPTIONS(LiveDriveSourceOptions);
+  VCHARGE_OPTION_GROUP(DriveTopics, topics, {}, "Topics of the drive.");
+  VCHARGE_OPTION(std::vector<std::string>, cameras, {}, anyValue(), "Cameras of the rig; empty: all.");
+  VCHARGE_OPTION(ImageTransport, image_transport, ImageTransport::kAuto, anyValue(), "Raw or compressed.");
+  VCHARGE_OPTION(int, image_queue_size, 4, atLeast(0), "Waiting images per camera; 0: all.");
+  VCHARGE_OPTION(int, odometry_queue_size, 200, atLeast(0), "Waiting odometry messages; 0: all.");
+  VCHARGE_OPTION(double, sort_window_s, 0.0, between(0.0, 60.0), "Drive time in which messages are sorted.");
+  VCHARGE_OPTION(double, idle_flush_s, 1.0, positive(), "Wall time until waiting messages are delivered.");
+  VCHARGE_OPTION(double, max_silence_s, 2.0, positive(), "Wall time until a silent topic is reported.");
+  VCHARGE_END_OPTIONS();
 
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("topics", topics);
-    visit("cameras", cameras);
-    visit("image_transport", image_transport);
-    visit("image_queue_size", image_queue_size);
-    visit("odometry_queue_size", odometry_queue_size);
-    visit("sort_window_s", sort_window_s);
-    visit("idle_flush_s", idle_flush_s);
-    visit("max_silence_s", max_silence_s);
-  }
-  /// For a replay of which every message is taken, in the order in which a bag's are.
+  /// For a replay without loss: every message is taken, in the order of a bag.
   void takeEverything() {
     image_queue_size = 0;
     odometry_queue_size = 0;
     sort_window_s = 0.5;
   }
-  void validate() const;  ///< throws std::invalid_argument naming the field
 };
 
 /// Subscribes to a drive's topics and feeds a consumer. Bad messages (and whatever a consumer throws) are
-/// logged once, counted, reported by report(), and skipped; stamps that jump back are passed on, after being
-/// reported, since a replayed bag may start over. Callbacks run on the queue of the node handle and are
-/// serialized here, also where that queue has several threads.
+/// logged once, counted, reported by report(), and skipped. Stamps that jump back are reported and passed on:
+/// a bag may be replayed. Callbacks run on the queue of the node handle and are serialized, also where that
+/// queue has several threads.
 class LiveDriveSource : public DriveSource {
  public:
   LiveDriveSource(const ros::NodeHandle& node, std::shared_ptr<const CameraRig> rig,
                   const LiveDriveSourceOptions& options = LiveDriveSourceOptions());
   ~LiveDriveSource() override;
 
-  /// Subscribes and returns; `consumer` must outlive this object. `progress` is never called: nobody knows
-  /// the end.
+  /// Subscribes and returns; `consumer` must outlive this object. `progress` is never called: a live drive
+  /// has no known end.
   void run(DriveConsumer* consumer, const ProgressCallback& progress) override;
 
-  /// Delivers what waits to be sorted: nothing more is to come for now.
+  /// Delivers what waits to be sorted.
   void flush();
 
-  /// State of the topics for /diagnostics. Thread safe, and waits for no consumer that is at work.
+  /// State of the topics for /diagnostics. Thread safe; does not wait for a consumer that is working.
   DriveMonitor::Report report();
 
  private:

@@ -12,12 +12,13 @@
 #include <ros/node_handle.h>
 #include <std_srvs/Trigger.h>
 
+#include "vcharge_core/frames/frame_assembler_options.h"
 #include "vcharge_ros/drive_monitor.h"
 
 namespace vcharge {
 
-/// Runs callbacks so that nothing they throw reaches ROS: each distinct text is logged once, the last is
-/// kept. Thread safe.
+/// Runs callbacks so that no exception reaches ROS: each distinct text is logged once, the last one is kept.
+/// Thread safe.
 class CallbackGuard {
  public:
   /// `name` begins every line in the log.
@@ -51,17 +52,19 @@ class CallbackGuard {
   uint64_t num_failures_ = 0;
 };
 
-/// Serves std_srvs/Trigger under `name`. What `serve` throws is the answer's text, without success. The guard
-/// must outlive the server. Throws std::runtime_error naming the service if this process serves it already: a
-/// nodelet that was unloaded while it worked does so until it is done.
+/// Serves std_srvs/Trigger under `name`. An exception of `serve` becomes an answer without success, with its
+/// text. The guard must outlive the server. Throws std::runtime_error that names the service if this process
+/// serves it already, as a nodelet does that was unloaded while it worked, until it is done.
 ros::ServiceServer advertiseTrigger(ros::NodeHandle* node, const std::string& name, CallbackGuard* guard,
                                     std::function<void(std_srvs::TriggerResponse*)> serve);
 
-/// Publishes one status on /diagnostics, every second of wall time, also where a simulated clock stands
-/// still.
+/// Adds the counters of all frames of the drive to a status, as "all_<name>".
+void addCounters(const FrameCounters& counters, DriveMonitor::Report* report);
+
+/// Publishes one status on /diagnostics, every second of wall time, also while a simulated clock is stopped.
 class NodeletDiagnostics {
  public:
-  /// `report` is called on the queue of `node`; `name` is the nodelet's and stands in the status's name.
+  /// `report` is called on the queue of `node`; `name` is that of the status.
   NodeletDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node,
                      const std::string& name, std::function<DriveMonitor::Report()> report);
 

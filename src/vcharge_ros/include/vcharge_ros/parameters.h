@@ -24,7 +24,7 @@ void readFieldsFromParameters(const ros::NodeHandle& node, const std::string& ke
   readFields(readParameter(node, key), "parameter " + node.resolveName(key), options);
 }
 
-/// A parameter that must be there. InputError names it and says what it is for ("the path of a rig.yaml").
+/// A required parameter. InputError names it and says what it is for ("the path of a rig.yaml").
 std::string requireStringParameter(const ros::NodeHandle& node, const std::string& key,
                                    const std::string& what);
 

@@ -16,9 +16,9 @@ struct RangeMapMessages {
   sensor_msgs::ImagePtr range;               ///< 32FC1, metres along the ray, NaN unknown
   sensor_msgs::ImagePtr confidence;          ///< 32FC1
   sensor_msgs::ImagePtr standard_deviation;  ///< 32FC1, metres
-  sensor_msgs::ImagePtr reference;           ///< mono8: what the camera saw; null where that is not given
+  sensor_msgs::ImagePtr reference;           ///< mono8: the undistorted image; null where it is not given
   sensor_msgs::CameraInfoPtr camera_info;    ///< equidistant fit of the working camera
-  /// x, y, z (metres) and intensity (0..255), FLOAT32, known ranges only; null where it was not asked for.
+  /// x, y, z (metres) and intensity (0..255), FLOAT32, known ranges only; null without with_points.
   sensor_msgs::PointCloud2Ptr points;
 };
 
@@ -31,8 +31,8 @@ class RangeMapConverter {
   ~RangeMapConverter();
 
   /// `gray` (CV_8UC1 of the map's size, the undistorted image, or empty) becomes the points' intensity;
-  /// without it intensity is the confidence times 255. with_points: whether anybody wants
-  /// them. std::logic_error for images of unlike size or type.
+  /// without it intensity is the confidence times 255. std::logic_error for images of different size or of
+  /// another type.
   RangeMapMessages convert(const RangeMap& map, const cv::Mat& gray, bool with_points = true);
 
  private:

@@ -9,15 +9,14 @@
 
 namespace vcharge {
 
-/// Sorts items that arrive roughly in order by stamp, through a window: an item is released once one that is
-/// `window` younger has come. At equal stamps the lower rank goes first, then the one that came first. Not
-/// thread safe.
+/// Sorts items that arrive roughly in order of stamps: an item is released once one that is `window` newer
+/// has come. At equal stamps the lower rank is first, then the one that came first. Not thread safe.
 template <class Item>
 class StampSorter {
  public:
   explicit StampSorter(Duration window) : window_(window) {}
 
-  /// Late by more than the window: it cannot be put in order any more, and is not taken.
+  /// Whether a stamp is late by more than the window, so that it cannot be sorted.
   bool isTooLate(Timestamp stamp) const { return any_ && stamp < newest_ - window_; }
   Timestamp newest() const { return newest_; }
   bool empty() const { return queue_.empty(); }
@@ -28,7 +27,7 @@ class StampSorter {
     any_ = true;
   }
 
-  /// Hands out what is old enough, in order.
+  /// Releases what is old enough, in order.
   template <class Function>
   void release(Function&& function) {
     while (!queue_.empty() && queue_.top().stamp <= newest_ - window_) {
@@ -36,7 +35,7 @@ class StampSorter {
     }
   }
 
-  /// Hands out everything, in order.
+  /// Releases everything, in order.
   template <class Function>
   void flush(Function&& function) {
     while (!queue_.empty()) {
@@ -44,7 +43,7 @@ class StampSorter {
     }
   }
 
-  /// Forgets everything, also the newest stamp.
+  /// Drops everything, also the newest stamp.
   void clear() {
     queue_ = {};
     any_ = false;
@@ -55,7 +54,7 @@ class StampSorter {
     Timestamp stamp;
     int rank;
     uint64_t sequence;
-    mutable Item item;  // moved out of the top, which is const, just before it is popped
+    mutable Item item;                          // moved out of the const top just before pop()
     bool operator<(const Entry& other) const {  // the queue's top is its largest
       return std::tie(other.stamp, other.rank, other.sequence) < std::tie(stamp, rank, sequence);
     }

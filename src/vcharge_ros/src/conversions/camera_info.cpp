@@ -44,7 +44,7 @@ sensor_msgs::CameraInfo makeCameraInfo(const CameraModel& model, cv::Size image_
       setEquidistant(fit.camera, &info);
       left_over = {fit.rms_px, fit.max_px};
     } catch (const std::invalid_argument&) {
-      // K stays zero, ROS's sign for an uncalibrated camera.
+      // K stays zero, which in ROS means an uncalibrated camera.
       left_over = {std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
     }
   }

@@ -12,7 +12,7 @@ namespace {
 constexpr int64_t kNanosecondsPerSecond = 1000000000;
 constexpr double kMaxNormError = 1e-3;
 
-// Pose and Transform hold the same numbers under other names.
+// Pose and Transform have the same fields with different names.
 RigidTransform checkedTransform(const Eigen::Quaterniond& rotation, const Eigen::Vector3d& translation,
                                 const std::string& source) {
   if (!translation.allFinite()) {
@@ -91,6 +91,17 @@ geometry_msgs::TransformStamped toTransformStamped(const RigidTransform& target_
   message.child_frame_id = source_frame;
   message.transform = toTransformMessage(target_from_source);
   return message;
+}
+
+std::vector<geometry_msgs::TransformStamped> cameraTransforms(const CameraRig& rig, Timestamp stamp) {
+  std::vector<geometry_msgs::TransformStamped> transforms;
+  for (const RigCamera& camera : rig.cameras) {
+    if (camera.vehicle_from_camera) {
+      transforms.push_back(
+          toTransformStamped(*camera.vehicle_from_camera, stamp, rig.vehicle_frame, camera.frame_id));
+    }
+  }
+  return transforms;
 }
 
 nav_msgs::Odometry toMessage(const VehicleOdometry& odometry, const std::string& odom_frame,

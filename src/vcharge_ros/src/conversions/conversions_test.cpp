@@ -45,7 +45,7 @@ TEST(ConversionsTest, NamesTheSourceOfABadPose) {
   geometry_msgs::Pose pose = toPoseMessage(someTransform());
   pose.orientation.w += 0.1;
   expectInputError([&] { fromMessage(pose, "/odom"); }, {"/odom", "norm 1"});
-  pose = geometry_msgs::Pose();  // all zero, as a publisher that forgets the orientation leaves it
+  pose = geometry_msgs::Pose();  // all zero: a publisher that did not set the orientation
   expectInputError([&] { fromMessage(pose, "/odom"); }, {"/odom", "norm 0"});
   pose = toPoseMessage(someTransform());
   pose.position.z = std::numeric_limits<double>::quiet_NaN();

@@ -40,7 +40,7 @@ const EncodingRule* findRule(const std::string& encoding) {
   return nullptr;
 }
 
-// The upper 8 bits of 16-bit pixels, which may be of the other byte order.
+// The upper 8 bits of 16-bit pixels in either byte order.
 cv::Mat upperBytes(const cv::Mat& pixels16, bool big_endian) {
   cv::Mat pixels8(pixels16.size(), CV_8UC1);
   for (int y = 0; y < pixels16.rows; ++y) {
@@ -70,7 +70,7 @@ Image toImage(const sensor_msgs::ImageConstPtr& message, const std::string& sour
                      std::to_string(message->step) + " do not hold " + std::to_string(message->width) + "x" +
                      std::to_string(message->height) + " pixels of " + message->encoding);
   }
-  // Image promises that nobody writes to its pixels.
+  // The pixels of an Image are never written to.
   const cv::Mat view(static_cast<int>(message->height), static_cast<int>(message->width), rule->cv_type,
                      const_cast<uint8_t*>(message->data.data()), message->step);
   Image image;

@@ -93,7 +93,7 @@ TEST(ImageConversionsTest, RefusesDataThatDoNotFillTheImage) {
   expectInputError([&] { toImage(message, "topic"); }, {"topic", "step 3"});
   message->width = 0;
   expectInputError([&] { toImage(message, "topic"); }, {"topic", "0x4"});
-  message->height = 0xffffffff;  // times the step beyond 32 bits
+  message->height = 0xffffffff;  // times the step exceeds 32 bits
   message->width = message->step = 0xffffffff;
   expectInputError([&] { toImage(message, "topic"); }, {"topic"});
 }
@@ -121,7 +121,7 @@ TEST(ImageConversionsTest, NamesTopicOfACompressedImageThatCannotBeDecoded) {
 TEST(ImageConversionsTest, WritesGrayAndFloatImagesRowByRow) {
   cv::Mat pixels(4, 6, CV_32FC1);
   cv::randu(pixels, 0.0, 1.0);
-  const cv::Mat part = pixels(cv::Rect(1, 1, 3, 2));  // rows are apart in memory
+  const cv::Mat part = pixels(cv::Rect(1, 1, 3, 2));  // rows are not contiguous in memory
   const sensor_msgs::ImagePtr message = toImageMessage(part, testing::milliseconds(5), "frame");
   EXPECT_EQ(message->encoding, "32FC1");
   EXPECT_EQ(message->step, 12u);

@@ -23,7 +23,7 @@ octomap_msgs::Octomap toMessage(const octomap::OcTree& tree, const std::string& 
   message.id = tree.getTreeType();
   message.resolution = tree.getResolution();
   std::ostringstream stream(std::ios::binary);
-  // As writeBinaryData(), which tells standard error about it.
+  // Like writeBinaryData(), which also prints to standard error.
   if (const octomap::OcTreeNode* root = tree.getRoot(); root && !tree.writeBinaryNode(stream, root)) {
     throw std::runtime_error("octree: cannot be serialized");
   }
@@ -48,9 +48,9 @@ void fromMessage(const octomap_msgs::Octomap& message, const std::string& source
 
 visualization_msgs::Marker makeOctomapMarker(const octomap::OcTree& tree, const std::string& frame_id,
                                              Timestamp stamp) {
-  constexpr double kSpan_m = 2.5;  // of the colours, from the height below which
+  constexpr double kSpan_m = 2.5;  // range of the colours, above the height below which
   constexpr double kLowShare =
-      0.05;  // this share of the leaves lies: a few wrong ranges end deep in the ground
+      0.05;  // this fraction of the leaves is: a few wrong ranges end deep in the ground
   visualization_msgs::Marker marker;
   marker.header.frame_id = frame_id;
   marker.header.stamp = fromTimestamp(stamp);

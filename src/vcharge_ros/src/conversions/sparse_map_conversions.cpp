@@ -37,7 +37,7 @@ visualization_msgs::Marker makeEdges(const SparseMap& map, bool accepted, const 
   return marker;
 }
 
-/// A cloud of so many points, in the fields of landmarks.
+/// An empty cloud for this many points, with the fields of landmarks.
 sensor_msgs::PointCloud2 makeEmptyCloud(size_t num_points, const std::string& frame_id) {
   sensor_msgs::PointCloud2 cloud;
   cloud.header.frame_id = frame_id;

@@ -6,7 +6,7 @@ namespace vcharge {
 namespace {
 
 constexpr double kDiagnosticsPeriod_s = 1.0;
-constexpr size_t kMaxLoggedTexts = 100;  // texts may carry stamps: no log may grow without end
+constexpr size_t kMaxLoggedTexts = 100;  // texts may contain stamps: the log must not grow without bound
 
 }  // namespace
 
@@ -46,6 +46,12 @@ ros::ServiceServer advertiseTrigger(ros::NodeHandle* node, const std::string& na
                              ": is served already: does a nodelet of this name still end its work?");
   }
   return server;
+}
+
+void addCounters(const FrameCounters& counters, DriveMonitor::Report* report) {
+  for (const auto& [name, count] : counters.named()) {
+    report->values.emplace_back("all_" + name, std::to_string(count));
+  }
 }
 
 NodeletDiagnostics::NodeletDiagnostics(const ros::NodeHandle& node, const ros::NodeHandle& private_node,

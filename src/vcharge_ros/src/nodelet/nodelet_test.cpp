@@ -25,22 +25,23 @@ namespace {
 
 using std::chrono_literals::operator""s;
 
-/// What a nodelet finds when it goes.
+/// State of the queues when a nodelet is destroyed.
 struct End {
   bool single_threaded_queue_lives = false, multi_threaded_queue_lives = false;
   std::thread::id thread;
 };
 
-/// Calls `work` in a callback of its own queue, if there is any; else it throws while it is initialized.
+/// Calls `work` in a callback of its own queue; throws in start() if `work` is empty.
 class TestNodelet : public Nodelet {
  public:
-  TestNodelet(std::function<void()> work, std::promise<End>* end) : work_(std::move(work)), end_(end) {}
+  TestNodelet(std::function<void()> work, std::promise<End>* end)
+      : Nodelet("test"), work_(std::move(work)), end_of_nodelet_(end) {}
   ~TestNodelet() override {
     End end;
     end.single_threaded_queue_lives = !single_threaded_.expired();
     end.multi_threaded_queue_lives = !multi_threaded_.expired();
     end.thread = std::this_thread::get_id();
-    end_->set_value(end);
+    end_of_nodelet_->set_value(end);
   }
 
  private:
@@ -48,7 +49,7 @@ class TestNodelet : public Nodelet {
     return dynamic_cast<nodelet::detail::CallbackQueue&>(*queue).shared_from_this();
   }
 
-  void initialize() override {
+  void start() override {
     single_threaded_ = watch(&getSTCallbackQueue());
     multi_threaded_ = watch(&getMTCallbackQueue());
     if (!work_) {
@@ -59,12 +60,12 @@ class TestNodelet : public Nodelet {
   }
 
   const std::function<void()> work_;
-  std::promise<End>* const end_;
+  std::promise<End>* const end_of_nodelet_;
   boost::weak_ptr<nodelet::detail::CallbackQueue> single_threaded_, multi_threaded_;
   ros::WallTimer timer_;
 };
 
-/// Loads nodelets that do `work`, and hears of the first that goes.
+/// Loads nodelets that do `work`, and waits for the destruction of the first.
 class NodeletTest : public ::testing::Test {
  protected:
   bool load(std::function<void()> work) {
@@ -95,7 +96,7 @@ TEST_F(NodeletTest, UnloadedWhileACallbackRunsItGoesBeforeItsQueues) {
   EXPECT_TRUE(loader_->unload("/test"));
   unloaded.set_value();
   const End end = waitForEnd();
-  EXPECT_NE(end.thread, std::this_thread::get_id());  // it went in the callback's thread, later than unload()
+  EXPECT_NE(end.thread, std::this_thread::get_id());  // destroyed in the callback's thread, after unload()
   EXPECT_TRUE(end.single_threaded_queue_lives);
   EXPECT_TRUE(end.multi_threaded_queue_lives);
 }

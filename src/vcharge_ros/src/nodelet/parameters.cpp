@@ -8,7 +8,7 @@
 namespace vcharge {
 namespace {
 
-// yaml-cpp writes doubles with its own precision, and knows no "inf".
+// yaml-cpp writes doubles with its own precision, and cannot write "inf".
 YAML::Node scalarFromDouble(double value) {
   if (std::isnan(value)) {
     return YAML::Node(".nan");

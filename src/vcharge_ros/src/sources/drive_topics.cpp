@@ -9,7 +9,7 @@ constexpr char kPlaceholder[] = "{camera}";
 
 }  // namespace
 
-void DriveTopics::validate() const {
+void DriveTopics::checkFields() const {
   if (image.find(kPlaceholder) == std::string::npos) {
     throw std::invalid_argument("image: must contain {camera}, is '" + image + "'");
   }

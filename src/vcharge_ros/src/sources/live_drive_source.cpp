@@ -22,16 +22,16 @@ namespace {
 using internal::DriveItem;
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr char kProcessing[] = "processing";  // stands for the consumer among the monitor's topics
+constexpr char kProcessing[] = "processing";  // the consumer's entry among the monitor's topics
 constexpr size_t kMaxLoggedTexts = 100;
 
-/// What came of one camera so far, for the choice between its transports.
+/// Newest stamps of one camera, to choose between its transports.
 struct LastImages {
   std::optional<Timestamp> raw;
   std::optional<Timestamp> compressed;
 };
 
-// ROS takes 0 as "no limit", as the options do.
+// In ROS, too, 0 means no limit.
 uint32_t queueSize(int size) {
   return static_cast<uint32_t>(size);
 }
@@ -69,7 +69,7 @@ struct LiveDriveSource::Implementation {
   const LiveDriveSourceOptions options;
   const std::vector<size_t> cameras;
 
-  DriveMonitor monitor;  // has its own lock: a report waits for no consumer
+  DriveMonitor monitor;  // has its own lock: a report does not wait for the consumer
 
   std::mutex mutex;  // guards all below, and serializes the consumer's calls
   DriveConsumer* consumer = nullptr;
@@ -102,7 +102,7 @@ void LiveDriveSource::Implementation::subscribeImages(size_t camera) {
     });
   };
   const ImageTransport transport = options.image_transport;
-  // Faults and silence are told under one name per camera, whichever transport brings its images.
+  // Faults and silence are reported under one name per camera, for either transport.
   const std::string topic = transport == ImageTransport::kCompressed ? compressed_topic : raw_topic;
   monitor.expectTopic(topic);
   if (transport != ImageTransport::kCompressed) {
@@ -215,7 +215,7 @@ void LiveDriveSource::Implementation::deliver(Timestamp stamp, const DriveItem& 
   monitor.endWork(SteadyClock::now());
 }
 
-// Judged by the drive's time: neither a slow replay nor a slow consumer makes raw images seem to be missing.
+// Uses the drive's time, so that a slow replay or consumer does not make raw images seem to be missing.
 bool LiveDriveSource::Implementation::isWanted(size_t camera, bool is_raw, Timestamp stamp) {
   LastImages& last = last_images[camera];
   if (is_raw) {
@@ -238,16 +238,6 @@ void LiveDriveSource::Implementation::flushWhenIdle() {
 
 void LiveDriveSource::Implementation::flush() {
   sorter.flush([this](Timestamp stamp, const DriveItem& item) { deliver(stamp, item); });
-}
-
-void LiveDriveSourceOptions::validate() const {
-  validateInner("topics", topics);
-  requireField(image_queue_size >= 0, "image_queue_size", "must not be negative", image_queue_size);
-  requireField(odometry_queue_size >= 0, "odometry_queue_size", "must not be negative", odometry_queue_size);
-  requireField(std::isfinite(sort_window_s) && sort_window_s >= 0.0, "sort_window_s",
-               "must be finite and not negative", sort_window_s);
-  requireField(idle_flush_s > 0.0, "idle_flush_s", "must be positive", idle_flush_s);
-  requireField(max_silence_s > 0.0, "max_silence_s", "must be positive", max_silence_s);
 }
 
 LiveDriveSource::LiveDriveSource(const ros::NodeHandle& node, std::shared_ptr<const CameraRig> rig,

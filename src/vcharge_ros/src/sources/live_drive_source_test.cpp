@@ -28,7 +28,7 @@ constexpr double kForever_s = 1e6;
 constexpr int kFront = 0;
 constexpr int kLeft = 1;
 
-/// Publishes and receives in one thread: messages published by pointer before waitFor() arrive in their
+/// Publishes and receives in one thread: messages published by pointer before waitFor() arrive in
 /// order.
 class LiveDriveSourceTest : public ::testing::Test {
  protected:
@@ -43,7 +43,7 @@ class LiveDriveSourceTest : public ::testing::Test {
     options_.max_silence_s = kForever_s;
   }
 
-  /// Subscribes `notes`, or another consumer.
+  /// Feeds `notes`, or another consumer.
   std::unique_ptr<LiveDriveSource> start(DriveConsumer* consumer) {
     auto source = std::make_unique<LiveDriveSource>(node_, rig_, options_);
     source->run(consumer, DriveSource::ProgressCallback());
@@ -61,7 +61,7 @@ class LiveDriveSourceTest : public ::testing::Test {
       ros::WallDuration(0.002).sleep();
     }
   }
-  /// Everything published before this is delivered once `notes` knows of an odometry published now.
+  /// Everything published before is delivered once `notes` has the odometry that is published here.
   void waitForAll(const Notes& notes, int64_t time_ms) {
     publishOdometry(time_ms);
     const std::string last = "o" + std::to_string(time_ms);
@@ -86,7 +86,7 @@ class LiveDriveSourceTest : public ::testing::Test {
     cv::imencode(".png", pixelsOf(camera, time_ms, false), message->data);
     compressed_[camera].publish(message);
   }
-  /// The i-th image that `notes` took is the one that was published in this way.
+  /// Expects that the i-th image of `notes` is the one that was published like this.
   static bool is(const Notes& notes, size_t i, int camera, int64_t time_ms, bool is_raw) {
     return cv::norm(notes.images.at(i).pixels, pixelsOf(camera, time_ms, is_raw), cv::NORM_INF) == 0.0;
   }
@@ -146,7 +146,7 @@ TEST_F(LiveDriveSourceTest, TurnsToCompressedImagesWhenRawOnesStopAndBackWhenThe
   const auto source = start(&notes);
   publishRaw(kFront, 0);
   for (int time_ms = 0; time_ms <= 1280; time_ms += kPeriod_ms) {
-    publishCompressed(kFront, time_ms);  // 1.0 s after the last raw image they count
+    publishCompressed(kFront, time_ms);  // 1.0 s after the last raw image compressed ones are used
   }
   publishRaw(kFront, 1360);
   publishCompressed(kFront, 1360);
@@ -214,7 +214,7 @@ TEST_F(LiveDriveSourceTest, PassesStampsThatJumpBackOnAndReportsThem) {
     options_.idle_flush_s = 0.1;
     Notes notes;
     const auto source = start(&notes);
-    for (const int time_ms : {5000, 5020, 0, 20}) {  // a replayed bag starts over
+    for (const int time_ms : {5000, 5020, 0, 20}) {  // a replayed bag
       publishOdometry(time_ms);
     }
     waitFor([&] { return notes.order.size() == 4; });

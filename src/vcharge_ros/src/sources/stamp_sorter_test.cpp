@@ -34,7 +34,7 @@ TEST(StampSorterTest, RestoresTheOrderOfItemsThatAreLateByLessThanTheWindow) {
   sorter.flush(take);
   ASSERT_EQ(released.size(), 1000u);
   EXPECT_TRUE(std::is_sorted(released.begin(), released.end()));
-  EXPECT_LE(most_waiting, 200u);  // bounded: what 100 ms of window and 100 ms of lateness can hold
+  EXPECT_LE(most_waiting, 200u);  // bounded by 100 ms of window and 100 ms of lateness
 }
 
 TEST(StampSorterTest, OrdersEqualStampsByRankThenArrival) {

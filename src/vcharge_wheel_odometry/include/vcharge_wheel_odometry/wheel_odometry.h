@@ -12,38 +12,20 @@
 namespace vcharge {
 
 struct WheelOdometryOptions {
-  double track_width_m = 1.52;  ///< between the rear wheels
-  double wheelbase_m = 2.58;
-  bool use_steering = true;                      ///< false: the car tells no steering angle
-  double max_acceleration_m_per_s2 = 1.5;        ///< usual change of the speed, per root of a second
-  double max_yaw_acceleration_rad_per_s2 = 0.4;  ///< the same of the yaw rate, where no steering tells it
-  double steering_noise_per_m = 0.002;           ///< standard deviation of the curvature that steering tells
-  double slip_window_s = 0.5;                    ///< over which wheels and steering are compared
-  double slip_yaw_rad = 0.04;                    ///< a difference above this, and above
-  double slip_share = 0.25;                      ///< this share of the turn, is a slip
-  double distance_error_share = 0.005;           ///< wrong wheel radius, for the covariance
-  double yaw_error_rad_per_m = 0.0005;           ///< unequal wheels, for the covariance
-  double standstill_s = 0.3;                     ///< without a tick
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("track_width_m", track_width_m);
-    visit("wheelbase_m", wheelbase_m);
-    visit("use_steering", use_steering);
-    visit("max_acceleration_m_per_s2", max_acceleration_m_per_s2);
-    visit("max_yaw_acceleration_rad_per_s2", max_yaw_acceleration_rad_per_s2);
-    visit("steering_noise_per_m", steering_noise_per_m);
-    visit("slip_window_s", slip_window_s);
-    visit("slip_yaw_rad", slip_yaw_rad);
-    visit("slip_share", slip_share);
-    visit("distance_error_share", distance_error_share);
-    visit("yaw_error_rad_per_m", yaw_error_rad_per_m);
-    visit("standstill_s", standstill_s);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(WheelOdometryOptions);
+  VCHARGE_OPTION(double, track_width_m, 1.52, positive(), "Distance between the rear wheels.");
+  VCHARGE_OPTION(double, wheelbase_m, 2.58, positive(), "Distance between the axles.");
+  VCHARGE_OPTION(bool, use_steering, true, anyValue(), "Whether the car measures the steering angle.");
+  VCHARGE_OPTION(double, max_acceleration_m_per_s2, 1.5, positive(), "Noise of the speed in a second.");
+  VCHARGE_OPTION(double, max_yaw_acceleration_rad_per_s2, 0.4, positive(), "The same of the yaw rate.");
+  VCHARGE_OPTION(double, steering_noise_per_m, 0.002, positive(), "Sigma of the steered curvature.");
+  VCHARGE_OPTION(double, slip_yaw_rad, 0.04, positive(), "Larger disagreement with the steering is a slip.");
+  VCHARGE_OPTION(double, distance_error_ratio, 0.005, positive(), "Relative error of the wheel radius.");
+  VCHARGE_OPTION(double, yaw_error_rad_per_m, 0.0005, positive(), "Heading error of unequal wheels.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// Dead reckoning with what it is worth.
+/// Dead reckoning with its covariance.
 struct OdometryEstimate {
   VehicleOdometry odometry;
   Eigen::Matrix3d pose_covariance = Eigen::Matrix3d::Zero();  ///< x, y (metres), yaw (radians), in odom
@@ -55,18 +37,18 @@ struct WheelOdometryCounts {
   uint64_t ticks = 0;
   uint64_t slips = 0;
   uint64_t out_of_order = 0;
-  uint64_t gaps = 0;    ///< of more than kMaxGap_s
+  uint64_t gaps = 0;    ///< longer than kMaxGap_s
   uint64_t resets = 0;  ///< counters that jumped
   bool slipping = false;
   bool standing = false;
 };
 
 /// Causal dead reckoning at the centre of the rear axle from the counters of the rear wheels and the steering
-/// angle. A count is right within a tick, and stays so: a Kalman filter takes the counters as bounded
-/// positions of the wheels, not their noisy increments, so that no error but that of wheels and track grows.
-/// Between ticks speed and steering carry the pose (bicycle model; the steering's zero is estimated), hence
-/// it is smooth. Where the wheels turn otherwise than the steering says, one of them slips: it is not
-/// believed until both agree again. Not thread safe.
+/// angle. A counter is exact within one tick, so a Kalman filter uses the counters as bounded positions of
+/// the wheels instead of noisy increments: only errors of the wheel radius and the track width grow. Between
+/// ticks speed and steering predict the pose (bicycle model with an estimated zero of the steering), which
+/// keeps it smooth. If the wheels turn otherwise than the steering says, one of them slips, and is ignored
+/// until both agree again. Not thread safe.
 class WheelOdometry {
  public:
   static constexpr double kMaxGap_s = 0.5;
@@ -81,8 +63,8 @@ class WheelOdometry {
   struct Sample {
     Timestamp stamp;
     double left_m, right_m;  // as counted
-    double steered_yaw_rad;  // integral of what the steering says
-    double speed_m_per_s;    // estimated then
+    double steered_yaw_rad;  // integral of the steered yaw rate
+    double speed_m_per_s;    // estimate
   };
   void predict(double dt_s, double steered_curvature);
   void checkSlip(const Sample& sample);
@@ -94,7 +76,7 @@ class WheelOdometry {
   WheelOdometryCounts counts_;
   std::optional<WheelTicks> last_;
   double left_m_ = 0.0, right_m_ = 0.0;                // counted since the first ticks
-  double left_excess_m_ = 0.0, right_excess_m_ = 0.0;  // of it, by slip
+  double left_excess_m_ = 0.0, right_excess_m_ = 0.0;  // the part caused by slip
   double steered_yaw_rad_ = 0.0;
   Timestamp last_motion_;
   std::deque<Sample> window_;
@@ -108,16 +90,16 @@ class WheelOdometry {
   Eigen::Matrix3d pose_covariance_ = Eigen::Matrix3d::Zero();
 };
 
-/// Puts estimates into the order of stamps in which they are published: each trigger has one at its very
-/// stamp. Estimates of ticks wait for the next trigger, but not longer than `hold_s`. Not thread safe.
+/// Sorts estimates by stamp for publishing, with one at the stamp of each camera trigger. Estimates of ticks
+/// wait for the next trigger, at most `hold_s`. Not thread safe.
 class OdometryStream {
  public:
   OdometryStream(double hold_s, double max_extrapolation_s);
 
-  /// Returns what is to be published now, in order of stamps.
+  /// Returns the estimates to publish now, in order of stamps.
   std::vector<OdometryEstimate> add(const OdometryEstimate& estimate);
-  /// As add(); the last is that at `stamp`, interpolated, or extrapolated by max_extrapolation_s at most.
-  /// Without it where that cannot be had, or where later ones are published already.
+  /// As add(). The last estimate is at `stamp`, interpolated, or extrapolated by at most max_extrapolation_s;
+  /// it is missing where neither is possible, or where later ones were published already.
   std::vector<OdometryEstimate> trigger(Timestamp stamp);
 
  private:

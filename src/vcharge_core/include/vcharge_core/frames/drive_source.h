@@ -9,8 +9,8 @@
 
 namespace vcharge {
 
-/// Takes what a drive delivers, in order of stamps from a bag, in order of arrival from live topics. Calls
-/// are never concurrent. A stage's front that both its nodelet and its offline tool feed.
+/// Receives the messages of a drive, in order of stamps from a bag, in order of arrival from live topics.
+/// Calls are never concurrent. Both the nodelet and the offline tool of a stage feed it.
 class DriveConsumer {
  public:
   virtual ~DriveConsumer() = default;
@@ -20,11 +20,11 @@ class DriveConsumer {
   virtual void addWheelTicks(const WheelTicks& /*ticks*/) {}
 };
 
-/// Where a drive comes from: a bag (run() returns at its end) or live topics (run() returns at once and the
-/// consumer is called until the source is destroyed).
+/// Source of a drive: a bag (run() returns at its end) or live topics (run() returns at once and the consumer
+/// is called until the source is destroyed).
 class DriveSource {
  public:
-  /// Share of the drive that was delivered, 0 to 1.
+  /// Fraction of the drive that was delivered, 0 to 1.
   using ProgressCallback = std::function<void(double)>;
 
   virtual ~DriveSource() = default;

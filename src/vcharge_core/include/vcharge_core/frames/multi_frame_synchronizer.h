@@ -2,29 +2,22 @@
 
 #include <cstdint>
 #include <deque>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "vcharge_core/base/options.h"
 #include "vcharge_core/frames/image.h"
 
 namespace vcharge {
 
 struct MultiFrameSynchronizerOptions {
-  double tolerance_s = 0.0;        ///< images this close belong together; 0: equal stamps (hardware sync)
-  int max_pending_sets = 8;        ///< incomplete sets kept before the oldest is given up
-  double reset_backwards_s = 1.0;  ///< a stamp this far before the newest starts over (a replayed bag)
-  bool keep_incomplete = false;    ///< sets that were given up wait in takeIncomplete()
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("tolerance_s", tolerance_s);
-    visit("max_pending_sets", max_pending_sets);
-    visit("reset_backwards_s", reset_backwards_s);
-    visit("keep_incomplete", keep_incomplete);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(MultiFrameSynchronizerOptions);
+  VCHARGE_OPTION(double, tolerance_s, 0.0, between(0.0, 3600.0), "Difference of stamps of one instant.");
+  VCHARGE_OPTION(int, max_pending_sets, 8, atLeast(1), "Incomplete sets that are kept.");
+  VCHARGE_OPTION(double, reset_backwards_s, 1.0, positive(), "A larger step back of stamps is a replay.");
+  VCHARGE_OPTION(bool, keep_incomplete, false, anyValue(), "Whether takeIncomplete() returns sets.");
+  VCHARGE_END_OPTIONS();
 };
 
 /// What became of the images so far.
@@ -37,9 +30,10 @@ struct MultiFrameSynchronizerCounts {
   std::vector<uint64_t> missing_per_camera;  ///< incomplete sets that lacked this camera
 };
 
-/// Groups single images into MultiFrames. Emits sets in time order, each as soon as it is complete; a set
-/// that a complete later one overtakes is given up and counted. The set's stamp is the earliest of its
-/// images. Not thread safe.
+/// Groups images whose stamps differ slightly, as those of cameras that share a trigger, into sets (the
+/// camera driver gives them one stamp; FrameAssembler puts images of equal stamps together with odometry).
+/// Sets are returned in order of time as soon as they are complete; incomplete ones that a complete later one
+/// overtakes are given up and counted. The stamp of a set is the earliest of its images. Not thread safe.
 class MultiFrameSynchronizer {
  public:
   explicit MultiFrameSynchronizer(
@@ -48,10 +42,10 @@ class MultiFrameSynchronizer {
   /// Takes one image; returns the set that it completes, or null. std::logic_error for a bad camera index.
   std::shared_ptr<const MultiFrame> add(size_t camera_index, Timestamp stamp, const Image& image);
 
-  /// Gives up the pending sets whose stamp is not after `stamp`: what they lack is not waited for any more.
+  /// Gives up the pending sets up to `stamp`.
   void giveUpUntil(Timestamp stamp);
-  /// The sets given up since the last call, in order of time; images that are missing have no pixels. Empty
-  /// unless keep_incomplete is set. They are older than what add() returns next, also when it gave them up.
+  /// The sets given up since the last call, in order of time; missing images have no pixels. Empty unless
+  /// keep_incomplete is set. They are older than the next set of add(), also if that call gave them up.
   std::vector<std::shared_ptr<const MultiFrame>> takeIncomplete();
 
   const MultiFrameSynchronizerCounts& counts() const { return counts_; }

@@ -8,15 +8,15 @@
 
 namespace vcharge {
 
-/// Takes a recorded drive as it was recorded: nothing is sorted, and nothing refused. For judging recordings;
-/// what works on drives takes them from a DriveSource.
+/// Receives a drive as it was recorded, without sorting or checks. For checking recordings; stages use a
+/// DriveSource.
 class RecordedDriveConsumer {
  public:
   virtual ~RecordedDriveConsumer() = default;
-  /// camera_index is that of the rig; the image may have any size. `recorded` is when it was written down.
+  /// camera_index is that of the rig; the image may have any size. `recorded`: the time of recording.
   virtual void addImage(size_t camera_index, Timestamp stamp, Timestamp recorded, const Image& image) = 0;
   virtual void addOdometry(Timestamp recorded, const VehicleOdometry& odometry) = 0;
-  /// A message that cannot be understood, and why.
+  /// A message that cannot be read, and why.
   virtual void addBroken(const std::string& topic, const std::string& why) = 0;
 };
 

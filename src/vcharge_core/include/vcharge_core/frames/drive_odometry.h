@@ -1,0 +1,54 @@
+#pragma once
+
+#include <optional>
+
+#include <Eigen/Core>
+
+#include "vcharge_core/frames/frame_assembler_options.h"
+#include "vcharge_core/motion/trajectory.h"
+#include "vcharge_core/motion/vehicle_odometry.h"
+
+namespace vcharge {
+
+/// Odometry of a drive, interpolated between its messages. Finds gaps and resets of the odometer, and bridges
+/// resets by the velocities before them. Not thread safe.
+class DriveOdometry {
+ public:
+  explicit DriveOdometry(const FrameAssemblerOptions& options);
+
+  /// Poses that are known beforehand; add() is then ignored, and nothing is waited for.
+  void setTrajectory(const Trajectory& odom_from_vehicle);
+  bool isGiven() const { return is_given_; }
+
+  /// Whether the stamp is so far before the newest that the drive starts over.
+  bool jumpsBack(Timestamp stamp) const;
+  /// The break before this message, if there is one. A message that is not newer than the last is ignored
+  /// and counted.
+  std::optional<DriveBreak> add(const VehicleOdometry& odometry, FrameCounters* counters);
+  void clear();
+
+  /// Whether the pose at this stamp is known, or will never be.
+  bool reaches(Timestamp stamp) const { return is_given_ || (last_ && last_->stamp >= stamp); }
+  /// As the odometer counts; never interpolated over a reset.
+  OdometryBuffer::Lookup lookup(Timestamp stamp) const;
+  /// In a frame without jumps: equal to lookup() up to the first reset.
+  OdometryBuffer::Lookup lookupBridged(Timestamp stamp) const { return bridged_.lookup(stamp); }
+
+  /// The last message; none after clear().
+  const std::optional<VehicleOdometry>& last() const { return last_; }
+  /// Change of x, y and yaw per second between the last two messages; none right after a break.
+  const std::optional<Eigen::Vector3d>& velocity() const { return velocity_; }
+
+ private:
+  bool isReset(const VehicleOdometry& odometry) const;
+
+  const FrameAssemblerOptions options_;
+  OdometryBufferOptions buffer_options_;
+  OdometryBuffer raw_, raw_before_reset_, bridged_;
+  RigidTransform bridged_from_odom_;
+  std::optional<VehicleOdometry> last_;
+  std::optional<Eigen::Vector3d> velocity_;
+  bool is_given_ = false;
+};
+
+}  // namespace vcharge

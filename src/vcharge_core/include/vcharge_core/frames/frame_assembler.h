@@ -1,0 +1,287 @@
+#pragma once
+
+#include <algorithm>
+#include <functional>
+#include <map>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/frames/drive_odometry.h"
+#include "vcharge_core/frames/drive_source.h"
+#include "vcharge_core/frames/image.h"
+
+namespace vcharge {
+
+/// The images of one stamp and the vehicle's pose then. An image is what a stage takes from a camera: gray
+/// pixels, or what was computed of them.
+template <class ImageType>
+struct AssembledFrame {
+  Timestamp stamp;
+  std::vector<ImageType> images;  ///< in the rig's order; default-constructed where a camera sent none
+  std::vector<bool> has_image;    ///< by camera
+  /// As the odometer counts; none inside gaps, over resets, or where no odometry came in time.
+  std::optional<RigidTransform> odom_from_vehicle;
+  /// In a frame that does not jump: resets of the odometer are bridged by its velocities before them.
+  std::optional<RigidTransform> bridged_from_vehicle;
+  /// Why there is no pose.
+  OdometryBuffer::LookupStatus odometry_status = OdometryBuffer::LookupStatus::kEmpty;
+  int64_t num_resets = 0;  ///< of the odometer before this frame
+};
+using ImageFrame = AssembledFrame<Image>;
+
+/// The one way in for frames: puts images of one stamp together with the odometry at that stamp, in order of
+/// stamps.
+///
+/// A frame is handed out once odometry reaches it and all cameras have sent their image. A camera is not
+/// waited for where it has sent a later image, is silent, or max_camera_wait_s is over; odometry is waited
+/// for max_odometry_wait_s. No more than kMaxWaiting frames wait. An image that comes after its frame was
+/// handed out is late: dropped and counted. At a break of the drive (see DriveBreak) all older frames are
+/// handed out, then `on_break` is called. A stage that has `on_break` begins anew there: for it older images
+/// that come afterwards are late, too. Not thread safe.
+template <class ImageType>
+class FrameAssembler {
+ public:
+  using Frame = AssembledFrame<ImageType>;
+  using FrameCallback = std::function<void(Frame)>;
+  /// The break and the stamp of what follows it.
+  using BreakCallback = std::function<void(DriveBreak, Timestamp)>;
+  static constexpr size_t kMaxWaiting = 25;  // two seconds at 12.5 Hz
+
+  /// `is_used`: by camera, false for cameras that send nothing; empty: all send. std::invalid_argument for
+  /// bad options.
+  FrameAssembler(size_t num_cameras, const FrameAssemblerOptions& options, FrameCallback on_frame,
+                 BreakCallback on_break = BreakCallback(), std::vector<bool> is_used = {})
+      : options_(options),
+        on_frame_(std::move(on_frame)),
+        on_break_(std::move(on_break)),
+        is_used_(is_used.empty() ? std::vector<bool>(num_cameras, true) : std::move(is_used)),
+        num_used_(static_cast<size_t>(std::count(is_used_.begin(), is_used_.end(), true))),
+        odometry_(options),
+        newest_of_camera_(num_cameras),
+        stamps_since_(num_cameras, 0),
+        counters_(num_cameras) {
+    check(num_used_ > 0, "FrameAssembler: expected cameras");
+  }
+
+  /// Takes poses from here instead of from the odometry.
+  void setTrajectory(const Trajectory& odom_from_vehicle) { odometry_.setTrajectory(odom_from_vehicle); }
+
+  /// False where the image is late, and dropped.
+  bool addImage(size_t camera_index, Timestamp stamp, ImageType image);
+  void addOdometry(const VehicleOdometry& odometry);
+  /// Hands out what waits: the drive is over.
+  void finish() { handOut(std::nullopt); }
+
+  const FrameCounters& counters() const { return counters_; }
+  const DriveOdometry& odometry() const { return odometry_; }
+  size_t numWaiting() const { return pending_.size(); }
+  /// Stamp of the frame that waits longest for odometry, where it waits longer than a gap may be.
+  std::optional<Timestamp> lacksOdometryAt() const;
+  std::optional<Timestamp> newestImage() const { return newest_image_; }
+  std::optional<Timestamp> newestImage(size_t camera_index) const { return newest_of_camera_[camera_index]; }
+  /// A camera without images while other cameras send theirs.
+  bool isSilent(size_t camera_index) const {
+    return stamps_since_[camera_index] > options_.silent_after_frames;
+  }
+
+ private:
+  struct Pending {
+    std::vector<ImageType> images;
+    std::vector<bool> has_image;
+    size_t num_images = 0;
+    Timestamp begun;  // by the drive's clock
+  };
+
+  static constexpr double kReplay_s = 1.0;
+  Timestamp clock() const {
+    const std::optional<VehicleOdometry>& last = odometry_.last();
+    return last && !(newest_image_ && *newest_image_ > last->stamp) ? last->stamp : *newest_image_;
+  }
+  bool hasImages(Timestamp stamp, const Pending& pending) const;
+  bool isReady(Timestamp stamp, const Pending& pending) const;
+  void handOutReady();
+  /// Everything before a stamp, or everything.
+  void handOut(std::optional<Timestamp> before);
+  void handOutFirst();
+  void startOver();
+
+  const FrameAssemblerOptions options_;
+  const FrameCallback on_frame_;
+  const BreakCallback on_break_;
+  const std::vector<bool> is_used_;
+  const size_t num_used_;
+  DriveOdometry odometry_;
+  std::map<Timestamp, Pending> pending_;
+  std::optional<Timestamp> newest_image_;
+  std::vector<std::optional<Timestamp>> newest_of_camera_;
+  std::vector<int> stamps_since_;         // by camera: stamps that came since its last image
+  std::optional<Timestamp> last_closed_;  // images up to this stamp are late
+  FrameCounters counters_;
+};
+
+/// FrameAssembler for a DriveSource.
+class ImageFrameAssembler : public DriveConsumer, public FrameAssembler<Image> {
+ public:
+  using FrameAssembler<Image>::FrameAssembler;
+  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
+    FrameAssembler<Image>::addImage(camera_index, stamp, image);
+  }
+  void addOdometry(const VehicleOdometry& odometry) override { FrameAssembler<Image>::addOdometry(odometry); }
+};
+
+template <class ImageType>
+bool FrameAssembler<ImageType>::addImage(size_t camera_index, Timestamp stamp, ImageType image) {
+  check(camera_index < is_used_.size() && is_used_[camera_index], "FrameAssembler::addImage: bad camera");
+  const std::optional<Timestamp> last = newest_of_camera_[camera_index];
+  if (last && toSeconds(*last - stamp) > kReplay_s) {
+    startOver();
+    if (on_break_) {
+      on_break_(DriveBreak::kReplay, stamp);
+    }
+  }
+  if (last_closed_ && stamp <= *last_closed_) {
+    ++counters_.late_images[camera_index];
+    return false;
+  }
+  newest_image_ = newest_image_ ? std::max(*newest_image_, stamp) : stamp;
+  std::optional<Timestamp>& newest = newest_of_camera_[camera_index];
+  newest = newest ? std::max(*newest, stamp) : stamp;
+  const auto [entry, is_new] = pending_.try_emplace(stamp);
+  Pending& pending = entry->second;
+  if (is_new) {
+    pending.images.resize(is_used_.size());
+    pending.has_image.assign(is_used_.size(), false);
+    pending.begun = clock();
+    for (int& stamps : stamps_since_) {
+      ++stamps;
+    }
+  }
+  stamps_since_[camera_index] = 0;
+  const bool is_repeated = pending.has_image[camera_index];
+  if (is_repeated) {
+    ++counters_.late_images[camera_index];
+  } else {
+    pending.images[camera_index] = std::move(image);
+    pending.has_image[camera_index] = true;
+    ++pending.num_images;
+  }
+  handOutReady();
+  return !is_repeated;
+}
+
+template <class ImageType>
+void FrameAssembler<ImageType>::addOdometry(const VehicleOdometry& odometry) {
+  if (odometry_.isGiven()) {
+    return;
+  }
+  std::optional<DriveBreak> found;
+  if (odometry_.jumpsBack(odometry.stamp)) {
+    startOver();
+    found = DriveBreak::kReplay;
+  }
+  if (const std::optional<DriveBreak> broken = odometry_.add(odometry, &counters_)) {
+    handOut(odometry.stamp);
+    if (on_break_) {
+      const Timestamp last_late = odometry.stamp - Duration(1);
+      last_closed_ = last_closed_ ? std::max(*last_closed_, last_late) : last_late;
+    }
+    found = broken;
+  }
+  if (found && on_break_) {
+    on_break_(*found, odometry.stamp);
+  }
+  handOutReady();
+}
+
+template <class ImageType>
+bool FrameAssembler<ImageType>::hasImages(Timestamp stamp, const Pending& pending) const {
+  if (pending.num_images == num_used_ || toSeconds(clock() - pending.begun) > options_.max_camera_wait_s) {
+    return true;
+  }
+  for (size_t camera = 0; camera < is_used_.size(); ++camera) {
+    const std::optional<Timestamp>& newest = newest_of_camera_[camera];
+    const bool has_passed = newest && *newest > stamp;
+    // A silent camera that sends again may do so with this frame; who is in no hurry waits for the next.
+    const bool is_absent = isSilent(camera) && (!options_.waitsForEverything() || *newest_image_ > stamp);
+    if (is_used_[camera] && !pending.has_image[camera] && !has_passed && !is_absent) {
+      return false;
+    }
+  }
+  return true;
+}
+
+template <class ImageType>
+bool FrameAssembler<ImageType>::isReady(Timestamp stamp, const Pending& pending) const {
+  return hasImages(stamp, pending) &&
+         (odometry_.reaches(stamp) || toSeconds(clock() - pending.begun) > options_.max_odometry_wait_s);
+}
+
+template <class ImageType>
+void FrameAssembler<ImageType>::handOutReady() {
+  while (!pending_.empty() &&
+         (pending_.size() > kMaxWaiting || isReady(pending_.begin()->first, pending_.begin()->second))) {
+    handOutFirst();
+  }
+}
+
+template <class ImageType>
+void FrameAssembler<ImageType>::handOut(std::optional<Timestamp> before) {
+  while (!pending_.empty() && (!before || pending_.begin()->first < *before)) {
+    handOutFirst();
+  }
+}
+
+template <class ImageType>
+void FrameAssembler<ImageType>::handOutFirst() {
+  const auto first = pending_.begin();
+  Frame frame;
+  frame.stamp = first->first;
+  frame.images = std::move(first->second.images);
+  frame.has_image = std::move(first->second.has_image);
+  frame.num_resets = counters_.odometry_resets;
+  const bool is_complete = first->second.num_images == num_used_;
+  pending_.erase(first);
+  ++counters_.frames;
+  counters_.incomplete_frames += is_complete ? 0 : 1;
+  for (size_t camera = 0; camera < is_used_.size(); ++camera) {
+    counters_.missing_images[camera] += is_used_[camera] && !frame.has_image[camera] ? 1 : 0;
+  }
+  const OdometryBuffer::Lookup bridged = odometry_.lookupBridged(frame.stamp);
+  frame.odometry_status = bridged.status;
+  if (bridged) {
+    frame.bridged_from_vehicle = bridged.odometry.odom_from_vehicle;
+    if (const OdometryBuffer::Lookup raw = odometry_.lookup(frame.stamp)) {
+      frame.odom_from_vehicle = raw.odometry.odom_from_vehicle;
+    }
+  } else {
+    ++counters_.frames_without_odometry;
+  }
+  last_closed_ = frame.stamp;
+  on_frame_(std::move(frame));
+}
+
+template <class ImageType>
+void FrameAssembler<ImageType>::startOver() {
+  handOut(std::nullopt);
+  newest_image_.reset();
+  last_closed_.reset();
+  std::fill(newest_of_camera_.begin(), newest_of_camera_.end(), std::nullopt);
+  std::fill(stamps_since_.begin(), stamps_since_.end(), 0);
+  if (!odometry_.isGiven()) {
+    odometry_.clear();
+  }
+  ++counters_.replays;
+}
+
+template <class ImageType>
+std::optional<Timestamp> FrameAssembler<ImageType>::lacksOdometryAt() const {
+  if (pending_.empty() || odometry_.reaches(pending_.begin()->first) ||
+      toSeconds(clock() - pending_.begin()->second.begun) <= options_.max_odometry_gap_s) {
+    return std::nullopt;
+  }
+  return pending_.begin()->first;
+}
+
+}  // namespace vcharge

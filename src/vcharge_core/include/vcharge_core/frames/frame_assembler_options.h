@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "vcharge_core/base/options.h"
+
+namespace vcharge {
+
+/// How long a frame waits for what is missing, and which odometry is believed. Waiting times are measured on
+/// the drive's clock: the newest stamp of an image or of odometry that has come.
+struct FrameAssemblerOptions {
+  VCHARGE_BEGIN_OPTIONS(FrameAssemblerOptions);
+  VCHARGE_OPTION(double, max_camera_wait_s, 0.15, notNegative(), "Longest wait for a missing camera.");
+  VCHARGE_OPTION(double, max_odometry_wait_s, 2.0, notNegative(), "Longest wait for the odometry.");
+  VCHARGE_OPTION(int, silent_after_frames, 3, atLeast(1), "Frames without a camera until it is not awaited.");
+  VCHARGE_OPTION(double, max_odometry_gap_s, 0.25, positive(), "Longest interpolated odometry period.");
+  VCHARGE_OPTION(double, max_speed_m_per_s, 25.0, positive(), "Faster odometry was reset.");
+  VCHARGE_OPTION(double, max_step_m, kNoLimit, positive(),
+                 "Larger changes of the odometry's step are resets.");
+  VCHARGE_OPTION(double, max_step_rad, kNoLimit, positive(), "Larger changes of its turn are resets.");
+  VCHARGE_END_OPTIONS();
+
+  static constexpr double kNoLimit = std::numeric_limits<double>::infinity();
+
+  /// For bags and replays without loss: waits for everything, however late it comes.
+  void waitForEverything() { max_camera_wait_s = max_odometry_wait_s = kNoLimit; }
+  bool waitsForEverything() const { return max_camera_wait_s == kNoLimit; }
+  /// Options with other waiting times, as defaults of a stage.
+  static FrameAssemblerOptions waiting(double max_camera_wait_s, double max_odometry_wait_s);
+};
+
+/// What became of the images and the odometry of a drive. Every stage reports these.
+struct FrameCounters {
+  explicit FrameCounters(size_t num_cameras = 0)
+      : missing_images(num_cameras, 0), late_images(num_cameras, 0) {}
+
+  int64_t frames = 0;
+  int64_t incomplete_frames = 0;
+  int64_t frames_without_odometry = 0;
+  int64_t odometry_gaps = 0;
+  int64_t odometry_resets = 0;
+  int64_t ignored_odometry = 0;         ///< repeated, or older than the newest
+  int64_t replays = 0;                  ///< stamps jumped back: the drive started over
+  std::vector<int64_t> missing_images;  ///< by camera, in the frames that were handed out
+  std::vector<int64_t> late_images;     ///< by camera: repeated, or came after their frame was handed out
+
+  int64_t numLateImages() const;
+  /// Names and values of all that is counted for the whole rig, for diagnostics and reports.
+  std::vector<std::pair<std::string, int64_t>> named() const;
+};
+
+/// Where what came before cannot be joined to what follows.
+enum class DriveBreak {
+  kOdometryGap,    ///< no odometry for longer than max_odometry_gap_s
+  kOdometryReset,  ///< the odometer's pose jumped
+  kReplay,         ///< stamps jumped back: a bag is replayed
+};
+
+/// "gap in the odometry", ...: part of a message.
+std::string describe(DriveBreak drive_break);
+
+}  // namespace vcharge

@@ -1,0 +1,226 @@
+#include "vcharge_core/frames/frame_assembler.h"
+
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace vcharge {
+namespace {
+
+Timestamp at(double seconds) {
+  return Timestamp::fromNanoseconds(1'000'000'000'000LL + static_cast<int64_t>(seconds * 1e9 + 0.5));
+}
+
+Image picture() {
+  return {cv::Mat(8, 8, CV_8UC1, cv::Scalar(1)), nullptr};
+}
+
+VehicleOdometry odometryAt(double seconds, double x_m) {
+  VehicleOdometry odometry;
+  odometry.stamp = at(seconds);
+  odometry.odom_from_vehicle = RigidTransform::planar(x_m, 0.0, 0.0);
+  return odometry;
+}
+
+class FrameAssemblerTest : public ::testing::Test {
+ protected:
+  void send(double seconds, const std::vector<size_t>& cameras) {
+    for (const size_t camera : cameras) {
+      assembler_.addImage(camera, at(seconds), picture());
+    }
+  }
+  /// A still vehicle's odometry at 50 Hz.
+  void sendOdometry(int from, int to, double x_m = 0.0) {
+    for (int i = from; i < to; ++i) {
+      assembler_.addOdometry(odometryAt(0.02 * i, x_m));
+    }
+  }
+  std::vector<ImageFrame> frames_;
+  FrameAssemblerOptions options_ = FrameAssemblerOptions::waiting(0.2, 0.3);
+  const ImageFrameAssembler::FrameCallback keep_ = [this](ImageFrame frame) {
+    frames_.push_back(std::move(frame));
+  };
+  ImageFrameAssembler assembler_{3, options_, keep_};
+};
+
+TEST_F(FrameAssemblerTest, WaitsForAllCamerasAndForOdometry) {
+  assembler_.addOdometry(odometryAt(0.0, 0.0));
+  send(0.01, {0, 1});
+  assembler_.addOdometry(odometryAt(0.02, 0.2));
+  EXPECT_TRUE(frames_.empty());
+  send(0.01, {2});
+  ASSERT_EQ(frames_.size(), 1u);
+  EXPECT_NEAR(frames_[0].odom_from_vehicle->translation().x(), 0.1, 1e-9);
+  send(0.09, {0, 1, 2});
+  EXPECT_EQ(frames_.size(), 1u) << "no odometry yet";
+  assembler_.addOdometry(odometryAt(0.1, 1.0));
+  EXPECT_EQ(frames_.size(), 2u);
+  EXPECT_EQ(assembler_.counters().incomplete_frames, 0);
+}
+
+TEST_F(FrameAssemblerTest, DoesNotWaitForACameraThatIsSilent) {
+  sendOdometry(0, 40);
+  for (int i = 0; i < 8; ++i) {
+    send(0.05 + 0.08 * i, {0, 2});
+  }
+  EXPECT_TRUE(assembler_.isSilent(1));
+  EXPECT_EQ(frames_.size(), 8u) << "the last is handed out at once";
+  EXPECT_TRUE(frames_.back().images[1].pixels.empty());
+  EXPECT_FALSE(frames_.back().images[2].pixels.empty());
+  // The camera sends again.
+  send(0.05 + 0.08 * 8, {1, 0, 2});
+  ASSERT_EQ(frames_.size(), 9u);
+  EXPECT_FALSE(frames_.back().images[1].pixels.empty());
+  EXPECT_FALSE(assembler_.isSilent(1));
+}
+
+TEST_F(FrameAssemblerTest, HandsOutAFrameOnceItsMissingCameraSentALaterImage) {
+  sendOdometry(0, 20);
+  send(0.08, {0, 1});
+  EXPECT_TRUE(frames_.empty());
+  send(0.16, {0, 1, 2});
+  ASSERT_EQ(frames_.size(), 2u);
+  EXPECT_LT(frames_[0].stamp, frames_[1].stamp);
+  EXPECT_EQ(assembler_.counters().incomplete_frames, 1);
+  send(0.08, {2});
+  EXPECT_EQ(assembler_.counters().late_images, (std::vector<int64_t>{0, 0, 1}));
+  EXPECT_EQ(frames_.size(), 2u);
+}
+
+TEST_F(FrameAssemblerTest, HandsOutFramesWithoutAPoseWhereOdometryStaysAway) {
+  for (int i = 0; i < 10; ++i) {
+    send(0.08 * i, {0, 1, 2});
+  }
+  EXPECT_GE(frames_.size(), 5u);
+  EXPECT_FALSE(frames_.front().odom_from_vehicle.has_value());
+  assembler_.finish();
+  EXPECT_EQ(frames_.size(), 10u);
+  EXPECT_EQ(assembler_.counters().frames_without_odometry, 10);
+}
+
+TEST_F(FrameAssemblerTest, NeverInterpolatesOverAReset) {
+  sendOdometry(0, 5, 50.0);
+  assembler_.addOdometry(odometryAt(0.10, 0.0));
+  assembler_.addOdometry(odometryAt(0.12, 0.0));
+  send(0.09, {0, 1, 2});
+  send(0.11, {0, 1, 2});
+  assembler_.finish();
+  ASSERT_EQ(frames_.size(), 2u);
+  EXPECT_FALSE(frames_[0].odom_from_vehicle.has_value());
+  EXPECT_TRUE(frames_[1].odom_from_vehicle.has_value());
+  EXPECT_EQ(frames_[1].num_resets, 1);
+}
+
+TEST_F(FrameAssemblerTest, BridgesAResetByTheSpeedBeforeIt) {
+  const auto moving = [](double seconds, double x_m) {
+    VehicleOdometry odometry = odometryAt(seconds, x_m);
+    odometry.forward_speed_m_per_s = 5.0;
+    return odometry;
+  };
+  for (int i = 0; i < 5; ++i) {
+    assembler_.addOdometry(moving(0.02 * i, 50.0 + 0.1 * i));
+  }
+  assembler_.addOdometry(moving(0.10, 0.0));
+  assembler_.addOdometry(moving(0.12, 0.1));
+  send(0.07, {0, 1, 2});
+  send(0.09, {0, 1, 2});
+  send(0.11, {0, 1, 2});
+  ASSERT_EQ(frames_.size(), 3u);
+  EXPECT_NEAR(frames_[0].odom_from_vehicle->translation().x(), 50.35, 1e-9);
+  EXPECT_NEAR(frames_[2].odom_from_vehicle->translation().x(), 0.05, 1e-9);
+  for (size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(frames_[i].bridged_from_vehicle->translation().x(), 50.35 + 0.1 * static_cast<double>(i),
+                1e-9);
+  }
+}
+
+TEST_F(FrameAssemblerTest, ASmallStepIsAResetOnlyWhereTheOptionsSaySo) {
+  for (const double max_step_m : {FrameAssemblerOptions::kNoLimit, 0.15}) {
+    options_.max_step_m = max_step_m;
+    ImageFrameAssembler assembler(3, options_, keep_);
+    for (const double x_m : {0.0, 0.1, 0.2, 0.6}) {
+      assembler.addOdometry(odometryAt(x_m / 5.0, x_m));
+      assembler.addOdometry(odometryAt(x_m / 5.0 + 0.01, x_m + 0.05));
+    }
+    assembler.addOdometry(odometryAt(0.14, 1.0));
+    EXPECT_EQ(assembler.counters().odometry_resets, max_step_m < 1.0 ? 1 : 0);
+  }
+}
+
+TEST_F(FrameAssemblerTest, HandsOutOlderFramesBeforeABreakAndDropsThemAfterIt) {
+  std::vector<std::pair<DriveBreak, size_t>> breaks;  // with the frames before it
+  ImageFrameAssembler assembler(3, options_, keep_, [&](DriveBreak drive_break, Timestamp stamp) {
+    EXPECT_EQ(stamp, at(1.0));
+    breaks.emplace_back(drive_break, frames_.size());
+  });
+  assembler.addOdometry(odometryAt(0.0, 0.0));
+  assembler.addImage(0, at(0.5), picture());
+  assembler.addOdometry(odometryAt(1.0, 0.0));
+  EXPECT_EQ(breaks, (std::vector<std::pair<DriveBreak, size_t>>{{DriveBreak::kOdometryGap, 1}}));
+  EXPECT_EQ(frames_[0].odometry_status, OdometryBuffer::LookupStatus::kInGap);
+  assembler.addImage(1, at(0.9), picture());
+  EXPECT_EQ(assembler.counters().late_images[1], 1);
+  assembler.addImage(1, at(1.0), picture());
+  assembler.finish();
+  EXPECT_TRUE(frames_.back().odom_from_vehicle.has_value());
+}
+
+TEST_F(FrameAssemblerTest, WaitsForACameraNoLongerThanTheOptionsSay) {
+  sendOdometry(0, 10);
+  send(0.10, {0, 1});
+  sendOdometry(10, 20);
+  EXPECT_TRUE(frames_.empty());
+  sendOdometry(20, 21);
+  EXPECT_EQ(frames_.size(), 1u);
+}
+
+TEST_F(FrameAssemblerTest, APatientStageLosesNoImageOfACameraThatComesBack) {
+  options_.waitForEverything();
+  ImageFrameAssembler assembler(2, options_, keep_);
+  for (int i = 0; i < 200; ++i) {
+    assembler.addOdometry(odometryAt(0.02 * i, 0.0));
+    if (i % 4 == 0) {
+      assembler.addImage(0, at(0.02 * i), picture());
+      if (i < 40 || i >= 160) {
+        assembler.addImage(1, at(0.02 * i), picture());
+      }
+    }
+  }
+  assembler.finish();
+  EXPECT_EQ(frames_.size(), 50u);
+  EXPECT_EQ(assembler.counters().missing_images, (std::vector<int64_t>{0, 30}));
+  EXPECT_EQ(assembler.counters().numLateImages(), 0);
+}
+
+TEST_F(FrameAssemblerTest, CamerasThatAreNotUsedAreNotWaitedFor) {
+  ImageFrameAssembler assembler(2, options_, keep_, nullptr, {false, true});
+  assembler.addOdometry(odometryAt(0.0, 0.0));
+  assembler.addImage(1, at(0.0), picture());
+  EXPECT_EQ(frames_.size(), 1u);
+  EXPECT_EQ(assembler.counters().incomplete_frames, 0);
+  EXPECT_THROW(assembler.addImage(0, at(0.0), picture()), std::logic_error);
+}
+
+TEST_F(FrameAssemblerTest, TakesPosesFromATrajectory) {
+  assembler_.setTrajectory({{at(0.0), RigidTransform()}, {at(0.2), RigidTransform::planar(2.0, 0.0, 0.0)}});
+  assembler_.addOdometry(odometryAt(0.1, 77.0));
+  send(0.1, {0, 1, 2});
+  send(0.3, {0, 1, 2});
+  ASSERT_EQ(frames_.size(), 2u);
+  EXPECT_NEAR(frames_[0].odom_from_vehicle->translation().x(), 1.0, 1e-9);
+  EXPECT_FALSE(frames_[1].odom_from_vehicle.has_value());
+}
+
+TEST_F(FrameAssemblerTest, AReplayStartsOver) {
+  assembler_.addOdometry(odometryAt(10.0, 0.0));
+  assembler_.addOdometry(odometryAt(10.1, 0.0));
+  send(10.05, {0, 1, 2});
+  assembler_.addOdometry(odometryAt(1.0, 0.0));
+  assembler_.addOdometry(odometryAt(1.1, 0.0));
+  send(1.05, {0, 1, 2});
+  ASSERT_EQ(frames_.size(), 2u);
+  EXPECT_TRUE(frames_[1].odom_from_vehicle.has_value());
+}
+
+}  // namespace
+}  // namespace vcharge

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <ros/node_handle.h>
+#include <sensor_msgs/CameraInfo.h>
+
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/frames/image.h"
+#include "vcharge_ros/drive_topics.h"
+
+namespace vcharge {
+
+/// /camera/<name>/image_raw and camera_info of some cameras of a rig. Publishes the messages in which the
+/// images lie, without a copy.
+class ImagePublisher {
+ public:
+  ImagePublisher(ros::NodeHandle* node, const CameraRig& rig, const std::vector<std::string>& cameras,
+                 const DriveTopics& topics);
+
+  /// Images of MessageSink, in the order of the cameras.
+  void publish(const MultiFrame& group) const;
+
+ private:
+  struct Camera {
+    std::string frame_id;
+    ros::Publisher image, info;
+    sensor_msgs::CameraInfo camera_info;
+  };
+  std::vector<Camera> cameras_;
+};
+
+}  // namespace vcharge
