@@ -1,4 +1,3 @@
-#include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -10,14 +9,12 @@
 #include "vcharge_calibration/intrinsics/intrinsics_files.h"
 #include "vcharge_calibration/rig/rig_calibrator_options.h"
 #include "vcharge_camera_driver/driver_options.h"
-#include "vcharge_core/base/error.h"
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/files/file_io.h"
 #include "vcharge_core/sparse_map/analytic_map.h"
 #include "vcharge_dense/height_map_options.h"
 #include "vcharge_dense/range_mapper.h"
 #include "vcharge_localization/drive_localizer.h"
-#include "vcharge_mapping/mapping_checkpoint.h"
 #include "vcharge_mapping/sparse_mapper_options.h"
 #include "vcharge_obstacles/obstacle_mapper.h"
 
@@ -28,20 +25,11 @@ CameraRig smallRig() {
   return makeAnalyticMap({2, 4}).rig;
 }
 
-std::string keyOfCheckpoint() {
-  return checkpointKey("a drive", smallRig(), SparseMapperOptions(), "a program");
-}
-
 std::string cameraFile(IntrinsicsFormat format) {
   CameraRig rig = smallRig();
   rig.cameras.erase(rig.cameras.begin() + 1, rig.cameras.end());
   rig.cameras[0].mask = cv::Mat();
   return bytesOf("cameras.yaml", [&](const std::string& path) { writeIntrinsics(rig, format, path); });
-}
-
-std::string checkpointBytes() {
-  MappingState state;
-  return bytesOf("a.work", [&](const std::string& path) { writeCheckpoint(state, keyOfCheckpoint(), path); });
 }
 
 template <class Options>
@@ -73,14 +61,6 @@ std::vector<FuzzTarget> stageTargets() {
                   "target_type: checkerboard\ntargetCols: 9\ntargetRows: 6\nrowSpacingMeters: "
                   "0.1\ncolSpacingMeters: 0.1\n"},
                  [](const std::string& path) { readCalibrationBoard(path); }),
-      fileTarget("mapping_checkpoint", "a.work", {checkpointBytes()},
-                 [](const std::string& path) {
-                   const CheckpointReading reading =
-                       readCheckpoint(path, keyOfCheckpoint(), std::make_shared<CameraRig>(smallRig()));
-                   if (!reading.state) {
-                     throw InputError(reading.refusal);
-                   }
-                 }),
       optionsTarget<DriverOptions>("driver", readTextFile(VCHARGE_EXAMPLE_CAR)),
       optionsTarget<RigCalibratorOptions>("calibration"),
       optionsTarget<SparseMapperOptions>("mapping"),

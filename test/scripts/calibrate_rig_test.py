@@ -63,7 +63,7 @@ class CalibrateRigTest(unittest.TestCase):
             return [(topic, message)]
 
         printed, _ = self.calibrate(self.drive.rewrite("covered.bag", cover))
-        self.assertIn("camera 'left': too few images in which points could be followed", printed)
+        self.assertIn("camera 'left': too few images with tracked points", printed)
 
     def test_a_drive_without_odometry_is_refused(self):
         bag = self.drive.rewrite("blind.bag", lambda topic, message: [] if topic == "/odom" else [(topic, message)])

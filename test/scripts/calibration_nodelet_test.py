@@ -127,7 +127,7 @@ class CalibrationNodeletTest(unittest.TestCase):
         self.assertEqual(nexts[-1], "you can stop now", coached[-1])
         self.assertEqual(coached[-1].state, CalibrationStatus.READY)
         self.assertEqual(list(coached[-1].missing), [])
-        self.assertAlmostEqual(coached[-1].left_turn_rad, 3 * math.pi, delta=0.6)  # a look every 2 m
+        self.assertAlmostEqual(coached[-1].left_turn_rad, 3 * math.pi, delta=0.6)  # an outlook every 2 m
         self.assertAlmostEqual(coached[-1].right_turn_rad, 2 * math.pi, delta=0.1)
         predicted = {camera.camera: camera for camera in coached[-1].cameras}
         self.assertEqual(tuple(predicted), CAMERAS)

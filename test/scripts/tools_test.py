@@ -234,7 +234,7 @@ class ToolsTest(unittest.TestCase):
                 ("cut.vmap", whole[:len(whole) // 2], ["truncated", len(whole)]),
                 ("newer.vmap", whole[:60] + b"\0\0\0\x09" + whole[64:], ["version 9", "newer"])):
             (self.work / name).write_bytes(content)
-            self.fail_with("map_info", [name, *words], map=self.work / name, export_ply=self.work / "new.ply")
+            self.fail_with("map_info", [name, *words], map=self.work / name, trajectory=self.work / "new.tum")
         for name, sql, words in (("moved.vmap", "UPDATE landmark SET z_m = z_m + 1", ["damaged", "hash"]),
                                  ("index.vmap", "UPDATE loop_edge SET first = 24", ["loop_edges[0]"])):
             shutil.copy(self.good / "map.vmap", self.work / name)
@@ -248,11 +248,11 @@ class ToolsTest(unittest.TestCase):
         for value in ("nan", "-1", "0", "inf"):
             self.fail_with("import", ["field_of_view_rad", value], field_of_view_rad=value)
         for key, value in (("duration_s", "nan"), ("duration_s", "-1"), ("image_scale", "2"), ("seed", "-1"),
-                           ("exposure_gain", "0"), ("height_cell_m", "nan"), ("height_limit_m", "inf")):
+                           ("exposure_gain", "0"), ("height_cell_m", "nan")):
             self.fail_with("simulate", [key, value], **{key: value})
         self.fail_with("import", ["ground_height_m", "nan"], ground_height_m="nan")
         self.fail_with("import", ["ground_slope_x", "-2"], ground_slope_x="-2")
-        for key, value in (("min_motion_m", ".nan"), ("max_speed_m_per_s", "-1"),
+        for key, value in (("plane_sweep.min_texture", ".nan"), ("neighbours.max_baseline_m", "-1"),
                            ("plane_sweep.min_distance_m", "-0.3"), ("plane_sweep.max_distance_m", ".inf"),
                            ("working_camera.focal_scale", ".nan"), ("neighbours.num_neighbours", "-4"),
                            ("odometry.max_gap_s", "0"), ("plane_sweep.num_planes", "many")):
@@ -300,16 +300,13 @@ class ToolsTest(unittest.TestCase):
         self.fail_with("evaluate_range", [blocked / "new"], report=blocked / "new")
         self.fail_with("evaluate_trajectory", [blocked / "new"], report=blocked / "new")
         self.fail_with("evaluate_map", [blocked / "new"], report=blocked / "new")
-        for option in ("export_ply", "export_colmap", "trajectory"):
-            self.fail_with("map_info", [blocked / "new"], **{option: blocked / "new"})
-        self.fail_with("map_info", [self.work, "blocked", "COLMAP"], export_colmap=self.work)
+        self.fail_with("map_info", [blocked / "new"], trajectory=blocked / "new")
         folder = self.work / "folder.bag"
         folder.mkdir()
         self.fail_with("import", [folder, "folder"], output=folder)
         for name, option in (("import", "output"), ("import", "rig"), ("compute", "output"),
                              ("evaluate_range", "report"), ("evaluate_trajectory", "report"),
-                             ("map_info", "map"), ("map_info", "export-ply"), ("map_info", "export-colmap"),
-                             ("map_info", "trajectory")):
+                             ("map_info", "map"), ("map_info", "trajectory")):
             self.fail_with(name, [f"--{option}", "expected a path"], **{option: ""})
 
     def test_existing_outputs_outlive_a_failure(self):

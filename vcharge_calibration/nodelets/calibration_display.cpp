@@ -13,17 +13,10 @@ namespace {
 constexpr const char* kFrame = "map";
 constexpr int kShownKeyframes = 20;  // while driving
 
-/// Poses and places are not adjusted yet.
-TriangulationOptions lenientTriangulation(const RigCalibratorOptions& options) {
-  TriangulationOptions lenient = options.triangulation;
-  lenient.max_error_rad = options.first_max_error_rad;
-  return lenient;
-}
-
 }  // namespace
 
 CalibrationDisplay::CalibrationDisplay(ros::NodeHandle* node, const RigCalibratorOptions& options)
-    : triangulation_(lenientTriangulation(options)),
+    : triangulation_(options.firstTriangulation()),
       status_(node->advertise<vcharge_msgs::CalibrationStatus>("/calibration/status", 10, true)),
       trajectory_(node->advertise<nav_msgs::Path>("/calibration/trajectory", 1, true)),
       landmarks_(node->advertise<sensor_msgs::PointCloud2>("/calibration/landmarks", 1, true)),
@@ -35,8 +28,8 @@ void CalibrationDisplay::tell(const RigCalibrationSession::Status& status) {
   status_.publish(message);
 }
 
-void CalibrationDisplay::showDrive(const RigCalibrationSession::Status& status, const MappingState& state,
-                                   const CameraRig& guess) {
+void CalibrationDisplay::showDrive(const RigCalibrationSession::Status& status,
+                                   const ReconstructionState& state, const CameraRig& guess) {
   landmarks_.publish(toCloud(recentLandmarksByCamera(state, guess, triangulation_, kShownKeyframes), kFrame));
   trajectory_.publish(makePath(keyframePath(state), kFrame));
   cameras_.publish(

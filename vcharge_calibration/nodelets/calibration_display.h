@@ -17,7 +17,7 @@ class CalibrationDisplay {
   void tell(const RigCalibrationSession::Status& status);
 
   /// The drive so far, by the places that hand-eye gives the cameras.
-  void showDrive(const RigCalibrationSession::Status& status, const MappingState& state,
+  void showDrive(const RigCalibrationSession::Status& status, const ReconstructionState& state,
                  const CameraRig& guess);
   /// The drive as it was calibrated.
   void showResult(RigCalibrationSession::Status status, const FinishedCalibration& work);

@@ -63,7 +63,7 @@ class CalibrationNodelet : public Nodelet {
     source_ = std::make_unique<LiveDriveSource>(node, rig, source_options);
     session_ = std::make_unique<RigCalibrationSession>(
         rig, options_, session_options, [this](const Status& status) { display_->tell(status); },
-        [this](const MappingState& state, const CameraRig& guess) { watch(state, guess); },
+        [this](const ReconstructionState& state, const CameraRig& guess) { watch(state, guess); },
         [this](const FinishedCalibration& work) { finish(work); });
     // Nothing throws any more: a nodelet that does not load must leave no publisher behind.
     display_ = std::make_unique<CalibrationDisplay>(&node, options_);
@@ -94,7 +94,7 @@ class CalibrationNodelet : public Nodelet {
     response->message = "a new drive begins";
   }
 
-  void watch(const MappingState& state, const CameraRig& guess) {
+  void watch(const ReconstructionState& state, const CameraRig& guess) {
     const Status status = session_->status();
     if (status.phase != RigCalibrationSession::Phase::kCalibrated) {  // what was found stays to be seen
       display_->showDrive(status, state, guess);

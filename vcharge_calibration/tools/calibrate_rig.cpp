@@ -30,15 +30,16 @@ void calibrate(const RigToolArguments& arguments, const std::string& map_file,
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Calibrates the places of a rig's cameras on the vehicle from a drive: images, /odom and the cameras' "
-      "intrinsics, without a guess, overlap or a board. Drive 100 m or more with turns to both sides and "
-      "come past the same places again, best a figure of eight. Prints every degree of freedom with its "
-      "standard deviation and a verdict: PASS, WARN with what is missing, or FAIL, which writes no file.");
+      "Calibrates the extrinsics of a rig from a drive with images, /odom and intrinsics, without a first "
+      "guess, overlap or a board. Drive 100 m or more with turns to both sides and revisit places, best a "
+      "figure of eight. Prints every degree of freedom with its standard deviation and a verdict: PASS, WARN "
+      "with what is missing, or FAIL, which writes no file.");
   RigToolArguments arguments;
   addRigToolArguments(&app, &arguments);
   std::string map_file;
-  app.add_option("--map", map_file, "sparse map to write (.vmap)")->check(requireNotEmpty);
-  return runTool(&app, argc, argv, [&] {
+  app.add_option("--map", map_file, "sparse map to write (.vmap)")->check(requireOutput);
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
+    arguments.found = found;
     runWithOptions<RigCalibratorOptions>(
         arguments, [&](const RigCalibratorOptions& options, const std::string& option_text) {
           calibrate(arguments, map_file, options, option_text);

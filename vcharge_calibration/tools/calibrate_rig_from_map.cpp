@@ -31,19 +31,19 @@ void calibrate(const RigToolArguments& arguments, const std::string& map_file,
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Calibrates the places of a rig's cameras on the vehicle from a drive in a finished map: images, "
-      "/odom, "
-      "the cameras' intrinsics, and the map, of whatever car. No guess, overlap, board or loop; some turns "
-      "to "
-      "both sides. The map is the measure of all lengths. Prints every degree of freedom with its standard "
-      "deviation and a verdict: PASS, WARN with what is missing, or FAIL, which writes no file.");
+      "Calibrates the extrinsics of a rig from a drive in a finished map of any car, with images, /odom and "
+      "intrinsics, without a first guess, overlap, a board or loops. Drive some turns to both sides. The map "
+      "defines the scale. Prints every degree of freedom with its standard deviation and a verdict: PASS, "
+      "WARN "
+      "with what is missing, or FAIL, which writes no file.");
   RigToolArguments arguments;
   addRigToolArguments(&app, &arguments);
   std::string map_file;
   app.add_option("--map", map_file, "map of build_map or calibrate_rig (.vmap)")
       ->required()
       ->check(requireNotEmpty);
-  return runTool(&app, argc, argv, [&] {
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
+    arguments.found = found;
     runWithOptions<MapRigCalibratorOptions>(
         arguments, [&](const MapRigCalibratorOptions& options, const std::string& option_text) {
           calibrate(arguments, map_file, options, option_text);

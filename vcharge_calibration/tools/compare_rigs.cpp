@@ -38,6 +38,23 @@ void print(const vcharge::RigComparison& comparison) {
   }
 }
 
+nlohmann::json toJson(const vcharge::RigComparison& comparison) {
+  nlohmann::json cameras = nlohmann::json::array();
+  for (const vcharge::CameraDifference& camera : comparison.cameras) {
+    nlohmann::json entry = {{"name", camera.name}};
+    for (int i = 0; i < 6; ++i) {
+      entry["difference"].push_back(camera.difference[i]);
+    }
+    if (camera.has_sigma) {
+      entry["is_significant"] = camera.is_significant;
+      entry["chi_square"] = camera.chi_square;
+    }
+    cameras.push_back(entry);
+  }
+  return {
+      {"cameras", cameras}, {"only_first", comparison.only_first}, {"only_second", comparison.only_second}};
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -48,7 +65,14 @@ int main(int argc, char** argv) {
   std::string first, second;
   app.add_option("first", first, "rig.yaml")->required();
   app.add_option("second", second, "rig.yaml")->required();
-  return vcharge::runTool(&app, argc, argv, [&] {
-    print(vcharge::compareRigs(vcharge::readCameraRig(first), vcharge::readCameraRig(second)));
+  app.footer(
+      "Keys of --json: cameras (name, difference of translation (m) and rotation (rad), and where "
+      "covariances "
+      "are known is_significant and chi_square), only_first, only_second.");
+  return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
+    const vcharge::RigComparison comparison =
+        vcharge::compareRigs(vcharge::readCameraRig(first), vcharge::readCameraRig(second));
+    *found = toJson(comparison);
+    print(comparison);
   });
 }

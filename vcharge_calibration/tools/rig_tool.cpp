@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <vector>
 
 #include "vcharge_calibration/report/rig_calibration_files.h"
 #include "vcharge_calibration/rig/rig_calibration_text.h"
@@ -15,27 +16,73 @@ namespace vcharge {
 
 void addRigToolArguments(CLI::App* app, RigToolArguments* arguments) {
   app->add_option("--bag", arguments->bag, "drive with images and /odom")->required();
-  app->add_option("--rig", arguments->rig, "rig.yaml with intrinsics; extrinsics that it has are not used")
+  app->add_option("--rig", arguments->rig, "rig.yaml with intrinsics; its extrinsics are ignored")
       ->required();
-  app->add_option("--output", arguments->output, "rig.yaml to write")->required()->check(requireNotEmpty);
+  app->add_option("--output", arguments->output, "rig.yaml to write")->required()->check(requireOutput);
   app->add_option("--trajectory", arguments->trajectory, "poses of all frames to write (.tum)")
-      ->check(requireNotEmpty);
-  app->add_option("--report", arguments->report, "folder for rig_report.html")->check(requireNotEmpty);
+      ->check(requireOutput);
+  app->add_option("--report", arguments->report, "folder for rig_report.html")->check(requireOutputFolder);
   app->add_option("--options", arguments->options, "YAML with options of the calibration");
-  app->add_flag("--show-options", arguments->show_options,
-                "print all options with their values, and do nothing else");
+  addShowOptions(app, &arguments->show_options);
+  app->footer(
+      "Keys of --json: verdict (PASS, WARN, FAIL), remarks, distance_m, left_turn_rad, right_turn_rad, "
+      "num_keyframes, num_landmarks, num_loop_edges, rms_px (per coordinate), odometer_turn_scale, "
+      "time_offset_s, time_offset_sigma_s, cameras (name, num_observations, rms_px, standard_deviations of "
+      "translation and rotation in the vehicle frame, travel_in_camera and up_in_camera as unit vectors "
+      "where "
+      "known), stage_s (wall time).");
 }
 
 void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const CameraRig>& rig,
                  DriveConsumer* consumer) {
   ProgressBar bar("following the drive");
   BagDriveSourceOptions options;
-  options.max_image_gap_s = INFINITY;  // a camera that pauses is borne, and told of
+  options.max_image_gap_s = INFINITY;  // frames without a camera are used and counted
   BagDriveSource source(arguments.bag, rig, options);
   source.run(consumer, [&](double fraction) { bar.update(fraction); });
 }
 
-RigCalibration finishAndPrint(const RigToolArguments& arguments, const MappingState& state,
+namespace {
+
+nlohmann::json toJson(const Eigen::VectorXd& values) {
+  return std::vector<double>(values.data(), values.data() + values.size());
+}
+
+nlohmann::json toJson(const RigCalibration& result, const std::map<std::string, double>& stage_s) {
+  nlohmann::json cameras = nlohmann::json::array();
+  for (const CameraCalibration& camera : result.cameras) {
+    nlohmann::json entry = {
+        {"name", camera.name},
+        {"num_observations", camera.num_observations},
+        {"rms_px", camera.rms_px},
+        {"standard_deviations", toJson(camera.covariance.diagonal().cwiseMax(0.0).cwiseSqrt())}};
+    if (camera.initial.travel_in_camera.norm() > 0.0) {
+      entry["travel_in_camera"] = toJson(camera.initial.travel_in_camera);
+    }
+    if (camera.up_in_camera.norm() > 0.0) {
+      entry["up_in_camera"] = toJson(camera.up_in_camera);
+    }
+    cameras.push_back(entry);
+  }
+  return {{"verdict", toString(result.verdict)},
+          {"remarks", result.remarks},
+          {"distance_m", result.distance_m},
+          {"left_turn_rad", result.left_turn_rad},
+          {"right_turn_rad", result.right_turn_rad},
+          {"num_keyframes", result.num_keyframes},
+          {"num_landmarks", result.num_landmarks},
+          {"num_loop_edges", result.num_loop_edges},
+          {"rms_px", result.rms_px},
+          {"odometer_turn_scale", result.odometer_turn_scale},
+          {"time_offset_s", result.time_offset_s},
+          {"time_offset_sigma_s", result.time_offset_sigma_s},
+          {"cameras", cameras},
+          {"stage_s", stage_s}};
+}
+
+}  // namespace
+
+RigCalibration finishAndPrint(const RigToolArguments& arguments, const ReconstructionState& state,
                               const std::function<RigCalibration(const StageCallback&)>& finish,
                               const KeyframeImages& images,
                               const std::function<std::string()>& more_sections) {
@@ -45,6 +92,9 @@ RigCalibration finishAndPrint(const RigToolArguments& arguments, const MappingSt
     result = finish([&](const StageProgress& progress) {
       bar.update((progress.number - 1 + progress.fraction) / progress.num_stages);
     });
+  }
+  if (arguments.found != nullptr) {
+    *arguments.found = toJson(result, state.report.stage_s);
   }
   std::printf("%s", describeCalibration(result).c_str());
   for (const auto& [stage, seconds] : state.report.stage_s) {

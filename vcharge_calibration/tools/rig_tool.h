@@ -13,22 +13,22 @@
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/frames/drive_source.h"
-#include "vcharge_reconstruction/stage_progress.h"
-#include "vcharge_reconstruction/mapping_state.h"
+#include "vcharge_reconstruction/reconstruction_state.h"
+#include "vcharge_reconstruction/stage_runner.h"
 
 namespace vcharge {
 
-// What the tools that calibrate a rig from a drive have in common.
+// Shared by the tools that calibrate a rig from a drive.
 
 struct RigToolArguments {
   std::string bag, rig, options, output, trajectory, report;
   bool show_options = false;
+  nlohmann::json* found = nullptr;  ///< for --json, filled by finishAndPrint()
 };
 
 void addRigToolArguments(CLI::App* app, RigToolArguments* arguments);
 
-/// The options of the file that was given, printed where that was asked for; otherwise calls `calibrate` with
-/// them and their text.
+/// Reads the options, then prints them for --show-options, or calls `calibrate` with them and their text.
 template <class Options, class Calibrate>
 void runWithOptions(const RigToolArguments& arguments, const Calibrate& calibrate) {
   Options options;
@@ -38,7 +38,7 @@ void runWithOptions(const RigToolArguments& arguments, const Calibrate& calibrat
   std::ostringstream text;
   text << writeFields(options);
   if (arguments.show_options) {
-    std::printf("%s\n", text.str().c_str());
+    std::fputs(showOptions(options).c_str(), stdout);
     return;
   }
   calibrate(options, text.str());
@@ -48,14 +48,14 @@ void runWithOptions(const RigToolArguments& arguments, const Calibrate& calibrat
 void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const CameraRig>& rig,
                  DriveConsumer* consumer);
 
-/// Runs the calibration with a progress bar, prints what came out, and writes the report, with more sections
-/// where there are some. InputError with the verdict's first reason where it is kFail.
-RigCalibration finishAndPrint(const RigToolArguments& arguments, const MappingState& state,
+/// Runs the calibration with a progress bar, prints the result, and writes the report with `more_sections`.
+/// InputError with the verdict's first reason for kFail.
+RigCalibration finishAndPrint(const RigToolArguments& arguments, const ReconstructionState& state,
                               const std::function<RigCalibration(const StageCallback&)>& finish,
                               const KeyframeImages& images,
                               const std::function<std::string()>& more_sections = nullptr);
 
-/// What the rig and the map say of where they come from.
+/// Provenance of the written rig and map.
 std::map<std::string, std::string> provenanceOf(const RigToolArguments& arguments, const std::string& program,
                                                 const std::string& options, const RigCalibration& result);
 

@@ -182,7 +182,7 @@ int main(int argc, char** argv) {
   app.add_option("--map", arguments.map, "sparse map of this drive (*.vmap), whose keyframe poses are used");
   app.add_option("--options", arguments.options, "YAML with overrides of HeightMapOptions");
   app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
-  app.add_flag("--keep-range-maps", arguments.keep_range_maps, "do not remove OUTPUT.range_maps at the end");
+  app.add_flag("--keep-range-maps", arguments.keep_range_maps, "keep OUTPUT.range_maps at the end");
   addShowOptions(&app, &arguments.show_options);
   app.footer(
       "Keys of --json: num_range_maps, num_reused_range_maps, size_cells, cell_size_m, num_observed_cells, "

@@ -146,15 +146,14 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
   app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
-  app.add_flag(
-      "--online", arguments.online,
-      "as the nodelet does: only images before the reference, averaged (default: before and after, split)");
-  app.add_flag("--no-pictures", arguments.no_pictures, "no PNG");
+  app.add_flag("--online", arguments.online,
+               "like the nodelet: only images before the reference (default: before and after it)");
+  app.add_flag("--no-pictures", arguments.no_pictures, "write no PNG");
   addShowOptions(&app, &arguments.show_options);
   app.footer(
       "Keys of --json: num_range_maps, known_ratio (of their pixels), cameras (name, num_range_maps, "
-      "num_images, "
-      "num_standing, num_without_pose, num_without_neighbours, num_resets, message), content_hash.");
+      "num_images, num_standing, num_without_pose, num_without_neighbours, num_resets, message), "
+      "content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (arguments.show_options) {
       std::cout << showOptions(readOptions(arguments));

@@ -87,7 +87,7 @@ visualization_msgs::Marker toSightingMarker(const LocalizationResult& result, co
     marker.action = visualization_msgs::Marker::DELETE;
     return marker;
   }
-  for (const LandmarkSighting& sighting : result.fix.inliers) {
+  for (const LandmarkObservation& sighting : result.fix.inliers) {
     const auto camera = static_cast<size_t>(sighting.camera);
     marker.points.push_back(
         toPoint(result.pose->map_from_vehicle * rig.cameras[camera].vehicle_from_camera->translation()));

@@ -50,7 +50,7 @@ class MappingNodelet : public Nodelet {
     }
     readFieldsFromParameters(private_node, "source", &source_options);
     session_ = std::make_unique<MappingSession>(
-        rig, options_, [this](const MappingState& state) { publish(state); },
+        rig, options_, [this](const ReconstructionState& state) { publish(state); },
         [this](const SparseMap& map) { publish(map); });
     source_ = std::make_unique<LiveDriveSource>(node, rig, source_options);
     // Nothing throws any more: a nodelet that does not load must leave no publisher behind.
@@ -92,7 +92,7 @@ class MappingNodelet : public Nodelet {
   }
 
   /// While driving; seldom enough that showing costs little.
-  void publish(const MappingState& state) {
+  void publish(const ReconstructionState& state) {
     if ((ros::WallTime::now() - last_shown_).toSec() >= kShowPeriod_s) {
       last_shown_ = ros::WallTime::now();
       trajectory_.publish(makePath(keyframePath(state)));

@@ -3,14 +3,10 @@
 #include <iostream>
 #include <map>
 #include <memory>
-#include <optional>
 #include <sstream>
 #include <string>
-#include <system_error>
-#include <utility>
 #include <vector>
 
-#include "program_hash.h"
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/options.h"
@@ -21,7 +17,6 @@
 #include "vcharge_core/motion/trajectory.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_mapping/map_report.h"
-#include "vcharge_mapping/mapping_checkpoint.h"
 #include "vcharge_mapping/sparse_mapper.h"
 #include "vcharge_recordings/bag_drive_source.h"
 
@@ -31,10 +26,10 @@ using namespace vcharge;
 
 struct Arguments {
   std::string bag, rig, options, output, trajectory, report;
-  bool show_options = false, fresh = false, no_checkpoint = false;
+  bool show_options = false;
 };
 
-void printReport(const SparseMapperReport& report, const SparseMap& map) {
+void printReport(const ReconstructionReport& report, const SparseMap& map) {
   std::cout << "frames: " << report.num_frames << " (" << report.num_incomplete_frames << " lack a camera";
   for (size_t i = 0; i < report.num_missing_images.size(); ++i) {
     if (report.num_missing_images[i] > 0) {
@@ -44,7 +39,7 @@ void printReport(const SparseMapperReport& report, const SparseMap& map) {
   std::cout << "; " << report.num_frames_without_odometry << " without odometry; "
             << report.num_standing_frames << " standing)\n";
   if (report.num_odometry_resets > 0) {
-    std::cout << "odometer: started over " << report.num_odometry_resets << " times\n";
+    std::cout << "odometer resets: " << report.num_odometry_resets << "\n";
   }
   if (report.num_late_images > 0) {
     std::cout << "late images, not used: " << report.num_late_images << "\n";
@@ -70,10 +65,7 @@ void printReport(const SparseMapperReport& report, const SparseMap& map) {
   }
   std::cout << "\nodometer: distance x " << map.contents().odometry_distance_scale << ", turn x "
             << map.contents().odometry_turn_scale << "\ntime:";
-  std::vector<std::string> stages = {"following"};
-  stages.insert(stages.end(), backEndStages().begin(), backEndStages().end());
-  stages.insert(stages.end(), {"assembly", "checkpoints"});
-  for (const std::string& stage : stages) {
+  for (const std::string& stage : report.stages) {
     const auto found = report.stage_s.find(stage);
     if (found != report.stage_s.end()) {
       std::cout << " " << stage << " " << found->second << " s;";
@@ -82,7 +74,7 @@ void printReport(const SparseMapperReport& report, const SparseMap& map) {
   std::cout << "\n";
 }
 
-nlohmann::json toJson(const SparseMapperReport& report, const SparseMap& map) {
+nlohmann::json toJson(const ReconstructionReport& report, const SparseMap& map) {
   nlohmann::json missing = nlohmann::json::object();
   for (size_t i = 0; i < report.num_missing_images.size(); ++i) {
     missing[map.rig().cameras[i].name] = report.num_missing_images[i];
@@ -120,8 +112,8 @@ nlohmann::json toJson(const SparseMapperReport& report, const SparseMap& map) {
           {"content_hash", map.contentHash()}};
 }
 
-/// A line per frame that was followed, for scripts.
-std::string listFrames(const MappingState& state) {
+/// The frames as CSV.
+std::string listFrames(const ReconstructionState& state) {
   const std::vector<std::string> motions = enumNames<MotionHypothesis>();
   std::string text = "time_s,motion,keyframe\n";
   for (const FramePose& frame : state.frames) {
@@ -131,10 +123,9 @@ std::string listFrames(const MappingState& state) {
   return text;
 }
 
-/// A bar per stage, which names the stage and how many there are.
+/// Shows one progress bar per stage.
 class StageBars {
  public:
-  /// Following the drive is the first stage, before those of the back end.
   void show(const std::string& stage, int number, int num_stages, double fraction) {
     if (stage != shown_) {
       bar_.reset();
@@ -151,92 +142,25 @@ class StageBars {
   std::string shown_;
 };
 
-/// The work of an earlier run that did not come to its end, kept beside the map.
-class Checkpoint {
- public:
-  Checkpoint(const Arguments& arguments, std::string key)
-      : path_(arguments.output + ".work"), key_(std::move(key)), is_on_(!arguments.no_checkpoint) {}
-
-  std::optional<MappingState> read(const std::shared_ptr<const CameraRig>& rig) const {
-    CheckpointReading reading = readCheckpoint(path_, key_, rig);
-    if (!reading.refusal.empty()) {
-      std::cerr << "build_map: " << reading.refusal << "; starting anew\n";
-    }
-    return std::move(reading.state);
-  }
-  /// To be called while this object lives.
-  CheckpointCallback writer() const {
-    if (!is_on_) {
-      return CheckpointCallback();
-    }
-    return [this](const std::string& /*stage*/, const MappingState& state) {
-      try {
-        writeCheckpoint(state, key_, path_);
-      } catch (const InputError& error) {
-        has_failed_ = true;
-        throw InputError(std::string(error.what()) + " (--no-checkpoint does without)");
-      }
-    };
-  }
-  /// That the newest could not be written.
-  bool hasFailed() const { return has_failed_; }
-  void remove() const {
-    std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
-  }
-
- private:
-  const std::string path_, key_;
-  const bool is_on_;
-  mutable bool has_failed_ = false;
-};
-
-std::string nameOfStage(const MappingState& state) {
-  return state.num_finished_stages == 0 ? "following the drive"
-                                        : backEndStages()[state.num_finished_stages - 1];
-}
-
 void buildMap(const Arguments& arguments, const SparseMapperOptions& options, nlohmann::json* found) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   SparseMapper mapper(rig, options);
-  const std::string bag_hash = fileHash(arguments.bag);
-  const Checkpoint checkpoint(arguments, checkpointKey(bag_hash, *rig, options, programHash()));
-  std::optional<MappingState> earlier;
-  if (!arguments.fresh) {
-    earlier = checkpoint.read(rig);
-  }
   StageBars bars;
-  std::string resumed_after;
-  if (earlier) {
-    resumed_after = nameOfStage(*earlier);
-    std::cout << "going on after the stage '" << resumed_after << "' of an earlier run\n";
-    mapper.resume(std::move(*earlier));
-  } else {
-    const int num_stages = static_cast<int>(backEndStages().size()) + 2;
-    BagDriveSourceOptions source_options;
-    source_options.max_image_gap_s = INFINITY;  // a camera that pauses is borne, and told of
-    BagDriveSource source(arguments.bag, rig, source_options);
-    source.run(&mapper, [&](double fraction) { bars.show("following the drive", 1, num_stages, fraction); });
-  }
-  std::shared_ptr<const SparseMap> map;
-  try {
-    map = mapper.finish(
-        [&](const StageProgress& progress) {
-          bars.show(progress.stage, progress.number + 1, progress.num_stages + 1, progress.fraction);
-        },
-        checkpoint.writer());
-  } catch (const InputError&) {
-    if (!checkpoint.hasFailed()) {
-      checkpoint.remove();  // this drive makes no map: nothing to go on from
-    }
-    throw;
-  }
+  BagDriveSourceOptions source_options;
+  source_options.max_image_gap_s = INFINITY;  // frames without a camera are used and counted
+  BagDriveSource source(arguments.bag, rig, source_options);
+  source.run(&mapper, [&](double fraction) {
+    bars.show("following the drive", 1, SparseMapper::kNumStages + 1, fraction);
+  });
+  const std::shared_ptr<const SparseMap> map = mapper.finish([&](const StageProgress& progress) {
+    bars.show(progress.stage, progress.number + 1, progress.num_stages + 1, progress.fraction);
+  });
   bars.end();
   std::ostringstream option_text;
   option_text << writeFields(options);
   writeSparseMap(*map,
                  {{"bag", arguments.bag},
-                  {"bag_hash", bag_hash},
+                  {"bag_hash", fileHash(arguments.bag)},
                   {"rig", arguments.rig},
                   {"mapper_options", option_text.str()},
                   {"program", "build_map 0.1.0"}},
@@ -244,21 +168,19 @@ void buildMap(const Arguments& arguments, const SparseMapperOptions& options, nl
   if (!arguments.trajectory.empty()) {
     writeTrajectory(mapper.trajectory(), arguments.trajectory);
   }
-  const std::string name = std::filesystem::path(arguments.output).filename().string();
   if (!arguments.report.empty()) {
     createFolder(arguments.report);
     const std::filesystem::path folder(arguments.report);
+    const std::string title = "Map " + std::filesystem::path(arguments.output).filename().string();
     writeTextFileAtomically((folder / "map_report.html").string(),
-                            makeMapReport("Map " + name, *map, mapper.state()));
+                            makeMapReport(title, *map, mapper.state()));
     writeTextFileAtomically((folder / "frames.csv").string(), listFrames(mapper.state()));
   }
-  checkpoint.remove();
   printReport(mapper.report(), *map);
   const MapVerdict verdict = judgeMap(*map, mapper.state());
   *found = toJson(mapper.report(), *map);
   (*found)["verdict"] = toString(verdict.grade);
   (*found)["remarks"] = verdict.remarks;
-  (*found)["resumed_after"] = resumed_after;
   std::cout << "verdict: " << toString(verdict.grade);
   for (const std::string& remark : verdict.remarks) {
     std::cout << "\n  " << remark;
@@ -280,17 +202,13 @@ int main(int argc, char** argv) {
   app.add_option("--report", arguments.report, "folder for map_report.html: pictures, numbers and a verdict")
       ->check(requireOutputFolder);
   app.add_option("--options", arguments.options, "YAML with overrides of SparseMapperOptions");
-  app.add_flag("--fresh", arguments.fresh, "do not go on from OUTPUT.work, which an earlier run left");
-  app.add_flag("--no-checkpoint", arguments.no_checkpoint, "leave no OUTPUT.work to go on from");
   addShowOptions(&app, &arguments.show_options);
   app.footer(
       "Keys of --json: verdict (GOOD, CHECK, BAD), remarks, num_frames, num_incomplete_frames, "
       "num_missing_images (by camera), num_frames_without_odometry, num_standing_frames, "
       "num_odometry_resets, num_late_images, num_motions (by hypothesis), num_keyframes, num_landmarks, "
       "num_observations, rms_px, num_loop_edges, num_rejected_loop_edges (by reason), "
-      "odometry_distance_scale, odometry_turn_scale, stage_s (wall time), resumed_after (stage of an earlier "
-      "run; empty: none), "
-      "content_hash.");
+      "odometry_distance_scale, odometry_turn_scale, stage_s (wall time), content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     SparseMapperOptions options;
     if (!arguments.options.empty()) {

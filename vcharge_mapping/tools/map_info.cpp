@@ -4,26 +4,8 @@
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_mapping/map_description.h"
-#include "vcharge_mapping/map_export.h"
 
 namespace {
-
-void printColmap(const vcharge::SparseMap& map, const vcharge::ColmapExport& result,
-                 const std::string& folder) {
-  std::printf("written: %s: %zu images, %zu points, %zu observations\n", folder.c_str(), result.num_images,
-              result.num_points, result.num_observations);
-  for (size_t i = 0; i < result.cameras.size(); ++i) {
-    std::printf("  %s: OPENCV_FISHEYE with a residual of %.4f px rms, %.4f px at most\n",
-                map.rig().cameras[i].name.c_str(), result.cameras[i].rms_px, result.cameras[i].max_px);
-  }
-  if (result.num_observations_left_out > 0) {
-    std::printf(
-        "  left out: %zu observations 90 degrees or more from the axis, which OPENCV_FISHEYE does not "
-        "project, "
-        "and %zu points seen by nothing else\n",
-        result.num_observations_left_out, result.num_points_left_out);
-  }
-}
 
 nlohmann::json toJson(const vcharge::SparseMap& map, const vcharge::MapProvenance& provenance) {
   nlohmann::json cameras = nlohmann::json::array();
@@ -48,16 +30,11 @@ nlohmann::json toJson(const vcharge::SparseMap& map, const vcharge::MapProvenanc
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Tells what a sparse map holds, and exports it.");
-  std::string map_path, ply_path, colmap_folder, trajectory_path;
+  CLI::App app("Describes a sparse map and writes the poses of its keyframes.");
+  std::string map_path, trajectory_path;
   bool list_loop_edges = false;
   app.add_option("--map", map_path, "the map (*.vmap)")->required()->check(vcharge::requireNotEmpty);
   app.add_flag("--loop-edges", list_loop_edges, "name every loop edge");
-  app.add_option("--export-ply", ply_path, "landmarks and keyframe poses as PLY")
-      ->check(vcharge::requireOutput);
-  app.add_option("--export-colmap", colmap_folder,
-                 "folder for COLMAP's text model, each camera as the closest OPENCV_FISHEYE")
-      ->check(vcharge::requireOutputFolder);
   app.add_option("--trajectory", trajectory_path, "keyframe poses as TUM text")
       ->check(vcharge::requireOutput);
   app.footer(
@@ -69,16 +46,9 @@ int main(int argc, char** argv) {
     const auto map = vcharge::readSparseMap(map_path, &provenance);
     std::fputs(vcharge::describeMap(*map, provenance, list_loop_edges).c_str(), stdout);
     *found = toJson(*map, provenance);
-    if (!ply_path.empty()) {
-      vcharge::exportPly(*map, ply_path);
-      std::printf("written: %s\n", ply_path.c_str());
-    }
     if (!trajectory_path.empty()) {
       vcharge::writeTrajectory(vcharge::trajectoryOf(*map), trajectory_path);
       std::printf("written: %s\n", trajectory_path.c_str());
-    }
-    if (!colmap_folder.empty()) {
-      printColmap(*map, vcharge::exportColmap(*map, colmap_folder), colmap_folder);
     }
   });
 }

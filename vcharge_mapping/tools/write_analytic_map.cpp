@@ -1,10 +1,10 @@
-// Writes the analytic map of vcharge_core/sparse_map/analytic_map.h, for tests of programs that read maps.
+// Writes the map of vcharge_core/sparse_map/analytic_map.h, for tests of tools that read maps.
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/sparse_map/analytic_map.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 
 int main(int argc, char** argv) {
-  CLI::App app("Writes a small map whose every observation is exact, for tests.");
+  CLI::App app("Writes a small map with exact observations, for tests.");
   std::string path;
   vcharge::AnalyticMapOptions options;
   app.add_option("--output", path, "the map (*.vmap)")->required()->check(vcharge::requireOutput);

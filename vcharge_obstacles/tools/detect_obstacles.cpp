@@ -98,8 +98,7 @@ class Pipeline : public DriveConsumer {
     }
     obstacles_->finish();
   }
-  /// What a core has to do per range map, without reading the bag and without writing the results, which is
-  /// part of detecting.
+  /// Processor time without reading the bag and writing the results; writing is part of detecting.
   void reportTiming(double writing_s, nlohmann::json* found) const {
     if (num_maps_ == 0) {
       return;

@@ -145,19 +145,17 @@ int main(int argc, char** argv) {
       "poses with which the map was made (TUM), to align it with the truth; without them the map must be in "
       "the world's frame");
   const OptionsArgument<HeightMapErrorOptions> options(&app);
-  const OutputArguments output(
-      &app, R"(kind: "height_map"; num_seen, num_mapped: cells; mean_signed_m; share_within_10_cm;
+  const ReportArgument report(&app, "height_map_errors");
+  describeJson(&app, R"(kind: "height_map"; num_seen, num_mapped: cells; mean_signed_m; share_within_10_cm;
 num_steps, num_steps_mapped, num_steps_found; num_kerbs_seen, num_kerbs; error distributions height_m,
 step_position_m, kerb_height_m; kerbs: [{position_m [x, y], error_m, nearest_view_m}]; measurements:
 [{kind, from_m, to_m, truth_m, map_m}]; mean_measurement_m, max_measurement_m, num_measurements_missing;
 drivability: {num_faces, num_faces_blocked, open_faces [{position_m, direction, height_m}], num_drivable,
-num_drivable_inside, num_open_ground, num_open_drivable, num_solid, num_solid_on_ground}.)",
-      "height_map_errors");
-  return runTool(&app, argc, argv, [&] {
+num_drivable_inside, num_open_ground, num_open_drivable, num_solid, num_solid_on_ground}.)");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (options.shown()) {
       return;
     }
-    output.check();
     const HeightMapErrorOptions error_options = options.read();
     const HeightMap map = readHeightMap(map_path);
     const HeightMap truth = readHeightMap(truth_path);
@@ -182,9 +180,10 @@ num_drivable_inside, num_open_ground, num_open_drivable, num_solid, num_solid_on
       throw InputError(map_path + ": none of its cells was visible in the drive of " + truth_path);
     }
     print(errors);
-    output.write(toJson(errors));
-    if (!output.report().empty()) {
-      writeErrorPicture(map, errors, output.report());
+    *found = toJson(errors);
+    report.write(*found);
+    if (!report.folder().empty()) {
+      writeErrorPicture(map, errors, report.folder());
     }
   });
 }

@@ -128,20 +128,18 @@ int main(int argc, char** argv) {
   app.add_option("--map", map_path, "map to judge (.vmap)")->required()->check(requireNotEmpty);
   app.add_option("--truth", truth_path, "true trajectory (.tum)")->required();
   const OptionsArgument<MapErrorOptions> options(&app);
-  const OutputArguments output(&app,
-                               R"(kind: "map"; content_hash; num_keyframes, num_landmarks, num_observations;
+  const ReportArgument report(&app, "map_errors");
+  describeJson(&app, R"(kind: "map"; content_hash; num_keyframes, num_landmarks, num_observations;
 truth_length_m; scale_error; error distributions of the aligned keyframes position_m, rotation_rad, and
 of the accepted edges accepted_m, accepted_rad; num_accepted, num_wrong; revisits, same_heading,
 opposite_heading, only_opposite_heading: keyframes at a position passed before {num_keyframes, num_found,
 share}; rejected: per reason {num_edges, num_right}; edges: [{first, second, accepted, reason,
 num_inliers, has_truth, right, opposite, distance_m, error_m, error_rad}]; keyframes: [{x_m, y_m, z_m,
-revisit, found}]; landmarks, truth_path: [[x_m, y_m]].)",
-                               "map_errors");
-  return runTool(&app, argc, argv, [&] {
+revisit, found}]; landmarks, truth_path: [[x_m, y_m]].)");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (options.shown()) {
       return;
     }
-    output.check();
     const MapErrorOptions error_options = options.read();
     const auto map = readSparseMap(map_path);
     const Trajectory truth = readTrajectory(truth_path);
@@ -152,6 +150,7 @@ revisit, found}]; landmarks, truth_path: [[x_m, y_m]].)",
       throw InputError(map_path + " against " + truth_path + ": " + error.what());
     }
     print(errors);
-    output.write(toJson(*map, errors, truth));
+    *found = toJson(*map, errors, truth);
+    report.write(*found);
   });
 }

@@ -265,22 +265,20 @@ int main(int argc, char** argv) {
                  "folder of the drive's truth (range/, rig.yaml, trajectory.tum, obstacles.yaml, ...)")
       ->required();
   const OptionsArgument<Options> options(&app);
-  const OutputArguments output(
-      &app,
-      R"(kind: "obstacles"; scans: per scan {name, and for rays off the direction of travel
+  const ReportArgument report(&app, "obstacle_errors");
+  describeJson(&app, R"(kind: "obstacles"; scans: per scan {name, and for rays off the direction of travel
 (aside), along it (ahead) and along it within 2 m (ahead_within_2_m) {rays, missed, nearer,
 mean_signed_m, share_within_one_sigma, share_within_two_sigma, error distributions error_m,
 error_own_ray_m}}; map: {maps, driven_m, obstacles [{kind, height_m, width_m, distance_m, reported, maps,
 maps_reported}], false_cells, false_cells_per_10_m, false_left, false_cells_per_map, false_cells_hidden,
 false_cell_list [{x_m, y_m, first_seen_ns, maps, left, on_open_ground}], observed_inside, free_inside:
 cells inside obstacles, kerb_points, kerb_reported, error distribution kerb_height_error_m, kerbs
-[{position_m, nearest_m, reported, ever_reported}], mover_maps, mover_reported, mover_cells, mover_free}.)",
-      "obstacle_errors");
-  return runTool(&app, argc, argv, [&] {
+[{position_m, nearest_m, reported, ever_reported}], mover_maps, mover_reported, mover_cells, mover_free}.)");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (options.shown()) {
       return;
     }
-    output.check();
-    output.write(evaluate(arguments, options.read()));
+    *found = evaluate(arguments, options.read());
+    report.write(*found);
   });
 }

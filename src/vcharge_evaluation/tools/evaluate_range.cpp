@@ -152,19 +152,16 @@ int main(int argc, char** argv) {
   app.add_option("--bag", bag, "the drive")->required();
   app.add_option("--rig", rig_path, "rig.yaml that the range maps were made with")->required();
   const OptionsArgument<RangeEvaluationOptions> options(&app);
-  const OutputArguments output(
-      &app,
-      R"(kind: "range"; tolerance: relative; sets: for all cameras and for each one {label,
+  const ReportArgument report(&app, "range_errors");
+  describeJson(&app, R"(kind: "range"; tolerance: relative; sets: for all cameras and for each one {label,
 num_frames, num_judged, num_known, share_within_one_sigma, share_within_two_sigma, accuracy [{density,
 share_within_tolerance, median_relative_error, share_known}] of the most confident fraction, and by_truth
 (m) and by_confidence [{low, high, count, share_within_tolerance, median_relative_error,
-share_within_one_sigma}] of the known ranges}.)",
-      "range_errors");
-  return runTool(&app, argc, argv, [&] {
+share_within_one_sigma}] of the known ranges}.)");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (options.shown()) {
       return;
     }
-    output.check();
     const RangeEvaluationOptions evaluation_options = options.read();
     const auto rig = std::make_shared<const CameraRig>(readCameraRig(rig_path));
     if (!rig->hasExtrinsics()) {
@@ -194,6 +191,7 @@ share_within_one_sigma}] of the known ranges}.)",
     for (const std::string& name : source_options.cameras) {
       json["sets"].push_back(reportErrors(name, judge.camera(rig->cameraIndex(name)).errors()));
     }
-    output.write(json);
+    *found = json;
+    report.write(*found);
   });
 }

@@ -46,18 +46,15 @@ int main(int argc, char** argv) {
   std::string estimate, truth;
   app.add_option("--estimate", estimate, "rig.yaml to judge")->required();
   app.add_option("--truth", truth, "true rig.yaml")->required();
-  const OutputArguments output(
-      &app,
-      R"(kind: "rig"; scale: factor on the translations that fits the truth best; as_is,
+  describeJson(&app, R"(kind: "rig"; scale: factor on the translations that fits the truth best; as_is,
 without_scale: per camera {camera, error_m [x, y, z], error_rad [x, y, z], normalized [6]: errors over
 their standard deviations, if there are covariances}.)");
-  return runTool(&app, argc, argv, [&] {
-    output.check();
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     const RigErrors errors = evaluateRig(readCameraRig(estimate), readCameraRig(truth));
     nlohmann::json json = {{"kind", "rig"}, {"scale", errors.scale}};
     json["as_is"] = print("as it is", errors.as_is);
     std::printf("scale: x %.5f\n", errors.scale);
     json["without_scale"] = print("without the common scale", errors.without_scale);
-    output.write(json);
+    *found = json;
   });
 }

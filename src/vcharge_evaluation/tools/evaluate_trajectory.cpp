@@ -62,15 +62,13 @@ int main(int argc, char** argv) {
   std::string estimate_path, truth_path;
   app.add_option("--estimate", estimate_path, "trajectory to judge (.tum)")->required();
   app.add_option("--truth", truth_path, "true trajectory (.tum)")->required();
-  const OutputArguments output(&app,
-                               R"(kind: "trajectory"; alignments: of the three kinds above {label, num_poses,
+  const ReportArgument report(&app, "trajectory_errors");
+  describeJson(&app, R"(kind: "trajectory"; alignments: of the three kinds above {label, num_poses,
 num_without_truth, truth_length_m, poses [[time_s, forward_m, left_m, up_m, rotation_rad]], and error
 distributions position_m, longitudinal_m, lateral_m, rotation_rad}; scale_error: 0.01 for 1 % too long;
 drift: [{distance_m, error distributions translation_percent, rotation_rad}]; estimate_path, truth_path:
-[[time_s, x_m, y_m]].)",
-                               "trajectory_errors");
-  return runTool(&app, argc, argv, [&] {
-    output.check();
+[[time_s, x_m, y_m]].)");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     const Trajectory estimate = readTrajectory(estimate_path);
     const Trajectory truth = readTrajectory(truth_path);
     nlohmann::json json = {{"kind", "trajectory"}};
@@ -102,6 +100,7 @@ drift: [{distance_m, error distributions translation_percent, rotation_rad}]; es
     }
     json["estimate_path"] = pathOf(estimate);
     json["truth_path"] = pathOf(truth);
-    output.write(json);
+    *found = json;
+    report.write(*found);
   });
 }

@@ -14,10 +14,8 @@ int main(int argc, char** argv) {
   CLI::App app(
       "Simulates a drive of a car with four fisheye cameras and writes it as a bag. Beside it are written "
       "rig_truth.yaml and the folder BAG_truth with rig.yaml and masks, trajectory.tum, height_map.tiff and "
-      ".yaml, "
-      "obstacles.yaml, movers.yaml, faults.yaml and, depending on options and scene, "
-      "range/CAMERA/STAMP_NS.tiff, "
-      "board.yaml, and rig_before.yaml and rig_after.yaml of a fault that changes the rig.");
+      ".yaml, obstacles.yaml, movers.yaml, faults.yaml and, depending on options and scene, board.yaml, "
+      "range/CAMERA/STAMP_NS.tiff, and rig_before.yaml and rig_after.yaml of a fault that changes the rig.");
   const vcharge::ScenarioCommandLine command_line(&app);
   vcharge::RecordingOptions recording;
   bool list = false;
@@ -27,8 +25,8 @@ int main(int argc, char** argv) {
       app.add_option("--output", recording.bag, "bag to write")->check(vcharge::requireOutput);
   app.add_option(
       "--images-from", recording.images_from,
-      "bag of the same drive with the same --seed and --noise off: its images get noise, exposure, faults "
-      "and ticks instead of being rendered again");
+      "bag of the same drive with the same --seed and --noise off, whose images are used instead of "
+      "rendering");
   app.add_flag("--truth-range", recording.truth_range, "write the range of every pixel");
   app.add_option("--height-cell-m", recording.height_cell_m, "cell size of the height map")
       ->check(CLI::Range(0.01, 10.0))
@@ -36,7 +34,7 @@ int main(int argc, char** argv) {
   app.add_option("--threads", threads, "number of threads; 0: one per core")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  app.add_flag("--list", list, "print scenes, drives, rigs and faults, and do nothing else");
+  app.add_flag("--list", list, "print scenes, drives, rigs and faults, and exit");
   vcharge::addShowOptions(&app, &show_options);
   app.footer("Keys of --json: scenario (all its options).");
   return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {

@@ -1,5 +1,4 @@
-// Calibration in an analytic map: a front and a left camera whose places nobody told, on a car that weaves
-// along the map's circle.
+// Calibration of a front and a left camera in an analytic map, on a car that weaves along the map's circle.
 #include "vcharge_calibration/from_map/map_rig_calibrator.h"
 
 #include <cmath>
@@ -23,7 +22,7 @@ constexpr double kDegree = 0.017453292519943295;
 
 struct TestDrive {
   int num_keyframes = 110;
-  double weave_rad = 0.5;       ///< of the heading, to both sides of the circle's
+  double weave_rad = 0.5;       ///< amplitude of the heading
   double odometry_scale = 1.0;  ///< counted over true distance
   int covered_camera = -1;
   bool is_elsewhere = false;
@@ -39,7 +38,7 @@ class MapRigCalibratorTest : public ::testing::Test {
   }
   static void TearDownTestSuite() { delete map_; }
 
-  /// The map's rig without its extrinsics: those are to be found.
+  /// The map's rig without extrinsics.
   static CameraRig bareRig() {
     CameraRig rig = (*map_)->rig();
     for (RigCamera& camera : rig.cameras) {
@@ -80,7 +79,7 @@ class MapRigCalibratorTest : public ::testing::Test {
 };
 std::shared_ptr<const SparseMap>* MapRigCalibratorTest::map_ = nullptr;
 
-TEST_F(MapRigCalibratorTest, FindsTheCamerasWithTheMapsScaleWhateverTheOdometerCounts) {
+TEST_F(MapRigCalibratorTest, FindsTheExtrinsicsInTheScaleOfTheMap) {
   TestDrive weaving;
   weaving.odometry_scale = 1.02;
   const auto calibrator = drive(weaving);
@@ -113,7 +112,7 @@ TEST_F(MapRigCalibratorTest, GivesTheSameBitsOnOneThread) {
   }
 }
 
-TEST_F(MapRigCalibratorTest, NamesTheCameraThatIsCovered) {
+TEST_F(MapRigCalibratorTest, NamesACoveredCamera) {
   TestDrive covered;
   covered.covered_camera = 1;
   covered.num_keyframes = 30;
@@ -124,7 +123,7 @@ TEST_F(MapRigCalibratorTest, NamesTheCameraThatIsCovered) {
   EXPECT_EQ(result.rig, nullptr);
 }
 
-TEST_F(MapRigCalibratorTest, RefusesADriveElsewhere) {
+TEST_F(MapRigCalibratorTest, RefusesADriveInAnotherPlace) {
   TestDrive elsewhere;
   elsewhere.is_elsewhere = true;
   elsewhere.num_keyframes = 30;
@@ -148,7 +147,7 @@ TEST_F(MapRigCalibratorTest, AsksForTurns) {
   EXPECT_THAT(result.remarks.at(0), HasSubstr("no turn"));
 }
 
-TEST_F(MapRigCalibratorTest, AnEmptyDriveIsToldAsSuch) {
+TEST_F(MapRigCalibratorTest, ReportsAnEmptyDrive) {
   MapRigCalibrator calibrator(*map_, bareRig(), MapRigCalibratorOptions());
   const RigCalibration result = calibrator.finish(nullptr);
   EXPECT_EQ(result.verdict, Verdict::kFail);

@@ -8,10 +8,10 @@
 
 namespace vcharge {
 
-LandmarksByCamera recentLandmarksByCamera(const MappingState& state, const CameraRig& guess,
+LandmarksByCamera recentLandmarksByCamera(const ReconstructionState& state, const CameraRig& guess,
                                           const TriangulationOptions& options, int num_keyframes) {
   const auto end = static_cast<int32_t>(state.data.keyframes.size());
-  MappingData part = lastPart(state.data, std::max(0, end - num_keyframes));
+  ReconstructionData part = lastPart(state.data, std::max(0, end - num_keyframes));
   auto rig = std::make_shared<CameraRig>(guess);
   std::vector<bool> has_place;
   for (RigCamera& camera : rig->cameras) {

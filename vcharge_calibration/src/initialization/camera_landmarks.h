@@ -4,15 +4,16 @@
 
 #include "vcharge_calibration/rig/rig_scene.h"
 #include "vcharge_core/camera/camera_rig.h"
-#include "vcharge_reconstruction/mapping_data.h"
-#include "vcharge_reconstruction/mapping_state.h"
+#include "vcharge_reconstruction/reconstruction_data.h"
+#include "vcharge_reconstruction/reconstruction_state.h"
 #include "vcharge_reconstruction/triangulation.h"
 
 namespace vcharge {
 
-/// While driving: points that the last keyframes saw, by cameras whose places come from hand-eye and whose
-/// heights these points tell; cameras without a place have none. Takes milliseconds.
-LandmarksByCamera recentLandmarksByCamera(const MappingState& state, const CameraRig& guess,
+/// Points of the last keyframes for displays while driving, by camera. The extrinsics of `guess` come from
+/// hand-eye calibration, the heights from the points; cameras without extrinsics have no points. Takes
+/// milliseconds.
+LandmarksByCamera recentLandmarksByCamera(const ReconstructionState& state, const CameraRig& guess,
                                           const TriangulationOptions& options, int num_keyframes);
 
 }  // namespace vcharge

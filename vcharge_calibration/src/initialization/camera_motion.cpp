@@ -11,14 +11,22 @@
 namespace vcharge {
 namespace {
 
-/// A direction is no better than this, whatever its covariance says.
+/// Least deviations of a motion: covariances underestimate them.
 constexpr double kMinDirectionSigma_rad = 0.003;
 constexpr double kMinRotationSigma_rad = 0.0003;
-/// A less certain direction is none.
+/// A direction with a larger deviation is not used.
 constexpr double kMaxDirectionSigma_rad = 0.3;
 
-/// Matches between keyframe i and the next, by i.
-std::vector<std::vector<RayMatch>> collectMatches(const MappingData& data, int32_t camera) {
+RobustOptions robustOptions() {
+  RobustOptions options;
+  options.max_error_rad = 0.003;
+  options.max_iterations = 300;
+  options.min_inliers = 20;
+  return options;
+}
+
+/// Matches between each keyframe and the next.
+std::vector<std::vector<RayMatch>> collectMatches(const ReconstructionData& data, int32_t camera) {
   std::vector<std::vector<RayMatch>> matches(data.keyframes.size());
   const CameraModel& model = data.rig->cameras[camera].model;
   for (const Track& track : data.tracks) {
@@ -43,8 +51,8 @@ std::vector<std::vector<RayMatch>> collectMatches(const MappingData& data, int32
 
 }  // namespace
 
-std::vector<MotionPair> estimateCameraMotions(const MappingData& data, int32_t camera,
-                                              const RobustOptions& options) {
+std::vector<MotionPair> estimateCameraMotions(const ReconstructionData& data, int32_t camera) {
+  const RobustOptions options = robustOptions();
   const std::vector<std::vector<RayMatch>> matches = collectMatches(data, camera);
   std::vector<std::optional<MotionPair>> found(matches.size());
   tbb::parallel_for(size_t{0}, matches.size(), [&](size_t i) {
@@ -61,7 +69,7 @@ std::vector<MotionPair> estimateCameraMotions(const MappingData& data, int32_t c
     pair.vehicle = data.keyframes[i].odom_from_vehicle.inverse() * data.keyframes[i + 1].odom_from_vehicle;
     pair.camera_rotation = motion.previous_from_current.rotation();
     pair.camera_direction = translation.normalized();
-    // The covariance is that of a vector of the length found.
+    // The covariance is that of the unnormalized translation.
     const double sigma = std::sqrt(
         (motion.covariance.topLeftCorner<3, 3>().trace() -
          pair.camera_direction.dot(motion.covariance.topLeftCorner<3, 3>() * pair.camera_direction)) /

@@ -3,14 +3,12 @@
 #include <vector>
 
 #include "vcharge_calibration/initialization/hand_eye.h"
-#include "vcharge_geometry/robust/robust_options.h"
-#include "vcharge_reconstruction/mapping_state.h"
+#include "vcharge_reconstruction/reconstruction_state.h"
 
 namespace vcharge {
 
-/// Monocular visual odometry of one camera: how it moved from keyframe to keyframe, by the points that it
-/// followed, beside what the odometer counted. Motions that cannot be told are left out. Data parallel.
-std::vector<MotionPair> estimateCameraMotions(const MappingData& data, int32_t camera,
-                                              const RobustOptions& options);
+/// Monocular visual odometry of one camera: its motions between consecutive keyframes from its tracks, paired
+/// with the odometer's. Leaves out motions that cannot be estimated. Data parallel.
+std::vector<MotionPair> estimateCameraMotions(const ReconstructionData& data, int32_t camera);
 
 }  // namespace vcharge

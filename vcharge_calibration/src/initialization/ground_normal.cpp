@@ -11,27 +11,27 @@
 namespace vcharge {
 namespace {
 
-constexpr double kMaxRange_m = 5.0;  // of points from the camera that passes nearest
+constexpr double kMaxRange_m = 5.0;  // of points from the nearest camera
 constexpr double kMinHeight_m = 0.15;
 constexpr double kMaxHeight_m = 4.0;
 constexpr double kThickness_m = 0.04;
-constexpr double kMaxSlope = 0.1;  // of the ground along the way
+constexpr double kMaxSlope = 0.1;  // of the ground along the path
 constexpr double kMinUprightness =
     0.5;  // cosine between upwards and the mean of the image's up and the view's back
 constexpr size_t kMinPoints = 40;
 constexpr int kNumSamples = 2000;
 constexpr uint32_t kSeed = 5;
 
-/// The camera's path by its own rotations and directions and the odometer's lengths, and its points.
+/// Path of the camera by its rotations and directions and the odometer's distances, and its points.
 struct CameraPath {
   std::vector<Eigen::Vector3d> places_m;
   std::vector<Eigen::Matrix3d> path_from_camera;
   std::vector<Eigen::Vector3d> points_m;  ///< near the path
 };
 
-CameraPath followCamera(const MappingData& data, int32_t camera, const std::vector<MotionPair>& motions,
-                        const TriangulationOptions& options) {
-  MappingData alone;
+CameraPath followCamera(const ReconstructionData& data, int32_t camera,
+                        const std::vector<MotionPair>& motions, const TriangulationOptions& options) {
+  ReconstructionData alone;
   auto rig = std::make_shared<CameraRig>(*data.rig);
   rig->cameras[camera].vehicle_from_camera = RigidTransform();
   alone.rig = rig;
@@ -71,7 +71,7 @@ CameraPath followCamera(const MappingData& data, int32_t camera, const std::vect
   return path;
 }
 
-/// n x = d with n upwards.
+/// The plane n x = d with upward normal n.
 struct Plane {
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   double offset_m = 0.0;
@@ -106,7 +106,7 @@ Plane throughPoint(const Eigen::Vector3d& normal, const Eigen::Vector3d& point,
   return {up, up.dot(point)};
 }
 
-/// What a point's height is worth: its error grows with the square of the range.
+/// Weight of a point's height, whose error grows with the square of the range.
 double weightOf(const CameraPath& path, const Eigen::Vector3d& point) {
   double square_m2 = kMaxRange_m * kMaxRange_m;
   for (const Eigen::Vector3d& place : path.places_m) {
@@ -135,7 +135,7 @@ Plane fitPlane(const CameraPath& path, const std::vector<Eigen::Vector3d>& point
 
 }  // namespace
 
-std::optional<Eigen::Vector3d> findUpwards(const MappingData& data, int32_t camera,
+std::optional<Eigen::Vector3d> findUpwards(const ReconstructionData& data, int32_t camera,
                                            const std::vector<MotionPair>& motions,
                                            const TriangulationOptions& options) {
   const CameraPath path = followCamera(data, camera, motions, options);
@@ -170,7 +170,7 @@ std::optional<Eigen::Vector3d> findUpwards(const MappingData& data, int32_t came
   for (int i = 0; i < kRefinements; ++i) {
     best = fitPlane(path, pointsIn(path, best));
   }
-  // The vehicle leans little: the mean over the way.
+  // Mean over the path: the vehicle leans little.
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Eigen::Matrix3d& path_from_camera : path.path_from_camera) {
     sum += path_from_camera.transpose() * best.normal;

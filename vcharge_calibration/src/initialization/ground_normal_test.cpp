@@ -16,7 +16,7 @@ constexpr int kNumKeyframes = 10;
 constexpr double kStep_m = 0.5;
 
 struct StraightDrive {
-  MappingData data;
+  ReconstructionData data;
   std::vector<MotionPair> motions;
   Eigen::Vector3d up_in_camera;
 };
@@ -84,7 +84,7 @@ TEST(GroundNormalTest, IsFoundBesideAWallWithMorePoints) {
       << up->transpose() << ", expected " << drive.up_in_camera.transpose();
 }
 
-TEST(GroundNormalTest, IsNotMadeUpWithoutGround) {
+TEST(GroundNormalTest, IsEmptyWithoutGround) {
   SceneOptions scene;
   scene.num_ground = 0;
   const StraightDrive wall = makeStraightDrive(scene);

@@ -10,6 +10,12 @@
 namespace vcharge {
 namespace {
 
+constexpr int kMinMotions = 6;
+/// Scale of the Cauchy loss, in standard deviations.
+constexpr double kLossSigmas = 2.0;
+/// Motions with larger errors are outliers.
+constexpr double kMaxInlierSigmas = 5.0;
+
 double cauchyWeight(double sigmas, double scale) {
   return 1.0 / (1.0 + sigmas * sigmas / (scale * scale));
 }
@@ -18,17 +24,18 @@ double yawOf(const MotionPair& motion) {
   return yawOfRotation(motion.vehicle.rotation());
 }
 
-/// The vertical, and how certain it is.
+/// The vertical in the camera's frame and its deviation.
 struct Vertical {
   Eigen::Vector3d up_in_camera = Eigen::Vector3d::UnitZ();
   double sigma_rad = INFINITY;
   std::vector<double> weights;
 };
 
-Vertical findVertical(const std::vector<MotionPair>& motions, const HandEyeOptions& options) {
+Vertical findVertical(const std::vector<MotionPair>& motions, const HandEyeOptions& options,
+                      int num_iterations) {
   Vertical result;
   result.weights.assign(motions.size(), 1.0);
-  for (int iteration = 0; iteration < options.num_iterations; ++iteration) {
+  for (int iteration = 0; iteration < num_iterations; ++iteration) {
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right_side = Eigen::Vector3d::Zero();
     for (size_t i = 0; i < motions.size(); ++i) {
@@ -53,7 +60,7 @@ Vertical findVertical(const std::vector<MotionPair>& motions, const HandEyeOptio
       return result;
     }
     result.up_in_camera = vertical.normalized();
-    // What keeps the vertical from tilting: the information across it.
+    // Information on the tilt of the vertical.
     const Eigen::Vector3d side = result.up_in_camera.unitOrthogonal();
     Eigen::Matrix<double, 3, 2> across;
     across << side, result.up_in_camera.cross(side);
@@ -69,21 +76,21 @@ Vertical findVertical(const std::vector<MotionPair>& motions, const HandEyeOptio
         sigmas = std::hypot(
             sigmas, motions[i].camera_direction.dot(result.up_in_camera) / motions[i].direction_sigma_rad);
       }
-      result.weights[i] = cauchyWeight(sigmas, options.loss_sigmas);
+      result.weights[i] = cauchyWeight(sigmas, kLossSigmas);
     }
   }
   return result;
 }
 
-/// Yaw and place of a camera whose frame was made level.
+/// Yaw and position of a camera in a levelled frame.
 struct PlanarPlace {
   Eigen::Vector2d cos_sin{1.0, 0.0};
   Eigen::Vector2d turned_place_m = Eigen::Vector2d::Zero();  ///< u
-  double yaw_sigma_rad = INFINITY, place_sigma_m = INFINITY;
+  double yaw_sigma_rad = INFINITY, position_sigma_m = INFINITY;
   std::vector<double> sigmas;  ///< error of each motion
 };
 
-/// What the camera's motion should be, Rz(-alpha) t + (R - I) u.
+/// Expected motion of the camera, Rz(-alpha) t + (R - I) u.
 Eigen::Vector2d predictedMotion(const MotionPair& motion, const PlanarPlace& place) {
   const Eigen::Rotation2Dd turn(yawOf(motion));
   Eigen::Matrix2d back;
@@ -93,14 +100,14 @@ Eigen::Vector2d predictedMotion(const MotionPair& motion, const PlanarPlace& pla
 }
 
 PlanarPlace findPlace(const std::vector<MotionPair>& motions, const std::vector<Eigen::Vector2d>& directions,
-                      const HandEyeOptions& options) {
+                      const HandEyeOptions& options, int num_iterations) {
   PlanarPlace place;
   place.sigmas.assign(motions.size(), 0.0);
   std::vector<double> lengths_m;
   for (const MotionPair& motion : motions) {
     lengths_m.push_back(motion.vehicle.translation().norm());
   }
-  for (int iteration = 0; iteration < options.num_iterations; ++iteration) {
+  for (int iteration = 0; iteration < num_iterations; ++iteration) {
     Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
     for (size_t i = 0; i < motions.size(); ++i) {
       if (!motions[i].has_direction) {
@@ -116,10 +123,10 @@ PlanarPlace findPlace(const std::vector<MotionPair>& motions, const std::vector<
       row.tail<2>() = (Eigen::Rotation2Dd(yawOf(motions[i])).toRotationMatrix() - Eigen::Matrix2d::Identity())
                           .transpose() *
                       across;
-      information +=
-          cauchyWeight(place.sigmas[i], options.loss_sigmas) / (sigma_m * sigma_m) * row * row.transpose();
+      information += cauchyWeight(place.sigmas[i], kLossSigmas) / (sigma_m * sigma_m) * row * row.transpose();
     }
-    // The place is eliminated; of the yaw's form the smaller eigenvalue belongs to its cosine and sine.
+    // After elimination of the position, the eigenvector of the smaller eigenvalue is cosine and sine of the
+    // yaw.
     const Eigen::Matrix2d of_place =
         information.bottomRightCorner<2, 2>() + 1e-6 * Eigen::Matrix2d::Identity();
     const Eigen::Matrix2d place_by_yaw = of_place.ldlt().solve(information.bottomLeftCorner<2, 2>());
@@ -139,7 +146,7 @@ PlanarPlace findPlace(const std::vector<MotionPair>& motions, const std::vector<
       place.turned_place_m = -place.turned_place_m;
     }
     place.yaw_sigma_rad = 1.0 / std::sqrt(std::max(1e-12, eigen.eigenvalues()[1]));
-    place.place_sigma_m =
+    place.position_sigma_m =
         1.0 /
         std::sqrt(std::max(1e-12, Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(of_place).eigenvalues()[0]));
     for (size_t i = 0; i < motions.size(); ++i) {
@@ -151,7 +158,7 @@ PlanarPlace findPlace(const std::vector<MotionPair>& motions, const std::vector<
       const double sigma_m =
           std::hypot(lengths_m[i] * motions[i].direction_sigma_rad, options.odometry_sigma_m);
       const Eigen::Vector2d across(-directions[i].y(), directions[i].x());
-      // A motion in the opposite direction is as wrong as one across.
+      // A motion in the opposite direction gets the same error as a perpendicular one.
       const double error_m = directions[i].dot(predicted) < 0.0 ? lengths_m[i] : across.dot(predicted);
       place.sigmas[i] = error_m / sigma_m;
     }
@@ -159,11 +166,12 @@ PlanarPlace findPlace(const std::vector<MotionPair>& motions, const std::vector<
   return place;
 }
 
-/// Mean direction of motions that went straight, against which the others weigh less the further they are.
-Eigen::Vector3d findTravel(const std::vector<MotionPair>& motions, const HandEyeOptions& options) {
+/// Robust mean direction of straight motions.
+Eigen::Vector3d findTravel(const std::vector<MotionPair>& motions, const HandEyeOptions& options,
+                           int num_iterations) {
   constexpr double kStraight_rad = 0.02;
   Eigen::Vector3d travel = Eigen::Vector3d::Zero();
-  for (int iteration = 0; iteration < options.num_iterations; ++iteration) {
+  for (int iteration = 0; iteration < num_iterations; ++iteration) {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (const MotionPair& motion : motions) {
       if (motion.has_direction && std::abs(yawOf(motion)) < kStraight_rad) {
@@ -171,7 +179,7 @@ Eigen::Vector3d findTravel(const std::vector<MotionPair>& motions, const HandEye
         const Eigen::Vector3d direction = forwards * motion.camera_direction;
         const double sigma = std::hypot(motion.direction_sigma_rad, kStraight_rad);
         const double sigmas = iteration == 0 ? 0.0 : (direction - travel).norm() / sigma;
-        sum += cauchyWeight(sigmas, options.loss_sigmas) / (sigma * sigma) * direction;
+        sum += cauchyWeight(sigmas, kLossSigmas) / (sigma * sigma) * direction;
       }
     }
     if (!(sum.norm() > 0.0)) {
@@ -184,26 +192,16 @@ Eigen::Vector3d findTravel(const std::vector<MotionPair>& motions, const HandEye
 
 }  // namespace
 
-void HandEyeOptions::validate() const {
-  requireField(min_motions >= 3, "min_motions", "must be 3 or more", min_motions);
-  requireField(num_iterations >= 1, "num_iterations", "must be 1 or more", num_iterations);
-  requireField(loss_sigmas > 0.0, "loss_sigmas", "must be positive", loss_sigmas);
-  requireField(max_inlier_sigmas > 0.0, "max_inlier_sigmas", "must be positive", max_inlier_sigmas);
-  requireField(odometry_sigma_m > 0.0, "odometry_sigma_m", "must be positive", odometry_sigma_m);
-  requireField(odometry_sigma_rad > 0.0, "odometry_sigma_rad", "must be positive", odometry_sigma_rad);
-  requireField(max_sigma_rad > 0.0, "max_sigma_rad", "must be positive", max_sigma_rad);
-  requireField(max_sigma_m > 0.0, "max_sigma_m", "must be positive", max_sigma_m);
-}
-
-HandEye solvePlanarHandEye(const std::vector<MotionPair>& motions, const HandEyeOptions& options) {
+HandEye solvePlanarHandEye(const std::vector<MotionPair>& motions, const HandEyeOptions& options,
+                           int num_iterations) {
   options.validate();
   HandEye result;
   result.num_motions = static_cast<int>(motions.size());
-  if (result.num_motions < options.min_motions) {
+  if (result.num_motions < kMinMotions) {
     return result;
   }
-  result.travel_in_camera = findTravel(motions, options);
-  const Vertical vertical = findVertical(motions, options);
+  result.travel_in_camera = findTravel(motions, options, num_iterations);
+  const Vertical vertical = findVertical(motions, options, num_iterations);
   result.tilt_sigma_rad = vertical.sigma_rad;
   const Eigen::Quaterniond level_from_camera =
       Eigen::Quaterniond::FromTwoVectors(vertical.up_in_camera, Eigen::Vector3d::UnitZ());
@@ -211,19 +209,18 @@ HandEye solvePlanarHandEye(const std::vector<MotionPair>& motions, const HandEye
   for (const MotionPair& motion : motions) {
     directions.emplace_back((level_from_camera * motion.camera_direction).head<2>().normalized());
   }
-  const PlanarPlace place = findPlace(motions, directions, options);
+  const PlanarPlace place = findPlace(motions, directions, options, num_iterations);
   result.yaw_sigma_rad = place.yaw_sigma_rad;
-  result.place_sigma_m = place.place_sigma_m;
+  result.position_sigma_m = place.position_sigma_m;
   for (size_t i = 0; i < motions.size(); ++i) {
-    const double turn_error_sigmas =
-        (1.0 / vertical.weights[i] - 1.0) * options.loss_sigmas * options.loss_sigmas;
-    result.num_inliers += std::abs(place.sigmas[i]) < options.max_inlier_sigmas &&
-                                  turn_error_sigmas < options.max_inlier_sigmas * options.max_inlier_sigmas
+    const double turn_error_sigmas = (1.0 / vertical.weights[i] - 1.0) * kLossSigmas * kLossSigmas;
+    result.num_inliers += std::abs(place.sigmas[i]) < kMaxInlierSigmas &&
+                                  turn_error_sigmas < kMaxInlierSigmas * kMaxInlierSigmas
                               ? 1
                               : 0;
   }
   if (!(result.tilt_sigma_rad < options.max_sigma_rad && result.yaw_sigma_rad < options.max_sigma_rad &&
-        result.place_sigma_m < options.max_sigma_m)) {
+        result.position_sigma_m < options.max_sigma_m)) {
     result.status = HandEyeStatus::kNoTurn;
     return result;
   }

@@ -72,32 +72,31 @@ TEST(PlanarHandEyeTest, FindsTheTruthWithoutNoise) {
   EXPECT_EQ(found.num_inliers, found.num_motions);
 }
 
-TEST(PlanarHandEyeTest, BearsNoiseAndWrongMotions) {
+TEST(PlanarHandEyeTest, HandlesNoiseAndOutliers) {
   Drive drive;
   drive.noise_rad = 0.01;
   drive.wrong_share = 0.2;
   const HandEye found = solvePlanarHandEye(makeMotions(drive), HandEyeOptions());
   ASSERT_EQ(found.status, HandEyeStatus::kOk);
-  // 160 motions of 0.57 degrees: four standard deviations of the mean, and what the wrong ones pull.
+  // 160 motions of 0.57 degrees: four standard deviations of the mean, and the bias of outliers.
   EXPECT_LT(angleBetween(found.vehicle_from_camera, truePlace()), 0.4 * kDegree);
-  // A motion's direction tells the place to 0.01 x 0.5 m / 0.06 at best: 8 cm over the root of 160, six
-  // times.
+  // A direction gives the position to 0.01 x 0.5 m / 0.06 = 8 cm at best; over the root of 160, six times.
   EXPECT_LT((found.vehicle_from_camera.translation() - truePlace().translation()).norm(), 0.04);
   EXPECT_LT(found.num_inliers, found.num_motions);
 }
 
-TEST(PlanarHandEyeTest, TellsStraightDrivesFromTurns) {
+TEST(PlanarHandEyeTest, DetectsALackOfTurns) {
   Drive drive;
   drive.turn_rad = 0.0;
   drive.noise_rad = 0.002;
   const HandEye found = solvePlanarHandEye(makeMotions(drive), HandEyeOptions());
   EXPECT_EQ(found.status, HandEyeStatus::kNoTurn);
-  // Straight ahead is seen all the same.
+  // The direction of travel needs no turn.
   const Eigen::Vector3d ahead = truePlace().rotation().conjugate() * Eigen::Vector3d::UnitX();
   EXPECT_LT(std::acos(found.travel_in_camera.dot(ahead)), 0.002);
 }
 
-TEST(PlanarHandEyeTest, TellsTooFewMotions) {
+TEST(PlanarHandEyeTest, DetectsTooFewMotions) {
   Drive drive;
   drive.num_motions = 5;
   EXPECT_EQ(solvePlanarHandEye(makeMotions(drive), HandEyeOptions()).status, HandEyeStatus::kTooFewMotions);
@@ -110,7 +109,7 @@ TEST(PlanarHandEyeTest, RefusesMotionsThatContradictTheOdometer) {
   EXPECT_NE(found.status, HandEyeStatus::kOk);
 }
 
-TEST(PlanarHandEyeTest, TurnsRoundWithAnOdometerThatCountsBackwards) {
+TEST(PlanarHandEyeTest, FacesBackwardsWithAReversedOdometer) {
   std::vector<MotionPair> motions = makeMotions(Drive());
   for (MotionPair& motion : motions) {
     motion.vehicle = RigidTransform(motion.vehicle.rotation(), -motion.vehicle.translation());

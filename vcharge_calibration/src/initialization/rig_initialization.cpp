@@ -8,16 +8,15 @@
 namespace vcharge {
 namespace {
 
-/// Of the keyframes, at which a camera must see how it moves.
-constexpr double kMinSeenShare = 0.2;
+/// Ratio of the keyframes at which the motion of a camera must be known.
+constexpr double kMinSeenRatio = 0.2;
 constexpr double kMinDistance_m = 5.0;
-/// A smaller offset is not told from none: what is driven in that time is within the cameras' accuracy.
+/// Smaller offsets are ignored: the distance driven in that time is within the accuracy of the extrinsics.
 constexpr double kMinOffset_s = 0.004;
 constexpr int kOffsetIterations = 3;
 
-/// Adds to the offset that the result has, and shifts the odometry accordingly; false where there is nothing
-/// to add.
-bool addTimeOffset(const TimeOffset& more, const OdometrySeries& series, MappingState* state,
+/// Adds to the result's offset and shifts the odometry; false where the addition is not significant.
+bool addTimeOffset(const TimeOffset& more, const OdometrySeries& series, ReconstructionState* state,
                    RigCalibration* result) {
   const bool has_offset = result->time_offset_s != 0.0;
   if (!has_offset && !(more.isSignificant() && std::abs(more.offset_s) > kMinOffset_s)) {
@@ -28,7 +27,7 @@ bool addTimeOffset(const TimeOffset& more, const OdometrySeries& series, Mapping
   return true;
 }
 
-std::shared_ptr<CameraRig> solveHandEyes(const MappingData& data,
+std::shared_ptr<CameraRig> solveHandEyes(const ReconstructionData& data,
                                          const std::vector<std::vector<MotionPair>>& motions,
                                          const HandEyeOptions& options, RigCalibration* result) {
   auto rig = std::make_shared<CameraRig>(*data.rig);
@@ -36,7 +35,7 @@ std::shared_ptr<CameraRig> solveHandEyes(const MappingData& data,
   for (size_t i = 0; i < rig->cameras.size(); ++i) {
     HandEye& initial = result->cameras[i].initial;
     initial = solvePlanarHandEye(motions[i], options);
-    if (kMinSeenShare * static_cast<double>(data.keyframes.size()) > static_cast<double>(motions[i].size())) {
+    if (kMinSeenRatio * static_cast<double>(data.keyframes.size()) > static_cast<double>(motions[i].size())) {
       initial.status = HandEyeStatus::kTooFewMotions;
     }
     if (initial.status != HandEyeStatus::kOk) {
@@ -56,7 +55,7 @@ std::shared_ptr<CameraRig> solveHandEyes(const MappingData& data,
 
 }  // namespace
 
-void describeDrive(const MappingState& state, RigCalibration* result) {
+void describeDrive(const ReconstructionState& state, RigCalibration* result) {
   for (const RigCamera& camera : state.data.rig->cameras) {
     result->cameras.emplace_back();
     result->cameras.back().name = camera.name;
@@ -72,13 +71,13 @@ void describeDrive(const MappingState& state, RigCalibration* result) {
   if (!keyframes.empty()) {
     result->distance_m = keyframes.back().travelled_m;
   }
-  const SparseMapperReport& report = state.report;
+  const ReconstructionReport& report = state.report;
   if (2 * report.num_frames_without_odometry > report.num_frames) {
     throw NotCalibrated{
-        {"most images have no odometry at their time: are the clocks of cameras and odometer the same?"}};
+        {"most images have no odometry at their stamps: do cameras and odometer use the same clock?"}};
   }
   if (keyframes.empty()) {
-    throw NotCalibrated{{"no images came with the drive"}};
+    throw NotCalibrated{{"no images in the drive"}};
   }
   if (result->distance_m < kMinDistance_m) {
     throw NotCalibrated{{"the vehicle stood: by the odometer it moved " + toText(result->distance_m, 1) +
@@ -87,7 +86,7 @@ void describeDrive(const MappingState& state, RigCalibration* result) {
 }
 
 std::shared_ptr<CameraRig> guessRig(const OdometrySeries& series, const HandEyeOptions& options,
-                                    std::vector<std::vector<MotionPair>> motions, MappingState* state,
+                                    std::vector<std::vector<MotionPair>> motions, ReconstructionState* state,
                                     RigCalibration* result) {
   std::shared_ptr<CameraRig> rig = solveHandEyes(state->data, motions, options, result);
   for (int i = 0; i < kOffsetIterations; ++i) {
@@ -111,7 +110,7 @@ std::shared_ptr<CameraRig> guessRig(const OdometrySeries& series, const HandEyeO
   return rig;
 }
 
-void correctTimeOffset(const OdometrySeries& series, MappingState* state, RigCalibration* result) {
+void correctTimeOffset(const OdometrySeries& series, ReconstructionState* state, RigCalibration* result) {
   const TimeOffset more = refineTimeOffset(series, result->time_offset_s, state->data);
   result->time_offset_sigma_s = more.sigma_s;
   addTimeOffset(more, series, state, result);

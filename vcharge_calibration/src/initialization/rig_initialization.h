@@ -7,27 +7,27 @@
 #include "initialization/time_offset.h"
 #include "vcharge_calibration/initialization/hand_eye.h"
 #include "vcharge_calibration/rig/rig_calibration.h"
-#include "vcharge_reconstruction/mapping_state.h"
+#include "vcharge_reconstruction/reconstruction_state.h"
 
 namespace vcharge {
 
-/// Thrown where nothing can be calibrated, with the verdict's reasons.
+/// Thrown where the calibration fails, with the reasons.
 struct NotCalibrated {
   std::vector<std::string> remarks;
 };
 
-/// Length and turns of the drive into `result`. NotCalibrated for one that has no odometry, or stands.
-void describeDrive(const MappingState& state, RigCalibration* result);
+/// Sets length and turns of the drive in `result`. NotCalibrated for a drive without odometry or motion.
+void describeDrive(const ReconstructionState& state, RigCalibration* result);
 
-/// The first guess of every camera's place, at height zero, from its motions and the odometer's; into the
-/// cameras of `result` too. Where the turns show that the odometer's stamps are off, the state's odometry is
-/// shifted by that. NotCalibrated, with a reason per camera, where one cannot be told, or where the
-/// odometer's signs are wrong.
+/// First guess of the extrinsics, at height zero, from the motions of each camera and the odometer; also sets
+/// the cameras of `result`. Where the turns show a time offset, the state's odometry is shifted by it.
+/// NotCalibrated, with a reason per camera, where a guess is not possible, or where the odometer has wrong
+/// signs.
 std::shared_ptr<CameraRig> guessRig(const OdometrySeries& series, const HandEyeOptions& options,
-                                    std::vector<std::vector<MotionPair>> motions, MappingState* state,
+                                    std::vector<std::vector<MotionPair>> motions, ReconstructionState* state,
                                     RigCalibration* result);
 
-/// Finds a time offset anew from adjusted keyframes, and shifts the state's odometry by it.
-void correctTimeOffset(const OdometrySeries& series, MappingState* state, RigCalibration* result);
+/// Estimates the time offset from adjusted keyframes and shifts the state's odometry by it.
+void correctTimeOffset(const OdometrySeries& series, ReconstructionState* state, RigCalibration* result);
 
 }  // namespace vcharge

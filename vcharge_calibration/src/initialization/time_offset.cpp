@@ -5,19 +5,19 @@
 namespace vcharge {
 namespace {
 
-/// Of a step's distance and turn, where the drive's own deviations are not asked.
+/// Deviations of the distance and turn between keyframes.
 constexpr double kDistanceSigma_m = 0.003;
 constexpr double kTurnSigma_rad = 0.001;
 constexpr double kLossSigmas = 2.0;
-/// To take a derivative by time.
+/// Step of the numerical derivative by time.
 constexpr double kStep_s = 0.01;
 
-/// Forward distance and turn of a step.
+/// Forward distance and turn of a motion.
 Eigen::Vector2d distanceAndTurn(const RigidTransform& motion) {
   return {motion.translation().x(), yawOfRotation(motion.rotation())};
 }
 
-/// A part of a planar motion, along its arc.
+/// A fraction of a planar motion, along its arc.
 RigidTransform partOf(const RigidTransform& motion, double part) {
   const double turn_rad = yawOfRotation(motion.rotation());
   const Eigen::Rotation2Dd back(-0.5 * turn_rad);
@@ -30,7 +30,7 @@ RigidTransform partOf(const RigidTransform& motion, double part) {
 
 }  // namespace
 
-OdometrySeries::OdometrySeries(const MappingState& state) {
+OdometrySeries::OdometrySeries(const ReconstructionState& state) {
   for (const FramePose& frame : state.frames) {
     if (time_s_.empty()) {
       first_ = frame.stamp;
@@ -52,7 +52,7 @@ RigidTransform OdometrySeries::at(Timestamp stamp, double offset_s) const {
   return previous * partOf(previous.inverse() * odom_from_vehicle_[i], part);
 }
 
-void OdometrySeries::shift(double offset_s, MappingState* state) const {
+void OdometrySeries::shift(double offset_s, ReconstructionState* state) const {
   if (time_s_.size() < 2) {
     return;
   }
@@ -65,7 +65,7 @@ void OdometrySeries::shift(double offset_s, MappingState* state) const {
   }
 }
 
-TimeOffset estimateTimeOffset(const MappingState& state,
+TimeOffset estimateTimeOffset(const ReconstructionState& state,
                               const std::vector<std::vector<MotionPair>>& motions_of_camera,
                               const std::vector<Eigen::Vector3d>& up_in_camera) {
   // The odometer's yaw rate at each keyframe, from the frames around it.
@@ -83,7 +83,7 @@ TimeOffset estimateTimeOffset(const MappingState& state,
           yawOfRotation(motion.rotation()) / toSeconds(state.frames[i + 1].stamp - state.frames[i - 1].stamp);
     }
   }
-  // Odometry that is late lags behind the camera's turn by offset times the change of the rate.
+  // Delayed odometry differs from the camera's turn by the offset times the change of the rate.
   TimeOffset result;
   constexpr int kIterations = 10;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
@@ -109,7 +109,7 @@ TimeOffset estimateTimeOffset(const MappingState& state,
   return result;
 }
 
-TimeOffset refineTimeOffset(const OdometrySeries& series, double offset_s, const MappingData& data) {
+TimeOffset refineTimeOffset(const OdometrySeries& series, double offset_s, const ReconstructionData& data) {
   TimeOffset result;
   constexpr int kIterations = 10;
   for (int iteration = 0; iteration < kIterations; ++iteration) {

@@ -1,4 +1,4 @@
-// An odometer whose clock is late, on a drive with turns that begin and end.
+// An odometer with delayed stamps on a drive with turns.
 #include "initialization/time_offset.h"
 
 #include <cmath>
@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kSpeed_m_per_s = 2.5;
 
-/// Exact motion at a yaw rate that swings: heading 0.6 sin(0.7 t).
+/// Exact motion with the heading 0.6 sin(0.7 t).
 RigidTransform poseAt(double time_s) {
   static constexpr double kTick_s = 0.001;
   double x = 0.0, y = 0.0;
@@ -24,8 +24,8 @@ RigidTransform poseAt(double time_s) {
 }
 
 /// Frames at 12.5 Hz, every third a keyframe; the odometer's poses come `late_s` after the truth.
-MappingState makeState(double late_s, int num_frames) {
-  MappingState state;
+ReconstructionState makeState(double late_s, int num_frames) {
+  ReconstructionState state;
   for (int i = 0; i < num_frames; ++i) {
     const double time_s = 0.08 * i;
     const Timestamp stamp = Timestamp::fromNanoseconds(1000000000 + int64_t{80000000} * i);
@@ -44,8 +44,8 @@ MappingState makeState(double late_s, int num_frames) {
   return state;
 }
 
-TEST(OdometrySeriesTest, ReadsBetweenFrames) {
-  const MappingState state = makeState(0.0, 60);
+TEST(OdometrySeriesTest, InterpolatesBetweenFrames) {
+  const ReconstructionState state = makeState(0.0, 60);
   const OdometrySeries series(state);
   const Timestamp stamp = state.frames[20].stamp;
   for (const double offset_s : {-0.2, -0.03, 0.0, 0.05, 0.11}) {
@@ -53,19 +53,19 @@ TEST(OdometrySeriesTest, ReadsBetweenFrames) {
     EXPECT_LT(error.translation().norm(), 0.001) << offset_s;
     EXPECT_LT(angleOfRotation(error.rotation()), 0.0005) << offset_s;
   }
-  // Beyond the ends the motion goes on.
+  // The motion continues beyond the ends.
   const RigidTransform before = poseAt(-0.05).inverse() * series.at(state.frames[0].stamp, -0.05);
   EXPECT_LT(before.translation().norm(), 0.005);
 }
 
 TEST(OdometrySeriesTest, ShiftsKeyframesAndFrames) {
-  MappingState state = makeState(0.1, 60);
+  ReconstructionState state = makeState(0.1, 60);
   const OdometrySeries series(state);
   series.shift(0.1, &state);
   for (const FramePose& frame : state.frames) {
     const double time_s = toSeconds(frame.stamp - state.frames[0].stamp);
     if (time_s > 4.5) {
-      break;  // the end, where the motion was only continued
+      break;  // extrapolated beyond the end
     }
     const RigidTransform odom_from_vehicle =
         state.data.keyframes[frame.keyframe].odom_from_vehicle * frame.keyframe_from_vehicle;
@@ -75,7 +75,7 @@ TEST(OdometrySeriesTest, ShiftsKeyframesAndFrames) {
 
 TEST(TimeOffsetTest, IsFoundFromAdjustedKeyframes) {
   for (const double late_s : {-0.1, 0.0, 0.02, 0.1}) {
-    MappingState state = makeState(late_s, 300);
+    ReconstructionState state = makeState(late_s, 300);
     const OdometrySeries series(state);
     double offset_s = 0.0;
     for (int i = 0; i < 3; ++i) {
@@ -87,8 +87,8 @@ TEST(TimeOffsetTest, IsFoundFromAdjustedKeyframes) {
   }
 }
 
-TEST(TimeOffsetTest, StraightAheadAtOneSpeedTellsNothing) {
-  MappingState state;
+TEST(TimeOffsetTest, IsUnknownAtConstantSpeed) {
+  ReconstructionState state;
   for (int i = 0; i < 50; ++i) {
     Keyframe keyframe;
     keyframe.stamp = Timestamp::fromNanoseconds(1000000000 + int64_t{200000000} * i);

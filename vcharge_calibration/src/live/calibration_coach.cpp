@@ -14,18 +14,27 @@
 namespace vcharge {
 namespace {
 
+/// A revisit is nearer than the radius to an earlier part, after at least the gap in between.
+constexpr double kRevisitRadius_m = 4.0;
+constexpr double kRevisitGap_m = 25.0;
+/// Ratio of the steps in which the motion of a camera must be known.
+constexpr double kMinSeenRatio = 0.3;
+/// Jackknife: length of parts with independent errors, and groups of parts that are left out once each.
+constexpr double kSegment_m = 5.0;
+constexpr int kNumGroups = 10;
+
 constexpr double kDegrees = 57.29577951308232;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr int kHeight = 2;
-// Of reweighting: a prediction needs not all of them.
-constexpr int kMaxIterations = 10;
+/// Iterations of hand-eye calibration: fewer suffice for a prediction.
+constexpr int kHandEyeIterations = 10;
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-/// As the formula has it; hand-eye gives one figure for x and y, and one for roll and pitch.
+/// Deviations by the formula of hand-eye calibration, which has one for x and y, and one for roll and pitch.
 Vector6d formulaSigma(const HandEye& hand_eye) {
   Vector6d sigma;
-  sigma << hand_eye.place_sigma_m, hand_eye.place_sigma_m, kNaN, hand_eye.tilt_sigma_rad,
+  sigma << hand_eye.position_sigma_m, hand_eye.position_sigma_m, kNaN, hand_eye.tilt_sigma_rad,
       hand_eye.tilt_sigma_rad, hand_eye.yaw_sigma_rad;
   return sigma;
 }
@@ -38,12 +47,12 @@ Vector6d differenceOf(const RigidTransform& from, const RigidTransform& to) {
   return difference;
 }
 
-/// An amount for people: full tens of degrees, never none.
+/// Text of an angle, rounded up to tens of degrees.
 std::string tensOfDegrees(double angle_rad) {
   return toText(10.0 * std::max(1.0, std::ceil(kDegrees * angle_rad / 10.0 - 1e-9)), 0);
 }
 
-/// Where a place lies, seen from the vehicle.
+/// Text of the direction from the vehicle to an earlier pose.
 std::string directionTo(const RigidTransform& odom_from_vehicle, const RigidTransform& odom_from_place) {
   const Eigen::Vector3d there = odom_from_vehicle.inverse() * odom_from_place.translation();
   const double angle = std::atan2(there.y(), there.x());
@@ -56,38 +65,21 @@ std::string directionTo(const RigidTransform& odom_from_vehicle, const RigidTran
 
 }  // namespace
 
-void CalibrationCoachOptions::validate() const {
-  requireField(enough_distance_m > 0.0, "enough_distance_m", "must be positive", enough_distance_m);
-  requireField(enough_turn_rad > 0.0, "enough_turn_rad", "must be positive", enough_turn_rad);
-  requireField(enough_revisited_m >= 0.0, "enough_revisited_m", "must not be negative", enough_revisited_m);
-  requireField(revisit_radius_m > 0.0, "revisit_radius_m", "must be positive", revisit_radius_m);
-  requireField(revisit_gap_m > 2.0 * revisit_radius_m, "revisit_gap_m",
-               "must be more than twice revisit_radius_m", revisit_gap_m);
-  requireField(enough_sigma_m > 0.0, "enough_sigma_m", "must be positive", enough_sigma_m);
-  requireField(enough_sigma_rad > 0.0, "enough_sigma_rad", "must be positive", enough_sigma_rad);
-  requireField(min_seen_share >= 0.0 && min_seen_share <= 1.0, "min_seen_share", "must be within 0 and 1",
-               min_seen_share);
-  requireField(min_steps >= 1, "min_steps", "must be 1 or more", min_steps);
-  requireField(segment_m > 0.0, "segment_m", "must be positive", segment_m);
-  requireField(num_groups >= 4, "num_groups", "must be 4 or more", num_groups);
-}
-
 CalibrationCoach::CalibrationCoach(const std::vector<std::string>& camera_names,
                                    const HandEyeOptions& hand_eye, const CalibrationCoachOptions& options)
     : names_(camera_names), hand_eye_(hand_eye), options_(options), motions_(camera_names.size()) {
   options_.validate();
   hand_eye_.validate();
-  hand_eye_.num_iterations = std::min(hand_eye_.num_iterations, kMaxIterations);
 }
 
 void CalibrationCoach::addKeyframe(const RigidTransform& odom_from_vehicle, double travelled_m) {
   Place place{odom_from_vehicle, travelled_m, false};
   for (const Place& earlier : places_) {
-    if (travelled_m - earlier.travelled_m < options_.revisit_gap_m) {
-      break;  // later ones are nearer still
+    if (travelled_m - earlier.travelled_m < kRevisitGap_m) {
+      break;  // later parts were driven even more recently
     }
     const Eigen::Vector3d way = earlier.odom_from_vehicle.translation() - odom_from_vehicle.translation();
-    place.is_revisited = place.is_revisited || way.head<2>().norm() < options_.revisit_radius_m;
+    place.is_revisited = place.is_revisited || way.head<2>().norm() < kRevisitRadius_m;
   }
   if (!places_.empty()) {
     const Place& last = places_.back();
@@ -110,30 +102,30 @@ CameraOutlook CalibrationCoach::cameraOutlook(size_t camera) const {
   const std::vector<MotionPair>& motions = motions_[camera];
   CameraOutlook outlook;
   outlook.name = names_[camera];
-  outlook.hand_eye = solvePlanarHandEye(motions, hand_eye_);
+  outlook.hand_eye = solvePlanarHandEye(motions, hand_eye_, kHandEyeIterations);
   outlook.sigma = Vector6d::Constant(kNaN);
   if (outlook.hand_eye.status != HandEyeStatus::kOk) {
     return outlook;
   }
   outlook.sigma = formulaSigma(outlook.hand_eye);
   Vector6d squares = Vector6d::Zero();
-  for (int group = 0; group < options_.num_groups; ++group) {
+  for (int group = 0; group < kNumGroups; ++group) {
     std::vector<MotionPair> others;
     for (const MotionPair& motion : motions) {
       const double travelled_m = places_[static_cast<size_t>(motion.keyframe)].travelled_m;
-      if (static_cast<int64_t>(travelled_m / options_.segment_m) % options_.num_groups != group) {
+      if (static_cast<int64_t>(travelled_m / kSegment_m) % kNumGroups != group) {
         others.push_back(motion);
       }
     }
-    const HandEye without = solvePlanarHandEye(others, hand_eye_);
+    const HandEye without = solvePlanarHandEye(others, hand_eye_, kHandEyeIterations);
     if (without.status != HandEyeStatus::kOk) {
-      outlook.sigma.setConstant(kNaN);  // it hangs on one part of the drive
+      outlook.sigma.setConstant(kNaN);  // one part of the drive decides
       return outlook;
     }
     squares += differenceOf(outlook.hand_eye.vehicle_from_camera, without.vehicle_from_camera).cwiseAbs2();
   }
-  // The jackknife's variance, times that of Student's t: so few groups know it badly themselves.
-  const double groups = options_.num_groups;
+  // Variance of the jackknife times that of Student's t, for the small number of groups.
+  const double groups = kNumGroups;
   const double factor = (groups - 1.0) / groups * (groups - 1.0) / (groups - 3.0);
   outlook.sigma = outlook.sigma.cwiseMax((factor * squares).cwiseSqrt());
   outlook.sigma[kHeight] = kNaN;
@@ -152,7 +144,7 @@ DriveOutlook CalibrationCoach::outlook() const {
   return outlook;
 }
 
-/// What is known least of a camera, in units of what is enough; infinite where nothing is known.
+/// Largest deviation of a camera over the sufficient one; infinite while unknown.
 double CalibrationCoach::weakness(const CameraOutlook& camera, int* degree_of_freedom) const {
   double worst = 0.0;
   for (int i = 0; i < 6; ++i) {
@@ -192,13 +184,13 @@ void CalibrationCoach::judgeSigmas(DriveOutlook* outlook, std::vector<double>* s
   outlook->missing.push_back(
       "turn tightly to both sides: " +
       (!std::isfinite(sigma)
-           ? "the place of " + who + " cannot be told yet"
-           : who + ", " + names[what] + ", is known to " +
-                 (what < 3 ? toText(100.0 * sigma, 0) + " cm" : toText(kDegrees * sigma, 1) + " degrees") +
-                 " only"));
+           ? "the position of " + who + " is still unknown"
+           : who + ", " + names[what] + ", is known only to " +
+                 (what < 3 ? toText(100.0 * sigma, 0) + " cm" : toText(kDegrees * sigma, 1) + " degrees")));
 }
 
-/// Cameras that do not see come first, since no manoeuvre helps; then turns, way, places, and what is weak.
+/// Requirements in order of importance: blind cameras, which no manoeuvre helps, then turns, distance,
+/// revisits, and uncertain cameras.
 void CalibrationCoach::judge(DriveOutlook* outlook) const {
   std::vector<std::string>& missing = outlook->missing;
   std::vector<double> shares{outlook->distance_m / options_.enough_distance_m,
@@ -209,7 +201,7 @@ void CalibrationCoach::judge(DriveOutlook* outlook) const {
   drive.num_keyframes = num_steps + 1;
   for (const CameraOutlook& camera : outlook->cameras) {
     HandEye hand_eye = camera.hand_eye;
-    if (num_steps >= options_.min_steps && hand_eye.num_motions < options_.min_seen_share * num_steps) {
+    if (num_steps >= options_.min_steps && hand_eye.num_motions < kMinSeenRatio * num_steps) {
       hand_eye.status = HandEyeStatus::kTooFewMotions;
     } else if (hand_eye.status != HandEyeStatus::kNoAgreement) {
       continue;
@@ -232,11 +224,11 @@ void CalibrationCoach::judge(DriveOutlook* outlook) const {
                       " m more");
   }
   if (revisited_m_ < options_.enough_revisited_m) {
-    missing.push_back("come past a place again" +
-                      (places_.empty()
-                           ? ""
-                           : ": where the drive began is " + directionTo(places_.back().odom_from_vehicle,
-                                                                         places_.front().odom_from_vehicle)));
+    missing.push_back(
+        "revisit a place" +
+        (places_.empty() ? ""
+                         : ": the start of the drive is " + directionTo(places_.back().odom_from_vehicle,
+                                                                        places_.front().odom_from_vehicle)));
     shares.push_back(revisited_m_ / options_.enough_revisited_m);
   }
   judgeSigmas(outlook, &shares);

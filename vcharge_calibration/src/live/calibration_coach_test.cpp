@@ -95,7 +95,7 @@ std::vector<Piece> figureOfEight() {
   return {{10.0, 0.0}, {40.0, 2.0 * M_PI}, {40.0, -2.0 * M_PI}, {20.0, 0.0}};
 }
 
-TEST(CalibrationCoachTest, AsksForAllOfAVehicleThatStands) {
+TEST(CalibrationCoachTest, ListsAllRequirementsForAStandingVehicle) {
   const DriveOutlook outlook = CoachedDrive().outlook();
   EXPECT_FALSE(outlook.isEnough());
   EXPECT_EQ(outlook.progress, 0.0);
@@ -104,7 +104,7 @@ TEST(CalibrationCoachTest, AsksForAllOfAVehicleThatStands) {
   EXPECT_TRUE(std::isnan(outlook.cameras[0].sigma[0]));
 }
 
-TEST(CalibrationCoachTest, AsksForTheTurnThatIsMissing) {
+TEST(CalibrationCoachTest, NamesTheMissingTurn) {
   CoachedDrive drive;
   drive.drive({{20.0, 0.0}, {15.0, 90.0 * kDegree}});
   EXPECT_EQ(drive.outlook().next, "turn right, 130 degrees more");
@@ -116,16 +116,16 @@ TEST(CalibrationCoachTest, AsksForTheTurnThatIsMissing) {
   EXPECT_NEAR(drive.outlook().right_turn_rad, 130.0 * kDegree, 1e-9);
 }
 
-TEST(CalibrationCoachTest, SaysWhereTheDriveBeganUntilAPlaceIsPassedAgain) {
+TEST(CalibrationCoachTest, NamesTheStartOfTheDriveUntilARevisit) {
   CoachedDrive drive;
   drive.drive({{30.0, 140.0 * kDegree}, {30.0, -140.0 * kDegree}, {45.0, 0.0}});
   const DriveOutlook outlook = drive.outlook();
-  EXPECT_EQ(outlook.next.find("come past a place again: where the drive began is "), 0U) << outlook.next;
+  EXPECT_EQ(outlook.next.find("revisit a place: the start of the drive is "), 0U) << outlook.next;
   EXPECT_NE(outlook.next.find("behind"), std::string::npos) << outlook.next;
   EXPECT_EQ(outlook.revisited_m, 0.0);
 }
 
-TEST(CalibrationCoachTest, StopsAfterAFigureOfEight) {
+TEST(CalibrationCoachTest, IsSatisfiedByAFigureOfEight) {
   CoachedDrive drive;
   drive.drive(figureOfEight());
   const DriveOutlook outlook = drive.outlook();
@@ -137,7 +137,7 @@ TEST(CalibrationCoachTest, StopsAfterAFigureOfEight) {
   EXPECT_TRUE(std::isnan(outlook.cameras[0].sigma[2])) << "planar motion does not show the height";
 }
 
-TEST(CalibrationCoachTest, ProgressNeverStopsShortOfNorRunsBeyondTheEnd) {
+TEST(CalibrationCoachTest, ProgressReachesOneAtTheEnd) {
   CoachedDrive drive;
   double last = 0.0;
   for (const Piece& piece : figureOfEight()) {
@@ -153,7 +153,7 @@ TEST(CalibrationCoachTest, ProgressNeverStopsShortOfNorRunsBeyondTheEnd) {
   EXPECT_EQ(last, 1.0);
 }
 
-TEST(CalibrationCoachTest, AStraightDriveNeverIsEnough) {
+TEST(CalibrationCoachTest, IsNeverSatisfiedByAStraightDrive) {
   CoachedDrive drive;
   drive.drive({{200.0, 0.0}});
   const DriveOutlook outlook = drive.outlook();
@@ -163,7 +163,7 @@ TEST(CalibrationCoachTest, AStraightDriveNeverIsEnough) {
             "turn tightly to both sides: the place of camera 'left' cannot be told yet");
 }
 
-TEST(CalibrationCoachTest, NamesACameraThatDoesNotSeeBeforeAnyManoeuvre) {
+TEST(CalibrationCoachTest, NamesABlindCameraFirst) {
   CoachedDrive drive;
   drive.sees = false;
   drive.drive(figureOfEight());
@@ -225,9 +225,6 @@ TEST(CalibrationCoachTest, RefusesBadOptionsByName) {
     }
   };
   refuse("enough_turn_rad", [](auto* options) { options->enough_turn_rad = 0.0; });
-  refuse("revisit_gap_m", [](auto* options) { options->revisit_gap_m = options->revisit_radius_m; });
-  refuse("min_seen_share", [](auto* options) { options->min_seen_share = 1.5; });
-  refuse("num_groups", [](auto* options) { options->num_groups = 3; });
 }
 
 }  // namespace

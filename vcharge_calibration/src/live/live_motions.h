@@ -1,15 +1,12 @@
 #pragma once
 
-#include <cstddef>
-
 #include "vcharge_calibration/live/calibration_coach.h"
-#include "vcharge_geometry/robust/robust_options.h"
-#include "vcharge_reconstruction/mapping_state.h"
+#include "vcharge_reconstruction/reconstruction_state.h"
 
 namespace vcharge {
 
-/// Tells a coach of the keyframes of a drive that it does not know yet, and of how the cameras moved between
-/// them: the same motions as estimateCameraMotions() gives of the whole drive.
-void tellCoach(const MappingState& state, const RobustOptions& camera_motion, CalibrationCoach* coach);
+/// Passes new keyframes of a drive to a coach, and the motions of the cameras between them as
+/// estimateCameraMotions() estimates them from the whole drive.
+void updateCoach(const ReconstructionState& state, CalibrationCoach* coach);
 
 }  // namespace vcharge

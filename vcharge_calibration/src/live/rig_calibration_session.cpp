@@ -10,7 +10,10 @@
 namespace vcharge {
 namespace {
 
-/// Thrown through the calibration when it is given up.
+/// Turn after which the coach updates its outlook.
+constexpr double kOutlookTurn_rad = 0.3;
+
+/// Thrown through the calibration when it is abandoned.
 struct Abandoned {};
 
 std::vector<std::string> namesOf(const CameraRig& rig) {
@@ -34,8 +37,8 @@ CameraRig guessOf(const CameraRig& rig, const DriveOutlook& outlook) {
   return guess;
 }
 
-std::vector<std::pair<std::string, int64_t>> countsOf(const MappingState& state) {
-  const SparseMapperReport& report = state.report;
+std::vector<std::pair<std::string, int64_t>> countsOf(const ReconstructionState& state) {
+  const ReconstructionReport& report = state.report;
   return {{"frames", report.num_frames},
           {"keyframes", static_cast<int64_t>(state.data.keyframes.size())},
           {"frames that lack a camera", report.num_incomplete_frames},
@@ -54,21 +57,13 @@ std::string describe(const RigCalibration& result) {
 
 }  // namespace
 
-void RigCalibrationSessionOptions::validate() const {
-  requireField(retry_m >= 0.0, "retry_m", "must not be negative", retry_m);
-  requireField(outlook_m > 0.0, "outlook_m", "must be positive", outlook_m);
-  requireField(outlook_turn_rad > 0.0, "outlook_turn_rad", "must be positive", outlook_turn_rad);
-  requireField(max_keyframes >= 10, "max_keyframes", "must be 10 or more", max_keyframes);
-  validateInner("coach", coach);
-}
-
-/// What follows one drive.
+/// The state of one drive.
 struct RigCalibrationSession::Follower {
   RigCalibrator calibrator;
   CalibrationCoach coach;
   DriveOutlook outlook;
-  std::optional<Keyframe> last_look;  // without images
-  double next_try_m = 0.0;            // to calibrate by itself
+  std::optional<Keyframe> last_outlook;  // of the coach, without images
+  double next_try_m = 0.0;               // distance of the next automatic calibration
 
   Follower(const std::shared_ptr<const CameraRig>& rig, const RigCalibratorOptions& calibrator_options,
            const CalibrationCoachOptions& coach_options)
@@ -76,31 +71,31 @@ struct RigCalibrationSession::Follower {
         coach(namesOf(*rig), calibrator_options.hand_eye, coach_options),
         outlook(coach.outlook()) {}
 
-  bool isTimeToLook(const RigCalibrationSessionOptions& options) const {
+  bool isOutlookDue(const RigCalibrationSessionOptions& options) const {
     const std::vector<Keyframe>& keyframes = calibrator.state().data.keyframes;
     if (keyframes.empty() || keyframes.size() == coach.numKeyframes()) {
       return false;
     }
-    if (!last_look) {
+    if (!last_outlook) {
       return true;
     }
-    const double turn_rad = angleOfRotation(last_look->odom_from_vehicle.rotation().conjugate() *
+    const double turn_rad = angleOfRotation(last_outlook->odom_from_vehicle.rotation().conjugate() *
                                             keyframes.back().odom_from_vehicle.rotation());
-    return keyframes.back().travelled_m - last_look->travelled_m >= options.outlook_m ||
-           turn_rad >= options.outlook_turn_rad;
+    return keyframes.back().travelled_m - last_outlook->travelled_m >= options.outlook_m ||
+           turn_rad >= kOutlookTurn_rad;
   }
 
-  void look(const RobustOptions& camera_motion) {
-    const MappingState& state = calibrator.state();
-    tellCoach(state, camera_motion, &coach);
+  void updateOutlook() {
+    const ReconstructionState& state = calibrator.state();
+    updateCoach(state, &coach);
     outlook = coach.outlook();
-    last_look.emplace();
-    last_look->odom_from_vehicle = state.data.keyframes.back().odom_from_vehicle;
-    last_look->travelled_m = state.data.keyframes.back().travelled_m;
+    last_outlook.emplace();
+    last_outlook->odom_from_vehicle = state.data.keyframes.back().odom_from_vehicle;
+    last_outlook->travelled_m = state.data.keyframes.back().travelled_m;
   }
 };
 
-/// A calibration that runs, or ran.
+/// A calibration that is running or done.
 struct RigCalibrationSession::Job {
   FinishedCalibration work;
   KeyframeImages all_images;
@@ -144,7 +139,7 @@ void RigCalibrationSession::tell(const std::function<void(Status*)>& change) {
 template <class Feed>
 void RigCalibrationSession::follow(const Feed& feed) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const MappingState& state = follower_->calibrator.state();
+  const ReconstructionState& state = follower_->calibrator.state();
   if (state.data.keyframes.size() < static_cast<size_t>(options_.max_keyframes)) {
     feed(&follower_->calibrator);
   }
@@ -152,20 +147,20 @@ void RigCalibrationSession::follow(const Feed& feed) {
     const std::lock_guard<std::mutex> status_lock(status_mutex_);
     status_.counts = countsOf(state);
   }
-  if (follower_->isTimeToLook(options_)) {
-    look();
+  if (follower_->isOutlookDue(options_)) {
+    updateOutlook();
   }
 }
 
-void RigCalibrationSession::look() {
+void RigCalibrationSession::updateOutlook() {
   Follower& follower = *follower_;
-  follower.look(calibrator_options_.camera_motion);
-  const MappingState& state = follower.calibrator.state();
+  follower.updateOutlook();
+  const ReconstructionState& state = follower.calibrator.state();
   on_drive_(state, guessOf(*rig_, follower.outlook));
   tell([&](Status* status) {
     status->outlook = follower.outlook;
     if (status->phase == Phase::kFailed) {
-      status->phase = Phase::kFollowing;  // the drive goes on
+      status->phase = Phase::kFollowing;  // the drive continues
     }
     if (status->phase == Phase::kFollowing) {
       status->message = follower.outlook.next;
@@ -196,12 +191,12 @@ bool RigCalibrationSession::calibrate(std::string* message) {
 
 bool RigCalibrationSession::begin(bool flushes, std::string* message) {
   if (job_ && !job_->is_done) {
-    *message = job_->is_abandoned ? "the calibration that was given up is just ending: try again"
-                                  : "it is being calibrated: " + status().message;
+    *message = job_->is_abandoned ? "the abandoned calibration is still ending: try again"
+                                  : "already calibrating: " + status().message;
     return false;
   }
   if (worker_.joinable()) {
-    worker_.join();  // it has returned, or is about to
+    worker_.join();  // it has returned or is about to
   }
   job_ = std::make_shared<Job>();
   if (flushes) {
@@ -210,7 +205,7 @@ bool RigCalibrationSession::begin(bool flushes, std::string* message) {
   job_->work.state = follower_->calibrator.state();
   job_->work.images = follower_->calibrator.images();
   job_->all_images = follower_->calibrator.allImages();
-  *message = "calibrating by " + std::to_string(job_->work.state.data.keyframes.size()) + " keyframes";
+  *message = "calibrating from " + std::to_string(job_->work.state.data.keyframes.size()) + " keyframes";
   tell([&](Status* status) {
     status->phase = Phase::kCalibrating;
     status->message = *message;
@@ -223,7 +218,7 @@ bool RigCalibrationSession::begin(bool flushes, std::string* message) {
 void RigCalibrationSession::run(const std::shared_ptr<Job>& job) {
   const auto tellOfJob = [&](const std::function<void(Status*)>& change) {
     tell([&](Status* status) {
-      if (!job->is_abandoned) {  // otherwise the status is that of another drive
+      if (!job->is_abandoned) {  // otherwise the status belongs to another drive
         change(status);
       }
     });
@@ -251,7 +246,7 @@ void RigCalibrationSession::run(const std::shared_ptr<Job>& job) {
     message = describe(job->work.result);
     phase = job->work.result.verdict == Verdict::kFail ? Phase::kFailed : Phase::kCalibrated;
   } catch (const Abandoned&) {
-    message = "given up";
+    message = "abandoned";
   } catch (const std::exception& error) {
     message = error.what();
   }
@@ -261,7 +256,7 @@ void RigCalibrationSession::run(const std::shared_ptr<Job>& job) {
     status->progress = 1.0;
     status->result = std::make_shared<const RigCalibration>(job->work.result);
   });
-  job->work.state = MappingState();
+  job->work.state = ReconstructionState();
   job->is_done = true;
 }
 

@@ -33,7 +33,7 @@ std::shared_ptr<const CameraRig> oneCamera() {
   return std::make_shared<const CameraRig>(rig);
 }
 
-/// A session without images: all its calibrations fail, at once.
+/// A session without images, whose calibrations fail at once.
 class RigCalibrationSessionTest : public testing::Test {
  protected:
   std::unique_ptr<RigCalibrationSession> makeSession(
@@ -41,7 +41,7 @@ class RigCalibrationSessionTest : public testing::Test {
     return std::make_unique<RigCalibrationSession>(
         oneCamera(), RigCalibratorOptions(), options,
         [this](const RigCalibrationSession::Status& /*status*/) { ++num_told_; },
-        [](const MappingState& /*state*/, const CameraRig& /*guess*/) {},
+        [](const ReconstructionState& /*state*/, const CameraRig& /*guess*/) {},
         [this](const FinishedCalibration& work) { on_result_(work); });
   }
 
@@ -53,7 +53,7 @@ class RigCalibrationSessionTest : public testing::Test {
     return session.status().phase;
   }
 
-  /// Until what ran before lets it.
+  /// Retries until the previous calibration has ended.
   static bool beginToCalibrate(RigCalibrationSession* session) {
     std::string message;
     for (int i = 0; i < 1000; ++i) {
@@ -69,7 +69,7 @@ class RigCalibrationSessionTest : public testing::Test {
   std::atomic<int> num_told_{0};
 };
 
-TEST_F(RigCalibrationSessionTest, FailsWithTheReasonLivesOnAndBeginsAnew) {
+TEST_F(RigCalibrationSessionTest, FailsWithTheReasonAndStartsAgain) {
   std::atomic<int> num_results{0};
   on_result_ = [&](const FinishedCalibration& work) {
     EXPECT_EQ(work.result.verdict, Verdict::kFail);
@@ -81,7 +81,7 @@ TEST_F(RigCalibrationSessionTest, FailsWithTheReasonLivesOnAndBeginsAnew) {
   for (int i = 1; i <= 2; ++i) {
     ASSERT_TRUE(beginToCalibrate(session.get()));
     EXPECT_EQ(waitForEnd(*session), Phase::kFailed);
-    EXPECT_EQ(session->status().message, "FAIL; no images came with the drive");
+    EXPECT_EQ(session->status().message, "FAIL; no images in the drive");
     ASSERT_NE(session->status().result, nullptr);
     EXPECT_EQ(num_results, i);
   }
@@ -92,7 +92,7 @@ TEST_F(RigCalibrationSessionTest, FailsWithTheReasonLivesOnAndBeginsAnew) {
   EXPECT_GT(num_told_, 4);
 }
 
-TEST_F(RigCalibrationSessionTest, AResultThatCannotBeWrittenIsAFailureWithItsText) {
+TEST_F(RigCalibrationSessionTest, FailsWhereTheResultCannotBeWritten) {
   on_result_ = [](const FinishedCalibration& /*work*/) { throw InputError("rig.yaml: no space left"); };
   const auto session = makeSession();
   ASSERT_TRUE(beginToCalibrate(session.get()));
@@ -100,7 +100,7 @@ TEST_F(RigCalibrationSessionTest, AResultThatCannotBeWrittenIsAFailureWithItsTex
   EXPECT_EQ(session->status().message, "rig.yaml: no space left");
 }
 
-TEST_F(RigCalibrationSessionTest, ADriveThatIsForgottenTellsNothingMore) {
+TEST_F(RigCalibrationSessionTest, ReportsNothingOfAnAbandonedDrive) {
   std::promise<void> begun, may_go_on;
   std::atomic<bool> is_first{true};
   on_result_ = [&](const FinishedCalibration& /*work*/) {
@@ -114,16 +114,16 @@ TEST_F(RigCalibrationSessionTest, ADriveThatIsForgottenTellsNothingMore) {
   ASSERT_TRUE(session->calibrate(&message));
   begun.get_future().wait();
   EXPECT_FALSE(session->calibrate(&message));
-  EXPECT_EQ(message.find("it is being calibrated"), 0U) << message;
+  EXPECT_EQ(message.find("already calibrating"), 0U) << message;
   session->reset();
   EXPECT_FALSE(session->calibrate(&message));
-  EXPECT_NE(message.find("given up"), std::string::npos) << message;
+  EXPECT_NE(message.find("abandoned"), std::string::npos) << message;
   may_go_on.set_value();
   ASSERT_TRUE(beginToCalibrate(session.get())) << "the new drive";
   EXPECT_EQ(waitForEnd(*session), Phase::kFailed);
 }
 
-TEST_F(RigCalibrationSessionTest, EndsWhileItCalibrates) {
+TEST_F(RigCalibrationSessionTest, EndsDuringACalibration) {
   const auto session = makeSession();
   std::string message;
   EXPECT_TRUE(session->calibrate(&message));

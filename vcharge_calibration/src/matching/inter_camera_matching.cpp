@@ -8,34 +8,61 @@
 
 #include <tbb/parallel_for.h>
 
+#include "vcharge_features/patch_tracker.h"
+#include "vcharge_features/rectified_view.h"
+
 namespace vcharge {
 namespace {
 
-/// Where a camera saw a landmark.
-struct Sighting {
+/// Views per keyframe, those with most common landmarks.
+constexpr size_t kNumViews = 2;
+/// Largest differences of directions and ranges between two views of a landmark.
+constexpr double kMaxViewAngle_rad = 0.5;
+constexpr double kMaxRangeRatio = 1.5;
+/// Largest distance in the rectified view from the predicted position.
+constexpr double kMaxShift_px = 8.0;
+
+RectifiedViewCacheOptions smallViews() {
+  RectifiedViewCacheOptions options;
+  options.view.width_px = 640;
+  options.view.height_px = 480;
+  return options;
+}
+
+PatchTrackerOptions patchOptions() {
+  PatchTrackerOptions options;
+  options.window_px = 15;
+  options.num_levels = 2;
+  options.max_forward_backward_px = 0.3;
+  return options;
+}
+
+/// Observation of a landmark in the image of a keyframe.
+struct LandmarkPixel {
   int32_t track = 0;
   Eigen::Vector2d position_px = Eigen::Vector2d::Zero();
 };
 
-/// A landmark that was found.
+/// A match of a landmark in the image of another camera.
 struct Found {
   int32_t keyframe = 0, camera = 0, track = 0;
   Eigen::Vector2d position_px = Eigen::Vector2d::Zero();
 };
 
-/// One camera's landmarks in the images of another.
+/// Searches for the landmarks of one camera in the images of another.
 class NeighbourSearch {
  public:
-  NeighbourSearch(const InterCameraOptions& options, const KeyframeImages& images, const MappingData& data,
-                  const std::vector<std::vector<Sighting>>& sightings, size_t first, size_t second)
+  NeighbourSearch(const InterCameraOptions& options, const KeyframeImages& images,
+                  const ReconstructionData& data, const std::vector<std::vector<LandmarkPixel>>& observations,
+                  size_t first, size_t second)
       : options_(options),
         images_(images),
         data_(data),
-        sightings_(sightings),
+        observations_(observations),
         first_(first),
         second_(second),
-        cache_(data.rig, options.views),
-        tracker_(options.patches) {}
+        cache_(data.rig, smallViews()),
+        tracker_(patchOptions()) {}
 
   std::vector<Found> run() {
     for (size_t k = 0; k < data_.keyframes.size(); k += static_cast<size_t>(options_.keyframe_step)) {
@@ -47,14 +74,14 @@ class NeighbourSearch {
   }
 
  private:
-  /// A keyframe, and what the first camera saw there that the second should see now.
+  /// An earlier keyframe, and the landmarks of its first camera that the second one should see now.
   struct HistoryView {
     size_t keyframe = 0;
-    std::vector<Sighting> common;
+    std::vector<LandmarkPixel> common;
   };
 
-  const std::vector<Sighting>& sightingsAt(size_t keyframe, size_t camera) const {
-    return sightings_[keyframe * data_.rig->cameras.size() + camera];
+  const std::vector<LandmarkPixel>& observationsAt(size_t keyframe, size_t camera) const {
+    return observations_[keyframe * data_.rig->cameras.size() + camera];
   }
 
   RigidTransform cameraFromMap(size_t keyframe, size_t camera) const {
@@ -62,7 +89,8 @@ class NeighbourSearch {
         .inverse();
   }
 
-  /// Keyframes at which the first camera saw most of what the second should see at `k`, the latest of equals.
+  /// Keyframes whose first camera observes most landmarks that the second should see at `k`; the latest
+  /// first.
   std::vector<HistoryView> chooseHistory(size_t k) const {
     std::vector<HistoryView> views;
     const Keyframe& now = data_.keyframes[k];
@@ -72,7 +100,7 @@ class NeighbourSearch {
       if (now.travelled_m - data_.keyframes[h].travelled_m > options_.history_m) {
         break;
       }
-      HistoryView view{h, commonSightings(h, k)};
+      HistoryView view{h, commonLandmarks(h, k)};
       if (view.common.size() >= static_cast<size_t>(options_.min_overlap)) {
         views.push_back(std::move(view));
       }
@@ -80,27 +108,27 @@ class NeighbourSearch {
     std::stable_sort(views.begin(), views.end(), [](const HistoryView& a, const HistoryView& b) {
       return a.common.size() > b.common.size();
     });
-    views.resize(std::min(views.size(), static_cast<size_t>(options_.num_views)));
+    views.resize(std::min(views.size(), kNumViews));
     return views;
   }
 
-  /// The first camera's landmarks at `earlier` that the second should see at `k`, from nearly the same side.
-  std::vector<Sighting> commonSightings(size_t earlier, size_t k) const {
+  /// Landmarks of the first camera at `earlier` that the second should see at `k` from a similar direction.
+  std::vector<LandmarkPixel> commonLandmarks(size_t earlier, size_t k) const {
     const RigCamera& camera = data_.rig->cameras[second_];
     const RigidTransform camera_from_map = cameraFromMap(k, second_);
     const Eigen::Vector3d here = camera_from_map.inverse().translation();
     const Eigen::Vector3d there = cameraFromMap(earlier, first_).inverse().translation();
-    const double min_cos_angle = std::cos(options_.max_view_angle_rad);
+    const double min_cos_angle = std::cos(kMaxViewAngle_rad);
     const double min_cos_field = std::cos(0.5 * camera.field_of_view_rad);
-    std::vector<Sighting> common;
-    for (const Sighting& sighting : sightingsAt(earlier, first_)) {
-      const Eigen::Vector3d& point = *data_.tracks[sighting.track].position_m;
+    std::vector<LandmarkPixel> common;
+    for (const LandmarkPixel& observation : observationsAt(earlier, first_)) {
+      const Eigen::Vector3d& point = *data_.tracks[observation.track].position_m;
       const double range = (point - here).norm(), other_range = (point - there).norm();
       const Eigen::Vector3d in_camera = camera_from_map * point;
-      if (range < options_.max_range_ratio * other_range && other_range < options_.max_range_ratio * range &&
+      if (range < kMaxRangeRatio * other_range && other_range < kMaxRangeRatio * range &&
           (point - here).dot(point - there) > min_cos_angle * range * other_range &&
           in_camera.z() > min_cos_field * range) {
-        common.push_back(sighting);
+        common.push_back(observation);
       }
     }
     return common;
@@ -137,15 +165,16 @@ class NeighbourSearch {
     std::vector<int32_t> tracks;
     std::vector<cv::Point2f> seen_px, expected_px;
     const RigidTransform second_from_map = cameraFromMap(k, second_);
-    for (const Sighting& sighting : earlier.common) {
+    for (const LandmarkPixel& observation : earlier.common) {
       Eigen::Vector3d ray;
-      if (!data_.rig->cameras[first_].model.unproject(sighting.position_px, &ray)) {
+      if (!data_.rig->cameras[first_].model.unproject(observation.position_px, &ray)) {
         continue;
       }
       const auto seen = toView(*pair->first, ray);
-      const auto expected = toView(*pair->second, second_from_map * *data_.tracks[sighting.track].position_m);
+      const auto expected =
+          toView(*pair->second, second_from_map * *data_.tracks[observation.track].position_m);
       if (seen && expected) {
-        tracks.push_back(sighting.track);
+        tracks.push_back(observation.track);
         seen_px.push_back(*seen);
         expected_px.push_back(*expected);
       }
@@ -156,15 +185,14 @@ class NeighbourSearch {
     const ImagePyramid first_view = viewOf(*pair->first, earlier.keyframe, first_);
     const ImagePyramid second_view = viewOf(*pair->second, k, second_);
     if (first_view.levels.empty() || second_view.levels.empty()) {
-      return;  // a camera sent no image
+      return;  // an image is missing
     }
     const std::vector<TrackedPoint> points =
         tracker_.track(first_view, second_view, seen_px, pair->second->validMask(), expected_px);
     for (size_t i = 0; i < points.size(); ++i) {
       const cv::Point2f shift = points[i].position_px - expected_px[i];
       Eigen::Vector2d sensor_px;
-      if (points[i].status == TrackStatus::kTracked &&
-          std::hypot(shift.x, shift.y) <= options_.max_shift_px &&
+      if (points[i].status == TrackStatus::kTracked && std::hypot(shift.x, shift.y) <= kMaxShift_px &&
           pair->second->toSensor({points[i].position_px.x, points[i].position_px.y}, &sensor_px)) {
         found_.push_back({static_cast<int32_t>(k), static_cast<int32_t>(second_), tracks[i], sensor_px});
       }
@@ -173,15 +201,15 @@ class NeighbourSearch {
 
   const InterCameraOptions& options_;
   const KeyframeImages& images_;
-  const MappingData& data_;
-  const std::vector<std::vector<Sighting>>& sightings_;
+  const ReconstructionData& data_;
+  const std::vector<std::vector<LandmarkPixel>>& observations_;
   const size_t first_, second_;
   RectifiedViewCache cache_;
   const PatchTracker tracker_;
   std::vector<Found> found_;
 };
 
-/// Ordered pairs of cameras that are neighbours by the direction in which they look.
+/// Ordered pairs of cameras with neighbouring viewing directions.
 std::vector<std::pair<size_t, size_t>> neighboursOf(const CameraRig& rig) {
   std::vector<std::pair<double, size_t>> by_yaw;
   for (size_t i = 0; i < rig.cameras.size(); ++i) {
@@ -210,50 +238,23 @@ bool isSeenAt(const Track& track, int32_t keyframe, int32_t camera) {
 
 }  // namespace
 
-RectifiedViewCacheOptions InterCameraOptions::smallViews() {
-  RectifiedViewCacheOptions options;
-  options.view.width_px = 640;
-  options.view.height_px = 480;
-  return options;
-}
-
-PatchTrackerOptions InterCameraOptions::singleLevelPatches() {
-  PatchTrackerOptions options;
-  options.window_px = 15;
-  options.num_levels = 2;
-  options.max_forward_backward_px = 0.3;
-  return options;
-}
-
-void InterCameraOptions::validate() const {
-  requireField(history_m >= 0.0, "history_m", "must not be negative", history_m);
-  requireField(num_views >= 1, "num_views", "must be 1 or more", num_views);
-  requireField(keyframe_step >= 1, "keyframe_step", "must be 1 or more", keyframe_step);
-  requireField(min_overlap >= 1, "min_overlap", "must be 1 or more", min_overlap);
-  requireField(max_view_angle_rad > 0.0, "max_view_angle_rad", "must be positive", max_view_angle_rad);
-  requireField(max_range_ratio >= 1.0, "max_range_ratio", "must be 1 or more", max_range_ratio);
-  requireField(max_shift_px > 0.0, "max_shift_px", "must be positive", max_shift_px);
-  requireField(sigma_px > 0.0, "sigma_px", "must be positive", sigma_px);
-  validateInner("views", views);
-  validateInner("patches", patches);
-}
-
 int64_t matchBetweenCameras(const InterCameraOptions& options, const KeyframeImages& images,
-                            MappingData* data) {
-  std::vector<std::vector<Sighting>> sightings(data->keyframes.size() * data->rig->cameras.size());
+                            ReconstructionData* data) {
+  std::vector<std::vector<LandmarkPixel>> observations(data->keyframes.size() * data->rig->cameras.size());
   for (size_t t = 0; t < data->tracks.size(); ++t) {
     if (!data->tracks[t].position_m) {
       continue;
     }
     for (const TrackObservation& o : data->tracks[t].observations) {
-      sightings[static_cast<size_t>(o.keyframe) * data->rig->cameras.size() + static_cast<size_t>(o.camera)]
+      observations[static_cast<size_t>(o.keyframe) * data->rig->cameras.size() +
+                   static_cast<size_t>(o.camera)]
           .push_back({static_cast<int32_t>(t), o.position_px});
     }
   }
   const std::vector<std::pair<size_t, size_t>> pairs = neighboursOf(*data->rig);
   std::vector<std::vector<Found>> found(pairs.size());
   tbb::parallel_for(size_t{0}, pairs.size(), [&](size_t i) {
-    found[i] = NeighbourSearch(options, images, *data, sightings, pairs[i].first, pairs[i].second).run();
+    found[i] = NeighbourSearch(options, images, *data, observations, pairs[i].first, pairs[i].second).run();
   });
   int64_t num_added = 0;
   for (const std::vector<Found>& of_pair : found) {

@@ -4,15 +4,15 @@
 
 #include "vcharge_calibration/matching/inter_camera_options.h"
 #include "vcharge_calibration/matching/keyframe_images.h"
-#include "vcharge_reconstruction/mapping_data.h"
+#include "vcharge_reconstruction/reconstruction_data.h"
 
 namespace vcharge {
 
-/// Looks for the landmarks that a camera saw in the images of its neighbours, now and within the next metres
-/// (paper, section Inter-Camera Feature Matching): both images are rectified to the average rotation of the
-/// two cameras, where the same patch looks alike, and the patch is aligned from where the rig and the poses
-/// put it. Adds the observations to the tracks; gives their number. Data parallel, deterministic.
+/// Searches for the landmarks of each camera in the images of its neighbours within the next metres (paper,
+/// section Inter-Camera Feature Matching): both images are rectified to the mean rotation of the two cameras,
+/// where patches look alike, and the patch is aligned from its predicted position. Adds the observations to
+/// the tracks and returns their number. Data parallel, deterministic.
 int64_t matchBetweenCameras(const InterCameraOptions& options, const KeyframeImages& images,
-                            MappingData* data);
+                            ReconstructionData* data);
 
 }  // namespace vcharge

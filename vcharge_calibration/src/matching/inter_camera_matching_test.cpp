@@ -1,4 +1,4 @@
-// Two cameras before a textured wall: what one of them sees is found in the other's image.
+// Two cameras before a textured wall: landmarks of one are found in the image of the other.
 #include "matching/inter_camera_matching.h"
 
 #include <memory>
@@ -19,7 +19,7 @@ InterCameraOptions makeOptions() {
   return options;
 }
 
-TEST(InterCameraMatchingTest, FindsWhatTheNeighbourSawNowAndBefore) {
+TEST(InterCameraMatchingTest, FindsLandmarksOfTheNeighbour) {
   WallScene scene;
   const int64_t num_found = matchBetweenCameras(makeOptions(), scene.images, &scene.data);
   EXPECT_GT(num_found, 60);
@@ -46,7 +46,7 @@ TEST(InterCameraMatchingTest, FindsWhatTheNeighbourSawNowAndBefore) {
   }
 }
 
-TEST(InterCameraMatchingTest, FindsThemWhereTheRigIsSomewhatWrong) {
+TEST(InterCameraMatchingTest, FindsLandmarksWithAnInaccurateRig) {
   WallScene scene;
   const auto truth = scene.data.rig;
   auto wrong = std::make_shared<CameraRig>(*truth);
@@ -64,11 +64,11 @@ TEST(InterCameraMatchingTest, FindsThemWhereTheRigIsSomewhatWrong) {
       errors_px.push_back(observation.camera == 1 ? (observation.position_px - pixel).norm() : 0.0);
     }
   }
-  // Expected they were 1.5 pixels and more aside.
+  // The predictions were wrong by 1.5 pixels and more.
   EXPECT_LT(quantile(errors_px, 0.9), 0.8);
 }
 
-TEST(InterCameraMatchingTest, MissingImagesAndOneCameraAreBorne) {
+TEST(InterCameraMatchingTest, HandlesMissingImagesAndASingleCamera) {
   WallScene scene;
   EXPECT_EQ(matchBetweenCameras(makeOptions(), KeyframeImages::ofAllKeyframes(), &scene.data), 0);
   auto one = std::make_shared<CameraRig>();

@@ -10,21 +10,34 @@
 #include <tbb/parallel_for.h>
 #include <Eigen/Geometry>
 
+#include "vcharge_features/patch_alignment.h"
+
 namespace vcharge {
 namespace {
 
-/// A landmark this near to the vehicle's ground is on it.
+/// Largest distance of an aligned position from the observed one.
+constexpr double kMaxShift_px = 2.0;
+
+PatchAlignmentOptions patchOptions() {
+  PatchAlignmentOptions options;
+  options.shape_sigma = 0.2;  // surfaces have any slant
+  options.min_correlation = 0.8;
+  return options;
+}
+
+/// Height below which a landmark is on the ground.
 constexpr double kMaxGroundHeight_m = 0.05;
 
 struct LandmarkPatch {
   const TrackObservation* source = nullptr;
-  cv::Mat image;  // cut out around the source
+  cv::Mat image;  // part of the image around the source
   Eigen::Vector2d anchor_px = Eigen::Vector2d::Zero();
 };
 
 class LandmarkAlignment {
  public:
-  LandmarkAlignment(const LandmarkAlignmentOptions& options, const KeyframeImages& images, MappingData* data)
+  LandmarkAlignment(const LandmarkAlignmentOptions& options, const KeyframeImages& images,
+                    ReconstructionData* data)
       : options_(options),
         images_(images),
         data_(*data),
@@ -40,7 +53,7 @@ class LandmarkAlignment {
   }
 
  private:
-  using Sighting = std::pair<size_t, TrackObservation*>;  // track, what was seen of it
+  using TrackedObservation = std::pair<size_t, TrackObservation*>;  // track and its observation
 
   size_t imageOf(const TrackObservation& seen) const {
     return static_cast<size_t>(seen.keyframe) * data_.rig->cameras.size() + static_cast<size_t>(seen.camera);
@@ -60,7 +73,7 @@ class LandmarkAlignment {
     return images_.image(static_cast<int32_t>(image / num_cameras), image % num_cameras);
   }
 
-  /// From the middle of the distances others differ least.
+  /// Chooses the observation of median range: the others differ least from it.
   void choosePatches() {
     for (size_t t = 0; t < data_.tracks.size(); ++t) {
       Track& track = data_.tracks[t];
@@ -88,9 +101,9 @@ class LandmarkAlignment {
         image = imageAt(image_index);
       }
       if (image.empty()) {
-        return;  // not kept
+        return;  // the image is not available
       }
-      const int reach_px = options_.patches.radius_px + 4;
+      const int reach_px = patch_options_.radius_px + 4;
       const cv::Point middle(static_cast<int>(std::lround(seen->position_px.x())),
                              static_cast<int>(std::lround(seen->position_px.y())));
       const cv::Rect around =
@@ -114,10 +127,10 @@ class LandmarkAlignment {
       }
       const std::optional<Eigen::Matrix2d> shape =
           expectedShape(*data_.tracks[track].position_m, *patch.source, *seen);
-      const auto place = shape ? alignPatch(patch.image, image, patch.anchor_px, {seen->position_px, *shape},
-                                            options_.patches)
-                               : std::nullopt;
-      if (place && (place->position_px - seen->position_px).norm() <= options_.max_shift_px) {
+      const auto place =
+          shape ? alignPatch(patch.image, image, patch.anchor_px, {seen->position_px, *shape}, patch_options_)
+                : std::nullopt;
+      if (place && (place->position_px - seen->position_px).norm() <= kMaxShift_px) {
         seen->position_px = place->position_px;
         seen->sigma_px = options_.sigma_px;
         ++num_aligned;
@@ -128,8 +141,8 @@ class LandmarkAlignment {
     return num_aligned;
   }
 
-  /// How pixels around the landmark in the source's image move in the other: on the ground, or else on a
-  /// surface that faces the source.
+  /// Warp of the pixels around the landmark from the source to another image, for a landmark on the ground,
+  /// or else on a surface that faces the source.
   std::optional<Eigen::Matrix2d> expectedShape(const Eigen::Vector3d& point_m, const TrackObservation& source,
                                                const TrackObservation& seen) const {
     const RigidTransform map_from_source = mapFromCamera(source);
@@ -167,30 +180,17 @@ class LandmarkAlignment {
   }
 
   const LandmarkAlignmentOptions& options_;
+  const PatchAlignmentOptions patch_options_ = patchOptions();
   const KeyframeImages& images_;
-  MappingData& data_;
-  std::vector<LandmarkPatch> patches_;       // by track
-  std::vector<std::vector<Sighting>> seen_;  // by image
+  ReconstructionData& data_;
+  std::vector<LandmarkPatch> patches_;                 // by track
+  std::vector<std::vector<TrackedObservation>> seen_;  // by image
 };
 
 }  // namespace
 
-PatchAlignmentOptions LandmarkAlignmentOptions::uncertainShapes() {
-  PatchAlignmentOptions options;
-  options.shape_sigma = 0.2;  // the surface may have any slant
-  options.min_correlation = 0.8;
-  return options;
-}
-
-void LandmarkAlignmentOptions::validate() const {
-  requireField(max_shift_px > 0.0, "max_shift_px", "must be positive", max_shift_px);
-  requireField(sigma_px > 0.0, "sigma_px", "must be positive", sigma_px);
-  requireField(unaligned_sigma_px > 0.0, "unaligned_sigma_px", "must be positive", unaligned_sigma_px);
-  validateInner("patches", patches);
-}
-
 int64_t alignLandmarks(const LandmarkAlignmentOptions& options, const KeyframeImages& images,
-                       MappingData* data) {
+                       ReconstructionData* data) {
   return LandmarkAlignment(options, images, data).run();
 }
 

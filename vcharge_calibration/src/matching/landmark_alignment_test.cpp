@@ -1,4 +1,4 @@
-// What two cameras saw of a wall, each time of a slightly different point, becomes observations of one point.
+// Observations of slightly different points of a wall are aligned with one point.
 #include "matching/landmark_alignment.h"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kError_px = 0.7;
 
-/// The landmarks as every camera sees them at every keyframe, each time up to kError_px aside.
+/// Observations of all cameras and keyframes with errors up to kError_px.
 WallScene makeScene() {
   WallScene scene;
   std::mt19937 generator(5);
@@ -36,8 +36,7 @@ WallScene makeScene() {
   return scene;
 }
 
-/// Distances between where a camera saw a landmark at one keyframe and at the next, less what the motion
-/// explains.
+/// Differences of a landmark's positions at consecutive keyframes, without the part of the motion.
 std::vector<double> differencesOf(const WallScene& scene) {
   std::vector<double> differences_px;
   for (const Track& track : scene.data.tracks) {
@@ -63,12 +62,12 @@ size_t numObservations(const WallScene& scene) {
   return number;
 }
 
-TEST(LandmarkAlignmentTest, AllSightingsBecomeOfOnePoint) {
+TEST(LandmarkAlignmentTest, AlignsAllObservationsWithOnePoint) {
   WallScene scene = makeScene();
   ASSERT_GT(quantile(differencesOf(scene), 0.5), 0.6);
   const int64_t num_aligned = alignLandmarks(LandmarkAlignmentOptions(), scene.images, &scene.data);
   EXPECT_GT(num_aligned, 0.7 * static_cast<double>(numObservations(scene)));
-  // Nearer, the same is larger: a point 0.7 pixels aside at first is 0.1 further aside at the last keyframe.
+  // Errors grow with the scale: 0.7 pixels at first are 0.1 more at the last keyframe.
   EXPECT_LT(quantile(differencesOf(scene), 0.5), 0.1);
   EXPECT_LT(quantile(differencesOf(scene), 0.9), 0.25);
   for (const Track& track : scene.data.tracks) {
@@ -78,7 +77,7 @@ TEST(LandmarkAlignmentTest, AllSightingsBecomeOfOnePoint) {
   }
 }
 
-TEST(LandmarkAlignmentTest, ADistractedSightingIsNotMovedButWeighsLess) {
+TEST(LandmarkAlignmentTest, LeavesAWrongObservationWithLessWeight) {
   WallScene scene = makeScene();
   Track& track = *std::find_if(scene.data.tracks.begin(), scene.data.tracks.end(),
                                [](const Track& t) { return t.observations.size() == 6; });
@@ -90,7 +89,7 @@ TEST(LandmarkAlignmentTest, ADistractedSightingIsNotMovedButWeighsLess) {
   EXPECT_EQ(last.sigma_px, 0.8);
 }
 
-TEST(LandmarkAlignmentTest, WithoutImagesNothingMoves) {
+TEST(LandmarkAlignmentTest, ChangesNothingWithoutImages) {
   WallScene scene = makeScene();
   const std::vector<double> before_px = differencesOf(scene);
   EXPECT_EQ(alignLandmarks(LandmarkAlignmentOptions(), KeyframeImages::ofAllKeyframes(), &scene.data), 0);

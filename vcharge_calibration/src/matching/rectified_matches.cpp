@@ -18,22 +18,22 @@ namespace {
 const cv::Size kViewSize_px(560, 420);
 constexpr double kFocal_px = 230.0;  // 101 degrees across
 constexpr size_t kMaxLines = 60;
-constexpr size_t kMaxCandidates = 8;  // per pair of cameras, whose views are looked at
+constexpr size_t kMaxCandidates = 8;  // per pair of cameras
 
 using CameraPair = std::pair<int32_t, int32_t>;
 using KeyframePair = std::pair<int32_t, int32_t>;
 
-RigidTransform mapFromCamera(const MappingData& data, int32_t keyframe, size_t camera) {
+RigidTransform mapFromCamera(const ReconstructionData& data, int32_t keyframe, size_t camera) {
   return data.keyframes[static_cast<size_t>(keyframe)].map_from_vehicle *
          *data.rig->cameras[camera].vehicle_from_camera;
 }
 
-/// The views of a pair: what a camera's view is turned by.
+/// Rotations of the cameras to the rectified views of a pair.
 struct Rectification {
   Eigen::Matrix3d first_from_view, second_from_view;
 };
 
-Rectification rectify(const MappingData& data, const CameraPairView& pair) {
+Rectification rectify(const ReconstructionData& data, const CameraPairView& pair) {
   const Eigen::Quaterniond first = mapFromCamera(data, pair.first_keyframe, pair.first_camera).rotation();
   const Eigen::Quaterniond second = mapFromCamera(data, pair.second_keyframe, pair.second_camera).rotation();
   const Eigen::Quaterniond average = first.slerp(0.5, second);
@@ -41,7 +41,7 @@ Rectification rectify(const MappingData& data, const CameraPairView& pair) {
           (second.conjugate() * average).toRotationMatrix()};
 }
 
-/// Where an observation is in its camera's rectified view; empty outside of it.
+/// Position of an observation in its rectified view; empty outside of it.
 std::optional<cv::Point2d> inView(const CameraModel& model, const Eigen::Vector2d& position_px,
                                   const Eigen::Matrix3d& camera_from_view) {
   Eigen::Vector3d ray;
@@ -67,7 +67,7 @@ const TrackObservation* findObservation(const Track& track, int32_t keyframe, si
   return nullptr;
 }
 
-std::optional<ViewMatch> matchOf(const MappingData& data, const CameraPairView& pair,
+std::optional<ViewMatch> matchOf(const ReconstructionData& data, const CameraPairView& pair,
                                  const Rectification& views, const Track& track) {
   const TrackObservation* first = findObservation(track, pair.first_keyframe, pair.first_camera);
   const TrackObservation* second = findObservation(track, pair.second_keyframe, pair.second_camera);
@@ -81,8 +81,8 @@ std::optional<ViewMatch> matchOf(const MappingData& data, const CameraPairView& 
   return at_first && at_second ? std::make_optional(ViewMatch{*at_first, *at_second}) : std::nullopt;
 }
 
-/// Landmarks that two cameras share, by keyframes at which there are images.
-std::map<CameraPair, std::map<KeyframePair, int>> countShared(const MappingData& data,
+/// Common landmarks of two cameras, by keyframes with images.
+std::map<CameraPair, std::map<KeyframePair, int>> countShared(const ReconstructionData& data,
                                                               const KeyframeImages& images) {
   std::vector<bool> has_image(data.keyframes.size(), false);
   for (const int32_t keyframe : images.keyframes()) {
@@ -110,7 +110,7 @@ std::map<CameraPair, std::map<KeyframePair, int>> countShared(const MappingData&
   return counts;
 }
 
-cv::Mat viewOf(const MappingData& data, const KeyframeImages& images, int32_t keyframe, size_t camera,
+cv::Mat viewOf(const ReconstructionData& data, const KeyframeImages& images, int32_t keyframe, size_t camera,
                const Eigen::Matrix3d& camera_from_view) {
   const cv::Mat image = images.image(keyframe, camera);
   cv::Mat view;
@@ -121,7 +121,8 @@ cv::Mat viewOf(const MappingData& data, const KeyframeImages& images, int32_t ke
 
 }  // namespace
 
-std::vector<CameraPairView> findCameraPairViews(const MappingData& data, const KeyframeImages& images) {
+std::vector<CameraPairView> findCameraPairViews(const ReconstructionData& data,
+                                                const KeyframeImages& images) {
   std::vector<CameraPairView> found;
   for (const auto& [cameras, by_keyframes] : countShared(data, images)) {
     std::vector<std::pair<KeyframePair, int>> candidates(by_keyframes.begin(), by_keyframes.end());
@@ -153,7 +154,7 @@ std::vector<CameraPairView> findCameraPairViews(const MappingData& data, const K
   return found;
 }
 
-std::vector<ViewMatch> matchesInViews(const MappingData& data, const CameraPairView& pair) {
+std::vector<ViewMatch> matchesInViews(const ReconstructionData& data, const CameraPairView& pair) {
   const Rectification views = rectify(data, pair);
   std::vector<ViewMatch> matches;
   for (const int32_t track : pair.tracks) {
@@ -164,7 +165,7 @@ std::vector<ViewMatch> matchesInViews(const MappingData& data, const CameraPairV
   return matches;
 }
 
-cv::Mat drawCameraPairView(const MappingData& data, const KeyframeImages& images,
+cv::Mat drawCameraPairView(const ReconstructionData& data, const KeyframeImages& images,
                            const CameraPairView& pair) {
   const Rectification views = rectify(data, pair);
   cv::Mat picture;

@@ -9,7 +9,7 @@
 
 #include "intrinsics/test_camera.h"
 #include "vcharge_calibration/matching/keyframe_images.h"
-#include "vcharge_reconstruction/mapping_data.h"
+#include "vcharge_reconstruction/reconstruction_data.h"
 
 namespace vcharge {
 
@@ -21,10 +21,10 @@ inline RigCamera makeWallCamera(const std::string& name, double yaw_rad, double 
   return makeFisheyeCamera(name, 250.0, placeCamera(yaw_rad, 0.0, 0.0, {0.0, side_m, 1.0}));
 }
 
-/// A vehicle that creeps towards the wall, cameras that look half to the left and half to the right, and
-/// landmarks on the wall of which the left one alone knows.
+/// A vehicle that approaches a wall, cameras that look half to the left and half to the right, and landmarks
+/// on the wall with observations of the left camera only.
 struct WallScene {
-  MappingData data;
+  ReconstructionData data;
   KeyframeImages images = KeyframeImages::ofAllKeyframes();
   cv::Mat texture;
 

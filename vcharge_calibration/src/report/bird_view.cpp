@@ -17,13 +17,13 @@ namespace {
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 const cv::Vec3b kSeamColour(40, 190, 255);  // BGR
 constexpr double kSeamOpacity = 0.5;
-constexpr double kMinSeamAngle_rad = 0.3;  // neighbours that look more alike than this have no seam
+constexpr double kMinSeamAngle_rad = 0.3;  // least angle between cameras with a seam
 
 Eigen::Vector3d axisOf(const RigCamera& camera) {
   return camera.vehicle_from_camera->rotation() * Eigen::Vector3d::UnitZ();
 }
 
-/// Where a camera sees points of the vehicle's frame.
+/// Projections of points of the vehicle's frame to a camera.
 struct Sight {
   Eigen::Matrix2Xd pixels;
   std::vector<uint8_t> valid;
@@ -49,7 +49,7 @@ Sight lookAt(const RigCamera& camera, const Eigen::Matrix3Xd& points) {
   return sight;
 }
 
-/// The pixel at a place of a full image, from one that may be smaller.
+/// The pixel at a position of the full image, from a copy that may be smaller.
 uint8_t sample(const cv::Mat& image, const RigCamera& camera, const Eigen::Vector2d& position_px) {
   const double scale = static_cast<double>(image.cols) / camera.image_size_px.width;
   const double x = std::clamp(toSmallImage(position_px.x(), scale), 0.0, image.cols - 1.001);
@@ -75,7 +75,7 @@ void drawSeams(const cv::Mat& owner, cv::Mat* view) {
   }
 }
 
-/// Where a ray from a camera meets the ground.
+/// Intersection of a ray of a camera with the ground.
 Eigen::Vector2d meetGround(const RigidTransform& vehicle_from_camera, const Eigen::Vector3d& ray_in_camera) {
   const Eigen::Vector3d ray = vehicle_from_camera.rotation() * ray_in_camera;
   const Eigen::Vector3d& from = vehicle_from_camera.translation();
@@ -86,7 +86,7 @@ Eigen::Vector3d onGround(const Eigen::Vector2d& ground_m) {
   return {ground_m.x(), ground_m.y(), 0.0};
 }
 
-/// Cameras next to each other, as they look around the vehicle.
+/// Pairs of cameras with neighbouring viewing directions.
 std::vector<std::pair<size_t, size_t>> neighbours(const CameraRig& rig) {
   std::vector<std::pair<double, size_t>> by_yaw;
   for (size_t i = 0; i < rig.cameras.size(); ++i) {
@@ -140,8 +140,7 @@ Eigen::Matrix2d groundCovariance(const RigidTransform& vehicle_from_camera, cons
                                  const Eigen::Vector2d& ground_m) {
   const Eigen::Vector3d ray = onGround(ground_m) - vehicle_from_camera.translation();
   check(ray.z() < 0.0, "groundCovariance: expected a camera above the ground");
-  // Rays move by dt + dphi x ray where they met the ground, and go on, or end, along themselves until they
-  // do.
+  // The point on the ray moves by dt + dphi x ray, then along the ray back to the ground.
   Eigen::Matrix<double, 3, 6> moved;
   moved << Eigen::Matrix3d::Identity(), crossMatrix(-ray);
   const Eigen::Matrix<double, 2, 6> on_ground =

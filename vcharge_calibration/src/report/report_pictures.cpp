@@ -29,7 +29,7 @@ std::string svg(cv::Size size, const std::string& content) {
          "\" fill=\"#fff\" stroke=\"#888\"/>" + content + "</svg>";
 }
 
-// White over yellow to red.
+// From white through yellow to red.
 std::string heatColour(double share) {
   const double s = std::clamp(share, 0.0, 1.0);
   const int green = static_cast<int>(std::lround(255.0 - 190.0 * s * s));

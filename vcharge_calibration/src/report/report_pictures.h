@@ -17,13 +17,13 @@ struct CornerError {
   Eigen::Vector2d pixel, error_px;
 };
 
-/// Where corners were seen: cells that no corner fell into are red. An <svg> element, as the following.
+/// Coverage of the image: cells without a corner are red. An <svg> element, as the following.
 std::string drawCoverage(cv::Size image_size_px, const std::vector<BoardView>& views);
-/// Errors as lines, `scale` times as long as they are.
+/// Errors as lines, enlarged by `scale`.
 std::string drawErrorVectors(cv::Size image_size_px, const std::vector<CornerError>& errors, double scale);
 /// RMS error per coordinate in the cells of a grid.
 std::string drawErrorMap(cv::Size image_size_px, const std::vector<CornerError>& errors);
-/// An <img> element with a JPEG of the picture in it, at most `max_width_px` wide.
+/// An <img> element with the picture as embedded JPEG, at most `max_width_px` wide.
 std::string embedPicture(const cv::Mat& picture, int max_width_px);
 /// The image with a view's corners, numbered at the board's origin.
 cv::Mat drawCorners(const cv::Mat& image, const CalibrationBoard& board, const BoardView& view);

@@ -12,7 +12,7 @@ namespace vcharge {
 namespace fs = std::filesystem;
 
 void writeRigReport(const std::string& folder, const std::string& title, const RigCalibration& result,
-                    const MappingState& state, const KeyframeImages& images,
+                    const ReconstructionState& state, const KeyframeImages& images,
                     const std::string& more_sections) {
   if (!folder.empty()) {
     createFolder(folder);
@@ -22,7 +22,7 @@ void writeRigReport(const std::string& folder, const std::string& title, const R
 }
 
 void writeRigAndTrajectory(const std::string& rig_file, const std::string& trajectory_file,
-                           const RigCalibration& result, const MappingState& state,
+                           const RigCalibration& result, const ReconstructionState& state,
                            const std::map<std::string, std::string>& provenance) {
   check(result.rig != nullptr, "writeRigAndTrajectory: expected a calibration that did not fail");
   if (!trajectory_file.empty()) {

@@ -7,7 +7,7 @@
 namespace vcharge {
 namespace {
 
-/// Chi-square of 6 degrees of freedom that chance exceeds in 0.3 % of all cases.
+/// 99.7 % quantile of the chi-square distribution with 6 degrees of freedom.
 constexpr double kSignificantChiSquare = 19.8;
 
 const RigidTransform& placeOf(const RigCamera& camera, const char* which) {

@@ -19,7 +19,7 @@ CameraRig makeRig(double forwards_m, double yaw_rad) {
   return rig;
 }
 
-TEST(RigComparisonTest, TellsMovedCamerasFromNoise) {
+TEST(RigComparisonTest, DistinguishesMovedCamerasFromNoise) {
   const CameraRig rig = makeRig(3.6, 0.1);
   const RigComparison noise = compareRigs(rig, makeRig(3.602, 0.101));
   ASSERT_EQ(noise.cameras.size(), 1U);
@@ -32,7 +32,7 @@ TEST(RigComparisonTest, TellsMovedCamerasFromNoise) {
   EXPECT_TRUE(compareRigs(rig, makeRig(3.6, 0.11)).cameras[0].is_significant);
 }
 
-TEST(RigComparisonTest, NamesCamerasThatOneLacks) {
+TEST(RigComparisonTest, NamesMissingCameras) {
   CameraRig other = makeRig(3.6, 0.1);
   other.cameras[0].name = "rear";
   const RigComparison comparison = compareRigs(makeRig(3.6, 0.1), other);

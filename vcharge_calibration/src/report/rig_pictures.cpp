@@ -54,16 +54,15 @@ std::string drawSparseMap(const RigScene& scene) {
   return plot.make();
 }
 
-std::string drawLoopGraph(const MappingState& state) {
+std::string drawLoopGraph(const ReconstructionState& state) {
   struct Kind {
     std::string name, css, colour;
     Segments edges;
   };
-  // Those that came furthest are drawn last.
-  Kind kinds[] = {
-      {"looked alike only", R"(stroke="#bbb" stroke-width="0.4" stroke-opacity="0.5")", "#bbb", {}},
-      {"accepted", R"(stroke="#2c8c4a" stroke-width="1.2")", "#2c8c4a", {}},
-      {"contradict the others", R"(stroke="#b3261e" stroke-width="1.4")", "#b3261e", {}}};
+  // Accepted edges are drawn last.
+  Kind kinds[] = {{"not verified", R"(stroke="#bbb" stroke-width="0.4" stroke-opacity="0.5")", "#bbb", {}},
+                  {"accepted", R"(stroke="#2c8c4a" stroke-width="1.2")", "#2c8c4a", {}},
+                  {"contradicting", R"(stroke="#b3261e" stroke-width="1.4")", "#b3261e", {}}};
   Points path;
   for (const Keyframe& keyframe : state.data.keyframes) {
     path.emplace_back(keyframe.map_from_vehicle.translation().head<2>());
@@ -103,7 +102,7 @@ std::string drawCameras(const CameraRig& rig) {
   return plot.make();
 }
 
-std::vector<std::vector<CornerError>> errorsByCamera(const MappingData& data) {
+std::vector<std::vector<CornerError>> errorsByCamera(const ReconstructionData& data) {
   std::vector<std::vector<CornerError>> errors(data.rig->cameras.size());
   std::vector<RigidTransform> camera_from_vehicle;
   for (const RigCamera& camera : data.rig->cameras) {
@@ -153,9 +152,9 @@ std::vector<CornerError> meanErrors(cv::Size image_size_px, const std::vector<Co
   return means;
 }
 
-std::string drawSightings(const std::vector<LandmarkSightings>& landmarks,
-                          const std::vector<Eigen::Vector3d>& path_m,
-                          const std::vector<std::string>& camera_names) {
+std::string drawLandmarkViews(const std::vector<LandmarkViews>& landmarks,
+                              const std::vector<Eigen::Vector3d>& path_m,
+                              const std::vector<std::string>& camera_names) {
   Points path;
   for (const Eigen::Vector3d& place : path_m) {
     path.emplace_back(place.head<2>());
@@ -164,14 +163,14 @@ std::string drawSightings(const std::vector<LandmarkSightings>& landmarks,
   std::map<size_t, Segments> lines;
   std::map<size_t, Points> dots;
   size_t num_lines = 0;
-  for (const LandmarkSightings& landmark : landmarks) {
+  for (const LandmarkViews& landmark : landmarks) {
     num_lines += landmark.cameras_m.size();
   }
   const size_t line_step = num_lines / kMaxDrawnLines + 1,
                dot_step = landmarks.size() / kMaxDrawnLandmarks + 1;
   size_t line = 0;
   for (size_t i = 0; i < landmarks.size(); ++i) {
-    const LandmarkSightings& landmark = landmarks[i];
+    const LandmarkViews& landmark = landmarks[i];
     if (i % dot_step == 0) {
       dots[landmark.first_camera].emplace_back(landmark.position_m.head<2>());
     }

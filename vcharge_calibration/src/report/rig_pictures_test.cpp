@@ -95,7 +95,7 @@ double medianError(const CameraRig& rig, const std::vector<cv::Mat>& images) {
   return errors[errors.size() / 2];
 }
 
-TEST(BirdViewTest, ShowsTheGroundWhereItIs) {
+TEST(BirdViewTest, ProjectsTheGround) {
   const auto rig = makeRig();
   std::vector<cv::Mat> images;
   for (const RigCamera& camera : rig->cameras) {
@@ -117,7 +117,7 @@ TEST(BirdViewTest, ShowsTheGroundWhereItIs) {
   EXPECT_GT(medianError(*rig, images), 10.0);
 }
 
-TEST(BirdViewTest, UncertaintyOnTheGroundIsThatOfTheRays) {
+TEST(BirdViewTest, PropagatesTheCovarianceToTheGround) {
   const RigidTransform place = placeCamera(0.7, 0.4, 0.0, {1.9, 0.9, 0.9});
   const Eigen::Vector2d ground(4.0, 5.0);
   const Eigen::Vector3d ray_in_camera = place.inverse() * Eigen::Vector3d(4.0, 5.0, 0.0);
@@ -169,7 +169,7 @@ TEST(BirdViewTest, SeamsAreBetweenNeighboursAndGrowWithDistance) {
 
 /// Two cameras at one keyframe that see points as far away as the sky.
 struct FarPoints {
-  MappingData data;
+  ReconstructionData data;
   KeyframeImages images;
 
   FarPoints() {
@@ -194,7 +194,7 @@ struct FarPoints {
   }
 };
 
-TEST(RectifiedMatchesTest, FarPointsAreInTheSamePlaceOfBothViews) {
+TEST(RectifiedMatchesTest, DistantPointsHaveEqualPositionsInBothViews) {
   const FarPoints scene;
   const std::vector<CameraPairView> pairs = findCameraPairViews(scene.data, scene.images);
   ASSERT_EQ(pairs.size(), 1U);
@@ -213,11 +213,11 @@ TEST(RectifiedMatchesTest, FarPointsAreInTheSamePlaceOfBothViews) {
   EXPECT_GT(cv::countNonZero(bright > 150), 100) << "lines";
 }
 
-TEST(RectifiedMatchesTest, WithoutImagesThereAreNoPairs) {
+TEST(RectifiedMatchesTest, FindsNoPairsWithoutImages) {
   EXPECT_TRUE(findCameraPairViews(FarPoints().data, KeyframeImages()).empty());
 }
 
-TEST(KeyframeImagesTest, KeepsAFewSpreadOverTheDrive) {
+TEST(KeyframeImagesTest, KeepsAFewDistributedOverTheDrive) {
   KeyframeImages images;
   const Image large{cv::Mat(400, 1280, CV_8UC1, cv::Scalar(77)), nullptr};
   for (int32_t keyframe = 0; keyframe < 500; ++keyframe) {
@@ -237,7 +237,7 @@ TEST(KeyframeImagesTest, KeepsAFewSpreadOverTheDrive) {
   EXPECT_TRUE(images.image(kept[3] + 1, 0).empty());
 }
 
-TEST(RigPicturesTest, MeanErrorsAreThoseOfTheirCells) {
+TEST(RigPicturesTest, AveragesErrorsByCell) {
   std::vector<CornerError> errors;
   for (int i = 0; i < 20; ++i) {
     errors.push_back({{10.0, 10.0}, {0.5, i % 2 == 0 ? 0.3 : -0.3}});
@@ -249,11 +249,11 @@ TEST(RigPicturesTest, MeanErrorsAreThoseOfTheirCells) {
   EXPECT_LT((means[0].error_px - Eigen::Vector2d(0.5, 0.0)).norm(), 1e-9);
 }
 
-TEST(RigPicturesTest, SightingsHaveALinePerCameraThatSeesALandmark) {
-  const std::vector<LandmarkSightings> landmarks = {{{5.0, 5.0, 0.0}, 0, {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0}}},
-                                                    {{6.0, 5.0, 0.0}, 1, {}}};
+TEST(RigPicturesTest, DrawsALineFromEachLandmarkToItsCameras) {
+  const std::vector<LandmarkViews> landmarks = {{{5.0, 5.0, 0.0}, 0, {{0.0, 0.0, 0.0}, {1.0, 0.0, 0.0}}},
+                                                {{6.0, 5.0, 0.0}, 1, {}}};
   const std::string picture =
-      drawSightings(landmarks, {{0.0, 0.0, 0.0}, {2.0, 0.0, 0.0}}, {"front", "<left>"});
+      drawLandmarkViews(landmarks, {{0.0, 0.0, 0.0}, {2.0, 0.0, 0.0}}, {"front", "<left>"});
   const auto count = [&](const std::string& text) {
     size_t found = 0;
     for (size_t at = picture.find(text); at != std::string::npos; at = picture.find(text, at + 1)) {
@@ -269,7 +269,7 @@ TEST(RigPicturesTest, SightingsHaveALinePerCameraThatSeesALandmark) {
 /// A page of a drive that passed or failed.
 std::string makePage(bool passed) {
   FarPoints scene;
-  MappingState state;
+  ReconstructionState state;
   state.data = scene.data;
   state.data.keyframes.resize(2);
   state.data.keyframes[1].map_from_vehicle = RigidTransform::planar(5.0, 0.0, 0.0);
@@ -298,7 +298,7 @@ std::string makePage(bool passed) {
   return makeRigReport("a & b", result, state, scene.images, "<h2>more</h2>");
 }
 
-TEST(RigReportTest, HasAllThatIsKnownAndNeedsNothingBesideIt) {
+TEST(RigReportTest, IsCompleteAndSelfContained) {
   const std::string page = makePage(true);
   for (const char* part : {"a &amp; b", "verdict WARN", "the drive &lt;turned&gt;", "Sparse map", "Before",
                            "After", "at 10 m (cm)", "front, left", "Landmarks that cameras share",
@@ -310,7 +310,7 @@ TEST(RigReportTest, HasAllThatIsKnownAndNeedsNothingBesideIt) {
   EXPECT_EQ(page.find("\u00b1 nan"), std::string::npos);
 }
 
-TEST(RigReportTest, AFailureWithoutARigHasItsReasonAndNoPictures) {
+TEST(RigReportTest, HasTheReasonOfAFailure) {
   const std::string page = makePage(false);
   EXPECT_NE(page.find("verdict FAIL"), std::string::npos);
   EXPECT_EQ(page.find("data:image"), std::string::npos);

@@ -46,28 +46,29 @@ std::string summaryOf(const RigCalibration& result) {
          rowOf({"map", std::to_string(result.num_keyframes) + " keyframes, " +
                            std::to_string(result.num_landmarks) + " landmarks, " +
                            std::to_string(result.num_loop_edges) + " loop edges"}) +
-         rowOf({"error of reprojection, RMS per coordinate", toText(result.rms_px, 3) + " px"}) +
+         rowOf({"reprojection error, RMS per coordinate", toText(result.rms_px, 3) + " px"}) +
          rowOf({"odometer's turn, true over counted", toText(result.odometer_turn_scale, 5)}) +
-         rowOf({"odometer's stamps late by", toText(1000.0 * result.time_offset_s, 1) + " ms"}) +
+         rowOf({"delay of the odometer's stamps", toText(1000.0 * result.time_offset_s, 1) + " ms"}) +
          rowOf({"height", result.height_source}) + "</table>";
 }
 
-/// Name, and each degree of freedom with its standard deviation: yaw, pitch and roll are those of a camera
-/// that was turned forwards.
+/// A row with each degree of freedom and its standard deviation; the angles are zero for an upright camera
+/// that looks forward.
 std::string parametersOf(const RigCalibration& result) {
   std::string text =
-      "<h2>Places of the cameras</h2><p>Axes of the vehicle: x forwards, y to the left, z up. " +
+      "<h2>Extrinsics</h2><p>Axes of the vehicle: x forwards, y to the left, z up. " +
       std::string(result.is_from_map
-                      ? "All lengths are the map's."
-                      : "All lengths are the odometer's: an error of the wheels' size is in them.") +
-      " Yaw, pitch and roll are zero for a camera that looks ahead, upright; their deviations are about the "
+                      ? "The map defines the scale."
+                      : "The odometer defines the scale: it contains the error of the wheels' size.") +
+      " Yaw, pitch and roll are zero for an upright camera that looks forward; their deviations are about "
+      "the "
       "vehicle's z, y and x.</p><table>" +
       rowOf({"camera", "x (cm)", "y (cm)", "z (cm)", "yaw (degrees)", "pitch", "roll", "least certain"},
             true);
   for (size_t i = 0; i < result.cameras.size(); ++i) {
     const CameraCalibration& camera = result.cameras[i];
-    const Eigen::Matrix<double, 6, 1> values = placeAndAngles(*result.rig->cameras[i].vehicle_from_camera);
-    const Eigen::Matrix<double, 6, 1> sigmas = placeAndAngleSigmas(camera.covariance);
+    const Eigen::Matrix<double, 6, 1> values = positionAndAngles(*result.rig->cameras[i].vehicle_from_camera);
+    const Eigen::Matrix<double, 6, 1> sigmas = positionAndAngleSigmas(camera.covariance);
     std::vector<std::string> cells{camera.name};
     for (int k = 0; k < 6; ++k) {
       const int digits = k < 3 ? 2 : 3;
@@ -82,9 +83,9 @@ std::string parametersOf(const RigCalibration& result) {
 std::string checksOf(const RigCalibration& result) {
   std::string text =
       "<h2>Checks</h2><table>" +
-      rowOf({"camera", "observations followed", "that fit", "error (px RMS)",
-             "of it common to neighbours (px)", "landmarks shared with other cameras",
-             "halves of the drive differ by (cm)", "(degrees)", "jackknife over formula, largest"},
+      rowOf({"camera", "observations tracked", "adjusted", "error (px RMS)", "common to neighbours (px)",
+             "landmarks shared with other cameras", "difference of the halves of the drive (cm)", "(degrees)",
+             "largest ratio of jackknife to formula"},
             true);
   for (const CameraCalibration& camera : result.cameras) {
     text += rowOf({camera.name, std::to_string(camera.num_tracked), std::to_string(camera.num_observations),
@@ -101,12 +102,12 @@ std::string row(const std::string& figures) {
   return "<div class=\"row\">" + figures + "</div>";
 }
 
-std::string mapsOf(const RigCalibration& result, const MappingState& state) {
+std::string mapsOf(const RigCalibration& result, const ReconstructionState& state) {
   std::string figures;
   if (result.first_scene != nullptr) {
     figures += htmlFigure(drawSparseMap(*result.first_scene),
                           "Before: landmarks by the odometer's path and hand-eye's rig, in the colour of the "
-                          "camera that saw them first.");
+                          "camera that observed them first.");
   }
   return "<h2>Sparse map</h2>" + row(figures + htmlFigure(drawSparseMap(makeRigScene(state.data)),
                                                           "After: landmarks by the adjusted path and rig."));
@@ -124,20 +125,18 @@ std::string seamsOf(const RigCalibration& result, const KeyframeImages& images) 
     }
     std::string figures;
     if (before != nullptr) {
-      figures +=
-          htmlFigure(embedPicture(makeBirdView(*before, shown, BirdViewArea()), kPictureWidth_px),
-                     "Before: by hand-eye's rig. Lines: where one camera's picture ends and the next "
-                     "begins; marks on the road go on across them where the cameras' places are right.");
+      figures += htmlFigure(embedPicture(makeBirdView(*before, shown, BirdViewArea()), kPictureWidth_px),
+                            "Before: by the first guess. Lines mark the seams between cameras; with correct "
+                            "extrinsics road markings continue across them.");
     }
     text += row(figures + htmlFigure(embedPicture(makeBirdView(rig, shown, BirdViewArea()), kPictureWidth_px),
                                      "After: by the calibrated rig. The vehicle drives upwards."));
   }
   text +=
-      "<p>How far apart two neighbouring cameras show a place on the ground that both see, half way between "
-      "their directions: \u00b1 one standard deviation after the calibration, the errors of the two taken "
-      "for "
-      "independent (height and tilt are largely common and cancel: an upper bound); in brackets, how far "
-      "apart they were by hand-eye.</p><table>";
+      "<p>Distance between the projections of a ground point half way between two neighbouring cameras: "
+      "\u00b1 one standard deviation after the calibration, for independent errors (an upper bound, since "
+      "those "
+      "of height and tilt are largely common); in brackets, the distance by the first guess.</p><table>";
   std::vector<std::string> head{"cameras"};
   for (const double distance_m : kSeamDistances_m) {
     head.push_back("at " + toText(distance_m, 0) + " m (cm)");
@@ -149,7 +148,7 @@ std::string seamsOf(const RigCalibration& result, const KeyframeImages& images) 
       cells.push_back(rig.cameras[point.first].name + ", " + rig.cameras[point.second].name);
     }
     cells.push_back(!point.is_seen                  ? "not seen by both"
-                    : !std::isfinite(point.sigma_m) ? "not known"
+                    : !std::isfinite(point.sigma_m) ? "unknown"
                                                     : "\u00b1 " + toText(100.0 * point.sigma_m, 1));
     if (point.is_seen && before != nullptr) {
       cells.back() += " (" + toText(100.0 * point.before_m, 1) + ")";
@@ -162,7 +161,7 @@ std::string seamsOf(const RigCalibration& result, const KeyframeImages& images) 
   return text + "</table>";
 }
 
-std::string sharedOf(const MappingState& state, const KeyframeImages& images) {
+std::string sharedOf(const ReconstructionState& state, const KeyframeImages& images) {
   std::string text;
   for (const CameraPairView& pair : findCameraPairViews(state.data, images)) {
     const auto nameOf = [&](size_t camera, int32_t keyframe) {
@@ -173,14 +172,13 @@ std::string sharedOf(const MappingState& state, const KeyframeImages& images) {
                            nameOf(pair.second_camera, pair.second_keyframe) + ": " +
                            std::to_string(pair.tracks.size()) + " landmarks in both views.");
   }
-  return text.empty()
-             ? ""
-             : "<h2>Landmarks that cameras share</h2><p>Views rectified to the average rotation of the "
-               "two cameras; lines join the observations of a landmark.</p>" +
-                   row(text);
+  return text.empty() ? ""
+                      : "<h2>Landmarks that cameras share</h2><p>Views rectified to the mean rotation of the "
+                        "two cameras; lines connect the observations of a landmark.</p>" +
+                            row(text);
 }
 
-std::string errorsOf(const MappingState& state) {
+std::string errorsOf(const ReconstructionState& state) {
   std::string maps, vectors;
   const std::vector<std::vector<CornerError>> errors = errorsByCamera(state.data);
   for (size_t i = 0; i < errors.size(); ++i) {
@@ -190,16 +188,16 @@ std::string errorsOf(const MappingState& state) {
     vectors += htmlFigure(
         drawErrorVectors(camera.image_size_px, meanErrors(camera.image_size_px, errors[i]), kVectorScale),
         camera.name + ": mean errors, " + toText(kVectorScale, 0) +
-            " times as long as they are. Where neighbours point the same way, the lens is not as "
-            "its intrinsics say.");
+            " times enlarged. Parallel neighbours show wrong intrinsics.");
   }
   return "<h2>Errors over the images</h2>" + row(maps) + row(vectors);
 }
 
 }  // namespace
 
-std::string makeRigReport(const std::string& title, const RigCalibration& result, const MappingState& state,
-                          const KeyframeImages& images, const std::string& more_sections) {
+std::string makeRigReport(const std::string& title, const RigCalibration& result,
+                          const ReconstructionState& state, const KeyframeImages& images,
+                          const std::string& more_sections) {
   std::string body = verdictOf(result) + summaryOf(result);
   if (result.rig != nullptr) {
     body += parametersOf(result) +
@@ -207,15 +205,14 @@ std::string makeRigReport(const std::string& title, const RigCalibration& result
                            "Cameras and their directions from above; the vehicle drives to the right.")) +
             checksOf(result);
   }
-  // After a failure there may be poses and landmarks all the same, which show what is wrong.
+  // After a failure existing poses and landmarks help to find the reason.
   if (state.data.rig != nullptr && state.data.rig->hasExtrinsics() && !state.data.keyframes.empty()) {
     body += mapsOf(result, state);
     body += result.rig != nullptr ? seamsOf(result, images) : "";
     body += sharedOf(state, images) + errorsOf(state);
   }
   if (!state.data.keyframes.empty() && !result.is_from_map) {
-    body += "<h2>Loops</h2>" +
-            row(htmlFigure(drawLoopGraph(state), "Places that were passed again, on the vehicle's path."));
+    body += "<h2>Loops</h2>" + row(htmlFigure(drawLoopGraph(state), "Loop edges on the vehicle's path."));
   }
   body += more_sections + "<h2>Times</h2><table>";
   for (const auto& [stage, seconds] : state.report.stage_s) {

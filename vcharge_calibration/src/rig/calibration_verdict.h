@@ -4,8 +4,7 @@
 
 namespace vcharge {
 
-/// Sets verdict and remarks of a calibration whose other fields are filled in; takes the model away when the
-/// verdict is kFail.
+/// Sets verdict and remarks of an intrinsic calibration from its other fields; removes the model for kFail.
 void judgeCalibration(const IntrinsicCalibrationOptions& options, IntrinsicCalibration* result);
 
 }  // namespace vcharge

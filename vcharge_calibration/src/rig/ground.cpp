@@ -3,17 +3,21 @@
 #include <algorithm>
 #include <cmath>
 
+#include "initialization/rig_initialization.h"
+
 namespace vcharge {
 namespace {
 
-constexpr double kMaxRange_m = 5.0;   // of ground points, along the ground
-constexpr double kMinBelow_m = 0.15;  // a camera is at least this high
+constexpr double kMaxRange_m = 5.0;  // of ground points, along the ground
+// Heights of a camera above the ground.
+constexpr double kMinBelow_m = 0.15;
 constexpr double kMaxBelow_m = 4.0;
 constexpr double kBin_m = 0.02;
 
-/// Landmarks in the vehicle's frame of each keyframe that sees them, near it along the ground.
+/// Calls `use` with each observation whose landmark is near its camera, and the landmark in the vehicle's
+/// frame.
 template <class Use>
-void forNearPoints(const MappingData& data, const Use& use) {
+void forNearPoints(const ReconstructionData& data, const Use& use) {
   for (const Track& track : data.tracks) {
     if (!track.position_m) {
       continue;
@@ -32,7 +36,7 @@ void forNearPoints(const MappingData& data, const Use& use) {
 
 }  // namespace
 
-std::optional<double> findCameraHeight(const MappingData& data, int32_t camera) {
+std::optional<double> findCameraHeight(const ReconstructionData& data, int32_t camera) {
   std::vector<double> histogram(static_cast<size_t>(kMaxBelow_m / kBin_m) + 1, 0.0);
   std::vector<double> depths_m;
   forNearPoints(data, [&](const TrackObservation& observation, const Eigen::Vector3d& point) {
@@ -57,7 +61,7 @@ std::optional<double> findCameraHeight(const MappingData& data, int32_t camera) 
       best = i;
     }
   }
-  // The mean of what lies about that level.
+  // Mean of the points around that level.
   const double mode_m = (static_cast<double>(best) + 0.5) * kBin_m;
   double sum = 0.0, num = 0.0;
   for (const double depth_m : depths_m) {
@@ -69,7 +73,30 @@ std::optional<double> findCameraHeight(const MappingData& data, int32_t camera) 
   return num < 30.0 ? std::nullopt : std::make_optional(sum / num);
 }
 
-std::vector<GroundPoint> findGroundPoints(const MappingData& data, double max_distance_m) {
+std::shared_ptr<const CameraRig> withCameraHeights(const ReconstructionData& data) {
+  std::vector<double> heights_m;
+  std::vector<std::optional<double>> height_of_camera;
+  for (size_t i = 0; i < data.rig->cameras.size(); ++i) {
+    height_of_camera.push_back(findCameraHeight(data, static_cast<int32_t>(i)));
+    if (height_of_camera.back()) {
+      heights_m.push_back(*height_of_camera.back());
+    }
+  }
+  if (heights_m.empty()) {
+    throw NotCalibrated{{"no camera sees the ground near the vehicle: the cameras' heights are unknown"}};
+  }
+  std::sort(heights_m.begin(), heights_m.end());
+  auto raised = std::make_shared<CameraRig>(*data.rig);
+  for (size_t i = 0; i < raised->cameras.size(); ++i) {
+    const RigidTransform& level = *data.rig->cameras[i].vehicle_from_camera;
+    Eigen::Vector3d position_m = level.translation();
+    position_m.z() = height_of_camera[i].value_or(heights_m[heights_m.size() / 2]);
+    raised->cameras[i].vehicle_from_camera = RigidTransform(level.rotation(), position_m);
+  }
+  return raised;
+}
+
+std::vector<GroundPoint> findGroundPoints(const ReconstructionData& data, double max_distance_m) {
   std::vector<GroundPoint> points;
   for (size_t t = 0; t < data.tracks.size(); ++t) {
     const Track& track = data.tracks[t];

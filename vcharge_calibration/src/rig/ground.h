@@ -1,27 +1,30 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include <Eigen/Core>
 
-#include "vcharge_reconstruction/mapping_data.h"
+#include "vcharge_reconstruction/reconstruction_data.h"
 
 namespace vcharge {
 
-/// Where the ground is below a camera that was put at height zero, from its landmarks alone: the level on
-/// which most of the points near the path lie. Gives the camera's height. Empty where the camera sees too
-/// little ground.
-std::optional<double> findCameraHeight(const MappingData& data, int32_t camera);
+/// Height of a camera above the ground, from its landmarks alone: the level of most of the points near the
+/// path. The rig of `data` has the camera at height zero. Empty where the camera sees too little ground.
+std::optional<double> findCameraHeight(const ReconstructionData& data, int32_t camera);
 
-/// A landmark on the ground, and the keyframe that passed nearest to it.
+/// The rig of `data` with its cameras raised to their heights; a camera without a height gets the median one.
+/// NotCalibrated where no camera sees the ground.
+std::shared_ptr<const CameraRig> withCameraHeights(const ReconstructionData& data);
+
+/// A landmark on the ground, and the nearest keyframe that observes it.
 struct GroundPoint {
   int32_t track = 0;
   int32_t keyframe = 0;
 };
 
-/// Landmarks that lie within `max_distance_m` of the vehicle's z = 0 and near its path: the ground, to the
-/// accuracy of poses and rig. In order of tracks.
-std::vector<GroundPoint> findGroundPoints(const MappingData& data, double max_distance_m);
+/// Landmarks within `max_distance_m` of the vehicle's z = 0 and near its path, in order of tracks.
+std::vector<GroundPoint> findGroundPoints(const ReconstructionData& data, double max_distance_m);
 
 }  // namespace vcharge

@@ -10,32 +10,22 @@
 
 namespace vcharge {
 
-void RigAdjustmentOptions::validate() const {
-  requireField(max_ground_distance_m > 0.0, "max_ground_distance_m", "must be positive",
-               max_ground_distance_m);
-  requireField(ground_sigma_m > 0.0, "ground_sigma_m", "must be positive", ground_sigma_m);
-  requireField(segment_m > 0.0, "segment_m", "must be positive", segment_m);
-  requireField(common_error_px >= 0.0, "common_error_px", "must not be negative", common_error_px);
-  requireField(common_range_m > 0.0, "common_range_m", "must be positive", common_range_m);
-  validateInner("bundle", bundle);
-}
-
 namespace {
 
-/// How much less certain the odometer is where wheels slipped.
+/// Factor on the odometer's deviation where the wheels slipped.
 constexpr double kSlipFactor = 20.0;
 constexpr double kSlipSigmas = 5.0;
-/// Of a keyframe to the next, to lean in.
+/// Turn between keyframes in which the body leans.
 constexpr double kMinTurn_rad = 0.01;
-/// No odometer is taken for better.
+// Least deviations of an odometer.
 constexpr double kMinOdometrySigma_m = 0.0005;
 constexpr double kMinOdometrySigma_rad = 0.0002;
 constexpr double kMinHeightSigma_m = 0.001;
 constexpr double kMinTiltSigma_rad = 0.0005;
 
-/// Weights of what keyframes tell of the cameras' tilt. The body leans outwards in turns: with turns to both
-/// sides counting the same in sum that cancels, so the side with more of them counts less.
-std::vector<double> balanceTurns(const MappingData& data) {
+/// Weights of the keyframes for the cameras' tilt. The body leans outwards in turns, which cancels if both
+/// sides have the same sum of weights: the side with more turns gets less weight.
+std::vector<double> balanceTurns(const ReconstructionData& data) {
   std::vector<double> turns_rad(data.keyframes.size(), 0.0);
   double left_rad = 0.0, right_rad = 0.0;
   for (size_t i = 1; i < data.keyframes.size(); ++i) {
@@ -53,21 +43,27 @@ std::vector<double> balanceTurns(const MappingData& data) {
   return weights;
 }
 
-/// In a finished map no keyframe is held: the first pose of the problem becomes the map's frame, which
-/// nothing refers to.
-void freeAllKeyframes(BundleProblem* problem) {
-  problem->map_from_vehicle.insert(problem->map_from_vehicle.begin(), RigidTransform());
-  for (BundleObservation& observation : problem->observations) {
-    ++observation.pose;
+/// Landmarks on the ground: planar motion shows neither the height of the cameras nor, well, their tilt.
+std::vector<GroundObservation> makeGroundObservations(const RigAdjustmentOptions& options,
+                                                      const std::vector<double>& weights,
+                                                      const ReconstructionData& data) {
+  std::vector<int32_t> point_of_track(data.tracks.size(), 0);
+  int32_t num_points = 0;
+  for (size_t t = 0; t < data.tracks.size(); ++t) {
+    point_of_track[t] = num_points;
+    num_points += data.tracks[t].position_m ? 1 : 0;
   }
-  for (BundleMotion& motion : problem->motions) {
-    ++motion.pose;
+  std::vector<GroundObservation> observations;
+  for (const GroundPoint& ground : findGroundPoints(data, options.max_ground_distance_m)) {
+    observations.push_back({point_of_track[ground.track], ground.keyframe,
+                            options.ground_sigma_m / std::sqrt(weights[ground.keyframe])});
   }
+  return observations;
 }
 
-/// The problem of mapping, with the ground's observations put to their points.
+/// The problem of mapping with unknown extrinsics, ground observations and the priors.
 BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPriors& priors,
-                             const MappingData& data) {
+                             const ReconstructionData& data) {
   const OdometryNoise& odometry = priors.odometry;
   BundleAdjustmentOptions bundle = options.bundle;
   if (odometry.sigma_m > 0.0) {
@@ -77,58 +73,35 @@ BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPrior
     bundle.tilt_sigma_rad = odometry.tilt_sigma_rad;
     bundle.odometry_distance_sigma = bundle.odometry_turn_sigma = 0.0;
   }
-  const BundleProblem mapping = makeBundleProblem(bundle, data);
-  BundleProblem problem = mapping;
+  BundleProblem problem = makeBundleProblem(bundle, data);
   const std::vector<double> weights = balanceTurns(data);
-  for (BundleMotion& motion : problem.motions) {
-    if (!odometry.has_slipped.empty() && odometry.has_slipped[motion.pose]) {
-      motion.information /= kSlipFactor * kSlipFactor;
+  for (OdometerFactor& factor : problem.odometer_factors) {
+    if (!odometry.has_slipped.empty() && odometry.has_slipped[factor.pose]) {
+      factor.information /= kSlipFactor * kSlipFactor;
     }
-    motion.information.block<2, 2>(3, 3) *= weights[motion.pose];
+    factor.information.block<2, 2>(3, 3) *= weights[factor.pose];
   }
   for (const RigCamera& camera : data.rig->cameras) {
     problem.vehicle_from_camera.push_back(*camera.vehicle_from_camera);
   }
-  problem.observations.clear();
-  const std::vector<GroundPoint> ground = findGroundPoints(data, options.max_ground_distance_m);
-  auto next_ground = ground.begin();
-  size_t point = 0;
-  for (size_t t = 0; t < data.tracks.size(); ++t) {
-    if (!data.tracks[t].position_m) {
-      continue;
-    }
-    problem.first_observation[point] = problem.observations.size();
-    const bool is_ground = next_ground != ground.end() && next_ground->track == static_cast<int32_t>(t);
-    for (size_t i = mapping.first_observation[point]; i < mapping.first_observation[point + 1]; ++i) {
-      if (is_ground && mapping.observations[i].pose == next_ground->keyframe &&
-          (i == mapping.first_observation[point] ||
-           mapping.observations[i - 1].pose != next_ground->keyframe)) {
-        problem.observations.push_back({next_ground->keyframe, kGroundCamera, Eigen::Vector2d::Zero(),
-                                        options.ground_sigma_m / std::sqrt(weights[next_ground->keyframe])});
-      }
-      problem.observations.push_back(mapping.observations[i]);
-    }
-    next_ground += is_ground ? 1 : 0;
-    ++point;
-  }
-  problem.first_observation[point] = problem.observations.size();
+  problem.ground_observations = makeGroundObservations(options, weights, data);
   if (priors.height_sigma_m > 0.0) {
     problem.common_information(2, 2) = 1.0 / (priors.height_sigma_m * priors.height_sigma_m);
   }
   if (priors.hasMap()) {
+    problem.is_first_pose_fixed = false;
     for (size_t t = 0; t < data.tracks.size(); ++t) {
       if (data.tracks[t].position_m) {
         problem.point_information.push_back(priors.landmark_information[t]);
       }
     }
-    freeAllKeyframes(&problem);
   }
   return problem;
 }
 
 }  // namespace
 
-OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const MappingData& data) {
+OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const ReconstructionData& data) {
   OdometryNoise noise;
   std::vector<double> errors_m, errors_rad, heights_m, tilts_rad;
   for (size_t i = 1; i < data.keyframes.size(); ++i) {
@@ -137,7 +110,7 @@ OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const M
     const RigidTransform seen =
         data.keyframes[i - 1].map_from_vehicle.inverse() * data.keyframes[i].map_from_vehicle;
     const Eigen::Vector2d error_m = (seen.translation() - counted.translation()).head<2>();
-    // Per axis, of a distance in two.
+    // Deviation per axis of a distance in two dimensions.
     errors_m.push_back(error_m.norm() / std::sqrt(2.0));
     errors_rad.push_back(std::abs(yawOfRotation(seen.rotation()) -
                                   data.odometry_turn_scale * yawOfRotation(counted.rotation())));
@@ -147,7 +120,7 @@ OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const M
   if (errors_m.size() < 10) {
     return noise;
   }
-  // Medians of a Rayleigh distribution and of the absolute value of a normal one.
+  // Medians of a Rayleigh distribution and of the absolute value of a normal distribution.
   constexpr double kRayleigh = 1.1774, kNormal = 0.6745;
   const BundleAdjustmentOptions& bundle = options.bundle;
   noise.sigma_m = std::clamp(quantile(errors_m, 0.5) * std::sqrt(2.0) / kRayleigh, kMinOdometrySigma_m,
@@ -167,7 +140,7 @@ OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const M
 }
 
 BundleAdjustmentSummary adjustRig(const RigAdjustmentOptions& options, const RigPriors& priors,
-                                  MappingData* data) {
+                                  ReconstructionData* data) {
   check(!data->keyframes.empty(), "adjustRig: expected keyframes");
   check(!priors.hasMap() || priors.landmark_information.size() == data->tracks.size(),
         "adjustRig: expected landmark_information of every track");
@@ -177,7 +150,6 @@ BundleAdjustmentSummary adjustRig(const RigAdjustmentOptions& options, const Rig
   const BundleSolution solved =
       solveBundle(options.bundle.max_iterations, options.bundle.cost_tolerance, &problem);
   if (priors.hasMap()) {
-    problem.map_from_vehicle.erase(problem.map_from_vehicle.begin());
     problem.points_in_map = before;
   }
   writeBack(problem, data);
@@ -193,13 +165,12 @@ BundleAdjustmentSummary adjustRig(const RigAdjustmentOptions& options, const Rig
 }
 
 RigUncertainty rigUncertainty(const RigAdjustmentOptions& options, const RigPriors& priors,
-                              const MappingData& data) {
+                              const ReconstructionData& data) {
   RigUncertainty result;
   const BundleCovariance tail = bundleCovariance(makeRigProblem(options, priors, data));
   if (!tail.is_valid) {
     return result;
   }
-  const Eigen::Index first_keyframe = priors.hasMap() ? 1 : 0;
   const Eigen::Index size = tail.covariance.rows() - 2;
   result.is_valid = true;
   result.covariance = tail.covariance.bottomRightCorner(size, size);
@@ -217,7 +188,7 @@ RigUncertainty rigUncertainty(const RigAdjustmentOptions& options, const RigPrio
       add();
       begin_m = data.keyframes[i].travelled_m;
     }
-    segment += tail.influence.col(static_cast<Eigen::Index>(i) + first_keyframe).tail(size);
+    segment += tail.influence.col(static_cast<Eigen::Index>(i)).tail(size);
   }
   add();
   if (num_segments > 1) {

@@ -26,8 +26,8 @@ RigCamera makeCamera(const std::string& name, double yaw_rad, const Eigen::Vecto
 }
 
 /// Keyframes 0.5 m apart along a figure of eight of circles of 6 m.
-MappingData makeDrive(uint32_t seed, double noise_px) {
-  MappingData data;
+ReconstructionData makeDrive(uint32_t seed, double noise_px) {
+  ReconstructionData data;
   auto rig = std::make_shared<CameraRig>();
   rig->cameras = {makeCamera("front", 0.0, {3.6, 0.0, 0.6}), makeCamera("left", 1.57, {1.9, 0.95, 0.9})};
   data.rig = rig;
@@ -94,8 +94,8 @@ RigAdjustmentOptions makeOptions() {
   return options;
 }
 
-/// Cameras turned and shifted, as a first guess is.
-void disturbRig(MappingData* data) {
+/// Cameras rotated and shifted as in a first guess.
+void disturbRig(ReconstructionData* data) {
   auto rig = std::make_shared<CameraRig>(*data->rig);
   for (size_t i = 0; i < rig->cameras.size(); ++i) {
     const double sign = i == 0 ? 1.0 : -1.0;
@@ -117,7 +117,7 @@ Vector6d errorOf(const CameraRig& rig, const CameraRig& truth, size_t camera) {
 }
 
 TEST(RigAdjustmentTest, FindsTheCamerasOfAKnownDrive) {
-  MappingData data = makeDrive(1, kNoise_px);
+  ReconstructionData data = makeDrive(1, kNoise_px);
   const std::shared_ptr<const CameraRig> truth = data.rig;
   disturbRig(&data);
   const RigAdjustmentOptions options = makeOptions();
@@ -132,12 +132,12 @@ TEST(RigAdjustmentTest, FindsTheCamerasOfAKnownDrive) {
   }
 }
 
-TEST(RigAdjustmentTest, KnowsItsUncertainty) {
+TEST(RigAdjustmentTest, CovarianceMatchesTheErrors) {
   // Errors over their standard deviations, squared: mean of many drives near 1.
   Vector6d sum = Vector6d::Zero();
   constexpr int kDrives = 5;
   for (uint32_t seed = 1; seed <= kDrives; ++seed) {
-    MappingData data = makeDrive(seed, kNoise_px);
+    ReconstructionData data = makeDrive(seed, kNoise_px);
     const std::shared_ptr<const CameraRig> truth = data.rig;
     const RigAdjustmentOptions options = makeOptions();
     adjustRig(options, RigPriors(), &data);
@@ -153,9 +153,8 @@ TEST(RigAdjustmentTest, KnowsItsUncertainty) {
   }
   const Vector6d mean = sum / (2.0 * kDrives);
   for (int i = 0; i < 6; ++i) {
-    // Ten errors that go together by pairs: a chi-square of five degrees of freedom over five is within these
-    // bounds in 99 % of all cases. The ground, which height and tilt come from, is said to be much rougher
-    // than it is here: those may err less.
+    // Ten errors that correlate in pairs: chi-square of five degrees of freedom over five, within these
+    // bounds in 99 % of all cases. Height and tilt may err less: the ground is smoother than assumed.
     EXPECT_LT(mean[i], 3.3) << i << ": " << mean.transpose();
     if (i == 0 || i == 1 || i == 5) {
       EXPECT_GT(mean[i], 0.08) << i << ": " << mean.transpose();
@@ -164,9 +163,9 @@ TEST(RigAdjustmentTest, KnowsItsUncertainty) {
 }
 
 TEST(RigAdjustmentTest, GivesTheSameBitsOnOneThread) {
-  MappingData parallel = makeDrive(2, kNoise_px);
+  ReconstructionData parallel = makeDrive(2, kNoise_px);
   disturbRig(&parallel);
-  MappingData serial = parallel;
+  ReconstructionData serial = parallel;
   RigAdjustmentOptions options = makeOptions();
   options.bundle.max_iterations = 3;
   adjustRig(options, RigPriors(), &parallel);
@@ -178,16 +177,16 @@ TEST(RigAdjustmentTest, GivesTheSameBitsOnOneThread) {
   }
 }
 
-TEST(OdometryNoiseTest, IsThatOfTheDrive) {
-  const MappingData data = makeDrive(3, kNoise_px);
+TEST(OdometryNoiseTest, MatchesTheDrive) {
+  const ReconstructionData data = makeDrive(3, kNoise_px);
   RigAdjustmentOptions loose;
   const OdometryNoise noise = estimateOdometryNoise(loose, data);
   EXPECT_NEAR(noise.sigma_m, 0.002, 0.0006);
   EXPECT_NEAR(noise.sigma_rad, 0.0005, 0.00015);
 }
 
-TEST(OdometryNoiseTest, FindsTheWheelThatSlipped) {
-  MappingData data = makeDrive(3, kNoise_px);
+TEST(OdometryNoiseTest, DetectsSlippingWheels) {
+  ReconstructionData data = makeDrive(3, kNoise_px);
   for (size_t i = 60; i < data.keyframes.size(); ++i) {
     RigidTransform& pose = data.keyframes[i].odom_from_vehicle;
     pose = data.keyframes[59].odom_from_vehicle * RigidTransform::planar(0.1, 0.0, 0.0) *
@@ -200,7 +199,7 @@ TEST(OdometryNoiseTest, FindsTheWheelThatSlipped) {
 }
 
 TEST(GroundTest, FindsTheHeightOfACameraPutAtZero) {
-  MappingData data = makeDrive(4, 0.0);
+  ReconstructionData data = makeDrive(4, 0.0);
   auto rig = std::make_shared<CameraRig>(*data.rig);
   const RigidTransform& place = *rig->cameras[1].vehicle_from_camera;
   rig->cameras[1].vehicle_from_camera = RigidTransform(
@@ -216,8 +215,8 @@ TEST(GroundTest, FindsTheHeightOfACameraPutAtZero) {
   EXPECT_NEAR(*height_m, 0.9, 0.01);
 }
 
-TEST(GroundTest, TakesThePointsUnderThePathAlone) {
-  const MappingData data = makeDrive(5, 0.0);
+TEST(GroundTest, UsesOnlyPointsUnderThePath) {
+  const ReconstructionData data = makeDrive(5, 0.0);
   const std::vector<GroundPoint> ground = findGroundPoints(data, 0.15);
   EXPECT_GT(ground.size(), 100U);
   for (const GroundPoint& point : ground) {

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kDegrees = 57.29577951308232;
 
-/// Numbers under each other, behind a name.
+/// A line with a name and numbers in columns.
 std::string tableRow(const std::string& name, const Eigen::Matrix<double, 6, 1>& values) {
   char text[128];
   std::snprintf(text, sizeof(text), "%-10s %9.2f %9.2f %9.2f   %9.3f %9.3f %9.3f", name.c_str(), values[0],
@@ -23,8 +23,8 @@ std::string describeCamera(const CameraCalibration& camera, const RigidTransform
   char counts[64];
   std::snprintf(counts, sizeof(counts), "   %8lld %8lld", static_cast<long long>(camera.num_observations),
                 static_cast<long long>(camera.num_shared_landmarks));
-  std::string text = tableRow(camera.name, placeAndAngles(vehicle_from_camera)) + counts + "\n" +
-                     tableRow("  +-", placeAndAngleSigmas(camera.covariance)) +
+  std::string text = tableRow(camera.name, positionAndAngles(vehicle_from_camera)) + counts + "\n" +
+                     tableRow("  +-", positionAndAngleSigmas(camera.covariance)) +
                      "   about z, y, x of the vehicle\n";
   if (!camera.weakest_direction.empty()) {
     text += "  least certain: " + camera.weakest_direction + "\n";
@@ -40,7 +40,7 @@ std::string describeDirection(const std::string& camera, const char* name, const
          toText(in_camera.y(), 4) + ", " + toText(in_camera.z(), 4) + ") in its frame\n";
 }
 
-/// What is known of cameras whose places could not be told.
+/// Known directions of cameras without extrinsics.
 std::string describeDirections(const RigCalibration& result) {
   std::string text;
   for (const CameraCalibration& camera : result.cameras) {
@@ -52,7 +52,7 @@ std::string describeDirections(const RigCalibration& result) {
 
 }  // namespace
 
-Eigen::Matrix<double, 6, 1> placeAndAngles(const RigidTransform& vehicle_from_camera) {
+Eigen::Matrix<double, 6, 1> positionAndAngles(const RigidTransform& vehicle_from_camera) {
   Eigen::Matrix3d optical_from_body;
   optical_from_body << 0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0;
   const Eigen::Matrix3d body = vehicle_from_camera.rotationMatrix() * optical_from_body;
@@ -62,7 +62,7 @@ Eigen::Matrix<double, 6, 1> placeAndAngles(const RigidTransform& vehicle_from_ca
   return result;
 }
 
-Eigen::Matrix<double, 6, 1> placeAndAngleSigmas(const Eigen::Matrix<double, 6, 6>& covariance) {
+Eigen::Matrix<double, 6, 1> positionAndAngleSigmas(const Eigen::Matrix<double, 6, 6>& covariance) {
   const Eigen::Matrix<double, 6, 1> sigmas = covariance.diagonal().cwiseMax(0.0).cwiseSqrt();
   Eigen::Matrix<double, 6, 1> result;
   result << 100.0 * sigmas.head<3>(), kDegrees * sigmas[5], kDegrees * sigmas[4], kDegrees * sigmas[3];

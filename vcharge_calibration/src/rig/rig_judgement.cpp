@@ -15,7 +15,7 @@
 namespace vcharge {
 namespace {
 
-// What counts as one: to compare metres with radians.
+// Units that make metres and radians comparable.
 constexpr double kUnit_m = 0.01;
 constexpr double kUnit_rad = 0.05 / 57.29577951308232;
 constexpr double kDegrees = 57.29577951308232;
@@ -24,7 +24,7 @@ constexpr int kHalfIterations = 10;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-/// RMS of the errors of a camera's landmarks, and of what neighbouring ones have in common.
+/// RMS of a camera's reprojection errors, and of their mean in cells of the image.
 class ErrorStatistics {
  public:
   explicit ErrorStatistics(cv::Size image_size_px)
@@ -47,7 +47,7 @@ class ErrorStatistics {
     double square = 0.0, weight = 0.0;
     for (size_t i = 0; i < sums_.size(); ++i) {
       if (counts_[i] >= kMinPerCell) {
-        // Without what independent errors leave of the mean.
+        // Without the expected square of the mean of independent errors.
         square += std::max(0.0, sums_[i].squaredNorm() / counts_[i] - 2.0 * rms() * rms());
         weight += 2.0 * counts_[i];
       }
@@ -64,7 +64,7 @@ class ErrorStatistics {
   int64_t count_ = 0;
 };
 
-void countObservations(const MappingData& data, RigCalibration* result) {
+void countObservations(const ReconstructionData& data, RigCalibration* result) {
   std::vector<ErrorStatistics> statistics;
   std::vector<RigidTransform> camera_from_vehicle;
   for (const RigCamera& camera : data.rig->cameras) {
@@ -98,10 +98,10 @@ void countObservations(const MappingData& data, RigCalibration* result) {
   }
 }
 
-/// The rig from the odd or the even parts of the drive alone; all keyframes stay, joined by odometry.
+/// The rig from the odd or the even parts of the drive; odometry connects all keyframes.
 std::shared_ptr<const CameraRig> calibrateHalf(const RigAdjustmentOptions& options, const RigPriors& priors,
-                                               const MappingData& data, bool odd) {
-  MappingData half;
+                                               const ReconstructionData& data, bool odd) {
+  ReconstructionData half;
   half.rig = data.rig;
   half.odometry_distance_scale = data.odometry_distance_scale;
   half.odometry_turn_scale = data.odometry_turn_scale;
@@ -145,7 +145,7 @@ Vector6d commonVariances(const RigAdjustmentOptions& options, const RigCamera& c
   return sigmas.cwiseAbs2();
 }
 
-/// What can be told least of a camera: the longest axis of its uncertainty, in words.
+/// Text of the longest axis of a camera's uncertainty.
 std::string describeWeakest(const Matrix6d& covariance) {
   const char* const names[] = {"forwards", "sideways", "height", "roll", "pitch", "yaw"};
   Vector6d units;
@@ -170,14 +170,14 @@ std::string describeFailure(const std::string& camera, const HandEye& initial, c
   const std::string who = "camera '" + camera + "'";
   switch (initial.status) {
     case HandEyeStatus::kTooFewMotions:
-      return who + ": too few images in which points could be followed (" +
-             std::to_string(initial.num_motions) + " motions of " + std::to_string(drive.num_keyframes) +
+      return who + ": too few images with tracked points (" + std::to_string(initial.num_motions) +
+             " motions of " + std::to_string(drive.num_keyframes) +
              "): is it covered, dirty, or without light?";
     case HandEyeStatus::kNoTurn:
       return who + ": no turn: the drive turned " + toText(kDegrees * drive.left_turn_rad, 0) +
              " degrees to the left and " + toText(kDegrees * drive.right_turn_rad, 0) +
-             " to the right; straight ahead shows neither where a camera is nor its roll. Drive a figure of "
-             "eight";
+             " to the right; a straight drive shows neither the position of a camera nor its roll. "
+             "Drive a figure of eight";
     case HandEyeStatus::kNoAgreement:
       return who + ": its motions contradict the odometer's (" + std::to_string(initial.num_inliers) +
              " of " + std::to_string(initial.num_motions) +
@@ -209,16 +209,15 @@ std::string findWrongSign(const CameraRig& rig) {
     return "all cameras would hang upside down: the odometer's turns have the wrong sign";
   }
   if (num_named > 0 && num_round == num_named) {
-    return "all cameras would look the opposite way of their names: the odometer's direction of travel has "
-           "the "
-           "wrong sign";
+    return "all cameras would look opposite to their names: the odometer's direction of travel has the wrong "
+           "sign";
   }
   return "";
 }
 
-void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, const MappingState& state,
+void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, const ReconstructionState& state,
               RigCalibration* result) {
-  const MappingData& data = state.data;
+  const ReconstructionData& data = state.data;
   result->rms_px = state.report.rms_px;
   result->odometer_turn_scale = data.odometry_turn_scale;
   for (const LoopEdge& edge : state.report.loop_edges) {
@@ -226,10 +225,9 @@ void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, cons
   }
   countObservations(data, result);
   const auto num_ground = findGroundPoints(data, options.max_ground_distance_m).size();
-  result->height_source = "from " + std::to_string(num_ground) +
-                          " landmarks on the ground near the path, on which base_link stands in the mean";
+  result->height_source = "from " + std::to_string(num_ground) + " landmarks on the ground near the path";
   if (result->is_from_map) {
-    result->height_source += ", and from the ground on which the map's vehicle stood";
+    result->height_source += ", and from the ground of the map";
   }
   auto rig = std::make_shared<CameraRig>(*data.rig);
   const RigUncertainty uncertainty = rigUncertainty(options, priors, data);

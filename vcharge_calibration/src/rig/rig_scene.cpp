@@ -10,7 +10,7 @@ std::string colourOfCamera(size_t camera) {
   return kColours[camera % kColours.size()];
 }
 
-LandmarksByCamera landmarksByCamera(const MappingData& data) {
+LandmarksByCamera landmarksByCamera(const ReconstructionData& data) {
   LandmarksByCamera landmarks(data.rig->cameras.size());
   for (const Track& track : data.tracks) {
     if (track.position_m) {
@@ -20,7 +20,7 @@ LandmarksByCamera landmarksByCamera(const MappingData& data) {
   return landmarks;
 }
 
-RigScene makeRigScene(const MappingData& data) {
+RigScene makeRigScene(const ReconstructionData& data) {
   RigScene scene{data.rig, {}, landmarksByCamera(data)};
   for (const Keyframe& keyframe : data.keyframes) {
     scene.map_from_vehicle.push_back(keyframe.map_from_vehicle);

@@ -9,15 +9,15 @@ namespace vcharge {
 namespace {
 
 constexpr double kDegrees = 57.29577951308232;
-// Standard deviations with which a calibration is good, and with which it is of no use.
+// Standard deviations of a good and of a useless calibration.
 constexpr double kGoodSigma_m = 0.01, kBadSigma_m = 0.05;
 constexpr double kGoodSigma_rad = 0.1 / kDegrees, kBadSigma_rad = 0.5 / kDegrees;
-// Between the halves of the drive.
+// Differences between the halves of the drive.
 constexpr double kMaxHalfSigmas = 4.0;
 constexpr double kBadHalf_m = 0.10, kBadHalf_rad = 0.5 / kDegrees;
-// Share of the errors that neighbours have in common: lenses that are not as their parameters say.
+// Ratio of the errors that neighbours have in common: wrong intrinsics.
 constexpr double kWarnStructure = 0.4, kFailStructure = 0.7;
-// Share of its points that fit, against the median of the other cameras.
+// Ratio of a camera's observations that fit, over the median of the other cameras.
 constexpr double kWarnFit = 0.75, kFailFit = 0.65;
 constexpr double kMinTurn_rad = 90.0 / kDegrees;
 constexpr double kMinDistance_m = 50.0;
@@ -47,12 +47,13 @@ class RigJudge {
  private:
   void remark(Verdict grade, const std::string& text) { found_.emplace_back(grade, text); }
 
-  /// One remark per degree of freedom, of all cameras of which it is known too little.
+  /// One remark per degree of freedom with all cameras where it is too uncertain.
   void judgeSigmas() {
     const char* const names[] = {"forwards", "sideways", "height", "roll", "pitch", "yaw"};
     for (const CameraCalibration& camera : result_->cameras) {
       if (!(camera.covariance.diagonal().minCoeff() > 0.0)) {
-        remark(Verdict::kFail, "camera '" + camera.name + "': its place cannot be told from this drive");
+        remark(Verdict::kFail,
+               "camera '" + camera.name + "': its extrinsics are not observable in this drive");
         return;
       }
     }
@@ -68,8 +69,8 @@ class RigJudge {
       }
       if (!who.empty()) {
         remark(worst > (i < 3 ? kBadSigma_m : kBadSigma_rad) ? Verdict::kFail : Verdict::kWarn,
-               who + ": " + names[i] + " is known to " + amount(i, worst) + " only: " +
-                   (i == 2 ? "they see too little ground, or share too little with the others"
+               who + ": " + names[i] + " is known only to " + amount(i, worst) + ": " +
+                   (i == 2 ? "too little ground, or too few landmarks shared with other cameras"
                            : "drive further, with tighter turns to both sides"));
       }
     }
@@ -79,7 +80,7 @@ class RigJudge {
     for (int i = 0; i < 6; ++i) {
       const double difference = std::abs(camera.half_difference[i]);
       const double limit = i < 3 ? kGoodSigma_m : kGoodSigma_rad;
-      // Each half has twice the variance of the whole.
+      // Each half has twice the variance of the whole drive.
       const double sigmas = difference / (2.0 * std::sqrt(std::max(1e-18, camera.covariance(i, i))));
       if (difference > (i < 3 ? kBadHalf_m : kBadHalf_rad)) {
         remark(Verdict::kFail,
@@ -99,21 +100,21 @@ class RigJudge {
   }
 
   void judgeErrors(const CameraCalibration& camera) {
-    const double share = camera.rms_px > 0.0 ? camera.structure_px / camera.rms_px : 0.0;
-    if (share > kWarnStructure) {
-      remark(share > kFailStructure ? Verdict::kFail : Verdict::kWarn,
-             "camera '" + camera.name + "': errors go together over the image (" + toText(100.0 * share, 0) +
-                 " % of them): its intrinsics are wrong. Calibrate the intrinsics anew");
+    const double ratio = camera.rms_px > 0.0 ? camera.structure_px / camera.rms_px : 0.0;
+    if (ratio > kWarnStructure) {
+      remark(ratio > kFailStructure ? Verdict::kFail : Verdict::kWarn,
+             "camera '" + camera.name + "': errors correlate over the image (" + toText(100.0 * ratio, 0) +
+                 " % of them): wrong intrinsics. Calibrate the intrinsics again");
     }
-    // A map joins its cameras whatever they share.
+    // A map connects the cameras even without shared landmarks.
     if (camera.num_shared_landmarks < kMinShared && result_->cameras.size() > 1 && !result_->is_from_map) {
-      remark(Verdict::kWarn,
-             "camera '" + camera.name + "' shares only " + std::to_string(camera.num_shared_landmarks) +
-                 " landmarks with other cameras: pass the same places again, in both directions");
+      remark(Verdict::kWarn, "camera '" + camera.name + "' shares only " +
+                                 std::to_string(camera.num_shared_landmarks) +
+                                 " landmarks with other cameras: revisit places in both directions");
     }
   }
 
-  /// Wrong intrinsics bend the camera's place until what fits fits well: the rest was left out.
+  /// With wrong intrinsics few observations fit, and those fit well: the others were removed.
   void judgeFit() {
     const auto shareOf = [](const CameraCalibration& camera) {
       return static_cast<double>(camera.num_observations) /
@@ -127,16 +128,16 @@ class RigJudge {
         }
       }
       if (others.size() < 2) {
-        return;  // two cameras may differ by what they look at
+        return;  // two cameras may differ by what they see
       }
       std::sort(others.begin(), others.end());
       const double usual = others[others.size() / 2];
-      const double share = shareOf(camera);
-      if (share < kWarnFit * usual) {
-        remark(
-            share < kFailFit * usual ? Verdict::kFail : Verdict::kWarn,
-            "camera '" + camera.name + "': of its points only " + toText(100.0 * share / usual, 0) +
-                " % as many fit as of the others': its intrinsics are wrong, or it moved during the drive");
+      const double ratio = shareOf(camera);
+      if (ratio < kWarnFit * usual) {
+        remark(ratio < kFailFit * usual ? Verdict::kFail : Verdict::kWarn,
+               "camera '" + camera.name + "': only " + toText(100.0 * ratio / usual, 0) +
+                   " % as many observations fit as of the other cameras: wrong intrinsics, or it moved "
+                   "during the drive");
       }
     }
   }
@@ -156,15 +157,14 @@ class RigJudge {
              "the drive is only " + toText(drive.distance_m, 0) + " m long: drive 100 m or more");
     }
     if (drive.num_loop_edges == 0 && !drive.is_from_map) {
-      remark(Verdict::kWarn, "no place was passed twice: come back to where the drive began");
+      remark(Verdict::kWarn, "no loop was closed: return to the start of the drive");
     }
     if (std::abs(drive.time_offset_s) > kWarnOffset_s) {
       remark(std::abs(drive.time_offset_s) > kFailOffset_s ? Verdict::kFail : Verdict::kWarn,
              "the odometer's stamps are " + toText(1000.0 * std::abs(drive.time_offset_s), 0) + " ms " +
                  (drive.time_offset_s > 0.0 ? "late" : "early") +
-                 " against the images, which was corrected for here: correct the clocks, since every later "
-                 "stage "
-                 "believes the stamps");
+                 " against the images. They are corrected here, but other stages use the stamps as they are: "
+                 "correct the clocks");
     }
   }
 

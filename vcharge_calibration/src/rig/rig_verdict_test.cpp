@@ -6,7 +6,7 @@
 namespace vcharge {
 namespace {
 
-/// A drive and three cameras without fault.
+/// A good calibration of three cameras.
 RigCalibration makeGood() {
   RigCalibration result;
   result.distance_m = 150.0;
@@ -39,16 +39,16 @@ void expectRemark(const std::string& remark, const std::string& part) {
   EXPECT_NE(remark.find(part), std::string::npos) << remark;
 }
 
-TEST(RigVerdictTest, PassesWhatIsGood) {
+TEST(RigVerdictTest, PassesAGoodCalibration) {
   Verdict verdict = Verdict::kFail;
   EXPECT_EQ(judge([](RigCalibration*) {}, &verdict), "");
   EXPECT_EQ(verdict, Verdict::kPass);
 }
 
-TEST(RigVerdictTest, NamesWhatIsKnownTooLittle) {
+TEST(RigVerdictTest, NamesUncertainDegreesOfFreedom) {
   Verdict verdict = Verdict::kPass;
   expectRemark(judge([](RigCalibration* r) { r->cameras[1].covariance(2, 2) = 0.02 * 0.02; }, &verdict),
-               "'left': height is known to 2.0 cm only");
+               "'left': height is known only to 2.0 cm");
   EXPECT_EQ(verdict, Verdict::kWarn);
   judge([](RigCalibration* r) { r->cameras[1].covariance(2, 2) = 0.2 * 0.2; }, &verdict);
   EXPECT_EQ(verdict, Verdict::kFail);
@@ -65,32 +65,31 @@ TEST(RigVerdictTest, ComparesTheHalvesOfTheDrive) {
   EXPECT_EQ(verdict, Verdict::kFail);
 }
 
-TEST(RigVerdictTest, AsksForTheManoeuvreThatIsMissing) {
+TEST(RigVerdictTest, NamesTheMissingManoeuvre) {
   Verdict verdict = Verdict::kPass;
   expectRemark(judge([](RigCalibration* r) { r->right_turn_rad = 0.5; }, &verdict), "degrees to the right");
   EXPECT_EQ(verdict, Verdict::kWarn);
-  expectRemark(judge([](RigCalibration* r) { r->num_loop_edges = 0; }, &verdict),
-               "no place was passed twice");
+  expectRemark(judge([](RigCalibration* r) { r->num_loop_edges = 0; }, &verdict), "no loop was closed");
   expectRemark(judge([](RigCalibration* r) { r->distance_m = 20.0; }, &verdict), "drive 100 m or more");
   expectRemark(judge([](RigCalibration* r) { r->cameras[0].num_shared_landmarks = 0; }, &verdict),
                "camera 'front' shares only 0 landmarks");
 }
 
-TEST(RigVerdictTest, TellsLateStampsAndWrongLenses) {
+TEST(RigVerdictTest, NamesDelayedStampsAndWrongIntrinsics) {
   Verdict verdict = Verdict::kPass;
   expectRemark(judge([](RigCalibration* r) { r->time_offset_s = 0.1; }, &verdict), "100 ms late");
   EXPECT_EQ(verdict, Verdict::kWarn) << "it is corrected for";
   judge([](RigCalibration* r) { r->time_offset_s = -0.4; }, &verdict);
   EXPECT_EQ(verdict, Verdict::kFail);
   expectRemark(judge([](RigCalibration* r) { r->cameras[0].num_observations = 5000; }, &verdict),
-               "camera 'front': of its points only 50 % as many fit");
+               "camera 'front': only 50 % as many observations fit");
   EXPECT_EQ(verdict, Verdict::kFail);
   expectRemark(judge([](RigCalibration* r) { r->cameras[1].structure_px = 0.4; }, &verdict),
-               "camera 'left': errors go together over the image");
+               "camera 'left': errors correlate over the image");
   EXPECT_EQ(verdict, Verdict::kFail);
 }
 
-TEST(WrongSignTest, IsToldFromNamesAndFromWhatIsUp) {
+TEST(WrongSignTest, FollowsFromNamesAndFromUpsideDownCameras) {
   const auto rigOf = [&](const RigidTransform& vehicle_from_wrong) {
     KannalaBrandtCamera::Parameters parameters;
     parameters << 200.0, 200.0, 319.5, 199.5, 0.0, 0.0, 0.0, 0.0;

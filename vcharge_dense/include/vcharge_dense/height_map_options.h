@@ -31,6 +31,7 @@ struct HeightFusionOptions {
   void checkFields() const;
 };
 
+/// Options of OctomapBuilder.
 struct OctomapOptions {
   VCHARGE_BEGIN_OPTIONS(OctomapOptions);
   VCHARGE_OPTION(double, resolution_m, 0.1, positive(), "Side of the smallest voxel.");
@@ -51,7 +52,7 @@ struct HeightMapOptions {
       double, label_gamma, 10.0, notNegative(),
       "Sum of weights that the free space above an observed cell must reach (gamma of the paper).");
   VCHARGE_OPTION_GROUP(DrivabilityOptions, drivability, {}, "Which cells can be driven on.");
-  VCHARGE_OPTION_GROUP(OctomapOptions, octomap, {}, "OctoMap.");
+  VCHARGE_OPTION_GROUP(OctomapOptions, octomap, {}, "OctoMap built from the same range maps.");
   VCHARGE_END_OPTIONS();
 };
 

@@ -86,7 +86,7 @@ class HeightMapper : public DriveConsumer {
   std::string trajectory_hash_ = "odometry";
   std::unique_ptr<RangeMapper> range_mapper_;
   std::vector<View> views_;
-  std::map<size_t, Eigen::Vector3d> last_position_m_;  // of the newest view of each camera
+  std::map<size_t, Eigen::Vector3d> last_position_m_;  // position of each camera at its newest view
   std::map<std::string, double> times_s_;
   size_t num_reused_ = 0;
   Eigen::AlignedBox3d extent_m_;  // x and y: camera positions; z: vehicle poses

@@ -47,7 +47,8 @@ class OctomapBuilder {
   std::unique_ptr<octomap::OcTree> tree_;
   std::unique_ptr<VoxelBlocks> voxels_;  // log odds, copied into the octree by tree()
   bool tree_is_current_ = true;
-  std::map<std::vector<double>, std::unique_ptr<RayTable>> rays_;  // by camera parameters and image size
+  std::map<std::vector<double>, std::unique_ptr<RayTable>>
+      rays_;  // indexed by camera parameters and image size
 };
 
 }  // namespace vcharge

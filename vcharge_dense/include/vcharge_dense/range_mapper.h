@@ -26,6 +26,7 @@ inline std::vector<std::string> enumNames<RangePreset>() {
   return {"fast", "default", "accurate"};
 }
 
+/// Options of RangeMapper.
 struct RangeMapperOptions {
   VCHARGE_BEGIN_OPTIONS(RangeMapperOptions);
   VCHARGE_OPTION(RangePreset, preset, RangePreset::kDefault, anyValue(),
@@ -36,7 +37,7 @@ struct RangeMapperOptions {
                  "Neighbours are also taken from after the reference, which delays range maps.");
   VCHARGE_OPTION_GROUP(WorkingCameraOptions, working_camera, {}, "Undistorted images that are swept.");
   VCHARGE_OPTION_GROUP(NeighbourOptions, neighbours, {}, "Images that a reference is matched with.");
-  VCHARGE_OPTION_GROUP(PlaneSweepOptions, plane_sweep, {}, "Plane sweep.");
+  VCHARGE_OPTION_GROUP(PlaneSweepOptions, plane_sweep, {}, "Planes, scores and limits of reported ranges.");
   VCHARGE_OPTION_GROUP(OdometryBufferOptions, odometry, {}, "Interpolation of the vehicle's poses.");
   VCHARGE_END_OPTIONS();
 
@@ -132,7 +133,7 @@ class RangeMapper : public DriveConsumer {
   const TaskCallback on_task_;
   OdometryBuffer poses_;
   bool poses_are_given_ = false;
-  std::vector<std::unique_ptr<Camera>> cameras_;  // by index in the rig; null: not in use
+  std::vector<std::unique_ptr<Camera>> cameras_;  // indexed as in the rig; null: not in use
   std::optional<Timestamp> newest_image_;
 };
 

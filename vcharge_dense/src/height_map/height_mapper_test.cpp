@@ -26,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr int kNumImages = 9;
 constexpr double kStep_m = 0.25;
-constexpr double kMaxRange_m = 8.0;  // of rays in the OctoMap
+constexpr double kMaxRange_m = 8.0;  // length of rays in the OctoMap
 const cv::Size kSize(240, 150);
 
 /// A vehicle drives along x over textured ground, with a camera that faces left and downwards.
@@ -96,11 +96,11 @@ TEST_F(HeightMapperTest, MapsLevelGroundAndResumesAnInterruptedRun) {
     HeightMapper mapper(rig_, options_, folder_ + "/work", "drive");
     mapper.setTrajectory(poses(kNumImages));
     drive(&mapper);
-    std::map<std::string, std::vector<double>> shares;
+    std::map<std::string, std::vector<double>> fractions;
     HeightMapResult result =
-        mapper.finish([&](const std::string& step, double share) { shares[step].push_back(share); });
-    EXPECT_GE(shares.size(), 2U);
-    for (const auto& [step, values] : shares) {
+        mapper.finish([&](const std::string& step, double fraction) { fractions[step].push_back(fraction); });
+    EXPECT_GE(fractions.size(), 2U);
+    for (const auto& [step, values] : fractions) {
       EXPECT_TRUE(std::is_sorted(values.begin(), values.end())) << step;
       EXPECT_DOUBLE_EQ(values.back(), 1.0) << step;
     }

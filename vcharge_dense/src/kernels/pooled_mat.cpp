@@ -67,7 +67,7 @@ class MatPool : public cv::MatAllocator {
   }
 
   mutable std::mutex mutex_;
-  mutable std::map<size_t, std::vector<void*>> idle_;  // by size
+  mutable std::map<size_t, std::vector<void*>> idle_;  // unused blocks, indexed by their size
   mutable size_t idle_bytes_ = 0;
 };
 

@@ -15,11 +15,11 @@
 namespace vcharge {
 namespace {
 
-/// Fractions of the pixels inside a border of 8 pixels.
+/// Quality of the ranges inside a border of 8 pixels.
 struct Score {
-  double known = 0.0;         // of all pixels
-  double right = 0.0;         // of the known ones: range within the tolerance
-  double within_sigma = 0.0;  // of the known ones: error within one sigma
+  double known = 0.0;         // fraction of all pixels
+  double right = 0.0;         // fraction of known pixels with a range within the tolerance
+  double within_sigma = 0.0;  // fraction of known pixels with an error within one sigma
   double median_error = 0.0;  // relative
 };
 template <class Select>

@@ -26,7 +26,7 @@ AnalyticScene kerb(uint32_t seed) {
 struct Errors {
   double known = 0.0;            // fraction of pixels with a range
   double median = 0.0;           // signed relative error of the inverse range of known pixels
-  double median_absolute = 0.0;  // of all pixels; unknown ones count as infinite
+  double median_absolute = 0.0;  // absolute error of all pixels; unknown ones count as infinite
 };
 
 double middleOf(std::vector<double> values) {

@@ -73,7 +73,7 @@ class RowReader {
   const Hypotheses& hypotheses_;
   const TileScores& scores_;
   const int first_plane_;
-  std::vector<float> offsets_;  // by slot
+  std::vector<float> offsets_;  // indexed by slot
   std::vector<uint8_t> inside_;
   size_t row_ = 0, first_ = 0;
   const float* weight_ = nullptr;

@@ -25,7 +25,7 @@ struct SurfaceEstimate {
 };
 
 struct Parabola {
-  float offset = 0.0f;  ///< of the maximum from the middle, in hypotheses
+  float offset = 0.0f;  ///< offset of the maximum from the middle, in hypotheses
   float curvature = std::numeric_limits<float>::quiet_NaN();  ///< negative second difference of correlations
 };
 

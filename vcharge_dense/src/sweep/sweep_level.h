@@ -46,7 +46,7 @@ class SweepLevel {
   const cv::Mat& validWindows() const { return valid_windows_; }
   const PlaneSweepOptions& options() const { return options_; }
   const std::vector<PlaneFamily>& families() const { return families_; }
-  const std::vector<Hypotheses>& planes() const { return planes_; }  ///< of families()
+  const std::vector<Hypotheses>& planes() const { return planes_; }  ///< planes of families()
 
  private:
   class WorkerPool;

@@ -15,26 +15,26 @@
 
 namespace vcharge {
 
-/// Maps a drive while it comes in: feeds a SparseMapper, and makes the map in a thread of its own, during
-/// which and after which what comes is counted and not used. A drive that makes no map is forgotten, and a
-/// new one begins. The drive's calls are serialized by their source; the others may come from any thread.
+/// Maps a live drive: feeds a SparseMapper, and finishes the map in a thread of its own. Images that arrive
+/// after finish() are counted and not used. After a failure a new drive begins. The source serializes the
+/// calls of DriveConsumer; the others may come from any thread.
 class MappingSession : public DriveConsumer {
  public:
   enum class Phase { kFollowing, kFinishing, kFinished };
   struct Status {
     Phase phase = Phase::kFollowing;
     std::string message;  ///< one line
-    std::string failure;  ///< why the last drive made no map; empty where none failed
-    std::vector<std::pair<std::string, int64_t>> counts;  ///< of frames, keyframes, what was skipped
+    std::string failure;  ///< why the last drive made no map; empty without a failure
+    std::vector<std::pair<std::string, int64_t>> counts;  ///< of frames, keyframes and skipped frames
   };
-  using KeyframeCallback = std::function<void(const MappingState&)>;
+  using KeyframeCallback = std::function<void(const ReconstructionState&)>;
   using MapCallback = std::function<void(const SparseMap&)>;
 
-  /// `on_keyframe` is called inside addImage() and addOdometry(), whenever there are more keyframes than
-  /// before; `on_map` in the thread that made the map. Neither may throw. Errors as SparseMapper.
+  /// `on_keyframe` is called inside addImage() and addOdometry() after new keyframes; `on_map` in the thread
+  /// that made the map. Neither may throw. Errors as those of SparseMapper.
   MappingSession(std::shared_ptr<const CameraRig> rig, const SparseMapperOptions& options,
                  KeyframeCallback on_keyframe, MapCallback on_map);
-  /// Gives up a map that is being made, at the end of its stage.
+  /// Abandons an unfinished map at the end of its stage.
   ~MappingSession() override;
   MappingSession(const MappingSession&) = delete;
   MappingSession& operator=(const MappingSession&) = delete;
@@ -42,12 +42,11 @@ class MappingSession : public DriveConsumer {
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
 
-  /// Begins to make the map of what came so far and returns. False where that was begun before; `message`
-  /// says so.
+  /// Starts to finish the map of the drive so far. False if that was started before; `message` has the state.
   bool finish(std::string* message);
 
   Status status() const;
-  /// Null before it is made.
+  /// Null before it is finished.
   std::shared_ptr<const SparseMap> map() const;
 
  private:
@@ -59,13 +58,13 @@ class MappingSession : public DriveConsumer {
   const KeyframeCallback on_keyframe_;
   const MapCallback on_map_;
 
-  std::mutex mutex_;  // guards the mapper while following; the worker alone has it while finishing
+  std::mutex mutex_;  // guards the mapper while following; while finishing only the worker uses it
   std::unique_ptr<SparseMapper> mapper_;
   size_t num_keyframes_told_ = 0;
 
   mutable std::mutex status_mutex_;  // never held during work
   Status status_;
-  int64_t num_ignored_images_ = 0;  // that came after finish()
+  int64_t num_ignored_images_ = 0;  // after finish()
   std::shared_ptr<const SparseMap> map_;
 
   std::atomic<bool> stop_{false};

@@ -6,7 +6,7 @@
 namespace vcharge {
 namespace {
 
-/// Thrown through the mapper when the session ends.
+/// Thrown through the mapper to end its work.
 struct Abandoned {};
 
 }  // namespace
@@ -48,7 +48,7 @@ void MappingSession::addOdometry(const VehicleOdometry& odometry) {
 }
 
 void MappingSession::tell() {
-  const SparseMapperReport& report = mapper_->report();
+  const ReconstructionReport& report = mapper_->report();
   const size_t num_keyframes = mapper_->state().data.keyframes.size();
   {
     const std::lock_guard<std::mutex> lock(status_mutex_);
@@ -82,11 +82,11 @@ bool MappingSession::finish(std::string* message) {
     status_.failure.clear();
   }
   if (worker_.joinable()) {
-    worker_.join();  // of a drive that made no map: it has returned
+    worker_.join();  // it has returned: its drive made no map
   }
   worker_ = std::thread([this] { run(); });
-  *message = "the map is being made of " + std::to_string(mapper_->state().data.keyframes.size()) +
-             " keyframes; /diagnostics tells how far it is";
+  *message = "making the map of " + std::to_string(mapper_->state().data.keyframes.size()) +
+             " keyframes; /diagnostics shows the progress";
   return true;
 }
 
@@ -113,7 +113,7 @@ void MappingSession::run() {
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   if (map) {
-    mapper_.reset();  // the images' features are of no more use
+    mapper_.reset();  // frees the features of the images
   } else {
     mapper_ = std::make_unique<SparseMapper>(rig_, options_);
     num_keyframes_told_ = 0;

@@ -40,7 +40,7 @@ void addOdometry(SparseMapper* mapper, int frame, double x_m) {
   mapper->addOdometry(odometry);
 }
 
-TEST(SparseMapperTest, SaysWhyADriveDoesNotMakeAMap) {
+TEST(SparseMapperTest, NamesTheReasonWithoutAMap) {
   {
     SparseMapper mapper(testing::makeTestRig(), SparseMapperOptions());
     EXPECT_THAT(errorOf(&mapper), HasSubstr("0 frames"));
@@ -73,7 +73,7 @@ TEST(SparseMapperTest, SaysWhyADriveDoesNotMakeAMap) {
   }
 }
 
-TEST(SparseMapperTest, CountsFramesThatLackACameraAndResetsOfTheOdometer) {
+TEST(SparseMapperTest, CountsIncompleteFramesAndOdometerResets) {
   SparseMapper mapper(testing::makeTestRig(), SparseMapperOptions());
   for (int frame = 0; frame < 10; ++frame) {
     addOdometry(&mapper, frame, frame < 5 ? 100.0 + 0.2 * frame : 0.2 * (frame - 5));

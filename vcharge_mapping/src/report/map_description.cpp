@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kDegreesPerRadian = 57.29577951308232;
 
-/// Appends as printf does.
+/// Appends text with the format of printf.
 __attribute__((format(printf, 2, 3))) void append(std::string* text, const char* format, ...) {
   va_list arguments, again;
   va_start(arguments, format);
@@ -29,9 +29,9 @@ __attribute__((format(printf, 2, 3))) void append(std::string* text, const char*
   text->pop_back();
 }
 
-/// The value that a share of the values does not exceed; values must not be empty.
-double percentile(std::vector<double>* values, double share) {
-  const std::ptrdiff_t rank = std::lround(share * static_cast<double>(values->size() - 1));
+/// Quantile of values, which must not be empty.
+double percentile(std::vector<double>* values, double ratio) {
+  const std::ptrdiff_t rank = std::lround(ratio * static_cast<double>(values->size() - 1));
   std::nth_element(values->begin(), values->begin() + rank, values->end());
   return (*values)[static_cast<size_t>(rank)];
 }
@@ -162,6 +162,14 @@ void describeProvenance(const MapProvenance& provenance, std::string* text) {
 
 }  // namespace
 
+Trajectory trajectoryOf(const SparseMap& map) {
+  Trajectory trajectory;
+  for (const MapKeyframe& keyframe : map.keyframes()) {
+    trajectory.push_back({keyframe.stamp, keyframe.map_from_vehicle});
+  }
+  return trajectory;
+}
+
 ReprojectionErrors measureReprojection(const SparseMap& map, size_t camera) {
   const RigCamera& rig_camera = map.rig().cameras.at(camera);
   const RigidTransform camera_from_vehicle = rig_camera.vehicle_from_camera->inverse();
@@ -199,7 +207,6 @@ std::string describeMap(const SparseMap& map, const MapProvenance& provenance, b
   describeLoops(map, list_loop_edges, &text);
   append(&text, "odometer      true over counted distance %.5f, true over counted turn %.5f\n",
          map.contents().odometry_distance_scale, map.contents().odometry_turn_scale);
-  append(&text, "vocabulary    %zu bytes\n", map.contents().vocabulary.size());
   describeProvenance(provenance, &text);
   return text;
 }

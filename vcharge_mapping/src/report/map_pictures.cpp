@@ -18,7 +18,7 @@ using Points = std::vector<Eigen::Vector2d>;
 constexpr size_t kMaxDrawnLandmarks = 30000;
 constexpr double kMargin_m = 12.0;  // shown around the path
 constexpr const char* kPathCss = "stroke=\"#333\" stroke-width=\"1.5\"";
-// From the lowest to the highest landmarks.
+// Colours from the lowest to the highest landmark.
 constexpr std::array<const char*, 6> kHeightColours = {"#3b4cc0", "#4f8fd0", "#35a79c",
                                                        "#8bbf3f", "#e0a030", "#c8402f"};
 constexpr double kLowest_m = -0.5, kHeightStep_m = 0.75;
@@ -42,7 +42,7 @@ SvgPlot plotAround(const Points& path, double margin_m) {
                  {box.min().y() - margin_m, box.max().y() + margin_m}, 0.0, true, "x (m)", "y (m)");
 }
 
-/// Way driven at each keyframe.
+/// Distance driven until each keyframe.
 std::vector<double> travelled(const SparseMap& map) {
   std::vector<double> way_m(map.keyframes().size(), 0.0);
   for (size_t k = 1; k < way_m.size(); ++k) {
@@ -53,13 +53,13 @@ std::vector<double> travelled(const SparseMap& map) {
   return way_m;
 }
 
-/// The frames that were followed, and the way to each.
+/// The frames and the distance driven until each.
 struct FramePlaces {
   std::vector<Eigen::Vector3d> position_m;
   std::vector<double> way_m;
 };
 
-FramePlaces placesOf(const MappingState& state) {
+FramePlaces placesOf(const ReconstructionState& state) {
   FramePlaces places;
   for (const FramePose& frame : state.frames) {
     const RigidTransform map_from_vehicle =
@@ -138,7 +138,7 @@ std::string drawLoops(const SparseMap& map) {
   for (const MapLoopEdge& edge : map.contents().loop_edges) {
     by_reason[edge.reason].emplace_back(path[edge.first], path[edge.second]);
   }
-  // Those that came furthest are drawn last; candidates that only looked alike are faint.
+  // Accepted edges are drawn last, unverified candidates faintly.
   std::vector<std::string> order;
   for (const auto& [reason, edges] : by_reason) {
     order.push_back(reason);
@@ -164,7 +164,7 @@ std::string drawLoops(const SparseMap& map) {
   return plot.make();
 }
 
-std::string drawMotions(const MappingState& state) {
+std::string drawMotions(const ReconstructionState& state) {
   const FramePlaces places = placesOf(state);
   Points path;
   for (const Eigen::Vector3d& position_m : places.position_m) {
@@ -176,7 +176,7 @@ std::string drawMotions(const MappingState& state) {
   for (size_t i = 1; i < path.size(); ++i) {
     by_motion[static_cast<size_t>(state.frames[i].motion)].push_back(path[i]);
   }
-  // Seldom ones are drawn over the usual one.
+  // Rare motions are drawn on top.
   for (const MotionHypothesis motion : {MotionHypothesis::kAckermann, MotionHypothesis::kOdometry,
                                         MotionHypothesis::kPlanar, MotionHypothesis::kSpatial}) {
     plot.addDots(by_motion[static_cast<size_t>(motion)], motion == MotionHypothesis::kAckermann ? 4.0 : 6.0,
@@ -186,7 +186,7 @@ std::string drawMotions(const MappingState& state) {
   return plot.make();
 }
 
-std::string drawHeights(const MappingState& state) {
+std::string drawHeights(const ReconstructionState& state) {
   const FramePlaces places = placesOf(state);
   Points line;
   double min_m = 0.0, max_m = 0.0;

@@ -7,7 +7,6 @@
 #include "report/map_pictures.h"
 #include "vcharge_core/base/text_format.h"
 #include "vcharge_core/files/html.h"
-#include "vcharge_mapping/map_back_end.h"
 #include "vcharge_mapping/map_description.h"
 
 namespace vcharge {
@@ -32,7 +31,7 @@ std::string verdictOf(const MapVerdict& verdict) {
   return text + "</p>";
 }
 
-std::string summaryOf(const SparseMap& map, const SparseMapperReport& report) {
+std::string summaryOf(const SparseMap& map, const ReconstructionReport& report) {
   double length_m = 0.0;
   for (size_t k = 1; k < map.keyframes().size(); ++k) {
     length_m += (map.keyframes()[k].map_from_vehicle.translation() -
@@ -58,7 +57,7 @@ std::string loopsOf(const SparseMap& map) {
   for (const MapLoopEdge& edge : map.contents().loop_edges) {
     ++by_reason[edge.accepted ? std::string() : edge.reason];
   }
-  std::string text = "<table>" + rowOf({"pairs of keyframes that looked alike", "edges"}, true) +
+  std::string text = "<table>" + rowOf({"pairs of similar keyframes", "edges"}, true) +
                      rowOf({"accepted", std::to_string(by_reason[""])});
   for (const auto& [reason, count] : by_reason) {
     if (!reason.empty()) {
@@ -68,11 +67,10 @@ std::string loopsOf(const SparseMap& map) {
   return text + "</table>";
 }
 
-std::string motionsOf(const SparseMapperReport& report) {
-  static const char* const kMeanings[] = {"too few matches, or none that agree: as the odometer counted",
-                                          "a circle about a point on the rear axle's line",
-                                          "any motion in the plane: the wheels slipped",
-                                          "six degrees of freedom: a ramp, a bump"};
+std::string motionsOf(const ReconstructionReport& report) {
+  static const char* const kMeanings[] = {
+      "too few matches agree: the odometer's motion", "a circle about a point on the rear axle's line",
+      "any motion in the plane: the wheels slipped", "six degrees of freedom: a ramp, a bump"};
   const std::vector<std::string> names = enumNames<MotionHypothesis>();
   std::string text = "<table>" + rowOf({"motion between frames", "frames", "meaning"}, true);
   for (size_t i = 0; i < names.size(); ++i) {
@@ -82,7 +80,7 @@ std::string motionsOf(const SparseMapperReport& report) {
   return text + "</table>";
 }
 
-std::string camerasOf(const SparseMap& map, const SparseMapperReport& report) {
+std::string camerasOf(const SparseMap& map, const ReconstructionReport& report) {
   std::string text =
       "<table>" + rowOf({"camera", "observations", "error, RMS distance (px)", "images missing"}, true);
   for (size_t i = 0; i < map.rig().cameras.size(); ++i) {
@@ -93,13 +91,10 @@ std::string camerasOf(const SparseMap& map, const SparseMapperReport& report) {
   return text + "</table>";
 }
 
-std::string stagesOf(const SparseMapperReport& report) {
-  std::vector<std::string> order = {"following"};
-  order.insert(order.end(), backEndStages().begin(), backEndStages().end());
-  order.insert(order.end(), {"assembly", "checkpoints"});
+std::string stagesOf(const ReconstructionReport& report) {
   double sum_s = 0.0;
   std::string text = "<table>" + rowOf({"stage", "time (s)"}, true);
-  for (const std::string& stage : order) {
+  for (const std::string& stage : report.stages) {
     const auto found = report.stage_s.find(stage);
     if (found != report.stage_s.end()) {
       sum_s += found->second;
@@ -109,7 +104,7 @@ std::string stagesOf(const SparseMapperReport& report) {
   return text + rowOf({"sum", toText(sum_s, 2)}) + "</table>";
 }
 
-std::string skippedOf(const SparseMapperReport& report, Timestamp start) {
+std::string skippedOf(const ReconstructionReport& report, Timestamp start) {
   const auto count_row = [](const char* what, int64_t count) {
     return count > 0 ? rowOf({what, std::to_string(count)}) : std::string();
   };
@@ -117,8 +112,8 @@ std::string skippedOf(const SparseMapperReport& report, Timestamp start) {
       count_row("frames without odometry: not used", report.num_frames_without_odometry) +
       count_row("frames that lack a camera: used with the others", report.num_incomplete_frames) +
       count_row("standing frames: not used", report.num_standing_frames) +
-      count_row("images that came too late: not used", report.num_late_images) +
-      count_row("times the odometer started over", report.num_odometry_resets);
+      count_row("images that arrived too late: not used", report.num_late_images) +
+      count_row("resets of the odometer", report.num_odometry_resets);
   if (text.empty()) {
     return "<p>Nothing.</p>";
   }
@@ -143,23 +138,22 @@ std::string skippedOf(const SparseMapperReport& report, Timestamp start) {
 
 }  // namespace
 
-std::string makeMapReport(const std::string& title, const SparseMap& map, const MappingState& state) {
-  const SparseMapperReport& report = state.report;
+std::string makeMapReport(const std::string& title, const SparseMap& map, const ReconstructionState& state) {
+  const ReconstructionReport& report = state.report;
   std::ostringstream out;
   out << verdictOf(judgeMap(map, state)) << summaryOf(map, report) << "<h2>From above</h2>"
       << htmlFigure(drawTopView(map), "Path and landmarks.") << "<h2>Loops</h2>" << loopsOf(map)
-      << htmlFigure(
-             drawLoops(map),
-             "Between the keyframes that each edge connects. Faint: pairs that looked alike and did not "
-             "pass verification.")
+      << htmlFigure(drawLoops(map),
+                    "Lines between the keyframes of each edge. Faint: similar pairs that did not pass "
+                    "verification.")
       << "<h2>How the vehicle moved</h2>" << motionsOf(report)
-      << htmlFigure(drawMotions(state), "By frame; what is seldom is drawn over what is usual.")
-      << htmlFigure(drawHeights(state), "Height of the path in the map, over the same colours.")
+      << htmlFigure(drawMotions(state), "By frame; rare motions are drawn on top.")
+      << htmlFigure(drawHeights(state), "Height of the path in the map, in the same colours.")
       << "<h2>Landmarks in view</h2>"
-      << htmlFigure(drawLandmarkCounts(map), "By keyframe. Places where there are few are hard to recognize.")
+      << htmlFigure(drawLandmarkCounts(map), "By keyframe. Relocalization is hard where there are few.")
       << "<h2>Errors</h2>" << camerasOf(map, report)
       << htmlFigure(drawErrors(map), "Distance between observations and projected landmarks.")
-      << "<h2>Stages</h2>" << stagesOf(report) << "<h2>What was skipped</h2>"
+      << "<h2>Stages</h2>" << stagesOf(report) << "<h2>Skipped frames</h2>"
       << skippedOf(report, map.keyframes().front().stamp);
   return htmlPage(title, out.str());
 }

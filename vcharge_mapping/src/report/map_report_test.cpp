@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 
-/// A map of the test drive, which has nothing to remark on.
+/// A map of the test drive without remarks.
 class MapReportTest : public ::testing::Test {
  protected:
   MapReportTest() {
@@ -42,12 +42,13 @@ class MapReportTest : public ::testing::Test {
     state_.report.num_motions = {0, 39, 0, 0};
     state_.report.num_missing_images = {0, 0};
     state_.report.rms_px = 0.3;
+    state_.report.stages = {"following", "loops"};
     state_.report.stage_s = {{"following", 12.34}, {"loops", 5.0}};
   }
 
   MapVerdict judge() const { return judgeMap(SparseMap(contents_), state_); }
   std::string page() const { return makeMapReport("Map <lot>", SparseMap(contents_), state_); }
-  /// The only remark holds this text, and the grade is this.
+  /// Expects this grade, and one remark that contains this text.
   void expect(MapGrade grade, const std::string& remark) const {
     const MapVerdict verdict = judge();
     EXPECT_EQ(verdict.grade, grade) << remark;
@@ -55,7 +56,7 @@ class MapReportTest : public ::testing::Test {
   }
 
   SparseMapContents contents_;
-  MappingState state_;
+  ReconstructionState state_;
 };
 
 TEST_F(MapReportTest, AGoodMapHasNoRemarks) {
@@ -63,7 +64,7 @@ TEST_F(MapReportTest, AGoodMapHasNoRemarks) {
   EXPECT_THAT(judge().remarks, IsEmpty());
 }
 
-TEST_F(MapReportTest, RemarksOnEachFaultByItself) {
+TEST_F(MapReportTest, RemarksOnEachDefect) {
   contents_.loop_edges.clear();
   expect(MapGrade::kCheck, "no loop");
   contents_.loop_edges.assign(4, {0, 39, RigidTransform(), 30, true, ""});
@@ -80,7 +81,7 @@ TEST_F(MapReportTest, RemarksOnEachFaultByItself) {
   state_.report.num_motions = {30, 9, 0, 0};
   expect(MapGrade::kBad, "odometer alone");
   state_.report.num_motions = {0, 30, 9, 0};
-  expect(MapGrade::kCheck, "rolling wheels");
+  expect(MapGrade::kCheck, "unlike rolling wheels");
   state_.report.num_motions = {0, 20, 0, 19};  // a ramp is no fault
   EXPECT_EQ(judge().grade, MapGrade::kGood);
   state_.data.odometry_distance_scale = 0.95;
@@ -96,13 +97,13 @@ TEST_F(MapReportTest, RemarksOnEachFaultByItself) {
   expect(MapGrade::kCheck, "lack a camera");
   state_.report.num_incomplete_frames = 0;
   state_.report.num_odometry_resets = 1;
-  expect(MapGrade::kCheck, "started over");
+  expect(MapGrade::kCheck, "odometer was reset");
 }
 
-TEST_F(MapReportTest, RemarksOnPlacesWithFewLandmarks) {
+TEST_F(MapReportTest, RemarksOnKeyframesWithFewLandmarks) {
   const SparseMapContents whole = contents_;
   for (const auto& [num_left, grade] : {std::make_pair(59, MapGrade::kCheck), {19, MapGrade::kBad}}) {
-    // The last 10 of 40 keyframes see but so many.
+    // Limits the observations of the last 10 of 40 keyframes.
     contents_ = whole;
     contents_.observations.clear();
     std::vector<int> count(40, 0);
@@ -125,7 +126,7 @@ TEST_F(MapReportTest, RemarksOnPlacesWithFewLandmarks) {
   }
 }
 
-TEST_F(MapReportTest, ThePageShowsAllPartsAndNeedsNothingBesideIt) {
+TEST_F(MapReportTest, ThePageIsCompleteAndSelfContained) {
   contents_.loop_edges.push_back({3, 30, RigidTransform(), 10, false, "too uncertain"});
   state_.report.skipped = {
       {"without camera left", contents_.keyframes[3].stamp, contents_.keyframes[6].stamp, 4}};
@@ -148,7 +149,7 @@ TEST_F(MapReportTest, ThePageShowsAllPartsAndNeedsNothingBesideIt) {
   EXPECT_THAT(text, Not(HasSubstr("inf")));
 }
 
-TEST_F(MapReportTest, AVehicleThatStaysInOnePlaceMakesAPageToo) {
+TEST_F(MapReportTest, MakesAPageOfAStandingVehicle) {
   for (MapKeyframe& keyframe : contents_.keyframes) {
     keyframe.map_from_vehicle = RigidTransform();
   }

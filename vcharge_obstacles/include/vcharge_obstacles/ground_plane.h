@@ -58,7 +58,6 @@ struct GroundCandidates {
   std::vector<float> weight;         ///< 0 to 1
 
   size_t size() const { return x_m.size(); }
-  void clear();
   void add(const Eigen::Vector3f& point_in_vehicle_m, float z_sigma_m, float point_weight);
 };
 

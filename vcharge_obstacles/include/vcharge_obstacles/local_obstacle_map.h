@@ -68,8 +68,6 @@ class LocalObstacleMap {
   void add(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle);
   /// Moves all cells into a fixed frame that has been corrected.
   void reanchor(const RigidTransform& new_from_old_fixed);
-  /// Resets all cells to unobserved.
-  void clear();
 
   /// The map at the last moveTo(); frame_id is left empty.
   ObstacleMap snapshot() const;

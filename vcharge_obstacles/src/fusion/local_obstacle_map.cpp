@@ -53,11 +53,6 @@ LocalObstacleMap::LocalObstacleMap(const LocalObstacleMapOptions& options)
       cells_(2 * static_cast<int>(std::lround(options.half_size_m / options.cell_size_m)),
              options.cell_size_m) {}
 
-void LocalObstacleMap::clear() {
-  cells_.clear();
-  last_camera_position_.clear();
-}
-
 void LocalObstacleMap::decay(double travelled_m) {
   const auto keep_occupied = static_cast<float>(std::exp(-travelled_m / options_.decay_occupied_m));
   const auto keep_free = static_cast<float>(std::exp(-travelled_m / options_.decay_free_m));

@@ -184,7 +184,7 @@ TEST_F(ObstacleMapObservationsTest, GroundFarOffTheAxisConfirmsFreeCellsAndFrees
   EXPECT_EQ(stateIn(seen, 0.05, free_y_m), kCellFree);
   EXPECT_LE(countCells(seen, kCellFree), num_free);
   // An obstacle that has gone becomes unobserved, not free.
-  map.clear();
+  map = LocalObstacleMap();
   for (int i = 0; i < 8; ++i) {
     const RigidTransform pose = RigidTransform::planar(0.1 * i, 0.0, 0.0);
     stamp_ = stamp_ + durationFromSeconds(0.08);

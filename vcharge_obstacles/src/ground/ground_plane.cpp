@@ -89,12 +89,6 @@ double GroundPlane::sigmaAt_m(double x_m, double y_m) const {
   return std::sqrt(std::max(0.0, row.dot(covariance * row)));
 }
 
-void GroundCandidates::clear() {
-  for (std::vector<float>* values : {&x_m, &y_m, &z_m, &sigma_m, &weight}) {
-    values->clear();
-  }
-}
-
 void GroundCandidates::add(const Eigen::Vector3f& point_in_vehicle_m, float z_sigma_m, float point_weight) {
   x_m.push_back(point_in_vehicle_m.x());
   y_m.push_back(point_in_vehicle_m.y());

@@ -10,7 +10,4 @@ namespace vcharge {
 /// created. InputError if that fails; plots that cannot be drawn (no matplotlib) only warn on stderr.
 void writeReport(const nlohmann::json& json, const std::string& folder, const std::string& name);
 
-/// Writes `json` to a file, replacing it only when it is complete. InputError if that fails.
-void writeJson(const nlohmann::json& json, const std::string& path);
-
 }  // namespace vcharge

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 void writeReport(const nlohmann::json& json, const std::string& folder, const std::string& name) {
   createFolder(folder);
   const std::string json_path = (fs::path(folder) / (name + ".json")).string();
-  writeJson(json, json_path);
+  writeTextFileAtomically(json_path, json.dump(2) + "\n");
 
   // The script is installed beside the tools.
   const std::string script = (fs::read_symlink("/proc/self/exe").parent_path() / "plot_evaluation").string();
@@ -29,10 +29,6 @@ void writeReport(const nlohmann::json& json, const std::string& folder, const st
       waitpid(child, &status, 0) != child || status != 0) {
     std::cerr << json_path << ": written, but " << script << " could not draw its plots\n";
   }
-}
-
-void writeJson(const nlohmann::json& json, const std::string& path) {
-  writeTextFileAtomically(path, json.dump(2) + "\n");
 }
 
 }  // namespace vcharge

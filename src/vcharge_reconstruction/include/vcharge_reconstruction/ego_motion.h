@@ -7,44 +7,27 @@
 
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/motion/rigid_transform.h"
-#include "vcharge_geometry/robust/motion_estimation.h"
 #include "vcharge_geometry/solvers/ray_match.h"
 
 namespace vcharge {
 
+/// Accuracy of the odometer's motion between two frames, against which the motion in the images is weighted.
 struct EgoMotionOptions {
-  RobustOptions robust = defaultRobust();
-  int min_matches = 30;                   ///< fewer: the odometer alone
-  double odometry_distance_sigma = 0.02;  ///< of the counted distance
-  double odometry_sigma_m = 0.003;        ///< besides
-  double odometry_turn_sigma = 0.05;      ///< of the counted turn
-  double odometry_sigma_rad = 0.001;      ///< besides
-  double side_slip_sigma_m = 0.002;       ///< of the Ackermann model
-  /// A less constrained motion is taken when it explains this many times the matches.
-  double min_gain = 1.1;
-
-  static RobustOptions defaultRobust();
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("robust", robust);
-    visit("min_matches", min_matches);
-    visit("odometry_distance_sigma", odometry_distance_sigma);
-    visit("odometry_sigma_m", odometry_sigma_m);
-    visit("odometry_turn_sigma", odometry_turn_sigma);
-    visit("odometry_sigma_rad", odometry_sigma_rad);
-    visit("side_slip_sigma_m", side_slip_sigma_m);
-    visit("min_gain", min_gain);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(EgoMotionOptions);
+  VCHARGE_OPTION(double, odometry_distance_sigma, 0.02, positive(),
+                 "Relative deviation of a counted distance.");
+  VCHARGE_OPTION(double, odometry_sigma_m, 0.003, positive(), "Constant deviation of a counted distance.");
+  VCHARGE_OPTION(double, odometry_turn_sigma, 0.05, positive(), "Relative deviation of a counted turn.");
+  VCHARGE_OPTION(double, odometry_sigma_rad, 0.001, positive(), "Constant deviation of a counted turn.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// Which motion explained a frame's matches.
+/// Motion model that explains a frame's matches.
 enum class MotionHypothesis {
-  kOdometry,   ///< too few matches, or none that agree: as the odometer counted
+  kOdometry,   ///< the odometer's motion: too few matches agree
   kAckermann,  ///< a circle about a point on the rear axle's line (paper, equation AckermannMotion)
   kPlanar,     ///< any motion in the plane: the wheels slipped
-  kSpatial,    ///< six degrees of freedom: a ramp, a bump
+  kSpatial,    ///< six degrees of freedom: a ramp or a bump
 };
 template <>
 inline std::vector<std::string> enumNames<MotionHypothesis>() {
@@ -57,9 +40,10 @@ struct EgoMotion {
   std::vector<bool> is_inlier;  ///< one per match
 };
 
-/// Motion of the vehicle between two frames: Lee et al.'s two-point method in a robust estimator over the
-/// matches of all cameras (paper, section Ego-Motion Estimation), its length and turn fused with the
-/// odometer's by their covariances, checked against less constrained motions. Deterministic.
+/// Motion of the vehicle between two frames: the two-point method of Lee et al. in a robust estimator over
+/// the matches of all cameras (paper, section Ego-Motion Estimation), compared with less constrained motions,
+/// and fused with the odometer's motion by their covariances. Matches are rays in the vehicle's frame.
+/// Deterministic.
 EgoMotion estimateEgoMotion(const std::vector<RayMatch>& matches,
                             const RigidTransform& odometry_previous_from_current,
                             const EgoMotionOptions& options);

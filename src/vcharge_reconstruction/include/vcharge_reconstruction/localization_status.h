@@ -7,14 +7,14 @@
 
 namespace vcharge {
 
-/// How a vehicle's pose in a map came to be, or why there is none.
+/// Source of a vehicle's pose in a map, or the reason why there is none.
 enum class LocalizationStatus {
-  kLocalized,          ///< the images fix it
-  kTooFewMatches,      ///< too little of the map was found in the images
-  kNoConsensus,        ///< no pose explains enough of what was found
-  kAmbiguous,          ///< two places explain it about equally well
-  kBridgedByOdometry,  ///< a fix a while ago, and the odometer since
-  kLost,               ///< nothing is known, or the last fix is too long ago
+  kLocalized,          ///< a pose from the images
+  kTooFewMatches,      ///< too few landmarks were matched
+  kNoConsensus,        ///< no pose explains enough matches
+  kAmbiguous,          ///< two poses explain the matches about equally well
+  kBridgedByOdometry,  ///< a recent pose from images, extrapolated by odometry
+  kLost,               ///< no recent pose
 };
 
 template <>

@@ -32,8 +32,8 @@ struct TrackCheck {
   bool was_landmark = false, is_landmark = false;
 };
 
-/// Residual of an observation over its standard deviation, and what it tells of the landmark's position.
-bool reproject(const MappingData& data, const Track& track, const TrackObservation& observation,
+/// Reprojection error of an observation. False where the camera does not project the landmark.
+bool reproject(const ReconstructionData& data, const Track& track, const TrackObservation& observation,
                Eigen::Vector2d* error_px) {
   const RigCamera& camera = data.rig->cameras[observation.camera];
   const RigidTransform map_from_camera =
@@ -46,9 +46,10 @@ bool reproject(const MappingData& data, const Track& track, const TrackObservati
   return true;
 }
 
-/// Of the landmark given the poses: every ray tells the position across it to its angle's deviation times
-/// range.
-Eigen::Matrix3d conditionalCovariance(const MappingData& data, const Track& track, double* max_parallax_rad) {
+/// Covariance of a landmark for fixed poses: each ray fixes the position across it with the deviation of its
+/// angle times the range.
+Eigen::Matrix3d conditionalCovariance(const ReconstructionData& data, const Track& track,
+                                      double* max_parallax_rad) {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   std::vector<Eigen::Vector3d> directions;
   double min_cosine = 1.0;
@@ -76,7 +77,7 @@ Eigen::Matrix3d conditionalCovariance(const MappingData& data, const Track& trac
   return covariance.allFinite() ? covariance : Eigen::Matrix3d::Zero();
 }
 
-TrackCheck checkTrack(const BundleAdjustmentOptions& options, const MappingData& data, Track* track) {
+TrackCheck checkTrack(const BundleAdjustmentOptions& options, const ReconstructionData& data, Track* track) {
   TrackCheck result;
   result.was_landmark = true;
   std::vector<TrackObservation> kept;
@@ -111,32 +112,11 @@ TrackCheck checkTrack(const BundleAdjustmentOptions& options, const MappingData&
 
 }  // namespace
 
-void BundleAdjustmentOptions::validate() const {
-  requireField(max_iterations >= 1, "max_iterations", "must be 1 or more", max_iterations);
-  requireField(cost_tolerance > 0.0, "cost_tolerance", "must be positive", cost_tolerance);
-  requireField(loss_sigmas > 0.0, "loss_sigmas", "must be positive", loss_sigmas);
-  requireField(outlier_sigmas > 0.0, "outlier_sigmas", "must be positive", outlier_sigmas);
-  requireField(min_parallax_rad >= 0.0, "min_parallax_rad", "must not be negative", min_parallax_rad);
-  requireField(min_observations >= 1, "min_observations", "must be 1 or more", min_observations);
-  requireField(max_range_m > 0.0, "max_range_m", "must be positive", max_range_m);
-  requireField(odometer_scale_sigma > 0.0, "odometer_scale_sigma", "must be positive", odometer_scale_sigma);
-  requireField(odometer_turn_sigma > 0.0, "odometer_turn_sigma", "must be positive", odometer_turn_sigma);
-  requireField(odometry_distance_sigma >= 0.0, "odometry_distance_sigma", "must not be negative",
-               odometry_distance_sigma);
-  requireField(odometry_sigma_m > 0.0, "odometry_sigma_m", "must be positive", odometry_sigma_m);
-  requireField(odometry_turn_sigma >= 0.0, "odometry_turn_sigma", "must not be negative",
-               odometry_turn_sigma);
-  requireField(odometry_sigma_rad > 0.0, "odometry_sigma_rad", "must be positive", odometry_sigma_rad);
-  requireField(height_sigma_m > 0.0, "height_sigma_m", "must be positive", height_sigma_m);
-  requireField(tilt_sigma_rad > 0.0, "tilt_sigma_rad", "must be positive", tilt_sigma_rad);
-}
-
-BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const MappingData& data) {
+BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const ReconstructionData& data) {
   BundleProblem problem;
   problem.rig = data.rig;
   problem.odometer = {data.odometry_distance_scale, data.odometry_turn_scale};
   problem.odometer_sigmas = {options.odometer_scale_sigma, options.odometer_turn_sigma};
-  problem.loss_sigmas = options.loss_sigmas;
   for (const Keyframe& keyframe : data.keyframes) {
     problem.map_from_vehicle.push_back(keyframe.map_from_vehicle);
   }
@@ -155,12 +135,13 @@ BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const Ma
   for (size_t i = 1; i < data.keyframes.size(); ++i) {
     const RigidTransform motion =
         data.keyframes[i - 1].odom_from_vehicle.inverse() * data.keyframes[i].odom_from_vehicle;
-    problem.motions.push_back({static_cast<int32_t>(i), motion, odometryInformation(motion, options)});
+    problem.odometer_factors.push_back(
+        {static_cast<int32_t>(i), motion, odometryInformation(motion, options)});
   }
   return problem;
 }
 
-void writeBack(const BundleProblem& problem, MappingData* data) {
+void writeBack(const BundleProblem& problem, ReconstructionData* data) {
   for (size_t i = 0; i < data->keyframes.size(); ++i) {
     data->keyframes[i].map_from_vehicle = problem.map_from_vehicle[i];
   }
@@ -174,7 +155,7 @@ void writeBack(const BundleProblem& problem, MappingData* data) {
   data->odometry_turn_scale = problem.odometer[1];
 }
 
-BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, MappingData* data) {
+BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, ReconstructionData* data) {
   options.validate();
   check(!data->keyframes.empty(), "adjustBundle: expected keyframes");
   BundleProblem problem = makeBundleProblem(options, *data);
@@ -186,7 +167,7 @@ BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, Map
   return summary;
 }
 
-BundleAdjustmentSummary removeOutliers(const BundleAdjustmentOptions& options, MappingData* data) {
+BundleAdjustmentSummary removeOutliers(const BundleAdjustmentOptions& options, ReconstructionData* data) {
   BundleAdjustmentSummary summary;
   std::vector<TrackCheck> checks(data->tracks.size());
   tbb::parallel_for(size_t{0}, data->tracks.size(), [&](size_t i) {

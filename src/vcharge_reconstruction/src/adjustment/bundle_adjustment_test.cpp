@@ -10,18 +10,18 @@
 namespace vcharge {
 namespace {
 
-/// Poses that bend away from the truth, as chained motions do, and points moved with them.
-void disturb(MappingData* data) {
+/// Adds drift, as of chained motions, to the poses, and noise to the points.
+void disturb(ReconstructionData* data) {
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0.0, 1.0);
   for (size_t i = 1; i < data->keyframes.size(); ++i) {
-    const double share = static_cast<double>(i) / static_cast<double>(data->keyframes.size());
+    const double ratio = static_cast<double>(i) / static_cast<double>(data->keyframes.size());
     RigidTransform& pose = data->keyframes[i].map_from_vehicle;
-    Eigen::Vector3d shift(0.3 * share, -0.2 * share, 0.05 * share);
+    Eigen::Vector3d shift(0.3 * ratio, -0.2 * ratio, 0.05 * ratio);
     for (int axis = 0; axis < 3; ++axis) {
       shift[axis] += 0.01 * noise(random);
     }
-    pose = RigidTransform(rotationFromVector(Eigen::Vector3d(0.004, -0.005, 0.02) * share) * pose.rotation(),
+    pose = RigidTransform(rotationFromVector(Eigen::Vector3d(0.004, -0.005, 0.02) * ratio) * pose.rotation(),
                           pose.translation() + shift);
   }
   for (Track& track : data->tracks) {
@@ -31,7 +31,7 @@ void disturb(MappingData* data) {
   }
 }
 
-double worstPositionError(const MappingData& a, const MappingData& b) {
+double worstPositionError(const ReconstructionData& a, const ReconstructionData& b) {
   double worst = 0.0;
   for (size_t i = 0; i < a.keyframes.size(); ++i) {
     worst = std::max(
@@ -44,8 +44,8 @@ double worstPositionError(const MappingData& a, const MappingData& b) {
 TEST(BundleAdjustmentTest, FindsPosesAndTheOdometersScale) {
   testing::TestDriveOptions drive;
   drive.odometry_scale = 1.02;
-  const MappingData truth = testing::makeTestDrive(drive);
-  MappingData data = truth;
+  const ReconstructionData truth = testing::makeTestDrive(drive);
+  ReconstructionData data = truth;
   disturb(&data);
   EXPECT_GT(worstPositionError(data, truth), 0.2);
   BundleAdjustmentOptions options;
@@ -57,11 +57,11 @@ TEST(BundleAdjustmentTest, FindsPosesAndTheOdometersScale) {
   EXPECT_EQ(summary.num_removed_observations, 0);
 }
 
-TEST(BundleAdjustmentTest, RemovesWrongObservationsAndKeepsTheRest) {
+TEST(BundleAdjustmentTest, RemovesWrongObservationsOnly) {
   testing::TestDriveOptions drive;
   drive.noise_px = 0.3;
-  const MappingData truth = testing::makeTestDrive(drive);
-  MappingData data = truth;
+  const ReconstructionData truth = testing::makeTestDrive(drive);
+  ReconstructionData data = truth;
   int64_t num_wrong = 0;
   for (size_t t = 0; t < data.tracks.size(); t += 5) {
     for (size_t i = 0; i < data.tracks[t].observations.size(); i += 7) {
@@ -80,9 +80,9 @@ TEST(BundleAdjustmentTest, RemovesWrongObservationsAndKeepsTheRest) {
 }
 
 TEST(BundleAdjustmentTest, GivesTheSameTwice) {
-  MappingData first = testing::makeTestDrive(testing::TestDriveOptions());
+  ReconstructionData first = testing::makeTestDrive(testing::TestDriveOptions());
   disturb(&first);
-  MappingData second = first;
+  ReconstructionData second = first;
   adjustBundle(BundleAdjustmentOptions(), &first);
   adjustBundle(BundleAdjustmentOptions(), &second);
   EXPECT_EQ(worstPositionError(first, second), 0.0);

@@ -1,4 +1,4 @@
-// What an adjusted bundle tells of its tail: the other half of BundleEquations.
+// Covariance of the tail of BundleEquations.
 #include <vector>
 
 #include <tbb/parallel_for.h>
@@ -9,7 +9,7 @@
 namespace vcharge {
 namespace {
 
-/// Of their diagonal, so that what nothing observes keeps the factorization possible.
+/// Relative damping that keeps the factorization possible where an unknown is not observed.
 constexpr double kTinyDamping = 1e-12;
 
 }  // namespace
@@ -18,7 +18,7 @@ Eigen::MatrixXd BundleEquations::pointInfluence(size_t point, const Eigen::Matri
   Eigen::MatrixXd by_point = Eigen::MatrixXd::Zero(tailSize(), 3);
   for (size_t s = first_slot_of_point_[point]; s < first_slot_of_point_[point + 1]; ++s) {
     const Slot& slot = slots_[s];
-    if (slot.pose > 0) {
+    if (isFree(slot.pose)) {
       by_point += inverse.middleRows<6>(columnOf(slot.pose)).transpose() * slot.with_point;
     }
     if (hasCamera(slot)) {
@@ -39,7 +39,7 @@ BundleCovariance BundleEquations::covariance() {
   }
   Eigen::MatrixXd units = Eigen::MatrixXd::Zero(tailColumn() + tailSize(), tailSize());
   units.bottomRows(tailSize()).setIdentity();
-  // Columns of the inverse of the whole system's reduced matrix: how the tail answers to each gradient.
+  // The tail's columns of the inverse: its response to the gradient of each unknown.
   const Eigen::MatrixXd inverse = factorization_.solve(units);
   result.covariance = inverse.bottomRows(tailSize());
   result.covariance = (0.5 * (result.covariance + result.covariance.transpose())).eval();
@@ -56,7 +56,7 @@ BundleCovariance BundleEquations::covariance() {
     for (const size_t s : slots_of_pose_[pose]) {
       const Slot& slot = slots_[s];
       influence -= by_point[slot.point] * slot.gradient;
-      if (pose > 0) {
+      if (isFree(pose)) {
         Vector6d gradient;
         gradient << -slot.gradient, -crossMatrix(slot.from_vehicle_m) * slot.gradient;
         influence -= inverse.middleRows<6>(columnOf(pose)).transpose() * gradient;
@@ -67,13 +67,13 @@ BundleCovariance BundleEquations::covariance() {
       }
     }
   });
-  for (size_t i = 0; i < problem_.motions.size(); ++i) {
-    const auto pose = static_cast<size_t>(problem_.motions[i].pose);
-    const MotionError motion = errors_.ofMotion(state_, i);
+  for (size_t i = 0; i < problem_.odometer_factors.size(); ++i) {
+    const auto pose = static_cast<size_t>(problem_.odometer_factors[i].pose);
+    const OdometerError motion = errors_.odometerFactor(state_, i);
     auto influence = result.influence.col(static_cast<Eigen::Index>(pose));
     influence -=
         inverse.middleRows<6>(columnOf(pose)).transpose() * (motion.by_current.transpose() * motion.error);
-    if (pose > 1) {
+    if (isFree(pose - 1)) {
       influence -= inverse.middleRows<6>(columnOf(pose - 1)).transpose() *
                    (motion.by_previous.transpose() * motion.error);
     }

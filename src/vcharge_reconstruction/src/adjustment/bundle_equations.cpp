@@ -13,7 +13,7 @@
 namespace vcharge {
 namespace {
 
-/// Of an unknown that the errors do not depend on.
+/// Least information of an unknown, for those that no term depends on.
 constexpr double kMinInformation = 1e-6;
 
 }  // namespace
@@ -24,100 +24,42 @@ BundleEquations::BundleEquations(const BundleProblem& problem, const BundleError
   makePattern();
 }
 
-void BundleEquations::makeSlots() {
-  slots_of_pose_.resize(problem_.map_from_vehicle.size());
-  for (size_t point = 0; point < points_.size(); ++point) {
-    first_slot_of_point_.push_back(slots_.size());
-    for (size_t i = problem_.first_observation[point]; i < problem_.first_observation[point + 1]; ++i) {
-      const int32_t pose = problem_.observations[i].pose;
-      const int32_t camera = problem_.observations[i].camera;
-      if (slots_.size() == first_slot_of_point_.back() || slots_.back().pose != pose ||
-          (hasCameras() && slots_.back().camera != camera)) {
-        slots_of_pose_[pose].push_back(slots_.size());
-        Slot slot;
-        slot.pose = pose;
-        slot.point = static_cast<int32_t>(point);
-        slot.camera = camera;
-        slots_.push_back(slot);
-      }
-    }
-  }
-  first_slot_of_point_.push_back(slots_.size());
-}
-
-void BundleEquations::makePattern() {
-  const size_t num_poses = slots_of_pose_.size();
-  rows_of_pose_.resize(num_poses);
-  tbb::parallel_for(size_t{1}, num_poses, [&](size_t pose) {
-    std::vector<bool> is_row(pose + 1, false);
-    is_row[pose] = true;
-    is_row[pose - 1] = true;  // by odometry
-    for (const size_t s : slots_of_pose_[pose]) {
-      for (size_t other = first_slot_of_point_[slots_[s].point]; other < s; ++other) {
-        is_row[slots_[other].pose] = true;
-      }
-    }
-    for (size_t other = 1; other <= pose; ++other) {
-      if (is_row[other]) {
-        rows_of_pose_[pose].push_back(static_cast<int32_t>(other));
-      }
-    }
-  });
-  std::vector<int> starts{0};
-  for (size_t pose = 1; pose < num_poses; ++pose) {
-    for (int i = 1; i <= 6; ++i) {
-      starts.push_back(starts.back() + 6 * static_cast<int>(rows_of_pose_[pose].size() - 1) + i);
-    }
-  }
-  for (int i = 1; i <= tailSize(); ++i) {
-    starts.push_back(starts.back() + static_cast<int>(tailColumn()) + i);
-  }
-  reduced_.resize(tailColumn() + tailSize(), tailColumn() + tailSize());
-  reduced_.resizeNonZeros(starts.back());
-  std::copy(starts.begin(), starts.end(), reduced_.outerIndexPtr());
-  int* inner = reduced_.innerIndexPtr();
-  for (size_t pose = 1; pose < num_poses; ++pose) {
-    for (int i = 0; i < 6; ++i) {
-      for (const int32_t row : rows_of_pose_[pose]) {
-        const int num_rows = static_cast<size_t>(row) == pose ? i + 1 : 6;
-        for (int k = 0; k < num_rows; ++k) {
-          *inner++ = static_cast<int>(columnOf(row)) + k;
-        }
-      }
-    }
-  }
-  for (int i = 0; i < tailSize(); ++i) {
-    for (int k = 0; k <= tailColumn() + i; ++k) {
-      *inner++ = k;
-    }
-  }
-  factorization_.analyzePattern(reduced_);
-}
-
 void BundleEquations::linearize(const BundleState& state) {
   state_ = state;
   tbb::parallel_for(size_t{0}, points_.size(), [&](size_t point) { linearizePoint(point); });
 }
 
+void BundleEquations::addImageErrors(const Eigen::Vector3d& point, Slot* slot) const {
+  for (size_t i = slot->begin; i < slot->end; ++i) {
+    Eigen::Vector2d error;
+    Eigen::Matrix<double, 2, 3> by_point;
+    if (errors_.reprojection(state_, problem_.observations[i], point, &error, &by_point)) {
+      const Eigen::Matrix<double, 3, 2> weighted =
+          errors_.robustWeight(error.squaredNorm()) * by_point.transpose();
+      slot->information += weighted * by_point;
+      slot->gradient += weighted * error;
+    }
+  }
+}
+
+void BundleEquations::addGroundError(Slot* slot) const {
+  Eigen::RowVector3d by_point;
+  const double error = errors_.ground(state_, problem_.ground_observations[slot->begin], &by_point);
+  const Eigen::Vector3d weighted = errors_.robustWeight(error * error) * by_point.transpose();
+  slot->information += weighted * by_point;
+  slot->gradient += weighted * error;
+}
+
 void BundleEquations::linearizePoint(size_t point) {
   const Eigen::Vector3d& position = state_.points[point];
-  size_t observation = problem_.first_observation[point];
   for (size_t s = first_slot_of_point_[point]; s < first_slot_of_point_[point + 1]; ++s) {
     Slot& slot = slots_[s];
     slot.information.setZero();
     slot.gradient.setZero();
-    for (; observation < problem_.first_observation[point + 1] &&
-           problem_.observations[observation].pose == slot.pose &&
-           (!hasCameras() || problem_.observations[observation].camera == slot.camera);
-         ++observation) {
-      Eigen::Vector2d error;
-      Eigen::Matrix<double, 2, 3> by_point;
-      if (errors_.ofObservation(state_, observation, position, &error, &by_point)) {
-        const Eigen::Matrix<double, 3, 2> weighted =
-            errors_.robustWeight(error.squaredNorm()) * by_point.transpose();
-        slot.information += weighted * by_point;
-        slot.gradient += weighted * error;
-      }
+    if (slot.is_ground) {
+      addGroundError(&slot);
+    } else {
+      addImageErrors(position, &slot);
     }
     slot.from_vehicle_m = position - state_.poses[slot.pose].translation();
     slot.with_point.topRows<3>() = -slot.information;
@@ -135,7 +77,7 @@ void BundleEquations::linearizePoint(size_t point) {
 
 void BundleEquations::eliminatePoint(size_t point, double damping) {
   PointTerms& terms = points_[point];
-  Eigen::Matrix3d information = errors_.priorInformation(point);
+  Eigen::Matrix3d information = errors_.pointInformation(point);
   terms.gradient = information * (state_.points[point] - problem_.points_in_map[point]);
   for (size_t s = first_slot_of_point_[point]; s < first_slot_of_point_[point + 1]; ++s) {
     information += slots_[s].information;
@@ -149,8 +91,8 @@ void BundleEquations::eliminatePoint(size_t point, double damping) {
   }
 }
 
-BundleEquations::MotionTerms BundleEquations::motionTerms() const {
-  MotionTerms terms;
+BundleEquations::PriorTerms BundleEquations::priorTerms() const {
+  PriorTerms terms;
   terms.own.assign(slots_of_pose_.size(), Matrix6d::Zero());
   terms.with_previous.assign(slots_of_pose_.size(), Matrix6d::Zero());
   terms.with_tail.setZero(tailColumn(), tailSize());
@@ -159,14 +101,14 @@ BundleEquations::MotionTerms BundleEquations::motionTerms() const {
   terms.tail.setZero(tailSize(), tailSize());
   terms.tail.topLeftCorner<2, 2>() = prior_information.asDiagonal();
   auto odometer_gradient = terms.gradient.segment<2>(tailColumn());
-  odometer_gradient = errors_.ofOdometer(state_).cwiseQuotient(problem_.odometer_sigmas);
-  for (size_t i = 0; i < problem_.motions.size(); ++i) {
-    const auto pose = static_cast<size_t>(problem_.motions[i].pose);
-    const MotionError motion = errors_.ofMotion(state_, i);
+  odometer_gradient = errors_.odometerPrior(state_).cwiseQuotient(problem_.odometer_sigmas);
+  for (size_t i = 0; i < problem_.odometer_factors.size(); ++i) {
+    const auto pose = static_cast<size_t>(problem_.odometer_factors[i].pose);
+    const OdometerError motion = errors_.odometerFactor(state_, i);
     terms.own[pose] += motion.by_current.transpose() * motion.by_current;
     terms.gradient.segment<6>(columnOf(pose)) += motion.by_current.transpose() * motion.error;
     terms.with_tail.block<6, 2>(columnOf(pose), 0) += motion.by_current.transpose() * motion.by_odometer;
-    if (pose > 1) {
+    if (isFree(pose - 1)) {
       terms.own[pose - 1] += motion.by_previous.transpose() * motion.by_previous;
       terms.with_previous[pose] += motion.by_previous.transpose() * motion.by_current;
       terms.gradient.segment<6>(columnOf(pose - 1)) += motion.by_previous.transpose() * motion.error;
@@ -198,7 +140,7 @@ BundleEquations::TailTerms BundleEquations::tailTerms() const {
   if (!hasCameras()) {
     return zero;
   }
-  // A fixed number of points per task, added up in order: the same sums on any number of threads.
+  // A fixed number of points per task, summed in order: the same result on any number of threads.
   constexpr size_t kPointsPerTask = 1024;
   std::vector<TailTerms> of_task((points_.size() + kPointsPerTask - 1) / kPointsPerTask, zero);
   tbb::parallel_for(size_t{0}, of_task.size(), [&](size_t task) {
@@ -237,18 +179,18 @@ BundleEquations::TailTerms BundleEquations::tailTerms() const {
 }
 
 void BundleEquations::assemble(double damping) {
-  MotionTerms motions = motionTerms();
-  gradient_ = motions.gradient;
+  PriorTerms priors = priorTerms();
+  gradient_ = priors.gradient;
   reduced_gradient_.setZero(gradient_.size());
   damping_.setZero(gradient_.size());
   tbb::enumerable_thread_specific<Scratch> scratch;
-  tbb::parallel_for(size_t{1}, slots_of_pose_.size(),
-                    [&](size_t pose) { assemblePose(pose, damping, &motions, &scratch.local()); });
-  assembleTail(damping, motions);
+  tbb::parallel_for(firstFreePose(), slots_of_pose_.size(),
+                    [&](size_t pose) { assemblePose(pose, damping, &priors, &scratch.local()); });
+  assembleTail(damping, priors);
 }
 
-// A pose owns its columns, and adds up in a fixed order.
-void BundleEquations::assemblePose(size_t pose, double damping, MotionTerms* motions, Scratch* scratch) {
+// Each pose writes its own columns, with sums in a fixed order.
+void BundleEquations::assemblePose(size_t pose, double damping, PriorTerms* priors, Scratch* scratch) {
   const std::vector<int32_t>& rows = rows_of_pose_[pose];
   scratch->block_of_pose.resize(slots_of_pose_.size());
   scratch->blocks.assign(rows.size(), Matrix6d::Zero());
@@ -256,7 +198,7 @@ void BundleEquations::assemblePose(size_t pose, double damping, MotionTerms* mot
     scratch->block_of_pose[rows[k]] = static_cast<int32_t>(k);
   }
   Matrix6d& own = scratch->blocks.back();
-  own = motions->own[pose];
+  own = priors->own[pose];
   Vector6d gradient = gradient_.segment<6>(columnOf(pose));
   Vector6d eliminated = Vector6d::Zero();
   for (const size_t s : slots_of_pose_[pose]) {
@@ -272,12 +214,12 @@ void BundleEquations::assemblePose(size_t pose, double damping, MotionTerms* mot
   reduced_gradient_.segment<6>(columnOf(pose)) = gradient - eliminated;
   damping_.segment<6>(columnOf(pose)) = damping * own.diagonal().cwiseMax(kMinInformation);
   own.diagonal() += damping_.segment<6>(columnOf(pose));
-  if (pose > 1) {
-    scratch->blocks[scratch->block_of_pose[pose - 1]] += motions->with_previous[pose];
+  if (pose > firstFreePose()) {
+    scratch->blocks[scratch->block_of_pose[pose - 1]] += priors->with_previous[pose];
   }
   for (const size_t s : slots_of_pose_[pose]) {
     for (size_t other = first_slot_of_point_[slots_[s].point]; other <= s; ++other) {
-      if (slots_[other].pose > 0) {
+      if (isFree(slots_[other].pose)) {
         const Matrix6d product = slots_[other].over_point * slots_[s].with_point.transpose();
         Matrix6d& block = scratch->blocks[scratch->block_of_pose[slots_[other].pose]];
         block -= product;
@@ -291,7 +233,7 @@ void BundleEquations::assemblePose(size_t pose, double damping, MotionTerms* mot
     for (const size_t s : slots_of_pose_[pose]) {
       const Slot& slot = slots_[s];
       const auto withCamera = [&](int32_t camera) {
-        return motions->with_tail.block<6, 6>(columnOf(pose), cameraInTail(camera));
+        return priors->with_tail.block<6, 6>(columnOf(pose), cameraInTail(camera));
       };
       if (hasCamera(slot)) {
         withCamera(slot.camera).noalias() += slot.with_point * slot.by_camera;
@@ -313,15 +255,15 @@ void BundleEquations::assemblePose(size_t pose, double damping, MotionTerms* mot
   }
 }
 
-void BundleEquations::assembleTail(double damping, const MotionTerms& motions) {
+void BundleEquations::assembleTail(double damping, const PriorTerms& priors) {
   const TailTerms tail = tailTerms();
-  const Eigen::MatrixXd information = motions.tail + tail.information;
+  const Eigen::MatrixXd information = priors.tail + tail.information;
   reduced_gradient_.tail(tailSize()) = gradient_.tail(tailSize()) + tail.reduced_gradient;
   gradient_.tail(tailSize()) += tail.gradient;
-  damping_.tail(tailSize()) = damping * (motions.tail.diagonal() + tail.diagonal).cwiseMax(kMinInformation);
+  damping_.tail(tailSize()) = damping * (priors.tail.diagonal() + tail.diagonal).cwiseMax(kMinInformation);
   for (Eigen::Index i = 0; i < tailSize(); ++i) {
     double* value = reduced_.valuePtr() + reduced_.outerIndexPtr()[tailColumn() + i];
-    value = std::copy_n(motions.with_tail.col(i).data(), tailColumn(), value);
+    value = std::copy_n(priors.with_tail.col(i).data(), tailColumn(), value);
     for (Eigen::Index k = 0; k <= i; ++k) {
       *value++ = information(k, i) + (k == i ? damping_[tailColumn() + i] : 0.0);
     }
@@ -340,7 +282,7 @@ double BundleEquations::step(double damping, BundleState* next) {
     return 0.0;
   }
   *next = state_;
-  for (size_t pose = 1; pose < slots_of_pose_.size(); ++pose) {
+  for (size_t pose = firstFreePose(); pose < slots_of_pose_.size(); ++pose) {
     const auto move = change.segment<6>(columnOf(pose));
     next->poses[pose] = RigidTransform(rotationFromVector(move.tail<3>()) * state_.poses[pose].rotation(),
                                        state_.poses[pose].translation() + move.head<3>());
@@ -349,13 +291,13 @@ double BundleEquations::step(double damping, BundleState* next) {
   for (size_t i = 0; i < problem_.vehicle_from_camera.size(); ++i) {
     next->moveCamera(i, change.segment<6>(tailColumn() + cameraInTail(static_cast<int32_t>(i))));
   }
-  // The linear model falls by d^T (damping d - gradient) / 2.
+  // Decrease of the linear model: d^T (damping d - gradient) / 2.
   const double by_poses = 0.5 * change.dot(damping_.cwiseProduct(change) - gradient_);
   return by_poses + sumOverPoints(points_.size(), [&](size_t point) {
            const PointTerms& terms = points_[point];
            Eigen::Vector3d gradient = terms.gradient;
            for (size_t s = first_slot_of_point_[point]; s < first_slot_of_point_[point + 1]; ++s) {
-             if (slots_[s].pose > 0) {
+             if (isFree(slots_[s].pose)) {
                gradient += slots_[s].with_point.transpose() * change.segment<6>(columnOf(slots_[s].pose));
              }
              if (hasCamera(slots_[s])) {

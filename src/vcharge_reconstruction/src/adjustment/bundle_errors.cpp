@@ -35,60 +35,60 @@ BundleErrors::BundleErrors(const BundleProblem& problem)
     : problem_(problem),
       squared_loss_scale_(problem.loss_sigmas * problem.loss_sigmas),
       manifold_(makePoseManifold()) {
-  for (const BundleMotion& motion : problem.motions) {
-    motion_costs_.push_back(makeOdometryCost(motion.previous_from_current, motion.information));
+  for (const OdometerFactor& factor : problem.odometer_factors) {
+    odometer_costs_.push_back(makeOdometryCost(factor.previous_from_current, factor.information));
   }
 }
 
 BundleErrors::~BundleErrors() = default;
 
-bool BundleErrors::ofObservation(const BundleState& state, size_t observation, const Eigen::Vector3d& point,
-                                 Eigen::Vector2d* error, Eigen::Matrix<double, 2, 3>* by_point) const {
-  const BundleObservation& observed = problem_.observations[observation];
-  const RigidTransform& pose = state.poses[observed.pose];
-  if (observed.camera == kGroundCamera) {
-    const Eigen::RowVector3d up = pose.rotationMatrix().col(2).transpose();
-    *error = Eigen::Vector2d(up.dot(point - pose.translation()) / observed.sigma_px, 0.0);
-    if (by_point != nullptr) {
-      *by_point << up / observed.sigma_px, Eigen::RowVector3d::Zero();
-    }
-    return true;
-  }
-  const RigidTransform& camera_from_vehicle = state.camera_from_vehicle[observed.camera];
+bool BundleErrors::reprojection(const BundleState& state, const BundleObservation& observation,
+                                const Eigen::Vector3d& point, Eigen::Vector2d* error,
+                                Eigen::Matrix<double, 2, 3>* by_point) const {
+  const RigidTransform& pose = state.poses[observation.pose];
+  const RigidTransform& camera_from_vehicle = state.camera_from_vehicle[observation.camera];
   const Eigen::Matrix3d camera_from_map =
       (camera_from_vehicle.rotation() * pose.rotation().conjugate()).toRotationMatrix();
   const Eigen::Vector3d in_camera =
       camera_from_map * (point - pose.translation()) + camera_from_vehicle.translation();
   Eigen::Vector2d pixel;
   Eigen::Matrix<double, 2, 3> pixel_by_point;
-  const bool seen = problem_.rig->cameras[observed.camera].model.visit([&](const auto& model) {
+  const bool seen = problem_.rig->cameras[observation.camera].model.visit([&](const auto& model) {
     return model.project(in_camera, &pixel, by_point == nullptr ? nullptr : &pixel_by_point);
   });
   if (!seen) {
     error->setConstant(kNoImageResidual);
     return false;
   }
-  *error = (pixel - observed.position_px) / observed.sigma_px;
+  *error = (pixel - observation.position_px) / observation.sigma_px;
   if (by_point != nullptr) {
-    *by_point = pixel_by_point * camera_from_map / observed.sigma_px;
+    *by_point = pixel_by_point * camera_from_map / observation.sigma_px;
   }
   return true;
+}
+
+double BundleErrors::ground(const BundleState& state, const GroundObservation& observation,
+                            Eigen::RowVector3d* by_point) const {
+  const RigidTransform& pose = state.poses[observation.pose];
+  const Eigen::RowVector3d up = pose.rotationMatrix().col(2).transpose();
+  *by_point = up / observation.sigma_m;
+  return up.dot(state.points[observation.point] - pose.translation()) / observation.sigma_m;
 }
 
 double BundleErrors::robustCost(double square) const {
   return 0.5 * squared_loss_scale_ * std::log1p(square / squared_loss_scale_);
 }
 
-MotionError BundleErrors::ofMotion(const BundleState& state, size_t motion) const {
-  const auto pose = static_cast<size_t>(problem_.motions[motion].pose);
+OdometerError BundleErrors::odometerFactor(const BundleState& state, size_t factor) const {
+  const auto pose = static_cast<size_t>(problem_.odometer_factors[factor].pose);
   const PoseBlock previous = toPoseBlock(state.poses[pose - 1]);
   const PoseBlock current = toPoseBlock(state.poses[pose]);
   const std::array<const double*, 3> blocks{previous.data(), current.data(), state.odometer.data()};
-  MotionError result;
+  OdometerError result;
   Eigen::Matrix<double, 6, 7, Eigen::RowMajor> by_previous, by_current;
   Eigen::Matrix<double, 6, 2, Eigen::RowMajor> by_odometer;
   std::array<double*, 3> jacobians{by_previous.data(), by_current.data(), by_odometer.data()};
-  motion_costs_[motion]->Evaluate(blocks.data(), result.error.data(), jacobians.data());
+  odometer_costs_[factor]->Evaluate(blocks.data(), result.error.data(), jacobians.data());
   Eigen::Matrix<double, 7, 6, Eigen::RowMajor> plus;
   manifold_->PlusJacobian(previous.data(), plus.data());
   result.by_previous = by_previous * plus;
@@ -98,7 +98,7 @@ MotionError BundleErrors::ofMotion(const BundleState& state, size_t motion) cons
   return result;
 }
 
-Eigen::Vector2d BundleErrors::ofOdometer(const BundleState& state) const {
+Eigen::Vector2d BundleErrors::odometerPrior(const BundleState& state) const {
   return (state.odometer - Eigen::Vector2d::Ones()).cwiseQuotient(problem_.odometer_sigmas);
 }
 
@@ -125,19 +125,24 @@ Eigen::Matrix<double, 6, 1> BundleErrors::commonMotion(const BundleState& state)
 double BundleErrors::cost(const BundleState& state) const {
   double cost = sumOverPoints(state.points.size(), [&](size_t point) {
     const Eigen::Vector3d moved_m = state.points[point] - problem_.points_in_map[point];
-    double of_point = 0.5 * moved_m.dot(priorInformation(point) * moved_m);
+    double cost_of_point = 0.5 * moved_m.dot(pointInformation(point) * moved_m);
     for (size_t i = problem_.first_observation[point]; i < problem_.first_observation[point + 1]; ++i) {
       Eigen::Vector2d error;
-      ofObservation(state, i, state.points[point], &error, nullptr);
-      of_point += robustCost(error.squaredNorm());
+      reprojection(state, problem_.observations[i], state.points[point], &error, nullptr);
+      cost_of_point += robustCost(error.squaredNorm());
     }
-    return of_point;
+    return cost_of_point;
   });
-  for (size_t i = 0; i < motion_costs_.size(); ++i) {
-    cost += 0.5 * ofMotion(state, i).error.squaredNorm();
+  for (const GroundObservation& observation : problem_.ground_observations) {
+    Eigen::RowVector3d by_point;
+    const double error = ground(state, observation, &by_point);
+    cost += robustCost(error * error);
+  }
+  for (size_t i = 0; i < odometer_costs_.size(); ++i) {
+    cost += 0.5 * odometerFactor(state, i).error.squaredNorm();
   }
   const Eigen::Matrix<double, 6, 1> common = commonMotion(state);
-  return cost + 0.5 * ofOdometer(state).squaredNorm() +
+  return cost + 0.5 * odometerPrior(state).squaredNorm() +
          0.5 * common.dot(problem_.common_information * common);
 }
 

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "vcharge_reconstruction/bundle_solver.h"
+#include "vcharge_reconstruction/bundle_problem.h"
 
 namespace ceres {
 class CostFunction;
@@ -15,7 +15,7 @@ class Manifold;
 
 namespace vcharge {
 
-/// Poses, points and the odometer's factors at one instant of the iteration.
+/// Values of the unknowns of a bundle adjustment at one iteration.
 struct BundleState {
   std::vector<RigidTransform> poses;
   std::vector<Eigen::Vector3d> points;
@@ -26,48 +26,54 @@ struct BundleState {
   void moveCamera(size_t camera, const Eigen::Matrix<double, 6, 1>& move);
 };
 
-/// An odometry error over its deviation, and its derivatives by the pose before, the pose, and the factors.
-struct MotionError {
+/// Error of an odometer factor over its standard deviation, with its derivatives.
+struct OdometerError {
   Eigen::Matrix<double, 6, 1> error;
   Eigen::Matrix<double, 6, 6> by_previous, by_current;
   Eigen::Matrix<double, 6, 2> by_odometer;
 };
 
-/// The errors that a bundle adjustment makes small.
+/// The terms of a bundle adjustment's cost.
 class BundleErrors {
  public:
   explicit BundleErrors(const BundleProblem& problem);
   ~BundleErrors();
 
-  /// Error of an observation over its deviation, and its derivative by the point where it is not null. False
-  /// where the camera cannot see the point: then the error is large, and flat.
-  bool ofObservation(const BundleState& state, size_t observation, const Eigen::Vector3d& point,
-                     Eigen::Vector2d* error, Eigen::Matrix<double, 2, 3>* by_point) const;
-  /// Weight of an observation whose error has this square.
-  double robustWeight(double square) const { return 1.0 / (1.0 + square / squared_loss_scale_); }
-  double robustCost(double square) const;
-
-  /// Of what is known of a point beforehand.
-  Eigen::Matrix3d priorInformation(size_t point) const {
+  /// Reprojection error of an observation over its standard deviation, and its derivative by the point where
+  /// `by_point` is not null. False where the camera does not project the point: the error is then large and
+  /// constant.
+  bool reprojection(const BundleState& state, const BundleObservation& observation,
+                    const Eigen::Vector3d& point, Eigen::Vector2d* error,
+                    Eigen::Matrix<double, 2, 3>* by_point) const;
+  /// Height of a point above the ground of a pose over its standard deviation, and the derivative by the
+  /// point.
+  double ground(const BundleState& state, const GroundObservation& observation,
+                Eigen::RowVector3d* by_point) const;
+  OdometerError odometerFactor(const BundleState& state, size_t factor) const;
+  /// Deviation of the odometer's factors from 1, over their standard deviations.
+  Eigen::Vector2d odometerPrior(const BundleState& state) const;
+  /// Information of the prior of a point; zero without a prior.
+  Eigen::Matrix3d pointInformation(size_t point) const {
     return problem_.point_information.empty() ? Eigen::Matrix3d::Zero().eval()
                                               : problem_.point_information[point];
   }
-
-  MotionError ofMotion(const BundleState& state, size_t motion) const;
-  Eigen::Vector2d ofOdometer(const BundleState& state) const;
-  /// How far the cameras moved as one rigid body, [dt, dphi]; zero where they are known.
+  /// Mean motion of the cameras as one rigid body, [dt, dphi]; zero where the extrinsics are known.
   Eigen::Matrix<double, 6, 1> commonMotion(const BundleState& state) const;
   /// Derivative of commonMotion() by the motion of a camera.
   Eigen::Matrix<double, 6, 6> commonMotionByCamera(size_t camera) const;
 
-  /// Half of the sum of (robust) squares, added up in an order that no scheduling changes.
+  /// Weight that linearizes the Cauchy loss at an error with this square.
+  double robustWeight(double square) const { return 1.0 / (1.0 + square / squared_loss_scale_); }
+  double robustCost(double square) const;
+
+  /// Half of the sum of (robust) squares, in an order that does not depend on scheduling.
   double cost(const BundleState& state) const;
 
  private:
   const BundleProblem& problem_;
   const double squared_loss_scale_;
   const std::unique_ptr<const ceres::Manifold> manifold_;
-  std::vector<std::unique_ptr<const ceres::CostFunction>> motion_costs_;
+  std::vector<std::unique_ptr<const ceres::CostFunction>> odometer_costs_;
 };
 
 }  // namespace vcharge

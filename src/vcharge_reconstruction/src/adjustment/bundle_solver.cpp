@@ -12,7 +12,7 @@
 namespace vcharge {
 namespace {
 
-// The trust region of Levenberg-Marquardt as Ceres has it by default.
+// Trust region of Levenberg-Marquardt, with the default values of Ceres.
 constexpr double kFirstRadius = 1e4;
 constexpr double kMaxRadius = 1e16;
 constexpr double kMinRadius = 1e-32;
@@ -22,6 +22,11 @@ void checkProblem(const BundleProblem& problem) {
   check(problem.first_observation.size() == problem.points_in_map.size() + 1 &&
             problem.first_observation.back() == problem.observations.size(),
         "BundleProblem: expected the observations grouped by point");
+  check(std::is_sorted(problem.ground_observations.begin(), problem.ground_observations.end(),
+                       [](const GroundObservation& a, const GroundObservation& b) {
+                         return std::make_pair(a.point, a.pose) < std::make_pair(b.point, b.pose);
+                       }),
+        "BundleProblem: expected ground_observations ordered by point, then by pose");
   check(problem.point_information.empty() || problem.point_information.size() == problem.points_in_map.size(),
         "BundleProblem: expected point_information of every point, or none");
   check(problem.vehicle_from_camera.empty() ||

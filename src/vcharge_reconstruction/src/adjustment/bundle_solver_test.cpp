@@ -17,7 +17,7 @@ BundleProblem makeProblem() {
   testing::TestDriveOptions drive;
   drive.noise_px = 0.4;
   drive.odometry_scale = 1.01;
-  const MappingData data = testing::makeTestDrive(drive);
+  const ReconstructionData data = testing::makeTestDrive(drive);
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0.0, 1.0);
   BundleProblem problem;
@@ -35,7 +35,7 @@ BundleProblem makeProblem() {
       sigmas << 0.005, 0.005, 0.02, 0.01, 0.01, 0.002;
       const RigidTransform motion =
           data.keyframes[i - 1].odom_from_vehicle.inverse() * data.keyframes[i].odom_from_vehicle;
-      problem.motions.push_back(
+      problem.odometer_factors.push_back(
           {static_cast<int32_t>(i), motion, sigmas.cwiseAbs2().cwiseInverse().asDiagonal()});
     }
   }
@@ -65,7 +65,7 @@ double largestDifference_m(const BundleProblem& a, const BundleProblem& b) {
   return largest;
 }
 
-TEST(BundleSolverTest, GoesThePathOfCeres) {
+TEST(BundleSolverTest, TakesTheStepsOfCeres) {
   for (const int iterations : {1, 3, 40}) {
     BundleProblem ours = makeProblem();
     BundleProblem theirs = ours;
@@ -73,7 +73,7 @@ TEST(BundleSolverTest, GoesThePathOfCeres) {
     const BundleSolution solution = solveBundle(iterations, 1e-9, &ours);
     testing::solveWithCeres(iterations, 1e-9, &theirs);
     EXPECT_GT(largestDifference_m(ours, before), 0.03) << "the problem should not be solved already";
-    // At the end rounding decides which of the last, tiny steps is still taken.
+    // Rounding decides which of the last, tiny steps are accepted.
     EXPECT_LT(largestDifference_m(ours, theirs), iterations < 40 ? 1e-9 : 1e-5)
         << iterations << " iterations";
     EXPECT_NEAR(ours.odometer[0], theirs.odometer[0], 1e-6);
@@ -81,7 +81,7 @@ TEST(BundleSolverTest, GoesThePathOfCeres) {
   }
 }
 
-TEST(BundleSolverTest, MovesUnknownCamerasAsCeresDoes) {
+TEST(BundleSolverTest, AdjustsExtrinsicsAsCeresDoes) {
   BundleProblem ours = makeProblem();
   for (const RigCamera& camera : ours.rig->cameras) {
     const RigidTransform& place = *camera.vehicle_from_camera;
@@ -103,7 +103,7 @@ TEST(BundleSolverTest, MovesUnknownCamerasAsCeresDoes) {
   }
 }
 
-TEST(BundleSolverTest, TakesPointsThatAreKnownBeforehandAsCeresDoes) {
+TEST(BundleSolverTest, UsesPriorsOfPointsAsCeresDoes) {
   BundleProblem ours = makeProblem();
   Eigen::Matrix3d information;
   information << 400.0, 50.0, -20.0, 50.0, 900.0, 30.0, -20.0, 30.0, 200.0;
@@ -125,12 +125,13 @@ TEST(BundleSolverTest, TakesPointsThatAreKnownBeforehandAsCeresDoes) {
   }
 }
 
-TEST(BundleSolverTest, PutsPointsOfTheGroundUnderTheVehicle) {
-  // One point that nothing sees, but that is said to lie on the ground at a pose.
+TEST(BundleSolverTest, MovesGroundPointsToTheGround) {
+  // One point that no camera sees, with a ground observation.
   BundleProblem problem = makeProblem();
   problem.points_in_map = {problem.map_from_vehicle[3] * Eigen::Vector3d(1.0, 2.0, 0.3)};
-  problem.observations = {{3, kGroundCamera, Eigen::Vector2d::Zero(), 1e-3}};
-  problem.first_observation = {0, 1};
+  problem.observations.clear();
+  problem.first_observation = {0, 0};
+  problem.ground_observations = {{0, 3, 1e-3}};
   problem.loss_sigmas = 1e6;
   solveBundle(30, 1e-12, &problem);
   EXPECT_NEAR((problem.map_from_vehicle[3].inverse() * problem.points_in_map[0]).z(), 0.0, 1e-4);
@@ -147,7 +148,7 @@ TEST(BundleSolverTest, GivesTheSameBitsOnOneThread) {
   EXPECT_EQ(parallel.points_in_map, serial.points_in_map);
 }
 
-TEST(BundleSolverTest, LeavesWhatNothingSees) {
+TEST(BundleSolverTest, KeepsUnobservedPoints) {
   BundleProblem problem = makeProblem();
   auto rig = std::make_shared<CameraRig>(*problem.rig);
   rig->cameras[0].model = MeiCamera(1.2, 400.0, 400.0, 320.0, 200.0);
@@ -168,7 +169,7 @@ TEST(BundleSolverTest, LeavesWhatNothingSees) {
   }
 }
 
-TEST(BundleSolverTest, RefusesObservationsThatAreNotGrouped) {
+TEST(BundleSolverTest, RefusesUngroupedObservations) {
   BundleProblem problem = makeProblem();
   problem.first_observation.pop_back();
   EXPECT_THROW(solveBundle(1, 1e-3, &problem), std::logic_error);

@@ -53,9 +53,9 @@ void solveWithCeres(int max_iterations, double cost_tolerance, BundleProblem* bu
                                bundle->points_in_map[point].data());
     }
   }
-  for (const BundleMotion& motion : bundle->motions) {
-    problem.AddResidualBlock(makeOdometryCost(motion.previous_from_current, motion.information).release(),
-                             nullptr, poses[motion.pose - 1].data(), poses[motion.pose].data(),
+  for (const OdometerFactor& factor : bundle->odometer_factors) {
+    problem.AddResidualBlock(makeOdometryCost(factor.previous_from_current, factor.information).release(),
+                             nullptr, poses[factor.pose - 1].data(), poses[factor.pose].data(),
                              bundle->odometer.data());
   }
   const Eigen::Vector2d weights = bundle->odometer_sigmas.cwiseInverse();

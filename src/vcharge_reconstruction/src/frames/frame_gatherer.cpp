@@ -7,15 +7,15 @@
 namespace vcharge {
 namespace {
 
-/// Frames that may wait for odometry before they go without.
+/// Frames that may wait for odometry.
 constexpr size_t kMaxWaitingFrames = 32;
-/// An incomplete frame is ready once this many stamps came, itself among them.
+/// An incomplete frame is ready once images of this many stamps, its own included, arrived.
 constexpr size_t kStampsForIncomplete = 3;
 
 }  // namespace
 
 FrameGatherer::FrameGatherer(std::shared_ptr<const CameraRig> rig, double max_speed_m_per_s,
-                             SparseMapperReport* report, FrameCallback on_frame)
+                             ReconstructionReport* report, FrameCallback on_frame)
     : rig_(std::move(rig)),
       max_speed_m_per_s_(max_speed_m_per_s),
       report_(report),
@@ -24,7 +24,7 @@ FrameGatherer::FrameGatherer(std::shared_ptr<const CameraRig> rig, double max_sp
 }
 
 void FrameGatherer::addOdometry(const VehicleOdometry& odometry) {
-  // Counters that start again make the pose jump: the motion over the jump is that of the velocities.
+  // A reset makes the pose jump: bridge it with the motion of the velocities.
   if (last_raw_odometry_ && odometry.stamp > last_raw_odometry_->stamp) {
     const double period_s = toSeconds(odometry.stamp - last_raw_odometry_->stamp);
     const RigidTransform motion =
@@ -61,7 +61,7 @@ void FrameGatherer::addImage(size_t camera_index, Timestamp stamp, const Image& 
 }
 
 void FrameGatherer::processFrames(bool all) {
-  // A frame is ready once later images have come, or all of its own, and odometry reaches it.
+  // A frame is ready once it is complete or later images arrived, and odometry reaches it.
   while (!pending_.empty()) {
     const auto first = pending_.begin();
     const Timestamp stamp = first->first;
@@ -69,8 +69,8 @@ void FrameGatherer::processFrames(bool all) {
     const auto newest = odometry_.newestStamp();
     const bool has_images = is_complete || pending_.size() >= kStampsForIncomplete;
     const bool has_odometry = newest && *newest >= stamp;
-    const bool waited_in_vain = !has_odometry && pending_.size() >= kMaxWaitingFrames;
-    if (!all && !(has_images && has_odometry) && !waited_in_vain) {
+    const bool waited_too_long = !has_odometry && pending_.size() >= kMaxWaitingFrames;
+    if (!all && !(has_images && has_odometry) && !waited_too_long) {
       return;
     }
     const PendingFrame frame = std::move(first->second);

@@ -12,26 +12,40 @@
 
 #include <tbb/parallel_for.h>
 
+#include "vcharge_features/descriptor_matching.h"
+
 namespace vcharge {
 namespace {
 
 constexpr double kReferenceWidth_px = 1280.0;
+/// Descriptors are comparable between views whose directions and ranges differ by less.
+constexpr double kMaxViewAngle_rad = 0.6;
+constexpr double kMaxRangeRatio = 1.8;
+/// Two landmarks whose ranges differ by more are not merged.
+constexpr double kMaxMergeRatio = 1.25;
 
-/// Where a landmark was seen before, as nearly as possible from where it is looked for now.
+MatchOptions closeMatches() {
+  MatchOptions options;
+  options.max_ratio = 0.8;
+  options.max_distance = 60.0;
+  return options;
+}
+
+/// The earlier observation of a landmark with the most similar view.
 struct Source {
   int32_t track = -1;
   const TrackObservation* observation = nullptr;
   double cos_angle = -1.0;
 };
 
-/// A feature that shows a landmark.
+/// A feature that matches a landmark.
 struct Proposal {
   int32_t keyframe, camera, feature, track;
 };
 
 class LandmarkSearch {
  public:
-  LandmarkSearch(const LandmarkSearchOptions& options, const MappingData& data)
+  LandmarkSearch(const LandmarkSearchOptions& options, const ReconstructionData& data)
       : options_(options), data_(data), observed_(data.keyframes.size()) {
     for (size_t t = 0; t < data.tracks.size(); ++t) {
       if (!data.tracks[t].position_m) {
@@ -80,7 +94,7 @@ class LandmarkSearch {
     const RigidTransform map_from_camera =
         data_.keyframes[keyframe].map_from_vehicle * *rig_camera.vehicle_from_camera;
     const Eigen::Vector3d& centre = map_from_camera.translation();
-    const double min_cos_view = std::cos(options_.max_view_angle_rad);
+    const double min_cos_view = std::cos(kMaxViewAngle_rad);
     std::unordered_map<int32_t, size_t> index_of_track;
     std::vector<Source> sources;
     for (const size_t neighbour : neighbours) {
@@ -89,8 +103,7 @@ class LandmarkSearch {
         const Eigen::Vector3d from_here = point - centre;
         const Eigen::Vector3d from_there = point - cameraCentre(observation->keyframe, observation->camera);
         const double range = from_here.norm(), other_range = from_there.norm();
-        if (range > options_.max_range_ratio * other_range ||
-            other_range > options_.max_range_ratio * range) {
+        if (range > kMaxRangeRatio * other_range || other_range > kMaxRangeRatio * range) {
           continue;
         }
         const double cos_angle = from_here.dot(from_there) / (range * other_range);
@@ -140,7 +153,7 @@ class LandmarkSearch {
     }
     const double radius_px = options_.radius_px * rig_camera.image_size_px.width / kReferenceWidth_px;
     for (const FeatureMatch& match : matchNearPixels(descriptors, predictions, image.features.descriptors,
-                                                     positions, radius_px, options_.matching)) {
+                                                     positions, radius_px, closeMatches())) {
       const int32_t track = tracks[match.first_index];
       if (image.track_of_feature[match.second_index] != track) {
         proposals->push_back({keyframe, camera, match.second_index, track});
@@ -149,11 +162,11 @@ class LandmarkSearch {
   }
 
   const LandmarkSearchOptions& options_;
-  const MappingData& data_;
+  const ReconstructionData& data_;
   std::vector<std::vector<std::pair<int32_t, const TrackObservation*>>> observed_;
 };
 
-/// Union of tracks that are one landmark.
+/// Disjoint sets of tracks that are one landmark.
 class TrackGroups {
  public:
   explicit TrackGroups(size_t size) : parent_(size) { std::iota(parent_.begin(), parent_.end(), 0); }
@@ -164,7 +177,7 @@ class TrackGroups {
     }
     return track;
   }
-  /// The lower number stands for both.
+  /// The lower index represents the union.
   void merge(int32_t a, int32_t b) {
     a = find(a);
     b = find(b);
@@ -175,22 +188,21 @@ class TrackGroups {
   std::vector<int32_t> parent_;
 };
 
-/// In which images a landmark is seen. Two that are seen apart in one image are not one.
+/// The images that observe each landmark. Two landmarks in one image are different ones.
 class ImagesOfTracks {
  public:
-  explicit ImagesOfTracks(const MappingData& data) : images_(data.tracks.size()) {
+  explicit ImagesOfTracks(const ReconstructionData& data) : images_(data.tracks.size()) {
     for (size_t t = 0; t < data.tracks.size(); ++t) {
       for (const TrackObservation& observation : data.tracks[t].observations) {
         images_[t].insert({observation.keyframe, observation.camera});
       }
     }
   }
-  /// False where the track is seen in this image already.
+  /// False if the image observes the track already.
   bool add(int32_t track, int32_t keyframe, int32_t camera) {
     return images_[track].insert({keyframe, camera}).second;
   }
-  /// Of the tracks that stand for their groups; the lower number has both afterwards. False where they are
-  /// seen in one image.
+  /// Joins the images of two representatives at the lower index. False if one image observes both.
   bool merge(int32_t a, int32_t b) {
     std::set<std::pair<int32_t, int32_t>>& to = images_[std::min(a, b)];
     std::set<std::pair<int32_t, int32_t>>& from = images_[std::max(a, b)];
@@ -208,10 +220,8 @@ class ImagesOfTracks {
   std::vector<std::set<std::pair<int32_t, int32_t>>> images_;
 };
 
-/// Whether a track's own position, where it has one, is that of the landmark whose image it is said to be, as
-/// far as the camera can tell.
-bool arePointsOne(const LandmarkSearchOptions& options, const MappingData& data, int32_t track,
-                  const Proposal& proposal) {
+/// Whether a track without a position, or at a similar range as the proposed landmark, may be this landmark.
+bool arePointsOne(const ReconstructionData& data, int32_t track, const Proposal& proposal) {
   const std::optional<Eigen::Vector3d>& own = data.tracks[track].position_m;
   if (!own) {
     return true;
@@ -221,12 +231,11 @@ bool arePointsOne(const LandmarkSearchOptions& options, const MappingData& data,
   const Eigen::Vector3d to_own = *own - centre;
   const Eigen::Vector3d to_other = *data.tracks[proposal.track].position_m - centre;
   const double ratio = to_own.norm() / to_other.norm();
-  return ratio < options.max_merge_ratio && 1.0 / ratio < options.max_merge_ratio;
+  return ratio < kMaxMergeRatio && 1.0 / ratio < kMaxMergeRatio;
 }
 
-/// Moves the observations of merged tracks to the one that stands for them; of two in one image the better
-/// stays.
-void joinTracks(TrackGroups* groups, MappingData* data) {
+/// Moves the observations of merged tracks to their representative; keeps the better of two in one image.
+void joinTracks(TrackGroups* groups, ReconstructionData* data) {
   for (size_t t = 0; t < data->tracks.size(); ++t) {
     const int32_t root = groups->find(static_cast<int32_t>(t));
     if (root != static_cast<int32_t>(t)) {
@@ -262,24 +271,7 @@ void joinTracks(TrackGroups* groups, MappingData* data) {
 
 }  // namespace
 
-MatchOptions LandmarkSearchOptions::closeMatches() {
-  MatchOptions options;
-  options.max_ratio = 0.8;
-  options.max_distance = 60.0;
-  return options;
-}
-
-void LandmarkSearchOptions::validate() const {
-  requireField(radius_px > 0.0, "radius_px", "must be positive", radius_px);
-  requireField(max_distance_m > 0.0, "max_distance_m", "must be positive", max_distance_m);
-  requireField(max_view_angle_rad > 0.0, "max_view_angle_rad", "must be positive", max_view_angle_rad);
-  requireField(max_range_ratio >= 1.0, "max_range_ratio", "must be 1 or more", max_range_ratio);
-  requireField(max_merge_ratio >= 1.0, "max_merge_ratio", "must be 1 or more", max_merge_ratio);
-  requireField(feature_sigma_px > 0.0, "feature_sigma_px", "must be positive", feature_sigma_px);
-  validateInner("matching", matching);
-}
-
-LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, MappingData* data) {
+LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, ReconstructionData* data) {
   const auto num_keyframes = static_cast<int32_t>(data->keyframes.size());
   std::vector<std::vector<Proposal>> proposals(num_keyframes);
   const LandmarkSearch search(options, *data);
@@ -294,7 +286,7 @@ LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, Mapp
       int32_t& track = image.track_of_feature[proposal.feature];
       if (track < 0) {
         if (!images.add(groups.find(proposal.track), proposal.keyframe, proposal.camera)) {
-          continue;  // seen elsewhere in this image
+          continue;  // observed elsewhere in this image
         }
         const cv::Point2f position = image.features.keypoints[proposal.feature].position_px;
         track = proposal.track;
@@ -302,8 +294,7 @@ LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, Mapp
             {proposal.keyframe, proposal.camera, proposal.feature, Eigen::Vector2d(position.x, position.y),
              options.feature_sigma_px});
         ++summary.num_new_observations;
-      } else if (groups.find(track) != groups.find(proposal.track) &&
-                 arePointsOne(options, *data, track, proposal) &&
+      } else if (groups.find(track) != groups.find(proposal.track) && arePointsOne(*data, track, proposal) &&
                  images.merge(groups.find(track), groups.find(proposal.track))) {
         groups.merge(track, proposal.track);
         ++summary.num_merged_tracks;

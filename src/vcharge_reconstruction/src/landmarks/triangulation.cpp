@@ -10,6 +10,9 @@ namespace vcharge {
 namespace {
 
 constexpr int kIterations = 3;
+constexpr double kMinRange_m = 0.3;
+/// Two rays meet by chance too easily.
+constexpr int kMinObservations = 3;
 
 double largestParallax(const std::vector<Ray>& rays) {
   double min_cosine = 1.0;
@@ -21,7 +24,7 @@ double largestParallax(const std::vector<Ray>& rays) {
   return std::acos(std::max(-1.0, min_cosine));
 }
 
-/// Least squares of the distances to the rays, each over its range, so that angles count.
+/// Least squares of the distances to the rays, each over its range: an approximation of the angles.
 std::optional<Eigen::Vector3d> nearestPoint(const std::vector<Ray>& rays) {
   if (rays.size() < 2) {
     return std::nullopt;
@@ -52,18 +55,17 @@ std::optional<Eigen::Vector3d> nearestPoint(const std::vector<Ray>& rays) {
 double angularError(const Ray& ray, const Eigen::Vector3d& point, const TriangulationOptions& options) {
   const Eigen::Vector3d to_point = point - ray.origin_m;
   const double range_m = to_point.norm();
-  if (!(range_m >= options.min_range_m && range_m <= options.max_range_m) ||
-      to_point.dot(ray.direction) <= 0.0) {
+  if (!(range_m >= kMinRange_m && range_m <= options.max_range_m) || to_point.dot(ray.direction) <= 0.0) {
     return INFINITY;
   }
   return to_point.cross(ray.direction).norm() / range_m;
 }
 
-/// Triangulates without the rays that fit worst, as long as enough are left: a tracked patch may have
+/// Triangulates after removal of the worst rays, as long as enough are left: a tracked patch may have
 /// slipped.
 std::optional<Eigen::Vector3d> triangulateMostOf(std::vector<Ray>* rays,
                                                  const TriangulationOptions& options) {
-  while (static_cast<int>(rays->size()) >= options.min_observations) {
+  while (static_cast<int>(rays->size()) >= kMinObservations) {
     const std::optional<Eigen::Vector3d> point = nearestPoint(*rays);
     if (!point || largestParallax(*rays) < options.min_parallax_rad) {
       return std::nullopt;
@@ -87,14 +89,6 @@ std::optional<Eigen::Vector3d> triangulateMostOf(std::vector<Ray>* rays,
 
 }  // namespace
 
-void TriangulationOptions::validate() const {
-  requireField(min_parallax_rad > 0.0, "min_parallax_rad", "must be positive", min_parallax_rad);
-  requireField(min_range_m >= 0.0, "min_range_m", "must not be negative", min_range_m);
-  requireField(max_range_m > min_range_m, "max_range_m", "must be above min_range_m", max_range_m);
-  requireField(max_error_rad > 0.0, "max_error_rad", "must be positive", max_error_rad);
-  requireField(min_observations >= 2, "min_observations", "must be 2 or more", min_observations);
-}
-
 std::optional<Eigen::Vector3d> triangulate(const std::vector<Ray>& rays,
                                            const TriangulationOptions& options) {
   const std::optional<Eigen::Vector3d> point = nearestPoint(rays);
@@ -109,7 +103,7 @@ std::optional<Eigen::Vector3d> triangulate(const std::vector<Ray>& rays,
   return point;
 }
 
-bool observationRay(const MappingData& data, const TrackObservation& observation, Ray* ray_in_map) {
+bool observationRay(const ReconstructionData& data, const TrackObservation& observation, Ray* ray_in_map) {
   const RigCamera& camera = data.rig->cameras[observation.camera];
   Eigen::Vector3d ray_in_camera;
   if (!camera.model.unproject(observation.position_px, &ray_in_camera)) {
@@ -121,11 +115,11 @@ bool observationRay(const MappingData& data, const TrackObservation& observation
   return true;
 }
 
-void triangulateTracks(const TriangulationOptions& options, MappingData* data) {
+void triangulateTracks(const TriangulationOptions& options, ReconstructionData* data) {
   tbb::parallel_for(size_t{0}, data->tracks.size(), [&](size_t i) {
     Track& track = data->tracks[i];
     track.position_m.reset();
-    if (static_cast<int>(track.observations.size()) < options.min_observations) {
+    if (static_cast<int>(track.observations.size()) < kMinObservations) {
       return;
     }
     std::vector<Ray> rays;

@@ -13,7 +13,7 @@ Ray rayTo(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& point_m) {
   return {origin_m, (point_m - origin_m).normalized()};
 }
 
-TEST(TriangulationTest, FindsThePointWhereRaysMeet) {
+TEST(TriangulationTest, FindsTheIntersectionOfRays) {
   const Eigen::Vector3d point(3.0, -2.0, 1.0);
   const std::vector<Ray> rays = {rayTo({0.0, 0.0, 0.0}, point), rayTo({1.0, 0.0, 0.0}, point),
                                  rayTo({2.0, 0.5, 0.2}, point)};
@@ -22,7 +22,7 @@ TEST(TriangulationTest, FindsThePointWhereRaysMeet) {
   EXPECT_LT((*found - point).norm(), 1e-9);
 }
 
-TEST(TriangulationTest, RefusesRaysThatAreParallelMeetBehindMissEachOtherOrTooFewOfThem) {
+TEST(TriangulationTest, RefusesParallelDivergingSkewOrTooFewRays) {
   const TriangulationOptions options;
   const Eigen::Vector3d point(3.0, -2.0, 1.0);
   const Ray first = rayTo({0.0, 0.0, 0.0}, point);
@@ -36,8 +36,8 @@ TEST(TriangulationTest, RefusesRaysThatAreParallelMeetBehindMissEachOtherOrTooFe
   EXPECT_FALSE(triangulate({}, options));
 }
 
-TEST(TriangulationTest, TracksBearAnObservationThatSlippedAway) {
-  MappingData data = testing::makeTestDrive(testing::TestDriveOptions());
+TEST(TriangulationTest, IgnoresOneWrongObservationOfATrack) {
+  ReconstructionData data = testing::makeTestDrive(testing::TestDriveOptions());
   const std::vector<Track> truth = data.tracks;
   for (Track& track : data.tracks) {
     track.position_m.reset();

@@ -8,13 +8,43 @@
 
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/motion/cross_matrix.h"
+#include "vcharge_features/descriptor_matching.h"
 #include "vcharge_features/place_index.h"
 #include "vcharge_geometry/pose_graph/pose_graph.h"
+#include "vcharge_geometry/pose_graph/robust_pose_graph.h"
 #include "vcharge_geometry/robust/motion_estimation.h"
 #include "vcharge_geometry/robust/pose_estimation.h"
 
 namespace vcharge {
 namespace {
+
+/// Distance between the keyframes that train the vocabulary: closer ones show the same features.
+constexpr double kTrainingSpacing_m = 2.5;
+/// Largest angle between the rotations of the planar motion and of the pose among landmarks.
+constexpr double kMaxDisagreement_rad = 0.035;
+/// A loop edge that differs more from the adjusted keyframes was wrong.
+constexpr double kMaxFinalError_m = 0.2;
+constexpr double kMaxFinalError_rad = 0.03;
+// Deviations in the pose graph: of the motion between consecutive keyframes, and of a loop edge in addition
+// to its covariance.
+constexpr double kStepSigma_m = 0.01;
+constexpr double kStepSigma_rad = 0.001;
+constexpr double kLoopSigma_m = 0.03;
+constexpr double kLoopSigma_rad = 0.003;
+
+VocabularyTreeOptions vocabularyOptions() {
+  VocabularyTreeOptions options;
+  options.max_iterations = 5;
+  return options;
+}
+
+RobustOptions robustOptions() {
+  RobustOptions options;
+  options.max_error_rad = 0.005;
+  options.max_iterations = 1000;
+  options.min_inliers = 12;
+  return options;
+}
 
 std::vector<cv::Mat> descriptorsOf(const Keyframe& keyframe) {
   std::vector<cv::Mat> descriptors;
@@ -24,22 +54,22 @@ std::vector<cv::Mat> descriptorsOf(const Keyframe& keyframe) {
   return descriptors;
 }
 
-Ray rayOf(const MappingData& data, int32_t keyframe, int camera, int feature) {
+Ray rayOf(const ReconstructionData& data, int32_t keyframe, int camera, int feature) {
   const RigidTransform& vehicle_from_camera = *data.rig->cameras[camera].vehicle_from_camera;
   return {
       vehicle_from_camera.translation(),
       vehicle_from_camera.rotation() * data.keyframes[keyframe].images[camera].rays_in_camera.col(feature)};
 }
 
-/// Rays of both keyframes that look alike, and the landmark that the first sees along its ray.
+/// Matches between two keyframes.
 struct LoopMatches {
   std::vector<RayMatch> rays;
-  /// What the first and the second see along their rays; -1: no track, or one without position.
+  /// The landmark that each keyframe observes along its ray, as a track; -1: none.
   std::vector<int32_t> first_tracks, second_tracks;
 };
 
-LoopMatches matchKeyframes(const LoopClosureOptions& options, const MappingData& data, int32_t first,
-                           int32_t second, const std::vector<std::pair<int, int>>& camera_pairs) {
+LoopMatches matchKeyframes(const ReconstructionData& data, int32_t first, int32_t second,
+                           const std::vector<std::pair<int, int>>& camera_pairs) {
   LoopMatches result;
   for (const auto& [first_camera, second_camera] : camera_pairs) {
     const KeyframeImage& first_image = data.keyframes[first].images[first_camera];
@@ -48,7 +78,7 @@ LoopMatches matchKeyframes(const LoopClosureOptions& options, const MappingData&
       continue;
     }
     for (const FeatureMatch& match : matchDescriptors(first_image.features.descriptors,
-                                                      second_image.features.descriptors, options.matching)) {
+                                                      second_image.features.descriptors, MatchOptions())) {
       RayMatch rays;
       rays.previous = rayOf(data, first, first_camera, match.first_index);
       rays.current = rayOf(data, second, second_camera, match.second_index);
@@ -66,10 +96,9 @@ LoopMatches matchKeyframes(const LoopClosureOptions& options, const MappingData&
   return result;
 }
 
-/// Pose of one keyframe's rig in the vehicle's frame of the other, whose landmarks its rays meet.
-PoseEstimate poseAmongLandmarks(const LoopClosureOptions& options, const MappingData& data, int32_t reference,
-                                const LoopMatches& matches, const std::vector<int>& inliers,
-                                bool reference_is_second) {
+/// Pose of one keyframe's rig among the landmarks of the reference, in the vehicle's frame of the reference.
+PoseEstimate poseAmongLandmarks(const ReconstructionData& data, int32_t reference, const LoopMatches& matches,
+                                const std::vector<int>& inliers, bool reference_is_second) {
   const RigidTransform reference_from_map = data.keyframes[reference].map_from_vehicle.inverse();
   const std::vector<int32_t>& tracks = reference_is_second ? matches.second_tracks : matches.first_tracks;
   std::vector<PointMatch> points;
@@ -83,10 +112,11 @@ PoseEstimate poseAmongLandmarks(const LoopClosureOptions& options, const Mapping
       points.push_back(point);
     }
   }
-  return estimateAbsolutePose(points, options.robust);
+  return estimateAbsolutePose(points, robustOptions());
 }
 
-/// Of target_from_source, over [dt, dphi] in the target's frame, to that of its inverse.
+/// Converts the covariance of target_from_source, over [dt, dphi] in the target's frame, to that of its
+/// inverse.
 Eigen::Matrix<double, 6, 6> covarianceOfInverse(const RigidTransform& target_from_source,
                                                 const Eigen::Matrix<double, 6, 6>& covariance) {
   // source_from_target's translation is -R^T t: it moves by -R^T (dt - dphi x t), its rotation by -R^T dphi.
@@ -99,7 +129,7 @@ Eigen::Matrix<double, 6, 6> covarianceOfInverse(const RigidTransform& target_fro
   return jacobian * covariance * jacobian.transpose();
 }
 
-/// Turns the vehicle's frame upright: what the map knows of roll and pitch.
+/// Rotation that removes roll and pitch of a pose.
 Eigen::Quaterniond uprightFromVehicle(const RigidTransform& map_from_vehicle) {
   const double yaw_rad = yawOfRotation(map_from_vehicle.rotation());
   return rotationFromYawPitchRoll(-yaw_rad, 0.0, 0.0) * map_from_vehicle.rotation();
@@ -112,15 +142,15 @@ Eigen::Matrix<double, 6, 6> diagonalInformation(double sigma_m, double sigma_rad
   return sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
-/// Of a loop edge in g2o's error, whose translation is in the second's frame.
-Eigen::Matrix<double, 6, 6> loopInformation(const LoopEdge& edge, const LoopClosureOptions& options) {
+/// Information of a loop edge for the error of g2o, whose translation is in the second keyframe's frame.
+Eigen::Matrix<double, 6, 6> loopInformation(const LoopEdge& edge) {
   Eigen::Matrix<double, 6, 6> first_from_error = Eigen::Matrix<double, 6, 6>::Zero();
   const Eigen::Matrix3d turn = edge.first_from_second.rotationMatrix().transpose();
   first_from_error.topLeftCorner<3, 3>() = turn;
   first_from_error.bottomRightCorner<3, 3>() = 0.5 * turn;
   Eigen::Matrix<double, 6, 6> covariance = edge.covariance;
-  covariance.diagonal().head<3>().array() += options.loop_sigma_m * options.loop_sigma_m;
-  covariance.diagonal().tail<3>().array() += options.loop_sigma_rad * options.loop_sigma_rad;
+  covariance.diagonal().head<3>().array() += kLoopSigma_m * kLoopSigma_m;
+  covariance.diagonal().tail<3>().array() += kLoopSigma_rad * kLoopSigma_rad;
   covariance = first_from_error * covariance * first_from_error.transpose();
   const Eigen::Matrix<double, 6, 6> information = covariance.inverse();
   return 0.5 * (information + information.transpose());
@@ -128,47 +158,12 @@ Eigen::Matrix<double, 6, 6> loopInformation(const LoopEdge& edge, const LoopClos
 
 }  // namespace
 
-VocabularyTreeOptions LoopClosureOptions::smallVocabulary() {
-  VocabularyTreeOptions options;
-  options.max_iterations = 5;
-  return options;
-}
-
-RobustOptions LoopClosureOptions::defaultRobust() {
-  RobustOptions options;
-  options.max_error_rad = 0.005;
-  options.max_iterations = 1000;
-  options.min_inliers = 12;
-  return options;
-}
-
-void LoopClosureOptions::validate() const {
-  requireField(training_spacing_m > 0.0, "training_spacing_m", "must be positive", training_spacing_m);
-  requireField(min_travel_m >= 0.0, "min_travel_m", "must not be negative", min_travel_m);
-  requireField(max_candidates >= 1, "max_candidates", "must be 1 or more", max_candidates);
-  validateInner("matching", matching);
-  validateInner("robust", robust);
-  validateInner("vocabulary", vocabulary);
-  requireField(min_inliers >= 6, "min_inliers", "must be 6 or more", min_inliers);
-  requireField(min_inlier_ratio >= 0.0 && min_inlier_ratio <= 1.0, "min_inlier_ratio", "must be in [0, 1]",
-               min_inlier_ratio);
-  requireField(max_sigma_m > 0.0, "max_sigma_m", "must be positive", max_sigma_m);
-  requireField(max_disagreement_rad > 0.0, "max_disagreement_rad", "must be positive", max_disagreement_rad);
-  requireField(max_final_error_m > 0.0, "max_final_error_m", "must be positive", max_final_error_m);
-  requireField(max_final_error_rad > 0.0, "max_final_error_rad", "must be positive", max_final_error_rad);
-  requireField(step_sigma_m > 0.0, "step_sigma_m", "must be positive", step_sigma_m);
-  requireField(step_sigma_rad > 0.0, "step_sigma_rad", "must be positive", step_sigma_rad);
-  requireField(loop_sigma_m > 0.0, "loop_sigma_m", "must be positive", loop_sigma_m);
-  requireField(loop_sigma_rad > 0.0, "loop_sigma_rad", "must be positive", loop_sigma_rad);
-}
-
-std::shared_ptr<const VocabularyTree> trainVocabulary(const LoopClosureOptions& options,
-                                                      const MappingData& data) {
+std::shared_ptr<const VocabularyTree> trainVocabulary(const ReconstructionData& data) {
   std::vector<cv::Mat> descriptors;
   double last_m = -INFINITY;
   bool has_features = false;
   for (const Keyframe& keyframe : data.keyframes) {
-    if (keyframe.travelled_m - last_m < options.training_spacing_m) {
+    if (keyframe.travelled_m - last_m < kTrainingSpacing_m) {
       continue;
     }
     last_m = keyframe.travelled_m;
@@ -178,40 +173,38 @@ std::shared_ptr<const VocabularyTree> trainVocabulary(const LoopClosureOptions& 
     }
   }
   if (!has_features) {
-    throw InputError("no image features in the whole drive: nothing to recognize places by");
+    throw InputError("no image features in the whole drive: places cannot be recognized");
   }
-  return std::make_shared<const VocabularyTree>(VocabularyTree::train(descriptors, options.vocabulary));
+  return std::make_shared<const VocabularyTree>(VocabularyTree::train(descriptors, vocabularyOptions()));
 }
 
-LoopEdge verifyLoop(const LoopClosureOptions& options, const MappingData& data, int32_t first, int32_t second,
-                    const std::vector<std::pair<int, int>>& camera_pairs) {
+LoopEdge verifyLoop(const LoopClosureOptions& options, const ReconstructionData& data, int32_t first,
+                    int32_t second, const std::vector<std::pair<int, int>>& camera_pairs) {
   LoopEdge edge;
   edge.first = first;
   edge.second = second;
-  const LoopMatches matches = matchKeyframes(options, data, first, second, camera_pairs);
+  const LoopMatches matches = matchKeyframes(data, first, second, camera_pairs);
   if (static_cast<int>(matches.rays.size()) < options.min_inliers) {
     edge.reason = "too few matches";
     return edge;
   }
-  MotionEstimate motion = estimatePlanarMotion(matches.rays, options.robust);
+  MotionEstimate motion = estimatePlanarMotion(matches.rays, robustOptions());
   const auto needed = std::max<size_t>(
       options.min_inliers,
       static_cast<size_t>(options.min_inlier_ratio * static_cast<double>(matches.rays.size())));
   if (!isUsable(motion) || motion.inliers.size() < needed) {
     motion = estimateKnownVerticalMotion(
         matches.rays, uprightFromVehicle(data.keyframes[first].map_from_vehicle),
-        uprightFromVehicle(data.keyframes[second].map_from_vehicle), options.robust);
+        uprightFromVehicle(data.keyframes[second].map_from_vehicle), robustOptions());
     edge.is_planar = false;
   }
   if (!isUsable(motion) || motion.inliers.size() < needed) {
     edge.reason = "no motion explains enough matches";
     return edge;
   }
-  // Metric, and free to move in all directions: one rig among the landmarks of the other.
-  const PoseEstimate first_from_second =
-      poseAmongLandmarks(options, data, first, matches, motion.inliers, false);
-  const PoseEstimate second_from_first =
-      poseAmongLandmarks(options, data, second, matches, motion.inliers, true);
+  // The metric pose in six degrees of freedom: one rig among the landmarks of the other.
+  const PoseEstimate first_from_second = poseAmongLandmarks(data, first, matches, motion.inliers, false);
+  const PoseEstimate second_from_first = poseAmongLandmarks(data, second, matches, motion.inliers, true);
   edge.num_inliers =
       static_cast<int>(std::max(first_from_second.inliers.size(), second_from_first.inliers.size()));
   if (edge.num_inliers == 0) {
@@ -226,7 +219,7 @@ LoopEdge verifyLoop(const LoopClosureOptions& options, const MappingData& data, 
     edge.covariance = covarianceOfInverse(second_from_first.map_from_rig, second_from_first.covariance);
   }
   if (angleOfRotation(motion.previous_from_current.rotation().conjugate() *
-                      edge.first_from_second.rotation()) > options.max_disagreement_rad) {
+                      edge.first_from_second.rotation()) > kMaxDisagreement_rad) {
     edge.reason = "matches and landmarks disagree";
   } else if (edge.covariance.topLeftCorner<3, 3>().trace() > options.max_sigma_m * options.max_sigma_m) {
     edge.reason = "too uncertain";
@@ -236,7 +229,7 @@ LoopEdge verifyLoop(const LoopClosureOptions& options, const MappingData& data, 
 
 std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
                                 const std::shared_ptr<const VocabularyTree>& vocabulary,
-                                const MappingData& data, const LoopProgress& progress) {
+                                const ReconstructionData& data, const LoopProgress& progress) {
   const auto num_cameras = static_cast<int>(data.rig->cameras.size());
   const auto num_keyframes = static_cast<int32_t>(data.keyframes.size());
   PlaceIndex index(vocabulary, num_cameras);
@@ -274,7 +267,7 @@ std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
   return edges;
 }
 
-void closeLoops(const LoopClosureOptions& options, std::vector<LoopEdge>* edges, MappingData* data) {
+void closeLoops(std::vector<LoopEdge>* edges, ReconstructionData* data) {
   PoseGraph graph;
   for (size_t i = 0; i < data->keyframes.size(); ++i) {
     graph.map_from_node[static_cast<int64_t>(i)] = data->keyframes[i].map_from_vehicle;
@@ -284,7 +277,7 @@ void closeLoops(const LoopClosureOptions& options, std::vector<LoopEdge>* edges,
       step.second = static_cast<int64_t>(i);
       step.first_from_second =
           data->keyframes[i - 1].map_from_vehicle.inverse() * data->keyframes[i].map_from_vehicle;
-      step.information = diagonalInformation(options.step_sigma_m, options.step_sigma_rad);
+      step.information = diagonalInformation(kStepSigma_m, kStepSigma_rad);
       graph.edges.push_back(step);
     }
   }
@@ -293,8 +286,7 @@ void closeLoops(const LoopClosureOptions& options, std::vector<LoopEdge>* edges,
     const LoopEdge& edge = (*edges)[i];
     if (edge.reason.empty()) {
       loops.push_back(i);
-      graph.edges.push_back(
-          {edge.first, edge.second, edge.first_from_second, loopInformation(edge, options)});
+      graph.edges.push_back({edge.first, edge.second, edge.first_from_second, loopInformation(edge)});
     }
   }
   if (loops.empty()) {
@@ -314,13 +306,13 @@ void closeLoops(const LoopClosureOptions& options, std::vector<LoopEdge>* edges,
   }
 }
 
-void checkLoops(const LoopClosureOptions& options, const MappingData& data, std::vector<LoopEdge>* edges) {
+void checkLoops(const ReconstructionData& data, std::vector<LoopEdge>* edges) {
   for (LoopEdge& edge : *edges) {
     const RigidTransform adjusted =
         data.keyframes[edge.first].map_from_vehicle.inverse() * data.keyframes[edge.second].map_from_vehicle;
     const RigidTransform error = adjusted.inverse() * edge.first_from_second;
-    if (edge.accepted && (error.translation().norm() > options.max_final_error_m ||
-                          angleOfRotation(error.rotation()) > options.max_final_error_rad)) {
+    if (edge.accepted && (error.translation().norm() > kMaxFinalError_m ||
+                          angleOfRotation(error.rotation()) > kMaxFinalError_rad)) {
       edge.accepted = false;
       edge.reason = "contradicts the adjusted map";
     }

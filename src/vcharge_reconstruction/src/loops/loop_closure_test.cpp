@@ -7,7 +7,8 @@
 namespace vcharge {
 namespace {
 
-LoopEdge edgeBetween(const MappingData& data, int32_t first, int32_t second, const RigidTransform& error) {
+LoopEdge edgeBetween(const ReconstructionData& data, int32_t first, int32_t second,
+                     const RigidTransform& error) {
   LoopEdge edge;
   edge.first = first;
   edge.second = second;
@@ -18,8 +19,8 @@ LoopEdge edgeBetween(const MappingData& data, int32_t first, int32_t second, con
   return edge;
 }
 
-TEST(LoopClosureTest, TheAdjustedMapRejectsEdgesThatItContradicts) {
-  const MappingData data = testing::makeTestDrive({});
+TEST(LoopClosureTest, RejectsEdgesThatContradictTheAdjustedMap) {
+  const ReconstructionData data = testing::makeTestDrive({});
   std::vector<LoopEdge> edges = {
       edgeBetween(data, 0, 30, RigidTransform::planar(0.05, 0.02, 0.005)),
       edgeBetween(data, 1, 31, RigidTransform::planar(0.3, 0.0, 0.0)),
@@ -28,7 +29,7 @@ TEST(LoopClosureTest, TheAdjustedMapRejectsEdgesThatItContradicts) {
   };
   edges[0].accepted = edges[1].accepted = edges[2].accepted = true;
   edges[3].reason = "too few landmarks agree";
-  checkLoops(LoopClosureOptions(), data, &edges);
+  checkLoops(data, &edges);
   EXPECT_TRUE(edges[0].accepted);
   EXPECT_TRUE(edges[0].reason.empty());
   EXPECT_FALSE(edges[1].accepted);
@@ -37,9 +38,9 @@ TEST(LoopClosureTest, TheAdjustedMapRejectsEdgesThatItContradicts) {
   EXPECT_EQ(edges[3].reason, "too few landmarks agree") << "a reason that is there stays";
 }
 
-TEST(LoopClosureTest, ClosingLoopsMovesTheKeyframesAndRejectsAWrongEdge) {
-  const MappingData truth = testing::makeTestDrive({});
-  MappingData data = truth;
+TEST(LoopClosureTest, MovesTheKeyframesAndRejectsAWrongEdge) {
+  const ReconstructionData truth = testing::makeTestDrive({});
+  ReconstructionData data = truth;
   // Chained motions that turn a little too much.
   for (size_t i = 1; i < data.keyframes.size(); ++i) {
     const RigidTransform step =
@@ -58,7 +59,7 @@ TEST(LoopClosureTest, ClosingLoopsMovesTheKeyframesAndRejectsAWrongEdge) {
         .norm();
   };
   const double before_m = errorAtEnd();
-  closeLoops(LoopClosureOptions(), &edges, &data);
+  closeLoops(&edges, &data);
   EXPECT_GT(before_m, 0.1);
   EXPECT_LT(errorAtEnd(), 0.2 * before_m);
   for (size_t i = 0; i < 6; ++i) {

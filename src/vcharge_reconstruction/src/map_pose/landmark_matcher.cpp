@@ -16,13 +16,26 @@ namespace vcharge {
 namespace {
 
 constexpr double kReferenceWidth_px = 1280.0;
-/// Of search: features of small images are no more exact.
+/// Search radius in the image: features of small images are not more accurate.
 constexpr double kLeastRadius_px = 3.0;
-/// Of most lenses of such images, about.
+/// Search radius in an image of the reference width, also of the second search.
+constexpr double kMinRadius_px = 6.0;
+/// Search radius in standard deviations of the expected pose.
+constexpr double kRadiusSigmas = 3.0;
+/// Typical resolution of the lenses at the reference width.
 constexpr double kReferencePixelsPerRadian = 450.0;
-/// Keyframes beside a recognized one whose landmarks are looked for too.
+/// Keyframes before and after a recognized one whose landmarks are searched too.
 constexpr int kNeighbours = 2;
 constexpr int kUnrelatedPairs = 1001;
+/// Largest distance of the descriptors of a match over the median distance of unrelated ones: a threshold for
+/// all kinds of descriptors.
+constexpr double kMaxRelativeDistance = 0.55;
+
+MatchOptions closeMatches() {
+  MatchOptions options;
+  options.max_ratio = 0.85;
+  return options;
+}
 
 double medianUnrelatedDistance(const SparseMap& map) {
   const cv::Mat& descriptors = map.descriptors();
@@ -47,7 +60,7 @@ double medianUnrelatedDistance(const SparseMap& map) {
 }  // namespace
 
 void LandmarkMatches::append(const LandmarkMatches& other) {
-  sightings.insert(sightings.end(), other.sightings.begin(), other.sightings.end());
+  observations.insert(observations.end(), other.observations.begin(), other.observations.end());
   points.insert(points.end(), other.points.begin(), other.points.end());
 }
 
@@ -57,10 +70,9 @@ LandmarkMatcher::LandmarkMatcher(std::shared_ptr<const SparseMap> map, std::shar
       rig_(std::move(rig)),
       options_(options),
       unrelated_distance_(medianUnrelatedDistance(*map_)),
-      matching_(options.matching) {
+      matching_(closeMatches()) {
   if (unrelated_distance_ > 0.0) {
-    matching_.max_distance =
-        std::min(matching_.max_distance, options.max_relative_distance * unrelated_distance_);
+    matching_.max_distance = std::min(matching_.max_distance, kMaxRelativeDistance * unrelated_distance_);
   }
 }
 
@@ -87,8 +99,9 @@ void LandmarkMatcher::add(const RigFeatures& features, size_t camera, size_t obs
   point.camera = static_cast<int>(camera);
   point.quality = -distance;
   matches->points.push_back(point);
-  matches->sightings.push_back({landmark, static_cast<int32_t>(camera),
-                                features.images[camera].keypoints[static_cast<size_t>(feature)].position_px});
+  matches->observations.push_back(
+      {landmark, static_cast<int32_t>(camera),
+       features.images[camera].keypoints[static_cast<size_t>(feature)].position_px});
 }
 
 LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
@@ -109,13 +122,12 @@ LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
     for (const Keypoint& keypoint : image.keypoints) {
       positions.push_back(keypoint.position_px);
     }
-    // How far a landmark in the middle of them may be from where it is expected.
-    const double angle_rad =
-        options_.radius_sigmas * (sigma_rad + sigma_m / quantile(expected.ranges_m, 0.5));
-    const double radius_px =
-        std::max(kLeastRadius_px, rig_->cameras[camera].image_size_px.width / kReferenceWidth_px *
-                                      std::clamp(kReferencePixelsPerRadian * angle_rad,
-                                                 options_.min_radius_px, options_.max_radius_px));
+    // Uncertainty of the direction to a landmark of median range.
+    const double angle_rad = kRadiusSigmas * (sigma_rad + sigma_m / quantile(expected.ranges_m, 0.5));
+    const double radius_px = std::max(
+        kLeastRadius_px,
+        rig_->cameras[camera].image_size_px.width / kReferenceWidth_px *
+            std::clamp(kReferencePixelsPerRadian * angle_rad, kMinRadius_px, options_.max_radius_px));
     for (const FeatureMatch& match :
          matchNearPixels(descriptorsOf(expected.observations), expected.positions_px, image.descriptors,
                          positions, radius_px, matching_)) {
@@ -131,7 +143,7 @@ LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
 }
 
 std::vector<size_t> LandmarkMatcher::observationsAround(size_t keyframe, size_t camera) const {
-  // Each landmark once, as nearly from the place as possible.
+  // Each landmark once, from the nearest keyframe.
   std::vector<size_t> observations;
   std::unordered_set<int32_t> landmarks;
   const auto num_keyframes = static_cast<std::ptrdiff_t>(map_->keyframes().size());
@@ -161,7 +173,7 @@ LandmarkMatches LandmarkMatcher::searchAtPlace(const RigFeatures& features, cons
     const std::vector<size_t> observations =
         observationsAround(static_cast<size_t>(place.place), static_cast<size_t>(place.cameras[camera]));
     for (const FeatureMatch& match :
-         matchDescriptors(image.descriptors, descriptorsOf(observations), options_.place_matching)) {
+         matchDescriptors(image.descriptors, descriptorsOf(observations), MatchOptions())) {
       add(features, camera, observations[static_cast<size_t>(match.second_index)], match.first_index,
           match.distance, &matches);
     }

@@ -11,30 +11,28 @@
 
 namespace vcharge {
 
-/// Sightings of landmarks, right and wrong ones, and the same for the estimator.
+/// Matches of features with landmarks, right and wrong ones, and the same as input of the estimator.
 struct LandmarkMatches {
-  std::vector<LandmarkSighting> sightings;
+  std::vector<LandmarkObservation> observations;
   std::vector<PointMatch> points;
 
   void append(const LandmarkMatches& other);
 };
 
-/// Finds a map's landmarks among a rig's features, where they are expected or at a place that was recognized.
+/// Matches a map's landmarks with a rig's features, near an expected pose or at a recognized place.
 /// Immutable.
 class LandmarkMatcher {
  public:
   LandmarkMatcher(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
                   const MapLocalizerOptions& options);
 
-  /// Where a rig at `map_from_vehicle`, known to the sigmas, should see them.
+  /// Searches around the projections of the landmarks from `map_from_vehicle`, with these deviations.
   LandmarkMatches searchNear(const RigFeatures& features, const RigidTransform& map_from_vehicle,
                              double sigma_m, double sigma_rad) const;
 
-  /// Anywhere in the images, among what the place's cameras (see PlaceMatch) saw there and just beside.
+  /// Searches the whole images for landmarks that the place's cameras (see PlaceMatch) saw at that keyframe
+  /// and its neighbours.
   LandmarkMatches searchAtPlace(const RigFeatures& features, const PlaceMatch& place) const;
-
-  /// Median distance between descriptors of two landmarks: what a match by chance is like.
-  double unrelatedDistance() const { return unrelated_distance_; }
 
  private:
   cv::Mat descriptorsOf(const std::vector<size_t>& observations) const;
@@ -46,7 +44,7 @@ class LandmarkMatcher {
   const std::shared_ptr<const CameraRig> rig_;
   const MapLocalizerOptions options_;
   const double unrelated_distance_;
-  MatchOptions matching_;  // the options' with a distance of the map's kind of descriptor
+  MatchOptions matching_;  // with a distance for the map's kind of descriptor
 };
 
 }  // namespace vcharge

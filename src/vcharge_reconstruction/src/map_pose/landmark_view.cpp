@@ -6,10 +6,17 @@
 #include <utility>
 
 namespace vcharge {
+namespace {
+
+/// Descriptors are comparable between views whose directions and ranges differ by less.
+constexpr double kMaxViewAngle_rad = 0.6;
+constexpr double kMaxRangeRatio = 1.8;
+
+}  // namespace
 
 LandmarkView::LandmarkView(const SparseMap& map, const CameraRig& rig, const MapLocalizerOptions& options,
                            const RigidTransform& map_from_vehicle)
-    : map_(map), rig_(rig), options_(options), map_from_vehicle_(map_from_vehicle) {
+    : map_(map), rig_(rig), map_from_vehicle_(map_from_vehicle) {
   std::vector<std::pair<double, size_t>> by_distance;
   for (size_t i = 0; i < map.keyframes().size(); ++i) {
     const double distance_m =
@@ -26,7 +33,7 @@ LandmarkView::LandmarkView(const SparseMap& map, const CameraRig& rig, const Map
 }
 
 std::vector<LandmarkView::Source> LandmarkView::sourcesFor(const Eigen::Vector3d& camera_centre) const {
-  const double min_cos_view = std::cos(options_.max_view_angle_rad);
+  const double min_cos_view = std::cos(kMaxViewAngle_rad);
   std::unordered_map<int32_t, size_t> index_of_landmark;
   std::vector<Source> sources;
   for (const size_t keyframe : keyframes_) {
@@ -41,8 +48,8 @@ std::vector<LandmarkView::Source> LandmarkView::sourcesFor(const Eigen::Vector3d
         const Eigen::Vector3d from_there = point - other_centre;
         const double range_m = from_here.norm(), other_range_m = from_there.norm();
         const double cos_angle = from_here.dot(from_there) / (range_m * other_range_m);
-        if (!(cos_angle >= min_cos_view) || range_m > options_.max_range_ratio * other_range_m ||
-            other_range_m > options_.max_range_ratio * range_m) {
+        if (!(cos_angle >= min_cos_view) || range_m > kMaxRangeRatio * other_range_m ||
+            other_range_m > kMaxRangeRatio * range_m) {
           continue;
         }
         const auto [found, is_new] = index_of_landmark.emplace(landmark, sources.size());

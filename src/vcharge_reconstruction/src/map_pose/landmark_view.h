@@ -11,15 +11,14 @@
 
 namespace vcharge {
 
-/// Landmarks that a camera should see, each by the observation that was made from most nearly the same
-/// direction.
+/// Landmarks that a camera should see, each with the observation from the most similar direction.
 struct ExpectedLandmarks {
-  std::vector<size_t> observations;       ///< indices into the map's
+  std::vector<size_t> observations;       ///< indices in the map
   std::vector<cv::Point2f> positions_px;  ///< where the camera should see them
   std::vector<double> ranges_m;
 };
 
-/// What a rig should see of a map from a pose. All arguments must outlive this.
+/// The landmarks of a map that a rig should see from a pose. All arguments must outlive this object.
 class LandmarkView {
  public:
   LandmarkView(const SparseMap& map, const CameraRig& rig, const MapLocalizerOptions& options,
@@ -30,15 +29,14 @@ class LandmarkView {
  private:
   struct Source {
     size_t observation;
-    double cos_angle;  ///< between the directions from which the landmark was and would be seen
+    double cos_angle;  ///< between the directions of the observation and the expected view
   };
   std::vector<Source> sourcesFor(const Eigen::Vector3d& camera_centre) const;
 
   const SparseMap& map_;
   const CameraRig& rig_;
-  const MapLocalizerOptions& options_;
   const RigidTransform& map_from_vehicle_;
-  std::vector<size_t> keyframes_;  ///< the nearest
+  std::vector<size_t> keyframes_;  ///< the nearest keyframes
 };
 
 }  // namespace vcharge

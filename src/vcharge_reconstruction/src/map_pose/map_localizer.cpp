@@ -16,11 +16,29 @@
 namespace vcharge {
 namespace {
 
-// What a pose of place recognition is good for, where the guided search about it begins.
+// Deviations of the pose of a recognized place, around which the guided search begins.
 constexpr double kPlaceSigma_m = 0.2;
 constexpr double kPlaceSigma_rad = 0.02;
-/// Places that are asked for, to get as many candidates apart from each other.
+/// Places requested per candidate, since neighbouring keyframes are similar.
 constexpr int kPlacesPerCandidate = 10;
+/// A candidate nearer than both to a better one is left out.
+constexpr double kPlaceSpacing_m = 2.5;
+constexpr double kPlaceSpacing_rad = 0.6;
+/// Error of a match with a recognized place: its landmarks are seen from elsewhere.
+constexpr double kPlaceMaxError_rad = 0.012;
+/// Poses further apart belong to different places.
+constexpr double kOtherPlace_m = 1.0;
+constexpr double kOtherHeading_rad = 0.1;
+/// Features of a coarse camera are not more accurate than this.
+constexpr double kMinError_px = 0.8;
+
+RobustOptions robustOptions() {
+  RobustOptions options;
+  options.max_error_rad = 0.004;
+  options.max_iterations = 500;
+  options.min_inliers = 12;
+  return options;
+}
 
 FeatureExtractorOptions extractorOptionsOf(const SparseMap& map) {
   FeatureExtractorOptions options;
@@ -34,55 +52,6 @@ FeatureExtractorOptions extractorOptionsOf(const SparseMap& map) {
 
 }  // namespace
 
-MatchOptions MapLocalizerOptions::closeMatches() {
-  MatchOptions options;
-  options.max_ratio = 0.85;
-  return options;
-}
-
-RobustOptions MapLocalizerOptions::defaultRobust() {
-  RobustOptions options;
-  options.max_error_rad = 0.004;
-  options.max_iterations = 500;
-  options.min_inliers = 12;
-  return options;
-}
-
-void MapLocalizerOptions::validate() const {
-  requireField(min_inliers >= 6, "min_inliers", "must be 6 or more", min_inliers);
-  requireField(min_inlier_ratio >= 0.0 && min_inlier_ratio <= 1.0, "min_inlier_ratio", "must be in [0, 1]",
-               min_inlier_ratio);
-  requireField(max_sigma_m > 0.0, "max_sigma_m", "must be positive", max_sigma_m);
-  requireField(max_sigma_rad > 0.0, "max_sigma_rad", "must be positive", max_sigma_rad);
-  requireField(max_distance_m > 0.0, "max_distance_m", "must be positive", max_distance_m);
-  requireField(max_keyframes >= 1, "max_keyframes", "must be 1 or more", max_keyframes);
-  requireField(max_view_angle_rad > 0.0, "max_view_angle_rad", "must be positive", max_view_angle_rad);
-  requireField(max_range_ratio >= 1.0, "max_range_ratio", "must be 1 or more", max_range_ratio);
-  requireField(min_radius_px > 0.0, "min_radius_px", "must be positive", min_radius_px);
-  requireField(max_radius_px >= min_radius_px, "max_radius_px", "must not be below min_radius_px",
-               max_radius_px);
-  requireField(radius_sigmas > 0.0, "radius_sigmas", "must be positive", radius_sigmas);
-  requireField(max_relative_distance > 0.0, "max_relative_distance", "must be positive",
-               max_relative_distance);
-  requireField(max_places >= 1, "max_places", "must be 1 or more", max_places);
-  requireField(min_inliers_without_prior >= 6, "min_inliers_without_prior", "must be 6 or more",
-               min_inliers_without_prior);
-  requireField(min_inliers_per_camera_without_prior >= 0, "min_inliers_per_camera_without_prior",
-               "must not be negative", min_inliers_per_camera_without_prior);
-  requireField(max_ambiguity > 0.0 && max_ambiguity <= 1.0, "max_ambiguity", "must be in (0, 1]",
-               max_ambiguity);
-  requireField(place_spacing_m >= 0.0, "place_spacing_m", "must not be negative", place_spacing_m);
-  requireField(place_spacing_rad >= 0.0, "place_spacing_rad", "must not be negative", place_spacing_rad);
-  requireField(place_max_error_rad > 0.0, "place_max_error_rad", "must be positive", place_max_error_rad);
-  requireField(other_place_m > 0.0, "other_place_m", "must be positive", other_place_m);
-  requireField(other_heading_rad > 0.0, "other_heading_rad", "must be positive", other_heading_rad);
-  validateInner("matching", matching);
-  validateInner("places", places);
-  validateInner("place_matching", place_matching);
-  validateInner("robust", robust);
-  requireField(min_error_px >= 0.0, "min_error_px", "must not be negative", min_error_px);
-}
-
 MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
                            const MapLocalizerOptions& options)
     : MapLocalizer(std::move(map), std::move(rig), options, nullptr) {}
@@ -92,7 +61,7 @@ MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr
     : map_(std::move(map)),
       rig_(std::move(rig)),
       options_(options),
-      robust_(options.robust),
+      robust_(robustOptions()),
       places_(std::move(places)) {
   options_.validate();
   check(map_ != nullptr && rig_ != nullptr, "MapLocalizer: expected a map and a rig");
@@ -107,7 +76,7 @@ MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr
   }
   for (const RigCamera& camera : rig_->cameras) {
     masks_.push_back(makeFeatureMask(camera));
-    robust_.max_error_rad = std::max(robust_.max_error_rad, options_.min_error_px * radiansPerPixel(camera));
+    robust_.max_error_rad = std::max(robust_.max_error_rad, kMinError_px * radiansPerPixel(camera));
   }
   matcher_ = std::make_unique<LandmarkMatcher>(map_, rig_, options_);
   if (places_ != nullptr) {
@@ -120,7 +89,7 @@ MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr
   }
   places_ =
       std::make_shared<PlaceVotes>(descriptors, std::move(images), static_cast<int>(map_->keyframes().size()),
-                                   static_cast<int>(num_cameras), options_.places);
+                                   static_cast<int>(num_cameras), PlaceVotesOptions());
 }
 
 MapLocalizer::~MapLocalizer() = default;
@@ -157,8 +126,8 @@ PoseFix MapLocalizer::fixWithoutPose(const LandmarkMatches& matches) const {
   fix.num_matches = static_cast<int>(matches.points.size());
   fix.inliers_of_camera.assign(rig_->cameras.size(), 0);
   fix.matches_of_camera.assign(rig_->cameras.size(), 0);
-  for (const LandmarkSighting& sighting : matches.sightings) {
-    ++fix.matches_of_camera[sighting.camera];
+  for (const LandmarkObservation& observation : matches.observations) {
+    ++fix.matches_of_camera[observation.camera];
   }
   return fix;
 }
@@ -175,8 +144,8 @@ PoseFix MapLocalizer::estimate(const LandmarkMatches& matches, int min_inliers,
     return fix;
   }
   for (const int i : pose.inliers) {
-    fix.inliers.push_back(matches.sightings[i]);
-    ++fix.inliers_of_camera[matches.sightings[i].camera];
+    fix.inliers.push_back(matches.observations[i]);
+    ++fix.inliers_of_camera[matches.observations[i].camera];
   }
   fix.map_from_vehicle = pose.map_from_rig;
   fix.covariance = pose.covariance;
@@ -211,14 +180,14 @@ int MapLocalizer::minInliersWithoutPrior(const RigFeatures& features) const {
 
 PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const {
   const LandmarkMatches matches = matcher_->searchAtPlace(features, place);
-  // Few of these are right. A vehicle stands on the ground as the map's did: two matches tell its pose.
+  // Few of these are right. For a vehicle that stands on the ground two matches determine the pose.
   const RigidTransform& map_from_keyframe =
       map_->keyframes()[static_cast<size_t>(place.place)].map_from_vehicle;
   const Eigen::Quaterniond upright_from_vehicle =
       rotationFromYawPitchRoll(-yawOfRotation(map_from_keyframe.rotation()), 0.0, 0.0) *
       map_from_keyframe.rotation();
   RobustOptions coarse = robust_;
-  coarse.max_error_rad = std::max(coarse.max_error_rad, options_.place_max_error_rad);
+  coarse.max_error_rad = std::max(coarse.max_error_rad, kPlaceMaxError_rad);
   PoseEstimate pose;
   if (options_.stands_upright) {
     pose = estimateUprightPose(matches.points, upright_from_vehicle, coarse);
@@ -229,7 +198,7 @@ PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMa
   if (pose.status != EstimationStatus::kOk) {
     return fixWithoutPose(matches);
   }
-  // The wide search tells right from wrong: hardly a wrong match fits a pose by chance there.
+  // Verification: few wrong matches of the wide search fit a pose by chance.
   const PoseFix fix =
       estimate(matcher_->searchNear(features, pose.map_from_rig, kPlaceSigma_m, kPlaceSigma_rad),
                options_.min_inliers_without_prior, 0.0);
@@ -241,8 +210,8 @@ PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMa
 
 bool MapLocalizer::isOtherPlace(const PoseFix& a, const PoseFix& b) const {
   const RigidTransform between = a.map_from_vehicle.inverse() * b.map_from_vehicle;
-  return between.translation().norm() > options_.other_place_m ||
-         angleOfRotation(between.rotation()) > options_.other_heading_rad;
+  return between.translation().norm() > kOtherPlace_m ||
+         angleOfRotation(between.rotation()) > kOtherHeading_rad;
 }
 
 std::vector<PlaceMatch> MapLocalizer::recognizePlaces(const RigFeatures& features) const {
@@ -250,15 +219,15 @@ std::vector<PlaceMatch> MapLocalizer::recognizePlaces(const RigFeatures& feature
   for (const ImageFeatures& image : features.images) {
     descriptors.push_back(image.descriptors);
   }
-  // Keyframes beside each other look alike: one of them stands for all, and leaves room for other places.
+  // Neighbouring keyframes are similar: one of them leaves room for other places.
   std::vector<PlaceMatch> places;
   for (const PlaceMatch& match : places_->query(descriptors, kPlacesPerCandidate * options_.max_places)) {
     const RigidTransform& pose = map_->keyframes()[static_cast<size_t>(match.place)].map_from_vehicle;
     const bool is_new = std::none_of(places.begin(), places.end(), [&](const PlaceMatch& other) {
       const RigidTransform between =
           pose.inverse() * map_->keyframes()[static_cast<size_t>(other.place)].map_from_vehicle;
-      return between.translation().norm() < options_.place_spacing_m &&
-             angleOfRotation(between.rotation()) < options_.place_spacing_rad;
+      return between.translation().norm() < kPlaceSpacing_m &&
+             angleOfRotation(between.rotation()) < kPlaceSpacing_rad;
     });
     if (is_new) {
       places.push_back(match);

@@ -16,7 +16,7 @@ std::shared_ptr<const CameraRig> rigOf(const std::shared_ptr<const SparseMap>& m
   return std::shared_ptr<const CameraRig>(map, &map->rig());
 }
 
-/// Half way between two keyframes, a little beside.
+/// A pose half way between two keyframes, slightly beside the path.
 RigidTransform posesBetween(const SparseMap& map, size_t keyframe) {
   const RigidTransform between = interpolate(map.keyframes()[keyframe].map_from_vehicle,
                                              map.keyframes()[keyframe + 1].map_from_vehicle, 0.5);
@@ -47,7 +47,7 @@ class MapLocalizerTest : public ::testing::Test {
 TEST_F(MapLocalizerTest, FindsThePoseNearAnExpectedOne) {
   for (const double wrong : {0.0, 0.4}) {
     testing::TestViewOptions view;
-    view.share_of_wrong = wrong;
+    view.wrong_ratio = wrong;
     for (size_t keyframe = 2; keyframe + 2 < map_->keyframes().size(); keyframe += 5) {
       const RigidTransform truth = posesBetween(*map_, keyframe);
       const PoseFix fix =
@@ -62,7 +62,7 @@ TEST_F(MapLocalizerTest, FindsThePoseNearAnExpectedOne) {
   }
 }
 
-TEST_F(MapLocalizerTest, CovarianceTellsTheError) {
+TEST_F(MapLocalizerTest, CovarianceMatchesTheError) {
   double sum = 0.0;
   int count = 0;
   for (uint32_t seed = 1; seed <= 40; ++seed) {
@@ -82,7 +82,7 @@ TEST_F(MapLocalizerTest, CovarianceTellsTheError) {
   EXPECT_LT(sum / count, 1.6);
 }
 
-TEST_F(MapLocalizerTest, OneCameraIsEnoughAndIsCounted) {
+TEST_F(MapLocalizerTest, LocalizesWithOneCamera) {
   const RigidTransform truth = posesBetween(*map_, 8);
   testing::TestViewOptions view;
   view.camera_without_image = 1;
@@ -94,7 +94,7 @@ TEST_F(MapLocalizerTest, OneCameraIsEnoughAndIsCounted) {
   EXPECT_LT(positionError(fix, truth), 0.03);
 }
 
-TEST_F(MapLocalizerTest, FindsThePoseFromNothing) {
+TEST_F(MapLocalizerTest, RelocalizesWithoutAPrior) {
   for (size_t keyframe = 2; keyframe + 2 < map_->keyframes().size(); keyframe += 4) {
     const RigidTransform truth = posesBetween(*map_, keyframe);
     const PoseFix fix = localizer_.localizeAnywhere(testing::makeTestView(*map_, truth, {}));
@@ -104,7 +104,7 @@ TEST_F(MapLocalizerTest, FindsThePoseFromNothing) {
   }
 }
 
-TEST_F(MapLocalizerTest, FewerThanItWantsOfEachCameraAreNotEnoughFromNothing) {
+TEST_F(MapLocalizerTest, RelocalizationNeedsInliersPerCamera) {
   const RigidTransform truth = posesBetween(*map_, 8);
   const RigFeatures view = testing::makeTestView(*map_, truth, {});
   const PoseFix fix = localizer_.localizeAnywhere(view);
@@ -116,7 +116,7 @@ TEST_F(MapLocalizerTest, FewerThanItWantsOfEachCameraAreNotEnoughFromNothing) {
   EXPECT_EQ(stricter.localizeNear(view, priorAbout(truth, 0.1, 0.0)).status, LocalizationStatus::kLocalized);
 }
 
-TEST_F(MapLocalizerTest, RefusesWhatIsNotInTheMap) {
+TEST_F(MapLocalizerTest, RefusesViewsOfAnotherPlace) {
   for (uint32_t seed = 1; seed <= 10; ++seed) {
     const RigFeatures foreign = testing::makeForeignView(*map_, seed);
     EXPECT_NE(localizer_.localizeAnywhere(foreign).status, LocalizationStatus::kLocalized);
@@ -125,7 +125,7 @@ TEST_F(MapLocalizerTest, RefusesWhatIsNotInTheMap) {
   }
 }
 
-TEST_F(MapLocalizerTest, NothingToSeeIsTooFewMatches) {
+TEST_F(MapLocalizerTest, ReportsTooFewMatchesWithoutFeatures) {
   RigFeatures nothing;
   nothing.images.resize(2);
   nothing.rays_in_camera.resize(2);
@@ -144,7 +144,7 @@ TEST_F(MapLocalizerTest, GivesTheSameOnOneThread) {
   EXPECT_EQ(parallel.numInliers(), serial.numInliers());
 }
 
-TEST(MapLocalizerTwinsTest, TwoPlacesThatLookAlikeAreAmbiguous) {
+TEST(MapLocalizerTwinsTest, ReportsTwoEqualPlacesAsAmbiguous) {
   testing::TestMapOptions options;
   options.twin_offset_m = 100.0;
   const auto map = testing::makeTestMap(options);
@@ -155,14 +155,14 @@ TEST(MapLocalizerTwinsTest, TwoPlacesThatLookAlikeAreAmbiguous) {
   const PoseFix fix = localizer.localizeAnywhere(features);
   EXPECT_EQ(fix.status, LocalizationStatus::kAmbiguous);
   EXPECT_GT(fix.second_best_ratio, 0.7);
-  // Who knows where it is, is not confused.
+  // A prior resolves the ambiguity.
   const PoseFix expected = localizer.localizeNear(features, priorAbout(truth, 0.1, 0.0));
   EXPECT_EQ(expected.status, LocalizationStatus::kLocalized);
   EXPECT_LT(positionError(expected, truth), 0.02);
 }
 
-/// A quarter of the size: a pixel is four times as wide, and features are found to half a pixel as ever.
-TEST(MapLocalizerSizeTest, SmallImagesAreGivenTheirPixels) {
+/// A quarter of the image size: pixels are four times as wide, features still accurate to half a pixel.
+TEST(MapLocalizerSizeTest, AcceptsThePixelErrorsOfSmallImages) {
   SparseMapContents contents = testing::makeTestMap({})->contents();
   contents.rig = parseCameraRig(R"(cameras:
   front:
@@ -192,7 +192,7 @@ TEST(MapLocalizerSizeTest, SmallImagesAreGivenTheirPixels) {
   }
 }
 
-/// What a view of the map with bits shows, where the descriptors are the bits as numbers 0 and `one`.
+/// A view of the map with the bits of the descriptors as numbers 0 and `one`.
 RigFeatures withNumbers(RigFeatures features, float one) {
   for (ImageFeatures& image : features.images) {
     image.descriptors = testing::descriptorsAsNumbers(image.descriptors, one);
@@ -200,12 +200,12 @@ RigFeatures withNumbers(RigFeatures features, float one) {
   return features;
 }
 
-/// Descriptors of numbers have other distances: those of SIFT are hundreds, those of RootSIFT about 1.
-TEST(MapLocalizerDescriptorTest, NumbersLocalizeAsBitsDo) {
+/// Distances depend on the descriptor: hundreds for SIFT, about 1 for RootSIFT.
+TEST(MapLocalizerDescriptorTest, LocalizesWithRealDescriptorsAsWithBinaryOnes) {
   const auto map = testing::makeTestMap({});
   const RigidTransform truth = posesBetween(*map, 8);
   testing::TestViewOptions view;
-  view.share_of_wrong = 0.3;
+  view.wrong_ratio = 0.3;
   const RigFeatures bits = testing::makeTestView(*map, truth, view);
   const PoseFix by_bits = MapLocalizer(map, rigOf(map)).localizeNear(bits, priorAbout(truth, 0.1, 0.0));
   ASSERT_EQ(by_bits.status, LocalizationStatus::kLocalized);
@@ -224,7 +224,7 @@ TEST(MapLocalizerDescriptorTest, NumbersLocalizeAsBitsDo) {
     EXPECT_LT(positionError(anywhere, truth), 0.03);
     const RigFeatures foreign = withNumbers(testing::makeForeignView(*map, 3), one);
     EXPECT_NE(localizer.localizeAnywhere(foreign).status, LocalizationStatus::kLocalized);
-    // The limit counts: what differs as much as two landmarks do is no match.
+    // Descriptors as different as those of two landmarks are no match.
     EXPECT_LT(localizer.localizeNear(foreign, priorAbout(truth, 0.0, 0.0)).num_matches, 10);
   }
 }
@@ -240,7 +240,7 @@ TEST(MapLocalizerDescriptorTest, NeedsNoVocabulary) {
   EXPECT_EQ(fix.status, LocalizationStatus::kLocalized);
 }
 
-TEST(MapLocalizerInputTest, NamesWhatIsWrongWithAMap) {
+TEST(MapLocalizerInputTest, NamesTheDefectOfAMap) {
   const auto map = testing::makeTestMap({});
   const auto expectError = [&](const char* text, const auto& change) {
     SparseMapContents contents = map->contents();

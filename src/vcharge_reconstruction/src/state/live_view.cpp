@@ -5,7 +5,7 @@
 
 namespace vcharge {
 
-Trajectory keyframePath(const MappingState& state) {
+Trajectory keyframePath(const ReconstructionState& state) {
   Trajectory path;
   for (const Keyframe& keyframe : state.data.keyframes) {
     path.push_back({keyframe.stamp, keyframe.map_from_vehicle});
@@ -13,8 +13,8 @@ Trajectory keyframePath(const MappingState& state) {
   return path;
 }
 
-MappingData lastPart(const MappingData& data, int32_t begin) {
-  MappingData part;
+ReconstructionData lastPart(const ReconstructionData& data, int32_t begin) {
+  ReconstructionData part;
   part.rig = data.rig;
   for (auto k = static_cast<size_t>(begin); k < data.keyframes.size(); ++k) {
     part.keyframes.emplace_back();
@@ -37,10 +37,10 @@ MappingData lastPart(const MappingData& data, int32_t begin) {
   return part;
 }
 
-std::vector<Eigen::Vector3d> recentLandmarks(const MappingState& state, const TriangulationOptions& options,
-                                             int num_keyframes) {
+std::vector<Eigen::Vector3d> recentLandmarks(const ReconstructionState& state,
+                                             const TriangulationOptions& options, int num_keyframes) {
   const auto end = static_cast<int32_t>(state.data.keyframes.size());
-  MappingData recent = lastPart(state.data, std::max(0, end - num_keyframes));
+  ReconstructionData recent = lastPart(state.data, std::max(0, end - num_keyframes));
   triangulateTracks(options, &recent);
   std::vector<Eigen::Vector3d> points;
   for (const Track& track : recent.tracks) {

@@ -9,8 +9,8 @@
 namespace vcharge {
 namespace {
 
-TEST(LiveViewTest, ShowsThePathAndWhatTheLastKeyframesSawWhereItIs) {
-  MappingState state;
+TEST(LiveViewTest, ShowsThePathAndRecentLandmarks) {
+  ReconstructionState state;
   state.data = testing::makeTestDrive(testing::TestDriveOptions());
   std::vector<Eigen::Vector3d> truth;
   for (Track& track : state.data.tracks) {
@@ -33,7 +33,7 @@ TEST(LiveViewTest, ShowsThePathAndWhatTheLastKeyframesSawWhereItIs) {
     });
     EXPECT_LT((*nearest - point).norm(), 1e-3);  // exact observations
   }
-  EXPECT_TRUE(recentLandmarks(MappingState(), TriangulationOptions(), 10).empty());
+  EXPECT_TRUE(recentLandmarks(ReconstructionState(), TriangulationOptions(), 10).empty());
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "vcharge_reconstruction/map_assembly.h"
+#include "vcharge_reconstruction/reconstruction_steps.h"
 
 #include <cstdlib>
 #include <sstream>
@@ -9,7 +9,7 @@
 namespace vcharge {
 namespace {
 
-/// The observation with a feature that is nearest in the drive; null where there is none.
+/// The nearest observation in the drive that has a feature; null where there is none.
 const TrackObservation* describedObservation(const Track& track, const TrackObservation& observation) {
   const TrackObservation* best = nullptr;
   for (const TrackObservation& other : track.observations) {
@@ -23,9 +23,9 @@ const TrackObservation* describedObservation(const Track& track, const TrackObse
 
 }  // namespace
 
-std::shared_ptr<const SparseMap> assembleMap(const MappingData& data, const std::vector<LoopEdge>& loop_edges,
-                                             const FeatureExtractorOptions& features,
-                                             const VocabularyTree& vocabulary) {
+std::shared_ptr<const SparseMap> assembleMap(const ReconstructionState& state,
+                                             const FeatureExtractorOptions& features) {
+  const ReconstructionData& data = state.data;
   SparseMapContents contents;
   contents.rig = *data.rig;
   for (const Keyframe& keyframe : data.keyframes) {
@@ -56,14 +56,13 @@ std::shared_ptr<const SparseMap> assembleMap(const MappingData& data, const std:
     }
   }
   cv::vconcat(descriptors, contents.descriptors);
-  for (const LoopEdge& edge : loop_edges) {
+  for (const LoopEdge& edge : state.report.loop_edges) {
     contents.loop_edges.push_back(
         {edge.first, edge.second, edge.first_from_second, edge.num_inliers, edge.accepted, edge.reason});
   }
   std::ostringstream feature_options;
   feature_options << writeFields(features);
   contents.feature_options = feature_options.str();
-  contents.vocabulary = vocabulary.serialize();
   contents.odometry_distance_scale = data.odometry_distance_scale;
   contents.odometry_turn_scale = data.odometry_turn_scale;
   return std::make_shared<const SparseMap>(std::move(contents));

@@ -30,8 +30,8 @@ std::shared_ptr<const CameraRig> makeTestRig() {
   return rig;
 }
 
-MappingData makeTestDrive(const TestDriveOptions& options) {
-  MappingData data;
+ReconstructionData makeTestDrive(const TestDriveOptions& options) {
+  ReconstructionData data;
   data.rig = makeTestRig();
   std::mt19937 random(options.seed), noise_source(options.seed + 1);
   std::uniform_real_distribution<double> place(-20.0, 20.0), height(-0.2, 4.0);

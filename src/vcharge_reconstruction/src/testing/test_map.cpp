@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "vcharge_core/sparse_map/analytic_map.h"
-#include "vcharge_features/vocabulary_tree.h"
 
 namespace vcharge::testing {
 namespace {
@@ -24,7 +23,7 @@ cv::Mat randomDescriptors(int count, std::mt19937* random) {
   return descriptors;
 }
 
-/// By its first observation.
+/// Descriptor of the landmark's first observation.
 cv::Mat descriptorOf(const SparseMap& map, size_t landmark) {
   return map.descriptors().row(*map.observationsOfLandmark(landmark).first);
 }
@@ -72,11 +71,6 @@ std::shared_ptr<const SparseMap> makeTestMap(const TestMapOptions& options) {
   for (size_t i = 0; i < contents.observations.size(); ++i) {
     of_landmarks.row(contents.observations[i].landmark).copyTo(contents.descriptors.row(static_cast<int>(i)));
   }
-  std::vector<cv::Mat> images;
-  for (int begin = 0; begin + 100 <= of_landmarks.rows; begin += 100) {
-    images.push_back(of_landmarks.rowRange(begin, begin + 100));
-  }
-  contents.vocabulary = VocabularyTree::train(images).serialize();
   if (options.twin_offset_m != 0.0) {
     addTwin(options.twin_offset_m, &contents);
   }
@@ -87,7 +81,7 @@ RigFeatures makeTestView(const SparseMap& map, const RigidTransform& map_from_ve
                          const TestViewOptions& options) {
   std::mt19937 random(options.seed);
   std::normal_distribution<double> noise(0.0, options.noise_px);
-  std::uniform_real_distribution<double> share(0.0, 1.0);
+  std::uniform_real_distribution<double> ratio(0.0, 1.0);
   std::uniform_int_distribution<int> bit(0, 8 * kDescriptorBytes - 1);
   std::uniform_int_distribution<size_t> any_landmark(0, map.landmarks().size() - 1);
   RigFeatures features;
@@ -110,7 +104,7 @@ RigFeatures makeTestView(const SparseMap& map, const RigidTransform& map_from_ve
       if (!rig_camera.model.unproject(pixel, &ray)) {
         continue;
       }
-      const bool is_wrong = share(random) < options.share_of_wrong;
+      const bool is_wrong = ratio(random) < options.wrong_ratio;
       cv::Mat descriptor = descriptorOf(map, is_wrong ? any_landmark(random) : i).clone();
       for (int k = 0; k < kFlippedBits; ++k) {
         const int flipped = bit(random);
@@ -149,15 +143,15 @@ cv::Mat descriptorsAsNumbers(const cv::Mat& descriptors, float one) {
 
 RigFeatures makeForeignView(const SparseMap& map, uint32_t seed) {
   std::mt19937 random(seed);
-  std::uniform_real_distribution<double> share(0.2, 0.8);
+  std::uniform_real_distribution<double> ratio(0.2, 0.8);
   RigFeatures features;
   for (const RigCamera& camera : map.rig().cameras) {
     ImageFeatures image;
     image.descriptors = randomDescriptors(500, &random);
     Eigen::Matrix3Xd rays(3, 500);
     for (int i = 0; i < 500; ++i) {
-      const double x = share(random) * camera.image_size_px.width;
-      const double y = share(random) * camera.image_size_px.height;
+      const double x = ratio(random) * camera.image_size_px.width;
+      const double y = ratio(random) * camera.image_size_px.height;
       Eigen::Vector3d ray = Eigen::Vector3d::UnitZ();
       camera.model.unproject(Eigen::Vector2d(x, y), &ray);
       rays.col(i) = ray;

@@ -4,11 +4,28 @@
 
 #include <Eigen/LU>
 
+#include "vcharge_geometry/robust/motion_estimation.h"
+
 namespace vcharge {
 namespace {
 
-/// How much less certain the odometer is where the wheels slip.
+/// Factor on the odometer's deviation where the wheels slip.
 constexpr double kSlipFactor = 20.0;
+/// With fewer matches the odometer alone gives the motion.
+constexpr int kMinMatches = 30;
+/// A less constrained motion model is adopted only if it explains this many times the matches: it fits noise
+/// better.
+constexpr double kMinGain = 1.1;
+/// Deviation of real wheels from the Ackermann model.
+constexpr double kSideSlipSigma_m = 0.002;
+
+RobustOptions robustOptions() {
+  RobustOptions options;
+  options.max_error_rad = 0.002;
+  options.max_iterations = 200;
+  options.min_inliers = 15;
+  return options;
+}
 
 /// x, y (metres) and yaw (radians) of a motion, and their covariance.
 struct PlanarMotion {
@@ -32,10 +49,9 @@ PlanarMotion odometryMotion(const RigidTransform& motion, const EgoMotionOptions
   return result;
 }
 
-/// A motion whose length is not observable gets the odometer's, with a deviation that makes it count for
-/// nothing.
-PlanarMotion visualMotion(const MotionEstimate& estimate, const PlanarMotion& odometry,
-                          const EgoMotionOptions& options) {
+/// Planar part of a motion in the images. Where its length is not observable it takes the odometer's, with a
+/// deviation that gives it no weight.
+PlanarMotion visualMotion(const MotionEstimate& estimate, const PlanarMotion& odometry) {
   const int rows[] = {0, 1, 5};
   PlanarMotion result;
   result.value = planarPart(estimate.previous_from_current);
@@ -53,7 +69,7 @@ PlanarMotion visualMotion(const MotionEstimate& estimate, const PlanarMotion& od
     result.covariance.bottomLeftCorner<1, 2>() *= length_m;
     result.covariance.topLeftCorner<2, 2>() += direction * direction.transpose();
   }
-  const double slip_squared = options.side_slip_sigma_m * options.side_slip_sigma_m;
+  const double slip_squared = kSideSlipSigma_m * kSideSlipSigma_m;
   result.covariance.diagonal() += Eigen::Vector3d(slip_squared, slip_squared, 1e-10);
   return result;
 }
@@ -66,39 +82,20 @@ Eigen::Vector3d fuse(const PlanarMotion& a, const PlanarMotion& b) {
 
 }  // namespace
 
-RobustOptions EgoMotionOptions::defaultRobust() {
-  RobustOptions options;
-  options.max_error_rad = 0.002;
-  options.max_iterations = 200;
-  options.min_inliers = 15;
-  return options;
-}
-
-void EgoMotionOptions::validate() const {
-  validateInner("robust", robust);
-  requireField(min_matches >= 5, "min_matches", "must be 5 or more", min_matches);
-  requireField(odometry_distance_sigma > 0.0, "odometry_distance_sigma", "must be positive",
-               odometry_distance_sigma);
-  requireField(odometry_sigma_m > 0.0, "odometry_sigma_m", "must be positive", odometry_sigma_m);
-  requireField(odometry_turn_sigma > 0.0, "odometry_turn_sigma", "must be positive", odometry_turn_sigma);
-  requireField(odometry_sigma_rad > 0.0, "odometry_sigma_rad", "must be positive", odometry_sigma_rad);
-  requireField(side_slip_sigma_m > 0.0, "side_slip_sigma_m", "must be positive", side_slip_sigma_m);
-  requireField(min_gain >= 1.0, "min_gain", "must be 1 or more", min_gain);
-}
-
 EgoMotion estimateEgoMotion(const std::vector<RayMatch>& matches,
                             const RigidTransform& odometry_previous_from_current,
                             const EgoMotionOptions& options) {
   EgoMotion result;
   result.previous_from_current = odometry_previous_from_current;
   result.is_inlier.assign(matches.size(), true);
-  if (static_cast<int>(matches.size()) < options.min_matches) {
+  if (static_cast<int>(matches.size()) < kMinMatches) {
     return result;
   }
-  MotionEstimate best = estimateAckermannMotion(matches, options.robust);
+  const RobustOptions robust = robustOptions();
+  MotionEstimate best = estimateAckermannMotion(matches, robust);
   MotionHypothesis hypothesis = MotionHypothesis::kAckermann;
   const auto adopt = [&](const MotionEstimate& estimate, MotionHypothesis other) {
-    const double needed = isUsable(best) ? options.min_gain * static_cast<double>(best.inliers.size()) : 0.0;
+    const double needed = isUsable(best) ? kMinGain * static_cast<double>(best.inliers.size()) : 0.0;
     if (isUsable(estimate) && static_cast<double>(estimate.inliers.size()) > needed) {
       best = estimate;
       hypothesis = other;
@@ -106,10 +103,10 @@ EgoMotion estimateEgoMotion(const std::vector<RayMatch>& matches,
   };
   const auto canGain = [&] {
     return !isUsable(best) ||
-           options.min_gain * static_cast<double>(best.inliers.size()) < static_cast<double>(matches.size());
+           kMinGain * static_cast<double>(best.inliers.size()) < static_cast<double>(matches.size());
   };
   if (canGain()) {
-    adopt(estimatePlanarMotion(matches, options.robust), MotionHypothesis::kPlanar);
+    adopt(estimatePlanarMotion(matches, robust), MotionHypothesis::kPlanar);
   }
   if (canGain()) {
     RigidTransform initial = odometry_previous_from_current;
@@ -120,21 +117,21 @@ EgoMotion estimateEgoMotion(const std::vector<RayMatch>& matches,
                                  initial.translation() * odometry_previous_from_current.translation().norm());
       }
     }
-    adopt(refineMotion(matches, initial, options.robust), MotionHypothesis::kSpatial);
+    adopt(refineMotion(matches, initial, robust), MotionHypothesis::kSpatial);
   }
   if (!isUsable(best)) {
     return result;
   }
   PlanarMotion odometry = odometryMotion(odometry_previous_from_current, options);
   if (hypothesis == MotionHypothesis::kPlanar) {
-    odometry.covariance *= kSlipFactor * kSlipFactor;  // wheels that slip count wrongly
+    odometry.covariance *= kSlipFactor * kSlipFactor;  // slipping wheels count a wrong distance
   }
-  const Eigen::Vector3d fused = fuse(visualMotion(best, odometry, options), odometry);
+  const Eigen::Vector3d fused = fuse(visualMotion(best, odometry), odometry);
   result.hypothesis = hypothesis;
   const RigidTransform planar = RigidTransform::planar(fused.x(), fused.y(), fused.z());
   result.previous_from_current = planar;
   if (hypothesis == MotionHypothesis::kSpatial) {
-    // The rest of the motion, which the odometer does not see, stays as the images show it.
+    // The odometer does not measure height, roll and pitch: they come from the images alone.
     const RigidTransform& seen = best.previous_from_current;
     const Eigen::Quaterniond turn = rotationFromYawPitchRoll(yawOfRotation(seen.rotation()), 0.0, 0.0);
     double height_m = seen.translation().z();

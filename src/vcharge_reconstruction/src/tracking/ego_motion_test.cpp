@@ -61,7 +61,7 @@ double turnBetween(const RigidTransform& a, const RigidTransform& b) {
   return angleOfRotation(a.rotation().conjugate() * b.rotation());
 }
 
-TEST(EgoMotionTest, FollowsACircleInSpiteOfWrongMatchesAndACoarseOdometer) {
+TEST(EgoMotionTest, FollowsACircleWithOutliersAndACoarseOdometer) {
   const RigidTransform truth = circle(0.3, 0.04);
   const EgoMotion motion =
       estimateEgoMotion(makeMatches(truth, 0.2), circle(0.306, 0.035), EgoMotionOptions());
@@ -77,7 +77,7 @@ TEST(EgoMotionTest, TakesTheLengthOfStraightMotionFromTheOdometer) {
   EXPECT_NEAR(motion.previous_from_current.translation().x(), 0.31, 0.005);
 }
 
-TEST(EgoMotionTest, SeesWheelsThatSlipSideways) {
+TEST(EgoMotionTest, DetectsSidewaysSlip) {
   const RigidTransform truth = RigidTransform::planar(0.25, 0.15, 0.02);
   const EgoMotion motion = estimateEgoMotion(makeMatches(truth, 0.1), circle(0.25, 0.02), EgoMotionOptions());
   EXPECT_EQ(motion.hypothesis, MotionHypothesis::kPlanar);
@@ -85,7 +85,7 @@ TEST(EgoMotionTest, SeesWheelsThatSlipSideways) {
   EXPECT_LT(std::acos(direction.dot(truth.translation().normalized())), 0.05);
 }
 
-TEST(EgoMotionTest, SeesARamp) {
+TEST(EgoMotionTest, DetectsARamp) {
   const RigidTransform truth(rotationFromYawPitchRoll(0.01, 0.03, 0.0), Eigen::Vector3d(0.3, 0.0, 0.02));
   const EgoMotion motion = estimateEgoMotion(makeMatches(truth, 0.1), circle(0.3, 0.01), EgoMotionOptions());
   EXPECT_EQ(motion.hypothesis, MotionHypothesis::kSpatial);
@@ -105,7 +105,7 @@ TEST(EgoMotionTest, FallsBackToTheOdometerWithoutUsableMatches) {
   EXPECT_LT(turnBetween(motion.previous_from_current, odometry), 1e-12);
 }
 
-TEST(EgoMotionTest, SaysWhichMatchesAgree) {
+TEST(EgoMotionTest, MarksInliers) {
   const RigidTransform truth = circle(0.3, 0.04);
   const EgoMotion clean = estimateEgoMotion(makeMatches(truth, 0.0), truth, EgoMotionOptions());
   const EgoMotion mixed = estimateEgoMotion(makeMatches(truth, 0.4), truth, EgoMotionOptions());

@@ -13,11 +13,24 @@ namespace vcharge {
 namespace {
 
 constexpr double kReferenceWidth_px = 1280.0;
-/// Points whose distance is unknown: on the ground, or this far.
+/// A tracked point and a feature this close are the same point.
+constexpr double kMaxAssociation_px = 1.5;
+/// A patch that alignment with its anchor moves further has slipped or looks different by now: the current
+/// keyframe becomes its anchor.
+constexpr double kMaxAlignment_px = 2.0;
+/// Assumed range of points of unknown distance that are not on the ground.
 constexpr double kUsualRange_m = 10.0;
 constexpr double kMinRange_m = 1.0;
 
-/// Range at which a ray of the vehicle's frame is expected to meet something.
+PatchTrackerOptions smallPatches() {
+  PatchTrackerOptions options;
+  options.window_px = 11;  // larger patches straddle near and far surfaces
+  options.max_forward_backward_px = 0.2;
+  options.max_iterations = 20;
+  return options;
+}
+
+/// Expected range of the surface along a ray in the vehicle's frame.
 double expectedRange(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& direction) {
   if (direction.z() < 0.0 && origin_m.z() > 0.0) {
     return std::clamp(-origin_m.z() / direction.z(), kMinRange_m, kUsualRange_m);
@@ -25,7 +38,7 @@ double expectedRange(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& dir
   return kUsualRange_m;
 }
 
-/// Cells that hold points, to find those near a position.
+/// A grid of cells for finding the nearest point.
 class OccupiedCells {
  public:
   OccupiedCells(cv::Size size, double spacing_px)
@@ -72,32 +85,10 @@ class OccupiedCells {
 
 }  // namespace
 
-PatchTrackerOptions FrameTrackerOptions::smallPatches() {
-  PatchTrackerOptions options;
-  options.window_px = 11;  // larger ones straddle what is near and what is far
-  options.max_forward_backward_px = 0.2;
-  options.max_iterations = 20;
-  return options;
-}
-
-void FrameTrackerOptions::validate() const {
-  requireField(max_tracks_per_camera >= 10, "max_tracks_per_camera", "must be 10 or more",
-               max_tracks_per_camera);
-  requireField(std::isfinite(min_spacing_px) && min_spacing_px >= 2.0, "min_spacing_px", "must be 2 or more",
-               min_spacing_px);
-  requireField(max_association_px >= 0.0 && max_association_px < 5.0, "max_association_px",
-               "must be in [0, 5)", max_association_px);
-  requireField(max_alignment_px >= 0.0, "max_alignment_px", "must not be negative", max_alignment_px);
-  requireField(tracking_sigma_px > 0.0 && tracking_sigma_px < 10.0, "tracking_sigma_px", "must be in (0, 10)",
-               tracking_sigma_px);
-  validateInner("patches", patches);
-  validateInner("alignment", alignment);
-}
-
 CameraTracker::CameraTracker(const RigCamera& camera, const FrameTrackerOptions& options)
     : camera_(camera),
       options_(options),
-      patch_tracker_(options.patches),
+      patch_tracker_(smallPatches()),
       mask_(makeFeatureMask(camera)),
       spacing_px_(std::max(4.0, options.min_spacing_px * camera.image_size_px.width / kReferenceWidth_px)) {}
 
@@ -184,10 +175,10 @@ bool CameraTracker::isMasked(const Eigen::Vector2d& position_px) const {
 void CameraTracker::alignWithAnchors(int32_t keyframe) {
   for (LiveTrack& track : tracks_) {
     const Eigen::Vector2d position_px(track.position_px.x, track.position_px.y);
-    const std::optional<PatchWarp> place =
-        alignPatch(anchors_.at(track.anchor_keyframe).pixels, image_.pixels,
-                   {track.anchor_px.x, track.anchor_px.y}, {position_px, track.shape}, options_.alignment);
-    if (place && (place->position_px - position_px).norm() <= options_.max_alignment_px &&
+    const std::optional<PatchWarp> place = alignPatch(anchors_.at(track.anchor_keyframe).pixels,
+                                                       image_.pixels, {track.anchor_px.x, track.anchor_px.y},
+                                                       {position_px, track.shape}, PatchAlignmentOptions());
+    if (place && (place->position_px - position_px).norm() <= kMaxAlignment_px &&
         !isMasked(place->position_px) && camera_.model.unproject(place->position_px, &track.ray_in_camera)) {
       track.position_px =
           cv::Point2f(static_cast<float>(place->position_px.x()), static_cast<float>(place->position_px.y()));
@@ -201,7 +192,7 @@ void CameraTracker::alignWithAnchors(int32_t keyframe) {
 }
 
 void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, const FeatureExtractor& extractor,
-                                MappingData* data) {
+                                ReconstructionData* data) {
   KeyframeImage& out = data->keyframes[keyframe].images[camera_index];
   if (image_.pixels.empty()) {
     return;
@@ -213,7 +204,7 @@ void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, const Fe
   out.rays_in_camera.resize(3, static_cast<Eigen::Index>(num_features));
 
   OccupiedCells cells(camera_.image_size_px, spacing_px_);
-  std::vector<double> best_distance_px(tracks_.size(), options_.max_association_px);
+  std::vector<double> best_distance_px(tracks_.size(), kMaxAssociation_px);
   std::vector<int> feature_of_track(tracks_.size(), -1);
   for (size_t i = 0; i < tracks_.size(); ++i) {
     cells.add(tracks_[i].position_px, static_cast<int>(i));

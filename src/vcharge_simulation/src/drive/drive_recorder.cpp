@@ -52,8 +52,8 @@ void checkImagesCanBeReused(const FaultOptions& faults, const std::string& image
   for (const auto& [name, is_active] : {std::pair("bumped_camera", faults.bumped_camera.isActive()),
                                         std::pair("motion_blur", faults.motion_blur.isActive())}) {
     if (is_active) {
-      throw InputError("faults." + std::string(name) + ": has to be rendered, images of " + images_from +
-                       " cannot be used");
+      throw InputError("faults." + std::string(name) + ": changes the rendered images, so the images of " +
+                       images_from + " cannot be used");
     }
   }
 }

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "scenes/lot/lot_scene.h"
+#include "vcharge_simulation/scenes/scene_catalogue.h"
 
 namespace vcharge {
 namespace {
@@ -12,7 +12,7 @@ namespace {
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
 TEST(DriveSimulatorTest, ImagesComeEvery80Milliseconds) {
-  const DrivePlan plan = planLotDrive("short");
+  const DrivePlan plan = planDrive("lot", "short");
   const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1);
   ASSERT_GT(drive.world_from_vehicle.size(), 50U);
   for (size_t i = 1; i < drive.world_from_vehicle.size(); ++i) {
@@ -23,7 +23,7 @@ TEST(DriveSimulatorTest, ImagesComeEvery80Milliseconds) {
 
 TEST(DriveSimulatorTest, OdometryTurnsWithTruthWithinThreeHundredthsOfADegreePerFrame) {
   for (const char* name : {"short", "figure_eight"}) {
-    const DrivePlan plan = planLotDrive(name);
+    const DrivePlan plan = planDrive("lot", name);
     WheelOdometerOptions options;
     options.left_right_error = 0.0;
     const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, options, 3, 3);
@@ -72,7 +72,7 @@ TEST(DriveSimulatorTest, OdometryScalesWithTheWheelRadiusError) {
 }
 
 TEST(DriveSimulatorTest, StandsStillBeforeItStarts) {
-  DrivePlan plan = planLotDrive("loop");
+  DrivePlan plan = planDrive("lot", "loop");
   plan.motion.duration_s = 0.5;
   const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1);
   EXPECT_EQ(drive.world_from_vehicle.front().world_from_vehicle.translation(),
@@ -81,7 +81,7 @@ TEST(DriveSimulatorTest, StandsStillBeforeItStarts) {
 }
 
 TEST(DriveSimulatorTest, PlanarMotionObeysTheBicycleModelAndTheBodyTiltsALittle) {
-  const DrivePlan plan = planLotDrive("figure_eight");
+  const DrivePlan plan = planDrive("lot", "figure_eight");
   const VehicleMotion motion(plan.path, plan.motion, 1);
   double largest_tilt_rad = 0.0;
   for (int ms = 0; ms < static_cast<int>(motion.duration() * 1000.0) - 1; ++ms) {
@@ -98,7 +98,7 @@ TEST(DriveSimulatorTest, PlanarMotionObeysTheBicycleModelAndTheBodyTiltsALittle)
 }
 
 TEST(DriveSimulatorTest, LoopEndsNearItsStart) {
-  const DrivePlan plan = planLotDrive("loop");
+  const DrivePlan plan = planDrive("lot", "loop");
   const SimulatedDrive drive = simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1);
   EXPECT_LT((drive.world_from_vehicle.back().world_from_vehicle.translation() -
              drive.world_from_vehicle.front().world_from_vehicle.translation())

@@ -7,6 +7,25 @@
 
 namespace vcharge {
 
+namespace {
+
+RTCRay makeRay(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float min_distance_m,
+               float max_distance_m) {
+  RTCRay ray = {};
+  ray.org_x = origin.x();
+  ray.org_y = origin.y();
+  ray.org_z = origin.z();
+  ray.dir_x = direction.x();
+  ray.dir_y = direction.y();
+  ray.dir_z = direction.z();
+  ray.tnear = min_distance_m;
+  ray.tfar = max_distance_m;
+  ray.mask = 0xFFFFFFFFU;
+  return ray;
+}
+
+}  // namespace
+
 RayTracer::RayTracer(const TriangleMesh& mesh, unsigned geometry_id) {
   // A single build thread makes the hierarchy, and with it the choice between coincident surfaces,
   // independent of the machine. TBB limits the threads because Embree's own setting applies to the whole
@@ -14,7 +33,7 @@ RayTracer::RayTracer(const TriangleMesh& mesh, unsigned geometry_id) {
   const tbb::global_control one_thread(tbb::global_control::max_allowed_parallelism, 1);
   device_ = rtcNewDevice("set_affinity=0");
   if (device_ == nullptr) {
-    throw std::runtime_error("RayTracer: Embree gives no device");
+    throw std::runtime_error("RayTracer: Embree cannot create a device");
   }
   scene_ = rtcNewScene(device_);
   rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
@@ -52,15 +71,7 @@ bool RayTracer::cast(const Eigen::Vector3f& origin, const Eigen::Vector3f& direc
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   RTCRayHit query = {};
-  query.ray.org_x = origin.x();
-  query.ray.org_y = origin.y();
-  query.ray.org_z = origin.z();
-  query.ray.dir_x = direction.x();
-  query.ray.dir_y = direction.y();
-  query.ray.dir_z = direction.z();
-  query.ray.tnear = min_distance_m;
-  query.ray.tfar = std::numeric_limits<float>::infinity();
-  query.ray.mask = 0xFFFFFFFFU;
+  query.ray = makeRay(origin, direction, min_distance_m, std::numeric_limits<float>::infinity());
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   rtcIntersect1(scene_, &context, &query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
@@ -74,16 +85,7 @@ bool RayTracer::occluded(const Eigen::Vector3f& origin, const Eigen::Vector3f& d
                          float max_distance_m) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  RTCRay ray = {};
-  ray.org_x = origin.x();
-  ray.org_y = origin.y();
-  ray.org_z = origin.z();
-  ray.dir_x = direction.x();
-  ray.dir_y = direction.y();
-  ray.dir_z = direction.z();
-  ray.tnear = 0.0F;
-  ray.tfar = max_distance_m;
-  ray.mask = 0xFFFFFFFFU;
+  RTCRay ray = makeRay(origin, direction, 0.0F, max_distance_m);
   rtcOccluded1(scene_, &context, &ray);
   return ray.tfar < 0.0F;
 }

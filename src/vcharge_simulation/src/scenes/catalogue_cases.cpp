@@ -1,6 +1,11 @@
 #include "scenes/catalogue_cases.h"
 
+#include <cmath>
 #include <map>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 
 #include "vcharge_simulation/drive/drive_simulator.h"
 #include "vcharge_simulation/scenes/scene_catalogue.h"
@@ -37,6 +42,81 @@ Moment momentOf(const SceneCase& scene_case, int later_frames) {
   const int frame = scene_case.frame + later_frames;
   return {drives.at(name).world_from_vehicle.at(static_cast<size_t>(frame)).world_from_vehicle,
           plan.start_s + kImagePeriod_s * frame};
+}
+
+std::shared_ptr<const Scene> planeScene() {
+  auto scene = std::make_shared<Scene>();
+  Material material;
+  material.kind = SurfaceKind::kGround;
+  const uint32_t ground = scene->addMaterial(material);
+  addQuad({-500, -500, 0}, {500, -500, 0}, {500, 500, 0}, {-500, 500, 0}, ground, &scene->mesh);
+  scene->sky = std::make_unique<Sky>(LightOptions(), 1);
+  return scene;
+}
+
+void expectRangesOfPlane(const CameraView& view, const RigidTransform& world_from_vehicle) {
+  const cv::Mat range_m = Renderer(planeScene()).renderRange(view, world_from_vehicle);
+  const RigidTransform world_from_camera = world_from_vehicle * *view.camera().vehicle_from_camera;
+  int seen = 0;
+  for (int y = 0; y < range_m.rows; ++y) {
+    for (int x = 0; x < range_m.cols; ++x) {
+      Eigen::Vector3d ray;
+      if (view.centreRay(x, y).isZero() || !view.camera().model.unproject({x, y}, &ray)) {
+        EXPECT_TRUE(std::isnan(range_m.at<float>(y, x)));
+        continue;
+      }
+      const Eigen::Vector3d direction = world_from_camera.rotation() * ray;
+      const double expected_m = -world_from_camera.translation().z() / direction.z();
+      if (direction.z() > 0.0) {
+        EXPECT_TRUE(std::isnan(range_m.at<float>(y, x)));
+      } else if (expected_m < 100.0) {
+        EXPECT_NEAR(range_m.at<float>(y, x), expected_m, 1e-4 * expected_m);
+        ++seen;
+      }
+    }
+  }
+  EXPECT_GT(seen, 1000);
+}
+
+StandingCells findStandingCells(const Scene& scene, const TruthHeightMap& map, int border_cells) {
+  cv::Mat covered = cv::Mat::zeros(map.height_m.size(), CV_8UC1);
+  if (border_cells > 0) {
+    cv::rectangle(covered, cv::Rect(0, 0, covered.cols, covered.rows), cv::Scalar(255), border_cells);
+  }
+  for (const Obstacle& obstacle : scene.obstacles) {
+    std::vector<cv::Point> polygon;
+    for (const Eigen::Vector2d& corner : obstacle.footprint_m) {
+      const Eigen::Vector2d cell = (corner - map.origin_m) / map.cell_size_m;
+      polygon.emplace_back(static_cast<int>(std::lround(cell.x())), static_cast<int>(std::lround(cell.y())));
+    }
+    cv::fillPoly(covered, std::vector<std::vector<cv::Point>>{polygon}, cv::Scalar(255));
+  }
+  cv::dilate(covered, covered, cv::Mat::ones(7, 7, CV_8UC1));
+  StandingCells cells;
+  for (int row = 0; row < map.height_m.rows; ++row) {
+    for (int column = 0; column < map.height_m.cols; ++column) {
+      const Eigen::Vector2d position_m = map.origin_m + map.cell_size_m * Eigen::Vector2d(column, row);
+      const double height_m = map.height_m.at<float>(row, column) - groundAt(scene, position_m);
+      // Higher cells are left out: branches extend beyond the trunk that is a tree's footprint.
+      if (height_m > 0.3 && height_m < 1.4) {
+        ++cells.all;
+        cells.unexplained += covered.at<uint8_t>(row, column) == 0 ? 1 : 0;
+      }
+    }
+  }
+  return cells;
+}
+
+double groundAt(const Scene& scene, const Eigen::Vector2d& position_m) {
+  return scene.ground_height ? scene.ground_height(position_m.x(), position_m.y()) : 0.0;
+}
+
+Eigen::Vector2d middleOf(const Obstacle& obstacle) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector2d& corner : obstacle.footprint_m) {
+    sum += corner;
+  }
+  return sum / static_cast<double>(obstacle.footprint_m.size());
 }
 
 }  // namespace vcharge

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "vcharge_core/motion/rigid_transform.h"
+#include "vcharge_simulation/drive/truth_maps.h"
 #include "vcharge_simulation/rendering/renderer.h"
 
 namespace vcharge {
@@ -28,5 +30,21 @@ struct Moment {
   double time_s;
 };
 Moment momentOf(const SceneCase& scene_case, int later_frames = 0);
+
+/// Level ground at z = 0, 1 km wide, under the default sky.
+std::shared_ptr<const Scene> planeScene();
+/// Expects that the ranges of the plane scene at every pixel of `view` follow the formula.
+void expectRangesOfPlane(const CameraView& view, const RigidTransform& world_from_vehicle);
+
+/// Cells of a height map that stand out of the ground by 0.3 to 1.4 m, and those of them that are on no
+/// obstacle's footprint, dilated by 3 cells for leaves and mirrors. `border_cells` at the border are left
+/// out.
+struct StandingCells {
+  int all = 0, unexplained = 0;
+};
+StandingCells findStandingCells(const Scene& scene, const TruthHeightMap& map, int border_cells = 0);
+double groundAt(const Scene& scene, const Eigen::Vector2d& position_m);
+/// Mean of the corners of a footprint.
+Eigen::Vector2d middleOf(const Obstacle& obstacle);
 
 }  // namespace vcharge

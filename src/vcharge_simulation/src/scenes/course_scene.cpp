@@ -1,11 +1,10 @@
-#include "scenes/course_scene.h"
-
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include "objects/figure.h"
-#include "scenes/lot/lot_scene.h"
+#include "scenes/lane_paths.h"
+#include "scenes/lot/lot_variant.h"
+#include "scenes/scene_builders.h"
 #include "scenes/scene_parts.h"
 #include "vcharge_simulation/objects/car_model.h"
 
@@ -146,6 +145,23 @@ LotLayout courseLayout(const SceneOptions& options) {
   return layout;
 }
 
+DrivePlan creep(bool backwards) {
+  const double k = 1.0 / 100.0;
+  std::vector<DrivePath::Segment> segments;
+  for (const double sign : {1.0, -1.0, -1.0, 1.0}) {
+    segments.push_back({4.4, 0.0, sign * k, backwards});
+    segments.push_back({4.4, sign * k, 0.0, backwards});
+  }
+  return {"", DrivePath(RigidTransform::planar(backwards ? 17.0 : -19.0, 0.0, 0.0), segments),
+          fromRestToRest(0.7)};
+}
+
+DrivePlan stand() {
+  VehicleMotionOptions motion = fromRestToRest(0.7);
+  motion.standstill_s = motion.duration_s = 20.0;
+  return {"", DrivePath(RigidTransform::planar(-5.0, 0.0, 0.0), {{1.0, 0.0, 0.0}}), motion};
+}
+
 }  // namespace
 
 std::shared_ptr<const Scene> buildCourseScene(const SceneOptions& options) {
@@ -162,33 +178,10 @@ std::shared_ptr<const Scene> buildCourseScene(const SceneOptions& options) {
   return buildLotVariant(options, course);
 }
 
-std::vector<CatalogueEntry> listCourseDrives() {
-  return {{"creep", "at 0.7 m/s past all obstacles"},
-          {"creep_back", "the same way backwards"},
-          {"stand", "20 s beside the walker"}};
-}
-
-DrivePlan planCourseDrive(const std::string& name) {
-  VehicleMotionOptions motion;
-  motion.cruise_speed_m_per_s = 0.7;
-  motion.standstill_s = 0.5;
-  motion.stop_at_end = true;
-  motion.duration_s = 600.0;
-  if (name == "creep" || name == "creep_back") {
-    const bool backwards = name == "creep_back";
-    const double k = 1.0 / 100.0;
-    std::vector<DrivePath::Segment> segments;
-    for (const double sign : {1.0, -1.0, -1.0, 1.0}) {
-      segments.push_back({4.4, 0.0, sign * k, backwards});
-      segments.push_back({4.4, sign * k, 0.0, backwards});
-    }
-    return {name, DrivePath(RigidTransform::planar(backwards ? 17.0 : -19.0, 0.0, 0.0), segments), motion, 0};
-  }
-  if (name == "stand") {
-    motion.standstill_s = motion.duration_s = 20.0;
-    return {name, DrivePath(RigidTransform::planar(-5.0, 0.0, 0.0), {{1.0, 0.0, 0.0}}), motion, 0};
-  }
-  throw std::invalid_argument("drive: the obstacles course has none of the name '" + name + "'");
+std::vector<SceneDrive> courseDrives() {
+  return {{{"creep", "at 0.7 m/s past all obstacles"}, [] { return creep(false); }},
+          {{"creep_back", "the same path backwards"}, [] { return creep(true); }},
+          {{"stand", "20 s beside the walker"}, stand}};
 }
 
 }  // namespace vcharge

@@ -68,6 +68,12 @@ DrivePath Lanes::bothDirections(const Eigen::Vector2d& outwards_m) const {
                  false);
 }
 
+DrivePath gentleCurves(const RigidTransform& world_from_start) {
+  constexpr double k = 1.0 / 22.0;
+  return DrivePath(world_from_start,
+                   {{3.0, 0.0, -k}, {3.0, -k, 0.0}, {3.0, 0.0, k}, {3.0, k, 0.0}, {3.0, 0.0, -k}});
+}
+
 DrivePath reverseIntoBay(double bay_x_m, double lane_y_m, double approach_m) {
   constexpr double k = kBayCurvature_per_m;
   return DrivePath(RigidTransform::planar(bay_x_m + kTangent_m - approach_m, lane_y_m, 0.0),
@@ -86,6 +92,15 @@ DrivePath leaveBayWestwards(double bay_x_m, double lane_y_m, double leave_m) {
                     {kArc_m, k, k},
                     {kTurnIn_m, k, 0.0},
                     {leave_m, 0.0, 0.0}});
+}
+
+VehicleMotionOptions fromRestToRest(double cruise_speed_m_per_s) {
+  VehicleMotionOptions motion;
+  motion.cruise_speed_m_per_s = cruise_speed_m_per_s;
+  motion.standstill_s = 0.5;
+  motion.stop_at_end = true;
+  motion.duration_s = 600.0;
+  return motion;
 }
 
 }  // namespace vcharge

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 
 #include "vcharge_simulation/vehicle/drive_path.h"
+#include "vcharge_simulation/vehicle/vehicle_motion.h"
 
 namespace vcharge {
 
@@ -29,10 +30,15 @@ struct Lanes {
   DrivePath through(const std::vector<Eigen::Vector2d>& waypoints, bool closed) const;
 };
 
+/// 15 m of gentle curves to either side.
+DrivePath gentleCurves(const RigidTransform& world_from_start);
 /// East along the lane at y = lane_y_m, past the bay at x = bay_x_m on its northern side, then backwards into
 /// the bay. `approach_m` is driven before reversing.
 DrivePath reverseIntoBay(double bay_x_m, double lane_y_m, double approach_m);
 /// From the end of reverseIntoBay() out of the bay and west along the lane, `leave_m` beyond the curve.
 DrivePath leaveBayWestwards(double bay_x_m, double lane_y_m, double leave_m);
+
+/// Starts from standstill and stops at the end of the path.
+VehicleMotionOptions fromRestToRest(double cruise_speed_m_per_s = 2.5);
 
 }  // namespace vcharge

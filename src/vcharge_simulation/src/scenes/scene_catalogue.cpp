@@ -1,15 +1,9 @@
 #include "vcharge_simulation/scenes/scene_catalogue.h"
 
-#include <algorithm>
-#include <functional>
 #include <stdexcept>
 
 #include "scenes/board/board_pattern.h"
-#include "scenes/board/board_scene.h"
-#include "scenes/course_scene.h"
-#include "scenes/garage/garage_scene.h"
-#include "scenes/garage/two_levels_scene.h"
-#include "scenes/lot/lot_scene.h"
+#include "scenes/scene_builders.h"
 #include "vcharge_core/base/error.h"
 
 namespace vcharge {
@@ -18,31 +12,33 @@ namespace {
 
 struct CatalogueScene {
   CatalogueEntry entry;
-  std::function<std::shared_ptr<const Scene>(const SceneOptions&)> build;
-  std::function<std::vector<CatalogueEntry>()> drives;
-  std::function<DrivePlan(const std::string&)> plan;
+  std::shared_ptr<const Scene> (*build)(const SceneOptions&);
+  std::vector<SceneDrive> (*drives)();
 };
 
 const std::vector<CatalogueScene>& catalogue() {
   static const std::vector<CatalogueScene> scenes = {
-      {{"lot", "parking lot of 80 x 60 m in the sun"}, buildLotScene, listLotDrives, planLotDrive},
-      {{"garage", "underground garage of 64 x 47 m, lit by lamps"},
-       buildGarageScene,
-       listGarageDrives,
-       planGarageDrive},
-      {{"obstacles", "course of posts, boxes, kerbs, a trailer and people on the lot"},
+      {{"lot", "sunlit parking lot of 80 x 60 m"}, buildLotScene, lotDrives},
+      {{"garage", "underground garage of 64 x 47 m, lit by lamps"}, buildGarageScene, garageDrives},
+      {{"obstacles", "posts, boxes, kerbs, a trailer and two people on the lot"},
        buildCourseScene,
-       listCourseDrives,
-       planCourseDrive},
+       courseDrives},
       {{"two_levels", "lot on two levels with ramps of 6 degrees and uneven ground"},
        buildTwoLevelsScene,
-       listTwoLevelsDrives,
-       planTwoLevelsDrive},
-      {{"chessboard", "chessboard or AprilGrid (--board) held before each camera in turn, on the lot"},
+       twoLevelsDrives},
+      {{"chessboard", "chessboard or AprilGrid (--board) in front of each camera in turn, on the lot"},
        buildBoardScene,
-       listBoardDrives,
-       planBoardDrive}};
+       boardDrives}};
   return scenes;
+}
+
+template <class Entries>
+std::vector<CatalogueEntry> entriesOf(const Entries& things) {
+  std::vector<CatalogueEntry> entries;
+  for (const auto& thing : things) {
+    entries.push_back(thing.entry);
+  }
+  return entries;
 }
 
 std::string namesOf(const std::vector<CatalogueEntry>& entries) {
@@ -69,15 +65,11 @@ std::string boardTarget(const std::string& board) {
 }
 
 std::vector<CatalogueEntry> listScenes() {
-  std::vector<CatalogueEntry> entries;
-  for (const CatalogueScene& scene : catalogue()) {
-    entries.push_back(scene.entry);
-  }
-  return entries;
+  return entriesOf(catalogue());
 }
 
 std::vector<CatalogueEntry> listDrives(const std::string& scene) {
-  return findScene(scene).drives();
+  return entriesOf(findScene(scene).drives());
 }
 
 std::shared_ptr<const Scene> buildScene(const std::string& name, const SceneOptions& options) {
@@ -87,14 +79,15 @@ std::shared_ptr<const Scene> buildScene(const std::string& name, const SceneOpti
 }
 
 DrivePlan planDrive(const std::string& scene, const std::string& drive) {
-  const CatalogueScene& found = findScene(scene);
-  const std::vector<CatalogueEntry> drives = found.drives();
-  if (std::none_of(drives.begin(), drives.end(),
-                   [&](const CatalogueEntry& entry) { return entry.name == drive; })) {
-    throw std::invalid_argument("drive: expected one of " + namesOf(drives) + " in the scene " + scene +
-                                ", got '" + drive + "'");
+  for (const SceneDrive& known : findScene(scene).drives()) {
+    if (known.entry.name == drive) {
+      DrivePlan plan = known.plan();
+      plan.name = drive;
+      return plan;
+    }
   }
-  return found.plan(drive);
+  throw std::invalid_argument("drive: expected one of " + namesOf(listDrives(scene)) + " in the scene " +
+                              scene + ", got '" + drive + "'");
 }
 
 }  // namespace vcharge

@@ -44,40 +44,12 @@ TEST_P(SceneTest, SameBytesOnAnyNumberOfThreads) {
   EXPECT_EQ(cv::norm(render(1), render(4), cv::NORM_INF), 0.0);
 }
 
-double groundAt(const Scene& scene, const Eigen::Vector2d& position_m) {
-  return scene.ground_height ? scene.ground_height(position_m.x(), position_m.y()) : 0.0;
-}
-
+// Walls around the scene stand on its border.
 TEST_P(SceneTest, WhatStandsOutOfTheGroundBelongsToAnObstacle) {
-  const Scene& scene = renderer().scene();
-  const TruthHeightMap map = computeHeightMap(renderer(), kCell_m, 2.4);
-  // Footprints on the grid, dilated by the reach of leaves and mirrors. Walls around the scene stand on its
-  // border.
-  cv::Mat covered = cv::Mat::zeros(map.height_m.size(), CV_8UC1);
-  cv::rectangle(covered, cv::Rect(0, 0, covered.cols, covered.rows), cv::Scalar(255), 3);
-  for (const Obstacle& obstacle : scene.obstacles) {
-    std::vector<cv::Point> polygon;
-    for (const Eigen::Vector2d& corner : obstacle.footprint_m) {
-      polygon.emplace_back(static_cast<int>(std::lround((corner.x() - map.origin_m.x()) / kCell_m)),
-                           static_cast<int>(std::lround((corner.y() - map.origin_m.y()) / kCell_m)));
-    }
-    cv::fillPoly(covered, std::vector<std::vector<cv::Point>>{polygon}, cv::Scalar(255));
-  }
-  cv::dilate(covered, covered, cv::Mat::ones(7, 7, CV_8UC1));
-  int standing = 0;
-  int unexplained = 0;
-  for (int row = 0; row < map.height_m.rows; ++row) {
-    for (int column = 0; column < map.height_m.cols; ++column) {
-      const Eigen::Vector2d position_m = map.origin_m + kCell_m * Eigen::Vector2d(column, row);
-      const double height_m = map.height_m.at<float>(row, column) - groundAt(scene, position_m);
-      if (height_m > 0.3 && height_m < 1.4) {
-        ++standing;
-        unexplained += covered.at<uint8_t>(row, column) == 0 ? 1 : 0;
-      }
-    }
-  }
-  EXPECT_GT(standing, 10000);
-  EXPECT_LT(unexplained, standing / 100);
+  const StandingCells cells =
+      findStandingCells(renderer().scene(), computeHeightMap(renderer(), kCell_m, 2.4), 3);
+  EXPECT_GT(cells.all, 10000);
+  EXPECT_LT(cells.unexplained, cells.all / 100);
 }
 
 TEST_P(SceneTest, HeightMapHoldsCarsPillarsAndThings) {
@@ -85,11 +57,7 @@ TEST_P(SceneTest, HeightMapHoldsCarsPillarsAndThings) {
   const TruthHeightMap map = computeHeightMap(renderer(), kCell_m, 2.8);
   int seen = 0;
   for (const Obstacle& obstacle : scene.obstacles) {
-    Eigen::Vector2d middle = Eigen::Vector2d::Zero();
-    for (const Eigen::Vector2d& corner : obstacle.footprint_m) {
-      middle += corner / static_cast<double>(obstacle.footprint_m.size());
-    }
-    const Eigen::Vector2d cell = (middle - map.origin_m) / kCell_m;
+    const Eigen::Vector2d cell = (middleOf(obstacle) - map.origin_m) / kCell_m;
     const bool is_solid = obstacle.kind == "car" || obstacle.kind == "box" || obstacle.kind == "trailer" ||
                           obstacle.kind == "bin" || obstacle.kind == "pedestrian";
     if (!is_solid || cell.minCoeff() < 1.0 || cell.x() > map.height_m.cols - 2 ||

@@ -41,7 +41,7 @@ LensBlur::LensBlur(const cv::Mat& sigma_px) {
 
 void LensBlur::apply(cv::Mat* light) const {
   check(num_steps_ == 0 || (light->type() == CV_32FC1 && light->size() == spread_.size()),
-        "LensBlur::apply: the image has another size or type than the blur");
+        "LensBlur::apply: the image must be CV_32FC1 of the size of sigma_px");
   cv::Mat along_rows(light->size(), CV_32FC1);
   const int last_column = light->cols - 1;
   const int last_row = light->rows - 1;

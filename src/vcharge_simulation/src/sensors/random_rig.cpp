@@ -1,9 +1,8 @@
-#include "vcharge_simulation/sensors/random_rig.h"
-
 #include <cmath>
 
 #include "vcharge_simulation/rendering/noise.h"
 #include "vcharge_simulation/sensors/golf_rig.h"
+#include "vcharge_simulation/sensors/rig_catalogue.h"
 
 namespace vcharge {
 

@@ -4,7 +4,6 @@
 #include <stdexcept>
 
 #include "vcharge_simulation/sensors/golf_rig.h"
-#include "vcharge_simulation/sensors/random_rig.h"
 
 namespace vcharge {
 
@@ -17,9 +16,10 @@ struct CatalogueRig {
 
 const std::vector<CatalogueRig>& catalogue() {
   static const std::vector<CatalogueRig> rigs = {
-      {{"golf", "four 185-degree cameras as on the V-Charge car, each a little different by --rig-seed"},
+      {{"golf", "four 185-degree cameras as on the V-Charge car, varied slightly by --rig-seed"},
        makeGolfRig},
-      {{"random", "the Golf's cameras moved by up to 10 cm and 10 degrees, with other lenses, by --rig-seed"},
+      {{"random",
+        "the Golf's cameras moved by up to 10 cm and 10 degrees, with random lenses, by --rig-seed"},
        makeRandomRig}};
   return rigs;
 }

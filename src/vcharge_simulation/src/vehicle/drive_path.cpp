@@ -23,7 +23,7 @@ std::vector<DrivePath::Segment> makeCorner(double turn_rad, double radius_m, dou
   // A clothoid turns by half the angle of an arc of its length.
   const double arc_m = std::abs(turn_rad) * radius_m - transition_m;
   if (arc_m < 0.0) {
-    throw std::invalid_argument("DrivePath: transition_m is longer than the corner turns");
+    throw std::invalid_argument("DrivePath: transition_m is too long for a corner");
   }
   const double curvature = sign / radius_m;
   return {{transition_m, 0.0, curvature}, {arc_m, curvature, curvature}, {transition_m, curvature, 0.0}};

@@ -9,69 +9,67 @@
 #include "vcharge_calibration/matching/keyframe_images.h"
 #include "vcharge_calibration/rig/rig_calibration.h"
 #include "vcharge_core/frames/drive_source.h"
-#include "vcharge_core/motion/trajectory.h"
 #include "vcharge_core/sparse_map/sparse_map.h"
-#include "vcharge_reconstruction/stage_progress.h"
 #include "vcharge_reconstruction/frame_gatherer.h"
+#include "vcharge_reconstruction/keyframe_builder.h"
 #include "vcharge_reconstruction/map_localizer.h"
-#include "vcharge_reconstruction/mapping_state.h"
+#include "vcharge_reconstruction/reconstruction_state.h"
+#include "vcharge_reconstruction/stage_runner.h"
 
 namespace vcharge {
 
-/// A keyframe of a drive in a map: what its cameras show, and where each of them is by itself.
+/// A keyframe of a drive in a map: its features, and the fix of each camera by itself.
 struct MapKeyframeView {
   RigFeatures features;
-  std::vector<std::optional<PoseFix>> camera_fixes;  ///< map_from_vehicle is that of the camera
+  std::vector<std::optional<PoseFix>> camera_fixes;  ///< map_from_vehicle is the pose of the camera
 };
 
 /// Calibrates the extrinsics of a rig from a drive in a finished map (paper, section Structure-based
-/// Calibration): no guess, no overlap, no loop. Each camera is looked for in the map alone; extrinsics and
-/// vehicle poses follow from that and the odometer, then the weighted reprojection errors of the map's
-/// landmarks are made small. The map, of whatever rig, is the measure of all lengths, and its vehicle stood
-/// where this one's base_link is in height. Feed it the drive, then call finish(). Data parallel inside; the
-/// same input gives the same result on any number of threads.
+/// Calibration), without a first guess, overlap of the cameras or loops: feed it the drive, then call
+/// finish(). Each camera is localized by itself; extrinsics and vehicle poses follow from these poses and the
+/// odometer, and are then adjusted to the observed landmarks. The map, of any rig, defines the scale, and the
+/// height of base_link. Data parallel inside; the same input gives the same result on any number of threads.
 class MapRigCalibrator : public DriveConsumer {
  public:
-  /// std::invalid_argument for bad options; InputError for a rig without cameras or a map that no extractor
-  /// of this program can have made.
+  /// std::invalid_argument for bad options; InputError for a rig without cameras, or a map with features of
+  /// an unknown kind.
   MapRigCalibrator(std::shared_ptr<const SparseMap> map, const CameraRig& rig,
                    const MapRigCalibratorOptions& options);
   ~MapRigCalibrator() override;
 
-  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
-    gatherer_->addImage(camera_index, stamp, image);
-  }
-  void addOdometry(const VehicleOdometry& odometry) override { gatherer_->addOdometry(odometry); }
+  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
+  void addOdometry(const VehicleOdometry& odometry) override;
 
-  /// What the images of a keyframe show: where images and odometry lead to.
+  /// Adds a keyframe by its features instead of its images.
   void addKeyframe(Timestamp stamp, RigFeatures features, const RigidTransform& odom_from_vehicle);
 
-  /// The calibration by all that was fed. A drive that does not suffice gives Verdict::kFail with the reason.
-  /// The callback may be empty, and may throw to end the work.
+  /// The calibration from the drive so far. A drive that does not suffice gives Verdict::kFail with the
+  /// reason. The callback may be empty, and may throw to end the work.
   RigCalibration finish(const StageCallback& progress);
 
-  /// After finish() with another verdict than kFail: poses of all frames in the map.
-  Trajectory trajectory() const { return trajectoryOf(state_); }
-  const MappingState& state() const { return state_; }
-  /// Of a few keyframes, for pictures.
+  /// The rig, poses and observed landmarks after finish() with another verdict than kFail.
+  const ReconstructionState& state() const { return state_; }
+  /// Small images of a few keyframes, for reports.
   const KeyframeImages& images() const { return images_; }
-  /// For the report: which landmarks of the map are seen from where, in the colours of the cameras that saw
-  /// them first. HTML; empty before finish() and after a failure.
+  /// HTML for the report: which landmarks of the map are observed from where. Empty before finish() and after
+  /// a failure.
   std::string reportSection() const;
 
  private:
   void processFrame(Timestamp stamp, const std::vector<Image>& images,
                     const RigidTransform& odom_from_vehicle);
+  RigidTransform motionSinceKeyframe(const RigidTransform& odom_from_vehicle) const;
   std::optional<PoseFix> findCamera(const RigFeatures& features, size_t camera) const;
 
   const MapRigCalibratorOptions options_;
   const std::shared_ptr<const SparseMap> map_;
-  std::shared_ptr<const CameraRig> rig_;  ///< each camera is where the vehicle is
+  std::shared_ptr<const CameraRig> rig_;  // with all cameras at the vehicle's origin
   std::unique_ptr<MapLocalizer> localizer_;
   std::vector<MapKeyframeView> views_;
   KeyframeImages images_;
-  std::vector<int32_t> landmark_of_track_;  ///< of the map, after finish()
-  MappingState state_;
+  std::vector<int32_t> landmark_of_track_;  // indices in the map, after finish()
+  ReconstructionState state_;
+  KeyframeBuilder keyframes_;
   std::unique_ptr<FrameGatherer> gatherer_;
   double travelled_m_ = 0.0;
 };

@@ -12,66 +12,52 @@
 namespace vcharge {
 
 struct HandEyeOptions {
-  int min_motions = 6;
-  int num_iterations = 30;   ///< of reweighting
-  double loss_sigmas = 2.0;  ///< scale of the Cauchy loss
-  double max_inlier_sigmas = 5.0;
-  double odometry_sigma_m = 0.005;  ///< of a motion's translation
-  double odometry_sigma_rad = 0.002;
-  // Less certain: there was not enough turning.
-  double max_sigma_rad = 0.05;
-  double max_sigma_m = 0.5;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("min_motions", min_motions);
-    visit("num_iterations", num_iterations);
-    visit("loss_sigmas", loss_sigmas);
-    visit("max_inlier_sigmas", max_inlier_sigmas);
-    visit("odometry_sigma_m", odometry_sigma_m);
-    visit("odometry_sigma_rad", odometry_sigma_rad);
-    visit("max_sigma_rad", max_sigma_rad);
-    visit("max_sigma_m", max_sigma_m);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(HandEyeOptions);
+  VCHARGE_OPTION(double, odometry_sigma_m, 0.005, positive(), "Deviation of the odometer's translations.");
+  VCHARGE_OPTION(double, odometry_sigma_rad, 0.002, positive(), "Deviation of the odometer's turns.");
+  VCHARGE_OPTION(double, max_sigma_rad, 0.05, positive(),
+                 "Deviation of a rotation that shows a lack of turns.");
+  VCHARGE_OPTION(double, max_sigma_m, 0.5, positive(), "Deviation of a position that shows a lack of turns.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// How vehicle and camera moved between two instants, previous_from_current.
+/// Motions of vehicle and camera between two instants, previous_from_current.
 struct MotionPair {
-  RigidTransform vehicle;              ///< planar, as the odometer counted
+  RigidTransform vehicle;              ///< planar, as counted by the odometer
   Eigen::Quaterniond camera_rotation;  ///< in the camera's frame
-  Eigen::Vector3d camera_direction;    ///< unit vector, of the translation
+  Eigen::Vector3d camera_direction;    ///< direction of the translation, a unit vector
   double rotation_sigma_rad = 0.001;
   double direction_sigma_rad = 0.01;
-  bool has_direction = true;  ///< false: the camera hardly moved
-  int32_t keyframe = 0;       ///< a label: where the motion begins
+  bool has_direction = true;  ///< false where the camera hardly moved
+  int32_t keyframe = 0;       ///< the earlier keyframe
 };
 
 enum class HandEyeStatus {
   kOk,
   kTooFewMotions,
-  kNoTurn,       ///< roll and pitch, or the place, are not observable: the vehicle went straight
+  kNoTurn,       ///< roll and pitch, or the position, are not observable on a straight drive
   kNoAgreement,  ///< most motions of camera and odometer contradict each other
 };
 
 struct HandEye {
   HandEyeStatus status = HandEyeStatus::kTooFewMotions;
-  RigidTransform vehicle_from_camera;  ///< z is zero: planar motion does not show it
+  RigidTransform vehicle_from_camera;  ///< z is zero, since planar motion does not show it
   double tilt_sigma_rad = 0.0;         ///< of roll and pitch, the larger
   double yaw_sigma_rad = 0.0;
-  double place_sigma_m = 0.0;  ///< of x and y, the larger
+  double position_sigma_m = 0.0;  ///< of x and y, the larger
   int num_motions = 0, num_inliers = 0;
-  /// Where straight ahead is in the camera's frame, which needs no turn; zero where nothing went straight.
+  /// Direction of travel in the camera's frame, which needs no turn; zero without straight motions.
   Eigen::Vector3d travel_in_camera = Eigen::Vector3d::Zero();
 };
 
-/// Planar hand-eye calibration (Guo, Mirzaei, Roumeliotis, ICRA 2012): the place of a camera on a vehicle
-/// that moves in a plane, from its motions without scale; 5 degrees of freedom, each step a closed form,
-/// reweighted against wrong motions. First the vertical in the camera's frame: about it the camera turns by
-/// the odometer's yaw, and perpendicular to it it moves. Then yaw and place: with u the place turned back by
-/// the yaw alpha, a motion's direction c is parallel to Rz(-alpha) t_odometer + (R_odometer - I) u, which is
-/// linear in cos(alpha), sin(alpha), u; the scale of each motion drops out. The sign of alpha follows from
-/// moving forwards.
-HandEye solvePlanarHandEye(const std::vector<MotionPair>& motions, const HandEyeOptions& options);
+/// Planar hand-eye calibration (Guo, Mirzaei, Roumeliotis, ICRA 2012): extrinsics of a camera on a vehicle
+/// that moves in a plane, from motions without scale, in 5 degrees of freedom. Each step has a closed form
+/// that is reweighted `num_iterations` times against wrong motions. First the vertical in the camera's frame:
+/// the camera turns about it by the odometer's yaw, and moves perpendicular to it. Then yaw and position:
+/// with u the position rotated back by the yaw alpha, a motion's direction c is parallel to Rz(-alpha)
+/// t_odometer + (R_odometer - I) u, which is linear in cos(alpha), sin(alpha), u and independent of the
+/// motion's scale. The sign of alpha follows from moving forwards.
+HandEye solvePlanarHandEye(const std::vector<MotionPair>& motions, const HandEyeOptions& options,
+                           int num_iterations = 30);
 
 }  // namespace vcharge

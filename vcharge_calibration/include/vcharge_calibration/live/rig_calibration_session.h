@@ -17,63 +17,55 @@ namespace vcharge {
 
 /// Options of RigCalibrationSession.
 struct RigCalibrationSessionOptions {
-  bool calibrates_itself = false;  ///< once the coach says that the drive is enough
-  double retry_m = 30.0;           ///< driven on after a failure before it calibrates itself again
-  double outlook_m = 2.0;          ///< way between two looks of the coach
-  double outlook_turn_rad = 0.3;   ///< or turn
-  int max_keyframes = 2000;        ///< further ones are not taken: a calibration has no use for them
-  CalibrationCoachOptions coach;
-
-  template <class Visitor>
-  void visitFields(Visitor&& visit) {
-    visit("calibrates_itself", calibrates_itself);
-    visit("retry_m", retry_m);
-    visit("outlook_m", outlook_m);
-    visit("outlook_turn_rad", outlook_turn_rad);
-    visit("max_keyframes", max_keyframes);
-    visit("coach", coach);
-  }
-  void validate() const;  ///< throws std::invalid_argument naming the field
+  VCHARGE_BEGIN_OPTIONS(RigCalibrationSessionOptions);
+  VCHARGE_OPTION(bool, calibrates_itself, false, anyValue(),
+                 "Calibrates once the coach finds the drive sufficient.");
+  VCHARGE_OPTION(double, retry_m, 30.0, notNegative(),
+                 "Distance after a failure until the next calibration.");
+  VCHARGE_OPTION(double, outlook_m, 2.0, positive(), "Distance between updates of the outlook.");
+  VCHARGE_OPTION(int, max_keyframes, 2000, atLeast(10), "Keyframes after which the drive is ignored.");
+  VCHARGE_OPTION_GROUP(CalibrationCoachOptions, coach, {}, "Requirements on a drive.");
+  VCHARGE_END_OPTIONS();
 };
 
-/// A calibration and all that it was made of.
+/// A calibration and the reconstruction that it came from.
 struct FinishedCalibration {
   RigCalibration result;
-  MappingState state;
+  ReconstructionState state;
   KeyframeImages images;
 };
 
-/// Calibrates a rig while it is driven: feeds a RigCalibrator, lets a CalibrationCoach watch, and calibrates
-/// the drive until then in a thread of its own. Following goes on meanwhile and after: a drive that did not
-/// suffice may be driven further and calibrated again. The drive's calls are serialized by their source; the
-/// others may come from any thread.
+/// Calibrates a rig while the vehicle is driven: feeds a RigCalibrator, updates the outlook of a
+/// CalibrationCoach, and calibrates in a thread of its own from the drive so far. The drive may continue
+/// meanwhile, and be calibrated again. The source serializes the calls of DriveConsumer; the others may come
+/// from any thread.
 class RigCalibrationSession : public DriveConsumer {
  public:
-  /// kFailed until the drive goes on, kCalibrated until it is calibrated again, or forgotten.
+  /// kFailed lasts until the drive continues, kCalibrated until the next calibration or reset.
   enum class Phase { kFollowing, kCalibrating, kCalibrated, kFailed };
   struct Status {
     Phase phase = Phase::kFollowing;
-    std::string message;    ///< one line: what happens, how it ended, or why it failed
-    double progress = 0.0;  ///< of the calibration, where one runs; otherwise of the drive
+    std::string message;    ///< one line: the current activity, the result, or the reason of a failure
+    double progress = 0.0;  ///< of a running calibration, otherwise of the drive
     DriveOutlook outlook;
     std::shared_ptr<const RigCalibration> result;         ///< the last one of this drive; null before
-    std::vector<std::pair<std::string, int64_t>> counts;  ///< of frames, keyframes, what was skipped
+    std::vector<std::pair<std::string, int64_t>> counts;  ///< of frames, keyframes and skipped frames
   };
-  /// Called from the drive's thread and from that of the calibration; may ask for status() and no more.
+  /// Called from the drive's thread and from that of the calibration; may only call status().
   using StatusCallback = std::function<void(const Status&)>;
-  /// Called in the calibration's thread with every result, also failures; writes files, shows pictures. What
-  /// it throws makes the calibration fail with that text.
+  /// Called in the calibration's thread with every result, also failures. An exception makes the calibration
+  /// fail with its text.
   using ResultCallback = std::function<void(const FinishedCalibration&)>;
-  /// Called inside addImage() and addOdometry() when the coach has looked; the rig is that of hand-eye, whose
-  /// cameras lack extrinsics where nothing can be told yet.
-  using DriveCallback = std::function<void(const MappingState&, const CameraRig& guess)>;
+  /// Called inside addImage() and addOdometry() after an update of the outlook; the rig has the extrinsics of
+  /// hand-eye calibration where they are known.
+  using DriveCallback = std::function<void(const ReconstructionState&, const CameraRig& guess)>;
 
   /// Callbacks but `on_result` must not throw. Errors as RigCalibrator; std::invalid_argument for bad
   /// options.
   RigCalibrationSession(std::shared_ptr<const CameraRig> rig, const RigCalibratorOptions& calibrator_options,
                         const RigCalibrationSessionOptions& options, StatusCallback on_status,
                         DriveCallback on_drive, ResultCallback on_result);
-  /// Gives up a calibration that runs, at the end of its stage.
+  /// Abandons a running calibration at the end of its stage.
   ~RigCalibrationSession() override;
   RigCalibrationSession(const RigCalibrationSession&) = delete;
   RigCalibrationSession& operator=(const RigCalibrationSession&) = delete;
@@ -81,10 +73,9 @@ class RigCalibrationSession : public DriveConsumer {
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
 
-  /// Begins to calibrate by what came so far and returns. False where that is being done; `message` says so.
+  /// Starts to calibrate from the drive so far. False while a calibration runs; `message` has the state.
   bool calibrate(std::string* message);
-  /// Forgets the drive, and gives up a calibration of it that runs, at the end of its stage: a new drive
-  /// begins at once.
+  /// Starts a new drive, and abandons a running calibration at the end of its stage.
   void reset();
 
   Status status() const;
@@ -97,7 +88,7 @@ class RigCalibrationSession : public DriveConsumer {
   bool begin(bool flushes, std::string* message);
   void run(const std::shared_ptr<Job>& job);
   void startOver();
-  void look();
+  void updateOutlook();
   void tell(const std::function<void(Status*)>& change);
 
   const std::shared_ptr<const CameraRig> rig_;
@@ -107,9 +98,9 @@ class RigCalibrationSession : public DriveConsumer {
   const DriveCallback on_drive_;
   const ResultCallback on_result_;
 
-  std::mutex mutex_;  // guards what follows
+  std::mutex mutex_;  // guards the following members
   std::unique_ptr<Follower> follower_;
-  std::shared_ptr<Job> job_;  // the last one; null before
+  std::shared_ptr<Job> job_;  // the last one; null before the first
   std::thread worker_;        // of job_
 
   mutable std::mutex status_mutex_;  // never held during work

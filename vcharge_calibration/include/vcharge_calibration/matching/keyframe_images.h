@@ -12,8 +12,8 @@
 
 namespace vcharge {
 
-/// Keyframes' images of a drive as JPEGs: by default a few small ones for pictures, evenly spread over the
-/// drive however long it becomes. Copies share the images.
+/// Images of keyframes as JPEGs: by default a few small ones, evenly distributed over the drive. Copies share
+/// the images.
 class KeyframeImages {
  public:
   static constexpr size_t kMaxKeyframes = 64;
@@ -23,17 +23,17 @@ class KeyframeImages {
   explicit KeyframeImages(size_t max_keyframes = kMaxKeyframes, int max_width_px = kMaxWidth_px,
                           int quality = kQuality)
       : max_keyframes_(max_keyframes), max_width_px_(max_width_px), quality_(quality) {}
-  /// All of them, of full size, and so that hardly anything is lost.
+  /// For all keyframes, in full size and high quality.
   static KeyframeImages ofAllKeyframes() { return KeyframeImages(SIZE_MAX, INT_MAX, 95); }
 
-  /// Takes the images of a keyframe, in the rig's order (empty where a camera sent none), or does not, where
-  /// it has enough of that part of the drive. Keyframes come in order.
+  /// Adds the images of a keyframe, in the rig's order (empty where one is missing), unless there are enough
+  /// of that part of the drive. Keyframes must be added in order.
   void add(int32_t keyframe, const std::vector<Image>& images);
 
-  /// In order.
+  /// Indices of the keyframes with images, in order.
   std::vector<int32_t> keyframes() const;
 
-  /// CV_8UC1, at most as wide as was said; empty where there is none.
+  /// CV_8UC1, at most as wide as given to the constructor; empty where there is none.
   cv::Mat image(int32_t keyframe, size_t camera) const;
 
  private:
@@ -44,7 +44,7 @@ class KeyframeImages {
   int32_t step_ = 1;                            // in keyframes
 };
 
-/// Pixel coordinates of a full image in one that was made smaller: centres are at whole coordinates.
+/// Converts a pixel coordinate to a smaller copy of the image; pixel centres have integer coordinates.
 inline double toSmallImage(double position_px, double small_per_full) {
   return (position_px + 0.5) * small_per_full - 0.5;
 }

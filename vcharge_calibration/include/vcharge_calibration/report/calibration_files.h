@@ -12,17 +12,17 @@ namespace vcharge {
 /// InputError names a folder without images and an image that cannot be read.
 std::vector<CalibrationImage> readCalibrationImages(const std::string& folder);
 
-/// What is written of a calibration.
+/// Outputs of an intrinsic calibration.
 struct CalibrationOutput {
   std::string camera_name;
-  double field_of_view_rad = 0.0;  ///< full angle; 0: as far as corners were seen
+  double field_of_view_rad = 0.0;  ///< full angle; 0: up to the outermost corner
   std::string rig_file;            ///< rig.yaml
-  bool keep_others = false;        ///< other cameras that the file has already stay in it
+  bool keep_others = false;        ///< keep other cameras of an existing file
   std::string report_file;         ///< HTML; empty: none
 };
 
-/// Writes the report, and the rig.yaml unless the verdict is kFail. InputError for a camera name that is none
-/// or a file that cannot be written.
+/// Writes the report, and the rig.yaml unless the verdict is kFail. InputError for an invalid camera name or
+/// a file that cannot be written.
 void writeCalibration(const CalibrationOutput& output, const CalibrationBoard& board,
                       const std::vector<CalibrationImage>& images, const IntrinsicCalibration& result);
 

@@ -14,32 +14,30 @@
 
 namespace vcharge {
 
-/// What is known of one camera.
+/// Calibration of one camera.
 struct CameraCalibration {
   std::string name;
-  HandEye initial;  ///< from the camera's own motions alone
-  /// Upwards in the camera's frame by the ground that it saw, where there was no turn; zero: not known.
+  HandEye initial;  ///< from the motions of this camera alone
+  /// Up in the camera's frame by the ground, for a drive without turns; zero: unknown.
   Eigen::Vector3d up_in_camera = Eigen::Vector3d::Zero();
-  /// Of vehicle_from_camera, [dt, dphi] in the vehicle's frame; beside the common scale, which is the
-  /// odometer's.
+  /// Covariance of vehicle_from_camera, [dt, dphi] in the vehicle's frame, for a fixed scale.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  /// By how much a jackknife over the drive found each degree of freedom less certain than independent errors
-  /// would leave it; 1 or more.
+  /// Ratio of the deviations by a jackknife over the drive to those for independent errors; 1 or more.
   Eigen::Matrix<double, 6, 1> inflation = Eigen::Matrix<double, 6, 1>::Ones();
-  /// Between the extrinsics from the odd and from the even parts of the drive.
+  /// Difference between the extrinsics from the odd and the even parts of the drive.
   Eigen::Matrix<double, 6, 1> half_difference = Eigen::Matrix<double, 6, 1>::Zero();
-  int64_t num_tracked = 0;       ///< observations of points that were followed over three keyframes or more
-  int64_t num_observations = 0;  ///< of these, and found later, that fit in the end
-  int64_t num_shared_landmarks = 0;  ///< that another camera sees too
+  int64_t num_tracked = 0;           ///< observations of tracks over three keyframes or more
+  int64_t num_observations = 0;      ///< observations of adjusted landmarks
+  int64_t num_shared_landmarks = 0;  ///< landmarks that another camera observes too
   double rms_px = 0.0;               ///< per coordinate
-  double structure_px = 0.0;         ///< RMS over the image of what neighbouring errors have in common
-  std::string weakest_direction;     ///< in words
+  double structure_px = 0.0;         ///< RMS over the image of the mean error of each cell
+  std::string weakest_direction;     ///< least certain degree of freedom, as text
 };
 
-/// A rig's extrinsics from a drive, or why there are none.
+/// Extrinsics of a rig from a drive, or the reasons of a failure.
 struct RigCalibration {
   Verdict verdict = Verdict::kFail;
-  std::vector<std::string> remarks;      ///< reasons, and the manoeuvre that is missing
+  std::vector<std::string> remarks;      ///< reasons, and the missing manoeuvre
   std::shared_ptr<const CameraRig> rig;  ///< with covariances; null for kFail
   std::vector<CameraCalibration> cameras;
   double distance_m = 0.0;
@@ -47,16 +45,16 @@ struct RigCalibration {
   int num_keyframes = 0;
   int64_t num_landmarks = 0;
   int num_loop_edges = 0;                ///< accepted
-  int64_t num_aligned_observations = 0;  ///< that were aligned with the patch of their landmark
-  int64_t num_inter_camera_matches = 0;  ///< of landmarks found in rectified views of a neighbouring camera
+  int64_t num_aligned_observations = 0;  ///< aligned with the patch of their landmark
+  int64_t num_inter_camera_matches = 0;  ///< in rectified views of neighbouring cameras
   double rms_px = 0.0;
   double odometer_turn_scale = 1.0;
-  double time_offset_s = 0.0;        ///< by which the odometer's stamps are late, which was corrected for
-  double time_offset_sigma_s = 0.0;  ///< 0: not known
+  double time_offset_s = 0.0;        ///< delay of the odometer's stamps, corrected
+  double time_offset_sigma_s = 0.0;  ///< 0: unknown
   std::string height_source;
-  /// By the first guess, before anything was adjusted: null where there was none.
+  /// The first guess, before any adjustment; null without one.
   std::shared_ptr<const RigScene> first_scene;
-  bool is_from_map = false;  ///< the landmarks were those of a finished map, which is the measure of lengths
+  bool is_from_map = false;  ///< the landmarks are those of a finished map, which defines the scale
 };
 
 }  // namespace vcharge

@@ -6,15 +6,15 @@
 
 namespace vcharge {
 
-/// The drive, every camera's degrees of freedom with their standard deviations, and what is known least, as
-/// lines of text; without verdict and remarks.
+/// Text with the drive, every degree of freedom of each camera and its standard deviation; without verdict
+/// and remarks.
 std::string describeCalibration(const RigCalibration& result);
 
-/// Place (x, y, z, cm) and angles (yaw, pitch, roll, degrees) of a camera turned forwards: angles are zero
-/// for one that looks ahead, upright.
-Eigen::Matrix<double, 6, 1> placeAndAngles(const RigidTransform& vehicle_from_camera);
+/// Position (x, y, z, cm) and angles (yaw, pitch, roll, degrees) of a camera; the angles are zero for an
+/// upright camera that looks forward.
+Eigen::Matrix<double, 6, 1> positionAndAngles(const RigidTransform& vehicle_from_camera);
 /// Standard deviations in the same order and units, about the vehicle's axes, from the covariance over
 /// [dt, dphi].
-Eigen::Matrix<double, 6, 1> placeAndAngleSigmas(const Eigen::Matrix<double, 6, 6>& covariance);
+Eigen::Matrix<double, 6, 1> positionAndAngleSigmas(const Eigen::Matrix<double, 6, 6>& covariance);
 
 }  // namespace vcharge

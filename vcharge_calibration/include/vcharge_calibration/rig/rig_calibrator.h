@@ -1,78 +1,62 @@
 #pragma once
 
-#include <functional>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "vcharge_calibration/matching/keyframe_images.h"
 #include "vcharge_calibration/rig/rig_calibration.h"
 #include "vcharge_calibration/rig/rig_calibrator_options.h"
 #include "vcharge_core/frames/drive_source.h"
-#include "vcharge_core/motion/trajectory.h"
 #include "vcharge_core/sparse_map/sparse_map.h"
-#include "vcharge_reconstruction/stage_progress.h"
-#include "vcharge_reconstruction/frame_gatherer.h"
-#include "vcharge_reconstruction/frame_tracker.h"
-#include "vcharge_reconstruction/mapping_state.h"
+#include "vcharge_reconstruction/frame_follower.h"
+#include "vcharge_reconstruction/reconstruction_state.h"
+#include "vcharge_reconstruction/stage_runner.h"
 
 namespace vcharge {
 
-/// Calibrates the extrinsics of a rig from a drive (paper, section SLAM-based Extrinsic Calibration): no
-/// guess, no overlap of the cameras, no board. Feed it the drive, then call finish(). Extrinsics that the rig
-/// has are not used. Data parallel inside; the same input gives the same result on any number of threads.
+/// Calibrates the extrinsics of a rig from a drive (paper, section SLAM-based Extrinsic Calibration), without
+/// a first guess, overlap of the cameras or a board: feed it the drive, then call finish(). Extrinsics of the
+/// given rig are ignored. Data parallel inside; the same input gives the same result on any number of
+/// threads.
 class RigCalibrator : public DriveConsumer {
  public:
   /// std::invalid_argument for bad options; InputError for a rig without cameras.
   RigCalibrator(const std::shared_ptr<const CameraRig>& rig, const RigCalibratorOptions& options);
   ~RigCalibrator() override;
 
-  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
-    gatherer_->addImage(camera_index, stamp, image);
-  }
-  void addOdometry(const VehicleOdometry& odometry) override { gatherer_->addOdometry(odometry); }
+  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
+  void addOdometry(const VehicleOdometry& odometry) override;
+  /// Processes the frames that still wait for images or odometry.
+  void flush();
 
-  /// Takes the frames that wait for odometry: none that is older will come.
-  void flush() { gatherer_->finish(); }
-
-  /// The calibration by all that was fed. A drive that does not suffice gives Verdict::kFail with the reason.
-  /// The callback may be empty, and may throw to end the work.
+  /// The calibration from the drive so far. A drive that does not suffice gives Verdict::kFail with the
+  /// reason. The callback may be empty, and may throw to end the work.
   RigCalibration finish(const StageCallback& progress);
 
-  /// After finish() with another verdict than kFail: poses of all frames, and the map that came with them.
-  Trajectory trajectory() const { return trajectoryOf(state_); }
+  /// Map of the drive, after finish() with another verdict than kFail.
   std::shared_ptr<const SparseMap> map() const;
-  const MappingState& state() const { return state_; }
-  /// Of a few keyframes, for pictures.
+  const ReconstructionState& state() const { return state_; }
+  /// Small images of a few keyframes, for reports.
   const KeyframeImages& images() const { return images_; }
-  /// Of all keyframes whose patches are matched between cameras or aligned.
+  /// Images of all keyframes, for matches between cameras and patch alignment.
   const KeyframeImages& allImages() const { return all_images_; }
 
  private:
-  void processFrame(Timestamp stamp, const std::vector<Image>& images,
-                    const RigidTransform& odom_from_vehicle);
-  void addKeyframe(Timestamp stamp, const std::vector<Image>& images,
-                   const RigidTransform& odom_from_vehicle);
-
   const RigCalibratorOptions options_;
-  std::shared_ptr<const CameraRig> rig_;  // without extrinsics
-  const std::unique_ptr<FeatureExtractor> extractor_;
-  std::vector<CameraTracker> trackers_;
-  MappingState state_;
+  ReconstructionState state_;
   KeyframeImages images_;
   KeyframeImages all_images_ = KeyframeImages::ofAllKeyframes();
-  std::unique_ptr<FrameGatherer> gatherer_;
-  std::optional<RigidTransform> last_odom_from_vehicle_;
-  double travelled_m_ = 0.0;
+  std::unique_ptr<FrameFollower> follower_;
 };
 
-/// What RigCalibrator::finish() does with the drive that it followed. With copies of state() and allImages()
-/// a drive can be calibrated while it goes on; `state` has the rig, the poses and the landmarks in the end.
+/// The steps of RigCalibrator::finish(): calibrates from a drive that was followed. With copies of state()
+/// and allImages() this may run while the drive goes on. `state` has the adjusted rig, poses and landmarks
+/// afterwards.
 RigCalibration calibrateFollowedDrive(const RigCalibratorOptions& options, const KeyframeImages& all_images,
-                                      const StageCallback& progress, MappingState* state);
+                                      const StageCallback& progress, ReconstructionState* state);
 
-/// The sparse map that came with a calibration of another verdict than kFail.
+/// The map of the drive, from the state after a calibration with another verdict than kFail.
 std::shared_ptr<const SparseMap> mapOfCalibration(const RigCalibratorOptions& options,
-                                                  const MappingState& state);
+                                                  const ReconstructionState& state);
 
 }  // namespace vcharge

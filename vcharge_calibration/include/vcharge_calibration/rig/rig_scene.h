@@ -8,26 +8,26 @@
 
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/motion/rigid_transform.h"
-#include "vcharge_reconstruction/mapping_data.h"
+#include "vcharge_reconstruction/reconstruction_data.h"
 
 namespace vcharge {
 
-/// Landmarks by the camera that saw them first, in the map.
+/// Landmarks in the map, by the camera that observed them first.
 using LandmarksByCamera = std::vector<std::vector<Eigen::Vector3d>>;
 
-/// "#rrggbb", in which a camera is drawn in pages and in rviz.
+/// "#rrggbb", the colour of a camera in reports and in rviz.
 std::string colourOfCamera(size_t camera);
 
-/// The points that have a position, by the camera that saw them first.
-LandmarksByCamera landmarksByCamera(const MappingData& data);
+/// Landmarks of a reconstruction, by the camera that observed them first.
+LandmarksByCamera landmarksByCamera(const ReconstructionData& data);
 
-/// A rig, its way and what it saw, as known at some stage of a calibration: for pictures.
+/// Rig, path and landmarks at some stage of a calibration, for pictures.
 struct RigScene {
   std::shared_ptr<const CameraRig> rig;
   std::vector<RigidTransform> map_from_vehicle;  ///< at the keyframes
   LandmarksByCamera landmarks;
 };
 
-RigScene makeRigScene(const MappingData& data);
+RigScene makeRigScene(const ReconstructionData& data);
 
 }  // namespace vcharge

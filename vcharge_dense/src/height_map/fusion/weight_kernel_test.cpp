@@ -13,7 +13,7 @@
 namespace vcharge {
 namespace {
 
-constexpr float kScale = 1.0F / (1.0F + 0.16F);  // of a sigma of 0.02 m over the reference sigma, squared
+constexpr float kScale = 1.0F / (1.0F + 0.16F);  // weight of a range with a sigma of 0.02 m
 
 /// Ranges count by their standard deviation alone: those of blankView() have a confidence of 1.
 RangeWeighting weightingBySigma() {

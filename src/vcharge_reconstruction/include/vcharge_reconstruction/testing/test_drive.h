@@ -4,7 +4,7 @@
 #include <memory>
 #include <random>
 
-#include "vcharge_reconstruction/mapping_data.h"
+#include "vcharge_reconstruction/reconstruction_data.h"
 
 namespace vcharge::testing {
 
@@ -23,6 +23,6 @@ struct TestDriveOptions {
 
 /// A drive along a circle among random points, with true poses, and exact (or noisy) observations of every
 /// point that a camera sees within 25 m, as tracks of consecutive keyframes with true positions.
-MappingData makeTestDrive(const TestDriveOptions& options);
+ReconstructionData makeTestDrive(const TestDriveOptions& options);
 
 }  // namespace vcharge::testing

@@ -11,30 +11,30 @@ namespace vcharge::testing {
 struct TestMapOptions {
   int num_keyframes = 24;
   int num_landmarks = 3000;
-  /// A second, equal place this far along x, with the same descriptors: nothing tells them apart. 0: none.
+  /// Distance along x of an indistinguishable copy of the map; 0: no copy.
   double twin_offset_m = 0.0;
   uint32_t seed = 1;
 };
 
-/// The analytic map of vcharge_core with a descriptor per landmark and a vocabulary trained from them.
+/// The analytic map of vcharge_core with a random descriptor per landmark.
 std::shared_ptr<const SparseMap> makeTestMap(const TestMapOptions& options);
 
 struct TestViewOptions {
   double noise_px = 0.3;
-  double share_of_wrong = 0.0;  ///< features that carry another landmark's descriptor
+  double wrong_ratio = 0.0;  ///< ratio of features with another landmark's descriptor
   double max_range_m = 20.0;
   int camera_without_image = -1;
   uint32_t seed = 7;
 };
 
-/// What the map's rig would see of its landmarks from a pose, with 8 of 256 bits of every descriptor flipped.
+/// Features of the map's landmarks from a pose, with 8 of 256 bits of every descriptor flipped.
 RigFeatures makeTestView(const SparseMap& map, const RigidTransform& map_from_vehicle,
                          const TestViewOptions& options);
 
 /// The first 128 bits of binary descriptors as numbers (CV_32FC1, 128 columns): 0, or `one`.
 cv::Mat descriptorsAsNumbers(const cv::Mat& descriptors, float one);
 
-/// Features at random places with random descriptors.
+/// Features at random positions with random descriptors.
 RigFeatures makeForeignView(const SparseMap& map, uint32_t seed);
 
 }  // namespace vcharge::testing

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 namespace vcharge {
@@ -28,6 +29,11 @@ inline float unitFromBits(uint32_t bits) {
 /// Pseudo-random number in [0, 1) of a grid cell.
 inline float cellValue(int x, int y, uint32_t seed) {
   return unitFromBits(hashCell(x, y, seed));
+}
+
+/// 0 up to `low`, 1 from `high` on, linear between.
+inline float ramp(float value, float low, float high) {
+  return std::clamp((value - low) / (high - low), 0.0F, 1.0F);
 }
 
 /// Smooth noise in [-1, 1] with features of about one unit.

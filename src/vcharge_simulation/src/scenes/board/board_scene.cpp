@@ -1,12 +1,10 @@
-#include "scenes/board/board_scene.h"
-
 #include <algorithm>
 #include <memory>
-#include <stdexcept>
 
 #include "scenes/board/board_motion.h"
 #include "scenes/board/board_pattern.h"
-#include "scenes/lot/lot_scene.h"
+#include "scenes/lot/lot_variant.h"
+#include "scenes/scene_builders.h"
 #include "scenes/scene_parts.h"
 #include "vcharge_simulation/sensors/golf_rig.h"
 #include "vcharge_simulation/sensors/rig_catalogue.h"
@@ -74,27 +72,20 @@ std::shared_ptr<const Scene> buildBoardScene(const SceneOptions& options) {
   return buildLotVariant(options, variant);
 }
 
-std::vector<CatalogueEntry> listBoardDrives() {
-  std::vector<CatalogueEntry> drives;
-  for (const char* camera : {"front", "left", "rear", "right"}) {
-    const std::string name(camera);
-    drives.push_back({"board_" + name, "the car stands; 40 s of the board before the camera " + name});
+std::vector<SceneDrive> boardDrives() {
+  std::vector<SceneDrive> drives;
+  for (const std::string camera : {"front", "left", "rear", "right"}) {
+    const double start_s = BoardMotion::kSpan_s * static_cast<double>(drives.size());
+    drives.push_back(
+        {{"board_" + camera, "40 s of the board in front of the camera " + camera + ", at standstill"},
+         [start_s] {
+           VehicleMotionOptions motion;
+           motion.standstill_s = motion.duration_s = BoardMotion::kSpan_s;
+           return DrivePlan{"",     DrivePath(worldFromVehicle(), {{1.0, 0.0, 0.0}}), motion, 0, nullptr,
+                            start_s};
+         }});
   }
   return drives;
-}
-
-DrivePlan planBoardDrive(const std::string& name) {
-  const std::vector<CatalogueEntry> drives = listBoardDrives();
-  const auto found = std::find_if(drives.begin(), drives.end(),
-                                  [&](const CatalogueEntry& entry) { return entry.name == name; });
-  if (found == drives.end()) {
-    throw std::invalid_argument("drive: the scene chessboard has none of the name '" + name + "'");
-  }
-  VehicleMotionOptions motion;
-  motion.standstill_s = motion.duration_s = BoardMotion::kSpan_s;
-  return {name,    DrivePath(worldFromVehicle(), {{1.0, 0.0, 0.0}}),
-          motion,  0,
-          nullptr, BoardMotion::kSpan_s * static_cast<double>(found - drives.begin())};
 }
 
 }  // namespace vcharge

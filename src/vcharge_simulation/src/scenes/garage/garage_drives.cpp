@@ -1,7 +1,5 @@
-#include <stdexcept>
-
-#include "scenes/garage/garage_scene.h"
 #include "scenes/lane_paths.h"
+#include "scenes/scene_builders.h"
 
 namespace vcharge {
 
@@ -14,48 +12,38 @@ constexpr Lanes kLanes{26.0, 15.5, 5.0};
 const Eigen::Vector2d kMapped_m(0.24, 0.8);
 const Eigen::Vector2d kOtherDay_m(-0.36, -1.2);
 
-}  // namespace
-
-std::vector<CatalogueEntry> listGarageDrives() {
-  return {
-      {"loop", "around all rows of bays, back to the start"},
-      {"loop_reverse_direction", "the loop, clockwise"},
-      {"both_directions", "175 s through all lanes in both directions, to build maps from"},
-      {"other_day", "the loop 2 m beside on another day, with moved cars and other lamps"},
-      {"other_day_reverse_direction", "the same, clockwise"},
-      {"figure_eight", "around the northern rows to the left, then around the southern ones to the right"},
-      {"short", "5 s of gentle curves in the middle lane"}};
+std::function<DrivePlan()> loop(const Eigen::Vector2d& outwards_m, bool clockwise, int day) {
+  return [=] { return DrivePlan{"", kLanes.loop(outwards_m, clockwise), fromRestToRest(), day}; };
 }
 
-DrivePlan planGarageDrive(const std::string& name) {
+DrivePlan figureEight() {
+  VehicleMotionOptions motion = fromRestToRest();
+  motion.standstill_s = 0.0;
+  return {"", kLanes.figureEight(), motion};
+}
+
+DrivePlan shortDrive() {
   VehicleMotionOptions motion;
-  motion.duration_s = 600.0;
-  motion.standstill_s = 0.5;
-  motion.stop_at_end = true;
-  if (name == "loop" || name == "loop_reverse_direction") {
-    return {name, kLanes.loop(kMapped_m, name != "loop"), motion, 0};
-  }
-  if (name == "other_day" || name == "other_day_reverse_direction") {
-    return {name, kLanes.loop(kOtherDay_m, name != "other_day"), motion, 1};
-  }
-  if (name == "both_directions") {
-    return {name, kLanes.bothDirections(kMapped_m), motion, 0};
-  }
-  if (name == "figure_eight") {
-    motion.standstill_s = 0.0;
-    return {name, kLanes.figureEight(), motion, 0};
-  }
-  if (name == "short") {
-    motion.standstill_s = 0.0;
-    motion.stop_at_end = false;
-    motion.duration_s = 5.0;
-    const double k = 1.0 / 22.0;
-    return {name,
-            DrivePath(RigidTransform::planar(7.0, 0.6, kPi + 0.06),
-                      {{3.0, 0.0, -k}, {3.0, -k, 0.0}, {3.0, 0.0, k}, {3.0, k, 0.0}, {3.0, 0.0, -k}}),
-            motion, 0};
-  }
-  throw std::invalid_argument("drive: the garage has none of the name '" + name + "'");
+  motion.duration_s = 5.0;
+  return {"", gentleCurves(RigidTransform::planar(7.0, 0.6, kPi + 0.06)), motion};
+}
+
+}  // namespace
+
+std::vector<SceneDrive> garageDrives() {
+  return {{{"loop", "around all rows of bays, back to the start"}, loop(kMapped_m, false, 0)},
+          {{"loop_reverse_direction", "the loop, clockwise"}, loop(kMapped_m, true, 0)},
+          {{"both_directions", "175 s through all lanes in both directions, for mapping"},
+           [] {
+             return DrivePlan{"", kLanes.bothDirections(kMapped_m), fromRestToRest()};
+           }},
+          {{"other_day", "2 m beside the loop on another day, with moved cars and other lamps"},
+           loop(kOtherDay_m, false, 1)},
+          {{"other_day_reverse_direction", "other_day, clockwise"}, loop(kOtherDay_m, true, 1)},
+          {{"figure_eight",
+            "counter-clockwise around the northern rows, then clockwise around the southern ones"},
+           figureEight},
+          {{"short", "5 s of gentle curves in the middle lane"}, shortDrive}};
 }
 
 }  // namespace vcharge

@@ -4,7 +4,6 @@
 #include <tbb/parallel_for.h>
 #include <opencv2/imgproc.hpp>
 
-#include "scenes/garage/garage_stains.h"
 #include "scenes/garage/garage_surfaces.h"
 #include "scenes/lot/marking_painter.h"
 #include "vcharge_simulation/rendering/noise.h"
@@ -17,10 +16,6 @@ namespace {
 constexpr double kHalfPi = 1.57079632679489661923;
 constexpr double kLine_m = 0.12;
 constexpr double kJoint_m = 7.8;
-
-float ramp(float value, float low, float high) {
-  return std::clamp((value - low) / (high - low), 0.0F, 1.0F);
-}
 
 cv::Mat drawMarkings(const GarageLayout& layout, double texel_m) {
   MarkingPainter painter(kGarageArea, texel_m);

@@ -1,5 +1,3 @@
-#include "scenes/garage/garage_scene.h"
-
 #include <algorithm>
 #include <cmath>
 
@@ -8,6 +6,7 @@
 #include "scenes/garage/garage_fittings.h"
 #include "scenes/garage/garage_surfaces.h"
 #include "scenes/lot/lot_ground.h"
+#include "scenes/scene_builders.h"
 #include "scenes/scene_parts.h"
 
 namespace vcharge {

@@ -1,11 +1,10 @@
-#include "scenes/garage/garage_stains.h"
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
 #include <opencv2/imgproc.hpp>
 
+#include "scenes/garage/garage_surfaces.h"
 #include "vcharge_simulation/rendering/noise.h"
 
 namespace vcharge {
@@ -15,10 +14,6 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kTrack_m = 1.5;  // track width of the cars that leave tyre marks
 constexpr double kLanes_m[] = {-15.5, 0.0, 15.5};
-
-float ramp(float value, float low, float high) {
-  return std::clamp((value - low) / (high - low), 0.0F, 1.0F);
-}
 
 // Seed from a coordinate that may be negative; goes through int64_t because converting a negative double to
 // unsigned is undefined.

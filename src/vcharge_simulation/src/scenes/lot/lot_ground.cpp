@@ -15,13 +15,6 @@ namespace {
 
 enum class Zone { kAsphalt, kCobbles, kBricks, kSlabs, kGrass };
 
-float clampUnit(float value) {
-  return std::min(1.0F, std::max(0.0F, value));
-}
-float ramp(float value, float low, float high) {
-  return clampUnit((value - low) / (high - low));
-}
-
 /// Oil, tar or a patch of repaired asphalt.
 struct Stain {
   float x, y, half_length, half_width, cosine, sine, strength;
@@ -120,7 +113,7 @@ class GroundPainter {
     const float warp_y = y + 0.25F * fractalNoise(x * 2.0F, y * 2.0F, 3, 0.6F, seed_ + 22);
     const float scale = presence > 0.35F ? 1.5F : 0.45F;
     const CellNoise cells = cellNoise(warp_x * scale, warp_y * scale, seed_ + 23);
-    const float width_m = 0.006F + 0.012F * clampUnit(presence);
+    const float width_m = 0.006F + 0.012F * std::clamp(presence, 0.0F, 1.0F);
     const float distance_m = cells.border_distance / scale;
     return 1.0F - 0.62F * (1.0F - ramp(distance_m, 0.4F * width_m, 1.6F * width_m));
   }

@@ -1,10 +1,11 @@
-#include "scenes/lot/lot_scene.h"
+#include "scenes/lot/lot_variant.h"
 
 #include <algorithm>
 
 #include "rendering/light_baker.h"
 #include "scenes/lot/lot_ground.h"
 #include "scenes/lot/lot_layout.h"
+#include "scenes/scene_builders.h"
 #include "scenes/scene_parts.h"
 
 namespace vcharge {

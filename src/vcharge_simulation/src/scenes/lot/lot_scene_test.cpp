@@ -1,4 +1,5 @@
-#include "scenes/lot/lot_scene.h"
+#include "scenes/catalogue_cases.h"
+#include "scenes/scene_builders.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,9 +8,6 @@
 #include <string>
 
 #include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
-
-#include "vcharge_simulation/drive/truth_maps.h"
 
 namespace vcharge {
 namespace {
@@ -38,14 +36,6 @@ float heightAt(double x, double y) {
   const TruthHeightMap& map = heightMap();
   return map.height_m.at<float>(static_cast<int>(std::lround((y - map.origin_m.y()) / map.cell_size_m)),
                                 static_cast<int>(std::lround((x - map.origin_m.x()) / map.cell_size_m)));
-}
-
-Eigen::Vector2d middleOf(const Obstacle& obstacle) {
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  for (const Eigen::Vector2d& corner : obstacle.footprint_m) {
-    sum += corner;
-  }
-  return sum / static_cast<double>(obstacle.footprint_m.size());
 }
 
 TEST(LotSceneTest, LanesAreLevelAndFree) {
@@ -82,32 +72,9 @@ TEST(LotSceneTest, HeightMapHoldsEveryObstacleAtItsHeight) {
 }
 
 TEST(LotSceneTest, WhatStandsOutOfTheGroundBelongsToAnObstacle) {
-  const TruthHeightMap& map = heightMap();
-  // Footprints on the grid, dilated by the reach of leaves and mirrors.
-  cv::Mat covered = cv::Mat::zeros(map.height_m.size(), CV_8UC1);
-  for (const Obstacle& obstacle : lot().scene().obstacles) {
-    std::vector<cv::Point> polygon;
-    for (const Eigen::Vector2d& corner : obstacle.footprint_m) {
-      polygon.emplace_back(static_cast<int>(std::lround((corner.x() - map.origin_m.x()) / map.cell_size_m)),
-                           static_cast<int>(std::lround((corner.y() - map.origin_m.y()) / map.cell_size_m)));
-    }
-    cv::fillPoly(covered, std::vector<std::vector<cv::Point>>{polygon}, cv::Scalar(255));
-  }
-  cv::dilate(covered, covered, cv::Mat::ones(7, 7, CV_8UC1));
-  int standing = 0;
-  int unexplained = 0;
-  for (int row = 0; row < map.height_m.rows; ++row) {
-    for (int column = 0; column < map.height_m.cols; ++column) {
-      const float height_m = map.height_m.at<float>(row, column);
-      // Low branches extend beyond the trunk that is the tree's footprint.
-      if (height_m > 0.3F && height_m < 1.4F) {
-        ++standing;
-        unexplained += covered.at<uint8_t>(row, column) == 0 ? 1 : 0;
-      }
-    }
-  }
-  EXPECT_GT(standing, 20000);
-  EXPECT_LT(unexplained, standing / 200);
+  const StandingCells cells = findStandingCells(lot().scene(), heightMap());
+  EXPECT_GT(cells.all, 20000);
+  EXPECT_LT(cells.unexplained, cells.all / 200);
 }
 
 TEST(LotSceneTest, OnAnotherDaySomeCarsHaveMovedAndAllElseStands) {

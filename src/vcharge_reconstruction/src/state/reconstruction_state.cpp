@@ -1,14 +1,14 @@
-#include "vcharge_reconstruction/mapping_state.h"
+#include "vcharge_reconstruction/reconstruction_state.h"
 
 namespace vcharge {
 
-Trajectory trajectoryOf(const MappingState& state) {
+Trajectory trajectoryOf(const ReconstructionState& state) {
   Trajectory trajectory;
   for (const FramePose& frame : state.frames) {
     const Keyframe& keyframe = state.data.keyframes[frame.keyframe];
     RigidTransform keyframe_from_vehicle = frame.keyframe_from_vehicle;
     if (static_cast<size_t>(frame.keyframe) + 1 < state.data.keyframes.size()) {
-      // What adjustment changed between two keyframes, in equal shares of time.
+      // The change by adjustment between two keyframes is distributed evenly over time.
       const Keyframe& next = state.data.keyframes[frame.keyframe + 1];
       const RigidTransform adjusted = keyframe.map_from_vehicle.inverse() * next.map_from_vehicle;
       const double fraction =

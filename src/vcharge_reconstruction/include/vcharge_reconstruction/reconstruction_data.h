@@ -14,45 +14,45 @@
 
 namespace vcharge {
 
-/// What one camera saw at a keyframe.
+/// Features of one camera at a keyframe.
 struct KeyframeImage {
   ImageFeatures features;
-  Eigen::Matrix3Xd rays_in_camera;        ///< unit rays of the features
+  Eigen::Matrix3Xd rays_in_camera;        ///< bearings of the features
   std::vector<int32_t> track_of_feature;  ///< -1: none
 };
 
-/// The vehicle at an instant that goes into the map.
+/// The vehicle at an instant that becomes part of the map.
 struct Keyframe {
   Timestamp stamp;
-  RigidTransform odom_from_vehicle;   ///< as the odometer counted
+  RigidTransform odom_from_vehicle;   ///< as counted by the odometer
   RigidTransform map_from_vehicle;    ///< estimated
-  double travelled_m = 0.0;           ///< by the odometer, since the drive's start
-  std::vector<KeyframeImage> images;  ///< in the rig's order; without features where a camera sent no image
+  double travelled_m = 0.0;           ///< by the odometer, since the start of the drive
+  std::vector<KeyframeImage> images;  ///< in the rig's order; without features where an image is missing
 };
 
-/// Where a camera saw the point of a track at a keyframe.
+/// Observation of a track in an image of a keyframe.
 struct TrackObservation {
   int32_t keyframe = 0;
   int32_t camera = 0;
-  int32_t feature = -1;  ///< of that image, whose descriptor describes it; -1: none
+  int32_t feature = -1;  ///< the image's feature that describes it; -1: none
   Eigen::Vector2d position_px = Eigen::Vector2d::Zero();
   double sigma_px = 1.0;
 };
 
-/// A scene point seen several times.
+/// Observations of one scene point; a landmark once it has a position.
 struct Track {
   std::vector<TrackObservation> observations;  ///< in order of keyframes
   std::optional<Eigen::Vector3d> position_m;   ///< in the map; absent where it was not triangulated
   Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();
 };
 
-/// All that a map is being made of.
-struct MappingData {
+/// Rig, keyframes and tracks of a reconstruction.
+struct ReconstructionData {
   std::shared_ptr<const CameraRig> rig;
   std::vector<Keyframe> keyframes;
   std::vector<Track> tracks;
-  double odometry_distance_scale = 1.0;
-  double odometry_turn_scale = 1.0;
+  double odometry_distance_scale = 1.0;  ///< true over counted distance
+  double odometry_turn_scale = 1.0;      ///< true over counted turn
 };
 
 }  // namespace vcharge

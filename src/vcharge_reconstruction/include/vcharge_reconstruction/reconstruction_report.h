@@ -11,21 +11,21 @@
 
 namespace vcharge {
 
-/// Frames one after the other that were not used, or not as they should be, for one reason.
+/// Consecutive frames that were not used, or not completely, for one reason.
 struct SkippedFrames {
   std::string reason;
   Timestamp first, last;
   int64_t num_frames = 0;
 };
 
-/// What became of a drive, in numbers.
-struct SparseMapperReport {
+/// Counts, errors and times of a reconstruction.
+struct ReconstructionReport {
   int64_t num_frames = 0;             ///< images of one stamp
-  int64_t num_incomplete_frames = 0;  ///< of these: a camera was missing
+  int64_t num_incomplete_frames = 0;  ///< of these, frames that lack a camera
   int64_t num_frames_without_odometry = 0;
   int64_t num_standing_frames = 0;
   int64_t num_odometry_resets = 0;
-  int64_t num_late_images = 0;              ///< came after their frame's turn
+  int64_t num_late_images = 0;              ///< arrived after their frame was processed
   std::vector<int64_t> num_missing_images;  ///< by camera
   std::vector<SkippedFrames> skipped;       ///< in the order of the drive
   std::array<int64_t, 4> num_motions{};     ///< by MotionHypothesis
@@ -33,7 +33,8 @@ struct SparseMapperReport {
   int64_t num_observations = 0;
   double rms_px = 0.0;
   std::vector<LoopEdge> loop_edges;
-  std::map<std::string, double> stage_s;  ///< wall time
+  std::vector<std::string> stages = {"following"};  ///< in the order in which they ran
+  std::map<std::string, double> stage_s;            ///< wall time by stage
 };
 
 }  // namespace vcharge

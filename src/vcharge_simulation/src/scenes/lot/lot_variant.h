@@ -2,8 +2,6 @@
 
 #include <functional>
 #include <memory>
-#include <string>
-#include <vector>
 
 #include "scenes/lot/lot_layout.h"
 #include "vcharge_simulation/scenes/scene_catalogue.h"
@@ -22,14 +20,5 @@ struct LotVariant {
 };
 
 std::shared_ptr<const Scene> buildLotVariant(const SceneOptions& options, const LotVariant& variant);
-
-/// Builds an outdoor parking lot of 80 x 60 m: lanes of asphalt and cobbles around two double rows of bays,
-/// parked cars, trees, hedges, kerbs, posts and fences, with houses around it.
-std::shared_ptr<const Scene> buildLotScene(const SceneOptions& options);
-
-/// Drives in the lot: loops, short drives and manoeuvres.
-std::vector<CatalogueEntry> listLotDrives();
-/// Throws std::invalid_argument for a name that is not in listLotDrives().
-DrivePlan planLotDrive(const std::string& name);
 
 }  // namespace vcharge

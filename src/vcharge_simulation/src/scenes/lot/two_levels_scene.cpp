@@ -1,11 +1,10 @@
-#include "scenes/garage/two_levels_scene.h"
-
 #include <algorithm>
 #include <cmath>
 
 #include "scenes/garage/garage_surfaces.h"
 #include "scenes/lot/lot_ground.h"
-#include "scenes/lot/lot_scene.h"
+#include "scenes/lot/lot_variant.h"
+#include "scenes/scene_builders.h"
 #include "scenes/scene_parts.h"
 
 namespace vcharge {

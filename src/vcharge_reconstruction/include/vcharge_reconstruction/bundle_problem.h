@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/motion/rigid_transform.h"
+
+namespace vcharge {
+
+/// A point seen by a camera of the rig.
+struct BundleObservation {
+  int32_t pose = 0;
+  int32_t camera = 0;
+  Eigen::Vector2d position_px = Eigen::Vector2d::Zero();
+  double sigma_px = 1.0;
+};
+
+/// A point that lies on the ground, at z = 0 in the vehicle's frame of a pose.
+struct GroundObservation {
+  int32_t point = 0;
+  int32_t pose = 0;
+  double sigma_m = 1.0;
+};
+
+/// Planar motion from the previous pose to `pose` as counted by the odometer, weighted as in
+/// makeOdometryCost().
+struct OdometerFactor {
+  int32_t pose = 1;
+  RigidTransform previous_from_current;
+  Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
+};
+
+/// The unknowns of a bundle adjustment and the terms of its cost. Observations, of images and of the ground,
+/// have a Cauchy loss; all other terms are quadratic.
+struct BundleProblem {
+  std::shared_ptr<const CameraRig> rig;
+
+  // Unknowns, with their initial values.
+  std::vector<RigidTransform> map_from_vehicle;
+  bool is_first_pose_fixed = true;  ///< false where point_information fixes the map's frame
+  std::vector<Eigen::Vector3d> points_in_map;
+  Eigen::Vector2d odometer = Eigen::Vector2d::Ones();  ///< true over counted distance, and turn
+  std::vector<RigidTransform> vehicle_from_camera;     ///< one per camera; empty: the rig's extrinsics hold
+
+  // Terms.
+  std::vector<BundleObservation> observations;         ///< grouped by point, ordered by pose within a point
+  std::vector<size_t> first_observation;               ///< one per point, then the number of observations
+  std::vector<GroundObservation> ground_observations;  ///< ordered by point, then by pose
+  std::vector<OdometerFactor> odometer_factors;
+  Eigen::Vector2d odometer_sigmas = Eigen::Vector2d::Ones();  ///< prior of `odometer`, around 1
+  /// Prior of each point around its initial value, 1/m^2 along the map's axes. Empty: no prior.
+  std::vector<Eigen::Matrix3d> point_information;
+  /// Prior of the extrinsics around their initial values: information on the mean motion of all cameras as
+  /// one rigid body, [dt, dphi] in the vehicle's frame.
+  Eigen::Matrix<double, 6, 6> common_information = Eigen::Matrix<double, 6, 6>::Zero();
+  double loss_sigmas = 2.0;  ///< scale of the Cauchy loss
+
+  size_t numFixedPoses() const { return is_first_pose_fixed ? 1 : 0; }
+};
+
+}  // namespace vcharge

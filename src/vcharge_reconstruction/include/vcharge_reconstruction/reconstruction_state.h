@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "vcharge_core/motion/trajectory.h"
+#include "vcharge_reconstruction/reconstruction_data.h"
+#include "vcharge_reconstruction/reconstruction_report.h"
+
+namespace vcharge {
+
+/// A frame that was followed.
+struct FramePose {
+  Timestamp stamp;
+  int32_t keyframe = 0;  ///< the last keyframe
+  RigidTransform keyframe_from_vehicle;
+  MotionHypothesis motion = MotionHypothesis::kOdometry;  ///< from the previous frame
+};
+
+/// A reconstruction and how it was made; the steps of a recipe change it one after the other.
+struct ReconstructionState {
+  ReconstructionData data;
+  std::vector<FramePose> frames;
+  std::vector<RigidTransform> keyframe_from_next;  ///< by the motions of the frames, before adjustment
+  ReconstructionReport report;
+};
+
+/// Poses of all frames in the map, by the current poses of the keyframes.
+Trajectory trajectoryOf(const ReconstructionState& state);
+
+}  // namespace vcharge

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <memory>
+
+#include "vcharge_core/sparse_map/sparse_map.h"
+#include "vcharge_reconstruction/bundle_adjustment.h"
+#include "vcharge_reconstruction/reconstruction_options.h"
+#include "vcharge_reconstruction/reconstruction_state.h"
+
+namespace vcharge {
+
+// Steps that the recipes of mapping and calibration share.
+
+/// Finds and verifies loops, closes them by a robust pose graph, and triangulates anew.
+void findAndCloseLoops(const ReconstructionOptions& options, const LoopProgress& progress,
+                       ReconstructionState* state);
+
+/// Sets the number of observations and the errors of an adjustment in the report.
+void recordAdjustment(const BundleAdjustmentSummary& summary, ReconstructionReport* report);
+
+/// The map of an adjusted reconstruction: landmarks with a position, and their observations. An observation
+/// without a feature takes the descriptor of the landmark's nearest keyframe that has one.
+std::shared_ptr<const SparseMap> assembleMap(const ReconstructionState& state,
+                                             const FeatureExtractorOptions& features);
+
+}  // namespace vcharge

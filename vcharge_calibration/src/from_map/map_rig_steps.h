@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "vcharge_calibration/from_map/map_rig_calibrator.h"
+
+namespace vcharge {
+
+/// The steps of MapRigCalibrator::finish(): calibrates from keyframes whose cameras were localized one by
+/// one. Afterwards `state` has the rig, the poses and the observed landmarks; `landmark_of_track` their
+/// indices in the map.
+RigCalibration calibrateInMap(const MapRigCalibratorOptions& options, const MapLocalizer& localizer,
+                              const std::vector<MapKeyframeView>& views, const StageCallback& progress,
+                              ReconstructionState* state, std::vector<int32_t>* landmark_of_track);
+
+}  // namespace vcharge
