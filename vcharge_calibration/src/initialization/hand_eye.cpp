@@ -167,8 +167,7 @@ PlanarPlace findPlace(const std::vector<MotionPair>& motions, const std::vector<
 }
 
 /// Robust mean direction of straight motions.
-Eigen::Vector3d findTravel(const std::vector<MotionPair>& motions, const HandEyeOptions& options,
-                           int num_iterations) {
+Eigen::Vector3d findTravel(const std::vector<MotionPair>& motions, int num_iterations) {
   constexpr double kStraight_rad = 0.02;
   Eigen::Vector3d travel = Eigen::Vector3d::Zero();
   for (int iteration = 0; iteration < num_iterations; ++iteration) {
@@ -200,7 +199,7 @@ HandEye solvePlanarHandEye(const std::vector<MotionPair>& motions, const HandEye
   if (result.num_motions < kMinMotions) {
     return result;
   }
-  result.travel_in_camera = findTravel(motions, options, num_iterations);
+  result.travel_in_camera = findTravel(motions, num_iterations);
   const Vertical vertical = findVertical(motions, options, num_iterations);
   result.tilt_sigma_rad = vertical.sigma_rad;
   const Eigen::Quaterniond level_from_camera =
