@@ -1,6 +1,6 @@
-# What every package of the suite builds with; comes with find_package(catkin REQUIRED COMPONENTS vcharge_core).
+# Build settings of all packages; included by find_package(catkin REQUIRED COMPONENTS vcharge_core).
 
-# C++17, Release unless the user chose, warnings. A macro: the settings belong to the calling package.
+# C++17, warnings, and Release by default. A macro, since the settings must apply to the calling package.
 macro(vcharge_build_settings)
   set(CMAKE_CXX_STANDARD 17)
   set(CMAKE_CXX_STANDARD_REQUIRED ON)
@@ -9,7 +9,7 @@ macro(vcharge_build_settings)
   if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
     set(CMAKE_BUILD_TYPE Release)
   endif()
-  # Private headers are named by their folder below src.
+  # Private headers are included by their path below src.
   include_directories(src)
   option(VCHARGE_WARNINGS_AS_ERRORS "Fail the build on compiler warnings" OFF)
   add_compile_options(-Wall -Wextra -Wno-missing-field-initializers -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
@@ -20,7 +20,7 @@ macro(vcharge_build_settings)
   if(VCHARGE_SANITIZE)
     add_compile_options(-fsanitize=${VCHARGE_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -g1)
     if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
-      # These of GCC's warnings are wrong in instrumented code.
+      # GCC reports false positives of these warnings in instrumented code.
       add_compile_options(-Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow)
     endif()
     add_link_options(-fsanitize=${VCHARGE_SANITIZE})
@@ -39,7 +39,7 @@ function(vcharge_add_gtest name)
   endif()
 endfunction()
 
-# Installs libraries and tools where rosrun and roslaunch look for them, and the public headers.
+# Installs libraries, tools and public headers where catkin, rosrun and roslaunch expect them.
 function(vcharge_install)
   cmake_parse_arguments(arg "" "" "TARGETS;LIBRARIES" ${ARGN})
   if(arg_LIBRARIES)

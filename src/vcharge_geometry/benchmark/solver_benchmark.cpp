@@ -1,5 +1,5 @@
-// Times of the minimal solvers with OpenGV's beside them in the same run, on the same problems, and both
-// error distributions. A solve is one call from ready correspondences to all solutions.
+// Times and error distributions of the minimal solvers beside OpenGV's, in the same run on the same problems.
+// A solve is one call from prepared correspondences to all solutions.
 
 #include <cstdio>
 #include <string>
@@ -24,7 +24,7 @@ namespace {
 
 constexpr size_t kNumProblems = 1000;
 
-/// Relative problems with their truth: lines for our solvers, bearings with cameras for OpenGV.
+/// Relative problems with known motion, as lines.
 template <size_t N>
 struct RelativeProblems {
   std::vector<RigidTransform> truths;
@@ -98,8 +98,8 @@ const PoseProblems& uprightPoseProblems() {
   return problems;
 }
 
-/// One correspondence is one "camera" for OpenGV: the point of its line closest to the origin. The lines, and
-/// so the problems, are the same.
+/// Each correspondence becomes a separate "camera" for OpenGV, at the point of its line closest to the
+/// origin. The lines, and therefore the problems, are the same.
 template <size_t N>
 struct OpengvRelative {
   opengv::bearingVectors_t previous, current;
@@ -148,7 +148,7 @@ struct OpengvAbsolute {
   }
 };
 
-/// What one solve returns, to be compared with the truth.
+/// Solutions of one problem.
 using Transforms = std::vector<RigidTransform>;
 
 template <class Solutions>
@@ -168,8 +168,8 @@ double errorOf(const Transforms& solutions, const RigidTransform& truth) {
   return smallest;
 }
 
-/// Runs `solve(problem)` over all problems, then fills the counters with the distribution of `error(result,
-/// i)`.
+/// Measures `solve(problem)` over all problems, then fills the counters with the distribution of
+/// `error(result, i)`.
 template <class Problem, class Solve, class Error>
 void measure(benchmark::State& state, const std::vector<Problem>& problems, const Solve& solve,
              const Error& error) {
@@ -191,7 +191,7 @@ void measure(benchmark::State& state, const std::vector<Problem>& problems, cons
   state.counters["q99"] = quantile(errors, 0.99);
 }
 
-/// One of our solvers: status solve(matches, solutions).
+/// Measures a solver of this package: solver(matches, solutions).
 template <class Solutions, class Problem, class Solver>
 void measureOurs(benchmark::State& state, const std::vector<Problem>& problems,
                  const std::vector<RigidTransform>& truths, const Solver& solver) {
@@ -249,7 +249,7 @@ void opengvSeventeenPoint(benchmark::State& state) {
       });
 }
 
-/// Returns rotations only, so its errors are of the rotation alone.
+/// The six-point solver returns rotations only, so its errors are those of the rotation.
 void opengvSixPoint(benchmark::State& state) {
   std::vector<OpengvRelative<6>> problems;
   for (size_t i = 0; i < 200; ++i) {
@@ -302,7 +302,7 @@ BENCHMARK(opengvSeventeenPoint);
 BENCHMARK(opengvSixPoint);
 BENCHMARK(opengvGeneralizedThreePoint);
 
-/// The usual report, and what the ratios are made of.
+/// The console report, which also keeps the times to compute ratios.
 class RatioReporter : public benchmark::ConsoleReporter {
  public:
   RatioReporter() : benchmark::ConsoleReporter(OO_Tabular) {}

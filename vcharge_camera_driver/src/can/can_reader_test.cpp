@@ -83,7 +83,7 @@ class CanReaderTest : public ::testing::Test {
       }
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
-    FAIL() << "waited in vain for " << what;
+    FAIL() << "timed out waiting for " << what;
   }
   std::vector<WheelTicks> received() {
     const std::lock_guard<std::mutex> lock(mutex_);

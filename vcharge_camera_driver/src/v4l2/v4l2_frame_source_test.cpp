@@ -54,7 +54,7 @@ class GroupingSink : public FrameSink {
   void waitFor(const std::function<bool()>& condition, const char* what) {
     std::unique_lock<std::mutex> lock(mutex_);
     if (!changed_.wait_for(lock, kPatience, condition)) {
-      ADD_FAILURE() << "waited in vain for " << what;
+      ADD_FAILURE() << "timed out waiting for " << what;
     }
   }
   // Protected by mutex_, or read after the end.

@@ -308,7 +308,7 @@ TEST_F(SparseMapFileTest, KeepsTheOldMapWhenTheNewOneCannotBeWritten) {
 
 TEST_F(SparseMapFileTest, NamesTheFileThatCannotBeWritten) {
   createFolder(folder_ + "/folder.vmap");
-  for (const std::string& path : {folder_ + "/no/such/folder.vmap", folder_ + "/folder.vmap",
+  for (const std::string& path : {std::string("/proc/no/such/folder.vmap"), folder_ + "/folder.vmap",
                                   path_ + "/below_a_file.vmap", std::string("/proc/map.vmap")}) {
     try {
       writeSparseMap(map_, {}, path);
