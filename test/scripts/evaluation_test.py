@@ -56,8 +56,8 @@ class ResultsTest(FolderTest):
     def test_table_has_a_column_per_condition(self):
         table = results.table([results.Measurement("t", "lot", [results.figure("error", 1.25, "cm", at_most=1)]),
                                results.Measurement("t", "garage", [results.figure("error", 0.5, "cm", at_most=1)])])
-        self.assertEqual(table.splitlines(), ["| what | goal | lot | garage |", "|---|---|---|---|",
-                                              "| error | <= 1 | **1.25 cm** | 0.5 cm |"])
+        self.assertEqual(table.splitlines(), ["|what|goal|lot|garage|", "|---|---|---|---|",
+                                              "|error|<= 1|**1.25 cm**|0.5 cm|"])
 
     def test_files_give_back_what_was_written(self):
         measurements = [results.Measurement("t", "lot", [results.figure("error", 1.25, "cm", at_most=1)], "command",

@@ -26,9 +26,9 @@ def show(measurements):
     origins = list(dict.fromkeys(origin(one) for one in measurements))
     if len(origins) == 1:
         return f"{results.table(measurements)}\n\n{origins[0]}"
-    rows = [f"| {one.condition + ': ' if one.condition else ''}{figure.name} | {figure.text()} | {figure.goal} | {origin(one)} |"
+    rows = [results.row([f"{one.condition + ': ' if one.condition else ''}{figure.name}", figure.text(), figure.goal, origin(one)])
             for one in measurements for figure in one.figures]
-    return "\n".join(["| what | figure | goal | command |", "|---|---|---|---|", *rows])
+    return "\n".join(["|what|figure|goal|command|", "|---|---|---|---|", *rows])
 
 
 def make_page(folder=results.RESULTS):

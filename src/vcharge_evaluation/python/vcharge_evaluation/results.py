@@ -63,6 +63,10 @@ class Measurement:
     commit: str = ""
 
 
+def row(cells):
+    return "|" + "|".join(cells) + "|"
+
+
 def table(measurements):
     """Markdown table of measurements with one title: a column per condition."""
     columns = {}
@@ -71,11 +75,11 @@ def table(measurements):
     names = list(dict.fromkeys(figure.name for one in measurements for figure in one.figures))
     has_goals = any(figure.goal for one in measurements for figure in one.figures)
     heads = ["what", *(["goal"] if has_goals else []), *(condition or "figure" for condition in columns)]
-    lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    lines = [row(heads), "|" + "---|" * len(heads)]
     for name in names:
         goals = [column[name].goal for column in columns.values() if name in column and column[name].goal]
         cells = [column[name].text() if name in column else "-" for column in columns.values()]
-        lines.append("| " + " | ".join([name, *([goals[0] if goals else ""] if has_goals else []), *cells]) + " |")
+        lines.append(row([name, *([goals[0] if goals else ""] if has_goals else []), *cells]))
     return "\n".join(lines)
 
 
