@@ -12,7 +12,6 @@
 #include "vcharge_core/motion/trajectory.h"
 #include "vcharge_core/sparse_map/analytic_map.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
-#include "vcharge_features/vocabulary_tree.h"
 
 namespace vcharge {
 namespace {
@@ -60,16 +59,6 @@ FuzzTarget heightMapTarget(const std::string& name, const std::string& replaced)
           }};
 }
 
-std::string vocabularyBytes() {
-  std::vector<cv::Mat> descriptors;
-  cv::RNG random(3);
-  for (int i = 0; i < 6; ++i) {
-    descriptors.emplace_back(12, 32, CV_8UC1);
-    random.fill(descriptors.back(), cv::RNG::UNIFORM, 0, 256);
-  }
-  return VocabularyTree::train(descriptors).serialize();
-}
-
 }  // namespace
 
 std::vector<FuzzTarget> coreTargets() {
@@ -84,13 +73,6 @@ std::vector<FuzzTarget> coreTargets() {
                  [](const std::string& path) { readSparseMap(path)->contentHash(); }),
       heightMapTarget("height_map_yaml", "height_map.yaml"),
       heightMapTarget("height_map_tiff", "height_map.tiff"),
-      {"vocabulary", [] { return std::vector<std::string>{vocabularyBytes()}; },
-       [](const std::string& bytes) {
-         const VocabularyTree tree = VocabularyTree::parse(bytes, "vocabulary");
-         if (tree.descriptorColumns() < 4096) {
-           tree.bagOfWords(cv::Mat(3, tree.descriptorColumns(), tree.descriptorType(), cv::Scalar(7)));
-         }
-       }},
   };
 }
 

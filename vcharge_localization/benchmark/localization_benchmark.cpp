@@ -15,7 +15,6 @@
 
 #include "vcharge_core/sparse_map/analytic_map.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
-#include "vcharge_features/vocabulary_tree.h"
 #include "vcharge_reconstruction/map_localizer.h"
 #include "vcharge_reconstruction/testing/test_map.h"
 
@@ -104,11 +103,6 @@ void addDescriptors(SparseMapContents* contents) {
       row.at<uchar>(bit / 8) ^= static_cast<uchar>(1 << (bit % 8));
     }
   }
-  std::vector<cv::Mat> images;
-  for (int begin = 0; begin + 500 <= num_landmarks; begin += 500) {
-    images.push_back(of_landmarks.rowRange(begin, begin + 500));
-  }
-  contents->vocabulary = VocabularyTree::train(images).serialize();
 }
 
 const std::shared_ptr<const SparseMap>& largeMap() {

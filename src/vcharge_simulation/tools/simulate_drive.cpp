@@ -5,7 +5,7 @@
 
 #include <tbb/global_control.h>
 
-#include "drive/drive_recorder.h"
+#include "drive_recorder.h"
 #include "scenario_command_line.h"
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/base/options.h"

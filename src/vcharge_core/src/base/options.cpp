@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <iomanip>
 #include <sstream>
 
 #include "vcharge_core/files/file_io.h"
@@ -95,6 +97,35 @@ int readEnum(const YAML::Node& node, const std::string& source, const std::strin
   return static_cast<int>(found - names.begin());
 }
 
+std::string valueText(double value) {
+  for (int digits = 6; digits < 17; ++digits) {
+    std::ostringstream text;
+    text << std::setprecision(digits) << value;
+    if (std::strtod(text.str().c_str(), nullptr) == value) {
+      return std::isinf(value) ? (value > 0.0 ? ".inf" : "-.inf") : text.str();
+    }
+  }
+  std::ostringstream text;
+  text << std::setprecision(17) << value;
+  return text.str();
+}
+
+std::string valueText(const std::vector<double>& values) {
+  std::vector<std::string> texts;
+  for (const double value : values) {
+    texts.push_back(valueText(value));
+  }
+  return "[" + join(texts) + "]";
+}
+
+std::string valueText(const std::string& value) {
+  return oneLine(YAML::Node(value));
+}
+
+std::string valueText(const std::vector<std::string>& values) {
+  return oneLine(YAML::Node(values));
+}
+
 std::string describeChoices(const std::vector<std::string>& names) {
   return "one of " + join(names);
 }
@@ -116,22 +147,31 @@ std::string showRows(const std::vector<OptionRow>& rows) {
     const size_t dot = row.key.rfind('.');
     text +=
         std::string(2 * depth, ' ') + (dot == std::string::npos ? row.key : row.key.substr(dot + 1)) + ":";
-    text += row.is_group ? "" : " " + oneLine(row.value);
+    text += !row.group_type.empty() ? "" : " " + row.value;
     text += row.meaning.empty() && row.allowed.empty() ? "" : "  # " + row.meaning;
     text += (row.allowed.empty() ? "" : " (" + row.allowed + ")") + "\n";
   }
   return text;
 }
 
-std::string listRows(const std::vector<OptionRow>& rows) {
+std::string listRows(const std::vector<OptionRow>& rows, std::set<std::string>* listed_groups) {
   std::string text;
+  std::string skipped = "\n";  // prefix of the keys of a group that is not listed again
   for (const OptionRow& row : rows) {
+    if (row.key.compare(0, skipped.size(), skipped) == 0) {
+      continue;
+    }
     const auto depth = static_cast<size_t>(std::count(row.key.begin(), row.key.end(), '.'));
     const size_t dot = row.key.rfind('.');
     text += std::string(2 * depth, ' ') + "- **" +
             (dot == std::string::npos ? row.key : row.key.substr(dot + 1)) + "**";
-    text += (row.is_group ? ": " : " `" + oneLine(row.value) + "`: ") + row.meaning;
-    text += (row.allowed.empty() ? "" : " (" + row.allowed + ")") + "\n";
+    text += (row.group_type.empty() ? " `" + row.value + "`: " : ": ") + row.meaning;
+    text += row.allowed.empty() ? "" : " (" + row.allowed + ")";
+    if (!row.group_type.empty() && !listed_groups->insert(row.group_type).second) {
+      text += " (listed above)";
+      skipped = row.key + ".";
+    }
+    text += "\n";
   }
   return text;
 }

@@ -19,6 +19,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 struct InnerOptions {
   VCHARGE_BEGIN_OPTIONS(InnerOptions);
@@ -140,8 +141,11 @@ TEST(OptionsTest, ShownOptionsReadBackAndTellTheirMeaning) {
   TestOptions copy;
   readFields(YAML::Load(shown), "shown", &copy);
   EXPECT_EQ(copy.inner.scale, 0.1);
-  EXPECT_THAT(optionList(options),
+  std::set<std::string> listed;
+  EXPECT_THAT(optionList(options, &listed),
               HasSubstr("  - **scale** `0.1`: Factor of all lengths. (must be positive)\n"));
+  EXPECT_THAT(optionList(options, &listed),
+              AllOf(HasSubstr("Scale of the planes. (listed above)\n"), Not(HasSubstr("scale"))));
 }
 
 TEST(OptionsTest, BadYamlNamesFileAndLine) {

@@ -176,7 +176,6 @@ std::string SparseMap::contentHash() const {
     hasher.add(edge.reason);
   }
   hasher.add(contents_.feature_options);
-  hasher.add(contents_.vocabulary);
   hasher.add(contents_.odometry_distance_scale);
   hasher.add(contents_.odometry_turn_scale);
   return hasher.hex();

@@ -62,11 +62,10 @@ void checkHeader(const std::string& path) {
     throw InputError(path + ": expected a map file, is the SQLite file of another program");
   }
   const uint32_t version = bigEndian(header + 60, 4);
-  if (version == 0 || version > kSchemaVersion) {
+  if (version != kSchemaVersion) {
     throw InputError(path + ": the map has version " + std::to_string(version) +
-                     " of the file format, this program reads versions 1 to " +
-                     std::to_string(kSchemaVersion) +
-                     (version == 0 ? "" : ": it was written by a newer program"));
+                     " of the file format, this program reads version " + std::to_string(kSchemaVersion) +
+                     (version > kSchemaVersion ? ": it was written by a newer program" : ": build it again"));
   }
   const uint64_t page_size = bigEndian(header + 16, 2) == 1 ? 65536 : bigEndian(header + 16, 2);
   const uint64_t expected_size = page_size * bigEndian(header + 28, 4);
@@ -95,7 +94,6 @@ class Reader {
     contents.odometry_turn_scale = metaNumber("odometry_turn_scale");
     const MapProvenance read_provenance = readProvenance();
     readRig(read_provenance, &contents.rig);
-    readVocabulary(&contents.vocabulary);
     readKeyframes(&contents.keyframes);
     readLandmarks(&contents.landmarks);
     readImages(&contents);
@@ -188,13 +186,6 @@ class Reader {
       if (camera.name != names[i] || (!mask_pngs[i].empty() && camera.mask.size() != camera.image_size_px)) {
         damaged("camera " + std::to_string(i) + ": name or mask differ from the rig");
       }
-    }
-  }
-
-  void readVocabulary(std::string* vocabulary) {
-    SqliteStatement select(database_, "SELECT tree FROM vocabulary");
-    if (select.step()) {
-      *vocabulary = select.text(0);
     }
   }
 

@@ -15,8 +15,8 @@ namespace vcharge::map_file {
 
 /// "vcmp", at byte 68 of the file: PRAGMA application_id.
 constexpr uint32_t kApplicationId = 0x76636d70;
-/// PRAGMA user_version. Raise it with every change of the tables; keep reading older versions.
-constexpr uint32_t kSchemaVersion = 1;
+/// PRAGMA user_version. Raise it with every change of the tables.
+constexpr uint32_t kSchemaVersion = 2;
 /// Large pages, since a map is read as a whole and its blobs are large.
 constexpr int kPageSize_bytes = 16384;
 
@@ -52,7 +52,6 @@ inline const std::vector<Table>& tables() {
        " x_m REAL NOT NULL, y_m REAL NOT NULL, z_m REAL NOT NULL,"
        " qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL, qw REAL NOT NULL,"
        " num_inliers INTEGER NOT NULL, accepted INTEGER NOT NULL, reason TEXT NOT NULL) STRICT"},
-      {"vocabulary", "CREATE TABLE vocabulary (tree BLOB NOT NULL) STRICT"},
   };
   return kTables;
 }

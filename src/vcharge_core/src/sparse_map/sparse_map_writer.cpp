@@ -97,11 +97,6 @@ void writeMeta(const SparseMap& map, const MapProvenance& provenance, SqliteData
     insert.bind(1, value);
     insert.run();
   }
-  if (!contents.vocabulary.empty()) {
-    SqliteStatement vocabulary(*database, "INSERT INTO vocabulary VALUES (?)");
-    vocabulary.bindBlob(0, contents.vocabulary.data(), contents.vocabulary.size());
-    vocabulary.run();
-  }
 }
 
 void writeKeyframes(const SparseMap& map, SqliteDatabase* database) {

@@ -40,15 +40,6 @@ class VocabularyTree {
   static VocabularyTree train(const std::vector<cv::Mat>& descriptors_of_images,
                               const VocabularyTreeOptions& options = VocabularyTreeOptions());
 
-  /// Reads the file of write(). Throws InputError naming the file when it is missing, truncated, corrupt, of
-  /// another version, or not a vocabulary.
-  static VocabularyTree read(const std::string& path);
-  /// Replaces an older file only when the new one is complete. Throws InputError when it cannot be written.
-  void write(const std::string& path) const;
-  /// The vocabulary as bytes, to be stored in a map; `source` names them in errors.
-  std::string serialize() const;
-  static VocabularyTree parse(const std::string& text, const std::string& source);
-
   int numWords() const { return static_cast<int>(word_weights_.size()); }
   int descriptorType() const { return centres_.type(); }
   int descriptorColumns() const { return centres_.cols; }
@@ -68,7 +59,6 @@ class VocabularyTree {
   VocabularyTree() = default;
   void addLeaves();
   void setWeights(const std::vector<cv::Mat>& descriptors_of_images);
-  bool isValid() const;
 
   std::vector<Node> nodes_;  ///< the root is the first; children come after their parents
   cv::Mat centres_;          ///< row i: centre of node i (the root's is zero)

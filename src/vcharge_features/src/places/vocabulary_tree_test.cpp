@@ -5,19 +5,15 @@
 #include <tbb/global_control.h>
 
 #include <cmath>
-#include <filesystem>
 #include <random>
 #include <set>
+#include <utility>
 
-#include "vcharge_core/base/error.h"
-#include "vcharge_core/files/content_hash.h"
-#include "vcharge_core/files/file_io.h"
 #include "vcharge_features/place_index.h"
 
 namespace vcharge {
 namespace {
 
-using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
@@ -72,12 +68,6 @@ class VocabularyTreeTest : public ::testing::TestWithParam<int> {
     options.depth = 2;
     return options;
   }
-  static std::string path() {
-    return (std::filesystem::temp_directory_path() /
-            ("vocabulary_" + std::to_string(::testing::UnitTest::GetInstance()->random_seed()) + "_" +
-             std::to_string(getpid()) + "_" + std::to_string(GetParam())))
-        .string();
-  }
 };
 
 TEST_P(VocabularyTreeTest, GivesDescriptorsOfOneTopicOneWord) {
@@ -114,73 +104,27 @@ TEST_P(VocabularyTreeTest, FindsThePlaceOfEachImageAgain) {
   EXPECT_GT(right, 180);
 }
 
-TEST_P(VocabularyTreeTest, IsTheSameOnAnyNumberOfThreadsAndAfterReading) {
+TEST_P(VocabularyTreeTest, IsTheSameOnAnyNumberOfThreads) {
   const std::vector<cv::Mat> images = trainingImages();
-  std::string texts[3];
+  const auto wordsAndWeights = [&](const VocabularyTree& tree) {
+    std::vector<std::pair<int32_t, float>> result;
+    for (const cv::Mat& image : images) {
+      for (const WeightedWord& word : tree.bagOfWords(image)) {
+        result.emplace_back(word.word, word.weight);
+      }
+    }
+    return result;
+  };
+  std::vector<std::pair<int32_t, float>> expected;
   for (const int threads : {1, 4}) {
     const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
-    VocabularyTree::train(images, options()).write(path());
-    texts[threads == 1 ? 0 : 1] = readTextFile(path());
+    const auto result = wordsAndWeights(VocabularyTree::train(images, options()));
+    expected = threads == 1 ? result : expected;
+    EXPECT_EQ(result, expected);
   }
-  EXPECT_EQ(texts[0], texts[1]);
-  VocabularyTree::read(path()).write(path());
-  EXPECT_EQ(texts[0], readTextFile(path()));
   VocabularyTreeOptions other = options();
   other.max_iterations = 1;
-  VocabularyTree::train(images, other).write(path());
-  EXPECT_NE(texts[0], readTextFile(path()));
-  std::filesystem::remove(path());
-}
-
-TEST_P(VocabularyTreeTest, TruncatedAndCorruptFilesAreNamed) {
-  VocabularyTree::train(trainingImages(20), options()).write(path());
-  const std::string text = readTextFile(path());
-  const auto expectError = [&](const std::string& broken, const std::string& message) {
-    writeTextFileAtomically(path(), broken);
-    EXPECT_THAT([&] { VocabularyTree::read(path()); },
-                ThrowsMessage<InputError>(AllOf(HasSubstr(path()), HasSubstr(message))));
-  };
-  for (size_t size = 0; size < text.size(); size += size < 60 ? 1 : 997) {
-    expectError(text.substr(0, size), size < 8 ? "expected a vocabulary" : "truncated");
-  }
-  expectError(text + "x", "checksum");
-  std::mt19937 generator(3);
-  for (int i = 0; i < 200; ++i) {
-    std::string broken = text;
-    broken[generator() % broken.size()] ^= static_cast<char>(1U << (generator() % 8));
-    expectError(broken, "");
-  }
-  std::string other_version = text;
-  other_version[8] = 9;
-  expectError(other_version, "version 1, got 9");
-  std::filesystem::remove(path());
-  EXPECT_THROW(VocabularyTree::read(path()), InputError);
-}
-
-TEST_P(VocabularyTreeTest, FilesWithARightChecksumOverWrongNumbersAreReadOrNamed) {
-  VocabularyTree::train(trainingImages(20), options()).write(path());
-  const std::string text = readTextFile(path());
-  const cv::Mat query = descriptorsOf({1, 2, 3, 4, 5}, GetParam(), 1);
-  std::mt19937 generator(4);
-  int named = 0;
-  for (int i = 0; i < 500; ++i) {
-    std::string broken = text.substr(0, text.size() - 32);
-    // Mostly in the header and the nodes, where damage could cause invalid accesses.
-    broken[8 + generator() % 300] = static_cast<char>(generator());
-    ContentHasher hasher;
-    hasher.addBytes(broken.data(), broken.size());
-    writeTextFileAtomically(path(), broken + hasher.hex());
-    try {
-      for (const int32_t word : VocabularyTree::read(path()).words(query)) {
-        EXPECT_GE(word, 0);
-      }
-    } catch (const InputError& error) {
-      EXPECT_THAT(error.what(), HasSubstr(path()));
-      ++named;
-    }
-  }
-  EXPECT_GT(named, 300);
-  std::filesystem::remove(path());
+  EXPECT_NE(wordsAndWeights(VocabularyTree::train(images, other)), expected);
 }
 
 INSTANTIATE_TEST_SUITE_P(Kinds, VocabularyTreeTest, ::testing::Values(CV_8UC1, CV_32FC1),

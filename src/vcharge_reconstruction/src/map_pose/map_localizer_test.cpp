@@ -229,17 +229,6 @@ TEST(MapLocalizerDescriptorTest, LocalizesWithRealDescriptorsAsWithBinaryOnes) {
   }
 }
 
-TEST(MapLocalizerDescriptorTest, NeedsNoVocabulary) {
-  const auto map = testing::makeTestMap({});
-  SparseMapContents contents = map->contents();
-  contents.vocabulary.clear();
-  const auto bare = std::make_shared<const SparseMap>(std::move(contents));
-  const RigidTransform truth = posesBetween(*map, 8);
-  const PoseFix fix =
-      MapLocalizer(bare, rigOf(bare)).localizeAnywhere(testing::makeTestView(*map, truth, {}));
-  EXPECT_EQ(fix.status, LocalizationStatus::kLocalized);
-}
-
 TEST(MapLocalizerInputTest, NamesTheDefectOfAMap) {
   const auto map = testing::makeTestMap({});
   const auto expectError = [&](const char* text, const auto& change) {

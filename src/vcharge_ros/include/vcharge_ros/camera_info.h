@@ -20,7 +20,7 @@ struct CameraInfoResidual {
 /// carries an equidistant fit (ROS's name for Kannala-Brandt), for a pinhole camera plumb_bob; K stays zero
 /// (ROS's sign for an uncalibrated camera) where no equidistant camera comes near.
 sensor_msgs::CameraInfo makeCameraInfo(const RigCamera& camera, CameraInfoResidual* residual = nullptr);
-/// Of any other camera, for instance the working camera of a range map.
+/// The same for any other camera, for instance the working camera of a range map.
 sensor_msgs::CameraInfo makeCameraInfo(const CameraModel& model, cv::Size image_size_px,
                                        double field_of_view_rad, const std::string& frame_id,
                                        CameraInfoResidual* residual = nullptr);

@@ -38,7 +38,7 @@ class ViewCollector {
   /// The board in the last image, if it was detected.
   const std::optional<BoardView>& lastView() const { return last_view_; }
   double coveredFraction() const { return coverage_.has_value() ? coverage_->coveredFraction() : 0.0; }
-  /// Which images are still missing; empty if there are enough.
+  /// Describes the images that are still missing; empty if there are enough.
   std::vector<std::string> missing() const;
 
  private:

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <exception>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
+#include <typeinfo>
 #include <vector>
 
 #include <yaml-cpp/yaml.h>
@@ -82,6 +84,17 @@ void forEachOption(Options& options, Visitor&& visit) {
 
 namespace internal {
 
+/// The value as YAML, with as few digits as read back to the same number.
+std::string valueText(double value);
+std::string valueText(const std::vector<double>& values);
+inline std::string valueText(bool value) {
+  return value ? "true" : "false";
+}
+inline std::string valueText(int value) {
+  return std::to_string(value);
+}
+std::string valueText(const std::string& value);
+std::string valueText(const std::vector<std::string>& values);
 std::string describeChoices(const std::vector<std::string>& names);
 inline const char* typeName(bool /*value*/) {
   return "true or false";
@@ -142,10 +155,10 @@ void readStruct(const YAML::Node& node, const std::string& source, const std::st
 struct OptionRow {
   std::string key;  ///< including the groups around it, for example "tracker.max_features"
   std::string type;
-  YAML::Node value;
+  std::string value;    ///< as YAML
   std::string allowed;  ///< the allowed values in words; empty if any value is allowed
   std::string meaning;
-  bool is_group = false;
+  std::string group_type;  ///< of a group of options; empty for an option
 };
 template <class Options>
 void collectRows(const Options& options, const std::string& prefix, std::vector<OptionRow>* rows);
@@ -160,10 +173,10 @@ OptionRow makeRow(const OptionDeclaration& option, const std::string& prefix, co
     row.value = enumNames<T>().at(static_cast<size_t>(field));
     row.allowed = describeChoices(enumNames<T>());
   } else if constexpr (kIsGroup<T>) {
-    row.is_group = true;
+    row.group_type = typeid(T).name();
   } else {
     row.type = typeName(field);
-    row.value = field;
+    row.value = valueText(field);
     row.allowed = option.range.requirement();
   }
   return row;
@@ -180,7 +193,7 @@ void collectRows(const Options& options, const std::string& prefix, std::vector<
 }
 
 std::string showRows(const std::vector<OptionRow>& rows);
-std::string listRows(const std::vector<OptionRow>& rows);
+std::string listRows(const std::vector<OptionRow>& rows, std::set<std::string>* listed_groups);
 
 }  // namespace internal
 
@@ -231,12 +244,13 @@ std::string showOptions(const Options& options) {
   return internal::showRows(rows);
 }
 
-/// A Markdown list of all options with default, meaning and allowed values.
+/// A Markdown list of all options with default, meaning and allowed values. A group whose type is in
+/// `listed_groups` is named without its options; the types of the others are added.
 template <class Options>
-std::string optionList(const Options& options) {
+std::string optionList(const Options& options, std::set<std::string>* listed_groups) {
   std::vector<internal::OptionRow> rows;
   internal::collectRows(options, "", &rows);
-  return internal::listRows(rows);
+  return internal::listRows(rows, listed_groups);
 }
 
 /// Throws std::invalid_argument "<field>: <requirement>, is <value>" unless the condition holds. For

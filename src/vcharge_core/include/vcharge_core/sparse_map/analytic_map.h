@@ -112,7 +112,6 @@ inline SparseMapContents makeAnalyticMap(const AnalyticMapOptions& options = {})
         {0, last / 2, RigidTransform::planar(1.0, 2.0, 3.0), 11, false, "outlier of the pose graph"});
   }
   contents.feature_options = "detector: analytic\n";
-  contents.vocabulary = std::string("tree\0with zeros", 15);
   contents.odometry_distance_scale = 1.0125;
   contents.odometry_turn_scale = 0.9921875;
   return contents;

@@ -60,7 +60,6 @@ struct SparseMapContents {
   cv::Mat descriptors;
   std::vector<MapLoopEdge> loop_edges;
   std::string feature_options;           ///< YAML of the options of the extractor that made the descriptors
-  std::string vocabulary;                ///< bytes of the vocabulary tree for place recognition; may be empty
   double odometry_distance_scale = 1.0;  ///< true distance over the distance counted by the odometer
   double odometry_turn_scale = 1.0;      ///< true turn over counted turn
 };

@@ -1,4 +1,4 @@
-#include "drive/drive_recorder.h"
+#include "drive_recorder.h"
 
 #include <cmath>
 #include <filesystem>
@@ -9,7 +9,7 @@
 
 #include <opencv2/imgcodecs.hpp>
 
-#include "sensors/image_source.h"
+#include "image_source.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/base/progress_bar.h"

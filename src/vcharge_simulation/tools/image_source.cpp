@@ -1,4 +1,4 @@
-#include "sensors/image_source.h"
+#include "image_source.h"
 
 #include <vector>
 

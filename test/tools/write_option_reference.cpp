@@ -1,0 +1,72 @@
+/// Prints doc/options.md: every option of the suite, from its declaration.
+///
+///   rosrun vcharge_tests write_option_reference > doc/options.md
+
+#include <iostream>
+#include <set>
+#include <string>
+
+#include "vcharge_calibration/from_map/map_rig_calibrator_options.h"
+#include "vcharge_calibration/intrinsics/intrinsic_calibration.h"
+#include "vcharge_calibration/intrinsics/view_collector.h"
+#include "vcharge_calibration/live/rig_calibration_session.h"
+#include "vcharge_calibration/rig/rig_calibrator_options.h"
+#include "vcharge_camera_driver/driver_options.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_dense/height_map_options.h"
+#include "vcharge_dense/range_mapper.h"
+#include "vcharge_localization/drive_localizer.h"
+#include "vcharge_mapping/sparse_mapper_options.h"
+#include "vcharge_obstacles/obstacle_mapper.h"
+#include "vcharge_ros/live_drive_source.h"
+#include "vcharge_simulation/drive/drive_scenario.h"
+
+namespace {
+
+std::set<std::string> listed_groups;
+
+template <class Options>
+void writeSection(const std::string& title, const std::string& used_by) {
+  std::cout << "\n## " << title << "\n\n"
+            << used_by << "\n\n"
+            << vcharge::optionList(Options(), &listed_groups);
+}
+
+}  // namespace
+
+int main() {
+  std::cout << "# Options\n\n"
+               "Every option with its default, meaning and allowed values. A YAML file or a parameter names "
+               "only what "
+               "differs from\nthe default; `--show-options` of a tool prints its own. Made by `rosrun "
+               "vcharge_tests write_option_reference`; a test "
+               "compares it "
+               "with the declarations.\n";
+  writeSection<vcharge::DriverOptions>("Camera driver",
+                                       "`camera_driver_nodelet`: `~options`, `config/driver/`.");
+  writeSection<vcharge::LiveDriveSourceOptions>("Live topics",
+                                                "All nodelets that read images and odometry: `~source`.");
+  writeSection<vcharge::IntrinsicCalibrationOptions>(
+      "Intrinsic calibration", "`calibrate_intrinsics`, `intrinsic_calibration_nodelet`.");
+  writeSection<vcharge::ViewCollectorOptions>("Views of the board, live",
+                                              "`intrinsic_calibration_nodelet`: `~collector`.");
+  writeSection<vcharge::RigCalibratorOptions>(
+      "Extrinsic calibration from a drive",
+      "`calibrate_rig`, `calibration_nodelet`: `config/calibration.yaml`.");
+  writeSection<vcharge::RigCalibrationSessionOptions>("Extrinsic calibration, live",
+                                                      "`calibration_nodelet`: `~session`.");
+  writeSection<vcharge::MapRigCalibratorOptions>(
+      "Extrinsic calibration from a map", "`calibrate_rig_from_map`: `config/calibration_in_map.yaml`.");
+  writeSection<vcharge::SparseMapperOptions>("Sparse map",
+                                             "`build_map`, `mapping_nodelet`: `config/mapping.yaml`.");
+  writeSection<vcharge::DriveLocalizerOptions>(
+      "Localization", "`localize_drive`, `localization_nodelet`: `config/localization.yaml`.");
+  writeSection<vcharge::RangeMapperOptions>("Range maps",
+                                            "`compute_range_maps`, `depth_nodelet`: `config/dense*.yaml`.");
+  writeSection<vcharge::HeightMapOptions>(
+      "Height map", "`build_height_map`, `height_map_nodelet`: `config/height_map.yaml`.");
+  writeSection<vcharge::ObstacleMapperOptions>(
+      "Obstacle map", "`detect_obstacles`, `obstacle_nodelet`: `config/obstacles.yaml`.");
+  writeSection<vcharge::DriveScenario>("Simulated drive", "`simulate_drive`: `config/scenarios/`.");
+  return 0;
+}
