@@ -212,7 +212,7 @@ TEST(MapLocalizerDescriptorTest, LocalizesWithRealDescriptorsAsWithBinaryOnes) {
   for (const float one : {1.0F / 16.0F, 40.0F}) {
     SparseMapContents contents = map->contents();
     contents.descriptors = testing::descriptorsAsNumbers(contents.descriptors, one);
-    contents.feature_options = "type: sift\n";
+    contents.feature_options = "type: root_sift\n";
     const auto map_of_numbers = std::make_shared<const SparseMap>(std::move(contents));
     const MapLocalizer localizer(map_of_numbers, rigOf(map_of_numbers));
     const RigFeatures numbers = withNumbers(bits, one);
@@ -245,7 +245,8 @@ TEST(MapLocalizerInputTest, NamesTheDefectOfAMap) {
   expectError("feature_options", [](SparseMapContents* contents) { contents->feature_options = "type: {"; });
   expectError("feature_options",
               [](SparseMapContents* contents) { contents->feature_options = "detector: another\n"; });
-  expectError("descriptors", [](SparseMapContents* contents) { contents->feature_options = "type: sift\n"; });
+  expectError("descriptors",
+              [](SparseMapContents* contents) { contents->feature_options = "type: root_sift\n"; });
   CameraRig bare = map->rig();
   bare.cameras[0].vehicle_from_camera.reset();
   EXPECT_THROW(MapLocalizer(map, std::make_shared<const CameraRig>(bare)), InputError);
