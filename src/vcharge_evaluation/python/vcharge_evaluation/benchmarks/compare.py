@@ -26,7 +26,7 @@ def read(path):
         return {f"{name}: {case}": values["times_ns"] for name, cases in bench["benchmarks"].items()
                 for case, values in cases.items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise SystemExit(f"bench_compare: {path}: expected JSON of bench.sh ({error})") from error
+        raise SystemExit(f"bench.sh --compare: {path}: expected JSON of bench.sh ({error})") from error
 
 
 def scatter(times):
@@ -42,7 +42,7 @@ def main():
     before, after = read(args.before), read(args.after)
     common = sorted(set(before) & set(after))
     if not common:
-        raise SystemExit(f"bench_compare: {args.before} and {args.after} have no benchmark in common")
+        raise SystemExit(f"bench.sh --compare: {args.before} and {args.after} have no benchmark in common")
     changes = {name: math.log(min(after[name]) / min(before[name])) for name in common}
     shift = statistics.median(changes.values())
     worse, better = [], []

@@ -3,6 +3,7 @@ stages once more with the true rig, and height maps with true poses."""
 import argparse
 
 from vcharge_evaluation.chain import report, steps
+from vcharge_evaluation.chain.arguments import argument_parser
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure
 
 # Title and step of each variant of the stages after calibration.
@@ -23,7 +24,7 @@ def run_chain(args, car):
     """Figures of all steps on a car."""
     scene, seed, rig_seed = car.split(":")
     words = ["--work", str(args.work / car.replace(":", "_")), "--scene", scene, "--seed", seed, "--rig-seed", rig_seed]
-    chain = steps.Chain(steps.argument_parser().parse_args([*words, *([] if args.full else ["--quick"])]))
+    chain = steps.Chain(argument_parser(steps.__doc__).parse_args([*words, *([] if args.full else ["--quick"])]))
     mapping, other, *_ = chain.stages()
     if not args.no_truth:
         chain.stages_from_truth(mapping, other)

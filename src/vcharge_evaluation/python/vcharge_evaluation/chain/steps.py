@@ -3,7 +3,6 @@ a height map and an OctoMap; another day's drive -> the pose in the map and obst
 Ends with report.html. A step that an earlier run finished with the same input is kept, and an interrupted one is resumed.
 The truth of simulated drives serves to judge the results, and for the masks of the vehicle's body, which on a real car are
 drawn by hand or made by a tool."""
-import argparse
 import concurrent.futures
 import hashlib
 import json
@@ -16,6 +15,7 @@ import time
 import yaml
 
 from vcharge_evaluation.chain import figures, nodelets, report
+from vcharge_evaluation.chain.arguments import arguments
 from vcharge_evaluation.tools import CONFIG, ROOT, import_published_images, run, run_tool, say, tool_path
 
 RVIZ_SCREENSHOT = ROOT / "src" / "vcharge_evaluation" / "scripts" / "rviz_screenshot.sh"
@@ -23,41 +23,6 @@ CAMERAS = ("front", "left", "rear", "right")
 # Metres per tick are known to 0.05 %, as doc/bring_up.md asks for.
 WHEELS = ("--set", "odometer.scale_error=0.0005", "--set", "odometer.left_right_error=0.0002")
 OTHER_WHEELS = ("--set", "odometer.scale_error=-0.0005", "--set", "odometer.left_right_error=0.0003")
-
-
-def argument_parser():
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--work", type=pathlib.Path, default=ROOT / "demo", help="folder for everything")
-    parser.add_argument("--quick", action="store_true", help="simulated images of half the size, shorter drives")
-    parser.add_argument("--scene", default="lot", help="simulated scene: lot or garage")
-    parser.add_argument("--seed", type=int, default=1, help="seed of the scene and of noise")
-    parser.add_argument("--rig-seed", type=int, default=1, help="seed of the lenses and of how they are mounted")
-    parser.add_argument("--no-nodelets", action="store_true", help="offline tools only")
-    parser.add_argument("--no-rviz", action="store_true", help="no pictures of rviz")
-    own = parser.add_argument_group("your own recordings")
-    own.add_argument("--bag", type=pathlib.Path, help="drive with images and /odom: calibrates, and is mapped")
-    own.add_argument("--other-bag", type=pathlib.Path, help="drive to localize in the map of --bag (default: --bag itself)")
-    own.add_argument("--boards", type=pathlib.Path,
-                     help="pictures of the board: a folder of images, or a bag, per camera: BOARDS/CAMERA or BOARDS/CAMERA.bag")
-    own.add_argument("--board", default="9x6", help="inner corners of the chessboard")
-    own.add_argument("--square-m", type=float, default=0.1, help="side of its squares")
-    own.add_argument("--rig", type=pathlib.Path,
-                     help="rig.yaml: with intrinsics alone, with masks beside --boards, or with extrinsics, which "
-                          "are then used as they are")
-    return parser
-
-
-def arguments():
-    parser = argument_parser()
-    args = parser.parse_args()
-    if args.bag is None and (args.boards or args.rig or args.other_bag):
-        parser.error("--boards, --rig and --other-bag go with --bag")
-    if args.bag is not None and not (args.boards or args.rig):
-        parser.error("--bag needs --boards (pictures of the board) or --rig (a rig.yaml with intrinsics)")
-    for path in (args.bag, args.other_bag, args.boards, args.rig):
-        if path is not None and not path.exists():
-            parser.error(f"{path}: there is no such file or folder")
-    return args
 
 
 def identity(path):
@@ -412,7 +377,7 @@ class Chain:
 
 
 def main():
-    Chain(arguments()).go()
+    Chain(arguments(__doc__)).go()
 
 
 if __name__ == "__main__":
