@@ -129,9 +129,9 @@ class LocalizationTest(unittest.TestCase):
         status, _, errors, rows = self.place.localize(rig=two)
         self.assertEqual((status, errors), (0, []))
         self.expect_right(rows, min_localized=0.7)
-        orb = self.place.folder / "orb.yaml"
-        orb.write_text("features: {type: orb}\n")
-        status, _, errors, rows = self.place.localize(place=self.place.build("orb", "--options", orb))
+        other = self.place.folder / "root_sift.yaml"
+        other.write_text("features: {type: root_sift}\n")
+        status, _, errors, rows = self.place.localize(place=self.place.build("root_sift", "--options", other))
         self.assertEqual((status, errors), (0, []))
         self.expect_right(rows, min_localized=0.8)
 

@@ -62,7 +62,7 @@ class MapTest(unittest.TestCase):
         self.assertEqual((status, errors), (0, []))
         for words in (f"landmarks     {len(self.landmarks)}\n", f"keyframes     {NUM_KEYFRAMES} over 120.1 m",
                       "content hash  ", "1 accepted, 1 rejected", "outlier of the pose graph", "bag: analytic.bag",
-                      "px rms", "distance 1.01250"):
+                      "error rms (px)", "distance 1.01250"):
             self.assertIn(words, output)
         poses = [line.split() for line in tum.read_text().splitlines() if not line.startswith("#")]
         self.assertEqual(len(poses), NUM_KEYFRAMES)
