@@ -52,7 +52,7 @@ WheelOdometerOptions exactWheels() {
 struct Errors {
   double max_distance_m = 0.0;
   double max_yaw_deg = 0.0;
-  double rms_yaw_jitter_deg = 0.0;  // of the turn from frame to frame
+  double rms_yaw_jitter_deg = 0.0;  // jitter of the turn from frame to frame
   double max_yaw_jitter_deg = 0.0;
   double max_position_m = 0.0;
   double length_m = 0.0;
@@ -285,7 +285,7 @@ TEST(OdometryStreamTest, HasAnEstimateAtEveryTriggerInOrderOfStamps) {
   std::vector<Timestamp> triggers;
   const auto keep = [&](const std::vector<OdometryEstimate>& ready) {
     for (const OdometryEstimate& estimate : ready) {
-      // A car at 2 m/s: the pose tells the time.
+      // A car at 2 m/s: the position shows the time.
       ASSERT_NEAR(estimate.odometry.odom_from_vehicle.translation().x(),
                   2.0 * toSeconds(estimate.odometry.stamp - kStart), 1e-9);
       stamps.push_back(estimate.odometry.stamp);

@@ -48,7 +48,7 @@ struct TapeMeasurement {
   Kind kind = Kind::kLength;
   Eigen::Vector2d from_m{0, 0}, to_m{0, 0};  ///< in the world; for a height, the points below and above
   double truth_m = 0.0;
-  double map_m = 0.0;  ///< NaN if the map does not show it
+  double map_m = 0.0;  ///< NaN if it cannot be read from the map
 };
 
 /// A point on a kerb in the map.

@@ -51,7 +51,7 @@ class PlaceVotes {
   const int num_places_, num_cameras_;
   const int type_, columns_;
   const std::vector<int32_t> images_;
-  cv::Mat mean_;  // of descriptors of numbers
+  cv::Mat mean_;  // mean descriptor, for descriptors of numbers
   std::unique_ptr<HammingIndex> index_;
 };
 

@@ -35,7 +35,7 @@ struct BundleAdjustmentOptions {
 struct BundleAdjustmentSummary {
   bool converged = false;
   int num_iterations = 0;
-  int64_t num_observations = 0;  ///< that were kept
+  int64_t num_observations = 0;  ///< observations that were kept
   int64_t num_removed_observations = 0;
   int64_t num_removed_landmarks = 0;
   double rms_px = 0.0;  ///< error per coordinate of the observations that were kept

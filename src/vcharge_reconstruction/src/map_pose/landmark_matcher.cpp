@@ -143,7 +143,7 @@ LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
 }
 
 std::vector<size_t> LandmarkMatcher::observationsAround(size_t keyframe, size_t camera) const {
-  // Each landmark once, from the nearest keyframe.
+  // Takes each landmark once, from the nearest keyframe.
   std::vector<size_t> observations;
   std::unordered_set<int32_t> landmarks;
   const auto num_keyframes = static_cast<std::ptrdiff_t>(map_->keyframes().size());

@@ -49,8 +49,8 @@ PlanarMotion odometryMotion(const RigidTransform& motion, const EgoMotionOptions
   return result;
 }
 
-/// Planar part of a motion in the images. Where its length is not observable it takes the odometer's, with a
-/// deviation that gives it no weight.
+/// Planar part of a motion in the images. If its length is not observable, it has the odometer's, with a
+/// standard deviation that gives it no weight.
 PlanarMotion visualMotion(const MotionEstimate& estimate, const PlanarMotion& odometry) {
   const int rows[] = {0, 1, 5};
   PlanarMotion result;

@@ -130,7 +130,7 @@ TEST_F(BagReaderTest, OrdersMessagesByTheTimeOfTheirRecording) {
   EXPECT_TRUE(std::is_sorted(messages.begin(), messages.end()));
 }
 
-// Also in compressed chunks, each of which is decompressed only once.
+// Covers compressed chunks, too, each of which is decompressed only once.
 TEST_F(BagReaderTest, OrdersMessagesOfOneTimeAsTheyLieInTheBag) {
   rosbag::Bag bag(path_, rosbag::bagmode::Write);
   bag.setChunkThreshold(1);

@@ -22,12 +22,12 @@ constexpr double kLowContrast = 12.0;
 constexpr double kTooLowContrast = 5.0;
 /// Relative change of the mean from one examined image to the next.
 constexpr double kExposureStep = 0.35;
-/// Edges that do not move in the image while the vehicle moves.
+/// Detection of edges that do not move in the image while the vehicle moves.
 constexpr int kMinMoved = 12;
 constexpr float kMinGradient = 6.0F;
-constexpr float kStaticShare = 0.75F;  // length of the gradients' sum over the sum of their lengths
-constexpr float kSteady = 0.35F;       // standard deviation of their lengths over the mean
-/// Edges of the scene stay by chance, the less often the more images there are.
+constexpr float kStaticShare = 0.75F;  // length of the gradients' sum relative to the sum of their lengths
+constexpr float kSteady = 0.35F;       // standard deviation of their lengths relative to the mean
+/// Edges of the scene may stay in place by chance, less often with more images.
 constexpr double kManyStatic = 0.003, kChanceOfOneImage = 0.4;
 constexpr double kTooManyStatic = 0.3;
 

@@ -125,7 +125,7 @@ void ImageMotionMeter::estimate(const std::vector<cv::Point2f>& from_px,
     }
     const Eigen::Vector3d before(from[i].x, from[i].y, 1.0);
     const Eigen::Vector3d after = begin_from_end * Eigen::Vector3d(to[i].x, to[i].y, 1.0);
-    // A point at begin's `before` lies off `after` on the far side from the direction of motion.
+    // Points move away from the direction of motion: `before` is nearer to it than `after`.
     votes += (before.normalized() - after.normalized()).dot(direction) > 0.0 ? 1 : -1;
   }
   motion->direction = votes >= 0 ? direction : -direction;

@@ -174,7 +174,7 @@ std::vector<VchargeRecording::ImageFile> readImageList(const std::string& folder
   return images;
 }
 
-// On the ground below the system's origin, z along the ground's normal, x in the system's x-z plane.
+// Pose of base_link: on the ground below the system's origin, z normal to the ground, x in the x-z plane.
 RigidTransform systemFromBase(const VchargeRecordingOptions& options) {
   const Eigen::Vector3d normal =
       Eigen::Vector3d(-options.ground_slope_x, -options.ground_slope_y, 1.0).normalized();

@@ -20,7 +20,7 @@ struct MultiFrameSynchronizerOptions {
   VCHARGE_END_OPTIONS();
 };
 
-/// What became of the images so far.
+/// Counts of the sets and images so far.
 struct MultiFrameSynchronizerCounts {
   uint64_t complete_sets = 0;
   uint64_t incomplete_sets = 0;              ///< given up with at least one camera missing

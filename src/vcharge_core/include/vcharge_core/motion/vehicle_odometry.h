@@ -27,7 +27,7 @@ struct WheelTicks {
   int64_t left_ticks = 0;
   int64_t right_ticks = 0;
   double metres_per_tick = 0.01;
-  double steering_angle_rad = 0.0;  ///< of a virtual front wheel in the middle, positive to the left
+  double steering_angle_rad = 0.0;  ///< angle of a virtual front wheel in the middle, positive to the left
 };
 
 struct OdometryBufferOptions {

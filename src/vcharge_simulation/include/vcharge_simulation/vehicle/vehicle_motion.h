@@ -12,10 +12,10 @@ namespace vcharge {
 /// How the car drives along a path and how its body moves on its springs. Set by the drives of the catalogue.
 struct VehicleMotionOptions {
   double cruise_speed_m_per_s = 2.5;
-  double standstill_s = 0.0;  ///< at the start; 0: the drive starts at cruise speed
+  double standstill_s = 0.0;  ///< time at the start; 0: the drive starts at cruise speed
   bool stop_at_end = false;
   double duration_s = 60.0;     ///< upper limit
-  double track_width_m = 1.52;  ///< between the rear wheels
+  double track_width_m = 1.52;  ///< distance between the rear wheels
   double wheelbase_m = 2.58;
   double pitch_rad_per_m_per_s2 = 0.0045;  ///< nose up when accelerating
   double road_noise_rad = 0.0012;          ///< standard deviation of pitch and roll caused by the road
