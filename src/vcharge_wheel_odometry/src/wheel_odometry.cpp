@@ -10,13 +10,13 @@ namespace {
 
 // Errors of successive counts are correlated: this many of them count as one measurement.
 constexpr double kCountsPerIndependentOne = 4.0;
-// Straight ahead both wheels tick at the same rate, so the error of their difference changes slowly.
+// Straight ahead both wheels tick at one rate, so the error of their difference changes over about this time.
 constexpr double kDifferenceCorrelation_s = 1.0;
 constexpr double kYawNoise_rad = 2e-4;     // per root of a second; error of the bicycle model
 constexpr double kZeroNoise_per_m = 3e-5;  // drift of the steering's zero, per root of a second
 constexpr double kZeroSigma_per_m = 0.01;  // initial standard deviation: 1.5 degrees of steering
 constexpr double kSteeredYawAcceleration =
-    1.0;                                    // rad/s^2 per root of a second, beside what steering explains
+    1.0;                                    // rad/s^2 per root of a second, beyond what the steering explains
 constexpr double kMaxSpeed_m_per_s = 60.0;  // a counter that changes faster was reset
 constexpr double kYawRateFloor_rad_per_s = 1e-3;
 constexpr double kSlipWindow_s = 0.5;   // period in which wheels and steering are compared

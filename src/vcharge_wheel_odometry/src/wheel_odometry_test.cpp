@@ -82,7 +82,7 @@ Errors compare(const VehicleMotion& motion, const WheelOdometer& odometer,
       ticks.stamp = atMilliseconds(ms);
       stream.add(*odometry.add(ticks));
     }
-    if (ms % kFramePeriod_ms == 50) {  // the frame of 30 ms ago comes
+    if (ms % kFramePeriod_ms == 50) {  // the trigger of 30 ms ago arrives
       const std::vector<OdometryEstimate> ready = stream.trigger(atMilliseconds(ms - 33));
       if (ready.empty()) {
         continue;
@@ -300,7 +300,7 @@ TEST(OdometryStreamTest, HasAnEstimateAtEveryTriggerInOrderOfStamps) {
       keep(stream.add(estimate));
     }
     if (ms % 80 == 35 && ms < 3000) {
-      triggers.push_back(atMilliseconds(ms % 160 == 35 ? ms - 30 : ms));  // the second ahead of the ticks
+      triggers.push_back(atMilliseconds(ms % 160 == 35 ? ms - 30 : ms));  // every second one precedes a tick
       keep(stream.trigger(triggers.back()));
     }
   }

@@ -7,7 +7,7 @@
 namespace vcharge {
 namespace {
 
-constexpr double kReplay_s = 1.0;  // a smaller step back is a message out of order
+constexpr double kReplay_s = 1.0;  // a smaller step back is a message that is out of order
 constexpr double kSlack_m = 0.1;   // jitter of stamps makes short steps seem fast
 constexpr double kHistory_s = 60.0;
 constexpr double kPatientHistory_s = 3600.0;  // history kept if frames may come very late

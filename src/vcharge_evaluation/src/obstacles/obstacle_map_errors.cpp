@@ -15,7 +15,7 @@ namespace {
 constexpr double kWheelbase_m = 2.6;
 constexpr double kMiddle_m = 1.4;
 constexpr double kHalfWidth_m = 0.9;
-// An obstacle is at least this wide. It is visible with so many points between these heights, must be
+// An obstacle is at least this wide. It is visible with this many points between these heights, must be
 // reported after this travel, and is reported by an occupied cell within this distance.
 constexpr double kMinWidth_m = 0.1;
 constexpr int kMinSeenPoints = 15;

@@ -42,8 +42,8 @@ struct BundleAdjustmentSummary {
 };
 
 /// Adjusts the keyframes (six degrees of freedom; the first is fixed), the landmarks and the odometer's
-/// factors to the least robust sum of reprojection and odometry errors; the extrinsics are fixed. Then calls
-/// removeOutliers().
+/// factors so that the robust sum of reprojection and odometry errors is least, with fixed extrinsics. Calls
+/// removeOutliers() at the end.
 BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, ReconstructionData* data);
 
 // The steps of adjustBundle(), for adjustments with further terms.

@@ -22,7 +22,7 @@ class FrameGatherer : public DriveConsumer {
   using FrameCallback =
       std::function<void(Timestamp, const std::vector<Image>&, const RigidTransform& odom_from_vehicle)>;
 
-  /// The report must outlive this object. `max_speed_m_per_s`: faster odometry is a reset of the odometer.
+  /// The report must outlive this object. Odometry faster than `max_speed_m_per_s` is an odometer reset.
   FrameGatherer(std::shared_ptr<const CameraRig> rig, double max_speed_m_per_s, ReconstructionReport* report,
                 FrameCallback on_frame);
 

@@ -76,7 +76,7 @@ class CameraTracker {
   Image image_;
   ImagePyramid pyramid_;
   std::vector<LiveTrack> tracks_;
-  std::map<int32_t, Image> anchors_;  // by keyframe, kept while a track refers to it
+  std::map<int32_t, Image> anchors_;  // key: keyframe; kept while a track refers to it
 };
 
 }  // namespace vcharge

@@ -50,7 +50,7 @@ std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
 
 /// Verifies one pair of keyframes on the pairs of cameras (of `first`, of `second`) with similar images: with
 /// the planar 3-point solver, or the 4-point solver with known vertical. The metric pose follows from the
-/// of one rig and the landmarks of the other (generalized P3P). The result's reason is empty if the loop is
+/// rays of one rig and the landmarks of the other (generalized P3P). The result's reason is empty if it is
 /// verified.
 LoopEdge verifyLoop(const LoopClosureOptions& options, const ReconstructionData& data, int32_t first,
                     int32_t second, const std::vector<std::pair<int, int>>& camera_pairs);

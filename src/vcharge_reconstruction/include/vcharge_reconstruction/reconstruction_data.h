@@ -24,7 +24,7 @@ struct KeyframeImage {
 /// The vehicle at an instant that becomes part of the map.
 struct Keyframe {
   Timestamp stamp;
-  RigidTransform odom_from_vehicle;   ///< as counted by the odometer
+  RigidTransform odom_from_vehicle;   ///< pose counted by the odometer
   RigidTransform map_from_vehicle;    ///< estimated
   double travelled_m = 0.0;           ///< distance by the odometer, since the start of the drive
   std::vector<KeyframeImage> images;  ///< in the rig's order; without features where an image is missing

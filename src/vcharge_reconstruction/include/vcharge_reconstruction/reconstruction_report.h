@@ -20,7 +20,7 @@ struct SkippedFrames {
 
 /// Counts, errors and times of a reconstruction.
 struct ReconstructionReport {
-  int64_t num_frames = 0;             ///< frames, each of the images of one stamp
+  int64_t num_frames = 0;             ///< frames (sets of images with one stamp)
   int64_t num_incomplete_frames = 0;  ///< frames that lack an image of a camera
   int64_t num_frames_without_odometry = 0;
   int64_t num_standing_frames = 0;

@@ -16,7 +16,7 @@ namespace vcharge {
 namespace {
 
 constexpr double kReferenceWidth_px = 1280.0;
-/// Search radius in the image: features of small images are not more accurate.
+/// Least search radius in the image, since features of small images are not more accurate.
 constexpr double kLeastRadius_px = 3.0;
 /// Search radius in an image of the reference width, also of the second search.
 constexpr double kMinRadius_px = 6.0;

@@ -24,7 +24,7 @@ constexpr int kPlacesPerCandidate = 10;
 /// A candidate closer than both to a better one is left out.
 constexpr double kPlaceSpacing_m = 2.5;
 constexpr double kPlaceSpacing_rad = 0.6;
-/// Error of a match with a recognized place: its landmarks are seen from elsewhere.
+/// Largest error of a match with a recognized place, whose landmarks were seen from another position.
 constexpr double kPlaceMaxError_rad = 0.012;
 /// Poses further apart belong to different places.
 constexpr double kOtherPlace_m = 1.0;

@@ -13,7 +13,7 @@ namespace {
 constexpr double kSlipFactor = 20.0;
 /// With fewer matches the odometer alone gives the motion.
 constexpr int kMinMatches = 30;
-/// A less constrained motion model is adopted only if it explains this many times the matches: it fits noise
+/// A less constrained motion model is used only if it explains this many times the matches, as it fits noise
 /// better.
 constexpr double kMinGain = 1.1;
 /// Deviation of real wheels from the Ackermann model.

@@ -372,7 +372,7 @@ TEST_F(BagReaderTest, MakesNoRoomForPixelsThatAreNotThere) {
   expectNoRoomForImages<sensor_msgs::CompressedImage>(path_);
 }
 
-// For the sanitizers: no changed byte makes the reader leave a buffer.
+// Run with sanitizers: no changed byte makes the reader access memory outside a buffer.
 TEST_F(BagReaderTest, EndsInAnErrorOrInMessagesWhateverByteIsDamaged) {
   for (const auto compression : {rosbag::compression::Uncompressed, rosbag::compression::LZ4}) {
     const std::string whole = write(compression, 2, 1000000);

@@ -14,7 +14,7 @@ constexpr int kExposureEvery = 5;
 constexpr double kManyRepeated = 0.01;
 constexpr double kTooManyRepeated = 0.2;
 constexpr int kDark = 4, kBright = 251;
-/// Fractions of the image.
+/// Fractions of saturated (dark or bright) pixels in an image.
 constexpr double kManySaturated = 0.15;
 constexpr double kTooManySaturated = 0.5;
 /// Standard deviation of the gray levels.

@@ -18,7 +18,7 @@ constexpr int kMaxCorners = 250;
 constexpr double kCornerQuality = 0.01;
 constexpr int kMinTracks = 30;
 constexpr double kMinInlierShare = 0.5;
-/// Largest angle to the optical axis: rays further out are too long on the image plane at depth 1.
+/// Least cosine of the angle to the optical axis: rays further out are too long on the plane at depth 1.
 constexpr double kMinCosine = 0.35;
 constexpr double kThreshold = 0.003;
 

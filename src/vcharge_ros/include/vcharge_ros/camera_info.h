@@ -9,7 +9,7 @@
 
 namespace vcharge {
 
-/// Pixel distance between a camera model and its form in a CameraInfo: 0 if the form is exact, infinite if no
+/// Pixel distance between a camera and the model in its CameraInfo: 0 if that model is exact, infinite if no
 /// distortion model of sensor_msgs fits.
 struct CameraInfoResidual {
   double rms_px = 0.0;

@@ -17,7 +17,7 @@
 
 namespace vcharge {
 
-/// Converts a ROS time to a Timestamp; exact, as is the inverse.
+/// Converts a ROS time to a Timestamp without rounding.
 Timestamp toTimestamp(const ros::Time& time);
 /// Converts to a ROS time. Throws std::out_of_range for stamps before 0 or after 2^32 s.
 ros::Time fromTimestamp(Timestamp stamp);

@@ -21,7 +21,7 @@ sensor_msgs::PointCloud2 makeHeightCloud(const HeightMap& map, Timestamp stamp);
 /// Grid with 0 for drivable, 100 for obstacle and -1 for unobserved cells. `states`: CV_8UC1 of CellState.
 nav_msgs::OccupancyGrid makeOccupancyGrid(const HeightMap& map, const cv::Mat& states, Timestamp stamp);
 
-/// Two triangles between each four observed neighbours, gray as the cameras saw them (white where the map
+/// Mesh of two triangles between four observed neighbours, gray as seen by the cameras (white if unknown).
 /// Skips cells regularly so that there are at most `max_triangles`.
 visualization_msgs::Marker makeHeightMesh(const HeightMap& map, Timestamp stamp,
                                           size_t max_triangles = 400000);

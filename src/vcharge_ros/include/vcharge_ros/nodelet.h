@@ -92,7 +92,7 @@ class Nodelet : public nodelet::Nodelet {
               guard_.run([&] { callback(message); });
             })));
   }
-  /// A status named like the nodelet and `suffix` ("/pose") on /diagnostics. With Threads::kOne the report is
+  /// Adds a status named after the nodelet and `suffix` ("/pose") to /diagnostics. With Threads::kOne, report
   /// is called between two callbacks; with kSeveral, at any time.
   void addDiagnostics(const std::string& suffix, Report report, Threads threads);
   /// Serves std_srvs/Trigger under ~`name`; see advertiseTrigger().

@@ -54,7 +54,7 @@ class CallbackGuard {
 
 /// Serves std_srvs/Trigger under `name`. If `serve` throws, the answer has success = false and the error's
 /// text. The guard must outlive the server. Throws std::runtime_error naming the service if this process
-/// already serves it, for example an unloaded nodelet whose last callback is still running.
+/// already serves it, for example in an unloaded nodelet whose last callback is still running.
 ros::ServiceServer advertiseTrigger(ros::NodeHandle* node, const std::string& name, CallbackGuard* guard,
                                     std::function<void(std_srvs::TriggerResponse*)> serve);
 

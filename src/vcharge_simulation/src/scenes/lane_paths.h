@@ -21,9 +21,9 @@ struct Lanes {
   DrivePath loop(const Eigen::Vector2d& outwards_m, bool clockwise) const;
   /// Path counter-clockwise around the northern block, then clockwise around the southern one.
   DrivePath figureEight() const;
-  /// All lanes in both directions without turning on the spot: counter-clockwise around both blocks, through
-  /// the middle lane, clockwise around both blocks, and back through the middle lane. The outer lanes are
-  /// shifted outwards by `outwards_m`.
+  /// All lanes in both directions without turning on the spot: counter-clockwise around both blocks, then
+  /// through the middle lane, clockwise around both blocks, and back through the middle lane. The outer lanes
+  /// are shifted outwards by `outwards_m`.
   DrivePath bothDirections(const Eigen::Vector2d& outwards_m) const;
 
  private:

@@ -98,7 +98,7 @@ class OdometryStream {
 
   /// Returns the estimates to publish now, in order of stamps.
   std::vector<OdometryEstimate> add(const OdometryEstimate& estimate);
-  /// As add(). The last estimate is at `stamp`, interpolated, or extrapolated by at most max_extrapolation_s;
+  /// Like add(). The last estimate is at `stamp`, interpolated or extrapolated by up to max_extrapolation_s;
   /// it is missing if neither is possible, or if later ones were published already.
   std::vector<OdometryEstimate> trigger(Timestamp stamp);
 

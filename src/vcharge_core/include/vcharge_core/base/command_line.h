@@ -83,8 +83,8 @@ inline void writeJson(const nlohmann::json& found, const std::string& path) {
 /// success. With --show-options, a tool that has it requires no other argument. An error in the arguments or
 /// thrown by `run` is printed as one line "<tool>: <what>" on standard error.
 ///
-/// Where `run` takes a `nlohmann::json*`, the tool also gets `--json FILE`: what `run` puts into this object
-/// written there when `run` returns or throws, in the latter case with the error's text as "error". The tool
+/// If `run` takes a `nlohmann::json*`, the tool also has the option `--json FILE`: the content of this object
+/// is written there when `run` returns or throws, then with the error's text as "error". The tool
 /// documents the keys in `app->footer("Keys of --json: ...")`. NaN is written as null.
 template <class Run>
 int runTool(CLI::App* app, int argc, char** argv, const Run& run) {

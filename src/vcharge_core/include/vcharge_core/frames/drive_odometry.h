@@ -22,8 +22,8 @@ class DriveOdometry {
 
   /// Whether the stamp is so much older than the newest that the drive has started again.
   bool jumpsBack(Timestamp stamp) const;
-  /// The break before this message, if there is one. A message that is not newer than the last is ignored
-  /// ignored and counted.
+  /// Adds a message; returns the break before it, if there is one. A message that is not newer than the last
+  /// is ignored and counted.
   std::optional<DriveBreak> add(const VehicleOdometry& odometry, FrameCounters* counters);
   void clear();
 

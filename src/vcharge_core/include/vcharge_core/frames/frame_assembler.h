@@ -34,12 +34,12 @@ using ImageFrame = AssembledFrame<Image>;
 /// Input of every stage that processes frames: combines images of one stamp with the odometry at that stamp,
 /// in order of stamps.
 ///
-/// A frame is handed out once odometry reaches it and all cameras have sent their image. A camera is not
-/// camera that has sent a later image or is silent, nor for any camera longer than max_camera_wait_s, and it
+/// A frame is handed out when odometry reaches it and all cameras have sent their image. It does not wait for
+/// cameras that have sent a later image or are silent, nor for any camera longer than max_camera_wait_s; it
 /// waits for odometry for at most max_odometry_wait_s. At most kMaxWaiting frames wait. An image that arrives
-/// handed out is late: dropped and counted. At a break of the drive (see DriveBreak) all older frames are
+/// after its frame was handed out is late: it is dropped and counted. At a break (see DriveBreak) all older
 /// handed out, then `on_break` is called. A stage that has `on_break` begins anew there: for it older images
-/// the break are late, too, since the stage has started again. Not thread safe.
+/// are late, too, since the stage has started again. Not thread safe.
 template <class ImageType>
 class FrameAssembler {
  public:
@@ -49,8 +49,8 @@ class FrameAssembler {
   using BreakCallback = std::function<void(DriveBreak, Timestamp)>;
   static constexpr size_t kMaxWaiting = 25;  // two seconds at 12.5 Hz
 
-  /// `is_used`: by camera, false for cameras that send nothing; empty: all send. std::invalid_argument for
-  /// bad options.
+  /// `is_used`: one per camera, false for cameras that send nothing; empty if all send. Throws
+  /// std::invalid_argument for bad options.
   FrameAssembler(size_t num_cameras, const FrameAssemblerOptions& options, FrameCallback on_frame,
                  BreakCallback on_break = BreakCallback(), std::vector<bool> is_used = {})
       : options_(options),
@@ -203,7 +203,7 @@ bool FrameAssembler<ImageType>::hasImages(Timestamp stamp, const Pending& pendin
   for (size_t camera = 0; camera < is_used_.size(); ++camera) {
     const std::optional<Timestamp>& newest = newest_of_camera_[camera];
     const bool has_passed = newest && *newest > stamp;
-    // A silent camera that sends again may do so with this frame; who is in no hurry waits for the next.
+    // A silent camera may resume with this frame: when waiting for everything, only newer images exclude it.
     const bool is_absent = isSilent(camera) && (!options_.waitsForEverything() || *newest_image_ > stamp);
     if (is_used_[camera] && !pending.has_image[camera] && !has_passed && !is_absent) {
       return false;

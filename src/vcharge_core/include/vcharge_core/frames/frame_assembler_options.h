@@ -10,8 +10,8 @@
 
 namespace vcharge {
 
-/// How long a frame waits for what is missing, and which odometry is believed. Waiting times are measured on
-/// drive's clock: the newest stamp of all images and odometry received.
+/// How long a frame waits for missing data, and which odometry is plausible. Waiting times are measured on
+/// the drive's clock: the newest stamp of all images and odometry received.
 struct FrameAssemblerOptions {
   VCHARGE_BEGIN_OPTIONS(FrameAssemblerOptions);
   VCHARGE_OPTION(double, max_camera_wait_s, 0.15, notNegative(), "Longest wait for a missing camera.");
