@@ -38,7 +38,7 @@ using ImageFrame = AssembledFrame<Image>;
 /// cameras that have sent a later image or are silent, nor for any camera longer than max_camera_wait_s; it
 /// waits for odometry for at most max_odometry_wait_s. At most kMaxWaiting frames wait. An image that arrives
 /// after its frame was handed out is late: it is dropped and counted. At a break (see DriveBreak) all older
-/// handed out, then `on_break` is called. A stage that has `on_break` begins anew there: for it older images
+/// frames are handed out, then `on_break` is called. With `on_break`, older images that arrive after a break
 /// are late, too, since the stage has started again. Not thread safe.
 template <class ImageType>
 class FrameAssembler {

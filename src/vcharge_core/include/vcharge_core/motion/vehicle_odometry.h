@@ -45,8 +45,8 @@ class OdometryBuffer {
  public:
   enum class AddResult {
     kAdded,
-    kAddedAfterGap,  ///< more than max_gap_s after the entry before it
-    kDuplicate,      ///< same stamp as an entry: ignored
+    kAddedAfterGap,  ///< added, more than max_gap_s after the previous entry
+    kDuplicate,      ///< same stamp as an earlier entry: ignored
     kOutOfOrder,     ///< slightly older than the newest entry: ignored
     kReset,          ///< time jumped backwards: all older entries were dropped, this one was kept
   };
