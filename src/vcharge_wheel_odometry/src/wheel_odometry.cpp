@@ -12,7 +12,7 @@ namespace {
 constexpr double kCountsPerIndependentOne = 4.0;
 // Straight ahead both wheels tick at one rate, so the error of their difference changes over about this time.
 constexpr double kDifferenceCorrelation_s = 1.0;
-constexpr double kYawNoise_rad = 2e-4;     // per root of a second; error of the bicycle model
+constexpr double kYawNoise_rad = 2e-4;     // error of the bicycle model, per root of a second
 constexpr double kZeroNoise_per_m = 3e-5;  // drift of the steering's zero, per root of a second
 constexpr double kZeroSigma_per_m = 0.01;  // initial standard deviation: 1.5 degrees of steering
 constexpr double kSteeredYawAcceleration =

@@ -38,8 +38,8 @@ struct HeightStep {
   Eigen::Vector2d position_m{0, 0};  ///< the edge, in the world
   Eigen::Vector2d direction{1, 0};   ///< unit, upwards
   double low_m = 0.0, high_m = 0.0;  ///< true heights beside it
-  bool both_sides_seen = false;      ///< the upper side is visible too
-  bool foot_seen = false;            ///< the foot of its face is visible to cameras in front of the face
+  bool both_sides_seen = false;      ///< whether the upper side is visible, too
+  bool foot_seen = false;            ///< whether the foot of its face is visible from in front of the face
 };
 
 /// A distance that a tape measure could take in the world, and the map's value of it.

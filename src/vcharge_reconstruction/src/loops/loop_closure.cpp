@@ -22,7 +22,7 @@ namespace {
 constexpr double kTrainingSpacing_m = 2.5;
 /// Largest angle between the rotations of the planar motion and of the pose among landmarks.
 constexpr double kMaxDisagreement_rad = 0.035;
-/// A loop edge that differs more from the adjusted keyframes was wrong.
+/// A loop edge that differs more from the adjusted keyframes is rejected.
 constexpr double kMaxFinalError_m = 0.2;
 constexpr double kMaxFinalError_rad = 0.03;
 // Standard deviations in the pose graph: of the motion between consecutive keyframes, and of a loop edge in

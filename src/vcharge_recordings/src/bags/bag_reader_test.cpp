@@ -33,7 +33,7 @@ Number numberAt(const std::string& bytes, size_t at) {
   return value;
 }
 
-/// The first byte of the n-th "name=" value.
+/// Position of the first byte of the n-th "name=" value.
 size_t valueOf(const std::string& bytes, const std::string& name, int n = 0) {
   size_t at = bytes.find(name + "=");
   for (; n > 0; --n) {
@@ -48,7 +48,7 @@ class BagReaderTest : public ::testing::Test {
   const ScratchFolder folder_;
   const std::string path_ = folder_ / "a.bag";
 
-  /// Two topics in several chunks. Returns the file's bytes.
+  /// Writes two topics in several chunks; returns the file's bytes.
   std::string write(rosbag::CompressionType compression = rosbag::compression::Uncompressed,
                     int num_messages = 3, uint32_t chunk_threshold = 1) const {
     rosbag::Bag bag(path_, rosbag::bagmode::Write);

@@ -42,7 +42,7 @@ cv::Mat shrink(const cv::Mat& pixels) {
   return result;
 }
 
-/// 255 where all pixels below are 255.
+/// A small mask that is 255 where all covered pixels of the mask are 255.
 cv::Mat shrinkMask(const cv::Mat& mask) {
   cv::Mat result;
   cv::threshold(shrink(mask), result, 254, 255, cv::THRESH_BINARY);

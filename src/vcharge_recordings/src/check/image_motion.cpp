@@ -115,7 +115,7 @@ void ImageMotionMeter::estimate(const std::vector<cv::Point2f>& from_px,
     }
   }
   motion->rotation_rad = vectorFromRotation(Eigen::Quaterniond(begin_from_end));
-  // The sign of the direction: near points move against it.
+  // The sign of the direction follows from the points, since near points move against it.
   Eigen::Vector3d direction(translation.at<double>(0), translation.at<double>(1), translation.at<double>(2));
   direction = -(begin_from_end * direction).normalized();
   int64_t votes = 0;

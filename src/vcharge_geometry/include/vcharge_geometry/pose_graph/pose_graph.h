@@ -16,7 +16,7 @@ struct PoseGraphEdge {
   int64_t second = 0;
   RigidTransform first_from_second;
   /// Information matrix of g2o's error [translation (m), vector part of the quaternion]. In planar graphs,
-  /// and columns 0, 1 and 5 belong to [x, y, yaw (rad)]; the others are zero.
+  /// rows and columns 0, 1 and 5 belong to [x, y, yaw (rad)]; the others are zero.
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
 };
 

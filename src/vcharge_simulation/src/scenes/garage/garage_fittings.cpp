@@ -94,8 +94,7 @@ void addBoards(double overhead_m, SceneParts* parts) {
                           : vector(sign.x + across, sign.y + thickness, z);
     };
     const double half = 0.5 * kBoardWidth_m;
-    // Seen along the lane's axis, left is at larger y in a lane along x and at smaller x in a lane along
-    // y.
+    // Seen along the lane's axis, left is at larger y in a lane along x and at smaller x in a lane along y.
     const double left = sign.along_x ? half : -half;
     for (const double side : {-1.0, 1.0}) {
       const double start = -side * left;
