@@ -39,7 +39,7 @@ struct LoopEdge {
 
 using LoopProgress = std::function<void(double)>;
 
-/// Trains a vocabulary from the drive itself. InputError where it has no features.
+/// Trains a vocabulary from the drive itself. InputError if the drive has no features.
 std::shared_ptr<const VocabularyTree> trainVocabulary(const ReconstructionData& data);
 
 /// Finds loop candidates for every keyframe by the features of all cameras (paper, section Loop-Closure

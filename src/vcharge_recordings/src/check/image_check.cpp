@@ -156,7 +156,7 @@ void ImageCheck::judgeMask(CheckFindings* findings) const {
   const cv::Mat is_steady =
       num_moved_ * sum_square_ < (1.0F + kSteady * kSteady) * sum_length_.mul(sum_length_);
   const cv::Mat stays = (sum_length_of_mean > kStaticShare * sum_length_) & has_edge & is_steady;
-  // The borders of the field of view and of the mask are no edges of the scene.
+  // The borders of the field of view and of the mask are not edges of the scene.
   cv::Mat inside;
   cv::erode(valid_, inside, cv::Mat::ones(7, 7, CV_8U), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT,
             cv::Scalar(0));
