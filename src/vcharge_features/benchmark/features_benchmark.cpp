@@ -10,8 +10,8 @@
 #include "vcharge_features/patch_tracker.h"
 #include "vcharge_features/vocabulary_tree.h"
 
-// All on one thread. Descriptor searches: the two nearest and the reverse, 1000 x 1000, beside OpenCV's in
-// the same run.
+// All benchmarks run on one thread. Descriptor searches find the two nearest and the reverse, 1000 x 1000,
+// and are compared with OpenCV's in the same run.
 namespace vcharge {
 namespace {
 

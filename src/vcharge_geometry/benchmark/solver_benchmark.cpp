@@ -1,4 +1,4 @@
-// Times and error distributions of the minimal solvers beside OpenGV's, in the same run on the same problems.
+// Times and error distributions of the minimal solvers and OpenGV's, in the same run on the same problems.
 // A solve is one call from prepared correspondences to all solutions.
 
 #include <cstdio>

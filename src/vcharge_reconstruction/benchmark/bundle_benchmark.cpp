@@ -70,7 +70,7 @@ BundleProblem makeProblem(const SparseMap& map) {
   return problem;
 }
 
-/// Processor time, which other work on the machine changes little.
+/// Processor time, which is hardly affected by other work on the machine.
 double secondsOf(const std::function<void()>& work) {
   const std::clock_t start = std::clock();
   work();

@@ -1,5 +1,5 @@
-// BagReader beside librosbag: opening a recording, and reading all of its images and odometry, from a bag
-// whose chunks are plain, or compressed by bz2 or lz4. A recording of one's own: BAG=DRIVE.bag
+// Compares BagReader with librosbag: opening a recording, and reading all of its images and odometry, from a
+// bag whose chunks are plain, or compressed by bz2 or lz4. To read another recording: BAG=DRIVE.bag
 // bag_reader_benchmark.
 #include <cstdlib>
 #include <filesystem>

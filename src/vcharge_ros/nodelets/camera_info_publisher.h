@@ -11,18 +11,18 @@
 
 namespace vcharge {
 
-/// camera_info of one camera of a rig, with the stamp of each of its images.
+/// Publishes camera_info of one camera of a rig, with the stamp of each of its images.
 class CameraInfoPublisher {
  public:
   CameraInfoPublisher(ros::NodeHandle* node, const RigCamera& camera, const std::string& topic)
       : info_(makeCameraInfo(camera, &residual_)),
         topic_(node, topic, kQueueSize, [](const sensor_msgs::CameraInfo&) { return true; }) {}
 
-  /// How far the published model is from the rig's.
+  /// Distance between the published model and the rig's.
   const CameraInfoResidual& residual() const { return residual_; }
   const std::string& model() const { return info_.distortion_model; }
 
-  /// Publishes once per stamp: an image may come raw and compressed.
+  /// Publishes once per stamp, since an image may arrive both raw and compressed.
   void publish(const ros::Time& stamp) {
     if (last_stamp_ != stamp) {
       last_stamp_ = stamp;

@@ -17,7 +17,7 @@
 namespace vcharge {
 
 /// Completes the topics of a recorded drive: odom -> base_link from the odometry, the rig's cameras on
-/// /tf_static, and camera_info with each image's stamp. Stands aside on /tf and on each camera_info where
+/// /tf_static, and camera_info with each image's stamp. Does not publish on /tf or a camera_info topic where
 /// another node, or the bag, publishes the same. Parameters: ~rig (path), ~topics (DriveTopics).
 class DriveTfNodelet : public Nodelet {
  public:
@@ -105,7 +105,7 @@ class DriveTfNodelet : public Nodelet {
   std::unique_ptr<DriveMonitor> monitor_;
   std::string odom_frame_ = "odom";
   std::optional<Timestamp> last_stamp_;
-  std::vector<std::unique_ptr<CameraInfoPublisher>> infos_;  // by camera
+  std::vector<std::unique_ptr<CameraInfoPublisher>> infos_;  // one per camera
   std::unique_ptr<internal::SharedTopic<tf2_msgs::TFMessage>> tf_;
   tf2_ros::StaticTransformBroadcaster static_broadcaster_;
 };

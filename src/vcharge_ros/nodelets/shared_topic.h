@@ -20,8 +20,8 @@ class SharedTopic {
   using Clock = std::chrono::steady_clock;
   using MessageConstPtr = boost::shared_ptr<const Message>;
 
-  /// `conflicts`: whether a message of another node makes ours superfluous. Publishing resumes once none came
-  /// for kPatience.
+  /// `conflicts`: whether a message of another node makes publishing unnecessary. Publishing resumes when no
+  /// such message has arrived for kPatience.
   SharedTopic(ros::NodeHandle* node, const std::string& topic, uint32_t queue_size,
               std::function<bool(const Message&)> conflicts)
       : conflicts_(std::move(conflicts)) {
@@ -34,7 +34,7 @@ class SharedTopic {
   /// True while another node publishes.
   bool standsAside() const { return seen_foreign_ && Clock::now() - last_foreign_ < kPatience; }
 
-  /// Publishes unless it stands aside. The message must not be changed afterwards.
+  /// Publishes unless another node does. The message must not be changed afterwards.
   void publish(const MessageConstPtr& message) {
     if (standsAside()) {
       return;
@@ -53,7 +53,7 @@ class SharedTopic {
   void listen(const MessageConstPtr& message) {
     for (auto own = own_.begin(); own != own_.end(); ++own) {
       if (*own == message) {
-        own_.erase(own_.begin(), std::next(own));  // they are received in order
+        own_.erase(own_.begin(), std::next(own));  // messages are received in order
         return;
       }
     }
@@ -64,7 +64,7 @@ class SharedTopic {
   }
 
   const std::function<bool(const Message&)> conflicts_;
-  std::deque<MessageConstPtr> own_;  // published and not received again yet
+  std::deque<MessageConstPtr> own_;  // published but not yet received back
   bool seen_foreign_ = false;
   Clock::time_point last_foreign_;
   ros::Publisher publisher_;

@@ -8,7 +8,7 @@ namespace vcharge {
 
 /// Outputs of simulate_drive.
 struct RecordingOptions {
-  std::string bag;          ///< rig_truth.yaml and the folder BAG_truth are written beside it
+  std::string bag;          ///< bag to write; rig_truth.yaml and the folder BAG_truth are written beside it
   std::string images_from;  ///< noise-free bag of the same drive, whose images are used instead of rendering
   bool truth_range = false;
   double height_cell_m = 0.1;

@@ -10,18 +10,18 @@ namespace {
 
 // Errors of successive counts are correlated: this many of them count as one measurement.
 constexpr double kCountsPerIndependentOne = 4.0;
-// Straight ahead both wheels tick alike, so the error of their difference changes over about this time.
+// Straight ahead both wheels tick at one rate, so the error of their difference changes over about this time.
 constexpr double kDifferenceCorrelation_s = 1.0;
-constexpr double kYawNoise_rad = 2e-4;     // per root of a second; error of the bicycle model
+constexpr double kYawNoise_rad = 2e-4;     // error of the bicycle model, per root of a second
 constexpr double kZeroNoise_per_m = 3e-5;  // drift of the steering's zero, per root of a second
-constexpr double kZeroSigma_per_m = 0.01;  // at the start: 1.5 degrees of steering
+constexpr double kZeroSigma_per_m = 0.01;  // initial standard deviation: 1.5 degrees of steering
 constexpr double kSteeredYawAcceleration =
-    1.0;                                    // rad/s^2 per root of a second, beside what steering explains
-constexpr double kMaxSpeed_m_per_s = 60.0;  // a counter that goes faster was reset
+    1.0;                                    // rad/s^2 per root of a second, beyond what the steering explains
+constexpr double kMaxSpeed_m_per_s = 60.0;  // a counter that changes faster was reset
 constexpr double kYawRateFloor_rad_per_s = 1e-3;
 constexpr double kSlipWindow_s = 0.5;   // period in which wheels and steering are compared
-constexpr double kSlipFraction = 0.25;  // of the turn: steering angles are less exact in tight turns
-constexpr double kStandstill_s = 0.3;   // without a tick
+constexpr double kSlipFraction = 0.25;  // fraction of the turn: steering angles are less exact in tight turns
+constexpr double kStandstill_s = 0.3;   // time without a tick
 
 double square(double value) {
   return value * value;
@@ -131,7 +131,7 @@ void WheelOdometry::correct(double dt_s, double tick_m, double steered_curvature
   }
 }
 
-// Without ticks for a while the wheels stand, at an unknown position within their ticks.
+// If no ticks come for a while, the wheels stand at an unknown position within their ticks.
 void WheelOdometry::stand() {
   along_[1] = 0.0;
   turn_[1] = 0.0;

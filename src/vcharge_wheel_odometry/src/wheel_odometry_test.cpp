@@ -51,7 +51,7 @@ WheelOdometerOptions exactWheels() {
 struct Errors {
   double max_distance_m = 0.0;
   double max_yaw_deg = 0.0;
-  double rms_yaw_jitter_deg = 0.0;  // of the turn from frame to frame
+  double rms_yaw_jitter_deg = 0.0;  // jitter of the turn from frame to frame
   double max_yaw_jitter_deg = 0.0;
   double max_position_m = 0.0;
   double length_m = 0.0;
@@ -81,7 +81,7 @@ Errors compare(const VehicleMotion& motion, const WheelOdometer& odometer,
       ticks.stamp = atMilliseconds(ms);
       stream.add(*odometry.add(ticks));
     }
-    if (ms % kFramePeriod_ms == 50) {  // the frame of 30 ms ago comes
+    if (ms % kFramePeriod_ms == 50) {  // the trigger of 30 ms ago arrives
       const std::vector<OdometryEstimate> ready = stream.trigger(atMilliseconds(ms - 33));
       if (ready.empty()) {
         continue;
@@ -284,7 +284,7 @@ TEST(OdometryStreamTest, HasAnEstimateAtEveryTriggerInOrderOfStamps) {
   std::vector<Timestamp> triggers;
   const auto keep = [&](const std::vector<OdometryEstimate>& ready) {
     for (const OdometryEstimate& estimate : ready) {
-      // A car at 2 m/s: the pose tells the time.
+      // A car at 2 m/s: the position shows the time.
       ASSERT_NEAR(estimate.odometry.odom_from_vehicle.translation().x(),
                   2.0 * toSeconds(estimate.odometry.stamp - kStart), 1e-9);
       stamps.push_back(estimate.odometry.stamp);
@@ -299,7 +299,7 @@ TEST(OdometryStreamTest, HasAnEstimateAtEveryTriggerInOrderOfStamps) {
       keep(stream.add(estimate));
     }
     if (ms % 80 == 35 && ms < 3000) {
-      triggers.push_back(atMilliseconds(ms % 160 == 35 ? ms - 30 : ms));  // the second ahead of the ticks
+      triggers.push_back(atMilliseconds(ms % 160 == 35 ? ms - 30 : ms));  // every second one precedes a tick
       keep(stream.trigger(triggers.back()));
     }
   }

@@ -77,7 +77,7 @@ std::string nameOf(const std::string& path) {
 void writeHeightMap(const HeightMap& map, const std::string& path_stem) {
   check(map.height_m.type() == CV_32FC1 && !map.height_m.empty(), "writeHeightMap: expected CV_32FC1");
   std::error_code ignored;
-  fs::remove(path_stem + ".yaml", ignored);  // so that a partly replaced map counts as incomplete
+  fs::remove(path_stem + ".yaml", ignored);  // a partly replaced map then counts as incomplete
   writeImage(map.height_m, path_stem + ".tiff");
   std::string files = "file: " + nameOf(path_stem) + ".tiff\n";
   for (const Layer& layer : kLayers) {

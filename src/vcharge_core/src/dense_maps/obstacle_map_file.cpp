@@ -155,7 +155,7 @@ void writeObstacles(const ObstacleMap& map, const std::vector<ObstacleScan>& sca
   const std::string stem = stemOf(folder, map.stamp);
   createFolder(folder);
   std::error_code ignored;
-  fs::remove(stem + ".yaml", ignored);  // so that a partly replaced stamp counts as incomplete
+  fs::remove(stem + ".yaml", ignored);  // a partly replaced stamp then counts as incomplete
   std::vector<cv::Mat> coordinates;
   cv::split(map.point_m, coordinates);
   writeFloatTiff(coordinates[0], stem + "_x.tiff");

@@ -45,7 +45,7 @@ void writeRangeMap(const RangeMap& map, const std::string& folder) {
   const std::string stem = stemOf(folder, map.camera_name, map.stamp);
   createFolder(fs::path(stem).parent_path().string());
   std::error_code ignored;
-  fs::remove(stem + ".yaml", ignored);  // so that a partly replaced map counts as incomplete
+  fs::remove(stem + ".yaml", ignored);  // a partly replaced map then counts as incomplete
   writeFloatTiff(map.range_m, stem + "_range.tiff");
   writeFloatTiff(map.standard_deviation_m, stem + "_sigma.tiff");
   writeFloatTiff(map.confidence, stem + "_confidence.tiff");

@@ -15,7 +15,7 @@ constexpr double kLeft = 70.0, kRight = 15.0, kTop = 12.0, kBottom = 45.0;
 constexpr double kLegendRow = 20.0, kLegendMark = 36.0, kLetter = 7.0;
 constexpr double kMinHeight = 250.0, kMaxHeight = 900.0;
 
-/// 1, 2 or 5 times a power of ten, so that about `count` steps fit into the range.
+/// Step of 1, 2 or 5 times a power of ten, so that about `count` steps fit into the range.
 double tickStep(double range, int count) {
   const double raw = range / count;
   const double power = std::pow(10.0, std::floor(std::log10(raw)));

@@ -7,10 +7,10 @@
 namespace vcharge {
 namespace {
 
-constexpr double kReplay_s = 1.0;  // a smaller step back is a message out of order
-constexpr double kSlack_m = 0.1;   // jitter of stamps makes short steps look fast
+constexpr double kReplay_s = 1.0;  // a smaller step back is a message that is out of order
+constexpr double kSlack_m = 0.1;   // jitter of stamps makes short steps seem fast
 constexpr double kHistory_s = 60.0;
-constexpr double kPatientHistory_s = 3600.0;  // where frames may come very late
+constexpr double kPatientHistory_s = 3600.0;  // history kept if frames may come very late
 
 Eigen::Vector3d planarStep(const VehicleOdometry& from, const VehicleOdometry& to) {
   const RigidTransform& start = from.odom_from_vehicle;

@@ -148,7 +148,7 @@ TEST_F(FrameAssemblerTest, ASmallStepIsAResetOnlyWhereTheOptionsSaySo) {
 }
 
 TEST_F(FrameAssemblerTest, HandsOutOlderFramesBeforeABreakAndDropsThemAfterIt) {
-  std::vector<std::pair<DriveBreak, size_t>> breaks;  // with the frames before it
+  std::vector<std::pair<DriveBreak, size_t>> breaks;  // each with the number of frames before it
   ImageFrameAssembler assembler(3, options_, keep_, [&](DriveBreak drive_break, Timestamp stamp) {
     EXPECT_EQ(stamp, at(1.0));
     breaks.emplace_back(drive_break, frames_.size());

@@ -186,7 +186,7 @@ TEST_F(SparseMapFileTest, EveryPrefixIsTruncated) {
     const std::string error = errorOf(bytes_.substr(0, length));
     EXPECT_THAT(error, HasSubstr("truncated")) << length;
   }
-  // Also detected if the header states the shorter length.
+  // The damage is also detected if the header states the shorter length.
   constexpr size_t kPageSize = 16384;
   for (size_t pages = 1; pages < bytes_.size() / kPageSize; ++pages) {
     std::string shorter = bytes_.substr(0, pages * kPageSize);

@@ -13,7 +13,7 @@ static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "blobs of a map file ar
 
 namespace vcharge::map_file {
 
-/// "vcmp", at byte 68 of the file: PRAGMA application_id.
+/// PRAGMA application_id: "vcmp", at byte 68 of the file.
 constexpr uint32_t kApplicationId = 0x76636d70;
 /// PRAGMA user_version. Raise it with every change of the tables.
 constexpr uint32_t kSchemaVersion = 2;

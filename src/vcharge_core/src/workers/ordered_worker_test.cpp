@@ -72,7 +72,7 @@ TEST(OrderedWorkerTest, EndsWithTheTaskInWorkAndBeginsNoOther) {
   worker->push(1, false);
   in_work.get_future().wait();
   std::thread end([&] { worker.reset(); });
-  // so that the destructor runs before the task ends
+  // Lets the destructor run before the task ends.
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   go_on.set_value();
   end.join();

@@ -38,8 +38,8 @@ struct HeightStep {
   Eigen::Vector2d position_m{0, 0};  ///< the edge, in the world
   Eigen::Vector2d direction{1, 0};   ///< unit, upwards
   double low_m = 0.0, high_m = 0.0;  ///< true heights beside it
-  bool both_sides_seen = false;      ///< the upper side is visible too
-  bool foot_seen = false;            ///< the foot of its face is visible to cameras in front of the face
+  bool both_sides_seen = false;      ///< whether the upper side is visible, too
+  bool foot_seen = false;            ///< whether the foot of its face is visible from in front of the face
 };
 
 /// A distance that a tape measure could take in the world, and the map's value of it.
@@ -48,7 +48,7 @@ struct TapeMeasurement {
   Kind kind = Kind::kLength;
   Eigen::Vector2d from_m{0, 0}, to_m{0, 0};  ///< in the world; for a height, the points below and above
   double truth_m = 0.0;
-  double map_m = 0.0;  ///< NaN if the map does not show it
+  double map_m = 0.0;  ///< NaN if it cannot be read from the map
 };
 
 /// A point on a kerb in the map.

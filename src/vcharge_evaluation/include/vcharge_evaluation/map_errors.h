@@ -27,10 +27,10 @@ struct MapErrorOptions {
 
 /// One of the map's loop edges against the truth.
 struct LoopEdgeJudgement {
-  bool has_truth = false;    ///< at both keyframes; otherwise the other members are not set
+  bool has_truth = false;    ///< whether both keyframes have truth; if not, the other members are not set
   bool is_opposite = false;  ///< whether the true headings are opposite
-  double distance_m = 0.0;   ///< between the true positions
-  double error_m = 0.0;      ///< of the measured transform
+  double distance_m = 0.0;   ///< distance between the true positions
+  double error_m = 0.0;      ///< translation error of the measured transform
   double error_rad = 0.0;
   bool is_right = false;  ///< both errors are within the bounds
 };
@@ -60,10 +60,10 @@ struct MapErrors {
   int num_accepted = 0;                  ///< accepted edges with truth
   int num_wrong = 0;                     ///< accepted edges that are not correct
   ErrorDistribution accepted_m, accepted_rad;
-  std::map<std::string, RejectedEdges> rejected;  ///< by reason
+  std::map<std::string, RejectedEdges> rejected;  ///< key: reason
 
-  std::vector<bool> is_revisit, is_found;  ///< by keyframe
-  RevisitCount revisits;                   ///< in any heading
+  std::vector<bool> is_revisit, is_found;  ///< one per keyframe
+  RevisitCount revisits;                   ///< revisits in any heading
   /// Keyframes passed before in the same or opposite heading, with an edge of that kind; one may count in
   /// both.
   RevisitCount same, opposite;

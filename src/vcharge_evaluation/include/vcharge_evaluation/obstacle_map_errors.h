@@ -27,18 +27,18 @@ struct ObstacleMapEvaluationOptions {
 /// An obstacle that was visible and could be judged.
 struct ObstacleOutcome {
   std::string kind;
-  Eigen::Vector2d middle_m{0.0, 0.0};  ///< in the world
+  Eigen::Vector2d middle_m{0.0, 0.0};  ///< centre in the world
   double height_m = 0.0;
   double width_m = 0.0;
-  double distance_m = 0.0;  ///< from the ground driven over
-  bool reported = false;    ///< when it was due, 1 m of travel after it was first visible
-  size_t frames = 0;        ///< maps from then on in which it was visible
+  double distance_m = 0.0;  ///< distance from the ground driven over
+  bool reported = false;    ///< whether it was reported when due, 1 m of travel after it was first visible
+  size_t frames = 0;        ///< maps since then in which it was visible
   size_t frames_reported = 0;
 };
 
 /// A cell that was occupied on open ground at any time. Each cell counts once.
 struct FalseCell {
-  Eigen::Vector2d world_m{0.0, 0.0};  ///< when it was first occupied
+  Eigen::Vector2d world_m{0.0, 0.0};  ///< position when it was first occupied
   Timestamp first_seen;
   size_t frames = 0;        ///< number of maps in which it was occupied
   bool is_left = false;     ///< still occupied when the vehicle had passed
@@ -48,28 +48,28 @@ struct FalseCell {
 /// A point on the outline of a kerb that was visible and could be judged.
 struct KerbOutcome {
   Eigen::Vector2d position_m{0.0, 0.0};  ///< in the world
-  double nearest_m = 0.0;       ///< least distance of the vehicle's middle since it was first visible
-  bool reported = false;        ///< when it was due
-  bool ever_reported = false;   ///< at any time within the view range
-  double height_error_m = 0.0;  ///< absolute, when it was due
+  double nearest_m = 0.0;       ///< least distance of the vehicle's middle since the point was first visible
+  bool reported = false;        ///< whether it was reported when due
+  bool ever_reported = false;   ///< whether it was reported at any time within the view range
+  double height_error_m = 0.0;  ///< absolute error when due
 };
 
 struct ObstacleMapErrors {
   size_t num_frames = 0;
   double driven_m = 0.0;
   std::vector<ObstacleOutcome> obstacles;
-  std::vector<FalseCell> false_cells;  ///< all; the numbers below count those on open ground
-  size_t num_false_cells = 0;          ///< over the whole drive
+  std::vector<FalseCell> false_cells;  ///< all false cells; the numbers below count those on open ground
+  size_t num_false_cells = 0;          ///< number over the whole drive
   double false_cells_per_10_m = 0.0;
-  size_t num_false_left = 0;         ///< still occupied when the vehicle had passed
-  size_t num_false_hidden = 0;       ///< on ground that was never visible
+  size_t num_false_left = 0;         ///< cells still occupied when the vehicle had passed
+  size_t num_false_hidden = 0;       ///< cells on ground that was never visible
   double false_cells_per_map = 0.0;  ///< mean number per map
   size_t num_observed_inside = 0;    ///< cells inside true obstacles that were ever observed
   size_t num_free_inside = 0;        ///< those that were ever free
   size_t num_kerb_points = 0;        ///< visible points on outlines of kerbs, every 10 cm
   size_t num_kerb_reported = 0;
   ErrorDistribution kerb_height_error_m;  ///< absolute errors of the reported points
-  std::vector<KerbOutcome> kerbs;         ///< all points
+  std::vector<KerbOutcome> kerbs;         ///< all judged points
   size_t num_mover_frames = 0;            ///< images in which a moving object was visible
   size_t num_mover_reported = 0;
   size_t num_mover_cells = 0;  ///< cells under moving objects, over all these images
@@ -94,7 +94,7 @@ class ObstacleMapEvaluator {
  private:
   struct Tracked {
     TruthObstacle obstacle;
-    std::optional<double> first_view_m;  // distance driven
+    std::optional<double> first_view_m;  // distance driven when it was first visible
     bool judged = false;
     ObstacleOutcome outcome;
   };
@@ -121,11 +121,11 @@ class ObstacleMapEvaluator {
   std::vector<TruthObstacle> standing_;
   std::vector<Tracked> tracked_;
   std::vector<KerbPoint> kerb_points_;
-  std::map<int64_t, FalseCell> false_cells_;  // by cell of the map's fixed frame
+  std::map<int64_t, FalseCell> false_cells_;  // key: cell of the map's fixed frame
   SeenCells seen_ground_;
   std::set<int64_t> observed_inside_, free_inside_;
   std::optional<Eigen::Vector2d> last_position_m_;
-  ObstacleMapErrors sums_;  // of maps, travel and moving objects; the other members are not set
+  ObstacleMapErrors sums_;  // totals of maps, travel and moving objects; the other members are not set
 };
 
 }  // namespace vcharge

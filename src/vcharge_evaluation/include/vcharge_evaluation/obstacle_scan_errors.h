@@ -21,8 +21,8 @@ struct ObstacleScanEvaluationOptions {
 /// Errors of the reported ranges of a set of rays.
 struct RayErrors {
   size_t num_judged = 0;              ///< rays with a true obstacle in bounds
-  size_t num_missed = 0;              ///< nothing reported within 0.5 m behind it
-  size_t num_nearer = 0;              ///< reported more than 0.5 m before it
+  size_t num_missed = 0;              ///< rays without a reported range up to 0.5 m behind it
+  size_t num_nearer = 0;              ///< rays with a reported range over 0.5 m in front of it
   ErrorDistribution error_m;          ///< absolute errors of the other rays
   ErrorDistribution error_own_ray_m;  ///< the same against the truth of the ray itself
   double mean_signed_m = 0.0;

@@ -28,7 +28,7 @@ struct RangeEvaluationOptions {
 struct RangeAccuracy {
   double density = 0.0;
   double fraction_within_tolerance = 0.0;
-  double median_relative_error = 0.0;  ///< of the known ranges among them
+  double median_relative_error = 0.0;  ///< median over the known ranges among these pixels
   double fraction_known = 0.0;
 };
 
@@ -48,7 +48,7 @@ struct RangeErrors {
   size_t num_known = 0;   ///< judged pixels with a range
   std::vector<RangeAccuracy> accuracy;
   double fraction_within_one_sigma =
-      0.0;  ///< of the known ranges; 0.683 for normal errors and a correct sigma
+      0.0;  ///< fraction of the known ranges; 0.683 for normal errors and a correct sigma
   double fraction_within_two_sigma = 0.0;
   std::vector<RangeBin> by_truth;
   std::vector<RangeBin> by_confidence;

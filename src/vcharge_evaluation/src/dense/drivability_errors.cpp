@@ -9,7 +9,7 @@ namespace vcharge {
 namespace {
 
 constexpr double kMargin_m = 0.1;
-constexpr double kOverGround_m = 0.3;  // higher surfaces are no ground
+constexpr double kOverGround_m = 0.3;  // higher surfaces are not ground
 
 void judgeFaces(const cv::Mat& states, double cell_size_m, const MapInWorld& in_world,
                 const std::vector<HeightStep>& steps, const IsRigid& is_rigid, DrivabilityErrors* errors) {

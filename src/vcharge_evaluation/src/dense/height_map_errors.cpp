@@ -25,13 +25,13 @@ constexpr double kSearch_m = 0.4;          // distance within which a step is se
 constexpr double kKerbLow_m = 0.1;         // heights of steps that are kerbs
 constexpr double kKerbHigh_m = 0.14;
 constexpr double kFromPlants_m = 0.3;
-constexpr double kCrownReach_m = 3.5;   // of a tree's leaves from its stem
+constexpr double kCrownReach_m = 3.5;   // distance of a tree's leaves from its stem
 constexpr double kUnderCrowns_m = 0.3;  // height above its foot up to which there are no leaves
 constexpr double kOnFootprint_m = 0.1;
 constexpr double kKerbTolerance_m = 0.03;
 constexpr double kOverGrass_m = 0.4;
 constexpr double kNotMapped = std::numeric_limits<double>::quiet_NaN();
-// A surface is judged if it is visible in so many frames, 0.3 m apart.
+// A surface is judged if it is visible in at least this many frames, 0.3 m apart.
 constexpr int kMinViews = 3;
 
 /// Errors of all visible cells away from steps, summed row by row for determinism. Returns a mask (CV_8UC1)
@@ -117,7 +117,7 @@ void judgeSteps(const MapInWorld& in_world, const SurfaceVisibility& visibility,
 }
 
 /// Distance along a line at which the map's ground ends, if no ground is mapped for 0.1 m beyond. Behind the
-/// face of a wall or pillar the map has no height, as no camera sees it. Heights above the level are no
+/// face of a wall or pillar the map has no height, as no camera sees it. Heights above the level are not
 /// ground, such as the roof of a car behind a side without heights.
 std::optional<double> findEnd(const HeightAt& height, const Eigen::Vector2d& start_m,
                               const Eigen::Vector2d& direction, double level_m, double cell_size_m) {

@@ -10,17 +10,17 @@
 namespace vcharge {
 namespace {
 
-constexpr double kSample_m = 0.01;      // along a line
+constexpr double kSample_m = 0.01;      // distance between samples along a line
 constexpr double kFlat_m = 0.03;        // largest difference of heights on a plateau
 constexpr double kReadHeight_m = 0.15;  // height above the ground at which a high step is located
-constexpr double kBeside_m = 0.1;       // from a line to those beside it
-constexpr double kMaxSkew_m = 0.058;    // of the edge on those lines: 30 degrees
-constexpr double kSpacing_m = 0.1;      // between the lines that are searched
-constexpr double kMinLength_m = 0.5;    // of a tape-measure distance
+constexpr double kBeside_m = 0.1;       // distance from a line to those beside it
+constexpr double kMaxSkew_m = 0.058;    // offset of the edge on those lines: 30 degrees
+constexpr double kSpacing_m = 0.1;      // distance between the lines that are searched
+constexpr double kMinLength_m = 0.5;    // shortest tape-measure distance
 constexpr double kMaxLength_m = 6.0;
-constexpr double kFarApart_m = 12.8;   // between measurements of one kind; halved repeatedly
-constexpr double kApart_m = 0.4;       // down to this if there is too little room
-constexpr double kOverEdge_m = 0.05;   // from an edge onto the object that it belongs to
+constexpr double kFarApart_m = 12.8;   // between measurements of one kind at first; halved repeatedly
+constexpr double kApart_m = 0.4;       // smallest such distance, if there is too little room
+constexpr double kOverEdge_m = 0.05;   // distance from an edge onto the object that it belongs to
 constexpr double kOnOneLine_m = 0.02;  // offset of two steps on one line
 
 bool isFlat(const HeightMap& map, const Eigen::Vector2d& position_m, const Eigen::Vector2d& direction,

@@ -7,7 +7,7 @@
 
 namespace vcharge {
 
-/// The cell whose centre is nearest to a point in the map's frame; it may be outside the map.
+/// The cell whose centre is nearest to a point in the map's frame; it may lie outside the map.
 inline cv::Point nearestCell(const HeightMap& map, const Eigen::Vector2d& point_m) {
   const Eigen::Vector2d cell = (point_m - map.origin_m) / map.cell_size_m;
   return {static_cast<int>(std::lround(cell.x())), static_cast<int>(std::lround(cell.y()))};

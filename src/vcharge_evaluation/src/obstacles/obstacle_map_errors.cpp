@@ -11,11 +11,11 @@
 namespace vcharge {
 namespace {
 
-// The vehicle, from its rear axle: front axle, middle, and half its width.
+// Distances of the vehicle's front axle and middle from its rear axle, and half its width.
 constexpr double kWheelbase_m = 2.6;
 constexpr double kMiddle_m = 1.4;
 constexpr double kHalfWidth_m = 0.9;
-// An obstacle is at least this wide. It is visible with so many points between these heights, must be
+// An obstacle is at least this wide. It is visible with this many points between these heights, must be
 // reported after this travel, and is reported by an occupied cell within this distance.
 constexpr double kMinWidth_m = 0.1;
 constexpr int kMinSeenPoints = 15;
@@ -33,7 +33,7 @@ constexpr float kInsideHeight_m = 0.2F;
 // Points on the outlines of kerbs between these heights are judged.
 constexpr double kKerbMin_m = 0.1;
 constexpr double kKerbMax_m = 0.16;
-constexpr double kSeenKerbHeight_m = 0.04;  // of a visible point of a kerb
+constexpr double kSeenKerbHeight_m = 0.04;  // height of a visible point of a kerb
 constexpr double kKerbStep_m = 0.1;
 constexpr double kKerbTolerance_m = 0.15;
 constexpr double kKerbWidth_m = 0.2;

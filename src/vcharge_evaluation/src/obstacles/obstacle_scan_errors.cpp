@@ -16,7 +16,7 @@ constexpr double kMinHeight_m = 0.1;
 constexpr double kMaxHeight_m = 2.0;
 // An obstacle reaches the judged height within this distance behind its nearest point.
 constexpr double kRiseDepth_m = 0.3;
-// A reported range further off belongs to another obstacle or to none.
+// A reported range that differs by more belongs to another obstacle or to none.
 constexpr double kGate_m = 0.5;
 
 /// True obstacles in one sector.

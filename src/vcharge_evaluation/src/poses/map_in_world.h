@@ -25,7 +25,7 @@ class MapInWorld {
     return (world_from_map_ * Eigen::Vector3d(in_map.x(), in_map.y(), height)).z();
   }
 
-  /// As heightAt(), of the nearest cell.
+  /// Like heightAt(), but the height of the nearest cell without interpolation.
   double cellHeightAt(const Eigen::Vector2d& point_m, double about_m) const {
     const Eigen::Vector3d in_map = inMap(point_m, about_m);
     const double height = nearestHeight(map_, in_map.head<2>());

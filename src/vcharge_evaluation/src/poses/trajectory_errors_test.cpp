@@ -104,7 +104,7 @@ TEST(AlignPointsTest, RecoversARandomTransform) {
     const RigidTransform target_from_source(Eigen::Quaterniond(next(), next(), next(), next()),
                                             Eigen::Vector3d(next(), next(), next()));
     std::vector<Eigen::Vector3d> source, target;
-    const bool planar = trial % 2 == 0;  // planar points also allow a reflection, which is no rotation
+    const bool planar = trial % 2 == 0;  // planar points also allow a reflection, which is not a rotation
     for (int i = 0; i < 10; ++i) {
       source.emplace_back(next(), next(), planar ? 0.0 : next());
       target.push_back(target_from_source * source.back());

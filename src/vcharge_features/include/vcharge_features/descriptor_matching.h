@@ -10,7 +10,7 @@
 
 namespace vcharge {
 
-/// A row of descriptors and its distance: Hamming for CV_8UC1, Euclidean for CV_32FC1. Index -1: none.
+/// Row of a descriptor and its distance: Hamming for CV_8UC1, Euclidean for CV_32FC1. Index -1: none.
 struct DescriptorNeighbour {
   int index = -1;
   float distance = 0.0F;

@@ -27,8 +27,8 @@ class HammingIndex {
 
  private:
   struct Table {
-    std::vector<int32_t> begin;    ///< by value of the piece, plus the end
-    std::vector<int32_t> indices;  ///< of descriptors, by value
+    std::vector<int32_t> begin;    ///< first index per value of the piece, plus the end
+    std::vector<int32_t> indices;  ///< indices of descriptors, ordered by value
   };
 
   const cv::Mat descriptors_;

@@ -30,7 +30,7 @@ struct PatchWarp {
 /// by Gauss-Newton steps from `start` (inverse compositional, Baker and Matthews, IJCV 2004), independent of
 /// brightness and contrast. Estimating the shape avoids the bias that a translation alone has when the scene
 /// comes nearer. Empty if `current` is empty, or if the patch leaves an image, has no texture, does not
-/// converge, or differs after the alignment.
+/// converge, or still differs after the alignment.
 std::optional<PatchWarp> alignPatch(const cv::Mat& anchor, const cv::Mat& current,
                                     const Eigen::Vector2d& anchor_px, const PatchWarp& start,
                                     const PatchAlignmentOptions& options);

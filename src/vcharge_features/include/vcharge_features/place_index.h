@@ -11,7 +11,7 @@
 
 namespace vcharge {
 
-/// A place that looks like the query.
+/// A place whose images are similar to the query's.
 struct PlaceMatch {
   int place = -1;      ///< number of the place
   double score = 0.0;  ///< higher is better; in [0, number of cameras] for PlaceIndex

@@ -29,8 +29,8 @@ struct PlaceVotesOptions {
 class PlaceVotes {
  public:
   /// Descriptor i belongs to image images[i] = place * num_cameras + camera. Descriptors of numbers are
-  /// compared by 256 bits that tell which of two numbers is larger. Throws std::logic_error for inconsistent
-  /// counts or images, std::invalid_argument for bad options or descriptors.
+  /// compared by 256 bits, each of which says which of two numbers is larger. Throws std::logic_error for
+  /// inconsistent counts or images, std::invalid_argument for bad options or descriptors.
   PlaceVotes(const cv::Mat& descriptors, std::vector<int32_t> images, int num_places, int num_cameras,
              const PlaceVotesOptions& options = PlaceVotesOptions());
 
@@ -51,7 +51,7 @@ class PlaceVotes {
   const int num_places_, num_cameras_;
   const int type_, columns_;
   const std::vector<int32_t> images_;
-  cv::Mat mean_;  // of descriptors of numbers
+  cv::Mat mean_;  // mean descriptor, for descriptors of numbers
   std::unique_ptr<HammingIndex> index_;
 };
 

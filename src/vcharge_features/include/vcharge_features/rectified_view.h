@@ -78,7 +78,7 @@ struct RectifiedPair {
 };
 
 /// Pairs of views on a common image plane of two cameras of a rig at two times of a drive (paper, section
-/// Inter-Camera Feature Matching): in them, features look alike that the fisheye images show rotated and
+/// Inter-Camera Feature Matching), in which features are similar that the fisheye images show rotated and
 /// distorted differently. Keeps the most recent pairs. Not thread safe.
 class RectifiedViewCache {
  public:

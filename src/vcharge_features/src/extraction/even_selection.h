@@ -11,7 +11,7 @@ namespace vcharge {
 constexpr int kGridColumns = 4;
 constexpr int kGridRows = 3;
 
-/// A feature to be selected or not.
+/// A feature that may be selected.
 struct SelectionCandidate {
   cv::Point2f position_px;
   float response = 0.0F;

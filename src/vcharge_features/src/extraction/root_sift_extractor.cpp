@@ -12,7 +12,7 @@ namespace {
 
 constexpr float kDegree = 0.017453292519943295F;
 constexpr int kMinSize_px = 16;
-// OpenCV's defaults, which are Lowe's.
+// OpenCV's defaults, which are those of Lowe.
 constexpr int kOctaveLayers = 3;
 constexpr double kEdgeThreshold = 10.0;
 constexpr double kSigma_px = 1.6;

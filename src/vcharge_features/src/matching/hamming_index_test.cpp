@@ -23,7 +23,7 @@ cv::Mat randomDescriptors(int count, unsigned seed) {
   return descriptors;
 }
 
-/// A copy with `count` different bits flipped.
+/// A copy in which `count` different bits are flipped.
 cv::Mat withFlips(const cv::Mat& descriptor, int count, std::mt19937* random) {
   cv::Mat flipped = descriptor.clone();
   std::vector<int> bits(kBits);

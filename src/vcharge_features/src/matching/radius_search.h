@@ -27,7 +27,7 @@ class RadiusSearch {
   const double radius_;
   Eigen::Vector3d min_ = Eigen::Vector3d::Zero(), max_ = Eigen::Vector3d::Zero();
   double cell_size_ = 1.0;
-  std::vector<std::pair<uint64_t, int32_t>> sorted_;  // by cell, then by index
+  std::vector<std::pair<uint64_t, int32_t>> sorted_;  // key of the cell and index of the point, sorted
 };
 
 }  // namespace vcharge

@@ -16,8 +16,8 @@ constexpr int kPlaces = 40;
 constexpr int kCameras = 2;
 constexpr int kFeatures = 60;  ///< features of an image
 
-/// Places that look alike: the features of all are variations of a few kinds, like corners of parked cars.
-/// The second camera's kinds differ from the first's.
+/// Places that are hard to distinguish: their features are variations of a few kinds, like corners of parked
+/// cars. The second camera's kinds differ from the first's.
 class AlikePlaces {
  public:
   explicit AlikePlaces(int type) : type_(type) {}

@@ -70,7 +70,7 @@ VocabularyTree VocabularyTree::train(const std::vector<cv::Mat>& descriptors_of_
     for (size_t i = 0; i < open.size(); ++i) {
       const size_t num_children = clusters[i].members.size();
       if (num_children < 2) {
-        continue;  // all descriptors are alike: a leaf
+        continue;  // all descriptors are equal, so the node is a leaf
       }
       tree.nodes_[open[i].node].first_child = static_cast<int32_t>(tree.nodes_.size());
       tree.nodes_[open[i].node].num_children = static_cast<int32_t>(num_children);

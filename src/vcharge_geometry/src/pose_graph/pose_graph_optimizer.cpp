@@ -14,7 +14,7 @@ namespace {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-/// A with A^T A = information, which may be singular.
+/// Matrix A with A^T A = information, which may be singular.
 Matrix6d squareRoot(const Matrix6d& information) {
   const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(information);
   return eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.eigenvectors().transpose();

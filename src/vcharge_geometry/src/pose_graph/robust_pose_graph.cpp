@@ -12,7 +12,7 @@
 namespace vcharge {
 namespace {
 
-/// Odometry steps, at either end, between two loop edges that are compared.
+/// Maximum number of odometry steps, at either end, between two loop edges that are compared.
 constexpr int64_t kMaxCycleSteps = 5;
 /// A loop edge above this is false if the information matrices are right.
 constexpr double kMaxEdgeChiSquared = 16.0;

@@ -16,7 +16,7 @@ namespace {
 struct FileWithFalseLoops {
   const char* name;
   size_t num_false;
-  double optimal_chi_squared;  ///< of the true edges
+  double optimal_chi_squared;  ///< sum over the true edges
 };
 
 class FalseLoopsTest : public testing::TestWithParam<FileWithFalseLoops> {};

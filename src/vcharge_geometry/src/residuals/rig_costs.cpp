@@ -128,7 +128,7 @@ class KnownCameraReprojectionCost : public ceres::SizedCostFunction<2, 7, 7, 3> 
   const double weight_;
 };
 
-/// A with A^T A = information. Throws std::logic_error unless it is symmetric and positive semidefinite.
+/// Matrix A with A^T A = information. Throws std::logic_error unless it is symmetric positive semidefinite.
 Matrix6d squareRootOf(const Matrix6d& information) {
   check(information.allFinite() && information.isApprox(information.transpose(), 1e-9),
         "information: expected a finite, symmetric matrix");

@@ -14,7 +14,7 @@
 namespace vcharge {
 namespace {
 
-/// Matches of which the first num_wrong are wrong: their two points are unrelated.
+/// Matches, the first num_wrong of which are wrong: their two points are unrelated.
 std::vector<RayMatch> rayMatches(RandomProblems* random, const RigidTransform& previous_from_current,
                                  int num_matches, int num_wrong, double sigma_rad, double same_camera = 0.8) {
   std::vector<RayMatch> matches;

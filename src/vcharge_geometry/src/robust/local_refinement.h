@@ -39,9 +39,9 @@ class RobustSums {
 
   double cost = 0.0;
   int num_components = 0;                  ///< components of the inliers' residuals
-  double squared_sum = 0.0;                ///< over the inliers
-  double influence_squared_sum = 0.0;      ///< of the first derivative of rho
-  double influence_slope_sum = 0.0;        ///< of the trace of its second derivative
+  double squared_sum = 0.0;                ///< sum of the squared residuals of the inliers
+  double influence_squared_sum = 0.0;      ///< sum of the squared first derivatives of rho
+  double influence_slope_sum = 0.0;        ///< sum of the traces of the second derivative of rho
   Matrix6d weighted = Matrix6d::Zero();    ///< sum of w J^T J
   Matrix6d unweighted = Matrix6d::Zero();  ///< sum of J^T J over the inliers
   Vector6d gradient = Vector6d::Zero();    ///< sum of w J^T e

@@ -143,7 +143,7 @@ TYPED_TEST(RelativeSolverTest, SaysThatStraightMotionWithinCamerasHidesTheScale)
     }
     num_right += right && num_hidden == 1 ? 1 : 0;
   }
-  // The others are problems with nearly parallel rows for any yaw.
+  // The remaining problems have nearly parallel rows for any yaw.
   EXPECT_GE(num_right, static_cast<int>(0.999 * kNumProblems));
 }
 

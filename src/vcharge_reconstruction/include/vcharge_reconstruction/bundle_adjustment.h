@@ -35,15 +35,15 @@ struct BundleAdjustmentOptions {
 struct BundleAdjustmentSummary {
   bool converged = false;
   int num_iterations = 0;
-  int64_t num_observations = 0;  ///< that were kept
+  int64_t num_observations = 0;  ///< observations that were kept
   int64_t num_removed_observations = 0;
   int64_t num_removed_landmarks = 0;
   double rms_px = 0.0;  ///< error per coordinate of the observations that were kept
 };
 
 /// Adjusts the keyframes (six degrees of freedom; the first is fixed), the landmarks and the odometer's
-/// factors to the least robust sum of reprojection and odometry errors; the extrinsics are fixed. Then calls
-/// removeOutliers().
+/// factors so that the robust sum of reprojection and odometry errors is least, with fixed extrinsics. Calls
+/// removeOutliers() at the end.
 BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, ReconstructionData* data);
 
 // The steps of adjustBundle(), for adjustments with further terms.

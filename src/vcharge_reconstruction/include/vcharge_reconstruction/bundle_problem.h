@@ -42,14 +42,14 @@ struct BundleProblem {
 
   // Unknowns, with their initial values.
   std::vector<RigidTransform> map_from_vehicle;
-  bool is_first_pose_fixed = true;  ///< false where point_information fixes the map's frame
+  bool is_first_pose_fixed = true;  ///< false if point_information fixes the map's frame
   std::vector<Eigen::Vector3d> points_in_map;
-  Eigen::Vector2d odometer = Eigen::Vector2d::Ones();  ///< true over counted distance, and turn
-  std::vector<RigidTransform> vehicle_from_camera;     ///< one per camera; empty: the rig's extrinsics hold
+  Eigen::Vector2d odometer = Eigen::Vector2d::Ones();  ///< ratios of true to counted distance and turn
+  std::vector<RigidTransform> vehicle_from_camera;     ///< one per camera; empty to use the rig's extrinsics
 
   // Terms.
   std::vector<BundleObservation> observations;         ///< grouped by point, ordered by pose within a point
-  std::vector<size_t> first_observation;               ///< one per point, then the number of observations
+  std::vector<size_t> first_observation;               ///< index per point, then the number of observations
   std::vector<GroundObservation> ground_observations;  ///< ordered by point, then by pose
   std::vector<OdometerFactor> odometer_factors;
   Eigen::Vector2d odometer_sigmas = Eigen::Vector2d::Ones();  ///< prior of `odometer`, around 1

@@ -13,7 +13,7 @@ struct BundleSolution {
 };
 
 /// Levenberg-Marquardt on the reduced system of the poses (Schur complement of the points), factorized by
-/// CHOLMOD. The robust loss is a weight that each iteration computes anew. Ends after `max_iterations` or
+/// CHOLMOD. Each iteration recomputes the weights of the robust loss. Ends after `max_iterations` or
 /// when the relative decrease of the cost is at most `cost_tolerance`. Data parallel, with sums in a fixed
 /// order: the same result on any number of threads. std::logic_error where the problem's lists do not fit
 /// together.
@@ -22,7 +22,7 @@ BundleSolution solveBundle(int max_iterations, double cost_tolerance, BundleProb
 /// Uncertainty of the odometer's factors and the extrinsics of an adjusted problem; rows and columns
 /// [distance, turn, then dt, dphi of each camera].
 struct BundleCovariance {
-  bool is_valid = false;  ///< false where an unknown is not observable
+  bool is_valid = false;  ///< false if an unknown is not observable
   /// Marginal covariance (Schur complement) for independent errors with the given standard deviations.
   Eigen::MatrixXd covariance;
   /// Contribution of each pose's terms (its observations and its odometer factor) to the unknowns, one column

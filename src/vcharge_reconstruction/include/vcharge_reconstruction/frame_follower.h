@@ -40,7 +40,7 @@ class FrameFollower : public DriveConsumer {
   void processFrame(Timestamp stamp, const std::vector<Image>& images,
                     const RigidTransform& odom_from_vehicle);
   MatchesByCamera track(const std::vector<Image>& images, const RigidTransform& odometry_motion);
-  /// Motion from the frame before; ends the tracks that contradict it.
+  /// Estimates the motion from the previous frame; ends the tracks that contradict it.
   EgoMotion estimateMotion(const MatchesByCamera& matches, const RigidTransform& odometry_motion);
   void addKeyframe(Timestamp stamp, const std::vector<Image>& images, const RigidTransform& odom_from_vehicle,
                    const RigidTransform& keyframe_from_vehicle, MotionHypothesis motion);
@@ -51,7 +51,7 @@ class FrameFollower : public DriveConsumer {
   ReconstructionState* const state_;
   const KeyframeCallback on_keyframe_;
   const std::unique_ptr<FeatureExtractor> extractor_;
-  std::vector<CameraTracker> trackers_;  // by camera
+  std::vector<CameraTracker> trackers_;  // one per camera
   KeyframeBuilder keyframes_;
   FrameGatherer gatherer_;
   RigidTransform previous_odom_from_vehicle_, map_from_vehicle_;

@@ -13,8 +13,8 @@
 
 namespace vcharge {
 
-/// The frames of a drive for mapping and calibration: a FrameAssembler that waits for everything, and a
-/// report of the frames that are skipped. Frames without odometry are not used; resets of the odometer are
+/// Assembles the frames of a drive for mapping and calibration: waits for all images and odometry and reports
+/// the frames that are skipped. Frames without odometry are not used; resets of the odometer are
 /// bridged.
 class FrameGatherer : public DriveConsumer {
  public:
@@ -22,13 +22,13 @@ class FrameGatherer : public DriveConsumer {
   using FrameCallback =
       std::function<void(Timestamp, const std::vector<Image>&, const RigidTransform& odom_from_vehicle)>;
 
-  /// The report must outlive this object. `max_speed_m_per_s`: faster odometry is a reset of the odometer.
+  /// The report must outlive this object. Odometry faster than `max_speed_m_per_s` is an odometer reset.
   FrameGatherer(std::shared_ptr<const CameraRig> rig, double max_speed_m_per_s, ReconstructionReport* report,
                 FrameCallback on_frame);
 
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
-  /// Hands out what waits: the drive is over.
+  /// Hands out the waiting frames at the end of the drive.
   void finish() { assembler_.finish(); }
   /// Reports that a frame was not used, or not completely.
   void noteSkipped(Timestamp stamp, const std::string& reason);
@@ -45,7 +45,7 @@ class FrameGatherer : public DriveConsumer {
   const std::shared_ptr<const CameraRig> rig_;
   ReconstructionReport* const report_;
   const FrameCallback on_frame_;
-  std::map<std::string, LastSkipped> last_skipped_;  // by reason
+  std::map<std::string, LastSkipped> last_skipped_;  // key: reason
   FrameAssembler<Image> assembler_;
 };
 

@@ -37,8 +37,8 @@ struct LiveTrack {
   int32_t anchor_keyframe = 0;  ///< keyframe whose image has the reference patch
   cv::Point2f anchor_px;
   Eigen::Matrix2d shape =
-      Eigen::Matrix2d::Identity();          ///< of the patch at the last keyframe, from the anchor
-  cv::Point2f last_step_px = {0.0F, 0.0F};  ///< from the previous image
+      Eigen::Matrix2d::Identity();          ///< deformation of the patch from its anchor to the last keyframe
+  cv::Point2f last_step_px = {0.0F, 0.0F};  ///< motion from the previous image
 };
 
 /// Tracks the points of one camera through its images. At keyframes each patch is aligned with its anchor,
@@ -46,7 +46,7 @@ struct LiveTrack {
 /// velocity, and matches are in the camera's frame instead of the vehicle's.
 class CameraTracker {
  public:
-  /// Both must outlive this object.
+  /// Both arguments must outlive this object.
   CameraTracker(const RigCamera& camera, const FrameTrackerOptions& options);
 
   /// Tracks all points into the next image; predicts them for a vehicle that moved by
@@ -55,10 +55,10 @@ class CameraTracker {
   void track(const Image& image, const RigidTransform& previous_from_current, int camera_index,
              std::vector<RayMatch>* matches);
 
-  /// Ends the tracks whose match (of the last call of track()) is false.
+  /// Ends the tracks whose entry in `is_good` (one per match of the last track()) is false.
   void keep(const std::vector<bool>& is_good);
 
-  /// Records all points at a keyframe and starts tracks at features that are not close to one.
+  /// Records all points at a keyframe and starts tracks at features that are not close to a tracked point.
   void addKeyframe(int32_t keyframe, int32_t camera_index, const FeatureExtractor& extractor,
                    ReconstructionData* data);
 
@@ -76,7 +76,7 @@ class CameraTracker {
   Image image_;
   ImagePyramid pyramid_;
   std::vector<LiveTrack> tracks_;
-  std::map<int32_t, Image> anchors_;  // by keyframe, while a track refers to it
+  std::map<int32_t, Image> anchors_;  // key: keyframe; kept while a track refers to it
 };
 
 }  // namespace vcharge

@@ -26,7 +26,7 @@ class KeyframeBuilder {
   /// Whether a frame that moved this far since the last keyframe becomes one; the first frame always does.
   bool isDue(const RigidTransform& keyframe_from_vehicle) const;
 
-  /// Appends a keyframe without images; `keyframe_from_vehicle` is its pose relative to the one before.
+  /// Appends a keyframe without images; `keyframe_from_vehicle` is its pose relative to the previous one.
   /// Returns its index.
   int32_t addKeyframe(Keyframe keyframe, const RigidTransform& keyframe_from_vehicle,
                       MotionHypothesis motion);

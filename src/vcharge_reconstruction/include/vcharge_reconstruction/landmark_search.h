@@ -20,8 +20,8 @@ struct LandmarkSearchSummary {
   int64_t num_merged_tracks = 0;
 };
 
-/// Searches for landmarks in all images that should see them according to the poses, of any camera and any
-/// visit, and adds the observations; merges two landmarks that share a feature. Data parallel, deterministic.
+/// Searches for landmarks in all images, of any camera and visit, in which the poses predict them; adds the
+/// observations; merges two landmarks that share a feature. Data parallel, deterministic.
 LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, ReconstructionData* data);
 
 }  // namespace vcharge

@@ -39,18 +39,18 @@ struct LoopEdge {
 
 using LoopProgress = std::function<void(double)>;
 
-/// Trains a vocabulary from the drive itself. InputError where it has no features.
+/// Trains a vocabulary from the drive itself. InputError if the drive has no features.
 std::shared_ptr<const VocabularyTree> trainVocabulary(const ReconstructionData& data);
 
-/// Finds candidates of every keyframe by the features of all cameras (paper, section Loop-Closure Detection),
-/// and verifies each with verifyLoop(). Data parallel, deterministic.
+/// Finds loop candidates for every keyframe by the features of all cameras (paper, section Loop-Closure
+/// Detection), and verifies each with verifyLoop(). Data parallel, deterministic.
 std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
                                 const std::shared_ptr<const VocabularyTree>& vocabulary,
                                 const ReconstructionData& data, const LoopProgress& progress);
 
-/// Verifies one pair of keyframes by the pairs of cameras (of `first`, of `second`) with similar images: by
-/// the planar 3-point solver, or the 4-point solver with known vertical; the metric pose is that of one rig
-/// among the landmarks of the other (generalized P3P). The result's reason is empty where the loop is
+/// Verifies one pair of keyframes on the pairs of cameras (of `first`, of `second`) with similar images: with
+/// the planar 3-point solver, or the 4-point solver with known vertical. The metric pose follows from the
+/// rays of one rig and the landmarks of the other (generalized P3P). The result's reason is empty if it is
 /// verified.
 LoopEdge verifyLoop(const LoopClosureOptions& options, const ReconstructionData& data, int32_t first,
                     int32_t second, const std::vector<std::pair<int, int>>& camera_pairs);

@@ -51,8 +51,8 @@ struct LandmarkObservation {
   cv::Point2f position_px;
 };
 
-/// The vehicle's pose by the images of one instant. Pose and covariance are valid for kLocalized, and for
-/// kAmbiguous as those of the better pose.
+/// Pose of the vehicle from the images of one instant. Pose and covariance are valid for kLocalized; for
+/// kAmbiguous they are those of the better pose.
 struct PoseFix {
   LocalizationStatus status = LocalizationStatus::kTooFewMatches;
   RigidTransform map_from_vehicle;
@@ -60,15 +60,15 @@ struct PoseFix {
   int num_matches = 0;
   std::vector<int> matches_of_camera, inliers_of_camera;
   std::vector<LandmarkObservation> inliers;
-  double second_best_ratio = 0.0;  ///< inliers of the best pose elsewhere over these; 0 with a prior
+  double second_best_ratio = 0.0;  ///< inliers of the best pose elsewhere relative to these; 0 with a prior
 
   int numInliers() const { return static_cast<int>(inliers.size()); }
 };
 
 /// Features of the rig's images of one instant.
 struct RigFeatures {
-  std::vector<ImageFeatures> images;             ///< by camera; empty for a missing image
-  std::vector<Eigen::Matrix3Xd> rays_in_camera;  ///< bearings of the features; zero where there is none
+  std::vector<ImageFeatures> images;             ///< one per camera; empty for a missing image
+  std::vector<Eigen::Matrix3Xd> rays_in_camera;  ///< bearings of the features; zero if a pixel has none
 };
 
 class LandmarkMatcher;
@@ -95,10 +95,10 @@ class MapLocalizer {
   PoseFix localizeNear(const RigFeatures& features, const PosePrior& prior) const;
 
   /// Relocalization: the best of the candidates of place recognition over the whole rig. Status kAmbiguous
-  /// where two places fit.
+  /// if two places fit the images.
   PoseFix localizeAnywhere(const RigFeatures& features) const;
 
-  /// Least number of inliers of a relocalization with these images.
+  /// Minimum number of inliers of a relocalization with these images.
   int minInliersWithoutPrior(const RigFeatures& features) const;
 
   const SparseMap& map() const { return *map_; }
@@ -107,7 +107,7 @@ class MapLocalizer {
   MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
                const MapLocalizerOptions& options, std::shared_ptr<const PlaceVotes> places);
 
-  /// A fix without a pose that has the numbers of matches.
+  /// A fix without a pose, with the numbers of matches filled in.
   PoseFix fixWithoutPose(const LandmarkMatches& matches) const;
   PoseFix estimate(const LandmarkMatches& matches, int min_inliers, double min_inlier_ratio) const;
   PoseFix refine(const RigFeatures& features, const PoseFix& fix, int min_inliers) const;
@@ -118,9 +118,9 @@ class MapLocalizer {
   const std::shared_ptr<const SparseMap> map_;
   const std::shared_ptr<const CameraRig> rig_;
   const MapLocalizerOptions options_;
-  RobustOptions robust_;  // with the resolution of the rig's images
+  RobustOptions robust_;  // adapted to the resolution of the rig's images
   std::unique_ptr<FeatureExtractor> extractor_;
-  std::vector<cv::Mat> masks_;  // by camera
+  std::vector<cv::Mat> masks_;  // one per camera
   std::unique_ptr<LandmarkMatcher> matcher_;
   std::shared_ptr<const PlaceVotes> places_;
 };

@@ -24,9 +24,9 @@ struct KeyframeImage {
 /// The vehicle at an instant that becomes part of the map.
 struct Keyframe {
   Timestamp stamp;
-  RigidTransform odom_from_vehicle;   ///< as counted by the odometer
+  RigidTransform odom_from_vehicle;   ///< pose counted by the odometer
   RigidTransform map_from_vehicle;    ///< estimated
-  double travelled_m = 0.0;           ///< by the odometer, since the start of the drive
+  double travelled_m = 0.0;           ///< distance by the odometer, since the start of the drive
   std::vector<KeyframeImage> images;  ///< in the rig's order; without features where an image is missing
 };
 
@@ -51,8 +51,8 @@ struct ReconstructionData {
   std::shared_ptr<const CameraRig> rig;
   std::vector<Keyframe> keyframes;
   std::vector<Track> tracks;
-  double odometry_distance_scale = 1.0;  ///< true over counted distance
-  double odometry_turn_scale = 1.0;      ///< true over counted turn
+  double odometry_distance_scale = 1.0;  ///< ratio of true to counted distance
+  double odometry_turn_scale = 1.0;      ///< ratio of true to counted turn
 };
 
 }  // namespace vcharge

@@ -9,23 +9,23 @@
 
 namespace vcharge {
 
-/// A frame that was followed.
+/// Pose of a processed frame relative to a keyframe.
 struct FramePose {
   Timestamp stamp;
-  int32_t keyframe = 0;  ///< the last keyframe
+  int32_t keyframe = 0;  ///< index of the latest keyframe at that time
   RigidTransform keyframe_from_vehicle;
-  MotionHypothesis motion = MotionHypothesis::kOdometry;  ///< from the previous frame
+  MotionHypothesis motion = MotionHypothesis::kOdometry;  ///< model of the motion from the previous frame
 };
 
 /// A reconstruction and how it was made; the steps of a recipe change it one after the other.
 struct ReconstructionState {
   ReconstructionData data;
   std::vector<FramePose> frames;
-  std::vector<RigidTransform> keyframe_from_next;  ///< by the motions of the frames, before adjustment
+  std::vector<RigidTransform> keyframe_from_next;  ///< from the motions of the frames, before adjustment
   ReconstructionReport report;
 };
 
-/// Poses of all frames in the map, by the current poses of the keyframes.
+/// Poses of all frames in the map, based on the current poses of the keyframes.
 Trajectory trajectoryOf(const ReconstructionState& state);
 
 }  // namespace vcharge

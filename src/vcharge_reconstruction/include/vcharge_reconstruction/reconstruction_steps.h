@@ -11,7 +11,7 @@ namespace vcharge {
 
 // Steps that the recipes of mapping and calibration share.
 
-/// Finds and verifies loops, closes them by a robust pose graph, and triangulates anew.
+/// Finds and verifies loops, closes them by a robust pose graph, and triangulates all tracks again.
 void findAndCloseLoops(const ReconstructionOptions& options, const LoopProgress& progress,
                        ReconstructionState* state);
 

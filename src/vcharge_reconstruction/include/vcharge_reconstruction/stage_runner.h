@@ -12,9 +12,9 @@ namespace vcharge {
 /// Progress of a reconstruction.
 struct StageProgress {
   std::string stage;
-  int number = 1;  ///< of the stage, from 1
+  int number = 1;  ///< number of the stage, from 1
   int num_stages = 1;
-  double fraction = 0.0;  ///< of the stage
+  double fraction = 0.0;  ///< completed fraction of the stage
 };
 using StageCallback = std::function<void(const StageProgress&)>;
 

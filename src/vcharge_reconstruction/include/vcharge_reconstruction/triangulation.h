@@ -19,14 +19,14 @@ struct TriangulationOptions {
   VCHARGE_END_OPTIONS();
 };
 
-/// The point nearest to rays (unit directions) of one frame. Empty where the rays are too parallel, meet
+/// The point nearest to rays (unit directions) of one frame. nullopt if the rays are too parallel, meet
 /// behind a camera or out of range, or miss the point by too much.
 std::optional<Eigen::Vector3d> triangulate(const std::vector<Ray>& rays, const TriangulationOptions& options);
 
-/// The ray of an observation in the map. False where the camera has no ray at that pixel.
+/// The ray of an observation in the map. False if the camera has no ray at that pixel.
 bool observationRay(const ReconstructionData& data, const TrackObservation& observation, Ray* ray_in_map);
 
-/// Triangulates every track from the poses of the keyframes; tracks that cannot be lose their position. Data
+/// Triangulates every track from the poses of the keyframes; a track loses its position if this fails. Data
 /// parallel.
 void triangulateTracks(const TriangulationOptions& options, ReconstructionData* data);
 

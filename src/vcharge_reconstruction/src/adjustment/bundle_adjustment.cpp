@@ -32,7 +32,7 @@ struct TrackCheck {
   bool was_landmark = false, is_landmark = false;
 };
 
-/// Reprojection error of an observation. False where the camera does not project the landmark.
+/// Reprojection error of an observation. False if the camera does not project the landmark.
 bool reproject(const ReconstructionData& data, const Track& track, const TrackObservation& observation,
                Eigen::Vector2d* error_px) {
   const RigCamera& camera = data.rig->cameras[observation.camera];
@@ -46,8 +46,8 @@ bool reproject(const ReconstructionData& data, const Track& track, const TrackOb
   return true;
 }
 
-/// Covariance of a landmark for fixed poses: each ray fixes the position across it with the deviation of its
-/// angle times the range.
+/// Covariance of a landmark for fixed poses: each ray fixes the position perpendicular to it, with the
+/// standard deviation of its angle times the range.
 Eigen::Matrix3d conditionalCovariance(const ReconstructionData& data, const Track& track,
                                       double* max_parallax_rad) {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();

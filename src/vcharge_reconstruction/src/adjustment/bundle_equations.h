@@ -110,7 +110,7 @@ class BundleEquations {
   const BundleProblem& problem_;
   const BundleErrors& errors_;
   BundleState state_;
-  std::vector<Slot> slots_;  ///< by point, by pose within a point
+  std::vector<Slot> slots_;  ///< ordered by point, then by pose
   std::vector<size_t> first_slot_of_point_;
   std::vector<std::vector<size_t>> slots_of_pose_;
   std::vector<std::vector<int32_t>> rows_of_pose_;  ///< earlier poses with a common term, and itself

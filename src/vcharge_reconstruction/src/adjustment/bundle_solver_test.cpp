@@ -126,7 +126,7 @@ TEST(BundleSolverTest, UsesPriorsOfPointsAsCeresDoes) {
 }
 
 TEST(BundleSolverTest, MovesGroundPointsToTheGround) {
-  // One point that no camera sees, with a ground observation.
+  // Adds one point that no camera sees, with a ground observation.
   BundleProblem problem = makeProblem();
   problem.points_in_map = {problem.map_from_vehicle[3] * Eigen::Vector3d(1.0, 2.0, 0.3)};
   problem.observations.clear();

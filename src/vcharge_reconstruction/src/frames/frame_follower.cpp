@@ -9,7 +9,7 @@
 namespace vcharge {
 namespace {
 
-/// A frame that moved less than both since the one before is standing: it shows nothing new.
+/// A frame that moved by less than both since the previous one is standing: it shows nothing new.
 constexpr double kMinFrameDistance_m = 0.05;
 constexpr double kMinFrameTurn_rad = 0.01;
 

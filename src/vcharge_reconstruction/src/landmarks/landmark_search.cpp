@@ -166,7 +166,7 @@ class LandmarkSearch {
   std::vector<std::vector<std::pair<int32_t, const TrackObservation*>>> observed_;
 };
 
-/// Disjoint sets of tracks that are one landmark.
+/// Disjoint sets of tracks that show the same landmark.
 class TrackGroups {
  public:
   explicit TrackGroups(size_t size) : parent_(size) { std::iota(parent_.begin(), parent_.end(), 0); }
@@ -188,7 +188,7 @@ class TrackGroups {
   std::vector<int32_t> parent_;
 };
 
-/// The images that observe each landmark. Two landmarks in one image are different ones.
+/// The images that observe each landmark. Two landmarks observed in one image are different ones.
 class ImagesOfTracks {
  public:
   explicit ImagesOfTracks(const ReconstructionData& data) : images_(data.tracks.size()) {
@@ -220,7 +220,7 @@ class ImagesOfTracks {
   std::vector<std::set<std::pair<int32_t, int32_t>>> images_;
 };
 
-/// Whether a track without a position, or at a similar range as the proposed landmark, may be this landmark.
+/// Whether a track can be the proposed landmark: it has no position, or lies at a similar range.
 bool arePointsOne(const ReconstructionData& data, int32_t track, const Proposal& proposal) {
   const std::optional<Eigen::Vector3d>& own = data.tracks[track].position_m;
   if (!own) {

@@ -8,8 +8,8 @@
 
 namespace vcharge {
 
-/// Calls a function with every point's index, in parallel, and adds up what it gives in an order that no
-/// scheduling changes.
+/// Calls a function with the index of every point, in parallel, and sums the results in an order that does
+/// not depend on scheduling.
 template <class Function>
 double sumOverPoints(size_t num_points, const Function& function) {
   constexpr size_t kPointsPerTask = 256;

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kIterations = 3;
 constexpr double kMinRange_m = 0.3;
-/// Two rays meet by chance too easily.
+/// Two rays often meet by chance, so a landmark needs more observations.
 constexpr int kMinObservations = 3;
 
 double largestParallax(const std::vector<Ray>& rays) {
@@ -24,7 +24,7 @@ double largestParallax(const std::vector<Ray>& rays) {
   return std::acos(std::max(-1.0, min_cosine));
 }
 
-/// Least squares of the distances to the rays, each over its range: an approximation of the angles.
+/// Least squares of the distances to the rays, each divided by its range: an approximation of the angles.
 std::optional<Eigen::Vector3d> nearestPoint(const std::vector<Ray>& rays) {
   if (rays.size() < 2) {
     return std::nullopt;
@@ -51,7 +51,7 @@ std::optional<Eigen::Vector3d> nearestPoint(const std::vector<Ray>& rays) {
   return point;
 }
 
-/// Sine of the angle between a ray and its point; infinite where the point is behind or out of range.
+/// Sine of the angle between a ray and its point; infinite if the point is behind or out of range.
 double angularError(const Ray& ray, const Eigen::Vector3d& point, const TriangulationOptions& options) {
   const Eigen::Vector3d to_point = point - ray.origin_m;
   const double range_m = to_point.norm();
@@ -61,7 +61,7 @@ double angularError(const Ray& ray, const Eigen::Vector3d& point, const Triangul
   return to_point.cross(ray.direction).norm() / range_m;
 }
 
-/// Triangulates after removal of the worst rays, as long as enough are left: a tracked patch may have
+/// Triangulates after removing the worst rays, as long as enough are left, since a tracked patch may have
 /// slipped.
 std::optional<Eigen::Vector3d> triangulateMostOf(std::vector<Ray>* rays,
                                                  const TriangulationOptions& options) {

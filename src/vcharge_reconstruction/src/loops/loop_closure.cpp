@@ -22,11 +22,11 @@ namespace {
 constexpr double kTrainingSpacing_m = 2.5;
 /// Largest angle between the rotations of the planar motion and of the pose among landmarks.
 constexpr double kMaxDisagreement_rad = 0.035;
-/// A loop edge that differs more from the adjusted keyframes was wrong.
+/// A loop edge that differs more from the adjusted keyframes is rejected.
 constexpr double kMaxFinalError_m = 0.2;
 constexpr double kMaxFinalError_rad = 0.03;
-// Deviations in the pose graph: of the motion between consecutive keyframes, and of a loop edge in addition
-// to its covariance.
+// Standard deviations in the pose graph: of the motion between consecutive keyframes, and of a loop edge in
+// addition to its covariance.
 constexpr double kStepSigma_m = 0.01;
 constexpr double kStepSigma_rad = 0.001;
 constexpr double kLoopSigma_m = 0.03;
@@ -96,7 +96,7 @@ LoopMatches matchKeyframes(const ReconstructionData& data, int32_t first, int32_
   return result;
 }
 
-/// Pose of one keyframe's rig among the landmarks of the reference, in the vehicle's frame of the reference.
+/// Pose of one keyframe's rig relative to the landmarks of the reference, in the reference's vehicle frame.
 PoseEstimate poseAmongLandmarks(const ReconstructionData& data, int32_t reference, const LoopMatches& matches,
                                 const std::vector<int>& inliers, bool reference_is_second) {
   const RigidTransform reference_from_map = data.keyframes[reference].map_from_vehicle.inverse();
@@ -202,7 +202,7 @@ LoopEdge verifyLoop(const LoopClosureOptions& options, const ReconstructionData&
     edge.reason = "no motion explains enough matches";
     return edge;
   }
-  // The metric pose in six degrees of freedom: one rig among the landmarks of the other.
+  // The metric pose in six degrees of freedom, from the rays of one rig and the landmarks of the other.
   const PoseEstimate first_from_second = poseAmongLandmarks(data, first, matches, motion.inliers, false);
   const PoseEstimate second_from_first = poseAmongLandmarks(data, second, matches, motion.inliers, true);
   edge.num_inliers =

@@ -16,7 +16,7 @@ namespace vcharge {
 namespace {
 
 constexpr double kReferenceWidth_px = 1280.0;
-/// Search radius in the image: features of small images are not more accurate.
+/// Least search radius in the image, since features of small images are not more accurate.
 constexpr double kLeastRadius_px = 3.0;
 /// Search radius in an image of the reference width, also of the second search.
 constexpr double kMinRadius_px = 6.0;
@@ -143,7 +143,7 @@ LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
 }
 
 std::vector<size_t> LandmarkMatcher::observationsAround(size_t keyframe, size_t camera) const {
-  // Each landmark once, from the nearest keyframe.
+  // Takes each landmark once, from the nearest keyframe.
   std::vector<size_t> observations;
   std::unordered_set<int32_t> landmarks;
   const auto num_keyframes = static_cast<std::ptrdiff_t>(map_->keyframes().size());

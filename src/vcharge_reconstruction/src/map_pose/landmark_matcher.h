@@ -11,7 +11,7 @@
 
 namespace vcharge {
 
-/// Matches of features with landmarks, right and wrong ones, and the same as input of the estimator.
+/// Matches of features with landmarks, some of them wrong, and the same as input of the estimator.
 struct LandmarkMatches {
   std::vector<LandmarkObservation> observations;
   std::vector<PointMatch> points;
@@ -26,7 +26,7 @@ class LandmarkMatcher {
   LandmarkMatcher(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
                   const MapLocalizerOptions& options);
 
-  /// Searches around the projections of the landmarks from `map_from_vehicle`, with these deviations.
+  /// Searches around the projections of the landmarks; the deviations are those of `map_from_vehicle`.
   LandmarkMatches searchNear(const RigFeatures& features, const RigidTransform& map_from_vehicle,
                              double sigma_m, double sigma_rad) const;
 

@@ -13,8 +13,8 @@ namespace vcharge {
 
 /// Landmarks that a camera should see, each with the observation from the most similar direction.
 struct ExpectedLandmarks {
-  std::vector<size_t> observations;       ///< indices in the map
-  std::vector<cv::Point2f> positions_px;  ///< where the camera should see them
+  std::vector<size_t> observations;       ///< indices into the map's observations
+  std::vector<cv::Point2f> positions_px;  ///< expected positions in the camera's image
   std::vector<double> ranges_m;
 };
 

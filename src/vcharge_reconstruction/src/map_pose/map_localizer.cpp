@@ -16,15 +16,15 @@
 namespace vcharge {
 namespace {
 
-// Deviations of the pose of a recognized place, around which the guided search begins.
+// Standard deviations of the pose of a recognized place, around which the guided search begins.
 constexpr double kPlaceSigma_m = 0.2;
 constexpr double kPlaceSigma_rad = 0.02;
 /// Places requested per candidate, since neighbouring keyframes are similar.
 constexpr int kPlacesPerCandidate = 10;
-/// A candidate nearer than both to a better one is left out.
+/// A candidate closer than both to a better one is left out.
 constexpr double kPlaceSpacing_m = 2.5;
 constexpr double kPlaceSpacing_rad = 0.6;
-/// Error of a match with a recognized place: its landmarks are seen from elsewhere.
+/// Largest error of a match with a recognized place, whose landmarks were seen from another position.
 constexpr double kPlaceMaxError_rad = 0.012;
 /// Poses further apart belong to different places.
 constexpr double kOtherPlace_m = 1.0;
@@ -180,7 +180,7 @@ int MapLocalizer::minInliersWithoutPrior(const RigFeatures& features) const {
 
 PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const {
   const LandmarkMatches matches = matcher_->searchAtPlace(features, place);
-  // Few of these are right. For a vehicle that stands on the ground two matches determine the pose.
+  // Few of these are right. If the vehicle stands on the ground, two matches determine the pose.
   const RigidTransform& map_from_keyframe =
       map_->keyframes()[static_cast<size_t>(place.place)].map_from_vehicle;
   const Eigen::Quaterniond upright_from_vehicle =
@@ -219,7 +219,7 @@ std::vector<PlaceMatch> MapLocalizer::recognizePlaces(const RigFeatures& feature
   for (const ImageFeatures& image : features.images) {
     descriptors.push_back(image.descriptors);
   }
-  // Neighbouring keyframes are similar: one of them leaves room for other places.
+  // Neighbouring keyframes are similar, so only one of them is kept, to leave room for other places.
   std::vector<PlaceMatch> places;
   for (const PlaceMatch& match : places_->query(descriptors, kPlacesPerCandidate * options_.max_places)) {
     const RigidTransform& pose = map_->keyframes()[static_cast<size_t>(match.place)].map_from_vehicle;

@@ -224,7 +224,7 @@ TEST(MapLocalizerDescriptorTest, LocalizesWithRealDescriptorsAsWithBinaryOnes) {
     EXPECT_LT(positionError(anywhere, truth), 0.03);
     const RigFeatures foreign = withNumbers(testing::makeForeignView(*map, 3), one);
     EXPECT_NE(localizer.localizeAnywhere(foreign).status, LocalizationStatus::kLocalized);
-    // Descriptors as different as those of two landmarks are no match.
+    // Descriptors as different as those of two landmarks are not matched.
     EXPECT_LT(localizer.localizeNear(foreign, priorAbout(truth, 0.0, 0.0)).num_matches, 10);
   }
 }

@@ -17,7 +17,7 @@ TEST(LiveViewTest, ShowsThePathAndRecentLandmarks) {
     if (track.observations.back().keyframe >= 30) {
       truth.push_back(*track.position_m);
     }
-    track.position_m.reset();  // as while driving
+    track.position_m.reset();  // tracks have no position while driving
   }
   const Trajectory path = keyframePath(state);
   ASSERT_EQ(path.size(), 40U);

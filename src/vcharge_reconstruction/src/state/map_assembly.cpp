@@ -9,7 +9,7 @@
 namespace vcharge {
 namespace {
 
-/// The nearest observation in the drive that has a feature; null where there is none.
+/// The nearest observation in the drive that has a feature; null if there is none.
 const TrackObservation* describedObservation(const Track& track, const TrackObservation& observation) {
   const TrackObservation* best = nullptr;
   for (const TrackObservation& other : track.observations) {

@@ -13,7 +13,7 @@ namespace {
 constexpr double kSlipFactor = 20.0;
 /// With fewer matches the odometer alone gives the motion.
 constexpr int kMinMatches = 30;
-/// A less constrained motion model is adopted only if it explains this many times the matches: it fits noise
+/// A less constrained motion model is used only if it explains this many times the matches, as it fits noise
 /// better.
 constexpr double kMinGain = 1.1;
 /// Deviation of real wheels from the Ackermann model.
@@ -49,8 +49,8 @@ PlanarMotion odometryMotion(const RigidTransform& motion, const EgoMotionOptions
   return result;
 }
 
-/// Planar part of a motion in the images. Where its length is not observable it takes the odometer's, with a
-/// deviation that gives it no weight.
+/// Planar part of a motion in the images. If its length is not observable, it has the odometer's, with a
+/// standard deviation that gives it no weight.
 PlanarMotion visualMotion(const MotionEstimate& estimate, const PlanarMotion& odometry) {
   const int rows[] = {0, 1, 5};
   PlanarMotion result;

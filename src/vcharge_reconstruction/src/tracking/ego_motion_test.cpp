@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kNoise_rad = 0.0005;
 
-/// Random points around the car, high ones too (those near the horizon tell little of the direction of
+/// Random points around the car, high ones too (those near the horizon hardly constrain the direction of
 /// motion), seen by both cameras of the test rig before and after a motion.
 std::vector<RayMatch> makeMatches(const RigidTransform& previous_from_current, double wrong_share) {
   const auto rig = testing::makeTestRig();

@@ -15,7 +15,7 @@ namespace {
 constexpr double kReferenceWidth_px = 1280.0;
 /// A tracked point and a feature this close are the same point.
 constexpr double kMaxAssociation_px = 1.5;
-/// A patch that alignment with its anchor moves further has slipped or looks different by now: the current
+/// If alignment with its anchor moves a patch further, it has slipped or changed its appearance: the current
 /// keyframe becomes its anchor.
 constexpr double kMaxAlignment_px = 2.0;
 /// Assumed range of points of unknown distance that are not on the ground.
@@ -232,7 +232,7 @@ void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, const Fe
         {keyframe, camera_index, feature_of_track[i],
          Eigen::Vector2d(tracks_[i].position_px.x, tracks_[i].position_px.y), options_.tracking_sigma_px});
   }
-  // The most distinct features first.
+  // Sorts the most distinct features first.
   std::stable_sort(free_features.begin(), free_features.end(), [&](size_t a, size_t b) {
     return out.features.keypoints[a].response > out.features.keypoints[b].response;
   });

@@ -35,7 +35,7 @@ class BagDriveSource : public DriveSource {
   /// May be called again, which reads the bag again.
   void run(DriveConsumer* consumer, const ProgressCallback& progress) override;
 
-  /// When the first and the last message of the drive's topics were recorded, by the recorder's clock; close
+  /// Recording times of the first and the last message of the drive's topics, by the recorder's clock; close
   /// to the stamps that run() delivers. Reads only the bag's index; errors as run().
   std::pair<Timestamp, Timestamp> recordedSpan() const;
 

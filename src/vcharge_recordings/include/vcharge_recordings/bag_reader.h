@@ -41,9 +41,9 @@ void requireWholeArrays<sensor_msgs::CompressedImage>(ros::serialization::IStrea
 /// The position of a message in a bag, and when it was recorded.
 struct BagEntry {
   ros::Time time;
-  uint32_t connection;  ///< in the reader's list
-  uint32_t chunk;       ///< in the reader's list
-  uint32_t offset;      ///< in its chunk, after decompression
+  uint32_t connection;  ///< index into the reader's connections
+  uint32_t chunk;       ///< index into the reader's chunks
+  uint32_t offset;      ///< in bytes, inside the decompressed chunk
 };
 
 /// A message as it was recorded. Valid until the reader reads the next one.
@@ -61,7 +61,7 @@ class BagMessage {
       throw InputError(source_ + ": expected the message definition of " + type +
                        " that this program was built with, got another");
     }
-    // The stream only reads.
+    // The cast is safe, since the stream only reads.
     ros::serialization::IStream stream(reinterpret_cast<uint8_t*>(const_cast<char*>(bytes_.data())),
                                        static_cast<uint32_t>(bytes_.size()));
     const auto message = boost::make_shared<Message>();
@@ -132,7 +132,7 @@ class BagReader {
   std::vector<Connection> connections_;
   std::map<uint32_t, uint32_t> connection_by_id_;
   std::vector<Chunk> chunks_;
-  std::vector<BagEntry> entries_;  // by time, then in the order of the file
+  std::vector<BagEntry> entries_;  // sorted by time, then by position in the file
   std::map<std::string, std::set<std::string>> topics_;
   std::unique_ptr<internal::BagBytes> decompressed_;
   std::optional<uint32_t> decompressed_chunk_;

@@ -12,7 +12,7 @@
 namespace vcharge {
 
 /// Writes a recorded drive on the suite's standard topics: images and camera_info of every camera, /odom,
-/// /wheel_ticks and, for simulated drives, /ground_truth. The bag has its name only after close().
+/// /wheel_ticks and, for simulated drives, /ground_truth. close() gives the bag its final name.
 /// `received` is the recording time of a message, by default its stamp.
 class DriveBagWriter {
  public:
@@ -21,12 +21,12 @@ class DriveBagWriter {
   /// Removes the unfinished file unless close() was called.
   ~DriveBagWriter();
 
-  /// CV_8UC1 of the rig's size.
+  /// Writes an image; `pixels` is CV_8UC1 of the rig's size.
   void writeImage(size_t camera_index, Timestamp stamp, const cv::Mat& pixels,
                   std::optional<Timestamp> received = std::nullopt);
   void writeOdometry(const VehicleOdometry& odometry, std::optional<Timestamp> received = std::nullopt);
   void writeWheelTicks(const WheelTicks& ticks, std::optional<Timestamp> received = std::nullopt);
-  /// `world` -> `base_link`, exact.
+  /// Writes the exact transform from `base_link` to `world`.
   void writeGroundTruth(const VehicleOdometry& truth);
   void close();
 

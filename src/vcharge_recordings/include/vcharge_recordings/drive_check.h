@@ -11,23 +11,23 @@ namespace vcharge {
 
 enum class CheckGrade { kPass, kWarn, kFail };
 
-/// "PASS", "WARN", "FAIL"
+/// The grade as text: "PASS", "WARN" or "FAIL".
 const char* toString(CheckGrade grade);
 
-/// What one check of a recorded drive found.
+/// Result of one check of a recorded drive.
 struct CheckFinding {
-  std::string subject;  ///< "sync", "front: exposure"
+  std::string subject;  ///< for example "sync" or "front: exposure"
   CheckGrade grade = CheckGrade::kPass;
   std::string what;  ///< the measured value, and the likely cause of a failure
 };
 
-/// The worst of them; kPass without any.
+/// The worst grade of the findings; kPass if there are none.
 CheckGrade worstGrade(const std::vector<CheckFinding>& findings);
 
 /// Checks a recorded drive before it is processed: are the cameras and the odometry complete, synchronous and
 /// well exposed, and do they agree on the motion? Turns are compared by the angle about the common axis of
 /// each camera's rotations, so the rig needs no extrinsics; where it has them, the images' motion is compared
-/// with them, too. Deterministic. Keeps times, odometry and a few numbers per pair of images. Not thread
+/// with them, too. Deterministic. Stores times, odometry and a few numbers per pair of images. Not thread
 /// safe.
 class DriveChecker : public RecordedDriveConsumer {
  public:
@@ -38,7 +38,7 @@ class DriveChecker : public RecordedDriveConsumer {
   void addOdometry(Timestamp recorded, const VehicleOdometry& odometry) override;
   void addBroken(const std::string& topic, const std::string& why) override;
 
-  /// All that was checked, in a fixed order.
+  /// The findings of all checks, in a fixed order.
   std::vector<CheckFinding> findings() const;
 
  private:

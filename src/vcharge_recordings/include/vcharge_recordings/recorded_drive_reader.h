@@ -9,9 +9,9 @@
 
 namespace vcharge {
 
-/// Delivers all images and the odometry of a bag in the order of recording. Missing topics deliver nothing;
+/// Delivers all images and the odometry of a bag in the order of recording. Missing topics are ignored;
 /// messages that cannot be read are reported to the consumer. `progress` (may be empty) receives the fraction
-/// done. InputError for a file that is no bag, or that is truncated.
+/// done. InputError for a file that is not a bag, or that is truncated.
 void readRecordedDrive(const std::string& bag_path, const CameraRig& rig, const DriveTopics& topics,
                        RecordedDriveConsumer* consumer, const std::function<void(double)>& progress);
 

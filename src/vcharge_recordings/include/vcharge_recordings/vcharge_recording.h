@@ -19,7 +19,7 @@ struct VchargeRecordingOptions {
   double ground_slope_x = 0.0036;
   double ground_slope_y = -0.0045;
   double odometry_margin_s = 0.5;  ///< poses kept before the first and after the last image
-  bool mask_vehicle = true;        ///< masks the car's body as the left mirror's camera sees it
+  bool mask_vehicle = true;        ///< masks the car's body in the image of the left mirror's camera
 
   void validate() const;  ///< throws std::invalid_argument naming the field
 };

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 
 class BagImagesTest : public ::testing::Test {
  protected:
-  // Ten images on /raw, of the gray value 10 i; the same, as PNG, on /packed/compressed; a word on /other.
+  // Writes ten images of gray value 10 i to /raw, the same as PNG to /packed/compressed, a word to /other.
   void SetUp() override {
     folder_ = fs::temp_directory_path() / (std::string("vcharge_bag_images_") +
                                            ::testing::UnitTest::GetInstance()->current_test_info()->name());

@@ -173,7 +173,7 @@ uint64_t BagReader::readChunkIndex(uint64_t offset, uint64_t index_offset) {
       file_->fail(at, "a time and the place of a message in a chunk of " +
                           std::to_string(chunks_.back().size) + " bytes");
     }
-    if (sec > 0 || nsec > 0) {  // rosbag, too, skips what was recorded before the clock started
+    if (sec > 0 || nsec > 0) {  // rosbag, too, skips messages recorded before the clock started
       entries_.push_back({ros::Time(sec, nsec), connection, chunk, message_offset});
     }
   }

@@ -33,7 +33,7 @@ Number numberAt(const std::string& bytes, size_t at) {
   return value;
 }
 
-/// The first byte of the n-th "name=" value.
+/// Position of the first byte of the n-th "name=" value.
 size_t valueOf(const std::string& bytes, const std::string& name, int n = 0) {
   size_t at = bytes.find(name + "=");
   for (; n > 0; --n) {
@@ -48,7 +48,7 @@ class BagReaderTest : public ::testing::Test {
   const ScratchFolder folder_;
   const std::string path_ = folder_ / "a.bag";
 
-  /// Two topics in several chunks. Returns the file's bytes.
+  /// Writes two topics in several chunks; returns the file's bytes.
   std::string write(rosbag::CompressionType compression = rosbag::compression::Uncompressed,
                     int num_messages = 3, uint32_t chunk_threshold = 1) const {
     rosbag::Bag bag(path_, rosbag::bagmode::Write);
@@ -130,7 +130,7 @@ TEST_F(BagReaderTest, OrdersMessagesByTheTimeOfTheirRecording) {
   EXPECT_TRUE(std::is_sorted(messages.begin(), messages.end()));
 }
 
-// Also in compressed chunks, each of which is decompressed only once.
+// Covers compressed chunks, too, each of which is decompressed only once.
 TEST_F(BagReaderTest, OrdersMessagesOfOneTimeAsTheyLieInTheBag) {
   rosbag::Bag bag(path_, rosbag::bagmode::Write);
   bag.setChunkThreshold(1);
@@ -372,7 +372,7 @@ TEST_F(BagReaderTest, MakesNoRoomForPixelsThatAreNotThere) {
   expectNoRoomForImages<sensor_msgs::CompressedImage>(path_);
 }
 
-// For the sanitizers: no changed byte makes the reader leave a buffer.
+// Run with sanitizers: no changed byte makes the reader access memory outside a buffer.
 TEST_F(BagReaderTest, EndsInAnErrorOrInMessagesWhateverByteIsDamaged) {
   for (const auto compression : {rosbag::compression::Uncompressed, rosbag::compression::LZ4}) {
     const std::string whole = write(compression, 2, 1000000);

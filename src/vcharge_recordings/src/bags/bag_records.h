@@ -17,7 +17,7 @@ class BagBytes {
   virtual uint64_t size() const = 0;
   /// The bytes [offset, offset + size), valid until the next call. InputError beyond the end.
   std::string_view view(uint64_t offset, uint64_t size);
-  /// A little-endian number.
+  /// Reads a little-endian number.
   template <class Number>
   Number number(uint64_t offset) {
     Number value;

@@ -17,7 +17,7 @@ class CheckFindings {
   void add(const std::string& subject, CheckGrade grade, std::string what) {
     findings_.push_back({subject, grade, std::move(what)});
   }
-  /// A number that should be small.
+  /// Grades a value that should be small: a warning above `warn`, a failure above `fail`.
   void atMost(const std::string& subject, double value, double warn, double fail, const std::string& figure,
               const std::string& advice) {
     const CheckGrade grade = value > fail   ? CheckGrade::kFail

@@ -49,13 +49,13 @@ struct DriveChecker::State {
   }
 
   std::shared_ptr<const CameraRig> rig;
-  std::vector<internal::TopicTimes> times;  // by camera, as all below
+  std::vector<internal::TopicTimes> times;  // one per camera, like the three members below
   std::vector<internal::ImageCheck> images;
   std::vector<internal::ImageMotionMeter> meters;
   std::vector<std::vector<internal::ImageMotion>> motions;
   internal::TopicTimes odometry_times;
   std::vector<VehicleOdometry> odometry;
-  std::map<std::string, Broken> broken;  // by topic
+  std::map<std::string, Broken> broken;  // key: topic
 };
 
 DriveChecker::DriveChecker(std::shared_ptr<const CameraRig> rig)
@@ -98,7 +98,7 @@ std::vector<CheckFinding> DriveChecker::findings() const {
                  std::to_string(broken.count) + " messages cannot be understood, the first: " + broken.first);
   }
   std::vector<std::vector<Timestamp>> stamps_by_camera;
-  std::vector<Timestamp> most_stamps;  // of the camera with the most images
+  std::vector<Timestamp> most_stamps;  // stamps of the camera with the most images
   double period_s = 0.0;
   for (size_t i = 0; i < state_->times.size(); ++i) {
     const std::string& name = state_->rig->cameras[i].name;

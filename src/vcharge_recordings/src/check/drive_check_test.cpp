@@ -15,7 +15,7 @@ constexpr int kFrames = 130;
 constexpr double kSpeed_m_per_s = 1.5;
 const Timestamp kStart = Timestamp::fromSeconds(1000.0);
 
-/// Weaves to both sides, so that the yaw rate changes all the time.
+/// Yaw of a drive that weaves to both sides, so that the yaw rate changes all the time.
 double yawAt(double time_s) {
   return 0.9 * std::sin(0.55 * time_s) + 0.25 * std::sin(1.7 * time_s);
 }
@@ -30,7 +30,7 @@ RigidTransform worldFromVehicle(double time_s) {
   return RigidTransform::planar(position.x(), position.y(), yawAt(time_s));
 }
 
-/// A textured wall all around, 15 m away, and a textured ground.
+/// Brightness of a textured wall all around, 15 m away, and of a textured ground.
 double brightness(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray) {
   const Eigen::Vector2d from = origin.head<2>() - Eigen::Vector2d(10.0, 0.0), along = ray.head<2>();
   const double a = along.squaredNorm(), b = from.dot(along), c = from.squaredNorm() - 15.0 * 15.0;
@@ -149,7 +149,7 @@ class DriveCheckerTest : public testing::Test {
 std::vector<std::vector<cv::Mat>>* DriveCheckerTest::images_ = nullptr;
 std::vector<RigidTransform>* DriveCheckerTest::poses_ = nullptr;
 
-/// "WARN left: rate; FAIL sync", in order.
+/// The findings that did not pass, in order, for example "WARN left: rate; FAIL sync".
 std::string notPassed(const std::vector<CheckFinding>& findings) {
   std::string text;
   for (const CheckFinding& finding : findings) {

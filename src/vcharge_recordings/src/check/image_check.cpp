@@ -14,7 +14,7 @@ constexpr int kExposureEvery = 5;
 constexpr double kManyRepeated = 0.01;
 constexpr double kTooManyRepeated = 0.2;
 constexpr int kDark = 4, kBright = 251;
-/// Fractions of the image.
+/// Fractions of saturated (dark or bright) pixels in an image.
 constexpr double kManySaturated = 0.15;
 constexpr double kTooManySaturated = 0.5;
 /// Standard deviation of the gray levels.
@@ -22,12 +22,12 @@ constexpr double kLowContrast = 12.0;
 constexpr double kTooLowContrast = 5.0;
 /// Relative change of the mean from one examined image to the next.
 constexpr double kExposureStep = 0.35;
-/// Edges that do not move in the image while the vehicle moves.
+/// Detection of edges that do not move in the image while the vehicle moves.
 constexpr int kMinMoved = 12;
 constexpr float kMinGradient = 6.0F;
-constexpr float kStaticShare = 0.75F;  // length of the gradients' sum over the sum of their lengths
-constexpr float kSteady = 0.35F;       // standard deviation of their lengths over the mean
-/// Edges of the scene stay by chance, the less often the more images there are.
+constexpr float kStaticShare = 0.75F;  // length of the gradients' sum relative to the sum of their lengths
+constexpr float kSteady = 0.35F;       // standard deviation of their lengths relative to the mean
+/// Edges of the scene may stay in place by chance, less often with more images.
 constexpr double kManyStatic = 0.003, kChanceOfOneImage = 0.4;
 constexpr double kTooManyStatic = 0.3;
 
@@ -42,7 +42,7 @@ cv::Mat shrink(const cv::Mat& pixels) {
   return result;
 }
 
-/// 255 where all pixels below are 255.
+/// A small mask that is 255 where all covered pixels of the mask are 255.
 cv::Mat shrinkMask(const cv::Mat& mask) {
   cv::Mat result;
   cv::threshold(shrink(mask), result, 254, 255, cv::THRESH_BINARY);
@@ -156,7 +156,7 @@ void ImageCheck::judgeMask(CheckFindings* findings) const {
   const cv::Mat is_steady =
       num_moved_ * sum_square_ < (1.0F + kSteady * kSteady) * sum_length_.mul(sum_length_);
   const cv::Mat stays = (sum_length_of_mean > kStaticShare * sum_length_) & has_edge & is_steady;
-  // The borders of the field of view and of the mask are no edges of the scene.
+  // The borders of the field of view and of the mask are not edges of the scene.
   cv::Mat inside;
   cv::erode(valid_, inside, cv::Mat::ones(7, 7, CV_8U), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT,
             cv::Scalar(0));

@@ -18,7 +18,7 @@ constexpr int kMaxCorners = 250;
 constexpr double kCornerQuality = 0.01;
 constexpr int kMinTracks = 30;
 constexpr double kMinInlierShare = 0.5;
-/// Largest angle to the optical axis: rays further out are too long on the image plane at depth 1.
+/// Least cosine of the angle to the optical axis: rays further out are too long on the plane at depth 1.
 constexpr double kMinCosine = 0.35;
 constexpr double kThreshold = 0.003;
 
@@ -115,7 +115,7 @@ void ImageMotionMeter::estimate(const std::vector<cv::Point2f>& from_px,
     }
   }
   motion->rotation_rad = vectorFromRotation(Eigen::Quaterniond(begin_from_end));
-  // The sign of the direction: near points move against it.
+  // The sign of the direction follows from the points, since near points move against it.
   Eigen::Vector3d direction(translation.at<double>(0), translation.at<double>(1), translation.at<double>(2));
   direction = -(begin_from_end * direction).normalized();
   int64_t votes = 0;
@@ -125,7 +125,7 @@ void ImageMotionMeter::estimate(const std::vector<cv::Point2f>& from_px,
     }
     const Eigen::Vector3d before(from[i].x, from[i].y, 1.0);
     const Eigen::Vector3d after = begin_from_end * Eigen::Vector3d(to[i].x, to[i].y, 1.0);
-    // A point at begin's `before` lies off `after` on the far side from the direction of motion.
+    // Points move away from the direction of motion: `before` is nearer to it than `after`.
     votes += (before.normalized() - after.normalized()).dot(direction) > 0.0 ? 1 : -1;
   }
   motion->direction = votes >= 0 ? direction : -direction;

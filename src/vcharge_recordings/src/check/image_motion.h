@@ -28,7 +28,7 @@ class ImageMotionMeter {
  public:
   explicit ImageMotionMeter(const RigCamera& camera);
 
-  /// The motion since the last examined image; nothing for images in between.
+  /// Returns the motion since the last examined image; nullopt for images in between.
   std::optional<ImageMotion> add(Timestamp stamp, const cv::Mat& pixels);
 
  private:
@@ -38,7 +38,7 @@ class ImageMotionMeter {
 
   const CameraModel model_;
   const cv::Size size_px_;
-  double scale_;  // small images over the sensor's size
+  double scale_;  // ratio of the small images' size to the sensor's
   cv::Mat mask_;  // for the small images
   PatchTracker tracker_;
   ImagePyramid last_;

@@ -15,7 +15,7 @@ constexpr double kStill_m = 0.005, kStill_rad = 0.0005;
 constexpr double kMoves_m = 0.1;
 /// Ratios instead of counts, since other cars may drive past.
 constexpr double kManyContradict = 0.05, kTooManyContradict = 0.3;
-constexpr size_t kMinMotions = 20;  // with a rotation each
+constexpr size_t kMinMotions = 20;  // motions with a rotation
 constexpr int kMinPairs = 5;        // fewer pairs give no finding
 
 constexpr double kMaxOffset_s = 0.5, kOffsetStep_s = 0.005;
@@ -41,7 +41,7 @@ struct Turn {
 /// A camera's motion and the odometry of the same time.
 struct ComparedMotion {
   const ImageMotion* motion;
-  double begin_s, end_s;  // on the odometry's path
+  double begin_s, end_s;  // times on the odometry's path
   double distance_m, turn_rad;
 };
 
@@ -93,7 +93,7 @@ struct TurnFit {
 };
 
 TurnFit fitTurns(const OdometryPath& path, const std::vector<Turn>& turns, double offset_s) {
-  std::vector<std::array<double, 2>> pairs;  // from the images, from the odometry
+  std::vector<std::array<double, 2>> pairs;  // turn from the images, turn from the odometry
   for (const Turn& turn : turns) {
     pairs.push_back(
         {turn.turn_rad, path.yaw_rad(turn.end_s + offset_s) - path.yaw_rad(turn.begin_s + offset_s)});
@@ -139,7 +139,7 @@ OffsetFit fitOffset(const OdometryPath& path, const std::vector<Turn>& turns) {
   result.turns = fits[static_cast<size_t>(best)];
   result.offset_s = (best - num_steps) * kOffsetStep_s;
   if (best == 0 || best == 2 * num_steps) {
-    return result;  // outside the examined range
+    return result;  // the best offset may lie outside the examined range
   }
   // A parabola through points that are far enough apart not to fit noise.
   const int reach = std::min({8, best, 2 * num_steps - best});

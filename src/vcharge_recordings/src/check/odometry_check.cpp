@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kManyUncovered = 0.01;
 constexpr double kTooManyUncovered = 0.2;
-/// Speeds above that of a car in a car park, and of any car.
+/// Speeds above that of a car in a car park, and above that of any car.
 constexpr double kFast_m_per_s = 15.0;
 constexpr double kTooFast_m_per_s = 60.0;
 /// Sideways motion is implausible: the rear axle's centre moves along the vehicle's axis.

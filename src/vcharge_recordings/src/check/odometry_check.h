@@ -12,7 +12,7 @@ namespace vcharge::internal {
 /// The path of the odometry, interpolated at any time.
 class OdometryPath {
  public:
-  /// In any order; of equal stamps the first is used.
+  /// `odometry` may be in any order; of equal stamps the first is used.
   explicit OdometryPath(std::vector<VehicleOdometry> odometry);
 
   bool empty() const { return stamps_s_.empty(); }
@@ -20,10 +20,10 @@ class OdometryPath {
   double end_s() const { return stamps_s_.back(); }
   size_t size() const { return stamps_s_.size(); }
   double stamp_s(size_t i) const { return stamps_s_[i]; }
-  /// The same relative to the first, as argument of the functions below.
+  /// Seconds since the first stamp, the argument of the functions below.
   double secondsOf(Timestamp stamp) const { return toSeconds(stamp - origin_); }
   bool covers(double time_s) const { return begin_s() <= time_s && time_s <= end_s(); }
-  /// Yaw without jumps at half turns; linear between the stamps, constant beyond the ends.
+  /// Yaw, continuous over half turns; linear between the stamps, constant beyond the ends.
   double yaw_rad(double time_s) const { return at(yaws_rad_, time_s); }
   /// Metres driven forwards minus metres driven backwards.
   double distance_m(double time_s) const { return at(distances_m_, time_s); }
@@ -34,15 +34,15 @@ class OdometryPath {
 
   Timestamp origin_;
   std::vector<double> stamps_s_, yaws_rad_, distances_m_;
-  std::vector<Eigen::Vector2d> steps_;  // from the previous entry, in the frame half way
+  std::vector<Eigen::Vector2d> steps_;  // motion from the previous entry, in the frame half way between both
 };
 
-/// Checks the odometry alone: coverage of the images, jumps, sideways motion, resolution; and what the drive
-/// contains. `image_stamps`: of one camera, in increasing order.
+/// Checks the odometry alone: coverage of the images, jumps, sideways motion, resolution; and what motion the
+/// drive contains. `image_stamps`: stamps of one camera, in increasing order.
 void judgeOdometry(const OdometryPath& path, const std::vector<Timestamp>& image_stamps,
                    CheckFindings* findings);
 
-/// Checks whether odometry and images agree on the motion. Motions by camera of the rig.
+/// Checks whether odometry and images agree on the motion. `motions`: one list per camera of the rig.
 void judgeAgreement(const OdometryPath& path, const CameraRig& rig,
                     const std::vector<std::vector<ImageMotion>>& motions, CheckFindings* findings);
 

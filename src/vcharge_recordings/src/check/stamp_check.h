@@ -15,17 +15,17 @@ class TopicTimes {
   void add(Timestamp stamp, Timestamp recorded);
 
   bool empty() const { return stamps_.empty(); }
-  /// In increasing order, without repetitions.
+  /// Stamps in increasing order, without repetitions.
   std::vector<Timestamp> sortedStamps() const;
   /// Median distance of neighbouring stamps; 0 for fewer than two.
   double period_s() const;
-  /// Order of stamps, and their delays to the times of recording.
+  /// Checks the order of stamps, and their delays to the times of recording.
   void judgeOrder(const std::string& subject, CheckFindings* findings) const;
-  /// Rate, lost messages, longest gap. A gap above `max_gap_s` fails.
+  /// Checks the rate, lost messages and the longest gap. A gap above `max_gap_s` fails.
   void judgeRate(const std::string& subject, double max_gap_s, CheckFindings* findings) const;
 
  private:
-  std::vector<Timestamp> stamps_;  // as recorded
+  std::vector<Timestamp> stamps_;  // in the order of recording
   std::vector<double> delays_s_;   // from stamp to recording
   int64_t num_backwards_ = 0, num_repeated_ = 0, num_unstamped_ = 0;
 };

@@ -67,9 +67,9 @@ class BagReading {
   DriveConsumer* const consumer_;
   const std::vector<size_t> cameras_;
   BagReader bag_;
-  std::map<std::string, TopicRole> roles_;  // by topic
+  std::map<std::string, TopicRole> roles_;  // key: topic
   StampSorter<DriveItem> sorter_;
-  std::vector<std::optional<Timestamp>> last_images_;  // delivered, by camera
+  std::vector<std::optional<Timestamp>> last_images_;  // last delivered image of each camera
   std::optional<Timestamp> first_image_;
 };
 

@@ -27,7 +27,7 @@ class BagDriveSourceTest : public ::testing::Test {
     return notes;
   }
 
-  /// Frames every 80 ms of both cameras, odometry every 20 ms.
+  /// Writes frames of both cameras every 80 ms and odometry every 20 ms.
   void writeDrive(int num_frames) const {
     DriveBagWriter writer(path_, *rig_);
     for (int i = 0; i < num_frames; ++i) {

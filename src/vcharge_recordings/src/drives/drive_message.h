@@ -16,10 +16,10 @@ struct DriveTopicRole {
   size_t camera_index = 0;
 };
 
-/// "nav_msgs/Odometry"
+/// Message type of a topic, for example "nav_msgs/Odometry".
 const char* expectedType(DriveTopicKind kind);
 
-/// The content and stamp of a bag's message; images may have any size. InputError naming the bag and the
+/// Converts a bag's message to a stamped item; images may have any size. InputError naming the bag and the
 /// topic for a message that cannot be read.
 DriveItem convertDriveMessage(const BagMessage& message, const DriveTopicRole& role,
                               const std::string& vehicle_frame, Timestamp* stamp);

@@ -27,7 +27,7 @@ std::map<std::string, DriveTopicRole> rolesOf(const BagReader& bag, const Camera
       roles.insert(*found);
     }
   }
-  // A topic with raw images is not read again compressed.
+  // If a camera has raw images, its compressed topic is not read.
   for (const RigCamera& camera : rig.cameras) {
     if (roles.count(topics.imageTopic(camera.name)) > 0) {
       roles.erase(topics.compressedImageTopic(camera.name));

@@ -23,7 +23,7 @@ constexpr double kMaxSkew_px = 1e-6;
 // of the images with a margin of a few pixels.
 const cv::Size kOutlineImageSize(1280, 800);
 const std::vector<std::vector<cv::Point>> kVehicleOutlines = {
-    // Fender and door handle below, the housing's rim up the left side.
+    // Outline of fender and door handle at the bottom, and of the housing's rim on the left.
     {{0, 0},
      {158, 0},
      {132, 40},
@@ -42,7 +42,7 @@ const std::vector<std::vector<cv::Point>> kVehicleOutlines = {
      {330, 764},
      {430, 800},
      {0, 800}},
-    // Door, window and pillar.
+    // Outline of door, window and pillar.
     {{805, 800},
      {860, 764},
      {905, 734},
@@ -53,7 +53,7 @@ const std::vector<std::vector<cv::Point>> kVehicleOutlines = {
      {1250, 554},
      {1280, 562},
      {1280, 800}},
-    // The housing's rim, upper right.
+    // Outline of the housing's rim at the upper right.
     {{1170, 0}, {1205, 28}, {1236, 74}, {1256, 150}, {1270, 230}, {1280, 290}, {1280, 0}},
 };
 
@@ -132,7 +132,7 @@ std::vector<VehicleOdometry> readPoses(const std::string& path, const RigidTrans
   return poses;
 }
 
-// Central differences, one-sided at the ends.
+// Fills the velocities by central differences, one-sided at the ends.
 void fillVelocities(std::vector<VehicleOdometry>* poses) {
   const size_t last = poses->size() - 1;
   for (size_t i = 0; i <= last; ++i) {
@@ -174,7 +174,7 @@ std::vector<VchargeRecording::ImageFile> readImageList(const std::string& folder
   return images;
 }
 
-// On the ground below the system's origin, z along the ground's normal, x in the system's x-z plane.
+// Pose of base_link: on the ground below the system's origin, z normal to the ground, x in the x-z plane.
 RigidTransform systemFromBase(const VchargeRecordingOptions& options) {
   const Eigen::Vector3d normal =
       Eigen::Vector3d(-options.ground_slope_x, -options.ground_slope_y, 1.0).normalized();

@@ -24,7 +24,7 @@ class VchargeRecordingTest : public ::testing::Test {
     for (const std::string name : {"mono_left_1000000.png", "mono_left_1080000.png"}) {
       cv::imwrite(folder_ / name, cv::Mat::zeros(20, 40, CV_8UC1));
     }
-    // 0.5 s at 2 m/s along the world's y (yaw 90 degrees), turning at 0.1 rad/s.
+    // Poses of 0.5 s at 2 m/s along the world's y (yaw 90 degrees), turning at 0.1 rad/s.
     std::string poses = "# comment\n";
     for (int i = 0; i <= 20; ++i) {
       const double t = 0.04 * i;
@@ -109,7 +109,7 @@ TEST(VchargeRecordingDataTest, ReadsThePublishedImages) {
   EXPECT_EQ(recording.images.size(), 25u);
   const RigCamera& camera = recording.rig.cameras.at(0);
   EXPECT_EQ(camera.image_size_px, cv::Size(1280, 800));
-  // The data's description: the camera is 0.90 m above the ground.
+  // According to the description of the data, the camera is 0.90 m above the ground.
   EXPECT_NEAR(camera.vehicle_from_camera->translation().z(), 0.90, 0.01);
   // The mirror's camera looks to the left and down.
   const Eigen::Vector3d axis = camera.vehicle_from_camera->rotation() * Eigen::Vector3d::UnitZ();

@@ -17,33 +17,33 @@
 
 namespace vcharge {
 
-/// Exact in both directions.
+/// Converts a ROS time to a Timestamp without rounding.
 Timestamp toTimestamp(const ros::Time& time);
-/// std::out_of_range for stamps that ros::Time cannot hold (before 0 or after 2^32 s).
+/// Converts to a ROS time. Throws std::out_of_range for stamps before 0 or after 2^32 s.
 ros::Time fromTimestamp(Timestamp stamp);
 
 geometry_msgs::Pose toPoseMessage(const RigidTransform& target_from_source);
 geometry_msgs::Transform toTransformMessage(const RigidTransform& target_from_source);
-/// InputError "<source>: ..." when anything is not finite or the quaternion's norm is off by more than 1e-3.
+/// Throws InputError "<source>: ..." if a number is not finite or the quaternion's norm is off by over 1e-3.
 RigidTransform fromMessage(const geometry_msgs::Pose& pose, const std::string& source);
 RigidTransform fromMessage(const geometry_msgs::Transform& transform, const std::string& source);
-/// TF's parent is `target_frame`, its child `source_frame`.
+/// The parent frame in TF is `target_frame`, the child frame is `source_frame`.
 geometry_msgs::TransformStamped toTransformStamped(const RigidTransform& target_from_source, Timestamp stamp,
                                                    const std::string& target_frame,
                                                    const std::string& source_frame);
-/// vehicle_frame -> each camera whose extrinsics are known.
+/// Transforms from the vehicle frame to each camera whose extrinsics are known.
 std::vector<geometry_msgs::TransformStamped> cameraTransforms(const CameraRig& rig, Timestamp stamp);
 
-/// Speed is twist.linear.x, yaw rate twist.angular.z, both in the child frame.
+/// The speed becomes twist.linear.x and the yaw rate twist.angular.z, both in the child frame.
 nav_msgs::Odometry toMessage(const VehicleOdometry& odometry, const std::string& odom_frame,
                              const std::string& vehicle_frame);
-/// InputError "<source>: ..." for a pose as above, velocities that are not finite, or a child_frame_id other
-/// than `vehicle_frame` (an empty one is taken as it).
+/// Throws InputError "<source>: ..." for an invalid pose (see above), velocities that are not finite, or a
+/// child_frame_id other than `vehicle_frame`; an empty one is accepted.
 VehicleOdometry fromMessage(const nav_msgs::Odometry& message, const std::string& source,
                             const std::string& vehicle_frame);
 
 vcharge_msgs::WheelTicks toMessage(const WheelTicks& ticks, const std::string& vehicle_frame);
-/// InputError "<source>: ..." when metres_per_tick is not positive or a number is not finite.
+/// Throws InputError "<source>: ..." if metres_per_tick is not positive or a number is not finite.
 WheelTicks fromMessage(const vcharge_msgs::WheelTicks& message, const std::string& source);
 
 }  // namespace vcharge

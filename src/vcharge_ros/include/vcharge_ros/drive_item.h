@@ -14,7 +14,7 @@ struct CameraImage {
   Image image;
 };
 
-/// One thing that a drive delivers.
+/// One item of a drive's data: odometry, wheel ticks or an image.
 using DriveItem = std::variant<VehicleOdometry, WheelTicks, CameraImage>;
 
 /// Order of items with one stamp: odometry, wheel ticks, images in the rig's camera order.
@@ -35,8 +35,8 @@ inline void deliver(Timestamp stamp, const DriveItem& item, DriveConsumer* consu
   }
 }
 
-/// Indices of the named cameras, or of all where none is named. InputError for a name that the rig does not
-/// have.
+/// Indices of the named cameras, or of all cameras if `names` is empty. Throws InputError for a name that the
+/// rig does not have.
 inline std::vector<size_t> selectCameras(const CameraRig& rig, const std::vector<std::string>& names) {
   std::vector<size_t> indices;
   for (const std::string& name : names) {

@@ -22,26 +22,26 @@ class DriveMonitor {
   enum class Level { kOk = 0, kWarn = 1, kError = 2 };
   struct Report {
     Level level = Level::kOk;
-    std::string message;                                      ///< one line, the worst first
+    std::string message;                                      ///< one line with the worst fault first
     std::vector<std::pair<std::string, std::string>> values;  ///< per topic: counts, rate, last error
   };
   enum class Change { kNone, kFailed, kRecovered };
 
   DriveMonitor(double max_silence_s, SteadyTime now);
 
-  /// A topic that must have data; silence of other topics is no fault.
+  /// Declares a topic that must have data; silence of other topics is not a fault.
   void expectTopic(const std::string& topic);
-  /// Good data. A stamp before the topic's newest is counted as a jump back and reported for some seconds, at
-  /// least in the next report. kRecovered when the topic was in fault.
+  /// Records good data. A stamp before the topic's newest counts as a jump back, which is reported for some
+  /// seconds, at least in the next report. Returns kRecovered if the topic was in fault.
   Change addGood(const std::string& topic, std::optional<Timestamp> stamp, SteadyTime now);
-  /// Bad data, and why. kFailed when the text is new for this topic and should be logged.
+  /// Records bad data and its reason. Returns kFailed if the text is new for this topic and should be logged.
   Change addBad(const std::string& topic, const std::string& error, SteadyTime now);
 
-  /// No topic is read from beginWork() to endWork(): that time is no silence.
+  /// No topic is read between beginWork() and endWork(), so that time does not count as silence.
   void beginWork(SteadyTime now);
   void endWork(SteadyTime now);
 
-  /// The state at `now`. An error is kept until it was reported once and good data came after it.
+  /// The state at `now`. An error is kept until it was reported once and good data followed.
   Report report(SteadyTime now);
 
  private:
@@ -62,7 +62,7 @@ class DriveMonitor {
   };
 
   const double max_silence_s_;
-  std::mutex mutex_;  // guards all below
+  std::mutex mutex_;  // guards all members below
   SteadyTime start_;
   std::optional<SteadyTime> work_began_;
   SteadyTime last_report_;

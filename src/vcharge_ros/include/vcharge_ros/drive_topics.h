@@ -6,7 +6,7 @@
 
 namespace vcharge {
 
-/// Topics of a drive. Images are raw or, where a drive has only that, compressed on <image topic>/compressed.
+/// Topics of a drive. Images are raw, or compressed on <image topic>/compressed if the drive has no raw ones.
 struct DriveTopics {
   VCHARGE_BEGIN_OPTIONS(DriveTopics);
   VCHARGE_OPTION(std::string, image, "/camera/{camera}/image_raw", anyValue(), "Images of a camera.");
@@ -17,7 +17,7 @@ struct DriveTopics {
 
   std::string imageTopic(const std::string& camera_name) const;
   std::string compressedImageTopic(const std::string& camera_name) const;
-  /// Beside the image topic, as image_transport expects it.
+  /// Topic of camera_info in the namespace of the image topic, as image_transport expects it.
   std::string cameraInfoTopic(const std::string& camera_name) const;
 };
 

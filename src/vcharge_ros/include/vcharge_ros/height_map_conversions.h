@@ -10,19 +10,19 @@
 
 namespace vcharge {
 
-/// All cells, exactly. Confidence is 1 where the map does not tell it.
+/// Converts all cells exactly. The confidence is 1 if the map has none.
 vcharge_msgs::HeightMap toMessage(const HeightMap& map, Timestamp stamp);
-/// InputError "<source>: ..." for cells that do not fit the sizes, or a grid that is not finite.
+/// Throws InputError "<source>: ..." if the cells do not match the sizes or the grid is not finite.
 HeightMap fromMessage(const vcharge_msgs::HeightMap& message, const std::string& source);
 
-/// The observed cells' centres as x, y, z (metres), intensity (gray, 0 to 255) and confidence, FLOAT32.
+/// Cloud of the observed cells' centres: x, y, z (metres), intensity (0 to 255) and confidence, FLOAT32.
 sensor_msgs::PointCloud2 makeHeightCloud(const HeightMap& map, Timestamp stamp);
 
-/// 0 drivable, 100 obstacle, -1 unobserved. `states`: CV_8UC1 of CellState.
+/// Grid with 0 for drivable, 100 for obstacle and -1 for unobserved cells. `states`: CV_8UC1 of CellState.
 nav_msgs::OccupancyGrid makeOccupancyGrid(const HeightMap& map, const cv::Mat& states, Timestamp stamp);
 
-/// Two triangles between each four observed neighbours, gray as the cameras saw them (white where the map
-/// does not tell). Every `stride`-th cell, so that no more than `max_triangles` come.
+/// Mesh of two triangles between four observed neighbours, gray as seen by the cameras (white if unknown).
+/// Skips cells regularly so that there are at most `max_triangles`.
 visualization_msgs::Marker makeHeightMesh(const HeightMap& map, Timestamp stamp,
                                           size_t max_triangles = 400000);
 

@@ -10,11 +10,11 @@
 
 namespace vcharge {
 
-/// A view of a mono8 (or 8UC1) message: no pixel is copied, the message lives as long as the image. bgr8,
+/// View of a mono8 (or 8UC1) message without copying pixels; the image keeps the message alive. bgr8,
 /// rgb8, bgra8, rgba8 and mono16 (its upper 8 bits) are converted. InputError "<source>: ..." for other
 /// encodings and for a message whose data do not fit its size.
 Image toImage(const sensor_msgs::ImageConstPtr& message, const std::string& source);
-/// Decoded by OpenCV (JPEG, PNG), as gray. InputError "<source>: ..." for data that cannot be decoded.
+/// Decodes a compressed message (JPEG, PNG) to gray. InputError "<source>: ..." if it cannot be decoded.
 Image toImage(const sensor_msgs::CompressedImageConstPtr& message, const std::string& source);
 
 /// Copies the pixels of CV_8UC1 (mono8) or CV_32FC1 (32FC1); std::logic_error for other types.

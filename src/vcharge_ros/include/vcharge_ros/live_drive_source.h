@@ -14,7 +14,7 @@
 
 namespace vcharge {
 
-/// How images are transported. kAuto: raw, and compressed from cameras without raw images during
+/// Transport of images. kAuto: raw images, or compressed ones from cameras without raw images during
 /// max_silence_s of the drive's time.
 enum class ImageTransport { kAuto, kRaw, kCompressed };
 
@@ -23,8 +23,8 @@ inline std::vector<std::string> enumNames<ImageTransport>() {
   return {"auto", "raw", "compressed"};
 }
 
-/// A queue that is full drops its oldest message; a size of 0 drops nothing. With a sort window messages are
-/// delivered in the order of a bag, delayed by the window; what waits is delivered once nothing has come for
+/// A full queue drops its oldest message; a size of 0 drops nothing. With a sort window, messages come in the
+/// order of a bag, delayed by the window; waiting messages are delivered when nothing has arrived for
 /// idle_flush_s.
 struct LiveDriveSourceOptions {
   VCHARGE_BEGIN_OPTIONS(LiveDriveSourceOptions);
@@ -38,7 +38,7 @@ struct LiveDriveSourceOptions {
   VCHARGE_OPTION(double, max_silence_s, 2.0, positive(), "Wall time until a silent topic is reported.");
   VCHARGE_END_OPTIONS();
 
-  /// For a replay without loss: every message is taken, in the order of a bag.
+  /// Settings for a replay without loss: no message is dropped, and messages come in the order of a bag.
   void takeEverything() {
     image_queue_size = 0;
     odometry_queue_size = 0;
@@ -46,9 +46,9 @@ struct LiveDriveSourceOptions {
   }
 };
 
-/// Subscribes to a drive's topics and feeds a consumer. Bad messages (and whatever a consumer throws) are
-/// logged once, counted, reported by report(), and skipped. Stamps that jump back are reported and passed on:
-/// a bag may be replayed. Callbacks run on the queue of the node handle and are serialized, also where that
+/// Subscribes to a drive's topics and feeds a consumer. Bad messages and exceptions of the consumer are
+/// logged once, counted, reported by report(), and skipped. Stamps that jump back are reported and passed on,
+/// since a bag may be replayed. Callbacks run on the queue of the node handle and are serialized, even if the
 /// queue has several threads.
 class LiveDriveSource : public DriveSource {
  public:
@@ -60,7 +60,7 @@ class LiveDriveSource : public DriveSource {
   /// has no known end.
   void run(DriveConsumer* consumer, const ProgressCallback& progress) override;
 
-  /// Delivers what waits to be sorted.
+  /// Delivers the messages that are waiting in the sort window.
   void flush();
 
   /// State of the topics for /diagnostics. Thread safe; does not wait for a consumer that is working.

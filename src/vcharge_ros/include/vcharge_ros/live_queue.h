@@ -8,9 +8,9 @@
 
 namespace vcharge {
 
-/// Work of a nodelet that may take longer than the next message: done in a thread of its own, the newest task
-/// of each channel (a camera) first, older ones dropped and counted. In a replay without loss the work is
-/// done at once, by the caller.
+/// Runs work of a nodelet that may take longer than the time between messages in its own thread: the newest
+/// task of each channel (a camera) first; older ones are dropped and counted. In a replay without loss, the
+/// work is done at once in the caller's thread.
 template <class Task>
 class LiveQueue {
  public:

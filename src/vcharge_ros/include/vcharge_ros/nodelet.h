@@ -20,8 +20,8 @@ namespace vcharge {
 /// Base of all nodelets of the suite.
 ///
 /// The life of a nodelet:
-/// 1. The manager loads it and calls start() of the derived class, which reads the parameters, makes its
-/// stage,
+/// 1. The manager loads it and calls start() of the derived class, which reads the parameters, creates
+///    the stage,
 ///    advertises its topics and, last, subscribes. If start() throws, the text is logged and the nodelet is
 ///    not loaded; the manager goes on.
 /// 2. Callbacks convert messages, call the stage and publish its results. What they throw is logged once per
@@ -53,7 +53,7 @@ class Nodelet : public nodelet::Nodelet {
   ros::NodeHandle& privateNode() const;
   CallbackGuard& guard() { return guard_; }
 
-  /// Parameters of the private node handle. InputError names the parameter.
+  /// Reads a required parameter of the private node handle. InputError names the parameter.
   std::string requireParameter(const std::string& key, const std::string& what) const {
     return requireStringParameter(privateNode(), key, what);
   }
@@ -65,23 +65,23 @@ class Nodelet : public nodelet::Nodelet {
   void readOptions(const std::string& key, Options* options) const {
     readFieldsFromParameters(privateNode(), key, options);
   }
-  /// The rig at the path ~rig.
+  /// Reads the rig whose path is the parameter ~rig.
   std::shared_ptr<const CameraRig> readRig() const;
-  /// ~lossless_replay: every message is processed, in order; otherwise old ones are dropped and counted.
+  /// ~lossless_replay: every message is processed in order; otherwise, old ones are dropped and counted.
   bool isLossless() const { return parameter("lossless_replay", false); }
 
   /// Makes the source of a drive, with the options ~source. It is subscribed by runSource().
   void openSource(std::shared_ptr<const CameraRig> rig, const std::vector<std::string>& cameras = {});
-  /// Feeds the consumer from now on and adds the topics' state to the diagnostics. The last step of start().
+  /// Starts to feed the consumer and adds the topics' state to the diagnostics. The last step of start().
   void runSource(DriveConsumer* consumer);
-  /// Delivers what the source still sorts.
+  /// Delivers the messages that are waiting in the source's sort window.
   void flushSource() { source_->flush(); }
 
   template <class Message>
   ros::Publisher advertiseLatched(const std::string& topic) const {
     return node().template advertise<Message>(topic, 1, true);
   }
-  /// Calls back until end().
+  /// Subscribes to a topic; `callback` runs until end().
   template <class Message>
   void subscribe(const std::string& topic, uint32_t queue_size,
                  std::function<void(const boost::shared_ptr<const Message>&)> callback) {
@@ -92,8 +92,8 @@ class Nodelet : public nodelet::Nodelet {
               guard_.run([&] { callback(message); });
             })));
   }
-  /// A status named like the nodelet and `suffix` ("/pose") on /diagnostics. With Threads::kOne the report is
-  /// made between two callbacks; with kSeveral at any time.
+  /// Adds a status named after the nodelet and `suffix` ("/pose") to /diagnostics. With Threads::kOne, report
+  /// is called between two callbacks; with kSeveral, at any time.
   void addDiagnostics(const std::string& suffix, Report report, Threads threads);
   /// Serves std_srvs/Trigger under ~`name`; see advertiseTrigger().
   void serve(const std::string& name, Serve work);

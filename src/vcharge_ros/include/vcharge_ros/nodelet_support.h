@@ -17,14 +17,14 @@
 
 namespace vcharge {
 
-/// Runs callbacks so that no exception reaches ROS: each distinct text is logged once, the last one is kept.
+/// Runs callbacks so that no exception reaches ROS: each distinct error is logged once, the last one is kept.
 /// Thread safe.
 class CallbackGuard {
  public:
   /// `name` begins every line in the log.
   explicit CallbackGuard(std::string name) : name_(std::move(name)) {}
 
-  /// True when `function` returned.
+  /// Calls `function`; returns false if it threw an exception.
   template <class Function>
   bool run(Function&& function) {
     try {
@@ -52,9 +52,9 @@ class CallbackGuard {
   uint64_t num_failures_ = 0;
 };
 
-/// Serves std_srvs/Trigger under `name`. An exception of `serve` becomes an answer without success, with its
-/// text. The guard must outlive the server. Throws std::runtime_error that names the service if this process
-/// serves it already, as a nodelet does that was unloaded while it worked, until it is done.
+/// Serves std_srvs/Trigger under `name`. If `serve` throws, the answer has success = false and the error's
+/// text. The guard must outlive the server. Throws std::runtime_error naming the service if this process
+/// already serves it, for example in an unloaded nodelet whose last callback is still running.
 ros::ServiceServer advertiseTrigger(ros::NodeHandle* node, const std::string& name, CallbackGuard* guard,
                                     std::function<void(std_srvs::TriggerResponse*)> serve);
 

@@ -10,11 +10,11 @@
 
 namespace vcharge {
 
-/// The same tree as YAML, numbers exact. InputError "<source>: ..." for types that YAML options do not have
+/// Converts a parameter to YAML with exact numbers. InputError "<source>: ..." for types without YAML form
 /// (dates, binary).
 YAML::Node toYaml(const XmlRpc::XmlRpcValue& value, const std::string& source);
 
-/// The parameter, or an empty map where there is none.
+/// Reads the parameter; returns an empty map if it is not set.
 YAML::Node readParameter(const ros::NodeHandle& node, const std::string& key);
 
 /// readFields (vcharge_core/options.h) from the parameter server: overrides the fields of `options` by the
@@ -24,7 +24,7 @@ void readFieldsFromParameters(const ros::NodeHandle& node, const std::string& ke
   readFields(readParameter(node, key), "parameter " + node.resolveName(key), options);
 }
 
-/// A required parameter. InputError names it and says what it is for ("the path of a rig.yaml").
+/// Reads a required parameter. InputError names it and its purpose `what` ("the path of a rig.yaml").
 std::string requireStringParameter(const ros::NodeHandle& node, const std::string& key,
                                    const std::string& what);
 

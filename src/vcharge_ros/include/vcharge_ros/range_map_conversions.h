@@ -11,12 +11,12 @@
 
 namespace vcharge {
 
-/// One range map as messages, equal stamps, in the camera's optical frame.
+/// One range map as messages with equal stamps in the camera's optical frame.
 struct RangeMapMessages {
-  sensor_msgs::ImagePtr range;               ///< 32FC1, metres along the ray, NaN unknown
+  sensor_msgs::ImagePtr range;               ///< 32FC1, metres along the ray, NaN if unknown
   sensor_msgs::ImagePtr confidence;          ///< 32FC1
   sensor_msgs::ImagePtr standard_deviation;  ///< 32FC1, metres
-  sensor_msgs::ImagePtr reference;           ///< mono8: the undistorted image; null where it is not given
+  sensor_msgs::ImagePtr reference;           ///< mono8: the undistorted image; null if it was not given
   sensor_msgs::CameraInfoPtr camera_info;    ///< equidistant fit of the working camera
   /// x, y, z (metres) and intensity (0..255), FLOAT32, known ranges only; null without with_points.
   sensor_msgs::PointCloud2Ptr points;

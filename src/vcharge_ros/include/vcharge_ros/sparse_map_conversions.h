@@ -16,7 +16,7 @@ namespace vcharge {
 /// covariance, NaN where unknown), all FLOAT32. Headers are stamped 0: valid at any time.
 sensor_msgs::PointCloud2 makeLandmarkCloud(const SparseMap& map, const std::string& frame_id = "map");
 
-/// Points of a map that is being made: in the same form, observations and sigma_m NaN.
+/// Points of a map under construction in the same form; observations and sigma_m are NaN.
 sensor_msgs::PointCloud2 makeLandmarkCloud(const std::vector<Eigen::Vector3d>& positions_m,
                                            const std::string& frame_id = "map");
 
@@ -25,8 +25,8 @@ nav_msgs::Path makePath(const SparseMap& map, const std::string& frame_id = "map
 /// Poses of the vehicle in `frame_id`, with their stamps.
 nav_msgs::Path makePath(const Trajectory& trajectory, const std::string& frame_id = "map");
 
-/// Two line lists between keyframes, in the namespaces "accepted" (green) and "rejected" (red, a little
-/// transparent). A list without edges is a DELETE of what an earlier map showed.
+/// Two line lists between keyframes, in the namespaces "accepted" (green) and "rejected" (red and slightly
+/// transparent). A list without edges has the action DELETE, to remove the edges of an earlier map.
 visualization_msgs::MarkerArray makeLoopEdgeMarkers(const SparseMap& map,
                                                     const std::string& frame_id = "map");
 

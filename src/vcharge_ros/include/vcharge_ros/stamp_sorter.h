@@ -9,8 +9,8 @@
 
 namespace vcharge {
 
-/// Sorts items that arrive roughly in order of stamps: an item is released once one that is `window` newer
-/// has come. At equal stamps the lower rank is first, then the one that came first. Not thread safe.
+/// Sorts items that arrive roughly in order of stamps: an item is released when one that is newer by `window`
+/// has arrived. At equal stamps the lower rank comes first, then the earlier arrival. Not thread safe.
 template <class Item>
 class StampSorter {
  public:
@@ -27,7 +27,7 @@ class StampSorter {
     any_ = true;
   }
 
-  /// Releases what is old enough, in order.
+  /// Releases the items that are old enough, in order.
   template <class Function>
   void release(Function&& function) {
     while (!queue_.empty() && queue_.top().stamp <= newest_ - window_) {
@@ -35,7 +35,7 @@ class StampSorter {
     }
   }
 
-  /// Releases everything, in order.
+  /// Releases all items, in order.
   template <class Function>
   void flush(Function&& function) {
     while (!queue_.empty()) {
@@ -43,7 +43,7 @@ class StampSorter {
     }
   }
 
-  /// Drops everything, also the newest stamp.
+  /// Drops all items and resets the newest stamp.
   void clear() {
     queue_ = {};
     any_ = false;

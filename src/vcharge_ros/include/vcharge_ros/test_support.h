@@ -17,7 +17,7 @@
 
 namespace vcharge::testing {
 
-/// A folder of the test's own, removed with it.
+/// A temporary folder that the destructor removes.
 class ScratchFolder {
  public:
   ScratchFolder() {
@@ -74,7 +74,7 @@ inline VehicleOdometry makeOdometry(int64_t time_ms) {
           0.0};
 }
 
-/// Notes what comes: "o<ms>", "t<ms>", "<camera>:<ms>".
+/// Records the delivered items: "o<ms>" (odometry), "t<ms>" (wheel ticks), "<camera>:<ms>" (image).
 class Notes : public DriveConsumer {
  public:
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {

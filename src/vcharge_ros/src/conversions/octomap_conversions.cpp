@@ -48,9 +48,9 @@ void fromMessage(const octomap_msgs::Octomap& message, const std::string& source
 
 visualization_msgs::Marker makeOctomapMarker(const octomap::OcTree& tree, const std::string& frame_id,
                                              Timestamp stamp) {
-  constexpr double kSpan_m = 2.5;  // range of the colours, above the height below which
+  constexpr double kSpan_m = 2.5;  // span of the colours, from the height
   constexpr double kLowShare =
-      0.05;  // this fraction of the leaves is: a few wrong ranges end deep in the ground
+      0.05;  // below which this fraction of the leaves lies: a few wrong ranges end deep in the ground
   visualization_msgs::Marker marker;
   marker.header.frame_id = frame_id;
   marker.header.stamp = fromTimestamp(stamp);

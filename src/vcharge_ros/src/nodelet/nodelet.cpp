@@ -5,7 +5,7 @@
 namespace vcharge {
 namespace {
 
-/// Shares a queue of nodelet's loader; nothing for a queue of another kind, which its owner keeps.
+/// Keeps a queue of nodelet's loader alive; null for a queue of another kind, which its owner keeps alive.
 boost::shared_ptr<const void> keep(ros::CallbackQueueInterface* queue) {
   auto* const shared = dynamic_cast<nodelet::detail::CallbackQueue*>(queue);
   return shared ? shared->shared_from_this() : boost::shared_ptr<const void>();

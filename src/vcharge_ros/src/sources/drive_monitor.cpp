@@ -60,7 +60,7 @@ DriveMonitor::Change DriveMonitor::addBad(const std::string& topic_name, const s
   topic.unreported = true;
   topic.error = error;
   if (topic.good == 0) {
-    topic.last_good = now;  // data comes: not silent
+    topic.last_good = now;  // the topic sends data, so it is not silent
   }
   return news ? Change::kFailed : Change::kNone;
 }

@@ -71,14 +71,14 @@ struct LiveDriveSource::Implementation {
 
   DriveMonitor monitor;  // has its own lock: a report does not wait for the consumer
 
-  std::mutex mutex;  // guards all below, and serializes the consumer's calls
+  std::mutex mutex;  // guards all members below, and serializes the consumer's calls
   DriveConsumer* consumer = nullptr;
   StampSorter<DriveItem> sorter;
   SteadyClock::time_point last_arrival = SteadyClock::now();
-  std::vector<LastImages> last_images;  // by camera
+  std::vector<LastImages> last_images;  // one per camera
   std::set<std::string> logged;
 
-  // Last, so that no callback runs once the rest is being destroyed.
+  // Declared last, so that no callback runs while the other members are destroyed.
   std::vector<ros::Subscriber> subscribers;
   ros::WallTimer idle_timer;
 };

@@ -43,7 +43,7 @@ class LiveDriveSourceTest : public ::testing::Test {
     options_.max_silence_s = kForever_s;
   }
 
-  /// Feeds `notes`, or another consumer.
+  /// Starts a source that feeds `consumer`.
   std::unique_ptr<LiveDriveSource> start(DriveConsumer* consumer) {
     auto source = std::make_unique<LiveDriveSource>(node_, rig_, options_);
     source->run(consumer, DriveSource::ProgressCallback());
@@ -86,7 +86,7 @@ class LiveDriveSourceTest : public ::testing::Test {
     cv::imencode(".png", pixelsOf(camera, time_ms, false), message->data);
     compressed_[camera].publish(message);
   }
-  /// Expects that the i-th image of `notes` is the one that was published like this.
+  /// Expects that the i-th image of `notes` was published with these values.
   static bool is(const Notes& notes, size_t i, int camera, int64_t time_ms, bool is_raw) {
     return cv::norm(notes.images.at(i).pixels, pixelsOf(camera, time_ms, is_raw), cv::NORM_INF) == 0.0;
   }
@@ -95,7 +95,7 @@ class LiveDriveSourceTest : public ::testing::Test {
   const std::shared_ptr<const CameraRig> rig_ = std::make_shared<const CameraRig>(testing::makeRig(kSize));
   const DriveTopics topics_;
   LiveDriveSourceOptions options_;
-  std::vector<ros::Publisher> raw_, compressed_;  // by camera
+  std::vector<ros::Publisher> raw_, compressed_;  // one per camera
   ros::Publisher odometry_;
 };
 

@@ -9,7 +9,7 @@ namespace {
 constexpr int kImagePeriod_ms = 80;
 constexpr int kImageOffset_ms = 7;
 constexpr int kOdometryPeriod_ms = 20;
-// Arbitrary date with as many digits as the stamps of real drives.
+// An arbitrary date with as many digits as the stamps of real drives.
 constexpr int64_t kStart_ns = 1'400'000'000'000'000'000;
 
 Timestamp stampAt(int milliseconds) {

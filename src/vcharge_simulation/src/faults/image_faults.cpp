@@ -13,11 +13,11 @@ namespace {
 
 constexpr double kFullWidth_px = 1280.0;
 // Lengths are for images that are 1280 wide; light is relative to white in the sun.
-constexpr double kSunLight = 25.0;      // at the centre of the sun
-constexpr double kSunRadius_px = 40.0;  // at which the light is half as strong
+constexpr double kSunLight = 25.0;      // light at the centre of the sun
+constexpr double kSunRadius_px = 40.0;  // radius at which the light is half as strong
 constexpr double kMaxBlobRadius_px = 45.0;
 constexpr double kMaxBlobLight = 0.15;
-constexpr double kBlobTransmission = 0.35;  // at the centre of a blob
+constexpr double kBlobTransmission = 0.35;  // transmission at the centre of a blob
 constexpr double kLineLight = 0.5;
 constexpr double kLineHalfWidth_px = 2.5;
 // Thinner lines would fall between the pixels of scaled-down images.

@@ -13,7 +13,7 @@ constexpr double kTick_m = 0.01;
 // The cruise speed varies by 5 %, and each counter is within a tick of the truth.
 constexpr double kTickTolerance = 2.5;
 
-// Two seconds straight ahead.
+// Simulates two seconds straight ahead.
 SimulatedDrive simulate(const FaultOptions& faults) {
   const DrivePath straight(RigidTransform(), {{40.0, 0.0, 0.0}});
   VehicleMotionOptions motion;

@@ -21,7 +21,7 @@ Eigen::Vector3f hang(const Eigen::Vector3f& from, double forwards_rad, float len
                                            -static_cast<float>(std::cos(forwards_rad)));
 }
 
-// Frustums through (height, radius), scaled by `depth` from front to back.
+// Adds frustums through (height, radius), scaled by `depth` from front to back.
 void addRounded(const std::vector<Eigen::Vector2f>& profile, const Eigen::Vector3f& foot, float depth,
                 uint32_t material, TriangleMesh* mesh) {
   const size_t first = mesh->vertices.size();

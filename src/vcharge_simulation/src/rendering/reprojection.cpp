@@ -182,7 +182,7 @@ Reprojection reproject(const Renderer& renderer, const Picture& first, const Pic
   for (int y = 1; y + 1 < size.height; ++y) {
     for (int x = 1; x + 1 < size.width; ++x) {
       double difference = 0.0;
-      Eigen::Vector2d gradient = Eigen::Vector2d::Zero();  // of the mean of both images
+      Eigen::Vector2d gradient = Eigen::Vector2d::Zero();  // gradient of the mean of both images
       for (int k = 0; k < 9; ++k) {
         const Eigen::Vector2d step(k % 3 - 1, k / 3 - 1);  // NOLINT: whole column and row
         const double one = first.gray.at<uint8_t>(y + k / 3 - 1, x + k % 3 - 1);

@@ -16,7 +16,7 @@ constexpr float kSkylineSine = 0.22F;
 constexpr float kSkylineLight = 0.10F;
 // Additional reflectivity of a rough polish at grazing incidence.
 constexpr float kGrazingGloss = 4.0F;
-constexpr float kFlattestCeilingRay = 0.12F;  // sine of the elevation
+constexpr float kFlattestCeilingRay = 0.12F;  // sine of the least elevation of a ray to the ceiling
 
 // Aspect ratio of the footprint of a round cone of rays on level ground.
 float stretchOf(const Eigen::Vector3f& direction) {

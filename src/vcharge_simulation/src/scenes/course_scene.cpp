@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kWalkLine_m = 3.6;    // y of the walker's line
-constexpr double kWalkReach_m = 15.0;  // the walker turns around there
+constexpr double kWalkReach_m = 15.0;  // distance from the middle at which the walker turns around
 constexpr double kWalkSpeed_m_per_s = 1.2;
 constexpr double kTurn_s = 0.8;
 

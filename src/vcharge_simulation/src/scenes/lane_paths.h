@@ -16,29 +16,29 @@ struct Lanes {
   double y_m = 15.0;
   double corner_radius_m = 5.2;
 
-  /// Around both blocks, starting and ending in the middle of the southern lane, shifted outwards by
+  /// Path around both blocks, starting and ending in the middle of the southern lane, shifted outwards by
   /// `outwards_m`.
   DrivePath loop(const Eigen::Vector2d& outwards_m, bool clockwise) const;
-  /// Counter-clockwise around the northern block, then clockwise around the southern one.
+  /// Path counter-clockwise around the northern block, then clockwise around the southern one.
   DrivePath figureEight() const;
-  /// All lanes in both directions without turning on the spot: counter-clockwise around both blocks, through
-  /// the middle lane, clockwise around both blocks, and back through the middle lane. The outer lanes are
-  /// shifted outwards by `outwards_m`.
+  /// All lanes in both directions without turning on the spot: counter-clockwise around both blocks, then
+  /// through the middle lane, clockwise around both blocks, and back through the middle lane. The outer lanes
+  /// are shifted outwards by `outwards_m`.
   DrivePath bothDirections(const Eigen::Vector2d& outwards_m) const;
 
  private:
   DrivePath through(const std::vector<Eigen::Vector2d>& waypoints, bool closed) const;
 };
 
-/// 15 m of gentle curves to either side.
+/// Path of 15 m with gentle curves to either side.
 DrivePath gentleCurves(const RigidTransform& world_from_start);
-/// East along the lane at y = lane_y_m, past the bay at x = bay_x_m on its northern side, then backwards into
-/// the bay. `approach_m` is driven before reversing.
+/// Path east along the lane at y = lane_y_m, past the bay at x = bay_x_m on its northern side, then backwards
+/// into the bay. `approach_m` is driven before reversing.
 DrivePath reverseIntoBay(double bay_x_m, double lane_y_m, double approach_m);
-/// From the end of reverseIntoBay() out of the bay and west along the lane, `leave_m` beyond the curve.
+/// Path from the end of reverseIntoBay() out of the bay and west along the lane, `leave_m` beyond the curve.
 DrivePath leaveBayWestwards(double bay_x_m, double lane_y_m, double leave_m);
 
-/// Starts from standstill and stops at the end of the path.
+/// Motion that starts from standstill and stops at the end of the path.
 VehicleMotionOptions fromRestToRest(double cruise_speed_m_per_s = 2.5);
 
 }  // namespace vcharge

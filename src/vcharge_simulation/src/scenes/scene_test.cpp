@@ -173,7 +173,7 @@ TEST(SlopeTest, ParkedCarsStandOnTheGroundWithAllFourWheels) {
     const Eigen::Vector2d middle = 0.5 * (obstacle.footprint_m[0] + obstacle.footprint_m[2]);
     const Eigen::Vector2d along = 0.5 * (obstacle.footprint_m[1] - obstacle.footprint_m[0]);
     const Eigen::Vector2d across = 0.5 * (obstacle.footprint_m[3] - obstacle.footprint_m[0]);
-    // Lowest vertex in each quarter of the car, relative to the ground: a tyre.
+    // Lowest vertex in each quarter of the car, relative to the ground; it belongs to a tyre.
     std::map<std::pair<bool, bool>, double> lowest_m;
     for (const uint32_t index : of_cars) {
       const Eigen::Vector3d vertex = scene.mesh.vertices[index].position.cast<double>();

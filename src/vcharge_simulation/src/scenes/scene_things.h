@@ -21,7 +21,7 @@ constexpr int kNumTallTrees = 3;
 
 /// Objects of a scene. Metres; x and y in the world frame, z of the lowest point.
 struct ParkedCar {
-  double x, y, yaw_rad;  ///< of the rear axle
+  double x, y, yaw_rad;  ///< pose of the rear axle
   int shape;             ///< index into carShapes()
   int paint;             ///< 0 to kNumPaints - 1, from dark to bright
   uint32_t seed;         ///< for the number plate

@@ -16,8 +16,8 @@ constexpr double kKannalaBrandtView_rad = 190.0 * kDegree;
 // For 1280x800 images.
 constexpr double kCentreX_px = 639.5;
 constexpr double kCentreY_px = 399.5;
-// The Golf's lens has 634. These circles fit the image even with the largest shift of the principal point and
-// the tangential distortion.
+// The Golf's lens has a radius of 634 px. These circles fit the image even with the largest shift of the
+// principal point and the tangential distortion.
 constexpr double kMinCircleRadius_px = 590.0;
 constexpr double kMaxCircleRadius_px = 628.0;
 

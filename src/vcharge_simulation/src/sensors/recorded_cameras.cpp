@@ -10,7 +10,7 @@ namespace vcharge {
 
 namespace {
 
-// Rejects cameras of faults that would silently have no effect.
+// Rejects camera names in faults that would silently have no effect.
 void checkCamerasOfFaults(const FaultOptions& faults, const CameraRig& rig) {
   forEachOption(faults, [&](const OptionDeclaration& option, const auto& fault) {
     using Fault = std::decay_t<decltype(fault)>;

@@ -20,7 +20,7 @@ constexpr double kMaxAcceleration_m_per_s2 = 1.0;
 constexpr double kMaxLateralAcceleration_m_per_s2 = 1.2;
 constexpr double kMaxBackwardsSpeed_m_per_s = 1.2;
 constexpr double kSpringFrequency_hz = 1.6;
-constexpr double kRoll_rad_per_m_per_s2 = 0.006;  // per lateral acceleration, to the outside of a curve
+constexpr double kRoll_rad_per_m_per_s2 = 0.006;  // roll per lateral acceleration, to the outside of a curve
 constexpr double kLookAhead_m = 1.5;
 
 // Road roughness: a sum of sines over the distance driven, with standard deviation one. The car shakes only

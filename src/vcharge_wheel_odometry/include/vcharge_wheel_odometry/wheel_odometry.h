@@ -37,7 +37,7 @@ struct WheelOdometryCounts {
   uint64_t ticks = 0;
   uint64_t slips = 0;
   uint64_t out_of_order = 0;
-  uint64_t gaps = 0;    ///< longer than kMaxGap_s
+  uint64_t gaps = 0;    ///< gaps longer than kMaxGap_s
   uint64_t resets = 0;  ///< counters that jumped
   bool slipping = false;
   bool standing = false;
@@ -47,14 +47,14 @@ struct WheelOdometryCounts {
 /// angle. A counter is exact within one tick, so a Kalman filter uses the counters as bounded positions of
 /// the wheels instead of noisy increments: only errors of the wheel radius and the track width grow. Between
 /// ticks speed and steering predict the pose (bicycle model with an estimated zero of the steering), which
-/// keeps it smooth. If the wheels turn otherwise than the steering says, one of them slips, and is ignored
-/// until both agree again. Not thread safe.
+/// keeps it smooth. If the wheels contradict the steering angle, one of them slips and is ignored until both
+/// agree again. Not thread safe.
 class WheelOdometry {
  public:
   static constexpr double kMaxGap_s = 0.5;
 
   explicit WheelOdometry(const WheelOdometryOptions& options);
-  /// The estimate at the ticks' stamp; the first is the identity. Nothing for ticks that are not newer than
+  /// The estimate at the ticks' stamp; the first is the identity. nullopt for ticks that are not newer than
   /// the last.
   std::optional<OdometryEstimate> add(const WheelTicks& ticks);
   const WheelOdometryCounts& counts() const { return counts_; }
@@ -62,9 +62,9 @@ class WheelOdometry {
  private:
   struct Sample {
     Timestamp stamp;
-    double left_m, right_m;  // as counted
+    double left_m, right_m;  // counted distances
     double steered_yaw_rad;  // integral of the steered yaw rate
-    double speed_m_per_s;    // estimate
+    double speed_m_per_s;    // estimated speed
   };
   void predict(double dt_s, double steered_curvature);
   void checkSlip(const Sample& sample);
@@ -81,9 +81,9 @@ class WheelOdometry {
   Timestamp last_motion_;
   std::deque<Sample> window_;
   bool left_slips_ = false;
-  Eigen::Vector2d along_ = Eigen::Vector2d::Zero();  // distance, speed
+  Eigen::Vector2d along_ = Eigen::Vector2d::Zero();  // state: distance, speed
   Eigen::Matrix2d along_covariance_;
-  Eigen::Vector3d turn_ = Eigen::Vector3d::Zero();  // yaw, yaw rate, curvature at steering's zero
+  Eigen::Vector3d turn_ = Eigen::Vector3d::Zero();  // state: yaw, yaw rate, curvature at steering's zero
   Eigen::Matrix3d turn_covariance_;
   RigidTransform odom_from_vehicle_;
   double yaw_rad_ = 0.0;
@@ -98,8 +98,8 @@ class OdometryStream {
 
   /// Returns the estimates to publish now, in order of stamps.
   std::vector<OdometryEstimate> add(const OdometryEstimate& estimate);
-  /// As add(). The last estimate is at `stamp`, interpolated, or extrapolated by at most max_extrapolation_s;
-  /// it is missing where neither is possible, or where later ones were published already.
+  /// Like add(). The last estimate is at `stamp`, interpolated or extrapolated by up to max_extrapolation_s;
+  /// it is missing if neither is possible, or if later ones were published already.
   std::vector<OdometryEstimate> trigger(Timestamp stamp);
 
  private:

@@ -16,12 +16,12 @@
 
 namespace vcharge {
 
-/// For CLI::Option::check() of a path to read.
+/// Check of a CLI::Option for a path: returns an error for an empty path, or "".
 inline std::string requireNotEmpty(const std::string& value) {
   return value.empty() ? "expected a path, got ''" : "";
 }
 
-/// For CLI::Option::check() of a file to write: reports before the work starts that it cannot be written.
+/// Check of a CLI::Option for a file to write: reports before the work starts if it cannot be written.
 /// Throws InputError naming the path.
 inline std::string requireOutput(const std::string& value) {
   const std::string error = requireNotEmpty(value);
@@ -39,7 +39,7 @@ inline std::string requireOutputFolder(const std::string& value) {
   return error;
 }
 
-/// Adds --show-options to a tool. runTool() then requires nothing else.
+/// Adds --show-options to a tool. With it, runTool() requires no other argument.
 inline void addShowOptions(CLI::App* app, bool* show_options) {
   app->add_flag("--show-options", *show_options,
                 "print all options with their values, units and meaning, and do nothing else");
@@ -80,12 +80,12 @@ inline void writeJson(const nlohmann::json& found, const std::string& path) {
 }  // namespace internal
 
 /// A tool's main(): parses its arguments, then calls `run`. Returns the exit status, which is 0 only for
-/// success. With --show-options, a tool that has it requires nothing else. An error, of the arguments or
-/// thrown by `run`, is one line "<tool>: <what>" on standard error.
+/// success. With --show-options, a tool that has it requires no other argument. An error in the arguments or
+/// thrown by `run` is printed as one line "<tool>: <what>" on standard error.
 ///
-/// Where `run` takes a `nlohmann::json*`, the tool also gets `--json FILE`: what `run` puts into this object
-/// is written there when it returns, and when it throws, then with the error's text as "error". The tool
-/// documents the keys in `app->footer("Keys of --json: ...")`. Not a number is written as null.
+/// If `run` takes a `nlohmann::json*`, the tool also has the option `--json FILE`: the content of this object
+/// is written there when `run` returns or throws, then with the error's text as "error". The tool
+/// documents the keys in `app->footer("Keys of --json: ...")`. NaN is written as null.
 template <class Run>
 int runTool(CLI::App* app, int argc, char** argv, const Run& run) {
   if constexpr (std::is_invocable_v<const Run&, nlohmann::json*>) {

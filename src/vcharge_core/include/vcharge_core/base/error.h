@@ -5,7 +5,7 @@
 
 namespace vcharge {
 
-/// A bad file, message or option. The text names the file (or topic), the key and what was expected.
+/// Error for a bad file, message or option. The text names the file (or topic), the key and what is expected.
 class InputError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

@@ -72,7 +72,7 @@ void visitLines(Self& self, Visitor& visit, std::integer_sequence<int, offsets..
 
 }  // namespace internal
 
-/// An options struct declares each option once, between two marks:
+/// An options struct declares each option once, between two macros:
 ///
 ///   struct PlaneSweepOptions {
 ///     VCHARGE_BEGIN_OPTIONS(PlaneSweepOptions);
@@ -84,7 +84,7 @@ void visitLines(Self& self, Visitor& visit, std::integer_sequence<int, offsets..
 ///
 /// The fields are plain members. validate() throws std::invalid_argument that names the field and what is
 /// required of it; a struct whose fields depend on each other also has `void checkFields() const`, which
-/// validate() calls last. One option stands on a line of the source.
+/// validate() calls last. Each option is declared on one line of the source.
 #define VCHARGE_BEGIN_OPTIONS(Struct)                                \
   using OptionsStruct = Struct;                                      \
   void validate() const {                                            \

@@ -84,7 +84,7 @@ void forEachOption(Options& options, Visitor&& visit) {
 
 namespace internal {
 
-/// The value as YAML, with as few digits as read back to the same number.
+/// The value as YAML, with the fewest digits that read back as the same number.
 std::string valueText(double value);
 std::string valueText(const std::vector<double>& values);
 inline std::string valueText(bool value) {
@@ -155,10 +155,10 @@ void readStruct(const YAML::Node& node, const std::string& source, const std::st
 struct OptionRow {
   std::string key;  ///< including the groups around it, for example "tracker.max_features"
   std::string type;
-  std::string value;    ///< as YAML
+  std::string value;    ///< value as YAML
   std::string allowed;  ///< the allowed values in words; empty if any value is allowed
   std::string meaning;
-  std::string group_type;  ///< of a group of options; empty for an option
+  std::string group_type;  ///< type of a group of options; empty for an option
 };
 template <class Options>
 void collectRows(const Options& options, const std::string& prefix, std::vector<OptionRow>* rows);

@@ -16,13 +16,13 @@ namespace vcharge {
 
 /// One camera of a rig.
 struct RigCamera {
-  std::string name;      ///< "front"
-  std::string frame_id;  ///< "camera_front_optical"
+  std::string name;      ///< for example "front"
+  std::string frame_id;  ///< for example "camera_front_optical"
   cv::Size image_size_px;
   CameraModel model;
   double field_of_view_rad =
       3.14159265358979;   ///< pixels whose ray leaves this cone (full angle) are not used
-  std::string mask_file;  ///< as written in rig.yaml; empty without a mask
+  std::string mask_file;  ///< path as written in rig.yaml; empty without a mask
   cv::Mat mask;           ///< CV_8UC1 of image_size_px, 0 where the vehicle is seen; empty without a mask
   std::optional<RigidTransform> vehicle_from_camera;  ///< absent before extrinsic calibration
   /// Covariance of vehicle_from_camera, over [dt, dphi] in the vehicle frame: t = t_hat + dt, R = Exp(dphi)

@@ -29,7 +29,7 @@ struct ObstacleScan {
   double angle_min_rad = 0.0;
   double angle_increment_rad = 0.0;
   double max_range_m = 0.0;
-  /// of the nearest obstacle; NaN if none is known, which does not mean free
+  /// Range of the nearest obstacle; NaN if none is known, which does not mean free.
   std::vector<float> range_m;
   std::vector<float> range_sigma_m;   ///< one standard deviation; NaN without an obstacle
   std::vector<float> height_m;        ///< height of the obstacle above the ground; NaN without an obstacle

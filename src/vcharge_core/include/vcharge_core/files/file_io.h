@@ -9,7 +9,7 @@ namespace vcharge {
 std::string readTextFile(const std::string& path);
 
 /// Throws InputError naming `path` unless a file can be written there: its folder exists or can be created
-/// and accepts new files, and `path` is not a folder. Leaves nothing behind. Tools call it before long work.
+/// and accepts new files, and `path` is not a folder. Leaves no file behind. Tools call it before long work.
 void requireWritable(const std::string& path);
 /// The same for a folder of results, which may exist.
 void requireWritableFolder(const std::string& path);

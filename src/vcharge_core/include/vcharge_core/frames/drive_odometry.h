@@ -16,22 +16,22 @@ class DriveOdometry {
  public:
   explicit DriveOdometry(const FrameAssemblerOptions& options);
 
-  /// Poses that are known beforehand; add() is then ignored, and nothing is waited for.
+  /// Uses known poses instead of odometry; add() is then ignored, and no frame waits for odometry.
   void setTrajectory(const Trajectory& odom_from_vehicle);
   bool isGiven() const { return is_given_; }
 
-  /// Whether the stamp is so far before the newest that the drive starts over.
+  /// Whether the stamp is so much older than the newest that the drive has started again.
   bool jumpsBack(Timestamp stamp) const;
-  /// The break before this message, if there is one. A message that is not newer than the last is ignored
-  /// and counted.
+  /// Adds a message; returns the break before it, if there is one. A message that is not newer than the last
+  /// is ignored and counted.
   std::optional<DriveBreak> add(const VehicleOdometry& odometry, FrameCounters* counters);
   void clear();
 
-  /// Whether the pose at this stamp is known, or will never be.
+  /// Whether the pose at this stamp is known or cannot become known any more.
   bool reaches(Timestamp stamp) const { return is_given_ || (last_ && last_->stamp >= stamp); }
-  /// As the odometer counts; never interpolated over a reset.
+  /// Pose as counted by the odometer; never interpolated over a reset.
   OdometryBuffer::Lookup lookup(Timestamp stamp) const;
-  /// In a frame without jumps: equal to lookup() up to the first reset.
+  /// Pose in a frame without jumps: equal to lookup() up to the first reset.
   OdometryBuffer::Lookup lookupBridged(Timestamp stamp) const { return bridged_.lookup(stamp); }
 
   /// The last message; none after clear().

@@ -14,7 +14,7 @@ namespace vcharge {
 class DriveConsumer {
  public:
   virtual ~DriveConsumer() = default;
-  /// camera_index is that of the rig; the image has the rig's size.
+  /// `camera_index` is the index in the rig; the image has the rig's size.
   virtual void addImage(size_t camera_index, Timestamp stamp, const Image& image) = 0;
   virtual void addOdometry(const VehicleOdometry& odometry) = 0;
   virtual void addWheelTicks(const WheelTicks& /*ticks*/) {}
@@ -24,7 +24,7 @@ class DriveConsumer {
 /// is called until the source is destroyed).
 class DriveSource {
  public:
-  /// Fraction of the drive that was delivered, 0 to 1.
+  /// Receives the fraction of the drive that was delivered, 0 to 1.
   using ProgressCallback = std::function<void(double)>;
 
   virtual ~DriveSource() = default;

@@ -14,43 +14,43 @@
 
 namespace vcharge {
 
-/// The images of one stamp and the vehicle's pose then. An image is what a stage takes from a camera: gray
-/// pixels, or what was computed of them.
+/// Images of one stamp and the pose of the vehicle at that time. An ImageType is the data of one camera: gray
+/// pixels, or something computed from them.
 template <class ImageType>
 struct AssembledFrame {
   Timestamp stamp;
   std::vector<ImageType> images;  ///< in the rig's order; default-constructed where a camera sent none
-  std::vector<bool> has_image;    ///< by camera
-  /// As the odometer counts; none inside gaps, over resets, or where no odometry came in time.
+  std::vector<bool> has_image;    ///< one per camera
+  /// Pose as counted by the odometer; absent inside gaps, across resets, or if no odometry came in time.
   std::optional<RigidTransform> odom_from_vehicle;
-  /// In a frame that does not jump: resets of the odometer are bridged by its velocities before them.
+  /// Pose in a frame without jumps: resets of the odometer are bridged by the velocities before them.
   std::optional<RigidTransform> bridged_from_vehicle;
-  /// Why there is no pose.
+  /// Reason why there is no pose.
   OdometryBuffer::LookupStatus odometry_status = OdometryBuffer::LookupStatus::kEmpty;
-  int64_t num_resets = 0;  ///< of the odometer before this frame
+  int64_t num_resets = 0;  ///< resets of the odometer before this frame
 };
 using ImageFrame = AssembledFrame<Image>;
 
-/// The one way in for frames: puts images of one stamp together with the odometry at that stamp, in order of
-/// stamps.
+/// Input of every stage that processes frames: combines images of one stamp with the odometry at that stamp,
+/// in order of stamps.
 ///
-/// A frame is handed out once odometry reaches it and all cameras have sent their image. A camera is not
-/// waited for where it has sent a later image, is silent, or max_camera_wait_s is over; odometry is waited
-/// for max_odometry_wait_s. No more than kMaxWaiting frames wait. An image that comes after its frame was
-/// handed out is late: dropped and counted. At a break of the drive (see DriveBreak) all older frames are
-/// handed out, then `on_break` is called. A stage that has `on_break` begins anew there: for it older images
-/// that come afterwards are late, too. Not thread safe.
+/// A frame is handed out when odometry reaches it and all cameras have sent their image. It does not wait for
+/// cameras that have sent a later image or are silent, nor for any camera longer than max_camera_wait_s; it
+/// waits for odometry for at most max_odometry_wait_s. At most kMaxWaiting frames wait. An image that arrives
+/// after its frame was handed out is late: it is dropped and counted. At a break (see DriveBreak) all older
+/// frames are handed out, then `on_break` is called. With `on_break`, older images that arrive after a break
+/// are late, too, since the stage has started again. Not thread safe.
 template <class ImageType>
 class FrameAssembler {
  public:
   using Frame = AssembledFrame<ImageType>;
   using FrameCallback = std::function<void(Frame)>;
-  /// The break and the stamp of what follows it.
+  /// Receives the break and the first stamp after it.
   using BreakCallback = std::function<void(DriveBreak, Timestamp)>;
   static constexpr size_t kMaxWaiting = 25;  // two seconds at 12.5 Hz
 
-  /// `is_used`: by camera, false for cameras that send nothing; empty: all send. std::invalid_argument for
-  /// bad options.
+  /// `is_used`: one per camera, false for cameras that send nothing; empty if all send. Throws
+  /// std::invalid_argument for bad options.
   FrameAssembler(size_t num_cameras, const FrameAssemblerOptions& options, FrameCallback on_frame,
                  BreakCallback on_break = BreakCallback(), std::vector<bool> is_used = {})
       : options_(options),
@@ -65,23 +65,23 @@ class FrameAssembler {
     check(num_used_ > 0, "FrameAssembler: expected cameras");
   }
 
-  /// Takes poses from here instead of from the odometry.
+  /// Takes the poses from this trajectory instead of from the odometry.
   void setTrajectory(const Trajectory& odom_from_vehicle) { odometry_.setTrajectory(odom_from_vehicle); }
 
-  /// False where the image is late, and dropped.
+  /// Returns false if the image is late and was dropped.
   bool addImage(size_t camera_index, Timestamp stamp, ImageType image);
   void addOdometry(const VehicleOdometry& odometry);
-  /// Hands out what waits: the drive is over.
+  /// Hands out all waiting frames at the end of the drive.
   void finish() { handOut(std::nullopt); }
 
   const FrameCounters& counters() const { return counters_; }
   const DriveOdometry& odometry() const { return odometry_; }
   size_t numWaiting() const { return pending_.size(); }
-  /// Stamp of the frame that waits longest for odometry, where it waits longer than a gap may be.
+  /// Stamp of the frame that has waited longest for odometry, if it has waited for longer than a gap may be.
   std::optional<Timestamp> lacksOdometryAt() const;
   std::optional<Timestamp> newestImage() const { return newest_image_; }
   std::optional<Timestamp> newestImage(size_t camera_index) const { return newest_of_camera_[camera_index]; }
-  /// A camera without images while other cameras send theirs.
+  /// Whether a camera sends no images while other cameras send theirs.
   bool isSilent(size_t camera_index) const {
     return stamps_since_[camera_index] > options_.silent_after_frames;
   }
@@ -91,7 +91,7 @@ class FrameAssembler {
     std::vector<ImageType> images;
     std::vector<bool> has_image;
     size_t num_images = 0;
-    Timestamp begun;  // by the drive's clock
+    Timestamp begun;  // start of waiting, on the drive's clock
   };
 
   static constexpr double kReplay_s = 1.0;
@@ -102,7 +102,7 @@ class FrameAssembler {
   bool hasImages(Timestamp stamp, const Pending& pending) const;
   bool isReady(Timestamp stamp, const Pending& pending) const;
   void handOutReady();
-  /// Everything before a stamp, or everything.
+  /// Hands out all frames before a stamp, or all frames.
   void handOut(std::optional<Timestamp> before);
   void handOutFirst();
   void startOver();
@@ -116,7 +116,7 @@ class FrameAssembler {
   std::map<Timestamp, Pending> pending_;
   std::optional<Timestamp> newest_image_;
   std::vector<std::optional<Timestamp>> newest_of_camera_;
-  std::vector<int> stamps_since_;         // by camera: stamps that came since its last image
+  std::vector<int> stamps_since_;         // per camera: stamps that came since its last image
   std::optional<Timestamp> last_closed_;  // images up to this stamp are late
   FrameCounters counters_;
 };
@@ -203,7 +203,7 @@ bool FrameAssembler<ImageType>::hasImages(Timestamp stamp, const Pending& pendin
   for (size_t camera = 0; camera < is_used_.size(); ++camera) {
     const std::optional<Timestamp>& newest = newest_of_camera_[camera];
     const bool has_passed = newest && *newest > stamp;
-    // A silent camera that sends again may do so with this frame; who is in no hurry waits for the next.
+    // A silent camera may resume with this frame: when waiting for everything, only newer images exclude it.
     const bool is_absent = isSilent(camera) && (!options_.waitsForEverything() || *newest_image_ > stamp);
     if (is_used_[camera] && !pending.has_image[camera] && !has_passed && !is_absent) {
       return false;

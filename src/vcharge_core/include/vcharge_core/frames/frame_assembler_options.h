@@ -10,8 +10,8 @@
 
 namespace vcharge {
 
-/// How long a frame waits for what is missing, and which odometry is believed. Waiting times are measured on
-/// the drive's clock: the newest stamp of an image or of odometry that has come.
+/// How long a frame waits for missing data, and which odometry is plausible. Waiting times are measured on
+/// the drive's clock: the newest stamp of all images and odometry received.
 struct FrameAssemblerOptions {
   VCHARGE_BEGIN_OPTIONS(FrameAssemblerOptions);
   VCHARGE_OPTION(double, max_camera_wait_s, 0.15, notNegative(), "Longest wait for a missing camera.");
@@ -33,7 +33,7 @@ struct FrameAssemblerOptions {
   static FrameAssemblerOptions waiting(double max_camera_wait_s, double max_odometry_wait_s);
 };
 
-/// What became of the images and the odometry of a drive. Every stage reports these.
+/// Counts of used, missing and dropped data of a drive, reported by every stage.
 struct FrameCounters {
   explicit FrameCounters(size_t num_cameras = 0)
       : missing_images(num_cameras, 0), late_images(num_cameras, 0) {}
@@ -44,23 +44,23 @@ struct FrameCounters {
   int64_t odometry_gaps = 0;
   int64_t odometry_resets = 0;
   int64_t ignored_odometry = 0;         ///< repeated, or older than the newest
-  int64_t replays = 0;                  ///< stamps jumped back: the drive started over
-  std::vector<int64_t> missing_images;  ///< by camera, in the frames that were handed out
-  std::vector<int64_t> late_images;     ///< by camera: repeated, or came after their frame was handed out
+  int64_t replays = 0;                  ///< stamps jumped back: the drive started again
+  std::vector<int64_t> missing_images;  ///< per camera, in the frames that were handed out
+  std::vector<int64_t> late_images;     ///< per camera: repeated, or came after their frame was handed out
 
   int64_t numLateImages() const;
-  /// Names and values of all that is counted for the whole rig, for diagnostics and reports.
+  /// Names and values of all counters of the whole rig, for diagnostics and reports.
   std::vector<std::pair<std::string, int64_t>> named() const;
 };
 
-/// Where what came before cannot be joined to what follows.
+/// Reason why the data before and after a point of the drive cannot be joined.
 enum class DriveBreak {
   kOdometryGap,    ///< no odometry for longer than max_odometry_gap_s
   kOdometryReset,  ///< the odometer's pose jumped
   kReplay,         ///< stamps jumped back: a bag is replayed
 };
 
-/// "gap in the odometry", ...: part of a message.
+/// Description as part of a message, for example "gap in the odometry".
 std::string describe(DriveBreak drive_break);
 
 }  // namespace vcharge

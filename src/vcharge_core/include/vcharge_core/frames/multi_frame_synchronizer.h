@@ -20,20 +20,20 @@ struct MultiFrameSynchronizerOptions {
   VCHARGE_END_OPTIONS();
 };
 
-/// What became of the images so far.
+/// Counts of the sets and images so far.
 struct MultiFrameSynchronizerCounts {
   uint64_t complete_sets = 0;
-  uint64_t incomplete_sets = 0;              ///< given up with at least one camera missing
-  uint64_t late_images = 0;                  ///< arrived after their set was complete, given up or overtaken
-  uint64_t duplicate_images = 0;             ///< same camera and stamp again
-  uint64_t resets = 0;                       ///< time jumped back
+  uint64_t incomplete_sets = 0;              ///< sets given up with at least one camera missing
+  uint64_t late_images = 0;                  ///< images that arrived after their set was complete or given up
+  uint64_t duplicate_images = 0;             ///< images with the camera and stamp of an earlier one
+  uint64_t resets = 0;                       ///< jumps back of the time
   std::vector<uint64_t> missing_per_camera;  ///< incomplete sets that lacked this camera
 };
 
-/// Groups images whose stamps differ slightly, as those of cameras that share a trigger, into sets (the
+/// Groups images whose stamps differ slightly, as from cameras with a common trigger, into sets (the
 /// camera driver gives them one stamp; FrameAssembler puts images of equal stamps together with odometry).
-/// Sets are returned in order of time as soon as they are complete; incomplete ones that a complete later one
-/// overtakes are given up and counted. The stamp of a set is the earliest of its images. Not thread safe.
+/// Sets are returned in order of time as soon as they are complete; incomplete sets older than a complete one
+/// are given up and counted. The stamp of a set is the earliest of its images. Not thread safe.
 class MultiFrameSynchronizer {
  public:
   explicit MultiFrameSynchronizer(

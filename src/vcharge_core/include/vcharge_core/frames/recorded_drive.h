@@ -13,10 +13,10 @@ namespace vcharge {
 class RecordedDriveConsumer {
  public:
   virtual ~RecordedDriveConsumer() = default;
-  /// camera_index is that of the rig; the image may have any size. `recorded`: the time of recording.
+  /// `camera_index` is the index in the rig; the image may have any size. `recorded`: the time of recording.
   virtual void addImage(size_t camera_index, Timestamp stamp, Timestamp recorded, const Image& image) = 0;
   virtual void addOdometry(Timestamp recorded, const VehicleOdometry& odometry) = 0;
-  /// A message that cannot be read, and why.
+  /// Reports a message that cannot be read, and the reason.
   virtual void addBroken(const std::string& topic, const std::string& why) = 0;
 };
 

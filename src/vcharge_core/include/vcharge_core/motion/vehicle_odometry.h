@@ -27,7 +27,7 @@ struct WheelTicks {
   int64_t left_ticks = 0;
   int64_t right_ticks = 0;
   double metres_per_tick = 0.01;
-  double steering_angle_rad = 0.0;  ///< of a virtual front wheel in the middle, positive to the left
+  double steering_angle_rad = 0.0;  ///< angle of a virtual front wheel in the middle, positive to the left
 };
 
 struct OdometryBufferOptions {
@@ -45,8 +45,8 @@ class OdometryBuffer {
  public:
   enum class AddResult {
     kAdded,
-    kAddedAfterGap,  ///< more than max_gap_s after the entry before it
-    kDuplicate,      ///< same stamp as an entry: ignored
+    kAddedAfterGap,  ///< added, more than max_gap_s after the previous entry
+    kDuplicate,      ///< same stamp as an earlier entry: ignored
     kOutOfOrder,     ///< slightly older than the newest entry: ignored
     kReset,          ///< time jumped backwards: all older entries were dropped, this one was kept
   };

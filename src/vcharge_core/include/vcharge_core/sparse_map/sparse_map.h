@@ -42,9 +42,9 @@ struct MapObservation {
 
 /// A loop closure candidate: two keyframes at the same location, and whether it was accepted.
 struct MapLoopEdge {
-  int32_t first = 0;  ///< keyframes
+  int32_t first = 0;  ///< indices of keyframes
   int32_t second = 0;
-  RigidTransform first_from_second;  ///< as measured, before optimization
+  RigidTransform first_from_second;  ///< measured transform, before optimization
   int32_t num_inliers = 0;
   bool accepted = false;
   std::string reason;  ///< reason of the rejection; empty if accepted

@@ -11,7 +11,7 @@ struct RobustPoseGraphSummary {
   std::vector<bool> accepted;  ///< one per edge
   int num_rejected = 0;
   double noise_scale = 1.0;        ///< squared error per degree of freedom of consistent pairs of loop edges
-  double final_chi_squared = 0.0;  ///< of the accepted edges
+  double final_chi_squared = 0.0;  ///< sum over the accepted edges
 };
 
 /// Optimizes a pose graph with false loop edges. Edges between nodes with consecutive numbers are odometry

@@ -33,7 +33,7 @@ void addHalfAngle(double cosine, double sine, FixedVector<HalfAngle, Capacity>* 
 }  // namespace internal
 
 /// Real roots on the projective line of the form sum_i c[i] cosine^(Degree-i) sine^i, each once, in no
-/// particular order. An angle of pi (half-angle cosine 0) is no special case.
+/// particular order. An angle of pi (half-angle cosine 0) needs no special treatment.
 template <size_t N>
 FixedVector<HalfAngle, static_cast<int>(N) - 1> halfAngleRoots(const std::array<double, N>& form) {
   FixedVector<HalfAngle, static_cast<int>(N) - 1> roots;

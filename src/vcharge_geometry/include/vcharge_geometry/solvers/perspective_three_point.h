@@ -17,7 +17,7 @@ namespace vcharge {
 ///   u^2 + b_2 u + (1 - D_12 x) = 0,  v^2 + b_3 v + (1 - D_13 x) = 0,  u^2 + v^2 + alpha u v - D_23 x = 0.
 /// The first two replace the squares in the third, which gives v as a fraction in u; put back into the second
 /// it leaves U u + V = 0 with U, V of degrees 1 and 2 in x, and the first then a quartic in x: at most 4
-/// poses with all points in front. The rays' origins are taken to be one, that of the first ray.
+/// poses with all points in front. All rays are assumed to start at the origin of the first ray.
 inline SolverStatus solvePerspectiveThreePoint(const std::array<PointMatch, 3>& matches,
                                                FixedVector<RotationTranslation, 4>* poses) {
   poses->clear();

@@ -14,8 +14,8 @@ std::shared_ptr<const CameraRig> makeTestRig();
 struct TestDriveOptions {
   int num_keyframes = 40;
   double step_m = 0.5;
-  double turn_rad = 0.05;       ///< per keyframe
-  double odometry_scale = 1.0;  ///< counted over true distance
+  double turn_rad = 0.05;       ///< turn per keyframe
+  double odometry_scale = 1.0;  ///< ratio of counted to true distance
   double noise_px = 0.0;        ///< standard deviation of an observed position
   int num_points = 600;
   uint32_t seed = 1;

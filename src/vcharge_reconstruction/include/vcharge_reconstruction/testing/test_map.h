@@ -21,7 +21,7 @@ std::shared_ptr<const SparseMap> makeTestMap(const TestMapOptions& options);
 
 struct TestViewOptions {
   double noise_px = 0.3;
-  double wrong_ratio = 0.0;  ///< ratio of features with another landmark's descriptor
+  double wrong_ratio = 0.0;  ///< fraction of the features with another landmark's descriptor
   double max_range_m = 20.0;
   int camera_without_image = -1;
   uint32_t seed = 7;
@@ -31,7 +31,7 @@ struct TestViewOptions {
 RigFeatures makeTestView(const SparseMap& map, const RigidTransform& map_from_vehicle,
                          const TestViewOptions& options);
 
-/// The first 128 bits of binary descriptors as numbers (CV_32FC1, 128 columns): 0, or `one`.
+/// The first 128 bits of binary descriptors as numbers (CV_32FC1, 128 columns), 0 or `one` each.
 cv::Mat descriptorsAsNumbers(const cv::Mat& descriptors, float one);
 
 /// Features at random positions with random descriptors.

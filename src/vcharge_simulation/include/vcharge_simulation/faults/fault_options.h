@@ -137,7 +137,7 @@ struct WheelSlipFault : FaultInterval {
   bool isActive() const { return ratio != 0.0; }
 };
 
-/// After the interval the counters contain the distance driven meanwhile. Without an end: no fault.
+/// After the interval the counters contain the distance driven meanwhile. Without an end, there is no fault.
 struct MissingTicksFault : FaultInterval {
   bool isActive() const { return end_s > 0.0; }
 };

@@ -51,7 +51,7 @@ inline constexpr double kCarTexelsPerM = 100.0;
 cv::Mat drawCarSide(const CarShape& shape, double paint);
 cv::Mat drawCarFront(const CarShape& shape, double paint);
 cv::Mat drawCarRear(const CarShape& shape, double paint);
-/// A wheel seen from outside, and a number plate.
+/// Images of a wheel seen from outside and of a number plate.
 cv::Mat drawWheel(uint32_t seed);
 cv::Mat drawPlate(const std::string& text);
 

@@ -14,9 +14,9 @@ namespace vcharge {
 /// How a scene is built.
 struct SceneOptions {
   uint64_t seed = 1;         ///< selects everything that does not change between days
-  int day = 0;               ///< other days have other light and moved cars
+  int day = 0;               ///< days differ in light and in some of the parked cars
   double image_scale = 1.0;  ///< size of the rendered images relative to 1280x800: coarser textures for less
-  double detail = 1.0;       ///< number of leaves and resolution of light maps; less is quicker to build
+  double detail = 1.0;       ///< number of leaves and resolution of light maps; lower values are built faster
   /// For the scene "chessboard": the board ("chessboard" or "aprilgrid") and the rig that it is shown to.
   std::string board = "chessboard";
   std::string rig = "golf";

@@ -22,7 +22,7 @@ class CameraView {
   static constexpr int kSamplesPerPixel = 4;
   static constexpr int kSamplesPerBlock = 16;
 
-  /// A point on the surface of the own car, in the vehicle frame.
+  /// Point on the surface of the own car, in the vehicle frame.
   struct BodySample {
     Eigen::Vector3f position, normal;
     uint32_t material;

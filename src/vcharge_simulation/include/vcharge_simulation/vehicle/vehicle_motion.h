@@ -12,10 +12,10 @@ namespace vcharge {
 /// How the car drives along a path and how its body moves on its springs. Set by the drives of the catalogue.
 struct VehicleMotionOptions {
   double cruise_speed_m_per_s = 2.5;
-  double standstill_s = 0.0;  ///< at the start; 0: the drive starts at cruise speed
+  double standstill_s = 0.0;  ///< time at rest at the start; 0: the drive starts at cruise speed
   bool stop_at_end = false;
-  double duration_s = 60.0;     ///< upper limit
-  double track_width_m = 1.52;  ///< between the rear wheels
+  double duration_s = 60.0;     ///< upper limit of the duration
+  double track_width_m = 1.52;  ///< distance between the rear wheels
   double wheelbase_m = 2.58;
   double pitch_rad_per_m_per_s2 = 0.0045;  ///< nose up when accelerating
   double road_noise_rad = 0.0012;          ///< standard deviation of pitch and roll caused by the road
@@ -27,7 +27,7 @@ struct MotionSample {
   RigidTransform world_from_planar;  ///< pose of the rear axle, projected to z = 0
   RigidTransform planar_from_body;  ///< height, pitch and roll of the ground and of the suspension, about the
                                     ///< vehicle origin
-  double speed_m_per_s = 0.0;       ///< along the ground, negative when driving backwards
+  double speed_m_per_s = 0.0;       ///< speed along the ground, negative when driving backwards
   double curvature_per_m = 0.0;
   double left_wheel_m = 0.0;  ///< distance rolled by the rear wheels
   double right_wheel_m = 0.0;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kToRim_rad =
-    0.012;  // between the outermost corner of the board and the end of the field of view
+    0.012;  // angle between the outermost corner of the board and the end of the field of view
 constexpr double kToBorder_px = 4.0;
 constexpr double kMinHeight_m = 0.08;
 constexpr double kMinDistance_m = 0.7;

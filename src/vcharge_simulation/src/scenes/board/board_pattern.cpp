@@ -13,7 +13,7 @@ constexpr int kWhite = 200;
 constexpr int kBlack = 12;
 
 BoardPattern makeChessboard() {
-  constexpr int kColumns = 10;  // squares
+  constexpr int kColumns = 10;  // squares in a row
   constexpr int kRows = 7;
   constexpr double kSquare_m = 0.1;
   constexpr double kMargin_m = 0.04;

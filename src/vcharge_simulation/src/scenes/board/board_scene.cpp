@@ -23,7 +23,7 @@ const RigidTransform& worldFromVehicle() {
 struct Board {
   BoardPattern pattern;
   BoardMotion motion;
-  uint32_t front, back;  // materials
+  uint32_t front, back;  // indices of materials
 };
 
 MoverState boardAt(const Board& board, double time_s) {

@@ -13,12 +13,12 @@ namespace {
 constexpr double kStopLength_m = 1.7;
 constexpr double kStopWidth_m = 0.14;
 constexpr double kStopHeight_m = 0.1;
-constexpr double kStopToEnd_m = 0.38;  // to the end of the bay
+constexpr double kStopToEnd_m = 0.38;  // distance to the end of the bay
 constexpr double kBoardHeight_m = 0.28;
 constexpr double kBoardWidth_m = 1.7;
 constexpr double kTexelsPerM = 150.0;
 constexpr double kPipeRadius_m = 0.055;
-constexpr double kPiece_m = 2.0;  // long objects are split into pieces, each with its own baked light
+constexpr double kPiece_m = 2.0;  // length of the pieces of long objects; each has its own baked light
 
 Eigen::Vector3f vector(double x, double y, double z) {
   return Eigen::Vector3d(x, y, z).cast<float>();
@@ -94,8 +94,7 @@ void addBoards(double overhead_m, SceneParts* parts) {
                           : vector(sign.x + across, sign.y + thickness, z);
     };
     const double half = 0.5 * kBoardWidth_m;
-    // For a viewer who looks along the lane's axis, left is at larger y in a lane along x and at smaller x in
-    // one along y.
+    // Seen along the lane's axis, left is at larger y in a lane along x and at smaller x in a lane along y.
     const double left = sign.along_x ? half : -half;
     for (const double side : {-1.0, 1.0}) {
       const double start = -side * left;

@@ -161,7 +161,7 @@ class GarageBuilder {
     for (const double x : layout_.beam_x) {
       beam(x, 0.0, area.depth(), 0.36, false);
     }
-    // Beams along the garage are slightly narrower, so that crossing beams do not repeats faces.
+    // Beams along the garage are slightly narrower, so that crossing beams do not repeat faces.
     for (const double y : layout_.beam_y) {
       beam(0.0, y, area.width(), 0.3, true);
     }

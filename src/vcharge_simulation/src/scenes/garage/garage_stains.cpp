@@ -135,7 +135,7 @@ class StainPainter {
   }
 
   static double nearestLane(const ParkingBay& bay) {
-    // Bays are open at the end that their yaw points away from.
+    // The open end of a bay is opposite to the direction of its yaw.
     const double mouth_y = bay.y - (bay.yaw_rad > 0.0 ? 0.5 : -0.5) * kGarageBayLength_m;
     return *std::min_element(std::begin(kLanes_m), std::end(kLanes_m), [&](double a, double b) {
       return std::abs(a - mouth_y) < std::abs(b - mouth_y);

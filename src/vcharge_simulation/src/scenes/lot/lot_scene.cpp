@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kGroundTexel_m = 0.0125;
 constexpr double kMaxGroundTexel_m = 0.5;
-constexpr double kLightTexel_m = 0.05;  // of the baked shadows
+constexpr double kLightTexel_m = 0.05;  // edge length of a texel of the baked shadows
 constexpr double kFarGround_m = 280.0;
 constexpr double kFarTexel_m = 0.2;
 constexpr double kWallLightTexel_m = 0.12;

@@ -11,8 +11,8 @@ constexpr double kTransition_m = 3.0;
 constexpr Lanes kLanes{26.5, 15.0, 5.2};
 constexpr double kBeside_m = 1.0;  // to either side in the long lanes
 
-// Once around, backwards into a bay, out of it the other way and around in that direction: in this scene no
-// lane connects the two directions.
+// Once around the lot, backwards into a bay, out of it the other way and around in that direction, since no
+// lane connects the two directions in this scene.
 DrivePath bothDirectionsPath() {
   constexpr double kCurve_m = 5.5;  // from the bay to where the car leaves the lane and enters it again
   const double x = kLanes.x_m;
