@@ -12,7 +12,7 @@
 
 namespace vcharge {
 
-/// Computes range maps of a live or replayed drive on the topics of RangeMapPublisher; publishes nothing while
+/// Computes range maps of a live or replayed drive, on the topics of RangeMapPublisher; nothing while
 /// the vehicle stands. Reports one status per camera in /diagnostics. Parameters: ~rig (path), ~options
 /// (RangeMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every image in order, as
 /// compute_range_maps; otherwise the newest first, and drops are counted).

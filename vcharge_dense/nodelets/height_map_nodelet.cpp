@@ -14,9 +14,9 @@ namespace vcharge {
 
 /// Builds a height map of a live or replayed drive as build_height_map does: computes range maps during the
 /// drive and fuses them at the service ~finish. Writes the map to ~output and publishes it, latched, on the
-/// topics of HeightMapPublication. Parameters: ~rig (path), ~output (folder), ~trajectory (TUM file of the drive,
-/// otherwise odometry), ~options (HeightMapOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every
-/// image in order, as build_height_map; otherwise those that wait too long are dropped).
+/// topics of HeightMapPublication. Parameters: ~rig (path), ~output (folder), ~trajectory (TUM file,
+/// otherwise odometry), ~options (HeightMapOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (all
+/// images in order, as build_height_map; otherwise those that wait too long are dropped).
 class HeightMapNodelet : public Nodelet, private DriveConsumer {
  public:
   HeightMapNodelet() : Nodelet("height_map") {}

@@ -28,7 +28,7 @@ class MapPublisherNodelet : public Nodelet {
                              << " landmarks, content hash " << map->contentHash());
   }
 
-  // members: a latched message lives as long as its publisher
+  // Kept as members because a latched message lives only as long as its publisher.
   ros::Publisher landmarks_, trajectory_, loop_edges_;
 };
 

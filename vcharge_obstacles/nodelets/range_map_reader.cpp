@@ -37,7 +37,7 @@ std::string describe(const sensor_msgs::CameraInfo& info) {
 }
 
 bool isSameCamera(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b) {
-  constexpr double kTolerance = 1e-3;  // in pixels and coefficients: model fits differ slightly between platforms
+  constexpr double kTolerance = 1e-3;  // pixels and coefficients: model fits differ by platform
   const auto is_near = [](double x, double y) { return std::abs(x - y) <= kTolerance; };
   return a.width == b.width && a.height == b.height && a.distortion_model == b.distortion_model &&
          a.header.frame_id == b.header.frame_id && a.D.size() == b.D.size() &&

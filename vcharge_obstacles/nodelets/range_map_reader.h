@@ -30,7 +30,7 @@ class RangeMapReader {
   /// `topic`: the common prefix of the parts' topics, used in error texts.
   RangeMapReader(const RigCamera& camera, std::string topic);
 
-  /// The range map refers to the messages' pixels; the messages must outlive it. InputError "<topic>/...: ..."
+  /// The range map refers to the messages' pixels, which must outlive it. InputError "<topic>/...: ..."
   /// for another encoding, images of different sizes, or a camera that differs from the rig's at that size.
   RangeMap read(const RangeMapParts& parts);
 

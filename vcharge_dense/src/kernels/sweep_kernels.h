@@ -15,7 +15,7 @@ namespace vcharge {
 
 /// Fraction bits of image positions in fixed point.
 constexpr int kPositionBits = 16;
-/// A cell of a PackedImage that must not be sampled.
+/// Value of a cell in a PackedImage that must not be sampled.
 constexpr int32_t kUnseenCell = static_cast<int32_t>(0x80808080u);
 /// Sum of the weights of a bilinear sample in each direction.
 constexpr int kWeightSum = 255;
@@ -32,7 +32,7 @@ constexpr float kVoteScale = 262144.0f;
 struct SampleScale {
   int shift = 0;             ///< sample = (gray level - 128) * kWeightSum^2 >> shift
   int32_t unseen = 0;        ///< value of a sample that is not seen
-  float max_squares = 0.0f;  ///< larger sums of squares about the mean mean unseen samples
+  float max_squares = 0.0f;  ///< windows with a larger sum of squares about the mean have unseen samples
   float min_squares = 0.0f;  ///< windows with smaller sums are constant
 
   static SampleScale forWindow(int window_px);
@@ -44,8 +44,8 @@ struct SampleScale {
 /// point is visible where the cosine of its angle to the axis exceeds -1/xi (xi > 1) or -xi.
 struct Projection {
   float fx, fy, cx, cy, xi;  ///< working camera, with the packed image's margin added to the centre
-  float min_x, min_y;        ///< lowest and ...
-  float max_x, max_y;        ///< ... highest positions that may be sampled
+  float min_x, min_y;        ///< lowest x and y that may be sampled
+  float max_x, max_y;        ///< highest x and y that may be sampled
   float rotation[9];         ///< neighbour from reference, row-major
   float translation[3];
 };

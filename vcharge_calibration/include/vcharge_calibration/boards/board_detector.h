@@ -26,7 +26,7 @@ class BoardDetector {
   /// an AprilGrid suffice.
   std::optional<BoardView> detect(const cv::Mat& image, const CameraModel& model) const;
 
-  /// The same for boards of which a part is detected in the image itself; takes tenths of a second instead of
+  /// Detects boards of which a part is visible without a camera model; takes tenths of a second instead of
   /// seconds.
   std::optional<BoardView> detectQuickly(const cv::Mat& image, const CameraModel& model) const;
 
