@@ -18,7 +18,7 @@
 
 namespace vcharge {
 
-/// Publishes cameras and wheels of the car: /camera/<name>/{image_raw,camera_info} (mono8; a stamp per pulse),
+/// Publishes cameras and wheels of a car: /camera/<name>/{image_raw,camera_info} (mono8; a stamp per pulse),
 /// /odom, odom -> base_link, cameras on /tf_static, /diagnostics. Parameters: ~rig (path), ~options
 /// (DriverOptions). Cameras and bus may be unplugged and plugged in again; options and rig must be valid.
 class CameraDriverNodelet : public Nodelet {

@@ -15,7 +15,7 @@ namespace vcharge {
 /// Corners of a chessboard in the image by their position (column, row) on a grid with any origin.
 using CornerGrid = std::map<std::pair<int, int>, Eigen::Vector2d>;
 
-/// Extends a part of a board in an image (CV_8UC1), square by square, as long as there are corners. Returns false
+/// Extends a part of a board in an image (CV_8UC1), square by square, while there are corners. Returns false
 /// and leaves the grid unchanged if the corners are not on a plane.
 bool growGrid(const cv::Mat& image, const CameraModel& model, CornerGrid* grid);
 

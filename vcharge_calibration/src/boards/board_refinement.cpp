@@ -115,7 +115,7 @@ std::optional<Eigen::Vector2d> BoardRefiner::refine(int index, const Eigen::Vect
       }
       cv::Mat values;
       cv::remap(image_, values, map, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
-      // The corner c solves sum w g g^T (b - c) = 0, for samples at b (metres from the corner) with gradient g.
+      // The corner c solves sum w g g^T (b - c) = 0, with samples at b (metres from the corner), gradients g.
       Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
       Eigen::Vector2d right_side = Eigen::Vector2d::Zero();
       double sum = 0.0, sum_squared = 0.0, product = 0.0;

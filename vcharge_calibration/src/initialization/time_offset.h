@@ -45,7 +45,7 @@ TimeOffset estimateTimeOffset(const ReconstructionState& state,
                               const std::vector<Eigen::Vector3d>& up_in_camera);
 
 /// Refines the time offset from adjusted keyframes: returns the offset, in addition to `offset_s` by which
-/// `data`'s odometry is already shifted, that fits distances and turns best. One step of robust least squares.
+/// `data`'s odometry is already shifted, that fits distances and turns best. A step of robust least squares.
 TimeOffset refineTimeOffset(const OdometrySeries& series, double offset_s, const ReconstructionData& data);
 
 }  // namespace vcharge

@@ -210,7 +210,7 @@ class Calibration {
     crossValidate(fit);
   }
 
-  // Splits the views into parts and fits without each of them: shows the error on excluded views, and how much
+  // Splits the views into parts and fits without each: shows the error on excluded views, and how much
   // parameters depend on the choice of views.
   void crossValidate(const ViewFit& fit) {
     const auto views = fit.views.size();

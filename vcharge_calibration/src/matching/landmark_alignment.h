@@ -8,7 +8,7 @@
 
 namespace vcharge {
 
-/// Aligns all observations of a landmark with one patch. Needed because joined tracks follow different patches
+/// Aligns all observations of a landmark with one patch, because joined tracks follow different patches
 /// and features are detected anew in each image, so that the observations show slightly different points.
 /// The patch comes from the image of median range and is warped by the poses and the rig. Returns the number
 /// of aligned observations. Data parallel, deterministic.

@@ -52,7 +52,7 @@ std::string summaryOf(const RigCalibration& result) {
          rowOf({"height", result.height_source}) + "</table>";
 }
 
-/// A table row of each degree of freedom with its standard deviation; the angles are zero for an upright camera
+/// Table row of each degree of freedom and its standard deviation; the angles are zero for an upright camera
 /// that looks forward.
 std::string parametersOf(const RigCalibration& result) {
   std::string text =

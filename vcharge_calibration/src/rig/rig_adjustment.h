@@ -17,7 +17,7 @@ struct OdometryNoise {
   double tilt_sigma_rad = 0.0;    ///< standard deviation of the rotation out of that plane
   std::vector<bool> has_slipped;  ///< by the later keyframe of a motion: the motion gets little weight
 };
-/// Estimates the noise from keyframes adjusted with loose odometry. The result is an upper bound, since it
+/// Estimates an upper bound from keyframes adjusted with loose odometry: it contains their own errors.
 OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const ReconstructionData& data);
 
 /// Prior knowledge in addition to the images.

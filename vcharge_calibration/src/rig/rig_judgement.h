@@ -13,7 +13,7 @@ namespace vcharge {
 /// Reason why the motions of a camera did not give its extrinsics, and a remedy.
 std::string describeFailure(const std::string& camera, const HandEye& initial, const RigCalibration& drive);
 
-/// Reason why initial extrinsics are implausible: an odometer with a wrong sign turns all cameras backwards or
+/// Reason why initial extrinsics are implausible: an odometer with wrong sign turns all cameras backwards or
 /// upside down. Empty if they are plausible.
 std::string findWrongSign(const CameraRig& rig);
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kWholeSphere_rad = 6.2831853;
 
-// Less confident ranges are left out, because the octree assumes that a hit is right with a probability of 0.7.
+// Less confident ranges are left out: the octree assumes that a hit is right with a probability of 0.7.
 constexpr float kMinConfidence = 0.7F;
 
 // Marks of a voxel in the current view.

@@ -15,7 +15,7 @@
 namespace vcharge {
 
 /// Calibrates the extrinsics of a rig from a drive (paper, section SLAM-based Extrinsic Calibration); needs
-/// no initial extrinsics, overlap of the cameras or board. Add the drive, then call finish(). Extrinsics of the
+/// no initial extrinsics, overlap of cameras or board. Add the drive, then call finish(). Extrinsics of the
 /// given rig are ignored. Data parallel inside; the same input gives the same result on any number of
 /// threads.
 class RigCalibrator : public DriveConsumer {

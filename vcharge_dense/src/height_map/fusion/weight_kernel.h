@@ -9,7 +9,7 @@ namespace vcharge {
 struct WeightProfile {
   float max_range_m;
   float band_m = 0.15F;      ///< voxels are occupied up to this distance behind the surface, unknown beyond
-  float min_ramp_m = 0.01F;  ///< the weight rises from free to occupied over sigma, at least over this distance
+  float min_ramp_m = 0.01F;  ///< the weight rises from free to occupied over sigma, at least over this
   float free_weight;
 
   explicit WeightProfile(const HeightFusionOptions& options);
