@@ -18,8 +18,8 @@ struct BirdViewArea {
 
 /// The rig's images of one instant projected to the ground plane z = 0: x upwards, y to the left; CV_8UC3.
 /// Each point comes from the camera whose axis is closest. Thin lines mark the seams, across which structures
-/// continue if the extrinsics are correct. Images may be smaller than the cameras' (empty: missing). Unseen is
-/// black. std::logic_error for a rig without extrinsics.
+/// continue if the extrinsics are correct. Images may be smaller than the cameras' (empty: missing). Unseen
+/// ground is black. std::logic_error for a rig without extrinsics.
 cv::Mat makeBirdView(const CameraRig& rig, const std::vector<cv::Mat>& images, const BirdViewArea& area);
 
 /// Covariance (x, y, m^2) of a ground point projected from a camera, by the covariance of vehicle_from_camera

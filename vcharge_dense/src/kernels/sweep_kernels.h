@@ -68,7 +68,7 @@ struct RayRow {
 constexpr int kCellCoefficients = 18;
 
 /// Largest second and third differences between neighbouring nodes over both directions and coordinates;
-/// nodes that are not visible.
+/// without nodes that are not visible.
 struct NodeDifferences {
   float second = 0.0f;
   float third = 0.0f;
@@ -170,7 +170,7 @@ struct SweepKernels {
   int lanes;
   /// Positions of `count` points, NaN where they are not visible in the packed image.
   void (*project)(const Projection& projection, const RayRow& rays, size_t count, float* u, float* v);
-  /// Like project(), in fixed point; 0, the unseen corner of the packed image, for points that are not visible.
+  /// Like project(), in fixed point; 0, the unseen corner of the packed image, for invisible points.
   void (*projectFixed)(const Projection& projection, const RayRow& rays, size_t count, int32_t* u,
                        int32_t* v);
   /// Computes cells, [cell][kCellCoefficients][lanes], over three rows of `nodes` nodes per strip (odd),
@@ -184,7 +184,7 @@ struct SweepKernels {
   /// `scores`: [hypothesis][pixel], `stride` elements from one hypothesis to the next.
   void (*findPeaks)(const int16_t* scores, size_t stride, int num_hypotheses, size_t num_pixels,
                     const Peaks& peaks);
-  /// Number and sum of the neighbours that differ from the middle by at most the tolerance; NaN is never counted.
+  /// Number and sum of the neighbours that differ from the middle by at most the tolerance, never of NaN.
   void (*sumAgreeing)(const NeighbourhoodRow& row, float* number, float* sum);
   /// Motion of each point's image in pixels per 1/m of inverse range, in the neighbour where it is largest.
   void (*largestMotion)(const UncertaintyRow& row, float* motion);

@@ -154,7 +154,7 @@ TEST(SweepKernelsTest, AllInstructionSetsAgree) {
   PlaneSweepOptions options;
   options.num_planes = 16;
   options.num_ground_planes = 8;
-  options.num_refinement_steps = 0;  // with equal scores of two planes, refinement would start at different ones
+  options.num_refinement_steps = 0;  // it would start elsewhere if two planes have equal scores
   for (const Aggregation aggregation : {Aggregation::kMean, Aggregation::kReferenceSplit}) {
     options.aggregation = aggregation;
     expectAgreement(options, 0.002f);  // nodes depend on the number of lanes

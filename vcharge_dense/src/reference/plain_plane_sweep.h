@@ -24,7 +24,7 @@ struct PlainResult {
   cv::Mat score;             ///< CV_64FC1, NaN if there is none
 };
 
-/// The plane sweep in its simplest form, as a reference for PlaneSweep's first sweep: double precision, without
+/// The simplest form of the plane sweep, as a reference for PlaneSweep's first sweep: double precision, no
 /// tiles, threads, refinement or uncertainty.
 PlainResult plainPlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask,
                             const std::vector<PlaneFamily>& families, const PlaneSweepOptions& options,

@@ -32,7 +32,7 @@ class SweepLevel {
   /// Makes an input without neighbours.
   SweepInput makeInput(const cv::Mat& reference_pixels) const;
 
-  /// Returns the surface from the planes with the best scores. `choice` has one entry per tile, or is empty: all
+  /// Surface from the planes with the best scores. `choice` has one entry per tile, or is empty: all
   /// planes.
   SurfaceEstimate sweepPlanes(const SweepInput& input, const std::vector<cv::Rect>& tiles,
                               const std::vector<TilePlanes>& choice) const;
