@@ -98,7 +98,7 @@ class Pipeline : public DriveConsumer {
     }
     obstacles_->finish();
   }
-  /// Processor time without reading the bag and writing the results. Writing happens during detection, so its
+  /// Processor time without reading the bag and writing results; writing happens inside the detection.
   void reportTiming(double writing_s, nlohmann::json* found) const {
     if (num_maps_ == 0) {
       return;

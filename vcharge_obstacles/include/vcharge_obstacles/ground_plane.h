@@ -17,7 +17,7 @@ enum class GroundState {
 };
 std::string toString(GroundState state);
 
-/// The ground in the vehicle frame: z = offset_m + slope.x() * x + slope.y() * y. All are zero for the calibrated
+/// The ground in the vehicle frame: z = offset_m + slope.x() * x + slope.y() * y. All zero for the calibrated
 /// attitude of the body; braking pitches the nose down, which is a positive slope along x.
 struct GroundPlane {
   GroundState state = GroundState::kFewPoints;
@@ -37,7 +37,7 @@ struct GroundPlane {
   double sigmaAt_m(double x_m, double y_m) const;
 };
 
-/// Tilt assumed while the ground plane is out of bounds: only points above it count as obstacles.
+/// Tilt assumed while the ground plane is out of bounds; an obstacle must then rise above such a ground.
 constexpr double kLostGroundTilt_rad = 0.0873;
 
 /// Options of fitGroundPlane.

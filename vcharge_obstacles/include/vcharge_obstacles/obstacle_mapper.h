@@ -71,7 +71,7 @@ struct ObstacleCameraStatus {
 };
 
 /// The map after all range maps of one stamp. Without range maps, a frame is emitted from time to time, and
-/// after a jump of the odometry an empty frame at once. Stamps increase until the drive starts over: range maps
+/// after a jump of the odometry an empty one at once. Stamps increase until the drive starts over: range maps
 /// that are not newer than the last frame are fused without emitting a frame.
 struct ObstacleFrame {
   ObstacleMap map;

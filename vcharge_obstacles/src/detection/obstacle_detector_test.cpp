@@ -72,7 +72,7 @@ TEST_F(ObstacleDetectorTest, FarObstaclesAtTheRimOfTheImageOnlyHideGround) {
                                        ? ObstacleDetector::kMaxOffAxisFree_m
                                        : std::numeric_limits<double>::infinity());
   }
-  const BoxWorld near_box{{{{3.9, 1.2, 0.0}, {4.3, 1.6, 0.8}}}};  // beside the bumper, at the rim of the image
+  const BoxWorld near_box{{{{3.9, 1.2, 0.0}, {4.3, 1.6, 0.8}}}};  // beside the bumper, at the rim
   const CameraObstacles near_seen = detect(near_box, "left", {}, {0.01, 0.1, 7});
   ASSERT_FALSE(near_seen.obstacles.empty());
   EXPECT_FALSE(near_seen.obstacles.front().is_off_axis);
@@ -150,7 +150,7 @@ TEST_F(ObstacleDetectorTest, GroundAboveWhichTheImageEndsIsNotFree) {
     return seen.free_fraction[grid.index(grid.rayOf(0.5 * M_PI), bin)];
   };
   EXPECT_GT(freeFraction(-1.0, 3.6), 0.5F);  // not masked
-  // At 0.9 m camera height, a ray that falls by 0.2 is 0.25 m above the ground at 3.25 m and meets it at 4.5 m.
+  // At 0.9 m camera height, a ray that falls by 0.2 is 0.25 m high at 3.25 m and meets the ground at 4.5 m.
   EXPECT_GT(freeFraction(0.2, 2.9), 0.5F);
   EXPECT_EQ(freeFraction(0.2, 3.6), 0.0F);
   // Nearby ground is free, because another camera would observe a body there: 0.25 m at 1.6 m, ground at 2.25

@@ -196,7 +196,7 @@ bool isRamp(const PolarPoints& points, const PolarObstacle& low) {
   return end_m - last_m <= kRampGap_m;
 }
 
-/// Weight of an obstacle; only that of high ones depends on confidence, since kerbs have a low confidence too.
+/// Weight of an obstacle; only high ones are weighted by confidence, since that of kerbs is low too.
 double weightOf(const PolarObstacle& obstacle, const std::vector<PolarPoint>& points) {
   if (obstacle.is_ramp) {
     return kRampWeight;
@@ -260,7 +260,7 @@ ObstacleScan makePolarScan(const PolarGrid& grid, const std::vector<PolarObstacl
                            const std::vector<float>& expected_ground) {
   ObstacleScan scan = ObstacleScan::unknown(static_cast<size_t>(grid.numRays()), grid.maxRange_m());
   for (auto obstacle = obstacles.rbegin(); obstacle != obstacles.rend(); ++obstacle) {
-    const auto ray = static_cast<size_t>(obstacle->ray);  // reversed, so that the first obstacle of a ray is written last
+    const auto ray = static_cast<size_t>(obstacle->ray);  // writes the first of a ray last
     scan.range_m[ray] = static_cast<float>(obstacle->range_m);
     scan.range_sigma_m[ray] = static_cast<float>(obstacle->range_sigma_m);
     scan.height_m[ray] = static_cast<float>(obstacle->height_m);

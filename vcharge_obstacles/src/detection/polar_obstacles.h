@@ -7,7 +7,7 @@
 
 namespace vcharge {
 
-/// Ranges interpolated between a high obstacle and the ground in front of it form a ramp. Its observations have
+/// Ranges interpolated between a high obstacle and the ground before it form a ramp. Its observations have
 /// this weight because it may also be a kerb.
 constexpr double kRampWeight = 0.25;
 /// Obstacles with this mean confidence or more have full weight.

@@ -13,7 +13,7 @@ namespace {
 constexpr double kHalfDiagonal = 0.7072;
 // Ground is blocked within this number of cell sides around an obstacle, plus two sigmas of its range.
 constexpr double kMarginCells = 0.75;
-// The lowest observed part of a static obstacle is below this height. Moving objects have wrong ranges and
+// A static obstacle is observed below this height. Moving objects get wrong ranges and seem to hang higher.
 constexpr double kStandsBelow_m = 0.25;
 // Angle by which the ground hidden by a static obstacle moves between two images, and margin in range.
 constexpr double kParallax_rad = 0.09;

@@ -6,7 +6,7 @@
 
 namespace vcharge {
 
-/// Ground of a cell of the map as shown by the rays of one camera that cross it. Fractions refer to the pixels
+/// Ground of a cell of the map as shown by one camera's rays that cross it. Fractions refer to the pixels
 /// that would show it.
 struct CellObservation {
   double free_fraction = 0.0;
@@ -25,8 +25,8 @@ class CellObserver {
   /// Observes the cell at a direction (vehicle's axes) and a range from the camera, whose bin is given.
   /// Averages all rays that cross the cell; an obstacle on one of them blocks it.
   CellObservation observe(double angle_rad, double range_m, int bin) const;
-  /// Whether changed ground at that direction and range is explained by an obstacle that stands there or in front
-  /// of it, since whatever rises from the ground does not follow the warp by its plane.
+  /// Whether changed ground in that direction and range is explained by an obstacle that stands there or in
+  /// front of it, since whatever rises from the ground does not follow the warp by its plane.
   bool isExplained(double angle_rad, double range_m) const;
 
  private:

@@ -16,7 +16,7 @@ constexpr float kMemory = 0.9F;
 // Distance along the ray, in sigmas, over which an observation is spread. Evidence further away would
 // accumulate over many observations with the same error.
 constexpr double kObservationSigmas = 1.0;
-// Log-odds of an obstacle observation with full support and small sigma, and of one whose pixels all show
+// Log-odds of an obstacle with full support and small sigma, and of a cell whose pixels all show ground.
 constexpr double kOccupiedLogOdds = 0.9;
 constexpr double kFreeLogOdds = 0.6;
 // Above this sigma, an observation's weight falls with the square: many uncertain observations with a common
@@ -32,7 +32,7 @@ constexpr double kHiddenDecay = 0.5;
 constexpr double kUnknownDecay = 0.7;
 // Time for which changed ground cannot become free.
 constexpr double kChangedHold_s = 0.3;
-// Within this angle of the direction of travel, missing ranges give no evidence: stereo has no parallax there.
+// Within this angle of the direction of travel missing ranges give no evidence: stereo has no parallax.
 constexpr double kBlindAngle_rad = 0.35;
 // Observations of a camera that has moved less have correlated errors, and weigh less.
 constexpr double kIndependentMotion_m = 0.1;
@@ -88,7 +88,7 @@ void LocalObstacleMap::add(const CameraObstacles& seen, const PolarGrid& grid,
   addOccupied(seen, grid, level, weight);
 }
 
-/// Weight of a camera's range map: maps from nearly the same position use the same images, so errors correlate.
+/// Weight of a camera's range map: maps from nearby positions use the same images, so errors correlate.
 double LocalObstacleMap::weightOf(const CameraObstacles& seen, const RigidTransform& fixed_from_vehicle) {
   const Eigen::Vector2d position = transformed(fixed_from_vehicle, seen.origin_m);
   const auto [last, is_first] = last_camera_position_.try_emplace(seen.camera_name, position);

@@ -213,7 +213,7 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const std::vector<const C
   on_frame_(frame);
 }
 
-/// Emits the map while no range maps arrive. The time is measured by the arrival of range maps instead of their
+/// Emits the map while no range maps arrive. The time is measured by their arrival instead of their
 /// stamps, so that a delay is no interruption. A stage that waits for everything cannot distinguish them, and
 /// emits maps only at the stamps of range maps.
 void ObstacleMapper::emitWhenSilent() {

@@ -13,7 +13,7 @@ class GroundShadows {
  public:
   explicit GroundShadows(double camera_height_m);  ///< height above the ground
 
-  /// Adds an obstacle in a square cell. offset_m: vector from the camera to the cell's middle; all offsets have
+  /// Adds an obstacle in a square cell. offset_m: from the camera to the cell's middle; all offsets have
   /// the same axes.
   void add(const Eigen::Vector2d& offset_m, double cell_m, double height_m);
   /// Whether the line of sight to the ground at an offset passes through an obstacle.
