@@ -48,7 +48,7 @@ std::string serialized(const Message& message) {
   return bytes;
 }
 
-/// Deserializes a message as if from a bag or a connection. Throws InputError if the bytes are no such message.
+/// Deserializes a message like a bag or a connection does. InputError if the bytes are not such a message.
 template <class Message>
 boost::shared_ptr<const Message> deserialized(std::string bytes) {
   const auto message = boost::make_shared<Message>();

@@ -106,7 +106,7 @@ class RigJudge {
              "camera '" + camera.name + "': errors correlate over the image (" + toText(100.0 * ratio, 0) +
                  " % of them): wrong intrinsics. Calibrate the intrinsics again");
     }
-    // A map connects the cameras even without shared landmarks.
+    // A map connects the cameras even without common landmarks.
     if (camera.num_shared_landmarks < kMinShared && result_->cameras.size() > 1 && !result_->is_from_map) {
       remark(Verdict::kWarn, "camera '" + camera.name + "' shares only " +
                                  std::to_string(camera.num_shared_landmarks) +

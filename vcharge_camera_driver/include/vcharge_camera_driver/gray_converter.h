@@ -48,7 +48,7 @@ class GrayConverter {
   GrayConverter& operator=(GrayConverter&& other) noexcept;
 
   /// `data` holds `size_bytes` bytes in rows `stride_bytes` apart (ignored for kMjpeg); `gray` is CV_8UC1 of
-  /// the frame's size. Returns an empty text, or the reason why the frame is rejected (too short, not a JPEG, a
+  /// the frame's size. Returns an empty text, or the reason to reject the frame (too short, not a JPEG, a
   /// JPEG of another size, damaged); `gray` is then undefined.
   std::string convert(PixelFormat format, const uint8_t* data, size_t size_bytes, size_t stride_bytes,
                       cv::Mat* gray);

@@ -50,7 +50,7 @@ struct V4l2Frame {
   /// Time of the kernel's CLOCK_MONOTONIC at the end of the frame, or at the start of its exposure, depending
   /// on the driver.
   Timestamp monotonic_stamp;
-  bool has_kernel_stamp = true;  ///< false: the driver's clock is unknown, and the stamp is the time of dequeue()
+  bool has_kernel_stamp = true;  ///< false: the driver's clock is unknown; uses the time of dequeue()
   bool is_damaged = false;       ///< V4L2_BUF_FLAG_ERROR
   const uint8_t* data = nullptr;
   size_t size_bytes = 0;

@@ -20,8 +20,8 @@ struct CameraHealthOptions {
   VCHARGE_END_OPTIONS();
 };
 
-/// Finds cameras that do not contribute, and the likely reason. The number of matches that fit a pose by chance
-/// depends on scene and image size, so cameras that contradict the pose are found by comparison with the
+/// Finds cameras that do not contribute, and the likely reason. The number of matches that fit by chance
+/// depends on scene and image size, so cameras that contradict the pose are found by comparing them with the
 /// others. Not thread safe.
 class CameraHealth {
  public:

@@ -31,7 +31,7 @@ class MappingSession : public DriveConsumer {
   using MapCallback = std::function<void(const SparseMap&)>;
 
   /// `on_keyframe` is called inside addImage() and addOdometry() after new keyframes; `on_map` in the thread
-  /// that made the map. Neither may throw. Throws the errors of SparseMapper.
+  /// that made the map. Neither may throw. The constructor throws the errors of SparseMapper.
   MappingSession(std::shared_ptr<const CameraRig> rig, const SparseMapperOptions& options,
                  KeyframeCallback on_keyframe, MapCallback on_map);
   /// Abandons an unfinished map at the end of its stage.

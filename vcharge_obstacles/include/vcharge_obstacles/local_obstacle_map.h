@@ -64,7 +64,7 @@ class LocalObstacleMap {
   /// Sets the vehicle's pose (x, y and yaw are used): scrolls, and decays by the distance driven.
   void moveTo(Timestamp stamp, const RigidTransform& fixed_from_vehicle);
   /// Adds the observation of a camera; std::logic_error before the first moveTo(). `grid` is the
-  /// grid of the detector.
+  /// detector's.
   void add(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle);
   /// Moves all cells into a corrected fixed frame.
   void reanchor(const RigidTransform& new_from_old_fixed);

@@ -87,7 +87,7 @@ struct CameraObstacles {
 /// Immutable and cheap to copy; one object may be used by any number of threads.
 class ObstacleDetector {
  public:
-  /// Beyond this range, obstacles off the optical axis hide ground but do not mark cells of the map: there the
+  /// Beyond this range, obstacles off the optical axis hide ground but mark no cells of the map: there the
   /// lens resolves little, and another camera observes them better.
   static constexpr double kMaxOffAxisRange_m = 2.5;
   /// Beyond this range, ground off the optical axis does not free cells, because a dark flank may be matched

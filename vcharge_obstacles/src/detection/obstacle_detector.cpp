@@ -83,9 +83,9 @@ struct ObstacleDetector::Implementation {
   const Eigen::Vector3f position;
   const PixelRays rays;
   const ExpectedPixels expected;
-  const std::vector<double> overseen_m;  // by sector, see overseenRange()
-  std::vector<bool> is_off_axis;         // by sector
-  std::vector<double> free_to_m;         // by sector
+  const std::vector<double> overseen_m;  // one per sector, see overseenRange()
+  std::vector<bool> is_off_axis;         // one per sector
+  std::vector<double> free_to_m;         // one per sector
 };
 
 ObstacleDetector::ObstacleDetector(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera,

@@ -34,7 +34,7 @@ class ObstacleMapObservationsTest : public ::testing::Test {
   /// A low camera that observes bare ground everywhere, even under the body of a car.
   CameraObstacles makeGroundObservation() const { return makeObservation("front", 0.55, 1.0F); }
 
-  /// A camera at (x, 0) that observes a flank from (-1, kFlankY_m) to (1, kFlankY_m); the error is equal in all
+  /// A camera at (x, 0) that observes a flank from (-1, kFlankY_m) to (1, kFlankY_m), with one error in all
   /// ranges.
   CameraObstacles makeFlankObservation(double x_m, double sigma_m, double error_m) const {
     CameraObstacles seen = makeObservation("left", 0.9, 0.0F);

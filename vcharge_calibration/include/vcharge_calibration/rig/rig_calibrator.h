@@ -50,8 +50,8 @@ class RigCalibrator : public DriveConsumer {
 };
 
 /// The steps of RigCalibrator::finish() on a recorded state. With copies of state() and allImages() it may
-/// run while the drive goes on. Afterwards, `state` has the adjusted rig, poses and landmarks.
-/// Returns the calibration.
+/// run while the drive goes on. Afterwards, `state` has the adjusted rig, poses and landmarks. Returns the
+/// calibration.
 RigCalibration calibrateFollowedDrive(const RigCalibratorOptions& options, const KeyframeImages& all_images,
                                       const StageCallback& progress, ReconstructionState* state);
 
