@@ -16,7 +16,7 @@ namespace vcharge {
 /// Calibrates the extrinsics of a rig from a live or replayed drive as calibrate_rig does, and coaches the
 /// driver: /calibration/status says what to drive next, how well each camera's extrinsics are known, and when
 /// to stop. Shows the drive on /calibration/trajectory, /calibration/landmarks (by camera) and
-/// /calibration/cameras, in the frame `map`. Services: ~calibrate starts to calibrate from the drive so far and
+/// /calibration/cameras, in the frame `map`. Services: ~calibrate starts to calibrate the drive so far and
 /// returns; ~reset begins a new drive. Files are written after PASS and WARN, the report always. Parameters:
 /// ~rig (path), ~output (rig.yaml to write), optional ~map (*.vmap), ~trajectory (*.tum), ~report (folder),
 /// ~options (RigCalibratorOptions), ~session (RigCalibrationSessionOptions), ~source

@@ -18,7 +18,7 @@
 
 namespace vcharge {
 
-/// Localizes a live or replayed drive in a map. Publishes /localization/pose (while it is
+/// Localizes a live or replayed drive in a map. Publishes /localization/pose (while the pose is
 /// known), /localization/status (every frame), /localization/observations (markers), map -> odom on /tf, and
 /// a status in /diagnostics; /initialpose sets a prior pose. Parameters: ~rig, ~map (paths), ~options
 /// (DriveLocalizerOptions), ~source (LiveDriveSourceOptions), ~map_frame, ~odom_frame, ~lossless_replay

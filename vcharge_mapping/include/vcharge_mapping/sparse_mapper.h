@@ -27,7 +27,7 @@ class SparseMapper : public DriveConsumer {
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
 
-  /// Makes the map of the drive so far. InputError, with a reason, if the drive does not suffice. The callback
+  /// Makes the map of the drive so far. InputError, with reason, if the drive does not suffice. The callback
   /// may be empty, and may throw to end the work; the mapper must not be used afterwards.
   std::shared_ptr<const SparseMap> finish(const StageCallback& progress);
 

@@ -6,7 +6,7 @@
 
 namespace vcharge {
 
-/// Describes the drive, and every degree of freedom of each camera with its standard deviation; without verdict
+/// Describes the drive, and every degree of freedom of a camera with its standard deviation; without verdict
 /// and remarks.
 std::string describeCalibration(const RigCalibration& result);
 
