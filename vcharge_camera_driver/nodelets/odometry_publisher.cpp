@@ -7,7 +7,7 @@
 namespace vcharge {
 namespace {
 
-constexpr double kHoldInPeriods = 1.5;  // an estimate is extrapolated to the next trigger at most
+constexpr double kHoldInPeriods = 1.5;  // longest wait of an estimate for the next trigger
 constexpr double kMaxExtrapolation_s = 0.1;
 constexpr double kUnknownVariance = 1e6;  // variance of height, roll and pitch, which wheels do not measure
 

@@ -26,8 +26,8 @@ struct CanFrame {
   std::array<uint8_t, 8> data{};
 };
 
-/// Position and scaling of a number in a message, as in DBC files: little endian signals start at their lowest
-/// bit, big endian (Motorola) signals at their highest bit; bits are counted from the lowest of
+/// Position and scaling of a number in a message, as in DBC files: little endian signals start at the lowest
+/// bit, big endian (Motorola) signals at the highest bit; bits are counted from the lowest of
 /// byte 0. value = raw * scale + offset.
 struct CanSignal {
   VCHARGE_BEGIN_OPTIONS(CanSignal);

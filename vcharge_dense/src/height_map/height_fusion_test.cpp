@@ -183,7 +183,7 @@ TEST(HeightFusionTest, PillarIsSolidAndTheGroundIsNot) {
         EXPECT_FALSE(is_solid) << centre.transpose();
         ++num_open;
       } else if (std::abs(centre.x() - 2.5) < 0.3 && outside_m < -0.01 && outside_m > -0.1) {
-        EXPECT_TRUE(is_solid) << centre.transpose();  // the faces beside the cameras' paths
+        EXPECT_TRUE(is_solid) << centre.transpose();  // only the faces that the cameras pass
         EXPECT_EQ(observed.at<uint8_t>(row, column), 0) << centre.transpose();
         ++num_faces;
       }
@@ -208,7 +208,7 @@ TEST(HeightFusionTest, RangesThatAreNotFiniteChangeNothing) {
   int number = 0;
   for (const float value : {std::nanf(""), std::numeric_limits<float>::infinity(), 0.0F, -1.0F}) {
     for (const bool in_sigma : {false, true}) {
-      // Corrupts ranges beside the box, where other views see the same ground.
+      // Adds a corrupt view of ground beside the box that other views show too.
       const RigidTransform pose = other.poses[static_cast<size_t>(8 + number++)];
       RangeMap map = testing::renderView(other.world, pose, cv::Size(320, 200));
       (in_sigma ? map.standard_deviation_m : map.range_m).setTo(value);

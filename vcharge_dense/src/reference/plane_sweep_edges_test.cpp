@@ -104,7 +104,7 @@ TEST(PlaneSweepEdgesTest, MoreOfThePlanesFarAwayFindAKerbsFaceBetter) {
   for (const uint32_t seed : {1u, 2u, 3u}) {
     SCOPED_TRACE(seed);
     const Sequence s = fourNeighbours(seed);
-    // At the kerb, the spacing of these planes is 0.45 times that of uniform planes.
+    // At the kerb, the spacing of the non-uniform planes is 0.45 times that of uniform planes.
     const Errors uniform = errorsOf(sweepPlanes(s, 64), s, kFace),
                  spaced = errorsOf(sweepPlanes(s, 64, 6.0), s, kFace);
     EXPECT_LE(spaced.median_absolute, 0.7 * uniform.median_absolute);

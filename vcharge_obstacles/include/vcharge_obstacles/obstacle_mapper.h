@@ -53,8 +53,8 @@ enum class ObstacleCameraState {
   kNoPose,        ///< no odometry at the range maps' stamps
   kStanding,      ///< the vehicle stands: motion stereo measures nothing
   kHardlySees,    ///< few ranges: night, dirt, no texture
-  kGroundLost,    ///< the ground is tilted beyond the bounds: nothing is cleared
-  kGroundUnsure,  ///< few ground points: nothing is cleared
+  kGroundLost,    ///< the ground is tilted beyond the bounds: no cell is cleared
+  kGroundUnsure,  ///< few ground points: no cell is cleared
   kMapping,
 };
 std::string toString(ObstacleCameraState state);

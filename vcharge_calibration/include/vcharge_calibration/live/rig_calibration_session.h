@@ -60,7 +60,7 @@ class RigCalibrationSession : public DriveConsumer {
   /// from hand-eye calibration as far as they are known.
   using DriveCallback = std::function<void(const ReconstructionState&, const CameraRig& guess)>;
 
-  /// Callbacks but `on_result` must not throw. Errors are those of RigCalibrator; std::invalid_argument
+  /// Callbacks other than `on_result` must not throw. Errors as for RigCalibrator; std::invalid_argument
   /// for bad options.
   RigCalibrationSession(std::shared_ptr<const CameraRig> rig, const RigCalibratorOptions& calibrator_options,
                         const RigCalibrationSessionOptions& options, StatusCallback on_status,
