@@ -96,7 +96,7 @@ class CommandsTest(unittest.TestCase):
 
     def test_the_commands_of_the_pages_work_as_typed(self):
         self.assertGreater(self.run_page(ROOT / "doc" / "bring_up.md"), 15)
-        self.assertGreater(self.run_page(ROOT / "README.md"), 8)
+        self.assertGreaterEqual(self.run_page(ROOT / "README.md"), 8)
         missing = sorted(name for name in RESULTS if not (self.work / name).exists())
         self.assertEqual(missing, [])
 

@@ -9,7 +9,6 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "vcharge_camera_driver/can_wheel_decoder.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_simulation/sensors/wheel_odometer.h"
 

@@ -160,7 +160,7 @@ TEST(CalibrationCoachTest, IsNeverSatisfiedByAStraightDrive) {
   EXPECT_EQ(outlook.cameras[0].hand_eye.status, HandEyeStatus::kNoTurn);
   EXPECT_EQ(outlook.progress, 0.0);
   EXPECT_EQ(outlook.missing.back(),
-            "turn tightly to both sides: the place of camera 'left' cannot be told yet");
+            "turn tightly to both sides: the position of camera 'left' is still unknown");
 }
 
 TEST(CalibrationCoachTest, NamesABlindCameraFirst) {

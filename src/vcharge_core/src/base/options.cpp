@@ -154,6 +154,14 @@ std::string showRows(const std::vector<OptionRow>& rows) {
   return text;
 }
 
+/// "must be positive" -> "positive"
+std::string withoutVerb(const std::string& requirement) {
+  const std::string verb = "must be ";
+  return requirement.compare(0, verb.size(), verb) == 0 ? requirement.substr(verb.size())
+         : requirement == "must not be negative"        ? "not negative"
+                                                        : requirement;
+}
+
 std::string listRows(const std::vector<OptionRow>& rows, std::set<std::string>* listed_groups) {
   std::string text;
   std::string skipped = "\n";  // prefix of the keys of a group that is not listed again
@@ -166,7 +174,7 @@ std::string listRows(const std::vector<OptionRow>& rows, std::set<std::string>* 
     text += std::string(2 * depth, ' ') + "- **" +
             (dot == std::string::npos ? row.key : row.key.substr(dot + 1)) + "**";
     text += (row.group_type.empty() ? " `" + row.value + "`: " : ": ") + row.meaning;
-    text += row.allowed.empty() ? "" : " (" + row.allowed + ")";
+    text += row.allowed.empty() ? "" : " (" + withoutVerb(row.allowed) + ")";
     if (!row.group_type.empty() && !listed_groups->insert(row.group_type).second) {
       text += " (listed above)";
       skipped = row.key + ".";

@@ -143,7 +143,7 @@ TEST(OptionsTest, ShownOptionsReadBackAndTellTheirMeaning) {
   EXPECT_EQ(copy.inner.scale, 0.1);
   std::set<std::string> listed;
   EXPECT_THAT(optionList(options, &listed),
-              HasSubstr("  - **scale** `0.1`: Factor of all lengths. (must be positive)\n"));
+              HasSubstr("  - **scale** `0.1`: Factor of all lengths. (positive)\n"));
   EXPECT_THAT(optionList(options, &listed),
               AllOf(HasSubstr("Scale of the planes. (listed above)\n"), Not(HasSubstr("scale"))));
 }
