@@ -35,7 +35,7 @@ struct SeamPoint {
   Eigen::Vector2d ground_m = Eigen::Vector2d::Zero();
   bool is_seen = false;  ///< both cameras see the point
   /// Standard deviation, in the worse direction, of the distance between the two projections of the point. An
-  /// upper bound: errors are assumed independent, but those of height and tilt are mostly common to both cameras.
+  /// upper bound: errors are assumed independent, but those of height and tilt are mostly common to both.
   double sigma_m = std::numeric_limits<double>::quiet_NaN();
   double before_m = std::numeric_limits<double>::quiet_NaN();  ///< for the initial rig
 };
