@@ -48,7 +48,7 @@ std::string serialized(const Message& message) {
   return bytes;
 }
 
-/// Deserializes a message like a bag or a connection. Throws InputError if the bytes are not such a message.
+/// Deserializes a message like a bag or a connection does. InputError if the bytes are not such a message.
 template <class Message>
 boost::shared_ptr<const Message> deserialized(std::string bytes) {
   const auto message = boost::make_shared<Message>();
@@ -64,8 +64,8 @@ boost::shared_ptr<const Message> deserialized(std::string bytes) {
 
 constexpr size_t kImageFields = 13;
 
-/// Height, width and step (32 bits each), a byte for the encoding, and the data. These fields are set
-/// directly, since roscpp allocates whatever length a serialized message claims, up to 4 GB, before it checks
+/// The input has height, width and step (32 bits each), a byte for the encoding, and the data. These are set
+/// directly, since roscpp allocates any length that a serialized message claims, up to 4 GB, before it checks
 /// the available bytes.
 std::string imageFields() {
   std::string bytes(kImageFields, '\0');
@@ -99,7 +99,7 @@ void takeCompressedImage(const std::string& bytes) {
   toImage(message, "/camera/front/image_raw/compressed");
 }
 
-/// The first byte selects the format, the second adds to the stride.
+/// The first byte of the input selects the format, the second adds to the stride.
 void convertFrame(const std::string& bytes) {
   if (bytes.size() < 2) {
     return;
@@ -127,7 +127,7 @@ std::vector<std::string> frames() {
   return seeds;
 }
 
-/// Signals that cross bytes, in both byte orders, and frames of 12 bytes each: id, size, data, time.
+/// The input has signals that cross bytes, in both byte orders, and frames of 12 bytes: id, size, data, time.
 void decodeCan(const std::string& bytes) {
   CanWheelOptions options;
   options.left_ticks = {0x101, 3, 13, ByteOrder::kLittle, false, 1.0, 0.0};

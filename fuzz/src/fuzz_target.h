@@ -12,7 +12,7 @@ namespace vcharge {
 /// for options), which take() ignores; any other outcome is a defect.
 struct FuzzTarget {
   std::string name;
-  std::function<std::vector<std::string>()> seeds;  ///< bytes that the reader accepts
+  std::function<std::vector<std::string>()> seeds;  ///< valid inputs of the reader
   std::function<void(const std::string& bytes)> read;
 };
 
@@ -23,8 +23,8 @@ bool take(const FuzzTarget& target, const std::string& bytes);
 const std::vector<FuzzTarget>& fuzzTargets();
 const FuzzTarget& fuzzTarget(const std::string& name);
 
-/// Readers without ROS of vcharge_core and vcharge_features; recordings, messages and buses; files and
-/// options of the stages.
+/// Targets of readers without ROS in vcharge_core and vcharge_features; of recordings, messages and buses; of
+/// files and options of the stages.
 std::vector<FuzzTarget> coreTargets();
 std::vector<FuzzTarget> driveTargets();
 std::vector<FuzzTarget> stageTargets();

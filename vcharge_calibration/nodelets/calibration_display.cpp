@@ -11,7 +11,7 @@ namespace vcharge {
 namespace {
 
 constexpr const char* kFrame = "map";
-constexpr int kShownKeyframes = 20;  // while driving
+constexpr int kShownKeyframes = 20;  // keyframes shown while the drive goes on
 
 }  // namespace
 

@@ -13,7 +13,7 @@
 namespace vcharge {
 namespace {
 
-constexpr double kPyramid_m = 0.5;  // its height
+constexpr double kPyramid_m = 0.5;  // height of a camera's pyramid
 constexpr double kLetter_m = 0.35;
 
 std::array<uint8_t, 3> rgbOf(size_t camera) {

@@ -12,8 +12,8 @@
 
 namespace vcharge {
 
-/// A session's status; the caller sets the header's stamp. Standard deviations of the cameras are those of
-/// the calibration once it is done, otherwise predictions for hand-eye.
+/// A session's status; the caller sets the header's stamp. The cameras' standard deviations come from the
+/// calibration once it is done, and before that from the prediction for hand-eye calibration.
 vcharge_msgs::CalibrationStatus toStatusMessage(const RigCalibrationSession::Status& status);
 
 /// Landmarks as x, y, z (metres, FLOAT32) and rgb, in their camera's colour.

@@ -16,7 +16,7 @@ namespace vcharge {
 /// Calibrates the extrinsics of a rig from a live or replayed drive as calibrate_rig does, and coaches the
 /// driver: /calibration/status says what to drive next, how well each camera's extrinsics are known, and when
 /// to stop. Shows the drive on /calibration/trajectory, /calibration/landmarks (by camera) and
-/// /calibration/cameras, in the frame `map`. Services: ~calibrate begins to calibrate by the drive so far and
+/// /calibration/cameras, in the frame `map`. Services: ~calibrate starts to calibrate the drive so far and
 /// returns; ~reset begins a new drive. Files are written after PASS and WARN, the report always. Parameters:
 /// ~rig (path), ~output (rig.yaml to write), optional ~map (*.vmap), ~trajectory (*.tum), ~report (folder),
 /// ~options (RigCalibratorOptions), ~session (RigCalibrationSessionOptions), ~source
@@ -27,7 +27,7 @@ class CalibrationNodelet : public Nodelet {
   CalibrationNodelet() : Nodelet("calibration") {}
   ~CalibrationNodelet() override {
     end();
-    session_.reset();  // its thread publishes
+    session_.reset();  // first: its thread publishes
   }
 
  private:
@@ -66,7 +66,7 @@ class CalibrationNodelet : public Nodelet {
   }
 
   void reset(Response* response) {
-    flushSource();  // belongs to the drive before
+    flushSource();  // frames left in the source belong to the previous drive
     session_->reset();
     response->success = 1;
     response->message = "a new drive begins";

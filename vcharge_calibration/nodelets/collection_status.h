@@ -36,7 +36,7 @@ class CollectionStatus {
     publisher_.publish(message_);
   }
 
-  /// NaN where there is no result.
+  /// NaN: there is no result.
   void setRms(double rms_px) {
     const std::lock_guard<std::mutex> lock(mutex_);
     message_.rms_px = rms_px;

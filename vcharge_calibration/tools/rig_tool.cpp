@@ -37,7 +37,7 @@ void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const 
                  DriveConsumer* consumer) {
   ProgressBar bar("following the drive");
   BagDriveSourceOptions options;
-  options.max_image_gap_s = INFINITY;  // frames without a camera are used and counted
+  options.max_image_gap_s = INFINITY;  // frames that lack a camera are used, and counted
   BagDriveSource source(arguments.bag, rig, options);
   source.run(consumer, [&](double fraction) { bar.update(fraction); });
 }

@@ -18,12 +18,12 @@
 
 namespace vcharge {
 
-// Shared by the tools that calibrate a rig from a drive.
+// Code shared by the tools that calibrate a rig from a drive.
 
 struct RigToolArguments {
   std::string bag, rig, options, output, trajectory, report;
   bool show_options = false;
-  nlohmann::json* found = nullptr;  ///< for --json, filled by finishAndPrint()
+  nlohmann::json* found = nullptr;  ///< output of --json, filled by finishAndPrint()
 };
 
 void addRigToolArguments(CLI::App* app, RigToolArguments* arguments);
@@ -49,7 +49,7 @@ void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const 
                  DriveConsumer* consumer);
 
 /// Runs the calibration with a progress bar, prints the result, and writes the report with `more_sections`.
-/// InputError with the verdict's first reason for kFail.
+/// For kFail, throws InputError with the verdict's first reason.
 RigCalibration finishAndPrint(const RigToolArguments& arguments, const ReconstructionState& state,
                               const std::function<RigCalibration(const StageCallback&)>& finish,
                               const KeyframeImages& images,

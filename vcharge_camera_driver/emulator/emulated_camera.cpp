@@ -331,7 +331,7 @@ uint8_t* EmulatedCamera::memory(uint32_t index) {
   return slots_[index].data != nullptr ? slots_[index].data : mapped_ + mapped_bytes_ / slots_.size() * index;
 }
 
-// Paints a gray ramp once; encodes the number of the pulse in the first pixels: white for a one, lowest bit
+// Paints a gray ramp once, then encodes the pulse's number in the first pixels: white for a one, lowest bit
 // first.
 void EmulatedCamera::paint(uint32_t index, uint64_t pulse) {
   uint8_t* data = memory(index);

@@ -136,7 +136,7 @@ class Hardware {
 
   std::recursive_mutex mutex_;  // recursive, since a camera's own mmap() and close() are handled here too
   std::condition_variable_any changed_;
-  std::map<int, std::shared_ptr<EmulatedCamera>> cameras_;  // by file descriptor of the application
+  std::map<int, std::shared_ptr<EmulatedCamera>> cameras_;  // key: the application's file descriptor
   std::atomic<size_t> num_open_{0};
   bool stop_ = false;
   std::thread thread_;

@@ -8,7 +8,7 @@
 namespace vcharge {
 namespace {
 
-struct Stopped {};  // thrown to end the reading of the bag
+struct Stopped {};  // exception that ends the reading of the bag
 
 }  // namespace
 

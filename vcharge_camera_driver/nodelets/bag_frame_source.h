@@ -13,7 +13,7 @@
 
 namespace vcharge {
 
-/// A recorded or simulated drive in real time, with current stamps.
+/// Plays a recorded or simulated drive in real time, with current stamps.
 class BagFrameSource : public FrameSource, private DriveConsumer {
  public:
   /// `ticks` receives the bag's wheel ticks with their new stamps.

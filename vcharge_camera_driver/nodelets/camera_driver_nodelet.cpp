@@ -18,9 +18,9 @@
 
 namespace vcharge {
 
-/// The car's cameras and wheels: /camera/<name>/{image_raw,camera_info} (mono8; one stamp per trigger pulse),
+/// Publishes cameras and wheels of a car: /camera/<name>/{image_raw,camera_info} (mono8; a stamp per pulse),
 /// /odom, odom -> base_link, cameras on /tf_static, /diagnostics. Parameters: ~rig (path), ~options
-/// (DriverOptions). Cameras and bus may be unplugged and plugged in again; options and rig must be right.
+/// (DriverOptions). Cameras and bus may be unplugged and plugged in again; options and rig must be valid.
 class CameraDriverNodelet : public Nodelet {
  public:
   CameraDriverNodelet() : Nodelet("camera_driver", Threads::kSeveral) {}
@@ -46,7 +46,7 @@ class CameraDriverNodelet : public Nodelet {
                                           options_.stamp_offset_s,
                                           [this](const MultiFrame& group) { publish(group); });
     source_ = makeFrameSource(options_, rig_, now, [this](const WheelTicks& ticks) { addTicks(ticks); });
-    // Nothing below is refused: topics that appear and vanish at once confuse their subscribers.
+    // All checks that may throw come before this: topics that appear and vanish at once confuse subscribers.
     images_ = std::make_unique<ImagePublisher>(&node(), *rig_, options_.cameras, topics_);
     if (options_.odometry_source != OdometrySourceKind::kNone) {
       odometry_ = std::make_unique<OdometryPublisher>(&node(), options_.odometry, rate_hz, topics_.odometry,

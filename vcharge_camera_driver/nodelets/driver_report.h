@@ -10,7 +10,7 @@ namespace vcharge {
 /// State of one camera.
 DriveMonitor::Report reportCamera(const std::string& name, const CameraStatus& status,
                                   const TriggerCameraCounts& counts);
-/// State of the synchronization; `before`: the counts of the last report.
+/// State of the synchronization; `before` holds the counts at the previous report.
 DriveMonitor::Report reportSync(const TriggerGrouperCounts& now, const TriggerGrouperCounts& before);
 /// State of the CAN bus.
 DriveMonitor::Report reportCan(const CanStatus& status);

@@ -12,10 +12,10 @@
 namespace vcharge {
 
 /// The options with the cameras and the image size filled in from the rig. InputError "parameter <source>:
-/// ..." where devices and cameras do not match, or the cameras' images differ in size.
+/// ..." if devices and cameras do not match, or if the cameras' image sizes differ.
 DriverOptions completeOptions(const DriverOptions& options, const CameraRig& rig, const std::string& source);
 
-/// The source of the images that the options ask for. `ticks` takes the wheel ticks of a bag.
+/// The source of images that the options select. `ticks` receives the wheel ticks of a bag.
 std::unique_ptr<FrameSource> makeFrameSource(const DriverOptions& options,
                                              const std::shared_ptr<const CameraRig>& rig,
                                              std::function<Timestamp()> now,

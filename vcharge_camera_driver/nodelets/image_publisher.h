@@ -12,14 +12,14 @@
 
 namespace vcharge {
 
-/// /camera/<name>/image_raw and camera_info of some cameras of a rig. Publishes the messages in which the
-/// images lie, without a copy.
+/// Publishes /camera/<name>/image_raw and camera_info for some cameras of a rig. The images are published in
+/// the messages that already hold their pixels, without a copy.
 class ImagePublisher {
  public:
   ImagePublisher(ros::NodeHandle* node, const CameraRig& rig, const std::vector<std::string>& cameras,
                  const DriveTopics& topics);
 
-  /// Images of MessageSink, in the order of the cameras.
+  /// Takes images from MessageSink, in the order of the cameras.
   void publish(const MultiFrame& group) const;
 
  private:

@@ -26,7 +26,7 @@ Image MessageSink::acquire(cv::Size size_px) {
 }
 
 sensor_msgs::ImagePtr MessageSink::messageOf(const Image& image) {
-  // acquire() made it, and it is not shared before it is published.
+  // The cast is safe: acquire() created the message, and nobody shares it before it is published.
   auto pooled = std::const_pointer_cast<sensor_msgs::Image>(
       std::static_pointer_cast<const sensor_msgs::Image>(image.owner));
   sensor_msgs::Image* raw = pooled.get();

@@ -7,13 +7,13 @@
 namespace vcharge {
 namespace {
 
-constexpr double kHoldInPeriods = 1.5;  // an estimate waits for the next trigger only
+constexpr double kHoldInPeriods = 1.5;  // longest wait of an estimate for the next trigger
 constexpr double kMaxExtrapolation_s = 0.1;
-constexpr double kUnknownVariance = 1e6;  // wheels do not measure height, roll and pitch
+constexpr double kUnknownVariance = 1e6;  // variance of height, roll and pitch, which wheels do not measure
 
 nav_msgs::Odometry toMessage(const OdometryEstimate& estimate, const std::string& vehicle_frame) {
   nav_msgs::Odometry message = vcharge::toMessage(estimate.odometry, "odom", vehicle_frame);
-  const int planar[] = {0, 1, 5};  // x, y, yaw of x, y, z, roll, pitch, yaw
+  const int planar[] = {0, 1, 5};  // indices of x, y and yaw in x, y, z, roll, pitch, yaw
   for (const int i : {2, 3, 4}) {
     message.pose.covariance[7 * i] = kUnknownVariance;
     message.twist.covariance[7 * i] = kUnknownVariance;

@@ -11,7 +11,7 @@
 
 namespace vcharge {
 
-/// Computes odometry from wheel ticks and publishes it as /odom and odom -> base_link, in order of stamps and
+/// Computes odometry from wheel ticks and publishes it as /odom and odom -> base_link, in stamp order and
 /// with an estimate at each trigger. Thread safe.
 class OdometryPublisher {
  public:

@@ -32,7 +32,7 @@ struct HuberCase {
   }
 };
 
-/// As many iterations as one call of PrimalDualSolver::iterate() does.
+/// Does as many iterations as one call of PrimalDualSolver::iterate().
 void BM_HuberIterationPlain(benchmark::State& state) {
   const HuberCase huber;
   PlainPrimalDual plain(huber.problem, huber.start, 0.1);

@@ -15,7 +15,7 @@ namespace {
 namespace hn = hwy::HWY_NAMESPACE;
 using DI = hn::ScalableTag<int32_t>;
 
-/// On x86 a gather depends on its register's old value even where all lanes are read, so it starts from
+/// On x86, a gather depends on its register's old value even if all lanes are read, so it starts from
 /// zeros; the compiler must not know that `lanes` are all set.
 HWY_INLINE hn::VFromD<DI> gatherBytes(const int32_t* base, hn::VFromD<DI> offset,
                                       decltype(hn::Lt(offset, offset)) lanes) {

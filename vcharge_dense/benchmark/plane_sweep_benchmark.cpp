@@ -1,4 +1,4 @@
-// Times the plane sweep beside the limit of the machine and the plain reference: 640x400 pixels, ZNCC 7x7, 64
+// Times the plane sweep, a memory benchmark and the plain reference: 640x400 pixels, ZNCC 7x7, 64
 // planes, 4 neighbours. Items are pixels times planes times images, or gathered pixels. --smoke runs
 // everything once on a small image.
 #include <algorithm>
@@ -20,7 +20,7 @@
 namespace vcharge {
 namespace {
 
-cv::Size image_size(640, 400);  // a smoke test takes a smaller one
+cv::Size image_size(640, 400);  // a smoke test uses a smaller size
 
 constexpr size_t kGatherRows = 64, kGatherColumns = 640;
 const MeiCamera kFisheye(1.158, 448.0, 447.0, 324.0, 199.0);
@@ -95,7 +95,7 @@ int64_t itemsPerSweep(int num_planes) {
          static_cast<int64_t>(scene(true).neighbours.size());
 }
 
-/// The first sweep: matching, aggregation and the two best peaks of every pixel.
+/// Times the first sweep: matching, aggregation and the two best peaks of every pixel.
 void kernel(benchmark::State& state, int64_t target, bool fisheye) {
   const OnlyTarget only(&state, target);
   if (!only.works()) {
@@ -148,7 +148,7 @@ void plain(benchmark::State& state) {
   state.SetItemsProcessed(state.iterations() * itemsPerSweep(options.num_planes));
 }
 
-/// A complete range map, from images to ranges.
+/// Times a complete range map, from images to ranges.
 void rangeMap(benchmark::State& state, int ground_planes, int refinement_steps, size_t num_neighbours,
               bool coarse_pass) {
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism,

@@ -12,8 +12,8 @@
 
 namespace vcharge {
 
-/// Range maps of a live or replayed drive, on the topics of RangeMapPublisher; nothing is published while the
-/// vehicle stands. A status per camera in /diagnostics. Parameters: ~rig (path), ~options
+/// Computes range maps of a live or replayed drive, on the topics of RangeMapPublisher; publishes none while
+/// the vehicle stands. Reports one status per camera in /diagnostics. Parameters: ~rig (path), ~options
 /// (RangeMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every image in order, as
 /// compute_range_maps; otherwise the newest first, and drops are counted).
 class DepthNodelet : public Nodelet {
@@ -22,7 +22,7 @@ class DepthNodelet : public Nodelet {
   ~DepthNodelet() override { end(); }
 
  private:
-  static constexpr uint32_t kQueueSize = 10;  // 0: nothing is ever dropped
+  static constexpr uint32_t kQueueSize = 10;  // 0 would mean that nothing is ever dropped
 
   void start() override {
     rig_ = readRig();
@@ -72,7 +72,7 @@ class DepthNodelet : public Nodelet {
   }
 
   std::shared_ptr<const CameraRig> rig_;
-  std::map<size_t, RangeMapPublisher> publishers_;  // by camera
+  std::map<size_t, RangeMapPublisher> publishers_;  // key: index of the camera
   std::unique_ptr<RangeMapper> mapper_;
   std::unique_ptr<LiveQueue<RangeTask>> queue_;
 };

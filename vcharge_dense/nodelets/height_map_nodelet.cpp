@@ -12,11 +12,11 @@
 
 namespace vcharge {
 
-/// A height map of a live or replayed drive, as build_height_map makes it: range maps while it drives, and at
-/// the service ~finish their fusion, which is written to ~output and published, latched, as
-/// HeightMapPublication says. Parameters: ~rig (path), ~output (folder), ~trajectory (TUM file of this drive,
-/// else odometry), ~options (HeightMapOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every
-/// image in order, as build_height_map; otherwise those that wait too long are dropped).
+/// Builds a height map of a live or replayed drive as build_height_map does: computes range maps during the
+/// drive and fuses them at the service ~finish. Writes the map to ~output and publishes it, latched, on the
+/// topics of HeightMapPublication. Parameters: ~rig (path), ~output (folder), ~trajectory (TUM file,
+/// otherwise odometry), ~options (HeightMapOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (all
+/// images in order, as build_height_map; otherwise those that wait too long are dropped).
 class HeightMapNodelet : public Nodelet, private DriveConsumer {
  public:
   HeightMapNodelet() : Nodelet("height_map") {}
@@ -85,7 +85,7 @@ class HeightMapNodelet : public Nodelet, private DriveConsumer {
   }
 
   std::string output_;
-  std::mutex mutex_;  // guards the mapper: services and diagnostics run in threads of their own
+  std::mutex mutex_;  // guards the mapper: services and diagnostics have their own threads
   std::unique_ptr<HeightMapper> mapper_;
   std::unique_ptr<HeightMapPublication> publication_;
 };

@@ -22,7 +22,7 @@ class HeightMapPublication {
         octomap_(node->advertise<octomap_msgs::Octomap>("/dense/octomap", 1, true)),
         occupied_(node->advertise<visualization_msgs::Marker>("/dense/octomap/occupied", 1, true)) {}
 
-  /// Stamped 0: valid at any time.
+  /// The stamp is 0: the map is valid at any time.
   void publish(const HeightMap& map, const cv::Mat& states, const octomap::OcTree& tree) {
     const Timestamp always = Timestamp::fromNanoseconds(0);
     map_.publish(toMessage(map, always));

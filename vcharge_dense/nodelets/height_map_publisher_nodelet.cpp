@@ -12,7 +12,7 @@
 namespace vcharge {
 
 /// Publishes a saved height map once, latched: /dense/height_map with /points, /grid and /mesh, and
-/// /dense/octomap, in the map's frame. Does not load where the map cannot be read, and says why. Parameters:
+/// /dense/octomap, in the map's frame. Fails to load, with the reason, if the map cannot be read. Parameters:
 /// ~height_map (folder of build_height_map), ~drivability (DrivabilityOptions).
 class HeightMapPublisherNodelet : public Nodelet {
  public:

@@ -9,9 +9,9 @@
 
 namespace vcharge {
 
-/// The topics of one camera:
+/// Publishes one camera's range maps on
 /// /dense/<camera>/range/{image,confidence,standard_deviation,reference,camera_info} and
-/// /dense/<camera>/points, which is computed for subscribers only. Not thread safe.
+/// /dense/<camera>/points; the points are computed only if somebody subscribes. Not thread safe.
 class RangeMapPublisher {
  public:
   RangeMapPublisher(ros::NodeHandle* node, const RigCamera& camera, uint32_t queue_size)

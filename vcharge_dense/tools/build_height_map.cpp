@@ -63,7 +63,7 @@ Trajectory keyframesOf(const std::string& map_path) {
   return trajectory;
 }
 
-/// Prints a summary; returns the same for --json.
+/// Prints a summary and returns it for --json.
 nlohmann::json report(const HeightMapResult& result) {
   const HeightMapStatistics& statistics = result.statistics;
   ContentHasher hasher;

@@ -58,7 +58,7 @@ RangeMapperOptions readOptions(const Arguments& arguments) {
   return options;
 }
 
-/// Prints a summary; returns the same for --json.
+/// Prints a summary and returns it for --json.
 nlohmann::json report(const RangeMapper& mapper, const std::vector<uint64_t>& maps,
                       const std::vector<double>& known, const ContentHasher& hasher) {
   nlohmann::json cameras = nlohmann::json::array();

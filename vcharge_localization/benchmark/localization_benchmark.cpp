@@ -1,4 +1,4 @@
-// Times of the stages of a frame of four cameras in a map of 200,000 landmarks and 3.4 million observations,
+// Measures the stages of a frame of four cameras in a map of 200,000 landmarks and 3.4 million observations,
 // and the time to load such a map. Uses all cores.
 
 #include <algorithm>
@@ -21,10 +21,10 @@
 namespace vcharge {
 namespace {
 
-constexpr int kRounds = 68;  // circles of the vehicle, side by side
+constexpr int kRounds = 68;  // number of side-by-side circles that the vehicle drives
 constexpr int kKeyframesPerRound = 60;
 constexpr int kLandmarksPerRound = 3000;
-constexpr int kNeighbours = 5;  // keyframes before and after its own that observe a landmark
+constexpr int kNeighbours = 5;  // number of keyframes before and after that observe a landmark
 constexpr double kRadius_m = 20.0, kSpacing_m = 100.0;
 constexpr double kPi = 3.14159265358979323846;
 
@@ -88,7 +88,7 @@ void addLandmark(int round, std::mt19937* random, SparseMapContents* contents) {
   }
 }
 
-/// The descriptor of each landmark, with different bits flipped in every observation.
+/// Gives each landmark a descriptor, with different bits flipped in every observation.
 void addDescriptors(SparseMapContents* contents) {
   const int num_landmarks = static_cast<int>(contents->landmarks.size());
   cv::Mat of_landmarks(num_landmarks, 32, CV_8UC1);
@@ -221,7 +221,7 @@ void prepareMap(benchmark::State& state) {
 }
 BENCHMARK(prepareMap)->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcessCPUTime();
 
-/// Everything between the start and the first frame.
+/// Does everything between the start and the first frame.
 void readAndPrepareMap(benchmark::State& state) {
   const auto rig = largeRig();
   writeSparseMap(*largeMap(), {}, mapPath());

@@ -112,7 +112,7 @@ PosePrior fromMessage(const geometry_msgs::PoseWithCovarianceStamped& message, c
   if (!prior.covariance.allFinite() || prior.covariance.diagonal().minCoeff() < 0.0) {
     throw InputError(source + ": expected a finite covariance");
   }
-  // rviz sets the variances of x, y and yaw only.
+  // "2D Pose Estimate" of rviz sets only the variances of x, y and yaw.
   for (int i = 0; i < 6; ++i) {
     if (prior.covariance(i, i) == 0.0) {
       const double sigma = i < 3 ? kInitialSigma_m : kInitialSigma_rad;

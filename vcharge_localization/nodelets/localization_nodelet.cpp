@@ -18,9 +18,9 @@
 
 namespace vcharge {
 
-/// The vehicle's pose in a map, of a live or replayed drive. Publishes /localization/pose (while it is
+/// Localizes a live or replayed drive in a map. Publishes /localization/pose (while the pose is
 /// known), /localization/status (every frame), /localization/observations (markers), map -> odom on /tf, and
-/// a status in /diagnostics; /initialpose seeds it. Parameters: ~rig, ~map (paths), ~options
+/// a status in /diagnostics; /initialpose sets a prior pose. Parameters: ~rig, ~map (paths), ~options
 /// (DriveLocalizerOptions), ~source (LiveDriveSourceOptions), ~map_frame, ~odom_frame, ~lossless_replay
 /// (every frame in order, as localize_drive; otherwise the newest first, and drops are counted).
 class LocalizationNodelet : public Nodelet {

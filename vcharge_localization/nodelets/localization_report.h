@@ -10,7 +10,7 @@
 
 namespace vcharge {
 
-/// The status of the pose on /diagnostics: good while it is localized and no camera has a warning. Thread
+/// The status of the pose on /diagnostics: OK while localized and no camera has a warning. Thread
 /// safe.
 class LocalizationReport {
  public:

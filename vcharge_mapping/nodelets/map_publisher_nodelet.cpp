@@ -9,7 +9,7 @@
 namespace vcharge {
 
 /// Publishes a saved map once, latched: /mapping/landmarks, /mapping/trajectory and /mapping/loop_edges, in
-/// the frame `map`. Does not load where the map cannot be read, and says why. Parameters: ~map (path).
+/// the frame `map`. Fails to load, with the reason, if the map cannot be read. Parameters: ~map (path).
 class MapPublisherNodelet : public Nodelet {
  public:
   MapPublisherNodelet() : Nodelet("map_publisher") {}
@@ -28,7 +28,7 @@ class MapPublisherNodelet : public Nodelet {
                              << " landmarks, content hash " << map->contentHash());
   }
 
-  // A latched message lives as long as its publisher.
+  // Kept as members because a latched message lives only as long as its publisher.
   ros::Publisher landmarks_, trajectory_, loop_edges_;
 };
 

@@ -15,10 +15,10 @@
 
 namespace vcharge {
 
-/// Maps a live or replayed drive as build_map does. Publishes the growing path and the landmarks seen last on
-/// /mapping/trajectory and /mapping/landmarks, and once the map is made all of it, latched, with
-/// /mapping/loop_edges, in the frame `map`. Services: ~finish begins to make the map and returns,
-/// /diagnostics reports the rest; ~save writes it. Parameters: ~rig (path), ~output (path of the *.vmap),
+/// Maps a live or replayed drive as build_map does. Publishes the growing path and the newest landmarks on
+/// /mapping/trajectory and /mapping/landmarks; once the map is made, the whole map, latched, with
+/// /mapping/loop_edges, in the frame `map`. Services: ~finish starts to make the map and returns,
+/// /diagnostics reports the progress; ~save writes it. Parameters: ~rig (path), ~output (path of the *.vmap),
 /// ~options (SparseMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every image in order,
 /// as build_map; otherwise those that wait too long are dropped).
 class MappingNodelet : public Nodelet {
@@ -26,7 +26,7 @@ class MappingNodelet : public Nodelet {
   MappingNodelet() : Nodelet("mapping") {}
   ~MappingNodelet() override {
     end();
-    session_.reset();  // its thread publishes
+    session_.reset();  // first: its thread publishes
   }
 
  private:
@@ -70,7 +70,7 @@ class MappingNodelet : public Nodelet {
     response->message = path + ": content hash: " + map->contentHash();
   }
 
-  /// While driving; at most twice a second, so that showing costs little.
+  /// Called during the drive; publishes at most twice a second to keep the cost low.
   void publish(const ReconstructionState& state) {
     if ((ros::WallTime::now() - last_shown_).toSec() >= kShowPeriod_s) {
       last_shown_ = ros::WallTime::now();

@@ -112,7 +112,7 @@ nlohmann::json toJson(const ReconstructionReport& report, const SparseMap& map) 
           {"content_hash", map.contentHash()}};
 }
 
-/// The frames as CSV.
+/// Lists the frames as CSV.
 std::string listFrames(const ReconstructionState& state) {
   const std::vector<std::string> motions = enumNames<MotionHypothesis>();
   std::string text = "time_s,motion,keyframe\n";
@@ -147,7 +147,7 @@ void buildMap(const Arguments& arguments, const SparseMapperOptions& options, nl
   SparseMapper mapper(rig, options);
   StageBars bars;
   BagDriveSourceOptions source_options;
-  source_options.max_image_gap_s = INFINITY;  // frames without a camera are used and counted
+  source_options.max_image_gap_s = INFINITY;  // frames that lack a camera are used, and counted
   BagDriveSource source(arguments.bag, rig, source_options);
   source.run(&mapper, [&](double fraction) {
     bars.show("following the drive", 1, SparseMapper::kNumStages + 1, fraction);

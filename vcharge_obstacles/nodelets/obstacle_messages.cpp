@@ -14,7 +14,7 @@ namespace vcharge {
 namespace {
 
 std_msgs::ColorRGBA colourOf(double height_m) {
-  std_msgs::ColorRGBA colour;  // yellow for kerbs to red for walls
+  std_msgs::ColorRGBA colour;  // from yellow (kerbs) to red (walls)
   colour.r = 1.0F;
   colour.g = static_cast<float>(std::max(0.0, 1.0 - height_m));
   colour.a = 0.6F;

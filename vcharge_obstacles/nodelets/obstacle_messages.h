@@ -18,12 +18,12 @@ class OcTree;
 
 namespace vcharge {
 
-/// -1 unobserved, 0 free, 100 occupied; frame_id and stamp of the map.
+/// Cells: -1 unobserved, 0 free, 100 occupied. frame_id and stamp are the map's.
 nav_msgs::OccupancyGrid toMessage(const ObstacleMap& map);
 
-/// Ranges to obstacles; +infinity where all is free up to the maximum; NaN where nothing is known.
-/// Intensities: height of the obstacle in metres, 0 without one. `frame_id`: at the scan's origin on the
-/// ground, with the vehicle's axes.
+/// Ranges to obstacles in metres; +infinity where all is free up to the maximum range; NaN where unknown.
+/// Intensities: height of the obstacle in metres, 0 without one. `frame_id` lies at the scan's origin on the
+/// ground and has the vehicle's axes.
 sensor_msgs::LaserScan toMessage(const ObstacleScan& scan, const std::string& frame_id);
 
 /// Outlines of the occupied cells as walls up to their heights, and as lines; replaces earlier markers.
@@ -33,7 +33,7 @@ visualization_msgs::MarkerArray toMarkers(const ObstacleMap& map);
 /// ground, nothing for unobserved cells. Voxels are aligned with the cells and have their size.
 std::unique_ptr<octomap::OcTree> toOctree(const ObstacleMap& map);
 
-/// Body over the ground as x: roll (rad), y: pitch (rad), z: height (m).
+/// Attitude and height of the body over the ground as x: roll (rad), y: pitch (rad), z: height (m).
 geometry_msgs::Vector3Stamped toMessage(const GroundPlane& ground, Timestamp stamp,
                                         const std::string& vehicle_frame);
 

@@ -17,9 +17,9 @@
 
 namespace vcharge {
 
-/// Obstacles and free ground around the vehicle, from depth_nodelet's /dense/<camera>/range/* and /odom, on
-/// the topics of ObstaclePublisher, and a status per camera in /diagnostics. Callbacks only collect messages;
-/// the rest is done in a thread of its own. Parameters: ~rig (path), ~options (ObstacleMapperOptions;
+/// Maps obstacles and free ground around the vehicle from depth_nodelet's /dense/<camera>/range/* and /odom.
+/// Publishes the topics of ObstaclePublisher and a status per camera in /diagnostics. Callbacks only queue
+/// messages; a separate thread processes them. Parameters: ~rig (path), ~options (ObstacleMapperOptions;
 /// fixed_frame: map needs localization's map -> odom on /tf), ~odometry_topic, ~lossless_replay (every range
 /// map in order, however late; otherwise those that wait too long are dropped).
 class ObstacleNodelet : public Nodelet {

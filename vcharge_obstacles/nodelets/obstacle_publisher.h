@@ -13,8 +13,8 @@
 
 namespace vcharge {
 
-/// /obstacles/grid (latched), /obstacles/scan, /obstacles/markers, /obstacles/octomap,
-/// /obstacles/<camera>/scan and /obstacles/<camera>/ground_plane; the frames of the scans on /tf_static.
+/// Publishes /obstacles/grid (latched), /obstacles/scan, /obstacles/markers, /obstacles/octomap,
+/// /obstacles/<camera>/scan, /obstacles/<camera>/ground_plane, and the scans' frames on /tf_static.
 class ObstaclePublisher {
  public:
   ObstaclePublisher(ros::NodeHandle* node, std::shared_ptr<const CameraRig> rig,

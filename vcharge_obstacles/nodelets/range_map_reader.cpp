@@ -15,7 +15,7 @@ namespace {
 
 constexpr size_t kMaxIncomplete = 20;
 
-/// An image that refers to the message's pixels, which must not be written.
+/// Returns an image header for the message's pixels, which must not be written.
 cv::Mat toImage(const sensor_msgs::ImageConstPtr& message, const std::string& encoding, int type,
                 const std::string& topic) {
   const size_t row_bytes = message->width * CV_ELEM_SIZE(type);
@@ -29,7 +29,7 @@ cv::Mat toImage(const sensor_msgs::ImageConstPtr& message, const std::string& en
                  const_cast<uint8_t*>(message->data.data()));
 }
 
-/// Text for errors: size, model, frame and intrinsics.
+/// Describes size, model, frame and intrinsics in error texts.
 std::string describe(const sensor_msgs::CameraInfo& info) {
   return std::to_string(info.width) + "x" + std::to_string(info.height) + " " + info.distortion_model +
          " in " + info.header.frame_id + ", K " + toText(info.K[0], 2) + ", " + toText(info.K[4], 2) + ", " +
@@ -37,7 +37,7 @@ std::string describe(const sensor_msgs::CameraInfo& info) {
 }
 
 bool isSameCamera(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b) {
-  constexpr double kTolerance = 1e-3;  // pixels and coefficients: fits differ a little between platforms
+  constexpr double kTolerance = 1e-3;  // pixels and coefficients: model fits differ by platform
   const auto is_near = [](double x, double y) { return std::abs(x - y) <= kTolerance; };
   return a.width == b.width && a.height == b.height && a.distortion_model == b.distortion_model &&
          a.header.frame_id == b.header.frame_id && a.D.size() == b.D.size() &&

@@ -27,11 +27,11 @@ struct RangeMapParts {
 /// thread safe.
 class RangeMapReader {
  public:
-  /// `topic`: the common beginning of the parts' topics, for errors.
+  /// `topic`: the common prefix of the parts' topics, used in error texts.
   RangeMapReader(const RigCamera& camera, std::string topic);
 
-  /// The range map's pixels are those of the messages, which must outlive it. InputError "<topic>/...: ..."
-  /// for another encoding, images of different sizes, or a camera that is not the rig's at that size.
+  /// The range map refers to the messages' pixels, which must outlive it. InputError "<topic>/...: ..."
+  /// for another encoding, images of different sizes, or a camera that differs from the rig's at that size.
   RangeMap read(const RangeMapParts& parts);
 
  private:
@@ -39,18 +39,18 @@ class RangeMapReader {
 
   const RigCamera camera_;
   const std::string topic_;
-  cv::Size size_;  // belongs to the two below
+  cv::Size size_;  // image size of the two members below
   std::optional<MeiCamera> model_;
   sensor_msgs::CameraInfo expected_;
 };
 
-/// Subscribes to the topics of one camera and calls back with all parts of a stamp once they have come. Parts
-/// that stay incomplete are dropped, the oldest first.
+/// Subscribes to the topics of one camera and calls back when all parts of a stamp have arrived. Stamps
+/// that stay incomplete are dropped, oldest first.
 class RangeMapSubscriber {
  public:
   using Callback = std::function<void(const RangeMapParts&)>;
 
-  /// `topic`: the common beginning of the parts' topics. The guard must outlive this object.
+  /// `topic`: the common prefix of the parts' topics. The guard must outlive this object.
   RangeMapSubscriber(ros::NodeHandle* node, const std::string& topic, uint32_t queue_size,
                      CallbackGuard* guard, Callback callback);
 

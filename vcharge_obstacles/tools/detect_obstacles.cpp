@@ -34,7 +34,7 @@ struct Arguments {
 /// Processor time of all threads of the process during parts of a run.
 class ProcessorTime {
  public:
-  /// Calls the function and adds the time that it takes.
+  /// Calls the function and adds its processor time.
   template <class Function>
   auto add(const Function& function) {
     const Count count{std::clock(), &ticks_};
@@ -51,7 +51,7 @@ class ProcessorTime {
   std::clock_t ticks_ = 0;
 };
 
-/// Feeds odometry to both stages, and the range maps of one to the other.
+/// Passes odometry to both stages, and range maps from the first to the second.
 class Pipeline : public DriveConsumer {
  public:
   Pipeline(const std::shared_ptr<const CameraRig>& rig, const RangeMapperOptions& range_options,
@@ -98,7 +98,7 @@ class Pipeline : public DriveConsumer {
     }
     obstacles_->finish();
   }
-  /// Processor time without reading the bag and writing the results; writing is part of detecting.
+  /// Processor time without reading the bag and writing results; writing happens inside the detection.
   void reportTiming(double writing_s, nlohmann::json* found) const {
     if (num_maps_ == 0) {
       return;
@@ -117,14 +117,14 @@ class Pipeline : public DriveConsumer {
 
  private:
   ObstacleMapper* obstacles_;
-  ProcessorTime whole_, sweeping_, detecting_;  // the last two are mostly parts of the first
+  ProcessorTime whole_, sweeping_, detecting_;  // the last two are mostly included in the first
   uint64_t num_maps_ = 0;
   std::unique_ptr<RangeMapper> ranges_;
   std::string range_folder_;
   std::map<Timestamp, std::map<size_t, std::string>> stored_;
 };
 
-/// Writes each frame, and collects what the summary needs.
+/// Writes each frame, and collects data for the summary.
 class Recorder {
  public:
   explicit Recorder(std::string folder) : folder_(std::move(folder)) {

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-// See ../README.md.
+// A replacement for oneTBB that ThreadSanitizer understands, see ../README.md.
 namespace tbb {
 
 template <class Value>

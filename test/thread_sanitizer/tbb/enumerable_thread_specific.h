@@ -4,7 +4,7 @@
 #include <mutex>
 #include <thread>
 
-// See ../README.md.
+// A replacement for oneTBB that ThreadSanitizer understands, see ../README.md.
 namespace tbb {
 
 template <class Value>

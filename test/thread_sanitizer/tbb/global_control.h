@@ -4,10 +4,10 @@
 #include <cstddef>
 #include <limits>
 
-// See ../README.md.
+// A replacement for oneTBB that ThreadSanitizer understands, see ../README.md.
 namespace tbb {
 
-/// Limits of threads; the innermost of those that live counts.
+/// Limits the number of threads; the newest living object counts.
 class global_control {
  public:
   enum parameter { max_allowed_parallelism };

@@ -9,7 +9,7 @@
 #include "blocked_range.h"
 #include "global_control.h"
 
-// See ../README.md.
+// A replacement for oneTBB that ThreadSanitizer understands, see ../README.md.
 namespace tbb {
 
 struct simple_partitioner {};
@@ -18,7 +18,7 @@ namespace stand_in {
 
 inline thread_local bool in_loop = false;
 
-/// Calls `run(i)` for 0 <= i < count on three threads, or on this one within another loop.
+/// Calls `run(i)` for 0 <= i < count on three threads, or on the calling thread inside another loop.
 template <class Run>
 void runAll(size_t count, const Run& run) {
   const size_t num_threads = in_loop ? 1 : std::min({count, size_t{3}, global_control::allowed()});
@@ -32,7 +32,7 @@ void runAll(size_t count, const Run& run) {
   std::exception_ptr error;
   std::vector<std::thread> threads;
   for (size_t t = 0; t < num_threads; ++t) {
-    // In turn, not as they come: every thread has its share, also of short loops.
+    // Indices are assigned to the threads in turn, so that every thread also works on short loops.
     threads.emplace_back([&, t] {
       in_loop = true;
       try {

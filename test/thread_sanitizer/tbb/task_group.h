@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-// See ../README.md.
+// A replacement for oneTBB that ThreadSanitizer understands, see ../README.md.
 namespace tbb {
 
-/// Every task in a thread of its own.
+/// Runs every task in a separate thread.
 class task_group {
  public:
   ~task_group() { join(); }

@@ -38,7 +38,7 @@ double cosine(const cv::Point2f& a, const cv::Point2f& b) {
   return a.dot(b) / std::max(1e-9, cv::norm(a) * cv::norm(b));
 }
 
-// The detector lists corners clockwise from any of the four; the board counter-clockwise from the lower left.
+// The detector lists corners clockwise from any corner; the board counter-clockwise from the lower left.
 std::vector<cv::Point2f> reordered(const std::vector<cv::Point2f>& corners, int first) {
   std::vector<cv::Point2f> result;
   for (int i = 0; i < 4; ++i) {

@@ -20,7 +20,7 @@ constexpr int kMaxRounds = 20;
 // A row or column outside of the board with a larger fraction of corners belongs to a larger board.
 constexpr double kMaxFractionBeyond = 0.6;
 
-/// Extends a part of a board, square by square, while there are corners.
+/// Extends a detected part of a board, square by square, as long as corners are found.
 class GridGrower {
  public:
   GridGrower(const cv::Mat& image, const CameraModel& model, CornerGrid grid)
@@ -177,7 +177,7 @@ int countInside(const CornerGrid& grid, const Extent& extent) {
                                         [&](const auto& entry) { return extent.contains(entry.first); }));
 }
 
-/// Whether a line of corners continues outside of a rectangle, which means a larger board.
+/// Whether a line of corners continues outside of a rectangle, so that the board is larger.
 bool goesOn(const CornerGrid& grid, const Extent& extent) {
   const std::array<Extent, 4> beyond = {{{extent.column - 1, extent.row, 1, extent.height},
                                          {extent.column + extent.width, extent.row, 1, extent.height},

@@ -20,7 +20,7 @@ using CornerGrid = std::map<std::pair<int, int>, Eigen::Vector2d>;
 bool growGrid(const cv::Mat& image, const CameraModel& model, CornerGrid* grid);
 
 /// Converts the grid to corners of the board. Empty if the board fits in no or several positions, or if the
-/// grid continues outside of it, which means a larger board.
+/// grid continues outside of it, so that the board is larger.
 std::optional<std::vector<BoardCorner>> boardOnGrid(const CornerGrid& grid, const CalibrationBoard& board);
 
 }  // namespace vcharge

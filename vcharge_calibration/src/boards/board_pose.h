@@ -20,7 +20,7 @@ struct BoardRay {
 /// it.
 std::optional<RigidTransform> boardPoseFromRays(const std::vector<BoardRay>& rays);
 
-/// The same for corners in an image; ignores those without a ray.
+/// Pose of a board from its corners in an image; ignores corners without a ray.
 std::optional<RigidTransform> boardPose(const CalibrationBoard& board,
                                         const std::vector<BoardCorner>& corners, const CameraModel& model);
 

@@ -11,14 +11,14 @@ namespace vcharge {
 
 namespace {
 
-// Half widths of the window relative to the distance to the next foreign edge; the widest that fits is used.
+// Half widths of the window relative to the distance to the next other edge; the largest that fits is used.
 constexpr std::array<double, 3> kWindows = {0.5, 0.35, 0.25};
 constexpr int kMinSteps = 4;
 constexpr int kMaxSteps = 40;
 constexpr int kMaxIterations = 30;
 constexpr double kConverged_px = 1e-3;
 constexpr double kMinCorrelation = 0.6;
-constexpr double kMinContrast = 3.0;  // standard deviation of gray levels below which there is only noise
+constexpr double kMinContrast = 3.0;  // gray levels; a smaller standard deviation is only noise
 
 cv::Mat toFloat(const cv::Mat& image) {
   cv::Mat result;
@@ -35,7 +35,7 @@ struct BoardRefiner::Patch {
   double step_x_m = 0.0, step_y_m = 0.0;
   cv::Mat map;                  // CV_32FC2, pixels
   Eigen::Vector2d predicted;    // corner
-  Eigen::Matrix2d pixels_by_m;  // at the corner
+  Eigen::Matrix2d pixels_by_m;  // derivative at the corner
 };
 
 BoardRefiner::BoardRefiner(const cv::Mat& image, const CalibrationBoard& board, const CameraModel& model,
@@ -115,7 +115,7 @@ std::optional<Eigen::Vector2d> BoardRefiner::refine(int index, const Eigen::Vect
       }
       cv::Mat values;
       cv::remap(image_, values, map, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
-      // sum w g g^T (b - c) = 0 over samples at b (metres from the corner) with gradients g.
+      // The corner c solves sum w g g^T (b - c) = 0, with samples at b (metres from the corner), gradients g.
       Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
       Eigen::Vector2d right_side = Eigen::Vector2d::Zero();
       double sum = 0.0, sum_squared = 0.0, product = 0.0;

@@ -16,7 +16,7 @@ constexpr double kDark = 25.0;
 constexpr double kBright = 215.0;
 constexpr double kWall = 110.0;
 constexpr double kNoise = 2.0;
-constexpr int kRays = 3;  // per pixel, in each direction
+constexpr int kRays = 3;  // rays per pixel in each direction
 constexpr int kTagCells = 10;
 
 // Chessboard: squares around the inner corners, dark where column + row is even, with a bright margin.

@@ -11,12 +11,12 @@
 
 namespace vcharge {
 
-// Images of boards for tests, from the formulas of camera and board and independent of the calibration's
+// Renders images of boards for tests, from the formulas of camera and board and without the calibration's
 // code.
 
 /// Range of board poses.
 struct PoseRange {
-  double max_angle_rad = 1.2;  ///< angle of the board's middle from the axis
+  double max_angle_rad = 1.2;  ///< angle between the axis and the board's middle
   double distance_m = 0.5;
   double min_visible_fraction = 1.0;  ///< fraction of visible corners
 };

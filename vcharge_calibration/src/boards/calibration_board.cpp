@@ -76,7 +76,7 @@ CalibrationBoard CalibrationBoard::parse(const std::string& size, double square_
 
 CalibrationBoard CalibrationBoard::aprilGrid(int tag_columns, int tag_rows, double tag_m,
                                              double tag_spacing) {
-  constexpr int kMaxTags = 587;  // size of the family 36h11
+  constexpr int kMaxTags = 587;  // number of tags in the family 36h11
   if (tag_columns < 1 || tag_rows < 1 || tag_columns > kMaxTags || tag_rows > kMaxTags ||
       tag_columns * tag_rows < 4 || tag_columns * tag_rows > kMaxTags) {
     throw std::invalid_argument("tagCols, tagRows: expected 4 to " + std::to_string(kMaxTags) +

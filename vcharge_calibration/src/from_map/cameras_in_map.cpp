@@ -11,15 +11,15 @@
 namespace vcharge {
 namespace {
 
-/// Ratio of the keyframes at which a camera must be localized.
+/// Minimum ratio of keyframes at which a camera must be localized.
 constexpr double kMinFixRatio = 0.2;
-/// Least deviations of a motion: covariances underestimate them.
+/// Minimum standard deviations of a motion, because covariances underestimate them.
 constexpr double kMinDirectionSigma_rad = 0.003;
 constexpr double kMinRotationSigma_rad = 0.0003;
-/// A direction with a larger deviation is not used.
+/// Directions with a larger standard deviation are not used.
 constexpr double kMaxDirectionSigma_rad = 0.3;
 
-/// Extends poses along the odometry to the keyframes before and after that have none.
+/// Extrapolates poses along the odometry to the keyframes before and after that have none.
 void extendByOdometry(const std::vector<Keyframe>& keyframes,
                       std::vector<std::optional<RigidTransform>>* poses) {
   const auto extend = [&](size_t from, size_t to) {

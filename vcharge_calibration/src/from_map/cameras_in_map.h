@@ -9,19 +9,19 @@
 
 namespace vcharge {
 
-// First guesses from the poses at which each camera was localized by itself.
+// Initial extrinsics and poses from the poses of each camera, localized alone.
 
-/// NotCalibrated where a camera was localized at too few keyframes.
+/// Throws NotCalibrated if a camera was localized at too few keyframes.
 void requireEnoughFixes(const std::vector<MapKeyframeView>& views, const CameraRig& rig);
 
-/// Motions of a camera between consecutive keyframes with a fix at both.
+/// Motions of a camera between consecutive keyframes that both have its pose.
 std::vector<MotionPair> motionsInMap(const std::vector<MapKeyframeView>& views,
                                      const std::vector<Keyframe>& keyframes, size_t camera);
 
-/// Height of a camera above the ground under the nearest keyframes of the map; the median over all fixes.
+/// Height of a camera above the ground at the nearest keyframes of the map: the median over all its poses.
 double heightInMap(const std::vector<MapKeyframeView>& views, const SparseMap& map, size_t camera);
 
-/// Sets the poses of the keyframes from the fix with most inliers at each; by the odometer where there is
+/// Sets the pose of each keyframe from the camera pose with most inliers; from the odometer if there is
 /// none.
 void setPosesByFixes(const std::vector<MapKeyframeView>& views, ReconstructionData* data);
 

@@ -12,7 +12,7 @@
 namespace vcharge {
 namespace {
 
-// Deviations of a camera's pose from the extrapolation of its last two poses.
+// Standard deviations of a camera's pose around the extrapolation of its last two poses.
 constexpr double kPredictionSigma_m = 0.1;
 constexpr double kPredictionSigma_rad = 0.03;
 

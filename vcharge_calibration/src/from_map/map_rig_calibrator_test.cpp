@@ -22,8 +22,8 @@ constexpr double kDegree = 0.017453292519943295;
 
 struct TestDrive {
   int num_keyframes = 110;
-  double weave_rad = 0.5;       ///< amplitude of the heading
-  double odometry_scale = 1.0;  ///< counted over true distance
+  double weave_rad = 0.5;       ///< amplitude of the heading's oscillation
+  double odometry_scale = 1.0;  ///< measured divided by true distance
   int covered_camera = -1;
   bool is_elsewhere = false;
 };
@@ -60,7 +60,7 @@ class MapRigCalibratorTest : public ::testing::Test {
                               drive.is_elsewhere ? testing::makeForeignView(**map_, view.seed)
                                                  : testing::makeTestView(**map_, map_from_vehicle, view),
                               odom_from_vehicle);
-      // Along the circle of 20 m, with a heading that weaves about it.
+      // Drives along the circle of 20 m, with a heading that oscillates around the tangent.
       const double heading_before = drive.weave_rad * std::sin(0.25 * k);
       const double heading_after = drive.weave_rad * std::sin(0.25 * (k + 1));
       const double turn_rad = 0.5 / 20.0 + heading_after - heading_before;

@@ -20,9 +20,9 @@ namespace vcharge {
 namespace {
 
 constexpr int kNumStages = 3;
-/// Searches with all cameras, each followed by an adjustment.
+/// Number of searches with all cameras; each is followed by an adjustment.
 constexpr int kNumSearches = 2;
-// Deviations of a keyframe's pose in the search with all cameras.
+// Standard deviations of a keyframe's pose in the search with all cameras.
 constexpr double kSearchSigma_m = 0.05;
 constexpr double kSearchSigma_rad = 0.01;
 
@@ -70,7 +70,7 @@ class MapRigSteps {
   }
 
  private:
-  /// Extrinsics from the motions of each camera in the map; keyframes by the fixes of the cameras.
+  /// Computes extrinsics from each camera's motions in the map, and keyframe poses from the cameras' poses.
   void initialize() {
     requireEnoughFixes(views_, *data_->rig);
     std::vector<std::vector<MotionPair>> motions;

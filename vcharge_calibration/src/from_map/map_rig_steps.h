@@ -7,8 +7,8 @@
 
 namespace vcharge {
 
-/// The steps of MapRigCalibrator::finish(): calibrates from keyframes whose cameras were localized one by
-/// one. Afterwards `state` has the rig, the poses and the observed landmarks; `landmark_of_track` their
+/// The steps of MapRigCalibrator::finish(): calibrates from keyframes whose cameras were localized
+/// separately. Afterwards, `state` has the rig, poses and observed landmarks, `landmark_of_track` their
 /// indices in the map.
 RigCalibration calibrateInMap(const MapRigCalibratorOptions& options, const MapLocalizer& localizer,
                               const std::vector<MapKeyframeView>& views, const StageCallback& progress,

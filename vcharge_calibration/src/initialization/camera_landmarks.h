@@ -10,7 +10,7 @@
 
 namespace vcharge {
 
-/// Points of the last keyframes for displays while driving, by camera. The extrinsics of `guess` come from
+/// Landmarks of the newest keyframes by camera, for displays. The extrinsics of `guess` come from
 /// hand-eye calibration, the heights from the points; cameras without extrinsics have no points. Takes
 /// milliseconds.
 LandmarksByCamera recentLandmarksByCamera(const ReconstructionState& state, const CameraRig& guess,

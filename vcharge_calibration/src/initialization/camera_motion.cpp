@@ -11,10 +11,10 @@
 namespace vcharge {
 namespace {
 
-/// Least deviations of a motion: covariances underestimate them.
+/// Minimum standard deviations of a motion, because covariances underestimate them.
 constexpr double kMinDirectionSigma_rad = 0.003;
 constexpr double kMinRotationSigma_rad = 0.0003;
-/// A direction with a larger deviation is not used.
+/// Directions with a larger standard deviation are not used.
 constexpr double kMaxDirectionSigma_rad = 0.3;
 
 RobustOptions robustOptions() {
@@ -69,7 +69,7 @@ std::vector<MotionPair> estimateCameraMotions(const ReconstructionData& data, in
     pair.vehicle = data.keyframes[i].odom_from_vehicle.inverse() * data.keyframes[i + 1].odom_from_vehicle;
     pair.camera_rotation = motion.previous_from_current.rotation();
     pair.camera_direction = translation.normalized();
-    // The covariance is that of the unnormalized translation.
+    // The covariance refers to the unnormalized translation.
     const double sigma = std::sqrt(
         (motion.covariance.topLeftCorner<3, 3>().trace() -
          pair.camera_direction.dot(motion.covariance.topLeftCorner<3, 3>() * pair.camera_direction)) /

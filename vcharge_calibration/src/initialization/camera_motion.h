@@ -7,8 +7,8 @@
 
 namespace vcharge {
 
-/// Monocular visual odometry of one camera: its motions between consecutive keyframes from its tracks, paired
-/// with the odometer's. Leaves out motions that cannot be estimated. Data parallel.
+/// Monocular visual odometry: estimates a camera's motions between consecutive keyframes from its tracks
+/// and pairs them with the odometer's. Leaves out motions that cannot be estimated. Data parallel.
 std::vector<MotionPair> estimateCameraMotions(const ReconstructionData& data, int32_t camera);
 
 }  // namespace vcharge

@@ -11,22 +11,22 @@
 namespace vcharge {
 namespace {
 
-constexpr double kMaxRange_m = 5.0;  // of points from the nearest camera
+constexpr double kMaxRange_m = 5.0;  // maximum distance between a point and the nearest camera
 constexpr double kMinHeight_m = 0.15;
 constexpr double kMaxHeight_m = 4.0;
 constexpr double kThickness_m = 0.04;
-constexpr double kMaxSlope = 0.1;  // of the ground along the path
+constexpr double kMaxSlope = 0.1;  // maximum slope of the ground along the path
 constexpr double kMinUprightness =
-    0.5;  // cosine between upwards and the mean of the image's up and the view's back
+    0.5;  // minimum cosine between upwards and the mean of the image's up and backwards
 constexpr size_t kMinPoints = 40;
 constexpr int kNumSamples = 2000;
 constexpr uint32_t kSeed = 5;
 
-/// Path of the camera by its rotations and directions and the odometer's distances, and its points.
+/// Path of the camera, from its rotations and directions and the odometer's distances, and points near it.
 struct CameraPath {
   std::vector<Eigen::Vector3d> places_m;
   std::vector<Eigen::Matrix3d> path_from_camera;
-  std::vector<Eigen::Vector3d> points_m;  ///< near the path
+  std::vector<Eigen::Vector3d> points_m;  ///< points near the path
 };
 
 CameraPath followCamera(const ReconstructionData& data, int32_t camera,
@@ -106,7 +106,7 @@ Plane throughPoint(const Eigen::Vector3d& normal, const Eigen::Vector3d& point,
   return {up, up.dot(point)};
 }
 
-/// Weight of a point's height, whose error grows with the square of the range.
+/// Weight of a point's height; the height's error grows with the square of the range.
 double weightOf(const CameraPath& path, const Eigen::Vector3d& point) {
   double square_m2 = kMaxRange_m * kMaxRange_m;
   for (const Eigen::Vector3d& place : path.places_m) {
@@ -170,7 +170,7 @@ std::optional<Eigen::Vector3d> findUpwards(const ReconstructionData& data, int32
   for (int i = 0; i < kRefinements; ++i) {
     best = fitPlane(path, pointsIn(path, best));
   }
-  // Mean over the path: the vehicle leans little.
+  // The mean over the path is the vertical, because the vehicle tilts little.
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Eigen::Matrix3d& path_from_camera : path.path_from_camera) {
     sum += path_from_camera.transpose() * best.normal;

@@ -11,10 +11,10 @@
 
 namespace vcharge {
 
-/// Up in a camera's frame, a unit vector, by the ground: the plane along the direction of travel that
-/// contains most points. Needs no turn and no extrinsics, but a camera that is mounted upright, since a wall
-/// beside the path is a plane too. `motions` are those of the camera from keyframe to keyframe, with the
-/// odometer's distances. Empty where too few points lie in such a plane.
+/// Estimates the upward direction in a camera's frame (unit vector) from the ground: the plane along the path
+/// that contains most points. Needs no turn and no extrinsics, but an upright camera, since a wall
+/// beside the path is a plane too. `motions` are the camera's motions between keyframes, with the
+/// odometer's distances. Empty if too few points lie in such a plane.
 std::optional<Eigen::Vector3d> findUpwards(const ReconstructionData& data, int32_t camera,
                                            const std::vector<MotionPair>& motions,
                                            const TriangulationOptions& options);

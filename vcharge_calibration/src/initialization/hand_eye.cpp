@@ -24,7 +24,7 @@ double yawOf(const MotionPair& motion) {
   return yawOfRotation(motion.vehicle.rotation());
 }
 
-/// The vertical in the camera's frame and its deviation.
+/// The vertical in the camera's frame and its standard deviation.
 struct Vertical {
   Eigen::Vector3d up_in_camera = Eigen::Vector3d::UnitZ();
   double sigma_rad = INFINITY;
@@ -60,7 +60,7 @@ Vertical findVertical(const std::vector<MotionPair>& motions, const HandEyeOptio
       return result;
     }
     result.up_in_camera = vertical.normalized();
-    // Information on the tilt of the vertical.
+    // Information matrix of the vertical's tilt.
     const Eigen::Vector3d side = result.up_in_camera.unitOrthogonal();
     Eigen::Matrix<double, 3, 2> across;
     across << side, result.up_in_camera.cross(side);
@@ -85,9 +85,9 @@ Vertical findVertical(const std::vector<MotionPair>& motions, const HandEyeOptio
 /// Yaw and position of a camera in a levelled frame.
 struct PlanarPlace {
   Eigen::Vector2d cos_sin{1.0, 0.0};
-  Eigen::Vector2d turned_place_m = Eigen::Vector2d::Zero();  ///< u
+  Eigen::Vector2d turned_place_m = Eigen::Vector2d::Zero();  ///< position u, see solvePlanarHandEye()
   double yaw_sigma_rad = INFINITY, position_sigma_m = INFINITY;
-  std::vector<double> sigmas;  ///< error of each motion
+  std::vector<double> sigmas;  ///< standardized error of each motion
 };
 
 /// Expected motion of the camera, Rz(-alpha) t + (R - I) u.

@@ -11,7 +11,7 @@ namespace {
 constexpr double kDegree = 0.017453292519943295;
 
 struct Drive {
-  double turn_rad = 0.08;  ///< per motion, at most: to the left in the first half, to the right in the second
+  double turn_rad = 0.08;  ///< maximum per motion: to the left in the first half, to the right in the second
   double noise_rad = 0.0;
   double wrong_share = 0.0;
   int num_motions = 200;
@@ -22,7 +22,7 @@ RigidTransform truePlace() {
   return RigidTransform(rotationFromYawPitchRoll(1.4, 0.3, -1.9), Eigen::Vector3d(1.9, 0.95, 0.0));
 }
 
-/// Turns of a car, as a camera at truePlace() and half a metre up would see itself move.
+/// Motions of a car that turns, and of a camera with the extrinsics truePlace(), 0.5 m above the ground.
 std::vector<MotionPair> makeMotions(const Drive& drive) {
   std::mt19937 random(drive.seed);
   std::normal_distribution<double> noise(0.0, drive.noise_rad);
@@ -38,7 +38,7 @@ std::vector<MotionPair> makeMotions(const Drive& drive) {
                                            truePlace().translation() + Eigen::Vector3d(0.0, 0.0, 0.5));
   std::vector<MotionPair> motions;
   for (int i = 0; i < drive.num_motions; ++i) {
-    // Circles of one radius would leave the place open.
+    // The radius varies: circles of one radius do not determine the position.
     const double turn_rad = drive.turn_rad * std::sin(6.283185 * i / drive.num_motions);
     MotionPair motion;
     motion.vehicle =
@@ -78,9 +78,9 @@ TEST(PlanarHandEyeTest, HandlesNoiseAndOutliers) {
   drive.wrong_share = 0.2;
   const HandEye found = solvePlanarHandEye(makeMotions(drive), HandEyeOptions());
   ASSERT_EQ(found.status, HandEyeStatus::kOk);
-  // 160 motions of 0.57 degrees: four standard deviations of the mean, and the bias of outliers.
+  // 160 motions with 0.57 degrees of noise: four standard deviations of the mean, plus the bias by outliers.
   EXPECT_LT(angleBetween(found.vehicle_from_camera, truePlace()), 0.4 * kDegree);
-  // A direction gives the position to 0.01 x 0.5 m / 0.06 = 8 cm at best; over the root of 160, six times.
+  // One motion gives the position to 0.01 x 0.5 m / 0.06 = 8 cm at best. Limit: 6 x 8 cm / sqrt(160).
   EXPECT_LT((found.vehicle_from_camera.translation() - truePlace().translation()).norm(), 0.04);
   EXPECT_LT(found.num_inliers, found.num_motions);
 }
@@ -91,7 +91,7 @@ TEST(PlanarHandEyeTest, DetectsALackOfTurns) {
   drive.noise_rad = 0.002;
   const HandEye found = solvePlanarHandEye(makeMotions(drive), HandEyeOptions());
   EXPECT_EQ(found.status, HandEyeStatus::kNoTurn);
-  // The direction of travel needs no turn.
+  // The direction of travel is known without turns.
   const Eigen::Vector3d ahead = truePlace().rotation().conjugate() * Eigen::Vector3d::UnitX();
   EXPECT_LT(std::acos(found.travel_in_camera.dot(ahead)), 0.002);
 }

@@ -8,14 +8,14 @@
 namespace vcharge {
 namespace {
 
-/// Ratio of the keyframes at which the motion of a camera must be known.
+/// Minimum ratio of keyframes at which the motion of a camera must be known.
 constexpr double kMinSeenRatio = 0.2;
 constexpr double kMinDistance_m = 5.0;
-/// Smaller offsets are ignored: the distance driven in that time is within the accuracy of the extrinsics.
+/// Smaller offsets are ignored: the distance driven during them is below the accuracy of the extrinsics.
 constexpr double kMinOffset_s = 0.004;
 constexpr int kOffsetIterations = 3;
 
-/// Adds to the result's offset and shifts the odometry; false where the addition is not significant.
+/// Adds a time offset to the result and shifts the odometry; false if the addition is not significant.
 bool addTimeOffset(const TimeOffset& more, const OdometrySeries& series, ReconstructionState* state,
                    RigCalibration* result) {
   const bool has_offset = result->time_offset_s != 0.0;

@@ -11,17 +11,17 @@
 
 namespace vcharge {
 
-/// Thrown where the calibration fails, with the reasons.
+/// Thrown if the calibration fails; has the reasons.
 struct NotCalibrated {
   std::vector<std::string> remarks;
 };
 
-/// Sets length and turns of the drive in `result`. NotCalibrated for a drive without odometry or motion.
+/// Sets length and turns of the drive in `result`. Throws NotCalibrated without odometry or motion.
 void describeDrive(const ReconstructionState& state, RigCalibration* result);
 
-/// First guess of the extrinsics, at height zero, from the motions of each camera and the odometer; also sets
-/// the cameras of `result`. Where the turns show a time offset, the state's odometry is shifted by it.
-/// NotCalibrated, with a reason per camera, where a guess is not possible, or where the odometer has wrong
+/// Initial extrinsics, at height zero, from the motions of each camera and the odometer; also sets
+/// the cameras of `result`. If the turns show a time offset, shifts the state's odometry by it.
+/// Throws NotCalibrated, with a reason per camera, if there is no solution or if the odometer has wrong
 /// signs.
 std::shared_ptr<CameraRig> guessRig(const OdometrySeries& series, const HandEyeOptions& options,
                                     std::vector<std::vector<MotionPair>> motions, ReconstructionState* state,

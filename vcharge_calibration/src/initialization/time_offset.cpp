@@ -5,11 +5,11 @@
 namespace vcharge {
 namespace {
 
-/// Deviations of the distance and turn between keyframes.
+/// Standard deviations of the distance and turn between keyframes.
 constexpr double kDistanceSigma_m = 0.003;
 constexpr double kTurnSigma_rad = 0.001;
 constexpr double kLossSigmas = 2.0;
-/// Step of the numerical derivative by time.
+/// Step of the numerical derivative with respect to time.
 constexpr double kStep_s = 0.01;
 
 /// Forward distance and turn of a motion.
@@ -17,7 +17,7 @@ Eigen::Vector2d distanceAndTurn(const RigidTransform& motion) {
   return {motion.translation().x(), yawOfRotation(motion.rotation())};
 }
 
-/// A fraction of a planar motion, along its arc.
+/// The given fraction of a planar motion, along its arc.
 RigidTransform partOf(const RigidTransform& motion, double part) {
   const double turn_rad = yawOfRotation(motion.rotation());
   const Eigen::Rotation2Dd back(-0.5 * turn_rad);
@@ -83,7 +83,7 @@ TimeOffset estimateTimeOffset(const ReconstructionState& state,
           yawOfRotation(motion.rotation()) / toSeconds(state.frames[i + 1].stamp - state.frames[i - 1].stamp);
     }
   }
-  // Delayed odometry differs from the camera's turn by the offset times the change of the rate.
+  // Turns of delayed odometry differ from the camera's by the offset times the change of the yaw rate.
   TimeOffset result;
   constexpr int kIterations = 10;
   for (int iteration = 0; iteration < kIterations; ++iteration) {

@@ -11,7 +11,7 @@
 
 namespace vcharge {
 
-/// Delay of the odometer's stamps against the images, and its standard deviation.
+/// Delay of the odometer's stamps relative to the images, and its standard deviation.
 struct TimeOffset {
   double offset_s = 0.0;
   double sigma_s = INFINITY;
@@ -19,7 +19,7 @@ struct TimeOffset {
   bool isSignificant() const { return std::abs(offset_s) > 3.0 * sigma_s; }
 };
 
-/// The odometer's poses at the stamps of the frames, interpolated to other instants.
+/// The odometer's poses at the stamps of the frames, and interpolated between them.
 class OdometrySeries {
  public:
   /// Takes the poses of all frames of the state.
@@ -33,19 +33,19 @@ class OdometrySeries {
   void shift(double offset_s, ReconstructionState* state) const;
 
  private:
-  std::vector<double> time_s_;  ///< since the first frame
+  std::vector<double> time_s_;  ///< stamps relative to the first frame
   std::vector<RigidTransform> odom_from_vehicle_;
   Timestamp first_;
 };
 
-/// Time offset from the beginnings and ends of turns, by the motions of the cameras and first guesses of the
+/// Estimates the time offset from the starts and ends of turns, using the cameras' motions and an initial
 /// vertical in each camera's frame.
 TimeOffset estimateTimeOffset(const ReconstructionState& state,
                               const std::vector<std::vector<MotionPair>>& motions_of_camera,
                               const std::vector<Eigen::Vector3d>& up_in_camera);
 
-/// Time offset from adjusted keyframes: the offset, in addition to `offset_s` by which the odometry of `data`
-/// is shifted already, with which distances and turns fit best. One step of robust least squares.
+/// Refines the time offset from adjusted keyframes: returns the offset, in addition to `offset_s` by which
+/// `data`'s odometry is already shifted, that fits distances and turns best. A step of robust least squares.
 TimeOffset refineTimeOffset(const OdometrySeries& series, double offset_s, const ReconstructionData& data);
 
 }  // namespace vcharge

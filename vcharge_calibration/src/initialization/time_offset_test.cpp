@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kSpeed_m_per_s = 2.5;
 
-/// Exact motion with the heading 0.6 sin(0.7 t).
+/// Exact pose of a motion with the heading 0.6 sin(0.7 t).
 RigidTransform poseAt(double time_s) {
   static constexpr double kTick_s = 0.001;
   double x = 0.0, y = 0.0;
@@ -23,7 +23,7 @@ RigidTransform poseAt(double time_s) {
   return RigidTransform::planar(x, y, 0.6 * std::sin(0.7 * time_s));
 }
 
-/// Frames at 12.5 Hz, every third a keyframe; the odometer's poses come `late_s` after the truth.
+/// Frames at 12.5 Hz, every third a keyframe; the odometer's poses are `late_s` older than their stamps say.
 ReconstructionState makeState(double late_s, int num_frames) {
   ReconstructionState state;
   for (int i = 0; i < num_frames; ++i) {
@@ -65,7 +65,7 @@ TEST(OdometrySeriesTest, ShiftsKeyframesAndFrames) {
   for (const FramePose& frame : state.frames) {
     const double time_s = toSeconds(frame.stamp - state.frames[0].stamp);
     if (time_s > 4.5) {
-      break;  // extrapolated beyond the end
+      break;  // the remaining frames are extrapolated beyond the end
     }
     const RigidTransform odom_from_vehicle =
         state.data.keyframes[frame.keyframe].odom_from_vehicle * frame.keyframe_from_vehicle;

@@ -126,7 +126,7 @@ TEST(BadInputTest, ABlurredImageAndAWrongOneAreNamedAndLeftOut) {
   images[5].pixels = blurred;
   cv::Mat warped;
   cv::resize(images[7].pixels, warped, cv::Size(), 1.0, 1.06, cv::INTER_CUBIC);
-  // A stretched image, which no view of this camera can be.
+  // A stretched image: no view of this camera fits it.
   images[7].pixels = warped(cv::Rect(0, 0, kSize.width, kSize.height)).clone();
   const IntrinsicCalibration result = calibrateIntrinsics(board(), images, options(), kNoProgress);
   ASSERT_TRUE(result.model.has_value());

@@ -14,11 +14,11 @@ namespace {
 
 constexpr int kSamplesAcross = 60;
 constexpr size_t kMinSamples = 50;
-// Beyond this angle, a plane image is mostly rim.
+// Beyond this angle, most of a plane image would show the rim of the field of view.
 constexpr double kMaxPinholeAngle_rad = 1.2217;
 constexpr int kMaxIterations = 500;
-// Fitted in steps from the centre outwards, since an initial camera without distortion is valid near the
-// axis.
+// The fit proceeds from the centre outwards, since an initial camera without distortion is only valid
+// near the axis.
 constexpr double kAngleSteps_rad[] = {0.5, 0.9, 1.3, 4.0};
 
 struct Sample {
@@ -26,7 +26,7 @@ struct Sample {
   Eigen::Vector2d pixel;
 };
 
-/// Difference of a ray's pixel in the new and the old model (2 residuals).
+/// Difference between a ray's pixels in the new and in the old model (2 residuals).
 template <class Model>
 class SampleCost : public ceres::SizedCostFunction<2, Model::kNumParameters> {
  public:
@@ -99,7 +99,7 @@ Eigen::VectorXd fit(const std::vector<Sample>& samples, const Eigen::VectorXd& s
   return parameters;
 }
 
-// Initial focal length and centre near the axis, without distortion.
+// Initial parameters: focal length and centre near the axis, without distortion.
 Eigen::VectorXd startFor(const std::string& model_name, const CameraModel& camera) {
   const double small = 1e-3;
   Eigen::Vector2d middle;

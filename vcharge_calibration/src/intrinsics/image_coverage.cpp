@@ -41,8 +41,8 @@ std::vector<std::string> ImageCoverage::missingParts() const {
     const char* name;
     cv::Rect cells;
   };
-  // Corners of fisheye images are often dark, so a part is the middle of a side or the outer cells of a
-  // quarter.
+  // Corners of fisheye images are often dark, so a part is the middle of a side, or the outer cells of a
+  // quarter of the image.
   static const std::array<Part, 8> kParts = {{{"left", {0, 1, 2, 3}},
                                               {"right", {6, 1, 2, 3}},
                                               {"upper", {2, 0, 4, 1}},

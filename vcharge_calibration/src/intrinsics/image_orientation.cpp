@@ -21,12 +21,12 @@ constexpr std::array<Turn, 3> kTurns = {{{"mirrored left-right", true, false},
                                          {"mirrored up-down", false, true},
                                          {"turned by 180 degrees", true, true}}};
 constexpr int kMaxIterations = 4;
-// A turned view must fit this many times better after turning it back.
+// Turning a view back must reduce its error at least by this factor.
 constexpr double kMinGain = 2.0;
-// After that, its error must not exceed the usual one by more than this factor.
+// A view that was turned back may have at most this multiple of the usual error.
 constexpr double kMaxUsual = 3.0;
-// If turned and upright images balance, the principal point of the fit is in the middle. The search therefore
-// starts this fraction of the image beside it.
+// With equally many turned and upright images, the fitted principal point lies in the middle. The search
+// therefore starts at this offset from it, as a fraction of the image size.
 constexpr double kStartShift = 0.01;
 
 BoardView turned(const BoardView& view, const Turn& turn, cv::Size size) {
@@ -54,7 +54,7 @@ CameraModel shifted(const CameraModel& model, const Turn& turn, cv::Size size) {
   return CameraModel::create(model.name(), parameters);
 }
 
-// Finds the turned views by alternating between the assignment and the camera that follows from it.
+// Finds the turned views by alternating between the assignment of views and a fit of the camera.
 std::vector<bool> assign(const CalibrationBoard& board, const std::vector<BoardView>& views, cv::Size size,
                          const Turn& turn, CameraModel model, std::vector<double>* as_is_px,
                          std::vector<double>* turned_px) {

@@ -16,8 +16,8 @@ struct TurnedImage {
 };
 
 /// Finds views that fit the camera of the other views only after mirroring or turning their image; names the
-/// smaller group. A chessboard equals its mirror image: if all images are mirrored alike, they fit a mirrored
-/// camera, and nothing can be detected. `fitted` is a camera fitted to the unmodified views.
+/// smaller group. A chessboard equals its mirror image: if all images are mirrored, they fit a mirrored
+/// camera, and the error is not detected. `fitted` is a camera fitted to the unmodified views.
 std::vector<TurnedImage> findTurnedImages(const CalibrationBoard& board, const std::vector<BoardView>& views,
                                           cv::Size image_size_px, const CameraModel& fitted);
 

@@ -22,12 +22,12 @@ namespace vcharge {
 
 namespace {
 
-// Fraction of the work spent on detecting boards without and with a camera; the rest is the fit.
+// Fraction of the progress for detecting boards with and without a camera; the rest is the fit.
 constexpr double kFindFraction = 0.5;
-// Parts into which the views are split for cross-validation.
+// Number of parts into which the views are split for cross-validation.
 constexpr int kCrossValidationFolds = 10;
 constexpr double kFindAgainFraction = 0.3;
-// Larger errors, or views that do not fit, cause a check for turned images.
+// Larger errors, or views that do not fit, trigger a check for turned images.
 constexpr double kSuspiciousError_px = 0.5;
 
 class Calibration {
@@ -96,7 +96,7 @@ class Calibration {
     return std::to_string(size.width) + "x" + std::to_string(size.height);
   }
 
-  // A few of the worst fitting views suffice to detect turned images.
+  // Returns some of the views that fit worst; they suffice to detect turned images.
   std::vector<BoardView> worstViews(const std::vector<BoardView>& views, const CameraModel& camera) const {
     constexpr size_t kMaxViews = 24;
     std::vector<std::pair<double, size_t>> order(views.size());
@@ -210,7 +210,7 @@ class Calibration {
     crossValidate(fit);
   }
 
-  // Splits the views into parts; a fit without each part shows the error on unseen views, and how much the
+  // Splits the views into parts and fits without each: shows the error on excluded views, and how much
   // parameters depend on the choice of views.
   void crossValidate(const ViewFit& fit) {
     const auto views = fit.views.size();

@@ -64,7 +64,7 @@ std::vector<BoardView> randomViews(const CalibrationBoard& board, const CameraMo
         view.corners.push_back({i, pixel + Eigen::Vector2d(x, y)});
       }
     }
-    // Boards that extend beyond the image show the camera at its rim.
+    // Boards that extend beyond the image cover its rim.
     if (2 * static_cast<int>(view.corners.size()) >= board.numCorners()) {
       views.push_back(view);
       if (poses != nullptr) {

@@ -43,7 +43,7 @@ Eigen::VectorXd parametersFor(const std::string& model_name, cv::Size size, doub
 /// Reprojection error of a corner of a bent board. Blocks: pose, camera, intrinsics, bending (3).
 class BentCornerCost : public ceres::CostFunction {
  public:
-  /// `flat` has a point (3) instead of the bending.
+  /// `flat` has a point (3) in the position of the bending.
   BentCornerCost(std::unique_ptr<ceres::CostFunction> flat, const CalibrationBoard& board, int index)
       : flat_(std::move(flat)),
         corner_(board.corner(index)),
@@ -77,7 +77,7 @@ class BentCornerCost : public ceres::CostFunction {
   Eigen::Vector3d corner_, basis_;
 };
 
-/// Prior of a nearly flat board: bending over the typical one. Blocks: bending (3).
+/// Prior of a nearly flat board: bending divided by the typical bending. Blocks: bending (3).
 class FlatnessCost : public ceres::SizedCostFunction<3, 3> {
  public:
   explicit FlatnessCost(double usual_m) : usual_m_(usual_m) {}
@@ -152,7 +152,7 @@ class Adjustment {
     options.parameter_tolerance = 1e-12;
     options.num_threads = 1;
     options.logging_type = ceres::SILENT;
-    auto* ordering = new ceres::ParameterBlockOrdering;  // NOLINT: Ceres takes it
+    auto* ordering = new ceres::ParameterBlockOrdering;  // NOLINT: Ceres takes ownership
     for (PoseBlock& pose : poses_) {
       ordering->AddElementToGroup(pose.data(), 0);
     }
@@ -200,7 +200,7 @@ class Adjustment {
   }
 
   std::unique_ptr<ceres::Manifold> manifold_;
-  std::vector<std::unique_ptr<ceres::LossFunction>> losses_;  // per view
+  std::vector<std::unique_ptr<ceres::LossFunction>> losses_;  // one per view
   ceres::Problem problem_;
   PoseBlock camera_;
   Eigen::VectorXd intrinsics_;

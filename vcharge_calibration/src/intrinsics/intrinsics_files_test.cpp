@@ -222,7 +222,7 @@ TEST(ConvertCameraTest, StatesWhatTheNewModelLeavesOver) {
       EXPECT_LT(converted.rms_px, 0.5) << from << " " << to;
       EXPECT_LE(converted.rms_px, converted.max_px);
       EXPECT_GT(converted.covered_fraction, 0.99);
-      // Computes the residual directly, on rays between the samples.
+      // Computes the error independently, on rays between the samples.
       double worst_px = 0.0;
       for (double theta = 0.013; theta < 1.3; theta += 0.1) {
         const Eigen::Vector3d ray(std::sin(theta), 0.0, std::cos(theta));

@@ -7,7 +7,7 @@
 
 namespace vcharge {
 
-/// vehicle_from_camera of a camera that looks ahead, rotated by these angles.
+/// vehicle_from_camera of a forward-looking camera that is rotated by these angles.
 inline RigidTransform placeCamera(double yaw_rad, double pitch_rad, double roll_rad,
                                   const Eigen::Vector3d& position_m) {
   Eigen::Matrix3d forward_from_optical;

@@ -18,7 +18,7 @@ namespace {
 
 // Opposite sides of a board parallel to the image are equally long, and so are its diagonals.
 constexpr double kMinTiltRatio = 1.15;
-// An approximate camera is fitted after every so many views.
+// An approximate camera is fitted each time this number of views has been added.
 constexpr size_t kFitEvery = 8;
 // Largest motion of the board's corners between images of a static board, relative to the image's longer
 // side.

@@ -19,9 +19,9 @@ namespace vcharge {
 namespace {
 
 constexpr int kMaxRounds = 6;
-// The bending of boards is judged after this round, when wrong corners have been removed.
+// Whether boards bend is decided after this round, when wrong corners have been removed.
 constexpr int kBendingRound = 1;
-// Factor by which bent boards must explain the errors better than random parameters.
+// Modelling the bending must reduce the errors by this factor more than random parameters would.
 constexpr double kMinBendingSignificance = 3.0;
 // Largest ratio of a corner's error to the usual one of its view.
 constexpr double kMaxCornerError = 5.0;
@@ -114,7 +114,7 @@ class ViewFitter {
     return sum;
   }
 
-  // F-test: the improvement by three more parameters per view, relative to that of as many random ones.
+  // F-test: the improvement by three more parameters per view, relative to that of as many random parameters.
   bool judgeBending() {
     size_t count = 0;
     const double flat = sumOfSquares(fit_.camera, fit_.views, &count);
@@ -203,7 +203,7 @@ class ViewFitter {
     std::vector<double> errors_px(count);
     tbb::parallel_for(size_t{0}, count, [&](size_t v) {
       widths_px[v] = widthOf(v);
-      // The corners of a noisy view are judged by its own noise.
+      // A corner of a noisy view is compared with the noise of that view.
       refined[v] = refineView(v, kMaxCornerError * std::max(usual_corner_px, view_medians_px[v]));
       errors_px[v] = rmsError(board_, refined[v], fit_.camera.boards[v], fit_.camera.model);
     });

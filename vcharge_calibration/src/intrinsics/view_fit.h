@@ -11,11 +11,11 @@ namespace vcharge {
 /// A camera fitted to consistent views.
 struct ViewFit {
   FittedCamera camera;
-  FitSettings settings;  ///< of the last fit, with the noise of each view
+  FitSettings settings;  ///< settings of the last fit, with the noise of each view
   std::vector<BoardView> views;
   std::vector<double> edge_widths_px;  ///< per view
   std::vector<RejectedImage> rejected;
-  double flat_rms_px = 0.0;  ///< with flat boards
+  double flat_rms_px = 0.0;  ///< RMS error with flat boards
 };
 
 /// RMS error of a view per coordinate, in pixels; infinite if the camera does not see a corner.

@@ -14,12 +14,12 @@
 namespace vcharge {
 namespace {
 
-/// A revisit is nearer than the radius to an earlier part, after at least the gap in between.
+/// A revisit is closer than this radius to an earlier part, with at least the gap driven in between.
 constexpr double kRevisitRadius_m = 4.0;
 constexpr double kRevisitGap_m = 25.0;
-/// Ratio of the steps in which the motion of a camera must be known.
+/// Minimum ratio of steps in which the motion of a camera must be known.
 constexpr double kMinSeenRatio = 0.3;
-/// Jackknife: length of parts with independent errors, and groups of parts that are left out once each.
+/// Jackknife: length of parts with independent errors, and number of groups of parts, each left out once.
 constexpr double kSegment_m = 5.0;
 constexpr int kNumGroups = 10;
 
@@ -31,7 +31,7 @@ constexpr int kHandEyeIterations = 10;
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-/// Deviations by the formula of hand-eye calibration, which has one for x and y, and one for roll and pitch.
+/// Standard deviations from the formula of hand-eye calibration: one for x and y, one for roll and pitch.
 Vector6d formulaSigma(const HandEye& hand_eye) {
   Vector6d sigma;
   sigma << hand_eye.position_sigma_m, hand_eye.position_sigma_m, kNaN, hand_eye.tilt_sigma_rad,
@@ -76,7 +76,7 @@ void CalibrationCoach::addKeyframe(const RigidTransform& odom_from_vehicle, doub
   Place place{odom_from_vehicle, travelled_m, false};
   for (const Place& earlier : places_) {
     if (travelled_m - earlier.travelled_m < kRevisitGap_m) {
-      break;  // later parts were driven even more recently
+      break;  // later parts are too recent as well
     }
     const Eigen::Vector3d way = earlier.odom_from_vehicle.translation() - odom_from_vehicle.translation();
     place.is_revisited = place.is_revisited || way.head<2>().norm() < kRevisitRadius_m;
@@ -119,12 +119,12 @@ CameraOutlook CalibrationCoach::cameraOutlook(size_t camera) const {
     }
     const HandEye without = solvePlanarHandEye(others, hand_eye_, kHandEyeIterations);
     if (without.status != HandEyeStatus::kOk) {
-      outlook.sigma.setConstant(kNaN);  // one part of the drive decides
+      outlook.sigma.setConstant(kNaN);  // a single part of the drive determines the result
       return outlook;
     }
     squares += differenceOf(outlook.hand_eye.vehicle_from_camera, without.vehicle_from_camera).cwiseAbs2();
   }
-  // Variance of the jackknife times that of Student's t, for the small number of groups.
+  // Variance of the jackknife times that of Student's t distribution, since there are few groups.
   const double groups = kNumGroups;
   const double factor = (groups - 1.0) / groups * (groups - 1.0) / (groups - 3.0);
   outlook.sigma = outlook.sigma.cwiseMax((factor * squares).cwiseSqrt());
@@ -144,7 +144,7 @@ DriveOutlook CalibrationCoach::outlook() const {
   return outlook;
 }
 
-/// Largest deviation of a camera over the sufficient one; infinite while unknown.
+/// Largest ratio of a camera's standard deviation to the sufficient one; infinite while unknown.
 double CalibrationCoach::weakness(const CameraOutlook& camera, int* degree_of_freedom) const {
   double worst = 0.0;
   for (int i = 0; i < 6; ++i) {

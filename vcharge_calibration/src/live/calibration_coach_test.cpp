@@ -18,12 +18,12 @@ RigidTransform truePlace() {
   return RigidTransform(rotationFromYawPitchRoll(1.4, 0.3, -1.9), Eigen::Vector3d(1.9, 0.95, 0.0));
 }
 
-/// A piece of the way: so many metres, and the turn in it (to the left).
+/// A piece of the drive: its length in metres, and its turn (to the left).
 struct Piece {
   double length_m = 0.0, turn_rad = 0.0;
 };
 
-/// Drives along pieces with a coach beside, whose one camera sees motions with noise.
+/// Drives along pieces and feeds a coach with the noisy motions of one camera.
 class CoachedDrive {
  public:
   explicit CoachedDrive(uint32_t seed = 1, double noise_rad = 0.003)
@@ -35,7 +35,7 @@ class CoachedDrive {
     for (const Piece& piece : pieces) {
       const int steps = static_cast<int>(std::lround(piece.length_m / kStep_m));
       for (int i = 0; i < steps; ++i) {
-        // Curves begin and end gently: circles of one radius would leave the place open.
+        // The curvature varies: circles of one radius do not determine the position.
         const double share = 1.0 - std::cos(2.0 * M_PI * (i + 0.5) / steps);
         step(share * piece.turn_rad / steps);
       }
@@ -43,9 +43,9 @@ class CoachedDrive {
   }
 
   bool sees = true;
-  /// Added to the camera's directions, the same over some metres: errors that go together.
+  /// Standard deviation of an error of the camera's directions that is constant over some metres.
   double common_error_rad = 0.0;
-  /// To the odometer's turns, as if it counted with the wrong sign.
+  /// Factor on the odometer's turns; -1: it counts with the wrong sign.
   double odometer_sign = 1.0;
 
   DriveOutlook outlook() const { return coach_.outlook(); }
@@ -90,7 +90,7 @@ class CoachedDrive {
   Eigen::Vector3d common_ = Eigen::Vector3d::Zero();
 };
 
-/// Two loops, to the left and to the right, that meet where they began.
+/// Two loops, one to the left and one to the right, that meet at their starts.
 std::vector<Piece> figureOfEight() {
   return {{10.0, 0.0}, {40.0, 2.0 * M_PI}, {40.0, -2.0 * M_PI}, {20.0, 0.0}};
 }
@@ -180,7 +180,7 @@ TEST(CalibrationCoachTest, NamesACameraThatContradictsTheOdometer) {
   EXPECT_FALSE(outlook.isEnough());
 }
 
-/// Mean squared error of hand-eye in predicted standard deviations, by degree of freedom.
+/// Mean squared error of hand-eye calibration relative to the predicted variance, per degree of freedom.
 Eigen::Matrix<double, 6, 1> meanSquaredError(double common_error_rad, int num_drives) {
   Eigen::Matrix<double, 6, 1> sum = Eigen::Matrix<double, 6, 1>::Zero();
   for (int seed = 1; seed <= num_drives; ++seed) {
@@ -199,11 +199,11 @@ Eigen::Matrix<double, 6, 1> meanSquaredError(double common_error_rad, int num_dr
 }
 
 TEST(CalibrationCoachTest, PredictedSigmasBoundTheErrorOfHandEye) {
-  // 40 drives: their mean of squared normal errors is within 1 +- 4 sqrt(2 / 40). Predictions may be too
+  // 40 drives: the mean of squared normal errors is within 1 +- 4 sqrt(2 / 40). Predictions may be too
   // large, not too small.
   constexpr int kDrives = 40;
   const double most = 1.0 + 4.0 * std::sqrt(2.0 / kDrives);
-  // Independent errors, and such that go together over 5 m, of which the formula knows nothing.
+  // Independent errors, and errors correlated over 5 m, which the formula does not model.
   for (const double common_error_rad : {0.0, 0.01}) {
     const Eigen::Matrix<double, 6, 1> squares = meanSquaredError(common_error_rad, kDrives);
     for (const int i : {0, 1, 3, 4, 5}) {

@@ -5,8 +5,8 @@
 
 namespace vcharge {
 
-/// Passes new keyframes of a drive to a coach, and the motions of the cameras between them as
-/// estimateCameraMotions() estimates them from the whole drive.
+/// Passes new keyframes of a drive to a coach, and the cameras' motions between them, estimated as in
+/// estimateCameraMotions().
 void updateCoach(const ReconstructionState& state, CalibrationCoach* coach);
 
 }  // namespace vcharge

@@ -62,8 +62,8 @@ struct RigCalibrationSession::Follower {
   RigCalibrator calibrator;
   CalibrationCoach coach;
   DriveOutlook outlook;
-  std::optional<Keyframe> last_outlook;  // of the coach, without images
-  double next_try_m = 0.0;               // distance of the next automatic calibration
+  std::optional<Keyframe> last_outlook;  // keyframe at the coach's last outlook, without images
+  double next_try_m = 0.0;               // driven distance at which to calibrate automatically again
 
   Follower(const std::shared_ptr<const CameraRig>& rig, const RigCalibratorOptions& calibrator_options,
            const CalibrationCoachOptions& coach_options)
@@ -95,7 +95,7 @@ struct RigCalibrationSession::Follower {
   }
 };
 
-/// A calibration that is running or done.
+/// A calibration that is running or finished.
 struct RigCalibrationSession::Job {
   FinishedCalibration work;
   KeyframeImages all_images;
@@ -196,7 +196,7 @@ bool RigCalibrationSession::begin(bool flushes, std::string* message) {
     return false;
   }
   if (worker_.joinable()) {
-    worker_.join();  // it has returned or is about to
+    worker_.join();  // returns at once or soon
   }
   job_ = std::make_shared<Job>();
   if (flushes) {

@@ -33,7 +33,7 @@ std::shared_ptr<const CameraRig> oneCamera() {
   return std::make_shared<const CameraRig>(rig);
 }
 
-/// A session without images, whose calibrations fail at once.
+/// A session without images; its calibrations fail at once.
 class RigCalibrationSessionTest : public testing::Test {
  protected:
   std::unique_ptr<RigCalibrationSession> makeSession(

@@ -14,7 +14,7 @@
 namespace vcharge {
 namespace {
 
-/// Views per keyframe, those with most common landmarks.
+/// Maximum number of views per keyframe: those with most common landmarks.
 constexpr size_t kNumViews = 2;
 /// Largest differences of directions and ranges between two views of a landmark.
 constexpr double kMaxViewAngle_rad = 0.5;
@@ -89,7 +89,7 @@ class NeighbourSearch {
         .inverse();
   }
 
-  /// Keyframes whose first camera observes most landmarks that the second should see at `k`; the latest
+  /// Keyframes at which the first camera observes most landmarks that the second should see at `k`; latest
   /// first.
   std::vector<HistoryView> chooseHistory(size_t k) const {
     std::vector<HistoryView> views;

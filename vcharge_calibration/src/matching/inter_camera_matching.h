@@ -8,7 +8,7 @@
 
 namespace vcharge {
 
-/// Searches for the landmarks of each camera in the images of its neighbours within the next metres (paper,
+/// Searches for each camera's landmarks in the images that its neighbours take within the next metres (paper,
 /// section Inter-Camera Feature Matching): both images are rectified to the mean rotation of the two cameras,
 /// where patches look alike, and the patch is aligned from its predicted position. Adds the observations to
 /// the tracks and returns their number. Data parallel, deterministic.

@@ -1,4 +1,4 @@
-// Two cameras before a textured wall: landmarks of one are found in the image of the other.
+// Two cameras in front of a textured wall: landmarks of one are found in the image of the other.
 #include "matching/inter_camera_matching.h"
 
 #include <memory>
@@ -64,7 +64,7 @@ TEST(InterCameraMatchingTest, FindsLandmarksWithAnInaccurateRig) {
       errors_px.push_back(observation.camera == 1 ? (observation.position_px - pixel).norm() : 0.0);
     }
   }
-  // The predictions were wrong by 1.5 pixels and more.
+  // The errors of the predictions are 1.5 pixels and more.
   EXPECT_LT(quantile(errors_px, 0.9), 0.8);
 }
 

@@ -73,7 +73,7 @@ class LandmarkAlignment {
     return images_.image(static_cast<int32_t>(image / num_cameras), image % num_cameras);
   }
 
-  /// Chooses the observation of median range: the others differ least from it.
+  /// Chooses the observation of median range: the other scales differ least from its scale.
   void choosePatches() {
     for (size_t t = 0; t < data_.tracks.size(); ++t) {
       Track& track = data_.tracks[t];
@@ -183,8 +183,8 @@ class LandmarkAlignment {
   const PatchAlignmentOptions patch_options_ = patchOptions();
   const KeyframeImages& images_;
   ReconstructionData& data_;
-  std::vector<LandmarkPatch> patches_;                 // by track
-  std::vector<std::vector<TrackedObservation>> seen_;  // by image
+  std::vector<LandmarkPatch> patches_;                 // one per track
+  std::vector<std::vector<TrackedObservation>> seen_;  // observations in each image
 };
 
 }  // namespace

@@ -8,8 +8,8 @@
 
 namespace vcharge {
 
-/// Aligns all observations of a landmark with one patch. Joined tracks follow different patches, and features
-/// are detected anew in each image, so that the observations of a landmark are not of exactly the same point.
+/// Aligns all observations of a landmark with one patch, because joined tracks follow different patches
+/// and features are detected anew in each image, so that the observations show slightly different points.
 /// The patch comes from the image of median range and is warped by the poses and the rig. Returns the number
 /// of aligned observations. Data parallel, deterministic.
 int64_t alignLandmarks(const LandmarkAlignmentOptions& options, const KeyframeImages& images,

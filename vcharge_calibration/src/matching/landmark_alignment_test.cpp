@@ -36,7 +36,7 @@ WallScene makeScene() {
   return scene;
 }
 
-/// Differences of a landmark's positions at consecutive keyframes, without the part of the motion.
+/// Differences between a landmark's position errors at consecutive keyframes.
 std::vector<double> differencesOf(const WallScene& scene) {
   std::vector<double> differences_px;
   for (const Track& track : scene.data.tracks) {
@@ -67,7 +67,7 @@ TEST(LandmarkAlignmentTest, AlignsAllObservationsWithOnePoint) {
   ASSERT_GT(quantile(differencesOf(scene), 0.5), 0.6);
   const int64_t num_aligned = alignLandmarks(LandmarkAlignmentOptions(), scene.images, &scene.data);
   EXPECT_GT(num_aligned, 0.7 * static_cast<double>(numObservations(scene)));
-  // Errors grow with the scale: 0.7 pixels at first are 0.1 more at the last keyframe.
+  // Errors grow with the scale: 0.7 pixels at the first keyframe are 0.8 at the last.
   EXPECT_LT(quantile(differencesOf(scene), 0.5), 0.1);
   EXPECT_LT(quantile(differencesOf(scene), 0.9), 0.25);
   for (const Track& track : scene.data.tracks) {

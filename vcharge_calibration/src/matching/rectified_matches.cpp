@@ -18,7 +18,7 @@ namespace {
 const cv::Size kViewSize_px(560, 420);
 constexpr double kFocal_px = 230.0;  // 101 degrees across
 constexpr size_t kMaxLines = 60;
-constexpr size_t kMaxCandidates = 8;  // per pair of cameras
+constexpr size_t kMaxCandidates = 8;  // candidates per pair of cameras
 
 using CameraPair = std::pair<int32_t, int32_t>;
 using KeyframePair = std::pair<int32_t, int32_t>;
@@ -81,7 +81,7 @@ std::optional<ViewMatch> matchOf(const ReconstructionData& data, const CameraPai
   return at_first && at_second ? std::make_optional(ViewMatch{*at_first, *at_second}) : std::nullopt;
 }
 
-/// Common landmarks of two cameras, by keyframes with images.
+/// Number of common landmarks of two cameras, by keyframes with images.
 std::map<CameraPair, std::map<KeyframePair, int>> countShared(const ReconstructionData& data,
                                                               const KeyframeImages& images) {
   std::vector<bool> has_image(data.keyframes.size(), false);

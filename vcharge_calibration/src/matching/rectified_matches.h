@@ -15,11 +15,11 @@ namespace vcharge {
 struct CameraPairView {
   size_t first_camera = 0, second_camera = 0;
   int32_t first_keyframe = 0, second_keyframe = 0;
-  std::vector<int32_t> tracks;  ///< in both rectified views
+  std::vector<int32_t> tracks;  ///< landmarks in both rectified views
 };
 
-/// For every two cameras with common landmarks: the keyframes with images whose views, rectified to the mean
-/// rotation of the two, contain most of them. Pairs with most common landmarks come first.
+/// For every two cameras with common landmarks, finds the keyframes with images whose views, rectified to the
+/// mean rotation of the two, contain most of them. Returns the pairs with most common landmarks first.
 std::vector<CameraPairView> findCameraPairViews(const ReconstructionData& data, const KeyframeImages& images);
 
 /// Positions of a landmark in both rectified views; equal for a distant one.

@@ -17,17 +17,17 @@ namespace {
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 const cv::Vec3b kSeamColour(40, 190, 255);  // BGR
 constexpr double kSeamOpacity = 0.5;
-constexpr double kMinSeamAngle_rad = 0.3;  // least angle between cameras with a seam
+constexpr double kMinSeamAngle_rad = 0.3;  // minimum angle between cameras with a seam
 
 Eigen::Vector3d axisOf(const RigCamera& camera) {
   return camera.vehicle_from_camera->rotation() * Eigen::Vector3d::UnitZ();
 }
 
-/// Projections of points of the vehicle's frame to a camera.
+/// Projections of points in the vehicle's frame to a camera.
 struct Sight {
   Eigen::Matrix2Xd pixels;
   std::vector<uint8_t> valid;
-  Eigen::RowVectorXd cosines;  ///< of the angles to the camera's axis
+  Eigen::RowVectorXd cosines;  ///< cosines of the angles to the camera's axis
 };
 
 Sight lookAt(const RigCamera& camera, const Eigen::Matrix3Xd& points) {
@@ -49,7 +49,7 @@ Sight lookAt(const RigCamera& camera, const Eigen::Matrix3Xd& points) {
   return sight;
 }
 
-/// The pixel at a position of the full image, from a copy that may be smaller.
+/// The gray level at a pixel of the full image, read from a copy that may be smaller.
 uint8_t sample(const cv::Mat& image, const RigCamera& camera, const Eigen::Vector2d& position_px) {
   const double scale = static_cast<double>(image.cols) / camera.image_size_px.width;
   const double x = std::clamp(toSmallImage(position_px.x(), scale), 0.0, image.cols - 1.001);

@@ -29,7 +29,7 @@ std::string svg(cv::Size size, const std::string& content) {
          "\" fill=\"#fff\" stroke=\"#888\"/>" + content + "</svg>";
 }
 
-// From white through yellow to red.
+// Colour scale from white through yellow to red.
 std::string heatColour(double share) {
   const double s = std::clamp(share, 0.0, 1.0);
   const int green = static_cast<int>(std::lround(255.0 - 190.0 * s * s));
@@ -54,7 +54,7 @@ std::string base64(const std::vector<uint8_t>& bytes) {
   return text;
 }
 
-/// `scale`: size of the image over that of the camera.
+/// `scale`: ratio of the image's size to the camera's.
 cv::Mat pinholeView(const cv::Mat& image, const CameraModel& model, double scale,
                     const Eigen::Matrix3d& camera_from_view, cv::Size size_px, double focal_px) {
   cv::Mat map(size_px, CV_32FC2, cv::Scalar(-1e4, -1e4));

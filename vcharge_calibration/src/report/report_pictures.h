@@ -17,7 +17,7 @@ struct CornerError {
   Eigen::Vector2d pixel, error_px;
 };
 
-/// Coverage of the image: cells without a corner are red. An <svg> element, as the following.
+/// Coverage of the image: cells without a corner are red. This and the next two return an <svg> element.
 std::string drawCoverage(cv::Size image_size_px, const std::vector<BoardView>& views);
 /// Errors as lines, enlarged by `scale`.
 std::string drawErrorVectors(cv::Size image_size_px, const std::vector<CornerError>& errors, double scale);
@@ -30,7 +30,7 @@ cv::Mat drawCorners(const cv::Mat& image, const CalibrationBoard& board, const B
 /// Pinhole view of a camera's image, which may be smaller than the camera's, turned by camera_from_view.
 cv::Mat perspectiveView(const cv::Mat& image, const RigCamera& camera,
                         const Eigen::Matrix3d& camera_from_view, cv::Size size_px, double focal_px);
-/// Pinhole view of the image, turned to the right by `yaw_rad`; 100 degrees across.
+/// Pinhole view of the image, turned to the right by `yaw_rad`; its field of view is 100 degrees.
 cv::Mat undistortedView(const cv::Mat& image, const CameraModel& model, double yaw_rad);
 
 }  // namespace vcharge

@@ -15,7 +15,7 @@ namespace vcharge {
 
 // Pictures of a calibration from a drive, as <svg> elements.
 
-/// Path, and landmarks from above in the colour of the camera that observed them first.
+/// Vehicle path and landmarks from above, in the colour of the camera that observed them first.
 std::string drawSparseMap(const RigScene& scene);
 
 /// Loop edges on the path: accepted, rejected, and unverified candidates.
@@ -33,7 +33,7 @@ std::vector<CornerError> meanErrors(cv::Size image_size_px, const std::vector<Co
 struct LandmarkViews {
   Eigen::Vector3d position_m = Eigen::Vector3d::Zero();
   size_t first_camera = 0;
-  std::vector<Eigen::Vector3d> cameras_m;  ///< positions of these cameras in the map
+  std::vector<Eigen::Vector3d> cameras_m;  ///< positions of the observing cameras in the map
 };
 
 /// A calibration in a finished map from above: landmarks in the colour of their first camera, with lines to

@@ -70,7 +70,7 @@ cv::Mat drawGround(const RigCamera& camera) {
   return image;
 }
 
-/// Median distance of the bird's-eye view from the ground's gray levels, over what is within some metres.
+/// Median gray-level difference between the bird's-eye view and the ground within some metres.
 double medianError(const CameraRig& rig, const std::vector<cv::Mat>& images) {
   BirdViewArea area;
   area.front_m = 7.0;
@@ -102,13 +102,13 @@ TEST(BirdViewTest, ProjectsTheGround) {
     images.push_back(drawGround(camera));
   }
   EXPECT_LT(medianError(*rig, images), 2.0);
-  // Smaller images show the same, a little softer.
+  // Smaller images give the same view, slightly blurred.
   std::vector<cv::Mat> small(images.size());
   for (size_t i = 0; i < images.size(); ++i) {
     cv::resize(images[i], small[i], cv::Size(), 0.5, 0.5, cv::INTER_AREA);
   }
   EXPECT_LT(medianError(*rig, small), 3.0);
-  // Half a metre off is a sixth of a wave.
+  // A displacement of half a metre is a sixth of a wave.
   for (RigCamera& camera : rig->cameras) {
     camera.vehicle_from_camera =
         RigidTransform(camera.vehicle_from_camera->rotation(),
@@ -157,17 +157,17 @@ TEST(BirdViewTest, SeamsAreBetweenNeighboursAndGrowWithDistance) {
   for (const SeamPoint& point : points) {
     EXPECT_NE((point.first + point.second) % 2, 0U) << "front and rear, left and right are no neighbours";
     EXPECT_TRUE(point.is_seen);
-    // Only left was moved, along the ground.
+    // Only the left camera was moved, along the ground.
     EXPECT_NEAR(point.before_m, point.first == 1 || point.second == 1 ? 0.1 : 0.0, 1e-9);
   }
   for (size_t i = 0; i < points.size(); i += 2) {
     EXPECT_LT(points[i].sigma_m, points[i + 1].sigma_m);
-    // A milliradian of tilt moves the ray's end by d^2 / h milliradians; two cameras.
+    // A milliradian of tilt moves the ray's end by d^2 / h milliradians; both cameras contribute.
     EXPECT_NEAR(points[i + 1].sigma_m, std::sqrt(2.0) * 0.001 * 5.0 * 5.0 / 0.8, 0.015);
   }
 }
 
-/// Two cameras at one keyframe that see points as far away as the sky.
+/// Two cameras at one keyframe that see very distant points.
 struct FarPoints {
   ReconstructionData data;
   KeyframeImages images;
@@ -242,7 +242,7 @@ TEST(RigPicturesTest, AveragesErrorsByCell) {
   for (int i = 0; i < 20; ++i) {
     errors.push_back({{10.0, 10.0}, {0.5, i % 2 == 0 ? 0.3 : -0.3}});
   }
-  errors.push_back({{600.0, 390.0}, {9.0, 9.0}});  // alone
+  errors.push_back({{600.0, 390.0}, {9.0, 9.0}});  // an outlier alone in its cell
   const std::vector<CornerError> means = meanErrors(kImageSize_px, errors);
   ASSERT_EQ(means.size(), 1U);
   EXPECT_LT((means[0].pixel - Eigen::Vector2d(20.0, 20.0)).norm(), 1e-9);
@@ -266,7 +266,7 @@ TEST(RigPicturesTest, DrawsALineFromEachLandmarkToItsCameras) {
   EXPECT_EQ(count("&lt;left&gt;"), 1U);
 }
 
-/// A page of a drive that passed or failed.
+/// Makes the page of a drive that passed or failed.
 std::string makePage(bool passed) {
   FarPoints scene;
   ReconstructionState state;

@@ -52,7 +52,7 @@ std::string summaryOf(const RigCalibration& result) {
          rowOf({"height", result.height_source}) + "</table>";
 }
 
-/// A row with each degree of freedom and its standard deviation; the angles are zero for an upright camera
+/// Table row of each degree of freedom and its standard deviation; the angles are zero for an upright camera
 /// that looks forward.
 std::string parametersOf(const RigCalibration& result) {
   std::string text =
@@ -205,7 +205,7 @@ std::string makeRigReport(const std::string& title, const RigCalibration& result
                            "Cameras and their directions from above; the vehicle drives to the right.")) +
             checksOf(result);
   }
-  // After a failure existing poses and landmarks help to find the reason.
+  // After a failure, poses and landmarks help to find the reason if they exist.
   if (state.data.rig != nullptr && state.data.rig->hasExtrinsics() && !state.data.keyframes.empty()) {
     body += mapsOf(result, state);
     body += result.rig != nullptr ? seamsOf(result, images) : "";

@@ -12,12 +12,12 @@ namespace {
 
 constexpr double kWarnCoverage = 0.6;
 constexpr double kFailCoverage = 0.35;
-// Fraction of half the longer image side: boards within this radius are all in the middle.
+// Boards within this radius, relative to half the longer image side, are all in the middle.
 constexpr double kFailReach = 0.7;
 constexpr double kWarnError_px = 0.5;
 constexpr double kFailError_px = 3.0;
 constexpr double kWarnUnseen = 1.5;
-// Least number and tilt of views against the line of sight: without them focal length and distance correlate.
+// Minimum tilt of views against the line of sight; without tilt, focal length and distance correlate.
 constexpr double kMinTilt_rad = 0.25;
 constexpr double kMinTiltedShare = 0.2;
 

@@ -8,8 +8,8 @@
 namespace vcharge {
 namespace {
 
-constexpr double kMaxRange_m = 5.0;  // of ground points, along the ground
-// Heights of a camera above the ground.
+constexpr double kMaxRange_m = 5.0;  // maximum horizontal distance of ground points
+// Bounds on the height of a camera above the ground.
 constexpr double kMinBelow_m = 0.15;
 constexpr double kMaxBelow_m = 4.0;
 constexpr double kBin_m = 0.02;
@@ -61,7 +61,7 @@ std::optional<double> findCameraHeight(const ReconstructionData& data, int32_t c
       best = i;
     }
   }
-  // Mean of the points around that level.
+  // Mean of the points near the most frequent level.
   const double mode_m = (static_cast<double>(best) + 0.5) * kBin_m;
   double sum = 0.0, num = 0.0;
   for (const double depth_m : depths_m) {

@@ -10,12 +10,12 @@
 
 namespace vcharge {
 
-/// Height of a camera above the ground, from its landmarks alone: the level of most of the points near the
-/// path. The rig of `data` has the camera at height zero. Empty where the camera sees too little ground.
+/// Height of a camera above the ground from its landmarks alone: the most frequent level of points near the
+/// path. The rig of `data` has the camera at height zero. Empty if the camera sees too little ground.
 std::optional<double> findCameraHeight(const ReconstructionData& data, int32_t camera);
 
-/// The rig of `data` with its cameras raised to their heights; a camera without a height gets the median one.
-/// NotCalibrated where no camera sees the ground.
+/// Returns the rig of `data` with each camera at its height; a camera without one gets the median height.
+/// Throws NotCalibrated if no camera sees the ground.
 std::shared_ptr<const CameraRig> withCameraHeights(const ReconstructionData& data);
 
 /// A landmark on the ground, and the nearest keyframe that observes it.

@@ -12,19 +12,19 @@ namespace vcharge {
 
 namespace {
 
-/// Factor on the odometer's deviation where the wheels slipped.
+/// Factor on the odometer's standard deviation if the wheels slipped.
 constexpr double kSlipFactor = 20.0;
 constexpr double kSlipSigmas = 5.0;
-/// Turn between keyframes in which the body leans.
+/// Larger turns between keyframes tilt the body.
 constexpr double kMinTurn_rad = 0.01;
-// Least deviations of an odometer.
+// Minimum standard deviations of an odometer.
 constexpr double kMinOdometrySigma_m = 0.0005;
 constexpr double kMinOdometrySigma_rad = 0.0002;
 constexpr double kMinHeightSigma_m = 0.001;
 constexpr double kMinTiltSigma_rad = 0.0005;
 
-/// Weights of the keyframes for the cameras' tilt. The body leans outwards in turns, which cancels if both
-/// sides have the same sum of weights: the side with more turns gets less weight.
+/// Weights of the keyframes for the cameras' tilt. The body tilts outwards in turns, which cancels if left
+/// and right have the same sum of weights: the side with more turns gets less weight.
 std::vector<double> balanceTurns(const ReconstructionData& data) {
   std::vector<double> turns_rad(data.keyframes.size(), 0.0);
   double left_rad = 0.0, right_rad = 0.0;
@@ -43,7 +43,7 @@ std::vector<double> balanceTurns(const ReconstructionData& data) {
   return weights;
 }
 
-/// Landmarks on the ground: planar motion shows neither the height of the cameras nor, well, their tilt.
+/// Landmarks on the ground; planar motion does not determine the cameras' height, and barely their tilt.
 std::vector<GroundObservation> makeGroundObservations(const RigAdjustmentOptions& options,
                                                       const std::vector<double>& weights,
                                                       const ReconstructionData& data) {
@@ -61,7 +61,7 @@ std::vector<GroundObservation> makeGroundObservations(const RigAdjustmentOptions
   return observations;
 }
 
-/// The problem of mapping with unknown extrinsics, ground observations and the priors.
+/// Builds the bundle adjustment with unknown extrinsics, ground observations and priors.
 BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPriors& priors,
                              const ReconstructionData& data) {
   const OdometryNoise& odometry = priors.odometry;
@@ -110,7 +110,7 @@ OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const R
     const RigidTransform seen =
         data.keyframes[i - 1].map_from_vehicle.inverse() * data.keyframes[i].map_from_vehicle;
     const Eigen::Vector2d error_m = (seen.translation() - counted.translation()).head<2>();
-    // Deviation per axis of a distance in two dimensions.
+    // Standard deviation per axis of a distance in two dimensions.
     errors_m.push_back(error_m.norm() / std::sqrt(2.0));
     errors_rad.push_back(std::abs(yawOfRotation(seen.rotation()) -
                                   data.odometry_turn_scale * yawOfRotation(counted.rotation())));
@@ -120,7 +120,7 @@ OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const R
   if (errors_m.size() < 10) {
     return noise;
   }
-  // Medians of a Rayleigh distribution and of the absolute value of a normal distribution.
+  // Medians of a Rayleigh distribution and of the absolute value of a standard normal variable.
   constexpr double kRayleigh = 1.1774, kNormal = 0.6745;
   const BundleAdjustmentOptions& bundle = options.bundle;
   noise.sigma_m = std::clamp(quantile(errors_m, 0.5) * std::sqrt(2.0) / kRayleigh, kMinOdometrySigma_m,

@@ -11,23 +11,23 @@ namespace vcharge {
 
 /// Noise of the odometer's motions between keyframes, estimated from the adjusted keyframes.
 struct OdometryNoise {
-  double sigma_m = 0.0;  ///< 0: unknown, the options' deviations hold
+  double sigma_m = 0.0;  ///< 0: unknown, the options' values are used
   double sigma_rad = 0.0;
-  double height_sigma_m = 0.0;    ///< deviation from the plane of motion
-  double tilt_sigma_rad = 0.0;    ///< rotation out of that plane
-  std::vector<bool> has_slipped;  ///< by the later keyframe: the motion gets little weight
+  double height_sigma_m = 0.0;    ///< standard deviation from the plane of motion
+  double tilt_sigma_rad = 0.0;    ///< standard deviation of the rotation out of that plane
+  std::vector<bool> has_slipped;  ///< by the later keyframe of a motion: the motion gets little weight
 };
-/// From keyframes that were adjusted with loose odometry. An upper bound, since it contains their own errors.
+/// Estimates an upper bound from keyframes adjusted with loose odometry: it contains their own errors.
 OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const ReconstructionData& data);
 
-/// Knowledge beside the images.
+/// Prior knowledge in addition to the images.
 struct RigPriors {
   OdometryNoise odometry;
   /// For landmarks of a finished map: information on each track's position, 1/m^2 along the map's axes. They
   /// fix the map's frame, and all keyframes are free. Empty: the landmarks are unknown, and the first
   /// keyframe defines the map's frame.
   std::vector<Eigen::Matrix3d> landmark_information;
-  /// Deviation of the cameras' mean height from its initial value; 0: no prior.
+  /// Standard deviation of the cameras' mean height from its initial value; 0: no prior.
   double height_sigma_m = 0.0;
 
   bool hasMap() const { return !landmark_information.empty(); }
@@ -35,7 +35,7 @@ struct RigPriors {
 
 /// Adjusts extrinsics, keyframes, landmarks and the odometer's factors together (paper, equation joint_opt),
 /// and removes outliers; landmarks of a finished map keep their positions. Landmarks on the ground fix
-/// heights and tilt, which planar motion hardly shows.
+/// heights and tilt, which planar motion hardly determines.
 BundleAdjustmentSummary adjustRig(const RigAdjustmentOptions& options, const RigPriors& priors,
                                   ReconstructionData* data);
 
@@ -43,7 +43,7 @@ BundleAdjustmentSummary adjustRig(const RigAdjustmentOptions& options, const Rig
 struct RigUncertainty {
   bool is_valid = false;
   Eigen::MatrixXd covariance;  ///< marginal, for independent errors
-  Eigen::MatrixXd jackknife;   ///< from the influence of parts of the drive
+  Eigen::MatrixXd jackknife;   ///< estimated by leaving out parts of the drive
 };
 RigUncertainty rigUncertainty(const RigAdjustmentOptions& options, const RigPriors& priors,
                               const ReconstructionData& data);

@@ -94,7 +94,7 @@ RigAdjustmentOptions makeOptions() {
   return options;
 }
 
-/// Cameras rotated and shifted as in a first guess.
+/// Rotates and shifts the cameras like an inaccurate initial rig.
 void disturbRig(ReconstructionData* data) {
   auto rig = std::make_shared<CameraRig>(*data->rig);
   for (size_t i = 0; i < rig->cameras.size(); ++i) {
@@ -133,7 +133,7 @@ TEST(RigAdjustmentTest, FindsTheCamerasOfAKnownDrive) {
 }
 
 TEST(RigAdjustmentTest, CovarianceMatchesTheErrors) {
-  // Errors over their standard deviations, squared: mean of many drives near 1.
+  // Squared errors divided by their variances: the mean over many drives is near 1.
   Vector6d sum = Vector6d::Zero();
   constexpr int kDrives = 5;
   for (uint32_t seed = 1; seed <= kDrives; ++seed) {

@@ -6,7 +6,7 @@
 namespace vcharge {
 namespace {
 
-/// Largest angle between a ray and its point by the first guess of rig and poses.
+/// Largest angle between a ray and its point for the initial rig and poses.
 constexpr double kFirstMaxError_rad = 0.03;
 
 std::shared_ptr<const CameraRig> withoutExtrinsics(const CameraRig& rig) {

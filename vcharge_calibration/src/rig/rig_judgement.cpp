@@ -47,7 +47,7 @@ class ErrorStatistics {
     double square = 0.0, weight = 0.0;
     for (size_t i = 0; i < sums_.size(); ++i) {
       if (counts_[i] >= kMinPerCell) {
-        // Without the expected square of the mean of independent errors.
+        // Subtracts the expected square of the mean of independent errors.
         square += std::max(0.0, sums_[i].squaredNorm() / counts_[i] - 2.0 * rms() * rms());
         weight += 2.0 * counts_[i];
       }

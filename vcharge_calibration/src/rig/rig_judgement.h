@@ -13,8 +13,8 @@ namespace vcharge {
 /// Reason why the motions of a camera did not give its extrinsics, and a remedy.
 std::string describeFailure(const std::string& camera, const HandEye& initial, const RigCalibration& drive);
 
-/// Reason why a first guess is implausible: an odometer with a wrong sign turns all cameras backwards or
-/// upside down. Empty for a plausible one.
+/// Reason why initial extrinsics are implausible: an odometer with wrong sign turns all cameras backwards or
+/// upside down. Empty if they are plausible.
 std::string findWrongSign(const CameraRig& rig);
 
 /// Sets covariances, statistics and verdict of an adjusted rig.

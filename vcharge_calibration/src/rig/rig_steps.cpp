@@ -1,4 +1,4 @@
-// The steps of the calibration from a drive that was followed (paper, section SLAM-based Extrinsic
+// The steps of the calibration from a recorded drive (paper, section SLAM-based Extrinsic
 // Calibration).
 #include <cmath>
 #include <utility>
@@ -21,7 +21,7 @@ namespace {
 constexpr int kNumStages = 9;
 /// Factor on the tolerance of ground landmarks before the first adjustment.
 constexpr double kFirstGroundFactor = 4.0;
-/// Factor on the cost tolerance of the last adjustment: extrinsics are a weak direction of the cost.
+/// Factor on the cost tolerance of the last adjustment: the cost depends only weakly on the extrinsics.
 constexpr double kFineToleranceFactor = 0.01;
 
 class RigSteps {
@@ -75,7 +75,7 @@ class RigSteps {
     }
   }
 
-  /// Extrinsics from the motions of each camera and the ground that it sees; keyframes by the odometer.
+  /// Computes extrinsics from each camera's motions and the ground that it sees; keyframes from the odometer.
   void initialize() {
     std::vector<std::vector<MotionPair>> motions;
     for (size_t i = 0; i < data_->rig->cameras.size(); ++i) {
@@ -99,7 +99,7 @@ class RigSteps {
     data_->rig = withCameraHeights(*data_);
   }
 
-  /// Without a turn the ground still shows the vertical in each camera.
+  /// Finds the vertical in each camera from the ground, which needs no turn.
   void findUpDirections(const std::vector<std::vector<MotionPair>>& motions) {
     for (size_t i = 0; i < motions.size(); ++i) {
       if (result_.cameras[i].initial.status == HandEyeStatus::kNoTurn) {

@@ -9,15 +9,15 @@ namespace vcharge {
 namespace {
 
 constexpr double kDegrees = 57.29577951308232;
-// Standard deviations of a good and of a useless calibration.
+// Standard deviations: below the first a calibration is good, above the second it is useless.
 constexpr double kGoodSigma_m = 0.01, kBadSigma_m = 0.05;
 constexpr double kGoodSigma_rad = 0.1 / kDegrees, kBadSigma_rad = 0.5 / kDegrees;
-// Differences between the halves of the drive.
+// Largest differences between the halves of the drive.
 constexpr double kMaxHalfSigmas = 4.0;
 constexpr double kBadHalf_m = 0.10, kBadHalf_rad = 0.5 / kDegrees;
-// Ratio of the errors that neighbours have in common: wrong intrinsics.
+// Ratio of reprojection error that neighbouring pixels have in common; large for wrong intrinsics.
 constexpr double kWarnStructure = 0.4, kFailStructure = 0.7;
-// Ratio of a camera's observations that fit, over the median of the other cameras.
+// A camera's inlier ratio divided by the median of the other cameras.
 constexpr double kWarnFit = 0.75, kFailFit = 0.65;
 constexpr double kMinTurn_rad = 90.0 / kDegrees;
 constexpr double kMinDistance_m = 50.0;
@@ -47,7 +47,7 @@ class RigJudge {
  private:
   void remark(Verdict grade, const std::string& text) { found_.emplace_back(grade, text); }
 
-  /// One remark per degree of freedom with all cameras where it is too uncertain.
+  /// Adds one remark per degree of freedom, with all cameras for which it is too uncertain.
   void judgeSigmas() {
     const char* const names[] = {"forwards", "sideways", "height", "roll", "pitch", "yaw"};
     for (const CameraCalibration& camera : result_->cameras) {
@@ -106,7 +106,7 @@ class RigJudge {
              "camera '" + camera.name + "': errors correlate over the image (" + toText(100.0 * ratio, 0) +
                  " % of them): wrong intrinsics. Calibrate the intrinsics again");
     }
-    // A map connects the cameras even without shared landmarks.
+    // A map connects the cameras even without common landmarks.
     if (camera.num_shared_landmarks < kMinShared && result_->cameras.size() > 1 && !result_->is_from_map) {
       remark(Verdict::kWarn, "camera '" + camera.name + "' shares only " +
                                  std::to_string(camera.num_shared_landmarks) +
@@ -114,7 +114,7 @@ class RigJudge {
     }
   }
 
-  /// With wrong intrinsics few observations fit, and those fit well: the others were removed.
+  /// With wrong intrinsics few observations fit; the error of these is small because the others were removed.
   void judgeFit() {
     const auto shareOf = [](const CameraCalibration& camera) {
       return static_cast<double>(camera.num_observations) /
@@ -128,7 +128,7 @@ class RigJudge {
         }
       }
       if (others.size() < 2) {
-        return;  // two cameras may differ by what they see
+        return;  // two cameras may differ because of what they see
       }
       std::sort(others.begin(), others.end());
       const double usual = others[others.size() / 2];

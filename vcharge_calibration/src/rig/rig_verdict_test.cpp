@@ -25,7 +25,7 @@ RigCalibration makeGood() {
   return result;
 }
 
-/// The verdict of a good calibration with one fault, and its first remark.
+/// Verdict and first remark of a good calibration with one fault.
 template <class Spoil>
 std::string judge(const Spoil& spoil, Verdict* verdict) {
   RigCalibration result = makeGood();

@@ -14,7 +14,7 @@ namespace vcharge {
 /// Throws InputError naming the interface if there is none.
 FileDescriptor openCanSocket(const std::string& interface);
 
-/// State of the bus for /diagnostics.
+/// State of the bus, for /diagnostics.
 struct CanStatus {
   bool connected = false;
   bool bus_off = false;
@@ -22,7 +22,7 @@ struct CanStatus {
   std::string message;
   uint64_t connections = 0;
   uint64_t error_frames = 0;
-  uint64_t bad_frames = 0;  ///< frames whose size is not that of a CAN frame
+  uint64_t bad_frames = 0;  ///< frames whose size differs from a CAN frame's
   uint64_t ticks = 0;
   CanWheelCounts decoded;
 };
@@ -51,7 +51,7 @@ class CanReader {
   CanWheelDecoder decoder_;
   const ClockMap::Clock drive_clock_;
   const Duration timeout_;
-  Timestamp last_ticks_;  // monotonic
+  Timestamp last_ticks_;  // on the monotonic clock
   FileDescriptor wake_;
   mutable std::mutex mutex_;
   CanStatus status_;

@@ -26,8 +26,8 @@ struct CanFrame {
   std::array<uint8_t, 8> data{};
 };
 
-/// Position and scaling of a number in a message, as in DBC files: the start bit of a little endian signal is
-/// its lowest bit, that of a big endian (Motorola) signal its highest; bits are counted from the lowest of
+/// Position and scaling of a number in a message, as in DBC files: little endian signals start at the lowest
+/// bit, big endian (Motorola) signals at the highest bit; bits are counted from the lowest of
 /// byte 0. value = raw * scale + offset.
 struct CanSignal {
   VCHARGE_BEGIN_OPTIONS(CanSignal);
@@ -50,7 +50,7 @@ struct CanSignal {
   std::optional<double> value(const CanFrame& frame) const;
 };
 
-/// The car's messages: counters of both rear wheels, or their speeds, and optionally the steering angle.
+/// The car's messages: counters or speeds of both rear wheels, and optionally the steering angle.
 struct CanWheelOptions {
   VCHARGE_BEGIN_OPTIONS(CanWheelOptions);
   VCHARGE_OPTION_GROUP(CanSignal, left_ticks, {},
@@ -69,7 +69,7 @@ struct CanWheelOptions {
   VCHARGE_END_OPTIONS();
   void checkFields() const;
 
-  /// False by default, when the car sends no wheel data.
+  /// False for the default options: the car sends no wheel data.
   bool isUsed() const { return left_ticks.isUsed() || left_speed_m_per_s.isUsed(); }
   bool hasTicks() const { return left_ticks.isUsed(); }
 };
@@ -78,7 +78,7 @@ struct CanWheelCounts {
   uint64_t frames = 0;
   uint64_t too_short = 0;  ///< messages that end before one of their signals
   uint64_t wraps = 0;
-  uint64_t resets = 0;  ///< counters that jumped, or were silent so long that they may have wrapped
+  uint64_t resets = 0;  ///< counters that jumped, or may have wrapped during a long silence
 };
 
 /// Converts a car's messages to WheelTicks with unwrapped, continuous counters. Speeds are integrated to
@@ -88,7 +88,7 @@ class CanWheelDecoder {
   static constexpr double kSpeedTick_m = 1e-4;
 
   explicit CanWheelDecoder(const CanWheelOptions& options);
-  /// Returns the ticks completed by this frame, at `stamp`: those of the message with both counters, or of
+  /// Returns the ticks completed by this frame, at `stamp`: after the message with both counters, or after
   /// the later message if each wheel has its own. Empty for other frames.
   std::optional<WheelTicks> add(const CanFrame& frame, Timestamp stamp);
   const CanWheelCounts& counts() const { return counts_; }

@@ -27,7 +27,7 @@ class ClockMap {
   Duration measure();
 
   Clock drive_clock_, monotonic_;
-  Timestamp last_update_;  // monotonic
+  Timestamp last_update_;  // on the monotonic clock
   Duration offset_{0};
   uint64_t num_steps_ = 0;
 };

@@ -21,7 +21,7 @@ inline std::vector<std::string> enumNames<OdometrySourceKind>() {
   return {"none", "can", "wheel_ticks"};
 }
 
-/// Configuration of the driver beside the rig.
+/// Configuration of the driver in addition to the rig.
 struct DriverOptions {
   VCHARGE_BEGIN_OPTIONS(DriverOptions);
   VCHARGE_OPTION(std::vector<std::string>, cameras, {}, anyValue(),

@@ -47,7 +47,7 @@ class FolderFrameSource : public FrameSource {
   const double frame_rate_hz_;
   const bool loop_;
   const ClockMap::Clock drive_clock_;
-  std::vector<File> files_;  // by stamp, then camera
+  std::vector<File> files_;  // sorted by stamp, then camera
   Pacer pacer_;
   std::shared_ptr<State> state_;
 };

@@ -13,11 +13,11 @@ namespace vcharge {
 struct CapturedFrame {
   size_t camera_index = 0;
   uint32_t sequence = 0;  ///< counts the camera's frames, including lost ones
-  Timestamp stamp;        ///< the camera's clock, mapped to the drive's
+  Timestamp stamp;        ///< stamp of the camera, converted to the drive's clock
   Image image;
 };
 
-/// Receives frames. Called only by the run() of a FrameSource, never concurrently.
+/// Receives frames. Called only within the run() of a FrameSource, never concurrently.
 class FrameSink {
  public:
   virtual ~FrameSink() = default;
@@ -33,18 +33,18 @@ struct CameraStatus {
   std::string device;
   bool streaming = false;
   std::string message;   ///< "streaming GREY", or the problem
-  uint64_t frames = 0;   ///< received
-  uint64_t lost = 0;     ///< according to the sequence numbers of received frames
-  uint64_t damaged = 0;  ///< flagged as damaged, too short, or not decodable
+  uint64_t frames = 0;   ///< frames received
+  uint64_t lost = 0;     ///< frames lost, according to the sequence numbers of received frames
+  uint64_t damaged = 0;  ///< frames flagged as damaged, too short, or not decodable
   uint64_t timeouts = 0;
-  uint64_t connections = 0;  ///< how often the device was opened
+  uint64_t connections = 0;  ///< number of times the device was opened
 };
 
 /// A source of frames: cameras, or the images of a recorded drive.
 class FrameSource {
  public:
   virtual ~FrameSource() = default;
-  /// Delivers frames until stop() or the end of the images. Called once.
+  /// Delivers frames until stop() or the end of the images. May be called only once.
   virtual void run(FrameSink* sink) = 0;
   /// Ends run() soon, even while it waits; thread safe.
   virtual void stop() = 0;

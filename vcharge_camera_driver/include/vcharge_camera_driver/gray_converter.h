@@ -13,8 +13,8 @@ namespace vcharge {
 /// Pixel formats of cameras, with the names of the V4L2 documentation.
 enum class PixelFormat {
   kGrey,   ///< 8 bit
-  kY10,    ///< 10 bit in the lower bits of 16, little endian
-  kY12,    ///< 12 bit in the lower bits of 16, little endian
+  kY10,    ///< 10 bits in the lower part of 16, little endian
+  kY12,    ///< 12 bits in the lower part of 16, little endian
   kY16,    ///< 16 bit little endian
   kYuyv,   ///< 4:2:2, luminance first
   kUyvy,   ///< 4:2:2, luminance second
@@ -25,15 +25,15 @@ enum class PixelFormat {
   kMjpeg,
 };
 
-/// All formats, ordered by the work to convert them; the order of preference if the options name none.
+/// All formats, fastest conversion first; this is the order of preference if the options name none.
 const std::vector<PixelFormat>& allPixelFormats();
 /// The four character code of V4L2.
 uint32_t fourccOf(PixelFormat format);
-/// "GREY", "Y10", "YUYV"...
+/// Name of a format: "GREY", "Y10", "YUYV"...
 std::string toString(PixelFormat format);
 /// All names, in the order of allPixelFormats().
 std::vector<std::string> pixelFormatNames();
-/// The characters of a code without trailing blanks.
+/// The characters of a V4L2 code without trailing blanks.
 std::string fourccText(uint32_t fourcc);
 /// Bytes of one row without padding; 0 for kMjpeg.
 size_t bytesPerRow(PixelFormat format, int width_px);
@@ -48,7 +48,7 @@ class GrayConverter {
   GrayConverter& operator=(GrayConverter&& other) noexcept;
 
   /// `data` holds `size_bytes` bytes in rows `stride_bytes` apart (ignored for kMjpeg); `gray` is CV_8UC1 of
-  /// the frame's size. Returns an empty text, or the reason why the frame is bad (too short, not a JPEG, a
+  /// the frame's size. Returns an empty text, or the reason to reject the frame (too short, not a JPEG, a
   /// JPEG of another size, damaged); `gray` is then undefined.
   std::string convert(PixelFormat format, const uint8_t* data, size_t size_bytes, size_t stride_bytes,
                       cv::Mat* gray);

@@ -13,7 +13,7 @@ namespace vcharge {
 template <class Buffer>
 class BufferPool {
  public:
-  /// A free buffer with its old content, or a new one.
+  /// Returns a free buffer with its old content, or a new one.
   std::shared_ptr<Buffer> acquire() {
     std::unique_ptr<Buffer> buffer;
     {

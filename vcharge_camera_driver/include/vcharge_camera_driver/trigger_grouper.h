@@ -25,8 +25,8 @@ struct TriggerGrouperOptions {
 struct TriggerCameraCounts {
   bool aligned = false;
   uint64_t frames = 0;
-  uint64_t lost = 0;       ///< according to sequence numbers, while aligned
-  uint64_t slips = 0;      ///< disagreements of sequence numbers and stamps
+  uint64_t lost = 0;       ///< frames lost according to sequence numbers, while aligned
+  uint64_t slips = 0;      ///< disagreements between sequence numbers and stamps
   uint64_t unaligned = 0;  ///< frames that were not used after a slip
   uint64_t missing = 0;    ///< groups without this camera
 };
@@ -35,7 +35,7 @@ struct TriggerGrouperCounts {
   uint64_t complete = 0;
   uint64_t incomplete = 0;
   uint64_t late = 0;          ///< frames that arrived after their group was complete or expired
-  double max_spread_s = 0.0;  ///< between the stamps of one group
+  double max_spread_s = 0.0;  ///< maximum difference between the stamps of one group
   double mean_spread_s = 0.0;
   std::vector<TriggerCameraCounts> cameras;
 };
@@ -75,7 +75,7 @@ class TriggerGrouper {
   const Duration period_, tolerance_;
   MultiFrameSynchronizer synchronizer_;
   std::vector<Camera> cameras_;
-  std::deque<std::pair<Timestamp, Timestamp>> arrivals_;  // now, stamp
+  std::deque<std::pair<Timestamp, Timestamp>> arrivals_;  // pairs of arrival time and stamp
   std::deque<std::pair<Timestamp, Timestamp>> spans_;     // earliest and latest stamp of recent pulses
   uint64_t num_spreads_ = 0;
   double sum_spread_s_ = 0.0;

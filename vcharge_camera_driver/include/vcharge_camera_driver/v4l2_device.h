@@ -50,7 +50,7 @@ struct V4l2Frame {
   /// Time of the kernel's CLOCK_MONOTONIC at the end of the frame, or at the start of its exposure, depending
   /// on the driver.
   Timestamp monotonic_stamp;
-  bool has_kernel_stamp = true;  ///< false: the driver's clock is unknown, the stamp is that of dequeue()
+  bool has_kernel_stamp = true;  ///< false: the driver's clock is unknown; uses the time of dequeue()
   bool is_damaged = false;       ///< V4L2_BUF_FLAG_ERROR
   const uint8_t* data = nullptr;
   size_t size_bytes = 0;
@@ -112,7 +112,7 @@ struct V4l2Description {
   std::vector<V4l2Control> controls;
 };
 
-/// Throws InputError if it cannot be opened or is not a V4L2 device.
+/// Throws InputError if the device cannot be opened or is not a V4L2 device.
 V4l2Description describeV4l2Device(const std::string& path);
 /// Splits "name=value". Throws InputError for anything else.
 std::pair<std::string, int32_t> parseControl(const std::string& text);

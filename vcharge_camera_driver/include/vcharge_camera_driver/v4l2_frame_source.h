@@ -20,7 +20,7 @@ struct V4l2FrameSourceOptions {
   VCHARGE_END_OPTIONS();
 };
 
-/// Frames of several V4L2 cameras, all processed by the thread that calls run(): it sleeps in poll() until a
+/// Delivers frames of several V4L2 cameras in the thread that calls run(), which sleeps in poll() until a
 /// frame, a deadline or stop(). A camera that cannot be opened, fails or is unplugged is reported in its
 /// status and retried periodically, without affecting the others. Each frame is converted once, from the
 /// kernel's buffer to the sink's memory.

@@ -138,7 +138,7 @@ bool CanReader::readFrames(int fd, const TicksCallback& callback) {
       if ((raw.can_id & CAN_RTR_FLAG) != 0) {
         continue;
       }
-      if (status_.bus_off) {  // data was received again
+      if (status_.bus_off) {  // data was received again after bus-off
         status_.bus_off = false;
         status_.message = "reading";
       }

@@ -9,7 +9,7 @@ constexpr int kMaxStandardId = 0x7ff;
 constexpr int kMaxBits = 64;
 constexpr double kMaxIntegration_s = 0.5;           // longest interval over which a speed is integrated
 constexpr double kSlackTicks = 4.0;                 // tolerance for inaccurate stamps
-constexpr double kMaxAcceleration_m_per_s2 = 50.0;  // of a wheel that starts to spin
+constexpr double kMaxAcceleration_m_per_s2 = 50.0;  // maximum of a wheel that starts to spin
 
 // Index of the i-th bit (0 is the lowest) of a big endian signal that starts at its highest bit: the bits of
 // a byte from highest to lowest, then those of the next byte.
@@ -96,7 +96,7 @@ CanWheelDecoder::CanWheelDecoder(const CanWheelOptions& options)
 void CanWheelDecoder::count(uint64_t raw, Timestamp stamp, Wheel* wheel) {
   if (wheel->raw) {
     // Chooses, among all changes that the counter's bits allow, the one closest to the prediction from the
-    // last speed. The prediction's maximum error tells whether it is the only one.
+    // last speed. The maximum error of the prediction tells whether only one change is possible.
     const double elapsed_s = std::max(0.0, toSeconds(stamp - wheel->stamp));
     const double tick_m = options_.metres_per_tick;
     const auto range = static_cast<double>(int64_t{1} << wheel->signal->length);

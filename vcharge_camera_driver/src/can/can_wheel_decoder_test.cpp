@@ -143,7 +143,7 @@ TEST(CanWheelDecoderTest, AResetOfTheCountersIsNoMotion) {
   const auto after = decoder.add(ticksFrame(0, 0), at(0.04));
   EXPECT_EQ(after->left_ticks, 10);
   EXPECT_EQ(decoder.counts().resets, 2u);
-  // The silence is longer than a counter at full speed needs to wrap, so the distance is unknown.
+  // During the silence the counter may have wrapped, so the distance is unknown.
   const auto later = decoder.add(ticksFrame(20, 20), at(60.0));
   EXPECT_EQ(later->left_ticks, 10);
   EXPECT_EQ(decoder.counts().resets, 4u);

@@ -19,7 +19,7 @@ std::string textOf(const __u8 (&field)[kSize]) {
   return std::string(text, strnlen(text, kSize));
 }
 
-// Letters and digits, with an underscore for anything between them, like v4l2-ctl.
+// Keeps letters and digits and replaces anything between them by an underscore, like v4l2-ctl.
 std::string controlName(const std::string& title) {
   std::string name;
   bool gap = false;
@@ -85,7 +85,7 @@ std::vector<V4l2Control> listControls(int fd) {
   std::vector<V4l2Control> controls;
   v4l2_queryctrl query{};
   query.id = V4L2_CTRL_FLAG_NEXT_CTRL;
-  // Drivers list a few dozen; the limit ends the endless list of a broken driver.
+  // Drivers list a few dozen controls; the limit ends an endless list of a broken driver.
   for (int i = 0; i < 1024 && v4l2Ioctl(fd, VIDIOC_QUERYCTRL, &query) == 0; ++i) {
     const bool has_value = query.type == V4L2_CTRL_TYPE_INTEGER || query.type == V4L2_CTRL_TYPE_BOOLEAN ||
                            query.type == V4L2_CTRL_TYPE_MENU || query.type == V4L2_CTRL_TYPE_INTEGER_MENU;

@@ -17,7 +17,7 @@
 namespace vcharge {
 namespace {
 
-/// Frames that the kernel may be ahead.
+/// Number of frames that the kernel can buffer.
 constexpr uint32_t kNumBuffers = 4;
 constexpr long kPageBytes = 4096;
 

@@ -16,7 +16,7 @@ constexpr Duration kClockPeriod = std::chrono::seconds(1);
 constexpr Duration kLongestWait = std::chrono::seconds(1);
 
 int toPollTimeout(Duration wait) {
-  // Rounded up: waking up a moment too early would cause a busy loop until the deadline.
+  // Rounds up: waking up slightly too early would cause a busy loop until the deadline.
   const auto milliseconds =
       std::chrono::ceil<std::chrono::milliseconds>(std::clamp(wait, Duration(0), kLongestWait));
   return static_cast<int>(milliseconds.count());
@@ -27,7 +27,7 @@ int toPollTimeout(Duration wait) {
 struct V4l2FrameSource::Camera {
   std::unique_ptr<V4l2Device> device;
   GrayConverter converter;
-  Timestamp next_attempt;  // monotonic, as last_frame
+  Timestamp next_attempt;  // on the monotonic clock, like last_frame
   Timestamp last_frame;
   std::optional<uint32_t> last_sequence;
   CameraStatus status;
@@ -117,7 +117,7 @@ bool V4l2FrameSource::take(size_t index, const V4l2Frame& frame, FrameSink* sink
                                        camera.device->strideBytes(), &captured.image.pixels);
   }
   const std::string format = toString(camera.device->pixelFormat());
-  camera.device->enqueue(frame);  // before the sink processes the image, since the camera needs its buffers
+  camera.device->enqueue(frame);  // first, because the camera needs its buffers while the sink works
 
   {
     const std::lock_guard<std::mutex> lock(mutex_);

@@ -57,7 +57,7 @@ class GroupingSink : public FrameSink {
       ADD_FAILURE() << "timed out waiting for " << what;
     }
   }
-  // Protected by mutex_, or read after the end.
+  // Protected by mutex_ during the run; read without lock after its end.
   int complete = 0;
   int incomplete = 0;
   int wrong = 0;

@@ -19,19 +19,19 @@ namespace vcharge {
 
 /// Input and convergence of a height map.
 struct HeightMapStatistics {
-  size_t num_views = 0;     ///< fused range maps
-  size_t num_reused = 0;    ///< fused range maps taken from an earlier run
-  size_t num_observed = 0;  ///< cells
-  size_t num_solid = 0;     ///< cells with an obstacle but without a height
+  size_t num_views = 0;     ///< number of fused range maps
+  size_t num_reused = 0;    ///< number of fused range maps reused from an earlier run
+  size_t num_observed = 0;  ///< number of observed cells
+  size_t num_solid = 0;     ///< number of cells with an obstacle but without a height
   int label_iterations = 0, height_iterations = 0;
   double label_gap_per_cell = 0.0, height_gap_per_cell = 0.0;
   bool converged = false;                 ///< both passes reached their duality gap
-  std::map<std::string, double> times_s;  ///< wall time by stage
+  std::map<std::string, double> times_s;  ///< wall time of each stage
 };
 
 struct HeightMapResult {
   HeightMap map;
-  cv::Mat states;  ///< CV_8UC1 of CellState
+  cv::Mat states;  ///< CV_8UC1, values of CellState
   std::unique_ptr<OctomapBuilder> octomap;
   HeightMapStatistics statistics;
 };
@@ -41,17 +41,17 @@ struct HeightMapResult {
 /// finish() fuses them. Used by build_height_map and height_map_nodelet. Not thread safe.
 class HeightMapper : public DriveConsumer {
  public:
-  /// `work_folder` holds the range maps; those of the same drive, rig, poses and options are used again.
-  /// `drive_name` identifies the drive, e.g. by the bag's hash; with an empty name nothing is used again.
+  /// `work_folder` holds the range maps; those of the same drive, rig, poses and options are reused.
+  /// `drive_name` identifies the drive, e.g. by the bag's hash; with an empty name nothing is reused.
   /// Throws InputError like RangeMapper, and std::invalid_argument for bad options.
   HeightMapper(std::shared_ptr<const CameraRig> rig, const HeightMapOptions& options, std::string work_folder,
                const std::string& drive_name);
   ~HeightMapper() override;
 
-  /// Replaces the poses of the odometry. The map is then in the frame `frame_id`, otherwise in "odom".
+  /// Replaces the odometry's poses. The map is then in the frame `frame_id` instead of "odom".
   void setTrajectory(const Trajectory& map_from_vehicle, const std::string& frame_id = "map");
 
-  /// Throws InputError where the grid over the poses from `first` to `last` would need too much memory, so
+  /// Throws InputError if the grid over the poses from `first` to `last` would need too much memory, so
   /// that a run fails before it starts. The grid over the cameras' positions is checked before each range map
   /// too.
   void checkGrid(const Trajectory& world_from_vehicle, Timestamp first, Timestamp last) const;
@@ -61,7 +61,7 @@ class HeightMapper : public DriveConsumer {
   void addOdometry(const VehicleOdometry& odometry) override;
 
   /// Fuses all range maps; may be called again after more images. `progress` (may be empty) receives the name
-  /// of a step and the completed fraction of it. Throws InputError with numbers and reasons where too many
+  /// of a step and its completed fraction. Throws InputError with numbers and reasons if too many
   /// images had no pose, no range map could be made, the grid is too large, or no cell was observed.
   HeightMapResult finish(const std::function<void(const std::string& step, double fraction)>& progress);
 

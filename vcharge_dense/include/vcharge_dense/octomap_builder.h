@@ -24,8 +24,8 @@ class VoxelBlocks;
 /// are assigned to it. Not thread safe.
 class OctomapBuilder {
  public:
-  /// `max_range_m`: longer rays clear up to here and mark no end as occupied. `farthest_m`: ranges from here
-  /// on lie on the farthest plane.
+  /// `max_range_m`: longer rays clear space up to here and mark no voxel as occupied. `farthest_m`: ranges
+  /// from here on lie on the farthest plane.
   OctomapBuilder(const OctomapOptions& options, double max_range_m, double farthest_m);
   ~OctomapBuilder();
 

@@ -17,7 +17,7 @@ struct Plane {
 };
 
 /// The ground under the vehicle (z = 0 of the vehicle frame) in a camera's frame. Throws
-/// std::invalid_argument where the camera is not above it.
+/// std::invalid_argument if the camera is not above it.
 Plane groundInCamera(const RigidTransform& vehicle_from_camera);
 
 /// Parallel planes, ordered from far to near. Along the unit ray r plane i has the inverse range
@@ -28,8 +28,8 @@ struct PlaneFamily {
   bool is_uniform = true;  ///< inverse distances are equally spaced
 };
 
-/// The families of planes that the options ask for. Throws std::invalid_argument where they need a ground
-/// that is not given, or where the camera is not more than 0.3 m above it.
+/// Makes the families of planes that the options select. Throws std::invalid_argument if they need a ground
+/// that is not given, or if the camera is not more than 0.3 m above it.
 std::vector<PlaneFamily> makePlaneFamilies(const PlaneSweepOptions& options,
                                            const std::optional<Plane>& ground_in_camera);
 

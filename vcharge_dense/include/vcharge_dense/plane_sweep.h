@@ -33,7 +33,7 @@ struct SweepImage {
 /// Intermediate results of the sweep at full resolution, for tests and figures.
 struct SweepDetails {
   cv::Mat score;   ///< CV_32FC1: aggregated correlation of the chosen plane; NaN where no plane was scored
-  cv::Mat plane;   ///< CV_32SC1: best plane of the first sweep, counted over all families; -1 where none
+  cv::Mat plane;   ///< best plane of the first sweep, counted over all families; -1 if none
   cv::Mat voters;  ///< CV_32SC1: bit n is set where neighbour n contributed to that score
 };
 

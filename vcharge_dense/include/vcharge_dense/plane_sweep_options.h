@@ -7,7 +7,7 @@
 
 namespace vcharge {
 
-/// How the correlations with the neighbours become the score of a plane.
+/// How the correlations with the neighbours are combined to the score of a plane.
 enum class Aggregation {
   kMean,            ///< mean over the neighbours that see the window
   kReferenceSplit,  ///< larger one of the means before and after the reference (Kang et al. 2001)

@@ -48,7 +48,7 @@ struct RangeMapperOptions {
   /// Neighbours before and after the reference, aggregated by reference-split.
   static RangeMapperOptions offline();
 
-  /// Sets the fields that the preset stands for and leaves the others.
+  /// Sets the fields that the preset determines and leaves the others.
   void usePreset(RangePreset new_preset);
 
   void fieldWasRead(const char* field);
@@ -68,18 +68,18 @@ struct RangeMapperStatus {
   std::string camera_name;
   RangeMapperState state = RangeMapperState::kNoImages;
   std::string message;          ///< one line for the user
-  uint64_t images = 0;          ///< received
+  uint64_t images = 0;          ///< images received
   uint64_t ignored_images = 0;  ///< repeated, or too late for their frame
   uint64_t without_pose = 0;
   uint64_t standing = 0;
   uint64_t without_neighbours = 0;
-  uint64_t references = 0;  ///< passed on to be swept
+  uint64_t references = 0;  ///< references passed on to be swept
   uint64_t resets = 0;      ///< restarts because time or poses jumped or odometry had a gap
 };
 
 /// A reference and its neighbours, ready to be swept. The pixels are shared and never changed.
 struct RangeTask {
-  size_t camera_index = 0;  ///< in the rig
+  size_t camera_index = 0;  ///< index in the rig
   SweepImage reference;
   std::vector<SweepImage> neighbours;
 };
@@ -90,13 +90,13 @@ struct RangeTask {
 /// addImage() and addOdometry() pass each reference to `on_task`, per camera in the order of stamps. The
 /// callback calls sweep() at once or later from another thread; only sweep() may be called concurrently. A
 /// reference is passed on once its neighbours are known: with use_later_images after the vehicle has moved
-/// on, or in finish(). While a camera stands still there are no references, see status(). A camera restarts,
-/// forgetting its images, where stamps jump back, odometry has a gap or poses jump.
+/// on, or in finish(). While a camera stands still there are no references, see status(). A camera restarts
+/// and drops its images if stamps jump back, odometry has a gap or poses jump.
 class RangeMapper : public DriveConsumer {
  public:
   using TaskCallback = std::function<void(RangeTask)>;
 
-  /// Throws InputError where the rig lacks a camera of the options or its extrinsics, std::invalid_argument
+  /// Throws InputError if the rig lacks a camera of the options or its extrinsics, std::invalid_argument
   /// for bad options.
   RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapperOptions& options, TaskCallback on_task);
   ~RangeMapper() override;

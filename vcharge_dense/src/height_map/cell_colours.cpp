@@ -8,11 +8,11 @@
 namespace vcharge {
 namespace {
 
-// A range belongs to a cell where it differs from the cell's distance by less than the sum of both.
-constexpr double kSameSurface = 0.05;  // times the distance
+// A range belongs to a cell if it differs from the cell's distance by less than the sum of these two.
+constexpr double kSameSurface = 0.05;  // relative to the distance
 constexpr double kSameSurface_m = 0.1;
 
-/// Projects a point, given by its offset from the camera in the world; returns false where it is not visible.
+/// Projects a point, given by its offset from the camera in the world; returns false if it is not visible.
 bool project(const PackedRangeMap& camera, const Eigen::Vector3f& offset, float distance, int* x, int* y) {
   const Eigen::Map<const Eigen::Matrix<float, 3, 3, Eigen::RowMajor>> rotation(camera.rotation);
   const Eigen::Vector3f point = rotation * offset;

@@ -27,7 +27,7 @@ struct Drive {
   HeightFusionOptions options;
   VoxelGrid grid;
 
-  /// `matched_up_to_m`: points above this height have no range, like paint without texture.
+  /// `matched_up_to_m`: points above this height have no range, like unstructured paint.
   explicit Drive(double noise_m = 0.0, const BoxWorld& box = BoxWorld(),
                  double matched_up_to_m = std::numeric_limits<double>::infinity())
       : world(box) {
@@ -157,7 +157,7 @@ TEST(HeightFusionTest, MapsABodyUnderWhichTheGroundIsVisible) {
       EXPECT_NEAR(single.best_height_m.at<float>(inside), 0.0, 0.03) << x;
       EXPECT_GT(layered.best_height_m.at<float>(inside), 0.45) << x;
       EXPECT_LT(layered.best_height_m.at<float>(inside), 0.6) << x;
-      // Nothing was observed above: only the support from below holds the height.
+      // Nothing above was observed: only the support from below keeps the height.
       EXPECT_GT(layered.support_below.at<float>(inside), 0.5F) << x;
       EXPECT_LT(layered.support_above.at<float>(inside), 0.1F) << x;
       EXPECT_GT(heights.at<float>(inside), 0.4) << x;
@@ -168,7 +168,7 @@ TEST(HeightFusionTest, MapsABodyUnderWhichTheGroundIsVisible) {
 
 TEST(HeightFusionTest, PillarIsSolidAndTheGroundIsNot) {
   BoxWorld pillar;
-  pillar.high.z() = 5.0;  // above the grid
+  pillar.high.z() = 5.0;  // reaches out of the grid
   const Drive drive(0.02, pillar);
   const ColumnImages columns = drive.fuse();
   PrimalDualReport report;
@@ -183,7 +183,7 @@ TEST(HeightFusionTest, PillarIsSolidAndTheGroundIsNot) {
         EXPECT_FALSE(is_solid) << centre.transpose();
         ++num_open;
       } else if (std::abs(centre.x() - 2.5) < 0.3 && outside_m < -0.01 && outside_m > -0.1) {
-        EXPECT_TRUE(is_solid) << centre.transpose();  // the faces beside the cameras' paths
+        EXPECT_TRUE(is_solid) << centre.transpose();  // only the faces that the cameras pass
         EXPECT_EQ(observed.at<uint8_t>(row, column), 0) << centre.transpose();
         ++num_faces;
       }
@@ -208,7 +208,7 @@ TEST(HeightFusionTest, RangesThatAreNotFiniteChangeNothing) {
   int number = 0;
   for (const float value : {std::nanf(""), std::numeric_limits<float>::infinity(), 0.0F, -1.0F}) {
     for (const bool in_sigma : {false, true}) {
-      // Beside the box, where other views see the same ground.
+      // Adds a corrupt view of ground beside the box that other views show too.
       const RigidTransform pose = other.poses[static_cast<size_t>(8 + number++)];
       RangeMap map = testing::renderView(other.world, pose, cv::Size(320, 200));
       (in_sigma ? map.standard_deviation_m : map.range_m).setTo(value);

@@ -22,7 +22,7 @@ namespace {
 
 // Ranges beyond this fraction of the farthest plane's distance may belong to any surface beyond it.
 constexpr double kFarthestFraction = 0.95;
-// A drive is refused where fewer of its images have a pose.
+// finish() rejects a drive if a smaller ratio of its images has a pose.
 constexpr double kMinCoveredImages = 0.9;
 
 std::string imagePath(const std::string& folder, const std::string& camera, Timestamp stamp) {
@@ -108,7 +108,7 @@ void HeightMapper::addTask(const RangeTask& task) {
   const RigidTransform world_from_vehicle =
       task.reference.world_from_camera * camera.vehicle_from_camera->inverse();
   extent_m_.extend(Eigen::Vector3d(position.x(), position.y(), world_from_vehicle.translation().z()));
-  makeVoxelGrid(extent_m_, options_.fusion);  // refuses a grid that is too large before more range maps
+  makeVoxelGrid(extent_m_, options_.fusion);  // rejects a grid that is too large before more range maps
   const StageTimer timer("range maps", &times_s_);
   if (!drive_name_.empty() && isKept(folder(), camera.name, task.reference.stamp)) {
     ++num_reused_;
@@ -121,7 +121,7 @@ void HeightMapper::addTask(const RangeTask& task) {
       }
     });
     RangeMap map = range_mapper_->sweep(task);
-    map.reference.release();       // already written as an image of its own
+    map.reference.release();       // already written as a separate image
     writeRangeMap(map, folder());  // writes its YAML last, which isKept() looks for
   }
   views_.push_back({task.camera_index, task.reference.stamp, task.reference.world_from_camera});

@@ -136,7 +136,7 @@ TEST_F(HeightMapperTest, MapsLevelGroundAndResumesAnInterruptedRun) {
   const HeightMapResult result = again.finish({});
   EXPECT_EQ(result.statistics.num_reused, stamps.size() - 2);
   EXPECT_EQ(hashOf(result.map), hash);
-  // With other poses nothing is used again.
+  // With other poses nothing is reused.
   HeightMapper other(rig_, options_, folder_ + "/work", "drive");
   Trajectory moved = poses(kNumImages);
   moved[0].world_from_vehicle = RigidTransform::planar(0.001, 0.0, 0.0);

@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kWholeSphere_rad = 6.2831853;
 
-// Less confident ranges are left out: the octree takes a hit as right with a probability of 0.7.
+// Less confident ranges are left out: the octree assumes that a hit is right with a probability of 0.7.
 constexpr float kMinConfidence = 0.7F;
 
 // Marks of a voxel in the current view.
@@ -99,7 +99,7 @@ void OctomapBuilder::add(const RangeMap& map, const RigidTransform& world_from_c
     if (tree_->computeRayKeys(origin, ray.end, passed)) {
       for (const octomap::OcTreeKey& key : passed) {
         const VoxelBlocks::Voxel voxel = voxels_->at(key);
-        // Voxels on a surface stay occupied although rays to surfaces behind pass through them.
+        // Voxels on a surface stay occupied even if rays to surfaces behind pass through them.
         if ((*voxel.marks & (kFree | kOccupied)) == 0) {
           *voxel.marks |= kFree;
           update(voxel.value, tree_->getProbMissLog());

@@ -7,7 +7,7 @@
 
 namespace vcharge {
 
-/// AddColumnWeights voxel by voxel in plain C++, as a reference for tests and benchmarks.
+/// The function AddColumnWeights voxel by voxel in plain C++, as a reference for tests and benchmarks.
 void addColumnWeightsPlain(const PackedRangeMap& map, const WeightProfile& profile, const VoxelColumn& column,
                            float* weights);
 

@@ -226,11 +226,11 @@ class RowSums {
         strip_(static_cast<size_t>(row.strip)),
         sums_{hn::Zero(DI()), hn::Zero(DI()), hn::Zero(DI())} {}
 
-  /// Adds the new sample of a column and subtracts the one that is a window above: the halves of `pair`.
+  /// Adds the new sample of a column and subtracts the one a window height above: the two halves of `pair`.
   HWY_INLINE void add(size_t s, VI pair) {
     const DI di;
     const size_t lanes = hn::Lanes(di);
-    const VI new_less_old = hn::Set(di, static_cast<int32_t>(0xffff0001u));  // the halves 1 and -1
+    const VI new_less_old = hn::Set(di, static_cast<int32_t>(0xffff0001u));  // the 16-bit halves are 1 and -1
     int32_t* column = columns_ + 3 * s * lanes;
     const VI b = addHalves(hn::Load(di, column), pair, new_less_old);
     const VI bb = addHalves(hn::Load(di, column + lanes), pair, negateHighHalf(pair));

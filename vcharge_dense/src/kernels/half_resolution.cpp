@@ -9,7 +9,7 @@
 namespace vcharge {
 namespace {
 
-constexpr int kMinWidth_px = 16;  // most lanes of a vector
+constexpr int kMinWidth_px = 16;  // largest number of lanes of a vector
 
 cv::Size halfSize(cv::Size size) {
   return {size.width / 2, size.height / 2};

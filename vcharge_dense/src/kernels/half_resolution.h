@@ -14,19 +14,19 @@ namespace vcharge {
 /// Whether images of this size are large enough to be swept at half their size.
 bool canBeHalved(cv::Size size);
 
-/// The images of a sweep.
+/// The images of a sweep: reference and neighbours.
 struct SweepPixels {
   cv::Mat reference;
   std::vector<cv::Mat> neighbours;
 };
 
-/// Halves images by means of two by two pixels.
+/// Halves images by averaging blocks of two by two pixels.
 SweepPixels halved(const SweepPixels& pixels);
 
-/// Camera of images that were halved by means of two by two pixels.
+/// Camera of images that were halved by averaging blocks of two by two pixels.
 MeiCamera halved(const MeiCamera& camera);
 
-/// Halves a mask: not 0 where all of two by two pixels are.
+/// Halves a mask: nonzero if all four pixels of a block are.
 cv::Mat halvedMask(const cv::Mat& mask);
 
 /// A level for halved images, with other options.

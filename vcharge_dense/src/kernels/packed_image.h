@@ -12,13 +12,13 @@ namespace vcharge {
 /// outside the image are kUnseenCell, as is a margin around the image.
 class PackedImage {
  public:
-  static constexpr int kMargin = 32;  ///< cells on each side
+  static constexpr int kMargin = 32;  ///< number of cells on each side
 
   /// `pixels` and `valid_mask`: CV_8UC1 of one size.
   PackedImage(const cv::Mat& pixels, const cv::Mat& valid_mask);
 
   const int32_t* cells() const { return cells_.ptr<int32_t>(); }
-  int pitch() const { return pitch_; }     ///< cells from one row to the next
+  int pitch() const { return pitch_; }     ///< number of cells from one row to the next
   cv::Size size() const { return size_; }  ///< including the margin
 
  private:

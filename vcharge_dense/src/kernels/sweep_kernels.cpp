@@ -8,7 +8,7 @@
 namespace vcharge {
 namespace {
 
-// A window with a smaller sum of squares about its mean is constant.
+// A window whose sum of squares about its mean is smaller is constant.
 constexpr float kMinSquares_gray2 = 1e-3f;
 constexpr int kLargestGray = 127;  // magnitude of a gray level minus 128
 
@@ -23,7 +23,7 @@ SampleScale SampleScale::forWindow(int window_px) {
   const double unseen = std::floor(std::sqrt(4294967295.0 / count));
   const auto largest = [&] { return full / (1 << scale.shift) + 1.0; };
   const auto squaresOf = [&] { return count * largest() * largest(); };
-  // Least sum of squares about the mean of a window with an unseen sample.
+  // Minimum sum of squares about the mean of a window with an unseen sample.
   const auto leastWithUnseen = [&] {
     return (count - 1.0) / count * (unseen - largest()) * (unseen - largest());
   };

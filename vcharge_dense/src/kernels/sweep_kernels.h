@@ -15,7 +15,7 @@ namespace vcharge {
 
 /// Fraction bits of image positions in fixed point.
 constexpr int kPositionBits = 16;
-/// A cell of a PackedImage that must not be sampled.
+/// Value of a cell in a PackedImage that must not be sampled.
 constexpr int32_t kUnseenCell = static_cast<int32_t>(0x80808080u);
 /// Sum of the weights of a bilinear sample in each direction.
 constexpr int kWeightSum = 255;
@@ -32,7 +32,7 @@ constexpr float kVoteScale = 262144.0f;
 struct SampleScale {
   int shift = 0;             ///< sample = (gray level - 128) * kWeightSum^2 >> shift
   int32_t unseen = 0;        ///< value of a sample that is not seen
-  float max_squares = 0.0f;  ///< larger sums of squares about the mean mean unseen samples
+  float max_squares = 0.0f;  ///< windows with a larger sum of squares about the mean have unseen samples
   float min_squares = 0.0f;  ///< windows with smaller sums are constant
 
   static SampleScale forWindow(int window_px);
@@ -44,8 +44,8 @@ struct SampleScale {
 /// point is visible where the cosine of its angle to the axis exceeds -1/xi (xi > 1) or -xi.
 struct Projection {
   float fx, fy, cx, cy, xi;  ///< working camera, with the packed image's margin added to the centre
-  float min_x, min_y;        ///< lowest and ...
-  float max_x, max_y;        ///< ... highest positions that may be sampled
+  float min_x, min_y;        ///< lowest x and y that may be sampled
+  float max_x, max_y;        ///< highest x and y that may be sampled
   float rotation[9];         ///< neighbour from reference, row-major
   float translation[3];
 };
@@ -67,14 +67,14 @@ struct RayRow {
 /// nine for v.
 constexpr int kCellCoefficients = 18;
 
-/// Largest second and third differences of neighbouring nodes over both directions and coordinates, ignoring
-/// nodes that are not visible.
+/// Largest second and third differences between neighbouring nodes over both directions and coordinates;
+/// without nodes that are not visible.
 struct NodeDifferences {
   float second = 0.0f;
   float third = 0.0f;
 };
 
-/// One row of a tile against one neighbour.
+/// Inputs and outputs for one row of a tile and one neighbour.
 struct CorrelationRow {
   const float* cells = nullptr;  ///< [cell][kCellCoefficients][lanes]; null: u and v are given per pixel
   int cell_shift = 0;            ///< a cell is 1 << cell_shift columns wide
@@ -82,7 +82,7 @@ struct CorrelationRow {
   const int32_t* u = nullptr;  ///< [strip][lanes]
   const int32_t* v = nullptr;
   const int32_t* image = nullptr;  ///< cells of a PackedImage
-  int pitch = 0;                   ///< cells from one row of it to the next
+  int pitch = 0;                   ///< number of cells from one row to the next
 
   int strip = 0;
   int window = 0;
@@ -101,14 +101,14 @@ struct CorrelationRow {
   uint8_t* voters = nullptr;  ///< one bit per lane, rowVoterBytes() bytes
 };
 
-/// The neighbours' votes in one row.
+/// Inputs and outputs for combining the neighbours' votes in one row.
 struct VoteRow {
   Aggregation aggregation = Aggregation::kMean;
   int num_neighbours = 0;
   const bool* after = nullptr;     ///< per neighbour: taken after the reference
-  const int32_t* votes = nullptr;  ///< [neighbour][strip][lanes]
+  const int32_t* votes = nullptr;  ///< layout [neighbour][strip][lanes]
   size_t neighbour_stride = 0;     ///< elements from one neighbour's votes to the next one's
-  /// 0 or less where the reference's window does not count.
+  /// 0 or less where the reference's window is not used.
   const float* vote_per_covariance = nullptr;
   int strip = 0;
   int16_t* scores = nullptr;  ///< [strip][lanes]
@@ -116,14 +116,14 @@ struct VoteRow {
   size_t voter_stride = 0;    ///< bytes from one neighbour's voters to the next one's
 };
 
-/// Two highest separate peaks over the hypotheses, per pixel. `before` and `after` are the scores beside the
-/// first one, kNoScore where there are none.
+/// The two highest separate peaks over the hypotheses, per pixel. `before` and `after` are the scores on both
+/// sides of the first peak, kNoScore where there are none.
 struct Peaks {
-  int16_t* best;  ///< hypothesis, -1 where no neighbour voted for any
+  int16_t* best;  ///< index of the hypothesis, -1 if no neighbour voted for any
   int16_t* score;
   int16_t* before;
   int16_t* after;
-  int16_t* second;  ///< hypothesis, -1 where there is none
+  int16_t* second;  ///< index of the hypothesis, -1 if there is none
   int16_t* second_score;
 };
 
@@ -135,7 +135,7 @@ struct NeighbourUncertainty {
   bool after;  ///< taken after the reference; errors before and after it are independent
 };
 
-/// One row of at least as many pixels as a vector has lanes; pointers need not be aligned.
+/// One row of pixels, at least as many as a vector has lanes; pointers need not be aligned.
 struct UncertaintyRow {
   size_t count = 0;
   const float* ray_x = nullptr;
@@ -159,7 +159,7 @@ struct NeighbourhoodRow {
   size_t count = 0;
   const float* const* rows = nullptr;
   int num_rows = 0;
-  int max_shift = 0;  ///< largest shift by columns, to both sides
+  int max_shift = 0;  ///< largest shift in columns, to both sides
   int shift_step = 1;
   const float* middle = nullptr;
   const float* tolerance = nullptr;
@@ -170,11 +170,11 @@ struct SweepKernels {
   int lanes;
   /// Positions of `count` points, NaN where they are not visible in the packed image.
   void (*project)(const Projection& projection, const RayRow& rays, size_t count, float* u, float* v);
-  /// The same in fixed point; 0, the unseen corner of the packed image, where a point is not visible.
+  /// Like project(), in fixed point; 0, the unseen corner of the packed image, for invisible points.
   void (*projectFixed)(const Projection& projection, const RayRow& rays, size_t count, int32_t* u,
                        int32_t* v);
   /// Computes cells, [cell][kCellCoefficients][lanes], over three rows of `nodes` nodes per strip (odd),
-  /// which are `spacing` pixels apart. A cell covers two steps in both directions; it is unseen where one of
+  /// which are `spacing` pixels apart. A cell covers two steps in both directions; it is unseen if one of
   /// its nodes is not visible.
   void (*makeCells)(const float* const* u_rows, const float* const* v_rows, int nodes, int spacing,
                     float* cells);
@@ -184,7 +184,7 @@ struct SweepKernels {
   /// `scores`: [hypothesis][pixel], `stride` elements from one hypothesis to the next.
   void (*findPeaks)(const int16_t* scores, size_t stride, int num_hypotheses, size_t num_pixels,
                     const Peaks& peaks);
-  /// Number and sum of the neighbours that differ from the middle by at most the tolerance; NaN never does.
+  /// Number and sum of the neighbours that differ from the middle by at most the tolerance, never of NaN.
   void (*sumAgreeing)(const NeighbourhoodRow& row, float* number, float* sum);
   /// Motion of each point's image in pixels per 1/m of inverse range, in the neighbour where it is largest.
   void (*largestMotion)(const UncertaintyRow& row, float* motion);

@@ -4,7 +4,7 @@
 
 namespace vcharge {
 
-// Each sets the kernels of its file.
+// Each function sets the kernels of its file.
 void addWarpKernels(SweepKernels* kernels);
 void addCorrelationKernels(SweepKernels* kernels);
 void addVoteKernels(SweepKernels* kernels);

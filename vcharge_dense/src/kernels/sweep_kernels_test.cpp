@@ -154,10 +154,10 @@ TEST(SweepKernelsTest, AllInstructionSetsAgree) {
   PlaneSweepOptions options;
   options.num_planes = 16;
   options.num_ground_planes = 8;
-  options.num_refinement_steps = 0;  // it would start elsewhere where two planes have equal scores
+  options.num_refinement_steps = 0;  // it would start elsewhere if two planes have equal scores
   for (const Aggregation aggregation : {Aggregation::kMean, Aggregation::kReferenceSplit}) {
     options.aggregation = aggregation;
-    expectAgreement(options, 0.002f);  // nodes depend on the length of vectors
+    expectAgreement(options, 0.002f);  // nodes depend on the number of lanes
   }
   // With every pixel projected sums are equal integers; reciprocal roots and rounding differ by 1e-4.
   options.warp_tolerance_px = 0.0;

@@ -39,9 +39,9 @@ struct Vector3 {
 
 /// Sensitivity of a point's image in a neighbour, from the derivative of the unified projection.
 struct Sensitivity {
-  VF pixels_per_inverse_range;  // 0 where the point is not visible
+  VF pixels_per_inverse_range;  // 0 if the point is not visible
   VF pixels_per_radian;         // in the same direction, for a rotation about the worst axis
-  VF range_ratio;               // range from the neighbour over range from the reference
+  VF range_ratio;               // ratio of the ranges from the neighbour and from the reference
 };
 
 HWY_INLINE Sensitivity sensitivityOf(const Projection& camera, const Vector3& ray, VF inverse_range) {

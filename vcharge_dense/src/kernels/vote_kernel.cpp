@@ -78,7 +78,7 @@ HWY_INLINE Mean meanOfAll(const Pixels& pixels) {
   return Mean(sum);
 }
 
-/// Larger one of the means before and after the reference.
+/// The larger of the means before and after the reference.
 HWY_INLINE Mean meanOfBetterSide(const Pixels& pixels) {
   const DI di;
   const bool* after = pixels.row.after;
@@ -156,7 +156,7 @@ void findPeaksTarget(const int16_t* scores, size_t stride, int num_hypotheses, s
   const V16 none = hn::Set(d, kNoScore);
   const size_t lanes = hn::Lanes(d);
   for (size_t first = 0; first < num_pixels; first += lanes) {
-    // The last vector overlaps the previous one where pixels do not fill it.
+    // The last vector overlaps the previous one if the number of pixels is not a multiple of the lanes.
     const size_t i = HWY_MIN(first, num_pixels - lanes);
     PeakSearch search(hn::LoadU(d, scores + i));
     const int16_t* next = scores + i;

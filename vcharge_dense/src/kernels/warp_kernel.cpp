@@ -145,7 +145,7 @@ void makeCellsTarget(const float* const* u_rows, const float* const* v_rows, int
   }
 }
 
-/// Larger one of both, ignoring NaN in `value`.
+/// The larger of both values, ignoring NaN in `value`.
 HWY_INLINE VF maxOfKnown(VF value, VF largest) {
   return hn::IfThenElse(hn::Gt(value, largest), value, largest);
 }

@@ -23,8 +23,8 @@ constexpr double kGuess_per_m = 0.15;
 // Rays closer to the direction of travel (sine of the angle) do not determine an epipolar plane.
 constexpr double kMinSine = 0.1;
 constexpr int kMaxSteps = 10;
-constexpr double kConverged = 1e-3;     // largest step, in standard deviations of the noise
-constexpr double kMaxDeviations = 4.0;  // largest correction of an axis
+constexpr double kConverged = 1e-3;     // largest remaining step, in standard deviations
+constexpr double kMaxDeviations = 4.0;  // largest correction per axis, in standard deviations
 
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;

@@ -15,7 +15,7 @@ namespace vcharge {
 ///
 /// Each relative pose is estimated separately: robust least squares over the tracks' angles to their epipolar
 /// planes, with the given pose and its noise (PoseNoiseOptions) as prior; only the prior constrains the
-/// length of the baseline. The given pose is kept where there are few tracks, the estimate does not converge
+/// length of the baseline. The given pose is kept if there are few tracks, the estimate does not converge,
 /// or it differs from the given pose by much more than the noise. Thread safe.
 class PoseRefinement {
  public:
@@ -26,7 +26,7 @@ class PoseRefinement {
   struct Result {
     RigidTransform neighbour_from_reference;
     bool is_refined = false;
-    int num_tracks = 0;  ///< tracks that also lead back to where they started
+    int num_tracks = 0;  ///< number of tracks whose backward track returns to its start
     /// Remaining fraction of the given pose's variances, mean over the axes.
     double rotation_variance_left = 1.0, translation_variance_left = 1.0;
   };

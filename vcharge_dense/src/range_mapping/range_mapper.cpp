@@ -10,9 +10,9 @@
 namespace vcharge {
 namespace {
 
-// A camera that moved less than this since its last image stands: there is no parallax.
+// A camera that has moved less than this since its last image stands still: there is no parallax.
 constexpr double kMinMotion_m = 0.03;
-// A camera whose newest image is older than this, against the other cameras, has stopped.
+// A camera has stopped if its newest image is older than those of other cameras by more than this.
 constexpr double kMaxImageGap_s = 1.0;
 
 struct Frame {
@@ -126,7 +126,7 @@ void RangeMapper::setTrajectory(const Trajectory& world_from_vehicle) {
 void RangeMapper::startOver(DriveBreak drive_break) {
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (camera) {
-      // Images before the break can still be matched with each other, not with those after it.
+      // Images before the break can still be matched with each other, but not with images after it.
       emitReferences(camera.get(), true);
       camera->frames.clear();
       camera->next_reference = 0;
@@ -176,7 +176,7 @@ void RangeMapper::placeImage(Camera* camera, const ImageFrame& frame) {
       camera->status.message = "the camera does not move: there is no parallax";
       return;
     }
-    // Jumps of the odometry are found by the assembler, those of a given trajectory here.
+    // The assembler detects jumps of the odometry; jumps of a given trajectory are detected here.
     if (motion_m > options_.frames.max_speed_m_per_s * toSeconds(stamp - last.stamp)) {
       emitReferences(camera, true);
       camera->frames.clear();

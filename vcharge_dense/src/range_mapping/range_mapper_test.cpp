@@ -172,7 +172,7 @@ TEST(RangeMapperTest, RestartsWhenStampsJumpBack) {
   RangeMapper mapper(makeRig(), smallOptions(), recorder.callback());
   drive(&mapper, 20, 0.2, 200);
   const size_t first = recorder.tasks.size();
-  drive(&mapper, 20, 0.2, 100);  // as if the bag is replayed
+  drive(&mapper, 20, 0.2, 100);  // like a replay of the bag
   EXPECT_EQ(recorder.tasks.size(), 2 * first);
   for (size_t i = first; i < recorder.tasks.size(); ++i) {
     for (const SweepImage& neighbour : recorder.tasks[i].neighbours) {
@@ -223,7 +223,7 @@ TEST(RangeMapperTest, UsesPosesOfATrajectory) {
     trajectory.push_back({stampOf(i), RigidTransform::planar(0.0, 0.3 * i, 0.0)});
   }
   mapper.setTrajectory(trajectory);
-  drive(&mapper, 10, 0.2);  // with odometry that must not be used
+  drive(&mapper, 10, 0.2);  // this odometry must not be used
   ASSERT_FALSE(recorder.tasks.empty());
   const Eigen::Vector3d motion = recorder.tasks.back().reference.world_from_camera.translation() -
                                  recorder.tasks.back().neighbours.back().world_from_camera.translation();
@@ -267,7 +267,7 @@ TEST(RangeMapperTest, MeasuresASceneThroughTheWholePath) {
 }
 
 TEST(RangeMapperTest, MeasuresTheSameSceneAtAnyFocalScale) {
-  // A distorted lens, whose border is cropped or kept depending on the focal scale.
+  // A lens with distortion; the focal scale determines whether its border is cropped or kept.
   MeiCamera::Parameters parameters;
   parameters << 1.158, 224.0, 223.5, 162.0, 99.5, -0.33, 0.0865, -0.00067, -0.00004;
   const MeiCamera lens(parameters);

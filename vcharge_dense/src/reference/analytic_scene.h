@@ -21,7 +21,7 @@ struct Patch {
   double contrast = 1.0;  ///< contrast of the texture; 0: one gray level
 };
 
-/// Patches with a band-limited texture that is a formula of the point in space, rendered by exact projection.
+/// Patches with a band-limited texture, a function of the point in space, rendered by exact projection.
 class AnalyticScene {
  public:
   AnalyticScene(std::vector<Patch> patches, uint32_t seed);
@@ -30,7 +30,7 @@ class AnalyticScene {
   /// Waves of the texture that are shorter than a pixel fade out.
   cv::Mat render(const MeiCamera& camera, cv::Size size, const RigidTransform& world_from_camera,
                  double noise_gray_levels = 0.0, uint32_t noise_seed = 1) const;
-  /// Distance along each pixel's ray (CV_64FC1), NaN where there is no surface.
+  /// Distance along each pixel's ray (CV_64FC1), NaN if it meets no surface.
   cv::Mat range(const MeiCamera& camera, cv::Size size, const RigidTransform& world_from_camera) const;
 
  private:
@@ -50,7 +50,7 @@ class AnalyticScene {
   std::vector<Wave> waves_;
 };
 
-/// A standard normal number; the same with every standard library.
+/// A standard normal number; identical for every standard library.
 double normalNumber(std::mt19937* generator);
 
 }  // namespace vcharge

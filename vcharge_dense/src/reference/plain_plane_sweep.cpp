@@ -7,7 +7,7 @@
 namespace vcharge {
 namespace {
 
-/// Mean distance of an inner plane from its neighbours.
+/// Mean distance between an inner plane and its two neighbours.
 double stepAt(const PlaneFamily& family, size_t plane) {
   const std::vector<float>& inverse = family.inverse_distances_per_m;
   return 0.5 * (inverse[plane + 1] - inverse[plane - 1]);
@@ -19,7 +19,7 @@ int wrap(int value, int size) {
   return ((value % size) + size) % size;
 }
 
-/// Bilinear sample; NaN where one of the four pixels must not be used.
+/// Bilinear sample; NaN if one of the four pixels must not be used.
 double sample(const cv::Mat& pixels, const cv::Mat& valid_mask, const Eigen::Vector2d& at,
               PlainBorder border) {
   const int x = static_cast<int>(std::floor(at.x()));
@@ -181,7 +181,7 @@ PlainResult plainPlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask,
         }
       }
     }
-    // The best plane of the family, and the maximum of the parabola through its score and those beside it.
+    // Finds the best plane of the family, and the maximum of the parabola through the scores around it.
     for (int y = 0; y < size.height; ++y) {
       for (int x = 0; x < size.width; ++x) {
         size_t best = num_planes;

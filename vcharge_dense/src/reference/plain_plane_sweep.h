@@ -21,11 +21,11 @@ struct PlainResult {
   cv::Mat plane;             ///< CV_32SC1: best plane, counted over all families; -1 where none
   cv::Mat inverse_distance;  ///< CV_64FC1: distance of the plane, interpolated by a parabola; NaN where none
   cv::Mat inverse_range;     ///< CV_64FC1
-  cv::Mat score;             ///< CV_64FC1, NaN where none
+  cv::Mat score;             ///< CV_64FC1, NaN if there is none
 };
 
-/// The plane sweep in its simplest form: double precision, without tiles, threads, refinement or uncertainty.
-/// The reference for PlaneSweep's first sweep.
+/// The simplest form of the plane sweep, as a reference for PlaneSweep's first sweep: double precision, no
+/// tiles, threads, refinement or uncertainty.
 PlainResult plainPlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask,
                             const std::vector<PlaneFamily>& families, const PlaneSweepOptions& options,
                             const SweepImage& reference, const std::vector<SweepImage>& neighbours,

@@ -163,7 +163,7 @@ TEST(PlaneSweepAccuracyTest, OcclusionHandlingHelpsBehindAnOccluder) {
 }
 
 TEST(PlaneSweepAccuracyTest, StandardDeviationMatchesErrorsUnderPixelAndPoseNoise) {
-  // Over several scenes, views and random odometry errors.
+  // Averages over several scenes, views and random odometry errors.
   double within_sigma = 0.0, known = 0.0;
   for (uint32_t draw = 1; draw <= 12; ++draw) {
     const bool left = draw % 2 == 0;
@@ -195,7 +195,7 @@ TEST(PlaneSweepAccuracyTest, MostConfidentPixelsAreRight) {
         disturb(options.pose_noise, &generator, &s);
       }
       const RangeMap map = sweepOf(s, options);
-      std::vector<std::pair<float, bool>> pixels;  // negative confidence, right
+      std::vector<std::pair<float, bool>> pixels;  // negated confidence, and whether the range is right
       for (int y = 0; y < kSize.height; ++y) {
         for (int x = 0; x < kSize.width; ++x) {
           const double truth = s.truth.at<double>(y, x);

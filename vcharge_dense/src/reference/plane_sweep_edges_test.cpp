@@ -78,7 +78,7 @@ double relativeErrorOf(double pixels) {
   return pixels / (pixels_per_rad * baseline_m) * range_m;
 }
 
-/// In the farthest neighbour 64 fronto-parallel planes are 4.4 pixels apart, 256 planes 1.1 pixels.
+/// In the farthest neighbour, 64 fronto-parallel planes are 4.4 pixels apart and 256 planes 1.1 pixels.
 RangeMap sweepPlanes(const Sequence& s, int num_planes, double near_spacing = 1.0) {
   PlaneSweepOptions options;
   options.aggregation = Aggregation::kReferenceSplit;
@@ -104,7 +104,7 @@ TEST(PlaneSweepEdgesTest, MoreOfThePlanesFarAwayFindAKerbsFaceBetter) {
   for (const uint32_t seed : {1u, 2u, 3u}) {
     SCOPED_TRACE(seed);
     const Sequence s = fourNeighbours(seed);
-    // At the kerb the spacing of the planes falls to 0.45 of that of uniform ones.
+    // At the kerb, the spacing of the non-uniform planes is 0.45 times that of uniform planes.
     const Errors uniform = errorsOf(sweepPlanes(s, 64), s, kFace),
                  spaced = errorsOf(sweepPlanes(s, 64, 6.0), s, kFace);
     EXPECT_LE(spaced.median_absolute, 0.7 * uniform.median_absolute);

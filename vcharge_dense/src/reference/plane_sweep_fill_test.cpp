@@ -9,7 +9,7 @@
 namespace vcharge {
 namespace {
 
-/// Ground and a wall with weak texture, of which small windows contain little.
+/// Ground and a wall whose texture is too weak for small windows.
 AnalyticScene faintScene() {
   return AnalyticScene(
       {{{0, 0, 0}, {0, 0, 1}}, {{0, 5.0, 0}, {0, -1, 0}, Eigen::Vector3d::Constant(1e6), 0.12}}, 3);

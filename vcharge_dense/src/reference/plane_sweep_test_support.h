@@ -54,7 +54,7 @@ inline Sequence makeSequence(const AnalyticScene& scene, const RigidTransform& s
   return sequence;
 }
 
-/// Crops the images of a sequence, as of a smaller camera.
+/// Crops the images of a sequence, as if a smaller camera had taken them.
 inline void crop(const cv::Rect& part, Sequence* sequence) {
   sequence->reference.pixels = sequence->reference.pixels(part).clone();
   for (SweepImage& image : sequence->neighbours) {
@@ -66,7 +66,7 @@ inline MeiCamera croppedCamera(const cv::Rect& part) {
                    kCamera.v0() - part.y);
 }
 
-/// Disturbs the poses of the neighbours, which are in the order of time, by odometry errors: a common scale
+/// Disturbs the poses of the neighbours, which are in order of time, by odometry errors: a common scale
 /// error, a random walk from image to image, and the jitter of the reference, which is common to all pairs.
 inline void disturb(const PoseNoiseOptions& noise, std::mt19937* generator, Sequence* sequence) {
   const auto randomVector = [&](double sigma) {

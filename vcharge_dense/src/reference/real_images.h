@@ -26,7 +26,7 @@ struct RealImages {
   Plane groundInCamera() const;
 };
 
-/// Reads $VCHARGE_DATA/vcharge_left; returns nothing where the variable is not set. Throws InputError for
+/// Reads $VCHARGE_DATA/vcharge_left; returns nothing if the variable is not set. Throws InputError for
 /// files that cannot be read.
 std::optional<RealImages> readRealImages();
 

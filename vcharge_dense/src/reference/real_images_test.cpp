@@ -106,7 +106,7 @@ TEST_F(RealImagesTest, KernelAgreesWithTheAuthorsWhereWindowsCorrelate) {
   for (int y = 0; y < kSize.height; ++y) {
     for (int x = 0; x < kSize.width; ++x) {
       const float score = details.score.at<float>(y, x);
-      // Only known pixels with a cost 1 - ZNCC below 0.2.
+      // Counts only known pixels whose cost 1 - ZNCC is below 0.2.
       if (!(score > 0.8f) || std::isnan(map.range_m.at<float>(y, x))) {
         continue;
       }

@@ -14,21 +14,21 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-// Image noise over what independent samples would have: the samples of a window are interpolated and
+// Ratio of the image noise to that of independent samples: the samples of a window are interpolated and
 // therefore correlated.
 constexpr float kImageNoiseFactor = 0.5f;
 
 // Error of a match that does not average out over neighbours.
 constexpr float kMatchingNoise_px = 0.035f;
 
-// A range is unknown where the correlation is lower, or its standard deviation over the range larger.
+// A range is unknown if the correlation is lower, or the relative standard deviation of the range larger.
 constexpr float kMinScore = 0.3f, kMaxRelativeSigma = 0.5f;
 
-// Standard deviation over the mean second difference of neighbouring estimates, whose windows overlap. Fitted
-// on simulated drives, together with the two noises above.
+// Ratio of the standard deviation to the mean second difference of neighbouring estimates, whose windows
+// overlap. Fitted on simulated drives, together with the two noises above.
 constexpr float kRoughnessFactor = 0.8f;
 
-// Calibration of the confidence: fraction of ranges within 5 % of the truth by the product of the
+// Calibration of the confidence: fraction of ranges within 5 % of the truth as a function of the product of
 // confidence's factors. Fitted on simulated drives that are not used for evaluation.
 constexpr float kFactors[] = {0.0f,  0.0625f, 0.0875f, 0.125f, 0.175f, 0.25f,  0.35f,
                               0.45f, 0.55f,   0.65f,   0.75f,  0.85f,  0.925f, 1.0f};
@@ -54,7 +54,7 @@ void calibrate(std::vector<float>* confidence) {
 
 constexpr int kSupportRadius_px = 3;
 
-/// Fraction of the neighbouring pixels inside the image that found the same surface, for the pixels of row y.
+/// Fraction of a pixel's neighbours inside the image that found the same surface, for the pixels of row y.
 /// `padded`: inverse ranges with a margin of kSupportRadius_px columns.
 std::vector<float> neighbourhoodSupport(const SweepKernels& kernels, const cv::Mat& padded,
                                         const cv::Mat& sigma, int y) {
@@ -101,8 +101,8 @@ std::vector<float> rowConfidence(const SweepInput& input, const SurfaceEstimate&
   return confidence;
 }
 
-/// Mean second difference of the inverse ranges around the pixels of row y, divided by the one that
-/// independent values with a standard deviation of 1 have; 0 where neighbours are unknown.
+/// Mean second difference of the inverse ranges around the pixels of row y, divided by its value for
+/// independent inverse ranges with a standard deviation of 1; 0 where neighbours are unknown.
 std::vector<float> neighbourhoodRoughness(const cv::Mat& inverse_range, int y) {
   constexpr int kSteps[][2] = {{2, 0}, {0, 2}, {2, 2}, {2, -2}, {4, 0}, {0, 4}, {4, 4}, {4, -4}};
   constexpr float kPerDeviation = 2.45f;  // square root of 1 + 1 + 4

@@ -16,7 +16,7 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 constexpr float kPerScore = 1.0f / kScoreScale;
 
-// Step of the refinement in the neighbour that moves most: samples the peak of the score finely whatever the
+// Step of the refinement in the neighbour that moves most: samples the peak of the score finely for every
 // baseline.
 constexpr float kRefinementStep_px = 0.5f;
 
@@ -58,7 +58,7 @@ class RowReader {
   int plane(int slot) const { return first_plane_ + scores_.slots[static_cast<size_t>(slot)]; }
 
   /// Score of the higher one of the two best peaks that is further than `separation` from `inverse_range`; -1
-  /// where neither is.
+  /// if neither is.
   float bestPeakApart(size_t pixel, int column, float inverse_range, float separation) const {
     const auto is_apart = [&](int slot) {
       return slot >= 0 && std::abs(offset(slot) * weight(column) - inverse_range) > separation;
@@ -230,7 +230,7 @@ Hypotheses makeRefinement(const SweepInput& input, const cv::Mat& window_counts,
     auto* weight_row = refinement.weight.ptr<float>(y);
     for (int x = 0; x < step.cols; ++x) {
       const float fine = kRefinementStep_px / std::max(motion[static_cast<size_t>(x)], 1e-6f);
-      // Fine for the neighbour that moves most, but wide enough to reach half way to the next plane.
+      // The step is fine for the neighbour that moves most, but the range reaches half way to the next plane.
       const float coarse = coarse_row[x] / static_cast<float>(half);
       weight_row[x] = std::clamp(fine, 0.75f * coarse, 2.0f * coarse);
     }
@@ -255,7 +255,7 @@ void readRefinement(const Hypotheses& refinement, const TileScores& scores, Surf
       const float best_score = kPerScore * static_cast<float>(reader.score(pixel));
       const float weight = reader.weight(column);
       const float peak = base[column] + reader.offset(best) * weight;
-      // A lower score far from the first sweep's result is another peak.
+      // A lower score far from the first sweep's result belongs to another peak.
       if (best_score < out.score[column] && std::abs(peak - out.inverse_range[column]) > out.step[column]) {
         continue;
       }

@@ -18,10 +18,10 @@ struct SurfaceEstimate {
   cv::Mat step;           ///< spacing of neighbouring hypotheses in inverse range
   cv::Mat score;
   cv::Mat curvature;     ///< negative second derivative of the score at its peak; NaN where unknown
-  cv::Mat second_score;  ///< score of the next best separate peak, -1 where there is none
+  cv::Mat second_score;  ///< score of the next best separate peak, -1 if there is none
   cv::Mat plane;         ///< CV_32SC1: best plane, counted over all families; -1 where none
   cv::Mat voters;        ///< CV_32SC1: bit n: neighbour n contributed
-  cv::Mat at_limit;      ///< CV_8UC1: not 0 where a plane beside the best one was not scored
+  cv::Mat at_limit;      ///< CV_8UC1: not 0 if a plane beside the best one was not scored
 };
 
 struct Parabola {
@@ -32,10 +32,10 @@ struct Parabola {
 /// Parabola through three scores (as in TileScores), the middle one being the highest (Tian and Huhns 1986).
 Parabola fitParabola(int before, int middle, int after);
 
-/// The planes of a family as hypotheses: base 0, weight -normal . ray, NaN where the ray does not meet them.
+/// The planes of a family as hypotheses: base 0, weight -normal . ray, NaN if the ray does not meet them.
 Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays, const cv::Mat& valid_mask);
 
-/// Reads one tile's scores of all families into the estimate. Families after the first one only count where
+/// Reads one tile's scores of all families into the estimate. Families after the first are only used where
 /// their best plane is not their outermost scored one: surfaces beyond it belong to the first family.
 void readPeaks(const std::vector<Hypotheses>& hypotheses, const std::vector<TileScores>& scores,
                SurfaceEstimate* estimate);

@@ -14,7 +14,7 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-/// Halves the size: mean of the known values of two by two.
+/// Halves the size: mean of the known values in blocks of two by two.
 cv::Mat meansOfKnown(const cv::Mat& values) {
   cv::Mat means = pooledMat({(values.cols + 1) / 2, (values.rows + 1) / 2}, CV_32FC1);
   forEachRow(means.rows, [&](int y) {

@@ -10,14 +10,14 @@
 namespace vcharge {
 namespace {
 
-// Chosen on two simulated drives that are not used for evaluation. Sizes are those of the coarse image.
-// A pixel is confident where its score is high and well above the second peak.
+// Chosen on two simulated drives that are not used for evaluation. Sizes are in pixels of the coarse image.
+// A pixel is confident if its score is high and well above the second peak.
 constexpr float kConfidentScore = 0.6f, kConfidentLead = 0.1f;
-// All planes are swept where fewer of a tile's pixels with texture are confident.
+// All planes are swept if a smaller fraction of a tile's pixels with texture is confident.
 constexpr double kMinConfidentFraction = 0.3;
 constexpr int kMinConfident = 16;
-constexpr int kReach_px = 2;      // pixels around a tile that count for it
-constexpr int kMinCount = 8;      // confident pixels that select a plane
+constexpr int kReach_px = 2;      // margin of pixels around a tile that also select its planes
+constexpr int kMinCount = 8;      // minimum number of confident pixels that select a plane
 constexpr int kMarginPlanes = 1;  // planes on both sides of a selected one that are swept too
 
 /// Slots of the selected planes and their margin, with a gap where planes are left out.

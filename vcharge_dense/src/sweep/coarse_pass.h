@@ -11,7 +11,7 @@
 
 namespace vcharge {
 
-/// A sweep at half the resolution over every second plane. Selects the planes that each tile of the main
+/// A sweep at half the resolution over every second plane. It selects the planes that each tile of the main
 /// sweep needs: on two simulated drives a third of all planes, without loss of accuracy.
 class CoarsePass {
  public:
@@ -22,11 +22,11 @@ class CoarsePass {
   SurfaceEstimate sweep(const SweepInput& half_input) const;
 
   /// The planes of each tile: those near the planes that confident pixels in and around it found, or all
-  /// planes where too few pixels are confident.
+  /// planes if too few pixels are confident.
   std::vector<TilePlanes> choosePlanes(const SurfaceEstimate& coarse,
                                        const std::vector<cv::Rect>& tiles) const;
 
-  /// Adds the second peaks of planes that were left out, as the coarse pass scored them.
+  /// Adds the second peaks of planes that were left out, with their scores from the coarse pass.
   void addSecondPeaks(const SurfaceEstimate& coarse, const std::vector<cv::Rect>& tiles,
                       const std::vector<TilePlanes>& choice, SurfaceEstimate* estimate) const;
 

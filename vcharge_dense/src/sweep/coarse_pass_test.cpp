@@ -98,7 +98,7 @@ TEST(TileScorerTest, RowsWithoutTextureDoNotChangeOthers) {
   s.reference.pixels.rowRange(0, first).setTo(90);
   s.reference.pixels.rowRange(end, kSize.height).setTo(90);
   PlaneSweepOptions options;
-  options.warp_tolerance_px = 0.0;  // exact everywhere, so that tiles do not matter
+  options.warp_tolerance_px = 0.0;  // exact everywhere, so that the choice of tiles has no effect
   const SweepLevel level(kCamera, allValid(), options, s.ground);
   const SweepInput input = inputOf(level, s);
   const int radius = kMatchingWindow_px / 2;

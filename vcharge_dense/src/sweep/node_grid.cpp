@@ -8,7 +8,7 @@ namespace vcharge {
 
 namespace {
 
-// In each direction a quadratic through three nodes exceeds their range by at most an eighth of their second
+// A quadratic through three nodes exceeds their range in each direction by at most an eighth of their second
 // difference. With this limit positions stay in the packed image (see kInset_px in sweep_input.cpp).
 constexpr float kMaxSecondDifference_px = 12.0f;
 
@@ -17,7 +17,7 @@ int countNodes(int pixels, int spacing) {
   return 2 * std::max(2, (pixels + 2 * spacing - 1) / (2 * spacing)) + 1;
 }
 
-/// Unit ray of a pixel of a camera without distortion (paper, Camera Model); NaN where there is none.
+/// Unit ray of a pixel of a camera without distortion (paper, Camera Model); NaN if there is none.
 Eigen::Vector3d rayWithoutDistortion(const MeiCamera& camera, double u, double v) {
   const double x = (u - camera.u0()) / camera.gamma1();
   const double y = (v - camera.v0()) / camera.gamma2();

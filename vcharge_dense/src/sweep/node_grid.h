@@ -34,7 +34,7 @@ class NodeGrid {
  private:
   TileLayout layout_;
   int spacing_, cell_shift_;
-  int nodes_, node_rows_;  // per strip and column of cells; odd
+  int nodes_, node_rows_;  // nodes per strip and rows of nodes; odd
   AlignedArray<float> x_, y_, z_, base_, weight_, u_, v_;
 };
 

@@ -5,7 +5,7 @@
 namespace vcharge {
 namespace {
 
-// The planes parallel to the ground lie within this height above and below it.
+// Maximum height of the planes parallel to the ground above and below it.
 constexpr double kMaxGroundHeight_m = 0.3;
 
 /// `count` inverse distances from 1 / far_m to 1 / near_m whose steps grow linearly, up to `growth` times the

@@ -16,7 +16,7 @@
 namespace vcharge {
 namespace {
 
-constexpr int kMinWidth_px = 16;  // most lanes of a vector
+constexpr int kMinWidth_px = 16;  // largest number of lanes of a vector
 
 void checkImage(const SweepImage& image, cv::Size size) {
   check(image.pixels.type() == CV_8UC1 && image.pixels.size() == size,

@@ -82,7 +82,7 @@ TEST(PlaneSweepTest, MaskedPixelsAreUnknownAndDoNotVote) {
   cv::Mat mask = allValid();
   const cv::Rect hole(140, 90, 40, 30);
   mask(hole).setTo(0);
-  Sequence painted = s;  // pixels under the mask must not matter
+  Sequence painted = s;  // pixels under the mask must not have an effect
   for (SweepImage& image : painted.neighbours) {
     image.pixels(hole).setTo(255);
   }

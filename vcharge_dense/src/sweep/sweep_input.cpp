@@ -24,7 +24,7 @@ void findMoments(int begin, int end, int window, double min_squares, SweepRefere
   const double count = window * window;
   const auto per_count = static_cast<float>(1.0 / count);
   const auto columns = static_cast<size_t>(samples.cols);
-  // Sums over a window of rows for each column, then over a window of columns for each first column.
+  // Sums over a window of rows for each column, then over a window of columns that starts at each column.
   std::vector<int32_t> sums(columns, 0), squares(columns, 0), sum(columns), square(columns);
   const auto addRow = [&](int y, int sign) {
     const auto* row = samples.ptr<int16_t>(y);

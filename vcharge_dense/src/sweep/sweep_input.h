@@ -18,7 +18,7 @@ struct SweepNeighbour {
   Eigen::Matrix3f neighbour_from_reference;  ///< rotation
   Eigen::Vector3f translation_m;             ///< translation of the same transform
   bool after = false;                        ///< taken after the reference
-  /// Remaining fraction of the variances of PoseNoiseOptions; less than 1 where the pose was refined.
+  /// Remaining fraction of the variances of PoseNoiseOptions; less than 1 if the pose was refined.
   float rotation_variance_left = 1.0f, translation_variance_left = 1.0f;
 
   Projection projectionOf(const MeiCamera& camera) const;
@@ -34,7 +34,7 @@ struct SweepReference {
   SweepReference(const cv::Mat& pixels, const PlaneSweepOptions& options, const SampleScale& scale);
 };
 
-/// Input that all tiles of one sweep share. The pointers must outlive it.
+/// Input common to all tiles of one sweep. The pointers must outlive it.
 struct SweepInput {
   MeiCamera camera;
   const RayTable* rays;
@@ -66,7 +66,7 @@ struct Hypotheses {
   }
 };
 
-/// CV_8UC1: not 0 where all pixels of the window around a pixel are not 0 in `counts`.
+/// CV_8UC1: not 0 if all pixels of the window around a pixel are not 0 in `counts`.
 cv::Mat windowsInside(const cv::Mat& counts, int window_px);
 
 }  // namespace vcharge

@@ -15,7 +15,7 @@ namespace vcharge {
 namespace {
 
 constexpr double kWholeSphere_rad = 6.283185307179586;
-// Node grids need positions this far around valid pixels.
+// Distance around valid pixels within which node grids need positions.
 constexpr int kNearValid_px = 17;
 
 }  // namespace
@@ -33,7 +33,7 @@ class SweepLevel::WorkerPool {
   template <class Function>
   void forEachTile(const SweepInput& input, const std::vector<cv::Rect>& tiles, size_t num_families,
                    const Function& function) {
-    std::atomic<size_t> next{0};  // takes tiles in their order, unlike the loop's index
+    std::atomic<size_t> next{0};  // assigns tiles in their order, unlike the loop's index
     tbb::parallel_for(
         tbb::blocked_range<size_t>(0, tiles.size(), 1),
         [&](const tbb::blocked_range<size_t>& range) {

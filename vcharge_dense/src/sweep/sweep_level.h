@@ -18,8 +18,8 @@ namespace vcharge {
 /// The planes that are swept in a tile, per family, see TileScores::slots.
 using TilePlanes = std::vector<std::vector<int>>;
 
-/// What all images of a camera have in common: its model without distortion and the planes to be swept.
-/// Inputs point into it. Thread safe. Keeps the working memory of tiles, a few megabytes per thread, because
+/// Everything common to the sweeps of one camera: its model without distortion and the planes to be swept.
+/// Inputs refer to it. Thread safe. Keeps the working memory of tiles, a few megabytes per thread, because
 /// new memory pages cost more time than the computation in them.
 class SweepLevel {
  public:
@@ -32,7 +32,7 @@ class SweepLevel {
   /// Makes an input without neighbours.
   SweepInput makeInput(const cv::Mat& reference_pixels) const;
 
-  /// The surface on the planes with the best scores. `choice` has one entry per tile, or is empty: all
+  /// Surface from the planes with the best scores. `choice` has one entry per tile, or is empty: all
   /// planes.
   SurfaceEstimate sweepPlanes(const SweepInput& input, const std::vector<cv::Rect>& tiles,
                               const std::vector<TilePlanes>& choice) const;

@@ -9,7 +9,7 @@ namespace vcharge {
 /// loop over vectors without shuffles; only the last columns of a strip need those of the next lane.
 struct TileLayout {
   int lanes = 1;
-  int strip = 1;  ///< columns per strip
+  int strip = 1;  ///< number of columns per strip
   int rows = 0;
 
   int columns() const { return lanes * strip; }

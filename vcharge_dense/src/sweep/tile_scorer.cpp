@@ -145,7 +145,7 @@ void TileScorer::loadSurface(const Hypotheses& hypotheses) {
   for (const std::unique_ptr<NodeGrid>& grid : grids_) {
     grid->setNormal(hypotheses.normal);
   }
-  // Rows without windows that count, at the top and the bottom, need no score.
+  // Rows at the top and bottom without usable windows need no score.
   const auto counts_in_row = [&](int row) {
     const float* begin = vote_per_covariance_.data() + static_cast<size_t>(row) * windows.rowSize();
     return std::any_of(begin, begin + windows.rowSize(), [](float value) { return value > 0.0f; });

@@ -25,7 +25,7 @@ struct TileScores {
   AlignedArray<int16_t> scores;     ///< [row][slot][pixel in row]: correlation times kScoreScale
   std::vector<uint8_t> voter_bits;  ///< [row][slot][neighbour][pixel in row / 8]
   AlignedArray<int16_t> best, best_score, before, after, second,
-      second_score;  ///< see Peaks; hypotheses by slot
+      second_score;  ///< see Peaks; hypotheses are slots
 
   /// Bit n: neighbour n contributed to the slot's score at a pixel.
   uint32_t voters(int slot, size_t pixel) const {
@@ -72,7 +72,7 @@ class TileScorer {
   const SweepInput* input_ = nullptr;
   static constexpr int kRadius_px = kMatchingWindow_px / 2;
   cv::Rect tile_;
-  int first_row_ = 0, end_row_ = 0;               // rows of the tile with windows that count
+  int first_row_ = 0, end_row_ = 0;               // rows of the tile with usable windows
   TileLayout halo_;                               // the tile and the pixels around it that windows cover
   std::vector<std::unique_ptr<NodeGrid>> grids_;  // coarse to fine
   std::vector<Neighbour> neighbours_;

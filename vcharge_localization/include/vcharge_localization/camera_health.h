@@ -20,18 +20,18 @@ struct CameraHealthOptions {
   VCHARGE_END_OPTIONS();
 };
 
-/// Finds cameras that do not contribute, and the likely reason. How many matches fit a pose by chance depends
-/// on the scene and the image size, so a camera that contradicts the pose is found by comparing it with the
+/// Finds cameras that do not contribute, and the likely reason. The number of matches that fit by chance
+/// depends on scene and image size, so cameras that contradict the pose are found by comparing them with the
 /// others. Not thread safe.
 class CameraHealth {
  public:
   CameraHealth(std::shared_ptr<const CameraRig> rig, const CameraHealthOptions& options);
 
-  /// The images of the frame, without those of cameras that repeat one image while the vehicle moves.
+  /// Returns the images of the frame without those of cameras that repeat one image while the vehicle moves.
   std::vector<Image> withoutFrozen(const ImageFrame& frame);
 
   void addFeatures(const RigFeatures& features);
-  /// Matches and inliers of a fix.
+  /// Adds the matches and inliers of a fix.
   void addFix(const PoseFix& fix);
 
   /// One line per camera that is silent, frozen, blind, or contradicts the others.
@@ -43,7 +43,7 @@ class CameraHealth {
     int equal_images = 0;
     int frames = 0, fixes = 0;
     bool is_missing = false;
-    double features = 0.0;  // means of the last frames
+    double features = 0.0;  // means over the last frames
     double matches = 0.0, inliers = 0.0;
   };
   void average(double value, double* mean) const;

@@ -9,12 +9,12 @@
 
 namespace vcharge {
 
-/// What is done to a recorded drive to see how localization takes it. Times are seconds since its first
+/// Changes to a recorded drive that test the robustness of localization. Times are seconds since its first
 /// frame.
 struct DriveExperimentOptions {
-  std::vector<size_t> cameras;                       ///< that are used; empty: all
-  std::optional<std::pair<double, double>> cover_s;  ///< all cameras are covered from, to
-  /// From, to: the vehicle is carried away, unseen by its cameras and its odometer.
+  std::vector<size_t> cameras;                       ///< indices of the used cameras; empty: all
+  std::optional<std::pair<double, double>> cover_s;  ///< interval in which all cameras are covered
+  /// Interval in which the vehicle is carried away without images or odometry.
   std::optional<std::pair<double, double>> carry_s;
 };
 
@@ -23,7 +23,7 @@ class DriveExperiment {
  public:
   explicit DriveExperiment(DriveExperimentOptions options);
 
-  /// False for a frame that is left out.
+  /// Returns false for a frame that is left out.
   bool apply(ImageFrame* frame);
 
  private:

@@ -26,40 +26,40 @@ struct DriveLocalizerOptions {
   VCHARGE_END_OPTIONS();
 };
 
-/// The pose at a frame, from this frame and earlier ones only.
+/// The pose at a frame, computed from this and earlier frames only.
 struct LocalizationResult {
   Timestamp stamp;
   LocalizationStatus status = LocalizationStatus::kLost;
-  std::optional<PosePrior> pose;  ///< for kLocalized and kBridgedByOdometry
-  PoseFix fix;                    ///< from this frame's images only
+  std::optional<PosePrior> pose;  ///< set for kLocalized and kBridgedByOdometry
+  PoseFix fix;                    ///< computed from this frame's images only
   bool searched_whole_map = false;
-  double fix_distance = 0.0;  ///< squared Mahalanobis distance of the fix to the prediction
-  double since_fix_s = 0.0;   ///< 0 for kLocalized; infinite before the first
+  double fix_distance = 0.0;  ///< squared Mahalanobis distance between the fix and the prediction
+  double since_fix_s = 0.0;   ///< time since the last fix: 0 for kLocalized; infinite before the first
   std::optional<RigidTransform> odom_from_vehicle;
-  std::string message;  ///< one line: what happens, and why
+  std::string message;  ///< one line: the current activity, and its reason
   std::vector<std::string> camera_warnings;
   std::map<std::string, double> stage_s;
 };
 
 /// Localizes a vehicle in a map, frame by frame (paper, section Localization). Tracking: the pose is
 /// predicted by the odometer and corrected by a fix from the images; frames without a fix are bridged.
-/// Relocalization: a lost vehicle is searched in the whole map, and a pose is accepted once two frames agree.
+/// Relocalization: a lost vehicle is searched in the whole map; a pose is accepted when two frames agree.
 /// Not thread safe.
 class DriveLocalizer {
  public:
-  /// Errors as MapLocalizer.
+  /// Throws the errors of MapLocalizer.
   DriveLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
                  const DriveLocalizerOptions& options = DriveLocalizerOptions());
 
   LocalizationResult process(const ImageFrame& frame);
-  /// The same with features that were extracted before; the images are not used.
+  /// Processes a frame whose features were already extracted; its images are not used.
   LocalizationResult process(const ImageFrame& frame, const RigFeatures& features);
 
-  /// A pose from outside, as by a user. There is no result until a frame confirms it; after
+  /// Sets an external pose, for example from a user. There is no result until a frame confirms it; after
   /// max_frames_without_fix the whole map is searched.
   void seed(const PosePrior& pose);
 
-  /// Starts anew, as before the first frame.
+  /// Returns to the state before the first frame.
   void forget();
 
   const MapLocalizer& localizer() const { return localizer_; }
@@ -75,7 +75,7 @@ class DriveLocalizer {
   bool isLost() const;
   void track(const RigFeatures& features, LocalizationResult* result);
   void searchWholeMap(const ImageFrame& frame, const RigFeatures& features, LocalizationResult* result);
-  /// The unconfirmed pose of a relocalization, moved to this frame; none where there is no recent one.
+  /// The unconfirmed pose of a relocalization, moved to this frame; empty if there is no recent one.
   std::optional<RigidTransform> candidateNow(const ImageFrame& frame) const;
   bool isConfirmed(const RigidTransform& expected, const PoseFix& fix) const;
   PoseFix searchFrom(const std::optional<RigidTransform>& expected, const RigFeatures& features) const;
@@ -92,7 +92,7 @@ class DriveLocalizer {
   RigidTransform last_motion_;
   double last_period_s_ = 0.0;
   int frames_without_fix_ = 0;
-  bool is_seed_ = false;  // the filter's pose is from seed(), and no image has confirmed it
+  bool is_seed_ = false;  // the filter's pose is from seed() and not yet confirmed by images
   std::optional<Candidate> candidate_;
 };
 

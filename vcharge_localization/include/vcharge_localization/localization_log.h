@@ -11,22 +11,22 @@
 
 namespace vcharge {
 
-/// Names of localizationRow()'s values, comma separated.
+/// Names of the columns of localizationRow(), comma separated.
 std::string localizationHeader(const CameraRig& rig);
 
-/// A frame's result as comma separated values: time_s, status, the pose (empty where there is none), the
+/// A frame's result as comma separated values: time_s, status, the pose (empty if there is none), the
 /// upper triangle of its covariance row by row, matches, inliers, inliers by camera, second_best_ratio,
-/// fix_distance, since_fix_s, whether the whole map was searched, and the time it took.
+/// fix_distance, since_fix_s, whether the whole map was searched, and the processing time.
 std::string localizationRow(const LocalizationResult& result, const CameraRig& rig);
 
-/// Frames by status, what the fixes looked like, and what was wrong with the cameras, for people.
+/// Readable summary: number of frames by status, statistics of the fixes, and warnings about cameras.
 class LocalizationSummary {
  public:
   void add(const LocalizationResult& result);
   std::string text() const;
   int64_t numFrames() const;
   const std::map<LocalizationStatus, int64_t>& numFramesByStatus() const { return num_frames_; }
-  /// Each kind of warning: number of frames that had it, and its last text.
+  /// For each kind of warning, the number of frames that had it, and its last text.
   std::vector<std::pair<int64_t, std::string>> warnings() const;
 
  private:
@@ -37,7 +37,7 @@ class LocalizationSummary {
     int64_t num_frames = 0;
     std::string last_text;
   };
-  std::map<std::string, Warning> warnings_;  // by what is the same in every frame
+  std::map<std::string, Warning> warnings_;  // indexed by the text without numbers
 };
 
 }  // namespace vcharge

@@ -11,7 +11,7 @@
 
 namespace vcharge {
 
-/// Standard deviations of the odometer are per square root of the distance or turn that it counts.
+/// Options of PoseFilter. Odometry errors are standard deviations per square root of the distance or turn.
 struct PoseFilterOptions {
   VCHARGE_BEGIN_OPTIONS(PoseFilterOptions);
   VCHARGE_OPTION(double, scale_sigma, 0.02, notNegative(), "Sigma of true over counted distance.");
@@ -25,14 +25,14 @@ struct PoseFilterOptions {
   VCHARGE_END_OPTIONS();
 };
 
-/// The options with the errors of a map made from a rig's images: proportional to the angle of its pixels.
+/// Scales the options' map errors for a map made from this rig's images: proportional to the pixels' angle.
 PoseFilterOptions optionsForMapOf(const CameraRig& rig, const PoseFilterOptions& options);
 
-/// Fuses fixes with the odometer: an error-state Kalman filter over the vehicle's pose in the map and the
-/// odometer's factors, so that bridged stretches profit from factors that were estimated while there were
+/// Fuses fixes with odometry: an error-state Kalman filter over the vehicle's pose in the map and the
+/// odometer's factors. Intervals without fixes therefore use factors that were estimated from earlier
 /// fixes.
 ///
-/// Successive fixes share the error of the map, which averaging does not reduce. It is added to the
+/// Successive fixes have the error of the map in common, which averaging does not reduce. It is added to the
 /// covariance that pose() returns.
 class PoseFilter {
  public:
@@ -44,19 +44,19 @@ class PoseFilter {
   double distanceScale() const { return factors_[0]; }
   double turnScale() const { return factors_[1]; }
 
-  /// Replaces the pose. The odometer's factors stay.
+  /// Replaces the pose and keeps the odometer's factors.
   void reset(const PosePrior& pose);
   void forget() { has_pose_ = false; }
 
-  /// The vehicle moved as the odometer counted.
+  /// Predicts the pose after a motion measured by the odometer.
   void predict(const RigidTransform& previous_from_current, double period_s);
 
-  /// Adds uncertainty for motion that the odometer did not count.
+  /// Adds uncertainty for motion that the odometer did not measure.
   void addNoise(double sigma_m, double sigma_rad);
 
   /// Squared Mahalanobis distance between a fix and the predicted pose.
   double distanceOf(const PoseFix& fix) const;
-  /// False, without an effect, for a fix beyond the gate.
+  /// Corrects the pose by a fix. Returns false, without an effect, for a fix beyond the gate.
   bool update(const PoseFix& fix);
 
  private:
@@ -70,7 +70,7 @@ class PoseFilter {
   PoseFilterOptions options_;
   bool has_pose_ = false;
   RigidTransform map_from_vehicle_;
-  Eigen::Vector2d factors_ = Eigen::Vector2d::Ones();  ///< true over counted distance, and turn
+  Eigen::Vector2d factors_ = Eigen::Vector2d::Ones();  ///< ratios of true to measured distance and turn
   Matrix8d covariance_ = Matrix8d::Zero();             ///< [dt, dphi] in the map's frame, factors
 };
 

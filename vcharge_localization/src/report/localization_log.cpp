@@ -26,7 +26,7 @@ double latencyOf(const LocalizationResult& result) {
   return sum_s;
 }
 
-/// A warning without its numbers, which differ from frame to frame.
+/// Text of a warning without its numbers, which differ between frames.
 std::string kindOf(std::string warning) {
   const auto isDigit = [](unsigned char letter) { return std::isdigit(letter) != 0; };
   warning.erase(std::remove_if(warning.begin(), warning.end(), isDigit), warning.end());

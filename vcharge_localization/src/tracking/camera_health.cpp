@@ -12,12 +12,12 @@ namespace {
 
 constexpr int kSampleStep_px = 16;
 constexpr double kMinMotion_m = 0.01;
-constexpr double kMemory_frames = 12.0;  // time constant of the averages: one second
-// Fraction of a camera's features that fit the map, over that of the others: less means another view
-// direction.
+constexpr double kMemory_frames = 12.0;  // time constant of the averages; equals one second
+// Ratio of a camera's fraction of features that fit the map to that of the others. A smaller ratio means that
+// the camera looks in another direction than its extrinsics say.
 constexpr double kMinFound = 0.1;
 
-/// Pixels on a coarse grid. Noise makes the samples of two different images differ.
+/// Samples pixels on a coarse grid. Noise makes the samples of two different images differ.
 cv::Mat sampleOf(const cv::Mat& image) {
   cv::Mat sample(image.rows / kSampleStep_px + 1, image.cols / kSampleStep_px + 1, CV_8UC1, cv::Scalar(0));
   for (int y = 0; y * kSampleStep_px < image.rows; ++y) {

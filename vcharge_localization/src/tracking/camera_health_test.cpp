@@ -92,7 +92,7 @@ TEST_F(CameraHealthTest, ABumpedCameraIsNamedWithinThreeMemories) {
   addFeatures(60, 500);
   addFixes(24, 40, 40, 100);
   EXPECT_TRUE(health_.warnings().empty());
-  addFixes(32, 0, 40, 30);  // features near a projection by chance match, but fit no pose
+  addFixes(32, 0, 40, 30);  // features near a projection match by chance, but fit no pose
   ASSERT_EQ(health_.warnings().size(), 1u);
   EXPECT_EQ(health_.warnings()[0].find("left: hardly any"), 0u) << health_.warnings()[0];
 }

@@ -10,11 +10,11 @@
 namespace vcharge {
 namespace {
 
-// A relocalization is accepted once two frames agree within these bounds.
+// A relocalization is accepted when two frames agree within these bounds.
 constexpr double kConfirmation_m = 0.3;
 constexpr double kConfirmation_rad = 0.03;
 constexpr double kMaxConfirmation_s = 1.0;
-// Uncertainty of motion without odometry, beside that of going on as before.
+// Additional uncertainty of motion without odometry, which assumes a constant velocity.
 constexpr double kUnknownMotion_m_per_s = 1.0;
 constexpr double kUnknownTurn_rad_per_s = 0.3;
 
@@ -48,14 +48,14 @@ void DriveLocalizer::predict(const ImageFrame& frame) {
     last_period_s_ = period_s;
     filter_.predict(last_motion_, period_s);
   } else if (period_s > 0.0) {
-    // Without odometry the vehicle is assumed to go on as before.
+    // Without odometry, the vehicle is assumed to keep its velocity.
     const double ratio = last_period_s_ > 0.0 ? period_s / last_period_s_ : 0.0;
     if (ratio > 0.0 && ratio < 10.0) {
       filter_.predict(interpolate(RigidTransform(), last_motion_, ratio), period_s);
     }
     filter_.addNoise(kUnknownMotion_m_per_s * period_s, kUnknownTurn_rad_per_s * period_s);
   } else if (period_s < 0.0) {
-    forget();  // a replay
+    forget();  // the drive is replayed
   }
   last_stamp_ = frame.stamp;
   last_num_resets_ = frame.num_resets;
@@ -67,7 +67,7 @@ bool DriveLocalizer::isLost() const {
     return true;
   }
   if (is_seed_) {
-    return false;  // however uncertain: the next frames search there
+    return false;  // even if uncertain: the next frames search around this pose
   }
   const Eigen::Matrix<double, 6, 6> covariance = filter_.pose().covariance;
   return covariance.topLeftCorner<3, 3>().trace() > options_.lost_sigma_m * options_.lost_sigma_m ||

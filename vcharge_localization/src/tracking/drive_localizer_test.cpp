@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kPeriod_s = 0.08;
 constexpr double kStep_m = 0.2;
-constexpr double kRadius_m = 20.0;  // of the test map's circle
+constexpr double kRadius_m = 20.0;  // radius of the test map's circle
 
 /// A drive along the test map's circle with an odometer that measures 1 % too much.
 class DriveLocalizerTest : public ::testing::Test {
@@ -162,7 +162,7 @@ TEST_F(DriveLocalizerTest, TakesASeedAndChecksIt) {
 TEST_F(DriveLocalizerTest, TakesASeedThatIsLessCertainThanALostPose) {
   PosePrior prior;
   prior.map_from_vehicle = truthAt(way_m_) * RigidTransform::planar(0.3, -0.2, 0.03);
-  prior.covariance.diagonal() << 0.25, 0.25, 0.25, 7e-4, 7e-4, 0.07;  // what rviz sends
+  prior.covariance.diagonal() << 0.25, 0.25, 0.25, 7e-4, 7e-4, 0.07;  // covariance sent by rviz
   localizer_.seed(prior);
   const LocalizationResult result = drive(1);
   EXPECT_EQ(result.status, LocalizationStatus::kLocalized);

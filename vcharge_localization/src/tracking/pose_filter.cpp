@@ -13,7 +13,7 @@
 namespace vcharge {
 namespace {
 
-// Noise of the odometer that depends little on the car: random walk of the factors and heights and tilts of
+// Odometer noise that depends little on the car: random walk of the factors, and heights and tilts of
 // the road per metre, heading noise per radian of turn, and drift per second, all per square root.
 constexpr double kFactorWalk = 0.001;
 constexpr double kYawTurnSigma = 0.01;
@@ -77,7 +77,7 @@ void PoseFilter::predict(const RigidTransform& previous_from_current, double per
   }
   const double distance_m = previous_from_current.translation().norm();
   const double turn_rad = yawOfRotation(previous_from_current.rotation());
-  // A correction of the turn rotates the chord by half of it, as in the adjustment of the map.
+  // A correction of the turn rotates the chord by half of it, as in the adjustment of maps.
   const Eigen::Matrix3d bend =
       Eigen::AngleAxisd(0.5 * (factors_[1] - 1.0) * turn_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   const Eigen::Vector3d counted = bend * previous_from_current.translation();

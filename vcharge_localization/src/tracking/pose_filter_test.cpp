@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kPeriod_s = 0.08;
 
-/// A drive in a gentle curve: the truth, and an odometer with wrong factors.
+/// A drive along a gentle curve: true poses, and an odometer with wrong factors.
 struct Drive {
   RigidTransform map_from_vehicle;
   double counted_per_true_distance = 0.98, counted_per_true_turn = 1.01;
@@ -74,7 +74,7 @@ TEST(PoseFilterTest, LearnsTheOdometersFactorsAndBridgesByThem) {
 TEST(PoseFilterTest, ErrorAgreesWithTheCovariance) {
   // Fixes cannot reveal the error of the map itself.
   PoseFilterOptions options;
-  options.fix_covariance_factor = 1.0;  // the covariances of these fixes are true
+  options.fix_covariance_factor = 1.0;  // these fixes have exact covariances
   double sum = 0.0;
   int count = 0;
   for (uint32_t seed = 1; seed <= 60; ++seed) {
@@ -161,8 +161,8 @@ TEST(PoseFilterTest, CovarianceStaysSymmetricAndPositive) {
 TEST(PoseFilterTest, ErrorsOfMapsAreProportionalToTheAngleOfPixels) {
   const PoseFilterOptions options;
   struct Case {
-    std::array<double, 2> pixels_rad;  // widths for two cameras; their angles are a little smaller
-    double factor;                     // on the map's errors
+    std::array<double, 2> pixels_rad;  // pixel widths of two cameras; their angles are slightly smaller
+    double factor;                     // expected factor on the map's errors
   };
   for (const auto& [pixels_rad, factor] :
        {Case{{0.001, 0.001}, 0.5}, Case{{0.003, 0.005}, 0.8}, Case{{0.005, 0.005}, 1.0},

@@ -7,8 +7,8 @@
 
 namespace vcharge {
 
-/// A readable description of a map: its size, reprojection errors, loops and provenance. `list_loop_edges`
-/// names every loop edge, not only their counts.
+/// A readable description of a map: size, reprojection errors, loops and provenance. `list_loop_edges`:
+/// lists every loop edge in addition to their counts.
 std::string describeMap(const SparseMap& map, const MapProvenance& provenance, bool list_loop_edges = false);
 
 /// The poses of the keyframes, map_from_vehicle.

@@ -18,11 +18,11 @@ struct MapVerdict {
 std::string toString(MapGrade grade);  ///< "GOOD", "CHECK", "BAD"
 
 /// Assesses a map without ground truth: landmarks per keyframe, reprojection error, loops, motion models, the
-/// odometer's factors, and skipped frames. `state` is the one after finish().
+/// odometer's factors, and skipped frames. `state` is the mapper's state after finish().
 MapVerdict judgeMap(const SparseMap& map, const ReconstructionState& state);
 
 /// A self-contained HTML page: verdict, path and landmarks from above, loop edges, motion along the drive,
-/// landmarks in view, errors by camera, times by stage, skipped frames.
+/// number of visible landmarks, errors by camera, times by stage, skipped frames.
 std::string makeMapReport(const std::string& title, const SparseMap& map, const ReconstructionState& state);
 
 }  // namespace vcharge

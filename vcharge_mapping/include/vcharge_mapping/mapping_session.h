@@ -15,23 +15,23 @@
 
 namespace vcharge {
 
-/// Maps a live drive: feeds a SparseMapper, and finishes the map in a thread of its own. Images that arrive
-/// after finish() are counted and not used. After a failure a new drive begins. The source serializes the
-/// calls of DriveConsumer; the others may come from any thread.
+/// Maps a live drive: feeds a SparseMapper, and finishes the map in a separate thread. Images that arrive
+/// after finish() are only counted. After a failure a new drive begins. The source must serialize the
+/// calls of DriveConsumer; other functions may be called from any thread.
 class MappingSession : public DriveConsumer {
  public:
   enum class Phase { kFollowing, kFinishing, kFinished };
   struct Status {
     Phase phase = Phase::kFollowing;
-    std::string message;  ///< one line
-    std::string failure;  ///< why the last drive made no map; empty without a failure
-    std::vector<std::pair<std::string, int64_t>> counts;  ///< of frames, keyframes and skipped frames
+    std::string message;  ///< one line: the current activity or result
+    std::string failure;  ///< why the last drive gave no map; empty without a failure
+    std::vector<std::pair<std::string, int64_t>> counts;  ///< numbers of frames, keyframes and skipped frames
   };
   using KeyframeCallback = std::function<void(const ReconstructionState&)>;
   using MapCallback = std::function<void(const SparseMap&)>;
 
   /// `on_keyframe` is called inside addImage() and addOdometry() after new keyframes; `on_map` in the thread
-  /// that made the map. Neither may throw. Errors as those of SparseMapper.
+  /// that made the map. Neither may throw. The constructor throws the errors of SparseMapper.
   MappingSession(std::shared_ptr<const CameraRig> rig, const SparseMapperOptions& options,
                  KeyframeCallback on_keyframe, MapCallback on_map);
   /// Abandons an unfinished map at the end of its stage.
@@ -46,7 +46,7 @@ class MappingSession : public DriveConsumer {
   bool finish(std::string* message);
 
   Status status() const;
-  /// Null before it is finished.
+  /// The finished map; null before.
   std::shared_ptr<const SparseMap> map() const;
 
  private:
@@ -62,9 +62,9 @@ class MappingSession : public DriveConsumer {
   std::unique_ptr<SparseMapper> mapper_;
   size_t num_keyframes_told_ = 0;
 
-  mutable std::mutex status_mutex_;  // never held during work
+  mutable std::mutex status_mutex_;  // never held during long work
   Status status_;
-  int64_t num_ignored_images_ = 0;  // after finish()
+  int64_t num_ignored_images_ = 0;  // images after finish()
   std::shared_ptr<const SparseMap> map_;
 
   std::atomic<bool> stop_{false};

@@ -12,7 +12,7 @@
 
 namespace vcharge {
 
-/// Makes a sparse map of a drive (paper, section Sparse Mapping): feed it the drive, then call finish().
+/// Makes a sparse map of a drive (paper, section Sparse Mapping): add the drive, then call finish().
 /// Needs a rig with extrinsics. Data parallel inside; the same input gives the same map on any number of
 /// threads.
 class SparseMapper : public DriveConsumer {
@@ -27,14 +27,14 @@ class SparseMapper : public DriveConsumer {
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
 
-  /// The map of the drive so far. InputError where the drive does not suffice, with the reason. The callback
-  /// may be empty, and may throw to end the work; the mapper is then of no more use.
+  /// Makes the map of the drive so far. InputError, with reason, if the drive does not suffice. The callback
+  /// may be empty, and may throw to end the work; the mapper must not be used afterwards.
   std::shared_ptr<const SparseMap> finish(const StageCallback& progress);
 
   const ReconstructionReport& report() const { return state_.report; }
-  /// Poses of all frames in the map, after finish().
+  /// Poses of all frames in the map; valid after finish().
   Trajectory trajectory() const { return trajectoryOf(state_); }
-  /// The reconstruction so far.
+  /// The current reconstruction.
   const ReconstructionState& state() const { return state_; }
 
  private:

@@ -6,7 +6,7 @@
 namespace vcharge {
 namespace {
 
-/// Thrown through the mapper to end its work.
+/// Exception that ends the mapper's work.
 struct Abandoned {};
 
 }  // namespace
@@ -82,7 +82,7 @@ bool MappingSession::finish(std::string* message) {
     status_.failure.clear();
   }
   if (worker_.joinable()) {
-    worker_.join();  // it has returned: its drive made no map
+    worker_.join();  // it has returned, and its drive gave no map
   }
   worker_ = std::thread([this] { run(); });
   *message = "making the map of " + std::to_string(mapper_->state().data.keyframes.size()) +

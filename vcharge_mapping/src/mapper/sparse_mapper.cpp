@@ -12,7 +12,7 @@
 namespace vcharge {
 namespace {
 
-/// Largest angle between a ray and its point before the first adjustment: chained motions drift.
+/// Largest angle between a ray and its point before the first adjustment; large because odometry drifts.
 constexpr double kFirstMaxError_rad = 0.02;
 
 }  // namespace

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kDegreesPerRadian = 57.29577951308232;
 
-/// Appends text with the format of printf.
+/// Appends text, formatted as by printf.
 __attribute__((format(printf, 2, 3))) void append(std::string* text, const char* format, ...) {
   va_list arguments, again;
   va_start(arguments, format);
@@ -23,7 +23,7 @@ __attribute__((format(printf, 2, 3))) void append(std::string* text, const char*
   va_end(arguments);
   check(length >= 0, "append: bad format");
   const size_t old_size = text->size();
-  text->resize(old_size + static_cast<size_t>(length) + 1);  // vsnprintf ends with a zero
+  text->resize(old_size + static_cast<size_t>(length) + 1);  // vsnprintf writes a terminating zero
   std::vsnprintf(&(*text)[old_size], static_cast<size_t>(length) + 1, format, again);
   va_end(again);
   text->pop_back();

@@ -16,7 +16,7 @@ namespace {
 using Points = std::vector<Eigen::Vector2d>;
 
 constexpr size_t kMaxDrawnLandmarks = 30000;
-constexpr double kMargin_m = 12.0;  // shown around the path
+constexpr double kMargin_m = 12.0;  // area shown around the path
 constexpr const char* kPathCss = "stroke=\"#333\" stroke-width=\"1.5\"";
 // Colours from the lowest to the highest landmark.
 constexpr std::array<const char*, 6> kHeightColours = {"#3b4cc0", "#4f8fd0", "#35a79c",
@@ -42,7 +42,7 @@ SvgPlot plotAround(const Points& path, double margin_m) {
                  {box.min().y() - margin_m, box.max().y() + margin_m}, 0.0, true, "x (m)", "y (m)");
 }
 
-/// Distance driven until each keyframe.
+/// Distance driven up to each keyframe.
 std::vector<double> travelled(const SparseMap& map) {
   std::vector<double> way_m(map.keyframes().size(), 0.0);
   for (size_t k = 1; k < way_m.size(); ++k) {
@@ -53,7 +53,7 @@ std::vector<double> travelled(const SparseMap& map) {
   return way_m;
 }
 
-/// The frames and the distance driven until each.
+/// The frames, and the distance driven up to each.
 struct FramePlaces {
   std::vector<Eigen::Vector3d> position_m;
   std::vector<double> way_m;
@@ -236,7 +236,7 @@ std::string drawLandmarkCounts(const SparseMap& map) {
 
 std::string drawErrors(const SparseMap& map) {
   constexpr int kBins = 40;
-  constexpr double kBinsPerSigma = 10.0;  // of the RMS per coordinate over all cameras
+  constexpr double kBinsPerSigma = 10.0;  // bins per RMS error per coordinate over all cameras
   std::vector<std::vector<double>> errors_of(map.rig().cameras.size());
   double sum_px2 = 0.0;
   size_t count = 0;

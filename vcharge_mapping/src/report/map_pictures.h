@@ -9,15 +9,15 @@ namespace vcharge {
 
 // Pictures of a map as <svg> elements.
 
-/// Path and landmarks from above, by height.
+/// Path and landmarks from above; colours show the landmarks' heights.
 std::string drawTopView(const SparseMap& map);
 /// Loop edges on the path: accepted, and rejected by reason.
 std::string drawLoops(const SparseMap& map);
-/// Path coloured by motion model.
+/// Path, coloured by motion model.
 std::string drawMotions(const ReconstructionState& state);
-/// Height of the path over the distance, in the same colours.
+/// Height of the path over the driven distance, coloured by motion model.
 std::string drawHeights(const ReconstructionState& state);
-/// Landmarks in view of all cameras and each over the distance.
+/// Number of visible landmarks over the driven distance, for all cameras and each camera.
 std::string drawLandmarkCounts(const SparseMap& map);
 /// Distribution of the reprojection errors by camera.
 std::string drawErrors(const SparseMap& map);

@@ -82,7 +82,7 @@ TEST_F(MapReportTest, RemarksOnEachDefect) {
   expect(MapGrade::kBad, "odometer alone");
   state_.report.num_motions = {0, 30, 9, 0};
   expect(MapGrade::kCheck, "unlike rolling wheels");
-  state_.report.num_motions = {0, 20, 0, 19};  // a ramp is no fault
+  state_.report.num_motions = {0, 20, 0, 19};  // a ramp is not a fault
   EXPECT_EQ(judge().grade, MapGrade::kGood);
   state_.data.odometry_distance_scale = 0.95;
   expect(MapGrade::kCheck, "true distances are 0.9500");

@@ -7,20 +7,20 @@
 namespace vcharge {
 namespace {
 
-// Landmarks observed at a keyframe; localization needs 20 matches.
+// Numbers of landmarks observed at a keyframe; localization needs 20 matches.
 constexpr int kFewLandmarks = 60;
 constexpr int kTooFewLandmarks = 20;
 constexpr double kMaxRatioWithFew = 0.05;
 // Reprojection errors per coordinate. Good tracks have about half a pixel in images of any size.
 constexpr double kHighError_px = 1.2;
 constexpr double kTooHighError_px = 3.0;
-// Ratios of the frames.
+// Ratios of all frames.
 constexpr double kManySkipped = 0.05;
 constexpr double kTooManySkipped = 0.3;
 constexpr double kManyByOdometry = 0.1;
 constexpr double kTooManyByOdometry = 0.5;
 constexpr double kManySlips = 0.1;
-// Deviation of the odometer's factors from 1: larger than that of a calibrated odometer, and of any.
+// Deviations of the odometer's factors from 1: larger than for a calibrated odometer, and for any odometer.
 constexpr double kOddFactor = 0.03;
 constexpr double kWrongFactor = 0.1;
 /// Ratio of contradicting to accepted loop edges.
@@ -30,7 +30,7 @@ class Judge {
  public:
   explicit Judge(MapVerdict* verdict) : verdict_(verdict) {}
 
-  /// Adds a remark for a number that should be small.
+  /// Adds a remark if a value exceeds the first or second bound.
   void atMost(double value, double odd, double bad, const std::string& remark) {
     if (value > odd) {
       add(value > bad ? MapGrade::kBad : MapGrade::kCheck, remark);

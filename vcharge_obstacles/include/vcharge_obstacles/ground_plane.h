@@ -9,7 +9,7 @@
 
 namespace vcharge {
 
-/// How far a fitted ground plane can be trusted.
+/// Reliability of a fitted ground plane.
 enum class GroundState {
   kMeasured,     ///< fitted to ground points
   kFewPoints,    ///< too few points: the nominal plane with the prior's uncertainty
@@ -23,8 +23,8 @@ struct GroundPlane {
   GroundState state = GroundState::kFewPoints;
   double offset_m = 0.0;
   Eigen::Vector2d slope{0.0, 0.0};
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of (offset_m, slope.x(), slope.y())
-  int num_points = 0;                                    ///< points on the plane
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< covariance of (offset_m, slope.x(), slope.y())
+  int num_points = 0;                                    ///< number of points on the plane
 
   /// Attitude of the body over the ground (REP 103: nose down and left side up are positive), and its height
   /// above the calibrated one.
@@ -37,7 +37,7 @@ struct GroundPlane {
   double sigmaAt_m(double x_m, double y_m) const;
 };
 
-/// While the ground plane is out of bounds, an obstacle must rise above everything that this tilt explains.
+/// Tilt assumed while the ground plane is out of bounds; an obstacle must then rise above such a ground.
 constexpr double kLostGroundTilt_rad = 0.0873;
 
 /// Options of fitGroundPlane.
@@ -54,7 +54,7 @@ struct GroundPlaneOptions {
 /// Points that may lie on the ground, as a structure of arrays.
 struct GroundCandidates {
   std::vector<float> x_m, y_m, z_m;  ///< in the vehicle frame
-  std::vector<float> sigma_m;        ///< of z
+  std::vector<float> sigma_m;        ///< standard deviation of z
   std::vector<float> weight;         ///< 0 to 1
 
   size_t size() const { return x_m.size(); }

@@ -22,9 +22,9 @@ struct GroundWatchOptions {
   VCHARGE_END_OPTIONS();
 };
 
-/// Detects ground whose appearance has changed: warps an earlier image of a camera into the present one by
-/// the ground plane and compares them. What moves, or rises above the ground, does not match. Motion stereo
-/// assumes a static scene and cannot range moving objects, whereas this comparison needs no range.
+/// Detects ground whose appearance has changed: warps an earlier image of a camera to the current pose with
+/// the ground plane and compares the images. Whatever moves or rises above the ground does not match. Motion
+/// stereo assumes a static scene and cannot range moving objects, but this comparison needs no range.
 /// Deterministic; not thread safe.
 class GroundWatch {
  public:
@@ -34,11 +34,11 @@ class GroundWatch {
   ~GroundWatch();
 
   /// Fraction of each cell's ground pixels that have changed, by PolarGrid::index. Empty if there is no
-  /// earlier image to compare with, or no ground plane. `image`: CV_8UC1 of the camera's size; of the pose,
-  /// x, y and yaw are used. std::logic_error for an image of another size.
+  /// earlier image to compare with, or no ground plane. `image`: CV_8UC1 of the camera's size. Uses only x, y
+  /// and yaw of the pose. std::logic_error for an image of another size.
   std::vector<float> compare(Timestamp stamp, const cv::Mat& image, const GroundPlane& ground,
                              const RigidTransform& fixed_from_vehicle);
-  /// Drops all earlier images, for poses that have jumped.
+  /// Drops all earlier images; call it when the poses have jumped.
   void clear();
 
  private:

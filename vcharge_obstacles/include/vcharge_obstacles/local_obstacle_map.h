@@ -15,7 +15,7 @@ namespace vcharge {
 class CellObserver;
 class GroundShadows;
 
-/// Bounds of a cell's log-odds, which keep the map able to revise a state.
+/// Bounds of a cell's log-odds; they ensure that a cell can change its state.
 constexpr double kMinCellLogOdds = -2.5;
 constexpr double kMaxCellLogOdds = 3.5;
 
@@ -47,7 +47,7 @@ struct LocalObstacleMapOptions {
   }
 };
 
-/// Obstacles and bare ground around the vehicle, fused over time and cameras as log-odds in a grid that
+/// Obstacles and free ground around the vehicle, fused over time and cameras as log-odds in a grid that
 /// scrolls with the vehicle in a fixed frame. A cell that is not observed again decays to unobserved with the
 /// distance driven, never with time: while the vehicle stands, motion stereo measures nothing, so all cells
 /// keep their state and only grow older.
@@ -55,7 +55,7 @@ struct LocalObstacleMapOptions {
 /// Deterministic; not thread safe.
 class LocalObstacleMap {
  public:
-  /// Error of a camera's motion across the ray to an obstacle, relative to the motion along it. It makes
+  /// Error of a camera's motion across the ray to an obstacle, relative to the motion along the ray. It makes
   /// ranges near the direction of travel uncertain, where stereo has little parallax.
   static constexpr double kParallaxSigma = 0.005;
 
@@ -63,10 +63,10 @@ class LocalObstacleMap {
 
   /// Sets the vehicle's pose (x, y and yaw are used): scrolls, and decays by the distance driven.
   void moveTo(Timestamp stamp, const RigidTransform& fixed_from_vehicle);
-  /// Adds what a camera observed from a pose; std::logic_error before the first moveTo(). `grid` is the
+  /// Adds the observation of a camera; std::logic_error before the first moveTo(). `grid` is the
   /// detector's.
   void add(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle);
-  /// Moves all cells into a fixed frame that has been corrected.
+  /// Moves all cells into a corrected fixed frame.
   void reanchor(const RigidTransform& new_from_old_fixed);
 
   /// The map at the last moveTo(); frame_id is left empty.
@@ -75,24 +75,24 @@ class LocalObstacleMap {
  private:
   struct Cell {
     float log_odds = 0.0F;
-    float weight = 0.0F;  // of the observations in the means below
-    float x_m = 0.0F;     // mean position of the obstacle, from the cell's corner
+    float weight = 0.0F;  // weight of the observations in the means below
+    float x_m = 0.0F;     // mean position of the obstacle relative to the cell's corner
     float y_m = 0.0F;
     float sigma_m = 0.0F;
     float height_m = 0.0F;
     float height_sigma_m = 0.0F;
-    float travel_m = 0.0F;          // distance driven at the last observation
+    float travel_m = 0.0F;          // driven distance at the last observation
     int64_t last_seen_ns = kNever;  // INT64_MIN: never
     int64_t last_occupied_ns = kNever;
     int64_t held_until_ns = kNever;  // the cell cannot become free before
   };
-  /// What a camera observes of the ground of one cell.
+  /// A camera's observation of the ground in one cell.
   struct GroundObservation;
-  /// A part of an obstacle, in the fixed frame.
+  /// Part of an obstacle, in the fixed frame.
   struct ObstaclePoint {
     Eigen::Vector2d point_m;
     double mass;
-    double sigma_m;  // along the ray
+    double sigma_m;  // standard deviation along the ray
     const PolarObstacle* obstacle;
   };
   static constexpr int64_t kNever = INT64_MIN;
@@ -121,7 +121,7 @@ class LocalObstacleMap {
   RigidTransform fixed_from_vehicle_;
   double travel_m_ = 0.0;
   Eigen::Vector2d travel_direction_{0.0, 0.0};                   // unit; zero before the first motion
-  std::map<std::string, Eigen::Vector2d> last_camera_position_;  // at its last observation
+  std::map<std::string, Eigen::Vector2d> last_camera_position_;  // camera position at its last observation
 };
 
 }  // namespace vcharge

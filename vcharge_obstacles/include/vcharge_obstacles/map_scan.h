@@ -4,9 +4,9 @@
 
 namespace vcharge {
 
-/// Scan through a map: the nearest obstacle in each of `num_rays` sectors around the vehicle frame's origin,
-/// and how far the cells of the sector are free without a gap. A range is the mean of the occupied cells
-/// within 0.2 m of the first one; for obstacles as low as a kerb it is that of the first cell, as the cells
+/// Computes a scan from a map: the nearest obstacle in each of `num_rays` sectors around the vehicle frame's
+/// origin, and the range up to which the sector's cells are free without a gap. A range is the mean of the
+/// cells within 0.2 m of the first occupied; for obstacles as low as a kerb, of the first alone, as the cells
 /// behind it are the kerb's top. A cell within half a cell of a sector's border counts in both sectors.
 ObstacleScan makeScan(const ObstacleMap& map, int num_rays);
 

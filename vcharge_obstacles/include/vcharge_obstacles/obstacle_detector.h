@@ -15,7 +15,7 @@
 
 namespace vcharge {
 
-/// Height of the obstacle with which the number of points in a cell is compared.
+/// Height of the reference obstacle, with which the number of points in a cell is compared.
 constexpr double kReferenceHeight_m = 0.2;
 
 /// Options of ObstacleDetector. Heights are above the ground.
@@ -43,55 +43,55 @@ struct ObstacleDetectorOptions {
   }
 };
 
-/// Something that stands on the ground, or hangs low above it, in one sector of a camera.
+/// An obstacle on the ground, or hanging low above it, in one sector of a camera.
 struct PolarObstacle {
   int ray = 0;
-  double range_m = 0.0;  ///< horizontal, from the camera; refined by the points in the cell
+  double range_m = 0.0;  ///< horizontal range from the camera; refined by the points in the cell
   double range_sigma_m = 0.0;
-  double height_m = 0.0;  ///< of the highest observed part
+  double height_m = 0.0;  ///< height of the highest observed part
   double height_sigma_m = 0.0;
   double bottom_m = 0.0;     ///< height of the lowest observed part
   bool is_off_axis = false;  ///< beyond max_off_axis_rad and kMaxOffAxisRange_m
-  bool is_ramp = false;      ///< its ranges rise without a gap to a higher obstacle: probably interpolated
-  double support = 0.0;      ///< its points over those of the reference obstacle, at most 1
-  double weight = 1.0;       ///< of this observation in the map
+  bool is_ramp = false;      ///< ranges rise without a gap to a higher obstacle: probably interpolated
+  double support = 0.0;      ///< number of points relative to the reference obstacle, at most 1
+  double weight = 1.0;       ///< weight of this observation in the map
 };
 
-/// What one range map shows around the camera. Vectors of floats are indexed by PolarGrid::index; their
-/// fractions are of the pixels that would show the ground of a cell.
+/// Obstacles and ground from one range map. Vectors of floats are indexed by PolarGrid::index; their
+/// fractions refer to the pixels that would show the ground of a cell.
 struct CameraObstacles {
   Timestamp stamp;
   std::string camera_name;
-  Eigen::Vector2d origin_m{0.0, 0.0};  ///< the camera in the vehicle frame
+  Eigen::Vector2d origin_m{0.0, 0.0};  ///< position of the camera in the vehicle frame
   double camera_height_m = 0.0;
   GroundPlane ground;
-  double known_fraction = 0.0;           ///< of the camera's valid pixels that have a range
-  std::vector<PolarObstacle> obstacles;  ///< by ray, then by range
-  /// Range by ray up to which bare ground makes a cell free; empty: no limit. Beyond it, too far off the
-  /// axis, bare ground only confirms free cells and weakens occupied ones.
+  double known_fraction = 0.0;           ///< fraction of the camera's valid pixels that have a range
+  std::vector<PolarObstacle> obstacles;  ///< sorted by ray, then by range
+  /// Range per ray up to which bare ground makes a cell free; empty: no limit. Beyond this range (too far off
+  /// the axis), bare ground only confirms free cells and weakens occupied ones.
   std::vector<double> free_to_m;
   std::vector<float> free_fraction;     ///< pixels that show bare ground
-  std::vector<float> hidden_fraction;   ///< pixels that show something on or before the ground
+  std::vector<float> hidden_fraction;   ///< pixels that show something on or in front of the ground
   std::vector<float> unknown_fraction;  ///< pixels without a range
-  /// Pixels that differ from an earlier image, from GroundWatch; empty if there was none to compare with.
+  /// Pixels that differ from an earlier image, from GroundWatch; empty if there was no earlier image.
   std::vector<float> changed_fraction;
-  ObstacleScan scan;  ///< the first obstacle on each ray
+  ObstacleScan scan;  ///< first obstacle on each ray
 };
 
 /// Finds obstacles in the range maps of one camera: points above the ground are collected in a polar grid and
 /// weighed against the evidence for bare ground (paper, section Obstacle Detection; Haene et al., IROS 2015).
 ///
-/// A measured ground point clears the strip in front of it, in which its ray is lower than min_height_m above
+/// A measured ground point clears the strip in front of it where its ray is lower than min_height_m above
 /// the ground. Unknown ranges, points beyond the grid and rays that pass higher clear nothing.
 ///
 /// Immutable and cheap to copy; one object may be used by any number of threads.
 class ObstacleDetector {
  public:
-  /// Beyond this range, obstacles off the optical axis hide ground but mark no cell of the map: there the
+  /// Beyond this range, obstacles off the optical axis hide ground but mark no cells of the map: there the
   /// lens resolves little, and another camera observes them better.
   static constexpr double kMaxOffAxisRange_m = 2.5;
-  /// Beyond this range, ground off the optical axis frees no cell: a dark flank may be matched as ground
-  /// there.
+  /// Beyond this range, ground off the optical axis does not free cells, because a dark flank may be matched
+  /// as ground there.
   static constexpr double kMaxOffAxisFree_m = 1.5;
 
   /// std::invalid_argument for bad options, or a camera that is not above the reference height.

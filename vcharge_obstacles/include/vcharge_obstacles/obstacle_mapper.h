@@ -16,8 +16,8 @@
 
 namespace vcharge {
 
-/// Frame in which the map's cells are fixed: the odometry's, or the sparse map's, in which localization
-/// corrects them.
+/// Frame in which the map's cells are fixed: the odometry's frame, or the sparse map's frame, in which
+/// localization corrects them.
 enum class FixedFrame { kOdom, kMap };
 template <>
 inline std::vector<std::string> enumNames<FixedFrame>() {
@@ -42,19 +42,19 @@ struct ObstacleMapperOptions {
 
   ObstacleMapperOptions() {
     frames.max_speed_m_per_s = 60.0;
-    frames.max_step_m = 0.15;  // smaller jumps than in other stages are visible in the cells
+    frames.max_step_m = 0.15;  // smaller jumps than in other stages would be visible in the cells
     frames.max_step_rad = 0.05;
   }
 };
 
-/// What a camera contributes to the map at present.
+/// Current contribution of a camera to the map.
 enum class ObstacleCameraState {
-  kNoRangeMaps,   ///< none yet, or they stopped while the vehicle drives
-  kNoPose,        ///< there is no odometry at the range maps' stamps
+  kNoRangeMaps,   ///< none yet, or they stopped during the drive
+  kNoPose,        ///< no odometry at the range maps' stamps
   kStanding,      ///< the vehicle stands: motion stereo measures nothing
   kHardlySees,    ///< few ranges: night, dirt, no texture
-  kGroundLost,    ///< the ground is tilted beyond the bounds: nothing is cleared
-  kGroundUnsure,  ///< few ground points: nothing is cleared
+  kGroundLost,    ///< the ground is tilted beyond the bounds: no cell is cleared
+  kGroundUnsure,  ///< few ground points: no cell is cleared
   kMapping,
 };
 std::string toString(ObstacleCameraState state);
@@ -63,24 +63,24 @@ struct ObstacleCameraStatus {
   std::string camera_name;
   ObstacleCameraState state = ObstacleCameraState::kNoRangeMaps;
   std::string message;  ///< one line for the user
-  GroundPlane ground;   ///< of the last range map
+  GroundPlane ground;   ///< ground plane of the last range map
   double known_fraction = 0.0;
   uint64_t range_maps = 0;
   uint64_t without_pose = 0;
-  uint64_t late = 0;  ///< ignored, because their stamp was fused before
+  uint64_t late = 0;  ///< ignored range maps: their stamp was already fused
 };
 
-/// The map after all range maps of one stamp. Without range maps a frame is emitted from time to time, and
+/// The map after all range maps of one stamp. Without range maps, a frame is emitted from time to time, and
 /// after a jump of the odometry an empty one at once. Stamps increase until the drive starts over: range maps
-/// that are not newer than the last frame are fused without a frame of their own.
+/// that are not newer than the last frame are fused without emitting a frame.
 struct ObstacleFrame {
   ObstacleMap map;
-  ObstacleScan scan;                     ///< through the fused map
-  std::vector<CameraObstacles> cameras;  ///< added at this stamp, in the rig's order
+  ObstacleScan scan;                     ///< scan of the fused map
+  std::vector<CameraObstacles> cameras;  ///< observations added at this stamp, in the rig's order
   std::vector<ObstacleCameraStatus> status;
 };
 
-/// Turns range maps and odometry into obstacle maps, for the nodelet and the offline tool alike. Range maps
+/// Turns range maps and odometry into obstacle maps; used by the nodelet and the offline tool. Range maps
 /// of one stamp are fused together, in the rig's order. Not thread safe.
 class ObstacleMapper {
  public:
@@ -93,18 +93,18 @@ class ObstacleMapper {
   ~ObstacleMapper();
 
   void addOdometry(const VehicleOdometry& odometry);
-  /// Localization's correction. Required with fixed_frame: map, ignored otherwise.
+  /// Sets localization's correction. Required with fixed_frame: map, ignored otherwise.
   void setMapFromOdom(const RigidTransform& map_from_odom);
-  /// InputError for a range map of a camera that is not in use, or that was made with another rig.
+  /// InputError for a range map of a camera that is not in use, or that was computed with another rig.
   void addRangeMap(const RangeMap& map);
-  /// Fuses what still waits at the end of the drive.
+  /// Fuses the waiting range maps at the end of the drive.
   void finish();
 
   /// One entry per camera in use, in the rig's order.
   std::vector<ObstacleCameraStatus> status() const;
   /// Number of times that the map was emptied because the odometry jumped.
   uint64_t numJumps() const { return num_jumps_; }
-  /// Number of stamps that wait for range maps or odometry.
+  /// Number of stamps that are waiting for range maps or odometry.
   size_t numWaiting() const { return assembler_->numWaiting(); }
   const FrameCounters& counters() const { return assembler_->counters(); }
 
@@ -131,11 +131,11 @@ class ObstacleMapper {
   const ObstacleMapperOptions options_;
   const FrameCallback on_frame_;
   const PolarGrid grid_;
-  std::vector<std::unique_ptr<Camera>> cameras_;  // by index in the rig; null where not in use
+  std::vector<std::unique_ptr<Camera>> cameras_;  // indexed as in the rig; null if not in use
   std::unique_ptr<FrameAssembler<Observation>> assembler_;
   LocalObstacleMap map_;
   std::optional<Timestamp> last_emitted_;
-  std::optional<Timestamp> last_heard_;  // odometry's stamp when the last range map came
+  std::optional<Timestamp> last_heard_;  // odometry's stamp when the last range map arrived
   RigidTransform map_from_odom_, anchor_;
   bool has_anchor_ = false;
   uint64_t num_jumps_ = 0;

@@ -8,7 +8,7 @@
 
 namespace vcharge {
 
-/// Range of the nearest bin of a polar grid.
+/// Near end of the nearest bin of a polar grid.
 constexpr double kMinPolarRange_m = 0.3;
 
 /// Options of PolarGrid. Ranges are horizontal distances from the camera.
@@ -37,7 +37,7 @@ class PolarGrid {
     const int ray = static_cast<int>(std::floor((angle_rad + M_PI) * inverse_increment_));
     return ray < 0 ? 0 : (ray >= num_rays_ ? num_rays_ - 1 : ray);
   }
-  /// Sector number modulo the number of sectors, for steps to neighbours.
+  /// Sector number modulo the number of sectors, for neighbouring sectors.
   int wrap(int ray) const { return (ray % num_rays_ + num_rays_) % num_rays_; }
   /// Direction of a sector's middle.
   double angle_rad(int ray) const { return -M_PI + (ray + 0.5) / inverse_increment_; }

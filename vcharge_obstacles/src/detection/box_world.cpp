@@ -14,8 +14,8 @@ namespace {
 constexpr double kMaxRange_m = 30.0;
 constexpr double kSmallestSigma_m = 0.005;
 
-/// Nearly normal number of variance one: a sum of four uniform ones, which every standard library computes
-/// alike.
+/// Approximately normal number of variance one: a sum of four uniform numbers, which all standard libraries
+/// compute identically.
 double normalNumber(std::mt19937* generator) {
   double sum = -2.0;
   for (int i = 0; i < 4; ++i) {

@@ -26,15 +26,15 @@ struct BoxWorld {
 
 /// Errors of simulated range maps.
 struct BoxWorldNoise {
-  double relative_sigma = 0.0;    ///< of the ranges, also reported as their standard deviation
-  double unknown_fraction = 0.0;  ///< of the pixels, chosen at random
+  double relative_sigma = 0.0;    ///< relative error of the ranges, also reported as their standard deviation
+  double unknown_fraction = 0.0;  ///< fraction of pixels without a range, chosen at random
   uint32_t seed = 1;
 };
 
-/// A rig of ideal cameras (256x160, 185 degrees): front, left and right, mounted as on a car.
+/// A rig of ideal cameras (256x160, 185 degrees) mounted as on a car: front, left and right.
 CameraRig makeBoxWorldRig();
 
-/// Range map of a camera of the rig; ranges beyond 30 m are unknown.
+/// Simulates the range map of a camera of the rig; ranges beyond 30 m are unknown.
 RangeMap measureBoxWorld(const BoxWorld& world, const RigCamera& camera,
                          const RigidTransform& world_from_vehicle, Timestamp stamp,
                          const BoxWorldNoise& noise = {});

@@ -12,13 +12,13 @@
 namespace vcharge {
 namespace {
 
-// Every so many-th pixel is a candidate for the ground plane.
+// Every n-th pixel is a candidate for the ground plane.
 constexpr size_t kGroundStride = 7;
 // Ranges with a larger relative standard deviation are not used.
 constexpr float kMaxRelativeSigma = 0.3F;
-// A ground point lies at least so many standard deviations below min_height_m.
+// A ground point lies at least this number of standard deviations below min_height_m.
 constexpr float kSureGroundSigmas = 1.0F;
-// Points deeper below the ground are wrong ranges.
+// Points further below the ground have wrong ranges.
 constexpr float kBelowGround_m = 0.08F;
 
 /// The plane and its covariance in single precision, for the loop over pixels.
@@ -36,7 +36,7 @@ struct PlaneTerms {
   Eigen::Matrix3f covariance;
 };
 
-/// Weights of the pixels that would show the ground of each cell, by what they show.
+/// Weights of the pixels that would show the ground of each cell, by what they actually show.
 struct GroundEvidence {
   explicit GroundEvidence(const PolarGrid& grid) : bare(grid), hidden(grid), unknown(grid) {}
   StripSum bare, hidden, unknown;
@@ -83,9 +83,9 @@ struct ObstacleDetector::Implementation {
   const Eigen::Vector3f position;
   const PixelRays rays;
   const ExpectedPixels expected;
-  const std::vector<double> overseen_m;  // by sector
-  std::vector<bool> is_off_axis;         // by sector
-  std::vector<double> free_to_m;         // by sector
+  const std::vector<double> overseen_m;  // one per sector, see overseenRange()
+  std::vector<bool> is_off_axis;         // one per sector
+  std::vector<double> free_to_m;         // one per sector
 };
 
 ObstacleDetector::ObstacleDetector(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera,
@@ -105,7 +105,7 @@ GroundCandidates ObstacleDetector::Implementation::collectGround(const RangeMap&
   const auto* range_m = map.range_m.ptr<float>();
   const auto* sigma_m = map.standard_deviation_m.ptr<float>();
   const auto* confidence = map.confidence.ptr<float>();
-  // Wider than the bounds, so that ground beyond them is detected.
+  // Wider than the bounds, so that ground out of bounds is detected.
   const double steepest = 2.5 * options.ground.max_tilt_rad;
   for (size_t i = 0; i < rays.size(); i += kGroundStride) {
     const int pixel = rays.pixel[i];
@@ -124,7 +124,7 @@ GroundCandidates ObstacleDetector::Implementation::collectGround(const RangeMap&
   return candidates;
 }
 
-/// Adds the strip of ground that a pixel would show if nothing stood on it.
+/// Adds the strip of ground that a pixel would show without obstacles.
 void ObstacleDetector::Implementation::addGroundStrip(size_t i, const GroundPlane& ground, float weight,
                                                       StripSum* sum) const {
   if (rays.z[i] < 0.0F) {
@@ -200,13 +200,13 @@ PolarPoints ObstacleDetector::Implementation::collectPoints(const RangeMap& map,
 std::vector<float> ObstacleDetector::Implementation::fractionOf(const std::vector<float>& weights) const {
   std::vector<float> fraction(weights.size(), 0.0F);
   for (size_t i = 0; i < weights.size(); ++i) {
-    // The additional pixel keeps one pixel from freeing a cell that hardly any pixel shows.
+    // The additional pixel prevents one pixel from freeing a cell that few pixels show.
     fraction[i] = std::min(1.0F, weights[i] / (expected.ground[i] + 1.0F));
   }
   return fraction;
 }
 
-/// Removes evidence for ground whose body above, if any, would lie outside the image.
+/// Removes evidence for ground if a body above it would lie outside the image.
 void ObstacleDetector::Implementation::dropOverhungGround(std::vector<float>* free_fraction) const {
   for (int ray = 0; ray < grid.numRays(); ++ray) {
     const double from_m = std::max(kMaxOffAxisRange_m, overseen_m[static_cast<size_t>(ray)]);

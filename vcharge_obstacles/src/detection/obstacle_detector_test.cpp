@@ -29,7 +29,7 @@ class ObstacleDetectorTest : public ::testing::Test {
                             *camera.vehicle_from_camera, options_)
         .detect(map);
   }
-  /// The scan's ray in a direction from the camera.
+  /// Index of the scan's ray in a direction from the camera.
   static size_t rayTo(const CameraObstacles& seen, double angle_rad) {
     return static_cast<size_t>(
         std::lround((angle_rad - seen.scan.angle_min_rad) / seen.scan.angle_increment_rad));
@@ -124,15 +124,15 @@ TEST_F(ObstacleDetectorTest, HighObstaclesAreWeightedByTheLogOddsOfTheirConfiden
   EXPECT_NEAR(weightAt(wall, 0.95), 1.0, 1e-6);
   EXPECT_NEAR(weightAt(wall, 0.75), std::log(3.0) / std::log(9.0), 1e-3);
   EXPECT_NEAR(weightAt(wall, 0.45), 0.0,
-              1e-6);  // probably wrong, but hides the ground behind all the same
+              1e-6);  // the obstacle is probably wrong, but hides the ground behind it
   EXPECT_NEAR(weightAt(wall, 0.85), std::log(0.85 / 0.15) / std::log(9.0), 1e-3);
   EXPECT_NEAR(weightAt(kerb, 0.85), 1.0, 1e-6);
 }
 
 TEST_F(ObstacleDetectorTest, GroundAboveWhichTheImageEndsIsNotFree) {
   const PolarGrid grid(options_.grid);
-  // Bare ground to the left of the left camera, whose image is masked above rays with the given fall per
-  // metre.
+  // Bare ground to the left of the left camera; the image is masked for rays that fall by less than this per
+  // metre of range.
   const auto freeFraction = [&](double fall, double range_m) {
     RigCamera camera = rig_.cameras[rig_.cameraIndex("left")];
     const RayTable rays(camera.model, camera.image_size_px, 2.0 * M_PI, camera.mask);
@@ -150,16 +150,16 @@ TEST_F(ObstacleDetectorTest, GroundAboveWhichTheImageEndsIsNotFree) {
     return seen.free_fraction[grid.index(grid.rayOf(0.5 * M_PI), bin)];
   };
   EXPECT_GT(freeFraction(-1.0, 3.6), 0.5F);  // not masked
-  // From 0.9 m height a ray that falls by 0.2 is 0.25 m above the ground at 3.25 m and meets it at 4.5 m.
+  // At 0.9 m camera height, a ray that falls by 0.2 is 0.25 m high at 3.25 m and meets the ground at 4.5 m.
   EXPECT_GT(freeFraction(0.2, 2.9), 0.5F);
   EXPECT_EQ(freeFraction(0.2, 3.6), 0.0F);
-  // Nearby ground is free, as another camera would observe a body there: 0.25 m at 1.6 m, the ground at 2.25
+  // Nearby ground is free, because another camera would observe a body there: 0.25 m at 1.6 m, ground at 2.25
   // m.
   EXPECT_GT(freeFraction(0.4, 2.0), 0.5F);
 }
 
 TEST_F(ObstacleDetectorTest, RampOfRangesUpToAWallHasALowWeight) {
-  // From 9 to 25 cm within 0.8 m, in steps of 1 cm: a slope of 0.2.
+  // A ramp that rises from 9 to 25 cm within 0.8 m in steps of 1 cm: a slope of 0.2.
   BoxWorld world{{{{-20.0, 3.2, 0.0}, {20.0, 3.4, 1.2}}}};
   for (int step = 0; step <= 16; ++step) {
     world.boxes.push_back({{-20.0, 2.4 + 0.05 * step, 0.0}, {20.0, 3.2, 0.09 + 0.01 * step}});
@@ -178,7 +178,7 @@ TEST_F(ObstacleDetectorTest, RampOfRangesUpToAWallHasALowWeight) {
 TEST_F(ObstacleDetectorTest, LowObstaclesInFrontOfAWallAreNoRamps) {
   const WorldBox wall{{-20.0, 3.4, 0.0}, {20.0, 3.6, 1.2}};
   const WorldBox pavement{{1.0, 2.4, 0.0}, {2.8, 3.4, 0.12}};  // no gap, but a flat top
-  const WorldBox box{{-20.0, 2.4, 0.0}, {20.0, 2.5, 0.25}};    // as high as a ramp, but leaves a gap
+  const WorldBox box{{-20.0, 2.4, 0.0}, {20.0, 2.5, 0.25}};    // as high as a ramp, but with a gap
   for (const WorldBox& low : {pavement, box}) {
     const CameraObstacles seen = detect({{wall, low}}, "left", {}, {0.005, 0.0, 3});
     const std::vector<PolarObstacle> found = onRay(seen, rayTo(seen, 0.5 * M_PI));
@@ -228,7 +228,7 @@ TEST_F(ObstacleDetectorTest, GroundTiltedByThreeDegreesIsReportedAndClearsNothin
     const CameraObstacles seen = detect(world, "left", pose, {0.01, 0.0, 4});
     EXPECT_EQ(seen.ground.state, GroundState::kOutOfBounds);
     EXPECT_EQ(*std::max_element(seen.free_fraction.begin(), seen.free_fraction.end()), 0.0F);
-    // A wall is still an obstacle, ground is not.
+    // A wall remains an obstacle, ground does not.
     EXPECT_NEAR(seen.scan.range_m[rayTo(seen, 0.5 * M_PI)], 2.02, 0.1);
     EXPECT_EQ(countObstacles(detect({}, "left", pose)), 0);
   }
@@ -267,7 +267,7 @@ TEST_F(ObstacleDetectorTest, SkyAndFarWallsClearNothing) {
 }
 
 TEST_F(ObstacleDetectorTest, DirtOnTheLensWithFarRangesIsNotGround) {
-  // Dirt has no parallax and gets the largest ranges, which lie below the ground on descending rays.
+  // Dirt has no parallax and gets the largest ranges; on descending rays these lie below the ground.
   const RigCamera& camera = rig_.cameras[rig_.cameraIndex("left")];
   RangeMap map = measureBoxWorld({}, camera, {}, Timestamp());
   map.range_m.rowRange(80, 88).setTo(40.0F);

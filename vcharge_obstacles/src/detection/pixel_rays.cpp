@@ -39,7 +39,7 @@ ExpectedPixels::ExpectedPixels(const PixelRays& rays, const PolarGrid& grid, dou
     if (rays.z[i] >= 0.0F) {
       continue;
     }
-    const float fall = -rays.z[i] / rays.horizontal[i];  // per metre of range
+    const float fall = -rays.z[i] / rays.horizontal[i];  // fall per metre of range
     ground_sum.add(rays.polar_ray[i], fall / height, fall / above_low, 1.0F);
     obstacle_sum.add(rays.polar_ray[i], fall / above_low, fall / above_reference, 1.0F);
   }

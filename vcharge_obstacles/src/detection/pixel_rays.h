@@ -18,8 +18,8 @@ struct PixelRays {
 
   std::vector<int32_t> pixel;      ///< row * columns + column
   std::vector<float> x, y, z;      ///< unit ray
-  std::vector<float> horizontal;   ///< its length projected on the ground
-  std::vector<int16_t> polar_ray;  ///< sector of the grid
+  std::vector<float> horizontal;   ///< length of the ray's projection on the ground
+  std::vector<int16_t> polar_ray;  ///< index of the grid's sector
 };
 
 /// Number of pixels of a camera that show each cell of the grid, for level ground.
@@ -32,11 +32,11 @@ struct ExpectedPixels {
   std::vector<float> obstacle;  ///< rays that would hit an obstacle between low_m and reference_m
 };
 
-/// Height up to which the underside of a body may hang over visible ground.
+/// Maximum height of a body's underside above visible ground.
 constexpr double kClearance_m = 0.25;
 
-/// Range by sector up to which the image shows the space kClearance_m above the ground. Beyond it, a body
-/// over visible ground may lie outside the image.
+/// Range per sector up to which the image shows the space kClearance_m above the ground. Beyond it, a body
+/// above visible ground may lie outside the image.
 std::vector<double> overseenRange(const PixelRays& rays, const PolarGrid& grid, double camera_height_m);
 
 /// Accumulates weights of strips between two inverse ranges of a sector, in constant time per strip.

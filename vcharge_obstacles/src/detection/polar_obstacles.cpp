@@ -16,13 +16,13 @@ constexpr double kTopFraction = 0.9;
 constexpr float kBareFraction = 0.4F;
 // An obstacle behind another one on its ray needs this support.
 constexpr double kMinSupportBehind = 0.5;
-// Weighted number of points of an obstacle, and their fraction of all points of the cell.
+// Minimum weighted number of points of an obstacle, and their minimum fraction of all points of the cell.
 constexpr double kMinPoints = 3.0;
 constexpr double kMinObstacleFraction = 0.4;
-// Obstacles on one ray.
+// Minimum distance between obstacles on one ray.
 constexpr double kMinSeparation_m = 0.4;
 constexpr int kMaxObstaclesPerRay = 3;
-// A ramp begins at an obstacle up to this height, rises to something higher within this length, has no larger
+// A ramp starts at an obstacle up to this height, rises to a higher one within this length, has no larger
 // gap, and is steeper than the flat top of a kerb.
 constexpr double kMaxRampHeight_m = 0.3;
 constexpr double kMaxRampLength_m = 1.3;
@@ -30,7 +30,7 @@ constexpr double kRampGap_m = 0.4;
 constexpr double kRampSlope = 0.05;
 // Points higher than a ramp by this belong to the obstacle behind it.
 constexpr double kRampRise_m = 0.05;
-// A shorter one is the foot of the high obstacle, which begins this far in front of it.
+// A shorter ramp is the foot of the high obstacle, which starts this far in front of it.
 constexpr double kRampLength_m = 0.3;
 constexpr double kRampFoot_m = 0.1;
 constexpr size_t kFewPoints = 4;
@@ -44,8 +44,8 @@ double medianOf(const std::vector<PolarPoint>& points, float PolarPoint::*member
   return quantile(std::move(values), 0.5);
 }
 
-/// Weight of an observation by its confidence, the probability that its ranges are correct. The points of a
-/// matching window are correct or wrong together, so their number does not count.
+/// Weight of an observation from its confidence, the probability that its ranges are correct. The points of a
+/// matching window are either all correct or all wrong, so their number does not count.
 double weightOfConfidence(double confidence) {
   const auto logOdds = [](double probability) { return std::log(probability / (1.0 - probability)); };
   constexpr double kCertain = 0.999;
@@ -60,7 +60,7 @@ double meanConfidence(const std::vector<PolarPoint>& points) {
   return sum / static_cast<double>(points.size());
 }
 
-/// Range and height of an obstacle from the points in its cell and the two beside it.
+/// Range and height of an obstacle from the points in its cell and the two neighbouring cells.
 PolarObstacle refine(int ray, const std::vector<PolarPoint>& points, double support) {
   PolarObstacle obstacle;
   obstacle.ray = ray;
@@ -83,7 +83,7 @@ PolarObstacle refine(int ray, const std::vector<PolarPoint>& points, double supp
   const double mean = sum_range / sum;
   const double spread_square = std::max(0.0, sum_square / sum - mean * mean);
   obstacle.range_m = middle_m + mean;
-  // Errors of neighbouring ranges are correlated, so the sigma is not divided by their number.
+  // Errors of neighbouring ranges are correlated, so sigma is not divided by the root of their number.
   obstacle.range_sigma_m = std::sqrt(sigma_m * sigma_m + spread_square);
   std::vector<double> heights;
   for (const PolarPoint& point : points) {
@@ -95,7 +95,7 @@ PolarObstacle refine(int ray, const std::vector<PolarPoint>& points, double supp
   return obstacle;
 }
 
-/// Points in a cell and its two neighbours over those of the reference obstacle; absent if there are too few.
+/// Number of points in a cell and its two neighbours relative to the reference obstacle; empty if too few.
 std::optional<double> supportOf(const PolarPoints& points, int ray, int bin, float expected,
                                 double min_support) {
   const float here = points.obstacleWeight(ray, bin);
@@ -115,8 +115,8 @@ std::optional<double> supportOf(const PolarPoints& points, int ray, int bin, flo
   return support;
 }
 
-/// Fraction of the pixels around a cell that show bare ground, as a single cell has few. Negative with hardly
-/// any pixel.
+/// Fraction of bare ground in the pixels around a cell, because a single cell has few. Negative if there are
+/// hardly any pixels.
 float bareFractionAround(const PolarGrid& grid, const std::vector<float>& free_fraction,
                          const std::vector<float>& expected_ground, int ray, int bin) {
   constexpr int kRays = 1;
@@ -135,7 +135,7 @@ float bareFractionAround(const PolarGrid& grid, const std::vector<float>& free_f
   return expected < kFewPixels ? -1.0F : bare / expected;
 }
 
-/// Slope of heights over ranges.
+/// Slope of a line through heights over ranges.
 double slopeOf(const std::vector<PolarPoint>& points) {
   double range_m = 0.0;
   double height_m = 0.0;
@@ -174,7 +174,7 @@ bool isRamp(const PolarPoints& points, const PolarObstacle& low) {
   if (end_m < low.range_m + kRampLength_m) {
     return false;
   }
-  // Points of the higher obstacle do not belong to the ramp.
+  // Points of the higher obstacle are not part of the ramp.
   run.erase(std::remove_if(run.begin(), run.end(),
                            [&](const PolarPoint& point) {
                              return point.range_m < low.range_m || point.range_m > end_m - kRampFoot_m ||
@@ -196,7 +196,7 @@ bool isRamp(const PolarPoints& points, const PolarObstacle& low) {
   return end_m - last_m <= kRampGap_m;
 }
 
-/// Kerbs have low confidence too, so only high obstacles are weighted by it.
+/// Weight of an obstacle; only high ones are weighted by confidence, since that of kerbs is low too.
 double weightOf(const PolarObstacle& obstacle, const std::vector<PolarPoint>& points) {
   if (obstacle.is_ramp) {
     return kRampWeight;
@@ -260,7 +260,7 @@ ObstacleScan makePolarScan(const PolarGrid& grid, const std::vector<PolarObstacl
                            const std::vector<float>& expected_ground) {
   ObstacleScan scan = ObstacleScan::unknown(static_cast<size_t>(grid.numRays()), grid.maxRange_m());
   for (auto obstacle = obstacles.rbegin(); obstacle != obstacles.rend(); ++obstacle) {
-    const auto ray = static_cast<size_t>(obstacle->ray);  // so that the first one of a ray is written last
+    const auto ray = static_cast<size_t>(obstacle->ray);  // writes the first of a ray last
     scan.range_m[ray] = static_cast<float>(obstacle->range_m);
     scan.range_sigma_m[ray] = static_cast<float>(obstacle->range_sigma_m);
     scan.height_m[ray] = static_cast<float>(obstacle->height_m);
@@ -272,7 +272,7 @@ ObstacleScan makePolarScan(const PolarGrid& grid, const std::vector<PolarObstacl
       const float bare_fraction = bareFractionAround(grid, free_fraction, expected_ground, ray, bin);
       const double bin_range_m = grid.range_m(bin);
       if (bare_fraction < 0.0F) {
-        continue;  // nearer than the image shows
+        continue;  // nearer than the range that the image shows
       }
       if (bare_fraction < kBareFraction || bin_range_m >= range_m) {
         break;

@@ -7,16 +7,16 @@
 
 namespace vcharge {
 
-/// Ranges interpolated between a high obstacle and the ground before it form a ramp, whose observations have
-/// this weight: it may be a kerb after all.
+/// Ranges interpolated between a high obstacle and the ground before it form a ramp. Its observations have
+/// this weight because it may also be a kerb.
 constexpr double kRampWeight = 0.25;
-/// Obstacles with this mean confidence have full weight.
+/// Obstacles with this mean confidence or more have full weight.
 constexpr double kReferenceConfidence = 0.9;
 
 /// A point that rises above the ground, in a cell of the polar grid.
 struct PolarPoint {
   int16_t ray, bin;
-  float range_m, range_sigma_m;  // horizontal
+  float range_m, range_sigma_m;  // horizontal range
   float height_m, height_sigma_m;
   float confidence;
   float weight;
@@ -54,7 +54,7 @@ class PolarPoints {
 };
 
 /// Cells with enough obstacle points, nearest first on each ray, refined by their points. expected_pixels:
-/// number that a reference obstacle would have, by PolarGrid::index.
+/// number of pixels that would show a reference obstacle, by PolarGrid::index.
 std::vector<PolarObstacle> findPolarObstacles(const PolarPoints& points,
                                               const std::vector<float>& expected_pixels, double min_support);
 

@@ -9,16 +9,16 @@
 namespace vcharge {
 namespace {
 
-// Half diagonal of a square cell over its side.
+// Half diagonal of a square cell relative to its side.
 constexpr double kHalfDiagonal = 0.7072;
-// Ground is blocked within this many sides of a cell around an obstacle, plus two sigmas of its range.
+// Ground is blocked within this number of cell sides around an obstacle, plus two sigmas of its range.
 constexpr double kMarginCells = 0.75;
-// A static obstacle is observed down to this height. Moving objects get wrong ranges and seem to hang higher.
+// A static obstacle is observed below this height. Moving objects get wrong ranges and seem to hang higher.
 constexpr double kStandsBelow_m = 0.25;
 // Angle by which the ground hidden by a static obstacle moves between two images, and margin in range.
 constexpr double kParallax_rad = 0.09;
 constexpr double kExplainedMargin_m = 0.3;
-// Obstacles this close to each other, sideways and in range, are parts of one body.
+// Obstacles within these distances of each other, sideways and in range, are parts of one body.
 constexpr double kGapWidth_m = 0.3;
 constexpr double kGapDepth_m = 0.3;
 
@@ -32,14 +32,14 @@ CellObserver::CellObserver(const CameraObstacles& seen, const PolarGrid& grid, d
   bridgeGaps();
 }
 
-/// The nearest obstacle on a ray, if it is high enough to be part of a body over visible ground.
+/// The nearest obstacle on a ray, if it is high enough to be part of a body above visible ground.
 const PolarObstacle* CellObserver::nearestBodyOn(int ray) const {
   const auto& obstacles = obstacles_of_ray_[static_cast<size_t>(grid_.wrap(ray))];
   return obstacles.empty() || obstacles.front()->height_m <= kClearance_m ? nullptr : obstacles.front();
 }
 
-/// Closes gaps in a dark body: stereo ranges its edges, plates and lamps, but only the ground below between
-/// them.
+/// Closes gaps in a dark body: stereo ranges its edges, plates and lamps, but between them only the ground
+/// below the body.
 void CellObserver::bridgeGaps() {
   bridge_m_.assign(static_cast<size_t>(grid_.numRays()), std::numeric_limits<double>::infinity());
   for (int ray = 0; ray < grid_.numRays(); ++ray) {
@@ -102,7 +102,7 @@ bool CellObserver::blocks(int ray, double range_m) const {
   }
   for (const PolarObstacle* obstacle : obstacles_of_ray_[static_cast<size_t>(ray)]) {
     const double margin_m = kMarginCells * cell_m_ + 2.0 * obstacle->range_sigma_m;
-    // Ground behind an obstacle that the camera cannot look over is a reflection.
+    // If the camera cannot look over an obstacle, the ground behind it is a reflection.
     const double sight_m = seen_.camera_height_m * (1.0 - obstacle->range_m / range_m);
     if (std::abs(obstacle->range_m - range_m) < margin_m ||
         (obstacle->range_m < range_m && sight_m < obstacle->height_m)) {

@@ -6,7 +6,7 @@
 
 namespace vcharge {
 
-/// What the rays of one camera that cross a cell of the map show of its ground. Fractions are of the pixels
+/// Ground of a cell of the map as shown by one camera's rays that cross it. Fractions refer to the pixels
 /// that would show it.
 struct CellObservation {
   double free_fraction = 0.0;
@@ -22,11 +22,11 @@ class CellObserver {
   /// seen and grid must outlive it; cell_m: side of the map's cells.
   CellObserver(const CameraObstacles& seen, const PolarGrid& grid, double cell_m);
 
-  /// Observes the cell in a direction (vehicle's axes) and at a range from the camera, whose bin is given.
+  /// Observes the cell at a direction (vehicle's axes) and a range from the camera, whose bin is given.
   /// Averages all rays that cross the cell; an obstacle on one of them blocks it.
   CellObservation observe(double angle_rad, double range_m, int bin) const;
-  /// Whether changed ground in that direction and range is due to an obstacle that stands there or in front
-  /// of it: what rises from the ground does not follow the warp by its plane.
+  /// Whether changed ground in that direction and range is explained by an obstacle that stands there or in
+  /// front of it, since whatever rises from the ground does not follow the warp by its plane.
   bool isExplained(double angle_rad, double range_m) const;
 
  private:
@@ -38,7 +38,7 @@ class CellObserver {
   const PolarGrid& grid_;
   const double cell_m_;
   std::vector<std::vector<const PolarObstacle*>> obstacles_of_ray_;
-  std::vector<double> bridge_m_;  // by ray: range of the body between two of its parts; else infinite
+  std::vector<double> bridge_m_;  // per ray: range of the body between two of its parts, else infinite
 };
 
 }  // namespace vcharge

@@ -5,7 +5,7 @@
 namespace vcharge {
 namespace {
 
-/// A camera 0.9 m above ground that it reports as bare everywhere, with obstacles that the test adds.
+/// A camera 0.9 m above the ground that reports bare ground everywhere, with obstacles that the test adds.
 class CellObserverTest : public ::testing::Test {
  protected:
   CellObserverTest() {

@@ -11,18 +11,18 @@
 namespace vcharge {
 namespace {
 
-// Factor on the weight of earlier observations, so that a cell follows the odometry's drift.
+// Factor on the weight of earlier observations; below 1, so that a cell follows the odometry's drift.
 constexpr float kMemory = 0.9F;
-// Distance along the ray, in sigmas, over which an observation is spread. Evidence further away would add up
-// over many observations with the same error.
+// Distance along the ray, in sigmas, over which an observation is spread. Evidence further away would
+// accumulate over many observations with the same error.
 constexpr double kObservationSigmas = 1.0;
-// Log-odds of an observation with full support and small sigma, and of one whose pixels all show ground.
+// Log-odds of an obstacle with full support and small sigma, and of a cell whose pixels all show ground.
 constexpr double kOccupiedLogOdds = 0.9;
 constexpr double kFreeLogOdds = 0.6;
-// Above this sigma an observation loses weight by the square: many uncertain observations with a common error
-// would mark ground far from the obstacle.
+// Above this sigma, an observation's weight falls with the square: many uncertain observations with a common
+// error would mark ground far from the obstacle.
 constexpr double kSharpSigma_m = 0.12;
-// Fractions of a cell's pixels: that show ground for any evidence of free ground; that hide ground for the
+// Minimum fractions of a cell's pixels: that show ground, for evidence of free ground; that hide ground, for
 // decay of a free cell; that have changed for a free cell to be reset.
 constexpr double kMinFreeFraction = 0.4;
 constexpr double kMinHiddenFraction = 0.5;
@@ -32,9 +32,9 @@ constexpr double kHiddenDecay = 0.5;
 constexpr double kUnknownDecay = 0.7;
 // Time for which changed ground cannot become free.
 constexpr double kChangedHold_s = 0.3;
-// Within this angle of the direction of travel missing ranges mean nothing: stereo has no parallax there.
+// Within this angle of the direction of travel missing ranges give no evidence: stereo has no parallax.
 constexpr double kBlindAngle_rad = 0.35;
-// Observations of a camera that moved less share their errors, and weigh less.
+// Observations of a camera that has moved less have correlated errors, and weigh less.
 constexpr double kIndependentMotion_m = 0.1;
 
 RigidTransform levelled(const RigidTransform& transform) {
@@ -88,7 +88,7 @@ void LocalObstacleMap::add(const CameraObstacles& seen, const PolarGrid& grid,
   addOccupied(seen, grid, level, weight);
 }
 
-/// Range maps from nearly the same position share most of their images, and therefore their errors.
+/// Weight of a camera's range map: maps from nearby positions use the same images, so errors correlate.
 double LocalObstacleMap::weightOf(const CameraObstacles& seen, const RigidTransform& fixed_from_vehicle) {
   const Eigen::Vector2d position = transformed(fixed_from_vehicle, seen.origin_m);
   const auto [last, is_first] = last_camera_position_.try_emplace(seen.camera_name, position);
@@ -100,9 +100,9 @@ double LocalObstacleMap::weightOf(const CameraObstacles& seen, const RigidTransf
 struct LocalObstacleMap::GroundObservation {
   int64_t x, y;  // index of the cell
   CellObservation cell;
-  bool in_shadow;  // hidden by an obstacle that was observed before
+  bool in_shadow;  // hidden by an obstacle observed earlier
   bool may_free;   // near enough to the camera's axis
-  bool explained;  // its change is due to a static obstacle
+  bool explained;  // the change is due to a static obstacle
 };
 
 GroundShadows LocalObstacleMap::shadowsFor(const CameraObstacles& seen,
@@ -174,7 +174,7 @@ void LocalObstacleMap::addGround(const CameraObstacles& seen, const PolarGrid& g
   }
 }
 
-/// Resets free cells whose ground has changed, and those around them.
+/// Resets free cells whose ground has changed, and the cells around them.
 void LocalObstacleMap::holdChanged(const std::vector<GroundObservation>& observations, Timestamp stamp) {
   for (const GroundObservation& ground : observations) {
     if (ground.cell.changed_fraction >= kMinChangedFraction) {
@@ -213,7 +213,7 @@ void LocalObstacleMap::addGroundObservation(const GroundObservation& ground, dou
     cell->travel_m = static_cast<float>(travel_m_);
   } else if (cell->log_odds < 0.0F &&
              (shows_ground || observed.hidden_fraction + observed.unknown_fraction >= kMinHiddenFraction)) {
-    // Something may stand there or in front of it now, so the cell decays towards unobserved.
+    // An obstacle may now be there or in front of it, so the cell decays towards unobserved.
     const bool hides = shows_ground || observed.hidden_fraction >= observed.unknown_fraction;
     cell->log_odds *= static_cast<float>(std::pow(hides ? kHiddenDecay : kUnknownDecay, weight));
   }
@@ -265,7 +265,7 @@ void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid&
     }
     const double width_m = obstacle.range_m * grid.increment_rad();
     const int across = std::max(1, static_cast<int>(std::ceil(width_m / cell_m)));
-    // Nearby, several rays meet one cell and together count as one observation.
+    // Close to the camera, several rays meet one cell and together count as one observation.
     const double ray_mass =
         weight * obstacle.weight * std::min(1.0, width_m / cell_m * 1.5) * std::max(0.3, obstacle.support);
     const double middle_rad = grid.angle_rad(obstacle.ray) + yaw_rad;
@@ -324,7 +324,7 @@ void LocalObstacleMap::reanchor(const RigidTransform& new_from_old_fixed) {
       moved.cells_.at(x, y) = cells_.at(old_x, old_y);
     }
   });
-  // Obstacles follow their points, so that none falls between two cells.
+  // Obstacles move with their points, so that none falls between two cells.
   cells_.forEach([&](int64_t x, int64_t y, const Cell& old) {
     const Eigen::Vector2d point_m =
         transformed(new_from_old, Eigen::Vector2d(x * cell_m + old.x_m, y * cell_m + old.y_m));

@@ -22,7 +22,7 @@ class LocalObstacleMapTest : public ::testing::Test {
     }
   }
 
-  /// One observation of all cameras from x, 80 ms after the previous one.
+  /// Adds one observation of all cameras from x, 80 ms after the previous one.
   void observe(const BoxWorld& world, double x_m, const BoxWorldNoise& noise = {0.01, 0.1, 1}) {
     stamp_ = stamp_ + durationFromSeconds(0.08);
     pose_ = RigidTransform::planar(x_m, 0.0, 0.0);
@@ -72,7 +72,7 @@ TEST_F(LocalObstacleMapTest, KeepsFreeOccupiedAndUnobservedApart) {
 TEST_F(LocalObstacleMapTest, ScanReportsThePersonWithinItsSigmas) {
   drive(kPerson, 0.0, 0.8);
   const ObstacleScan scan = makeScan(map_.snapshot(), 360);
-  // The near side of the person, from (0.8, 0).
+  // Towards the near side of the person, from (0.8, 0).
   const double angle_rad = std::atan2(2.8, 1.9 - 0.8);
   const auto ray =
       static_cast<size_t>(std::lround((angle_rad - scan.angle_min_rad) / scan.angle_increment_rad));
@@ -104,7 +104,7 @@ TEST_F(LocalObstacleMapTest, StandingKeepsStatesAndTheirAgeGrows) {
 TEST_F(LocalObstacleMapTest, UnobservedCellsDecayAndAreNeverFreed) {
   drive(kPerson, 0.0, 0.8);
   const ObstacleMap before = map_.snapshot();
-  // Without observations for 6 m; the person is still within the map.
+  // Drives 6 m without observations; the person is still within the map.
   for (int i = 1; i <= 60; ++i) {
     map_.moveTo(stamp_, RigidTransform::planar(0.8 + 0.1 * i, 0.0, 0.0));
   }
@@ -186,7 +186,7 @@ TEST_F(LocalObstacleMapTest, ReanchoringMovesObstaclesWithTheirFrame) {
   map_.reanchor(moved);
   const ObstacleMap map = map_.snapshot();
   const Eigen::Vector3d person = moved * Eigen::Vector3d(1.9, 2.85, 0.0);
-  bool found = false;  // in its cell or a neighbour
+  bool found = false;  // in the person's cell or a neighbour
   for (const double x : {-0.1, 0.0, 0.1}) {
     for (const double y : {-0.1, 0.0, 0.1}) {
       found = found || stateIn(map, person.x() + x, person.y() + y) == kCellOccupied;

@@ -9,7 +9,7 @@
 #include "fusion/obstacle_map_cells.h"
 #include "vcharge_obstacles/local_obstacle_map.h"
 
-// Single synthetic observations and their effect on a LocalObstacleMap.
+// Tests single synthetic observations and their effect on a LocalObstacleMap.
 
 namespace vcharge {
 namespace {
@@ -18,7 +18,7 @@ constexpr double kFlankY_m = 5.0;
 
 class ObstacleMapObservationsTest : public ::testing::Test {
  protected:
-  /// A camera above the vehicle's origin that observes bare ground in this fraction of every cell's pixels.
+  /// A camera above the vehicle's origin that observes this fraction of bare ground in every cell.
   CameraObstacles makeObservation(const std::string& camera_name, double camera_height_m,
                                   float free_fraction) const {
     CameraObstacles seen;
@@ -34,7 +34,7 @@ class ObstacleMapObservationsTest : public ::testing::Test {
   /// A low camera that observes bare ground everywhere, even under the body of a car.
   CameraObstacles makeGroundObservation() const { return makeObservation("front", 0.55, 1.0F); }
 
-  /// A camera at (x, 0) that observes a flank from (-1, kFlankY_m) to (1, kFlankY_m) with one error of all
+  /// A camera at (x, 0) that observes a flank from (-1, kFlankY_m) to (1, kFlankY_m), with one error in all
   /// ranges.
   CameraObstacles makeFlankObservation(double x_m, double sigma_m, double error_m) const {
     CameraObstacles seen = makeObservation("left", 0.9, 0.0F);
@@ -59,7 +59,7 @@ class ObstacleMapObservationsTest : public ::testing::Test {
     return obstacle;
   }
 
-  /// Number of observations until the first cell is occupied, at most 200. They are numbered from 1.
+  /// Number of observations until the first cell is occupied, at most 200. Observations are numbered from 1.
   static int observationsUntilOccupied(
       const std::function<void(int number, LocalObstacleMap* map)>& observe) {
     LocalObstacleMap map;
@@ -100,7 +100,7 @@ TEST_F(ObstacleMapObservationsTest, ObservationsWithoutWeightChangeNothing) {
 }
 
 TEST_F(ObstacleMapObservationsTest, ManyUncertainObservationsMarkNothingFarFromTheObstacle) {
-  // A passing camera whose ranges scatter according to their sigma.
+  // A passing camera whose range errors match their sigma.
   for (const double sigma_m : {0.05, 0.4}) {
     LocalObstacleMap map;
     for (int i = 0; i <= 100; ++i) {
@@ -112,7 +112,7 @@ TEST_F(ObstacleMapObservationsTest, ManyUncertainObservationsMarkNothingFarFromT
     const ObstacleMap result = map.snapshot();
     const int to_flank =
         static_cast<int>(std::lround((kFlankY_m - result.origin_m.y()) / result.cell_size_m));
-    // Allowed are the range error and the diagonal of a cell.
+    // Allows the range error and the diagonal of a cell.
     EXPECT_EQ(cv::countNonZero(result.state.rowRange(0, to_flank - 3) == kCellOccupied), 0) << sigma_m;
     if (sigma_m < 0.1) {
       EXPECT_EQ(stateIn(result, 0.05, kFlankY_m + 0.05), kCellOccupied);
@@ -149,7 +149,7 @@ TEST_F(ObstacleMapObservationsTest, GroundUnderABodyObservedByAnotherCameraIsNot
       EXPECT_EQ(stateIn(map.snapshot(), 0.05, near_y_m), kCellFree);
       EXPECT_EQ(stateIn(map.snapshot(), 0.05, under_y_m), may_be_seen ? kCellFree : kCellUnobserved)
           << height_m << " " << shadow_s;
-      // The flank is not observed any more.
+      // The flank is no longer observed.
       pass(15, 30, false);
       EXPECT_EQ(stateIn(map.snapshot(), 0.05, under_y_m), kCellFree);
     }
@@ -177,13 +177,13 @@ TEST_F(ObstacleMapObservationsTest, GroundFarOffTheAxisConfirmsFreeCellsAndFrees
   seen = observe(false, 8);
   EXPECT_EQ(stateIn(seen, 0.05, free_y_m), kCellFree);
   const int num_free = countCells(seen, kCellFree);
-  // Back and forth until a cell without observations would have decayed.
+  // Drives back and forth until a cell without observations would have decayed.
   for (int times = 0; times < 20; ++times) {
     seen = observe(true, 8);
   }
   EXPECT_EQ(stateIn(seen, 0.05, free_y_m), kCellFree);
   EXPECT_LE(countCells(seen, kCellFree), num_free);
-  // An obstacle that has gone becomes unobserved, not free.
+  // A removed obstacle becomes unobserved, not free.
   map = LocalObstacleMap();
   for (int i = 0; i < 8; ++i) {
     const RigidTransform pose = RigidTransform::planar(0.1 * i, 0.0, 0.0);
@@ -221,7 +221,7 @@ TEST_F(ObstacleMapObservationsTest, UncertainObservationsAccumulateSlowly) {
     seen.obstacles = {makeObstacle(grid_.rayOf(0.5 * M_PI), 3.02, sigma_m)};
     return observationsUntilOccupied([&](int number, LocalObstacleMap* map) {
       const RigidTransform pose = RigidTransform::planar(0.1 * number, 0.0, 0.0);
-      seen.origin_m.x() = 1.9 - 0.1 * number;  // the camera itself stays in place
+      seen.origin_m.x() = 1.9 - 0.1 * number;  // the camera itself does not move
       map->moveTo(stamp_, RigidTransform());
       map->add(seen, grid_, pose);
       seen.camera_name = std::to_string(number);  // each observation has full weight
@@ -241,7 +241,7 @@ TEST_F(ObstacleMapObservationsTest, RangesAlongTheTravelAreUncertain) {
     for (int i = 0; i < 40; ++i) {
       const RigidTransform pose = RigidTransform::planar(0.1 * i, 0.0, 0.0);
       map.moveTo(stamp_, pose);
-      seen.origin_m.x() = 3.6 - 0.1 * i;  // the camera itself stays in place
+      seen.origin_m.x() = 3.6 - 0.1 * i;  // the camera itself does not move
       seen.camera_name = std::to_string(i);
       map.add(seen, grid_, pose);
     }
@@ -253,7 +253,7 @@ TEST_F(ObstacleMapObservationsTest, RangesAlongTheTravelAreUncertain) {
   const double aside_m = sigmaAt(0.5 * M_PI - 0.01);
   const double ahead_m = sigmaAt(0.1);
   EXPECT_LT(aside_m, 0.06);
-  // The error of the direction of motion, at 0.1 rad from it.
+  // Includes the error of the direction of motion at 0.1 rad from it.
   EXPECT_GT(ahead_m, LocalObstacleMap::kParallaxSigma * 3.0 / std::tan(0.12));
 }
 

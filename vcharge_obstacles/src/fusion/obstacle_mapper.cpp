@@ -11,11 +11,11 @@
 namespace vcharge {
 namespace {
 
-// Below this speed the vehicle stands.
+// Below this speed, the vehicle counts as standing.
 constexpr double kStanding_m_per_s = 0.02;
-// After this time without any range map a map is emitted all the same.
+// If no range map arrives for this time, a map is emitted nevertheless.
 constexpr double kSilence_s = 0.5;
-// Corrections of map -> odom below these bounds are smaller than a cell and not applied. The bound on the
+// Corrections of map -> odom below these bounds are smaller than a cell and are ignored. The bound on the
 // angle is low because a turn moves cells far from the origin of the map.
 constexpr double kMinAnchorStep_m = 0.03;
 constexpr double kMinAnchorStep_rad = 0.003;
@@ -26,7 +26,7 @@ struct ObstacleMapper::Camera {
   size_t index = 0;
   std::unique_ptr<ObstacleDetector> detector;  // null before the first range map
   std::unique_ptr<GroundWatch> watch;
-  MeiCamera::Parameters parameters = MeiCamera::Parameters::Zero();  // of the range maps' camera
+  MeiCamera::Parameters parameters = MeiCamera::Parameters::Zero();  // camera of the range maps
   cv::Size size;
   ObstacleCameraStatus status;
 };
@@ -72,7 +72,7 @@ ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const Obsta
 
 ObstacleMapper::~ObstacleMapper() = default;
 
-/// Nothing in the map is where it was: the empty map is shown at once.
+/// Clears the map after a jump, because its cells have lost their positions, and emits it at once.
 void ObstacleMapper::startOver(DriveBreak drive_break, Timestamp stamp) {
   num_jumps_ += drive_break == DriveBreak::kReplay ? 0 : 1;
   map_ = LocalObstacleMap(options_.map);
@@ -195,7 +195,7 @@ void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle
     map_.add(obstacles, grid_, fixed_from_vehicle);
     cameras.push_back(&obstacles);
   }
-  if (!last_emitted_ || frame->stamp > *last_emitted_) {  // otherwise the next map shows it
+  if (!last_emitted_ || frame->stamp > *last_emitted_) {  // otherwise the next map includes it
     emit(map_, cameras);
   }
 }
@@ -213,9 +213,9 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const std::vector<const C
   on_frame_(frame);
 }
 
-/// Emits the map while no range maps come. Silence is measured by the arrival of range maps, not by their
-/// stamps, so that a lag is no silence. A stage that waits for everything cannot tell the two apart, and
-/// emits maps at range maps' stamps only.
+/// Emits the map while no range maps arrive. The time is measured by their arrival instead of their
+/// stamps, so that a delay is no interruption. A stage that waits for everything cannot distinguish them, and
+/// emits maps only at the stamps of range maps.
 void ObstacleMapper::emitWhenSilent() {
   const std::optional<VehicleOdometry>& odometry = assembler_->odometry().last();
   if (!odometry || !last_emitted_ || numWaiting() > 0 || options_.frames.waitsForEverything()) {
@@ -228,7 +228,7 @@ void ObstacleMapper::emitWhenSilent() {
 }
 
 /// Emits a moved copy of the map at a stamp without range maps. The map itself must not change, so that it
-/// depends on the range maps alone and not on when they arrive.
+/// depends only on the range maps and not on when they arrive.
 void ObstacleMapper::emitAt(Timestamp stamp) {
   const OdometryBuffer::Lookup pose = assembler_->odometry().lookup(stamp);
   const std::optional<RigidTransform> fixed_from_vehicle =

@@ -86,13 +86,13 @@ class ObstacleMapperTest : public ::testing::Test {
     }
     return newly;
   }
-  /// Without the front camera, which observes both sides.
+  /// A rig without the front camera, which observes both sides.
   static std::shared_ptr<const CameraRig> makeSideRig() {
     CameraRig rig = makeBoxWorldRig();
     rig.cameras.erase(rig.cameras.begin());
     return std::make_shared<const CameraRig>(rig);
   }
-  /// Number of free cells within 1 m of the side cameras along x, and between min_y_m and 3 m beyond.
+  /// Number of free cells within 1 m of the side cameras along x, and at y from min_y_m to 3 m more.
   int countFreeBeside(double min_y_m) const {
     const double middle = frames_.back().map.fixed_from_vehicle.translation().x() + 1.9;
     int free = 0;

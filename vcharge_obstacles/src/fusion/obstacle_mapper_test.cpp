@@ -107,7 +107,7 @@ TEST_F(ObstacleMapperTest, CellsFollowTheMapFrame) {
   start();
   drive(0, 40);
   mapper_->finish();
-  EXPECT_TRUE(frames_.empty());  // no pose without map -> odom
+  EXPECT_TRUE(frames_.empty());  // without map -> odom there is no pose
   start();
   mapper_->setMapFromOdom(RigidTransform::planar(10.0, 5.0, 0.0));
   drive(0, 40);

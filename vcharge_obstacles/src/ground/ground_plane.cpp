@@ -11,14 +11,14 @@ namespace {
 // Widths of the kernel. The first covers the residuals of far points at the largest tilt, so that no initial
 // value is needed; the last is the scatter of ground points.
 constexpr double kKernelWidths_m[] = {0.15, 0.10, 0.07, 0.05, 0.035, 0.025, 0.025, 0.025};
-// Points within so many of the last widths are inliers.
+// Points within this multiple of the last width are inliers.
 constexpr double kInlierWidths = 2.0;
-// Fewer inliers are no measurement.
+// A fit with fewer inliers is not a measurement.
 constexpr int kMinInliers = 200;
-// Standard deviations of a car body on its suspension.
+// Standard deviations of the attitude and height of a car body on its suspension.
 constexpr double kPriorTiltSigma_rad = 0.012;
 constexpr double kPriorOffsetSigma_m = 0.02;
-// Fraction of the points that are independent: matching windows overlap.
+// Fraction of the points that are independent, because matching windows overlap.
 constexpr double kIndependentFraction = 0.02;
 
 struct NormalEquations {

@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kDegree = M_PI / 180.0;
 
-/// Ground beside the vehicle, with a fraction of the points on a wall that stands on it.
+/// Ground beside the vehicle; a fraction of the points is on a wall that stands on it.
 GroundCandidates makeGround(double offset_m, double slope_x, double slope_y, double wall_fraction = 0.0) {
   GroundCandidates points;
   std::mt19937 generator(3);

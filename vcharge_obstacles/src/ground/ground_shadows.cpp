@@ -23,7 +23,7 @@ int GroundShadows::directionOf(double angle_rad) {
 void GroundShadows::add(const Eigen::Vector2d& offset_m, double cell_m, double height_m) {
   const double range_m = offset_m.norm();
   if (range_m < cell_m) {
-    return;  // the camera stands over the cell
+    return;  // the camera is above the cell
   }
   // The cell itself is left out: ground may be visible in front of its obstacle.
   const double from_m = range_m + 0.75 * cell_m;

@@ -7,14 +7,14 @@
 
 namespace vcharge {
 
-/// Ground that obstacles in the map hide from a camera. Range maps may contradict it: under the body of a car
-/// ground is visible, although nothing there is free.
+/// Ground that obstacles in the map hide from a camera. Range maps may show it nevertheless: ground under the
+/// body of a car is visible, but not free.
 class GroundShadows {
  public:
-  explicit GroundShadows(double camera_height_m);  ///< above the ground
+  explicit GroundShadows(double camera_height_m);  ///< height above the ground
 
-  /// Adds an obstacle in a square cell. offset_m: from the camera to the cell's middle; all offsets share
-  /// axes.
+  /// Adds an obstacle in a square cell. offset_m: from the camera to the cell's middle; all offsets have
+  /// the same axes.
   void add(const Eigen::Vector2d& offset_m, double cell_m, double height_m);
   /// Whether the line of sight to the ground at an offset passes through an obstacle.
   bool hides(const Eigen::Vector2d& offset_m) const;
@@ -23,7 +23,7 @@ class GroundShadows {
   static int directionOf(double angle_rad);
 
   double camera_height_m_;
-  std::vector<std::vector<std::pair<double, double>>> hidden_m_;  // from, to; by direction
+  std::vector<std::vector<std::pair<double, double>>> hidden_m_;  // intervals [from, to] by direction
 };
 
 }  // namespace vcharge

@@ -14,18 +14,18 @@ namespace {
 
 // Images are smoothed over this window before they are compared.
 constexpr int kSmoothing_px = 3;
-// Error of the warp that is tolerated.
+// Tolerated error of the warp.
 constexpr int kSlack_px = 1;
-// Age of the image that is compared with the present one: the nearest one up to the maximum is taken.
+// Desired age of the image that is compared with the current one; the nearest up to the maximum is used.
 constexpr double kInterval_s = 0.24;
 constexpr double kMaxInterval_s = 1.0;
 // Differences below this fraction of the brightness are noise.
 constexpr float kRelativeDifference = 0.05F;
-// The gain between two images is estimated from at least so many pixels of at least this brightness.
+// The gain between two images is estimated from at least this number of pixels of this brightness or more.
 constexpr size_t kMinCompared = 200;
 constexpr float kMinBrightness = 8.0F;
 
-/// An image with which later ones are compared.
+/// An image to compare later images with.
 struct View {
   Timestamp stamp;
   RigidTransform fixed_from_body;
@@ -89,7 +89,7 @@ struct GroundWatch::Implementation {
   std::deque<View> views;
 };
 
-/// The view whose age is nearest to the interval; null without one.
+/// The view whose age is nearest to the interval; null if there is none.
 const View* GroundWatch::Implementation::viewBefore(Timestamp stamp) const {
   const View* best = nullptr;
   for (const View& view : views) {
@@ -116,7 +116,7 @@ std::vector<Comparison> GroundWatch::Implementation::comparePixels(const View& n
       camera.z() - static_cast<float>(ground.offset_m) - slope_x * camera.x() - slope_y * camera.y();
   const auto xi = static_cast<float>(model.xi());
   const auto max_distance = static_cast<float>(max_distance_m);
-  // The detector's default min_height_m: a pixel covers the strip in which its ray is lower.
+  // The detector's default min_height_m: a pixel covers the strip where its ray is lower than this.
   constexpr float kLow_m = 0.08F;
   std::vector<Comparison> pixels;
   pixels.reserve(rays.size() / 2);
@@ -154,7 +154,7 @@ std::vector<Comparison> GroundWatch::Implementation::comparePixels(const View& n
 }
 
 std::vector<float> GroundWatch::Implementation::changedFraction(const std::vector<Comparison>& pixels) const {
-  // The exposure may have changed; most of the ground has not, so the median ratio is the gain.
+  // The exposure may have changed. Most of the ground has not, so the median ratio is the gain.
   std::vector<float> ratios;
   ratios.reserve(pixels.size());
   for (const Comparison& pixel : pixels) {
@@ -182,7 +182,7 @@ std::vector<float> GroundWatch::Implementation::changedFraction(const std::vecto
   std::vector<float> fraction = changed.finish();
   const std::vector<float> all = compared.finish();
   for (size_t i = 0; i < fraction.size(); ++i) {
-    fraction[i] /= all[i] + 1.0F;  // the additional pixel keeps single pixels from deciding
+    fraction[i] /= all[i] + 1.0F;  // the additional pixel reduces the effect of single pixels
   }
   return fraction;
 }

@@ -137,7 +137,7 @@ TEST_F(GroundWatchTest, GroundUnderAnArrivingPersonIsChanged) {
 
 TEST_F(GroundWatchTest, PersonWalkingAlongsideIsDetectedWithoutARange) {
   const std::vector<float> changed =
-      compare(personAt(2.2), personAt(2.4));  // as fast as the vehicle, without parallax
+      compare(personAt(2.2), personAt(2.4));  // as fast as the vehicle, so without parallax
   EXPECT_GT(fractionAt(changed, 2.55, 2.65), 0.5);
 }
 

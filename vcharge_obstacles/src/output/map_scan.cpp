@@ -7,9 +7,9 @@
 namespace vcharge {
 namespace {
 
-// Cells behind the first one are the top of an obstacle lower than this, and the range noise of a higher one.
+// Cells behind the first one are the top of an obstacle lower than this, or range noise of a higher obstacle.
 constexpr float kLow_m = 0.2F;
-// Cells up to this far behind the first one contribute to the range of a higher obstacle.
+// Cells within this distance behind the first one contribute to the range of a higher obstacle.
 constexpr double kDepth_m = 0.2;
 
 struct Hit {
@@ -78,12 +78,12 @@ void setRay(const std::vector<Hit>& hits, double cell_m, size_t ray, ObstacleSca
   }
   const double mean_m = range_m / weight;
   scan->range_m[ray] = static_cast<float>(mean_m);
-  // The position within a cell is uncertain too.
+  // The position within a cell adds uncertainty.
   const double spread_m2 = std::max(0.0, square_m2 / weight - mean_m * mean_m) + cell_m * cell_m / 12.0;
   scan->range_sigma_m[ray] = static_cast<float>(std::sqrt(nearest->sigma_m * nearest->sigma_m + spread_m2));
 }
 
-/// End of the first run of free cells: those under and beside the vehicle are never observed.
+/// End of the first run of free cells; skips cells under and beside the vehicle, which are never observed.
 float freeRange(const ObstacleMap& map, const Viewpoint& viewpoint, double angle_in_fixed_rad, double max_m) {
   const Eigen::Vector2d direction(std::cos(angle_in_fixed_rad), std::sin(angle_in_fixed_rad));
   const double step_m = 0.5 * map.cell_size_m;

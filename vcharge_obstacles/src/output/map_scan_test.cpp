@@ -74,7 +74,7 @@ TEST(MapScanTest, TopOfAKerbDoesNotPullItsEdgeBack) {
     occupy(&map, 20, 31, height_m);
     const ObstacleScan scan = makeScan(map, 360);
     const size_t ray = rayTo(scan, 0.5 * M_PI - kAside_rad);
-    // Two cells of an upright surface are averaged; of a kerb, the second one is its top.
+    // Two cells of an upright surface are averaged; the second cell of a kerb is its top.
     EXPECT_NEAR(scan.range_m[ray], height_m < 0.2F ? 1.05 : 1.10, 0.01);
   }
 }
@@ -92,7 +92,7 @@ TEST(OutlinesTest, EachGroupOfCellsHasOneOutline) {
   for (int column = 10; column < 15; ++column) {
     occupy(&map, column, 10, 0.3F);
   }
-  occupy(&map, 15, 11, 0.9F);  // touches by a corner
+  occupy(&map, 15, 11, 0.9F);  // touches at a corner
   occupy(&map, 30, 30, 0.2F);
   const std::vector<ObstacleOutline> outlines = findOutlines(map);
   ASSERT_EQ(outlines.size(), 2U);

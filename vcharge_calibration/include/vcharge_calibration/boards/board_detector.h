@@ -26,8 +26,8 @@ class BoardDetector {
   /// an AprilGrid suffice.
   std::optional<BoardView> detect(const cv::Mat& image, const CameraModel& model) const;
 
-  /// The same for boards of which a part is detected in the image itself; takes tenths of a second instead of
-  /// seconds.
+  /// Finds, with the camera model, boards of which a part is detected in the image itself; takes tenths of a
+  /// second instead of seconds.
   std::optional<BoardView> detectQuickly(const cv::Mat& image, const CameraModel& model) const;
 
   /// Describes what the image shows instead of the board, for example "a chessboard of 8x6 inner corners" or

@@ -19,8 +19,8 @@ enum class BoardPattern { kChessboard, kAprilGrid };
 /// touch the corners of the tags: four corners per tag, so two rows and columns of corners per row and column
 /// of tags. Its first corner is the lower left one of tag 0; tags are counted to the right, then upwards.
 struct CalibrationBoard {
-  int columns = 9;  ///< of corners
-  int rows = 6;     ///< of corners
+  int columns = 9;  ///< number of corners in a row
+  int rows = 6;     ///< number of corners in a column
   double square_m = 0.1;
   BoardPattern pattern = BoardPattern::kChessboard;
   double tag_spacing = 0.0;  ///< AprilGrid: ratio of the gap to the tags' side
@@ -59,13 +59,13 @@ struct PlacedBoard {
   /// from -1 to 1 over the corners. Zero for a flat board.
   Eigen::Vector3d bending_m = Eigen::Vector3d::Zero();
 
-  /// x^2, x y and y^2 at a position on the board (metres).
+  /// Values of x^2, x y and y^2 at a position on the board (metres).
   static Eigen::Vector3d bendingBasis(const CalibrationBoard& board, const Eigen::Vector2d& position_m) {
     const Eigen::Vector2d last = board.corner(board.numCorners() - 1).head<2>();
     const Eigen::Vector2d p = 2.0 * position_m.cwiseQuotient(last) - Eigen::Vector2d::Ones();
     return {p.x() * p.x(), p.x() * p.y(), p.y() * p.y()};
   }
-  /// Point in the camera frame.
+  /// Maps a position on the bent board to a point in the camera frame.
   Eigen::Vector3d point(const CalibrationBoard& board, const Eigen::Vector2d& position_m) const {
     return camera_from_board *
            Eigen::Vector3d(position_m.x(), position_m.y(), bending_m.dot(bendingBasis(board, position_m)));

@@ -18,21 +18,21 @@
 
 namespace vcharge {
 
-/// A keyframe of a drive in a map: its features, and the fix of each camera by itself.
+/// A keyframe of a drive in a map: its features, and a pose from each camera alone.
 struct MapKeyframeView {
   RigFeatures features;
-  std::vector<std::optional<PoseFix>> camera_fixes;  ///< map_from_vehicle is the pose of the camera
+  std::vector<std::optional<PoseFix>> camera_fixes;  ///< map_from_vehicle holds the pose of the camera
 };
 
 /// Calibrates the extrinsics of a rig from a drive in a finished map (paper, section Structure-based
-/// Calibration), without a first guess, overlap of the cameras or loops: feed it the drive, then call
+/// Calibration). Needs no initial extrinsics, overlap of the cameras or loops: add the drive, then call
 /// finish(). Each camera is localized by itself; extrinsics and vehicle poses follow from these poses and the
 /// odometer, and are then adjusted to the observed landmarks. The map, of any rig, defines the scale, and the
 /// height of base_link. Data parallel inside; the same input gives the same result on any number of threads.
 class MapRigCalibrator : public DriveConsumer {
  public:
-  /// std::invalid_argument for bad options; InputError for a rig without cameras, or a map with features of
-  /// an unknown kind.
+  /// std::invalid_argument for bad options; InputError for a rig without cameras, or a map that has
+  /// features of an unknown kind.
   MapRigCalibrator(std::shared_ptr<const SparseMap> map, const CameraRig& rig,
                    const MapRigCalibratorOptions& options);
   ~MapRigCalibrator() override;
@@ -40,18 +40,18 @@ class MapRigCalibrator : public DriveConsumer {
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
 
-  /// Adds a keyframe by its features instead of its images.
+  /// Adds a keyframe from its features instead of its images.
   void addKeyframe(Timestamp stamp, RigFeatures features, const RigidTransform& odom_from_vehicle);
 
-  /// The calibration from the drive so far. A drive that does not suffice gives Verdict::kFail with the
-  /// reason. The callback may be empty, and may throw to end the work.
+  /// Calibrates from the drive so far. If the drive does not suffice, the verdict is kFail, with remarks why.
+  /// The callback may be empty, and may throw to abandon the calibration.
   RigCalibration finish(const StageCallback& progress);
 
-  /// The rig, poses and observed landmarks after finish() with another verdict than kFail.
+  /// Rig, poses and observed landmarks; valid after finish() unless the verdict is kFail.
   const ReconstructionState& state() const { return state_; }
   /// Small images of a few keyframes, for reports.
   const KeyframeImages& images() const { return images_; }
-  /// HTML for the report: which landmarks of the map are observed from where. Empty before finish() and after
+  /// HTML for the report: which landmarks are observed from which poses. Empty before finish() and after
   /// a failure.
   std::string reportSection() const;
 
@@ -63,11 +63,11 @@ class MapRigCalibrator : public DriveConsumer {
 
   const MapRigCalibratorOptions options_;
   const std::shared_ptr<const SparseMap> map_;
-  std::shared_ptr<const CameraRig> rig_;  // with all cameras at the vehicle's origin
+  std::shared_ptr<const CameraRig> rig_;  // all cameras at the vehicle's origin
   std::unique_ptr<MapLocalizer> localizer_;
   std::vector<MapKeyframeView> views_;
   KeyframeImages images_;
-  std::vector<int32_t> landmark_of_track_;  // indices in the map, after finish()
+  std::vector<int32_t> landmark_of_track_;  // indices in the map, set by finish()
   ReconstructionState state_;
   KeyframeBuilder keyframes_;
   std::unique_ptr<FrameGatherer> gatherer_;

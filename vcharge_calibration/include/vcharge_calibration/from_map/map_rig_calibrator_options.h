@@ -20,7 +20,7 @@ struct MapRigCalibratorOptions : KeyframeOptions {
   VCHARGE_OPTION_GROUP(RigAdjustmentOptions, adjustment, defaultAdjustment(), "Joint adjustment.");
   VCHARGE_END_OPTIONS();
 
-  /// The map defines the scale; its landmarks may be seen only once.
+  /// The map defines the scale. A landmark may have a single observation in the drive.
   static RigAdjustmentOptions defaultAdjustment();
 };
 

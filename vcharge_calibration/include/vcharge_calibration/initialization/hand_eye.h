@@ -23,37 +23,37 @@ struct HandEyeOptions {
 
 /// Motions of vehicle and camera between two instants, previous_from_current.
 struct MotionPair {
-  RigidTransform vehicle;              ///< planar, as counted by the odometer
-  Eigen::Quaterniond camera_rotation;  ///< in the camera's frame
-  Eigen::Vector3d camera_direction;    ///< direction of the translation, a unit vector
+  RigidTransform vehicle;              ///< planar motion from the odometer
+  Eigen::Quaterniond camera_rotation;  ///< rotation in the camera's frame
+  Eigen::Vector3d camera_direction;    ///< unit vector along the translation, in the camera's frame
   double rotation_sigma_rad = 0.001;
   double direction_sigma_rad = 0.01;
-  bool has_direction = true;  ///< false where the camera hardly moved
-  int32_t keyframe = 0;       ///< the earlier keyframe
+  bool has_direction = true;  ///< false if the camera hardly moved
+  int32_t keyframe = 0;       ///< index of the earlier keyframe
 };
 
 enum class HandEyeStatus {
   kOk,
   kTooFewMotions,
-  kNoTurn,       ///< roll and pitch, or the position, are not observable on a straight drive
+  kNoTurn,       ///< roll, pitch and position are not observable on a straight drive
   kNoAgreement,  ///< most motions of camera and odometer contradict each other
 };
 
 struct HandEye {
   HandEyeStatus status = HandEyeStatus::kTooFewMotions;
-  RigidTransform vehicle_from_camera;  ///< z is zero, since planar motion does not show it
-  double tilt_sigma_rad = 0.0;         ///< of roll and pitch, the larger
+  RigidTransform vehicle_from_camera;  ///< z is zero: planar motion does not determine it
+  double tilt_sigma_rad = 0.0;         ///< larger standard deviation of roll and pitch
   double yaw_sigma_rad = 0.0;
-  double position_sigma_m = 0.0;  ///< of x and y, the larger
+  double position_sigma_m = 0.0;  ///< larger standard deviation of x and y
   int num_motions = 0, num_inliers = 0;
-  /// Direction of travel in the camera's frame, which needs no turn; zero without straight motions.
+  /// Direction of travel in the camera's frame, from straight motions; zero without any.
   Eigen::Vector3d travel_in_camera = Eigen::Vector3d::Zero();
 };
 
 /// Planar hand-eye calibration (Guo, Mirzaei, Roumeliotis, ICRA 2012): extrinsics of a camera on a vehicle
 /// that moves in a plane, from motions without scale, in 5 degrees of freedom. Each step has a closed form
-/// that is reweighted `num_iterations` times against wrong motions. First the vertical in the camera's frame:
-/// the camera turns about it by the odometer's yaw, and moves perpendicular to it. Then yaw and position:
+/// that is reweighted `num_iterations` times against outliers. First, the vertical in the camera's frame:
+/// the camera turns about it by the odometer's yaw, and moves perpendicular to it. Second, yaw and position:
 /// with u the position rotated back by the yaw alpha, a motion's direction c is parallel to Rz(-alpha)
 /// t_odometer + (R_odometer - I) u, which is linear in cos(alpha), sin(alpha), u and independent of the
 /// motion's scale. The sign of alpha follows from moving forwards.

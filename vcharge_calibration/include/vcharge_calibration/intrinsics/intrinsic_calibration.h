@@ -34,7 +34,7 @@ struct CalibrationImage {
 struct CalibratedView {
   BoardView view;
   PlacedBoard placed;
-  double rms_px = 0.0;  ///< per coordinate
+  double rms_px = 0.0;  ///< RMS error per coordinate
   double edge_width_px = 0.0;
 };
 
@@ -50,7 +50,7 @@ std::string toString(Verdict verdict);
 /// Result of calibrateIntrinsics(). Without a model if the verdict is kFail.
 struct IntrinsicCalibration {
   Verdict verdict = Verdict::kFail;
-  std::vector<std::string> remarks;  ///< reasons of the verdict, and which images are missing
+  std::vector<std::string> remarks;  ///< reasons of the verdict, and what the images lack
   cv::Size image_size_px;
   std::optional<CameraModel> model;
   /// Standard deviations of the model's parameters, in their order, for errors that are correlated within a
@@ -58,10 +58,10 @@ struct IntrinsicCalibration {
   Eigen::VectorXd standard_deviations;
   std::vector<CalibratedView> views;
   std::vector<RejectedImage> rejected;
-  double rms_px = 0.0;              ///< per coordinate
-  double mean_error_px = 0.0;       ///< mean distance
-  double flat_rms_px = 0.0;         ///< like rms_px, with flat boards
-  bool bent_boards = false;         ///< boards were found to bend, and the fit models it
+  double rms_px = 0.0;              ///< RMS error per coordinate
+  double mean_error_px = 0.0;       ///< mean distance between projection and corner
+  double flat_rms_px = 0.0;         ///< rms_px of a fit with flat boards
+  bool bent_boards = false;         ///< boards bend, and the fit models it
   double bending_m = 0.0;           ///< RMS of the boards' bending along their longer side
   double cross_validated_px = 0.0;  ///< RMS per coordinate of views that were excluded from the fit
   double covered_fraction = 0.0;    ///< fraction of the image's cells in which corners were detected

@@ -37,7 +37,7 @@ void writeIntrinsics(const CameraRig& rig, IntrinsicsFormat format, const std::s
 /// A camera converted to another model, and the difference of its pixels.
 struct ConvertedCamera {
   CameraModel model;
-  double rms_px = 0.0;  ///< distance
+  double rms_px = 0.0;  ///< RMS distance between the pixels
   double max_px = 0.0;
   /// Fraction of the pixels within the field of view that the new model can image.
   double covered_fraction = 0.0;

@@ -29,9 +29,9 @@ struct CalibrationCoachOptions {
 struct CameraOutlook {
   std::string name;
   HandEye hand_eye;
-  /// Standard deviations of vehicle_from_camera, [dt, dphi] in the vehicle's frame (metres, radians), of
+  /// Predicted standard deviations of vehicle_from_camera, [dt, dphi] in the vehicle's frame (m, rad), by
   /// hand-eye calibration: an upper bound for the joint adjustment. NaN for the height, which hand-eye does
-  /// not observe, and for all while they are unknown.
+  /// not observe, and for all components while unknown.
   Eigen::Matrix<double, 6, 1> sigma;
   bool is_enough = false;
 };
@@ -40,19 +40,19 @@ struct CameraOutlook {
 struct DriveOutlook {
   double distance_m = 0.0;
   double left_turn_rad = 0.0, right_turn_rad = 0.0;  ///< both positive
-  double revisited_m = 0.0;                          ///< distance driven near earlier parts
+  double revisited_m = 0.0;                          ///< distance driven near earlier parts of the drive
   std::vector<CameraOutlook> cameras;
   /// Smallest fulfilled fraction of the requirements, 0 to 1.
   double progress = 0.0;
-  std::vector<std::string> missing;  ///< one line each, the first is `next`
-  std::string next;                  ///< for the driver: a manoeuvre, or that the drive suffices
+  std::vector<std::string> missing;  ///< one line each; the first equals `next`
+  std::string next;                  ///< advice for the driver: a manoeuvre, or that the drive suffices
   bool isEnough() const { return missing.empty(); }
 };
 
 /// Finds during a drive what the calibration of a rig still needs: turns to both sides, distance, revisits,
 /// and motions that fix the extrinsics of every camera. Standard deviations are those of planar hand-eye
 /// calibration from the motions so far: the larger of its formula and of a jackknife over parts of the drive,
-/// since errors of neighbouring motions correlate. An outlook takes some ten milliseconds.
+/// since errors of neighbouring motions correlate. outlook() takes some ten milliseconds.
 class CalibrationCoach {
  public:
   /// std::invalid_argument for bad options.
@@ -83,7 +83,7 @@ class CalibrationCoach {
   HandEyeOptions hand_eye_;
   const CalibrationCoachOptions options_;
   std::vector<Place> places_;
-  std::vector<std::vector<MotionPair>> motions_;  // by camera
+  std::vector<std::vector<MotionPair>> motions_;  // motions of each camera
   double left_turn_rad_ = 0.0, right_turn_rad_ = 0.0, revisited_m_ = 0.0;
 };
 

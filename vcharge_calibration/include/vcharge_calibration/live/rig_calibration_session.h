@@ -28,7 +28,7 @@ struct RigCalibrationSessionOptions {
   VCHARGE_END_OPTIONS();
 };
 
-/// A calibration and the reconstruction that it came from.
+/// A calibration and the reconstruction it was made from.
 struct FinishedCalibration {
   RigCalibration result;
   ReconstructionState state;
@@ -36,32 +36,32 @@ struct FinishedCalibration {
 };
 
 /// Calibrates a rig while the vehicle is driven: feeds a RigCalibrator, updates the outlook of a
-/// CalibrationCoach, and calibrates in a thread of its own from the drive so far. The drive may continue
-/// meanwhile, and be calibrated again. The source serializes the calls of DriveConsumer; the others may come
-/// from any thread.
+/// CalibrationCoach, and calibrates in a separate thread from the drive so far. The drive may continue
+/// meanwhile and be calibrated again. The source must serialize the calls of DriveConsumer; other functions
+/// may be called from any thread.
 class RigCalibrationSession : public DriveConsumer {
  public:
-  /// kFailed lasts until the drive continues, kCalibrated until the next calibration or reset.
+  /// kFailed lasts until the drive continues; kCalibrated lasts until the next calibration or reset.
   enum class Phase { kFollowing, kCalibrating, kCalibrated, kFailed };
   struct Status {
     Phase phase = Phase::kFollowing;
     std::string message;    ///< one line: the current activity, the result, or the reason of a failure
-    double progress = 0.0;  ///< of a running calibration, otherwise of the drive
+    double progress = 0.0;  ///< progress of a running calibration, otherwise of the drive
     DriveOutlook outlook;
-    std::shared_ptr<const RigCalibration> result;         ///< the last one of this drive; null before
-    std::vector<std::pair<std::string, int64_t>> counts;  ///< of frames, keyframes and skipped frames
+    std::shared_ptr<const RigCalibration> result;         ///< last of this drive; null before
+    std::vector<std::pair<std::string, int64_t>> counts;  ///< numbers of frames, keyframes and skipped frames
   };
-  /// Called from the drive's thread and from that of the calibration; may only call status().
+  /// Called from the thread of the drive and from the thread of the calibration; may only call status().
   using StatusCallback = std::function<void(const Status&)>;
-  /// Called in the calibration's thread with every result, also failures. An exception makes the calibration
-  /// fail with its text.
+  /// Called in the calibration's thread with every result, including failures. If it throws, the calibration
+  /// fails with the exception's text.
   using ResultCallback = std::function<void(const FinishedCalibration&)>;
-  /// Called inside addImage() and addOdometry() after an update of the outlook; the rig has the extrinsics of
-  /// hand-eye calibration where they are known.
+  /// Called inside addImage() and addOdometry() after an update of the outlook; the rig has the extrinsics
+  /// from hand-eye calibration as far as they are known.
   using DriveCallback = std::function<void(const ReconstructionState&, const CameraRig& guess)>;
 
-  /// Callbacks but `on_result` must not throw. Errors as RigCalibrator; std::invalid_argument for bad
-  /// options.
+  /// Callbacks other than `on_result` must not throw. Errors as for RigCalibrator; std::invalid_argument
+  /// for bad options.
   RigCalibrationSession(std::shared_ptr<const CameraRig> rig, const RigCalibratorOptions& calibrator_options,
                         const RigCalibrationSessionOptions& options, StatusCallback on_status,
                         DriveCallback on_drive, ResultCallback on_result);
@@ -100,10 +100,10 @@ class RigCalibrationSession : public DriveConsumer {
 
   std::mutex mutex_;  // guards the following members
   std::unique_ptr<Follower> follower_;
-  std::shared_ptr<Job> job_;  // the last one; null before the first
-  std::thread worker_;        // of job_
+  std::shared_ptr<Job> job_;  // last job; null before the first
+  std::thread worker_;        // thread of job_
 
-  mutable std::mutex status_mutex_;  // never held during work
+  mutable std::mutex status_mutex_;  // never held during long work
   Status status_;
 };
 

@@ -23,25 +23,25 @@ class KeyframeImages {
   explicit KeyframeImages(size_t max_keyframes = kMaxKeyframes, int max_width_px = kMaxWidth_px,
                           int quality = kQuality)
       : max_keyframes_(max_keyframes), max_width_px_(max_width_px), quality_(quality) {}
-  /// For all keyframes, in full size and high quality.
+  /// Keeps the images of all keyframes, in full size and high quality.
   static KeyframeImages ofAllKeyframes() { return KeyframeImages(SIZE_MAX, INT_MAX, 95); }
 
-  /// Adds the images of a keyframe, in the rig's order (empty where one is missing), unless there are enough
-  /// of that part of the drive. Keyframes must be added in order.
+  /// Adds the images of a keyframe, in the rig's order (empty if missing), unless this part of the drive
+  /// already has enough. Keyframes must be added in order.
   void add(int32_t keyframe, const std::vector<Image>& images);
 
   /// Indices of the keyframes with images, in order.
   std::vector<int32_t> keyframes() const;
 
-  /// CV_8UC1, at most as wide as given to the constructor; empty where there is none.
+  /// CV_8UC1, at most as wide as given to the constructor; empty if missing.
   cv::Mat image(int32_t keyframe, size_t camera) const;
 
  private:
   using Jpeg = std::shared_ptr<const std::vector<uint8_t>>;
   size_t max_keyframes_;
   int max_width_px_, quality_;
-  std::map<int32_t, std::vector<Jpeg>> jpegs_;  // null: no image
-  int32_t step_ = 1;                            // in keyframes
+  std::map<int32_t, std::vector<Jpeg>> jpegs_;  // a null pointer: no image
+  int32_t step_ = 1;                            // distance of kept keyframes, in keyframes
 };
 
 /// Converts a pixel coordinate to a smaller copy of the image; pixel centres have integer coordinates.

@@ -4,7 +4,7 @@
 
 namespace vcharge {
 
-/// Options of the alignment of a landmark's observations with one patch of it.
+/// Options of the alignment of all observations of a landmark with one image patch.
 struct LandmarkAlignmentOptions {
   VCHARGE_BEGIN_OPTIONS(LandmarkAlignmentOptions);
   VCHARGE_OPTION(double, sigma_px, 0.3, positive(), "Deviation of an aligned position.");

@@ -8,8 +8,8 @@
 
 namespace vcharge {
 
-/// The images of a folder (png, jpg, bmp, tif, pgm; other files are ignored), in the order of their names.
-/// InputError names a folder without images and an image that cannot be read.
+/// Reads the images of a folder (png, jpg, bmp, tif, pgm; ignores other files) in the order of their names.
+/// InputError names a folder without images or an image that cannot be read.
 std::vector<CalibrationImage> readCalibrationImages(const std::string& folder);
 
 /// Outputs of an intrinsic calibration.

@@ -9,13 +9,13 @@
 
 namespace vcharge {
 
-/// Writes rig_report.html (see makeRigReport()) into a folder, which is created; nothing for an empty name.
+/// Writes rig_report.html (see makeRigReport()) into a folder, which is created. An empty name: no report.
 void writeRigReport(const std::string& folder, const std::string& title, const RigCalibration& result,
                     const ReconstructionState& state, const KeyframeImages& images,
                     const std::string& more_sections = "");
 
 /// Writes the trajectory (*.tum, unless empty), then rig.yaml, each atomically. InputError names a file that
-/// cannot be written. Not for kFail.
+/// cannot be written. Must not be called for kFail.
 void writeRigAndTrajectory(const std::string& rig_file, const std::string& trajectory_file,
                            const RigCalibration& result, const ReconstructionState& state,
                            const std::map<std::string, std::string>& provenance);

@@ -8,10 +8,10 @@
 
 namespace vcharge {
 
-/// A calibration as one self-contained HTML page: verdict, every degree of freedom with its standard
+/// Makes a self-contained HTML page of a calibration: verdict, every degree of freedom with its standard
 /// deviation, checks, sparse maps before and after the adjustment, the ground from above with its seams
-/// before and after, common landmarks in rectified views, errors over each image, loops and times. Pictures
-/// of missing images are left out. `more_sections` is HTML that stands before the times.
+/// before and after, common landmarks in rectified views, errors over each image, loops and times. Leaves out
+/// pictures that need missing images. `more_sections` is HTML that is inserted before the times.
 std::string makeRigReport(const std::string& title, const RigCalibration& result,
                           const ReconstructionState& state, const KeyframeImages& images = KeyframeImages(),
                           const std::string& more_sections = "");

@@ -5,9 +5,9 @@
 
 namespace vcharge {
 
-/// Options of the joint adjustment of extrinsics, poses and landmarks. The common error is the one that all
-/// parts of a drive share, which a jackknife does not see: patches that look different from elsewhere, and
-/// lenses that deviate from their models.
+/// Options of the joint adjustment of extrinsics, poses and landmarks. The common error is the part that is
+/// equal in all parts of a drive, so that a jackknife cannot measure it: patches that look different from
+/// other directions, and lenses that deviate from their models.
 struct RigAdjustmentOptions {
   VCHARGE_BEGIN_OPTIONS(RigAdjustmentOptions);
   VCHARGE_OPTION(double, max_ground_distance_m, 0.05, positive(), "Height below which a landmark is ground.");

@@ -6,15 +6,15 @@
 
 namespace vcharge {
 
-/// Text with the drive, every degree of freedom of each camera and its standard deviation; without verdict
+/// Describes the drive, and every degree of freedom of a camera with its standard deviation; without verdict
 /// and remarks.
 std::string describeCalibration(const RigCalibration& result);
 
 /// Position (x, y, z, cm) and angles (yaw, pitch, roll, degrees) of a camera; the angles are zero for an
 /// upright camera that looks forward.
 Eigen::Matrix<double, 6, 1> positionAndAngles(const RigidTransform& vehicle_from_camera);
-/// Standard deviations in the same order and units, about the vehicle's axes, from the covariance over
-/// [dt, dphi].
+/// Standard deviations in the order and units of positionAndAngles(), about the vehicle's axes, from the
+/// covariance over [dt, dphi].
 Eigen::Matrix<double, 6, 1> positionAndAngleSigmas(const Eigen::Matrix<double, 6, 6>& covariance);
 
 }  // namespace vcharge

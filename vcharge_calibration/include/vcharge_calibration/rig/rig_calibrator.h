@@ -14,8 +14,8 @@
 
 namespace vcharge {
 
-/// Calibrates the extrinsics of a rig from a drive (paper, section SLAM-based Extrinsic Calibration), without
-/// a first guess, overlap of the cameras or a board: feed it the drive, then call finish(). Extrinsics of the
+/// Calibrates the extrinsics of a rig from a drive (paper, section SLAM-based Extrinsic Calibration); needs
+/// no initial extrinsics, overlap of cameras or board. Add the drive, then call finish(). Extrinsics of the
 /// given rig are ignored. Data parallel inside; the same input gives the same result on any number of
 /// threads.
 class RigCalibrator : public DriveConsumer {
@@ -26,19 +26,19 @@ class RigCalibrator : public DriveConsumer {
 
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
-  /// Processes the frames that still wait for images or odometry.
+  /// Processes the frames that are still waiting for images or odometry.
   void flush();
 
-  /// The calibration from the drive so far. A drive that does not suffice gives Verdict::kFail with the
-  /// reason. The callback may be empty, and may throw to end the work.
+  /// Calibrates from the drive so far. If the drive does not suffice, the verdict is kFail, with remarks why.
+  /// The callback may be empty, and may throw to abandon the calibration.
   RigCalibration finish(const StageCallback& progress);
 
-  /// Map of the drive, after finish() with another verdict than kFail.
+  /// Map of the drive; valid after finish() unless the verdict is kFail.
   std::shared_ptr<const SparseMap> map() const;
   const ReconstructionState& state() const { return state_; }
   /// Small images of a few keyframes, for reports.
   const KeyframeImages& images() const { return images_; }
-  /// Images of all keyframes, for matches between cameras and patch alignment.
+  /// Images of all keyframes, for matching between cameras and for patch alignment.
   const KeyframeImages& allImages() const { return all_images_; }
 
  private:
@@ -49,13 +49,13 @@ class RigCalibrator : public DriveConsumer {
   std::unique_ptr<FrameFollower> follower_;
 };
 
-/// The steps of RigCalibrator::finish(): calibrates from a drive that was followed. With copies of state()
-/// and allImages() this may run while the drive goes on. `state` has the adjusted rig, poses and landmarks
-/// afterwards.
+/// The steps of RigCalibrator::finish() on a recorded state. With copies of state() and allImages() it may
+/// run while the drive goes on. Afterwards, `state` has the adjusted rig, poses and landmarks. Returns the
+/// calibration.
 RigCalibration calibrateFollowedDrive(const RigCalibratorOptions& options, const KeyframeImages& all_images,
                                       const StageCallback& progress, ReconstructionState* state);
 
-/// The map of the drive, from the state after a calibration with another verdict than kFail.
+/// The map of the drive, from the state after a calibration whose verdict is not kFail.
 std::shared_ptr<const SparseMap> mapOfCalibration(const RigCalibratorOptions& options,
                                                   const ReconstructionState& state);
 

@@ -22,7 +22,7 @@ struct RigCalibratorOptions : ReconstructionOptions {
   /// The odometer's distance defines the scale.
   static RigAdjustmentOptions defaultAdjustment();
 
-  /// Triangulation before the first adjustment, with rays that miss their points by more.
+  /// Triangulation before the first adjustment; tolerates larger reprojection errors.
   TriangulationOptions firstTriangulation() const;
 };
 

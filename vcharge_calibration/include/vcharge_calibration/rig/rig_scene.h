@@ -24,7 +24,7 @@ LandmarksByCamera landmarksByCamera(const ReconstructionData& data);
 /// Rig, path and landmarks at some stage of a calibration, for pictures.
 struct RigScene {
   std::shared_ptr<const CameraRig> rig;
-  std::vector<RigidTransform> map_from_vehicle;  ///< at the keyframes
+  std::vector<RigidTransform> map_from_vehicle;  ///< poses of the vehicle at the keyframes
   LandmarksByCamera landmarks;
 };
 

@@ -22,7 +22,7 @@ constexpr int kBlockCells = 512;          // side of a block of columns
 constexpr size_t kViewsAtOnce = 8;        // views added to a block in one parallel loop
 constexpr size_t kKeptBytes = 600000000;  // recently used views in memory
 constexpr double kBytesPerCell = 94.0;    // images and solvers, see primal_dual.h
-constexpr double kSupport_m = 0.1;        // reach above and below the best height for the supports
+constexpr double kSupport_m = 0.1;        // counted around the best height for the supports
 // Sum of weights, times the voxel height, at which the support reaches 1 - 1/e.
 constexpr double kFullSupport_m = 0.05;
 // A column is solid where a run of occupied voxels is this high: no camera sees free space above walls and

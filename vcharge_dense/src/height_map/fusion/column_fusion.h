@@ -18,13 +18,13 @@ struct VoxelGrid {
   int columns = 0, rows = 0;
   double bottom_m = 0.0;  ///< lower face of the lowest voxels
   double height_step_m = 0.025;
-  int num_voxels = 0;  ///< per column
+  int num_voxels = 0;  ///< number of voxels per column
 
   double top_m() const { return bottom_m + num_voxels * height_step_m; }
 };
 
 /// Grid of all voxels within max_range_m of the cameras. `extent_m`: extent of the cameras in x and y and of
-/// the vehicle's poses in z. Throws InputError with numbers where it would need more than max_memory_gb.
+/// the vehicle's poses in z. Throws InputError with numbers if it would need more than max_memory_gb.
 VoxelGrid makeVoxelGrid(const Eigen::AlignedBox3d& extent_m, const HeightFusionOptions& options);
 
 /// Results of all columns, as images of the grid's size.
@@ -34,7 +34,7 @@ struct ColumnImages {
   /// CV_32FC1, 0 to 1: evidence that space just below the best height is occupied, and that space just above
   /// it is free. On the side of a car only one of them may be observed. 0 where no surface was observed.
   cv::Mat support_below, support_above;
-  cv::Mat solid;  ///< CV_8UC1, 255 where a high run of voxels is occupied, whatever is above it
+  cv::Mat solid;  ///< CV_8UC1, 255 where a high run of voxels is occupied, regardless of the voxels above
 
   /// Confidence of the best height: the smaller one of both supports.
   cv::Mat confidence() const { return cv::min(support_below, support_above); }

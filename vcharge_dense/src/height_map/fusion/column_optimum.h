@@ -41,7 +41,7 @@ inline VoxelRun heaviestRun(const float* weights, int begin, int num_voxels) {
 /// Height of least cost C(h) = - sum of the weights below h + sum of the weights from h up (paper, equation
 /// perColumnMin); the lowest one of equal costs. Weights are negative where space is free.
 ///
-/// One height cannot represent an object over free space: cameras see under a car's body, and where its paint
+/// One height cannot represent an object above free space: cameras see under a car's body, and if its paint
 /// has few matches the free space outweighs it. Therefore a run of voxels above the best height whose weights
 /// sum to at least `min_layer_weight` is a layer, and its top is the height (Gallup et al. 2010, 3D
 /// reconstruction using an n-layer heightmap).

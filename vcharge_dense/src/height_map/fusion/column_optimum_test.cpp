@@ -10,7 +10,7 @@
 namespace vcharge {
 namespace {
 
-/// Equation perColumnMin as in the paper.
+/// Cost of a height by equation perColumnMin of the paper.
 double costOf(const std::vector<float>& weights, int height) {
   double cost = 0.0;
   for (int z = 0; z < static_cast<int>(weights.size()); ++z) {
@@ -65,7 +65,7 @@ TEST(ColumnOptimumTest, HeaviestRunIsTheHeaviestOfAllRuns) {
 }
 
 TEST(ColumnOptimumTest, LiesOnTopOfOccupiedVoxelsUnderUnknownSpace) {
-  // Ground, unknown, free.
+  // From bottom to top: ground, unknown, free.
   const ColumnOptimum optimum = optimumOf({0, 2, 3, 0, 0, 0, -1, -4});
   EXPECT_EQ(optimum.height_index, 3);
   EXPECT_TRUE(optimum.has_surface);
@@ -83,7 +83,7 @@ TEST(ColumnOptimumTest, TakesTheStrongerOfTwoSurfaces) {
 }
 
 TEST(ColumnOptimumTest, FindsALayerAlthoughTheFreeSpaceUnderItOutweighsIt) {
-  // Ground, a gap, a car's body with little evidence, unknown.
+  // From bottom to top: ground, a gap, a car's body with little evidence, unknown.
   const std::vector<float> weights = {3, -4, -4, 2, 2, 0, 0};
   const auto optimum = [&](double min_layer_weight) {
     return findColumnOptimum(weights.data(), static_cast<int>(weights.size()), min_layer_weight);
@@ -93,7 +93,7 @@ TEST(ColumnOptimumTest, FindsALayerAlthoughTheFreeSpaceUnderItOutweighsIt) {
   EXPECT_EQ(optimum(4.5).layer_weight, 0.0);
   EXPECT_EQ(optimum(4.0).height_index, 5);
   EXPECT_EQ(optimum(4.0).layer_weight, 4.0);
-  EXPECT_EQ(optimum(4.0).min_cost, -15.0);  // as if ground, gap and body had no contrary evidence
+  EXPECT_EQ(optimum(4.0).min_cost, -15.0);  // the cost of ground, gap and body without contrary evidence
   EXPECT_EQ(optimum(4.0).occupied_cost, optimumOf(weights).occupied_cost);
 }
 

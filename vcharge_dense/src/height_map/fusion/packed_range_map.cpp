@@ -8,10 +8,10 @@
 namespace vcharge {
 namespace {
 
-// Neighbouring pixels belong to one surface where their inverse ranges differ by less than this fraction.
+// Neighbouring pixels belong to one surface if their inverse ranges differ by less than this fraction.
 constexpr float kMaxRelativeChange = 0.15F;
 
-// Ranges of a lower confidence or a larger standard deviation over range are left out. A confidence of 0.7
+// Ranges with a lower confidence or a larger relative standard deviation are left out. A confidence of 0.7
 // left gaps without making distances in the map more accurate.
 constexpr float kMinConfidence = 0.5F, kMaxRelativeSigma = 0.08F;
 

@@ -33,7 +33,7 @@ struct RangeWeighting {
   double reference_footprint_m = 0.15;
 };
 
-/// Ranges that are not finite, with a low confidence or a large standard deviation count as unknown.
+/// Ranges that are not finite, or have a low confidence or a large standard deviation, become unknown.
 PackedRangeMap packRangeMap(const RangeMap& map, const RigidTransform& world_from_camera,
                             const RangeWeighting& weighting = {});
 

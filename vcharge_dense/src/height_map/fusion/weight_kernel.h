@@ -8,8 +8,8 @@ namespace vcharge {
 /// How a range's weight varies along its ray.
 struct WeightProfile {
   float max_range_m;
-  float band_m = 0.15F;      ///< behind the surface voxels are occupied this far, beyond they are unknown
-  float min_ramp_m = 0.01F;  ///< the weight runs from free to occupied over sigma, but over no less than this
+  float band_m = 0.15F;      ///< voxels are occupied up to this distance behind the surface, unknown beyond
+  float min_ramp_m = 0.01F;  ///< the weight rises from free to occupied over sigma, at least over this
   float free_weight;
 
   explicit WeightProfile(const HeightFusionOptions& options);
@@ -18,7 +18,7 @@ struct WeightProfile {
 /// The voxels of one column in a camera's frame.
 struct VoxelColumn {
   float first[3];  ///< centre of the lowest voxel in the camera's frame, metres
-  float step[3];   ///< from a voxel to the one above it
+  float step[3];   ///< difference from a voxel to the one above it
   int count;       ///< number of voxels, a multiple of kVoxelLanes
 };
 

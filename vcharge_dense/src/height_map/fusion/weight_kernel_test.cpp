@@ -15,7 +15,7 @@ namespace {
 
 constexpr float kScale = 1.0F / (1.0F + 0.16F);  // weight of a range with a sigma of 0.02 m
 
-/// Ranges count by their standard deviation alone: those of blankView() have a confidence of 1.
+/// Weighting by standard deviation alone: ranges of blankView() have a confidence of 1.
 RangeWeighting weightingBySigma() {
   RangeWeighting weighting;
   weighting.reference_footprint_m = 1e9;

@@ -28,7 +28,7 @@ cv::Mat labelObserved(const ColumnImages& columns, double gamma, PrimalDualRepor
   cv::Mat start(size, CV_32FC1);
   for (int row = 0; row < size.height; ++row) {
     for (int column = 0; column < size.width; ++column) {
-      // Cost l (C^min + gamma) + (1 - l) C^occ without its part that does not depend on the label l.
+      // Cost l (C^min + gamma) + (1 - l) C^occ without the part that does not depend on the label l.
       const bool has_surface = !std::isnan(columns.best_height_m.at<float>(row, column));
       const float gain = has_surface ? columns.occupied_gain.at<float>(row, column) : 0.0F;
       const auto slope = static_cast<float>(kLabelLambda * (gamma - gain));

@@ -71,7 +71,7 @@ PrimalDualSolver::PrimalDualSolver(const VariationalProblem& problem, const cv::
 }
 
 void PrimalDualSolver::iterateBand(int first_row, int last_row, const Fields& from, Fields* to) const {
-  // Each iteration invalidates one more row beside the band; those rows are discarded.
+  // Each iteration makes one more row beside the band invalid; those rows are discarded.
   const int begin = std::max(0, first_row - kIterationsAtOnce);
   const int end = std::min(rows_, last_row + kIterationsAtOnce);
   thread_local Fields scratch;

@@ -18,7 +18,7 @@ struct VariationalProblem {
   cv::Mat ceiling;       ///< CV_32FC1; +inf: no cost above
   cv::Mat slope;         ///< CV_32FC1, or empty: 0
   cv::Mat weight_below;  ///< CV_32FC1, not negative, or empty: 1
-  cv::Mat weight_above;  ///< the same
+  cv::Mat weight_above;  ///< like weight_below
   float below = 0.0F, above = 0.0F;
   float epsilon = 0.0F;
   float low = 0.0F, high = 1.0F;
@@ -26,9 +26,9 @@ struct VariationalProblem {
 
 /// When the iterations stop, and their step.
 struct PrimalDualSettings {
-  double max_gap_per_cell = 2e-4;  ///< duality gap over the number of cells, in the energy's unit
+  double max_gap_per_cell = 2e-4;  ///< duality gap divided by the number of cells, in the energy's unit
   int max_iterations = 4000;
-  double step_ratio = 0.1;  ///< primal over dual step: about the distance that values change by
+  double step_ratio = 0.1;  ///< ratio of primal to dual step: about the distance that values change by
 };
 
 /// Convergence of a solution.
