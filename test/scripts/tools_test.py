@@ -292,9 +292,8 @@ class ToolsTest(unittest.TestCase):
 
     def test_outputs_that_cannot_be_written_are_named(self):
         blocked = self.text("blocked", "a file, not a folder")
-        none = self.work / "none"
-        self.fail_with("import", [none / "new.bag"], output=none / "new.bag")
-        self.fail_with("import", [none], rig=none / "new.yaml")
+        self.fail_with("import", [blocked / "new.bag"], output=blocked / "new.bag")
+        self.fail_with("import", [blocked / "new.yaml"], rig=blocked / "new.yaml")
         self.fail_with("compute", [blocked], output=blocked)
         self.fail_with("compute", [blocked / "new"], output=blocked / "new")
         self.fail_with("evaluate_range", [blocked / "new"], report=blocked / "new")

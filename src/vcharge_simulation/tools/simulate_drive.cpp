@@ -29,7 +29,6 @@ int main(int argc, char** argv) {
       "rendering");
   app.add_flag("--truth-range", recording.truth_range, "write the range of every pixel");
   app.add_option("--height-cell-m", recording.height_cell_m, "cell size of the height map")
-      ->check(CLI::Range(0.01, 10.0))
       ->capture_default_str();
   app.add_option("--threads", threads, "number of threads; 0: one per core")
       ->check(CLI::NonNegativeNumber)
@@ -47,6 +46,8 @@ int main(int argc, char** argv) {
       std::cout << vcharge::showOptions(scenario);
       return;
     }
+    vcharge::requireField(recording.height_cell_m >= 0.01 && recording.height_cell_m <= 10.0, "height_cell_m",
+                          "must be in [0.01, 10]", recording.height_cell_m);
     if (output->count() == 0) {
       throw CLI::RequiredError("--output");
     }

@@ -176,8 +176,8 @@ void CameraTracker::alignWithAnchors(int32_t keyframe) {
   for (LiveTrack& track : tracks_) {
     const Eigen::Vector2d position_px(track.position_px.x, track.position_px.y);
     const std::optional<PatchWarp> place = alignPatch(anchors_.at(track.anchor_keyframe).pixels,
-                                                       image_.pixels, {track.anchor_px.x, track.anchor_px.y},
-                                                       {position_px, track.shape}, PatchAlignmentOptions());
+                                                      image_.pixels, {track.anchor_px.x, track.anchor_px.y},
+                                                      {position_px, track.shape}, PatchAlignmentOptions());
     if (place && (place->position_px - position_px).norm() <= kMaxAlignment_px &&
         !isMasked(place->position_px) && camera_.model.unproject(place->position_px, &track.ray_in_camera)) {
       track.position_px =

@@ -6,6 +6,7 @@
 #include <rosbag/bag.h>
 
 #include "vcharge_core/base/error.h"
+#include "vcharge_core/files/file_io.h"
 #include "vcharge_ros/camera_info.h"
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/drive_topics.h"
@@ -51,6 +52,7 @@ DriveBagWriter::DriveBagWriter(const std::string& path, const CameraRig& rig)
   if (std::filesystem::is_directory(path)) {
     throw InputError(path + ": cannot be written (it is a folder)");
   }
+  createFolder(std::filesystem::path(path).parent_path().string());
   try {
     implementation_->bag.open(implementation_->unfinished_path, rosbag::bagmode::Write);
   } catch (const rosbag::BagException& error) {

@@ -93,8 +93,8 @@ TEST(DriveBagWriterTest, SameDriveGivesSameBytes) {
 }
 
 TEST(DriveBagWriterTest, NamesAFolderItCannotWrite) {
-  expectInputError([] { DriveBagWriter("/nonexistent/folder/drive.bag", testing::makeRig(kSize)); },
-                   {"/nonexistent/folder/drive.bag", "cannot be written"});
+  expectInputError([] { DriveBagWriter("/proc/folder/drive.bag", testing::makeRig(kSize)); },
+                   {"/proc/folder", "cannot be created"});
   const testing::ScratchFolder folder;
   expectInputError([&] { DriveBagWriter(folder.path(), testing::makeRig(kSize)); },
                    {folder.path(), "it is a folder"});
