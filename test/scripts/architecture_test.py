@@ -24,7 +24,7 @@ KNOWS_ROS = {"vcharge_ros", "vcharge_recordings"}  # libraries of these may incl
 ROS_HEADER = re.compile(r"#\s*include <((?:ros|rosbag|nodelet|pluginlib|tf2_ros|tf2|diagnostic_updater|std_srvs|"
                         r"octomap_msgs|\w+_msgs)/[^>]+)>")
 OWN_HEADER = re.compile(r'#\s*include "((vcharge_\w+)/[^"]+)"')
-RIDDLE = re.compile(r"^\s*//[/!]?<?\s*(Of|And|That|Which|Else|Whom)\b")
+RIDDLE = re.compile(r"^\s*//[/!]?<?\s*(Of|And|That|Which|Else|Whom)\b|\S.*\s///?<?\s+(of|which|whom)\b")
 
 MAX_FILE_LINES = 400
 MAX_FOLDER_SOURCES = 20

@@ -12,7 +12,7 @@ namespace vcharge {
 /// Options of RigCalibrator.
 struct RigCalibratorOptions : ReconstructionOptions {
   VCHARGE_BEGIN_DERIVED_OPTIONS(RigCalibratorOptions, ReconstructionOptions);
-  VCHARGE_OPTION_GROUP(HandEyeOptions, hand_eye, {}, "First guess of each camera's extrinsics.");
+  VCHARGE_OPTION_GROUP(HandEyeOptions, hand_eye, {}, "Initial extrinsics of each camera.");
   VCHARGE_OPTION_GROUP(InterCameraOptions, inter_camera, {}, "Matches between neighbouring cameras.");
   VCHARGE_OPTION_GROUP(LandmarkAlignmentOptions, landmark_alignment, {},
                        "Alignment of a landmark's patches.");

@@ -14,14 +14,20 @@ namespace vcharge {
 /// the drive's clock: the newest stamp of all images and odometry received.
 struct FrameAssemblerOptions {
   VCHARGE_BEGIN_OPTIONS(FrameAssemblerOptions);
-  VCHARGE_OPTION(double, max_camera_wait_s, 0.15, notNegative(), "Longest wait for a missing camera.");
-  VCHARGE_OPTION(double, max_odometry_wait_s, 2.0, notNegative(), "Longest wait for the odometry.");
-  VCHARGE_OPTION(int, silent_after_frames, 3, atLeast(1), "Frames without a camera until it is not awaited.");
-  VCHARGE_OPTION(double, max_odometry_gap_s, 0.25, positive(), "Longest interpolated odometry period.");
-  VCHARGE_OPTION(double, max_speed_m_per_s, 25.0, positive(), "Faster odometry was reset.");
+  VCHARGE_OPTION(double, max_camera_wait_s, 0.15, notNegative(),
+                 "Time after which a frame goes on without a missing camera.");
+  VCHARGE_OPTION(double, max_odometry_wait_s, 2.0, notNegative(),
+                 "Time after which a frame goes on without odometry.");
+  VCHARGE_OPTION(int, silent_after_frames, 3, atLeast(1),
+                 "Missed frames after which a camera is not waited for.");
+  VCHARGE_OPTION(double, max_odometry_gap_s, 0.25, positive(),
+                 "Longest period between odometry messages to interpolate over.");
+  VCHARGE_OPTION(double, max_speed_m_per_s, 25.0, positive(),
+                 "Speed above which the odometry counts as reset.");
   VCHARGE_OPTION(double, max_step_m, kNoLimit, positive(),
-                 "Larger changes of the odometry's step are resets.");
-  VCHARGE_OPTION(double, max_step_rad, kNoLimit, positive(), "Larger changes of its turn are resets.");
+                 "Change of the distance between two odometry messages that counts as a reset.");
+  VCHARGE_OPTION(double, max_step_rad, kNoLimit, positive(),
+                 "Change of the turn between two odometry messages that counts as a reset.");
   VCHARGE_END_OPTIONS();
 
   static constexpr double kNoLimit = std::numeric_limits<double>::infinity();
