@@ -4,11 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 namespace vcharge {
 namespace {
 
 Timestamp at(double seconds) {
-  return Timestamp::fromNanoseconds(1'000'000'000'000LL + static_cast<int64_t>(seconds * 1e9 + 0.5));
+  return Timestamp::fromNanoseconds(1'000'000'000'000LL + std::llround(seconds * 1e9));
 }
 
 Image picture() {
