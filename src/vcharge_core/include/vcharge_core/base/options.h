@@ -22,7 +22,9 @@ std::vector<std::string> enumNames();
 
 /// Calls visit(const OptionDeclaration&, field) for every option of a struct, in order.
 template <class Options, class Visitor>
-void forEachOption(Options& options, Visitor&& visit);
+void forEachOption(Options& options, Visitor&& visit) {
+  Options::OptionsStruct::visitOptions(options, visit);
+}
 
 namespace internal {
 
@@ -55,11 +57,6 @@ template <class Options>
 struct HasReadHook<Options, std::void_t<decltype(std::declval<Options&>().fieldWasRead(""))>>
     : std::true_type {};
 
-template <class Options, class = void>
-struct IsDeclared : std::false_type {};
-template <class Options>
-struct IsDeclared<Options, std::void_t<typename Options::OptionsStruct>> : std::true_type {};
-
 template <class T>
 constexpr bool kIsGroup =
     std::is_class_v<T> && !std::is_same_v<T, std::string> && !std::is_same_v<T, std::vector<double>> &&
@@ -68,21 +65,6 @@ constexpr bool kIsGroup =
 template <class Options>
 void readStruct(const YAML::Node& node, const std::string& source, const std::string& prefix,
                 Options* options);
-
-}  // namespace internal
-
-template <class Options, class Visitor>
-void forEachOption(Options& options, Visitor&& visit) {
-  if constexpr (internal::IsDeclared<std::remove_const_t<Options>>::value) {
-    Options::OptionsStruct::visitOptions(options, visit);
-  } else {
-    const_cast<std::remove_const_t<Options>&>(options).visitFields([&](const char* name, auto& field) {
-      visit(OptionDeclaration{name, anyValue(), ""}, field);
-    });
-  }
-}
-
-namespace internal {
 
 /// The value as YAML, with the fewest digits that read back as the same number.
 std::string valueText(double value);
