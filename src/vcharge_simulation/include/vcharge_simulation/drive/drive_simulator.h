@@ -14,9 +14,9 @@ namespace vcharge {
 struct SimulatedDrive {
   Trajectory world_from_vehicle;  ///< true pose at every image stamp
   std::vector<VehicleOdometry>
-      ground_truth;                       ///< true pose in the world frame at every odometry and image stamp
-  std::vector<VehicleOdometry> odometry;  ///< at 50 Hz and at every image stamp
-  std::vector<WheelTicks> wheel_ticks;    ///< at 50 Hz
+      ground_truth;  ///< true pose in the world frame at every odometry and image stamp
+  std::vector<Received<VehicleOdometry>> odometry;  ///< in order of reception, see causalOdometry()
+  std::vector<Received<WheelTicks>> wheel_ticks;    ///< at 50 Hz, in order of reception
   /// Poses of the renderings that are averaged into each image; empty without motion blur.
   std::vector<std::vector<RigidTransform>> exposure_poses;
 };
