@@ -42,12 +42,13 @@ class CausalityTest(unittest.TestCase):
         whole, cut = (self.chain.folder / name for name in ("whole", "cut"))
         whole.mkdir()
         cut.mkdir()
+        self.maxDiff = None
         status, _, errors = run_tool(self.chain.words("build_map", whole, whole))
         self.assertEqual((status, errors), (0, []))
         for name in LIVE:
             status, _, errors = run_tool(self.chain.words(name, whole, whole))
             self.assertEqual((status, errors), (0, []), name)
-        short = self.chain.folder / "short.bag"
+        short = self.chain.folder / "cut" / self.chain.drive.bag.name
         with rosbag.Bag(str(self.chain.drive.bag)) as bag, rosbag.Bag(str(short), "w") as copy:
             begin = bag.get_start_time()
             end = rospy.Time.from_sec(begin + 0.7 * (bag.get_end_time() - begin))

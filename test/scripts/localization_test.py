@@ -221,7 +221,11 @@ class LocalizationTest(unittest.TestCase):
 
     def check_tf(self):
         """map_from_odom * odom_from_vehicle = map_from_vehicle, compared by positions; /odom is frequent enough for linear interpolation."""
-        odometry = [message for topic, message in self.messages if topic == "/odom"]
+        first = {}  # tf keeps the first transform of a stamp; later messages correct it
+        for topic, message in self.messages:
+            if topic == "/odom":
+                first.setdefault(message.header.stamp, message)
+        odometry = [first[stamp] for stamp in sorted(first)]
         stamps = [message.header.stamp.to_sec() for message in odometry]
         way = np.array([[getattr(message.pose.pose.position, axis) for axis in "xyz"] for message in odometry])
         transforms = {t.header.stamp: t for message in self.received["/tf"] for t in message.transforms

@@ -271,7 +271,9 @@ std::vector<OdometryEstimate> OdometryStream::add(const OdometryEstimate& estima
   }
   history_.push_back(estimate);
   if (extrapolated_ && *extrapolated_ <= estimate.odometry.stamp) {
-    if (const std::optional<OdometryEstimate> corrected = at(*extrapolated_)) {
+    const std::optional<OdometryEstimate> corrected = at(*extrapolated_);
+    // After a gap in the ticks a correction comes too late to be sorted by those who read it.
+    if (corrected && estimate.odometry.stamp - *extrapolated_ <= hold_) {
       ready.push_back(*corrected);
     }
     extrapolated_.reset();
