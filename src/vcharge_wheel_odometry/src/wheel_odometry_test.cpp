@@ -312,7 +312,7 @@ TEST(OdometryStreamTest, HasAnEstimateAtEveryTriggerInOrderOfStamps) {
   EXPECT_GE(stamps.back(), atMilliseconds(3800)) << "they go on without triggers";
 }
 
-TEST(OdometryStreamTest, DoesNotGuessFarAhead) {
+TEST(OdometryStreamTest, DoesNotExtrapolateFarAhead) {
   OdometryStream stream(0.12, 0.1);
   EXPECT_TRUE(stream.trigger(kStart).empty());
   OdometryEstimate estimate;

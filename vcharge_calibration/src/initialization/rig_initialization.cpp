@@ -85,9 +85,9 @@ void describeDrive(const ReconstructionState& state, RigCalibration* result) {
   }
 }
 
-std::shared_ptr<CameraRig> guessRig(const OdometrySeries& series, const HandEyeOptions& options,
-                                    std::vector<std::vector<MotionPair>> motions, ReconstructionState* state,
-                                    RigCalibration* result) {
+std::shared_ptr<CameraRig> estimateInitialRig(const OdometrySeries& series, const HandEyeOptions& options,
+                                              std::vector<std::vector<MotionPair>> motions,
+                                              ReconstructionState* state, RigCalibration* result) {
   std::shared_ptr<CameraRig> rig = solveHandEyes(state->data, motions, options, result);
   for (int i = 0; i < kOffsetIterations; ++i) {
     std::vector<Eigen::Vector3d> up_in_camera;

@@ -152,12 +152,12 @@ void RangeMapper::addOdometry(const VehicleOdometry& odometry) {
 void RangeMapper::process(const ImageFrame& frame) {
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (camera && frame.has_image[camera->index]) {
-      placeImage(camera.get(), frame);
+      addImageWithPose(camera.get(), frame);
     }
   }
 }
 
-void RangeMapper::placeImage(Camera* camera, const ImageFrame& frame) {
+void RangeMapper::addImageWithPose(Camera* camera, const ImageFrame& frame) {
   if (!frame.odom_from_vehicle) {
     ++camera->status.without_pose;
     camera->status.state = RangeMapperState::kNoPose;

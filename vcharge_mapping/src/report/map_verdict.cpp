@@ -31,13 +31,13 @@ class Judge {
   explicit Judge(MapVerdict* verdict) : verdict_(verdict) {}
 
   /// Adds a remark if a value exceeds the first or second bound.
-  void atMost(double value, double odd, double bad, const std::string& remark) {
-    if (value > odd) {
-      add(value > bad ? MapGrade::kBad : MapGrade::kCheck, remark);
+  void atMost(double value, double warn_above, double fail_above, const std::string& remark) {
+    if (value > warn_above) {
+      add(value > fail_above ? MapGrade::kBad : MapGrade::kCheck, remark);
     }
   }
-  void check(bool is_odd, const std::string& remark) {
-    if (is_odd) {
+  void check(bool is_suspicious, const std::string& remark) {
+    if (is_suspicious) {
       add(MapGrade::kCheck, remark);
     }
   }
