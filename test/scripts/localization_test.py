@@ -79,6 +79,7 @@ class LocalizationTest(unittest.TestCase):
         self.expect_right(self.rows)
         self.assertEqual(self.rows[0]["status"], "lost", "one recognized place alone is not believed")
         self.assertEqual(warnings(self.found), [])
+        self.assertEqual((self.found["num_frames"], self.found["num_incomplete_frames"]), (len(self.rows), 0))
 
     def test_is_the_same_on_one_thread_and_without_the_truth(self):
         blind = self.road.map_drive.folder / "blind.bag"
@@ -112,6 +113,8 @@ class LocalizationTest(unittest.TestCase):
             self.assertEqual({text.split(":")[0] for _, text in told}, set(blamed), told)
             self.assertTrue(all(words in text for _, text in told), told)
             self.assertGreater(min(frames for frames, _ in told), 10)
+            without_rear = found["num_missing_images"]["rear"]
+            self.assertEqual((found["num_incomplete_frames"], without_rear > 10), (without_rear, words == "no image"))
 
     def test_faults_of_the_odometer_and_late_images_are_borne(self):
         for name, *settings in (("reset", "faults.counter_reset.time_s=2"),
@@ -122,6 +125,7 @@ class LocalizationTest(unittest.TestCase):
             self.assertEqual((status, errors), (0, []), name)
             self.expect_right(rows)
             self.assertEqual(warnings(found), [], name)
+            self.assertEqual(found["num_odometry_resets"], 1 if name == "reset" else 0, name)
 
     def test_a_rig_with_other_cameras_and_a_map_of_other_features_work(self):
         two = self.road.rig.parent / "two.yaml"

@@ -72,7 +72,7 @@ void describeDrive(const ReconstructionState& state, RigCalibration* result) {
     result->distance_m = keyframes.back().travelled_m;
   }
   const ReconstructionReport& report = state.report;
-  if (2 * report.num_frames_without_odometry > report.num_frames) {
+  if (2 * report.counters.frames_without_odometry > report.counters.frames) {
     throw NotCalibrated{
         {"most images have no odometry at their stamps: do cameras and odometer use the same clock?"}};
   }

@@ -39,12 +39,12 @@ CameraRig initialRig(const CameraRig& rig, const DriveOutlook& outlook) {
 
 std::vector<std::pair<std::string, int64_t>> countsOf(const ReconstructionState& state) {
   const ReconstructionReport& report = state.report;
-  return {{"frames", report.num_frames},
+  return {{"frames", report.counters.frames},
           {"keyframes", static_cast<int64_t>(state.data.keyframes.size())},
-          {"frames that lack a camera", report.num_incomplete_frames},
-          {"frames without odometry", report.num_frames_without_odometry},
+          {"frames that lack a camera", report.counters.incomplete_frames},
+          {"frames without odometry", report.counters.frames_without_odometry},
           {"standing frames", report.num_standing_frames},
-          {"late images", report.num_late_images}};
+          {"late images", report.counters.numLateImages()}};
 }
 
 std::string describe(const RigCalibration& result) {
