@@ -75,9 +75,7 @@ class CalibrationNodeletTest(unittest.TestCase):
         rospy.set_param("/calibration", {
             "rig": str(self.cameras), "output": str(self.output), "map": str(self.work / "room.vmap"),
             "trajectory": str(self.work / "path.tum"), "report": str(self.work / "report"), "lossless_replay": True,
-            "options": OPTIONS, "session": {"coach": {"enough_distance_m": 70.0}},
-            # Topics are published much faster than in a drive: on a busy machine they drift apart.
-            "source": {"sort_window_s": 2.0}})
+            "options": OPTIONS, "session": {"coach": {"enough_distance_m": 70.0}}})
 
     def start(self):
         self.assertTrue(self.load("/calibration", "vcharge_calibration/calibration_nodelet", [], [], [], "").success)
