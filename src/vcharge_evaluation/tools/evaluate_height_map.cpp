@@ -173,7 +173,7 @@ num_drivable_inside, num_open_ground, num_open_drivable, num_solid, num_solid_on
         throw InputError(trajectory_path + ": " + error.what());
       }
     }
-    const IsRigid is_rigid = rigidBy(readTruthObstacles(truth_path + "/obstacles.yaml"));
+    const IsRigid is_rigid = makeIsRigid(readTruthObstacles(truth_path + "/obstacles.yaml"));
     const HeightMapErrors errors =
         evaluateHeightMap(map, world_from_map, truth, true_poses, rig, is_rigid, error_options);
     if (errors.num_seen == 0) {
