@@ -53,6 +53,20 @@ WheelOdometry::WheelOdometry(const WheelOdometryOptions& options) : options_(opt
   turn_covariance_ = Eigen::Vector3d(0.0, 0.1, square(kZeroSigma_per_m)).asDiagonal();
 }
 
+std::pair<double, double> WheelOdometry::steeredCurvature(const WheelTicks& ticks) {
+  const double told = std::tan(ticks.steering_angle_rad) / options_.wheelbase_m;
+  const auto lag = durationFromSeconds(options_.steering_lag_s);
+  steering_.emplace_back(ticks.stamp, told);
+  while (steering_.size() > 1 && steering_[1].first <= ticks.stamp - lag) {
+    steering_.pop_front();
+  }
+  // The steering goes on turning as during the last lag. A lag may be half as long or half as long again.
+  const double since_s = toSeconds(ticks.stamp - steering_.front().first);
+  const double change =
+      since_s > 0.0 ? (told - steering_.front().second) * options_.steering_lag_s / since_s : 0.0;
+  return {told + change, std::hypot(options_.steering_noise_per_m, 0.5 * change)};
+}
+
 void WheelOdometry::predict(double dt_s, double steered_curvature) {
   steered_yaw_rad_ += along_[1] * (steered_curvature + turn_[2]) * dt_s;
   Eigen::Matrix2d along = Eigen::Matrix2d::Identity();
@@ -101,7 +115,7 @@ void WheelOdometry::checkSlip(const Sample& sample) {
   counts_.slipping = slips;
 }
 
-void WheelOdometry::correct(double dt_s, double tick_m, double steered_curvature) {
+void WheelOdometry::correct(double dt_s, double tick_m, double steered_curvature, double steered_sigma) {
   const double left_m = left_m_;
   const double right_m = right_m_;
   if (counts_.slipping) {
@@ -118,10 +132,9 @@ void WheelOdometry::correct(double dt_s, double tick_m, double steered_curvature
                   &along_, &along_covariance_);
   if (options_.use_steering) {
     const double speed = along_[1];
-    kalmanUpdate<3>(Eigen::RowVector3d(0.0, 1.0, -speed),
-                    speed * steered_curvature - (turn_[1] - speed * turn_[2]),
-                    square(speed * options_.steering_noise_per_m) + square(kYawRateFloor_rad_per_s), &turn_,
-                    &turn_covariance_);
+    kalmanUpdate<3>(
+        Eigen::RowVector3d(0.0, 1.0, -speed), speed * steered_curvature - (turn_[1] - speed * turn_[2]),
+        square(speed * steered_sigma) + square(kYawRateFloor_rad_per_s), &turn_, &turn_covariance_);
   }
   if (!counts_.slipping) {
     const double difference_variance =
@@ -215,19 +228,32 @@ std::optional<OdometryEstimate> WheelOdometry::add(const WheelTicks& ticks) {
     window_.clear();
     return estimate(ticks.stamp, 0.0, 0.0);
   }
-  const double steered_curvature = std::tan(ticks.steering_angle_rad) / options_.wheelbase_m;
+  const auto [steered_curvature, steered_sigma] = steeredCurvature(ticks);
   const double distance_before_m = along_[0];
   const double yaw_before_rad = turn_[0];
   predict(dt_s, steered_curvature);
   if (options_.use_steering) {
     checkSlip({ticks.stamp, left_m_, right_m_, steered_yaw_rad_, along_[1]});
   }
-  correct(dt_s, tick_m, steered_curvature);
+  correct(dt_s, tick_m, steered_curvature, steered_sigma);
   return estimate(ticks.stamp, along_[0] - distance_before_m, turn_[0] - yaw_before_rad);
 }
 
 OdometryStream::OdometryStream(double hold_s, double max_extrapolation_s)
     : hold_(durationFromSeconds(hold_s)), max_extrapolation_(durationFromSeconds(max_extrapolation_s)) {}
+
+OdometryStream OdometryStream::forFrameRate(double frame_rate_hz) {
+  // An estimate waits for the next trigger, which may be late by half a period.
+  return OdometryStream(1.5 / frame_rate_hz, 0.1);
+}
+
+std::vector<OdometryEstimate> OdometryStream::flush() {
+  std::vector<OdometryEstimate> ready;
+  if (!history_.empty()) {
+    release(history_.back().odometry.stamp + Duration(1), &ready);
+  }
+  return ready;
+}
 
 void OdometryStream::release(Timestamp before, std::vector<OdometryEstimate>* ready) {
   for (const OdometryEstimate& each : history_) {
@@ -244,6 +270,12 @@ std::vector<OdometryEstimate> OdometryStream::add(const OdometryEstimate& estima
     return ready;
   }
   history_.push_back(estimate);
+  if (extrapolated_ && *extrapolated_ <= estimate.odometry.stamp) {
+    if (const std::optional<OdometryEstimate> corrected = at(*extrapolated_)) {
+      ready.push_back(*corrected);
+    }
+    extrapolated_.reset();
+  }
   release(estimate.odometry.stamp - hold_, &ready);
   while (toSeconds(estimate.odometry.stamp - history_.front().odometry.stamp) > 1.0) {
     history_.pop_front();
@@ -287,6 +319,9 @@ std::vector<OdometryEstimate> OdometryStream::trigger(Timestamp stamp) {
     if (const std::optional<OdometryEstimate> estimate = at(stamp)) {
       ready.push_back(*estimate);
       published_ = stamp;
+      if (history_.back().odometry.stamp < stamp) {
+        extrapolated_ = stamp;
+      }
     }
   }
   return ready;

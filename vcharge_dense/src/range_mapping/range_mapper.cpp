@@ -151,8 +151,19 @@ void RangeMapper::addOdometry(const VehicleOdometry& odometry) {
 
 void RangeMapper::process(const ImageFrame& frame) {
   for (const std::unique_ptr<Camera>& camera : cameras_) {
+    if (camera) {
+      correctPoses(camera.get(), frame.corrections);
+    }
     if (camera && frame.has_image[camera->index]) {
       addImageWithPose(camera.get(), frame);
+    }
+  }
+}
+
+void RangeMapper::correctPoses(Camera* camera, const std::vector<CorrectedPose>& corrections) {
+  for (Frame& earlier : camera->frames) {
+    if (const CorrectedPose* corrected = correctionAt(corrections, earlier.image.stamp)) {
+      earlier.image.world_from_camera = corrected->odom_from_vehicle * camera->vehicle_from_camera;
     }
   }
 }

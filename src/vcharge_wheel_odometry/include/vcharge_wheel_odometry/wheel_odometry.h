@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -16,6 +17,7 @@ struct WheelOdometryOptions {
   VCHARGE_OPTION(double, track_width_m, 1.52, positive(), "Distance between the rear wheels.");
   VCHARGE_OPTION(double, wheelbase_m, 2.58, positive(), "Distance between the axles.");
   VCHARGE_OPTION(bool, use_steering, true, anyValue(), "Whether the car measures the steering angle.");
+  VCHARGE_OPTION(double, steering_lag_s, 0.05, between(0.0, 0.5), "Age of the steering angle at its stamp.");
   VCHARGE_OPTION(double, max_acceleration_m_per_s2, 1.5, positive(), "Noise of the speed in a second.");
   VCHARGE_OPTION(double, max_yaw_acceleration_rad_per_s2, 0.4, positive(), "The same of the yaw rate.");
   VCHARGE_OPTION(double, steering_noise_per_m, 0.002, positive(), "Sigma of the steered curvature.");
@@ -66,13 +68,15 @@ class WheelOdometry {
     double steered_yaw_rad;  // integral of the steered yaw rate
     double speed_m_per_s;    // estimated speed
   };
+  /// Curvature of the path by the steering angle now and before its lag, and its standard deviation.
+  std::pair<double, double> steeredCurvature(const WheelTicks& ticks);
   void predict(double dt_s, double steered_curvature);
   void checkSlip(const Sample& sample);
-  void correct(double dt_s, double tick_m, double steered_curvature);
+  void correct(double dt_s, double tick_m, double steered_curvature, double steered_sigma);
   void stand();
   OdometryEstimate estimate(Timestamp stamp, double distance_m, double turn_rad);
 
-  const WheelOdometryOptions options_;
+  WheelOdometryOptions options_;
   WheelOdometryCounts counts_;
   std::optional<WheelTicks> last_;
   double left_m_ = 0.0, right_m_ = 0.0;                // counted since the first ticks
@@ -80,6 +84,7 @@ class WheelOdometry {
   double steered_yaw_rad_ = 0.0;
   Timestamp last_motion_;
   std::deque<Sample> window_;
+  std::deque<std::pair<Timestamp, double>> steering_;  // curvatures by the angles of the last lag
   bool left_slips_ = false;
   Eigen::Vector2d along_ = Eigen::Vector2d::Zero();  // state: distance, speed
   Eigen::Matrix2d along_covariance_;
@@ -91,24 +96,30 @@ class WheelOdometry {
 };
 
 /// Sorts estimates by stamp for publishing, with one at the stamp of each camera trigger. Estimates of ticks
-/// wait for the next trigger, at most `hold_s`. Not thread safe.
+/// wait for the next trigger, at most `hold_s`. The estimate at a trigger is extrapolated if the ticks are
+/// late; once they reach it, it is published again under the same stamp, corrected. Not thread safe.
 class OdometryStream {
  public:
   OdometryStream(double hold_s, double max_extrapolation_s);
+  /// For triggers at this rate.
+  static OdometryStream forFrameRate(double frame_rate_hz);
 
   /// Returns the estimates to publish now, in order of stamps.
   std::vector<OdometryEstimate> add(const OdometryEstimate& estimate);
   /// Like add(). The last estimate is at `stamp`, interpolated or extrapolated by up to max_extrapolation_s;
   /// it is missing if neither is possible, or if later ones were published already.
   std::vector<OdometryEstimate> trigger(Timestamp stamp);
+  /// The estimates that wait, at the end of a drive.
+  std::vector<OdometryEstimate> flush();
 
  private:
   std::optional<OdometryEstimate> at(Timestamp stamp) const;
   void release(Timestamp before, std::vector<OdometryEstimate>* ready);
 
-  const Duration hold_, max_extrapolation_;
+  Duration hold_, max_extrapolation_;
   std::deque<OdometryEstimate> history_;  // the newest second
   std::optional<Timestamp> published_;
+  std::optional<Timestamp> extrapolated_;  // trigger whose estimate is to be corrected
 };
 
 }  // namespace vcharge

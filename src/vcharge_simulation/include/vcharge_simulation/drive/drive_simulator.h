@@ -15,8 +15,8 @@ struct SimulatedDrive {
   Trajectory world_from_vehicle;  ///< true pose at every image stamp
   /// True poses in the world frame, and velocities, at every odometry and image stamp.
   std::vector<VehicleOdometry> ground_truth;
-  std::vector<VehicleOdometry> odometry;  ///< at 50 Hz and at every image stamp
-  std::vector<WheelTicks> wheel_ticks;    ///< at 50 Hz
+  std::vector<Received<VehicleOdometry>> odometry;  ///< in order of reception, see causalOdometry()
+  std::vector<Received<WheelTicks>> wheel_ticks;    ///< at 50 Hz, in order of reception
   /// For each image, world_from_vehicle of the renderings that are averaged into it; empty without motion
   /// blur.
   std::vector<std::vector<RigidTransform>> exposure_poses;
