@@ -147,7 +147,7 @@ void decodeCan(const std::string& bytes) {
   }
 }
 
-struct NobodyLooks : RecordedDriveConsumer {
+struct IgnoringConsumer : RecordedDriveConsumer {
   void addImage(size_t, Timestamp, Timestamp, const Image&) override {}
   void addOdometry(Timestamp, const VehicleOdometry&) override {}
   void addBroken(const std::string&, const std::string&) override {}
@@ -200,8 +200,8 @@ std::vector<FuzzTarget> driveTargets() {
                  {bagBytes(rosbag::compression::Uncompressed), bagBytes(rosbag::compression::BZ2),
                   bagBytes(rosbag::compression::LZ4)},
                  [](const std::string& path) {
-                   NobodyLooks nobody;
-                   readRecordedDrive(path, oneCamera(), DriveTopics(), &nobody, {});
+                   IgnoringConsumer ignore;
+                   readRecordedDrive(path, oneCamera(), DriveTopics(), &ignore, {});
                  }),
       {"camera_frame", frames, convertFrame},
       {"can", [] { return std::vector<std::string>{std::string(48, '\x11')}; }, decodeCan},

@@ -110,8 +110,8 @@ nlohmann::json raysToJson(const char* what, const RayErrors& errors) {
           {"error_m", errors.error_m},
           {"error_own_ray_m", errors.error_own_ray_m},
           {"mean_signed_m", errors.mean_signed_m},
-          {"share_within_one_sigma", errors.fraction_within_one_sigma},
-          {"share_within_two_sigma", errors.fraction_within_two_sigma}};
+          {"fraction_within_one_sigma", errors.fraction_within_one_sigma},
+          {"fraction_within_two_sigma", errors.fraction_within_two_sigma}};
 }
 
 nlohmann::json scanToJson(const std::string& name, const ObstacleScanEvaluator& evaluator) {
@@ -268,7 +268,7 @@ int main(int argc, char** argv) {
   const ReportArgument report(&app, "obstacle_errors");
   describeJson(&app, R"(kind: "obstacles"; scans: per scan {name, and for rays off the direction of travel
 (aside), along it (ahead) and along it within 2 m (ahead_within_2_m) {rays, missed, nearer,
-mean_signed_m, share_within_one_sigma, share_within_two_sigma, error distributions error_m,
+mean_signed_m, fraction_within_one_sigma, fraction_within_two_sigma, error distributions error_m,
 error_own_ray_m}}; map: {maps, driven_m, obstacles [{kind, height_m, width_m, distance_m, reported, maps,
 maps_reported}], false_cells, false_cells_per_10_m, false_left, false_cells_per_map, false_cells_hidden,
 false_cell_list [{x_m, y_m, first_seen_ns, maps, left, on_open_ground}], observed_inside, free_inside:

@@ -307,10 +307,10 @@ std::optional<OdometryEstimate> OdometryStream::at(Timestamp stamp) const {
     return result;
   }
   const VehicleOdometry& to = after->odometry;
-  const double share = since_s / toSeconds(to.stamp - from.stamp);
-  result.odometry.odom_from_vehicle = interpolate(from.odom_from_vehicle, to.odom_from_vehicle, share);
-  result.odometry.forward_speed_m_per_s += share * (to.forward_speed_m_per_s - from.forward_speed_m_per_s);
-  result.odometry.yaw_rate_rad_per_s += share * (to.yaw_rate_rad_per_s - from.yaw_rate_rad_per_s);
+  const double fraction = since_s / toSeconds(to.stamp - from.stamp);
+  result.odometry.odom_from_vehicle = interpolate(from.odom_from_vehicle, to.odom_from_vehicle, fraction);
+  result.odometry.forward_speed_m_per_s += fraction * (to.forward_speed_m_per_s - from.forward_speed_m_per_s);
+  result.odometry.yaw_rate_rad_per_s += fraction * (to.yaw_rate_rad_per_s - from.yaw_rate_rad_per_s);
   return result;
 }
 

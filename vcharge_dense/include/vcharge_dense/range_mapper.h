@@ -123,7 +123,7 @@ class RangeMapper : public DriveConsumer {
 
   void process(const ImageFrame& frame);
   static void correctPoses(Camera* camera, const std::vector<CorrectedPose>& corrections);
-  void placeImage(Camera* camera, const ImageFrame& frame);
+  void addImageWithPose(Camera* camera, const ImageFrame& frame);
   void startOver(DriveBreak drive_break);
   void addFrame(Camera* camera, const SweepImage& frame);
   void emitReferences(Camera* camera, bool drive_is_over);

@@ -155,7 +155,7 @@ void RangeMapper::process(const ImageFrame& frame) {
       correctPoses(camera.get(), frame.corrections);
     }
     if (camera && frame.has_image[camera->index]) {
-      placeImage(camera.get(), frame);
+      addImageWithPose(camera.get(), frame);
     }
   }
 }
@@ -168,7 +168,7 @@ void RangeMapper::correctPoses(Camera* camera, const std::vector<CorrectedPose>&
   }
 }
 
-void RangeMapper::placeImage(Camera* camera, const ImageFrame& frame) {
+void RangeMapper::addImageWithPose(Camera* camera, const ImageFrame& frame) {
   if (!frame.odom_from_vehicle) {
     ++camera->status.without_pose;
     camera->status.state = RangeMapperState::kNoPose;

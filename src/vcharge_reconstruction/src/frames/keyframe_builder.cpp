@@ -4,6 +4,13 @@
 
 namespace vcharge {
 
+FrameAssemblerOptions KeyframeOptions::assemblerOptions() const {
+  FrameAssemblerOptions options;
+  options.waitForEverything();
+  options.max_speed_m_per_s = max_speed_m_per_s;
+  return options;
+}
+
 bool KeyframeBuilder::isDue(const RigidTransform& keyframe_from_vehicle) const {
   return state_->data.keyframes.empty() ||
          keyframe_from_vehicle.translation().norm() >= options_.keyframe_distance_m ||

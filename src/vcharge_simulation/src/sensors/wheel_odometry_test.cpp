@@ -347,7 +347,7 @@ TEST(OdometryStreamTest, CorrectsAnExtrapolatedEstimateOnceTheTicksReachIt) {
   EXPECT_NEAR(corrected[0].odometry.odom_from_vehicle.translation().x(), 0.015, 1e-12);
 }
 
-TEST(OdometryStreamTest, DoesNotGuessFarAhead) {
+TEST(OdometryStreamTest, DoesNotExtrapolateFarAhead) {
   OdometryStream stream(0.12, 0.1);
   EXPECT_TRUE(stream.trigger(kStart).empty());
   OdometryEstimate estimate;

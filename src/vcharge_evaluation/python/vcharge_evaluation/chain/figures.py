@@ -108,7 +108,7 @@ def judge_map(path, truth, figures, report, picture):
 def judge_height_map(output, truth, rig, poses, figures, folder):
     errors = tools.judge("height_map", folder / "report", "--map", output, "--truth", truth, "--rig", rig, "--trajectory",
                          poses)
-    figures.update({"mean_m": errors["height_m"]["mean"], "within_10_cm": errors["share_within_10_cm"],
+    figures.update({"mean_m": errors["height_m"]["mean"], "within_10_cm": errors["fraction_within_10_cm"],
                     "step_m": errors["step_position_m"]["mean"], "tape_m": errors["mean_measurement_m"],
                     "max_tape_m": errors["max_measurement_m"],
                     "tapes": len(errors["measurements"]) - errors["num_measurements_missing"],
@@ -118,7 +118,7 @@ def judge_height_map(output, truth, rig, poses, figures, folder):
 def judge_ranges(output, truth, bag, rig, folder):
     errors = tools.judge("range", folder / "report", "--range", output, "--truth", truth, "--bag", bag, "--rig", rig)
     whole = next((part for part in errors["sets"] if part["label"] == "all cameras"), errors["sets"][0])
-    return {"within_5_percent": {f"{100 * row['density']:.0f} %": row["share_within_tolerance"] for row in whole["accuracy"]}}
+    return {"within_5_percent": {f"{100 * row['density']:.0f} %": row["fraction_within_tolerance"] for row in whole["accuracy"]}}
 
 
 def localization_figures(result, csv, map_path, truths, picture):
