@@ -252,6 +252,8 @@ std::vector<OdometryEstimate> OdometryStream::flush() {
   if (!history_.empty()) {
     release(history_.back().odometry.stamp + Duration(1), &ready);
   }
+  history_.clear();
+  extrapolated_.reset();
   return ready;
 }
 

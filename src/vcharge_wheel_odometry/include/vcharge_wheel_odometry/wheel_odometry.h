@@ -109,7 +109,8 @@ class OdometryStream {
   /// Like add(). The last estimate is at `stamp`, interpolated or extrapolated by up to max_extrapolation_s;
   /// it is missing if neither is possible, or if later ones were published already.
   std::vector<OdometryEstimate> trigger(Timestamp stamp);
-  /// The estimates that wait, at the end of a drive.
+  /// The estimates that wait, at the end of a drive or when the odometry starts again at another pose. Stamps
+  /// after it still increase.
   std::vector<OdometryEstimate> flush();
 
  private:

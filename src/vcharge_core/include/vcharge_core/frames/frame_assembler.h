@@ -90,6 +90,10 @@ class FrameAssembler {
   /// Takes the poses from this trajectory instead of from the odometry.
   void setTrajectory(const Trajectory& odom_from_vehicle) { odometry_.setTrajectory(odom_from_vehicle); }
 
+  /// Keeps the first pose of every stamp, for stages whose images come so late that it depends on the load
+  /// whether a correction comes before or after them.
+  void ignoreCorrections() { odometry_.ignoreCorrections(); }
+
   /// Returns false if the image is late and was dropped.
   bool addImage(size_t camera_index, Timestamp stamp, ImageType image);
   void addOdometry(const VehicleOdometry& odometry);
