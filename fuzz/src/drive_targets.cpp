@@ -152,7 +152,7 @@ void decodeCan(const std::string& bytes) {
   }
 }
 
-struct NobodyLooks : RecordedDriveConsumer {
+struct IgnoringConsumer : RecordedDriveConsumer {
   void addImage(size_t, Timestamp, Timestamp, const Image&) override {}
   void addOdometry(Timestamp, const VehicleOdometry&) override {}
   void addBroken(const std::string&, const std::string&) override {}
@@ -205,8 +205,8 @@ std::vector<FuzzTarget> driveTargets() {
                  {bagBytes(rosbag::compression::Uncompressed), bagBytes(rosbag::compression::BZ2),
                   bagBytes(rosbag::compression::LZ4)},
                  [](const std::string& path) {
-                   NobodyLooks nobody;
-                   readRecordedDrive(path, oneCamera(), DriveTopics(), &nobody, {});
+                   IgnoringConsumer ignore;
+                   readRecordedDrive(path, oneCamera(), DriveTopics(), &ignore, {});
                  }),
       {"camera_frame", frames, convertFrame},
       fileTarget("candump", "can.log", {"(46408.584954) can0 0B4#00000000\n(46408.6) can0 18FEF100#01\n"},

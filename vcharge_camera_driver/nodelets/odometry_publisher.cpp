@@ -7,8 +7,6 @@
 namespace vcharge {
 namespace {
 
-constexpr double kHoldInPeriods = 1.5;  // longest wait of an estimate for the next trigger
-constexpr double kMaxExtrapolation_s = 0.1;
 constexpr double kUnknownVariance = 1e6;  // variance of height, roll and pitch, which wheels do not measure
 
 nav_msgs::Odometry toMessage(const OdometryEstimate& estimate, const std::string& vehicle_frame) {
@@ -37,12 +35,16 @@ OdometryPublisher::OdometryPublisher(ros::NodeHandle* node, const WheelOdometryO
     : vehicle_frame_(std::move(vehicle_frame)),
       publisher_(node->advertise<nav_msgs::Odometry>(topic, 100)),
       odometry_(options),
-      stream_(kHoldInPeriods / frame_rate_hz, kMaxExtrapolation_s) {}
+      stream_(OdometryStream::forFrameRate(frame_rate_hz)) {}
 
 void OdometryPublisher::publish(const std::vector<OdometryEstimate>& estimates) {
   for (const OdometryEstimate& estimate : estimates) {
-    broadcaster_.sendTransform(toTransformStamped(estimate.odometry.odom_from_vehicle,
-                                                  estimate.odometry.stamp, "odom", vehicle_frame_));
+    // tf keeps the first transform of a stamp: a correction goes to the topic only.
+    if (broadcast_ != estimate.odometry.stamp) {
+      broadcaster_.sendTransform(toTransformStamped(estimate.odometry.odom_from_vehicle,
+                                                    estimate.odometry.stamp, "odom", vehicle_frame_));
+      broadcast_ = estimate.odometry.stamp;
+    }
     publisher_.publish(toMessage(estimate, vehicle_frame_));
   }
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <mutex>
+#include <optional>
 #include <string>
 
 #include <ros/node_handle.h>
@@ -31,6 +32,7 @@ class OdometryPublisher {
   std::mutex mutex_;
   WheelOdometry odometry_;
   OdometryStream stream_;
+  std::optional<Timestamp> broadcast_;
   uint64_t reported_measurements_ = 0;
   uint64_t reported_slips_ = 0;
 };

@@ -49,16 +49,33 @@ double understeer(double speed_m_per_s) {
   return std::min(1.0, square(speed_m_per_s / kCharacteristicSpeed_m_per_s));
 }
 
-double steeringAngle(const WheelMeasurement& wheels) {
-  return std::visit([](const auto& each) { return each.steering_angle_rad; }, wheels);
-}
-
 }  // namespace
 
 WheelOdometry::WheelOdometry(const WheelOdometryOptions& options) : options_(options) {
   options.validate();
   along_covariance_ = Eigen::Vector2d(0.0, 1.0).asDiagonal();
   turn_covariance_ = Eigen::Vector3d(0.0, 0.1, square(kZeroSigma_per_m)).asDiagonal();
+}
+
+WheelOdometry::Steering WheelOdometry::steeringOf(const WheelMeasurement& wheels) {
+  const double angle_rad = std::visit([](const auto& each) { return each.steering_angle_rad; }, wheels);
+  if (!options_.use_steering || !(std::abs(angle_rad) < kMaxSteeringAngle_rad)) {  // unknown, which is NaN
+    steering_.clear();
+    return {};
+  }
+  const Timestamp stamp = stampOf(wheels);
+  const double told = std::tan(angle_rad) / options_.wheelbase_m;
+  const auto lag = durationFromSeconds(options_.steering_lag_s);
+  steering_.emplace_back(stamp, told);
+  while (steering_.size() > 1 && steering_[1].first <= stamp - lag) {
+    steering_.pop_front();
+  }
+  // The steering goes on turning as during the last lag. A lag may be half as long or half as long again.
+  const double since_s = toSeconds(stamp - steering_.front().first);
+  const double change =
+      since_s > 0.0 ? (told - steering_.front().second) * options_.steering_lag_s / since_s : 0.0;
+  return {true, told + change,
+          std::hypot(options_.steering_noise_per_m, 0.5 * change) + understeer(along_[1]) * std::abs(told)};
 }
 
 void WheelOdometry::predict(double dt_s, const Steering& steering) {
@@ -186,11 +203,9 @@ void WheelOdometry::correct(const WheelMotion& motion, const Steering& steering)
                   &along_, &along_covariance_);
   if (steering.is_known) {
     const double speed = along_[1];
-    const double steering_noise_per_m =
-        options_.steering_noise_per_m + understeer(speed) * std::abs(steering.curvature_per_m);
     kalmanUpdate<3>(Eigen::RowVector3d(0.0, 1.0, -speed),
                     speed * steering.curvature_per_m - (turn_[1] - speed * turn_[2]),
-                    square(speed * steering_noise_per_m) + square(kYawRateFloor_rad_per_s), &turn_,
+                    square(speed * steering.sigma_per_m) + square(kYawRateFloor_rad_per_s), &turn_,
                     &turn_covariance_);
   }
   if (!is_blind) {
@@ -255,10 +270,7 @@ std::optional<OdometryEstimate> WheelOdometry::add(const WheelMeasurement& wheel
     last_motion_ = stamp;
     return estimate(stamp, 0.0, 0.0);
   }
-  Steering steering;
-  steering.is_known =
-      options_.use_steering && std::abs(steeringAngle(wheels)) < kMaxSteeringAngle_rad;  // false for NaN
-  steering.curvature_per_m = steering.is_known ? std::tan(steeringAngle(wheels)) / options_.wheelbase_m : 0.0;
+  const Steering steering = steeringOf(wheels);
   const double curvature_per_m = steering.is_known ? steering.curvature_per_m + turn_[2]
                                  : std::abs(along_[1]) > kMinSpeedOfCurvature_m_per_s ? turn_[1] / along_[1]
                                                                                       : 0.0;
@@ -300,73 +312,6 @@ std::optional<OdometryEstimate> WheelOdometry::add(const WheelMeasurement& wheel
     addGap(motion.dt_s);
   }
   return estimate(stamp, along_[0] - distance_before_m, turn_[0] - yaw_before_rad);
-}
-
-OdometryStream::OdometryStream(double hold_s, double max_extrapolation_s)
-    : hold_(durationFromSeconds(hold_s)), max_extrapolation_(durationFromSeconds(max_extrapolation_s)) {}
-
-void OdometryStream::release(Timestamp before, std::vector<OdometryEstimate>* ready) {
-  for (const OdometryEstimate& each : history_) {
-    if (each.odometry.stamp < before && (!published_ || *published_ < each.odometry.stamp)) {
-      ready->push_back(each);
-      published_ = each.odometry.stamp;
-    }
-  }
-}
-
-std::vector<OdometryEstimate> OdometryStream::add(const OdometryEstimate& estimate) {
-  std::vector<OdometryEstimate> ready;
-  if (!history_.empty() && estimate.odometry.stamp <= history_.back().odometry.stamp) {
-    return ready;
-  }
-  history_.push_back(estimate);
-  release(estimate.odometry.stamp - hold_, &ready);
-  while (toSeconds(estimate.odometry.stamp - history_.front().odometry.stamp) > 1.0) {
-    history_.pop_front();
-  }
-  return ready;
-}
-
-std::optional<OdometryEstimate> OdometryStream::at(Timestamp stamp) const {
-  const auto after = std::find_if(history_.begin(), history_.end(),
-                                  [&](const OdometryEstimate& each) { return stamp <= each.odometry.stamp; });
-  if (after != history_.end() && after->odometry.stamp == stamp) {
-    return *after;
-  }
-  if (after == history_.begin()) {
-    return std::nullopt;
-  }
-  OdometryEstimate result = *(after - 1);
-  const VehicleOdometry& from = (after - 1)->odometry;
-  const double since_s = toSeconds(stamp - from.stamp);
-  result.odometry.stamp = stamp;
-  if (after == history_.end()) {
-    if (stamp - from.stamp > max_extrapolation_) {
-      return std::nullopt;
-    }
-    result.odometry.odom_from_vehicle =
-        from.odom_from_vehicle *
-        arcMotion(from.forward_speed_m_per_s * since_s, from.yaw_rate_rad_per_s * since_s);
-    return result;
-  }
-  const VehicleOdometry& to = after->odometry;
-  const double share = since_s / toSeconds(to.stamp - from.stamp);
-  result.odometry.odom_from_vehicle = interpolate(from.odom_from_vehicle, to.odom_from_vehicle, share);
-  result.odometry.forward_speed_m_per_s += share * (to.forward_speed_m_per_s - from.forward_speed_m_per_s);
-  result.odometry.yaw_rate_rad_per_s += share * (to.yaw_rate_rad_per_s - from.yaw_rate_rad_per_s);
-  return result;
-}
-
-std::vector<OdometryEstimate> OdometryStream::trigger(Timestamp stamp) {
-  std::vector<OdometryEstimate> ready;
-  release(stamp, &ready);
-  if (!published_ || *published_ < stamp) {
-    if (const std::optional<OdometryEstimate> estimate = at(stamp)) {
-      ready.push_back(*estimate);
-      published_ = stamp;
-    }
-  }
-  return ready;
 }
 
 }  // namespace vcharge

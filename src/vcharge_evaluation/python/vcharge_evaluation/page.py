@@ -42,10 +42,10 @@ def make_page(folder=results.RESULTS):
     return "\n".join(parts)
 
 
-def main():
+def main(words=None):
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true", help="write nothing; exit status 1 where the page is stale")
-    args = parser.parse_args()
+    args = parser.parse_args(words)
     page = make_page()
     if not args.check:
         PAGE.write_text(page, encoding="utf-8")

@@ -12,6 +12,7 @@ struct WheelOdometryOptions {
   VCHARGE_OPTION(double, left_scale, 1.0, positive(), "True distance by that of the left rear wheel's data.");
   VCHARGE_OPTION(double, right_scale, 1.0, positive(), "The same of the right rear wheel.");
   VCHARGE_OPTION(bool, use_steering, true, anyValue(), "Whether the car measures the steering angle.");
+  VCHARGE_OPTION(double, steering_lag_s, 0.05, between(0.0, 0.5), "Age of the steering angle at its stamp.");
   VCHARGE_OPTION(double, max_acceleration_m_per_s2, 1.5, positive(), "Noise of the speed in a second.");
   VCHARGE_OPTION(double, max_yaw_acceleration_rad_per_s2, 0.4, positive(), "The same of the yaw rate.");
   VCHARGE_OPTION(double, steering_noise_per_m, 0.002, positive(), "Sigma of the steered curvature.");

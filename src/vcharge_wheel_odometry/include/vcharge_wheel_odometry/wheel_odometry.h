@@ -2,6 +2,7 @@
 
 #include <deque>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -58,7 +59,10 @@ class WheelOdometry {
   struct Steering {
     bool is_known = false;
     double curvature_per_m = 0.0;
+    double sigma_per_m = 0.0;
   };
+  /// Curvature of the path by the steering angle now and before its lag.
+  Steering steeringOf(const WheelMeasurement& wheels);
   void predict(double dt_s, const Steering& steering);
   void addMotion(const WheelMotion& motion);
   void addGap(double gap_s);
@@ -68,7 +72,7 @@ class WheelOdometry {
   void forgetSpeeds();
   OdometryEstimate estimate(Timestamp stamp, double distance_m, double turn_rad);
 
-  const WheelOdometryOptions options_;
+  WheelOdometryOptions options_;
   WheelOdometryCounts counts_;
   std::optional<WheelMeasurement> last_;
   double left_m_ = 0.0, right_m_ = 0.0;  // measured since the beginning
@@ -77,6 +81,7 @@ class WheelOdometry {
   double steered_yaw_rad_ = 0.0;
   Timestamp last_motion_;
   std::deque<Sample> window_;
+  std::deque<std::pair<Timestamp, double>> steering_;  // curvatures by the angles of the last lag
   bool left_slips_ = false, right_slips_ = false;
   Eigen::Vector2d along_ = Eigen::Vector2d::Zero();  // state: distance, speed
   Eigen::Matrix2d along_covariance_;
@@ -88,24 +93,30 @@ class WheelOdometry {
 };
 
 /// Sorts estimates by stamp for publishing, with one at the stamp of each camera trigger. Estimates of ticks
-/// wait for the next trigger, at most `hold_s`. Not thread safe.
+/// wait for the next trigger, at most `hold_s`. The estimate at a trigger is extrapolated if the ticks are
+/// late; once they reach it, it is published again under the same stamp, corrected. Not thread safe.
 class OdometryStream {
  public:
   OdometryStream(double hold_s, double max_extrapolation_s);
+  /// For triggers at this rate.
+  static OdometryStream forFrameRate(double frame_rate_hz);
 
   /// Returns the estimates to publish now, in order of stamps.
   std::vector<OdometryEstimate> add(const OdometryEstimate& estimate);
   /// Like add(). The last estimate is at `stamp`, interpolated or extrapolated by up to max_extrapolation_s;
   /// it is missing if neither is possible, or if later ones were published already.
   std::vector<OdometryEstimate> trigger(Timestamp stamp);
+  /// The estimates that wait, at the end of a drive.
+  std::vector<OdometryEstimate> flush();
 
  private:
   std::optional<OdometryEstimate> at(Timestamp stamp) const;
   void release(Timestamp before, std::vector<OdometryEstimate>* ready);
 
-  const Duration hold_, max_extrapolation_;
+  Duration hold_, max_extrapolation_;
   std::deque<OdometryEstimate> history_;  // the newest second
   std::optional<Timestamp> published_;
+  std::optional<Timestamp> extrapolated_;  // trigger whose estimate is to be corrected
 };
 
 }  // namespace vcharge

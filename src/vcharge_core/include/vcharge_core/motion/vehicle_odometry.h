@@ -60,14 +60,15 @@ struct OdometryBufferOptions {
   VCHARGE_END_OPTIONS();
 };
 
-/// Interpolates odometry between its stamps. Does not extrapolate: lookups outside the buffer or inside a gap
+/// Interpolates odometry between its stamps. An entry with the stamp of an earlier one replaces it, as when
+/// an extrapolated pose becomes known. Does not extrapolate: lookups outside the buffer or inside a gap
 /// return a status. Not thread safe.
 class OdometryBuffer {
  public:
   enum class AddResult {
     kAdded,
     kAddedAfterGap,  ///< added, more than max_gap_s after the previous entry
-    kDuplicate,      ///< same stamp as an earlier entry: ignored
+    kCorrected,      ///< same stamp as an earlier entry, which it replaces
     kOutOfOrder,     ///< slightly older than the newest entry: ignored
     kReset,          ///< time jumped backwards: all older entries were dropped, this one was kept
   };
@@ -80,7 +81,7 @@ class OdometryBuffer {
   struct Counts {
     uint64_t added = 0;
     uint64_t gaps = 0;
-    uint64_t duplicates = 0;
+    uint64_t corrections = 0;
     uint64_t out_of_order = 0;
     uint64_t resets = 0;
   };
