@@ -7,7 +7,7 @@ from vcharge_evaluation.tools import ROOT
 
 PAGE = ROOT / "doc" / "results.md"
 # In the order of the pipeline; other stages follow by name.
-ORDER = ("chain", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "faults", "latency",
+ORDER = ("chain", "masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "faults", "latency",
          "real_images", "foundations", "speed")
 INTRODUCTION = """# Results
 
