@@ -18,7 +18,7 @@ constexpr float kBodyEdgeSigma = 0.25F;
 // Moving structure relative to the image's typical one, which is as likely on a body as in the scene.
 constexpr float kEvenMoving = 0.45F;
 constexpr float kStillEvidence = 2.0F;
-constexpr float kMovingEvidence = 0.4F, kUpperMovingEvidence = 1.0F;
+constexpr float kMovingEvidence = 0.4F, kUpperMovingEvidence = 0.7F;
 constexpr float kNoEdgeEvidence = 0.25F;
 constexpr float kMaxMoving = 1.5F;
 constexpr float kMaxEdgeEvidence = 20.0F, kUpperMaxEdgeEvidence = 10.0F;
@@ -47,8 +47,7 @@ constexpr double kMinBody = 0.0003;
 
 class Evidence {
  public:
-  Evidence(const SmallView& view, const StaticStructure& structure)
-      : view_(view), structure_(structure), edge_sigma_(static_cast<float>(structure.edge_noise)) {
+  Evidence(const SmallView& view, const StaticStructure& structure) : view_(view), structure_(structure) {
     cv::magnitude(structure.edge_x, structure.edge_y, edge_);
     std::vector<double> light;
     for (int y = 0; y < view.size.height; ++y) {
@@ -61,11 +60,11 @@ class Evidence {
     sky_level_ = static_cast<float>(kSkyBrightness * quantile(light, 0.95));
   }
   const SmallView& view() const { return view_; }
-  /// CV_8UC1, 255 on clear static edges. In the upper half, straight driving leaves edges of the scene.
+  /// CV_8UC1, 255 on clear static edges.
   cv::Mat clearEdges() const {
-    cv::Mat clear = edge_ > kWeakEdge * edge_sigma_;
+    cv::Mat clear = edge_ > kWeakEdge * structure_.edge_noise;
     const cv::Rect upper(0, 0, clear.cols, clear.rows / 2);
-    clear(upper) &= edge_(upper) > kUpperEdge * edge_sigma_;
+    clear(upper) = edge_(upper) > kUpperEdge * structure_.edge_noise;
     return clear;
   }
 
@@ -78,7 +77,7 @@ class Evidence {
     if (y < view_.size.height / 2 && structure_.light.at<float>(y, x) > sky_level_) {
       return -kIndependence;
     }
-    const float scene_precision = 1.0F / (edge_sigma_ * edge_sigma_);
+    const float scene_precision = 1.0F / (sigmaAt(y) * sigmaAt(y));
     const float body_precision = 1.0F / (kBodyEdgeSigma * kBodyEdgeSigma);
     const float edge = edge_.at<float>(y, x);
     const float by_edge =
@@ -104,14 +103,20 @@ class Evidence {
                       structure_.edge_y.at<float>(v, u) * static_cast<float>(dy));
     };
     const float length = std::hypot(static_cast<float>(dx), static_cast<float>(dy));
-    const float edge = std::max(across(y, x), across(y + dy, x + dx)) / length / (kClearEdge * edge_sigma_);
+    const float edge = std::max(across(y, x), across(y + dy, x + dx)) / length /
+                       (kClearEdge * static_cast<float>(structure_.edge_noise));
     return (kMinCutCost + (kCutCost - kMinCutCost) * std::max(0.0F, 1.0F - edge * edge)) / length;
   }
 
  private:
+  /// Standard deviation of edges' directions where nothing stays.
+  float sigmaAt(int y) const {
+    return static_cast<float>(y < view_.size.height / 2 ? structure_.upper_edge_noise
+                                                        : structure_.edge_noise);
+  }
+
   const SmallView& view_;
   const StaticStructure& structure_;
-  const float edge_sigma_;
   float sky_level_ = 255.0F;
   cv::Mat edge_;
 };

@@ -22,8 +22,8 @@ constexpr double kTurnArm_m = 2.0;
 constexpr int kHeadingBins = 12;
 constexpr int kMinSamples = 25;
 constexpr double kFullTurn_rad = 2.0 * CV_PI;
-// Pixels around the body that show body and scene, at the size of the small images.
-constexpr int kMargin_px = 3;
+// Width of the seam that shows body and scene, relative to the image width.
+constexpr double kMargin = 0.005;
 constexpr double kManySpots = 0.001;
 
 FrameAssemblerOptions patientAssembler() {
@@ -67,8 +67,9 @@ cv::Mat drawPicture(const SmallView& view, const StaticStructure& structure, con
 /// Mask at the camera's size from the body at the small size.
 cv::Mat enlarge(const cv::Mat& body, cv::Size size) {
   cv::Mat grown, large, mask;
+  const int margin_px = std::max(2, cvRound(kMargin * body.cols));
   cv::dilate(body, grown,
-             cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(2 * kMargin_px + 1, 2 * kMargin_px + 1)));
+             cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(2 * margin_px + 1, 2 * margin_px + 1)));
   cv::resize(grown, large, size, 0, 0, cv::INTER_LINEAR);
   cv::threshold(large, mask, 127, 255, cv::THRESH_BINARY_INV);
   return mask;

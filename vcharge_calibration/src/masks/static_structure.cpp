@@ -27,8 +27,11 @@ constexpr float kRim_rad = 0.15F;
 constexpr int kRimBins = 40;
 constexpr int kMinOutside_px = 200;
 constexpr double kStatic = 0.35;
-// Quantile 0.4 of the Rayleigh distribution.
-constexpr double kRayleighQuantile = 1.0108;
+// Quantiles 0.4 and 0.85 of the Rayleigh distribution.
+constexpr double kRayleigh40 = 1.0108, kRayleigh85 = 1.9479;
+constexpr double kMinEdgeNoise = 0.02, kMaxEdgeNoise = 0.2;
+// Moving structure that is weaker than this fraction of the noise is not significant.
+constexpr double kMinMoving = 0.3;
 constexpr int kBlock_px = 16;
 
 /// Standard deviation of the noise: the smoothest blocks' response to a filter that cancels planes
@@ -277,21 +280,32 @@ StaticStructure findStaticStructure(const SmallView& view, const std::vector<cv:
   cv::sqrt(fine(variance), found.moving);
   cv::Mat edge;
   cv::magnitude(found.edge_x, found.edge_y, edge);
-  std::vector<double> moving, edges;
+  std::vector<double> moving, noises, edges[2];  // edges of the upper and the lower half
   for (int y = 0; y < view.size.height; ++y) {
     for (int x = 0; x < view.size.width; ++x) {
       if (view.valid.at<uint8_t>(y, x) == 0) {
         continue;
       }
-      edges.push_back(edge.at<float>(y, x));
+      edges[y < view.size.height / 2 ? 0 : 1].push_back(edge.at<float>(y, x));
       if (edge.at<float>(y, x) < kStatic) {
         moving.push_back(found.moving.at<float>(y, x));
+        noises.push_back(std::sqrt(sum_noise.at<float>(y, x) / total));
       }
     }
   }
-  // The lengths of random directions have a Rayleigh distribution; bodies take up less than half of the view.
-  found.edge_noise = edges.empty() ? 0.0 : std::clamp(quantile(edges, 0.4) / kRayleighQuantile, 0.02, 0.2);
-  found.typical_moving = moving.empty() ? 0.0 : quantile(moving, 0.5);
+  // The lengths of random directions have a Rayleigh distribution. Straight driving leaves edges of the scene
+  // in the upper half, where less of the body is visible than in the lower one.
+  if (!moving.empty() && !edges[0].empty() && !edges[1].empty()) {
+    const double lower = quantile(edges[1], 0.4) / kRayleigh40;
+    const double upper =
+        std::max(quantile(edges[0], 0.4) / kRayleigh40, quantile(edges[0], 0.85) / kRayleigh85);
+    found.edge_noise = std::clamp(lower, kMinEdgeNoise, kMaxEdgeNoise);
+    found.upper_edge_noise = std::clamp(upper, kMinEdgeNoise, kMaxEdgeNoise);
+    found.typical_moving = quantile(moving, 0.5);
+    if (found.typical_moving < kMinMoving * quantile(noises, 0.5)) {
+      found.typical_moving = 0.0;
+    }
+  }
   return found;
 }
 

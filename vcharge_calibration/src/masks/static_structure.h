@@ -26,8 +26,9 @@ struct StaticStructure {
   cv::Mat fading;          ///< of the lens at its rim, 1 inside
   cv::Mat edge_x, edge_y;  ///< mean of the gradients' directions: length 1 for an edge that is always there
   cv::Mat moving;          ///< standard deviation over time of the local contrast, without the images' noise
-  double typical_moving = 0.0;  ///< median of `moving` away from static edges
-  double edge_noise = 0.0;      ///< standard deviation of edge_x and edge_y where nothing stays
+  double typical_moving = 0.0;  ///< median of `moving` away from static edges; 0 if nothing moves
+  /// Standard deviation of edge_x and edge_y where nothing stays, in the lower and the upper half.
+  double edge_noise = 0.0, upper_edge_noise = 0.0;
 };
 
 /// `images`: CV_8UC1 of the view's size, some may be empty; one weight each.
