@@ -30,34 +30,36 @@ constexpr float kMinCutCost = 0.05F;
 constexpr float kForbidden = 1e4F;
 // Length of the mean edge direction of a clear edge, relative to that of the scene's noise.
 constexpr float kClearEdge = 4.0F;
-constexpr float kWeakEdge = 3.0F, kUpperEdge = 4.0F;
+constexpr float kWeakEdge = 3.0F, kUpperEdge = 3.0F;
 // Directions from the optical axis, of which neighbours on both sides decide whether an edge bounds the body.
 constexpr int kDirections = 360;
 constexpr int kReach = 6;
 constexpr int kMaxGap = 25;
 constexpr float kBoundedFraction = 0.5F;
-// Fraction of the gray levels' quantile 0.95 above which a pixel may be sky.
-constexpr double kSkyBrightness = 0.75;
+// Brightness relative to the ground above which a pixel of the upper half may be sky.
+constexpr double kSkyBrightness = 1.5;
 // Distance from the border of the field of view and from the body at which static edges are dirt.
 constexpr int kBorder_px = 8;
 constexpr float kAlwaysThere = 0.7F;
 // The body reaches below this fraction of the image height.
-constexpr double kLowest = 0.6;
+constexpr double kLowest = 0.75;
 constexpr double kMinBody = 0.0003;
 
 class Evidence {
  public:
   Evidence(const SmallView& view, const StaticStructure& structure) : view_(view), structure_(structure) {
     cv::magnitude(structure.edge_x, structure.edge_y, edge_);
-    std::vector<double> light;
-    for (int y = 0; y < view.size.height; ++y) {
+    std::vector<double> ground;
+    for (int y = view.size.height / 2; y < view.size.height; ++y) {
       for (int x = 0; x < view.size.width; ++x) {
         if (view.valid.at<uint8_t>(y, x) != 0) {
-          light.push_back(structure.light.at<float>(y, x));
+          ground.push_back(structure.light.at<float>(y, x));
         }
       }
     }
-    sky_level_ = static_cast<float>(kSkyBrightness * quantile(light, 0.95));
+    if (!ground.empty()) {
+      sky_level_ = std::min(sky_level_, static_cast<float>(kSkyBrightness * quantile(ground, 0.5)));
+    }
   }
   const SmallView& view() const { return view_; }
   /// CV_8UC1, 255 on clear static edges.
@@ -117,7 +119,7 @@ class Evidence {
 
   const SmallView& view_;
   const StaticStructure& structure_;
-  float sky_level_ = 255.0F;
+  float sky_level_ = 240.0F;  // saturated
   cv::Mat edge_;
 };
 
