@@ -30,7 +30,7 @@ constexpr float kMinCutCost = 0.05F;
 constexpr float kForbidden = 1e4F;
 // Length of the mean edge direction of a clear edge, relative to that of the scene's noise.
 constexpr float kClearEdge = 4.0F;
-constexpr float kWeakEdge = 3.0F, kUpperEdge = 3.0F;
+constexpr float kWeakEdge = 3.0F, kUpperEdge = 3.0F, kStrongEdge = 7.0F;
 // Directions from the optical axis, of which neighbours on both sides decide whether an edge bounds the body.
 constexpr int kDirections = 360;
 constexpr int kReach = 6;
@@ -42,7 +42,7 @@ constexpr double kSkyBrightness = 1.5;
 constexpr int kBorder_px = 8;
 constexpr float kAlwaysThere = 0.7F;
 // The body reaches below this fraction of the image height.
-constexpr double kLowest = 0.75;
+constexpr double kLowest = 0.8;
 constexpr double kMinBody = 0.0003;
 
 class Evidence {
@@ -70,6 +70,12 @@ class Evidence {
     return clear;
   }
 
+  /// CV_8UC1, 255 on strong static edges of the lower half.
+  cv::Mat strongEdges() const {
+    cv::Mat strong = edge_ > kStrongEdge * structure_.edge_noise;
+    strong.rowRange(0, strong.rows / 2).setTo(0);
+    return strong;
+  }
   /// CV_8UC1, 255 on edges that are in nearly every image.
   cv::Mat alwaysThere() const { return edge_ > kAlwaysThere; }
 
@@ -197,7 +203,9 @@ void bridgeGaps(const std::array<int, kDirections>& length, std::array<bool, kDi
 
 /// Removes the body in directions in which no static edge separates it from the scene, such as smooth sky or
 /// asphalt.
-void keepBoundedDirections(const SmallView& view, const cv::Mat& edges, cv::Mat* body) {
+void keepBoundedDirections(const Evidence& evidence, cv::Mat* body) {
+  const SmallView& view = evidence.view();
+  const cv::Mat edges = evidence.clearEdges(), strong = evidence.strongEdges();
   cv::Mat near_edge;
   cv::dilate(edges, near_edge, cv::Mat::ones(3, 3, CV_8U));
   const auto directionOf = [&](int y, int x) {
@@ -212,6 +220,15 @@ void keepBoundedDirections(const SmallView& view, const cv::Mat& edges, cv::Mat*
         const auto direction = static_cast<size_t>(directionOf(y, x));
         ++length[direction];
         bounded[direction] += near_edge.at<uint8_t>(y, x) != 0 ? 1 : 0;
+      }
+    }
+  }
+  // The outline may be weak where a strong edge is inside.
+  for (int y = 0; y < body->rows; ++y) {
+    for (int x = 0; x < body->cols; ++x) {
+      if (body->at<uint8_t>(y, x) != 0 && strong.at<uint8_t>(y, x) != 0) {
+        const auto direction = static_cast<size_t>(directionOf(y, x));
+        bounded[direction] = length[direction];
       }
     }
   }
@@ -246,7 +263,7 @@ BodyRegions cutBody(const SmallView& view, const StaticStructure& structure) {
   }
   const Evidence evidence(view, structure);
   regions.body = minimumCut(evidence);
-  keepBoundedDirections(view, evidence.clearEdges(), &regions.body);
+  keepBoundedDirections(evidence, &regions.body);
   // The body reaches into the lower half of the image, to which mirrors are connected.
   const double area = cv::countNonZero(view.valid);
   cv::Mat labels, numbers, centres;
