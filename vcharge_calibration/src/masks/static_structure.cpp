@@ -27,8 +27,8 @@ constexpr float kRim_rad = 0.15F;
 constexpr int kRimBins = 40;
 constexpr int kMinOutside_px = 200;
 constexpr double kStatic = 0.35;
-// Quantiles 0.4 and 0.7 of the Rayleigh distribution.
-constexpr double kRayleigh40 = 1.0108, kRayleigh70 = 1.5518;
+// Quantiles 0.15, 0.4 and 0.7 of the Rayleigh distribution.
+constexpr double kRayleigh15 = 0.5701, kRayleigh40 = 1.0108, kRayleigh70 = 1.5518;
 constexpr double kMinEdgeNoise = 0.02, kMaxEdgeNoise = 0.2;
 // Moving structure that is weaker than this fraction of the noise is not significant.
 constexpr double kMinMoving = 0.3;
@@ -296,9 +296,10 @@ StaticStructure findStaticStructure(const SmallView& view, const std::vector<cv:
   // The lengths of random directions have a Rayleigh distribution. Straight driving leaves edges of the scene
   // in the upper half, where less of the body is visible than in the lower one.
   if (!moving.empty() && !edges[0].empty() && !edges[1].empty()) {
-    const double lower = quantile(edges[1], 0.4) / kRayleigh40;
     const double upper =
         std::max(quantile(edges[0], 0.4) / kRayleigh40, quantile(edges[0], 0.7) / kRayleigh70);
+    // The body may fill most of the lower half, with edges that are longer than those of the scene.
+    const double lower = std::min(upper, quantile(edges[1], 0.15) / kRayleigh15);
     found.edge_noise = std::clamp(lower, kMinEdgeNoise, kMaxEdgeNoise);
     found.upper_edge_noise = std::clamp(upper, kMinEdgeNoise, kMaxEdgeNoise);
     found.typical_moving = quantile(moving, 0.5);
