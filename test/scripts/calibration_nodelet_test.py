@@ -75,9 +75,7 @@ class CalibrationNodeletTest(unittest.TestCase):
         rospy.set_param("/calibration", {
             "rig": str(self.cameras), "output": str(self.output), "map": str(self.work / "room.vmap"),
             "trajectory": str(self.work / "path.tum"), "report": str(self.work / "report"), "lossless_replay": True,
-            "options": OPTIONS, "session": {"coach": {"enough_distance_m": 70.0}},
-            # Topics are published much faster than in a drive: on a busy machine they drift apart.
-            "source": {"sort_window_s": 2.0}})
+            "options": OPTIONS, "session": {"coach": {"enough_distance_m": 70.0}}})
 
     def start(self):
         self.assertTrue(self.load("/calibration", "vcharge_calibration/calibration_nodelet", [], [], [], "").success)
@@ -97,14 +95,14 @@ class CalibrationNodeletTest(unittest.TestCase):
         self.assertEqual(self.list().nodelets, [], "the manager outlives the nodelet")
         rospy.delete_param("/calibration")
 
-    def publish(self, share=1.0):
+    def publish(self, fraction=1.0):
         """Publishes the first part of the drive; returns when the nodelet has processed it and is idle, since unloading
         a nodelet inside a callback destroys its queues first."""
-        count = int(share * len(self.messages))
+        count = int(fraction * len(self.messages))
         for topic, message in self.messages[:count]:
             self.publishers[topic].publish(message)
-            time.sleep(0.0005)
-        expected = int(share * self.num_frames) - 10
+            time.sleep(0.002)  # topics must not drift apart by the sorting window on a busy machine
+        expected = int(fraction * self.num_frames) - 10
         wait_for(lambda: self.num_followed() >= expected, "the frames", WORK_TIMEOUT_S)
         while True:
             before = self.num_followed()

@@ -73,9 +73,9 @@ def draw(eye, rays, texture):
     distances = np.stack([ends[i] / rays[i] for i in range(3)])
     distance = distances.min(axis=0)
     side = [distance == distances[i] for i in range(3)]
-    place = [np.float32(eye[i]) + distance * rays[i] for i in range(3)]
-    along = np.where(side[0], place[1] + 7.3, place[0]) + np.where(side[1], np.float32(31.7), 0)
-    up = np.where(side[2], place[1], place[2] + 20.0) + 9.1 * np.where(side[2], rays[2] > 0, rays[0] > 0)
+    point = [np.float32(eye[i]) + distance * rays[i] for i in range(3)]
+    along = np.where(side[0], point[1] + 7.3, point[0]) + np.where(side[1], np.float32(31.7), 0)
+    up = np.where(side[2], point[1], point[2] + 20.0) + 9.1 * np.where(side[2], rays[2] > 0, rays[0] > 0)
     incidence = np.select(side, [np.abs(rays[i]) for i in range(3)])
     footprint_m = distance / (FOCAL_PX * np.maximum(incidence, np.float32(0.02)))
     texels_per_m = np.where(side[2], np.float32(FLOOR_TEXELS_PER_M), np.float32(TEXELS_PER_M))
@@ -98,13 +98,13 @@ def write_rig(file, with_extrinsics):
     file.write_text("\n".join(lines) + "\n")
 
 
-def write_bag(file, duration_share=1.0):
+def write_bag(file, duration_fraction=1.0):
     """Images of all cameras, and odometry ten times as often. Only pixels have noise."""
     rays, inside = camera_rays()
     texture = make_texture(1)
     random = np.random.default_rng(2)
     poses = path(FRAME_M / ODOMETRY_PER_FRAME)
-    poses = poses[:max(2, int(duration_share * len(poses)))]
+    poses = poses[:max(2, int(duration_fraction * len(poses)))]
     with rosbag.Bag(str(file), "w") as bag:
         for i, (x, y, yaw) in enumerate(poses):
             stamp = rospy.Time.from_sec(100.0 + i * FRAME_S / ODOMETRY_PER_FRAME)

@@ -229,7 +229,7 @@ class DriveTfNodeletTest(unittest.TestCase):
         self.assertTrue(self.is_quiet())
         self.assertEqual(self.stamps("left"), [stamp(0.0), stamp(0.08)])
 
-    def test_stands_aside_where_a_driver_publishes_camera_info_and_returns_after_it(self):
+    def test_pauses_while_a_driver_publishes_camera_info_and_resumes_after_it(self):
         driver = CameraInfo(width=1280, height=800, distortion_model="the driver's")
 
         def heard(seconds):
@@ -242,7 +242,7 @@ class DriveTfNodeletTest(unittest.TestCase):
             self.is_quiet()
             return [info.distortion_model for info in self.infos["left"]]
 
-        def stands_aside(t=iter(range(1, 10000))):
+        def is_paused(t=iter(range(1, 10000))):
             # The nodelet may receive it later than this script; it ignores a repeated stamp.
             self.drivers["left"].publish(driver)
             wait_for(lambda: self.infos["left"], "the driver's camera_info")
@@ -250,10 +250,10 @@ class DriveTfNodeletTest(unittest.TestCase):
 
         self.assertEqual(heard(0.0), ["equidistant"])
         self.infos["left"].clear()
-        wait_for(stands_aside, "the nodelet to stand aside")
+        wait_for(is_paused, "the nodelet to pause")
         wait_for(lambda t=iter(range(10000)): heard(1.0 + 0.08 * next(t)) == ["equidistant"], "camera_info again")
 
-    def test_stands_aside_where_another_node_broadcasts_the_odometry(self):
+    def test_pauses_while_another_node_broadcasts_the_odometry(self):
         other = TransformStamped(child_frame_id="trailer")
         other.header.frame_id = "base_link"
         other.transform.rotation.w = 1.0
@@ -273,14 +273,14 @@ class DriveTfNodeletTest(unittest.TestCase):
         self.assertEqual(own_transforms(0.0), [stamp(0.0)], "a trailer is no odometry")
         other.header.frame_id, other.child_frame_id = "odom", "base_link"
 
-        def stands_aside(t=iter(range(1, 10000))):
+        def is_paused(t=iter(range(1, 10000))):
             # The nodelet may receive it later than this script.
             self.transforms.clear()
             self.tf.publish([other])
             wait_for(lambda: self.transforms, "the other transform")
             return own_transforms(0.1 * next(t)) == []
 
-        wait_for(stands_aside, "the nodelet to stand aside")
+        wait_for(is_paused, "the nodelet to pause")
 
     def test_bad_odometry_is_reported_and_skipped(self):
         bad = odometry(0.0)

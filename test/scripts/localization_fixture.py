@@ -14,7 +14,7 @@ EXPOSURE = ("--exposure-gain", 1.15)
 MAP_DURATION_S, DURATION_S, SCALE = 5, 4, 0.25
 
 
-class Place:
+class MappedRoad:
     """A map, and another day's drive through it, both with images of a quarter of the size. Faults need no new rendering."""
 
     def __init__(self):
@@ -61,7 +61,7 @@ class Place:
             raise RuntimeError(f"simulate_drive failed: {output} {errors}")
         return folder / "drive.bag"
 
-    def localize(self, bag=None, rig=None, place=None, words=(), prefix=()):
+    def localize(self, bag=None, rig=None, map_path=None, words=(), prefix=()):
         """Exit status, findings and errors of localize_drive, and the rows of its table."""
         output = self.folder / "localized.tum"
         table = self.folder / "localized.tum.csv"
@@ -69,7 +69,7 @@ class Place:
             path.unlink(missing_ok=True)
         status, found, errors = run_tool([
             *prefix, tool("vcharge_localization", "localize_drive"), "--bag", bag or self.bag, "--rig", rig or self.rig,
-            "--map", place or self.map, "--output", output, *words])
+            "--map", map_path or self.map, "--output", output, *words])
         rows = []
         if table.exists():
             with open(table, encoding="utf-8") as file:

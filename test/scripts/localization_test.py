@@ -17,7 +17,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from localization_fixture import CAMERAS, Place, count, rig_text, warnings  # noqa: E402
+from localization_fixture import CAMERAS, MappedRoad, count, rig_text, warnings  # noqa: E402
 from nodelet_fixture import Diagnostics, drive_publishers, manager_services, reach, wait_for, wait_until_gone  # noqa: E402
 from vcharge_msgs.msg import LocalizationStatus  # noqa: E402
 
@@ -38,11 +38,11 @@ def later(shift_s):
 class LocalizationTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.place = Place()
-        status, cls.found, errors, cls.rows = cls.place.localize()
+        cls.road = MappedRoad()
+        status, cls.found, errors, cls.rows = cls.road.localize()
         if status != 0:
             raise RuntimeError(f"localize_drive failed: {errors}")
-        cls.messages = [(topic, message) for topic, message in cls.messages_of(cls.place.bag)
+        cls.messages = [(topic, message) for topic, message in cls.messages_of(cls.road.bag)
                         if topic == "/odom" or topic.endswith("/image_raw")]
         cls.received = {}
         cls.logged = []
@@ -62,7 +62,7 @@ class LocalizationTest(unittest.TestCase):
 
     @classmethod
     def tearDownClass(cls):
-        cls.place.remove()
+        cls.road.remove()
 
     @classmethod
     def messages_of(cls, path):
@@ -72,39 +72,40 @@ class LocalizationTest(unittest.TestCase):
     def expect_right(self, rows, min_localized=0.9, max_error_m=MAX_ERROR_M):
         self.assertEqual(len(rows), len(self.rows))
         self.assertGreaterEqual(count(rows, "localized"), min_localized * len(rows))
-        self.assertLess(self.place.errors_of_rows_m(rows).max(), max_error_m)
+        self.assertLess(self.road.errors_of_rows_m(rows).max(), max_error_m)
 
     def test_poses_are_right_and_no_camera_is_blamed(self):
         self.assertGreater(len(self.rows), 40)
         self.expect_right(self.rows)
         self.assertEqual(self.rows[0]["status"], "lost", "one recognized place alone is not believed")
         self.assertEqual(warnings(self.found), [])
+        self.assertEqual((self.found["num_frames"], self.found["num_incomplete_frames"]), (len(self.rows), 0))
 
     def test_is_the_same_on_one_thread_and_without_the_truth(self):
-        blind = self.place.map_drive.folder / "blind.bag"
+        blind = self.road.map_drive.folder / "blind.bag"
         with rosbag.Bag(str(blind), "w") as bag:
-            for topic, message in self.messages_of(self.place.bag):
+            for topic, message in self.messages_of(self.road.bag):
                 if topic != "/ground_truth":
                     bag.write(topic, message, message.header.stamp)
-        status, found, _, _ = self.place.localize(bag=blind, prefix=("taskset", "-c", "0"))
+        status, found, _, _ = self.road.localize(bag=blind, prefix=("taskset", "-c", "0"))
         self.assertEqual(status, 0)
         self.assertEqual(found["content_hash"], self.found["content_hash"])
 
     def test_faults_of_cameras_are_named_and_the_pose_stays_right(self):
-        frozen = self.place.drive("frozen", "faults.frozen_camera.cameras=[left]", "faults.frozen_camera.start_s=1.5")
-        dead = self.place.drive("dead", "faults.dead_camera.cameras=[rear]", "faults.dead_camera.start_s=1.5")
-        swapped = self.place.drive("swapped", "faults.swapped_cameras.cameras=[left,right]")
+        frozen = self.road.drive("frozen", "faults.frozen_camera.cameras=[left]", "faults.frozen_camera.start_s=1.5")
+        dead = self.road.drive("dead", "faults.dead_camera.cameras=[rear]", "faults.dead_camera.start_s=1.5")
+        swapped = self.road.drive("swapped", "faults.swapped_cameras.cameras=[left,right]")
 
         def wrong_lens(cameras):
             for key in ("gamma1", "gamma2"):
                 cameras["right"]["intrinsics"][key] *= 1.1
 
-        wrong = self.place.rig.parent / "wrong_lens.yaml"
-        wrong.write_text(rig_text(self.place.rig, wrong_lens))
+        wrong = self.road.rig.parent / "wrong_lens.yaml"
+        wrong.write_text(rig_text(self.road.rig, wrong_lens))
         for bag, rig, blamed, words in ((frozen, None, ("left",), "frozen"), (dead, None, ("rear",), "no image"),
                                         (swapped, None, ("left", "right"), "intrinsics"),
                                         (None, wrong, ("right",), "intrinsics")):
-            status, found, errors, rows = self.place.localize(bag=bag, rig=rig)
+            status, found, errors, rows = self.road.localize(bag=bag, rig=rig)
             self.assertEqual((status, errors), (0, []))
             # With these small images a frame has about 80 inliers and needs 20: each lost camera costs frames.
             self.expect_right(rows, min_localized=0.9 - 0.1 * len(blamed))
@@ -112,47 +113,50 @@ class LocalizationTest(unittest.TestCase):
             self.assertEqual({text.split(":")[0] for _, text in told}, set(blamed), told)
             self.assertTrue(all(words in text for _, text in told), told)
             self.assertGreater(min(frames for frames, _ in told), 10)
+            without_rear = found["num_missing_images"]["rear"]
+            self.assertEqual((found["num_incomplete_frames"], without_rear > 10), (without_rear, words == "no image"))
 
     def test_faults_of_the_odometer_and_late_images_are_borne(self):
         for name, *settings in (("reset", "faults.counter_reset.time_s=2"),
                                 ("gap", "faults.missing_ticks.start_s=1.5", "faults.missing_ticks.end_s=2.5"),
                                 ("late", "faults.late_images.cameras=[rear]", "faults.late_images.probability=0.5",
                                  "faults.late_images.delay_s=0.17")):
-            status, found, errors, rows = self.place.localize(bag=self.place.drive(name, *settings))
+            status, found, errors, rows = self.road.localize(bag=self.road.drive(name, *settings))
             self.assertEqual((status, errors), (0, []), name)
             self.expect_right(rows)
             self.assertEqual(warnings(found), [], name)
+            self.assertEqual(found["num_odometry_resets"], 1 if name == "reset" else 0, name)
 
     def test_a_rig_with_other_cameras_and_a_map_of_other_features_work(self):
-        two = self.place.rig.parent / "two.yaml"
-        two.write_text(rig_text(self.place.rig, lambda cameras: {name: cameras[name] for name in ("rear", "left")}))
-        status, _, errors, rows = self.place.localize(rig=two)
+        two = self.road.rig.parent / "two.yaml"
+        two.write_text(rig_text(self.road.rig, lambda cameras: {name: cameras[name] for name in ("rear", "left")}))
+        status, _, errors, rows = self.road.localize(rig=two)
         self.assertEqual((status, errors), (0, []))
         self.expect_right(rows, min_localized=0.7)
-        other = self.place.folder / "root_sift.yaml"
+        other = self.road.folder / "root_sift.yaml"
         other.write_text("features: {type: root_sift}\n")
-        status, _, errors, rows = self.place.localize(place=self.place.build("root_sift", "--options", other))
+        status, _, errors, rows = self.road.localize(map_path=self.road.build("root_sift", "--options", other))
         self.assertEqual((status, errors), (0, []))
         self.expect_right(rows, min_localized=0.8)
 
     def test_bad_input_is_one_error_and_nothing_is_written(self):
-        for name, place, rig, options, words in self.place.bad_inputs():
+        for name, map_path, rig, options, words in self.road.bad_inputs():
             extra = ()
             if options:
-                path = self.place.folder / "odd.yaml"
+                path = self.road.folder / "odd.yaml"
                 path.write_text("no_such_option: 1\n")
                 extra = ("--options", path)
-            status, _, errors, rows = self.place.localize(place=place, rig=rig, words=extra)
+            status, _, errors, rows = self.road.localize(map_path=map_path, rig=rig, words=extra)
             self.assertNotEqual(status, 0, name)
             self.assertEqual(len(errors), 1, errors)
             for word in words:
                 self.assertIn(word, errors[0])
             self.assertEqual(rows, [])
-            self.assertFalse((self.place.folder / "localized.tum").exists())
+            self.assertFalse((self.road.folder / "localized.tum").exists())
 
     def start(self, lossless=True):
-        rospy.set_param("/localization/rig", str(self.place.rig))
-        rospy.set_param("/localization/map", str(self.place.map))
+        rospy.set_param("/localization/rig", str(self.road.rig))
+        rospy.set_param("/localization/map", str(self.road.map))
         rospy.set_param("/localization/lossless_replay", lossless)
         self.assertTrue(self.load("/localization", NODELET, [], [], [], "").success)
         self.addCleanup(self.stop)
@@ -187,7 +191,7 @@ class LocalizationTest(unittest.TestCase):
         wait_for(lambda: self.diagnostics.tells(*words, level=level), f"a diagnostic with {words}")
 
     def pose_errors_m(self, shift_s=0.0):
-        return self.place.errors_m(
+        return self.road.errors_m(
             [pose.header.stamp.to_sec() - shift_s for pose in self.poses()],
             [[getattr(pose.pose.pose.position, axis) for axis in "xyz"] for pose in self.poses()])
 
@@ -221,7 +225,11 @@ class LocalizationTest(unittest.TestCase):
 
     def check_tf(self):
         """map_from_odom * odom_from_vehicle = map_from_vehicle, compared by positions; /odom is frequent enough for linear interpolation."""
-        odometry = [message for topic, message in self.messages if topic == "/odom"]
+        first = {}  # tf keeps the first transform of a stamp; later messages correct it
+        for topic, message in self.messages:
+            if topic == "/odom":
+                first.setdefault(message.header.stamp, message)
+        odometry = [first[stamp] for stamp in sorted(first)]
         stamps = [message.header.stamp.to_sec() for message in odometry]
         way = np.array([[getattr(message.pose.pose.position, axis) for axis in "xyz"] for message in odometry])
         transforms = {t.header.stamp: t for message in self.received["/tf"] for t in message.transforms
@@ -336,9 +344,9 @@ class LocalizationTest(unittest.TestCase):
         self.assertLess(self.pose_errors_m().max(), MAX_ERROR_M)
 
     def test_bad_input_does_not_load_is_told_and_the_manager_lives_on(self):
-        for name, place, rig, options, words in self.place.bad_inputs():
-            rospy.set_param(f"/{name}/map", str(place or self.place.map))
-            rospy.set_param(f"/{name}/rig", str(rig or self.place.rig))
+        for name, map_path, rig, options, words in self.road.bad_inputs():
+            rospy.set_param(f"/{name}/map", str(map_path or self.road.map))
+            rospy.set_param(f"/{name}/rig", str(rig or self.road.rig))
             if options:
                 rospy.set_param(f"/{name}/options", options)
 

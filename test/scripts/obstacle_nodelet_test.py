@@ -36,7 +36,7 @@ def cells_of(grid):
     return np.array(grid.data, np.int8).reshape(grid.info.height, grid.info.width)
 
 
-def places_of(grid, state):
+def positions_of(grid, state):
     """Centres (N x 2) of the cells with a state, in the fixed frame."""
     rows, columns = np.nonzero(cells_of(grid) == state)
     origin = grid.info.origin.position
@@ -174,8 +174,8 @@ class ObstacleNodeletTest(unittest.TestCase):
             before = counts()
             time.sleep(3.0)
 
-    def publish(self, change=lambda topic, message: message, from_share=0.0, to_share=1.0):
-        messages = self.messages[int(from_share * len(self.messages)):int(to_share * len(self.messages))]
+    def publish(self, change=lambda topic, message: message, from_fraction=0.0, to_fraction=1.0):
+        messages = self.messages[int(from_fraction * len(self.messages)):int(to_fraction * len(self.messages))]
         for topic, message in messages:
             changed = change(topic, message)
             if changed is not None:
@@ -197,7 +197,7 @@ class ObstacleNodeletTest(unittest.TestCase):
         self.clear()
         self.publish()
         wait_for(lambda: len(self.grids()) >= len(self.offline_stamps()) - 3, "maps of a good drive")
-        self.assertGreater(len(places_of(self.grids()[-1], FREE)), 300)
+        self.assertGreater(len(positions_of(self.grids()[-1], FREE)), 300)
 
     def test_equals_the_offline_tool_and_the_truth(self):
         self.publish()
@@ -240,12 +240,12 @@ class ObstacleNodeletTest(unittest.TestCase):
         highest = cv2.dilate(heights, np.ones((2 * near + 1, 2 * near + 1)))
         lowest = cv2.erode(heights, np.ones((2 * near + 1, 2 * near + 1)))
 
-        def at(image, places):
-            world = places @ world_from_odom[:, :2].T + world_from_odom[:, 2]
+        def at(image, positions):
+            world = positions @ world_from_odom[:, :2].T + world_from_odom[:, 2]
             cells = np.round((world - meta["origin_m"]) / meta["cell_size_m"]).astype(int)
             return image[cells[:, 1], cells[:, 0]]
 
-        free, occupied = places_of(grid, FREE), places_of(grid, OCCUPIED)
+        free, occupied = positions_of(grid, FREE), positions_of(grid, OCCUPIED)
         self.assertGreater(len(free), 300)
         self.assertGreater(len(occupied), 10)
         self.assertGreaterEqual(np.mean(at(lowest, free) < 0.2), 0.99)
@@ -300,8 +300,8 @@ class ObstacleNodeletTest(unittest.TestCase):
         self.expect_recovery()
 
     def test_jump_of_odometry_empties_the_map_at_once(self):
-        last = self.publish(to_share=0.7)
-        wait_for(lambda: self.grids() and len(places_of(self.grids()[-1], FREE)) > 300, "free ground")
+        last = self.publish(to_fraction=0.7)
+        wait_for(lambda: self.grids() and len(positions_of(self.grids()[-1], FREE)) > 300, "free ground")
         odometry = moved([message for topic, message in last if topic == "/odom"][-1], 0.02)
         odometry.pose = copy.deepcopy(odometry.pose)
         odometry.pose.pose.position.x += 2.0

@@ -54,7 +54,7 @@ class OfflineTest(unittest.TestCase):
             self.drive.truth, "--bag", self.drive.bag, "--rig", self.drive.rig, "--report", report])
         self.assertEqual((status, errors), (0, []), output)
         accuracy = json.loads((report / "range_errors.json").read_text())["sets"][0]["accuracy"]
-        right = next(entry["share_within_tolerance"] for entry in accuracy if round(entry["density"], 3) == 0.4)
+        right = next(entry["fraction_within_tolerance"] for entry in accuracy if round(entry["density"], 3) == 0.4)
         # The drive has a quarter of the sensor's pixels, and short baselines in its first half.
         self.assertGreater(right, 0.8)
         self.assertIn("range_errors_accuracy.png", files_below(report))

@@ -3,13 +3,14 @@
 ///   rosrun vcharge_tests write_option_reference > doc/options.md
 
 #include <iostream>
-#include <set>
+#include <map>
 #include <string>
 
 #include "vcharge_calibration/from_map/map_rig_calibrator_options.h"
 #include "vcharge_calibration/intrinsics/intrinsic_calibration.h"
 #include "vcharge_calibration/intrinsics/view_collector.h"
 #include "vcharge_calibration/live/rig_calibration_session.h"
+#include "vcharge_calibration/masks/body_mask_estimator.h"
 #include "vcharge_calibration/rig/rig_calibrator_options.h"
 #include "vcharge_camera_driver/driver_options.h"
 #include "vcharge_core/base/options.h"
@@ -23,25 +24,22 @@
 
 namespace {
 
-std::set<std::string> listed_groups;
+std::map<std::string, std::string> listed_groups;
 
 template <class Options>
 void writeSection(const std::string& title, const std::string& used_by) {
   std::cout << "\n## " << title << "\n\n"
             << used_by << "\n\n"
-            << vcharge::optionList(Options(), &listed_groups);
+            << vcharge::optionTable(Options(), title, &listed_groups);
 }
 
 }  // namespace
 
 int main() {
   std::cout << "# Options\n\n"
-               "Every option with its default, meaning and allowed values. A YAML file or a parameter names "
-               "only what "
-               "differs from\nthe default; `--show-options` of a tool prints its own. Made by `rosrun "
-               "vcharge_tests write_option_reference`; a test "
-               "compares it "
-               "with the declarations.\n";
+               "A YAML file or a parameter names only what differs from the default; keys with dots are "
+               "nested maps.\n`--show-options` of a tool prints its own. Made by `rosrun vcharge_tests "
+               "write_option_reference`;\na test compares this page with the declarations.\n";
   writeSection<vcharge::DriverOptions>("Camera driver",
                                        "`camera_driver_nodelet`: `~options`, `config/driver/`.");
   writeSection<vcharge::LiveDriveSourceOptions>("Live topics",
@@ -57,6 +55,7 @@ int main() {
                                                       "`calibration_nodelet`: `~session`.");
   writeSection<vcharge::MapRigCalibratorOptions>(
       "Extrinsic calibration from a map", "`calibrate_rig_from_map`: `config/calibration_in_map.yaml`.");
+  writeSection<vcharge::BodyMaskOptions>("Masks of the own body", "`make_masks`.");
   writeSection<vcharge::SparseMapperOptions>("Sparse map",
                                              "`build_map`, `mapping_nodelet`: `config/mapping.yaml`.");
   writeSection<vcharge::DriveLocalizerOptions>(

@@ -29,11 +29,12 @@ void CalibrationDisplay::tell(const RigCalibrationSession::Status& status) {
 }
 
 void CalibrationDisplay::showDrive(const RigCalibrationSession::Status& status,
-                                   const ReconstructionState& state, const CameraRig& guess) {
-  landmarks_.publish(toCloud(recentLandmarksByCamera(state, guess, triangulation_, kShownKeyframes), kFrame));
+                                   const ReconstructionState& state, const CameraRig& initial_rig) {
+  landmarks_.publish(
+      toCloud(recentLandmarksByCamera(state, initial_rig, triangulation_, kShownKeyframes), kFrame));
   trajectory_.publish(makePath(keyframePath(state), kFrame));
-  cameras_.publish(
-      toCameraMarkers(guess, state.data.keyframes.back().map_from_vehicle, toStatusMessage(status), kFrame));
+  cameras_.publish(toCameraMarkers(initial_rig, state.data.keyframes.back().map_from_vehicle,
+                                   toStatusMessage(status), kFrame));
 }
 
 void CalibrationDisplay::showResult(RigCalibrationSession::Status status, const FinishedCalibration& work) {

@@ -18,7 +18,7 @@ class CalibrationDisplay {
 
   /// The drive so far, with the camera poses from hand-eye calibration.
   void showDrive(const RigCalibrationSession::Status& status, const ReconstructionState& state,
-                 const CameraRig& guess);
+                 const CameraRig& initial_rig);
   /// The calibrated drive.
   void showResult(RigCalibrationSession::Status status, const FinishedCalibration& work);
 

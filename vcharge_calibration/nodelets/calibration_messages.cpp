@@ -98,18 +98,18 @@ sensor_msgs::PointCloud2 toCloud(const LandmarksByCamera& landmarks, const std::
   sensor_msgs::PointCloud2Modifier modifier(cloud);
   modifier.setPointCloud2FieldsByString(2, "xyz", "rgb");
   modifier.resize(num_points);
-  sensor_msgs::PointCloud2Iterator<float> place(cloud, "x");
+  sensor_msgs::PointCloud2Iterator<float> xyz(cloud, "x");
   sensor_msgs::PointCloud2Iterator<uint8_t> blue(cloud, "b"), green(cloud, "g"), red(cloud, "r");
   for (size_t i = 0; i < landmarks.size(); ++i) {
     const auto rgb = rgbOf(i);
     for (const Eigen::Vector3d& point : landmarks[i]) {
       for (int k = 0; k < 3; ++k) {
-        place[k] = static_cast<float>(point[k]);
+        xyz[k] = static_cast<float>(point[k]);
       }
       *red = rgb[0];
       *green = rgb[1];
       *blue = rgb[2];
-      ++place, ++red, ++green, ++blue;
+      ++xyz, ++red, ++green, ++blue;
     }
   }
   return cloud;

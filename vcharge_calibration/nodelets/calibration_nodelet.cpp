@@ -49,7 +49,7 @@ class CalibrationNodelet : public Nodelet {
     openSource(rig);
     session_ = std::make_unique<RigCalibrationSession>(
         rig, options_, session_options, [this](const Status& status) { display_->tell(status); },
-        [this](const ReconstructionState& state, const CameraRig& guess) { watch(state, guess); },
+        [this](const ReconstructionState& state, const CameraRig& initial_rig) { watch(state, initial_rig); },
         [this](const FinishedCalibration& work) { finish(work); });
     display_ = std::make_unique<CalibrationDisplay>(&node(), options_);
     display_->tell(session_->status());
@@ -72,10 +72,10 @@ class CalibrationNodelet : public Nodelet {
     response->message = "a new drive begins";
   }
 
-  void watch(const ReconstructionState& state, const CameraRig& guess) {
+  void watch(const ReconstructionState& state, const CameraRig& initial_rig) {
     const Status status = session_->status();
     if (status.phase != RigCalibrationSession::Phase::kCalibrated) {  // otherwise the result stays visible
-      display_->showDrive(status, state, guess);
+      display_->showDrive(status, state, initial_rig);
     }
   }
 

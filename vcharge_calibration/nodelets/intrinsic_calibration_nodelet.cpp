@@ -81,9 +81,9 @@ class IntrinsicCalibrationNodelet : public Nodelet {
 
   void calibrate(std_srvs::TriggerResponse* response) {
     const bool is_done = guard().run([&] {
-      const IntrinsicCalibration result =
-          calibrateIntrinsics(board_, collector_->images(), options_,
-                              [this](double share) { publish(Status::CALIBRATING, "calibrating", share); });
+      const IntrinsicCalibration result = calibrateIntrinsics(
+          board_, collector_->images(), options_,
+          [this](double fraction) { publish(Status::CALIBRATING, "calibrating", fraction); });
       writeCalibration(output_, board_, collector_->images(), result);
       response->success = result.verdict != Verdict::kFail ? 1 : 0;
       response->message = toString(result.verdict);

@@ -30,8 +30,9 @@ void calibrate(const RigToolArguments& arguments, const std::string& map_file,
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Calibrates the extrinsics of a rig from a drive with images, /odom and intrinsics, without a first "
-      "guess, overlap or a board. Drive 100 m or more with turns to both sides and revisit places, best a "
+      "Calibrates the extrinsics of a rig from a drive with images, /odom and intrinsics, without an "
+      "initial estimate, overlap or a board. Drive 100 m or more with turns to both sides and revisit "
+      "places, best a "
       "figure of eight. Prints every degree of freedom with its standard deviation and a verdict: PASS, WARN "
       "with what is missing, or FAIL, which writes no file.");
   RigToolArguments arguments;

@@ -32,7 +32,8 @@ void calibrate(const RigToolArguments& arguments, const std::string& map_file,
 int main(int argc, char** argv) {
   CLI::App app(
       "Calibrates the extrinsics of a rig from a drive in a finished map of any car, with images, /odom and "
-      "intrinsics, without a first guess, overlap, a board or loops. Drive some turns to both sides. The map "
+      "intrinsics, without an initial estimate, overlap, a board or loops. Drive some turns to both sides. "
+      "The map "
       "defines the scale. Prints every degree of freedom with its standard deviation and a verdict: PASS, "
       "WARN "
       "with what is missing, or FAIL, which writes no file.");

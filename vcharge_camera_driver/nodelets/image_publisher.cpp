@@ -22,14 +22,14 @@ ImagePublisher::ImagePublisher(ros::NodeHandle* node, const CameraRig& rig,
   }
 }
 
-void ImagePublisher::publish(const MultiFrame& group) const {
+void ImagePublisher::publish(const MultiFrame& frame) const {
   for (size_t i = 0; i < cameras_.size(); ++i) {
-    if (group.images[i].pixels.empty()) {
-      continue;
+    if (frame.images[i].pixels.empty()) {
+      continue;  // this camera's image was lost
     }
     const Camera& camera = cameras_[i];
-    const sensor_msgs::ImagePtr message = MessageSink::messageOf(group.images[i]);
-    message->header.stamp = fromTimestamp(group.stamp);
+    const sensor_msgs::ImagePtr message = MessageSink::messageOf(frame.images[i]);
+    message->header.stamp = fromTimestamp(frame.stamp);
     message->header.frame_id = camera.frame_id;
     const auto info = boost::make_shared<sensor_msgs::CameraInfo>(camera.camera_info);
     info->header = message->header;

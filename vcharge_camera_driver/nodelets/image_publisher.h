@@ -19,8 +19,9 @@ class ImagePublisher {
   ImagePublisher(ros::NodeHandle* node, const CameraRig& rig, const std::vector<std::string>& cameras,
                  const DriveTopics& topics);
 
-  /// Takes images from MessageSink, in the order of the cameras.
-  void publish(const MultiFrame& group) const;
+  /// Publishes the images of a frame from MessageSink, which has them in the order of `cameras`; those of
+  /// lost images are empty. All have the frame's stamp.
+  void publish(const MultiFrame& frame) const;
 
  private:
   struct Camera {

@@ -7,8 +7,6 @@
 namespace vcharge {
 namespace {
 
-constexpr double kHoldInPeriods = 1.5;  // longest wait of an estimate for the next trigger
-constexpr double kMaxExtrapolation_s = 0.1;
 constexpr double kUnknownVariance = 1e6;  // variance of height, roll and pitch, which wheels do not measure
 
 nav_msgs::Odometry toMessage(const OdometryEstimate& estimate, const std::string& vehicle_frame) {
@@ -37,19 +35,23 @@ OdometryPublisher::OdometryPublisher(ros::NodeHandle* node, const WheelOdometryO
     : vehicle_frame_(std::move(vehicle_frame)),
       publisher_(node->advertise<nav_msgs::Odometry>(topic, 100)),
       odometry_(options),
-      stream_(kHoldInPeriods / frame_rate_hz, kMaxExtrapolation_s) {}
+      stream_(OdometryStream::forFrameRate(frame_rate_hz)) {}
 
 void OdometryPublisher::publish(const std::vector<OdometryEstimate>& estimates) {
   for (const OdometryEstimate& estimate : estimates) {
-    broadcaster_.sendTransform(toTransformStamped(estimate.odometry.odom_from_vehicle,
-                                                  estimate.odometry.stamp, "odom", vehicle_frame_));
+    // tf keeps the first transform of a stamp: a correction goes to the topic only.
+    if (broadcast_ != estimate.odometry.stamp) {
+      broadcaster_.sendTransform(toTransformStamped(estimate.odometry.odom_from_vehicle,
+                                                    estimate.odometry.stamp, "odom", vehicle_frame_));
+      broadcast_ = estimate.odometry.stamp;
+    }
     publisher_.publish(toMessage(estimate, vehicle_frame_));
   }
 }
 
-void OdometryPublisher::add(const WheelTicks& ticks) {
+void OdometryPublisher::add(const WheelMeasurement& wheels) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (const std::optional<OdometryEstimate> estimate = odometry_.add(ticks)) {
+  if (const std::optional<OdometryEstimate> estimate = odometry_.add(wheels)) {
     publish(stream_.add(*estimate));
   }
 }
@@ -63,18 +65,18 @@ DriveMonitor::Report OdometryPublisher::report() {
   const std::lock_guard<std::mutex> lock(mutex_);
   const WheelOdometryCounts& counts = odometry_.counts();
   DriveMonitor::Report report;
-  const bool silent = counts.ticks == reported_ticks_;
+  const bool silent = counts.measurements == reported_measurements_;
   const bool slipped = counts.slipping || counts.slips > reported_slips_;
   report.level = silent    ? DriveMonitor::Level::kError
                  : slipped ? DriveMonitor::Level::kWarn
                            : DriveMonitor::Level::kOk;
-  report.message = silent            ? "no wheel ticks"
+  report.message = silent            ? "no wheel data"
                    : slipped         ? "a wheel slips"
                    : counts.standing ? "the vehicle stands"
                                      : "the vehicle moves";
-  reported_ticks_ = counts.ticks;
+  reported_measurements_ = counts.measurements;
   reported_slips_ = counts.slips;
-  report.values = {{"ticks", std::to_string(counts.ticks)},
+  report.values = {{"measurements", std::to_string(counts.measurements)},
                    {"slips", std::to_string(counts.slips)},
                    {"gaps", std::to_string(counts.gaps)},
                    {"counter resets", std::to_string(counts.resets)},

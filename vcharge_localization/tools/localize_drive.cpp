@@ -13,6 +13,7 @@
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/files/content_hash.h"
 #include "vcharge_core/files/file_io.h"
+#include "vcharge_core/frames/frame_counters_text.h"
 #include "vcharge_core/motion/trajectory.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_localization/drive_experiment.h"
@@ -100,12 +101,14 @@ void localizeDrive(const Arguments& arguments, const DriveLocalizerOptions& opti
   for (const auto& [count, text] : summary.warnings()) {
     warnings.push_back({{"num_frames", count}, {"text", text}});
   }
-  *found = {{"num_frames", summary.numFrames()},
-            {"num_frames_by_status", statuses},
-            {"map_ready_s", map_ready_s},
-            {"warnings", warnings},
-            {"content_hash", hasher.hex()}};
-  std::cout << summary.text() << "content hash: " << hasher.hex() << "\n";
+  *found = countersToJson(assembler.counters(), *rig);
+  found->update({{"num_frames", summary.numFrames()},  // without those that an experiment left out
+                 {"num_frames_by_status", statuses},
+                 {"map_ready_s", map_ready_s},
+                 {"warnings", warnings},
+                 {"content_hash", hasher.hex()}});
+  std::cout << describe(assembler.counters(), *rig) << summary.text() << "content hash: " << hasher.hex()
+            << "\n";
 }
 
 }  // namespace
@@ -132,9 +135,9 @@ int main(int argc, char** argv) {
                  "start from nothing again after so many frames, to see how soon a place is found; 0: never")
       ->check(CLI::NonNegativeNumber);
   addShowOptions(&app, &arguments.show_options);
-  app.footer(
-      "Keys of --json: num_frames, num_frames_by_status, map_ready_s (time to read and prepare the map), "
-      "warnings (text, num_frames), content_hash.");
+  app.footer(std::string("Keys of --json: ") + kFrameCounterKeys +
+             ", num_frames_by_status, map_ready_s (time to read and prepare the map), "
+             "warnings (text, num_frames), content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     DriveLocalizerOptions options;
     options.frames.waitForEverything();

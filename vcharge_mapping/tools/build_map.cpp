@@ -14,6 +14,7 @@
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/files/content_hash.h"
 #include "vcharge_core/files/file_io.h"
+#include "vcharge_core/frames/frame_counters_text.h"
 #include "vcharge_core/motion/trajectory.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_mapping/map_report.h"
@@ -29,38 +30,33 @@ struct Arguments {
   bool show_options = false;
 };
 
+/// Numbers of accepted loop edges, and of rejected ones by reason.
+struct LoopCounts {
+  int num_accepted = 0;
+  std::map<std::string, int> num_rejected;
+};
+
+LoopCounts countLoops(const std::vector<LoopEdge>& edges) {
+  LoopCounts counts;
+  for (const LoopEdge& edge : edges) {
+    ++(edge.accepted ? counts.num_accepted : counts.num_rejected[edge.reason]);
+  }
+  return counts;
+}
+
 void printReport(const ReconstructionReport& report, const SparseMap& map) {
-  std::cout << "frames: " << report.num_frames << " (" << report.num_incomplete_frames << " lack a camera";
-  for (size_t i = 0; i < report.num_missing_images.size(); ++i) {
-    if (report.num_missing_images[i] > 0) {
-      std::cout << ", " << report.num_missing_images[i] << " of them " << map.rig().cameras[i].name;
-    }
-  }
-  std::cout << "; " << report.num_frames_without_odometry << " without odometry; "
-            << report.num_standing_frames << " standing)\n";
-  if (report.num_odometry_resets > 0) {
-    std::cout << "odometer resets: " << report.num_odometry_resets << "\n";
-  }
-  if (report.num_late_images > 0) {
-    std::cout << "late images, not used: " << report.num_late_images << "\n";
-  }
+  std::cout << describe(report.counters, map.rig())
+            << "standing frames, not used: " << report.num_standing_frames << "\n";
   const std::vector<std::string> hypotheses = enumNames<MotionHypothesis>();
   std::cout << "motions:";
   for (size_t i = 0; i < hypotheses.size(); ++i) {
     std::cout << " " << hypotheses[i] << " " << report.num_motions[i];
   }
-  std::map<std::string, int> rejected;
-  int num_accepted = 0;
-  for (const LoopEdge& edge : report.loop_edges) {
-    num_accepted += edge.accepted ? 1 : 0;
-    if (!edge.accepted) {
-      ++rejected[edge.reason];
-    }
-  }
+  const LoopCounts loops = countLoops(report.loop_edges);
   std::cout << "\nkeyframes: " << map.keyframes().size() << ", landmarks: " << map.landmarks().size()
             << ", observations: " << map.observations().size() << ", error: " << report.rms_px << " px RMS\n"
-            << "loop edges: " << num_accepted << " accepted";
-  for (const auto& [reason, count] : rejected) {
+            << "loop edges: " << loops.num_accepted << " accepted";
+  for (const auto& [reason, count] : loops.num_rejected) {
     std::cout << ", " << count << " rejected (" << reason << ")";
   }
   std::cout << "\nodometer: distance x " << map.contents().odometry_distance_scale << ", turn x "
@@ -75,41 +71,26 @@ void printReport(const ReconstructionReport& report, const SparseMap& map) {
 }
 
 nlohmann::json toJson(const ReconstructionReport& report, const SparseMap& map) {
-  nlohmann::json missing = nlohmann::json::object();
-  for (size_t i = 0; i < report.num_missing_images.size(); ++i) {
-    missing[map.rig().cameras[i].name] = report.num_missing_images[i];
-  }
   nlohmann::json motions = nlohmann::json::object();
   const std::vector<std::string> hypotheses = enumNames<MotionHypothesis>();
   for (size_t i = 0; i < hypotheses.size(); ++i) {
     motions[hypotheses[i]] = report.num_motions[i];
   }
-  std::map<std::string, int> rejected;
-  int num_accepted = 0;
-  for (const LoopEdge& edge : report.loop_edges) {
-    num_accepted += edge.accepted ? 1 : 0;
-    if (!edge.accepted) {
-      ++rejected[edge.reason];
-    }
-  }
-  return {{"num_frames", report.num_frames},
-          {"num_incomplete_frames", report.num_incomplete_frames},
-          {"num_missing_images", missing},
-          {"num_frames_without_odometry", report.num_frames_without_odometry},
-          {"num_standing_frames", report.num_standing_frames},
-          {"num_odometry_resets", report.num_odometry_resets},
-          {"num_late_images", report.num_late_images},
-          {"num_motions", motions},
-          {"num_keyframes", map.keyframes().size()},
-          {"num_landmarks", map.landmarks().size()},
-          {"num_observations", map.observations().size()},
-          {"rms_px", report.rms_px},
-          {"num_loop_edges", num_accepted},
-          {"num_rejected_loop_edges", rejected},
-          {"odometry_distance_scale", map.contents().odometry_distance_scale},
-          {"odometry_turn_scale", map.contents().odometry_turn_scale},
-          {"stage_s", report.stage_s},
-          {"content_hash", map.contentHash()}};
+  const LoopCounts loops = countLoops(report.loop_edges);
+  nlohmann::json found = countersToJson(report.counters, map.rig());
+  found.update({{"num_standing_frames", report.num_standing_frames},
+                {"num_motions", motions},
+                {"num_keyframes", map.keyframes().size()},
+                {"num_landmarks", map.landmarks().size()},
+                {"num_observations", map.observations().size()},
+                {"rms_px", report.rms_px},
+                {"num_loop_edges", loops.num_accepted},
+                {"num_rejected_loop_edges", loops.num_rejected},
+                {"odometry_distance_scale", map.contents().odometry_distance_scale},
+                {"odometry_turn_scale", map.contents().odometry_turn_scale},
+                {"stage_s", report.stage_s},
+                {"content_hash", map.contentHash()}});
+  return found;
 }
 
 /// Lists the frames as CSV.
@@ -203,12 +184,10 @@ int main(int argc, char** argv) {
       ->check(requireOutputFolder);
   app.add_option("--options", arguments.options, "YAML with overrides of SparseMapperOptions");
   addShowOptions(&app, &arguments.show_options);
-  app.footer(
-      "Keys of --json: verdict (GOOD, CHECK, BAD), remarks, num_frames, num_incomplete_frames, "
-      "num_missing_images (by camera), num_frames_without_odometry, num_standing_frames, "
-      "num_odometry_resets, num_late_images, num_motions (by hypothesis), num_keyframes, num_landmarks, "
-      "num_observations, rms_px, num_loop_edges, num_rejected_loop_edges (by reason), "
-      "odometry_distance_scale, odometry_turn_scale, stage_s (wall time), content_hash.");
+  app.footer(std::string("Keys of --json: verdict (GOOD, CHECK, BAD), remarks, ") + kFrameCounterKeys +
+             ", num_standing_frames, num_motions (by hypothesis), num_keyframes, num_landmarks, "
+             "num_observations, rms_px, num_loop_edges, num_rejected_loop_edges (by reason), "
+             "odometry_distance_scale, odometry_turn_scale, stage_s (wall time), content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     SparseMapperOptions options;
     if (!arguments.options.empty()) {

@@ -1,3 +1,4 @@
+// Messages that the obstacle nodelet reads (range maps) and publishes (OctoMap).
 #include "obstacle_messages.h"
 
 #include <cmath>
@@ -61,20 +62,20 @@ TEST_F(RangeMapReaderTest, RestoresThePublishedRangeMap) {
   EXPECT_EQ(cv::countNonZero(map.reference == 77), map.range_m.rows * map.range_m.cols);
 }
 
-TEST_F(RangeMapReaderTest, RefusesAnotherCameraNamingTopicAndExpectation) {
-  const sensor_msgs::CameraInfo right = *info_;
+TEST_F(RangeMapReaderTest, RefusesAnotherCameraAndNamesTheTopic) {
+  const sensor_msgs::CameraInfo valid = *info_;
   info_->K[0] *= 1.01;
   expectError({"/dense/left/range/camera_info", "expected camera 'left'"});
-  *info_ = right;
+  *info_ = valid;
   info_->D[0] += 0.01;
   expectError({"/dense/left/range/camera_info"});
-  *info_ = right;
+  *info_ = valid;
   info_->header.frame_id = "camera_right_optical";
   expectError({"/dense/left/range/camera_info", "camera_right_optical"});
-  *info_ = right;
+  *info_ = valid;
   info_->width += 1;
   expectError({"/dense/left/range/camera_info"});
-  *info_ = right;
+  *info_ = valid;
   EXPECT_NO_THROW(read());
 }
 
@@ -90,7 +91,7 @@ TEST_F(RangeMapReaderTest, RefusesImagesOfOtherSizesOrEncodings) {
   expectError({"/dense/left/range/image", "aspect ratio of camera 'left'"});
 }
 
-TEST(ToOctreeTest, VoxelsLieWhereTheCellsLie) {
+TEST(ToOctreeTest, VoxelsHaveThePositionsAndStatesOfTheCells) {
   ObstacleMap map = ObstacleMap::unobserved({4, 3}, 0.1);
   map.origin_m = {-0.2, 5.0};
   map.state.at<int8_t>(0, 1) = kCellFree;

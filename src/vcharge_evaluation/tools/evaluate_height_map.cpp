@@ -99,7 +99,7 @@ nlohmann::json toJson(const HeightMapErrors& errors) {
           {"num_mapped", errors.num_mapped},
           {"height_m", errors.height_m},
           {"mean_signed_m", errors.mean_signed_m},
-          {"share_within_10_cm", errors.fraction_within_10_cm},
+          {"fraction_within_10_cm", errors.fraction_within_10_cm},
           {"num_steps", errors.num_steps},
           {"num_steps_mapped", errors.num_steps_mapped},
           {"num_steps_found", errors.num_steps_found},
@@ -146,7 +146,7 @@ int main(int argc, char** argv) {
       "the world's frame");
   const OptionsArgument<HeightMapErrorOptions> options(&app);
   const ReportArgument report(&app, "height_map_errors");
-  describeJson(&app, R"(kind: "height_map"; num_seen, num_mapped: cells; mean_signed_m; share_within_10_cm;
+  describeJson(&app, R"(kind: "height_map"; num_seen, num_mapped: cells; mean_signed_m; fraction_within_10_cm;
 num_steps, num_steps_mapped, num_steps_found; num_kerbs_seen, num_kerbs; error distributions height_m,
 step_position_m, kerb_height_m; kerbs: [{position_m [x, y], error_m, nearest_view_m}]; measurements:
 [{kind, from_m, to_m, truth_m, map_m}]; mean_measurement_m, max_measurement_m, num_measurements_missing;
@@ -173,7 +173,7 @@ num_drivable_inside, num_open_ground, num_open_drivable, num_solid, num_solid_on
         throw InputError(trajectory_path + ": " + error.what());
       }
     }
-    const IsRigid is_rigid = rigidBy(readTruthObstacles(truth_path + "/obstacles.yaml"));
+    const IsRigid is_rigid = makeIsRigid(readTruthObstacles(truth_path + "/obstacles.yaml"));
     const HeightMapErrors errors =
         evaluateHeightMap(map, world_from_map, truth, true_poses, rig, is_rigid, error_options);
     if (errors.num_seen == 0) {

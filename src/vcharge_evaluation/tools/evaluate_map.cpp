@@ -46,7 +46,7 @@ void print(const MapErrors& errors) {
 
 nlohmann::json toJson(const RevisitCount& count) {
   return {
-      {"num_keyframes", count.num_keyframes}, {"num_found", count.num_found}, {"share", count.fraction()}};
+      {"num_keyframes", count.num_keyframes}, {"num_found", count.num_found}, {"fraction", count.fraction()}};
 }
 
 nlohmann::json positionsFromAbove(const Trajectory& trajectory) {
@@ -133,7 +133,7 @@ int main(int argc, char** argv) {
 truth_length_m; scale_error; error distributions of the aligned keyframes position_m, rotation_rad, and
 of the accepted edges accepted_m, accepted_rad; num_accepted, num_wrong; revisits, same_heading,
 opposite_heading, only_opposite_heading: keyframes at a position passed before {num_keyframes, num_found,
-share}; rejected: per reason {num_edges, num_right}; edges: [{first, second, accepted, reason,
+fraction}; rejected: per reason {num_edges, num_right}; edges: [{first, second, accepted, reason,
 num_inliers, has_truth, right, opposite, distance_m, error_m, error_rad}]; keyframes: [{x_m, y_m, z_m,
 revisit, found}]; landmarks, truth_path: [[x_m, y_m]].)");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {

@@ -107,9 +107,9 @@ nlohmann::json binsToJson(const std::vector<RangeBin>& bins) {
     json.push_back({{"low", bin.low},
                     {"high", bin.high},
                     {"count", bin.count},
-                    {"share_within_tolerance", bin.fraction_within_tolerance},
+                    {"fraction_within_tolerance", bin.fraction_within_tolerance},
                     {"median_relative_error", bin.median_relative_error},
-                    {"share_within_one_sigma", bin.fraction_within_one_sigma}});
+                    {"fraction_within_one_sigma", bin.fraction_within_one_sigma}});
   }
   return json;
 }
@@ -124,9 +124,9 @@ nlohmann::json reportErrors(const std::string& label, const RangeErrors& errors)
     std::printf("  %3.0f %% most confident: %5.1f %% right, median error %.2f %%\n", 100.0 * accuracy.density,
                 100.0 * accuracy.fraction_within_tolerance, 100.0 * accuracy.median_relative_error);
     accuracies.push_back({{"density", accuracy.density},
-                          {"share_within_tolerance", accuracy.fraction_within_tolerance},
+                          {"fraction_within_tolerance", accuracy.fraction_within_tolerance},
                           {"median_relative_error", accuracy.median_relative_error},
-                          {"share_known", accuracy.fraction_known}});
+                          {"fraction_known", accuracy.fraction_known}});
   }
   std::printf("  within one sigma: %.1f %% of the ranges, within two: %.1f %%\n",
               100.0 * errors.fraction_within_one_sigma, 100.0 * errors.fraction_within_two_sigma);
@@ -135,8 +135,8 @@ nlohmann::json reportErrors(const std::string& label, const RangeErrors& errors)
           {"num_judged", errors.num_judged},
           {"num_known", errors.num_known},
           {"accuracy", accuracies},
-          {"share_within_one_sigma", errors.fraction_within_one_sigma},
-          {"share_within_two_sigma", errors.fraction_within_two_sigma},
+          {"fraction_within_one_sigma", errors.fraction_within_one_sigma},
+          {"fraction_within_two_sigma", errors.fraction_within_two_sigma},
           {"by_truth", binsToJson(errors.by_truth)},
           {"by_confidence", binsToJson(errors.by_confidence)}};
 }
@@ -154,10 +154,10 @@ int main(int argc, char** argv) {
   const OptionsArgument<RangeEvaluationOptions> options(&app);
   const ReportArgument report(&app, "range_errors");
   describeJson(&app, R"(kind: "range"; tolerance: relative; sets: for all cameras and for each one {label,
-num_frames, num_judged, num_known, share_within_one_sigma, share_within_two_sigma, accuracy [{density,
-share_within_tolerance, median_relative_error, share_known}] of the most confident fraction, and by_truth
-(m) and by_confidence [{low, high, count, share_within_tolerance, median_relative_error,
-share_within_one_sigma}] of the known ranges}.)");
+num_frames, num_judged, num_known, fraction_within_one_sigma, fraction_within_two_sigma, accuracy [{density,
+fraction_within_tolerance, median_relative_error, fraction_known}] of the most confident fraction, and by_truth
+(m) and by_confidence [{low, high, count, fraction_within_tolerance, median_relative_error,
+fraction_within_one_sigma}] of the known ranges}.)");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (options.shown()) {
       return;

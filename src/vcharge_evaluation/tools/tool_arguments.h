@@ -16,7 +16,7 @@ namespace vcharge {
 inline void describeJson(CLI::App* app, const std::string& keys) {
   app->footer("Keys of --json: " + keys +
               "\nAn error distribution has count, mean, root_mean_square, percentile_50, percentile_68,\n"
-              "percentile_90, percentile_95, percentile_99 and max. A share is a fraction from 0 to 1.");
+              "percentile_90, percentile_95, percentile_99 and max. A fraction is from 0 to 1.");
 }
 
 /// --report of an evaluation tool: a folder for the JSON and its plots.

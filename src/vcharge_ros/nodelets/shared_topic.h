@@ -32,11 +32,11 @@ class SharedTopic {
   }
 
   /// True while another node publishes.
-  bool standsAside() const { return seen_foreign_ && Clock::now() - last_foreign_ < kPatience; }
+  bool anotherPublishes() const { return seen_foreign_ && Clock::now() - last_foreign_ < kPatience; }
 
   /// Publishes unless another node does. The message must not be changed afterwards.
   void publish(const MessageConstPtr& message) {
-    if (standsAside()) {
+    if (anotherPublishes()) {
       return;
     }
     own_.push_back(message);

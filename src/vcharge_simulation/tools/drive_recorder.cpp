@@ -66,7 +66,7 @@ std::vector<ImageFaults::Camera> faultyCameras(const RecordedCameras& cameras) {
   return list;
 }
 
-// Writes odometry, counters and true poses in the order of their stamps.
+// Writes odometry and counters as they are received, and true poses at their stamps.
 class MotionRecorder {
  public:
   MotionRecorder(const SimulatedDrive& drive, const OdometryStampShiftFault& shift, DriveBagWriter* writer)
@@ -75,22 +75,21 @@ class MotionRecorder {
   /// Writes everything up to and including `end`, or all that remains.
   void writeUntil(std::optional<Timestamp> end) {
     const auto isDue = [&](const auto& list, size_t i) {
-      return i < list.size() && (!end || list[i].stamp <= *end);
+      return i < list.size() && (!end || list[i].received <= *end);
     };
-    while (isDue(drive_.ground_truth, truth_)) {
-      const Timestamp stamp = drive_.ground_truth[truth_].stamp;
-      if (isDue(drive_.odometry, odometry_) && drive_.odometry[odometry_].stamp == stamp) {
-        VehicleOdometry odometry = drive_.odometry[odometry_++];
-        odometry.stamp = shifted(stamp);
-        writer_->writeOdometry(odometry, stamp);
-      }
-      writer_->writeGroundTruth(drive_.ground_truth[truth_++]);
+    for (; truth_ < drive_.ground_truth.size() && (!end || drive_.ground_truth[truth_].stamp <= *end);
+         ++truth_) {
+      writer_->writeGroundTruth(drive_.ground_truth[truth_]);
+    }
+    for (; isDue(drive_.odometry, odometry_); ++odometry_) {
+      auto [odometry, received] = drive_.odometry[odometry_];
+      odometry.stamp = shifted(odometry.stamp);
+      writer_->writeOdometry(odometry, received);
     }
     for (; isDue(drive_.wheel_ticks, ticks_); ++ticks_) {
-      WheelTicks ticks = drive_.wheel_ticks[ticks_];
-      const Timestamp stamp = ticks.stamp;
-      ticks.stamp = shifted(stamp);
-      writer_->writeWheelTicks(ticks, stamp);
+      auto [ticks, received] = drive_.wheel_ticks[ticks_];
+      ticks.stamp = shifted(ticks.stamp);
+      writer_->writeWheelTicks(ticks, received);
     }
   }
 

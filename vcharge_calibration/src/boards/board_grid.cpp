@@ -31,8 +31,8 @@ class GridGrower {
     if (!locate()) {
       return false;
     }
-    for (auto& [place, pixel] : grid_) {
-      refine(place, &pixel);
+    for (auto& [position, pixel] : grid_) {
+      refine(position, &pixel);
     }
     for (int round = 0; round < kMaxRounds; ++round) {
       if (!locate()) {
@@ -40,8 +40,8 @@ class GridGrower {
       }
       if (round == 0) {
         polarity_ = 0.0;
-        for (const auto& [place, pixel] : grid_) {
-          polarity_ += signedCorrelation(place, pixel);
+        for (const auto& [position, pixel] : grid_) {
+          polarity_ += signedCorrelation(position, pixel);
         }
         polarity_ = polarity_ < 0.0 ? -1.0 : 1.0;
       }
@@ -59,10 +59,10 @@ class GridGrower {
  private:
   bool locate() {
     std::vector<BoardRay> rays;
-    for (const auto& [place, pixel] : grid_) {
+    for (const auto& [position, pixel] : grid_) {
       Eigen::Vector3d ray;
       if (model_.unproject(pixel, &ray)) {
-        rays.push_back({{static_cast<double>(place.first), static_cast<double>(place.second)}, ray});
+        rays.push_back({{static_cast<double>(position.first), static_cast<double>(position.second)}, ray});
       }
     }
     const auto pose = boardPoseFromRays(rays);
@@ -79,12 +79,13 @@ class GridGrower {
   }
 
   // Moves the pixel to the nearby saddle point; false, with the pixel unchanged, if there is none.
-  bool refine(const std::pair<int, int>& place, Eigen::Vector2d* pixel) const {
+  bool refine(const std::pair<int, int>& position, Eigen::Vector2d* pixel) const {
     Eigen::Vector2d right;
     Eigen::Vector2d below;
     Eigen::Vector2d here;
-    if (!predict(place.first, place.second, &here) || !predict(place.first + 0.5, place.second, &right) ||
-        !predict(place.first, place.second + 0.5, &below)) {
+    if (!predict(position.first, position.second, &here) ||
+        !predict(position.first + 0.5, position.second, &right) ||
+        !predict(position.first, position.second + 0.5, &below)) {
       return false;
     }
     const double spacing_px = 2.0 * std::min((right - here).norm(), (below - here).norm());
@@ -93,9 +94,9 @@ class GridGrower {
 
   // Correlation of the image around a pixel with a corner. Positive if the square towards +x, +y is bright
   // and (column + row) is even.
-  double signedCorrelation(const std::pair<int, int>& place, const Eigen::Vector2d& at) const {
+  double signedCorrelation(const std::pair<int, int>& position, const Eigen::Vector2d& at) const {
     Eigen::Vector2d predicted;
-    if (!predict(place.first, place.second, &predicted)) {
+    if (!predict(position.first, position.second, &predicted)) {
       return 0.0;
     }
     const Eigen::Vector2d shift = at - predicted;
@@ -110,7 +111,7 @@ class GridGrower {
           continue;
         }
         Eigen::Vector2d pixel;
-        if (!predict(place.first + 0.4 * i / kSteps, place.second + 0.4 * j / kSteps, &pixel)) {
+        if (!predict(position.first + 0.4 * i / kSteps, position.second + 0.4 * j / kSteps, &pixel)) {
           return 0.0;
         }
         pixel += shift;
@@ -130,19 +131,19 @@ class GridGrower {
     if (variance < 9.0) {
       return 0.0;  // only noise
     }
-    const double sign = (place.first + place.second) % 2 == 0 ? 1.0 : -1.0;
+    const double sign = (position.first + position.second) % 2 == 0 ? 1.0 : -1.0;
     return sign * product / count / std::sqrt(variance);
   }
 
   CornerGrid neighbours() const {
     CornerGrid found;
-    for (const auto& [place, pixel] : grid_) {
+    for (const auto& [position, pixel] : grid_) {
       for (const auto& step : std::array<std::pair<int, int>, 4>{{{1, 0}, {-1, 0}, {0, 1}, {0, -1}}}) {
-        const std::pair<int, int> next(place.first + step.first, place.second + step.second);
+        const std::pair<int, int> next(position.first + step.first, position.second + step.second);
         Eigen::Vector2d here;
         Eigen::Vector2d at;
-        if (grid_.count(next) > 0 || found.count(next) > 0 || !predict(place.first, place.second, &here) ||
-            !predict(next.first, next.second, &at)) {
+        if (grid_.count(next) > 0 || found.count(next) > 0 ||
+            !predict(position.first, position.second, &here) || !predict(next.first, next.second, &at)) {
           continue;
         }
         // The prediction has about the same error as at the neighbour, if the camera or board model is
@@ -166,9 +167,9 @@ class GridGrower {
 /// A rectangle of grid positions.
 struct Extent {
   int column, row, width, height;
-  bool contains(const std::pair<int, int>& place) const {
-    return place.first >= column && place.first < column + width && place.second >= row &&
-           place.second < row + height;
+  bool contains(const std::pair<int, int>& position) const {
+    return position.first >= column && position.first < column + width && position.second >= row &&
+           position.second < row + height;
   }
 };
 
@@ -202,9 +203,9 @@ bool growGrid(const cv::Mat& image, const CameraModel& model, CornerGrid* grid) 
 std::optional<std::vector<BoardCorner>> boardOnGrid(const CornerGrid& grid, const CalibrationBoard& board) {
   Extent low{0, 0, 0, 0};
   Extent high{0, 0, 0, 0};
-  for (const auto& [place, pixel] : grid) {
-    low = {std::min(low.column, place.first), std::min(low.row, place.second), 0, 0};
-    high = {std::max(high.column, place.first), std::max(high.row, place.second), 0, 0};
+  for (const auto& [position, pixel] : grid) {
+    low = {std::min(low.column, position.first), std::min(low.row, position.second), 0, 0};
+    high = {std::max(high.column, position.first), std::max(high.row, position.second), 0, 0};
   }
   std::optional<Extent> best;
   int best_count = 0;
@@ -230,12 +231,12 @@ std::optional<std::vector<BoardCorner>> boardOnGrid(const CornerGrid& grid, cons
   }
   const bool upright = best->width == board.columns;
   std::vector<BoardCorner> corners;
-  for (const auto& [place, pixel] : grid) {
-    if (!best->contains(place)) {
+  for (const auto& [position, pixel] : grid) {
+    if (!best->contains(position)) {
       continue;
     }
-    const int column = place.first - best->column;
-    const int row = place.second - best->row;
+    const int column = position.first - best->column;
+    const int row = position.second - best->row;
     // A quarter turn preserves the board's handedness.
     const int index =
         upright ? row * board.columns + column : (best->width - 1 - column) * board.columns + row;

@@ -39,12 +39,12 @@ struct BoardRefiner::Patch {
 };
 
 BoardRefiner::BoardRefiner(const cv::Mat& image, const CalibrationBoard& board, const CameraModel& model,
-                           const PlacedBoard& placed)
-    : image_(toFloat(image)), board_(board), model_(model), placed_(placed) {}
+                           const PosedBoard& posed)
+    : image_(toFloat(image)), board_(board), model_(model), posed_(posed) {}
 
 std::optional<Eigen::Vector2d> BoardRefiner::predict(int index) const {
   Eigen::Vector2d pixel;
-  if (!model_.project(placed_.corner(board_, index), &pixel)) {
+  if (!model_.project(posed_.corner(board_, index), &pixel)) {
     return std::nullopt;
   }
   return pixel;
@@ -53,7 +53,7 @@ std::optional<Eigen::Vector2d> BoardRefiner::predict(int index) const {
 std::optional<BoardRefiner::Patch> BoardRefiner::cut(int index, double half_m) const {
   const Eigen::Vector2d corner = board_.corner(index).head<2>();
   const auto project = [&](double x_m, double y_m, Eigen::Vector2d* pixel) {
-    return model_.project(placed_.point(board_, corner + Eigen::Vector2d(x_m, y_m)), pixel);
+    return model_.project(posed_.point(board_, corner + Eigen::Vector2d(x_m, y_m)), pixel);
   };
   Patch patch;
   Eigen::Vector2d left;
@@ -81,7 +81,7 @@ std::optional<BoardRefiner::Patch> BoardRefiner::cut(int index, double half_m) c
       for (int column = 0; column < patch.map.cols && seen; ++column) {
         const double x_m = (column - patch.nx - 1) * patch.step_x_m;
         Eigen::Vector2d pixel;
-        seen = model.project(placed_.point(board_, corner + Eigen::Vector2d(x_m, y_m)), &pixel);
+        seen = model.project(posed_.point(board_, corner + Eigen::Vector2d(x_m, y_m)), &pixel);
         line[column] = {static_cast<float>(pixel.x()), static_cast<float>(pixel.y())};
       }
     }

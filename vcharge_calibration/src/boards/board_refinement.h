@@ -19,7 +19,7 @@ class BoardRefiner {
  public:
   /// `image` is CV_8UC1. References must outlive this object.
   BoardRefiner(const cv::Mat& image, const CalibrationBoard& board, const CameraModel& model,
-               const PlacedBoard& placed);
+               const PosedBoard& posed);
 
   /// Refines corner `index` near `start`. Empty if the window leaves the image, the corner would move further
   /// than `max_move_px`, or the quarters around it are not alternately black and white.
@@ -34,7 +34,7 @@ class BoardRefiner {
   const cv::Mat image_;  // float
   const CalibrationBoard& board_;
   const CameraModel& model_;
-  const PlacedBoard& placed_;
+  const PosedBoard& posed_;
 };
 
 }  // namespace vcharge

@@ -32,12 +32,12 @@ namespace {
 
 // Width of the edge through `middle` (metres on the board) in the direction `along`; 0 if it cannot be
 // measured.
-double widthAt(const cv::Mat& image, const CalibrationBoard& board, const PlacedBoard& placed,
+double widthAt(const cv::Mat& image, const CalibrationBoard& board, const PosedBoard& posed,
                const CameraModel& model, const Eigen::Vector2d& middle, const Eigen::Vector2d& across_m) {
   Eigen::Vector2d at;
   Eigen::Vector2d towards;
-  if (!model.project(placed.point(board, middle), &at) ||
-      !model.project(placed.point(board, middle + across_m), &towards)) {
+  if (!model.project(posed.point(board, middle), &at) ||
+      !model.project(posed.point(board, middle + across_m), &towards)) {
     return 0.0;
   }
   const double clearance_px = (towards - at).norm() * board.clearance_m() / across_m.norm();
@@ -57,10 +57,10 @@ double widthAt(const cv::Mat& image, const CalibrationBoard& board, const Placed
       return 0.0;
     }
     const double slope = value - last_value;
-    const double place = s - 0.5 * kStep_px;
+    const double position_px = s - 0.5 * kStep_px;
     sum += slope;
-    first += slope * place;
-    second += slope * place * place;
+    first += slope * position_px;
+    second += slope * position_px * position_px;
     last_value = value;
   }
   if (std::abs(last_value - start) < kMinContrast) {
@@ -77,14 +77,14 @@ double medianOf(const std::vector<double>& values) {
 }  // namespace
 
 double edgeWidth(const cv::Mat& image, const CalibrationBoard& board, const BoardView& view,
-                 const PlacedBoard& placed, const CameraModel& model) {
+                 const PosedBoard& posed, const CameraModel& model) {
   // Motion blurs only edges of one direction.
   std::vector<double> along_rows;
   std::vector<double> along_columns;
   const double step_m = 0.1 * board.clearance_m();
   const auto add = [&](int index, int next, const Eigen::Vector2d& across_m, std::vector<double>* widths) {
     const Eigen::Vector2d middle = 0.5 * (board.corner(index) + board.corner(next)).head<2>();
-    const double width_px = widthAt(image, board, placed, model, middle, across_m);
+    const double width_px = widthAt(image, board, posed, model, middle, across_m);
     if (width_px > 0.0) {
       widths->push_back(width_px);
     }

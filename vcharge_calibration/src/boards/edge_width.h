@@ -11,6 +11,6 @@ namespace vcharge {
 /// slope, in pixels. The median over the edges along rows or along columns, whichever is wider. About 2 for a
 /// sharp image; 0 if nothing could be measured.
 double edgeWidth(const cv::Mat& image, const CalibrationBoard& board, const BoardView& view,
-                 const PlacedBoard& placed, const CameraModel& model);
+                 const PosedBoard& posed, const CameraModel& model);
 
 }  // namespace vcharge

@@ -60,32 +60,38 @@ MapRigCalibrator::MapRigCalibrator(std::shared_ptr<const SparseMap> map, const C
   rig_ = withCamerasAtOrigin(rig);
   localizer_ = std::make_unique<MapLocalizer>(map_, rig_, withoutUprightVehicle(options_.localizer));
   state_.data.rig = rig_;
-  gatherer_ = std::make_unique<FrameGatherer>(
-      rig_, options_.max_speed_m_per_s, &state_.report,
-      [this](Timestamp stamp, const std::vector<Image>& images, const RigidTransform& odom_from_vehicle) {
-        processFrame(stamp, images, odom_from_vehicle);
-      });
+  assembler_ =
+      std::make_unique<FrameAssembler<Image>>(rig_->cameras.size(), options_.assemblerOptions(),
+                                              [this](const ImageFrame& frame) { processFrame(frame); });
+  state_.report.counters = assembler_->counters();
 }
 
 MapRigCalibrator::~MapRigCalibrator() = default;
 
 void MapRigCalibrator::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
-  gatherer_->addImage(camera_index, stamp, image);
+  assembler_->addImage(camera_index, stamp, image);
+  state_.report.counters = assembler_->counters();
 }
 
 void MapRigCalibrator::addOdometry(const VehicleOdometry& odometry) {
-  gatherer_->addOdometry(odometry);
+  assembler_->addOdometry(odometry);
+  state_.report.counters = assembler_->counters();
 }
 
-void MapRigCalibrator::processFrame(Timestamp stamp, const std::vector<Image>& images,
-                                    const RigidTransform& odom_from_vehicle) {
+void MapRigCalibrator::processFrame(const ImageFrame& frame) {
+  state_.report.noteFrame(frame, *rig_, assembler_->counters());
+  if (!frame.bridged_from_vehicle) {
+    return;
+  }
   const StageTimer timer("finding cameras", &state_.report.stage_s);
+  keyframes_.correct(frame.corrections);
+  const RigidTransform& odom_from_vehicle = *frame.bridged_from_vehicle;
   const RigidTransform since = motionSinceKeyframe(odom_from_vehicle);
   if (keyframes_.isDue(since)) {
-    images_.add(static_cast<int32_t>(views_.size()), images);
-    addKeyframe(stamp, localizer_->extract(images), odom_from_vehicle);
+    images_.add(static_cast<int32_t>(views_.size()), frame.images);
+    addKeyframe(frame.stamp, localizer_->extract(frame.images), odom_from_vehicle);
   } else {
-    keyframes_.addFrame(stamp, since, MotionHypothesis::kOdometry);
+    keyframes_.addFrame(frame.stamp, since, MotionHypothesis::kOdometry);
   }
 }
 
@@ -137,7 +143,7 @@ std::optional<PoseFix> MapRigCalibrator::findCamera(const RigFeatures& features,
 }
 
 RigCalibration MapRigCalibrator::finish(const StageCallback& progress) {
-  gatherer_->finish();
+  assembler_->finish();
   return calibrateInMap(options_, *localizer_, views_, progress, &state_, &landmark_of_track_);
 }
 

@@ -46,7 +46,7 @@ class MapRigSteps {
     priors_.height_sigma_m = options_.height_sigma_m;
     try {
       describeDrive(*state_, &result_);
-      stages_.run("first guess", [&] {
+      stages_.run("initial estimate", [&] {
         initialize();
         useFixesOfCameras();
         adjust();
@@ -77,7 +77,8 @@ class MapRigSteps {
     for (size_t i = 0; i < data_->rig->cameras.size(); ++i) {
       motions.push_back(motionsInMap(views_, data_->keyframes, i));
     }
-    const std::shared_ptr<CameraRig> rig = guessRig(series_, options_.hand_eye, motions, state_, &result_);
+    const std::shared_ptr<CameraRig> rig =
+        estimateInitialRig(series_, options_.hand_eye, motions, state_, &result_);
     for (size_t i = 0; i < rig->cameras.size(); ++i) {
       const RigidTransform& level = *rig->cameras[i].vehicle_from_camera;
       Eigen::Vector3d position_m = level.translation();

@@ -8,21 +8,21 @@
 
 namespace vcharge {
 
-LandmarksByCamera recentLandmarksByCamera(const ReconstructionState& state, const CameraRig& guess,
+LandmarksByCamera recentLandmarksByCamera(const ReconstructionState& state, const CameraRig& initial_rig,
                                           const TriangulationOptions& options, int num_keyframes) {
   const auto end = static_cast<int32_t>(state.data.keyframes.size());
   ReconstructionData part = lastPart(state.data, std::max(0, end - num_keyframes));
-  auto rig = std::make_shared<CameraRig>(guess);
-  std::vector<bool> has_place;
+  auto rig = std::make_shared<CameraRig>(initial_rig);
+  std::vector<bool> has_extrinsics;
   for (RigCamera& camera : rig->cameras) {
-    has_place.push_back(camera.vehicle_from_camera.has_value());
+    has_extrinsics.push_back(camera.vehicle_from_camera.has_value());
     camera.vehicle_from_camera = camera.vehicle_from_camera.value_or(RigidTransform());
   }
   part.rig = rig;
   triangulateTracks(options, &part);
   LandmarksByCamera landmarks = landmarksByCamera(part);
   for (size_t i = 0; i < landmarks.size(); ++i) {
-    if (!has_place[i]) {
+    if (!has_extrinsics[i]) {
       landmarks[i].clear();
     }
     const double height_m = findCameraHeight(part, static_cast<int32_t>(i)).value_or(0.0);

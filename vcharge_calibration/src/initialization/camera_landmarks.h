@@ -10,10 +10,10 @@
 
 namespace vcharge {
 
-/// Landmarks of the newest keyframes by camera, for displays. The extrinsics of `guess` come from
+/// Landmarks of the newest keyframes by camera, for displays. The extrinsics of `initial_rig` come from
 /// hand-eye calibration, the heights from the points; cameras without extrinsics have no points. Takes
 /// milliseconds.
-LandmarksByCamera recentLandmarksByCamera(const ReconstructionState& state, const CameraRig& guess,
+LandmarksByCamera recentLandmarksByCamera(const ReconstructionState& state, const CameraRig& initial_rig,
                                           const TriangulationOptions& options, int num_keyframes);
 
 }  // namespace vcharge

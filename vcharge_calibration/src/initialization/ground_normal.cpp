@@ -24,7 +24,7 @@ constexpr uint32_t kSeed = 5;
 
 /// Path of the camera, from its rotations and directions and the odometer's distances, and points near it.
 struct CameraPath {
-  std::vector<Eigen::Vector3d> places_m;
+  std::vector<Eigen::Vector3d> positions_m;
   std::vector<Eigen::Matrix3d> path_from_camera;
   std::vector<Eigen::Vector3d> points_m;  ///< points near the path
 };
@@ -55,14 +55,14 @@ CameraPath followCamera(const ReconstructionData& data, int32_t camera,
   triangulateTracks(options, &alone);
   CameraPath path;
   for (const Keyframe& keyframe : alone.keyframes) {
-    path.places_m.push_back(keyframe.map_from_vehicle.translation());
+    path.positions_m.push_back(keyframe.map_from_vehicle.translation());
     path.path_from_camera.push_back(keyframe.map_from_vehicle.rotationMatrix());
   }
   for (const Track& track : alone.tracks) {
     const bool is_near =
         track.position_m &&
-        std::any_of(path.places_m.begin(), path.places_m.end(), [&](const Eigen::Vector3d& place) {
-          return (place - *track.position_m).norm() < kMaxRange_m;
+        std::any_of(path.positions_m.begin(), path.positions_m.end(), [&](const Eigen::Vector3d& position) {
+          return (position - *track.position_m).norm() < kMaxRange_m;
         });
     if (is_near) {
       path.points_m.push_back(*track.position_m);
@@ -80,13 +80,13 @@ struct Plane {
 };
 
 bool canBeGround(const CameraPath& path, const Plane& plane) {
-  const Eigen::Vector3d travel = path.places_m.back() - path.places_m.front();
+  const Eigen::Vector3d travel = path.positions_m.back() - path.positions_m.front();
   const Eigen::Vector3d upright =
       path.path_from_camera.front() * Eigen::Vector3d(0.0, -1.0, -1.0).normalized();
   return std::abs(plane.normal.dot(travel)) < kMaxSlope * travel.norm() &&
          plane.normal.dot(upright) > kMinUprightness &&
-         std::all_of(path.places_m.begin(), path.places_m.end(), [&](const Eigen::Vector3d& place) {
-           return plane.height_m(place) > kMinHeight_m && plane.height_m(place) < kMaxHeight_m;
+         std::all_of(path.positions_m.begin(), path.positions_m.end(), [&](const Eigen::Vector3d& position) {
+           return plane.height_m(position) > kMinHeight_m && plane.height_m(position) < kMaxHeight_m;
          });
 }
 
@@ -109,8 +109,8 @@ Plane throughPoint(const Eigen::Vector3d& normal, const Eigen::Vector3d& point,
 /// Weight of a point's height; the height's error grows with the square of the range.
 double weightOf(const CameraPath& path, const Eigen::Vector3d& point) {
   double square_m2 = kMaxRange_m * kMaxRange_m;
-  for (const Eigen::Vector3d& place : path.places_m) {
-    square_m2 = std::min(square_m2, (place - point).squaredNorm());
+  for (const Eigen::Vector3d& position : path.positions_m) {
+    square_m2 = std::min(square_m2, (position - point).squaredNorm());
   }
   return 1.0 / (square_m2 * square_m2);
 }
@@ -130,7 +130,7 @@ Plane fitPlane(const CameraPath& path, const std::vector<Eigen::Vector3d>& point
     scatter += weights[i] * (points[i] - mean) * (points[i] - mean).transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(scatter);
-  return throughPoint(eigen.eigenvectors().col(0), mean, path.places_m.front());
+  return throughPoint(eigen.eigenvectors().col(0), mean, path.positions_m.front());
 }
 
 }  // namespace
@@ -154,7 +154,7 @@ std::optional<Eigen::Vector3d> findUpwards(const ReconstructionData& data, int32
     if (normal.norm() < 1e-3) {
       continue;
     }
-    const Plane plane = throughPoint(normal.normalized(), a, path.places_m.front());
+    const Plane plane = throughPoint(normal.normalized(), a, path.positions_m.front());
     if (canBeGround(path, plane)) {
       const size_t count = pointsIn(path, plane).size();
       if (count > most) {

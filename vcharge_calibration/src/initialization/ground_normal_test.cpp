@@ -31,7 +31,7 @@ StraightDrive makeStraightDrive(const SceneOptions& scene) {
   KannalaBrandtCamera::Parameters parameters;
   parameters << 400.0, 400.0, 639.5, 399.5, 0.0, 0.0, 0.0, 0.0;
   RigCamera camera{"left", "camera_left_optical", cv::Size(1280, 800), KannalaBrandtCamera(parameters)};
-  const RigidTransform vehicle_from_camera = placeCamera(1.57, 0.7, 0.05, {1.9, 0.95, 0.9});
+  const RigidTransform vehicle_from_camera = makeExtrinsics(1.57, 0.7, 0.05, {1.9, 0.95, 0.9});
   StraightDrive drive;
   auto rig = std::make_shared<CameraRig>();
   rig->cameras = {camera};

@@ -83,26 +83,27 @@ Vertical findVertical(const std::vector<MotionPair>& motions, const HandEyeOptio
 }
 
 /// Yaw and position of a camera in a levelled frame.
-struct PlanarPlace {
+struct PlanarPose {
   Eigen::Vector2d cos_sin{1.0, 0.0};
-  Eigen::Vector2d turned_place_m = Eigen::Vector2d::Zero();  ///< position u, see solvePlanarHandEye()
+  Eigen::Vector2d turned_position_m = Eigen::Vector2d::Zero();  ///< position u, see solvePlanarHandEye()
   double yaw_sigma_rad = INFINITY, position_sigma_m = INFINITY;
   std::vector<double> sigmas;  ///< standardized error of each motion
 };
 
 /// Expected motion of the camera, Rz(-alpha) t + (R - I) u.
-Eigen::Vector2d predictedMotion(const MotionPair& motion, const PlanarPlace& place) {
+Eigen::Vector2d predictedMotion(const MotionPair& motion, const PlanarPose& pose) {
   const Eigen::Rotation2Dd turn(yawOf(motion));
   Eigen::Matrix2d back;
-  back << place.cos_sin[0], place.cos_sin[1], -place.cos_sin[1], place.cos_sin[0];
+  back << pose.cos_sin[0], pose.cos_sin[1], -pose.cos_sin[1], pose.cos_sin[0];
   return back * motion.vehicle.translation().head<2>() +
-         (turn.toRotationMatrix() - Eigen::Matrix2d::Identity()) * place.turned_place_m;
+         (turn.toRotationMatrix() - Eigen::Matrix2d::Identity()) * pose.turned_position_m;
 }
 
-PlanarPlace findPlace(const std::vector<MotionPair>& motions, const std::vector<Eigen::Vector2d>& directions,
-                      const HandEyeOptions& options, int num_iterations) {
-  PlanarPlace place;
-  place.sigmas.assign(motions.size(), 0.0);
+PlanarPose findPlanarPose(const std::vector<MotionPair>& motions,
+                          const std::vector<Eigen::Vector2d>& directions, const HandEyeOptions& options,
+                          int num_iterations) {
+  PlanarPose pose;
+  pose.sigmas.assign(motions.size(), 0.0);
   std::vector<double> lengths_m;
   for (const MotionPair& motion : motions) {
     lengths_m.push_back(motion.vehicle.translation().norm());
@@ -123,47 +124,49 @@ PlanarPlace findPlace(const std::vector<MotionPair>& motions, const std::vector<
       row.tail<2>() = (Eigen::Rotation2Dd(yawOf(motions[i])).toRotationMatrix() - Eigen::Matrix2d::Identity())
                           .transpose() *
                       across;
-      information += cauchyWeight(place.sigmas[i], kLossSigmas) / (sigma_m * sigma_m) * row * row.transpose();
+      information += cauchyWeight(pose.sigmas[i], kLossSigmas) / (sigma_m * sigma_m) * row * row.transpose();
     }
     // After elimination of the position, the eigenvector of the smaller eigenvalue is cosine and sine of the
     // yaw.
-    const Eigen::Matrix2d of_place =
+    const Eigen::Matrix2d position_information =
         information.bottomRightCorner<2, 2>() + 1e-6 * Eigen::Matrix2d::Identity();
-    const Eigen::Matrix2d place_by_yaw = of_place.ldlt().solve(information.bottomLeftCorner<2, 2>());
-    const Eigen::Matrix2d of_yaw =
-        information.topLeftCorner<2, 2>() - information.topRightCorner<2, 2>() * place_by_yaw;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(of_yaw);
-    place.cos_sin = eigen.eigenvectors().col(0);
-    place.turned_place_m = -place_by_yaw * place.cos_sin;
+    const Eigen::Matrix2d position_by_yaw =
+        position_information.ldlt().solve(information.bottomLeftCorner<2, 2>());
+    const Eigen::Matrix2d yaw_information =
+        information.topLeftCorner<2, 2>() - information.topRightCorner<2, 2>() * position_by_yaw;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> eigen(yaw_information);
+    pose.cos_sin = eigen.eigenvectors().col(0);
+    pose.turned_position_m = -position_by_yaw * pose.cos_sin;
     double forwards = 0.0;
     for (size_t i = 0; i < motions.size(); ++i) {
       if (motions[i].has_direction) {
-        forwards += directions[i].dot(predictedMotion(motions[i], place));
+        forwards += directions[i].dot(predictedMotion(motions[i], pose));
       }
     }
     if (forwards < 0.0) {
-      place.cos_sin = -place.cos_sin;
-      place.turned_place_m = -place.turned_place_m;
+      pose.cos_sin = -pose.cos_sin;
+      pose.turned_position_m = -pose.turned_position_m;
     }
-    place.yaw_sigma_rad = 1.0 / std::sqrt(std::max(1e-12, eigen.eigenvalues()[1]));
-    place.position_sigma_m =
+    pose.yaw_sigma_rad = 1.0 / std::sqrt(std::max(1e-12, eigen.eigenvalues()[1]));
+    pose.position_sigma_m =
         1.0 /
-        std::sqrt(std::max(1e-12, Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(of_place).eigenvalues()[0]));
+        std::sqrt(std::max(
+            1e-12, Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(position_information).eigenvalues()[0]));
     for (size_t i = 0; i < motions.size(); ++i) {
       if (!motions[i].has_direction) {
         continue;
       }
-      const Eigen::Vector2d predicted = predictedMotion(motions[i], place);
+      const Eigen::Vector2d predicted = predictedMotion(motions[i], pose);
       lengths_m[i] = predicted.norm();
       const double sigma_m =
           std::hypot(lengths_m[i] * motions[i].direction_sigma_rad, options.odometry_sigma_m);
       const Eigen::Vector2d across(-directions[i].y(), directions[i].x());
       // A motion in the opposite direction gets the same error as a perpendicular one.
       const double error_m = directions[i].dot(predicted) < 0.0 ? lengths_m[i] : across.dot(predicted);
-      place.sigmas[i] = error_m / sigma_m;
+      pose.sigmas[i] = error_m / sigma_m;
     }
   }
-  return place;
+  return pose;
 }
 
 /// Robust mean direction of straight motions.
@@ -208,25 +211,25 @@ HandEye solvePlanarHandEye(const std::vector<MotionPair>& motions, const HandEye
   for (const MotionPair& motion : motions) {
     directions.emplace_back((level_from_camera * motion.camera_direction).head<2>().normalized());
   }
-  const PlanarPlace place = findPlace(motions, directions, options, num_iterations);
-  result.yaw_sigma_rad = place.yaw_sigma_rad;
-  result.position_sigma_m = place.position_sigma_m;
+  const PlanarPose pose = findPlanarPose(motions, directions, options, num_iterations);
+  result.yaw_sigma_rad = pose.yaw_sigma_rad;
+  result.position_sigma_m = pose.position_sigma_m;
   for (size_t i = 0; i < motions.size(); ++i) {
     const double turn_error_sigmas = (1.0 / vertical.weights[i] - 1.0) * kLossSigmas * kLossSigmas;
-    result.num_inliers += std::abs(place.sigmas[i]) < kMaxInlierSigmas &&
-                                  turn_error_sigmas < kMaxInlierSigmas * kMaxInlierSigmas
-                              ? 1
-                              : 0;
+    result.num_inliers +=
+        std::abs(pose.sigmas[i]) < kMaxInlierSigmas && turn_error_sigmas < kMaxInlierSigmas * kMaxInlierSigmas
+            ? 1
+            : 0;
   }
   if (!(result.tilt_sigma_rad < options.max_sigma_rad && result.yaw_sigma_rad < options.max_sigma_rad &&
         result.position_sigma_m < options.max_sigma_m)) {
     result.status = HandEyeStatus::kNoTurn;
     return result;
   }
-  const double yaw_rad = std::atan2(place.cos_sin[1], place.cos_sin[0]);
-  const Eigen::Vector2d place_m = Eigen::Rotation2Dd(yaw_rad) * place.turned_place_m;
+  const double yaw_rad = std::atan2(pose.cos_sin[1], pose.cos_sin[0]);
+  const Eigen::Vector2d position_m = Eigen::Rotation2Dd(yaw_rad) * pose.turned_position_m;
   result.vehicle_from_camera = RigidTransform(rotationFromYawPitchRoll(yaw_rad, 0.0, 0.0) * level_from_camera,
-                                              Eigen::Vector3d(place_m.x(), place_m.y(), 0.0));
+                                              Eigen::Vector3d(position_m.x(), position_m.y(), 0.0));
   result.status =
       2 * result.num_inliers > result.num_motions ? HandEyeStatus::kOk : HandEyeStatus::kNoAgreement;
   return result;

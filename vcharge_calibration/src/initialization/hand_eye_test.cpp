@@ -13,16 +13,16 @@ constexpr double kDegree = 0.017453292519943295;
 struct Drive {
   double turn_rad = 0.08;  ///< maximum per motion: to the left in the first half, to the right in the second
   double noise_rad = 0.0;
-  double wrong_share = 0.0;
+  double wrong_fraction = 0.0;
   int num_motions = 200;
   uint32_t seed = 1;
 };
 
-RigidTransform truePlace() {
+RigidTransform trueExtrinsics() {
   return RigidTransform(rotationFromYawPitchRoll(1.4, 0.3, -1.9), Eigen::Vector3d(1.9, 0.95, 0.0));
 }
 
-/// Motions of a car that turns, and of a camera with the extrinsics truePlace(), 0.5 m above the ground.
+/// Motions of a car that turns, and of a camera with the extrinsics trueExtrinsics(), 0.5 m above the ground.
 std::vector<MotionPair> makeMotions(const Drive& drive) {
   std::mt19937 random(drive.seed);
   std::normal_distribution<double> noise(0.0, drive.noise_rad);
@@ -34,8 +34,8 @@ std::vector<MotionPair> makeMotions(const Drive& drive) {
     }
     return vector;
   };
-  const RigidTransform vehicle_from_camera(truePlace().rotation(),
-                                           truePlace().translation() + Eigen::Vector3d(0.0, 0.0, 0.5));
+  const RigidTransform vehicle_from_camera(trueExtrinsics().rotation(),
+                                           trueExtrinsics().translation() + Eigen::Vector3d(0.0, 0.0, 0.5));
   std::vector<MotionPair> motions;
   for (int i = 0; i < drive.num_motions; ++i) {
     // The radius varies: circles of one radius do not determine the position.
@@ -44,7 +44,7 @@ std::vector<MotionPair> makeMotions(const Drive& drive) {
     motion.vehicle =
         RigidTransform::planar(0.5 * std::cos(0.5 * turn_rad), 0.5 * std::sin(0.5 * turn_rad), turn_rad);
     RigidTransform camera = vehicle_from_camera.inverse() * motion.vehicle * vehicle_from_camera;
-    if (uniform(random) < 2.0 * drive.wrong_share - 1.0) {
+    if (uniform(random) < 2.0 * drive.wrong_fraction - 1.0) {
       camera = RigidTransform(rotationFromVector(0.1 * draw(&uniform)), draw(&uniform));
     }
     motion.camera_rotation = camera.rotation();
@@ -67,21 +67,21 @@ double angleBetween(const RigidTransform& a, const RigidTransform& b) {
 TEST(PlanarHandEyeTest, FindsTheTruthWithoutNoise) {
   const HandEye found = solvePlanarHandEye(makeMotions(Drive()), HandEyeOptions());
   ASSERT_EQ(found.status, HandEyeStatus::kOk);
-  EXPECT_LT(angleBetween(found.vehicle_from_camera, truePlace()), 1e-6);
-  EXPECT_LT((found.vehicle_from_camera.translation() - truePlace().translation()).norm(), 1e-6);
+  EXPECT_LT(angleBetween(found.vehicle_from_camera, trueExtrinsics()), 1e-6);
+  EXPECT_LT((found.vehicle_from_camera.translation() - trueExtrinsics().translation()).norm(), 1e-6);
   EXPECT_EQ(found.num_inliers, found.num_motions);
 }
 
 TEST(PlanarHandEyeTest, HandlesNoiseAndOutliers) {
   Drive drive;
   drive.noise_rad = 0.01;
-  drive.wrong_share = 0.2;
+  drive.wrong_fraction = 0.2;
   const HandEye found = solvePlanarHandEye(makeMotions(drive), HandEyeOptions());
   ASSERT_EQ(found.status, HandEyeStatus::kOk);
   // 160 motions with 0.57 degrees of noise: four standard deviations of the mean, plus the bias by outliers.
-  EXPECT_LT(angleBetween(found.vehicle_from_camera, truePlace()), 0.4 * kDegree);
+  EXPECT_LT(angleBetween(found.vehicle_from_camera, trueExtrinsics()), 0.4 * kDegree);
   // One motion gives the position to 0.01 x 0.5 m / 0.06 = 8 cm at best. Limit: 6 x 8 cm / sqrt(160).
-  EXPECT_LT((found.vehicle_from_camera.translation() - truePlace().translation()).norm(), 0.04);
+  EXPECT_LT((found.vehicle_from_camera.translation() - trueExtrinsics().translation()).norm(), 0.04);
   EXPECT_LT(found.num_inliers, found.num_motions);
 }
 
@@ -92,7 +92,7 @@ TEST(PlanarHandEyeTest, DetectsALackOfTurns) {
   const HandEye found = solvePlanarHandEye(makeMotions(drive), HandEyeOptions());
   EXPECT_EQ(found.status, HandEyeStatus::kNoTurn);
   // The direction of travel is known without turns.
-  const Eigen::Vector3d ahead = truePlace().rotation().conjugate() * Eigen::Vector3d::UnitX();
+  const Eigen::Vector3d ahead = trueExtrinsics().rotation().conjugate() * Eigen::Vector3d::UnitX();
   EXPECT_LT(std::acos(found.travel_in_camera.dot(ahead)), 0.002);
 }
 
@@ -104,7 +104,7 @@ TEST(PlanarHandEyeTest, DetectsTooFewMotions) {
 
 TEST(PlanarHandEyeTest, RefusesMotionsThatContradictTheOdometer) {
   Drive drive;
-  drive.wrong_share = 1.0;
+  drive.wrong_fraction = 1.0;
   const HandEye found = solvePlanarHandEye(makeMotions(drive), HandEyeOptions());
   EXPECT_NE(found.status, HandEyeStatus::kOk);
 }
@@ -116,7 +116,7 @@ TEST(PlanarHandEyeTest, FacesBackwardsWithAReversedOdometer) {
   }
   const HandEye found = solvePlanarHandEye(motions, HandEyeOptions());
   ASSERT_EQ(found.status, HandEyeStatus::kOk);
-  EXPECT_NEAR(angleBetween(found.vehicle_from_camera, truePlace()), 3.14159265, 1e-6);
+  EXPECT_NEAR(angleBetween(found.vehicle_from_camera, trueExtrinsics()), 3.14159265, 1e-6);
 }
 
 }  // namespace

@@ -72,7 +72,7 @@ void describeDrive(const ReconstructionState& state, RigCalibration* result) {
     result->distance_m = keyframes.back().travelled_m;
   }
   const ReconstructionReport& report = state.report;
-  if (2 * report.num_frames_without_odometry > report.num_frames) {
+  if (2 * report.counters.frames_without_odometry > report.counters.frames) {
     throw NotCalibrated{
         {"most images have no odometry at their stamps: do cameras and odometer use the same clock?"}};
   }
@@ -85,9 +85,9 @@ void describeDrive(const ReconstructionState& state, RigCalibration* result) {
   }
 }
 
-std::shared_ptr<CameraRig> guessRig(const OdometrySeries& series, const HandEyeOptions& options,
-                                    std::vector<std::vector<MotionPair>> motions, ReconstructionState* state,
-                                    RigCalibration* result) {
+std::shared_ptr<CameraRig> estimateInitialRig(const OdometrySeries& series, const HandEyeOptions& options,
+                                              std::vector<std::vector<MotionPair>> motions,
+                                              ReconstructionState* state, RigCalibration* result) {
   std::shared_ptr<CameraRig> rig = solveHandEyes(state->data, motions, options, result);
   for (int i = 0; i < kOffsetIterations; ++i) {
     std::vector<Eigen::Vector3d> up_in_camera;

@@ -23,9 +23,9 @@ void describeDrive(const ReconstructionState& state, RigCalibration* result);
 /// the cameras of `result`. If the turns show a time offset, shifts the state's odometry by it.
 /// Throws NotCalibrated, with a reason per camera, if there is no solution or if the odometer has wrong
 /// signs.
-std::shared_ptr<CameraRig> guessRig(const OdometrySeries& series, const HandEyeOptions& options,
-                                    std::vector<std::vector<MotionPair>> motions, ReconstructionState* state,
-                                    RigCalibration* result);
+std::shared_ptr<CameraRig> estimateInitialRig(const OdometrySeries& series, const HandEyeOptions& options,
+                                              std::vector<std::vector<MotionPair>> motions,
+                                              ReconstructionState* state, RigCalibration* result);
 
 /// Estimates the time offset from adjusted keyframes and shifts the state's odometry by it.
 void correctTimeOffset(const OdometrySeries& series, ReconstructionState* state, RigCalibration* result);

@@ -24,8 +24,8 @@ RigidTransform partOf(const RigidTransform& motion, double part) {
   const Eigen::Vector2d chord = back * motion.translation().head<2>();
   const double shrink =
       std::abs(turn_rad) < 1e-6 ? part : std::sin(0.5 * part * turn_rad) / std::sin(0.5 * turn_rad);
-  const Eigen::Vector2d place = Eigen::Rotation2Dd(0.5 * part * turn_rad) * (shrink * chord);
-  return RigidTransform::planar(place.x(), place.y(), part * turn_rad);
+  const Eigen::Vector2d position_m = Eigen::Rotation2Dd(0.5 * part * turn_rad) * (shrink * chord);
+  return RigidTransform::planar(position_m.x(), position_m.y(), part * turn_rad);
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace vcharge {
 namespace {
 
 const cv::Size kSize(640, 400);
-const auto kNoProgress = [](double /*share*/) {};
+const auto kNoProgress = [](double /*fraction*/) {};
 
 // A lens of 170 degrees with a typical offset of the principal point.
 CameraModel camera() {

@@ -39,8 +39,8 @@ BoardView turned(const BoardView& view, const Turn& turn, cv::Size size) {
 }
 
 double errorOf(const CalibrationBoard& board, const BoardView& view, const CameraModel& model) {
-  const auto placed = fitBoard(board, view, model, {Loss::kRobust});
-  return placed.has_value() ? rmsError(board, view, *placed, model) : std::numeric_limits<double>::infinity();
+  const auto posed = fitBoard(board, view, model, {Loss::kRobust});
+  return posed.has_value() ? rmsError(board, view, *posed, model) : std::numeric_limits<double>::infinity();
 }
 
 CameraModel shifted(const CameraModel& model, const Turn& turn, cv::Size size) {

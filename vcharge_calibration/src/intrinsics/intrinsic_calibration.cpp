@@ -8,10 +8,10 @@
 
 #include <tbb/parallel_for.h>
 
+#include "intrinsics/calibration_verdict.h"
 #include "intrinsics/image_orientation.h"
 #include "intrinsics/intrinsic_optimizer.h"
 #include "intrinsics/view_fit.h"
-#include "rig/calibration_verdict.h"
 #include "vcharge_calibration/boards/board_detector.h"
 #include "vcharge_calibration/intrinsics/image_coverage.h"
 #include "vcharge_core/base/error.h"
@@ -101,9 +101,9 @@ class Calibration {
     constexpr size_t kMaxViews = 24;
     std::vector<std::pair<double, size_t>> order(views.size());
     tbb::parallel_for(size_t{0}, views.size(), [&](size_t v) {
-      const auto placed = fitBoard(board_, views[v], camera, {Loss::kRobust});
-      order[v] = {placed.has_value() ? -rmsError(board_, views[v], *placed, camera)
-                                     : -std::numeric_limits<double>::infinity(),
+      const auto posed = fitBoard(board_, views[v], camera, {Loss::kRobust});
+      order[v] = {posed.has_value() ? -rmsError(board_, views[v], *posed, camera)
+                                    : -std::numeric_limits<double>::infinity(),
                   v};
     });
     std::sort(order.begin(), order.end());
@@ -185,20 +185,20 @@ class Calibration {
     size_t count = 0;
     ImageCoverage coverage(result_.image_size_px);
     for (size_t v = 0; v < fit.views.size(); ++v) {
-      const PlacedBoard& placed = fit.camera.boards[v];
-      result_.views.push_back({fit.views[v], placed, rmsError(board_, fit.views[v], placed, fit.camera.model),
+      const PosedBoard& posed = fit.camera.boards[v];
+      result_.views.push_back({fit.views[v], posed, rmsError(board_, fit.views[v], posed, fit.camera.model),
                                fit.edge_widths_px[v]});
       coverage.add(fit.views[v]);
       for (const BoardCorner& corner : fit.views[v].corners) {
-        const double distance = reprojectionError(board_, corner, placed, fit.camera.model).norm();
+        const double distance = reprojectionError(board_, corner, posed, fit.camera.model).norm();
         sum += distance * distance;
         sum_distance += distance;
         ++count;
-        const Eigen::Vector3d point = placed.corner(board_, corner.index);
+        const Eigen::Vector3d point = posed.corner(board_, corner.index);
         result_.max_angle_rad =
             std::max(result_.max_angle_rad, std::atan2(point.head<2>().norm(), point.z()));
       }
-      const double along = placed.bending_m[board_.columns >= board_.rows ? 0 : 2];
+      const double along = posed.bending_m[board_.columns >= board_.rows ? 0 : 2];
       sum_bending += along * along / static_cast<double>(fit.views.size());
     }
     result_.rms_px = std::sqrt(sum / (2.0 * static_cast<double>(count)));
@@ -236,10 +236,10 @@ class Calibration {
       for (size_t v = fold; v < views; v += folds) {
         FitSettings own = fit.settings;
         own.sigmas_px = {fit.settings.sigmas_px[v]};
-        const auto placed =
+        const auto posed =
             camera.has_value() ? fitBoard(board_, fit.views[v], camera->model, own) : std::nullopt;
-        const double rms = placed.has_value() ? rmsError(board_, fit.views[v], *placed, camera->model)
-                                              : std::numeric_limits<double>::infinity();
+        const double rms = posed.has_value() ? rmsError(board_, fit.views[v], *posed, camera->model)
+                                             : std::numeric_limits<double>::infinity();
         sums[fold] += rms * rms * 2.0 * static_cast<double>(fit.views[v].corners.size());
         counts[fold] += 2 * fit.views[v].corners.size();
       }

@@ -127,7 +127,7 @@ TEST(BoardPoseTest, TooFewOrCollinearRaysHaveNone) {
   EXPECT_FALSE(boardPoseFromRays({same, same, same, same, same}).has_value());
 }
 
-TEST(IntrinsicOptimizerTest, FindsEveryModelWithoutAFocalGuess) {
+TEST(IntrinsicOptimizerTest, FindsEveryModelWithoutAnInitialFocalLength) {
   const CalibrationBoard board{9, 6, 0.1};
   Eigen::Matrix<double, 8, 1> kannala_brandt;
   kannala_brandt << 420.0, 421.0, 645.0, 402.0, 0.02, -0.006, 0.002, -0.0004;
@@ -178,7 +178,7 @@ TEST(CalibrationBoardTest, SizesThatAreNoneAreNamed) {
   EXPECT_EQ(CalibrationBoard::parse("9x6", 0.1).numCorners(), 54);
 }
 
-const auto kNoProgress = [](double /*share*/) {};
+const auto kNoProgress = [](double /*fraction*/) {};
 
 TEST(CalibrateIntrinsicsTest, WithoutABoardItFailsAndSaysSo) {
   const cv::Mat gray(200, 300, CV_8UC1, cv::Scalar(90));

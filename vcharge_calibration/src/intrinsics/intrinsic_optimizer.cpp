@@ -22,8 +22,8 @@ constexpr double kRobust_px = 1.0;
 // Typical bending of a hand-held board, relative to its diagonal.
 constexpr double kUsualBending = 0.003;
 // Largest error of a view when a first camera is judged.
-constexpr double kMaxGuessError_px = 20.0;
-constexpr size_t kMaxGuessViews = 20;
+constexpr double kMaxInitialError_px = 20.0;
+constexpr size_t kMaxInitialViews = 20;
 constexpr size_t kFirstViews = 8;
 
 Eigen::VectorXd parametersFor(const std::string& model_name, cv::Size size, double focal_px) {
@@ -47,7 +47,7 @@ class BentCornerCost : public ceres::CostFunction {
   BentCornerCost(std::unique_ptr<ceres::CostFunction> flat, const CalibrationBoard& board, int index)
       : flat_(std::move(flat)),
         corner_(board.corner(index)),
-        basis_(PlacedBoard::bendingBasis(board, corner_.head<2>())) {
+        basis_(PosedBoard::bendingBasis(board, corner_.head<2>())) {
     set_num_residuals(2);
     *mutable_parameter_block_sizes() = flat_->parameter_block_sizes();
   }
@@ -104,9 +104,9 @@ class Adjustment {
     for (int i = 0; i < board.numCorners(); ++i) {
       corners_.push_back(board.corner(i));
     }
-    for (const PlacedBoard& placed : start.boards) {
-      poses_.push_back(toPoseBlock(placed.camera_from_board.inverse()));
-      bendings_.push_back(placed.bending_m);
+    for (const PosedBoard& posed : start.boards) {
+      poses_.push_back(toPoseBlock(posed.camera_from_board.inverse()));
+      bendings_.push_back(posed.bending_m);
     }
     problem_.AddParameterBlock(camera_.data(), 7);
     problem_.SetParameterBlockConstant(camera_.data());
@@ -167,8 +167,8 @@ class Adjustment {
     return summary.IsSolutionUsable();
   }
 
-  std::vector<PlacedBoard> boards() const {
-    std::vector<PlacedBoard> boards;
+  std::vector<PosedBoard> boards() const {
+    std::vector<PosedBoard> boards;
     for (size_t v = 0; v < poses_.size(); ++v) {
       boards.push_back({fromPoseBlock(poses_[v]).inverse(), bendings_[v]});
     }
@@ -213,20 +213,20 @@ class Adjustment {
 }  // namespace
 
 Eigen::Vector2d reprojectionError(const CalibrationBoard& board, const BoardCorner& corner,
-                                  const PlacedBoard& placed, const CameraModel& model) {
+                                  const PosedBoard& posed, const CameraModel& model) {
   Eigen::Vector2d pixel;
-  if (!model.project(placed.corner(board, corner.index), &pixel)) {
+  if (!model.project(posed.corner(board, corner.index), &pixel)) {
     return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   }
   return pixel - corner.pixel;
 }
 
-std::optional<CameraModel> guessCamera(const std::string& model_name, cv::Size image_size_px,
-                                       const CalibrationBoard& board, const std::vector<BoardView>& views) {
+std::optional<CameraModel> initialCamera(const std::string& model_name, cv::Size image_size_px,
+                                         const CalibrationBoard& board, const std::vector<BoardView>& views) {
   constexpr int kSteps = 40;
   std::optional<CameraModel> best;
   double best_error = std::numeric_limits<double>::infinity();
-  const size_t stride = std::max<size_t>(1, views.size() / kMaxGuessViews);
+  const size_t stride = std::max<size_t>(1, views.size() / kMaxInitialViews);
   for (int step = 0; step <= kSteps; ++step) {
     // Focal lengths from a fisheye lens of more than 180 degrees to a long lens.
     const double focal_px = image_size_px.width * 0.15 * std::pow(20.0, static_cast<double>(step) / kSteps);
@@ -241,8 +241,8 @@ std::optional<CameraModel> guessCamera(const std::string& model_name, cv::Size i
         const double miss_px =
             pose.has_value()
                 ? reprojectionError(board, corner, {*pose, Eigen::Vector3d::Zero()}, model).norm()
-                : kMaxGuessError_px;
-        error += std::isfinite(miss_px) ? std::min(miss_px, kMaxGuessError_px) : kMaxGuessError_px;
+                : kMaxInitialError_px;
+        error += std::isfinite(miss_px) ? std::min(miss_px, kMaxInitialError_px) : kMaxInitialError_px;
       }
     }
     if (any && error < best_error) {
@@ -289,7 +289,7 @@ std::optional<FittedCamera> fitFromScratch(const std::string& model_name, cv::Si
        count = std::min(2 * count, sorted.size())) {
     const std::vector<BoardView> part(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(count));
     const auto start = fitted.has_value() ? std::optional<CameraModel>(fitted->model)
-                                          : guessCamera(model_name, image_size_px, board, part);
+                                          : initialCamera(model_name, image_size_px, board, part);
     const auto next = start.has_value() ? fitCamera(board, part, *start, {Loss::kRobust}) : std::nullopt;
     if (next.has_value()) {
       fitted = next;
@@ -301,8 +301,8 @@ std::optional<FittedCamera> fitFromScratch(const std::string& model_name, cv::Si
   return std::nullopt;
 }
 
-std::optional<PlacedBoard> fitBoard(const CalibrationBoard& board, const BoardView& view,
-                                    const CameraModel& model, const FitSettings& settings) {
+std::optional<PosedBoard> fitBoard(const CalibrationBoard& board, const BoardView& view,
+                                   const CameraModel& model, const FitSettings& settings) {
   const auto pose = boardPose(board, view.corners, model);
   if (!pose.has_value()) {
     return std::nullopt;

@@ -16,13 +16,13 @@ namespace vcharge {
 /// A camera and the board in each view.
 struct FittedCamera {
   CameraModel model;
-  std::vector<PlacedBoard> boards;  ///< one per view
+  std::vector<PosedBoard> boards;  ///< one per view
 };
 
 /// Initial camera without a known focal length: the candidate with which each view alone fits its board best.
 /// The principal point is in the middle of the image; without distortion. Empty if no view fits.
-std::optional<CameraModel> guessCamera(const std::string& model_name, cv::Size image_size_px,
-                                       const CalibrationBoard& board, const std::vector<BoardView>& views);
+std::optional<CameraModel> initialCamera(const std::string& model_name, cv::Size image_size_px,
+                                         const CalibrationBoard& board, const std::vector<BoardView>& views);
 
 enum class Loss { kSquared, kRobust };
 
@@ -47,8 +47,8 @@ std::optional<FittedCamera> fitFromScratch(const std::string& model_name, cv::Si
                                            const std::vector<BoardView>& views);
 
 /// Pose and bending of the board in a view for a known camera. Empty if it fails.
-std::optional<PlacedBoard> fitBoard(const CalibrationBoard& board, const BoardView& view,
-                                    const CameraModel& model, const FitSettings& settings);
+std::optional<PosedBoard> fitBoard(const CalibrationBoard& board, const BoardView& view,
+                                   const CameraModel& model, const FitSettings& settings);
 
 /// Covariance of the intrinsics, in the order of parameterNames(), for corners with the standard deviations
 /// of the settings and unknown board poses. Empty if the views do not determine them.
@@ -58,6 +58,6 @@ std::optional<Eigen::MatrixXd> intrinsicsCovariance(const CalibrationBoard& boar
 
 /// Projection of a board's corner minus its detection, in pixels; NaN if the camera does not see it.
 Eigen::Vector2d reprojectionError(const CalibrationBoard& board, const BoardCorner& corner,
-                                  const PlacedBoard& placed, const CameraModel& model);
+                                  const PosedBoard& posed, const CameraModel& model);
 
 }  // namespace vcharge

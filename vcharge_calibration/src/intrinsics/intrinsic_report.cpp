@@ -94,7 +94,7 @@ class Report {
         continue;
       }
       for (const BoardCorner& corner : view.view.corners) {
-        errors.push_back({corner.pixel, reprojectionError(board_, corner, view.placed, *result_.model)});
+        errors.push_back({corner.pixel, reprojectionError(board_, corner, view.posed, *result_.model)});
       }
     }
     out_ << "<h2>Coverage of the image</h2><div class=\"row\">"
@@ -142,7 +142,7 @@ class Report {
            << "</td><td><svg class=\"bar\" viewBox=\"0 0 100 10\" preserveAspectRatio=\"none\"><rect width=\""
            << toText(100.0 * view.rms_px / worst_px, 0)
            << "\" height=\"10\" fill=\"#b3261e\"/></svg></td><td>" << toText(view.edge_width_px, 1)
-           << "</td><td>" << toText(view.placed.camera_from_board.translation().norm(), 2)
+           << "</td><td>" << toText(view.posed.camera_from_board.translation().norm(), 2)
            << "</td><td class=\"text\"></td></tr>";
     }
     for (const RejectedImage& image : result_.rejected) {

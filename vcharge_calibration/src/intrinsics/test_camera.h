@@ -8,8 +8,8 @@
 namespace vcharge {
 
 /// vehicle_from_camera of a forward-looking camera that is rotated by these angles.
-inline RigidTransform placeCamera(double yaw_rad, double pitch_rad, double roll_rad,
-                                  const Eigen::Vector3d& position_m) {
+inline RigidTransform makeExtrinsics(double yaw_rad, double pitch_rad, double roll_rad,
+                                     const Eigen::Vector3d& position_m) {
   Eigen::Matrix3d forward_from_optical;
   forward_from_optical << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
   return RigidTransform(

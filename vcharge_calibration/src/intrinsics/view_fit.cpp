@@ -241,11 +241,11 @@ double median(const std::vector<double>& values) {
   return values.empty() ? 0.0 : quantile(values, 0.5);
 }
 
-double rmsError(const CalibrationBoard& board, const BoardView& view, const PlacedBoard& placed,
+double rmsError(const CalibrationBoard& board, const BoardView& view, const PosedBoard& posed,
                 const CameraModel& model) {
   double sum = 0.0;
   for (const BoardCorner& corner : view.corners) {
-    sum += reprojectionError(board, corner, placed, model).squaredNorm();
+    sum += reprojectionError(board, corner, posed, model).squaredNorm();
   }
   const double rms = std::sqrt(sum / (2.0 * static_cast<double>(view.corners.size())));
   return std::isfinite(rms) ? rms : std::numeric_limits<double>::infinity();

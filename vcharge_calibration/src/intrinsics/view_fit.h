@@ -19,7 +19,7 @@ struct ViewFit {
 };
 
 /// RMS error of a view per coordinate, in pixels; infinite if the camera does not see a corner.
-double rmsError(const CalibrationBoard& board, const BoardView& view, const PlacedBoard& placed,
+double rmsError(const CalibrationBoard& board, const BoardView& view, const PosedBoard& posed,
                 const CameraModel& model);
 
 double median(const std::vector<double>& values);

@@ -53,8 +53,8 @@ std::string tensOfDegrees(double angle_rad) {
 }
 
 /// Text of the direction from the vehicle to an earlier pose.
-std::string directionTo(const RigidTransform& odom_from_vehicle, const RigidTransform& odom_from_place) {
-  const Eigen::Vector3d there = odom_from_vehicle.inverse() * odom_from_place.translation();
+std::string directionTo(const RigidTransform& odom_from_vehicle, const RigidTransform& odom_from_earlier) {
+  const Eigen::Vector3d there = odom_from_vehicle.inverse() * odom_from_earlier.translation();
   const double angle = std::atan2(there.y(), there.x());
   const char* where = std::abs(angle) < 0.8   ? "ahead"
                       : std::abs(angle) > 2.4 ? "behind"
@@ -73,27 +73,27 @@ CalibrationCoach::CalibrationCoach(const std::vector<std::string>& camera_names,
 }
 
 void CalibrationCoach::addKeyframe(const RigidTransform& odom_from_vehicle, double travelled_m) {
-  Place place{odom_from_vehicle, travelled_m, false};
-  for (const Place& earlier : places_) {
+  VisitedPose current{odom_from_vehicle, travelled_m, false};
+  for (const VisitedPose& earlier : visited_) {
     if (travelled_m - earlier.travelled_m < kRevisitGap_m) {
       break;  // later parts are too recent as well
     }
     const Eigen::Vector3d way = earlier.odom_from_vehicle.translation() - odom_from_vehicle.translation();
-    place.is_revisited = place.is_revisited || way.head<2>().norm() < kRevisitRadius_m;
+    current.is_revisited = current.is_revisited || way.head<2>().norm() < kRevisitRadius_m;
   }
-  if (!places_.empty()) {
-    const Place& last = places_.back();
+  if (!visited_.empty()) {
+    const VisitedPose& last = visited_.back();
     const double turn_rad =
         yawOfRotation(last.odom_from_vehicle.rotation().conjugate() * odom_from_vehicle.rotation());
     (turn_rad > 0.0 ? left_turn_rad_ : right_turn_rad_) += std::abs(turn_rad);
-    revisited_m_ += place.is_revisited ? travelled_m - last.travelled_m : 0.0;
+    revisited_m_ += current.is_revisited ? travelled_m - last.travelled_m : 0.0;
   }
-  places_.push_back(place);
+  visited_.push_back(current);
 }
 
 void CalibrationCoach::addMotion(size_t camera, const MotionPair& motion) {
   check(camera < motions_.size() && motion.keyframe >= 0 &&
-            static_cast<size_t>(motion.keyframe) < places_.size(),
+            static_cast<size_t>(motion.keyframe) < visited_.size(),
         "CalibrationCoach::addMotion: expected a camera and a keyframe that were added");
   motions_[camera].push_back(motion);
 }
@@ -112,7 +112,7 @@ CameraOutlook CalibrationCoach::cameraOutlook(size_t camera) const {
   for (int group = 0; group < kNumGroups; ++group) {
     std::vector<MotionPair> others;
     for (const MotionPair& motion : motions) {
-      const double travelled_m = places_[static_cast<size_t>(motion.keyframe)].travelled_m;
+      const double travelled_m = visited_[static_cast<size_t>(motion.keyframe)].travelled_m;
       if (static_cast<int64_t>(travelled_m / kSegment_m) % kNumGroups != group) {
         others.push_back(motion);
       }
@@ -134,7 +134,7 @@ CameraOutlook CalibrationCoach::cameraOutlook(size_t camera) const {
 
 DriveOutlook CalibrationCoach::outlook() const {
   DriveOutlook outlook;
-  outlook.distance_m = places_.empty() ? 0.0 : places_.back().travelled_m;
+  outlook.distance_m = visited_.empty() ? 0.0 : visited_.back().travelled_m;
   outlook.left_turn_rad = left_turn_rad_;
   outlook.right_turn_rad = right_turn_rad_;
   outlook.revisited_m = revisited_m_;
@@ -149,18 +149,18 @@ double CalibrationCoach::weakness(const CameraOutlook& camera, int* degree_of_fr
   double worst = 0.0;
   for (int i = 0; i < 6; ++i) {
     const double enough = i < 3 ? options_.enough_sigma_m : options_.enough_sigma_rad;
-    const double share = i == kHeight                     ? 0.0
+    const double ratio = i == kHeight                     ? 0.0
                          : std::isfinite(camera.sigma[i]) ? camera.sigma[i] / enough
                                                           : std::numeric_limits<double>::infinity();
-    if (share > worst) {
-      worst = share;
+    if (ratio > worst) {
+      worst = ratio;
       *degree_of_freedom = i;
     }
   }
   return worst;
 }
 
-void CalibrationCoach::judgeSigmas(DriveOutlook* outlook, std::vector<double>* shares) const {
+void CalibrationCoach::judgeSigmas(DriveOutlook* outlook, std::vector<double>* fulfilled) const {
   const char* const names[] = {"forwards", "sideways", "height", "roll", "pitch", "yaw"};
   const CameraOutlook* weakest = nullptr;
   double most = 1.0;
@@ -169,7 +169,7 @@ void CalibrationCoach::judgeSigmas(DriveOutlook* outlook, std::vector<double>* s
     int degree_of_freedom = 0;
     const double weak = weakness(camera, &degree_of_freedom);
     camera.is_enough = weak <= 1.0;
-    shares->push_back(1.0 / std::max(1.0, weak * weak));
+    fulfilled->push_back(1.0 / std::max(1.0, weak * weak));
     if (weak > most) {
       most = weak;
       weakest = &camera;
@@ -193,10 +193,10 @@ void CalibrationCoach::judgeSigmas(DriveOutlook* outlook, std::vector<double>* s
 /// revisits, and uncertain cameras.
 void CalibrationCoach::judge(DriveOutlook* outlook) const {
   std::vector<std::string>& missing = outlook->missing;
-  std::vector<double> shares{outlook->distance_m / options_.enough_distance_m,
-                             left_turn_rad_ / options_.enough_turn_rad,
-                             right_turn_rad_ / options_.enough_turn_rad};
-  const int num_steps = static_cast<int>(places_.size()) - 1;
+  std::vector<double> fulfilled{outlook->distance_m / options_.enough_distance_m,
+                                left_turn_rad_ / options_.enough_turn_rad,
+                                right_turn_rad_ / options_.enough_turn_rad};
+  const int num_steps = static_cast<int>(visited_.size()) - 1;
   RigCalibration drive;
   drive.num_keyframes = num_steps + 1;
   for (const CameraOutlook& camera : outlook->cameras) {
@@ -207,7 +207,7 @@ void CalibrationCoach::judge(DriveOutlook* outlook) const {
       continue;
     }
     missing.push_back(describeFailure(camera.name, hand_eye, drive));
-    shares.push_back(0.0);
+    fulfilled.push_back(0.0);
   }
   std::pair<double, const char*> turns[] = {{left_turn_rad_, "left"}, {right_turn_rad_, "right"}};
   if (right_turn_rad_ < left_turn_rad_) {
@@ -224,15 +224,15 @@ void CalibrationCoach::judge(DriveOutlook* outlook) const {
                       " m more");
   }
   if (revisited_m_ < options_.enough_revisited_m) {
-    missing.push_back(
-        "revisit a place" +
-        (places_.empty() ? ""
-                         : ": the start of the drive is " + directionTo(places_.back().odom_from_vehicle,
-                                                                        places_.front().odom_from_vehicle)));
-    shares.push_back(revisited_m_ / options_.enough_revisited_m);
+    missing.push_back("revisit a place" + (visited_.empty()
+                                               ? ""
+                                               : ": the start of the drive is " +
+                                                     directionTo(visited_.back().odom_from_vehicle,
+                                                                 visited_.front().odom_from_vehicle)));
+    fulfilled.push_back(revisited_m_ / options_.enough_revisited_m);
   }
-  judgeSigmas(outlook, &shares);
-  outlook->progress = std::clamp(*std::min_element(shares.begin(), shares.end()), 0.0, 1.0);
+  judgeSigmas(outlook, &fulfilled);
+  outlook->progress = std::clamp(*std::min_element(fulfilled.begin(), fulfilled.end()), 0.0, 1.0);
   outlook->next = missing.empty() ? "you can stop now" : missing.front();
 }
 

@@ -14,7 +14,7 @@ namespace {
 constexpr double kDegree = 0.017453292519943295;
 constexpr double kStep_m = 0.5;
 
-RigidTransform truePlace() {
+RigidTransform trueExtrinsics() {
   return RigidTransform(rotationFromYawPitchRoll(1.4, 0.3, -1.9), Eigen::Vector3d(1.9, 0.95, 0.0));
 }
 
@@ -36,8 +36,8 @@ class CoachedDrive {
       const int steps = static_cast<int>(std::lround(piece.length_m / kStep_m));
       for (int i = 0; i < steps; ++i) {
         // The curvature varies: circles of one radius do not determine the position.
-        const double share = 1.0 - std::cos(2.0 * M_PI * (i + 0.5) / steps);
-        step(share * piece.turn_rad / steps);
+        const double weight = 1.0 - std::cos(2.0 * M_PI * (i + 0.5) / steps);
+        step(weight * piece.turn_rad / steps);
       }
     }
   }
@@ -61,7 +61,7 @@ class CoachedDrive {
     if (!sees) {
       return;
     }
-    const RigidTransform camera = truePlace().inverse() * motion * truePlace();
+    const RigidTransform camera = trueExtrinsics().inverse() * motion * trueExtrinsics();
     MotionPair pair;
     pair.keyframe = static_cast<int32_t>(coach_.numKeyframes()) - 2;
     pair.vehicle = RigidTransform::planar(motion.translation().x(), odometer_sign * motion.translation().y(),
@@ -190,9 +190,9 @@ Eigen::Matrix<double, 6, 1> meanSquaredError(double common_error_rad, int num_dr
     const CameraOutlook camera = drive.outlook().cameras[0];
     EXPECT_EQ(camera.hand_eye.status, HandEyeStatus::kOk);
     Eigen::Matrix<double, 6, 1> error;
-    error << camera.hand_eye.vehicle_from_camera.translation() - truePlace().translation(),
+    error << camera.hand_eye.vehicle_from_camera.translation() - trueExtrinsics().translation(),
         vectorFromRotation(camera.hand_eye.vehicle_from_camera.rotation() *
-                           truePlace().rotation().conjugate());
+                           trueExtrinsics().rotation().conjugate());
     sum += error.cwiseQuotient(camera.sigma).cwiseAbs2();
   }
   return sum / num_drives;

@@ -24,27 +24,27 @@ std::vector<std::string> namesOf(const CameraRig& rig) {
   return names;
 }
 
-CameraRig guessOf(const CameraRig& rig, const DriveOutlook& outlook) {
-  CameraRig guess = rig;
-  for (size_t i = 0; i < guess.cameras.size(); ++i) {
+CameraRig initialRig(const CameraRig& rig, const DriveOutlook& outlook) {
+  CameraRig initial_rig = rig;
+  for (size_t i = 0; i < initial_rig.cameras.size(); ++i) {
     const HandEye& hand_eye = outlook.cameras[i].hand_eye;
-    guess.cameras[i].covariance.reset();
-    guess.cameras[i].vehicle_from_camera.reset();
+    initial_rig.cameras[i].covariance.reset();
+    initial_rig.cameras[i].vehicle_from_camera.reset();
     if (hand_eye.status == HandEyeStatus::kOk) {
-      guess.cameras[i].vehicle_from_camera = hand_eye.vehicle_from_camera;
+      initial_rig.cameras[i].vehicle_from_camera = hand_eye.vehicle_from_camera;
     }
   }
-  return guess;
+  return initial_rig;
 }
 
 std::vector<std::pair<std::string, int64_t>> countsOf(const ReconstructionState& state) {
   const ReconstructionReport& report = state.report;
-  return {{"frames", report.num_frames},
+  return {{"frames", report.counters.frames},
           {"keyframes", static_cast<int64_t>(state.data.keyframes.size())},
-          {"frames that lack a camera", report.num_incomplete_frames},
-          {"frames without odometry", report.num_frames_without_odometry},
+          {"frames that lack a camera", report.counters.incomplete_frames},
+          {"frames without odometry", report.counters.frames_without_odometry},
           {"standing frames", report.num_standing_frames},
-          {"late images", report.num_late_images}};
+          {"late images", report.counters.numLateImages()}};
 }
 
 std::string describe(const RigCalibration& result) {
@@ -156,7 +156,7 @@ void RigCalibrationSession::updateOutlook() {
   Follower& follower = *follower_;
   follower.updateOutlook();
   const ReconstructionState& state = follower.calibrator.state();
-  on_drive_(state, guessOf(*rig_, follower.outlook));
+  on_drive_(state, initialRig(*rig_, follower.outlook));
   tell([&](Status* status) {
     status->outlook = follower.outlook;
     if (status->phase == Phase::kFailed) {

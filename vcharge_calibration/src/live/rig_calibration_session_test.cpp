@@ -41,7 +41,7 @@ class RigCalibrationSessionTest : public testing::Test {
     return std::make_unique<RigCalibrationSession>(
         oneCamera(), RigCalibratorOptions(), options,
         [this](const RigCalibrationSession::Status& /*status*/) { ++num_told_; },
-        [](const ReconstructionState& /*state*/, const CameraRig& /*guess*/) {},
+        [](const ReconstructionState& /*state*/, const CameraRig& /*initial_rig*/) {},
         [this](const FinishedCalibration& work) { on_result_(work); });
   }
 

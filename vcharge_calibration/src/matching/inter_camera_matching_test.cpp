@@ -50,9 +50,9 @@ TEST(InterCameraMatchingTest, FindsLandmarksWithAnInaccurateRig) {
   WallScene scene;
   const auto truth = scene.data.rig;
   auto wrong = std::make_shared<CameraRig>(*truth);
-  const RigidTransform& place = *wrong->cameras[1].vehicle_from_camera;
-  wrong->cameras[1].vehicle_from_camera =
-      RigidTransform(rotationFromVector({0.0, 0.004, 0.008}) * place.rotation(), place.translation());
+  const RigidTransform& extrinsics = *wrong->cameras[1].vehicle_from_camera;
+  wrong->cameras[1].vehicle_from_camera = RigidTransform(
+      rotationFromVector({0.0, 0.004, 0.008}) * extrinsics.rotation(), extrinsics.translation());
   scene.data.rig = wrong;
   EXPECT_GT(matchBetweenCameras(makeOptions(), scene.images, &scene.data), 50);
   scene.data.rig = truth;

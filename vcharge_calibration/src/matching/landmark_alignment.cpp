@@ -127,11 +127,11 @@ class LandmarkAlignment {
       }
       const std::optional<Eigen::Matrix2d> shape =
           expectedShape(*data_.tracks[track].position_m, *patch.source, *seen);
-      const auto place =
+      const auto aligned =
           shape ? alignPatch(patch.image, image, patch.anchor_px, {seen->position_px, *shape}, patch_options_)
                 : std::nullopt;
-      if (place && (place->position_px - seen->position_px).norm() <= kMaxShift_px) {
-        seen->position_px = place->position_px;
+      if (aligned && (aligned->position_px - seen->position_px).norm() <= kMaxShift_px) {
+        seen->position_px = aligned->position_px;
         seen->sigma_px = options_.sigma_px;
         ++num_aligned;
       } else {

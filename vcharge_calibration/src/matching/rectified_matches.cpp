@@ -82,8 +82,8 @@ std::optional<ViewMatch> matchOf(const ReconstructionData& data, const CameraPai
 }
 
 /// Number of common landmarks of two cameras, by keyframes with images.
-std::map<CameraPair, std::map<KeyframePair, int>> countShared(const ReconstructionData& data,
-                                                              const KeyframeImages& images) {
+std::map<CameraPair, std::map<KeyframePair, int>> countCommonLandmarks(const ReconstructionData& data,
+                                                                       const KeyframeImages& images) {
   std::vector<bool> has_image(data.keyframes.size(), false);
   for (const int32_t keyframe : images.keyframes()) {
     has_image[static_cast<size_t>(keyframe)] = true;
@@ -124,7 +124,7 @@ cv::Mat viewOf(const ReconstructionData& data, const KeyframeImages& images, int
 std::vector<CameraPairView> findCameraPairViews(const ReconstructionData& data,
                                                 const KeyframeImages& images) {
   std::vector<CameraPairView> found;
-  for (const auto& [cameras, by_keyframes] : countShared(data, images)) {
+  for (const auto& [cameras, by_keyframes] : countCommonLandmarks(data, images)) {
     std::vector<std::pair<KeyframePair, int>> candidates(by_keyframes.begin(), by_keyframes.end());
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const auto& a, const auto& b) { return a.second > b.second; });

@@ -18,7 +18,7 @@ inline constexpr double kMetresPerTexel = 0.01;
 inline constexpr int kKeyframes = 3;
 
 inline RigCamera makeWallCamera(const std::string& name, double yaw_rad, double side_m) {
-  return makeFisheyeCamera(name, 250.0, placeCamera(yaw_rad, 0.0, 0.0, {0.0, side_m, 1.0}));
+  return makeFisheyeCamera(name, 250.0, makeExtrinsics(yaw_rad, 0.0, 0.0, {0.0, side_m, 1.0}));
 }
 
 /// A vehicle that approaches a wall, cameras that look half to the left and half to the right, and landmarks

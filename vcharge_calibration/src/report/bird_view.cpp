@@ -24,29 +24,30 @@ Eigen::Vector3d axisOf(const RigCamera& camera) {
 }
 
 /// Projections of points in the vehicle's frame to a camera.
-struct Sight {
+struct Projection {
   Eigen::Matrix2Xd pixels;
   std::vector<uint8_t> valid;
   Eigen::RowVectorXd cosines;  ///< cosines of the angles to the camera's axis
 };
 
-Sight lookAt(const RigCamera& camera, const Eigen::Matrix3Xd& points) {
-  Sight sight;
+Projection projectTo(const RigCamera& camera, const Eigen::Matrix3Xd& points) {
+  Projection projection;
   const RigidTransform camera_from_vehicle = camera.vehicle_from_camera->inverse();
   const Eigen::Matrix3Xd in_camera =
       (camera_from_vehicle.rotationMatrix() * points).colwise() + camera_from_vehicle.translation();
-  camera.model.project(in_camera, &sight.pixels, &sight.valid);
-  sight.cosines = in_camera.row(2).cwiseQuotient(in_camera.colwise().norm());
+  camera.model.project(in_camera, &projection.pixels, &projection.valid);
+  projection.cosines = in_camera.row(2).cwiseQuotient(in_camera.colwise().norm());
   const double least_cosine = std::cos(0.5 * camera.field_of_view_rad);
   for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    const cv::Point at(static_cast<int>(std::lround(sight.pixels(0, i))),
-                       static_cast<int>(std::lround(sight.pixels(1, i))));
-    const bool is_seen = sight.valid[static_cast<size_t>(i)] != 0 && sight.cosines[i] > least_cosine &&
+    const cv::Point at(static_cast<int>(std::lround(projection.pixels(0, i))),
+                       static_cast<int>(std::lround(projection.pixels(1, i))));
+    const bool is_seen = projection.valid[static_cast<size_t>(i)] != 0 &&
+                         projection.cosines[i] > least_cosine &&
                          cv::Rect(cv::Point(), camera.image_size_px).contains(at) &&
                          (camera.mask.empty() || camera.mask.at<uint8_t>(at) != 0);
-    sight.valid[static_cast<size_t>(i)] = is_seen ? 1 : 0;
+    projection.valid[static_cast<size_t>(i)] = is_seen ? 1 : 0;
   }
-  return sight;
+  return projection;
 }
 
 /// The gray level at a pixel of the full image, read from a copy that may be smaller.
@@ -121,13 +122,13 @@ cv::Mat makeBirdView(const CameraRig& rig, const std::vector<cv::Mat>& images, c
     if (images[camera].empty()) {
       continue;
     }
-    const Sight sight = lookAt(rig.cameras[camera], points);
+    const Projection projection = projectTo(rig.cameras[camera], points);
     for (Eigen::Index i = 0; i < points.cols(); ++i) {
-      if (sight.valid[static_cast<size_t>(i)] != 0 && sight.cosines[i] > best[i]) {
-        best[i] = sight.cosines[i];
+      if (projection.valid[static_cast<size_t>(i)] != 0 && projection.cosines[i] > best[i]) {
+        best[i] = projection.cosines[i];
         const int row = static_cast<int>(i / columns), column = static_cast<int>(i % columns);
         view.at<cv::Vec3b>(row, column) =
-            cv::Vec3b::all(sample(images[camera], rig.cameras[camera], sight.pixels.col(i)));
+            cv::Vec3b::all(sample(images[camera], rig.cameras[camera], projection.pixels.col(i)));
         owner.at<int8_t>(row, column) = static_cast<int8_t>(camera);
       }
     }
@@ -169,7 +170,7 @@ std::vector<SeamPoint> seamPoints(const CameraRig& rig, const CameraRig* before,
       point.distance_m = distance_m;
       point.ground_m = middle + distance_m * (along_a + along_b).normalized();
       const Eigen::Vector3d ground = onGround(point.ground_m);
-      point.is_seen = lookAt(a, ground).valid[0] != 0 && lookAt(b, ground).valid[0] != 0;
+      point.is_seen = projectTo(a, ground).valid[0] != 0 && projectTo(b, ground).valid[0] != 0;
       if (a.covariance && b.covariance) {
         const Eigen::Matrix2d sum = groundCovariance(*a.vehicle_from_camera, *a.covariance, point.ground_m) +
                                     groundCovariance(*b.vehicle_from_camera, *b.covariance, point.ground_m);

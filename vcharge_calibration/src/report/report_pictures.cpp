@@ -30,8 +30,8 @@ std::string svg(cv::Size size, const std::string& content) {
 }
 
 // Colour scale from white through yellow to red.
-std::string heatColour(double share) {
-  const double s = std::clamp(share, 0.0, 1.0);
+std::string heatColour(double fraction) {
+  const double s = std::clamp(fraction, 0.0, 1.0);
   const int green = static_cast<int>(std::lround(255.0 - 190.0 * s * s));
   const int blue = static_cast<int>(std::lround(std::max(40.0, 225.0 - 400.0 * s)));
   return "rgb(255," + std::to_string(green) + "," + std::to_string(blue) + ")";

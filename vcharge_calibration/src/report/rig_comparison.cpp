@@ -10,7 +10,7 @@ namespace {
 /// 99.7 % quantile of the chi-square distribution with 6 degrees of freedom.
 constexpr double kSignificantChiSquare = 19.8;
 
-const RigidTransform& placeOf(const RigCamera& camera, const char* which) {
+const RigidTransform& extrinsicsOf(const RigCamera& camera, const char* which) {
   if (!camera.vehicle_from_camera) {
     throw InputError(std::string(which) + " rig: cameras." + camera.name + ": expected vehicle_from_camera");
   }
@@ -30,7 +30,8 @@ RigComparison compareRigs(const CameraRig& first, const CameraRig& second) {
     const RigCamera& other = second.cameras[index];
     CameraDifference of_camera;
     of_camera.name = camera.name;
-    of_camera.difference << placeOf(other, "second").translation() - placeOf(camera, "first").translation(),
+    of_camera.difference << extrinsicsOf(other, "second").translation() -
+                                extrinsicsOf(camera, "first").translation(),
         vectorFromRotation(other.vehicle_from_camera->rotation() *
                            camera.vehicle_from_camera->rotation().conjugate());
     Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();

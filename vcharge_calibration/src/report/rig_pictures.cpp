@@ -86,10 +86,10 @@ std::string drawCameras(const CameraRig& rig) {
   const Points corners{{-1.5, -1.8}, {4.5, 1.8}};
   Points ends = corners;
   for (const RigCamera& camera : rig.cameras) {
-    const Eigen::Vector2d place = camera.vehicle_from_camera->translation().head<2>();
-    ends.push_back(place);
+    const Eigen::Vector2d position_m = camera.vehicle_from_camera->translation().head<2>();
+    ends.push_back(position_m);
     ends.emplace_back(
-        place + kAxis_m * (camera.vehicle_from_camera->rotation() * Eigen::Vector3d::UnitZ()).head<2>());
+        position_m + kAxis_m * (camera.vehicle_from_camera->rotation() * Eigen::Vector3d::UnitZ()).head<2>());
   }
   SvgPlot plot = plotAround(ends, 0.0);
   for (size_t i = 0; i < rig.cameras.size(); ++i) {
@@ -156,8 +156,8 @@ std::string drawLandmarkViews(const std::vector<LandmarkViews>& landmarks,
                               const std::vector<Eigen::Vector3d>& path_m,
                               const std::vector<std::string>& camera_names) {
   Points path;
-  for (const Eigen::Vector3d& place : path_m) {
-    path.emplace_back(place.head<2>());
+  for (const Eigen::Vector3d& position_m : path_m) {
+    path.emplace_back(position_m.head<2>());
   }
   SvgPlot plot = plotAround(path, kMargin_m);
   std::map<size_t, Segments> lines;

@@ -26,12 +26,12 @@ const cv::Size kImageSize_px(640, 400);
 /// Four fisheye cameras around a car.
 std::shared_ptr<CameraRig> makeRig() {
   auto rig = std::make_shared<CameraRig>();
-  const std::pair<const char*, Eigen::Vector3d> places[] = {{"front", {3.6, 0.0, 0.7}},
-                                                            {"left", {1.9, 1.0, 0.9}},
-                                                            {"rear", {-0.9, 0.0, 0.8}},
-                                                            {"right", {1.9, -1.0, 0.9}}};
+  const std::pair<const char*, Eigen::Vector3d> positions[] = {{"front", {3.6, 0.0, 0.7}},
+                                                               {"left", {1.9, 1.0, 0.9}},
+                                                               {"rear", {-0.9, 0.0, 0.8}},
+                                                               {"right", {1.9, -1.0, 0.9}}};
   double yaw_rad = 0.0;
-  for (const auto& [name, place_m] : places) {
+  for (const auto& [name, position_m] : positions) {
     rig->cameras.push_back({name,
                             std::string("camera_") + name + "_optical",
                             kImageSize_px,
@@ -39,7 +39,7 @@ std::shared_ptr<CameraRig> makeRig() {
                             3.0,
                             "",
                             {},
-                            placeCamera(yaw_rad, 0.5, 0.0, place_m),
+                            makeExtrinsics(yaw_rad, 0.5, 0.0, position_m),
                             {}});
     yaw_rad += kRightAngle_rad;
   }
@@ -118,16 +118,16 @@ TEST(BirdViewTest, ProjectsTheGround) {
 }
 
 TEST(BirdViewTest, PropagatesTheCovarianceToTheGround) {
-  const RigidTransform place = placeCamera(0.7, 0.4, 0.0, {1.9, 0.9, 0.9});
+  const RigidTransform vehicle_from_camera = makeExtrinsics(0.7, 0.4, 0.0, {1.9, 0.9, 0.9});
   const Eigen::Vector2d ground(4.0, 5.0);
-  const Eigen::Vector3d ray_in_camera = place.inverse() * Eigen::Vector3d(4.0, 5.0, 0.0);
+  const Eigen::Vector3d ray_in_camera = vehicle_from_camera.inverse() * Eigen::Vector3d(4.0, 5.0, 0.0);
   constexpr double kStep = 1e-6;
   Eigen::Matrix<double, 2, 6> numeric;
   for (int i = 0; i < 6; ++i) {
     Eigen::Matrix<double, 6, 1> step = Eigen::Matrix<double, 6, 1>::Zero();
     step[i] = kStep;
-    const RigidTransform moved(rotationFromVector(step.tail<3>()) * place.rotation(),
-                               place.translation() + step.head<3>());
+    const RigidTransform moved(rotationFromVector(step.tail<3>()) * vehicle_from_camera.rotation(),
+                               vehicle_from_camera.translation() + step.head<3>());
     const Eigen::Vector3d ray = moved.rotation() * ray_in_camera;
     const Eigen::Vector3d there = moved.translation() - moved.translation().z() / ray.z() * ray;
     numeric.col(i) = (there.head<2>() - ground) / kStep;
@@ -140,7 +140,8 @@ TEST(BirdViewTest, PropagatesTheCovarianceToTheGround) {
   }
   const Eigen::Matrix<double, 6, 6> covariance = root * root.transpose();
   const Eigen::Matrix2d expected = numeric * covariance * numeric.transpose();
-  EXPECT_LT((groundCovariance(place, covariance, ground) - expected).norm(), 1e-4 * expected.norm());
+  EXPECT_LT((groundCovariance(vehicle_from_camera, covariance, ground) - expected).norm(),
+            1e-4 * expected.norm());
 }
 
 TEST(BirdViewTest, SeamsAreBetweenNeighboursAndGrowWithDistance) {

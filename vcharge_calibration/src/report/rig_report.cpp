@@ -90,7 +90,7 @@ std::string checksOf(const RigCalibration& result) {
   for (const CameraCalibration& camera : result.cameras) {
     text += rowOf({camera.name, std::to_string(camera.num_tracked), std::to_string(camera.num_observations),
                    toText(camera.rms_px, 3), toText(camera.structure_px, 3),
-                   std::to_string(camera.num_shared_landmarks),
+                   std::to_string(camera.num_common_landmarks),
                    toText(100.0 * camera.half_difference.head<3>().norm(), 2),
                    toText(kDegrees * camera.half_difference.tail<3>().norm(), 3),
                    toText(camera.inflation.maxCoeff(), 1)});
@@ -125,9 +125,10 @@ std::string seamsOf(const RigCalibration& result, const KeyframeImages& images) 
     }
     std::string figures;
     if (before != nullptr) {
-      figures += htmlFigure(embedPicture(makeBirdView(*before, shown, BirdViewArea()), kPictureWidth_px),
-                            "Before: by the first guess. Lines mark the seams between cameras; with correct "
-                            "extrinsics road markings continue across them.");
+      figures +=
+          htmlFigure(embedPicture(makeBirdView(*before, shown, BirdViewArea()), kPictureWidth_px),
+                     "Before: by the initial estimate. Lines mark the seams between cameras; with correct "
+                     "extrinsics road markings continue across them.");
     }
     text += row(figures + htmlFigure(embedPicture(makeBirdView(rig, shown, BirdViewArea()), kPictureWidth_px),
                                      "After: by the calibrated rig. The vehicle drives upwards."));
@@ -136,7 +137,7 @@ std::string seamsOf(const RigCalibration& result, const KeyframeImages& images) 
       "<p>Distance between the projections of a ground point half way between two neighbouring cameras: "
       "\u00b1 one standard deviation after the calibration, for independent errors (an upper bound, since "
       "those "
-      "of height and tilt are largely common); in brackets, the distance by the first guess.</p><table>";
+      "of height and tilt are largely common); in brackets, the distance by the initial estimate.</p><table>";
   std::vector<std::string> head{"cameras"};
   for (const double distance_m : kSeamDistances_m) {
     head.push_back("at " + toText(distance_m, 0) + " m (cm)");
@@ -161,7 +162,7 @@ std::string seamsOf(const RigCalibration& result, const KeyframeImages& images) 
   return text + "</table>";
 }
 
-std::string sharedOf(const ReconstructionState& state, const KeyframeImages& images) {
+std::string commonLandmarksOf(const ReconstructionState& state, const KeyframeImages& images) {
   std::string text;
   for (const CameraPairView& pair : findCameraPairViews(state.data, images)) {
     const auto nameOf = [&](size_t camera, int32_t keyframe) {
@@ -209,7 +210,7 @@ std::string makeRigReport(const std::string& title, const RigCalibration& result
   if (state.data.rig != nullptr && state.data.rig->hasExtrinsics() && !state.data.keyframes.empty()) {
     body += mapsOf(result, state);
     body += result.rig != nullptr ? seamsOf(result, images) : "";
-    body += sharedOf(state, images) + errorsOf(state);
+    body += commonLandmarksOf(state, images) + errorsOf(state);
   }
   if (!state.data.keyframes.empty() && !result.is_from_map) {
     body += "<h2>Loops</h2>" + row(htmlFigure(drawLoopGraph(state), "Loop edges on the vehicle's path."));

@@ -21,8 +21,8 @@ constexpr double kDegree = 0.017453292519943295;
 constexpr double kNoise_px = 0.3;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-RigCamera makeCamera(const std::string& name, double yaw_rad, const Eigen::Vector3d& place_m) {
-  return makeFisheyeCamera(name, 200.0, placeCamera(yaw_rad, 0.35, 0.0, place_m));
+RigCamera makeCamera(const std::string& name, double yaw_rad, const Eigen::Vector3d& position_m) {
+  return makeFisheyeCamera(name, 200.0, makeExtrinsics(yaw_rad, 0.35, 0.0, position_m));
 }
 
 /// Keyframes 0.5 m apart along a figure of eight of circles of 6 m.
@@ -99,20 +99,20 @@ void disturbRig(ReconstructionData* data) {
   auto rig = std::make_shared<CameraRig>(*data->rig);
   for (size_t i = 0; i < rig->cameras.size(); ++i) {
     const double sign = i == 0 ? 1.0 : -1.0;
-    const RigidTransform& place = *rig->cameras[i].vehicle_from_camera;
-    rig->cameras[i].vehicle_from_camera =
-        RigidTransform(rotationFromVector(sign * Eigen::Vector3d(0.008, -0.006, 0.01)) * place.rotation(),
-                       place.translation() + sign * Eigen::Vector3d(0.05, -0.04, 0.03));
+    const RigidTransform& extrinsics = *rig->cameras[i].vehicle_from_camera;
+    rig->cameras[i].vehicle_from_camera = RigidTransform(
+        rotationFromVector(sign * Eigen::Vector3d(0.008, -0.006, 0.01)) * extrinsics.rotation(),
+        extrinsics.translation() + sign * Eigen::Vector3d(0.05, -0.04, 0.03));
   }
   data->rig = rig;
 }
 
 Vector6d errorOf(const CameraRig& rig, const CameraRig& truth, size_t camera) {
   const RigidTransform& found = *rig.cameras[camera].vehicle_from_camera;
-  const RigidTransform& place = *truth.cameras[camera].vehicle_from_camera;
+  const RigidTransform& extrinsics = *truth.cameras[camera].vehicle_from_camera;
   Vector6d error;
-  error << found.translation() - place.translation(),
-      vectorFromRotation(found.rotation() * place.rotation().conjugate());
+  error << found.translation() - extrinsics.translation(),
+      vectorFromRotation(found.rotation() * extrinsics.rotation().conjugate());
   return error;
 }
 
@@ -201,9 +201,10 @@ TEST(OdometryNoiseTest, DetectsSlippingWheels) {
 TEST(GroundTest, FindsTheHeightOfACameraPutAtZero) {
   ReconstructionData data = makeDrive(4, 0.0);
   auto rig = std::make_shared<CameraRig>(*data.rig);
-  const RigidTransform& place = *rig->cameras[1].vehicle_from_camera;
-  rig->cameras[1].vehicle_from_camera = RigidTransform(
-      place.rotation(), Eigen::Vector3d(place.translation().x(), place.translation().y(), 0.0));
+  const RigidTransform& extrinsics = *rig->cameras[1].vehicle_from_camera;
+  rig->cameras[1].vehicle_from_camera =
+      RigidTransform(extrinsics.rotation(),
+                     Eigen::Vector3d(extrinsics.translation().x(), extrinsics.translation().y(), 0.0));
   data.rig = rig;
   for (Track& track : data.tracks) {
     if (track.position_m) {

@@ -22,7 +22,7 @@ std::string tableRow(const std::string& name, const Eigen::Matrix<double, 6, 1>&
 std::string describeCamera(const CameraCalibration& camera, const RigidTransform& vehicle_from_camera) {
   char counts[64];
   std::snprintf(counts, sizeof(counts), "   %8lld %8lld", static_cast<long long>(camera.num_observations),
-                static_cast<long long>(camera.num_shared_landmarks));
+                static_cast<long long>(camera.num_common_landmarks));
   std::string text = tableRow(camera.name, positionAndAngles(vehicle_from_camera)) + counts + "\n" +
                      tableRow("  +-", positionAndAngleSigmas(camera.covariance)) +
                      "   about z, y, x of the vehicle\n";

@@ -88,7 +88,7 @@ void countObservations(const ReconstructionData& data, RigCalibration* result) {
       }
     }
     for (const int32_t camera : cameras) {
-      result->cameras[camera].num_shared_landmarks += cameras.size() > 1 ? 1 : 0;
+      result->cameras[camera].num_common_landmarks += cameras.size() > 1 ? 1 : 0;
     }
   }
   for (size_t i = 0; i < statistics.size(); ++i) {

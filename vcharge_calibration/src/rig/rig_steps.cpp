@@ -83,7 +83,7 @@ class RigSteps {
     }
     std::shared_ptr<const CameraRig> rig;
     try {
-      rig = guessRig(series_, options_.hand_eye, motions, state_, &result_);
+      rig = estimateInitialRig(series_, options_.hand_eye, motions, state_, &result_);
     } catch (const NotCalibrated&) {
       findUpDirections(motions);
       throw;

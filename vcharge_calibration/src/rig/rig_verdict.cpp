@@ -22,7 +22,7 @@ constexpr double kWarnFit = 0.75, kFailFit = 0.65;
 constexpr double kMinTurn_rad = 90.0 / kDegrees;
 constexpr double kMinDistance_m = 50.0;
 constexpr double kWarnOffset_s = 0.01, kFailOffset_s = 0.3;
-constexpr int64_t kMinShared = 20;
+constexpr int64_t kMinCommonLandmarks = 20;
 
 class RigJudge {
  public:
@@ -107,16 +107,17 @@ class RigJudge {
                  " % of them): wrong intrinsics. Calibrate the intrinsics again");
     }
     // A map connects the cameras even without common landmarks.
-    if (camera.num_shared_landmarks < kMinShared && result_->cameras.size() > 1 && !result_->is_from_map) {
+    if (camera.num_common_landmarks < kMinCommonLandmarks && result_->cameras.size() > 1 &&
+        !result_->is_from_map) {
       remark(Verdict::kWarn, "camera '" + camera.name + "' shares only " +
-                                 std::to_string(camera.num_shared_landmarks) +
+                                 std::to_string(camera.num_common_landmarks) +
                                  " landmarks with other cameras: revisit places in both directions");
     }
   }
 
   /// With wrong intrinsics few observations fit; the error of these is small because the others were removed.
   void judgeFit() {
-    const auto shareOf = [](const CameraCalibration& camera) {
+    const auto fittingRatio = [](const CameraCalibration& camera) {
       return static_cast<double>(camera.num_observations) /
              std::max(1.0, static_cast<double>(camera.num_tracked));
     };
@@ -124,7 +125,7 @@ class RigJudge {
       std::vector<double> others;
       for (const CameraCalibration& other : result_->cameras) {
         if (&other != &camera) {
-          others.push_back(shareOf(other));
+          others.push_back(fittingRatio(other));
         }
       }
       if (others.size() < 2) {
@@ -132,7 +133,7 @@ class RigJudge {
       }
       std::sort(others.begin(), others.end());
       const double usual = others[others.size() / 2];
-      const double ratio = shareOf(camera);
+      const double ratio = fittingRatio(camera);
       if (ratio < kWarnFit * usual) {
         remark(ratio < kFailFit * usual ? Verdict::kFail : Verdict::kWarn,
                "camera '" + camera.name + "': only " + toText(100.0 * ratio / usual, 0) +

@@ -16,7 +16,7 @@ RigCalibration makeGood() {
     CameraCalibration camera;
     camera.name = name;
     camera.covariance.diagonal() << 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7;
-    camera.num_shared_landmarks = 500;
+    camera.num_common_landmarks = 500;
     camera.num_tracked = camera.num_observations = 10000;
     camera.rms_px = 0.5;
     camera.structure_px = 0.03;
@@ -71,7 +71,7 @@ TEST(RigVerdictTest, NamesTheMissingManoeuvre) {
   EXPECT_EQ(verdict, Verdict::kWarn);
   expectRemark(judge([](RigCalibration* r) { r->num_loop_edges = 0; }, &verdict), "no loop was closed");
   expectRemark(judge([](RigCalibration* r) { r->distance_m = 20.0; }, &verdict), "drive 100 m or more");
-  expectRemark(judge([](RigCalibration* r) { r->cameras[0].num_shared_landmarks = 0; }, &verdict),
+  expectRemark(judge([](RigCalibration* r) { r->cameras[0].num_common_landmarks = 0; }, &verdict),
                "camera 'front' shares only 0 landmarks");
 }
 
@@ -97,7 +97,7 @@ TEST(WrongSignTest, FollowsFromNamesAndFromUpsideDownCameras) {
     for (const auto& [name, yaw_rad] : {std::make_pair("front", 0.0), std::make_pair("left", 1.57)}) {
       RigCamera camera{name, name, cv::Size(640, 400), KannalaBrandtCamera(parameters)};
       camera.vehicle_from_camera =
-          vehicle_from_wrong * placeCamera(yaw_rad, 0.3, 0.0, Eigen::Vector3d::Zero());
+          vehicle_from_wrong * makeExtrinsics(yaw_rad, 0.3, 0.0, Eigen::Vector3d::Zero());
       rig.cameras.push_back(camera);
     }
     return rig;

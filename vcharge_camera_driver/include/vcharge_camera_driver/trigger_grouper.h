@@ -3,7 +3,6 @@
 #include <deque>
 #include <memory>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "vcharge_camera_driver/frame_source.h"
@@ -67,16 +66,23 @@ class TriggerGrouper {
     int consistent = 0;
     TriggerCameraCounts counts;
   };
-  /// Returns true if the frame may be grouped.
+  struct Arrival {
+    Timestamp time, stamp;
+  };
+  struct StampSpan {
+    Timestamp earliest, latest;
+  };
+  /// Counts the frame; returns true if the camera's numbers and stamps have agreed for long enough.
   bool align(const CapturedFrame& frame);
-  void collect(Groups groups, Groups* ready);
+  /// Appends groups to `ready` and counts the images that they lack.
+  void takeGroups(Groups groups, Groups* ready);
 
   const TriggerGrouperOptions options_;
-  const Duration period_, tolerance_;
+  const Duration tolerance_;  // half a period
   MultiFrameSynchronizer synchronizer_;
   std::vector<Camera> cameras_;
-  std::deque<std::pair<Timestamp, Timestamp>> arrivals_;  // pairs of arrival time and stamp
-  std::deque<std::pair<Timestamp, Timestamp>> spans_;     // earliest and latest stamp of recent pulses
+  std::deque<Arrival> arrivals_;  // frames of groups that are not complete
+  std::deque<StampSpan> spans_;   // one per recent pulse
   uint64_t num_spreads_ = 0;
   double sum_spread_s_ = 0.0;
   double max_spread_s_ = 0.0;

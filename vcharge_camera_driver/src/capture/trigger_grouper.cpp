@@ -12,7 +12,8 @@ namespace {
 constexpr double kToleranceInPeriods = 0.5;
 // Over more pulses, a small deviation from the nominal rate could cause a miscount.
 constexpr int64_t kMaxPulsesBetweenFrames = 100;
-constexpr size_t kRecentSpans = 16;
+// Pulses whose frames may still arrive; the spread of older ones is final.
+constexpr size_t kMaxOpenPulses = 16;
 
 MultiFrameSynchronizerOptions synchronizerOptions(const TriggerGrouperOptions& options) {
   options.validate();
@@ -26,7 +27,6 @@ MultiFrameSynchronizerOptions synchronizerOptions(const TriggerGrouperOptions& o
 
 TriggerGrouper::TriggerGrouper(size_t num_cameras, const TriggerGrouperOptions& options)
     : options_(options),
-      period_(durationFromSeconds(1.0 / options.frame_rate_hz)),
       tolerance_(durationFromSeconds(kToleranceInPeriods / options.frame_rate_hz)),
       synchronizer_(num_cameras, synchronizerOptions(options)),
       cameras_(num_cameras) {}
@@ -54,7 +54,7 @@ bool TriggerGrouper::align(const CapturedFrame& frame) {
   return camera.counts.aligned;
 }
 
-void TriggerGrouper::collect(Groups groups, Groups* ready) {
+void TriggerGrouper::takeGroups(Groups groups, Groups* ready) {
   for (std::shared_ptr<const MultiFrame>& group : groups) {
     for (size_t i = 0; i < cameras_.size(); ++i) {
       cameras_[i].counts.missing += group->images[i].pixels.empty() ? 1 : 0;
@@ -69,30 +69,30 @@ TriggerGrouper::Groups TriggerGrouper::add(const CapturedFrame& frame, Timestamp
   if (!align(frame)) {
     return ready;
   }
-  const auto span = std::find_if(spans_.begin(), spans_.end(), [&](const auto& each) {
-    return std::chrono::abs(each.first - frame.stamp) <= tolerance_;
+  const auto span = std::find_if(spans_.begin(), spans_.end(), [&](const StampSpan& each) {
+    return std::chrono::abs(each.earliest - frame.stamp) <= tolerance_;
   });
   if (span == spans_.end()) {
-    spans_.emplace_back(frame.stamp, frame.stamp);
-    if (spans_.size() > kRecentSpans) {
-      const double spread_s = toSeconds(spans_.front().second - spans_.front().first);
+    spans_.push_back({frame.stamp, frame.stamp});
+    if (spans_.size() > kMaxOpenPulses) {
+      const double spread_s = toSeconds(spans_.front().latest - spans_.front().earliest);
       max_spread_s_ = std::max(max_spread_s_, spread_s);
       sum_spread_s_ += spread_s;
       ++num_spreads_;
       spans_.pop_front();
     }
   } else {
-    span->first = std::min(span->first, frame.stamp);
-    span->second = std::max(span->second, frame.stamp);
+    span->earliest = std::min(span->earliest, frame.stamp);
+    span->latest = std::max(span->latest, frame.stamp);
   }
-  arrivals_.emplace_back(now, frame.stamp);
+  arrivals_.push_back({now, frame.stamp});
   const std::shared_ptr<const MultiFrame> complete =
       synchronizer_.add(frame.camera_index, frame.stamp, frame.image);
-  collect(synchronizer_.takeIncomplete(), &ready);
+  takeGroups(synchronizer_.takeIncomplete(), &ready);
   if (complete) {
     const Timestamp done = complete->stamp + tolerance_;
     arrivals_.erase(std::remove_if(arrivals_.begin(), arrivals_.end(),
-                                   [&](const auto& arrival) { return arrival.second <= done; }),
+                                   [&](const Arrival& arrival) { return arrival.stamp <= done; }),
                     arrivals_.end());
     ready.push_back(complete);
   }
@@ -101,11 +101,11 @@ TriggerGrouper::Groups TriggerGrouper::add(const CapturedFrame& frame, Timestamp
 
 TriggerGrouper::Groups TriggerGrouper::expire(Timestamp now) {
   Groups ready;
-  while (!arrivals_.empty() && arrivals_.front().first + tolerance_ <= now) {
-    synchronizer_.giveUpUntil(arrivals_.front().second);
+  while (!arrivals_.empty() && arrivals_.front().time + tolerance_ <= now) {
+    synchronizer_.giveUpUntil(arrivals_.front().stamp);
     arrivals_.pop_front();
   }
-  collect(synchronizer_.takeIncomplete(), &ready);
+  takeGroups(synchronizer_.takeIncomplete(), &ready);
   return ready;
 }
 
@@ -113,7 +113,7 @@ std::optional<Timestamp> TriggerGrouper::nextDeadline() const {
   if (arrivals_.empty()) {
     return std::nullopt;
   }
-  return arrivals_.front().first + tolerance_;
+  return arrivals_.front().time + tolerance_;
 }
 
 TriggerGrouperCounts TriggerGrouper::counts() const {

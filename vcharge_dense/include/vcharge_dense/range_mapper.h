@@ -122,7 +122,8 @@ class RangeMapper : public DriveConsumer {
   struct Camera;
 
   void process(const ImageFrame& frame);
-  void placeImage(Camera* camera, const ImageFrame& frame);
+  static void correctPoses(Camera* camera, const std::vector<CorrectedPose>& corrections);
+  void addImageWithPose(Camera* camera, const ImageFrame& frame);
   void startOver(DriveBreak drive_break);
   void addFrame(Camera* camera, const SweepImage& frame);
   void emitReferences(Camera* camera, bool drive_is_over);

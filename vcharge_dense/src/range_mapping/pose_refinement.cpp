@@ -18,8 +18,8 @@ const cv::Size kTrackWindow_px(15, 15);
 constexpr float kMaxReturnError_px = 0.5f;
 constexpr double kTrackNoise_px = 0.2;
 constexpr int kMinTracks = 30;
-// Initial guess of a track: where a point at this inverse range would be.
-constexpr double kGuess_per_m = 0.15;
+// Initial position of a track: where a point at this inverse range would be.
+constexpr double kInitialInverseRange_per_m = 0.15;
 // Rays closer to the direction of travel (sine of the angle) do not determine an epipolar plane.
 constexpr double kMinSine = 0.1;
 constexpr int kMaxSteps = 10;
@@ -79,11 +79,11 @@ PoseRefinement::Result PoseRefinement::refine(const cv::Mat& pixels,
   cv::buildOpticalFlowPyramid(pixels, pyramid, kTrackWindow_px, kPyramidLevels);
   std::vector<cv::Point2f> found(corners_), returned(corners_);
   for (size_t i = 0; i < corners_.size(); ++i) {
-    Eigen::Vector2d guess;
+    Eigen::Vector2d initial_px;
     if (camera_.project(neighbour_from_reference.rotation() * rays_[i] +
-                            kGuess_per_m * neighbour_from_reference.translation(),
-                        &guess)) {
-      found[i] = cv::Point2f(static_cast<float>(guess.x()), static_cast<float>(guess.y()));
+                            kInitialInverseRange_per_m * neighbour_from_reference.translation(),
+                        &initial_px)) {
+      found[i] = cv::Point2f(static_cast<float>(initial_px.x()), static_cast<float>(initial_px.y()));
     }
   }
   std::vector<uint8_t> forward, backward;

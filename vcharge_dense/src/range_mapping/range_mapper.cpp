@@ -151,13 +151,24 @@ void RangeMapper::addOdometry(const VehicleOdometry& odometry) {
 
 void RangeMapper::process(const ImageFrame& frame) {
   for (const std::unique_ptr<Camera>& camera : cameras_) {
+    if (camera) {
+      correctPoses(camera.get(), frame.corrections);
+    }
     if (camera && frame.has_image[camera->index]) {
-      placeImage(camera.get(), frame);
+      addImageWithPose(camera.get(), frame);
     }
   }
 }
 
-void RangeMapper::placeImage(Camera* camera, const ImageFrame& frame) {
+void RangeMapper::correctPoses(Camera* camera, const std::vector<CorrectedPose>& corrections) {
+  for (Frame& earlier : camera->frames) {
+    if (const CorrectedPose* corrected = correctionAt(corrections, earlier.image.stamp)) {
+      earlier.image.world_from_camera = corrected->odom_from_vehicle * camera->vehicle_from_camera;
+    }
+  }
+}
+
+void RangeMapper::addImageWithPose(Camera* camera, const ImageFrame& frame) {
   if (!frame.odom_from_vehicle) {
     ++camera->status.without_pose;
     camera->status.state = RangeMapperState::kNoPose;

@@ -9,20 +9,22 @@
 
 namespace vcharge {
 
-/// The warp of a tile over a plane: exact at nodes `spacing` pixels apart, biquadratic in cells of 3 x 3
-/// nodes between them.
+/// Maps the pixels of a reference tile over a plane to positions in a neighbour's image, which would be
+/// costly to project one by one: exact at nodes `spacing` pixels apart, biquadratic in cells of 3 x 3 nodes
+/// between them.
 class NodeGrid {
  public:
-  /// `origin`: image position of the tile's first pixel. `near_valid`: CV_8UC1; nodes where it is 0 are
-  /// unseen. `spacing`: a power of two.
+  /// `camera`: the reference, without distortion. `near_valid`: CV_8UC1 of the image's size, 0 at pixels
+  /// whose nodes no valid pixel needs. `origin`: image position of the tile's first pixel. `spacing`: a power
+  /// of two.
   NodeGrid(const MeiCamera& camera, const cv::Mat& near_valid, cv::Point origin, const TileLayout& layout,
            int spacing);
 
-  /// Sets the planes' normal, see PlaneFamily.
+  /// Sets the unit normal of the planes, in the reference camera's frame.
   void setNormal(const Eigen::Vector3f& normal);
-  /// Computes the cells for the plane at this inverse distance. Returns an upper bound of the interpolation
-  /// error in pixels, from the nodes' third differences, or infinity where the warp is too curved for a
-  /// bound.
+  /// Computes the cells for the plane at this inverse distance (1/m), as SweepKernels::makeCells lays them
+  /// out. Returns an upper bound of the interpolation error in pixels, from the nodes' third differences, or
+  /// infinity where the mapping is too curved for a bound.
   float makeCells(const SweepKernels& kernels, const Projection& projection, float inverse_distance,
                   AlignedArray<float>* cells);
 
@@ -35,6 +37,7 @@ class NodeGrid {
   TileLayout layout_;
   int spacing_, cell_shift_;
   int nodes_, node_rows_;  // nodes per strip and rows of nodes; odd
+  // Per node: unit ray, factors of its inverse range (see RayRow), and position in the neighbour's image.
   AlignedArray<float> x_, y_, z_, base_, weight_, u_, v_;
 };
 

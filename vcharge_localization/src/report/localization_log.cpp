@@ -9,11 +9,11 @@
 namespace vcharge {
 namespace {
 
-double quantile(std::vector<double> values, double share) {
+double quantile(std::vector<double> values, double fraction) {
   if (values.empty()) {
     return 0.0;
   }
-  const auto index = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  const auto index = static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + index, values.end());
   return values[static_cast<size_t>(index)];
 }
@@ -111,7 +111,7 @@ std::vector<std::pair<int64_t, std::string>> LocalizationSummary::warnings() con
 
 std::string LocalizationSummary::text() const {
   std::ostringstream text;
-  text << "frames: " << numFrames() << std::fixed << std::setprecision(1) << "\n";
+  text << "results: " << numFrames() << std::fixed << std::setprecision(1) << "\n";
   for (const auto& [status, count] : num_frames_) {
     text << "  " << enumNames<LocalizationStatus>()[static_cast<size_t>(status)] << ": " << count << " ("
          << 100.0 * static_cast<double>(count) / static_cast<double>(numFrames()) << " %)\n";

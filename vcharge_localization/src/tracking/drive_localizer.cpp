@@ -40,6 +40,12 @@ void DriveLocalizer::seed(const PosePrior& pose) {
 }
 
 void DriveLocalizer::predict(const ImageFrame& frame) {
+  // After a fix the pose no longer has the error of the last odometry; without one the next motion cancels
+  // it.
+  const CorrectedPose* corrected = last_stamp_ ? correctionAt(frame.corrections, *last_stamp_) : nullptr;
+  if (corrected != nullptr && last_fix_ == last_stamp_) {
+    last_odom_from_vehicle_ = corrected->odom_from_vehicle;
+  }
   const double period_s = last_stamp_ ? toSeconds(frame.stamp - *last_stamp_) : 0.0;
   const bool is_counted = last_odom_from_vehicle_ && frame.odom_from_vehicle && period_s > 0.0 &&
                           frame.num_resets == last_num_resets_;

@@ -52,12 +52,12 @@ void MappingSession::tell() {
   const size_t num_keyframes = mapper_->state().data.keyframes.size();
   {
     const std::lock_guard<std::mutex> lock(status_mutex_);
-    status_.counts = {{"frames", report.num_frames},
+    status_.counts = {{"frames", report.counters.frames},
                       {"keyframes", static_cast<int64_t>(num_keyframes)},
-                      {"frames that lack a camera", report.num_incomplete_frames},
-                      {"frames without odometry", report.num_frames_without_odometry},
+                      {"frames that lack a camera", report.counters.incomplete_frames},
+                      {"frames without odometry", report.counters.frames_without_odometry},
                       {"standing frames", report.num_standing_frames},
-                      {"late images", report.num_late_images},
+                      {"late images", report.counters.numLateImages()},
                       {"images after finish", num_ignored_images_}};
     status_.message = num_keyframes == 0 ? "waiting for a drive"
                                          : "following: " + std::to_string(num_keyframes) + " keyframes";

@@ -63,8 +63,8 @@ std::shared_ptr<const SparseMap> SparseMapper::finish(const StageCallback& progr
 void SparseMapper::requireKeyframes() const {
   if (state_.data.keyframes.size() < 2) {
     std::ostringstream text;
-    text << "no map could be made: " << report().num_frames << " frames, "
-         << report().num_frames_without_odometry << " without odometry, " << report().num_standing_frames
+    text << "no map could be made: " << report().counters.frames << " frames, "
+         << report().counters.frames_without_odometry << " without odometry, " << report().num_standing_frames
          << " standing";
     throw InputError(text.str());
   }

@@ -83,9 +83,9 @@ TEST(SparseMapperTest, CountsIncompleteFramesAndOdometerResets) {
     }
   }
   errorOf(&mapper);
-  EXPECT_EQ(mapper.report().num_frames, 10);
-  EXPECT_EQ(mapper.report().num_incomplete_frames, 1);
-  EXPECT_EQ(mapper.report().num_odometry_resets, 1);
+  EXPECT_EQ(mapper.report().counters.frames, 10);
+  EXPECT_EQ(mapper.report().counters.incomplete_frames, 1);
+  EXPECT_EQ(mapper.report().counters.odometry_resets, 1);
 }
 
 TEST(SparseMapperTest, RefusesARigWithoutExtrinsicsAndBadOptions) {

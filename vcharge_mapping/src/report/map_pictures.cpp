@@ -54,22 +54,24 @@ std::vector<double> travelled(const SparseMap& map) {
 }
 
 /// The frames, and the distance driven up to each.
-struct FramePlaces {
+struct FramePath {
   std::vector<Eigen::Vector3d> position_m;
   std::vector<double> way_m;
 };
 
-FramePlaces placesOf(const ReconstructionState& state) {
-  FramePlaces places;
+FramePath framePathOf(const ReconstructionState& state) {
+  FramePath frame_path;
   for (const FramePose& frame : state.frames) {
     const RigidTransform map_from_vehicle =
         state.data.keyframes[frame.keyframe].map_from_vehicle * frame.keyframe_from_vehicle;
     const Eigen::Vector3d& position_m = map_from_vehicle.translation();
-    places.way_m.push_back(
-        places.way_m.empty() ? 0.0 : places.way_m.back() + (position_m - places.position_m.back()).norm());
-    places.position_m.push_back(position_m);
+    frame_path.way_m.push_back(frame_path.way_m.empty()
+                                   ? 0.0
+                                   : frame_path.way_m.back() +
+                                         (position_m - frame_path.position_m.back()).norm());
+    frame_path.position_m.push_back(position_m);
   }
-  return places;
+  return frame_path;
 }
 
 void addMotionLegend(SvgPlot* plot) {
@@ -165,9 +167,9 @@ std::string drawLoops(const SparseMap& map) {
 }
 
 std::string drawMotions(const ReconstructionState& state) {
-  const FramePlaces places = placesOf(state);
+  const FramePath frame_path = framePathOf(state);
   Points path;
-  for (const Eigen::Vector3d& position_m : places.position_m) {
+  for (const Eigen::Vector3d& position_m : frame_path.position_m) {
     path.emplace_back(position_m.head<2>());
   }
   SvgPlot plot = plotAround(path, 2.0);
@@ -187,22 +189,24 @@ std::string drawMotions(const ReconstructionState& state) {
 }
 
 std::string drawHeights(const ReconstructionState& state) {
-  const FramePlaces places = placesOf(state);
+  const FramePath frame_path = framePathOf(state);
   Points line;
   double min_m = 0.0, max_m = 0.0;
-  for (size_t i = 0; i < places.way_m.size(); ++i) {
-    line.emplace_back(places.way_m[i], places.position_m[i].z());
-    min_m = std::min(min_m, places.position_m[i].z());
-    max_m = std::max(max_m, places.position_m[i].z());
+  for (size_t i = 0; i < frame_path.way_m.size(); ++i) {
+    line.emplace_back(frame_path.way_m[i], frame_path.position_m[i].z());
+    min_m = std::min(min_m, frame_path.position_m[i].z());
+    max_m = std::max(max_m, frame_path.position_m[i].z());
   }
-  SvgPlot plot({0.0, places.way_m.back()}, {min_m - 0.1, max_m + 0.1}, 300.0, false, "way (m)", "height (m)");
-  for (size_t i = 1; i < places.way_m.size();) {
+  SvgPlot plot({0.0, frame_path.way_m.back()}, {min_m - 0.1, max_m + 0.1}, 300.0, false, "way (m)",
+               "height (m)");
+  for (size_t i = 1; i < frame_path.way_m.size();) {
     const MotionHypothesis motion = state.frames[i].motion;
     const size_t begin = i;
-    while (i < places.way_m.size() && state.frames[i].motion == motion) {
+    while (i < frame_path.way_m.size() && state.frames[i].motion == motion) {
       ++i;
     }
-    plot.addBand(places.way_m[begin - 1], places.way_m[i - 1], colourOf(motion) + "\" fill-opacity=\"0.25");
+    plot.addBand(frame_path.way_m[begin - 1], frame_path.way_m[i - 1],
+                 colourOf(motion) + "\" fill-opacity=\"0.25");
   }
   plot.addLine(line, "stroke=\"#000\" stroke-width=\"1.5\"");
   return plot.make();
@@ -266,18 +270,18 @@ std::string drawErrors(const SparseMap& map) {
   std::vector<Points> lines;
   double most = 1e-6;
   for (const std::vector<double>& errors : errors_of) {
-    std::array<double, kBins> share{};
+    std::array<double, kBins> percent{};
     for (const double error : errors) {
       const auto bin = static_cast<int>(std::min(error / bin_px, 1e6));
       if (bin < kBins) {
-        share[bin] += 100.0 / static_cast<double>(errors.size());
+        percent[bin] += 100.0 / static_cast<double>(errors.size());
       }
     }
     Points line;
     for (int bin = 0; bin < kBins; ++bin) {
-      line.emplace_back(bin * bin_px, share[bin]);
-      line.emplace_back((bin + 1) * bin_px, share[bin]);
-      most = std::max(most, share[bin]);
+      line.emplace_back(bin * bin_px, percent[bin]);
+      line.emplace_back((bin + 1) * bin_px, percent[bin]);
+      most = std::max(most, percent[bin]);
     }
     lines.push_back(line);
   }

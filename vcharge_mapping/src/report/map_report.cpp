@@ -41,7 +41,7 @@ std::string summaryOf(const SparseMap& map, const ReconstructionReport& report) 
   const double duration_s = toSeconds(map.keyframes().back().stamp - map.keyframes().front().stamp);
   return "<table>" +
          rowOf({"drive", toText(length_m, 1) + " m in " + toText(duration_s, 1) + " s, " +
-                             std::to_string(report.num_frames) + " frames"}) +
+                             std::to_string(report.counters.frames) + " frames"}) +
          rowOf({"map", std::to_string(map.keyframes().size()) + " keyframes, " +
                            std::to_string(map.landmarks().size()) + " landmarks, " +
                            std::to_string(map.observations().size()) + " observations"}) +
@@ -86,7 +86,7 @@ std::string camerasOf(const SparseMap& map, const ReconstructionReport& report) 
   for (size_t i = 0; i < map.rig().cameras.size(); ++i) {
     const ReprojectionErrors errors = measureReprojection(map, i);
     text += rowOf({map.rig().cameras[i].name, std::to_string(errors.num_observations),
-                   toText(errors.rms_px, 3), std::to_string(report.num_missing_images[i])});
+                   toText(errors.rms_px, 3), std::to_string(report.counters.missing_images[i])});
   }
   return text + "</table>";
 }
@@ -109,11 +109,11 @@ std::string skippedOf(const ReconstructionReport& report, Timestamp start) {
     return count > 0 ? rowOf({what, std::to_string(count)}) : std::string();
   };
   std::string text =
-      count_row("frames without odometry: not used", report.num_frames_without_odometry) +
-      count_row("frames that lack a camera: used with the others", report.num_incomplete_frames) +
+      count_row("frames without odometry: not used", report.counters.frames_without_odometry) +
+      count_row("frames that lack a camera: used with the others", report.counters.incomplete_frames) +
       count_row("standing frames: not used", report.num_standing_frames) +
-      count_row("images that arrived too late: not used", report.num_late_images) +
-      count_row("resets of the odometer", report.num_odometry_resets);
+      count_row("images that arrived too late: not used", report.counters.numLateImages()) +
+      count_row("resets of the odometer", report.counters.odometry_resets);
   if (text.empty()) {
     return "<p>Nothing.</p>";
   }

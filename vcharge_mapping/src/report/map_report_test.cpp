@@ -38,9 +38,9 @@ class MapReportTest : public ::testing::Test {
     }
     contents_.descriptors = cv::Mat::zeros(static_cast<int>(contents_.observations.size()), 32, CV_8UC1);
     contents_.loop_edges.push_back({0, 39, RigidTransform(), 30, true, ""});
-    state_.report.num_frames = 40;
+    state_.report.counters.frames = 40;
     state_.report.num_motions = {0, 39, 0, 0};
-    state_.report.num_missing_images = {0, 0};
+    state_.report.counters.missing_images = {0, 0};
     state_.report.rms_px = 0.3;
     state_.report.stages = {"following", "loops"};
     state_.report.stage_s = {{"following", 12.34}, {"loops", 5.0}};
@@ -90,13 +90,13 @@ TEST_F(MapReportTest, RemarksOnEachDefect) {
   state_.data.odometry_turn_scale = 1.2;
   expect(MapGrade::kBad, "true turns are 1.2000");
   state_.data.odometry_turn_scale = 1.0;
-  state_.report.num_frames_without_odometry = 4;
+  state_.report.counters.frames_without_odometry = 4;
   expect(MapGrade::kCheck, "10.0 % of the frames have no odometry");
-  state_.report.num_frames_without_odometry = 0;
-  state_.report.num_incomplete_frames = 40;
+  state_.report.counters.frames_without_odometry = 0;
+  state_.report.counters.incomplete_frames = 40;
   expect(MapGrade::kCheck, "lack a camera");
-  state_.report.num_incomplete_frames = 0;
-  state_.report.num_odometry_resets = 1;
+  state_.report.counters.incomplete_frames = 0;
+  state_.report.counters.odometry_resets = 1;
   expect(MapGrade::kCheck, "odometer was reset");
 }
 
@@ -130,8 +130,8 @@ TEST_F(MapReportTest, ThePageIsCompleteAndSelfContained) {
   contents_.loop_edges.push_back({3, 30, RigidTransform(), 10, false, "too uncertain"});
   state_.report.skipped = {
       {"without camera left", contents_.keyframes[3].stamp, contents_.keyframes[6].stamp, 4}};
-  state_.report.num_incomplete_frames = 4;
-  state_.report.num_missing_images = {0, 4};
+  state_.report.counters.incomplete_frames = 4;
+  state_.report.counters.missing_images = {0, 4};
   const std::string text = page();
   for (const char* part :
        {"Map &lt;lot&gt;", "class=\"verdict CHECK\"", "From above", "1 accepted", "1 rejected: too uncertain",

@@ -31,13 +31,13 @@ class Judge {
   explicit Judge(MapVerdict* verdict) : verdict_(verdict) {}
 
   /// Adds a remark if a value exceeds the first or second bound.
-  void atMost(double value, double odd, double bad, const std::string& remark) {
-    if (value > odd) {
-      add(value > bad ? MapGrade::kBad : MapGrade::kCheck, remark);
+  void atMost(double value, double warn_above, double fail_above, const std::string& remark) {
+    if (value > warn_above) {
+      add(value > fail_above ? MapGrade::kBad : MapGrade::kCheck, remark);
     }
   }
-  void check(bool is_odd, const std::string& remark) {
-    if (is_odd) {
+  void check(bool is_suspicious, const std::string& remark) {
+    if (is_suspicious) {
       add(MapGrade::kCheck, remark);
     }
   }
@@ -125,15 +125,15 @@ MapVerdict judgeMap(const SparseMap& map, const ReconstructionState& state) {
   judge.atMost(std::abs(turn - 1.0), kOddFactor, kWrongFactor,
                "true turns are " + toText(turn, 4) + " of what the odometer counted");
 
-  const double without = ratioOf(report.num_frames_without_odometry, report.num_frames);
+  const double without = ratioOf(report.counters.frames_without_odometry, report.counters.frames);
   judge.atMost(without, kManySkipped, kTooManySkipped,
                percent(without) + " of the frames have no odometry and were not used");
-  const double incomplete = ratioOf(report.num_incomplete_frames, report.num_frames);
+  const double incomplete = ratioOf(report.counters.incomplete_frames, report.counters.frames);
   judge.atMost(incomplete, kManySkipped, 1.0, percent(incomplete) + " of the frames lack a camera");
-  judge.check(report.num_odometry_resets > 0,
-              "the odometer was reset " + std::to_string(report.num_odometry_resets) + " times");
-  judge.check(report.num_late_images > 0,
-              std::to_string(report.num_late_images) + " images arrived too late to be used");
+  judge.check(report.counters.odometry_resets > 0,
+              "the odometer was reset " + std::to_string(report.counters.odometry_resets) + " times");
+  judge.check(report.counters.numLateImages() > 0,
+              std::to_string(report.counters.numLateImages()) + " images arrived too late to be used");
   return verdict;
 }
 

@@ -116,7 +116,7 @@ class LocalObstacleMap {
 
   LocalObstacleMapOptions options_;
   ScrollingGrid<Cell> cells_;  // in the fixed frame
-  bool placed_ = false;
+  bool has_pose_ = false;
   Timestamp stamp_;
   RigidTransform fixed_from_vehicle_;
   double travel_m_ = 0.0;

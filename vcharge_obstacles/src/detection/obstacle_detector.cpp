@@ -53,7 +53,7 @@ struct ObstacleDetector::Implementation {
         position(vehicle_from_camera.translation().cast<float>()),
         rays(camera, vehicle_from_camera, grid),
         expected(rays, grid, position.z(), options.min_height_m, kReferenceHeight_m),
-        overseen_m(overseenRange(rays, grid, position.z())) {
+        fully_visible_m(fullyVisibleRange(rays, grid, position.z())) {
     const Eigen::Vector3d axis = vehicle_from_camera.rotation() * Eigen::Vector3d::UnitZ();
     const double axis_rad = std::atan2(axis.y(), axis.x());
     for (int ray = 0; ray < grid.numRays(); ++ray) {
@@ -83,9 +83,9 @@ struct ObstacleDetector::Implementation {
   const Eigen::Vector3f position;
   const PixelRays rays;
   const ExpectedPixels expected;
-  const std::vector<double> overseen_m;  // one per sector, see overseenRange()
-  std::vector<bool> is_off_axis;         // one per sector
-  std::vector<double> free_to_m;         // one per sector
+  const std::vector<double> fully_visible_m;  // one per sector, see fullyVisibleRange()
+  std::vector<bool> is_off_axis;              // one per sector
+  std::vector<double> free_to_m;              // one per sector
 };
 
 ObstacleDetector::ObstacleDetector(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera,
@@ -209,7 +209,7 @@ std::vector<float> ObstacleDetector::Implementation::fractionOf(const std::vecto
 /// Removes evidence for ground if a body above it would lie outside the image.
 void ObstacleDetector::Implementation::dropOverhungGround(std::vector<float>* free_fraction) const {
   for (int ray = 0; ray < grid.numRays(); ++ray) {
-    const double from_m = std::max(kMaxOffAxisRange_m, overseen_m[static_cast<size_t>(ray)]);
+    const double from_m = std::max(kMaxOffAxisRange_m, fully_visible_m[static_cast<size_t>(ray)]);
     for (int bin = 0; bin < grid.numBins() && grid.range_m(bin) > from_m; ++bin) {
       (*free_fraction)[grid.index(ray, bin)] = 0.0F;
     }

@@ -47,7 +47,7 @@ ExpectedPixels::ExpectedPixels(const PixelRays& rays, const PolarGrid& grid, dou
   obstacle = obstacle_sum.finish();
 }
 
-std::vector<double> overseenRange(const PixelRays& rays, const PolarGrid& grid, double camera_height_m) {
+std::vector<double> fullyVisibleRange(const PixelRays& rays, const PolarGrid& grid, double camera_height_m) {
   std::vector<double> least_fall(static_cast<size_t>(grid.numRays()),
                                  std::numeric_limits<double>::infinity());
   for (size_t i = 0; i < rays.size(); ++i) {

@@ -37,7 +37,7 @@ constexpr double kClearance_m = 0.25;
 
 /// Range per sector up to which the image shows the space kClearance_m above the ground. Beyond it, a body
 /// above visible ground may lie outside the image.
-std::vector<double> overseenRange(const PixelRays& rays, const PolarGrid& grid, double camera_height_m);
+std::vector<double> fullyVisibleRange(const PixelRays& rays, const PolarGrid& grid, double camera_height_m);
 
 /// Accumulates weights of strips between two inverse ranges of a sector, in constant time per strip.
 class StripSum {

@@ -103,9 +103,9 @@ bool CellObserver::blocks(int ray, double range_m) const {
   for (const PolarObstacle* obstacle : obstacles_of_ray_[static_cast<size_t>(ray)]) {
     const double margin_m = kMarginCells * cell_m_ + 2.0 * obstacle->range_sigma_m;
     // If the camera cannot look over an obstacle, the ground behind it is a reflection.
-    const double sight_m = seen_.camera_height_m * (1.0 - obstacle->range_m / range_m);
+    const double ray_height_m = seen_.camera_height_m * (1.0 - obstacle->range_m / range_m);
     if (std::abs(obstacle->range_m - range_m) < margin_m ||
-        (obstacle->range_m < range_m && sight_m < obstacle->height_m)) {
+        (obstacle->range_m < range_m && ray_height_m < obstacle->height_m)) {
       return true;
     }
   }

@@ -65,7 +65,7 @@ void LocalObstacleMap::moveTo(Timestamp stamp, const RigidTransform& fixed_from_
   const RigidTransform level = levelled(fixed_from_vehicle);
   const int64_t first_x = cells_.indexOf(level.translation().x()) - cells_.size() / 2;
   const int64_t first_y = cells_.indexOf(level.translation().y()) - cells_.size() / 2;
-  if (placed_) {
+  if (has_pose_) {
     const double travelled_m = (level.translation() - fixed_from_vehicle_.translation()).norm();
     if (travelled_m > 0.0) {
       decay(travelled_m);
@@ -74,14 +74,14 @@ void LocalObstacleMap::moveTo(Timestamp stamp, const RigidTransform& fixed_from_
     }
   }
   cells_.moveTo(first_x, first_y);
-  placed_ = true;
+  has_pose_ = true;
   stamp_ = stamp;
   fixed_from_vehicle_ = level;
 }
 
 void LocalObstacleMap::add(const CameraObstacles& seen, const PolarGrid& grid,
                            const RigidTransform& fixed_from_vehicle) {
-  check(placed_, "LocalObstacleMap::add: moveTo() comes first");
+  check(has_pose_, "LocalObstacleMap::add: moveTo() comes first");
   const RigidTransform level = levelled(fixed_from_vehicle);
   const double weight = weightOf(seen, level);
   addGround(seen, grid, level, weight);
@@ -307,7 +307,7 @@ int8_t LocalObstacleMap::stateOf(const Cell& cell) const {
 }
 
 void LocalObstacleMap::reanchor(const RigidTransform& new_from_old_fixed) {
-  if (!placed_) {
+  if (!has_pose_) {
     return;
   }
   const RigidTransform new_from_old = levelled(new_from_old_fixed);

@@ -154,32 +154,37 @@ std::string showRows(const std::vector<OptionRow>& rows) {
   return text;
 }
 
-/// "must be positive" -> "positive"
-std::string withoutVerb(const std::string& requirement) {
-  const std::string verb = "must be ";
-  return requirement.compare(0, verb.size(), verb) == 0 ? requirement.substr(verb.size())
-         : requirement == "must not be negative"        ? "not negative"
-                                                        : requirement;
+/// "must be positive" -> ">0", "must be in [0, 1)" -> "[0,1)", "one of a, b" -> "a, b"
+std::string shortRange(const std::string& requirement) {
+  static const std::vector<std::pair<std::string, std::string>> kShort = {
+      {"must not be negative", "≥0"}, {"must be positive", ">0"}, {"must be negative", "<0"},
+      {"must be at least ", "≥"},     {"must be above ", ">"},    {"must be at most ", "≤"},
+      {"must be below ", "<"},        {"must be in ", ""},        {"one of ", ""}};
+  for (const auto& [words, symbol] : kShort) {
+    if (requirement.compare(0, words.size(), words) == 0) {
+      std::string text = symbol + requirement.substr(words.size());
+      text.erase(std::remove(text.begin(), text.end(), ' '), text.end());
+      return text;
+    }
+  }
+  return requirement;
 }
 
-std::string listRows(const std::vector<OptionRow>& rows, std::set<std::string>* listed_groups) {
-  std::string text;
+std::string listRows(const std::vector<OptionRow>& rows, std::map<std::string, std::string>* listed_groups,
+                     const std::string& section) {
+  std::string text = "|option|default|range|meaning|\n|---|---|---|---|\n";
   std::string skipped = "\n";  // prefix of the keys of a group that is not listed again
   for (const OptionRow& row : rows) {
     if (row.key.compare(0, skipped.size(), skipped) == 0) {
       continue;
     }
-    const auto depth = static_cast<size_t>(std::count(row.key.begin(), row.key.end(), '.'));
-    const size_t dot = row.key.rfind('.');
-    text += std::string(2 * depth, ' ') + "- **" +
-            (dot == std::string::npos ? row.key : row.key.substr(dot + 1)) + "**";
-    text += (row.group_type.empty() ? " `" + row.value + "`: " : ": ") + row.meaning;
-    text += row.allowed.empty() ? "" : " (" + withoutVerb(row.allowed) + ")";
-    if (!row.group_type.empty() && !listed_groups->insert(row.group_type).second) {
-      text += " (listed above)";
-      skipped = row.key + ".";
+    if (row.group_type.empty()) {
+      text += "|" + row.key + "|`" + row.value + "`|" + shortRange(row.allowed) + "|" + row.meaning + "|\n";
+      continue;
     }
-    text += "\n";
+    const auto [listed, is_new] = listed_groups->emplace(row.group_type, section + ": " + row.key);
+    text += "|**" + row.key + "**||" + (is_new ? "" : "see " + listed->second) + "|" + row.meaning + "|\n";
+    skipped = is_new ? "\n" : row.key + ".";
   }
   return text;
 }

@@ -141,11 +141,17 @@ TEST(OptionsTest, ShownOptionsReadBackAndTellTheirMeaning) {
   TestOptions copy;
   readFields(YAML::Load(shown), "shown", &copy);
   EXPECT_EQ(copy.inner.scale, 0.1);
-  std::set<std::string> listed;
-  EXPECT_THAT(optionList(options, &listed),
-              HasSubstr("  - **scale** `0.1`: Factor of all lengths. (positive)\n"));
-  EXPECT_THAT(optionList(options, &listed),
-              AllOf(HasSubstr("Scale of the planes. (listed above)\n"), Not(HasSubstr("scale"))));
+}
+
+TEST(OptionsTest, TableListsAGroupOnceAndRefersToItLater) {
+  std::map<std::string, std::string> listed;
+  const std::string first = optionTable(TestOptions(), "Planes", &listed);
+  EXPECT_THAT(first, HasSubstr("|count|`3`|>0|Number of planes.|\n"));
+  EXPECT_THAT(first, HasSubstr("|mode|`mean`|mean,best_k|How costs are combined.|\n"));
+  EXPECT_THAT(first, HasSubstr("|inner.scale|`2`|>0|Factor of all lengths.|\n"));
+  EXPECT_THAT(optionTable(TestOptions(), "Others", &listed),
+              AllOf(HasSubstr("|**inner**||see Planes: inner|Scale of the planes.|\n"),
+                    Not(HasSubstr("inner.scale"))));
 }
 
 TEST(OptionsTest, BadYamlNamesFileAndLine) {

@@ -169,9 +169,9 @@ void writeHeightMapMesh(const HeightMap& map, const std::string& path) {
       if (!std::isfinite(height)) {
         continue;
       }
-      const Eigen::Vector2f place = map.centreOf(column, row).cast<float>();
-      append(&vertices, place.x());
-      append(&vertices, place.y());
+      const Eigen::Vector2f centre = map.centreOf(column, row).cast<float>();
+      append(&vertices, centre.x());
+      append(&vertices, centre.y());
       append(&vertices, height);
       const char gray = map.gray.empty() ? static_cast<char>(255) : map.gray.at<char>(row, column);
       vertices.append(3, gray);

@@ -66,14 +66,14 @@ double SvgPlot::toY(double y) const {
   return height_ - kBottom - (y - y_.min) / (y_.max - y_.min) * (height_ - kTop - kBottom);
 }
 
-std::string SvgPlot::place(const Eigen::Vector2d& point) const {
+std::string SvgPlot::coordinates(const Eigen::Vector2d& point) const {
   return toText(toX(point.x()), 1) + " " + toText(toY(point.y()), 1);
 }
 
 void SvgPlot::addLine(const std::vector<Eigen::Vector2d>& points, const std::string& css) {
   content_ += "<polyline fill=\"none\" " + css + " points=\"";
   for (const Eigen::Vector2d& point : points) {
-    content_ += place(point) + " ";
+    content_ += coordinates(point) + " ";
   }
   content_ += "\"/>";
 }
@@ -82,7 +82,7 @@ void SvgPlot::addSegments(const std::vector<std::pair<Eigen::Vector2d, Eigen::Ve
                           const std::string& css) {
   content_ += "<path fill=\"none\" " + css + " d=\"";
   for (const auto& [from, to] : segments) {
-    content_ += "M" + place(from) + "L" + place(to);
+    content_ += "M" + coordinates(from) + "L" + coordinates(to);
   }
   content_ += "\"/>";
 }
@@ -92,7 +92,7 @@ void SvgPlot::addDots(const std::vector<Eigen::Vector2d>& points, double size, c
               toText(size, 1) + "\" d=\"";
   for (const Eigen::Vector2d& point : points) {
     if (point.x() >= x_.min && point.x() <= x_.max && point.y() >= y_.min && point.y() <= y_.max) {
-      content_ += "M" + place(point) + "h0";
+      content_ += "M" + coordinates(point) + "h0";
     }
   }
   content_ += "\"/>";

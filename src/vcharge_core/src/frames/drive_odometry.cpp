@@ -49,6 +49,7 @@ std::vector<std::pair<std::string, int64_t>> FrameCounters::named() const {
           {"odometry_gaps", odometry_gaps},
           {"odometry_resets", odometry_resets},
           {"ignored_odometry", ignored_odometry},
+          {"odometry_corrections", odometry_corrections},
           {"replays", replays}};
 }
 
@@ -105,12 +106,27 @@ bool DriveOdometry::isReset(const VehicleOdometry& odometry) const {
   return change.head<2>().norm() > options_.max_step_m || std::abs(change.z()) > options_.max_step_rad;
 }
 
+void DriveOdometry::correct(const VehicleOdometry& odometry, FrameCounters* counters) {
+  // Entries before a reset are not corrected: their bridged poses have been continued.
+  const bool is_known = takes_corrections_ && raw_.add(odometry) == OdometryBuffer::AddResult::kCorrected;
+  ++(is_known ? counters->odometry_corrections : counters->ignored_odometry);
+  if (!is_known) {
+    return;
+  }
+  VehicleOdometry bridged = odometry;
+  bridged.odom_from_vehicle = bridged_from_odom_ * odometry.odom_from_vehicle;
+  bridged_.add(bridged);
+  if (odometry.stamp == last_->stamp) {
+    last_ = odometry;
+  }
+}
+
 std::optional<DriveBreak> DriveOdometry::add(const VehicleOdometry& odometry, FrameCounters* counters) {
   if (is_given_) {
     return std::nullopt;
   }
   if (last_ && odometry.stamp <= last_->stamp) {
-    ++counters->ignored_odometry;
+    correct(odometry, counters);
     return std::nullopt;
   }
   std::optional<DriveBreak> found;

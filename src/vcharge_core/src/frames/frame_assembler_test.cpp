@@ -136,6 +136,26 @@ TEST_F(FrameAssemblerTest, BridgesAResetByTheSpeedBeforeIt) {
   }
 }
 
+TEST_F(FrameAssemblerTest, TellsTheNextFrameOfCorrectedPoses) {
+  assembler_.addOdometry(odometryAt(0.0, 0.0));
+  assembler_.addOdometry(odometryAt(0.08, 0.8));  // extrapolated to the images' stamp
+  send(0.08, {0, 1, 2});
+  ASSERT_EQ(frames_.size(), 1u);
+  assembler_.addOdometry(odometryAt(0.08, 0.7));
+  assembler_.addOdometry(odometryAt(0.16, 1.5));
+  send(0.16, {0, 1, 2});
+  ASSERT_EQ(frames_.size(), 2u);
+  ASSERT_EQ(frames_[1].corrections.size(), 1u);
+  const CorrectedPose* corrected = correctionAt(frames_[1].corrections, at(0.08));
+  ASSERT_NE(corrected, nullptr);
+  EXPECT_EQ(corrected->odom_from_vehicle.translation().x(), 0.7);
+  EXPECT_EQ(corrected->bridged_from_vehicle.translation().x(), 0.7);
+  assembler_.addOdometry(odometryAt(0.24, 2.4));
+  send(0.24, {0, 1, 2});
+  EXPECT_TRUE(frames_[2].corrections.empty()) << "each correction is told once";
+  EXPECT_EQ(assembler_.counters().odometry_corrections, 1);
+}
+
 TEST_F(FrameAssemblerTest, ASmallStepIsAResetOnlyWhereTheOptionsSaySo) {
   for (const double max_step_m : {FrameAssemblerOptions::kNoLimit, 0.15}) {
     options_.max_step_m = max_step_m;

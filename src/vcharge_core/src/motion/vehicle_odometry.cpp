@@ -29,9 +29,13 @@ OdometryBuffer::AddResult OdometryBuffer::add(const VehicleOdometry& odometry) {
         const auto entry =
             std::lower_bound(entries_.begin(), entries_.end(), odometry.stamp,
                              [](const VehicleOdometry& left, Timestamp stamp) { return left.stamp < stamp; });
-        const bool duplicate = entry != entries_.end() && entry->stamp == odometry.stamp;
-        ++(duplicate ? counts_.duplicates : counts_.out_of_order);
-        return duplicate ? AddResult::kDuplicate : AddResult::kOutOfOrder;
+        if (entry == entries_.end() || entry->stamp != odometry.stamp) {
+          ++counts_.out_of_order;
+          return AddResult::kOutOfOrder;
+        }
+        *entry = odometry;
+        ++counts_.corrections;
+        return AddResult::kCorrected;
       }
     } else if (toSeconds(odometry.stamp - newest) > options_.max_gap_s) {
       ++counts_.gaps;

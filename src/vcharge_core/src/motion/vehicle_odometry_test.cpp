@@ -53,14 +53,17 @@ TEST(OdometryBufferTest, ReportsGapsAndDoesNotBridgeThem) {
   EXPECT_EQ(buffer.counts().gaps, 1U);
 }
 
-TEST(OdometryBufferTest, IgnoresDuplicatesAndSmallStepsBack) {
+TEST(OdometryBufferTest, ARepeatedStampCorrectsItsEntryAndSmallStepsBackAreIgnored) {
   OdometryBuffer buffer;
   buffer.add(odometryAt(0.0));
   buffer.add(odometryAt(0.1));
-  EXPECT_EQ(buffer.add(odometryAt(0.1)), AddResult::kDuplicate);
-  EXPECT_EQ(buffer.add(odometryAt(0.0)), AddResult::kDuplicate);
+  VehicleOdometry corrected = odometryAt(0.1);
+  corrected.odom_from_vehicle = RigidTransform::planar(7.0, 0.0, 0.0);
+  EXPECT_EQ(buffer.add(corrected), AddResult::kCorrected);
+  EXPECT_EQ(buffer.lookup(at(0.1)).odometry.odom_from_vehicle.translation().x(), 7.0);
+  EXPECT_EQ(buffer.add(odometryAt(0.0)), AddResult::kCorrected);
   EXPECT_EQ(buffer.add(odometryAt(0.05)), AddResult::kOutOfOrder);
-  EXPECT_EQ(buffer.counts().duplicates, 2U);
+  EXPECT_EQ(buffer.counts().corrections, 2U);
   EXPECT_EQ(buffer.counts().out_of_order, 1U);
   EXPECT_EQ(buffer.counts().added, 2U);
 }

@@ -31,7 +31,7 @@ using IsRigid = std::function<bool(const Eigen::Vector2d& point_m, double high_m
 /// IsRigid by the obstacles of the scene (obstacles.yaml). Excluded are points within 0.3 m of a tree, bush
 /// or hedge, points in a tree's crown (over 0.3 m up, within 3.5 m of the stem, not on another object), and
 /// on an island with a kerb all but the kerb itself.
-IsRigid rigidBy(const std::vector<TruthObstacle>& obstacles);
+IsRigid makeIsRigid(const std::vector<TruthObstacle>& obstacles);
 
 /// A point where the true height jumps, crossed along an axis of the world from the low to the high side.
 struct HeightStep {

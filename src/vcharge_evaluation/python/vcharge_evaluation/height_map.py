@@ -66,7 +66,7 @@ def figures(errors, made):
     return [
         figure("mean height error of cells seen in 3 frames, apart from steps", 100 * errors["height_m"]["mean"], "cm",
                at_most=4),
-        figure("cells within 10 cm", 100 * errors["share_within_10_cm"], "%", at_least=95),
+        figure("cells within 10 cm", 100 * errors["fraction_within_10_cm"], "%", at_least=95),
         Figure("cells mapped", percent(errors["num_mapped"], errors["num_seen"]), "%"),
         *kerb_figures(errors),
         figure("steps: mean horizontal error", 100 * errors["step_position_m"]["mean"], "cm", at_most=5),

@@ -44,12 +44,12 @@ class RangeErrors:
 
     def figures(self, label="all cameras"):
         errors = self.sets[label]
-        at = {round(entry["density"], 3): entry["share_within_tolerance"] for entry in errors["accuracy"]}
+        at = {round(entry["density"], 3): entry["fraction_within_tolerance"] for entry in errors["accuracy"]}
         yield Figure("pixels with a range", percent(errors["num_known"], errors["num_judged"]), "%")
         for density in DENSITIES:
             yield Figure(f"within 5 % of the truth, at {100 * density:.0f} % density", 100 * at[density], "%")
-        yield Figure("within one standard deviation", 100 * errors["share_within_one_sigma"], "%")
-        yield Figure("within two standard deviations", 100 * errors["share_within_two_sigma"], "%")
+        yield Figure("within one standard deviation", 100 * errors["fraction_within_one_sigma"], "%")
+        yield Figure("within two standard deviations", 100 * errors["fraction_within_two_sigma"], "%")
 
     def processor_ms(self):
         return 1000 * self.run.cpu_s / self.sets["all cameras"]["num_frames"]
@@ -88,7 +88,7 @@ def evaluate_settings(args, results):
                 bins = [entry for entry in errors.sets["all cameras"]["by_confidence"] if entry["count"]]
         results.add(f"Settings, {title}", *columns)
         results.add(f"Within 5 % of the truth by confidence, {title}", ("default", [
-            Figure(f"confidence {entry['low']:g} to {entry['high']:g}", 100 * entry["share_within_tolerance"], "%")
+            Figure(f"confidence {entry['low']:g} to {entry['high']:g}", 100 * entry["fraction_within_tolerance"], "%")
             for entry in bins]))
 
 

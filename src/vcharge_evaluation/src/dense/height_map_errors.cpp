@@ -18,18 +18,20 @@
 namespace vcharge {
 namespace {
 
-constexpr double kLever_m = 5.0;           // distance of the points by which two poses are aligned
+constexpr double kLever_m = 5.0;  // distance from the vehicle of the points by which poses are aligned
 constexpr double kAboveSurface_m = 0.005;  // height over the surface of the point whose visibility is tested
 constexpr double kBeforeFoot_m = 0.05;     // distance from a face at which its foot's visibility is tested
 constexpr double kSearch_m = 0.4;          // distance within which a step is searched in the map
 constexpr double kKerbLow_m = 0.1;         // heights of steps that are kerbs
 constexpr double kKerbHigh_m = 0.14;
-constexpr double kFromPlants_m = 0.3;
-constexpr double kCrownReach_m = 3.5;   // distance of a tree's leaves from its stem
-constexpr double kUnderCrowns_m = 0.3;  // height above its foot up to which there are no leaves
-constexpr double kOnFootprint_m = 0.1;
-constexpr double kKerbTolerance_m = 0.03;
-constexpr double kOverGrass_m = 0.4;
+constexpr double kPlantMargin_m = 0.3;      // distance from plants at which surfaces are rigid
+constexpr double kCrownRadius_m = 3.5;      // distance of a tree's leaves from its stem
+constexpr double kCrownBase_m = 0.3;        // height above its foot up to which there are no leaves
+constexpr double kFootprintMargin_m = 0.1;  // distance from an object within which a point belongs to it
+constexpr double kKerbTolerance_m =
+    0.03;                            // height above or below a kerb's top that still belongs to the kerb
+constexpr double kMaxGrass_m = 0.4;  // height above a kerb's top up to which grass grows on its island
+constexpr double kWithin_m = 0.1;    // see HeightMapErrors::fraction_within_10_cm
 constexpr double kNotMapped = std::numeric_limits<double>::quiet_NaN();
 // A surface is judged if it is visible in at least this many frames, 0.3 m apart.
 constexpr int kMinViews = 3;
@@ -66,7 +68,7 @@ cv::Mat judgeCells(const HeightMap& map, const MapInWorld& in_world, const Heigh
       if (std::isfinite(error)) {
         absolute.push_back(std::abs(error));
         sum += error;
-        within += std::abs(error) <= 0.1 ? 1 : 0;
+        within += std::abs(error) <= kWithin_m ? 1 : 0;
       }
     }
   }
@@ -134,7 +136,7 @@ std::optional<double> findEnd(const HeightAt& height, const Eigen::Vector2d& sta
 
 /// Distance of an edge in the map from the true one, where the map rises or ends: the median of five lines.
 /// NaN if at most two lines show it.
-double readEdge(const MapInWorld& in_world, const HeightStep& step, double cell_size_m) {
+double measureEdge(const MapInWorld& in_world, const HeightStep& step, double cell_size_m) {
   const Eigen::Vector2d across(-step.direction.y(), step.direction.x());
   const HeightAt interpolated = [&](const Eigen::Vector2d& position_m) {
     return in_world.heightAt(position_m, step.low_m);
@@ -160,35 +162,36 @@ const HeightStep& stepAt(const std::vector<HeightStep>& steps, const Eigen::Vect
                        [&](const HeightStep& step) { return step.position_m == position_m; });
 }
 
-void measure(const MapInWorld& in_world, double cell_size_m, const std::vector<HeightStep>& steps,
-             HeightMapErrors* errors) {
+/// Takes the tape measurements in the map: between its edges, or between its heights.
+void takeMeasurements(const MapInWorld& in_world, double cell_size_m, const std::vector<HeightStep>& steps,
+                      HeightMapErrors* errors) {
   double sum = 0.0;
-  size_t shown = 0;
+  size_t count = 0;
   for (TapeMeasurement& measurement : errors->measurements) {
     if (measurement.kind == TapeMeasurement::Kind::kHeight) {
       measurement.map_m =
           in_world.heightAt(measurement.to_m, 0.0) - in_world.heightAt(measurement.from_m, 0.0);
     } else {
       const HeightStep &a = stepAt(steps, measurement.from_m), &b = stepAt(steps, measurement.to_m);
-      const Eigen::Vector2d from = a.position_m + readEdge(in_world, a, cell_size_m) * a.direction;
-      const Eigen::Vector2d to = b.position_m + readEdge(in_world, b, cell_size_m) * b.direction;
+      const Eigen::Vector2d from = a.position_m + measureEdge(in_world, a, cell_size_m) * a.direction;
+      const Eigen::Vector2d to = b.position_m + measureEdge(in_world, b, cell_size_m) * b.direction;
       measurement.map_m = (to - from).norm();
     }
     const double error = std::abs(measurement.map_m - measurement.truth_m);
     if (std::isfinite(error)) {
       sum += error;
-      ++shown;
+      ++count;
       errors->max_measurement_m = std::max(errors->max_measurement_m, error);
     } else {
       ++errors->num_measurements_missing;
     }
   }
-  errors->mean_measurement_m = shown > 0 ? sum / static_cast<double>(shown) : 0.0;
+  errors->mean_measurement_m = count > 0 ? sum / static_cast<double>(count) : 0.0;
 }
 
 }  // namespace
 
-IsRigid rigidBy(const std::vector<TruthObstacle>& obstacles) {
+IsRigid makeIsRigid(const std::vector<TruthObstacle>& obstacles) {
   const auto isPlant = [](const TruthObstacle& obstacle) {
     return obstacle.kind == "tree" || obstacle.kind == "bush" || obstacle.kind == "hedge";
   };
@@ -196,20 +199,20 @@ IsRigid rigidBy(const std::vector<TruthObstacle>& obstacles) {
     const bool is_on_object =
         std::any_of(obstacles.begin(), obstacles.end(), [&](const TruthObstacle& obstacle) {
           return !isPlant(obstacle) && obstacle.kind != "kerb" &&
-                 distanceToPolygon(position_m, obstacle.footprint_m) < kOnFootprint_m;
+                 distanceToPolygon(position_m, obstacle.footprint_m) < kFootprintMargin_m;
         });
     return std::all_of(obstacles.begin(), obstacles.end(), [&](const TruthObstacle& obstacle) {
       const double distance = distanceToPolygon(position_m, obstacle.footprint_m);
       if (isPlant(obstacle)) {
         // The footprint is that of the stem; leaves hang over its surroundings.
-        const bool is_crown = obstacle.kind == "tree" && !is_on_object && distance < kCrownReach_m &&
-                              high_m > obstacle.base_z_m + kUnderCrowns_m;
-        return distance > kFromPlants_m && !is_crown;
+        const bool is_crown = obstacle.kind == "tree" && !is_on_object && distance < kCrownRadius_m &&
+                              high_m > obstacle.base_z_m + kCrownBase_m;
+        return distance > kPlantMargin_m && !is_crown;
       }
       // A surface on a kerb's island that is lower or a little higher than the kerb is grass.
       const double over_kerb = high_m - obstacle.top_z_m;
       return obstacle.kind != "kerb" || distance > 0.0 || std::abs(over_kerb) < kKerbTolerance_m ||
-             over_kerb > kOverGrass_m;
+             over_kerb > kMaxGrass_m;
     });
   };
 }
@@ -262,7 +265,7 @@ HeightMapErrors evaluateHeightMap(const HeightMap& map, const RigidTransform& wo
   errors.drivability =
       judgeDrivability(map, in_world, truth, world_from_vehicle, seen, steps, is_rigid, options.step_m);
   errors.measurements = pickMeasurements(truth, steps, is_rigid, options);
-  measure(in_world, map.cell_size_m, steps, &errors);
+  takeMeasurements(in_world, map.cell_size_m, steps, &errors);
   steps.erase(std::remove_if(steps.begin(), steps.end(),
                              [&](const HeightStep& step) { return !isMapped(in_world, step); }),
               steps.end());

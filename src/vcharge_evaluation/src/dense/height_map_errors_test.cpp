@@ -70,7 +70,7 @@ class HeightMapErrorsTest : public ::testing::Test {
 
   CameraRig rig_;
   Trajectory poses_;
-  const IsRigid everything_rigid_ = rigidBy({});
+  const IsRigid everything_rigid_ = makeIsRigid({});
 };
 
 TEST_F(HeightMapErrorsTest, PerfectMapHasNoErrors) {
@@ -227,10 +227,10 @@ TEST_F(HeightMapErrorsTest, PlantsAndGrassOnAnIslandAreNotRigid) {
   const auto rectangle = [](double x0, double y0, double x1, double y1) {
     return std::vector<Eigen::Vector2d>{{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}};
   };
-  const IsRigid is_rigid = rigidBy({{"kerb", rectangle(0, 0, 4, 4), 0.0, kKerb_m},
-                                    {"car", rectangle(10, 0, 14, 2), 0.0, 1.4},
-                                    {"hedge", rectangle(1, 3, 3, 3.5), kKerb_m, 1.0},
-                                    {"tree", rectangle(12, 5, 12.2, 5.2), 0.0, 1.8}});
+  const IsRigid is_rigid = makeIsRigid({{"kerb", rectangle(0, 0, 4, 4), 0.0, kKerb_m},
+                                        {"car", rectangle(10, 0, 14, 2), 0.0, 1.4},
+                                        {"hedge", rectangle(1, 3, 3, 3.5), kKerb_m, 1.0},
+                                        {"tree", rectangle(12, 5, 12.2, 5.2), 0.0, 1.8}});
   EXPECT_TRUE(is_rigid({0.05, 1.0}, kKerb_m + 0.01));
   EXPECT_FALSE(is_rigid({2.0, 1.0}, 0.25));  // grass
   EXPECT_FALSE(is_rigid({2.0, 3.2}, 1.0));
@@ -245,7 +245,7 @@ TEST_F(HeightMapErrorsTest, PlantsAndGrassOnAnIslandAreNotRigid) {
   // Half of the platform belongs to a hedge.
   const HeightMapErrors errors =
       evaluateHeightMap(world(0.05), RigidTransform(), world(0.025), poses_, rig_,
-                        rigidBy({{"hedge", rectangle(3, 0, 4, 2.4), 0.0, kKerb_m}}));
+                        makeIsRigid({{"hedge", rectangle(3, 0, 4, 2.4), 0.0, kKerb_m}}));
   EXPECT_GT(errors.measurements.size(), 8U);  // half of the scene has no room for 20
   for (const TapeMeasurement& measurement : errors.measurements) {
     EXPECT_TRUE(measurement.from_m.y() < 0.0 || measurement.from_m.y() > 2.3)

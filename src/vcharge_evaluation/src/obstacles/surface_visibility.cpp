@@ -78,8 +78,8 @@ int SurfaceVisibility::countFaceViews(const Eigen::Vector3d& point_in_world, con
                                       int enough) const {
   int count = 0;
   for (const View& view : views_) {
-    const bool looks_at_face = normal.dot((view.position_m - point_in_world).normalized()) >= kMinFaceCosine;
-    count += looks_at_face && sees(view, point_in_world) ? 1 : 0;
+    const bool faces_camera = normal.dot((view.position_m - point_in_world).normalized()) >= kMinFaceCosine;
+    count += faces_camera && sees(view, point_in_world) ? 1 : 0;
     if (count >= enough) {
       break;
     }

@@ -18,7 +18,7 @@ constexpr double kPi = 3.14159265358979323846;
 
 /// vehicle_from_camera of a camera that points `yaw_rad` to the left of the vehicle's x axis and `down_rad`
 /// down.
-Eigen::Quaterniond lookingAt(double yaw_rad, double down_rad) {
+Eigen::Quaterniond cameraRotation(double yaw_rad, double down_rad) {
   Eigen::Matrix3d forward;
   forward << 0, 0, 1, -1, 0, 0, 0, -1, 0;
   return rotationFromYawPitchRoll(yaw_rad, down_rad, 0.0) * Eigen::Quaterniond(forward);
@@ -35,7 +35,7 @@ RigCamera makeCamera(const std::string& name, double yaw_rad, double down_rad) {
       3.2,
       "",
       {},
-      RigidTransform(lookingAt(yaw_rad, down_rad), Eigen::Vector3d(1, 2, 0.6)),
+      RigidTransform(cameraRotation(yaw_rad, down_rad), Eigen::Vector3d(1, 2, 0.6)),
       {}};
   return camera;
 }
@@ -89,7 +89,7 @@ TEST(RectifiedViewTest, PixelsMapToTheFisheyeImageExactly) {
   EXPECT_GT(count, 5000);
 }
 
-TEST(RectifiedViewTest, ViewsOfCamerasInOnePlaceAreOneImage) {
+TEST(RectifiedViewTest, ViewsOfCamerasAtOnePositionAreOneImage) {
   const auto rig = makeRig();
   RectifiedViewCache cache(rig);
   const auto pair = cache.pair(0, 1, 0.0);

@@ -5,6 +5,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "places/place_ranking.h"
 #include "vcharge_core/base/error.h"
 
 namespace vcharge {
@@ -70,12 +71,7 @@ std::vector<PlaceMatch> PlaceIndex::query(const std::vector<cv::Mat>& descriptor
       }
     }
   }
-  matches.erase(std::remove_if(matches.begin(), matches.end(),
-                               [](const PlaceMatch& match) { return !(match.score > 0.0); }),
-                matches.end());
-  std::stable_sort(matches.begin(), matches.end(),
-                   [](const PlaceMatch& a, const PlaceMatch& b) { return a.score > b.score; });
-  matches.resize(std::min(matches.size(), static_cast<size_t>(std::max(max_results, 0))));
+  keepBest(max_results, &matches);
   return matches;
 }
 

@@ -10,6 +10,7 @@
 
 #include "matching/binary_signature.h"
 #include "matching/matching_internal.h"
+#include "places/place_ranking.h"
 #include "vcharge_core/base/error.h"
 
 namespace vcharge {
@@ -118,12 +119,7 @@ std::vector<PlaceMatch> PlaceVotes::query(const std::vector<cv::Mat>& descriptor
       }
     }
   }
-  matches.erase(std::remove_if(matches.begin(), matches.end(),
-                               [](const PlaceMatch& match) { return !(match.score > 0.0); }),
-                matches.end());
-  std::stable_sort(matches.begin(), matches.end(),
-                   [](const PlaceMatch& a, const PlaceMatch& b) { return a.score > b.score; });
-  matches.resize(std::min(matches.size(), static_cast<size_t>(std::max(max_results, 0))));
+  keepBest(max_results, &matches);
   return matches;
 }
 

@@ -24,9 +24,9 @@ constexpr double kNoise_gray = 4.0;
 constexpr double kMaxScale = 2.0;
 
 /// Whether the deformed square of this radius lies inside the image, with a margin of one pixel.
-bool isInside(const cv::Mat& image, const PatchWarp& place, double radius_px) {
-  const Eigen::Vector2d reach_px = place.shape.cwiseAbs() * Eigen::Vector2d::Constant(radius_px);
-  const Eigen::Vector2d low_px = place.position_px - reach_px, high_px = place.position_px + reach_px;
+bool isInside(const cv::Mat& image, const PatchWarp& warp, double radius_px) {
+  const Eigen::Vector2d reach_px = warp.shape.cwiseAbs() * Eigen::Vector2d::Constant(radius_px);
+  const Eigen::Vector2d low_px = warp.position_px - reach_px, high_px = warp.position_px + reach_px;
   return low_px.minCoeff() >= 1.0 && high_px.x() < image.cols - 2.0 && high_px.y() < image.rows - 2.0;
 }
 
@@ -37,11 +37,11 @@ class Alignment {
 
   /// False if the patch leaves the image or has no texture.
   bool setAnchor(const cv::Mat& image, const Eigen::Vector2d& anchor_px) {
-    const PatchWarp place{anchor_px, Eigen::Matrix2d::Identity()};
-    if (!isInside(image, place, options_.radius_px + 1.0)) {
+    const PatchWarp warp{anchor_px, Eigen::Matrix2d::Identity()};
+    if (!isInside(image, warp, options_.radius_px + 1.0)) {
       return false;
     }
-    anchor_ = read(image, place);
+    anchor_ = read(image, warp);
     contrast_ = normalize(&anchor_);
     if (contrast_ < kMinContrast) {
       return false;
@@ -69,28 +69,28 @@ class Alignment {
   }
 
   std::optional<PatchWarp> align(const PatchWarp& start) const {
-    PatchWarp place = start;
+    PatchWarp warp = start;
     const Eigen::Matrix2d start_inverse = start.shape.inverse();
     for (int iteration = 0; iteration < kMaxIterations; ++iteration) {
-      if (!isInside(current_, place, options_.radius_px)) {
+      if (!isInside(current_, warp, options_.radius_px)) {
         return std::nullopt;
       }
-      Eigen::VectorXf patch = read(current_, place);
+      Eigen::VectorXf patch = read(current_, warp);
       if (normalize(&patch) < kMinContrast) {
         return std::nullopt;
       }
-      const Vector6 step = stepFor(patch, start_inverse * place.shape - Eigen::Matrix2d::Identity());
+      const Vector6 step = stepFor(patch, start_inverse * warp.shape - Eigen::Matrix2d::Identity());
       // The step deforms the anchor; the current patch is deformed by its inverse.
       const Eigen::Matrix2d change = Eigen::Matrix2d::Identity() + shapeOf(step);
       if (!step.allFinite() || change.determinant() < 0.1) {
         return std::nullopt;
       }
-      place.shape = place.shape * change.inverse();
-      const Eigen::Vector2d move_px = place.shape * step.head<2>();
-      place.position_px -= move_px;
+      warp.shape = warp.shape * change.inverse();
+      const Eigen::Vector2d move_px = warp.shape * step.head<2>();
+      warp.position_px -= move_px;
       const double rim_move_px = options_.radius_px * step.tail<4>().norm();
       if (move_px.norm() < kMinStep_px && rim_move_px < 4.0 * kMinStep_px) {
-        return isGood(patch, place) ? std::make_optional(place) : std::nullopt;
+        return isGood(patch, warp) ? std::make_optional(warp) : std::nullopt;
       }
     }
     return std::nullopt;
@@ -112,10 +112,10 @@ class Alignment {
     return ratio * ratio;
   }
 
-  Eigen::VectorXf read(const cv::Mat& image, const PatchWarp& place) const {
+  Eigen::VectorXf read(const cv::Mat& image, const PatchWarp& warp) const {
     Eigen::VectorXf patch(size_);
-    const Eigen::Matrix2f shape = place.shape.cast<float>();
-    const Eigen::Vector2f center = place.position_px.cast<float>();
+    const Eigen::Matrix2f shape = warp.shape.cast<float>();
+    const Eigen::Vector2f center = warp.position_px.cast<float>();
     for (int i = 0; i < size_; ++i) {
       const Eigen::Vector2f at = center + shape * offsetOf(i);
       patch[i] = bilinearSample(image, at.x(), at.y());
@@ -138,8 +138,8 @@ class Alignment {
     return solver_.solve(gradient);
   }
 
-  bool isGood(const Eigen::VectorXf& patch, const PatchWarp& place) const {
-    const Eigen::Vector2d scales = Eigen::JacobiSVD<Eigen::Matrix2d>(place.shape).singularValues();
+  bool isGood(const Eigen::VectorXf& patch, const PatchWarp& warp) const {
+    const Eigen::Vector2d scales = Eigen::JacobiSVD<Eigen::Matrix2d>(warp.shape).singularValues();
     return anchor_.dot(patch) / static_cast<float>(size_) >= options_.min_correlation &&
            scales[0] <= kMaxScale && scales[1] * kMaxScale >= 1.0;
   }

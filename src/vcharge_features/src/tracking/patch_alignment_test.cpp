@@ -39,13 +39,13 @@ class PatchAlignmentTest : public ::testing::Test {
     return points;
   }
 
-  /// Position errors of aligned patches, started half a pixel away without a guess of the shape.
+  /// Position errors of aligned patches, started half a pixel away without an initial estimate of the shape.
   std::vector<double> errorsOfAlignment() const {
     std::vector<double> errors_px;
     for (const Eigen::Vector2d& point : points()) {
       const PatchWarp start{warped(point) + Eigen::Vector2d(0.4, -0.3), Eigen::Matrix2d::Identity()};
-      if (const auto place = alignPatch(first_, second_, point, start, options_)) {
-        errors_px.push_back((place->position_px - warped(point)).norm());
+      if (const auto aligned = alignPatch(first_, second_, point, start, options_)) {
+        errors_px.push_back((aligned->position_px - warped(point)).norm());
       }
     }
     return errors_px;
@@ -55,17 +55,17 @@ class PatchAlignmentTest : public ::testing::Test {
     PatchTrackerOptions options;
     options.window_px = 2 * options_.radius_px + 1;
     const PatchTracker tracker(options);
-    std::vector<cv::Point2f> starts, guesses;
+    std::vector<cv::Point2f> starts, expected;
     for (const Eigen::Vector2d& point : points()) {
       starts.emplace_back(static_cast<float>(point.x()), static_cast<float>(point.y()));
-      guesses.emplace_back(static_cast<float>(warped(point).x()), static_cast<float>(warped(point).y()));
+      expected.emplace_back(static_cast<float>(warped(point).x()), static_cast<float>(warped(point).y()));
     }
     std::vector<double> errors_px;
     const std::vector<TrackedPoint> tracked = tracker.track(
-        tracker.buildPyramid(first_), tracker.buildPyramid(second_), starts, cv::Mat(), guesses);
+        tracker.buildPyramid(first_), tracker.buildPyramid(second_), starts, cv::Mat(), expected);
     for (size_t i = 0; i < tracked.size(); ++i) {
       if (tracked[i].status == TrackStatus::kTracked) {
-        errors_px.push_back(cv::norm(tracked[i].position_px - guesses[i]));
+        errors_px.push_back(cv::norm(tracked[i].position_px - expected[i]));
       }
     }
     return errors_px;

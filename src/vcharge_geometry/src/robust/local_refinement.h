@@ -96,16 +96,27 @@ struct CartesianParameters {
   }
 };
 
-/// Levenberg-Marquardt on the robust cost. `sums(model)` returns RobustSums with Jacobians over [dt, dphi],
-/// and `cost(model)` the cost alone. Never returns a model of higher cost than the initial one.
-template <class Parameters, class Sums, class Cost>
-RotationTranslation refineLocally(const RotationTranslation& start, int max_steps, const Sums& sums,
-                                  const Cost& cost) {
+/// Robust cost of a model: that of RobustSums, without Jacobians.
+template <class Problem>
+double robustCost(const Problem& problem, const RotationTranslation& model, double truncation_rad) {
+  RobustSums sums(truncation_rad);
+  for (size_t i = 0; i < problem.qualities().size(); ++i) {
+    sums.addResidual(problem.squaredError(model, static_cast<int>(i)), Problem::kDimensions);
+  }
+  return sums.cost;
+}
+
+/// Levenberg-Marquardt on the robust cost of a problem for estimateRobustly(), which also has `kDimensions`,
+/// the size of a residual, and `sums(model, truncation_rad)`, RobustSums with Jacobians over [dt, dphi].
+/// Never returns a model of higher cost than the initial one.
+template <class Parameters, class Problem>
+RotationTranslation refineLocally(const Problem& problem, const RotationTranslation& start,
+                                  double truncation_rad, int max_steps) {
   constexpr int kSize = Parameters::kSize;
   RotationTranslation model = start;
   double damping = 1e-4;
   for (int step = 0; step < max_steps; ++step) {
-    const RobustSums current = sums(model);
+    const RobustSums current = problem.sums(model, truncation_rad);
     const Eigen::Matrix<double, 6, kSize> basis = Parameters::basis(model);
     const Eigen::Matrix<double, kSize, kSize> hessian = basis.transpose() * current.weighted * basis;
     const Eigen::Matrix<double, kSize, 1> gradient = basis.transpose() * current.gradient;
@@ -121,7 +132,7 @@ RotationTranslation refineLocally(const RotationTranslation& start, int max_step
         return model;
       }
       const RotationTranslation candidate = Parameters::moved(model, change);
-      const double candidate_cost = cost(candidate);
+      const double candidate_cost = robustCost(problem, candidate, truncation_rad);
       converged = change.norm() < 1e-12;
       if (candidate_cost < current.cost) {
         model = candidate;

@@ -54,6 +54,7 @@ template <class Solver, class Parameters>
 class MotionProblem {
  public:
   static constexpr int kSampleSize = Solver::kSampleSize;
+  static constexpr int kDimensions = 1;
 
   MotionProblem(const std::vector<RayMatch>& matches, double max_error_rad)
       : matches_(matches), max_error_rad_(max_error_rad) {
@@ -89,7 +90,7 @@ class MotionProblem {
     RobustSums sums(truncation_rad);
     for (const RayMatch& match : matches_) {
       const EpipolarGeometry geometry(match, model);
-      const double weight = sums.addResidual(squaredEpipolarAngle(match, model, max_error_rad_), 1);
+      const double weight = sums.addResidual(squaredEpipolarAngle(match, model, max_error_rad_), kDimensions);
       if (weight == 0.0 || !geometry.hasBaseline()) {
         continue;
       }
@@ -104,15 +105,7 @@ class MotionProblem {
   }
 
   RotationTranslation refined(const RotationTranslation& model, double truncation_rad, int max_steps) const {
-    const auto cost = [&](const RotationTranslation& candidate) {
-      RobustSums cost_only(truncation_rad);
-      for (const RayMatch& match : matches_) {
-        cost_only.addResidual(squaredEpipolarAngle(match, candidate, max_error_rad_), 1);
-      }
-      return cost_only.cost;
-    };
-    return refineLocally<Parameters>(
-        model, max_steps, [&](const RotationTranslation& at) { return sums(at, truncation_rad); }, cost);
+    return refineLocally<Parameters>(*this, model, truncation_rad, max_steps);
   }
 
  private:

@@ -33,6 +33,7 @@ template <class Solver, class Parameters>
 class PoseProblem {
  public:
   static constexpr int kSampleSize = Solver::kSampleSize;
+  static constexpr int kDimensions = 2;
 
   PoseProblem(const std::vector<PointMatch>& matches, double max_error_rad)
       : matches_(matches), max_error_rad_(max_error_rad) {
@@ -65,7 +66,7 @@ class PoseProblem {
   RobustSums sums(const RotationTranslation& model, double truncation_rad) const {
     RobustSums sums(truncation_rad);
     for (const PointMatch& match : matches_) {
-      const double weight = sums.addResidual(squaredPointingError(match, model), 2);
+      const double weight = sums.addResidual(squaredPointingError(match, model), kDimensions);
       if (weight == 0.0) {
         continue;
       }
@@ -80,15 +81,7 @@ class PoseProblem {
   }
 
   RotationTranslation refined(const RotationTranslation& model, double truncation_rad, int max_steps) const {
-    const auto cost = [&](const RotationTranslation& candidate) {
-      RobustSums cost_only(truncation_rad);
-      for (const PointMatch& match : matches_) {
-        cost_only.addResidual(squaredPointingError(match, candidate), 2);
-      }
-      return cost_only.cost;
-    };
-    return refineLocally<Parameters>(
-        model, max_steps, [&](const RotationTranslation& at) { return sums(at, truncation_rad); }, cost);
+    return refineLocally<Parameters>(*this, model, truncation_rad, max_steps);
   }
 
  private:

@@ -6,10 +6,9 @@
 #include <optional>
 #include <vector>
 
-#include "vcharge_core/frames/drive_source.h"
+#include "vcharge_core/frames/frame_assembler.h"
 #include "vcharge_features/feature_extractor.h"
 #include "vcharge_reconstruction/ego_motion.h"
-#include "vcharge_reconstruction/frame_gatherer.h"
 #include "vcharge_reconstruction/frame_tracker.h"
 #include "vcharge_reconstruction/keyframe_builder.h"
 #include "vcharge_reconstruction/reconstruction_options.h"
@@ -37,8 +36,7 @@ class FrameFollower : public DriveConsumer {
  private:
   using MatchesByCamera = std::vector<std::vector<RayMatch>>;
 
-  void processFrame(Timestamp stamp, const std::vector<Image>& images,
-                    const RigidTransform& odom_from_vehicle);
+  void processFrame(const ImageFrame& frame);
   MatchesByCamera track(const std::vector<Image>& images, const RigidTransform& odometry_motion);
   /// Estimates the motion from the previous frame; ends the tracks that contradict it.
   EgoMotion estimateMotion(const MatchesByCamera& matches, const RigidTransform& odometry_motion);
@@ -53,7 +51,7 @@ class FrameFollower : public DriveConsumer {
   const std::unique_ptr<FeatureExtractor> extractor_;
   std::vector<CameraTracker> trackers_;  // one per camera
   KeyframeBuilder keyframes_;
-  FrameGatherer gatherer_;
+  FrameAssembler<Image> assembler_;
   RigidTransform previous_odom_from_vehicle_, map_from_vehicle_;
   double travelled_m_ = 0.0;
 };

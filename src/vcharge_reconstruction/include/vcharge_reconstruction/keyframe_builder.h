@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "vcharge_core/base/options.h"
+#include "vcharge_core/frames/frame_assembler.h"
 #include "vcharge_reconstruction/reconstruction_state.h"
 
 namespace vcharge {
@@ -14,6 +15,9 @@ struct KeyframeOptions {
   VCHARGE_OPTION(double, keyframe_turn_rad, 0.1, positive(), "Turn between keyframes.");
   VCHARGE_OPTION(double, max_speed_m_per_s, 25.0, positive(), "Speed above which odometry was reset.");
   VCHARGE_END_OPTIONS();
+
+  /// Options of the assembler of the frames, which waits for all images and odometry.
+  FrameAssemblerOptions assemblerOptions() const;
 };
 
 /// Appends the frames of a drive to a reconstruction and selects its keyframes.
@@ -33,6 +37,9 @@ class KeyframeBuilder {
 
   /// Appends a frame between keyframes.
   void addFrame(Timestamp stamp, const RigidTransform& keyframe_from_vehicle, MotionHypothesis motion);
+
+  /// Corrects the odometry of earlier frames, and their poses where these follow from it.
+  void correct(const std::vector<CorrectedPose>& corrections);
 
  private:
   const KeyframeOptions options_;

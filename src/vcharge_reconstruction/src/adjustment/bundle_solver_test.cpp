@@ -84,10 +84,10 @@ TEST(BundleSolverTest, TakesTheStepsOfCeres) {
 TEST(BundleSolverTest, AdjustsExtrinsicsAsCeresDoes) {
   BundleProblem ours = makeProblem();
   for (const RigCamera& camera : ours.rig->cameras) {
-    const RigidTransform& place = *camera.vehicle_from_camera;
+    const RigidTransform& extrinsics = *camera.vehicle_from_camera;
     ours.vehicle_from_camera.emplace_back(
-        rotationFromVector(Eigen::Vector3d(0.004, -0.003, 0.005)) * place.rotation(),
-        place.translation() + Eigen::Vector3d(0.03, 0.02, -0.02));
+        rotationFromVector(Eigen::Vector3d(0.004, -0.003, 0.005)) * extrinsics.rotation(),
+        extrinsics.translation() + Eigen::Vector3d(0.03, 0.02, -0.02));
   }
   BundleProblem theirs = ours;
   const BundleProblem before = ours;

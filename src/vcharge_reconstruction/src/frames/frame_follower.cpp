@@ -25,11 +25,9 @@ FrameFollower::FrameFollower(const ReconstructionOptions& options,
       on_keyframe_(std::move(on_keyframe)),
       extractor_(makeFeatureExtractor(options.features)),
       keyframes_(options, state),
-      gatherer_(
-          rig_, options.max_speed_m_per_s, &state->report,
-          [this](Timestamp stamp, const std::vector<Image>& images, const RigidTransform& odom_from_vehicle) {
-            processFrame(stamp, images, odom_from_vehicle);
-          }) {
+      assembler_(rig_->cameras.size(), options.assemblerOptions(),
+                 [this](const ImageFrame& frame) { processFrame(frame); }) {
+  state_->report.counters = assembler_.counters();
   for (const RigCamera& camera : rig_->cameras) {
     trackers_.emplace_back(camera, options_.tracker);
   }
@@ -38,19 +36,36 @@ FrameFollower::FrameFollower(const ReconstructionOptions& options,
 FrameFollower::~FrameFollower() = default;
 
 void FrameFollower::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
-  gatherer_.addImage(camera_index, stamp, image);
+  assembler_.addImage(camera_index, stamp, image);
+  state_->report.counters = assembler_.counters();
 }
 
 void FrameFollower::addOdometry(const VehicleOdometry& odometry) {
-  gatherer_.addOdometry(odometry);
+  assembler_.addOdometry(odometry);
+  state_->report.counters = assembler_.counters();
 }
 
 void FrameFollower::flush() {
-  gatherer_.finish();
+  assembler_.finish();
 }
 
-void FrameFollower::processFrame(Timestamp stamp, const std::vector<Image>& images,
-                                 const RigidTransform& odom_from_vehicle) {
+void FrameFollower::processFrame(const ImageFrame& frame) {
+  state_->report.noteFrame(frame, *rig_, assembler_.counters());
+  if (!frame.bridged_from_vehicle) {
+    return;
+  }
+  keyframes_.correct(frame.corrections);
+  const CorrectedPose* corrected =
+      state_->frames.empty() ? nullptr : correctionAt(frame.corrections, state_->frames.back().stamp);
+  if (corrected != nullptr) {
+    previous_odom_from_vehicle_ = corrected->bridged_from_vehicle;
+    if (state_->frames.size() > 1 && state_->frames.back().motion == MotionHypothesis::kOdometry) {
+      map_from_vehicle_ = map_from_vehicle_ * corrected->old_vehicle_from_vehicle;
+    }
+  }
+  const Timestamp stamp = frame.stamp;
+  const std::vector<Image>& images = frame.images;
+  const RigidTransform& odom_from_vehicle = *frame.bridged_from_vehicle;
   const StageTimer timer("following", &state_->report.stage_s);
   const bool is_first = state_->data.keyframes.empty();
   const RigidTransform odometry_motion =
@@ -59,7 +74,7 @@ void FrameFollower::processFrame(Timestamp stamp, const std::vector<Image>& imag
   if (!is_first && distance_m < kMinFrameDistance_m &&
       angleOfRotation(odometry_motion.rotation()) < kMinFrameTurn_rad) {
     ++state_->report.num_standing_frames;
-    gatherer_.noteSkipped(stamp, "standing");
+    state_->report.noteSkipped(stamp, "standing");
     return;
   }
   previous_odom_from_vehicle_ = odom_from_vehicle;

@@ -34,7 +34,7 @@ ReconstructionData makeTestDrive(const TestDriveOptions& options) {
   ReconstructionData data;
   data.rig = makeTestRig();
   std::mt19937 random(options.seed), noise_source(options.seed + 1);
-  std::uniform_real_distribution<double> place(-20.0, 20.0), height(-0.2, 4.0);
+  std::uniform_real_distribution<double> coordinate(-20.0, 20.0), height(-0.2, 4.0);
   std::normal_distribution<double> noise(0.0, options.noise_px);
   RigidTransform map_from_vehicle, odom_from_vehicle;
   for (int i = 0; i < options.num_keyframes; ++i) {
@@ -55,8 +55,8 @@ ReconstructionData makeTestDrive(const TestDriveOptions& options) {
   }
   for (int p = 0; p < options.num_points; ++p) {
     Eigen::Vector3d point;
-    point.x() = place(random);
-    point.y() = place(random);
+    point.x() = coordinate(random);
+    point.y() = coordinate(random);
     point.z() = height(random);
     for (int32_t camera = 0; camera < static_cast<int32_t>(data.rig->cameras.size()); ++camera) {
       const RigCamera& rig_camera = data.rig->cameras[camera];

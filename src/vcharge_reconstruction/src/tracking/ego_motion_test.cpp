@@ -16,24 +16,24 @@ constexpr double kNoise_rad = 0.0005;
 
 /// Random points around the car, high ones too (those near the horizon hardly constrain the direction of
 /// motion), seen by both cameras of the test rig before and after a motion.
-std::vector<RayMatch> makeMatches(const RigidTransform& previous_from_current, double wrong_share) {
+std::vector<RayMatch> makeMatches(const RigidTransform& previous_from_current, double wrong_fraction) {
   const auto rig = testing::makeTestRig();
   std::mt19937 random(3);
-  std::uniform_real_distribution<double> place(-12.0, 12.0), height(-1.0, 9.0), share(0.0, 1.0);
+  std::uniform_real_distribution<double> coordinate(-12.0, 12.0), height(-1.0, 9.0), uniform(0.0, 1.0);
   std::normal_distribution<double> noise(0.0, kNoise_rad);
   std::vector<RayMatch> matches;
   while (matches.size() < 300) {
     const int camera = static_cast<int>(matches.size() % 2);
     const RigidTransform& vehicle_from_camera = *rig->cameras[camera].vehicle_from_camera;
     Eigen::Vector3d point;
-    point.x() = place(random);
-    point.y() = place(random);
+    point.x() = coordinate(random);
+    point.y() = coordinate(random);
     point.z() = height(random);
     const Eigen::Vector3d seen = vehicle_from_camera.inverse() * point;
     if (seen.norm() < 2.0 || seen.z() < 0.0) {
       continue;
     }
-    if (share(random) < wrong_share) {
+    if (uniform(random) < wrong_fraction) {
       point = Eigen::Vector3d(point.y() + 3.0, point.x(), point.z() + 1.0);
     }
     const auto rayTo = [&](const Eigen::Vector3d& point_in_vehicle) {

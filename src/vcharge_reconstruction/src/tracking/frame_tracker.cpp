@@ -175,14 +175,15 @@ bool CameraTracker::isMasked(const Eigen::Vector2d& position_px) const {
 void CameraTracker::alignWithAnchors(int32_t keyframe) {
   for (LiveTrack& track : tracks_) {
     const Eigen::Vector2d position_px(track.position_px.x, track.position_px.y);
-    const std::optional<PatchWarp> place = alignPatch(anchors_.at(track.anchor_keyframe).pixels,
-                                                      image_.pixels, {track.anchor_px.x, track.anchor_px.y},
-                                                      {position_px, track.shape}, PatchAlignmentOptions());
-    if (place && (place->position_px - position_px).norm() <= kMaxAlignment_px &&
-        !isMasked(place->position_px) && camera_.model.unproject(place->position_px, &track.ray_in_camera)) {
-      track.position_px =
-          cv::Point2f(static_cast<float>(place->position_px.x()), static_cast<float>(place->position_px.y()));
-      track.shape = place->shape;
+    const std::optional<PatchWarp> aligned = alignPatch(anchors_.at(track.anchor_keyframe).pixels,
+                                                        image_.pixels, {track.anchor_px.x, track.anchor_px.y},
+                                                        {position_px, track.shape}, PatchAlignmentOptions());
+    if (aligned && (aligned->position_px - position_px).norm() <= kMaxAlignment_px &&
+        !isMasked(aligned->position_px) &&
+        camera_.model.unproject(aligned->position_px, &track.ray_in_camera)) {
+      track.position_px = cv::Point2f(static_cast<float>(aligned->position_px.x()),
+                                      static_cast<float>(aligned->position_px.y()));
+      track.shape = aligned->shape;
     } else {
       track.anchor_keyframe = keyframe;
       track.anchor_px = track.position_px;

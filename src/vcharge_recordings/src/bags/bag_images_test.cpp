@@ -42,7 +42,7 @@ class BagImagesTest : public ::testing::Test {
   std::string path() const { return (folder_ / "images.bag").string(); }
   static std::string errorOf(const std::string& bag, const std::string& topic) {
     try {
-      readBagImages(bag, topic, 5, [](double /*share*/) {});
+      readBagImages(bag, topic, 5, [](double /*fraction*/) {});
     } catch (const InputError& error) {
       return error.what();
     }
@@ -54,10 +54,10 @@ class BagImagesTest : public ::testing::Test {
 
 TEST_F(BagImagesTest, ReadsRawAndCompressedImagesWithTheirStamps) {
   for (const char* topic : {"/raw", "/packed", "/packed/compressed"}) {
-    double share = 0.0;
-    const auto images = readBagImages(path(), topic, 100, [&](double done) { share = done; });
+    double fraction = 0.0;
+    const auto images = readBagImages(path(), topic, 100, [&](double done) { fraction = done; });
     ASSERT_EQ(images.size(), 10U) << topic;
-    EXPECT_EQ(share, 1.0);
+    EXPECT_EQ(fraction, 1.0);
     for (int i = 0; i < 10; ++i) {
       EXPECT_EQ(images[static_cast<size_t>(i)].image.pixels.at<uint8_t>(3, 5), 10 * i) << topic;
       EXPECT_EQ(toString(images[static_cast<size_t>(i)].stamp),
@@ -67,7 +67,7 @@ TEST_F(BagImagesTest, ReadsRawAndCompressedImagesWithTheirStamps) {
 }
 
 TEST_F(BagImagesTest, TakesAsManyAsWantedEvenlySpread) {
-  const auto images = readBagImages(path(), "/raw", 5, [](double /*share*/) {});
+  const auto images = readBagImages(path(), "/raw", 5, [](double /*fraction*/) {});
   ASSERT_EQ(images.size(), 5U);
   for (int i = 0; i < 5; ++i) {
     EXPECT_EQ(images[static_cast<size_t>(i)].image.pixels.at<uint8_t>(0, 0), 20 * i);

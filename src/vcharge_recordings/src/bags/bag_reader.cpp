@@ -170,7 +170,7 @@ uint64_t BagReader::readChunkIndex(uint64_t offset, uint64_t index_offset) {
     const auto nsec = file_->number<uint32_t>(at + 4);
     const auto message_offset = file_->number<uint32_t>(at + 8);
     if (nsec >= 1000000000 || message_offset >= chunks_.back().size) {
-      file_->fail(at, "a time and the place of a message in a chunk of " +
+      file_->fail(at, "a time and the offset of a message in a chunk of " +
                           std::to_string(chunks_.back().size) + " bytes");
     }
     if (sec > 0 || nsec > 0) {  // rosbag, too, skips messages recorded before the clock started

@@ -33,11 +33,11 @@ class CheckFindings {
 
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
 
-inline std::string percentText(double share) {
-  return toText(100.0 * share, share < 0.01 ? 2 : 1) + " %";
+inline std::string percentText(double fraction) {
+  return toText(100.0 * fraction, fraction < 0.01 ? 2 : 1) + " %";
 }
 
-inline double shareOf(int64_t part, int64_t whole) {
+inline double fractionOf(int64_t part, int64_t whole) {
   return whole == 0 ? 0.0 : static_cast<double>(part) / static_cast<double>(whole);
 }
 

@@ -80,6 +80,9 @@ void DriveChecker::addImage(size_t camera_index, Timestamp stamp, Timestamp reco
 }
 
 void DriveChecker::addOdometry(Timestamp recorded, const VehicleOdometry& odometry) {
+  if (!state_->odometry.empty() && state_->odometry.back().stamp == odometry.stamp) {
+    return;  // corrects an estimate that was extrapolated; the check judges what live stages receive first
+  }
   state_->odometry_times.add(odometry.stamp, recorded);
   state_->odometry.push_back(odometry);
 }

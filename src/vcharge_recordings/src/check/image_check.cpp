@@ -25,8 +25,8 @@ constexpr double kExposureStep = 0.35;
 /// Detection of edges that do not move in the image while the vehicle moves.
 constexpr int kMinMoved = 12;
 constexpr float kMinGradient = 6.0F;
-constexpr float kStaticShare = 0.75F;  // length of the gradients' sum relative to the sum of their lengths
-constexpr float kSteady = 0.35F;       // standard deviation of their lengths relative to the mean
+constexpr float kMinStaticRatio = 0.75F;  // length of the gradients' sum relative to the sum of their lengths
+constexpr float kSteady = 0.35F;          // standard deviation of their lengths relative to the mean
 /// Edges of the scene may stay in place by chance, less often with more images.
 constexpr double kManyStatic = 0.003, kChanceOfOneImage = 0.4;
 constexpr double kTooManyStatic = 0.3;
@@ -74,8 +74,8 @@ void ImageCheck::add(const cv::Mat& pixels) {
   const double num_valid = std::max(1, cv::countNonZero(valid_));
   means_.push_back(mean[0]);
   contrasts_.push_back(deviation[0]);
-  dark_shares_.push_back(cv::countNonZero((small <= kDark) & valid_) / num_valid);
-  bright_shares_.push_back(cv::countNonZero((small >= kBright) & valid_) / num_valid);
+  dark_fractions_.push_back(cv::countNonZero((small <= kDark) & valid_) / num_valid);
+  bright_fractions_.push_back(cv::countNonZero((small >= kBright) & valid_) / num_valid);
 }
 
 void ImageCheck::addMoved(const cv::Mat& pixels) {
@@ -112,7 +112,8 @@ void ImageCheck::judge(CheckFindings* findings) const {
   if (num_wrong_size_ == num_images_) {
     return;
   }
-  findings->atMost(name_ + ": frozen", shareOf(num_repeated_, num_images_), kManyRepeated, kTooManyRepeated,
+  findings->atMost(name_ + ": frozen", fractionOf(num_repeated_, num_images_), kManyRepeated,
+                   kTooManyRepeated,
                    std::to_string(num_repeated_) + " of " + std::to_string(num_images_) +
                        " images are the one before to the last pixel",
                    "the camera or its cable hangs?");
@@ -122,7 +123,7 @@ void ImageCheck::judge(CheckFindings* findings) const {
 
 void ImageCheck::judgeExposure(CheckFindings* findings) const {
   const double mean = quantile(means_, 0.5), contrast = quantile(contrasts_, 0.5);
-  const double dark = quantile(dark_shares_, 0.5), bright = quantile(bright_shares_, 0.5);
+  const double dark = quantile(dark_fractions_, 0.5), bright = quantile(bright_fractions_, 0.5);
   double step = 0.0;
   for (size_t i = 1; i < means_.size(); ++i) {
     step = std::max(step,
@@ -155,12 +156,12 @@ void ImageCheck::judgeMask(CheckFindings* findings) const {
   // A horizon keeps its position and direction, but not its strength.
   const cv::Mat is_steady =
       num_moved_ * sum_square_ < (1.0F + kSteady * kSteady) * sum_length_.mul(sum_length_);
-  const cv::Mat stays = (sum_length_of_mean > kStaticShare * sum_length_) & has_edge & is_steady;
+  const cv::Mat stays = (sum_length_of_mean > kMinStaticRatio * sum_length_) & has_edge & is_steady;
   // The borders of the field of view and of the mask are not edges of the scene.
   cv::Mat inside;
   cv::erode(valid_, inside, cv::Mat::ones(7, 7, CV_8U), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT,
             cv::Scalar(0));
-  const double in_use = shareOf(cv::countNonZero(stays & inside), cv::countNonZero(inside));
+  const double in_use = fractionOf(cv::countNonZero(stays & inside), cv::countNonZero(inside));
   const std::string subject = name_ + ": mask";
   const std::string figure =
       percentText(in_use) + " of the image shows edges that stay while the vehicle moves";

@@ -32,7 +32,7 @@ class ImageCheck {
   int64_t num_images_ = 0, num_wrong_size_ = 0, num_repeated_ = 0;
   cv::Size wrong_size_px_;
   cv::Mat last_;
-  std::vector<double> means_, contrasts_, dark_shares_, bright_shares_;
+  std::vector<double> means_, contrasts_, dark_fractions_, bright_fractions_;
   cv::Mat sum_x_, sum_y_, sum_length_, sum_square_;  // sums of gradients and of their lengths, CV_32FC1
   int num_moved_ = 0;
 };

@@ -17,7 +17,7 @@ constexpr int kSmallWidth_px = 640;
 constexpr int kMaxCorners = 250;
 constexpr double kCornerQuality = 0.01;
 constexpr int kMinTracks = 30;
-constexpr double kMinInlierShare = 0.5;
+constexpr double kMinInlierRatio = 0.5;
 /// Least cosine of the angle to the optical axis: rays further out are too long on the plane at depth 1.
 constexpr double kMinCosine = 0.35;
 constexpr double kThreshold = 0.003;
@@ -95,7 +95,7 @@ void ImageMotionMeter::estimate(const std::vector<cv::Point2f>& from_px,
   cv::Mat inliers;
   const cv::Mat essential =
       cv::findEssentialMat(from, to, cv::Mat::eye(3, 3, CV_64F), cv::RANSAC, 0.999, kThreshold, inliers);
-  if (essential.rows != 3 || cv::countNonZero(inliers) < kMinInlierShare * static_cast<double>(from.size())) {
+  if (essential.rows != 3 || cv::countNonZero(inliers) < kMinInlierRatio * static_cast<double>(from.size())) {
     return;
   }
   // Two rotations fit; the wrong one differs by half a turn about the direction of motion.

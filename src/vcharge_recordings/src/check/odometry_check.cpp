@@ -67,9 +67,9 @@ void judgePath(const OdometryPath& path, CheckFindings* findings) {
   findings->atMost("odometry: speed", fastest, kFast_m_per_s, kTooFast_m_per_s,
                    "up to " + toText(fastest, 1) + " m/s",
                    "at " + toText(fastest_at_s, 2) + " s: counters that jump, or a wrong scale?");
-  const double share = along + sideways > kMinDrive_m ? sideways / (along + sideways) : 0.0;
-  findings->atMost("odometry: sideways", share, kManySideways, kTooManySideways,
-                   percentText(share) + " of the way lies across the vehicle's axis",
+  const double fraction = along + sideways > kMinDrive_m ? sideways / (along + sideways) : 0.0;
+  findings->atMost("odometry: sideways", fraction, kManySideways, kTooManySideways,
+                   percentText(fraction) + " of the way lies across the vehicle's axis",
                    "is base_link at the centre of the rear axle, x forward?");
 }
 
@@ -166,10 +166,10 @@ void judgeOdometry(const OdometryPath& path, const std::vector<Timestamp>& image
   for (const Timestamp stamp : image_stamps) {
     num_uncovered += path.covers(path.secondsOf(stamp)) ? 0 : 1;
   }
-  const double share = image_stamps.empty()
-                           ? 0.0
-                           : static_cast<double>(num_uncovered) / static_cast<double>(image_stamps.size());
-  findings->atMost("odometry: coverage", share, kManyUncovered, kTooManyUncovered,
+  const double fraction = image_stamps.empty()
+                              ? 0.0
+                              : static_cast<double>(num_uncovered) / static_cast<double>(image_stamps.size());
+  findings->atMost("odometry: coverage", fraction, kManyUncovered, kTooManyUncovered,
                    std::to_string(num_uncovered) + " of " + std::to_string(image_stamps.size()) +
                        " images before its begin or after its end",
                    "expected odometry for as long as there are images");

@@ -67,8 +67,8 @@ double TopicTimes::period_s() const {
 void TopicTimes::judgeOrder(const std::string& subject, CheckFindings* findings) const {
   const int64_t num_bad = num_backwards_ + num_repeated_ + num_unstamped_;
   findings->atMost(subject + ": stamp order",
-                   shareOf(num_bad, static_cast<int64_t>(stamps_.size()) + num_unstamped_), kManyDisordered,
-                   kTooManyDisordered,
+                   fractionOf(num_bad, static_cast<int64_t>(stamps_.size()) + num_unstamped_),
+                   kManyDisordered, kTooManyDisordered,
                    std::to_string(num_backwards_) + " stamps go back, " + std::to_string(num_repeated_) +
                        " repeat, " + std::to_string(num_unstamped_) + " are missing",
                    "two publishers on one topic, or a clock that was set?");
@@ -102,7 +102,7 @@ void TopicTimes::judgeRate(const std::string& subject, double max_gap_s, CheckFi
     longest = std::max(longest, gap);
     num_lost += std::max<int64_t>(0, std::llround(gap / period) - 1);
   }
-  const double lost = shareOf(num_lost, static_cast<int64_t>(sorted.size()) + num_lost);
+  const double lost = fractionOf(num_lost, static_cast<int64_t>(sorted.size()) + num_lost);
   const std::string figure = toText(1.0 / period, 2) + " Hz, " + std::to_string(num_lost) + " of " +
                              std::to_string(sorted.size() + num_lost) + " lost, longest gap " +
                              toText(longest, 2) + " s";
@@ -152,7 +152,7 @@ void judgeSync(const std::vector<std::vector<Timestamp>>& stamps_by_camera, doub
     skew = std::max(skew, medianSkew(*cameras.front(), *stamps));
   }
   const std::string figure = "all " + std::to_string(cameras.size()) + " cameras at " +
-                             percentText(1.0 - shareOf(num_incomplete, num_instants)) + " of " +
+                             percentText(1.0 - fractionOf(num_incomplete, num_instants)) + " of " +
                              std::to_string(num_instants) + " instants";
   if (skew > 0.0) {
     findings->add("sync", CheckGrade::kFail,
@@ -161,8 +161,8 @@ void judgeSync(const std::vector<std::vector<Timestamp>>& stamps_by_camera, doub
                       ": images of one trigger pulse need one stamp");
     return;
   }
-  findings->atMost("sync", shareOf(num_incomplete, num_instants), kManyIncomplete, kTooManyIncomplete, figure,
-                   "a camera that loses images, or stamps that differ");
+  findings->atMost("sync", fractionOf(num_incomplete, num_instants), kManyIncomplete, kTooManyIncomplete,
+                   figure, "a camera that loses images, or stamps that differ");
 }
 
 }  // namespace vcharge::internal

@@ -69,6 +69,7 @@ class BagReading {
   BagReader bag_;
   std::map<std::string, TopicRole> roles_;  // key: topic
   StampSorter<DriveItem> sorter_;
+  internal::ItemRanks ranks_;
   std::vector<std::optional<Timestamp>> last_images_;  // last delivered image of each camera
   std::optional<Timestamp> first_image_;
 };
@@ -132,7 +133,7 @@ void BagReading::push(const std::string& topic, Timestamp stamp, DriveItem item)
                      "; expected stamps that increase, within " +
                      "sort_window_s = " + seconds(options_.sort_window_s));
   }
-  const int rank = internal::rankOf(item);
+  const int rank = ranks_.rankOf(stamp, item);
   sorter_.push(stamp, rank, std::move(item));
 }
 

@@ -31,10 +31,10 @@ TEST_F(BagDriveSourceTest, NamesAFileThatIsNoBag) {
 TEST_F(BagDriveSourceTest, NamesABagThatIsCutOffAnywhere) {
   writeDrive(3);
   const std::string whole = readTextFile(path_);
-  for (const double share : {0.001, 0.01, 0.1, 0.3, 0.5, 0.9, 0.99, 0.9999}) {
-    SCOPED_TRACE(share);
-    writeTextFileAtomically(path_,
-                            whole.substr(0, static_cast<size_t>(share * static_cast<double>(whole.size()))));
+  for (const double fraction : {0.001, 0.01, 0.1, 0.3, 0.5, 0.9, 0.99, 0.9999}) {
+    SCOPED_TRACE(fraction);
+    writeTextFileAtomically(
+        path_, whole.substr(0, static_cast<size_t>(fraction * static_cast<double>(whole.size()))));
     expectInputError([&] { read(); }, {path_, "expected"});
   }
 }

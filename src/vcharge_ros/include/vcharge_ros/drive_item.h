@@ -1,5 +1,7 @@
 #pragma once
 
+#include <limits>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -17,13 +19,25 @@ struct CameraImage {
 /// One item of a drive's data: odometry, wheel ticks or an image.
 using DriveItem = std::variant<VehicleOdometry, WheelTicks, CameraImage>;
 
-/// Order of items with one stamp: odometry, wheel ticks, images in the rig's camera order.
-inline int rankOf(const DriveItem& item) {
-  if (const auto* image = std::get_if<CameraImage>(&item)) {
-    return 2 + static_cast<int>(image->camera_index);
+/// Order of items with one stamp: odometry, wheel ticks, images in the rig's camera order, and odometry that
+/// corrects earlier odometry of this stamp, which was received after the images.
+class ItemRanks {
+ public:
+  int rankOf(Timestamp stamp, const DriveItem& item) {
+    if (const auto* image = std::get_if<CameraImage>(&item)) {
+      return 2 + static_cast<int>(image->camera_index);
+    }
+    if (std::holds_alternative<VehicleOdometry>(item)) {
+      const bool corrects = last_odometry_ == stamp;
+      last_odometry_ = stamp;
+      return corrects ? std::numeric_limits<int>::max() : 0;
+    }
+    return 1;
   }
-  return static_cast<int>(item.index());
-}
+
+ private:
+  std::optional<Timestamp> last_odometry_;
+};
 
 inline void deliver(Timestamp stamp, const DriveItem& item, DriveConsumer* consumer) {
   if (const auto* image = std::get_if<CameraImage>(&item)) {

@@ -42,7 +42,7 @@ struct LiveDriveSourceOptions {
   void takeEverything() {
     image_queue_size = 0;
     odometry_queue_size = 0;
-    sort_window_s = 0.5;
+    sort_window_s = 2.0;  // topics may be published faster than the drive
   }
 };
 

@@ -49,7 +49,7 @@ void fromMessage(const octomap_msgs::Octomap& message, const std::string& source
 visualization_msgs::Marker makeOctomapMarker(const octomap::OcTree& tree, const std::string& frame_id,
                                              Timestamp stamp) {
   constexpr double kSpan_m = 2.5;  // span of the colours, from the height
-  constexpr double kLowShare =
+  constexpr double kLowFraction =
       0.05;  // below which this fraction of the leaves lies: a few wrong ranges end deep in the ground
   visualization_msgs::Marker marker;
   marker.header.frame_id = frame_id;
@@ -84,13 +84,13 @@ visualization_msgs::Marker makeOctomapMarker(const octomap::OcTree& tree, const 
   for (const geometry_msgs::Point& point : marker.points) {
     heights.push_back(point.z);
   }
-  const double low = quantile(std::move(heights), kLowShare);
+  const double low = quantile(std::move(heights), kLowFraction);
   for (const geometry_msgs::Point& point : marker.points) {
-    const auto share = static_cast<float>(std::clamp((point.z - low) / kSpan_m, 0.0, 1.0));
+    const auto relative_height = static_cast<float>(std::clamp((point.z - low) / kSpan_m, 0.0, 1.0));
     std_msgs::ColorRGBA colour;
-    colour.r = share;
-    colour.g = 1.0F - std::abs(2.0F * share - 1.0F);
-    colour.b = 1.0F - share;
+    colour.r = relative_height;
+    colour.g = 1.0F - std::abs(2.0F * relative_height - 1.0F);
+    colour.b = 1.0F - relative_height;
     colour.a = 1.0F;
     marker.colors.push_back(colour);
   }

@@ -34,7 +34,7 @@ TEST(SparseMapConversionsTest, CloudHasTheLandmarksInOrder) {
   }
 }
 
-TEST(SparseMapConversionsTest, PointsOfAMapInTheMakingHaveTheSameFields) {
+TEST(SparseMapConversionsTest, PointsOfAnUnfinishedMapHaveTheSameFields) {
   const std::vector<Eigen::Vector3d> points = {{1.0, 2.0, 3.0}, {-4.0, 0.5, 0.25}};
   const sensor_msgs::PointCloud2 cloud = makeLandmarkCloud(points, "other");
   const sensor_msgs::PointCloud2 finished = makeLandmarkCloud(SparseMap(makeAnalyticMap()));
@@ -59,14 +59,16 @@ TEST(SparseMapConversionsTest, PathHasPosesAndStampsOfTheKeyframes) {
   for (size_t i = 0; i < path.poses.size(); ++i) {
     EXPECT_EQ(toTimestamp(path.poses[i].header.stamp), map.keyframes()[i].stamp);
     EXPECT_EQ(path.poses[i].header.frame_id, "other");
-    const RigidTransform pose = fromMessage(path.poses[i].pose, "path");
-    EXPECT_LT((pose.translation() - map.keyframes()[i].map_from_vehicle.translation()).norm(), 1e-12);
-    EXPECT_LT(angleOfRotation(pose.rotation().conjugate() * map.keyframes()[i].map_from_vehicle.rotation()),
+    const RigidTransform map_from_vehicle = fromMessage(path.poses[i].pose, "path");
+    EXPECT_LT((map_from_vehicle.translation() - map.keyframes()[i].map_from_vehicle.translation()).norm(),
+              1e-12);
+    EXPECT_LT(angleOfRotation(map_from_vehicle.rotation().conjugate() *
+                              map.keyframes()[i].map_from_vehicle.rotation()),
               1e-7);
   }
 }
 
-TEST(SparseMapConversionsTest, EdgesAreApartByWhatBecameOfThem) {
+TEST(SparseMapConversionsTest, AcceptedAndRejectedLoopEdgesAreSeparateMarkers) {
   SparseMapContents contents = makeAnalyticMap();
   const visualization_msgs::MarkerArray array = makeLoopEdgeMarkers(SparseMap(contents));
   ASSERT_EQ(array.markers.size(), 2U);

@@ -74,6 +74,7 @@ struct LiveDriveSource::Implementation {
   std::mutex mutex;  // guards all members below, and serializes the consumer's calls
   DriveConsumer* consumer = nullptr;
   StampSorter<DriveItem> sorter;
+  internal::ItemRanks ranks;
   SteadyClock::time_point last_arrival = SteadyClock::now();
   std::vector<LastImages> last_images;  // one per camera
   std::set<std::string> logged;
@@ -198,7 +199,7 @@ void LiveDriveSource::Implementation::take(const std::string& topic, Timestamp s
     sorter.flush(deliver_item);
     sorter.clear();
   }
-  const int rank = internal::rankOf(item);
+  const int rank = ranks.rankOf(stamp, item);
   sorter.push(stamp, rank, std::move(item));
   sorter.release(deliver_item);
 }

@@ -1,6 +1,10 @@
 #include "vcharge_simulation/drive/drive_simulator.h"
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
+
+#include "vcharge_simulation/rendering/noise.h"
 
 namespace vcharge {
 
@@ -9,6 +13,7 @@ namespace {
 constexpr int kImagePeriod_ms = 80;
 constexpr int kImageOffset_ms = 7;
 constexpr int kOdometryPeriod_ms = 20;
+constexpr int kMargin_ms = 200;
 // An arbitrary date with as many digits as the stamps of real drives.
 constexpr int64_t kStart_ns = 1'400'000'000'000'000'000;
 
@@ -45,20 +50,33 @@ SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& 
   const WheelOdometer odometer(motion, odometer_options, wheel_seed + 1, faults);
   const int duration_ms = static_cast<int>(std::floor(motion.duration() * 1000.0 + 0.5));
   SimulatedDrive drive;
-  std::vector<int> odometry_ms;
+  std::vector<Received<WheelTicks>> all_ticks;
+  std::vector<Timestamp> image_stamps;
+  Random jitter(wheel_seed + 2);
+  // The car reports its wheels before the recording starts and after it ends.
+  for (int time_ms = -kMargin_ms; time_ms <= duration_ms + kMargin_ms; time_ms += kOdometryPeriod_ms) {
+    if (faults.missing_ticks.isActive() && faults.missing_ticks.actsAt(std::chrono::milliseconds(time_ms))) {
+      continue;
+    }
+    WheelTicks ticks = odometer.ticks(time_ms);
+    ticks.stamp = stampAt(time_ms);
+    const double delay_s = odometer_options.latency_s + odometer_options.latency_jitter_s * jitter.uniform();
+    const Timestamp received = ticks.stamp + durationFromSeconds(delay_s);
+    all_ticks.push_back(
+        {ticks, all_ticks.empty() ? received : std::max(received, all_ticks.back().received)});
+    if (time_ms >= 0 && time_ms <= duration_ms) {
+      drive.wheel_ticks.push_back(all_ticks.back());
+    }
+  }
   for (int time_ms = 0; time_ms <= duration_ms; ++time_ms) {
     const bool is_image = time_ms % kImagePeriod_ms == kImageOffset_ms;
     const bool is_odometry = time_ms % kOdometryPeriod_ms == 0;
-    const bool is_missing =
-        faults.missing_ticks.isActive() && faults.missing_ticks.actsAt(std::chrono::milliseconds(time_ms));
     if (is_image) {
+      image_stamps.push_back(stampAt(time_ms));
       drive.world_from_vehicle.push_back({stampAt(time_ms), motion.at(time_ms).worldFromVehicle()});
       if (faults.motion_blur.isActive()) {
         drive.exposure_poses.push_back(exposurePoses(motion, time_ms, faults.motion_blur));
       }
-    }
-    if ((is_image || is_odometry) && !is_missing) {
-      odometry_ms.push_back(time_ms);
     }
     if (is_image || is_odometry) {
       const MotionSample& sample = motion.at(time_ms);
@@ -69,15 +87,16 @@ SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& 
       truth.yaw_rate_rad_per_s = sample.speed_m_per_s * sample.curvature_per_m;
       drive.ground_truth.push_back(truth);
     }
-    if (is_odometry && !is_missing) {
-      WheelTicks ticks = odometer.ticks(time_ms);
-      ticks.stamp = stampAt(time_ms);
-      drive.wheel_ticks.push_back(ticks);
-    }
   }
-  drive.odometry = odometer.deadReckoning(odometry_ms);
-  for (size_t i = 0; i < drive.odometry.size(); ++i) {
-    drive.odometry[i].stamp = stampAt(odometry_ms[i]);
+  std::optional<Timestamp> reset;
+  if (faults.counter_reset.isActive()) {
+    reset = stampAt(0) + durationFromSeconds(faults.counter_reset.time_s);
+  }
+  for (const Received<VehicleOdometry>& odometry :
+       causalOdometry(all_ticks, image_stamps, stampAt(0), reset, motion_options)) {
+    if (odometry.message.stamp <= stampAt(duration_ms)) {
+      drive.odometry.push_back(odometry);
+    }
   }
   return drive;
 }

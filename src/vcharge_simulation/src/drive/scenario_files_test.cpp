@@ -1,5 +1,6 @@
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <map>
 #include <set>
 #include <string>
@@ -37,6 +38,12 @@ double durationOf(const SimulatedDrive& drive) {
 // Mean position error of odometry over stretches of 100 m, relative to their length.
 double driftOf(const SimulatedDrive& drive) {
   constexpr double kStretch_m = 100.0;
+  OdometryBufferOptions options;
+  options.history_s = std::numeric_limits<double>::infinity();
+  OdometryBuffer odometry(options);
+  for (const Received<VehicleOdometry>& entry : drive.odometry) {
+    odometry.add(entry.message);
+  }
   std::vector<double> travelled_m(1, 0.0);
   for (size_t i = 1; i < drive.ground_truth.size(); ++i) {
     travelled_m.push_back(travelled_m.back() + (drive.ground_truth[i].odom_from_vehicle.translation() -
@@ -53,10 +60,18 @@ double driftOf(const SimulatedDrive& drive) {
     if (end == travelled_m.size()) {
       break;
     }
-    const auto motion = [&](const std::vector<VehicleOdometry>& poses) {
-      return (poses[i].odom_from_vehicle.inverse() * poses[end].odom_from_vehicle).translation().eval();
+    const OdometryBuffer::Lookup from = odometry.lookup(drive.ground_truth[i].stamp);
+    const OdometryBuffer::Lookup to = odometry.lookup(drive.ground_truth[end].stamp);
+    if (!from || !to) {
+      continue;
+    }
+    const auto motion = [](const VehicleOdometry& first, const VehicleOdometry& last) {
+      return (first.odom_from_vehicle.inverse() * last.odom_from_vehicle).translation().eval();
     };
-    sum += (motion(drive.odometry) - motion(drive.ground_truth)).head<2>().norm() / kStretch_m;
+    sum += (motion(from.odometry, to.odometry) - motion(drive.ground_truth[i], drive.ground_truth[end]))
+               .head<2>()
+               .norm() /
+           kStretch_m;
     ++count;
   }
   return count > 0 ? sum / count : 0.0;

@@ -29,7 +29,7 @@ double timeOf(const SimulatedDrive& drive, Timestamp stamp) {
 }
 
 const VehicleOdometry& odometryAt(const SimulatedDrive& drive, double time_s) {
-  for (const VehicleOdometry& odometry : drive.odometry) {
+  for (const auto& [odometry, received] : drive.odometry) {
     if (std::abs(timeOf(drive, odometry.stamp) - time_s) < 1e-4) {
       return odometry;
     }
@@ -38,7 +38,7 @@ const VehicleOdometry& odometryAt(const SimulatedDrive& drive, double time_s) {
 }
 
 const WheelTicks& ticksAt(const SimulatedDrive& drive, double time_s) {
-  for (const WheelTicks& ticks : drive.wheel_ticks) {
+  for (const auto& [ticks, received] : drive.wheel_ticks) {
     if (std::abs(timeOf(drive, ticks.stamp) - time_s) < 1e-4) {
       return ticks;
     }
@@ -77,19 +77,21 @@ TEST(OdometryFaultsTest, SlipChangesOnlyThatWheelInThatInterval) {
   ASSERT_EQ(right.wheel_ticks.size(), wrong.wheel_ticks.size());
   const double slipped_ticks = 0.3 * 0.4 * kSpeed_m_per_s / kTick_m;
   for (size_t i = 0; i < right.wheel_ticks.size(); ++i) {
-    EXPECT_EQ(right.wheel_ticks[i].left_ticks, wrong.wheel_ticks[i].left_ticks);
-    const double time_s = timeOf(right, right.wheel_ticks[i].stamp);
-    const auto difference =
-        static_cast<double>(wrong.wheel_ticks[i].right_ticks - right.wheel_ticks[i].right_ticks);
+    const WheelTicks& right_ticks = right.wheel_ticks[i].message;
+    const WheelTicks& wrong_ticks = wrong.wheel_ticks[i].message;
+    EXPECT_EQ(right_ticks.left_ticks, wrong_ticks.left_ticks);
+    const double time_s = timeOf(right, right_ticks.stamp);
+    const auto difference = static_cast<double>(wrong_ticks.right_ticks - right_ticks.right_ticks);
     if (time_s < 0.8) {
       EXPECT_EQ(difference, 0.0);
     } else if (time_s >= 1.2) {
       EXPECT_NEAR(difference, slipped_ticks, kTickTolerance);
     }
   }
-  // The heading changes by the difference of the wheel distances over the track width.
-  EXPECT_NEAR(yawOfRotation(odometryAt(wrong, 2.0).odom_from_vehicle.rotation()),
-              slipped_ticks * kTick_m / VehicleMotionOptions().track_width_m, 0.02);
+  // The heading would change by the difference of the wheel distances over the track width; the odometry
+  // recognizes the slip by the steering.
+  EXPECT_LT(std::abs(yawOfRotation(odometryAt(wrong, 2.0).odom_from_vehicle.rotation())),
+            0.2 * slipped_ticks * kTick_m / VehicleMotionOptions().track_width_m);
 }
 
 TEST(OdometryFaultsTest, BlockedWheelStandsStill) {
@@ -109,19 +111,18 @@ TEST(OdometryFaultsTest, MissingCountersLeaveAGapAndThePathGoesOnAfterIt) {
   const SimulatedDrive wrong = simulate(faults);
   expectSameTruth(right, wrong);
   std::map<int64_t, WheelTicks> ticks;
-  for (const WheelTicks& entry : right.wheel_ticks) {
+  for (const auto& [entry, received] : right.wheel_ticks) {
     ticks[entry.stamp.nanoseconds()] = entry;
   }
-  for (const WheelTicks& entry : wrong.wheel_ticks) {
+  for (const auto& [entry, received] : wrong.wheel_ticks) {
     const double time_s = timeOf(wrong, entry.stamp);
     EXPECT_TRUE(time_s < 0.8 || time_s >= 1.2) << time_s;
     EXPECT_EQ(entry.left_ticks, ticks.at(entry.stamp.nanoseconds()).left_ticks);
   }
   EXPECT_EQ(right.wheel_ticks.size() - wrong.wheel_ticks.size(), 20U);
-  EXPECT_EQ(right.odometry.size() - wrong.odometry.size(), 25U);  // 20 regular samples and those of 5 images
-  for (const VehicleOdometry& entry : wrong.odometry) {
+  for (const auto& [entry, received] : wrong.odometry) {
     const double time_s = timeOf(wrong, entry.stamp);
-    EXPECT_TRUE(time_s < 0.8 || time_s >= 1.2) << time_s;
+    EXPECT_TRUE(time_s < 0.8 + 0.1 || time_s >= 1.2) << time_s << ": extrapolated by more than 0.1 s";
   }
   EXPECT_NEAR(odometryAt(wrong, 2.0).odom_from_vehicle.translation().x(),
               odometryAt(right, 2.0).odom_from_vehicle.translation().x(), kTick_m);

@@ -5,6 +5,7 @@
 
 #include "vcharge_core/base/error.h"
 #include "vcharge_simulation/rendering/noise.h"
+#include "vcharge_wheel_odometry/wheel_odometry.h"
 
 namespace vcharge {
 
@@ -12,9 +13,7 @@ namespace {
 
 using Wheel = WheelSlipFault::Wheel;
 
-// Half width of the filter window: long enough to average the quantization of the counters.
-constexpr double kSmoothing_s = 0.25;
-static_assert(kSmoothing_s <= VehicleMotion::kMargin_s, "the window must fit the margin of the motion");
+constexpr double kFrameRate_hz = 12.5;
 
 // Wheel rotation relative to the distance rolled on the road.
 double turnFactor(const FaultOptions& faults, Wheel wheel, Duration since_start) {
@@ -94,63 +93,59 @@ WheelTicks WheelOdometer::ticks(int milliseconds) const {
   ticks.left_ticks = left_.at(index) - left_.at(start);
   ticks.right_ticks = right_.at(index) - right_.at(start);
   ticks.metres_per_tick = options_.metres_per_tick;
-  ticks.steering_angle_rad =
-      std::atan(motion_.options().wheelbase_m * motion_.at(milliseconds).curvature_per_m);
+  const int lag = static_cast<int>(std::lround(1000.0 * options_.steering_lag_s));
+  const double steering_rad =
+      std::atan(motion_.options().wheelbase_m * motion_.at(milliseconds - lag).curvature_per_m);
+  const double step_rad = options_.steering_resolution_deg * M_PI / 180.0;
+  ticks.steering_angle_rad = step_rad > 0.0 ? step_rad * std::round(steering_rad / step_rad) : steering_rad;
   return ticks;
 }
 
-WheelOdometer::WheelState WheelOdometer::smoothed(const std::vector<int64_t>& counter,
-                                                  int milliseconds) const {
-  // Least-squares parabola over a symmetric window (Savitzky and Golay). Its value and its slope at the
-  // centre are weighted sums of the counters with closed-form weights.
-  const int half = static_cast<int>(std::lround(kSmoothing_s * VehicleMotion::kStepsPerSecond));
-  const int centre = milliseconds + VehicleMotion::marginSteps();
-  const double n = 2.0 * half + 1.0;
-  const double s2 = half * (half + 1.0) * n / 3.0;                      // sum of i^2
-  const double s4 = s2 * (3.0 * half * half + 3.0 * half - 1.0) / 5.0;  // sum of i^4
-  const double determinant = n * s4 - s2 * s2;
-  // Relative to the centre, so that the sums stay exact on long drives.
-  const int64_t reference = counter.at(static_cast<size_t>(centre));
-  double value = 0.0;
-  double slope = 0.0;
-  for (int i = -half; i <= half; ++i) {
-    const auto ticks = static_cast<double>(counter.at(static_cast<size_t>(centre + i)) - reference);
-    value += (s4 - s2 * i * i) / determinant * ticks;
-    slope += i / s2 * ticks;
-  }
-  return {(static_cast<double>(reference) + value) * options_.metres_per_tick,
-          slope * options_.metres_per_tick * VehicleMotion::kStepsPerSecond};
-}
-
-std::vector<VehicleOdometry> WheelOdometer::deadReckoning(const std::vector<int>& milliseconds) const {
-  std::vector<VehicleOdometry> result;
-  const double track_m = motion_.options().track_width_m;
-  WheelState last_left{};
-  WheelState last_right{};
-  RigidTransform odom_from_vehicle;
-  for (size_t i = 0; i < milliseconds.size(); ++i) {
-    check(i == 0 || milliseconds[i] > milliseconds[i - 1],
-          "WheelOdometer::deadReckoning: times must increase");
-    const WheelState left = smoothed(left_, milliseconds[i]);
-    const WheelState right = smoothed(right_, milliseconds[i]);
-    if (i > 0) {
-      const double left_m = left.distance_m - last_left.distance_m;
-      const double right_m = right.distance_m - last_right.distance_m;
-      odom_from_vehicle =
-          odom_from_vehicle * arcMotion(0.5 * (left_m + right_m), (right_m - left_m) / track_m);
-      if (isReset(milliseconds[i]) && !isReset(milliseconds[i - 1])) {
-        odom_from_vehicle = RigidTransform();
+std::vector<Received<VehicleOdometry>> causalOdometry(const std::vector<Received<WheelTicks>>& ticks,
+                                                      const std::vector<Timestamp>& triggers, Timestamp start,
+                                                      std::optional<Timestamp> reset,
+                                                      const VehicleMotionOptions& vehicle) {
+  WheelOdometryOptions options;
+  options.track_width_m = vehicle.track_width_m;
+  options.wheelbase_m = vehicle.wheelbase_m;
+  WheelOdometry odometry(options);
+  OdometryStream stream = OdometryStream::forFrameRate(kFrameRate_hz);
+  std::vector<Received<VehicleOdometry>> published;
+  std::optional<RigidTransform> first_from_odom;  // the recording begins at the identity
+  const auto publish = [&](const std::vector<OdometryEstimate>& estimates, Timestamp now) {
+    for (const OdometryEstimate& estimate : estimates) {
+      VehicleOdometry message = estimate.odometry;
+      if (message.stamp < start) {
+        continue;
       }
+      first_from_odom = first_from_odom.value_or(message.odom_from_vehicle.inverse());
+      message.odom_from_vehicle = *first_from_odom * message.odom_from_vehicle;
+      published.push_back({message, now});
     }
-    VehicleOdometry odometry;
-    odometry.odom_from_vehicle = odom_from_vehicle;
-    odometry.forward_speed_m_per_s = 0.5 * (left.speed_m_per_s + right.speed_m_per_s);
-    odometry.yaw_rate_rad_per_s = (right.speed_m_per_s - left.speed_m_per_s) / track_m;
-    result.push_back(odometry);
-    last_left = left;
-    last_right = right;
+  };
+  size_t trigger = 0;
+  const auto triggerUntil = [&](Timestamp now) {
+    for (; trigger < triggers.size() && triggers[trigger] < now; ++trigger) {
+      publish(stream.trigger(triggers[trigger]), triggers[trigger]);
+    }
+  };
+  for (const auto& [message, received] : ticks) {
+    triggerUntil(received);
+    if (reset && message.stamp >= *reset) {
+      publish(stream.flush(), received);
+      odometry = WheelOdometry(options);
+      first_from_odom = RigidTransform();
+      reset.reset();
+    }
+    if (const std::optional<OdometryEstimate> estimate = odometry.add(message)) {
+      publish(stream.add(*estimate), received);
+    }
   }
-  return result;
+  if (!ticks.empty()) {
+    triggerUntil(ticks.back().received);
+    publish(stream.flush(), ticks.back().received);
+  }
+  return published;
 }
 
 }  // namespace vcharge

@@ -43,17 +43,17 @@ struct CalibrationBoard {
   std::string description() const;
 
  private:
-  double along(int place) const {
+  double along(int line) const {
     if (pattern == BoardPattern::kChessboard) {
-      return place * square_m;
+      return line * square_m;
     }
-    const int tag = place / 2;
-    return (tag * (1.0 + tag_spacing) + place % 2) * square_m;
+    const int tag = line / 2;
+    return (tag * (1.0 + tag_spacing) + line % 2) * square_m;
   }
 };
 
 /// Pose and shape of a board in a view: hand-held boards bend by millimetres.
-struct PlacedBoard {
+struct PosedBoard {
   RigidTransform camera_from_board;
   /// Coefficients of x^2, x y and y^2 of the board's height along its z axis, in metres, where x and y range
   /// from -1 to 1 over the corners. Zero for a flat board.

@@ -10,7 +10,6 @@
 #include "vcharge_calibration/rig/rig_calibration.h"
 #include "vcharge_core/frames/drive_source.h"
 #include "vcharge_core/sparse_map/sparse_map.h"
-#include "vcharge_reconstruction/frame_gatherer.h"
 #include "vcharge_reconstruction/keyframe_builder.h"
 #include "vcharge_reconstruction/map_localizer.h"
 #include "vcharge_reconstruction/reconstruction_state.h"
@@ -18,10 +17,12 @@
 
 namespace vcharge {
 
-/// A keyframe of a drive in a map: its features, and a pose from each camera alone.
+/// A keyframe of a drive in a map: its features, and the pose of each camera by its own image.
 struct MapKeyframeView {
   RigFeatures features;
-  std::vector<std::optional<PoseFix>> camera_fixes;  ///< map_from_vehicle holds the pose of the camera
+  /// One per camera; empty where it was not localized. Their map_from_vehicle is map_from_camera, since the
+  /// localizer's rig has all cameras at its origin.
+  std::vector<std::optional<PoseFix>> camera_fixes;
 };
 
 /// Calibrates the extrinsics of a rig from a drive in a finished map (paper, section Structure-based
@@ -40,7 +41,8 @@ class MapRigCalibrator : public DriveConsumer {
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
 
-  /// Adds a keyframe from its features instead of its images.
+  /// Adds a keyframe from its features instead of its images; the distance to the last keyframe is not
+  /// checked.
   void addKeyframe(Timestamp stamp, RigFeatures features, const RigidTransform& odom_from_vehicle);
 
   /// Calibrates from the drive so far. If the drive does not suffice, the verdict is kFail, with remarks why.
@@ -56,9 +58,9 @@ class MapRigCalibrator : public DriveConsumer {
   std::string reportSection() const;
 
  private:
-  void processFrame(Timestamp stamp, const std::vector<Image>& images,
-                    const RigidTransform& odom_from_vehicle);
+  void processFrame(const ImageFrame& frame);
   RigidTransform motionSinceKeyframe(const RigidTransform& odom_from_vehicle) const;
+  /// Localizes one camera by its own features, near the pose predicted by the odometer if there is one.
   std::optional<PoseFix> findCamera(const RigFeatures& features, size_t camera) const;
 
   const MapRigCalibratorOptions options_;
@@ -70,7 +72,7 @@ class MapRigCalibrator : public DriveConsumer {
   std::vector<int32_t> landmark_of_track_;  // indices in the map, set by finish()
   ReconstructionState state_;
   KeyframeBuilder keyframes_;
-  std::unique_ptr<FrameGatherer> gatherer_;
+  std::unique_ptr<FrameAssembler<Image>> assembler_;
   double travelled_m_ = 0.0;
 };
 

@@ -33,7 +33,7 @@ struct CalibrationImage {
 /// A view used by the calibration.
 struct CalibratedView {
   BoardView view;
-  PlacedBoard placed;
+  PosedBoard posed;
   double rms_px = 0.0;  ///< RMS error per coordinate
   double edge_width_px = 0.0;
 };

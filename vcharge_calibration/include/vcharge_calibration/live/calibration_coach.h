@@ -64,25 +64,25 @@ class CalibrationCoach {
   /// Adds a motion of a camera; MotionPair::keyframe is the index of its first keyframe.
   void addMotion(size_t camera, const MotionPair& motion);
 
-  size_t numKeyframes() const { return places_.size(); }
+  size_t numKeyframes() const { return visited_.size(); }
   /// Computed from all keyframes and motions.
   DriveOutlook outlook() const;
 
  private:
-  struct Place {
+  struct VisitedPose {
     RigidTransform odom_from_vehicle;
     double travelled_m = 0.0;
     bool is_revisited = false;
   };
   CameraOutlook cameraOutlook(size_t camera) const;
   double weakness(const CameraOutlook& camera, int* degree_of_freedom) const;
-  void judgeSigmas(DriveOutlook* outlook, std::vector<double>* shares) const;
+  void judgeSigmas(DriveOutlook* outlook, std::vector<double>* fulfilled) const;
   void judge(DriveOutlook* outlook) const;
 
   const std::vector<std::string> names_;
   HandEyeOptions hand_eye_;
   const CalibrationCoachOptions options_;
-  std::vector<Place> places_;
+  std::vector<VisitedPose> visited_;
   std::vector<std::vector<MotionPair>> motions_;  // motions of each camera
   double left_turn_rad_ = 0.0, right_turn_rad_ = 0.0, revisited_m_ = 0.0;
 };

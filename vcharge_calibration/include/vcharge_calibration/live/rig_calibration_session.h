@@ -58,7 +58,7 @@ class RigCalibrationSession : public DriveConsumer {
   using ResultCallback = std::function<void(const FinishedCalibration&)>;
   /// Called inside addImage() and addOdometry() after an update of the outlook; the rig has the extrinsics
   /// from hand-eye calibration as far as they are known.
-  using DriveCallback = std::function<void(const ReconstructionState&, const CameraRig& guess)>;
+  using DriveCallback = std::function<void(const ReconstructionState&, const CameraRig& initial_rig)>;
 
   /// Callbacks other than `on_result` must not throw. Errors as for RigCalibrator; std::invalid_argument
   /// for bad options.

@@ -28,7 +28,7 @@ struct CameraCalibration {
   Eigen::Matrix<double, 6, 1> half_difference = Eigen::Matrix<double, 6, 1>::Zero();
   int64_t num_tracked = 0;           ///< observations in tracks of three keyframes or more
   int64_t num_observations = 0;      ///< observations of adjusted landmarks
-  int64_t num_shared_landmarks = 0;  ///< landmarks that another camera observes too
+  int64_t num_common_landmarks = 0;  ///< landmarks that another camera observes too
   double rms_px = 0.0;               ///< RMS error per coordinate
   double structure_px = 0.0;         ///< RMS over the image's cells of their mean error
   std::string weakest_direction;     ///< the least certain degree of freedom, as text

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <exception>
-#include <set>
+#include <map>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -175,7 +175,8 @@ void collectRows(const Options& options, const std::string& prefix, std::vector<
 }
 
 std::string showRows(const std::vector<OptionRow>& rows);
-std::string listRows(const std::vector<OptionRow>& rows, std::set<std::string>* listed_groups);
+std::string listRows(const std::vector<OptionRow>& rows, std::map<std::string, std::string>* listed_groups,
+                     const std::string& section);
 
 }  // namespace internal
 
@@ -226,13 +227,15 @@ std::string showOptions(const Options& options) {
   return internal::showRows(rows);
 }
 
-/// A Markdown list of all options with default, meaning and allowed values. A group whose type is in
-/// `listed_groups` is named without its options; the types of the others are added.
+/// A Markdown table of all options of a section with default, allowed values and meaning. `listed_groups`
+/// has the place of every type of group listed so far: such a group is a reference to it. The others are
+/// added.
 template <class Options>
-std::string optionList(const Options& options, std::set<std::string>* listed_groups) {
+std::string optionTable(const Options& options, const std::string& section,
+                        std::map<std::string, std::string>* listed_groups) {
   std::vector<internal::OptionRow> rows;
   internal::collectRows(options, "", &rows);
-  return internal::listRows(rows, listed_groups);
+  return internal::listRows(rows, listed_groups, section);
 }
 
 /// Throws std::invalid_argument "<field>: <requirement>, is <value>" unless the condition holds. For

@@ -29,7 +29,7 @@ class SvgPlot {
   std::string make() const;
 
  private:
-  std::string place(const Eigen::Vector2d& point) const;
+  std::string coordinates(const Eigen::Vector2d& point) const;
   double toX(double x) const;
   double toY(double y) const;
   std::string axes() const;

@@ -19,11 +19,14 @@ class DriveOdometry {
   /// Uses known poses instead of odometry; add() is then ignored, and no frame waits for odometry.
   void setTrajectory(const Trajectory& odom_from_vehicle);
   bool isGiven() const { return is_given_; }
+  /// Corrections are then counted as ignored messages.
+  void ignoreCorrections() { takes_corrections_ = false; }
 
   /// Whether the stamp is so much older than the newest that the drive has started again.
   bool jumpsBack(Timestamp stamp) const;
-  /// Adds a message; returns the break before it, if there is one. A message that is not newer than the last
-  /// is ignored and counted.
+  /// Adds a message; returns the break before it, if there is one. A message with the stamp of an earlier one
+  /// replaces it, as when the driver's extrapolation to an image's stamp becomes known. Other messages that
+  /// are not newer than the last are ignored. Both are counted.
   std::optional<DriveBreak> add(const VehicleOdometry& odometry, FrameCounters* counters);
   void clear();
 
@@ -40,6 +43,7 @@ class DriveOdometry {
   const std::optional<Eigen::Vector3d>& velocity() const { return velocity_; }
 
  private:
+  void correct(const VehicleOdometry& odometry, FrameCounters* counters);
   bool isReset(const VehicleOdometry& odometry) const;
 
   const FrameAssemblerOptions options_;
@@ -49,6 +53,7 @@ class DriveOdometry {
   std::optional<VehicleOdometry> last_;
   std::optional<Eigen::Vector3d> velocity_;
   bool is_given_ = false;
+  bool takes_corrections_ = true;
 };
 
 }  // namespace vcharge

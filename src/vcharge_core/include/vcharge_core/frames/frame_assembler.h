@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <deque>
 #include <functional>
 #include <map>
 #include <optional>
@@ -13,6 +14,24 @@
 #include "vcharge_core/frames/image.h"
 
 namespace vcharge {
+
+/// Pose of a frame that was handed out with another one, before the odometry corrected it.
+struct CorrectedPose {
+  Timestamp stamp;
+  RigidTransform odom_from_vehicle;
+  RigidTransform bridged_from_vehicle;
+  RigidTransform old_vehicle_from_vehicle;  ///< the correction itself
+};
+
+/// The pose that a correction gives the frame at this stamp; null without one.
+inline const CorrectedPose* correctionAt(const std::vector<CorrectedPose>& corrections, Timestamp stamp) {
+  for (const CorrectedPose& corrected : corrections) {
+    if (corrected.stamp == stamp) {
+      return &corrected;
+    }
+  }
+  return nullptr;
+}
 
 /// Images of one stamp and the pose of the vehicle at that time. An ImageType is the data of one camera: gray
 /// pixels, or something computed from them.
@@ -28,6 +47,9 @@ struct AssembledFrame {
   /// Reason why there is no pose.
   OdometryBuffer::LookupStatus odometry_status = OdometryBuffer::LookupStatus::kEmpty;
   int64_t num_resets = 0;  ///< resets of the odometer before this frame
+  /// Frames of the last second whose poses changed since the previous frame, in order of stamps. The pose at
+  /// an image's stamp is extrapolated if the wheels' data are late; the next message corrects it.
+  std::vector<CorrectedPose> corrections;
 };
 using ImageFrame = AssembledFrame<Image>;
 
@@ -68,6 +90,10 @@ class FrameAssembler {
   /// Takes the poses from this trajectory instead of from the odometry.
   void setTrajectory(const Trajectory& odom_from_vehicle) { odometry_.setTrajectory(odom_from_vehicle); }
 
+  /// Keeps the first pose of every stamp, for stages whose images come so late that it depends on the load
+  /// whether a correction comes before or after them.
+  void ignoreCorrections() { odometry_.ignoreCorrections(); }
+
   /// Returns false if the image is late and was dropped.
   bool addImage(size_t camera_index, Timestamp stamp, ImageType image);
   void addOdometry(const VehicleOdometry& odometry);
@@ -95,6 +121,7 @@ class FrameAssembler {
   };
 
   static constexpr double kReplay_s = 1.0;
+  static constexpr double kCorrectable_s = 1.0;
   Timestamp clock() const {
     const std::optional<VehicleOdometry>& last = odometry_.last();
     return last && !(newest_image_ && *newest_image_ > last->stamp) ? last->stamp : *newest_image_;
@@ -105,6 +132,7 @@ class FrameAssembler {
   /// Hands out all frames before a stamp, or all frames.
   void handOut(std::optional<Timestamp> before);
   void handOutFirst();
+  std::vector<CorrectedPose> takeCorrections();
   void startOver();
 
   const FrameAssemblerOptions options_;
@@ -118,6 +146,8 @@ class FrameAssembler {
   std::vector<std::optional<Timestamp>> newest_of_camera_;
   std::vector<int> stamps_since_;         // per camera: stamps that came since its last image
   std::optional<Timestamp> last_closed_;  // images up to this stamp are late
+  std::deque<CorrectedPose> handed_out_;  // poses of the frames of the last kCorrectable_s
+  int64_t num_corrections_ = 0;           // corrections of the odometry that handed_out_ has
   FrameCounters counters_;
 };
 
@@ -248,12 +278,15 @@ void FrameAssembler<ImageType>::handOutFirst() {
   for (size_t camera = 0; camera < is_used_.size(); ++camera) {
     counters_.missing_images[camera] += is_used_[camera] && !frame.has_image[camera] ? 1 : 0;
   }
+  frame.corrections = takeCorrections();
   const OdometryBuffer::Lookup bridged = odometry_.lookupBridged(frame.stamp);
   frame.odometry_status = bridged.status;
   if (bridged) {
     frame.bridged_from_vehicle = bridged.odometry.odom_from_vehicle;
     if (const OdometryBuffer::Lookup raw = odometry_.lookup(frame.stamp)) {
       frame.odom_from_vehicle = raw.odometry.odom_from_vehicle;
+      handed_out_.push_back(
+          {frame.stamp, *frame.odom_from_vehicle, *frame.bridged_from_vehicle, RigidTransform()});
     }
   } else {
     ++counters_.frames_without_odometry;
@@ -263,8 +296,34 @@ void FrameAssembler<ImageType>::handOutFirst() {
 }
 
 template <class ImageType>
+std::vector<CorrectedPose> FrameAssembler<ImageType>::takeCorrections() {
+  std::vector<CorrectedPose> corrections;
+  const auto isSame = [](const RigidTransform& a, const RigidTransform& b) {
+    return a.translation() == b.translation() && a.rotation().coeffs() == b.rotation().coeffs();
+  };
+  if (counters_.odometry_corrections != num_corrections_) {
+    for (CorrectedPose& pose : handed_out_) {
+      const OdometryBuffer::Lookup raw = odometry_.lookup(pose.stamp);
+      const OdometryBuffer::Lookup bridged = odometry_.lookupBridged(pose.stamp);
+      if (raw && bridged && !isSame(raw.odometry.odom_from_vehicle, pose.odom_from_vehicle)) {
+        pose = {pose.stamp, raw.odometry.odom_from_vehicle, bridged.odometry.odom_from_vehicle,
+                pose.bridged_from_vehicle.inverse() * bridged.odometry.odom_from_vehicle};
+        corrections.push_back(pose);
+      }
+    }
+    num_corrections_ = counters_.odometry_corrections;
+  }
+  while (!handed_out_.empty() &&
+         toSeconds(handed_out_.back().stamp - handed_out_.front().stamp) > kCorrectable_s) {
+    handed_out_.pop_front();
+  }
+  return corrections;
+}
+
+template <class ImageType>
 void FrameAssembler<ImageType>::startOver() {
   handOut(std::nullopt);
+  handed_out_.clear();
   newest_image_.reset();
   last_closed_.reset();
   std::fill(newest_of_camera_.begin(), newest_of_camera_.end(), std::nullopt);

@@ -49,7 +49,8 @@ struct FrameCounters {
   int64_t frames_without_odometry = 0;
   int64_t odometry_gaps = 0;
   int64_t odometry_resets = 0;
-  int64_t ignored_odometry = 0;         ///< repeated, or older than the newest
+  int64_t ignored_odometry = 0;         ///< older than the newest, at a stamp without an entry
+  int64_t odometry_corrections = 0;     ///< entries replaced by a later message with their stamp
   int64_t replays = 0;                  ///< stamps jumped back: the drive started again
   std::vector<int64_t> missing_images;  ///< per camera, in the frames that were handed out
   std::vector<int64_t> late_images;     ///< per camera: repeated, or came after their frame was handed out

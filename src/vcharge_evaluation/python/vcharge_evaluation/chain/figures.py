@@ -8,7 +8,7 @@ import yaml
 
 from vcharge_evaluation import obstacles, tools
 from vcharge_evaluation.camera_models import project
-from vcharge_evaluation.localization_errors import LocalizationErrors, Map
+from vcharge_evaluation.localization_errors import BOUND_DEG, BOUND_M, LocalizationErrors, Map
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
@@ -108,7 +108,7 @@ def judge_map(path, truth, figures, report, picture):
 def judge_height_map(output, truth, rig, poses, figures, folder):
     errors = tools.judge("height_map", folder / "report", "--map", output, "--truth", truth, "--rig", rig, "--trajectory",
                          poses)
-    figures.update({"mean_m": errors["height_m"]["mean"], "within_10_cm": errors["share_within_10_cm"],
+    figures.update({"mean_m": errors["height_m"]["mean"], "within_10_cm": errors["fraction_within_10_cm"],
                     "step_m": errors["step_position_m"]["mean"], "tape_m": errors["mean_measurement_m"],
                     "max_tape_m": errors["max_measurement_m"],
                     "tapes": len(errors["measurements"]) - errors["num_measurements_missing"],
@@ -118,7 +118,7 @@ def judge_height_map(output, truth, rig, poses, figures, folder):
 def judge_ranges(output, truth, bag, rig, folder):
     errors = tools.judge("range", folder / "report", "--range", output, "--truth", truth, "--bag", bag, "--rig", rig)
     whole = next((part for part in errors["sets"] if part["label"] == "all cameras"), errors["sets"][0])
-    return {"within_5_percent": {f"{100 * row['density']:.0f} %": row["share_within_tolerance"] for row in whole["accuracy"]}}
+    return {"within_5_percent": {f"{100 * row['density']:.0f} %": row["fraction_within_tolerance"] for row in whole["accuracy"]}}
 
 
 def localization_figures(result, csv, map_path, truths, picture):
@@ -130,11 +130,11 @@ def localization_figures(result, csv, map_path, truths, picture):
     errors = LocalizationErrors(csv, other / "trajectory.tum", Map(map_path, mapping / "trajectory.tum"))
     good = errors.localized()
     if good.any():
-        figures.update({"median_m": float(np.median(errors.error_m[good])),
-                        "p95_m": float(np.percentile(errors.error_m[good], 95)),
-                        "median_deg": float(np.median(errors.error_deg[good])),
-                        "p95_deg": float(np.percentile(errors.error_deg[good], 95)), "wrong": errors.num_false(),
-                        "absolute_median_m": float(np.median(errors.absolute_m[good])),
+        figures.update({"median_m": errors.quantile(errors.error_m, 50, BOUND_M),
+                        "p95_m": errors.quantile(errors.error_m, 95, BOUND_M),
+                        "median_deg": errors.quantile(errors.error_deg, 50, BOUND_DEG),
+                        "p95_deg": errors.quantile(errors.error_deg, 95, BOUND_DEG), "wrong": errors.num_false(),
+                        "absolute_median_m": errors.quantile(errors.absolute_m, 50, BOUND_M),
                         "normalized": float(np.mean(errors.normalized[good]))})
         errors.plot(picture)
     return figures

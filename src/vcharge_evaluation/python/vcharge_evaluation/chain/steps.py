@@ -25,14 +25,15 @@ WHEELS = ("--set", "odometer.scale_error=0.0005", "--set", "odometer.left_right_
 OTHER_WHEELS = ("--set", "odometer.scale_error=-0.0005", "--set", "odometer.left_right_error=0.0003")
 
 
-def identity(path):
-    """Text that changes when a recording does: its files with their sizes and times."""
+def fingerprint(path):
+    """Text that changes with a file or folder: its files with their sizes and times of modification."""
     path = path.resolve()
     files = sorted(path.rglob("*")) if path.is_dir() else [path]
     return " ".join(f"{file}:{file.stat().st_size}:{file.stat().st_mtime_ns}" for file in files if file.is_file())
 
 
 def settings(name):
+    """Path and text of an options file in config/; the text decides whether a step must run again."""
     return CONFIG / name, (CONFIG / name).read_text()
 
 
@@ -45,10 +46,11 @@ class Chain:
         self.simulated = args.bag is None
         self.pictures = self.work / "pictures"
         self.pictures.mkdir(parents=True, exist_ok=True)
+        # By name of the step: the hash of its input, and what it found (title, figures, times).
         self.keys, self.steps, self.number = {}, {}, 0
         scale = 0.5 if args.quick else 1.0
-        self.words = ["--scene-seed", args.seed, "--rig", "random", "--rig-seed", args.rig_seed,
-                      "--image-scale", scale]
+        self.simulator_arguments = ["--scene-seed", args.seed, "--rig", "random", "--rig-seed", args.rig_seed,
+                                    "--image-scale", scale]
 
     def step(self, name, title, needs, given, work):
         """Calls `work(folder)`, which returns figures, unless an earlier run did with the same `given` (texts) after the same
@@ -77,7 +79,7 @@ class Chain:
         return folder
 
     def simulate(self, name, title, *words):
-        words = ["--scene", self.args.scene, *self.words, *words]
+        words = ["--scene", self.args.scene, *self.simulator_arguments, *words]
 
         def work(folder):
             run_tool("simulate_drive", folder / "simulate.log", *words, "--output", folder / "drive.bag")
@@ -85,14 +87,16 @@ class Chain:
 
         return self.step(name, title, [], words, work)
 
-    def take_own(self, name, title, bag):
+    def link_recording(self, name, title, bag):
+        """A step that only links a bag of the user."""
         def work(folder):
             (folder / "drive.bag").symlink_to(bag.resolve())
             return {}
 
-        return self.step(name, title, [], [identity(bag)], work)
+        return self.step(name, title, [], [fingerprint(bag)], work)
 
     def truth_of(self, drive):
+        """Folder of a simulated drive's truth; None for a recording."""
         return drive / "drive_truth" if self.simulated else None
 
     def boards(self):
@@ -104,9 +108,9 @@ class Chain:
                     entries[entry.stem] = entry
             if not entries:
                 raise SystemExit(f"{self.args.boards}: no folder CAMERA and no CAMERA.bag in it")
-            self.keys["boards"] = identity(self.args.boards)
+            self.keys["boards"] = fingerprint(self.args.boards)
             return entries
-        words = [*self.words, "--scene", "chessboard", "--seed", self.args.seed + 100, "--image-step", 8]
+        words = [*self.simulator_arguments, "--scene", "chessboard", "--seed", self.args.seed + 100, "--image-step", 8]
 
         def work(folder):
             for camera in CAMERAS:
@@ -134,7 +138,7 @@ class Chain:
                 figures.judge_intrinsics(output, truths, found, self.pictures / "intrinsics.png")
             return found
 
-        given = [self.args.board, self.args.square_m, identity(self.args.rig) if self.args.rig else ""]
+        given = [self.args.board, self.args.square_m, fingerprint(self.args.rig) if self.args.rig else ""]
         return self.step("intrinsics", "intrinsics from the boards", ["boards"], given, work) / "cameras.yaml"
 
     def add_masks(self, path, boards):
@@ -235,7 +239,7 @@ class Chain:
             result = run_tool("localize_drive", folder / "localize.log", "--bag", drive / "drive.bag", "--rig", rig, "--map",
                               mapped / "map.vmap", "--options", options, "--output", folder / "poses.tum")
             return figures.localization_figures(result, folder / "poses.tum.csv", mapped / "map.vmap", truths,
-                                                     self.pictures / f"{name}.png")
+                                                self.pictures / f"{name}.png")
 
         return self.step(name, title, needs, [text], work)
 
@@ -245,10 +249,10 @@ class Chain:
 
         def work(folder):
             # The options name cameras that another rig may not have.
-            known = set(yaml.safe_load(rig.read_text())["cameras"])
-            words = ["--options", options] if {"front", "left", "right"} <= known else []
+            cameras = set(yaml.safe_load(rig.read_text())["cameras"])
+            words = ["--options", options] if {"front", "left", "right"} <= cameras else []
             result = run_tool("detect_obstacles", folder / "detect.log", "--bag", drive / "drive.bag", "--rig", rig, *words,
-                              "--range-options", self.range_options(ranges, known, folder), "--output", folder / "maps")
+                              "--range-options", self.range_options(ranges, cameras, folder), "--output", folder / "maps")
             found = figures.pick(result, "num_maps", "content_hash", "processor_ms_per_range_map")
             self.draw("obstacles", f"{name}.png", folder, "--bag", drive / "drive.bag", "--rig", rig, "--obstacles", folder / "maps",
                       *(["--truth", truth] if truth else []))
@@ -315,8 +319,8 @@ class Chain:
     def drives(self):
         """For calibration, for the map, and on another day."""
         if not self.simulated:
-            mapping = self.take_own("mapping_drive", "your drive", self.args.bag)
-            other = self.take_own("other_day", "your other drive", self.args.other_bag) if self.args.other_bag else mapping
+            mapping = self.link_recording("mapping_drive", "your drive", self.args.bag)
+            other = self.link_recording("other_day", "your other drive", self.args.other_bag) if self.args.other_bag else mapping
             return mapping, mapping, other
         args = self.args
         calibration = self.simulate("calibration_drive", "a drive to calibrate from", "--drive", "figure_eight", "--seed",
@@ -333,9 +337,9 @@ class Chain:
         given = self.args.rig
         if given and not self.args.boards:
             cameras = yaml.safe_load(given.read_text())["cameras"]
-            self.keys["intrinsics"] = identity(given)
+            self.keys["intrinsics"] = fingerprint(given)
             if all("vehicle_from_camera" in camera for camera in cameras.values()):
-                self.keys["extrinsics"] = identity(given)
+                self.keys["extrinsics"] = fingerprint(given)
                 return given.resolve()
             path = given.resolve()
         else:
@@ -343,7 +347,7 @@ class Chain:
         return self.extrinsics(path, calibration, ["intrinsics", calibration.name])
 
     def stages(self):
-        """Everything from recordings to results, each stage with the output of those before."""
+        """All stages from recordings to results, each with the output of those before."""
         calibration, mapping, other = self.drives()
         rig = self.rig(calibration)
         mapped = self.sparse_map(mapping, rig, ["extrinsics", mapping.name])
@@ -364,7 +368,7 @@ class Chain:
         self.height_map(mapping, rig, mapped / "map.tum", ["map_true_rig"], "height_map_true_rig", "a height map, true rig")
         self.height_map(mapping, rig, poses, [mapping.name], "height_map_truth", "a height map, true rig and poses")
 
-    def go(self):
+    def run_all(self):
         _, other, rig, mapped, heights = self.stages()
         if not self.args.no_nodelets:
             self.nodelets(mapped, other, rig, ["localization", "obstacles"])
@@ -377,7 +381,7 @@ class Chain:
 
 
 def main():
-    Chain(arguments(__doc__)).go()
+    Chain(arguments(__doc__)).run_all()
 
 
 if __name__ == "__main__":

@@ -81,8 +81,8 @@ namespace internal {
 /// a step leaves the bracket.
 template <size_t N>
 double rootInBracket(const std::array<double, N>& polynomial, double low, double high, bool low_is_negative,
-                     double guess) {
-  double x = guess;
+                     double start) {
+  double x = start;
   for (int iteration = 0; iteration < 60; ++iteration) {
     double value = 0.0;
     double derivative = 0.0;
@@ -221,9 +221,9 @@ void visitRootsInUnitInterval(const std::array<double, N>& polynomial, const Vis
     }
     if (variations == 1 && first == 0 && last == N - 1) {
       const double fraction = b[crossing] / (b[crossing] - b[crossing + 1]);
-      const double guess =
+      const double start =
           piece.low + piece.width * (static_cast<double>(crossing) + fraction) / static_cast<double>(N - 1);
-      visit(internal::rootInBracket(polynomial, piece.low, piece.low + piece.width, b[0] < 0.0, guess));
+      visit(internal::rootInBracket(polynomial, piece.low, piece.low + piece.width, b[0] < 0.0, start));
       continue;
     }
     if (piece.depth >= kDoubleRootDepth) {

@@ -13,18 +13,21 @@ namespace vcharge {
 /// Everything recorded on a drive except the images.
 struct SimulatedDrive {
   Trajectory world_from_vehicle;  ///< true pose at every image stamp
-  std::vector<VehicleOdometry>
-      ground_truth;                       ///< true pose in the world frame at every odometry and image stamp
-  std::vector<VehicleOdometry> odometry;  ///< at 50 Hz and at every image stamp
-  std::vector<WheelTicks> wheel_ticks;    ///< at 50 Hz
-  /// Poses of the renderings that are averaged into each image; empty without motion blur.
+  /// True poses in the world frame, and velocities, at every odometry and image stamp.
+  std::vector<VehicleOdometry> ground_truth;
+  std::vector<Received<VehicleOdometry>> odometry;  ///< in order of reception, see causalOdometry()
+  std::vector<Received<WheelTicks>> wheel_ticks;    ///< at 50 Hz, in order of reception
+  /// For each image, world_from_vehicle of the renderings that are averaged into it; empty without motion
+  /// blur.
   std::vector<std::vector<RigidTransform>> exposure_poses;
 };
 
-/// Simulates a drive along a path. Images come every 80 ms, 7 ms after an odometry sample. `road_seed`
-/// selects the road roughness, `wheel_seed` the phase of the wheel counters at the start. Applies the faults
-/// of wheels, counters and suspension, and returns the poses for motion blur; all stamps are the true ones.
-/// The same arguments give bit-identical results. Throws std::invalid_argument for invalid options.
+/// Simulates a drive along a path on ground of this height. Images come every 80 ms, 7 ms after an odometry
+/// sample, so that no image has the stamp of a regular odometry message. `road_seed` selects the road's
+/// roughness, `wheel_seed` the phase of the wheel counters at the start. Applies the faults of wheels,
+/// counters and suspension; all stamps are the true ones, since faults of clocks and messages are applied
+/// when the drive is recorded. The same arguments give bit-identical results. Throws std::invalid_argument
+/// for bad options.
 SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& motion_options,
                              const WheelOdometerOptions& odometer_options, uint64_t road_seed,
                              uint64_t wheel_seed, const FaultOptions& faults = FaultOptions(),

@@ -1,4 +1,4 @@
-#include "rig/calibration_verdict.h"
+#include "intrinsics/calibration_verdict.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +19,7 @@ constexpr double kFailError_px = 3.0;
 constexpr double kWarnUnseen = 1.5;
 // Minimum tilt of views against the line of sight; without tilt, focal length and distance correlate.
 constexpr double kMinTilt_rad = 0.25;
-constexpr double kMinTiltedShare = 0.2;
+constexpr double kMinTiltedFraction = 0.2;
 
 std::string join(const std::vector<std::string>& words) {
   std::string text;
@@ -29,10 +29,10 @@ std::string join(const std::vector<std::string>& words) {
   return text;
 }
 
-double tilt(const PlacedBoard& placed) {
-  const Eigen::Vector3d normal = placed.camera_from_board.rotation() * Eigen::Vector3d::UnitZ();
-  const Eigen::Vector3d sight = placed.camera_from_board.translation().normalized();
-  return std::acos(std::min(1.0, std::abs(normal.dot(sight))));
+double tilt(const PosedBoard& posed) {
+  const Eigen::Vector3d normal = posed.camera_from_board.rotation() * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d to_board = posed.camera_from_board.translation().normalized();
+  return std::acos(std::min(1.0, std::abs(normal.dot(to_board))));
 }
 
 }  // namespace
@@ -42,7 +42,7 @@ void judgeCalibration(const IntrinsicCalibrationOptions& options, IntrinsicCalib
   size_t tilted = 0;
   for (const CalibratedView& view : result->views) {
     coverage.add(view.view);
-    tilted += tilt(view.placed) > kMinTilt_rad ? 1 : 0;
+    tilted += tilt(view.posed) > kMinTilt_rad ? 1 : 0;
   }
   result->remarks.clear();
   const auto fail = [result](const std::string& reason) {
@@ -70,7 +70,7 @@ void judgeCalibration(const IntrinsicCalibrationOptions& options, IntrinsicCalib
          (missing.empty() ? "hold the board also at its sides and in its corners"
                           : "pictures with the board at the image's " + join(missing) + " are missing"));
   }
-  if (static_cast<double>(tilted) < kMinTiltedShare * static_cast<double>(result->views.size())) {
+  if (static_cast<double>(tilted) < kMinTiltedFraction * static_cast<double>(result->views.size())) {
     warn("the board faces the camera in nearly all images: pictures with the board tilted are missing");
   }
   if (result->rms_px > kWarnError_px) {

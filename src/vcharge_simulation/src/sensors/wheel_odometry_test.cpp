@@ -133,7 +133,8 @@ TEST(WheelOdometryTest, ASimulatedDriveIsRightWithinTheEncodersResolutionAndSmoo
     const double tick_deg = tick_m / motion.options().track_width_m * kDegrees;
     EXPECT_LE(errors.max_distance_m, tick_m);
     EXPECT_LE(errors.max_yaw_deg, tick_deg);
-    EXPECT_LE(errors.rms_yaw_jitter_deg, 0.03);
+    // The steering's lag counts with the speed.
+    EXPECT_LE(errors.rms_yaw_jitter_deg, speed > 3.0 ? 0.04 : 0.03);
     EXPECT_EQ(errors.counts.slips, 0u);
     EXPECT_GT(errors.length_m, 80.0);
   }
@@ -172,6 +173,20 @@ TEST(WheelOdometryTest, DrivesThatNothingWasChosenOnAreRightAndSmoothToo) {
       EXPECT_LE(errors.rms_yaw_jitter_deg, 0.03) << name;
       EXPECT_EQ(errors.counts.slips, 0u) << name;
     }
+  }
+}
+
+TEST(WheelOdometryTest, AnotherSteeringLagThanTheOptionsSayCostsLittle) {
+  const VehicleMotion motion = drive(2.5);
+  for (const double lag_s : {0.0, 0.1}) {
+    WheelOdometerOptions sensors = exactWheels();
+    sensors.steering_lag_s = lag_s;
+    const WheelOdometer odometer(motion, sensors, 5);
+    const Errors errors = compare(motion, odometer, WheelOdometryOptions());
+    print(("steering that lags by " + std::to_string(lag_s) + " s").c_str(), errors);
+    EXPECT_LE(errors.max_yaw_deg, 2.0 * sensors.metres_per_tick / motion.options().track_width_m * kDegrees);
+    EXPECT_LE(errors.rms_yaw_jitter_deg, 0.06);
+    EXPECT_EQ(errors.counts.slips, 0u);
   }
 }
 
@@ -304,7 +319,7 @@ TEST(OdometryStreamTest, HasAnEstimateAtEveryTriggerInOrderOfStamps) {
     }
   }
   for (size_t i = 1; i < stamps.size(); ++i) {
-    ASSERT_LT(stamps[i - 1], stamps[i]);
+    ASSERT_LE(stamps[i - 1], stamps[i]) << "the same stamp again is a correction";
   }
   for (const Timestamp trigger : triggers) {
     EXPECT_TRUE(std::binary_search(stamps.begin(), stamps.end(), trigger));
@@ -312,7 +327,27 @@ TEST(OdometryStreamTest, HasAnEstimateAtEveryTriggerInOrderOfStamps) {
   EXPECT_GE(stamps.back(), atMilliseconds(3800)) << "they go on without triggers";
 }
 
-TEST(OdometryStreamTest, DoesNotGuessFarAhead) {
+TEST(OdometryStreamTest, CorrectsAnExtrapolatedEstimateOnceTheTicksReachIt) {
+  OdometryStream stream(0.12, 0.1);
+  const auto at = [](int milliseconds, double x_m) {
+    OdometryEstimate estimate;
+    estimate.odometry.stamp = atMilliseconds(milliseconds);
+    estimate.odometry.odom_from_vehicle = RigidTransform::planar(x_m, 0.0, 0.0);
+    estimate.odometry.forward_speed_m_per_s = 1.0;
+    return estimate;
+  };
+  stream.add(at(0, 0.0));
+  const auto extrapolated = stream.trigger(atMilliseconds(30));
+  ASSERT_FALSE(extrapolated.empty());
+  EXPECT_NEAR(extrapolated.back().odometry.odom_from_vehicle.translation().x(), 0.03, 1e-12);
+  EXPECT_TRUE(stream.add(at(20, 0.01)).empty()) << "not yet reached";
+  const auto corrected = stream.add(at(40, 0.02));  // slower than before
+  ASSERT_EQ(corrected.size(), 1u);
+  EXPECT_EQ(corrected[0].odometry.stamp, atMilliseconds(30));
+  EXPECT_NEAR(corrected[0].odometry.odom_from_vehicle.translation().x(), 0.015, 1e-12);
+}
+
+TEST(OdometryStreamTest, DoesNotExtrapolateFarAhead) {
   OdometryStream stream(0.12, 0.1);
   EXPECT_TRUE(stream.trigger(kStart).empty());
   OdometryEstimate estimate;
