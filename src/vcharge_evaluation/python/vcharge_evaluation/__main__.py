@@ -3,6 +3,7 @@ import importlib
 import sys
 
 STAGES = {
+    "masks": "masks",
     "calibration": "calibration",
     "mapping": "mapping",
     "localization": "localization",
@@ -10,6 +11,7 @@ STAGES = {
     "height_map": "height_map",
     "obstacles": "obstacles",
     "faults": "faults",
+    "odometry": "odometry",
     "chain": "chain.cars",
     "latency": "live.latency",
     "soak": "live.soak",
