@@ -31,7 +31,7 @@ TEST(RigCatalogueTest, UnknownRigsAndScalesAreNamed) {
     makeRig("tractor", 1, 1.0);
     FAIL();
   } catch (const std::invalid_argument& error) {
-    EXPECT_NE(std::string(error.what()).find("golf, random"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("golf, recessed, random"), std::string::npos) << error.what();
     EXPECT_NE(std::string(error.what()).find("tractor"), std::string::npos);
   }
   EXPECT_THROW(makeRig("random", 1, 1.5), std::invalid_argument);
