@@ -18,6 +18,7 @@
 #include "vcharge_simulation/drive/truth_maps.h"
 #include "vcharge_simulation/faults/fault_truth.h"
 #include "vcharge_simulation/faults/image_faults.h"
+#include "vcharge_simulation/faults/light_faults.h"
 #include "vcharge_simulation/rendering/renderer.h"
 #include "vcharge_simulation/scenes/scene_catalogue.h"
 #include "vcharge_simulation/sensors/recorded_cameras.h"
@@ -28,6 +29,8 @@ namespace {
 
 // The height map leaves out tree crowns and lamps above this height over the ground.
 constexpr double kHeightLimit_m = 2.5;
+// Surfaces this near to a lamp belong to it and do not hide it.
+constexpr double kLampSize_m = 0.3;
 
 DrivePlan planDriveOf(const DriveScenario& scenario) {
   DrivePlan plan = planDrive(scenario.scene, scenario.drive);
@@ -47,13 +50,16 @@ void thin(int step, std::vector<T>* list) {
   *list = std::move(kept);
 }
 
-// These faults change what is rendered, so images rendered without them cannot be used.
+// These faults need the renderer, so images rendered without them cannot be used.
 void checkImagesCanBeReused(const FaultOptions& faults, const std::string& images_from) {
+  const bool lamps_in_world = faults.bright_lamps.isActive() && !faults.bright_lamps.positions_m.empty();
   for (const auto& [name, is_active] : {std::pair("bumped_camera", faults.bumped_camera.isActive()),
-                                        std::pair("motion_blur", faults.motion_blur.isActive())}) {
+                                        std::pair("rolling_shutter", faults.rolling_shutter.isActive()),
+                                        std::pair("motion_blur", faults.motion_blur.isActive()),
+                                        std::pair("bright_lamps.positions_m", lamps_in_world)}) {
     if (is_active) {
-      throw InputError("faults." + std::string(name) + ": changes the rendered images, so the images of " +
-                       images_from + " cannot be used");
+      throw InputError("faults." + std::string(name) + ": needs rendering, so the images of " + images_from +
+                       " cannot be used");
     }
   }
 }
@@ -61,7 +67,7 @@ void checkImagesCanBeReused(const FaultOptions& faults, const std::string& image
 std::vector<ImageFaults::Camera> faultyCameras(const RecordedCameras& cameras) {
   std::vector<ImageFaults::Camera> list;
   for (size_t i = 0; i < cameras.size(); ++i) {
-    list.push_back({cameras.name(i), cameras.index(i), cameras.rig().cameras[i].image_size_px});
+    list.push_back({cameras.name(i), cameras.index(i)});
   }
   return list;
 }
@@ -95,8 +101,7 @@ class MotionRecorder {
 
  private:
   Timestamp shifted(Timestamp stamp) const {
-    const bool acts = shift_.isActive() && shift_.actsAt(stamp - drive_.ground_truth.front().stamp);
-    return acts ? stamp + durationFromSeconds(shift_.shift_s) : stamp;
+    return stamp + shift_.shiftAt(stamp - drive_.ground_truth.front().stamp);
   }
 
   const SimulatedDrive& drive_;
@@ -134,7 +139,7 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
       simulateDrive(plan.path, plan.motion, scenario.odometer, static_cast<uint64_t>(scenario.seed),
                     scenario.sensorSeed(), faults, plan.ground_height);
   thin(scenario.image_step, &drive.world_from_vehicle);
-  thin(scenario.image_step, &drive.exposure_poses);
+  thin(scenario.image_step, &drive.image_motion);
   const Timestamp start = drive.ground_truth.front().stamp;
 
   DriveBagWriter writer(recording.bag, rig);
@@ -181,39 +186,49 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
     }
   }
 
-  ImageFaults image_faults(faults, faultyCameras(cameras), response, start, scenario.sensorSeed());
+  std::vector<std::string> names;
+  for (const RigCamera& camera : rig.cameras) {
+    names.push_back(camera.name);
+  }
+  LightFaults::IsVisible is_visible;
+  if (renderer) {
+    is_visible = [&](const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m) {
+      const double distance_m = (to_m - from_m).norm();
+      const auto hit_m = renderer->castRay(from_m, (to_m - from_m) / distance_m);
+      return !hit_m || *hit_m > distance_m - kLampSize_m;
+    };
+  }
+  const LightFaults light_faults(faults, cameras, response, start, is_visible);
+  // Noise-free images are at the normal exposure, so that other drives can be made of them.
+  ExposureFaults exposures(faults, names, response, start, scenario.noise ? scenario.exposure_gain : 1.0);
+  ImageFaults image_faults(faults, faultyCameras(cameras), start, scenario.sensorSeed());
   MotionRecorder motion(drive, faults.odometry_stamp_shift, &writer);
   ProgressBar progress("simulating " + scenario.drive);
   for (size_t frame = 0; frame < drive.world_from_vehicle.size(); ++frame) {
-    const auto& [stamp, world_from_vehicle] = drive.world_from_vehicle[frame];
+    const Timestamp stamp = stamps[frame];
     motion.writeUntil(stamp);
     for (size_t camera = 0; camera < cameras.size(); ++camera) {
-      cv::Mat image = image_faults.throughLens(camera, stamp, images->image(camera, frame));
-      const double gain = image_faults.exposureGain(camera, stamp);
-      if (scenario.noise) {
-        image = response.addNoise(image, scenario.sensorSeed(), cameras.index(camera),
-                                  static_cast<int64_t>(frame), gain * scenario.exposure_gain);
-      } else if (gain != 1.0) {
-        image = response.expose(image, gain);
-      }
+      const Readout readout = cameras.readout(camera, stamp - start, drive.image_motion[frame]);
+      const cv::Mat light = light_faults.apply(camera, stamp, images->image(camera, frame), readout);
+      const Exposure exposure = exposures.next(camera, stamp, light);
+      const cv::Mat image = scenario.noise
+                                ? response.addNoise(light, scenario.sensorSeed(), cameras.index(camera),
+                                                    static_cast<int64_t>(frame), exposure)
+                                : response.expose(light, exposure);
+      exposures.observe(camera, image);
       const size_t plug = cameras.plug(camera, stamp - start);
       if (const std::optional<DeliveredImage> delivered = image_faults.deliver(camera, frame, stamp, image)) {
         writer.writeImage(plug, delivered->stamp, delivered->pixels, delivered->received);
       }
       if (truth_range) {
-        writeRange(renderer->renderRange(cameras.view(camera, stamp - start), world_from_vehicle,
-                                         scene_times_s[frame]),
+        writeRange(renderer->renderRange(cameras.view(camera, stamp - start), readout, scene_times_s[frame]),
                    truth.path() + "/range/" + cameras.name(plug), stamp);
       }
     }
     progress.update(static_cast<double>(frame + 1) / static_cast<double>(drive.world_from_vehicle.size()));
   }
   motion.writeUntil(std::nullopt);
-  std::vector<std::string> names;
-  for (const RigCamera& camera : rig.cameras) {
-    names.push_back(camera.name);
-  }
-  writeFaults(faults, start, names, image_faults.hits(), truth.path() + "/faults.yaml");
+  writeFaults(faults, start, names, image_faults.hits(), exposures.records(), truth.path() + "/faults.yaml");
   writeTruthRig(rig, truth.path(), "");
   if (cameras.isRigFaulty()) {
     writeTruthRig(rig, truth.path(), "_before");

@@ -30,18 +30,18 @@ class RenderedImages : public ImageSource {
         blur_(blur) {}
 
   cv::Mat image(size_t camera, size_t frame) override {
-    const StampedTransform& pose = drive_.world_from_vehicle[frame];
-    const Duration since_start = pose.stamp - drive_.ground_truth.front().stamp;
+    const Duration since_start = drive_.world_from_vehicle[frame].stamp - drive_.ground_truth.front().stamp;
     const CameraView& view = cameras_.view(camera, since_start);
+    Readout readout = cameras_.readout(camera, since_start, drive_.image_motion[frame]);
     if (!blur_.actsOn(cameras_.name(camera), since_start)) {
-      return response_.develop(renderer_.renderLight(view, pose.world_from_vehicle, scene_times_s_[frame]));
+      return response_.develop(renderer_.renderLight(view, readout, scene_times_s_[frame]));
     }
-    const std::vector<RigidTransform>& exposure = drive_.exposure_poses[frame];
     cv::Mat light = cv::Mat::zeros(view.size(), CV_32FC1);
-    for (const RigidTransform& world_from_vehicle : exposure) {
-      light += renderer_.renderLight(view, world_from_vehicle, scene_times_s_[frame]);
+    for (int i = 0; i < blur_.renderings; ++i) {
+      readout.middle_s = ((i + 0.5) / blur_.renderings - 0.5) * blur_.exposure_time_s;
+      light += renderer_.renderLight(view, readout, scene_times_s_[frame]);
     }
-    return response_.develop(light / static_cast<double>(exposure.size()));
+    return response_.develop(light / static_cast<double>(blur_.renderings));
   }
 
  private:

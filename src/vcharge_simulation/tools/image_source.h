@@ -18,8 +18,7 @@ class ImageSource {
   virtual cv::Mat image(size_t camera, size_t frame) = 0;
 };
 
-/// Renders the images; the arguments must outlive the source. Movers do not move during an exposure.
-/// `scene_times_s` has one entry per frame.
+/// Renders the images; the arguments must outlive the source. `scene_times_s` has one entry per frame.
 std::unique_ptr<ImageSource> renderImages(const Renderer& renderer, const RecordedCameras& cameras,
                                           const CameraResponse& response, const SimulatedDrive& drive,
                                           const std::vector<double>& scene_times_s,

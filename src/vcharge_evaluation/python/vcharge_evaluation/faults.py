@@ -10,8 +10,8 @@ from vcharge_evaluation.results import Figure, Results, add_arguments, figure
 from vcharge_evaluation.tools import CONFIG, judge, run_tool, say, simulate
 
 SCENARIOS = CONFIG / "scenarios"
-# The fault changes the light or the camera's pose: these drives cannot reuse the images of the sound drive.
-RENDERED = ("motion_blur", "sun_glare", "bumped_camera", "soft_suspension")
+# The fault needs the renderer: these drives cannot reuse the images of the sound drive.
+RENDERED = ("motion_blur", "rolling_shutter", "sun_glare", "bright_lamps", "bumped_camera", "soft_suspension")
 MAX_LISTED_STATES = 5
 
 

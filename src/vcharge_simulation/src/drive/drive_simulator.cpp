@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "vcharge_simulation/rendering/noise.h"
 
@@ -21,21 +22,19 @@ Timestamp stampAt(int milliseconds) {
   return Timestamp::fromNanoseconds(kStart_ns + static_cast<int64_t>(milliseconds) * 1'000'000);
 }
 
-RigidTransform worldFromVehicleAt(const VehicleMotion& motion, double milliseconds) {
-  const double before = std::floor(milliseconds);
-  const int index = static_cast<int>(before);
-  return interpolate(motion.at(index).worldFromVehicle(), motion.at(index + 1).worldFromVehicle(),
-                     milliseconds - before);
+// Time before and after its stamp in which an image is exposed and read out.
+int reachOfImage_ms(const FaultOptions& faults) {
+  const double blur_s = faults.motion_blur.isActive() ? faults.motion_blur.exposure_time_s : 0.0;
+  const double readout_s = faults.rolling_shutter.isActive() ? faults.rolling_shutter.readout_time_s : 0.0;
+  return static_cast<int>(std::ceil(500.0 * (blur_s + readout_s)));
 }
 
-std::vector<RigidTransform> exposurePoses(const VehicleMotion& motion, int middle_ms,
-                                          const MotionBlurFault& blur) {
+MotionWindow windowOf(const VehicleMotion& motion, int middle_ms, int reach_ms) {
   std::vector<RigidTransform> poses;
-  for (int i = 0; i < blur.renderings; ++i) {
-    const double fraction = (i + 0.5) / blur.renderings - 0.5;
-    poses.push_back(worldFromVehicleAt(motion, middle_ms + 1000.0 * fraction * blur.exposure_time_s));
+  for (int time_ms = middle_ms - reach_ms; time_ms <= middle_ms + reach_ms; ++time_ms) {
+    poses.push_back(motion.at(time_ms).worldFromVehicle());
   }
-  return poses;
+  return MotionWindow(std::move(poses));
 }
 
 }  // namespace
@@ -74,9 +73,7 @@ SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& 
     if (is_image) {
       image_stamps.push_back(stampAt(time_ms));
       drive.world_from_vehicle.push_back({stampAt(time_ms), motion.at(time_ms).worldFromVehicle()});
-      if (faults.motion_blur.isActive()) {
-        drive.exposure_poses.push_back(exposurePoses(motion, time_ms, faults.motion_blur));
-      }
+      drive.image_motion.push_back(windowOf(motion, time_ms, reachOfImage_ms(faults)));
     }
     if (is_image || is_odometry) {
       const MotionSample& sample = motion.at(time_ms);

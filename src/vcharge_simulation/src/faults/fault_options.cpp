@@ -18,6 +18,36 @@ bool CameraFault::actsOn(const std::string& camera) const {
                      [&](const std::string& name) { return name == camera || name == "all"; });
 }
 
+void BrightLampsFault::checkFields() const {
+  CameraFault::checkFields();
+  requireField(positions_m.size() % 3 == 0, "positions_m", "must have three numbers per lamp",
+               static_cast<double>(positions_m.size()));
+  requireField(image_positions.size() % 2 == 0, "image_positions", "must have two numbers per lamp",
+               static_cast<double>(image_positions.size()));
+}
+
+void CameraGainsFault::checkFields() const {
+  CameraFault::checkFields();
+  requireField(gains.size() == 1 || gains.size() == cameras.size(), "gains",
+               "must have one number, or one per camera", static_cast<double>(gains.size()));
+}
+
+double CameraGainsFault::gainOf(const std::string& camera) const {
+  for (size_t i = 0; i < cameras.size(); ++i) {
+    if (cameras[i] == camera || cameras[i] == "all") {
+      return gains[gains.size() == 1 ? 0 : i];
+    }
+  }
+  return 1.0;
+}
+
+Duration OdometryStampShiftFault::shiftAt(Duration since_start) const {
+  if (!actsAt(since_start)) {
+    return Duration(0);
+  }
+  return durationFromSeconds(shift_s + 1e-6 * drift_ppm * (toSeconds(since_start) - start_s));
+}
+
 void BumpedCameraFault::checkFields() const {
   CameraFault::checkFields();
   for (const auto& [name, vector] :

@@ -45,6 +45,29 @@ TEST(FaultOptionsTest, ActFromTheStartUntilBeforeTheEnd) {
   EXPECT_TRUE(forever.dead_camera.actsOn("front", std::chrono::milliseconds(-500)));
 }
 
+TEST(FaultOptionsTest, ClockOfTheOdometryIsOffAndDriftsInItsInterval) {
+  const OdometryStampShiftFault clock =
+      read("odometry_stamp_shift: {shift_s: 0.01, drift_ppm: 100, start_s: 2, end_s: 60}")
+          .odometry_stamp_shift;
+  using std::chrono::microseconds;
+  using std::chrono::seconds;
+  EXPECT_EQ(clock.shiftAt(seconds(1)), Duration(0));
+  EXPECT_EQ(clock.shiftAt(seconds(2)), microseconds(10000));
+  EXPECT_EQ(clock.shiftAt(seconds(32)), microseconds(13000));
+  EXPECT_EQ(clock.shiftAt(seconds(60)), Duration(0));
+  const FaultOptions drifting = read("odometry_stamp_shift: {drift_ppm: -50}");
+  EXPECT_TRUE(drifting.odometry_stamp_shift.isActive());
+  EXPECT_EQ(drifting.odometry_stamp_shift.shiftAt(seconds(3600)), microseconds(-180000));
+}
+
+TEST(FaultOptionsTest, GainsFollowTheOrderOfTheCameras) {
+  const FaultOptions each = read("camera_gains: {cameras: [left, front], gains: [0.5, 3]}");
+  EXPECT_EQ(each.camera_gains.gainOf("front"), 3.0);
+  EXPECT_EQ(each.camera_gains.gainOf("left"), 0.5);
+  EXPECT_EQ(each.camera_gains.gainOf("rear"), 1.0);
+  EXPECT_EQ(read("camera_gains: {cameras: [all], gains: [3]}").camera_gains.gainOf("rear"), 3.0);
+}
+
 TEST(FaultOptionsTest, BadValuesAreNamed) {
   expectRejected("dead_camera: {cameras: [left], start_s: 2, end_s: 1}", "dead_camera.end_s");
   expectRejected("dead_camera: {camera: left}", "dead_camera.camera");
@@ -56,6 +79,17 @@ TEST(FaultOptionsTest, BadValuesAreNamed) {
   expectRejected("late_images: {delay_s: 0}", "late_images.delay_s");
   expectRejected("exposure_step: {gain: 0}", "exposure_step.gain");
   expectRejected("motion_blur: {exposure_time_s: 1}", "motion_blur.exposure_time_s");
+  expectRejected("rolling_shutter: {readout_time_s: 0.1}", "rolling_shutter.readout_time_s");
+  expectRejected("auto_exposure: {target_gray: 0}", "auto_exposure.target_gray");
+  expectRejected("camera_gains: {cameras: [left, front, rear], gains: [1, 2]}", "camera_gains.gains");
+  expectRejected("camera_gains: {cameras: [left], gains: [0]}", "camera_gains.gains");
+  expectRejected("vignetting: {rim_loss: 1}", "vignetting.rim_loss");
+  expectRejected("water_drop: {radius: 0}", "water_drop.radius");
+  expectRejected("low_light: {level: 0}", "low_light.level");
+  expectRejected("bright_lamps: {positions_m: [1, 2]}", "bright_lamps.positions_m");
+  expectRejected("bright_lamps: {positions_m: [1, 2, .nan]}", "bright_lamps.positions_m");
+  expectRejected("bright_lamps: {image_positions: [0.5]}", "bright_lamps.image_positions");
+  expectRejected("odometry_stamp_shift: {drift_ppm: .inf}", "odometry_stamp_shift.drift_ppm");
   expectRejected("wheel_slip: {wheel: front}", "wheel_slip.wheel");
   expectRejected("wheel_slip: {ratio: -2}", "wheel_slip.ratio");
   expectRejected("odometry_scale: {factor: .nan}", "odometry_scale.factor");

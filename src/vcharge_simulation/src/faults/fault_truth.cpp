@@ -9,7 +9,8 @@
 namespace vcharge {
 
 void writeFaults(const FaultOptions& faults, Timestamp start, const std::vector<std::string>& cameras,
-                 const ImageFaults::Hits& hits, const std::string& path) {
+                 const ImageFaults::Hits& hits,
+                 const std::vector<std::vector<ExposureFaults::Record>>& exposures, const std::string& path) {
   const auto stampAt = [&](double time_s) { return (start + durationFromSeconds(time_s)).nanoseconds(); };
   const auto stampsOf = [&](const std::vector<std::vector<Timestamp>>& hits_of_camera) {
     YAML::Node node(YAML::NodeType::Map);
@@ -46,6 +47,18 @@ void writeFaults(const FaultOptions& faults, Timestamp start, const std::vector<
     }
     if constexpr (std::is_same_v<Fault, LateImagesFault>) {
       entry["images_ns"] = stampsOf(hits.late);
+    }
+    if constexpr (std::is_same_v<Fault, AutoExposureFault>) {
+      for (size_t i = 0; i < cameras.size(); ++i) {
+        for (const ExposureFaults::Record& record : exposures[i]) {
+          YAML::Node image(YAML::NodeType::Map);
+          image.SetStyle(YAML::EmitterStyle::Flow);
+          image["stamp_ns"] = record.stamp.nanoseconds();
+          image["exposure_time_s"] = record.time_s;
+          image["gain"] = record.gain;
+          entry["exposures"][cameras[i]].push_back(image);
+        }
+      }
     }
     root["faults"].push_back(entry);
   });

@@ -164,22 +164,22 @@ TEST(OdometryFaultsTest, SoftSuspensionDivesDeeperOnTheBrakes) {
   EXPECT_NEAR(deepest_rad(6.0), 6.0 * usual_rad, 0.01 * usual_rad);
 }
 
-TEST(OdometryFaultsTest, ExposurePosesAreSpreadOverTheExposureAboutTheStamp) {
+TEST(OdometryFaultsTest, MotionOfAnImageCoversItsExposureAndReadout) {
   FaultOptions faults;
   faults.motion_blur.cameras = {"left"};
   faults.motion_blur.exposure_time_s = 0.04;
-  faults.motion_blur.renderings = 4;
+  faults.rolling_shutter.cameras = {"left"};
+  faults.rolling_shutter.readout_time_s = 0.0205;
   const SimulatedDrive drive = simulate(faults);
   expectSameTruth(simulate({}), drive);
-  ASSERT_EQ(drive.exposure_poses.size(), drive.world_from_vehicle.size());
-  EXPECT_TRUE(simulate({}).exposure_poses.empty());
-  for (size_t i = 0; i < drive.exposure_poses.size(); ++i) {
-    const std::vector<RigidTransform>& poses = drive.exposure_poses[i];
-    ASSERT_EQ(poses.size(), 4U);
-    // The first and the last rendering are three quarters of the exposure apart.
-    EXPECT_NEAR((poses[3].translation() - poses[0].translation()).norm(), 0.03 * kSpeed_m_per_s, 0.005);
-    const Eigen::Vector3d middle = 0.5 * (poses[1].translation() + poses[2].translation());
-    EXPECT_LT((middle - drive.world_from_vehicle[i].world_from_vehicle.translation()).norm(), 1e-3);
+  ASSERT_EQ(drive.image_motion.size(), drive.world_from_vehicle.size());
+  constexpr double kReach_s = 0.03025;
+  for (size_t i = 0; i < drive.image_motion.size(); ++i) {
+    const MotionWindow& motion = drive.image_motion[i];
+    EXPECT_EQ(motion.at(0.0).matrix(), drive.world_from_vehicle[i].world_from_vehicle.matrix());
+    const Eigen::Vector3d driven_m = motion.at(kReach_s).translation() - motion.at(-kReach_s).translation();
+    // The cruise speed varies by 5 %.
+    EXPECT_NEAR(driven_m.norm(), 2.0 * kReach_s * kSpeed_m_per_s, 0.05 * 2.0 * kReach_s * kSpeed_m_per_s);
   }
 }
 

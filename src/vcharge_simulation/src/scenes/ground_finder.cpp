@@ -19,9 +19,8 @@ constexpr float kPlaneTolerance_m = 0.001F;
 
 }  // namespace
 
-GroundFinder::GroundFinder(const SceneInstant& instant, const SurfaceShader& shader, const CameraView& view,
-                           const Eigen::Matrix3f& world_from_camera, const Eigen::Vector3f& origin)
-    : instant_(instant), shader_(shader), view_(view), rotation_(world_from_camera), origin_(origin) {
+GroundFinder::GroundFinder(const ExposedRows& rows, const SurfaceShader& shader, const CameraView& view)
+    : rows_(rows), shader_(shader), view_(view) {
   const size_t num_blocks = static_cast<size_t>(view.blocksPerRow()) * static_cast<size_t>(view.blockRows());
   probes_.resize(num_blocks);
   planes_.resize(num_blocks);
@@ -31,6 +30,7 @@ GroundFinder::GroundFinder(const SceneInstant& instant, const SurfaceShader& sha
 }
 
 void GroundFinder::probeRow(int block_y) {
+  const ExposedRow& row = rows_[block_y];
   const int blocks = view_.blocksPerRow();
   const size_t first = static_cast<size_t>(block_y) * static_cast<size_t>(blocks);
   for (int start = 0; start < blocks; start += kPacket) {
@@ -40,11 +40,12 @@ void GroundFinder::probeRow(int block_y) {
       const bool inside = start + i < blocks;
       const size_t block = first + static_cast<size_t>(std::min(start + i, blocks - 1));
       const float* sample = view_.blockRays(block) + kMiddleSample;
-      const Eigen::Vector3f ray = rotation_ * Eigen::Vector3f(sample[0], sample[CameraView::kSamplesPerBlock],
-                                                              sample[2 * CameraView::kSamplesPerBlock]);
-      rays.ray.org_x[i] = origin_.x();
-      rays.ray.org_y[i] = origin_.y();
-      rays.ray.org_z[i] = origin_.z();
+      const Eigen::Vector3f ray =
+          row.rotation * Eigen::Vector3f(sample[0], sample[CameraView::kSamplesPerBlock],
+                                         sample[2 * CameraView::kSamplesPerBlock]);
+      rays.ray.org_x[i] = row.origin.x();
+      rays.ray.org_y[i] = row.origin.y();
+      rays.ray.org_z[i] = row.origin.z();
       rays.ray.dir_x[i] = ray.x();
       rays.ray.dir_y[i] = ray.y();
       rays.ray.dir_z[i] = ray.z();
@@ -59,7 +60,7 @@ void GroundFinder::probeRow(int block_y) {
       // Only blocks that are entirely in the field of view and do not show the own car.
       active[i] = inside && view_.blockPixels(block) == 0xF && view_.blockBodyMask(block) == 0 ? -1 : 0;
     }
-    instant_.intersect(active, &rays);
+    row.instant->intersect(active, &rays);
     for (int i = 0; i < kPacket && start + i < blocks; ++i) {
       const size_t block = first + static_cast<size_t>(start + i);
       probes_[block].material = kNoGround;
@@ -70,7 +71,7 @@ void GroundFinder::probeRow(int block_y) {
       const Eigen::Vector3f ray(rays.ray.dir_x[i], rays.ray.dir_y[i], rays.ray.dir_z[i]);
       const Eigen::Vector3f normal =
           Eigen::Vector3f(rays.hit.Ng_x[i], rays.hit.Ng_y[i], rays.hit.Ng_z[i]).normalized();
-      probes_[block] = {origin_ + rays.ray.tfar[i] * ray, shader_.materialIndexOf(rays.hit.primID[i])};
+      probes_[block] = {row.origin + rays.ray.tfar[i] * ray, shader_.materialIndexOf(rays.hit.primID[i])};
       planes_[block] = {normal, normal.dot(probes_[block].point), rays.hit.primID[i]};
     }
   }

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "rendering/exposed_rows.h"
 #include "rendering/surface_shader.h"
-#include "scenes/scene_instant.h"
 #include "vcharge_simulation/sensors/camera_view.h"
 
 namespace vcharge {
@@ -15,8 +15,8 @@ namespace vcharge {
 /// missed, so blocks whose rays land more than kMaxSpacing_m apart are never plain.
 class GroundFinder {
  public:
-  GroundFinder(const SceneInstant& instant, const SurfaceShader& shader, const CameraView& view,
-               const Eigen::Matrix3f& world_from_camera, const Eigen::Vector3f& origin);
+  /// All arguments must outlive this object.
+  GroundFinder(const ExposedRows& rows, const SurfaceShader& shader, const CameraView& view);
 
   static constexpr float kMaxSpacing_m = 0.03F;
 
@@ -37,11 +37,9 @@ class GroundFinder {
   void probeRow(int block_y);
   void findPlainRow(int block_y);
 
-  const SceneInstant& instant_;
+  const ExposedRows& rows_;
   const SurfaceShader& shader_;
   const CameraView& view_;
-  const Eigen::Matrix3f rotation_;
-  const Eigen::Vector3f origin_;
   std::vector<Probe> probes_;
   std::vector<Plane> planes_;
   std::vector<uint8_t> plain_;

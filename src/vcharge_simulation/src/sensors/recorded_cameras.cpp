@@ -81,6 +81,11 @@ const CameraView& RecordedCameras::view(size_t camera, Duration since_start) con
   return (is_bumped ? bumped_views_ : views_).at(camera);
 }
 
+Readout RecordedCameras::readout(size_t camera, Duration since_start, const MotionWindow& motion) const {
+  const RollingShutterFault& rolling = faults_.rolling_shutter;
+  return {motion, rolling.actsOn(name(camera), since_start) ? rolling.readout_time_s : 0.0};
+}
+
 size_t RecordedCameras::partner(size_t camera) const {
   const std::vector<std::string>& pair = faults_.swapped_cameras.cameras;
   return rig_.cameraIndex(name(camera) == pair[0] ? pair[1] : pair[0]);

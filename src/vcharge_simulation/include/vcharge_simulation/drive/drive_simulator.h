@@ -6,6 +6,7 @@
 #include "vcharge_core/motion/trajectory.h"
 #include "vcharge_core/motion/vehicle_odometry.h"
 #include "vcharge_simulation/sensors/wheel_odometer.h"
+#include "vcharge_simulation/vehicle/motion_window.h"
 #include "vcharge_simulation/vehicle/vehicle_motion.h"
 
 namespace vcharge {
@@ -17,9 +18,7 @@ struct SimulatedDrive {
   std::vector<VehicleOdometry> ground_truth;
   std::vector<Received<VehicleOdometry>> odometry;  ///< in order of reception, see causalOdometry()
   std::vector<Received<WheelTicks>> wheel_ticks;    ///< at 50 Hz, in order of reception
-  /// For each image, world_from_vehicle of the renderings that are averaged into it; empty without motion
-  /// blur.
-  std::vector<std::vector<RigidTransform>> exposure_poses;
+  std::vector<MotionWindow> image_motion;           ///< for each image, over its exposure and readout
 };
 
 /// Simulates a drive along a path on ground of this height. Images come every 80 ms, 7 ms after an odometry

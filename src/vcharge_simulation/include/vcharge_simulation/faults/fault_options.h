@@ -51,9 +51,52 @@ struct SunGlareFault : CameraFault {
   VCHARGE_END_OPTIONS();
 };
 
+/// Lamps in the image. Their glare is that of the sun (1e5 lx) scaled by their illuminance at the lens.
+struct BrightLampsFault : CameraFault {
+  VCHARGE_BEGIN_DERIVED_OPTIONS(BrightLampsFault, CameraFault);
+  VCHARGE_OPTION(double, intensity_cd, 3000.0, between(0.0, 1e7), "Luminous intensity of each lamp.");
+  VCHARGE_OPTION(std::vector<double>, positions_m, {}, between(-1e6, 1e6),
+                 "Lamps at x, y, z of the world, x, y, z of the next one, and so on.");
+  VCHARGE_OPTION(std::vector<double>, image_positions, {}, between(-10.0, 10.0),
+                 "Lamps at x, y as fractions of the image width and height, and so on.");
+  VCHARGE_OPTION(double, image_distance_m, 10.0, between(0.1, 1e4), "Distance of lamps at image_positions.");
+  VCHARGE_END_OPTIONS();
+
+  void checkFields() const;
+};
+
+/// The light of the scene, not that of lamps and sun glare. Without auto_exposure the images darken.
+struct LowLightFault : FaultInterval {
+  VCHARGE_BEGIN_DERIVED_OPTIONS(LowLightFault, FaultInterval);
+  VCHARGE_OPTION(double, level, 1.0, positive().upTo(1.0),
+                 "Light relative to the scene's own, for example 0.02; 1: no fault.");
+  VCHARGE_END_OPTIONS();
+
+  bool isActive() const { return level != 1.0; }
+};
+
+/// The lens transmits cos(a)^4 where tan(a) grows in proportion to the angle from the optical axis.
+struct VignettingFault : CameraFault {
+  VCHARGE_BEGIN_DERIVED_OPTIONS(VignettingFault, CameraFault);
+  VCHARGE_OPTION(double, rim_loss, 0.5, notNegative().below(1.0),
+                 "Fraction of the light lost at the rim of the field of view.");
+  VCHARGE_END_OPTIONS();
+};
+
+/// A drop is a small lens: it shows a blurred, inverted image of its surroundings.
+struct WaterDropFault : CameraFault {
+  VCHARGE_BEGIN_DERIVED_OPTIONS(WaterDropFault, CameraFault);
+  VCHARGE_OPTION(double, x, 0.5, between(0.0, 1.0), "Centre, as a fraction of the image width.");
+  VCHARGE_OPTION(double, y, 0.5, between(0.0, 1.0), "Centre, as a fraction of the image height.");
+  VCHARGE_OPTION(double, radius, 0.08, positive().upTo(0.5), "Radius, as a fraction of the image width.");
+  VCHARGE_END_OPTIONS();
+};
+
 struct DirtyLensFault : CameraFault {
   VCHARGE_BEGIN_DERIVED_OPTIONS(DirtyLensFault, CameraFault);
-  VCHARGE_OPTION(int, blobs, 8, between(0, 1000), "Number of blurred blobs of dirt on each lens.");
+  VCHARGE_OPTION(int, blobs, 8, between(0, 1000), "Number of soft-edged blobs of dirt on each lens.");
+  VCHARGE_OPTION(double, blur_px, 0.0, between(0.0, 50.0),
+                 "Standard deviation of the blur behind a blob, in pixels of a 1280x800 image.");
   VCHARGE_OPTION(int, seed, 1, notNegative(), "Seed of the positions; each camera has its own dirt.");
   VCHARGE_END_OPTIONS();
 };
@@ -100,6 +143,34 @@ struct ExposureStepFault : CameraFault {
   VCHARGE_END_OPTIONS();
 };
 
+/// Sensor gain: it amplifies signal and noise alike.
+struct CameraGainsFault : CameraFault {
+  VCHARGE_BEGIN_DERIVED_OPTIONS(CameraGainsFault, CameraFault);
+  VCHARGE_OPTION(std::vector<double>, gains, std::vector<double>(1, 2.0), between(0.01, 100.0),
+                 "Gain of each of the cameras, in their order, or one for all.");
+  VCHARGE_END_OPTIONS();
+
+  void checkFields() const;
+  double gainOf(const std::string& camera) const;  ///< 1 for other cameras
+};
+
+/// Each camera controls exposure time (0.05 to 20 ms) and then gain (1 to 16), see ExposureControl.
+struct AutoExposureFault : CameraFault {
+  VCHARGE_BEGIN_DERIVED_OPTIONS(AutoExposureFault, CameraFault);
+  VCHARGE_OPTION(double, target_gray, 85.0, between(1.0, 250.0), "Mean gray value of the image.");
+  VCHARGE_OPTION(double, time_constant_s, 0.5, between(0.0, 100.0),
+                 "Time in which a deviation of the exposure falls to 1/e.");
+  VCHARGE_END_OPTIONS();
+};
+
+/// Rows are exposed from top to bottom; the stamp is the middle of the exposure of the middle row.
+struct RollingShutterFault : CameraFault {
+  VCHARGE_BEGIN_DERIVED_OPTIONS(RollingShutterFault, CameraFault);
+  VCHARGE_OPTION(double, readout_time_s, 0.02, between(0.0, 0.03),
+                 "Time per row times number of rows, see Readout.");
+  VCHARGE_END_OPTIONS();
+};
+
 /// An image is the mean light of renderings at equal time steps, centred on its stamp.
 struct MotionBlurFault : CameraFault {
   VCHARGE_BEGIN_DERIVED_OPTIONS(MotionBlurFault, CameraFault);
@@ -109,12 +180,17 @@ struct MotionBlurFault : CameraFault {
   VCHARGE_END_OPTIONS();
 };
 
+/// Offset and drift of the odometry's clock against the cameras'. Order and reception of the messages stay.
 struct OdometryStampShiftFault : FaultInterval {
   VCHARGE_BEGIN_DERIVED_OPTIONS(OdometryStampShiftFault, FaultInterval);
-  VCHARGE_OPTION(double, shift_s, 0.0, between(-10.0, 10.0), "Stamp minus true time; 0: no fault.");
+  VCHARGE_OPTION(double, shift_s, 0.0, between(-10.0, 10.0), "Stamp minus true time at start_s.");
+  VCHARGE_OPTION(double, drift_ppm, 0.0, between(-1e4, 1e4),
+                 "Growth of the shift, in microseconds per second.");
   VCHARGE_END_OPTIONS();
 
-  bool isActive() const { return shift_s != 0.0; }
+  bool isActive() const { return shift_s != 0.0 || drift_ppm != 0.0; }
+  /// Stamp minus true time at a time since the start of the drive; zero outside the interval.
+  Duration shiftAt(Duration since_start) const;
 };
 
 struct OdometryScaleFault : FaultInterval {
@@ -166,6 +242,11 @@ struct FaultOptions {
                        "Cameras repeat their last image with new stamps.");
   VCHARGE_OPTION_GROUP(SunGlareFault, sun_glare, {},
                        "A low sun in the image: a white disk and veiling glare.");
+  VCHARGE_OPTION_GROUP(BrightLampsFault, bright_lamps, {},
+                       "Lamps in the image: saturated disks and veiling glare.");
+  VCHARGE_OPTION_GROUP(LowLightFault, low_light, {}, "Less light than by day.");
+  VCHARGE_OPTION_GROUP(VignettingFault, vignetting, {}, "Lenses transmit less light towards the rim.");
+  VCHARGE_OPTION_GROUP(WaterDropFault, water_drop, {}, "A drop of water on the lens.");
   VCHARGE_OPTION_GROUP(DirtyLensFault, dirty_lens, {},
                        "A bright line and dirt blobs at fixed image positions.");
   VCHARGE_OPTION_GROUP(BumpedCameraFault, bumped_camera, {}, "A bump rotates and moves cameras.");
@@ -176,9 +257,12 @@ struct FaultOptions {
                        "Images with the right stamp arrive late, at random.");
   VCHARGE_OPTION_GROUP(ImageStampShiftFault, image_stamp_shift, {}, "Stamps of cameras are wrong.");
   VCHARGE_OPTION_GROUP(ExposureStepFault, exposure_step, {}, "The exposure changes abruptly.");
+  VCHARGE_OPTION_GROUP(CameraGainsFault, camera_gains, {}, "Cameras have different gains.");
+  VCHARGE_OPTION_GROUP(AutoExposureFault, auto_exposure, {}, "Cameras control exposure time and gain.");
+  VCHARGE_OPTION_GROUP(RollingShutterFault, rolling_shutter, {}, "Rows are exposed one after the other.");
   VCHARGE_OPTION_GROUP(MotionBlurFault, motion_blur, {}, "Long exposures blur the images.");
   VCHARGE_OPTION_GROUP(OdometryStampShiftFault, odometry_stamp_shift, {},
-                       "Stamps of odometry and ticks are wrong.");
+                       "The clock of odometry and ticks is off or drifts.");
   VCHARGE_OPTION_GROUP(OdometryScaleFault, odometry_scale, {}, "Both wheels count too much or too little.");
   VCHARGE_OPTION_GROUP(WheelSlipFault, wheel_slip, {}, "A rear wheel spins (ratio above 0) or blocks (-1).");
   VCHARGE_OPTION_GROUP(MissingTicksFault, missing_ticks, {},

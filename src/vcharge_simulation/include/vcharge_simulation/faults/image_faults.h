@@ -9,7 +9,6 @@
 
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_simulation/faults/fault_options.h"
-#include "vcharge_simulation/sensors/camera_response.h"
 
 namespace vcharge {
 
@@ -20,15 +19,13 @@ struct DeliveredImage {
   cv::Mat pixels;      ///< CV_8UC1
 };
 
-/// Applies camera faults between lens and recorder. For every camera and frame, in order, call throughLens()
-/// with the noise-free image, then apply noise and exposure, then call deliver(). Images pass unchanged
-/// without a fault. Not thread safe.
+/// Applies camera faults between sensor and recorder. For every camera and frame, in order, call deliver().
+/// Images pass unchanged without a fault. Not thread safe.
 class ImageFaults {
  public:
   struct Camera {
     std::string name;
     int index;  ///< in the whole rig, so that random faults do not depend on which cameras are recorded
-    cv::Size size_px;
   };
   /// True stamps of the images hit by a random fault, per camera.
   struct Hits {
@@ -36,14 +33,7 @@ class ImageFaults {
   };
 
   /// `start` is the start of the drive; `seed` selects the dropped and late images.
-  ImageFaults(const FaultOptions& faults, const std::vector<Camera>& cameras, const CameraResponse& response,
-              Timestamp start, uint64_t seed);
-
-  /// Adds sun glare and lens dirt to the noise-free image (CV_8UC1); `stamp` is the true stamp.
-  cv::Mat throughLens(size_t camera, Timestamp stamp, const cv::Mat& clean) const;
-
-  /// Exposure relative to the normal exposure.
-  double exposureGain(size_t camera, Timestamp stamp) const;
+  ImageFaults(const FaultOptions& faults, const std::vector<Camera>& cameras, Timestamp start, uint64_t seed);
 
   /// The image that arrives at the recorder; std::nullopt if it is lost.
   std::optional<DeliveredImage> deliver(size_t camera, size_t frame, Timestamp stamp, const cv::Mat& image);
@@ -57,12 +47,8 @@ class ImageFaults {
 
   FaultOptions faults_;
   std::vector<Camera> cameras_;
-  CameraResponse response_;
   Timestamp start_;
   uint64_t seed_;
-  /// Per camera, CV_32FC1: light added by the sun, fraction of the scene's light that passes the dirt, light
-  /// scattered by the dirt. Empty without the fault.
-  std::vector<cv::Mat> sun_light_, dirt_transmission_, dirt_light_;
   std::vector<cv::Mat> last_image_;  ///< last image before the camera froze
   Hits hits_;
 };

@@ -7,6 +7,13 @@
 
 namespace vcharge {
 
+/// Exposure of an image relative to the normal exposure. The collected light has shot noise; the gain then
+/// amplifies signal and noise alike.
+struct Exposure {
+  double factor = 1.0;  ///< collected light relative to that of the normal exposure
+  double gain = 1.0;    ///< sensor gain
+};
+
 /// Response of the sensor: gray = 255 min(1, x (1 + w) / (x + w))^gamma with x = exposure * light and w =
 /// shoulder. Noise is added to noise-free images, so that one rendering serves many noisy drives. Immutable,
 /// thread safe.
@@ -24,12 +31,13 @@ class CameraResponse {
   /// Converts light (CV_32FC1) to gray (CV_8UC1) without noise.
   cv::Mat develop(const cv::Mat& light) const;
 
-  /// Adds photon and read noise to a noise-free image (CV_8UC1) at `gain` times the exposure. The result
-  /// depends only on the arguments.
-  cv::Mat addNoise(const cv::Mat& clean, uint64_t seed, int camera, int64_t frame, double gain = 1.0) const;
+  /// Adds photon and read noise to light (CV_32FC1), or to a noise-free image at the normal exposure
+  /// (CV_8UC1). The result (CV_8UC1) depends only on the arguments.
+  cv::Mat addNoise(const cv::Mat& clean, uint64_t seed, int camera, int64_t frame,
+                   const Exposure& exposure = Exposure()) const;
 
-  /// Noise-free image (CV_8UC1) at `gain` times the exposure.
-  cv::Mat expose(const cv::Mat& clean, double gain) const;
+  /// The same without noise.
+  cv::Mat expose(const cv::Mat& clean, const Exposure& exposure) const;
 
   /// Gray value in [0, 255], not rounded, of an amount of light.
   double grayFromLight(double light) const;

@@ -6,6 +6,7 @@
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_simulation/drive/drive_scenario.h"
 #include "vcharge_simulation/sensors/camera_view.h"
+#include "vcharge_simulation/sensors/readout.h"
 
 namespace vcharge {
 
@@ -24,6 +25,8 @@ class RecordedCameras {
 
   /// The camera with its extrinsics at that time.
   const CameraView& view(size_t camera, Duration since_start) const;
+  /// Readout of an image whose exposure of the middle row has this window of the vehicle's motion.
+  Readout readout(size_t camera, Duration since_start, const MotionWindow& motion) const;
   /// Index of the camera under whose name the images of this one are recorded.
   size_t plug(size_t camera, Duration since_start) const;
 
