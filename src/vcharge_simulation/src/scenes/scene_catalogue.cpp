@@ -28,6 +28,10 @@ const std::vector<CatalogueScene>& catalogue() {
       {{"two_levels", "lot on two levels with ramps of 6 degrees and uneven ground"},
        buildTwoLevelsScene,
        twoLevelsDrives},
+      {{"road", "straight road with parked cars and houses, then speed bumps and a slope of 5 %"},
+       buildRoadScene,
+       roadDrives,
+       true},
       {{"chessboard", "chessboard or AprilGrid (--board) in front of each camera in turn, on the lot"},
        buildBoardScene,
        boardDrives}};

@@ -10,6 +10,8 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kTransition_m = 3.0;
+// Tighter than the own car's, since the rectangle on the right-hand side of clockwise lanes is smaller.
+constexpr double kCornerRadius_m = 4.2;
 // Curve out of a bay.
 constexpr double kBayCurvature_per_m = 0.2;
 constexpr double kBayTurnIn_m = 1.0;
@@ -62,8 +64,7 @@ DrivePath driveAround(const MoverArea& area, double aside_m, double total_m, Ran
   if (mirrored) {
     std::reverse(corners.begin(), corners.end());
   }
-  return repeated(DrivePath::throughWaypoints(corners, true, area.lanes.corner_radius_m, kTransition_m),
-                  total_m);
+  return repeated(DrivePath::throughWaypoints(corners, true, kCornerRadius_m, kTransition_m), total_m);
 }
 
 std::optional<DrivePath> leaveBay(const MoverArea& area, const ParkingBay& bay, double axle_m, double aside_m,
@@ -90,10 +91,10 @@ std::optional<DrivePath> leaveBay(const MoverArea& area, const ParkingBay& bay, 
   std::vector<DrivePath::Segment> turn = {{straight_m, 0.0, 0.0}};
   addTurn(to_left ? 0.5 * kPi : -0.5 * kPi, kBayCurvature_per_m, kBayTurnIn_m, &turn);
   DrivePath path(RigidTransform::planar(start.x(), start.y(), bay.yaw_rad + kPi), std::move(turn));
-  // On around the block on the side where the bay is not, so that the car meets no own bay again.
-  const double next_y = lane_y == 0.0 ? side * area.lanes.y_m : 0.0;
+  // On around the block.
+  const double next_y = (lane_y == 0.0 ? side * area.lanes.y_m : 0.0) + along_x * aside_m;
   path.append(DrivePath::throughWaypoints({{turned_x, y}, {corner_x, y}, {corner_x, next_y}, {0.0, next_y}},
-                                          false, area.lanes.corner_radius_m, kTransition_m));
+                                          false, kCornerRadius_m, kTransition_m));
   return path;
 }
 

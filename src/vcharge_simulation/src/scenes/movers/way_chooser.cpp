@@ -135,7 +135,7 @@ bool WayChooser::chooseBicycle(Random* random, Way* way) const {
   way->mover.middle_m = 0.55;
   way->task.num_speeds = 6;
   way->task.max_speed_m_per_s = random->uniform(2.2, 4.5);
-  return chooseLaneDrive(random, area_.is_road ? 2.6 : random->uniform(0.6, 2.0), way);
+  return chooseLaneDrive(random, area_.is_road ? 2.6 : random->uniform(0.6, 1.7), way);
 }
 
 bool WayChooser::chooseLaneDrive(Random* random, double aside_m, Way* way) const {
