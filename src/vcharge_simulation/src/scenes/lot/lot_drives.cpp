@@ -61,7 +61,7 @@ std::vector<SceneDrive> lotDrives() {
            }},
           {{"bay_forwards", "forwards into the space beside the last bay of a row and out of it backwards"},
            [] {
-             return DrivePlan{"", visitSpaceForwards(26.0, -14.5, 6.5), fromRestToRest(2.0)};
+             return DrivePlan{"", visitSpaceForwards(26.0, -13.7, 5.5), fromRestToRest(2.0)};
            }},
           {{"three_point_turn", "a turn in three moves at the mouth of the middle lane"},
            [] {
