@@ -15,6 +15,8 @@
 
 #include "fuzz_target.h"
 #include "vcharge_camera_driver/can_wheel_decoder.h"
+#include "vcharge_camera_driver/candump_file.h"
+#include "vcharge_camera_driver/dbc_file.h"
 #include "vcharge_camera_driver/gray_converter.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/frames/recorded_drive.h"
@@ -130,9 +132,12 @@ std::vector<std::string> frames() {
 /// The input has signals that cross bytes, in both byte orders, and frames of 12 bytes: id, size, data, time.
 void decodeCan(const std::string& bytes) {
   CanWheelOptions options;
-  options.left_ticks = {0x101, 3, 13, ByteOrder::kLittle, false, 1.0, 0.0};
-  options.right_ticks = {0x101, 31, 16, ByteOrder::kBig, false, 1.0, 0.0};
-  options.steering_angle_rad = {0x7a, 7, 64, ByteOrder::kBig, true, 1e-4, 0.5};
+  options.left_ticks = {{3, 13, ByteOrder::kLittle, false, 1.0, 0.0}, 0x101, {}, {}};
+  options.right_ticks = {{31, 16, ByteOrder::kBig, false, 1.0, 0.0}, 0x101, {}, {}};
+  options.steering_angle_rad = {{7, 32, ByteOrder::kBig, true, 1e-4, 0.5},
+                                0x7a,
+                                {32, 20, ByteOrder::kLittle, true, 1e-5, 0.0},
+                                {52, 2, ByteOrder::kLittle, 1}};
   options.validate();
   CanWheelDecoder decoder(options);
   int64_t now_ns = 0;
@@ -204,6 +209,19 @@ std::vector<FuzzTarget> driveTargets() {
                    readRecordedDrive(path, oneCamera(), DriveTopics(), &ignore, {});
                  }),
       {"camera_frame", frames, convertFrame},
+      fileTarget("candump", "can.log", {"(46408.584954) can0 0B4#00000000\n(46408.6) can0 18FEF100#01\n"},
+                 [](const std::string& path) { readCandump(path); }),
+      fileTarget("dbc", "car.dbc",
+                 {"BO_ 170 A: 8 X\n SG_ P M : 0|2@1+ (1,0) [0|3] \"\" X\n"
+                  " SG_ S m1 : 7|16@0- (0.01,-67.67) [0|250] \"km/h\" X\nSG_MUL_VAL_ 170 S P 1-1;\n"},
+                 [](const std::string& path) {
+                   const DbcFile dbc = DbcFile::read(path);
+                   for (const DbcFile::Message& message : dbc.messages()) {
+                     for (const DbcFile::Signal& signal : message.signals) {
+                       dbc.layoutOf(message.name + "." + signal.name);
+                     }
+                   }
+                 }),
       {"can", [] { return std::vector<std::string>{std::string(48, '\x11')}; }, decodeCan},
   };
 }

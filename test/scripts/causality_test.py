@@ -46,7 +46,7 @@ class CausalityTest(unittest.TestCase):
         status, _, errors = run_tool(self.chain.words("build_map", whole, whole))
         self.assertEqual((status, errors), (0, []))
         for name in LIVE:
-            status, _, errors = run_tool(self.chain.words(name, whole, whole))
+            status, _, errors = run_tool(self.chain.words(name, whole, whole, live=["--online"]))
             self.assertEqual((status, errors), (0, []), name)
         short = self.chain.folder / "cut" / self.chain.drive.bag.name
         with rosbag.Bag(str(self.chain.drive.bag)) as bag, rosbag.Bag(str(short), "w") as copy:
@@ -56,7 +56,7 @@ class CausalityTest(unittest.TestCase):
                 copy.write(topic, message, received)
         self.chain.drive.bag = short
         for name in LIVE:
-            status, _, errors = run_tool(self.chain.words(name, cut, whole))
+            status, _, errors = run_tool(self.chain.words(name, cut, whole, live=["--online"]))
             self.assertEqual((status, errors), (0, []), name)
         expected, found = (results_until(folder, end.to_nsec()) for folder in (whole, cut))
         self.assertGreater(len(expected["poses.tum.csv"]), 20)

@@ -53,6 +53,19 @@ class ResultsTest(FolderTest):
             self.assertFalse(results.figure("error", missing, "cm", at_most=3).reached)
             self.assertIsNone(results.figure("error", missing, "cm", at_most=3).value)
 
+    def test_table_tells_the_median_and_the_worst_condition_first(self):
+        def measurement(condition, error_cm, ratio):
+            return results.Measurement("t", condition, [results.figure("error", error_cm, "cm", at_most=2),
+                                                        results.figure("found", ratio, at_least=0.5),
+                                                        results.Figure("time", 1, "s")])
+
+        lines = results.table([measurement("lot", 1.0, 0.9), measurement("garage", 3.0, 0.4),
+                               measurement("ramp", None, 0.8)]).splitlines()
+        self.assertEqual(lines[0], "|what|goal|median|worst|garage|ramp|lot|")
+        self.assertEqual(lines[2], "|error|<= 2|**3 cm**|**-** (ramp)|**3 cm**|**-**|1 cm|")
+        self.assertEqual(lines[3], "|found|>= 0.5|0.8|**0.4** (garage)|**0.4**|0.8|0.9|")
+        self.assertEqual(lines[4], "|time||||1 s|1 s|1 s|")
+
     def test_table_has_a_column_per_condition(self):
         table = results.table([results.Measurement("t", "lot", [results.figure("error", 1.25, "cm", at_most=1)]),
                                results.Measurement("t", "garage", [results.figure("error", 0.5, "cm", at_most=1)])])

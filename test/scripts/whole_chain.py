@@ -17,8 +17,9 @@ class WholeChain:
         self.folder = self.drive.folder
         self.ranges = self.drive.write_text("ranges.yaml", OBSTACLE_RANGES)
 
-    def words(self, name, output, source):
-        """Command of a tool that writes below `output` and reads earlier results below `source`."""
+    def words(self, name, output, source, live=()):
+        """Command of a tool that writes below `output` and reads earlier results below `source`; `live`: what range maps need
+        to be computed as by the nodelet."""
         given = ["--bag", self.drive.bag, "--rig", self.drive.rig]
         heights = self.drive.write_text("heights.yaml", HEIGHTS)
         return {
@@ -26,7 +27,7 @@ class WholeChain:
                           output / "lot.tum"],
             "localize_drive": [tool("vcharge_localization", "localize_drive"), *given, "--map", source / "lot.vmap",
                                "--output", output / "poses.tum"],
-            "compute_range_maps": [tool("vcharge_dense", "compute_range_maps"), *given, "--options", self.ranges, "--output",
+            "compute_range_maps": [tool("vcharge_dense", "compute_range_maps"), *given, *live, "--options", self.ranges, "--output",
                                    output / "range", "--no-pictures"],
             "build_height_map": [tool("vcharge_dense", "build_height_map"), *given, "--trajectory", source / "lot.tum",
                                  "--options", heights, "--output", output / "heights"],

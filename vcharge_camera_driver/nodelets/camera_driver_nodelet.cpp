@@ -45,7 +45,7 @@ class CameraDriverNodelet : public Nodelet {
     sink_ = std::make_unique<MessageSink>(options_.cameras.size(), TriggerGrouperOptions{rate_hz},
                                           options_.stamp_offset_s,
                                           [this](const MultiFrame& group) { publish(group); });
-    source_ = makeFrameSource(options_, rig_, now, [this](const WheelTicks& ticks) { addTicks(ticks); });
+    source_ = makeFrameSource(options_, rig_, now, [this](const WheelTicks& ticks) { addWheels(ticks); });
     // All checks that may throw come before this: topics that appear and vanish at once confuse subscribers.
     images_ = std::make_unique<ImagePublisher>(&node(), *rig_, options_.cameras, topics_);
     if (options_.odometry_source != OdometrySourceKind::kNone) {
@@ -59,11 +59,11 @@ class CameraDriverNodelet : public Nodelet {
                                          options_.can, now);
       addDiagnostics(
           "/can", [this] { return reportCan(can_->status()); }, Threads::kSeveral);
-      threads_.emplace_back([this] { can_->run([this](const WheelTicks& ticks) { addTicks(ticks); }); });
+      threads_.emplace_back([this] { can_->run([this](const WheelMeasurement& wheels) { addWheels(wheels); }); });
     } else if (odometry_ && options_.source != FrameSourceKind::kBag) {
       subscribe<vcharge_msgs::WheelTicks>(topics_.wheel_ticks, 100,
                                           [this](const vcharge_msgs::WheelTicksConstPtr& message) {
-                                            addTicks(fromMessage(*message, topics_.wheel_ticks));
+                                            addWheels(fromMessage(*message, topics_.wheel_ticks));
                                           });
     }
     threads_.emplace_back([this] { guard().run([this] { source_->run(sink_.get()); }); });
@@ -71,9 +71,9 @@ class CameraDriverNodelet : public Nodelet {
 
   static Timestamp now() { return toTimestamp(ros::Time::now()); }
 
-  void addTicks(const WheelTicks& ticks) {
+  void addWheels(const WheelMeasurement& wheels) {
     if (odometry_) {
-      odometry_->add(ticks);
+      odometry_->add(wheels);
     }
   }
 

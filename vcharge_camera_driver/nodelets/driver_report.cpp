@@ -66,11 +66,12 @@ DriveMonitor::Report reportCan(const CanStatus& status) {
   report.level = works ? DriveMonitor::Level::kOk : DriveMonitor::Level::kError;
   report.message =
       "can: " + status.message + (status.connected && status.silent ? ", no wheel data comes" : "");
-  add("ticks", status.ticks, &report);
+  add("measurements", status.measurements, &report);
   add("frames", status.decoded.frames, &report);
   add("too short", status.decoded.too_short, &report);
   add("counter wraps", status.decoded.wraps, &report);
   add("counter resets", status.decoded.resets, &report);
+  add("invalid speeds", status.decoded.invalid, &report);
   add("error frames", status.error_frames, &report);
   add("bad frames", status.bad_frames, &report);
   add("connections", status.connections, &report);

@@ -49,9 +49,9 @@ void OdometryPublisher::publish(const std::vector<OdometryEstimate>& estimates) 
   }
 }
 
-void OdometryPublisher::add(const WheelTicks& ticks) {
+void OdometryPublisher::add(const WheelMeasurement& wheels) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (const std::optional<OdometryEstimate> estimate = odometry_.add(ticks)) {
+  if (const std::optional<OdometryEstimate> estimate = odometry_.add(wheels)) {
     publish(stream_.add(*estimate));
   }
 }
@@ -65,18 +65,18 @@ DriveMonitor::Report OdometryPublisher::report() {
   const std::lock_guard<std::mutex> lock(mutex_);
   const WheelOdometryCounts& counts = odometry_.counts();
   DriveMonitor::Report report;
-  const bool silent = counts.ticks == reported_ticks_;
+  const bool silent = counts.measurements == reported_measurements_;
   const bool slipped = counts.slipping || counts.slips > reported_slips_;
   report.level = silent    ? DriveMonitor::Level::kError
                  : slipped ? DriveMonitor::Level::kWarn
                            : DriveMonitor::Level::kOk;
-  report.message = silent            ? "no wheel ticks"
+  report.message = silent            ? "no wheel data"
                    : slipped         ? "a wheel slips"
                    : counts.standing ? "the vehicle stands"
                                      : "the vehicle moves";
-  reported_ticks_ = counts.ticks;
+  reported_measurements_ = counts.measurements;
   reported_slips_ = counts.slips;
-  report.values = {{"ticks", std::to_string(counts.ticks)},
+  report.values = {{"measurements", std::to_string(counts.measurements)},
                    {"slips", std::to_string(counts.slips)},
                    {"gaps", std::to_string(counts.gaps)},
                    {"counter resets", std::to_string(counts.resets)},

@@ -12,14 +12,14 @@
 
 namespace vcharge {
 
-/// Computes odometry from wheel ticks and publishes it as /odom and odom -> base_link, in stamp order and
+/// Computes odometry from wheel data and publishes it as /odom and odom -> base_link, in stamp order and
 /// with an estimate at each trigger. Thread safe.
 class OdometryPublisher {
  public:
   OdometryPublisher(ros::NodeHandle* node, const WheelOdometryOptions& options, double frame_rate_hz,
                     const std::string& topic, std::string vehicle_frame);
 
-  void add(const WheelTicks& ticks);
+  void add(const WheelMeasurement& wheels);
   void trigger(Timestamp stamp);
   DriveMonitor::Report report();
 
@@ -33,7 +33,7 @@ class OdometryPublisher {
   WheelOdometry odometry_;
   OdometryStream stream_;
   std::optional<Timestamp> broadcast_;
-  uint64_t reported_ticks_ = 0;
+  uint64_t reported_measurements_ = 0;
   uint64_t reported_slips_ = 0;
 };
 

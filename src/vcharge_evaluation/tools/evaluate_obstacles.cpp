@@ -2,11 +2,13 @@
 #include <cstdio>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "tool_arguments.h"
 #include "vcharge_core/base/progress_bar.h"
 #include "vcharge_core/dense_maps/obstacle_map_file.h"
 #include "vcharge_core/motion/trajectory.h"
+#include "vcharge_evaluation/approach_errors.h"
 #include "vcharge_evaluation/obstacle_map_errors.h"
 #include "vcharge_evaluation/obstacle_scan_errors.h"
 #include "vcharge_evaluation/range_truth.h"
@@ -21,6 +23,7 @@ struct Options {
   VCHARGE_OPTION(int, pixel_step, 2, positive(), "Every how many columns and rows a true range is used.");
   VCHARGE_OPTION_GROUP(ObstacleScanEvaluationOptions, scan, {}, "Ranges of the scans.");
   VCHARGE_OPTION_GROUP(ObstacleMapEvaluationOptions, map, {}, "Cells of the fused map.");
+  VCHARGE_OPTION_GROUP(ApproachEvaluationOptions, approach, {}, "First reports and the driving corridor.");
   VCHARGE_END_OPTIONS();
 };
 
@@ -99,16 +102,14 @@ nlohmann::json raysToJson(const char* what, const RayErrors& errors) {
   const auto judged = static_cast<double>(std::max<size_t>(1, errors.num_judged));
   std::printf(
       "  %-12s %6zu rays, missed %.1f %%, nearer %.1f %%; error mean %.1f cm (signed %+.1f), 95 %% %.1f cm; "
-      "own ray mean %.1f cm, 95 %% %.1f cm; within 1, 2 sigma %.0f, %.0f %%\n",
+      "within 1, 2 sigma %.0f, %.0f %%\n",
       what, errors.num_judged, 100.0 * errors.num_missed / judged, 100.0 * errors.num_nearer / judged,
       100.0 * errors.error_m.mean, 100.0 * errors.mean_signed_m, 100.0 * errors.error_m.percentile_95,
-      100.0 * errors.error_own_ray_m.mean, 100.0 * errors.error_own_ray_m.percentile_95,
       100.0 * errors.fraction_within_one_sigma, 100.0 * errors.fraction_within_two_sigma);
   return {{"rays", errors.num_judged},
           {"missed", errors.num_missed},
           {"nearer", errors.num_nearer},
           {"error_m", errors.error_m},
-          {"error_own_ray_m", errors.error_own_ray_m},
           {"mean_signed_m", errors.mean_signed_m},
           {"fraction_within_one_sigma", errors.fraction_within_one_sigma},
           {"fraction_within_two_sigma", errors.fraction_within_two_sigma}};
@@ -116,7 +117,18 @@ nlohmann::json raysToJson(const char* what, const RayErrors& errors) {
 
 nlohmann::json scanToJson(const std::string& name, const ObstacleScanEvaluator& evaluator) {
   std::printf("%s scan:\n", name.c_str());
+  nlohmann::json by_range = nlohmann::json::array();
+  for (const auto& [from_m, to_m, errors] : evaluator.byRange()) {
+    char label[32];
+    std::snprintf(label, sizeof(label), "%.1f-%.1f m", from_m, to_m);
+    nlohmann::json bin = raysToJson(label, errors);
+    bin["from_m"] = from_m;
+    bin["to_m"] = to_m;
+    by_range.push_back(bin);
+  }
   return {{"name", name},
+          {"by_range", by_range},
+          {"all", raysToJson("all", evaluator.all())},
           {"aside", raysToJson("aside", evaluator.aside())},
           {"ahead", raysToJson("ahead", evaluator.ahead())},
           {"ahead_within_2_m", raysToJson("ahead < 2 m", evaluator.aheadNear())}};
@@ -202,6 +214,42 @@ nlohmann::json mapToJson(const ObstacleMapErrors& errors) {
           {"mover_free", errors.num_mover_free}};
 }
 
+nlohmann::json approachToJson(const ApproachErrors& errors) {
+  nlohmann::json reports = nlohmann::json::array();
+  for (const FirstReport& report : errors.reports) {
+    const auto orNull = [](const std::optional<double>& value) {
+      return value ? nlohmann::json(*value) : nlohmann::json();
+    };
+    reports.push_back({{"kind", report.kind},
+                       {"moves", report.moves},
+                       {"first_visible_m", report.first_visible_m},
+                       {"nearest_m", report.nearest_m},
+                       {"first_reported_m", orNull(report.reported_m)},
+                       {"contact_s", orNull(report.contact_s)}});
+  }
+  const CorridorCounts& cells = errors.corridor;
+  const size_t num_free = cells.free_as_free + cells.free_as_unknown + cells.free_as_occupied;
+  std::printf(
+      "corridor: %zu free cells, of which %.1f %% free, %.1f %% unknown, %.2f %% occupied; "
+      "%zu occupied ones, of which %zu free; %zu false alarms in %.1f s, %.1f m\n",
+      num_free, 100.0 * static_cast<double>(cells.free_as_free) / std::max<size_t>(1, num_free),
+      100.0 * static_cast<double>(cells.free_as_unknown) / std::max<size_t>(1, num_free),
+      100.0 * static_cast<double>(cells.free_as_occupied) / std::max<size_t>(1, num_free),
+      cells.occupied_as_free + cells.occupied_as_unknown + cells.occupied_as_occupied, cells.occupied_as_free,
+      errors.num_false_alarms, errors.duration_s, errors.driven_m);
+  return {{"reports", reports},
+          {"corridor",
+           {{"free_as_free", cells.free_as_free},
+            {"free_as_unknown", cells.free_as_unknown},
+            {"free_as_occupied", cells.free_as_occupied},
+            {"occupied_as_free", cells.occupied_as_free},
+            {"occupied_as_unknown", cells.occupied_as_unknown},
+            {"occupied_as_occupied", cells.occupied_as_occupied}}},
+          {"false_alarms", errors.num_false_alarms},
+          {"duration_s", errors.duration_s},
+          {"driven_m", errors.driven_m}};
+}
+
 struct Arguments {
   std::string obstacles, truth;
 };
@@ -211,6 +259,9 @@ nlohmann::json evaluate(const Arguments& arguments, const Options& options) {
   ObstacleMapEvaluator map_evaluator(readTruthObstacles(arguments.truth + "/obstacles.yaml"),
                                      readTruthHeights(arguments.truth + "/height_map.yaml"), truth.path(),
                                      options.map);
+  ApproachEvaluator approach_evaluator(readTruthObstacles(arguments.truth + "/obstacles.yaml"),
+                                       readTruthHeights(arguments.truth + "/height_map.yaml"),
+                                       readTrajectory(arguments.truth + "/trajectory.tum"), options.approach);
   std::map<std::string, ObstacleScanEvaluator> scan_evaluators;
   const std::vector<Timestamp> stamps = listObstacles(arguments.obstacles);
   size_t judged = 0;
@@ -238,9 +289,11 @@ nlohmann::json evaluate(const Arguments& arguments, const Options& options) {
         scan_evaluators.try_emplace(scan.name, options.scan).first->second.add(scan, all, *pose);
       }
     }
-    map_evaluator.add(readObstacleMap(arguments.obstacles, stamps[i]), all, *pose,
-                      truth.moversBetween(stamps[i], stamps[i]),
+    const ObstacleMap map = readObstacleMap(arguments.obstacles, stamps[i]);
+    const std::vector<TruthObstacle> movers = truth.moversBetween(stamps[i], stamps[i]);
+    map_evaluator.add(map, all, *pose, movers,
                       truth.moversBetween(stamps[i] - durationFromSeconds(1.0), stamps[i]));
+    approach_evaluator.add(map, all, *pose, movers);
   }
   if (judged == 0) {
     throw InputError(arguments.truth + "/range: no true ranges for any of the " +
@@ -252,6 +305,7 @@ nlohmann::json evaluate(const Arguments& arguments, const Options& options) {
     json["scans"].push_back(scanToJson(name, evaluator));
   }
   json["map"] = mapToJson(map_evaluator.errors());
+  json["approach"] = approachToJson(approach_evaluator.errors());
   return json;
 }
 
@@ -266,14 +320,16 @@ int main(int argc, char** argv) {
       ->required();
   const OptionsArgument<Options> options(&app);
   const ReportArgument report(&app, "obstacle_errors");
-  describeJson(&app, R"(kind: "obstacles"; scans: per scan {name, and for rays off the direction of travel
-(aside), along it (ahead) and along it within 2 m (ahead_within_2_m) {rays, missed, nearer,
-mean_signed_m, fraction_within_one_sigma, fraction_within_two_sigma, error distributions error_m,
-error_own_ray_m}}; map: {maps, driven_m, obstacles [{kind, height_m, width_m, distance_m, reported, maps,
+  describeJson(&app,
+               R"(kind: "obstacles"; scans: per scan {name, and for all rays (all), those off the direction of
+travel (aside), along it (ahead) and along it within 2 m (ahead_within_2_m), and by_range (with from_m, to_m) {rays,
+missed, nearer, mean_signed_m, fraction_within_one_sigma, fraction_within_two_sigma, error distribution error_m, in
+which missed and nearer rays count as 0.5 m}}; map: {maps, driven_m, obstacles [{kind, height_m, width_m, distance_m, reported, maps,
 maps_reported}], false_cells, false_cells_per_10_m, false_left, false_cells_per_map, false_cells_hidden,
 false_cell_list [{x_m, y_m, first_seen_ns, maps, left, on_open_ground}], observed_inside, free_inside:
 cells inside obstacles, kerb_points, kerb_reported, error distribution kerb_height_error_m, kerbs
-[{position_m, nearest_m, reported, ever_reported}], mover_maps, mover_reported, mover_cells, mover_free}.)");
+[{position_m, nearest_m, reported, ever_reported}], mover_maps, mover_reported, mover_cells, mover_free}; approach: {reports [{kind, moves, first_visible_m, nearest_m,
+first_reported_m, contact_s: null if never}], corridor {TRUTH_as_MAP: cells}, false_alarms, duration_s, driven_m}.)");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (options.shown()) {
       return;

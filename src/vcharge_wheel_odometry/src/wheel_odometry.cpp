@@ -16,23 +16,22 @@ constexpr double kYawNoise_rad = 2e-4;     // error of the bicycle model, per ro
 constexpr double kZeroNoise_per_m = 3e-5;  // drift of the steering's zero, per root of a second
 constexpr double kZeroSigma_per_m = 0.01;  // initial standard deviation: 1.5 degrees of steering
 constexpr double kSteeredYawAcceleration =
-    1.0;                                    // rad/s^2 per root of a second, beyond what the steering explains
-constexpr double kMaxSpeed_m_per_s = 60.0;  // a counter that changes faster was reset
+    1.0;  // rad/s^2 per root of a second, beyond what the steering explains
 constexpr double kYawRateFloor_rad_per_s = 1e-3;
 constexpr double kSlipWindow_s = 0.5;   // period in which wheels and steering are compared
 constexpr double kSlipFraction = 0.25;  // fraction of the turn: steering angles are less exact in tight turns
 constexpr double kStandstill_s = 0.3;   // time without a tick
+// Tyres transmit forces by rolling up to this fraction faster or slower than the car moves.
+constexpr double kTyreSlip = 0.05;
+// At this speed, a car that understeers turns half as much as its front wheels are steered; the effect grows
+// with the square of the speed. A low value among passenger cars.
+constexpr double kCharacteristicSpeed_m_per_s = 18.0;
+constexpr double kMaxSteeringAngle_rad = 1.3;  // no car steers farther
+constexpr double kMinSpeedOfCurvature_m_per_s = 0.5;
+constexpr double kMaxUncertainGap_s = 60.0;  // the uncertainty of a longer gap grows no more
 
 double square(double value) {
   return value * value;
-}
-
-/// Pose after an arc from the origin along x.
-RigidTransform arc(double distance_m, double turn_rad) {
-  const double half = 0.5 * turn_rad;
-  const double chord =
-      std::abs(half) < 1e-6 ? distance_m * (1.0 - half * half / 6.0) : distance_m * std::sin(half) / half;
-  return RigidTransform::planar(chord * std::cos(half), chord * std::sin(half), turn_rad);
 }
 
 template <int kSize>
@@ -45,6 +44,11 @@ void kalmanUpdate(const Eigen::Matrix<double, 1, kSize>& row, double innovation,
   *covariance = 0.5 * (*covariance + covariance->transpose()).eval();
 }
 
+/// Fraction of the steered turn by which the car may turn less.
+double understeer(double speed_m_per_s) {
+  return std::min(1.0, square(speed_m_per_s / kCharacteristicSpeed_m_per_s));
+}
+
 }  // namespace
 
 WheelOdometry::WheelOdometry(const WheelOdometryOptions& options) : options_(options) {
@@ -53,22 +57,30 @@ WheelOdometry::WheelOdometry(const WheelOdometryOptions& options) : options_(opt
   turn_covariance_ = Eigen::Vector3d(0.0, 0.1, square(kZeroSigma_per_m)).asDiagonal();
 }
 
-std::pair<double, double> WheelOdometry::steeredCurvature(const WheelTicks& ticks) {
-  const double told = std::tan(ticks.steering_angle_rad) / options_.wheelbase_m;
+WheelOdometry::Steering WheelOdometry::steeringOf(const WheelMeasurement& wheels) {
+  const double angle_rad = std::visit([](const auto& each) { return each.steering_angle_rad; }, wheels);
+  if (!options_.use_steering || !(std::abs(angle_rad) < kMaxSteeringAngle_rad)) {  // unknown, which is NaN
+    steering_.clear();
+    return {};
+  }
+  const Timestamp stamp = stampOf(wheels);
+  const double told = std::tan(angle_rad) / options_.wheelbase_m;
   const auto lag = durationFromSeconds(options_.steering_lag_s);
-  steering_.emplace_back(ticks.stamp, told);
-  while (steering_.size() > 1 && steering_[1].first <= ticks.stamp - lag) {
+  steering_.emplace_back(stamp, told);
+  while (steering_.size() > 1 && steering_[1].first <= stamp - lag) {
     steering_.pop_front();
   }
   // The steering goes on turning as during the last lag. A lag may be half as long or half as long again.
-  const double since_s = toSeconds(ticks.stamp - steering_.front().first);
+  const double since_s = toSeconds(stamp - steering_.front().first);
   const double change =
       since_s > 0.0 ? (told - steering_.front().second) * options_.steering_lag_s / since_s : 0.0;
-  return {told + change, std::hypot(options_.steering_noise_per_m, 0.5 * change)};
+  return {true, told + change,
+          std::hypot(options_.steering_noise_per_m, 0.5 * change) + understeer(along_[1]) * std::abs(told)};
 }
 
-void WheelOdometry::predict(double dt_s, double steered_curvature) {
-  steered_yaw_rad_ += along_[1] * (steered_curvature + turn_[2]) * dt_s;
+void WheelOdometry::predict(double dt_s, const Steering& steering) {
+  steered_yaw_rad_ +=
+      (steering.is_known ? along_[1] * (steering.curvature_per_m + turn_[2]) : turn_[1]) * dt_s;
   Eigen::Matrix2d along = Eigen::Matrix2d::Identity();
   along(0, 1) = dt_s;
   along_ = along * along_;
@@ -87,13 +99,46 @@ void WheelOdometry::predict(double dt_s, double steered_curvature) {
   turn_ = turn * turn_;
   turn_covariance_ = turn * turn_covariance_ * turn.transpose();
   addWhiteAcceleration(
-      square(options_.use_steering ? kSteeredYawAcceleration : options_.max_yaw_acceleration_rad_per_s2),
+      square(steering.is_known ? kSteeredYawAcceleration : options_.max_yaw_acceleration_rad_per_s2),
       &turn_covariance_);
   turn_covariance_(0, 0) += square(kYawNoise_rad) * dt_s;
   turn_covariance_(2, 2) += square(kZeroNoise_per_m) * dt_s;
 }
 
-void WheelOdometry::checkSlip(const Sample& sample) {
+void WheelOdometry::addMotion(const WheelMotion& motion) {
+  left_m_ += motion.left_m;
+  right_m_ += motion.right_m;
+  // Without front wheels, nothing contradicts the rear wheels.
+  front_left_m_ += motion.has_front_wheels ? motion.front_left_m : motion.left_m;
+  front_right_m_ += motion.has_front_wheels ? motion.front_right_m : motion.right_m;
+  if (left_slips_ && motion.has_front_wheels) {
+    left_excess_m_ += motion.left_m - motion.front_left_m;
+  }
+  if (right_slips_ && motion.has_front_wheels) {
+    right_excess_m_ += motion.right_m - motion.front_right_m;
+  }
+}
+
+// The car may have accelerated and braked, or turned, in a gap.
+void WheelOdometry::addGap(double gap_s) {
+  const double factor_s2 = square(std::min(gap_s, kMaxUncertainGap_s)) / 4.0;
+  pose_covariance_.topLeftCorner<2, 2>().diagonal().array() +=
+      square(options_.max_acceleration_m_per_s2 * factor_s2);
+  pose_covariance_(2, 2) += square(std::min(M_PI, options_.max_yaw_acceleration_rad_per_s2 * factor_s2));
+}
+
+// Takes back what a slip moved before it was found, and the change of the speed that came with it. The yaw
+// follows single wheels too slowly to be changed much.
+void WheelOdometry::takeBack(double left_excess_m, double right_excess_m, double speed_before_m_per_s) {
+  left_excess_m_ += left_excess_m;
+  right_excess_m_ += right_excess_m;
+  along_[0] -= 0.5 * (left_excess_m + right_excess_m);
+  along_[1] = speed_before_m_per_s;
+  along_covariance_(0, 1) = along_covariance_(1, 0) = 0.0;
+  along_covariance_(1, 1) = 1.0;
+}
+
+void WheelOdometry::checkSlip(const Sample& sample, bool has_front_wheels, bool is_steered) {
   window_.push_back(sample);
   while (toSeconds(sample.stamp - window_.front().stamp) > kSlipWindow_s) {
     window_.pop_front();
@@ -102,23 +147,49 @@ void WheelOdometry::checkSlip(const Sample& sample) {
   const double left_m = sample.left_m - first.left_m;
   const double right_m = sample.right_m - first.right_m;
   const double steered_rad = sample.steered_yaw_rad - first.steered_yaw_rad;
-  const double wheels_rad = (right_m - left_m) / options_.track_width_m;
-  const bool slips = std::abs(wheels_rad - steered_rad) >
-                     std::max(options_.slip_yaw_rad, kSlipFraction * std::abs(steered_rad));
-  if (slips && !counts_.slipping) {
-    ++counts_.slips;
-    // The slipping wheel changed its speed more than a car can.
-    const double before_m = first.speed_m_per_s * toSeconds(sample.stamp - first.stamp);
-    const double half_turn_m = 0.5 * steered_rad * options_.track_width_m;
-    left_slips_ = std::abs(left_m - (before_m - half_turn_m)) > std::abs(right_m - (before_m + half_turn_m));
+  const double before_m = first.speed_m_per_s * toSeconds(sample.stamp - first.stamp);
+  const double half_turn_m = 0.5 * steered_rad * options_.track_width_m;
+  const double left_error_m = std::abs(left_m - (before_m - half_turn_m));
+  const double right_error_m = std::abs(right_m - (before_m + half_turn_m));
+  bool left_slips = false;
+  bool right_slips = false;
+  if (has_front_wheels) {
+    const double front_left_m = sample.front_left_m - first.front_left_m;
+    const double front_right_m = sample.front_right_m - first.front_right_m;
+    const double limit_m = options_.slip_yaw_rad * options_.track_width_m;
+    // The wheel that slips is the one that changed its speed more.
+    left_slips = std::abs(left_m - front_left_m) > std::max(limit_m, kTyreSlip * std::abs(front_left_m)) &&
+                 left_error_m > std::abs(front_left_m - (before_m - half_turn_m));
+    right_slips =
+        std::abs(right_m - front_right_m) > std::max(limit_m, kTyreSlip * std::abs(front_right_m)) &&
+        right_error_m > std::abs(front_right_m - (before_m + half_turn_m));
+    if ((left_slips && !left_slips_) || (right_slips && !right_slips_)) {
+      const double left_excess_m = left_slips && !left_slips_ ? left_m - front_left_m : 0.0;
+      const double right_excess_m = right_slips && !right_slips_ ? right_m - front_right_m : 0.0;
+      takeBack(left_excess_m, right_excess_m, first.speed_m_per_s);
+    }
+  } else if (is_steered) {
+    const double wheels_rad = (right_m - left_m) / options_.track_width_m;
+    const double fraction = kSlipFraction + understeer(sample.speed_m_per_s);
+    if (std::abs(wheels_rad - steered_rad) >
+        std::max(options_.slip_yaw_rad, fraction * std::abs(steered_rad))) {
+      // The slipping wheel changed its speed more than a car can.
+      left_slips = counts_.slipping ? left_slips_ : left_error_m > right_error_m;
+      right_slips = !left_slips;
+    }
   }
+  const bool slips = left_slips || right_slips;
+  counts_.slips += slips && !counts_.slipping ? 1 : 0;
   counts_.slipping = slips;
+  left_slips_ = left_slips;
+  right_slips_ = right_slips;
 }
 
-void WheelOdometry::correct(double dt_s, double tick_m, double steered_curvature, double steered_sigma) {
+void WheelOdometry::correct(const WheelMotion& motion, const Steering& steering) {
   const double left_m = left_m_;
   const double right_m = right_m_;
-  if (counts_.slipping) {
+  const bool is_blind = counts_.slipping && !motion.has_front_wheels;
+  if (is_blind) {
     // The position of the slipping wheel follows from the other wheel and the steering.
     const double apart_m = options_.track_width_m * turn_[0];
     (left_slips_ ? left_excess_m_ : right_excess_m_) = left_slips_
@@ -127,25 +198,25 @@ void WheelOdometry::correct(double dt_s, double tick_m, double steered_curvature
   }
   const double left = left_m - left_excess_m_;
   const double right = right_m - right_excess_m_;
-  const double count_variance = kCountsPerIndependentOne * square(tick_m) / 12.0;
+  const double count_variance = kCountsPerIndependentOne * square(motion.resolution_m) / 12.0;
   kalmanUpdate<2>(Eigen::RowVector2d(1.0, 0.0), 0.5 * (left + right) - along_[0], 0.5 * count_variance,
                   &along_, &along_covariance_);
-  if (options_.use_steering) {
+  if (steering.is_known) {
     const double speed = along_[1];
-    kalmanUpdate<3>(
-        Eigen::RowVector3d(0.0, 1.0, -speed), speed * steered_curvature - (turn_[1] - speed * turn_[2]),
-        square(speed * steered_sigma) + square(kYawRateFloor_rad_per_s), &turn_, &turn_covariance_);
+    kalmanUpdate<3>(Eigen::RowVector3d(0.0, 1.0, -speed),
+                    speed * steering.curvature_per_m - (turn_[1] - speed * turn_[2]),
+                    square(speed * steering.sigma_per_m) + square(kYawRateFloor_rad_per_s), &turn_,
+                    &turn_covariance_);
   }
-  if (!counts_.slipping) {
+  if (!is_blind) {
     const double difference_variance =
-        std::max(1.0, kDifferenceCorrelation_s / dt_s) * 2.0 * square(tick_m) / 12.0;
+        std::max(1.0, kDifferenceCorrelation_s / motion.dt_s) * 2.0 * square(motion.resolution_m) / 12.0;
     kalmanUpdate<3>(Eigen::RowVector3d(1.0, 0.0, 0.0), (right - left) / options_.track_width_m - turn_[0],
                     difference_variance / square(options_.track_width_m), &turn_, &turn_covariance_);
   }
 }
 
-// If no ticks come for a while, the wheels stand at an unknown position within their ticks.
-void WheelOdometry::stand() {
+void WheelOdometry::forgetSpeeds() {
   along_[1] = 0.0;
   turn_[1] = 0.0;
   along_covariance_(0, 1) = along_covariance_(1, 0) = 0.0;
@@ -170,7 +241,7 @@ OdometryEstimate WheelOdometry::estimate(Timestamp stamp, double distance_m, dou
   pose_covariance_ = propagation * pose_covariance_ * propagation.transpose() +
                      distance_variance * along * along.transpose();
   pose_covariance_(2, 2) += yaw_variance;
-  odom_from_vehicle_ = odom_from_vehicle_ * arc(distance_m, turn_rad);
+  odom_from_vehicle_ = odom_from_vehicle_ * arcMotion(distance_m, turn_rad);
   yaw_rad_ += turn_rad;
 
   OdometryEstimate result;
@@ -187,146 +258,60 @@ OdometryEstimate WheelOdometry::estimate(Timestamp stamp, double distance_m, dou
   return result;
 }
 
-std::optional<OdometryEstimate> WheelOdometry::add(const WheelTicks& ticks) {
-  if (last_ && ticks.stamp <= last_->stamp) {
+std::optional<OdometryEstimate> WheelOdometry::add(const WheelMeasurement& wheels) {
+  const Timestamp stamp = stampOf(wheels);
+  if (last_ && stamp <= stampOf(*last_)) {
     ++counts_.out_of_order;
     return std::nullopt;
   }
-  ++counts_.ticks;
+  ++counts_.measurements;
   if (!last_) {
-    last_ = ticks;
-    last_motion_ = ticks.stamp;
-    return estimate(ticks.stamp, 0.0, 0.0);
+    last_ = wheels;
+    last_motion_ = stamp;
+    return estimate(stamp, 0.0, 0.0);
   }
-  const double dt_s = toSeconds(ticks.stamp - last_->stamp);
-  counts_.gaps += dt_s > kMaxGap_s ? 1 : 0;
-  const int64_t left_change = ticks.left_ticks - last_->left_ticks;
-  const int64_t right_change = ticks.right_ticks - last_->right_ticks;
-  const double tick_m = ticks.metres_per_tick;
-  const bool jumped =
-      std::max(std::abs(static_cast<double>(left_change)), std::abs(static_cast<double>(right_change))) *
-          tick_m >
-      kMaxSpeed_m_per_s * dt_s + 4.0 * tick_m;
-  last_ = ticks;
-  if (jumped) {  // the counters were reset: the distance in between follows from the speed
-    ++counts_.resets;
-    left_m_ = along_[0] + along_[1] * dt_s - 0.5 * options_.track_width_m * (turn_[0] + turn_[1] * dt_s) +
-              left_excess_m_;
-    right_m_ = along_[0] + along_[1] * dt_s + 0.5 * options_.track_width_m * (turn_[0] + turn_[1] * dt_s) +
-               right_excess_m_;
+  const Steering steering = steeringOf(wheels);
+  const double curvature_per_m = steering.is_known ? steering.curvature_per_m + turn_[2]
+                                 : std::abs(along_[1]) > kMinSpeedOfCurvature_m_per_s ? turn_[1] / along_[1]
+                                                                                      : 0.0;
+  const WheelMotion motion = wheelMotion(*last_, wheels, curvature_per_m, options_);
+  last_ = wheels;
+  counts_.gaps += motion.dt_s > WheelMotion::kMaxGap_s ? 1 : 0;
+  counts_.resets += motion.is_reset ? 1 : 0;
+  if (motion.is_reset && motion.dt_s > WheelMotion::kMaxBridgedGap_s) {
+    forgetSpeeds();
     window_.clear();
-    last_motion_ = ticks.stamp;
+    last_motion_ = stamp;
+    addGap(motion.dt_s);
+    return estimate(stamp, 0.0, 0.0);
   }
-  left_m_ += jumped ? 0.0 : static_cast<double>(left_change) * tick_m;
-  right_m_ += jumped ? 0.0 : static_cast<double>(right_change) * tick_m;
-  if (left_change != 0 || right_change != 0) {
-    last_motion_ = ticks.stamp;
+  if (motion.is_reset) {  // the distance in between follows from the speed
+    const double along_m = along_[0] + along_[1] * motion.dt_s;
+    const double half_apart_m = 0.5 * options_.track_width_m * (turn_[0] + turn_[1] * motion.dt_s);
+    left_m_ = along_m - half_apart_m + left_excess_m_;
+    right_m_ = along_m + half_apart_m + right_excess_m_;
+    window_.clear();
   }
-  counts_.standing = toSeconds(ticks.stamp - last_motion_) >= kStandstill_s;
+  addMotion(motion);
+  if (motion.is_moving || motion.is_reset) {
+    last_motion_ = stamp;
+  }
+  counts_.standing = toSeconds(stamp - last_motion_) >= kStandstill_s;
   if (counts_.standing) {
-    stand();
+    forgetSpeeds();  // the wheels stand at an unknown position within their ticks
     window_.clear();
-    return estimate(ticks.stamp, 0.0, 0.0);
+    return estimate(stamp, 0.0, 0.0);
   }
-  const auto [steered_curvature, steered_sigma] = steeredCurvature(ticks);
   const double distance_before_m = along_[0];
   const double yaw_before_rad = turn_[0];
-  predict(dt_s, steered_curvature);
-  if (options_.use_steering) {
-    checkSlip({ticks.stamp, left_m_, right_m_, steered_yaw_rad_, along_[1]});
+  predict(motion.dt_s, steering);
+  checkSlip({stamp, left_m_, right_m_, front_left_m_, front_right_m_, steered_yaw_rad_, along_[1]},
+            motion.has_front_wheels, steering.is_known);
+  correct(motion, steering);
+  if (motion.is_interpolated) {
+    addGap(motion.dt_s);
   }
-  correct(dt_s, tick_m, steered_curvature, steered_sigma);
-  return estimate(ticks.stamp, along_[0] - distance_before_m, turn_[0] - yaw_before_rad);
-}
-
-OdometryStream::OdometryStream(double hold_s, double max_extrapolation_s)
-    : hold_(durationFromSeconds(hold_s)), max_extrapolation_(durationFromSeconds(max_extrapolation_s)) {}
-
-OdometryStream OdometryStream::forFrameRate(double frame_rate_hz) {
-  // An estimate waits for the next trigger, which may be late by half a period.
-  return OdometryStream(1.5 / frame_rate_hz, 0.1);
-}
-
-std::vector<OdometryEstimate> OdometryStream::flush() {
-  std::vector<OdometryEstimate> ready;
-  if (!history_.empty()) {
-    release(history_.back().odometry.stamp + Duration(1), &ready);
-  }
-  return ready;
-}
-
-void OdometryStream::release(Timestamp before, std::vector<OdometryEstimate>* ready) {
-  for (const OdometryEstimate& each : history_) {
-    if (each.odometry.stamp < before && (!published_ || *published_ < each.odometry.stamp)) {
-      ready->push_back(each);
-      published_ = each.odometry.stamp;
-    }
-  }
-}
-
-std::vector<OdometryEstimate> OdometryStream::add(const OdometryEstimate& estimate) {
-  std::vector<OdometryEstimate> ready;
-  if (!history_.empty() && estimate.odometry.stamp <= history_.back().odometry.stamp) {
-    return ready;
-  }
-  history_.push_back(estimate);
-  if (extrapolated_ && *extrapolated_ <= estimate.odometry.stamp) {
-    const std::optional<OdometryEstimate> corrected = at(*extrapolated_);
-    // After a gap in the ticks a correction comes too late to be sorted by those who read it.
-    if (corrected && estimate.odometry.stamp - *extrapolated_ <= hold_) {
-      ready.push_back(*corrected);
-    }
-    extrapolated_.reset();
-  }
-  release(estimate.odometry.stamp - hold_, &ready);
-  while (toSeconds(estimate.odometry.stamp - history_.front().odometry.stamp) > 1.0) {
-    history_.pop_front();
-  }
-  return ready;
-}
-
-std::optional<OdometryEstimate> OdometryStream::at(Timestamp stamp) const {
-  const auto after = std::find_if(history_.begin(), history_.end(),
-                                  [&](const OdometryEstimate& each) { return stamp <= each.odometry.stamp; });
-  if (after != history_.end() && after->odometry.stamp == stamp) {
-    return *after;
-  }
-  if (after == history_.begin()) {
-    return std::nullopt;
-  }
-  OdometryEstimate result = *(after - 1);
-  const VehicleOdometry& from = (after - 1)->odometry;
-  const double since_s = toSeconds(stamp - from.stamp);
-  result.odometry.stamp = stamp;
-  if (after == history_.end()) {
-    if (stamp - from.stamp > max_extrapolation_) {
-      return std::nullopt;
-    }
-    result.odometry.odom_from_vehicle =
-        from.odom_from_vehicle * arc(from.forward_speed_m_per_s * since_s, from.yaw_rate_rad_per_s * since_s);
-    return result;
-  }
-  const VehicleOdometry& to = after->odometry;
-  const double fraction = since_s / toSeconds(to.stamp - from.stamp);
-  result.odometry.odom_from_vehicle = interpolate(from.odom_from_vehicle, to.odom_from_vehicle, fraction);
-  result.odometry.forward_speed_m_per_s += fraction * (to.forward_speed_m_per_s - from.forward_speed_m_per_s);
-  result.odometry.yaw_rate_rad_per_s += fraction * (to.yaw_rate_rad_per_s - from.yaw_rate_rad_per_s);
-  return result;
-}
-
-std::vector<OdometryEstimate> OdometryStream::trigger(Timestamp stamp) {
-  std::vector<OdometryEstimate> ready;
-  release(stamp, &ready);
-  if (!published_ || *published_ < stamp) {
-    if (const std::optional<OdometryEstimate> estimate = at(stamp)) {
-      ready.push_back(*estimate);
-      published_ = stamp;
-      if (history_.back().odometry.stamp < stamp) {
-        extrapolated_ = stamp;
-      }
-    }
-  }
-  return ready;
+  return estimate(stamp, along_[0] - distance_before_m, turn_[0] - yaw_before_rad);
 }
 
 }  // namespace vcharge

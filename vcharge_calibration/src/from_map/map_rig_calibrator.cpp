@@ -84,6 +84,7 @@ void MapRigCalibrator::processFrame(const ImageFrame& frame) {
     return;
   }
   const StageTimer timer("finding cameras", &state_.report.stage_s);
+  keyframes_.correct(frame.corrections);
   const RigidTransform& odom_from_vehicle = *frame.bridged_from_vehicle;
   const RigidTransform since = motionSinceKeyframe(odom_from_vehicle);
   if (keyframes_.isDue(since)) {

@@ -23,7 +23,7 @@ struct CanStatus {
   uint64_t connections = 0;
   uint64_t error_frames = 0;
   uint64_t bad_frames = 0;  ///< frames whose size differs from a CAN frame's
-  uint64_t ticks = 0;
+  uint64_t measurements = 0;
   CanWheelCounts decoded;
 };
 
@@ -32,26 +32,26 @@ struct CanStatus {
 class CanReader {
  public:
   using Open = std::function<FileDescriptor()>;
-  using TicksCallback = std::function<void(const WheelTicks&)>;
+  using WheelsCallback = std::function<void(const WheelMeasurement&)>;
 
   /// `open` throws InputError if there is no bus. `drive_clock` provides the stamps if the socket does not.
   CanReader(Open open, const CanWheelOptions& options, ClockMap::Clock drive_clock, double timeout_s = 0.5);
 
   /// Blocks until stop().
-  void run(const TicksCallback& callback);
+  void run(const WheelsCallback& callback);
   void stop();               ///< thread safe
   CanStatus status() const;  ///< thread safe
 
  private:
   /// Returns false at the end of the socket.
-  bool readFrames(int fd, const TicksCallback& callback);
+  bool readFrames(int fd, const WheelsCallback& callback);
   void setMessage(bool connected, const std::string& message);
 
   const Open open_;
   CanWheelDecoder decoder_;
   const ClockMap::Clock drive_clock_;
   const Duration timeout_;
-  Timestamp last_ticks_;  // on the monotonic clock
+  Timestamp last_wheels_;  // on the monotonic clock
   FileDescriptor wake_;
   mutable std::mutex mutex_;
   CanStatus status_;

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "vcharge_camera_driver/can_wheel_decoder.h"
+#include "vcharge_camera_driver/can_wheel_options.h"
 #include "vcharge_camera_driver/v4l2_frame_source.h"
 #include "vcharge_wheel_odometry/wheel_odometry.h"
 

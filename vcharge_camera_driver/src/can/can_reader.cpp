@@ -108,7 +108,7 @@ void CanReader::setMessage(bool connected, const std::string& message) {
   status_.message = message;
 }
 
-bool CanReader::readFrames(int fd, const TicksCallback& callback) {
+bool CanReader::readFrames(int fd, const WheelsCallback& callback) {
   while (true) {
     const Received received = receive(fd);
     if (received.size < 0 && (errno == EAGAIN || errno == EINTR)) {
@@ -119,7 +119,7 @@ bool CanReader::readFrames(int fd, const TicksCallback& callback) {
                             (received.size == 0 ? "it is closed" : std::strerror(errno)));
       return false;
     }
-    std::optional<WheelTicks> ticks;
+    std::optional<WheelMeasurement> wheels;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       const can_frame& raw = received.frame;
@@ -147,23 +147,23 @@ bool CanReader::readFrames(int fd, const TicksCallback& callback) {
       frame.id = raw.can_id & (frame.is_extended ? CAN_EFF_MASK : CAN_SFF_MASK);
       frame.size = raw.can_dlc;
       std::copy(std::begin(raw.data), std::end(raw.data), frame.data.begin());
-      ticks = decoder_.add(frame, received.stamp ? *received.stamp : drive_clock_());
+      wheels = decoder_.add(frame, received.stamp ? *received.stamp : drive_clock_());
       status_.decoded = decoder_.counts();
-      if (ticks) {
-        ++status_.ticks;
+      if (wheels) {
+        ++status_.measurements;
         status_.silent = false;
-        last_ticks_ = monotonicNow();
+        last_wheels_ = monotonicNow();
       }
     }
-    if (ticks) {
-      callback(*ticks);
+    if (wheels) {
+      callback(*wheels);
     }
   }
 }
 
-void CanReader::run(const TicksCallback& callback) {
+void CanReader::run(const WheelsCallback& callback) {
   FileDescriptor bus;
-  last_ticks_ = monotonicNow();
+  last_wheels_ = monotonicNow();
   while (true) {
     if (!bus) {
       try {
@@ -187,7 +187,7 @@ void CanReader::run(const TicksCallback& callback) {
       poll(&pause, 1, kReconnect_ms);
     }
     const std::lock_guard<std::mutex> lock(mutex_);
-    status_.silent = monotonicNow() - last_ticks_ >= timeout_;
+    status_.silent = monotonicNow() - last_wheels_ >= timeout_;
   }
 }
 

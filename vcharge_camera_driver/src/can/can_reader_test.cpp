@@ -95,9 +95,9 @@ class CanReaderTest : public ::testing::Test {
   std::vector<WheelTicks> received_;
   CanReader reader_{bus_.opener(), wheels(), systemNow, 0.2};
   std::thread thread_{[this] {
-    reader_.run([this](const WheelTicks& ticks) {
+    reader_.run([this](const WheelMeasurement& wheels) {
       const std::lock_guard<std::mutex> lock(mutex_);
-      received_.push_back(ticks);
+      received_.push_back(std::get<WheelTicks>(wheels));
     });
   }};
 };

@@ -37,69 +37,16 @@ CanWheelOptions ticksOptions() {
   return options;
 }
 
+/// The ticks that a frame completed.
+std::optional<WheelTicks> addTo(CanWheelDecoder* decoder, const CanFrame& frame, Timestamp stamp) {
+  const auto wheels = decoder->add(frame, stamp);
+  return wheels ? std::optional<WheelTicks>(std::get<WheelTicks>(*wheels)) : std::nullopt;
+}
+
 CanFrame ticksFrame(int left, int right) {
   return frameOf(0x1a0,
                  {static_cast<uint8_t>(left & 255), static_cast<uint8_t>(left >> 8 & 3),
                   static_cast<uint8_t>(right & 255), static_cast<uint8_t>(right >> 8 & 3), 0, 0, 0, 0});
-}
-
-TEST(CanSignalTest, ReadsBitsInBothByteOrders) {
-  CanSignal signal;
-  signal.id = 1;
-  const CanFrame frame = frameOf(1, {0x12, 0x34, 0x56, 0x78, 0x9a, 0xbc, 0xde, 0xf0});
-  signal.start_bit = 8;
-  signal.length = 16;
-  EXPECT_EQ(signal.rawBits(frame), 0x5634u);
-  signal.start_bit = 4;
-  signal.length = 12;
-  EXPECT_EQ(signal.rawBits(frame), 0x341u);
-  signal.endianness = ByteOrder::kBig;
-  signal.start_bit = 15;  // the highest bit of byte 1
-  signal.length = 16;
-  EXPECT_EQ(signal.rawBits(frame), 0x3456u);
-  signal.start_bit = 3;  // the lower half of byte 0, then byte 1
-  signal.length = 12;
-  EXPECT_EQ(signal.rawBits(frame), 0x234u);
-  signal.start_bit = 7;
-  signal.length = 64;
-  EXPECT_EQ(signal.rawBits(frame), 0x123456789abcdef0u);
-  signal.endianness = ByteOrder::kLittle;
-  signal.start_bit = 0;
-  EXPECT_EQ(signal.rawBits(frame), 0xf0debc9a78563412u);
-}
-
-TEST(CanSignalTest, TakesAnyNumberThatWasPutIn) {
-  std::mt19937_64 random(5);
-  for (int round = 0; round < 2000; ++round) {
-    CanSignal signal;
-    signal.id = 7;
-    signal.length = 1 + static_cast<int>(random() % 63);
-    signal.start_bit = static_cast<int>(random() % static_cast<uint64_t>(65 - signal.length));
-    signal.is_signed = random() % 2 == 0;
-    signal.scale = 0.5;
-    signal.offset = -3.0;
-    const uint64_t raw = random() & ((uint64_t{1} << signal.length) - 1);
-    const uint64_t noise = random();
-    const uint64_t mask = ((uint64_t{1} << signal.length) - 1) << signal.start_bit;
-    const uint64_t word = (noise & ~mask) | raw << signal.start_bit;
-    CanFrame frame = frameOf(7, {});
-    for (size_t i = 0; i < 8; ++i) {
-      frame.data[i] = static_cast<uint8_t>(word >> (8 * i));
-    }
-    const bool negative = signal.is_signed && (raw >> (signal.length - 1)) != 0;
-    const double number =
-        negative ? static_cast<double>(raw) - std::ldexp(1.0, signal.length) : static_cast<double>(raw);
-    ASSERT_NEAR(*signal.value(frame), 0.5 * number - 3.0, 1e-6 + 1e-12 * std::abs(number));
-  }
-}
-
-TEST(CanSignalTest, AFrameThatEndsBeforeTheSignalHasNoValue) {
-  CanSignal signal;
-  signal.id = 1;
-  signal.start_bit = 14;
-  signal.length = 4;  // bits 14 to 17: bytes 1 and 2
-  EXPECT_FALSE(signal.value(frameOf(1, {}, 2)));
-  EXPECT_TRUE(signal.value(frameOf(1, {}, 3)));
 }
 
 TEST(CanWheelDecoderTest, CountersWrapForwardsAndBackwards) {
@@ -109,8 +56,8 @@ TEST(CanWheelDecoderTest, CountersWrapForwardsAndBackwards) {
   const int64_t left_start = left;
   const int64_t right_start = right;
   for (int i = 0; i < 500; ++i) {
-    const auto ticks =
-        decoder.add(ticksFrame(static_cast<int>(left & 1023), static_cast<int>(right & 1023)), at(0.02 * i));
+    const auto ticks = addTo(
+        &decoder, ticksFrame(static_cast<int>(left & 1023), static_cast<int>(right & 1023)), at(0.02 * i));
     ASSERT_TRUE(ticks);
     ASSERT_EQ(ticks->left_ticks, left - left_start);
     ASSERT_EQ(ticks->right_ticks, right - right_start);
@@ -128,7 +75,7 @@ TEST(CanWheelDecoderTest, NoDistanceIsLostWithMissingMessages) {
   std::optional<WheelTicks> last;
   for (int i = 0; i <= 1000; ++i) {
     const auto ticks = i == 0 || i == 1000 || random() % 2 == 0
-                           ? decoder.add(ticksFrame(5 * i & 1023, 6 * i & 1023), at(0.02 * i))
+                           ? addTo(&decoder, ticksFrame(5 * i & 1023, 6 * i & 1023), at(0.02 * i))
                            : std::nullopt;
     last = ticks ? ticks : last;
   }
@@ -138,16 +85,16 @@ TEST(CanWheelDecoderTest, NoDistanceIsLostWithMissingMessages) {
 
 TEST(CanWheelDecoderTest, AResetOfTheCountersIsNoMotion) {
   CanWheelDecoder decoder(ticksOptions());
-  decoder.add(ticksFrame(500, 500), at(0.0));
-  decoder.add(ticksFrame(510, 510), at(0.02));
-  const auto after = decoder.add(ticksFrame(0, 0), at(0.04));
+  addTo(&decoder, ticksFrame(500, 500), at(0.0));
+  addTo(&decoder, ticksFrame(510, 510), at(0.02));
+  const auto after = addTo(&decoder, ticksFrame(0, 0), at(0.04));
   EXPECT_EQ(after->left_ticks, 10);
   EXPECT_EQ(decoder.counts().resets, 2u);
   // During the silence the counter may have wrapped, so the distance is unknown.
-  const auto later = decoder.add(ticksFrame(20, 20), at(60.0));
+  const auto later = addTo(&decoder, ticksFrame(20, 20), at(60.0));
   EXPECT_EQ(later->left_ticks, 10);
   EXPECT_EQ(decoder.counts().resets, 4u);
-  EXPECT_EQ(decoder.add(ticksFrame(25, 25), at(60.02))->left_ticks, 15);
+  EXPECT_EQ(addTo(&decoder, ticksFrame(25, 25), at(60.02))->left_ticks, 15);
 }
 
 TEST(CanWheelDecoderTest, TakesSteeringDirectionAndWheelsOfSeveralMessages) {
@@ -157,38 +104,91 @@ TEST(CanWheelDecoderTest, TakesSteeringDirectionAndWheelsOfSeveralMessages) {
   options.backwards.start_bit = 3;
   options.backwards.length = 1;
   CanWheelDecoder decoder(options);
-  EXPECT_FALSE(decoder.add(frameOf(0x0c2, {0xfe, 0x0c, 0, 0, 0, 0, 0, 0}), at(0.0)));  // -500
-  EXPECT_FALSE(decoder.add(ticksFrame(1020, 0), at(0.0)));
+  EXPECT_FALSE(addTo(&decoder, frameOf(0x0c2, {0xfe, 0x0c, 0, 0, 0, 0, 0, 0}), at(0.0)));  // -500
+  EXPECT_FALSE(addTo(&decoder, ticksFrame(1020, 0), at(0.0)));
   CanFrame right = ticksFrame(0, 1000);
   right.id = 0x1a1;
-  const auto first = decoder.add(right, at(0.001));
+  const auto first = addTo(&decoder, right, at(0.001));
   ASSERT_TRUE(first);
   EXPECT_NEAR(first->steering_angle_rad, -0.05, 1e-12);
-  EXPECT_FALSE(decoder.add(ticksFrame(4, 0), at(0.02)));
-  decoder.add(frameOf(0x0c3, {8, 0, 0, 0, 0, 0, 0, 0}), at(0.02));
+  EXPECT_FALSE(addTo(&decoder, ticksFrame(4, 0), at(0.02)));
+  addTo(&decoder, frameOf(0x0c3, {8, 0, 0, 0, 0, 0, 0, 0}), at(0.02));
   right = ticksFrame(0, 1010);
   right.id = 0x1a1;
-  const auto second = decoder.add(right, at(0.021));
+  const auto second = addTo(&decoder, right, at(0.021));
   EXPECT_EQ(second->left_ticks, 8);
   EXPECT_EQ(second->right_ticks, -10);
 }
 
-TEST(CanWheelDecoderTest, IntegratesSpeeds) {
+CanWheelOptions speedsOptions() {
   CanWheelOptions options;
   readFields(YAML::Load("{left_speed_m_per_s: {id: 1, length: 16, scale: 0.01}, "
-                        "right_speed_m_per_s: {id: 1, start_bit: 16, length: 16, scale: 0.01}}"),
+                        "right_speed_m_per_s: {id: 1, start_bit: 16, length: 16, scale: 0.01}, "
+                        "front_left_speed_m_per_s: {id: 2, length: 16, scale: 0.01}, "
+                        "front_right_speed_m_per_s: {id: 2, start_bit: 16, length: 16, scale: 0.01}, "
+                        "backwards: {id: 3, length: 4}, backwards_value: 7, "
+                        "steering_angle_rad: {id: 4, length: 16, is_signed: true, scale: 0.001}}"),
              "can.yaml", &options);
+  return options;
+}
+
+CanFrame wordsFrame(uint32_t id, int first, int second) {
+  return frameOf(id,
+                 {static_cast<uint8_t>(first & 255), static_cast<uint8_t>(first >> 8 & 255),
+                  static_cast<uint8_t>(second & 255), static_cast<uint8_t>(second >> 8 & 255), 0, 0, 0, 0});
+}
+
+TEST(CanWheelDecoderTest, TellsSpeedsOfTheRearWheelsWithWhatIsNewOfTheOthers) {
+  CanWheelDecoder decoder(speedsOptions());
+  const auto add = [&](uint32_t id, int first, int second, double time_s) {
+    return decoder.add(wordsFrame(id, first, second), at(time_s));
+  };
+  auto wheels = add(1, 500, 510, 0.0);
+  ASSERT_TRUE(wheels);
+  auto speeds = std::get<WheelSpeeds>(*wheels);
+  EXPECT_DOUBLE_EQ(speeds.rear_left_m_per_s, 5.0);
+  EXPECT_DOUBLE_EQ(speeds.rear_right_m_per_s, 5.1);
+  EXPECT_TRUE(std::isnan(speeds.front_left_m_per_s));
+  EXPECT_TRUE(std::isnan(speeds.steering_angle_rad));
+  EXPECT_FALSE(add(2, 520, 530, 0.01));
+  EXPECT_FALSE(add(4, -200, 0, 0.01));
+  speeds = std::get<WheelSpeeds>(*add(1, 500, 510, 0.02));
+  EXPECT_DOUBLE_EQ(speeds.front_left_m_per_s, 5.2);
+  EXPECT_DOUBLE_EQ(speeds.front_right_m_per_s, 5.3);
+  EXPECT_DOUBLE_EQ(speeds.steering_angle_rad, -0.2);
+  speeds = std::get<WheelSpeeds>(*add(1, 500, 510, 0.5));
+  EXPECT_TRUE(std::isnan(speeds.front_right_m_per_s)) << "the front wheels are silent";
+  EXPECT_TRUE(std::isnan(speeds.steering_angle_rad));
+}
+
+TEST(CanWheelDecoderTest, TheGearGivesSpeedsTheirSign) {
+  CanWheelDecoder decoder(speedsOptions());
+  const auto speedInGear = [&](int gear) {
+    decoder.add(wordsFrame(3, gear, 0), at(0.0));
+    return std::get<WheelSpeeds>(*decoder.add(wordsFrame(1, 200, 200), at(0.0))).rear_left_m_per_s;
+  };
+  EXPECT_EQ(speedInGear(1), 2.0);
+  EXPECT_EQ(speedInGear(7), -2.0);
+  EXPECT_EQ(speedInGear(0), 2.0);
+}
+
+TEST(CanWheelDecoderTest, SpeedsThatMarkAFailureAreNotTold) {
+  CanWheelDecoder decoder(speedsOptions());
+  EXPECT_FALSE(decoder.add(wordsFrame(1, 0xffff, 500), at(0.0)));
+  EXPECT_EQ(decoder.counts().invalid, 1u);
+  EXPECT_TRUE(decoder.add(wordsFrame(1, 500, 500), at(0.02)));
+}
+
+TEST(CanWheelDecoderTest, EachRearWheelMayHaveItsMessage) {
+  CanWheelOptions options = speedsOptions();
+  options.right_speed_m_per_s.id = 5;
   CanWheelDecoder decoder(options);
-  std::optional<WheelTicks> ticks;
-  // 10 s: the left wheel accelerates by 0.5 m/s^2, the right one moves at 3 m/s
-  for (int i = 0; i <= 500; ++i) {
-    const int left = i;
-    ticks = decoder.add(frameOf(1, {static_cast<uint8_t>(left & 255), static_cast<uint8_t>(left >> 8),
-                                    300 & 255, 1, 0, 0, 0, 0}),
-                        at(0.02 * i));
-  }
-  EXPECT_NEAR(static_cast<double>(ticks->left_ticks) * ticks->metres_per_tick, 25.0, 1e-3);
-  EXPECT_NEAR(static_cast<double>(ticks->right_ticks) * ticks->metres_per_tick, 30.0, 1e-3);
+  EXPECT_FALSE(decoder.add(wordsFrame(1, 500, 0), at(0.0)));
+  EXPECT_TRUE(decoder.add(wordsFrame(5, 0, 510), at(0.001)));
+  EXPECT_FALSE(decoder.add(wordsFrame(1, 500, 0), at(0.02)));
+  EXPECT_FALSE(decoder.add(wordsFrame(1, 505, 0), at(0.04))) << "the other message was lost";
+  const auto wheels = decoder.add(wordsFrame(5, 0, 515), at(0.041));
+  EXPECT_DOUBLE_EQ(std::get<WheelSpeeds>(*wheels).rear_left_m_per_s, 5.05);
 }
 
 TEST(CanWheelDecoderTest, FuzzedFramesNeverCrashItNorMoveTheCarFasterThanItCan) {
@@ -212,11 +212,11 @@ TEST(CanWheelDecoderTest, FuzzedFramesNeverCrashItNorMoveTheCarFasterThanItCan) 
     time_s += step_s;
     forwards_s += std::max(0.0, step_s);
     ++num_frames;
-    const auto ticks = decoder.add(frame, at(time_s));
+    const auto ticks = addTo(&decoder, frame, at(time_s));
     if (ticks && last) {
       const double most = 60.0 * forwards_s / 0.02 + 4.0 * num_frames;
       ASSERT_LE(std::abs(static_cast<double>(ticks->left_ticks - last->left_ticks)), most);
-      ASSERT_TRUE(std::isfinite(ticks->steering_angle_rad));
+      ASSERT_FALSE(std::isinf(ticks->steering_angle_rad));  // NaN: unknown
     }
     if (ticks) {
       last = ticks;
@@ -247,6 +247,17 @@ TEST(CanWheelOptionsTest, RejectsBadDescriptionsByName) {
   EXPECT_THAT(errorFrom("{left_ticks: {endianness: middle}}"),
               HasSubstr("left_ticks.endianness: expected one of little, big"));
   EXPECT_THAT(errorFrom("{left_ticks: {bits: 3}}"), HasSubstr("left_ticks.bits: unknown key"));
+  EXPECT_THAT(errorFrom("{right_ticks: {start_bit: 8}}"), HasSubstr("message 0x1a0 than left_ticks"));
+  EXPECT_THAT(errorFrom("{left_ticks: {plus: {start_bit: 40, length: 4}}}"), HasSubstr("plus"));
+  EXPECT_THAT(errorFrom("{backwards: {start_bit: 3, length: 1}}"), HasSubstr("backwards.id: must be given"));
+  EXPECT_THAT(errorFrom("{front_left_speed_m_per_s: {id: 9, length: 8}}"), HasSubstr("both front wheels"));
+  EXPECT_THAT(errorFrom("{steering_angle_rad: {scale: 0}}"), HasSubstr("steering_angle_rad.scale: "));
+  EXPECT_THAT(errorFrom("{steering_angle_rad: {multiplexor: {length: 2, value: 4}}}"),
+              HasSubstr("steering_angle_rad.multiplexor.value: "));
+  EXPECT_THAT(errorFrom("{steering_angle_rad: {multiplexor: {value: 4}}}"),
+              HasSubstr("steering_angle_rad.multiplexor.length: "));
+  EXPECT_THAT(errorFrom("{steering_angle_rad: {plus: {start_bit: 7, length: 4}}}"),
+              HasSubstr("steering_angle_rad.plus.start_bit: "));
   EXPECT_THAT(errorFrom("{metres_per_tick: 0}"), HasSubstr("metres_per_tick: "));
   EXPECT_THAT(errorFrom("{left_speed_m_per_s: {id: 1, length: 8}}"), HasSubstr("both wheels"));
   EXPECT_EQ(errorFrom("{}"), "no error");

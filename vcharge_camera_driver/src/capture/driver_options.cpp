@@ -21,6 +21,9 @@ void DriverOptions::checkFields() const {
           "odometry_source: must be wheel_ticks (those of the bag) or none with source bag");
   require(odometry_source != OdometrySourceKind::kCan || can.isUsed(),
           "can.left_ticks: must describe the wheels' messages with odometry_source can");
+  require(odometry_source != OdometrySourceKind::kCan || !odometry.use_steering ||
+              can.steering_angle_rad.isUsed(),
+          "odometry.use_steering: must be false where can.steering_angle_rad is not described");
 }
 
 }  // namespace vcharge

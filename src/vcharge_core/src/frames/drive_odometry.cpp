@@ -108,7 +108,7 @@ bool DriveOdometry::isReset(const VehicleOdometry& odometry) const {
 
 void DriveOdometry::correct(const VehicleOdometry& odometry, FrameCounters* counters) {
   // Entries before a reset are not corrected: their bridged poses have been continued.
-  const bool is_known = raw_.add(odometry) == OdometryBuffer::AddResult::kCorrected;
+  const bool is_known = takes_corrections_ && raw_.add(odometry) == OdometryBuffer::AddResult::kCorrected;
   ++(is_known ? counters->odometry_corrections : counters->ignored_odometry);
   if (!is_known) {
     return;

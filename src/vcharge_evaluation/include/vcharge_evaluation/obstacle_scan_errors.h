@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <tuple>
 #include <vector>
 
 #include "vcharge_core/base/options.h"
@@ -20,13 +22,12 @@ struct ObstacleScanEvaluationOptions {
 
 /// Errors of the reported ranges of a set of rays.
 struct RayErrors {
-  size_t num_judged = 0;              ///< rays with a true obstacle in bounds
-  size_t num_missed = 0;              ///< rays without a reported range up to 0.5 m behind it
-  size_t num_nearer = 0;              ///< rays with a reported range over 0.5 m in front of it
-  ErrorDistribution error_m;          ///< absolute errors of the other rays
-  ErrorDistribution error_own_ray_m;  ///< the same against the truth of the ray itself
-  double mean_signed_m = 0.0;
-  double fraction_within_one_sigma = 0.0;
+  size_t num_judged = 0;       ///< rays with a true obstacle in bounds
+  size_t num_missed = 0;       ///< rays without a reported range up to 0.5 m behind it
+  size_t num_nearer = 0;       ///< rays with a reported range over 0.5 m in front of it
+  ErrorDistribution error_m;   ///< absolute errors of all judged rays; missed and nearer ones count as 0.5 m
+  double mean_signed_m = 0.0;  ///< of the rays that are neither missed nor nearer
+  double fraction_within_one_sigma = 0.0;  ///< fraction of all judged rays
   double fraction_within_two_sigma = 0.0;
 };
 
@@ -35,26 +36,32 @@ class ObstacleScanEvaluator {
  public:
   explicit ObstacleScanEvaluator(const ObstacleScanEvaluationOptions& options = {});
 
-  /// world_from_vehicle is the true pose. A reported range is compared with the nearest truth among its own
-  /// sector and the two beside it, as an obstacle's edge may lie in either of two sectors.
+  /// world_from_vehicle is the true pose. A reported range is compared with the nearest surface in its own
+  /// sector.
   void add(const ObstacleScan& scan, const std::vector<SeenPoint>& points,
            const RigidTransform& world_from_vehicle);
 
+  RayErrors all() const { return summarizeRays(all_); }
   RayErrors aside() const { return summarizeRays(aside_); }           ///< rays off the direction of travel
   RayErrors ahead() const { return summarizeRays(ahead_); }           ///< rays along it
   RayErrors aheadNear() const { return summarizeRays(ahead_near_); }  ///< rays along it, nearer than 2 m
+  /// Bounds of the true range, from and to, with the errors of the rays between them.
+  std::vector<std::tuple<double, double, RayErrors>> byRange() const;
 
  private:
   struct Rays {
     size_t judged = 0, missed = 0, nearer = 0;
-    std::vector<double> errors_m, own_errors_m, sigmas;
+    std::vector<double> errors_m, sigmas;
     double signed_sum_m = 0.0;
   };
-  static void addRay(double reported_m, double sigma_m, double truth_m, double nearest_truth_m, Rays* rays);
+  static constexpr std::array<double, 5> kRangeBounds_m = {0.5, 1.0, 2.0, 3.5, 5.0};
+
+  static void addRay(double reported_m, double sigma_m, double truth_m, Rays* rays);
   static RayErrors summarizeRays(const Rays& rays);
 
   ObstacleScanEvaluationOptions options_;
-  Rays aside_, ahead_, ahead_near_;
+  Rays all_, aside_, ahead_, ahead_near_;
+  std::array<Rays, kRangeBounds_m.size() - 1> by_range_;
 };
 
 }  // namespace vcharge

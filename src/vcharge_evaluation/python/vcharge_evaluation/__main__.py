@@ -10,6 +10,7 @@ STAGES = {
     "height_map": "height_map",
     "obstacles": "obstacles",
     "faults": "faults",
+    "odometry": "odometry",
     "chain": "chain.cars",
     "latency": "live.latency",
     "soak": "live.soak",

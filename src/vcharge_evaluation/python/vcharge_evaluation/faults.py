@@ -5,7 +5,7 @@ import collections
 import csv
 
 from vcharge_evaluation import tools
-from vcharge_evaluation.localization_errors import LocalizationErrors, Map
+from vcharge_evaluation.localization_errors import BOUND_M, LocalizationErrors, Map
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure
 from vcharge_evaluation.tools import CONFIG, judge, run_tool, say, simulate
 
@@ -71,7 +71,6 @@ def localize(folder, scene):
     if result.error():
         return [Figure("localization reports", result.error())]
     errors = LocalizationErrors(folder / "poses.tum.csv", folder / "drive_truth" / "trajectory.tum", scene.mapped)
-    good = errors.localized()
     states, last = [], None
     for time_s, status in zip(errors.time_s, errors.status):
         if status != last:
@@ -80,9 +79,9 @@ def localize(folder, scene):
     if len(states) > MAX_LISTED_STATES:
         states = [f"{len(states)} changes of state"]
     warnings = [f"{one['num_frames']} frames: {one['text']}" for one in result.found["warnings"]]
-    median = float(sorted(errors.error_m[good])[good.sum() // 2]) if good.any() else None
     return [Figure("frames localized", 100 * errors.ratio(), "%"),
-            Figure("position error, median", None if median is None else 100 * median, "cm"),
+            Figure("position error of all frames (none: 50 cm), median",
+                   100 * errors.quantile(errors.error_m, 50, BOUND_M), "cm"),
             figure("wrong poses reported as localized", errors.num_false(), equal=0),
             Figure("localization reports", "; ".join([*states, *warnings]))]
 

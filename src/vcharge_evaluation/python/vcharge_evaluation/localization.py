@@ -5,7 +5,7 @@ import pathlib
 import numpy as np
 
 from vcharge_evaluation import tools
-from vcharge_evaluation.localization_errors import LocalizationErrors, Map
+from vcharge_evaluation.localization_errors import BOUND_DEG, BOUND_M, LocalizationErrors, Map
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
 from vcharge_evaluation.tools import CONFIG, run_tool, say, simulate
 
@@ -55,26 +55,23 @@ class Localization(LocalizationErrors):
                             *words)
         super().__init__(f"{output}.csv", folder / "drive_truth" / "trajectory.tum", mapped)
 
-    def quantile(self, errors, which):
-        """Percentile over the localized frames; None without any."""
-        good = self.localized()
-        return float(np.percentile(errors[good], which)) if good.any() else None
-
 
 def other_day_figures(result, min_percent):
-    def scaled(value, factor):
-        return None if value is None else factor * value
+    def centimetres(errors_m, which):
+        return 100 * result.quantile(errors_m, which, BOUND_M)
 
     consistency, num_frames = result.consistency() if result.localized().any() else (None, 0)
     latency_ms = 1e3 * np.percentile(result.latency_s, [50, 95])
     return [
         Figure("frames", len(result.status)),
         figure("frames localized", 100 * result.ratio(), "%", at_least=min_percent),
-        figure("position relative to the map, median", scaled(result.quantile(result.error_m, 50), 100), "cm", at_most=3),
-        figure("position relative to the map, 95 %", scaled(result.quantile(result.error_m, 95), 100), "cm", at_most=8),
-        figure("heading, median", result.quantile(result.heading_deg, 50), "degrees", at_most=0.05),
-        figure("heading, 95 %", result.quantile(result.heading_deg, 95), "degrees", at_most=0.2),
-        figure("absolute position, median", scaled(result.quantile(result.absolute_m, 50), 100), "cm", at_most=5),
+        figure("position relative to the map, all frames (none: 50 cm), median", centimetres(result.error_m, 50), "cm",
+               at_most=3),
+        figure("position relative to the map, 95 %", centimetres(result.error_m, 95), "cm", at_most=8),
+        figure("heading, all frames (none: 2 degrees), median", result.quantile(result.heading_deg, 50, BOUND_DEG), "degrees",
+               at_most=0.05),
+        figure("heading, 95 %", result.quantile(result.heading_deg, 95, BOUND_DEG), "degrees", at_most=0.2),
+        figure("absolute position, median", centimetres(result.absolute_m, 50), "cm", at_most=5),
         figure("localized, but over 0.5 m or 2 degrees off", result.num_false(), equal=0),
         figure(f"normalized error squared per degree of freedom ({num_frames} frames)", consistency, at_least=0.5,
                at_most=2.0),
@@ -119,9 +116,8 @@ def disturbance_figures(args, folder, mapped):
 def camera_columns(args, folder, mapped):
     for cameras in (["front"], ["front", "left"], ["left", "rear", "right"], ["front", "left", "rear", "right"]):
         result = Localization(args, folder, mapped, "cameras_" + "_".join(cameras), "--cameras", *cameras)
-        kept = ("frames localized", "position relative to the map, median", "position relative to the map, 95 %",
-                "heading, median", "localized, but over 0.5 m or 2 degrees off")
-        yield ", ".join(cameras), [one for one in other_day_figures(result, 0) if one.name in kept]
+        kept = ("frames localized", "position", "heading", "localized, but over 0.5 m or 2 degrees off")
+        yield ", ".join(cameras), [one for one in other_day_figures(result, 0) if one.name.startswith(kept)]
 
 
 def evaluate_scene(args, scene, mapped, other, results):

@@ -10,6 +10,9 @@ from vcharge_evaluation.tools import run_tool
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
 
+# Frames without a pose count with these errors, and no frame counts with a larger one.
+BOUND_M, BOUND_DEG = 0.5, 2.0
+
 
 class Map:
     """A map and the true poses of its keyframes."""
@@ -87,7 +90,12 @@ class LocalizationErrors:
 
     def num_false(self):
         """Frames reported as localized that are more than 0.5 m or 2 degrees off."""
-        return int((self.localized() & ((self.error_m > 0.5) | (self.error_deg > 2.0))).sum())
+        return int((self.localized() & ((self.error_m > BOUND_M) | (self.error_deg > BOUND_DEG))).sum())
+
+    @staticmethod
+    def quantile(errors, which, bound):
+        """Percentile over all frames."""
+        return float(np.percentile(np.minimum(errors, bound), which))
 
     def consistency(self):
         """Mean normalized error squared per degree of freedom over localized frames two seconds apart, and their number."""

@@ -7,8 +7,8 @@ from vcharge_evaluation.tools import ROOT
 
 PAGE = ROOT / "doc" / "results.md"
 # In the order of the pipeline; other stages follow by name.
-ORDER = ("chain", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "faults", "latency",
-         "real_images", "foundations", "speed")
+ORDER = ("chain", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "faults", "odometry",
+         "latency", "real_images", "foundations", "speed")
 INTRODUCTION = """# Results
 
 Made by `python3 -m vcharge_evaluation.page` from `doc/results/*.json`: do not edit. A figure that misses its goal is
@@ -42,10 +42,10 @@ def make_page(folder=results.RESULTS):
     return "\n".join(parts)
 
 
-def main():
+def main(words=None):
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--check", action="store_true", help="write nothing; exit status 1 where the page is stale")
-    args = parser.parse_args()
+    args = parser.parse_args(words)
     page = make_page()
     if not args.check:
         PAGE.write_text(page, encoding="utf-8")

@@ -6,6 +6,7 @@ made, command, date, commit, and its figures: name, value, unit, goal and whethe
 import dataclasses
 import datetime
 import json
+import math
 import os
 import pathlib
 import subprocess
@@ -14,6 +15,7 @@ import sys
 from vcharge_evaluation.tools import ROOT, say
 
 RESULTS = ROOT / "doc" / "results"
+MIN_CONDITIONS_OF_SUMMARY = 3
 
 
 @dataclasses.dataclass
@@ -23,6 +25,15 @@ class Figure:
     unit: str = ""
     goal: str = ""
     reached: object = None  # True, False, or None without a goal
+
+    def badness(self):
+        """How bad the value is, larger is worse, for values of one figure; None without a bound as the goal."""
+        sign = {"<=": 1.0, ">=": -1.0}.get(self.goal.split(" ")[0])
+        if sign is None and self.goal == "0":
+            sign = 1.0
+        if sign is None or isinstance(self.value, str):
+            return None
+        return math.inf if self.value is None else sign * self.value
 
     def text(self):
         """Value and unit for a table; bold where the goal is missed."""
@@ -68,19 +79,39 @@ def row(cells):
 
 
 def table(measurements):
-    """Markdown table of measurements with one title: a column per condition."""
+    """Markdown table of measurements with one title: a column per condition, those that miss most goals first. From three
+    conditions on, the median (of an even number, the worse one in the middle) and the worst figure with its condition stand
+    before them."""
     columns = {}
     for one in measurements:
         columns.setdefault(one.condition, {}).update({figure.name: figure for figure in one.figures})
     names = list(dict.fromkeys(figure.name for one in measurements for figure in one.figures))
+    columns = dict(sorted(columns.items(), key=lambda item: -num_missed(item[1])))
     has_goals = any(figure.goal for one in measurements for figure in one.figures)
-    heads = ["what", *(["goal"] if has_goals else []), *(condition or "figure" for condition in columns)]
+    with_summary = len(columns) >= MIN_CONDITIONS_OF_SUMMARY
+    heads = ["what", *(["goal"] if has_goals else []), *(["median", "worst"] if with_summary else []),
+             *(condition or "figure" for condition in columns)]
     lines = [row(heads), "|" + "---|" * len(heads)]
     for name in names:
         goals = [column[name].goal for column in columns.values() if name in column and column[name].goal]
         cells = [column[name].text() if name in column else "-" for column in columns.values()]
-        lines.append(row([name, *([goals[0] if goals else ""] if has_goals else []), *cells]))
+        summary = median_and_worst({condition: column[name] for condition, column in columns.items() if name in column})
+        lines.append(row([name, *([goals[0] if goals else ""] if has_goals else []), *(summary if with_summary else []),
+                          *cells]))
     return "\n".join(lines)
+
+
+def num_missed(column):
+    return sum(figure.reached is False for figure in column.values())
+
+
+def median_and_worst(figures):
+    """Cells with the median over the conditions, and the worst figure with its condition; figures: {condition: figure}."""
+    ranked = sorted((one.badness(), condition) for condition, one in figures.items() if one.badness() is not None)
+    if len(ranked) < 2:
+        return ["", ""]
+    median, worst = figures[ranked[len(ranked) // 2][1]], ranked[-1][1]
+    return [median.text(), f"{figures[worst].text()} ({worst})"]
 
 
 def by_title(measurements):
@@ -115,9 +146,12 @@ def merge(old, new):
 
 
 def commit():
-    done = subprocess.run(["git", "-C", str(ROOT), "describe", "--always", "--dirty"], capture_output=True, text=True,
-                          check=False)
-    return done.stdout.strip()
+    """The commit of the source tree, with -dirty where anything but results was changed since."""
+    def git(*words):
+        return subprocess.run(["git", "-C", str(ROOT), *words], capture_output=True, text=True, check=False).stdout.strip()
+
+    changed = git("status", "--porcelain", "--untracked-files=no", "--", ".", ":!doc/results", ":!doc/results.md")
+    return git("rev-parse", "--short=7", "HEAD") + ("-dirty" if changed else "")
 
 
 class Results:

@@ -65,17 +65,17 @@ ObstacleScanEvaluator::ObstacleScanEvaluator(const ObstacleScanEvaluationOptions
   options_.validate();
 }
 
-void ObstacleScanEvaluator::addRay(double reported_m, double sigma_m, double truth_m, double nearest_truth_m,
-                                   Rays* rays) {
+void ObstacleScanEvaluator::addRay(double reported_m, double sigma_m, double truth_m, Rays* rays) {
   ++rays->judged;
-  const double error_m = reported_m - nearest_truth_m;
+  const double error_m = reported_m - truth_m;
   if (!(error_m <= kGate_m)) {  // true for NaN, if nothing is reported
     ++rays->missed;
+    rays->errors_m.push_back(kGate_m);
   } else if (error_m < -kGate_m) {
     ++rays->nearer;
+    rays->errors_m.push_back(kGate_m);
   } else {
     rays->errors_m.push_back(std::abs(error_m));
-    rays->own_errors_m.push_back(std::abs(reported_m - truth_m));
     rays->sigmas.push_back(std::abs(error_m) / sigma_m);
     rays->signed_sum_m += error_m;
   }
@@ -90,17 +90,18 @@ void ObstacleScanEvaluator::add(const ObstacleScan& scan, const std::vector<Seen
         truth[i].judged_range_m > truth_m + kRiseDepth_m) {
       continue;
     }
-    const double reported_m = scan.range_m[i];
-    double nearest_m = truth_m;
-    for (const size_t beside : {(i + 1) % scan.size(), (i + scan.size() - 1) % scan.size()}) {
-      if (std::abs(truth[beside].range_m - reported_m) < std::abs(nearest_m - reported_m)) {
-        nearest_m = truth[beside].range_m;
+    const bool is_aside = truth[i].from_travel_rad >= kMinAngleFromTravel_rad;
+    std::vector<Rays*> sets = {&all_, is_aside ? &aside_ : &ahead_};
+    if (!is_aside && truth_m < kNear_m) {
+      sets.push_back(&ahead_near_);
+    }
+    for (size_t bin = 0; bin < by_range_.size(); ++bin) {
+      if (truth_m >= kRangeBounds_m[bin] && truth_m < kRangeBounds_m[bin + 1]) {
+        sets.push_back(&by_range_[bin]);
       }
     }
-    const bool is_aside = truth[i].from_travel_rad >= kMinAngleFromTravel_rad;
-    addRay(reported_m, scan.range_sigma_m[i], truth_m, nearest_m, is_aside ? &aside_ : &ahead_);
-    if (!is_aside && truth_m < kNear_m) {
-      addRay(reported_m, scan.range_sigma_m[i], truth_m, nearest_m, &ahead_near_);
+    for (Rays* rays : sets) {
+      addRay(scan.range_m[i], scan.range_sigma_m[i], truth_m, rays);
     }
   }
 }
@@ -111,10 +112,9 @@ RayErrors ObstacleScanEvaluator::summarizeRays(const Rays& rays) {
   errors.num_missed = rays.missed;
   errors.num_nearer = rays.nearer;
   errors.error_m = summarize(rays.errors_m);
-  errors.error_own_ray_m = summarize(rays.own_errors_m);
-  if (!rays.errors_m.empty()) {
-    const auto count = static_cast<double>(rays.errors_m.size());
-    errors.mean_signed_m = rays.signed_sum_m / count;
+  if (!rays.sigmas.empty()) {
+    errors.mean_signed_m = rays.signed_sum_m / static_cast<double>(rays.sigmas.size());
+    const auto count = static_cast<double>(rays.judged);
     const auto within = [&](double sigmas) {
       return static_cast<double>(std::count_if(rays.sigmas.begin(), rays.sigmas.end(),
                                                [&](double value) { return value <= sigmas; })) /
@@ -124,6 +124,14 @@ RayErrors ObstacleScanEvaluator::summarizeRays(const Rays& rays) {
     errors.fraction_within_two_sigma = within(2.0);
   }
   return errors;
+}
+
+std::vector<std::tuple<double, double, RayErrors>> ObstacleScanEvaluator::byRange() const {
+  std::vector<std::tuple<double, double, RayErrors>> bins;
+  for (size_t i = 0; i < by_range_.size(); ++i) {
+    bins.emplace_back(kRangeBounds_m[i], kRangeBounds_m[i + 1], summarizeRays(by_range_[i]));
+  }
+  return bins;
 }
 
 }  // namespace vcharge

@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "vcharge_core/base/options.h"
-#include "vcharge_core/frames/frame_assembler_options.h"
+#include "vcharge_core/frames/frame_assembler.h"
 #include "vcharge_reconstruction/reconstruction_state.h"
 
 namespace vcharge {
@@ -37,6 +37,9 @@ class KeyframeBuilder {
 
   /// Appends a frame between keyframes.
   void addFrame(Timestamp stamp, const RigidTransform& keyframe_from_vehicle, MotionHypothesis motion);
+
+  /// Corrects the odometry of earlier frames, and their poses where these follow from it.
+  void correct(const std::vector<CorrectedPose>& corrections);
 
  private:
   const KeyframeOptions options_;

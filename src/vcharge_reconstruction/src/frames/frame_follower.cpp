@@ -54,6 +54,15 @@ void FrameFollower::processFrame(const ImageFrame& frame) {
   if (!frame.bridged_from_vehicle) {
     return;
   }
+  keyframes_.correct(frame.corrections);
+  const CorrectedPose* corrected =
+      state_->frames.empty() ? nullptr : correctionAt(frame.corrections, state_->frames.back().stamp);
+  if (corrected != nullptr) {
+    previous_odom_from_vehicle_ = corrected->bridged_from_vehicle;
+    if (state_->frames.size() > 1 && state_->frames.back().motion == MotionHypothesis::kOdometry) {
+      map_from_vehicle_ = map_from_vehicle_ * corrected->old_vehicle_from_vehicle;
+    }
+  }
   const Timestamp stamp = frame.stamp;
   const std::vector<Image>& images = frame.images;
   const RigidTransform& odom_from_vehicle = *frame.bridged_from_vehicle;

@@ -1,5 +1,6 @@
 #include "vcharge_reconstruction/keyframe_builder.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace vcharge {
@@ -34,6 +35,29 @@ void KeyframeBuilder::addFrame(Timestamp stamp, const RigidTransform& keyframe_f
                                MotionHypothesis motion) {
   const auto last = static_cast<int32_t>(state_->data.keyframes.size()) - 1;
   state_->frames.push_back({stamp, last, keyframe_from_vehicle, motion});
+}
+
+void KeyframeBuilder::correct(const std::vector<CorrectedPose>& corrections) {
+  for (const CorrectedPose& corrected : corrections) {
+    const auto frame = std::find_if(state_->frames.rbegin(), state_->frames.rend(),
+                                    [&](const FramePose& each) { return each.stamp <= corrected.stamp; });
+    if (frame == state_->frames.rend() || frame->stamp != corrected.stamp) {
+      continue;  // a frame at standstill was left out
+    }
+    const bool is_counted = frame->motion == MotionHypothesis::kOdometry;
+    const auto index = static_cast<size_t>(frame->keyframe);
+    Keyframe& keyframe = state_->data.keyframes[index];
+    if (keyframe.stamp == corrected.stamp) {
+      keyframe.odom_from_vehicle = corrected.bridged_from_vehicle;
+      if (is_counted && index > 0) {
+        keyframe.map_from_vehicle = keyframe.map_from_vehicle * corrected.old_vehicle_from_vehicle;
+        RigidTransform& from_previous = state_->keyframe_from_next[index - 1];
+        from_previous = from_previous * corrected.old_vehicle_from_vehicle;
+      }
+    } else if (is_counted) {
+      frame->keyframe_from_vehicle = frame->keyframe_from_vehicle * corrected.old_vehicle_from_vehicle;
+    }
+  }
 }
 
 }  // namespace vcharge

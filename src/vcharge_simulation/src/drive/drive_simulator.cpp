@@ -92,18 +92,10 @@ SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& 
   if (faults.counter_reset.isActive()) {
     reset = stampAt(0) + durationFromSeconds(faults.counter_reset.time_s);
   }
-  std::optional<RigidTransform> first_from_odom;  // the recording begins at the identity
   for (const Received<VehicleOdometry>& odometry :
-       causalOdometry(all_ticks, image_stamps, reset, motion_options)) {
-    const Timestamp stamp = odometry.message.stamp;
-    if (stamp < stampAt(0) || stamp > stampAt(duration_ms)) {
-      continue;
-    }
-    drive.odometry.push_back(odometry);
-    if (!reset || stamp < *reset) {
-      VehicleOdometry& message = drive.odometry.back().message;
-      first_from_odom = first_from_odom ? first_from_odom : message.odom_from_vehicle.inverse();
-      message.odom_from_vehicle = *first_from_odom * message.odom_from_vehicle;
+       causalOdometry(all_ticks, image_stamps, stampAt(0), reset, motion_options)) {
+    if (odometry.message.stamp <= stampAt(duration_ms)) {
+      drive.odometry.push_back(odometry);
     }
   }
   return drive;

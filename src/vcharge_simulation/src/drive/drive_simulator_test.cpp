@@ -103,7 +103,8 @@ TEST(DriveSimulatorTest, OdometryScalesWithTheWheelRadiusError) {
                               .head<2>()
                               .norm();
   const double counted_m = last.odom_from_vehicle.translation().norm();
-  EXPECT_NEAR(counted_m, 1.02 * driven_m, options.metres_per_tick);
+  // The drive starts at full speed, which the odometry learns in its first tenths of a second.
+  EXPECT_NEAR(counted_m, 1.02 * driven_m, 3.0 * options.metres_per_tick);
   const auto ticks = static_cast<double>(drive.wheel_ticks.back().message.left_ticks);
   EXPECT_NEAR(ticks * 0.01, 1.02 * driven_m,
               0.01 + 2.7 * 0.02);  // the last ticks are at most 20 ms away from the last odometry

@@ -102,7 +102,7 @@ WheelTicks WheelOdometer::ticks(int milliseconds) const {
 }
 
 std::vector<Received<VehicleOdometry>> causalOdometry(const std::vector<Received<WheelTicks>>& ticks,
-                                                      const std::vector<Timestamp>& triggers,
+                                                      const std::vector<Timestamp>& triggers, Timestamp start,
                                                       std::optional<Timestamp> reset,
                                                       const VehicleMotionOptions& vehicle) {
   WheelOdometryOptions options;
@@ -111,9 +111,16 @@ std::vector<Received<VehicleOdometry>> causalOdometry(const std::vector<Received
   WheelOdometry odometry(options);
   OdometryStream stream = OdometryStream::forFrameRate(kFrameRate_hz);
   std::vector<Received<VehicleOdometry>> published;
+  std::optional<RigidTransform> first_from_odom;  // the recording begins at the identity
   const auto publish = [&](const std::vector<OdometryEstimate>& estimates, Timestamp now) {
     for (const OdometryEstimate& estimate : estimates) {
-      published.push_back({estimate.odometry, now});
+      VehicleOdometry message = estimate.odometry;
+      if (message.stamp < start) {
+        continue;
+      }
+      first_from_odom = first_from_odom.value_or(message.odom_from_vehicle.inverse());
+      message.odom_from_vehicle = *first_from_odom * message.odom_from_vehicle;
+      published.push_back({message, now});
     }
   };
   size_t trigger = 0;
@@ -127,7 +134,7 @@ std::vector<Received<VehicleOdometry>> causalOdometry(const std::vector<Received
     if (reset && message.stamp >= *reset) {
       publish(stream.flush(), received);
       odometry = WheelOdometry(options);
-      stream = OdometryStream::forFrameRate(kFrameRate_hz);
+      first_from_odom = RigidTransform();
       reset.reset();
     }
     if (const std::optional<OdometryEstimate> estimate = odometry.add(message)) {

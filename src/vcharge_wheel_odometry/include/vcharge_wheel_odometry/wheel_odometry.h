@@ -7,25 +7,10 @@
 
 #include <Eigen/Core>
 
-#include "vcharge_core/base/options.h"
 #include "vcharge_core/motion/vehicle_odometry.h"
+#include "vcharge_wheel_odometry/wheel_motion.h"
 
 namespace vcharge {
-
-struct WheelOdometryOptions {
-  VCHARGE_BEGIN_OPTIONS(WheelOdometryOptions);
-  VCHARGE_OPTION(double, track_width_m, 1.52, positive(), "Distance between the rear wheels.");
-  VCHARGE_OPTION(double, wheelbase_m, 2.58, positive(), "Distance between the axles.");
-  VCHARGE_OPTION(bool, use_steering, true, anyValue(), "Whether the car measures the steering angle.");
-  VCHARGE_OPTION(double, steering_lag_s, 0.05, between(0.0, 0.5), "Age of the steering angle at its stamp.");
-  VCHARGE_OPTION(double, max_acceleration_m_per_s2, 1.5, positive(), "Noise of the speed in a second.");
-  VCHARGE_OPTION(double, max_yaw_acceleration_rad_per_s2, 0.4, positive(), "The same of the yaw rate.");
-  VCHARGE_OPTION(double, steering_noise_per_m, 0.002, positive(), "Sigma of the steered curvature.");
-  VCHARGE_OPTION(double, slip_yaw_rad, 0.04, positive(), "Larger disagreement with the steering is a slip.");
-  VCHARGE_OPTION(double, distance_error_ratio, 0.005, positive(), "Relative error of the wheel radius.");
-  VCHARGE_OPTION(double, yaw_error_rad_per_m, 0.0005, positive(), "Heading error of unequal wheels.");
-  VCHARGE_END_OPTIONS();
-};
 
 /// Dead reckoning with its covariance.
 struct OdometryEstimate {
@@ -36,56 +21,68 @@ struct OdometryEstimate {
 };
 
 struct WheelOdometryCounts {
-  uint64_t ticks = 0;
+  uint64_t measurements = 0;
   uint64_t slips = 0;
   uint64_t out_of_order = 0;
-  uint64_t gaps = 0;    ///< gaps longer than kMaxGap_s
-  uint64_t resets = 0;  ///< counters that jumped
+  uint64_t gaps = 0;    ///< longer than WheelMotion::kMaxGap_s
+  uint64_t resets = 0;  ///< counters that jumped, or long gaps in speeds
   bool slipping = false;
   bool standing = false;
 };
 
-/// Causal dead reckoning at the centre of the rear axle from the counters of the rear wheels and the steering
-/// angle. A counter is exact within one tick, so a Kalman filter uses the counters as bounded positions of
-/// the wheels instead of noisy increments: only errors of the wheel radius and the track width grow. Between
-/// ticks speed and steering predict the pose (bicycle model with an estimated zero of the steering), which
-/// keeps it smooth. If the wheels contradict the steering angle, one of them slips and is ignored until both
-/// agree again. Not thread safe.
+/// Causal dead reckoning at the centre of the rear axle from the counters or speeds of the rear wheels and
+/// the steering angle. A counter is exact within one tick, so a Kalman filter uses the counters as bounded
+/// positions of the wheels instead of noisy increments: only errors of the wheel radius and the track width
+/// grow. Cars compute wheel speeds from such counters, so the integral of the speeds is used in the same way,
+/// with its own resolution. In between, speed and steering predict the pose (bicycle model with an estimated
+/// zero of the steering), which keeps it smooth. A slipping rear wheel is ignored until all wheels agree
+/// again: with speeds of the front wheels, it slips if it contradicts the front wheel on its side, which then
+/// replaces it; otherwise, if the wheels contradict the steering angle. During a gap in the speeds, motion is
+/// interpolated and its uncertainty grows; after a long one, the pose goes on where it was. Counters lose
+/// nothing. Not thread safe.
 class WheelOdometry {
  public:
-  static constexpr double kMaxGap_s = 0.5;
-
   explicit WheelOdometry(const WheelOdometryOptions& options);
-  /// The estimate at the ticks' stamp; the first is the identity. nullopt for ticks that are not newer than
-  /// the last.
-  std::optional<OdometryEstimate> add(const WheelTicks& ticks);
+  /// The estimate at the measurement's stamp; the first is the identity. nullopt for a measurement that is
+  /// not newer than the last. All must be of one kind, with finite speeds of the rear wheels.
+  std::optional<OdometryEstimate> add(const WheelMeasurement& wheels);
   const WheelOdometryCounts& counts() const { return counts_; }
 
  private:
   struct Sample {
     Timestamp stamp;
-    double left_m, right_m;  // counted distances
+    double left_m, right_m;  // measured distances
+    double front_left_m, front_right_m;
     double steered_yaw_rad;  // integral of the steered yaw rate
     double speed_m_per_s;    // estimated speed
   };
-  /// Curvature of the path by the steering angle now and before its lag, and its standard deviation.
-  std::pair<double, double> steeredCurvature(const WheelTicks& ticks);
-  void predict(double dt_s, double steered_curvature);
-  void checkSlip(const Sample& sample);
-  void correct(double dt_s, double tick_m, double steered_curvature, double steered_sigma);
-  void stand();
+  struct Steering {
+    bool is_known = false;
+    double curvature_per_m = 0.0;
+    double sigma_per_m = 0.0;
+  };
+  /// Curvature of the path by the steering angle now and before its lag.
+  Steering steeringOf(const WheelMeasurement& wheels);
+  void predict(double dt_s, const Steering& steering);
+  void addMotion(const WheelMotion& motion);
+  void addGap(double gap_s);
+  void checkSlip(const Sample& sample, bool has_front_wheels, bool is_steered);
+  void correct(const WheelMotion& motion, const Steering& steering);
+  void takeBack(double left_excess_m, double right_excess_m, double speed_before_m_per_s);
+  void forgetSpeeds();
   OdometryEstimate estimate(Timestamp stamp, double distance_m, double turn_rad);
 
   WheelOdometryOptions options_;
   WheelOdometryCounts counts_;
-  std::optional<WheelTicks> last_;
-  double left_m_ = 0.0, right_m_ = 0.0;                // counted since the first ticks
+  std::optional<WheelMeasurement> last_;
+  double left_m_ = 0.0, right_m_ = 0.0;  // measured since the beginning
+  double front_left_m_ = 0.0, front_right_m_ = 0.0;
   double left_excess_m_ = 0.0, right_excess_m_ = 0.0;  // the part caused by slip
   double steered_yaw_rad_ = 0.0;
   Timestamp last_motion_;
   std::deque<Sample> window_;
   std::deque<std::pair<Timestamp, double>> steering_;  // curvatures by the angles of the last lag
-  bool left_slips_ = false;
+  bool left_slips_ = false, right_slips_ = false;
   Eigen::Vector2d along_ = Eigen::Vector2d::Zero();  // state: distance, speed
   Eigen::Matrix2d along_covariance_;
   Eigen::Vector3d turn_ = Eigen::Vector3d::Zero();  // state: yaw, yaw rate, curvature at steering's zero
@@ -109,7 +106,8 @@ class OdometryStream {
   /// Like add(). The last estimate is at `stamp`, interpolated or extrapolated by up to max_extrapolation_s;
   /// it is missing if neither is possible, or if later ones were published already.
   std::vector<OdometryEstimate> trigger(Timestamp stamp);
-  /// The estimates that wait, at the end of a drive.
+  /// The estimates that wait, at the end of a drive or when the odometry starts again at another pose. Stamps
+  /// after it still increase.
   std::vector<OdometryEstimate> flush();
 
  private:

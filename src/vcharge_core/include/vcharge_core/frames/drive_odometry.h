@@ -19,6 +19,8 @@ class DriveOdometry {
   /// Uses known poses instead of odometry; add() is then ignored, and no frame waits for odometry.
   void setTrajectory(const Trajectory& odom_from_vehicle);
   bool isGiven() const { return is_given_; }
+  /// Corrections are then counted as ignored messages.
+  void ignoreCorrections() { takes_corrections_ = false; }
 
   /// Whether the stamp is so much older than the newest that the drive has started again.
   bool jumpsBack(Timestamp stamp) const;
@@ -51,6 +53,7 @@ class DriveOdometry {
   std::optional<VehicleOdometry> last_;
   std::optional<Eigen::Vector3d> velocity_;
   bool is_given_ = false;
+  bool takes_corrections_ = true;
 };
 
 }  // namespace vcharge

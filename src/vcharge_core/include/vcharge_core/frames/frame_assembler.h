@@ -20,6 +20,7 @@ struct CorrectedPose {
   Timestamp stamp;
   RigidTransform odom_from_vehicle;
   RigidTransform bridged_from_vehicle;
+  RigidTransform old_vehicle_from_vehicle;  ///< the correction itself
 };
 
 /// The pose that a correction gives the frame at this stamp; null without one.
@@ -88,6 +89,10 @@ class FrameAssembler {
 
   /// Takes the poses from this trajectory instead of from the odometry.
   void setTrajectory(const Trajectory& odom_from_vehicle) { odometry_.setTrajectory(odom_from_vehicle); }
+
+  /// Keeps the first pose of every stamp, for stages whose images come so late that it depends on the load
+  /// whether a correction comes before or after them.
+  void ignoreCorrections() { odometry_.ignoreCorrections(); }
 
   /// Returns false if the image is late and was dropped.
   bool addImage(size_t camera_index, Timestamp stamp, ImageType image);
@@ -280,7 +285,8 @@ void FrameAssembler<ImageType>::handOutFirst() {
     frame.bridged_from_vehicle = bridged.odometry.odom_from_vehicle;
     if (const OdometryBuffer::Lookup raw = odometry_.lookup(frame.stamp)) {
       frame.odom_from_vehicle = raw.odometry.odom_from_vehicle;
-      handed_out_.push_back({frame.stamp, *frame.odom_from_vehicle, *frame.bridged_from_vehicle});
+      handed_out_.push_back(
+          {frame.stamp, *frame.odom_from_vehicle, *frame.bridged_from_vehicle, RigidTransform()});
     }
   } else {
     ++counters_.frames_without_odometry;
@@ -300,7 +306,8 @@ std::vector<CorrectedPose> FrameAssembler<ImageType>::takeCorrections() {
       const OdometryBuffer::Lookup raw = odometry_.lookup(pose.stamp);
       const OdometryBuffer::Lookup bridged = odometry_.lookupBridged(pose.stamp);
       if (raw && bridged && !isSame(raw.odometry.odom_from_vehicle, pose.odom_from_vehicle)) {
-        pose = {pose.stamp, raw.odometry.odom_from_vehicle, bridged.odometry.odom_from_vehicle};
+        pose = {pose.stamp, raw.odometry.odom_from_vehicle, bridged.odometry.odom_from_vehicle,
+                pose.bridged_from_vehicle.inverse() * bridged.odometry.odom_from_vehicle};
         corrections.push_back(pose);
       }
     }

@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <optional>
 #include <string>
+#include <variant>
 
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/base/timestamp.h"
@@ -27,8 +29,27 @@ struct WheelTicks {
   int64_t left_ticks = 0;
   int64_t right_ticks = 0;
   double metres_per_tick = 0.01;
-  double steering_angle_rad = 0.0;  ///< angle of a virtual front wheel in the middle, positive to the left
+  /// Angle of a virtual front wheel in the middle, positive to the left; NaN where the car does not tell.
+  double steering_angle_rad = 0.0;
 };
+
+/// Speeds of the wheels' circumferences, negative backwards. NaN where the car does not tell.
+struct WheelSpeeds {
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+  Timestamp stamp;
+  double rear_left_m_per_s = 0.0;
+  double rear_right_m_per_s = 0.0;
+  double front_left_m_per_s = kUnknown;
+  double front_right_m_per_s = kUnknown;
+  double steering_angle_rad = kUnknown;  ///< as in WheelTicks
+};
+
+/// What a car tells of its wheels.
+using WheelMeasurement = std::variant<WheelTicks, WheelSpeeds>;
+
+inline Timestamp stampOf(const WheelMeasurement& wheels) {
+  return std::visit([](const auto& each) { return each.stamp; }, wheels);
+}
 
 struct OdometryBufferOptions {
   VCHARGE_BEGIN_OPTIONS(OdometryBufferOptions);

@@ -8,7 +8,7 @@ import yaml
 
 from vcharge_evaluation import obstacles, tools
 from vcharge_evaluation.camera_models import project
-from vcharge_evaluation.localization_errors import LocalizationErrors, Map
+from vcharge_evaluation.localization_errors import BOUND_DEG, BOUND_M, LocalizationErrors, Map
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
@@ -130,11 +130,11 @@ def localization_figures(result, csv, map_path, truths, picture):
     errors = LocalizationErrors(csv, other / "trajectory.tum", Map(map_path, mapping / "trajectory.tum"))
     good = errors.localized()
     if good.any():
-        figures.update({"median_m": float(np.median(errors.error_m[good])),
-                        "p95_m": float(np.percentile(errors.error_m[good], 95)),
-                        "median_deg": float(np.median(errors.error_deg[good])),
-                        "p95_deg": float(np.percentile(errors.error_deg[good], 95)), "wrong": errors.num_false(),
-                        "absolute_median_m": float(np.median(errors.absolute_m[good])),
+        figures.update({"median_m": errors.quantile(errors.error_m, 50, BOUND_M),
+                        "p95_m": errors.quantile(errors.error_m, 95, BOUND_M),
+                        "median_deg": errors.quantile(errors.error_deg, 50, BOUND_DEG),
+                        "p95_deg": errors.quantile(errors.error_deg, 95, BOUND_DEG), "wrong": errors.num_false(),
+                        "absolute_median_m": errors.quantile(errors.absolute_m, 50, BOUND_M),
                         "normalized": float(np.mean(errors.normalized[good]))})
         errors.plot(picture)
     return figures

@@ -1,0 +1,106 @@
+"""Runs every evaluation on the test scenes and publishes the figures in doc/results and doc/results.md. A step that is done
+is not run again while the code is the same, so that an interrupted run goes on where it ended."""
+import argparse
+import dataclasses
+import json
+import pathlib
+import subprocess
+import sys
+import time
+
+from vcharge_evaluation import page
+from vcharge_evaluation.results import commit
+from vcharge_evaluation.tools import ROOT, say
+
+# Options are chosen on scenes and rigs with seeds below 100 alone, and are fixed before a test scene is rendered.
+LOTS, GARAGES, COURSES, RIGS = (201, 202, 203), (211, 212, 213), (221, 222, 223), (231, 232, 233, 234)
+
+
+@dataclasses.dataclass
+class Step:
+    stage: str  # as in evaluate.sh
+    full: list
+    quick: list = None  # None: left out of the quick run
+
+    def words(self, quick):
+        return [str(word) for word in (self.quick if quick else self.full)]
+
+
+def steps():
+    """All steps, the cheap ones first."""
+    yield Step("ranges", ["--parts", "settings", "--drives", *(f"lot:{seed}" for seed in LOTS),
+                          *(f"garage:{seed}" for seed in GARAGES)],
+               ["--parts", "settings", "--drives", f"lot:{LOTS[0]}", f"garage:{GARAGES[0]}", "--duration-s", 1.2])
+    for lot, garage, course in zip(LOTS, GARAGES, COURSES):
+        first = lot == LOTS[0]
+        for drive, seed in (("lot", lot), ("garage", garage), ("course", course)):
+            words = ["--seed", seed, "--drives", drive]
+            yield Step("obstacles", words, [*words, "--small"] if first else None)
+        for scene, seed in (("lot", lot), ("garage", garage)):
+            yield Step("height_map", ["--seed", seed, "--scenes", scene, "--duration-s", 12],
+                       ["--seed", seed, "--scenes", scene, "--duration-s", 6, "--image-scale", 0.5] if first else None)
+            yield Step("localization", ["--seed", seed, "--scenes", scene, "--image-scale", 0.5],
+                       ["--seed", seed, "--scenes", scene, "--image-scale", 0.25, "--map-duration-s", 60, "--duration-s", 30,
+                        "--no-experiments"] if first else None)
+    faults = ["--seed", LOTS[0] + 40]
+    yield Step("faults", faults, [*faults, "--faults", "counter_reset", "dead_camera", "late_images", "missing_ticks",
+                                  "odometry_stamp_shift", "wheel_slip"])
+    yield Step("mapping", ["--seeds", *LOTS, "--image-scale", 0.5])
+    yield Step("calibration", ["--parts", "rigs", "--scene-seed", LOTS[1], "--rigs",
+                               *(f"{'lot' if i % 2 == 0 else 'garage'}:{rig}" for i, rig in enumerate(RIGS))])
+    cars = [*(f"lot:{seed}:{rig}" for seed, rig in zip(LOTS, RIGS)),
+            *(f"garage:{seed}:{rig}" for seed, rig in zip(GARAGES, RIGS))]
+    yield Step("chain", ["--cars", *cars], ["--cars", cars[0], "--no-truth"])
+
+
+class Journal:
+    """Which steps are done, in WORK/done.json."""
+
+    def __init__(self, path):
+        self.path = path
+        self.done = json.loads(path.read_text()) if path.exists() else {}
+
+    def has(self, stage, words):
+        entry = self.done.get(" ".join([stage, *words]))
+        return entry is not None and entry["commit"] == commit() and "dirty" not in entry["commit"]
+
+    def add(self, stage, words, wall_s):
+        self.done[" ".join([stage, *words])] = {"commit": commit(), "wall_s": round(wall_s)}
+        self.path.write_text(json.dumps(self.done, indent=1) + "\n")
+
+
+def run_step(args, step, journal):
+    """Whether the step succeeded, now or before."""
+    words = step.words(args.quick)
+    if journal.has(step.stage, words):
+        say(f"{step.stage} {' '.join(words)}: done before")
+        return True
+    say(f"{step.stage} {' '.join(words)}")
+    start = time.monotonic()
+    status = subprocess.run([sys.executable, "-m", "vcharge_evaluation", step.stage, *words, "--work",
+                             str(args.work / step.stage), "--publish"], check=False).returncode
+    if status == 0:
+        journal.add(step.stage, words, time.monotonic() - start)
+    return status == 0
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="small images and short drives: 40 minutes on two cores")
+    parser.add_argument("--stages", nargs="*", help="these stages only")
+    parser.add_argument("--work", type=pathlib.Path, default=ROOT / "build" / "evaluation", help="folder for drives and results")
+    args = parser.parse_args()
+    args.work = args.work.resolve() / ("quick" if args.quick else "full")
+    args.work.mkdir(parents=True, exist_ok=True)
+    journal = Journal(args.work / "done.json")
+    chosen = [step for step in steps() if (step.quick is not None or not args.quick) and
+              (not args.stages or step.stage in args.stages)]
+    failed = [step for step in chosen if not run_step(args, step, journal)]
+    page.main([])
+    for step in failed:
+        print(f"failed: {step.stage} {' '.join(step.words(args.quick))}", file=sys.stderr)
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,243 @@
+#include "vcharge_evaluation/approach_errors.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <opencv2/imgproc.hpp>
+
+namespace vcharge {
+namespace {
+
+// An obstacle is visible with this many points between these heights, and is reported by an occupied cell
+// within this distance.
+constexpr int kMinSeenPoints = 15;
+constexpr double kSeenHeight_m = 0.1;
+constexpr double kMaxHeight_m = 2.0;
+constexpr double kTolerance_m = 0.25;
+// Ground is open if nothing of this height stands within the allowed range error and the diagonal of a cell.
+constexpr float kOpenHeight_m = 0.08F;
+constexpr double kOpenRadius_m = 0.29;
+constexpr double kPathStep_m = 0.25;  // between footprints that make up the corridor
+constexpr double kStanding_m_per_s = 0.05;
+
+double distanceBetween(const std::vector<Eigen::Vector2d>& a, const std::vector<Eigen::Vector2d>& b) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector2d& corner : a) {
+    nearest = std::min(nearest, distanceToPolygon(corner, b));
+  }
+  for (const Eigen::Vector2d& corner : b) {
+    nearest = std::min(nearest, distanceToPolygon(corner, a));
+  }
+  return nearest;
+}
+
+}  // namespace
+
+struct ApproachEvaluator::Frame {
+  const ObstacleMap& map;
+  RigidTransform world_from_vehicle;
+  RigidTransform world_from_fixed;
+  std::vector<Eigen::Vector2d> outline;
+  double speed_m_per_s = 0.0;
+  SeenCells seen;
+  std::vector<Eigen::Vector2d> occupied;  // in the world frame
+
+  Eigen::Vector2d worldOf(int column, int row) const {
+    const Eigen::Vector2d fixed = map.origin_m + map.cell_size_m * Eigen::Vector2d(column + 0.5, row + 0.5);
+    return (world_from_fixed * Eigen::Vector3d(fixed.x(), fixed.y(), 0.0)).head<2>();
+  }
+  bool sees(const TruthObstacle& obstacle) const {
+    int sum = 0;
+    for (const auto& [key, count] : seen.counts()) {
+      sum +=
+          distanceToPolygon(SeenCells::middleOf(key), obstacle.footprint_m) < SeenCells::kCell_m ? count : 0;
+    }
+    return sum >= kMinSeenPoints;
+  }
+  bool reports(const TruthObstacle& obstacle) const {
+    return std::any_of(occupied.begin(), occupied.end(), [&](const Eigen::Vector2d& cell) {
+      return distanceToPolygon(cell, obstacle.footprint_m) <= kTolerance_m;
+    });
+  }
+};
+
+/// Footprints of the vehicle on the next part of its path.
+struct ApproachEvaluator::Corridor {
+  std::vector<std::vector<Eigen::Vector2d>> footprints;
+
+  bool contains(const Eigen::Vector2d& point) const {
+    return std::any_of(footprints.begin(), footprints.end(),
+                       [&](const auto& footprint) { return distanceToPolygon(point, footprint) <= 0.0; });
+  }
+};
+
+ApproachEvaluator::ApproachEvaluator(const std::vector<TruthObstacle>& obstacles, const TruthHeights& heights,
+                                     Trajectory path, const ApproachEvaluationOptions& options)
+    : options_((options.validate(), options)), heights_(heights), path_(std::move(path)) {
+  cv::Mat known = heights.height_m.clone();
+  cv::patchNaNs(known, 0.0);
+  const int side = 2 * static_cast<int>(std::lround(kOpenRadius_m / heights.cell_size_m)) + 1;
+  cv::dilate(known, highest_around_, cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
+  std::vector<std::vector<Eigen::Vector2d>> driven;
+  std::optional<Eigen::Vector2d> last_m;
+  for (const StampedTransform& pose : path_) {
+    const Eigen::Vector2d position_m = pose.world_from_vehicle.translation().head<2>();
+    if (!last_m || (position_m - *last_m).norm() >= kPathStep_m) {
+      driven.push_back(outline(pose.world_from_vehicle, 0.0));
+      last_m = position_m;
+    }
+  }
+  for (const TruthObstacle& obstacle : obstacles) {
+    const bool is_near = std::any_of(driven.begin(), driven.end(), [&](const auto& footprint) {
+      return distanceBetween(footprint, obstacle.footprint_m) <= options_.max_gap_m;
+    });
+    if (is_near && obstacle.height_m() >= options_.min_height_m && obstacle.base_z_m < kMaxHeight_m) {
+      standing_.push_back(obstacle);
+    }
+  }
+}
+
+std::vector<Eigen::Vector2d> ApproachEvaluator::outline(const RigidTransform& world_from_vehicle,
+                                                        double margin_m) const {
+  const double side_m = options_.vehicle_half_width_m + margin_m;
+  std::vector<Eigen::Vector2d> corners;
+  for (const auto& [x, y] : {std::pair(options_.vehicle_front_m, side_m),
+                             {options_.vehicle_rear_m, side_m},
+                             {options_.vehicle_rear_m, -side_m},
+                             {options_.vehicle_front_m, -side_m}}) {
+    corners.emplace_back((world_from_vehicle * Eigen::Vector3d(x, y, 0.0)).head<2>());
+  }
+  return corners;
+}
+
+void ApproachEvaluator::add(const ObstacleMap& map, const std::vector<SeenPoint>& points,
+                            const RigidTransform& world_from_vehicle,
+                            const std::vector<TruthObstacle>& movers) {
+  const Eigen::Vector2d position_m = world_from_vehicle.translation().head<2>();
+  const RigidTransform level =
+      RigidTransform::planar(position_m.x(), position_m.y(), yawOfRotation(world_from_vehicle.rotation()));
+  Frame frame{map, level, level * map.fixed_from_vehicle.inverse(), outline(level, 0.0), 0.0, {}, {}};
+  if (last_ && map.stamp > *last_) {
+    const double step_m = (position_m - *last_position_m_).norm();
+    frame.speed_m_per_s = step_m / toSeconds(map.stamp - *last_);
+    sums_.driven_m += step_m;
+  }
+  first_ = first_.value_or(map.stamp);
+  last_ = map.stamp;
+  last_position_m_ = position_m;
+  for (const SeenPoint& point : points) {
+    if (point.world_m.z() >= kSeenHeight_m && point.world_m.z() <= kMaxHeight_m) {
+      frame.seen.add(point.world_m.head<2>().cast<double>());
+    }
+  }
+  for (int row = 0; row < map.state.rows; ++row) {
+    for (int column = 0; column < map.state.cols; ++column) {
+      if (map.state.at<int8_t>(row, column) == kCellOccupied) {
+        frame.occupied.push_back(frame.worldOf(column, row));
+      }
+    }
+  }
+  for (size_t i = 0; i < standing_.size(); ++i) {
+    judgeObstacle(frame, standing_[i], static_cast<int>(i));
+  }
+  for (size_t i = 0; i < movers.size(); ++i) {
+    judgeObstacle(frame, movers[i], -1 - static_cast<int>(i));
+  }
+  judgeCorridor(frame, movers);
+}
+
+void ApproachEvaluator::judgeObstacle(const Frame& frame, const TruthObstacle& obstacle, int key) {
+  const double distance_m = distanceBetween(frame.outline, obstacle.footprint_m);
+  auto found = reports_.find(key);
+  if (found == reports_.end()) {
+    if (!frame.sees(obstacle)) {
+      return;
+    }
+    found = reports_.emplace(key, FirstReport{obstacle.kind, key < 0, distance_m, distance_m, {}, {}}).first;
+  }
+  FirstReport& report = found->second;
+  report.nearest_m = std::min(report.nearest_m, distance_m);
+  if (!report.reported_m && frame.reports(obstacle)) {
+    report.reported_m = distance_m;
+    if (frame.speed_m_per_s > kStanding_m_per_s) {
+      report.contact_s = distance_m / frame.speed_m_per_s;
+    }
+  }
+}
+
+std::optional<bool> ApproachEvaluator::truthAt(const Eigen::Vector2d& world_m,
+                                               const std::vector<TruthObstacle>& movers) const {
+  double nearest_mover_m = std::numeric_limits<double>::infinity();
+  for (const TruthObstacle& mover : movers) {
+    nearest_mover_m = std::min(nearest_mover_m, distanceToPolygon(world_m, mover.footprint_m));
+  }
+  const float height_m = heights_.at(heights_.height_m, world_m);
+  if (nearest_mover_m <= 0.0 || height_m >= static_cast<float>(options_.min_height_m)) {
+    return true;
+  }
+  if (nearest_mover_m <= kTolerance_m || !(heights_.at(highest_around_, world_m) < kOpenHeight_m)) {
+    return std::nullopt;
+  }
+  return false;
+}
+
+void ApproachEvaluator::judgeCorridor(const Frame& frame, const std::vector<TruthObstacle>& movers) {
+  Corridor corridor;
+  double ahead_m = 0.0, since_m = kPathStep_m;
+  auto pose =
+      std::lower_bound(path_.begin(), path_.end(), frame.map.stamp,
+                       [](const StampedTransform& each, Timestamp stamp) { return each.stamp < stamp; });
+  for (auto last = pose; pose != path_.end() && ahead_m <= options_.corridor_m; last = pose++) {
+    const double step_m =
+        (pose->world_from_vehicle.translation() - last->world_from_vehicle.translation()).norm();
+    ahead_m += step_m;
+    since_m += step_m;
+    if (since_m >= kPathStep_m) {
+      corridor.footprints.push_back(outline(pose->world_from_vehicle, options_.margin_m));
+      since_m = 0.0;
+    }
+  }
+  const double reach_m = options_.corridor_m + options_.vehicle_front_m - options_.vehicle_rear_m;
+  const Eigen::Vector2d here_m = frame.world_from_vehicle.translation().head<2>();
+  for (int row = 0; row < frame.map.state.rows; ++row) {
+    for (int column = 0; column < frame.map.state.cols; ++column) {
+      const Eigen::Vector2d world_m = frame.worldOf(column, row);
+      if ((world_m - here_m).norm() > reach_m || distanceToPolygon(world_m, frame.outline) <= 0.0 ||
+          !corridor.contains(world_m)) {
+        continue;
+      }
+      const std::optional<bool> truth = truthAt(world_m, movers);
+      if (!truth) {
+        continue;
+      }
+      const int8_t state = frame.map.state.at<int8_t>(row, column);
+      CorridorCounts& counts = sums_.corridor;
+      size_t& count = *truth ? (state == kCellOccupied ? counts.occupied_as_occupied
+                                : state == kCellFree   ? counts.occupied_as_free
+                                                       : counts.occupied_as_unknown)
+                             : (state == kCellOccupied ? counts.free_as_occupied
+                                : state == kCellFree   ? counts.free_as_free
+                                                       : counts.free_as_unknown);
+      ++count;
+      const Eigen::Vector2d fixed_m =
+          frame.map.origin_m + frame.map.cell_size_m * Eigen::Vector2d(column, row);
+      bool& was_alarm = was_alarm_[{std::llround(fixed_m.x() / frame.map.cell_size_m),
+                                    std::llround(fixed_m.y() / frame.map.cell_size_m)}];
+      const bool is_alarm = !*truth && state == kCellOccupied;
+      sums_.num_false_alarms += is_alarm && !was_alarm ? 1 : 0;
+      was_alarm = is_alarm;
+    }
+  }
+}
+
+ApproachErrors ApproachEvaluator::errors() const {
+  ApproachErrors errors = sums_;
+  for (const auto& [key, report] : reports_) {
+    errors.reports.push_back(report);
+  }
+  errors.duration_s = first_ ? toSeconds(*last_ - *first_) : 0.0;
+  return errors;
+}
+
+}  // namespace vcharge
