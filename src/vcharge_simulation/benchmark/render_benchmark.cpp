@@ -6,6 +6,7 @@
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
+#include "vcharge_simulation/drive/drive_simulator.h"
 #include "vcharge_simulation/rendering/renderer.h"
 #include "vcharge_simulation/scenes/scene_catalogue.h"
 #include "vcharge_simulation/sensors/golf_rig.h"
@@ -13,20 +14,34 @@
 namespace vcharge {
 namespace {
 
-const Renderer& rendererOf(const std::string& scene) {
+const Renderer& rendererOf(const std::string& scene, const std::string& drive, const MoverOptions& movers) {
   static std::string built;
   static std::unique_ptr<const Renderer> renderer;
-  if (scene != built) {
+  const std::string name = scene + (movers.hasAny() ? " with movers" : "");
+  if (name != built) {
     renderer.reset();
-    renderer = std::make_unique<const Renderer>(buildScene(scene, SceneOptions()));
-    built = scene;
+    SceneOptions options;
+    options.movers = movers;
+    const DrivePlan plan = planDrive(scene, drive);
+    options.own_poses = ownPoses(simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1,
+                                               FaultOptions(), plan.ground_height));
+    renderer = std::make_unique<const Renderer>(buildScene(scene, options));
+    built = name;
   }
   return *renderer;
 }
 
+MoverOptions tenMovers() {
+  MoverOptions movers;
+  movers.people = 4;
+  movers.children = movers.cars = movers.bicycles = 2;
+  return movers;
+}
+
 // Renders one 1280x800 image at four rays per pixel on one core, at the start of a drive.
-void renderImage(benchmark::State& state, const std::string& scene, const std::string& drive) {
-  const Renderer& renderer = rendererOf(scene);
+void renderImage(benchmark::State& state, const std::string& scene, const std::string& drive,
+                 const MoverOptions& movers = MoverOptions()) {
+  const Renderer& renderer = rendererOf(scene, drive, movers);
   const auto body = makeGolfBody();
   const DrivePlan plan = planDrive(scene, drive);
   const RigidTransform& start = plan.path.worldFromStart();
@@ -50,6 +65,9 @@ void oneThread(benchmark::internal::Benchmark* images) {
 }
 
 BENCHMARK_CAPTURE(renderImage, lot, "lot", "short")->DenseRange(0, 3)->Apply(oneThread);
+BENCHMARK_CAPTURE(renderImage, lot_with_movers, "lot", "standing", tenMovers())
+    ->DenseRange(0, 3)
+    ->Apply(oneThread);
 BENCHMARK_CAPTURE(renderImage, garage, "garage", "loop")->DenseRange(0, 3)->Apply(oneThread);
 BENCHMARK_CAPTURE(renderImage, obstacles, "obstacles", "creep")->Arg(1)->Apply(oneThread);
 BENCHMARK_CAPTURE(renderImage, two_levels, "two_levels", "up_and_down")->Arg(1)->Apply(oneThread);

@@ -2,9 +2,9 @@
 
 #include <vector>
 
-#include "scenes/movers/mover_routes.h"
 #include "scenes/movers/own_car.h"
 #include "scenes/movers/planned_mover.h"
+#include "scenes/movers/ways/mover_routes.h"
 #include "vcharge_simulation/scenes/mover_options.h"
 
 namespace vcharge {

@@ -1,5 +1,7 @@
 #include <cmath>
+#include <fstream>
 #include <map>
+#include <sstream>
 
 #include <gtest/gtest.h>
 
@@ -9,6 +11,7 @@
 #include "scenes/lot/lot_layout.h"
 #include "scenes/movers/mover_planner.h"
 #include "vcharge_simulation/drive/drive_simulator.h"
+#include "vcharge_simulation/drive/truth_maps.h"
 #include "vcharge_simulation/objects/car_model.h"
 #include "vcharge_simulation/scenes/scene_catalogue.h"
 
@@ -200,6 +203,27 @@ TEST(MoverMeshTest, IsWhereTheTruthSays) {
     ++seen[mover.object_class];
   }
   EXPECT_EQ(seen.size(), 4U);
+
+  const std::vector<TrackedObject> objects = trueObjects(scene->movers, 7.3);
+  ASSERT_EQ(objects.size(), scene->movers.size());
+  for (size_t i = 0; i < objects.size(); ++i) {
+    const MoverState state = scene->movers[i].stateAt(7.3);
+    EXPECT_EQ(objects[i].id, i + 1);
+    EXPECT_EQ(objects[i].object_class, scene->movers[i].object_class);
+    EXPECT_EQ(objects[i].frame_from_object.matrix(), state.world_from_mover.matrix());
+    EXPECT_EQ(objects[i].velocity_m_per_s, state.velocity_m_per_s);
+    EXPECT_EQ(objects[i].is_standing, state.is_standing);
+    EXPECT_EQ(objects[i].footprint_m, state.obstacle.footprint_m);
+    EXPECT_TRUE(objects[i].covariance.isZero());
+  }
+  const std::string file = testing::TempDir() + "movers_test.yaml";
+  writeMovers(scene->movers, {Timestamp::fromNanoseconds(5)}, {7.3}, file);
+  std::stringstream written;
+  written << std::ifstream(file).rdbuf();
+  for (const char* key : {"class: adult", "class: child", "class: car", "class: bicycle",
+                          "velocity_m_per_s: [", "height_m: ", "is_standing: "}) {
+    EXPECT_NE(written.str().find(key), std::string::npos) << key;
+  }
 }
 
 TEST(MoverMeshTest, ChildrenAreSmallerThanAdults) {
@@ -220,25 +244,6 @@ TEST(MoverCatalogueTest, ScenesWithoutMoversSaySo) {
   options.movers.people = 1;
   EXPECT_THROW(buildScene("two_levels", options), std::invalid_argument);
   EXPECT_THROW(buildScene("chessboard", options), std::invalid_argument);
-}
-
-TEST(SpeedScheduleTest, WaitsWhereItMustAndSaysWhenThereIsNoWay) {
-  ScheduleTask task;
-  task.path_m = 10.0;
-  task.num_steps = 40;
-  task.speed_limit_m_per_s = [](double) { return 10.0; };
-  task.wanted_m_per_s = [&](int) { return task.max_speed_m_per_s; };
-  // The path is closed between 4 and 5 m until 12 s.
-  task.is_free = [](int step, double along_m) {
-    return along_m < 4.0 || along_m > 5.0 || SpeedSchedule::kStep_s * step > 12.0;
-  };
-  const std::optional<SpeedSchedule> schedule = planSchedule(task);
-  ASSERT_TRUE(schedule);
-  EXPECT_LT(schedule->at(12.0).along_m, 4.0);
-  EXPECT_GT(schedule->at(12.0).along_m, 2.0);
-  EXPECT_GT(schedule->at(20.0).along_m, 5.0);
-  task.is_free = [](int step, double) { return SpeedSchedule::kStep_s * step < 12.0; };
-  EXPECT_FALSE(planSchedule(task));
 }
 
 TEST(FootprintTest, DistanceFollowsGeometry) {

@@ -4,8 +4,8 @@
 #include <memory>
 #include <vector>
 
-#include "scenes/movers/mover_path.h"
-#include "scenes/movers/speed_schedule.h"
+#include "scenes/movers/ways/mover_path.h"
+#include "scenes/movers/ways/speed_schedule.h"
 #include "vcharge_simulation/scenes/scene.h"
 
 namespace vcharge {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "scenes/movers/mover_routes.h"
+#include "scenes/movers/ways/mover_routes.h"
 #include "vcharge_simulation/scenes/scene_catalogue.h"
 
 namespace vcharge {

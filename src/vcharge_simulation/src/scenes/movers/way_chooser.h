@@ -2,10 +2,10 @@
 
 #include <optional>
 
-#include "scenes/movers/mover_routes.h"
 #include "scenes/movers/own_car.h"
 #include "scenes/movers/planned_mover.h"
 #include "scenes/movers/standing_obstacles.h"
+#include "scenes/movers/ways/mover_routes.h"
 
 namespace vcharge {
 

@@ -1,4 +1,4 @@
-#include "scenes/movers/speed_schedule.h"
+#include "scenes/movers/ways/speed_schedule.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "scenes/movers/mover_path.h"
+#include "scenes/movers/ways/mover_path.h"
 
 #include <algorithm>
 #include <utility>

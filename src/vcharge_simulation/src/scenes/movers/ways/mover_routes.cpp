@@ -1,4 +1,4 @@
-#include "scenes/movers/mover_routes.h"
+#include "scenes/movers/ways/mover_routes.h"
 
 #include <algorithm>
 #include <cmath>

@@ -5,7 +5,7 @@
 
 #include "scenes/lane_paths.h"
 #include "scenes/lot/parking_bays.h"
-#include "scenes/movers/mover_path.h"
+#include "scenes/movers/ways/mover_path.h"
 #include "scenes/scene_things.h"
 #include "vcharge_simulation/rendering/noise.h"
 
