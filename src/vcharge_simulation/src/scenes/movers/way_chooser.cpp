@@ -170,11 +170,15 @@ bool WayChooser::isFreeLap(double lap_m, Way* way) const {
   return obstacles_.freeLength(0.0, lap_m, way->mover) >= lap_m;
 }
 
-// Ends the way before the first obstacle; false if less than `least_m` is left.
+// Ends the way before the first obstacle, or where the drive ends. False if less than `least_m` of a longer
+// way is left.
 bool WayChooser::isFreeFor(double least_m, Way* way) const {
   const double start_m = way->mover.start_m;
-  way->end_m = start_m + obstacles_.freeLength(start_m, way->mover.path->length(), way->mover);
-  return way->end_m - start_m >= least_m;
+  const double reach_m =
+      std::min(way->task.max_speed_m_per_s * SpeedSchedule::kStep_s * num_steps_, way->end_m - start_m);
+  const double free_m = obstacles_.freeLength(start_m, start_m + reach_m, way->mover);
+  way->end_m = start_m + free_m;
+  return free_m >= std::min(least_m, reach_m - 1e-6);
 }
 
 }  // namespace vcharge
