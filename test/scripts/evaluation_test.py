@@ -204,7 +204,7 @@ class BenchmarkComparisonTest(FolderTest):
 
 class ArgumentsTest(FolderTest):
     def test_every_stage_has_help(self):
-        for stage in ("calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "faults", "chain",
+        for stage in ("masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "faults", "chain",
                       "latency", "soak"):
             output, arguments = io.StringIO(), sys.argv
             self.addCleanup(setattr, sys, "argv", arguments)

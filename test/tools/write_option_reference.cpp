@@ -10,6 +10,7 @@
 #include "vcharge_calibration/intrinsics/intrinsic_calibration.h"
 #include "vcharge_calibration/intrinsics/view_collector.h"
 #include "vcharge_calibration/live/rig_calibration_session.h"
+#include "vcharge_calibration/masks/body_mask_estimator.h"
 #include "vcharge_calibration/rig/rig_calibrator_options.h"
 #include "vcharge_camera_driver/driver_options.h"
 #include "vcharge_core/base/options.h"
@@ -54,6 +55,7 @@ int main() {
                                                       "`calibration_nodelet`: `~session`.");
   writeSection<vcharge::MapRigCalibratorOptions>(
       "Extrinsic calibration from a map", "`calibrate_rig_from_map`: `config/calibration_in_map.yaml`.");
+  writeSection<vcharge::BodyMaskOptions>("Masks of the own body", "`make_masks`.");
   writeSection<vcharge::SparseMapperOptions>("Sparse map",
                                              "`build_map`, `mapping_nodelet`: `config/mapping.yaml`.");
   writeSection<vcharge::DriveLocalizerOptions>(

@@ -3,6 +3,7 @@ import importlib
 import sys
 
 STAGES = {
+    "masks": "masks",
     "calibration": "calibration",
     "mapping": "mapping",
     "localization": "localization",

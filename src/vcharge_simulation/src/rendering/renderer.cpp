@@ -22,6 +22,9 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kMaxShadow_m = 150.0F;
 // Offset of shadow ray origins from their surface.
 constexpr float kShadowOffset_m = 0.01F;
+// Reflections in glossy paint of the own car.
+constexpr float kBrightestReflection = 2.0F;
+constexpr float kMirroredCone_rad = 0.01F;
 
 // Renders blocks of one image; holds what all blocks share.
 class BlockRenderer {
@@ -259,9 +262,32 @@ class BlockRenderer {
   }
 
   float shadeBody(const CameraView::BodySample& sample, const Eigen::Vector3f& ray) const {
-    return shader_.shadePlain(view_.body()->materials()[sample.material],
-                              vehicle_origin_ + vehicle_rotation_ * sample.position,
-                              vehicle_rotation_ * sample.normal, ray);
+    const Material& material = view_.body()->materials()[sample.material];
+    const Eigen::Vector3f position = vehicle_origin_ + vehicle_rotation_ * sample.position;
+    const Eigen::Vector3f normal = vehicle_rotation_ * sample.normal;
+    if (!view_.body()->isGlossy() || material.reflectivity <= 0.0F) {
+      return shader_.shadePlain(material, position, normal, ray);
+    }
+    return shader_.shadeMatt(material, position, normal) +
+           SurfaceShader::fresnel(material, normal, ray) *
+               mirroredLight(position + kShadowOffset_m * normal, ray - 2.0F * normal.dot(ray) * normal);
+  }
+
+  // Light that reaches a mirroring surface from a direction. The paint's curvature widens the ray's cone.
+  float mirroredLight(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const {
+    RayTracer::Hit hit;
+    if (!instant_.cast(origin, direction, &hit)) {
+      return std::min(shader_.skyRadiance(direction), kBrightestReflection);
+    }
+    SurfacePoint point;
+    point.direction = direction;
+    point.position = origin + hit.distance_m * direction;
+    point.geometric_normal = Eigen::Vector3f::UnitZ();
+    point.triangle = hit.triangle;
+    point.u = hit.u;
+    point.v = hit.v;
+    point.footprint_m = kMirroredCone_rad * hit.distance_m;
+    return shader_.shade(point, isShadowed(point.position) ? 0.0F : 1.0F);
   }
 
   const SceneInstant& instant_;

@@ -229,13 +229,17 @@ float SurfaceShader::lightOf(const SurfacePoint& point, const Interpolated& surf
   return light + seen * reflection(material, point.position, surface.normal, point.direction);
 }
 
-float SurfaceShader::reflection(const Material& material, const Eigen::Vector3f& position,
-                                const Eigen::Vector3f& normal, const Eigen::Vector3f& direction) const {
+float SurfaceShader::fresnel(const Material& material, const Eigen::Vector3f& normal,
+                             const Eigen::Vector3f& direction) {
   const float cosine = std::min(1.0F, std::max(0.0F, -normal.dot(direction)));
   const float m = 1.0F - cosine;
-  const float fresnel = material.reflectivity + (1.0F - material.reflectivity) * m * m * m * m * m;
+  return material.reflectivity + (1.0F - material.reflectivity) * m * m * m * m * m;
+}
+
+float SurfaceShader::reflection(const Material& material, const Eigen::Vector3f& position,
+                                const Eigen::Vector3f& normal, const Eigen::Vector3f& direction) const {
   const Eigen::Vector3f mirrored = direction - 2.0F * normal.dot(direction) * normal;
-  return fresnel * surroundings(position, mirrored);
+  return fresnel(material, normal, direction) * surroundings(position, mirrored);
 }
 
 float SurfaceShader::ceilingRadiance(const Eigen::Vector3f& position,
@@ -278,12 +282,16 @@ float SurfaceShader::surroundings(const Eigen::Vector3f& position, const Eigen::
 
 float SurfaceShader::shadePlain(const Material& material, const Eigen::Vector3f& position,
                                 const Eigen::Vector3f& normal, const Eigen::Vector3f& direction) const {
+  const float matt = shadeMatt(material, position, normal);
+  return material.reflectivity > 0.0F ? matt + reflection(material, position, normal, direction) : matt;
+}
+
+float SurfaceShader::shadeMatt(const Material& material, const Eigen::Vector3f& position,
+                               const Eigen::Vector3f& normal) const {
   const float to_sun = std::max(0.0F, normal.dot(sky_.directionToSun()));
   // Under a ceiling, the baked light of the floor gives the local brightness.
   const float surrounding = scene_.ceiling != nullptr ? groundLight(position, 0.5F, 0.0F) : ambient(normal);
-  const float diffuse =
-      material.albedo * (static_cast<float>(sky_.light().sun_irradiance) * to_sun + surrounding);
-  return material.reflectivity > 0.0F ? diffuse + reflection(material, position, normal, direction) : diffuse;
+  return material.albedo * (static_cast<float>(sky_.light().sun_irradiance) * to_sun + surrounding);
 }
 
 }  // namespace vcharge

@@ -46,7 +46,13 @@ class SurfaceShader {
                          float sun_visibility) const;
   /// Light from the sky, or from the ground for downward directions; for reflections.
   float surroundings(const Eigen::Vector3f& position, const Eigen::Vector3f& direction) const;
-  /// Light of an untextured surface (the own car) in the world frame.
+  /// Fraction of the light that a glossy surface reflects towards a ray's origin (Schlick).
+  static float fresnel(const Material& material, const Eigen::Vector3f& normal,
+                       const Eigen::Vector3f& direction);
+  /// Diffuse light of an untextured surface (the own car) in the world frame.
+  float shadeMatt(const Material& material, const Eigen::Vector3f& position,
+                  const Eigen::Vector3f& normal) const;
+  /// The same, with the reflection of surroundings().
   float shadePlain(const Material& material, const Eigen::Vector3f& position, const Eigen::Vector3f& normal,
                    const Eigen::Vector3f& direction) const;
   float skyRadiance(const Eigen::Vector3f& direction) const { return sky_.radiance(direction); }

@@ -23,6 +23,8 @@ constexpr double kRimFade_rad = 0.045;
 constexpr double kFullWidth_px = 1280.0;
 // The lens blurs the own car beyond its outline.
 constexpr int kMaskMargin_px = 2;
+// A body close to the lens is out of focus within this distance of its outline.
+constexpr int kOutlineWidth_px = 4;
 
 float lensTransmission(double cos_angle, double angle_rad, double half_field_of_view_rad) {
   const double natural = 0.55 + 0.45 * std::max(0.0, cos_angle);
@@ -51,16 +53,27 @@ CameraView::CameraView(const RigCamera& camera, std::shared_ptr<const VehicleBod
   pixel_angle_rad_.assign(num_pixels, 0.0F);
   vignette_ = cv::Mat::zeros(size(), CV_32FC1);
   mask_ = cv::Mat(size(), CV_8UC1, cv::Scalar(255));
-  computeRays();
+  cv::Mat sigma_px = cv::Mat::zeros(size(), CV_32FC1);
+  computeRays(&sigma_px);
   computePixelAngles();
   if (body_ != nullptr) {
     findBody();
+    if (body_->isGlossy()) {
+      blurOutline(&sigma_px);
+    }
   }
+  blur_ = LensBlur(sigma_px);
 }
 
-void CameraView::computeRays() {
+void CameraView::blurOutline(cv::Mat* sigma_px) const {
+  cv::Mat outline;
+  const cv::Mat around = cv::Mat::ones(2 * kOutlineWidth_px + 1, 2 * kOutlineWidth_px + 1, CV_8UC1);
+  cv::morphologyEx(mask_, outline, cv::MORPH_GRADIENT, around);
+  sigma_px->setTo(LensBlur::kMaxSigma_px * size().width / kFullWidth_px, outline);
+}
+
+void CameraView::computeRays(cv::Mat* sigma_px) {
   const double image_scale = size().width / kFullWidth_px;
-  cv::Mat sigma_px = cv::Mat::zeros(size(), CV_32FC1);
   const double half_field_of_view_rad = 0.5 * camera_.field_of_view_rad;
   tbb::parallel_for(0, block_rows_, [&](int block_y) {
     for (int block_x = 0; block_x < blocks_per_row_; ++block_x) {
@@ -93,13 +106,12 @@ void CameraView::computeRays() {
         if (complete) {
           block_pixels_[block] |= static_cast<uint8_t>(1 << p);
           centre_rays_[static_cast<size_t>(y) * size().width + x] = centre.cast<float>();
-          sigma_px.at<float>(y, x) = static_cast<float>(lens_.blurAt(angle_rad, image_scale));
+          sigma_px->at<float>(y, x) = static_cast<float>(lens_.blurAt(angle_rad, image_scale));
           vignette_.at<float>(y, x) = lensTransmission(centre.z(), angle_rad, half_field_of_view_rad);
         }
       }
     }
   });
-  blur_ = LensBlur(sigma_px);
 }
 
 void CameraView::computePixelAngles() {

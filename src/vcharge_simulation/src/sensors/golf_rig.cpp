@@ -1,7 +1,9 @@
 #include "vcharge_simulation/sensors/golf_rig.h"
 
 #include <cmath>
+#include <map>
 #include <stdexcept>
+#include <utility>
 
 #include "vcharge_simulation/objects/car_model.h"
 #include "vcharge_simulation/rendering/noise.h"
@@ -73,6 +75,31 @@ MeiCamera makeLens(double scale, Random* random) {
   return MeiCamera(parameters);
 }
 
+// Cameras further from the middle plane are in the mirrors.
+constexpr double kSideCamera_m = 0.8;
+
+struct Paint {
+  float albedo, reflectivity;
+};
+
+CarMaterials makeMaterials(const Paint& paint, std::vector<Material>* materials) {
+  const auto add = [&](float albedo, float reflectivity) {
+    Material material;
+    material.albedo = albedo;
+    material.reflectivity = reflectivity;
+    material.kind = SurfaceKind::kCar;
+    materials->push_back(material);
+    return static_cast<uint32_t>(materials->size() - 1);
+  };
+  CarMaterials car{};
+  car.paint = add(paint.albedo, paint.reflectivity);
+  car.side = car.front = car.rear = car.plate = car.paint;
+  car.glass = add(0.02F, 0.05F);
+  car.trim = car.tyre = add(0.03F, 0.0F);
+  car.wheel = add(0.25F, 0.02F);
+  return car;
+}
+
 }  // namespace
 
 CameraRig makeGolfRig(uint64_t seed, double image_scale) {
@@ -105,23 +132,41 @@ CameraRig makeGolfRig(uint64_t seed, double image_scale) {
   return rig;
 }
 
+CameraRig makeRecessedRig(uint64_t seed, double image_scale) {
+  CameraRig rig = makeGolfRig(seed, image_scale);
+  const std::map<std::string, Eigen::Vector3d> positions_m = {{"front", {3.38, 0.0, 0.80}},
+                                                              {"left", {1.80, 0.96, 1.02}},
+                                                              {"rear", {-0.66, 0.0, 1.04}},
+                                                              {"right", {1.80, -0.96, 1.02}}};
+  for (RigCamera& camera : rig.cameras) {
+    camera.vehicle_from_camera =
+        RigidTransform::fromUnit(camera.vehicle_from_camera->rotation(), positions_m.at(camera.name));
+  }
+  return rig;
+}
+
 std::shared_ptr<const VehicleBody> makeGolfBody() {
+  const Paint paint{0.035F, 0.05F};
   std::vector<Material> materials;
-  const auto add = [&](float albedo, float reflectivity) {
-    Material material;
-    material.albedo = albedo;
-    material.reflectivity = reflectivity;
-    material.kind = SurfaceKind::kCar;
-    materials.push_back(material);
-    return static_cast<uint32_t>(materials.size() - 1);
-  };
-  CarMaterials car{};
-  car.paint = add(0.035F, 0.05F);
-  car.side = car.front = car.rear = car.plate = car.paint;
-  car.glass = add(0.02F, 0.05F);
-  car.trim = car.tyre = add(0.03F, 0.0F);
-  car.wheel = add(0.25F, 0.02F);
+  const CarMaterials car = makeMaterials(paint, &materials);
   return std::make_shared<VehicleBody>(makeCarMesh(carShapes().front(), car, false), materials);
+}
+
+std::shared_ptr<const VehicleBody> makeGlossyBody(const CameraRig& rig, uint64_t seed) {
+  Random random(seed ^ 0xA24BAED4963EE407ULL);
+  const Paint paint{static_cast<float>(0.03 * std::pow(20.0, random.uniform(0.0, 1.0))), 0.045F};
+  std::vector<Material> materials;
+  const CarMaterials car = makeMaterials(paint, &materials);
+  TriangleMesh mesh = makeCarMesh(carShapes().front(), car, false);
+  for (const RigCamera& camera : rig.cameras) {
+    const Eigen::Vector3d position_m = camera.vehicle_from_camera->translation();
+    if (std::abs(position_m.y()) > kSideCamera_m) {
+      const double outwards = position_m.y() > 0.0 ? 1.0 : -1.0;
+      addBox(placement(position_m.x() - 0.12, position_m.y() - 0.06 * outwards, position_m.z() + 0.05, 0.0),
+             {0.16F, 0.16F, 0.12F}, car.paint, &mesh);
+    }
+  }
+  return std::make_shared<VehicleBody>(std::move(mesh), materials, true);
 }
 
 }  // namespace vcharge

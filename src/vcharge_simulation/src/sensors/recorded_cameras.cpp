@@ -26,6 +26,17 @@ void checkCamerasOfFaults(const FaultOptions& faults, const CameraRig& rig) {
   });
 }
 
+std::shared_ptr<const VehicleBody> makeBody(const DriveScenario& scenario, const CameraRig& rig) {
+  switch (scenario.body) {
+    case BodyKind::kNone:
+      return nullptr;
+    case BodyKind::kGlossy:
+      return makeGlossyBody(rig, static_cast<uint64_t>(scenario.rig_seed));
+    default:
+      return makeGolfBody();
+  }
+}
+
 RigCamera bumped(RigCamera camera, const BumpedCameraFault& fault) {
   if (fault.actsOn(camera.name)) {
     const RigidTransform before_from_after(rotationFromVector(Eigen::Vector3d(fault.rotation_rad.data())),
@@ -54,7 +65,7 @@ RecordedCameras::RecordedCameras(const DriveScenario& scenario, const std::strin
     indices_.push_back(static_cast<int>(index));
   }
   checkCamerasOfFaults(faults_, rig_);
-  const auto body = makeGolfBody();
+  const auto body = makeBody(scenario, whole);
   for (RigCamera& camera : rig_.cameras) {
     views_.emplace_back(camera, body, scenario.lens);
     bumped_views_.push_back(faults_.bumped_camera.actsOn(camera.name)

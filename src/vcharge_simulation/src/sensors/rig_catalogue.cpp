@@ -18,6 +18,9 @@ const std::vector<CatalogueRig>& catalogue() {
   static const std::vector<CatalogueRig> rigs = {
       {{"golf", "four 185-degree cameras as on the V-Charge car, varied slightly by --rig-seed"},
        makeGolfRig},
+      {{"recessed",
+        "the Golf's cameras set back, so that bonnet, tailgate and doors fill more of the images"},
+       makeRecessedRig},
       {{"random",
         "the Golf's cameras moved by up to 10 cm and 10 degrees, with random lenses, by --rig-seed"},
        makeRandomRig}};

@@ -7,8 +7,11 @@
 
 namespace vcharge {
 
-VehicleBody::VehicleBody(TriangleMesh mesh, std::vector<Material> materials)
-    : mesh_(std::move(mesh)), materials_(std::move(materials)), tracer_(std::make_unique<RayTracer>(mesh_)) {
+VehicleBody::VehicleBody(TriangleMesh mesh, std::vector<Material> materials, bool is_glossy)
+    : mesh_(std::move(mesh)),
+      materials_(std::move(materials)),
+      is_glossy_(is_glossy),
+      tracer_(std::make_unique<RayTracer>(mesh_)) {
   for (const MeshVertex& vertex : mesh_.vertices) {
     radius_m_ = std::max(radius_m_, vertex.position.norm());
   }

@@ -11,12 +11,22 @@
 
 namespace vcharge {
 
+/// Body of the car that carries the cameras: dark paint that reflects a smooth sky and ground; nothing; or
+/// paint of any brightness that reflects the scene, with mirror housings beside the cameras and soft edges.
+enum class BodyKind { kPlain, kNone, kGlossy };
+
+template <>
+inline std::vector<std::string> enumNames<BodyKind>() {
+  return {"plain", "none", "glossy"};
+}
+
 /// Everything that determines a simulated drive. The same scenario gives the same bytes.
 struct DriveScenario {
   VCHARGE_BEGIN_OPTIONS(DriveScenario);
   VCHARGE_OPTION(std::string, scene, "lot", anyValue(), "Name of the scene, see --list.");
   VCHARGE_OPTION(std::string, drive, "short", anyValue(), "Name of the drive in the scene, see --list.");
   VCHARGE_OPTION(std::string, rig, "golf", anyValue(), "Name of the rig, see --list.");
+  VCHARGE_OPTION(BodyKind, body, BodyKind::kPlain, anyValue(), "Body of the car that carries the cameras.");
   VCHARGE_OPTION(std::string, board, "chessboard", anyValue(),
                  "Board in the scene chessboard: chessboard or aprilgrid.");
   VCHARGE_OPTION(int, scene_seed, 1, notNegative(), "Seed of the scene.");

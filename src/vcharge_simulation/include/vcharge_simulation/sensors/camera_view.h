@@ -62,9 +62,10 @@ class CameraView {
   const cv::Mat& mask() const { return mask_; }
 
  private:
-  void computeRays();
+  void computeRays(cv::Mat* sigma_px);
   void computePixelAngles();
   void findBody();
+  void blurOutline(cv::Mat* sigma_px) const;
 
   RigCamera camera_;
   LensOptions lens_;

@@ -17,4 +17,12 @@ CameraRig makeGolfRig(uint64_t seed, double image_scale);
 /// Body of the Golf that carries the cameras, dark and glossy.
 std::shared_ptr<const VehicleBody> makeGolfBody();
 
+/// The Golf in paint of a random brightness that reflects the scene, with a mirror housing behind each camera
+/// at the side.
+std::shared_ptr<const VehicleBody> makeGlossyBody(const CameraRig& rig, uint64_t seed);
+
+/// The Golf's cameras set back from the outline of the car, so that bonnet, tailgate and doors fill more of
+/// the images; otherwise as makeGolfRig.
+CameraRig makeRecessedRig(uint64_t seed, double image_scale);
+
 }  // namespace vcharge
