@@ -85,7 +85,7 @@ class LocalizationTest(unittest.TestCase):
         blind = self.road.map_drive.folder / "blind.bag"
         with rosbag.Bag(str(blind), "w") as bag:
             for topic, message in self.messages_of(self.road.bag):
-                if topic != "/ground_truth":
+                if not topic.startswith("/ground_truth"):
                     bag.write(topic, message, message.header.stamp)
         status, found, _, _ = self.road.localize(bag=blind, prefix=("taskset", "-c", "0"))
         self.assertEqual(status, 0)

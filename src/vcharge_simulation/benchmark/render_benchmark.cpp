@@ -6,6 +6,7 @@
 #include <benchmark/benchmark.h>
 #include <tbb/global_control.h>
 
+#include "vcharge_simulation/drive/drive_simulator.h"
 #include "vcharge_simulation/rendering/renderer.h"
 #include "vcharge_simulation/scenes/scene_catalogue.h"
 #include "vcharge_simulation/sensors/golf_rig.h"
@@ -13,21 +14,34 @@
 namespace vcharge {
 namespace {
 
-const Renderer& rendererOf(const std::string& scene) {
+const Renderer& rendererOf(const std::string& scene, const std::string& drive, const MoverOptions& movers) {
   static std::string built;
   static std::unique_ptr<const Renderer> renderer;
-  if (scene != built) {
+  const std::string name = scene + (movers.hasAny() ? " with movers" : "");
+  if (name != built) {
     renderer.reset();
-    renderer = std::make_unique<const Renderer>(buildScene(scene, SceneOptions()));
-    built = scene;
+    SceneOptions options;
+    options.movers = movers;
+    const DrivePlan plan = planDrive(scene, drive);
+    options.own_poses = ownPoses(simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1,
+                                               FaultOptions(), plan.ground_height));
+    renderer = std::make_unique<const Renderer>(buildScene(scene, options));
+    built = name;
   }
   return *renderer;
 }
 
+MoverOptions tenMovers() {
+  MoverOptions movers;
+  movers.people = 4;
+  movers.children = movers.cars = movers.bicycles = 2;
+  return movers;
+}
+
 // Renders one 1280x800 image at four rays per pixel on one core, at the start of a drive at 2.5 m/s.
 void renderImage(benchmark::State& state, const std::string& scene, const std::string& drive,
-                 double readout_time_s) {
-  const Renderer& renderer = rendererOf(scene);
+                 double readout_time_s = 0.0, const MoverOptions& movers = MoverOptions()) {
+  const Renderer& renderer = rendererOf(scene, drive, movers);
   const auto body = makeGolfBody();
   const DrivePlan plan = planDrive(scene, drive);
   const RigidTransform& start = plan.path.worldFromStart();
@@ -55,12 +69,15 @@ void oneThread(benchmark::internal::Benchmark* images) {
   images->Unit(benchmark::kMillisecond)->ComputeStatistics("min", minimum);
 }
 
-BENCHMARK_CAPTURE(renderImage, lot, "lot", "short", 0.0)->DenseRange(0, 3)->Apply(oneThread);
+BENCHMARK_CAPTURE(renderImage, lot, "lot", "short")->DenseRange(0, 3)->Apply(oneThread);
 BENCHMARK_CAPTURE(renderImage, lot_rolling_20_ms, "lot", "short", 0.02)->DenseRange(0, 3)->Apply(oneThread);
-BENCHMARK_CAPTURE(renderImage, garage, "garage", "loop", 0.0)->DenseRange(0, 3)->Apply(oneThread);
-BENCHMARK_CAPTURE(renderImage, obstacles, "obstacles", "creep", 0.0)->Arg(1)->Apply(oneThread);
-BENCHMARK_CAPTURE(renderImage, two_levels, "two_levels", "up_and_down", 0.0)->Arg(1)->Apply(oneThread);
-BENCHMARK_CAPTURE(renderImage, chessboard, "chessboard", "board_left", 0.0)->Arg(1)->Apply(oneThread);
+BENCHMARK_CAPTURE(renderImage, lot_with_movers, "lot", "standing", 0.0, tenMovers())
+    ->DenseRange(0, 3)
+    ->Apply(oneThread);
+BENCHMARK_CAPTURE(renderImage, garage, "garage", "loop")->DenseRange(0, 3)->Apply(oneThread);
+BENCHMARK_CAPTURE(renderImage, obstacles, "obstacles", "creep")->Arg(1)->Apply(oneThread);
+BENCHMARK_CAPTURE(renderImage, two_levels, "two_levels", "up_and_down")->Arg(1)->Apply(oneThread);
+BENCHMARK_CAPTURE(renderImage, chessboard, "chessboard", "board_left")->Arg(1)->Apply(oneThread);
 
 }  // namespace
 }  // namespace vcharge

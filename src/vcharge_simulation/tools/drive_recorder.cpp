@@ -164,6 +164,9 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
     scene.board = scenario.board;
     scene.rig = scenario.rig;
     scene.rig_seed = static_cast<uint64_t>(scenario.rig_seed);
+    scene.movers = scenario.movers;
+    scene.own_poses = ownPoses(drive);
+    scene.start_s = plan.start_s;
     renderer.emplace(buildScene(scenario.scene, scene));
     images = renderImages(*renderer, cameras, response, drive, scene_times_s, faults.motion_blur);
     writeHeightMap(computeHeightMap(*renderer, recording.height_cell_m, kHeightLimit_m),
@@ -179,6 +182,7 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   if (scenario.scene == "chessboard") {
     writeTextFileAtomically(truth.path() + "/board.yaml", boardTarget(scenario.board));
   }
+  const bool has_objects = renderer && !trueObjects(renderer->scene().movers, 0.0).empty();
   const bool truth_range = recording.truth_range && renderer.has_value();
   for (const RigCamera& camera : rig.cameras) {
     if (truth_range) {
@@ -207,6 +211,9 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   for (size_t frame = 0; frame < drive.world_from_vehicle.size(); ++frame) {
     const Timestamp stamp = stamps[frame];
     motion.writeUntil(stamp);
+    if (has_objects) {
+      writer.writeTrueObjects(stamp, trueObjects(renderer->scene().movers, scene_times_s[frame]));
+    }
     for (size_t camera = 0; camera < cameras.size(); ++camera) {
       const Readout readout = cameras.readout(camera, stamp - start, drive.image_motion[frame]);
       const cv::Mat light = light_faults.apply(camera, stamp, images->image(camera, frame), readout);

@@ -11,6 +11,7 @@
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/drive_topics.h"
 #include "vcharge_ros/image_conversions.h"
+#include "vcharge_ros/object_conversions.h"
 
 namespace vcharge {
 namespace {
@@ -18,6 +19,7 @@ namespace {
 constexpr char kOdomFrame[] = "odom";
 constexpr char kWorldFrame[] = "world";
 constexpr char kGroundTruthTopic[] = "/ground_truth";
+constexpr char kTrueObjectsTopic[] = "/ground_truth/objects";
 
 }  // namespace
 
@@ -99,6 +101,10 @@ void DriveBagWriter::writeWheelTicks(const WheelTicks& ticks, std::optional<Time
 void DriveBagWriter::writeGroundTruth(const VehicleOdometry& truth) {
   implementation_->write(kGroundTruthTopic, truth.stamp,
                          toMessage(truth, kWorldFrame, implementation_->rig.vehicle_frame));
+}
+
+void DriveBagWriter::writeTrueObjects(Timestamp stamp, const std::vector<TrackedObject>& objects) {
+  implementation_->write(kTrueObjectsTopic, stamp, toMessage(objects, stamp, kWorldFrame));
 }
 
 void DriveBagWriter::close() {

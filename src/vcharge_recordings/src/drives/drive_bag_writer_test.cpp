@@ -36,6 +36,7 @@ TEST(DriveBagWriterTest, WritesTheStandardTopicsAtTheirStamps) {
   writer.writeOdometry(odometry);
   writer.writeWheelTicks({milliseconds(10), 3, 4, 0.01, 0.2});
   writer.writeGroundTruth(odometry);
+  writer.writeTrueObjects(milliseconds(10), {TrackedObject()});
   writer.close();
 
   rosbag::Bag bag(folder / "drive.bag");
@@ -53,10 +54,11 @@ TEST(DriveBagWriterTest, WritesTheStandardTopicsAtTheirStamps) {
       EXPECT_EQ(info->K, makeCameraInfo(rig.cameras[1]).K);
     }
   }
-  EXPECT_EQ(topics, (std::set<std::string>{"/camera/left/image_raw sensor_msgs/Image",
-                                           "/camera/left/camera_info sensor_msgs/CameraInfo",
-                                           "/odom nav_msgs/Odometry", "/wheel_ticks vcharge_msgs/WheelTicks",
-                                           "/ground_truth nav_msgs/Odometry"}));
+  EXPECT_EQ(topics,
+            (std::set<std::string>{
+                "/camera/left/image_raw sensor_msgs/Image", "/camera/left/camera_info sensor_msgs/CameraInfo",
+                "/odom nav_msgs/Odometry", "/wheel_ticks vcharge_msgs/WheelTicks",
+                "/ground_truth nav_msgs/Odometry", "/ground_truth/objects vcharge_msgs/TrackedObjects"}));
 }
 
 TEST(DriveBagWriterTest, ShowsTheBagOnlyOnceItIsClosed) {

@@ -98,4 +98,16 @@ SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& 
   return drive;
 }
 
+std::vector<RigidTransform> ownPoses(const SimulatedDrive& drive) {
+  constexpr int64_t kPeriod_ns = 100'000'000;
+  const Timestamp start = drive.ground_truth.front().stamp;
+  std::vector<RigidTransform> poses;
+  for (const VehicleOdometry& truth : drive.ground_truth) {
+    if ((truth.stamp - start).count() % kPeriod_ns == 0) {
+      poses.push_back(truth.odom_from_vehicle);
+    }
+  }
+  return poses;
+}
+
 }  // namespace vcharge

@@ -107,6 +107,27 @@ void writeObstacles(const std::vector<Obstacle>& obstacles, const std::string& p
   writeTextFileAtomically(path, std::string(yaml.c_str()) + "\n");
 }
 
+std::vector<TrackedObject> trueObjects(const std::vector<Mover>& movers, double time_s) {
+  std::vector<TrackedObject> objects;
+  for (const Mover& mover : movers) {
+    if (mover.object_class == ObjectClass::kUnknown) {
+      continue;
+    }
+    const MoverState state = mover.stateAt(time_s);
+    TrackedObject object;
+    object.id = static_cast<uint32_t>(objects.size() + 1);
+    object.object_class = mover.object_class;
+    object.frame_from_object = state.world_from_mover;
+    object.velocity_m_per_s = state.velocity_m_per_s;
+    object.is_standing = state.is_standing;
+    object.footprint_m = state.obstacle.footprint_m;
+    object.base_z_m = state.obstacle.base_z_m;
+    object.height_m = state.obstacle.top_z_m - state.obstacle.base_z_m;
+    objects.push_back(object);
+  }
+  return objects;
+}
+
 void writeMovers(const std::vector<Mover>& movers, const std::vector<Timestamp>& stamps,
                  const std::vector<double>& times_s, const std::string& path) {
   check(stamps.size() == times_s.size(), "writeMovers: expected a time for each stamp");
@@ -126,7 +147,13 @@ void writeMovers(const std::vector<Mover>& movers, const std::vector<Timestamp>&
       yaml << YAML::Key << "translation_m" << YAML::Value << YAML::Flow << YAML::BeginSeq << translation.x()
            << translation.y() << translation.z() << YAML::EndSeq;
       yaml << YAML::Key << "rotation_xyzw" << YAML::Value << YAML::Flow << YAML::BeginSeq << rotation.x()
-           << rotation.y() << rotation.z() << rotation.w() << YAML::EndSeq << YAML::EndMap;
+           << rotation.y() << rotation.z() << rotation.w() << YAML::EndSeq;
+      const Eigen::Vector3d& velocity = state.velocity_m_per_s;
+      yaml << YAML::Key << "class" << YAML::Value << nameOf(mover.object_class);
+      yaml << YAML::Key << "velocity_m_per_s" << YAML::Value << YAML::Flow << YAML::BeginSeq << velocity.x()
+           << velocity.y() << velocity.z() << YAML::EndSeq;
+      yaml << YAML::Key << "height_m" << YAML::Value << state.obstacle.top_z_m - state.obstacle.base_z_m;
+      yaml << YAML::Key << "is_standing" << YAML::Value << state.is_standing << YAML::EndMap;
     }
     yaml << YAML::EndSeq << YAML::EndMap;
   }

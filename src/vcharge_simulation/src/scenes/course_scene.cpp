@@ -96,24 +96,40 @@ void addStandingFigure(SceneParts* parts) {
       {"pedestrian", circleAround(-4.5, 2.3, kFigureRadius_m), 0.0, kFigureHeight_m});
 }
 
-MoverState walkerAt(const FigureMaterials& materials, double time_s) {
-  // The walker goes back and forth with a turn at each end.
-  const double leg_s = 2.0 * kWalkReach_m / kWalkSpeed_m_per_s;
-  const double period_s = 2.0 * (leg_s + kTurn_s);
-  const double in_period_s = time_s - period_s * std::floor(time_s / period_s);
-  const bool returns = in_period_s >= 0.5 * period_s;
-  const double in_leg_s = in_period_s - (returns ? 0.5 * period_s : 0.0);
-  const double walked_m = kWalkSpeed_m_per_s * std::min(in_leg_s, leg_s);
-  const double turned = std::max(0.0, (in_leg_s - leg_s) / kTurn_s);
-  const double x = returns ? walked_m - kWalkReach_m : kWalkReach_m - walked_m;
-  const double yaw_rad = kPi * ((returns ? 0.0 : 1.0) + turned);
-  // Arms and legs stop swinging for the turn.
-  const double swing = std::clamp(2.0 * std::min(in_leg_s, leg_s - in_leg_s), 0.0, 1.0);
+// The walker goes back and forth with a turn at each end.
+struct Walk {
+  explicit Walk(double time_s) {
+    const double leg_s = 2.0 * kWalkReach_m / kWalkSpeed_m_per_s;
+    const double period_s = 2.0 * (leg_s + kTurn_s);
+    const double in_period_s = time_s - period_s * std::floor(time_s / period_s);
+    const bool returns = in_period_s >= 0.5 * period_s;
+    const double in_leg_s = in_period_s - (returns ? 0.5 * period_s : 0.0);
+    walked_m = kWalkSpeed_m_per_s * std::min(in_leg_s, leg_s);
+    const double turned = std::max(0.0, (in_leg_s - leg_s) / kTurn_s);
+    x = returns ? walked_m - kWalkReach_m : kWalkReach_m - walked_m;
+    yaw_rad = kPi * ((returns ? 0.0 : 1.0) + turned);
+    speed_m_per_s = in_leg_s < leg_s ? kWalkSpeed_m_per_s : 0.0;
+    // Arms and legs stop swinging for the turn.
+    swing = std::clamp(2.0 * std::min(in_leg_s, leg_s - in_leg_s), 0.0, 1.0);
+  }
+  double walked_m, x, yaw_rad, speed_m_per_s, swing;
+};
+
+TriangleMesh walkerMesh(const FigureMaterials& materials, double time_s) {
+  const Walk walk(time_s);
+  TriangleMesh mesh;
+  mesh.append(makeFigure(materials, walk.swing, 2.0 * kPi * walk.walked_m / kFigureStride_m),
+              placement(walk.x, kWalkLine_m, 0.0, walk.yaw_rad));
+  return mesh;
+}
+
+MoverState walkerAt(double time_s) {
+  const Walk walk(time_s);
   MoverState state;
-  state.world_from_mover = RigidTransform::planar(x, kWalkLine_m, yaw_rad);
-  state.mesh.append(makeFigure(materials, swing, 2.0 * kPi * walked_m / kFigureStride_m),
-                    placement(x, kWalkLine_m, 0.0, yaw_rad));
-  state.obstacle = {"pedestrian", circleAround(x, kWalkLine_m, kFigureRadius_m), 0.0, kFigureHeight_m};
+  state.world_from_mover = RigidTransform::planar(walk.x, kWalkLine_m, walk.yaw_rad);
+  state.velocity_m_per_s = state.world_from_mover.rotation() * Eigen::Vector3d(walk.speed_m_per_s, 0.0, 0.0);
+  state.is_standing = walk.speed_m_per_s == 0.0;
+  state.obstacle = {"pedestrian", circleAround(walk.x, kWalkLine_m, kFigureRadius_m), 0.0, kFigureHeight_m};
   return state;
 }
 
@@ -173,7 +189,8 @@ std::shared_ptr<const Scene> buildCourseScene(const SceneOptions& options) {
     addTrailer(parts);
     addStandingFigure(parts);
     const FigureMaterials walker = addFigureMaterials(0.12, 0.2, parts);
-    parts->scene().movers.push_back({"walker", [walker](double time_s) { return walkerAt(walker, time_s); }});
+    parts->scene().movers.push_back({"walker", ObjectClass::kAdult, walkerAt,
+                                     [walker](double time_s) { return walkerMesh(walker, time_s); }});
   };
   return buildLotVariant(options, course);
 }

@@ -94,6 +94,63 @@ DrivePath leaveBayWestwards(double bay_x_m, double lane_y_m, double leave_m) {
                     {leave_m, 0.0, 0.0}});
 }
 
+DrivePath visitBayBackwards(double bay_x_m, double lane_y_m) {
+  DrivePath path = reverseIntoBay(bay_x_m, lane_y_m, 12.0);
+  path.append(leaveBayWestwards(bay_x_m, lane_y_m, 8.0));
+  return path;
+}
+
+DrivePath threePointTurn(const Lanes& lanes) {
+  constexpr double kBefore_m = 8.0;
+  constexpr double k = kBayCurvature_per_m;
+  return DrivePath(RigidTransform::planar(lanes.x_m, -kBefore_m, kHalfPi),
+                   {{kBefore_m + kTangent_m, 0.0, 0.0},
+                    {kTurnIn_m, 0.0, k, true},
+                    {kArc_m, k, k, true},
+                    {kTurnIn_m, k, 0.0, true},
+                    {kIntoBay_m, 0.0, 0.0, true},
+                    {kIntoBay_m, 0.0, 0.0},
+                    {kTurnIn_m, 0.0, -k},
+                    {kArc_m, -k, -k},
+                    {kTurnIn_m, -k, 0.0},
+                    {kBefore_m, 0.0, 0.0}});
+}
+
+DrivePath visitSpaceForwards(double space_x_m, double lane_y_m, double depth_m) {
+  constexpr double kBefore_m = 12.0;
+  constexpr double k = -kBayCurvature_per_m;
+  const double into_m = depth_m - kTangent_m;
+  return DrivePath(RigidTransform::planar(space_x_m - kTangent_m - kBefore_m, lane_y_m, 0.0),
+                   {{kBefore_m, 0.0, 0.0},
+                    {kTurnIn_m, 0.0, k},
+                    {kArc_m, k, k},
+                    {kTurnIn_m, k, 0.0},
+                    {into_m, 0.0, 0.0},
+                    {into_m, 0.0, 0.0, true},
+                    {kTurnIn_m, 0.0, k, true},
+                    {kArc_m, k, k, true},
+                    {kTurnIn_m, k, 0.0, true},
+                    {kBefore_m, 0.0, 0.0, true}});
+}
+
+DrivePath stopAndGo(const RigidTransform& world_from_start) {
+  DrivePath path(world_from_start, {{38.0, 0.0, 0.0}});
+  for (const double at_m : {5.0, 11.0, 14.0, 23.0, 31.0}) {
+    path.addStop({at_m, 1.5});
+  }
+  return path;
+}
+
+DrivePath standingPath(const RigidTransform& world_from_vehicle) {
+  return DrivePath(world_from_vehicle, {{1.0, 0.0, 0.0}});
+}
+
+VehicleMotionOptions standing(double duration_s) {
+  VehicleMotionOptions motion;
+  motion.standstill_s = motion.duration_s = duration_s;
+  return motion;
+}
+
 VehicleMotionOptions fromRestToRest(double cruise_speed_m_per_s) {
   VehicleMotionOptions motion;
   motion.cruise_speed_m_per_s = cruise_speed_m_per_s;

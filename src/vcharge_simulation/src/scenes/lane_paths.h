@@ -38,6 +38,22 @@ DrivePath reverseIntoBay(double bay_x_m, double lane_y_m, double approach_m);
 /// Path from the end of reverseIntoBay() out of the bay and west along the lane, `leave_m` beyond the curve.
 DrivePath leaveBayWestwards(double bay_x_m, double lane_y_m, double leave_m);
 
+/// Path into a bay at x = bay_x_m on the northern side of the lane, backwards, a stop, and out of it
+/// westwards.
+DrivePath visitBayBackwards(double bay_x_m, double lane_y_m);
+/// Path along the eastern lane of `lanes` northwards past the middle lane, backwards into that, and back
+/// southwards: a turn in three moves.
+DrivePath threePointTurn(const Lanes& lanes);
+/// Path east along the lane at y = lane_y_m, to the right into a space whose middle line is at x = space_x_m
+/// and ends `depth_m` south of the lane; a stop, backwards out of it, and back westwards.
+DrivePath visitSpaceForwards(double space_x_m, double lane_y_m, double depth_m);
+
+/// Path of 38 m straight ahead with five stops.
+DrivePath stopAndGo(const RigidTransform& world_from_start);
+/// Path for a car that stands, see standing().
+DrivePath standingPath(const RigidTransform& world_from_vehicle);
+VehicleMotionOptions standing(double duration_s);
+
 /// Motion that starts from standstill and stops at the end of the path.
 VehicleMotionOptions fromRestToRest(double cruise_speed_m_per_s = 2.5);
 

@@ -25,6 +25,10 @@ std::vector<SceneDrive> lotDrives();
 std::shared_ptr<const Scene> buildGarageScene(const SceneOptions& options);
 std::vector<SceneDrive> garageDrives();
 
+/// A straight road of 400 m with kerbs, pavements, parked cars and houses, then speed bumps and a slope.
+std::shared_ptr<const Scene> buildRoadScene(const SceneOptions& options);
+std::vector<SceneDrive> roadDrives();
+
 /// The lot with small obstacles in its middle lane, a standing and a walking person.
 std::shared_ptr<const Scene> buildCourseScene(const SceneOptions& options);
 std::vector<SceneDrive> courseDrives();

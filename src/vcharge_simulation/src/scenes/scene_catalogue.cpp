@@ -14,18 +14,24 @@ struct CatalogueScene {
   CatalogueEntry entry;
   std::shared_ptr<const Scene> (*build)(const SceneOptions&);
   std::vector<SceneDrive> (*drives)();
+  bool has_movers = false;  ///< knows SceneOptions::movers
 };
 
 const std::vector<CatalogueScene>& catalogue() {
   static const std::vector<CatalogueScene> scenes = {
-      {{"lot", "sunlit parking lot of 80 x 60 m"}, buildLotScene, lotDrives},
-      {{"garage", "underground garage of 64 x 47 m, lit by lamps"}, buildGarageScene, garageDrives},
+      {{"lot", "sunlit parking lot of 80 x 60 m"}, buildLotScene, lotDrives, true},
+      {{"garage", "underground garage of 64 x 47 m, lit by lamps"}, buildGarageScene, garageDrives, true},
       {{"obstacles", "posts, boxes, kerbs, a trailer and two people on the lot"},
        buildCourseScene,
-       courseDrives},
+       courseDrives,
+       true},
       {{"two_levels", "lot on two levels with ramps of 6 degrees and uneven ground"},
        buildTwoLevelsScene,
        twoLevelsDrives},
+      {{"road", "straight road with parked cars and houses, then speed bumps and a slope of 5 %"},
+       buildRoadScene,
+       roadDrives,
+       true},
       {{"chessboard", "chessboard or AprilGrid (--board) in front of each camera in turn, on the lot"},
        buildBoardScene,
        boardDrives}};
@@ -75,7 +81,11 @@ std::vector<CatalogueEntry> listDrives(const std::string& scene) {
 std::shared_ptr<const Scene> buildScene(const std::string& name, const SceneOptions& options) {
   check(options.image_scale > 0.0 && options.detail > 0.0,
         "buildScene: image_scale and detail must be positive");
-  return findScene(name).build(options);
+  const CatalogueScene& scene = findScene(name);
+  if (options.movers.hasAny() && !scene.has_movers) {
+    throw std::invalid_argument("movers: the scene " + name + " has none");
+  }
+  return scene.build(options);
 }
 
 DrivePlan planDrive(const std::string& scene, const std::string& drive) {

@@ -15,20 +15,20 @@ constexpr float kMaxShadow_m = 150.0F;
 SceneInstant::SceneInstant(const Scene& scene, const RayTracer& fixed, double time_s)
     : fixed_(fixed), num_fixed_triangles_(static_cast<uint32_t>(scene.mesh.triangles.size())) {
   for (const Mover& mover : scene.movers) {
-    moving_.append(mover.stateAt(time_s).mesh, Eigen::Isometry3f::Identity());
+    const TriangleMesh mesh = mover.meshAt(time_s);
+    if (mesh.triangles.empty()) {
+      continue;
+    }
+    moving_.append(mesh, Eigen::Isometry3f::Identity());
+    Eigen::AlignedBox3f box;
+    for (const MeshVertex& vertex : mesh.vertices) {
+      box.extend(vertex.position);
+    }
+    spheres_.push_back({box.center(), 0.5F * box.diagonal().norm()});
   }
-  if (moving_.triangles.empty()) {
-    return;
+  if (!moving_.triangles.empty()) {
+    moving_tracer_.emplace(moving_, kMovingGeometry);
   }
-  moving_tracer_.emplace(moving_, kMovingGeometry);
-  Eigen::Vector3f low = moving_.vertices.front().position;
-  Eigen::Vector3f high = low;
-  for (const MeshVertex& vertex : moving_.vertices) {
-    low = low.cwiseMin(vertex.position);
-    high = high.cwiseMax(vertex.position);
-  }
-  centre_ = 0.5F * (low + high);
-  radius_m_ = 0.5F * (high - low).norm();
 }
 
 void SceneInstant::intersect(const int* active, RTCRayHit16* rays) const {
@@ -73,17 +73,15 @@ bool SceneInstant::cast(const Eigen::Vector3f& origin, const Eigen::Vector3f& di
 
 bool SceneInstant::isShadowedByMover(const Eigen::Vector3f& position,
                                      const Eigen::Vector3f& direction_to_sun) const {
-  if (!moving_tracer_) {
-    return false;
-  }
-  // The ray to the sun must pass within the sphere around all movers.
-  const Eigen::Vector3f to_centre = centre_ - position;
-  const float along = to_centre.dot(direction_to_sun);
-  if (along < -radius_m_ || (to_centre - along * direction_to_sun).squaredNorm() > radius_m_ * radius_m_) {
-    return false;
-  }
-  return moving_tracer_->occluded(position + kShadowOffset_m * direction_to_sun, direction_to_sun,
-                                  kMaxShadow_m);
+  // The ray to the sun must pass within the sphere around a mover.
+  const bool passes_one = std::any_of(spheres_.begin(), spheres_.end(), [&](const Sphere& sphere) {
+    const Eigen::Vector3f to_centre = sphere.centre - position;
+    const float along = to_centre.dot(direction_to_sun);
+    return along >= -sphere.radius_m &&
+           (to_centre - along * direction_to_sun).squaredNorm() <= sphere.radius_m * sphere.radius_m;
+  });
+  return passes_one && moving_tracer_->occluded(position + kShadowOffset_m * direction_to_sun,
+                                                direction_to_sun, kMaxShadow_m);
 }
 
 }  // namespace vcharge

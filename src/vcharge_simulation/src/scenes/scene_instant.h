@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "rendering/ray_tracer.h"
 #include "vcharge_simulation/scenes/scene.h"
@@ -32,8 +33,11 @@ class SceneInstant {
   const uint32_t num_fixed_triangles_;
   TriangleMesh moving_;
   std::optional<RayTracer> moving_tracer_;
-  Eigen::Vector3f centre_ = Eigen::Vector3f::Zero();  // sphere around all movers
-  float radius_m_ = 0.0F;
+  struct Sphere {
+    Eigen::Vector3f centre;
+    float radius_m;
+  };
+  std::vector<Sphere> spheres_;  // around each mover
 };
 
 }  // namespace vcharge

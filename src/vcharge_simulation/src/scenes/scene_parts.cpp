@@ -156,35 +156,39 @@ const CarMaterials& SceneParts::carMaterials(int shape_index, int paint_index) {
   return car_materials_.emplace(key, car).first->second;
 }
 
+TriangleMesh SceneParts::carMesh(int shape, int paint, uint32_t seed) {
+  if (!plate_marker_) {
+    plate_marker_ = plain(SurfaceKind::kCar, 0.6);
+  }
+  const auto key = std::make_pair(shape, paint);
+  if (car_meshes_.count(key) == 0) {
+    CarMaterials materials = carMaterials(shape, paint);
+    materials.plate = *plate_marker_;
+    TriangleMesh mesh = makeCarMesh(carShapes()[static_cast<size_t>(shape)], materials, true);
+    bakeVertexAmbient(24, &mesh);
+    car_meshes_.emplace(key, std::move(mesh));
+  }
+  Random plate_random(seed);
+  std::string text = "BS ";
+  for (int i = 0; i < 5; ++i) {
+    text += i < 2 ? static_cast<char>('A' + plate_random.index(26))
+                  : static_cast<char>('0' + plate_random.index(10));
+  }
+  const uint32_t plate = textured(SurfaceKind::kCar, drawPlate(text), 400.0);
+  TriangleMesh mesh = car_meshes_.at(key);
+  for (MeshTriangle& triangle : mesh.triangles) {
+    triangle.material = triangle.material == *plate_marker_ ? plate : triangle.material;
+  }
+  return mesh;
+}
+
 void SceneParts::addCars(const std::vector<ParkedCar>& cars) {
-  const uint32_t plate_marker = plain(SurfaceKind::kCar, 0.6);
-  std::map<std::pair<int, int>, TriangleMesh> meshes;
   for (const ParkedCar& car : cars) {
     const CarShape& shape = carShapes()[static_cast<size_t>(car.shape)];
-    const auto key = std::make_pair(car.shape, car.paint);
-    if (meshes.count(key) == 0) {
-      CarMaterials materials = carMaterials(car.shape, car.paint);
-      materials.plate = plate_marker;
-      TriangleMesh mesh = makeCarMesh(shape, materials, true);
-      bakeVertexAmbient(24, &mesh);
-      meshes.emplace(key, std::move(mesh));
-    }
-    const size_t first = scene_->mesh.triangles.size();
-    scene_->mesh.append(meshes.at(key),
+    scene_->mesh.append(carMesh(car.shape, car.paint, car.seed),
                         placement(car.x, car.y, car.z, car.yaw_rad) *
                             Eigen::AngleAxisf(static_cast<float>(car.pitch_rad), Eigen::Vector3f::UnitY()) *
                             Eigen::AngleAxisf(static_cast<float>(car.roll_rad), Eigen::Vector3f::UnitX()));
-    Random plate_random(car.seed);
-    std::string text = "BS ";
-    for (int i = 0; i < 5; ++i) {
-      text += i < 2 ? static_cast<char>('A' + plate_random.index(26))
-                    : static_cast<char>('0' + plate_random.index(10));
-    }
-    const uint32_t plate = textured(SurfaceKind::kCar, drawPlate(text), 400.0);
-    for (size_t i = first; i < scene_->mesh.triangles.size(); ++i) {
-      uint32_t& material = scene_->mesh.triangles[i].material;
-      material = material == plate_marker ? plate : material;
-    }
     scene_->obstacles.push_back(
         {"car", orientedRectangle(car.x, car.y, car.yaw_rad, shape.rear(), shape.front(), 0.5 * shape.width),
          car.z, car.z + shape.height});

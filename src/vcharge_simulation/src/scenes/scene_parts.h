@@ -2,6 +2,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -45,6 +46,8 @@ class SceneParts {
   /// A raised area surrounded by kerb stones.
   void addIsland(const GroundRectangle& area, uint32_t ground, double base_z_m = 0.0);
   void addCars(const std::vector<ParkedCar>& cars);
+  /// Mesh of a car in its vehicle frame, with ambient light and a number plate of its own.
+  TriangleMesh carMesh(int shape, int paint, uint32_t seed);
   void addTrees(const std::vector<Tree>& trees, uint64_t seed);
   void addBushes(const std::vector<Bush>& bushes);
   void addHedges(const std::vector<Hedge>& hedges);
@@ -70,6 +73,8 @@ class SceneParts {
   std::vector<Wall> walls_;
   uint32_t concrete_ = 0, metal_ = 0, dark_metal_ = 0;
   std::map<std::pair<int, int>, CarMaterials> car_materials_;
+  std::map<std::pair<int, int>, TriangleMesh> car_meshes_;  // with plate_marker_ on the number plates
+  std::optional<uint32_t> plate_marker_;
 };
 
 }  // namespace vcharge

@@ -5,6 +5,7 @@
 
 #include "vcharge_core/base/options.h"
 #include "vcharge_simulation/faults/fault_options.h"
+#include "vcharge_simulation/scenes/mover_options.h"
 #include "vcharge_simulation/sensors/lens_blur.h"
 #include "vcharge_simulation/sensors/wheel_odometer.h"
 
@@ -40,6 +41,7 @@ struct DriveScenario {
   VCHARGE_OPTION(bool, noise, true, anyValue(), "Add sensor noise to the images.");
   VCHARGE_OPTION(std::vector<std::string>, cameras, {}, anyValue(),
                  "Cameras to record, by name; empty: all.");
+  VCHARGE_OPTION_GROUP(MoverOptions, movers, {}, "Objects that move through the scene.");
   VCHARGE_OPTION_GROUP(WheelOdometerOptions, odometer, {}, "Errors of the wheel odometer.");
   VCHARGE_OPTION_GROUP(LensOptions, lens, {}, "Blur of the lenses.");
   VCHARGE_OPTION_GROUP(FaultOptions, faults, {}, "Faults of sensors, wheels and suspension.");

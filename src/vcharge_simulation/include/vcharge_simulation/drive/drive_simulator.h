@@ -32,4 +32,7 @@ SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& 
                              uint64_t wheel_seed, const FaultOptions& faults = FaultOptions(),
                              const GroundHeight& ground_height = nullptr);
 
+/// True poses every 0.1 s, for SceneOptions::own_poses.
+std::vector<RigidTransform> ownPoses(const SimulatedDrive& drive);
+
 }  // namespace vcharge

@@ -26,9 +26,11 @@ TruthHeightMap computeHeightMap(const Renderer& renderer, double cell_size_m, do
 void writeHeightMap(const TruthHeightMap& map, const std::string& path_stem);
 /// Writes the obstacles as a YAML list of kind, base_z_m, top_z_m and footprint_m.
 void writeObstacles(const std::vector<Obstacle>& obstacles, const std::string& path);
-/// Writes the pose and footprint of every mover at every image: a YAML list of stamp_ns and, for each mover,
-/// name, kind, base_z_m, top_z_m, footprint_m, translation_m and rotation_xyzw (world_from_mover). `times_s`
-/// is the scene time at each stamp.
+/// Movers whose class is known, numbered from 1.
+std::vector<TrackedObject> trueObjects(const std::vector<Mover>& movers, double time_s);
+/// Writes every mover at every image: a YAML list of stamp_ns and, for each mover, name, kind, base_z_m,
+/// top_z_m, footprint_m, class, translation_m and rotation_xyzw (world_from_mover), velocity_m_per_s,
+/// height_m and is_standing. `times_s` is the scene time at each stamp.
 void writeMovers(const std::vector<Mover>& movers, const std::vector<Timestamp>& stamps,
                  const std::vector<double>& times_s, const std::string& path);
 

@@ -10,6 +10,7 @@
 #include <Eigen/Core>
 
 #include "vcharge_core/motion/rigid_transform.h"
+#include "vcharge_core/motion/tracked_object.h"
 #include "vcharge_simulation/rendering/mesh.h"
 #include "vcharge_simulation/rendering/sky.h"
 #include "vcharge_simulation/rendering/texture.h"
@@ -66,16 +67,18 @@ struct Obstacle {
 
 /// State of a mover at one time.
 struct MoverState {
-  TriangleMesh mesh;  ///< in the world frame; materials are the scene's
-  RigidTransform world_from_mover;
+  RigidTransform world_from_mover;  ///< people and vehicles: on the ground in their middle, x forwards
+  Eigen::Vector3d velocity_m_per_s = Eigen::Vector3d::Zero();  ///< of that origin, in the world frame
+  bool is_standing = false;
   Obstacle obstacle;  ///< footprint of the mover
 };
 
-/// An object that moves through the scene. `stateAt` computes its state from the time and must be thread
-/// safe.
+/// An object that moves through the scene. Both functions depend only on the time and must be thread safe.
 struct Mover {
   std::string name;
+  ObjectClass object_class = ObjectClass::kUnknown;
   std::function<MoverState(double time_s)> stateAt;
+  std::function<TriangleMesh(double time_s)> meshAt;  ///< in the world frame; materials are the scene's
 };
 
 /// A static world with movers. Metres, z up.

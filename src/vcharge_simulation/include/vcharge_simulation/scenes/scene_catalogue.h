@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "vcharge_simulation/scenes/mover_options.h"
 #include "vcharge_simulation/scenes/scene.h"
 #include "vcharge_simulation/vehicle/drive_path.h"
 #include "vcharge_simulation/vehicle/vehicle_motion.h"
@@ -21,6 +22,11 @@ struct SceneOptions {
   std::string board = "chessboard";
   std::string rig = "golf";
   uint64_t rig_seed = 1;
+  /// Movers of the scenes lot, garage, obstacles and road. They depend on the drive: `own_poses` are
+  /// world_from_vehicle every 0.1 s from the scene time `start_s` on (see ownPoses()).
+  MoverOptions movers;
+  std::vector<RigidTransform> own_poses;
+  double start_s = 0.0;
 };
 
 /// Kalibr target file of SceneOptions::board. Throws std::invalid_argument for an unknown board.
@@ -43,8 +49,8 @@ struct CatalogueEntry {
 std::vector<CatalogueEntry> listScenes();
 std::vector<CatalogueEntry> listDrives(const std::string& scene);
 
-/// Both throw std::invalid_argument that lists the known names for an unknown one. The same options give the
-/// same scene.
+/// Both throw std::invalid_argument that lists the known names for an unknown one, and if movers are wanted
+/// in a scene that has none. The same options give the same scene.
 std::shared_ptr<const Scene> buildScene(const std::string& name, const SceneOptions& options);
 DrivePlan planDrive(const std::string& scene, const std::string& drive);
 

@@ -26,21 +26,38 @@ struct Board {
   uint32_t front, back;  // indices of materials
 };
 
-MoverState boardAt(const Board& board, double time_s) {
-  constexpr double kThickness_m = 0.01;
+constexpr double kThickness_m = 0.01;
+
+Eigen::Vector3d cornerOf(const Board& board, const RigidTransform& world_from_sheet, double x, double y,
+                         double z_m) {
+  return world_from_sheet *
+         Eigen::Vector3d(0.5 * x * board.pattern.size_m.x(), 0.5 * y * board.pattern.size_m.y(), z_m);
+}
+
+TriangleMesh meshOf(const Board& board, double time_s) {
   const RigidTransform world_from_sheet = board.motion.worldFromSheet(time_s);
-  const Eigen::Vector2d half = 0.5 * board.pattern.size_m;
-  Eigen::AlignedBox3d box;
-  const auto corner = [&](double x, double y, double z) {
-    const Eigen::Vector3d position = world_from_sheet * Eigen::Vector3d(x * half.x(), y * half.y(), z);
-    box.extend(position);
-    return position.cast<float>().eval();
+  const auto corner = [&](double x, double y, double z_m) {
+    return cornerOf(board, world_from_sheet, x, y, z_m).cast<float>().eval();
   };
-  MoverState state;
+  TriangleMesh mesh;
   // The viewer is at negative z, and image rows grow with y.
-  addQuad(corner(-1, 1, 0), corner(1, 1, 0), corner(1, -1, 0), corner(-1, -1, 0), board.front, &state.mesh);
+  addQuad(corner(-1, 1, 0), corner(1, 1, 0), corner(1, -1, 0), corner(-1, -1, 0), board.front, &mesh);
   addQuad(corner(1, 1, kThickness_m), corner(-1, 1, kThickness_m), corner(-1, -1, kThickness_m),
-          corner(1, -1, kThickness_m), board.back, &state.mesh);
+          corner(1, -1, kThickness_m), board.back, &mesh);
+  return mesh;
+}
+
+MoverState boardAt(const Board& board, double time_s) {
+  const RigidTransform world_from_sheet = board.motion.worldFromSheet(time_s);
+  Eigen::AlignedBox3d box;
+  for (const double x : {-1.0, 1.0}) {
+    for (const double y : {-1.0, 1.0}) {
+      for (const double z_m : {0.0, kThickness_m}) {
+        box.extend(cornerOf(board, world_from_sheet, x, y, z_m));
+      }
+    }
+  }
+  MoverState state;
   state.world_from_mover = world_from_sheet * board.pattern.sheet_from_pattern;
   state.obstacle = {"board", cornersOf({box.min().x(), box.min().y(), box.max().x(), box.max().y()}),
                     box.min().z(), box.max().z()};
@@ -67,7 +84,9 @@ std::shared_ptr<const Scene> buildBoardScene(const SceneOptions& options) {
     const uint32_t front = parts->textured(SurfaceKind::kOther, pattern.image, pattern.texels_per_m);
     const uint32_t back = parts->plain(SurfaceKind::kOther, 0.3);
     const auto board = std::make_shared<const Board>(Board{pattern, motion, front, back});
-    parts->scene().movers.push_back({"board", [board](double time_s) { return boardAt(*board, time_s); }});
+    parts->scene().movers.push_back({"board", ObjectClass::kUnknown,
+                                     [board](double time_s) { return boardAt(*board, time_s); },
+                                     [board](double time_s) { return meshOf(*board, time_s); }});
   };
   return buildLotVariant(options, variant);
 }

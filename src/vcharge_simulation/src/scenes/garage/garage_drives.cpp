@@ -1,3 +1,4 @@
+#include "scenes/garage/garage_layout.h"
 #include "scenes/lane_paths.h"
 #include "scenes/scene_builders.h"
 
@@ -6,7 +7,7 @@ namespace vcharge {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr Lanes kLanes{26.0, 15.5, 5.0};
+constexpr Lanes kLanes = kGarageLanes;
 
 // Offsets from the loop: in the long lanes, mapping drives and drives of the other day are 2 m apart.
 const Eigen::Vector2d kMapped_m(0.24, 0.8);
@@ -43,6 +44,26 @@ std::vector<SceneDrive> garageDrives() {
           {{"figure_eight",
             "counter-clockwise around the northern rows, then clockwise around the southern ones"},
            figureEight},
+          {{"stop_and_go", "along the middle lane with five stops"},
+           [] {
+             return DrivePlan{"", stopAndGo(RigidTransform::planar(-19.0, -0.3, 0.02)), fromRestToRest()};
+           }},
+          {{"bay_backwards", "backwards into a bay and out of it forwards"},
+           [] {
+             return DrivePlan{"", visitBayBackwards(kFreeGarageBayX_m, -16.0), fromRestToRest(2.0)};
+           }},
+          {{"bay_forwards", "forwards into the space beside the last bay of a row and out of it backwards"},
+           [] {
+             return DrivePlan{"", visitSpaceForwards(27.5, -14.3, 5.5), fromRestToRest(2.0)};
+           }},
+          {{"three_point_turn", "a turn in three moves at the mouth of the middle lane"},
+           [] {
+             return DrivePlan{"", threePointTurn({26.6, 15.5, 5.0}), fromRestToRest(2.0)};
+           }},
+          {{"standing", "20 s at standstill"},
+           [] {
+             return DrivePlan{"", standingPath(RigidTransform::planar(-5.0, 0.2, 0.1)), standing(20.0)};
+           }},
           {{"short", "5 s of gentle curves in the middle lane"}, shortDrive}};
 }
 

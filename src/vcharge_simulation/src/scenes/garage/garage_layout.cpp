@@ -27,7 +27,10 @@ void addBays(GarageLayout* layout) {
     for (const double across : {kInnerBays_m, kOuterBays_m, kWallBays_m}) {
       const double yaw_rad = across == kOuterBays_m ? -side * kHalfPi : side * kHalfPi;
       for (int i = 0; i < kBaysPerRow; ++i) {
-        layout->bays.push_back({kFirstBay_m + (i + 0.5) * kBayWidth_m, side * across, yaw_rad, number++});
+        const double x = kFirstBay_m + (i + 0.5) * kBayWidth_m;
+        const bool keep_free =
+            side < 0.0 && across == kOuterBays_m && std::abs(x - kFreeGarageBayX_m) < 0.5 * kBayWidth_m;
+        layout->bays.push_back({x, side * across, yaw_rad, number++, keep_free});
       }
     }
   }

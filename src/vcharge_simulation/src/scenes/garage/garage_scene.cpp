@@ -6,6 +6,7 @@
 #include "scenes/garage/garage_fittings.h"
 #include "scenes/garage/garage_surfaces.h"
 #include "scenes/lot/lot_ground.h"
+#include "scenes/movers/scene_movers.h"
 #include "scenes/scene_builders.h"
 #include "scenes/scene_parts.h"
 
@@ -66,6 +67,7 @@ class GarageBuilder {
     light.gathered_rays = static_cast<int>(std::lround(24 * options_.detail));
     bakeLampLight(layout_.lamps, light, scene().min_m, scene().max_m, &scene());
     addCeilingReflection();
+    addMovers(options_, {kGarageArea, kGarageLanes, layout_.bays}, &parts_);
     return parts_.sharedScene();
   }
 

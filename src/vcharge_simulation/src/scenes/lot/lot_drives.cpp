@@ -11,14 +11,6 @@ namespace {
 const Eigen::Vector2d kMapped_m(-0.3, -1.1);
 const Eigen::Vector2d kOtherDay_m(0.9, 0.9);
 
-DrivePath stopAndGoPath() {
-  DrivePath path(RigidTransform::planar(-19.0, -0.3, 0.02), {{38.0, 0.0, 0.0}});
-  for (const double at_m : {5.0, 11.0, 14.0, 23.0, 31.0}) {
-    path.addStop({at_m, 1.5});
-  }
-  return path;
-}
-
 std::function<DrivePlan()> loop(const Eigen::Vector2d& outwards_m, bool clockwise, int day) {
   return [=] { return DrivePlan{"", Lanes().loop(outwards_m, clockwise), fromRestToRest(), day}; };
 }
@@ -29,12 +21,6 @@ std::function<DrivePlan()> straight(const RigidTransform& world_from_start, doub
     return DrivePlan{"", DrivePath(world_from_start, {{length_m, 0.0, 0.0}}),
                      fromRestToRest(cruise_speed_m_per_s)};
   };
-}
-
-DrivePlan standing() {
-  VehicleMotionOptions motion;
-  motion.standstill_s = motion.duration_s = 20.0;
-  return {"", DrivePath(RigidTransform::planar(-5.0, 0.2, 0.1), {{1.0, 0.0, 0.0}}), motion};
 }
 
 DrivePlan moving(const DrivePath& path, double duration_s) {
@@ -63,15 +49,30 @@ std::vector<SceneDrive> lotDrives() {
           {{"other_day_reverse_direction", "other_day_beside, clockwise"}, loop(kOtherDay_m, true, 1)},
           {{"stop_and_go", "along the middle lane with five stops"},
            [] {
-             return DrivePlan{"", stopAndGoPath(), fromRestToRest()};
+             return DrivePlan{"", stopAndGo(RigidTransform::planar(-19.0, -0.3, 0.02)), fromRestToRest()};
            }},
           {{"reverse_into_bay", "past a bay, then backwards into it"},
            [] {
              return DrivePlan{"", reverseIntoBay(kFreeBayX_m, -15.8, 12.0), fromRestToRest(1.2)};
            }},
+          {{"bay_backwards", "backwards into a bay and out of it forwards"},
+           [] {
+             return DrivePlan{"", visitBayBackwards(kFreeBayX_m, -15.8), fromRestToRest(2.0)};
+           }},
+          {{"bay_forwards", "forwards into the space beside the last bay of a row and out of it backwards"},
+           [] {
+             return DrivePlan{"", visitSpaceForwards(26.0, -13.7, 5.5), fromRestToRest(2.0)};
+           }},
+          {{"three_point_turn", "a turn in three moves at the mouth of the middle lane"},
+           [] {
+             return DrivePlan{"", threePointTurn(Lanes()), fromRestToRest(2.0)};
+           }},
           {{"straight", "46 m straight ahead at 4 m/s"},
            straight(RigidTransform::planar(-22.0, -15.0, 0.0), 46.0, 4.0)},
-          {{"standing", "20 s at standstill"}, standing},
+          {{"standing", "20 s at standstill"},
+           [] {
+             return DrivePlan{"", standingPath(RigidTransform::planar(-5.0, 0.2, 0.1)), standing(20.0)};
+           }},
           {{"approach", "straight towards the plants at the western border"},
            straight(RigidTransform::planar(-8.0, 0.0, 3.14159265358979323846), 15.0, 2.5)}};
 }

@@ -5,6 +5,7 @@
 #include "rendering/light_baker.h"
 #include "scenes/lot/lot_ground.h"
 #include "scenes/lot/lot_layout.h"
+#include "scenes/movers/scene_movers.h"
 #include "scenes/scene_builders.h"
 #include "scenes/scene_parts.h"
 
@@ -71,6 +72,7 @@ class LotBuilder {
           return layout_.groundHeight(x, y) + (variant_.ground_height ? variant_.ground_height(x, y) : 0.0);
         },
         &scene());
+    addMovers(options_, {kLotArea, Lanes(), layout_.bays}, &parts_);
     return parts_.sharedScene();
   }
 

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "vcharge_core/motion/rigid_transform.h"
+
+namespace vcharge {
+
+enum class ObjectClass : uint8_t { kUnknown, kAdult, kChild, kCar, kBicycle };
+
+/// "unknown", "adult", "child", "car" or "bicycle" (with its rider).
+std::string nameOf(ObjectClass object_class);
+
+/// An object that can move, at one time, in a frame with z up: the world for true objects, odom for tracked
+/// ones. Metres.
+struct TrackedObject {
+  uint32_t id = 0;  ///< the same as long as the object is followed
+  ObjectClass object_class = ObjectClass::kUnknown;
+  double class_probability = 1.0;
+  double existence_probability = 1.0;
+  RigidTransform frame_from_object;  ///< origin on the ground in the middle of the object, x forwards
+  Eigen::Vector3d velocity_m_per_s = Eigen::Vector3d::Zero();  ///< of the origin, along the frame's axes
+  bool is_standing = false;
+  /// Covariance of [position, velocity] along the frame's axes.
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  std::vector<Eigen::Vector2d> footprint_m;  ///< convex, counter-clockwise
+  double base_z_m = 0.0;                     ///< height of the footprint
+  double height_m = 0.0;
+};
+
+}  // namespace vcharge

@@ -1,0 +1,45 @@
+#include "vcharge_ros/object_conversions.h"
+
+#include "vcharge_ros/conversions.h"
+
+namespace vcharge {
+
+using Message = vcharge_msgs::TrackedObject;
+static_assert(static_cast<int>(ObjectClass::kUnknown) == static_cast<int>(Message::UNKNOWN) &&
+                  static_cast<int>(ObjectClass::kAdult) == static_cast<int>(Message::ADULT) &&
+                  static_cast<int>(ObjectClass::kChild) == static_cast<int>(Message::CHILD) &&
+                  static_cast<int>(ObjectClass::kCar) == static_cast<int>(Message::CAR) &&
+                  static_cast<int>(ObjectClass::kBicycle) == static_cast<int>(Message::BICYCLE),
+              "classes have the numbers of the message");
+
+vcharge_msgs::TrackedObjects toMessage(const std::vector<TrackedObject>& objects, Timestamp stamp,
+                                       const std::string& frame_id) {
+  vcharge_msgs::TrackedObjects list;
+  list.header.stamp = fromTimestamp(stamp);
+  list.header.frame_id = frame_id;
+  for (const TrackedObject& object : objects) {
+    Message message;
+    message.id = object.id;
+    message.object_class = static_cast<uint8_t>(object.object_class);
+    message.class_probability = object.class_probability;
+    message.existence_probability = object.existence_probability;
+    message.pose = toPoseMessage(object.frame_from_object);
+    message.velocity.x = object.velocity_m_per_s.x();
+    message.velocity.y = object.velocity_m_per_s.y();
+    message.velocity.z = object.velocity_m_per_s.z();
+    message.is_standing = object.is_standing ? 1 : 0;
+    Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(message.covariance.data()) = object.covariance;
+    for (const Eigen::Vector2d& corner : object.footprint_m) {
+      geometry_msgs::Point32 point;
+      point.x = static_cast<float>(corner.x());
+      point.y = static_cast<float>(corner.y());
+      point.z = static_cast<float>(object.base_z_m);
+      message.footprint.points.push_back(point);
+    }
+    message.height_m = object.height_m;
+    list.objects.push_back(message);
+  }
+  return list;
+}
+
+}  // namespace vcharge
