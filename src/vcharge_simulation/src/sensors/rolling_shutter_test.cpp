@@ -118,12 +118,16 @@ TEST(RollingShutterTest, WithoutReadoutTimeEveryRowIsSeenAtTheStamp) {
 TEST(RollingShutterTest, MoversMoveDuringTheReadout) {
   constexpr double kApproach_m_per_s = 10.0;
   const auto scene = wallScene();
-  scene->movers.push_back({"shield", [](double time_s) {
-                             MoverState state;
-                             const auto x = static_cast<float>(4.0 - kApproach_m_per_s * time_s);
-                             addQuad({x, -50, -50}, {x, 50, -50}, {x, 50, 50}, {x, -50, 50}, 0, &state.mesh);
-                             return state;
-                           }});
+  Mover shield;
+  shield.name = "shield";
+  shield.stateAt = [](double) { return MoverState(); };
+  shield.meshAt = [](double time_s) {
+    TriangleMesh mesh;
+    const auto x = static_cast<float>(4.0 - kApproach_m_per_s * time_s);
+    addQuad({x, -50, -50}, {x, 50, -50}, {x, 50, 50}, {x, -50, 50}, 0, &mesh);
+    return mesh;
+  };
+  scene->movers.push_back(shield);
   const Renderer renderer(scene);
   const CameraView view = pinholeView();
   constexpr double kTime_s = 0.1;
