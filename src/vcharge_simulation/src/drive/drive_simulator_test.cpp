@@ -98,10 +98,10 @@ TEST(DriveSimulatorTest, OdometryScalesWithTheWheelRadiusError) {
   const auto truth = std::find_if(drive.ground_truth.begin(), drive.ground_truth.end(),
                                   [&](const VehicleOdometry& each) { return each.stamp == last.stamp; });
   ASSERT_NE(truth, drive.ground_truth.end());
-  const double driven_m = (truth->odom_from_vehicle.translation() -
-                           drive.ground_truth.front().odom_from_vehicle.translation())
-                              .head<2>()
-                              .norm();
+  const double driven_m =
+      (truth->odom_from_vehicle.translation() - drive.ground_truth.front().odom_from_vehicle.translation())
+          .head<2>()
+          .norm();
   const double counted_m = last.odom_from_vehicle.translation().norm();
   // The drive starts at full speed, which the odometry learns in its first tenths of a second.
   EXPECT_NEAR(counted_m, 1.02 * driven_m, 3.0 * options.metres_per_tick);

@@ -31,8 +31,8 @@ struct CameraBodyMask {
   std::vector<std::string> remarks;  ///< reasons of the verdict
   cv::Mat mask;                      ///< CV_8UC1 of the camera's image size, 0 where the body is seen
   double body_fraction = 0.0;        ///< of the field of view
-  double spot_fraction = 0.0;  ///< of the field of view: other static edges (dirt); not in the mask
-  cv::Mat picture;             ///< CV_8UC3: mean image with the mask, static edges, moving structure
+  double spot_fraction = 0.0;        ///< of the field of view: other static edges (dirt); not in the mask
+  cv::Mat picture;                   ///< CV_8UC3: mean image with the mask, static edges, moving structure
 };
 
 /// Masks of a rig.

@@ -57,8 +57,8 @@ class WheelOdometer {
 /// The odometry that the camera driver publishes of these ticks, in the order of publication: at an image's
 /// stamp only the ticks received by then are known, so that its pose is extrapolated, and corrected under the
 /// same stamp once the ticks reach it. `ticks`: in order of reception, may begin before the recording, which
-/// begins at `start` with the identity. `triggers`: stamps of the images. At `reset` the odometer starts again
-/// at the identity.
+/// begins at `start` with the identity. `triggers`: stamps of the images. At `reset` the odometer starts
+/// again at the identity.
 std::vector<Received<VehicleOdometry>> causalOdometry(const std::vector<Received<WheelTicks>>& ticks,
                                                       const std::vector<Timestamp>& triggers, Timestamp start,
                                                       std::optional<Timestamp> reset,
