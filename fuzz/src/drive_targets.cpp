@@ -212,7 +212,7 @@ std::vector<FuzzTarget> driveTargets() {
       fileTarget("candump", "can.log", {"(46408.584954) can0 0B4#00000000\n(46408.6) can0 18FEF100#01\n"},
                  [](const std::string& path) { readCandump(path); }),
       fileTarget("dbc", "car.dbc",
-                 {"BO_ 170 A: 8 X\n SG_ P M : 0|2@1+ (1,0) [0|3] \"\" X\n"
+                 {"BO_ 170 A: 8 X\n SG_ P M : 56|2@1+ (1,0) [0|3] \"\" X\n"
                   " SG_ S m1 : 7|16@0- (0.01,-67.67) [0|250] \"km/h\" X\nSG_MUL_VAL_ 170 S P 1-1;\n"},
                  [](const std::string& path) {
                    const DbcFile dbc = DbcFile::read(path);

@@ -59,8 +59,7 @@ class CameraDriverNodelet : public Nodelet {
                                          options_.can, now);
       addDiagnostics(
           "/can", [this] { return reportCan(can_->status()); }, Threads::kSeveral);
-      threads_.emplace_back(
-          [this] { can_->run([this](const WheelMeasurement& wheels) { addWheels(wheels); }); });
+      threads_.emplace_back([this] { can_->run([this](const auto& wheels) { addWheels(wheels); }); });
     } else if (odometry_ && options_.source != FrameSourceKind::kBag) {
       subscribe<vcharge_msgs::WheelTicks>(topics_.wheel_ticks, 100,
                                           [this](const vcharge_msgs::WheelTicksConstPtr& message) {

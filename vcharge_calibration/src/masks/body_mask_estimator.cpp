@@ -151,7 +151,7 @@ void BodyMaskEstimator::addFrame(const ImageFrame& frame) {
   }
   samples_.push_back(std::move(sample));
   if (samples_.size() > kMaxSamples) {
-    for (size_t i = 0; 2 * i < samples_.size(); ++i) {
+    for (size_t i = 1; 2 * i < samples_.size(); ++i) {
       samples_[i] = std::move(samples_[2 * i]);
     }
     samples_.resize((samples_.size() + 1) / 2);

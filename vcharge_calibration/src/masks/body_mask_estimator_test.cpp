@@ -132,6 +132,16 @@ TEST(BodyMaskEstimatorTest, HidesTheBodyAndKeepsTheScene) {
   expectBodyHidden(masks);
 }
 
+TEST(BodyMaskEstimatorTest, ThinsOutTheSamplesOfALongDrive) {
+  DrawnDrive drive;
+  drive.speed_m_per_s = 8.0;
+  drive.num_images = static_cast<int>(BodyMaskEstimator::kMaxSamples) + 60;
+  const BodyMasks masks = drive.masks(drawBody);
+  EXPECT_LE(masks.num_samples, static_cast<int>(BodyMaskEstimator::kMaxSamples));
+  EXPECT_GT(masks.num_samples, static_cast<int>(BodyMaskEstimator::kMaxSamples) / 2);
+  expectBodyHidden(masks);
+}
+
 TEST(BodyMaskEstimatorTest, HidesPaintThatReflectsTheMovingScene) {
   expectBodyHidden(DrawnDrive().masks([](double /*heading_rad*/, cv::Mat* image) {
     cv::Mat mirrored;
