@@ -31,8 +31,11 @@ struct Options {
 class Truth {
  public:
   Truth(const std::string& folder, CameraRig rig)
-      : folder_(folder), rig_(std::move(rig)), movers_(readTruthMovers(folder + "/movers.yaml")) {
-    for (const StampedTransform& entry : readTrajectory(folder + "/trajectory.tum")) {
+      : folder_(folder),
+        rig_(std::move(rig)),
+        trajectory_(readTrajectory(folder + "/trajectory.tum")),
+        movers_(readTruthMovers(folder + "/movers.yaml")) {
+    for (const StampedTransform& entry : trajectory_) {
       poses_[entry.stamp] = entry.world_from_vehicle;
     }
     for (const RigCamera& camera : rig_.cameras) {
@@ -77,6 +80,7 @@ class Truth {
     }
     return all;
   }
+  const Trajectory& trajectory() const { return trajectory_; }
   const CameraRig& rig() const { return rig_; }
 
  private:
@@ -93,6 +97,7 @@ class Truth {
 
   const std::string folder_;
   const CameraRig rig_;
+  const Trajectory trajectory_;
   std::map<Timestamp, RigidTransform> poses_;
   std::map<Timestamp, std::vector<TruthObstacle>> movers_;
   std::vector<std::unique_ptr<RayTable>> rays_;
@@ -256,12 +261,10 @@ struct Arguments {
 
 nlohmann::json evaluate(const Arguments& arguments, const Options& options) {
   Truth truth(arguments.truth, readCameraRig(arguments.truth + "/rig.yaml"));
-  ObstacleMapEvaluator map_evaluator(readTruthObstacles(arguments.truth + "/obstacles.yaml"),
-                                     readTruthHeights(arguments.truth + "/height_map.yaml"), truth.path(),
-                                     options.map);
-  ApproachEvaluator approach_evaluator(readTruthObstacles(arguments.truth + "/obstacles.yaml"),
-                                       readTruthHeights(arguments.truth + "/height_map.yaml"),
-                                       readTrajectory(arguments.truth + "/trajectory.tum"), options.approach);
+  const std::vector<TruthObstacle> obstacles = readTruthObstacles(arguments.truth + "/obstacles.yaml");
+  const TruthHeights heights = readTruthHeights(arguments.truth + "/height_map.yaml");
+  ObstacleMapEvaluator map_evaluator(obstacles, heights, truth.path(), options.map);
+  ApproachEvaluator approach_evaluator(obstacles, heights, truth.trajectory(), options.approach);
   std::map<std::string, ObstacleScanEvaluator> scan_evaluators;
   const std::vector<Timestamp> stamps = listObstacles(arguments.obstacles);
   size_t judged = 0;

@@ -1,9 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "vcharge_core/base/options.h"
@@ -82,7 +82,7 @@ class ApproachEvaluator {
   cv::Mat highest_around_;
   std::vector<TruthObstacle> standing_;
   std::map<int, FirstReport> reports_;  // key: index of a standing obstacle, or -1 - index of a mover
-  std::map<std::pair<int64_t, int64_t>, bool> was_alarm_;  // cells of the fixed frame
+  std::map<int64_t, bool> was_alarm_;   // key: cell of the map's fixed frame
   std::optional<Timestamp> first_, last_;
   std::optional<Eigen::Vector2d> last_position_m_;
   ApproachErrors sums_;

@@ -4,20 +4,18 @@
 #include <cmath>
 #include <limits>
 
-#include <opencv2/imgproc.hpp>
+#include "obstacles/judged_map.h"
 
 namespace vcharge {
 namespace {
 
-// An obstacle is visible with this many points between these heights, and is reported by an occupied cell
-// within this distance.
-constexpr int kMinSeenPoints = 15;
-constexpr double kSeenHeight_m = 0.1;
-constexpr double kMaxHeight_m = 2.0;
-constexpr double kTolerance_m = 0.25;
-// Ground is open if nothing of this height stands within the allowed range error and the diagonal of a cell.
-constexpr float kOpenHeight_m = 0.08F;
-constexpr double kOpenRadius_m = 0.29;
+using internal::kMaxHeight_m;
+using internal::kMinSeenPoints;
+using internal::kOpenHeight_m;
+using internal::kOpenRadius_m;
+using internal::kSeenHeight_m;
+using internal::kTolerance_m;
+
 constexpr double kPathStep_m = 0.25;  // between footprints that make up the corridor
 constexpr double kStanding_m_per_s = 0.05;
 
@@ -34,32 +32,12 @@ double distanceBetween(const std::vector<Eigen::Vector2d>& a, const std::vector<
 
 }  // namespace
 
-struct ApproachEvaluator::Frame {
-  const ObstacleMap& map;
-  RigidTransform world_from_vehicle;
-  RigidTransform world_from_fixed;
+struct ApproachEvaluator::Frame : internal::JudgedMap {
+  using JudgedMap::JudgedMap;
+
   std::vector<Eigen::Vector2d> outline;
   double speed_m_per_s = 0.0;
   SeenCells seen;
-  std::vector<Eigen::Vector2d> occupied;  // in the world frame
-
-  Eigen::Vector2d worldOf(int column, int row) const {
-    const Eigen::Vector2d fixed = map.origin_m + map.cell_size_m * Eigen::Vector2d(column + 0.5, row + 0.5);
-    return (world_from_fixed * Eigen::Vector3d(fixed.x(), fixed.y(), 0.0)).head<2>();
-  }
-  bool sees(const TruthObstacle& obstacle) const {
-    int sum = 0;
-    for (const auto& [key, count] : seen.counts()) {
-      sum +=
-          distanceToPolygon(SeenCells::middleOf(key), obstacle.footprint_m) < SeenCells::kCell_m ? count : 0;
-    }
-    return sum >= kMinSeenPoints;
-  }
-  bool reports(const TruthObstacle& obstacle) const {
-    return std::any_of(occupied.begin(), occupied.end(), [&](const Eigen::Vector2d& cell) {
-      return distanceToPolygon(cell, obstacle.footprint_m) <= kTolerance_m;
-    });
-  }
 };
 
 /// Footprints of the vehicle on the next part of its path.
@@ -75,10 +53,7 @@ struct ApproachEvaluator::Corridor {
 ApproachEvaluator::ApproachEvaluator(const std::vector<TruthObstacle>& obstacles, const TruthHeights& heights,
                                      Trajectory path, const ApproachEvaluationOptions& options)
     : options_((options.validate(), options)), heights_(heights), path_(std::move(path)) {
-  cv::Mat known = heights.height_m.clone();
-  cv::patchNaNs(known, 0.0);
-  const int side = 2 * static_cast<int>(std::lround(kOpenRadius_m / heights.cell_size_m)) + 1;
-  cv::dilate(known, highest_around_, cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
+  highest_around_ = internal::highestWithin(heights, kOpenRadius_m);
   std::vector<std::vector<Eigen::Vector2d>> driven;
   std::optional<Eigen::Vector2d> last_m;
   for (const StampedTransform& pose : path_) {
@@ -115,9 +90,8 @@ void ApproachEvaluator::add(const ObstacleMap& map, const std::vector<SeenPoint>
                             const RigidTransform& world_from_vehicle,
                             const std::vector<TruthObstacle>& movers) {
   const Eigen::Vector2d position_m = world_from_vehicle.translation().head<2>();
-  const RigidTransform level =
-      RigidTransform::planar(position_m.x(), position_m.y(), yawOfRotation(world_from_vehicle.rotation()));
-  Frame frame{map, level, level * map.fixed_from_vehicle.inverse(), outline(level, 0.0), 0.0, {}, {}};
+  Frame frame(map, world_from_vehicle);
+  frame.outline = outline(frame.level, 0.0);
   if (last_ && map.stamp > *last_) {
     const double step_m = (position_m - *last_position_m_).norm();
     frame.speed_m_per_s = step_m / toSeconds(map.stamp - *last_);
@@ -129,13 +103,6 @@ void ApproachEvaluator::add(const ObstacleMap& map, const std::vector<SeenPoint>
   for (const SeenPoint& point : points) {
     if (point.world_m.z() >= kSeenHeight_m && point.world_m.z() <= kMaxHeight_m) {
       frame.seen.add(point.world_m.head<2>().cast<double>());
-    }
-  }
-  for (int row = 0; row < map.state.rows; ++row) {
-    for (int column = 0; column < map.state.cols; ++column) {
-      if (map.state.at<int8_t>(row, column) == kCellOccupied) {
-        frame.occupied.push_back(frame.worldOf(column, row));
-      }
     }
   }
   for (size_t i = 0; i < standing_.size(); ++i) {
@@ -151,7 +118,7 @@ void ApproachEvaluator::judgeObstacle(const Frame& frame, const TruthObstacle& o
   const double distance_m = distanceBetween(frame.outline, obstacle.footprint_m);
   auto found = reports_.find(key);
   if (found == reports_.end()) {
-    if (!frame.sees(obstacle)) {
+    if (internal::seenPointsOf(frame.seen, obstacle) < kMinSeenPoints) {
       return;
     }
     found = reports_.emplace(key, FirstReport{obstacle.kind, key < 0, distance_m, distance_m, {}, {}}).first;
@@ -176,7 +143,8 @@ std::optional<bool> ApproachEvaluator::truthAt(const Eigen::Vector2d& world_m,
   if (nearest_mover_m <= 0.0 || height_m >= static_cast<float>(options_.min_height_m)) {
     return true;
   }
-  if (nearest_mover_m <= kTolerance_m || !(heights_.at(highest_around_, world_m) < kOpenHeight_m)) {
+  if (nearest_mover_m <= kTolerance_m ||
+      !(heights_.at(highest_around_, world_m) < static_cast<float>(kOpenHeight_m))) {
     return std::nullopt;
   }
   return false;
@@ -199,36 +167,30 @@ void ApproachEvaluator::judgeCorridor(const Frame& frame, const std::vector<Trut
     }
   }
   const double reach_m = options_.corridor_m + options_.vehicle_front_m - options_.vehicle_rear_m;
-  const Eigen::Vector2d here_m = frame.world_from_vehicle.translation().head<2>();
-  for (int row = 0; row < frame.map.state.rows; ++row) {
-    for (int column = 0; column < frame.map.state.cols; ++column) {
-      const Eigen::Vector2d world_m = frame.worldOf(column, row);
-      if ((world_m - here_m).norm() > reach_m || distanceToPolygon(world_m, frame.outline) <= 0.0 ||
-          !corridor.contains(world_m)) {
-        continue;
-      }
-      const std::optional<bool> truth = truthAt(world_m, movers);
-      if (!truth) {
-        continue;
-      }
-      const int8_t state = frame.map.state.at<int8_t>(row, column);
-      CorridorCounts& counts = sums_.corridor;
-      size_t& count = *truth ? (state == kCellOccupied ? counts.occupied_as_occupied
-                                : state == kCellFree   ? counts.occupied_as_free
-                                                       : counts.occupied_as_unknown)
-                             : (state == kCellOccupied ? counts.free_as_occupied
-                                : state == kCellFree   ? counts.free_as_free
-                                                       : counts.free_as_unknown);
-      ++count;
-      const Eigen::Vector2d fixed_m =
-          frame.map.origin_m + frame.map.cell_size_m * Eigen::Vector2d(column, row);
-      bool& was_alarm = was_alarm_[{std::llround(fixed_m.x() / frame.map.cell_size_m),
-                                    std::llround(fixed_m.y() / frame.map.cell_size_m)}];
-      const bool is_alarm = !*truth && state == kCellOccupied;
-      sums_.num_false_alarms += is_alarm && !was_alarm ? 1 : 0;
-      was_alarm = is_alarm;
+  const Eigen::Vector2d here_m = frame.level.translation().head<2>();
+  frame.forEachCell([&](int column, int row, int8_t state) {
+    const Eigen::Vector2d world_m = frame.worldOf(column, row);
+    if ((world_m - here_m).norm() > reach_m || distanceToPolygon(world_m, frame.outline) <= 0.0 ||
+        !corridor.contains(world_m)) {
+      return;
     }
-  }
+    const std::optional<bool> truth = truthAt(world_m, movers);
+    if (!truth) {
+      return;
+    }
+    CorridorCounts& counts = sums_.corridor;
+    size_t& count = *truth ? (state == kCellOccupied ? counts.occupied_as_occupied
+                              : state == kCellFree   ? counts.occupied_as_free
+                                                     : counts.occupied_as_unknown)
+                           : (state == kCellOccupied ? counts.free_as_occupied
+                              : state == kCellFree   ? counts.free_as_free
+                                                     : counts.free_as_unknown);
+    ++count;
+    bool& was_alarm = was_alarm_[SeenCells::keyOf(frame.fixedOf(column, row))];
+    const bool is_alarm = !*truth && state == kCellOccupied;
+    sums_.num_false_alarms += is_alarm && !was_alarm ? 1 : 0;
+    was_alarm = is_alarm;
+  });
 }
 
 ApproachErrors ApproachEvaluator::errors() const {

@@ -6,27 +6,28 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "obstacles/judged_map.h"
 #include "vcharge_evaluation/travel_angle.h"
 
 namespace vcharge {
 namespace {
 
+using internal::kMaxHeight_m;
+using internal::kMinSeenPoints;
+using internal::kOpenHeight_m;
+using internal::kOpenRadius_m;
+using internal::kSeenHeight_m;
+using internal::kTolerance_m;
+using internal::OccupiedCell;
+
 // Distances of the vehicle's front axle and middle from its rear axle, and half its width.
 constexpr double kWheelbase_m = 2.6;
 constexpr double kMiddle_m = 1.4;
 constexpr double kHalfWidth_m = 0.9;
-// An obstacle is at least this wide. It is visible with this many points between these heights, must be
-// reported after this travel, and is reported by an occupied cell within this distance.
+// An obstacle is at least this wide, and must be reported after this travel.
 constexpr double kMinWidth_m = 0.1;
-constexpr int kMinSeenPoints = 15;
-constexpr double kSeenHeight_m = 0.1;
-constexpr double kMaxHeight_m = 2.0;
 constexpr double kGrace_m = 1.0;
-constexpr double kTolerance_m = 0.25;
-// Ground is open if nothing of this height stands within this distance: the allowed range error of 15 cm and
-// the diagonal of a cell. Cells further from the vehicle's middle are not judged.
-constexpr double kFalseHeight_m = 0.08;
-constexpr double kFalseRadius_m = 0.29;
+// Cells further from the vehicle's middle are not judged as false.
 constexpr double kFalseRange_m = 5.0;
 // A cell lies inside an obstacle if everything around it has this height.
 constexpr float kInsideHeight_m = 0.2F;
@@ -71,52 +72,14 @@ bool isNearAny(const std::vector<TruthObstacle>& obstacles, const Eigen::Vector2
   });
 }
 
-/// An occupied cell in the world frame.
-struct OccupiedCell {
-  Eigen::Vector2d world_m;
-  double height_m;
-};
-
 }  // namespace
 
-struct ObstacleMapEvaluator::Frame {
-  const ObstacleMap& map;
-  RigidTransform world_from_fixed;
-  Eigen::Vector2d vehicle_middle_m;
-  std::vector<OccupiedCell> occupied;
-  SeenCells seen_high, seen_low;  // visible surfaces off the direction of travel, within the view range
-  const std::vector<TruthObstacle>& movers;
-  const std::vector<TruthObstacle>& earlier_movers;
+struct ObstacleMapEvaluator::Frame : internal::JudgedMap {
+  using JudgedMap::JudgedMap;
 
-  /// Calls visit(column, row, state) for all cells.
-  template <class Visitor>
-  void forEachCell(Visitor&& visit) const {
-    for (int row = 0; row < map.state.rows; ++row) {
-      for (int column = 0; column < map.state.cols; ++column) {
-        visit(column, row, map.state.at<int8_t>(row, column));
-      }
-    }
-  }
-  Eigen::Vector2d fixedOf(int column, int row) const {
-    return map.origin_m + map.cell_size_m * Eigen::Vector2d(column + 0.5, row + 0.5);
-  }
-  Eigen::Vector2d worldOf(int column, int row) const {
-    const Eigen::Vector2d fixed = fixedOf(column, row);
-    return (world_from_fixed * Eigen::Vector3d(fixed.x(), fixed.y(), 0.0)).head<2>();
-  }
-  int seenPointsOf(const TruthObstacle& obstacle) const {
-    int sum = 0;
-    for (const auto& [key, count] : seen_high.counts()) {
-      sum +=
-          distanceToPolygon(SeenCells::middleOf(key), obstacle.footprint_m) < SeenCells::kCell_m ? count : 0;
-    }
-    return sum;
-  }
-  bool reports(const TruthObstacle& obstacle) const {
-    return std::any_of(occupied.begin(), occupied.end(), [&](const OccupiedCell& cell) {
-      return distanceToPolygon(cell.world_m, obstacle.footprint_m) <= kTolerance_m;
-    });
-  }
+  Eigen::Vector2d vehicle_middle_m;
+  SeenCells seen_high, seen_low;  // visible surfaces off the direction of travel, within the view range
+  std::vector<TruthObstacle> movers, earlier_movers;
 };
 
 ObstacleMapEvaluator::ObstacleMapEvaluator(const std::vector<TruthObstacle>& obstacles,
@@ -126,17 +89,11 @@ ObstacleMapEvaluator::ObstacleMapEvaluator(const std::vector<TruthObstacle>& obs
     : options_(options), heights_(heights) {
   options_.validate();
   const cv::Mat known = withoutNaN(heights.height_m);
-  const auto highestWithin = [&](double radius_m) {
-    const int side = 2 * static_cast<int>(std::lround(radius_m / heights.cell_size_m)) + 1;
-    cv::Mat highest;
-    cv::dilate(known, highest, cv::getStructuringElement(cv::MORPH_ELLIPSE, {side, side}));
-    return highest;
-  };
-  highest_around_ = highestWithin(kFalseRadius_m);
-  const cv::Mat highest_on_kerbs = highestWithin(kKerbWidth_m);
+  highest_around_ = internal::highestWithin(heights, kOpenRadius_m);
+  const cv::Mat highest_on_kerbs = internal::highestWithin(heights, kKerbWidth_m);
   cv::erode(known, lowest_around_, cv::getStructuringElement(cv::MORPH_RECT, {3, 3}));
   for (const TruthObstacle& obstacle : obstacles) {
-    if (obstacle.top_z_m >= kFalseHeight_m && obstacle.base_z_m < kMaxHeight_m) {
+    if (obstacle.top_z_m >= kOpenHeight_m && obstacle.base_z_m < kMaxHeight_m) {
       standing_.push_back(obstacle);
     }
     std::vector<Eigen::Vector2d> outline = obstacle.footprint_m;
@@ -191,26 +148,15 @@ void ObstacleMapEvaluator::add(const ObstacleMap& map, const std::vector<SeenPoi
   sums_.driven_m += last_position_m_ ? (position - *last_position_m_).norm() : 0.0;
   last_position_m_ = position;
   ++sums_.num_frames;
-  const RigidTransform level =
-      RigidTransform::planar(position.x(), position.y(), yawOfRotation(world_from_vehicle.rotation()));
-  Frame frame{map,
-              level * map.fixed_from_vehicle.inverse(),
-              (level * Eigen::Vector3d(kMiddle_m, 0.0, 0.0)).head<2>(),
-              {},
-              {},
-              {},
-              movers,
-              earlier_movers};
-  frame.forEachCell([&](int column, int row, int8_t state) {
-    if (state == kCellOccupied) {
-      frame.occupied.push_back({frame.worldOf(column, row), map.height_m.at<float>(row, column)});
-    }
-  });
+  Frame frame(map, world_from_vehicle);
+  frame.vehicle_middle_m = (frame.level * Eigen::Vector3d(kMiddle_m, 0.0, 0.0)).head<2>();
+  frame.movers = movers;
+  frame.earlier_movers = earlier_movers;
   for (const SeenPoint& point : points) {
     const Eigen::Vector2d point_m = point.world_m.head<2>().cast<double>();
     const double height_m = point.world_m.z();
     const double distance_m = (point_m - frame.vehicle_middle_m).norm();
-    if (height_m < kFalseHeight_m && distance_m <= kFalseRange_m) {
+    if (height_m < kOpenHeight_m && distance_m <= kFalseRange_m) {
       seen_ground_.add(point_m);
     }
     if (point.from_travel_rad < kMinAngleFromTravel_rad || distance_m > options_.view_range_m) {
@@ -232,7 +178,7 @@ void ObstacleMapEvaluator::add(const ObstacleMap& map, const std::vector<SeenPoi
 void ObstacleMapEvaluator::judgeObstacles(const Frame& frame) {
   for (Tracked& tracked : tracked_) {
     if (!isNear(tracked.obstacle, frame.vehicle_middle_m, options_.view_range_m + 1.0) ||
-        frame.seenPointsOf(tracked.obstacle) < kMinSeenPoints) {
+        internal::seenPointsOf(frame.seen_high, tracked.obstacle) < kMinSeenPoints) {
       continue;
     }
     if (!tracked.first_view_m) {
@@ -313,9 +259,9 @@ void ObstacleMapEvaluator::judgeCells(const Frame& frame) {
         free_inside_.insert(key);
       }
     } else if (state == kCellOccupied && !isNearAny(frame.earlier_movers, position, kTolerance_m) &&
-               !isNearAny(nearby, position, kFalseRadius_m) &&  // the height map may miss thin posts
+               !isNearAny(nearby, position, kOpenRadius_m) &&  // the height map may miss thin posts
 
-               heights_.at(highest_around_, position) < static_cast<float>(kFalseHeight_m)) {
+               heights_.at(highest_around_, position) < static_cast<float>(kOpenHeight_m)) {
       FalseCell& cell =
           false_cells_.try_emplace(fixed_key, FalseCell{position, frame.map.stamp}).first->second;
       ++cell.frames;
@@ -348,7 +294,7 @@ void ObstacleMapEvaluator::addFalseCellsTo(ObstacleMapErrors* errors) const {
 
 void ObstacleMapEvaluator::judgeMovers(const Frame& frame) {
   for (const TruthObstacle& mover : frame.movers) {
-    if (frame.seenPointsOf(mover) < kMinSeenPoints) {
+    if (internal::seenPointsOf(frame.seen_high, mover) < kMinSeenPoints) {
       continue;
     }
     ++sums_.num_mover_frames;
