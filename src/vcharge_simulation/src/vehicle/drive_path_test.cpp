@@ -1,4 +1,5 @@
 #include "vcharge_simulation/vehicle/drive_path.h"
+#include "vcharge_wheel_odometry/wheel_motion.h"
 
 #include <cmath>
 

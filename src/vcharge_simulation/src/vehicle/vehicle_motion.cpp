@@ -7,6 +7,7 @@
 
 #include "vcharge_core/base/error.h"
 #include "vcharge_simulation/rendering/noise.h"
+#include "vcharge_wheel_odometry/wheel_motion.h"
 
 namespace vcharge {
 

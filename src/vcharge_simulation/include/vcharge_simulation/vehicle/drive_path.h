@@ -8,10 +8,6 @@
 
 namespace vcharge {
 
-/// Motion of the centre of the rear axle over `distance_m` along a circular arc that turns by `turn_rad`
-/// (positive to the left), starting along x. Exact, also for straight lines.
-RigidTransform arcMotion(double distance_m, double turn_rad);
-
 /// A path with piecewise linear curvature in arc length: straight lines, circular arcs and clothoids, driven
 /// forwards or backwards. Arc length increases in both directions of travel.
 class DrivePath {

@@ -1,4 +1,5 @@
 #include "scenes/movers/ways/mover_path.h"
+#include "vcharge_wheel_odometry/wheel_motion.h"
 
 #include <algorithm>
 #include <utility>
