@@ -12,6 +12,7 @@ STAGES = {
     "obstacles": "obstacles",
     "faults": "faults",
     "odometry": "odometry",
+    "images": "images",
     "chain": "chain.cars",
     "latency": "live.latency",
     "soak": "live.soak",

@@ -37,3 +37,16 @@ def project(points, camera):
     """Pixels (N x 2) of points (N x 3) in the frame of a camera of rig.yaml. Points behind a pinhole camera are not valid."""
     unit = np.asarray(points, float) / np.linalg.norm(points, axis=1, keepdims=True)
     return MODELS[camera["model"]](unit, camera["intrinsics"])
+
+
+def unproject(pixels, camera):
+    """Unit rays (N x 3) of pixels (N x 2) of a Mei camera; NaN outside its image."""
+    mei = camera["intrinsics"]
+    seen = (np.asarray(pixels, float) - [mei["u0"], mei["v0"]]) / [mei["gamma1"], mei["gamma2"]]
+    plane = seen.copy()
+    for _ in range(100):  # fixed-point iteration: the distortion is a contraction inside the image circle
+        plane += seen - distorted(plane[:, 0], plane[:, 1], mei)
+    r = (plane ** 2).sum(1)
+    with np.errstate(invalid="ignore"):
+        scale = (mei["xi"] + np.sqrt(1 + (1 - mei["xi"] ** 2) * r)) / (r + 1)
+    return np.column_stack([scale[:, None] * plane, scale - mei["xi"]])
