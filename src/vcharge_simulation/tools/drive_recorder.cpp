@@ -159,6 +159,7 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   if (recording.images_from.empty()) {
     SceneOptions scene;
     scene.seed = static_cast<uint64_t>(scenario.scene_seed);
+    scene.surface_seed = static_cast<uint64_t>(scenario.surface_seed);
     scene.day = plan.day;
     scene.image_scale = scenario.image_scale;
     scene.board = scenario.board;

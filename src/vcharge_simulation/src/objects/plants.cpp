@@ -127,8 +127,9 @@ TriangleMesh makeTree(const PlantMaterials& materials, double leaf_m, double den
   return mesh;
 }
 
-TriangleMesh makeBush(const PlantMaterials& materials, double radius_m, double height_m, double density,
-                      uint64_t seed) {
+TriangleMesh makeBush(const PlantMaterials& materials, double radius_m, double height_m, double leaf_scale,
+                      double density, uint64_t seed) {
+  density /= leaf_scale * leaf_scale;
   Random random(seed);
   TriangleMesh mesh;
   const Eigen::Vector3d radii(radius_m, radius_m, 0.5 * height_m);
@@ -139,14 +140,15 @@ TriangleMesh makeBush(const PlantMaterials& materials, double radius_m, double h
     const Eigen::Vector3d direction = randomDirection(&random);
     const Eigen::Vector3d centre =
         Eigen::Vector3d(0.0, 0.0, 0.5 * height_m) + 0.5 * direction.cwiseProduct(radii);
-    addLeafBall(centre, 0.58 * radii, static_cast<int>(density * 380.0 * area), 0.075,
+    addLeafBall(centre, 0.58 * radii, static_cast<int>(density * 380.0 * area), 0.075 * leaf_scale,
                 std::clamp(0.7 + 0.3 * direction.z(), 0.3, 1.0), materials.leaves, &random, &mesh);
   }
   return mesh;
 }
 
-TriangleMesh makeHedge(const PlantMaterials& materials, const Eigen::Vector3d& size_m, double density,
-                       uint64_t seed) {
+TriangleMesh makeHedge(const PlantMaterials& materials, const Eigen::Vector3d& size_m, double leaf_scale,
+                       double density, uint64_t seed) {
+  density /= leaf_scale * leaf_scale;
   Random random(seed);
   TriangleMesh mesh;
   const Eigen::Vector3d half = 0.5 * size_m;
@@ -168,7 +170,7 @@ TriangleMesh makeHedge(const PlantMaterials& materials, const Eigen::Vector3d& s
                                        half.cwiseProduct(face.normal + random.uniform(-1.0, 1.0) * face.side +
                                                          random.uniform(-1.0, 1.0) * face.up) +
                                        depth * face.normal;
-      addLeaf(position, face.normal, 0.06 * random.uniform(0.7, 1.3),
+      addLeaf(position, face.normal, 0.06 * leaf_scale * random.uniform(0.7, 1.3),
               std::clamp(0.8 + 4.0 * depth, 0.25, 1.0), materials.leaves, &random, &mesh);
     }
   }

@@ -7,7 +7,6 @@ namespace vcharge {
 
 namespace {
 
-constexpr float kDetailContrast = 0.75F;
 // Coarser levels of the detail textures are uniform.
 constexpr float kMaxDetailLevel = 4.0F;
 
@@ -52,7 +51,8 @@ float SurfaceShader::detailFactor(const Eigen::Vector3f& position, float width_m
   for (const GroundTexture& detail : scene_.ground.details) {
     const float level = fastLog2(width_m * detail.texels_per_m);
     if (level < kMaxDetailLevel) {
-      factor *= 1.0F + kDetailContrast * (detail.sampleAt(position.x(), position.y(), level) - 0.5F);
+      factor *=
+          1.0F + scene_.ground.detail_contrast * (detail.sampleAt(position.x(), position.y(), level) - 0.5F);
     }
   }
   return factor;

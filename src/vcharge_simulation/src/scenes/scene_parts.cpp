@@ -41,8 +41,11 @@ std::vector<Eigen::Vector2d> cornersOf(const GroundRectangle& area) {
       {area.min_x, area.min_y}, {area.max_x, area.min_y}, {area.max_x, area.max_y}, {area.min_x, area.max_y}};
 }
 
-SceneParts::SceneParts(uint64_t random_seed, double foliage_density)
-    : foliage_density_(foliage_density), random_(random_seed), scene_(std::make_shared<Scene>()) {
+SceneParts::SceneParts(uint64_t random_seed, double foliage_density, const SurfaceVariety& surfaces)
+    : foliage_density_(foliage_density),
+      surfaces_(surfaces),
+      random_(random_seed),
+      scene_(std::make_shared<Scene>()) {
   addMaterials();
 }
 
@@ -61,7 +64,11 @@ uint32_t SceneParts::textured(SurfaceKind kind, const cv::Mat& image, double tex
   material.albedo = 1.0F;
   material.texels_per_m = static_cast<float>(texels_per_m);
   material.reflectivity = static_cast<float>(reflectivity);
-  return scene_->addTexturedMaterial(image, border, material);
+  cv::Mat faded = image;
+  if (kind == SurfaceKind::kBuilding || kind == SurfaceKind::kPole) {
+    surfaces_.fade(texels_per_m, &faded);
+  }
+  return scene_->addTexturedMaterial(faded, border, material);
 }
 
 cv::Mat SceneParts::noiseImage(int width, int height, double mean, double contrast, double scale_x,
@@ -198,7 +205,8 @@ void SceneParts::addCars(const std::vector<ParkedCar>& cars) {
 void SceneParts::addTrees(const std::vector<Tree>& trees, uint64_t seed) {
   std::vector<TriangleMesh> variants;
   for (int i = 0; i < kNumSmallTrees + kNumTallTrees; ++i) {
-    variants.push_back(makeTree(plants_, i < kNumSmallTrees ? kSmallTreeLeaf_m : kTallTreeLeaf_m,
+    variants.push_back(makeTree(plants_,
+                                surfaces_.leaf * (i < kNumSmallTrees ? kSmallTreeLeaf_m : kTallTreeLeaf_m),
                                 foliage_density_, seed * 50U + static_cast<uint64_t>(i)));
   }
   for (const Tree& tree : trees) {
@@ -215,8 +223,9 @@ void SceneParts::addTrees(const std::vector<Tree>& trees, uint64_t seed) {
 
 void SceneParts::addBushes(const std::vector<Bush>& bushes) {
   for (const Bush& bush : bushes) {
-    scene_->mesh.append(makeBush(plants_, bush.radius, bush.height, foliage_density_, bush.seed),
-                        placement(bush.x, bush.y, bush.z, 0.0));
+    scene_->mesh.append(
+        makeBush(plants_, bush.radius, bush.height, surfaces_.leaf, foliage_density_, bush.seed),
+        placement(bush.x, bush.y, bush.z, 0.0));
     scene_->obstacles.push_back(
         {"bush", circleAround(bush.x, bush.y, bush.radius), bush.z, bush.z + bush.height});
   }
@@ -226,7 +235,8 @@ void SceneParts::addHedges(const std::vector<Hedge>& hedges) {
   for (const Hedge& hedge : hedges) {
     const GroundRectangle& area = hedge.area;
     scene_->mesh.append(
-        makeHedge(plants_, {area.width(), area.depth(), hedge.height}, foliage_density_, random_.bits()),
+        makeHedge(plants_, {area.width(), area.depth(), hedge.height}, surfaces_.leaf, foliage_density_,
+                  random_.bits()),
         placement(0.5 * (area.min_x + area.max_x), 0.5 * (area.min_y + area.max_y), hedge.base_z, 0.0));
     scene_->obstacles.push_back({"hedge", cornersOf(area), hedge.base_z, hedge.base_z + hedge.height});
   }

@@ -9,6 +9,7 @@
 #include "objects/plants.h"
 #include "rendering/light_baker.h"
 #include "scenes/scene_things.h"
+#include "scenes/surface_variety.h"
 #include "vcharge_simulation/objects/car_model.h"
 #include "vcharge_simulation/rendering/noise.h"
 #include "vcharge_simulation/scenes/scene.h"
@@ -26,12 +27,13 @@ std::vector<Eigen::Vector2d> circleAround(double x, double y, double radius);
 class SceneParts {
  public:
   /// Creates an empty scene with the materials of plants, kerbs and metal. `foliage_density` scales the
-  /// number of leaves.
-  SceneParts(uint64_t random_seed, double foliage_density);
+  /// number of leaves. `surfaces` acts on what is added.
+  SceneParts(uint64_t random_seed, double foliage_density, const SurfaceVariety& surfaces = SurfaceVariety());
 
   Scene& scene() { return *scene_; }
   const std::shared_ptr<Scene>& sharedScene() const { return scene_; }
   Random& random() { return random_; }
+  const SurfaceVariety& surfaces() const { return surfaces_; }
   uint32_t metal() const { return metal_; }
   uint32_t darkMetal() const { return dark_metal_; }
   uint32_t concrete() const { return concrete_; }
@@ -67,6 +69,7 @@ class SceneParts {
   const CarMaterials& carMaterials(int shape_index, int paint_index);
 
   const double foliage_density_;
+  const SurfaceVariety surfaces_;
   Random random_;
   std::shared_ptr<Scene> scene_;
   PlantMaterials plants_{};

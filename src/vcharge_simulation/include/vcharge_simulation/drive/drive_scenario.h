@@ -30,6 +30,9 @@ struct DriveScenario {
   VCHARGE_OPTION(std::string, board, "chessboard", anyValue(),
                  "Board in the scene chessboard: chessboard or aprilgrid.");
   VCHARGE_OPTION(int, scene_seed, 1, notNegative(), "Seed of the scene.");
+  VCHARGE_OPTION(
+      int, surface_seed, 0, notNegative(),
+      "Seed of the contrast of ground, walls and signs, and of the size of leaves; 0: strong and smooth.");
   VCHARGE_OPTION(int, rig_seed, 1, notNegative(), "Seed of lenses and mountings.");
   VCHARGE_OPTION(int, seed, 1, notNegative(), "Seed of the road roughness, and by default of the sensors.");
   VCHARGE_OPTION(int, sensor_seed, -1, atLeast(-1), "Seed of wheels and image noise; -1: the same as seed.");

@@ -43,6 +43,7 @@ struct GroundLayers {
   std::vector<GroundTexture>
       layers;  ///< reflectance divided by kGroundLayerAlbedo; each layer covers the next one
   std::vector<GroundTexture> details;          ///< fine relief that modulates the layers; 0.5 is neutral
+  float detail_contrast = 0.75F;               ///< factor on the relief of the details
   std::unique_ptr<GroundTexture> sun;          ///< fraction of the sun that reaches the ground; null: all
   std::unique_ptr<GroundTexture> surrounding;  ///< fraction of the sky visible from the ground; null: all
 };

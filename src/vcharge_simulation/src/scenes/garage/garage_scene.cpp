@@ -47,7 +47,7 @@ class GarageBuilder {
       : options_(options),
         seed_(options.seed),
         layout_(makeGarageLayout(seed_, options.day)),
-        parts_(seed_ * 53U + 7U, 1.0) {}
+        parts_(seed_ * 53U + 7U, 1.0, SurfaceVariety::fromSeed(options.surface_seed)) {}
 
   std::shared_ptr<const Scene> build() {
     scene().sky = std::make_unique<Sky>(lampLight(), 1);
@@ -82,10 +82,11 @@ class GarageBuilder {
     floor.texture = 0;
     floor.reflectivity = kFloorReflectivity;
     const uint32_t material = scene().addMaterial(floor);
+    cv::Mat painted_floor = drawGarageFloor(layout_, texel_m, seed_);
+    parts_.surfaces().fade(1.0 / texel_m, &painted_floor);
     scene().ground.layers.push_back(
-        {Texture(drawGarageFloor(layout_, texel_m, seed_), Texture::Border::kClamp),
-         static_cast<float>(kGarageArea.min_x), static_cast<float>(kGarageArea.min_y),
-         static_cast<float>(1.0 / texel_m)});
+        {Texture(painted_floor, Texture::Border::kClamp), static_cast<float>(kGarageArea.min_x),
+         static_cast<float>(kGarageArea.min_y), static_cast<float>(1.0 / texel_m)});
     for (const double stretch : {1.0, 1.61803}) {
       scene().ground.details.push_back({Texture(drawGroundDetail(1024, seed_ + 40), Texture::Border::kRepeat),
                                         0.0F, 0.0F, static_cast<float>(1.0 / (kDetailTexel_m * stretch))});

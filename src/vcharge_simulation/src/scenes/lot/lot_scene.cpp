@@ -40,7 +40,7 @@ class LotBuilder {
       : options_(options),
         variant_(variant),
         layout_(variant.layout),
-        parts_(options.seed * 77U + 1U, options.detail) {}
+        parts_(options.seed * 77U + 1U, options.detail, SurfaceVariety::fromSeed(options.surface_seed)) {}
 
   std::shared_ptr<const Scene> build() {
     scene().sky = std::make_unique<Sky>(
@@ -94,10 +94,12 @@ class LotBuilder {
     const uint32_t near_ground = scene().addMaterial(ground);
     ground.texture = 1;
     const uint32_t far_ground = scene().addMaterial(ground);
-    scene().ground.layers.push_back(
-        {Texture(drawLotGround(layout_, texel_m, options_.seed), Texture::Border::kClamp),
-         static_cast<float>(kLotArea.min_x), static_cast<float>(kLotArea.min_y),
-         static_cast<float>(1.0 / texel_m)});
+    cv::Mat lot_ground = drawLotGround(layout_, texel_m, options_.seed);
+    parts_.surfaces().fade(1.0 / texel_m, &lot_ground);
+    scene().ground.detail_contrast *= static_cast<float>(parts_.surfaces().grain);
+    scene().ground.layers.push_back({Texture(lot_ground, Texture::Border::kClamp),
+                                     static_cast<float>(kLotArea.min_x), static_cast<float>(kLotArea.min_y),
+                                     static_cast<float>(1.0 / texel_m)});
     scene().ground.layers.push_back(
         {Texture(drawFarGround(-0.5 * kFarGround_m, kFarGround_m, kFarTexel_m, options_.seed),
                  Texture::Border::kClamp),
