@@ -33,7 +33,7 @@ constexpr double kHeightLimit_m = 2.5;
 constexpr double kLampSize_m = 0.3;
 
 DrivePlan planDriveOf(const DriveScenario& scenario) {
-  DrivePlan plan = planDrive(scenario.scene, scenario.drive);
+  DrivePlan plan = planDrive(scenario.scene, scenario.drive, static_cast<uint64_t>(scenario.layout_seed));
   if (scenario.duration_s > 0.0) {
     plan.motion.duration_s = scenario.duration_s;
   }
@@ -159,6 +159,7 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   if (recording.images_from.empty()) {
     SceneOptions scene;
     scene.seed = static_cast<uint64_t>(scenario.scene_seed);
+    scene.layout_seed = static_cast<uint64_t>(scenario.layout_seed);
     scene.surface_seed = static_cast<uint64_t>(scenario.surface_seed);
     scene.day = plan.day;
     scene.image_scale = scenario.image_scale;

@@ -18,12 +18,12 @@ struct SceneDrive {
 /// An outdoor parking lot of 80 x 60 m: lanes of asphalt and cobbles around two double rows of bays, parked
 /// cars, trees, hedges, kerbs, posts and fences, with houses around it.
 std::shared_ptr<const Scene> buildLotScene(const SceneOptions& options);
-std::vector<SceneDrive> lotDrives();
+std::vector<SceneDrive> lotDrives(uint64_t layout_seed);
 
 /// An underground garage of 64 x 47 m, lit by lamps: lanes around rows of bays between numbered pillars,
 /// parked cars, beams and pipes.
 std::shared_ptr<const Scene> buildGarageScene(const SceneOptions& options);
-std::vector<SceneDrive> garageDrives();
+std::vector<SceneDrive> garageDrives(uint64_t layout_seed);
 
 /// A straight road of 400 m with kerbs, pavements, parked cars and houses, then speed bumps and a slope.
 std::shared_ptr<const Scene> buildRoadScene(const SceneOptions& options);

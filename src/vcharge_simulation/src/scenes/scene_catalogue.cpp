@@ -13,28 +13,33 @@ namespace {
 struct CatalogueScene {
   CatalogueEntry entry;
   std::shared_ptr<const Scene> (*build)(const SceneOptions&);
-  std::vector<SceneDrive> (*drives)();
-  bool has_movers = false;  ///< knows SceneOptions::movers
+  std::function<std::vector<SceneDrive>(uint64_t layout_seed)> drives;
+  bool has_movers = false;   ///< knows SceneOptions::movers
+  bool has_layouts = false;  ///< knows SceneOptions::layout_seed
 };
 
 const std::vector<CatalogueScene>& catalogue() {
   static const std::vector<CatalogueScene> scenes = {
-      {{"lot", "sunlit parking lot of 80 x 60 m"}, buildLotScene, lotDrives, true},
-      {{"garage", "underground garage of 64 x 47 m, lit by lamps"}, buildGarageScene, garageDrives, true},
+      {{"lot", "sunlit parking lot of 80 x 60 m"}, buildLotScene, lotDrives, true, true},
+      {{"garage", "underground garage of 64 x 47 m, lit by lamps"},
+       buildGarageScene,
+       garageDrives,
+       true,
+       true},
       {{"obstacles", "posts, boxes, kerbs, a trailer and two people on the lot"},
        buildCourseScene,
-       courseDrives,
+       [](uint64_t) { return courseDrives(); },
        true},
       {{"two_levels", "lot on two levels with ramps of 6 degrees and uneven ground"},
        buildTwoLevelsScene,
-       twoLevelsDrives},
+       [](uint64_t) { return twoLevelsDrives(); }},
       {{"road", "straight road with parked cars and houses, then speed bumps and a slope of 5 %"},
        buildRoadScene,
-       roadDrives,
+       [](uint64_t) { return roadDrives(); },
        true},
       {{"chessboard", "chessboard or AprilGrid (--board) in front of each camera in turn, on the lot"},
        buildBoardScene,
-       boardDrives}};
+       [](uint64_t) { return boardDrives(); }}};
   return scenes;
 }
 
@@ -53,6 +58,12 @@ std::string namesOf(const std::vector<CatalogueEntry>& entries) {
     names += (names.empty() ? "" : ", ") + entry.name;
   }
   return names;
+}
+
+void checkLayout(const CatalogueScene& scene, uint64_t layout_seed) {
+  if (layout_seed != 0 && !scene.has_layouts) {
+    throw std::invalid_argument("layout_seed: the scene " + scene.entry.name + " has one layout, 0");
+  }
 }
 
 const CatalogueScene& findScene(const std::string& name) {
@@ -75,7 +86,7 @@ std::vector<CatalogueEntry> listScenes() {
 }
 
 std::vector<CatalogueEntry> listDrives(const std::string& scene) {
-  return entriesOf(findScene(scene).drives());
+  return entriesOf(findScene(scene).drives(0));
 }
 
 std::shared_ptr<const Scene> buildScene(const std::string& name, const SceneOptions& options) {
@@ -85,11 +96,13 @@ std::shared_ptr<const Scene> buildScene(const std::string& name, const SceneOpti
   if (options.movers.hasAny() && !scene.has_movers) {
     throw std::invalid_argument("movers: the scene " + name + " has none");
   }
+  checkLayout(scene, options.layout_seed);
   return scene.build(options);
 }
 
-DrivePlan planDrive(const std::string& scene, const std::string& drive) {
-  for (const SceneDrive& known : findScene(scene).drives()) {
+DrivePlan planDrive(const std::string& scene, const std::string& drive, uint64_t layout_seed) {
+  checkLayout(findScene(scene), layout_seed);
+  for (const SceneDrive& known : findScene(scene).drives(layout_seed)) {
     if (known.entry.name == drive) {
       DrivePlan plan = known.plan();
       plan.name = drive;

@@ -111,10 +111,11 @@ void SceneParts::addLevel(const GroundRectangle& area, double z, uint32_t materi
           corner(area.min_x, area.max_y), material, &scene_->mesh);
 }
 
-void SceneParts::addIsland(const GroundRectangle& area, uint32_t ground, double base_z_m) {
-  addLevel(area, base_z_m + kKerbHeight_m, ground);
+void SceneParts::addIsland(const GroundRectangle& area, uint32_t ground, double base_z_m, const Kerb& kerb) {
+  addLevel(area, base_z_m + kerb.height_m, ground);
   constexpr double kStone_m = 1.0;
   constexpr double kKerbWidth_m = 0.14;
+  constexpr float kBevel_m = 0.08F;
   const std::vector<Eigen::Vector2d> outline = cornersOf(area);
   for (size_t i = 0; i < outline.size(); ++i) {
     const Eigen::Vector2d& from = outline[i];
@@ -125,20 +126,25 @@ void SceneParts::addIsland(const GroundRectangle& area, uint32_t ground, double 
     for (int k = 0; k < stones; ++k) {
       const Eigen::Vector2d middle = from + edge * ((k + 0.5) / stones);
       const Eigen::Isometry3f pose =
-          placement(middle.x(), middle.y(), base_z_m + (0.5 * kKerbHeight_m + random_.uniform(-0.004, 0.004)),
+          placement(middle.x(), middle.y(), base_z_m + (0.5 * kerb.height_m + random_.uniform(-0.004, 0.004)),
                     yaw) *
           placement(0.0, 0.5 * kKerbWidth_m, 0.0, 0.0);
       const size_t first = scene_->mesh.vertices.size();
-      addBox(pose, Eigen::Vector3d(length - 0.01, kKerbWidth_m, kKerbHeight_m + 0.012).cast<float>(),
+      addBox(pose, Eigen::Vector3d(length - 0.01, kKerbWidth_m, kerb.height_m + 0.012).cast<float>(),
              concrete_, &scene_->mesh);
       // Each stone shows a different part of the texture.
       const auto shift = static_cast<float>(random_.uniform(0.0, 0.8));
       for (size_t v = first; v < scene_->mesh.vertices.size(); ++v) {
-        scene_->mesh.vertices[v].u = shift + 0.2F * scene_->mesh.vertices[v].u;
+        MeshVertex& vertex = scene_->mesh.vertices[v];
+        vertex.u = shift + 0.2F * vertex.u;
+        const Eigen::Vector3f in_stone = pose.inverse() * vertex.position;
+        if (kerb.is_bevelled && in_stone.y() < 0.0F && in_stone.z() > 0.0F) {
+          vertex.position = pose * (in_stone + Eigen::Vector3f(0.0F, kBevel_m, 0.0F));
+        }
       }
     }
   }
-  scene_->obstacles.push_back({"kerb", cornersOf(area), base_z_m, base_z_m + kKerbHeight_m});
+  scene_->obstacles.push_back({"kerb", cornersOf(area), base_z_m, base_z_m + kerb.height_m});
 }
 
 const CarMaterials& SceneParts::carMaterials(int shape_index, int paint_index) {
@@ -242,7 +248,7 @@ void SceneParts::addHedges(const std::vector<Hedge>& hedges) {
   }
 }
 
-void SceneParts::addGrassAlong(const GroundRectangle& area, double base_z_m) {
+void SceneParts::addGrassAlong(const GroundRectangle& area, double base_z_m, const Kerb& kerb) {
   const double perimeter = 2.0 * (area.width() + area.depth());
   const int tufts = static_cast<int>(foliage_density_ * perimeter * 0.9);
   for (int i = 0; i < tufts; ++i) {
@@ -252,7 +258,7 @@ void SceneParts::addGrassAlong(const GroundRectangle& area, double base_z_m) {
     double y = random_.uniform(area.min_y + 0.2, area.max_y - 0.2);
     (along_x ? y : x) = random_.chance(0.5) ? (along_x ? area.min_y : area.min_x) + inset
                                             : (along_x ? area.max_y : area.max_x) - inset;
-    addGrassTuft(Eigen::Vector3d(x, y, base_z_m + kKerbHeight_m).cast<float>(), random_.uniform(0.08, 0.25),
+    addGrassTuft(Eigen::Vector3d(x, y, base_z_m + kerb.height_m).cast<float>(), random_.uniform(0.08, 0.25),
                  24, plants_.leaves, random_.bits(), &scene_->mesh);
   }
 }

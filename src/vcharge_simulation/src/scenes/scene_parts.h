@@ -46,7 +46,8 @@ class SceneParts {
 
   void addLevel(const GroundRectangle& area, double z, uint32_t material);
   /// A raised area surrounded by kerb stones.
-  void addIsland(const GroundRectangle& area, uint32_t ground, double base_z_m = 0.0);
+  void addIsland(const GroundRectangle& area, uint32_t ground, double base_z_m = 0.0,
+                 const Kerb& kerb = Kerb());
   void addCars(const std::vector<ParkedCar>& cars);
   /// Mesh of a car in its vehicle frame, with ambient light and a number plate of its own.
   TriangleMesh carMesh(int shape, int paint, uint32_t seed);
@@ -54,7 +55,7 @@ class SceneParts {
   void addBushes(const std::vector<Bush>& bushes);
   void addHedges(const std::vector<Hedge>& hedges);
   /// Tufts of grass along the edge of a raised area.
-  void addGrassAlong(const GroundRectangle& area, double base_z_m = 0.0);
+  void addGrassAlong(const GroundRectangle& area, double base_z_m = 0.0, const Kerb& kerb = Kerb());
   void addHouses(const std::vector<Building>& houses);
   void addPoles(const std::vector<Pole>& poles);
   void addBins(const std::vector<Bin>& bins);

@@ -160,6 +160,51 @@ TEST(CatalogueTest, DrivesOfTheLotKeepClearOfParkedCarsForEverySeed) {
   }
 }
 
+class LayoutTest : public testing::TestWithParam<const char*> {
+ protected:
+  static SceneOptions optionsOf(uint64_t layout_seed) {
+    SceneOptions options;
+    options.seed = options.layout_seed = layout_seed;
+    options.image_scale = 0.02;
+    options.detail = 0.02;
+    return options;
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Scenes, LayoutTest, testing::Values("lot", "garage"));
+
+TEST_P(LayoutTest, DrivesKeepClearOfAllThatStandsInEveryDrawnLayout) {
+  for (uint64_t layout_seed = 1; layout_seed <= 20; ++layout_seed) {
+    SceneOptions options = optionsOf(layout_seed);
+    for (const int day : {0, 1}) {
+      options.day = day;
+      const std::shared_ptr<const Scene> scene = buildScene(GetParam(), options);
+      for (const CatalogueEntry& entry : listDrives(GetParam())) {
+        const DrivePlan plan = planDrive(GetParam(), entry.name, layout_seed);
+        if (plan.day == day) {
+          EXPECT_THAT(touchedOn(plan, scene->obstacles), testing::IsEmpty())
+              << entry.name << ", layout " << layout_seed;
+        }
+      }
+    }
+  }
+}
+
+TEST_P(LayoutTest, MoversFindTheirWaysInEveryDrawnLayout) {
+  for (uint64_t layout_seed = 1; layout_seed <= 20; ++layout_seed) {
+    SceneOptions options = optionsOf(layout_seed);
+    options.movers.people = 2;
+    options.movers.cars = 2;
+    const DrivePlan plan = planDrive(GetParam(), "stop_and_go", layout_seed);
+    options.own_poses = ownPoses(simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1,
+                                               FaultOptions(), plan.ground_height));
+    EXPECT_GE(buildScene(GetParam(), options)->movers.size(), 3U) << "layout " << layout_seed;
+  }
+}
+
+TEST(LayoutSeedTest, IsRefusedByScenesWithOneLayout) {
+  EXPECT_THROW(planDrive("road", "bumps", 1), std::invalid_argument);
+}
+
 TEST(SlopeTest, ParkedCarsStandOnTheGroundWithAllFourWheels) {
   const Scene& scene = rendererOf("two_levels").scene();
   std::set<uint32_t> of_cars;

@@ -15,6 +15,12 @@ struct GroundRectangle {
 
 inline constexpr double kKerbHeight_m = 0.12;
 
+/// Edge stones of raised areas.
+struct Kerb {
+  double height_m = kKerbHeight_m;
+  bool is_bevelled = false;
+};
+
 // Values of Tree::variant below kNumSmallTrees are small trees, the others tall ones.
 constexpr int kNumSmallTrees = 4;
 constexpr int kNumTallTrees = 3;
@@ -54,6 +60,11 @@ struct Pole {
 };
 struct Bin {
   double x, y, z, yaw_rad;
+};
+/// A plastered wall that stands alone.
+struct GardenWall {
+  GroundRectangle area;
+  double height;
 };
 struct Fence {
   double x0, y0, x1, y1, z;

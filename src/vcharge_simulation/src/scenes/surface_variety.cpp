@@ -14,7 +14,7 @@ SurfaceVariety SurfaceVariety::fromSeed(uint64_t seed) {
   if (seed != 0) {
     Random random(seed * 7717U + 19U);
     // The middle of each range is near what the published V-Charge images of a street show.
-    variety.grain = 1.8 * std::pow(2.2, random.uniform());
+    variety.grain = 1.4 * std::pow(2.0, random.uniform());
     variety.pattern = random.uniform(0.35, 0.9);
     variety.leaf = random.uniform(0.45, 0.75);
   }

@@ -31,6 +31,9 @@ struct DriveScenario {
                  "Board in the scene chessboard: chessboard or aprilgrid.");
   VCHARGE_OPTION(int, scene_seed, 1, notNegative(), "Seed of the scene.");
   VCHARGE_OPTION(
+      int, layout_seed, 0, notNegative(),
+      "Seed of the plan of lot or garage: bays, aisles, kerbs, walls, pillars; 0: the known plan.");
+  VCHARGE_OPTION(
       int, surface_seed, 0, notNegative(),
       "Seed of the contrast of ground, walls and signs, and of the size of leaves; 0: strong and smooth.");
   VCHARGE_OPTION(int, rig_seed, 1, notNegative(), "Seed of lenses and mountings.");

@@ -52,8 +52,9 @@ std::vector<CatalogueEntry> listScenes();
 std::vector<CatalogueEntry> listDrives(const std::string& scene);
 
 /// Both throw std::invalid_argument that lists the known names for an unknown one, and if movers are wanted
-/// in a scene that has none. The same options give the same scene.
+/// in a scene that has none, or a
+/// layout in a scene that has a single one. The same options give the same scene.
 std::shared_ptr<const Scene> buildScene(const std::string& name, const SceneOptions& options);
-DrivePlan planDrive(const std::string& scene, const std::string& drive);
+DrivePlan planDrive(const std::string& scene, const std::string& drive, uint64_t layout_seed = 0);
 
 }  // namespace vcharge

@@ -7,20 +7,19 @@ namespace vcharge {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr Lanes kLanes = kGarageLanes;
-
 // Offsets from the loop: in the long lanes, mapping drives and drives of the other day are 2 m apart.
 const Eigen::Vector2d kMapped_m(0.24, 0.8);
 const Eigen::Vector2d kOtherDay_m(-0.36, -1.2);
 
-std::function<DrivePlan()> loop(const Eigen::Vector2d& outwards_m, bool clockwise, int day) {
-  return [=] { return DrivePlan{"", kLanes.loop(outwards_m, clockwise), fromRestToRest(), day}; };
+std::function<DrivePlan()> loop(const GaragePlan& plan, const Eigen::Vector2d& outwards_m, bool clockwise,
+                                int day) {
+  return [=] { return DrivePlan{"", plan.lanes.loop(outwards_m, clockwise), fromRestToRest(), day}; };
 }
 
-DrivePlan figureEight() {
+DrivePlan figureEight(const GaragePlan& plan) {
   VehicleMotionOptions motion = fromRestToRest();
   motion.standstill_s = 0.0;
-  return {"", kLanes.figureEight(), motion};
+  return {"", plan.lanes.figureEight(), motion};
 }
 
 DrivePlan shortDrive() {
@@ -31,37 +30,42 @@ DrivePlan shortDrive() {
 
 }  // namespace
 
-std::vector<SceneDrive> garageDrives() {
-  return {{{"loop", "around all rows of bays, back to the start"}, loop(kMapped_m, false, 0)},
-          {{"loop_reverse_direction", "the loop, clockwise"}, loop(kMapped_m, true, 0)},
+std::vector<SceneDrive> garageDrives(uint64_t layout_seed) {
+  const GaragePlan plan = GaragePlan::fromSeed(layout_seed);
+  return {{{"loop", "around all rows of bays, back to the start"}, loop(plan, kMapped_m, false, 0)},
+          {{"loop_reverse_direction", "the loop, clockwise"}, loop(plan, kMapped_m, true, 0)},
           {{"both_directions", "175 s through all lanes in both directions, for mapping"},
-           [] {
-             return DrivePlan{"", kLanes.bothDirections(kMapped_m), fromRestToRest()};
+           [plan] {
+             return DrivePlan{"", plan.lanes.bothDirections(kMapped_m), fromRestToRest()};
            }},
           {{"other_day", "2 m beside the loop on another day, with moved cars and other lamps"},
-           loop(kOtherDay_m, false, 1)},
-          {{"other_day_reverse_direction", "other_day, clockwise"}, loop(kOtherDay_m, true, 1)},
+           loop(plan, kOtherDay_m, false, 1)},
+          {{"other_day_reverse_direction", "other_day, clockwise"}, loop(plan, kOtherDay_m, true, 1)},
           {{"figure_eight",
             "counter-clockwise around the northern rows, then clockwise around the southern ones"},
-           figureEight},
+           [plan] { return figureEight(plan); }},
           {{"stop_and_go", "along the middle lane with five stops"},
-           [] {
+           [plan] {
              return DrivePlan{"", stopAndGo(RigidTransform::planar(-19.0, -0.3, 0.02)), fromRestToRest()};
            }},
           {{"bay_backwards", "backwards into a bay and out of it forwards"},
-           [] {
-             return DrivePlan{"", visitBayBackwards(kFreeGarageBayX_m, -16.0), fromRestToRest(2.0)};
+           [plan] {
+             return DrivePlan{"", visitBayBackwards(plan.free_bay_x_m, -plan.lanes.y_m - 0.5),
+                              fromRestToRest(2.0)};
            }},
           {{"bay_forwards", "forwards into the space beside the last bay of a row and out of it backwards"},
-           [] {
-             return DrivePlan{"", visitSpaceForwards(27.5, -14.3, 5.5), fromRestToRest(2.0)};
+           [plan] {
+             return DrivePlan{"", visitSpaceForwards(plan.lanes.x_m + 1.5, 1.2 - plan.lanes.y_m, 5.5),
+                              fromRestToRest(2.0)};
            }},
           {{"three_point_turn", "a turn in three moves at the mouth of the middle lane"},
-           [] {
-             return DrivePlan{"", threePointTurn({26.6, 15.5, 5.0}), fromRestToRest(2.0)};
+           [plan] {
+             return DrivePlan{
+                 "", threePointTurn({plan.lanes.x_m + 0.6, plan.lanes.y_m, plan.lanes.corner_radius_m}),
+                 fromRestToRest(2.0)};
            }},
           {{"standing", "20 s at standstill"},
-           [] {
+           [plan] {
              return DrivePlan{"", standingPath(RigidTransform::planar(-5.0, 0.2, 0.1)), standing(20.0)};
            }},
           {{"short", "5 s of gentle curves in the middle lane"}, shortDrive}};

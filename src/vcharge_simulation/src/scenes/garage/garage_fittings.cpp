@@ -17,6 +17,7 @@ constexpr double kStopToEnd_m = 0.38;  // distance to the end of the bay
 constexpr double kBoardHeight_m = 0.28;
 constexpr double kBoardWidth_m = 1.7;
 constexpr double kTexelsPerM = 150.0;
+constexpr double kLowestForBoards_m = 2.5;
 constexpr double kPipeRadius_m = 0.055;
 constexpr double kPiece_m = 2.0;  // length of the pieces of long objects; each has its own baked light
 
@@ -68,27 +69,30 @@ cv::Mat drawBoard(const std::string& text, bool bright) {
 }
 
 // Boards across the lanes, readable from both sides.
-void addBoards(double overhead_m, SceneParts* parts) {
+void addBoards(const GaragePlan& plan, SceneParts* parts) {
+  if (plan.height_m < kLowestForBoards_m) {
+    return;
+  }
   struct Sign {
     double x, y;
     bool along_x;  // direction of the lane
     const char* text;
   };
-  static const std::vector<Sign> kSigns = {
-      {-19.0, -15.5, true, "AUSFAHRT ->"}, {-3.5, -15.5, true, "P2 269 - 285"},
-      {12.0, -15.5, true, "<- KASSE"},     {-19.0, 0.0, true, "P2 201 - 217"},
-      {4.0, 0.0, true, "LIFT 3 ->"},       {19.5, 0.0, true, "EINBAHN"},
-      {-11.5, 15.5, true, "NOTAUSGANG"},   {4.0, 15.5, true, "2,10 m"},
-      {19.5, 15.5, true, "P2 235 - 251"},  {-26.0, -9.0, false, "AUSFAHRT"},
-      {-26.0, 9.0, false, "WC / LIFT"},    {26.0, -9.0, false, "SCHRITT 10"},
-      {26.0, 9.0, false, "P3 P4 ->"}};
+  const double x = plan.lanes.x_m;
+  const double y = plan.lanes.y_m;
+  const std::vector<Sign> signs = {
+      {-19.0, -y, true, "AUSFAHRT ->"},   {-3.5, -y, true, "P2 269 - 285"}, {12.0, -y, true, "<- KASSE"},
+      {-19.0, 0.0, true, "P2 201 - 217"}, {4.0, 0.0, true, "LIFT 3 ->"},    {19.5, 0.0, true, "EINBAHN"},
+      {-11.5, y, true, "NOTAUSGANG"},     {4.0, y, true, "2,10 m"},         {19.5, y, true, "P2 235 - 251"},
+      {-x, -9.0, false, "AUSFAHRT"},      {-x, 9.0, false, "WC / LIFT"},    {x, -9.0, false, "SCHRITT 10"},
+      {x, 9.0, false, "P3 P4 ->"}};
   const uint32_t rod = parts->plain(SurfaceKind::kOther, 0.3);
   bool bright = false;
-  for (const Sign& sign : kSigns) {
+  for (const Sign& sign : signs) {
     bright = !bright;
     const uint32_t material =
         parts->textured(SurfaceKind::kOther, drawBoard(sign.text, bright), kTexelsPerM, 0.03);
-    const double low = overhead_m + 0.04;
+    const double low = plan.overhead() + 0.04;
     const auto at = [&](double across, double thickness, double z) {
       return sign.along_x ? vector(sign.x + thickness, sign.y + across, z)
                           : vector(sign.x + across, sign.y + thickness, z);
@@ -103,7 +107,7 @@ void addBoards(double overhead_m, SceneParts* parts) {
               at(start, depth, low + kBoardHeight_m), material, &parts->scene().mesh);
     }
     for (const double across : {-0.7 * half, 0.7 * half}) {
-      addFrustum(at(across, 0.0, low + kBoardHeight_m), at(across, 0.0, kGarageHeight_m), 0.01F, 0.01F, 5,
+      addFrustum(at(across, 0.0, low + kBoardHeight_m), at(across, 0.0, plan.height_m), 0.01F, 0.01F, 5,
                  false, rod, &parts->scene().mesh);
     }
   }
@@ -123,34 +127,36 @@ cv::Mat drawLadder() {
   return image;
 }
 
-void addCableTrays(SceneParts* parts) {
+void addCableTrays(const GaragePlan& plan, SceneParts* parts) {
   const uint32_t ladder = parts->textured(SurfaceKind::kOther, drawLadder(), 110.0);
   const uint32_t edge = parts->plain(SurfaceKind::kOther, 0.45, 0.04);
   constexpr double kHalf_m = 0.15;
-  constexpr double kHeight_m = 2.33;
-  for (const double y : {-13.4, 1.9, 17.3}) {
-    for (double x = kGarageArea.min_x; x < kGarageArea.max_x - 1e-6; x += kPiece_m) {
-      addQuad(vector(x, y + kHalf_m, kHeight_m), vector(x + kPiece_m, y + kHalf_m, kHeight_m),
-              vector(x + kPiece_m, y - kHalf_m, kHeight_m), vector(x, y - kHalf_m, kHeight_m), ladder,
+  const double height_m = 2.33 + plan.lift();
+  for (const double known_y : {-13.4, 1.9, 17.3}) {
+    const double y = plan.shifted(known_y);
+    for (double x = plan.area.min_x; x < plan.area.max_x - 1e-6; x += kPiece_m) {
+      addQuad(vector(x, y + kHalf_m, height_m), vector(x + kPiece_m, y + kHalf_m, height_m),
+              vector(x + kPiece_m, y - kHalf_m, height_m), vector(x, y - kHalf_m, height_m), ladder,
               &parts->scene().mesh);
-      addBox(placement(x + 0.5 * kPiece_m, y + kHalf_m, kHeight_m + 0.03, 0.0), vector(kPiece_m, 0.01, 0.06),
+      addBox(placement(x + 0.5 * kPiece_m, y + kHalf_m, height_m + 0.03, 0.0), vector(kPiece_m, 0.01, 0.06),
              edge, &parts->scene().mesh);
-      addBox(placement(x + 0.5 * kPiece_m, y - kHalf_m, kHeight_m + 0.03, 0.0), vector(kPiece_m, 0.01, 0.06),
+      addBox(placement(x + 0.5 * kPiece_m, y - kHalf_m, height_m + 0.03, 0.0), vector(kPiece_m, 0.01, 0.06),
              edge, &parts->scene().mesh);
     }
   }
 }
 
-void addDownPipes(const std::vector<GarageLayout::Pillar>& pillars, double overhead_m, SceneParts* parts) {
+void addDownPipes(const GarageLayout& layout, SceneParts* parts) {
+  const GaragePlan& plan = layout.plan;
   const uint32_t zinc = parts->plain(SurfaceKind::kPole, 0.4, 0.04);
   const uint32_t clamp = parts->plain(SurfaceKind::kPole, 0.08);
-  for (const GarageLayout::Pillar& pillar : pillars) {
+  for (const GarageLayout::Pillar& pillar : layout.pillars) {
     // The pipe is on the side away from the crossing lane.
     const double side = pillar.x > 0.0 ? -1.0 : 1.0;
     if (!parts->random().chance(0.3)) {
       continue;
     }
-    const double x = pillar.x + side * (0.5 * kPillarWidth_m + kPipeRadius_m + 0.01);
+    const double x = pillar.x + side * (0.5 * plan.pillar_width_m + kPipeRadius_m + 0.01);
     const auto radius = static_cast<float>(kPipeRadius_m);
     for (const double z : {0.0, 0.55, 1.1, 1.65}) {
       addFrustum(vector(x, pillar.y, z), vector(x, pillar.y, z + 0.55), radius, radius, 10, false, zinc,
@@ -158,23 +164,23 @@ void addDownPipes(const std::vector<GarageLayout::Pillar>& pillars, double overh
       addFrustum(vector(x, pillar.y, z + 0.36), vector(x, pillar.y, z + 0.4), radius + 0.008F,
                  radius + 0.008F, 10, false, clamp, &parts->scene().mesh);
     }
-    addFrustum(vector(x, pillar.y, 2.2), vector(x, pillar.y, kGarageHeight_m), radius, radius, 10, false,
-               zinc, &parts->scene().mesh);
+    addFrustum(vector(x, pillar.y, 2.2), vector(x, pillar.y, std::max(2.2, plan.height_m)), radius, radius,
+               10, false, zinc, &parts->scene().mesh);
     // Closed at the overhead limit, so that the height map sees it as solid.
-    addFrustum(vector(x, pillar.y, overhead_m - 0.02), vector(x, pillar.y, overhead_m - 0.01), radius, radius,
-               10, true, zinc, &parts->scene().mesh);
+    addFrustum(vector(x, pillar.y, plan.overhead() - 0.02), vector(x, pillar.y, plan.overhead() - 0.01),
+               radius, radius, 10, true, zinc, &parts->scene().mesh);
     parts->scene().obstacles.push_back(
-        {"pipe", circleAround(x, pillar.y, kPipeRadius_m), 0.0, kGarageHeight_m});
+        {"pipe", circleAround(x, pillar.y, kPipeRadius_m), 0.0, plan.height_m});
   }
 }
 
 }  // namespace
 
-void addGarageFittings(const GarageLayout& layout, double overhead_m, SceneParts* parts) {
+void addGarageFittings(const GarageLayout& layout, SceneParts* parts) {
   addWheelStops(layout.bays, parts);
-  addBoards(overhead_m, parts);
-  addCableTrays(parts);
-  addDownPipes(layout.pillars, overhead_m, parts);
+  addBoards(layout.plan, parts);
+  addCableTrays(layout.plan, parts);
+  addDownPipes(layout, parts);
 }
 
 }  // namespace vcharge

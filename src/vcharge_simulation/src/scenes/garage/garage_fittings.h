@@ -6,7 +6,7 @@
 namespace vcharge {
 
 /// Adds wheel stops in the bays, boards over the lanes, cable trays under the beams and down pipes at some
-/// pillars. Everything that hangs is above `overhead_m`.
-void addGarageFittings(const GarageLayout& layout, double overhead_m, SceneParts* parts);
+/// pillars. Everything that hangs is above the plan's overhead height.
+void addGarageFittings(const GarageLayout& layout, SceneParts* parts);
 
 }  // namespace vcharge

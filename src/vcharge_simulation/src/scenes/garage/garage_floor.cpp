@@ -18,7 +18,8 @@ constexpr double kLine_m = 0.12;
 constexpr double kJoint_m = 7.8;
 
 cv::Mat drawMarkings(const GarageLayout& layout, double texel_m) {
-  MarkingPainter painter(kGarageArea, texel_m);
+  const Lanes& lanes = layout.plan.lanes;
+  MarkingPainter painter(layout.plan.area, texel_m);
   for (const ParkingBay& bay : layout.bays) {
     const double half_x = 0.5 * kBayWidth_m;
     const double half_y = 0.5 * kGarageBayLength_m;
@@ -27,34 +28,40 @@ cv::Mat drawMarkings(const GarageLayout& layout, double texel_m) {
     const double mouth = bay.yaw_rad > 0.0 ? -1.0 : 1.0;
     painter.text(std::to_string(200 + bay.number), bay.x, bay.y + mouth * (half_y - 0.4), bay.yaw_rad, 0.35);
   }
-  for (const double y : {-15.5, 0.0, 15.5}) {
+  for (const double y : {-lanes.y_m, 0.0, lanes.y_m}) {
     painter.arrow(-17.0, y - 1.4, 0.0);
     painter.arrow(-3.0, y + 1.4, 2.0 * kHalfPi);
     painter.arrow(9.0, y - 1.4, 0.0);
-    painter.dashed(-21.0, y, 21.0, y, kLine_m, 1.5, 3.0);
+    painter.dashed(5.0 - lanes.x_m, y, lanes.x_m - 5.0, y, kLine_m, 1.5, 3.0);
   }
-  for (const double x : {-26.0, 26.0}) {
+  for (const double x : {-lanes.x_m, lanes.x_m}) {
     painter.arrow(x + 1.4, -7.0, kHalfPi);
     painter.arrow(x - 1.4, 8.0, -kHalfPi);
     painter.dashed(x, -11.0, x, 11.0, kLine_m, 1.5, 3.0);
     // Footpath along the wall.
     const double side = x > 0.0 ? 1.0 : -1.0;
-    painter.line(side * 29.4, -22.0, side * 29.4, 22.0, 0.1);
-    for (double y = -21.5; y < 22.0; y += 0.9) {
-      painter.line(side * 29.5, y, side * 30.3, y + 0.5, 0.1);
+    const double end_y = layout.plan.area.max_y - 1.5;
+    const double path_x = lanes.x_m + 3.4;
+    painter.line(side * path_x, -end_y, side * path_x, end_y, 0.1);
+    for (double y = 0.5 - end_y; y < end_y; y += 0.9) {
+      painter.line(side * (path_x + 0.1), y, side * (path_x + 0.9), y + 0.5, 0.1);
     }
   }
-  painter.text("AUSFAHRT", 4.0, -17.0, 0.0, 0.7);
-  painter.text("10", -11.0, 17.0, 2.0 * kHalfPi, 1.1);
-  painter.text("P2", 26.0, -17.5, kHalfPi, 1.2);
-  painter.line(-22.9, -1.4, -22.9, 1.4, 0.35);
-  painter.line(22.9, -1.4, 22.9, 1.4, 0.35);
+  painter.text("AUSFAHRT", 4.0, -lanes.y_m - 1.5, 0.0, 0.7);
+  painter.text("10", -11.0, lanes.y_m + 1.5, 2.0 * kHalfPi, 1.1);
+  painter.text("P2", lanes.x_m, -lanes.y_m - 2.0, kHalfPi, 1.2);
+  for (const double x : {3.1 - lanes.x_m, lanes.x_m - 3.1}) {
+    painter.line(x, -1.4, x, 1.4, 0.35);
+  }
   return painter.image();
 }
 
 class FloorPainter {
  public:
-  explicit FloorPainter(uint64_t seed) : seed_(static_cast<uint32_t>(seed * 6151U + 11U)) {}
+  FloorPainter(const Lanes& lanes, uint64_t seed)
+      : lane_x_(static_cast<float>(lanes.x_m)),
+        lane_y_(static_cast<float>(lanes.y_m)),
+        seed_(static_cast<uint32_t>(seed * 6151U + 11U)) {}
 
   /// `stains` multiplies the reflectance of the clean floor; `marking` is the coverage of paint.
   float albedo(float x, float y, float stains, float marking) const {
@@ -85,12 +92,12 @@ class FloorPainter {
   float tyreFactor(float x, float y) const {
     const float wander = 0.25F * valueNoise(x * 0.11F, y * 0.11F, seed_ + 5);
     float rubber = 0.0F;
-    for (const float lane : {-15.5F, 0.0F, 15.5F}) {
+    for (const float lane : {-lane_y_, 0.0F, lane_y_}) {
       const float across = std::abs(std::abs(y - lane + wander) - 0.76F);
-      rubber = std::max(rubber, std::abs(x) < 26.0F ? 1.0F - ramp(across, 0.08F, 0.3F) : 0.0F);
+      rubber = std::max(rubber, std::abs(x) < lane_x_ ? 1.0F - ramp(across, 0.08F, 0.3F) : 0.0F);
     }
-    const float across = std::abs(std::abs(std::abs(x) - 26.0F + wander) - 0.76F);
-    rubber = std::max(rubber, std::abs(y) < 16.0F ? 1.0F - ramp(across, 0.08F, 0.3F) : 0.0F);
+    const float across = std::abs(std::abs(std::abs(x) - lane_x_ + wander) - 0.76F);
+    rubber = std::max(rubber, std::abs(y) < lane_y_ + 0.5F ? 1.0F - ramp(across, 0.08F, 0.3F) : 0.0F);
     const float streaks = 0.7F + 0.5F * fractalNoise(x * 3.0F, y * 3.0F, 3, 0.8F, seed_ + 6);
     return 1.0F - 0.22F * rubber * streaks;
   }
@@ -106,6 +113,7 @@ class FloorPainter {
     return 1.0F - 0.55F * (1.0F - ramp(distance_m, 0.003F, 0.011F));
   }
 
+  float lane_x_, lane_y_;
   uint32_t seed_;
 };
 
@@ -114,12 +122,12 @@ class FloorPainter {
 cv::Mat drawGarageFloor(const GarageLayout& layout, double texel_m, uint64_t seed) {
   const cv::Mat markings = drawMarkings(layout, texel_m);
   const cv::Mat stains = drawGarageStains(layout, texel_m, seed);
-  const FloorPainter painter(seed);
+  const FloorPainter painter(layout.plan.lanes, seed);
   cv::Mat image(markings.size(), CV_8UC1);
   tbb::parallel_for(0, image.rows, [&](int row) {
-    const auto y = static_cast<float>(kGarageArea.min_y + (row + 0.5) * texel_m);
+    const auto y = static_cast<float>(layout.plan.area.min_y + (row + 0.5) * texel_m);
     for (int column = 0; column < image.cols; ++column) {
-      const auto x = static_cast<float>(kGarageArea.min_x + (column + 0.5) * texel_m);
+      const auto x = static_cast<float>(layout.plan.area.min_x + (column + 0.5) * texel_m);
       const float marking = static_cast<float>(markings.at<uint8_t>(row, column)) / 255.0F;
       image.at<uint8_t>(row, column) = cv::saturate_cast<uint8_t>(
           painter.albedo(x, y, stains.at<float>(row, column), marking) * (255.0F / kGroundLayerAlbedo));

@@ -5,19 +5,12 @@
 #include <vector>
 
 #include "rendering/lamp_light.h"
-#include "scenes/lane_paths.h"
+#include "scenes/garage/garage_plan.h"
 #include "scenes/lot/parking_bays.h"
 #include "scenes/scene_things.h"
 
 namespace vcharge {
 
-/// Inner faces of the garage. Lanes run along y = -15.5, 0 and 15.5 and along x = -26 and 26.
-inline constexpr GroundRectangle kGarageArea{-32.0, -23.5, 32.0, 23.5};
-inline constexpr Lanes kGarageLanes{26.0, 15.5, 5.0};
-inline constexpr double kGarageHeight_m = 2.75;
-inline constexpr double kBeamHeight_m = 2.42;  ///< lower edge of the beams
-/// This bay, north of the southern lane, is kept free for manoeuvres.
-inline constexpr double kFreeGarageBayX_m = -10.4;
 inline constexpr double kGarageBayLength_m = 4.8;
 
 /// Positions of everything in the garage.
@@ -27,6 +20,7 @@ struct GarageLayout {
     std::string name;
   };
 
+  GaragePlan plan;
   std::vector<ParkingBay> bays;
   std::vector<ParkedCar> cars;
   std::vector<Pillar> pillars;
@@ -35,8 +29,6 @@ struct GarageLayout {
   std::vector<Lamp> lamps;
 };
 
-inline constexpr double kPillarWidth_m = 0.5;
-
-GarageLayout makeGarageLayout(uint64_t seed, int day);
+GarageLayout makeGarageLayout(uint64_t seed, int day, uint64_t layout_seed = 0);
 
 }  // namespace vcharge

@@ -22,8 +22,6 @@ constexpr double kCeilingAlbedo = 0.6;
 // Irradiance at baked light 1; the camera's exposure is set for the garage.
 constexpr double kFullIrradiance = 4.5;
 constexpr double kTypicalCeilingLight = 0.12;
-// Ducts and lamps are above this height.
-constexpr double kOverhead_m = 2.1;
 constexpr float kFloorReflectivity = 0.03F;
 // Panels are split into cells of this size, because lamp light is baked at their corners.
 constexpr double kLightCell_m = 0.5;
@@ -46,28 +44,29 @@ class GarageBuilder {
   explicit GarageBuilder(const SceneOptions& options)
       : options_(options),
         seed_(options.seed),
-        layout_(makeGarageLayout(seed_, options.day)),
+        layout_(makeGarageLayout(seed_, options.day, options.layout_seed)),
+        plan_(layout_.plan),
         parts_(seed_ * 53U + 7U, 1.0, SurfaceVariety::fromSeed(options.surface_seed)) {}
 
   std::shared_ptr<const Scene> build() {
     scene().sky = std::make_unique<Sky>(lampLight(), 1);
-    scene().min_m = {kGarageArea.min_x, kGarageArea.min_y};
-    scene().max_m = {kGarageArea.max_x, kGarageArea.max_y};
-    scene().overhead_m = kOverhead_m;
+    scene().min_m = {plan_.area.min_x, plan_.area.min_y};
+    scene().max_m = {plan_.area.max_x, plan_.area.max_y};
+    scene().overhead_m = plan_.overhead();
     addFloor();
     addWalls();
     addCeiling();
     addPillars();
     addPipes();
     addLamps();
-    addGarageFittings(layout_, kOverhead_m, &parts_);
+    addGarageFittings(layout_, &parts_);
     parts_.addCars(layout_.cars);
     LampOptions light;
     light.floor_texel_m = 0.1 / options_.detail;
     light.gathered_rays = static_cast<int>(std::lround(24 * options_.detail));
     bakeLampLight(layout_.lamps, light, scene().min_m, scene().max_m, &scene());
     addCeilingReflection();
-    addMovers(options_, {kGarageArea, kGarageLanes, layout_.bays}, &parts_);
+    addMovers(options_, {plan_.area, plan_.lanes, layout_.bays}, &parts_);
     return parts_.sharedScene();
   }
 
@@ -85,13 +84,13 @@ class GarageBuilder {
     cv::Mat painted_floor = drawGarageFloor(layout_, texel_m, seed_);
     parts_.surfaces().fade(1.0 / texel_m, &painted_floor);
     scene().ground.layers.push_back(
-        {Texture(painted_floor, Texture::Border::kClamp), static_cast<float>(kGarageArea.min_x),
-         static_cast<float>(kGarageArea.min_y), static_cast<float>(1.0 / texel_m)});
+        {Texture(painted_floor, Texture::Border::kClamp), static_cast<float>(plan_.area.min_x),
+         static_cast<float>(plan_.area.min_y), static_cast<float>(1.0 / texel_m)});
     for (const double stretch : {1.0, 1.61803}) {
       scene().ground.details.push_back({Texture(drawGroundDetail(1024, seed_ + 40), Texture::Border::kRepeat),
                                         0.0F, 0.0F, static_cast<float>(1.0 / (kDetailTexel_m * stretch))});
     }
-    parts_.addLevel(kGarageArea, 0.0, material);
+    parts_.addLevel(plan_.area, 0.0, material);
   }
 
   // Adds a flat panel, split into cells to resolve the light baked at their corners.
@@ -117,17 +116,17 @@ class GarageBuilder {
   }
 
   void addWalls() {
-    const std::vector<Eigen::Vector2d> outline = cornersOf(kGarageArea);
+    const std::vector<Eigen::Vector2d> outline = cornersOf(plan_.area);
     for (size_t i = 0; i < outline.size(); ++i) {
       // The outline is reversed so that the walls face inwards.
       const Eigen::Vector2d& from = outline[(i + 1) % outline.size()];
       const Eigen::Vector2d edge = outline[i] - from;
-      const uint32_t wall =
-          parts_.textured(SurfaceKind::kBuilding,
-                          drawGarageWall(edge.norm(), kGarageHeight_m, static_cast<uint32_t>(seed_ * 9U + i)),
-                          kGarageTexelsPerM);
+      const uint32_t wall = parts_.textured(
+          SurfaceKind::kBuilding,
+          drawGarageWall(edge.norm(), plan_.height_m, plan_.walls, static_cast<uint32_t>(seed_ * 9U + i)),
+          kGarageTexelsPerM);
       addPanel(vector(from.x(), from.y(), 0.0), vector(edge.x(), edge.y(), 0.0),
-               vector(0.0, 0.0, kGarageHeight_m), wall);
+               vector(0.0, 0.0, plan_.height_m), wall);
     }
   }
 
@@ -138,28 +137,28 @@ class GarageBuilder {
     const uint32_t concrete = parts_.textured(
         SurfaceKind::kOther, drawFormedConcrete(size, size, mean, static_cast<uint32_t>(seed_ + 70U)),
         kGarageTexelsPerM, 0.0, Texture::Border::kRepeat);
-    const GroundRectangle& area = kGarageArea;
+    const GroundRectangle& area = plan_.area;
     const auto repeats_x = static_cast<float>(area.width() / kTile_m);
     const auto repeats_y = static_cast<float>(area.depth() / kTile_m);
-    addPanel(vector(area.min_x, area.max_y, kGarageHeight_m), vector(area.width(), 0.0, 0.0),
+    addPanel(vector(area.min_x, area.max_y, plan_.height_m), vector(area.width(), 0.0, 0.0),
              vector(0.0, -area.depth(), 0.0), concrete, {0.0F, 0.0F, repeats_x, repeats_y});
-    const double height = kGarageHeight_m - kBeamHeight_m;
+    const double height = plan_.height_m - plan_.beam_height_m;
     const auto beam = [&](double x, double y, double length, double width, bool along_x) {
       const double dx = 0.5 * (along_x ? length : width);
       const double dy = 0.5 * (along_x ? width : length);
       const auto repeats = static_cast<float>((along_x ? length : width) / kTile_m);
       const Eigen::Vector3f up = vector(0.0, 0.0, height);
-      addPanel(vector(x - dx, y - dy, kBeamHeight_m), vector(2.0 * dx, 0.0, 0.0), up, concrete,
+      addPanel(vector(x - dx, y - dy, plan_.beam_height_m), vector(2.0 * dx, 0.0, 0.0), up, concrete,
                {0.0F, 0.0F, repeats, 0.02F});
-      addPanel(vector(x + dx, y + dy, kBeamHeight_m), vector(-2.0 * dx, 0.0, 0.0), up, concrete,
+      addPanel(vector(x + dx, y + dy, plan_.beam_height_m), vector(-2.0 * dx, 0.0, 0.0), up, concrete,
                {0.3F, 0.3F, 0.3F + repeats, 0.32F});
       const auto depth_repeats = static_cast<float>(2.0 * dy / kTile_m);
-      addPanel(vector(x + dx, y - dy, kBeamHeight_m), vector(0.0, 2.0 * dy, 0.0), up, concrete,
+      addPanel(vector(x + dx, y - dy, plan_.beam_height_m), vector(0.0, 2.0 * dy, 0.0), up, concrete,
                {0.5F, 0.1F, 0.5F + depth_repeats, 0.12F});
-      addPanel(vector(x - dx, y + dy, kBeamHeight_m), vector(0.0, -2.0 * dy, 0.0), up, concrete,
+      addPanel(vector(x - dx, y + dy, plan_.beam_height_m), vector(0.0, -2.0 * dy, 0.0), up, concrete,
                {0.7F, 0.6F, 0.7F + depth_repeats, 0.62F});
-      addPanel(vector(x - dx, y + dy, kBeamHeight_m), vector(2.0 * dx, 0.0, 0.0), vector(0.0, -2.0 * dy, 0.0),
-               concrete, {0.2F, 0.2F, 0.2F + repeats, 0.2F + depth_repeats});
+      addPanel(vector(x - dx, y + dy, plan_.beam_height_m), vector(2.0 * dx, 0.0, 0.0),
+               vector(0.0, -2.0 * dy, 0.0), concrete, {0.2F, 0.2F, 0.2F + repeats, 0.2F + depth_repeats});
     };
     for (const double x : layout_.beam_x) {
       beam(x, 0.0, area.depth(), 0.36, false);
@@ -173,30 +172,57 @@ class GarageBuilder {
   void addPillars() {
     uint32_t number = 0;
     for (const GarageLayout::Pillar& pillar : layout_.pillars) {
-      const uint32_t material = parts_.textured(
-          SurfaceKind::kPole, drawGaragePillar(pillar.name, static_cast<uint32_t>(seed_ * 131U) + number++),
-          kGarageTexelsPerM);
-      const double half = 0.5 * kPillarWidth_m;
+      const uint32_t material =
+          parts_.textured(SurfaceKind::kPole,
+                          drawGaragePillar(pillar.name, plan_.pillar_width_m, plan_.height_m,
+                                           static_cast<uint32_t>(seed_ * 131U) + number++),
+                          kGarageTexelsPerM);
+      if (plan_.has_round_pillars) {
+        addRoundPillar(pillar, material);
+        continue;
+      }
+      const double half = 0.5 * plan_.pillar_width_m;
       const std::vector<Eigen::Vector2d> corners =
           orientedRectangle(pillar.x, pillar.y, 0.0, -half, half, half);
       for (size_t i = 0; i < corners.size(); ++i) {
         const Eigen::Vector2d edge = corners[(i + 1) % corners.size()] - corners[i];
         const float u = 0.25F * static_cast<float>(i);
         addPanel(vector(corners[i].x(), corners[i].y(), 0.0), vector(edge.x(), edge.y(), 0.0),
-                 vector(0.0, 0.0, kGarageHeight_m), material, {u, 0.0F, u + 0.25F, 1.0F});
+                 vector(0.0, 0.0, plan_.height_m), material, {u, 0.0F, u + 0.25F, 1.0F});
       }
       // A lid at the overhead limit, so that the height map sees a solid pillar.
-      parts_.addLevel({corners[0].x(), corners[0].y(), corners[2].x(), corners[2].y()}, kOverhead_m - 0.01,
-                      material);
-      scene().obstacles.push_back({"pillar", corners, 0.0, kGarageHeight_m});
+      parts_.addLevel({corners[0].x(), corners[0].y(), corners[2].x(), corners[2].y()},
+                      plan_.overhead() - 0.01, material);
+      scene().obstacles.push_back({"pillar", corners, 0.0, plan_.height_m});
     }
+  }
+
+  // Stacked pieces, each with its part of the texture.
+  void addRoundPillar(const GarageLayout::Pillar& pillar, uint32_t material) {
+    const auto radius = static_cast<float>(0.5 * plan_.pillar_width_m);
+    const int pieces = static_cast<int>(std::ceil(plan_.height_m / kLightCell_m));
+    std::vector<MeshVertex>& vertices = scene().mesh.vertices;
+    for (int i = 0; i < pieces; ++i) {
+      const double low = plan_.height_m * i / pieces;
+      const double high = plan_.height_m * (i + 1) / pieces;
+      const size_t first = vertices.size();
+      addFrustum(vector(pillar.x, pillar.y, low), vector(pillar.x, pillar.y, high), radius, radius, 16, false,
+                 material, &scene().mesh);
+      for (size_t v = first; v < vertices.size(); ++v) {
+        vertices[v].v = 1.0F - vertices[v].position.z() / static_cast<float>(plan_.height_m);
+      }
+    }
+    const double lid = plan_.overhead() - 0.01;
+    addFrustum(vector(pillar.x, pillar.y, lid - 0.01), vector(pillar.x, pillar.y, lid), radius, radius, 16,
+               true, material, &scene().mesh);
+    scene().obstacles.push_back({"pillar", circleAround(pillar.x, pillar.y, radius), 0.0, plan_.height_m});
   }
 
   // Sprinkler pipes and a duct under the beams, in pieces that each get their own baked light.
   void addPipes() {
     constexpr double kPiece_m = 2.0;
     const auto pipe = [&](double y, double z, double radius, uint32_t material) {
-      for (double x = kGarageArea.min_x; x < kGarageArea.max_x - 1e-6; x += kPiece_m) {
+      for (double x = plan_.area.min_x; x < plan_.area.max_x - 1e-6; x += kPiece_m) {
         addFrustum(vector(x, y, z), vector(x + kPiece_m, y, z), static_cast<float>(radius),
                    static_cast<float>(radius), 8, false, material, &scene().mesh);
       }
@@ -204,15 +230,18 @@ class GarageBuilder {
     const uint32_t red = parts_.plain(SurfaceKind::kOther, 0.12, 0.03);
     const uint32_t zinc = parts_.plain(SurfaceKind::kOther, 0.45, 0.05);
     for (const double side : {-1.0, 1.0}) {
-      pipe(side * 12.0, 2.33, 0.05, red);
-      pipe(side * 18.2, 2.33, 0.04, red);
-      pipe(side * 3.4, 2.3, 0.09, zinc);
+      pipe(plan_.shifted(side * 12.0), 2.33 + plan_.lift(), 0.05, red);
+      pipe(plan_.shifted(side * 18.2), 2.33 + plan_.lift(), 0.04, red);
+      pipe(plan_.shifted(side * 3.4), 2.3 + plan_.lift(), 0.09, zinc);
     }
-    for (double x = kGarageArea.min_x; x < kGarageArea.max_x - 1e-6; x += kPiece_m) {
-      addBox(placement(x + 0.5 * kPiece_m, 22.9, 2.35, 0.0), vector(kPiece_m - 0.02, 0.6, 0.35), zinc,
-             &scene().mesh);
-      addQuad(vector(x, 23.2, 2.175), vector(x + kPiece_m, 23.2, 2.175), vector(x + kPiece_m, 22.6, 2.175),
-              vector(x, 22.6, 2.175), zinc, &scene().mesh);
+    for (double x = plan_.area.min_x; x < plan_.area.max_x - 1e-6; x += kPiece_m) {
+      addBox(placement(x + 0.5 * kPiece_m, plan_.area.max_y - 0.6, 2.35 + plan_.lift(), 0.0),
+             vector(kPiece_m - 0.02, 0.6, 0.35), zinc, &scene().mesh);
+      const double near_y = plan_.area.max_y - 0.9;
+      const double far_y = plan_.area.max_y - 0.3;
+      const double low = 2.175 + plan_.lift();
+      addQuad(vector(x, far_y, low), vector(x + kPiece_m, far_y, low), vector(x + kPiece_m, near_y, low),
+              vector(x, near_y, low), zinc, &scene().mesh);
     }
   }
 
@@ -237,13 +266,13 @@ class GarageBuilder {
       addBox(placement(lamp.centre.x(), lamp.centre.y(), lamp.centre.z() + 0.06, 0.0),
              size + Eigen::Vector3f(0.06F, 0.06F, -0.02F), housing, &scene().mesh);
       // Rod to the ceiling.
-      addFrustum(lamp.centre, {lamp.centre.x(), lamp.centre.y(), static_cast<float>(kGarageHeight_m)}, 0.015F,
+      addFrustum(lamp.centre, {lamp.centre.x(), lamp.centre.y(), static_cast<float>(plan_.height_m)}, 0.015F,
                  0.015F, 5, false, housing, &scene().mesh);
     }
   }
 
   void addCeilingReflection() {
-    const GroundRectangle& area = kGarageArea;
+    const GroundRectangle& area = plan_.area;
     cv::Mat image(
         static_cast<int>(area.depth() / kCeilingTexel_m), static_cast<int>(area.width() / kCeilingTexel_m),
         CV_8UC1, cv::Scalar(255.0 * kCeilingAlbedo * kTypicalCeilingLight * kFullIrradiance / kLampRadiance));
@@ -258,7 +287,7 @@ class GarageBuilder {
                cv::Scalar(255.0 * lamp.intensity / 3.0), 1, cv::LINE_8, 3);
     }
     scene().ceiling = std::make_unique<Ceiling>(
-        Ceiling{static_cast<float>(kGarageHeight_m),
+        Ceiling{static_cast<float>(plan_.height_m),
                 kLampRadiance,
                 {Texture(image, Texture::Border::kClamp), static_cast<float>(area.min_x),
                  static_cast<float>(area.min_y), static_cast<float>(1.0 / kCeilingTexel_m)}});
@@ -267,6 +296,7 @@ class GarageBuilder {
   const SceneOptions options_;
   const uint64_t seed_;
   const GarageLayout layout_;
+  const GaragePlan& plan_;
   SceneParts parts_;
 };
 

@@ -13,7 +13,6 @@ namespace {
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kTrack_m = 1.5;  // track width of the cars that leave tyre marks
-constexpr double kLanes_m[] = {-15.5, 0.0, 15.5};
 
 // Seed from a coordinate that may be negative; goes through int64_t because converting a negative double to
 // unsigned is undefined.
@@ -31,12 +30,14 @@ struct Blob {
 
 class StainPainter {
  public:
-  StainPainter(double texel_m, uint64_t seed)
-      : texel_m_(texel_m),
+  StainPainter(const GaragePlan& plan, double texel_m, uint64_t seed)
+      : plan_(plan),
+        area_(plan.area),
+        texel_m_(texel_m),
         seed_(static_cast<uint32_t>(seed * 733U + 5U)),
         random_(seed + 31U),
-        image_(static_cast<int>(std::lround(kGarageArea.depth() / texel_m)),
-               static_cast<int>(std::lround(kGarageArea.width() / texel_m)), CV_32FC1, cv::Scalar(1.0)) {}
+        image_(static_cast<int>(std::lround(area_.depth() / texel_m)),
+               static_cast<int>(std::lround(area_.width() / texel_m)), CV_32FC1, cv::Scalar(1.0)) {}
 
   const cv::Mat& image() const { return image_; }
 
@@ -128,16 +129,17 @@ class StainPainter {
   template <class Add>
   void anywhere(int count, const Add& add) {
     for (int i = 0; i < count; ++i) {
-      const double x = random_.uniform(kGarageArea.min_x, kGarageArea.max_x);
-      const double y = random_.uniform(kGarageArea.min_y, kGarageArea.max_y);
+      const double x = random_.uniform(area_.min_x, area_.max_x);
+      const double y = random_.uniform(area_.min_y, area_.max_y);
       add(x, y);
     }
   }
 
-  static double nearestLane(const ParkingBay& bay) {
+  double nearestLane(const ParkingBay& bay) const {
     // The open end of a bay is opposite to the direction of its yaw.
     const double mouth_y = bay.y - (bay.yaw_rad > 0.0 ? 0.5 : -0.5) * kGarageBayLength_m;
-    return *std::min_element(std::begin(kLanes_m), std::end(kLanes_m), [&](double a, double b) {
+    const double lanes[] = {-plan_.lanes.y_m, 0.0, plan_.lanes.y_m};
+    return *std::min_element(std::begin(lanes), std::end(lanes), [&](double a, double b) {
       return std::abs(a - mouth_y) < std::abs(b - mouth_y);
     });
   }
@@ -146,8 +148,8 @@ class StainPainter {
     const auto texel = [&](double metres, double origin_m) {
       return static_cast<int>(std::floor((metres - origin_m) / texel_m_));
     };
-    const cv::Point low(texel(min_x, kGarageArea.min_x), texel(min_y, kGarageArea.min_y));
-    const cv::Point high(texel(max_x, kGarageArea.min_x) + 1, texel(max_y, kGarageArea.min_y) + 1);
+    const cv::Point low(texel(min_x, area_.min_x), texel(min_y, area_.min_y));
+    const cv::Point high(texel(max_x, area_.min_x) + 1, texel(max_y, area_.min_y) + 1);
     return cv::Rect(low, high) & cv::Rect(0, 0, image_.cols, image_.rows);
   }
 
@@ -167,9 +169,9 @@ class StainPainter {
     // The border is at least one texel wide.
     const float soft = std::max(0.3F, static_cast<float>(texel_m_) / half_width);
     for (int row = box.y; row < box.y + box.height; ++row) {
-      const auto dy = static_cast<float>(kGarageArea.min_y + (row + 0.5) * texel_m_ - blob.y);
+      const auto dy = static_cast<float>(area_.min_y + (row + 0.5) * texel_m_ - blob.y);
       for (int column = box.x; column < box.x + box.width; ++column) {
-        const auto dx = static_cast<float>(kGarageArea.min_x + (column + 0.5) * texel_m_ - blob.x);
+        const auto dx = static_cast<float>(area_.min_x + (column + 0.5) * texel_m_ - blob.x);
         const float along = (dx * cosine + dy * sine) / half_length;
         const float across = (dy * cosine - dx * sine) / half_width;
         const float wobble =
@@ -213,6 +215,8 @@ class StainPainter {
     }
   }
 
+  const GaragePlan plan_;
+  const GroundRectangle area_;
   const double texel_m_;
   const uint32_t seed_;
   Random random_;
@@ -222,7 +226,7 @@ class StainPainter {
 }  // namespace
 
 cv::Mat drawGarageStains(const GarageLayout& layout, double texel_m, uint64_t seed) {
-  StainPainter painter(texel_m, seed);
+  StainPainter painter(layout.plan, texel_m, seed);
   painter.addPatches();
   painter.addTyreMarks(layout.bays);
   painter.addStains();

@@ -12,8 +12,6 @@ namespace vcharge {
 
 namespace {
 
-constexpr double kBand_m = 1.1;
-
 int texels(double metres) {
   return static_cast<int>(std::lround(metres * kGarageTexelsPerM));
 }
@@ -158,15 +156,15 @@ cv::Mat drawFormedConcrete(int width_px, int height_px, double mean, uint32_t se
   return image;
 }
 
-cv::Mat drawGarageWall(double width_m, double height_m, uint32_t seed) {
+cv::Mat drawGarageWall(double width_m, double height_m, const GarageWallKind& kind, uint32_t seed) {
   cv::Mat image(texels(height_m), texels(width_m), CV_8UC1);
   tbb::parallel_for(0, image.rows, [&](int y) {
     for (int x = 0; x < image.cols; ++x) {
       const float u = static_cast<float>(x) / static_cast<float>(kGarageTexelsPerM);
       const float v = static_cast<float>(image.rows - y) / static_cast<float>(kGarageTexelsPerM);
-      float value = concrete(u, v, 0.6F, seed);
-      if (v < kBand_m + 0.01F * valueNoise(u * 3.0F, 0.0F, seed + 1)) {
-        value *= 0.55F;
+      float value = concrete(u, v, static_cast<float>(kind.tone), seed);
+      if (v < kind.band_m + 0.01F * valueNoise(u * 3.0F, 0.0F, seed + 1)) {
+        value *= static_cast<float>(kind.band_tone);
       }
       // Water stains from joints above and splashed dirt below.
       const float leak = valueNoise(u * 1.4F, 0.1F * v, seed + 2) + 0.5F * valueNoise(u * 6.0F, v, seed + 4);
@@ -179,15 +177,15 @@ cv::Mat drawGarageWall(double width_m, double height_m, uint32_t seed) {
     }
   });
   Random random(seed);
-  for (double x = 1.0; x + 2.5 < width_m; x += random.uniform(1.4, 3.4)) {
+  for (double x = 1.0; x + 2.5 < width_m; x += kind.fixture_gaps * random.uniform(1.4, 3.4)) {
     drawFixture(texels(x), &random, &image);
   }
   return image;
 }
 
-cv::Mat drawGaragePillar(const std::string& name, uint32_t seed) {
-  const int face = texels(kPillarWidth_m);
-  const int height = texels(kGarageHeight_m);
+cv::Mat drawGaragePillar(const std::string& name, double width_m, double height_m, uint32_t seed) {
+  const int face = texels(width_m);
+  const int height = texels(height_m);
   cv::Mat image = drawFormedConcrete(4 * face, height, 0.52, seed);
   Random random(seed);
   const int stripe_top = height - texels(1.0);

@@ -13,8 +13,6 @@ namespace vcharge {
 
 namespace {
 
-enum class Zone { kAsphalt, kCobbles, kBricks, kSlabs, kGrass };
-
 /// Oil, tar or a patch of repaired asphalt.
 struct Stain {
   float x, y, half_length, half_width, cosine, sine, strength;
@@ -43,42 +41,35 @@ class GroundPainter {
     }
   }
 
-  Zone zoneAt(float x, float y) const {
+  Paving pavingAt(float x, float y) const {
     if (layout_.groundHeight(x, y) > 0.0) {
-      return Zone::kGrass;
+      return Paving::kGrass;
     }
-    if (x > 29.6F) {
-      return y > -4.0F ? Zone::kSlabs : Zone::kCobbles;
-    }
-    const float across = std::abs(y);
-    if (across < 3.0F || x < -22.9F) {
-      return Zone::kCobbles;
-    }
-    if (y > 12.0F && y < 18.0F) {
-      return Zone::kCobbles;
-    }
-    return (y > 3.0F && y < 12.0F) || y > 18.0F ? Zone::kBricks : Zone::kAsphalt;
+    const auto found = std::find_if(layout_.paving.begin(), layout_.paving.end(), [&](const PavedArea& area) {
+      return x > area.min_x && x < area.max_x && y > area.min_y && y < area.max_y;
+    });
+    return found == layout_.paving.end() ? Paving::kAsphalt : found->paving;
   }
 
   float albedo(float x, float y, float marking) const {
     float value = 0.0F;
     // Zone borders vary by a few centimetres.
     const float wander = 0.04F * valueNoise(x * 2.1F, y * 2.1F, seed_ + 1);
-    const Zone zone = zoneAt(x + wander, y - wander);
-    switch (zone) {
-      case Zone::kAsphalt:
+    const Paving paving = pavingAt(x + wander, y - wander);
+    switch (paving) {
+      case Paving::kAsphalt:
         value = asphalt(x, y);
         break;
-      case Zone::kCobbles:
+      case Paving::kCobbles:
         value = blocks(x, y, 0.19F, 0.27F, 0.011F, 0.2F, 0.30F);
         break;
-      case Zone::kBricks:
+      case Paving::kBricks:
         value = blocks(x, y, 0.105F, 0.21F, 0.005F, 0.24F, 0.20F);
         break;
-      case Zone::kSlabs:
+      case Paving::kSlabs:
         value = blocks(x, y, 0.42F, 0.62F, 0.008F, 0.36F, 0.12F);
         break;
-      case Zone::kGrass:
+      case Paving::kGrass:
         return grass(x, y);
     }
     // Large-scale weathering makes every part of the ground distinct.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scenes/lot/drawn_lot.h"
 #include "vcharge_simulation/rendering/noise.h"
 
 namespace vcharge {
@@ -26,6 +27,16 @@ void addBays(LotLayout* layout) {
     addRow(side * std::abs(kFreeBayY_m), -side * kHalfPi, -20.8, 16);  // along the outer lanes, inner side
     addRow(side * 20.3, side * kHalfPi, -23.4, 18);                    // along the outer lanes, outer side
   }
+}
+
+void addPaving(LotLayout* layout) {
+  constexpr float kEnd = 1e3F;
+  constexpr float kPlaza = 29.6F;
+  layout->paving = {
+      {kPlaza, -4.0F, kEnd, kEnd, Paving::kSlabs},   {kPlaza, -kEnd, kEnd, kEnd, Paving::kCobbles},
+      {-kEnd, -3.0F, kEnd, 3.0F, Paving::kCobbles},  {-kEnd, -kEnd, -22.9F, kEnd, Paving::kCobbles},
+      {-kEnd, 12.0F, kEnd, 18.0F, Paving::kCobbles}, {-kEnd, 3.0F, kEnd, 12.0F, Paving::kBricks},
+      {-kEnd, 18.0F, kEnd, kEnd, Paving::kBricks}};
 }
 
 void addIslands(LotLayout* layout) {
@@ -140,15 +151,23 @@ void addStreetFurniture(Random* random, LotLayout* layout) {
 double LotLayout::groundHeight(double x, double y) const {
   for (const GroundRectangle& island : islands) {
     if (island.contains(x, y)) {
-      return kKerbHeight_m;
+      return kerb.height_m;
     }
   }
   return 0.0;
 }
 
-LotLayout makeLotLayout(uint64_t seed, int day) {
+LotLayout makeLotLayout(uint64_t seed, int day, uint64_t layout_seed) {
+  if (layout_seed != 0) {
+    LotLayout layout = makeDrawnLot(LotPlan::fromSeed(layout_seed), layout_seed, seed);
+    addWoods(seed, &layout);
+    addHouses(&layout);
+    layout.cars = parkCars(layout.bays, kOccupiedBays, seed, day);
+    return layout;
+  }
   LotLayout layout;
   Random random(seed);
+  addPaving(&layout);
   addBays(&layout);
   addIslands(&layout);
   addPlants(&random, &layout);

@@ -5,16 +5,29 @@
 
 #include <Eigen/Core>
 
+#include "scenes/lot/lot_plan.h"
 #include "scenes/lot/parking_bays.h"
 #include "scenes/scene_things.h"
 
 namespace vcharge {
 
-/// Positions of everything on the lot. Lanes run along y = -15, 0 and 15 and along x = -26 and 26.
+enum class Paving { kAsphalt, kCobbles, kBricks, kSlabs, kGrass };
+
+/// Paving between these borders.
+struct PavedArea {
+  float min_x, min_y, max_x, max_y;
+  Paving paving;
+};
+
+/// Positions of everything on the lot.
 struct LotLayout {
   using Bay = ParkingBay;
 
-  std::vector<GroundRectangle> islands;  ///< raised by kKerbHeight_m
+  Lanes lanes;
+  std::vector<PavedArea> paving;  ///< the first area counts; asphalt elsewhere
+  Kerb kerb;
+  std::vector<GroundRectangle> islands;  ///< raised by the kerb's height
+  std::vector<GardenWall> garden_walls;
   std::vector<Bay> bays;
   std::vector<ParkedCar> cars;
   std::vector<Tree> trees;
@@ -28,11 +41,10 @@ struct LotLayout {
   double groundHeight(double x, double y) const;
 };
 
-inline constexpr double kBayLength_m = 4.3;
 /// This bay, north of the southern lane, is kept free for manoeuvres.
 inline constexpr double kFreeBayX_m = -9.1;
 inline constexpr double kFreeBayY_m = -9.95;
 
-LotLayout makeLotLayout(uint64_t seed, int day);
+LotLayout makeLotLayout(uint64_t seed, int day, uint64_t layout_seed = 0);
 
 }  // namespace vcharge

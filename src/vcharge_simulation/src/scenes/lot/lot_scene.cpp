@@ -52,8 +52,9 @@ class LotBuilder {
     parts_.addBushes(layout_.bushes);
     parts_.addHedges(layout_.hedges);
     for (const GroundRectangle& island : layout_.islands) {
-      parts_.addGrassAlong(island, levelOf(island));
+      parts_.addGrassAlong(island, levelOf(island), layout_.kerb);
     }
+    addGardenWalls();
     parts_.addHouses(layout_.buildings);
     parts_.addPoles(layout_.poles);
     parts_.addBins(layout_.bins);
@@ -72,7 +73,7 @@ class LotBuilder {
           return layout_.groundHeight(x, y) + (variant_.ground_height ? variant_.ground_height(x, y) : 0.0);
         },
         &scene());
-    addMovers(options_, {kLotArea, Lanes(), layout_.bays}, &parts_);
+    addMovers(options_, {kLotArea, layout_.lanes, baysToLeave()}, &parts_);
     return parts_.sharedScene();
   }
 
@@ -83,6 +84,27 @@ class LotBuilder {
     return variant_.ground_height ? variant_.ground_height(0.5 * (island.min_x + island.max_x),
                                                            0.5 * (island.min_y + island.max_y))
                                   : 0.0;
+  }
+
+  // Bays that open at right angles to a lane.
+  std::vector<ParkingBay> baysToLeave() const {
+    std::vector<ParkingBay> bays;
+    std::copy_if(layout_.bays.begin(), layout_.bays.end(), std::back_inserter(bays),
+                 [](const ParkingBay& bay) { return !bay.is_oblique; });
+    return bays;
+  }
+
+  void addGardenWalls() {
+    for (const GardenWall& wall : layout_.garden_walls) {
+      const GroundRectangle& area = wall.area;
+      const uint32_t plaster = parts_.textured(
+          SurfaceKind::kBuilding,
+          parts_.noiseImage(1024, 128, parts_.random().uniform(0.25, 0.6), 0.15, 0.02, 0.03), 30.0);
+      addBox(
+          placement(0.5 * (area.min_x + area.max_x), 0.5 * (area.min_y + area.max_y), 0.5 * wall.height, 0.0),
+          Eigen::Vector3d(area.width(), area.depth(), wall.height).cast<float>(), plaster, &scene().mesh);
+      scene().obstacles.push_back({"wall", cornersOf(area), 0.0, wall.height});
+    }
   }
 
   void addGround() {
@@ -121,7 +143,7 @@ class LotBuilder {
     parts_.addLevel({-far, kLotArea.min_y, kLotArea.min_x, kLotArea.max_y}, 0.0, far_ground);
     parts_.addLevel({kLotArea.max_x, kLotArea.min_y, far, kLotArea.max_y}, 0.0, far_ground);
     for (const GroundRectangle& island : layout_.islands) {
-      parts_.addIsland(island, near_ground, levelOf(island));
+      parts_.addIsland(island, near_ground, levelOf(island), layout_.kerb);
     }
   }
 
@@ -139,7 +161,7 @@ std::shared_ptr<const Scene> buildLotVariant(const SceneOptions& options, const 
 
 std::shared_ptr<const Scene> buildLotScene(const SceneOptions& options) {
   LotVariant lot;
-  lot.layout = makeLotLayout(options.seed, options.day);
+  lot.layout = makeLotLayout(options.seed, options.day, options.layout_seed);
   return buildLotVariant(options, lot);
 }
 

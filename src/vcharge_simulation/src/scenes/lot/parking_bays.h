@@ -14,6 +14,7 @@ struct ParkingBay {
   double x, y, yaw_rad;  ///< centre; cars point along the yaw or against it
   int number;
   bool keep_free = false;
+  bool is_oblique = false;  ///< angled or parallel to the lane
 };
 
 /// Parks cars on level ground at z = 0. Each bay has its own random generator, so that a day other than 0
