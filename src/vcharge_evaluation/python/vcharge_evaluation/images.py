@@ -45,9 +45,9 @@ class ImageSet:
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__)
     add_arguments(parser, "image_evaluation")
-    parser.add_argument("--drives", nargs="*", default=["lot:1", "lot:2", "garage:1", "garage:2"], help="SCENE:SEED")
+    parser.add_argument("--drives", nargs="*", default=["lot:1", "lot:2", "garage:1", "garage:2"], help="SCENE:SEED; the seed draws plan and surfaces too")
     parser.add_argument("--duration-s", type=float, default=10.0, help="of the simulated drives")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="option of the simulated drives")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="option of the simulated drives, as in layout_seed=0")
     return parser.parse_args()
 
 
@@ -190,7 +190,8 @@ def main():
         scene, seed = drive.split(":")
         folder = args.work / drive.replace(":", "_")
         seeds = [word for option in ("--scene-seed", "--seed") for word in (option, seed)]
-        settings = [word for setting in args.set for word in ("--set", setting)]
+        drawn = [f"layout_seed={seed}", f"surface_seed={seed}"]
+        settings = [word for setting in [*drawn, *args.set] for word in ("--set", setting)]
         simulate(folder, ["--scene", scene, "--drive", "loop", "--cameras", CAMERA, "--duration-s", args.duration_s, *seeds,
                           *settings])
         measure(read_drive(drive, folder / "drive.bag", folder / "rig_truth.yaml", "/ground_truth"), real.get(scene, {}))
