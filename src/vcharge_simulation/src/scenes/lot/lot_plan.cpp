@@ -41,7 +41,7 @@ LotPlan LotPlan::fromSeed(uint64_t layout_seed) {
                    kInnerBays_m + 0.5 * kBayLength_m;
   plan.drive_offset = 0.5;
   // A bay of the row west of the middle, with room for the drives on both sides.
-  plan.free_bay_x_m = (0.5 - 0.5 * plan.bays_per_row + (plan.bays_per_row / 2 - 4)) * kBayWidth_m;
+  plan.free_bay_x_m = (0.5 - 0.5 * plan.bays_per_row + (plan.bays_per_row / 2 - 2)) * kBayWidth_m;
   return plan;
 }
 
