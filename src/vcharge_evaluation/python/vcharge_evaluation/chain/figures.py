@@ -6,14 +6,13 @@ import matplotlib
 import numpy as np
 import yaml
 
-from vcharge_evaluation import obstacles, tools
+from vcharge_evaluation import masks, obstacles, tools
 from vcharge_evaluation.camera_models import project
 from vcharge_evaluation.localization_errors import BOUND_DEG, BOUND_M, LocalizationErrors, Map
+from vcharge_evaluation.poses import at_stamps, rotations
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
-
-MASK_MARGIN_PX = 4
 
 
 def pick(result, *keys):
@@ -68,12 +67,19 @@ def save(figure, path):
     plt.close(figure)
 
 
-def copy_mask(source, target, margin):
-    mask = cv2.imread(str(source), cv2.IMREAD_GRAYSCALE)
-    if margin:
-        size = 2 * MASK_MARGIN_PX + 1
-        mask = cv2.erode(mask, np.ones((size, size), np.uint8))
-    cv2.imwrite(str(target), mask)
+def draw_masks(report, picture):
+    """The mean images of all cameras with the found body, from the pictures of make_masks."""
+    drawn = [cv2.imread(str(path)) for path in sorted(report.glob("*.png"))]
+    if drawn:
+        means = [cv2.resize(image[:, :image.shape[1] // 3], (640, 400), interpolation=cv2.INTER_AREA) for image in drawn]
+        means += [np.zeros_like(means[0])] * (len(means) % 2)
+        cv2.imwrite(str(picture), np.vstack([np.hstack(means[i:i + 2]) for i in range(0, len(means), 2)]))
+
+
+def judge_masks(path, truth, figures):
+    cameras = masks.compare(truth.parent, yaml.safe_load(truth.read_text()), path.parent, yaml.safe_load(path.read_text()))
+    total = sum(cameras.values(), masks.Pixels())
+    figures.update({"hidden_percent": total.hidden_percent(), "lost_percent": total.lost_percent()})
 
 
 def judge_rig(path, truth, figures, folder, picture):
@@ -138,6 +144,16 @@ def localization_figures(result, csv, map_path, truths, picture):
                         "normalized": float(np.mean(errors.normalized[good]))})
         errors.plot(picture)
     return figures
+
+
+def crossing_moment(truth):
+    """When a moving object is nearest to a point 4 m ahead of the vehicle's origin, as a fraction of the drive's duration."""
+    images = yaml.safe_load((truth / "movers.yaml").read_text())["images"]
+    poses = at_stamps(truth / "trajectory.tum", np.array([image["stamp_ns"] * 1e-9 for image in images]))
+    ahead = poses[:, 1:4] + 4.0 * rotations(poses[:, 4:])[:, :, 0]
+    distances = [min((np.linalg.norm(np.array(mover["translation_m"]) - point) for mover in image["movers"]), default=np.inf)
+                 for image, point in zip(images, ahead)]
+    return int(np.argmin(distances)) / (len(images) - 1)
 
 
 def judge_obstacles(output, truth, figures, folder):
