@@ -166,7 +166,7 @@ class LayoutTest : public testing::TestWithParam<const char*> {
     SceneOptions options;
     options.seed = options.layout_seed = layout_seed;
     options.image_scale = 0.02;
-    options.detail = 0.02;
+    options.detail = 0.1;
     return options;
   }
 };

@@ -1,5 +1,6 @@
 #include "scenes/lot/lot_plan.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "scenes/lot/parking_bays.h"
@@ -17,6 +18,12 @@ double LotPlan::depthOf(BayKind kind) const {
       return kBayLength_m;
   }
 }
+
+namespace {
+
+constexpr double kLeastLaneDistance_m = 14.5;
+
+}  // namespace
 
 LotPlan LotPlan::fromSeed(uint64_t layout_seed) {
   LotPlan plan;
@@ -39,6 +46,10 @@ LotPlan LotPlan::fromSeed(uint64_t layout_seed) {
   plan.lanes.x_m = 0.5 * plan.bays_per_row * kBayWidth_m + plan.to_row_end_m;
   plan.lanes.y_m = plan.half_middle_aisle_m + plan.depthOf(plan.middle_bays) + 2.0 * plan.half_island_m +
                    kInnerBays_m + 0.5 * kBayLength_m;
+  // Two corners of a drive need this distance between the lanes.
+  const double missing_m = std::max(0.0, kLeastLaneDistance_m - plan.lanes.y_m);
+  plan.half_island_m += 0.5 * missing_m;
+  plan.lanes.y_m += missing_m;
   plan.drive_offset = 0.5;
   // A bay of the row west of the middle, with room for the drives on both sides.
   plan.free_bay_x_m = (0.5 - 0.5 * plan.bays_per_row + (plan.bays_per_row / 2 - 2)) * kBayWidth_m;
