@@ -28,6 +28,7 @@ const std::vector<CatalogueScene>& catalogue() {
       {{"two_levels", "lot on two levels with ramps of 6 degrees and uneven ground"},
        buildTwoLevelsScene,
        twoLevelsDrives},
+      {{"ramp", "helical ramp of 9 m radius, 10 % and 1.25 turns on the lot"}, buildRampScene, rampDrives},
       {{"road", "straight road with parked cars and houses, then speed bumps and a slope of 5 %"},
        buildRoadScene,
        roadDrives,

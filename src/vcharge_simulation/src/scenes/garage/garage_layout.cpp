@@ -78,11 +78,11 @@ void addLamps(uint64_t seed, int day, GarageLayout* layout) {
 
 }  // namespace
 
-GarageLayout makeGarageLayout(uint64_t seed, int day) {
+GarageLayout makeGarageLayout(uint64_t seed, const Day& day) {
   GarageLayout layout;
   addBays(&layout);
   addPillars(&layout);
-  addLamps(seed, day, &layout);
+  addLamps(seed, day.number, &layout);
   layout.cars = parkCars(layout.bays, kOccupiedBays, seed + 90U, day);
   return layout;
 }

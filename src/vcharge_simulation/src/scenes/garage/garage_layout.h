@@ -37,6 +37,6 @@ struct GarageLayout {
 
 inline constexpr double kPillarWidth_m = 0.5;
 
-GarageLayout makeGarageLayout(uint64_t seed, int day);
+GarageLayout makeGarageLayout(uint64_t seed, const Day& day);
 
 }  // namespace vcharge

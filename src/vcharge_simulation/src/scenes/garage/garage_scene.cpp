@@ -21,6 +21,7 @@ constexpr double kCeilingTexel_m = 0.1;
 constexpr double kCeilingAlbedo = 0.6;
 // Irradiance at baked light 1; the camera's exposure is set for the garage.
 constexpr double kFullIrradiance = 4.5;
+constexpr double kFullIlluminance_lx = 1500.0;  // the same in reality
 constexpr double kTypicalCeilingLight = 0.12;
 // Ducts and lamps are above this height.
 constexpr double kOverhead_m = 2.1;
@@ -40,13 +41,23 @@ Eigen::Vector3f vector(double x, double y, double z) {
   return Eigen::Vector3d(x, y, z).cast<float>();
 }
 
+// After hours every other lamp is off.
+GarageLayout litLayout(const Conditions& conditions, uint64_t seed, const Day& day) {
+  GarageLayout layout = makeGarageLayout(seed, day);
+  for (size_t i = 0; i < layout.lamps.size() && conditions.is_dark; i += 2) {
+    layout.lamps[i].intensity = 0.0F;
+  }
+  return layout;
+}
+
 // Builds one garage; each step adds to the scene.
 class GarageBuilder {
  public:
   explicit GarageBuilder(const SceneOptions& options)
       : options_(options),
         seed_(options.seed),
-        layout_(makeGarageLayout(seed_, options.day)),
+        conditions_(conditionsOf(options.condition)),
+        layout_(litLayout(conditions_, seed_, options.day)),
         parts_(seed_ * 53U + 7U, 1.0) {}
 
   std::shared_ptr<const Scene> build() {
@@ -67,6 +78,7 @@ class GarageBuilder {
     light.gathered_rays = static_cast<int>(std::lround(24 * options_.detail));
     bakeLampLight(layout_.lamps, light, scene().min_m, scene().max_m, &scene());
     addCeilingReflection();
+    scene().vehicle_lamps = vehicleLampsOf(conditions_, kFullIlluminance_lx / kFullIrradiance);
     addMovers(options_, {kGarageArea, kGarageLanes, layout_.bays}, &parts_);
     return parts_.sharedScene();
   }
@@ -81,6 +93,7 @@ class GarageBuilder {
     floor.mapping = Material::Mapping::kGround;
     floor.texture = 0;
     floor.reflectivity = kFloorReflectivity;
+    floor.wetness = static_cast<float>(conditions_.wetness);
     const uint32_t material = scene().addMaterial(floor);
     scene().ground.layers.push_back(
         {Texture(drawGarageFloor(layout_, texel_m, seed_), Texture::Border::kClamp),
@@ -265,6 +278,7 @@ class GarageBuilder {
 
   const SceneOptions options_;
   const uint64_t seed_;
+  const Conditions conditions_;
   const GarageLayout layout_;
   SceneParts parts_;
 };

@@ -146,7 +146,7 @@ double LotLayout::groundHeight(double x, double y) const {
   return 0.0;
 }
 
-LotLayout makeLotLayout(uint64_t seed, int day) {
+LotLayout makeLotLayout(uint64_t seed, const Day& day) {
   LotLayout layout;
   Random random(seed);
   addBays(&layout);

@@ -33,6 +33,6 @@ inline constexpr double kBayLength_m = 4.3;
 inline constexpr double kFreeBayX_m = -9.1;
 inline constexpr double kFreeBayY_m = -9.95;
 
-LotLayout makeLotLayout(uint64_t seed, int day);
+LotLayout makeLotLayout(uint64_t seed, const Day& day);
 
 }  // namespace vcharge
