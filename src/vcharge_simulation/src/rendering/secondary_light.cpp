@@ -17,8 +17,9 @@ constexpr float kShadowOffset_m = 0.01F;
 constexpr float kBrightestReflection = 2.0F;
 constexpr float kMirroredCone_rad = 0.01F;
 constexpr float kWaterCone_rad = 0.004F;
-// Lamps are not traced where they are darker than this fraction of their brightness at 1 m.
-constexpr float kFaintestLamp = 1e-6F;
+// Lamps are not traced where they are darker than these fractions of a headlight at 1 m and of the sky.
+constexpr float kFaintestOfHeadlight = 5e-6F;
+constexpr float kFaintestOfSky = 0.002F;
 
 }  // namespace
 
@@ -28,7 +29,9 @@ SecondaryLight::SecondaryLight(const Scene& scene, const SurfaceShader& shader, 
       view_(view),
       sun_(scene.sky->directionToSun()),
       has_sun_(scene.sky->light().sun_irradiance > 0.0),
-      has_vehicle_lamps_(scene.vehicle_lamps.headlight > 0.0F || scene.vehicle_lamps.taillight > 0.0F) {}
+      has_vehicle_lamps_(scene.vehicle_lamps.headlight > 0.0F || scene.vehicle_lamps.taillight > 0.0F),
+      faintest_lamp_(std::max(kFaintestOfHeadlight * scene.vehicle_lamps.headlight,
+                              kFaintestOfSky * static_cast<float>(scene.sky->light().sky_irradiance))) {}
 
 bool SecondaryLight::isShadowed(const ExposedRow& row, const Eigen::Vector3f& position) const {
   return has_sun_ && (isShadowedByBody(row, position) || row.instant->isShadowedByMover(position, sun_));
@@ -54,16 +57,14 @@ Eigen::Vector3f SecondaryLight::vehicleLampsAt(const ExposedRow& row, const Eige
   const Eigen::Vector3f in_vehicle = row.vehicle_rotation.transpose() * (position - row.vehicle_origin);
   for (const VehicleLamp& lamp : kVehicleLamps) {
     const float irradiance = vehicleLampIrradiance(scene_.vehicle_lamps, lamp, in_vehicle);
-    if (irradiance <=
-        kFaintestLamp * std::max(scene_.vehicle_lamps.headlight, scene_.vehicle_lamps.taillight)) {
+    if (irradiance <= faintest_lamp_) {
       continue;
     }
-    const Eigen::Vector3f lamp_position = row.vehicle_origin + row.vehicle_rotation * lamp.position;
-    const float distance = (lamp_position - position).norm();
-    const Eigen::Vector3f to_lamp = (lamp_position - position) / distance;
-    RayTracer::Hit hit;
-    if (!row.instant->cast(position + kShadowOffset_m * to_lamp, to_lamp, &hit) ||
-        hit.distance_m > distance - 2.0F * kShadowOffset_m) {
+    const Eigen::Vector3f offset = row.vehicle_origin + row.vehicle_rotation * lamp.position - position;
+    const float distance = offset.norm();
+    const Eigen::Vector3f to_lamp = offset / distance;
+    if (!row.instant->occluded(position + kShadowOffset_m * to_lamp, to_lamp,
+                               distance - 2.0F * kShadowOffset_m)) {
       sum += irradiance * to_lamp;
     }
   }

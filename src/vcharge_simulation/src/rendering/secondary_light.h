@@ -40,6 +40,7 @@ class SecondaryLight {
   const CameraView& view_;
   const Eigen::Vector3f sun_;
   const bool has_sun_, has_vehicle_lamps_;
+  const float faintest_lamp_;
 };
 
 }  // namespace vcharge

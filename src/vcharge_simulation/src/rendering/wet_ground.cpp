@@ -1,6 +1,7 @@
 #include "rendering/wet_ground.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "vcharge_simulation/rendering/noise.h"
 
@@ -8,7 +9,7 @@ namespace vcharge {
 
 namespace {
 
-constexpr float kNormalReflectance = 0.02F;
+constexpr float kRefractiveIndex = 1.33F;
 constexpr float kPuddleSize_m = 3.5F;
 constexpr float kWetAsphalt = 0.55F;  // reflectance relative to dry asphalt
 constexpr float kFilm = 0.35F;        // fraction of the surface between puddles that is smooth
@@ -20,8 +21,11 @@ constexpr float kRipple_m = 0.07F;
 }  // namespace
 
 float waterReflectance(float cosine) {
-  const float m = 1.0F - std::clamp(cosine, 0.0F, 1.0F);
-  return kNormalReflectance + (1.0F - kNormalReflectance) * m * m * m * m * m;
+  const float a = std::clamp(cosine, 0.0F, 1.0F);
+  const float b = std::sqrt(1.0F - (1.0F - a * a) / (kRefractiveIndex * kRefractiveIndex));
+  const float s = (a - kRefractiveIndex * b) / (a + kRefractiveIndex * b);
+  const float p = (b - kRefractiveIndex * a) / (b + kRefractiveIndex * a);
+  return 0.5F * (s * s + p * p);
 }
 
 Water waterAt(const Eigen::Vector3f& position, const Eigen::Vector3f& ground_normal, float wetness,

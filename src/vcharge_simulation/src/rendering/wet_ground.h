@@ -4,8 +4,8 @@
 
 namespace vcharge {
 
-/// Fraction of the light that smooth water reflects at this cosine of the angle of incidence (Schlick, index
-/// of refraction 1.33).
+/// Fraction of unpolarized light that smooth water reflects at this cosine of the angle of incidence
+/// (Fresnel).
 float waterReflectance(float cosine);
 
 /// Water at a point of the ground.

@@ -149,8 +149,9 @@ TEST(ConditionsTest, WaterReflectsAsFresnelsEquationsSay) {
     const double b = std::cos(refracted_rad);
     const double s = std::pow((a - kIndex * b) / (a + kIndex * b), 2);
     const double p = std::pow((b - kIndex * a) / (b + kIndex * a), 2);
-    EXPECT_NEAR(waterReflectance(static_cast<float>(a)), 0.5 * (s + p), 0.03) << angle_rad;
+    EXPECT_NEAR(waterReflectance(static_cast<float>(a)), 0.5 * (s + p), 1e-4) << angle_rad;
   }
+  EXPECT_EQ(waterReflectance(0.0F), 1.0F);
 }
 
 TEST(ConditionsTest, WetGroundMirrorsAWallMoreTheMoreItsGrazingAndDryGroundDoesNot) {
@@ -241,8 +242,6 @@ TEST(ConditionsTest, AWetNightChangesNoRangeAndIsTheSameOnAnyNumberOfThreads) {
     {
       const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, 1);
       EXPECT_EQ(cv::norm(many, night.renderLight(view, pose), cv::NORM_INF), 0.0);
-      EXPECT_EQ(cv::norm(many, Renderer(buildScene(name, options)).renderLight(view, pose), cv::NORM_INF),
-                0.0);
     }
     cv::Mat ranges_m[] = {night.renderRange(view, pose), rendererOf(name).renderRange(view, pose)};
     for (cv::Mat& range_m : ranges_m) {
