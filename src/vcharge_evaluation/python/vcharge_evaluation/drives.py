@@ -1,23 +1,28 @@
 """Simulated drives that several stages share, and what is made from them once: the masks of the car's own body, and maps."""
 import hashlib
-import shutil
 
+import cv2
+import numpy as np
 import yaml
 
 from vcharge_evaluation.tools import CONFIG, run_tool_once, simulate
 
 SCENARIOS = CONFIG / "scenarios"
-# Scenes whose loop is long enough for masks of the own body; elsewhere the same car's masks come from the lot.
-MASK_SCENES = ("lot", "garage", "two_levels")
+# A car's masks come once from the loop of the scene with this seed; elsewhere those of the same car from the lot serve.
+MASK_SEEDS = {"lot": 201, "garage": 211}
 # The loop of a scene at noon, from which come its masks, its height map and the map for other days.
 LOOP_S, LOOP_STEP, HEIGHT_CELL_M = 24, 2, 0.025
+MASK_SCALE = 0.4  # image size, over 1280x800, of the drives in which masks are found
+# Another day's drive as in the chain (chain/steps.py): other light, moved cars, other errors of the wheels.
+OTHER_DAY = ("--drive", "other_day", "--exposure-gain", 1.2, "--set", "odometer.scale_error=-0.0005", "--set",
+             "odometer.left_right_error=0.0003")
 
 
 class Drive:
     """A simulated drive with its folder WORK/drives/NAME_HASH, where the hash is that of the words that make the drive."""
 
     def __init__(self, work, name, *words):
-        words = [str(word) for word in words]
+        words = [f"{word:g}" if isinstance(word, float) else str(word) for word in words]
         key = hashlib.sha1(" ".join(words).encode()).hexdigest()[:8]
         self.folder = work / "drives" / f"{name}_{key}"
         simulate(self.folder, words)
@@ -25,10 +30,10 @@ class Drive:
         self.trajectory, self.true_rig = self.truth / "trajectory.tum", self.folder / "rig_truth.yaml"
 
     def map(self, rig):
-        """Sparse map and trajectory of build_map with a rig file, and its run."""
+        """Sparse map and trajectory of build_map with a rig file, and its run, which may have failed."""
         run = run_tool_once("build_map", self.folder / "map.log", "--bag", self.bag, "--rig", rig, "--output",
                             self.folder / "map.vmap", "--trajectory", self.folder / "map.tum", "--options",
-                            CONFIG / "mapping.yaml")
+                            CONFIG / "mapping.yaml", may_fail=True)
         return self.folder / "map.vmap", self.folder / "map.tum", run
 
 
@@ -37,6 +42,13 @@ def loop_drive(work, scene, seed, scale, duration_s=LOOP_S, words=()):
     return Drive(work, f"{scene}_loop", "--scene", scene, "--drive", "loop", "--scene-seed", seed, "--seed", seed,
                  "--image-scale", scale, "--image-step", LOOP_STEP, "--duration-s", duration_s, "--height-cell-m",
                  HEIGHT_CELL_M, *words)
+
+
+def other_day_drive(work, scene, seed, scale, duration_s, words=()):
+    """A drive in a scene on another day, with true ranges. `words` choose another car."""
+    # The same words as those of evaluate.sh obstacles, so that the stages share the drive.
+    return Drive(work, f"{scene}_other_day", "--scene", scene, *OTHER_DAY, "--scene-seed", seed, "--seed", seed + 400,
+                 "--image-scale", scale, "--duration-s", duration_s, "--truth-range", *words)
 
 
 class FoundMasks:
@@ -58,9 +70,10 @@ class FoundMasks:
         """What a row of the results says about masks."""
         return f"make_masks: {self.verdict}" + ("" if self.rig else "; without masks")
 
-    def rig_of(self, drive):
-        """A drive's rig file with its true calibration and the found masks in place of the true ones, which only judge."""
-        return write_masked_rig(drive.true_rig, self.rig, drive.folder / "rig_found_masks.yaml")
+    def rig_of(self, folder):
+        """Rig file of a drive in a folder: the true calibration, with the found masks in place of the true ones, which only
+        judge."""
+        return write_masked_rig(folder / "rig_truth.yaml", self.rig, folder / "rig_found_masks.yaml")
 
 
 def write_masked_rig(true_rig, masked_rig, path):
@@ -71,12 +84,22 @@ def write_masked_rig(true_rig, masked_rig, path):
         camera.pop("mask", None)
         mask = found.get(name, {}).get("mask")
         if mask:
-            shutil.copyfile(masked_rig.parent / mask, path.parent / f"found_mask_{name}.png")
             camera["mask"] = f"found_mask_{name}.png"
+            save_resized(masked_rig.parent / mask, path.parent / camera["mask"], camera["image_size_px"])
     path.write_text(yaml.safe_dump(rig, sort_keys=False))
     return path
 
 
-def found_masks(work, scene, seed, scale, words=()):
-    """Masks of a car, found in the loop of the scene (or of the lot) with images of this scale."""
-    return FoundMasks(loop_drive(work, scene if scene in MASK_SCENES else "lot", seed, scale, words=words))
+def save_resized(mask, path, size_px):
+    """Writes a mask in another image size; a pixel that lies on a hidden one to any part is hidden."""
+    pixels = cv2.imread(str(mask), cv2.IMREAD_GRAYSCALE)
+    if pixels.shape[::-1] != tuple(size_px):
+        whole = cv2.resize(pixels, tuple(size_px), interpolation=cv2.INTER_AREA)
+        pixels = np.where(whole == 255, 255, 0).astype(np.uint8)
+    cv2.imwrite(str(path), pixels)
+
+
+def found_masks(work, scene, words=()):
+    """Masks of a car, found in a loop of the scene (or of the lot). `words` choose another car."""
+    scene = scene if scene in MASK_SEEDS else "lot"
+    return FoundMasks(loop_drive(work, scene, MASK_SEEDS[scene], MASK_SCALE, words=words))

@@ -7,7 +7,7 @@ from vcharge_evaluation.tools import ROOT
 
 PAGE = ROOT / "doc" / "results.md"
 # In the order of the pipeline; other stages follow by name.
-ORDER = ("chain", "masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "faults",
+ORDER = ("chain", "conditions", "masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "faults",
          "odometry", "latency", "real_images", "foundations", "speed")
 INTRODUCTION = """# Results
 
@@ -31,6 +31,15 @@ def show(measurements):
     return "\n".join(["|what|figure|goal|command|", "|---|---|---|---|", *rows])
 
 
+def picture(folder, name):
+    """Lines with the picture of a stage's worst case, if there is one."""
+    entry = results.read_caption(folder / "pictures" / f"{name}.json")
+    if entry is None:
+        return []
+    return [f"![worst case]({folder.name}/pictures/{name}.jpg)\n\nWorst case: {entry['caption']}. `{entry['command']}` "
+            f"({entry['date']}, {entry['commit']})\n"]
+
+
 def make_page(folder=results.RESULTS):
     parts = [INTRODUCTION]
     paths = {path.stem: path for path in folder.glob("*.json")}
@@ -39,6 +48,7 @@ def make_page(folder=results.RESULTS):
         parts.append(f"## {title}\n")
         for heading, group in results.by_title(measurements).items():
             parts.append(f"### {heading}\n\n{show(group)}\n")
+        parts += picture(folder, name)
     return "\n".join(parts)
 
 

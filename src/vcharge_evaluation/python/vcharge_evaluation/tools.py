@@ -68,7 +68,7 @@ def run_tool(name, log, *words, prefix=(), may_fail=False):
 def state_of(name, words):
     """Text that changes with a tool, the libraries, its words and the option files among them."""
     options = [pathlib.Path(str(word)) for word in words if str(word).endswith(".yaml") and pathlib.Path(str(word)).exists()]
-    programs = [tool_path(name), *sorted(TOOLS.glob("*.so"))]
+    programs = [tool_path(name), *(path for path in TOOLS.glob("*.so") if "evaluation" not in path.name)]
     newest = max((path.stat().st_mtime_ns for path in programs), default=0)
     texts = [*(str(word) for word in words), *(path.read_text() for path in options), str(newest)]
     return hashlib.sha1("\n".join(texts).encode()).hexdigest()
