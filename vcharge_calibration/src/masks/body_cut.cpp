@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/imgproc/detail/gcgraph.hpp>
 
-#include "vcharge_core/base/quantile.h"
+#include "masks/scene_levels.h"
 
 namespace vcharge::internal {
 namespace {
@@ -15,13 +15,15 @@ namespace {
 // Mean edge directions have this standard deviation per coordinate on a body, whose shading and reflections
 // of itself stay in place. In the scene it is measured.
 constexpr float kBodyEdgeSigma = 0.25F;
-// Moving structure relative to the image's typical one, which is as likely on a body as in the scene.
+// Moving structure relative to the scene's at this elevation, which is as likely on a body as in the scene.
 constexpr float kEvenMoving = 0.45F;
 constexpr float kStillEvidence = 2.0F;
-constexpr float kMovingEvidence = 0.4F, kUpperMovingEvidence = 0.7F;
+// Glossy paint reflects the scene, at flat angles with most of its contrast.
+constexpr float kMovingEvidence = 0.4F;
 constexpr float kNoEdgeEvidence = 0.25F;
 constexpr float kMaxMoving = 1.5F;
-constexpr float kMaxEdgeEvidence = 20.0F, kUpperMaxEdgeEvidence = 10.0F;
+constexpr float kClearlyStill = 0.75F;
+constexpr float kMaxEdgeEvidence = 20.0F;
 // Evidence of a pixel relative to an independent one: smoothing correlates neighbours.
 constexpr float kIndependence = 0.15F;
 // Costs of a cut between neighbours away from static edges and along them.
@@ -30,14 +32,12 @@ constexpr float kMinCutCost = 0.05F;
 constexpr float kForbidden = 1e4F;
 // Length of the mean edge direction of a clear edge, relative to that of the scene's noise.
 constexpr float kClearEdge = 4.0F;
-constexpr float kWeakEdge = 3.0F, kUpperEdge = 3.0F, kStrongEdge = 7.0F;
+constexpr float kWeakEdge = 3.0F, kStrongEdge = 7.0F;
 // Directions from the optical axis, of which neighbours on both sides decide whether an edge bounds the body.
-constexpr int kDirections = 360;
-constexpr int kReach = 6;
-constexpr int kMaxGap = 25;
+constexpr size_t kDirections = 360;
+constexpr size_t kReach = 6;
+constexpr size_t kMaxGap = 25;
 constexpr float kBoundedFraction = 0.5F;
-// Brightness relative to the ground above which a pixel of the upper half may be sky.
-constexpr double kSkyBrightness = 1.5;
 // Distance from the border of the field of view and from the body at which static edges are dirt.
 constexpr int kBorder_px = 8;
 constexpr float kAlwaysThere = 0.7F;
@@ -47,62 +47,44 @@ constexpr double kMinBody = 0.0003;
 
 class Evidence {
  public:
-  Evidence(const SmallView& view, const StaticStructure& structure) : view_(view), structure_(structure) {
+  Evidence(const SmallView& view, const StaticStructure& structure)
+      : view_(view), structure_(structure), levels_(findSceneLevels(view, structure)) {
     cv::magnitude(structure.edge_x, structure.edge_y, edge_);
-    std::vector<double> ground;
-    for (int y = view.size.height / 2; y < view.size.height; ++y) {
-      for (int x = 0; x < view.size.width; ++x) {
-        if (view.valid.at<uint8_t>(y, x) != 0) {
-          ground.push_back(structure.light.at<float>(y, x));
-        }
-      }
-    }
-    if (!ground.empty()) {
-      sky_level_ = std::min(sky_level_, static_cast<float>(kSkyBrightness * quantile(ground, 0.5)));
-    }
   }
   const SmallView& view() const { return view_; }
   /// CV_8UC1, 255 on clear static edges.
-  cv::Mat clearEdges() const {
-    cv::Mat clear = edge_ > kWeakEdge * structure_.edge_noise;
-    const cv::Rect upper(0, 0, clear.cols, clear.rows / 2);
-    clear(upper) = edge_(upper) > kUpperEdge * structure_.edge_noise;
-    return clear;
-  }
-
-  /// CV_8UC1, 255 on strong static edges of the lower half.
+  cv::Mat clearEdges() const { return edge_ > kWeakEdge * levels_.edge_noise; }
+  /// CV_8UC1, 255 on strong static edges below the horizon.
   cv::Mat strongEdges() const {
-    cv::Mat strong = edge_ > kStrongEdge * structure_.edge_noise;
-    strong.rowRange(0, strong.rows / 2).setTo(0);
-    return strong;
+    return (edge_ > kStrongEdge * levels_.edge_noise) & (levels_.elevation_rad < 0.0);
   }
   /// CV_8UC1, 255 on edges that are in nearly every image.
   cv::Mat alwaysThere() const { return edge_ > kAlwaysThere; }
 
   /// Log of the likelihood ratio of body and scene.
   float at(int y, int x) const {
-    // Sky shows little structure. Images are upright, so it is in their upper half.
-    if (y < view_.size.height / 2 && structure_.light.at<float>(y, x) > sky_level_) {
-      return -kIndependence;
-    }
-    const float scene_precision = 1.0F / (sigmaAt(y) * sigmaAt(y));
+    const float scene_sigma = levels_.edge_noise.at<float>(y, x);
+    const float scene_precision = 1.0F / (scene_sigma * scene_sigma);
     const float body_precision = 1.0F / (kBodyEdgeSigma * kBodyEdgeSigma);
     const float edge = edge_.at<float>(y, x);
     const float by_edge =
         std::log(body_precision / scene_precision) + 0.5F * edge * edge * (scene_precision - body_precision);
-    const float relative = structure_.moving.at<float>(y, x) / static_cast<float>(structure_.typical_moving);
-    const float stillness = std::log(kEvenMoving / std::max(relative, 1e-3F));
-    // Glossy paint below the camera reflects the ground, at flat angles with most of its contrast.
-    const bool is_upper = y < view_.size.height / 2;
-    const float weight = stillness > 0.0F ? kStillEvidence
-                         : is_upper       ? kUpperMovingEvidence
-                                          : kMovingEvidence;
-    const float by_moving = std::clamp(weight * stillness, -kMaxMoving, kMaxMoving);
+    const float by_moving = stillnessAt(y, x);
     // Flat paint has no edges.
-    const float least_by_edge = stillness < 0.0F ? -kNoEdgeEvidence : 0.0F;
-    return kIndependence *
-           (std::clamp(by_edge, least_by_edge, is_upper ? kUpperMaxEdgeEvidence : kMaxEdgeEvidence) +
-            structure_.fading.at<float>(y, x) * by_moving);
+    const float least_by_edge = by_moving > kNoEdgeEvidence ? 0.0F : -kNoEdgeEvidence;
+    return kIndependence * (std::clamp(by_edge, least_by_edge, kMaxEdgeEvidence) + trustAt(y, x) * by_moving);
+  }
+  /// Weight of the moving structure, which the fading of the lens makes uncertain.
+  float trustAt(int y, int x) const { return structure_.fading.at<float>(y, x); }
+  /// The part of the moving structure in it.
+  float stillnessAt(int y, int x) const {
+    const float expected = std::max(levels_.moving.at<float>(y, x), 1e-6F);
+    const float relative = structure_.moving.at<float>(y, x) / expected;
+    const float stillness = std::log(kEvenMoving / std::max(relative, 1e-3F));
+    // Where the scene hardly moves, as clear sky, stillness tells nothing.
+    const float significance = std::min(1.0F, expected / static_cast<float>(structure_.typical_moving));
+    return significance * std::clamp((stillness > 0.0F ? kStillEvidence : kMovingEvidence) * stillness,
+                                     -kMaxMoving, kMaxMoving);
   }
   /// Cost of a cut between two neighbours; cheap where a static edge runs between them.
   float cutCost(int y, int x, int dy, int dx) const {
@@ -112,20 +94,14 @@ class Evidence {
     };
     const float length = std::hypot(static_cast<float>(dx), static_cast<float>(dy));
     const float edge = std::max(across(y, x), across(y + dy, x + dx)) / length /
-                       (kClearEdge * static_cast<float>(structure_.edge_noise));
+                       (kClearEdge * levels_.edge_noise.at<float>(y, x));
     return (kMinCutCost + (kCutCost - kMinCutCost) * std::max(0.0F, 1.0F - edge * edge)) / length;
   }
 
  private:
-  /// Standard deviation of edges' directions where nothing stays.
-  float sigmaAt(int y) const {
-    return static_cast<float>(y < view_.size.height / 2 ? structure_.upper_edge_noise
-                                                        : structure_.edge_noise);
-  }
-
   const SmallView& view_;
   const StaticStructure& structure_;
-  float sky_level_ = 240.0F;  // saturated
+  const SceneLevels levels_;
   cv::Mat edge_;
 };
 
@@ -184,68 +160,68 @@ cv::Mat minimumCut(const Evidence& evidence) {
 /// Keeps directions without a clear edge too if they lie between kept ones.
 void bridgeGaps(const std::array<int, kDirections>& length, std::array<bool, kDirections>* keeps) {
   const std::array<bool, kDirections> clear = *keeps;
-  for (int direction = 0; direction < kDirections; ++direction) {
-    for (int gap = 2; clear[static_cast<size_t>(direction)] && gap <= kMaxGap; ++gap) {
-      if (!clear[static_cast<size_t>((direction + gap) % kDirections)]) {
+  for (size_t direction = 0; direction < kDirections; ++direction) {
+    for (size_t gap = 2; clear[direction] && gap <= kMaxGap; ++gap) {
+      if (!clear[(direction + gap) % kDirections]) {
         continue;
       }
       bool has_body = true;
-      for (int step = 1; step < gap; ++step) {
-        has_body = has_body && length[static_cast<size_t>((direction + step) % kDirections)] > 0;
+      for (size_t step = 1; step < gap; ++step) {
+        has_body = has_body && length[(direction + step) % kDirections] > 0;
       }
-      for (int step = 1; has_body && step < gap; ++step) {
-        (*keeps)[static_cast<size_t>((direction + step) % kDirections)] = true;
+      for (size_t step = 1; has_body && step < gap; ++step) {
+        (*keeps)[(direction + step) % kDirections] = true;
       }
       break;
     }
   }
 }
 
-/// Removes the body in directions in which no static edge separates it from the scene, such as smooth sky or
-/// asphalt.
+/// Removes the body in directions in which neither a static edge separates it from the scene nor all of it is
+/// still where the scene moves.
 void keepBoundedDirections(const Evidence& evidence, cv::Mat* body) {
   const SmallView& view = evidence.view();
-  const cv::Mat edges = evidence.clearEdges(), strong = evidence.strongEdges();
+  const cv::Mat strong = evidence.strongEdges();
   cv::Mat near_edge;
-  cv::dilate(edges, near_edge, cv::Mat::ones(3, 3, CV_8U));
-  const auto directionOf = [&](int y, int x) {
-    const double turn = std::atan2(y - view.centre.y, x - view.centre.x) / (2.0 * CV_PI) + 0.5;
-    return std::min(kDirections - 1, static_cast<int>(turn * kDirections));
-  };
+  cv::dilate(evidence.clearEdges(), near_edge, cv::Mat::ones(3, 3, CV_8U));
   std::array<int, kDirections> length{}, bounded{};
+  std::array<float, kDirections> trust{}, stillness{};
+  std::array<bool, kDirections> has_strong_edge{};
   for (int y = 0; y < body->rows; ++y) {
     for (int x = 0; x < body->cols; ++x) {
-      const cv::Point inner = cv::Point(x, y) - outward(view, y, x);
-      if (body->at<uint8_t>(y, x) != 0 && body->at<uint8_t>(inner) == 0) {
-        const auto direction = static_cast<size_t>(directionOf(y, x));
+      if (body->at<uint8_t>(y, x) == 0) {
+        continue;
+      }
+      const size_t direction = view.sectorOf(y, x, kDirections);
+      trust[direction] += evidence.trustAt(y, x);
+      stillness[direction] += evidence.trustAt(y, x) * evidence.stillnessAt(y, x);
+      has_strong_edge[direction] = has_strong_edge[direction] || strong.at<uint8_t>(y, x) != 0;
+      if (body->at<uint8_t>(cv::Point(x, y) - outward(view, y, x)) == 0) {
         ++length[direction];
         bounded[direction] += near_edge.at<uint8_t>(y, x) != 0 ? 1 : 0;
       }
     }
   }
-  // The outline may be weak where a strong edge is inside.
-  for (int y = 0; y < body->rows; ++y) {
-    for (int x = 0; x < body->cols; ++x) {
-      if (body->at<uint8_t>(y, x) != 0 && strong.at<uint8_t>(y, x) != 0) {
-        const auto direction = static_cast<size_t>(directionOf(y, x));
-        bounded[direction] = length[direction];
-      }
+  for (size_t direction = 0; direction < kDirections; ++direction) {
+    // The outline may be weak where a strong edge is inside.
+    if (has_strong_edge[direction] || stillness[direction] > kClearlyStill * trust[direction]) {
+      bounded[direction] = length[direction];
     }
   }
   std::array<bool, kDirections> keeps{};
-  for (int direction = 0; direction < kDirections; ++direction) {
+  for (size_t direction = 0; direction < kDirections; ++direction) {
     int all = 0, clear = 0;
-    for (int step = -kReach; step <= kReach; ++step) {
-      const auto other = static_cast<size_t>((direction + step + kDirections) % kDirections);
+    for (size_t step = 0; step <= 2 * kReach; ++step) {
+      const size_t other = (direction + step + kDirections - kReach) % kDirections;
       all += length[other];
       clear += bounded[other];
     }
-    keeps[static_cast<size_t>(direction)] = clear > kBoundedFraction * static_cast<float>(all);
+    keeps[direction] = static_cast<float>(clear) > kBoundedFraction * static_cast<float>(all);
   }
   bridgeGaps(length, &keeps);
   for (int y = 0; y < body->rows; ++y) {
     for (int x = 0; x < body->cols; ++x) {
-      if (!keeps[static_cast<size_t>(directionOf(y, x))]) {
+      if (!keeps[view.sectorOf(y, x, kDirections)]) {
         body->at<uint8_t>(y, x) = 0;
       }
     }

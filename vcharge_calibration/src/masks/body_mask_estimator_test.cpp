@@ -110,12 +110,12 @@ double fraction(const cv::Mat& part, const cv::Mat& whole) {
   return static_cast<double>(cv::countNonZero(part & whole)) / cv::countNonZero(whole);
 }
 
-void expectBodyHidden(const BodyMasks& masks) {
+void expectBodyHidden(const BodyMasks& masks, const cv::Mat& body = vcharge::body()) {
   const CameraBodyMask& found = masks.cameras.at(0);
   ASSERT_NE(found.verdict, Verdict::kFail) << found.remarks.at(0);
   ASSERT_EQ(found.mask.size(), kSize);
-  EXPECT_GE(fraction(found.mask == 0, body() & inside()), 0.97);
-  EXPECT_LE(fraction(found.mask == 0, inside() & (body() == 0)), 0.02);
+  EXPECT_GE(fraction(found.mask == 0, body & inside()), 0.97);
+  EXPECT_LE(fraction(found.mask == 0, inside() & (body == 0)), 0.02);
 }
 
 void expectNotEnoughMotion(const BodyMasks& masks) {
@@ -140,6 +140,20 @@ TEST(BodyMaskEstimatorTest, ThinsOutTheSamplesOfALongDrive) {
   EXPECT_LE(masks.num_samples, static_cast<int>(BodyMaskEstimator::kMaxSamples));
   EXPECT_GT(masks.num_samples, static_cast<int>(BodyMaskEstimator::kMaxSamples) / 2);
   expectBodyHidden(masks);
+}
+
+TEST(BodyMaskEstimatorTest, HidesPaintAboveTheHorizonThatReflectsThingsOfMoreStructureThanTheGround) {
+  cv::Mat side = cv::Mat::zeros(kSize, CV_8UC1);
+  cv::ellipse(side, cv::Point(0, 200), cv::Size(110, 400), 0.0, 0.0, 360.0, cv::Scalar(255), cv::FILLED);
+  expectBodyHidden(DrawnDrive().masks([&](double /*heading_rad*/, cv::Mat* image) {
+    image->rowRange(0, 180) = 110.0 + 2.5 * (image->rowRange(0, 180) - 110.0);
+    image->rowRange(180, kSize.height) = 110.0 + 0.5 * (image->rowRange(180, kSize.height) - 110.0);
+    cv::Mat mirrored;
+    cv::flip(*image, mirrored, 1);
+    mirrored = 60.0 + 0.2 * mirrored;
+    mirrored.copyTo(*image, side);
+  }),
+                   side);
 }
 
 TEST(BodyMaskEstimatorTest, HidesPaintThatReflectsTheMovingScene) {

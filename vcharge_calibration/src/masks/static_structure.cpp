@@ -27,9 +27,6 @@ constexpr float kRim_rad = 0.15F;
 constexpr int kRimBins = 40;
 constexpr int kMinOutside_px = 200;
 constexpr double kStatic = 0.35;
-// Quantiles 0.15, 0.4 and 0.7 of the Rayleigh distribution.
-constexpr double kRayleigh15 = 0.5701, kRayleigh40 = 1.0108, kRayleigh70 = 1.5518;
-constexpr double kMinEdgeNoise = 0.02, kMaxEdgeNoise = 0.2;
 // Moving structure that is weaker than this fraction of the noise is not significant.
 constexpr double kMinMoving = 0.3;
 constexpr int kBlock_px = 16;
@@ -82,21 +79,16 @@ cv::Mat rimFading(const SmallView& view, const cv::Mat& light) {
   double rim_rad = 0.0;
   cv::minMaxLoc(view.angle_rad, nullptr, &rim_rad, nullptr, nullptr, view.valid);
   const float inner_rad = static_cast<float>(rim_rad) - kRim_rad;
-  constexpr int kDirections = 180;
-  const cv::Point2f centre(0.5F * view.size.width, 0.5F * view.size.height);
-  const auto directionOf = [&](int x, int y) {
-    const double turn = std::atan2(y - centre.y, x - centre.x) / (2.0 * CV_PI) + 0.5;
-    return std::min(kDirections - 1, static_cast<int>(turn * kDirections));
-  };
+  constexpr size_t kDirections = 180;
   std::vector<std::vector<double>> inside(kDirections);
-  std::vector<std::vector<double>> cells(static_cast<size_t>(kDirections) * kRimBins);
+  std::vector<std::vector<double>> cells(kDirections * kRimBins);
   for (int y = 0; y < view.size.height; ++y) {
     for (int x = 0; x < view.size.width; ++x) {
       const float beyond = view.angle_rad.at<float>(y, x) - inner_rad;
       if (view.valid.at<uint8_t>(y, x) == 0 || beyond < -0.5F * kRim_rad) {
         continue;
       }
-      const auto direction = static_cast<size_t>(directionOf(x, y));
+      const size_t direction = view.sectorOf(y, x, kDirections);
       if (beyond < 0.0F) {
         inside[direction].push_back(light.at<float>(y, x));
       } else {
@@ -208,6 +200,7 @@ SmallView makeSmallView(const RigCamera& camera) {
   view.centre = cv::Point2f(static_cast<float>((axis.x() + 0.5) * view.size.width / full.width - 0.5),
                             static_cast<float>((axis.y() + 0.5) * view.size.height / full.height - 0.5));
   view.valid = cv::Mat::zeros(view.size, CV_8UC1);
+  view.rays = cv::Mat::zeros(view.size, CV_32FC3);
   view.angle_rad = cv::Mat(view.size, CV_32FC1, cv::Scalar(10.0));
   for (int y = 0; y < view.size.height; ++y) {
     for (int x = 0; x < view.size.width; ++x) {
@@ -216,12 +209,20 @@ SmallView makeSmallView(const RigCamera& camera) {
       Eigen::Vector3d ray;
       if (camera.model.unproject(pixel, &ray)) {
         const double angle_rad = std::atan2(ray.head<2>().norm(), ray.z());
+        const Eigen::Vector3f direction = ray.normalized().cast<float>();
+        view.rays.at<cv::Vec3f>(y, x) = {direction.x(), direction.y(), direction.z()};
         view.angle_rad.at<float>(y, x) = static_cast<float>(angle_rad);
         view.valid.at<uint8_t>(y, x) = angle_rad <= 0.5 * camera.field_of_view_rad ? 255 : 0;
       }
     }
   }
   return view;
+}
+
+size_t SmallView::sectorOf(int y, int x, size_t num_sectors) const {
+  const double turn =
+      std::atan2(static_cast<float>(y) - centre.y, static_cast<float>(x) - centre.x) / (2.0 * CV_PI) + 0.5;
+  return std::min(num_sectors - 1, static_cast<size_t>(turn * static_cast<double>(num_sectors)));
 }
 
 cv::Mat shrink(const cv::Mat& pixels, cv::Size size) {
@@ -280,28 +281,16 @@ StaticStructure findStaticStructure(const SmallView& view, const std::vector<cv:
   cv::sqrt(fine(variance), found.moving);
   cv::Mat edge;
   cv::magnitude(found.edge_x, found.edge_y, edge);
-  std::vector<double> moving, noises, edges[2];  // edges of the upper and the lower half
+  std::vector<double> moving, noises;
   for (int y = 0; y < view.size.height; ++y) {
     for (int x = 0; x < view.size.width; ++x) {
-      if (view.valid.at<uint8_t>(y, x) == 0) {
-        continue;
-      }
-      edges[y < view.size.height / 2 ? 0 : 1].push_back(edge.at<float>(y, x));
-      if (edge.at<float>(y, x) < kStatic) {
+      if (view.valid.at<uint8_t>(y, x) != 0 && edge.at<float>(y, x) < kStatic) {
         moving.push_back(found.moving.at<float>(y, x));
         noises.push_back(std::sqrt(sum_noise.at<float>(y, x) / total));
       }
     }
   }
-  // The lengths of random directions have a Rayleigh distribution. Straight driving leaves edges of the scene
-  // in the upper half, where less of the body is visible than in the lower one.
-  if (!moving.empty() && !edges[0].empty() && !edges[1].empty()) {
-    const double upper =
-        std::max(quantile(edges[0], 0.4) / kRayleigh40, quantile(edges[0], 0.7) / kRayleigh70);
-    // The body may fill most of the lower half, with edges that are longer than those of the scene.
-    const double lower = std::min(upper, quantile(edges[1], 0.15) / kRayleigh15);
-    found.edge_noise = std::clamp(lower, kMinEdgeNoise, kMaxEdgeNoise);
-    found.upper_edge_noise = std::clamp(upper, kMinEdgeNoise, kMaxEdgeNoise);
+  if (!moving.empty()) {
     found.typical_moving = quantile(moving, 0.5);
     if (found.typical_moving < kMinMoving * quantile(noises, 0.5)) {
       found.typical_moving = 0.0;

@@ -13,7 +13,11 @@ struct SmallView {
   cv::Size size;
   cv::Mat valid;       ///< CV_8UC1, 255 inside the field of view
   cv::Point2f centre;  ///< pixel of the optical axis
+  cv::Mat rays;        ///< CV_32FC3, unit vectors in the camera frame; 0 where the model has none
   cv::Mat angle_rad;   ///< CV_32FC1, angle to the optical axis
+
+  /// Number of the sector around the optical axis, out of `num_sectors`, in which a pixel lies.
+  size_t sectorOf(int y, int x, size_t num_sectors) const;
 };
 cv::Size smallSize(const RigCamera& camera);
 SmallView makeSmallView(const RigCamera& camera);
@@ -27,8 +31,6 @@ struct StaticStructure {
   cv::Mat edge_x, edge_y;  ///< mean of the gradients' directions: length 1 for an edge that is always there
   cv::Mat moving;          ///< standard deviation over time of the local contrast, without the images' noise
   double typical_moving = 0.0;  ///< median of `moving` away from static edges; 0 if nothing moves
-  /// Standard deviation of edge_x and edge_y where nothing stays, in the lower and the upper half.
-  double edge_noise = 0.0, upper_edge_noise = 0.0;
 };
 
 /// `images`: CV_8UC1 of the view's size, some may be empty; one weight each.

@@ -46,7 +46,7 @@ double cornerTangent(const std::vector<DrivePath::Segment>& corner, double turn_
 
 }  // namespace
 
-DrivePath::DrivePath(const RigidTransform& world_from_start, std::vector<Segment> segments)
+DrivePath::DrivePath(const RigidTransform& world_from_start, const std::vector<Segment>& segments)
     : world_from_start_(world_from_start) {
   for (const Segment& segment : segments) {
     if (!(segment.length_m >= 0.0)) {

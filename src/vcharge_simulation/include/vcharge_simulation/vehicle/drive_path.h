@@ -31,7 +31,7 @@ class DrivePath {
   static DrivePath throughWaypoints(const std::vector<Eigen::Vector2d>& waypoints, bool closed,
                                     double radius_m, double transition_m);
 
-  DrivePath(const RigidTransform& world_from_start, std::vector<Segment> segments);
+  DrivePath(const RigidTransform& world_from_start, const std::vector<Segment>& segments);
 
   const RigidTransform& worldFromStart() const { return world_from_start_; }
   double length() const { return length_m_; }
