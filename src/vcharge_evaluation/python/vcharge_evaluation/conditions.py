@@ -119,7 +119,7 @@ def main():
                     (name, condition.figures()))
         results.show(draw_obstacles(condition.drive, condition.drive.folder / "obstacles"),
                      f"{name}: mean range error of obstacles {100 * condition.badness:.1f} cm. Image with obstacles, scan, and map: "
-                     "green free, red occupied, dark unknown, true outlines yellow", condition.badness)
+                     "green free, red occupied, dark unknown, true outlines cyan", condition.badness)
     results.end()
 
 

@@ -130,7 +130,7 @@ def main():
         if means:
             drive.truth = truth
             results.show(draw_obstacles(drive, folder / "obstacles"), f"{fault}: mean range error of obstacles {means[0]:.1f} cm. "
-                         "Image with obstacles, scan, and map: green free, red occupied, dark unknown, true outlines yellow", means[0])
+                         "Image with obstacles, scan, and map: green free, red occupied, dark unknown, true outlines cyan", means[0])
     results.end()
 
 

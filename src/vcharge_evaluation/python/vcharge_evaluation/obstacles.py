@@ -180,7 +180,7 @@ def main():
         results.show(draw_obstacles(drive, drive.folder / "obstacles"),
                      f"{column}: mean range error {100 * found['mean_m']:.1f} cm, {found['missed']} of {found['obstacles']} "
                      "obstacles missed. Image with obstacles, scan, and map: green free, red occupied, dark unknown, true outlines "
-                     "yellow", found["missed"] + found["mean_m"])
+                     "cyan", found["missed"] + found["mean_m"])
     results.end()
 
 

@@ -12,7 +12,6 @@ import pathlib
 import subprocess
 import sys
 
-from vcharge_evaluation.drawing.pictures import save_small
 from vcharge_evaluation.tools import ROOT, say
 
 RESULTS = ROOT / "doc" / "results"
@@ -189,6 +188,8 @@ class Results:
     def show(self, picture, caption, badness):
         """Makes a picture (BGR) that of the stage, with its caption (scene and figure), if it is the worst (largest badness)
         of those drawn at this commit. With `publish` it also goes into doc/results/pictures."""
+        from vcharge_evaluation.drawing.pictures import save_small  # the page is made without OpenCV and rosbag
+
         for folder in [self.path.parent / "pictures", *([PICTURES] if self.publish else [])]:
             entry = read_caption(folder / f"{self.stage}.json")
             if entry and entry["commit"] == commit() and entry["badness"] >= badness:
