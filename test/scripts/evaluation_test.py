@@ -118,6 +118,10 @@ class ResultsTest(FolderTest):
         new = [results.Measurement("t", "lot", [results.Figure("error", 1)]), results.Measurement("u", "lot", [])]
         self.assertEqual(results.merge(old, new), [new[0], old[1], new[1]])
 
+    def test_the_command_of_a_figure_leaves_out_where_it_was_kept(self):
+        self.assertEqual(results.words_that_matter(["--seed", "2", "--work", "/tmp/somewhere", "--publish", "--small"]),
+                         ["--seed", "2", "--small"])
+
     def test_results_are_published_on_request_only(self):
         args = types.SimpleNamespace(work=self.folder / "work", publish=False)
         published = results.RESULTS
@@ -134,6 +138,14 @@ class PageTest(unittest.TestCase):
     def test_results_page_is_made_from_the_results(self):
         self.assertEqual(page.PAGE.read_text(encoding="utf-8"), page.make_page(),
                          "doc/results.md is stale or edited by hand: run scripts/in_build.sh python3 -m vcharge_evaluation.page")
+
+    def test_one_table_holds_what_several_commands_measured(self):
+        both = [results.Measurement("t", scene, [results.Figure("error", 1)], f"measure {scene}", "2026-01-02", "abc")
+                for scene in ("lot", "garage")]
+        self.assertEqual(page.show(both).splitlines()[-4:], ["|error|1|1|", "", "- `measure lot` (2026-01-02, abc)",
+                                                             "- `measure garage` (2026-01-02, abc)"])
+        both[1].figures[0].name = "time"
+        self.assertIn("|garage: time|1||`measure garage` (2026-01-02, abc)|", page.show(both))
 
     def test_figures_of_the_readme_are_results(self):
         rows = (ROOT / "README.md").read_text().split("A few [results]")[1].split("##")[0].splitlines()

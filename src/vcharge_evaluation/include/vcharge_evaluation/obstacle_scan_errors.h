@@ -30,8 +30,7 @@ struct RayErrors {
   double mean_signed_m = 0.0;  ///< of the rays that are neither missed nor nearer
   double fraction_within_one_sigma = 0.0;  ///< fraction of all judged rays
   double fraction_within_two_sigma = 0.0;
-  /// Of the rays with a reported range: its confidence is the probability, by its sigma, that the error is
-  /// within 0.15 m, when it is right.
+  /// A reported range is right within 0.15 m; its confidence is the probability of this by its sigma.
   std::vector<ConfidenceBin> calibration;
 };
 

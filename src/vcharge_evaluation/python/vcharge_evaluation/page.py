@@ -22,10 +22,12 @@ def origin(one):
 
 
 def show(measurements):
-    """The table of measurements with one title, with its command; where there are several commands, each in its row."""
+    """The table of measurements with one title, with its commands. Where each command measured something else, it is in its
+    row."""
     origins = list(dict.fromkeys(origin(one) for one in measurements))
-    if len(origins) == 1:
-        return f"{results.table(measurements)}\n\n{origins[0]}"
+    names = [figure.name for one in measurements for figure in one.figures]
+    if len(origins) == 1 or len(set(names)) < len(names):
+        return f"{results.table(measurements)}\n\n" + "\n".join(f"- {one}" if len(origins) > 1 else one for one in origins)
     rows = [results.row([f"{one.condition + ': ' if one.condition else ''}{figure.name}", figure.text(), figure.goal, origin(one)])
             for one in measurements for figure in one.figures]
     return "\n".join(["|what|figure|goal|command|", "|---|---|---|---|", *rows])

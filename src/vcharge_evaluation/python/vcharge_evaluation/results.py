@@ -163,6 +163,15 @@ def commit():
     return git("rev-parse", "--short=7", "HEAD") + ("-dirty" if changed else "")
 
 
+def words_that_matter(words):
+    """Arguments without those that leave the figures as they are."""
+    kept = []
+    for before, word in zip(["", *words], words):
+        if before != "--work" and word not in ("--work", "--publish"):
+            kept.append(os.path.relpath(word, ROOT) if os.path.isabs(word) else word)
+    return kept
+
+
 class Results:
     """What a stage's evaluation measures: printed as it comes, and kept in WORK/STAGE.json. With `publish` it also goes
     into doc/results/STAGE.json."""
@@ -171,8 +180,7 @@ class Results:
         self.stage, self.title = stage, title
         self.path, self.publish = args.work / f"{stage}.json", args.publish
         self.measurements = []
-        words = [os.path.relpath(word, ROOT) if os.path.isabs(word) else word for word in sys.argv[1:]]
-        self.command = " ".join(["scripts/evaluate.sh", stage, *(word for word in words if word != "--publish")])
+        self.command = " ".join(["scripts/evaluate.sh", stage, *words_that_matter(sys.argv[1:])])
 
     def add(self, title, *columns):
         """Adds and prints a table; a column is (condition, figures)."""
