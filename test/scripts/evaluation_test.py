@@ -118,6 +118,12 @@ class ResultsTest(FolderTest):
         new = [results.Measurement("t", "lot", [results.Figure("error", 1)]), results.Measurement("u", "lot", [])]
         self.assertEqual(results.merge(old, new), [new[0], old[1], new[1]])
 
+    def test_measurements_of_other_commits_are_dropped_on_request(self):
+        path = self.folder / "stage.json"
+        results.write(path, "Stage", [results.Measurement("t", name, [], "command", "2026-01-02", name) for name in ("old", "new")])
+        results.drop_others(path, "new")
+        self.assertEqual([one.condition for one in results.read(path)[1]], ["new"])
+
     def test_the_command_of_a_figure_leaves_out_where_it_was_kept(self):
         self.assertEqual(results.words_that_matter(["--seed", "2", "--work", "/tmp/somewhere", "--publish", "--small"]),
                          ["--seed", "2", "--small"])

@@ -10,7 +10,7 @@ import sys
 import time
 
 from vcharge_evaluation import page
-from vcharge_evaluation.results import commit
+from vcharge_evaluation.results import RESULTS, commit, drop_others
 from vcharge_evaluation.tools import ROOT, say
 
 # Options are chosen on scenes and rigs with seeds below 100 alone, and are fixed before a test scene is rendered.
@@ -107,6 +107,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="small images and short drives: 40 minutes on two cores")
     parser.add_argument("--stages", nargs="*", help="these stages only")
+    parser.add_argument("--drop-old", action="store_true", help="remove what other commits measured from the stages that ran")
     parser.add_argument("--no-publish", action="store_true", help="leave doc/results as it is")
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "build" / "evaluation", help="folder for drives and results")
     args = parser.parse_args()
@@ -116,6 +117,9 @@ def main():
     chosen = [step for step in steps() if (step.quick is not None or not args.quick) and
               (not args.stages or step.stage in args.stages)]
     failed = [step for step in chosen if not run_step(args, step, journal)]
+    if args.drop_old and not args.no_publish and not failed:
+        for stage in {step.stage for step in chosen}:
+            drop_others(RESULTS / f"{stage}.json", commit())
     if not args.no_publish:
         page.main([])
     for step in failed:

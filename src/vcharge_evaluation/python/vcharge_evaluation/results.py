@@ -154,6 +154,12 @@ def merge(old, new):
     return kept + list(replaced.values())
 
 
+def drop_others(path, wanted):
+    """Removes what other commits than `wanted` measured from a file of results."""
+    title, measurements = read(path)
+    write(path, title, [one for one in measurements if one.commit == wanted])
+
+
 def commit():
     """The commit of the source tree, with -dirty where anything but results was changed since."""
     def git(*words):
@@ -179,18 +185,14 @@ class Results:
     def __init__(self, stage, title, args):
         self.stage, self.title = stage, title
         self.path, self.publish = args.work / f"{stage}.json", args.publish
-        self.measurements = []
         self.command = " ".join(["scripts/evaluate.sh", stage, *words_that_matter(sys.argv[1:])])
 
     def add(self, title, *columns):
         """Adds and prints a table; a column is (condition, figures)."""
         now = datetime.date.today().isoformat()
         new = [Measurement(title, condition, list(figures), self.command, now, commit()) for condition, figures in columns]
-        self.measurements += new
         print(f"\n### {title}\n\n{table(new)}", flush=True)
-        write(self.path, self.title, self.measurements)
-        if self.publish:
-            path = RESULTS / f"{self.stage}.json"
+        for path in [self.path, *([RESULTS / f"{self.stage}.json"] if self.publish else [])]:
             write(path, self.title, merge(read(path)[1] if path.exists() else [], new))
 
     def show(self, picture, caption, badness):
