@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs, builds, and takes a simulated car with unknown cameras through every step: chessboards -> intrinsics; a drive ->
-# extrinsics; a drive -> sparse map, height map, OctoMap; another day's drive -> pose in the map, range maps and obstacles,
+# Installs, builds, and takes a simulated car with unknown cameras through every step: chessboards -> intrinsics; a drive -> masks and
+# extrinsics; a drive -> sparse map, height map, OctoMap; another day, with people -> pose in the map, range maps and obstacles,
 # offline and through the nodelets. Ends with the page demo/report.html. Steps that an earlier run finished are kept: delete
 # demo/ to start over.
 #   demo.sh [--quick] [--no-rviz] [--scene lot|garage] [--seed N]

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include <opencv2/imgproc.hpp>
 #include <opencv2/imgproc/detail/gcgraph.hpp>
@@ -58,6 +59,7 @@ class Evidence {
   cv::Mat strongEdges() const {
     return (edge_ > kStrongEdge * levels_.edge_noise) & (levels_.elevation_rad < 0.0);
   }
+  bool isBelowHorizon(int y, int x) const { return levels_.elevation_rad.at<float>(y, x) < 0.0F; }
   /// CV_8UC1, 255 on edges that are in nearly every image.
   cv::Mat alwaysThere() const { return edge_ > kAlwaysThere; }
 
@@ -103,6 +105,19 @@ class Evidence {
   const StaticStructure& structure_;
   const SceneLevels levels_;
   cv::Mat edge_;
+};
+
+/// Whether the pixels of a region are still where the scene moves.
+class Stillness {
+ public:
+  void add(const Evidence& evidence, int y, int x) {
+    trust_ += evidence.trustAt(y, x);
+    sum_ += evidence.trustAt(y, x) * evidence.stillnessAt(y, x);
+  }
+  bool isClear(double min_area = 0.0) const { return trust_ > min_area && sum_ > kClearlyStill * trust_; }
+
+ private:
+  float trust_ = 0.0F, sum_ = 0.0F;
 };
 
 /// Step to the neighbour that is further from the optical axis.
@@ -185,7 +200,7 @@ void keepBoundedDirections(const Evidence& evidence, cv::Mat* body) {
   cv::Mat near_edge;
   cv::dilate(evidence.clearEdges(), near_edge, cv::Mat::ones(3, 3, CV_8U));
   std::array<int, kDirections> length{}, bounded{};
-  std::array<float, kDirections> trust{}, stillness{};
+  std::array<Stillness, kDirections> stillness{};
   std::array<bool, kDirections> has_strong_edge{};
   for (int y = 0; y < body->rows; ++y) {
     for (int x = 0; x < body->cols; ++x) {
@@ -193,8 +208,7 @@ void keepBoundedDirections(const Evidence& evidence, cv::Mat* body) {
         continue;
       }
       const size_t direction = view.sectorOf(y, x, kDirections);
-      trust[direction] += evidence.trustAt(y, x);
-      stillness[direction] += evidence.trustAt(y, x) * evidence.stillnessAt(y, x);
+      stillness[direction].add(evidence, y, x);
       has_strong_edge[direction] = has_strong_edge[direction] || strong.at<uint8_t>(y, x) != 0;
       if (body->at<uint8_t>(cv::Point(x, y) - outward(view, y, x)) == 0) {
         ++length[direction];
@@ -204,7 +218,7 @@ void keepBoundedDirections(const Evidence& evidence, cv::Mat* body) {
   }
   for (size_t direction = 0; direction < kDirections; ++direction) {
     // The outline may be weak where a strong edge is inside.
-    if (has_strong_edge[direction] || stillness[direction] > kClearlyStill * trust[direction]) {
+    if (has_strong_edge[direction] || stillness[direction].isClear()) {
       bounded[direction] = length[direction];
     }
   }
@@ -228,6 +242,31 @@ void keepBoundedDirections(const Evidence& evidence, cv::Mat* body) {
   }
 }
 
+/// Removes small parts, and those that neither reach the bottom of the image, where the body is, nor are
+/// still where the scene moves.
+void removeDoubtfulParts(const Evidence& evidence, cv::Mat* body) {
+  cv::Mat labels, numbers, centres;
+  const auto count =
+      static_cast<size_t>(cv::connectedComponentsWithStats(*body, labels, numbers, centres, 8));
+  std::vector<Stillness> stillness(count);
+  for (int y = 0; y < body->rows; ++y) {
+    for (int x = 0; x < body->cols; ++x) {
+      if (body->at<uint8_t>(y, x) != 0 && evidence.isBelowHorizon(y, x)) {
+        stillness[static_cast<size_t>(labels.at<int>(y, x))].add(evidence, y, x);
+      }
+    }
+  }
+  const double area = cv::countNonZero(evidence.view().valid);
+  for (int label = 1; label < static_cast<int>(count); ++label) {
+    const int bottom = numbers.at<int>(label, cv::CC_STAT_TOP) + numbers.at<int>(label, cv::CC_STAT_HEIGHT);
+    const bool is_low = bottom >= kLowest * body->rows;
+    if (numbers.at<int>(label, cv::CC_STAT_AREA) < kMinBody * area ||
+        !(is_low || stillness[static_cast<size_t>(label)].isClear(kMinBody * area))) {
+      body->setTo(0, labels == label);
+    }
+  }
+}
+
 }  // namespace
 
 BodyRegions cutBody(const SmallView& view, const StaticStructure& structure) {
@@ -240,16 +279,7 @@ BodyRegions cutBody(const SmallView& view, const StaticStructure& structure) {
   const Evidence evidence(view, structure);
   regions.body = minimumCut(evidence);
   keepBoundedDirections(evidence, &regions.body);
-  // The body reaches into the lower half of the image, to which mirrors are connected.
-  const double area = cv::countNonZero(view.valid);
-  cv::Mat labels, numbers, centres;
-  const int count = cv::connectedComponentsWithStats(regions.body, labels, numbers, centres, 8);
-  for (int label = 1; label < count; ++label) {
-    const int bottom = numbers.at<int>(label, cv::CC_STAT_TOP) + numbers.at<int>(label, cv::CC_STAT_HEIGHT);
-    if (numbers.at<int>(label, cv::CC_STAT_AREA) < kMinBody * area || bottom < kLowest * view.size.height) {
-      regions.body.setTo(0, labels == label);
-    }
-  }
+  removeDoubtfulParts(evidence, &regions.body);
   cv::Mat near_body, inside;
   const cv::Mat around = cv::Mat::ones(2 * kBorder_px + 1, 2 * kBorder_px + 1, CV_8U);
   cv::dilate(regions.body, near_body, around);

@@ -72,11 +72,13 @@ class Pixels:
 
 
 def compare(truth_folder, truth, found_folder, found):
-    """Pixels by camera name. A missing rig or mask hides nothing."""
+    """Pixels by camera name, inside the fields of view of both rigs. A missing rig or mask hides nothing."""
     pixels = {}
     for name, camera in truth["cameras"].items():
-        inside, body = field_of_view(camera), hidden_pixels(truth_folder, camera)
-        hidden = hidden_pixels(found_folder, found["cameras"][name]) if found else np.zeros_like(body)
+        inside, body, hidden = field_of_view(camera), hidden_pixels(truth_folder, camera), False
+        if found:
+            inside &= field_of_view(found["cameras"][name])
+            hidden = hidden_pixels(found_folder, found["cameras"][name])
         pixels[name] = Pixels(*(int(np.count_nonzero(inside & part)) for part in
                                 (body, body & hidden, ~body, ~body & hidden)))
     return pixels

@@ -6,14 +6,12 @@ import matplotlib
 import numpy as np
 import yaml
 
-from vcharge_evaluation import obstacles, tools
+from vcharge_evaluation import masks, obstacles, tools
 from vcharge_evaluation.camera_models import project
 from vcharge_evaluation.localization_errors import BOUND_DEG, BOUND_M, LocalizationErrors, Map
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
-
-MASK_MARGIN_PX = 4
 
 
 def pick(result, *keys):
@@ -68,12 +66,19 @@ def save(figure, path):
     plt.close(figure)
 
 
-def copy_mask(source, target, margin):
-    mask = cv2.imread(str(source), cv2.IMREAD_GRAYSCALE)
-    if margin:
-        size = 2 * MASK_MARGIN_PX + 1
-        mask = cv2.erode(mask, np.ones((size, size), np.uint8))
-    cv2.imwrite(str(target), mask)
+def draw_masks(report, picture):
+    """The mean images of all cameras with the found body, from the pictures of make_masks."""
+    drawn = [cv2.imread(str(path)) for path in sorted(report.glob("*.png"))]
+    if drawn:
+        means = [cv2.resize(image[:, :image.shape[1] // 3], (640, 400), interpolation=cv2.INTER_AREA) for image in drawn]
+        means += [np.zeros_like(means[0])] * (len(means) % 2)
+        cv2.imwrite(str(picture), np.vstack([np.hstack(means[i:i + 2]) for i in range(0, len(means), 2)]))
+
+
+def judge_masks(path, truth, figures):
+    cameras = masks.compare(truth.parent, yaml.safe_load(truth.read_text()), path.parent, yaml.safe_load(path.read_text()))
+    total = sum(cameras.values(), masks.Pixels())
+    figures.update({"hidden_percent": total.hidden_percent(), "lost_percent": total.lost_percent()})
 
 
 def judge_rig(path, truth, figures, folder, picture):

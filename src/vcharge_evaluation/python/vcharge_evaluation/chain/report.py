@@ -46,6 +46,10 @@ def summary_rows(figures):
     if lenses and all("error_px" in camera for camera in lenses.values()):
         rows.append(("intrinsics: rms against the true lens, where pixels are used",
                      listed({name: camera["error_px"] for name, camera in lenses.items()}, "px", 2), "not given"))
+    masks = figures.get("masks", {})
+    if masks.get("hidden_percent") is not None:
+        rows.append(("masks: of the own body hidden; of the scene lost",
+                     f"{masks['hidden_percent']:.1f} %; {masks['lost_percent']:.1f} %", "drawn by hand"))
     rig = figures.get("extrinsics", {})
     if "error_m" in rig:
         rows.append(("extrinsics: error",
@@ -82,6 +86,9 @@ def summary_rows(figures):
         rows.append(("obstacles missed; false cells on open ground",
                      f"{obstacles['missed']} of {obstacles['obstacles']}; {obstacles['false_per_10_m']:.1f} per 10 m",
                      "not given"))
+    for one in (one for one in obstacles.get("reports", []) if one["moves"]):
+        reported = "never" if one["first_reported_m"] is None else f"at {one['first_reported_m']:.1f} m"
+        rows.append((f"{one['kind']} who comes as near as {one['nearest_m']:.1f} m: first reported", reported, "not given"))
     nodelets = figures.get("nodelets", {})
     if nodelets:
         rows.append(("nodelets give what the offline tools give", f"{nodelets['equal_poses']} of {nodelets['poses']} poses, "
@@ -99,6 +106,10 @@ def describe_drive(rig):
 def verdict_rows(figures):
     rows = [(f"intrinsics, {name}", camera["verdict"], f"{camera['num_images']} images, {camera['rms_px']:.3f} px rms. " +
              " ".join(camera["remarks"])) for name, camera in figures.get("intrinsics", {}).items()]
+    masks = figures.get("masks")
+    if masks:
+        remarks = [f"{camera['name']}: {remark}" for camera in masks["cameras"] or [] for remark in camera["remarks"]]
+        rows.append(("masks of the own body", masks["verdict"], " ".join(remarks) or masks["error"] or ""))
     rig = figures.get("extrinsics")
     if rig:
         rows.append(("the drive to calibrate from (check_bag)", rig["check"], ""))
@@ -115,6 +126,7 @@ def verdict_rows(figures):
 
 PICTURES = (
     ("Lenses", (("intrinsics.png", "How far the calibrated lens is from the true one, by the angle from its axis"),)),
+    ("The own body", (("masks.png", "Mean images of the drive; red: the own body, hidden from all stages"),)),
     ("Extrinsics", (("rig.png", "Errors of the extrinsics"),)),
     ("The sparse map", (("map.png", "The map from above, over the truth"),
                         ("map_landmarks.png", "Its landmarks in the image with most of them, by distance"))),
@@ -137,8 +149,7 @@ def write(path, chain):
     figures = {name: step["figures"] for name, step in chain.steps.items()}
     size = "640x400" if chain.args.quick else "1280x800"
     origin = (f"A simulated {chain.args.scene}, seed {chain.args.seed}, rig {chain.args.rig_seed}, images of {size}: "
-              "only the simulator knows lenses and mounting of the cameras; truth serves to judge the results"
-              ", and for the masks of the vehicle's body." if chain.simulated else
+              "only the simulator knows lenses and mounting of the cameras; truth only judges the results." if chain.simulated else
               f"The recording {chain.args.bag}; there is no truth to judge it by.")
     parts = ['<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>vcharge: the whole chain</title>',
              f"<style>{STYLE}</style></head><body><h1>From unknown cameras to a drive in its own map</h1>",

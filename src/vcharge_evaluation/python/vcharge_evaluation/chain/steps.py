@@ -1,8 +1,7 @@
-"""The whole chain on one car, step by step: boards -> intrinsics; a drive -> extrinsics; a drive -> a sparse map, range maps,
-a height map and an OctoMap; another day's drive -> the pose in the map and obstacles, offline and through the nodelets.
-Ends with report.html. A step that an earlier run finished with the same input is kept, and an interrupted one is resumed.
-The truth of simulated drives serves to judge the results, and for the masks of the vehicle's body, which on a real car are
-drawn by hand or made by a tool."""
+"""The whole chain on one car, step by step: boards -> intrinsics; a drive -> masks of the own body, and extrinsics; a drive ->
+a sparse map, range maps, a height map and an OctoMap; another day's drive -> the pose in the map and obstacles, offline and
+through the nodelets. Ends with report.html. A step that an earlier run finished with the same input is kept, and an
+interrupted one is resumed. The truth of simulated drives only judges the results."""
 import concurrent.futures
 import hashlib
 import json
@@ -22,6 +21,9 @@ RVIZ_SCREENSHOT = ROOT / "src" / "vcharge_evaluation" / "scripts" / "rviz_screen
 CAMERAS = ("front", "left", "rear", "right")
 # Metres per tick are known to 0.05 %, as doc/bring_up.md asks for.
 WHEELS = ("--set", "odometer.scale_error=0.0005", "--set", "odometer.left_right_error=0.0002")
+# Paint that reflects, and people who walk through the other day's drive, one of them in front of the car.
+BODY = ("--set", "body=glossy")
+PEOPLE = ("--set", "movers.people=2", "--set", "movers.crossing=true")
 OTHER_WHEELS = ("--set", "odometer.scale_error=-0.0005", "--set", "odometer.left_right_error=0.0003")
 
 
@@ -50,7 +52,7 @@ class Chain:
         self.keys, self.steps, self.number = {}, {}, 0
         scale = 0.5 if args.quick else 1.0
         self.simulator_arguments = ["--scene-seed", args.seed, "--rig", "random", "--rig-seed", args.rig_seed,
-                                    "--image-scale", scale]
+                                    "--image-scale", scale, *BODY]
 
     def step(self, name, title, needs, given, work):
         """Calls `work(folder)`, which returns figures, unless an earlier run did with the same `given` (texts) after the same
@@ -132,7 +134,8 @@ class Chain:
                                   "--square-m", self.args.square_m, "--camera", camera, "--output", output, "--keep-others",
                                   "--report", folder / f"{camera}.html")
                 found[camera] = figures.pick(result, "verdict", "remarks", "num_images", "rms_px")
-            self.add_masks(output, boards)
+            if self.args.rig:
+                self.add_given_masks(output)
             if self.simulated:
                 truths = {camera: source.parent / f"{camera}_truth" / "rig.yaml" for camera, source in boards.items()}
                 figures.judge_intrinsics(output, truths, found, self.pictures / "intrinsics.png")
@@ -141,20 +144,34 @@ class Chain:
         given = [self.args.board, self.args.square_m, fingerprint(self.args.rig) if self.args.rig else ""]
         return self.step("intrinsics", "intrinsics from the boards", ["boards"], given, work) / "cameras.yaml"
 
-    def add_masks(self, path, boards):
-        """Masks of the vehicle's own body: those of --rig on a real car; the simulator's with a margin otherwise."""
-        rig = yaml.safe_load(path.read_text())
-        for camera in rig["cameras"]:
-            mask = None
-            if self.simulated:
-                mask = boards[camera].parent / f"{camera}_truth" / f"{camera}_mask.png"
-            elif self.args.rig:
-                given = yaml.safe_load(self.args.rig.read_text())["cameras"].get(camera, {})
-                mask = self.args.rig.parent / given["mask"] if "mask" in given else None
-            if mask is not None and mask.exists():
-                figures.copy_mask(mask, path.parent / f"{camera}_mask.png", margin=self.simulated)
-                rig["cameras"][camera]["mask"] = f"{camera}_mask.png"
+    def add_given_masks(self, path):
+        """Adds the masks of --rig to a rig file."""
+        rig, given = yaml.safe_load(path.read_text()), yaml.safe_load(self.args.rig.read_text())["cameras"]
+        for camera, entry in rig["cameras"].items():
+            if "mask" in given.get(camera, {}):
+                entry["mask"] = f"{camera}_mask.png"
+                shutil.copyfile(self.args.rig.parent / given[camera]["mask"], path.parent / entry["mask"])
         path.write_text(yaml.safe_dump(rig, sort_keys=False))
+
+    def masks(self, cameras, drive, needs):
+        """The rig with masks of the own body, found in a drive. Masks that it has already are kept."""
+        if any("mask" in camera for camera in yaml.safe_load(cameras.read_text())["cameras"].values()):
+            self.keys["masks"] = self.keys["intrinsics"]
+            return cameras
+
+        def work(folder):
+            output = folder / "cameras.yaml"
+            result = run_tool("make_masks", folder / "masks.log", "--bag", drive / "drive.bag", "--rig", cameras, "--output",
+                              output, "--report", folder / "report", may_fail=True)
+            if not output.exists():
+                shutil.copyfile(cameras, output)
+            figures.draw_masks(folder / "report", self.pictures / "masks.png")
+            found = {**figures.pick(result, "verdict", "cameras"), "error": result.error()}
+            if self.simulated:
+                figures.judge_masks(output, drive / "rig_truth.yaml", found)
+            return found
+
+        return self.step("masks", "masks of the own body from the same drive", needs, [], work) / "cameras.yaml"
 
     def extrinsics(self, cameras, drive, needs):
         def work(folder):
@@ -327,13 +344,13 @@ class Chain:
                                     args.seed + 200, "--image-step", 2, "--duration-s", 80, *WHEELS)
         mapping = self.simulate("mapping_drive", "a drive to map", "--drive", "loop", "--seed", args.seed + 300, "--image-step",
                                 2, "--height-cell-m", 0.025, "--duration-s", 24 if args.quick else 48, *WHEELS)
-        other = self.simulate("other_day", "another day: other light, other cars", "--drive", "other_day", "--seed",
+        other = self.simulate("other_day", "another day: other light, other cars, people", "--drive", "other_day", "--seed",
                               args.seed + 400, "--exposure-gain", 1.2, "--truth-range", "--duration-s", 8 if args.quick else 16,
-                              *OTHER_WHEELS)
+                              *PEOPLE, *OTHER_WHEELS)
         return calibration, mapping, other
 
     def rig(self, calibration):
-        """Intrinsics from boards and extrinsics from a drive, unless --rig has them."""
+        """Intrinsics from boards, masks and extrinsics from a drive, unless --rig has them."""
         given = self.args.rig
         if given and not self.args.boards:
             cameras = yaml.safe_load(given.read_text())["cameras"]
@@ -344,7 +361,8 @@ class Chain:
             path = given.resolve()
         else:
             path = self.intrinsics()
-        return self.extrinsics(path, calibration, ["intrinsics", calibration.name])
+        path = self.masks(path, calibration, ["intrinsics", calibration.name])
+        return self.extrinsics(path, calibration, ["masks", calibration.name])
 
     def stages(self):
         """All stages from recordings to results, each with the output of those before."""
