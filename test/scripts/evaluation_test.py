@@ -222,6 +222,10 @@ class DrivesTest(FolderTest):
         path = drives.write_masked_rig(truth, None, self.folder / "truth" / "rig_found.yaml")
         self.assertNotIn("mask", yaml.safe_load(path.read_text())["cameras"]["left"])
 
+    def test_reasons_in_results_name_no_paths(self):
+        run = tools.Run(0, 0, 0, {"error": "/tmp/some/drive.bag: no range map could be made (front: stands)"})
+        self.assertEqual(run.reason(), "no range map could be made (front: stands)")
+
     def test_a_tool_runs_once_until_its_words_change(self):
         tool = self.folder / "package" / "count_runs"
         tool.parent.mkdir()

@@ -63,7 +63,7 @@ class FoundMasks:
         output = drive.folder / "masked" / "cameras.yaml"
         self.run = run_tool_once("make_masks", drive.folder / "make_masks.log", "--bag", drive.bag, "--rig", source,
                                  "--output", output, may_fail=True)
-        self.verdict = self.run.found.get("verdict") or self.run.error()
+        self.verdict = self.run.found.get("verdict") or self.run.reason()
         self.rig = None if self.run.error() or self.verdict == "FAIL" or not output.exists() else output
 
     def text(self):

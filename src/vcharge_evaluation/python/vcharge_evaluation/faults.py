@@ -69,7 +69,7 @@ def localize(folder, scene):
                       scene.masks.rig_of(folder), "--map", scene.mapped.path, "--options", CONFIG / "localization.yaml", "--output",
                       folder / "poses.tum", may_fail=True)
     if result.error():
-        return [Figure("localization reports", result.error())]
+        return [Figure("localization reports", result.reason())]
     errors = LocalizationErrors(folder / "poses.tum.csv", folder / "drive_truth" / "trajectory.tum", scene.mapped)
     states, last = [], None
     for time_s, status in zip(errors.time_s, errors.status):
@@ -94,7 +94,7 @@ def obstacles(folder, truth, scene):
                       scene.masks.rig_of(folder), "--options", CONFIG / "obstacles.yaml", "--range-options",
                       CONFIG / "dense_obstacles.yaml", "--output", output, may_fail=True)
     if result.error():
-        return [Figure("obstacle detection reports", result.error())]
+        return [Figure("obstacle detection reports", result.reason())]
     with open(output / "status.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     start_ns, seen = int(rows[0]["stamp_ns"]), collections.OrderedDict()

@@ -4,7 +4,7 @@ import argparse
 from vcharge_evaluation.drawing.moments import draw_obstacles
 from vcharge_evaluation.drives import OTHER_DAY, Drive, found_masks
 from vcharge_evaluation.results import Figure, Results, add_arguments, calibration_figures, figure, percent
-from vcharge_evaluation.tools import CONFIG, judge, run_tool_once
+from vcharge_evaluation.tools import CONFIG, NoResult, judge, run_tool_once
 
 STOP_AND_GO = ("--drive", "stop_and_go")
 # Scene, duration, and words of each drive. pitch is the lot's drive on a soft suspension.
@@ -44,11 +44,13 @@ def detect(args, name):
 
 
 def judge_obstacles(drive, rig, *words):
-    """Errors of the obstacle maps of a drive with a rig file."""
+    """Errors of the obstacle maps of a drive with a rig file. NoResult if there are no maps."""
     folder = drive.folder
-    run_tool_once("detect_obstacles", folder / "detect.log", "--bag", drive.bag, "--rig", rig, "--options",
-                  CONFIG / "obstacles.yaml", "--range-options", CONFIG / "dense_obstacles.yaml", "--output",
-                  folder / "obstacles", *words)
+    run = run_tool_once("detect_obstacles", folder / "detect.log", "--bag", drive.bag, "--rig", rig, "--options",
+                        CONFIG / "obstacles.yaml", "--range-options", CONFIG / "dense_obstacles.yaml", "--output",
+                        folder / "obstacles", *words, may_fail=True)
+    if run.error():
+        raise NoResult(run.reason())
     return judge("obstacles", folder / "report", "--obstacles", folder / "obstacles", "--truth", drive.truth)
 
 

@@ -14,6 +14,9 @@ INTRODUCTION = """# Results
 Made by `python3 -m vcharge_evaluation.page` from `doc/results/*.json`: do not edit. A figure that misses its goal is
 **bold**. Each table names the command that measured it, the date and the commit. `scripts/evaluate.sh STAGE --publish`
 measures again.
+
+A result that is missing counts as an error at the bound that its row names. Where a row or title names `make_masks`, the masks
+of the own body are those that this tool found in a drive, or none where it found none, and the truth only judges.
 """
 
 

@@ -6,7 +6,7 @@ import yaml
 from vcharge_evaluation.drawing.moments import draw_range_map
 from vcharge_evaluation.drives import Drive, found_masks, other_day_drive
 from vcharge_evaluation.results import Figure, Results, add_arguments, calibration_figures, figure, percent
-from vcharge_evaluation.tools import judge, run_tool_once, say
+from vcharge_evaluation.tools import NoResult, judge, run_tool_once, say
 
 DENSITIES = (0.4, 0.6, 0.8)
 TRUE_POSES = {"refine_poses": False,
@@ -41,7 +41,9 @@ class RangeErrors:
         self.drive, self.output = drive, drive.folder / name
         say(f"{drive.folder}: {name}")
         self.run = run_tool_once("compute_range_maps", drive.folder / f"{name}.log", "--bag", drive.bag, "--rig",
-                                 masks.rig_of(drive.folder), "--output", self.output, "--no-pictures", *words)
+                                 masks.rig_of(drive.folder), "--output", self.output, "--no-pictures", *words, may_fail=True)
+        if self.run.error():
+            raise NoResult(self.run.reason())
         errors = judge("range", drive.folder / f"{name}_report", "--range", self.output, "--truth", drive.truth, "--bag",
                        drive.bag, "--rig", drive.true_rig)
         self.sets = {one["label"]: one for one in errors["sets"]}

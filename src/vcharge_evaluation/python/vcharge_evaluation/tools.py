@@ -4,6 +4,7 @@ import hashlib
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,10 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parents[4]
 TOOLS = ROOT / "build" / "devel" / "lib"
 CONFIG = ROOT / "config"
+
+
+class NoResult(RuntimeError):
+    """A tool's error where it found no result, as on a drive that stands."""
 
 
 @dataclasses.dataclass
@@ -25,6 +30,11 @@ class Run:
     def error(self):
         """The error's text, or None after success."""
         return self.found.get("error")
+
+
+    def reason(self):
+        """The error's text without the paths of files, for results."""
+        return re.sub(r"\S*/\S+: ", "", self.error() or "")
 
 
 def say(text):
