@@ -72,7 +72,7 @@ class ResultsTest(FolderTest):
         lines = results.table([results.Measurement("t", f"drive {i}", [results.figure("error", float(i), "cm", at_most=6)])
                                for i in range(results.MAX_COLUMNS + 1)]).splitlines()
         self.assertEqual(lines[0], "|what|error|")
-        self.assertEqual([line.split("|")[1] for line in lines[2:6]], ["goal", "median", "worst", "drive 6"])
+        self.assertEqual(lines[2:7], ["|goal|<= 6|", "|median|3 cm|", "|95 %|6 cm|", "|worst|6 cm (drive 6)|", "|drive 6|6 cm|"])
         self.assertEqual(lines[-1], "|drive 0|0 cm|")
 
     def test_spread_counts_misses_at_the_bound(self):

@@ -29,9 +29,10 @@ class Figure:
     reached: object = None  # True, False, or None without a goal
 
     def badness(self):
-        """How bad the value is, larger is worse, for values of one figure; None without a bound as the goal."""
+        """How bad the value is, larger is worse, for values of one figure; None if it has no bound as the goal and is no
+        error."""
         sign = {"<=": 1.0, ">=": -1.0}.get(self.goal.split(" ")[0])
-        if sign is None and self.goal == "0":
+        if sign is None and (self.goal == "0" or (not self.goal and "error" in self.name)):
             sign = 1.0
         if sign is None or isinstance(self.value, str):
             return None
@@ -82,23 +83,26 @@ def row(cells):
 
 def table(measurements):
     """Markdown table of measurements with one title: a column per condition (a row where there are many), those that miss most
-    goals first, and among these the one whose first figure with a goal is worst. From three conditions on, the median (of an
-    even number, the worse one in the middle) and the worst figure with its condition stand before them."""
+    goals first, and among these the one whose first bounded figure or error is worst. From three conditions on, the median (of
+    an even number, the worse one in the middle) and the worst figure with its condition stand before them, and the 95 %
+    quantile where there are many."""
     columns = {}
     for one in measurements:
         columns.setdefault(one.condition, {}).update({figure.name: figure for figure in one.figures})
     names = list(dict.fromkeys(figure.name for one in measurements for figure in one.figures))
     columns = dict(sorted(columns.items(), key=lambda item: rank(item[1])))
     has_goals = any(figure.goal for one in measurements for figure in one.figures)
-    with_summary = len(columns) >= MIN_CONDITIONS_OF_SUMMARY
-    heads = ["what", *(["goal"] if has_goals else []), *(["median", "worst"] if with_summary else []),
-             *(condition or "figure" for condition in columns)]
+    shares = {}
+    if len(columns) >= MIN_CONDITIONS_OF_SUMMARY:
+        shares = {"median": 0.5, **({"95 %": 0.95} if len(columns) > MAX_COLUMNS else {}), "worst": 1.0}
+    heads = ["what", *(["goal"] if has_goals else []), *shares, *(condition or "figure" for condition in columns)]
     lines = [heads]
     for name in names:
         goals = [column[name].goal for column in columns.values() if name in column and column[name].goal]
         cells = [column[name].text() if name in column else "-" for column in columns.values()]
-        summary = median_and_worst({condition: column[name] for condition, column in columns.items() if name in column})
-        lines.append([name, *([goals[0] if goals else ""] if has_goals else []), *(summary if with_summary else []), *cells])
+        summary = summarize({condition: column[name] for condition, column in columns.items() if name in column},
+                            shares.values())
+        lines.append([name, *([goals[0] if goals else ""] if has_goals else []), *summary, *cells])
     if len(columns) > MAX_COLUMNS:
         lines = list(zip(*lines))
     return "\n".join([row(lines[0]), "|" + "---|" * len(lines[0]), *(row(line) for line in lines[1:])])
@@ -114,13 +118,16 @@ def num_missed(column):
     return sum(figure.reached is False for figure in column.values())
 
 
-def median_and_worst(figures):
-    """Cells with the median over the conditions, and the worst figure with its condition; figures: {condition: figure}."""
+def summarize(figures, shares):
+    """Cells with the figures below which these shares of the conditions are, the worst with its condition unless all
+    are equal; figures: {condition: figure}."""
     ranked = sorted((one.badness(), condition) for condition, one in figures.items() if one.badness() is not None)
     if len(ranked) < 2:
-        return ["", ""]
-    median, worst = figures[ranked[len(ranked) // 2][1]], ranked[-1][1]
-    return [median.text(), f"{figures[worst].text()} ({worst})"]
+        return [""] * len(shares)
+    chosen = [ranked[min(int(share * len(ranked)), len(ranked) - 1)][1] for share in shares]
+    differ = ranked[0][0] != ranked[-1][0]
+    return [figures[condition].text() + (f" ({condition})" if share == 1.0 and differ else "")
+            for share, condition in zip(shares, chosen)]
 
 
 def by_title(measurements):
