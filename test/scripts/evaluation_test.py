@@ -274,8 +274,9 @@ class ObstacleClassesTest(unittest.TestCase):
                   "movers": [{"kind": "pedestrian", "maps": 10, "maps_reported": 9}]}
         reports = [{"kind": "pedestrian", "first_reported_m": 4.0, "contact_s": 2.0},
                    {"kind": "pedestrian", "first_reported_m": None, "contact_s": None}]
-        figures = {one.name: one for one in obstacles.class_figures({"classes": obstacles.recall_by_class(judged),
-                                                                     "reports": reports})}
+        classes = obstacles.recall_by_class(judged)
+        self.assertEqual(json.loads(json.dumps(classes)), classes, "the chain keeps figures as JSON")
+        figures = {one.name: one for one in obstacles.class_figures({"classes": classes, "reports": reports})}
         self.assertEqual(figures["cars, standing: reported, of those that are visible"].value, 50)
         self.assertFalse(figures["cars, standing: reported, of those that are visible"].reached)
         self.assertEqual(figures["people, moving: reported, of those images in which they are visible"].value, 90)

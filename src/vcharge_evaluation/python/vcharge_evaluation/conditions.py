@@ -111,7 +111,8 @@ class Condition:
         yield Figure("obstacles: range error, 95 %", 100 * (found["p95_m"] if found else OBSTACLE_BOUND_M), "cm")
         yield figure("obstacles missed", percent(found["missed"], found["obstacles"]) if found else 100.0, "%", at_most=0)
         for name in ("people", "cars"):
-            reported, number = found["classes"].get((name, True), (0, 0)) if found else (0, 0)
+            moving = [entry for entry in found["classes"] if entry[:2] == [name, True]] if found else []
+            reported, number = moving[0][2:] if moving else (0, 0)
             yield Figure(f"moving {name}: reported, of images that show them", percent(reported, number) if number else None, "%")
         yield figure("false cells per 10 m", found["false_per_10_m"] if found else 0.0, at_most=1.0)
         yield figure("cells inside obstacles that were free", found["free_inside"] if found else 0, equal=0)

@@ -84,7 +84,8 @@ def class_of(kind):
 
 
 def recall_by_class(judged):
-    """Class and whether it moves: (reported, judged). Standing things count once, moving ones per image that shows them."""
+    """List of class, whether it moves, how many were reported and judged. Standing things count once, moving ones per image
+    that shows them."""
     counts = {}
     for moves, kind, reported, number in (
             *((False, one["kind"], int(one["reported"]), 1) for one in judged["obstacles"]),
@@ -92,12 +93,12 @@ def recall_by_class(judged):
         entry = counts.setdefault((class_of(kind), moves), [0, 0])
         entry[0] += reported
         entry[1] += number
-    return counts
+    return [[name, moves, *entry] for (name, moves), entry in sorted(counts.items())]
 
 
 def class_figures(found):
     """Recall and first report by class. What is never reported counts as reported at contact."""
-    for (name, moves), (reported, number) in sorted(found["classes"].items()):
+    for name, moves, reported, number in found["classes"]:
         unit = "images in which they are visible" if moves else "that are visible"
         yield figure(f"{name}, {'moving' if moves else 'standing'}: reported, of those {unit}", percent(reported, number), "%",
                      at_least=None if moves else 100)
