@@ -14,11 +14,14 @@ import types
 import unittest
 
 import cv2
+import genpy
 import numpy as np
+import rosbag
 import rostest
 import yaml
 from geometry_msgs.msg import Quaternion
 from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Image
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "src" / "vcharge_evaluation" / "python"))
@@ -291,6 +294,19 @@ class PosesTest(FolderTest):
 
     def test_nearest_finds_both_neighbours_and_ends(self):
         np.testing.assert_array_equal(poses.nearest(np.array([0.0, 1.0, 2.0]), np.array([-1.0, 0.4, 0.6, 5.0])), [0, 0, 1, 2])
+
+    def test_a_repeated_stamp_corrects_the_odometry_before(self):
+        with rosbag.Bag(str(self.folder / "drive.bag"), "w") as bag:
+            for received, (stamp, x) in enumerate(((1, 0.1), (2, 0.2), (2, 0.25), (3, 0.3))):
+                message = Odometry()
+                message.header.stamp = genpy.Time(stamp)
+                message.pose.pose.position.x = x
+                bag.write("/odom", message, genpy.Time(10 + received))
+            image = Image()
+            image.header.stamp = genpy.Time(2)
+            bag.write("/camera/left/image_raw", image, genpy.Time(20))
+        self.assertEqual(poses.write_odometry(self.folder / "drive.bag", self.folder / "odometry.tum"), (0.0, 1))
+        np.testing.assert_allclose(np.loadtxt(self.folder / "odometry.tum")[:, :2], [[1, 0.1], [2, 0.25], [3, 0.3]])
 
     def test_stamps_are_exact(self):
         self.assertEqual(poses.stamp_ns("1700000000.123456789"), 1700000000123456789)
