@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Measures a stage: simulates drives (or uses those of an earlier run in --work), runs the tools, and judges the results.
 #   evaluate.sh STAGE [arguments; --help]
-# STAGE: masks, calibration, mapping, localization, ranges, height_map, obstacles, faults, odometry (a real car's CAN), chain
-# (all of them from unknown cameras), latency (of the nodelets), soak (their memory). --publish puts the figures into
+# STAGE: masks, calibration, mapping, localization, ranges, height_map, obstacles, conditions, faults, odometry (a real car's CAN),
+# chain (all of them from unknown cameras), latency (of the nodelets), soak (their memory). --publish puts the figures into
 # doc/results and doc/results.md.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

@@ -9,6 +9,7 @@ import yaml
 from vcharge_evaluation import masks, obstacles, tools
 from vcharge_evaluation.camera_models import project
 from vcharge_evaluation.localization_errors import BOUND_DEG, BOUND_M, LocalizationErrors, Map
+from vcharge_evaluation.poses import at_stamps, rotations
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
@@ -143,6 +144,16 @@ def localization_figures(result, csv, map_path, truths, picture):
                         "normalized": float(np.mean(errors.normalized[good]))})
         errors.plot(picture)
     return figures
+
+
+def crossing_moment(truth):
+    """When a moving object is nearest to a point 4 m ahead of the vehicle's origin, as a fraction of the drive's duration."""
+    images = yaml.safe_load((truth / "movers.yaml").read_text())["images"]
+    poses = at_stamps(truth / "trajectory.tum", np.array([image["stamp_ns"] * 1e-9 for image in images]))
+    ahead = poses[:, 1:4] + 4.0 * rotations(poses[:, 4:])[:, :, 0]
+    distances = [min((np.linalg.norm(np.array(mover["translation_m"]) - point) for mover in image["movers"]), default=np.inf)
+                 for image, point in zip(images, ahead)]
+    return int(np.argmin(distances)) / (len(images) - 1)
 
 
 def judge_obstacles(output, truth, figures, folder):

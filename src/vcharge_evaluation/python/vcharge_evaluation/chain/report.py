@@ -138,7 +138,7 @@ PICTURES = (
                     ("height_map_octomap.png", "Occupied voxels of the OctoMap by height"),
                     ("rviz_height_map.png", "Mesh, grid and OctoMap in rviz"))),
     ("The pose on another day", (("localization.png", "Errors frame by frame"), ("rviz_pose.png", "In rviz"))),
-    ("Obstacles", (("obstacles.png", "What the left camera reports, and the fused map"),
+    ("Obstacles", (("obstacles.png", "What a camera reports, and the fused map"),
                    ("rviz_obstacles.png", "Obstacle map and scan in rviz"))),
     ("The published images of the V-Charge car", (("real_height_map.png", "Height map: cobbles, kerb, hedge"),
                                                   ("real_obstacles.png", "Obstacles: kerb and hedge; the cobbles are free"))),

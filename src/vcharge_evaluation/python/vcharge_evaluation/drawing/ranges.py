@@ -95,6 +95,7 @@ def main():
     parser.add_argument("--bag", type=pathlib.Path, required=True)
     parser.add_argument("--rig", type=pathlib.Path, required=True)
     parser.add_argument("--range", type=pathlib.Path, required=True)
+    parser.add_argument("--moment", type=float, default=0.5, help="of the images, as a fraction of the drive's duration")
     parser.add_argument("--truth", type=pathlib.Path)
     parser.add_argument("--output", type=pathlib.Path, required=True)
     arguments = parser.parse_args()
@@ -124,10 +125,10 @@ def main():
                 good = (sigma < MAX_RELATIVE_SIGMA * distance) & (confidence > MIN_CONFIDENCE) & (distance < 15)
             points = np.vstack([rays[:, good] * distance[good], np.ones(good.sum())])
             cloud.add((poses[stamp] @ vehicle_from_camera @ points)[:3])
-        middle = stamps[len(stamps) // 2]
-        image = read_image(arguments.bag, camera, middle)
+        shown = stamps[int(arguments.moment * (len(stamps) - 1))]
+        image = read_image(arguments.bag, camera, shown)
         inputs.append(label(cv2.resize(image, (640, 400), interpolation=cv2.INTER_AREA), camera))
-        picture = cv2.imread(str(folder / f"{middle}_range.png"))
+        picture = cv2.imread(str(folder / f"{shown}_range.png"))
         ranges.append(label(cv2.resize(picture, (640, 400), interpolation=cv2.INTER_NEAREST), f"{camera} range"))
 
     def mosaic(pictures):

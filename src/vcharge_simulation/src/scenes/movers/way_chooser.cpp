@@ -95,8 +95,10 @@ bool WayChooser::chooseCrossing(Random* random, Way* way) const {
   way->task.wanted_m_per_s = [go_s, speed = way->task.max_speed_m_per_s](int step) {
     return SpeedSchedule::kStep_s * step < go_s ? 0.0 : speed;
   };
-  way->crossing = Way::Crossing{met_s, half_m};
-  return go_s > 0.0 && own_car_.speedAt(met_s) > 0.5 && isFreeLap(2.0 * half_m, way);
+  // Already on the way at the start of a short drive.
+  way->mover.start_m = std::max(0.0, -go_s * way->task.max_speed_m_per_s);
+  way->crossing = Way::Crossing{met_s, half_m - way->mover.start_m};
+  return way->mover.start_m < 0.5 * half_m && own_car_.speedAt(met_s) > 0.5 && isFreeLap(2.0 * half_m, way);
 }
 
 bool WayChooser::chooseCar(Random* random, Way* way) const {
