@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Measures every stage on the test scenes and makes doc/results.md: renders the drives, runs the tools, judges the results.
 # A run that was interrupted goes on where it ended.
-#   evaluate_everything.sh [--quick] [--stages STAGE...] [--work FOLDER]
+#   evaluate_everything.sh [--quick] [--stages STAGE...] [--work FOLDER] [--no-publish] [--drop-old]
 # --quick: small images and short drives (40 minutes on two cores); otherwise a night.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

@@ -13,16 +13,21 @@ import tempfile
 import types
 import unittest
 
+import cv2
+import genpy
 import numpy as np
+import rosbag
 import rostest
 import yaml
 from geometry_msgs.msg import Quaternion
 from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Image
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "src" / "vcharge_evaluation" / "python"))
 from vcharge_evaluation import __main__ as evaluation_main  # noqa: E402
-from vcharge_evaluation import page, poses, results, spoiled_drives  # noqa: E402
+from vcharge_evaluation import conditions, consistency, drives, everything, faults, obstacles, page  # noqa: E402
+from vcharge_evaluation import poses, results, spoiled_drives, tools  # noqa: E402
 from vcharge_evaluation.camera_models import project  # noqa: E402
 
 
@@ -66,6 +71,38 @@ class ResultsTest(FolderTest):
         self.assertEqual(lines[3], "|found|>= 0.5|0.8|**0.4** (garage)|**0.4**|0.8|0.9|")
         self.assertEqual(lines[4], "|time||||1 s|1 s|1 s|")
 
+    def test_many_conditions_have_a_row_each_worst_first(self):
+        lines = results.table([results.Measurement("t", f"drive {i}", [results.figure("error", float(i), "cm", at_most=6)])
+                               for i in range(results.MAX_COLUMNS + 1)]).splitlines()
+        self.assertEqual(lines[0], "|what|error|")
+        self.assertEqual(lines[2:7], ["|goal|<= 6|", "|median|3 cm|", "|95 %|6 cm|", "|worst|6 cm (drive 6)|", "|drive 6|6 cm|"])
+        self.assertEqual(lines[-1], "|drive 0|0 cm|")
+
+    def test_spread_counts_misses_at_the_bound(self):
+        figures = results.spread("error", [0.01, 0.02, None, float("inf"), float("nan")], 0.5, "cm", 100, at_most=1)
+        self.assertEqual([one.value for one in figures], [50, 50, 50])
+        self.assertFalse(figures[0].reached)
+        median, upper, worst = results.spread("error", [i / 100 for i in range(101)], 5.0)
+        self.assertAlmostEqual(median.value, 0.5)
+        self.assertAlmostEqual(upper.value, 0.95)
+        self.assertAlmostEqual(worst.value, 1.0)
+        self.assertIsNone(results.spread("error", [], 1.0)[2].value)
+
+    def test_the_picture_of_a_stage_is_that_of_its_worst_case(self):
+        args = types.SimpleNamespace(work=self.folder, publish=True)
+        published = results.PICTURES
+        self.addCleanup(setattr, results, "PICTURES", published)
+        results.PICTURES = self.folder / "doc" / "pictures"
+        stage = results.Results("stage", "Stage", args)
+        noise = np.random.default_rng(1).integers(0, 256, (800, 1400, 3), dtype=np.uint8)
+        for badness in (2.0, 3.0, 1.0):
+            stage.show(noise, f"badness {badness:g}", badness)
+        for folder in (self.folder / "pictures", results.PICTURES):
+            self.assertEqual(results.read_caption(folder / "stage.json")["caption"], "badness 3")
+            self.assertLessEqual((folder / "stage.jpg").stat().st_size, 60_000)
+        results.write(self.folder / "doc" / "stage.json", "Stage", [results.Measurement("t", "lot", [results.Figure("error", 1)])])
+        self.assertIn("![worst case](doc/pictures/stage.jpg)", page.make_page(self.folder / "doc"))
+
     def test_table_has_a_column_per_condition(self):
         table = results.table([results.Measurement("t", "lot", [results.figure("error", 1.25, "cm", at_most=1)]),
                                results.Measurement("t", "garage", [results.figure("error", 0.5, "cm", at_most=1)])])
@@ -84,6 +121,16 @@ class ResultsTest(FolderTest):
         new = [results.Measurement("t", "lot", [results.Figure("error", 1)]), results.Measurement("u", "lot", [])]
         self.assertEqual(results.merge(old, new), [new[0], old[1], new[1]])
 
+    def test_measurements_of_other_commits_are_dropped_on_request(self):
+        path = self.folder / "stage.json"
+        results.write(path, "Stage", [results.Measurement("t", name, [], "command", "2026-01-02", name) for name in ("old", "new")])
+        results.drop_others(path, "new")
+        self.assertEqual([one.condition for one in results.read(path)[1]], ["new"])
+
+    def test_the_command_of_a_figure_leaves_out_where_it_was_kept(self):
+        self.assertEqual(results.words_that_matter(["--seed", "2", "--work", "/tmp/somewhere", "--publish", "--small"]),
+                         ["--seed", "2", "--small"])
+
     def test_results_are_published_on_request_only(self):
         args = types.SimpleNamespace(work=self.folder / "work", publish=False)
         published = results.RESULTS
@@ -100,6 +147,14 @@ class PageTest(unittest.TestCase):
     def test_results_page_is_made_from_the_results(self):
         self.assertEqual(page.PAGE.read_text(encoding="utf-8"), page.make_page(),
                          "doc/results.md is stale or edited by hand: run scripts/in_build.sh python3 -m vcharge_evaluation.page")
+
+    def test_one_table_holds_what_several_commands_measured(self):
+        both = [results.Measurement("t", scene, [results.Figure("error", 1)], f"measure {scene}", "2026-01-02", "abc")
+                for scene in ("lot", "garage")]
+        self.assertEqual(page.show(both).splitlines()[-4:], ["|error|1|1|", "", "- `measure lot` (2026-01-02, abc)",
+                                                             "- `measure garage` (2026-01-02, abc)"])
+        both[1].figures[0].name = "time"
+        self.assertIn("|garage: time|1||`measure garage` (2026-01-02, abc)|", page.show(both))
 
     def test_figures_of_the_readme_are_results(self):
         rows = (ROOT / "README.md").read_text().split("A few [results]")[1].split("##")[0].splitlines()
@@ -121,6 +176,117 @@ class PageTest(unittest.TestCase):
                 self.assertTrue(one.command and one.date and one.commit and one.figures, f"{path}: {one.title}")
 
 
+class CompletenessTest(unittest.TestCase):
+    def test_every_fault_and_condition_scenario_has_a_row(self):
+        stage = {one.condition for one in results.read(results.RESULTS / "faults.json")[1]}
+        self.assertEqual({f"fault_{name}" for name in faults.all_faults()},
+                         {path.stem for path in drives.SCENARIOS.glob("fault_*.yaml")})
+        self.assertLessEqual(set(faults.all_faults()), stage)
+        self.assertLessEqual({path.stem for path in drives.SCENARIOS.glob("condition_*.yaml")}, set(conditions.all_scenarios()))
+
+    def test_every_scenario_of_the_conditions_exists(self):
+        for name in conditions.DRIVING:
+            self.assertTrue((drives.SCENARIOS / f"{name}.yaml").exists(), name)
+            self.assertEqual(len(conditions.scene_and_drive(name)), 2)
+
+    def test_the_quick_run_has_every_stage_that_it_can_measure(self):
+        quick = {step.stage for step in everything.steps() if step.quick is not None}
+        self.assertLessEqual({"masks", "ranges", "obstacles", "height_map", "localization", "conditions", "faults", "chain"}, quick)
+        self.assertLessEqual(quick, set(evaluation_main.STAGES))
+
+
+class DrivesTest(FolderTest):
+    def rig(self, folder, sizes, masked):
+        folder.mkdir()
+        cameras = {}
+        for name, (width, height) in sizes.items():
+            cameras[name] = {"image_size_px": [width, height], "model": "mei"}
+            if name in masked:
+                cv2.imwrite(str(folder / f"{name}.png"), masked[name])
+                cameras[name]["mask"] = f"{name}.png"
+        (folder / "rig.yaml").write_text(yaml.safe_dump({"cameras": cameras}))
+        return folder / "rig.yaml"
+
+    def test_found_masks_replace_the_true_ones_in_the_size_of_the_images(self):
+        found = np.full((40, 80), 255, np.uint8)
+        found[:10, :21] = 0
+        truth = self.rig(self.folder / "truth", {"left": (40, 20), "front": (40, 20)},
+                         {"left": np.zeros((20, 40), np.uint8), "front": np.zeros((20, 40), np.uint8)})
+        masked = self.rig(self.folder / "found", {"left": (80, 40), "front": (80, 40)}, {"left": found})
+        path = drives.write_masked_rig(truth, masked, self.folder / "truth" / "rig_found.yaml")
+        cameras = yaml.safe_load(path.read_text())["cameras"]
+        self.assertNotIn("mask", cameras["front"], "no mask was found for this camera")
+        pixels = cv2.imread(str(path.parent / cameras["left"]["mask"]), cv2.IMREAD_GRAYSCALE)
+        self.assertEqual(pixels.shape, (20, 40))
+        self.assertEqual(np.count_nonzero(pixels == 0), 5 * 11)
+
+    def test_where_no_masks_were_found_the_rig_has_none(self):
+        truth = self.rig(self.folder / "truth", {"left": (40, 20)}, {"left": np.zeros((20, 40), np.uint8)})
+        path = drives.write_masked_rig(truth, None, self.folder / "truth" / "rig_found.yaml")
+        self.assertNotIn("mask", yaml.safe_load(path.read_text())["cameras"]["left"])
+
+    def test_reasons_in_results_name_no_paths(self):
+        run = tools.Run(0, 0, 0, {"error": "/tmp/some/drive.bag: no range map could be made (front: stands)"})
+        self.assertEqual(run.reason(), "no range map could be made (front: stands)")
+
+    def test_a_tool_runs_once_until_its_words_change(self):
+        tool = self.folder / "package" / "count_runs"
+        tool.parent.mkdir()
+        tool.write_text("#!/bin/sh\necho run >> \"$1\"\nshift 2; echo '{}' > \"$2\"\n")
+        tool.chmod(0o755)
+        self.addCleanup(setattr, tools, "TOOLS", tools.TOOLS)
+        tools.TOOLS = self.folder
+        runs = self.folder / "runs"
+        for word in ("a", "a", "b"):
+            tools.run_tool_once("count_runs", self.folder / "tool.log", runs, word)
+        self.assertEqual(len(runs.read_text().splitlines()), 2)
+
+
+class ConsistencyTest(unittest.TestCase):
+    def test_interval_of_chi_square(self):
+        for dof, expected in ((30, (16.79 / 30, 46.98 / 30)), (100, (0.7422, 1.2956))):
+            np.testing.assert_allclose(consistency.chi_square_interval(dof), expected, rtol=2e-3)
+
+    def test_probability_of_a_right_pose_follows_the_covariance(self):
+        generator = np.random.default_rng(3)
+        self.assertEqual(consistency.probability_right(np.diag([1e-6] * 6), generator), 1.0)
+        self.assertLess(consistency.probability_right(np.diag([1.0] * 3 + [1e-6] * 3), generator), 0.01)
+        # One direction alone: 68.3 % within a standard deviation.
+        one = consistency.probability_right(np.diag([0.01, 0, 0, 0, 0, 0]), generator)
+        self.assertAlmostEqual(one, 0.683, delta=4 * (0.683 * 0.317 / consistency.SAMPLES) ** 0.5)
+
+    def test_calibration_error_is_what_is_claimed_too_much(self):
+        found = consistency.calibration([0.95] * 10 + [1.0] * 10, [True] * 5 + [False] * 5 + [True] * 10)
+        self.assertEqual([one["count"] for one in found["bins"]], [20])
+        self.assertAlmostEqual(found["expected_calibration_error"], abs(0.975 - 0.75))
+        figures = results.calibration_figures(found)
+        self.assertIn("0.9 to 1", figures[1].name)
+        self.assertEqual(consistency.calibration([], [])["bins"], [])
+
+    def test_the_worst_drive_is_named(self):
+        figures = consistency.squared_figures({"seed 1": [1.0, 1.0], "seed 2": [2.0, 3.0], "seed 3": []})
+        self.assertEqual(figures[0].value, 1.75)
+        self.assertIn("seed 2", figures[-1].value)
+        self.assertFalse(consistency.squared_figures({"seed 1": []})[0].reached)
+
+
+class ObstacleClassesTest(unittest.TestCase):
+    def test_people_are_judged_apart_and_the_unreported_at_contact(self):
+        judged = {"obstacles": [{"kind": "car", "reported": True}, {"kind": "car", "reported": False},
+                                {"kind": "pole", "reported": True}],
+                  "movers": [{"kind": "pedestrian", "maps": 10, "maps_reported": 9}]}
+        reports = [{"kind": "pedestrian", "first_reported_m": 4.0, "contact_s": 2.0},
+                   {"kind": "pedestrian", "first_reported_m": None, "contact_s": None}]
+        classes = obstacles.recall_by_class(judged)
+        self.assertEqual(json.loads(json.dumps(classes)), classes, "the chain keeps figures as JSON")
+        figures = {one.name: one for one in obstacles.class_figures({"classes": classes, "reports": reports})}
+        self.assertEqual(figures["cars, standing: reported, of those that are visible"].value, 50)
+        self.assertFalse(figures["cars, standing: reported, of those that are visible"].reached)
+        self.assertEqual(figures["people, moving: reported, of those images in which they are visible"].value, 90)
+        self.assertEqual(figures["the same, least (people)"].value, 0)
+        self.assertEqual(figures["the same time, least (people)"].value, 0)
+
+
 class PosesTest(FolderTest):
     def test_rotations_turn_axes(self):
         half = np.sqrt(0.5)
@@ -128,6 +294,19 @@ class PosesTest(FolderTest):
 
     def test_nearest_finds_both_neighbours_and_ends(self):
         np.testing.assert_array_equal(poses.nearest(np.array([0.0, 1.0, 2.0]), np.array([-1.0, 0.4, 0.6, 5.0])), [0, 0, 1, 2])
+
+    def test_a_repeated_stamp_corrects_the_odometry_before(self):
+        with rosbag.Bag(str(self.folder / "drive.bag"), "w") as bag:
+            for received, (stamp, x) in enumerate(((1, 0.1), (2, 0.2), (2, 0.25), (3, 0.3))):
+                message = Odometry()
+                message.header.stamp = genpy.Time(stamp)
+                message.pose.pose.position.x = x
+                bag.write("/odom", message, genpy.Time(10 + received))
+            image = Image()
+            image.header.stamp = genpy.Time(2)
+            bag.write("/camera/left/image_raw", image, genpy.Time(20))
+        self.assertEqual(poses.write_odometry(self.folder / "drive.bag", self.folder / "odometry.tum"), (0.0, 1))
+        np.testing.assert_allclose(np.loadtxt(self.folder / "odometry.tum")[:, :2], [[1, 0.1], [2, 0.25], [3, 0.3]])
 
     def test_stamps_are_exact(self):
         self.assertEqual(poses.stamp_ns("1700000000.123456789"), 1700000000123456789)
@@ -204,8 +383,8 @@ class BenchmarkComparisonTest(FolderTest):
 
 class ArgumentsTest(FolderTest):
     def test_every_stage_has_help(self):
-        for stage in ("masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "faults", "chain",
-                      "latency", "soak"):
+        for stage in ("masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "conditions",
+                      "faults", "chain", "latency", "soak"):
             output, arguments = io.StringIO(), sys.argv
             self.addCleanup(setattr, sys, "argv", arguments)
             sys.argv = ["evaluate.sh", stage, "--help"]

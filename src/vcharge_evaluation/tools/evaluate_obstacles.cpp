@@ -117,7 +117,8 @@ nlohmann::json raysToJson(const char* what, const RayErrors& errors) {
           {"error_m", errors.error_m},
           {"mean_signed_m", errors.mean_signed_m},
           {"fraction_within_one_sigma", errors.fraction_within_one_sigma},
-          {"fraction_within_two_sigma", errors.fraction_within_two_sigma}};
+          {"fraction_within_two_sigma", errors.fraction_within_two_sigma},
+          {"calibration", calibrationToJson(errors.calibration)}};
 }
 
 nlohmann::json scanToJson(const std::string& name, const ObstacleScanEvaluator& evaluator) {
@@ -179,9 +180,13 @@ nlohmann::json mapToJson(const ObstacleMapErrors& errors) {
   std::printf("kerbs: %zu of %zu points reported, height error mean %.1f cm, 95 %% %.1f cm\n",
               errors.num_kerb_reported, errors.num_kerb_points, 100.0 * errors.kerb_height_error_m.mean,
               100.0 * errors.kerb_height_error_m.percentile_95);
-  std::printf("moving objects: reported in %zu of %zu maps; %zu of %zu cells under them free\n",
-              errors.num_mover_reported, errors.num_mover_frames, errors.num_mover_free,
-              errors.num_mover_cells);
+  nlohmann::json movers = nlohmann::json::array();
+  for (const auto& [kind, counts] : errors.movers) {
+    std::printf("moving: %s reported in %zu of %zu maps\n", kind.c_str(), counts.frames_reported,
+                counts.frames);
+    movers.push_back({{"kind", kind}, {"maps", counts.frames}, {"maps_reported", counts.frames_reported}});
+  }
+  std::printf("%zu of %zu cells under moving objects free\n", errors.num_mover_free, errors.num_mover_cells);
   nlohmann::json kerbs = nlohmann::json::array();
   for (const KerbOutcome& kerb : errors.kerbs) {
     kerbs.push_back({{"position_m", {kerb.position_m.x(), kerb.position_m.y()}},
@@ -213,8 +218,7 @@ nlohmann::json mapToJson(const ObstacleMapErrors& errors) {
           {"kerb_reported", errors.num_kerb_reported},
           {"kerb_height_error_m", errors.kerb_height_error_m},
           {"kerbs", kerbs},
-          {"mover_maps", errors.num_mover_frames},
-          {"mover_reported", errors.num_mover_reported},
+          {"movers", movers},
           {"mover_cells", errors.num_mover_cells},
           {"mover_free", errors.num_mover_free}};
 }
@@ -327,11 +331,12 @@ int main(int argc, char** argv) {
                R"(kind: "obstacles"; scans: per scan {name, and for all rays (all), those off the direction of
 travel (aside), along it (ahead) and along it within 2 m (ahead_within_2_m), and by_range (with from_m, to_m) {rays,
 missed, nearer, mean_signed_m, fraction_within_one_sigma, fraction_within_two_sigma, error distribution error_m, in
-which missed and nearer rays count as 0.5 m}}; map: {maps, driven_m, obstacles [{kind, height_m, width_m, distance_m, reported, maps,
+which missed and nearer rays count as 0.5 m, calibration {expected_calibration_error, bins [{count, mean_confidence,
+fraction_right}]} of the probability, by the reported sigma, of an error within 0.15 m}}; map: {maps, driven_m, obstacles [{kind, height_m, width_m, distance_m, reported, maps,
 maps_reported}], false_cells, false_cells_per_10_m, false_left, false_cells_per_map, false_cells_hidden,
 false_cell_list [{x_m, y_m, first_seen_ns, maps, left, on_open_ground}], observed_inside, free_inside:
 cells inside obstacles, kerb_points, kerb_reported, error distribution kerb_height_error_m, kerbs
-[{position_m, nearest_m, reported, ever_reported}], mover_maps, mover_reported, mover_cells, mover_free}; approach: {reports [{kind, moves, first_visible_m, nearest_m,
+[{position_m, nearest_m, reported, ever_reported}], movers [{kind, maps, maps_reported}], mover_cells, mover_free}; approach: {reports [{kind, moves, first_visible_m, nearest_m,
 first_reported_m, contact_s: null if never}], corridor {TRUTH_as_MAP: cells}, false_alarms, duration_s, driven_m}.)");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (options.shown()) {

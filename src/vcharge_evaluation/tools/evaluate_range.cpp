@@ -106,6 +106,7 @@ nlohmann::json binsToJson(const std::vector<RangeBin>& bins) {
   for (const RangeBin& bin : bins) {
     json.push_back({{"low", bin.low},
                     {"high", bin.high},
+                    {"num_judged", bin.num_judged},
                     {"count", bin.count},
                     {"fraction_within_tolerance", bin.fraction_within_tolerance},
                     {"median_relative_error", bin.median_relative_error},
@@ -138,7 +139,9 @@ nlohmann::json reportErrors(const std::string& label, const RangeErrors& errors)
           {"fraction_within_one_sigma", errors.fraction_within_one_sigma},
           {"fraction_within_two_sigma", errors.fraction_within_two_sigma},
           {"by_truth", binsToJson(errors.by_truth)},
-          {"by_confidence", binsToJson(errors.by_confidence)}};
+          {"by_confidence", binsToJson(errors.by_confidence)},
+          {"bounded_relative_error", errors.bounded_relative_error},
+          {"calibration", calibrationToJson(errors.calibration)}};
 }
 
 }  // namespace
@@ -156,8 +159,10 @@ int main(int argc, char** argv) {
   describeJson(&app, R"(kind: "range"; tolerance: relative; sets: for all cameras and for each one {label,
 num_frames, num_judged, num_known, fraction_within_one_sigma, fraction_within_two_sigma, accuracy [{density,
 fraction_within_tolerance, median_relative_error, fraction_known}] of the most confident fraction, and by_truth
-(m) and by_confidence [{low, high, count, fraction_within_tolerance, median_relative_error,
-fraction_within_one_sigma}] of the known ranges}.)");
+(m) and by_confidence [{low, high, num_judged, and of the known ranges count, fraction_within_tolerance,
+median_relative_error, fraction_within_one_sigma}]; error distribution bounded_relative_error, in which unknown ranges
+count as 0.5; calibration {expected_calibration_error, bins [{count, mean_confidence, fraction_right}]} of the
+confidence, where ranges within 10 % are right}.)");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (options.shown()) {
       return;

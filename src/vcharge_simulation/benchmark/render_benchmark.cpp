@@ -14,14 +14,17 @@
 namespace vcharge {
 namespace {
 
-const Renderer& rendererOf(const std::string& scene, const std::string& drive, const MoverOptions& movers) {
+const Renderer& rendererOf(const std::string& scene, const std::string& drive, const MoverOptions& movers,
+                           ConditionKind condition) {
   static std::string built;
   static std::unique_ptr<const Renderer> renderer;
-  const std::string name = scene + (movers.hasAny() ? " with movers" : "");
+  const std::string name =
+      scene + (movers.hasAny() ? " with movers " : " ") + std::to_string(static_cast<int>(condition));
   if (name != built) {
     renderer.reset();
     SceneOptions options;
     options.movers = movers;
+    options.condition.kind = condition;
     const DrivePlan plan = planDrive(scene, drive);
     options.own_poses = ownPoses(simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1,
                                                FaultOptions(), plan.ground_height));
@@ -40,8 +43,9 @@ MoverOptions tenMovers() {
 
 // Renders one 1280x800 image at four rays per pixel on one core, at the start of a drive at 2.5 m/s.
 void renderImage(benchmark::State& state, const std::string& scene, const std::string& drive,
-                 double readout_time_s = 0.0, const MoverOptions& movers = MoverOptions()) {
-  const Renderer& renderer = rendererOf(scene, drive, movers);
+                 double readout_time_s = 0.0, const MoverOptions& movers = MoverOptions(),
+                 ConditionKind condition = ConditionKind::kNoon) {
+  const Renderer& renderer = rendererOf(scene, drive, movers, condition);
   const auto body = makeGolfBody();
   const DrivePlan plan = planDrive(scene, drive);
   const RigidTransform& start = plan.path.worldFromStart();
@@ -59,7 +63,14 @@ void renderImage(benchmark::State& state, const std::string& scene, const std::s
   for (auto _ : state) {
     benchmark::DoNotOptimize(renderer.renderLight(view, readout, plan.start_s).data);
   }
+  state.counters["images"] = benchmark::Counter(1.0, benchmark::Counter::kIsIterationInvariantRate);
 }
+
+void renderCondition(benchmark::State& state, const std::string& scene, const std::string& drive,
+                     ConditionKind condition) {
+  renderImage(state, scene, drive, 0.0, MoverOptions(), condition);
+}
+
 // The minimum is reported because other load on the machine only adds time.
 double minimum(const std::vector<double>& times) {
   return *std::min_element(times.begin(), times.end());
@@ -73,6 +84,27 @@ BENCHMARK_CAPTURE(renderImage, lot, "lot", "short")->DenseRange(0, 3)->Apply(one
 BENCHMARK_CAPTURE(renderImage, lot_rolling_20_ms, "lot", "short", 0.02)->DenseRange(0, 3)->Apply(oneThread);
 BENCHMARK_CAPTURE(renderImage, lot_with_movers, "lot", "standing", 0.0, tenMovers())
     ->DenseRange(0, 3)
+    ->Apply(oneThread);
+BENCHMARK_CAPTURE(renderCondition, lot_noon, "lot", "short", ConditionKind::kNoon)->Arg(0)->Apply(oneThread);
+BENCHMARK_CAPTURE(renderCondition, lot_low_sun, "lot", "short", ConditionKind::kLowSun)
+    ->Arg(0)
+    ->Apply(oneThread);
+BENCHMARK_CAPTURE(renderCondition, lot_overcast, "lot", "short", ConditionKind::kOvercast)
+    ->Arg(0)
+    ->Apply(oneThread);
+BENCHMARK_CAPTURE(renderCondition, lot_dusk, "lot", "short", ConditionKind::kDusk)->Arg(0)->Apply(oneThread);
+BENCHMARK_CAPTURE(renderCondition, lot_night, "lot", "short", ConditionKind::kNight)
+    ->Arg(0)
+    ->Apply(oneThread);
+BENCHMARK_CAPTURE(renderCondition, lot_wet, "lot", "short", ConditionKind::kWet)->Arg(0)->Apply(oneThread);
+BENCHMARK_CAPTURE(renderCondition, garage_noon, "garage", "loop", ConditionKind::kNoon)
+    ->Arg(0)
+    ->Apply(oneThread);
+BENCHMARK_CAPTURE(renderCondition, garage_night, "garage", "loop", ConditionKind::kNight)
+    ->Arg(0)
+    ->Apply(oneThread);
+BENCHMARK_CAPTURE(renderCondition, garage_wet, "garage", "loop", ConditionKind::kWet)
+    ->Arg(0)
     ->Apply(oneThread);
 BENCHMARK_CAPTURE(renderImage, garage, "garage", "loop")->DenseRange(0, 3)->Apply(oneThread);
 BENCHMARK_CAPTURE(renderImage, obstacles, "obstacles", "creep")->Arg(1)->Apply(oneThread);

@@ -22,6 +22,7 @@
 #include "vcharge_simulation/rendering/renderer.h"
 #include "vcharge_simulation/scenes/scene_catalogue.h"
 #include "vcharge_simulation/sensors/recorded_cameras.h"
+#include "wheel_can_log.h"
 
 namespace vcharge {
 
@@ -50,18 +51,28 @@ void thin(int step, std::vector<T>* list) {
   *list = std::move(kept);
 }
 
-// These faults need the renderer, so images rendered without them cannot be used.
-void checkImagesCanBeReused(const FaultOptions& faults, const std::string& images_from) {
+// These options need the renderer, so images rendered without them cannot be used.
+void checkImagesCanBeReused(const DriveScenario& scenario, const std::string& images_from) {
+  const FaultOptions& faults = scenario.faults;
   const bool lamps_in_world = faults.bright_lamps.isActive() && !faults.bright_lamps.positions_m.empty();
-  for (const auto& [name, is_active] : {std::pair("bumped_camera", faults.bumped_camera.isActive()),
-                                        std::pair("rolling_shutter", faults.rolling_shutter.isActive()),
-                                        std::pair("motion_blur", faults.motion_blur.isActive()),
-                                        std::pair("bright_lamps.positions_m", lamps_in_world)}) {
+  for (const auto& [name, is_active] :
+       {std::pair("faults.bumped_camera", faults.bumped_camera.isActive()),
+        std::pair("faults.rolling_shutter", faults.rolling_shutter.isActive()),
+        std::pair("faults.motion_blur", faults.motion_blur.isActive()),
+        std::pair("faults.bright_lamps.positions_m", lamps_in_world),
+        std::pair("condition", !scenario.condition.isNoon())}) {
     if (is_active) {
-      throw InputError("faults." + std::string(name) + ": needs rendering, so the images of " + images_from +
+      throw InputError(std::string(name) + ": needs rendering, so the images of " + images_from +
                        " cannot be used");
     }
   }
+}
+
+// `to` is a point or, if w is 0, a direction.
+bool isVisible(const Renderer& renderer, const Eigen::Vector3d& from_m, const Eigen::Vector4d& to) {
+  const Eigen::Vector3d offset = to.head<3>() - to.w() * from_m;
+  const auto hit_m = renderer.castRay(from_m, offset.normalized());
+  return !hit_m || (to.w() > 0.0 && *hit_m > offset.norm() - kLampSize_m);
 }
 
 std::vector<ImageFaults::Camera> faultyCameras(const RecordedCameras& cameras) {
@@ -134,7 +145,7 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   const std::string truth_name = bag.stem().string() + "_truth";
   const RecordedCameras cameras(scenario, "rig_truth_masks");
   const CameraRig& rig = cameras.rig();
-  const FaultOptions& faults = scenario.faults;
+  const FaultOptions faults = scenario.activeFaults();
   SimulatedDrive drive =
       simulateDrive(plan.path, plan.motion, scenario.odometer, static_cast<uint64_t>(scenario.seed),
                     scenario.sensorSeed(), faults, plan.ground_height);
@@ -154,6 +165,7 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   }
   const CameraResponse response;
   std::optional<Renderer> renderer;
+  std::optional<LensGlare> glare;
   std::unique_ptr<ImageSource> images;
   writeTrajectory(drive.world_from_vehicle, truth.path() + "/trajectory.tum");
   if (recording.images_from.empty()) {
@@ -161,7 +173,8 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
     scene.seed = static_cast<uint64_t>(scenario.scene_seed);
     scene.layout_seed = static_cast<uint64_t>(scenario.layout_seed);
     scene.surface_seed = static_cast<uint64_t>(scenario.surface_seed);
-    scene.day = plan.day;
+    scene.day = {scenario.day < 0 ? plan.day : scenario.day, scenario.exchanged_cars};
+    scene.condition = scenario.condition;
     scene.image_scale = scenario.image_scale;
     scene.board = scenario.board;
     scene.rig = scenario.rig;
@@ -170,7 +183,13 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
     scene.own_poses = ownPoses(drive);
     scene.start_s = plan.start_s;
     renderer.emplace(buildScene(scenario.scene, scene));
-    images = renderImages(*renderer, cameras, response, drive, scene_times_s, faults.motion_blur);
+    if (!scenario.condition.isNoon()) {
+      glare.emplace(renderer->scene(), [&](const Eigen::Vector3d& from_m, const Eigen::Vector4d& to) {
+        return isVisible(*renderer, from_m, to);
+      });
+    }
+    images = renderImages(*renderer, cameras, response, drive, scene_times_s, faults.motion_blur,
+                          glare ? &*glare : nullptr);
     writeHeightMap(computeHeightMap(*renderer, recording.height_cell_m, kHeightLimit_m),
                    truth.path() + "/height_map");
     writeObstacles(renderer->scene().obstacles, truth.path() + "/obstacles.yaml");
@@ -178,7 +197,7 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
       writeMovers(renderer->scene().movers, stamps, scene_times_s, truth.path() + "/movers.yaml");
     }
   } else {
-    checkImagesCanBeReused(faults, recording.images_from);
+    checkImagesCanBeReused(scenario, recording.images_from);
     images = readImages(recording.images_from, rig, drive);
   }
   if (scenario.scene == "chessboard") {
@@ -199,9 +218,7 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   LightFaults::IsVisible is_visible;
   if (renderer) {
     is_visible = [&](const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m) {
-      const double distance_m = (to_m - from_m).norm();
-      const auto hit_m = renderer->castRay(from_m, (to_m - from_m) / distance_m);
-      return !hit_m || *hit_m > distance_m - kLampSize_m;
+      return isVisible(*renderer, from_m, to_m.homogeneous());
     };
   }
   const LightFaults light_faults(faults, cameras, response, start, is_visible);
@@ -209,6 +226,16 @@ void recordDrive(const DriveScenario& scenario, const RecordingOptions& recordin
   ExposureFaults exposures(faults, names, response, start, scenario.noise ? scenario.exposure_gain : 1.0);
   ImageFaults image_faults(faults, faultyCameras(cameras), start, scenario.sensorSeed());
   MotionRecorder motion(drive, faults.odometry_stamp_shift, &writer);
+  if (!drive.wheel_speeds.empty()) {
+    std::vector<WheelSpeeds> speeds;
+    for (const Received<WheelSpeeds>& each : drive.wheel_speeds) {
+      speeds.push_back(each.message);
+      speeds.back().stamp =
+          each.message.stamp + faults.odometry_stamp_shift.shiftAt(each.message.stamp - start);
+    }
+    writeTextFileAtomically((bag.parent_path() / (bag.stem().string() + "_can.log")).string(),
+                            wheelCanLog(speeds));
+  }
   ProgressBar progress("simulating " + scenario.drive);
   for (size_t frame = 0; frame < drive.world_from_vehicle.size(); ++frame) {
     const Timestamp stamp = stamps[frame];

@@ -21,27 +21,35 @@ class RenderedImages : public ImageSource {
  public:
   RenderedImages(const Renderer& renderer, const RecordedCameras& cameras, const CameraResponse& response,
                  const SimulatedDrive& drive, const std::vector<double>& scene_times_s,
-                 const MotionBlurFault& blur)
+                 const MotionBlurFault& blur, const LensGlare* glare)
       : renderer_(renderer),
         cameras_(cameras),
         response_(response),
         drive_(drive),
         scene_times_s_(scene_times_s),
-        blur_(blur) {}
+        blur_(blur),
+        glare_(glare) {}
 
   cv::Mat image(size_t camera, size_t frame) override {
     const Duration since_start = drive_.world_from_vehicle[frame].stamp - drive_.ground_truth.front().stamp;
     const CameraView& view = cameras_.view(camera, since_start);
     Readout readout = cameras_.readout(camera, since_start, drive_.image_motion[frame]);
-    if (!blur_.actsOn(cameras_.name(camera), since_start)) {
-      return response_.develop(renderer_.renderLight(view, readout, scene_times_s_[frame]));
+    const int renderings = blur_.actsOn(cameras_.name(camera), since_start) ? blur_.renderings : 1;
+    cv::Mat light;
+    for (int i = 0; i < renderings; ++i) {
+      readout.middle_s = ((i + 0.5) / renderings - 0.5) * blur_.exposure_time_s;
+      const cv::Mat rendered = renderer_.renderLight(view, readout, scene_times_s_[frame]);
+      light = i == 0 ? rendered : light + rendered;
     }
-    cv::Mat light = cv::Mat::zeros(view.size(), CV_32FC1);
-    for (int i = 0; i < blur_.renderings; ++i) {
-      readout.middle_s = ((i + 0.5) / blur_.renderings - 0.5) * blur_.exposure_time_s;
-      light += renderer_.renderLight(view, readout, scene_times_s_[frame]);
+    if (renderings > 1) {
+      light /= static_cast<double>(renderings);
     }
-    return response_.develop(light / static_cast<double>(blur_.renderings));
+    if (glare_ == nullptr) {
+      return response_.develop(light);
+    }
+    readout.middle_s = 0.0;
+    glare_->apply(view, readout, &light);
+    return light;
   }
 
  private:
@@ -51,6 +59,7 @@ class RenderedImages : public ImageSource {
   const SimulatedDrive& drive_;
   const std::vector<double>& scene_times_s_;
   const MotionBlurFault blur_;
+  const LensGlare* glare_;
 };
 
 class RecordedImages : public ImageSource {
@@ -109,8 +118,8 @@ class RecordedImages : public ImageSource {
 std::unique_ptr<ImageSource> renderImages(const Renderer& renderer, const RecordedCameras& cameras,
                                           const CameraResponse& response, const SimulatedDrive& drive,
                                           const std::vector<double>& scene_times_s,
-                                          const MotionBlurFault& blur) {
-  return std::make_unique<RenderedImages>(renderer, cameras, response, drive, scene_times_s, blur);
+                                          const MotionBlurFault& blur, const LensGlare* glare) {
+  return std::make_unique<RenderedImages>(renderer, cameras, response, drive, scene_times_s, blur, glare);
 }
 
 std::unique_ptr<ImageSource> readImages(const std::string& bag, const CameraRig& rig,

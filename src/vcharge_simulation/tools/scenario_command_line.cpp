@@ -42,6 +42,8 @@ ScenarioCommandLine::ScenarioCommandLine(CLI::App* app) {
   add(app, &DriveScenario::board);
   add(app, &DriveScenario::scene_seed);
   add(app, &DriveScenario::rig_seed);
+  add(app, &DriveScenario::day);
+  add(app, &DriveScenario::exchanged_cars);
   add(app, &DriveScenario::seed);
   add(app, &DriveScenario::sensor_seed);
   add(app, &DriveScenario::exposure_gain);

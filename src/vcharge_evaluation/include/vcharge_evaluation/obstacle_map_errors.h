@@ -54,6 +54,12 @@ struct KerbOutcome {
   double height_error_m = 0.0;  ///< absolute error when due
 };
 
+/// Images in which moving objects of one kind were visible, and those in which they were reported.
+struct MoverCounts {
+  size_t frames = 0;
+  size_t frames_reported = 0;
+};
+
 struct ObstacleMapErrors {
   size_t num_frames = 0;
   double driven_m = 0.0;
@@ -68,12 +74,11 @@ struct ObstacleMapErrors {
   size_t num_free_inside = 0;        ///< those that were ever free
   size_t num_kerb_points = 0;        ///< visible points on outlines of kerbs, every 10 cm
   size_t num_kerb_reported = 0;
-  ErrorDistribution kerb_height_error_m;  ///< absolute errors of the reported points
-  std::vector<KerbOutcome> kerbs;         ///< all judged points
-  size_t num_mover_frames = 0;            ///< images in which a moving object was visible
-  size_t num_mover_reported = 0;
-  size_t num_mover_cells = 0;  ///< cells under moving objects, over all these images
-  size_t num_mover_free = 0;   ///< those that were free
+  ErrorDistribution kerb_height_error_m;      ///< absolute errors of the reported points
+  std::vector<KerbOutcome> kerbs;             ///< all judged points
+  std::map<std::string, MoverCounts> movers;  ///< by kind
+  size_t num_mover_cells = 0;                 ///< cells under moving objects, over all these images
+  size_t num_mover_free = 0;                  ///< those that were free
 };
 
 /// Compares the fused maps of one drive, in order of time, with the surfaces visible at the same time.

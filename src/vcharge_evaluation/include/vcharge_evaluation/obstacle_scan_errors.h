@@ -7,6 +7,7 @@
 
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/dense_maps/obstacle_map.h"
+#include "vcharge_evaluation/confidence_calibration.h"
 #include "vcharge_evaluation/error_distribution.h"
 #include "vcharge_evaluation/obstacle_truth.h"
 
@@ -29,6 +30,8 @@ struct RayErrors {
   double mean_signed_m = 0.0;  ///< of the rays that are neither missed nor nearer
   double fraction_within_one_sigma = 0.0;  ///< fraction of all judged rays
   double fraction_within_two_sigma = 0.0;
+  /// A reported range is right within 0.15 m; its confidence is the probability of this by its sigma.
+  std::vector<ConfidenceBin> calibration;
 };
 
 /// Compares scans with the surface points that were visible to the cameras at the same time.
@@ -53,6 +56,7 @@ class ObstacleScanEvaluator {
     size_t judged = 0, missed = 0, nearer = 0;
     std::vector<double> errors_m, sigmas;
     double signed_sum_m = 0.0;
+    ConfidenceCalibration calibration;
   };
   static constexpr std::array<double, 5> kRangeBounds_m = {0.5, 1.0, 2.0, 3.5, 5.0};
 

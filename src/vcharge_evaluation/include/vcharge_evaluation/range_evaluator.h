@@ -8,6 +8,7 @@
 
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/dense_maps/range_map.h"
+#include "vcharge_evaluation/confidence_calibration.h"
 #include "vcharge_evaluation/error_distribution.h"
 
 namespace vcharge {
@@ -36,7 +37,8 @@ struct RangeAccuracy {
 struct RangeBin {
   double low = 0.0;
   double high = 0.0;
-  size_t count = 0;
+  size_t num_judged = 0;  ///< pixels with and without a range
+  size_t count = 0;       ///< pixels with a range
   double fraction_within_tolerance = 0.0;
   double median_relative_error = 0.0;
   double fraction_within_one_sigma = 0.0;
@@ -46,12 +48,15 @@ struct RangeErrors {
   size_t num_frames = 0;
   size_t num_judged = 0;  ///< pixels with texture, a true range in bounds, and off the direction of travel
   size_t num_known = 0;   ///< judged pixels with a range
+  /// Relative errors of all judged pixels; unknown ranges and larger errors count as 0.5.
+  ErrorDistribution bounded_relative_error;
   std::vector<RangeAccuracy> accuracy;
   double fraction_within_one_sigma =
       0.0;  ///< fraction of the known ranges; 0.683 for normal errors and a correct sigma
   double fraction_within_two_sigma = 0.0;
   std::vector<RangeBin> by_truth;
   std::vector<RangeBin> by_confidence;
+  std::vector<ConfidenceBin> calibration;  ///< a range is right within 10 % of the truth
 };
 
 /// Compares range maps with their truth.

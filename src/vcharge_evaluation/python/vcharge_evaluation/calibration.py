@@ -3,10 +3,12 @@ errors, calibration in a map, verdicts on spoiled drives, and the published imag
 import argparse
 import math
 
+import cv2
 import numpy as np
 import yaml
 
 from vcharge_evaluation import spoiled_drives
+from vcharge_evaluation.chain.figures import judge_rig as judge_and_draw_rig
 from vcharge_evaluation.poses import rotations
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
 from vcharge_evaluation.tools import CONFIG, import_published_images, judge_rig, run_tool, say, simulate
@@ -112,6 +114,13 @@ def evaluate_rigs(args, results):
     results.add("Wall time by stage", *((rig, [Figure(stage, seconds, "s") for stage, seconds in one.stage_s.items()])
                                         for rig, one in calibrations.items()))
     results.add(f"Random rigs, goals, {size}", (" ".join(args.rigs), judged(calibrations.values())))
+    found = {rig: max(shift for shift, _ in one.sizes()) for rig, one in calibrations.items() if one.errors}
+    if found:
+        worst = max(found, key=found.get)
+        folder = calibrations[worst].output.parent
+        judge_and_draw_rig(calibrations[worst].output, folder / "rig_truth.yaml", {}, folder, folder / "rig_errors.png")
+        results.show(cv2.imread(str(folder / "rig_errors.png")),
+                     f"{worst}: largest translation error of a camera {100 * found[worst]:.2f} cm", found[worst])
 
 
 def evaluate_seeds(args, results):

@@ -4,12 +4,13 @@ import argparse
 import dataclasses
 import json
 import pathlib
+import resource
 import subprocess
 import sys
 import time
 
 from vcharge_evaluation import page
-from vcharge_evaluation.results import commit
+from vcharge_evaluation.results import RESULTS, commit, drop_others
 from vcharge_evaluation.tools import ROOT, say
 
 # Options are chosen on scenes and rigs with seeds below 100 alone, and are fixed before a test scene is rendered.
@@ -26,25 +27,37 @@ class Step:
         return [str(word) for word in (self.quick if quick else self.full)]
 
 
+QUICK_SCALE, QUICK_S = 0.4, 6  # of the drives that the stages of a quick run share
+
+
 def steps():
-    """All steps, the cheap ones first."""
+    """All steps, the cheap ones first. Stages use the same drives where they can, and the masks that make_masks found in them."""
+    loops = [f"lot:{LOTS[0]}", f"garage:{GARAGES[0]}"]
+    yield Step("masks", ["--loops", *loops], ["--drives", "--loops", *loops])
+    other_day = ["--parts", "other_day", "--drives"]
+    yield Step("ranges", [*other_day, *loops, "--duration-s", 8, "--image-scale", 0.5],
+               [*other_day, *loops, "--duration-s", QUICK_S, "--image-scale", QUICK_SCALE])
     yield Step("ranges", ["--parts", "settings", "--drives", *(f"lot:{seed}" for seed in LOTS),
-                          *(f"garage:{seed}" for seed in GARAGES)],
-               ["--parts", "settings", "--drives", f"lot:{LOTS[0]}", f"garage:{GARAGES[0]}", "--duration-s", 1.2])
+                          *(f"garage:{seed}" for seed in GARAGES)])
     for lot, garage, course in zip(LOTS, GARAGES, COURSES):
         first = lot == LOTS[0]
         for drive, seed in (("lot", lot), ("garage", garage), ("course", course)):
-            words = ["--seed", seed, "--drives", drive]
-            yield Step("obstacles", words, [*words, "--small"] if first else None)
+            quick = ["--seed", seed, "--small"]
+            quick += ["--drives", "course", "--duration-s", 10] if drive == "course" else [
+                "--drives", f"{drive}_other_day", "--duration-s", QUICK_S]
+            yield Step("obstacles", ["--seed", seed, "--drives", drive], quick if first else None)
         for scene, seed in (("lot", lot), ("garage", garage)):
-            yield Step("height_map", ["--seed", seed, "--scenes", scene, "--duration-s", 12],
-                       ["--seed", seed, "--scenes", scene, "--duration-s", 6, "--image-scale", 0.5] if first else None)
-            yield Step("localization", ["--seed", seed, "--scenes", scene, "--image-scale", 0.5],
-                       ["--seed", seed, "--scenes", scene, "--image-scale", 0.25, "--map-duration-s", 60, "--duration-s", 30,
+            words = ["--seed", seed, "--scenes", scene]
+            yield Step("height_map", words, [*words, "--image-scale", QUICK_SCALE] if first else None)
+            yield Step("localization", [*words, "--image-scale", 0.5],
+                       [*words, "--image-scale", QUICK_SCALE, "--loops", "--duration-s", QUICK_S, "--no-opposite",
                         "--no-experiments"] if first else None)
-    faults = ["--seed", LOTS[0] + 40]
-    yield Step("faults", faults, [*faults, "--faults", "counter_reset", "dead_camera", "late_images", "missing_ticks",
-                                  "odometry_stamp_shift", "wheel_slip"])
+            yield Step("localization", [*words, "--image-scale", 0.25, "--consistency", 20],
+                       [*words, "--image-scale", QUICK_SCALE, "--consistency", 5] if first else None)
+    conditions = ["--seed", LOTS[0]]
+    yield Step("conditions", conditions, [*conditions, "--image-scale", 0.3, "--duration-s", 5])
+    faults = ["--seed", LOTS[0]]
+    yield Step("faults", faults, [*faults, "--image-scale", 0.3])
     yield Step("mapping", ["--seeds", *LOTS, "--image-scale", 0.5])
     yield Step("calibration", ["--parts", "rigs", "--scene-seed", LOTS[1], "--rigs",
                                *(f"{'lot' if i % 2 == 0 else 'garage'}:{rig}" for i, rig in enumerate(RIGS))])
@@ -64,8 +77,8 @@ class Journal:
         entry = self.done.get(" ".join([stage, *words]))
         return entry is not None and entry["commit"] == commit() and "dirty" not in entry["commit"]
 
-    def add(self, stage, words, wall_s):
-        self.done[" ".join([stage, *words])] = {"commit": commit(), "wall_s": round(wall_s)}
+    def add(self, stage, words, wall_s, cpu_s):
+        self.done[" ".join([stage, *words])] = {"commit": commit(), "wall_s": round(wall_s), "cpu_s": round(cpu_s)}
         self.path.write_text(json.dumps(self.done, indent=1) + "\n")
 
 
@@ -76,18 +89,26 @@ def run_step(args, step, journal):
         say(f"{step.stage} {' '.join(words)}: done before")
         return True
     say(f"{step.stage} {' '.join(words)}")
-    start = time.monotonic()
+    start, cpu_s = time.monotonic(), processor_s()
     status = subprocess.run([sys.executable, "-m", "vcharge_evaluation", step.stage, *words, "--work",
-                             str(args.work / step.stage), "--publish"], check=False).returncode
+                             str(args.work), *([] if args.no_publish else ["--publish"])], check=False).returncode
     if status == 0:
-        journal.add(step.stage, words, time.monotonic() - start)
+        journal.add(step.stage, words, time.monotonic() - start, processor_s() - cpu_s)
     return status == 0
+
+
+def processor_s():
+    """Processor time of all programs that ended."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="small images and short drives: 40 minutes on two cores")
     parser.add_argument("--stages", nargs="*", help="these stages only")
+    parser.add_argument("--drop-old", action="store_true", help="remove what other commits measured from the stages that ran")
+    parser.add_argument("--no-publish", action="store_true", help="leave doc/results as it is")
     parser.add_argument("--work", type=pathlib.Path, default=ROOT / "build" / "evaluation", help="folder for drives and results")
     args = parser.parse_args()
     args.work = args.work.resolve() / ("quick" if args.quick else "full")
@@ -96,7 +117,11 @@ def main():
     chosen = [step for step in steps() if (step.quick is not None or not args.quick) and
               (not args.stages or step.stage in args.stages)]
     failed = [step for step in chosen if not run_step(args, step, journal)]
-    page.main([])
+    if args.drop_old and not args.no_publish and not failed:
+        for stage in {step.stage for step in chosen}:
+            drop_others(RESULTS / f"{stage}.json", commit())
+    if not args.no_publish:
+        page.main([])
     for step in failed:
         print(f"failed: {step.stage} {' '.join(step.words(args.quick))}", file=sys.stderr)
     return 1 if failed else 0

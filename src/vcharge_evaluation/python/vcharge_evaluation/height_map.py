@@ -1,43 +1,40 @@
 """Height maps: heights, kerbs, steps, tape-measure distances, drivable cells, time and memory."""
 import argparse
 import pathlib
+import sys
 
-from vcharge_evaluation import tools
+import cv2
+
+from vcharge_evaluation.drives import LOOP_S, found_masks, loop_drive
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
-from vcharge_evaluation.tools import CONFIG, judge, run_tool, say, simulate
+from vcharge_evaluation.tools import CONFIG, judge, run, run_tool, say
 
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__)
     add_arguments(parser, "height_map_evaluation")
     parser.add_argument("--scenes", nargs="*", default=["lot", "garage"])
-    parser.add_argument("--drive", default="loop")
     parser.add_argument("--seed", type=int, default=101,
                         help="seed of scene and drive; those below 100 serve to choose options")
-    parser.add_argument("--duration-s", type=float, default=25.0)
+    parser.add_argument("--duration-s", type=float, default=LOOP_S, help="of the scene's loop, with half of its images")
     parser.add_argument("--image-scale", type=float, default=1.0, help="image size over 1280x800")
-    parser.add_argument("--image-step", type=int, default=1)
     parser.add_argument("--options", type=pathlib.Path, default=CONFIG / "height_map.yaml")
     parser.add_argument("--true-poses", action="store_true", help="use the truth's poses in place of build_map's")
     return parser.parse_args()
 
 
 def evaluate(args, scene):
-    """Errors of a scene's height map, and the run that made it."""
-    folder = args.work / f"{scene}_seed{args.seed}_scale{args.image_scale:g}_{args.duration_s:g}s"
-    simulate(folder, ["--scene", scene, "--drive", args.drive, "--seed", args.seed, "--image-scale", args.image_scale,
-                      "--image-step", args.image_step, "--duration-s", args.duration_s, "--height-cell-m", 0.025])
-    bag, rig, truth = folder / "drive.bag", folder / "rig_truth.yaml", folder / "drive_truth"
-    trajectory = truth / "trajectory.tum"
-    if not args.true_poses:
-        tools.build_map(folder, "lot")
-        trajectory = folder / "lot.tum"
+    """Errors of a scene's height map, the run that made it, the folder of the drive, and its masks."""
+    drive = loop_drive(args.work, scene, args.seed, args.image_scale, args.duration_s)
+    folder, masks = drive.folder, found_masks(args.work, scene)
+    rig = masks.rig_of(folder)
+    trajectory = drive.trajectory if args.true_poses else drive.map(rig)[1]
     say(f"{folder}: height map")
-    made = run_tool("build_height_map", folder / "height_map.log", "--bag", bag, "--rig", rig, "--trajectory", trajectory,
-                    "--options", args.options, "--output", folder / "height_map")
-    errors = judge("height_map", folder / "report", "--map", folder / "height_map", "--truth", truth, "--rig", rig,
-                   "--trajectory", trajectory)
-    return errors, made
+    made = run_tool("build_height_map", folder / "height_map.log", "--bag", drive.bag, "--rig", rig, "--trajectory",
+                    trajectory, "--options", args.options, "--output", folder / "height_map")
+    errors = judge("height_map", folder / "report", "--map", folder / "height_map", "--truth", drive.truth, "--rig",
+                   drive.true_rig, "--trajectory", trajectory)
+    return errors, made, folder, masks
 
 
 def kerb_figures(errors):
@@ -66,6 +63,8 @@ def figures(errors, made):
     return [
         figure("mean height error of cells seen in 3 frames, apart from steps", 100 * errors["height_m"]["mean"], "cm",
                at_most=4),
+        Figure("the same, 95 %", 100 * errors["height_m"]["percentile_95"], "cm"),
+        Figure("the same, worst", 100 * errors["height_m"]["max"], "cm"),
         figure("cells within 10 cm", 100 * errors["fraction_within_10_cm"], "%", at_least=95),
         Figure("cells mapped", percent(errors["num_mapped"], errors["num_seen"]), "%"),
         *kerb_figures(errors),
@@ -87,8 +86,14 @@ def main():
     results = Results("height_map", "Height maps", args)
     poses = "true poses" if args.true_poses else "poses of build_map"
     for scene in args.scenes:
+        errors, made, folder, masks = evaluate(args, scene)
         results.add(f"Height maps, {poses}, image scale {args.image_scale:g}",
-                    (f"{scene}, seed {args.seed}", figures(*evaluate(args, scene))))
+                    (f"{scene}, seed {args.seed}", [*figures(errors, made), Figure("masks", masks.text())]))
+        picture = folder / "height_map.png"
+        run([sys.executable, "-m", "vcharge_evaluation.drawing.height_map", "--map", folder / "height_map", "--output", picture],
+            folder / "draw.log")
+        mean_m = errors["height_m"]["mean"]
+        results.show(cv2.imread(str(picture)), f"{scene}, seed {args.seed}: mean height error {100 * mean_m:.1f} cm", mean_m)
     results.end()
 
 

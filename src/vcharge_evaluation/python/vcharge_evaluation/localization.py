@@ -2,15 +2,18 @@
 import argparse
 import pathlib
 
+import cv2
 import numpy as np
 
-from vcharge_evaluation import tools
+from vcharge_evaluation import consistency
+from vcharge_evaluation.drives import SCENARIOS, Drive, found_masks, loop_drive, other_day_drive
 from vcharge_evaluation.localization_errors import BOUND_DEG, BOUND_M, LocalizationErrors, Map
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
-from vcharge_evaluation.tools import CONFIG, run_tool, say, simulate
+from vcharge_evaluation.tools import CONFIG, run_tool_once, say
 
 FRAMES_OF_START = 5
 START_EVERY = 10
+MIN_FRAMES_OF_CONSISTENCY = 10  # fewer scatter too much for a goal
 COVERED_S = (20.0, 30.0)
 
 
@@ -23,37 +26,37 @@ def arguments():
     parser.add_argument("--map-duration-s", type=float, default=0.0, help="end mapping drives early; 0: whole drives")
     parser.add_argument("--duration-s", type=float, default=0.0, help="end the other drives early; 0: whole drives")
     parser.add_argument("--options", type=pathlib.Path, default=CONFIG / "localization.yaml")
+    parser.add_argument("--loops", action="store_true", help="map the scenes' loops, and localize on another day in these")
+    parser.add_argument("--consistency", type=int, default=0, metavar="N",
+                        help="only compare covariances with errors, over N short drives in the map of each scene's loop")
     parser.add_argument("--no-opposite", action="store_true", help="leave out drives against a mapped loop's direction")
     parser.add_argument("--no-experiments", action="store_true", help="leave out disturbances, starts and single cameras")
     return parser.parse_args()
 
 
 def drive(args, scenario, seed, duration_s):
-    folder = args.work / (f"{scenario}_seed{args.seed}_scale{args.image_scale:g}" +
-                          (f"_{duration_s:g}s" if duration_s else ""))
-    simulate(folder, ["--scenario", CONFIG / "scenarios" / f"{scenario}.yaml", "--seed", seed, "--scene-seed", args.seed,
-                      "--image-scale", args.image_scale, *(["--duration-s", duration_s] if duration_s else [])])
-    return folder
+    return Drive(args.work, scenario, "--scenario", SCENARIOS / f"{scenario}.yaml", "--seed", seed, "--scene-seed", args.seed,
+                 "--image-scale", args.image_scale, *(["--duration-s", duration_s] if duration_s else []))
 
 
-def map_of(folder):
-    """The map of a mapping drive; an existing one is kept."""
-    path = folder / "lot.vmap"
-    if not path.exists():
-        tools.build_map(folder, "lot")
-    return Map(path, folder / "drive_truth" / "trajectory.tum")
+def map_of(made, masks):
+    """The map of a mapping drive. RuntimeError if there is none."""
+    path, _, run = made.map(masks.rig_of(made.folder))
+    if run.error():
+        raise RuntimeError(f"{path}: {run.error()}")
+    return Map(path, made.trajectory)
 
 
 class Localization(LocalizationErrors):
-    """A drive that was localized in a map, and its errors."""
+    """A drive that was localized in a map with the masks of `mapped`, and its errors."""
 
-    def __init__(self, args, folder, mapped, name, *words):
-        output = folder / f"{name}.tum"
-        say(f"{folder}: {name}")
-        self.run = run_tool("localize_drive", folder / f"{name}.log", "--bag", folder / "drive.bag", "--rig",
-                            folder / "rig_truth.yaml", "--map", mapped.path, "--options", args.options, "--output", output,
-                            *words)
-        super().__init__(f"{output}.csv", folder / "drive_truth" / "trajectory.tum", mapped)
+    def __init__(self, args, made, mapped, name, *words):
+        output = made.folder / f"{name}.tum"
+        say(f"{made.folder}: {name}")
+        self.run = run_tool_once("localize_drive", made.folder / f"{name}.log", "--bag", made.bag, "--rig",
+                                 mapped.masks.rig_of(made.folder), "--map", mapped.path, "--options", args.options, "--output",
+                                 output, *words)
+        super().__init__(f"{output}.csv", made.trajectory, mapped)
 
 
 def other_day_figures(result, min_percent):
@@ -68,13 +71,15 @@ def other_day_figures(result, min_percent):
         figure("position relative to the map, all frames (none: 50 cm), median", centimetres(result.error_m, 50), "cm",
                at_most=3),
         figure("position relative to the map, 95 %", centimetres(result.error_m, 95), "cm", at_most=8),
+        Figure("position relative to the map, worst", centimetres(result.error_m, 100), "cm"),
         figure("heading, all frames (none: 2 degrees), median", result.quantile(result.heading_deg, 50, BOUND_DEG), "degrees",
                at_most=0.05),
         figure("heading, 95 %", result.quantile(result.heading_deg, 95, BOUND_DEG), "degrees", at_most=0.2),
+        Figure("heading, worst", result.quantile(result.heading_deg, 100, BOUND_DEG), "degrees"),
         figure("absolute position, median", centimetres(result.absolute_m, 50), "cm", at_most=5),
         figure("localized, but over 0.5 m or 2 degrees off", result.num_false(), equal=0),
-        figure(f"normalized error squared per degree of freedom ({num_frames} frames)", consistency, at_least=0.5,
-               at_most=2.0),
+        figure(f"normalized error squared per degree of freedom ({num_frames} frames)", consistency,
+               **(dict(at_least=0.5, at_most=2.0) if num_frames >= MIN_FRAMES_OF_CONSISTENCY else {})),
         Figure("time of a frame, median", float(latency_ms[0]), "ms"),
         figure("time of a frame, 95 %", float(latency_ms[1]), "ms", at_most=120),
         Figure("processor time of a frame", 1e3 * result.run.cpu_s / len(result.status), "ms"),
@@ -124,13 +129,14 @@ def evaluate_scene(args, scene, mapped, other, results):
     """Adds the scene's tables; returns its drives that started again and again without a prior."""
     size, starts = f"image scale {args.image_scale:g}", []
     result = Localization(args, other, mapped, "localized")
-    result.plot(other / "localized.png")
-    columns = [(f"{scene}, seed {args.seed}", other_day_figures(result, 97))]
+    masks = Figure("masks", mapped.masks.text())
+    columns = [(f"{scene}, seed {args.seed}", [*other_day_figures(result, 97), masks])]
+    show(results, result, other, f"{scene}, seed {args.seed}")
     if not args.no_opposite:
         opposite = drive(args, f"opposite_direction_{scene}", args.seed + 100, args.duration_s)
         result = Localization(args, opposite, mapped, "localized")
-        result.plot(opposite / "localized.png")
-        columns.append((f"{scene}, seed {args.seed}, opposite direction", other_day_figures(result, 90)))
+        columns.append((f"{scene}, seed {args.seed}, opposite direction", [*other_day_figures(result, 90), masks]))
+        show(results, result, opposite, columns[-1][0])
         starts.append(Localization(args, opposite, mapped, "starts", "--forget-every", START_EVERY))
     results.add(f"Another day, {size}", *columns)
     if not args.no_experiments:
@@ -140,14 +146,38 @@ def evaluate_scene(args, scene, mapped, other, results):
     return starts
 
 
+def show(results, result, made, name):
+    """Errors over time, if they are the worst so far."""
+    path = made.folder / "localized.png"
+    result.plot(path)
+    worst_m = result.quantile(result.error_m, 95, BOUND_M)
+    results.show(cv2.imread(str(path)), f"{name}: 95 % of the position errors are below {100 * worst_m:.1f} cm (no pose: 50 cm)",
+                 worst_m)
+
+
+def drives_of(args, scene):
+    """Mapping drive of a scene, and the drive on another day."""
+    if args.loops or args.consistency:
+        return (loop_drive(args.work, scene, args.seed, args.image_scale),
+                other_day_drive(args.work, scene, args.seed, args.image_scale, args.duration_s or 6) if args.loops else None)
+    return (drive(args, f"mapping_{scene}", args.seed, args.map_duration_s),
+            drive(args, f"other_day_{scene}", args.seed + 100, args.duration_s))
+
+
 def main():
     args = arguments()
     args.work.mkdir(parents=True, exist_ok=True)
     results = Results("localization", "Localization", args)
     maps, others, starts = {}, {}, []
     for scene in args.scenes:
-        maps[scene] = map_of(drive(args, f"mapping_{scene}", args.seed, args.map_duration_s))
-        others[scene] = drive(args, f"other_day_{scene}", args.seed + 100, args.duration_s)
+        mapping, others[scene] = drives_of(args, scene)
+        masks = found_masks(args.work, scene)
+        maps[scene] = map_of(mapping, masks)
+        maps[scene].masks = masks
+    if args.consistency:
+        consistency.evaluate(args, maps, Localization, results)
+        results.end()
+        return
     for scene, mapped in maps.items():
         starts += evaluate_scene(args, scene, mapped, others[scene], results)
     if starts:

@@ -54,6 +54,7 @@ class LocalizationErrors:
         self.error_m, self.error_deg = np.full(size, np.inf), np.full(size, np.inf)
         self.heading_deg, self.absolute_m = np.full(size, np.inf), np.full(size, np.inf)
         self.normalized, self.sigma_m = np.full(size, np.nan), np.full(size, np.nan)
+        self.covariance = np.full((size, 6, 6), np.nan)
         if self.has_pose.any():
             self.judge([row for row in rows if row["tx"] != ""], true_trajectory, mapped)
 
@@ -70,6 +71,7 @@ class LocalizationErrors:
         for i in range(6):
             for k in range(i, 6):
                 covariance[:, i, k] = covariance[:, k, i] = [float(row[f"covariance_{i}{k}"]) for row in rows]
+        self.covariance[self.has_pose] = covariance
         planar = np.ix_(range(len(rows)), [0, 1, 5], [0, 1, 5])
         errors = np.stack([shift[:, 0], shift[:, 1], axis[:, 2]], -1)
         self.error_m[self.has_pose] = np.linalg.norm(shift, axis=1)
@@ -97,13 +99,18 @@ class LocalizationErrors:
         """Percentile over all frames."""
         return float(np.percentile(np.minimum(errors, bound), which))
 
-    def consistency(self):
-        """Mean normalized error squared per degree of freedom over localized frames two seconds apart, and their number."""
+    def apart(self):
+        """Normalized errors squared per degree of freedom of localized frames two seconds apart."""
         values, last_s = [], -np.inf
         for i in np.flatnonzero(self.localized()):
             if self.time_s[i] - last_s >= 2.0:
                 last_s = self.time_s[i]
                 values.append(self.normalized[i])
+        return values
+
+    def consistency(self):
+        """Mean normalized error squared per degree of freedom over localized frames two seconds apart, and their number."""
+        values = self.apart()
         return float(np.mean(values)), len(values)
 
     def plot(self, path):

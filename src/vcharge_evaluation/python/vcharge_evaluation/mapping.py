@@ -3,6 +3,7 @@ import argparse
 import math
 import pathlib
 
+import cv2
 import numpy as np
 import yaml
 
@@ -135,6 +136,8 @@ def evaluate_drive(scenario, seed, args, is_first, results):
                     Figure("front camera alone: revisits with a right loop edge", front.found_percent("revisits"), "%"),
                     Figure("front camera alone: wrong loop edges", front.map["num_wrong"])]
     results.add(f"Maps of simulated drives, image scale {args.image_scale:g}", (f"{scenario}, seed {seed}", figures))
+    results.show(cv2.imread(str(folder / "lot_report" / "map_errors_top_view.png")),
+                 f"{scenario}, seed {seed}: root mean square error of the trajectory {whole.rmse_cm:.1f} cm", whole.rmse_cm)
 
 
 def evaluate_real(args, results):

@@ -3,9 +3,11 @@ import argparse
 
 import cv2
 import numpy as np
+import rosbag
 import yaml
 
 from vcharge_evaluation.camera_models import project
+from vcharge_evaluation.drives import MASK_SCALE, MASK_SEEDS, FoundMasks, loop_drive
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
 from vcharge_evaluation.tools import run_tool, simulate
 
@@ -29,6 +31,8 @@ def arguments():
     parser.add_argument("--seed", type=int, default=205,
                         help="of scene, rig and drive; those below 50 serve to choose options")
     parser.add_argument("--drives", nargs="*", default=list(DRIVES), choices=DRIVES)
+    parser.add_argument("--loops", nargs="*", default=[], metavar="SCENE:SEED",
+                        help=f"loops of {', '.join(MASK_SEEDS)}, whose masks the other stages use")
     return parser.parse_args()
 
 
@@ -93,7 +97,44 @@ def make_masks(args, name):
     result = run_tool("make_masks", folder / "make_masks.log", "--bag", folder / "drive.bag", "--rig",
                       folder / "cameras.yaml", "--output", output, "--report", folder / "report", may_fail=True)
     found = None if result.error() else yaml.safe_load(output.read_text())
-    return result, compare(folder, truth, output.parent, found)
+    return result, compare(folder, truth, output.parent, found), folder
+
+
+def draw_worst(folder, output, pixels):
+    """A camera's image with the found mask red and the outline of the true one yellow, for the camera that shows most of its body."""
+    name = min(pixels, key=lambda one: pixels[one].hidden_percent() if pixels[one].body else 100.0)
+    truth = yaml.safe_load((folder / "rig_truth.yaml").read_text())["cameras"][name]
+    found = yaml.safe_load(output.read_text())["cameras"][name] if output.exists() else {**truth, "mask": None}
+    with rosbag.Bag(str(folder / "drive.bag")) as bag:
+        message = next(message for _, message, _ in bag.read_messages(topics=[f"/camera/{name}/image_raw"]))
+    picture = cv2.cvtColor(np.frombuffer(message.data, np.uint8).reshape(message.height, message.width), cv2.COLOR_GRAY2BGR)
+    if found.get("mask"):
+        hidden = hidden_pixels(output.parent, found)
+        picture[hidden] = (0.5 * picture[hidden] + 0.5 * np.array([0, 0, 255])).astype(np.uint8)
+    outlines, _ = cv2.findContours(hidden_pixels(folder, truth).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    cv2.drawContours(picture, outlines, -1, (0, 255, 255), 1)
+    return picture, name
+
+
+def show(results, folder, output, pixels, condition):
+    """The picture of a drive, if its masks are the worst so far."""
+    total = sum(pixels.values(), Pixels())
+    badness = (100.0 - total.hidden_percent() if total.body else 0.0) + total.lost_percent()
+    picture, camera = draw_worst(folder, output, pixels)
+    results.show(picture, f"{condition}, camera {camera}: {100 - (pixels[camera].hidden_percent() or 100.0):.1f} % of its own body is "
+                 "not hidden. Found mask red, outline of the true one yellow", badness)
+
+
+def evaluate_loop(args, loop, results):
+    scene, seed = loop.split(":")
+    drive = loop_drive(args.work, scene, int(seed), MASK_SCALE)
+    masks = FoundMasks(drive)
+    truth = yaml.safe_load(drive.true_rig.read_text())
+    output = drive.folder / "masked" / "cameras.yaml"
+    found = yaml.safe_load(masks.rig.read_text()) if masks.rig else None
+    pixels = compare(drive.folder, truth, output.parent, found)
+    results.add("Masks that the other stages use, from a loop of 24 s", (f"{scene}, seed {seed}", figures(masks.run, pixels)))
+    show(results, drive.folder, output, pixels, f"{scene}, seed {seed}")
 
 
 def figures(result, pixels):
@@ -115,7 +156,11 @@ def main():
     args.work.mkdir(parents=True, exist_ok=True)
     results = Results("masks", "Masks of the own body", args)
     for name in args.drives:
-        results.add("Masks from a drive of 40 s", (f"{name}, seed {args.seed}", figures(*make_masks(args, name))))
+        result, pixels, folder = make_masks(args, name)
+        results.add("Masks from a drive of 40 s", (f"{name}, seed {args.seed}", figures(result, pixels)))
+        show(results, folder, folder / "masked" / "cameras.yaml", pixels, f"{name}, seed {args.seed}")
+    for loop in args.loops:
+        evaluate_loop(args, loop, results)
     results.end()
 
 

@@ -1,21 +1,22 @@
 """Obstacles: range errors, obstacles missed, false cells, and cells inside obstacles that were free."""
 import argparse
 
-from vcharge_evaluation.results import Figure, Results, add_arguments, figure
-from vcharge_evaluation.tools import CONFIG, judge, run_tool, simulate
+from vcharge_evaluation.drawing.moments import draw_obstacles
+from vcharge_evaluation.drives import OTHER_DAY, Drive, found_masks
+from vcharge_evaluation.results import Figure, Results, add_arguments, calibration_figures, figure, percent
+from vcharge_evaluation.tools import CONFIG, NoResult, judge, run_tool_once
 
-# pitch is the lot's drive on a soft suspension. The other_day drives are those of the chain (chain/steps.py).
-OTHER_DAY = ["--drive", "other_day", "--duration-s", 8, "--exposure-gain", 1.2, "--set", "odometer.scale_error=-0.0005",
-             "--set", "odometer.left_right_error=0.0003"]
-STOP_AND_GO = ["--scene", "lot", "--drive", "stop_and_go", "--duration-s", 6]
+STOP_AND_GO = ("--drive", "stop_and_go")
+# Scene, duration, and words of each drive. pitch is the lot's drive on a soft suspension.
 DRIVES = {
-    "course": ["--scene", "obstacles", "--drive", "creep", "--duration-s", 19.5],
-    "lot": STOP_AND_GO,
-    "pitch": [*STOP_AND_GO, "--set", "faults.soft_suspension.pitch_factor=4"],
-    "garage": ["--scene", "garage", "--drive", "short", "--duration-s", 4],
-    "lot_other_day": ["--scene", "lot", *OTHER_DAY],
-    "garage_other_day": ["--scene", "garage", *OTHER_DAY],
+    "course": ("obstacles", 19.5, ("--drive", "creep")),
+    "lot": ("lot", 6, STOP_AND_GO),
+    "pitch": ("lot", 6, (*STOP_AND_GO, "--set", "faults.soft_suspension.pitch_factor=4")),
+    "garage": ("garage", 4, ("--drive", "short")),
+    "lot_other_day": ("lot", 8, OTHER_DAY),
+    "garage_other_day": ("garage", 8, OTHER_DAY),
 }
+SMALL = 0.4
 
 
 def arguments():
@@ -24,25 +25,33 @@ def arguments():
     parser.add_argument("--small", action="store_true",
                         help="images of 512x320, which render faster; range maps have 384x240 pixels either way")
     parser.add_argument("--seed", type=int, default=108, help="those below 50 serve to choose options")
-    parser.add_argument("--rig-seed", type=int, default=1, help="random rig of the other_day drives")
+    parser.add_argument("--rig-seed", type=int, help="random rig in place of the Golf's")
+    parser.add_argument("--duration-s", type=float, help="in place of each drive's own duration")
     parser.add_argument("--drives", nargs="*", default=["course", "lot", "pitch", "garage"], choices=DRIVES)
     return parser.parse_args()
 
 
 def detect(args, name):
-    """Errors of the obstacle maps of a drive."""
-    if name.endswith("_other_day"):
-        words = ["--seed", args.seed + 400, "--rig", "random", "--rig-seed", args.rig_seed, "--image-scale", 0.5]
-        folder = args.work / f"{name}_seed{args.seed}_rig{args.rig_seed}"
-    else:
-        words = ["--seed", f"{args.seed}1", "--image-scale", 0.4 if args.small else 1.0]
-        folder = args.work / (f"{name}_seed{args.seed}" + ("_small" if args.small else ""))
-    simulate(folder, [*DRIVES[name], *words, "--scene-seed", args.seed, "--cameras", "front", "left", "right",
-                      "--truth-range"])
-    run_tool("detect_obstacles", folder / "detect.log", "--bag", folder / "drive.bag", "--rig", folder / "rig_truth.yaml",
-             "--options", CONFIG / "obstacles.yaml", "--range-options", CONFIG / "dense_obstacles.yaml", "--output",
-             folder / "obstacles")
-    return judge("obstacles", folder / "report", "--obstacles", folder / "obstacles", "--truth", folder / "drive_truth")
+    """Errors of the obstacle maps of a drive, the drive, and the masks that make_masks found for its car."""
+    scene, duration_s, words = DRIVES[name]
+    car = () if args.rig_seed is None else ("--rig", "random", "--rig-seed", args.rig_seed)
+    scale = SMALL if args.small else 1.0
+    # The words of drives.other_day_drive, so that stages share this drive.
+    drive = Drive(args.work, name, "--scene", scene, *words, "--scene-seed", args.seed, "--seed", args.seed + 400,
+                  "--image-scale", scale, "--duration-s", args.duration_s or duration_s, "--truth-range", *car)
+    masks = found_masks(args.work, scene, car)
+    return judge_obstacles(drive, masks.rig_of(drive.folder)), drive, masks
+
+
+def judge_obstacles(drive, rig, *words):
+    """Errors of the obstacle maps of a drive with a rig file. NoResult if there are no maps."""
+    folder = drive.folder
+    run = run_tool_once("detect_obstacles", folder / "detect.log", "--bag", drive.bag, "--rig", rig, "--options",
+                        CONFIG / "obstacles.yaml", "--range-options", CONFIG / "dense_obstacles.yaml", "--output",
+                        folder / "obstacles", *words, may_fail=True)
+    if run.error():
+        raise NoResult(run.reason())
+    return judge("obstacles", folder / "report", "--obstacles", folder / "obstacles", "--truth", drive.truth)
 
 
 def summary(errors):
@@ -52,7 +61,11 @@ def summary(errors):
     approach = errors["approach"]
     cells = approach["corridor"]
     free = cells["free_as_free"] + cells["free_as_unknown"] + cells["free_as_occupied"]
-    return {"mean_m": fused["all"]["error_m"]["mean"], "p95_m": fused["all"]["error_m"]["percentile_95"],
+    spread = fused["all"]["error_m"]
+    return {"mean_m": spread["mean"], "median_m": spread["percentile_50"], "p95_m": spread["percentile_95"],
+            "worst_m": spread["max"], "calibration": fused["all"]["calibration"],
+            "by_camera": {scan["name"]: scan["all"] for scan in errors["scans"] if scan["name"] != "fused"},
+            "classes": recall_by_class(errors["map"]),
             "missed_rays": fused["all"]["missed"] / max(1, fused["all"]["rays"]),
             "by_range": [(one["from_m"], one["to_m"], one["error_m"]["mean"] if one["rays"] else None)
                          for one in fused["by_range"]],
@@ -63,6 +76,44 @@ def summary(errors):
             "corridor_wrong": cells["occupied_as_free"],
             "alarms_per_minute": 60 * approach["false_alarms"] / max(1e-9, approach["duration_s"]),
             "alarms_per_m": approach["false_alarms"] / approach["driven_m"] if approach["driven_m"] > 0.1 else None}
+
+
+def class_of(kind):
+    """Class of a kind of the truth: people apart from the rest."""
+    return {"pedestrian": "people", "car": "cars", "bicycle": "bicycles"}.get(kind, "other things")
+
+
+def recall_by_class(judged):
+    """List of class, whether it moves, how many were reported and judged. Standing things count once, moving ones per image
+    that shows them."""
+    counts = {}
+    for moves, kind, reported, number in (
+            *((False, one["kind"], int(one["reported"]), 1) for one in judged["obstacles"]),
+            *((True, one["kind"], one["maps_reported"], one["maps"]) for one in judged["movers"])):
+        entry = counts.setdefault((class_of(kind), moves), [0, 0])
+        entry[0] += reported
+        entry[1] += number
+    return [[name, moves, *entry] for (name, moves), entry in sorted(counts.items())]
+
+
+def class_figures(found):
+    """Recall and first report by class. What is never reported counts as reported at contact."""
+    for name, moves, reported, number in found["classes"]:
+        unit = "images in which they are visible" if moves else "that are visible"
+        yield figure(f"{name}, {'moving' if moves else 'standing'}: reported, of those {unit}", percent(reported, number), "%",
+                     at_least=None if moves else 100)
+    for name in ("people", "cars", "bicycles", "other things"):
+        chosen = [one for one in found["reports"] if class_of(one["kind"]) == name]
+        if not chosen:
+            continue
+        distances = sorted(one["first_reported_m"] or 0.0 for one in chosen)
+        yield Figure(f"{name} within 1 m of the path: first reported, median distance", distances[len(distances) // 2], "m")
+        yield Figure("the same, least" + f" ({name})", distances[0], "m")
+        times = sorted(one["contact_s"] or 0.0 for one in chosen
+                       if one["contact_s"] is not None or one["first_reported_m"] is None)
+        if times:
+            yield Figure(f"{name} within 1 m of the path: first reported, median time to contact", times[len(times) // 2], "s")
+            yield Figure(f"the same time, least ({name})", times[0], "s")
 
 
 def reported_before(reports, distance_m=None, contact_s=None):
@@ -90,7 +141,9 @@ def report_figures(reports):
 
 def figures(found):
     yield figure("range error within 5 m, mean, missed rays as 0.5 m", 100 * found["mean_m"], "cm", at_most=7)
+    yield Figure("range error within 5 m, median", 100 * found["median_m"], "cm")
     yield Figure("range error within 5 m, 95 %", 100 * found["p95_m"], "cm")
+    yield Figure("range error within 5 m, worst", 100 * found["worst_m"], "cm")
     yield Figure("rays missed", 100 * found["missed_rays"], "%")
     for from_m, to_m, mean_m in found["by_range"]:
         yield Figure(f"range error from {from_m:g} to {to_m:g} m, mean", None if mean_m is None else 100 * mean_m, "cm")
@@ -106,13 +159,31 @@ def figures(found):
     yield Figure("false alarms in the corridor per metre", found["alarms_per_m"])
 
 
+def camera_figures(found):
+    for camera, rays in found["by_camera"].items():
+        yield Figure(f"{camera}: range error, mean", 100 * rays["error_m"]["mean"] if rays["rays"] else None, "cm")
+        yield Figure(f"{camera}: range error, 95 %", 100 * rays["error_m"]["percentile_95"] if rays["rays"] else None, "cm")
+        yield Figure(f"{camera}: rays missed", percent(rays["missed"], rays["rays"]), "%")
+
+
 def main():
     args = arguments()
     args.work.mkdir(parents=True, exist_ok=True)
     results = Results("obstacles", "Obstacles", args)
+    size = ", small images" if args.small else ""
     for name in args.drives:
-        results.add(f"Obstacles of 20 cm and more at 0.5 to 5 m{', small images' if args.small else ''}",
-                    (f"{name}, seed {args.seed}", list(figures(summary(detect(args, name))))))
+        errors, drive, masks = detect(args, name)
+        found, column = summary(errors), f"{name}, seed {args.seed}"
+        results.add(f"Obstacles of 20 cm and more at 0.5 to 5 m{size}",
+                    (column, [*figures(found), Figure("masks", masks.text())]))
+        results.add(f"By class{size}", (column, list(class_figures(found))))
+        results.add(f"By camera{size}", (column, list(camera_figures(found))))
+        results.add(f"Confidence, by the reported sigma, of ranges within 15 cm{size}",
+                    (column, calibration_figures(found["calibration"])))
+        results.show(draw_obstacles(drive, drive.folder / "obstacles"),
+                     f"{column}: mean range error {100 * found['mean_m']:.1f} cm, {found['missed']} of {found['obstacles']} "
+                     "obstacles missed. Image with obstacles, scan, and map: green free, red occupied, dark unknown, true outlines "
+                     "cyan", found["missed"] + found["mean_m"])
     results.end()
 
 

@@ -7,13 +7,16 @@ from vcharge_evaluation.tools import ROOT
 
 PAGE = ROOT / "doc" / "results.md"
 # In the order of the pipeline; other stages follow by name.
-ORDER = ("chain", "masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "faults",
+ORDER = ("chain", "conditions", "masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "faults",
          "odometry", "images", "latency", "real_images", "foundations", "speed")
 INTRODUCTION = """# Results
 
 Made by `python3 -m vcharge_evaluation.page` from `doc/results/*.json`: do not edit. A figure that misses its goal is
 **bold**. Each table names the command that measured it, the date and the commit. `scripts/evaluate.sh STAGE --publish`
 measures again.
+
+A result that is missing counts as an error at the bound that its row names. Where a row or title names `make_masks`, the masks
+of the own body are those that this tool found in a drive, or none where it found none, and the truth only judges.
 """
 
 
@@ -22,13 +25,24 @@ def origin(one):
 
 
 def show(measurements):
-    """The table of measurements with one title, with its command; where there are several commands, each in its row."""
+    """The table of measurements with one title, with its commands. Where each command measured something else, it is in its
+    row."""
     origins = list(dict.fromkeys(origin(one) for one in measurements))
-    if len(origins) == 1:
-        return f"{results.table(measurements)}\n\n{origins[0]}"
+    names = [figure.name for one in measurements for figure in one.figures]
+    if len(origins) == 1 or len(set(names)) < len(names):
+        return f"{results.table(measurements)}\n\n" + "\n".join(f"- {one}" if len(origins) > 1 else one for one in origins)
     rows = [results.row([f"{one.condition + ': ' if one.condition else ''}{figure.name}", figure.text(), figure.goal, origin(one)])
             for one in measurements for figure in one.figures]
     return "\n".join(["|what|figure|goal|command|", "|---|---|---|---|", *rows])
+
+
+def picture(folder, name):
+    """Lines with the picture of a stage's worst case, if there is one."""
+    entry = results.read_caption(folder / "pictures" / f"{name}.json")
+    if entry is None:
+        return []
+    return [f"![worst case]({folder.name}/pictures/{name}.jpg)\n\nWorst case: {entry['caption']}. `{entry['command']}` "
+            f"({entry['date']}, {entry['commit']})\n"]
 
 
 def make_page(folder=results.RESULTS):
@@ -39,6 +53,7 @@ def make_page(folder=results.RESULTS):
         parts.append(f"## {title}\n")
         for heading, group in results.by_title(measurements).items():
             parts.append(f"### {heading}\n\n{show(group)}\n")
+        parts += picture(folder, name)
     return "\n".join(parts)
 
 

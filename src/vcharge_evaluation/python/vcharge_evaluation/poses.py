@@ -44,13 +44,15 @@ def pose_of(message):
 
 
 def write_odometry(bag_path, path):
-    """Writes a bag's odometry as TUM text; returns its duration (s) and its number of stamps with images."""
-    stamps = set()
-    with rosbag.Bag(str(bag_path)) as bag, open(path, "w", encoding="utf-8") as file:
+    """Writes a bag's odometry as TUM text, the last message of a repeated stamp, which corrects those before; returns its
+    duration (s) and its number of stamps with images."""
+    stamps, lines = set(), {}
+    with rosbag.Bag(str(bag_path)) as bag:
         for topic, message, _ in bag.read_messages():
             if topic == "/odom":
                 stamp, (position, quaternion) = message.header.stamp, pose_of(message)
-                file.write(f"{stamp.secs}.{stamp.nsecs:09d} " + " ".join(map(str, [*position, *quaternion])) + "\n")
+                lines[stamp.to_nsec()] = f"{stamp.secs}.{stamp.nsecs:09d} " + " ".join(map(str, [*position, *quaternion])) + "\n"
             elif topic.endswith("/image_raw"):
                 stamps.add(message.header.stamp.to_nsec())
+    path.write_text("".join(lines[stamp] for stamp in sorted(lines)), encoding="utf-8")
     return (max(stamps) - min(stamps)) * 1e-9, len(stamps)

@@ -3,8 +3,10 @@ import argparse
 
 import yaml
 
-from vcharge_evaluation.results import Figure, Results, add_arguments, percent
-from vcharge_evaluation.tools import judge, run_tool, say, simulate
+from vcharge_evaluation.drawing.moments import draw_range_map
+from vcharge_evaluation.drives import Drive, found_masks, other_day_drive
+from vcharge_evaluation.results import Figure, Results, add_arguments, calibration_figures, figure, percent
+from vcharge_evaluation.tools import NoResult, judge, run_tool_once, say
 
 DENSITIES = (0.4, 0.6, 0.8)
 TRUE_POSES = {"refine_poses": False,
@@ -23,23 +25,27 @@ SETTINGS = {
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__)
     add_arguments(parser, "range_evaluation")
-    parser.add_argument("--parts", nargs="*", default=["drive"], choices=["drive", "settings"],
-                        help="drive: four cameras on 4 s in a lot; settings: two cameras on 1.7 s each in lot and garage")
-    parser.add_argument("--drives", nargs="*", default=["lot:5", "garage:6"], help="scene:seed of the settings' drives")
-    parser.add_argument("--duration-s", type=float, default=1.7, help="duration of the settings' drives")
+    parser.add_argument("--parts", nargs="*", default=["drive"], choices=["drive", "settings", "other_day"],
+                        help="drive: four cameras on 4 s in a lot; settings: two cameras on 1.7 s each in lot and garage; "
+                        "other_day: four cameras by camera and distance")
+    parser.add_argument("--drives", nargs="*", default=["lot:5", "garage:6"], help="scene:seed of the other parts' drives")
+    parser.add_argument("--duration-s", type=float, default=1.7, help="duration of these drives")
+    parser.add_argument("--image-scale", type=float, default=1.0, help="image size of the drives of another day over 1280x800")
     return parser.parse_args()
 
 
 class RangeErrors:
-    """Range maps of a drive and their errors, by camera and over "all cameras"."""
+    """Range maps of a drive, made with the masks that make_masks found, and their errors, by camera and over "all cameras"."""
 
-    def __init__(self, folder, name, *words):
-        bag, rig, truth = folder / "drive.bag", folder / "rig_truth.yaml", folder / "drive_truth"
-        say(f"{folder}: {name}")
-        self.run = run_tool("compute_range_maps", folder / f"{name}.log", "--bag", bag, "--rig", rig, "--output",
-                            folder / name, "--no-pictures", *words)
-        errors = judge("range", folder / f"{name}_report", "--range", folder / name, "--truth", truth, "--bag", bag,
-                       "--rig", rig)
+    def __init__(self, drive, masks, name, *words):
+        self.drive, self.output = drive, drive.folder / name
+        say(f"{drive.folder}: {name}")
+        self.run = run_tool_once("compute_range_maps", drive.folder / f"{name}.log", "--bag", drive.bag, "--rig",
+                                 masks.rig_of(drive.folder), "--output", self.output, "--no-pictures", *words, may_fail=True)
+        if self.run.error():
+            raise NoResult(self.run.reason())
+        errors = judge("range", drive.folder / f"{name}_report", "--range", self.output, "--truth", drive.truth, "--bag",
+                       drive.bag, "--rig", drive.true_rig)
         self.sets = {one["label"]: one for one in errors["sets"]}
 
     def figures(self, label="all cameras"):
@@ -48,19 +54,56 @@ class RangeErrors:
         yield Figure("pixels with a range", percent(errors["num_known"], errors["num_judged"]), "%")
         for density in DENSITIES:
             yield Figure(f"within 5 % of the truth, at {100 * density:.0f} % density", 100 * at[density], "%")
+        yield from relative_errors(errors)
         yield Figure("within one standard deviation", 100 * errors["fraction_within_one_sigma"], "%")
         yield Figure("within two standard deviations", 100 * errors["fraction_within_two_sigma"], "%")
+
+    def distance_figures(self):
+        """By true distance: unknown ranges count as wrong."""
+        for one in self.sets["all cameras"]["by_truth"]:
+            if one["num_judged"]:
+                name = f"from {one['low']:g} to {min(one['high'], 20):g} m"
+                yield Figure(f"{name}: pixels with a range", percent(one["count"], one["num_judged"]), "%")
+                yield Figure(f"{name}: within 5 %", percent(one["fraction_within_tolerance"] * one["count"],
+                                                            one["num_judged"]), "%")
 
     def processor_ms(self):
         return 1000 * self.run.cpu_s / self.sets["all cameras"]["num_frames"]
 
 
+def relative_errors(errors):
+    """Errors over all pixels that were judged."""
+    spread = errors["bounded_relative_error"]
+    yield Figure("error over the range, all pixels (unknown: 50 %), median", 100 * spread["percentile_50"], "%")
+    yield Figure("the same, 95 %", 100 * spread["percentile_95"], "%")
+    yield Figure("the same, worst", 100 * spread["max"], "%")
+
+
+def evaluate_other_day(args, results):
+    """All cameras on another day, by camera, by distance and by confidence."""
+    for drive in args.drives:
+        scene, seed = drive.split(":")
+        masks = found_masks(args.work, scene)
+        errors = RangeErrors(other_day_drive(args.work, scene, int(seed), args.image_scale, args.duration_s), masks, "ranges")
+        size = f"image scale {args.image_scale:g}"
+        results.add(f"By camera, {size}", *((f"{scene} {seed}, {label}", [
+            figure("pixels with a range", percent(one["num_known"], one["num_judged"]), "%", at_least=70),
+            *list(errors.figures(label))[1:], Figure("masks", masks.text())]) for label, one in errors.sets.items()))
+        results.add(f"By distance, {size}", (f"{scene} {seed}", list(errors.distance_figures())))
+        results.add(f"Confidence against ranges within 10 %, {size}",
+                    (f"{scene} {seed}", calibration_figures(errors.sets["all cameras"]["calibration"])))
+        worst = max((label for label in errors.sets if label != "all cameras"),
+                    key=lambda label: errors.sets[label]["bounded_relative_error"]["mean"])
+        badness = errors.sets[worst]["bounded_relative_error"]["mean"]
+        results.show(draw_range_map(errors.drive.bag, errors.output, worst),
+                     f"{scene}, seed {seed}, camera {worst}: mean error {100 * badness:.1f} % of the range (unknown: 50 %). Image "
+                     "and ranges, red near, blue far, black unknown", badness)
+
+
 def evaluate_drive(args, results):
-    folder = args.work / "short"
-    simulate(folder, ["--scene", "lot", "--drive", "short", "--truth-range"])
-    odometry = RangeErrors(folder, "odometry")
-    true = RangeErrors(folder, "truth", "--cameras", "front", "left", "--trajectory",
-                       folder / "drive_truth" / "trajectory.tum")
+    drive, masks = Drive(args.work, "short", "--scene", "lot", "--drive", "short", "--truth-range"), found_masks(args.work, "lot")
+    odometry = RangeErrors(drive, masks, "odometry")
+    true = RangeErrors(drive, masks, "truth", "--cameras", "front", "left", "--trajectory", drive.trajectory)
     results.add("Range maps of a simulated lot", *((f"{poses}, {label}", errors.figures(label)) for poses, errors in
                                                    (("odometry", odometry), ("true poses, refined", true))
                                                    for label in errors.sets))
@@ -70,18 +113,18 @@ def evaluate_settings(args, results):
     drives = []
     for drive in args.drives:
         scene, seed = drive.split(":")
-        folder = args.work / f"{scene}_seed{seed}_{args.duration_s:g}s"
-        simulate(folder, ["--scene", scene, "--drive", "figure_eight", "--seed", seed, "--duration-s", args.duration_s,
-                          "--cameras", "front", "left", "--truth-range"])
-        drives += [(f"{scene}, true poses", folder, True), (f"{scene}, odometry", folder, False)]
-    for title, folder, true_poses in drives:
+        made = Drive(args.work, f"{scene}_figure_eight", "--scene", scene, "--drive", "figure_eight", "--seed", seed,
+                     "--duration-s", args.duration_s, "--cameras", "front", "left", "--truth-range")
+        masks = found_masks(args.work, scene)
+        drives += [(f"{scene}, true poses", made, masks, True), (f"{scene}, odometry", made, masks, False)]
+    for title, made, masks, true_poses in drives:
         columns = []
         for number, (setting, (preset, overrides)) in enumerate(SETTINGS.items()):
             name = f"setting{number}_{'true' if true_poses else 'odometry'}"
-            options = folder / f"{name}.yaml"
+            options = made.folder / f"{name}.yaml"
             options.write_text(yaml.safe_dump({"plane_sweep": {**overrides, **(TRUE_POSES if true_poses else {})}}))
-            poses = ["--trajectory", folder / "drive_truth" / "trajectory.tum"] if true_poses else []
-            errors = RangeErrors(folder, name, "--preset", preset, "--options", options, *poses)
+            poses = ["--trajectory", made.trajectory] if true_poses else []
+            errors = RangeErrors(made, masks, name, "--preset", preset, "--options", options, *poses)
             columns.append((setting, [*errors.figures(), Figure("processor time per range map", errors.processor_ms(),
                                                                 "ms")]))
             if setting == "default":
@@ -96,10 +139,8 @@ def main():
     args = arguments()
     args.work.mkdir(parents=True, exist_ok=True)
     results = Results("ranges", "Range maps", args)
-    if "drive" in args.parts:
-        evaluate_drive(args, results)
-    if "settings" in args.parts:
-        evaluate_settings(args, results)
+    for part in args.parts:
+        globals()[f"evaluate_{part}"](args, results)
     results.end()
 
 

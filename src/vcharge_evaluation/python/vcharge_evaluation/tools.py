@@ -1,8 +1,10 @@
 """Runs the suite's tools and reads what they write with --json."""
 import dataclasses
+import hashlib
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -11,6 +13,10 @@ import time
 ROOT = pathlib.Path(__file__).resolve().parents[4]
 TOOLS = ROOT / "build" / "devel" / "lib"
 CONFIG = ROOT / "config"
+
+
+class NoResult(RuntimeError):
+    """A tool's error where it found no result, as on a drive that stands."""
 
 
 @dataclasses.dataclass
@@ -24,6 +30,11 @@ class Run:
     def error(self):
         """The error's text, or None after success."""
         return self.found.get("error")
+
+
+    def reason(self):
+        """The error's text without the paths of files, for results."""
+        return re.sub(r"\S*/\S+: ", "", self.error() or "")
 
 
 def say(text):
@@ -61,6 +72,28 @@ def run_tool(name, log, *words, prefix=(), may_fail=False):
         result.found = json.loads(report.read_text())
     else:
         result.found = {"error": f"{name} wrote no {report.name}: see {log}"}
+    return result
+
+
+def state_of(name, words):
+    """Text that changes with a tool, the libraries, its words and the option files among them."""
+    options = [pathlib.Path(str(word)) for word in words if str(word).endswith(".yaml") and pathlib.Path(str(word)).exists()]
+    programs = [tool_path(name), *(path for path in TOOLS.glob("*.so") if "evaluation" not in path.name)]
+    newest = max((path.stat().st_mtime_ns for path in programs), default=0)
+    texts = [*(str(word) for word in words), *(path.read_text() for path in options), str(newest)]
+    return hashlib.sha1("\n".join(texts).encode()).hexdigest()
+
+
+def run_tool_once(name, log, *words, may_fail=False):
+    """run_tool, unless an earlier call with the same log, words, options and programs finished: stages share its output."""
+    kept, state = log.with_suffix(".kept.json"), state_of(name, words)
+    if kept.exists():
+        entry = json.loads(kept.read_text())
+        if entry["state"] == state:
+            return Run(**entry["run"])
+    kept.unlink(missing_ok=True)
+    result = run_tool(name, log, *words, may_fail=may_fail)
+    kept.write_text(json.dumps({"state": state, "run": dataclasses.asdict(result)}))
     return result
 
 

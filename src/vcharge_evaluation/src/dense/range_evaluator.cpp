@@ -17,6 +17,8 @@ constexpr double kMinTruth_m = 0.5;
 // A pixel has texture if the image's standard deviation in this window reaches this number of gray levels.
 constexpr int kTextureWindow_px = 7;
 constexpr double kMinTexture = 4.0;
+constexpr double kMaxRelativeError = 0.5;    // larger errors and unknown ranges count as this
+constexpr double kRightRelativeError = 0.1;  // up to which a range counts as right for its confidence
 
 /// Standard deviation of the image in a square window around each pixel, in gray levels.
 cv::Mat localStandardDeviation(const cv::Mat& image, int window_px) {
@@ -90,12 +92,14 @@ struct RangeEvaluator::Known {
 
 RangeBin RangeEvaluator::makeBin(double low, double high, float Sample::*criterion) const {
   Known known{options_.tolerance};
+  size_t num_judged = 0;
   for (const Sample& sample : samples_) {
     if (sample.*criterion >= low && sample.*criterion < high) {
+      ++num_judged;
       known.add(sample);
     }
   }
-  RangeBin bin{low, high, known.count()};
+  RangeBin bin{low, high, num_judged, known.count()};
   bin.fraction_within_tolerance = fractionOf(known.within_tolerance, known.count());
   bin.fraction_within_one_sigma = fractionOf(known.within_one_sigma, known.count());
   bin.median_relative_error = summarize(std::move(known.relative_errors)).percentile_50;
@@ -137,6 +141,17 @@ RangeErrors RangeEvaluator::errors() const {
   Known all{options_.tolerance};
   std::for_each(samples_.begin(), samples_.end(), [&](const Sample& sample) { all.add(sample); });
   errors.num_known = all.count();
+  std::vector<double> bounded(samples_.size() - all.count(), kMaxRelativeError);
+  ConfidenceCalibration calibration;
+  for (const Sample& sample : samples_) {
+    if (std::isfinite(sample.range_m)) {
+      const double error = std::abs(sample.range_m / static_cast<double>(sample.truth_m) - 1.0);
+      bounded.push_back(std::min(error, kMaxRelativeError));
+      calibration.add(sample.confidence, error <= kRightRelativeError);
+    }
+  }
+  errors.bounded_relative_error = summarize(std::move(bounded));
+  errors.calibration = calibration.bins();
   errors.fraction_within_one_sigma = fractionOf(all.within_one_sigma, all.count());
   errors.fraction_within_two_sigma = fractionOf(all.within_two_sigma, all.count());
   return errors;

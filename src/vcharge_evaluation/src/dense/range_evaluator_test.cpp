@@ -74,6 +74,29 @@ TEST(RangeEvaluatorTest, UnknownRangesCountAsWrongAtFixedDensity) {
   EXPECT_EQ(errors.num_known, errors.num_judged / 2);
 }
 
+TEST(RangeEvaluatorTest, UnknownRangesCountAsTheLargestError) {
+  Frame frame;
+  frame.map.range_m.rowRange(0, 30).setTo(kNan);
+  frame.map.range_m.rowRange(30, 40).setTo(4.4);
+  const ErrorDistribution errors = frame.evaluate().bounded_relative_error;
+  EXPECT_EQ(errors.count, static_cast<size_t>(kSize.area()));
+  EXPECT_NEAR(errors.mean, 0.3 * 0.5 + 0.1 * 0.1, 1e-6);
+  EXPECT_EQ(errors.max, 0.5);
+  for (const RangeBin& bin : frame.evaluate().by_truth) {
+    EXPECT_EQ(bin.num_judged, bin.low == 4.0 ? static_cast<size_t>(kSize.area()) : 0U);
+    EXPECT_EQ(bin.count, bin.num_judged * 7 / 10);
+  }
+}
+
+TEST(RangeEvaluatorTest, ConfidencesAreComparedWithRangesWithinTenPercent) {
+  Frame frame;
+  frame.map.range_m.rowRange(0, 50).setTo(4.5);  // 12.5 % off
+  const std::vector<ConfidenceBin> bins = frame.evaluate().calibration;
+  ASSERT_EQ(bins.size(), 1U);
+  EXPECT_NEAR(bins[0].mean_confidence, 0.5, 1e-6);
+  EXPECT_NEAR(bins[0].fraction_right, 0.5, 1e-9);
+}
+
 TEST(RangeEvaluatorTest, MostConfidentPixelsAreTakenFirst) {
   Frame frame;
   frame.map.range_m.rowRange(0, 60).setTo(4.3);  // 7.5 % off

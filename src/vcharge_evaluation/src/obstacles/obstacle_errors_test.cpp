@@ -53,6 +53,17 @@ TEST(ObstacleScanErrorsTest, UnreportedAndTooDistantWallsAreMissed) {
   EXPECT_EQ(evaluator.aside().error_m.mean, 0.5) << "missed rays count at their bound";
 }
 
+TEST(ObstacleScanErrorsTest, SmallSigmasOfWrongRangesAreBadlyCalibrated) {
+  for (const double error_m : {0.0, 0.3}) {
+    ObstacleScanEvaluator evaluator;
+    evaluator.add(makeScan(3.0, error_m), makeWall(1.0), RigidTransform());
+    const RayErrors errors = evaluator.all();
+    ASSERT_EQ(errors.calibration.size(), 1U);  // sigma of 5 cm: 15 cm are three of them
+    EXPECT_NEAR(errors.calibration[0].mean_confidence, 0.9973, 1e-4);
+    EXPECT_NEAR(errors.calibration[0].fraction_right, error_m > 0.0 ? 0.0 : 1.0, 0.1);
+  }
+}
+
 TEST(ObstacleScanErrorsTest, KerbsAreNotJudgedAsWalls) {
   ObstacleScanEvaluator evaluator;
   evaluator.add(makeScan(3.0, 0.0), makeWall(0.15), RigidTransform());
@@ -137,6 +148,25 @@ TEST_F(ObstacleMapErrorsTest, FalseCellsAndFreeCellsInsideObstaclesAreCounted) {
   EXPECT_NEAR(errors.false_cells_per_10_m, 10.0 / 2.9, 0.01);
   EXPECT_EQ(errors.num_free_inside, 1U);
   EXPECT_EQ(errors.num_observed_inside, 1U);
+}
+
+TEST_F(ObstacleMapErrorsTest, MovingObjectsAreCountedByKind) {
+  TruthObstacle car = box_;
+  car.kind = "car";
+  TruthObstacle hidden = box_;
+  hidden.kind = "bicycle";
+  hidden.footprint_m = {{1.0, 6.0}, {2.0, 6.0}, {2.0, 7.0}, {1.0, 7.0}};
+  ObstacleMapEvaluator evaluator({}, heights_, path_);
+  for (size_t i = 0; i < path_.size(); ++i) {
+    ObstacleMap map =
+        mapWith(i % 2 == 0 ? std::vector<Eigen::Vector2d>{{1.05, 2.55}} : std::vector<Eigen::Vector2d>{}, {});
+    map.fixed_from_vehicle = path_[i];
+    evaluator.add(map, points_, path_[i], {car, hidden}, {});
+  }
+  const auto movers = evaluator.errors().movers;
+  ASSERT_EQ(movers.size(), 1U) << "a hidden object is not judged";
+  EXPECT_EQ(movers.at("car").frames, path_.size());
+  EXPECT_EQ(movers.at("car").frames_reported, path_.size() / 2);
 }
 
 TEST_F(ObstacleMapErrorsTest, PointsOfKerbsAreJudgedOnceWithTheirLeastDistance) {

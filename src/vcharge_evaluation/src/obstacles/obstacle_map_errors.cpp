@@ -297,8 +297,9 @@ void ObstacleMapEvaluator::judgeMovers(const Frame& frame) {
     if (internal::seenPointsOf(frame.seen_high, mover) < kMinSeenPoints) {
       continue;
     }
-    ++sums_.num_mover_frames;
-    sums_.num_mover_reported += frame.reports(mover) ? 1 : 0;
+    MoverCounts& counts = sums_.movers[mover.kind];
+    ++counts.frames;
+    counts.frames_reported += frame.reports(mover) ? 1 : 0;
     frame.forEachCell([&](int column, int row, int8_t state) {
       if (distanceToPolygon(frame.worldOf(column, row), mover.footprint_m) <= 0.0) {
         ++sums_.num_mover_cells;

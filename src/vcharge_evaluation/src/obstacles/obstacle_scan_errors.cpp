@@ -18,6 +18,7 @@ constexpr double kMaxHeight_m = 2.0;
 constexpr double kRiseDepth_m = 0.3;
 // A reported range that differs by more belongs to another obstacle or to none.
 constexpr double kGate_m = 0.5;
+constexpr double kRight_m = 0.15;  // allowed error of a range
 
 /// True obstacles in one sector.
 struct SectorTruth {
@@ -68,6 +69,9 @@ ObstacleScanEvaluator::ObstacleScanEvaluator(const ObstacleScanEvaluationOptions
 void ObstacleScanEvaluator::addRay(double reported_m, double sigma_m, double truth_m, Rays* rays) {
   ++rays->judged;
   const double error_m = reported_m - truth_m;
+  if (std::isfinite(reported_m)) {
+    rays->calibration.add(probabilityWithin(kRight_m, sigma_m), std::abs(error_m) <= kRight_m);
+  }
   if (!(error_m <= kGate_m)) {  // true for NaN, if nothing is reported
     ++rays->missed;
     rays->errors_m.push_back(kGate_m);
@@ -112,6 +116,7 @@ RayErrors ObstacleScanEvaluator::summarizeRays(const Rays& rays) {
   errors.num_missed = rays.missed;
   errors.num_nearer = rays.nearer;
   errors.error_m = summarize(rays.errors_m);
+  errors.calibration = rays.calibration.bins();
   if (!rays.sigmas.empty()) {
     errors.mean_signed_m = rays.signed_sum_m / static_cast<double>(rays.sigmas.size());
     const auto count = static_cast<double>(rays.judged);

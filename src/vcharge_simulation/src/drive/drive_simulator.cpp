@@ -49,22 +49,29 @@ SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& 
   const WheelOdometer odometer(motion, odometer_options, wheel_seed + 1, faults);
   const int duration_ms = static_cast<int>(std::floor(motion.duration() * 1000.0 + 0.5));
   SimulatedDrive drive;
-  std::vector<Received<WheelTicks>> all_ticks;
+  std::vector<Received<WheelMeasurement>> all_wheels;
   std::vector<Timestamp> image_stamps;
+  const bool has_ticks = odometer_options.sensor == WheelSensor::kTicks;
   Random jitter(wheel_seed + 2);
   // The car reports its wheels before the recording starts and after it ends.
   for (int time_ms = -kMargin_ms; time_ms <= duration_ms + kMargin_ms; time_ms += kOdometryPeriod_ms) {
     if (faults.missing_ticks.isActive() && faults.missing_ticks.actsAt(std::chrono::milliseconds(time_ms))) {
       continue;
     }
-    WheelTicks ticks = odometer.ticks(time_ms);
-    ticks.stamp = stampAt(time_ms);
     const double delay_s = odometer_options.latency_s + odometer_options.latency_jitter_s * jitter.uniform();
-    const Timestamp received = ticks.stamp + durationFromSeconds(delay_s);
-    all_ticks.push_back(
-        {ticks, all_ticks.empty() ? received : std::max(received, all_ticks.back().received)});
-    if (time_ms >= 0 && time_ms <= duration_ms) {
-      drive.wheel_ticks.push_back(all_ticks.back());
+    Timestamp received = stampAt(time_ms) + durationFromSeconds(delay_s);
+    received = all_wheels.empty() ? received : std::max(received, all_wheels.back().received);
+    const auto add = [&](auto wheels, auto* recorded) {
+      wheels.stamp = stampAt(time_ms);
+      all_wheels.push_back({wheels, received});
+      if (time_ms >= 0 && time_ms <= duration_ms) {
+        recorded->push_back({wheels, received});
+      }
+    };
+    if (has_ticks) {
+      add(odometer.ticks(time_ms), &drive.wheel_ticks);
+    } else {
+      add(odometer.speeds(time_ms), &drive.wheel_speeds);
     }
   }
   for (int time_ms = 0; time_ms <= duration_ms; ++time_ms) {
@@ -86,11 +93,11 @@ SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& 
     }
   }
   std::optional<Timestamp> reset;
-  if (faults.counter_reset.isActive()) {
+  if (faults.counter_reset.isActive() && has_ticks) {
     reset = stampAt(0) + durationFromSeconds(faults.counter_reset.time_s);
   }
   for (const Received<VehicleOdometry>& odometry :
-       causalOdometry(all_ticks, image_stamps, stampAt(0), reset, motion_options)) {
+       causalOdometry(all_wheels, image_stamps, stampAt(0), reset, motion_options)) {
     if (odometry.message.stamp <= stampAt(duration_ms)) {
       drive.odometry.push_back(odometry);
     }

@@ -211,5 +211,54 @@ TEST(DriveSimulatorTest, CarRollsOnGroundThatFallsToItsRight) {
   EXPECT_NEAR(left.z() / left.y(), 0.05, 1e-9);
 }
 
+TEST(DriveSimulatorTest, SpeedsAreThoseOfTheWheelsInStepsAndGiveOdometryAsGoodAsTicks) {
+  const DrivePlan plan = planDrive("lot", "loop");
+  WheelOdometerOptions options;
+  options.scale_error = options.left_right_error = 0.0;
+  const auto drive = [&](WheelSensor sensor) {
+    options.sensor = sensor;
+    return simulateDrive(plan.path, plan.motion, options, 1, 1);
+  };
+  const auto endErrorOf = [](const SimulatedDrive& simulated) {
+    const Timestamp end = simulated.ground_truth.back().stamp;
+    for (auto entry = simulated.odometry.rbegin(); entry != simulated.odometry.rend(); ++entry) {
+      if (entry->message.stamp == end) {
+        const RigidTransform first_from_last = simulated.ground_truth.front().odom_from_vehicle.inverse() *
+                                               simulated.ground_truth.back().odom_from_vehicle;
+        return (entry->message.odom_from_vehicle.translation() - first_from_last.translation())
+            .head<2>()
+            .norm();
+      }
+    }
+    return 1e9;
+  };
+  const SimulatedDrive ticks = drive(WheelSensor::kTicks);
+  EXPECT_TRUE(ticks.wheel_speeds.empty());
+  for (const WheelSensor sensor : {WheelSensor::kRearSpeeds, WheelSensor::kSpeeds}) {
+    const SimulatedDrive speeds = drive(sensor);
+    EXPECT_TRUE(speeds.wheel_ticks.empty());
+    ASSERT_EQ(speeds.wheel_speeds.size(), ticks.wheel_ticks.size());
+    std::map<Timestamp, VehicleOdometry> truth;
+    for (const VehicleOdometry& each : speeds.ground_truth) {
+      truth[each.stamp] = each;
+    }
+    for (const auto& [wheels, received] : speeds.wheel_speeds) {
+      const double speed = truth.at(wheels.stamp).forward_speed_m_per_s;
+      const double sideways = 0.5 * plan.motion.track_width_m * truth.at(wheels.stamp).yaw_rate_rad_per_s;
+      EXPECT_NEAR(wheels.rear_left_m_per_s, speed - sideways, 0.0075);  // half a step and the road's bumps
+      EXPECT_NEAR(wheels.rear_right_m_per_s, speed + sideways, 0.0075);
+      EXPECT_NEAR(std::remainder(wheels.rear_left_m_per_s, 0.01), 0.0, 1e-9);
+      if (sensor == WheelSensor::kSpeeds) {
+        const double axle = plan.motion.wheelbase_m * truth.at(wheels.stamp).yaw_rate_rad_per_s;
+        EXPECT_NEAR(wheels.front_left_m_per_s, std::hypot(speed - sideways, axle), 0.0075);
+        EXPECT_NEAR(wheels.front_right_m_per_s, std::hypot(speed + sideways, axle), 0.0075);
+      } else {
+        EXPECT_TRUE(std::isnan(wheels.front_left_m_per_s));
+      }
+    }
+    EXPECT_LT(endErrorOf(speeds), endErrorOf(ticks) + 0.01 * plan.path.length());
+  }
+}
+
 }  // namespace
 }  // namespace vcharge

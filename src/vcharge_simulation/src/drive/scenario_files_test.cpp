@@ -86,6 +86,17 @@ TEST(ScenarioFilesTest, EveryFileIsAScenarioOfTheCatalogue) {
   }
 }
 
+TEST(ScenarioFilesTest, EveryConditionHasAFile) {
+  const std::map<std::string, DriveScenario> scenarios = readScenarios();
+  for (const std::string& condition : enumNames<ConditionKind>()) {
+    if (condition != "noon") {
+      const DriveScenario& scenario = scenarios.at("condition_" + condition);
+      EXPECT_EQ(enumNames<ConditionKind>()[static_cast<size_t>(scenario.condition.kind)], condition);
+      EXPECT_TRUE(scenario.activeFaults().auto_exposure.isActive());
+    }
+  }
+}
+
 TEST(ScenarioFilesTest, MappingDrivesLastLongDriveLanesInBothDirectionsAndDrift) {
   for (const auto& [name, scenario] : readScenarios()) {
     if (name.rfind("mapping_", 0) != 0) {

@@ -50,7 +50,7 @@ Exposure ExposureFaults::next(size_t camera, Timestamp stamp, const cv::Mat& lig
   if (control) {
     control->observe(response_, mean_gray_[camera], toSeconds(stamp - records_[camera].back().stamp));
   } else {
-    control.emplace(automatic.target_gray, automatic.time_constant_s);
+    control.emplace(automatic.target_gray, automatic.time_constant_s, automatic.normal_time_s);
     cv::Mat coarse;
     cv::resize(light, coarse, cv::Size(), 1.0 / kSettlingImageStep, 1.0 / kSettlingImageStep,
                cv::INTER_NEAREST);
@@ -60,7 +60,7 @@ Exposure ExposureFaults::next(size_t camera, Timestamp stamp, const cv::Mat& lig
     }
   }
   exposure = product(exposure, control->exposure());
-  records_[camera].push_back({stamp, exposure.factor * ExposureControl::kNormalTime_s, exposure.gain});
+  records_[camera].push_back({stamp, exposure.factor * automatic.normal_time_s, exposure.gain});
   return exposure;
 }
 

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "vcharge_simulation/rendering/noise.h"
+#include "vcharge_simulation/sensors/lens_glare.h"
 
 namespace vcharge {
 
@@ -14,10 +15,7 @@ namespace {
 
 constexpr double kFullWidth_px = 1280.0;
 // Lengths are for images that are 1280 wide; light is relative to white in the sun.
-constexpr double kSunLight = 25.0;      // light at the centre of the sun
-constexpr double kSunRadius_px = 40.0;  // radius at which the light is half as strong
-constexpr double kSunIlluminance_lx = 1e5;
-constexpr double kLampRadius_px = 2.0;  // a lamp is much smaller than the sun's aureole
+constexpr double kScatter = 1.0;  // the lens is not clean
 constexpr double kMaxBlobRadius_px = 45.0;
 constexpr double kMaxBlobLight = 0.15;
 constexpr double kBlobTransmission = 0.35;  // transmission at the centre of a blob
@@ -43,21 +41,6 @@ cv::Mat mapOfPixels(cv::Size size, Function&& value) {
 
 Eigen::Vector2d pixelAt(double x, double y, cv::Size size) {
   return {x * size.width - 0.5, y * size.height - 0.5};
-}
-
-// Adds the light of a point source: `peak` at its centre, half of it at the radius, and further away falling
-// with the square of the distance, as light scattered in a lens does (CIE glare equation).
-void addGlare(const Eigen::Vector2d& centre_px, double peak, double radius_px, cv::Mat* light) {
-  *light += mapOfPixels(light->size(), [&](const Eigen::Vector2d& pixel) {
-    return peak / (1.0 + (pixel - centre_px).squaredNorm() / (radius_px * radius_px));
-  });
-}
-
-void addLampGlare(const Eigen::Vector2d& centre_px, double illuminance_lx, cv::Mat* light) {
-  // Far from the centre the light is that of the sun, in proportion to the illuminance.
-  const double widening = kSunRadius_px / kLampRadius_px;
-  const double peak = kSunLight * widening * widening * illuminance_lx / kSunIlluminance_lx;
-  addGlare(centre_px, peak, kLampRadius_px * light->cols / kFullWidth_px, light);
 }
 
 cv::Mat vignetteOf(const VignettingFault& fault, const CameraView& view) {
@@ -178,8 +161,8 @@ LightFaults::LightFaults(const FaultOptions& faults, const RecordedCameras& came
     }
     if (faults.sun_glare.actsOn(name)) {
       lens.sun = cv::Mat::zeros(size, CV_32FC1);
-      addGlare(pixelAt(faults.sun_glare.x, faults.sun_glare.y, size), kSunLight,
-               kSunRadius_px * size.width / kFullWidth_px, &lens.sun);
+      addSunGlare(pixelAt(faults.sun_glare.x, faults.sun_glare.y, size), kSunIlluminance_lx, kScatter,
+                  &lens.sun);
     }
     if (faults.dirty_lens.actsOn(name)) {
       makeDirt(faults.dirty_lens, cameras.index(i), size, &lens.dirt_transmission, &lens.dirt_blur,
@@ -199,12 +182,16 @@ cv::Mat LightFaults::apply(size_t camera, Timestamp stamp, const cv::Mat& clean,
     return clean;
   }
   const Lens& lens = lenses_[camera];
-  cv::Mat light_of_gray(1, 256, CV_32FC1);
-  for (int gray = 0; gray < 256; ++gray) {
-    light_of_gray.at<float>(gray) = static_cast<float>(response_.lightFromGray(gray));
-  }
   cv::Mat light;
-  cv::LUT(clean, light_of_gray, light);
+  if (clean.type() == CV_32FC1) {
+    light = clean.clone();
+  } else {
+    cv::Mat light_of_gray(1, 256, CV_32FC1);
+    for (int gray = 0; gray < 256; ++gray) {
+      light_of_gray.at<float>(gray) = static_cast<float>(response_.lightFromGray(gray));
+    }
+    cv::LUT(clean, light_of_gray, light);
+  }
   if (acts(faults_.vignetting)) {
     light = light.mul(lens.vignette);
   }
@@ -232,36 +219,18 @@ cv::Mat LightFaults::apply(size_t camera, Timestamp stamp, const cv::Mat& clean,
   return light;
 }
 
-bool LightFaults::isVisible(const CameraView& view, const Eigen::Vector2d& pixel,
-                            const Eigen::Vector3d& camera_m, const Eigen::Vector3d& lamp_m) const {
-  const auto x = static_cast<int>(std::lround(pixel.x()));
-  const auto y = static_cast<int>(std::lround(pixel.y()));
-  return x >= 0 && y >= 0 && x < view.size().width && y < view.size().height &&
-         !view.centreRay(x, y).isZero() && view.mask().at<uint8_t>(y, x) != 0 &&
-         (!is_visible_ || is_visible_(camera_m, lamp_m));
-}
-
 void LightFaults::addLamps(const CameraView& view, const Readout& readout, cv::Mat* light) const {
   const BrightLampsFault& lamps = faults_.bright_lamps;
   for (size_t i = 0; i < lamps.image_positions.size(); i += 2) {
     addLampGlare(pixelAt(lamps.image_positions[i], lamps.image_positions[i + 1], light->size()),
-                 lamps.intensity_cd / (lamps.image_distance_m * lamps.image_distance_m), light);
+                 lamps.intensity_cd / (lamps.image_distance_m * lamps.image_distance_m), kScatter, light);
   }
   for (size_t i = 0; i < lamps.positions_m.size(); i += 3) {
     const Eigen::Vector3d lamp_m(lamps.positions_m.data() + i);
-    // The row in which the lamp appears depends on the time of that row.
-    Eigen::Vector2d pixel(0.0, 0.5 * (light->rows - 1));
-    Eigen::Vector3d camera_m;
-    bool is_in_front = true;
-    for (int step = 0; step < 3 && is_in_front; ++step) {
-      const double row = std::clamp(pixel.y(), 0.0, light->rows - 1.0);
-      const RigidTransform world_from_camera =
-          readout.motion.at(readout.timeOfRow(row, light->rows)) * *view.camera().vehicle_from_camera;
-      camera_m = world_from_camera.translation();
-      is_in_front = view.camera().model.project(world_from_camera.inverse() * lamp_m, &pixel);
-    }
-    if (is_in_front && isVisible(view, pixel, camera_m, lamp_m)) {
-      addLampGlare(pixel, lamps.intensity_cd / std::max(0.01, (lamp_m - camera_m).squaredNorm()), light);
+    const auto seen = findPoint(view, readout, lamp_m.homogeneous());
+    if (seen && (!is_visible_ || is_visible_(seen->camera_m, lamp_m))) {
+      addLampGlare(seen->pixel, lamps.intensity_cd / std::max(0.01, (lamp_m - seen->camera_m).squaredNorm()),
+                   kScatter, light);
     }
   }
 }

@@ -14,8 +14,6 @@ namespace {
 
 constexpr float kTwoPi = 6.28318531F;
 constexpr float kLift_m = 0.012F;
-// The light of a lamp fades to zero at this distance, so that distant lamps need no rays.
-constexpr float kReach_m = 10.0F;
 // Shadow rays end before the housing of the lamp.
 constexpr float kHousing_m = 0.16F;
 constexpr float kUpwardFraction = 0.2F;
@@ -33,7 +31,7 @@ class LampBaker {
     for (size_t i = 0; i < lamps_.size(); ++i) {
       const Lamp& lamp = lamps_[i];
       const Eigen::Vector3f to_lamp = lamp.centre - position;
-      if (to_lamp.squaredNorm() > kReach_m * kReach_m ||
+      if (to_lamp.squaredNorm() > lamp.reach_m * lamp.reach_m ||
           normal.dot(to_lamp) + lamp.half_length.norm() <= 0.0F) {
         continue;
       }
@@ -42,18 +40,12 @@ class LampBaker {
         const float along =
             (static_cast<float>(k) + unitFromBits(bits)) / static_cast<float>(options_.rays_per_lamp);
         const Eigen::Vector3f offset = to_lamp + (2.0F * along - 1.0F) * lamp.half_length;
-        const float distance = offset.norm();
-        const Eigen::Vector3f direction = offset / distance;
-        const float cosine = normal.dot(direction);
-        if (cosine <= 0.0F || distance >= kReach_m) {
+        const float irradiance = lampIrradiance(lamp, offset, normal);
+        if (irradiance <= 0.0F) {
           continue;
         }
-        const float near = std::max(distance, 0.4F);
-        const float fade = 1.0F - distance * distance / (kReach_m * kReach_m);
-        const float downward = direction.z() > 0.0F
-                                   ? kSidewardFraction + (1.0F - kSidewardFraction) * direction.z()
-                                   : kUpwardFraction;
-        const float irradiance = lamp.intensity * downward * cosine * fade * fade / (near * near);
+        const float distance = offset.norm();
+        const Eigen::Vector3f direction = offset / distance;
         if (!tracer_.occluded(position + kLift_m * normal, direction,
                               std::max(0.01F, distance - kHousing_m))) {
           sum += irradiance;
@@ -107,6 +99,47 @@ GroundTexture mapOf(const cv::Mat& irradiance, const Eigen::Vector2d& min_m, dou
 }
 
 }  // namespace
+
+float lampIrradiance(const Lamp& lamp, const Eigen::Vector3f& to_lamp, const Eigen::Vector3f& normal) {
+  const float distance = to_lamp.norm();
+  const Eigen::Vector3f direction = to_lamp / distance;
+  const float cosine = normal.dot(direction);
+  if (cosine <= 0.0F || distance >= lamp.reach_m) {
+    return 0.0F;
+  }
+  const float near = std::max(distance, 0.4F);
+  const float fade = 1.0F - distance * distance / (lamp.reach_m * lamp.reach_m);
+  const float downward =
+      direction.z() > 0.0F ? kSidewardFraction + (1.0F - kSidewardFraction) * direction.z() : kUpwardFraction;
+  return lamp.intensity * downward * cosine * fade * fade / (near * near);
+}
+
+void bakeGroundLamps(const Eigen::Vector2d& min_m, const Eigen::Vector2d& max_m, double texel_m,
+                     const std::function<double(double, double)>& ground_height, Scene* scene) {
+  if (scene->lamps.empty()) {
+    return;
+  }
+  LampOptions options;
+  options.rays_per_lamp = 1;
+  const LampBaker baker(scene->lamps, options, scene->mesh);
+  cv::Mat root(static_cast<int>(std::lround((max_m.y() - min_m.y()) / texel_m)),
+               static_cast<int>(std::lround((max_m.x() - min_m.x()) / texel_m)), CV_32FC1);
+  tbb::parallel_for(0, root.rows, [&](int row) {
+    for (int column = 0; column < root.cols; ++column) {
+      const double x = min_m.x() + (column + 0.5) * texel_m;
+      const double y = min_m.y() + (row + 0.5) * texel_m;
+      const Eigen::Vector3f position = Eigen::Vector3d(x, y, ground_height(x, y)).cast<float>();
+      root.at<float>(row, column) =
+          std::sqrt(baker.direct(position, Eigen::Vector3f::UnitZ(), hashCell(column, row, 93)));
+    }
+  });
+  cv::GaussianBlur(root, root, cv::Size(3, 3), 0.7);
+  double brightest = 0.0;
+  cv::minMaxLoc(root, nullptr, &brightest);
+  scene->ground.max_lamp_irradiance = static_cast<float>(brightest * brightest);
+  scene->ground.lamps =
+      std::make_unique<GroundTexture>(mapOf(root / std::max(1e-12, brightest), min_m, texel_m));
+}
 
 void bakeLampLight(const std::vector<Lamp>& lamps, const LampOptions& options, const Eigen::Vector2d& min_m,
                    const Eigen::Vector2d& max_m, Scene* scene) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "rendering/ray_tracer.h"
@@ -7,12 +8,10 @@
 
 namespace vcharge {
 
-/// A fluorescent tube that shines down and, weakly, up.
-struct Lamp {
-  Eigen::Vector3f centre;
-  Eigen::Vector3f half_length;  ///< from the centre to one end
-  float intensity = 1.0F;       ///< baked light 1 m below the lamp
-};
+/// Fills ground.lamps with the light of scene->lamps, shadowed by the scene, in [min_m, max_m] at height
+/// `ground_height(x, y)`. The same scene gives the same map for any number of threads.
+void bakeGroundLamps(const Eigen::Vector2d& min_m, const Eigen::Vector2d& max_m, double texel_m,
+                     const std::function<double(double, double)>& ground_height, Scene* scene);
 
 /// Options of the lamp light. Light is relative to the sky's irradiance.
 struct LampOptions {

@@ -10,6 +10,7 @@
 
 #include "rendering/exposed_rows.h"
 #include "rendering/ray_tracer.h"
+#include "rendering/secondary_light.h"
 #include "rendering/surface_shader.h"
 #include "scenes/ground_finder.h"
 
@@ -22,9 +23,6 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kMaxShadow_m = 150.0F;
 // Offset of shadow ray origins from their surface.
 constexpr float kShadowOffset_m = 0.01F;
-// Reflections in glossy paint of the own car.
-constexpr float kBrightestReflection = 2.0F;
-constexpr float kMirroredCone_rad = 0.01F;
 
 // Renders blocks of one image; holds what all blocks share.
 class BlockRenderer {
@@ -32,9 +30,9 @@ class BlockRenderer {
   BlockRenderer(const Scene& scene, const ExposedRows& rows, const CameraView& view)
       : rows_(rows),
         shader_(scene, rows.moving()),
+        secondary_(scene, shader_, view),
         view_(view),
         sun_(scene.sky->directionToSun()),
-        has_sun_(scene.sky->light().sun_irradiance > 0.0),
         ground_(rows, shader_, view) {}
 
   void render(int block_x, int block_y, cv::Mat* light) const {
@@ -51,8 +49,9 @@ class BlockRenderer {
     }
     const uint32_t body_mask = view_.blockBodyMask(block);
     trace(row, block, pixels, body_mask, &rays);
-    std::array<float, 4> sun_visibility{1.0F, 1.0F, 1.0F, 1.0F};
-    traceShadows(row, rays, pixels, body_mask, &sun_visibility);
+    std::array<TracedLight, 4> traced;
+    traceShadows(row, rays, pixels, body_mask, &traced);
+    traceVehicleLamps(row, rays, pixels, body_mask, &traced);
     size_t next_body_sample = view_.blockBodyStart(block);
     for (int p = 0; p < 4; ++p) {
       if ((pixels >> p & 1) == 0) {
@@ -62,12 +61,12 @@ class BlockRenderer {
       const int y = 2 * block_y + p / 2;
       if (meetsOneTriangle(rays, p, body_mask)) {
         const float footprint_m = rays.ray.tfar[4 * p] * view_.pixelAngle(x, y);
-        light->at<float>(y, x) = shader_.shadePixel({surfacePoint(row, rays, 4 * p, footprint_m),
-                                                     surfacePoint(row, rays, 4 * p + 1, footprint_m),
-                                                     surfacePoint(row, rays, 4 * p + 2, footprint_m),
-                                                     surfacePoint(row, rays, 4 * p + 3, footprint_m)},
-                                                    sun_visibility[static_cast<size_t>(p)]) *
-                                 view_.vignette().at<float>(y, x);
+        const std::array<SurfacePoint, 4> points = {
+            surfacePoint(row, rays, 4 * p, footprint_m), surfacePoint(row, rays, 4 * p + 1, footprint_m),
+            surfacePoint(row, rays, 4 * p + 2, footprint_m), surfacePoint(row, rays, 4 * p + 3, footprint_m)};
+        light->at<float>(y, x) =
+            wetted(row, points[0], shader_.shadePixel(points, traced[static_cast<size_t>(p)])) *
+            view_.vignette().at<float>(y, x);
         continue;
       }
       float sum = 0.0F;
@@ -75,7 +74,7 @@ class BlockRenderer {
       for (int s = 0; s < CameraView::kSamplesPerPixel; ++s) {
         const int i = 4 * p + s;
         if ((body_mask >> i & 1U) != 0) {
-          sum += shadeBody(row, view_.bodySamples()[next_body_sample++], direction(rays, i));
+          sum += secondary_.shadeBody(row, view_.bodySamples()[next_body_sample++], direction(rays, i));
         } else if (rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
           if (sky < 0.0F) {
             sky = shader_.skyRadiance(direction(rays, i));
@@ -83,8 +82,8 @@ class BlockRenderer {
           sum += sky;
         } else {
           const float footprint_m = rays.ray.tfar[i] * view_.pixelAngle(x, y);
-          sum +=
-              shader_.shade(surfacePoint(row, rays, i, footprint_m), sun_visibility[static_cast<size_t>(p)]);
+          const SurfacePoint point = surfacePoint(row, rays, i, footprint_m);
+          sum += wetted(row, point, shader_.shade(point, traced[static_cast<size_t>(p)]));
         }
       }
       light->at<float>(y, x) = sum * (1.0F / CameraView::kSamplesPerPixel) * view_.vignette().at<float>(y, x);
@@ -147,12 +146,31 @@ class BlockRenderer {
         positions[static_cast<size_t>(s)] = row.origin + along * (row.rotation * ray);
         middle += 0.25F * positions[static_cast<size_t>(s)];
       }
-      const float sun_visibility = isShadowed(row, middle) ? 0.0F : 1.0F;
-      light->at<float>(y, x) =
-          shader_.shadeGroundPixel(material, positions, plane.normal, (middle - row.origin) / range_m,
-                                   range_m * view_.pixelAngle(x, y), sun_visibility) *
-          view_.vignette().at<float>(y, x);
+      TracedLight traced;
+      traced.sun_visibility = secondary_.isShadowed(row, middle) ? 0.0F : 1.0F;
+      if (secondary_.hasVehicleLamps()) {
+        traced.vehicle_lamps = secondary_.vehicleLampsAt(row, middle);
+      }
+      const Eigen::Vector3f direction = (middle - row.origin) / range_m;
+      const float footprint_m = range_m * view_.pixelAngle(x, y);
+      float ground =
+          shader_.shadeGroundPixel(material, positions, plane.normal, direction, footprint_m, traced);
+      if (material.wetness > 0.0F) {
+        ground =
+            secondary_.wetted(row, ground, material.wetness, middle, plane.normal, direction, footprint_m);
+      }
+      light->at<float>(y, x) = ground * view_.vignette().at<float>(y, x);
     }
+  }
+
+  // Light of a surface with the reflection in the water on it.
+  float wetted(const ExposedRow& row, const SurfacePoint& point, float dry) const {
+    const float wetness = shader_.materialOf(point.triangle).wetness;
+    if (wetness <= 0.0F) {
+      return dry;
+    }
+    return secondary_.wetted(row, dry, wetness, point.position, point.geometric_normal.normalized(),
+                             point.direction, point.footprint_m);
   }
 
   void trace(const ExposedRow& row, size_t block, uint8_t pixels, uint32_t body_mask,
@@ -184,8 +202,8 @@ class BlockRenderer {
   // Traces one shadow ray per pixel: from its centre if one triangle fills it, otherwise from the first
   // sample that needs one.
   void traceShadows(const ExposedRow& row, const RTCRayHit16& rays, uint8_t pixels, uint32_t body_mask,
-                    std::array<float, 4>* sun_visibility) const {
-    if (!has_sun_) {
+                    std::array<TracedLight, 4>* traced) const {
+    if (!secondary_.hasSun()) {
       return;
     }
     alignas(16) int active[4] = {0, 0, 0, 0};
@@ -201,8 +219,8 @@ class BlockRenderer {
                                              ? middleOfPixel(row, rays, p)
                                              : positionOf(row, rays, i);
         const Material& material = shader_.materialOf(rays.hit.primID[i]);
-        if (isShadowed(row, position)) {
-          (*sun_visibility)[static_cast<size_t>(p)] = 0.0F;
+        if (secondary_.isShadowed(row, position)) {
+          (*traced)[static_cast<size_t>(p)].sun_visibility = 0.0F;
           break;
         }
         if (SurfaceShader::hasBakedSun(material)) {
@@ -235,67 +253,31 @@ class BlockRenderer {
     row.instant->findOccluded(active, &shadow);
     for (int p = 0; p < 4; ++p) {
       if (active[p] != 0 && shadow.tfar[p] < 0.0F) {
-        (*sun_visibility)[static_cast<size_t>(p)] = 0.0F;
+        (*traced)[static_cast<size_t>(p)].sun_visibility = 0.0F;
       }
     }
   }
 
-  // Shadows that no light map contains: those of the own car and of movers.
-  bool isShadowed(const ExposedRow& row, const Eigen::Vector3f& position) const {
-    return has_sun_ && (isShadowedByBody(row, position) || row.instant->isShadowedByMover(position, sun_));
-  }
-
-  bool isShadowedByBody(const ExposedRow& row, const Eigen::Vector3f& position) const {
-    if (view_.body() == nullptr) {
-      return false;
+  // Traces the own car's lamps once per pixel, from the first sample that meets the scene.
+  void traceVehicleLamps(const ExposedRow& row, const RTCRayHit16& rays, uint8_t pixels, uint32_t body_mask,
+                         std::array<TracedLight, 4>* traced) const {
+    for (int p = 0; secondary_.hasVehicleLamps() && p < 4; ++p) {
+      for (int i = 4 * p; i < 4 * p + 4; ++i) {
+        if ((pixels >> p & 1) != 0 && (body_mask >> i & 1U) == 0 &&
+            rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID) {
+          (*traced)[static_cast<size_t>(p)].vehicle_lamps =
+              secondary_.vehicleLampsAt(row, positionOf(row, rays, i));
+          break;
+        }
+      }
     }
-    const Eigen::Vector3f in_vehicle = row.vehicle_rotation.transpose() * (position - row.vehicle_origin);
-    // The shadow ray must pass within the body's radius.
-    const float along = -in_vehicle.dot(row.sun_in_vehicle);
-    const float radius = view_.body()->radius();
-    if (along < -radius || (in_vehicle + along * row.sun_in_vehicle).squaredNorm() > radius * radius) {
-      return false;
-    }
-    return view_.body()->tracer().occluded(in_vehicle + kShadowOffset_m * row.sun_in_vehicle,
-                                           row.sun_in_vehicle, kMaxShadow_m);
-  }
-
-  float shadeBody(const ExposedRow& row, const CameraView::BodySample& sample,
-                  const Eigen::Vector3f& ray) const {
-    const Material& material = view_.body()->materials()[sample.material];
-    const Eigen::Vector3f position = row.vehicle_origin + row.vehicle_rotation * sample.position;
-    const Eigen::Vector3f normal = row.vehicle_rotation * sample.normal;
-    if (!view_.body()->isGlossy() || material.reflectivity <= 0.0F) {
-      return shader_.shadePlain(material, position, normal, ray);
-    }
-    return shader_.shadeMatt(material, position, normal) +
-           SurfaceShader::fresnel(material, normal, ray) *
-               mirroredLight(row, position + kShadowOffset_m * normal, ray - 2.0F * normal.dot(ray) * normal);
-  }
-
-  // Light that reaches a mirroring surface from a direction. The paint's curvature widens the ray's cone.
-  float mirroredLight(const ExposedRow& row, const Eigen::Vector3f& origin,
-                      const Eigen::Vector3f& direction) const {
-    RayTracer::Hit hit;
-    if (!row.instant->cast(origin, direction, &hit)) {
-      return std::min(shader_.skyRadiance(direction), kBrightestReflection);
-    }
-    SurfacePoint point;
-    point.direction = direction;
-    point.position = origin + hit.distance_m * direction;
-    point.geometric_normal = Eigen::Vector3f::UnitZ();
-    point.triangle = hit.triangle;
-    point.u = hit.u;
-    point.v = hit.v;
-    point.footprint_m = kMirroredCone_rad * hit.distance_m;
-    return shader_.shade(point, isShadowed(row, point.position) ? 0.0F : 1.0F);
   }
 
   const ExposedRows& rows_;
   const SurfaceShader shader_;
+  const SecondaryLight secondary_;
   const CameraView& view_;
   const Eigen::Vector3f sun_;
-  const bool has_sun_;
   const GroundFinder ground_;
 };
 

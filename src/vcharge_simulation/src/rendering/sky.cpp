@@ -65,7 +65,7 @@ float Sky::radiance(const Eigen::Vector3f& direction) const {
   const float haze = (1.0F - z) * (1.0F - z) * (1.0F - z);
   const float clear = 0.42F + 0.65F * haze;
   const float from_sun = 1.0F - direction.dot(direction_to_sun_);  // 0 towards the sun
-  const float glow = 0.06F / (from_sun + 0.012F);
+  const float glow = static_cast<float>(light_.sun_glow) * 0.06F / (from_sun + 0.012F);
   const float cloudy = 1.25F + 0.25F * haze + 0.5F * glow;
   return static_cast<float>(light_.sky_irradiance) * kSeenToLighting *
          (clear + cloud * (cloudy - clear) + glow);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rendering/lamp_light.h"
+
 namespace vcharge {
 
 namespace {
@@ -12,7 +14,6 @@ constexpr float kMaxDetailLevel = 4.0F;
 
 // Sine of the elevation below which reflections show trees and houses instead of the sky.
 constexpr float kSkylineSine = 0.22F;
-constexpr float kSkylineLight = 0.10F;
 // Additional reflectivity of a rough polish at grazing incidence.
 constexpr float kGrazingGloss = 4.0F;
 constexpr float kFlattestCeilingRay = 0.12F;  // sine of the least elevation of a ray to the ceiling
@@ -72,14 +73,30 @@ float SurfaceShader::groundLight(const Eigen::Vector3f& position, float width_m,
   if (scene_.ground.surrounding != nullptr) {
     surrounding = scene_.ground.surrounding->sampleAt(position.x(), position.y(), 0.0F);
   }
-  return static_cast<float>(sky_.light().sun_irradiance) * sun_fraction +
-         static_cast<float>(sky_.light().sky_irradiance) * surrounding;
+  float light = static_cast<float>(sky_.light().sun_irradiance) * sun_fraction +
+                static_cast<float>(sky_.light().sky_irradiance) * surrounding;
+  if (scene_.ground.lamps != nullptr) {
+    const float root = scene_.ground.lamps->sampleAt(position.x(), position.y(), 0.0F);
+    light += scene_.ground.max_lamp_irradiance * root * root;
+  }
+  return light;
+}
+
+float SurfaceShader::lampLight(const Eigen::Vector3f& position, const Eigen::Vector3f& normal) const {
+  float sum = 0.0F;
+  for (const Lamp& lamp : scene_.lamps) {
+    const Eigen::Vector3f to_lamp = lamp.centre - position;
+    if (to_lamp.squaredNorm() < lamp.reach_m * lamp.reach_m) {
+      sum += lampIrradiance(lamp, to_lamp, normal);
+    }
+  }
+  return sum;
 }
 
 float SurfaceShader::shadeGroundPixel(const Material& material,
                                       const std::array<Eigen::Vector3f, 4>& positions,
                                       const Eigen::Vector3f& normal, const Eigen::Vector3f& direction,
-                                      float footprint_m, float sun_visibility) const {
+                                      float footprint_m, const TracedLight& traced) const {
   const float stretch = stretchOf(direction);
   const GroundTexture& texture = scene_.ground.layers[static_cast<size_t>(material.texture)];
   const float level = fastLog2(groundSampleWidth(footprint_m, stretch) * texture.texels_per_m);
@@ -95,7 +112,9 @@ float SurfaceShader::shadeGroundPixel(const Material& material,
       0.5F * (detailFactor(tall ? upper : left, width_m) + detailFactor(tall ? lower : right, width_m));
   const Eigen::Vector3f middle = 0.5F * (upper + lower);
   return kGroundLayerAlbedo * albedo * detail *
-             groundLight(middle, footprint_m * std::sqrt(stretch), sun_visibility * towardsSun(normal)) +
+             (groundLight(middle, footprint_m * std::sqrt(stretch),
+                          traced.sun_visibility * towardsSun(normal)) +
+              vehicleLightOnGround(normal, traced)) +
          groundReflection(material, middle, direction);
 }
 
@@ -110,7 +129,7 @@ float SurfaceShader::groundReflection(const Material& material, const Eigen::Vec
   return reflected * surroundings(position, {direction.x(), direction.y(), -direction.z()});
 }
 
-float SurfaceShader::shade(const SurfacePoint& point, float sun_visibility) const {
+float SurfaceShader::shade(const SurfacePoint& point, const TracedLight& traced) const {
   const Material& material = materialOf(point.triangle);
   if (material.mapping == Material::Mapping::kGround) {
     const float stretch = stretchOf(point.direction);
@@ -120,28 +139,30 @@ float SurfaceShader::shade(const SurfacePoint& point, float sun_visibility) cons
         kGroundLayerAlbedo *
         texture.sampleAt(point.position.x(), point.position.y(), fastLog2(width_m * texture.texels_per_m)) *
         detailFactor(point.position, width_m);
-    return albedo * groundLight(point.position, point.footprint_m * std::sqrt(stretch),
-                                sun_visibility * towardsSun(point.geometric_normal.normalized())) +
+    const Eigen::Vector3f normal = point.geometric_normal.normalized();
+    return albedo * (groundLight(point.position, point.footprint_m * std::sqrt(stretch),
+                                 traced.sun_visibility * towardsSun(normal)) +
+                     vehicleLightOnGround(normal, traced)) +
            groundReflection(material, point.position, point.direction);
   }
   const Interpolated surface = interpolate(point);
-  return lightOf(point, surface, albedoAt(point, surface), sun_visibility);
+  return lightOf(point, surface, albedoAt(point, surface), traced);
 }
 
-float SurfaceShader::shadePixel(const std::array<SurfacePoint, 4>& points, float sun_visibility) const {
+float SurfaceShader::shadePixel(const std::array<SurfacePoint, 4>& points, const TracedLight& traced) const {
   const Material& material = materialOf(points[0].triangle);
   if (material.mapping == Material::Mapping::kGround) {
     return shadeGroundPixel(
         material, {points[0].position, points[1].position, points[2].position, points[3].position},
         points[0].geometric_normal.normalized(), 0.5F * (points[0].direction + points[3].direction),
-        points[0].footprint_m, sun_visibility);
+        points[0].footprint_m, traced);
   }
   // Light is evaluated at the centre of the pixel, consistent with the mean of the texture.
   const SurfacePoint middle = middleOf(points);
   const Interpolated surface = interpolate(middle);
   const float albedo =
       material.mapping == Material::Mapping::kTexture ? meanAlbedo(points, surface) : material.albedo;
-  return lightOf(middle, surface, albedo, sun_visibility);
+  return lightOf(middle, surface, albedo, traced);
 }
 
 SurfaceShader::Interpolated SurfaceShader::interpolate(const SurfacePoint& point) const {
@@ -213,14 +234,19 @@ float SurfaceShader::sunMapAt(const SurfacePoint& point, const Interpolated& sur
 }
 
 float SurfaceShader::lightOf(const SurfacePoint& point, const Interpolated& surface, float albedo,
-                             float sun_visibility) const {
+                             const TracedLight& traced) const {
   const Material& material = materialOf(point.triangle);
   const auto sun = static_cast<float>(sky_.light().sun_irradiance);
   const float to_sun = surface.normal.dot(sky_.directionToSun());
   const float lit = std::max(to_sun, 0.0F) + material.translucency * std::max(-to_sun, 0.0F);
-  sun_visibility *= sunMapAt(point, surface);
-  const float light =
+  const float sun_visibility = traced.sun_visibility * sunMapAt(point, surface);
+  float light =
       material.emission + albedo * (sun * lit * sun_visibility + ambient(surface.normal) * surface.occlusion);
+  const float from_vehicle = surface.normal.dot(traced.vehicle_lamps);
+  light += albedo * (std::max(from_vehicle, 0.0F) + material.translucency * std::max(-from_vehicle, 0.0F));
+  if (!scene_.lamps.empty()) {
+    light += albedo * lampLight(point.position, surface.normal);
+  }
   if (material.reflectivity <= 0.0F) {
     return light;
   }
@@ -259,11 +285,12 @@ float SurfaceShader::surroundings(const Eigen::Vector3f& position, const Eigen::
     return ceilingRadiance(position, direction);
   }
   if (direction.z() > 0.0F) {
+    const auto skyline_light = static_cast<float>(sky_.light().skyline_light);
     const float skyline = std::min(1.0F, std::max(0.0F, (direction.z() - kSkylineSine) * 12.0F));
-    return kSkylineLight + skyline * (std::min(sky_.radiance(direction), 2.0F) - kSkylineLight);
+    return skyline_light + skyline * (std::min(sky_.radiance(direction), 2.0F) - skyline_light);
   }
   if (position.z() <= 0.0F || direction.z() > -0.03F || scene_.ground.layers.empty()) {
-    return kSkylineLight;
+    return static_cast<float>(sky_.light().skyline_light);
   }
   const float distance = position.z() / -direction.z();
   const float x = position.x() + distance * direction.x();
@@ -289,9 +316,10 @@ float SurfaceShader::shadePlain(const Material& material, const Eigen::Vector3f&
 float SurfaceShader::shadeMatt(const Material& material, const Eigen::Vector3f& position,
                                const Eigen::Vector3f& normal) const {
   const float to_sun = std::max(0.0F, normal.dot(sky_.directionToSun()));
+  const float lamps = scene_.lamps.empty() ? 0.0F : lampLight(position, normal);
   // Under a ceiling, the baked light of the floor gives the local brightness.
   const float surrounding = scene_.ceiling != nullptr ? groundLight(position, 0.5F, 0.0F) : ambient(normal);
-  return material.albedo * (static_cast<float>(sky_.light().sun_irradiance) * to_sun + surrounding);
+  return material.albedo * (static_cast<float>(sky_.light().sun_irradiance) * to_sun + surrounding + lamps);
 }
 
 }  // namespace vcharge

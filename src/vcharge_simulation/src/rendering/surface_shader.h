@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 
 #include <Eigen/Core>
 
@@ -16,6 +17,12 @@ struct SurfacePoint {
   uint32_t triangle;
   float u, v;         ///< barycentric
   float footprint_m;  ///< width of the sample's cone at the surface
+};
+
+/// Direct light at a point that no light map holds.
+struct TracedLight {
+  float sun_visibility = 1.0F;  ///< 0 in shadow and 1 in the sun; multiplies the light map if there is one
+  Eigen::Vector3f vehicle_lamps = Eigen::Vector3f::Zero();  ///< see SecondaryLight::vehicleLampsAt
 };
 
 /// Computes the light that leaves surfaces towards the viewer.
@@ -35,15 +42,14 @@ class SurfaceShader {
     return material.mapping == Material::Mapping::kGround || material.sun_map >= 0;
   }
 
-  /// `sun_visibility` is 0 in shadow and 1 in the sun; it multiplies the light map if there is one.
-  float shade(const SurfacePoint& point, float sun_visibility) const;
+  float shade(const SurfacePoint& point, const TracedLight& traced) const;
   /// Mean light of a pixel whose four samples meet the same triangle; evaluates the light only once.
-  float shadePixel(const std::array<SurfacePoint, 4>& points, float sun_visibility) const;
+  float shadePixel(const std::array<SurfacePoint, 4>& points, const TracedLight& traced) const;
   /// Mean light of a pixel whose four samples (see CameraView) meet one ground material at `positions`.
   /// `direction` is the mean ray, `normal` the unit normal of the ground.
   float shadeGroundPixel(const Material& material, const std::array<Eigen::Vector3f, 4>& positions,
                          const Eigen::Vector3f& normal, const Eigen::Vector3f& direction, float footprint_m,
-                         float sun_visibility) const;
+                         const TracedLight& traced) const;
   /// Light from the sky, or from the ground for downward directions; for reflections.
   float surroundings(const Eigen::Vector3f& position, const Eigen::Vector3f& direction) const;
   /// Fraction of the light that a glossy surface reflects towards a ray's origin (Schlick).
@@ -77,13 +83,19 @@ class SurfaceShader {
   static float textureLevel(const Material& material, const SurfacePoint& point, const Interpolated& surface);
   float sunMapAt(const SurfacePoint& point, const Interpolated& surface) const;
   float lightOf(const SurfacePoint& point, const Interpolated& surface, float albedo,
-                float sun_visibility) const;
+                const TracedLight& traced) const;
+  /// Irradiance from the scene's lamps, without shadows.
+  float lampLight(const Eigen::Vector3f& position, const Eigen::Vector3f& normal) const;
   float detailFactor(const Eigen::Vector3f& position, float width_m) const;
   /// Cosine of the sun's incidence on the ground.
   float towardsSun(const Eigen::Vector3f& ground_normal) const;
   /// `sun_fraction` is the fraction of the sun's light left by the incidence angle and by shadows outside the
   /// light map.
   float groundLight(const Eigen::Vector3f& position, float width_m, float sun_fraction) const;
+  /// Irradiance of ground with this unit normal from the own car's lamps.
+  static float vehicleLightOnGround(const Eigen::Vector3f& normal, const TracedLight& traced) {
+    return std::abs(normal.dot(traced.vehicle_lamps));
+  }
   float ambient(const Eigen::Vector3f& normal) const;
   float groundReflection(const Material& material, const Eigen::Vector3f& position,
                          const Eigen::Vector3f& direction) const;

@@ -40,6 +40,11 @@ std::vector<SceneDrive> twoLevelsDrives();
 /// Height of the drivable ground: levels, ramps and bumps.
 double twoLevelsGroundHeight(double x_m, double y_m);
 
+/// The lot with a helical ramp in its middle (see ramp_shape.h) that leads to a landing above its first turn.
+/// Where levels lie over each other, height maps hold the uppermost.
+std::shared_ptr<const Scene> buildRampScene(const SceneOptions& options);
+std::vector<SceneDrive> rampDrives();
+
 /// The lot with a calibration board (options.board) held in front of each camera of the standing car in turn,
 /// at many poses out to the rim of the image. The poses fit the cameras of options.rig; the mover's pose is
 /// that of the pattern frame (see BoardPattern).

@@ -71,6 +71,12 @@ bool SceneInstant::cast(const Eigen::Vector3f& origin, const Eigen::Vector3f& di
   return true;
 }
 
+bool SceneInstant::occluded(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction,
+                            float max_distance_m) const {
+  return fixed_.occluded(origin, direction, max_distance_m) ||
+         (moving_tracer_ && moving_tracer_->occluded(origin, direction, max_distance_m));
+}
+
 bool SceneInstant::isShadowedByMover(const Eigen::Vector3f& position,
                                      const Eigen::Vector3f& direction_to_sun) const {
   // The ray to the sun must pass within the sphere around a mover.

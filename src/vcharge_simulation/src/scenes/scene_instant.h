@@ -25,6 +25,8 @@ class SceneInstant {
   /// Sets tfar of the active rays that are occluded to a negative value, as Embree does.
   void findOccluded(const int* active, RTCRay4* rays) const;
   bool cast(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, RayTracer::Hit* hit) const;
+  /// True if any surface lies within max_distance_m along a unit direction.
+  bool occluded(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction, float max_distance_m) const;
   /// True if a mover occludes the sun.
   bool isShadowedByMover(const Eigen::Vector3f& position, const Eigen::Vector3f& direction_to_sun) const;
 

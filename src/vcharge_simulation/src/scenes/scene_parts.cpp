@@ -10,6 +10,7 @@ namespace vcharge {
 
 namespace {
 
+constexpr float kPoleLampReach_m = 60.0F;
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kSmallTreeLeaf_m = 0.12;
 constexpr double kTallTreeLeaf_m = 0.17;  // multiplied by the scale of the tree
@@ -289,15 +290,29 @@ void SceneParts::addHouses(const std::vector<Building>& houses) {
   }
 }
 
-void SceneParts::addPoles(const std::vector<Pole>& poles) {
+void SceneParts::addPoles(const std::vector<Pole>& poles, double lamp_cd) {
+  constexpr double kWhiteInSun_cd_per_m2 = kSunIlluminance_lx / 3.14159265358979323846;
+  const Eigen::Vector3f head_m(0.5F, 0.22F, 0.12F);
+  uint32_t head = metal_;
+  if (lamp_cd > 0.0) {
+    Material glowing = scene_->materials[metal_];
+    glowing.emission = static_cast<float>(lamp_cd / kWhiteInSun_cd_per_m2) / (head_m.x() * head_m.y());
+    head = scene_->addMaterial(glowing);
+  }
   for (const Pole& pole : poles) {
     const Eigen::Vector3f base = Eigen::Vector3d(pole.x, pole.y, pole.z).cast<float>();
     const Eigen::Vector3f top = base + Eigen::Vector3f(0.0F, 0.0F, static_cast<float>(pole.height));
     const auto radius = static_cast<float>(pole.radius);
     addFrustum(base, top, radius, 0.8F * radius, 10, true, pole.lamp ? metal_ : dark_metal_, &scene_->mesh);
     if (pole.lamp) {
-      addBox(placement(pole.x, pole.y, pole.z + pole.height, 0.4), {0.5F, 0.22F, 0.12F}, metal_,
-             &scene_->mesh);
+      addBox(placement(pole.x, pole.y, pole.z + pole.height, 0.4), head_m, head, &scene_->mesh);
+      if (lamp_cd > 0.0) {
+        Lamp lamp;
+        lamp.centre = top - Eigen::Vector3f(0.0F, 0.0F, 0.5F * head_m.z());
+        lamp.intensity = static_cast<float>(lamp_cd / kSunIlluminance_lx);
+        lamp.reach_m = kPoleLampReach_m;
+        scene_->lamps.push_back(lamp);
+      }
     }
     scene_->obstacles.push_back(
         {"pole", circleAround(pole.x, pole.y, pole.radius), pole.z, pole.z + pole.height});

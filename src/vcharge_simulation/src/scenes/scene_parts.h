@@ -57,7 +57,8 @@ class SceneParts {
   /// Tufts of grass along the edge of a raised area.
   void addGrassAlong(const GroundRectangle& area, double base_z_m = 0.0, const Kerb& kerb = Kerb());
   void addHouses(const std::vector<Building>& houses);
-  void addPoles(const std::vector<Pole>& poles);
+  /// The lamps shine down with `lamp_cd`; 0: they are off.
+  void addPoles(const std::vector<Pole>& poles, double lamp_cd = 0.0);
   void addBins(const std::vector<Bin>& bins);
   void addFence(const Fence& fence);
   /// Distant woods and roofs: a ring with an irregular upper edge.

@@ -1,6 +1,8 @@
 #include "vcharge_simulation/scenes/scene_catalogue.h"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <set>
 #include <string>
@@ -11,7 +13,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "scenes/catalogue_cases.h"
+#include "scenes/garage/garage_layout.h"
 #include "scenes/lot/lot_layout.h"
+#include "scenes/road/road_layout.h"
 #include "scenes/scene_parts.h"
 #include "vcharge_simulation/drive/drive_simulator.h"
 #include "vcharge_simulation/drive/truth_maps.h"
@@ -33,6 +37,7 @@ std::string sceneOf(const testing::TestParamInfo<SceneCase>& info) {
   return info.param.scene;
 }
 INSTANTIATE_TEST_SUITE_P(Catalogue, SceneTest, testing::ValuesIn(kSceneCases), sceneOf);
+INSTANTIATE_TEST_SUITE_P(Ramp, SceneTest, testing::Values(SceneCase{"ramp", "up", 200}), sceneOf);
 
 TEST_P(SceneTest, SameBytesOnAnyNumberOfThreads) {
   const CameraView view(makeGolfRig(1, 0.15).cameras[1], makeGolfBody());
@@ -103,6 +108,7 @@ cv::Mat_<cv::Point2f> outlineOf(const std::vector<Eigen::Vector2d>& footprint_m)
 // Obstacles that the own car would touch on a drive.
 std::set<std::string> touchedOn(const DrivePlan& plan, const std::vector<Obstacle>& obstacles) {
   constexpr double kMirror_m = 0.1;
+  constexpr double kRollsOver_m = 0.02;
   const CarShape& golf = carShapes().front();
   std::vector<cv::Mat_<cv::Point2f>> outlines;
   for (const Obstacle& obstacle : obstacles) {
@@ -112,6 +118,7 @@ std::set<std::string> touchedOn(const DrivePlan& plan, const std::vector<Obstacl
   const VehicleMotion motion(plan.path, plan.motion, 1, plan.ground_height);
   for (int ms = 0; ms < static_cast<int>(motion.duration() * 1000.0); ms += 250) {
     const RigidTransform pose = motion.at(ms).world_from_planar;
+    const double height_m = motion.at(ms).worldFromVehicle().translation().z();
     const cv::Mat_<cv::Point2f> own = outlineOf(
         orientedRectangle(pose.translation().x(), pose.translation().y(), yawOfRotation(pose.rotation()),
                           golf.rear(), golf.front(), 0.5 * golf.width + kMirror_m));
@@ -119,8 +126,10 @@ std::set<std::string> touchedOn(const DrivePlan& plan, const std::vector<Obstacl
       const cv::Point2f corner = outlines[i](0);
       const bool is_far =
           std::abs(corner.x - own(0).x) + std::abs(corner.y - own(0).y) > 12.0F && obstacles[i].kind == "car";
+      const bool is_level =
+          obstacles[i].base_z_m < height_m + golf.height && obstacles[i].top_z_m > height_m + kRollsOver_m;
       cv::Mat overlap;
-      if (!is_far && cv::intersectConvexConvex(outlines[i], own, overlap) > 0.0F) {
+      if (!is_far && is_level && cv::intersectConvexConvex(outlines[i], own, overlap) > 0.0F) {
         touched.insert(obstacles[i].kind + " at " + std::to_string(corner.x) + ", " +
                        std::to_string(corner.y));
       }
@@ -132,32 +141,69 @@ std::set<std::string> touchedOn(const DrivePlan& plan, const std::vector<Obstacl
 TEST_P(SceneTest, DrivesKeepClearOfAllThatStands) {
   for (const CatalogueEntry& entry : listDrives(GetParam().scene)) {
     const DrivePlan plan = planDrive(GetParam().scene, entry.name);
-    if (plan.day == 0) {
-      EXPECT_THAT(touchedOn(plan, renderer().scene().obstacles), testing::IsEmpty()) << entry.name;
+    std::vector<Obstacle> obstacles = renderer().scene().obstacles;
+    if (plan.day != 0) {  // the cars are those of day 0
+      obstacles.erase(std::remove_if(obstacles.begin(), obstacles.end(),
+                                     [](const Obstacle& obstacle) { return obstacle.kind == "car"; }),
+                      obstacles.end());
+    }
+    EXPECT_THAT(touchedOn(plan, obstacles), testing::IsEmpty()) << entry.name;
+  }
+}
+
+// Scenes with different seeds and days differ, where the car drives, only in the parked cars.
+TEST(CatalogueTest, DrivesKeepClearOfParkedCarsForEverySeedAndDay) {
+  const std::map<std::string, std::function<std::vector<ParkedCar>(uint64_t, const Day&)>> scenes = {
+      {"lot", [](uint64_t seed, const Day& day) { return makeLotLayout(seed, day).cars; }},
+      {"garage", [](uint64_t seed, const Day& day) { return makeGarageLayout(seed, day).cars; }},
+      {"road", [](uint64_t seed, const Day& day) { return makeRoadLayout(seed, day).cars; }}};
+  for (const auto& [scene, carsOf] : scenes) {
+    for (const CatalogueEntry& entry : listDrives(scene)) {
+      const DrivePlan plan = planDrive(scene, entry.name);
+      std::vector<Obstacle> cars;
+      for (uint64_t seed = 1; seed <= 12; ++seed) {
+        for (const Day& day : {Day(plan.day), Day(plan.day, 1.0)}) {
+          for (const ParkedCar& car : carsOf(seed, day)) {
+            const CarShape& shape = carShapes()[static_cast<size_t>(car.shape)];
+            cars.push_back(
+                {"car",
+                 orientedRectangle(car.x, car.y, car.yaw_rad, shape.rear(), shape.front(), 0.5 * shape.width),
+                 -1.0, 5.0});
+          }
+        }
+      }
+      EXPECT_THAT(touchedOn(plan, cars), testing::IsEmpty()) << scene << " " << entry.name;
     }
   }
 }
 
-// On lanes and bays, lots with different seeds and days differ only in the parked cars.
-TEST(CatalogueTest, DrivesOfTheLotKeepClearOfParkedCarsForEverySeed) {
-  for (uint64_t seed = 1; seed <= 12; ++seed) {
-    for (const int day : {0, 1}) {
-      std::vector<Obstacle> cars;
-      for (const ParkedCar& car : makeLotLayout(seed, day).cars) {
-        const CarShape& shape = carShapes()[static_cast<size_t>(car.shape)];
-        cars.push_back(
-            {"car",
-             orientedRectangle(car.x, car.y, car.yaw_rad, shape.rear(), shape.front(), 0.5 * shape.width),
-             0.0, shape.height});
-      }
-      for (const CatalogueEntry& entry : listDrives("lot")) {
-        const DrivePlan plan = planDrive("lot", entry.name);
-        if (plan.day == day) {
-          EXPECT_THAT(touchedOn(plan, cars), testing::IsEmpty()) << entry.name << ", seed " << seed;
-        }
-      }
+TEST(CatalogueTest, ADayExchangesTheWantedFractionOfTheCarsAndNothingElse) {
+  const LotLayout before = makeLotLayout(1, 0);
+  const auto same = [](const ParkedCar& a, const ParkedCar& b) {
+    return a.x == b.x && a.y == b.y && a.yaw_rad == b.yaw_rad && a.shape == b.shape && a.paint == b.paint;
+  };
+  size_t kept_of_less = before.cars.size();
+  for (const double fraction : {0.0, 0.2, 0.5, 1.0}) {
+    const LotLayout after = makeLotLayout(1, Day(3, fraction));
+    size_t kept = 0;
+    for (const ParkedCar& car : before.cars) {
+      kept += std::any_of(after.cars.begin(), after.cars.end(),
+                          [&](const ParkedCar& other) { return same(car, other); })
+                  ? 1
+                  : 0;
     }
+    const double expected = (1.0 - fraction) * static_cast<double>(before.cars.size());
+    EXPECT_NEAR(kept, expected, 3.0 * std::sqrt(fraction * expected + 1e-9) + 1e-9) << fraction;
+    EXPECT_LE(kept, kept_of_less);
+    kept_of_less = kept;
+    EXPECT_GT(after.cars.size(), before.cars.size() / 2);
+    ASSERT_EQ(after.trees.size(), before.trees.size());
+    for (size_t i = 0; i < after.trees.size(); ++i) {
+      EXPECT_EQ(after.trees[i].x, before.trees[i].x);
+    }
+    EXPECT_EQ(after.poles.size(), before.poles.size());
   }
+  EXPECT_FALSE(same(makeLotLayout(1, Day(1, 1.0)).cars[0], makeLotLayout(1, Day(2, 1.0)).cars[0]));
 }
 
 class LayoutTest : public testing::TestWithParam<const char*> {

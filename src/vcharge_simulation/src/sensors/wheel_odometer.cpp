@@ -67,10 +67,11 @@ WheelOdometer::WheelOdometer(const VehicleMotion& motion, const WheelOdometerOpt
     right_slip_m += (turnFactor(faults, Wheel::kRight, since_start) - 1.0) * right_scale *
                     (sample.right_wheel_m - last->right_wheel_m);
     last = &sample;
-    left_.push_back(static_cast<int64_t>(
-        std::floor((sample.left_wheel_m * left_scale + left_slip_m) / options.metres_per_tick + left_phase)));
-    right_.push_back(static_cast<int64_t>(std::floor(
-        (sample.right_wheel_m * right_scale + right_slip_m) / options.metres_per_tick + right_phase)));
+    left_m_.push_back(sample.left_wheel_m * left_scale + left_slip_m);
+    right_m_.push_back(sample.right_wheel_m * right_scale + right_slip_m);
+    left_.push_back(static_cast<int64_t>(std::floor(left_m_.back() / options.metres_per_tick + left_phase)));
+    right_.push_back(
+        static_cast<int64_t>(std::floor(right_m_.back() / options.metres_per_tick + right_phase)));
   }
   if (faults.missing_ticks.isActive()) {
     bridge(faults.missing_ticks, &left_);
@@ -93,15 +94,46 @@ WheelTicks WheelOdometer::ticks(int milliseconds) const {
   ticks.left_ticks = left_.at(index) - left_.at(start);
   ticks.right_ticks = right_.at(index) - right_.at(start);
   ticks.metres_per_tick = options_.metres_per_tick;
+  ticks.steering_angle_rad = steeringAngle(milliseconds);
+  return ticks;
+}
+
+double WheelOdometer::steeringAngle(int milliseconds) const {
   const int lag = static_cast<int>(std::lround(1000.0 * options_.steering_lag_s));
   const double steering_rad =
       std::atan(motion_.options().wheelbase_m * motion_.at(milliseconds - lag).curvature_per_m);
   const double step_rad = options_.steering_resolution_deg * M_PI / 180.0;
-  ticks.steering_angle_rad = step_rad > 0.0 ? step_rad * std::round(steering_rad / step_rad) : steering_rad;
-  return ticks;
+  return step_rad > 0.0 ? step_rad * std::round(steering_rad / step_rad) : steering_rad;
 }
 
-std::vector<Received<VehicleOdometry>> causalOdometry(const std::vector<Received<WheelTicks>>& ticks,
+WheelSpeeds WheelOdometer::speeds(int milliseconds) const {
+  const auto index = static_cast<size_t>(milliseconds + VehicleMotion::marginSteps());
+  const auto speedOf = [&](const std::vector<double>& distance_m) {
+    return 0.5 * VehicleMotion::kStepsPerSecond * (distance_m.at(index + 1) - distance_m.at(index - 1));
+  };
+  const auto quantized = [&](double speed_m_per_s) {
+    return options_.speed_step_m_per_s * std::round(speed_m_per_s / options_.speed_step_m_per_s);
+  };
+  const double left = speedOf(left_m_);
+  const double right = speedOf(right_m_);
+  WheelSpeeds speeds;
+  speeds.rear_left_m_per_s = quantized(left);
+  speeds.rear_right_m_per_s = quantized(right);
+  if (options_.sensor == WheelSensor::kSpeeds) {
+    const VehicleMotionOptions& vehicle = motion_.options();
+    const auto frontOf = [&](double rear, double side) {
+      const double curvature = motion_.at(milliseconds).curvature_per_m;
+      const double across = 1.0 - 0.5 * side * vehicle.track_width_m * curvature;
+      return quantized(rear * std::hypot(1.0, vehicle.wheelbase_m * curvature / across));
+    };
+    speeds.front_left_m_per_s = frontOf(left, 1.0);
+    speeds.front_right_m_per_s = frontOf(right, -1.0);
+  }
+  speeds.steering_angle_rad = steeringAngle(milliseconds);
+  return speeds;
+}
+
+std::vector<Received<VehicleOdometry>> causalOdometry(const std::vector<Received<WheelMeasurement>>& wheels,
                                                       const std::vector<Timestamp>& triggers, Timestamp start,
                                                       std::optional<Timestamp> reset,
                                                       const VehicleMotionOptions& vehicle) {
@@ -129,9 +161,9 @@ std::vector<Received<VehicleOdometry>> causalOdometry(const std::vector<Received
       publish(stream.trigger(triggers[trigger]), triggers[trigger]);
     }
   };
-  for (const auto& [message, received] : ticks) {
+  for (const auto& [message, received] : wheels) {
     triggerUntil(received);
-    if (reset && message.stamp >= *reset) {
+    if (reset && stampOf(message) >= *reset) {
       publish(stream.flush(), received);
       odometry = WheelOdometry(options);
       first_from_odom = RigidTransform();
@@ -141,9 +173,9 @@ std::vector<Received<VehicleOdometry>> causalOdometry(const std::vector<Received
       publish(stream.add(*estimate), received);
     }
   }
-  if (!ticks.empty()) {
-    triggerUntil(ticks.back().received);
-    publish(stream.flush(), ticks.back().received);
+  if (!wheels.empty()) {
+    triggerUntil(wheels.back().received);
+    publish(stream.flush(), wheels.back().received);
   }
   return published;
 }

@@ -68,11 +68,11 @@ class Spring {
 class WheelContacts {
  public:
   WheelContacts(const GroundHeight& ground_height, const VehicleMotionOptions& options,
-                const RigidTransform& world_from_planar)
+                const RigidTransform& world_from_planar, double near_z_m)
       : track_m_(options.track_width_m), wheelbase_m_(options.wheelbase_m) {
     const auto height = [&](double x_m, double y_m) {
       const Eigen::Vector3d position_m = world_from_planar * Eigen::Vector3d(x_m, y_m, 0.0);
-      return ground_height(position_m.x(), position_m.y());
+      return ground_height(position_m.x(), position_m.y(), near_z_m);
     };
     rear_left_m = height(0.0, 0.5 * track_m_);
     rear_right_m = height(0.0, -0.5 * track_m_);
@@ -81,6 +81,7 @@ class WheelContacts {
   }
 
   double rear_left_m, rear_right_m;
+  double height() const { return 0.5 * (rear_left_m + rear_right_m); }
 
   /// Rise over distance along x.
   double slope() const {
@@ -89,7 +90,7 @@ class WheelContacts {
   RigidTransform planarFromGround() const {
     const double bank = 0.5 * (rear_left_m + front_left_m_ - rear_right_m - front_right_m_) / track_m_;
     return RigidTransform(rotationFromYawPitchRoll(0.0, -std::atan(slope()), std::atan(bank)),
-                          {0.0, 0.0, 0.5 * (rear_left_m + rear_right_m)});
+                          {0.0, 0.0, height()});
   }
 
  private:
@@ -149,6 +150,7 @@ VehicleMotion::VehicleMotion(const DrivePath& path, const VehicleMotionOptions& 
   auto stop = path.stops().begin();
   double stop_ends_s = -1.0;  // end of the current stop; negative while driving
   double direction = path.direction(s_m);
+  double height_m = options.start_height_m;
   MotionSample sample;
   sample.world_from_planar = path.worldFromStart() * arcMotion(direction * s_m, 0.0);
   int remaining_after_end = 2 * marginSteps();
@@ -193,7 +195,8 @@ VehicleMotion::VehicleMotion(const DrivePath& path, const VehicleMotionOptions& 
                                              {0.0, 0.0, options.road_heave_m * heave_noise.at(s_m)});
     std::optional<WheelContacts> contacts;
     if (ground_height) {
-      contacts.emplace(ground_height, options, sample.world_from_planar);
+      contacts.emplace(ground_height, options, sample.world_from_planar, height_m);
+      height_m = contacts->height();
       sample.planar_from_body = contacts->planarFromGround() * sample.planar_from_body;
     }
     samples_.push_back(sample);
@@ -206,7 +209,7 @@ VehicleMotion::VehicleMotion(const DrivePath& path, const VehicleMotionOptions& 
     double left_m = direction * horizontal_m - 0.5 * options.track_width_m * turn_rad;
     double right_m = direction * horizontal_m + 0.5 * options.track_width_m * turn_rad;
     if (contacts) {
-      const WheelContacts next(ground_height, options, sample.world_from_planar);
+      const WheelContacts next(ground_height, options, sample.world_from_planar, height_m);
       left_m = alongSurface(left_m, next.rear_left_m - contacts->rear_left_m);
       right_m = alongSurface(right_m, next.rear_right_m - contacts->rear_right_m);
     }

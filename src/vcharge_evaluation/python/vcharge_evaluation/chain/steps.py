@@ -3,18 +3,15 @@ a sparse map, range maps, a height map and an OctoMap; another day's drive -> th
 through the nodelets. Ends with report.html. A step that an earlier run finished with the same input is kept, and an
 interrupted one is resumed. The truth of simulated drives only judges the results."""
 import concurrent.futures
-import hashlib
-import json
 import os
-import pathlib
 import shutil
 import sys
-import time
 
 import yaml
 
 from vcharge_evaluation.chain import figures, nodelets, report
 from vcharge_evaluation.chain.arguments import arguments
+from vcharge_evaluation.chain.step_folders import StepFolders, fingerprint
 from vcharge_evaluation.tools import CONFIG, ROOT, import_published_images, run, run_tool, say, tool_path
 
 RVIZ_SCREENSHOT = ROOT / "src" / "vcharge_evaluation" / "scripts" / "rviz_screenshot.sh"
@@ -27,58 +24,23 @@ PEOPLE = ("--set", "movers.people=2", "--set", "movers.crossing=true")
 OTHER_WHEELS = ("--set", "odometer.scale_error=-0.0005", "--set", "odometer.left_right_error=0.0003")
 
 
-def fingerprint(path):
-    """Text that changes with a file or folder: its files with their sizes and times of modification."""
-    path = path.resolve()
-    files = sorted(path.rglob("*")) if path.is_dir() else [path]
-    return " ".join(f"{file}:{file.stat().st_size}:{file.stat().st_mtime_ns}" for file in files if file.is_file())
-
-
 def settings(name):
     """Path and text of an options file in config/; the text decides whether a step must run again."""
     return CONFIG / name, (CONFIG / name).read_text()
 
 
-class Chain:
-    """The steps in their order, each in its own folder below the work folder."""
+class Chain(StepFolders):
+    """The steps in their order."""
 
     def __init__(self, args):
+        super().__init__(args.work.resolve())
         self.args = args
-        self.work = args.work.resolve()
         self.simulated = args.bag is None
         self.pictures = self.work / "pictures"
         self.pictures.mkdir(parents=True, exist_ok=True)
-        # By name of the step: the hash of its input, and what it found (title, figures, times).
-        self.keys, self.steps, self.number = {}, {}, 0
         scale = 0.5 if args.quick else 1.0
         self.simulator_arguments = ["--scene-seed", args.seed, "--rig", "random", "--rig-seed", args.rig_seed,
                                     "--image-scale", scale, *BODY]
-
-    def step(self, name, title, needs, given, work):
-        """Calls `work(folder)`, which returns figures, unless an earlier run did with the same `given` (texts) after the same
-        steps `needs` (names)."""
-        self.number += 1
-        folder = self.work / name
-        key = hashlib.sha1(repr([[str(word) for word in given], [self.keys[need] for need in needs]]).encode()).hexdigest()
-        self.keys[name] = key
-        begun, done = folder / "begun", folder / "done.json"
-        if done.exists() and json.loads(done.read_text())["key"] == key:
-            say(f"{self.number:2d} {title}: kept")
-        else:
-            say(f"{self.number:2d} {title}")
-            if not begun.exists() or begun.read_text() != key:
-                shutil.rmtree(folder, ignore_errors=True)
-                folder.mkdir(parents=True)
-                begun.write_text(key)
-            start, cpu_s = time.monotonic(), sum(os.times()[2:4])
-            found = work(folder)
-            temporary = folder / "done.json.tmp"
-            temporary.write_text(json.dumps({"key": key, "title": title, "figures": found,
-                                             "wall_s": time.monotonic() - start,
-                                             "cpu_s": sum(os.times()[2:4]) - cpu_s}, indent=1))
-            temporary.rename(done)
-        self.steps[name] = json.loads(done.read_text())
-        return folder
 
     def simulate(self, name, title, *words):
         words = ["--scene", self.args.scene, *self.simulator_arguments, *words]

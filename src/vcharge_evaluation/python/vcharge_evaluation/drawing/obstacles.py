@@ -115,7 +115,11 @@ def main():
     parser.add_argument("--moment", type=float, default=0.7, help="time in the drive as a fraction of its duration")
     parser.add_argument("--truth", type=pathlib.Path)
     parser.add_argument("--output", type=pathlib.Path, required=True)
-    arguments = parser.parse_args()
+    draw(parser.parse_args())
+
+
+def draw(arguments):
+    """Writes the picture; `arguments` as of the command line."""
     cameras = yaml.safe_load(arguments.rig.read_text())["cameras"]
     arguments.camera = arguments.camera or ("left" if "left" in cameras else next(iter(cameras)))
     camera = cameras[arguments.camera]

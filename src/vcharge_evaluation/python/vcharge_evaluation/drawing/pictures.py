@@ -15,6 +15,22 @@ def save(path, picture):
     print(f"written: {path}")
 
 
+MAX_BYTES, MAX_WIDTH_PX = 60_000, 900
+
+
+def save_small(path, picture):
+    """Writes a JPEG of at most MAX_BYTES: first of lower quality, then smaller."""
+    scale = min(1.0, MAX_WIDTH_PX / picture.shape[1])
+    while True:
+        smaller = picture if scale == 1.0 else cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+        for quality in (85, 70, 55):
+            done, data = cv2.imencode(".jpg", smaller, [cv2.IMWRITE_JPEG_QUALITY, quality])
+            if done and len(data) <= MAX_BYTES:
+                path.write_bytes(data.tobytes())
+                return
+        scale *= 0.8
+
+
 def read_image(bag_path, camera, stamp_ns):
     """The camera's gray image of this stamp. SystemExit without one."""
     topic = f"/camera/{camera}/image_raw"

@@ -5,6 +5,7 @@
 
 #include "vcharge_core/base/options.h"
 #include "vcharge_simulation/faults/fault_options.h"
+#include "vcharge_simulation/scenes/conditions.h"
 #include "vcharge_simulation/scenes/mover_options.h"
 #include "vcharge_simulation/sensors/lens_blur.h"
 #include "vcharge_simulation/sensors/wheel_odometer.h"
@@ -37,6 +38,9 @@ struct DriveScenario {
       int, surface_seed, 0, notNegative(),
       "Seed of the contrast of ground, walls and signs, and of the size of leaves; 0: strong and smooth.");
   VCHARGE_OPTION(int, rig_seed, 1, notNegative(), "Seed of lenses and mountings.");
+  VCHARGE_OPTION(int, day, -1, atLeast(-1), "Day, with its light and parked cars; -1: that of the drive.");
+  VCHARGE_OPTION(double, exchanged_cars, -1.0, between(-1.0, 1.0),
+                 "Fraction of the bays whose cars differ from day 0; negative: 0.3, on day 0 none.");
   VCHARGE_OPTION(int, seed, 1, notNegative(), "Seed of the road roughness, and by default of the sensors.");
   VCHARGE_OPTION(int, sensor_seed, -1, atLeast(-1), "Seed of wheels and image noise; -1: the same as seed.");
   VCHARGE_OPTION(double, duration_s, 0.0, between(0.0, 1e6), "End of the drive; 0: the end of its path.");
@@ -47,12 +51,22 @@ struct DriveScenario {
   VCHARGE_OPTION(bool, noise, true, anyValue(), "Add sensor noise to the images.");
   VCHARGE_OPTION(std::vector<std::string>, cameras, {}, anyValue(),
                  "Cameras to record, by name; empty: all.");
+  VCHARGE_OPTION_GROUP(ConditionOptions, condition, {}, "Light and weather.");
   VCHARGE_OPTION_GROUP(MoverOptions, movers, {}, "Objects that move through the scene.");
   VCHARGE_OPTION_GROUP(WheelOdometerOptions, odometer, {}, "Errors of the wheel odometer.");
   VCHARGE_OPTION_GROUP(LensOptions, lens, {}, "Blur of the lenses.");
   VCHARGE_OPTION_GROUP(FaultOptions, faults, {}, "Faults of sensors, wheels and suspension.");
   VCHARGE_END_OPTIONS();
 
+  /// `faults` with automatic exposure of all cameras in any condition but noon.
+  FaultOptions activeFaults() const {
+    FaultOptions active = faults;
+    if (!condition.isNoon() && !active.auto_exposure.isActive()) {
+      active.auto_exposure.cameras = {"all"};
+      active.auto_exposure.normal_time_s = 1e-4;  // of a lens fast enough for the night
+    }
+    return active;
+  }
   uint64_t sensorSeed() const { return static_cast<uint64_t>(sensor_seed < 0 ? seed : sensor_seed); }
 };
 

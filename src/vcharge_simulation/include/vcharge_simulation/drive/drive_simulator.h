@@ -17,8 +17,10 @@ struct SimulatedDrive {
   /// True poses in the world frame, and velocities, at every odometry and image stamp.
   std::vector<VehicleOdometry> ground_truth;
   std::vector<Received<VehicleOdometry>> odometry;  ///< in order of reception, see causalOdometry()
-  std::vector<Received<WheelTicks>> wheel_ticks;    ///< at 50 Hz, in order of reception
-  std::vector<MotionWindow> image_motion;           ///< for each image, over its exposure and readout
+  /// At 50 Hz, in order of reception; one of them is empty, see WheelOdometerOptions::sensor.
+  std::vector<Received<WheelTicks>> wheel_ticks;
+  std::vector<Received<WheelSpeeds>> wheel_speeds;
+  std::vector<MotionWindow> image_motion;  ///< for each image, over its exposure and readout
 };
 
 /// Simulates a drive along a path on ground of this height. Images come every 80 ms, 7 ms after an odometry

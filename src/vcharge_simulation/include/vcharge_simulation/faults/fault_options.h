@@ -160,6 +160,8 @@ struct AutoExposureFault : CameraFault {
   VCHARGE_OPTION(double, target_gray, 85.0, between(1.0, 250.0), "Mean gray value of the image.");
   VCHARGE_OPTION(double, time_constant_s, 0.5, between(0.0, 100.0),
                  "Time in which a deviation of the exposure falls to 1/e.");
+  VCHARGE_OPTION(double, normal_time_s, 1e-3, between(5e-5, 0.02),
+                 "Exposure time of the normal exposure; shorter for a more sensitive camera.");
   VCHARGE_END_OPTIONS();
 };
 

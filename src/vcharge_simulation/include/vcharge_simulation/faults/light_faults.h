@@ -22,8 +22,9 @@ class LightFaults {
   LightFaults(const FaultOptions& faults, const RecordedCameras& cameras, const CameraResponse& response,
               Timestamp start, IsVisible is_visible = nullptr);
 
-  /// Light on the sensor (CV_32FC1) of a noise-free image at the normal exposure (CV_8UC1), whose highlights
-  /// are those of the normal exposure; without a fault the image itself. `stamp` is the true stamp.
+  /// Light on the sensor (CV_32FC1). `clean` is such light, or a noise-free image at the normal exposure
+  /// (CV_8UC1), whose highlights are those of the normal exposure; without a fault `clean` itself. `stamp` is
+  /// the true stamp.
   cv::Mat apply(size_t camera, Timestamp stamp, const cv::Mat& clean, const Readout& readout) const;
 
  private:
@@ -35,8 +36,6 @@ class LightFaults {
     cv::Mat dirt_transmission, dirt_blur, dirt_light;
   };
 
-  bool isVisible(const CameraView& view, const Eigen::Vector2d& pixel, const Eigen::Vector3d& camera_m,
-                 const Eigen::Vector3d& lamp_m) const;
   void addLamps(const CameraView& view, const Readout& readout, cv::Mat* light) const;
 
   FaultOptions faults_;

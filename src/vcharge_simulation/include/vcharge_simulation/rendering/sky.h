@@ -8,6 +8,9 @@
 
 namespace vcharge {
 
+/// Illuminance of a surface perpendicular to the sun at noon, to which light outdoors is relative.
+inline constexpr double kSunIlluminance_lx = 1e5;
+
 /// Sun, sky and ground light, relative to the sun's irradiance on a surface perpendicular to it.
 struct LightOptions {
   double sun_azimuth_rad = 2.2;
@@ -16,6 +19,8 @@ struct LightOptions {
   double sky_irradiance = 0.42;     ///< irradiance from the whole sky on level ground
   double bounce_irradiance = 0.12;  ///< irradiance from the ground on a surface that faces down
   double cloud_cover = 0.45;        ///< 0 clear, 1 overcast
+  double skyline_light = 0.10;      ///< radiance of distant trees and houses in reflections
+  double sun_glow = 1.0;            ///< brightness of the sky around the sun, relative to a clear sky's
 };
 
 /// Sky with a vertical gradient, a cloud layer in perspective, and a glow around the sun.

@@ -33,6 +33,7 @@ struct Material {
   float texels_per_m = 100.0F;  ///< texture resolution on the surface, for the level of detail
   float reflectivity = 0.0F;    ///< at normal incidence; 0.04 for paint and glass
   float emission = 0.0F;        ///< light emitted by the surface itself
+  float wetness = 0.0F;         ///< water on the ground, from 0 to 1
   float translucency = 0.0F;    ///< fraction of the light on the back that leaves through the front
   bool two_sided = false;       ///< the normal is turned towards the viewer
   SurfaceKind kind = SurfaceKind::kOther;
@@ -46,10 +47,30 @@ struct GroundLayers {
   float detail_contrast = 0.75F;               ///< factor on the relief of the details
   std::unique_ptr<GroundTexture> sun;          ///< fraction of the sun that reaches the ground; null: all
   std::unique_ptr<GroundTexture> surrounding;  ///< fraction of the sky visible from the ground; null: all
+  std::unique_ptr<GroundTexture>
+      lamps;  ///< root of the irradiance from Scene::lamps over max_lamp_irradiance
+  float max_lamp_irradiance = 0.0F;
 };
 
 /// Reflectance of a ground layer at texel value 255.
 inline constexpr float kGroundLayerAlbedo = 0.8F;
+
+/// A lamp that shines down and, weakly, up: a tube, or a point if half_length is zero.
+struct Lamp {
+  Eigen::Vector3f centre;
+  Eigen::Vector3f half_length = Eigen::Vector3f::Zero();  ///< from the centre to one end
+  float intensity = 1.0F;                                 ///< irradiance 1 m below the lamp
+  float reach_m = 10.0F;  ///< the light fades to zero at this distance, so that distant lamps need no rays
+};
+
+/// Irradiance of a surface with this normal by a point of the lamp at `to_lamp` from it, if nothing is
+/// between.
+float lampIrradiance(const Lamp& lamp, const Eigen::Vector3f& to_lamp, const Eigen::Vector3f& normal);
+
+/// Lamps of the car that carries the cameras: irradiance at 1 m in the brightest direction; 0: off.
+struct VehicleLamps {
+  float headlight = 0.0F, taillight = 0.0F;  ///< each of two
+};
 
 /// Ceiling of a closed scene as reflected by polished floors and car paint.
 struct Ceiling {
@@ -90,7 +111,9 @@ struct Scene {
   GroundLayers ground;
   std::unique_ptr<Sky> sky;
   std::unique_ptr<Ceiling> ceiling;  ///< null: reflections show the sky
-  std::vector<Obstacle> obstacles;   ///< static obstacles
+  std::vector<Lamp> lamps;           ///< lamps whose light on objects is computed when rendering
+  VehicleLamps vehicle_lamps;
+  std::vector<Obstacle> obstacles;  ///< static obstacles
   std::vector<Mover> movers;
   GroundHeight ground_height;  ///< height of the drivable ground
   /// Height above the ground from which objects are overhead: truth maps ignore them.

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "vcharge_simulation/scenes/conditions.h"
 #include "vcharge_simulation/scenes/mover_options.h"
 #include "vcharge_simulation/scenes/scene.h"
 #include "vcharge_simulation/vehicle/drive_path.h"
@@ -12,14 +13,27 @@
 
 namespace vcharge {
 
+/// Days differ in light and in some of the parked cars.
+struct Day {
+  static constexpr double kExchangedCars = 0.3;
+  int number = 0;
+  double exchanged_cars = -1.0;  ///< fraction of the bays; negative: kExchangedCars, none on day 0
+
+  Day(int day = 0, double exchanged = -1.0) : number(day), exchanged_cars(exchanged) {}  // NOLINT: implicit
+  double exchangedCars() const {
+    return exchanged_cars >= 0.0 ? exchanged_cars : (number != 0 ? kExchangedCars : 0.0);
+  }
+};
+
 /// How a scene is built.
 struct SceneOptions {
-  uint64_t seed = 1;          ///< selects everything that does not change between days
-  int day = 0;                ///< days differ in light and in some of the parked cars
+  uint64_t seed = 1;  ///< selects everything that does not change between days
+  Day day;
+  ConditionOptions condition;
   uint64_t layout_seed = 0;   ///< plan of lot or garage; 0: the known one
   uint64_t surface_seed = 0;  ///< contrast of surfaces; 0: the known one
   double image_scale = 1.0;   ///< size of the rendered images relative to 1280x800: coarser textures for less
-  double detail = 1.0;  ///< number of leaves and resolution of light maps; lower values are built faster
+  double detail = 1.0;        ///< number of leaves and resolution of light maps; lower values are built faster
   /// For the scene "chessboard": the board ("chessboard" or "aprilgrid") and the rig that it is shown to.
   std::string board = "chessboard";
   std::string rig = "golf";

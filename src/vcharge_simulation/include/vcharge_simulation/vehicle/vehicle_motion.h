@@ -15,6 +15,7 @@ struct VehicleMotionOptions {
   double standstill_s = 0.0;  ///< time at rest at the start; 0: the drive starts at cruise speed
   bool stop_at_end = false;
   double duration_s = 60.0;     ///< upper limit of the duration
+  double start_height_m = 0.0;  ///< selects the level of the ground where there are several
   double track_width_m = 1.52;  ///< distance between the rear wheels
   double wheelbase_m = 2.58;
   double pitch_rad_per_m_per_s2 = 0.0045;  ///< nose up when accelerating

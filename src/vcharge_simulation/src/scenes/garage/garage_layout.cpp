@@ -81,12 +81,12 @@ void addLamps(uint64_t seed, int day, GarageLayout* layout) {
 
 }  // namespace
 
-GarageLayout makeGarageLayout(uint64_t seed, int day, uint64_t layout_seed) {
+GarageLayout makeGarageLayout(uint64_t seed, const Day& day, uint64_t layout_seed) {
   GarageLayout layout;
   layout.plan = GaragePlan::fromSeed(layout_seed);
   addBays(&layout);
   addPillars(&layout);
-  addLamps(seed, day, &layout);
+  addLamps(seed, day.number, &layout);
   layout.cars = parkCars(layout.bays, kOccupiedBays, seed + 90U, day);
   return layout;
 }

@@ -29,6 +29,6 @@ struct GarageLayout {
   std::vector<Lamp> lamps;
 };
 
-GarageLayout makeGarageLayout(uint64_t seed, int day, uint64_t layout_seed = 0);
+GarageLayout makeGarageLayout(uint64_t seed, const Day& day, uint64_t layout_seed = 0);
 
 }  // namespace vcharge

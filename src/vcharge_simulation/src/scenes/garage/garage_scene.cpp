@@ -21,6 +21,7 @@ constexpr double kCeilingTexel_m = 0.1;
 constexpr double kCeilingAlbedo = 0.6;
 // Irradiance at baked light 1; the camera's exposure is set for the garage.
 constexpr double kFullIrradiance = 4.5;
+constexpr double kFullIlluminance_lx = 1500.0;  // the same in reality
 constexpr double kTypicalCeilingLight = 0.12;
 constexpr float kFloorReflectivity = 0.03F;
 // Panels are split into cells of this size, because lamp light is baked at their corners.
@@ -38,13 +39,23 @@ Eigen::Vector3f vector(double x, double y, double z) {
   return Eigen::Vector3d(x, y, z).cast<float>();
 }
 
+// After hours every other lamp is off.
+GarageLayout litLayout(const Conditions& conditions, const SceneOptions& options) {
+  GarageLayout layout = makeGarageLayout(options.seed, options.day, options.layout_seed);
+  for (size_t i = 0; i < layout.lamps.size() && conditions.is_dark; i += 2) {
+    layout.lamps[i].intensity = 0.0F;
+  }
+  return layout;
+}
+
 // Builds one garage; each step adds to the scene.
 class GarageBuilder {
  public:
   explicit GarageBuilder(const SceneOptions& options)
       : options_(options),
         seed_(options.seed),
-        layout_(makeGarageLayout(seed_, options.day, options.layout_seed)),
+        conditions_(conditionsOf(options.condition)),
+        layout_(litLayout(conditions_, options)),
         plan_(layout_.plan),
         parts_(seed_ * 53U + 7U, 1.0, SurfaceVariety::fromSeed(options.surface_seed)) {}
 
@@ -66,6 +77,7 @@ class GarageBuilder {
     light.gathered_rays = static_cast<int>(std::lround(24 * options_.detail));
     bakeLampLight(layout_.lamps, light, scene().min_m, scene().max_m, &scene());
     addCeilingReflection();
+    scene().vehicle_lamps = vehicleLampsOf(conditions_, kFullIlluminance_lx / kFullIrradiance);
     addMovers(options_, {plan_.area, plan_.lanes, layout_.bays}, &parts_);
     return parts_.sharedScene();
   }
@@ -80,6 +92,7 @@ class GarageBuilder {
     floor.mapping = Material::Mapping::kGround;
     floor.texture = 0;
     floor.reflectivity = kFloorReflectivity;
+    floor.wetness = static_cast<float>(conditions_.wetness);
     const uint32_t material = scene().addMaterial(floor);
     cv::Mat painted_floor = drawGarageFloor(layout_, texel_m, seed_);
     parts_.surfaces().fade(1.0 / texel_m, &painted_floor);
@@ -295,6 +308,7 @@ class GarageBuilder {
 
   const SceneOptions options_;
   const uint64_t seed_;
+  const Conditions conditions_;
   const GarageLayout layout_;
   const GaragePlan& plan_;
   SceneParts parts_;

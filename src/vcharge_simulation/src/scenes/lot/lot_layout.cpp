@@ -157,7 +157,7 @@ double LotLayout::groundHeight(double x, double y) const {
   return 0.0;
 }
 
-LotLayout makeLotLayout(uint64_t seed, int day, uint64_t layout_seed) {
+LotLayout makeLotLayout(uint64_t seed, const Day& day, uint64_t layout_seed) {
   if (layout_seed != 0) {
     LotLayout layout = makeDrawnLot(LotPlan::fromSeed(layout_seed), layout_seed, seed);
     addWoods(seed, &layout);

@@ -45,6 +45,6 @@ struct LotLayout {
 inline constexpr double kFreeBayX_m = -9.1;
 inline constexpr double kFreeBayY_m = -9.95;
 
-LotLayout makeLotLayout(uint64_t seed, int day, uint64_t layout_seed = 0);
+LotLayout makeLotLayout(uint64_t seed, const Day& day, uint64_t layout_seed = 0);
 
 }  // namespace vcharge

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "rendering/lamp_light.h"
 #include "rendering/light_baker.h"
 #include "scenes/lot/lot_ground.h"
 #include "scenes/lot/lot_layout.h"
@@ -40,12 +41,13 @@ class LotBuilder {
       : options_(options),
         variant_(variant),
         layout_(variant.layout),
+        conditions_(conditionsOf(options.condition, lightOfDay(options.day.number))),
         parts_(options.seed * 77U + 1U, options.detail, SurfaceVariety::fromSeed(options.surface_seed)) {}
 
   std::shared_ptr<const Scene> build() {
     scene().sky = std::make_unique<Sky>(
-        lightOfDay(options_.day),
-        static_cast<uint32_t>(options_.seed * 13U + static_cast<uint64_t>(options_.day)));
+        conditions_.light,
+        static_cast<uint32_t>(options_.seed * 13U + static_cast<uint64_t>(options_.day.number)));
     addGround();
     parts_.addCars(layout_.cars);
     parts_.addTrees(layout_.trees, options_.seed);
@@ -56,23 +58,24 @@ class LotBuilder {
     }
     addGardenWalls();
     parts_.addHouses(layout_.buildings);
-    parts_.addPoles(layout_.poles);
+    parts_.addPoles(layout_.poles, conditions_.pole_lamp_cd);
     parts_.addBins(layout_.bins);
     for (const Fence& fence : layout_.fences) {
       parts_.addFence(fence);
     }
     parts_.addSkyline();
+    scene().ground_height = variant_.ground_height;
     if (variant_.add_things) {
       variant_.add_things(&parts_);
     }
-    scene().ground_height = variant_.ground_height;
     bakeWallLight(parts_.walls(), kWallLightTexel_m, &scene());
-    bakeGroundLight(
-        {-44.0, -34.0}, {44.0, 34.0}, kLightTexel_m / options_.detail,
-        [&](double x, double y) {
-          return layout_.groundHeight(x, y) + (variant_.ground_height ? variant_.ground_height(x, y) : 0.0);
-        },
-        &scene());
+    const auto ground_height = [&](double x, double y) {
+      return layout_.groundHeight(x, y) + (variant_.ground_height ? variant_.ground_height(x, y) : 0.0);
+    };
+    const Eigen::Vector2d corner_m(44.0, 34.0);
+    bakeGroundLight(-corner_m, corner_m, kLightTexel_m / options_.detail, ground_height, &scene());
+    bakeGroundLamps(-corner_m, corner_m, kLightTexel_m / options_.detail, ground_height, &scene());
+    scene().vehicle_lamps = vehicleLampsOf(conditions_, kSunIlluminance_lx);
     addMovers(options_, {kLotArea, layout_.lanes, baysToLeave()}, &parts_);
     return parts_.sharedScene();
   }
@@ -113,7 +116,10 @@ class LotBuilder {
     ground.kind = SurfaceKind::kGround;
     ground.mapping = Material::Mapping::kGround;
     ground.texture = 0;
-    const uint32_t near_ground = scene().addMaterial(ground);
+    const uint32_t island_ground = scene().addMaterial(ground);
+    ground.wetness = static_cast<float>(conditions_.wetness);
+    const uint32_t near_ground = conditions_.wetness > 0.0 ? scene().addMaterial(ground) : island_ground;
+    ground.wetness = 0.0F;
     ground.texture = 1;
     const uint32_t far_ground = scene().addMaterial(ground);
     cv::Mat lot_ground = drawLotGround(layout_, texel_m, options_.seed);
@@ -143,13 +149,14 @@ class LotBuilder {
     parts_.addLevel({-far, kLotArea.min_y, kLotArea.min_x, kLotArea.max_y}, 0.0, far_ground);
     parts_.addLevel({kLotArea.max_x, kLotArea.min_y, far, kLotArea.max_y}, 0.0, far_ground);
     for (const GroundRectangle& island : layout_.islands) {
-      parts_.addIsland(island, near_ground, levelOf(island), layout_.kerb);
+      parts_.addIsland(island, island_ground, levelOf(island), layout_.kerb);
     }
   }
 
   const SceneOptions options_;
   const LotVariant& variant_;
   const LotLayout& layout_;
+  const Conditions conditions_;
   SceneParts parts_;
 };
 

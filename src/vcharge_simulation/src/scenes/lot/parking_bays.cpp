@@ -10,7 +10,6 @@ namespace vcharge {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kMovedCars = 0.3;  // fraction of the bays that another day redraws
 
 ParkedCar parkedCar(const ParkingBay& bay, Random* random) {
   ParkedCar car{};
@@ -34,15 +33,15 @@ ParkedCar parkedCar(const ParkingBay& bay, Random* random) {
 }  // namespace
 
 std::vector<ParkedCar> parkCars(const std::vector<ParkingBay>& bays, double occupied_fraction, uint64_t seed,
-                                int day) {
+                                const Day& day) {
   std::vector<ParkedCar> cars;
   for (const ParkingBay& bay : bays) {
     const uint64_t bay_seed = seed * 1000003U + static_cast<uint64_t>(bay.number);
     Random random(bay_seed);
     bool occupied = random.chance(occupied_fraction);
-    if (day != 0) {
-      Random other_day(bay_seed * 31U + static_cast<uint64_t>(day));
-      if (other_day.chance(kMovedCars)) {
+    if (day.exchangedCars() > 0.0) {
+      Random other_day(bay_seed * 31U + static_cast<uint64_t>(day.number));
+      if (other_day.chance(day.exchangedCars())) {
         occupied = other_day.chance(occupied_fraction);
         random = other_day;
       }

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "scenes/scene_things.h"
+#include "vcharge_simulation/scenes/scene_catalogue.h"
 
 namespace vcharge {
 
@@ -17,9 +18,10 @@ struct ParkingBay {
   bool is_oblique = false;  ///< angled or parallel to the lane
 };
 
-/// Parks cars on level ground at z = 0. Each bay has its own random generator, so that a day other than 0
-/// redraws only some of the bays and keeps the others.
+/// Parks cars on level ground at z = 0. Each bay has its own random generator, so that a day redraws only a
+/// fraction of the bays and keeps the others. A redrawn bay is empty or holds another car in another pose. A
+/// larger fraction redraws more bays besides those of a smaller one.
 std::vector<ParkedCar> parkCars(const std::vector<ParkingBay>& bays, double occupied_fraction, uint64_t seed,
-                                int day);
+                                const Day& day);
 
 }  // namespace vcharge

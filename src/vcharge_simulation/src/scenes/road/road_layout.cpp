@@ -70,14 +70,14 @@ float grass(float x, float y, uint32_t seed) {
 
 }  // namespace
 
-RoadLayout makeRoadLayout(uint64_t seed, int day) {
+RoadLayout makeRoadLayout(uint64_t seed, const Day& day) {
   RoadLayout layout;
   const double south = -kRoadHalfWidth_m - kParkingDepth_m;
   const double from_x = kRoadArea.min_x + 4.0;
   layout.pavements = {{from_x, kRoadHalfWidth_m, kRoadLevelEnd_m, kRoadHalfWidth_m + kPavementWidth_m},
                       {from_x, south - kPavementWidth_m, kRoadLevelEnd_m, south}};
   Random random(seed * 91U + 3U);
-  Random cars(seed * 91U + 4U + 1000U * static_cast<uint64_t>(day));
+  Random cars(seed * 91U + 4U + 1000U * static_cast<uint64_t>(day.number));
   for (double x = from_x + 6.0; x < kRoadLevelEnd_m - 6.0; x += 6.2) {
     if (!cars.chance(0.6)) {
       continue;

@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "scenes/scene_things.h"
+#include "vcharge_simulation/scenes/scene_catalogue.h"
 
 namespace vcharge {
 
@@ -29,7 +30,7 @@ struct RoadLayout {
   std::vector<Pole> poles;
   std::vector<Hedge> hedges;
 };
-RoadLayout makeRoadLayout(uint64_t seed, int day);
+RoadLayout makeRoadLayout(uint64_t seed, const Day& day);
 
 /// Height of the road, which depends only on x.
 double roadHeight(double x_m);

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rendering/lamp_light.h"
 #include "scenes/lane_paths.h"
 #include "scenes/lot/lot_ground.h"
 #include "scenes/movers/scene_movers.h"
@@ -55,14 +56,16 @@ void addSurface(uint32_t ground, SceneParts* parts) {
           parts->concrete(), mesh);
 }
 
-void addGround(const SceneOptions& options, const RoadLayout& layout, SceneParts* parts) {
+void addGround(const SceneOptions& options, const RoadLayout& layout, double wetness, SceneParts* parts) {
   Scene& scene = parts->scene();
   const double texel_m = std::min(kMaxGroundTexel_m, kGroundTexel_m / options.image_scale);
   Material ground;
   ground.kind = SurfaceKind::kGround;
   ground.mapping = Material::Mapping::kGround;
   ground.texture = 0;
+  ground.wetness = static_cast<float>(wetness);
   const uint32_t near_ground = scene.addMaterial(ground);
+  ground.wetness = 0.0F;
   ground.texture = 1;
   const uint32_t far_ground = scene.addMaterial(ground);
   scene.ground.layers.push_back(groundTexture(drawRoadGround(texel_m, options.seed), kRoadArea.min_x,
@@ -97,26 +100,27 @@ std::shared_ptr<const Scene> buildRoadScene(const SceneOptions& options) {
   const RoadLayout layout = makeRoadLayout(options.seed, options.day);
   SceneParts parts(options.seed * 83U + 5U, options.detail);
   Scene& scene = parts.scene();
-  scene.sky = std::make_unique<Sky>(LightOptions(), static_cast<uint32_t>(options.seed * 17U));
+  const Conditions conditions = conditionsOf(options.condition);
+  scene.sky = std::make_unique<Sky>(conditions.light, static_cast<uint32_t>(options.seed * 17U));
   scene.min_m = {kRoadArea.min_x, kRoadArea.min_y};
   scene.max_m = {kRoadArea.max_x, kRoadArea.max_y};
-  addGround(options, layout, &parts);
+  addGround(options, layout, conditions.wetness, &parts);
   parts.addCars(layout.cars);
   parts.addTrees(layout.trees, options.seed);
   parts.addHedges(layout.hedges);
   parts.addHouses(layout.houses);
-  parts.addPoles(layout.poles);
+  parts.addPoles(layout.poles, conditions.pole_lamp_cd);
   scene.ground_height = [](double x, double) { return roadHeight(x); };
   bakeWallLight(parts.walls(), kWallLightTexel_m, &scene);
-  bakeGroundLight(
-      scene.min_m, scene.max_m, kLightTexel_m / options.detail,
-      [&](double x, double y) {
-        const bool is_raised =
-            std::any_of(layout.pavements.begin(), layout.pavements.end(),
-                        [&](const GroundRectangle& pavement) { return pavement.contains(x, y); });
-        return roadHeight(x) + (is_raised ? kKerbHeight_m : 0.0);
-      },
-      &scene);
+  const auto ground_height = [&](double x, double y) {
+    const bool is_raised =
+        std::any_of(layout.pavements.begin(), layout.pavements.end(),
+                    [&](const GroundRectangle& pavement) { return pavement.contains(x, y); });
+    return roadHeight(x) + (is_raised ? kKerbHeight_m : 0.0);
+  };
+  bakeGroundLight(scene.min_m, scene.max_m, kLightTexel_m / options.detail, ground_height, &scene);
+  bakeGroundLamps(scene.min_m, scene.max_m, kLightTexel_m / options.detail, ground_height, &scene);
+  scene.vehicle_lamps = vehicleLampsOf(conditions, kSunIlluminance_lx);
   addMovers(options,
             {{kRoadArea.min_x + 2.0, kRoadArea.min_y, kRoadLevelEnd_m, kRoadArea.max_y}, Lanes(), {}, true},
             &parts);

@@ -1,0 +1,105 @@
+"""Simulated drives that several stages share, and what is made from them once: the masks of the car's own body, and maps."""
+import hashlib
+
+import cv2
+import numpy as np
+import yaml
+
+from vcharge_evaluation.tools import CONFIG, run_tool_once, simulate
+
+SCENARIOS = CONFIG / "scenarios"
+# A car's masks come once from the loop of the scene with this seed; elsewhere those of the same car from the lot serve.
+MASK_SEEDS = {"lot": 201, "garage": 211}
+# The loop of a scene at noon, from which come its masks, its height map and the map for other days.
+LOOP_S, LOOP_STEP, HEIGHT_CELL_M = 24, 2, 0.025
+MASK_SCALE = 0.4  # image size, over 1280x800, of the drives in which masks are found
+# Another day's drive as in the chain (chain/steps.py): other light, moved cars, other errors of the wheels.
+OTHER_DAY = ("--drive", "other_day", "--exposure-gain", 1.2, "--set", "odometer.scale_error=-0.0005", "--set",
+             "odometer.left_right_error=0.0003")
+
+
+class Drive:
+    """A simulated drive with its folder WORK/drives/NAME_HASH, where the hash is that of the words that make the drive."""
+
+    def __init__(self, work, name, *words):
+        words = [f"{word:g}" if isinstance(word, float) else str(word) for word in words]
+        key = hashlib.sha1(" ".join(words).encode()).hexdigest()[:8]
+        self.folder = work / "drives" / f"{name}_{key}"
+        simulate(self.folder, words)
+        self.bag, self.truth = self.folder / "drive.bag", self.folder / "drive_truth"
+        self.trajectory, self.true_rig = self.truth / "trajectory.tum", self.folder / "rig_truth.yaml"
+
+    def map(self, rig):
+        """Sparse map and trajectory of build_map with a rig file, and its run, which may have failed."""
+        run = run_tool_once("build_map", self.folder / "map.log", "--bag", self.bag, "--rig", rig, "--output",
+                            self.folder / "map.vmap", "--trajectory", self.folder / "map.tum", "--options",
+                            CONFIG / "mapping.yaml", may_fail=True)
+        return self.folder / "map.vmap", self.folder / "map.tum", run
+
+
+def loop_drive(work, scene, seed, scale, duration_s=LOOP_S, words=()):
+    """The loop of a scene at noon. `words` choose another car."""
+    return Drive(work, f"{scene}_loop", "--scene", scene, "--drive", "loop", "--scene-seed", seed, "--seed", seed,
+                 "--image-scale", scale, "--image-step", LOOP_STEP, "--duration-s", duration_s, "--height-cell-m",
+                 HEIGHT_CELL_M, *words)
+
+
+def other_day_drive(work, scene, seed, scale, duration_s, words=()):
+    """A drive in a scene on another day, with true ranges. `words` choose another car."""
+    # The same words as those of evaluate.sh obstacles, so that the stages share the drive.
+    return Drive(work, f"{scene}_other_day", "--scene", scene, *OTHER_DAY, "--scene-seed", seed, "--seed", seed + 400,
+                 "--image-scale", scale, "--duration-s", duration_s, "--truth-range", *words)
+
+
+class FoundMasks:
+    """Masks of the own body that make_masks finds in a drive: its verdict, and its rig file or None."""
+
+    def __init__(self, drive):
+        truth = yaml.safe_load(drive.true_rig.read_text())
+        cameras = {name: {key: value for key, value in camera.items() if key not in ("mask", "vehicle_from_camera")}
+                   for name, camera in truth["cameras"].items()}
+        source = drive.folder / "cameras.yaml"
+        source.write_text(yaml.safe_dump({**truth, "cameras": cameras}, sort_keys=False))
+        output = drive.folder / "masked" / "cameras.yaml"
+        self.run = run_tool_once("make_masks", drive.folder / "make_masks.log", "--bag", drive.bag, "--rig", source,
+                                 "--output", output, may_fail=True)
+        self.verdict = self.run.found.get("verdict") or self.run.reason()
+        self.rig = None if self.run.error() or self.verdict == "FAIL" or not output.exists() else output
+
+    def text(self):
+        """What a row of the results says about masks."""
+        return f"make_masks: {self.verdict}" + ("" if self.rig else "; without masks")
+
+    def rig_of(self, folder):
+        """Rig file of a drive in a folder: the true calibration, with the found masks in place of the true ones, which only
+        judge."""
+        return write_masked_rig(folder / "rig_truth.yaml", self.rig, folder / "rig_found_masks.yaml")
+
+
+def write_masked_rig(true_rig, masked_rig, path):
+    """Writes the true rig with the masks of another rig file of the same cameras; None: without masks. Returns `path`."""
+    rig = yaml.safe_load(true_rig.read_text())
+    found = yaml.safe_load(masked_rig.read_text())["cameras"] if masked_rig else {}
+    for name, camera in rig["cameras"].items():
+        camera.pop("mask", None)
+        mask = found.get(name, {}).get("mask")
+        if mask:
+            camera["mask"] = f"found_mask_{name}.png"
+            save_resized(masked_rig.parent / mask, path.parent / camera["mask"], camera["image_size_px"])
+    path.write_text(yaml.safe_dump(rig, sort_keys=False))
+    return path
+
+
+def save_resized(mask, path, size_px):
+    """Writes a mask in another image size; a pixel that lies on a hidden one to any part is hidden."""
+    pixels = cv2.imread(str(mask), cv2.IMREAD_GRAYSCALE)
+    if pixels.shape[::-1] != tuple(size_px):
+        whole = cv2.resize(pixels, tuple(size_px), interpolation=cv2.INTER_AREA)
+        pixels = np.where(whole == 255, 255, 0).astype(np.uint8)
+    cv2.imwrite(str(path), pixels)
+
+
+def found_masks(work, scene, words=()):
+    """Masks of a car, found in a loop of the scene (or of the lot). `words` choose another car."""
+    scene = scene if scene in MASK_SEEDS else "lot"
+    return FoundMasks(loop_drive(work, scene, MASK_SEEDS[scene], MASK_SCALE, words=words))
