@@ -5,9 +5,12 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 #include <opencv2/imgproc.hpp>
 
+#include "scenes/scene_things.h"
 #include "vcharge_simulation/drive/drive_simulator.h"
+#include "vcharge_simulation/objects/car_model.h"
 #include "vcharge_simulation/scenes/scene_catalogue.h"
 
 namespace vcharge {
@@ -16,6 +19,21 @@ namespace {
 
 constexpr double kImageScale = 0.3;
 constexpr double kImagePeriod_s = 0.08;
+
+struct Outline {
+  cv::Mat_<cv::Point2f> corners;
+  Eigen::AlignedBox2d box;
+};
+
+Outline outlineOf(const std::vector<Eigen::Vector2d>& footprint_m) {
+  Outline outline{cv::Mat_<cv::Point2f>(static_cast<int>(footprint_m.size()), 1), Eigen::AlignedBox2d()};
+  for (size_t i = 0; i < footprint_m.size(); ++i) {
+    const Eigen::Vector2f corner = footprint_m[i].cast<float>();
+    outline.corners(static_cast<int>(i)) = {corner.x(), corner.y()};
+    outline.box.extend(footprint_m[i]);
+  }
+  return outline;
+}
 
 }  // namespace
 
@@ -109,6 +127,37 @@ StandingCells findStandingCells(const Scene& scene, const TruthHeightMap& map, i
 
 double groundAt(const Scene& scene, const Eigen::Vector2d& position_m) {
   return scene.ground_height ? scene.ground_height(position_m.x(), position_m.y()) : 0.0;
+}
+
+std::set<std::string> touchedOn(const DrivePlan& plan, const std::vector<Obstacle>& obstacles) {
+  constexpr double kMirror_m = 0.1;
+  constexpr double kRollsOver_m = 0.02;
+  const CarShape& golf = carShapes().front();
+  std::vector<Outline> outlines;
+  for (const Obstacle& obstacle : obstacles) {
+    outlines.push_back(outlineOf(obstacle.footprint_m));
+  }
+  std::set<std::string> touched;
+  const VehicleMotion motion(plan.path, plan.motion, 1, plan.ground_height);
+  for (int ms = 0; ms < static_cast<int>(motion.duration() * 1000.0); ms += 250) {
+    const RigidTransform pose = motion.at(ms).world_from_planar;
+    const double height_m = motion.at(ms).worldFromVehicle().translation().z();
+    const Outline own = outlineOf(orientedRectangle(pose.translation().x(), pose.translation().y(),
+                                                    yawOfRotation(pose.rotation()), golf.rear(), golf.front(),
+                                                    0.5 * golf.width + kMirror_m));
+    for (size_t i = 0; i < outlines.size(); ++i) {
+      const bool is_level =
+          obstacles[i].base_z_m < height_m + golf.height && obstacles[i].top_z_m > height_m + kRollsOver_m;
+      cv::Mat overlap;
+      if (is_level && outlines[i].box.intersects(own.box) &&
+          cv::intersectConvexConvex(outlines[i].corners, own.corners, overlap) > 0.0F) {
+        const cv::Point2f corner = outlines[i].corners(0);
+        touched.insert(obstacles[i].kind + " at " + std::to_string(corner.x) + ", " +
+                       std::to_string(corner.y));
+      }
+    }
+  }
+  return touched;
 }
 
 Eigen::Vector2d middleOf(const Obstacle& obstacle) {

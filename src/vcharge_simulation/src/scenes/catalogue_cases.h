@@ -1,11 +1,13 @@
 #pragma once
 
 #include <memory>
+#include <set>
 #include <string>
 
 #include "vcharge_core/motion/rigid_transform.h"
 #include "vcharge_simulation/drive/truth_maps.h"
 #include "vcharge_simulation/rendering/renderer.h"
+#include "vcharge_simulation/scenes/scene_catalogue.h"
 
 namespace vcharge {
 
@@ -42,6 +44,8 @@ struct StandingCells {
 };
 StandingCells findStandingCells(const Scene& scene, const TruthHeightMap& map, int border_cells = 0);
 double groundAt(const Scene& scene, const Eigen::Vector2d& position_m);
+/// Obstacles that the own car would touch on a drive.
+std::set<std::string> touchedOn(const DrivePlan& plan, const std::vector<Obstacle>& obstacles);
 /// Mean of the corners of a footprint.
 Eigen::Vector2d middleOf(const Obstacle& obstacle);
 

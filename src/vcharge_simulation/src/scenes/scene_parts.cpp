@@ -18,30 +18,6 @@ constexpr std::array<double, kNumPaints> kPaints = {0.025, 0.07, 0.18, 0.4, 0.72
 
 }  // namespace
 
-std::vector<Eigen::Vector2d> orientedRectangle(double x, double y, double yaw_rad, double min_along,
-                                               double max_along, double half_width) {
-  const Eigen::Vector2d along(std::cos(yaw_rad), std::sin(yaw_rad));
-  const Eigen::Vector2d across(-along.y(), along.x());
-  const Eigen::Vector2d origin(x, y);
-  return {origin + min_along * along - half_width * across, origin + max_along * along - half_width * across,
-          origin + max_along * along + half_width * across, origin + min_along * along + half_width * across};
-}
-
-std::vector<Eigen::Vector2d> circleAround(double x, double y, double radius) {
-  std::vector<Eigen::Vector2d> points;
-  constexpr int kCorners = 10;
-  for (int i = 0; i < kCorners; ++i) {
-    const double angle = 2.0 * kPi * i / kCorners;
-    points.emplace_back(x + radius * std::cos(angle), y + radius * std::sin(angle));
-  }
-  return points;
-}
-
-std::vector<Eigen::Vector2d> cornersOf(const GroundRectangle& area) {
-  return {
-      {area.min_x, area.min_y}, {area.max_x, area.min_y}, {area.max_x, area.max_y}, {area.min_x, area.max_y}};
-}
-
 SceneParts::SceneParts(uint64_t random_seed, double foliage_density, const SurfaceVariety& surfaces)
     : foliage_density_(foliage_density),
       surfaces_(surfaces),
@@ -145,7 +121,7 @@ void SceneParts::addIsland(const GroundRectangle& area, uint32_t ground, double 
       }
     }
   }
-  scene_->obstacles.push_back({"kerb", cornersOf(area), base_z_m, base_z_m + kerb.height_m});
+  scene_->obstacles.push_back(obstacleOf(area, kerb, base_z_m));
 }
 
 const CarMaterials& SceneParts::carMaterials(int shape_index, int paint_index) {
@@ -198,14 +174,11 @@ TriangleMesh SceneParts::carMesh(int shape, int paint, uint32_t seed) {
 
 void SceneParts::addCars(const std::vector<ParkedCar>& cars) {
   for (const ParkedCar& car : cars) {
-    const CarShape& shape = carShapes()[static_cast<size_t>(car.shape)];
     scene_->mesh.append(carMesh(car.shape, car.paint, car.seed),
                         placement(car.x, car.y, car.z, car.yaw_rad) *
                             Eigen::AngleAxisf(static_cast<float>(car.pitch_rad), Eigen::Vector3f::UnitY()) *
                             Eigen::AngleAxisf(static_cast<float>(car.roll_rad), Eigen::Vector3f::UnitX()));
-    scene_->obstacles.push_back(
-        {"car", orientedRectangle(car.x, car.y, car.yaw_rad, shape.rear(), shape.front(), 0.5 * shape.width),
-         car.z, car.z + shape.height});
+    scene_->obstacles.push_back(obstacleOf(car));
   }
 }
 
@@ -223,8 +196,7 @@ void SceneParts::addTrees(const std::vector<Tree>& trees, uint64_t seed) {
       vertex.position *= static_cast<float>(tree.scale);
     }
     scene_->mesh.append(scaled, pose);
-    scene_->obstacles.push_back(
-        {"tree", circleAround(tree.x, tree.y, 0.2 * tree.scale), tree.z, tree.z + 2.0 * tree.scale});
+    scene_->obstacles.push_back(obstacleOf(tree));
   }
 }
 
@@ -233,8 +205,7 @@ void SceneParts::addBushes(const std::vector<Bush>& bushes) {
     scene_->mesh.append(
         makeBush(plants_, bush.radius, bush.height, surfaces_.leaf, foliage_density_, bush.seed),
         placement(bush.x, bush.y, bush.z, 0.0));
-    scene_->obstacles.push_back(
-        {"bush", circleAround(bush.x, bush.y, bush.radius), bush.z, bush.z + bush.height});
+    scene_->obstacles.push_back(obstacleOf(bush));
   }
 }
 
@@ -245,7 +216,7 @@ void SceneParts::addHedges(const std::vector<Hedge>& hedges) {
         makeHedge(plants_, {area.width(), area.depth(), hedge.height}, surfaces_.leaf, foliage_density_,
                   random_.bits()),
         placement(0.5 * (area.min_x + area.max_x), 0.5 * (area.min_y + area.max_y), hedge.base_z, 0.0));
-    scene_->obstacles.push_back({"hedge", cornersOf(area), hedge.base_z, hedge.base_z + hedge.height});
+    scene_->obstacles.push_back(obstacleOf(hedge));
   }
 }
 
@@ -286,7 +257,7 @@ void SceneParts::addHouses(const std::vector<Building>& houses) {
       top.push_back(low_a + up);
     }
     addQuad(top[0], top[1], top[2], top[3], roof, &scene_->mesh);
-    scene_->obstacles.push_back({"building", outline, 0.0, house.height});
+    scene_->obstacles.push_back(obstacleOf(house));
   }
 }
 
@@ -314,8 +285,7 @@ void SceneParts::addPoles(const std::vector<Pole>& poles, double lamp_cd) {
         scene_->lamps.push_back(lamp);
       }
     }
-    scene_->obstacles.push_back(
-        {"pole", circleAround(pole.x, pole.y, pole.radius), pole.z, pole.z + pole.height});
+    scene_->obstacles.push_back(obstacleOf(pole));
   }
 }
 
@@ -325,8 +295,7 @@ void SceneParts::addBins(const std::vector<Bin>& bins) {
     const double z = bin.z;
     addBox(placement(bin.x, bin.y, z + 0.5, bin.yaw_rad), {0.55F, 0.6F, 1.0F}, material, &scene_->mesh);
     addBox(placement(bin.x, bin.y, z + 1.03, bin.yaw_rad), {0.6F, 0.66F, 0.07F}, dark_metal_, &scene_->mesh);
-    scene_->obstacles.push_back(
-        {"bin", orientedRectangle(bin.x, bin.y, bin.yaw_rad, -0.3, 0.3, 0.33), z, z + 1.06});
+    scene_->obstacles.push_back(obstacleOf(bin));
   }
 }
 
@@ -346,8 +315,7 @@ void SceneParts::addFence(const Fence& fence) {
     addBox(placement(middle.x(), middle.y(), middle.z(), yaw), {static_cast<float>(length), 0.02F, 0.06F},
            metal_, &scene_->mesh);
   }
-  scene_->obstacles.push_back(
-      {"fence", orientedRectangle(fence.x0, fence.y0, yaw, 0.0, length, 0.03), fence.z, fence.z + 1.28});
+  scene_->obstacles.push_back(obstacleOf(fence));
 }
 
 void SceneParts::addSkyline() {

@@ -7,20 +7,14 @@
 #include <vector>
 
 #include "objects/plants.h"
+#include "objects/surface_variety.h"
 #include "rendering/light_baker.h"
 #include "scenes/scene_things.h"
-#include "scenes/surface_variety.h"
 #include "vcharge_simulation/objects/car_model.h"
 #include "vcharge_simulation/rendering/noise.h"
 #include "vcharge_simulation/scenes/scene.h"
 
 namespace vcharge {
-
-std::vector<Eigen::Vector2d> cornersOf(const GroundRectangle& area);
-/// Corners of a rectangle with yaw about (x, y), counter-clockwise.
-std::vector<Eigen::Vector2d> orientedRectangle(double x, double y, double yaw_rad, double min_along,
-                                               double max_along, double half_width);
-std::vector<Eigen::Vector2d> circleAround(double x, double y, double radius);
 
 /// Adds objects to a scene, each with triangles, materials and obstacles. Used by the builders of all scenes.
 /// Random numbers depend on the order of the calls.

@@ -10,7 +10,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
-#include <opencv2/imgproc.hpp>
 
 #include "scenes/catalogue_cases.h"
 #include "scenes/garage/garage_layout.h"
@@ -96,48 +95,6 @@ TEST(CatalogueTest, EveryDriveStaysInItsSceneAndLastsSomeSeconds) {
   }
 }
 
-cv::Mat_<cv::Point2f> outlineOf(const std::vector<Eigen::Vector2d>& footprint_m) {
-  cv::Mat_<cv::Point2f> outline(static_cast<int>(footprint_m.size()), 1);
-  for (int i = 0; i < outline.rows; ++i) {
-    const Eigen::Vector2f corner = footprint_m[static_cast<size_t>(i)].cast<float>();
-    outline(i) = {corner.x(), corner.y()};
-  }
-  return outline;
-}
-
-// Obstacles that the own car would touch on a drive.
-std::set<std::string> touchedOn(const DrivePlan& plan, const std::vector<Obstacle>& obstacles) {
-  constexpr double kMirror_m = 0.1;
-  constexpr double kRollsOver_m = 0.02;
-  const CarShape& golf = carShapes().front();
-  std::vector<cv::Mat_<cv::Point2f>> outlines;
-  for (const Obstacle& obstacle : obstacles) {
-    outlines.push_back(outlineOf(obstacle.footprint_m));
-  }
-  std::set<std::string> touched;
-  const VehicleMotion motion(plan.path, plan.motion, 1, plan.ground_height);
-  for (int ms = 0; ms < static_cast<int>(motion.duration() * 1000.0); ms += 250) {
-    const RigidTransform pose = motion.at(ms).world_from_planar;
-    const double height_m = motion.at(ms).worldFromVehicle().translation().z();
-    const cv::Mat_<cv::Point2f> own = outlineOf(
-        orientedRectangle(pose.translation().x(), pose.translation().y(), yawOfRotation(pose.rotation()),
-                          golf.rear(), golf.front(), 0.5 * golf.width + kMirror_m));
-    for (size_t i = 0; i < outlines.size(); ++i) {
-      const cv::Point2f corner = outlines[i](0);
-      const bool is_far =
-          std::abs(corner.x - own(0).x) + std::abs(corner.y - own(0).y) > 12.0F && obstacles[i].kind == "car";
-      const bool is_level =
-          obstacles[i].base_z_m < height_m + golf.height && obstacles[i].top_z_m > height_m + kRollsOver_m;
-      cv::Mat overlap;
-      if (!is_far && is_level && cv::intersectConvexConvex(outlines[i], own, overlap) > 0.0F) {
-        touched.insert(obstacles[i].kind + " at " + std::to_string(corner.x) + ", " +
-                       std::to_string(corner.y));
-      }
-    }
-  }
-  return touched;
-}
-
 TEST_P(SceneTest, DrivesKeepClearOfAllThatStands) {
   for (const CatalogueEntry& entry : listDrives(GetParam().scene)) {
     const DrivePlan plan = planDrive(GetParam().scene, entry.name);
@@ -164,11 +121,9 @@ TEST(CatalogueTest, DrivesKeepClearOfParkedCarsForEverySeedAndDay) {
       for (uint64_t seed = 1; seed <= 12; ++seed) {
         for (const Day& day : {Day(plan.day), Day(plan.day, 1.0)}) {
           for (const ParkedCar& car : carsOf(seed, day)) {
-            const CarShape& shape = carShapes()[static_cast<size_t>(car.shape)];
-            cars.push_back(
-                {"car",
-                 orientedRectangle(car.x, car.y, car.yaw_rad, shape.rear(), shape.front(), 0.5 * shape.width),
-                 -1.0, 5.0});
+            cars.push_back(obstacleOf(car));
+            cars.back().base_z_m = -1.0;
+            cars.back().top_z_m = 5.0;
           }
         }
       }
@@ -204,51 +159,6 @@ TEST(CatalogueTest, ADayExchangesTheWantedFractionOfTheCarsAndNothingElse) {
     EXPECT_EQ(after.poles.size(), before.poles.size());
   }
   EXPECT_FALSE(same(makeLotLayout(1, Day(1, 1.0)).cars[0], makeLotLayout(1, Day(2, 1.0)).cars[0]));
-}
-
-class LayoutTest : public testing::TestWithParam<const char*> {
- protected:
-  static SceneOptions optionsOf(uint64_t layout_seed) {
-    SceneOptions options;
-    options.seed = options.layout_seed = layout_seed;
-    options.image_scale = 0.02;
-    options.detail = 0.1;
-    return options;
-  }
-};
-INSTANTIATE_TEST_SUITE_P(Scenes, LayoutTest, testing::Values("lot", "garage"));
-
-TEST_P(LayoutTest, DrivesKeepClearOfAllThatStandsInEveryDrawnLayout) {
-  for (uint64_t layout_seed = 1; layout_seed <= 20; ++layout_seed) {
-    SceneOptions options = optionsOf(layout_seed);
-    for (const int day : {0, 1}) {
-      options.day = day;
-      const std::shared_ptr<const Scene> scene = buildScene(GetParam(), options);
-      for (const CatalogueEntry& entry : listDrives(GetParam())) {
-        const DrivePlan plan = planDrive(GetParam(), entry.name, layout_seed);
-        if (plan.day == day) {
-          EXPECT_THAT(touchedOn(plan, scene->obstacles), testing::IsEmpty())
-              << entry.name << ", layout " << layout_seed;
-        }
-      }
-    }
-  }
-}
-
-TEST_P(LayoutTest, MoversFindTheirWaysInEveryDrawnLayout) {
-  for (uint64_t layout_seed = 1; layout_seed <= 20; ++layout_seed) {
-    SceneOptions options = optionsOf(layout_seed);
-    options.movers.people = 2;
-    options.movers.cars = 2;
-    const DrivePlan plan = planDrive(GetParam(), "stop_and_go", layout_seed);
-    options.own_poses = ownPoses(simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1,
-                                               FaultOptions(), plan.ground_height));
-    EXPECT_GE(buildScene(GetParam(), options)->movers.size(), 3U) << "layout " << layout_seed;
-  }
-}
-
-TEST(LayoutSeedTest, IsRefusedByScenesWithOneLayout) {
-  EXPECT_THROW(planDrive("road", "bumps", 1), std::invalid_argument);
 }
 
 TEST(SlopeTest, ParkedCarsStandOnTheGroundWithAllFourWheels) {

@@ -2,6 +2,11 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "vcharge_simulation/scenes/scene.h"
 
 namespace vcharge {
 
@@ -69,5 +74,23 @@ struct GardenWall {
 struct Fence {
   double x0, y0, x1, y1, z;
 };
+
+std::vector<Eigen::Vector2d> cornersOf(const GroundRectangle& area);
+/// Corners of a rectangle with yaw about (x, y), counter-clockwise.
+std::vector<Eigen::Vector2d> orientedRectangle(double x, double y, double yaw_rad, double min_along,
+                                               double max_along, double half_width);
+std::vector<Eigen::Vector2d> circleAround(double x, double y, double radius);
+
+/// Outlines of things; those on slopes are as wide as on level ground.
+Obstacle obstacleOf(const GroundRectangle& island, const Kerb& kerb, double base_z_m = 0.0);
+Obstacle obstacleOf(const ParkedCar& car);
+Obstacle obstacleOf(const Tree& tree);
+Obstacle obstacleOf(const Bush& bush);
+Obstacle obstacleOf(const Hedge& hedge);
+Obstacle obstacleOf(const Building& house);
+Obstacle obstacleOf(const Pole& pole);
+Obstacle obstacleOf(const Bin& bin);
+Obstacle obstacleOf(const GardenWall& wall);
+Obstacle obstacleOf(const Fence& fence);
 
 }  // namespace vcharge

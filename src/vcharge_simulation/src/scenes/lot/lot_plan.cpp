@@ -21,7 +21,8 @@ double LotPlan::depthOf(BayKind kind) const {
 
 namespace {
 
-constexpr double kLeastLaneDistance_m = 14.5;
+// Two corners of a drive on the inner side of two lanes need this distance between their middles.
+constexpr double kLeastLaneDistance_m = 15.0;
 
 }  // namespace
 
@@ -46,7 +47,6 @@ LotPlan LotPlan::fromSeed(uint64_t layout_seed) {
   plan.lanes.x_m = 0.5 * plan.bays_per_row * kBayWidth_m + plan.to_row_end_m;
   plan.lanes.y_m = plan.half_middle_aisle_m + plan.depthOf(plan.middle_bays) + 2.0 * plan.half_island_m +
                    kInnerBays_m + 0.5 * kBayLength_m;
-  // Two corners of a drive need this distance between the lanes.
   const double missing_m = std::max(0.0, kLeastLaneDistance_m - plan.lanes.y_m);
   plan.half_island_m += 0.5 * missing_m;
   plan.lanes.y_m += missing_m;

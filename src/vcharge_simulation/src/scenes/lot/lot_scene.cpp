@@ -76,7 +76,7 @@ class LotBuilder {
     bakeGroundLight(-corner_m, corner_m, kLightTexel_m / options_.detail, ground_height, &scene());
     bakeGroundLamps(-corner_m, corner_m, kLightTexel_m / options_.detail, ground_height, &scene());
     scene().vehicle_lamps = vehicleLampsOf(conditions_, kSunIlluminance_lx);
-    addMovers(options_, {kLotArea, layout_.lanes, baysToLeave()}, &parts_);
+    addMovers(options_, {kLotArea, layout_.lanes, baysToLeave(layout_.bays)}, &parts_);
     return parts_.sharedScene();
   }
 
@@ -89,14 +89,6 @@ class LotBuilder {
                                   : 0.0;
   }
 
-  // Bays that open at right angles to a lane.
-  std::vector<ParkingBay> baysToLeave() const {
-    std::vector<ParkingBay> bays;
-    std::copy_if(layout_.bays.begin(), layout_.bays.end(), std::back_inserter(bays),
-                 [](const ParkingBay& bay) { return !bay.is_oblique; });
-    return bays;
-  }
-
   void addGardenWalls() {
     for (const GardenWall& wall : layout_.garden_walls) {
       const GroundRectangle& area = wall.area;
@@ -106,7 +98,7 @@ class LotBuilder {
       addBox(
           placement(0.5 * (area.min_x + area.max_x), 0.5 * (area.min_y + area.max_y), 0.5 * wall.height, 0.0),
           Eigen::Vector3d(area.width(), area.depth(), wall.height).cast<float>(), plaster, &scene().mesh);
-      scene().obstacles.push_back({"wall", cornersOf(area), 0.0, wall.height});
+      scene().obstacles.push_back(obstacleOf(wall));
     }
   }
 

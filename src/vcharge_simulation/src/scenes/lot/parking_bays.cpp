@@ -1,6 +1,8 @@
 #include "scenes/lot/parking_bays.h"
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "vcharge_simulation/objects/car_model.h"
 #include "vcharge_simulation/rendering/noise.h"
@@ -31,6 +33,13 @@ ParkedCar parkedCar(const ParkingBay& bay, Random* random) {
 }
 
 }  // namespace
+
+std::vector<ParkingBay> baysToLeave(const std::vector<ParkingBay>& bays) {
+  std::vector<ParkingBay> chosen;
+  std::copy_if(bays.begin(), bays.end(), std::back_inserter(chosen),
+               [](const ParkingBay& bay) { return !bay.is_oblique; });
+  return chosen;
+}
 
 std::vector<ParkedCar> parkCars(const std::vector<ParkingBay>& bays, double occupied_fraction, uint64_t seed,
                                 const Day& day) {

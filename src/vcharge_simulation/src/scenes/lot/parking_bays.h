@@ -18,6 +18,9 @@ struct ParkingBay {
   bool is_oblique = false;  ///< angled or parallel to the lane
 };
 
+/// The bays at right angles to their lane: movers know no way out of others.
+std::vector<ParkingBay> baysToLeave(const std::vector<ParkingBay>& bays);
+
 /// Parks cars on level ground at z = 0. Each bay has its own random generator, so that a day redraws only a
 /// fraction of the bays and keeps the others. A redrawn bay is empty or holds another car in another pose. A
 /// larger fraction redraws more bays besides those of a smaller one.

@@ -181,10 +181,10 @@ class RampBuilder {
   // The well in the middle, with a wall like a garage's.
   void addCore() {
     const double top = landingHeight() + kParapet_m;
-    const uint32_t wall =
-        parts_.textured(SurfaceKind::kBuilding,
-                        drawGarageWall(kTwoPi * kCore_m, top, static_cast<uint32_t>(parts_.random().bits())),
-                        kGarageTexelsPerM);
+    const uint32_t wall = parts_.textured(SurfaceKind::kBuilding,
+                                          drawGarageWall(kTwoPi * kCore_m, top, GarageWallKind(),
+                                                         static_cast<uint32_t>(parts_.random().bits())),
+                                          kGarageTexelsPerM);
     addFrustum({0.0F, 0.0F, -0.05F}, {0.0F, 0.0F, static_cast<float>(top)}, static_cast<float>(kCore_m),
                static_cast<float>(kCore_m), 64, true, wall, &mesh_);
     parts_.scene().obstacles.push_back({"wall", circleAround(0.0, 0.0, kCore_m), 0.0, top});

@@ -1,4 +1,4 @@
-#include "scenes/surface_variety.h"
+#include "objects/surface_variety.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,149 @@
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "scenes/catalogue_cases.h"
+#include "scenes/garage/garage_layout.h"
+#include "scenes/lot/lot_ground.h"
+#include "scenes/lot/lot_layout.h"
+#include "scenes/movers/mover_planner.h"
+#include "vcharge_simulation/drive/drive_simulator.h"
+#include "vcharge_simulation/objects/car_model.h"
+
+namespace vcharge {
+namespace {
+
+constexpr uint64_t kLayouts = 20;
+
+// What stands on a drawn lot or in a drawn garage, without triangles and light, which take longer to make.
+struct Outlines {
+  MoverArea area;
+  std::vector<Obstacle> obstacles;
+
+  template <class Things>
+  void add(const Things& things) {
+    for (const auto& thing : things) {
+      obstacles.push_back(obstacleOf(thing));
+    }
+  }
+};
+
+Outlines outlinesOfLot(const LotLayout& layout) {
+  Outlines lot{{kLotArea, layout.lanes, baysToLeave(layout.bays)}, {}};
+  for (const GroundRectangle& island : layout.islands) {
+    lot.obstacles.push_back(obstacleOf(island, layout.kerb));
+  }
+  lot.add(layout.cars);
+  lot.add(layout.trees);
+  lot.add(layout.bushes);
+  lot.add(layout.hedges);
+  lot.add(layout.garden_walls);
+  lot.add(layout.buildings);
+  lot.add(layout.poles);
+  lot.add(layout.bins);
+  lot.add(layout.fences);
+  return lot;
+}
+
+Outlines outlinesOfGarage(const GarageLayout& layout) {
+  constexpr double kWall_m = 1.0;
+  constexpr double kPipe_m = 0.15;  // a pipe may be on either side of a pillar
+  const GroundRectangle& area = layout.plan.area;
+  Outlines garage{{area, layout.plan.lanes, layout.bays}, {}};
+  for (const GroundRectangle& wall :
+       {GroundRectangle{area.min_x - kWall_m, area.min_y, area.min_x, area.max_y},
+        GroundRectangle{area.max_x, area.min_y, area.max_x + kWall_m, area.max_y},
+        GroundRectangle{area.min_x, area.min_y - kWall_m, area.max_x, area.min_y},
+        GroundRectangle{area.min_x, area.max_y, area.max_x, area.max_y + kWall_m}}) {
+    garage.obstacles.push_back({"wall", cornersOf(wall), 0.0, layout.plan.height_m});
+  }
+  garage.add(layout.cars);
+  const double half_m = 0.5 * layout.plan.pillar_width_m;
+  for (const GarageLayout::Pillar& pillar : layout.pillars) {
+    garage.obstacles.push_back(
+        {"pillar", orientedRectangle(pillar.x, pillar.y, 0.0, -half_m - kPipe_m, half_m + kPipe_m, half_m),
+         0.0, layout.plan.height_m});
+  }
+  return garage;
+}
+
+class LayoutTest : public testing::TestWithParam<std::string> {
+ protected:
+  static Outlines outlinesOf(uint64_t layout_seed, const Day& day) {
+    return GetParam() == "lot" ? outlinesOfLot(makeLotLayout(layout_seed, day, layout_seed))
+                               : outlinesOfGarage(makeGarageLayout(layout_seed, day, layout_seed));
+  }
+};
+std::string sceneOf(const testing::TestParamInfo<std::string>& info) {
+  return info.param;
+}
+INSTANTIATE_TEST_SUITE_P(Scenes, LayoutTest, testing::Values("lot", "garage"), sceneOf);
+
+TEST_P(LayoutTest, DrivesKeepClearOfAllThatStandsInEveryDrawnLayout) {
+  for (uint64_t layout_seed = 1; layout_seed <= kLayouts; ++layout_seed) {
+    // Any drive may be driven on any day.
+    std::vector<Obstacle> obstacles = outlinesOf(layout_seed, 0).obstacles;
+    for (const Obstacle& obstacle : outlinesOf(layout_seed, Day(1, 1.0)).obstacles) {
+      if (obstacle.kind == "car") {
+        obstacles.push_back(obstacle);
+      }
+    }
+    for (const CatalogueEntry& entry : listDrives(GetParam())) {
+      EXPECT_THAT(touchedOn(planDrive(GetParam(), entry.name, layout_seed), obstacles), testing::IsEmpty())
+          << entry.name << ", layout " << layout_seed;
+    }
+  }
+}
+
+TEST_P(LayoutTest, MoversFindTheirWaysInEveryDrawnLayout) {
+  MoverOptions movers;
+  movers.people = 2;
+  movers.children = 1;
+  movers.cars = 2;
+  movers.bicycles = 1;
+  for (uint64_t layout_seed = 1; layout_seed <= kLayouts; ++layout_seed) {
+    const DrivePlan plan = planDrive(GetParam(), "stop_and_go", layout_seed);
+    const OwnCar own_car(ownPoses(simulateDrive(plan.path, plan.motion, WheelOdometerOptions(), 1, 1,
+                                                FaultOptions(), plan.ground_height)));
+    const Outlines outlines = outlinesOf(layout_seed, 0);
+    Scene scene;
+    scene.obstacles = outlines.obstacles;
+    EXPECT_EQ(planMovers(movers, outlines.area, scene, own_car, 0.0).size(), 6U) << "layout " << layout_seed;
+  }
+}
+
+TEST_P(LayoutTest, ADrawnSceneHoldsWhatItsLayoutNames) {
+  SceneOptions options;
+  options.seed = options.layout_seed = 3;
+  options.image_scale = 0.02;
+  options.detail = 0.1;
+  const std::shared_ptr<const Scene> scene = buildScene(GetParam(), options);
+  const auto positions = [](const std::vector<Obstacle>& obstacles) {
+    std::vector<std::string> found;
+    for (const Obstacle& obstacle : obstacles) {
+      // Walls of the garage are its border; pipes and stops stand at pillars and in bays.
+      if (obstacle.kind != "pipe" && obstacle.kind != "wheel_stop" &&
+          (GetParam() == "lot" || obstacle.kind != "wall")) {
+        const Eigen::Vector2d middle_mm = (1e3 * middleOf(obstacle)).array().round();
+        found.push_back(obstacle.kind + " " + std::to_string(middle_mm.x()) + " " +
+                        std::to_string(middle_mm.y()));
+      }
+    }
+    return found;
+  };
+  EXPECT_THAT(positions(scene->obstacles),
+              testing::UnorderedElementsAreArray(positions(outlinesOf(3, 0).obstacles)));
+  for (const CatalogueEntry& entry : listDrives(GetParam())) {
+    const DrivePlan plan = planDrive(GetParam(), entry.name, 3);
+    EXPECT_THAT(touchedOn(plan, scene->obstacles), testing::IsEmpty()) << entry.name;
+  }
+}
+
+TEST(LayoutSeedTest, IsRefusedByScenesWithOneLayout) {
+  EXPECT_THROW(planDrive("road", "bumps", 1), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace vcharge
