@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "lighting/light_baker.h"
 #include "objects/plants.h"
-#include "rendering/light_baker.h"
 #include "scenes/scene_things.h"
 #include "vcharge_simulation/objects/car_model.h"
 #include "vcharge_simulation/rendering/noise.h"
