@@ -8,9 +8,9 @@
 
 #include <tbb/parallel_for.h>
 
+#include "lighting/secondary_light.h"
 #include "rendering/exposed_rows.h"
 #include "rendering/ray_tracer.h"
-#include "rendering/secondary_light.h"
 #include "rendering/surface_shader.h"
 #include "scenes/ground_finder.h"
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rendering/lamp_light.h"
+#include "lighting/lamp_light.h"
 
 namespace vcharge {
 

@@ -6,9 +6,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "rendering/lamp_light.h"
-#include "rendering/vehicle_lamps.h"
-#include "rendering/wet_ground.h"
+#include "lighting/lamp_light.h"
+#include "lighting/vehicle_lamps.h"
+#include "lighting/wet_ground.h"
 #include "scenes/catalogue_cases.h"
 #include "scenes/scene_builders.h"
 #include "vcharge_simulation/drive/drive_scenario.h"

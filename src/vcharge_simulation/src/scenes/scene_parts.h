@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include "lighting/light_baker.h"
 #include "objects/plants.h"
 #include "objects/surface_variety.h"
-#include "rendering/light_baker.h"
 #include "scenes/scene_things.h"
 #include "vcharge_simulation/objects/car_model.h"
 #include "vcharge_simulation/rendering/noise.h"

@@ -161,7 +161,7 @@ DrivePath DrivePath::throughWaypoints(const std::vector<Eigen::Vector2d>& waypoi
   }
   const Eigen::Vector2d first = points[1] - points[0];
   return DrivePath(RigidTransform::planar(points[0].x(), points[0].y(), std::atan2(first.y(), first.x())),
-                   std::move(segments));
+                   segments);
 }
 
 }  // namespace vcharge

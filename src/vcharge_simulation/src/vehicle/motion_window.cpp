@@ -15,7 +15,8 @@ RigidTransform MotionWindow::at(double since_stamp_s) const {
   if (poses_.size() == 1) {
     return poses_.front();
   }
-  const double index = 1000.0 * since_stamp_s + static_cast<double>(poses_.size() / 2);
+  const size_t middle = poses_.size() / 2;
+  const double index = 1000.0 * since_stamp_s + static_cast<double>(middle);
   const double before = std::floor(index);
   check(before >= 0.0 && index <= static_cast<double>(poses_.size() - 1),
         "MotionWindow: the time is outside the window");

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "rendering/lamp_light.h"
+#include "lighting/lamp_light.h"
 #include "scenes/garage/garage_plan.h"
 #include "scenes/lot/parking_bays.h"
 #include "scenes/scene_things.h"

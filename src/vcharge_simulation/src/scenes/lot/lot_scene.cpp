@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "rendering/lamp_light.h"
-#include "rendering/light_baker.h"
+#include "lighting/lamp_light.h"
+#include "lighting/light_baker.h"
 #include "scenes/lot/lot_ground.h"
 #include "scenes/lot/lot_layout.h"
 #include "scenes/movers/scene_movers.h"

@@ -6,12 +6,13 @@ namespace vcharge {
 
 /// A helical ramp about the z axis that turns left as it rises, from the x axis over kRampTurns, and a level
 /// landing at its upper end, along -x.
-inline constexpr double kRampRadius_m = 9.0;  ///< of the middle of the lane
+inline constexpr double kRampRadius_m = 9.0;  ///< to the middle of the lane
 inline constexpr double kRampHalfWidth_m = 2.25;
 inline constexpr double kRampSlope = 0.1;  ///< in the middle of the lane
 inline constexpr double kRampTurns = 1.25;
 inline constexpr double kRampAngle_rad = kRampTurns * 6.28318530717958647692;
-inline constexpr double kRampLength_m = kRampAngle_rad * kRampRadius_m;  ///< of the middle, seen from above
+inline constexpr double kRampLength_m =
+    kRampAngle_rad * kRampRadius_m;             ///< along the middle, seen from above
 inline constexpr double kRampRounding_m = 3.0;  ///< at both ends, where the slope changes linearly
 inline constexpr double kLandingLength_m = 15.0;
 inline constexpr double kRampSkirt_m = 2.2;  ///< where it is lower, the ramp is closed down to the ground

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rendering/lamp_light.h"
+#include "lighting/lamp_light.h"
 #include "scenes/lane_paths.h"
 #include "scenes/lot/lot_ground.h"
 #include "scenes/movers/scene_movers.h"

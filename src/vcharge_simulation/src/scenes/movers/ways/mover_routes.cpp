@@ -43,7 +43,7 @@ DrivePath walkBackAndForth(const RigidTransform& world_from_start, double leg_m,
     lap.push_back({leg_m, 0.0, 0.0});
     addTurn(kPi, 1.0 / turn_radius_m, kTurnIn_m, &lap);
   }
-  return repeated(DrivePath(world_from_start, std::move(lap)), total_m);
+  return repeated(DrivePath(world_from_start, lap), total_m);
 }
 
 DrivePath driveAround(const MoverArea& area, double aside_m, double total_m, Random* random) {
@@ -90,7 +90,7 @@ std::optional<DrivePath> leaveBay(const MoverArea& area, const ParkingBay& bay, 
   }
   std::vector<DrivePath::Segment> turn = {{straight_m, 0.0, 0.0}};
   addTurn(to_left ? 0.5 * kPi : -0.5 * kPi, kBayCurvature_per_m, kBayTurnIn_m, &turn);
-  DrivePath path(RigidTransform::planar(start.x(), start.y(), bay.yaw_rad + kPi), std::move(turn));
+  DrivePath path(RigidTransform::planar(start.x(), start.y(), bay.yaw_rad + kPi), turn);
   // On around the block.
   const double next_y = (lane_y == 0.0 ? side * area.lanes.y_m : 0.0) + along_x * aside_m;
   path.append(DrivePath::throughWaypoints({{turned_x, y}, {corner_x, y}, {corner_x, next_y}, {0.0, next_y}},

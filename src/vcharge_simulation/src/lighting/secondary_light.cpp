@@ -1,10 +1,10 @@
-#include "rendering/secondary_light.h"
+#include "lighting/secondary_light.h"
 
 #include <algorithm>
 #include <limits>
 
-#include "rendering/vehicle_lamps.h"
-#include "rendering/wet_ground.h"
+#include "lighting/vehicle_lamps.h"
+#include "lighting/wet_ground.h"
 
 namespace vcharge {
 

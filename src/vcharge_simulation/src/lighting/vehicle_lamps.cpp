@@ -1,4 +1,4 @@
-#include "rendering/vehicle_lamps.h"
+#include "lighting/vehicle_lamps.h"
 
 #include <algorithm>
 #include <cmath>

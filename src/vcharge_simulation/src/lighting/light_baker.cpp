@@ -1,4 +1,4 @@
-#include "rendering/light_baker.h"
+#include "lighting/light_baker.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "rendering/lamp_light.h"
+#include "lighting/lamp_light.h"
 
 #include <algorithm>
 #include <cmath>

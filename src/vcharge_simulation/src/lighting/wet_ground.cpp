@@ -1,4 +1,4 @@
-#include "rendering/wet_ground.h"
+#include "lighting/wet_ground.h"
 
 #include <algorithm>
 #include <cmath>
