@@ -39,7 +39,8 @@ GaragePlan GaragePlan::fromSeed(uint64_t layout_seed) {
   const double end_x = plan.lanes.x_m + random.uniform(4.2, 7.0);
   const double end_y = plan.shifted(kGarageArea.max_y);
   plan.area = {-end_x, -end_y, end_x, end_y};
-  plan.free_bay_x_m = plan.firstBay() + (plan.bays_per_row / 2 - 1.5) * kGarageBayWidth_m;
+  const int bays_before = plan.bays_per_row / 2 - 2;
+  plan.free_bay_x_m = plan.firstBay() + (bays_before + 0.5) * kGarageBayWidth_m;
   plan.height_m = random.uniform(2.1, 3.0);
   plan.beam_height_m = std::max(kLowestBeam_m, plan.height_m - kBeam_m);
   plan.pillar_width_m = random.uniform(0.3, 0.5);

@@ -12,8 +12,8 @@ namespace {
 
 constexpr double kHalfPi = 1.57079632679489661923;
 constexpr double kParallelBay_m = 6.2;
-constexpr double kEdge_m = 29.0;   // of the lot across the lanes
-constexpr double kEdgeX_m = 39.0;  // and along them
+constexpr double kEdge_m = 29.0;   // half the extent across the lanes
+constexpr double kEdgeX_m = 39.0;  // half the extent along them
 constexpr double kLarge_m = 1e3;
 
 class LotDrawer {

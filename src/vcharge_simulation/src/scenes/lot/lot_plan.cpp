@@ -52,7 +52,8 @@ LotPlan LotPlan::fromSeed(uint64_t layout_seed) {
   plan.lanes.y_m += missing_m;
   plan.drive_offset = 0.5;
   // A bay of the row west of the middle, with room for the drives on both sides.
-  plan.free_bay_x_m = (0.5 - 0.5 * plan.bays_per_row + (plan.bays_per_row / 2 - 2)) * kBayWidth_m;
+  const int bays_before = plan.bays_per_row / 2 - 2;
+  plan.free_bay_x_m = (0.5 - 0.5 * plan.bays_per_row + bays_before) * kBayWidth_m;
   return plan;
 }
 
