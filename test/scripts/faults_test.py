@@ -339,9 +339,11 @@ class FaultsTest(unittest.TestCase):
             for key in ("scene", "drive", "rig"):
                 self.assertEqual(read[key], given.get(key, "golf"), path)
             faults = given.get("faults", {})
-            self.assertTrue(not faults or any(path.stem.startswith(f"fault_{kind}") for kind in faults), path)
+            # Darkness needs long exposures, which blur.
+            is_condition = path.stem.startswith("condition_")
+            self.assertTrue(not faults or is_condition or any(path.stem.startswith(f"fault_{kind}") for kind in faults), path)
             for kind, fields in faults.items():
-                with_fault.add(kind)
+                with_fault.update([] if is_condition else [kind])
                 for key, value in fields.items():
                     self.assertEqual(read["faults"][kind][key], value, path)
         self.assertEqual(with_fault, kinds)
