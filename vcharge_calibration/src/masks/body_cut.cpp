@@ -49,26 +49,24 @@ constexpr double kMinBody = 0.0003;
 class Evidence {
  public:
   Evidence(const SmallView& view, const StaticStructure& structure)
-      : view_(view), structure_(structure), levels_(findSceneLevels(view, structure)) {
-    cv::magnitude(structure.edge_x, structure.edge_y, edge_);
-  }
+      : view_(view), structure_(structure), levels_(findSceneLevels(view, structure)) {}
   const SmallView& view() const { return view_; }
   /// CV_8UC1, 255 on clear static edges.
-  cv::Mat clearEdges() const { return edge_ > kWeakEdge * levels_.edge_noise; }
+  cv::Mat clearEdges() const { return structure_.edge > kWeakEdge * levels_.edge_noise; }
   /// CV_8UC1, 255 on strong static edges below the horizon.
   cv::Mat strongEdges() const {
-    return (edge_ > kStrongEdge * levels_.edge_noise) & (levels_.elevation_rad < 0.0);
+    return (structure_.edge > kStrongEdge * levels_.edge_noise) & (levels_.elevation_rad < 0.0);
   }
   bool isBelowHorizon(int y, int x) const { return levels_.elevation_rad.at<float>(y, x) < 0.0F; }
   /// CV_8UC1, 255 on edges that are in nearly every image.
-  cv::Mat alwaysThere() const { return edge_ > kAlwaysThere; }
+  cv::Mat alwaysThere() const { return structure_.edge > kAlwaysThere; }
 
   /// Log of the likelihood ratio of body and scene.
   float at(int y, int x) const {
     const float scene_sigma = levels_.edge_noise.at<float>(y, x);
     const float scene_precision = 1.0F / (scene_sigma * scene_sigma);
     const float body_precision = 1.0F / (kBodyEdgeSigma * kBodyEdgeSigma);
-    const float edge = edge_.at<float>(y, x);
+    const float edge = structure_.edge.at<float>(y, x);
     const float by_edge =
         std::log(body_precision / scene_precision) + 0.5F * edge * edge * (scene_precision - body_precision);
     const float by_moving = stillnessAt(y, x);
@@ -104,7 +102,6 @@ class Evidence {
   const SmallView& view_;
   const StaticStructure& structure_;
   const SceneLevels levels_;
-  cv::Mat edge_;
 };
 
 /// Whether the pixels of a region are still where the scene moves.

@@ -52,8 +52,7 @@ cv::Mat drawPicture(const SmallView& view, const StaticStructure& structure, con
   blue.setTo(cv::Scalar(255, 128, 0), spots);
   cv::addWeighted(red, 0.25, mean, 0.75, 0.0, red);
   cv::addWeighted(blue, 0.5, red, 0.5, 0.0, mean);
-  cv::magnitude(structure.edge_x, structure.edge_y, edge);
-  edge.convertTo(edge, CV_8U, 255.0);
+  structure.edge.convertTo(edge, CV_8U, 255.0);
   structure.moving.convertTo(moving, CV_8U, 100.0 / std::max(1e-6, structure.typical_moving));
   for (cv::Mat* panel : {&edge, &moving}) {
     panel->setTo(0, view.valid == 0);

@@ -18,7 +18,6 @@ constexpr float kGround_rad = -0.25F;
 constexpr int kStep = 4;
 constexpr double kMaxRoll_rad = 0.44, kMinPitch_rad = -0.35, kMaxPitch_rad = 1.4;
 constexpr double kCoarse_rad = 0.0873, kFine_rad = 0.0175;
-constexpr double kStatic = 0.35;
 // Quantiles 0.15, 0.4 and 0.7 of the Rayleigh distribution, which the lengths of random directions have.
 constexpr double kRayleigh15 = 0.5701, kRayleigh40 = 1.0108, kRayleigh70 = 1.5518;
 constexpr double kMinEdgeNoise = 0.02, kMaxEdgeNoise = 0.2;
@@ -130,9 +129,8 @@ std::vector<double> ofNeighbours(const std::vector<double>& levels, const Combin
 
 SceneLevels findSceneLevels(const SmallView& view, const StaticStructure& structure) {
   SceneLevels levels;
-  cv::Mat log_moving, edge;
+  cv::Mat log_moving;
   cv::log(cv::max(structure.moving / structure.typical_moving, 0.02), log_moving);
-  cv::magnitude(structure.edge_x, structure.edge_y, edge);
   levels.down = VerticalSearch(view, log_moving).best();
   levels.elevation_rad = cv::Mat(view.size, CV_32FC1);
   std::vector<std::vector<double>> moving(kNumBins), edges(kNumBins);
@@ -145,11 +143,12 @@ SceneLevels findSceneLevels(const SmallView& view, const StaticStructure& struct
         continue;
       }
       const size_t bin = binOf(elevation_rad);
-      edges[bin].push_back(edge.at<float>(y, x));
+      const float edge = structure.edge.at<float>(y, x);
+      edges[bin].push_back(edge);
       moving[bin].push_back(structure.moving.at<float>(y, x));
       if (elevation_rad < kGround_rad) {
-        ground_edges.push_back(edge.at<float>(y, x));
-        if (edge.at<float>(y, x) < kStatic) {
+        ground_edges.push_back(edge);
+        if (edge < kStaticEdge) {
           ground_moving.push_back(structure.moving.at<float>(y, x));
         }
       }

@@ -31,6 +31,7 @@ StaticStructure structureOf(const SmallView& view, const cv::Vec3f& down, int bo
   StaticStructure structure;
   structure.edge_x = cv::Mat(view.size, CV_32FC1, cv::Scalar(0.03));
   structure.edge_y = cv::Mat(view.size, CV_32FC1, cv::Scalar(0.04));
+  structure.edge = cv::Mat(view.size, CV_32FC1, cv::Scalar(0.05));
   structure.moving = cv::Mat(view.size, CV_32FC1, cv::Scalar(0.0));
   for (int y = 0; y < view.size.height; ++y) {
     for (int x = 0; x < view.size.width; ++x) {

@@ -26,7 +26,6 @@ constexpr double kDark = 6.0;
 constexpr float kRim_rad = 0.15F;
 constexpr int kRimBins = 40;
 constexpr int kMinOutside_px = 200;
-constexpr double kStatic = 0.35;
 // Moving structure that is weaker than this fraction of the noise is not significant.
 constexpr double kMinMoving = 0.3;
 constexpr int kBlock_px = 16;
@@ -279,12 +278,11 @@ StaticStructure findStaticStructure(const SmallView& view, const std::vector<cv:
   cv::Mat variance = (sum_square / total - sum.mul(sum)) * unbiased - sum_noise / total;
   variance = cv::max(variance, 0.0);
   cv::sqrt(fine(variance), found.moving);
-  cv::Mat edge;
-  cv::magnitude(found.edge_x, found.edge_y, edge);
+  cv::magnitude(found.edge_x, found.edge_y, found.edge);
   std::vector<double> moving, noises;
   for (int y = 0; y < view.size.height; ++y) {
     for (int x = 0; x < view.size.width; ++x) {
-      if (view.valid.at<uint8_t>(y, x) != 0 && edge.at<float>(y, x) < kStatic) {
+      if (view.valid.at<uint8_t>(y, x) != 0 && found.edge.at<float>(y, x) < kStaticEdge) {
         moving.push_back(found.moving.at<float>(y, x));
         noises.push_back(std::sqrt(sum_noise.at<float>(y, x) / total));
       }

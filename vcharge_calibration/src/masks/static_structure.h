@@ -23,12 +23,16 @@ cv::Size smallSize(const RigCamera& camera);
 SmallView makeSmallView(const RigCamera& camera);
 cv::Mat shrink(const cv::Mat& pixels, cv::Size size);
 
+/// Length of the mean edge direction from which an edge counts as static.
+inline constexpr double kStaticEdge = 0.35;
+
 /// What stays and what moves in the images of a drive, per pixel of a SmallView. All matrices are CV_32FC1.
 struct StaticStructure {
   cv::Mat mean;            ///< gray levels
   cv::Mat light;           ///< mean without the fading of the lens at its rim
   cv::Mat fading;          ///< of the lens at its rim, 1 inside
-  cv::Mat edge_x, edge_y;  ///< mean of the gradients' directions: length 1 for an edge that is always there
+  cv::Mat edge_x, edge_y;  ///< mean of the gradients' directions
+  cv::Mat edge;            ///< its length: 1 for an edge that is always there
   cv::Mat moving;          ///< standard deviation over time of the local contrast, without the images' noise
   double typical_moving = 0.0;  ///< median of `moving` away from static edges; 0 if nothing moves
 };
