@@ -10,9 +10,6 @@ namespace vcharge {
 
 namespace {
 
-constexpr float kMaxShadow_m = 150.0F;
-// Offset of ray origins from their surface.
-constexpr float kShadowOffset_m = 0.01F;
 // Reflections in glossy paint of the own car.
 constexpr float kBrightestReflection = 2.0F;
 constexpr float kMirroredCone_rad = 0.01F;

@@ -6,6 +6,10 @@
 
 namespace vcharge {
 
+inline constexpr float kMaxShadow_m = 150.0F;
+/// Offset of the origins of shadow and mirrored rays from their surface.
+inline constexpr float kShadowOffset_m = 0.01F;
+
 /// Light that reaches the camera by more than one ray: shadows of the own car and of movers, the own car's
 /// lamps, reflections in its paint and in wet ground. Immutable, thread safe.
 class SecondaryLight {

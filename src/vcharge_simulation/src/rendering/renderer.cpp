@@ -20,9 +20,6 @@ namespace {
 
 constexpr int kSamples = CameraView::kSamplesPerBlock;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr float kMaxShadow_m = 150.0F;
-// Offset of shadow ray origins from their surface.
-constexpr float kShadowOffset_m = 0.01F;
 
 // Renders blocks of one image; holds what all blocks share.
 class BlockRenderer {
