@@ -13,7 +13,7 @@ MASK_SEEDS = {"lot": 201, "garage": 211}
 # The loop of a scene at noon, from which come its masks, its height map and the map for other days.
 LOOP_S, LOOP_STEP, HEIGHT_CELL_M = 24, 2, 0.025
 MASK_SCALE = 0.4  # image size, over 1280x800, of the drives in which masks are found
-# Another day's drive as in the chain (chain/steps.py): other light, moved cars, other errors of the wheels.
+# Another day's drive, that of the chain too: other light, moved cars, other errors of the wheels.
 OTHER_DAY = ("--drive", "other_day", "--exposure-gain", 1.2, "--set", "odometer.scale_error=-0.0005", "--set",
              "odometer.left_right_error=0.0003")
 

@@ -12,6 +12,7 @@ import yaml
 from vcharge_evaluation.chain import figures, nodelets, report
 from vcharge_evaluation.chain.arguments import arguments
 from vcharge_evaluation.chain.step_folders import StepFolders, fingerprint
+from vcharge_evaluation.drives import OTHER_DAY
 from vcharge_evaluation.tools import CONFIG, ROOT, import_published_images, run, run_tool, say, tool_path
 
 RVIZ_SCREENSHOT = ROOT / "src" / "vcharge_evaluation" / "scripts" / "rviz_screenshot.sh"
@@ -21,7 +22,6 @@ WHEELS = ("--set", "odometer.scale_error=0.0005", "--set", "odometer.left_right_
 # Paint that reflects, and people who walk through the other day's drive, one of them in front of the car.
 BODY = ("--set", "body=glossy")
 PEOPLE = ("--set", "movers.people=2", "--set", "movers.crossing=true")
-OTHER_WHEELS = ("--set", "odometer.scale_error=-0.0005", "--set", "odometer.left_right_error=0.0003")
 
 
 def settings(name):
@@ -306,9 +306,8 @@ class Chain(StepFolders):
                                     args.seed + 200, "--image-step", 2, "--duration-s", 80, *WHEELS)
         mapping = self.simulate("mapping_drive", "a drive to map", "--drive", "loop", "--seed", args.seed + 300, "--image-step",
                                 2, "--height-cell-m", 0.025, "--duration-s", 24 if args.quick else 48, *WHEELS)
-        other = self.simulate("other_day", "another day: other light, other cars, people", "--drive", "other_day", "--seed",
-                              args.seed + 400, "--exposure-gain", 1.2, "--truth-range", "--duration-s", 8 if args.quick else 16,
-                              *PEOPLE, *OTHER_WHEELS)
+        other = self.simulate("other_day", "another day: other light, other cars, people", *OTHER_DAY, "--seed",
+                              args.seed + 400, "--truth-range", "--duration-s", 8 if args.quick else 16, *PEOPLE)
         return calibration, mapping, other
 
     def rig(self, calibration):
