@@ -9,14 +9,30 @@
 
 namespace vcharge {
 
-SurfaceVariety SurfaceVariety::fromSeed(uint64_t seed) {
+// The middle of each range is near what the published V-Charge images of a street and of a workshop show.
+SurfaceVariety SurfaceVariety::outdoors(uint64_t seed) {
   SurfaceVariety variety;
   if (seed != 0) {
     Random random(seed * 7717U + 19U);
-    // The middle of each range is near what the published V-Charge images of a street show.
-    variety.grain = 1.4 * std::pow(2.0, random.uniform());
+    variety.grain = random.uniform(2.05, 2.75);
     variety.pattern = random.uniform(0.35, 0.9);
     variety.leaf = random.uniform(0.45, 0.75);
+    variety.grain_size = random.uniform(0.55, 0.7);
+    variety.has_coarse_grain = true;
+    variety.relief_m = random.uniform(0.05, 0.07);
+    variety.foliage = random.uniform(0.25, 0.45);
+  }
+  return variety;
+}
+
+SurfaceVariety SurfaceVariety::indoors(uint64_t seed) {
+  SurfaceVariety variety;
+  if (seed != 0) {
+    Random random(seed * 7717U + 19U);
+    variety.grain = random.uniform(0.5, 0.9);
+    variety.pattern = random.uniform(0.35, 0.9);
+    variety.grain_size = random.uniform(0.55, 0.7);
+    variety.relief_m = random.uniform(0.005, 0.015);
   }
   return variety;
 }

@@ -155,6 +155,35 @@ TEST(RendererTest, CheckerboardKeepsItsSquaresNearbyAndItsMeanFarAway) {
   EXPECT_NEAR(far_albedo / far_pixels, 0.5 * (kDarkSquare + kBrightSquare), 8.0);
 }
 
+// Steeper rays than the flattest that the shader shifts by its true amount.
+TEST(RendererTest, ReliefThatIsRaisedEverywhereLooksLikeLevelGroundFromALowerCamera) {
+  constexpr float kRaised_m = 0.05F;
+  const auto raised = checkerboardScene();
+  raised->ground.details.push_back(
+      {Texture(cv::Mat(64, 64, CV_8UC1, cv::Scalar(255)), Texture::Border::kRepeat), 0.0F, 0.0F, 1.0F});
+  raised->ground.detail_contrast = 0.0F;
+  raised->ground.relief_m = 2.0F * kRaised_m;
+  const CameraView view(makeGolfRig(1, 0.5).cameras[1], nullptr, kIdealLens);
+  const RigidTransform pose = RigidTransform::planar(0.3, 0.2, 0.4);
+  const RigidTransform lower = RigidTransform(Eigen::Quaterniond::Identity(), {0.0, 0.0, -kRaised_m}) * pose;
+  const cv::Mat relief = Renderer(raised).renderLight(view, pose);
+  const cv::Mat flat = Renderer(checkerboardScene()).renderLight(view, pose);
+  const cv::Mat expected = Renderer(checkerboardScene()).renderLight(view, lower);
+  const Eigen::Quaterniond vehicle_from_camera = view.camera().vehicle_from_camera->rotation();
+  double difference = 0.0;
+  double without_relief = 0.0;
+  for (int y = 0; y < flat.rows; ++y) {
+    for (int x = 0; x < flat.cols; ++x) {
+      if ((vehicle_from_camera * view.centreRay(x, y).cast<double>()).z() < -0.2) {
+        difference += std::abs(relief.at<float>(y, x) - expected.at<float>(y, x));
+        without_relief += std::abs(flat.at<float>(y, x) - expected.at<float>(y, x));
+      }
+    }
+  }
+  EXPECT_GT(without_relief, 10.0);
+  EXPECT_LT(difference, 0.05 * without_relief);
+}
+
 // The edge of the light on a wall appears at the same subpixel row as in the range image.
 TEST(RendererTest, LightLiesWhereItsSurfaceIs) {
   constexpr int kTexels = 256;

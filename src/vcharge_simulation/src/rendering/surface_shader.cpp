@@ -16,6 +16,7 @@ constexpr float kMaxDetailLevel = 4.0F;
 constexpr float kSkylineSine = 0.22F;
 // Additional reflectivity of a rough polish at grazing incidence.
 constexpr float kGrazingGloss = 4.0F;
+constexpr float kFlattestReliefRay = 0.15F;   // sine of the least elevation of a ray to the ground's relief
 constexpr float kFlattestCeilingRay = 0.12F;  // sine of the least elevation of a ray to the ceiling
 
 // Aspect ratio of the footprint of a round cone of rays on level ground.
@@ -59,6 +60,22 @@ float SurfaceShader::detailFactor(const Eigen::Vector3f& position, float width_m
   return factor;
 }
 
+Eigen::Vector3f SurfaceShader::reliefShift(const Eigen::Vector3f& position, const Eigen::Vector3f& direction,
+                                           float width_m) const {
+  const GroundLayers& ground = scene_.ground;
+  if (ground.relief_m == 0.0F) {
+    return Eigen::Vector3f::Zero();
+  }
+  const GroundTexture& relief = ground.details.front();
+  const float level = fastLog2(width_m * relief.texels_per_m);
+  if (level >= kMaxDetailLevel) {
+    return Eigen::Vector3f::Zero();
+  }
+  const float height_m = ground.relief_m * (relief.sampleAt(position.x(), position.y(), level) - 0.5F);
+  const float run = height_m / std::min(-kFlattestReliefRay, -std::abs(direction.z()));
+  return {run * direction.x(), run * direction.y(), 0.0F};
+}
+
 float SurfaceShader::towardsSun(const Eigen::Vector3f& ground_normal) const {
   const float up = ground_normal.z() < 0.0F ? -1.0F : 1.0F;
   return std::max(0.0F, up * ground_normal.dot(sky_.directionToSun()));
@@ -93,11 +110,18 @@ float SurfaceShader::lampLight(const Eigen::Vector3f& position, const Eigen::Vec
   return sum;
 }
 
-float SurfaceShader::shadeGroundPixel(const Material& material,
-                                      const std::array<Eigen::Vector3f, 4>& positions,
+float SurfaceShader::shadeGroundPixel(const Material& material, const std::array<Eigen::Vector3f, 4>& samples,
                                       const Eigen::Vector3f& normal, const Eigen::Vector3f& direction,
                                       float footprint_m, const TracedLight& traced) const {
   const float stretch = stretchOf(direction);
+  std::array<Eigen::Vector3f, 4> positions = samples;
+  if (scene_.ground.relief_m != 0.0F) {
+    const Eigen::Vector3f shift =
+        reliefShift(0.5F * (samples[0] + samples[3]), direction, footprint_m * std::sqrt(stretch));
+    for (Eigen::Vector3f& position : positions) {
+      position += shift;
+    }
+  }
   const GroundTexture& texture = scene_.ground.layers[static_cast<size_t>(material.texture)];
   const float level = fastLog2(groundSampleWidth(footprint_m, stretch) * texture.texels_per_m);
   const float albedo = texture.sampleMeanAt(positions, level);
@@ -135,10 +159,10 @@ float SurfaceShader::shade(const SurfacePoint& point, const TracedLight& traced)
     const float stretch = stretchOf(point.direction);
     const GroundTexture& texture = scene_.ground.layers[static_cast<size_t>(material.texture)];
     const float width_m = groundSampleWidth(point.footprint_m, stretch);
-    const float albedo =
-        kGroundLayerAlbedo *
-        texture.sampleAt(point.position.x(), point.position.y(), fastLog2(width_m * texture.texels_per_m)) *
-        detailFactor(point.position, width_m);
+    const Eigen::Vector3f seen = point.position + reliefShift(point.position, point.direction, width_m);
+    const float albedo = kGroundLayerAlbedo *
+                         texture.sampleAt(seen.x(), seen.y(), fastLog2(width_m * texture.texels_per_m)) *
+                         detailFactor(seen, width_m);
     const Eigen::Vector3f normal = point.geometric_normal.normalized();
     return albedo * (groundLight(point.position, point.footprint_m * std::sqrt(stretch),
                                  traced.sun_visibility * towardsSun(normal)) +

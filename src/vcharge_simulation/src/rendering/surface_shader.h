@@ -45,9 +45,9 @@ class SurfaceShader {
   float shade(const SurfacePoint& point, const TracedLight& traced) const;
   /// Mean light of a pixel whose four samples meet the same triangle; evaluates the light only once.
   float shadePixel(const std::array<SurfacePoint, 4>& points, const TracedLight& traced) const;
-  /// Mean light of a pixel whose four samples (see CameraView) meet one ground material at `positions`.
+  /// Mean light of a pixel whose four samples (see CameraView) meet one ground material at `samples`.
   /// `direction` is the mean ray, `normal` the unit normal of the ground.
-  float shadeGroundPixel(const Material& material, const std::array<Eigen::Vector3f, 4>& positions,
+  float shadeGroundPixel(const Material& material, const std::array<Eigen::Vector3f, 4>& samples,
                          const Eigen::Vector3f& normal, const Eigen::Vector3f& direction, float footprint_m,
                          const TracedLight& traced) const;
   /// Light from the sky, or from the ground for downward directions; for reflections.
@@ -87,6 +87,9 @@ class SurfaceShader {
   /// Irradiance from the scene's lamps, without shadows.
   float lampLight(const Eigen::Vector3f& position, const Eigen::Vector3f& normal) const;
   float detailFactor(const Eigen::Vector3f& position, float width_m) const;
+  /// From the point where a ray meets the flat ground to the point below which it meets the relief.
+  Eigen::Vector3f reliefShift(const Eigen::Vector3f& position, const Eigen::Vector3f& direction,
+                              float width_m) const;
   /// Cosine of the sun's incidence on the ground.
   float towardsSun(const Eigen::Vector3f& ground_normal) const;
   /// `sun_fraction` is the fraction of the sun's light left by the incidence angle and by shadows outside the

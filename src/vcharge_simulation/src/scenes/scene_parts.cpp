@@ -5,11 +5,13 @@
 #include <string>
 
 #include "scenes/lot/facade.h"
+#include "scenes/lot/lot_ground.h"
 
 namespace vcharge {
 
 namespace {
 
+constexpr double kDetailTexel_m = 0.0035;
 constexpr float kPoleLampReach_m = 60.0F;
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kSmallTreeLeaf_m = 0.12;
@@ -19,7 +21,7 @@ constexpr std::array<double, kNumPaints> kPaints = {0.025, 0.07, 0.18, 0.4, 0.72
 }  // namespace
 
 SceneParts::SceneParts(uint64_t random_seed, double foliage_density, const SurfaceVariety& surfaces)
-    : foliage_density_(foliage_density),
+    : foliage_density_(foliage_density * surfaces.foliage),
       surfaces_(surfaces),
       random_(random_seed),
       scene_(std::make_shared<Scene>()) {
@@ -80,6 +82,21 @@ void SceneParts::addMaterials() {
   concrete_ = textured(SurfaceKind::kKerb, noiseImage(512, 32, 0.36, 0.22, 0.07, 0.12), 100.0);
   metal_ = plain(SurfaceKind::kPole, 0.25, 0.05);
   dark_metal_ = plain(SurfaceKind::kPole, 0.06, 0.04);
+}
+
+void SceneParts::addGroundDetails(uint64_t seed) {
+  GroundLayers& ground = scene_->ground;
+  ground.detail_contrast *= static_cast<float>(surfaces_.grain);
+  ground.relief_m = static_cast<float>(surfaces_.relief_m);
+  std::vector<double> stretches = {1.0, 1.61803};
+  if (surfaces_.has_coarse_grain) {
+    stretches.push_back(4.2);
+  }
+  for (const double stretch : stretches) {
+    ground.details.push_back({Texture(drawGroundDetail(1024, seed + 40), Texture::Border::kRepeat), 0.0F,
+                              0.0F,
+                              static_cast<float>(1.0 / (kDetailTexel_m * surfaces_.grain_size * stretch))});
+  }
 }
 
 void SceneParts::addLevel(const GroundRectangle& area, double z, uint32_t material) {

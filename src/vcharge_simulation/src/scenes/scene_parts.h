@@ -38,6 +38,8 @@ class SceneParts {
   /// Fractal noise around `mean`, CV_8UC1.
   cv::Mat noiseImage(int width, int height, double mean, double contrast, double scale_x, double scale_y);
 
+  /// Grain and relief of the ground.
+  void addGroundDetails(uint64_t seed);
   void addLevel(const GroundRectangle& area, double z, uint32_t material);
   /// A raised area surrounded by kerb stones.
   void addIsland(const GroundRectangle& area, uint32_t ground, double base_z_m = 0.0,

@@ -36,7 +36,7 @@ struct DriveScenario {
       "Seed of the plan of lot or garage: bays, aisles, kerbs, walls, pillars; 0: the known plan.");
   VCHARGE_OPTION(
       int, surface_seed, 0, notNegative(),
-      "Seed of the contrast of ground, walls and signs, and of the size of leaves; 0: strong and smooth.");
+      "Seed of grain, relief and contrast of surfaces and of foliage, as in real images; 0: smooth, dense.");
   VCHARGE_OPTION(int, rig_seed, 1, notNegative(), "Seed of lenses and mountings.");
   VCHARGE_OPTION(int, day, -1, atLeast(-1), "Day, with its light and parked cars; -1: that of the drive.");
   VCHARGE_OPTION(double, exchanged_cars, -1.0, between(-1.0, 1.0),

@@ -43,8 +43,9 @@ struct Material {
 struct GroundLayers {
   std::vector<GroundTexture>
       layers;  ///< reflectance divided by kGroundLayerAlbedo; each layer covers the next one
-  std::vector<GroundTexture> details;          ///< fine relief that modulates the layers; 0.5 is neutral
-  float detail_contrast = 0.75F;               ///< factor on the relief of the details
+  std::vector<GroundTexture> details;  ///< fine relief that modulates the layers; 0.5 is neutral
+  float detail_contrast = 0.75F;       ///< factor on the relief of the details
+  float relief_m = 0.0F;  ///< height between values 0 and 1 of the first detail; shifts what is seen aslant
   std::unique_ptr<GroundTexture> sun;          ///< fraction of the sun that reaches the ground; null: all
   std::unique_ptr<GroundTexture> surrounding;  ///< fraction of the sky visible from the ground; null: all
   std::unique_ptr<GroundTexture>

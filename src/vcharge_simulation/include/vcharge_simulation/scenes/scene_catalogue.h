@@ -31,7 +31,7 @@ struct SceneOptions {
   Day day;
   ConditionOptions condition;
   uint64_t layout_seed = 0;   ///< plan of lot or garage; 0: the known one
-  uint64_t surface_seed = 0;  ///< contrast of surfaces; 0: the known one
+  uint64_t surface_seed = 0;  ///< see SurfaceVariety
   double image_scale = 1.0;   ///< size of the rendered images relative to 1280x800: coarser textures for less
   double detail = 1.0;  ///< number of leaves and resolution of light maps; lower values are built faster
   /// For the scene "chessboard": the board ("chessboard" or "aprilgrid") and the rig that it is shown to.

@@ -15,7 +15,6 @@ namespace vcharge {
 namespace {
 
 constexpr double kFloorTexel_m = 0.0125;
-constexpr double kDetailTexel_m = 0.0035;
 constexpr float kLampRadiance = 2.4F;
 constexpr double kCeilingTexel_m = 0.1;
 constexpr double kCeilingAlbedo = 0.6;
@@ -57,7 +56,7 @@ class GarageBuilder {
         conditions_(conditionsOf(options.condition)),
         layout_(litLayout(conditions_, options)),
         plan_(layout_.plan),
-        parts_(seed_ * 53U + 7U, 1.0, SurfaceVariety::fromSeed(options.surface_seed)) {}
+        parts_(seed_ * 53U + 7U, 1.0, SurfaceVariety::indoors(options.surface_seed)) {}
 
   std::shared_ptr<const Scene> build() {
     scene().sky = std::make_unique<Sky>(lampLight(), 1);
@@ -99,10 +98,7 @@ class GarageBuilder {
     scene().ground.layers.push_back(
         {Texture(painted_floor, Texture::Border::kClamp), static_cast<float>(plan_.area.min_x),
          static_cast<float>(plan_.area.min_y), static_cast<float>(1.0 / texel_m)});
-    for (const double stretch : {1.0, 1.61803}) {
-      scene().ground.details.push_back({Texture(drawGroundDetail(1024, seed_ + 40), Texture::Border::kRepeat),
-                                        0.0F, 0.0F, static_cast<float>(1.0 / (kDetailTexel_m * stretch))});
-    }
+    parts_.addGroundDetails(seed_);
     parts_.addLevel(plan_.area, 0.0, material);
   }
 

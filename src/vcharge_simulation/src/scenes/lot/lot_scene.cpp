@@ -20,7 +20,6 @@ constexpr double kLightTexel_m = 0.05;  // edge length of a texel of the baked s
 constexpr double kFarGround_m = 280.0;
 constexpr double kFarTexel_m = 0.2;
 constexpr double kWallLightTexel_m = 0.12;
-constexpr double kDetailTexel_m = 0.0035;
 
 LightOptions lightOfDay(int day) {
   LightOptions light;
@@ -42,7 +41,7 @@ class LotBuilder {
         variant_(variant),
         layout_(variant.layout),
         conditions_(conditionsOf(options.condition, lightOfDay(options.day.number))),
-        parts_(options.seed * 77U + 1U, options.detail, SurfaceVariety::fromSeed(options.surface_seed)) {}
+        parts_(options.seed * 77U + 1U, options.detail, SurfaceVariety::outdoors(options.surface_seed)) {}
 
   std::shared_ptr<const Scene> build() {
     scene().sky = std::make_unique<Sky>(
@@ -116,7 +115,6 @@ class LotBuilder {
     const uint32_t far_ground = scene().addMaterial(ground);
     cv::Mat lot_ground = drawLotGround(layout_, texel_m, options_.seed);
     parts_.surfaces().fade(1.0 / texel_m, &lot_ground);
-    scene().ground.detail_contrast *= static_cast<float>(parts_.surfaces().grain);
     scene().ground.layers.push_back({Texture(lot_ground, Texture::Border::kClamp),
                                      static_cast<float>(kLotArea.min_x), static_cast<float>(kLotArea.min_y),
                                      static_cast<float>(1.0 / texel_m)});
@@ -125,11 +123,7 @@ class LotBuilder {
                  Texture::Border::kClamp),
          static_cast<float>(-0.5 * kFarGround_m), static_cast<float>(-0.5 * kFarGround_m),
          static_cast<float>(1.0 / kFarTexel_m)});
-    for (const double stretch : {1.0, 1.61803}) {
-      scene().ground.details.push_back(
-          {Texture(drawGroundDetail(1024, options_.seed + 40), Texture::Border::kRepeat), 0.0F, 0.0F,
-           static_cast<float>(1.0 / (kDetailTexel_m * stretch))});
-    }
+    parts_.addGroundDetails(options_.seed);
     if (variant_.add_ground) {
       variant_.add_ground(near_ground, &parts_);
     } else {

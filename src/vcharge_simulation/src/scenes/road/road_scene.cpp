@@ -15,7 +15,6 @@ namespace {
 
 constexpr double kGroundTexel_m = 0.02;
 constexpr double kMaxGroundTexel_m = 0.5;
-constexpr double kDetailTexel_m = 0.0035;
 constexpr double kLightTexel_m = 0.08;
 constexpr double kFarGround_m = 640.0;
 constexpr double kFarTexel_m = 0.4;
@@ -73,10 +72,7 @@ void addGround(const SceneOptions& options, const RoadLayout& layout, double wet
   const double far = 0.5 * kFarGround_m;
   scene.ground.layers.push_back(groundTexture(drawFarGround(-far, kFarGround_m, kFarTexel_m, options.seed),
                                               -far, -far, kFarTexel_m, Texture::Border::kClamp));
-  for (const double stretch : {1.0, 1.61803}) {
-    scene.ground.details.push_back(groundTexture(drawGroundDetail(1024, options.seed + 40), 0.0, 0.0,
-                                                 kDetailTexel_m * stretch, Texture::Border::kRepeat));
-  }
+  parts->addGroundDetails(options.seed);
   addSurface(near_ground, parts);
   parts->addLevel({-far, kRoadArea.max_y, far, far}, 0.0, far_ground);
   parts->addLevel({-far, -far, far, kRoadArea.min_y}, 0.0, far_ground);
@@ -98,7 +94,7 @@ std::function<DrivePlan()> alongRoad(double from_x, double length_m, double spee
 
 std::shared_ptr<const Scene> buildRoadScene(const SceneOptions& options) {
   const RoadLayout layout = makeRoadLayout(options.seed, options.day);
-  SceneParts parts(options.seed * 83U + 5U, options.detail);
+  SceneParts parts(options.seed * 83U + 5U, options.detail, SurfaceVariety::outdoors(options.surface_seed));
   Scene& scene = parts.scene();
   const Conditions conditions = conditionsOf(options.condition);
   scene.sky = std::make_unique<Sky>(conditions.light, static_cast<uint32_t>(options.seed * 17U));
