@@ -155,6 +155,10 @@ class PageTest(unittest.TestCase):
                 self.assertTrue(one.command and one.date and one.commit and one.figures, f"{path}: {one.title}")
 
 
+# Scenarios of other stages, and the short one of the tests.
+OTHER_STAGES = ("condition_", "fault_", "mapping_", "other_day_", "opposite_direction_", "calibration_", "random_rig", "short_drive")
+
+
 class CompletenessTest(unittest.TestCase):
     def test_every_fault_and_condition_scenario_has_a_row(self):
         stage = {one.condition for one in results.read(results.RESULTS / "faults.json")[1]}
@@ -162,6 +166,18 @@ class CompletenessTest(unittest.TestCase):
                          {path.stem for path in drives.SCENARIOS.glob("fault_*.yaml")})
         self.assertLessEqual(set(faults.all_faults()), stage)
         self.assertLessEqual({path.stem for path in drives.SCENARIOS.glob("condition_*.yaml")}, set(conditions.all_scenarios()))
+
+    def test_every_driving_scenario_has_a_row_in_the_full_run(self):
+        driving = {path.stem for path in drives.SCENARIOS.glob("*.yaml") if not path.stem.startswith(OTHER_STAGES)}
+        self.assertEqual(driving, set(conditions.DRIVING))
+        full, quick = (next(step.words(is_quick) for step in everything.steps() if step.stage == "conditions")
+                       for is_quick in (False, True))
+        self.assertNotIn("--scenarios", full)
+        self.assertLessEqual(set(quick[quick.index("--scenarios") + 1:]), set(conditions.all_scenarios()))
+
+    def test_drawn_plans_follow_the_seed(self):
+        self.assertEqual(conditions.plan_words("layout_lot", 7), ["--set", "layout_seed=7", "--set", "surface_seed=7"])
+        self.assertEqual(conditions.plan_words("ramp_up", 7), [])
 
     def test_every_scenario_of_the_conditions_exists(self):
         for name in conditions.DRIVING:

@@ -12,10 +12,14 @@ from vcharge_evaluation.ranges import RangeErrors
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
 from vcharge_evaluation.tools import CONFIG, NoResult, run_tool_once, say
 
-DRIVING = ("movers_lot", "movers_garage", "movers_crossing", "standing_lot", "stop_and_go_lot", "bay_backwards_lot",
-           "bay_backwards_garage", "bay_forwards_lot", "three_point_turn_lot", "road_fast", "road_bumps")
+DRIVING_QUICK = ("movers_lot", "movers_garage", "movers_crossing", "standing_lot", "stop_and_go_lot", "bay_backwards_lot",
+                 "bay_backwards_garage", "bay_forwards_lot", "three_point_turn_lot", "road_fast", "road_bumps")
+DRIVING = (*DRIVING_QUICK, "stop_and_go_garage", "bay_forwards_garage", "three_point_turn_garage", "road_slow", "road_slope",
+           "ramp_up", "ramp_down", "layout_lot", "layout_garage", "wheel_speeds")
 # A car that stands cannot map: the noon map of its place comes from another drive.
 MAP_DRIVES = {"standing": "short"}
+# The car needs 8 s to reach the ramp, and 25 s for a turn of it.
+TIMES_LONGER = {"ramp": 3}
 OBSTACLE_BOUND_M, RANGE_BOUND = 0.5, 0.5  # errors of missed rays, and relative ones of unknown ranges
 NOON = "noon_"  # before the name of a condition: its drive without it
 
@@ -24,17 +28,27 @@ def condition_scenarios():
     return sorted(path.stem for path in SCENARIOS.glob("condition_*.yaml"))
 
 
-def all_scenarios():
+def all_scenarios(driving=DRIVING):
     """Driving, conditions of light and weather, and the drives of these at noon."""
     conditions, noons = condition_scenarios(), {}
     for name in conditions:
         noons.setdefault(scene_and_drive(name), NOON + name)
-    return [*DRIVING, *noons.values(), *conditions]
+    return [*driving, *noons.values(), *conditions]
+
+
+def read_scenario(name):
+    return yaml.safe_load((SCENARIOS / f"{name.removeprefix(NOON)}.yaml").read_text())
 
 
 def scene_and_drive(name):
-    scenario = yaml.safe_load((SCENARIOS / f"{name.removeprefix(NOON)}.yaml").read_text())
+    scenario = read_scenario(name)
     return scenario.get("scene", "lot"), scenario.get("drive", "short")
+
+
+def plan_words(name, seed):
+    """Words that draw the plan and the surfaces of a scenario's scene from a seed, if the scenario has them drawn."""
+    scenario = read_scenario(name)
+    return [word for key in ("layout_seed", "surface_seed") if scenario.get(key) for word in ("--set", f"{key}={seed}")]
 
 
 def arguments():
@@ -53,7 +67,8 @@ class Condition:
 
     def __init__(self, args, name):
         scene, driven = scene_and_drive(name)
-        size = ("--image-scale", args.image_scale, "--duration-s", args.duration_s)
+        size = ("--image-scale", args.image_scale, "--duration-s", args.duration_s * TIMES_LONGER.get(scene, 1),
+                *plan_words(name, args.seed))
         noon = ("--scene", scene, "--drive", MAP_DRIVES.get(driven, driven), "--scene-seed", args.seed)
         mapping = Drive(args.work, f"noon_{scene}_{driven}", *noon, "--seed", args.seed + 1, "--image-step", 2, *size)
         words = (*noon[:2], "--drive", driven) if name.startswith(NOON) else ("--scenario", SCENARIOS / f"{name}.yaml")
@@ -61,9 +76,19 @@ class Condition:
         self.masks = found_masks(args.work, scene)
         self.rig = self.masks.rig_of(self.drive.folder)
         path, _, run = mapping.map(self.masks.rig_of(mapping.folder))
-        self.remarks = [self.masks.text(), *([f"map: {run.reason()}"] if run.error() else [])]
+        self.remarks = [self.masks.text(), *([f"map: {run.reason()}"] if run.error() else []), *self.log_remarks()]
         self.map = None if run.error() else Map(path, mapping.trajectory)
         self.badness, self.drawn = OBSTACLE_BOUND_M, False
+
+    def log_remarks(self):
+        """For a car without counters: what the driver's decoder makes of the log of its wheel speeds. The odometry in its bag is
+        computed from the same speeds, by the same package."""
+        log = self.drive.folder / "drive_can.log"
+        if log.exists():
+            run = run_tool_once("decode_can", self.drive.folder / "decode_can.log", "--log", log, "--layout",
+                                CONFIG / "driver" / "simulated_car.yaml", may_fail=True)
+            yield f"decode_can: {run.reason()}" if run.error() else (
+                f"odometry from wheel speeds; decode_can reads {run.found['measurements']} of them, {run.found['distance_m']:.1f} m")
 
     def localization_figures(self):
         result, folder = None, self.drive.folder

@@ -10,6 +10,7 @@ import sys
 import time
 
 from vcharge_evaluation import page
+from vcharge_evaluation.conditions import DRIVING_QUICK, all_scenarios
 from vcharge_evaluation.results import RESULTS, commit, drop_others
 from vcharge_evaluation.tools import ROOT, say
 
@@ -55,7 +56,8 @@ def steps():
             yield Step("localization", [*words, "--image-scale", 0.25, "--consistency", 20],
                        [*words, "--image-scale", QUICK_SCALE, "--consistency", 5] if first else None)
     conditions = ["--seed", LOTS[0]]
-    yield Step("conditions", conditions, [*conditions, "--image-scale", 0.3, "--duration-s", 5])
+    yield Step("conditions", conditions, [*conditions, "--image-scale", 0.3, "--duration-s", 5, "--scenarios",
+                                          *all_scenarios(DRIVING_QUICK)])
     faults = ["--seed", LOTS[0]]
     yield Step("faults", faults, [*faults, "--image-scale", 0.3])
     yield Step("mapping", ["--seeds", *LOTS, "--image-scale", 0.5])

@@ -20,6 +20,9 @@ constexpr float kFar_m = 120.0F;
 constexpr int kSurroundingStride = 5;
 constexpr int kSurroundingRays = 32;
 constexpr int kWallRays = 8;
+constexpr float kSkyReach_m = 25.0F;
+// Surfaces that block the sky reflect this fraction of its light themselves.
+constexpr float kOwnLight = 0.15F;
 
 // Direction about `normal` with density proportional to the cosine.
 Eigen::Vector3f cosineDirection(const Eigen::Vector3f& normal, float u, float v) {
@@ -62,36 +65,85 @@ class SunDisk {
 }  // namespace
 
 void bakeWallLight(const std::vector<Wall>& walls, double texel_m, Scene* scene) {
+  std::vector<LitSurface> surfaces;
+  for (const Wall& wall : walls) {
+    const Eigen::Vector3f normal = wall.along.cross(wall.up).normalized();
+    const auto point_at = [wall, normal](float u, float v) {
+      return LitSurface::Point{wall.foot + u * wall.along + (1.0F - v) * wall.up, normal};
+    };
+    surfaces.push_back({point_at, {wall.along.norm(), wall.up.norm()}, wall.material});
+  }
+  bakeSunMaps(surfaces, texel_m, scene);
+}
+
+void bakeSunMaps(const std::vector<LitSurface>& surfaces, double texel_m, Scene* scene) {
   const RayTracer tracer(scene->mesh);
   const SunDisk sun(scene->sky->directionToSun());
-  for (const Wall& wall : walls) {
-    const int width = std::max(1, static_cast<int>(std::lround(wall.along.norm() / texel_m)));
-    const int height = std::max(1, static_cast<int>(std::lround(wall.up.norm() / texel_m)));
-    const Eigen::Vector3f normal = wall.along.cross(wall.up).normalized();
-    cv::Mat image(height, width, CV_8UC1, cv::Scalar(0));
-    if (normal.dot(scene->sky->directionToSun()) > 0.0F) {
-      tbb::parallel_for(0, height, [&](int row) {
-        for (int column = 0; column < width; ++column) {
-          int lit = 0;
-          for (int i = 0; i < kWallRays; ++i) {
-            const uint32_t hash = hashCell(column * kWallRays + i, row, wall.material);
-            const float u =
-                (static_cast<float>(column) + unitFromBits(mixBits(hash + 2U))) / static_cast<float>(width);
-            const float v =
-                (static_cast<float>(row) + unitFromBits(mixBits(hash + 3U))) / static_cast<float>(height);
-            const Eigen::Vector3f point =
-                wall.foot + u * wall.along + (1.0F - v) * wall.up + kLift_m * normal;
-            lit += tracer.occluded(point, sun.direction(hash), kFar_m) ? 0 : 1;
-          }
-          image.at<uint8_t>(row, column) = static_cast<uint8_t>(255 * lit / kWallRays);
+  for (const LitSurface& surface : surfaces) {
+    const int width = std::max(1, static_cast<int>(std::lround(surface.size_m.x() / texel_m)));
+    const int height = std::max(1, static_cast<int>(std::lround(surface.size_m.y() / texel_m)));
+    cv::Mat image(height, width, CV_8UC1);
+    tbb::parallel_for(0, height, [&](int row) {
+      for (int column = 0; column < width; ++column) {
+        int lit = 0;
+        for (int i = 0; i < kWallRays; ++i) {
+          const uint32_t hash = hashCell(column * kWallRays + i, row, surface.material);
+          const float u =
+              (static_cast<float>(column) + unitFromBits(mixBits(hash + 2U))) / static_cast<float>(width);
+          const float v =
+              (static_cast<float>(row) + unitFromBits(mixBits(hash + 3U))) / static_cast<float>(height);
+          const LitSurface::Point point = surface.pointAt(u, v);
+          const bool is_lit =
+              point.normal.dot(scene->sky->directionToSun()) > 0.0F &&
+              !tracer.occluded(point.position + kLift_m * point.normal, sun.direction(hash), kFar_m);
+          lit += is_lit ? 1 : 0;
         }
-      });
-    }
-    Material& material = scene->materials[wall.material];
+        image.at<uint8_t>(row, column) = static_cast<uint8_t>(255 * lit / kWallRays);
+      }
+    });
+    Material& material = scene->materials[surface.material];
     material.sun_map = static_cast<int>(scene->textures.size());
     material.sun_map_texels_per_m = static_cast<float>(1.0 / texel_m);
     scene->textures.emplace_back(image, Texture::Border::kClamp);
   }
+}
+
+void bakeSkyLight(const std::vector<LitSurface>& surfaces, int rays_per_vertex, Scene* scene) {
+  const RayTracer tracer(scene->mesh);
+  const auto from_sky = static_cast<float>(scene->sky->light().sky_irradiance);
+  const auto from_ground = static_cast<float>(scene->sky->light().bounce_irradiance);
+  std::vector<const LitSurface*> surface_of_material(scene->materials.size(), nullptr);
+  for (const LitSurface& surface : surfaces) {
+    surface_of_material[surface.material] = &surface;
+  }
+  std::vector<const LitSurface*> surface_of_vertex(scene->mesh.vertices.size(), nullptr);
+  for (const MeshTriangle& triangle : scene->mesh.triangles) {
+    for (const uint32_t vertex : triangle.vertices) {
+      surface_of_vertex[vertex] = surface_of_material[triangle.material];
+    }
+  }
+  tbb::parallel_for(size_t{0}, surface_of_vertex.size(), [&](size_t i) {
+    if (surface_of_vertex[i] == nullptr) {
+      return;
+    }
+    MeshVertex& vertex = scene->mesh.vertices[i];
+    const LitSurface::Point point = surface_of_vertex[i]->pointAt(vertex.u, vertex.v);
+    float light = 0.0F;
+    float open_light = 0.0F;
+    // The same directions at all vertices: their error is then the same along the surface.
+    for (int k = 0; k < rays_per_vertex; ++k) {
+      const float u = (static_cast<float>(k) + 0.5F) / static_cast<float>(rays_per_vertex);
+      const float v = std::fmod(0.61803399F * static_cast<float>(k), 1.0F);
+      const Eigen::Vector3f direction = cosineDirection(point.normal, u, v);
+      const bool is_up = direction.z() > 0.0F;
+      const float full = is_up ? from_sky : from_ground;
+      open_light += full;
+      light += is_up && tracer.occluded(point.position + kLift_m * point.normal, direction, kSkyReach_m)
+                   ? kOwnLight * full
+                   : full;
+    }
+    vertex.ambient = open_light > 0.0F ? light / open_light : 1.0F;
+  });
 }
 
 void bakeGroundLight(const Eigen::Vector2d& min_m, const Eigen::Vector2d& max_m, double texel_m,
@@ -120,9 +172,9 @@ void bakeGroundLight(const Eigen::Vector2d& min_m, const Eigen::Vector2d& max_m,
       const Eigen::Vector3f point =
           pointAt((column + 0.5) * kSurroundingStride - 0.5, (row + 0.5) * kSurroundingStride - 0.5);
       const float free = freeSky(tracer, point, Eigen::Vector3f::UnitZ(), kSurroundingRays,
-                                 hashCell(column, row, 78), 25.0F);
-      // Surfaces that block the sky reflect some light themselves.
-      sky_image.at<uint8_t>(row, column) = cv::saturate_cast<uint8_t>(255.0F * (0.15F + 0.85F * free));
+                                 hashCell(column, row, 78), kSkyReach_m);
+      sky_image.at<uint8_t>(row, column) =
+          cv::saturate_cast<uint8_t>(255.0F * (kOwnLight + (1.0F - kOwnLight) * free));
     }
   });
   cv::GaussianBlur(sky_image, sky_image, cv::Size(3, 3), 0.8);

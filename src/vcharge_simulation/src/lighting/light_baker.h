@@ -19,6 +19,22 @@ struct Wall {
 /// needs its own material.
 void bakeWallLight(const std::vector<Wall>& walls, double texel_m, Scene* scene);
 
+/// A surface of the scene, flat or curved, with a material of its own.
+struct LitSurface {
+  struct Point {
+    Eigen::Vector3f position;
+    Eigen::Vector3f normal;  ///< unit, outwards
+  };
+  std::function<Point(float u, float v)> pointAt;  ///< at texture coordinates in [0, 1]
+  Eigen::Vector2d size_m;                          ///< along u and v
+  uint32_t material;
+};
+/// The same as bakeWallLight.
+void bakeSunMaps(const std::vector<LitSurface>& surfaces, double texel_m, Scene* scene);
+/// Sets the ambient light of the surfaces' vertices: sky where no surface of the scene hides it, and all of
+/// the light from the ground.
+void bakeSkyLight(const std::vector<LitSurface>& surfaces, int rays_per_vertex, Scene* scene);
+
 /// Fills scene->ground.sun and .surrounding: the fraction of the sun's disk and of the sky visible from each
 /// point of the ground in [min_m, max_m], at height `ground_height(x, y)`. The same scene gives the same
 /// maps.

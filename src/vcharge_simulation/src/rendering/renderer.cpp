@@ -62,7 +62,7 @@ class BlockRenderer {
             surfacePoint(row, rays, 4 * p, footprint_m), surfacePoint(row, rays, 4 * p + 1, footprint_m),
             surfacePoint(row, rays, 4 * p + 2, footprint_m), surfacePoint(row, rays, 4 * p + 3, footprint_m)};
         light->at<float>(y, x) =
-            wetted(row, points[0], shader_.shadePixel(points, traced[static_cast<size_t>(p)])) *
+            wettedPixel(row, points, shader_.shadePixel(points, traced[static_cast<size_t>(p)])) *
             view_.vignette().at<float>(y, x);
         continue;
       }
@@ -153,8 +153,11 @@ class BlockRenderer {
       float ground =
           shader_.shadeGroundPixel(material, positions, plane.normal, direction, footprint_m, traced);
       if (material.wetness > 0.0F) {
-        ground =
-            secondary_.wetted(row, ground, material.wetness, middle, plane.normal, direction, footprint_m);
+        std::array<Eigen::Vector3f, CameraView::kSamplesPerPixel> directions;
+        for (size_t s = 0; s < positions.size(); ++s) {
+          directions[s] = (positions[s] - row.origin).normalized();
+        }
+        ground = wetted(row, ground, material.wetness, plane.normal, positions, directions, footprint_m);
       }
       light->at<float>(y, x) = ground * view_.vignette().at<float>(y, x);
     }
@@ -168,6 +171,35 @@ class BlockRenderer {
     }
     return secondary_.wetted(row, dry, wetness, point.position, point.geometric_normal.normalized(),
                              point.direction, point.footprint_m);
+  }
+
+  // Light of a pixel whose samples meet one triangle.
+  float wettedPixel(const ExposedRow& row,
+                    const std::array<SurfacePoint, CameraView::kSamplesPerPixel>& points, float dry) const {
+    const float wetness = shader_.materialOf(points[0].triangle).wetness;
+    if (wetness <= 0.0F) {
+      return dry;
+    }
+    std::array<Eigen::Vector3f, CameraView::kSamplesPerPixel> positions;
+    std::array<Eigen::Vector3f, CameraView::kSamplesPerPixel> directions;
+    for (size_t s = 0; s < points.size(); ++s) {
+      positions[s] = points[s].position;
+      directions[s] = points[s].direction;
+    }
+    return wetted(row, dry, wetness, points[0].geometric_normal.normalized(), positions, directions,
+                  points[0].footprint_m);
+  }
+
+  // Mean over the samples, since outlines in the mirror image are as sharp as those of the things.
+  float wetted(const ExposedRow& row, float dry, float wetness, const Eigen::Vector3f& normal,
+               const std::array<Eigen::Vector3f, CameraView::kSamplesPerPixel>& positions,
+               const std::array<Eigen::Vector3f, CameraView::kSamplesPerPixel>& directions,
+               float footprint_m) const {
+    float sum = 0.0F;
+    for (size_t s = 0; s < positions.size(); ++s) {
+      sum += secondary_.wetted(row, dry, wetness, positions[s], normal, directions[s], footprint_m);
+    }
+    return sum / static_cast<float>(CameraView::kSamplesPerPixel);
   }
 
   void trace(const ExposedRow& row, size_t block, uint8_t pixels, uint32_t body_mask,

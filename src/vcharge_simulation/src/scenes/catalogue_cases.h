@@ -17,9 +17,13 @@ struct SceneCase {
   const char* drive;
   int frame;
 };
-inline constexpr SceneCase kSceneCases[] = {{"lot", "short", 10},        {"garage", "short", 10},
-                                            {"obstacles", "creep", 100}, {"two_levels", "up_and_down", 100},
-                                            {"road", "bumps", 100},      {"chessboard", "board_front", 30}};
+inline constexpr SceneCase kSceneCases[] = {{"lot", "short", 10},
+                                            {"garage", "short", 10},
+                                            {"obstacles", "creep", 100},
+                                            {"two_levels", "up_and_down", 100},
+                                            {"road", "bumps", 100},
+                                            {"ramp", "up", 200},
+                                            {"chessboard", "board_front", 30}};
 
 /// Renderer of a scene that is quick to build and sharp enough for small images; built once per process.
 const Renderer& rendererOf(const std::string& scene);

@@ -36,7 +36,6 @@ std::string sceneOf(const testing::TestParamInfo<SceneCase>& info) {
   return info.param.scene;
 }
 INSTANTIATE_TEST_SUITE_P(Catalogue, SceneTest, testing::ValuesIn(kSceneCases), sceneOf);
-INSTANTIATE_TEST_SUITE_P(Ramp, SceneTest, testing::Values(SceneCase{"ramp", "up", 200}), sceneOf);
 
 TEST_P(SceneTest, SameBytesOnAnyNumberOfThreads) {
   const CameraView view(makeGolfRig(1, 0.15).cameras[1], makeGolfBody());

@@ -1,11 +1,15 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <utility>
+#include <vector>
 
 #include <opencv2/imgproc.hpp>
 
 #include "scenes/garage/garage_surfaces.h"
 #include "scenes/lot/lot_variant.h"
 #include "scenes/ramp/ramp_shape.h"
+#include "scenes/ramp/ruled_surface.h"
 #include "scenes/scene_builders.h"
 #include "scenes/scene_parts.h"
 
@@ -19,26 +23,30 @@ constexpr double kSlab_m = 0.3;
 constexpr double kParapet_m = 1.0;  // height above the lane
 constexpr double kThickness_m = 0.2;
 constexpr double kCore_m = kInner_m - kThickness_m - 0.1;
-constexpr int kCells = 300;  // along the ramp
+constexpr int kRampCells = 300;
+constexpr int kCells = kRampCells + 65;  // with those along the landing
 constexpr int kCellsPerObstacle = 5;
-constexpr int kAmbientRays = 48;
+constexpr double kLength_m = kRampLength_m + kLandingLength_m;
+constexpr int kAmbientRays = 128;
+constexpr double kAmbientSpacing_m = 0.5;
+constexpr double kSunTexel_m = 0.04;
 // The area of the lot that is cleared for the ramp.
 constexpr GroundRectangle kSite{-17.0, -15.0, 14.0, 14.0};
 
-// A place on the ramp or its walls: cell along the ramp, radius, height above the lane.
+// A place on the ramp and its landing, which continues it straight on, or on their walls: cell along the
+// lane, radius, height above the lane.
 struct Place {
   int cell;
   double radius_m, above_m;
 
-  double laneHeight() const { return rampHeightAt(kRampAngle_rad * cell / kCells); }
-  Eigen::Vector2d planar() const {
-    const double angle_rad = kRampAngle_rad * cell / kCells;
-    return {radius_m * std::cos(angle_rad), radius_m * std::sin(angle_rad)};
+  double angle() const { return kRampAngle_rad * std::min(cell, kRampCells) / kRampCells; }
+  double laneHeight() const { return rampHeightAt(angle()); }
+  Eigen::Vector3d position() const {
+    const double straight_m = kLandingLength_m * std::max(0, cell - kRampCells) / (kCells - kRampCells);
+    return {radius_m * std::cos(angle()) - straight_m * std::sin(angle()),
+            radius_m * std::sin(angle()) + straight_m * std::cos(angle()), laneHeight() + above_m};
   }
-  Eigen::Vector3f position() const {
-    const Eigen::Vector2d at = planar();
-    return Eigen::Vector3d(at.x(), at.y(), laneHeight() + above_m).cast<float>();
-  }
+  Eigen::Vector2d planar() const { return position().head<2>(); }
 };
 
 // Concrete with stains, tyre marks along the lane and, on its edges, painted lines.
@@ -74,11 +82,15 @@ class RampBuilder {
     }
     addLanding();
     addCore();
-    bakeVertexAmbient(kAmbientRays, &mesh_);
-    parts_.scene().mesh.append(mesh_, Eigen::Isometry3f::Identity());
+    Scene& scene = parts_.scene();
+    scene.mesh.append(mesh_, Eigen::Isometry3f::Identity());
+    bakeSkyLight(surfaces_, kAmbientRays, &scene);
+    bakeSunMaps(surfaces_, kSunTexel_m, &scene);
   }
 
  private:
+  using Edge = std::function<Eigen::Vector3d(int border)>;
+
   uint32_t concrete(double length_m, double height_m) {
     return parts_.textured(SurfaceKind::kBuilding,
                            drawFormedConcrete(static_cast<int>(length_m * kGarageTexelsPerM),
@@ -87,51 +99,54 @@ class RampBuilder {
                            kGarageTexelsPerM);
   }
 
-  // A strip along the ramp between two edges; seen from above or outside if `low` is on the right.
-  template <class Low, class High>
-  void addStrip(uint32_t material, const Low& low, const High& high) {
-    for (int cell = 0; cell < kCells; ++cell) {
-      const TextureWindow window{static_cast<float>(cell) / kCells, 0.0F,
-                                 static_cast<float>(cell + 1) / kCells, 1.0F};
-      addQuad(low(cell).position(), low(cell + 1).position(), high(cell + 1).position(),
-              high(cell).position(), material, &mesh_, window);
-    }
+  static Edge edge(double radius_m, double above_m) {
+    return [=](int border) { return Place{border, radius_m, above_m}.position(); };
+  }
+
+  void addStrip(uint32_t material, double width_m, const Edge& low, const Edge& high) {
+    const int rows = 1 + static_cast<int>(std::ceil(width_m / kAmbientSpacing_m));
+    surfaces_.push_back(addRuledSurface({low, high, kCells, kLength_m, width_m, rows}, material, &mesh_));
   }
 
   void addLane() {
-    const auto edge = [](double radius_m, double above_m) {
-      return [=](int cell) { return Place{cell, radius_m, above_m}; };
-    };
-    const uint32_t lane = parts_.textured(
-        SurfaceKind::kGround, drawLane(kRampLength_m, 2.0 * kRampHalfWidth_m, &parts_), kGarageTexelsPerM);
-    addStrip(lane, edge(kOuter_m, 0.0), edge(kInner_m, 0.0));
-    addStrip(concrete(kRampLength_m, 2.0 * kRampHalfWidth_m), edge(kInner_m, -kSlab_m),
-             edge(kOuter_m, -kSlab_m));
+    const double width_m = 2.0 * kRampHalfWidth_m;
+    const uint32_t lane =
+        parts_.textured(SurfaceKind::kGround, drawLane(kLength_m, width_m, &parts_), kGarageTexelsPerM);
+    addStrip(lane, width_m, edge(kOuter_m, 0.0), edge(kInner_m, 0.0));
+    addStrip(concrete(kLength_m, width_m), width_m, edge(kInner_m, -kSlab_m), edge(kOuter_m, -kSlab_m));
   }
 
   void addParapet(double side) {
     const double lane_side_m = kRampRadius_m + side * kRampHalfWidth_m;
     const double far_side_m = lane_side_m + side * kThickness_m;
-    const auto foot = [&](int cell) {
-      const Place place{cell, far_side_m, 0.0};
+    const double height_m = kParapet_m + (side > 0.0 ? kRampSkirt_m + 0.05 : kSlab_m);
+    const Edge foot = [=](int border) {
+      const Place place{border, far_side_m, 0.0};
       const bool on_ground = side > 0.0 && place.laneHeight() < kRampSkirt_m;
-      return Place{cell, far_side_m, on_ground ? -place.laneHeight() - 0.05 : -kSlab_m};
+      return Place{border, far_side_m, on_ground ? -place.laneHeight() - 0.05 : -kSlab_m}.position();
     };
-    const auto at = [](double radius_m, double above_m) {
-      return [=](int cell) { return Place{cell, radius_m, above_m}; };
+    // Seen from the other side, a strip goes the other way.
+    const auto add_strip = [&](double width_m, Edge low, Edge high) {
+      if (side < 0.0) {
+        std::swap(low, high);
+      }
+      addStrip(concrete(kLength_m, width_m), width_m, low, high);
     };
-    const uint32_t wall = concrete(kRampLength_m, kParapet_m);
-    const auto top = at(far_side_m, kParapet_m);
-    const auto lane_top = at(lane_side_m, kParapet_m);
-    const auto lane_foot = at(lane_side_m, 0.0);
+    const Edge top = edge(far_side_m, kParapet_m);
+    const Edge lane_top = edge(lane_side_m, kParapet_m);
+    const Edge lane_foot = edge(lane_side_m, 0.0);
+    add_strip(kParapet_m, lane_top, lane_foot);
+    add_strip(height_m, foot, top);
+    add_strip(kThickness_m, top, lane_top);
+    // Its lower end.
+    const Eigen::Vector3f a = lane_foot(0).cast<float>();
+    const Eigen::Vector3f b = Place{0, far_side_m, 0.0}.position().cast<float>();
+    const Eigen::Vector3f up(0.0F, 0.0F, static_cast<float>(kParapet_m));
+    const uint32_t end = concrete(kThickness_m, kParapet_m);
     if (side > 0.0) {
-      addStrip(wall, lane_top, lane_foot);
-      addStrip(wall, foot, top);
-      addStrip(wall, top, lane_top);
+      addQuad(a, b, b + up, a + up, end, &mesh_);
     } else {
-      addStrip(wall, lane_foot, lane_top);
-      addStrip(wall, top, foot);
-      addStrip(wall, lane_top, top);
+      addQuad(b, a, a + up, b + up, end, &mesh_);
     }
     for (int cell = 0; cell < kCells; cell += kCellsPerObstacle) {
       const int next = cell + kCellsPerObstacle;
@@ -141,7 +156,7 @@ class RampBuilder {
           {"wall",
            {Place{cell, near_m, 0.0}.planar(), Place{cell, far_m, 0.0}.planar(),
             Place{next, far_m, 0.0}.planar(), Place{next, near_m, 0.0}.planar()},
-           foot(cell).position().z(),
+           foot(cell).z(),
            Place{next, 0.0, kParapet_m}.position().z()});
     }
   }
@@ -154,25 +169,14 @@ class RampBuilder {
     parts_.scene().obstacles.push_back({kind, cornersOf(area), low_m, high_m});
   }
 
+  // Its end wall and pillars; lane and parapets continue those of the ramp.
   void addLanding() {
-    const double z = landingHeight();
-    const uint32_t lane = parts_.textured(
-        SurfaceKind::kGround, drawLane(kLandingLength_m, 2.0 * kRampHalfWidth_m, &parts_), kGarageTexelsPerM);
-    const auto at = [](double x, double y, double height) {
-      return Eigen::Vector3d(x, y, height).cast<float>().eval();
-    };
     const double end = -kLandingLength_m;
-    addQuad(at(end, kInner_m, z), at(0.0, kInner_m, z), at(0.0, kOuter_m, z), at(end, kOuter_m, z), lane,
-            &mesh_);
-    const double under = z - kSlab_m;
-    addQuad(at(end, kOuter_m, under), at(0.0, kOuter_m, under), at(0.0, kInner_m, under),
-            at(end, kInner_m, under), parts_.concrete(), &mesh_);
-    const uint32_t wall = concrete(kLandingLength_m, kParapet_m);
+    const double under = landingHeight() - kSlab_m;
     const double inner = kInner_m - kThickness_m;
     const double outer = kOuter_m + kThickness_m;
-    addSolid("wall", {end, inner, 0.0, kInner_m}, under, z + kParapet_m, wall);
-    addSolid("wall", {end, kOuter_m, 0.0, outer}, under, z + kParapet_m, wall);
-    addSolid("wall", {end - kThickness_m, inner, end, outer}, under, z + kParapet_m, wall);
+    addSolid("wall", {end - kThickness_m, inner, end, outer}, under, landingHeight() + kParapet_m,
+             concrete(outer - inner, kParapet_m + kSlab_m));
     for (const double y : {kInner_m, kOuter_m - 0.4}) {
       addSolid("pillar", {end + 0.3, y, end + 0.7, y + 0.4}, 0.0, under, concrete(1.0, landingHeight()));
     }
@@ -180,19 +184,31 @@ class RampBuilder {
 
   // The well in the middle, with a wall like a garage's.
   void addCore() {
+    constexpr int kSides = 128;
     const double top = landingHeight() + kParapet_m;
     const uint32_t wall = parts_.textured(SurfaceKind::kBuilding,
                                           drawGarageWall(kTwoPi * kCore_m, top, GarageWallKind(),
                                                          static_cast<uint32_t>(parts_.random().bits())),
                                           kGarageTexelsPerM);
-    addFrustum({0.0F, 0.0F, -0.05F}, {0.0F, 0.0F, static_cast<float>(top)}, static_cast<float>(kCore_m),
-               static_cast<float>(kCore_m), 64, true, wall, &mesh_);
+    const auto circle = [](double height_m) {
+      return [=](int border) {
+        const double angle_rad = kTwoPi * border / kSides;
+        return Eigen::Vector3d(kCore_m * std::cos(angle_rad), kCore_m * std::sin(angle_rad), height_m);
+      };
+    };
+    const int rows = 1 + static_cast<int>(std::ceil(top / kAmbientSpacing_m));
+    surfaces_.push_back(
+        addRuledSurface({circle(0.0), circle(top), kSides, kTwoPi * kCore_m, top, rows}, wall, &mesh_));
+    addFrustum({0.0F, 0.0F, static_cast<float>(top) - 0.02F}, {0.0F, 0.0F, static_cast<float>(top)},
+               static_cast<float>(kCore_m) - 0.01F, static_cast<float>(kCore_m) - 0.01F, 64, true,
+               parts_.concrete(), &mesh_);
     parts_.scene().obstacles.push_back({"wall", circleAround(0.0, 0.0, kCore_m), 0.0, top});
   }
 
   static constexpr double kTwoPi = 6.28318530717958647692;
   SceneParts& parts_;
   TriangleMesh mesh_;
+  std::vector<LitSurface> surfaces_;
 };
 
 template <class Things, class IsOnSite>
