@@ -337,7 +337,7 @@ maps_reported}], false_cells, false_cells_per_10_m, false_left, false_cells_per_
 false_cell_list [{x_m, y_m, first_seen_ns, maps, left, on_open_ground}], observed_inside, free_inside:
 cells inside obstacles, kerb_points, kerb_reported, error distribution kerb_height_error_m, kerbs
 [{position_m, nearest_m, reported, ever_reported}], movers [{kind, maps, maps_reported}], mover_cells, mover_free}; approach: {reports [{kind, moves, first_visible_m, nearest_m,
-first_reported_m, contact_s: null if never}], corridor {TRUTH_as_MAP: cells}, false_alarms, duration_s, driven_m}.)");
+first_reported_m (least distance until then), contact_s: null if never}], corridor {TRUTH_as_MAP: cells}, false_alarms, duration_s, driven_m}.)");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (options.shown()) {
       return;

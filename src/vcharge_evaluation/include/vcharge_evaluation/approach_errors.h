@@ -33,7 +33,7 @@ struct FirstReport {
   bool moves = false;
   double first_visible_m = 0.0;      ///< distance from the vehicle's outline when a camera first saw it
   double nearest_m = 0.0;            ///< least distance while it was visible or reported
-  std::optional<double> reported_m;  ///< distance when it was first reported; absent: never
+  std::optional<double> reported_m;  ///< least distance until it was first reported; absent: never
   std::optional<double> contact_s;   ///< the same divided by the vehicle's speed; absent also at standstill
 };
 

@@ -126,9 +126,10 @@ void ApproachEvaluator::judgeObstacle(const Frame& frame, const TruthObstacle& o
   FirstReport& report = found->second;
   report.nearest_m = std::min(report.nearest_m, distance_m);
   if (!report.reported_m && frame.reports(obstacle)) {
-    report.reported_m = distance_m;
+    // A report that comes once the obstacle is farther away again came too late.
+    report.reported_m = report.nearest_m;
     if (frame.speed_m_per_s > kStanding_m_per_s) {
-      report.contact_s = distance_m / frame.speed_m_per_s;
+      report.contact_s = report.nearest_m / frame.speed_m_per_s;
     }
   }
 }

@@ -82,6 +82,13 @@ TEST_F(ApproachErrorsTest, AnObstacleThatIsNeverReportedIsCounted) {
   EXPECT_FALSE(errors.reports[1].reported_m);
 }
 
+TEST_F(ApproachErrorsTest, AReportOnceTheObstacleIsFartherAgainIsLate) {
+  path_.back().world_from_vehicle = RigidTransform::planar(9.0, 0.0, 0.0);
+  const FirstReport box = judge(30, -1).reports[1];
+  ASSERT_TRUE(box.reported_m);
+  EXPECT_NEAR(*box.reported_m, 1.4 - 0.89, 1e-6);
+}
+
 TEST_F(ApproachErrorsTest, TheCorridorIsFreeUnknownOrBlocked) {
   const ApproachErrors free = judge(0, 0);
   EXPECT_GT(free.corridor.free_as_free, 5000u);

@@ -8,11 +8,15 @@ import yaml
 
 from vcharge_evaluation import masks, obstacles, tools
 from vcharge_evaluation.camera_models import project
+from vcharge_evaluation.drawing.pictures import label
 from vcharge_evaluation.localization_errors import BOUND_DEG, BOUND_M, LocalizationErrors, Map
 from vcharge_evaluation.poses import at_stamps, rotations
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
+
+# From the origin of the simulated car's frame to its front.
+FRONT_M = 3.7
 
 
 def pick(result, *keys):
@@ -69,9 +73,10 @@ def save(figure, path):
 
 def draw_masks(report, picture):
     """The mean images of all cameras with the found body, from the pictures of make_masks."""
-    drawn = [cv2.imread(str(path)) for path in sorted(report.glob("*.png"))]
+    drawn = {path.stem: cv2.imread(str(path)) for path in sorted(report.glob("*.png"))}
     if drawn:
-        means = [cv2.resize(image[:, :image.shape[1] // 3], (640, 400), interpolation=cv2.INTER_AREA) for image in drawn]
+        means = [label(cv2.resize(image[:, :image.shape[1] // 3], (640, 400), interpolation=cv2.INTER_AREA), name)
+                 for name, image in drawn.items()]
         means += [np.zeros_like(means[0])] * (len(means) % 2)
         cv2.imwrite(str(picture), np.vstack([np.hstack(means[i:i + 2]) for i in range(0, len(means), 2)]))
 
@@ -146,14 +151,14 @@ def localization_figures(result, csv, map_path, truths, picture):
     return figures
 
 
-def crossing_moment(truth):
-    """When a moving object is nearest to a point 4 m ahead of the vehicle's origin, as a fraction of the drive's duration."""
+def crossing_stamp(truth):
+    """When a moving object is nearest to a point 4 m before the car's front, in ns."""
     images = yaml.safe_load((truth / "movers.yaml").read_text())["images"]
     poses = at_stamps(truth / "trajectory.tum", np.array([image["stamp_ns"] * 1e-9 for image in images]))
-    ahead = poses[:, 1:4] + 4.0 * rotations(poses[:, 4:])[:, :, 0]
+    ahead = poses[:, 1:4] + (FRONT_M + 4.0) * rotations(poses[:, 4:])[:, :, 0]
     distances = [min((np.linalg.norm(np.array(mover["translation_m"]) - point) for mover in image["movers"]), default=np.inf)
                  for image, point in zip(images, ahead)]
-    return int(np.argmin(distances)) / (len(images) - 1)
+    return images[int(np.argmin(distances))]["stamp_ns"]
 
 
 def judge_obstacles(output, truth, figures, folder):

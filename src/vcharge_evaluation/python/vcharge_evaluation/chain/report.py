@@ -87,8 +87,9 @@ def summary_rows(figures):
                      f"{obstacles['missed']} of {obstacles['obstacles']}; {obstacles['false_per_10_m']:.1f} per 10 m",
                      "not given"))
     for one in (one for one in obstacles.get("reports", []) if one["moves"]):
-        reported = "never" if one["first_reported_m"] is None else f"at {one['first_reported_m']:.1f} m"
-        rows.append((f"{one['kind']} who comes as near as {one['nearest_m']:.1f} m: first reported", reported, "not given"))
+        reported = "never" if one["first_reported_m"] is None else f"{one['first_reported_m']:.1f} m"
+        rows.append((f"{one['kind']} who comes as near as {one['nearest_m']:.1f} m: least distance until first reported", reported,
+                     "not given"))
     nodelets = figures.get("nodelets", {})
     if nodelets:
         rows.append(("nodelets give what the offline tools give", f"{nodelets['equal_poses']} of {nodelets['poses']} poses, "
@@ -127,19 +128,21 @@ def verdict_rows(figures):
 PICTURES = (
     ("Lenses", (("intrinsics.png", "How far the calibrated lens is from the true one, by the angle from its axis"),)),
     ("The own body", (("masks.png", "Mean images of the drive; red: the own body, hidden from all stages"),)),
-    ("Extrinsics", (("rig.png", "Errors of the extrinsics"),)),
-    ("The sparse map", (("map.png", "The map from above, over the truth"),
-                        ("map_landmarks.png", "Its landmarks in the image with most of them, by distance"))),
+    ("Extrinsics", (("rig.png", "Errors of the extrinsics along and about the vehicle's axes"),)),
+    ("The sparse map", (("map.png", "Its landmarks from above (dots), loop edges, and the true drive (black)"),
+                        ("map_landmarks.png", "Landmarks in one image: coloured by distance, larger where seen more often"))),
     ("Range maps", (("input_frames.png", "What the cameras see on another day"),
-                    ("range_maps.png", "Range along each pixel's ray"),
+                    ("range_maps.png", "Range along each pixel's ray (red near, blue far, black unknown)"),
                     ("rviz_ranges.png", "Images, range maps and clouds in rviz"),
-                    ("cloud_from_above.png", "The points of all cameras from above"))),
-    ("Height map", (("height_map.png", "Heights, drivable cells, gray of the images"),
+                    ("cloud_from_above.png", "The points of all cameras from above, blue low, red high; white: the drive; gray: the true heights if known"))),
+    ("Height map", (("height_map.png", "Heights, brightness in the images, drivable cells"),
                     ("height_map_octomap.png", "Occupied voxels of the OctoMap by height"),
-                    ("rviz_height_map.png", "Mesh, grid and OctoMap in rviz"))),
-    ("The pose on another day", (("localization.png", "Errors frame by frame"), ("rviz_pose.png", "In rviz"))),
-    ("Obstacles", (("obstacles.png", "What a camera reports, and the fused map"),
-                   ("rviz_obstacles.png", "Obstacle map and scan in rviz"))),
+                    ("rviz_height_map.png", "Mesh and drivable grid in rviz"))),
+    ("The pose on another day", (("localization.png", "Errors frame by frame, and the standard deviation (sigma) that the tool gives"), ("rviz_pose.png", "In rviz"))),
+    ("Obstacles", (("obstacles.png", "Left: what one camera reports, in its image (red: obstacles; green: free ground) and from "
+                    "above (white: obstacles; gray: free ground). Right: the map of all cameras (red: occupied; green: free; dark: "
+                    "unknown). White: the car. Where the truth is known: cyan stands, magenta moves, reported or not"),
+                   ("rviz_obstacles.png", "Obstacle map (black: occupied; light: free) and scan (red dots) in rviz"))),
     ("The published images of the V-Charge car", (("real_height_map.png", "Height map: cobbles, kerb, hedge"),
                                                   ("real_obstacles.png", "Obstacles: kerb and hedge; the cobbles are free"))),
 )

@@ -204,7 +204,7 @@ class Chain(StepFolders):
             run_tool("compute_range_maps", folder / "ranges.log", "--bag", drive / "drive.bag", "--rig", rig, "--options",
                      options, "--output", output)
             self.draw("ranges", "", folder, "--bag", drive / "drive.bag", "--rig", rig, "--range", output,
-                      *(["--truth", truth, "--moment", figures.crossing_moment(truth)] if truth else []))
+                      *(["--truth", truth, "--stamp-ns", figures.crossing_stamp(truth)] if truth else []))
             return figures.judge_ranges(output, truth, drive / "drive.bag", rig, folder) if truth else {}
 
         return self.step("ranges", "range maps", needs, [text], work)
@@ -234,7 +234,7 @@ class Chain(StepFolders):
                               "--range-options", self.range_options(ranges, cameras, folder), "--output", folder / "maps")
             found = figures.pick(result, "num_maps", "content_hash", "processor_ms_per_range_map")
             self.draw("obstacles", f"{name}.png", folder, "--bag", drive / "drive.bag", "--rig", rig, "--obstacles", folder / "maps",
-                      *(["--truth", truth, "--camera", "front", "--moment", figures.crossing_moment(truth)] if truth else []))
+                      *(["--truth", truth, "--camera", "front", "--stamp-ns", figures.crossing_stamp(truth)] if truth else []))
             if truth:
                 figures.judge_obstacles(folder / "maps", truth, found, folder)
             return found

@@ -32,6 +32,6 @@ def draw_range_map(bag, folder, camera):
 def draw_obstacles(drive, folder):
     """Image, scan and fused map late in a drive; `folder` is that of detect_obstacles."""
     output = folder.parent / f"{folder.name}.png"
-    obstacles.draw(argparse.Namespace(bag=drive.bag, rig=drive.true_rig, obstacles=folder, camera=None, moment=0.7,
-                                      truth=drive.truth, output=output))
+    obstacles.draw(argparse.Namespace(bag=drive.bag, rig=drive.true_rig, obstacles=folder, camera=None, stamp_ns=None,
+                                      moment=0.7, truth=drive.truth, output=output))
     return cv2.imread(str(output))

@@ -1,5 +1,6 @@
 """Draws one moment of a drive's obstacle maps: an image with the obstacles, one camera's scan, and the fused map (green
-free, red occupied, dark unknown) with the true outlines if they are given."""
+free, red occupied, dark unknown) with the vehicle (white) and, if the truth is given, the true outlines of what stands (cyan)
+and moves (magenta)."""
 import argparse
 import csv
 import math
@@ -10,10 +11,11 @@ import numpy as np
 import yaml
 
 from vcharge_evaluation.camera_models import project
-from vcharge_evaluation.drawing.pictures import read_image, save
+from vcharge_evaluation.drawing.pictures import add_moment_arguments, chosen_stamp, read_image, save
 from vcharge_evaluation.poses import rotations
 
 PIXELS_PER_CELL = 4
+CYAN, MAGENTA = (255, 255, 0), (255, 0, 255)
 
 
 def read_scans(path):
@@ -24,8 +26,8 @@ def read_scans(path):
     return scans
 
 
-def draw_over_image(image, scan, camera):
-    """Obstacles as vertical bars up to their heights, free ground as green dots."""
+def draw_over_image(image, scan, camera, truth):
+    """Obstacles as vertical bars up to their heights, free ground as green dots, what truly moves in frames."""
     picture = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
     pose = camera["vehicle_from_camera"]
     rotation = rotations([pose["rotation_xyzw"]])[0]
@@ -51,6 +53,11 @@ def draw_over_image(image, scan, camera):
             ends, ok = pixels_of([at(ray["range_m"], 0.0), at(ray["range_m"], ray["height_m"])])
             if ok.all():
                 cv2.line(picture, tuple(int(v) for v in ends[0]), tuple(int(v) for v in ends[1]), (0, 0, 255), 2)
+    for mover in truth.moving if truth else ():
+        corners, ok = pixels_of(truth.corners(mover))
+        if ok.all():
+            low, high = corners.min(0).astype(int) - 3, corners.max(0).astype(int) + 3
+            cv2.rectangle(picture, tuple(low.tolist()), tuple(high.tolist()), MAGENTA, 1)
     return picture
 
 
@@ -81,6 +88,33 @@ def yaw_of(q):
     return 2 * math.atan2(q[2], q[3])
 
 
+def read_yaml(path):
+    return yaml.load(path.read_text(), Loader=yaml.CSafeLoader)
+
+
+class Truth:
+    """What stands and what moves at one stamp, in the vehicle's frame."""
+
+    def __init__(self, folder, stamp_ns):
+        poses = np.loadtxt(folder / "trajectory.tum")
+        pose = poses[np.argmin(abs(poses[:, 0] - stamp_ns * 1e-9))]
+        self.position_m, yaw = pose[1:4], yaw_of(pose[4:])
+        self.turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+        self.standing = read_yaml(folder / "obstacles.yaml")["obstacles"]
+        images = read_yaml(folder / "movers.yaml")["images"] if (folder / "movers.yaml").exists() else []
+        self.moving = min(images, key=lambda image: abs(image["stamp_ns"] - stamp_ns))["movers"] if images else []
+
+    def footprint(self, obstacle):
+        """Corners, N x 2, metres."""
+        return (np.array(obstacle["footprint_m"]) - self.position_m[:2]) @ self.turn
+
+    def corners(self, obstacle):
+        """Corners on the ground and of the top, 2N x 3, metres."""
+        flat = self.footprint(obstacle)
+        return np.vstack([np.column_stack([flat, np.full(len(flat), obstacle[key] - self.position_m[2])])
+                          for key in ("base_z_m", "top_z_m")])
+
+
 def draw_map(folder, stamp, truth):
     gray = cv2.imread(str(folder / f"{stamp}.pgm"), cv2.IMREAD_UNCHANGED)
     meta = yaml.safe_load((folder / f"{stamp}.yaml").read_text())
@@ -97,12 +131,9 @@ def draw_map(folder, stamp, truth):
         cv2.polylines(picture, [np.stack([cells[:, 0], gray.shape[0] * k - cells[:, 1]], 1).astype(int)], True, colour, 1)
 
     outline([[3.7, .9], [3.7, -.9], [-.9, -.9], [-.9, .9]], (255, 255, 255))
-    if truth:
-        poses = np.loadtxt(truth / "trajectory.tum")
-        pose = poses[np.argmin(abs(poses[:, 0] - stamp * 1e-9))]
-        c, s = math.cos(-yaw_of(pose[4:])), math.sin(-yaw_of(pose[4:]))
-        for obstacle in yaml.load((truth / "obstacles.yaml").read_text(), Loader=yaml.CSafeLoader)["obstacles"]:
-            outline((np.array(obstacle["footprint_m"]) - pose[1:3]) @ np.array([[c, s], [-s, c]]), (255, 255, 0))
+    for obstacles, colour in ((truth.standing, CYAN), (truth.moving, MAGENTA)) if truth else ():
+        for obstacle in obstacles:
+            outline(truth.footprint(obstacle), colour)
     return picture
 
 
@@ -112,7 +143,7 @@ def main():
     parser.add_argument("--rig", type=pathlib.Path, required=True)
     parser.add_argument("--obstacles", type=pathlib.Path, required=True, help="folder that detect_obstacles wrote")
     parser.add_argument("--camera", help="default: left, or the first of the rig")
-    parser.add_argument("--moment", type=float, default=0.7, help="time in the drive as a fraction of its duration")
+    add_moment_arguments(parser, 0.7)
     parser.add_argument("--truth", type=pathlib.Path)
     parser.add_argument("--output", type=pathlib.Path, required=True)
     draw(parser.parse_args())
@@ -128,10 +159,11 @@ def draw(arguments):
                    if arguments.camera in read_scans(arguments.obstacles / f"{stamp}_scans.csv")]
     if not with_camera:
         raise SystemExit(f"{arguments.obstacles}: no scan of camera '{arguments.camera}'")
-    stamp = with_camera[int(arguments.moment * (len(with_camera) - 1))]
+    stamp = chosen_stamp(arguments, with_camera)
     scan = read_scans(arguments.obstacles / f"{stamp}_scans.csv")[arguments.camera]
-    over = draw_over_image(read_image(arguments.bag, arguments.camera, stamp), scan, camera)
-    fused = draw_map(arguments.obstacles, stamp, arguments.truth)
+    truth = Truth(arguments.truth, stamp) if arguments.truth else None
+    over = draw_over_image(read_image(arguments.bag, arguments.camera, stamp), scan, camera, truth)
+    fused = draw_map(arguments.obstacles, stamp, truth)
     height = fused.shape[0]
     over = cv2.resize(over, (over.shape[1] * height // (2 * over.shape[0]), height // 2))
     own = cv2.resize(draw_scan(scan, height // 2), (height // 2, height // 2))

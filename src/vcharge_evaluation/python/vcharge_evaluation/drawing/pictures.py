@@ -42,3 +42,24 @@ def read_image(bag_path, camera, stamp_ns):
                     return cv2.imdecode(data, cv2.IMREAD_GRAYSCALE)
                 return data.reshape(message.height, message.step)[:, :message.width]
     raise SystemExit(f"{bag_path}: no image of camera '{camera}' at {stamp_ns} ns")
+
+
+def label(image, text):
+    """A copy in colours with a text in its upper left corner."""
+    image = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image.copy()
+    cv2.putText(image, text, (10, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.7, (0, 0, 0), 4, cv2.LINE_AA)
+    cv2.putText(image, text, (10, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.7, (255, 255, 255), 1, cv2.LINE_AA)
+    return image
+
+
+def add_moment_arguments(parser, default):
+    """Adds --stamp-ns and --moment, which `chosen_stamp` reads."""
+    parser.add_argument("--stamp-ns", type=int, help="draws what is nearest to this time")
+    parser.add_argument("--moment", type=float, default=default, help="without --stamp-ns: fraction of what there is to draw")
+
+
+def chosen_stamp(arguments, stamps):
+    """The stamp to draw, of those (ns, sorted) of which something is there."""
+    if arguments.stamp_ns is not None:
+        return min(stamps, key=lambda stamp: abs(stamp - arguments.stamp_ns))
+    return stamps[int(arguments.moment * (len(stamps) - 1))]

@@ -7,7 +7,7 @@ import numpy as np
 import rosbag
 import yaml
 
-from vcharge_evaluation.drawing.pictures import read_image, save
+from vcharge_evaluation.drawing.pictures import add_moment_arguments, chosen_stamp, label, read_image, save
 from vcharge_evaluation.poses import pose_of, stamp_ns, transform
 
 CLOUD_CELL_M = 0.05
@@ -40,13 +40,6 @@ def rays_of(size, mei):
     discriminant = 1 + (1 - mei["xi"] ** 2) * r
     scale = (mei["xi"] + np.sqrt(np.where(discriminant > 0, discriminant, np.nan))) / (r + 1)
     return np.stack([scale * x, scale * y, scale - mei["xi"]])
-
-
-def label(image, text):
-    image = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR) if image.ndim == 2 else image.copy()
-    cv2.putText(image, text, (10, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.7, (0, 0, 0), 4, cv2.LINE_AA)
-    cv2.putText(image, text, (10, 24), cv2.FONT_HERSHEY_SIMPLEX, 0.7, (255, 255, 255), 1, cv2.LINE_AA)
-    return image
 
 
 class Cloud:
@@ -95,7 +88,7 @@ def main():
     parser.add_argument("--bag", type=pathlib.Path, required=True)
     parser.add_argument("--rig", type=pathlib.Path, required=True)
     parser.add_argument("--range", type=pathlib.Path, required=True)
-    parser.add_argument("--moment", type=float, default=0.5, help="of the images, as a fraction of the drive's duration")
+    add_moment_arguments(parser, 0.5)
     parser.add_argument("--truth", type=pathlib.Path)
     parser.add_argument("--output", type=pathlib.Path, required=True)
     arguments = parser.parse_args()
@@ -125,7 +118,7 @@ def main():
                 good = (sigma < MAX_RELATIVE_SIGMA * distance) & (confidence > MIN_CONFIDENCE) & (distance < 15)
             points = np.vstack([rays[:, good] * distance[good], np.ones(good.sum())])
             cloud.add((poses[stamp] @ vehicle_from_camera @ points)[:3])
-        shown = stamps[int(arguments.moment * (len(stamps) - 1))]
+        shown = chosen_stamp(arguments, stamps)
         image = read_image(arguments.bag, camera, shown)
         inputs.append(label(cv2.resize(image, (640, 400), interpolation=cv2.INTER_AREA), camera))
         picture = cv2.imread(str(folder / f"{shown}_range.png"))
