@@ -36,19 +36,9 @@ def all_scenarios(driving=DRIVING):
     return [*driving, *noons.values(), *conditions]
 
 
-def read_scenario(name):
-    return yaml.safe_load((SCENARIOS / f"{name.removeprefix(NOON)}.yaml").read_text())
-
-
 def scene_and_drive(name):
-    scenario = read_scenario(name)
+    scenario = yaml.safe_load((SCENARIOS / f"{name.removeprefix(NOON)}.yaml").read_text())
     return scenario.get("scene", "lot"), scenario.get("drive", "short")
-
-
-def plan_words(name, seed):
-    """Words that draw the plan and the surfaces of a scenario's scene from a seed, if the scenario has them drawn."""
-    scenario = read_scenario(name)
-    return [word for key in ("layout_seed", "surface_seed") if scenario.get(key) for word in ("--set", f"{key}={seed}")]
 
 
 def arguments():
@@ -67,8 +57,7 @@ class Condition:
 
     def __init__(self, args, name):
         scene, driven = scene_and_drive(name)
-        size = ("--image-scale", args.image_scale, "--duration-s", args.duration_s * TIMES_LONGER.get(scene, 1),
-                *plan_words(name, args.seed))
+        size = ("--image-scale", args.image_scale, "--duration-s", args.duration_s * TIMES_LONGER.get(scene, 1))
         noon = ("--scene", scene, "--drive", MAP_DRIVES.get(driven, driven), "--scene-seed", args.seed)
         mapping = Drive(args.work, f"noon_{scene}_{driven}", *noon, "--seed", args.seed + 1, "--image-step", 2, *size)
         words = (*noon[:2], "--drive", driven) if name.startswith(NOON) else ("--scenario", SCENARIOS / f"{name}.yaml")

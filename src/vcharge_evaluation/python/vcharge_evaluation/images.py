@@ -201,8 +201,7 @@ def main():
     for scene, seed in args.drives:
         folder = args.work / f"{scene}_{seed}"
         seeds = [word for option in ("--scene-seed", "--seed") for word in (option, seed)]
-        drawn = [f"layout_seed={seed}", f"surface_seed={seed}"]
-        settings = [word for setting in [*drawn, *args.set] for word in ("--set", setting)]
+        settings = [word for setting in args.set for word in ("--set", setting)]
         simulate(folder, ["--scene", scene, "--drive", "loop", "--cameras", CAMERA, "--duration-s", args.duration_s, *seeds,
                           *settings])
         measure(scene, read_drive(f"{scene}:{seed}", folder / "drive.bag", folder / "rig_truth.yaml", "/ground_truth"), real.get(scene, {}))

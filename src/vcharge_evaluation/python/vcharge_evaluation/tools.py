@@ -10,9 +10,12 @@ import subprocess
 import sys
 import time
 
+import yaml
+
 ROOT = pathlib.Path(__file__).resolve().parents[4]
 TOOLS = ROOT / "build" / "devel" / "lib"
 CONFIG = ROOT / "config"
+SCENES_WITH_PLANS = ("lot", "garage")  # whose plan a seed draws
 
 
 class NoResult(RuntimeError):
@@ -110,9 +113,20 @@ def judge_rig(estimate, truth, report):
     return json.loads(report.read_text())
 
 
+def drawn(words):
+    """Words that draw the plan and the surfaces of a drive's scene, both with the seed of the scene."""
+    given = dict(zip(words, words[1:]))
+    scenario = yaml.safe_load(pathlib.Path(given["--scenario"]).read_text()) if "--scenario" in given else {}
+    scene, seed = given.get("--scene", scenario.get("scene", "lot")), given.get("--scene-seed", "1")
+    keys = ("layout_seed", "surface_seed") if scene in SCENES_WITH_PLANS else ("surface_seed",)
+    return [word for key in keys for word in ("--set", f"{key}={seed}")]
+
+
 def simulate(folder, words):
-    """Simulates FOLDER/drive.bag. A complete drive that was made with the same words is kept."""
+    """Simulates FOLDER/drive.bag in a scene with drawn plan and surfaces. A complete drive that was made with the same words is
+    kept."""
     words = [str(word) for word in words]
+    words = [*drawn(words), *words]
     done = folder / "simulated.txt"
     if done.exists() and done.read_text() == " ".join(words):
         say(f"{folder}: drive kept")

@@ -13,7 +13,7 @@ from vcharge_evaluation.chain import figures, nodelets, report
 from vcharge_evaluation.chain.arguments import arguments
 from vcharge_evaluation.chain.step_folders import StepFolders, fingerprint
 from vcharge_evaluation.drives import OTHER_DAY
-from vcharge_evaluation.tools import CONFIG, ROOT, import_published_images, run, run_tool, say, tool_path
+from vcharge_evaluation.tools import CONFIG, ROOT, drawn, import_published_images, run, run_tool, say, tool_path
 
 RVIZ_SCREENSHOT = ROOT / "src" / "vcharge_evaluation" / "scripts" / "rviz_screenshot.sh"
 CAMERAS = ("front", "left", "rear", "right")
@@ -44,6 +44,7 @@ class Chain(StepFolders):
 
     def simulate(self, name, title, *words):
         words = ["--scene", self.args.scene, *self.simulator_arguments, *words]
+        words = [*drawn([str(word) for word in words]), *words]
 
         def work(folder):
             run_tool("simulate_drive", folder / "simulate.log", *words, "--output", folder / "drive.bag")
