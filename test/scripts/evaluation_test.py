@@ -71,6 +71,13 @@ class DrivesTest(FolderTest):
         path = drives.write_masked_rig(truth, None, self.folder / "truth" / "rig_found.yaml")
         self.assertNotIn("mask", yaml.safe_load(path.read_text())["cameras"]["left"])
 
+    def test_a_scene_with_one_plan_has_only_its_surfaces_drawn(self):
+        self.assertEqual(tools.drawn(["--scene", "garage", "--scene-seed", "7"]),
+                         ["--set", "layout_seed=7", "--set", "surface_seed=7"])
+        self.assertEqual(tools.drawn(["--scenario", str(tools.CONFIG / "scenarios" / "road_fast.yaml"), "--scene-seed", "7"]),
+                         ["--set", "surface_seed=7"])
+        self.assertEqual(tools.drawn([]), ["--set", "layout_seed=1", "--set", "surface_seed=1"])
+
     def test_reasons_in_results_name_no_paths(self):
         run = tools.Run(0, 0, 0, {"error": "/tmp/some/drive.bag: no range map could be made (front: stands)"})
         self.assertEqual(run.reason(), "no range map could be made (front: stands)")

@@ -56,8 +56,8 @@ void judgeCalibration(const IntrinsicCalibrationOptions& options, IntrinsicCalib
   }
   if (coverage.coveredFraction() < kFailCoverage || coverage.reach() < kFailReach) {
     return fail("the board was only seen in the middle, on " + toText(100.0 * coverage.coveredFraction(), 0) +
-                " % of the image: pictures with the board at the image's " + join(coverage.missingParts()) +
-                " are missing");
+                " % of the image: pictures with the board in the " + join(coverage.missingParts()) +
+                " part of the image are missing");
   }
   result->verdict = Verdict::kPass;
   const auto warn = [result](const std::string& remark) {
@@ -67,8 +67,9 @@ void judgeCalibration(const IntrinsicCalibrationOptions& options, IntrinsicCalib
   const std::vector<std::string> missing = coverage.missingParts();
   if (coverage.coveredFraction() < kWarnCoverage || !missing.empty()) {
     warn("corners cover only " + toText(100.0 * coverage.coveredFraction(), 0) + " % of the image: " +
-         (missing.empty() ? "hold the board also at its sides and in its corners"
-                          : "pictures with the board at the image's " + join(missing) + " are missing"));
+         (missing.empty()
+              ? "hold the board also at its sides and in its corners"
+              : "pictures with the board in the " + join(missing) + " part of the image are missing"));
   }
   if (static_cast<double>(tilted) < kMinTiltedFraction * static_cast<double>(result->views.size())) {
     warn("the board faces the camera in nearly all images: pictures with the board tilted are missing");
