@@ -4,7 +4,7 @@ import argparse
 
 import yaml
 
-from vcharge_evaluation.drawing.moments import draw_obstacles
+from vcharge_evaluation.drawing.moments import OBSTACLE_LEGEND, draw_obstacles
 from vcharge_evaluation.drives import SCENARIOS, Drive, found_masks
 from vcharge_evaluation.localization_errors import BOUND_DEG, BOUND_M, LocalizationErrors, Map
 from vcharge_evaluation.obstacles import judge_obstacles, summary
@@ -147,8 +147,8 @@ def main():
                     (name, condition.figures()))
         if condition.drawn:
             results.show(draw_obstacles(condition.drive, condition.drive.folder / "obstacles"),
-                         f"{name}: mean range error of obstacles {100 * condition.badness:.1f} cm. Image with obstacles, scan and "
-                         "map: green free, red occupied, dark unknown, true outlines cyan", condition.badness)
+                         f"{name}: mean range error of obstacles {100 * condition.badness:.1f} cm. {OBSTACLE_LEGEND}",
+                         condition.badness)
     results.end()
 
 

@@ -4,7 +4,7 @@ import argparse
 import collections
 import csv
 
-from vcharge_evaluation.drawing.moments import draw_obstacles
+from vcharge_evaluation.drawing.moments import OBSTACLE_LEGEND, draw_obstacles
 from vcharge_evaluation.drives import SCENARIOS, Drive, found_masks
 from vcharge_evaluation.localization_errors import BOUND_M, LocalizationErrors, Map
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure
@@ -130,7 +130,7 @@ def main():
         if means:
             drive.truth = truth
             results.show(draw_obstacles(drive, folder / "obstacles"), f"{fault}: mean range error of obstacles {means[0]:.1f} cm. "
-                         "Image with obstacles, scan, and map: green free, red occupied, dark unknown, true outlines cyan", means[0])
+                         f"{OBSTACLE_LEGEND}", means[0])
     results.end()
 
 

@@ -55,9 +55,11 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__)
     add_arguments(parser, "image_evaluation")
     parser.add_argument("--drives", nargs="*", type=drive_of, metavar="SCENE:SEED",
-                        default=[drive_of(word) for word in ("lot:201", "lot:202", "garage:211", "garage:212")], help="the seed draws plan and surfaces too")
+                        default=[drive_of(word) for word in ("lot:201", "lot:202", "garage:211", "garage:212")],
+                        help="the seed draws plan and surfaces too")
     parser.add_argument("--duration-s", type=float, default=10.0, help="of the simulated drives")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="option of the simulated drives, as in layout_seed=0")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE",
+                        help="option of the simulated drives, as in layout_seed=0")
     return parser.parse_args()
 
 

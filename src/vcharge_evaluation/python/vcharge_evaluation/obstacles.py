@@ -1,7 +1,7 @@
 """Obstacles: range errors, obstacles missed, false cells, and cells inside obstacles that were free."""
 import argparse
 
-from vcharge_evaluation.drawing.moments import draw_obstacles
+from vcharge_evaluation.drawing.moments import OBSTACLE_LEGEND, draw_obstacles
 from vcharge_evaluation.drives import OTHER_DAY, Drive, found_masks
 from vcharge_evaluation.results import Figure, Results, add_arguments, calibration_figures, figure, percent
 from vcharge_evaluation.tools import CONFIG, NoResult, judge, run_tool_once
@@ -182,8 +182,7 @@ def main():
                     (column, calibration_figures(found["calibration"])))
         results.show(draw_obstacles(drive, drive.folder / "obstacles"),
                      f"{column}: mean range error {100 * found['mean_m']:.1f} cm, {found['missed']} of {found['obstacles']} "
-                     "obstacles missed. Image with obstacles, scan, and map: green free, red occupied, dark unknown, true outlines "
-                     "cyan", found["missed"] + found["mean_m"])
+                     f"obstacles missed. {OBSTACLE_LEGEND}", found["missed"] + found["mean_m"])
     results.end()
 
 

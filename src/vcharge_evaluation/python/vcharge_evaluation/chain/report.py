@@ -134,11 +134,13 @@ PICTURES = (
     ("Range maps", (("input_frames.png", "What the cameras see on another day"),
                     ("range_maps.png", "Range along each pixel's ray (red near, blue far, black unknown)"),
                     ("rviz_ranges.png", "Images, range maps and clouds in rviz"),
-                    ("cloud_from_above.png", "The points of all cameras from above, blue low, red high; white: the drive; gray: the true heights if known"))),
+                    ("cloud_from_above.png", "The points of all cameras from above, blue low, red high; white: the drive; gray: the true "
+                     "heights if known"))),
     ("Height map", (("height_map.png", "Heights, brightness in the images, drivable cells"),
                     ("height_map_octomap.png", "Occupied voxels of the OctoMap by height"),
                     ("rviz_height_map.png", "Mesh and drivable grid in rviz"))),
-    ("The pose on another day", (("localization.png", "Errors frame by frame, and the standard deviation (sigma) that the tool gives"), ("rviz_pose.png", "In rviz"))),
+    ("The pose on another day", (("localization.png", "Errors frame by frame, and the standard deviation (sigma) that the "
+                                   "tool gives"), ("rviz_pose.png", "In rviz"))),
     ("Obstacles", (("obstacles.png", "Left: what one camera reports, in its image (red: obstacles; green: free ground) and from "
                     "above (white: obstacles; gray: free ground). Right: the map of all cameras (red: occupied; green: free; dark: "
                     "unknown). White: the car. Where the truth is known: cyan stands, magenta moves, reported or not"),

@@ -9,6 +9,9 @@ from vcharge_evaluation.drawing.pictures import read_image
 
 NEAREST_M, FARTHEST_M = 0.5, 20.0
 HEIGHT_PX = 300
+# What draw_obstacles shows, for captions.
+OBSTACLE_LEGEND = ("Image with obstacles, scan, and map: green free, red occupied, dark unknown; true outlines of what stands cyan, "
+                   "of what moves magenta")
 
 
 def colour_ranges(range_m):
