@@ -127,6 +127,12 @@ class PageTest(unittest.TestCase):
         self.assertEqual(page.PAGE.read_text(encoding="utf-8"), page.make_page(),
                          "doc/results.md is stale or edited by hand: run scripts/in_build.sh python3 -m vcharge_evaluation.page")
 
+    def test_no_two_figures_of_a_row_have_one_name(self):
+        for path in results.RESULTS.glob("*.json"):
+            for measurement in results.read(path)[1]:
+                names = [figure.name for figure in measurement.figures]
+                self.assertEqual(len(names), len(set(names)), f"{path.name}: {measurement.title}, {measurement.condition}")
+
     def test_one_table_holds_what_several_commands_measured(self):
         both = [results.Measurement("t", scene, [results.Figure("error", 1)], f"measure {scene}", "2026-01-02", "abc")
                 for scene in ("lot", "garage")]

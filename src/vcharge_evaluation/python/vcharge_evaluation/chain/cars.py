@@ -40,8 +40,8 @@ def scaled(figures, step, key, factor=1.0):
 def pose_figures(figures, step, title):
     found = figures.get(step, {})
     yield figure(f"pose in the map, {title}: median", scaled(figures, step, "median_m", 100), "cm", at_most=5)
-    yield figure("the same, angle", scaled(figures, step, "median_deg"), "degrees", at_most=0.1)
-    yield Figure("the same, 95 %", scaled(figures, step, "p95_m", 100), "cm")
+    yield figure(f"pose in the map, {title}: median of the angle", scaled(figures, step, "median_deg"), "degrees", at_most=0.1)
+    yield Figure(f"pose in the map, {title}: 95 %", scaled(figures, step, "p95_m", 100), "cm")
     yield Figure(f"frames localized, {title}, of {found.get('frames')}", found.get("localized"))
     yield figure(f"wrong poses reported as localized, {title}", found.get("wrong"), equal=0)
     yield Figure(f"normalized error squared per degree of freedom, {title}", found.get("normalized"))
@@ -49,7 +49,7 @@ def pose_figures(figures, step, title):
 
 def height_figures(figures, step, title):
     yield figure(f"height map, {title}: mean", scaled(figures, step, "mean_m", 100), "cm", at_most=5)
-    yield Figure("the same, tape measures: mean", scaled(figures, step, "tape_m", 100), "cm")
+    yield Figure(f"tape measures, {title}: mean error", scaled(figures, step, "tape_m", 100), "cm")
     yield Figure(f"tape measures shown, {title}, of {figures.get(step, {}).get('all_tapes')}",
                  figures.get(step, {}).get("tapes"))
 
@@ -57,7 +57,7 @@ def height_figures(figures, step, title):
 def obstacle_figures(figures, step, title):
     found = figures.get(step, {})
     yield figure(f"obstacles within 5 m, {title}: mean", scaled(figures, step, "mean_m", 100), "cm", at_most=7)
-    yield Figure("the same, 95 %", scaled(figures, step, "p95_m", 100), "cm")
+    yield Figure(f"obstacles within 5 m, {title}: 95 %", scaled(figures, step, "p95_m", 100), "cm")
     yield Figure(f"obstacles missed, {title}", found.get("missed"))
     yield Figure(f"false cells per 10 m, {title}", found.get("false_per_10_m"))
     yield Figure(f"cells inside obstacles that were free, {title}", found.get("free_inside"))
