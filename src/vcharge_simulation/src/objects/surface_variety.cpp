@@ -1,7 +1,7 @@
 #include "objects/surface_variety.h"
 
 #include <algorithm>
-#include <cmath>
+#include <initializer_list>
 
 #include <opencv2/imgproc.hpp>
 
@@ -9,32 +9,48 @@
 
 namespace vcharge {
 
-// The middle of each range is near what the published V-Charge images of a street and of a workshop show.
-SurfaceVariety SurfaceVariety::outdoors(uint64_t seed) {
+namespace {
+
+struct Range {
+  double SurfaceVariety::*value;
+  double low, high;
+};
+
+// Draws the values in the order of their ranges.
+SurfaceVariety drawVariety(uint64_t seed, std::initializer_list<Range> ranges) {
   SurfaceVariety variety;
-  if (seed != 0) {
-    Random random(seed * 7717U + 19U);
-    variety.grain = random.uniform(2.05, 2.75);
-    variety.pattern = random.uniform(0.35, 0.9);
-    variety.leaf = random.uniform(0.45, 0.75);
-    variety.grain_size = random.uniform(0.55, 0.7);
-    variety.has_coarse_grain = true;
-    variety.relief_m = random.uniform(0.05, 0.07);
-    variety.foliage = random.uniform(0.25, 0.45);
+  Random random(seed * 7717U + 19U);
+  for (const Range& range : ranges) {
+    variety.*range.value = random.uniform(range.low, range.high);
   }
   return variety;
 }
 
-SurfaceVariety SurfaceVariety::indoors(uint64_t seed) {
-  SurfaceVariety variety;
-  if (seed != 0) {
-    Random random(seed * 7717U + 19U);
-    variety.grain = random.uniform(0.5, 0.9);
-    variety.pattern = random.uniform(0.35, 0.9);
-    variety.grain_size = random.uniform(0.55, 0.7);
-    variety.relief_m = random.uniform(0.005, 0.015);
+}  // namespace
+
+// The middle of each range is near what the published V-Charge images of a street and of a workshop show.
+SurfaceVariety SurfaceVariety::outdoors(uint64_t seed) {
+  if (seed == 0) {
+    return {};
   }
+  SurfaceVariety variety = drawVariety(seed, {{&SurfaceVariety::grain, 2.05, 2.75},
+                                              {&SurfaceVariety::pattern, 0.35, 0.9},
+                                              {&SurfaceVariety::leaf, 0.45, 0.75},
+                                              {&SurfaceVariety::grain_size, 0.55, 0.7},
+                                              {&SurfaceVariety::relief_m, 0.05, 0.07},
+                                              {&SurfaceVariety::foliage, 0.25, 0.45}});
+  variety.has_coarse_grain = true;
   return variety;
+}
+
+SurfaceVariety SurfaceVariety::indoors(uint64_t seed) {
+  if (seed == 0) {
+    return {};
+  }
+  return drawVariety(seed, {{&SurfaceVariety::grain, 0.5, 0.9},
+                            {&SurfaceVariety::pattern, 0.35, 0.9},
+                            {&SurfaceVariety::grain_size, 0.55, 0.7},
+                            {&SurfaceVariety::relief_m, 0.005, 0.015}});
 }
 
 void SurfaceVariety::fade(double texels_per_m, cv::Mat* texture) const {

@@ -115,12 +115,10 @@ float SurfaceShader::shadeGroundPixel(const Material& material, const std::array
                                       float footprint_m, const TracedLight& traced) const {
   const float stretch = stretchOf(direction);
   std::array<Eigen::Vector3f, 4> positions = samples;
-  if (scene_.ground.relief_m != 0.0F) {
-    const Eigen::Vector3f shift =
-        reliefShift(0.5F * (samples[0] + samples[3]), direction, footprint_m * std::sqrt(stretch));
-    for (Eigen::Vector3f& position : positions) {
-      position += shift;
-    }
+  const Eigen::Vector3f shift =
+      reliefShift(0.5F * (samples[0] + samples[3]), direction, footprint_m * std::sqrt(stretch));
+  for (Eigen::Vector3f& position : positions) {
+    position += shift;
   }
   const GroundTexture& texture = scene_.ground.layers[static_cast<size_t>(material.texture)];
   const float level = fastLog2(groundSampleWidth(footprint_m, stretch) * texture.texels_per_m);

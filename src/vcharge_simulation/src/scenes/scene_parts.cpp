@@ -92,10 +92,10 @@ void SceneParts::addGroundDetails(uint64_t seed) {
   if (surfaces_.has_coarse_grain) {
     stretches.push_back(4.2);
   }
+  const Texture detail(drawGroundDetail(1024, seed + 40), Texture::Border::kRepeat);
   for (const double stretch : stretches) {
-    ground.details.push_back({Texture(drawGroundDetail(1024, seed + 40), Texture::Border::kRepeat), 0.0F,
-                              0.0F,
-                              static_cast<float>(1.0 / (kDetailTexel_m * surfaces_.grain_size * stretch))});
+    ground.details.push_back(
+        {detail, 0.0F, 0.0F, static_cast<float>(1.0 / (kDetailTexel_m * surfaces_.grain_size * stretch))});
   }
 }
 
