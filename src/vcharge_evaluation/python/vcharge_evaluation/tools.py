@@ -115,6 +115,7 @@ def judge_rig(estimate, truth, report):
 
 def drawn(words):
     """Words that draw the plan and the surfaces of a drive's scene, both with the seed of the scene."""
+    words = [str(word) for word in words]
     given = dict(zip(words, words[1:]))
     scenario = yaml.safe_load(pathlib.Path(given["--scenario"]).read_text()) if "--scenario" in given else {}
     scene, seed = given.get("--scene", scenario.get("scene", "lot")), given.get("--scene-seed", "1")
@@ -125,8 +126,7 @@ def drawn(words):
 def simulate(folder, words):
     """Simulates FOLDER/drive.bag in a scene with drawn plan and surfaces. A complete drive that was made with the same words is
     kept."""
-    words = [str(word) for word in words]
-    words = [*drawn(words), *words]
+    words = [str(word) for word in [*drawn(words), *words]]
     done = folder / "simulated.txt"
     if done.exists() and done.read_text() == " ".join(words):
         say(f"{folder}: drive kept")

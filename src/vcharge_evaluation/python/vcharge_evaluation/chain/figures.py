@@ -8,15 +8,13 @@ import yaml
 
 from vcharge_evaluation import masks, obstacles, tools
 from vcharge_evaluation.camera_models import project
+from vcharge_evaluation.drawing.obstacles import FRONT_M
 from vcharge_evaluation.drawing.pictures import label
 from vcharge_evaluation.localization_errors import BOUND_DEG, BOUND_M, LocalizationErrors, Map
 from vcharge_evaluation.poses import at_stamps, rotations
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt  # noqa: E402
-
-# From the origin of the simulated car's frame to its front.
-FRONT_M = 3.7
 
 
 def pick(result, *keys):

@@ -44,7 +44,7 @@ class Chain(StepFolders):
 
     def simulate(self, name, title, *words):
         words = ["--scene", self.args.scene, *self.simulator_arguments, *words]
-        words = [*drawn([str(word) for word in words]), *words]
+        words = [*drawn(words), *words]
 
         def work(folder):
             run_tool("simulate_drive", folder / "simulate.log", *words, "--output", folder / "drive.bag")

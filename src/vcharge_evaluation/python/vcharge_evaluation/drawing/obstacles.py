@@ -15,6 +15,7 @@ from vcharge_evaluation.drawing.pictures import add_moment_arguments, chosen_sta
 from vcharge_evaluation.poses import rotations
 
 PIXELS_PER_CELL = 4
+FRONT_M, REAR_M, HALF_WIDTH_M = 3.7, -0.9, 0.9  # outline of the simulated car about the origin of its frame
 CYAN, MAGENTA = (255, 255, 0), (255, 0, 255)
 
 
@@ -130,7 +131,7 @@ def draw_map(folder, stamp, truth):
         cells = (fixed - meta["origin"][:2]) / meta["resolution"] * k
         cv2.polylines(picture, [np.stack([cells[:, 0], gray.shape[0] * k - cells[:, 1]], 1).astype(int)], True, colour, 1)
 
-    outline([[3.7, .9], [3.7, -.9], [-.9, -.9], [-.9, .9]], (255, 255, 255))
+    outline([[FRONT_M, HALF_WIDTH_M], [FRONT_M, -HALF_WIDTH_M], [REAR_M, -HALF_WIDTH_M], [REAR_M, HALF_WIDTH_M]], (255, 255, 255))
     for obstacles, colour in ((truth.standing, CYAN), (truth.moving, MAGENTA)) if truth else ():
         for obstacle in obstacles:
             outline(truth.footprint(obstacle), colour)
