@@ -1,11 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "vcharge_core/base/timestamp.h"
+#include "vcharge_core/files/content_hash.h"
 #include "vcharge_core/motion/rigid_transform.h"
 
 namespace vcharge {
@@ -14,6 +17,8 @@ enum class ObjectClass : uint8_t { kUnknown, kAdult, kChild, kCar, kBicycle };
 
 /// "unknown", "adult", "child", "car" or "bicycle" (with its rider).
 std::string nameOf(ObjectClass object_class);
+/// Inverse of nameOf; absent for any other text.
+std::optional<ObjectClass> objectClassOf(const std::string& name);
 
 /// An object that can move, at one time, in a frame with z up: the world for true objects, odom for tracked
 /// ones. Metres.
@@ -31,5 +36,14 @@ struct TrackedObject {
   double base_z_m = 0.0;                     ///< height of the footprint
   double height_m = 0.0;
 };
+
+/// The tracked objects at one stamp, in the frame odom.
+struct ObjectFrame {
+  Timestamp stamp;
+  RigidTransform odom_from_vehicle;
+  std::vector<TrackedObject> objects;
+};
+
+void addToHash(const ObjectFrame& frame, ContentHasher* hasher);
 
 }  // namespace vcharge
