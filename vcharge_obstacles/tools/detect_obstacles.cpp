@@ -17,7 +17,9 @@
 #include "vcharge_core/dense_maps/range_map_file.h"
 #include "vcharge_core/files/content_hash.h"
 #include "vcharge_core/files/file_io.h"
+#include "vcharge_core/motion/tracked_object_file.h"
 #include "vcharge_dense/range_mapper.h"
+#include "vcharge_obstacles/object_tracker.h"
 #include "vcharge_obstacles/obstacle_mapper.h"
 #include "vcharge_recordings/bag_drive_source.h"
 
@@ -55,8 +57,8 @@ class ProcessorTime {
 class Pipeline : public DriveConsumer {
  public:
   Pipeline(const std::shared_ptr<const CameraRig>& rig, const RangeMapperOptions& range_options,
-           const std::string& range_folder, ObstacleMapper* obstacles)
-      : obstacles_(obstacles) {
+           const std::string& range_folder, ObstacleMapper* obstacles, ObjectTracker* objects)
+      : obstacles_(obstacles), objects_(objects) {
     if (range_folder.empty()) {
       ranges_ = std::make_unique<RangeMapper>(rig, range_options, [this](const RangeTask& task) {
         const RangeMap map = sweeping_.add([&] { return ranges_->sweep(task); });
@@ -75,11 +77,14 @@ class Pipeline : public DriveConsumer {
   }
 
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
+    tracking_.add([&] { objects_->addImage(camera_index, stamp, image); });
+    ++num_images_;
     if (ranges_) {
       whole_.add([&] { ranges_->addImage(camera_index, stamp, image); });
     }
   }
   void addOdometry(const VehicleOdometry& odometry) override {
+    tracking_.add([&] { objects_->addOdometry(odometry); });
     detecting_.add([&] { obstacles_->addOdometry(odometry); });
     if (ranges_) {
       whole_.add([&] { ranges_->addOdometry(odometry); });
@@ -97,9 +102,14 @@ class Pipeline : public DriveConsumer {
       ranges_->finish();
     }
     obstacles_->finish();
+    objects_->finish();
   }
   /// Processor time without reading the bag and writing results; writing happens inside the detection.
   void reportTiming(double writing_s, nlohmann::json* found) const {
+    const double objects_ms =
+        1000.0 * tracking_.seconds() / static_cast<double>(std::max<uint64_t>(1, num_images_));
+    std::cout << "processor time per image: objects " << toText(objects_ms, 1) << " ms\n";
+    (*found)["processor_ms_per_image"] = {{"objects", objects_ms}};
     if (num_maps_ == 0) {
       return;
     }
@@ -117,8 +127,10 @@ class Pipeline : public DriveConsumer {
 
  private:
   ObstacleMapper* obstacles_;
+  ObjectTracker* objects_;
+  ProcessorTime tracking_;
   ProcessorTime whole_, sweeping_, detecting_;  // the last two are mostly included in the first
-  uint64_t num_maps_ = 0;
+  uint64_t num_maps_ = 0, num_images_ = 0;
   std::unique_ptr<RangeMapper> ranges_;
   std::string range_folder_;
   std::map<Timestamp, std::map<size_t, std::string>> stored_;
@@ -151,7 +163,13 @@ class Recorder {
     ++num_frames_;
   }
 
+  void add(const ObjectFrame& frame) {
+    addToHash(frame, &hasher_);
+    object_frames_.push_back(frame);
+  }
+
   void finish(const ObstacleMapper& mapper, nlohmann::json* found) const {
+    writeObjects(object_frames_, folder_);
     writeTextFileAtomically(folder_ + "/status.csv", table_);
     nlohmann::json cameras = nlohmann::json::array();
     for (const ObstacleCameraStatus& status : mapper.status()) {
@@ -170,17 +188,19 @@ class Recorder {
     std::cout << "obstacle maps: " << num_frames_ << ", odometry jumps: " << mapper.numJumps() << "\n"
               << "content hash: " << hasher_.hex() << "\n";
   }
-  uint64_t numFrames() const { return num_frames_; }
+  uint64_t numFrames() const { return num_frames_ + object_frames_.size(); }
 
  private:
   const std::string folder_;
   std::string table_;
   ContentHasher hasher_;
   uint64_t num_frames_ = 0;
+  std::vector<ObjectFrame> object_frames_;
 };
 
 void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& options,
-                     const RangeMapperOptions& range_options, nlohmann::json* found) {
+                     const RangeMapperOptions& range_options, const ObjectTrackerOptions& object_options,
+                     nlohmann::json* found) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   if (!std::filesystem::exists(arguments.bag)) {
     throw InputError(arguments.bag + ": no such file");  // before the output is created
@@ -190,9 +210,12 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
   ProcessorTime writing;
   ObstacleMapper mapper(rig, options,
                         [&](const ObstacleFrame& frame) { writing.add([&] { recorder.add(frame); }); });
-  Pipeline pipeline(rig, range_options, arguments.range, &mapper);
+  ObjectTracker tracker(rig, object_options, [&](const ObjectFrame& frame) { recorder.add(frame); });
+  Pipeline pipeline(rig, range_options, arguments.range, &mapper, &tracker);
   BagDriveSourceOptions source_options;
-  source_options.cameras = options.cameras;
+  if (!object_options.cameras.empty()) {
+    source_options.cameras = options.cameras;
+  }
   source_options.max_image_gap_s = INFINITY;  // a camera that stops is reported, not an error
   BagDriveSource source(arguments.bag, rig, source_options);
   {
@@ -237,6 +260,7 @@ int main(int argc, char** argv) {
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     ObstacleMapperOptions options;
     RangeMapperOptions range_options;
+    ObjectTrackerOptions object_options;
     if (!arguments.options.empty()) {
       readFieldsFromFile(arguments.options, &options);
     }
@@ -247,12 +271,14 @@ int main(int argc, char** argv) {
       options.cameras = arguments.cameras;
     }
     range_options.cameras = options.cameras;
+    object_options.cameras = arguments.cameras;
+    object_options.frames.waitForEverything();
     if (arguments.show_options) {
       std::cout << "# For --options\n"
                 << showOptions(options) << "\n# For --range-options\n"
                 << showOptions(range_options);
       return;
     }
-    detectObstacles(arguments, options, range_options, found);
+    detectObstacles(arguments, options, range_options, object_options, found);
   });
 }

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/camera/working_camera.h"
+#include "vcharge_core/frames/frame_assembler.h"
+#include "vcharge_core/motion/tracked_object.h"
+
+namespace vcharge {
+
+/// Options of ObjectTracker.
+struct ObjectTrackerOptions {
+  VCHARGE_BEGIN_OPTIONS(ObjectTrackerOptions);
+  VCHARGE_OPTION(std::vector<std::string>, cameras, {}, anyValue(),
+                 "Cameras of the rig by name; empty: all.");
+  VCHARGE_OPTION(double, max_range_m, 12.0, above(1.0).upTo(100.0),
+                 "Distance from a camera up to which objects are followed.");
+  VCHARGE_OPTION(int, image_width_px, 640, between(160, 4096),
+                 "Largest width of the undistorted images in which points are followed.");
+  VCHARGE_END_OPTIONS();
+
+  FrameAssemblerOptions frames;  ///< waiting for images of one stamp, and odometry
+};
+
+/// Finds what moves around the vehicle, while it drives and while it stands, and follows it in the odometry's
+/// frame. Works on single cameras and short intervals, without range maps:
+///
+///  1. Points are followed through the images of each camera for 0.4 s.
+///  2. A rotation of the body that the wheels did not measure is estimated from all of them.
+///  3. A point moves if no static point on or above the ground explains its two rays within their errors.
+///  4. Moving points are set on the ground where the image, compared with an earlier one that is warped by
+///  the
+///     ground plane, begins to differ below them.
+///  5. Groups of points get a position, a velocity and their covariances; a Kalman filter joins cameras and
+///  time.
+///
+/// Deterministic; not thread safe.
+class ObjectTracker : public DriveConsumer {
+ public:
+  using FrameCallback = std::function<void(const ObjectFrame&)>;
+
+  /// InputError if the rig lacks a camera of the options, or its extrinsics; std::invalid_argument for bad
+  /// options.
+  ObjectTracker(std::shared_ptr<const CameraRig> rig, const ObjectTrackerOptions& options,
+                FrameCallback on_frame);
+  ~ObjectTracker() override;
+
+  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
+  void addOdometry(const VehicleOdometry& odometry) override;
+  /// Hands out the waiting frames at the end of the drive.
+  void finish();
+  const FrameCounters& counters() const { return assembler_->counters(); }
+
+ private:
+  struct Camera;
+  struct State;
+
+  void process(const ImageFrame& frame);
+  void startOver();
+
+  const std::shared_ptr<const CameraRig> rig_;
+  const ObjectTrackerOptions options_;
+  const FrameCallback on_frame_;
+  std::vector<std::unique_ptr<Camera>> cameras_;  // indexed as in the rig; null: not in use
+  std::unique_ptr<State> state_;
+  std::unique_ptr<ImageFrameAssembler> assembler_;
+};
+
+}  // namespace vcharge

@@ -1,0 +1,95 @@
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include <vcharge_msgs/TrackedObjects.h>
+#include <visualization_msgs/MarkerArray.h>
+#include <pluginlib/class_list_macros.hpp>
+
+#include "object_markers.h"
+#include "vcharge_core/workers/ordered_worker.h"
+#include "vcharge_obstacles/object_tracker.h"
+#include "vcharge_ros/nodelet.h"
+#include "vcharge_ros/object_conversions.h"
+
+namespace vcharge {
+
+/// Follows what moves around the vehicle of a live or replayed drive. Publishes /obstacles/objects
+/// (vcharge_msgs/TrackedObjects in `odom`, at every stamp of the images) and /obstacles/object_markers.
+/// Parameters: ~rig (path), ~options (ObjectTrackerOptions), ~source (LiveDriveSourceOptions),
+/// ~lossless_replay (every image in order, as detect_obstacles; otherwise images that wait too long are
+/// dropped, and counted in /diagnostics).
+class ObjectNodelet : public Nodelet, private DriveConsumer {
+ public:
+  ObjectNodelet() : Nodelet("objects") {}
+  ~ObjectNodelet() override { end(); }
+
+ private:
+  static constexpr uint32_t kOutputQueue = 10;
+  static constexpr size_t kMaxWaitingFrames = 2;
+  using Task = std::function<void()>;
+
+  void start() override {
+    rig_ = readRig();
+    ObjectTrackerOptions options;
+    if (isLossless()) {
+      options.frames.waitForEverything();
+    }
+    readOptions("options", &options);
+    const uint32_t queue = isLossless() ? 0 : kOutputQueue;
+    objects_ = node().advertise<vcharge_msgs::TrackedObjects>("/obstacles/objects", queue);
+    markers_ = node().advertise<visualization_msgs::MarkerArray>("/obstacles/object_markers", queue);
+    tracker_ =
+        std::make_unique<ObjectTracker>(rig_, options, [this](const ObjectFrame& frame) { publish(frame); });
+    worker_ = std::make_unique<OrderedWorker<Task>>(
+        [this](const Task& task) { guard().run([&] { work(task); }); },
+        OrderedQueue<Task>(isLossless() ? 0 : kMaxWaitingFrames * rig_->cameras.size()));
+    addDiagnostics(
+        "", [this] { return report(); }, Threads::kOne);
+    openSource(rig_, options.cameras);
+    runSource(this);
+  }
+
+  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
+    worker_->push([this, camera_index, stamp, image] { tracker_->addImage(camera_index, stamp, image); },
+                  true);
+  }
+  void addOdometry(const VehicleOdometry& odometry) override {
+    worker_->push([this, odometry] { tracker_->addOdometry(odometry); }, false);
+  }
+
+  void work(const Task& task) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    task();
+  }
+
+  void publish(const ObjectFrame& frame) {
+    num_objects_ = frame.objects.size();
+    objects_.publish(toMessage(frame.objects, frame.stamp, "odom"));
+    if (markers_.getNumSubscribers() > 0) {
+      markers_.publish(toMarkers(frame));
+    }
+  }
+
+  DriveMonitor::Report report() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    DriveMonitor::Report report;
+    report.message = std::to_string(num_objects_) + " objects move";
+    report.values.emplace_back("objects", std::to_string(num_objects_));
+    report.values.emplace_back("dropped", std::to_string(worker_->numDropped()));
+    addCounters(tracker_->counters(), &report);
+    return report;
+  }
+
+  std::shared_ptr<const CameraRig> rig_;
+  std::mutex mutex_;  // guards the tracker: diagnostics run in another thread
+  ros::Publisher objects_, markers_;
+  size_t num_objects_ = 0;
+  std::unique_ptr<ObjectTracker> tracker_;
+  std::unique_ptr<OrderedWorker<Task>> worker_;
+};
+
+}  // namespace vcharge
+
+PLUGINLIB_EXPORT_CLASS(vcharge::ObjectNodelet, nodelet::Nodelet)

@@ -1,0 +1,232 @@
+#include "objects/ground_contact.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <opencv2/imgproc.hpp>
+
+namespace vcharge {
+namespace {
+
+constexpr int kNumSectors = 360;
+constexpr double kMinRange_m = 0.4;
+// Rays that fall less reach the ground beyond any range of interest.
+constexpr double kLeastSlope = 1e-3;
+// Windows of this side are compared.
+constexpr int kWindow_px = 5, kSmoothing_px = 3;
+// Standard deviation in gray levels from which a window has texture, and the correlations above and below
+// which it shows the ground or something else.
+constexpr float kTexture = 2.5F, kSame = 0.7F, kOther = 0.5F;
+// Windows without texture show the ground if their brightness differs by less than this, absolute and
+// relative.
+constexpr float kSameBrightness = 6.0F, kSameBrightnessRatio = 0.06F;
+// Number of bins below a contact that must show ground, and their least mean label.
+constexpr int kGroundBins = 10;
+constexpr double kMinGround = 0.4;
+// The windows that a contact lies in do not show the ground either: it seems lower by about this.
+constexpr double kReach_px = 1.2;
+// Error of a contact's position in the image, and of the direction of the ground (pitch of the body).
+constexpr double kContactSigma_px = 1.2, kPitchSigma_rad = 0.003;
+
+}  // namespace
+
+GroundContact::GroundContact(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera,
+                             double max_range_m)
+    : camera_(camera),
+      vehicle_from_camera_(vehicle_from_camera),
+      height_m_(vehicle_from_camera.translation().z()),
+      min_inverse_per_m_(1.0 / max_range_m) {
+  const double focal_px = camera.model().gamma1() / (1.0 + camera.model().xi());
+  bin_per_m_ = 1.0 / (focal_px * height_m_);
+  num_bins_ = static_cast<int>((1.0 / kMinRange_m - min_inverse_per_m_) / bin_per_m_);
+  pixels_.assign(static_cast<size_t>(kNumSectors) * num_bins_, -1);
+  const RigidTransform camera_from_vehicle = vehicle_from_camera.inverse();
+  int top = camera.size().height, bottom = 0;
+  for (int sector = 0; sector < kNumSectors; ++sector) {
+    const double azimuth_rad = (sector + 0.5) * 2.0 * M_PI / kNumSectors - M_PI;
+    for (int bin = 0; bin < num_bins_; ++bin) {
+      const double range_m = 1.0 / (min_inverse_per_m_ + (bin + 0.5) * bin_per_m_);
+      const Eigen::Vector3d ground(vehicle_from_camera.translation().x() + range_m * std::cos(azimuth_rad),
+                                   vehicle_from_camera.translation().y() + range_m * std::sin(azimuth_rad),
+                                   0.0);
+      Eigen::Vector2d pixel;
+      if (!camera.model().project(camera_from_vehicle * ground, &pixel)) {
+        continue;
+      }
+      const cv::Point at(cvRound(pixel.x()), cvRound(pixel.y()));
+      if (cv::Rect(cv::Point(), camera.size()).contains(at) && camera.validMask().at<uint8_t>(at) != 0) {
+        pixels_[static_cast<size_t>(sector) * num_bins_ + bin] = at.y * camera.size().width + at.x;
+        top = std::min(top, at.y);
+        bottom = std::max(bottom, at.y + 1);
+      }
+    }
+  }
+  rows_ = top < bottom ? cv::Rect(0, top, camera.size().width, bottom - top) : cv::Rect();
+  for (int y = rows_.y; y < rows_.y + rows_.height; ++y) {
+    for (int x = 0; x < rows_.width; ++x) {
+      Eigen::Vector3d ray;
+      Eigen::Vector3f& ground = ground_m_.emplace_back(Eigen::Vector3f::Constant(NAN));
+      if (camera.validMask().at<uint8_t>(y, x) != 0 &&
+          camera.model().unproject({static_cast<double>(x), static_cast<double>(y)}, &ray)) {
+        const Eigen::Vector3d direction = vehicle_from_camera.rotation() * ray.normalized();
+        if (direction.z() < -kLeastSlope) {
+          ground = (vehicle_from_camera.translation() - height_m_ / direction.z() * direction).cast<float>();
+        }
+      }
+    }
+  }
+}
+
+int GroundContact::sectorOf(double azimuth_rad) const {
+  const int sector = static_cast<int>(std::floor((azimuth_rad + M_PI) / (2.0 * M_PI) * kNumSectors));
+  return (sector % kNumSectors + kNumSectors) % kNumSectors;
+}
+
+cv::Mat GroundContact::warpOf(const RigidTransform& before_from_now) const {
+  const RigidTransform camera_from_now = vehicle_from_camera_.inverse() * before_from_now;
+  const Eigen::Matrix3f rotation = camera_from_now.rotationMatrix().cast<float>();
+  const Eigen::Vector3f translation = camera_from_now.translation().cast<float>();
+  const MeiCamera& model = camera_.model();
+  const auto xi = static_cast<float>(model.xi());
+  const auto gamma1 = static_cast<float>(model.gamma1()), gamma2 = static_cast<float>(model.gamma2());
+  const auto u0 = static_cast<float>(model.u0()), v0 = static_cast<float>(model.v0());
+  const cv::Rect image(cv::Point(), camera_.size());
+  cv::Mat map(rows_.size(), CV_32FC2, cv::Scalar::all(-1.0));
+  for (int y = 0; y < rows_.height; ++y) {
+    auto* row = map.ptr<cv::Vec2f>(y);
+    for (int x = 0; x < rows_.width; ++x) {
+      const Eigen::Vector3f point =
+          rotation * ground_m_[static_cast<size_t>(y) * rows_.width + x] + translation;
+      const float denominator = point.z() + xi * point.norm();
+      if (!(denominator > 0.1F * point.norm())) {
+        continue;  // without ground, or too far off the axis
+      }
+      const cv::Vec2f pixel(gamma1 * point.x() / denominator + u0, gamma2 * point.y() / denominator + v0);
+      const cv::Point nearest(cvRound(pixel[0]), cvRound(pixel[1]));
+      if (image.contains(nearest) && camera_.validMask().at<uint8_t>(nearest) != 0) {
+        row[x] = pixel;
+      }
+    }
+  }
+  return map;
+}
+
+void GroundContact::compare(const cv::Mat& now, const cv::Mat& before,
+                            const RigidTransform& before_from_now) {
+  labels_ = cv::Mat::zeros(now.size(), CV_8SC1);
+  if (rows_.empty()) {
+    return;
+  }
+  const cv::Mat map = warpOf(before_from_now);
+  cv::Mat warped, is_known;
+  cv::remap(before, warped, map, cv::Mat(), cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(0));
+  std::vector<cv::Mat> channels;
+  cv::split(map, channels);
+  is_known = channels[0] >= 0.0;
+  cv::erode(is_known, is_known, cv::Mat::ones(kWindow_px, kWindow_px, CV_8U));
+  cv::Mat a, b, mean_a, mean_b, square_a, square_b, product;
+  // Fine grain does not look alike from another distance.
+  cv::blur(now(rows_), a, cv::Size(kSmoothing_px, kSmoothing_px));
+  cv::blur(warped, b, cv::Size(kSmoothing_px, kSmoothing_px));
+  a.convertTo(a, CV_32F);
+  b.convertTo(b, CV_32F);
+  const cv::Size window(kWindow_px, kWindow_px);
+  const auto mean = [&](const cv::Mat& of, cv::Mat* result) { cv::boxFilter(of, *result, CV_32F, window); };
+  mean(a, &mean_a);
+  mean(b, &mean_b);
+  mean(a.mul(a), &square_a);
+  mean(b.mul(b), &square_b);
+  mean(a.mul(b), &product);
+  // Most of the ground is unchanged, so the median ratio is the change of the exposure.
+  std::vector<float> ratios;
+  for (int y = 0; y < rows_.height; y += 4) {
+    for (int x = 0; x < rows_.width; x += 4) {
+      if (is_known.at<uint8_t>(y, x) != 0 && mean_b.at<float>(y, x) > 8.0F) {
+        ratios.push_back(mean_a.at<float>(y, x) / mean_b.at<float>(y, x));
+      }
+    }
+  }
+  float gain = 1.0F;
+  if (!ratios.empty()) {
+    std::nth_element(ratios.begin(), ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2),
+                     ratios.end());
+    gain = ratios[ratios.size() / 2];
+  }
+  for (int y = 0; y < rows_.height; ++y) {
+    for (int x = 0; x < rows_.width; ++x) {
+      if (is_known.at<uint8_t>(y, x) == 0) {
+        continue;
+      }
+      const float ma = mean_a.at<float>(y, x), mb = mean_b.at<float>(y, x);
+      const float variance_a = std::max(0.0F, square_a.at<float>(y, x) - ma * ma);
+      const float variance_b = std::max(0.0F, square_b.at<float>(y, x) - mb * mb);
+      int8_t& label = labels_.at<int8_t>(y + rows_.y, x);
+      if (std::max(variance_a, variance_b) < kTexture * kTexture) {
+        label = std::abs(ma - gain * mb) < kSameBrightness + kSameBrightnessRatio * ma ? 1 : -1;
+        continue;
+      }
+      const float correlation = (product.at<float>(y, x) - ma * mb) /
+                                std::sqrt(std::max(1.0F, variance_a) * std::max(1.0F, variance_b));
+      label = correlation > kSame ? 1 : (correlation < kOther ? -1 : 0);
+    }
+  }
+}
+
+int GroundContact::labelAt(int sector, int bin) const {
+  const int32_t pixel = pixels_[static_cast<size_t>((sector + kNumSectors) % kNumSectors) * num_bins_ + bin];
+  return pixel < 0 ? 0 : labels_.ptr<int8_t>()[pixel];
+}
+
+std::optional<Contact> GroundContact::below(const Eigen::Vector3d& ray_in_vehicle) const {
+  const int sector = sectorOf(std::atan2(ray_in_vehicle.y(), ray_in_vehicle.x()));
+  return belowSectors(sector - 1, 3, ray_in_vehicle.z() / ray_in_vehicle.head<2>().norm());
+}
+
+std::optional<Contact> GroundContact::below(double low_rad, double high_rad, double slope) const {
+  const int low = sectorOf(low_rad), high = sectorOf(high_rad);
+  return belowSectors(low, (high - low + kNumSectors) % kNumSectors + 1, slope);
+}
+
+std::optional<Contact> GroundContact::belowSectors(int first_sector, int num_sectors, double slope) const {
+  if (labels_.empty()) {
+    return std::nullopt;
+  }
+  int first = 0;
+  if (slope < 0.0) {
+    const double bin = (-slope / height_m_ - min_inverse_per_m_) / bin_per_m_;
+    first = std::clamp(static_cast<int>(bin), 0, num_bins_ - 1);
+  }
+  std::vector<int> scores;
+  for (int bin = first; bin < num_bins_; ++bin) {
+    int sum = 0;
+    for (int sector = first_sector; sector < first_sector + num_sectors; ++sector) {
+      sum += labelAt(sector, bin);
+    }
+    scores.push_back(sum);
+  }
+  // A contact before bin c: what lies from the ray down to it is not ground, and the bins below it are.
+  const int count = static_cast<int>(scores.size());
+  int above = 0, ground = 0, best = -1, best_score = 0, best_ground = 0;
+  for (int i = 0; i < std::min(kGroundBins, count); ++i) {
+    ground += scores[static_cast<size_t>(i)];
+  }
+  for (int c = 0; c + kGroundBins <= count; ++c) {
+    if (c == 0 || ground - above > best_score) {
+      best = c;
+      best_score = ground - above;
+      best_ground = ground;
+    }
+    above += scores[static_cast<size_t>(c)];
+    ground -= scores[static_cast<size_t>(c)];
+    ground += c + kGroundBins < count ? scores[static_cast<size_t>(c + kGroundBins)] : 0;
+  }
+  if (best < 0 || best_ground < kMinGround * num_sectors * kGroundBins) {
+    return std::nullopt;
+  }
+  const double inverse_per_m =
+      std::max(0.5 * min_inverse_per_m_, min_inverse_per_m_ + (first + best - kReach_px) * bin_per_m_);
+  const double sigma_per_m = std::hypot(kContactSigma_px * bin_per_m_, kPitchSigma_rad / height_m_);
+  return Contact{1.0 / inverse_per_m, sigma_per_m / (inverse_per_m * inverse_per_m)};
+}
+
+}  // namespace vcharge

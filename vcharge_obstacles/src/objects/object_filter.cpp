@@ -1,0 +1,220 @@
+#include "objects/object_filter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <tuple>
+
+#include <Eigen/Cholesky>
+
+namespace vcharge {
+namespace {
+
+// Standard deviation of the acceleration: a person starts and stops within a second.
+constexpr double kAcceleration_m_per_s2 = 1.5;
+// Largest squared Mahalanobis distance of a detection (four degrees of freedom, 99.9 %), and largest
+// distance.
+constexpr double kGate = 18.5, kMaxDistance_m = 2.0;
+// Log-odds of a new object, changes by a detection and by a stamp without one, and their bounds. An object
+// ends at the lower bound.
+constexpr double kNew = -1.8, kHit = 0.9, kMiss = -0.25, kLeast = -2.5, kMost = 3.0;
+// Two objects this near with like velocities are one.
+constexpr double kTwin_m = 0.7, kTwin_m_per_s = 0.8;
+// Part of an object's size that is kept from stamp to stamp: it is not always seen whole.
+constexpr double kKeptSize = 0.97;
+// An object is reported once its speed has exceeded this number of standard deviations, and its travel since
+// it was first detected this squared Mahalanobis distance (two degrees of freedom, 78 %): wrong groups jump,
+// but stay.
+constexpr double kMovingSigmas = 2.0, kTravel = 3.0;
+constexpr double kPersonRadius_m = 0.25;
+constexpr double kCarWidth_m = 1.8, kCarLength_m = 4.2, kMinCarWidth_m = 1.2;
+constexpr double kChildHeight_m = 1.35;
+
+/// Distance from the middle of an object to its side that faces a camera: the radius of a person, or the
+/// extent of a car's outline along the view.
+double depthBehindSide(double width_m, const Eigen::Vector2d& away, const Eigen::Vector2d& velocity) {
+  if (width_m <= kMinCarWidth_m || velocity.norm() < 1e-3) {
+    return kPersonRadius_m;
+  }
+  const double along = std::abs(away.dot(velocity.normalized()));
+  return 0.5 * (kCarLength_m * along + kCarWidth_m * std::sqrt(std::max(0.0, 1.0 - along * along)));
+}
+
+/// A detection as position of the object's middle and velocity, in the fixed frame.
+struct Measurement {
+  Measurement(const ObjectDetection& detection, double width_m, const RigidTransform& fixed_from_vehicle) {
+    const Eigen::Matrix2d rotation = fixed_from_vehicle.rotationMatrix().topLeftCorner<2, 2>();
+    const double depth_m = depthBehindSide(width_m, detection.away, detection.velocity_m_per_s);
+    state << rotation * (detection.position_m + depth_m * detection.away) +
+                 fixed_from_vehicle.translation().head<2>(),
+        rotation * detection.velocity_m_per_s;
+    Eigen::Matrix4d turn = Eigen::Matrix4d::Zero();
+    turn.topLeftCorner<2, 2>() = turn.bottomRightCorner<2, 2>() = rotation;
+    covariance = turn * detection.covariance * turn.transpose();
+  }
+  Eigen::Vector4d state;
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+};
+
+double widthOf(const ObjectDetection& detection) {
+  return (detection.left_m - detection.right_m).norm();
+}
+
+}  // namespace
+
+void ObjectFilter::clear() {
+  tracks_.clear();
+}
+
+void ObjectFilter::predict(Timestamp stamp) {
+  const double step_s = tracks_.empty() ? 0.0 : toSeconds(stamp - stamp_);
+  stamp_ = stamp;
+  Eigen::Matrix4d transition = Eigen::Matrix4d::Identity();
+  transition.topRightCorner<2, 2>() = step_s * Eigen::Matrix2d::Identity();
+  const double q = kAcceleration_m_per_s2 * kAcceleration_m_per_s2 * step_s;
+  Eigen::Matrix4d noise = Eigen::Matrix4d::Zero();
+  for (int axis = 0; axis < 2; ++axis) {
+    noise(axis, axis) = q * step_s * step_s / 3.0;
+    noise(axis, axis + 2) = noise(axis + 2, axis) = q * step_s / 2.0;
+    noise(axis + 2, axis + 2) = q;
+  }
+  for (Track& track : tracks_) {
+    track.state = transition * track.state;
+    track.covariance = transition * track.covariance * transition.transpose() + noise;
+  }
+}
+
+void ObjectFilter::update(const std::vector<ObjectDetection>& detections,
+                          const RigidTransform& fixed_from_vehicle) {
+  std::vector<std::tuple<double, size_t, size_t>> pairs;  // distance, track, detection
+  for (size_t d = 0; d < detections.size(); ++d) {
+    for (size_t t = 0; t < tracks_.size(); ++t) {
+      const Measurement measured(detections[d], std::max(tracks_[t].width_m, widthOf(detections[d])),
+                                 fixed_from_vehicle);
+      const Eigen::Matrix4d sum = tracks_[t].covariance + measured.covariance;
+      const Eigen::Vector4d difference = measured.state - tracks_[t].state;
+      const double squared = difference.dot(sum.ldlt().solve(difference));
+      if (squared < kGate && difference.head<2>().norm() < kMaxDistance_m) {
+        pairs.emplace_back(squared + std::log(sum.determinant()), t, d);
+      }
+    }
+  }
+  std::sort(pairs.begin(), pairs.end());
+  std::vector<bool> is_used(detections.size(), false), is_hit(tracks_.size(), false);
+  for (const auto& [distance, t, d] : pairs) {
+    if (is_used[d] || is_hit[t]) {
+      continue;
+    }
+    is_used[d] = is_hit[t] = true;
+    Track& track = tracks_[t];
+    track.height_m = std::max(kKeptSize * track.height_m, detections[d].height_m);
+    track.width_m = std::max(kKeptSize * track.width_m, widthOf(detections[d]));
+    const Measurement measured(detections[d], track.width_m, fixed_from_vehicle);
+    const Eigen::Matrix4d gain =
+        (track.covariance + measured.covariance).ldlt().solve(track.covariance).transpose();
+    const Eigen::Matrix4d rest = Eigen::Matrix4d::Identity() - gain;
+    track.state += gain * (measured.state - track.state);
+    track.covariance =
+        rest * track.covariance * rest.transpose() + gain * measured.covariance * gain.transpose();
+    if (track.last_seen < stamp_) {
+      track.existence_log_odds = std::min(kMost, track.existence_log_odds + kHit);
+    }
+    track.last_seen = stamp_;
+  }
+  for (size_t d = 0; d < detections.size(); ++d) {
+    if (!is_used[d]) {
+      const Measurement measured(detections[d], widthOf(detections[d]), fixed_from_vehicle);
+      tracks_.push_back({next_id_++, measured.state, measured.covariance, kNew + kHit, detections[d].height_m,
+                         widthOf(detections[d]), stamp_, measured.state.head<2>(),
+                         measured.covariance.topLeftCorner<2, 2>(), false});
+    }
+  }
+}
+
+/// Of two objects that are one, the older one stays.
+void ObjectFilter::mergeTwins() {
+  std::vector<Track> kept;
+  for (const Track& track : tracks_) {
+    const bool is_twin = std::any_of(kept.begin(), kept.end(), [&](const Track& older) {
+      return (older.state.head<2>() - track.state.head<2>()).norm() < kTwin_m + 0.4 * older.width_m &&
+             (older.state.tail<2>() - track.state.tail<2>()).norm() < kTwin_m_per_s;
+    });
+    if (!is_twin) {
+      kept.push_back(track);
+    }
+  }
+  tracks_ = std::move(kept);
+}
+
+void ObjectFilter::finish() {
+  for (Track& track : tracks_) {
+    const Eigen::Vector2d travel_m = track.state.head<2>() - track.start_m;
+    const Eigen::Matrix2d covariance = track.start_covariance + track.covariance.topLeftCorner<2, 2>();
+    const Eigen::Vector2d velocity = track.state.tail<2>();
+    const double variance = velocity.dot(track.covariance.bottomRightCorner<2, 2>() * velocity);
+    track.has_moved = track.has_moved || (velocity.squaredNorm() > kMovingSigmas * std::sqrt(variance) &&
+                                          travel_m.dot(covariance.ldlt().solve(travel_m)) > kTravel);
+    if (track.last_seen < stamp_) {
+      track.existence_log_odds += kMiss;
+    }
+  }
+  tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(),
+                               [](const Track& track) { return track.existence_log_odds < kLeast; }),
+                tracks_.end());
+  mergeTwins();
+}
+
+TrackedObject ObjectFilter::describe(const Track& track) const {
+  TrackedObject object;
+  object.id = track.id;
+  object.existence_probability = 1.0 / (1.0 + std::exp(-track.existence_log_odds));
+  const Eigen::Vector2d velocity = track.state.tail<2>();
+  const double speed = velocity.norm();
+  const double heading_rad = std::atan2(velocity.y(), velocity.x());
+  const bool is_car = track.width_m > kMinCarWidth_m;
+  object.object_class = is_car                            ? ObjectClass::kCar
+                        : track.height_m < kChildHeight_m ? ObjectClass::kChild
+                                                          : ObjectClass::kAdult;
+  object.class_probability = 0.7;
+  object.frame_from_object = RigidTransform::planar(track.state.x(), track.state.y(), heading_rad);
+  object.velocity_m_per_s = Eigen::Vector3d(velocity.x(), velocity.y(), 0.0);
+  object.is_standing = speed < 0.1;
+  for (int row = 0; row < 2; ++row) {
+    for (int column = 0; column < 2; ++column) {
+      object.covariance(row, column) = track.covariance(row, column);
+      object.covariance(row, column + 3) = track.covariance(row, column + 2);
+      object.covariance(row + 3, column) = track.covariance(row + 2, column);
+      object.covariance(row + 3, column + 3) = track.covariance(row + 2, column + 2);
+    }
+  }
+  object.height_m = track.height_m;
+  const auto corner = [&](double x_m, double y_m) {
+    return Eigen::Vector2d((object.frame_from_object * Eigen::Vector3d(x_m, y_m, 0.0)).head<2>());
+  };
+  if (is_car) {
+    const double length_m = std::max(kCarLength_m, track.width_m);
+    object.footprint_m = {
+        corner(-0.5 * length_m, -0.5 * kCarWidth_m), corner(0.5 * length_m, -0.5 * kCarWidth_m),
+        corner(0.5 * length_m, 0.5 * kCarWidth_m), corner(-0.5 * length_m, 0.5 * kCarWidth_m)};
+  } else {
+    constexpr int kNumCorners = 8;
+    for (int i = 0; i < kNumCorners; ++i) {
+      const double angle_rad = 2.0 * M_PI * i / kNumCorners;
+      object.footprint_m.push_back(
+          corner(kPersonRadius_m * std::cos(angle_rad), kPersonRadius_m * std::sin(angle_rad)));
+    }
+  }
+  return object;
+}
+
+std::vector<TrackedObject> ObjectFilter::objects() const {
+  std::vector<TrackedObject> found;
+  for (const Track& track : tracks_) {
+    if (track.existence_log_odds >= 0.0 && track.has_moved) {
+      found.push_back(describe(track));
+    }
+  }
+  return found;
+}
+
+}  // namespace vcharge

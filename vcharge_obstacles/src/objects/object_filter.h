@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "objects/object_detections.h"
+#include "vcharge_core/base/timestamp.h"
+#include "vcharge_core/motion/rigid_transform.h"
+#include "vcharge_core/motion/tracked_object.h"
+
+namespace vcharge {
+
+/// Follows objects over time and cameras: a Kalman filter per object with constant velocity in the fixed
+/// frame, one-to-one assignment by Mahalanobis distance, and an existence probability from hits and misses.
+/// Deterministic.
+class ObjectFilter {
+ public:
+  /// Moves all objects to a stamp. Stamps must not decrease.
+  void predict(Timestamp stamp);
+  /// Adds the detections of one camera at that stamp.
+  void update(const std::vector<ObjectDetection>& detections, const RigidTransform& fixed_from_vehicle);
+  /// Ends the stamp: objects that no camera has detected become less probable, and some end.
+  void finish();
+  /// Objects that probably exist, in the fixed frame.
+  std::vector<TrackedObject> objects() const;
+  void clear();
+
+ private:
+  struct Track {
+    uint32_t id = 0;
+    Eigen::Vector4d state = Eigen::Vector4d::Zero();  // x, y, velocity along x and y
+    Eigen::Matrix4d covariance = Eigen::Matrix4d::Identity();
+    double existence_log_odds = 0.0;
+    double height_m = 0.0, width_m = 0.0;  // as seen lately
+    Timestamp last_seen;
+    Eigen::Vector2d start_m = Eigen::Vector2d::Zero();  // as first detected
+    Eigen::Matrix2d start_covariance = Eigen::Matrix2d::Identity();
+    bool has_moved = false;
+  };
+  TrackedObject describe(const Track& track) const;
+  void mergeTwins();
+
+  std::vector<Track> tracks_;
+  Timestamp stamp_;
+  uint32_t next_id_ = 1;
+};
+
+}  // namespace vcharge

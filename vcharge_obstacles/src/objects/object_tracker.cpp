@@ -1,0 +1,329 @@
+#include "vcharge_obstacles/object_tracker.h"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <optional>
+#include <utility>
+
+#include <opencv2/imgproc.hpp>
+
+#include "objects/ground_contact.h"
+#include "objects/ground_motion.h"
+#include "objects/object_detections.h"
+#include "objects/object_filter.h"
+#include "points/followed_points.h"
+#include "points/rotation_correction.h"
+#include "points/static_motion.h"
+#include "vcharge_core/base/error.h"
+
+namespace vcharge {
+namespace {
+
+// Points are judged from this time after they were first seen.
+constexpr double kMinAge_s = 0.15;
+// A point moves if its residual is larger than this number of standard deviations and of pixels.
+constexpr double kMovingSigmas = 4.0, kMovingPixels = 1.0;
+// Side of the patches of a point that are compared, and their least correlation.
+constexpr int kPatch_px = 9;
+constexpr float kSameAppearance = 0.75F;
+// Standard deviation of a followed point, per image.
+constexpr double kTracking_px = 0.35;
+// Errors of wheel odometry between two images: at standstill, and growing with the square root of the travel,
+// as measured over the public 118 s of the V-Charge car.
+constexpr double kTranslation_m = 0.001, kTranslationPerSqrt_m = 0.006;
+constexpr double kRotation_rad = 0.0003, kRotationPerSqrt_rad = 0.0015;
+// Deviation of the body's rotation from the odometer's that is estimated: braking pitches the body.
+constexpr double kBodyRotation_rad = 0.004;
+// A static point is at least this far away, and at most this far below the plane of the ground, plus a slope.
+constexpr double kMinRange_m = 0.3, kGroundBelow_m = 0.05, kGroundSlope = 0.015;
+// The image with which the ground is compared: at most this long ago and this far back.
+constexpr double kCompareInterval_s = 0.42, kCompareTravel_m = 0.5;
+
+}  // namespace
+
+namespace {
+
+/// A followed point that is old enough to be judged, and its equation for the body's rotation.
+struct JudgedPoint {
+  const PointTrack* track;
+  RigidTransform before_from_now;  // motion of the vehicle
+  double age_s;
+  StaticResidual found;
+  RotationEquation equation;
+};
+
+Eigen::Matrix3d crossMatrixOf(const Eigen::Vector3d& vector) {
+  Eigen::Matrix3d cross;
+  cross << 0.0, -vector.z(), vector.y(), vector.z(), 0.0, -vector.x(), -vector.y(), vector.x(), 0.0;
+  return cross;
+}
+
+WorkingCameraOptions workingOptions(const ObjectTrackerOptions& options) {
+  WorkingCameraOptions working;
+  working.width_px = options.image_width_px;
+  return working;
+}
+
+}  // namespace
+
+struct ObjectTracker::State {
+  struct Pose {
+    Timestamp stamp;
+    RigidTransform odom_from_vehicle;
+  };
+  const Pose* at(Timestamp stamp) const {
+    const auto found =
+        std::find_if(poses.begin(), poses.end(), [&](const Pose& pose) { return pose.stamp == stamp; });
+    return found == poses.end() ? nullptr : &*found;
+  }
+  std::deque<Pose> poses;  // of the last images
+  ObjectFilter filter;
+};
+
+struct ObjectTracker::Camera {
+  Camera(const RigCamera& camera, const ObjectTrackerOptions& options)
+      : vehicle_from_camera(*camera.vehicle_from_camera),
+        working(camera.model, camera.image_size_px, camera.field_of_view_rad, camera.mask,
+                workingOptions(options)),
+        focal_px(working.model().gamma1() / (1.0 + working.model().xi())),
+        sigma_rad(kTracking_px * M_SQRT2 / focal_px),
+        points(working, vehicle_from_camera),
+        contact(working, vehicle_from_camera, options.max_range_m) {}
+
+  void add(Timestamp stamp, const cv::Mat& image, const RigidTransform& previous_from_now) {
+    points.add(stamp, image, previous_from_now);
+    images.emplace_back(stamp, image);
+    while (toSeconds(stamp - images.front().first) > kCompareInterval_s) {
+      images.pop_front();
+    }
+  }
+  void clear() {
+    points.clear();
+    images.clear();
+  }
+  std::vector<JudgedPoint> judge(const State& state) const;
+  std::vector<MovingPoint> movingPoints(const std::vector<JudgedPoint>& judged,
+                                        const Eigen::Vector3d& rotation) const;
+  bool compareGround(const State& state);
+  /// Motion of the vehicle since an image, such that the ground fits.
+  RigidTransform groundMotion(Timestamp before, const RigidTransform& before_from_now) const {
+    std::vector<RayPair> rays;
+    for (const PointTrack& track : points.tracks()) {
+      for (const PointObservation& observation : track) {
+        if (observation.stamp == before) {
+          rays.push_back({vehicle_from_camera.rotation() * track.back().ray_in_camera,
+                          vehicle_from_camera.rotation() * observation.ray_in_camera});
+        }
+      }
+    }
+    return fitGroundMotion(before_from_now, rays, vehicle_from_camera.translation(), sigma_rad);
+  }
+
+  /// Whether a point still has the appearance of its first observation: others have slid along an edge.
+  bool hasKeptAppearance(const PointTrack& track) const {
+    for (const auto& [stamp, image] : images) {
+      if (stamp == track.front().stamp) {
+        cv::Mat before, now;
+        cv::getRectSubPix(image, cv::Size(kPatch_px, kPatch_px), track.front().position_px, before);
+        cv::getRectSubPix(images.back().second, cv::Size(kPatch_px, kPatch_px), track.back().position_px,
+                          now);
+        cv::Mat correlation;
+        cv::matchTemplate(now, before, correlation, cv::TM_CCOEFF_NORMED);
+        return correlation.at<float>(0) > kSameAppearance;
+      }
+    }
+    return false;
+  }
+
+  const RigidTransform vehicle_from_camera;
+  const WorkingCamera working;
+  const double focal_px;   // in the middle of the image, per radian
+  const double sigma_rad;  // of the motion of a point between two images
+  FollowedPoints points;
+  GroundContact contact;
+  std::deque<std::pair<Timestamp, cv::Mat>> images;
+};
+
+ObjectTracker::ObjectTracker(std::shared_ptr<const CameraRig> rig, const ObjectTrackerOptions& options,
+                             FrameCallback on_frame)
+    : rig_(std::move(rig)),
+      options_((options.validate(), options)),
+      on_frame_(std::move(on_frame)),
+      state_(std::make_unique<State>()) {
+  std::vector<bool> is_used(rig_->cameras.size(), options_.cameras.empty());
+  for (const std::string& name : options_.cameras) {
+    is_used[rig_->cameraIndex(name)] = true;
+  }
+  cameras_.resize(rig_->cameras.size());
+  for (size_t i = 0; i < cameras_.size(); ++i) {
+    if (!is_used[i]) {
+      continue;
+    }
+    if (!rig_->cameras[i].vehicle_from_camera) {
+      throw InputError("rig: cameras." + rig_->cameras[i].name + ": expected vehicle_from_camera");
+    }
+    cameras_[i] = std::make_unique<Camera>(rig_->cameras[i], options_);
+  }
+  assembler_ = std::make_unique<ImageFrameAssembler>(
+      cameras_.size(), options_.frames, [this](const ImageFrame& frame) { process(frame); },
+      [this](DriveBreak /*drive_break*/, Timestamp /*stamp*/) { startOver(); }, is_used);
+}
+
+ObjectTracker::~ObjectTracker() = default;
+
+void ObjectTracker::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
+  check(camera_index < cameras_.size(), "ObjectTracker::addImage: no such camera");
+  if (cameras_[camera_index]) {
+    assembler_->addImage(camera_index, stamp, image);
+  }
+}
+
+void ObjectTracker::addOdometry(const VehicleOdometry& odometry) {
+  assembler_->addOdometry(odometry);
+}
+
+void ObjectTracker::finish() {
+  assembler_->finish();
+}
+
+void ObjectTracker::startOver() {
+  *state_ = State();
+  for (const std::unique_ptr<Camera>& camera : cameras_) {
+    if (camera) {
+      camera->clear();
+    }
+  }
+}
+
+std::vector<JudgedPoint> ObjectTracker::Camera::judge(const State& state) const {
+  std::vector<JudgedPoint> judged;
+  const State::Pose& now = state.poses.back();
+  const double height_m = vehicle_from_camera.translation().z();
+  for (const PointTrack& track : points.tracks()) {
+    const State::Pose* before = state.at(track.front().stamp);
+    const double age_s = toSeconds(now.stamp - track.front().stamp);
+    if (before == nullptr || age_s < kMinAge_s) {
+      continue;
+    }
+    JudgedPoint point{&track, before->odom_from_vehicle.inverse() * now.odom_from_vehicle, age_s, {}, {}};
+    // The ground, lowered by its tolerance, is the farthest that a point can be.
+    const double down = -(vehicle_from_camera.rotation() * track.back().ray_in_camera).z() - kGroundSlope;
+    const double min_inverse_per_m = std::max(0.0, down / (height_m + kGroundBelow_m));
+    point.found =
+        compareWithStatic({track.back().ray_in_camera, track.front().ray_in_camera},
+                          vehicle_from_camera.inverse() * point.before_from_now * vehicle_from_camera,
+                          min_inverse_per_m, std::max(1.0 / kMinRange_m, min_inverse_per_m));
+    if (!point.found.is_valid) {
+      continue;
+    }
+    RotationEquation& equation = point.equation;
+    equation.by_rotation = age_s / FollowedPoints::kHistory_s * point.found.tangents *
+                           crossMatrixOf(track.front().ray_in_camera) *
+                           vehicle_from_camera.rotationMatrix().transpose();
+    equation.residual_rad = point.found.residual_rad;
+    equation.sigma_rad = sigma_rad;
+    equation.has_second = point.found.normal.isZero();
+    if (!equation.has_second) {
+      equation.residual_rad = {point.found.normal.dot(point.found.residual_rad), 0.0};
+      equation.by_rotation.row(0) = point.found.normal.transpose() * equation.by_rotation;
+    }
+    judged.push_back(point);
+  }
+  return judged;
+}
+
+std::vector<MovingPoint> ObjectTracker::Camera::movingPoints(const std::vector<JudgedPoint>& judged,
+                                                             const Eigen::Vector3d& rotation) const {
+  std::vector<MovingPoint> moving;
+  for (const JudgedPoint& point : judged) {
+    const Eigen::Vector2d left = point.equation.residual_rad - point.equation.by_rotation * rotation;
+    const double residual_rad = point.equation.has_second ? left.norm() : std::abs(left.x());
+    const double travel_m = point.before_from_now.translation().norm();
+    const double translation_rad =
+        (kTranslation_m + kTranslationPerSqrt_m * std::sqrt(travel_m)) * point.found.inverse_range_per_m;
+    const double rotation_rad = kRotation_rad + kRotationPerSqrt_rad * std::sqrt(travel_m);
+    if (residual_rad > kMovingSigmas * std::hypot(sigma_rad, translation_rad, rotation_rad) &&
+        residual_rad > kMovingPixels / focal_px && hasKeptAppearance(*point.track)) {
+      const RigidTransform turned(rotationFromVector(-point.age_s / FollowedPoints::kHistory_s * rotation),
+                                  Eigen::Vector3d::Zero());
+      moving.push_back({vehicle_from_camera.rotation() * point.track->back().ray_in_camera,
+                        vehicle_from_camera.rotation() * point.track->front().ray_in_camera,
+                        turned * point.before_from_now, point.age_s, sigma_rad});
+    }
+  }
+  return moving;
+}
+
+/// Compares the ground with that of the oldest image that was taken near enough; false without an earlier
+/// image.
+bool ObjectTracker::Camera::compareGround(const State& state) {
+  for (size_t i = 0; i + 1 < images.size(); ++i) {
+    const auto& [stamp, image] = images[i];
+    const State::Pose* before = state.at(stamp);
+    if (before == nullptr) {
+      continue;
+    }
+    const RigidTransform before_from_now =
+        before->odom_from_vehicle.inverse() * state.poses.back().odom_from_vehicle;
+    if (before_from_now.translation().norm() < kCompareTravel_m || i + 2 == images.size()) {
+      contact.compare(images.back().second, image, groundMotion(stamp, before_from_now));
+      return true;
+    }
+  }
+  return false;
+}
+
+void ObjectTracker::process(const ImageFrame& frame) {
+  for (State::Pose& pose : state_->poses) {
+    if (const CorrectedPose* corrected = correctionAt(frame.corrections, pose.stamp)) {
+      pose.odom_from_vehicle = corrected->odom_from_vehicle;
+    }
+  }
+  if (!frame.odom_from_vehicle) {
+    startOver();
+    return;
+  }
+  const RigidTransform now = *frame.odom_from_vehicle;
+  const RigidTransform previous_from_now =
+      state_->poses.empty() ? RigidTransform() : state_->poses.back().odom_from_vehicle.inverse() * now;
+  state_->poses.push_back({frame.stamp, now});
+  while (toSeconds(frame.stamp - state_->poses.front().stamp) > 1.5 * FollowedPoints::kHistory_s) {
+    state_->poses.pop_front();
+  }
+  std::vector<std::vector<JudgedPoint>> judged(cameras_.size());
+  std::vector<RotationEquation> equations;
+  for (size_t i = 0; i < cameras_.size(); ++i) {
+    Camera* camera = cameras_[i].get();
+    if (camera == nullptr) {
+      continue;
+    }
+    if (!frame.has_image[i]) {
+      camera->clear();
+      continue;
+    }
+    camera->add(frame.stamp, camera->working.undistort(frame.images[i].pixels), previous_from_now);
+    judged[i] = camera->judge(*state_);
+    for (const JudgedPoint& point : judged[i]) {
+      equations.push_back(point.equation);
+    }
+  }
+  // The body of the vehicle is rigid: all cameras together tell its rotation, even if one sees little but an
+  // object.
+  const Eigen::Vector3d rotation = correctRotation(equations, kBodyRotation_rad);
+  state_->filter.predict(frame.stamp);
+  for (size_t i = 0; i < cameras_.size(); ++i) {
+    if (judged[i].empty()) {
+      continue;
+    }
+    const std::vector<MovingPoint> moving = cameras_[i]->movingPoints(judged[i], rotation);
+    if (!moving.empty() && cameras_[i]->compareGround(*state_)) {
+      const Eigen::Vector3d camera_m = cameras_[i]->vehicle_from_camera.translation();
+      state_->filter.update(detectObjects(moving, cameras_[i]->contact, camera_m), now);
+    }
+  }
+  state_->filter.finish();
+  on_frame_({frame.stamp, now, state_->filter.objects()});
+}
+
+}  // namespace vcharge
