@@ -58,8 +58,9 @@ Eigen::Vector2d nearestPoint(const Outline& outline, const Eigen::Vector2d& poin
     const Eigen::Vector2d& a = outline[i];
     const Eigen::Vector2d& b = outline[(i + 1) % outline.size()];
     const Eigen::Vector2d on_edge = nearestOnSegment(point_m, a, b);
-    if ((on_edge - point_m).norm() < least) {
-      least = (on_edge - point_m).norm();
+    const double distance_square = (on_edge - point_m).squaredNorm();
+    if (distance_square < least) {
+      least = distance_square;
       nearest = on_edge;
     }
     if ((a.y() > point_m.y()) != (b.y() > point_m.y()) &&
@@ -92,8 +93,9 @@ Eigen::Vector2d nearestPoint(const Outline& outline, const Outline& other) {
   Eigen::Vector2d nearest = outline.front();
   double least = std::numeric_limits<double>::infinity();
   const auto consider = [&](const Eigen::Vector2d& own, const Eigen::Vector2d& of_other) {
-    if ((own - of_other).norm() < least) {
-      least = (own - of_other).norm();
+    const double distance_square = (own - of_other).squaredNorm();
+    if (distance_square < least) {
+      least = distance_square;
       nearest = own;
     }
   };

@@ -13,7 +13,7 @@ from vcharge_evaluation.drawing.pictures import add_moment_arguments, chosen_sta
 
 YELLOW, WHITE = (0, 255, 255), (255, 255, 255)
 SIZE_PX, REACH_M = 640, 12.0  # of the view from above; the judged objects are within 8 m of the vehicle's outline
-IMAGE_PX = (400, 250)
+IMAGE_PX = (512, 320)
 
 
 def rotation(yaw):
