@@ -236,8 +236,8 @@ class BenchmarkComparisonTest(FolderTest):
 
 class ArgumentsTest(FolderTest):
     def test_every_stage_has_help(self):
-        for stage in ("masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "conditions",
-                      "faults", "chain", "latency", "soak"):
+        for stage in ("masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "objects",
+                      "conditions", "faults", "chain", "latency", "soak"):
             output, arguments = io.StringIO(), sys.argv
             self.addCleanup(setattr, sys, "argv", arguments)
             sys.argv = ["evaluate.sh", stage, "--help"]

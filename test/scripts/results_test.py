@@ -188,7 +188,8 @@ class CompletenessTest(unittest.TestCase):
 
     def test_the_quick_run_has_every_stage_that_it_can_measure(self):
         quick = {step.stage for step in everything.steps() if step.quick is not None}
-        self.assertLessEqual({"masks", "ranges", "obstacles", "height_map", "localization", "conditions", "faults", "chain"}, quick)
+        self.assertLessEqual({"masks", "ranges", "obstacles", "height_map", "localization", "objects", "conditions", "faults",
+                              "chain"}, quick)
         self.assertLessEqual(quick, set(evaluation_main.STAGES))
 
 

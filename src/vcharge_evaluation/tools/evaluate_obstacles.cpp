@@ -1,17 +1,15 @@
 #include <algorithm>
 #include <cstdio>
 #include <map>
-#include <memory>
 #include <optional>
 
 #include "tool_arguments.h"
 #include "vcharge_core/base/progress_bar.h"
 #include "vcharge_core/dense_maps/obstacle_map_file.h"
-#include "vcharge_core/motion/trajectory.h"
 #include "vcharge_evaluation/approach_errors.h"
+#include "vcharge_evaluation/drive_truth.h"
 #include "vcharge_evaluation/obstacle_map_errors.h"
 #include "vcharge_evaluation/obstacle_scan_errors.h"
-#include "vcharge_evaluation/range_truth.h"
 
 namespace {
 
@@ -25,82 +23,6 @@ struct Options {
   VCHARGE_OPTION_GROUP(ObstacleMapEvaluationOptions, map, {}, "Cells of the fused map.");
   VCHARGE_OPTION_GROUP(ApproachEvaluationOptions, approach, {}, "First reports and the driving corridor.");
   VCHARGE_END_OPTIONS();
-};
-
-/// The truth of a simulated drive.
-class Truth {
- public:
-  Truth(const std::string& folder, CameraRig rig)
-      : folder_(folder),
-        rig_(std::move(rig)),
-        trajectory_(readTrajectory(folder + "/trajectory.tum")),
-        movers_(readTruthMovers(folder + "/movers.yaml")) {
-    for (const StampedTransform& entry : trajectory_) {
-      poses_[entry.stamp] = entry.world_from_vehicle;
-    }
-    for (const RigCamera& camera : rig_.cameras) {
-      rays_.push_back(nullptr);
-      if (!camera.vehicle_from_camera) {
-        throw InputError(folder + "/rig.yaml: cameras." + camera.name + ": expected vehicle_from_camera");
-      }
-    }
-  }
-
-  const RigidTransform* poseAt(Timestamp stamp) const {
-    const auto found = poses_.find(stamp);
-    return found == poses_.end() ? nullptr : &found->second;
-  }
-  std::vector<RigidTransform> path() const {
-    std::vector<RigidTransform> path;
-    for (const auto& entry : poses_) {
-      path.push_back(entry.second);
-    }
-    return path;
-  }
-  /// Points visible to a camera; empty without a true range image.
-  std::vector<SeenPoint> pointsOf(size_t index, Timestamp stamp, int step) {
-    const RigCamera& camera = rig_.cameras[index];
-    const cv::Mat range_m = readRangeTruth(folder_ + "/range", camera.name, stamp);
-    if (range_m.empty()) {
-      return {};
-    }
-    checkImageSize(camera, range_m.size(), folder_ + "/range/" + camera.name);
-    if (!rays_[index]) {
-      rays_[index] = std::make_unique<RayTable>(camera.model, camera.image_size_px, camera.field_of_view_rad,
-                                                camera.mask);
-    }
-    const RigidTransform& vehicle_from_camera = *camera.vehicle_from_camera;
-    return makeSeenPoints(range_m, *rays_[index], poses_.at(stamp) * vehicle_from_camera,
-                          travelAt(stamp, vehicle_from_camera), step);
-  }
-  std::vector<TruthObstacle> moversBetween(Timestamp from, Timestamp to) const {
-    std::vector<TruthObstacle> all;
-    for (auto entry = movers_.lower_bound(from); entry != movers_.end() && entry->first <= to; ++entry) {
-      all.insert(all.end(), entry->second.begin(), entry->second.end());
-    }
-    return all;
-  }
-  const Trajectory& trajectory() const { return trajectory_; }
-  const CameraRig& rig() const { return rig_; }
-
- private:
-  /// Direction of a camera's motion at a stamp; zero if it stands.
-  Eigen::Vector2d travelAt(Timestamp stamp, const RigidTransform& vehicle_from_camera) const {
-    const auto here = poses_.find(stamp);
-    const auto next = std::next(here) == poses_.end() ? here : std::next(here);
-    const auto previous = here == poses_.begin() ? here : std::prev(here);
-    const Eigen::Vector2d motion = ((next->second * vehicle_from_camera).translation() -
-                                    (previous->second * vehicle_from_camera).translation())
-                                       .head<2>();
-    return motion.norm() < 0.01 ? Eigen::Vector2d(0.0, 0.0) : Eigen::Vector2d(motion.normalized());
-  }
-
-  const std::string folder_;
-  const CameraRig rig_;
-  const Trajectory trajectory_;
-  std::map<Timestamp, RigidTransform> poses_;
-  std::map<Timestamp, std::vector<TruthObstacle>> movers_;
-  std::vector<std::unique_ptr<RayTable>> rays_;
 };
 
 nlohmann::json raysToJson(const char* what, const RayErrors& errors) {
@@ -264,7 +186,7 @@ struct Arguments {
 };
 
 nlohmann::json evaluate(const Arguments& arguments, const Options& options) {
-  Truth truth(arguments.truth, readCameraRig(arguments.truth + "/rig.yaml"));
+  DriveTruth truth(arguments.truth);
   const std::vector<TruthObstacle> obstacles = readTruthObstacles(arguments.truth + "/obstacles.yaml");
   const TruthHeights heights = readTruthHeights(arguments.truth + "/height_map.yaml");
   ObstacleMapEvaluator map_evaluator(obstacles, heights, truth.path(), options.map);

@@ -10,6 +10,7 @@
 #include "vcharge_core/dense_maps/obstacle_map.h"
 #include "vcharge_core/motion/trajectory.h"
 #include "vcharge_evaluation/obstacle_truth.h"
+#include "vcharge_evaluation/outlines.h"
 
 namespace vcharge {
 
@@ -21,9 +22,12 @@ struct ApproachEvaluationOptions {
   VCHARGE_OPTION(double, min_height_m, 0.2, positive(), "Least height of a judged obstacle.");
   VCHARGE_OPTION(double, max_gap_m, 1.0, notNegative(),
                  "Largest distance of a judged obstacle from the ground that is driven over.");
-  VCHARGE_OPTION(double, vehicle_front_m, 3.46, anyValue(), "Front end of the vehicle in its own frame.");
-  VCHARGE_OPTION(double, vehicle_rear_m, -0.74, anyValue(), "Rear end of the vehicle in its own frame.");
-  VCHARGE_OPTION(double, vehicle_half_width_m, 0.89, positive(), "Half the width of the vehicle.");
+  VCHARGE_OPTION(double, vehicle_front_m, kVehicleFront_m, anyValue(),
+                 "Front end of the vehicle in its own frame.");
+  VCHARGE_OPTION(double, vehicle_rear_m, kVehicleRear_m, anyValue(),
+                 "Rear end of the vehicle in its own frame.");
+  VCHARGE_OPTION(double, vehicle_half_width_m, kVehicleHalfWidth_m, positive(),
+                 "Half the width of the vehicle.");
   VCHARGE_END_OPTIONS();
 };
 
@@ -74,7 +78,7 @@ class ApproachEvaluator {
   void judgeCorridor(const Frame& frame, const std::vector<TruthObstacle>& movers);
   /// Whether a cell is occupied; absent at the edges of obstacles.
   std::optional<bool> truthAt(const Eigen::Vector2d& world_m, const std::vector<TruthObstacle>& movers) const;
-  std::vector<Eigen::Vector2d> outline(const RigidTransform& world_from_vehicle, double margin_m) const;
+  Outline outline(const RigidTransform& world_from_vehicle, double margin_m) const;
 
   const ApproachEvaluationOptions options_;
   const TruthHeights heights_;

@@ -12,13 +12,15 @@
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/camera/ray_table.h"
+#include "vcharge_core/motion/tracked_object.h"
+#include "vcharge_evaluation/outlines.h"
 
 namespace vcharge {
 
 /// A solid object of a simulated scene, in the world frame.
 struct TruthObstacle {
   std::string kind;
-  std::vector<Eigen::Vector2d> footprint_m;  ///< polygon
+  Outline footprint_m;
   double base_z_m = 0.0;
   double top_z_m = 0.0;
 
@@ -28,13 +30,18 @@ struct TruthObstacle {
   Eigen::Vector2d middle_m() const;
 };
 
-/// Distance of a point from a polygon; 0 inside it.
-double distanceToPolygon(const Eigen::Vector2d& point_m, const std::vector<Eigen::Vector2d>& polygon_m);
-
 /// Reads obstacles.yaml of a simulated drive. InputError naming file and key.
 std::vector<TruthObstacle> readTruthObstacles(const std::string& path);
-/// Reads the moving objects in movers.yaml of a simulated drive, by stamp; empty without such a file.
-std::map<Timestamp, std::vector<TruthObstacle>> readTruthMovers(const std::string& path);
+
+/// An object that can move: what a map of obstacles can tell of it, and the whole object in the world frame,
+/// numbered from 1 in the file's order.
+struct TruthMover {
+  TruthObstacle obstacle;
+  TrackedObject object;
+};
+/// Reads movers.yaml of a simulated drive, by stamp; empty without such a file. InputError naming file, stamp
+/// and what is expected.
+std::map<Timestamp, std::vector<TruthMover>> readTruthMovers(const std::string& path);
 
 /// Heights of a simulated scene on a grid.
 struct TruthHeights {

@@ -10,6 +10,7 @@ STAGES = {
     "ranges": "ranges",
     "height_map": "height_map",
     "obstacles": "obstacles",
+    "objects": "objects",
     "conditions": "conditions",
     "faults": "faults",
     "odometry": "odometry",

@@ -2,10 +2,8 @@
 range maps from earlier images alone, and obstacle maps from these. The masks of the own body are those of make_masks."""
 import argparse
 
-import yaml
-
 from vcharge_evaluation.drawing.moments import OBSTACLE_LEGEND, draw_obstacles
-from vcharge_evaluation.drives import SCENARIOS, Drive, found_masks
+from vcharge_evaluation.drives import SCENARIOS, Drive, found_masks, scenario_drive, scene_and_drive
 from vcharge_evaluation.localization_errors import BOUND_DEG, BOUND_M, LocalizationErrors, Map
 from vcharge_evaluation.obstacles import judge_obstacles, summary
 from vcharge_evaluation.ranges import RangeErrors
@@ -38,11 +36,6 @@ def all_scenarios(driving=DRIVING):
     return [*driving, *noons.values(), *conditions]
 
 
-def scene_and_drive(name):
-    scenario = yaml.safe_load((SCENARIOS / f"{name.removeprefix(NOON)}.yaml").read_text())
-    return scenario.get("scene", "lot"), scenario.get("drive", "short")
-
-
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__)
     add_arguments(parser, "condition_evaluation")
@@ -58,13 +51,17 @@ class Condition:
     """A scenario's drive, and its noon map or None. Where a stage has no result, a remark says why."""
 
     def __init__(self, args, name):
-        scene, driven = scene_and_drive(name)
+        scene, driven = scene_and_drive(name.removeprefix(NOON))
         self.has_obstacle_truth = scene not in LAYERED
-        size = ("--image-scale", args.image_scale, "--duration-s", args.duration_s * TIMES_LONGER.get(scene, 1))
+        duration_s = args.duration_s * TIMES_LONGER.get(scene, 1)
+        size = ("--image-scale", args.image_scale, "--duration-s", duration_s)
         noon = ("--scene", scene, "--drive", MAP_DRIVES.get(driven, driven), "--scene-seed", args.seed)
         mapping = Drive(args.work, f"noon_{scene}_{driven}", *noon, "--seed", args.seed + 1, "--image-step", 2, *size)
-        words = (*noon[:2], "--drive", driven) if name.startswith(NOON) else ("--scenario", SCENARIOS / f"{name}.yaml")
-        self.drive = Drive(args.work, name, *words, "--scene-seed", args.seed, "--seed", args.seed + 2, *size, "--truth-range")
+        if name.startswith(NOON):
+            self.drive = Drive(args.work, name, *noon[:2], "--drive", driven, "--scene-seed", args.seed, "--seed", args.seed + 2,
+                               *size, "--truth-range")
+        else:
+            self.drive = scenario_drive(args.work, name, args.seed, args.image_scale, duration_s)
         self.masks = found_masks(args.work, scene)
         self.rig = self.masks.rig_of(self.drive.folder)
         path, _, run = mapping.map(self.masks.rig_of(mapping.folder))

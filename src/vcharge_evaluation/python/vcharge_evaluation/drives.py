@@ -51,6 +51,18 @@ def other_day_drive(work, scene, seed, scale, duration_s, words=()):
                  "--image-scale", scale, "--duration-s", duration_s, "--truth-range", *words)
 
 
+def scenario_drive(work, name, seed, scale, duration_s, words=()):
+    """A drive of config/scenarios with true ranges. `words` change the scenario."""
+    return Drive(work, name, "--scenario", SCENARIOS / f"{name}.yaml", "--scene-seed", seed, "--seed", seed + 2, "--image-scale",
+                 scale, "--duration-s", duration_s, "--truth-range", *words)
+
+
+def scene_and_drive(name):
+    """Scene and drive that a scenario names, or their defaults."""
+    scenario = yaml.safe_load((SCENARIOS / f"{name}.yaml").read_text())
+    return scenario.get("scene", "lot"), scenario.get("drive", "short")
+
+
 class FoundMasks:
     """Masks of the own body that make_masks finds in a drive: its verdict, and its rig file or None."""
 

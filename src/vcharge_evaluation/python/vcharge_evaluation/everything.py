@@ -29,6 +29,7 @@ class Step:
 
 
 QUICK_SCALE, QUICK_S = 0.4, 6  # of the drives that the stages of a quick run share
+CONDITIONS_SCALE, CONDITIONS_S = 0.3, 5  # of its drives in other conditions
 
 
 def steps():
@@ -55,9 +56,15 @@ def steps():
                         "--no-experiments"] if first else None)
             yield Step("localization", [*words, "--image-scale", 0.25, "--consistency", 20],
                        [*words, "--image-scale", QUICK_SCALE, "--consistency", 5] if first else None)
+    # The quick run's drives are those of its conditions.
+    moving = ["movers_crossing", "movers_lot", "standing_lot"]
+    yield Step("objects", ["--seeds", *LOTS, "--drives", *moving, "stop_and_go_lot", "bay_backwards_lot"],
+               ["--seeds", LOTS[0], "--drives", *moving, "--image-scale", CONDITIONS_SCALE, "--duration-s", CONDITIONS_S])
+    yield Step("objects", ["--seeds", *GARAGES, "--drives", "movers_garage"])
+    yield Step("objects", ["--seeds", LOTS[0], "--drives", "movers_lot", "--conditions", "dusk", "wet"])
     conditions = ["--seed", LOTS[0]]
-    yield Step("conditions", conditions, [*conditions, "--image-scale", 0.3, "--duration-s", 5, "--scenarios",
-                                          *all_scenarios(DRIVING_QUICK)])
+    yield Step("conditions", conditions, [*conditions, "--image-scale", CONDITIONS_SCALE, "--duration-s", CONDITIONS_S,
+                                          "--scenarios", *all_scenarios(DRIVING_QUICK)])
     faults = ["--seed", LOTS[0]]
     yield Step("faults", faults, [*faults, "--image-scale", 0.3])
     yield Step("mapping", ["--seeds", *LOTS, "--image-scale", 0.5])

@@ -43,15 +43,20 @@ def detect(args, name):
     return judge_obstacles(drive, masks.rig_of(drive.folder)), drive, masks
 
 
-def judge_obstacles(drive, rig, *words):
-    """Errors of the obstacle maps of a drive with a rig file. NoResult if there are no maps."""
-    folder = drive.folder
-    run = run_tool_once("detect_obstacles", folder / "detect.log", "--bag", drive.bag, "--rig", rig, "--options",
-                        CONFIG / "obstacles.yaml", "--range-options", CONFIG / "dense_obstacles.yaml", "--output",
-                        folder / "obstacles", *words, may_fail=True)
+def detect_obstacles(drive, rig, output, *words):
+    """Writes obstacle maps of a drive with a rig file into a folder, with the log beside it. NoResult if there are none."""
+    run = run_tool_once("detect_obstacles", output.with_suffix(".log"), "--bag", drive.bag, "--rig", rig, "--options",
+                        CONFIG / "obstacles.yaml", "--range-options", CONFIG / "dense_obstacles.yaml", "--output", output,
+                        *words, may_fail=True)
     if run.error():
         raise NoResult(run.reason())
-    return judge("obstacles", folder / "report", "--obstacles", folder / "obstacles", "--truth", drive.truth)
+
+
+def judge_obstacles(drive, rig, *words):
+    """Errors of the obstacle maps of a drive with a rig file. NoResult if there are no maps."""
+    output = drive.folder / "obstacles"
+    detect_obstacles(drive, rig, output, *words)
+    return judge("obstacles", drive.folder / "report", "--obstacles", output, "--truth", drive.truth)
 
 
 def summary(errors):

@@ -19,17 +19,6 @@ using internal::kTolerance_m;
 constexpr double kPathStep_m = 0.25;  // between footprints that make up the corridor
 constexpr double kStanding_m_per_s = 0.05;
 
-double distanceBetween(const std::vector<Eigen::Vector2d>& a, const std::vector<Eigen::Vector2d>& b) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (const Eigen::Vector2d& corner : a) {
-    nearest = std::min(nearest, distanceToPolygon(corner, b));
-  }
-  for (const Eigen::Vector2d& corner : b) {
-    nearest = std::min(nearest, distanceToPolygon(corner, a));
-  }
-  return nearest;
-}
-
 }  // namespace
 
 struct ApproachEvaluator::Frame : internal::JudgedMap {
@@ -75,15 +64,8 @@ ApproachEvaluator::ApproachEvaluator(const std::vector<TruthObstacle>& obstacles
 
 std::vector<Eigen::Vector2d> ApproachEvaluator::outline(const RigidTransform& world_from_vehicle,
                                                         double margin_m) const {
-  const double side_m = options_.vehicle_half_width_m + margin_m;
-  std::vector<Eigen::Vector2d> corners;
-  for (const auto& [x, y] : {std::pair(options_.vehicle_front_m, side_m),
-                             {options_.vehicle_rear_m, side_m},
-                             {options_.vehicle_rear_m, -side_m},
-                             {options_.vehicle_front_m, -side_m}}) {
-    corners.emplace_back((world_from_vehicle * Eigen::Vector3d(x, y, 0.0)).head<2>());
-  }
-  return corners;
+  return vehicleOutline(world_from_vehicle, options_.vehicle_front_m, options_.vehicle_rear_m,
+                        options_.vehicle_half_width_m + margin_m);
 }
 
 void ApproachEvaluator::add(const ObstacleMap& map, const std::vector<SeenPoint>& points,

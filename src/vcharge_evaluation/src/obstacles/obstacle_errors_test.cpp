@@ -239,13 +239,6 @@ TEST_F(ObstacleMapErrorsTest, FalseCellCountsOnceAndIsLeftOnlyWhileOccupied) {
   EXPECT_EQ(evaluator.errors().num_false_left, 0U);
 }
 
-TEST(ObstacleTruthTest, DistanceToAPolygon) {
-  const std::vector<Eigen::Vector2d> square = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-  EXPECT_EQ(distanceToPolygon({0.5, 0.5}, square), 0.0);
-  EXPECT_DOUBLE_EQ(distanceToPolygon({2.0, 0.5}, square), 1.0);
-  EXPECT_DOUBLE_EQ(distanceToPolygon({-3.0, -4.0}, square), 5.0);
-}
-
 TEST(ObstacleTruthTest, CellsOfTheWorldHaveUniqueKeys) {
   SeenCells cells;
   cells.add({-0.05, -3.25}, 3);

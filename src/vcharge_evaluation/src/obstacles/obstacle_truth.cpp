@@ -30,12 +30,31 @@ TruthObstacle readObstacle(const YAML::Node& node) {
   return obstacle;
 }
 
-double distanceToSegment(const Eigen::Vector2d& point, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  const Eigen::Vector2d along = b - a;
-  const double length_square = along.squaredNorm();
-  const double fraction =
-      length_square > 0.0 ? std::clamp((point - a).dot(along) / length_square, 0.0, 1.0) : 0.0;
-  return (point - a - fraction * along).norm();
+Eigen::Vector3d readVector(const YAML::Node& node) {
+  return {node[0].as<double>(), node[1].as<double>(), node[2].as<double>()};
+}
+
+TruthMover readMover(const YAML::Node& node, uint32_t id) {
+  TruthMover mover;
+  mover.obstacle = readObstacle(node);
+  TrackedObject& object = mover.object;
+  object.id = id;
+  const std::optional<ObjectClass> object_class = objectClassOf(node["class"].as<std::string>());
+  if (!object_class) {
+    throw InputError("class");
+  }
+  object.object_class = *object_class;
+  const YAML::Node rotation = node["rotation_xyzw"];
+  object.frame_from_object =
+      RigidTransform(Eigen::Quaterniond(rotation[3].as<double>(), rotation[0].as<double>(),
+                                        rotation[1].as<double>(), rotation[2].as<double>()),
+                     readVector(node["translation_m"]));
+  object.velocity_m_per_s = readVector(node["velocity_m_per_s"]);
+  object.is_standing = node["is_standing"].as<bool>();
+  object.footprint_m = mover.obstacle.footprint_m;
+  object.base_z_m = mover.obstacle.base_z_m;
+  object.height_m = node["height_m"].as<double>();
+  return mover;
 }
 
 }  // namespace
@@ -58,21 +77,6 @@ Eigen::Vector2d TruthObstacle::middle_m() const {
   return sum / static_cast<double>(footprint_m.size());
 }
 
-double distanceToPolygon(const Eigen::Vector2d& point_m, const std::vector<Eigen::Vector2d>& polygon_m) {
-  double nearest = std::numeric_limits<double>::infinity();
-  bool inside = false;
-  for (size_t i = 0; i < polygon_m.size(); ++i) {
-    const Eigen::Vector2d& a = polygon_m[i];
-    const Eigen::Vector2d& b = polygon_m[(i + 1) % polygon_m.size()];
-    nearest = std::min(nearest, distanceToSegment(point_m, a, b));
-    if ((a.y() > point_m.y()) != (b.y() > point_m.y()) &&
-        point_m.x() < a.x() + (b.x() - a.x()) * (point_m.y() - a.y()) / (b.y() - a.y())) {
-      inside = !inside;
-    }
-  }
-  return inside ? 0.0 : nearest;
-}
-
 std::vector<TruthObstacle> readTruthObstacles(const std::string& path) {
   const YAML::Node node = loadYamlFile(path);
   std::vector<TruthObstacle> obstacles;
@@ -86,21 +90,27 @@ std::vector<TruthObstacle> readTruthObstacles(const std::string& path) {
   return obstacles;
 }
 
-std::map<Timestamp, std::vector<TruthObstacle>> readTruthMovers(const std::string& path) {
-  std::map<Timestamp, std::vector<TruthObstacle>> movers;
+std::map<Timestamp, std::vector<TruthMover>> readTruthMovers(const std::string& path) {
+  std::map<Timestamp, std::vector<TruthMover>> movers;
   if (!std::filesystem::exists(path)) {
     return movers;
   }
   const YAML::Node node = loadYamlFile(path);
+  std::string where = "images";
   try {
     for (const YAML::Node& image : node["images"]) {
-      auto& here = movers[Timestamp::fromNanoseconds(image["stamp_ns"].as<int64_t>())];
+      const auto stamp_ns = image["stamp_ns"].as<int64_t>();
+      where = "images: stamp_ns " + std::to_string(stamp_ns);
+      auto& here = movers[Timestamp::fromNanoseconds(stamp_ns)];
       for (const YAML::Node& mover : image["movers"]) {
-        here.push_back(readObstacle(mover));
+        here.push_back(readMover(mover, static_cast<uint32_t>(here.size() + 1)));
       }
     }
-  } catch (const std::exception&) {
-    throw InputError(path + ": images: expected stamp_ns and movers");
+  } catch (const std::exception&) {  // from yaml-cpp, readMover or RigidTransform
+    throw InputError(
+        path + ": " + where +
+        ": expected stamp_ns and movers, each with kind, base_z_m, top_z_m, footprint_m of three "
+        "corners, class, translation_m, rotation_xyzw, velocity_m_per_s, height_m and is_standing");
   }
   return movers;
 }

@@ -4,7 +4,7 @@ import argparse
 import cv2
 import numpy as np
 
-from vcharge_evaluation.drawing import obstacles
+from vcharge_evaluation.drawing import objects, obstacles
 from vcharge_evaluation.drawing.pictures import read_image
 
 NEAREST_M, FARTHEST_M = 0.5, 20.0
@@ -12,6 +12,9 @@ HEIGHT_PX = 300
 # What draw_obstacles shows, for captions.
 OBSTACLE_LEGEND = ("Image with obstacles, scan, and map: green free, red occupied, dark unknown; true outlines of what stands cyan, "
                    "of what moves magenta")
+
+OBJECT_LEGEND = ("From above and in the images: true moving objects magenta, reported ones yellow with their ids, lines as far as they "
+                 "move in 1 s")
 
 
 def colour_ranges(range_m):
@@ -38,3 +41,8 @@ def draw_obstacles(drive, folder):
     obstacles.draw(argparse.Namespace(bag=drive.bag, rig=drive.true_rig, obstacles=folder, camera=None, stamp_ns=None,
                                       moment=0.7, truth=drive.truth, output=output))
     return cv2.imread(str(output))
+
+
+def draw_objects(drive, folder, stamp):
+    """The tracked objects of one image from above, and over the images; `folder` holds objects.csv."""
+    return objects.draw(drive.bag, drive.true_rig, folder, drive.truth, stamp)

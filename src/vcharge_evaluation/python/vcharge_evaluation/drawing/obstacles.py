@@ -27,9 +27,8 @@ def read_scans(path):
     return scans
 
 
-def draw_over_image(image, scan, camera, truth):
-    """Obstacles as vertical bars up to their heights, free ground as green dots, what truly moves in frames."""
-    picture = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
+def projection_into(camera):
+    """Function from points (N x 3, in the vehicle's frame) to pixels (N x 2), and whether each is in front of the camera."""
     pose = camera["vehicle_from_camera"]
     rotation = rotations([pose["rotation_xyzw"]])[0]
     translation = np.array(pose["translation_m"])
@@ -38,7 +37,21 @@ def draw_over_image(image, scan, camera, truth):
         in_camera = (np.array(points) - translation) @ rotation
         in_front = in_camera[:, 2] > np.linalg.norm(in_camera, axis=1) * math.cos(math.radians(88))
         return project(in_camera, camera), in_front
+    return pixels_of
 
+
+def frame(picture, corners, pixels_of, colour):
+    """A rectangle around a body given by its corners, if all are in front of the camera."""
+    pixels, ok = pixels_of(corners)
+    if ok.all():
+        low, high = pixels.min(0).astype(int) - 3, pixels.max(0).astype(int) + 3
+        cv2.rectangle(picture, tuple(low.tolist()), tuple(high.tolist()), colour, 1)
+
+
+def draw_over_image(image, scan, camera, truth):
+    """Obstacles as vertical bars up to their heights, free ground as green dots, what truly moves in frames."""
+    picture = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
+    pixels_of = projection_into(camera)
     for ray in scan:
         direction = np.array([math.cos(ray["angle_rad"]), math.sin(ray["angle_rad"])])
         origin = np.array([ray["origin_x_m"], ray["origin_y_m"]])
@@ -55,10 +68,7 @@ def draw_over_image(image, scan, camera, truth):
             if ok.all():
                 cv2.line(picture, tuple(int(v) for v in ends[0]), tuple(int(v) for v in ends[1]), (0, 0, 255), 2)
     for mover in truth.moving if truth else ():
-        corners, ok = pixels_of(truth.corners(mover))
-        if ok.all():
-            low, high = corners.min(0).astype(int) - 3, corners.max(0).astype(int) + 3
-            cv2.rectangle(picture, tuple(low.tolist()), tuple(high.tolist()), MAGENTA, 1)
+        frame(picture, truth.corners(mover), pixels_of, MAGENTA)
     return picture
 
 
