@@ -31,6 +31,9 @@ struct CrossingObject {
   double travel_m = 0.0;  ///< travel at which the vehicle's outline reaches it, rounded down to 0.1 m
 };
 
+/// Objects after a time, moved with their velocities.
+std::vector<TrackedObject> movedObjects(const std::vector<TrackedObject>& objects, double time_s);
+
 /// What lies ahead in one direction of travel. Travel is the arc length of the vehicle frame's origin; on a
 /// straight path it is the distance from the bumper.
 struct CorridorDirection {

@@ -10,11 +10,14 @@
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/dense_maps/range_map.h"
 #include "vcharge_core/frames/frame_assembler.h"
+#include "vcharge_obstacles/corridor.h"
 #include "vcharge_obstacles/ground_watch.h"
 #include "vcharge_obstacles/local_obstacle_map.h"
 #include "vcharge_obstacles/obstacle_detector.h"
 
 namespace vcharge {
+
+class PathCurvature;
 
 /// Frame in which the map's cells are fixed: the odometry's frame, or the sparse map's frame, in which
 /// localization corrects them.
@@ -33,6 +36,7 @@ struct ObstacleMapperOptions {
   VCHARGE_OPTION_GROUP(ObstacleDetectorOptions, detector, {}, "Obstacles in one range map.");
   VCHARGE_OPTION_GROUP(GroundWatchOptions, watch, {}, "Ground whose appearance changes.");
   VCHARGE_OPTION_GROUP(LocalObstacleMapOptions, map, {}, "Fusion over time and cameras.");
+  VCHARGE_OPTION_GROUP(CorridorOptions, corridor, {}, "What the vehicle sweeps on its present arc.");
   VCHARGE_OPTION_GROUP(FrameAssemblerOptions, frames, {}, "Range maps of one stamp, and odometry.");
   VCHARGE_OPTION(double, max_silence_s, 1.0, positive(),
                  "Time without range maps after which a camera has stopped.");
@@ -76,6 +80,7 @@ struct ObstacleCameraStatus {
 struct ObstacleFrame {
   ObstacleMap map;
   ObstacleScan scan;                     ///< scan of the fused map
+  Corridor corridor;                     ///< for the curvature of the path that the vehicle drives
   std::vector<CameraObstacles> cameras;  ///< observations added at this stamp, in the rig's order
   std::vector<ObstacleCameraStatus> status;
 };
@@ -85,6 +90,7 @@ struct ObstacleFrame {
 class ObstacleMapper {
  public:
   using FrameCallback = std::function<void(const ObstacleFrame&)>;
+  static constexpr double kObjectLife_s = 1.0;
 
   /// InputError if the rig lacks a camera of the options, or its extrinsics; std::invalid_argument for bad
   /// options.
@@ -95,6 +101,9 @@ class ObstacleMapper {
   void addOdometry(const VehicleOdometry& odometry);
   /// Sets localization's correction. Required with fixed_frame: map, ignored otherwise.
   void setMapFromOdom(const RigidTransform& map_from_odom);
+  /// Sets the objects that move around the vehicle, in the map's fixed frame. They enter the corridors of the
+  /// following frames, moved with their velocities, until they are replaced or kObjectLife_s old.
+  void setObjects(Timestamp stamp, std::vector<TrackedObject> objects);
   /// InputError for a range map of a camera that is not in use, or that was computed with another rig.
   void addRangeMap(const RangeMap& map);
   /// Fuses the waiting range maps at the end of the drive.
@@ -120,8 +129,10 @@ class ObstacleMapper {
       const std::optional<RigidTransform>& odom_from_vehicle) const;
   void process(Frame frame);
   void fuse(Frame* frame, const RigidTransform& fixed_from_vehicle);
+  std::optional<RigidTransform> odomFromVehicle(Timestamp stamp) const;
   void noteWithoutPose(const Frame& frame);
   void emit(const LocalObstacleMap& map, const std::vector<const CameraObstacles*>& cameras);
+  Corridor findCorridor(const ObstacleMap& map);
   void emitAt(Timestamp stamp);
   void emitWhenSilent();
   void updateStatus(Camera* camera, const CameraObstacles& seen) const;
@@ -134,6 +145,10 @@ class ObstacleMapper {
   std::vector<std::unique_ptr<Camera>> cameras_;  // indexed as in the rig; null if not in use
   std::unique_ptr<FrameAssembler<Observation>> assembler_;
   LocalObstacleMap map_;
+  const CorridorFinder corridor_finder_;
+  std::unique_ptr<PathCurvature> curvature_;
+  Timestamp objects_stamp_;
+  std::vector<TrackedObject> objects_;
   std::optional<Timestamp> last_emitted_;
   std::optional<Timestamp> last_heard_;  // odometry's stamp when the last range map arrived
   RigidTransform map_from_odom_, anchor_;

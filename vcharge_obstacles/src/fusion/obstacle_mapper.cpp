@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "corridor/path_curvature.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/text_format.h"
 #include "vcharge_obstacles/map_scan.h"
@@ -43,7 +44,9 @@ ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const Obsta
       options_((options.validate(), options)),
       on_frame_(std::move(on_frame)),
       grid_(options.detector.grid),
-      map_(options.map) {
+      map_(options.map),
+      corridor_finder_(options.detector.vehicleOutline(), options.corridor),
+      curvature_(std::make_unique<PathCurvature>()) {
   cameras_.resize(rig_->cameras.size());
   std::vector<std::string> names = options_.cameras;
   if (names.empty()) {
@@ -78,6 +81,8 @@ ObstacleMapper::~ObstacleMapper() = default;
 void ObstacleMapper::startOver(DriveBreak drive_break, Timestamp stamp) {
   num_jumps_ += drive_break == DriveBreak::kReplay ? 0 : 1;
   map_ = LocalObstacleMap(options_.map);
+  curvature_->clear();
+  objects_.clear();
   last_emitted_.reset();
   last_heard_.reset();
   for (const std::unique_ptr<Camera>& camera : cameras_) {
@@ -93,6 +98,11 @@ void ObstacleMapper::addOdometry(const VehicleOdometry& odometry) {
   assembler_->addOdometry(odometry);
 }
 
+std::optional<RigidTransform> ObstacleMapper::odomFromVehicle(Timestamp stamp) const {
+  const OdometryBuffer::Lookup pose = assembler_->odometry().lookup(stamp);
+  return pose ? std::optional<RigidTransform>(pose.odometry.odom_from_vehicle) : std::nullopt;
+}
+
 void ObstacleMapper::setMapFromOdom(const RigidTransform& map_from_odom) {
   if (options_.fixed_frame != FixedFrame::kMap) {
     return;
@@ -106,6 +116,11 @@ void ObstacleMapper::setMapFromOdom(const RigidTransform& map_from_odom) {
   map_.reanchor(moved);
   anchor_ = map_from_odom;
   has_anchor_ = true;
+}
+
+void ObstacleMapper::setObjects(Timestamp stamp, std::vector<TrackedObject> objects) {
+  objects_stamp_ = stamp;
+  objects_ = std::move(objects);
 }
 
 std::optional<RigidTransform> ObstacleMapper::fixedFromVehicle(
@@ -207,12 +222,22 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const std::vector<const C
   frame.map = map.snapshot();
   frame.map.frame_id = enumNames<FixedFrame>()[static_cast<size_t>(options_.fixed_frame)];
   frame.scan = makeScan(frame.map, options_.detector.grid.num_rays);
+  frame.corridor = findCorridor(frame.map);
   for (const CameraObstacles* camera : cameras) {
     frame.cameras.push_back(*camera);
   }
   frame.status = status();
   last_emitted_ = frame.map.stamp;
   on_frame_(frame);
+}
+
+Corridor ObstacleMapper::findCorridor(const ObstacleMap& map) {
+  const double curvature_per_m =
+      curvature_->update(map.stamp, [this](Timestamp stamp) { return odomFromVehicle(stamp); });
+  const double age_s = toSeconds(map.stamp - objects_stamp_);
+  return corridor_finder_.find(
+      map, curvature_per_m,
+      age_s <= kObjectLife_s ? movedObjects(objects_, age_s) : std::vector<TrackedObject>());
 }
 
 /// Emits the map while no range maps arrive. The time is measured by their arrival instead of their
@@ -232,10 +257,7 @@ void ObstacleMapper::emitWhenSilent() {
 /// Emits a moved copy of the map at a stamp without range maps. The map itself must not change, so that it
 /// depends only on the range maps and not on when they arrive.
 void ObstacleMapper::emitAt(Timestamp stamp) {
-  const OdometryBuffer::Lookup pose = assembler_->odometry().lookup(stamp);
-  const std::optional<RigidTransform> fixed_from_vehicle =
-      pose ? fixedFromVehicle(pose.odometry.odom_from_vehicle) : std::nullopt;
-  if (fixed_from_vehicle) {
+  if (const std::optional<RigidTransform> fixed_from_vehicle = fixedFromVehicle(odomFromVehicle(stamp))) {
     LocalObstacleMap moved = map_;
     moved.moveTo(stamp, *fixed_from_vehicle);
     emit(moved, {});

@@ -41,7 +41,7 @@ class ObstacleMapperTest : public ::testing::Test {
   /// Odometry along the true poses.
   void addOdometry(int tick) { addOdometry(tick, poseAt(tick).translation().x()); }
   RangeMap measure(size_t camera, int tick, const BoxWorldNoise& noise = {}) const {
-    return measureBoxWorld(kWorld, rig_->cameras[camera], poseAt(tick), stampAt(tick), noise);
+    return measureBoxWorld(world_, rig_->cameras[camera], poseAt(tick), stampAt(tick), noise);
   }
   void addRangeMaps(int tick, const BoxWorldNoise& noise = {}) {
     for (size_t camera = 0; camera < rig_->cameras.size(); ++camera) {
@@ -60,7 +60,7 @@ class ObstacleMapperTest : public ::testing::Test {
         }
         BoxWorldNoise noise{0.01, camera.name == blind_camera_ && tick >= dead_from_ ? 1.0 : 0.1,
                             static_cast<uint32_t>(tick)};
-        mapper_->addRangeMap(measureBoxWorld(kWorld, camera, poseAt(tick), stampAt(tick), noise));
+        mapper_->addRangeMap(measureBoxWorld(world_, camera, poseAt(tick), stampAt(tick), noise));
       }
     }
   }
@@ -108,6 +108,7 @@ class ObstacleMapperTest : public ::testing::Test {
                          [&](const ObstacleCameraStatus& status) { return status.camera_name == camera; });
   }
 
+  BoxWorld world_ = kWorld;
   std::shared_ptr<const CameraRig> rig_ = std::make_shared<const CameraRig>(makeBoxWorldRig());
   ObstacleMapperOptions options_;
   std::unique_ptr<ObstacleMapper> mapper_;
