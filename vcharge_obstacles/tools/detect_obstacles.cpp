@@ -18,6 +18,7 @@
 #include "vcharge_core/files/content_hash.h"
 #include "vcharge_core/files/file_io.h"
 #include "vcharge_dense/range_mapper.h"
+#include "vcharge_obstacles/image_fingerprint.h"
 #include "vcharge_obstacles/obstacle_mapper.h"
 #include "vcharge_recordings/bag_drive_source.h"
 
@@ -75,6 +76,7 @@ class Pipeline : public DriveConsumer {
   }
 
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
+    obstacles_->noteImage(camera_index, stamp, fingerprintOf(image.pixels));
     if (ranges_) {
       whole_.add([&] { ranges_->addImage(camera_index, stamp, image); });
     }

@@ -18,6 +18,7 @@
 namespace vcharge {
 
 class PathCurvature;
+class SilentCameras;
 
 /// Frame in which the map's cells are fixed: the odometry's frame, or the sparse map's frame, in which
 /// localization corrects them.
@@ -54,6 +55,8 @@ struct ObstacleMapperOptions {
 /// Current contribution of a camera to the map.
 enum class ObstacleCameraState {
   kNoRangeMaps,   ///< none yet, or they stopped during the drive
+  kSilent,        ///< images have stopped: ground that no other camera sees is not free
+  kFrozen,        ///< the images repeat one while the vehicle moves: as if silent, range maps are ignored
   kNoPose,        ///< no odometry at the range maps' stamps
   kStanding,      ///< the vehicle stands: motion stereo measures nothing
   kHardlySees,    ///< few ranges: night, dirt, no texture
@@ -71,6 +74,8 @@ struct ObstacleCameraStatus {
   double known_fraction = 0.0;
   uint64_t range_maps = 0;
   uint64_t without_pose = 0;
+  /// Mean time by which images are older than the odometry on their arrival; 0 without images.
+  double image_lag_s = 0.0;
   uint64_t late = 0;  ///< ignored range maps: their stamp was already fused
 };
 
@@ -99,6 +104,11 @@ class ObstacleMapper {
   ~ObstacleMapper();
 
   void addOdometry(const VehicleOdometry& odometry);
+  /// Notes that an image of a camera has arrived, by fingerprintOf() its pixels. Without range maps, as while
+  /// the vehicle stands, this shows that the camera is alive. A camera whose images stop, or repeat, for 0.3
+  /// s is silent: free cells that it sees, and no living camera, become unobserved. A camera of which no
+  /// image was ever noted does not count as silent. std::logic_error for an index beyond the rig.
+  void noteImage(size_t camera_index, Timestamp stamp, uint64_t fingerprint);
   /// Sets localization's correction. Required with fixed_frame: map, ignored otherwise.
   void setMapFromOdom(const RigidTransform& map_from_odom);
   /// Sets the objects that move around the vehicle, in the map's fixed frame. They enter the corridors of the
@@ -130,6 +140,9 @@ class ObstacleMapper {
   void process(Frame frame);
   void fuse(Frame* frame, const RigidTransform& fixed_from_vehicle);
   std::optional<RigidTransform> odomFromVehicle(Timestamp stamp) const;
+  void settleImages(Timestamp until);
+  void forgetUnwatched(Timestamp stamp, LocalObstacleMap* map) const;
+  void setLiveness(const Camera& camera, ObstacleCameraStatus* status) const;
   void noteWithoutPose(const Frame& frame);
   void emit(const LocalObstacleMap& map, const std::vector<const CameraObstacles*>& cameras);
   Corridor findCorridor(const ObstacleMap& map);
@@ -147,6 +160,9 @@ class ObstacleMapper {
   LocalObstacleMap map_;
   const CorridorFinder corridor_finder_;
   std::unique_ptr<PathCurvature> curvature_;
+  std::unique_ptr<SilentCameras> silent_;
+  size_t num_silent_emitted_ = 0;        // silent cameras at the last emitted frame
+  std::optional<Timestamp> last_fused_;  // stamp of the last range maps in the map
   Timestamp objects_stamp_;
   std::vector<TrackedObject> objects_;
   std::optional<Timestamp> last_emitted_;
