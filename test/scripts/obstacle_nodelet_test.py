@@ -293,7 +293,7 @@ class ObstacleNodeletTest(unittest.TestCase):
                     compared += 1
                     found = getattr(corridor, direction)
                     self.assertAlmostEqual(corridor.curvature_per_m, float(row["curvature_per_m"]), places=4)
-                    for key in ("known_free_m", "occupied_m", "unknown_fraction", "oldest_age_s"):
+                    for key in ("known_free_m", "free_beyond_rim_m", "occupied_m", "unknown_fraction", "oldest_age_s"):
                         np.testing.assert_allclose(getattr(found, key), float(row[key]), atol=2e-3, err_msg=key)
                     self.assertFalse(found.has_crossing)
         self.assertGreater(compared, 50)

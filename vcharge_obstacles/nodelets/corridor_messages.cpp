@@ -16,6 +16,7 @@ constexpr double kStripHeight_m = 0.03;
 vcharge_msgs::CorridorDirection toMessage(const CorridorDirection& direction) {
   vcharge_msgs::CorridorDirection message;
   message.known_free_m = direction.known_free_m;
+  message.free_beyond_rim_m = direction.free_beyond_rim_m;
   message.occupied_m = direction.occupied_m;
   message.unknown_fraction = direction.unknown_fraction;
   message.oldest_age_s = direction.oldest_age_s;
@@ -31,7 +32,9 @@ vcharge_msgs::CorridorDirection toMessage(const CorridorDirection& direction) {
 std_msgs::ColorRGBA colourAt(const CorridorDirection& direction, double travel_m) {
   std_msgs::ColorRGBA colour;
   colour.a = 0.4F;
-  colour.r = travel_m < direction.known_free_m ? 0.0F : 1.0F;
+  const bool is_free = travel_m < direction.known_free_m ||
+                       (travel_m >= kBlindRim_m && travel_m < direction.free_beyond_rim_m);
+  colour.r = is_free ? 0.0F : 1.0F;
   colour.g = travel_m < direction.occupied_m ? 1.0F : 0.0F;
   return colour;
 }

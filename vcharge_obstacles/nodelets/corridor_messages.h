@@ -13,8 +13,8 @@ namespace vcharge {
 /// `vehicle_frame`: the rig's.
 vcharge_msgs::Corridor toMessage(const Corridor& corridor, Timestamp stamp, const std::string& vehicle_frame);
 
-/// The arcs as strips in the vehicle frame, up to kCorridorMarker_m: green as far as known free, red from an
-/// occupied cell on, yellow elsewhere. Replaces earlier markers.
+/// The arcs as strips in the vehicle frame, up to kCorridorMarker_m: green where known free, red from an
+/// occupied cell on, yellow elsewhere, as in the blind rim around the body. Replaces earlier markers.
 visualization_msgs::MarkerArray toMarkers(const Corridor& corridor, Timestamp stamp,
                                           const std::string& vehicle_frame);
 

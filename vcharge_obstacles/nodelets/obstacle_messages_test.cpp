@@ -118,6 +118,7 @@ TEST(CorridorMessageTest, HoldsBothDirectionsInTheVehicleFrame) {
   corridor.curvature_per_m = 0.1;
   corridor.outline = {3.75, -0.95, 1.15};
   corridor.forward.known_free_m = 2.0;
+  corridor.forward.free_beyond_rim_m = 2.5;
   corridor.forward.occupied_m = 3.0;
   corridor.forward.unknown_fraction = 0.25;
   corridor.forward.oldest_age_s = 0.5;
@@ -131,6 +132,7 @@ TEST(CorridorMessageTest, HoldsBothDirectionsInTheVehicleFrame) {
   EXPECT_EQ(message.rear_m, -0.95);
   EXPECT_EQ(message.half_width_m, 1.15);
   EXPECT_EQ(message.forward.known_free_m, 2.0);
+  EXPECT_EQ(message.forward.free_beyond_rim_m, 2.5);
   EXPECT_EQ(message.forward.occupied_m, 3.0);
   EXPECT_EQ(message.forward.unknown_fraction, 0.25);
   EXPECT_EQ(message.forward.oldest_age_s, 0.5);
@@ -149,7 +151,8 @@ TEST(CorridorMessageTest, StripsAreGreenThenYellowThenRedAlongTheArc) {
   Corridor corridor;
   corridor.curvature_per_m = 0.2;
   corridor.outline = {3.75, -0.95, 1.15};
-  corridor.forward.known_free_m = 2.0;
+  corridor.forward.known_free_m = 0.3;  // the ground of the rim is not seen
+  corridor.forward.free_beyond_rim_m = 2.0;
   corridor.forward.occupied_m = 3.0;
   const auto markers = toMarkers(corridor, Timestamp::fromNanoseconds(5000000000LL), "base_link").markers;
   ASSERT_EQ(markers.size(), 2U);
@@ -164,7 +167,8 @@ TEST(CorridorMessageTest, StripsAreGreenThenYellowThenRedAlongTheArc) {
     const double outer_m = std::hypot(3.75, 5.0 + 1.15);
     EXPECT_NEAR(std::min(std::abs(radius_m - inner_m), std::abs(radius_m - outer_m)), 0.0, 1e-9);
     const double travel_m = 0.1 * static_cast<double>(i / 6) + 0.05;
-    EXPECT_EQ(forward.colors[i].r, travel_m < 2.0 ? 0.0F : 1.0F) << travel_m;
+    const bool is_free = travel_m < 0.3 || (travel_m > 0.6 && travel_m < 2.0);
+    EXPECT_EQ(forward.colors[i].r, is_free ? 0.0F : 1.0F) << travel_m;
     EXPECT_EQ(forward.colors[i].g, travel_m < 3.0 ? 1.0F : 0.0F) << travel_m;
   }
   EXPECT_EQ(markers[1].colors.front().r, 1.0F);  // nothing is known to be free behind

@@ -131,7 +131,8 @@ class Recorder {
  public:
   explicit Recorder(std::string folder) : folder_(std::move(folder)) {
     corridors_ =
-        "stamp_ns,direction,curvature_per_m,known_free_m,occupied_m,unknown_fraction,oldest_age_s,"
+        "stamp_ns,direction,curvature_per_m,known_free_m,free_beyond_rim_m,occupied_m,unknown_fraction,"
+        "oldest_age_s,"
         "crossing_id,crossing_time_s,crossing_travel_m\n";
     table_ = "stamp_ns,camera,state,known_fraction,pitch_rad,roll_rad,height_m,ground_state,ground_points\n";
   }
@@ -185,8 +186,9 @@ class Recorder {
       const CorridorDirection& direction = is_forward ? frame.corridor.forward : frame.corridor.backward;
       corridors_ += std::to_string(frame.map.stamp.nanoseconds()) +
                     (is_forward ? ",forward," : ",backward,") + toText(frame.corridor.curvature_per_m, 5) +
-                    "," + toText(direction.known_free_m, 3) + "," + toText(direction.occupied_m, 3) + "," +
-                    toText(direction.unknown_fraction, 4) + "," + toText(direction.oldest_age_s, 3) + ",";
+                    "," + toText(direction.known_free_m, 3) + "," + toText(direction.free_beyond_rim_m, 3) +
+                    "," + toText(direction.occupied_m, 3) + "," + toText(direction.unknown_fraction, 4) +
+                    "," + toText(direction.oldest_age_s, 3) + ",";
       if (const std::optional<CrossingObject>& crossing = direction.crossing) {
         corridors_ += std::to_string(crossing->id) + "," + toText(crossing->time_s, 3) + "," +
                       toText(crossing->travel_m, 1);

@@ -40,17 +40,23 @@ struct CorridorDirection {
   /// Travel up to which every swept cell is known to be free. Unknown cells, and those outside the map, end
   /// it. After a full turn without an obstacle: the circumference.
   double known_free_m = 0.0;
+  /// The same if unknown cells within kBlindRim_m of the present outline do not count: no camera sees the
+  /// ground there, so that known_free_m is mostly 0. Whoever uses it must know that nothing has come to the
+  /// body since the ground around it was seen.
+  double free_beyond_rim_m = 0.0;
   /// Travel until the outline touches an occupied cell; infinity if it sweeps none in the map.
   double occupied_m = std::numeric_limits<double>::infinity();
   /// Fraction of the cells swept within kUnknownTravel_m that are unknown, 0 to 1.
   double unknown_fraction = 1.0;
-  /// Age of the oldest observation that known_free_m rests on; NaN if it rests on none.
+  /// Age of the oldest observation that free_beyond_rim_m rests on; NaN if it rests on none.
   double oldest_age_s = std::numeric_limits<double>::quiet_NaN();
   std::optional<CrossingObject> crossing;  ///< the object that touches first, within kCrossingTime_s
 };
 
 /// Travel over which CorridorDirection::unknown_fraction is counted.
 inline constexpr double kUnknownTravel_m = 4.0;
+/// Distance from the outline with its margins up to which the ground is not seen: 0.55 m ahead of the bumper.
+inline constexpr double kBlindRim_m = 0.6;
 /// Time within which a crossing object is reported.
 inline constexpr double kCrossingTime_s = 5.0;
 

@@ -72,6 +72,12 @@ class OutlineContact {
     return std::max(0.0, distance_m / largest_gain_);
   }
 
+  /// Whether the whole square is within a distance of the outline where the vehicle stands.
+  bool isWithin(const Eigen::Vector2d& min_in_fixed_m, double side_m, double distance_m) const {
+    const Square square = squareAt(min_in_fixed_m, side_m);
+    return distanceTo(square, with_margin_) + square.half_diagonal_m <= distance_m;
+  }
+
   /// Travel until the outline touches a square; infinity if it does not within a full turn, or if the square
   /// lies under the vehicle.
   double travelTo(const Eigen::Vector2d& min_in_fixed_m, double side_m) const {
@@ -305,13 +311,13 @@ CorridorDirection CorridorFinder::findDirection(const ObstacleMap& map, double c
   const double reach_m =
       std::hypot(std::max(std::abs(vehicle_.front_m), std::abs(vehicle_.rear_m)), with_margin_.half_width_m);
   CorridorDirection direction;
-  direction.known_free_m = motionOf(curvature_per_m, is_forward).fullTurn_m();
+  direction.known_free_m = direction.free_beyond_rim_m = motionOf(curvature_per_m, is_forward).fullTurn_m();
   int near = 0;
   int unknown = 0;
   for (const CandidateCell& cell : findCandidates(map, contact, fixed_from_vehicle.translation(), reach_m)) {
     // Most cells are too far away to matter.
     const double limit_m = std::max(
-        kUnknownTravel_m, cell.state == kCellOccupied ? direction.occupied_m : direction.known_free_m);
+        kUnknownTravel_m, cell.state == kCellOccupied ? direction.occupied_m : direction.free_beyond_rim_m);
     if (cell.least_travel_m > limit_m) {
       continue;
     }
@@ -321,13 +327,19 @@ CorridorDirection CorridorFinder::findDirection(const ObstacleMap& map, double c
     }
     if (cell.state != kCellFree) {
       direction.known_free_m = std::min(direction.known_free_m, travel_m);
-    } else if (travel_m < direction.known_free_m && !(cell.age_s <= direction.oldest_age_s)) {
+      if (cell.state == kCellOccupied || !contact.isWithin(cell.corner_m, map.cell_size_m, kBlindRim_m)) {
+        direction.free_beyond_rim_m = std::min(direction.free_beyond_rim_m, travel_m);
+      }
+    } else if (travel_m < direction.free_beyond_rim_m && !(cell.age_s <= direction.oldest_age_s)) {
       direction.oldest_age_s = cell.age_s;
     }
     if (travel_m <= kUnknownTravel_m) {
       ++near;
       unknown += cell.state == kCellUnobserved ? 1 : 0;
     }
+  }
+  if (direction.free_beyond_rim_m <= kBlindRim_m) {  // nothing is known to be free behind the rim
+    direction.free_beyond_rim_m = direction.known_free_m;
   }
   direction.unknown_fraction = near == 0 ? 1.0 : static_cast<double>(unknown) / near;
   return direction;

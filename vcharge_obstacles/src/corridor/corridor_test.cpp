@@ -104,6 +104,7 @@ TEST_F(CorridorTest, UnknownMapHasNoFreeTravelAndNoObstacle) {
   for (const double curvature_per_m : {0.0, 0.2, -0.05}) {
     const Corridor corridor = find(curvature_per_m);
     EXPECT_LT(corridor.forward.known_free_m, 0.06);
+    EXPECT_EQ(corridor.forward.free_beyond_rim_m, corridor.forward.known_free_m);
     EXPECT_EQ(corridor.forward.occupied_m, std::numeric_limits<double>::infinity());
     EXPECT_EQ(corridor.forward.unknown_fraction, 1.0);
   }
@@ -231,6 +232,21 @@ TEST_F(CorridorTest, ContactIsThatOfSampledOutlines) {
       }
     }
   }
+}
+
+TEST_F(CorridorTest, UnknownRimAroundTheBodyEndsTheKnownFreeTravelOnly) {
+  const auto isInRim = [](const Vector2d& p) { return p.x() < 4.2 && p.x() > -1.4 && std::abs(p.y()) < 1.4; };
+  setWhere(isInRim, kCellUnobserved);
+  set(7.05, 0.05, kCellUnobserved);
+  for (const double curvature_per_m : {0.0, 0.02}) {
+    EXPECT_LT(find(curvature_per_m).forward.known_free_m, 0.06);
+    EXPECT_NEAR(find(curvature_per_m).forward.free_beyond_rim_m, 7.0 - 3.75, 0.05);
+    EXPECT_NEAR(find(curvature_per_m).forward.oldest_age_s, 0.5, 1e-6);
+  }
+  setWhere([](const Vector2d& p) { return p.x() > 4.4 && p.x() < 4.5; }, kCellUnobserved);  // not in the rim
+  EXPECT_NEAR(find(0.0).forward.free_beyond_rim_m, 4.4 - 3.75, 1e-5);
+  setWhere(isInRim, kCellOccupied);  // obstacles count everywhere
+  EXPECT_LT(find(0.0).forward.free_beyond_rim_m, 0.06);
 }
 
 TEST_F(CorridorTest, PoseOfTheVehicleMovesTheCorridor) {
