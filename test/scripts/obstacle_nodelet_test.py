@@ -20,6 +20,7 @@ from nav_msgs.msg import OccupancyGrid, Odometry
 from octomap_msgs.msg import Octomap
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CameraInfo, Image, LaserScan
+from vcharge_msgs.msg import Corridor
 from visualization_msgs.msg import MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
@@ -74,7 +75,7 @@ class ObstacleNodeletTest(unittest.TestCase):
                           for topic, message in {topic: message for topic, message in cls.messages}.items()}
         cls.received, cls.log = {}, []
         topics = {"/obstacles/grid": OccupancyGrid, "/obstacles/scan": LaserScan, "/obstacles/markers": MarkerArray,
-                  "/obstacles/octomap": Octomap}
+                  "/obstacles/octomap": Octomap, "/obstacles/corridor": Corridor}
         for camera in CAMERAS:
             topics[f"/obstacles/{camera}/scan"] = LaserScan
             topics[f"/obstacles/{camera}/ground_plane"] = Vector3Stamped
@@ -268,6 +269,7 @@ class ObstacleNodeletTest(unittest.TestCase):
         self.assertEqual((octomap.header.frame_id, octomap.id, octomap.binary), ("odom", "OcTree", True))
         self.assertAlmostEqual(octomap.resolution, grid.info.resolution, places=5)
         self.assertGreater(len(octomap.data), 100)
+        self.check_corridor(self.received["/obstacles/corridor"])
         walls = next(marker for marker in self.received["/obstacles/markers"][-1].markers if marker.ns == "walls")
         self.assertEqual(walls.header.frame_id, "odom")
         self.assertGreater(max(point.z for point in walls.points), 0.1)
@@ -277,6 +279,24 @@ class ObstacleNodeletTest(unittest.TestCase):
             # The ground is level, and the suspension moves by less than a degree and 3 cm.
             self.assertLess(np.abs(np.median(planes[:, :2], axis=0)).max(), math.radians(1.0))
             self.assertLess(abs(np.median(planes[:, 2])), 0.03)
+
+    def check_corridor(self, corridors):
+        """Equals corridor.csv of the offline tool."""
+        with open(self.offline / "corridor.csv") as file:
+            expected = {(int(row["stamp_ns"]), row["direction"]): row for row in csv.DictReader(file)}
+        compared = 0
+        for corridor in corridors:
+            self.assertEqual(corridor.header.frame_id, "base_link")
+            for direction in ("forward", "backward"):
+                row = expected.get((corridor.header.stamp.to_nsec(), direction))
+                if row is not None:
+                    compared += 1
+                    found = getattr(corridor, direction)
+                    self.assertAlmostEqual(corridor.curvature_per_m, float(row["curvature_per_m"]), places=4)
+                    for key in ("known_free_m", "free_beyond_rim_m", "occupied_m", "unknown_fraction", "oldest_age_s"):
+                        np.testing.assert_allclose(getattr(found, key), float(row[key]), atol=2e-3, err_msg=key)
+                    self.assertFalse(found.has_crossing)
+        self.assertGreater(compared, 50)
 
     def test_camera_info_unlike_the_rig_is_refused_with_one_error(self):
         def other_lens(topic, message):

@@ -18,6 +18,7 @@
 #include "vcharge_dense/range_mapper.h"
 #include "vcharge_localization/drive_localizer.h"
 #include "vcharge_mapping/sparse_mapper_options.h"
+#include "vcharge_obstacles/object_tracker.h"
 #include "vcharge_obstacles/obstacle_mapper.h"
 #include "vcharge_ros/live_drive_source.h"
 #include "vcharge_simulation/drive/drive_scenario.h"
@@ -64,6 +65,8 @@ int main() {
                                             "`compute_range_maps`, `depth_nodelet`: `config/dense*.yaml`.");
   writeSection<vcharge::HeightMapOptions>(
       "Height map", "`build_height_map`, `height_map_nodelet`: `config/height_map.yaml`.");
+  writeSection<vcharge::ObjectTrackerOptions>("Moving objects",
+                                              "`object_nodelet`; `detect_obstacles` uses the defaults.");
   writeSection<vcharge::ObstacleMapperOptions>(
       "Obstacle map", "`detect_obstacles`, `obstacle_nodelet`: `config/obstacles.yaml`.");
   writeSection<vcharge::DriveScenario>("Simulated drive", "`simulate_drive`: `config/scenarios/`.");

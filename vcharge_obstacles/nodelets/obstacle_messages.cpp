@@ -151,6 +151,7 @@ DriveMonitor::Report toReport(const ObstacleCameraStatus& status) {
                    {"range_maps", std::to_string(status.range_maps)},
                    {"without_pose", std::to_string(status.without_pose)},
                    {"late", std::to_string(status.late)},
+                   {"image_lag_s", toText(status.image_lag_s, 3)},
                    {"ground", toString(status.ground.state)},
                    {"pitch_rad", toText(status.ground.pitch_rad(), 4)},
                    {"roll_rad", toText(status.ground.roll_rad(), 4)},

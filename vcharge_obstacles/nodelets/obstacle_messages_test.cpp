@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <octomap/OcTree.h>
 
+#include "corridor_messages.h"
 #include "detection/box_world.h"
 #include "range_map_reader.h"
 #include "vcharge_core/base/error.h"
@@ -110,6 +111,68 @@ TEST(ToOctreeTest, VoxelsHaveThePositionsAndStatesOfTheCells) {
   EXPECT_EQ(stateAt(-0.05, 5.05, 0.15), kCellUnobserved);  // nothing is known above free ground
   EXPECT_EQ(stateAt(0.15, 5.25, 0.35), kCellOccupied);
   EXPECT_EQ(stateAt(0.15, 5.25, 0.45), kCellUnobserved);
+}
+
+TEST(CorridorMessageTest, HoldsBothDirectionsInTheVehicleFrame) {
+  Corridor corridor;
+  corridor.curvature_per_m = 0.1;
+  corridor.outline = {3.75, -0.95, 1.15};
+  corridor.forward.known_free_m = 2.0;
+  corridor.forward.free_beyond_rim_m = 2.5;
+  corridor.forward.occupied_m = 3.0;
+  corridor.forward.unknown_fraction = 0.25;
+  corridor.forward.oldest_age_s = 0.5;
+  corridor.forward.crossing = CrossingObject{7, 1.5, 0.3};
+  const Timestamp stamp = Timestamp::fromNanoseconds(5000000000LL);
+  const vcharge_msgs::Corridor message = toMessage(corridor, stamp, "base_link");
+  EXPECT_EQ(message.header.frame_id, "base_link");
+  EXPECT_EQ(message.header.stamp.sec, 5U);
+  EXPECT_EQ(message.curvature_per_m, 0.1);
+  EXPECT_EQ(message.front_m, 3.75);
+  EXPECT_EQ(message.rear_m, -0.95);
+  EXPECT_EQ(message.half_width_m, 1.15);
+  EXPECT_EQ(message.forward.known_free_m, 2.0);
+  EXPECT_EQ(message.forward.free_beyond_rim_m, 2.5);
+  EXPECT_EQ(message.forward.occupied_m, 3.0);
+  EXPECT_EQ(message.forward.unknown_fraction, 0.25);
+  EXPECT_EQ(message.forward.oldest_age_s, 0.5);
+  EXPECT_TRUE(message.forward.has_crossing);
+  EXPECT_EQ(message.forward.crossing_id, 7U);
+  EXPECT_EQ(message.forward.crossing_time_s, 1.5);
+  EXPECT_EQ(message.forward.crossing_travel_m, 0.3);
+  EXPECT_EQ(message.backward.known_free_m, 0.0);
+  EXPECT_EQ(message.backward.occupied_m, std::numeric_limits<double>::infinity());
+  EXPECT_EQ(message.backward.unknown_fraction, 1.0);
+  EXPECT_TRUE(std::isnan(message.backward.oldest_age_s));
+  EXPECT_FALSE(message.backward.has_crossing);
+}
+
+TEST(CorridorMessageTest, StripsAreGreenThenYellowThenRedAlongTheArc) {
+  Corridor corridor;
+  corridor.curvature_per_m = 0.2;
+  corridor.outline = {3.75, -0.95, 1.15};
+  corridor.forward.known_free_m = 0.3;  // the ground of the rim is not seen
+  corridor.forward.free_beyond_rim_m = 2.0;
+  corridor.forward.occupied_m = 3.0;
+  const auto markers = toMarkers(corridor, Timestamp::fromNanoseconds(5000000000LL), "base_link").markers;
+  ASSERT_EQ(markers.size(), 2U);
+  const visualization_msgs::Marker& forward = markers[0];
+  EXPECT_EQ(forward.header.frame_id, "base_link");
+  ASSERT_EQ(forward.points.size(), forward.colors.size());
+  ASSERT_EQ(forward.points.size(), 6 * std::lround(kCorridorMarker_m / 0.1));
+  for (size_t i = 0; i < forward.points.size(); ++i) {
+    // Ends of the bumper keep their distances from the centre of the turn, (0, 5).
+    const double radius_m = std::hypot(forward.points[i].x, forward.points[i].y - 5.0);
+    const double inner_m = std::hypot(3.75, 5.0 - 1.15);
+    const double outer_m = std::hypot(3.75, 5.0 + 1.15);
+    EXPECT_NEAR(std::min(std::abs(radius_m - inner_m), std::abs(radius_m - outer_m)), 0.0, 1e-9);
+    const double travel_m = 0.1 * static_cast<double>(i / 6) + 0.05;
+    const bool is_free = travel_m < 0.3 || (travel_m > 0.6 && travel_m < 2.0);
+    EXPECT_EQ(forward.colors[i].r, is_free ? 0.0F : 1.0F) << travel_m;
+    EXPECT_EQ(forward.colors[i].g, travel_m < 3.0 ? 1.0F : 0.0F) << travel_m;
+  }
+  EXPECT_EQ(markers[1].colors.front().r, 1.0F);  // nothing is known to be free behind
+  EXPECT_EQ(markers[1].colors.front().g, 1.0F);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <tf2_ros/transform_listener.h>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "image_listener.h"
 #include "obstacle_messages.h"
 #include "obstacle_publisher.h"
 #include "range_map_reader.h"
@@ -17,11 +18,11 @@
 
 namespace vcharge {
 
-/// Maps obstacles and free ground around the vehicle from depth_nodelet's /dense/<camera>/range/* and /odom.
-/// Publishes the topics of ObstaclePublisher and a status per camera in /diagnostics. Callbacks only queue
-/// messages; a separate thread processes them. Parameters: ~rig (path), ~options (ObstacleMapperOptions;
-/// fixed_frame: map needs localization's map -> odom on /tf), ~odometry_topic, ~lossless_replay (every range
-/// map in order, however late; otherwise those that wait too long are dropped).
+/// Maps obstacles and free ground around the vehicle from depth_nodelet's /dense/<camera>/range/*, /odom and
+/// images. Publishes the topics of ObstaclePublisher and a status per camera in /diagnostics. Callbacks only
+/// queue messages; a separate thread processes them. Parameters: ~rig (path), ~options
+/// (ObstacleMapperOptions; fixed_frame: map needs localization's map -> odom on /tf), ~odometry_topic,
+/// ~lossless_replay (every range map in order, however late; otherwise those that wait too long are dropped).
 class ObstacleNodelet : public Nodelet {
  public:
   ObstacleNodelet() : Nodelet("obstacles") {}
@@ -54,6 +55,9 @@ class ObstacleNodelet : public Nodelet {
           "/" + cameras[i].camera_name, [this, i] { return report(i); }, Threads::kOne);
       addCamera(cameras[i].camera_name);
     }
+    images_ = std::make_unique<ImageListener>(
+        &node(), *rig_, cameras, inputQueue(), &guard(),
+        [this](auto... image) { worker_->push([=] { mapper_->noteImage(image...); }, false); });
     subscribe<nav_msgs::Odometry>(
         odometry_topic_, inputQueue(),
         [this](const nav_msgs::OdometryConstPtr& message) { addOdometry(*message); });
@@ -107,6 +111,7 @@ class ObstacleNodelet : public Nodelet {
   std::unique_ptr<tf2_ros::TransformListener> listener_;
   std::unique_ptr<OrderedWorker<Task>> worker_;
   std::vector<std::unique_ptr<RangeMapSubscriber>> cameras_;
+  std::unique_ptr<ImageListener> images_;
 };
 
 }  // namespace vcharge

@@ -4,6 +4,7 @@
 
 #include <octomap/OcTree.h>
 
+#include "corridor_messages.h"
 #include "obstacle_messages.h"
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/octomap_conversions.h"
@@ -22,6 +23,7 @@ ObstaclePublisher::ObstaclePublisher(ros::NodeHandle* node, std::shared_ptr<cons
     : rig_(std::move(rig)),
       grid_(node->advertise<nav_msgs::OccupancyGrid>("/obstacles/grid", queue_size, true)),
       scan_(node->advertise<sensor_msgs::LaserScan>("/obstacles/scan", queue_size)),
+      corridor_(node->advertise<vcharge_msgs::Corridor>("/obstacles/corridor", queue_size)),
       markers_(node->advertise<visualization_msgs::MarkerArray>("/obstacles/markers", queue_size)),
       octomap_(node->advertise<octomap_msgs::Octomap>("/obstacles/octomap", queue_size)) {
   std::vector<geometry_msgs::TransformStamped> frames;
@@ -41,8 +43,14 @@ ObstaclePublisher::ObstaclePublisher(ros::NodeHandle* node, std::shared_ptr<cons
 void ObstaclePublisher::publish(const ObstacleFrame& frame) const {
   grid_.publish(toMessage(frame.map));
   scan_.publish(toMessage(frame.scan, rig_->vehicle_frame));
+  corridor_.publish(toMessage(frame.corridor, frame.map.stamp, rig_->vehicle_frame));
   if (markers_.getNumSubscribers() > 0) {
-    markers_.publish(toMarkers(frame.map));
+    visualization_msgs::MarkerArray markers = toMarkers(frame.map);
+    for (visualization_msgs::Marker& strip :
+         toMarkers(frame.corridor, frame.map.stamp, rig_->vehicle_frame).markers) {
+      markers.markers.push_back(std::move(strip));
+    }
+    markers_.publish(markers);
   }
   if (octomap_.getNumSubscribers() > 0) {
     octomap_.publish(toMessage(*toOctree(frame.map), frame.map.frame_id, frame.map.stamp));

@@ -19,6 +19,7 @@
 #include "vcharge_core/files/file_io.h"
 #include "vcharge_core/motion/tracked_object_file.h"
 #include "vcharge_dense/range_mapper.h"
+#include "vcharge_obstacles/image_fingerprint.h"
 #include "vcharge_obstacles/object_tracker.h"
 #include "vcharge_obstacles/obstacle_mapper.h"
 #include "vcharge_recordings/bag_drive_source.h"
@@ -79,6 +80,7 @@ class Pipeline : public DriveConsumer {
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
     tracking_.add([&] { objects_->addImage(camera_index, stamp, image); });
     ++num_images_;
+    obstacles_->noteImage(camera_index, stamp, fingerprintOf(image.pixels));
     if (ranges_) {
       whole_.add([&] { ranges_->addImage(camera_index, stamp, image); });
     }
@@ -140,6 +142,10 @@ class Pipeline : public DriveConsumer {
 class Recorder {
  public:
   explicit Recorder(std::string folder) : folder_(std::move(folder)) {
+    corridors_ =
+        "stamp_ns,direction,curvature_per_m,known_free_m,free_beyond_rim_m,occupied_m,unknown_fraction,"
+        "oldest_age_s,"
+        "crossing_id,crossing_time_s,crossing_travel_m\n";
     table_ = "stamp_ns,camera,state,known_fraction,pitch_rad,roll_rad,height_m,ground_state,ground_points\n";
   }
 
@@ -160,6 +166,7 @@ class Recorder {
                 toText(status.ground.height_m(), 4) + "," + toString(status.ground.state) + "," +
                 std::to_string(status.ground.num_points) + "\n";
     }
+    addCorridor(frame);
     ++num_frames_;
   }
 
@@ -171,6 +178,7 @@ class Recorder {
   void finish(const ObstacleMapper& mapper, nlohmann::json* found) const {
     writeObjects(object_frames_, folder_);
     writeTextFileAtomically(folder_ + "/status.csv", table_);
+    writeTextFileAtomically(folder_ + "/corridor.csv", corridors_);
     nlohmann::json cameras = nlohmann::json::array();
     for (const ObstacleCameraStatus& status : mapper.status()) {
       std::cout << status.camera_name << ": " << status.range_maps << " range maps (" << status.without_pose
@@ -191,8 +199,26 @@ class Recorder {
   uint64_t numFrames() const { return num_frames_ + object_frames_.size(); }
 
  private:
+  void addCorridor(const ObstacleFrame& frame) {
+    for (const bool is_forward : {true, false}) {
+      const CorridorDirection& direction = is_forward ? frame.corridor.forward : frame.corridor.backward;
+      corridors_ += std::to_string(frame.map.stamp.nanoseconds()) +
+                    (is_forward ? ",forward," : ",backward,") + toText(frame.corridor.curvature_per_m, 5) +
+                    "," + toText(direction.known_free_m, 3) + "," + toText(direction.free_beyond_rim_m, 3) +
+                    "," + toText(direction.occupied_m, 3) + "," + toText(direction.unknown_fraction, 4) +
+                    "," + toText(direction.oldest_age_s, 3) + ",";
+      if (const std::optional<CrossingObject>& crossing = direction.crossing) {
+        corridors_ += std::to_string(crossing->id) + "," + toText(crossing->time_s, 3) + "," +
+                      toText(crossing->travel_m, 1);
+      } else {
+        corridors_ += ",,";
+      }
+      corridors_ += "\n";
+    }
+  }
+
   const std::string folder_;
-  std::string table_;
+  std::string table_, corridors_;
   ContentHasher hasher_;
   uint64_t num_frames_ = 0;
   std::vector<ObjectFrame> object_frames_;
@@ -241,8 +267,8 @@ int main(int argc, char** argv) {
   CLI::App app(
       "Detects obstacles and free ground around the vehicle in a recorded drive. Writes the fused map (PGM "
       "and "
-      "YAML of map_server, float TIFFs) and all scans (CSV) per image stamp, and the state of the cameras "
-      "(status.csv).");
+      "YAML of map_server, float TIFFs) and all scans (CSV) per image stamp, the state of the cameras "
+      "(status.csv), and the free travel along the vehicle's arc (corridor.csv).");
   Arguments arguments;
   app.add_option("--bag", arguments.bag, "the drive")->required();
   app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -66,6 +67,9 @@ class LocalObstacleMap {
   /// Adds the observation of a camera; std::logic_error before the first moveTo(). `grid` is the
   /// detector's.
   void add(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle);
+  /// Makes free cells unobserved for which `is_unwatched` is true. It gets their middles in the vehicle frame
+  /// of the last moveTo(). Occupied cells keep their state.
+  void forgetFree(const std::function<bool(const Eigen::Vector2d& point_in_vehicle_m)>& is_unwatched);
   /// Moves all cells into a corrected fixed frame.
   void reanchor(const RigidTransform& new_from_old_fixed);
 

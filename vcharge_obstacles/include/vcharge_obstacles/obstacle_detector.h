@@ -12,6 +12,7 @@
 #include "vcharge_core/dense_maps/range_map.h"
 #include "vcharge_obstacles/ground_plane.h"
 #include "vcharge_obstacles/polar_grid.h"
+#include "vcharge_obstacles/vehicle_outline.h"
 
 namespace vcharge {
 
@@ -41,6 +42,7 @@ struct ObstacleDetectorOptions {
     requireField(vehicle_front_m > vehicle_rear_m, "vehicle_front_m", "must be above vehicle_rear_m",
                  vehicle_front_m);
   }
+  VehicleOutline vehicleOutline() const { return {vehicle_front_m, vehicle_rear_m, vehicle_half_width_m}; }
 };
 
 /// An obstacle on the ground, or hanging low above it, in one sector of a camera.

@@ -10,11 +10,15 @@
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/dense_maps/range_map.h"
 #include "vcharge_core/frames/frame_assembler.h"
+#include "vcharge_obstacles/corridor.h"
 #include "vcharge_obstacles/ground_watch.h"
 #include "vcharge_obstacles/local_obstacle_map.h"
 #include "vcharge_obstacles/obstacle_detector.h"
 
 namespace vcharge {
+
+class PathCurvature;
+class SilentCameras;
 
 /// Frame in which the map's cells are fixed: the odometry's frame, or the sparse map's frame, in which
 /// localization corrects them.
@@ -33,6 +37,7 @@ struct ObstacleMapperOptions {
   VCHARGE_OPTION_GROUP(ObstacleDetectorOptions, detector, {}, "Obstacles in one range map.");
   VCHARGE_OPTION_GROUP(GroundWatchOptions, watch, {}, "Ground whose appearance changes.");
   VCHARGE_OPTION_GROUP(LocalObstacleMapOptions, map, {}, "Fusion over time and cameras.");
+  VCHARGE_OPTION_GROUP(CorridorOptions, corridor, {}, "What the vehicle sweeps on its present arc.");
   VCHARGE_OPTION_GROUP(FrameAssemblerOptions, frames, {}, "Range maps of one stamp, and odometry.");
   VCHARGE_OPTION(double, max_silence_s, 1.0, positive(),
                  "Time without range maps after which a camera has stopped.");
@@ -50,6 +55,8 @@ struct ObstacleMapperOptions {
 /// Current contribution of a camera to the map.
 enum class ObstacleCameraState {
   kNoRangeMaps,   ///< none yet, or they stopped during the drive
+  kSilent,        ///< images have stopped: ground that no other camera sees is not free
+  kFrozen,        ///< the images repeat one while the vehicle moves: as if silent, range maps are ignored
   kNoPose,        ///< no odometry at the range maps' stamps
   kStanding,      ///< the vehicle stands: motion stereo measures nothing
   kHardlySees,    ///< few ranges: night, dirt, no texture
@@ -67,6 +74,8 @@ struct ObstacleCameraStatus {
   double known_fraction = 0.0;
   uint64_t range_maps = 0;
   uint64_t without_pose = 0;
+  /// Mean time by which images are older than the odometry on their arrival; 0 without images.
+  double image_lag_s = 0.0;
   uint64_t late = 0;  ///< ignored range maps: their stamp was already fused
 };
 
@@ -76,6 +85,7 @@ struct ObstacleCameraStatus {
 struct ObstacleFrame {
   ObstacleMap map;
   ObstacleScan scan;                     ///< scan of the fused map
+  Corridor corridor;                     ///< for the curvature of the path that the vehicle drives
   std::vector<CameraObstacles> cameras;  ///< observations added at this stamp, in the rig's order
   std::vector<ObstacleCameraStatus> status;
 };
@@ -85,6 +95,7 @@ struct ObstacleFrame {
 class ObstacleMapper {
  public:
   using FrameCallback = std::function<void(const ObstacleFrame&)>;
+  static constexpr double kObjectLife_s = 1.0;
 
   /// InputError if the rig lacks a camera of the options, or its extrinsics; std::invalid_argument for bad
   /// options.
@@ -93,8 +104,16 @@ class ObstacleMapper {
   ~ObstacleMapper();
 
   void addOdometry(const VehicleOdometry& odometry);
+  /// Notes that an image of a camera has arrived, by fingerprintOf() its pixels. Without range maps, as while
+  /// the vehicle stands, this shows that the camera is alive. A camera whose images stop, or repeat, for 0.3
+  /// s is silent: free cells that it sees, and no living camera, become unobserved. A camera of which no
+  /// image was ever noted does not count as silent. std::logic_error for an index beyond the rig.
+  void noteImage(size_t camera_index, Timestamp stamp, uint64_t fingerprint);
   /// Sets localization's correction. Required with fixed_frame: map, ignored otherwise.
   void setMapFromOdom(const RigidTransform& map_from_odom);
+  /// Sets the objects that move around the vehicle, in the map's fixed frame. They enter the corridors of the
+  /// following frames, moved with their velocities, until they are replaced or kObjectLife_s old.
+  void setObjects(Timestamp stamp, std::vector<TrackedObject> objects);
   /// InputError for a range map of a camera that is not in use, or that was computed with another rig.
   void addRangeMap(const RangeMap& map);
   /// Fuses the waiting range maps at the end of the drive.
@@ -120,8 +139,13 @@ class ObstacleMapper {
       const std::optional<RigidTransform>& odom_from_vehicle) const;
   void process(Frame frame);
   void fuse(Frame* frame, const RigidTransform& fixed_from_vehicle);
+  std::optional<RigidTransform> odomFromVehicle(Timestamp stamp) const;
+  void settleImages(Timestamp until);
+  void forgetUnwatched(Timestamp stamp, LocalObstacleMap* map) const;
+  void setLiveness(const Camera& camera, ObstacleCameraStatus* status) const;
   void noteWithoutPose(const Frame& frame);
   void emit(const LocalObstacleMap& map, const std::vector<const CameraObstacles*>& cameras);
+  Corridor findCorridor(const ObstacleMap& map);
   void emitAt(Timestamp stamp);
   void emitWhenSilent();
   void updateStatus(Camera* camera, const CameraObstacles& seen) const;
@@ -134,6 +158,13 @@ class ObstacleMapper {
   std::vector<std::unique_ptr<Camera>> cameras_;  // indexed as in the rig; null if not in use
   std::unique_ptr<FrameAssembler<Observation>> assembler_;
   LocalObstacleMap map_;
+  const CorridorFinder corridor_finder_;
+  std::unique_ptr<PathCurvature> curvature_;
+  std::unique_ptr<SilentCameras> silent_;
+  size_t num_silent_emitted_ = 0;        // silent cameras at the last emitted frame
+  std::optional<Timestamp> last_fused_;  // stamp of the last range maps in the map
+  Timestamp objects_stamp_;
+  std::vector<TrackedObject> objects_;
   std::optional<Timestamp> last_emitted_;
   std::optional<Timestamp> last_heard_;  // odometry's stamp when the last range map arrived
   RigidTransform map_from_odom_, anchor_;

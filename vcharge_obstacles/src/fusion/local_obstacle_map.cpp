@@ -299,6 +299,21 @@ void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid&
   }
 }
 
+void LocalObstacleMap::forgetFree(
+    const std::function<bool(const Eigen::Vector2d& point_in_vehicle_m)>& is_unwatched) {
+  const RigidTransform vehicle_from_fixed = fixed_from_vehicle_.inverse();
+  const double cell_m = options_.cell_size_m;
+  for (int64_t y = cells_.firstY(); y < cells_.firstY() + cells_.size(); ++y) {
+    for (int64_t x = cells_.firstX(); x < cells_.firstX() + cells_.size(); ++x) {
+      Cell& cell = cells_.at(x, y);
+      if (cell.log_odds < 0.0F &&
+          is_unwatched(transformed(vehicle_from_fixed, {(x + 0.5) * cell_m, (y + 0.5) * cell_m}))) {
+        cell.log_odds = 0.0F;
+      }
+    }
+  }
+}
+
 int8_t LocalObstacleMap::stateOf(const Cell& cell) const {
   if (cell.log_odds >= static_cast<float>(options_.occupied_threshold)) {
     return kCellOccupied;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "corridor/path_curvature.h"
+#include "liveness/silent_cameras.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/text_format.h"
 #include "vcharge_obstacles/map_scan.h"
@@ -15,6 +17,8 @@ namespace {
 constexpr double kStanding_m_per_s = 0.02;
 // If no range map arrives for this time, a map is emitted nevertheless.
 constexpr double kSilence_s = 0.5;
+// After this time without range maps, the map of a camera's silence does not wait for the next ones.
+constexpr double kNoRangeMaps_s = 0.2;
 // Corrections of map -> odom below these bounds are smaller than a cell and are ignored. The bound on the
 // angle is low because a turn moves cells far from the origin of the map.
 constexpr double kMinAnchorStep_m = 0.03;
@@ -32,8 +36,8 @@ struct ObstacleMapper::Camera {
 };
 
 std::string toString(ObstacleCameraState state) {
-  constexpr const char* kNames[] = {"no range maps", "no pose",       "standing", "hardly sees",
-                                    "ground lost",   "ground unsure", "mapping"};
+  constexpr const char* kNames[] = {"no range maps", "silent",      "frozen",        "no pose", "standing",
+                                    "hardly sees",   "ground lost", "ground unsure", "mapping"};
   return kNames[static_cast<size_t>(state)];
 }
 
@@ -43,7 +47,9 @@ ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const Obsta
       options_((options.validate(), options)),
       on_frame_(std::move(on_frame)),
       grid_(options.detector.grid),
-      map_(options.map) {
+      map_(options.map),
+      corridor_finder_(options.detector.vehicleOutline(), options.corridor),
+      curvature_(std::make_unique<PathCurvature>()) {
   cameras_.resize(rig_->cameras.size());
   std::vector<std::string> names = options_.cameras;
   if (names.empty()) {
@@ -68,6 +74,7 @@ ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const Obsta
   assembler_ = std::make_unique<FrameAssembler<Observation>>(
       cameras_.size(), options_.frames, [this](Frame frame) { process(std::move(frame)); },
       [this](DriveBreak drive_break, Timestamp stamp) { startOver(drive_break, stamp); }, is_used);
+  silent_ = std::make_unique<SilentCameras>(rig_, is_used, options_.map.free_range_m);
   // Range maps take long to compute: a replay must give the same map however long that is.
   assembler_->ignoreCorrections();
 }
@@ -78,6 +85,14 @@ ObstacleMapper::~ObstacleMapper() = default;
 void ObstacleMapper::startOver(DriveBreak drive_break, Timestamp stamp) {
   num_jumps_ += drive_break == DriveBreak::kReplay ? 0 : 1;
   map_ = LocalObstacleMap(options_.map);
+  curvature_->clear();
+  objects_.clear();
+  last_fused_.reset();
+  if (drive_break == DriveBreak::kReplay) {
+    silent_->clear();
+  } else {
+    silent_->noteJump();
+  }
   last_emitted_.reset();
   last_heard_.reset();
   for (const std::unique_ptr<Camera>& camera : cameras_) {
@@ -91,6 +106,28 @@ void ObstacleMapper::startOver(DriveBreak drive_break, Timestamp stamp) {
 void ObstacleMapper::addOdometry(const VehicleOdometry& odometry) {
   emitWhenSilent();  // range maps of earlier odometry have been added by now
   assembler_->addOdometry(odometry);
+  settleImages(odometry.stamp);
+}
+
+void ObstacleMapper::noteImage(size_t camera_index, Timestamp stamp, uint64_t fingerprint) {
+  check(camera_index < cameras_.size(), "ObstacleMapper::noteImage: expected a camera of the rig");
+  const std::optional<VehicleOdometry>& odometry = assembler_->odometry().last();
+  silent_->addImage(camera_index, stamp, fingerprint,
+                    odometry ? std::optional<Timestamp>(odometry->stamp) : std::nullopt);
+}
+
+std::optional<RigidTransform> ObstacleMapper::odomFromVehicle(Timestamp stamp) const {
+  const OdometryBuffer::Lookup pose = assembler_->odometry().lookup(stamp);
+  return pose ? std::optional<RigidTransform>(pose.odometry.odom_from_vehicle) : std::nullopt;
+}
+
+/// Judges the images that the odometry has reached.
+void ObstacleMapper::settleImages(Timestamp until) {
+  silent_->settle(until, [this](Timestamp stamp) { return odomFromVehicle(stamp); });
+}
+
+void ObstacleMapper::forgetUnwatched(Timestamp stamp, LocalObstacleMap* map) const {
+  silent_->forgetUnwatched(last_fused_.value_or(Timestamp()), stamp, map);
 }
 
 void ObstacleMapper::setMapFromOdom(const RigidTransform& map_from_odom) {
@@ -106,6 +143,11 @@ void ObstacleMapper::setMapFromOdom(const RigidTransform& map_from_odom) {
   map_.reanchor(moved);
   anchor_ = map_from_odom;
   has_anchor_ = true;
+}
+
+void ObstacleMapper::setObjects(Timestamp stamp, std::vector<TrackedObject> objects) {
+  objects_stamp_ = stamp;
+  objects_ = std::move(objects);
 }
 
 std::optional<RigidTransform> ObstacleMapper::fixedFromVehicle(
@@ -183,10 +225,21 @@ void ObstacleMapper::noteWithoutPose(const Frame& frame) {
 }
 
 void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle) {
+  settleImages(frame->stamp);
+  for (const std::unique_ptr<Camera>& camera : cameras_) {
+    if (camera && frame->has_image[camera->index]) {
+      silent_->addRangeMap(camera->index, frame->stamp);
+    }
+  }
+  // A camera that was silent has seen the ground around the earlier pose and around this one.
+  forgetUnwatched(frame->stamp, &map_);
   map_.moveTo(frame->stamp, fixed_from_vehicle);
+  forgetUnwatched(frame->stamp, &map_);
+  last_fused_ = frame->stamp;
   std::vector<const CameraObstacles*> cameras;
   for (const std::unique_ptr<Camera>& camera : cameras_) {
-    if (!camera || !frame->has_image[camera->index]) {
+    if (!camera || !frame->has_image[camera->index] ||
+        silent_->liveness(camera->index).isRepeated(frame->stamp)) {
       continue;
     }
     auto& [obstacles, reference] = frame->images[camera->index];
@@ -207,12 +260,23 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const std::vector<const C
   frame.map = map.snapshot();
   frame.map.frame_id = enumNames<FixedFrame>()[static_cast<size_t>(options_.fixed_frame)];
   frame.scan = makeScan(frame.map, options_.detector.grid.num_rays);
+  frame.corridor = findCorridor(frame.map);
   for (const CameraObstacles* camera : cameras) {
     frame.cameras.push_back(*camera);
   }
   frame.status = status();
   last_emitted_ = frame.map.stamp;
+  num_silent_emitted_ = silent_->numSilentAt(frame.map.stamp);
   on_frame_(frame);
+}
+
+Corridor ObstacleMapper::findCorridor(const ObstacleMap& map) {
+  const double curvature_per_m =
+      curvature_->update(map.stamp, [this](Timestamp stamp) { return odomFromVehicle(stamp); });
+  const double age_s = toSeconds(map.stamp - objects_stamp_);
+  return corridor_finder_.find(
+      map, curvature_per_m,
+      age_s <= kObjectLife_s ? movedObjects(objects_, age_s) : std::vector<TrackedObject>());
 }
 
 /// Emits the map while no range maps arrive. The time is measured by their arrival instead of their
@@ -224,7 +288,10 @@ void ObstacleMapper::emitWhenSilent() {
     return;
   }
   const Timestamp last = last_heard_ ? std::max(*last_heard_, *last_emitted_) : *last_emitted_;
-  if (toSeconds(odometry->stamp - last) >= kSilence_s) {
+  const bool is_newly_silent = silent_->numSilentAt(odometry->stamp) > num_silent_emitted_ &&
+                               odometry->stamp > *last_emitted_ &&
+                               (!last_heard_ || toSeconds(odometry->stamp - *last_heard_) >= kNoRangeMaps_s);
+  if (is_newly_silent || toSeconds(odometry->stamp - last) >= kSilence_s) {
     emitAt(odometry->stamp);
   }
 }
@@ -232,12 +299,11 @@ void ObstacleMapper::emitWhenSilent() {
 /// Emits a moved copy of the map at a stamp without range maps. The map itself must not change, so that it
 /// depends only on the range maps and not on when they arrive.
 void ObstacleMapper::emitAt(Timestamp stamp) {
-  const OdometryBuffer::Lookup pose = assembler_->odometry().lookup(stamp);
-  const std::optional<RigidTransform> fixed_from_vehicle =
-      pose ? fixedFromVehicle(pose.odometry.odom_from_vehicle) : std::nullopt;
-  if (fixed_from_vehicle) {
+  if (const std::optional<RigidTransform> fixed_from_vehicle = fixedFromVehicle(odomFromVehicle(stamp))) {
     LocalObstacleMap moved = map_;
+    forgetUnwatched(stamp, &moved);
     moved.moveTo(stamp, *fixed_from_vehicle);
+    forgetUnwatched(stamp, &moved);
     emit(moved, {});
   }
 }
@@ -262,9 +328,27 @@ std::vector<ObstacleCameraStatus> ObstacleMapper::status() const {
       status.message = stands ? "the vehicle stands: nothing is measured, the map keeps its state"
                               : "no range map since " + toString(*newest);
     }
+    setLiveness(*camera, &status);
     all.push_back(status);
   }
   return all;
+}
+
+void ObstacleMapper::setLiveness(const Camera& camera, ObstacleCameraStatus* status) const {
+  const CameraLiveness& liveness = silent_->liveness(camera.index);
+  const std::optional<VehicleOdometry>& odometry = assembler_->odometry().last();
+  const CameraLiveness::State state =
+      odometry ? liveness.stateAt(odometry->stamp) : CameraLiveness::State::kUnknown;
+  if (state == CameraLiveness::State::kSilent || state == CameraLiveness::State::kFrozen) {
+    const bool is_silent = state == CameraLiveness::State::kSilent;
+    status->state = is_silent ? ObstacleCameraState::kSilent : ObstacleCameraState::kFrozen;
+    status->message = (is_silent ? "no image since " : "the images repeat the one of ") +
+                      toString(*liveness.lastNew()) + ": ground that no other camera sees is not free";
+  }
+  status->image_lag_s = silent_->imageLag_s(camera.index);
+  if (status->image_lag_s >= kLateImages_s) {
+    status->message += "; images come " + toText(status->image_lag_s, 2) + " s after their stamps";
+  }
 }
 
 }  // namespace vcharge

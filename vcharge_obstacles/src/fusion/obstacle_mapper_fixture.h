@@ -41,7 +41,7 @@ class ObstacleMapperTest : public ::testing::Test {
   /// Odometry along the true poses.
   void addOdometry(int tick) { addOdometry(tick, poseAt(tick).translation().x()); }
   RangeMap measure(size_t camera, int tick, const BoxWorldNoise& noise = {}) const {
-    return measureBoxWorld(kWorld, rig_->cameras[camera], poseAt(tick), stampAt(tick), noise);
+    return measureBoxWorld(world_, rig_->cameras[camera], poseAt(tick), stampAt(tick), noise);
   }
   void addRangeMaps(int tick, const BoxWorldNoise& noise = {}) {
     for (size_t camera = 0; camera < rig_->cameras.size(); ++camera) {
@@ -51,16 +51,29 @@ class ObstacleMapperTest : public ::testing::Test {
   void drive(int from_tick, int to_tick) {
     for (int tick = from_tick; tick < to_tick; ++tick) {
       addOdometry(tick, poseAt(tick).translation().x() + (tick >= jumps_at_ ? jump_m_ : 0.0));
+      if (tick % 4 == 0 && notes_images_) {
+        noteImages(tick);
+      }
       if (tick % 4 != 0 || tick >= stops_at_) {
         continue;
       }
       for (const RigCamera& camera : rig_->cameras) {
-        if (camera.name == dead_camera_ && tick >= dead_from_) {
+        if (camera.name == dead_camera_ && tick >= dead_from_ && tick < recovers_at_) {
           continue;
         }
         BoxWorldNoise noise{0.01, camera.name == blind_camera_ && tick >= dead_from_ ? 1.0 : 0.1,
                             static_cast<uint32_t>(tick)};
-        mapper_->addRangeMap(measureBoxWorld(kWorld, camera, poseAt(tick), stampAt(tick), noise));
+        mapper_->addRangeMap(measureBoxWorld(world_, camera, poseAt(tick), stampAt(tick), noise));
+      }
+    }
+  }
+  /// Images of all cameras, except a dead one; a frozen one repeats its image from dead_from_ on.
+  void noteImages(int tick) {
+    for (size_t camera = 0; camera < rig_->cameras.size(); ++camera) {
+      const bool fails = tick >= dead_from_ && tick < recovers_at_;
+      const bool is_frozen = fails && rig_->cameras[camera].name == frozen_camera_;
+      if (!fails || rig_->cameras[camera].name != dead_camera_) {
+        mapper_->noteImage(camera, stampAt(tick), static_cast<uint64_t>(is_frozen ? dead_from_ : tick));
       }
     }
   }
@@ -108,13 +121,15 @@ class ObstacleMapperTest : public ::testing::Test {
                          [&](const ObstacleCameraStatus& status) { return status.camera_name == camera; });
   }
 
+  BoxWorld world_ = kWorld;
   std::shared_ptr<const CameraRig> rig_ = std::make_shared<const CameraRig>(makeBoxWorldRig());
   ObstacleMapperOptions options_;
   std::unique_ptr<ObstacleMapper> mapper_;
   std::vector<ObstacleFrame> frames_;
-  int stops_at_ = 100000, jumps_at_ = 100000, dead_from_ = 0;
+  int stops_at_ = 100000, jumps_at_ = 100000, dead_from_ = 0, recovers_at_ = 100000;
+  bool notes_images_ = false;
   double jump_m_ = 0.0, roll_rad_ = 0.0;
-  std::string dead_camera_, blind_camera_;
+  std::string dead_camera_, blind_camera_, frozen_camera_;
 };
 
 }  // namespace vcharge

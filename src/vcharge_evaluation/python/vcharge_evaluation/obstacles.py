@@ -44,18 +44,21 @@ def detect(args, name):
 
 
 def detect_obstacles(drive, rig, output, *words):
-    """Writes obstacle maps of a drive with a rig file into a folder, with the log beside it. NoResult if there are none."""
+    """Writes obstacle maps and moving objects of a drive with a rig file into a folder, with the log beside it. Returns the
+    number of maps, which a standing car has not. NoResult without any of both."""
     run = run_tool_once("detect_obstacles", output.with_suffix(".log"), "--bag", drive.bag, "--rig", rig, "--options",
                         CONFIG / "obstacles.yaml", "--range-options", CONFIG / "dense_obstacles.yaml", "--output", output,
                         *words, may_fail=True)
     if run.error():
         raise NoResult(run.reason())
+    return run.found["num_maps"]
 
 
 def judge_obstacles(drive, rig, *words):
     """Errors of the obstacle maps of a drive with a rig file. NoResult if there are no maps."""
     output = drive.folder / "obstacles"
-    detect_obstacles(drive, rig, output, *words)
+    if detect_obstacles(drive, rig, output, *words) == 0:
+        raise NoResult("no obstacle map could be made")
     return judge("obstacles", drive.folder / "report", "--obstacles", output, "--truth", drive.truth)
 
 

@@ -1,0 +1,44 @@
+#include "image_listener.h"
+
+#include <utility>
+
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+
+#include "vcharge_core/base/error.h"
+#include "vcharge_obstacles/image_fingerprint.h"
+#include "vcharge_ros/conversions.h"
+#include "vcharge_ros/drive_topics.h"
+
+namespace vcharge {
+
+ImageListener::ImageListener(ros::NodeHandle* node, const CameraRig& rig,
+                             const std::vector<ObstacleCameraStatus>& cameras, uint32_t queue_size,
+                             CallbackGuard* guard, Callback callback)
+    : guard_(guard), callback_(std::move(callback)) {
+  const DriveTopics topics;
+  for (const ObstacleCameraStatus& camera : cameras) {
+    const size_t index = rig.cameraIndex(camera.camera_name);
+    subscribe<sensor_msgs::Image>(node, index, topics.imageTopic(camera.camera_name), queue_size);
+    subscribe<sensor_msgs::CompressedImage>(node, index, topics.compressedImageTopic(camera.camera_name),
+                                            queue_size);
+  }
+}
+
+template <class Message>
+void ImageListener::subscribe(ros::NodeHandle* node, size_t camera_index, const std::string& topic,
+                              uint32_t queue_size) {
+  using Pointer = boost::shared_ptr<const Message>;
+  const boost::function<void(const Pointer&)> note = [this, camera_index, topic](const Pointer& message) {
+    guard_->run([&] {
+      if (message->header.stamp.isZero()) {
+        throw InputError(topic + ": expected a stamp in the message's header, got 0");
+      }
+      callback_(camera_index, toTimestamp(message->header.stamp),
+                fingerprintOf(message->data.data(), message->data.size()));
+    });
+  };
+  subscribers_.push_back(node->subscribe<Message>(topic, queue_size, note));
+}
+
+}  // namespace vcharge
