@@ -131,7 +131,7 @@ void ObjectFilter::update(const std::vector<ObjectDetection>& detections,
   }
 }
 
-/// Of two objects that are one, the older one stays.
+/// Keeps the older one where two objects are one.
 void ObjectFilter::mergeTwins() {
   std::vector<Track> kept;
   for (const Track& track : tracks_) {
