@@ -23,8 +23,9 @@ constexpr double kTwin_m = 0.7, kTwin_m_per_s = 0.8;
 constexpr double kKeptSize = 0.97;
 // An object is reported once its speed has exceeded this number of standard deviations, and its travel since
 // it was first detected this squared Mahalanobis distance (two degrees of freedom, 78 %): wrong groups jump,
-// but stay.
+// but stay, and are not detected so many times.
 constexpr double kMovingSigmas = 2.0, kTravel = 3.0;
+constexpr int kManyDetections = 5;
 constexpr double kPersonRadius_m = 0.25;
 constexpr double kCarWidth_m = 1.8, kCarLength_m = 4.2, kMinCarWidth_m = 1.2;
 constexpr double kChildHeight_m = 1.35;
@@ -119,6 +120,7 @@ void ObjectFilter::update(const std::vector<ObjectDetection>& detections,
       track.existence_log_odds = std::min(kMost, track.existence_log_odds + kHit);
     }
     track.last_seen = stamp_;
+    ++track.num_detections;
   }
   for (size_t d = 0; d < detections.size(); ++d) {
     if (!is_used[d]) {
@@ -151,8 +153,9 @@ void ObjectFilter::finish() {
     const Eigen::Matrix2d covariance = track.start_covariance + track.covariance.topLeftCorner<2, 2>();
     const Eigen::Vector2d velocity = track.state.tail<2>();
     const double variance = velocity.dot(track.covariance.bottomRightCorner<2, 2>() * velocity);
-    track.has_moved = track.has_moved || (velocity.squaredNorm() > kMovingSigmas * std::sqrt(variance) &&
-                                          travel_m.dot(covariance.ldlt().solve(travel_m)) > kTravel);
+    const bool travels = velocity.squaredNorm() > kMovingSigmas * std::sqrt(variance) &&
+                         travel_m.dot(covariance.ldlt().solve(travel_m)) > kTravel;
+    track.has_moved = track.has_moved || travels || track.num_detections >= kManyDetections;
     if (track.last_seen < stamp_) {
       track.existence_log_odds += kMiss;
     }

@@ -38,6 +38,7 @@ class ObjectFilter {
     Eigen::Vector2d start_m = Eigen::Vector2d::Zero();  // as first detected
     Eigen::Matrix2d start_covariance = Eigen::Matrix2d::Identity();
     bool has_moved = false;
+    int num_detections = 1;
   };
   TrackedObject describe(const Track& track) const;
   void mergeTwins();
