@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "marker_shapes.h"
 #include "vcharge_ros/conversions.h"
 
 namespace vcharge {
@@ -39,14 +40,6 @@ std_msgs::ColorRGBA colourAt(const CorridorDirection& direction, double travel_m
   return colour;
 }
 
-geometry_msgs::Point pointOf(const Eigen::Vector2d& position_m) {
-  geometry_msgs::Point point;
-  point.x = position_m.x();
-  point.y = position_m.y();
-  point.z = kStripHeight_m;
-  return point;
-}
-
 }  // namespace
 
 vcharge_msgs::Corridor toMessage(const Corridor& corridor, Timestamp stamp,
@@ -67,13 +60,9 @@ visualization_msgs::MarkerArray toMarkers(const Corridor& corridor, Timestamp st
                                           const std::string& vehicle_frame) {
   visualization_msgs::MarkerArray markers;
   for (const bool is_forward : {true, false}) {
-    visualization_msgs::Marker strip;
-    strip.header.stamp = fromTimestamp(stamp);
-    strip.header.frame_id = vehicle_frame;
-    strip.ns = is_forward ? "corridor_forward" : "corridor_backward";
-    strip.type = visualization_msgs::Marker::TRIANGLE_LIST;
-    strip.action = visualization_msgs::Marker::ADD;
-    strip.pose.orientation.w = 1.0;
+    visualization_msgs::Marker strip =
+        makeMarker(stamp, vehicle_frame, is_forward ? "corridor_forward" : "corridor_backward",
+                   visualization_msgs::Marker::TRIANGLE_LIST);
     strip.scale.x = strip.scale.y = strip.scale.z = 1.0;
     const CorridorDirection& direction = is_forward ? corridor.forward : corridor.backward;
     const int steps = static_cast<int>(std::lround(kCorridorMarker_m / kStripStep_m));
@@ -81,7 +70,7 @@ visualization_msgs::MarkerArray toMarkers(const Corridor& corridor, Timestamp st
       const auto near = corridor.bumperAt(is_forward, step * kStripStep_m);
       const auto far = corridor.bumperAt(is_forward, (step + 1) * kStripStep_m);
       for (const Eigen::Vector2d& corner_m : {near[0], near[1], far[0], far[0], near[1], far[1]}) {
-        strip.points.push_back(pointOf(corner_m));
+        strip.points.push_back(pointOf(corner_m, kStripHeight_m));
         strip.colors.push_back(colourAt(direction, (step + 0.5) * kStripStep_m));
       }
     }

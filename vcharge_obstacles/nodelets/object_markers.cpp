@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <string>
 
-#include "vcharge_ros/conversions.h"
+#include "marker_shapes.h"
 
 namespace vcharge {
 namespace {
@@ -11,23 +11,9 @@ namespace {
 using visualization_msgs::Marker;
 
 Marker makeMarker(const ObjectFrame& frame, const std::string& kind, int type, int id) {
-  Marker marker;
-  marker.header.stamp = fromTimestamp(frame.stamp);
-  marker.header.frame_id = "odom";
-  marker.ns = kind;
+  Marker marker = makeMarker(frame.stamp, "odom", kind, type);
   marker.id = id;
-  marker.type = type;
-  marker.pose.orientation.w = 1.0;
-  marker.color.a = 1.0F;
   return marker;
-}
-
-geometry_msgs::Point pointOf(const Eigen::Vector2d& position_m, double z_m) {
-  geometry_msgs::Point point;
-  point.x = position_m.x();
-  point.y = position_m.y();
-  point.z = z_m;
-  return point;
 }
 
 }  // namespace

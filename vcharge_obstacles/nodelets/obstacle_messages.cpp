@@ -6,6 +6,7 @@
 
 #include <octomap/OcTree.h>
 
+#include "marker_shapes.h"
 #include "vcharge_core/base/text_format.h"
 #include "vcharge_obstacles/obstacle_outlines.h"
 #include "vcharge_ros/conversions.h"
@@ -21,24 +22,10 @@ std_msgs::ColorRGBA colourOf(double height_m) {
   return colour;
 }
 
-geometry_msgs::Point pointOf(const Eigen::Vector2d& position, double z_m) {
-  geometry_msgs::Point point;
-  point.x = position.x();
-  point.y = position.y();
-  point.z = z_m;
-  return point;
-}
-
 visualization_msgs::Marker makeMarker(const ObstacleMap& map, const char* name, int type, double scale) {
-  visualization_msgs::Marker marker;
-  marker.header.stamp = fromTimestamp(map.stamp);
-  marker.header.frame_id = map.frame_id;
-  marker.ns = name;
-  marker.type = type;
-  marker.action = visualization_msgs::Marker::ADD;
-  marker.pose.orientation.w = 1.0;
+  visualization_msgs::Marker marker = makeMarker(map.stamp, map.frame_id, name, type);
   marker.scale.x = marker.scale.y = marker.scale.z = scale;
-  marker.color.r = marker.color.a = 1.0F;
+  marker.color.r = 1.0F;
   return marker;
 }
 

@@ -268,7 +268,8 @@ int main(int argc, char** argv) {
       "Detects obstacles and free ground around the vehicle in a recorded drive. Writes the fused map (PGM "
       "and "
       "YAML of map_server, float TIFFs) and all scans (CSV) per image stamp, the state of the cameras "
-      "(status.csv), and the free travel along the vehicle's arc (corridor.csv).");
+      "(status.csv), the free travel along the vehicle's arc (corridor.csv), and what moves (objects.csv, "
+      "objects_frames.csv).");
   Arguments arguments;
   app.add_option("--bag", arguments.bag, "the drive")->required();
   app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
@@ -282,7 +283,8 @@ int main(int argc, char** argv) {
   app.footer(
       "Keys of --json: num_maps, num_odometry_jumps, cameras (name, num_range_maps, num_without_pose, "
       "num_late, "
-      "message), processor_ms_per_range_map (images, ranges, obstacles), content_hash.");
+      "message), processor_ms_per_image (objects), processor_ms_per_range_map (images, ranges, obstacles), "
+      "content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     ObstacleMapperOptions options;
     RangeMapperOptions range_options;
