@@ -17,7 +17,7 @@ namespace vcharge {
 struct StepMapperOptions {
   VCHARGE_BEGIN_OPTIONS(StepMapperOptions);
   VCHARGE_OPTION(double, min_step_m, 0.05, between(0.02, 0.3), "Height of the lowest step that is reported.");
-  VCHARGE_OPTION(double, max_slope, 0.3, between(0.05, 1.0),
+  VCHARGE_OPTION(double, max_slope, 0.25, between(0.05, 1.0),
                  "Rise per run of the steepest ramp that wheels climb; steeper changes of height are steps.");
   VCHARGE_END_OPTIONS();
 };
@@ -40,12 +40,12 @@ class StepMapper {
  public:
   static constexpr double kCell_m = 0.05;
   /// Distance from the vehicle's outline up to which ground is measured.
-  static constexpr double kReach_m = 4.0;
+  static constexpr double kReach_m = 3.5;
   /// Largest horizontal distance between the upper and the lower side of a step. It covers the strip in front
   /// of a hole's far side, or behind a kerb, that is hidden from a camera.
   static constexpr double kMaxRun_m = 0.25;
   /// Smallest number of neighbouring cells that make a step.
-  static constexpr int kMinStepCells = 4;
+  static constexpr int kMinStepCells = 10;
 
   explicit StepMapper(const VehicleOutline& outline, const StepMapperOptions& options = StepMapperOptions());
 
@@ -62,7 +62,9 @@ class StepMapper {
  private:
   struct Cell {
     float height_m = 0.0F;
-    float weight = 0.0F;  // inverse variance of the height; 0: never observed
+    float weight = 0.0F;   // inverse variance of the height, if all observations are right; 0: never observed
+    float scatter = 0.0F;  // mean squared difference of the observations from the height
+    int observations = 0;
   };
   /// Points of one range map in one cell.
   struct Sum {

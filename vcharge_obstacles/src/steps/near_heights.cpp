@@ -13,8 +13,8 @@ namespace {
 constexpr float kLowest_m = -0.3F;
 constexpr float kHighest_m = 0.3F;
 // Heights that are less certain say nothing about a step of some centimetres.
-constexpr float kMaxHeightSigma_m = 0.05F;
-constexpr float kMinConfidence = 0.4F;
+constexpr float kMaxHeightSigma_m = 0.03F;
+constexpr float kMinConfidence = 0.8F;
 
 }  // namespace
 

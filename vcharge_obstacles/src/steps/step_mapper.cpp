@@ -24,11 +24,20 @@ constexpr float kLevelSigma_m = 0.015F;
 constexpr double kLevelKernel_m = 0.02;
 constexpr int kLevelIterations = 3;
 // Cells that are known less well have no height yet.
-constexpr float kKnownSigma_m = 0.012F;
-// Standard deviations of the errors that levelling corrects, in height and slope. They bring the map back to
-// the plane of the ground, however far the vehicle drives.
+constexpr float kKnownSigma_m = 0.02F;
+// Fraction of the difference to the map that is left in each range map. It brings the map back to the plane
+// of the ground: each levelling alone would add to a drift.
+constexpr double kLeak = 0.1;
+// Standard deviations of the errors that levelling corrects, in height and slope.
 constexpr double kOffsetSigma_m = 0.02;
 constexpr double kSlopeSigma = 0.01;
+// A cell is known after this number of range maps. Its height follows most of them: observations further off
+// than this number of standard deviations weigh less.
+constexpr int kMinObservations = 8;
+constexpr float kGateSigmas = 2.0F;
+constexpr float kScatterMemory = 0.9F;
+// Errors of successive range maps are alike: as many have independent errors, however many there are.
+constexpr float kIndependentMaps = 8.0F;
 
 constexpr float squared(float value) {
   return value * value;
@@ -123,7 +132,7 @@ Eigen::Vector3d StepMapper::levelOn(const std::vector<Sum>& sums) const {
     }
     plane = information.ldlt().solve(vector);
   }
-  return plane;
+  return (1.0 - kLeak) * plane;
 }
 
 void StepMapper::add(const HeightPoints& points) {
@@ -141,9 +150,17 @@ void StepMapper::add(const HeightPoints& points) {
                                static_cast<float>(std::min(sum.count, kIndependentPoints)) +
                            squared(kCommonSigma_m);
     Cell& cell = cells_.at(sum.x, sum.y);
-    const float weight = 1.0F / variance;
-    cell.height_m += weight / (cell.weight + weight) * (height_m - cell.height_m);
+    const float difference_m = height_m - cell.height_m;
+    // A cell that changed is followed by and by, since its scatter grows with the differences.
+    const float gate = 1.0F + squared(difference_m) / (squared(kGateSigmas) * (variance + cell.scatter));
+    const float weight = cell.observations > 0 ? 1.0F / (variance * gate) : 1.0F / variance;
+    cell.height_m += weight / (cell.weight + weight) * difference_m;
     cell.weight = std::min(cell.weight + weight, kMaxWeight);
+    if (cell.observations > 0) {
+      const float memory = std::min(kScatterMemory, 1.0F - 1.0F / static_cast<float>(cell.observations));
+      cell.scatter = memory * cell.scatter + (1.0F - memory) * squared(difference_m);
+    }
+    ++cell.observations;
   }
 }
 
@@ -176,11 +193,12 @@ StepMap StepMapper::snapshot() const {
   map.origin_m =
       kCell_m * Eigen::Vector2d(static_cast<double>(cells_.firstX()), static_cast<double>(cells_.firstY()));
   cells_.forEach([&](int64_t x, int64_t y, const Cell& cell) {
-    if (cell.weight * squared(kKnownSigma_m) >= 1.0F) {
+    const float variance = 1.0F / cell.weight + cell.scatter / kIndependentMaps;
+    if (cell.observations >= kMinObservations && variance <= squared(kKnownSigma_m)) {
       const auto row = static_cast<int>(y - cells_.firstY());
       const auto column = static_cast<int>(x - cells_.firstX());
       map.ground_m.at<float>(row, column) = cell.height_m;
-      map.sigma_m.at<float>(row, column) = 1.0F / std::sqrt(cell.weight);
+      map.sigma_m.at<float>(row, column) = std::sqrt(variance);
     }
   });
   findSteps(options_, &map);

@@ -171,7 +171,7 @@ TEST(StepMapperTest, StandingKeepsTheMapAndUnseenGroundIsUnknown) {
   mapper.add({});
   EXPECT_TRUE(std::isnan(at(mapper.snapshot(), mapper.snapshot().height_m, 2.0, 2.0)));
   std::mt19937 random(7);
-  for (int i = 0; i < 5; ++i) {
+  for (int i = 0; i < 10; ++i) {
     mapper.add(measure(kerbAt(2.0, 0.1), RigidTransform(), {}, &random));
   }
   const StepMap before = mapper.snapshot();
@@ -187,7 +187,7 @@ TEST(StepMapperTest, StepsStayWhereTheyAreInACorrectedFrame) {
   std::mt19937 random(7);
   StepMapper mapper(kOutline);
   mapper.moveTo(Timestamp(), RigidTransform());
-  for (int i = 0; i < 5; ++i) {
+  for (int i = 0; i < 10; ++i) {
     mapper.add(measure(kerbAt(2.0, 0.1), RigidTransform(), {}, &random));
   }
   mapper.reanchor(RigidTransform::planar(10.0, 5.0, 0.5 * M_PI));
