@@ -56,13 +56,13 @@ float reportedNear(const StepMap& map, const Eigen::Vector2d& fixed_m, double ra
 
 StepTruth::StepTruth(const TruthHeights& heights) : heights_(heights) {
   const double cell_m = heights.cell_size_m;
-  const cv::Mat unknown = heights.height_m != heights.height_m;
+  const cv::Mat is_known = heights.height_m == heights.height_m;  // false for NaN
   cv::Mat known = heights.height_m.clone();
   cv::patchNaNs(known, 0.0);
   cv::Mat lowest, highest, tall;
   cv::erode(known, lowest, disk(kTallRadius_m, cell_m));
   cv::Mat is_tall = (known - lowest) > kTall_m;
-  cv::dilate(is_tall | unknown, tall, disk(kTallRadius_m, cell_m));
+  cv::dilate(is_tall | ~is_known, tall, disk(kTallRadius_m, cell_m));
   // Steeper than a ramp over the run, and about as high as a step: a map may report that.
   cv::erode(known, lowest, disk(0.5 * kRun_m, cell_m));
   cv::dilate(known, highest, disk(0.5 * kRun_m, cell_m));
