@@ -80,7 +80,10 @@ class Pipeline : public DriveConsumer {
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
     tracking_.add([&] { objects_->addImage(camera_index, stamp, image); });
     ++num_images_;
-    obstacles_->noteImage(camera_index, stamp, fingerprintOf(image.pixels));
+    detecting_.add([&] {
+      obstacles_->addImage(camera_index, stamp, fingerprintOf(image.pixels),
+                           [image] { return image.pixels; });
+    });
     if (ranges_) {
       whole_.add([&] { ranges_->addImage(camera_index, stamp, image); });
     }
@@ -138,8 +141,8 @@ class Pipeline : public DriveConsumer {
   std::map<Timestamp, std::map<size_t, std::string>> stored_;
 };
 
-/// Cameras for the objects: those of the map, and the rig's others that have extrinsics and images in the bag.
-/// Prints a warning that names the ones left out. Empty for a map of all cameras: all.
+/// Cameras for the objects: those of the map, and the rig's others that have extrinsics and images in the
+/// bag. Prints a warning that names the ones left out. Empty for a map of all cameras: all.
 std::vector<std::string> findObjectCameras(const std::string& bag, const CameraRig& rig,
                                            const std::vector<std::string>& map_cameras) {
   std::vector<std::string> cameras = map_cameras;
@@ -308,8 +311,9 @@ int main(int argc, char** argv) {
   app.add_option("--range-options", arguments.range_options, "YAML with overrides of RangeMapperOptions");
   app.add_option("--range", arguments.range,
                  "folder that compute_range_maps wrote, instead of computing range maps");
-  app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: those of --options; for objects also the rig's others "
-                 "that have extrinsics and images)");
+  app.add_option("--cameras", arguments.cameras,
+                 "cameras of the rig by name (default: those of --options; for objects also the rig's "
+                 "others that have extrinsics and images)");
   app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
   addShowOptions(&app, &arguments.show_options);
   app.footer(
