@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """The judge of moving objects on a simulated drive: reports made from the truth are right, and spoiled ones are as wrong as they
 were made."""
+import argparse
 import csv
 import json
 import math
@@ -8,6 +9,7 @@ import pathlib
 import sys
 import unittest
 
+import cv2
 import numpy as np
 import rostest
 
@@ -17,7 +19,9 @@ from drive_fixture import CAMERAS, Drive, run, tool  # noqa: E402
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "src" / "vcharge_evaluation" / "python"))
 from vcharge_evaluation import objects  # noqa: E402
+from vcharge_evaluation.drawing import film  # noqa: E402
 from vcharge_evaluation.drawing.moments import draw_objects  # noqa: E402
+from vcharge_evaluation.drawing.objects import pixels_from_above  # noqa: E402
 from vcharge_evaluation.drawing.obstacles import read_yaml, yaw_of  # noqa: E402
 from vcharge_evaluation.poses import stamp_ns  # noqa: E402
 
@@ -147,6 +151,46 @@ class ObjectsTest(unittest.TestCase):
         empty = draw_objects(self.drive, self.write("empty", lambda index, rows: []), stamp)
         self.assertEqual(np.count_nonzero((empty == (0, 255, 255)).all(2)), 0)
         self.assertGreater(np.count_nonzero((empty == (255, 0, 255)).all(2)), 20, "true objects are magenta")
+
+    def film(self, folder, bag=None):
+        output = folder / "film"
+        film.write_film(argparse.Namespace(bag=bag or self.drive.bag, rig=self.drive.true_rig, obstacles=folder, truth=self.drive.truth,
+                                           rate_hz=12.5, output=output))
+        return output
+
+    def test_the_film_has_a_picture_of_each_stamp(self):
+        folder = self.write("filmed")
+        stamps = [image["stamp_ns"] for image in self.images]
+        write_table(folder / "corridor.csv", ("stamp_ns", "direction", "known_free_m", "crossing_id", "crossing_time_s"),
+                    [{"stamp_ns": stamps[0], "direction": "forward", "known_free_m": 1.5, "crossing_id": 4, "crossing_time_s": 2.0}])
+        self.assertEqual(film.read_corridor(folder), {stamps[0]: "forward free 1.5 m, 4 crosses in 2.0 s"})
+        output = self.film(folder)
+        pictures = cv2.VideoCapture(str(output / "film.webm"))
+        count = 0
+        while pictures.read()[0]:
+            count += 1
+        self.assertEqual(count, len(stamps))
+        self.assertIn("film.webm", (output / "index.html").read_text())
+        # Objects of another drive: an error, and the film that is there stays.
+        before = (output / "film.webm").read_bytes()
+        write_table(folder / "objects_frames.csv", FRAME_COLUMNS, [])
+        with self.assertRaises(SystemExit) as failure:
+            self.film(folder)
+        self.assertIn("objects_frames.csv", str(failure.exception))
+        self.assertEqual((output / "film.webm").read_bytes(), before)
+
+    def test_the_map_of_the_film_is_turned_with_the_vehicle(self):
+        folder = self.drive.folder / "map"
+        folder.mkdir()
+        gray = np.full((200, 200), 205, np.uint8)
+        gray[200 - 1 - 150, 100] = 0  # x 0 m, y 5 m
+        cv2.imwrite(str(folder / "5.pgm"), gray)
+        (folder / "5.yaml").write_text("resolution: 0.1\norigin: [-10.05, -10.05, 0.0]\n")
+        picture = film.Maps(folder).draw(5, [0.0, 0.0, math.pi / 2])
+        rows, columns = np.nonzero((picture == film.COLOURS[0]).all(2))
+        expected = pixels_from_above([[5.0, 0.0]])[0]
+        self.assertLess(math.hypot(columns.mean() - expected[0], rows.mean() - expected[1]), 2.0)
+        self.assertIsNone(film.Maps(folder).draw(4, [0.0, 0.0, 0.0]))
 
     def test_settings_name_movers_and_the_condition(self):
         self.assertEqual(objects.settings("movers_lot", "noon"), [])

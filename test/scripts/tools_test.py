@@ -162,6 +162,24 @@ class ToolsTest(unittest.TestCase):
             self.assertEqual((status, errors), (0, []), program)
             self.assertGreater(len(yaml.safe_load(output)), 2, program)
 
+    def test_objects_do_without_cameras_that_have_no_images_or_extrinsics(self):
+        rig = yaml.safe_load((self.good / "rig.yaml").read_text())
+        left = {key: value for key, value in rig["cameras"]["left"].items() if key != "mask"}
+        rig["cameras"] = {"front": {key: value for key, value in left.items() if key != "vehicle_from_camera"}, "left": left,
+                          "rear": left}
+        (self.work / "rig.yaml").write_text(yaml.safe_dump(rig, sort_keys=False))
+        (self.work / "options.yaml").write_text("cameras: [left]\n")
+        words = [tool("vcharge_obstacles", "detect_obstacles"), "--bag", self.good / "drive.bag", "--rig",
+                 self.work / "rig.yaml", "--output", self.work / "obstacles"]
+        status, output, errors = run([*words, "--options", self.work / "options.yaml"])
+        self.assertEqual((status, errors), (0, []))
+        self.assertIn("warning: objects are detected without front (no vehicle_from_camera), rear (no images in the bag)",
+                      str(output))
+        for name in ("front", "rear"):
+            status, _, errors = run([*words, "--cameras", "left", name])
+            self.assertEqual(status, 1)
+            self.assertIn(name, errors[0])
+
     def test_missing_required_options_are_named(self):
         for name in ("import", "compute", "evaluate_range", "evaluate_trajectory", "evaluate_map", "map_info"):
             for option in self.tools[name][1]:

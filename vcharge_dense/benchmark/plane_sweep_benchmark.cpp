@@ -120,7 +120,7 @@ void kernel(benchmark::State& state, int64_t target, bool fisheye) {
                      {}};
     for (const SweepImage& image : s.neighbours) {
       const RigidTransform from_reference = image.world_from_camera.inverse() * s.reference.world_from_camera;
-      input.neighbours.push_back({PackedImage(image.pixels, valid),
+      input.neighbours.push_back({PackedImage(image.pixels, valid), s.camera,
                                   from_reference.rotationMatrix().cast<float>(),
                                   from_reference.translation().cast<float>(), false});
     }

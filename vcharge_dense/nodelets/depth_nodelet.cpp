@@ -12,10 +12,10 @@
 
 namespace vcharge {
 
-/// Computes range maps of a live or replayed drive, on the topics of RangeMapPublisher; publishes none while
-/// the vehicle stands. Reports one status per camera in /diagnostics. Parameters: ~rig (path), ~options
-/// (RangeMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every image in order, as
-/// compute_range_maps; otherwise the newest first, and drops are counted).
+/// Computes range maps of a live or replayed drive, on the topics of RangeMapPublisher; while the vehicle
+/// stands only with the option inter_camera. Reports one status per camera in /diagnostics. Parameters: ~rig
+/// (path), ~options (RangeMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every image in
+/// order, as compute_range_maps; otherwise the newest first, and drops are counted).
 class DepthNodelet : public Nodelet {
  public:
   DepthNodelet() : Nodelet("depth") {}
@@ -61,6 +61,7 @@ class DepthNodelet : public Nodelet {
     };
     add("images", status.images);
     add("references", status.references);
+    add("inter_camera", status.inter_camera);
     add("dropped", queue_->numDropped(rig_->cameraIndex(status.camera_name)));
     add("standing", status.standing);
     add("without_pose", status.without_pose);

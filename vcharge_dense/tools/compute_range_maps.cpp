@@ -65,6 +65,7 @@ nlohmann::json report(const RangeMapper& mapper, const std::vector<uint64_t>& ma
   for (const RangeMapperStatus& status : mapper.status()) {
     cameras.push_back({{"name", status.camera_name},
                        {"num_range_maps", status.references},
+                       {"num_inter_camera", status.inter_camera},
                        {"num_images", status.images},
                        {"num_standing", status.standing},
                        {"num_without_pose", status.without_pose},
@@ -152,7 +153,8 @@ int main(int argc, char** argv) {
   addShowOptions(&app, &arguments.show_options);
   app.footer(
       "Keys of --json: num_range_maps, known_ratio (of their pixels), cameras (name, num_range_maps, "
-      "num_images, num_standing, num_without_pose, num_without_neighbours, num_resets, message), "
+      "num_inter_camera, num_images, num_standing, num_without_pose, num_without_neighbours, num_resets, "
+      "message), "
       "content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (arguments.show_options) {

@@ -9,6 +9,7 @@
 #include "vcharge_obstacles/image_fingerprint.h"
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/drive_topics.h"
+#include "vcharge_ros/image_conversions.h"
 
 namespace vcharge {
 
@@ -35,7 +36,8 @@ void ImageListener::subscribe(ros::NodeHandle* node, size_t camera_index, const 
         throw InputError(topic + ": expected a stamp in the message's header, got 0");
       }
       callback_(camera_index, toTimestamp(message->header.stamp),
-                fingerprintOf(message->data.data(), message->data.size()));
+                fingerprintOf(message->data.data(), message->data.size()),
+                [message, topic] { return toImage(message, topic).pixels; });
     });
   };
   subscribers_.push_back(node->subscribe<Message>(topic, queue_size, note));

@@ -15,10 +15,12 @@
 namespace vcharge {
 
 /// Subscribes to the images of the cameras in use, raw or compressed, and tells their stamps and
-/// fingerprints. Decodes nothing: in the manager of the driver, a raw image arrives as a pointer.
+/// fingerprints. Decodes nothing by itself: in the manager of the driver, a raw image arrives as a pointer.
 class ImageListener {
  public:
-  using Callback = std::function<void(size_t camera_index, Timestamp, uint64_t fingerprint)>;
+  /// `pixels` decodes the image (CV_8UC1); InputError if it cannot be decoded.
+  using Callback = std::function<void(size_t camera_index, Timestamp, uint64_t fingerprint,
+                                      const std::function<cv::Mat()>& pixels)>;
 
   /// The guard must outlive this object. Images without a stamp are refused with an InputError.
   ImageListener(ros::NodeHandle* node, const CameraRig& rig, const std::vector<ObstacleCameraStatus>& cameras,

@@ -57,7 +57,7 @@ class ObstacleNodelet : public Nodelet {
     }
     images_ = std::make_unique<ImageListener>(
         &node(), *rig_, cameras, inputQueue(), &guard(),
-        [this](auto... image) { worker_->push([=] { mapper_->noteImage(image...); }, false); });
+        [this](auto... image) { worker_->push([=] { mapper_->addImage(image...); }, false); });
     subscribe<nav_msgs::Odometry>(
         odometry_topic_, inputQueue(),
         [this](const nav_msgs::OdometryConstPtr& message) { addOdometry(*message); });

@@ -81,7 +81,10 @@ class Pipeline : public DriveConsumer {
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
     tracking_.add([&] { objects_->addImage(camera_index, stamp, image); });
     ++num_images_;
-    obstacles_->noteImage(camera_index, stamp, fingerprintOf(image.pixels));
+    detecting_.add([&] {
+      obstacles_->addImage(camera_index, stamp, fingerprintOf(image.pixels),
+                           [image] { return image.pixels; });
+    });
     if (ranges_) {
       whole_.add([&] { ranges_->addImage(camera_index, stamp, image); });
     }
@@ -138,6 +141,36 @@ class Pipeline : public DriveConsumer {
   std::string range_folder_;
   std::map<Timestamp, std::map<size_t, std::string>> stored_;
 };
+
+/// Cameras for the objects: those of the map, and the rig's others that have extrinsics and images in the
+/// bag. Prints a warning that names the ones left out. Empty for a map of all cameras: all.
+std::vector<std::string> findObjectCameras(const std::string& bag, const CameraRig& rig,
+                                           const std::vector<std::string>& map_cameras) {
+  std::vector<std::string> cameras = map_cameras;
+  if (cameras.empty()) {
+    return cameras;
+  }
+  const auto contains = [](const std::vector<std::string>& names, const std::string& name) {
+    return std::find(names.begin(), names.end(), name) != names.end();
+  };
+  const std::vector<std::string> recorded = camerasWithImages(bag, rig);
+  std::string left_out;
+  for (const RigCamera& camera : rig.cameras) {
+    if (contains(map_cameras, camera.name)) {
+      continue;
+    }
+    if (camera.vehicle_from_camera && contains(recorded, camera.name)) {
+      cameras.push_back(camera.name);
+    } else {
+      left_out += (left_out.empty() ? "" : ", ") + camera.name +
+                  (camera.vehicle_from_camera ? " (no images in the bag)" : " (no vehicle_from_camera)");
+    }
+  }
+  if (!left_out.empty()) {
+    std::cout << "warning: objects are detected without " << left_out << "\n";
+  }
+  return cameras;
+}
 
 /// Writes each frame, and collects data for the summary.
 class Recorder {
@@ -228,11 +261,14 @@ class Recorder {
 };
 
 void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& options,
-                     const RangeMapperOptions& range_options, const ObjectTrackerOptions& object_options,
+                     const RangeMapperOptions& range_options, ObjectTrackerOptions object_options,
                      nlohmann::json* found) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   if (!std::filesystem::exists(arguments.bag)) {
     throw InputError(arguments.bag + ": no such file");  // before the output is created
+  }
+  if (object_options.cameras.empty()) {
+    object_options.cameras = findObjectCameras(arguments.bag, *rig, options.cameras);
   }
   FolderTransaction output(arguments.output);
   Recorder recorder(output.path());
@@ -242,9 +278,7 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
   ObjectTracker tracker(rig, object_options, [&](const ObjectFrame& frame) { recorder.add(frame); });
   Pipeline pipeline(rig, range_options, arguments.range, &mapper, &tracker);
   BagDriveSourceOptions source_options;
-  if (!object_options.cameras.empty()) {
-    source_options.cameras = options.cameras;
-  }
+  source_options.cameras = object_options.cameras;
   source_options.max_image_gap_s = INFINITY;  // a camera that stops is reported, not an error
   BagDriveSource source(arguments.bag, rig, source_options);
   {
@@ -280,7 +314,9 @@ int main(int argc, char** argv) {
   app.add_option("--range-options", arguments.range_options, "YAML with overrides of RangeMapperOptions");
   app.add_option("--range", arguments.range,
                  "folder that compute_range_maps wrote, instead of computing range maps");
-  app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
+  app.add_option("--cameras", arguments.cameras,
+                 "cameras of the rig by name (default: those of --options; for objects also the rig's "
+                 "others that have extrinsics and images)");
   app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
   addShowOptions(&app, &arguments.show_options);
   app.footer(

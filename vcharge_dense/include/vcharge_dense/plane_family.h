@@ -28,9 +28,18 @@ struct PlaneFamily {
   bool is_uniform = true;  ///< inverse distances are equally spaced
 };
 
-/// Makes the families of planes that the options select. Throws std::invalid_argument if they need a ground
-/// that is not given, or if the camera is not more than 0.3 m above it.
+/// Unit vectors in the camera frame, each perpendicular to the planes of one family and pointing away from
+/// the camera. Fronto-parallel planes have the optical axis.
+using PlaneAxes = std::vector<Eigen::Vector3d>;
+inline PlaneAxes opticalAxis() {
+  return {Eigen::Vector3d::UnitZ()};
+}
+
+/// Makes the families of planes that the options select: one per axis, in their order, then the planes
+/// parallel to the ground. Throws std::invalid_argument if they need a ground that is not given, or if the
+/// camera is not more than 0.3 m above it.
 std::vector<PlaneFamily> makePlaneFamilies(const PlaneSweepOptions& options,
-                                           const std::optional<Plane>& ground_in_camera);
+                                           const std::optional<Plane>& ground_in_camera,
+                                           const PlaneAxes& axes = opticalAxis());
 
 }  // namespace vcharge

@@ -23,11 +23,19 @@ struct SurfaceEstimate;
 struct SweepInput;
 struct SweepPixels;
 
-/// One image of the swept camera and its pose.
+/// A camera without distortion and the pixels that may be used (CV_8UC1 of its images' size, not 0 there).
+struct SweepCamera {
+  MeiCamera model;
+  cv::Mat valid_mask;
+};
+
+/// One image and its pose.
 struct SweepImage {
   Timestamp stamp;
   cv::Mat pixels;  ///< CV_8UC1, size of the working camera
   RigidTransform world_from_camera;
+  /// Camera of a neighbour; null: the swept camera. Poses of other cameras are not refined.
+  std::shared_ptr<const SweepCamera> camera = nullptr;
 };
 
 /// Intermediate results of the sweep at full resolution, for tests and figures.
@@ -56,9 +64,10 @@ class PlaneSweep {
   /// `camera` has no distortion; `valid_mask`: CV_8UC1, not 0 where pixels may be used (both from a
   /// WorkingCamera). Planes parallel to the ground need `ground_in_camera`. Throws std::invalid_argument for
   /// bad options or a missing or impossible ground, std::logic_error for a camera with distortion and images
-  /// less than 16 pixels wide.
+  /// less than 16 pixels wide. `axes`: of the families of upright planes.
   PlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask, const PlaneSweepOptions& options,
-             const std::optional<Plane>& ground_in_camera = std::nullopt);
+             const std::optional<Plane>& ground_in_camera = std::nullopt,
+             const PlaneAxes& axes = opticalAxis());
 
   /// Range map of `reference`: stamp, camera and images are set, names are left empty. Neighbours with a
   /// later stamp count as after it. Without neighbours all ranges are unknown. Throws std::logic_error for

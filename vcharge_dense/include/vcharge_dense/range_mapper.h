@@ -17,11 +17,26 @@
 
 namespace vcharge {
 
+class InterCameraStereo;
+struct InstantImages;
+class WorkingImages;
+
 /// Numbers of planes, neighbours and refinement steps that trade accuracy for time.
 enum class RangePreset { kFast, kDefault, kAccurate };
 template <>
 inline std::vector<std::string> enumNames<RangePreset>() {
   return {"fast", "default", "accurate"};
+}
+
+/// When a camera's image is also matched with the images of other cameras at its stamp, see RangeMapper.
+enum class InterCamera {
+  kOff,
+  kStanding,  ///< where the camera's own earlier images give no parallax
+  kAlways,    ///< also in addition to them
+};
+template <>
+inline std::vector<std::string> enumNames<InterCamera>() {
+  return {"off", "standing", "always"};
 }
 
 /// Options of RangeMapper.
@@ -33,6 +48,9 @@ struct RangeMapperOptions {
                  "Cameras of the rig by name; empty: all.");
   VCHARGE_OPTION(bool, use_later_images, false, anyValue(),
                  "Neighbours are also taken from after the reference, which delays range maps.");
+  VCHARGE_OPTION(InterCamera, inter_camera, InterCamera::kOff, anyValue(),
+                 "Whether cameras with overlapping images are matched with each other: only while standing, "
+                 "always, or not.");
   VCHARGE_OPTION_GROUP(WorkingCameraOptions, working_camera, {}, "Undistorted images that are swept.");
   VCHARGE_OPTION_GROUP(NeighbourOptions, neighbours, {}, "Images that a reference is matched with.");
   VCHARGE_OPTION_GROUP(PlaneSweepOptions, plane_sweep, {}, "Planes, scores and limits of reported ranges.");
@@ -58,7 +76,7 @@ struct RangeMapperOptions {
 enum class RangeMapperState {
   kNoImages,       ///< no image yet, or the camera stopped sending
   kNoPose,         ///< there is no odometry at the images' stamps
-  kStanding,       ///< the camera does not move: there is no parallax
+  kStanding,       ///< the camera does not move: only other cameras' images give parallax
   kFewNeighbours,  ///< moving, but no image with enough baseline yet
   kMapping,
 };
@@ -73,8 +91,9 @@ struct RangeMapperStatus {
   uint64_t without_pose = 0;
   uint64_t standing = 0;
   uint64_t without_neighbours = 0;
-  uint64_t references = 0;  ///< references passed on to be swept
-  uint64_t resets = 0;      ///< restarts because time or poses jumped or odometry had a gap
+  uint64_t references = 0;    ///< references passed on to be swept
+  uint64_t inter_camera = 0;  ///< those that are matched with images of other cameras
+  uint64_t resets = 0;        ///< restarts because time or poses jumped or odometry had a gap
 };
 
 /// A reference and its neighbours, ready to be swept. The pixels are shared and never changed.
@@ -82,6 +101,8 @@ struct RangeTask {
   size_t camera_index = 0;  ///< index in the rig
   SweepImage reference;
   std::vector<SweepImage> neighbours;
+  /// Images of all cameras at the reference's stamp, if the reference is matched with them; otherwise null.
+  std::shared_ptr<const InstantImages> instant;
 };
 
 /// Turns the images and odometry of a drive into sweeps: undistorts images, keeps the latest of each camera,
@@ -92,6 +113,12 @@ struct RangeTask {
 /// reference is passed on once its neighbours are known: with use_later_images after the vehicle has moved
 /// on, or in finish(). While a camera stands still there are no references, see status(). A camera restarts
 /// and drops its images if stamps jump back, odometry has a gap or poses jump.
+///
+/// With inter_camera, references are matched with the images that other cameras took at the same stamp, where
+/// both see the same: `standing` for references without neighbours, also of a camera that stands still, which
+/// are passed on at once; `always` for every reference. Where the image has a range from its neighbours and
+/// another one from other cameras, both are fused by their variances, or unknown if they contradict each
+/// other.
 class RangeMapper : public DriveConsumer {
  public:
   using TaskCallback = std::function<void(RangeTask)>;
@@ -123,16 +150,18 @@ class RangeMapper : public DriveConsumer {
 
   void process(const ImageFrame& frame);
   static void correctPoses(Camera* camera, const std::vector<CorrectedPose>& corrections);
-  void addImageWithPose(Camera* camera, const ImageFrame& frame);
+  void addImageWithPose(Camera* camera, const ImageFrame& frame, WorkingImages* images);
   void startOver(DriveBreak drive_break);
-  void addFrame(Camera* camera, const SweepImage& frame);
+  void addFrame(Camera* camera, const SweepImage& frame, std::shared_ptr<const InstantImages> instant);
   void emitReferences(Camera* camera, bool drive_is_over);
   void emitReference(Camera* camera, size_t index);
+  void emit(Camera* camera, RangeTask task);
 
   const std::shared_ptr<const CameraRig> rig_;
   const RangeMapperOptions options_;
   const TaskCallback on_task_;
-  std::vector<std::unique_ptr<Camera>> cameras_;  // indexed as in the rig; null: not in use
+  std::vector<std::unique_ptr<Camera>> cameras_;     // indexed as in the rig; null: not in use
+  std::unique_ptr<const InterCameraStereo> stereo_;  // null: off
   std::unique_ptr<ImageFrameAssembler> assembler_;
 };
 

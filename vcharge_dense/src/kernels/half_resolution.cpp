@@ -57,18 +57,22 @@ bool canBeHalved(cv::Size size) {
 std::unique_ptr<const SweepLevel> halfLevel(const SweepLevel& fine, const PlaneSweepOptions& options,
                                             const std::optional<Plane>& ground_in_camera) {
   return std::make_unique<SweepLevel>(halved(fine.camera()), halvedMask(fine.validMask()), options,
-                                      ground_in_camera);
+                                      ground_in_camera, fine.axes());
 }
 
 SweepInput halfInput(const SweepLevel& half, const SweepInput& fine, const SweepPixels& half_pixels) {
   SweepInput input = half.makeInput(half_pixels.reference);
-  std::vector<std::optional<PackedImage>> images(half_pixels.neighbours.size());
-  tbb::parallel_for(size_t{0}, images.size(),
-                    [&](size_t n) { images[n].emplace(half_pixels.neighbours[n], half.validMask()); });
-  for (size_t n = 0; n < images.size(); ++n) {
+  std::vector<std::optional<SweepNeighbour>> halves(half_pixels.neighbours.size());
+  tbb::parallel_for(size_t{0}, halves.size(), [&](size_t n) {
     const SweepNeighbour& from = fine.neighbours[n];
-    input.neighbours.push_back({std::move(*images[n]), from.neighbour_from_reference, from.translation_m,
-                                from.after, from.rotation_variance_left, from.translation_variance_left});
+    const cv::Mat other_mask = from.other_mask.empty() ? cv::Mat() : halvedMask(from.other_mask);
+    halves[n].emplace(SweepNeighbour{
+        PackedImage(half_pixels.neighbours[n], other_mask.empty() ? half.validMask() : other_mask),
+        halved(from.camera), from.neighbour_from_reference, from.translation_m, from.after,
+        from.rotation_variance_left, from.translation_variance_left, other_mask});
+  });
+  for (std::optional<SweepNeighbour>& neighbour : halves) {
+    input.neighbours.push_back(std::move(*neighbour));
   }
   return input;
 }

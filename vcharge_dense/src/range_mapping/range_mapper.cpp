@@ -5,6 +5,8 @@
 #include <string_view>
 #include <utility>
 
+#include "range_mapping/inter_camera_stereo.h"
+#include "range_mapping/range_fusion.h"
 #include "vcharge_core/base/error.h"
 
 namespace vcharge {
@@ -17,7 +19,8 @@ constexpr double kMaxImageGap_s = 1.0;
 
 struct Frame {
   SweepImage image;
-  double path_m;  // length of the camera's path up to this frame
+  double path_m;                                 // length of the camera's path up to this frame
+  std::shared_ptr<const InstantImages> instant;  // null once passed on, or without other cameras
 };
 
 }  // namespace
@@ -62,6 +65,40 @@ void RangeMapperOptions::checkFields() const {
   requireField(!use_later_images || neighbours.num_neighbours % 2 == 0, "neighbours.num_neighbours",
                "must be even where later images are used", neighbours.num_neighbours);
 }
+
+/// The working images of one frame, undistorted at their first use.
+class WorkingImages {
+ public:
+  WorkingImages(const ImageFrame& frame, std::vector<const WorkingCamera*> cameras,
+                const InterCameraStereo* stereo)
+      : frame_(frame), cameras_(std::move(cameras)), stereo_(stereo), pixels_(cameras_.size()) {}
+
+  const cv::Mat& of(size_t camera) {
+    if (pixels_[camera].empty()) {
+      pixels_[camera] = cameras_[camera]->undistort(frame_.images[camera].pixels);
+    }
+    return pixels_[camera];
+  }
+
+  /// The images of all cameras if this one can be matched with some of them; otherwise null.
+  std::shared_ptr<const InstantImages> instant(size_t camera) {
+    if (stereo_ != nullptr && !instant_) {
+      std::vector<cv::Mat> pixels(cameras_.size());
+      for (size_t i = 0; i < cameras_.size(); ++i) {
+        pixels[i] = cameras_[i] != nullptr && frame_.has_image[i] ? of(i) : cv::Mat();
+      }
+      instant_ = stereo_->instant(frame_.stamp, std::move(pixels));
+    }
+    return instant_ && stereo_->canMeasure(*instant_, camera) ? instant_ : nullptr;
+  }
+
+ private:
+  const ImageFrame& frame_;
+  const std::vector<const WorkingCamera*> cameras_;
+  const InterCameraStereo* stereo_;
+  std::vector<cv::Mat> pixels_;
+  std::shared_ptr<const InstantImages> instant_;
+};
 
 struct RangeMapper::Camera {
   size_t index;
@@ -112,6 +149,13 @@ RangeMapper::RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapper
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     is_used.push_back(camera != nullptr);
   }
+  if (options_.inter_camera != InterCamera::kOff) {
+    std::vector<std::optional<StereoCamera>> views(cameras_.size());
+    for (const size_t index : used) {
+      views[index] = StereoCamera{cameras_[index]->working_camera, cameras_[index]->vehicle_from_camera};
+    }
+    stereo_ = std::make_unique<InterCameraStereo>(views, options_.plane_sweep);
+  }
   assembler_ = std::make_unique<ImageFrameAssembler>(
       cameras_.size(), options_.frames, [this](const ImageFrame& frame) { process(frame); },
       [this](DriveBreak drive_break, Timestamp /*stamp*/) { startOver(drive_break); }, is_used);
@@ -150,12 +194,17 @@ void RangeMapper::addOdometry(const VehicleOdometry& odometry) {
 }
 
 void RangeMapper::process(const ImageFrame& frame) {
+  std::vector<const WorkingCamera*> working(cameras_.size(), nullptr);
+  for (size_t i = 0; i < cameras_.size(); ++i) {
+    working[i] = cameras_[i] ? &cameras_[i]->working_camera : nullptr;
+  }
+  WorkingImages images(frame, std::move(working), stereo_.get());
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (camera) {
       correctPoses(camera.get(), frame.corrections);
     }
     if (camera && frame.has_image[camera->index]) {
-      addImageWithPose(camera.get(), frame);
+      addImageWithPose(camera.get(), frame, &images);
     }
   }
 }
@@ -168,7 +217,7 @@ void RangeMapper::correctPoses(Camera* camera, const std::vector<CorrectedPose>&
   }
 }
 
-void RangeMapper::addImageWithPose(Camera* camera, const ImageFrame& frame) {
+void RangeMapper::addImageWithPose(Camera* camera, const ImageFrame& frame, WorkingImages* images) {
   if (!frame.odom_from_vehicle) {
     ++camera->status.without_pose;
     camera->status.state = RangeMapperState::kNoPose;
@@ -185,6 +234,10 @@ void RangeMapper::addImageWithPose(Camera* camera, const ImageFrame& frame) {
       ++camera->status.standing;
       camera->status.state = RangeMapperState::kStanding;
       camera->status.message = "the camera does not move: there is no parallax";
+      if (std::shared_ptr<const InstantImages> instant = images->instant(camera->index)) {
+        camera->status.message = "the camera does not move: ranges only where other cameras see the same";
+        emit(camera, {camera->index, {stamp, images->of(camera->index), world_from_camera}, {}, instant});
+      }
       return;
     }
     // The assembler detects jumps of the odometry; jumps of a given trajectory are detected here.
@@ -195,18 +248,18 @@ void RangeMapper::addImageWithPose(Camera* camera, const ImageFrame& frame) {
       ++camera->status.resets;
     }
   }
-  addFrame(camera,
-           {stamp, camera->working_camera.undistort(frame.images[camera->index].pixels), world_from_camera});
+  addFrame(camera, {stamp, images->of(camera->index), world_from_camera}, images->instant(camera->index));
 }
 
-void RangeMapper::addFrame(Camera* camera, const SweepImage& frame) {
+void RangeMapper::addFrame(Camera* camera, const SweepImage& frame,
+                           std::shared_ptr<const InstantImages> instant) {
   double path_m = 0.0;
   if (!camera->frames.empty()) {
     const Frame& last = camera->frames.back();
     path_m = last.path_m +
              (frame.world_from_camera.translation() - last.image.world_from_camera.translation()).norm();
   }
-  camera->frames.push_back({frame, path_m});
+  camera->frames.push_back({frame, path_m, std::move(instant)});
   emitReferences(camera, false);
   // Drops frames that are further back than any baseline of the next reference.
   const double reach_m = 1.5 * options_.neighbours.max_forward_baseline_m;
@@ -236,7 +289,7 @@ void RangeMapper::emitReference(Camera* camera, size_t index) {
   const Eigen::Vector3d position = reference.world_from_camera.translation();
   const Eigen::Vector3d axis = reference.world_from_camera.rotation() * Eigen::Vector3d::UnitZ();
   const int sides = options_.use_later_images ? 2 : 1;
-  RangeTask task{camera->index, reference, {}};
+  RangeTask task{camera->index, reference, {}, std::move(camera->frames[index].instant)};
   for (int side = 0; side < sides; ++side) {
     const size_t first = side == 0 ? 0 : index + 1;
     const size_t last = side == 0 ? index : camera->frames.size();
@@ -258,11 +311,22 @@ void RangeMapper::emitReference(Camera* camera, size_t index) {
     ++camera->status.without_neighbours;
     camera->status.state = RangeMapperState::kFewNeighbours;
     camera->status.message = "no image with enough baseline yet";
+    if (task.instant) {
+      emit(camera, std::move(task));
+    }
     return;
   }
-  ++camera->status.references;
+  if (options_.inter_camera != InterCamera::kAlways) {
+    task.instant.reset();
+  }
   camera->status.state = RangeMapperState::kMapping;
   camera->status.message = "mapping";
+  emit(camera, std::move(task));
+}
+
+void RangeMapper::emit(Camera* camera, RangeTask task) {
+  ++camera->status.references;
+  camera->status.inter_camera += task.instant ? 1 : 0;
   on_task_(std::move(task));
 }
 
@@ -278,7 +342,17 @@ void RangeMapper::finish() {
 RangeMap RangeMapper::sweep(const RangeTask& task) const {
   check(task.camera_index < cameras_.size() && cameras_[task.camera_index],
         "RangeMapper::sweep: unknown camera");
-  RangeMap map = cameras_[task.camera_index]->plane_sweep.sweep(task.reference, task.neighbours);
+  std::optional<RangeMap> from_cameras;
+  if (task.instant) {
+    check(stereo_ != nullptr, "RangeMapper::sweep: a task of another mapper");
+    from_cameras = stereo_->rangeMap(*task.instant, task.camera_index);
+  }
+  RangeMap map = from_cameras && task.neighbours.empty()
+                     ? *from_cameras
+                     : cameras_[task.camera_index]->plane_sweep.sweep(task.reference, task.neighbours);
+  if (from_cameras && !task.neighbours.empty()) {
+    map = fuseRangeMaps(map, *from_cameras);
+  }
   map.camera_name = rig_->cameras[task.camera_index].name;
   map.frame_id = rig_->cameras[task.camera_index].frame_id;
   map.reference = task.reference.pixels;

@@ -129,6 +129,44 @@ TEST(RangeMapperTest, OfflineUsesBothSidesAndSweepsEveryImage) {
   EXPECT_GE(two_sided, 48);
 }
 
+TEST(RangeMapperTest, AStandingCameraIsMatchedWithOthersAtItsStamp) {
+  for (const InterCamera mode : {InterCamera::kOff, InterCamera::kStanding, InterCamera::kAlways}) {
+    SCOPED_TRACE(enumNames<InterCamera>()[static_cast<size_t>(mode)]);
+    Recorder recorder;
+    RangeMapperOptions options = smallOptions();
+    options.inter_camera = mode;
+    RangeMapper mapper(makeRig(), options, recorder.callback());
+    drive(&mapper, 10, 0.2);
+    size_t with_instant = 0;
+    for (const RangeTask& task : recorder.tasks) {
+      with_instant += task.instant ? 1 : 0;
+      EXPECT_EQ(task.instant != nullptr, mode == InterCamera::kAlways || task.neighbours.empty());
+    }
+    EXPECT_EQ(recorder.tasks.size(), mode == InterCamera::kOff ? 18u : 20u);
+    EXPECT_EQ(mapper.status()[0].inter_camera, with_instant / 2);
+    const size_t moving = recorder.tasks.size();
+    for (int i = 10; i < 20; ++i) {
+      mapper.addOdometry(odometryAt(stampOf(i), 9 * 0.2));
+      mapper.addImage(0, stampOf(i), blankImage());
+      if (i < 15) {
+        mapper.addImage(1, stampOf(i), blankImage());
+      }
+    }
+    mapper.finish();
+    // Without the other camera's image nothing can be measured.
+    ASSERT_EQ(recorder.tasks.size() - moving, mode == InterCamera::kOff ? 0u : 10u);
+    for (size_t i = moving; i < recorder.tasks.size(); ++i) {
+      const RangeTask& task = recorder.tasks[i];
+      EXPECT_TRUE(task.neighbours.empty());
+      const RangeMap map = mapper.sweep(task);
+      EXPECT_EQ(map.stamp, task.reference.stamp);
+      EXPECT_EQ(map.camera_name, task.camera_index == 0 ? "left" : "front");
+      EXPECT_EQ(cv::countNonZero(map.range_m == map.range_m), 0);  // images without texture
+    }
+    EXPECT_EQ(mapper.status()[0].state, RangeMapperState::kStanding);
+  }
+}
+
 TEST(RangeMapperTest, ReportsAStandingVehicle) {
   Recorder recorder;
   RangeMapper mapper(makeRig(), smallOptions(), recorder.callback());

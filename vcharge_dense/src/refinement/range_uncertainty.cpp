@@ -141,7 +141,7 @@ std::vector<NeighbourUncertainty> neighbourUncertainties(const SweepInput& input
       return static_cast<float>(constant * constant + per_sqrt_m * per_sqrt_m * baseline_m);
     };
     result.push_back(
-        {neighbour.projectionOf(input.camera),
+        {neighbour.projection(),
          neighbour.rotation_variance_left * variance(pose.rotation_rad, pose.rotation_rad_per_sqrt_m),
          neighbour.translation_variance_left * variance(pose.translation_m, pose.translation_m_per_sqrt_m),
          neighbour.after});

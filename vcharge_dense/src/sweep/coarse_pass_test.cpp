@@ -21,7 +21,7 @@ SweepInput inputOf(const SweepLevel& level, const Sequence& sequence) {
   SweepInput input = level.makeInput(sequence.reference.pixels);
   for (const SweepImage& image : sequence.neighbours) {
     const RigidTransform pose = image.world_from_camera.inverse() * sequence.reference.world_from_camera;
-    input.neighbours.push_back({PackedImage(image.pixels, level.validMask()),
+    input.neighbours.push_back({PackedImage(image.pixels, level.validMask()), level.camera(),
                                 pose.rotationMatrix().cast<float>(), pose.translation().cast<float>(),
                                 false});
   }

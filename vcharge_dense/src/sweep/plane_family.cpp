@@ -34,12 +34,15 @@ Plane groundInCamera(const RigidTransform& vehicle_from_camera) {
 }
 
 std::vector<PlaneFamily> makePlaneFamilies(const PlaneSweepOptions& options,
-                                           const std::optional<Plane>& ground_in_camera) {
+                                           const std::optional<Plane>& ground_in_camera,
+                                           const PlaneAxes& axes) {
   std::vector<PlaneFamily> families;
-  families.push_back({-Eigen::Vector3d::UnitZ(),
-                      inverseDistances(options.max_distance_m, options.min_distance_m, options.num_planes,
-                                       options.near_spacing),
-                      options.near_spacing == 1.0});
+  for (const Eigen::Vector3d& axis : axes) {
+    families.push_back({-axis,
+                        inverseDistances(options.max_distance_m, options.min_distance_m, options.num_planes,
+                                         options.near_spacing),
+                        options.near_spacing == 1.0});
+  }
   if (options.num_ground_planes > 0) {
     if (!ground_in_camera) {
       throw std::invalid_argument(

@@ -23,6 +23,10 @@ void checkImage(const SweepImage& image, cv::Size size) {
         "PlaneSweep: images must be CV_8UC1 of the working camera's size");
 }
 
+void checkNoDistortion(const MeiCamera& camera) {
+  check(camera.parameters().tail<4>().isZero(0.0), "PlaneSweep: cameras must not have distortion");
+}
+
 /// Packs the neighbours' images and computes their relative poses.
 void addNeighbours(const SweepLevel& level, const SweepImage& reference,
                    const std::vector<SweepImage>& neighbours, SweepInput* input) {
@@ -33,16 +37,19 @@ void addNeighbours(const SweepLevel& level, const SweepImage& reference,
   std::vector<std::optional<SweepNeighbour>> prepared(neighbours.size());
   tbb::parallel_for(size_t{0}, neighbours.size(), [&](size_t n) {
     const SweepImage& image = neighbours[n];
+    const SweepCamera* other = image.camera.get();
     PoseRefinement::Result pose;
     pose.neighbour_from_reference = image.world_from_camera.inverse() * reference.world_from_camera;
-    if (poses) {
+    if (poses && other == nullptr) {
       pose = poses->refine(image.pixels, pose.neighbour_from_reference);
     }
     prepared[n].emplace(SweepNeighbour{
-        PackedImage(image.pixels, level.validMask()),
+        PackedImage(image.pixels, other != nullptr ? other->valid_mask : level.validMask()),
+        other != nullptr ? other->model : level.camera(),
         pose.neighbour_from_reference.rotationMatrix().cast<float>(),
         pose.neighbour_from_reference.translation().cast<float>(), image.stamp > reference.stamp,
-        static_cast<float>(pose.rotation_variance_left), static_cast<float>(pose.translation_variance_left)});
+        static_cast<float>(pose.rotation_variance_left), static_cast<float>(pose.translation_variance_left),
+        other != nullptr ? other->valid_mask : cv::Mat()});
   });
   for (std::optional<SweepNeighbour>& neighbour : prepared) {
     input->neighbours.push_back(std::move(*neighbour));
@@ -65,20 +72,19 @@ void fillUnknown(const RangeMap& half, RangeMap* map) {
 }  // namespace
 
 PlaneSweep::PlaneSweep(const MeiCamera& camera, const cv::Mat& valid_mask, const PlaneSweepOptions& options,
-                       const std::optional<Plane>& ground_in_camera) {
+                       const std::optional<Plane>& ground_in_camera, const PlaneAxes& axes) {
   options.validate();
-  const MeiCamera::Parameters p = camera.parameters();
-  check(p.tail<4>().isZero(0.0), "PlaneSweep: the working camera must not have distortion");
+  checkNoDistortion(camera);
   check(valid_mask.cols >= kMinWidth_px, "PlaneSweep: images must be at least 16 pixels wide");
-  level_ = std::make_shared<SweepLevel>(camera, valid_mask, options, ground_in_camera);
+  level_ = std::make_shared<SweepLevel>(camera, valid_mask, options, ground_in_camera, axes);
   if (options.coarse_pass && canBeHalved(valid_mask.size())) {
     coarse_ = std::make_shared<CoarsePass>(level_, ground_in_camera);
   }
   if (options.num_fill_levels > 0 && canBeHalved(valid_mask.size())) {
     PlaneSweepOptions half_options = options;
     --half_options.num_fill_levels;
-    half_ =
-        std::make_shared<PlaneSweep>(halved(camera), halvedMask(valid_mask), half_options, ground_in_camera);
+    half_ = std::make_shared<PlaneSweep>(halved(camera), halvedMask(valid_mask), half_options,
+                                         ground_in_camera, axes);
   }
 }
 
@@ -109,7 +115,10 @@ RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepI
   checkImage(reference, size);
   SweepPixels pixels{reference.pixels, {}};
   for (const SweepImage& image : neighbours) {
-    checkImage(image, size);
+    checkImage(image, image.camera ? image.camera->valid_mask.size() : size);
+    if (image.camera) {
+      checkNoDistortion(image.camera->model);
+    }
     pixels.neighbours.push_back(image.pixels);
   }
   check(neighbours.size() <= 32, "PlaneSweep: at most 32 neighbours");

@@ -73,7 +73,7 @@ void findMoments(int begin, int end, int window, double min_squares, SweepRefere
 
 }  // namespace
 
-Projection SweepNeighbour::projectionOf(const MeiCamera& camera) const {
+Projection SweepNeighbour::projection() const {
   constexpr auto kMargin = static_cast<float>(PackedImage::kMargin);
   Projection p;
   p.fx = static_cast<float>(camera.gamma1());

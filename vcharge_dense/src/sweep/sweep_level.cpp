@@ -69,13 +69,14 @@ class SweepLevel::WorkerPool {
 };
 
 SweepLevel::SweepLevel(const MeiCamera& camera, const cv::Mat& valid_mask, const PlaneSweepOptions& options,
-                       const std::optional<Plane>& ground_in_camera)
+                       const std::optional<Plane>& ground_in_camera, const PlaneAxes& axes)
     : camera_(camera),
       valid_mask_(valid_mask.clone()),
       valid_windows_(windowsInside(valid_mask_, kMatchingWindow_px)),
       options_(options),
+      axes_(axes),
       rays_(camera, valid_mask.size(), kWholeSphere_rad, valid_mask),
-      families_(makePlaneFamilies(options, ground_in_camera)),
+      families_(makePlaneFamilies(options, ground_in_camera, axes)),
       workers_(std::make_unique<WorkerPool>()) {
   for (const PlaneFamily& family : families_) {
     planes_.push_back(makePlaneHypotheses(family, rays_, valid_mask_));

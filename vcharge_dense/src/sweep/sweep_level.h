@@ -24,7 +24,7 @@ using TilePlanes = std::vector<std::vector<int>>;
 class SweepLevel {
  public:
   SweepLevel(const MeiCamera& camera, const cv::Mat& valid_mask, const PlaneSweepOptions& options,
-             const std::optional<Plane>& ground_in_camera);
+             const std::optional<Plane>& ground_in_camera, const PlaneAxes& axes = opticalAxis());
   ~SweepLevel();
   SweepLevel(const SweepLevel&) = delete;
   SweepLevel& operator=(const SweepLevel&) = delete;
@@ -45,6 +45,7 @@ class SweepLevel {
   /// CV_8UC1: not 0 where all pixels of the window are valid.
   const cv::Mat& validWindows() const { return valid_windows_; }
   const PlaneSweepOptions& options() const { return options_; }
+  const PlaneAxes& axes() const { return axes_; }
   const std::vector<PlaneFamily>& families() const { return families_; }
   const std::vector<Hypotheses>& planes() const { return planes_; }  ///< planes of families()
 
@@ -55,6 +56,7 @@ class SweepLevel {
   cv::Mat valid_mask_, valid_windows_;
   cv::Mat near_valid_;  // CV_8UC1: not 0 near valid pixels
   PlaneSweepOptions options_;
+  PlaneAxes axes_;
   RayTable rays_;
   std::vector<PlaneFamily> families_;
   std::vector<Hypotheses> planes_;

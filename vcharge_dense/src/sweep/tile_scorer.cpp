@@ -88,7 +88,7 @@ void TileScorer::setInput(const SweepInput& input) {
   neighbours_.resize(input.neighbours.size());
   for (size_t n = 0; n < input.neighbours.size(); ++n) {
     const SweepNeighbour& from = input.neighbours[n];
-    neighbours_[n].projection = from.projectionOf(input.camera);
+    neighbours_[n].projection = from.projection();
     after_[n] = from.after;
   }
 }

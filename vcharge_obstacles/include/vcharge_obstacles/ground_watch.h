@@ -22,10 +22,18 @@ struct GroundWatchOptions {
   VCHARGE_END_OPTIONS();
 };
 
-/// Detects ground whose appearance has changed: warps an earlier image of a camera to the current pose with
-/// the ground plane and compares the images. Whatever moves or rises above the ground does not match. Motion
-/// stereo assumes a static scene and cannot range moving objects, but this comparison needs no range.
-/// Deterministic; not thread safe.
+/// What the images of a camera tell about the ground, by PolarGrid::index.
+struct GroundAppearance {
+  std::vector<float> changed_fraction;  ///< pixels that have changed; empty without an earlier image
+  std::vector<float> ground_pixels;     ///< number of pixels that show the ground, less those that do not
+};
+
+/// Compares the images of a camera by the plane of the ground. Whatever moves or rises above the ground does
+/// not fit. Motion stereo assumes a static scene and cannot range moving objects, and has few ranges near the
+/// direction of travel; this comparison needs no range. Deterministic; not thread safe.
+///
+/// Changes are found with an image 0.24 s earlier. That a pixel shows the ground is decided with images whose
+/// distance suits the range: with a short baseline a low obstacle looks like the ground behind it.
 class GroundWatch {
  public:
   /// Ground beyond `max_distance_m` from the camera is not compared. std::invalid_argument for bad options.
@@ -33,11 +41,14 @@ class GroundWatch {
               double max_distance_m, const GroundWatchOptions& options = GroundWatchOptions());
   ~GroundWatch();
 
-  /// Fraction of each cell's ground pixels that have changed, by PolarGrid::index. Empty if there is no
-  /// earlier image to compare with, or no ground plane. `image`: CV_8UC1 of the camera's size. Uses only x, y
-  /// and yaw of the pose. std::logic_error for an image of another size.
-  std::vector<float> compare(Timestamp stamp, const cv::Mat& image, const GroundPlane& ground,
-                             const RigidTransform& fixed_from_vehicle);
+  /// Empty vectors if there is no earlier image to compare with, or no ground plane. `image`: CV_8UC1 of the
+  /// camera's size. Uses only x, y and yaw of the pose. std::logic_error for an image of another size.
+  GroundAppearance compare(Timestamp stamp, const cv::Mat& image, const GroundPlane& ground,
+                           const RigidTransform& fixed_from_vehicle);
+  /// Fraction of each cell's ground pixels that have changed while the camera stood still, by
+  /// PolarGrid::index: since 0.24 s ago, or slowly within 3 s. Empty without an earlier image. Call clear()
+  /// when the vehicle has moved. std::logic_error for an image of another size.
+  std::vector<float> compareStanding(Timestamp stamp, const cv::Mat& image);
   /// Drops all earlier images; call it when the poses have jumped.
   void clear();
 

@@ -62,14 +62,22 @@ class LocalObstacleMap {
 
   explicit LocalObstacleMap(const LocalObstacleMapOptions& options = LocalObstacleMapOptions());
 
-  /// Sets the vehicle's pose (x, y and yaw are used): scrolls, and decays by the distance driven.
-  void moveTo(Timestamp stamp, const RigidTransform& fixed_from_vehicle);
+  /// Tells an area of the ground by points in the vehicle frame.
+  using GroundArea = std::function<bool(const Eigen::Vector2d& point_in_vehicle_m)>;
+
+  /// Sets the vehicle's pose (x, y and yaw are used): scrolls, and decays by the distance driven. Free ground
+  /// that is now in the area `is_hidden`, where no camera sees it, keeps its state and only grows older.
+  void moveTo(Timestamp stamp, const RigidTransform& fixed_from_vehicle,
+              const GroundArea& is_hidden = nullptr);
   /// Adds the observation of a camera; std::logic_error before the first moveTo(). `grid` is the
   /// detector's.
   void add(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle);
   /// Makes free cells unobserved for which `is_unwatched` is true. It gets their middles in the vehicle frame
   /// of the last moveTo(). Occupied cells keep their state.
-  void forgetFree(const std::function<bool(const Eigen::Vector2d& point_in_vehicle_m)>& is_unwatched);
+  void forgetFree(const GroundArea& is_unwatched);
+  /// Makes free cells within changed_margin_m of a point in the fixed frame unobserved, as the ground there
+  /// has changed; none of them becomes free within 0.3 s. Occupied cells keep their state.
+  void forgetAround(const Eigen::Vector2d& point_m, Timestamp stamp);
   /// Moves all cells into a corrected fixed frame.
   void reanchor(const RigidTransform& new_from_old_fixed);
 
@@ -101,7 +109,7 @@ class LocalObstacleMap {
   };
   static constexpr int64_t kNever = INT64_MIN;
 
-  void decay(double travelled_m);
+  void decay(double travelled_m, const RigidTransform& fixed_from_vehicle, const GroundArea& is_hidden);
   double weightOf(const CameraObstacles& seen, const RigidTransform& fixed_from_vehicle);
   void addGround(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle,
                  double weight);

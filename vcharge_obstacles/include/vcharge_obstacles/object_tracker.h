@@ -34,10 +34,10 @@ struct ObjectTrackerOptions {
 ///  2. A rotation of the body that the wheels did not measure is estimated from all of them.
 ///  3. A point moves if no static point on or above the ground explains its two rays within their errors.
 ///  4. Moving points are set on the ground where the image, compared with an earlier one that is warped by
-///  the
-///     ground plane, begins to differ below them.
-///  5. Groups of points get a position, a velocity and their covariances; a Kalman filter joins cameras and
-///  time.
+///     the ground plane, begins to differ below them.
+///  5. Groups of points get a position, a velocity and their covariances.
+///  6. A Kalman filter per object joins cameras and time.
+///  7. Objects without points are found by their whole body in the next image, and by their contact.
 ///
 /// Deterministic; not thread safe.
 class ObjectTracker : public DriveConsumer {

@@ -72,9 +72,14 @@ struct CameraObstacles {
   /// Range per ray up to which bare ground makes a cell free; empty: no limit. Beyond this range (too far off
   /// the axis), bare ground only confirms free cells and weakens occupied ones.
   std::vector<double> free_to_m;
+  /// Range per ray from which no ground is bare, as a body above it would lie outside the image; empty: none.
+  std::vector<double> overhung_from_m;
   std::vector<float> free_fraction;     ///< pixels that show bare ground
   std::vector<float> hidden_fraction;   ///< pixels that show something on or in front of the ground
   std::vector<float> unknown_fraction;  ///< pixels without a range
+  /// Number of pixels that would show the ground of a cell, by which fractions of several cells are averaged;
+  /// empty: the same number for all.
+  std::vector<float> expected_ground;
   /// Pixels that differ from an earlier image, from GroundWatch; empty if there was no earlier image.
   std::vector<float> changed_fraction;
   ObstacleScan scan;  ///< first obstacle on each ray

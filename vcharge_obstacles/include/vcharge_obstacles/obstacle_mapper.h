@@ -18,8 +18,10 @@
 
 namespace vcharge {
 
+class HiddenGround;
 class PathCurvature;
 class SilentCameras;
+class StandingWatch;
 
 /// Frame in which the map's cells are fixed: the odometry's frame, or the sparse map's frame, in which
 /// localization corrects them.
@@ -112,6 +114,10 @@ class ObstacleMapper {
   /// s is silent: free cells that it sees, and no living camera, become unobserved. A camera of which no
   /// image was ever noted does not count as silent. std::logic_error for an index beyond the rig.
   void noteImage(size_t camera_index, Timestamp stamp, uint64_t fingerprint);
+  /// The same, with a function that gives the image's pixels (CV_8UC1 of the sensor's size) if they are
+  /// needed: while the vehicle stands, free ground where the images change becomes unobserved.
+  void addImage(size_t camera_index, Timestamp stamp, uint64_t fingerprint,
+                const std::function<cv::Mat()>& pixels);
   /// Sets localization's correction. Required with fixed_frame: map, ignored otherwise.
   void setMapFromOdom(const RigidTransform& map_from_odom);
   /// Sets the objects that move around the vehicle, in the map's fixed frame. They enter the corridors of the
@@ -152,6 +158,7 @@ class ObstacleMapper {
             const std::vector<const CameraObstacles*>& cameras);
   Corridor findCorridor(const ObstacleMap& map);
   void emitAt(Timestamp stamp);
+  void moveTo(Timestamp stamp, const RigidTransform& fixed_from_vehicle, LocalObstacleMap* map) const;
   void emitWhenSilent();
   void updateStatus(Camera* camera, const CameraObstacles& seen) const;
   void startOver(DriveBreak drive_break, Timestamp stamp);
@@ -167,6 +174,8 @@ class ObstacleMapper {
   const CorridorFinder corridor_finder_;
   std::unique_ptr<PathCurvature> curvature_;
   std::unique_ptr<SilentCameras> silent_;
+  std::unique_ptr<StandingWatch> standing_;
+  std::unique_ptr<const HiddenGround> hidden_;
   size_t num_silent_emitted_ = 0;        // silent cameras at the last emitted frame
   std::optional<Timestamp> last_fused_;  // stamp of the last range maps in the map
   Timestamp objects_stamp_;

@@ -53,7 +53,10 @@ struct ObstacleDetector::Implementation {
         position(vehicle_from_camera.translation().cast<float>()),
         rays(camera, vehicle_from_camera, grid),
         expected(rays, grid, position.z(), options.min_height_m, kReferenceHeight_m),
-        fully_visible_m(fullyVisibleRange(rays, grid, position.z())) {
+        overhung_from_m(fullyVisibleRange(rays, grid, position.z())) {
+    for (double& from_m : overhung_from_m) {
+      from_m = std::max(kMaxOffAxisRange_m, from_m);
+    }
     const Eigen::Vector3d axis = vehicle_from_camera.rotation() * Eigen::Vector3d::UnitZ();
     const double axis_rad = std::atan2(axis.y(), axis.x());
     for (int ray = 0; ray < grid.numRays(); ++ray) {
@@ -83,9 +86,9 @@ struct ObstacleDetector::Implementation {
   const Eigen::Vector3f position;
   const PixelRays rays;
   const ExpectedPixels expected;
-  const std::vector<double> fully_visible_m;  // one per sector, see fullyVisibleRange()
-  std::vector<bool> is_off_axis;              // one per sector
-  std::vector<double> free_to_m;              // one per sector
+  std::vector<double> overhung_from_m;  // one per sector, see fullyVisibleRange()
+  std::vector<bool> is_off_axis;        // one per sector
+  std::vector<double> free_to_m;        // one per sector
 };
 
 ObstacleDetector::ObstacleDetector(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera,
@@ -209,7 +212,7 @@ std::vector<float> ObstacleDetector::Implementation::fractionOf(const std::vecto
 /// Removes evidence for ground if a body above it would lie outside the image.
 void ObstacleDetector::Implementation::dropOverhungGround(std::vector<float>* free_fraction) const {
   for (int ray = 0; ray < grid.numRays(); ++ray) {
-    const double from_m = std::max(kMaxOffAxisRange_m, fully_visible_m[static_cast<size_t>(ray)]);
+    const double from_m = overhung_from_m[static_cast<size_t>(ray)];
     for (int bin = 0; bin < grid.numBins() && grid.range_m(bin) > from_m; ++bin) {
       (*free_fraction)[grid.index(ray, bin)] = 0.0F;
     }
@@ -228,6 +231,7 @@ CameraObstacles ObstacleDetector::detect(const RangeMap& map) const {
   result.origin_m = self.position.head<2>().cast<double>();
   result.camera_height_m = self.position.z();
   result.free_to_m = self.free_to_m;
+  result.overhung_from_m = self.overhung_from_m;
   result.ground = fitGroundPlane(self.collectGround(map), self.options.ground);
   GroundEvidence evidence(self.grid);
   const PolarPoints points = self.collectPoints(map, result.ground, &evidence);
@@ -235,6 +239,7 @@ CameraObstacles ObstacleDetector::detect(const RangeMap& map) const {
   self.dropOverhungGround(&result.free_fraction);
   result.hidden_fraction = self.fractionOf(evidence.hidden.finish());
   result.unknown_fraction = self.fractionOf(evidence.unknown.finish());
+  result.expected_ground = self.expected.ground;
   result.obstacles = findPolarObstacles(points, self.expected.obstacle, self.options.min_support);
   for (PolarObstacle& obstacle : result.obstacles) {
     obstacle.is_off_axis =

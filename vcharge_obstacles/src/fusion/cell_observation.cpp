@@ -64,21 +64,34 @@ void CellObserver::bridgeGaps() {
 CellObservation CellObserver::observe(double angle_rad, double range_m, int bin) const {
   const int middle = grid_.rayOf(angle_rad);
   const int spread = static_cast<int>(std::lround(kHalfDiagonal * cell_m_ / range_m / grid_.increment_rad()));
+  // Close to the camera, a cell covers several bins.
+  const auto binAt = [&](double at_m) { return grid_.binOfInverse(static_cast<float>(1.0 / at_m)); };
+  const double reach_m = 0.5 * (cell_m_ - grid_.binWidth() * range_m * range_m);
+  const int first = reach_m > 0.0 ? std::max(0, binAt(range_m + reach_m)) : bin;
+  const int last =
+      reach_m > 0.0 && reach_m < range_m ? std::min(grid_.numBins() - 1, binAt(range_m - reach_m)) : bin;
   CellObservation cell;
+  double pixels = 0.0;
+  const bool is_uniform = seen_.expected_ground.empty();
   for (int step = middle - spread; step <= middle + spread; ++step) {
     const int ray = grid_.wrap(step);
-    const size_t index = grid_.index(ray, bin);
-    cell.free_fraction += seen_.free_fraction[index];
-    cell.hidden_fraction += seen_.hidden_fraction[index];
-    cell.unknown_fraction += seen_.unknown_fraction[index];
-    cell.changed_fraction += seen_.changed_fraction.empty() ? 0.0 : seen_.changed_fraction[index];
     cell.blocked = cell.blocked || blocks(ray, range_m);
+    for (int each = first; each <= last; ++each) {
+      const size_t index = grid_.index(ray, each);
+      // The detector's fractions have one additional pixel in each denominator; here one is enough for all.
+      const double expected = is_uniform ? 0.0 : seen_.expected_ground[index];
+      pixels += is_uniform ? 1.0 : expected;
+      cell.free_fraction += (expected + 1.0) * seen_.free_fraction[index];
+      cell.hidden_fraction += (expected + 1.0) * seen_.hidden_fraction[index];
+      cell.unknown_fraction += (expected + 1.0) * seen_.unknown_fraction[index];
+      cell.changed_fraction += seen_.changed_fraction.empty() ? 0.0 : seen_.changed_fraction[index];
+    }
   }
-  const int count = 2 * spread + 1;
-  cell.free_fraction /= count;
-  cell.hidden_fraction /= count;
-  cell.unknown_fraction /= count;
-  cell.changed_fraction /= count;
+  const double inverse = 1.0 / (is_uniform ? pixels : pixels + 1.0);
+  cell.free_fraction *= inverse;
+  cell.hidden_fraction *= inverse;
+  cell.unknown_fraction *= inverse;
+  cell.changed_fraction /= (2 * spread + 1) * (last - first + 1);
   return cell;
 }
 

@@ -53,22 +53,35 @@ LocalObstacleMap::LocalObstacleMap(const LocalObstacleMapOptions& options)
       cells_(2 * static_cast<int>(std::lround(options.half_size_m / options.cell_size_m)),
              options.cell_size_m) {}
 
-void LocalObstacleMap::decay(double travelled_m) {
+void LocalObstacleMap::decay(double travelled_m, const RigidTransform& fixed_from_vehicle,
+                             const GroundArea& is_hidden) {
   const auto keep_occupied = static_cast<float>(std::exp(-travelled_m / options_.decay_occupied_m));
   const auto keep_free = static_cast<float>(std::exp(-travelled_m / options_.decay_free_m));
-  for (Cell& cell : cells_.cells()) {
-    cell.log_odds *= cell.log_odds > 0.0F ? keep_occupied : keep_free;
+  const RigidTransform vehicle_from_fixed = fixed_from_vehicle.inverse();
+  const double cell_m = options_.cell_size_m;
+  for (int64_t y = cells_.firstY(); y < cells_.firstY() + cells_.size(); ++y) {
+    for (int64_t x = cells_.firstX(); x < cells_.firstX() + cells_.size(); ++x) {
+      Cell& cell = cells_.at(x, y);
+      if (cell.log_odds > 0.0F) {
+        cell.log_odds *= keep_occupied;
+      } else if (cell.log_odds < 0.0F &&
+                 !(is_hidden &&
+                   is_hidden(transformed(vehicle_from_fixed, {(x + 0.5) * cell_m, (y + 0.5) * cell_m})))) {
+        cell.log_odds *= keep_free;
+      }
+    }
   }
 }
 
-void LocalObstacleMap::moveTo(Timestamp stamp, const RigidTransform& fixed_from_vehicle) {
+void LocalObstacleMap::moveTo(Timestamp stamp, const RigidTransform& fixed_from_vehicle,
+                              const GroundArea& is_hidden) {
   const RigidTransform level = levelled(fixed_from_vehicle);
   const int64_t first_x = cells_.indexOf(level.translation().x()) - cells_.size() / 2;
   const int64_t first_y = cells_.indexOf(level.translation().y()) - cells_.size() / 2;
   if (has_pose_) {
     const double travelled_m = (level.translation() - fixed_from_vehicle_.translation()).norm();
     if (travelled_m > 0.0) {
-      decay(travelled_m);
+      decay(travelled_m, level, is_hidden);
       travel_direction_ = (level.translation() - fixed_from_vehicle_.translation()).head<2>().normalized();
       travel_m_ += travelled_m;
     }
@@ -299,8 +312,7 @@ void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid&
   }
 }
 
-void LocalObstacleMap::forgetFree(
-    const std::function<bool(const Eigen::Vector2d& point_in_vehicle_m)>& is_unwatched) {
+void LocalObstacleMap::forgetFree(const GroundArea& is_unwatched) {
   const RigidTransform vehicle_from_fixed = fixed_from_vehicle_.inverse();
   const double cell_m = options_.cell_size_m;
   for (int64_t y = cells_.firstY(); y < cells_.firstY() + cells_.size(); ++y) {
@@ -312,6 +324,10 @@ void LocalObstacleMap::forgetFree(
       }
     }
   }
+}
+
+void LocalObstacleMap::forgetAround(const Eigen::Vector2d& point_m, Timestamp stamp) {
+  hold(cells_.indexOf(point_m.x()), cells_.indexOf(point_m.y()), options_.changed_margin_m, stamp);
 }
 
 int8_t LocalObstacleMap::stateOf(const Cell& cell) const {
@@ -363,33 +379,6 @@ void LocalObstacleMap::reanchor(const RigidTransform& new_from_old_fixed) {
     moved.last_camera_position_[name] = transformed(new_from_old, position);
   }
   *this = moved;
-}
-
-ObstacleMap LocalObstacleMap::snapshot() const {
-  ObstacleMap map = ObstacleMap::unobserved({cells_.size(), cells_.size()}, options_.cell_size_m);
-  map.stamp = stamp_;
-  map.fixed_from_vehicle = fixed_from_vehicle_;
-  map.origin_m = options_.cell_size_m *
-                 Eigen::Vector2d(static_cast<double>(cells_.firstX()), static_cast<double>(cells_.firstY()));
-  const auto cell_m = static_cast<float>(options_.cell_size_m);
-  cells_.forEach([&](int64_t x, int64_t y, const Cell& cell) {
-    if (cell.last_seen_ns == kNever) {
-      return;
-    }
-    const cv::Point at(static_cast<int>(x - cells_.firstX()), static_cast<int>(y - cells_.firstY()));
-    map.age_s.at<float>(at) =
-        static_cast<float>(static_cast<double>(stamp_.nanoseconds() - cell.last_seen_ns) * 1e-9);
-    map.state.at<int8_t>(at) = stateOf(cell);
-    if (map.state.at<int8_t>(at) == kCellOccupied) {
-      const auto drift_m = static_cast<float>((travel_m_ - cell.travel_m) * options_.odometry_sigma_m_per_m);
-      map.point_m.at<cv::Vec2f>(at) = {static_cast<float>(at.x) * cell_m + cell.x_m,
-                                       static_cast<float>(at.y) * cell_m + cell.y_m};
-      map.point_sigma_m.at<float>(at) = std::hypot(cell.sigma_m, drift_m);
-      map.height_m.at<float>(at) = cell.height_m;
-      map.height_sigma_m.at<float>(at) = cell.height_sigma_m;
-    }
-  });
-  return map;
 }
 
 }  // namespace vcharge

@@ -5,6 +5,9 @@
 #include <utility>
 
 #include "corridor/path_curvature.h"
+#include "fusion/ground_evidence.h"
+#include "fusion/hidden_ground.h"
+#include "ground/standing_watch.h"
 #include "liveness/silent_cameras.h"
 #include "steps/near_heights.h"
 #include "vcharge_core/base/error.h"
@@ -77,7 +80,9 @@ ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const Obsta
   assembler_ = std::make_unique<FrameAssembler<Observation>>(
       cameras_.size(), options_.frames, [this](Frame frame) { process(std::move(frame)); },
       [this](DriveBreak drive_break, Timestamp stamp) { startOver(drive_break, stamp); }, is_used);
+  hidden_ = std::make_unique<const HiddenGround>(*rig_, is_used, options_.detector.vehicleOutline());
   silent_ = std::make_unique<SilentCameras>(rig_, is_used, options_.map.free_range_m);
+  standing_ = std::make_unique<StandingWatch>(rig_, grid_, options_.map.free_range_m, options_.watch);
   // Range maps take long to compute: a replay must give the same map however long that is.
   assembler_->ignoreCorrections();
 }
@@ -90,6 +95,7 @@ void ObstacleMapper::startOver(DriveBreak drive_break, Timestamp stamp) {
   map_ = LocalObstacleMap(options_.map);
   steps_ = StepMapper(options_.detector.vehicleOutline(), options_.steps);
   curvature_->clear();
+  standing_->clear();
   objects_.clear();
   last_fused_.reset();
   if (drive_break == DriveBreak::kReplay) {
@@ -120,6 +126,12 @@ void ObstacleMapper::noteImage(size_t camera_index, Timestamp stamp, uint64_t fi
                     odometry ? std::optional<Timestamp>(odometry->stamp) : std::nullopt);
 }
 
+void ObstacleMapper::addImage(size_t camera_index, Timestamp stamp, uint64_t fingerprint,
+                              const std::function<cv::Mat()>& pixels) {
+  noteImage(camera_index, stamp, fingerprint);
+  standing_->addImage(camera_index, stamp, pixels);
+}
+
 std::optional<RigidTransform> ObstacleMapper::odomFromVehicle(Timestamp stamp) const {
   const OdometryBuffer::Lookup pose = assembler_->odometry().lookup(stamp);
   return pose ? std::optional<RigidTransform>(pose.odometry.odom_from_vehicle) : std::nullopt;
@@ -128,6 +140,10 @@ std::optional<RigidTransform> ObstacleMapper::odomFromVehicle(Timestamp stamp) c
 /// Judges the images that the odometry has reached.
 void ObstacleMapper::settleImages(Timestamp until) {
   silent_->settle(until, [this](Timestamp stamp) { return odomFromVehicle(stamp); });
+  standing_->settle(until, [this](Timestamp stamp) {
+    const OdometryBuffer::Lookup found = assembler_->odometry().lookup(stamp);
+    return found ? std::optional<VehicleOdometry>(found.odometry) : std::nullopt;
+  });
 }
 
 void ObstacleMapper::forgetUnwatched(Timestamp stamp, LocalObstacleMap* map) const {
@@ -179,6 +195,7 @@ void ObstacleMapper::addRangeMap(const RangeMap& map) {
                                                   options_.map.free_range_m, options_.watch);
     camera->heights = std::make_unique<NearHeights>(working, *rig_camera.vehicle_from_camera,
                                                     options_.detector.vehicleOutline(), StepMapper::kReach_m);
+    standing_->setCamera(camera->index, working);
     camera->size = map.range_m.size();
     camera->parameters = map.camera.parameters();
   }
@@ -233,6 +250,15 @@ void ObstacleMapper::noteWithoutPose(const Frame& frame) {
   }
 }
 
+void ObstacleMapper::moveTo(Timestamp stamp, const RigidTransform& fixed_from_vehicle,
+                            LocalObstacleMap* map) const {
+  // A camera that was silent has seen the ground around the earlier pose and around this one.
+  forgetUnwatched(stamp, map);
+  map->moveTo(stamp, fixed_from_vehicle,
+              [this](const Eigen::Vector2d& point_m) { return hidden_->contains(point_m); });
+  forgetUnwatched(stamp, map);
+}
+
 void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle) {
   settleImages(frame->stamp);
   for (const std::unique_ptr<Camera>& camera : cameras_) {
@@ -240,11 +266,10 @@ void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle
       silent_->addRangeMap(camera->index, frame->stamp);
     }
   }
-  // A camera that was silent has seen the ground around the earlier pose and around this one.
-  forgetUnwatched(frame->stamp, &map_);
-  map_.moveTo(frame->stamp, fixed_from_vehicle);
+  moveTo(frame->stamp, fixed_from_vehicle, &map_);
   steps_.moveTo(frame->stamp, fixed_from_vehicle);
-  forgetUnwatched(frame->stamp, &map_);
+  standing_->forgetChanged(frame->stamp, anchor_, &map_);
+  standing_->dropChanges(frame->stamp);
   last_fused_ = frame->stamp;
   std::vector<const CameraObstacles*> cameras;
   for (const std::unique_ptr<Camera>& camera : cameras_) {
@@ -254,8 +279,8 @@ void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle
     }
     auto& [obstacles, heights, reference] = frame->images[camera->index];
     if (!reference.empty()) {
-      obstacles.changed_fraction =
-          camera->watch->compare(frame->stamp, reference, obstacles.ground, fixed_from_vehicle);
+      addAppearance(camera->watch->compare(frame->stamp, reference, obstacles.ground, fixed_from_vehicle),
+                    grid_, &obstacles);
     }
     map_.add(obstacles, grid_, fixed_from_vehicle);
     steps_.add(heights);
@@ -315,9 +340,8 @@ void ObstacleMapper::emitWhenSilent() {
 void ObstacleMapper::emitAt(Timestamp stamp) {
   if (const std::optional<RigidTransform> fixed_from_vehicle = fixedFromVehicle(odomFromVehicle(stamp))) {
     LocalObstacleMap moved = map_;
-    forgetUnwatched(stamp, &moved);
-    moved.moveTo(stamp, *fixed_from_vehicle);
-    forgetUnwatched(stamp, &moved);
+    moveTo(stamp, *fixed_from_vehicle, &moved);
+    standing_->forgetChanged(stamp, anchor_, &moved);
     StepMapper moved_steps = steps_;
     moved_steps.moveTo(stamp, *fixed_from_vehicle);
     emit(moved, moved_steps, {});

@@ -3,34 +3,28 @@
 #include <algorithm>
 #include <cmath>
 
-#include <opencv2/imgproc.hpp>
-
-#include "detection/pixel_rays.h"
+#include "ground/ground_match.h"
 #include "vcharge_core/base/error.h"
-#include "vcharge_core/frames/bilinear_sample.h"
 
 namespace vcharge {
 namespace {
 
-// Images are smoothed over this window before they are compared.
-constexpr int kSmoothing_px = 3;
-// Tolerated error of the warp.
-constexpr int kSlack_px = 1;
-// Desired age of the image that is compared with the current one; the nearest up to the maximum is used.
+// Desired age of the image with which changes are found; the nearest up to the maximum is used.
 constexpr double kInterval_s = 0.24;
 constexpr double kMaxInterval_s = 1.0;
-// Differences below this fraction of the brightness are noise.
-constexpr float kRelativeDifference = 0.05F;
-// The gain between two images is estimated from at least this number of pixels of this brightness or more.
-constexpr size_t kMinCompared = 200;
-constexpr float kMinBrightness = 8.0F;
-
-/// An image to compare later images with.
-struct View {
-  Timestamp stamp;
-  RigidTransform fixed_from_body;
-  cv::Mat smooth, lowest, highest;  // extremes within the slack
+// Images are kept for this time.
+constexpr double kMaxAge_s = 3.0;
+// Nearest ground that is compared.
+constexpr double kNearest_m = 0.3;
+// Range up to which the ground is decided with an image at a distance.
+struct Band {
+  double far_m, baseline_m;
 };
+constexpr Band kBands[] = {{1.6, 0.2}, {2.6, 0.3}, {1000.0, 0.6}};
+// Weight of a pixel that does not show the ground, relative to one that does.
+constexpr float kOtherWeight = 2.0F;
+// Distances of an image, relative to the desired one, with which it is used.
+constexpr double kLeastBaseline = 0.6, kLargestBaseline = 1.6;
 
 /// Pose of the tilted body over level ground.
 RigidTransform levelFromBody(const GroundPlane& ground) {
@@ -40,59 +34,48 @@ RigidTransform levelFromBody(const GroundPlane& ground) {
   return RigidTransform(rotation, Eigen::Vector3d(0.0, 0.0, -ground.offset_m / normal.norm()));
 }
 
-/// Brightness of a pixel now, and of the same ground in the earlier image.
-struct Comparison {
-  size_t ray;
-  float from_inverse, to_inverse;  // strip of ground that the pixel covers, as inverse ranges
-  float now, before, lowest, highest;
-};
-
 }  // namespace
 
 struct GroundWatch::Implementation {
   Implementation(const WorkingCamera& camera, const RigidTransform& body_from_camera,
-                 const PolarGrid& polar_grid, double furthest_m, const GroundWatchOptions& watch_options)
-      : options((watch_options.validate(), watch_options)),
-        max_distance_m(furthest_m),
+                 const PolarGrid& polar_grid, double furthest_m, const GroundWatchOptions& options)
+      : max_distance_m(furthest_m),
         grid(polar_grid),
-        model(camera.model()),
         vehicle_from_camera(body_from_camera),
         size(camera.size()),
-        rays(camera, body_from_camera, grid) {
-    // Smoothing and slack must not reach invalid pixels.
-    const int reach = 2 * (kSmoothing_px / 2 + kSlack_px) + 3;
-    cv::erode(camera.validMask(), valid, cv::Mat::ones(reach, reach, CV_8U), cv::Point(-1, -1), 1,
-              cv::BORDER_CONSTANT, cv::Scalar(0));
-  }
+        rays(camera, body_from_camera, grid),
+        match(camera, body_from_camera, rays, options.min_difference) {}
 
-  View makeView(Timestamp stamp, const cv::Mat& image, const RigidTransform& fixed_from_body) const {
-    View view{stamp, fixed_from_body, {}, {}, {}};
-    cv::blur(image, view.smooth, cv::Size(kSmoothing_px, kSmoothing_px));
-    constexpr int side = 2 * kSlack_px + 1;
-    const cv::Mat window = cv::Mat::ones(side, side, CV_8U);
-    cv::erode(view.smooth, view.lowest, window);
-    cv::dilate(view.smooth, view.highest, window);
-    return view;
+  void checkImage(const cv::Mat& image) const {
+    check(image.type() == CV_8UC1 && image.size() == size,
+          "GroundWatch: expected CV_8UC1 images of the camera's size");
   }
-  const View* viewBefore(Timestamp stamp) const;
-  std::vector<Comparison> comparePixels(const View& now, const View& before, const GroundPlane& ground) const;
-  std::vector<float> changedFraction(const std::vector<Comparison>& pixels) const;
+  /// Adds the current view and drops old ones.
+  void addView(Timestamp stamp, const cv::Mat& image, const RigidTransform& fixed_from_body) {
+    checkImage(image);
+    while (!views.empty() && toSeconds(stamp - views.front().stamp) > kMaxAge_s) {
+      views.pop_front();
+    }
+    views.emplace_back(stamp, image, fixed_from_body);
+  }
+  const GroundView* viewBefore(Timestamp stamp) const;
+  const GroundView* viewAt(double baseline_m) const;
+  std::vector<float> changedFraction(const GroundView& before, const GroundPlane& ground) const;
+  std::vector<float> groundPixels(const GroundPlane& ground) const;
 
-  const GroundWatchOptions options;
   const double max_distance_m;
   const PolarGrid grid;
-  const MeiCamera model;
   const RigidTransform vehicle_from_camera;
   const cv::Size size;
   const PixelRays rays;
-  cv::Mat valid;
-  std::deque<View> views;
+  const GroundMatch match;
+  std::deque<GroundView> views;  // the last one is the current one
 };
 
 /// The view whose age is nearest to the interval; null if there is none.
-const View* GroundWatch::Implementation::viewBefore(Timestamp stamp) const {
-  const View* best = nullptr;
-  for (const View& view : views) {
+const GroundView* GroundWatch::Implementation::viewBefore(Timestamp stamp) const {
+  const GroundView* best = nullptr;
+  for (const GroundView& view : views) {
     const double age_s = toSeconds(stamp - view.stamp);
     const bool is_better = best == nullptr || std::abs(age_s - kInterval_s) <
                                                   std::abs(toSeconds(stamp - best->stamp) - kInterval_s);
@@ -103,80 +86,35 @@ const View* GroundWatch::Implementation::viewBefore(Timestamp stamp) const {
   return best;
 }
 
-std::vector<Comparison> GroundWatch::Implementation::comparePixels(const View& now, const View& before,
-                                                                   const GroundPlane& ground) const {
-  const RigidTransform before_from_now =
-      (before.fixed_from_body * vehicle_from_camera).inverse() * now.fixed_from_body;
-  const Eigen::Matrix3f rotation = before_from_now.rotationMatrix().cast<float>();
-  const Eigen::Vector3f translation = before_from_now.translation().cast<float>();
-  const Eigen::Vector3f camera = vehicle_from_camera.translation().cast<float>();
-  const auto slope_x = static_cast<float>(ground.slope.x());
-  const auto slope_y = static_cast<float>(ground.slope.y());
-  const float height =
-      camera.z() - static_cast<float>(ground.offset_m) - slope_x * camera.x() - slope_y * camera.y();
-  const auto xi = static_cast<float>(model.xi());
-  const auto max_distance = static_cast<float>(max_distance_m);
-  // The detector's default min_height_m: a pixel covers the strip where its ray is lower than this.
-  constexpr float kLow_m = 0.08F;
-  std::vector<Comparison> pixels;
-  pixels.reserve(rays.size() / 2);
-  for (size_t i = 0; i < rays.size(); ++i) {
-    const float fall = slope_x * rays.x[i] + slope_y * rays.y[i] - rays.z[i];
-    if (fall * max_distance <= height * rays.horizontal[i] || valid.data[rays.pixel[i]] == 0) {
-      continue;
+/// The earlier view whose distance from the current one is nearest to the baseline; null if none is near.
+const GroundView* GroundWatch::Implementation::viewAt(double baseline_m) const {
+  const GroundView* best = nullptr;
+  double best_ratio = 0.0;
+  const Eigen::Vector3d here = views.back().fixed_from_body * vehicle_from_camera.translation();
+  for (const GroundView& view : views) {
+    const double ratio =
+        (view.fixed_from_body * vehicle_from_camera.translation() - here).norm() / baseline_m;
+    if (ratio >= kLeastBaseline && ratio <= kLargestBaseline &&
+        (best == nullptr || std::abs(ratio - 1.0) <= std::abs(best_ratio - 1.0))) {
+      best = &view;
+      best_ratio = ratio;
     }
-    const float range = height / fall;
-    const Eigen::Vector3f point =
-        rotation * (camera + range * Eigen::Vector3f(rays.x[i], rays.y[i], rays.z[i])) + translation;
-    const float denominator = point.z() + xi * point.norm();
-    if (denominator <= 0.1F) {
-      continue;
-    }
-    const float u =
-        static_cast<float>(model.gamma1()) * point.x() / denominator + static_cast<float>(model.u0());
-    const float v =
-        static_cast<float>(model.gamma2()) * point.y() / denominator + static_cast<float>(model.v0());
-    if (!(u >= 1.0F && v >= 1.0F && u < static_cast<float>(size.width - 2) &&
-          v < static_cast<float>(size.height - 2))) {
-      continue;
-    }
-    const int nearest = static_cast<int>(std::lround(v)) * size.width + static_cast<int>(std::lround(u));
-    if (valid.data[nearest] == 0) {
-      continue;
-    }
-    const float inverse = 1.0F / (range * rays.horizontal[i]);
-    pixels.push_back({i, inverse, inverse * height / (height - kLow_m),
-                      static_cast<float>(now.smooth.data[rays.pixel[i]]), bilinearSample(before.smooth, u, v),
-                      static_cast<float>(before.lowest.data[nearest]),
-                      static_cast<float>(before.highest.data[nearest])});
   }
-  return pixels;
+  return best;
 }
 
-std::vector<float> GroundWatch::Implementation::changedFraction(const std::vector<Comparison>& pixels) const {
-  // The exposure may have changed. Most of the ground has not, so the median ratio is the gain.
-  std::vector<float> ratios;
-  ratios.reserve(pixels.size());
-  for (const Comparison& pixel : pixels) {
-    if (std::min(pixel.now, pixel.before) >= kMinBrightness) {
-      ratios.push_back(pixel.now / pixel.before);
-    }
-  }
-  if (ratios.size() < kMinCompared) {
+std::vector<float> GroundWatch::Implementation::changedFraction(const GroundView& before,
+                                                                const GroundPlane& ground) const {
+  const std::vector<MatchedPixel> pixels =
+      match.compare(views.back(), before, ground, kNearest_m, max_distance_m);
+  if (pixels.empty()) {
     return {};
   }
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  const float gain = *middle;
   StripSum changed(grid), compared(grid);
-  for (const Comparison& pixel : pixels) {
-    const auto tolerance = static_cast<float>(options.min_difference) + kRelativeDifference * pixel.now;
-    const bool differs =
-        pixel.now < gain * pixel.lowest - tolerance || pixel.now > gain * pixel.highest + tolerance;
-    const int ray = rays.polar_ray[pixel.ray];
-    compared.add(ray, pixel.from_inverse, pixel.to_inverse, 1.0F);
-    if (differs) {
-      changed.add(ray, pixel.from_inverse, pixel.to_inverse, 1.0F);
+  for (const MatchedPixel& pixel : pixels) {
+    compared.add(rays.polar_ray[pixel.ray], pixel.from_inverse, pixel.to_inverse, 1.0F);
+    if (pixel.is_changed) {
+      changed.add(rays.polar_ray[pixel.ray], pixel.from_inverse, pixel.to_inverse, 1.0F);
     }
   }
   std::vector<float> fraction = changed.finish();
@@ -187,31 +125,82 @@ std::vector<float> GroundWatch::Implementation::changedFraction(const std::vecto
   return fraction;
 }
 
+std::vector<float> GroundWatch::Implementation::groundPixels(const GroundPlane& ground) const {
+  StripSum shown(grid), other(grid), compared(grid);
+  double near_m = kNearest_m;
+  for (const Band& band : kBands) {
+    const GroundView* before = viewAt(band.baseline_m);
+    const double far_m = std::min(band.far_m, max_distance_m);
+    if (before != nullptr && far_m > near_m) {
+      for (const MatchedPixel& pixel : match.compare(views.back(), *before, ground, near_m, far_m)) {
+        const int ray = rays.polar_ray[pixel.ray];
+        compared.add(ray, pixel.from_inverse, pixel.to_inverse, 1.0F);
+        if (pixel.is_ground) {
+          shown.add(ray, pixel.from_inverse, pixel.to_inverse, 1.0F);
+        } else if (pixel.is_other || pixel.is_changed) {
+          other.add(ray, pixel.from_inverse, pixel.to_inverse, 1.0F);
+        }
+      }
+    }
+    near_m = far_m;
+  }
+  std::vector<float> ground_pixels = shown.finish();
+  const std::vector<float> others = other.finish(), all = compared.finish();
+  for (size_t i = 0; i < ground_pixels.size(); ++i) {
+    // Pixels that do not decide lie between ones that do: they are ground too, but no more than those.
+    const float between = std::max(0.0F, all[i] - ground_pixels[i] - others[i]);
+    ground_pixels[i] += std::min(between, ground_pixels[i]);
+    ground_pixels[i] = std::max(0.0F, ground_pixels[i] - kOtherWeight * others[i]);
+  }
+  return ground_pixels;
+}
+
 GroundWatch::GroundWatch(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera,
                          const PolarGrid& grid, double max_distance_m, const GroundWatchOptions& options)
-    : implementation_(
-          std::make_unique<Implementation>(camera, vehicle_from_camera, grid, max_distance_m, options)) {}
+    : implementation_(std::make_unique<Implementation>(camera, vehicle_from_camera, grid, max_distance_m,
+                                                       (options.validate(), options))) {}
 
 GroundWatch::~GroundWatch() = default;
 
-std::vector<float> GroundWatch::compare(Timestamp stamp, const cv::Mat& image, const GroundPlane& ground,
-                                        const RigidTransform& fixed_from_vehicle) {
+GroundAppearance GroundWatch::compare(Timestamp stamp, const cv::Mat& image, const GroundPlane& ground,
+                                      const RigidTransform& fixed_from_vehicle) {
   Implementation& self = *implementation_;
-  check(image.type() == CV_8UC1 && image.size() == self.size,
-        "GroundWatch: expected CV_8UC1 images of the camera's size");
+  self.checkImage(image);
   if (ground.state == GroundState::kOutOfBounds) {
     return {};
-  }
-  while (!self.views.empty() && toSeconds(stamp - self.views.front().stamp) > kMaxInterval_s) {
-    self.views.pop_front();
   }
   const RigidTransform planar =
       RigidTransform::planar(fixed_from_vehicle.translation().x(), fixed_from_vehicle.translation().y(),
                              yawOfRotation(fixed_from_vehicle.rotation()));
-  self.views.push_back(self.makeView(stamp, image, planar * levelFromBody(ground)));
-  const View* before = self.viewBefore(stamp);
-  return before == nullptr ? std::vector<float>()
-                           : self.changedFraction(self.comparePixels(self.views.back(), *before, ground));
+  self.addView(stamp, image, planar * levelFromBody(ground));
+  GroundAppearance appearance;
+  if (const GroundView* before = self.viewBefore(stamp)) {
+    appearance.changed_fraction = self.changedFraction(*before, ground);
+  }
+  if (ground.state == GroundState::kMeasured) {
+    appearance.ground_pixels = self.groundPixels(ground);
+  }
+  return appearance;
+}
+
+std::vector<float> GroundWatch::compareStanding(Timestamp stamp, const cv::Mat& image) {
+  Implementation& self = *implementation_;
+  self.addView(stamp, image, RigidTransform());
+  const GroundView* before = self.viewBefore(stamp);
+  if (before == nullptr) {
+    return {};
+  }
+  const GroundPlane level;
+  std::vector<float> changed = self.changedFraction(*before, level);
+  const GroundView& oldest = self.views.front();
+  if (&oldest == before || changed.empty()) {
+    return changed;
+  }
+  const std::vector<float> slowly = self.changedFraction(oldest, level);
+  for (size_t i = 0; i < slowly.size(); ++i) {
+    changed[i] = std::max(changed[i], slowly[i]);
+  }
+  return changed;
 }
 
 void GroundWatch::clear() {

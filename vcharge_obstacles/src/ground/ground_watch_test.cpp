@@ -1,5 +1,6 @@
 #include "vcharge_obstacles/ground_watch.h"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -77,12 +78,15 @@ class GroundWatchTest : public ::testing::Test {
     watch_.clear();
     GroundPlane level;
     level.state = GroundState::kMeasured;
-    EXPECT_TRUE(
-        watch_.compare(Timestamp(), takeImage(first, poseAt(0.0, 0.0)), level, poseAt(0.0, 0.0)).empty());
+    EXPECT_TRUE(watch_.compare(Timestamp(), takeImage(first, poseAt(0.0, 0.0)), level, poseAt(0.0, 0.0))
+                    .changed_fraction.empty());
     GroundPlane tilted = level;
     tilted.slope.x() = std::tan(pitch_rad);
-    return watch_.compare(Timestamp() + durationFromSeconds(kStep_s),
-                          takeImage(second, poseAt(0.2, pitch_rad)), tilted, poseAt(0.2, 0.0));
+    const GroundAppearance appearance =
+        watch_.compare(Timestamp() + durationFromSeconds(kStep_s), takeImage(second, poseAt(0.2, pitch_rad)),
+                       tilted, poseAt(0.2, 0.0));
+    ground_pixels_ = appearance.ground_pixels;
+    return appearance.changed_fraction;
   }
   static RigidTransform poseAt(double x_m, double pitch_rad) {
     return RigidTransform(rotationFromYawPitchRoll(0.0, pitch_rad, 0.0), Eigen::Vector3d(x_m, 0.0, 0.0));
@@ -112,6 +116,7 @@ class GroundWatchTest : public ::testing::Test {
   const WorkingCamera working_;
   GroundWatch watch_;
   const Pattern ground_{110.0, 1}, box_{60.0, 2};
+  std::vector<float> ground_pixels_;  // of the last comparison
   double gain_ = 1.0;
   std::mt19937 generator_{3};
   std::normal_distribution<double> noise_{0.0, 2.0};
@@ -146,8 +151,10 @@ TEST_F(GroundWatchTest, ChangeOfExposureIsNoChangeOfTheGround) {
   level.state = GroundState::kMeasured;
   watch_.compare(Timestamp(), takeImage({}, poseAt(0.0, 0.0)), level, poseAt(0.0, 0.0));
   gain_ = 1.3;
-  EXPECT_LT(meanFraction(watch_.compare(Timestamp() + durationFromSeconds(kStep_s),
-                                        takeImage({}, poseAt(0.2, 0.0)), level, poseAt(0.2, 0.0))),
+  EXPECT_LT(meanFraction(watch_
+                             .compare(Timestamp() + durationFromSeconds(kStep_s),
+                                      takeImage({}, poseAt(0.2, 0.0)), level, poseAt(0.2, 0.0))
+                             .changed_fraction),
             0.02);
 }
 
@@ -155,14 +162,52 @@ TEST_F(GroundWatchTest, MeasuredPitchIsNoChangeOfTheGround) {
   EXPECT_LT(meanFraction(compare({}, {}, 1.0 * kDegree)), 0.02);
 }
 
+TEST_F(GroundWatchTest, TexturedGroundIsKnownWithoutRanges) {
+  compare({}, {});
+  for (const double y : {2.0, 2.4}) {
+    EXPECT_GT(fractionAt(ground_pixels_, 2.2, y), 1.0) << y;
+  }
+}
+
+TEST_F(GroundWatchTest, StaticObstacleIsNoGround) {
+  // Rays to the ground at these points meet the box 0.2 m and more above the ground; lower, it may pass for
+  // ground.
+  const BoxWorld box{{{{1.2, 1.9, 0.0}, {3.6, 2.9, 0.3}}}};
+  compare(box, box);
+  for (const double y : {2.2, 2.3, 2.5, 2.6}) {
+    EXPECT_EQ(fractionAt(ground_pixels_, 2.2, y), 0.0) << y;
+  }
+}
+
+TEST_F(GroundWatchTest, GroundIsUndecidedWithoutMotionOrTexture) {
+  GroundPlane level;
+  level.state = GroundState::kMeasured;
+  const auto none = [](const GroundAppearance& appearance) {
+    return std::all_of(appearance.ground_pixels.begin(), appearance.ground_pixels.end(),
+                       [](float pixels) { return pixels == 0.0F; });
+  };
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_TRUE(none(watch_.compare(Timestamp() + durationFromSeconds(kStep_s * i),
+                                    takeImage({}, poseAt(0.0, 0.0)), level, RigidTransform())));
+  }
+  watch_.clear();
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_TRUE(
+        none(watch_.compare(Timestamp() + durationFromSeconds(kStep_s * i),
+                            cv::Mat(working_.size(), CV_8UC1, cv::Scalar(90)), level, poseAt(0.2 * i, 0.0))));
+  }
+}
+
 TEST_F(GroundWatchTest, ImagesTooFarApartAreNotCompared) {
   GroundPlane level;
   level.state = GroundState::kMeasured;
   const cv::Mat image = takeImage({}, poseAt(0.0, 0.0));
   watch_.compare(Timestamp(), image, level, RigidTransform());
-  EXPECT_TRUE(watch_.compare(Timestamp() + durationFromSeconds(1.5), image, level, RigidTransform()).empty());
+  EXPECT_TRUE(watch_.compare(Timestamp() + durationFromSeconds(1.5), image, level, RigidTransform())
+                  .changed_fraction.empty());
   level.state = GroundState::kOutOfBounds;
-  EXPECT_TRUE(watch_.compare(Timestamp() + durationFromSeconds(1.6), image, level, RigidTransform()).empty());
+  EXPECT_TRUE(watch_.compare(Timestamp() + durationFromSeconds(1.6), image, level, RigidTransform())
+                  .changed_fraction.empty());
   EXPECT_THROW(watch_.compare(Timestamp() + durationFromSeconds(1.7), cv::Mat(10, 10, CV_8UC1), GroundPlane(),
                               RigidTransform()),
                std::logic_error);

@@ -25,8 +25,9 @@ constexpr int kGroundBins = 10;
 constexpr double kMinGround = 0.4;
 // The windows that a contact lies in do not show the ground either: it seems lower by about this.
 constexpr double kReach_px = 1.2;
-// Error of a contact's position in the image, and of the direction of the ground (pitch of the body).
-constexpr double kContactSigma_px = 1.2, kPitchSigma_rad = 0.003;
+// Error of a contact's position in the image, as measured on simulated people (feet swing, shadows move
+// along), and of the direction of the ground (pitch of the body).
+constexpr double kContactSigma_px = 3.0, kPitchSigma_rad = 0.003;
 
 }  // namespace
 

@@ -9,14 +9,19 @@
 namespace vcharge {
 namespace {
 
-// Standard deviation of the acceleration: a person starts and stops within a second.
-constexpr double kAcceleration_m_per_s2 = 1.5;
+// Standard deviation of the acceleration, in a second: a person walks on at much the same speed.
+constexpr double kAcceleration_m_per_s2 = 0.8;
 // Largest squared Mahalanobis distance of a detection (four degrees of freedom, 99.9 %), and largest
 // distance.
 constexpr double kGate = 18.5, kMaxDistance_m = 2.0;
+// Largest squared ratio of a single number to its standard deviation (99.9 %), and least log-odds of an
+// object that is searched in the images.
+constexpr double kSingleGate = 11.0, kFollowed = -1.0;
 // Log-odds of a new object, changes by a detection and by a stamp without one, and their bounds. An object
 // ends at the lower bound.
 constexpr double kNew = -1.8, kHit = 0.9, kMiss = -0.25, kLeast = -2.5, kMost = 3.0;
+// Bounds of the change without a detection.
+constexpr double kLeastChange = -0.6, kMostChange = 0.25;
 // Two objects this near with like velocities are one.
 constexpr double kTwin_m = 0.7, kTwin_m_per_s = 0.8;
 // Part of an object's size that is kept from stamp to stamp: it is not always seen whole.
@@ -26,6 +31,8 @@ constexpr double kKeptSize = 0.97;
 // but stay, and are not detected so many times.
 constexpr double kMovingSigmas = 2.0, kTravel = 3.0;
 constexpr int kManyDetections = 5;
+// An object that stands is reported for this time.
+constexpr double kKeptStanding_s = 2.0;
 constexpr double kPersonRadius_m = 0.25;
 constexpr double kCarWidth_m = 1.8, kCarLength_m = 4.2, kMinCarWidth_m = 1.2;
 constexpr double kChildHeight_m = 1.35;
@@ -132,6 +139,31 @@ void ObjectFilter::update(const std::vector<ObjectDetection>& detections,
   }
 }
 
+std::vector<ObjectFilter::Expected> ObjectFilter::expected() const {
+  std::vector<Expected> result;
+  for (size_t i = 0; i < tracks_.size(); ++i) {
+    const Track& track = tracks_[i];
+    if (track.existence_log_odds >= kFollowed) {
+      result.push_back({i, track.state.head<2>(), track.state.tail<2>(), track.width_m, track.height_m,
+                        track.last_seen == stamp_});
+    }
+  }
+  return result;
+}
+
+bool ObjectFilter::correct(size_t index, double innovation, const Eigen::Vector4d& row, double sigma) {
+  Track& track = tracks_[index];
+  const double variance = row.dot(track.covariance * row) + sigma * sigma;
+  if (innovation * innovation > kSingleGate * variance) {
+    return false;
+  }
+  const Eigen::Vector4d gain = track.covariance * row / variance;
+  const Eigen::Matrix4d rest = Eigen::Matrix4d::Identity() - gain * row.transpose();
+  track.state += innovation * gain;
+  track.covariance = rest * track.covariance * rest.transpose() + sigma * sigma * gain * gain.transpose();
+  return true;
+}
+
 /// Keeps the older one where two objects are one.
 void ObjectFilter::mergeTwins() {
   std::vector<Track> kept;
@@ -153,11 +185,16 @@ void ObjectFilter::finish() {
     const Eigen::Matrix2d covariance = track.start_covariance + track.covariance.topLeftCorner<2, 2>();
     const Eigen::Vector2d velocity = track.state.tail<2>();
     const double variance = velocity.dot(track.covariance.bottomRightCorner<2, 2>() * velocity);
-    const bool travels = velocity.squaredNorm() > kMovingSigmas * std::sqrt(variance) &&
-                         travel_m.dot(covariance.ldlt().solve(travel_m)) > kTravel;
+    const bool is_fast = velocity.squaredNorm() > kMovingSigmas * std::sqrt(variance);
+    const bool travels = is_fast && travel_m.dot(covariance.ldlt().solve(travel_m)) > kTravel;
     track.has_moved = track.has_moved || travels || track.num_detections >= kManyDetections;
     if (track.last_seen < stamp_) {
-      track.existence_log_odds += kMiss;
+      track.existence_log_odds = std::min(
+          kMost, track.existence_log_odds + std::clamp(kMiss + track.votes, kLeastChange, kMostChange));
+    }
+    track.votes = 0.0;
+    if (track.last_seen == stamp_ || is_fast) {
+      track.last_moving = stamp_;
     }
   }
   tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(),
@@ -212,7 +249,8 @@ TrackedObject ObjectFilter::describe(const Track& track) const {
 std::vector<TrackedObject> ObjectFilter::objects() const {
   std::vector<TrackedObject> found;
   for (const Track& track : tracks_) {
-    if (track.existence_log_odds >= 0.0 && track.has_moved) {
+    if (track.existence_log_odds >= 0.0 && track.has_moved &&
+        toSeconds(stamp_ - track.last_moving) < kKeptStanding_s) {
       found.push_back(describe(track));
     }
   }

@@ -21,6 +21,21 @@ class ObjectFilter {
   void predict(Timestamp stamp);
   /// Adds the detections of one camera at that stamp.
   void update(const std::vector<ObjectDetection>& detections, const RigidTransform& fixed_from_vehicle);
+  /// An object as it is expected at this stamp, in the fixed frame.
+  struct Expected {
+    size_t index = 0;  ///< until finish()
+    Eigen::Vector2d position_m, velocity_m_per_s;
+    double width_m = 0.0, height_m = 0.0;
+    bool is_detected = false;  ///< by a camera, at this stamp
+  };
+  /// Objects that are probable enough to be searched in the images.
+  std::vector<Expected> expected() const;
+  /// Corrects an object by a measured number: its difference from the expected one, its derivative by
+  /// position and velocity, and its standard deviation. False, and not used, if it contradicts what is
+  /// expected.
+  bool correct(size_t index, double innovation, const Eigen::Vector4d& row, double sigma);
+  /// Adds log-odds to the existence of an object that no camera detects at this stamp.
+  void vote(size_t index, double log_odds) { tracks_[index].votes += log_odds; }
   /// Ends the stamp: objects that no camera has detected become less probable, and some end.
   void finish();
   /// Objects that probably exist, in the fixed frame.
@@ -39,6 +54,8 @@ class ObjectFilter {
     Eigen::Matrix2d start_covariance = Eigen::Matrix2d::Identity();
     bool has_moved = false;
     int num_detections = 1;
+    Timestamp last_moving;  // detected, or surely moving
+    double votes = 0.0;     // at this stamp
   };
   TrackedObject describe(const Track& track) const;
   void mergeTwins();

@@ -56,6 +56,49 @@ TEST(ObjectFilterTest, NoiseIsAveragedAndCovarianceIsTrue) {
   EXPECT_NEAR(normalized, 2.0, 1.0);
 }
 
+/// A person five metres ahead who was detected five times, crossing at 1.2 m/s, and is undetected since one
+/// stamp.
+ObjectFilter filterOfUndetected() {
+  ObjectFilter filter;
+  for (int frame = 0; frame < 6; ++frame) {
+    filter.predict(stampAt(frame));
+    if (frame < 5) {
+      filter.update({detect({5.0, 1.2 * kPeriod_s * frame}, {0.0, 1.2})}, RigidTransform());
+      filter.finish();
+    }
+  }
+  return filter;
+}
+
+TEST(ObjectFilterTest, OneNumberCorrectsAnUndetectedObject) {
+  ObjectFilter filter = filterOfUndetected();
+  ASSERT_EQ(filter.expected().size(), 1U);
+  const ObjectFilter::Expected before = filter.expected().front();
+  EXPECT_FALSE(before.is_detected);
+  EXPECT_NEAR(before.position_m.y(), 1.2 * kPeriod_s * 5, 0.05);
+  const Eigen::Vector4d along_y(0.0, 1.0, 0.0, 0.0);
+  EXPECT_TRUE(filter.correct(before.index, 0.1, along_y, 0.001));
+  EXPECT_NEAR(filter.expected().front().position_m.y(), before.position_m.y() + 0.1, 0.005);
+  EXPECT_NEAR(filter.expected().front().position_m.x(), before.position_m.x(), 0.01);
+  // What is far from all that is expected is no measurement of this object.
+  EXPECT_FALSE(filter.correct(before.index, 3.0, along_y, 0.05));
+  EXPECT_NEAR(filter.expected().front().position_m.y(), before.position_m.y() + 0.1, 0.005);
+}
+
+TEST(ObjectFilterTest, VotesKeepAnUndetectedObjectOrEndIt) {
+  for (const double votes : {0.4, -0.1}) {
+    ObjectFilter filter = filterOfUndetected();
+    for (int frame = 6; frame < 30; ++frame) {
+      for (const ObjectFilter::Expected& object : filter.expected()) {
+        filter.vote(object.index, votes);
+      }
+      filter.finish();
+      filter.predict(stampAt(frame));
+    }
+    EXPECT_EQ(filter.objects().empty(), votes < 0.0) << votes;
+  }
+}
+
 TEST(ObjectFilterTest, CrossingPeopleKeepTheirNumbers) {
   ObjectFilter filter;
   uint32_t first_id = 0;

@@ -12,7 +12,9 @@
 #include "objects/ground_motion.h"
 #include "objects/object_detections.h"
 #include "objects/object_filter.h"
+#include "objects/object_following.h"
 #include "points/followed_points.h"
+#include "points/panorama.h"
 #include "points/rotation_correction.h"
 #include "points/static_motion.h"
 #include "vcharge_core/base/error.h"
@@ -89,11 +91,14 @@ struct ObjectTracker::Camera {
         focal_px(working.model().gamma1() / (1.0 + working.model().xi())),
         sigma_rad(kTracking_px * M_SQRT2 / focal_px),
         points(working, vehicle_from_camera),
-        contact(working, vehicle_from_camera, options.max_range_m) {}
+        contact(working, vehicle_from_camera, options.max_range_m),
+        panorama(working, vehicle_from_camera) {}
 
   void add(Timestamp stamp, const cv::Mat& image, const RigidTransform& previous_from_now) {
     points.add(stamp, image, previous_from_now);
     images.emplace_back(stamp, image);
+    panorama_before = panorama_now;
+    panorama_now = panorama.render(image);
     while (toSeconds(stamp - images.front().first) > kCompareInterval_s) {
       images.pop_front();
     }
@@ -101,11 +106,13 @@ struct ObjectTracker::Camera {
   void clear() {
     points.clear();
     images.clear();
+    panorama_now = cv::Mat();
   }
   std::vector<JudgedPoint> judge(const State& state) const;
   std::vector<MovingPoint> movingPoints(const std::vector<JudgedPoint>& judged,
                                         const Eigen::Vector3d& rotation) const;
   bool compareGround(const State& state);
+  void follow(State* state, bool is_compared) const;
   /// Motion of the vehicle since an image, such that the ground fits.
   RigidTransform groundMotion(Timestamp before, const RigidTransform& before_from_now) const {
     std::vector<RayPair> rays;
@@ -142,6 +149,8 @@ struct ObjectTracker::Camera {
   const double sigma_rad;  // of the motion of a point between two images
   FollowedPoints points;
   GroundContact contact;
+  const Panorama panorama;
+  cv::Mat panorama_before, panorama_now;  // empty without images
   std::deque<std::pair<Timestamp, cv::Mat>> images;
 };
 
@@ -274,6 +283,23 @@ bool ObjectTracker::Camera::compareGround(const State& state) {
   return false;
 }
 
+/// Finds the objects that are expected in the image.
+void ObjectTracker::Camera::follow(State* state, bool is_compared) const {
+  if (state->poses.size() < 2 || panorama_before.empty()) {
+    return;
+  }
+  const State::Pose& before = state->poses[state->poses.size() - 2];
+  const State::Pose& now = state->poses.back();
+  const TwoViews views{panorama,
+                       panorama_before,
+                       panorama_now,
+                       before.odom_from_vehicle,
+                       now.odom_from_vehicle,
+                       toSeconds(now.stamp - before.stamp),
+                       vehicle_from_camera.translation()};
+  followObjects(views, is_compared ? &contact : nullptr, &state->filter);
+}
+
 void ObjectTracker::process(const ImageFrame& frame) {
   for (State::Pose& pose : state_->poses) {
     if (const CorrectedPose* corrected = correctionAt(frame.corrections, pose.stamp)) {
@@ -317,10 +343,15 @@ void ObjectTracker::process(const ImageFrame& frame) {
       continue;
     }
     const std::vector<MovingPoint> moving = cameras_[i]->movingPoints(judged[i], rotation);
-    if (!moving.empty() && cameras_[i]->compareGround(*state_)) {
+    if (moving.empty() && state_->filter.expected().empty()) {
+      continue;
+    }
+    const bool is_compared = cameras_[i]->compareGround(*state_);
+    if (is_compared && !moving.empty()) {
       const Eigen::Vector3d camera_m = cameras_[i]->vehicle_from_camera.translation();
       state_->filter.update(detectObjects(moving, cameras_[i]->contact, camera_m), now);
     }
+    cameras_[i]->follow(state_.get(), is_compared);
   }
   state_->filter.finish();
   on_frame_({frame.stamp, now, state_->filter.objects()});

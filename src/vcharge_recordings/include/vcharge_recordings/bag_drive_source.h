@@ -45,4 +45,9 @@ class BagDriveSource : public DriveSource {
   const BagDriveSourceOptions options_;
 };
 
+/// Names of the rig's cameras whose images a bag has, raw or compressed, in the rig's order. Reads only the
+/// bag's index. InputError for a missing, truncated or corrupt bag.
+std::vector<std::string> camerasWithImages(const std::string& bag_path, const CameraRig& rig,
+                                           const DriveTopics& topics = DriveTopics());
+
 }  // namespace vcharge

@@ -221,4 +221,17 @@ std::pair<Timestamp, Timestamp> BagDriveSource::recordedSpan() const {
   return BagReading(bag_path_, *rig_, options_, nullptr).recordedSpan();
 }
 
+std::vector<std::string> camerasWithImages(const std::string& bag_path, const CameraRig& rig,
+                                           const DriveTopics& topics) {
+  const BagReader bag(bag_path);
+  std::vector<std::string> names;
+  for (const RigCamera& camera : rig.cameras) {
+    if (bag.topics().count(topics.imageTopic(camera.name)) > 0 ||
+        bag.topics().count(topics.compressedImageTopic(camera.name)) > 0) {
+      names.push_back(camera.name);
+    }
+  }
+  return names;
+}
+
 }  // namespace vcharge

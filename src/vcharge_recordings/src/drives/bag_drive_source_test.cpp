@@ -75,6 +75,18 @@ TEST_F(BagDriveSourceTest, ReadsOnlyTheCamerasAskedFor) {
   expectInputError([&] { read(options); }, {"roof", "front"});
 }
 
+TEST_F(BagDriveSourceTest, TellsWhichCamerasHaveImages) {
+  writeBag([&] {
+    writeImage("left", 0);
+    write("/camera/roof/image_raw/compressed", sensor_msgs::CompressedImage());
+  });
+  CameraRig rig = *rig_;
+  EXPECT_EQ(camerasWithImages(path_, rig), std::vector<std::string>{"left"});
+  rig.cameras[0].name = "roof";
+  EXPECT_EQ(camerasWithImages(path_, rig), (std::vector<std::string>{"roof", "left"}));
+  expectInputError([&] { camerasWithImages(path_ + ".none", rig); }, {".none"});
+}
+
 TEST_F(BagDriveSourceTest, ReadsCompressedImages) {
   writeBag([&] {
     writeOdometry(0);

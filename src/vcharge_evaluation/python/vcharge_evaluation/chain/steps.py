@@ -230,7 +230,7 @@ class Chain(StepFolders):
         def work(folder):
             # The options name cameras that another rig may not have.
             cameras = set(yaml.safe_load(rig.read_text())["cameras"])
-            words = ["--options", options] if {"front", "left", "right"} <= cameras else []
+            words = ["--options", options] if {"front", "left", "rear", "right"} <= cameras else []
             result = run_tool("detect_obstacles", folder / "detect.log", "--bag", drive / "drive.bag", "--rig", rig, *words,
                               "--range-options", self.range_options(ranges, cameras, folder), "--output", folder / "maps")
             found = figures.pick(result, "num_maps", "content_hash", "processor_ms_per_range_map")

@@ -28,23 +28,27 @@ class Body:
         self.solid = np.vstack([np.column_stack([corners, np.full(len(corners), z)]) for z in (base, top)])
 
 
-def read_reports(folder, stamp):
-    """Reported objects of a stamp; none where nothing was reported."""
-    with open(folder / "objects_frames.csv", encoding="utf-8") as file:
-        poses = {int(row["stamp_ns"]): row for row in csv.DictReader(file)}
-    if stamp not in poses:
-        return []
-    here = np.array([float(poses[stamp][key]) for key in ("x_m", "y_m")])
-    turn = rotation(float(poses[stamp]["yaw_rad"]))
-    with open(folder / "objects.csv", encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if int(row["stamp_ns"]) == stamp]
-    bodies = []
-    for row in rows:
-        corners = np.array([[float(word) for word in corner.split(" ")] for corner in row["footprint_m"].split(";")])
-        centre, velocity = (np.array([float(row[key]) for key in keys]) for keys in (("x_m", "y_m"), ("vx_m_per_s", "vy_m_per_s")))
-        bodies.append(Body((corners - here) @ turn, (centre - here) @ turn, velocity @ turn, 0.0, float(row["height_m"]),
-                           f"{row['id']} {row['class']}"))
-    return bodies
+class Reports:
+    """The reported objects of a drive: `folder` is that of detect_obstacles."""
+
+    def __init__(self, folder):
+        with open(folder / "objects_frames.csv", encoding="utf-8") as file:
+            self.poses = {int(row["stamp_ns"]): [float(row[key]) for key in ("x_m", "y_m", "yaw_rad")] for row in csv.DictReader(file)}
+        self.rows = {}
+        with open(folder / "objects.csv", encoding="utf-8") as file:
+            for row in csv.DictReader(file):
+                self.rows.setdefault(int(row["stamp_ns"]), []).append(row)
+
+    def at(self, stamp):
+        """Bodies of a stamp; none where nothing was reported."""
+        bodies = []
+        for row in self.rows.get(stamp, []):
+            here, turn = np.array(self.poses[stamp][:2]), rotation(self.poses[stamp][2])
+            corners = np.array([[float(word) for word in corner.split(" ")] for corner in row["footprint_m"].split(";")])
+            centre, velocity = (np.array([float(row[key]) for key in keys]) for keys in (("x_m", "y_m"), ("vx_m_per_s", "vy_m_per_s")))
+            bodies.append(Body((corners - here) @ turn, (centre - here) @ turn, velocity @ turn, 0.0, float(row["height_m"]),
+                               f"{row['id']} {row['class']}"))
+        return bodies
 
 
 def read_truth(truth):
@@ -57,48 +61,55 @@ def read_truth(truth):
     return bodies
 
 
-def draw_from_above(truth, groups):
-    """View with the vehicle in the middle, its x upwards; `groups`: colours and their bodies."""
-    picture = np.full((SIZE_PX, SIZE_PX, 3), 40, np.uint8)
-    middle = np.array([0.5 * (FRONT_M + REAR_M), 0.0])
+def pixels_from_above(points):
+    """Pixels, N x 2, of points in the vehicle's frame; the vehicle is in the middle, its x upwards."""
+    across = (np.asarray(points) - [0.5 * (FRONT_M + REAR_M), 0.0]) * SIZE_PX / (2 * REACH_M)
+    return np.stack([SIZE_PX / 2 - across[:, 1], SIZE_PX / 2 - across[:, 0]], 1)
 
-    def pixels(points):
-        across = (np.asarray(points) - middle) * SIZE_PX / (2 * REACH_M)
-        return np.stack([SIZE_PX / 2 - across[:, 1], SIZE_PX / 2 - across[:, 0]], 1).astype(int)
+
+def draw_from_above(standing, groups, ground=None):
+    """View from above: outlines of what stands, and `groups`: colours and their bodies; over `ground`, if there is one."""
+    picture = np.full((SIZE_PX, SIZE_PX, 3), 40, np.uint8) if ground is None else ground
 
     def outline(corners, colour):
-        cv2.polylines(picture, [pixels(corners)], True, colour, 1, cv2.LINE_AA)
+        cv2.polylines(picture, [pixels_from_above(corners).astype(int)], True, colour, 1, cv2.LINE_AA)
 
-    for obstacle in truth.standing:
-        outline(truth.footprint(obstacle), CYAN)
+    for corners in standing:
+        outline(corners, CYAN)
     outline([[FRONT_M, HALF_WIDTH_M], [FRONT_M, -HALF_WIDTH_M], [REAR_M, -HALF_WIDTH_M], [REAR_M, HALF_WIDTH_M]], WHITE)
     for colour, bodies in groups:
         for body in bodies:
             outline(body.corners, colour)
-            start, end = pixels([body.centre, body.centre + body.velocity]).tolist()
+            start, end = pixels_from_above([body.centre, body.centre + body.velocity]).astype(int).tolist()
             cv2.line(picture, start, end, colour, 1, cv2.LINE_AA)
             cv2.putText(picture, body.text, (start[0] + 6, start[1] - 6), cv2.FONT_HERSHEY_SIMPLEX, 0.4, colour, 1, cv2.LINE_AA)
     return picture
 
 
-def draw(bag, rig, folder, truth_folder, stamp):
-    """The picture (BGR) of a stamp (ns)."""
-    truth = Truth(truth_folder, stamp)
-    groups = ((MAGENTA, read_truth(truth)), (YELLOW, read_reports(folder, stamp)))
-    images = []
-    for name, camera in read_yaml(rig)["cameras"].items():
-        picture = cv2.cvtColor(read_image(bag, name, stamp), cv2.COLOR_GRAY2BGR)
+def draw_moment(above, images, cameras, groups):
+    """The view from above beside the images (gray, by camera name) with frames around the bodies of `groups`."""
+    parts = []
+    for name, image in images.items():
+        picture = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
         for colour, bodies in groups:
             for body in bodies:
                 if np.linalg.norm(body.centre) <= REACH_M:
-                    frame(picture, body.solid, projection_into(camera), colour)
-        images.append(label(cv2.resize(picture, IMAGE_PX, interpolation=cv2.INTER_AREA), name))
-    if len(images) % 2:
-        images.append(np.zeros_like(images[0]))
-    rows = np.vstack([np.hstack(images[i:i + 2]) for i in range(0, len(images), 2)])
-    above = draw_from_above(truth, groups)
+                    frame(picture, body.solid, projection_into(cameras[name]), colour)
+        parts.append(label(cv2.resize(picture, IMAGE_PX, interpolation=cv2.INTER_AREA), name))
+    if len(parts) % 2:
+        parts.append(np.zeros_like(parts[0]))
+    rows = np.vstack([np.hstack(parts[i:i + 2]) for i in range(0, len(parts), 2)])
     height = max(len(rows), len(above))
     return np.hstack([cv2.copyMakeBorder(part, 0, height - len(part), 0, 0, cv2.BORDER_CONSTANT) for part in (above, rows)])
+
+
+def draw(bag, rig, folder, truth_folder, stamp):
+    """The picture (BGR) of a stamp (ns)."""
+    truth = Truth(truth_folder, stamp)
+    groups = ((MAGENTA, read_truth(truth)), (YELLOW, Reports(folder).at(stamp)))
+    cameras = read_yaml(rig)["cameras"]
+    above = draw_from_above([truth.footprint(obstacle) for obstacle in truth.standing], groups)
+    return draw_moment(above, {name: read_image(bag, name, stamp) for name in cameras}, cameras, groups)
 
 
 def main():

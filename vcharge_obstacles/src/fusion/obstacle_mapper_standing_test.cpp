@@ -1,0 +1,97 @@
+#include <cmath>
+#include <random>
+
+#include <opencv2/imgproc.hpp>
+
+#include "fusion/obstacle_mapper_fixture.h"
+
+namespace vcharge {
+namespace {
+
+constexpr int kStopTick = 200;         // after 5 m
+constexpr int kStandingTicks = 15000;  // 5 minutes
+constexpr int kImageTicks = 40;
+constexpr double kPersonX_m = 7.0, kPersonY_m = 2.6;
+
+/// The vehicle drives, then stands, and gets images of its left camera only.
+class StandingMapperTest : public ObstacleMapperTest {
+ protected:
+  StandingMapperTest() {
+    stops_at_ = kStopTick;
+    start();
+    drive(0, kStopTick);
+    cv::Mat pattern(rig_->cameras[1].image_size_px, CV_8UC1);
+    cv::randu(pattern, 0, 255);
+    cv::GaussianBlur(pattern, pattern_, cv::Size(), 2.0);
+    before_ = stand(100);
+  }
+
+  /// The image at a tick: the light changes slowly, and the sensor has noise.
+  cv::Mat imageAt(int tick) {
+    cv::Mat noise(pattern_.size(), CV_16SC1), image;
+    random_.fill(noise, cv::RNG::NORMAL, 0.0, 2.0);
+    pattern_.convertTo(image, CV_16SC1, 1.0 + 0.3 * std::sin(tick * 2e-3));
+    image += noise;
+    if (tick >= person_from_ && tick < person_until_) {
+      const RigCamera& camera = rig_->cameras[1];
+      Eigen::Vector2d foot, right;
+      const RigidTransform camera_from_world = (poseAt(kStopTick) * *camera.vehicle_from_camera).inverse();
+      EXPECT_TRUE(
+          camera.model.project(camera_from_world * Eigen::Vector3d(kPersonX_m, kPersonY_m, 0.0), &foot));
+      EXPECT_TRUE(camera.model.project(camera_from_world * Eigen::Vector3d(kPersonX_m + 0.3, kPersonY_m, 0.0),
+                                       &right));
+      const int width = std::abs(cvRound(right.x() - foot.x()));
+      cv::rectangle(image, cv::Rect(cvRound(foot.x()) - width / 2, 0, width, cvRound(foot.y()) + width / 4),
+                    cv::Scalar(20), cv::FILLED);
+    }
+    image.convertTo(image, CV_8UC1);
+    return image;
+  }
+  /// The last map after standing.
+  const ObstacleFrame& stand(int ticks) {
+    for (const int end = tick_ + ticks; tick_ < end; ++tick_) {
+      const int tick = tick_;
+      VehicleOdometry odometry;
+      odometry.stamp = stampAt(tick);
+      odometry.odom_from_vehicle = poseAt(kStopTick);
+      mapper_->addOdometry(odometry);
+      if (tick % kImageTicks == 0) {
+        const cv::Mat image = imageAt(tick);
+        mapper_->addImage(1, stampAt(tick), static_cast<uint64_t>(tick), [image] { return image; });
+      } else if (tick % 8 == 0) {  // shows that the camera is alive
+        mapper_->noteImage(1, stampAt(tick), static_cast<uint64_t>(tick));
+      }
+      if (frames_.size() > 1) {
+        frames_.erase(frames_.begin(), frames_.end() - 1);
+      }
+    }
+    return frames_.back();
+  }
+
+  cv::RNG random_{7};
+  cv::Mat pattern_;
+  ObstacleFrame before_;
+  int tick_ = kStopTick, person_from_ = 0, person_until_ = 0;
+};
+
+TEST_F(StandingMapperTest, FiveMinutesWithoutChangeLoseNothing) {
+  const ObstacleFrame& after = stand(kStandingTicks);
+  EXPECT_GT(toSeconds(after.map.stamp - before_.map.stamp), 298.0);
+  EXPECT_GT(count(before_, kCellFree), 1000);
+  EXPECT_EQ(count(after, kCellFree), count(before_, kCellFree));
+  EXPECT_EQ(count(after, kCellOccupied), count(before_, kCellOccupied));
+}
+
+TEST_F(StandingMapperTest, WhatChangesBecomesUnknownAndStaysSo) {
+  person_from_ = kStopTick + 400;
+  person_until_ = kStopTick + 800;
+  ASSERT_EQ(stateAt(before_, kPersonX_m, kPersonY_m), kCellFree);
+  EXPECT_EQ(stateAt(stand(300), kPersonX_m, kPersonY_m), kCellFree);
+  const ObstacleFrame& after = stand(1500);
+  EXPECT_EQ(stateAt(after, kPersonX_m, kPersonY_m), kCellUnobserved);
+  EXPECT_GT(count(after, kCellFree), 8 * count(before_, kCellFree) / 10);
+  EXPECT_EQ(count(after, kCellOccupied), count(before_, kCellOccupied));
+}
+
+}  // namespace
+}  // namespace vcharge

@@ -1,0 +1,222 @@
+#include "ground/ground_match.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <opencv2/imgproc.hpp>
+
+namespace vcharge {
+namespace {
+
+// Images are smoothed over this window before they are compared, and correlated within the other one.
+constexpr int kSmoothing_px = 3;
+constexpr int kWindow_px = 5;
+// Tolerated error of the warp.
+constexpr int kSlack_px = 1;
+// Pixels beyond the range limits that windows at the limits reach, as a fraction of the range.
+constexpr float kBandMargin = 0.15F;
+// The detector's default min_height_m: a pixel covers the strip where its ray is lower than this.
+constexpr float kLow_m = 0.08F;
+// Standard deviation in gray levels from which a window has texture.
+constexpr float kTexture = 1.2F;
+// Correlations from which a window shows the plane, up to which it does not, and the least difference between
+// two planes that decides.
+constexpr float kSame = 0.7F, kOther = 0.4F, kDecisive = 0.15F;
+// A larger window must show the ground too: small windows of a body fit by chance now and then.
+constexpr int kWideWindow_px = 9;
+// Differences below this fraction of the brightness are noise.
+constexpr float kRelativeDifference = 0.05F;
+// The gain between two images is estimated from at least this number of pixels of this brightness or more.
+constexpr size_t kMinCompared = 200;
+constexpr float kMinBrightness = 8.0F;
+
+/// Means over windows, from which correlations follow.
+class Windows {
+ public:
+  Windows(const cv::Mat& image, int side_px) : size_(side_px, side_px) {
+    image.convertTo(values_, CV_32F);
+    cv::boxFilter(values_, mean_, CV_32F, size_);
+    cv::boxFilter(values_.mul(values_), variance_, CV_32F, size_);
+    variance_ -= mean_.mul(mean_);
+  }
+  float variance(int row, int column) const { return variance_.at<float>(row, column); }
+  /// Covariance of the windows of two images.
+  cv::Mat covarianceWith(const Windows& other) const {
+    cv::Mat covariance;
+    cv::boxFilter(values_.mul(other.values_), covariance, CV_32F, size_);
+    return covariance - mean_.mul(other.mean_);
+  }
+
+ private:
+  const cv::Size size_;
+  cv::Mat values_, mean_, variance_;
+};
+
+float correlation(float covariance, float variance_a, float variance_b) {
+  return covariance / std::sqrt(std::max(1.0F, variance_a) * std::max(1.0F, variance_b));
+}
+
+}  // namespace
+
+GroundView::GroundView(Timestamp time, const cv::Mat& image, const RigidTransform& pose)
+    : stamp(time), fixed_from_body(pose) {
+  cv::blur(image, smooth, cv::Size(kSmoothing_px, kSmoothing_px));
+  constexpr int side = 2 * kSlack_px + 1;
+  const cv::Mat window = cv::Mat::ones(side, side, CV_8U);
+  cv::erode(smooth, lowest, window);
+  cv::dilate(smooth, highest, window);
+}
+
+GroundMatch::GroundMatch(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera,
+                         const PixelRays& rays, double min_difference)
+    : model_(camera.model()),
+      vehicle_from_camera_(vehicle_from_camera),
+      size_(camera.size()),
+      rays_(rays),
+      min_difference_(static_cast<float>(min_difference)) {
+  // Smoothing, window and slack must not reach invalid pixels.
+  const int reach = 2 * (kSmoothing_px / 2 + kSlack_px) + 3;
+  cv::erode(camera.validMask(), valid_, cv::Mat::ones(reach, reach, CV_8U), cv::Point(-1, -1), 1,
+            cv::BORDER_CONSTANT, cv::Scalar(0));
+}
+
+/// Pixels (CV_32FC2) of the older image that show what the newer one's pixels show, if that is the ground, or
+/// the plane above it; only for rows of the newer image that matter. (-1, -1) where there is none.
+struct GroundMatch::Warp {
+  struct Pixel {
+    size_t ray;
+    float range_m, inverse, height_m;  // along the ray to the ground; inverse horizontal range
+  };
+  cv::Rect rows;
+  cv::Mat ground, raised;
+  std::vector<Pixel> pixels;
+};
+
+GroundMatch::Warp GroundMatch::warp(const RigidTransform& before_from_now, const GroundPlane& ground,
+                                    double near_m, double far_m) const {
+  const Eigen::Matrix3f rotation = before_from_now.rotationMatrix().cast<float>();
+  const Eigen::Vector3f translation = before_from_now.translation().cast<float>();
+  const Eigen::Vector3f camera = vehicle_from_camera_.translation().cast<float>();
+  const auto slope_x = static_cast<float>(ground.slope.x());
+  const auto slope_y = static_cast<float>(ground.slope.y());
+  const float height =
+      camera.z() - static_cast<float>(ground.offset_m) - slope_x * camera.x() - slope_y * camera.y();
+  const auto near = static_cast<float>(near_m) * (1.0F - kBandMargin);
+  const auto far = static_cast<float>(far_m) * (1.0F + kBandMargin);
+  Warp result;
+  int top = size_.height, bottom = 0;
+  for (size_t i = 0; i < rays_.size(); ++i) {
+    const float fall = slope_x * rays_.x[i] + slope_y * rays_.y[i] - rays_.z[i];
+    const float across = height * rays_.horizontal[i];
+    if (fall * far > across && fall * near < across) {
+      result.pixels.push_back({i, height / fall, fall / across, height});
+      const int row = rays_.pixel[i] / size_.width;
+      top = std::min(top, row);
+      bottom = std::max(bottom, row + 1);
+    }
+  }
+  result.rows = top < bottom ? cv::Rect(0, top, size_.width, bottom - top) : cv::Rect();
+  result.ground = cv::Mat(result.rows.size(), CV_32FC2, cv::Scalar::all(-1.0));
+  result.raised = result.ground.clone();
+  const auto xi = static_cast<float>(model_.xi());
+  const auto project = [&](size_t i, float range_m, cv::Mat* map) {
+    const Eigen::Vector3f point =
+        rotation * (camera + range_m * Eigen::Vector3f(rays_.x[i], rays_.y[i], rays_.z[i])) + translation;
+    const float denominator = point.z() + xi * point.norm();
+    if (!(denominator > 0.1F * point.norm())) {
+      return;
+    }
+    const cv::Vec2f at(
+        static_cast<float>(model_.gamma1()) * point.x() / denominator + static_cast<float>(model_.u0()),
+        static_cast<float>(model_.gamma2()) * point.y() / denominator + static_cast<float>(model_.v0()));
+    const cv::Point nearest(cvRound(at[0]), cvRound(at[1]));
+    if (cv::Rect(1, 1, size_.width - 2, size_.height - 2).contains(nearest) &&
+        valid_.at<uint8_t>(nearest) != 0) {
+      const int pixel = rays_.pixel[i];
+      map->at<cv::Vec2f>(pixel / size_.width - top, pixel % size_.width) = at;
+    }
+  };
+  const float raised = 1.0F - static_cast<float>(kRaised_m) / height;
+  for (const Warp::Pixel& pixel : result.pixels) {
+    if (valid_.data[rays_.pixel[pixel.ray]] != 0) {
+      project(pixel.ray, pixel.range_m, &result.ground);
+      project(pixel.ray, pixel.range_m * raised, &result.raised);
+    }
+  }
+  return result;
+}
+
+std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const GroundView& before,
+                                               const GroundPlane& ground, double near_m, double far_m) const {
+  const RigidTransform before_from_now =
+      (before.fixed_from_body * vehicle_from_camera_).inverse() * now.fixed_from_body;
+  const Warp warp = this->warp(before_from_now, ground, near_m, far_m);
+  if (warp.rows.empty()) {
+    return {};
+  }
+  const auto warped = [&](const cv::Mat& map) {
+    cv::Mat image;
+    cv::remap(before.smooth, image, map, cv::Mat(), cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(0));
+    return image;
+  };
+  const auto knownIn = [&](const cv::Mat& map) {
+    cv::Mat channel, known;
+    cv::extractChannel(map, channel, 0);
+    known = channel >= 0.0;
+    cv::erode(known, known, cv::Mat::ones(kWindow_px, kWindow_px, CV_8U));
+    return known;
+  };
+  const cv::Mat on_ground = warped(warp.ground);
+  const cv::Mat knows_ground = knownIn(warp.ground), knows_raised = knownIn(warp.raised);
+  const Windows here(now.smooth(warp.rows), kWindow_px), by_ground(on_ground, kWindow_px),
+      by_raised(warped(warp.raised), kWindow_px);
+  const Windows wide_here(now.smooth(warp.rows), kWideWindow_px), wide_ground(on_ground, kWideWindow_px);
+  const cv::Mat wide = wide_here.covarianceWith(wide_ground);
+  const cv::Mat with_ground = here.covarianceWith(by_ground), with_raised = here.covarianceWith(by_raised);
+  // The exposure may have changed. Most of the ground has not, so the median ratio is the gain.
+  std::vector<float> ratios;
+  for (const Warp::Pixel& pixel : warp.pixels) {
+    const int at = rays_.pixel[pixel.ray], row = at / size_.width - warp.rows.y, column = at % size_.width;
+    const float a = now.smooth.data[at], b = on_ground.at<uint8_t>(row, column);
+    if (knows_ground.at<uint8_t>(row, column) != 0 && std::min(a, b) >= kMinBrightness) {
+      ratios.push_back(a / b);
+    }
+  }
+  if (ratios.size() < kMinCompared) {
+    return {};
+  }
+  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
+  std::nth_element(ratios.begin(), middle, ratios.end());
+  const float gain = *middle;
+  std::vector<MatchedPixel> result;
+  const auto near_inverse = static_cast<float>(1.0 / near_m), far_inverse = static_cast<float>(1.0 / far_m);
+  for (const Warp::Pixel& pixel : warp.pixels) {
+    const int at = rays_.pixel[pixel.ray], row = at / size_.width - warp.rows.y, column = at % size_.width;
+    if (pixel.inverse > near_inverse || pixel.inverse < far_inverse ||
+        knows_ground.at<uint8_t>(row, column) == 0) {
+      continue;
+    }
+    const float variance = here.variance(row, column), before_variance = by_ground.variance(row, column);
+    const bool has_texture = std::min(variance, before_variance) >= kTexture * kTexture;
+    const float fit = correlation(with_ground.at<float>(row, column), variance, before_variance);
+    const float wide_fit = correlation(wide.at<float>(row, column), wide_here.variance(row, column),
+                                       wide_ground.variance(row, column));
+    const float raised =
+        knows_raised.at<uint8_t>(row, column) != 0
+            ? correlation(with_raised.at<float>(row, column), variance, by_raised.variance(row, column))
+            : 1.0F;
+    const cv::Vec2f source = warp.ground.at<cv::Vec2f>(row, column);
+    const cv::Point nearest(cvRound(source[0]), cvRound(source[1]));
+    const float brightness = now.smooth.data[at];
+    const float tolerance = min_difference_ + kRelativeDifference * brightness;
+    const bool differs = brightness < gain * before.lowest.at<uint8_t>(nearest) - tolerance ||
+                         brightness > gain * before.highest.at<uint8_t>(nearest) + tolerance;
+    const bool is_ground = has_texture && std::min(fit, wide_fit) >= kSame && fit >= raised + kDecisive;
+    const bool is_other = has_texture && (fit < kOther || raised >= fit + kDecisive);
+    result.push_back({pixel.ray, pixel.inverse, pixel.inverse * pixel.height_m / (pixel.height_m - kLow_m),
+                      is_ground, is_other, differs});
+  }
+  return result;
+}
+
+}  // namespace vcharge

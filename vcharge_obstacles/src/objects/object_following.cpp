@@ -1,0 +1,121 @@
+#include "objects/object_following.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "objects/body_match.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kMinRange_m = 0.6, kMaxRange_m = 12.0;
+// Difference from the expected speed across the view up to which a body is searched, and its least
+// correlation.
+constexpr double kSearch_m_per_s = 1.8, kMinCorrelation = 0.6;
+// Standard deviation of a bearing, in pixels: legs and arms swing.
+constexpr double kBearing_px = 1.0;
+// Contacts of successive images are alike: each counts as this much less certain.
+constexpr double kCommonContact = 1.5;
+// Half the width, and the radius, of a person.
+constexpr double kHalfWidth_m = 0.15, kRadius_m = 0.25, kMaxPersonWidth_m = 1.2;
+// Ranges, relative to the expected one, at which something static would have to be to pass for the object;
+// the excess, in pixels, from which it cannot.
+constexpr double kStaticRanges[] = {0.7, 1.0, 1.4};
+constexpr double kMoving_px = 1.0;
+// Log-odds for an object that is seen to move, and that was measured where it is not expected.
+constexpr double kMoves = 0.4, kContradicts = -0.1;
+
+class Follower {
+ public:
+  Follower(const TwoViews& views, const GroundContact* contact, ObjectFilter* filter)
+      : views_(views), contact_(contact), filter_(filter) {}
+
+  void follow(const ObjectFilter::Expected& object) const {
+    const Seen now = see(views_.fixed_from_vehicle_now, object.position_m);
+    const Seen before =
+        see(views_.fixed_from_vehicle_before, object.position_m - views_.step_s * object.velocity_m_per_s);
+    if (now.bearing.range_m > kMinRange_m && now.bearing.range_m < kMaxRange_m) {
+      filter_->vote(object.index, findBody(object, before, now) + findContact(object, now));
+    }
+  }
+
+ private:
+  struct Seen {
+    BodyBearing bearing;
+    Eigen::Vector2d direction;  // unit, from the camera, in the fixed frame
+    Eigen::Vector2d across() const { return {-direction.y(), direction.x()}; }
+  };
+  Eigen::Vector2d cameraAt(const RigidTransform& fixed_from_vehicle) const {
+    return (fixed_from_vehicle * views_.camera_in_vehicle_m).head<2>();
+  }
+  Seen see(const RigidTransform& fixed_from_vehicle, const Eigen::Vector2d& position_m) const {
+    const Eigen::Vector2d from_camera = position_m - cameraAt(fixed_from_vehicle);
+    const Eigen::Vector3d in_vehicle =
+        fixed_from_vehicle.rotation().conjugate() * Eigen::Vector3d(from_camera.x(), from_camera.y(), 0.0);
+    return {{std::atan2(in_vehicle.y(), in_vehicle.x()), from_camera.norm()}, from_camera.normalized()};
+  }
+
+  double findBody(const ObjectFilter::Expected& object, const Seen& before, const Seen& now) const {
+    const std::optional<BodyMatch> match =
+        matchBody(views_.panorama, views_.before, views_.now, before.bearing, now.bearing,
+                  views_.camera_in_vehicle_m.z(), object.height_m,
+                  kSearch_m_per_s * views_.step_s / now.bearing.range_m);
+    if (!match || match->correlation < kMinCorrelation) {
+      return 0.0;
+    }
+    Eigen::Vector4d row;
+    row << now.across() / now.bearing.range_m - before.across() / before.bearing.range_m,
+        views_.step_s / before.bearing.range_m * before.across();
+    if (!filter_->correct(object.index, match->shift_rad, row, kBearing_px * views_.panorama.pixel_rad())) {
+      return kContradicts;
+    }
+    double low_rad = std::numeric_limits<double>::infinity(), high_rad = -low_rad;
+    for (const double factor : kStaticRanges) {
+      const Seen still =
+          see(views_.fixed_from_vehicle_now, cameraAt(views_.fixed_from_vehicle_before) +
+                                                 factor * before.bearing.range_m * before.direction);
+      const double shift_rad =
+          std::remainder(still.bearing.azimuth_rad - now.bearing.azimuth_rad, 2.0 * M_PI);
+      low_rad = std::min(low_rad, shift_rad);
+      high_rad = std::max(high_rad, shift_rad);
+    }
+    const double excess_rad = std::max(low_rad - match->shift_rad, match->shift_rad - high_rad);
+    return excess_rad > kMoving_px * views_.panorama.pixel_rad() ? kMoves : 0.0;
+  }
+
+  double findContact(const ObjectFilter::Expected& object, const Seen& now) const {
+    if (contact_ == nullptr || object.is_detected || object.width_m > kMaxPersonWidth_m) {
+      return 0.0;
+    }
+    const double half_rad = kHalfWidth_m / now.bearing.range_m;
+    const double middle_slope =
+        (0.5 * object.height_m - views_.camera_in_vehicle_m.z()) / now.bearing.range_m;
+    const std::optional<Contact> found =
+        contact_->below(now.bearing.azimuth_rad - half_rad, now.bearing.azimuth_rad + half_rad, middle_slope);
+    if (!found) {
+      return 0.0;
+    }
+    Eigen::Vector4d row;
+    row << now.direction, 0.0, 0.0;
+    const double innovation_m = found->range_m + kRadius_m - now.bearing.range_m;
+    return filter_->correct(object.index, innovation_m, row, kCommonContact * found->sigma_m) ? 0.0
+                                                                                              : kContradicts;
+  }
+
+  const TwoViews& views_;
+  const GroundContact* contact_;
+  ObjectFilter* filter_;
+};
+
+}  // namespace
+
+void followObjects(const TwoViews& views, const GroundContact* contact, ObjectFilter* filter) {
+  const Follower follower(views, contact, filter);
+  for (const ObjectFilter::Expected& object : filter->expected()) {
+    follower.follow(object);
+  }
+}
+
+}  // namespace vcharge

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+
+#include "objects/ground_contact.h"
+#include "objects/object_filter.h"
+#include "points/panorama.h"
+#include "vcharge_core/motion/rigid_transform.h"
+
+namespace vcharge {
+
+/// What one camera saw at two successive stamps.
+struct TwoViews {
+  const Panorama& panorama;
+  const cv::Mat& before;
+  const cv::Mat& now;
+  RigidTransform fixed_from_vehicle_before, fixed_from_vehicle_now;
+  double step_s = 0.0;
+  Eigen::Vector3d camera_in_vehicle_m;
+};
+
+/// Measures the objects that the filter expects in a camera's view, without points to follow: the bearing at
+/// which the whole body is found again, and the contact with the ground below it. A bearing at which nothing
+/// static can be found makes an object more probable; one that contradicts its motion, less. `contact` is
+/// null if the ground was not compared.
+void followObjects(const TwoViews& views, const GroundContact* contact, ObjectFilter* filter);
+
+}  // namespace vcharge

@@ -1,0 +1,53 @@
+#include "points/panorama.h"
+
+#include <cmath>
+
+#include <opencv2/imgproc.hpp>
+
+namespace vcharge {
+namespace {
+
+constexpr double kHalfWidth_rad = 1.68;
+constexpr double kTopSlope = 0.6, kBottomSlope = -0.9;
+
+}  // namespace
+
+Panorama::Panorama(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera)
+    : pixel_rad_((1.0 + camera.model().xi()) / camera.model().gamma1()), top_slope_(kTopSlope) {
+  const Eigen::Vector3d axis = vehicle_from_camera.rotation() * Eigen::Vector3d::UnitZ();
+  middle_rad_ = std::atan2(axis.y(), axis.x());
+  const int width = 2 * static_cast<int>(kHalfWidth_rad / pixel_rad_) + 1;
+  const int height = static_cast<int>((kTopSlope - kBottomSlope) / pixel_rad_) + 1;
+  cv::Mat map(height, width, CV_32FC2, cv::Scalar::all(-1.0));
+  valid_mask_ = cv::Mat::zeros(height, width, CV_8UC1);
+  const cv::Rect image(cv::Point(), camera.size());
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double azimuth_rad = middle_rad_ + (width / 2 - x) * pixel_rad_;
+      const Eigen::Vector3d direction(std::cos(azimuth_rad), std::sin(azimuth_rad),
+                                      top_slope_ - y * pixel_rad_);
+      Eigen::Vector2d pixel;
+      if (!camera.model().project(vehicle_from_camera.rotation().conjugate() * direction, &pixel)) {
+        continue;
+      }
+      const cv::Point nearest(cvRound(pixel.x()), cvRound(pixel.y()));
+      if (image.contains(nearest) && camera.validMask().at<uint8_t>(nearest) != 0) {
+        map.at<cv::Vec2f>(y, x) = {static_cast<float>(pixel.x()), static_cast<float>(pixel.y())};
+        valid_mask_.at<uint8_t>(y, x) = 255;
+      }
+    }
+  }
+  cv::convertMaps(map, cv::Mat(), pixels_, fractions_, CV_16SC2);
+}
+
+cv::Mat Panorama::render(const cv::Mat& image) const {
+  cv::Mat panorama;
+  cv::remap(image, panorama, pixels_, fractions_, cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(0));
+  return panorama;
+}
+
+double Panorama::columnOf(double azimuth_rad) const {
+  return valid_mask_.cols / 2 - std::remainder(azimuth_rad - middle_rad_, 2.0 * M_PI) / pixel_rad_;
+}
+
+}  // namespace vcharge
