@@ -13,6 +13,10 @@ namespace {
 constexpr float kMeasuredFraction = 0.8F;
 // A difference of heights is real from this number of standard deviations on.
 constexpr float kSureSigmas = 3.0F;
+// Cells beside a step see part of its rise. Those within this distance that see less than this fraction are
+// not marked, so that a step is where it is steepest.
+constexpr int kThinningCells = 2;
+constexpr float kThinningFraction = 0.67F;
 
 /// Offset between two cells, one for each pair of opposite directions.
 struct Offset {
@@ -63,28 +67,38 @@ void markSteps(const StepMapperOptions& options, const cv::Mat& ground_m, const 
   }
 }
 
-}  // namespace
-
-void findSteps(const StepMapperOptions& options, StepMap* map) {
-  const cv::Mat ground_sigma_m = map->sigma_m.clone();
-  for (int row = 0; row < map->ground_m.rows; ++row) {
-    for (int column = 0; column < map->ground_m.cols; ++column) {
-      map->height_m.at<float>(row, column) = std::isfinite(map->ground_m.at<float>(row, column)) ? 0.0F : NAN;
-    }
-  }
-  markSteps(options, map->ground_m, ground_sigma_m, map);
+/// True for marked cells that belong to too small a step, or to the flank of a higher one.
+cv::Mat cellsToDrop(const cv::Mat& height_m) {
+  const cv::Mat is_step = height_m > 0.0F;
+  cv::Mat step_m = cv::Mat::zeros(height_m.size(), CV_32FC1);
+  height_m.copyTo(step_m, is_step);
+  cv::Mat highest_m;
+  const int window = 2 * kThinningCells + 1;
+  cv::dilate(step_m, highest_m, cv::getStructuringElement(cv::MORPH_RECT, {window, window}));
+  cv::Mat drop = (step_m < kThinningFraction * highest_m) & is_step;
   cv::Mat labels, statistics, centroids;
-  cv::connectedComponentsWithStats(map->height_m > 0.0F, labels, statistics, centroids, 8, CV_32S);
+  cv::connectedComponentsWithStats(is_step, labels, statistics, centroids, 8, CV_32S);
   for (int row = 0; row < labels.rows; ++row) {
     for (int column = 0; column < labels.cols; ++column) {
       const int label = labels.at<int>(row, column);
       if (label > 0 && statistics.at<int>(label, cv::CC_STAT_AREA) < StepMapper::kMinStepCells) {
-        const bool is_known = std::isfinite(map->ground_m.at<float>(row, column));
-        map->height_m.at<float>(row, column) = is_known ? 0.0F : NAN;
-        map->sigma_m.at<float>(row, column) = ground_sigma_m.at<float>(row, column);
+        drop.at<uint8_t>(row, column) = 255;
       }
     }
   }
+  return drop;
+}
+
+}  // namespace
+
+void findSteps(const StepMapperOptions& options, StepMap* map) {
+  const cv::Mat ground_sigma_m = map->sigma_m.clone();
+  const cv::Mat even_m = cv::abs(map->ground_m) * 0.0F;  // NaN where the ground is unknown
+  even_m.copyTo(map->height_m);
+  markSteps(options, map->ground_m, ground_sigma_m, map);
+  const cv::Mat drop = cellsToDrop(map->height_m);
+  even_m.copyTo(map->height_m, drop);
+  ground_sigma_m.copyTo(map->sigma_m, drop);
 }
 
 }  // namespace vcharge

@@ -105,6 +105,16 @@ TEST(StepMapperTest, FindsAStepOf5cmAndNotOneOf3cm) {
   EXPECT_LE(foundAlong(drive(kerbAt(2.0, 0.03)), 0.0, 5.0, 2.0), 0.05);
 }
 
+TEST(StepMapperTest, AStepIsMarkedWhereItIs) {
+  // A kerb whose rise is spread over 10 cm, as by matching windows.
+  const StepMap map = drive([](double, double y) { return 0.12 * std::clamp((y - 1.95) / 0.1, 0.0, 1.0); });
+  EXPECT_GE(foundAlong(map, 0.0, 5.0, 2.0), 0.95);
+  for (double x_m = 0.025; x_m < 5.0; x_m += 0.05) {
+    EXPECT_EQ(at(map, map.height_m, x_m, 1.84), 0.0F) << x_m;
+    EXPECT_EQ(at(map, map.height_m, x_m, 2.16), 0.0F) << x_m;
+  }
+}
+
 TEST(StepMapperTest, FindsAHoleAndAStepDown) {
   const StepMap map = drive([](double x, double y) {
     const bool is_hole = x > 1.0 && x < 2.0 && y > -2.5 && y < -1.8;
