@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "objects/ground_contact.h"
+#include "contacts/ground_contact.h"
 #include "vcharge_core/motion/rigid_transform.h"
 
 namespace vcharge {

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-#include "objects/contact_path.h"
+#include "contacts/contact_path.h"
 #include "objects/object_detections.h"
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/motion/rigid_transform.h"

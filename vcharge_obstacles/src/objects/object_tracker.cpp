@@ -8,9 +8,9 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "contacts/ground_contact.h"
+#include "contacts/ground_motion.h"
 #include "objects/freestanding.h"
-#include "objects/ground_contact.h"
-#include "objects/ground_motion.h"
 #include "objects/object_detections.h"
 #include "objects/object_filter.h"
 #include "objects/object_following.h"

@@ -1,4 +1,4 @@
-#include "objects/contact_path.h"
+#include "contacts/contact_path.h"
 
 #include <optional>
 #include <random>
