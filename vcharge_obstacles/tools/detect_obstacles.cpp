@@ -275,7 +275,10 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
   ProcessorTime writing;
   ObstacleMapper mapper(rig, options,
                         [&](const ObstacleFrame& frame) { writing.add([&] { recorder.add(frame); }); });
-  ObjectTracker tracker(rig, object_options, [&](const ObjectFrame& frame) { recorder.add(frame); });
+  ObjectTracker tracker(rig, object_options, [&](const ObjectFrame& frame) {
+    mapper.setObjects(frame.stamp, frame.objects);
+    recorder.add(frame);
+  });
   Pipeline pipeline(rig, range_options, arguments.range, &mapper, &tracker);
   BagDriveSourceOptions source_options;
   source_options.cameras = object_options.cameras;

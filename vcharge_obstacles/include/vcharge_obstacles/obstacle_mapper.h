@@ -120,7 +120,7 @@ class ObstacleMapper {
                 const std::function<cv::Mat()>& pixels);
   /// Sets localization's correction. Required with fixed_frame: map, ignored otherwise.
   void setMapFromOdom(const RigidTransform& map_from_odom);
-  /// Sets the objects that move around the vehicle, in the map's fixed frame. They enter the corridors of the
+  /// Sets the objects that move around the vehicle, in the frame odom. They enter the corridors of the
   /// following frames, moved with their velocities, until they are replaced or kObjectLife_s old.
   void setObjects(Timestamp stamp, std::vector<TrackedObject> objects);
   /// InputError for a range map of a camera that is not in use, or that was computed with another rig.

@@ -313,9 +313,9 @@ Corridor ObstacleMapper::findCorridor(const ObstacleMap& map) {
   const double curvature_per_m =
       curvature_->update(map.stamp, [this](Timestamp stamp) { return odomFromVehicle(stamp); });
   const double age_s = toSeconds(map.stamp - objects_stamp_);
-  return corridor_finder_.find(
-      map, curvature_per_m,
-      age_s <= kObjectLife_s ? movedObjects(objects_, age_s) : std::vector<TrackedObject>());
+  return corridor_finder_.find(map, curvature_per_m,
+                               age_s <= kObjectLife_s ? transformed(anchor_, movedObjects(objects_, age_s))
+                                                      : std::vector<TrackedObject>());
 }
 
 /// Emits the map while no range maps arrive. The time is measured by their arrival instead of their
