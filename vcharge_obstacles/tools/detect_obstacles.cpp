@@ -15,6 +15,7 @@
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/dense_maps/obstacle_map_file.h"
 #include "vcharge_core/dense_maps/range_map_file.h"
+#include "vcharge_core/dense_maps/step_map_file.h"
 #include "vcharge_core/files/content_hash.h"
 #include "vcharge_core/files/file_io.h"
 #include "vcharge_core/motion/tracked_object_file.h"
@@ -188,7 +189,9 @@ class Recorder {
       scans.push_back(camera.scan);
     }
     writeObstacles(frame.map, scans, folder_);
+    writeStepMap(frame.steps, folder_);
     addToHash(frame.map, &hasher_);
+    addToHash(frame.steps, &hasher_);
     for (const ObstacleScan& scan : scans) {
       addToHash(scan, &hasher_);
     }
