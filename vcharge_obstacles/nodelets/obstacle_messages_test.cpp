@@ -186,7 +186,8 @@ TEST(CorridorMessageTest, StripsAreGreenThenYellowThenRedAlongTheArc) {
     const double inner_m = std::hypot(3.75, 5.0 - 1.15);
     const double outer_m = std::hypot(3.75, 5.0 + 1.15);
     EXPECT_NEAR(std::min(std::abs(radius_m - inner_m), std::abs(radius_m - outer_m)), 0.0, 1e-9);
-    const double travel_m = 0.1 * static_cast<double>(i / 6) + 0.05;
+    const size_t strip = i / 6;
+    const double travel_m = 0.1 * static_cast<double>(strip) + 0.05;
     const bool is_free = travel_m < 0.3 || (travel_m > 0.6 && travel_m < 2.0);
     EXPECT_EQ(forward.colors[i].r, is_free ? 0.0F : 1.0F) << travel_m;
     EXPECT_EQ(forward.colors[i].g, travel_m < 3.0 ? 1.0F : 0.0F) << travel_m;
