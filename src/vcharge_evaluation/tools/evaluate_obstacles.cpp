@@ -59,7 +59,8 @@ nlohmann::json scanToJson(const std::string& name, const ObstacleScanEvaluator& 
           {"all", raysToJson("all", evaluator.all())},
           {"aside", raysToJson("aside", evaluator.aside())},
           {"ahead", raysToJson("ahead", evaluator.ahead())},
-          {"ahead_within_2_m", raysToJson("ahead < 2 m", evaluator.aheadNear())}};
+          {"ahead_within_2_m", raysToJson("ahead < 2 m", evaluator.aheadNear())},
+          {"overhead", raysToJson("overhead", evaluator.overhead())}};
 }
 
 /// Prints how many obstacles were missed, and those that were not reported in all maps.

@@ -75,6 +75,7 @@ def summary(errors):
             "by_camera": {scan["name"]: scan["all"] for scan in errors["scans"] if scan["name"] != "fused"},
             "classes": recall_by_class(errors["map"]),
             "missed_rays": fused["all"]["missed"] / max(1, fused["all"]["rays"]),
+            "overhead": fused["overhead"],
             "by_range": [(one["from_m"], one["to_m"], one["error_m"]["mean"] if one["rays"] else None)
                          for one in fused["by_range"]],
             "obstacles": len(judged), "missed": sum(not obstacle["reported"] for obstacle in judged),
@@ -153,6 +154,8 @@ def figures(found):
     yield Figure("range error within 5 m, 95 %", 100 * found["p95_m"], "cm")
     yield Figure("range error within 5 m, worst", 100 * found["worst_m"], "cm")
     yield Figure("rays missed", 100 * found["missed_rays"], "%")
+    yield Figure("rays missed of what only hangs above 1.7 m, as pipes do",
+                 percent(found["overhead"]["missed"], found["overhead"]["rays"]) if found["overhead"]["rays"] else None, "%")
     for from_m, to_m, mean_m in found["by_range"]:
         yield Figure(f"range error from {from_m:g} to {to_m:g} m, mean", None if mean_m is None else 100 * mean_m, "cm")
     yield figure(f"obstacles missed, of {found['obstacles']}", found["missed"], equal=0)
