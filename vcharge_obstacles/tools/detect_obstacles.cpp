@@ -30,7 +30,7 @@ namespace {
 using namespace vcharge;
 
 struct Arguments {
-  std::string bag, rig, options, range_options, range, output;
+  std::string bag, rig, options, range_options, object_options, range, output;
   std::vector<std::string> cameras;
   bool show_options = false;
 };
@@ -273,13 +273,16 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
   FolderTransaction output(arguments.output);
   Recorder recorder(output.path());
   ProcessorTime writing;
-  ObstacleMapper mapper(rig, options,
-                        [&](const ObstacleFrame& frame) { writing.add([&] { recorder.add(frame); }); });
-  ObjectTracker tracker(rig, object_options, [&](const ObjectFrame& frame) {
+  std::unique_ptr<ObjectTracker> tracker;
+  ObstacleMapper mapper(rig, options, [&](const ObstacleFrame& frame) {
+    tracker->setObstacles(frame.map);
+    writing.add([&] { recorder.add(frame); });
+  });
+  tracker = std::make_unique<ObjectTracker>(rig, object_options, [&](const ObjectFrame& frame) {
     mapper.setObjects(frame.stamp, frame.objects);
     recorder.add(frame);
   });
-  Pipeline pipeline(rig, range_options, arguments.range, &mapper, &tracker);
+  Pipeline pipeline(rig, range_options, arguments.range, &mapper, tracker.get());
   BagDriveSourceOptions source_options;
   source_options.cameras = object_options.cameras;
   source_options.max_image_gap_s = INFINITY;  // a camera that stops is reported, not an error
@@ -315,6 +318,7 @@ int main(int argc, char** argv) {
   app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
   app.add_option("--options", arguments.options, "YAML with overrides of ObstacleMapperOptions");
   app.add_option("--range-options", arguments.range_options, "YAML with overrides of RangeMapperOptions");
+  app.add_option("--object-options", arguments.object_options, "YAML with overrides of ObjectTrackerOptions");
   app.add_option("--range", arguments.range,
                  "folder that compute_range_maps wrote, instead of computing range maps");
   app.add_option("--cameras", arguments.cameras,
@@ -337,16 +341,19 @@ int main(int argc, char** argv) {
     if (!arguments.range_options.empty()) {
       readFieldsFromFile(arguments.range_options, &range_options);
     }
+    if (!arguments.object_options.empty()) {
+      readFieldsFromFile(arguments.object_options, &object_options);
+    }
     if (!arguments.cameras.empty()) {
-      options.cameras = arguments.cameras;
+      options.cameras = object_options.cameras = arguments.cameras;
     }
     range_options.cameras = options.cameras;
-    object_options.cameras = arguments.cameras;
     object_options.frames.waitForEverything();
     if (arguments.show_options) {
       std::cout << "# For --options\n"
                 << showOptions(options) << "\n# For --range-options\n"
-                << showOptions(range_options);
+                << showOptions(range_options) << "\n# For --object-options\n"
+                << showOptions(object_options);
       return;
     }
     detectObstacles(arguments, options, range_options, object_options, found);
