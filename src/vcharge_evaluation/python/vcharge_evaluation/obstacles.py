@@ -82,7 +82,7 @@ def summary(errors):
             "false_per_10_m": errors["map"]["false_cells_per_10_m"], "free_inside": errors["map"]["free_inside"],
             "observed_inside": errors["map"]["observed_inside"], "reports": approach["reports"],
             "corridor_free": cells["free_as_free"] / max(1, free), "corridor_unknown": cells["free_as_unknown"] / max(1, free),
-            "corridor_wrong": cells["occupied_as_free"],
+            "corridor_wrong": cells["occupied_as_free"], "paths": {name: approach[name] for name in ("ahead", "behind")},
             "alarms_per_minute": 60 * approach["false_alarms"] / max(1e-9, approach["duration_s"]),
             "alarms_per_m": approach["false_alarms"] / approach["driven_m"] if approach["driven_m"] > 0.1 else None}
 
@@ -166,6 +166,11 @@ def figures(found):
     yield Figure("free cells of the driving corridor that are free", 100 * found["corridor_free"], "%")
     yield Figure("the same, unknown", 100 * found["corridor_unknown"], "%")
     yield figure("occupied cells of the corridor that are free", found["corridor_wrong"], equal=0)
+    for name, path in found["paths"].items():
+        free = sum(path[f"free_as_{state}"] for state in ("free", "unknown", "occupied"))
+        yield figure(f"own path {name}, 0.5 to 4 m, after 2 m: free ground known free",
+                     percent(path["free_as_free"], free) if free else None, "%", at_least=97)
+        yield figure(f"own path {name}: occupied cells that are free", path["occupied_as_free"], equal=0)
     yield Figure("false alarms in the corridor a minute", found["alarms_per_minute"])
     yield Figure("false alarms in the corridor per metre", found["alarms_per_m"])
 
