@@ -32,7 +32,7 @@ using namespace vcharge;
 struct Arguments {
   std::string bag, rig, options, range_options, object_options, range, output;
   std::vector<std::string> cameras;
-  bool show_options = false;
+  bool show_options = false, no_objects = false;
 };
 
 /// Processor time of all threads of the process during parts of a run.
@@ -55,7 +55,8 @@ class ProcessorTime {
   std::clock_t ticks_ = 0;
 };
 
-/// Passes odometry to both stages, and range maps from the first to the second.
+/// Passes odometry and images to the stages, and range maps from the first to the second. `objects` may be
+/// null.
 class Pipeline : public DriveConsumer {
  public:
   Pipeline(const std::shared_ptr<const CameraRig>& rig, const RangeMapperOptions& range_options,
@@ -79,7 +80,9 @@ class Pipeline : public DriveConsumer {
   }
 
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
-    tracking_.add([&] { objects_->addImage(camera_index, stamp, image); });
+    if (objects_ != nullptr) {
+      tracking_.add([&] { objects_->addImage(camera_index, stamp, image); });
+    }
     ++num_images_;
     detecting_.add([&] {
       obstacles_->addImage(camera_index, stamp, fingerprintOf(image.pixels),
@@ -90,7 +93,9 @@ class Pipeline : public DriveConsumer {
     }
   }
   void addOdometry(const VehicleOdometry& odometry) override {
-    tracking_.add([&] { objects_->addOdometry(odometry); });
+    if (objects_ != nullptr) {
+      tracking_.add([&] { objects_->addOdometry(odometry); });
+    }
     detecting_.add([&] { obstacles_->addOdometry(odometry); });
     if (ranges_) {
       whole_.add([&] { ranges_->addOdometry(odometry); });
@@ -108,7 +113,9 @@ class Pipeline : public DriveConsumer {
       ranges_->finish();
     }
     obstacles_->finish();
-    objects_->finish();
+    if (objects_ != nullptr) {
+      objects_->finish();
+    }
   }
   /// Processor time without reading the bag and writing results; writing happens inside the detection.
   void reportTiming(double writing_s, nlohmann::json* found) const {
@@ -212,7 +219,9 @@ class Recorder {
   }
 
   void finish(const ObstacleMapper& mapper, nlohmann::json* found) const {
-    writeObjects(object_frames_, folder_);
+    if (!object_frames_.empty()) {
+      writeObjects(object_frames_, folder_);
+    }
     writeTextFileAtomically(folder_ + "/status.csv", table_);
     writeTextFileAtomically(folder_ + "/corridor.csv", corridors_);
     nlohmann::json cameras = nlohmann::json::array();
@@ -267,7 +276,9 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
   if (!std::filesystem::exists(arguments.bag)) {
     throw InputError(arguments.bag + ": no such file");  // before the output is created
   }
-  if (object_options.cameras.empty()) {
+  if (arguments.no_objects) {
+    object_options.cameras = options.cameras;
+  } else if (object_options.cameras.empty()) {
     object_options.cameras = findObjectCameras(arguments.bag, *rig, options.cameras);
   }
   FolderTransaction output(arguments.output);
@@ -275,13 +286,17 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
   ProcessorTime writing;
   std::unique_ptr<ObjectTracker> tracker;
   ObstacleMapper mapper(rig, options, [&](const ObstacleFrame& frame) {
-    tracker->setObstacles(frame.map);
+    if (tracker) {
+      tracker->setObstacles(frame.map);
+    }
     writing.add([&] { recorder.add(frame); });
   });
-  tracker = std::make_unique<ObjectTracker>(rig, object_options, [&](const ObjectFrame& frame) {
-    mapper.setObjects(frame.stamp, frame.objects);
-    recorder.add(frame);
-  });
+  if (!arguments.no_objects) {
+    tracker = std::make_unique<ObjectTracker>(rig, object_options, [&](const ObjectFrame& frame) {
+      mapper.setObjects(frame.stamp, frame.objects);
+      recorder.add(frame);
+    });
+  }
   Pipeline pipeline(rig, range_options, arguments.range, &mapper, tracker.get());
   BagDriveSourceOptions source_options;
   source_options.cameras = object_options.cameras;
@@ -325,6 +340,7 @@ int main(int argc, char** argv) {
                  "cameras of the rig by name (default: those of --options; for objects also the rig's "
                  "others that have extrinsics and images)");
   app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
+  app.add_flag("--no-objects", arguments.no_objects, "do not follow what moves: faster");
   addShowOptions(&app, &arguments.show_options);
   app.footer(
       "Keys of --json: num_maps, num_odometry_jumps, cameras (name, num_range_maps, num_without_pose, "

@@ -1,4 +1,4 @@
-#include "objects/known_obstacles.h"
+#include "occupancy/known_obstacles.h"
 
 #include <algorithm>
 #include <cmath>
