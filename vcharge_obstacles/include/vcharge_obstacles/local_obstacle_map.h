@@ -50,8 +50,8 @@ struct LocalObstacleMapOptions {
 
 /// Obstacles and free ground around the vehicle, fused over time and cameras as log-odds in a grid that
 /// scrolls with the vehicle in a fixed frame. A cell that is not observed again decays to unobserved with the
-/// distance driven, never with time: while the vehicle stands, motion stereo measures nothing, so all cells
-/// keep their state and only grow older.
+/// distance driven, never with time: while the vehicle stands, motion stereo measures nothing, so cells keep
+/// their state and only grow older, except where cameras that overlap measure.
 ///
 /// Deterministic; not thread safe.
 class LocalObstacleMap {
@@ -71,7 +71,10 @@ class LocalObstacleMap {
               const GroundArea& is_hidden = nullptr);
   /// Adds the observation of a camera; std::logic_error before the first moveTo(). `grid` is the
   /// detector's.
-  void add(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle);
+  ///
+  /// A map counts by the distance that its camera has moved since its last map. At rest it counts by time,
+  /// but all maps of one pose together count no more than two: their errors repeat. True if the camera rests.
+  bool add(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle);
   /// Makes free cells unobserved for which `is_unwatched` is true. It gets their middles in the vehicle frame
   /// of the last moveTo(). Occupied cells keep their state.
   void forgetFree(const GroundArea& is_unwatched);
@@ -98,6 +101,16 @@ class LocalObstacleMap {
     int64_t last_occupied_ns = kNever;
     int64_t held_until_ns = kNever;  // the cell cannot become free before
   };
+  /// What a camera's range map counts; at rest its evidence is bounded.
+  struct MapWeight {
+    double value;
+    bool is_at_rest;
+  };
+  /// Where a camera was at the last map that counts as moved, and the stamp of its last map.
+  struct LastObservation {
+    Eigen::Vector2d position_m;
+    Timestamp stamp;
+  };
   /// A camera's observation of the ground in one cell.
   struct GroundObservation;
   /// Part of an obstacle, in the fixed frame.
@@ -105,23 +118,24 @@ class LocalObstacleMap {
     Eigen::Vector2d point_m;
     double mass;
     double sigma_m;  // standard deviation along the ray
+    bool is_at_rest;
     const PolarObstacle* obstacle;
   };
   static constexpr int64_t kNever = INT64_MIN;
 
   void decay(double travelled_m, const RigidTransform& fixed_from_vehicle, const GroundArea& is_hidden);
-  double weightOf(const CameraObstacles& seen, const RigidTransform& fixed_from_vehicle);
+  MapWeight weightOf(const CameraObstacles& seen, const Eigen::Vector2d& position_m);
   void addGround(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle,
-                 double weight);
+                 const MapWeight& weight);
   GroundShadows shadowsFor(const CameraObstacles& seen, const Eigen::Vector2d& camera_m) const;
   std::vector<GroundObservation> observeGround(const CameraObstacles& seen, const CellObserver& observer,
                                                const PolarGrid& grid,
                                                const RigidTransform& fixed_from_vehicle) const;
   void holdChanged(const std::vector<GroundObservation>& observations, Timestamp stamp);
   void hold(int64_t x, int64_t y, double radius_m, Timestamp stamp);
-  void addGroundObservation(const GroundObservation& ground, double weight, Timestamp stamp);
+  void addGroundObservation(const GroundObservation& ground, const MapWeight& weight, Timestamp stamp);
   void addOccupied(const CameraObstacles& seen, const PolarGrid& grid,
-                   const RigidTransform& fixed_from_vehicle, double weight);
+                   const RigidTransform& fixed_from_vehicle, const MapWeight& weight);
   void addObstaclePoint(const ObstaclePoint& point, Timestamp stamp);
   double parallaxSigma_m(double range_m, const Eigen::Vector2d& direction) const;
   int8_t stateOf(const Cell& cell) const;
@@ -132,8 +146,8 @@ class LocalObstacleMap {
   Timestamp stamp_;
   RigidTransform fixed_from_vehicle_;
   double travel_m_ = 0.0;
-  Eigen::Vector2d travel_direction_{0.0, 0.0};                   // unit; zero before the first motion
-  std::map<std::string, Eigen::Vector2d> last_camera_position_;  // camera position at its last observation
+  Eigen::Vector2d travel_direction_{0.0, 0.0};               // unit; zero before the first motion
+  std::map<std::string, LastObservation> last_observation_;  // by camera
 };
 
 }  // namespace vcharge

@@ -60,7 +60,7 @@ enum class ObstacleCameraState {
   kSilent,        ///< images have stopped: ground that no other camera sees is not free
   kFrozen,        ///< the images repeat one while the vehicle moves: as if silent, range maps are ignored
   kNoPose,        ///< no odometry at the range maps' stamps
-  kStanding,      ///< the vehicle stands: motion stereo measures nothing
+  kStanding,      ///< the vehicle stands: only the overlap of cameras is measured, or nothing
   kHardlySees,    ///< few ranges: night, dirt, no texture
   kGroundLost,    ///< the ground is tilted beyond the bounds: no cell is cleared
   kGroundUnsure,  ///< few ground points: no cell is cleared

@@ -34,8 +34,9 @@ constexpr double kUnknownDecay = 0.7;
 constexpr double kChangedHold_s = 0.3;
 // Within this angle of the direction of travel missing ranges give no evidence: stereo has no parallax.
 constexpr double kBlindAngle_rad = 0.35;
-// Observations of a camera that has moved less have correlated errors, and weigh less.
-constexpr double kIndependentMotion_m = 0.1;
+// All maps of one pose together change a cell to at most the log-odds of this many maps: just enough to be
+// occupied or free, and so little that one map to the contrary makes it unobserved again.
+constexpr double kMapsAtRest = 2.0;
 
 RigidTransform levelled(const RigidTransform& transform) {
   return RigidTransform::planar(transform.translation().x(), transform.translation().y(),
@@ -92,22 +93,14 @@ void LocalObstacleMap::moveTo(Timestamp stamp, const RigidTransform& fixed_from_
   fixed_from_vehicle_ = level;
 }
 
-void LocalObstacleMap::add(const CameraObstacles& seen, const PolarGrid& grid,
+bool LocalObstacleMap::add(const CameraObstacles& seen, const PolarGrid& grid,
                            const RigidTransform& fixed_from_vehicle) {
   check(has_pose_, "LocalObstacleMap::add: moveTo() comes first");
   const RigidTransform level = levelled(fixed_from_vehicle);
-  const double weight = weightOf(seen, level);
+  const MapWeight weight = weightOf(seen, transformed(level, seen.origin_m));
   addGround(seen, grid, level, weight);
   addOccupied(seen, grid, level, weight);
-}
-
-/// Weight of a camera's range map: maps from nearby positions use the same images, so errors correlate.
-double LocalObstacleMap::weightOf(const CameraObstacles& seen, const RigidTransform& fixed_from_vehicle) {
-  const Eigen::Vector2d position = transformed(fixed_from_vehicle, seen.origin_m);
-  const auto [last, is_first] = last_camera_position_.try_emplace(seen.camera_name, position);
-  const double moved_m = (position - last->second).norm();
-  last->second = position;
-  return is_first ? 1.0 : std::min(1.0, moved_m / kIndependentMotion_m);
+  return weight.is_at_rest;
 }
 
 struct LocalObstacleMap::GroundObservation {
@@ -178,7 +171,7 @@ std::vector<LocalObstacleMap::GroundObservation> LocalObstacleMap::observeGround
 }
 
 void LocalObstacleMap::addGround(const CameraObstacles& seen, const PolarGrid& grid,
-                                 const RigidTransform& fixed_from_vehicle, double weight) {
+                                 const RigidTransform& fixed_from_vehicle, const MapWeight& weight) {
   const std::vector<GroundObservation> observations =
       observeGround(seen, CellObserver(seen, grid, options_.cell_size_m), grid, fixed_from_vehicle);
   holdChanged(observations, seen.stamp);
@@ -212,23 +205,27 @@ void LocalObstacleMap::hold(int64_t x, int64_t y, double radius_m, Timestamp sta
   }
 }
 
-void LocalObstacleMap::addGroundObservation(const GroundObservation& ground, double weight, Timestamp stamp) {
+void LocalObstacleMap::addGroundObservation(const GroundObservation& ground, const MapWeight& weight,
+                                            Timestamp stamp) {
   const CellObservation& observed = ground.cell;
   Cell* cell = &cells_.at(ground.x, ground.y);
   const bool shows_ground = !observed.blocked && observed.free_fraction >= kMinFreeFraction;
+  // At rest, ground without a range is mostly ground that only one camera sees.
+  const double unknown_fraction = weight.is_at_rest ? 0.0 : observed.unknown_fraction;
+  const double hidden_fraction = observed.hidden_fraction + unknown_fraction;
   if (shows_ground && !ground.in_shadow) {
-    const double log_odds = cell->log_odds - weight * kFreeLogOdds * observed.free_fraction;
+    const double log_odds = cell->log_odds - weight.value * kFreeLogOdds * observed.free_fraction;
     const bool may_free =
         stamp.nanoseconds() >= cell->held_until_ns && (ground.may_free || stateOf(*cell) == kCellFree);
-    const double least = may_free ? kMinCellLogOdds : std::min(0.0, static_cast<double>(cell->log_odds));
+    const double bound = weight.is_at_rest ? -kMapsAtRest * kFreeLogOdds : kMinCellLogOdds;
+    const double least = std::min(may_free ? bound : 0.0, static_cast<double>(cell->log_odds));
     cell->log_odds = static_cast<float>(std::max(least, log_odds));
     cell->last_seen_ns = stamp.nanoseconds();
     cell->travel_m = static_cast<float>(travel_m_);
-  } else if (cell->log_odds < 0.0F &&
-             (shows_ground || observed.hidden_fraction + observed.unknown_fraction >= kMinHiddenFraction)) {
+  } else if (cell->log_odds < 0.0F && (shows_ground || hidden_fraction >= kMinHiddenFraction)) {
     // An obstacle may now be there or in front of it, so the cell decays towards unobserved.
-    const bool hides = shows_ground || observed.hidden_fraction >= observed.unknown_fraction;
-    cell->log_odds *= static_cast<float>(std::pow(hides ? kHiddenDecay : kUnknownDecay, weight));
+    const bool hides = shows_ground || observed.hidden_fraction >= unknown_fraction;
+    cell->log_odds *= static_cast<float>(std::pow(hides ? kHiddenDecay : kUnknownDecay, weight.value));
   }
 }
 
@@ -239,8 +236,16 @@ void LocalObstacleMap::addObstaclePoint(const ObstaclePoint& point, Timestamp st
     return;
   }
   Cell& cell = cells_.at(x, y);
-  cell.log_odds = std::min(static_cast<float>(kMaxCellLogOdds),
-                           cell.log_odds + static_cast<float>(kOccupiedLogOdds * point.mass));
+  cell.travel_m = static_cast<float>(travel_m_);
+  cell.last_seen_ns = cell.last_occupied_ns = stamp.nanoseconds();
+  const float before = cell.log_odds;
+  const double most =
+      point.is_at_rest ? std::max<double>(before, kMapsAtRest * kOccupiedLogOdds) : kMaxCellLogOdds;
+  cell.log_odds =
+      std::min(static_cast<float>(most), before + static_cast<float>(kOccupiedLogOdds * point.mass));
+  if (point.is_at_rest && cell.log_odds <= before) {
+    return;  // the means do not improve by errors that repeat
+  }
   const double sigma_m = point.sigma_m;
   const auto weight = static_cast<float>(point.mass / (sigma_m * sigma_m + 1e-4));
   const float kept = kMemory * cell.weight;
@@ -254,8 +259,6 @@ void LocalObstacleMap::addObstaclePoint(const ObstaclePoint& point, Timestamp st
   blend(&cell.sigma_m, sigma_m);
   blend(&cell.height_m, point.obstacle->height_m);
   blend(&cell.height_sigma_m, point.obstacle->height_sigma_m);
-  cell.travel_m = static_cast<float>(travel_m_);
-  cell.last_seen_ns = cell.last_occupied_ns = stamp.nanoseconds();
 }
 
 /// Standard deviation of a range due to the error of the camera's motion across the ray. Directions are in
@@ -269,7 +272,7 @@ double LocalObstacleMap::parallaxSigma_m(double range_m, const Eigen::Vector2d& 
 }
 
 void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid& grid,
-                                   const RigidTransform& fixed_from_vehicle, double weight) {
+                                   const RigidTransform& fixed_from_vehicle, const MapWeight& weight) {
   const double cell_m = options_.cell_size_m;
   const double yaw_rad = yawOfRotation(fixed_from_vehicle.rotation());
   for (const PolarObstacle& obstacle : seen.obstacles) {
@@ -279,12 +282,12 @@ void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid&
     const double width_m = obstacle.range_m * grid.increment_rad();
     const int across = std::max(1, static_cast<int>(std::ceil(width_m / cell_m)));
     // Close to the camera, several rays meet one cell and together count as one observation.
-    const double ray_mass =
-        weight * obstacle.weight * std::min(1.0, width_m / cell_m * 1.5) * std::max(0.3, obstacle.support);
+    const double ray_mass = weight.value * obstacle.weight * std::min(1.0, width_m / cell_m * 1.5) *
+                            std::max(0.3, obstacle.support);
     const double middle_rad = grid.angle_rad(obstacle.ray) + yaw_rad;
-    const double sigma_m =
-        std::hypot(obstacle.range_sigma_m,
-                   parallaxSigma_m(obstacle.range_m, {std::cos(middle_rad), std::sin(middle_rad)}));
+    const Eigen::Vector2d middle(std::cos(middle_rad), std::sin(middle_rad));
+    const double parallax_sigma_m = weight.is_at_rest ? 0.0 : parallaxSigma_m(obstacle.range_m, middle);
+    const double sigma_m = std::hypot(obstacle.range_sigma_m, parallax_sigma_m);
     const double sharpness = std::min(1.0, kSharpSigma_m / sigma_m);
     const double observation_mass = sharpness * sharpness * ray_mass;
     const int along =
@@ -304,9 +307,10 @@ void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid&
       for (int step = -along; step <= along; ++step) {
         const Eigen::Vector2d point_in_vehicle =
             seen.origin_m + (obstacle.range_m + step * cell_m) * direction;
-        addObstaclePoint({transformed(fixed_from_vehicle, point_in_vehicle),
-                          observation_mass * density(step) / normalizer, sigma_m, &obstacle},
-                         seen.stamp);
+        addObstaclePoint(
+            {transformed(fixed_from_vehicle, point_in_vehicle), observation_mass * density(step) / normalizer,
+             sigma_m, weight.is_at_rest, &obstacle},
+            seen.stamp);
       }
     }
   }
@@ -375,8 +379,8 @@ void LocalObstacleMap::reanchor(const RigidTransform& new_from_old_fixed) {
   moved.travel_direction_ =
       (new_from_old.rotation() * Eigen::Vector3d(travel_direction_.x(), travel_direction_.y(), 0.0))
           .head<2>();
-  for (const auto& [name, position] : last_camera_position_) {
-    moved.last_camera_position_[name] = transformed(new_from_old, position);
+  for (const auto& [name, last] : last_observation_) {
+    moved.last_observation_[name] = {transformed(new_from_old, last.position_m), last.stamp};
   }
   *this = moved;
 }

@@ -201,14 +201,62 @@ TEST_F(LocalObstacleMapTest, ReanchoringMovesObstaclesWithTheirFrame) {
               1e-9);
 }
 
-TEST_F(LocalObstacleMapTest, ObservationsFromTheSamePositionCountOnce) {
-  observe(kPerson, 0.0);
-  const ObstacleMap first = map_.snapshot();
-  for (int i = 0; i < 50; ++i) {
+TEST_F(LocalObstacleMapTest, MapsAtRestCountTwoAndNoMore) {
+  for (int i = 0; i < 10; ++i) {
     observe(kPerson, 0.0);
   }
-  EXPECT_EQ(countCells(map_.snapshot(), kCellFree), countCells(first, kCellFree));
-  EXPECT_EQ(countCells(map_.snapshot(), kCellOccupied), countCells(first, kCellOccupied));
+  EXPECT_EQ(stateAt(1.9, 2.85), kCellOccupied);
+  EXPECT_EQ(stateAt(1.9, 2.2), kCellFree);
+  for (int i = 0; i < 90; ++i) {
+    observe(kPerson, 0.0);
+  }
+  // Little to the contrary changes what 100 maps have told: 1.8 - 0.6 < 1.5 and -1.2 / 2 > -1. The first two
+  // maps without the person are within the time for which it hides ground.
+  for (int i = 0; i < 4; ++i) {
+    observe({}, 0.0);
+  }
+  EXPECT_NE(stateAt(1.9, 2.85), kCellOccupied);
+  const BoxWorld nearer{{{{1.7, 2.0, 0.0}, {2.1, 2.4, 1.7}}}};
+  observe(nearer, 0.0);
+  EXPECT_EQ(stateAt(1.9, 2.2), kCellUnobserved);
+}
+
+TEST_F(LocalObstacleMapTest, AtRestWhatCameIsNotFreeAfterAThirdOfASecondAndWhatLeftGoesWithinOne) {
+  drive({}, 0.0, 0.8);
+  ASSERT_EQ(stateAt(1.9, 2.85), kCellFree);
+  for (int i = 0; i < 4; ++i) {
+    observe(kPerson, 0.8);
+  }
+  EXPECT_NE(stateAt(1.9, 2.85), kCellFree);
+  for (int i = 0; i < 4; ++i) {
+    observe(kPerson, 0.8);
+  }
+  EXPECT_EQ(stateAt(1.9, 2.85), kCellOccupied);
+  drive(kPerson, 0.9, 1.7);  // the log-odds reach their bound of 3.5
+  for (int i = 0; i < 12; ++i) {
+    observe({}, 1.7);
+  }
+  EXPECT_NE(stateAt(1.9, 2.85), kCellOccupied);
+}
+
+TEST_F(LocalObstacleMapTest, AtRestGroundWithoutARangeKeepsItsState) {
+  drive(kPerson, 0.0, 0.8);
+  const ObstacleMap before = map_.snapshot();
+  for (int i = 0; i < 50; ++i) {
+    observe(kPerson, pose_.translation().x(), {0.01, 1.0, 1});  // no range at all
+  }
+  EXPECT_EQ(cv::countNonZero(map_.snapshot().state != before.state), 0);
+}
+
+TEST_F(LocalObstacleMapTest, AtRestMapsOfAnUnchangedWorldKeepItsStates) {
+  drive(kPerson, 0.0, 0.8);
+  const ObstacleMap before = map_.snapshot();
+  for (int i = 0; i < 200; ++i) {
+    observe(kPerson, 0.8);
+  }
+  const ObstacleMap after = map_.snapshot();
+  EXPECT_GE(countCells(after, kCellFree), 98 * countCells(before, kCellFree) / 100);
+  EXPECT_GE(countCells(after, kCellOccupied), countCells(before, kCellOccupied));
 }
 
 }  // namespace

@@ -36,6 +36,7 @@ struct ObstacleMapper::Camera {
   MeiCamera::Parameters parameters = MeiCamera::Parameters::Zero();  // camera of the range maps
   cv::Size size;
   ObstacleCameraStatus status;
+  bool is_at_rest = false;  // at its last range map
 };
 
 std::string toString(ObstacleCameraState state) {
@@ -272,7 +273,7 @@ void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle
       addAppearance(camera->watch->compare(frame->stamp, reference, obstacles.ground, fixed_from_vehicle),
                     grid_, &obstacles);
     }
-    map_.add(obstacles, grid_, fixed_from_vehicle);
+    camera->is_at_rest = map_.add(obstacles, grid_, fixed_from_vehicle);
     cameras.push_back(&obstacles);
   }
   if (!last_emitted_ || frame->stamp > *last_emitted_) {  // otherwise the next map includes it
@@ -345,6 +346,12 @@ std::vector<ObstacleCameraStatus> ObstacleMapper::status() const {
       continue;
     }
     ObstacleCameraStatus status = camera->status;
+    if (camera->is_at_rest && status.state != ObstacleCameraState::kNoPose &&
+        status.state != ObstacleCameraState::kGroundLost) {
+      status.state = ObstacleCameraState::kStanding;
+      status.message = "the vehicle stands: only the overlap of cameras is measured, " +
+                       toText(100.0 * status.known_fraction, 0) + " % of the pixels have a range";
+    }
     status.late = static_cast<uint64_t>(assembler_->counters().late_images[camera->index]);
     const std::optional<Timestamp> newest = assembler_->newestImage(camera->index);
     if (odometry.last() && newest && toSeconds(odometry.last()->stamp - *newest) >= options_.max_silence_s) {

@@ -93,5 +93,18 @@ TEST_F(StandingMapperTest, WhatChangesBecomesUnknownAndStaysSo) {
   EXPECT_EQ(count(after, kCellOccupied), count(before_, kCellOccupied));
 }
 
+TEST_F(StandingMapperTest, RangeMapsMeasureChangedGroundAgainAndAreReported) {
+  person_from_ = kStopTick + 200;
+  person_until_ = kStopTick + 300;
+  EXPECT_EQ(stateAt(stand(300), kPersonX_m, kPersonY_m), kCellUnobserved);
+  for (int i = 0; i < 25; ++i) {
+    addRangeMaps(tick_ - 1);  // at the pose where the vehicle stands
+    stand(4);
+  }
+  EXPECT_EQ(stateAt(frames_.back(), kPersonX_m, kPersonY_m), kCellFree);
+  EXPECT_EQ(statusOf("left").state, ObstacleCameraState::kStanding);
+  EXPECT_NE(statusOf("left").message.find("only the overlap of cameras is measured"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace vcharge
