@@ -22,6 +22,19 @@ std_msgs::ColorRGBA colourOf(double height_m) {
   return colour;
 }
 
+/// An empty grid with the header, origin and resolution of a map.
+template <class Map>
+nav_msgs::OccupancyGrid makeGrid(const Map& map) {
+  nav_msgs::OccupancyGrid grid;
+  grid.header.stamp = fromTimestamp(map.stamp);
+  grid.header.frame_id = map.frame_id;
+  grid.info.map_load_time = grid.header.stamp;
+  grid.info.resolution = static_cast<float>(map.cell_size_m);
+  grid.info.origin.position = pointOf(map.origin_m, 0.0);
+  grid.info.origin.orientation.w = 1.0;
+  return grid;
+}
+
 visualization_msgs::Marker makeMarker(const ObstacleMap& map, const char* name, int type, double scale) {
   visualization_msgs::Marker marker = makeMarker(map.stamp, map.frame_id, name, type);
   marker.scale.x = marker.scale.y = marker.scale.z = scale;
@@ -32,19 +45,29 @@ visualization_msgs::Marker makeMarker(const ObstacleMap& map, const char* name, 
 }  // namespace
 
 nav_msgs::OccupancyGrid toMessage(const ObstacleMap& map) {
-  nav_msgs::OccupancyGrid grid;
-  grid.header.stamp = fromTimestamp(map.stamp);
-  grid.header.frame_id = map.frame_id;
-  grid.info.map_load_time = grid.header.stamp;
-  grid.info.resolution = static_cast<float>(map.cell_size_m);
+  nav_msgs::OccupancyGrid grid = makeGrid(map);
   grid.info.width = static_cast<uint32_t>(map.state.cols);
   grid.info.height = static_cast<uint32_t>(map.state.rows);
-  grid.info.origin.position = pointOf(map.origin_m, 0.0);
-  grid.info.origin.orientation.w = 1.0;
   grid.data.reserve(map.state.total());
   for (int row = 0; row < map.state.rows; ++row) {
     const int8_t* cells = map.state.ptr<int8_t>(row);
     grid.data.insert(grid.data.end(), cells, cells + map.state.cols);
+  }
+  return grid;
+}
+
+nav_msgs::OccupancyGrid toMessage(const StepMap& map) {
+  nav_msgs::OccupancyGrid grid = makeGrid(map);
+  grid.info.width = static_cast<uint32_t>(map.height_m.cols);
+  grid.info.height = static_cast<uint32_t>(map.height_m.rows);
+  grid.data.reserve(map.height_m.total());
+  for (int row = 0; row < map.height_m.rows; ++row) {
+    for (int column = 0; column < map.height_m.cols; ++column) {
+      const float height_m = map.height_m.at<float>(row, column);
+      grid.data.push_back(height_m > 0.0F        ? kCellOccupied
+                          : std::isnan(height_m) ? kCellUnobserved
+                                                 : kCellFree);
+    }
   }
   return grid;
 }

@@ -9,6 +9,7 @@
 #include <visualization_msgs/MarkerArray.h>
 
 #include "vcharge_core/dense_maps/obstacle_map.h"
+#include "vcharge_core/dense_maps/step_map.h"
 #include "vcharge_obstacles/obstacle_mapper.h"
 #include "vcharge_ros/drive_monitor.h"
 
@@ -20,6 +21,9 @@ namespace vcharge {
 
 /// Cells: -1 unobserved, 0 free, 100 occupied. frame_id and stamp are the map's.
 nav_msgs::OccupancyGrid toMessage(const ObstacleMap& map);
+
+/// Cells: -1 unknown, 0 even, 100 step. frame_id and stamp are the map's.
+nav_msgs::OccupancyGrid toMessage(const StepMap& map);
 
 /// Ranges to obstacles in metres; +infinity where all is free up to the maximum range; NaN where unknown.
 /// Intensities: height of the obstacle in metres, 0 without one. `frame_id` lies at the scan's origin on the

@@ -113,6 +113,26 @@ TEST(ToOctreeTest, VoxelsHaveThePositionsAndStatesOfTheCells) {
   EXPECT_EQ(stateAt(0.15, 5.25, 0.45), kCellUnobserved);
 }
 
+TEST(StepMessageTest, HoldsStepsEvenAndUnknownGround) {
+  StepMap map = StepMap::unknown({4, 3}, 0.05);
+  map.stamp = Timestamp::fromNanoseconds(5000000000);
+  map.frame_id = "odom";
+  map.origin_m = {-0.2, 5.0};
+  map.height_m.at<float>(0, 1) = 0.0F;
+  map.height_m.at<float>(2, 3) = 0.08F;
+  const nav_msgs::OccupancyGrid grid = toMessage(map);
+  EXPECT_EQ(grid.header.frame_id, "odom");
+  EXPECT_EQ(grid.header.stamp.sec, 5U);
+  EXPECT_EQ(grid.info.width, 4U);
+  EXPECT_EQ(grid.info.height, 3U);
+  EXPECT_NEAR(grid.info.resolution, 0.05, 1e-6);
+  EXPECT_NEAR(grid.info.origin.position.y, 5.0, 1e-12);
+  ASSERT_EQ(grid.data.size(), 12U);
+  for (size_t i = 0; i < grid.data.size(); ++i) {
+    EXPECT_EQ(grid.data[i], i == 1 ? 0 : i == 11 ? 100 : -1) << i;
+  }
+}
+
 TEST(CorridorMessageTest, HoldsBothDirectionsInTheVehicleFrame) {
   Corridor corridor;
   corridor.curvature_per_m = 0.1;
@@ -166,7 +186,8 @@ TEST(CorridorMessageTest, StripsAreGreenThenYellowThenRedAlongTheArc) {
     const double inner_m = std::hypot(3.75, 5.0 - 1.15);
     const double outer_m = std::hypot(3.75, 5.0 + 1.15);
     EXPECT_NEAR(std::min(std::abs(radius_m - inner_m), std::abs(radius_m - outer_m)), 0.0, 1e-9);
-    const double travel_m = 0.1 * static_cast<double>(i / 6) + 0.05;
+    const size_t strip = i / 6;
+    const double travel_m = 0.1 * static_cast<double>(strip) + 0.05;
     const bool is_free = travel_m < 0.3 || (travel_m > 0.6 && travel_m < 2.0);
     EXPECT_EQ(forward.colors[i].r, is_free ? 0.0F : 1.0F) << travel_m;
     EXPECT_EQ(forward.colors[i].g, travel_m < 3.0 ? 1.0F : 0.0F) << travel_m;

@@ -8,7 +8,7 @@
 #include <tf2_ros/transform_listener.h>
 #include <pluginlib/class_list_macros.hpp>
 
-#include "image_listener.h"
+#include "mapper_listener.h"
 #include "obstacle_messages.h"
 #include "obstacle_publisher.h"
 #include "range_map_reader.h"
@@ -18,11 +18,11 @@
 
 namespace vcharge {
 
-/// Maps obstacles and free ground around the vehicle from depth_nodelet's /dense/<camera>/range/*, /odom and
-/// images. Publishes the topics of ObstaclePublisher and a status per camera in /diagnostics. Callbacks only
-/// queue messages; a separate thread processes them. Parameters: ~rig (path), ~options
-/// (ObstacleMapperOptions; fixed_frame: map needs localization's map -> odom on /tf), ~odometry_topic,
-/// ~lossless_replay (every range map in order, however late; otherwise those that wait too long are dropped).
+/// Maps obstacles and free ground around the vehicle from depth_nodelet's /dense/<camera>/range/*, /odom,
+/// images, and object_nodelet's objects. Publishes the topics of ObstaclePublisher and a status per camera in
+/// /diagnostics. Callbacks only queue messages; a thread processes them. Parameters: ~rig (path), ~options
+/// (ObstacleMapperOptions; fixed_frame: map needs map -> odom on /tf), ~odometry_topic, ~lossless_replay
+/// (every range map in order, however late; otherwise those that wait too long are dropped).
 class ObstacleNodelet : public Nodelet {
  public:
   ObstacleNodelet() : Nodelet("obstacles") {}
@@ -55,16 +55,16 @@ class ObstacleNodelet : public Nodelet {
           "/" + cameras[i].camera_name, [this, i] { return report(i); }, Threads::kOne);
       addCamera(cameras[i].camera_name);
     }
-    images_ = std::make_unique<ImageListener>(
+    inputs_ = std::make_unique<MapperListener>(
         &node(), *rig_, cameras, inputQueue(), &guard(),
-        [this](auto... image) { worker_->push([=] { mapper_->addImage(image...); }, false); });
+        [this](auto... image) { worker_->push([=] { mapper_->addImage(image...); }, false); },
+        [this](auto... objects) { worker_->push([=] { mapper_->setObjects(objects...); }, false); });
     subscribe<nav_msgs::Odometry>(
         odometry_topic_, inputQueue(),
         [this](const nav_msgs::OdometryConstPtr& message) { addOdometry(*message); });
   }
 
   uint32_t inputQueue() const { return isLossless() ? 0 : kInputQueue; }
-
   void addCamera(const std::string& name) {
     const std::string topic = "/dense/" + name + "/range";
     const auto reader = std::make_shared<RangeMapReader>(rig_->cameras[rig_->cameraIndex(name)], topic);
@@ -111,7 +111,7 @@ class ObstacleNodelet : public Nodelet {
   std::unique_ptr<tf2_ros::TransformListener> listener_;
   std::unique_ptr<OrderedWorker<Task>> worker_;
   std::vector<std::unique_ptr<RangeMapSubscriber>> cameras_;
-  std::unique_ptr<ImageListener> images_;
+  std::unique_ptr<MapperListener> inputs_;
 };
 
 }  // namespace vcharge

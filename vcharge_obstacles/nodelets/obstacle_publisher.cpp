@@ -22,6 +22,7 @@ ObstaclePublisher::ObstaclePublisher(ros::NodeHandle* node, std::shared_ptr<cons
                                      const std::vector<ObstacleCameraStatus>& cameras, uint32_t queue_size)
     : rig_(std::move(rig)),
       grid_(node->advertise<nav_msgs::OccupancyGrid>("/obstacles/grid", queue_size, true)),
+      steps_(node->advertise<nav_msgs::OccupancyGrid>("/obstacles/steps", queue_size, true)),
       scan_(node->advertise<sensor_msgs::LaserScan>("/obstacles/scan", queue_size)),
       corridor_(node->advertise<vcharge_msgs::Corridor>("/obstacles/corridor", queue_size)),
       markers_(node->advertise<visualization_msgs::MarkerArray>("/obstacles/markers", queue_size)),
@@ -42,6 +43,7 @@ ObstaclePublisher::ObstaclePublisher(ros::NodeHandle* node, std::shared_ptr<cons
 
 void ObstaclePublisher::publish(const ObstacleFrame& frame) const {
   grid_.publish(toMessage(frame.map));
+  steps_.publish(toMessage(frame.steps));
   scan_.publish(toMessage(frame.scan, rig_->vehicle_frame));
   corridor_.publish(toMessage(frame.corridor, frame.map.stamp, rig_->vehicle_frame));
   if (markers_.getNumSubscribers() > 0) {

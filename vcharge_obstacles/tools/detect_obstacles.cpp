@@ -15,6 +15,7 @@
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/dense_maps/obstacle_map_file.h"
 #include "vcharge_core/dense_maps/range_map_file.h"
+#include "vcharge_core/dense_maps/step_map_file.h"
 #include "vcharge_core/files/content_hash.h"
 #include "vcharge_core/files/file_io.h"
 #include "vcharge_core/motion/tracked_object_file.h"
@@ -188,7 +189,9 @@ class Recorder {
       scans.push_back(camera.scan);
     }
     writeObstacles(frame.map, scans, folder_);
+    writeStepMap(frame.steps, folder_);
     addToHash(frame.map, &hasher_);
+    addToHash(frame.steps, &hasher_);
     for (const ObstacleScan& scan : scans) {
       addToHash(scan, &hasher_);
     }
@@ -272,7 +275,10 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
   ProcessorTime writing;
   ObstacleMapper mapper(rig, options,
                         [&](const ObstacleFrame& frame) { writing.add([&] { recorder.add(frame); }); });
-  ObjectTracker tracker(rig, object_options, [&](const ObjectFrame& frame) { recorder.add(frame); });
+  ObjectTracker tracker(rig, object_options, [&](const ObjectFrame& frame) {
+    mapper.setObjects(frame.stamp, frame.objects);
+    recorder.add(frame);
+  });
   Pipeline pipeline(rig, range_options, arguments.range, &mapper, &tracker);
   BagDriveSourceOptions source_options;
   source_options.cameras = object_options.cameras;

@@ -33,6 +33,9 @@ struct CrossingObject {
 
 /// Objects after a time, moved with their velocities.
 std::vector<TrackedObject> movedObjects(const std::vector<TrackedObject>& objects, double time_s);
+/// Objects in another frame whose z axis points up too.
+std::vector<TrackedObject> transformed(const RigidTransform& target_from_source,
+                                       const std::vector<TrackedObject>& objects);
 
 /// What lies ahead in one direction of travel. Travel is the arc length of the vehicle frame's origin; on a
 /// straight path it is the distance from the bumper.

@@ -36,8 +36,11 @@ struct ObjectTrackerOptions {
 ///  4. Moving points are set on the ground where the image, compared with an earlier one that is warped by
 ///     the ground plane, begins to differ below them.
 ///  5. Groups of points get a position, a velocity and their covariances.
-///  6. A Kalman filter per object joins cameras and time.
-///  7. Objects without points are found by their whole body in the next image, and by their contact.
+///  6. Narrow things that stand apart on the ground are followed by their contacts: somebody who comes
+///  straight
+///     ahead moves in the image as something static that is nearer would.
+///  7. A Kalman filter per object joins cameras and time.
+///  8. Objects without points are found by their whole body in the next image, and by their contact.
 ///
 /// Deterministic; not thread safe.
 class ObjectTracker : public DriveConsumer {

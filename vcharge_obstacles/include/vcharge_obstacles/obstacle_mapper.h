@@ -14,6 +14,7 @@
 #include "vcharge_obstacles/ground_watch.h"
 #include "vcharge_obstacles/local_obstacle_map.h"
 #include "vcharge_obstacles/obstacle_detector.h"
+#include "vcharge_obstacles/step_mapper.h"
 
 namespace vcharge {
 
@@ -39,6 +40,7 @@ struct ObstacleMapperOptions {
   VCHARGE_OPTION_GROUP(ObstacleDetectorOptions, detector, {}, "Obstacles in one range map.");
   VCHARGE_OPTION_GROUP(GroundWatchOptions, watch, {}, "Ground whose appearance changes.");
   VCHARGE_OPTION_GROUP(LocalObstacleMapOptions, map, {}, "Fusion over time and cameras.");
+  VCHARGE_OPTION_GROUP(StepMapperOptions, steps, {}, "Height of the ground near the vehicle.");
   VCHARGE_OPTION_GROUP(CorridorOptions, corridor, {}, "What the vehicle sweeps on its present arc.");
   VCHARGE_OPTION_GROUP(FrameAssemblerOptions, frames, {}, "Range maps of one stamp, and odometry.");
   VCHARGE_OPTION(double, max_silence_s, 1.0, positive(),
@@ -86,8 +88,9 @@ struct ObstacleCameraStatus {
 /// that are not newer than the last frame are fused without emitting a frame.
 struct ObstacleFrame {
   ObstacleMap map;
-  ObstacleScan scan;                     ///< scan of the fused map
-  Corridor corridor;                     ///< for the curvature of the path that the vehicle drives
+  StepMap steps;      ///< kerbs, holes and other steps near the vehicle, also those too low for the map
+  ObstacleScan scan;  ///< scan of the fused map
+  Corridor corridor;  ///< for the curvature of the path that the vehicle drives
   std::vector<CameraObstacles> cameras;  ///< observations added at this stamp, in the rig's order
   std::vector<ObstacleCameraStatus> status;
 };
@@ -117,7 +120,7 @@ class ObstacleMapper {
                 const std::function<cv::Mat()>& pixels);
   /// Sets localization's correction. Required with fixed_frame: map, ignored otherwise.
   void setMapFromOdom(const RigidTransform& map_from_odom);
-  /// Sets the objects that move around the vehicle, in the map's fixed frame. They enter the corridors of the
+  /// Sets the objects that move around the vehicle, in the frame odom. They enter the corridors of the
   /// following frames, moved with their velocities, until they are replaced or kObjectLife_s old.
   void setObjects(Timestamp stamp, std::vector<TrackedObject> objects);
   /// InputError for a range map of a camera that is not in use, or that was computed with another rig.
@@ -137,6 +140,7 @@ class ObstacleMapper {
   struct Camera;
   struct Observation {
     CameraObstacles obstacles;
+    HeightPoints heights;
     cv::Mat reference;  // the image of the range map; may be empty
   };
   using Frame = AssembledFrame<Observation>;
@@ -150,7 +154,8 @@ class ObstacleMapper {
   void forgetUnwatched(Timestamp stamp, LocalObstacleMap* map) const;
   void setLiveness(const Camera& camera, ObstacleCameraStatus* status) const;
   void noteWithoutPose(const Frame& frame);
-  void emit(const LocalObstacleMap& map, const std::vector<const CameraObstacles*>& cameras);
+  void emit(const LocalObstacleMap& map, const StepMapper& steps,
+            const std::vector<const CameraObstacles*>& cameras);
   Corridor findCorridor(const ObstacleMap& map);
   void emitAt(Timestamp stamp);
   void moveTo(Timestamp stamp, const RigidTransform& fixed_from_vehicle, LocalObstacleMap* map) const;
@@ -165,6 +170,7 @@ class ObstacleMapper {
   std::vector<std::unique_ptr<Camera>> cameras_;  // indexed as in the rig; null if not in use
   std::unique_ptr<FrameAssembler<Observation>> assembler_;
   LocalObstacleMap map_;
+  StepMapper steps_;
   const CorridorFinder corridor_finder_;
   std::unique_ptr<PathCurvature> curvature_;
   std::unique_ptr<SilentCameras> silent_;

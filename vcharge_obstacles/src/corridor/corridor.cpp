@@ -259,19 +259,6 @@ bool isFinite(const TrackedObject& object) {
 
 }  // namespace
 
-std::vector<TrackedObject> movedObjects(const std::vector<TrackedObject>& objects, double time_s) {
-  std::vector<TrackedObject> moved = objects;
-  for (TrackedObject& object : moved) {
-    const Eigen::Vector3d step_m = time_s * object.velocity_m_per_s;
-    object.frame_from_object =
-        RigidTransform(object.frame_from_object.rotation(), object.frame_from_object.translation() + step_m);
-    for (Eigen::Vector2d& corner_m : object.footprint_m) {
-      corner_m += step_m.head<2>();
-    }
-  }
-  return moved;
-}
-
 std::array<Eigen::Vector2d, 2> Corridor::bumperAt(bool is_forward, double travel_m) const {
   const ArcMotion motion = motionOf(curvature_per_m, is_forward);
   const double x_m = is_forward ? outline.front_m : outline.rear_m;

@@ -101,5 +101,20 @@ TEST_F(CrossingObjectsTest, HostileObjectsAreIgnored) {
   EXPECT_TRUE(find({object}));
 }
 
+TEST(MovedObjectsTest, AnotherFrameTurnsAndShiftsAll) {
+  TrackedObject object;
+  object.frame_from_object = RigidTransform::planar(2.0, 0.0, 0.1);
+  object.velocity_m_per_s = {1.0, 0.0, 0.0};
+  object.covariance(0, 0) = 4.0;
+  object.footprint_m = {{2.0, 0.5}};
+  const std::vector<TrackedObject> turned =
+      transformed(RigidTransform::planar(10.0, 0.0, M_PI / 2.0), std::vector<TrackedObject>{object});
+  ASSERT_EQ(turned.size(), 1U);
+  EXPECT_TRUE(turned[0].frame_from_object.translation().isApprox(Eigen::Vector3d(10.0, 2.0, 0.0), 1e-12));
+  EXPECT_TRUE(turned[0].velocity_m_per_s.isApprox(Eigen::Vector3d(0.0, 1.0, 0.0), 1e-12));
+  EXPECT_NEAR(turned[0].covariance(1, 1), 4.0, 1e-12);
+  EXPECT_TRUE(turned[0].footprint_m[0].isApprox(Eigen::Vector2d(9.5, 2.0), 1e-12));
+}
+
 }  // namespace
 }  // namespace vcharge

@@ -9,6 +9,7 @@
 #include "fusion/hidden_ground.h"
 #include "ground/standing_watch.h"
 #include "liveness/silent_cameras.h"
+#include "steps/near_heights.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/text_format.h"
 #include "vcharge_obstacles/map_scan.h"
@@ -33,6 +34,7 @@ struct ObstacleMapper::Camera {
   size_t index = 0;
   std::unique_ptr<ObstacleDetector> detector;  // null before the first range map
   std::unique_ptr<GroundWatch> watch;
+  std::unique_ptr<NearHeights> heights;
   MeiCamera::Parameters parameters = MeiCamera::Parameters::Zero();  // camera of the range maps
   cv::Size size;
   ObstacleCameraStatus status;
@@ -52,6 +54,7 @@ ObstacleMapper::ObstacleMapper(std::shared_ptr<const CameraRig> rig, const Obsta
       on_frame_(std::move(on_frame)),
       grid_(options.detector.grid),
       map_(options.map),
+      steps_(options.detector.vehicleOutline(), options.steps),
       corridor_finder_(options.detector.vehicleOutline(), options.corridor),
       curvature_(std::make_unique<PathCurvature>()) {
   cameras_.resize(rig_->cameras.size());
@@ -91,6 +94,7 @@ ObstacleMapper::~ObstacleMapper() = default;
 void ObstacleMapper::startOver(DriveBreak drive_break, Timestamp stamp) {
   num_jumps_ += drive_break == DriveBreak::kReplay ? 0 : 1;
   map_ = LocalObstacleMap(options_.map);
+  steps_ = StepMapper(options_.detector.vehicleOutline(), options_.steps);
   curvature_->clear();
   standing_->clear();
   objects_.clear();
@@ -158,6 +162,7 @@ void ObstacleMapper::setMapFromOdom(const RigidTransform& map_from_odom) {
     return;
   }
   map_.reanchor(moved);
+  steps_.reanchor(moved);
   anchor_ = map_from_odom;
   has_anchor_ = true;
 }
@@ -189,14 +194,18 @@ void ObstacleMapper::addRangeMap(const RangeMap& map) {
         std::make_unique<ObstacleDetector>(working, *rig_camera.vehicle_from_camera, options_.detector);
     camera->watch = std::make_unique<GroundWatch>(working, *rig_camera.vehicle_from_camera, grid_,
                                                   options_.map.free_range_m, options_.watch);
+    camera->heights = std::make_unique<NearHeights>(working, *rig_camera.vehicle_from_camera,
+                                                    options_.detector.vehicleOutline(), StepMapper::kReach_m);
     standing_->setCamera(camera->index, working);
     camera->size = map.range_m.size();
     camera->parameters = map.camera.parameters();
   }
   CameraObstacles obstacles = camera->detector->detect(map);
   updateStatus(camera, obstacles);
+  HeightPoints heights = camera->heights->find(map, obstacles.ground);
   const std::optional<VehicleOdometry> odometry = assembler_->odometry().last();
-  if (assembler_->addImage(camera->index, map.stamp, {std::move(obstacles), map.reference.clone()}) &&
+  if (assembler_->addImage(camera->index, map.stamp,
+                           {std::move(obstacles), std::move(heights), map.reference.clone()}) &&
       odometry) {
     last_heard_ = odometry->stamp;
   }
@@ -259,6 +268,7 @@ void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle
     }
   }
   moveTo(frame->stamp, fixed_from_vehicle, &map_);
+  steps_.moveTo(frame->stamp, fixed_from_vehicle);
   standing_->forgetChanged(frame->stamp, anchor_, &map_);
   standing_->dropChanges(frame->stamp);
   last_fused_ = frame->stamp;
@@ -268,23 +278,27 @@ void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle
         silent_->liveness(camera->index).isRepeated(frame->stamp)) {
       continue;
     }
-    auto& [obstacles, reference] = frame->images[camera->index];
+    auto& [obstacles, heights, reference] = frame->images[camera->index];
     if (!reference.empty()) {
       addAppearance(camera->watch->compare(frame->stamp, reference, obstacles.ground, fixed_from_vehicle),
                     grid_, &obstacles);
     }
     camera->is_at_rest = map_.add(obstacles, grid_, fixed_from_vehicle);
+    steps_.add(heights);
     cameras.push_back(&obstacles);
   }
   if (!last_emitted_ || frame->stamp > *last_emitted_) {  // otherwise the next map includes it
-    emit(map_, cameras);
+    emit(map_, steps_, cameras);
   }
 }
 
-void ObstacleMapper::emit(const LocalObstacleMap& map, const std::vector<const CameraObstacles*>& cameras) {
+void ObstacleMapper::emit(const LocalObstacleMap& map, const StepMapper& steps,
+                          const std::vector<const CameraObstacles*>& cameras) {
   ObstacleFrame frame;
   frame.map = map.snapshot();
   frame.map.frame_id = enumNames<FixedFrame>()[static_cast<size_t>(options_.fixed_frame)];
+  frame.steps = steps.snapshot();
+  frame.steps.frame_id = frame.map.frame_id;
   frame.scan = makeScan(frame.map, options_.detector.grid.num_rays);
   frame.corridor = findCorridor(frame.map);
   for (const CameraObstacles* camera : cameras) {
@@ -300,9 +314,9 @@ Corridor ObstacleMapper::findCorridor(const ObstacleMap& map) {
   const double curvature_per_m =
       curvature_->update(map.stamp, [this](Timestamp stamp) { return odomFromVehicle(stamp); });
   const double age_s = toSeconds(map.stamp - objects_stamp_);
-  return corridor_finder_.find(
-      map, curvature_per_m,
-      age_s <= kObjectLife_s ? movedObjects(objects_, age_s) : std::vector<TrackedObject>());
+  return corridor_finder_.find(map, curvature_per_m,
+                               age_s <= kObjectLife_s ? transformed(anchor_, movedObjects(objects_, age_s))
+                                                      : std::vector<TrackedObject>());
 }
 
 /// Emits the map while no range maps arrive. The time is measured by their arrival instead of their
@@ -329,7 +343,9 @@ void ObstacleMapper::emitAt(Timestamp stamp) {
     LocalObstacleMap moved = map_;
     moveTo(stamp, *fixed_from_vehicle, &moved);
     standing_->forgetChanged(stamp, anchor_, &moved);
-    emit(moved, {});
+    StepMapper moved_steps = steps_;
+    moved_steps.moveTo(stamp, *fixed_from_vehicle);
+    emit(moved, moved_steps, {});
   }
 }
 

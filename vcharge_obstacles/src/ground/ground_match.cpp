@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include <opencv2/imgproc.hpp>
 
@@ -54,6 +56,21 @@ class Windows {
 
 float correlation(float covariance, float variance_a, float variance_b) {
   return covariance / std::sqrt(std::max(1.0F, variance_a) * std::max(1.0F, variance_b));
+}
+
+cv::Mat warped(const cv::Mat& before, const cv::Mat& map) {
+  cv::Mat image;
+  cv::remap(before, image, map, cv::Mat(), cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(0));
+  return image;
+}
+
+/// CV_8UC1: not 0 where the windows of a warped image are known.
+cv::Mat knownIn(const cv::Mat& map) {
+  cv::Mat channel, known;
+  cv::extractChannel(map, channel, 0);
+  known = channel >= 0.0;
+  cv::erode(known, known, cv::Mat::ones(kWindow_px, kWindow_px, CV_8U));
+  return known;
 }
 
 }  // namespace
@@ -146,33 +163,62 @@ GroundMatch::Warp GroundMatch::warp(const RigidTransform& before_from_now, const
   return result;
 }
 
+/// How well an image fits an older one that is warped by the ground, and by the plane above it.
+class GroundMatch::PlaneFit {
+ public:
+  PlaneFit(const cv::Mat& now, const cv::Mat& on_ground, const cv::Mat& on_raised, cv::Mat knows_raised)
+      : here_(now, kWindow_px),
+        ground_(on_ground, kWindow_px),
+        raised_(on_raised, kWindow_px),
+        wide_here_(now, kWideWindow_px),
+        wide_ground_(on_ground, kWideWindow_px),
+        with_ground_(here_.covarianceWith(ground_)),
+        with_raised_(here_.covarianceWith(raised_)),
+        with_wide_(wide_here_.covarianceWith(wide_ground_)),
+        knows_raised_(std::move(knows_raised)) {}
+  bool isGround(int row, int column) const {
+    const float fit = fitOf(row, column);
+    return hasTexture(row, column) && std::min(fit, wideFitOf(row, column)) >= kSame &&
+           fit >= raisedFitOf(row, column) + kDecisive;
+  }
+  bool isOther(int row, int column) const {
+    const float fit = fitOf(row, column);
+    return hasTexture(row, column) && (fit < kOther || raisedFitOf(row, column) >= fit + kDecisive);
+  }
+
+ private:
+  bool hasTexture(int row, int column) const {
+    return std::min(here_.variance(row, column), ground_.variance(row, column)) >= kTexture * kTexture;
+  }
+  float fitOf(int row, int column) const {
+    return correlation(with_ground_.at<float>(row, column), here_.variance(row, column),
+                       ground_.variance(row, column));
+  }
+  float wideFitOf(int row, int column) const {
+    return correlation(with_wide_.at<float>(row, column), wide_here_.variance(row, column),
+                       wide_ground_.variance(row, column));
+  }
+  float raisedFitOf(int row, int column) const {
+    return knows_raised_.at<uint8_t>(row, column) != 0
+               ? correlation(with_raised_.at<float>(row, column), here_.variance(row, column),
+                             raised_.variance(row, column))
+               : 1.0F;
+  }
+
+  const Windows here_, ground_, raised_, wide_here_, wide_ground_;
+  const cv::Mat with_ground_, with_raised_, with_wide_, knows_raised_;
+};
+
 std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const GroundView& before,
-                                               const GroundPlane& ground, double near_m, double far_m) const {
+                                               const GroundPlane& ground, double near_m, double far_m,
+                                               Wanted wanted) const {
   const RigidTransform before_from_now =
       (before.fixed_from_body * vehicle_from_camera_).inverse() * now.fixed_from_body;
   const Warp warp = this->warp(before_from_now, ground, near_m, far_m);
   if (warp.rows.empty()) {
     return {};
   }
-  const auto warped = [&](const cv::Mat& map) {
-    cv::Mat image;
-    cv::remap(before.smooth, image, map, cv::Mat(), cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(0));
-    return image;
-  };
-  const auto knownIn = [&](const cv::Mat& map) {
-    cv::Mat channel, known;
-    cv::extractChannel(map, channel, 0);
-    known = channel >= 0.0;
-    cv::erode(known, known, cv::Mat::ones(kWindow_px, kWindow_px, CV_8U));
-    return known;
-  };
-  const cv::Mat on_ground = warped(warp.ground);
-  const cv::Mat knows_ground = knownIn(warp.ground), knows_raised = knownIn(warp.raised);
-  const Windows here(now.smooth(warp.rows), kWindow_px), by_ground(on_ground, kWindow_px),
-      by_raised(warped(warp.raised), kWindow_px);
-  const Windows wide_here(now.smooth(warp.rows), kWideWindow_px), wide_ground(on_ground, kWideWindow_px);
-  const cv::Mat wide = wide_here.covarianceWith(wide_ground);
-  const cv::Mat with_ground = here.covarianceWith(by_ground), with_raised = here.covarianceWith(by_raised);
+  const cv::Mat on_ground = warped(before.smooth, warp.ground), knows_ground = knownIn(warp.ground);
   // The exposure may have changed. Most of the ground has not, so the median ratio is the gain.
   std::vector<float> ratios;
   for (const Warp::Pixel& pixel : warp.pixels) {
@@ -188,6 +234,10 @@ std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const Grou
   const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
   std::nth_element(ratios.begin(), middle, ratios.end());
   const float gain = *middle;
+  std::optional<PlaneFit> fit;
+  if (wanted == Wanted::kAll) {
+    fit.emplace(now.smooth(warp.rows), on_ground, warped(before.smooth, warp.raised), knownIn(warp.raised));
+  }
   std::vector<MatchedPixel> result;
   const auto near_inverse = static_cast<float>(1.0 / near_m), far_inverse = static_cast<float>(1.0 / far_m);
   for (const Warp::Pixel& pixel : warp.pixels) {
@@ -196,25 +246,14 @@ std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const Grou
         knows_ground.at<uint8_t>(row, column) == 0) {
       continue;
     }
-    const float variance = here.variance(row, column), before_variance = by_ground.variance(row, column);
-    const bool has_texture = std::min(variance, before_variance) >= kTexture * kTexture;
-    const float fit = correlation(with_ground.at<float>(row, column), variance, before_variance);
-    const float wide_fit = correlation(wide.at<float>(row, column), wide_here.variance(row, column),
-                                       wide_ground.variance(row, column));
-    const float raised =
-        knows_raised.at<uint8_t>(row, column) != 0
-            ? correlation(with_raised.at<float>(row, column), variance, by_raised.variance(row, column))
-            : 1.0F;
     const cv::Vec2f source = warp.ground.at<cv::Vec2f>(row, column);
     const cv::Point nearest(cvRound(source[0]), cvRound(source[1]));
     const float brightness = now.smooth.data[at];
     const float tolerance = min_difference_ + kRelativeDifference * brightness;
     const bool differs = brightness < gain * before.lowest.at<uint8_t>(nearest) - tolerance ||
                          brightness > gain * before.highest.at<uint8_t>(nearest) + tolerance;
-    const bool is_ground = has_texture && std::min(fit, wide_fit) >= kSame && fit >= raised + kDecisive;
-    const bool is_other = has_texture && (fit < kOther || raised >= fit + kDecisive);
     result.push_back({pixel.ray, pixel.inverse, pixel.inverse * pixel.height_m / (pixel.height_m - kLow_m),
-                      is_ground, is_other, differs});
+                      fit && fit->isGround(row, column), fit && fit->isOther(row, column), differs});
   }
   return result;
 }

@@ -38,6 +38,10 @@ struct MatchedPixel {
 /// own texture, as on a pole straight ahead, both fit and nothing is decided.
 class GroundMatch {
  public:
+  enum class Wanted {
+    kChanges,  ///< MatchedPixel::is_changed only, for a fraction of the time
+    kAll,
+  };
   /// Height of the plane that stands for obstacles; the decision falls halfway.
   static constexpr double kRaised_m = 0.2;
 
@@ -47,10 +51,12 @@ class GroundMatch {
 
   /// Pixels whose ground lies between two ranges from the camera; none if the exposures cannot be compared.
   std::vector<MatchedPixel> compare(const GroundView& now, const GroundView& before,
-                                    const GroundPlane& ground, double near_m, double far_m) const;
+                                    const GroundPlane& ground, double near_m, double far_m,
+                                    Wanted wanted) const;
 
  private:
   struct Warp;
+  class PlaneFit;
 
   Warp warp(const RigidTransform& before_from_now, const GroundPlane& ground, double near_m,
             double far_m) const;

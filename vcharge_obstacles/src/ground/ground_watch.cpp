@@ -106,7 +106,7 @@ const GroundView* GroundWatch::Implementation::viewAt(double baseline_m) const {
 std::vector<float> GroundWatch::Implementation::changedFraction(const GroundView& before,
                                                                 const GroundPlane& ground) const {
   const std::vector<MatchedPixel> pixels =
-      match.compare(views.back(), before, ground, kNearest_m, max_distance_m);
+      match.compare(views.back(), before, ground, kNearest_m, max_distance_m, GroundMatch::Wanted::kChanges);
   if (pixels.empty()) {
     return {};
   }
@@ -132,7 +132,8 @@ std::vector<float> GroundWatch::Implementation::groundPixels(const GroundPlane& 
     const GroundView* before = viewAt(band.baseline_m);
     const double far_m = std::min(band.far_m, max_distance_m);
     if (before != nullptr && far_m > near_m) {
-      for (const MatchedPixel& pixel : match.compare(views.back(), *before, ground, near_m, far_m)) {
+      for (const MatchedPixel& pixel :
+           match.compare(views.back(), *before, ground, near_m, far_m, GroundMatch::Wanted::kAll)) {
         const int ray = rays.polar_ray[pixel.ray];
         compared.add(ray, pixel.from_inverse, pixel.to_inverse, 1.0F);
         if (pixel.is_ground) {

@@ -4,7 +4,7 @@
 
 #include <Eigen/Core>
 
-#include "objects/ground_contact.h"
+#include "contacts/ground_contact.h"
 #include "vcharge_core/motion/rigid_transform.h"
 
 namespace vcharge {
@@ -27,6 +27,8 @@ struct ObjectDetection {
   Eigen::Vector2d away{1.0, 0.0};                            ///< unit direction from the camera
   double height_m = 0.0;                                     ///< highest point
   int num_points = 0;
+  bool has_velocity = true;    ///< otherwise the velocity is 0 with a wide covariance
+  double drift_m_per_s = 0.0;  ///< speed at which something static may seem to move, without a velocity
 };
 
 /// Groups moving points by where they stand on the ground, and fits a position and a velocity to each group.

@@ -31,6 +31,8 @@ constexpr double kKeptSize = 0.97;
 // but stay, and are not detected so many times.
 constexpr double kMovingSigmas = 2.0, kTravel = 3.0;
 constexpr int kManyDetections = 5;
+// Nobody walks faster; part of the drift of contacts that is kept from stamp to stamp.
+constexpr double kFastest_m_per_s = 2.5, kKeptDrift = 0.7;
 // An object that stands is reported for this time.
 constexpr double kKeptStanding_s = 2.0;
 constexpr double kPersonRadius_m = 0.25;
@@ -127,7 +129,7 @@ void ObjectFilter::update(const std::vector<ObjectDetection>& detections,
       track.existence_log_odds = std::min(kMost, track.existence_log_odds + kHit);
     }
     track.last_seen = stamp_;
-    ++track.num_detections;
+    note(detections[d], measured.state.head<2>(), &track);
   }
   for (size_t d = 0; d < detections.size(); ++d) {
     if (!is_used[d]) {
@@ -135,8 +137,27 @@ void ObjectFilter::update(const std::vector<ObjectDetection>& detections,
       tracks_.push_back({next_id_++, measured.state, measured.covariance, kNew + kHit, detections[d].height_m,
                          widthOf(detections[d]), stamp_, measured.state.head<2>(),
                          measured.covariance.topLeftCorner<2, 2>(), false});
+      note(detections[d], measured.state.head<2>(), &tracks_.back());
     }
   }
+}
+
+/// Remembers what tells whether an object moves.
+void ObjectFilter::note(const ObjectDetection& detection, const Eigen::Vector2d& position_m,
+                        Track* track) const {
+  if (detection.has_velocity) {
+    ++track->num_detections;
+    return;
+  }
+  track->contacts.add(stamp_, position_m);
+  track->drift_m_per_s = kKeptDrift * track->drift_m_per_s + (1.0 - kKeptDrift) * detection.drift_m_per_s;
+}
+
+/// Whether the contacts of an object that stands apart move by themselves, as the filter finds too.
+bool ObjectFilter::walks(const Track& track) const {
+  const std::optional<Eigen::Vector2d> found = track.contacts.velocity();
+  return found && found->norm() < kFastest_m_per_s && found->norm() > track.drift_m_per_s &&
+         found->dot(track.state.tail<2>()) > 0.5 * found->squaredNorm();
 }
 
 std::vector<ObjectFilter::Expected> ObjectFilter::expected() const {
@@ -187,7 +208,9 @@ void ObjectFilter::finish() {
     const double variance = velocity.dot(track.covariance.bottomRightCorner<2, 2>() * velocity);
     const bool is_fast = velocity.squaredNorm() > kMovingSigmas * std::sqrt(variance);
     const bool travels = is_fast && travel_m.dot(covariance.ldlt().solve(travel_m)) > kTravel;
-    track.has_moved = track.has_moved || travels || track.num_detections >= kManyDetections;
+    track.contacts.forgetBefore(stamp_);
+    track.has_moved = track.has_moved || (travels && track.num_detections > 0) || (is_fast && walks(track)) ||
+                      track.num_detections >= kManyDetections;
     if (track.last_seen < stamp_) {
       track.existence_log_odds = std::min(
           kMost, track.existence_log_odds + std::clamp(kMiss + track.votes, kLeastChange, kMostChange));

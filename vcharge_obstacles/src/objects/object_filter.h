@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 
+#include "contacts/contact_path.h"
 #include "objects/object_detections.h"
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/motion/rigid_transform.h"
@@ -53,10 +54,14 @@ class ObjectFilter {
     Eigen::Vector2d start_m = Eigen::Vector2d::Zero();  // as first detected
     Eigen::Matrix2d start_covariance = Eigen::Matrix2d::Identity();
     bool has_moved = false;
-    int num_detections = 1;
+    int num_detections = 0;  // with a velocity
+    ContactPath contacts;    // of detections without one
+    double drift_m_per_s = 0.0;
     Timestamp last_moving;  // detected, or surely moving
     double votes = 0.0;     // at this stamp
   };
+  bool walks(const Track& track) const;
+  void note(const ObjectDetection& detection, const Eigen::Vector2d& position_m, Track* track) const;
   TrackedObject describe(const Track& track) const;
   void mergeTwins();
 

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
-#include "objects/ground_contact.h"
+#include "contacts/ground_contact.h"
 #include "objects/object_filter.h"
 #include "points/panorama.h"
 #include "vcharge_core/motion/rigid_transform.h"

@@ -8,8 +8,9 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "objects/ground_contact.h"
-#include "objects/ground_motion.h"
+#include "contacts/ground_contact.h"
+#include "contacts/ground_motion.h"
+#include "objects/freestanding.h"
 #include "objects/object_detections.h"
 #include "objects/object_filter.h"
 #include "objects/object_following.h"
@@ -113,6 +114,7 @@ struct ObjectTracker::Camera {
                                         const Eigen::Vector3d& rotation) const;
   bool compareGround(const State& state);
   void follow(State* state, bool is_compared) const;
+  CameraMotion motion(const State& state) const;
   /// Motion of the vehicle since an image, such that the ground fits.
   RigidTransform groundMotion(Timestamp before, const RigidTransform& before_from_now) const {
     std::vector<RayPair> rays;
@@ -283,6 +285,20 @@ bool ObjectTracker::Camera::compareGround(const State& state) {
   return false;
 }
 
+CameraMotion ObjectTracker::Camera::motion(const State& state) const {
+  const Eigen::Vector3d position_m = vehicle_from_camera.translation();
+  const Eigen::Vector3d axis = vehicle_from_camera.rotation() * Eigen::Vector3d::UnitZ();
+  CameraMotion motion{position_m, std::atan2(axis.y(), axis.x()), Eigen::Vector2d::Zero()};
+  const State::Pose& before = state.poses.front();
+  const State::Pose& now = state.poses.back();
+  if (before.stamp < now.stamp) {
+    const RigidTransform now_from_before = now.odom_from_vehicle.inverse() * before.odom_from_vehicle;
+    motion.velocity_m_per_s =
+        (position_m - now_from_before * position_m).head<2>() / toSeconds(now.stamp - before.stamp);
+  }
+  return motion;
+}
+
 /// Finds the objects that are expected in the image.
 void ObjectTracker::Camera::follow(State* state, bool is_compared) const {
   if (state->poses.size() < 2 || panorama_before.empty()) {
@@ -343,13 +359,11 @@ void ObjectTracker::process(const ImageFrame& frame) {
       continue;
     }
     const std::vector<MovingPoint> moving = cameras_[i]->movingPoints(judged[i], rotation);
-    if (moving.empty() && state_->filter.expected().empty()) {
-      continue;
-    }
     const bool is_compared = cameras_[i]->compareGround(*state_);
-    if (is_compared && !moving.empty()) {
-      const Eigen::Vector3d camera_m = cameras_[i]->vehicle_from_camera.translation();
-      state_->filter.update(detectObjects(moving, cameras_[i]->contact, camera_m), now);
+    if (is_compared) {
+      const CameraMotion motion = cameras_[i]->motion(*state_);
+      state_->filter.update(detectObjects(moving, cameras_[i]->contact, motion.position_m), now);
+      state_->filter.update(findFreestanding(cameras_[i]->contact, motion), now);
     }
     cameras_[i]->follow(state_.get(), is_compared);
   }

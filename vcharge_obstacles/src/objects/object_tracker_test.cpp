@@ -74,6 +74,12 @@ TEST(ObjectTrackerTest, DrivingCarTellsAPersonWhoCrossesFromAPost) {
   expectFollowed(drive(world, 2.0, 2.0), world.cylinders[0], 0.6, 0.4, 0.35);
 }
 
+TEST(ObjectTrackerTest, DrivingCarFollowsAPersonWhoComesStraightAhead) {
+  MovingWorld world;
+  world.cylinders = {{{10.5, 0.2}, {-1.0, 0.0}}};
+  expectFollowed(drive(world, 1.0, 3.0), world.cylinders[0], 2.4, 0.3, 0.3);
+}
+
 TEST(ObjectTrackerTest, NothingMovesInAStaticWorld) {
   MovingWorld world;
   world.cylinders = {{{7.0, 1.2}, {0.0, 0.0}, 0.15, 1.2}, {{9.0, -1.5}, {0.0, 0.0}, 0.4, 1.5}};

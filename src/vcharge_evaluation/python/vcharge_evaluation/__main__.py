@@ -11,6 +11,7 @@ STAGES = {
     "height_map": "height_map",
     "obstacles": "obstacles",
     "objects": "objects",
+    "steps": "steps",
     "conditions": "conditions",
     "faults": "faults",
     "odometry": "odometry",

@@ -14,4 +14,9 @@ namespace vcharge {
 vcharge_msgs::TrackedObjects toMessage(const std::vector<TrackedObject>& objects, Timestamp stamp,
                                        const std::string& frame_id);
 
+/// Inverse of toMessage(). InputError that begins with `source` for a number that is not finite, or an
+/// unknown class.
+std::vector<TrackedObject> fromMessage(const vcharge_msgs::TrackedObjects& message,
+                                       const std::string& source);
+
 }  // namespace vcharge

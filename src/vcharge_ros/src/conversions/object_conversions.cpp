@@ -1,5 +1,8 @@
 #include "vcharge_ros/object_conversions.h"
 
+#include <cmath>
+
+#include "vcharge_core/base/error.h"
 #include "vcharge_ros/conversions.h"
 
 namespace vcharge {
@@ -40,6 +43,41 @@ vcharge_msgs::TrackedObjects toMessage(const std::vector<TrackedObject>& objects
     list.objects.push_back(message);
   }
   return list;
+}
+
+std::vector<TrackedObject> fromMessage(const vcharge_msgs::TrackedObjects& message,
+                                       const std::string& source) {
+  std::vector<TrackedObject> objects;
+  for (const Message& from : message.objects) {
+    const std::string name = source + ": object " + std::to_string(from.id);
+    if (from.object_class > Message::BICYCLE) {
+      throw InputError(name + ": expected a class up to " + std::to_string(Message::BICYCLE) + ", got " +
+                       std::to_string(from.object_class));
+    }
+    TrackedObject object;
+    object.id = from.id;
+    object.object_class = static_cast<ObjectClass>(from.object_class);
+    object.class_probability = from.class_probability;
+    object.existence_probability = from.existence_probability;
+    object.frame_from_object = fromMessage(from.pose, name);
+    object.velocity_m_per_s = {from.velocity.x, from.velocity.y, from.velocity.z};
+    object.is_standing = from.is_standing != 0;
+    object.covariance =
+        Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>(from.covariance.data());
+    bool is_finite =
+        object.velocity_m_per_s.allFinite() && object.covariance.allFinite() && std::isfinite(from.height_m);
+    for (const geometry_msgs::Point32& corner : from.footprint.points) {
+      object.footprint_m.emplace_back(corner.x, corner.y);
+      object.base_z_m = corner.z;
+      is_finite = is_finite && object.footprint_m.back().allFinite() && std::isfinite(corner.z);
+    }
+    if (!is_finite) {
+      throw InputError(name + ": expected finite numbers");
+    }
+    object.height_m = from.height_m;
+    objects.push_back(object);
+  }
+  return objects;
 }
 
 }  // namespace vcharge

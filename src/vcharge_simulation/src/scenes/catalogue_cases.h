@@ -20,6 +20,7 @@ struct SceneCase {
 inline constexpr SceneCase kSceneCases[] = {{"lot", "short", 10},
                                             {"garage", "short", 10},
                                             {"obstacles", "creep", 100},
+                                            {"steps", "pass", 100},
                                             {"two_levels", "up_and_down", 100},
                                             {"road", "bumps", 100},
                                             {"ramp", "up", 200},

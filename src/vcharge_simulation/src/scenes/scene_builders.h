@@ -33,6 +33,10 @@ std::vector<SceneDrive> roadDrives();
 std::shared_ptr<const Scene> buildCourseScene(const SceneOptions& options);
 std::vector<SceneDrive> courseDrives();
 
+/// The lot with kerbs of 5, 8 and 12 cm, holes, and bumps with ramps along its middle lane.
+std::shared_ptr<const Scene> buildStepsScene(const SceneOptions& options);
+std::vector<SceneDrive> stepsDrives();
+
 /// The lot with its northern half raised behind a wall, ramps of 6 degrees in the east and in the west, and
 /// slightly uneven ground.
 std::shared_ptr<const Scene> buildTwoLevelsScene(const SceneOptions& options);

@@ -1,4 +1,4 @@
-#include "objects/ground_motion.h"
+#include "contacts/ground_motion.h"
 
 #include <algorithm>
 #include <cmath>

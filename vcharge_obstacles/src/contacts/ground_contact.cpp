@@ -1,4 +1,4 @@
-#include "objects/ground_contact.h"
+#include "contacts/ground_contact.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,0 +1,65 @@
+#include "mapper_listener.h"
+
+#include <utility>
+
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+#include <vcharge_msgs/TrackedObjects.h>
+
+#include "vcharge_core/base/error.h"
+#include "vcharge_obstacles/image_fingerprint.h"
+#include "vcharge_ros/conversions.h"
+#include "vcharge_ros/drive_topics.h"
+#include "vcharge_ros/image_conversions.h"
+#include "vcharge_ros/object_conversions.h"
+
+namespace vcharge {
+
+MapperListener::MapperListener(ros::NodeHandle* node, const CameraRig& rig,
+                               const std::vector<ObstacleCameraStatus>& cameras, uint32_t queue_size,
+                               CallbackGuard* guard, ImageCallback on_image, ObjectCallback on_objects)
+    : guard_(guard), on_image_(std::move(on_image)), on_objects_(std::move(on_objects)) {
+  const DriveTopics topics;
+  for (const ObstacleCameraStatus& camera : cameras) {
+    const size_t index = rig.cameraIndex(camera.camera_name);
+    subscribe<sensor_msgs::Image>(node, index, topics.imageTopic(camera.camera_name), queue_size);
+    subscribe<sensor_msgs::CompressedImage>(node, index, topics.compressedImageTopic(camera.camera_name),
+                                            queue_size);
+  }
+  subscribeObjects(node, queue_size);
+}
+
+void MapperListener::subscribeObjects(ros::NodeHandle* node, uint32_t queue_size) {
+  using Pointer = vcharge_msgs::TrackedObjectsConstPtr;
+  constexpr char kTopic[] = "/obstacles/objects";
+  const boost::function<void(const Pointer&)> note = [this, kTopic](const Pointer& message) {
+    guard_->run([&] {
+      if (message->header.stamp.isZero() || message->header.frame_id != "odom") {
+        throw InputError(std::string(kTopic) +
+                         ": expected a stamp and the frame odom in the header, got frame '" +
+                         message->header.frame_id + "'");
+      }
+      on_objects_(toTimestamp(message->header.stamp), fromMessage(*message, kTopic));
+    });
+  };
+  subscribers_.push_back(node->subscribe<vcharge_msgs::TrackedObjects>(kTopic, queue_size, note));
+}
+
+template <class Message>
+void MapperListener::subscribe(ros::NodeHandle* node, size_t camera_index, const std::string& topic,
+                               uint32_t queue_size) {
+  using Pointer = boost::shared_ptr<const Message>;
+  const boost::function<void(const Pointer&)> note = [this, camera_index, topic](const Pointer& message) {
+    guard_->run([&] {
+      if (message->header.stamp.isZero()) {
+        throw InputError(topic + ": expected a stamp in the message's header, got 0");
+      }
+      on_image_(camera_index, toTimestamp(message->header.stamp),
+                fingerprintOf(message->data.data(), message->data.size()),
+                [message, topic] { return toImage(message, topic).pixels; });
+    });
+  };
+  subscribers_.push_back(node->subscribe<Message>(topic, queue_size, note));
+}
+
+}  // namespace vcharge

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "contacts/ground_contact.h"
+#include "objects/object_detections.h"
+
+namespace vcharge {
+
+/// Where one camera is, and what it moves.
+struct CameraMotion {
+  Eigen::Vector3d position_m;        ///< in the vehicle frame
+  double axis_azimuth_rad = 0.0;     ///< of its optical axis
+  Eigen::Vector2d velocity_m_per_s;  ///< over the ground, along the vehicle's axes
+};
+
+/// Narrow things that stand apart on the ground, as people do, by the contacts in one camera's view: the
+/// ground beside them is visible further away. They have no velocity; whether they walk is seen as their
+/// contacts are followed.
+std::vector<ObjectDetection> findFreestanding(const GroundContact& contact, const CameraMotion& camera);
+
+}  // namespace vcharge
