@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -50,8 +51,8 @@ struct LocalObstacleMapOptions {
 
 /// Obstacles and free ground around the vehicle, fused over time and cameras as log-odds in a grid that
 /// scrolls with the vehicle in a fixed frame. A cell that is not observed again decays to unobserved with the
-/// distance driven, never with time: while the vehicle stands, motion stereo measures nothing, so cells keep
-/// their state and only grow older, except where cameras that overlap measure.
+/// distance driven, never with time: while the vehicle stands, motion stereo measures nothing, so all cells
+/// keep their state and only grow older, except where cameras that overlap measure.
 ///
 /// Deterministic; not thread safe.
 class LocalObstacleMap {
@@ -72,9 +73,12 @@ class LocalObstacleMap {
   /// Adds the observation of a camera; std::logic_error before the first moveTo(). `grid` is the
   /// detector's.
   ///
-  /// A map counts by the distance that its camera has moved since its last map. At rest it counts by time,
-  /// but all maps of one pose together count no more than two: their errors repeat. True if the camera rests.
-  bool add(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle);
+  /// A range map counts by the distance that its camera has moved since its last one. One measured at rest
+  /// comes from cameras that overlap, and its errors repeat: it may occupy cells, and make free ones
+  /// unobserved until they are measured in motion, but neither frees a cell nor clears one that was occupied
+  /// in motion. Cells occupied at rest are cleared by maps that show bare ground, at rest or not.
+  void add(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle,
+           bool is_at_rest = false);
   /// Makes free cells unobserved for which `is_unwatched` is true. It gets their middles in the vehicle frame
   /// of the last moveTo(). Occupied cells keep their state.
   void forgetFree(const GroundArea& is_unwatched);
@@ -90,8 +94,9 @@ class LocalObstacleMap {
  private:
   struct Cell {
     float log_odds = 0.0F;
-    float weight = 0.0F;  // weight of the observations in the means below
-    float x_m = 0.0F;     // mean position of the obstacle relative to the cell's corner
+    float rest_log_odds = 0.0F;  // of maps measured at rest: positive if occupied; never frees the cell
+    float weight = 0.0F;         // weight of the observations in the means below
+    float x_m = 0.0F;            // mean position of the obstacle relative to the cell's corner
     float y_m = 0.0F;
     float sigma_m = 0.0F;
     float height_m = 0.0F;
@@ -101,18 +106,13 @@ class LocalObstacleMap {
     int64_t last_occupied_ns = kNever;
     int64_t held_until_ns = kNever;  // the cell cannot become free before
   };
-  /// What a camera's range map counts; at rest its evidence is bounded.
+  /// A camera's observation of the ground in one cell.
+  struct GroundObservation;
+  /// What a camera's range map counts.
   struct MapWeight {
     double value;
     bool is_at_rest;
   };
-  /// Where a camera was at the last map that counts as moved, and the stamp of its last map.
-  struct LastObservation {
-    Eigen::Vector2d position_m;
-    Timestamp stamp;
-  };
-  /// A camera's observation of the ground in one cell.
-  struct GroundObservation;
   /// Part of an obstacle, in the fixed frame.
   struct ObstaclePoint {
     Eigen::Vector2d point_m;
@@ -124,7 +124,14 @@ class LocalObstacleMap {
   static constexpr int64_t kNever = INT64_MIN;
 
   void decay(double travelled_m, const RigidTransform& fixed_from_vehicle, const GroundArea& is_hidden);
-  MapWeight weightOf(const CameraObstacles& seen, const Eigen::Vector2d& position_m);
+  /// Weight of a camera's range map: maps from nearby positions use the same images, so errors correlate.
+  double weightOf(const CameraObstacles& seen, const Eigen::Vector2d& position_m);
+  double weightAtRest(const CameraObstacles& seen);
+  static void raiseAtRest(float log_odds, float most, Cell* cell);
+  static void hideAtRest(double weight, Cell* cell);
+  /// True if the cell's means shall take the observation.
+  bool occupyAtRest(double mass, Cell* cell) const;
+  static void clearAtRest(double mass, Cell* cell);
   void addGround(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle,
                  const MapWeight& weight);
   GroundShadows shadowsFor(const CameraObstacles& seen, const Eigen::Vector2d& camera_m) const;
@@ -138,6 +145,7 @@ class LocalObstacleMap {
                    const RigidTransform& fixed_from_vehicle, const MapWeight& weight);
   void addObstaclePoint(const ObstaclePoint& point, Timestamp stamp);
   double parallaxSigma_m(double range_m, const Eigen::Vector2d& direction) const;
+  static float occupiedLogOdds(const Cell& cell) { return std::max(cell.log_odds, cell.rest_log_odds); }
   int8_t stateOf(const Cell& cell) const;
 
   LocalObstacleMapOptions options_;
@@ -146,8 +154,9 @@ class LocalObstacleMap {
   Timestamp stamp_;
   RigidTransform fixed_from_vehicle_;
   double travel_m_ = 0.0;
-  Eigen::Vector2d travel_direction_{0.0, 0.0};               // unit; zero before the first motion
-  std::map<std::string, LastObservation> last_observation_;  // by camera
+  Eigen::Vector2d travel_direction_{0.0, 0.0};                   // unit; zero before the first motion
+  std::map<std::string, Eigen::Vector2d> last_camera_position_;  // at its last map in motion
+  std::map<std::string, Timestamp> last_at_rest_;                // stamp of a camera's last map at rest
 };
 
 }  // namespace vcharge

@@ -178,6 +178,7 @@ class ObstacleMapper {
   std::unique_ptr<const HiddenGround> hidden_;
   size_t num_silent_emitted_ = 0;        // silent cameras at the last emitted frame
   std::optional<Timestamp> last_fused_;  // stamp of the last range maps in the map
+  bool is_at_rest_ = false;              // whether the vehicle stood at that stamp
   Timestamp objects_stamp_;
   std::vector<TrackedObject> objects_;
   std::optional<Timestamp> last_emitted_;

@@ -34,9 +34,6 @@ constexpr double kUnknownDecay = 0.7;
 constexpr double kChangedHold_s = 0.3;
 // Within this angle of the direction of travel missing ranges give no evidence: stereo has no parallax.
 constexpr double kBlindAngle_rad = 0.35;
-// All maps of one pose together change a cell to at most the log-odds of this many maps: just enough to be
-// occupied or free, and so little that one map to the contrary makes it unobserved again.
-constexpr double kMapsAtRest = 2.0;
 
 RigidTransform levelled(const RigidTransform& transform) {
   return RigidTransform::planar(transform.translation().x(), transform.translation().y(),
@@ -63,6 +60,7 @@ void LocalObstacleMap::decay(double travelled_m, const RigidTransform& fixed_fro
   for (int64_t y = cells_.firstY(); y < cells_.firstY() + cells_.size(); ++y) {
     for (int64_t x = cells_.firstX(); x < cells_.firstX() + cells_.size(); ++x) {
       Cell& cell = cells_.at(x, y);
+      cell.rest_log_odds *= cell.rest_log_odds > 0.0F ? keep_occupied : keep_free;
       if (cell.log_odds > 0.0F) {
         cell.log_odds *= keep_occupied;
       } else if (cell.log_odds < 0.0F &&
@@ -93,14 +91,14 @@ void LocalObstacleMap::moveTo(Timestamp stamp, const RigidTransform& fixed_from_
   fixed_from_vehicle_ = level;
 }
 
-bool LocalObstacleMap::add(const CameraObstacles& seen, const PolarGrid& grid,
-                           const RigidTransform& fixed_from_vehicle) {
+void LocalObstacleMap::add(const CameraObstacles& seen, const PolarGrid& grid,
+                           const RigidTransform& fixed_from_vehicle, bool is_at_rest) {
   check(has_pose_, "LocalObstacleMap::add: moveTo() comes first");
   const RigidTransform level = levelled(fixed_from_vehicle);
-  const MapWeight weight = weightOf(seen, transformed(level, seen.origin_m));
+  const MapWeight weight{is_at_rest ? weightAtRest(seen) : weightOf(seen, transformed(level, seen.origin_m)),
+                         is_at_rest};
   addGround(seen, grid, level, weight);
   addOccupied(seen, grid, level, weight);
-  return weight.is_at_rest;
 }
 
 struct LocalObstacleMap::GroundObservation {
@@ -200,6 +198,7 @@ void LocalObstacleMap::hold(int64_t x, int64_t y, double radius_m, Timestamp sta
         Cell& cell = cells_.at(column, row);
         cell.held_until_ns = std::max(cell.held_until_ns, until_ns);
         cell.log_odds = std::max(cell.log_odds, 0.0F);
+        cell.rest_log_odds = std::max(cell.rest_log_odds, 0.0F);
       }
     }
   }
@@ -210,21 +209,26 @@ void LocalObstacleMap::addGroundObservation(const GroundObservation& ground, con
   const CellObservation& observed = ground.cell;
   Cell* cell = &cells_.at(ground.x, ground.y);
   const bool shows_ground = !observed.blocked && observed.free_fraction >= kMinFreeFraction;
-  // At rest, ground without a range is mostly ground that only one camera sees.
-  const double unknown_fraction = weight.is_at_rest ? 0.0 : observed.unknown_fraction;
-  const double hidden_fraction = observed.hidden_fraction + unknown_fraction;
   if (shows_ground && !ground.in_shadow) {
-    const double log_odds = cell->log_odds - weight.value * kFreeLogOdds * observed.free_fraction;
-    const bool may_free =
-        stamp.nanoseconds() >= cell->held_until_ns && (ground.may_free || stateOf(*cell) == kCellFree);
-    const double bound = weight.is_at_rest ? -kMapsAtRest * kFreeLogOdds : kMinCellLogOdds;
-    const double least = std::min(may_free ? bound : 0.0, static_cast<double>(cell->log_odds));
-    cell->log_odds = static_cast<float>(std::max(least, log_odds));
     cell->last_seen_ns = stamp.nanoseconds();
     cell->travel_m = static_cast<float>(travel_m_);
-  } else if (cell->log_odds < 0.0F && (shows_ground || hidden_fraction >= kMinHiddenFraction)) {
+    const bool was_free = stateOf(*cell) == kCellFree;
+    clearAtRest(weight.value * observed.free_fraction, cell);
+    if (weight.is_at_rest) {
+      return;
+    }
+    const double log_odds = cell->log_odds - weight.value * kFreeLogOdds * observed.free_fraction;
+    const bool may_free = stamp.nanoseconds() >= cell->held_until_ns && (ground.may_free || was_free);
+    const double least = may_free ? kMinCellLogOdds : std::min(0.0, static_cast<double>(cell->log_odds));
+    cell->log_odds = static_cast<float>(std::max(least, log_odds));
+  } else if (weight.is_at_rest) {
+    if (cell->log_odds < 0.0F && (shows_ground || observed.hidden_fraction >= kMinHiddenFraction)) {
+      hideAtRest(weight.value, cell);
+    }
+  } else if (cell->log_odds < 0.0F &&
+             (shows_ground || observed.hidden_fraction + observed.unknown_fraction >= kMinHiddenFraction)) {
     // An obstacle may now be there or in front of it, so the cell decays towards unobserved.
-    const bool hides = shows_ground || observed.hidden_fraction >= unknown_fraction;
+    const bool hides = shows_ground || observed.hidden_fraction >= observed.unknown_fraction;
     cell->log_odds *= static_cast<float>(std::pow(hides ? kHiddenDecay : kUnknownDecay, weight.value));
   }
 }
@@ -238,13 +242,11 @@ void LocalObstacleMap::addObstaclePoint(const ObstaclePoint& point, Timestamp st
   Cell& cell = cells_.at(x, y);
   cell.travel_m = static_cast<float>(travel_m_);
   cell.last_seen_ns = cell.last_occupied_ns = stamp.nanoseconds();
-  const float before = cell.log_odds;
-  const double most =
-      point.is_at_rest ? std::max<double>(before, kMapsAtRest * kOccupiedLogOdds) : kMaxCellLogOdds;
-  cell.log_odds =
-      std::min(static_cast<float>(most), before + static_cast<float>(kOccupiedLogOdds * point.mass));
-  if (point.is_at_rest && cell.log_odds <= before) {
-    return;  // the means do not improve by errors that repeat
+  if (!point.is_at_rest) {
+    cell.log_odds = std::min(static_cast<float>(kMaxCellLogOdds),
+                             cell.log_odds + static_cast<float>(kOccupiedLogOdds * point.mass));
+  } else if (!occupyAtRest(point.mass, &cell)) {
+    return;
   }
   const double sigma_m = point.sigma_m;
   const auto weight = static_cast<float>(point.mass / (sigma_m * sigma_m + 1e-4));
@@ -335,7 +337,7 @@ void LocalObstacleMap::forgetAround(const Eigen::Vector2d& point_m, Timestamp st
 }
 
 int8_t LocalObstacleMap::stateOf(const Cell& cell) const {
-  if (cell.log_odds >= static_cast<float>(options_.occupied_threshold)) {
+  if (occupiedLogOdds(cell) >= static_cast<float>(options_.occupied_threshold)) {
     return kCellOccupied;
   }
   return cell.log_odds <= static_cast<float>(options_.free_threshold) ? kCellFree : kCellUnobserved;
@@ -355,7 +357,7 @@ void LocalObstacleMap::reanchor(const RigidTransform& new_from_old_fixed) {
         transformed(old_from_new, Eigen::Vector2d((x + 0.5) * cell_m, (y + 0.5) * cell_m));
     const int64_t old_x = cells_.indexOf(point_m.x());
     const int64_t old_y = cells_.indexOf(point_m.y());
-    if (cells_.isInside(old_x, old_y) && cells_.at(old_x, old_y).log_odds <= 0.0F) {
+    if (cells_.isInside(old_x, old_y) && occupiedLogOdds(cells_.at(old_x, old_y)) <= 0.0F) {
       moved.cells_.at(x, y) = cells_.at(old_x, old_y);
     }
   });
@@ -365,11 +367,11 @@ void LocalObstacleMap::reanchor(const RigidTransform& new_from_old_fixed) {
         transformed(new_from_old, Eigen::Vector2d(x * cell_m + old.x_m, y * cell_m + old.y_m));
     const int64_t new_x = cells_.indexOf(point_m.x());
     const int64_t new_y = cells_.indexOf(point_m.y());
-    if (old.log_odds <= 0.0F || !moved.cells_.isInside(new_x, new_y)) {
+    if (occupiedLogOdds(old) <= 0.0F || !moved.cells_.isInside(new_x, new_y)) {
       return;
     }
     Cell& target = moved.cells_.at(new_x, new_y);
-    if (old.log_odds > target.log_odds) {
+    if (occupiedLogOdds(old) > occupiedLogOdds(target)) {
       target = old;
       target.x_m = static_cast<float>(point_m.x() - static_cast<double>(new_x) * cell_m);
       target.y_m = static_cast<float>(point_m.y() - static_cast<double>(new_y) * cell_m);
@@ -379,8 +381,9 @@ void LocalObstacleMap::reanchor(const RigidTransform& new_from_old_fixed) {
   moved.travel_direction_ =
       (new_from_old.rotation() * Eigen::Vector3d(travel_direction_.x(), travel_direction_.y(), 0.0))
           .head<2>();
-  for (const auto& [name, last] : last_observation_) {
-    moved.last_observation_[name] = {transformed(new_from_old, last.position_m), last.stamp};
+  moved.last_at_rest_ = last_at_rest_;
+  for (const auto& [name, position] : last_camera_position_) {
+    moved.last_camera_position_[name] = transformed(new_from_old, position);
   }
   *this = moved;
 }

@@ -12,13 +12,12 @@
 #include "steps/near_heights.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/text_format.h"
+#include "vcharge_core/frames/standstill.h"
 #include "vcharge_obstacles/map_scan.h"
 
 namespace vcharge {
 namespace {
 
-// Below this speed, the vehicle counts as standing.
-constexpr double kStanding_m_per_s = 0.02;
 // If no range map arrives for this time, a map is emitted nevertheless.
 constexpr double kSilence_s = 0.5;
 // After this time without range maps, the map of a camera's silence does not wait for the next ones.
@@ -38,7 +37,6 @@ struct ObstacleMapper::Camera {
   MeiCamera::Parameters parameters = MeiCamera::Parameters::Zero();  // camera of the range maps
   cv::Size size;
   ObstacleCameraStatus status;
-  bool is_at_rest = false;  // at its last range map
 };
 
 std::string toString(ObstacleCameraState state) {
@@ -262,6 +260,7 @@ void ObstacleMapper::moveTo(Timestamp stamp, const RigidTransform& fixed_from_ve
 
 void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle) {
   settleImages(frame->stamp);
+  is_at_rest_ = standsAt(assembler_->odometry(), frame->stamp);
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (camera && frame->has_image[camera->index]) {
       silent_->addRangeMap(camera->index, frame->stamp);
@@ -283,8 +282,10 @@ void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle
       addAppearance(camera->watch->compare(frame->stamp, reference, obstacles.ground, fixed_from_vehicle),
                     grid_, &obstacles);
     }
-    camera->is_at_rest = map_.add(obstacles, grid_, fixed_from_vehicle);
-    steps_.add(heights);
+    map_.add(obstacles, grid_, fixed_from_vehicle, is_at_rest_);
+    if (!is_at_rest_) {  // errors repeat at rest
+      steps_.add(heights);
+    }
     cameras.push_back(&obstacles);
   }
   if (!last_emitted_ || frame->stamp > *last_emitted_) {  // otherwise the next map includes it
@@ -356,17 +357,15 @@ void ObstacleMapper::finish() {
 std::vector<ObstacleCameraStatus> ObstacleMapper::status() const {
   std::vector<ObstacleCameraStatus> all;
   const DriveOdometry& odometry = assembler_->odometry();
-  const bool stands = odometry.velocity() && odometry.velocity()->head<2>().norm() < kStanding_m_per_s;
+  const bool stands = odometry.last() && standsAt(odometry, odometry.last()->stamp);
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (!camera) {
       continue;
     }
     ObstacleCameraStatus status = camera->status;
-    if (camera->is_at_rest && status.state != ObstacleCameraState::kNoPose &&
-        status.state != ObstacleCameraState::kGroundLost) {
+    if (is_at_rest_ && status.state > ObstacleCameraState::kStanding) {  // its range map was used
       status.state = ObstacleCameraState::kStanding;
-      status.message = "the vehicle stands: only the overlap of cameras is measured, " +
-                       toText(100.0 * status.known_fraction, 0) + " % of the pixels have a range";
+      status.message = "the vehicle stands: only the overlap of cameras is measured";
     }
     status.late = static_cast<uint64_t>(assembler_->counters().late_images[camera->index]);
     const std::optional<Timestamp> newest = assembler_->newestImage(camera->index);
