@@ -115,10 +115,10 @@ struct RangeTask {
 /// and drops its images if stamps jump back, odometry has a gap or poses jump.
 ///
 /// With inter_camera, references are matched with the images that other cameras took at the same stamp, where
-/// both see the same: `standing` for references without neighbours, also of a camera that stands still, which
-/// are passed on at once; `always` for every reference. Where the image has a range from its neighbours and
-/// another one from other cameras, both are fused by their variances, or unknown if they contradict each
-/// other.
+/// both see the same. Alone only where standsAt() is true, also for cameras that stand still, and passed on
+/// at once: elsewhere every range map has ranges from motion. With `always` also every reference with
+/// neighbours: where an image has ranges of both kinds, they are fused by their variances, or unknown if they
+/// contradict each other.
 class RangeMapper : public DriveConsumer {
  public:
   using TaskCallback = std::function<void(RangeTask)>;

@@ -8,6 +8,7 @@
 #include "range_mapping/inter_camera_stereo.h"
 #include "range_mapping/range_fusion.h"
 #include "vcharge_core/base/error.h"
+#include "vcharge_core/frames/standstill.h"
 
 namespace vcharge {
 namespace {
@@ -234,7 +235,10 @@ void RangeMapper::addImageWithPose(Camera* camera, const ImageFrame& frame, Work
       ++camera->status.standing;
       camera->status.state = RangeMapperState::kStanding;
       camera->status.message = "the camera does not move: there is no parallax";
-      if (std::shared_ptr<const InstantImages> instant = images->instant(camera->index)) {
+      // Whoever fuses range maps counts on motion stereo where the vehicle does not stand, see standsAt().
+      std::shared_ptr<const InstantImages> instant =
+          standsAt(assembler_->odometry(), stamp) ? images->instant(camera->index) : nullptr;
+      if (instant) {
         camera->status.message = "the camera does not move: ranges only where other cameras see the same";
         emit(camera, {camera->index, {stamp, images->of(camera->index), world_from_camera}, {}, instant});
       }
@@ -311,7 +315,7 @@ void RangeMapper::emitReference(Camera* camera, size_t index) {
     ++camera->status.without_neighbours;
     camera->status.state = RangeMapperState::kFewNeighbours;
     camera->status.message = "no image with enough baseline yet";
-    if (task.instant) {
+    if (task.instant && standsAt(assembler_->odometry(), reference.stamp)) {
       emit(camera, std::move(task));
     }
     return;

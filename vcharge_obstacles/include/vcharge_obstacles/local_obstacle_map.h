@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -51,7 +52,7 @@ struct LocalObstacleMapOptions {
 /// Obstacles and free ground around the vehicle, fused over time and cameras as log-odds in a grid that
 /// scrolls with the vehicle in a fixed frame. A cell that is not observed again decays to unobserved with the
 /// distance driven, never with time: while the vehicle stands, motion stereo measures nothing, so all cells
-/// keep their state and only grow older.
+/// keep their state and only grow older, except where cameras that overlap measure.
 ///
 /// Deterministic; not thread safe.
 class LocalObstacleMap {
@@ -71,7 +72,13 @@ class LocalObstacleMap {
               const GroundArea& is_hidden = nullptr);
   /// Adds the observation of a camera; std::logic_error before the first moveTo(). `grid` is the
   /// detector's.
-  void add(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle);
+  ///
+  /// A range map counts by the distance that its camera has moved since its last one. One measured at rest
+  /// comes from cameras that overlap, and its errors repeat: it may occupy cells, and make free ones
+  /// unobserved until they are measured in motion, but neither frees a cell nor clears one that was occupied
+  /// in motion. Cells occupied at rest are cleared by maps that show bare ground, at rest or not.
+  void add(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle,
+           bool is_at_rest = false);
   /// Makes free cells unobserved for which `is_unwatched` is true. It gets their middles in the vehicle frame
   /// of the last moveTo(). Occupied cells keep their state.
   void forgetFree(const GroundArea& is_unwatched);
@@ -87,8 +94,9 @@ class LocalObstacleMap {
  private:
   struct Cell {
     float log_odds = 0.0F;
-    float weight = 0.0F;  // weight of the observations in the means below
-    float x_m = 0.0F;     // mean position of the obstacle relative to the cell's corner
+    float rest_log_odds = 0.0F;  // of maps measured at rest: positive if occupied; never frees the cell
+    float weight = 0.0F;         // weight of the observations in the means below
+    float x_m = 0.0F;            // mean position of the obstacle relative to the cell's corner
     float y_m = 0.0F;
     float sigma_m = 0.0F;
     float height_m = 0.0F;
@@ -100,30 +108,44 @@ class LocalObstacleMap {
   };
   /// A camera's observation of the ground in one cell.
   struct GroundObservation;
+  /// What a camera's range map counts.
+  struct MapWeight {
+    double value;
+    bool is_at_rest;
+  };
   /// Part of an obstacle, in the fixed frame.
   struct ObstaclePoint {
     Eigen::Vector2d point_m;
     double mass;
     double sigma_m;  // standard deviation along the ray
+    bool is_at_rest;
     const PolarObstacle* obstacle;
   };
   static constexpr int64_t kNever = INT64_MIN;
 
   void decay(double travelled_m, const RigidTransform& fixed_from_vehicle, const GroundArea& is_hidden);
-  double weightOf(const CameraObstacles& seen, const RigidTransform& fixed_from_vehicle);
+  /// Weight of a camera's range map: maps from nearby positions use the same images, so errors correlate.
+  double weightOf(const CameraObstacles& seen, const Eigen::Vector2d& position_m);
+  double weightAtRest(const CameraObstacles& seen);
+  static void raiseAtRest(float log_odds, float most, Cell* cell);
+  static void hideAtRest(double weight, Cell* cell);
+  /// True if the cell's means shall take the observation.
+  bool occupyAtRest(double mass, Cell* cell) const;
+  static void clearAtRest(double mass, Cell* cell);
   void addGround(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle,
-                 double weight);
+                 const MapWeight& weight);
   GroundShadows shadowsFor(const CameraObstacles& seen, const Eigen::Vector2d& camera_m) const;
   std::vector<GroundObservation> observeGround(const CameraObstacles& seen, const CellObserver& observer,
                                                const PolarGrid& grid,
                                                const RigidTransform& fixed_from_vehicle) const;
   void holdChanged(const std::vector<GroundObservation>& observations, Timestamp stamp);
   void hold(int64_t x, int64_t y, double radius_m, Timestamp stamp);
-  void addGroundObservation(const GroundObservation& ground, double weight, Timestamp stamp);
+  void addGroundObservation(const GroundObservation& ground, const MapWeight& weight, Timestamp stamp);
   void addOccupied(const CameraObstacles& seen, const PolarGrid& grid,
-                   const RigidTransform& fixed_from_vehicle, double weight);
+                   const RigidTransform& fixed_from_vehicle, const MapWeight& weight);
   void addObstaclePoint(const ObstaclePoint& point, Timestamp stamp);
   double parallaxSigma_m(double range_m, const Eigen::Vector2d& direction) const;
+  static float occupiedLogOdds(const Cell& cell) { return std::max(cell.log_odds, cell.rest_log_odds); }
   int8_t stateOf(const Cell& cell) const;
 
   LocalObstacleMapOptions options_;
@@ -133,7 +155,8 @@ class LocalObstacleMap {
   RigidTransform fixed_from_vehicle_;
   double travel_m_ = 0.0;
   Eigen::Vector2d travel_direction_{0.0, 0.0};                   // unit; zero before the first motion
-  std::map<std::string, Eigen::Vector2d> last_camera_position_;  // camera position at its last observation
+  std::map<std::string, Eigen::Vector2d> last_camera_position_;  // at its last map in motion
+  std::map<std::string, Timestamp> last_at_rest_;                // stamp of a camera's last map at rest
 };
 
 }  // namespace vcharge

@@ -62,7 +62,7 @@ enum class ObstacleCameraState {
   kSilent,        ///< images have stopped: ground that no other camera sees is not free
   kFrozen,        ///< the images repeat one while the vehicle moves: as if silent, range maps are ignored
   kNoPose,        ///< no odometry at the range maps' stamps
-  kStanding,      ///< the vehicle stands: motion stereo measures nothing
+  kStanding,      ///< the vehicle stands: only the overlap of cameras is measured, or nothing
   kHardlySees,    ///< few ranges: night, dirt, no texture
   kGroundLost,    ///< the ground is tilted beyond the bounds: no cell is cleared
   kGroundUnsure,  ///< few ground points: no cell is cleared
@@ -156,7 +156,6 @@ class ObstacleMapper {
   void noteWithoutPose(const Frame& frame);
   void emit(const LocalObstacleMap& map, const StepMapper& steps,
             const std::vector<const CameraObstacles*>& cameras);
-  Corridor findCorridor(const ObstacleMap& map, const std::vector<TrackedObject>& objects);
   void emitAt(Timestamp stamp);
   void moveTo(Timestamp stamp, const RigidTransform& fixed_from_vehicle, LocalObstacleMap* map) const;
   void emitWhenSilent();
@@ -178,6 +177,7 @@ class ObstacleMapper {
   std::unique_ptr<const HiddenGround> hidden_;
   size_t num_silent_emitted_ = 0;        // silent cameras at the last emitted frame
   std::optional<Timestamp> last_fused_;  // stamp of the last range maps in the map
+  bool is_at_rest_ = false;              // whether the vehicle stood at that stamp
   Timestamp objects_stamp_;
   std::vector<TrackedObject> objects_;
   std::optional<Timestamp> last_emitted_;

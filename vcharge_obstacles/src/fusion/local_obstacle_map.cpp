@@ -34,8 +34,6 @@ constexpr double kUnknownDecay = 0.7;
 constexpr double kChangedHold_s = 0.3;
 // Within this angle of the direction of travel missing ranges give no evidence: stereo has no parallax.
 constexpr double kBlindAngle_rad = 0.35;
-// Observations of a camera that has moved less have correlated errors, and weigh less.
-constexpr double kIndependentMotion_m = 0.1;
 
 RigidTransform levelled(const RigidTransform& transform) {
   return RigidTransform::planar(transform.translation().x(), transform.translation().y(),
@@ -62,6 +60,7 @@ void LocalObstacleMap::decay(double travelled_m, const RigidTransform& fixed_fro
   for (int64_t y = cells_.firstY(); y < cells_.firstY() + cells_.size(); ++y) {
     for (int64_t x = cells_.firstX(); x < cells_.firstX() + cells_.size(); ++x) {
       Cell& cell = cells_.at(x, y);
+      cell.rest_log_odds *= cell.rest_log_odds > 0.0F ? keep_occupied : keep_free;
       if (cell.log_odds > 0.0F) {
         cell.log_odds *= keep_occupied;
       } else if (cell.log_odds < 0.0F &&
@@ -93,21 +92,13 @@ void LocalObstacleMap::moveTo(Timestamp stamp, const RigidTransform& fixed_from_
 }
 
 void LocalObstacleMap::add(const CameraObstacles& seen, const PolarGrid& grid,
-                           const RigidTransform& fixed_from_vehicle) {
+                           const RigidTransform& fixed_from_vehicle, bool is_at_rest) {
   check(has_pose_, "LocalObstacleMap::add: moveTo() comes first");
   const RigidTransform level = levelled(fixed_from_vehicle);
-  const double weight = weightOf(seen, level);
+  const MapWeight weight{is_at_rest ? weightAtRest(seen) : weightOf(seen, transformed(level, seen.origin_m)),
+                         is_at_rest};
   addGround(seen, grid, level, weight);
   addOccupied(seen, grid, level, weight);
-}
-
-/// Weight of a camera's range map: maps from nearby positions use the same images, so errors correlate.
-double LocalObstacleMap::weightOf(const CameraObstacles& seen, const RigidTransform& fixed_from_vehicle) {
-  const Eigen::Vector2d position = transformed(fixed_from_vehicle, seen.origin_m);
-  const auto [last, is_first] = last_camera_position_.try_emplace(seen.camera_name, position);
-  const double moved_m = (position - last->second).norm();
-  last->second = position;
-  return is_first ? 1.0 : std::min(1.0, moved_m / kIndependentMotion_m);
 }
 
 struct LocalObstacleMap::GroundObservation {
@@ -178,7 +169,7 @@ std::vector<LocalObstacleMap::GroundObservation> LocalObstacleMap::observeGround
 }
 
 void LocalObstacleMap::addGround(const CameraObstacles& seen, const PolarGrid& grid,
-                                 const RigidTransform& fixed_from_vehicle, double weight) {
+                                 const RigidTransform& fixed_from_vehicle, const MapWeight& weight) {
   const std::vector<GroundObservation> observations =
       observeGround(seen, CellObserver(seen, grid, options_.cell_size_m), grid, fixed_from_vehicle);
   holdChanged(observations, seen.stamp);
@@ -207,28 +198,38 @@ void LocalObstacleMap::hold(int64_t x, int64_t y, double radius_m, Timestamp sta
         Cell& cell = cells_.at(column, row);
         cell.held_until_ns = std::max(cell.held_until_ns, until_ns);
         cell.log_odds = std::max(cell.log_odds, 0.0F);
+        cell.rest_log_odds = std::max(cell.rest_log_odds, 0.0F);
       }
     }
   }
 }
 
-void LocalObstacleMap::addGroundObservation(const GroundObservation& ground, double weight, Timestamp stamp) {
+void LocalObstacleMap::addGroundObservation(const GroundObservation& ground, const MapWeight& weight,
+                                            Timestamp stamp) {
   const CellObservation& observed = ground.cell;
   Cell* cell = &cells_.at(ground.x, ground.y);
   const bool shows_ground = !observed.blocked && observed.free_fraction >= kMinFreeFraction;
   if (shows_ground && !ground.in_shadow) {
-    const double log_odds = cell->log_odds - weight * kFreeLogOdds * observed.free_fraction;
-    const bool may_free =
-        stamp.nanoseconds() >= cell->held_until_ns && (ground.may_free || stateOf(*cell) == kCellFree);
-    const double least = may_free ? kMinCellLogOdds : std::min(0.0, static_cast<double>(cell->log_odds));
-    cell->log_odds = static_cast<float>(std::max(least, log_odds));
     cell->last_seen_ns = stamp.nanoseconds();
     cell->travel_m = static_cast<float>(travel_m_);
+    const bool was_free = stateOf(*cell) == kCellFree;
+    clearAtRest(weight.value * observed.free_fraction, cell);
+    if (weight.is_at_rest) {
+      return;
+    }
+    const double log_odds = cell->log_odds - weight.value * kFreeLogOdds * observed.free_fraction;
+    const bool may_free = stamp.nanoseconds() >= cell->held_until_ns && (ground.may_free || was_free);
+    const double least = may_free ? kMinCellLogOdds : std::min(0.0, static_cast<double>(cell->log_odds));
+    cell->log_odds = static_cast<float>(std::max(least, log_odds));
+  } else if (weight.is_at_rest) {
+    if (cell->log_odds < 0.0F && (shows_ground || observed.hidden_fraction >= kMinHiddenFraction)) {
+      hideAtRest(weight.value, cell);
+    }
   } else if (cell->log_odds < 0.0F &&
              (shows_ground || observed.hidden_fraction + observed.unknown_fraction >= kMinHiddenFraction)) {
     // An obstacle may now be there or in front of it, so the cell decays towards unobserved.
     const bool hides = shows_ground || observed.hidden_fraction >= observed.unknown_fraction;
-    cell->log_odds *= static_cast<float>(std::pow(hides ? kHiddenDecay : kUnknownDecay, weight));
+    cell->log_odds *= static_cast<float>(std::pow(hides ? kHiddenDecay : kUnknownDecay, weight.value));
   }
 }
 
@@ -239,8 +240,14 @@ void LocalObstacleMap::addObstaclePoint(const ObstaclePoint& point, Timestamp st
     return;
   }
   Cell& cell = cells_.at(x, y);
-  cell.log_odds = std::min(static_cast<float>(kMaxCellLogOdds),
-                           cell.log_odds + static_cast<float>(kOccupiedLogOdds * point.mass));
+  cell.travel_m = static_cast<float>(travel_m_);
+  cell.last_seen_ns = cell.last_occupied_ns = stamp.nanoseconds();
+  if (!point.is_at_rest) {
+    cell.log_odds = std::min(static_cast<float>(kMaxCellLogOdds),
+                             cell.log_odds + static_cast<float>(kOccupiedLogOdds * point.mass));
+  } else if (!occupyAtRest(point.mass, &cell)) {
+    return;
+  }
   const double sigma_m = point.sigma_m;
   const auto weight = static_cast<float>(point.mass / (sigma_m * sigma_m + 1e-4));
   const float kept = kMemory * cell.weight;
@@ -254,8 +261,6 @@ void LocalObstacleMap::addObstaclePoint(const ObstaclePoint& point, Timestamp st
   blend(&cell.sigma_m, sigma_m);
   blend(&cell.height_m, point.obstacle->height_m);
   blend(&cell.height_sigma_m, point.obstacle->height_sigma_m);
-  cell.travel_m = static_cast<float>(travel_m_);
-  cell.last_seen_ns = cell.last_occupied_ns = stamp.nanoseconds();
 }
 
 /// Standard deviation of a range due to the error of the camera's motion across the ray. Directions are in
@@ -269,7 +274,7 @@ double LocalObstacleMap::parallaxSigma_m(double range_m, const Eigen::Vector2d& 
 }
 
 void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid& grid,
-                                   const RigidTransform& fixed_from_vehicle, double weight) {
+                                   const RigidTransform& fixed_from_vehicle, const MapWeight& weight) {
   const double cell_m = options_.cell_size_m;
   const double yaw_rad = yawOfRotation(fixed_from_vehicle.rotation());
   for (const PolarObstacle& obstacle : seen.obstacles) {
@@ -279,12 +284,12 @@ void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid&
     const double width_m = obstacle.range_m * grid.increment_rad();
     const int across = std::max(1, static_cast<int>(std::ceil(width_m / cell_m)));
     // Close to the camera, several rays meet one cell and together count as one observation.
-    const double ray_mass =
-        weight * obstacle.weight * std::min(1.0, width_m / cell_m * 1.5) * std::max(0.3, obstacle.support);
+    const double ray_mass = weight.value * obstacle.weight * std::min(1.0, width_m / cell_m * 1.5) *
+                            std::max(0.3, obstacle.support);
     const double middle_rad = grid.angle_rad(obstacle.ray) + yaw_rad;
-    const double sigma_m =
-        std::hypot(obstacle.range_sigma_m,
-                   parallaxSigma_m(obstacle.range_m, {std::cos(middle_rad), std::sin(middle_rad)}));
+    const Eigen::Vector2d middle(std::cos(middle_rad), std::sin(middle_rad));
+    const double parallax_sigma_m = weight.is_at_rest ? 0.0 : parallaxSigma_m(obstacle.range_m, middle);
+    const double sigma_m = std::hypot(obstacle.range_sigma_m, parallax_sigma_m);
     const double sharpness = std::min(1.0, kSharpSigma_m / sigma_m);
     const double observation_mass = sharpness * sharpness * ray_mass;
     const int along =
@@ -304,9 +309,10 @@ void LocalObstacleMap::addOccupied(const CameraObstacles& seen, const PolarGrid&
       for (int step = -along; step <= along; ++step) {
         const Eigen::Vector2d point_in_vehicle =
             seen.origin_m + (obstacle.range_m + step * cell_m) * direction;
-        addObstaclePoint({transformed(fixed_from_vehicle, point_in_vehicle),
-                          observation_mass * density(step) / normalizer, sigma_m, &obstacle},
-                         seen.stamp);
+        addObstaclePoint(
+            {transformed(fixed_from_vehicle, point_in_vehicle), observation_mass * density(step) / normalizer,
+             sigma_m, weight.is_at_rest, &obstacle},
+            seen.stamp);
       }
     }
   }
@@ -331,7 +337,7 @@ void LocalObstacleMap::forgetAround(const Eigen::Vector2d& point_m, Timestamp st
 }
 
 int8_t LocalObstacleMap::stateOf(const Cell& cell) const {
-  if (cell.log_odds >= static_cast<float>(options_.occupied_threshold)) {
+  if (occupiedLogOdds(cell) >= static_cast<float>(options_.occupied_threshold)) {
     return kCellOccupied;
   }
   return cell.log_odds <= static_cast<float>(options_.free_threshold) ? kCellFree : kCellUnobserved;
@@ -351,7 +357,7 @@ void LocalObstacleMap::reanchor(const RigidTransform& new_from_old_fixed) {
         transformed(old_from_new, Eigen::Vector2d((x + 0.5) * cell_m, (y + 0.5) * cell_m));
     const int64_t old_x = cells_.indexOf(point_m.x());
     const int64_t old_y = cells_.indexOf(point_m.y());
-    if (cells_.isInside(old_x, old_y) && cells_.at(old_x, old_y).log_odds <= 0.0F) {
+    if (cells_.isInside(old_x, old_y) && occupiedLogOdds(cells_.at(old_x, old_y)) <= 0.0F) {
       moved.cells_.at(x, y) = cells_.at(old_x, old_y);
     }
   });
@@ -361,11 +367,11 @@ void LocalObstacleMap::reanchor(const RigidTransform& new_from_old_fixed) {
         transformed(new_from_old, Eigen::Vector2d(x * cell_m + old.x_m, y * cell_m + old.y_m));
     const int64_t new_x = cells_.indexOf(point_m.x());
     const int64_t new_y = cells_.indexOf(point_m.y());
-    if (old.log_odds <= 0.0F || !moved.cells_.isInside(new_x, new_y)) {
+    if (occupiedLogOdds(old) <= 0.0F || !moved.cells_.isInside(new_x, new_y)) {
       return;
     }
     Cell& target = moved.cells_.at(new_x, new_y);
-    if (old.log_odds > target.log_odds) {
+    if (occupiedLogOdds(old) > occupiedLogOdds(target)) {
       target = old;
       target.x_m = static_cast<float>(point_m.x() - static_cast<double>(new_x) * cell_m);
       target.y_m = static_cast<float>(point_m.y() - static_cast<double>(new_y) * cell_m);
@@ -375,6 +381,7 @@ void LocalObstacleMap::reanchor(const RigidTransform& new_from_old_fixed) {
   moved.travel_direction_ =
       (new_from_old.rotation() * Eigen::Vector3d(travel_direction_.x(), travel_direction_.y(), 0.0))
           .head<2>();
+  moved.last_at_rest_ = last_at_rest_;
   for (const auto& [name, position] : last_camera_position_) {
     moved.last_camera_position_[name] = transformed(new_from_old, position);
   }

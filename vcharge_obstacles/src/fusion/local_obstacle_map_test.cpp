@@ -1,6 +1,7 @@
 #include "vcharge_obstacles/local_obstacle_map.h"
 
 #include <cmath>
+#include <random>
 
 #include <gtest/gtest.h>
 
@@ -23,7 +24,8 @@ class LocalObstacleMapTest : public ::testing::Test {
   }
 
   /// Adds one observation of all cameras from x, 80 ms after the previous one.
-  void observe(const BoxWorld& world, double x_m, const BoxWorldNoise& noise = {0.01, 0.1, 1}) {
+  void observe(const BoxWorld& world, double x_m, const BoxWorldNoise& noise = {0.01, 0.1, 1},
+               bool is_at_rest = false) {
     stamp_ = stamp_ + durationFromSeconds(0.08);
     pose_ = RigidTransform::planar(x_m, 0.0, 0.0);
     map_.moveTo(stamp_, pose_);
@@ -31,13 +33,22 @@ class LocalObstacleMapTest : public ::testing::Test {
       BoxWorldNoise own = noise;
       own.seed = static_cast<uint32_t>(1000 * i) + static_cast<uint32_t>(stamp_.nanoseconds() / 80000000);
       map_.add(detectors_[i].detect(measureBoxWorld(world, rig_.cameras[i], pose_, stamp_, own)), grid_,
-               pose_);
+               pose_, is_at_rest);
     }
   }
   void drive(const BoxWorld& world, double from_m, double to_m, double step_m = 0.1) {
     for (double x = from_m; x <= to_m + 1e-9; x += step_m) {
       observe(world, x);
     }
+  }
+  void rest(const BoxWorld& world, int num_maps, const BoxWorldNoise& noise = {0.01, 0.1, 1}) {
+    for (int i = 0; i < num_maps; ++i) {
+      observe(world, pose_.translation().x(), noise, true);
+    }
+  }
+  /// Number of cells of a state in a map that did not have it in an earlier map at the same pose.
+  static int countNew(const ObstacleMap& before, const ObstacleMap& after, int8_t state) {
+    return cv::countNonZero((after.state == state) & (before.state != state));
   }
   int8_t stateAt(double x_m, double y_m) const { return stateIn(map_.snapshot(), x_m, y_m); }
 
@@ -209,6 +220,86 @@ TEST_F(LocalObstacleMapTest, ObservationsFromTheSamePositionCountOnce) {
   }
   EXPECT_EQ(countCells(map_.snapshot(), kCellFree), countCells(first, kCellFree));
   EXPECT_EQ(countCells(map_.snapshot(), kCellOccupied), countCells(first, kCellOccupied));
+}
+
+TEST_F(LocalObstacleMapTest, AtRestObstaclesAreFoundAndNothingIsFreed) {
+  rest(kPerson, 4);  // 0.32 s
+  EXPECT_GT(countCells(map_.snapshot(), kCellOccupied), 0);
+  rest(kPerson, 100);
+  EXPECT_EQ(stateAt(1.9, 2.85), kCellOccupied);
+  EXPECT_EQ(countCells(map_.snapshot(), kCellFree), 0);
+}
+
+TEST_F(LocalObstacleMapTest, AtRestWhatCameIsOccupiedAndWhatLeftBecomesUnobserved) {
+  drive({}, 0.0, 0.8);
+  rest({}, 50);
+  ASSERT_EQ(stateAt(1.9, 2.85), kCellFree);
+  rest(kPerson, 4);  // 0.32 s
+  EXPECT_EQ(stateAt(1.9, 2.85), kCellOccupied);
+  rest(kPerson, 100);
+  rest({}, 4);
+  EXPECT_EQ(stateAt(1.9, 2.85), kCellUnobserved);
+  rest({}, 100);
+  EXPECT_EQ(stateAt(1.9, 2.85), kCellUnobserved);
+  drive({}, 0.9, 1.4);
+  EXPECT_EQ(stateAt(1.9, 2.85), kCellFree);
+}
+
+TEST_F(LocalObstacleMapTest, AtRestNothingIsClearedThatWasOccupiedInMotion) {
+  drive(kPerson, 0.0, 0.8);
+  const ObstacleMap before = map_.snapshot();
+  rest({}, 200);
+  const ObstacleMap after = map_.snapshot();
+  EXPECT_EQ(countNew(after, before, kCellOccupied), 0);
+  EXPECT_EQ(countNew(before, after, kCellFree), 0);
+  // Positions and heights from motion stay, too.
+  rest({{{{1.7, 2.8, 0.0}, {2.1, 3.2, 0.4}}}}, 50);
+  EXPECT_EQ(cv::norm(map_.snapshot().height_m, before.height_m, cv::NORM_INF, before.state == kCellOccupied),
+            0.0);
+  drive({}, 0.9, 0.9 + 11 * 0.1);
+  EXPECT_EQ(stateAt(1.9, 2.85), kCellFree);
+}
+
+TEST_F(LocalObstacleMapTest, WhateverMapsAtRestShowTheyOnlyTakeFreedomAndOccupy) {
+  drive(kPerson, 0.0, 0.8);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> along(-3.0, 6.0), aside(-6.0, 6.0);
+  for (int i = 0; i < 30; ++i) {
+    BoxWorld world;
+    for (int k = 0; k < 5; ++k) {
+      const double x = along(random), y = aside(random);
+      world.boxes.push_back({{x, y, 0.0}, {x + 0.5, y + 0.5, 1.5}});
+    }
+    const ObstacleMap before = map_.snapshot();
+    rest(i % 2 == 0 ? world : BoxWorld(), 1 + i % 7, {0.05, 0.3, 1});
+    const ObstacleMap after = map_.snapshot();
+    ASSERT_EQ(countNew(before, after, kCellFree), 0) << i;
+  }
+  EXPECT_EQ(stateAt(1.9, 2.85), kCellOccupied);
+}
+
+TEST_F(LocalObstacleMapTest, AtRestMapsOfAnUnchangedWorldKeepItsStates) {
+  drive(kPerson, 0.0, 0.8);
+  const ObstacleMap before = map_.snapshot();
+  rest(kPerson, 200);
+  const ObstacleMap after = map_.snapshot();
+  EXPECT_GE(countCells(after, kCellFree), 98 * countCells(before, kCellFree) / 100);
+  EXPECT_GE(countCells(after, kCellOccupied), countCells(before, kCellOccupied));
+  rest(kPerson, 50, {0.01, 1.0, 1});  // no range at all
+  EXPECT_EQ(cv::countNonZero(map_.snapshot().state != after.state), 0);
+}
+
+TEST_F(LocalObstacleMapTest, WhatIsOccupiedAtRestMovesWithItsFrameAndIsClearedInMotion) {
+  rest(kPerson, 10);
+  const int occupied = countCells(map_.snapshot(), kCellOccupied);
+  ASSERT_GT(occupied, 0);
+  const RigidTransform moved = RigidTransform::planar(10.0, -20.0, 0.0);
+  map_.reanchor(moved);
+  EXPECT_EQ(stateAt(11.9, -17.15), kCellOccupied);
+  EXPECT_EQ(countCells(map_.snapshot(), kCellOccupied), occupied);
+  map_.reanchor(moved.inverse());
+  drive({}, 0.1, 0.8);
+  EXPECT_EQ(stateAt(1.9, 2.85), kCellFree);
 }
 
 }  // namespace

@@ -13,13 +13,12 @@
 #include "steps/near_heights.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/text_format.h"
+#include "vcharge_core/frames/standstill.h"
 #include "vcharge_obstacles/map_scan.h"
 
 namespace vcharge {
 namespace {
 
-// Below this speed, the vehicle counts as standing.
-constexpr double kStanding_m_per_s = 0.02;
 // If no range map arrives for this time, a map is emitted nevertheless.
 constexpr double kSilence_s = 0.5;
 // After this time without range maps, the map of a camera's silence does not wait for the next ones.
@@ -262,6 +261,7 @@ void ObstacleMapper::moveTo(Timestamp stamp, const RigidTransform& fixed_from_ve
 
 void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle) {
   settleImages(frame->stamp);
+  is_at_rest_ = standsAt(assembler_->odometry(), frame->stamp);
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (camera && frame->has_image[camera->index]) {
       silent_->addRangeMap(camera->index, frame->stamp);
@@ -283,8 +283,10 @@ void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle
       addAppearance(camera->watch->compare(frame->stamp, reference, obstacles.ground, fixed_from_vehicle),
                     grid_, &obstacles);
     }
-    map_.add(obstacles, grid_, fixed_from_vehicle);
-    steps_.add(heights);
+    map_.add(obstacles, grid_, fixed_from_vehicle, is_at_rest_);
+    if (!is_at_rest_) {  // errors repeat at rest
+      steps_.add(heights);
+    }
     cameras.push_back(&obstacles);
   }
   if (!last_emitted_ || frame->stamp > *last_emitted_) {  // otherwise the next map includes it
@@ -303,7 +305,9 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const StepMapper& steps,
       transformed(anchor_, movedObjects(objects_, toSeconds(frame.map.stamp - objects_stamp_)));
   forgetFreeUnder(objects, &frame.map);
   frame.scan = makeScan(frame.map, options_.detector.grid.num_rays);
-  frame.corridor = findCorridor(frame.map, objects);
+  const double curvature_per_m =
+      curvature_->update(frame.map.stamp, [this](Timestamp stamp) { return odomFromVehicle(stamp); });
+  frame.corridor = corridor_finder_.find(frame.map, curvature_per_m, objects);
   for (const CameraObstacles* camera : cameras) {
     frame.cameras.push_back(*camera);
   }
@@ -311,12 +315,6 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const StepMapper& steps,
   last_emitted_ = frame.map.stamp;
   num_silent_emitted_ = silent_->numSilentAt(frame.map.stamp);
   on_frame_(frame);
-}
-
-Corridor ObstacleMapper::findCorridor(const ObstacleMap& map, const std::vector<TrackedObject>& objects) {
-  const double curvature_per_m =
-      curvature_->update(map.stamp, [this](Timestamp stamp) { return odomFromVehicle(stamp); });
-  return corridor_finder_.find(map, curvature_per_m, objects);
 }
 
 /// Emits the map while no range maps arrive. The time is measured by their arrival instead of their
@@ -356,12 +354,16 @@ void ObstacleMapper::finish() {
 std::vector<ObstacleCameraStatus> ObstacleMapper::status() const {
   std::vector<ObstacleCameraStatus> all;
   const DriveOdometry& odometry = assembler_->odometry();
-  const bool stands = odometry.velocity() && odometry.velocity()->head<2>().norm() < kStanding_m_per_s;
+  const bool stands = odometry.last() && standsAt(odometry, odometry.last()->stamp);
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (!camera) {
       continue;
     }
     ObstacleCameraStatus status = camera->status;
+    if (is_at_rest_ && status.state > ObstacleCameraState::kStanding) {  // its range map was used
+      status.state = ObstacleCameraState::kStanding;
+      status.message = "the vehicle stands: only the overlap of cameras is measured";
+    }
     status.late = static_cast<uint64_t>(assembler_->counters().late_images[camera->index]);
     const std::optional<Timestamp> newest = assembler_->newestImage(camera->index);
     if (odometry.last() && newest && toSeconds(odometry.last()->stamp - *newest) >= options_.max_silence_s) {

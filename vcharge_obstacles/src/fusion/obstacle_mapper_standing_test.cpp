@@ -67,6 +67,13 @@ class StandingMapperTest : public ObstacleMapperTest {
     }
     return frames_.back();
   }
+  /// Range maps of all cameras besides, measured at the pose where the vehicle stands.
+  void standWithRangeMaps(int ticks) {
+    for (int i = 0; i < ticks; i += 4) {
+      addRangeMaps(tick_ - 1, {0.01, 0.1, static_cast<uint32_t>(tick_)});
+      stand(4);
+    }
+  }
 
   cv::RNG random_{7};
   cv::Mat pattern_;
@@ -91,6 +98,37 @@ TEST_F(StandingMapperTest, WhatChangesBecomesUnknownAndStaysSo) {
   EXPECT_EQ(stateAt(after, kPersonX_m, kPersonY_m), kCellUnobserved);
   EXPECT_GT(count(after, kCellFree), 8 * count(before_, kCellFree) / 10);
   EXPECT_EQ(count(after, kCellOccupied), count(before_, kCellOccupied));
+}
+
+TEST_F(StandingMapperTest, RangeMapsAtRestFreeNoChangedGround) {
+  person_from_ = kStopTick + 200;
+  person_until_ = kStopTick + 300;
+  EXPECT_EQ(stateAt(stand(300), kPersonX_m, kPersonY_m), kCellUnobserved);
+  standWithRangeMaps(100);
+  EXPECT_EQ(stateAt(frames_.back(), kPersonX_m, kPersonY_m), kCellUnobserved);
+}
+
+TEST_F(StandingMapperTest, RangeMapsAtRestShowWhatCameAndThatItLeft) {
+  ASSERT_EQ(stateAt(before_, kPersonX_m, kPersonY_m), kCellFree);
+  world_.boxes.push_back({{kPersonX_m - 0.2, kPersonY_m, 0.0}, {kPersonX_m + 0.2, kPersonY_m + 0.4, 1.7}});
+  standWithRangeMaps(40);
+  EXPECT_EQ(stateAt(frames_.back(), kPersonX_m, kPersonY_m + 0.05), kCellOccupied);
+  EXPECT_EQ(statusOf("left").state, ObstacleCameraState::kStanding);
+  EXPECT_NE(statusOf("left").message.find("only the overlap of cameras is measured"), std::string::npos);
+  world_.boxes.pop_back();
+  standWithRangeMaps(100);
+  EXPECT_EQ(stateAt(frames_.back(), kPersonX_m, kPersonY_m + 0.05), kCellUnobserved);
+}
+
+TEST_F(StandingMapperTest, FiveMinutesOfRangeMapsAtRestLoseNothing) {
+  for (int minute = 0; minute < 5; ++minute) {
+    standWithRangeMaps(100);
+    stand(kStandingTicks / 5 - 100);
+  }
+  const ObstacleFrame& after = frames_.back();
+  EXPECT_GE(count(after, kCellFree), 98 * count(before_, kCellFree) / 100);
+  EXPECT_EQ(newlyFree(before_, after, -100.0), 0);
+  EXPECT_GE(count(after, kCellOccupied), count(before_, kCellOccupied));
 }
 
 }  // namespace

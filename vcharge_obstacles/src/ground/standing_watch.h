@@ -19,10 +19,10 @@
 
 namespace vcharge {
 
-/// Watches the ground while the vehicle stands and gets no range maps: the map keeps what it holds, except
-/// where images tell that something has changed. What changes there becomes unknown, and stays so until it is
-/// measured again. The result depends on stamps only, not on the order in which images, range maps and
-/// odometry arrive. Not thread safe.
+/// Watches the ground while the vehicle stands and gets no range maps, or only where cameras overlap: the map
+/// keeps what it holds, except where images tell that something has changed. What changes there becomes
+/// unknown, and stays so until it is measured again. The result depends on stamps only, not on the order in
+/// which images, range maps and odometry arrive. Not thread safe.
 class StandingWatch {
  public:
   using Pixels = std::function<cv::Mat()>;
