@@ -10,6 +10,8 @@ import unittest
 
 import rospy
 import rostest
+import yaml
+from nav_msgs.msg import OccupancyGrid
 from vcharge_msgs.msg import TrackedObjects
 from visualization_msgs.msg import MarkerArray
 
@@ -17,6 +19,8 @@ sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import CAMERAS, Drive, run, tool  # noqa: E402
 from nodelet_fixture import (Diagnostics, drive_publishers, expect_bad_rig_is_refused, manager_services,  # noqa: E402
                              reach, wait_for, wait_until_gone)
+
+OPTIONS = {"ignore_hidden": False}  # no obstacle map is published here
 
 
 class ObjectNodeletTest(unittest.TestCase):
@@ -27,7 +31,8 @@ class ObjectNodeletTest(unittest.TestCase):
         cls.drive = Drive(drive="standing", duration_s=3.0, extra=movers)
         offline = cls.drive.folder / "offline"
         status, output, errors = run([tool("vcharge_obstacles", "detect_obstacles"), "--bag", cls.drive.bag, "--rig",
-                                      cls.drive.rig, "--output", offline])
+                                      cls.drive.rig, "--object-options",
+                                      cls.drive.write_text("objects.yaml", yaml.safe_dump(OPTIONS)), "--output", offline])
         if status != 0:
             raise RuntimeError(f"detect_obstacles failed: {output} {errors}")
         with open(offline / "objects_frames.csv", encoding="utf-8") as file:
@@ -56,7 +61,7 @@ class ObjectNodeletTest(unittest.TestCase):
         cls.drive.remove()
 
     def start(self, is_lossless):
-        rospy.set_param("/objects", {"rig": str(self.drive.rig), "lossless_replay": is_lossless})
+        rospy.set_param("/objects", {"rig": str(self.drive.rig), "lossless_replay": is_lossless, "options": OPTIONS})
         self.assertTrue(self.load("/objects", "vcharge_obstacles/object_nodelet", [], [], [], "").success)
         self.diagnostics.clear()
         reach(self.publishers, self.diagnostics.heard, self.subscribers)
@@ -101,6 +106,17 @@ class ObjectNodeletTest(unittest.TestCase):
         wait_for(lambda: len(self.received) >= len(self.stamps) // 6, "objects of some images", 60.0)
         self.assertLessEqual(set(self.received), set(self.stamps))
         wait_for(lambda: "dropped" in self.diagnostics.values("objects"), "the number of dropped images")
+
+    def test_bad_obstacle_map_is_refused_and_the_nodelet_goes_on(self):
+        self.start(is_lossless=True)
+        publisher = rospy.Publisher("/obstacles/grid", OccupancyGrid, queue_size=1)
+        wait_for(lambda: publisher.get_num_connections() > 0, "the nodelet to subscribe to the map")
+        publisher.publish(OccupancyGrid())
+        wait_for(lambda: self.diagnostics.tells("/obstacles/grid", "expected a stamp"), "the error")
+        for topic, message in self.messages:
+            self.publishers[topic].publish(message)
+            time.sleep(0.002)
+        wait_for(lambda: len(self.received) >= len(self.stamps) - 3, "objects of almost all images", 120.0)
 
     def test_missing_rig_is_refused(self):
         expect_bad_rig_is_refused(self, "vcharge_obstacles/object_nodelet", self.drive.folder / "none.yaml")

@@ -3,11 +3,13 @@
 #include <mutex>
 #include <string>
 
+#include <nav_msgs/OccupancyGrid.h>
 #include <vcharge_msgs/TrackedObjects.h>
 #include <visualization_msgs/MarkerArray.h>
 #include <pluginlib/class_list_macros.hpp>
 
 #include "object_markers.h"
+#include "obstacle_messages.h"
 #include "vcharge_core/workers/ordered_worker.h"
 #include "vcharge_obstacles/object_tracker.h"
 #include "vcharge_ros/nodelet.h"
@@ -17,6 +19,7 @@ namespace vcharge {
 
 /// Follows what moves around the vehicle of a live or replayed drive. Publishes /obstacles/objects
 /// (vcharge_msgs/TrackedObjects in `odom`, at every stamp of the images) and /obstacles/object_markers.
+/// Objects behind obstacles of obstacle_nodelet's /obstacles/grid, if it is there, are left out.
 /// Parameters: ~rig (path), ~options (ObjectTrackerOptions), ~source (LiveDriveSourceOptions),
 /// ~lossless_replay (every image in order, as detect_obstacles; otherwise images that wait too long are
 /// dropped, and counted in /diagnostics).
@@ -27,6 +30,7 @@ class ObjectNodelet : public Nodelet, private DriveConsumer {
 
  private:
   static constexpr uint32_t kOutputQueue = 10;
+  static constexpr const char* kGridTopic = "/obstacles/grid";
   static constexpr size_t kMaxWaitingFrames = 2;
   using Task = std::function<void()>;
 
@@ -47,6 +51,8 @@ class ObjectNodelet : public Nodelet, private DriveConsumer {
         OrderedQueue<Task>(isLossless() ? 0 : kMaxWaitingFrames * rig_->cameras.size()));
     addDiagnostics(
         "", [this] { return report(); }, Threads::kOne);
+    subscribe<nav_msgs::OccupancyGrid>(
+        kGridTopic, 1, [this](const nav_msgs::OccupancyGridConstPtr& grid) { addObstacles(*grid); });
     openSource(rig_, options.cameras);
     runSource(this);
   }
@@ -57,6 +63,10 @@ class ObjectNodelet : public Nodelet, private DriveConsumer {
   }
   void addOdometry(const VehicleOdometry& odometry) override {
     worker_->push([this, odometry] { tracker_->addOdometry(odometry); }, false);
+  }
+
+  void addObstacles(const nav_msgs::OccupancyGrid& grid) {
+    worker_->push([this, map = fromMessage(grid, kGridTopic)] { tracker_->setObstacles(map); }, false);
   }
 
   void work(const Task& task) {

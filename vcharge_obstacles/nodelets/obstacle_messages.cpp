@@ -7,6 +7,7 @@
 #include <octomap/OcTree.h>
 
 #include "marker_shapes.h"
+#include "vcharge_core/base/error.h"
 #include "vcharge_core/base/text_format.h"
 #include "vcharge_obstacles/obstacle_outlines.h"
 #include "vcharge_ros/conversions.h"
@@ -54,6 +55,26 @@ nav_msgs::OccupancyGrid toMessage(const ObstacleMap& map) {
     grid.data.insert(grid.data.end(), cells, cells + map.state.cols);
   }
   return grid;
+}
+
+ObstacleMap fromMessage(const nav_msgs::OccupancyGrid& grid, const std::string& topic) {
+  const auto& rotation = grid.info.origin.orientation;
+  const bool is_turned = rotation.x != 0.0 || rotation.y != 0.0 || rotation.z != 0.0;
+  constexpr uint32_t kMaxSide = 10000;
+  if (grid.header.stamp.isZero() || grid.header.frame_id.empty() || !(grid.info.resolution > 0.0F) ||
+      is_turned || grid.info.width > kMaxSide || grid.info.height > kMaxSide ||
+      grid.data.size() != size_t{grid.info.width} * grid.info.height) {
+    throw InputError(topic +
+                     ": expected a stamp, a frame, a resolution above 0, an origin without rotation, and "
+                     "width x height cells");
+  }
+  ObstacleMap map = ObstacleMap::unobserved(
+      {static_cast<int>(grid.info.width), static_cast<int>(grid.info.height)}, grid.info.resolution);
+  map.stamp = toTimestamp(grid.header.stamp);
+  map.frame_id = grid.header.frame_id;
+  map.origin_m = {grid.info.origin.position.x, grid.info.origin.position.y};
+  std::copy(grid.data.begin(), grid.data.end(), map.state.begin<int8_t>());
+  return map;
 }
 
 nav_msgs::OccupancyGrid toMessage(const StepMap& map) {

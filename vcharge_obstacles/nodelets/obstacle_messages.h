@@ -22,6 +22,11 @@ namespace vcharge {
 /// Cells: -1 unobserved, 0 free, 100 occupied. frame_id and stamp are the map's.
 nav_msgs::OccupancyGrid toMessage(const ObstacleMap& map);
 
+/// The states of the cells; pose, heights, points and ages are unknown. InputError that names the topic
+/// unless the grid has a stamp, a frame, a resolution, an origin without rotation, and as many cells as it
+/// says.
+ObstacleMap fromMessage(const nav_msgs::OccupancyGrid& grid, const std::string& topic);
+
 /// Cells: -1 unknown, 0 even, 100 step. frame_id and stamp are the map's.
 nav_msgs::OccupancyGrid toMessage(const StepMap& map);
 

@@ -30,9 +30,9 @@ namespace {
 using namespace vcharge;
 
 struct Arguments {
-  std::string bag, rig, options, range_options, range, output;
+  std::string bag, rig, options, range_options, object_options, range, output;
   std::vector<std::string> cameras;
-  bool show_options = false;
+  bool show_options = false, no_objects = false;
 };
 
 /// Processor time of all threads of the process during parts of a run.
@@ -55,7 +55,8 @@ class ProcessorTime {
   std::clock_t ticks_ = 0;
 };
 
-/// Passes odometry to both stages, and range maps from the first to the second.
+/// Passes odometry and images to the stages, and range maps from the first to the second. `objects` may be
+/// null.
 class Pipeline : public DriveConsumer {
  public:
   Pipeline(const std::shared_ptr<const CameraRig>& rig, const RangeMapperOptions& range_options,
@@ -79,7 +80,9 @@ class Pipeline : public DriveConsumer {
   }
 
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
-    tracking_.add([&] { objects_->addImage(camera_index, stamp, image); });
+    if (objects_ != nullptr) {
+      tracking_.add([&] { objects_->addImage(camera_index, stamp, image); });
+    }
     ++num_images_;
     detecting_.add([&] {
       obstacles_->addImage(camera_index, stamp, fingerprintOf(image.pixels),
@@ -90,7 +93,9 @@ class Pipeline : public DriveConsumer {
     }
   }
   void addOdometry(const VehicleOdometry& odometry) override {
-    tracking_.add([&] { objects_->addOdometry(odometry); });
+    if (objects_ != nullptr) {
+      tracking_.add([&] { objects_->addOdometry(odometry); });
+    }
     detecting_.add([&] { obstacles_->addOdometry(odometry); });
     if (ranges_) {
       whole_.add([&] { ranges_->addOdometry(odometry); });
@@ -108,7 +113,9 @@ class Pipeline : public DriveConsumer {
       ranges_->finish();
     }
     obstacles_->finish();
-    objects_->finish();
+    if (objects_ != nullptr) {
+      objects_->finish();
+    }
   }
   /// Processor time without reading the bag and writing results; writing happens inside the detection.
   void reportTiming(double writing_s, nlohmann::json* found) const {
@@ -212,7 +219,9 @@ class Recorder {
   }
 
   void finish(const ObstacleMapper& mapper, nlohmann::json* found) const {
-    writeObjects(object_frames_, folder_);
+    if (!object_frames_.empty()) {
+      writeObjects(object_frames_, folder_);
+    }
     writeTextFileAtomically(folder_ + "/status.csv", table_);
     writeTextFileAtomically(folder_ + "/corridor.csv", corridors_);
     nlohmann::json cameras = nlohmann::json::array();
@@ -267,19 +276,28 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
   if (!std::filesystem::exists(arguments.bag)) {
     throw InputError(arguments.bag + ": no such file");  // before the output is created
   }
-  if (object_options.cameras.empty()) {
+  if (arguments.no_objects) {
+    object_options.cameras = options.cameras;
+  } else if (object_options.cameras.empty()) {
     object_options.cameras = findObjectCameras(arguments.bag, *rig, options.cameras);
   }
   FolderTransaction output(arguments.output);
   Recorder recorder(output.path());
   ProcessorTime writing;
-  ObstacleMapper mapper(rig, options,
-                        [&](const ObstacleFrame& frame) { writing.add([&] { recorder.add(frame); }); });
-  ObjectTracker tracker(rig, object_options, [&](const ObjectFrame& frame) {
-    mapper.setObjects(frame.stamp, frame.objects);
-    recorder.add(frame);
+  std::unique_ptr<ObjectTracker> tracker;
+  ObstacleMapper mapper(rig, options, [&](const ObstacleFrame& frame) {
+    if (tracker) {
+      tracker->setObstacles(frame.map);
+    }
+    writing.add([&] { recorder.add(frame); });
   });
-  Pipeline pipeline(rig, range_options, arguments.range, &mapper, &tracker);
+  if (!arguments.no_objects) {
+    tracker = std::make_unique<ObjectTracker>(rig, object_options, [&](const ObjectFrame& frame) {
+      mapper.setObjects(frame.stamp, frame.objects);
+      recorder.add(frame);
+    });
+  }
+  Pipeline pipeline(rig, range_options, arguments.range, &mapper, tracker.get());
   BagDriveSourceOptions source_options;
   source_options.cameras = object_options.cameras;
   source_options.max_image_gap_s = INFINITY;  // a camera that stops is reported, not an error
@@ -315,12 +333,14 @@ int main(int argc, char** argv) {
   app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
   app.add_option("--options", arguments.options, "YAML with overrides of ObstacleMapperOptions");
   app.add_option("--range-options", arguments.range_options, "YAML with overrides of RangeMapperOptions");
+  app.add_option("--object-options", arguments.object_options, "YAML with overrides of ObjectTrackerOptions");
   app.add_option("--range", arguments.range,
                  "folder that compute_range_maps wrote, instead of computing range maps");
   app.add_option("--cameras", arguments.cameras,
                  "cameras of the rig by name (default: those of --options; for objects also the rig's "
                  "others that have extrinsics and images)");
   app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
+  app.add_flag("--no-objects", arguments.no_objects, "do not follow what moves: faster");
   addShowOptions(&app, &arguments.show_options);
   app.footer(
       "Keys of --json: num_maps, num_odometry_jumps, cameras (name, num_range_maps, num_without_pose, "
@@ -337,16 +357,19 @@ int main(int argc, char** argv) {
     if (!arguments.range_options.empty()) {
       readFieldsFromFile(arguments.range_options, &range_options);
     }
+    if (!arguments.object_options.empty()) {
+      readFieldsFromFile(arguments.object_options, &object_options);
+    }
     if (!arguments.cameras.empty()) {
-      options.cameras = arguments.cameras;
+      options.cameras = object_options.cameras = arguments.cameras;
     }
     range_options.cameras = options.cameras;
-    object_options.cameras = arguments.cameras;
     object_options.frames.waitForEverything();
     if (arguments.show_options) {
       std::cout << "# For --options\n"
                 << showOptions(options) << "\n# For --range-options\n"
-                << showOptions(range_options);
+                << showOptions(range_options) << "\n# For --object-options\n"
+                << showOptions(object_options);
       return;
     }
     detectObstacles(arguments, options, range_options, object_options, found);

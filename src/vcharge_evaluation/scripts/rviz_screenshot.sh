@@ -1,12 +1,13 @@
 #!/usr/bin/env bash
 # Takes a picture of rviz on a virtual display, of a drive replayed through the nodelets or of a saved map:
 #   rviz_screenshot.sh DRIVE.bag rig.yaml OUTPUT.png            range maps and point clouds
+#   rviz_screenshot.sh DRIVE.bag rig.yaml OUTPUT.png around     obstacles, free ground, steps and moving objects
 #   rviz_screenshot.sh DRIVE.bag rig.yaml OUTPUT.png LOT.vmap   the pose in a map
 #   rviz_screenshot.sh DRIVE.bag rig.yaml OUTPUT.png LOT.vmap obstacles    obstacles and free ground, the whole car running
 #   rviz_screenshot.sh MAP OUTPUT.png                           a height map with its OctoMap (folder of build_height_map)
 set -euo pipefail
 views=$(realpath "$(dirname "${BASH_SOURCE[0]}")/../../../config/rviz")
-[ $# -ge 2 ] && [ $# -le 5 ] || { sed -n '2,6s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+[ $# -ge 2 ] && [ $# -le 5 ] || { sed -n '2,7s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 if [ $# -eq 2 ]; then
   output=$2
   wait_s=40  # a mesh of some hundred thousand triangles
@@ -18,6 +19,9 @@ else
   if [ "${5:-}" = obstacles ]; then
     launch=(vcharge.launch map:="$4")
     wait_s=35  # the drive starts after 5 s and is replayed once
+  elif [ "${4:-}" = around ]; then
+    launch=(obstacles.launch objects:=true)
+    wait_s=30
   elif [ $# -eq 4 ]; then
     launch=(localization.launch map:="$4" loop:=true)
   else

@@ -59,7 +59,8 @@ nlohmann::json scanToJson(const std::string& name, const ObstacleScanEvaluator& 
           {"all", raysToJson("all", evaluator.all())},
           {"aside", raysToJson("aside", evaluator.aside())},
           {"ahead", raysToJson("ahead", evaluator.ahead())},
-          {"ahead_within_2_m", raysToJson("ahead < 2 m", evaluator.aheadNear())}};
+          {"ahead_within_2_m", raysToJson("ahead < 2 m", evaluator.aheadNear())},
+          {"overhead", raysToJson("overhead", evaluator.overhead())}};
 }
 
 /// Prints how many obstacles were missed, and those that were not reported in all maps.
@@ -145,6 +146,15 @@ nlohmann::json mapToJson(const ObstacleMapErrors& errors) {
           {"mover_free", errors.num_mover_free}};
 }
 
+nlohmann::json toJson(const CorridorCounts& cells) {
+  return {{"free_as_free", cells.free_as_free},
+          {"free_as_unknown", cells.free_as_unknown},
+          {"free_as_occupied", cells.free_as_occupied},
+          {"occupied_as_free", cells.occupied_as_free},
+          {"occupied_as_unknown", cells.occupied_as_unknown},
+          {"occupied_as_occupied", cells.occupied_as_occupied}};
+}
+
 nlohmann::json approachToJson(const ApproachErrors& errors) {
   nlohmann::json reports = nlohmann::json::array();
   for (const FirstReport& report : errors.reports) {
@@ -169,13 +179,9 @@ nlohmann::json approachToJson(const ApproachErrors& errors) {
       cells.occupied_as_free + cells.occupied_as_unknown + cells.occupied_as_occupied, cells.occupied_as_free,
       errors.num_false_alarms, errors.duration_s, errors.driven_m);
   return {{"reports", reports},
-          {"corridor",
-           {{"free_as_free", cells.free_as_free},
-            {"free_as_unknown", cells.free_as_unknown},
-            {"free_as_occupied", cells.free_as_occupied},
-            {"occupied_as_free", cells.occupied_as_free},
-            {"occupied_as_unknown", cells.occupied_as_unknown},
-            {"occupied_as_occupied", cells.occupied_as_occupied}}},
+          {"corridor", toJson(cells)},
+          {"ahead", toJson(errors.ahead)},
+          {"behind", toJson(errors.behind)},
           {"false_alarms", errors.num_false_alarms},
           {"duration_s", errors.duration_s},
           {"driven_m", errors.driven_m}};
@@ -259,7 +265,7 @@ maps_reported}], false_cells, false_cells_per_10_m, false_left, false_cells_per_
 false_cell_list [{x_m, y_m, first_seen_ns, maps, left, on_open_ground}], observed_inside, free_inside:
 cells inside obstacles, kerb_points, kerb_reported, error distribution kerb_height_error_m, kerbs
 [{position_m, nearest_m, reported, ever_reported}], movers [{kind, maps, maps_reported}], mover_cells, mover_free}; approach: {reports [{kind, moves, first_visible_m, nearest_m,
-first_reported_m (least distance until then), contact_s: null if never}], corridor {TRUTH_as_MAP: cells}, false_alarms, duration_s, driven_m}.)");
+first_reported_m (least distance until then), contact_s: null if never}], corridor, ahead and behind {TRUTH_as_MAP: cells}, false_alarms, duration_s, driven_m}.)");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (options.shown()) {
       return;

@@ -31,7 +31,9 @@ struct CrossingObject {
   double travel_m = 0.0;  ///< travel at which the vehicle's outline reaches it, rounded down to 0.1 m
 };
 
-/// Objects after a time, moved with their velocities.
+/// Objects are believed for this time after they were seen.
+inline constexpr double kObjectLife_s = 1.0;
+/// Objects after a time, moved with their velocities; none after more than kObjectLife_s.
 std::vector<TrackedObject> movedObjects(const std::vector<TrackedObject>& objects, double time_s);
 /// Objects in another frame whose z axis points up too.
 std::vector<TrackedObject> transformed(const RigidTransform& target_from_source,

@@ -8,6 +8,7 @@
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/camera/working_camera.h"
+#include "vcharge_core/dense_maps/obstacle_map.h"
 #include "vcharge_core/frames/frame_assembler.h"
 #include "vcharge_core/motion/tracked_object.h"
 
@@ -22,13 +23,15 @@ struct ObjectTrackerOptions {
                  "Distance from a camera up to which objects are followed.");
   VCHARGE_OPTION(int, image_width_px, 640, between(160, 4096),
                  "Largest width of the undistorted images in which points are followed.");
+  VCHARGE_OPTION(bool, ignore_hidden, true, anyValue(),
+                 "Whether objects behind obstacles of the obstacle map are left out.");
   VCHARGE_END_OPTIONS();
 
   FrameAssemblerOptions frames;  ///< waiting for images of one stamp, and odometry
 };
 
 /// Finds what moves around the vehicle, while it drives and while it stands, and follows it in the odometry's
-/// frame. Works on single cameras and short intervals, without range maps:
+/// frame. Works on single cameras and short intervals; what stands still is known from the obstacle map:
 ///
 ///  1. Points are followed through the images of each camera for 0.4 s.
 ///  2. A rotation of the body that the wheels did not measure is estimated from all of them.
@@ -37,10 +40,10 @@ struct ObjectTrackerOptions {
 ///     the ground plane, begins to differ below them.
 ///  5. Groups of points get a position, a velocity and their covariances.
 ///  6. Narrow things that stand apart on the ground are followed by their contacts: somebody who comes
-///  straight
-///     ahead moves in the image as something static that is nearer would.
+///     straight ahead moves in the image as something static that is nearer would.
 ///  7. A Kalman filter per object joins cameras and time.
 ///  8. Objects without points are found by their whole body in the next image, and by their contact.
+///  9. Objects that an obstacle of the obstacle map, if there is one, hides from all cameras are left out.
 ///
 /// Deterministic; not thread safe.
 class ObjectTracker : public DriveConsumer {
@@ -55,6 +58,9 @@ class ObjectTracker : public DriveConsumer {
 
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
+  /// Replaces the obstacles that hide objects of the following images. Only maps in the frame `odom` are
+  /// used.
+  void setObstacles(const ObstacleMap& map);
   /// Hands out the waiting frames at the end of the drive.
   void finish();
   const FrameCounters& counters() const { return assembler_->counters(); }

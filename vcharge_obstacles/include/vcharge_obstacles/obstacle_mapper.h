@@ -100,7 +100,6 @@ struct ObstacleFrame {
 class ObstacleMapper {
  public:
   using FrameCallback = std::function<void(const ObstacleFrame&)>;
-  static constexpr double kObjectLife_s = 1.0;
 
   /// InputError if the rig lacks a camera of the options, or its extrinsics; std::invalid_argument for bad
   /// options.
@@ -121,7 +120,8 @@ class ObstacleMapper {
   /// Sets localization's correction. Required with fixed_frame: map, ignored otherwise.
   void setMapFromOdom(const RigidTransform& map_from_odom);
   /// Sets the objects that move around the vehicle, in the frame odom. They enter the corridors of the
-  /// following frames, moved with their velocities, until they are replaced or kObjectLife_s old.
+  /// following frames, moved with their velocities, until they are replaced or kObjectLife_s old, and the
+  /// ground under them is not free. They do not change what is fused.
   void setObjects(Timestamp stamp, std::vector<TrackedObject> objects);
   /// InputError for a range map of a camera that is not in use, or that was computed with another rig.
   void addRangeMap(const RangeMap& map);
@@ -156,7 +156,7 @@ class ObstacleMapper {
   void noteWithoutPose(const Frame& frame);
   void emit(const LocalObstacleMap& map, const StepMapper& steps,
             const std::vector<const CameraObstacles*>& cameras);
-  Corridor findCorridor(const ObstacleMap& map);
+  Corridor findCorridor(const ObstacleMap& map, const std::vector<TrackedObject>& objects);
   void emitAt(Timestamp stamp);
   void moveTo(Timestamp stamp, const RigidTransform& fixed_from_vehicle, LocalObstacleMap* map) const;
   void emitWhenSilent();

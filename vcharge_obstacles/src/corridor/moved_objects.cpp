@@ -3,6 +3,9 @@
 namespace vcharge {
 
 std::vector<TrackedObject> movedObjects(const std::vector<TrackedObject>& objects, double time_s) {
+  if (time_s > kObjectLife_s) {
+    return {};
+  }
   std::vector<TrackedObject> moved = objects;
   for (TrackedObject& object : moved) {
     const Eigen::Vector3d step_m = time_s * object.velocity_m_per_s;

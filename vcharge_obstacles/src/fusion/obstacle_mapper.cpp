@@ -9,6 +9,7 @@
 #include "fusion/hidden_ground.h"
 #include "ground/standing_watch.h"
 #include "liveness/silent_cameras.h"
+#include "occupancy/object_cells.h"
 #include "steps/near_heights.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/text_format.h"
@@ -298,8 +299,11 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const StepMapper& steps,
   frame.map.frame_id = enumNames<FixedFrame>()[static_cast<size_t>(options_.fixed_frame)];
   frame.steps = steps.snapshot();
   frame.steps.frame_id = frame.map.frame_id;
+  const std::vector<TrackedObject> objects =
+      transformed(anchor_, movedObjects(objects_, toSeconds(frame.map.stamp - objects_stamp_)));
+  forgetFreeUnder(objects, &frame.map);
   frame.scan = makeScan(frame.map, options_.detector.grid.num_rays);
-  frame.corridor = findCorridor(frame.map);
+  frame.corridor = findCorridor(frame.map, objects);
   for (const CameraObstacles* camera : cameras) {
     frame.cameras.push_back(*camera);
   }
@@ -309,13 +313,10 @@ void ObstacleMapper::emit(const LocalObstacleMap& map, const StepMapper& steps,
   on_frame_(frame);
 }
 
-Corridor ObstacleMapper::findCorridor(const ObstacleMap& map) {
+Corridor ObstacleMapper::findCorridor(const ObstacleMap& map, const std::vector<TrackedObject>& objects) {
   const double curvature_per_m =
       curvature_->update(map.stamp, [this](Timestamp stamp) { return odomFromVehicle(stamp); });
-  const double age_s = toSeconds(map.stamp - objects_stamp_);
-  return corridor_finder_.find(map, curvature_per_m,
-                               age_s <= kObjectLife_s ? transformed(anchor_, movedObjects(objects_, age_s))
-                                                      : std::vector<TrackedObject>());
+  return corridor_finder_.find(map, curvature_per_m, objects);
 }
 
 /// Emits the map while no range maps arrive. The time is measured by their arrival instead of their

@@ -36,5 +36,25 @@ TEST_F(ObstacleMapperTest, ObjectsEnterTheCorridorUntilTheyAreOld) {
   EXPECT_FALSE(frames_.back().corridor.forward.crossing);
 }
 
+TEST_F(ObstacleMapperTest, GroundUnderObjectsIsNotFreeUntilTheyHaveLeft) {
+  start();
+  drive(0, 81);
+  const auto stateAt = [&](double x_m, double y_m) {
+    const ObstacleMap& map = frames_.back().map;
+    const Eigen::Vector2d cell = (Eigen::Vector2d(x_m, y_m) - map.origin_m) / map.cell_size_m;
+    return map.state.at<int8_t>(static_cast<int>(cell.y()), static_cast<int>(cell.x()));
+  };
+  ASSERT_EQ(stateAt(4.0, 3.0), kCellFree);
+  TrackedObject object;
+  object.footprint_m = {{3.8, 2.8}, {4.2, 2.8}, {4.2, 3.2}, {3.8, 3.2}};
+  mapper_->setObjects(stampAt(81), {object});
+  drive(81, 85);
+  EXPECT_EQ(stateAt(4.0, 3.0), kCellUnobserved);
+  EXPECT_EQ(stateAt(4.0, 2.0), kCellFree);
+  mapper_->setObjects(stampAt(85), {});
+  drive(85, 89);
+  EXPECT_EQ(stateAt(4.0, 3.0), kCellFree) << "the object is in no cell that is fused";
+}
+
 }  // namespace
 }  // namespace vcharge

@@ -2,61 +2,27 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
-#include <utility>
-
 #include <opencv2/imgproc.hpp>
+
+#include "ground/plane_fit.h"
 
 namespace vcharge {
 namespace {
 
-// Images are smoothed over this window before they are compared, and correlated within the other one.
+// Images are smoothed over this window before they are compared.
 constexpr int kSmoothing_px = 3;
-constexpr int kWindow_px = 5;
+constexpr int kWindow_px = PlaneFit::kWindow_px;
 // Tolerated error of the warp.
 constexpr int kSlack_px = 1;
 // Pixels beyond the range limits that windows at the limits reach, as a fraction of the range.
 constexpr float kBandMargin = 0.15F;
 // The detector's default min_height_m: a pixel covers the strip where its ray is lower than this.
 constexpr float kLow_m = 0.08F;
-// Standard deviation in gray levels from which a window has texture.
-constexpr float kTexture = 1.2F;
-// Correlations from which a window shows the plane, up to which it does not, and the least difference between
-// two planes that decides.
-constexpr float kSame = 0.7F, kOther = 0.4F, kDecisive = 0.15F;
-// A larger window must show the ground too: small windows of a body fit by chance now and then.
-constexpr int kWideWindow_px = 9;
 // Differences below this fraction of the brightness are noise.
 constexpr float kRelativeDifference = 0.05F;
 // The gain between two images is estimated from at least this number of pixels of this brightness or more.
 constexpr size_t kMinCompared = 200;
 constexpr float kMinBrightness = 8.0F;
-
-/// Means over windows, from which correlations follow.
-class Windows {
- public:
-  Windows(const cv::Mat& image, int side_px) : size_(side_px, side_px) {
-    image.convertTo(values_, CV_32F);
-    cv::boxFilter(values_, mean_, CV_32F, size_);
-    cv::boxFilter(values_.mul(values_), variance_, CV_32F, size_);
-    variance_ -= mean_.mul(mean_);
-  }
-  float variance(int row, int column) const { return variance_.at<float>(row, column); }
-  /// Covariance of the windows of two images.
-  cv::Mat covarianceWith(const Windows& other) const {
-    cv::Mat covariance;
-    cv::boxFilter(values_.mul(other.values_), covariance, CV_32F, size_);
-    return covariance - mean_.mul(other.mean_);
-  }
-
- private:
-  const cv::Size size_;
-  cv::Mat values_, mean_, variance_;
-};
-
-float correlation(float covariance, float variance_a, float variance_b) {
-  return covariance / std::sqrt(std::max(1.0F, variance_a) * std::max(1.0F, variance_b));
-}
 
 cv::Mat warped(const cv::Mat& before, const cv::Mat& map) {
   cv::Mat image;
@@ -105,12 +71,12 @@ struct GroundMatch::Warp {
     float range_m, inverse, height_m;  // along the ray to the ground; inverse horizontal range
   };
   cv::Rect rows;
-  cv::Mat ground, raised;
+  cv::Mat ground, raised;  // raised: empty if not wanted
   std::vector<Pixel> pixels;
 };
 
 GroundMatch::Warp GroundMatch::warp(const RigidTransform& before_from_now, const GroundPlane& ground,
-                                    double near_m, double far_m) const {
+                                    double near_m, double far_m, Wanted wanted) const {
   const Eigen::Matrix3f rotation = before_from_now.rotationMatrix().cast<float>();
   const Eigen::Vector3f translation = before_from_now.translation().cast<float>();
   const Eigen::Vector3f camera = vehicle_from_camera_.translation().cast<float>();
@@ -121,6 +87,7 @@ GroundMatch::Warp GroundMatch::warp(const RigidTransform& before_from_now, const
   const auto near = static_cast<float>(near_m) * (1.0F - kBandMargin);
   const auto far = static_cast<float>(far_m) * (1.0F + kBandMargin);
   Warp result;
+  result.pixels.reserve(rays_.size());
   int top = size_.height, bottom = 0;
   for (size_t i = 0; i < rays_.size(); ++i) {
     const float fall = slope_x * rays_.x[i] + slope_y * rays_.y[i] - rays_.z[i];
@@ -134,7 +101,7 @@ GroundMatch::Warp GroundMatch::warp(const RigidTransform& before_from_now, const
   }
   result.rows = top < bottom ? cv::Rect(0, top, size_.width, bottom - top) : cv::Rect();
   result.ground = cv::Mat(result.rows.size(), CV_32FC2, cv::Scalar::all(-1.0));
-  result.raised = result.ground.clone();
+  result.raised = wanted == Wanted::kAll ? result.ground.clone() : cv::Mat();
   const auto xi = static_cast<float>(model_.xi());
   const auto project = [&](size_t i, float range_m, cv::Mat* map) {
     const Eigen::Vector3f point =
@@ -157,64 +124,20 @@ GroundMatch::Warp GroundMatch::warp(const RigidTransform& before_from_now, const
   for (const Warp::Pixel& pixel : result.pixels) {
     if (valid_.data[rays_.pixel[pixel.ray]] != 0) {
       project(pixel.ray, pixel.range_m, &result.ground);
-      project(pixel.ray, pixel.range_m * raised, &result.raised);
+      if (wanted == Wanted::kAll) {
+        project(pixel.ray, pixel.range_m * raised, &result.raised);
+      }
     }
   }
   return result;
 }
-
-/// How well an image fits an older one that is warped by the ground, and by the plane above it.
-class GroundMatch::PlaneFit {
- public:
-  PlaneFit(const cv::Mat& now, const cv::Mat& on_ground, const cv::Mat& on_raised, cv::Mat knows_raised)
-      : here_(now, kWindow_px),
-        ground_(on_ground, kWindow_px),
-        raised_(on_raised, kWindow_px),
-        wide_here_(now, kWideWindow_px),
-        wide_ground_(on_ground, kWideWindow_px),
-        with_ground_(here_.covarianceWith(ground_)),
-        with_raised_(here_.covarianceWith(raised_)),
-        with_wide_(wide_here_.covarianceWith(wide_ground_)),
-        knows_raised_(std::move(knows_raised)) {}
-  bool isGround(int row, int column) const {
-    const float fit = fitOf(row, column);
-    return hasTexture(row, column) && std::min(fit, wideFitOf(row, column)) >= kSame &&
-           fit >= raisedFitOf(row, column) + kDecisive;
-  }
-  bool isOther(int row, int column) const {
-    const float fit = fitOf(row, column);
-    return hasTexture(row, column) && (fit < kOther || raisedFitOf(row, column) >= fit + kDecisive);
-  }
-
- private:
-  bool hasTexture(int row, int column) const {
-    return std::min(here_.variance(row, column), ground_.variance(row, column)) >= kTexture * kTexture;
-  }
-  float fitOf(int row, int column) const {
-    return correlation(with_ground_.at<float>(row, column), here_.variance(row, column),
-                       ground_.variance(row, column));
-  }
-  float wideFitOf(int row, int column) const {
-    return correlation(with_wide_.at<float>(row, column), wide_here_.variance(row, column),
-                       wide_ground_.variance(row, column));
-  }
-  float raisedFitOf(int row, int column) const {
-    return knows_raised_.at<uint8_t>(row, column) != 0
-               ? correlation(with_raised_.at<float>(row, column), here_.variance(row, column),
-                             raised_.variance(row, column))
-               : 1.0F;
-  }
-
-  const Windows here_, ground_, raised_, wide_here_, wide_ground_;
-  const cv::Mat with_ground_, with_raised_, with_wide_, knows_raised_;
-};
 
 std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const GroundView& before,
                                                const GroundPlane& ground, double near_m, double far_m,
                                                Wanted wanted) const {
   const RigidTransform before_from_now =
       (before.fixed_from_body * vehicle_from_camera_).inverse() * now.fixed_from_body;
-  const Warp warp = this->warp(before_from_now, ground, near_m, far_m);
+  const Warp warp = this->warp(before_from_now, ground, near_m, far_m, wanted);
   if (warp.rows.empty()) {
     return {};
   }
@@ -234,11 +157,13 @@ std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const Grou
   const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
   std::nth_element(ratios.begin(), middle, ratios.end());
   const float gain = *middle;
-  std::optional<PlaneFit> fit;
+  cv::Mat fit(warp.rows.size(), CV_8UC1, cv::Scalar(0));
   if (wanted == Wanted::kAll) {
-    fit.emplace(now.smooth(warp.rows), on_ground, warped(before.smooth, warp.raised), knownIn(warp.raised));
+    fit =
+        fitPlanes(now.smooth(warp.rows), on_ground, warped(before.smooth, warp.raised), knownIn(warp.raised));
   }
   std::vector<MatchedPixel> result;
+  result.reserve(warp.pixels.size());
   const auto near_inverse = static_cast<float>(1.0 / near_m), far_inverse = static_cast<float>(1.0 / far_m);
   for (const Warp::Pixel& pixel : warp.pixels) {
     const int at = rays_.pixel[pixel.ray], row = at / size_.width - warp.rows.y, column = at % size_.width;
@@ -253,7 +178,8 @@ std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const Grou
     const bool differs = brightness < gain * before.lowest.at<uint8_t>(nearest) - tolerance ||
                          brightness > gain * before.highest.at<uint8_t>(nearest) + tolerance;
     result.push_back({pixel.ray, pixel.inverse, pixel.inverse * pixel.height_m / (pixel.height_m - kLow_m),
-                      fit && fit->isGround(row, column), fit && fit->isOther(row, column), differs});
+                      fit.at<uint8_t>(row, column) == PlaneFit::kGround,
+                      fit.at<uint8_t>(row, column) == PlaneFit::kOther, differs});
   }
   return result;
 }

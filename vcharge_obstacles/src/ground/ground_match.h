@@ -56,10 +56,9 @@ class GroundMatch {
 
  private:
   struct Warp;
-  class PlaneFit;
 
-  Warp warp(const RigidTransform& before_from_now, const GroundPlane& ground, double near_m,
-            double far_m) const;
+  Warp warp(const RigidTransform& before_from_now, const GroundPlane& ground, double near_m, double far_m,
+            Wanted wanted) const;
 
   const MeiCamera model_;
   const RigidTransform vehicle_from_camera_;

@@ -28,12 +28,12 @@ std::optional<BodyMatch> matchBody(const Panorama& panorama, const cv::Mat& befo
     return static_cast<int>(panorama.rowOf((height_m - camera_height_m) / range_m));
   };
   const int half_width = static_cast<int>(0.5 * kWidth_m / range_m / pixel_rad);
-  const int width = std::max(kMinWidth_px, 2 * half_width + 1);
+  const int width = std::max(kMinWidth_px, 2 * half_width + 1), half = width / 2;
   const int top = std::max(0, rowAt(std::min(body_height_m, kMaxTop_m)));
   const int bottom = std::min(now.rows, rowAt(kBottom_m));
   const int search = std::max(kMinSearch_px, static_cast<int>(std::ceil(search_rad / pixel_rad)));
   const int middle = cvRound(panorama.columnOf(expected_now.azimuth_rad));
-  const cv::Rect part(middle - width / 2, top, width, bottom - top);
+  const cv::Rect part(middle - half, top, width, bottom - top);
   const cv::Rect searched(part.x - search, top, width + 2 * search, part.height);
   if (part.height < kMinHeight_px || (searched & cv::Rect(cv::Point(), now.size())) != searched ||
       !isVisible(panorama.validMask()(searched))) {
@@ -41,9 +41,8 @@ std::optional<BodyMatch> matchBody(const Panorama& panorama, const cv::Mat& befo
   }
   // Things get larger about the horizon as they come nearer.
   const double scale = range_m / seen_before.range_m, horizon = panorama.rowOf(0.0);
-  const cv::Matx23d before_from_part(scale, 0.0,
-                                     panorama.columnOf(seen_before.azimuth_rad) - scale * (width / 2), 0.0,
-                                     scale, horizon + scale * (top - horizon));
+  const cv::Matx23d before_from_part(scale, 0.0, panorama.columnOf(seen_before.azimuth_rad) - scale * half,
+                                     0.0, scale, horizon + scale * (top - horizon));
   constexpr int kFlags = cv::INTER_LINEAR | cv::WARP_INVERSE_MAP;
   cv::Mat body, mask, scores;
   cv::warpAffine(before, body, before_from_part, part.size(), kFlags);

@@ -14,6 +14,7 @@
 #include "objects/object_detections.h"
 #include "objects/object_filter.h"
 #include "objects/object_following.h"
+#include "occupancy/known_obstacles.h"
 #include "points/followed_points.h"
 #include "points/panorama.h"
 #include "points/rotation_correction.h"
@@ -82,6 +83,7 @@ struct ObjectTracker::State {
   }
   std::deque<Pose> poses;  // of the last images
   ObjectFilter filter;
+  KnownObstacles obstacles;
 };
 
 struct ObjectTracker::Camera {
@@ -368,7 +370,23 @@ void ObjectTracker::process(const ImageFrame& frame) {
     cameras_[i]->follow(state_.get(), is_compared);
   }
   state_->filter.finish();
-  on_frame_({frame.stamp, now, state_->filter.objects()});
+  std::vector<TrackedObject> objects = state_->filter.objects();
+  if (options_.ignore_hidden) {
+    std::vector<RigidTransform> odom_from_cameras;
+    for (const std::unique_ptr<Camera>& camera : cameras_) {
+      if (camera) {
+        odom_from_cameras.push_back(now * camera->vehicle_from_camera);
+      }
+    }
+    state_->obstacles.removeHidden(odom_from_cameras, &objects);
+  }
+  on_frame_({frame.stamp, now, std::move(objects)});
+}
+
+void ObjectTracker::setObstacles(const ObstacleMap& map) {
+  if (map.frame_id == "odom") {
+    state_->obstacles.set(map);
+  }
 }
 
 }  // namespace vcharge

@@ -16,14 +16,14 @@ Panorama::Panorama(const WorkingCamera& camera, const RigidTransform& vehicle_fr
     : pixel_rad_((1.0 + camera.model().xi()) / camera.model().gamma1()), top_slope_(kTopSlope) {
   const Eigen::Vector3d axis = vehicle_from_camera.rotation() * Eigen::Vector3d::UnitZ();
   middle_rad_ = std::atan2(axis.y(), axis.x());
-  const int width = 2 * static_cast<int>(kHalfWidth_rad / pixel_rad_) + 1;
+  const int width = 2 * static_cast<int>(kHalfWidth_rad / pixel_rad_) + 1, middle = width / 2;
   const int height = static_cast<int>((kTopSlope - kBottomSlope) / pixel_rad_) + 1;
   cv::Mat map(height, width, CV_32FC2, cv::Scalar::all(-1.0));
   valid_mask_ = cv::Mat::zeros(height, width, CV_8UC1);
   const cv::Rect image(cv::Point(), camera.size());
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
-      const double azimuth_rad = middle_rad_ + (width / 2 - x) * pixel_rad_;
+      const double azimuth_rad = middle_rad_ + (middle - x) * pixel_rad_;
       const Eigen::Vector3d direction(std::cos(azimuth_rad), std::sin(azimuth_rad),
                                       top_slope_ - y * pixel_rad_);
       Eigen::Vector2d pixel;
@@ -47,7 +47,8 @@ cv::Mat Panorama::render(const cv::Mat& image) const {
 }
 
 double Panorama::columnOf(double azimuth_rad) const {
-  return valid_mask_.cols / 2 - std::remainder(azimuth_rad - middle_rad_, 2.0 * M_PI) / pixel_rad_;
+  const int middle = valid_mask_.cols / 2;
+  return middle - std::remainder(azimuth_rad - middle_rad_, 2.0 * M_PI) / pixel_rad_;
 }
 
 }  // namespace vcharge

@@ -45,11 +45,16 @@ struct FirstReport {
 struct CorridorCounts {
   size_t free_as_free = 0, free_as_unknown = 0, free_as_occupied = 0;
   size_t occupied_as_free = 0, occupied_as_unknown = 0, occupied_as_occupied = 0;
+
+  void add(bool is_occupied, int8_t state);  ///< one cell: the truth, and its state in the map
 };
 
 struct ApproachErrors {
   std::vector<FirstReport> reports;
   CorridorCounts corridor;
+  /// Ground that the vehicle drives over next, and has driven over last, 0.5 to 4 m from its outline, without
+  /// margin, once it has driven 2 m.
+  CorridorCounts ahead, behind;
   double driven_m = 0.0;
   double duration_s = 0.0;
   size_t num_false_alarms = 0;  ///< times that open ground in the corridor turned occupied
@@ -75,6 +80,8 @@ class ApproachEvaluator {
   struct Corridor;
 
   void judgeObstacle(const Frame& frame, const TruthObstacle& obstacle, int key);
+  /// The next (or with is_forward false, the last) part of the path from a stamp on.
+  Corridor corridorFrom(Timestamp stamp, bool is_forward, double length_m, double margin_m) const;
   void judgeCorridor(const Frame& frame, const std::vector<TruthObstacle>& movers);
   /// Whether a cell is occupied; absent at the edges of obstacles.
   std::optional<bool> truthAt(const Eigen::Vector2d& world_m, const std::vector<TruthObstacle>& movers) const;

@@ -40,7 +40,8 @@ class ObstacleScanEvaluator {
   explicit ObstacleScanEvaluator(const ObstacleScanEvaluationOptions& options = {});
 
   /// world_from_vehicle is the true pose. A reported range is compared with the nearest surface in its own
-  /// sector.
+  /// sector. A surface seen above 1.7 m only, in front of what stands on the ground, is judged by itself: a
+  /// vehicle may pass below it.
   void add(const ObstacleScan& scan, const std::vector<SeenPoint>& points,
            const RigidTransform& world_from_vehicle);
 
@@ -48,6 +49,7 @@ class ObstacleScanEvaluator {
   RayErrors aside() const { return summarizeRays(aside_); }           ///< rays off the direction of travel
   RayErrors ahead() const { return summarizeRays(ahead_); }           ///< rays along it
   RayErrors aheadNear() const { return summarizeRays(ahead_near_); }  ///< rays along it, nearer than 2 m
+  RayErrors overhead() const { return summarizeRays(overhead_); }     ///< what hangs, judged by itself
   /// Bounds of the true range, from and to, with the errors of the rays between them.
   std::vector<std::tuple<double, double, RayErrors>> byRange() const;
 
@@ -64,7 +66,7 @@ class ObstacleScanEvaluator {
   static RayErrors summarizeRays(const Rays& rays);
 
   ObstacleScanEvaluationOptions options_;
-  Rays all_, aside_, ahead_, ahead_near_;
+  Rays all_, aside_, ahead_, ahead_near_, overhead_;
   std::array<Rays, kRangeBounds_m.size() - 1> by_range_;
 };
 

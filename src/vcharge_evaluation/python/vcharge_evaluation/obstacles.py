@@ -75,13 +75,14 @@ def summary(errors):
             "by_camera": {scan["name"]: scan["all"] for scan in errors["scans"] if scan["name"] != "fused"},
             "classes": recall_by_class(errors["map"]),
             "missed_rays": fused["all"]["missed"] / max(1, fused["all"]["rays"]),
+            "overhead": fused["overhead"],
             "by_range": [(one["from_m"], one["to_m"], one["error_m"]["mean"] if one["rays"] else None)
                          for one in fused["by_range"]],
             "obstacles": len(judged), "missed": sum(not obstacle["reported"] for obstacle in judged),
             "false_per_10_m": errors["map"]["false_cells_per_10_m"], "free_inside": errors["map"]["free_inside"],
             "observed_inside": errors["map"]["observed_inside"], "reports": approach["reports"],
             "corridor_free": cells["free_as_free"] / max(1, free), "corridor_unknown": cells["free_as_unknown"] / max(1, free),
-            "corridor_wrong": cells["occupied_as_free"],
+            "corridor_wrong": cells["occupied_as_free"], "paths": {name: approach[name] for name in ("ahead", "behind")},
             "alarms_per_minute": 60 * approach["false_alarms"] / max(1e-9, approach["duration_s"]),
             "alarms_per_m": approach["false_alarms"] / approach["driven_m"] if approach["driven_m"] > 0.1 else None}
 
@@ -153,6 +154,8 @@ def figures(found):
     yield Figure("range error within 5 m, 95 %", 100 * found["p95_m"], "cm")
     yield Figure("range error within 5 m, worst", 100 * found["worst_m"], "cm")
     yield Figure("rays missed", 100 * found["missed_rays"], "%")
+    yield Figure("rays missed of what only hangs above 1.7 m, as pipes do",
+                 percent(found["overhead"]["missed"], found["overhead"]["rays"]) if found["overhead"]["rays"] else None, "%")
     for from_m, to_m, mean_m in found["by_range"]:
         yield Figure(f"range error from {from_m:g} to {to_m:g} m, mean", None if mean_m is None else 100 * mean_m, "cm")
     yield figure(f"obstacles missed, of {found['obstacles']}", found["missed"], equal=0)
@@ -163,6 +166,11 @@ def figures(found):
     yield Figure("free cells of the driving corridor that are free", 100 * found["corridor_free"], "%")
     yield Figure("the same, unknown", 100 * found["corridor_unknown"], "%")
     yield figure("occupied cells of the corridor that are free", found["corridor_wrong"], equal=0)
+    for name, path in found["paths"].items():
+        free = sum(path[f"free_as_{state}"] for state in ("free", "unknown", "occupied"))
+        yield figure(f"own path {name}, 0.5 to 4 m, after 2 m: free ground known free",
+                     percent(path["free_as_free"], free) if free else None, "%", at_least=97)
+        yield figure(f"own path {name}: occupied cells that are free", path["occupied_as_free"], equal=0)
     yield Figure("false alarms in the corridor a minute", found["alarms_per_minute"])
     yield Figure("false alarms in the corridor per metre", found["alarms_per_m"])
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "obstacles/judged_map.h"
@@ -18,6 +19,8 @@ using internal::kTolerance_m;
 
 constexpr double kPathStep_m = 0.25;  // between footprints that make up the corridor
 constexpr double kStanding_m_per_s = 0.05;
+// The vehicle's own path ahead and behind is judged at these distances from it, once it has driven so far.
+constexpr double kNear_m = 0.5, kFar_m = 4.0, kStart_m = 2.0;
 
 }  // namespace
 
@@ -38,6 +41,16 @@ struct ApproachEvaluator::Corridor {
                        [&](const auto& footprint) { return distanceToPolygon(point, footprint) <= 0.0; });
   }
 };
+
+void CorridorCounts::add(bool is_occupied, int8_t state) {
+  size_t& count = is_occupied ? (state == kCellOccupied ? occupied_as_occupied
+                                 : state == kCellFree   ? occupied_as_free
+                                                        : occupied_as_unknown)
+                              : (state == kCellOccupied ? free_as_occupied
+                                 : state == kCellFree   ? free_as_free
+                                                        : free_as_unknown);
+  ++count;
+}
 
 ApproachEvaluator::ApproachEvaluator(const std::vector<TruthObstacle>& obstacles, const TruthHeights& heights,
                                      Trajectory path, const ApproachEvaluationOptions& options)
@@ -133,47 +146,67 @@ std::optional<bool> ApproachEvaluator::truthAt(const Eigen::Vector2d& world_m,
   return false;
 }
 
-void ApproachEvaluator::judgeCorridor(const Frame& frame, const std::vector<TruthObstacle>& movers) {
+ApproachEvaluator::Corridor ApproachEvaluator::corridorFrom(Timestamp stamp, bool is_forward, double length_m,
+                                                            double margin_m) const {
   Corridor corridor;
-  double ahead_m = 0.0, since_m = kPathStep_m;
-  auto pose =
-      std::lower_bound(path_.begin(), path_.end(), frame.map.stamp,
-                       [](const StampedTransform& each, Timestamp stamp) { return each.stamp < stamp; });
-  for (auto last = pose; pose != path_.end() && ahead_m <= options_.corridor_m; last = pose++) {
-    const double step_m =
-        (pose->world_from_vehicle.translation() - last->world_from_vehicle.translation()).norm();
-    ahead_m += step_m;
-    since_m += step_m;
-    if (since_m >= kPathStep_m) {
-      corridor.footprints.push_back(outline(pose->world_from_vehicle, options_.margin_m));
-      since_m = 0.0;
+  double travel_m = 0.0, since_m = kPathStep_m;
+  const auto now =
+      std::lower_bound(path_.begin(), path_.end(), stamp,
+                       [](const StampedTransform& each, Timestamp time) { return each.stamp < time; });
+  const auto addFrom = [&](auto pose, auto end) {
+    for (auto last = pose; pose != end && travel_m <= length_m; last = pose++) {
+      const double step_m =
+          (pose->world_from_vehicle.translation() - last->world_from_vehicle.translation()).norm();
+      travel_m += step_m;
+      since_m += step_m;
+      if (since_m >= kPathStep_m) {
+        corridor.footprints.push_back(outline(pose->world_from_vehicle, margin_m));
+        since_m = 0.0;
+      }
     }
+  };
+  if (is_forward) {
+    addFrom(now, path_.end());
+  } else {
+    addFrom(std::make_reverse_iterator(now), path_.rend());
   }
+  return corridor;
+}
+
+void ApproachEvaluator::judgeCorridor(const Frame& frame, const std::vector<TruthObstacle>& movers) {
   const double reach_m = options_.corridor_m + options_.vehicle_front_m - options_.vehicle_rear_m;
   const Eigen::Vector2d here_m = frame.level.translation().head<2>();
-  frame.forEachCell([&](int column, int row, int8_t state) {
-    const Eigen::Vector2d world_m = frame.worldOf(column, row);
-    if ((world_m - here_m).norm() > reach_m || distanceToPolygon(world_m, frame.outline) <= 0.0 ||
-        !corridor.contains(world_m)) {
-      return;
-    }
-    const std::optional<bool> truth = truthAt(world_m, movers);
-    if (!truth) {
-      return;
-    }
-    CorridorCounts& counts = sums_.corridor;
-    size_t& count = *truth ? (state == kCellOccupied ? counts.occupied_as_occupied
-                              : state == kCellFree   ? counts.occupied_as_free
-                                                     : counts.occupied_as_unknown)
-                           : (state == kCellOccupied ? counts.free_as_occupied
-                              : state == kCellFree   ? counts.free_as_free
-                                                     : counts.free_as_unknown);
-    ++count;
-    bool& was_alarm = was_alarm_[SeenCells::keyOf(frame.fixedOf(column, row))];
-    const bool is_alarm = !*truth && state == kCellOccupied;
-    sums_.num_false_alarms += is_alarm && !was_alarm ? 1 : 0;
-    was_alarm = is_alarm;
-  });
+  const auto countCells = [&](const Corridor& corridor, double from_m, double to_m, const auto& add) {
+    frame.forEachCell([&](int column, int row, int8_t state) {
+      const Eigen::Vector2d world_m = frame.worldOf(column, row);
+      if ((world_m - here_m).norm() > reach_m) {
+        return;
+      }
+      const double distance_m = distanceToPolygon(world_m, frame.outline);
+      if (distance_m <= from_m || distance_m > to_m || !corridor.contains(world_m)) {
+        return;
+      }
+      if (const std::optional<bool> truth = truthAt(world_m, movers)) {
+        add(column, row, state, *truth);
+      }
+    });
+  };
+  countCells(corridorFrom(frame.map.stamp, true, options_.corridor_m, options_.margin_m), 0.0,
+             std::numeric_limits<double>::infinity(), [&](int column, int row, int8_t state, bool truth) {
+               sums_.corridor.add(truth, state);
+               bool& was_alarm = was_alarm_[SeenCells::keyOf(frame.fixedOf(column, row))];
+               const bool is_alarm = !truth && state == kCellOccupied;
+               sums_.num_false_alarms += is_alarm && !was_alarm ? 1 : 0;
+               was_alarm = is_alarm;
+             });
+  if (sums_.driven_m < kStart_m) {
+    return;
+  }
+  for (const bool is_forward : {true, false}) {
+    CorridorCounts& counts = is_forward ? sums_.ahead : sums_.behind;
+    countCells(corridorFrom(frame.map.stamp, is_forward, kFar_m, 0.0), kNear_m, kFar_m,
+               [&](int /*column*/, int /*row*/, int8_t state, bool truth) { counts.add(truth, state); });
+  }
 }
 
 ApproachErrors ApproachEvaluator::errors() const {

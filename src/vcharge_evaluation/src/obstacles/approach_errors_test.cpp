@@ -103,6 +103,23 @@ TEST_F(ApproachErrorsTest, TheCorridorIsFreeUnknownOrBlocked) {
   EXPECT_LT(blocked.num_false_alarms, blocked.corridor.free_as_occupied) << "a cell that stays is one alarm";
 }
 
+TEST_F(ApproachErrorsTest, ThePathAheadAndBehindIsJudgedFromTwoMetresOn) {
+  const ApproachErrors free = judge(0, 0);
+  // Ten stamps of 0.2 m are not judged. Of the others, all have the 3.5 m behind that were driven, if so many
+  // were; ahead, the path ends at 6 m.
+  double ahead_m2 = 0.0, behind_m2 = 0.0;
+  for (double driven_m = 2.0; driven_m < 6.01; driven_m += 0.2) {
+    ahead_m2 += 1.78 * std::max(0.0, std::min(4.0, 6.0 - driven_m) - 0.5);
+    behind_m2 += 1.78 * std::max(0.0, std::min(4.0, driven_m) - 0.5);
+  }
+  EXPECT_NEAR(0.01 * static_cast<double>(free.ahead.free_as_free), ahead_m2, 0.1 * ahead_m2);
+  EXPECT_NEAR(0.01 * static_cast<double>(free.behind.free_as_free), behind_m2, 0.1 * behind_m2);
+  EXPECT_EQ(free.ahead.free_as_unknown + free.behind.free_as_unknown, 0U);
+  const ApproachErrors unknown = judge(0, 0, kCellUnobserved);
+  EXPECT_EQ(unknown.ahead.free_as_unknown, free.ahead.free_as_free);
+  EXPECT_EQ(unknown.behind.free_as_unknown, free.behind.free_as_free);
+}
+
 TEST_F(ApproachErrorsTest, APersonInTheCorridorMustNotBeFree) {
   person_.footprint_m = {{7.0, -0.3}, {7.6, -0.3}, {7.6, 0.3}, {7.0, 0.3}};
   const ApproachErrors errors = judge(0, -1);

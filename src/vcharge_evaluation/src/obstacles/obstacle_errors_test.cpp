@@ -70,6 +70,27 @@ TEST(ObstacleScanErrorsTest, KerbsAreNotJudgedAsWalls) {
   EXPECT_EQ(evaluator.aside().num_judged, 0U);
 }
 
+TEST(ObstacleScanErrorsTest, WhatHangsOverheadIsJudgedByItself) {
+  std::vector<SeenPoint> points = makeWall(1.0);
+  const size_t num_of_wall = points.size();
+  for (const SeenPoint& point : makeWall(1.98, 2.0)) {
+    if (point.world_m.z() > 1.9F) {  // a pipe in front of the wall
+      points.push_back(point);
+    }
+  }
+  ASSERT_GT(points.size(), num_of_wall);
+  ObstacleScanEvaluator wall_found;
+  wall_found.add(makeScan(3.0, 0.0), points, RigidTransform());
+  EXPECT_GT(wall_found.all().num_judged, 80U);
+  EXPECT_EQ(wall_found.all().num_missed, 0U);
+  EXPECT_EQ(wall_found.overhead().num_missed, wall_found.overhead().num_judged);
+  ObstacleScanEvaluator pipe_found;
+  pipe_found.add(makeScan(2.0, 0.0), points, RigidTransform());
+  EXPECT_GT(pipe_found.overhead().num_judged, 80U);
+  EXPECT_EQ(pipe_found.overhead().num_missed, 0U);
+  EXPECT_EQ(pipe_found.all().num_nearer, 0U) << "what is in front of the wall is no error of the wall";
+}
+
 /// A box of 0.4 m beside a path along x, with its height map.
 class ObstacleMapErrorsTest : public ::testing::Test {
  protected:

@@ -14,6 +14,8 @@ constexpr double kMinRange_m = 0.5;
 // Surfaces between these heights are obstacles.
 constexpr double kMinHeight_m = 0.1;
 constexpr double kMaxHeight_m = 2.0;
+// What is seen above this height only hangs overhead: a pipe below a ceiling, a crown of a tree.
+constexpr double kOverheadHeight_m = 1.7;
 // An obstacle reaches the judged height within this distance behind its nearest point.
 constexpr double kRiseDepth_m = 0.3;
 // A reported range that differs by more belongs to another obstacle or to none.
@@ -22,8 +24,9 @@ constexpr double kRight_m = 0.15;  // allowed error of a range
 
 /// True obstacles in one sector.
 struct SectorTruth {
-  double range_m = std::numeric_limits<double>::infinity();         // nearest obstacle
-  double judged_range_m = std::numeric_limits<double>::infinity();  // nearest one that is high enough
+  double range_m = std::numeric_limits<double>::infinity();           // nearest obstacle
+  double judged_range_m = std::numeric_limits<double>::infinity();    // nearest one that is high enough
+  double overhead_range_m = std::numeric_limits<double>::infinity();  // nearest surface overhead
   double from_travel_rad = 0.0;
 };
 
@@ -48,6 +51,10 @@ std::vector<SectorTruth> collectTruth(const ObstacleScan& scan, const std::vecto
     const auto count = static_cast<int64_t>(scan.size());
     const int64_t ray = (std::lround(angle_rad / scan.angle_increment_rad) % count + count) % count;
     SectorTruth& sector = truth[static_cast<size_t>(ray)];
+    if (height_m > kOverheadHeight_m) {
+      sector.overhead_range_m = std::min(sector.overhead_range_m, range_m);
+      continue;
+    }
     if (range_m < sector.range_m) {
       sector.range_m = range_m;
       sector.from_travel_rad = point.from_travel_rad;
@@ -89,7 +96,15 @@ void ObstacleScanEvaluator::add(const ObstacleScan& scan, const std::vector<Seen
                                 const RigidTransform& world_from_vehicle) {
   const std::vector<SectorTruth> truth = collectTruth(scan, points, world_from_vehicle, options_);
   for (size_t i = 0; i < scan.size(); ++i) {
-    const double truth_m = truth[i].range_m;
+    const double truth_m = truth[i].range_m, overhead_m = truth[i].overhead_range_m;
+    if (overhead_m + kRiseDepth_m < truth_m) {
+      if (overhead_m >= kMinRange_m && overhead_m <= options_.max_range_m) {
+        addRay(scan.range_m[i], scan.range_sigma_m[i], overhead_m, &overhead_);
+      }
+      if (std::abs(scan.range_m[i] - overhead_m) <= kGate_m) {
+        continue;  // it is reported in front of what stands behind it
+      }
+    }
     if (!(truth_m >= kMinRange_m && truth_m <= options_.max_range_m) ||
         truth[i].judged_range_m > truth_m + kRiseDepth_m) {
       continue;

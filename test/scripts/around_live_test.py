@@ -1,0 +1,92 @@
+#!/usr/bin/env python3
+"""Ranges, obstacle map and objects of all four cameras in one manager, while a drive replays in real time and other processes keep
+every core busy: maps and objects go on, in order, what is dropped is reported, and with the load the losses end."""
+import os
+import subprocess
+import sys
+import time
+import unittest
+
+import rospy
+import rostest
+from nav_msgs.msg import OccupancyGrid
+from vcharge_msgs.msg import Corridor, TrackedObjects
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from drive_fixture import Drive  # noqa: E402
+from nodelet_fixture import Diagnostics, drive_publishers, manager_services, wait_for  # noqa: E402
+
+CAMERAS = ("front", "left", "rear", "right")
+TOPICS = {"/obstacles/grid": OccupancyGrid, "/obstacles/corridor": Corridor, "/obstacles/objects": TrackedObjects}
+NODELETS = {"/depth": "vcharge_dense/depth_nodelet", "/obstacles": "vcharge_obstacles/obstacle_nodelet",
+            "/objects": "vcharge_obstacles/object_nodelet"}
+OPTIONS = {"/depth": {"preset": "fast", "working_camera": {"image_scale": 0.5}}}
+DURATION_S = 4.0
+
+
+class AroundLiveTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.drive = Drive(duration_s=DURATION_S, cameras=CAMERAS, extra=("--set", "movers.people=6"))
+        cls.messages = [(topic, message) for topic, message in cls.drive.messages()
+                        if topic == "/odom" or topic.endswith("/image_raw")]
+        cls.received = {topic: [] for topic in TOPICS}
+        cls.subscribers = [rospy.Subscriber(topic, kind, cls.received[topic].append, queue_size=1000)
+                           for topic, kind in TOPICS.items()]
+        cls.diagnostics = Diagnostics()
+        cls.publishers = drive_publishers(CAMERAS)
+        cls.load, cls.unload, cls.list = manager_services()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.drive.remove()
+
+    def replay(self):
+        """Publishes the drive in its own time."""
+        begin, first = time.monotonic(), self.messages[0][1].header.stamp.to_sec()
+        for topic, message in self.messages:
+            time.sleep(max(0.0, begin + message.header.stamp.to_sec() - first - time.monotonic()))
+            self.publishers[topic].publish(message)
+
+    def stamps(self, topic):
+        return [message.header.stamp.to_sec() for message in list(self.received[topic])]
+
+    def test_all_goes_on_beside_busy_cores_and_losses_are_reported(self):
+        for name, kind in NODELETS.items():
+            rospy.set_param(name, {"rig": str(self.drive.rig), "options": OPTIONS.get(name, {})})
+            self.assertTrue(self.load(name, kind, [], [], [], "").success)
+        # Depth and objects read the images, the map of obstacles reads their fingerprints.
+        wait_for(lambda: all(publisher.get_num_connections() > 0 for publisher in self.publishers.values()),
+                 "the nodelets to subscribe")
+        wait_for(lambda: all(subscriber.get_num_connections() > 0 for subscriber in self.subscribers),
+                 "the results to be connected")
+        busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(os.cpu_count() or 1)]
+        try:
+            self.replay()
+        finally:
+            for process in busy:
+                process.kill()
+                process.wait()
+        first, last = (self.messages[i][1].header.stamp.to_sec() for i in (0, -1))
+        for topic in TOPICS:
+            wait_for(lambda topic=topic: self.stamps(topic) and self.stamps(topic)[-1] > first + 0.8 * DURATION_S,
+                     f"{topic} of the end of the drive")
+            stamps = self.stamps(topic)
+            self.assertEqual(stamps, sorted(set(stamps)), f"{topic}: stamps in order, each once")
+            self.assertGreaterEqual(stamps[0], first)
+            self.assertLessEqual(stamps[-1], last)
+            self.assertGreater(len(stamps), 3, topic)
+        grid = self.received["/obstacles/grid"][-1]
+        self.assertGreater(sum(cell == 0 for cell in grid.data), 300, "free ground")
+        wait_for(lambda: "dropped" in self.diagnostics.values("objects"), "the number of images without objects")
+        values = wait_for(lambda: self.diagnostics.values("obstacles/front"), "the state of the front camera's map")
+        for key in ("dropped_of_all_cameras", "waiting_stamps"):
+            self.assertGreaterEqual(int(values[key]), 0, key)
+        corridor = self.received["/obstacles/corridor"][-1]
+        self.assertGreaterEqual(corridor.forward.oldest_age_s, 0.0)
+        self.assertEqual(set(self.list().nodelets), set(NODELETS), "all live on")
+
+
+if __name__ == "__main__":
+    rospy.init_node("around_live_test")
+    rostest.rosrun("vcharge_tests", "around_live", AroundLiveTest)

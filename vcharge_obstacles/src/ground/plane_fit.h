@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+
+#include <opencv2/core.hpp>
+
+namespace vcharge {
+
+/// What the surroundings of a pixel show.
+struct PlaneFit {
+  enum : uint8_t {
+    kUndecided,
+    kGround,  ///< fits the ground, and fits the plane above it worse
+    kOther,   ///< fits the plane above better, or neither
+  };
+  /// Side of the windows that are correlated.
+  static constexpr int kWindow_px = 5;
+};
+
+/// Compares an image (CV_8UC1) with an older one that was warped as if it showed the ground, and as if it
+/// showed a plane above the ground; `knows_raised` (CV_8UC1) is 0 where the latter is unknown. All have one
+/// size. Returns CV_8UC1 with values of PlaneFit; windows at the border are cut off there. In integers: the
+/// result does not depend on the machine.
+cv::Mat fitPlanes(const cv::Mat& now, const cv::Mat& on_ground, const cv::Mat& on_raised,
+                  const cv::Mat& knows_raised);
+
+}  // namespace vcharge
