@@ -284,9 +284,7 @@ void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle
                     grid_, &obstacles);
     }
     map_.add(obstacles, grid_, fixed_from_vehicle, is_at_rest_);
-    if (!is_at_rest_) {  // errors repeat at rest
-      steps_.add(heights);
-    }
+    steps_.add(is_at_rest_ ? HeightPoints() : heights);  // errors repeat at rest
     cameras.push_back(&obstacles);
   }
   if (!last_emitted_ || frame->stamp > *last_emitted_) {  // otherwise the next map includes it
