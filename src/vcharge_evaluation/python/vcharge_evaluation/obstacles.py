@@ -75,7 +75,7 @@ def summary(errors):
             "by_camera": {scan["name"]: scan["all"] for scan in errors["scans"] if scan["name"] != "fused"},
             "classes": recall_by_class(errors["map"]),
             "missed_rays": fused["all"]["missed"] / max(1, fused["all"]["rays"]),
-            "overhead": fused["overhead"],
+            "overhead": fused["overhead"], "in_motion": errors["fused_after_2_m"]["all"],
             "by_range": [(one["from_m"], one["to_m"], one["error_m"]["mean"] if one["rays"] else None)
                          for one in fused["by_range"]],
             "obstacles": len(judged), "missed": sum(not obstacle["reported"] for obstacle in judged),
@@ -154,6 +154,11 @@ def figures(found):
     yield Figure("range error within 5 m, 95 %", 100 * found["p95_m"], "cm")
     yield Figure("range error within 5 m, worst", 100 * found["worst_m"], "cm")
     yield Figure("rays missed", 100 * found["missed_rays"], "%")
+    moving = found["in_motion"]
+    if moving["rays"]:
+        yield figure("after 2 m of driving: range error within 5 m, mean", 100 * moving["error_m"]["mean"], "cm", at_most=4)
+        yield figure("the same, 95 %", 100 * moving["error_m"]["percentile_95"], "cm", at_most=12)
+        yield Figure("the same, rays missed", percent(moving["missed"], moving["rays"]), "%")
     yield Figure("rays missed of what only hangs above 1.7 m, as pipes do",
                  percent(found["overhead"]["missed"], found["overhead"]["rays"]) if found["overhead"]["rays"] else None, "%")
     for from_m, to_m, mean_m in found["by_range"]:
