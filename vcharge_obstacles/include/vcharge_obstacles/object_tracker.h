@@ -24,7 +24,7 @@ struct ObjectTrackerOptions {
   VCHARGE_OPTION(int, image_width_px, 640, between(160, 4096),
                  "Largest width of the undistorted images in which points are followed.");
   VCHARGE_OPTION(bool, ignore_hidden, true, anyValue(),
-                 "Whether objects behind obstacles of the obstacle map are left out.");
+                 "Whether objects behind obstacles of the obstacle map are left out, driving.");
   VCHARGE_END_OPTIONS();
 
   FrameAssemblerOptions frames;  ///< waiting for images of one stamp, and odometry
@@ -43,7 +43,9 @@ struct ObjectTrackerOptions {
 ///     straight ahead moves in the image as something static that is nearer would.
 ///  7. A Kalman filter per object joins cameras and time.
 ///  8. Objects without points are found by their whole body in the next image, and by their contact.
-///  9. Objects that an obstacle of the obstacle map, if there is one, hides from all cameras are left out.
+///  9. While the vehicle drives, objects that an obstacle of the obstacle map, if there is one, hides from
+///  all
+///     cameras are left out.
 ///
 /// Deterministic; not thread safe.
 class ObjectTracker : public DriveConsumer {

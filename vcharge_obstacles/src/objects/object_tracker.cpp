@@ -41,6 +41,8 @@ constexpr double kRotation_rad = 0.0003, kRotationPerSqrt_rad = 0.0015;
 constexpr double kBodyRotation_rad = 0.004;
 // A static point is at least this far away, and at most this far below the plane of the ground, plus a slope.
 constexpr double kMinRange_m = 0.3, kGroundBelow_m = 0.05, kGroundSlope = 0.015;
+// Less travel within the history of the points is none.
+constexpr double kStandstill_m = 0.05;
 // The image with which the ground is compared: at most this long ago and this far back.
 constexpr double kCompareInterval_s = 0.42, kCompareTravel_m = 0.5;
 
@@ -371,7 +373,9 @@ void ObjectTracker::process(const ImageFrame& frame) {
   }
   state_->filter.finish();
   std::vector<TrackedObject> objects = state_->filter.objects();
-  if (options_.ignore_hidden) {
+  // While the vehicle stands, nothing static seems to move, and people may be in the map themselves.
+  const double travel_m = (state_->poses.front().odom_from_vehicle.inverse() * now).translation().norm();
+  if (options_.ignore_hidden && travel_m > kStandstill_m) {
     std::vector<RigidTransform> odom_from_cameras;
     for (const std::unique_ptr<Camera>& camera : cameras_) {
       if (camera) {
