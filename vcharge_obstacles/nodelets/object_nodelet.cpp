@@ -19,10 +19,11 @@ namespace vcharge {
 
 /// Follows what moves around the vehicle of a live or replayed drive. Publishes /obstacles/objects
 /// (vcharge_msgs/TrackedObjects in `odom`, at every stamp of the images) and /obstacles/object_markers.
-/// Objects behind obstacles of obstacle_nodelet's /obstacles/grid, if it is there, are left out.
-/// Parameters: ~rig (path), ~options (ObjectTrackerOptions), ~source (LiveDriveSourceOptions),
-/// ~lossless_replay (every image in order, as detect_obstacles; otherwise images that wait too long are
-/// dropped, and counted in /diagnostics).
+/// While the vehicle drives, objects behind obstacles of obstacle_nodelet's last /obstacles/grid are left
+/// out; which grid is the last one depends on its arrival, also in a replay without loss. Parameters: ~rig
+/// (path), ~options (ObjectTrackerOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every image
+/// in order, as detect_obstacles; otherwise images that wait too long are dropped, and counted in
+/// /diagnostics).
 class ObjectNodelet : public Nodelet, private DriveConsumer {
  public:
   ObjectNodelet() : Nodelet("objects") {}
