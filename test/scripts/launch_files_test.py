@@ -195,7 +195,7 @@ class LaunchFilesTest(unittest.TestCase):
         published = re.compile(rf"/camera/({'|'.join(cameras)})/image_raw|"
                                rf"/dense/({'|'.join(cameras)})/(points|range/(image|confidence|standard_deviation))|"
                                r"/calibration/(image|landmarks|trajectory|cameras)|/mapping/(landmarks|trajectory|loop_edges)|/localization/(pose|observations)|"
-                               r"/obstacles/(grid|scan|markers|object_markers)|/dense/height_map(/(points|grid|mesh))?|/dense/octomap/occupied")
+                               r"/obstacles/(grid|steps|scan|markers|object_markers)|/dense/height_map(/(points|grid|mesh))?|/dense/octomap/occupied")
 
         def topics(node):
             if isinstance(node, dict):
