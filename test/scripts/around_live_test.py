@@ -1,10 +1,9 @@
 #!/usr/bin/env python3
 """Ranges, obstacle map and objects of all four cameras in one manager, while a drive replays in real time and other processes keep
-every core busy: maps and objects go on, in order, what is dropped is reported, and with the load the losses end."""
+every core busy: maps and objects go on, in order, up to the end of the drive, and what is dropped is counted."""
 import os
 import subprocess
 import sys
-import time
 import unittest
 
 import rospy
@@ -13,8 +12,8 @@ from nav_msgs.msg import OccupancyGrid
 from vcharge_msgs.msg import Corridor, TrackedObjects
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from drive_fixture import Drive  # noqa: E402
-from nodelet_fixture import Diagnostics, drive_publishers, manager_services, wait_for  # noqa: E402
+from drive_fixture import Drive, inputs_of  # noqa: E402
+from nodelet_fixture import Diagnostics, drive_publishers, manager_services, replay, wait_for  # noqa: E402
 
 CAMERAS = ("front", "left", "rear", "right")
 TOPICS = {"/obstacles/grid": OccupancyGrid, "/obstacles/corridor": Corridor, "/obstacles/objects": TrackedObjects}
@@ -28,8 +27,7 @@ class AroundLiveTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.drive = Drive(duration_s=DURATION_S, cameras=CAMERAS, extra=("--set", "movers.people=6"))
-        cls.messages = [(topic, message) for topic, message in cls.drive.messages()
-                        if topic == "/odom" or topic.endswith("/image_raw")]
+        cls.messages = inputs_of(cls.drive.messages())
         cls.received = {topic: [] for topic in TOPICS}
         cls.subscribers = [rospy.Subscriber(topic, kind, cls.received[topic].append, queue_size=1000)
                            for topic, kind in TOPICS.items()]
@@ -40,13 +38,6 @@ class AroundLiveTest(unittest.TestCase):
     @classmethod
     def tearDownClass(cls):
         cls.drive.remove()
-
-    def replay(self):
-        """Publishes the drive in its own time."""
-        begin, first = time.monotonic(), self.messages[0][1].header.stamp.to_sec()
-        for topic, message in self.messages:
-            time.sleep(max(0.0, begin + message.header.stamp.to_sec() - first - time.monotonic()))
-            self.publishers[topic].publish(message)
 
     def stamps(self, topic):
         return [message.header.stamp.to_sec() for message in list(self.received[topic])]
@@ -62,7 +53,7 @@ class AroundLiveTest(unittest.TestCase):
                  "the results to be connected")
         busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(os.cpu_count() or 1)]
         try:
-            self.replay()
+            replay(self.messages, self.publishers)
         finally:
             for process in busy:
                 process.kill()

@@ -14,7 +14,7 @@ import yaml
 from sensor_msgs.msg import Image, PointCloud2
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from drive_fixture import CAMERAS, Drive  # noqa: E402
+from drive_fixture import CAMERAS, Drive, inputs_of  # noqa: E402
 from nodelet_fixture import (Diagnostics, drive_publishers, expect_bad_rig_is_refused, manager_services,  # noqa: E402
                              project_mei, reach, wait_for, wait_until_gone)
 
@@ -35,8 +35,7 @@ class DepthNodeletTest(unittest.TestCase):
         status, output, errors = cls.drive.compute_range_maps(cls.offline, extra=["--online"])
         if status != 0:
             raise RuntimeError(f"compute_range_maps failed: {output} {errors}")
-        cls.messages = [(topic, message) for topic, message in cls.drive.messages()
-                        if topic == "/odom" or topic.endswith("/image_raw")]
+        cls.messages = inputs_of(cls.drive.messages())
         cls.received = {}
         cls.clouds = []
 

@@ -35,6 +35,11 @@ def is_progress(line):
     return line.rstrip().endswith(" s)") and "%" in line
 
 
+def inputs_of(messages):
+    """The (topic, message) pairs that a car publishes: odometry and images."""
+    return [(topic, message) for topic, message in messages if topic == "/odom" or topic.endswith("/image_raw")]
+
+
 class Drive:
     """A drive at half resolution with truth: two cameras on the first 1.6 s of the short drive by default."""
 

@@ -17,6 +17,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+from drive_fixture import inputs_of  # noqa: E402
 from localization_fixture import CAMERAS, MappedRoad, count, rig_text, warnings  # noqa: E402
 from nodelet_fixture import Diagnostics, drive_publishers, manager_services, reach, wait_for, wait_until_gone  # noqa: E402
 from vcharge_msgs.msg import LocalizationStatus  # noqa: E402
@@ -42,8 +43,7 @@ class LocalizationTest(unittest.TestCase):
         status, cls.found, errors, cls.rows = cls.road.localize()
         if status != 0:
             raise RuntimeError(f"localize_drive failed: {errors}")
-        cls.messages = [(topic, message) for topic, message in cls.messages_of(cls.road.bag)
-                        if topic == "/odom" or topic.endswith("/image_raw")]
+        cls.messages = inputs_of(cls.messages_of(cls.road.bag))
         cls.received = {}
         cls.logged = []
 

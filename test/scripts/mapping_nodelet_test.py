@@ -16,7 +16,7 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from drive_fixture import Drive, run_tool, tool  # noqa: E402
+from drive_fixture import Drive, inputs_of, run_tool, tool  # noqa: E402
 from mapping_fixture import numbers_of_map  # noqa: E402
 from nodelet_fixture import (TIMEOUT_S, Diagnostics, drive_publishers, manager_services, reach, wait_for,  # noqa: E402
                              wait_until_gone)
@@ -36,8 +36,7 @@ class MappingNodeletTest(unittest.TestCase):
             cls.offline_map])
         if status != 0:
             raise RuntimeError(f"build_map failed: {cls.offline} {errors}")
-        cls.messages = [(topic, message) for topic, message in cls.drive.messages()
-                        if topic == "/odom" or topic.endswith("/image_raw")]
+        cls.messages = inputs_of(cls.drive.messages())
         cls.num_frames = len({message.header.stamp.to_nsec() for topic, message in cls.messages if topic != "/odom"})
         cls.received = {}
 

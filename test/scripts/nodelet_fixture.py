@@ -38,6 +38,14 @@ def drive_publishers(cameras):
     return publishers
 
 
+def replay(messages, publishers):
+    """Publishes (topic, message) pairs in their own time."""
+    begin, first = time.monotonic(), messages[0][1].header.stamp.to_sec()
+    for topic, message in messages:
+        time.sleep(max(0.0, begin + message.header.stamp.to_sec() - first - time.monotonic()))
+        publishers[topic].publish(message)
+
+
 class Diagnostics:
     """Collects /diagnostics: the newest status by name, and (level, message) of all."""
 

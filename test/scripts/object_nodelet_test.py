@@ -16,9 +16,9 @@ from vcharge_msgs.msg import TrackedObjects
 from visualization_msgs.msg import MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from drive_fixture import CAMERAS, Drive, run, tool  # noqa: E402
+from drive_fixture import CAMERAS, Drive, inputs_of, run, tool  # noqa: E402
 from nodelet_fixture import (Diagnostics, drive_publishers, expect_bad_rig_is_refused, manager_services,  # noqa: E402
-                             reach, wait_for, wait_until_gone)
+                             reach, replay, wait_for, wait_until_gone)
 
 OPTIONS = {"ignore_hidden": False}  # no obstacle map is published here
 
@@ -41,8 +41,7 @@ class ObjectNodeletTest(unittest.TestCase):
         with open(offline / "objects.csv", encoding="utf-8") as file:
             for row in csv.DictReader(file):
                 cls.offline[int(row["stamp_ns"])][int(row["id"])] = row
-        cls.messages = [(topic, message) for topic, message in cls.drive.messages()
-                        if topic == "/odom" or topic.endswith("/image_raw")]
+        cls.messages = inputs_of(cls.drive.messages())
         cls.received, cls.markers = {}, []
         cls.diagnostics = Diagnostics()
         cls.subscribers = [
@@ -98,11 +97,7 @@ class ObjectNodeletTest(unittest.TestCase):
 
     def test_live_drive_goes_on_when_images_are_dropped(self):
         self.start(is_lossless=False)
-        first = self.messages[0][1].header.stamp.to_sec()
-        begin = time.monotonic()
-        for topic, message in self.messages:
-            time.sleep(max(0.0, begin + message.header.stamp.to_sec() - first - time.monotonic()))
-            self.publishers[topic].publish(message)
+        replay(self.messages, self.publishers)
         wait_for(lambda: len(self.received) >= len(self.stamps) // 6, "objects of some images", 60.0)
         self.assertLessEqual(set(self.received), set(self.stamps))
         wait_for(lambda: "dropped" in self.diagnostics.values("objects"), "the number of dropped images")

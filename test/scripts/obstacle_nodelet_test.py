@@ -24,7 +24,7 @@ from vcharge_msgs.msg import Corridor
 from visualization_msgs.msg import MarkerArray
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-from drive_fixture import CAMERAS, Drive, run, tool  # noqa: E402
+from drive_fixture import CAMERAS, Drive, inputs_of, run, tool  # noqa: E402
 from nodelet_fixture import (Diagnostics, drive_publishers, expect_bad_rig_is_refused, manager_services,  # noqa: E402
                              reach, wait_for, wait_until_connected, wait_until_gone)
 
@@ -104,13 +104,12 @@ class ObstacleNodeletTest(unittest.TestCase):
         if not cls.load("/depth", "vcharge_dense/depth_nodelet", [], [], [], "").success:
             raise RuntimeError("the depth nodelet does not load")
         reach(publishers, diagnostics.heard)
-        drive = [(topic, message) for topic, message in cls.drive.messages()
-                 if topic == "/odom" or topic.endswith("/image_raw")]
+        drive = inputs_of(cls.drive.messages())
         for topic, message in drive:
             publishers[topic].publish(message)
             time.sleep(0.002)
-        stamps = sorted(int(path.stem) for path in cls.offline.glob("*.yaml") if path.stem.isdigit())
-        wait_for(lambda: len(recorded) >= len(PARTS) * len(CAMERAS) * (len(stamps) - 3), "range maps", 150.0)
+        num_stamps = len(cls.offline_stamps())
+        wait_for(lambda: len(recorded) >= len(PARTS) * len(CAMERAS) * (num_stamps - 3), "range maps", 150.0)
         time.sleep(2.0)
         cls.unload("/depth")
         for connection in [*subscribers, *publishers.values()]:
@@ -187,8 +186,9 @@ class ObstacleNodeletTest(unittest.TestCase):
     def grids(self):
         return list(self.received.get("/obstacles/grid", []))
 
-    def offline_stamps(self):
-        return sorted(int(path.stem) for path in self.offline.glob("*.yaml") if path.stem.isdigit())
+    @classmethod
+    def offline_stamps(cls):
+        return sorted(int(path.stem) for path in cls.offline.glob("*.yaml") if path.stem.isdigit())
 
     def wait_for_message(self, *words):
         wait_for(lambda: self.diagnostics.tells(*words), f"a diagnostic with {words}")

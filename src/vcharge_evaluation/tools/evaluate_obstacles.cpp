@@ -43,8 +43,6 @@ nlohmann::json raysToJson(const char* what, const RayErrors& errors) {
           {"calibration", calibrationToJson(errors.calibration)}};
 }
 
-constexpr double kStart_m = 2.0;  // without motion, stereo of single cameras measures nothing
-
 nlohmann::json scanToJson(const std::string& name, const ObstacleScanEvaluator& evaluator) {
   std::printf("%s scan:\n", name.c_str());
   nlohmann::json by_range = nlohmann::json::array();
@@ -200,9 +198,7 @@ nlohmann::json evaluate(const Arguments& arguments, const Options& options) {
   ObstacleMapEvaluator map_evaluator(obstacles, heights, truth.path(), options.map);
   ApproachEvaluator approach_evaluator(obstacles, heights, truth.trajectory(), options.approach);
   std::map<std::string, ObstacleScanEvaluator> scan_evaluators;
-  ObstacleScanEvaluator in_motion(options.scan);  // once the vehicle has driven kStart_m
-  double driven_m = 0.0;
-  std::optional<Eigen::Vector3d> last_m;
+  ObstacleScanEvaluator in_motion(options.scan);
   const std::vector<Timestamp> stamps = listObstacles(arguments.obstacles);
   size_t judged = 0;
   ProgressBar progress("evaluating");
@@ -224,21 +220,19 @@ nlohmann::json evaluate(const Arguments& arguments, const Options& options) {
       all.insert(all.end(), points.begin(), points.end());
     }
     judged += all.empty() ? 0 : 1;
-    driven_m += (pose->translation() - last_m.value_or(pose->translation())).norm();
-    last_m = pose->translation();
-    for (const ObstacleScan& scan : scans) {
-      if (scan.name == "fused") {
-        scan_evaluators.try_emplace(scan.name, options.scan).first->second.add(scan, all, *pose);
-        if (driven_m >= kStart_m) {
-          in_motion.add(scan, all, *pose);
-        }
-      }
-    }
     const ObstacleMap map = readObstacleMap(arguments.obstacles, stamps[i]);
     const std::vector<TruthObstacle> movers = truth.moversBetween(stamps[i], stamps[i]);
     map_evaluator.add(map, all, *pose, movers,
                       truth.moversBetween(stamps[i] - durationFromSeconds(1.0), stamps[i]));
     approach_evaluator.add(map, all, *pose, movers);
+    for (const ObstacleScan& scan : scans) {
+      if (scan.name == "fused") {
+        scan_evaluators.try_emplace(scan.name, options.scan).first->second.add(scan, all, *pose);
+        if (approach_evaluator.hasDriven()) {
+          in_motion.add(scan, all, *pose);
+        }
+      }
+    }
   }
   if (judged == 0) {
     throw InputError(arguments.truth + "/range: no true ranges for any of the " +
@@ -268,10 +262,12 @@ int main(int argc, char** argv) {
   const ReportArgument report(&app, "obstacle_errors");
   describeJson(&app,
                R"(kind: "obstacles"; scans: per scan {name, and for all rays (all), those off the direction of
-travel (aside), along it (ahead) and along it within 2 m (ahead_within_2_m), and by_range (with from_m, to_m) {rays,
+travel (aside), along it (ahead) and along it within 2 m (ahead_within_2_m), those to what only hangs above 1.7 m
+(overhead), and by_range (with from_m, to_m) {rays,
 missed, nearer, mean_signed_m, fraction_within_one_sigma, fraction_within_two_sigma, error distribution error_m, in
 which missed and nearer rays count as 0.5 m, calibration {expected_calibration_error, bins [{count, mean_confidence,
-fraction_right}]} of the probability, by the reported sigma, of an error within 0.15 m}}; fused_after_2_m: the same for the fused scan, once the vehicle has driven 2 m;
+fraction_right}]} of the probability, by the reported sigma, of an error within 0.15 m}};
+fused_after_2_m: the same for the fused scan, once the vehicle has driven 2 m;
 map: {maps, driven_m, obstacles [{kind, height_m, width_m, distance_m, reported, maps,
 maps_reported}], false_cells, false_cells_per_10_m, false_left, false_cells_per_map, false_cells_hidden,
 false_cell_list [{x_m, y_m, first_seen_ns, maps, left, on_open_ground}], observed_inside, free_inside:

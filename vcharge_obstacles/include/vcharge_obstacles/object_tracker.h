@@ -43,9 +43,8 @@ struct ObjectTrackerOptions {
 ///     straight ahead moves in the image as something static that is nearer would.
 ///  7. A Kalman filter per object joins cameras and time.
 ///  8. Objects without points are found by their whole body in the next image, and by their contact.
-///  9. While the vehicle drives, objects that an obstacle of the obstacle map, if there is one, hides from
-///  all
-///     cameras are left out.
+///  9. While the vehicle drives, objects that an obstacle of the obstacle map hides from all cameras are
+///     left out.
 ///
 /// Deterministic; not thread safe.
 class ObjectTracker : public DriveConsumer {

@@ -39,11 +39,7 @@ TEST_F(ObstacleMapperTest, ObjectsEnterTheCorridorUntilTheyAreOld) {
 TEST_F(ObstacleMapperTest, GroundUnderObjectsIsNotFreeUntilTheyHaveLeft) {
   start();
   drive(0, 81);
-  const auto stateAt = [&](double x_m, double y_m) {
-    const ObstacleMap& map = frames_.back().map;
-    const Eigen::Vector2d cell = (Eigen::Vector2d(x_m, y_m) - map.origin_m) / map.cell_size_m;
-    return map.state.at<int8_t>(static_cast<int>(cell.y()), static_cast<int>(cell.x()));
-  };
+  const auto stateAt = [&](double x_m, double y_m) { return stateIn(frames_.back().map, x_m, y_m); };
   ASSERT_EQ(stateAt(4.0, 3.0), kCellFree);
   TrackedObject object;
   object.footprint_m = {{3.8, 2.8}, {4.2, 2.8}, {4.2, 3.2}, {3.8, 3.2}};

@@ -17,7 +17,6 @@ class KnownObstacles {
  public:
   /// Replaces the obstacles by the occupied cells of a map.
   void set(const ObstacleMap& map);
-  void clear() { occupied_ = cv::Mat(); }
   /// Whether an obstacle stands on the line on the ground from a camera to `distance_m` along a unit
   /// direction, in the map's fixed frame. What the map does not reach hides nothing.
   bool hideLine(const Eigen::Vector2d& camera_m, const Eigen::Vector2d& direction, double distance_m) const;

@@ -28,7 +28,7 @@ TEST(KnownObstaclesTest, WhatIsBehindAWallIsHidden) {
   EXPECT_FALSE(obstacles.hideLine(camera_m, Eigen::Vector2d(4.0, 2.0).normalized(), 6.0))
       << "beside the wall";
   EXPECT_FALSE(obstacles.hideLine(camera_m, -ahead, 6.0)) << "outside of the map";
-  obstacles.clear();
+  obstacles = KnownObstacles();
   EXPECT_FALSE(obstacles.hideLine(camera_m, ahead, 6.0));
 }
 

@@ -5,15 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include "fusion/obstacle_map_cells.h"
+
 namespace vcharge {
 namespace {
-
-ObstacleMap freeMap() {
-  ObstacleMap map = ObstacleMap::unobserved({100, 100}, 0.1);
-  map.origin_m = {-5.0, -5.0};
-  map.state.setTo(kCellFree);
-  return map;
-}
 
 TrackedObject objectWith(const std::vector<Eigen::Vector2d>& footprint_m) {
   TrackedObject object;
@@ -22,7 +17,7 @@ TrackedObject objectWith(const std::vector<Eigen::Vector2d>& footprint_m) {
 }
 
 TEST(ObjectCellsTest, OnlyFreeCellsUnderAndBesideAnObjectAreForgotten) {
-  ObstacleMap map = freeMap();
+  ObstacleMap map = makeFreeMap(100);
   map.state.at<int8_t>(55, 75) = kCellOccupied;  // at (2.55, 0.55)
   forgetFreeUnder({objectWith({{2.0, 0.0}, {3.0, 0.0}, {3.0, 1.0}, {2.0, 1.0}})}, &map);
   EXPECT_EQ(map.state.at<int8_t>(55, 75), kCellOccupied);
@@ -42,7 +37,7 @@ TEST(ObjectCellsTest, OnlyFreeCellsUnderAndBesideAnObjectAreForgotten) {
 }
 
 TEST(ObjectCellsTest, ObjectsOutsideOfTheMapOrWithoutAnOutlineChangeNothing) {
-  ObstacleMap map = freeMap();
+  ObstacleMap map = makeFreeMap(100);
   forgetFreeUnder({objectWith({{50.0, 50.0}, {51.0, 50.0}, {51.0, 51.0}}), objectWith({}),
                    objectWith({{0.0, 0.0}, {1.0, 0.0}})},
                   &map);

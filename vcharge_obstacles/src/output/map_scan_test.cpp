@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "fusion/obstacle_map_cells.h"
 #include "vcharge_obstacles/obstacle_outlines.h"
 
 namespace vcharge {
@@ -11,10 +12,7 @@ namespace {
 
 /// Free map of 4 m x 4 m around the origin; the vehicle is in the middle and points along x.
 ObstacleMap makeMap() {
-  ObstacleMap map = ObstacleMap::unobserved({40, 40}, 0.1);
-  map.origin_m = {-2.0, -2.0};
-  map.state.setTo(kCellFree);
-  return map;
+  return makeFreeMap(40);
 }
 
 void occupy(ObstacleMap* map, int column, int row, float height_m) {

@@ -74,6 +74,8 @@ class ApproachEvaluator {
            const RigidTransform& world_from_vehicle, const std::vector<TruthObstacle>& movers);
 
   ApproachErrors errors() const;
+  /// Whether the vehicle has driven 2 m: before, stereo of single cameras has measured little or nothing.
+  bool hasDriven() const;
 
  private:
   struct Frame;

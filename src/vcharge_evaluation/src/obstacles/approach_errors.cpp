@@ -199,7 +199,7 @@ void ApproachEvaluator::judgeCorridor(const Frame& frame, const std::vector<Trut
                sums_.num_false_alarms += is_alarm && !was_alarm ? 1 : 0;
                was_alarm = is_alarm;
              });
-  if (sums_.driven_m < kStart_m) {
+  if (!hasDriven()) {
     return;
   }
   for (const bool is_forward : {true, false}) {
@@ -207,6 +207,10 @@ void ApproachEvaluator::judgeCorridor(const Frame& frame, const std::vector<Trut
     countCells(corridorFrom(frame.map.stamp, is_forward, kFar_m, 0.0), kNear_m, kFar_m,
                [&](int /*column*/, int /*row*/, int8_t state, bool truth) { counts.add(truth, state); });
   }
+}
+
+bool ApproachEvaluator::hasDriven() const {
+  return sums_.driven_m >= kStart_m;
 }
 
 ApproachErrors ApproachEvaluator::errors() const {
