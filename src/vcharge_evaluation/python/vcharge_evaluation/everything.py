@@ -59,7 +59,7 @@ def steps():
     yield Step("steps", ["--seeds", *LOTS])
     # The quick run's drives are those of its conditions.
     moving = ["movers_crossing", "movers_lot", "standing_lot"]
-    yield Step("objects", ["--seeds", *LOTS, "--drives", *moving, "stop_and_go_lot", "bay_backwards_lot"],
+    yield Step("objects", ["--seeds", *LOTS, "--drives", *moving, "standing_approached", "stop_and_go_lot", "bay_backwards_lot"],
                ["--seeds", LOTS[0], "--drives", *moving, "--image-scale", CONDITIONS_SCALE, "--duration-s", CONDITIONS_S])
     yield Step("objects", ["--seeds", *GARAGES, "--drives", "movers_garage"])
     yield Step("objects", ["--seeds", LOTS[0], "--drives", "movers_lot", "--conditions", "dusk", "wet"])

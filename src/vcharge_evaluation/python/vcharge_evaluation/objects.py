@@ -7,7 +7,8 @@ from vcharge_evaluation.obstacles import detect_obstacles
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent, quantile
 from vcharge_evaluation.tools import NoResult, judge, say
 
-DRIVES = ("movers_lot", "movers_garage", "movers_crossing", "standing_lot", "stop_and_go_lot", "bay_backwards_lot")
+DRIVES = ("movers_lot", "movers_garage", "movers_crossing", "standing_lot", "standing_approached", "stop_and_go_lot",
+          "bay_backwards_lot")
 # Movers of the scenarios that have none.
 MOVERS = {"bay_backwards_lot": {"people": 6, "children": 3, "cars": 2, "bicycles": 2}}
 CONDITIONS = ("noon", "dusk", "wet")

@@ -39,10 +39,10 @@ class Planner {
     }
   }
 
-  void add(ObjectClass object_class, bool crossing, uint64_t seed) {
+  void add(ObjectClass object_class, Purpose purpose, uint64_t seed) {
     Random random(seed);
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
-      std::optional<Way> way = chooser_.choose(object_class, crossing, &random);
+      std::optional<Way> way = chooser_.choose(object_class, purpose, &random);
       if (way && schedule(&*way)) {
         movers_.push_back(way->mover);
         addMoving([&](double time_s) { return way->mover.stateAt(time_s); });
@@ -67,14 +67,16 @@ class Planner {
     moving_.push_back(std::move(moving));
   }
 
-  double horizonAt(double time_s, bool crossing) const {
-    return crossing ? 0.5 * own_car_.speedAt(time_s) / kStop_m_per_s2 + kReaction_s : kOwnHorizon_s;
+  /// Time for which a mover keeps clear of where the own car will be.
+  double horizonAt(double time_s, bool is_near) const {
+    return is_near ? 0.5 * own_car_.speedAt(time_s) / kStop_m_per_s2 + kReaction_s : kOwnHorizon_s;
   }
 
   bool schedule(Way* way) const {
     PlannedMover* mover = &way->mover;
     ScheduleTask* task = &way->task;
     const bool crossing = way->crossing.has_value();
+    const bool is_near = crossing || way->own_clearance_m < kOwnClearance_m;
     const MoverPath& path = *mover->path;
     task->path_m = way->end_m - mover->start_m;
     task->speed_limit_m_per_s = [&](double along_m) {
@@ -94,8 +96,8 @@ class Planner {
         return isNearerThan(kMoverClearance_m + moving.margin_m + task->margin_m(), outline,
                             moving.outlines[static_cast<size_t>(kChecksPerStep * step)]);
       });
-      return is_free_of_movers && own_car_.keepsClearOf(outline, time_s, horizonAt(time_s, crossing),
-                                                        kOwnClearance_m + task->margin_m());
+      return is_free_of_movers && own_car_.keepsClearOf(outline, time_s, horizonAt(time_s, is_near),
+                                                        way->own_clearance_m + task->margin_m());
     };
     const std::optional<SpeedSchedule> found = planSchedule(*task);
     if (!found) {
@@ -111,7 +113,7 @@ class Planner {
       const bool meets_mover = std::any_of(moving_.begin(), moving_.end(), [&](const Moving& moving) {
         return isNearerThan(kMoverClearance_m, outline, moving.outlines[static_cast<size_t>(check)]);
       });
-      if (meets_mover || !own_car_.keepsClearOf(outline, time_s, 0.0, kOwnClearance_m)) {
+      if (meets_mover || !own_car_.keepsClearOf(outline, time_s, 0.0, way->own_clearance_m)) {
         return false;
       }
     }
@@ -133,13 +135,17 @@ std::vector<PlannedMover> planMovers(const MoverOptions& options, const MoverAre
   Planner planner(area, scene, own_car, start_s);
   const auto seed = static_cast<uint64_t>(options.seed) * 1000003U;
   if (options.crossing) {
-    planner.add(ObjectClass::kAdult, true, seed);
+    planner.add(ObjectClass::kAdult, Purpose::kCrossing, seed);
+  }
+  for (int i = 0; i < options.approaching; ++i) {
+    planner.add(ObjectClass::kAdult, Purpose::kApproaching,
+                seed + 900000U + static_cast<uint64_t>(i));  // apart from the other seeds
   }
   for (const auto& [object_class, count] :
        {std::pair(ObjectClass::kCar, options.cars), std::pair(ObjectClass::kBicycle, options.bicycles),
         std::pair(ObjectClass::kAdult, options.people), std::pair(ObjectClass::kChild, options.children)}) {
     for (int i = 0; i < count; ++i) {
-      planner.add(object_class, false,
+      planner.add(object_class, Purpose::kOwn,
                   seed + 1000U * static_cast<uint64_t>(object_class) + static_cast<uint64_t>(i) + 1U);
     }
   }

@@ -184,6 +184,31 @@ TEST(CrossingTest, PersonCrossesTheWayOfAShortDriveToo) {
   EXPECT_GE(countCrossings(OwnCar(poses)), kSeeds - 5);
 }
 
+TEST(ApproachTest, PeopleWalkUpToTheStandingCarButDoNotTouchIt) {
+  const OwnCar own_car(ownPoses(simulate("lot", "standing")));
+  int planned = 0, arrivals = 0;
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    MoverOptions options;
+    options.approaching = 3;
+    options.seed = seed;
+    for (const PlannedMover& mover :
+         planMovers(options, areaOf("lot"), rendererOf("lot").scene(), own_car, 0.0)) {
+      double first_m = 0.0, nearest_m = INFINITY;
+      for (double time_s = 0.0; time_s <= own_car.duration(); time_s += 0.1) {
+        const Footprint outline(mover.stateAt(time_s).obstacle.footprint_m);
+        nearest_m = std::min(nearest_m, distanceBetween(outline, own_car.footprintAt(time_s)));
+        first_m = time_s == 0.0 ? nearest_m : first_m;
+      }
+      EXPECT_GE(nearest_m, kApproachClearance_m) << "seed " << seed;
+      EXPECT_GT(first_m, 3.0) << "seed " << seed;
+      ++planned;
+      arrivals += nearest_m < 1.3 ? 1 : 0;  // the fastest stop early
+    }
+  }
+  EXPECT_GE(planned, 2 * kSeeds);
+  EXPECT_GE(arrivals, 2 * kSeeds);  // others start late, or are slow
+}
+
 TEST(MoverMeshTest, IsWhereTheTruthSays) {
   SceneOptions options;
   options.image_scale = 0.3;

@@ -9,6 +9,8 @@ namespace vcharge {
 
 /// Distance that movers keep from the own car's footprint.
 inline constexpr double kOwnClearance_m = 1.5;
+/// The same for people who walk up to it.
+inline constexpr double kApproachClearance_m = 0.4;
 /// The own car can stop at this deceleration, after this reaction time.
 inline constexpr double kStop_m_per_s2 = 2.5;
 inline constexpr double kReaction_s = 0.5;

@@ -14,6 +14,7 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kAdultRadius_m = 0.35;
 constexpr double kAdultHeight_m = 1.78;
 constexpr double kMaxStart_m = 250.0;
+constexpr double kApproachStep_m = 0.05;
 
 void setPath(DrivePath path, Way* way) {
   way->mover.path = std::make_shared<const MoverPath>(std::move(path));
@@ -22,14 +23,15 @@ void setPath(DrivePath path, Way* way) {
 
 }  // namespace
 
-std::optional<Way> WayChooser::choose(ObjectClass object_class, bool crossing, Random* random) const {
+std::optional<Way> WayChooser::choose(ObjectClass object_class, Purpose purpose, Random* random) const {
   Way way;
   way.mover.object_class = object_class;
   way.mover.look = static_cast<uint32_t>(random->bits());
   way.task.num_steps = num_steps_;
   const bool is_free = object_class == ObjectClass::kCar       ? chooseCar(random, &way)
                        : object_class == ObjectClass::kBicycle ? chooseBicycle(random, &way)
-                       : crossing                              ? chooseCrossing(random, &way)
+                       : purpose == Purpose::kCrossing         ? chooseCrossing(random, &way)
+                       : purpose == Purpose::kApproaching      ? chooseApproach(random, &way)
                                                                : chooseWalk(random, &way);
   return is_free ? std::optional<Way>(std::move(way)) : std::nullopt;
 }
@@ -99,6 +101,29 @@ bool WayChooser::chooseCrossing(Random* random, Way* way) const {
   way->mover.start_m = std::max(0.0, -go_s * way->task.max_speed_m_per_s);
   way->crossing = Way::Crossing{met_s, half_m - way->mover.start_m};
   return way->mover.start_m < 0.5 * half_m && own_car_.speedAt(met_s) > 0.5 && isFreeLap(2.0 * half_m, way);
+}
+
+// Straight from where there is room up to the own car, which stands there at some time; stays there.
+bool WayChooser::chooseApproach(Random* random, Way* way) const {
+  makePerson(random, way);
+  way->task.max_speed_m_per_s = random->uniform(0.5, 2.0);
+  const double go_s = random->uniform(0.0, 0.5) * own_car_.duration();
+  const Footprint& own = own_car_.footprintAt(go_s);
+  const double angle_rad = random->uniform(-kPi, kPi);
+  const Eigen::Vector2d direction(std::cos(angle_rad), std::sin(angle_rad));
+  const double from_m = random->uniform(6.0, 9.0);
+  const Eigen::Vector2d from = own.centre + from_m * direction;
+  setPath(DrivePath(RigidTransform::planar(from.x(), from.y(), angle_rad + kPi), {{from_m, 0.0, 0.0}}), way);
+  const double nearest_m = kApproachClearance_m + way->task.margin_m();
+  way->end_m = 0.0;
+  while (!isNearerThan(nearest_m, Footprint(way->mover.outlineAt(way->end_m + kApproachStep_m)), own)) {
+    way->end_m += kApproachStep_m;
+  }
+  way->task.wanted_m_per_s = [go_s, speed = way->task.max_speed_m_per_s](int step) {
+    return SpeedSchedule::kStep_s * step < go_s ? 0.0 : speed;
+  };
+  way->own_clearance_m = kApproachClearance_m;
+  return isFreeLap(way->end_m, way);
 }
 
 bool WayChooser::chooseCar(Random* random, Way* way) const {

@@ -9,6 +9,9 @@
 
 namespace vcharge {
 
+/// What a mover is on the way for.
+enum class Purpose { kOwn, kCrossing, kApproaching };
+
 /// A mover with a path that is free of all that stands; its schedule is still to be found.
 struct Way {
   PlannedMover mover;
@@ -19,6 +22,7 @@ struct Way {
     double time_s, along_m;
   };
   std::optional<Crossing> crossing;
+  double own_clearance_m = kOwnClearance_m;
 };
 
 /// Chooses at random what movers are and where they go.
@@ -29,13 +33,14 @@ class WayChooser {
       : area_(area), obstacles_(obstacles), own_car_(own_car), num_steps_(num_steps) {}
 
   /// Nothing if what was chosen is blocked.
-  std::optional<Way> choose(ObjectClass object_class, bool crossing, Random* random) const;
+  std::optional<Way> choose(ObjectClass object_class, Purpose purpose, Random* random) const;
 
  private:
   void wantPauses(Random* random, double standing_part, ScheduleTask* task) const;
   void makePerson(Random* random, Way* way) const;
   bool chooseWalk(Random* random, Way* way) const;
   bool chooseCrossing(Random* random, Way* way) const;
+  bool chooseApproach(Random* random, Way* way) const;
   bool chooseCar(Random* random, Way* way) const;
   bool leaveAnyBay(Random* random, double aside_m, Way* way) const;
   bool chooseBicycle(Random* random, Way* way) const;
