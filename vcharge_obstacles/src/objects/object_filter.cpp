@@ -33,6 +33,9 @@ constexpr double kMovingSigmas = 2.0, kTravel = 3.0;
 constexpr int kManyDetections = 5;
 // Nobody walks faster; part of the drift of contacts that is kept from stamp to stamp.
 constexpr double kFastest_m_per_s = 2.5, kKeptDrift = 0.7;
+// What looks like a person is reported once it moves at this least speed and number of standard deviations:
+// few things that stand do. Part of the likeness that is kept from view to view.
+constexpr double kPersonLikeness = -0.2, kPersonSigmas = 1.0, kSlowest_m_per_s = 0.2, kKeptLikeness = 0.7;
 // An object that stands is reported for this time.
 constexpr double kKeptStanding_s = 2.0;
 constexpr double kPersonRadius_m = 0.25;
@@ -160,6 +163,19 @@ bool ObjectFilter::walks(const Track& track) const {
          found->dot(track.state.tail<2>()) > 0.5 * found->squaredNorm();
 }
 
+void ObjectFilter::addLikeness(size_t index, double score) {
+  double& likeness = tracks_[index].likeness;
+  likeness = kKeptLikeness * likeness + (1.0 - kKeptLikeness) * score;
+}
+
+/// Whether an object that looks like a person moves as one, at this number of its speed's standard
+/// deviations.
+bool ObjectFilter::movesLikePerson(const Track& track, double speed_sigmas) {
+  const double speed = track.state.tail<2>().norm();
+  return track.likeness > kPersonLikeness && speed_sigmas > kPersonSigmas && speed > kSlowest_m_per_s &&
+         speed < kFastest_m_per_s;
+}
+
 std::vector<ObjectFilter::Expected> ObjectFilter::expected() const {
   std::vector<Expected> result;
   for (size_t i = 0; i < tracks_.size(); ++i) {
@@ -206,11 +222,12 @@ void ObjectFilter::finish() {
     const Eigen::Matrix2d covariance = track.start_covariance + track.covariance.topLeftCorner<2, 2>();
     const Eigen::Vector2d velocity = track.state.tail<2>();
     const double variance = velocity.dot(track.covariance.bottomRightCorner<2, 2>() * velocity);
-    const bool is_fast = velocity.squaredNorm() > kMovingSigmas * std::sqrt(variance);
+    const double speed_sigmas = variance > 0.0 ? velocity.squaredNorm() / std::sqrt(variance) : 0.0;
+    const bool is_fast = speed_sigmas > kMovingSigmas;
     const bool travels = is_fast && travel_m.dot(covariance.ldlt().solve(travel_m)) > kTravel;
     track.contacts.forgetBefore(stamp_);
     track.has_moved = track.has_moved || (travels && track.num_detections > 0) || (is_fast && walks(track)) ||
-                      track.num_detections >= kManyDetections;
+                      movesLikePerson(track, speed_sigmas) || track.num_detections >= kManyDetections;
     if (track.last_seen < stamp_) {
       track.existence_log_odds = std::min(
           kMost, track.existence_log_odds + std::clamp(kMiss + track.votes, kLeastChange, kMostChange));

@@ -37,6 +37,8 @@ class ObjectFilter {
   bool correct(size_t index, double innovation, const Eigen::Vector4d& row, double sigma);
   /// Adds log-odds to the existence of an object that no camera detects at this stamp.
   void vote(size_t index, double log_odds) { tracks_[index].votes += log_odds; }
+  /// Adds how much an object looks like a person in one view: PersonMatch::score.
+  void addLikeness(size_t index, double score);
   /// Ends the stamp: objects that no camera has detected become less probable, and some end.
   void finish();
   /// Objects that probably exist, in the fixed frame.
@@ -44,6 +46,7 @@ class ObjectFilter {
   void clear();
 
  private:
+  static constexpr double kUnlike = -1.5;  // median likeness to a person of what is none
   struct Track {
     uint32_t id = 0;
     Eigen::Vector4d state = Eigen::Vector4d::Zero();  // x, y, velocity along x and y
@@ -59,8 +62,10 @@ class ObjectFilter {
     double drift_m_per_s = 0.0;
     Timestamp last_moving;  // detected, or surely moving
     double votes = 0.0;     // at this stamp
+    double likeness = kUnlike;
   };
   bool walks(const Track& track) const;
+  static bool movesLikePerson(const Track& track, double speed_sigmas);
   void note(const ObjectDetection& detection, const Eigen::Vector2d& position_m, Track* track) const;
   TrackedObject describe(const Track& track) const;
   void mergeTwins();

@@ -26,11 +26,14 @@ constexpr double kStaticRanges[] = {0.7, 1.0, 1.4};
 constexpr double kMoving_px = 1.0;
 // Log-odds for an object that is seen to move, and that was measured where it is not expected.
 constexpr double kMoves = 0.4, kContradicts = -0.1;
+// Score from which a person's bearing is used, and its standard deviation across the view.
+constexpr double kPersonScore = 0.0, kPersonAcross_m = 0.12;
 
 class Follower {
  public:
-  Follower(const TwoViews& views, const GroundContact* contact, ObjectFilter* filter)
-      : views_(views), contact_(contact), filter_(filter) {}
+  Follower(const TwoViews& views, const GroundContact* contact, const PersonLikeness& people,
+           ObjectFilter* filter)
+      : views_(views), contact_(contact), people_(people), filter_(filter) {}
 
   void follow(const ObjectFilter::Expected& object) const {
     const Seen now = see(views_.fixed_from_vehicle_now, object.position_m);
@@ -38,6 +41,21 @@ class Follower {
         see(views_.fixed_from_vehicle_before, object.position_m - views_.step_s * object.velocity_m_per_s);
     if (now.bearing.range_m > kMinRange_m && now.bearing.range_m < kMaxRange_m) {
       filter_->vote(object.index, findBody(object, before, now) + findContact(object, now));
+    }
+  }
+
+  void look(const ObjectFilter::Expected& object) const {
+    const Seen now = see(views_.fixed_from_vehicle_now, object.position_m);
+    const std::optional<PersonMatch> found =
+        people_.find(views_.panorama, views_.now, now.bearing, views_.camera_in_vehicle_m.z());
+    if (!found) {
+      return;
+    }
+    filter_->addLikeness(object.index, found->score);
+    if (found->score > kPersonScore) {
+      Eigen::Vector4d row;
+      row << now.across() / now.bearing.range_m, 0.0, 0.0;
+      filter_->correct(object.index, found->shift_rad, row, kPersonAcross_m / now.bearing.range_m);
     }
   }
 
@@ -106,15 +124,20 @@ class Follower {
 
   const TwoViews& views_;
   const GroundContact* contact_;
+  const PersonLikeness& people_;
   ObjectFilter* filter_;
 };
 
 }  // namespace
 
-void followObjects(const TwoViews& views, const GroundContact* contact, ObjectFilter* filter) {
-  const Follower follower(views, contact, filter);
+void followObjects(const TwoViews& views, const GroundContact* contact, const PersonLikeness& people,
+                   ObjectFilter* filter) {
+  const Follower follower(views, contact, people, filter);
   for (const ObjectFilter::Expected& object : filter->expected()) {
     follower.follow(object);
+  }
+  for (const ObjectFilter::Expected& object : filter->expected()) {
+    follower.look(object);
   }
 }
 

@@ -14,6 +14,7 @@
 #include "objects/object_detections.h"
 #include "objects/object_filter.h"
 #include "objects/object_following.h"
+#include "objects/person_likeness.h"
 #include "occupancy/known_obstacles.h"
 #include "points/followed_points.h"
 #include "points/panorama.h"
@@ -155,6 +156,7 @@ struct ObjectTracker::Camera {
   const double sigma_rad;  // of the motion of a point between two images
   FollowedPoints points;
   GroundContact contact;
+  const PersonLikeness people;
   const Panorama panorama;
   cv::Mat panorama_before, panorama_now;  // empty without images
   std::deque<std::pair<Timestamp, cv::Mat>> images;
@@ -317,7 +319,7 @@ void ObjectTracker::Camera::follow(State* state, bool is_compared) const {
                        now.odom_from_vehicle,
                        toSeconds(now.stamp - before.stamp),
                        vehicle_from_camera.translation()};
-  followObjects(views, is_compared ? &contact : nullptr, &state->filter);
+  followObjects(views, is_compared ? &contact : nullptr, people, &state->filter);
 }
 
 void ObjectTracker::process(const ImageFrame& frame) {
