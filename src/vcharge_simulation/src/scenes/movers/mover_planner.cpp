@@ -76,7 +76,7 @@ class Planner {
     PlannedMover* mover = &way->mover;
     ScheduleTask* task = &way->task;
     const bool crossing = way->crossing.has_value();
-    const bool is_near = crossing || way->own_clearance_m < kOwnClearance_m;
+    const bool is_near = way->purpose != Purpose::kNone;
     const MoverPath& path = *mover->path;
     task->path_m = way->end_m - mover->start_m;
     task->speed_limit_m_per_s = [&](double along_m) {
@@ -97,7 +97,7 @@ class Planner {
                             moving.outlines[static_cast<size_t>(kChecksPerStep * step)]);
       });
       return is_free_of_movers && own_car_.keepsClearOf(outline, time_s, horizonAt(time_s, is_near),
-                                                        way->own_clearance_m + task->margin_m());
+                                                        way->ownClearance_m() + task->margin_m());
     };
     const std::optional<SpeedSchedule> found = planSchedule(*task);
     if (!found) {
@@ -113,7 +113,7 @@ class Planner {
       const bool meets_mover = std::any_of(moving_.begin(), moving_.end(), [&](const Moving& moving) {
         return isNearerThan(kMoverClearance_m, outline, moving.outlines[static_cast<size_t>(check)]);
       });
-      if (meets_mover || !own_car_.keepsClearOf(outline, time_s, 0.0, way->own_clearance_m)) {
+      if (meets_mover || !own_car_.keepsClearOf(outline, time_s, 0.0, way->ownClearance_m())) {
         return false;
       }
     }
@@ -145,7 +145,7 @@ std::vector<PlannedMover> planMovers(const MoverOptions& options, const MoverAre
        {std::pair(ObjectClass::kCar, options.cars), std::pair(ObjectClass::kBicycle, options.bicycles),
         std::pair(ObjectClass::kAdult, options.people), std::pair(ObjectClass::kChild, options.children)}) {
     for (int i = 0; i < count; ++i) {
-      planner.add(object_class, Purpose::kOwn,
+      planner.add(object_class, Purpose::kNone,
                   seed + 1000U * static_cast<uint64_t>(object_class) + static_cast<uint64_t>(i) + 1U);
     }
   }

@@ -21,10 +21,18 @@ void setPath(DrivePath path, Way* way) {
   way->end_m = way->mover.path->length();
 }
 
+// Stands until then.
+void startAt(double go_s, ScheduleTask* task) {
+  task->wanted_m_per_s = [go_s, speed = task->max_speed_m_per_s](int step) {
+    return SpeedSchedule::kStep_s * step < go_s ? 0.0 : speed;
+  };
+}
+
 }  // namespace
 
 std::optional<Way> WayChooser::choose(ObjectClass object_class, Purpose purpose, Random* random) const {
   Way way;
+  way.purpose = purpose;
   way.mover.object_class = object_class;
   way.mover.look = static_cast<uint32_t>(random->bits());
   way.task.num_steps = num_steps_;
@@ -94,16 +102,14 @@ bool WayChooser::chooseCrossing(Random* random, Way* way) const {
       front.translation() - half_m * Eigen::Vector3d(std::cos(yaw_rad), std::sin(yaw_rad), 0.0);
   setPath(DrivePath(RigidTransform::planar(from.x(), from.y(), yaw_rad), {{2.0 * half_m, 0.0, 0.0}}), way);
   const double go_s = met_s - half_m / way->task.max_speed_m_per_s - random->uniform(2.0, 4.0);
-  way->task.wanted_m_per_s = [go_s, speed = way->task.max_speed_m_per_s](int step) {
-    return SpeedSchedule::kStep_s * step < go_s ? 0.0 : speed;
-  };
+  startAt(go_s, &way->task);
   // Already on the way at the start of a short drive.
   way->mover.start_m = std::max(0.0, -go_s * way->task.max_speed_m_per_s);
   way->crossing = Way::Crossing{met_s, half_m - way->mover.start_m};
   return way->mover.start_m < 0.5 * half_m && own_car_.speedAt(met_s) > 0.5 && isFreeLap(2.0 * half_m, way);
 }
 
-// Straight from where there is room up to the own car, which stands there at some time; stays there.
+// Straight up to where the own car is when the walk begins; stays there.
 bool WayChooser::chooseApproach(Random* random, Way* way) const {
   makePerson(random, way);
   way->task.max_speed_m_per_s = random->uniform(0.5, 2.0);
@@ -114,15 +120,12 @@ bool WayChooser::chooseApproach(Random* random, Way* way) const {
   const double from_m = random->uniform(6.0, 9.0);
   const Eigen::Vector2d from = own.centre + from_m * direction;
   setPath(DrivePath(RigidTransform::planar(from.x(), from.y(), angle_rad + kPi), {{from_m, 0.0, 0.0}}), way);
-  const double nearest_m = kApproachClearance_m + way->task.margin_m();
+  const double nearest_m = way->ownClearance_m() + way->task.margin_m();
   way->end_m = 0.0;
   while (!isNearerThan(nearest_m, Footprint(way->mover.outlineAt(way->end_m + kApproachStep_m)), own)) {
     way->end_m += kApproachStep_m;
   }
-  way->task.wanted_m_per_s = [go_s, speed = way->task.max_speed_m_per_s](int step) {
-    return SpeedSchedule::kStep_s * step < go_s ? 0.0 : speed;
-  };
-  way->own_clearance_m = kApproachClearance_m;
+  startAt(go_s, &way->task);
   return isFreeLap(way->end_m, way);
 }
 
@@ -149,9 +152,7 @@ bool WayChooser::leaveAnyBay(Random* random, double aside_m, Way* way) const {
   }
   setPath(*path, way);
   const double go_s = random->uniform(0.0, 0.5 * std::min(own_car_.duration(), 30.0));
-  way->task.wanted_m_per_s = [go_s, speed = way->task.max_speed_m_per_s](int step) {
-    return SpeedSchedule::kStep_s * step < go_s ? 0.0 : speed;
-  };
+  startAt(go_s, &way->task);
   return isFreeFor(10.0, way);
 }
 

@@ -9,8 +9,8 @@
 
 namespace vcharge {
 
-/// What a mover is on the way for.
-enum class Purpose { kOwn, kCrossing, kApproaching };
+/// What a mover has to do with the own car.
+enum class Purpose { kNone, kCrossing, kApproaching };
 
 /// A mover with a path that is free of all that stands; its schedule is still to be found.
 struct Way {
@@ -22,7 +22,11 @@ struct Way {
     double time_s, along_m;
   };
   std::optional<Crossing> crossing;
-  double own_clearance_m = kOwnClearance_m;
+  Purpose purpose = Purpose::kNone;
+  /// Distance kept from the own car's footprint.
+  double ownClearance_m() const {
+    return purpose == Purpose::kApproaching ? kApproachClearance_m : kOwnClearance_m;
+  }
 };
 
 /// Chooses at random what movers are and where they go.
