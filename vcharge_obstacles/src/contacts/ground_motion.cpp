@@ -22,6 +22,20 @@ constexpr double kRotation_rad = 0.004, kTranslation_m = 0.005, kTranslationPerT
 
 }  // namespace
 
+std::vector<RayPair> rayPairsSince(Timestamp before, const std::vector<PointTrack>& tracks,
+                                   const Eigen::Quaterniond& vehicle_from_camera) {
+  std::vector<RayPair> pairs;
+  for (const PointTrack& track : tracks) {
+    for (const PointObservation& observation : track) {
+      if (observation.stamp == before) {
+        pairs.push_back({vehicle_from_camera * track.back().ray_in_camera,
+                         vehicle_from_camera * observation.ray_in_camera});
+      }
+    }
+  }
+  return pairs;
+}
+
 RigidTransform fitGroundMotion(const RigidTransform& before_from_now, const std::vector<RayPair>& points,
                                const Eigen::Vector3d& camera_in_vehicle_m, double sigma_rad) {
   const double translation_sigma_m =

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "points/followed_points.h"
 #include "vcharge_core/motion/rigid_transform.h"
 
 namespace vcharge {
@@ -12,6 +13,10 @@ namespace vcharge {
 struct RayPair {
   Eigen::Vector3d now, before;
 };
+
+/// The rays of all points that were observed at a stamp too.
+std::vector<RayPair> rayPairsSince(Timestamp before, const std::vector<PointTrack>& tracks,
+                                   const Eigen::Quaterniond& vehicle_from_camera);
 
 /// Corrects the motion of the vehicle such that the points on the ground fit it, which wheel odometry alone
 /// does within a few pixels only: the body pitches, rolls and heaves. Points that are not on the ground are

@@ -19,7 +19,7 @@ constexpr size_t kMinPoints = 3;
 // Lower points may be edges of shadows on the ground, and groups that reach no higher than the second are.
 constexpr double kMinPointHeight_m = 0.15, kMinHeight_m = 0.4;
 // Errors of contacts are alike in successive images: each counts as this much less certain.
-constexpr double kCommonContact = 1.5;
+constexpr double kCommonContact = 3.0;
 // Velocities of points on outlines are between those of the object and of what is behind it: errors across
 // and along the view.
 constexpr double kAcross_m_per_s = 0.4, kAlong_m_per_s = 0.8;

@@ -10,7 +10,7 @@ namespace vcharge {
 namespace {
 
 // Standard deviation of the acceleration, in a second: a person walks on at much the same speed.
-constexpr double kAcceleration_m_per_s2 = 0.8;
+constexpr double kAcceleration_m_per_s2 = 0.5;
 // Largest squared Mahalanobis distance of a detection (four degrees of freedom, 99.9 %), and largest
 // distance.
 constexpr double kGate = 18.5, kMaxDistance_m = 2.0;

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
+#include <vector>
 
-#include "objects/body_match.h"
+#include "bodies/body_match.h"
 
 namespace vcharge {
 namespace {
@@ -17,7 +19,7 @@ constexpr double kSearch_m_per_s = 1.8, kMinCorrelation = 0.6;
 // Standard deviation of a bearing, in pixels: legs and arms swing.
 constexpr double kBearing_px = 1.0;
 // Contacts of successive images are alike: each counts as this much less certain.
-constexpr double kCommonContact = 1.5;
+constexpr double kCommonContact = 3.0;
 // Half the width, and the radius, of a person.
 constexpr double kHalfWidth_m = 0.15, kRadius_m = 0.25, kMaxPersonWidth_m = 1.2;
 // Ranges, relative to the expected one, at which something static would have to be to pass for the object;
@@ -28,6 +30,9 @@ constexpr double kMoving_px = 1.0;
 constexpr double kMoves = 0.4, kContradicts = -0.1;
 // Score from which a person's bearing is used, and its standard deviation across the view.
 constexpr double kPersonScore = 0.0, kPersonAcross_m = 0.12;
+// Log-odds of something no wider than a person, per score beyond that which people and other things have
+// alike, and their bound: scores of successive views are alike.
+constexpr double kPerScore = 0.3, kEvenScore = -0.5, kPersonVote = 0.3;
 
 class Follower {
  public:
@@ -52,6 +57,10 @@ class Follower {
       return;
     }
     filter_->addLikeness(object.index, found->score);
+    if (object.width_m < kMaxPersonWidth_m) {
+      filter_->vote(object.index,
+                    std::clamp(kPerScore * (found->score - kEvenScore), -kPersonVote, kPersonVote));
+    }
     if (found->score > kPersonScore) {
       Eigen::Vector4d row;
       row << now.across() / now.bearing.range_m, 0.0, 0.0;
@@ -138,6 +147,38 @@ void followObjects(const TwoViews& views, const GroundContact* contact, const Pe
   }
   for (const ObjectFilter::Expected& object : filter->expected()) {
     follower.look(object);
+  }
+}
+
+void followByStereo(const std::vector<PanoramaView>& views, const RigidTransform& fixed_from_vehicle,
+                    ObjectFilter* filter) {
+  const Eigen::Matrix2d rotation = fixed_from_vehicle.rotationMatrix().topLeftCorner<2, 2>();
+  for (const ObjectFilter::Expected& object : filter->expected()) {
+    const Eigen::Vector2d position_m =
+        rotation.transpose() * (object.position_m - fixed_from_vehicle.translation().head<2>());
+    std::vector<std::pair<double, const PanoramaView*>> seen;  // and the distance from the middle of the view
+    for (const PanoramaView& view : views) {
+      const Eigen::Vector2d offset = position_m - view.camera_in_vehicle_m.head<2>();
+      const double middle = 0.5 * (view.image.cols - 1);
+      const double aside = std::abs(view.panorama.columnOf(std::atan2(offset.y(), offset.x())) - middle);
+      if (aside < middle && offset.norm() > kMinRange_m && offset.norm() < kMaxRange_m) {
+        seen.emplace_back(aside, &view);
+      }
+    }
+    if (seen.size() < 2 || object.width_m > kMaxPersonWidth_m) {
+      continue;
+    }
+    std::sort(seen.begin(), seen.end());
+    const PanoramaView& first = *seen[0].second;
+    const Eigen::Vector2d offset = position_m - first.camera_in_vehicle_m.head<2>();
+    const BodyBearing expected{std::atan2(offset.y(), offset.x()), offset.norm()};
+    const std::optional<StereoRange> found =
+        matchBodyRange(first, *seen[1].second, expected, object.height_m);
+    if (found) {
+      Eigen::Vector4d row;
+      row << rotation * offset.normalized(), 0.0, 0.0;
+      filter->correct(object.index, found->range_m - expected.range_m, row, found->sigma_m);
+    }
   }
 }
 

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <vector>
+
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
+#include "bodies/body_stereo.h"
+#include "bodies/person_likeness.h"
 #include "contacts/ground_contact.h"
 #include "objects/object_filter.h"
-#include "objects/person_likeness.h"
 #include "points/panorama.h"
 #include "vcharge_core/motion/rigid_transform.h"
 
@@ -24,9 +27,13 @@ struct TwoViews {
 /// Measures the objects that the filter expects in a camera's view, without points to follow: the bearing at
 /// which the whole body is found again, and the contact with the ground below it. A bearing at which nothing
 /// static can be found makes an object more probable; one that contradicts its motion, less. `contact` is
-/// null if the ground was not compared. Each object is told how much it looks like a person; where it does,
-/// its bearing is that of the person.
+/// null if the ground was not compared. Each object is told how much it looks like a person, which makes a
+/// narrow one more or less probable; where it does, its bearing is that of the person.
 void followObjects(const TwoViews& views, const GroundContact* contact, const PersonLikeness& people,
                    ObjectFilter* filter);
+
+/// Measures the ranges of the objects that two cameras see at one stamp.
+void followByStereo(const std::vector<PanoramaView>& views, const RigidTransform& fixed_from_vehicle,
+                    ObjectFilter* filter);
 
 }  // namespace vcharge

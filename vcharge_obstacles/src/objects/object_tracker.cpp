@@ -8,13 +8,13 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "bodies/person_likeness.h"
 #include "contacts/ground_contact.h"
 #include "contacts/ground_motion.h"
 #include "objects/freestanding.h"
 #include "objects/object_detections.h"
 #include "objects/object_filter.h"
 #include "objects/object_following.h"
-#include "objects/person_likeness.h"
 #include "occupancy/known_obstacles.h"
 #include "points/followed_points.h"
 #include "points/panorama.h"
@@ -122,16 +122,9 @@ struct ObjectTracker::Camera {
   CameraMotion motion(const State& state) const;
   /// Motion of the vehicle since an image, such that the ground fits.
   RigidTransform groundMotion(Timestamp before, const RigidTransform& before_from_now) const {
-    std::vector<RayPair> rays;
-    for (const PointTrack& track : points.tracks()) {
-      for (const PointObservation& observation : track) {
-        if (observation.stamp == before) {
-          rays.push_back({vehicle_from_camera.rotation() * track.back().ray_in_camera,
-                          vehicle_from_camera.rotation() * observation.ray_in_camera});
-        }
-      }
-    }
-    return fitGroundMotion(before_from_now, rays, vehicle_from_camera.translation(), sigma_rad);
+    return fitGroundMotion(before_from_now,
+                           rayPairsSince(before, points.tracks(), vehicle_from_camera.rotation()),
+                           vehicle_from_camera.translation(), sigma_rad);
   }
 
   /// Whether a point still has the appearance of its first observation: others have slid along an edge.
@@ -373,6 +366,13 @@ void ObjectTracker::process(const ImageFrame& frame) {
     }
     cameras_[i]->follow(state_.get(), is_compared);
   }
+  std::vector<PanoramaView> views;
+  for (const std::unique_ptr<Camera>& camera : cameras_) {
+    if (camera && !camera->panorama_now.empty()) {
+      views.push_back({camera->panorama, camera->panorama_now, camera->vehicle_from_camera.translation()});
+    }
+  }
+  followByStereo(views, now, &state_->filter);
   state_->filter.finish();
   std::vector<TrackedObject> objects = state_->filter.objects();
   // While the vehicle stands, nothing static seems to move, and people may be in the map themselves.

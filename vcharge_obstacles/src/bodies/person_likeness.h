@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/objdetect.hpp>
 
-#include "objects/body_match.h"
+#include "bodies/body_match.h"
 #include "points/panorama.h"
 
 namespace vcharge {

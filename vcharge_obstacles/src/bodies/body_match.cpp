@@ -1,4 +1,4 @@
-#include "objects/body_match.h"
+#include "bodies/body_match.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "objects/person_likeness.h"
+#include "bodies/person_likeness.h"
 
 #include <algorithm>
 #include <limits>

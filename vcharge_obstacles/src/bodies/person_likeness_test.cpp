@@ -1,4 +1,4 @@
-#include "objects/person_likeness.h"
+#include "bodies/person_likeness.h"
 
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>

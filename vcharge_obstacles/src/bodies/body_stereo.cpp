@@ -1,0 +1,146 @@
+#include "bodies/body_stereo.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <opencv2/imgproc.hpp>
+
+namespace vcharge {
+namespace {
+
+// Ranges that are searched, relative to the expected one; least range from the second camera, and sine of the
+// angle between the lines of sight from which they tell a range.
+constexpr double kNearest = 0.78, kFarthest = 1.28, kMinRange_m = 1.0, kMinParallax = 0.1;
+// Part of a body that is compared, below its top: legs swing, and show what is behind them.
+constexpr double kWidth_m = 0.44, kBottom = 0.3, kMaxTop_m = 1.8;
+constexpr int kMinRows = 10;
+// Least correlation, and its least excess over that of all ranges beyond so many pixels of the second view.
+constexpr double kMinCorrelation = 0.45, kMinExcess = 0.1;
+constexpr int kPeak_px = 3;
+// Standard deviation in gray levels from which a part has texture.
+constexpr double kTexture = 3.0;
+// Pixels up or down that are searched: errors of the calibration.
+constexpr int kVertical_px = 1;
+// Errors of a match: in pixels, and since two cameras see two sides of a body.
+constexpr double kMatch_px = 0.7, kSides_m = 0.03;
+
+BodyBearing bearingOf(const PanoramaView& view, const Eigen::Vector2d& position_m) {
+  const Eigen::Vector2d offset = position_m - view.camera_in_vehicle_m.head<2>();
+  return {std::atan2(offset.y(), offset.x()), offset.norm()};
+}
+
+/// A part of a panorama, of which a pixel is `step` pixels, around a column, from a row downwards. Empty if a
+/// tenth of it is not visible, or without texture.
+cv::Mat cut(const PanoramaView& view, double column, double top_row, double step, const cv::Size& size) {
+  const double left = column - step * 0.5 * (size.width - 1);
+  if (left < 0.0 || top_row < 0.0 || left + step * (size.width - 1) > view.image.cols - 1.0 ||
+      top_row + step * (size.height - 1) > view.image.rows - 1.0) {
+    return {};
+  }
+  const cv::Matx23d panorama_from_part(step, 0.0, left, 0.0, step, top_row);
+  constexpr int kFlags = cv::INTER_LINEAR | cv::WARP_INVERSE_MAP;
+  cv::Mat part, mask;
+  cv::warpAffine(view.panorama.validMask(), mask, panorama_from_part, size, kFlags);
+  if (10 * cv::countNonZero(mask) < 9 * size.area()) {
+    return {};
+  }
+  cv::warpAffine(view.image, part, panorama_from_part, size, kFlags);
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(part, mean, deviation);
+  return deviation[0] < kTexture ? cv::Mat() : part;
+}
+
+/// Compares a body with a second view at any range.
+class RangeSweep {
+ public:
+  RangeSweep(const PanoramaView& first, const PanoramaView& second, const BodyBearing& expected,
+             double body_height_m)
+      : first_(first), second_(second), expected_(expected) {
+    const BodyBearing in_second = seenAt(expected.range_m);
+    parallax_ = std::abs(std::sin(in_second.azimuth_rad - expected.azimuth_rad));
+    if (parallax_ < kMinParallax || in_second.range_m < kMinRange_m) {
+      return;
+    }
+    pixel_m_ = std::max(expected.range_m * first.panorama.pixel_rad(),
+                        in_second.range_m * second.panorama.pixel_rad());
+    const double top_m = std::min(body_height_m, kMaxTop_m);
+    top_slope_ = (top_m - first.camera_in_vehicle_m.z()) / expected.range_m;
+    const cv::Size size(2 * static_cast<int>(0.5 * kWidth_m / pixel_m_) + 1,
+                        static_cast<int>((top_m - kBottom * body_height_m) / pixel_m_));
+    if (size.height >= kMinRows) {
+      body_ = cut(first, first.panorama.columnOf(expected.azimuth_rad), first.panorama.rowOf(top_slope_),
+                  pixel_m_ / (expected.range_m * first.panorama.pixel_rad()), size);
+    }
+    // Successive ranges differ by a pixel of the second view.
+    const double step = pixel_m_ / in_second.range_m / parallax_;
+    count_ = std::max(2 * kPeak_px + 3, static_cast<int>(std::log(kFarthest / kNearest) / step));
+  }
+
+  bool isPossible() const { return !body_.empty(); }
+  int count() const { return count_; }
+  double rangeAt(double index) const {
+    return expected_.range_m * kNearest * std::pow(kFarthest / kNearest, index / (count_ - 1.0));
+  }
+  /// Correlation at a range; -1 where the second view does not tell.
+  double compareAt(double range_m) const {
+    const BodyBearing seen = seenAt(range_m);
+    const double step =
+        pixel_m_ * range_m / expected_.range_m / (seen.range_m * second_.panorama.pixel_rad());
+    const double top_m = first_.camera_in_vehicle_m.z() + top_slope_ * range_m;
+    const double top_row = second_.panorama.rowOf((top_m - second_.camera_in_vehicle_m.z()) / seen.range_m);
+    const cv::Mat part =
+        cut(second_, second_.panorama.columnOf(seen.azimuth_rad), top_row - kVertical_px * step, step,
+            body_.size() + cv::Size(0, 2 * kVertical_px));
+    if (part.empty()) {
+      return -1.0;
+    }
+    cv::Mat correlations;
+    cv::matchTemplate(part, body_, correlations, cv::TM_CCOEFF_NORMED);
+    double best = 0.0;
+    cv::minMaxLoc(correlations, nullptr, &best);
+    return best;
+  }
+  double sigma_m() const { return std::hypot(kMatch_px * pixel_m_, kSides_m) / parallax_; }
+
+ private:
+  BodyBearing seenAt(double range_m) const {
+    const Eigen::Vector2d direction(std::cos(expected_.azimuth_rad), std::sin(expected_.azimuth_rad));
+    return bearingOf(second_, first_.camera_in_vehicle_m.head<2>() + range_m * direction);
+  }
+
+  const PanoramaView& first_;
+  const PanoramaView& second_;
+  const BodyBearing expected_;
+  double parallax_ = 0.0, pixel_m_ = 0.0, top_slope_ = 0.0;
+  int count_ = 0;
+  cv::Mat body_;
+};
+
+}  // namespace
+
+std::optional<StereoRange> matchBodyRange(const PanoramaView& first, const PanoramaView& second,
+                                          const BodyBearing& expected, double body_height_m) {
+  const RangeSweep sweep(first, second, expected, body_height_m);
+  if (!sweep.isPossible()) {
+    return std::nullopt;
+  }
+  std::vector<double> scores;
+  for (int i = 0; i < sweep.count(); ++i) {
+    scores.push_back(sweep.compareAt(sweep.rangeAt(i)));
+  }
+  const auto best = std::max_element(scores.begin(), scores.end());
+  if (best == scores.begin() || best + 1 == scores.end() || *best < kMinCorrelation) {
+    return std::nullopt;
+  }
+  for (auto score = scores.begin(); score != scores.end(); ++score) {
+    if (std::abs(score - best) > kPeak_px && *score > *best - kMinExcess) {
+      return std::nullopt;
+    }
+  }
+  const double before = *(best - 1), after = *(best + 1), curvature = before - 2.0 * *best + after;
+  const double fraction = curvature < 0.0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
+  return StereoRange{sweep.rangeAt(static_cast<double>(best - scores.begin()) + fraction), sweep.sigma_m()};
+}
+
+}  // namespace vcharge
