@@ -66,6 +66,24 @@ nlohmann::json crossingsToJson(const std::vector<Crossing>& crossings) {
   return list;
 }
 
+nlohmann::json approachesToJson(const std::vector<ObjectApproach>& approaches) {
+  nlohmann::json list = nlohmann::json::array();
+  size_t num_reported = 0;
+  for (const ObjectApproach& approach : approaches) {
+    num_reported += approach.reported ? 1 : 0;
+    list.push_back({{"object", approach.object},
+                    {"class", nameOf(approach.object_class)},
+                    {"stamp_ns", approach.stamp.nanoseconds()},
+                    {"reported", approach.reported},
+                    {"first_reported_m", approach.first_reported_m}});
+  }
+  if (!approaches.empty()) {
+    std::printf("approaches to the standing vehicle reported before 1.5 m: %zu of %zu\n", num_reported,
+                approaches.size());
+  }
+  return list;
+}
+
 nlohmann::json firstReportsToJson(const std::vector<FirstObjectReport>& reports) {
   nlohmann::json list = nlohmann::json::array();
   size_t num_never = 0;
@@ -108,6 +126,7 @@ nlohmann::json toJson(const ObjectErrors& errors) {
     json["by_distance"].push_back(entry);
   }
   json["crossings"] = crossingsToJson(errors.crossings);
+  json["approaches"] = approachesToJson(errors.approaches);
   json["first_reports"] = firstReportsToJson(errors.first_reports);
   std::printf("false objects: %zu, %.2f per minute\n", errors.false_objects.size(),
               errors.false_per_minute());

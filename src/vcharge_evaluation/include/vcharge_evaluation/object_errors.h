@@ -70,6 +70,16 @@ struct Crossing {
   bool kept() const { return 2 * num_found >= num_due && ids.size() == 1; }
 };
 
+/// A true object that came nearer than 1.5 m to the vehicle, which stood, after it had been farther than 2 m
+/// and in sight for at least 0.5 s.
+struct ObjectApproach {
+  uint32_t object = 0;
+  ObjectClass object_class = ObjectClass::kUnknown;
+  Timestamp stamp;                ///< first image in which it is that near
+  bool reported = false;          ///< in an earlier image, of the last 0.5 s
+  double first_reported_m = 0.0;  ///< distance of the first report since it came into sight; 0 without one
+};
+
 /// How soon a true object that was ever due was found.
 struct FirstObjectReport {
   uint32_t object = 0;
@@ -97,6 +107,7 @@ struct ObjectErrors {
   };
   std::vector<DistanceBin> by_distance;
   std::vector<Crossing> crossings;
+  std::vector<ObjectApproach> approaches;
   std::vector<FirstObjectReport> first_reports;
   std::vector<FalseObject> false_objects;
   /// Squares of the centres' errors by the reported covariances; means of 2 are honest. At most
@@ -138,6 +149,8 @@ class ObjectEvaluator {
   std::vector<const Body*> assign(const std::vector<Body>& movers, const std::vector<Body>& reports) const;
   Eigen::Vector2d nearestToVehicle(const Body& body, const Body& mover) const;
   void judgeMover(const Body& mover, const Body* report, Track* track);
+  bool vehicleStands(const RigidTransform& world_from_vehicle);
+  void judgeApproach(const Body& mover, bool is_reported, Track* track);
   void countFalse(const std::vector<Body>& reports, const std::vector<Body>& movers);
   ObjectFigures figuresOf(const std::function<bool(const Sample&)>& isChosen) const;
 
@@ -147,6 +160,9 @@ class ObjectEvaluator {
   std::map<uint32_t, Track> tracks_;
   std::vector<Sample> samples_;
   std::vector<Crossing> crossings_;
+  std::vector<ObjectApproach> approaches_;
+  std::optional<Eigen::Vector2d> vehicle_m_;  // in the world, where it has stood since stands_since_
+  Timestamp stands_since_;
   std::map<uint32_t, FalseObject> unmatched_;
 };
 

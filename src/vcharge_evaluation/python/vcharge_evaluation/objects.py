@@ -13,6 +13,7 @@ DRIVES = ("movers_lot", "movers_garage", "movers_crossing", "standing_lot", "sta
 MOVERS = {"bay_backwards_lot": {"people": 6, "children": 3, "cars": 2, "bicycles": 2}}
 CONDITIONS = ("noon", "dusk", "wet")
 LEAST_PERCENT = 90
+LEAST_APPROACHES_PERCENT = 98
 FOUND, GOOD, KEPT = "found, of those due", "within 0.3 m and 0.3 m/s", "crossings that keep one id"
 NEAREST_ERROR, VELOCITY_ERROR = "position error of the nearest point", "velocity error"
 MISSED_M, MISSED_M_PER_S = 1.0, 1.0  # errors with which evaluate_objects counts a missed object
@@ -69,6 +70,14 @@ def drive_figures(errors):
     """The bars first."""
     yield from bar_figures(errors["all"])
     yield part(KEPT, sum(one["kept"] for one in errors["crossings"]), len(errors["crossings"]), at_least=LEAST_PERCENT)
+    approaches = errors["approaches"]
+    if approaches:
+        yield part("approaches to the standing vehicle reported before 1.5 m", sum(one["reported"] for one in approaches),
+                   len(approaches), at_least=LEAST_APPROACHES_PERCENT)
+        yield Figure("approaches", len(approaches))
+        firsts = sorted(one["first_reported_m"] for one in approaches)
+        yield Figure("first reported at, median", quantile(firsts, 0.5), "m")
+        yield Figure("first reported at, nearest", firsts[0], "m")
     yield figure("false objects a minute", errors["false_per_minute"], at_most=1)
     yield from error_figures(errors["all"])
     delays = sorted(one["delay_s"] for one in errors["first_reports"])

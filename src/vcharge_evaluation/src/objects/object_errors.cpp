@@ -14,6 +14,7 @@ namespace vcharge {
 namespace {
 
 constexpr Duration kSpeedTime(500'000'000), kVisibleTime(500'000'000), kCrossingTime(1'000'000'000);
+constexpr double kApproached_m = 1.5, kAway_m = 2.0, kStanding_m = 0.02;
 constexpr double kMissedVelocity_m_per_s = 1.0;
 constexpr size_t kMinFalseFrames = 3;
 constexpr double kFalseDistance_m = 1.0;
@@ -56,7 +57,10 @@ struct ObjectEvaluator::Track {
   std::optional<Timestamp> moving_since;  // first image in which it moves, visible and near
   std::optional<Timestamp> found;
   bool was_due = false;
-  Crossing crossing;  // has no images while the object is not due
+  bool was_away = false;                   // farther than kAway_m since it was last near
+  std::optional<Timestamp> reported;       // last image with a report
+  std::optional<double> first_reported_m;  // since it came into sight
+  Crossing crossing;                       // has no images while the object is not due
 
   /// Mean speed over the last kSpeedTime; 0 while less time is known.
   double addPosition(Timestamp stamp, const Eigen::Vector2d& position_m) {
@@ -183,6 +187,7 @@ void ObjectEvaluator::add(const TrueObjectFrame& truth, const ObjectFrame& repor
     }
   }
   stamps_.push_back(truth.stamp);
+  const bool stands = vehicleStands(truth.world_from_vehicle);
   for (size_t i = 0; i < movers.size(); ++i) {
     Track& track = tracks_[movers[i].object->id];
     track.object_class = movers[i].object->object_class;
@@ -191,6 +196,13 @@ void ObjectEvaluator::add(const TrueObjectFrame& truth, const ObjectFrame& repor
     const bool is_near = truth.visible_fraction[i] >= options_.min_visible_fraction &&
                          movers[i].distance_m <= options_.max_distance_m;
     track.near_since = is_near ? track.near_since.value_or(truth.stamp) : std::optional<Timestamp>();
+    if (stands && is_near) {
+      judgeApproach(movers[i], report_of[i] != nullptr, &track);
+    } else {
+      track.was_away = false;
+      track.reported.reset();
+      track.first_reported_m.reset();
+    }
     if (is_near && !movers[i].object->is_standing) {
       track.moving_since = track.moving_since.value_or(truth.stamp);
     }
@@ -205,6 +217,33 @@ void ObjectEvaluator::add(const TrueObjectFrame& truth, const ObjectFrame& repor
     }
   }
   countFalse(reports, movers);
+}
+
+/// Whether the vehicle has stood for kSpeedTime.
+bool ObjectEvaluator::vehicleStands(const RigidTransform& world_from_vehicle) {
+  const Eigen::Vector2d position_m = world_from_vehicle.translation().head<2>();
+  if (!vehicle_m_ || (position_m - *vehicle_m_).norm() > kStanding_m) {
+    vehicle_m_ = position_m;
+    stands_since_ = stamps_.back();
+  }
+  return stamps_.back() - stands_since_ >= kSpeedTime;
+}
+
+/// A mover in sight of the standing vehicle.
+void ObjectEvaluator::judgeApproach(const Body& mover, bool is_reported, Track* track) {
+  const Timestamp stamp = stamps_.back();
+  if (mover.distance_m < kApproached_m && track->was_away) {
+    const bool was_reported = track->reported && stamp - *track->reported <= kVisibleTime;
+    approaches_.push_back(
+        {mover.object->id, track->object_class, stamp, was_reported, track->first_reported_m.value_or(0.0)});
+    track->was_away = false;
+  } else if (mover.distance_m > kAway_m && stamp - *track->near_since >= kVisibleTime) {
+    track->was_away = true;
+  }
+  if (is_reported) {
+    track->reported = stamp;
+    track->first_reported_m = track->first_reported_m.value_or(mover.distance_m);
+  }
 }
 
 void ObjectEvaluator::judgeMover(const Body& mover, const Body* report, Track* track) {
@@ -311,6 +350,7 @@ ObjectErrors ObjectEvaluator::errors() const {
   if (worst != sums.end()) {
     errors.worst = worst->first;
   }
+  errors.approaches = approaches_;
   errors.crossings = crossings_;
   for (const auto& [id, track] : tracks_) {
     track.addCrossing(&errors.crossings);
