@@ -29,10 +29,10 @@ constexpr double kMoving_px = 1.0;
 // Log-odds for an object that is seen to move, and that was measured where it is not expected.
 constexpr double kMoves = 0.4, kContradicts = -0.1;
 // Score from which a person's bearing is used, and its standard deviation across the view.
-constexpr double kPersonScore = 0.0, kPersonAcross_m = 0.12;
+constexpr double kPersonScore = -0.2, kPersonAcross_m = 0.08;
 // Log-odds of something no wider than a person, per score beyond that which people and other things have
 // alike, and their bound: scores of successive views are alike.
-constexpr double kPerScore = 0.3, kEvenScore = -0.5, kPersonVote = 0.3;
+constexpr double kPerScore = 0.4, kEvenScore = -0.3, kPersonVote = 0.4;
 
 class Follower {
  public:
