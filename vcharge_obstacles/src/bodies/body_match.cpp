@@ -5,20 +5,25 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "bodies/body_part.h"
+
 namespace vcharge {
 namespace {
 
 // Part of a body that is compared: the torso, and the legs but the feet.
 constexpr double kWidth_m = 0.44, kBottom_m = 0.15, kMaxTop_m = 1.6;
 constexpr int kMinWidth_px = 7, kMinHeight_px = 10, kMinSearch_px = 2;
-// Standard deviation in gray levels from which a body has texture.
-constexpr double kTexture = 3.0;
 
 bool isVisible(const cv::Mat& mask) {
   return cv::countNonZero(mask) == mask.rows * mask.cols;
 }
 
 }  // namespace
+
+BodyBearing bearingFrom(const Eigen::Vector2d& camera_m, const Eigen::Vector2d& position_m) {
+  const Eigen::Vector2d offset = position_m - camera_m;
+  return {std::atan2(offset.y(), offset.x()), offset.norm()};
+}
 
 std::optional<BodyMatch> matchBody(const Panorama& panorama, const cv::Mat& before, const cv::Mat& now,
                                    const BodyBearing& seen_before, const BodyBearing& expected_now,
@@ -47,9 +52,7 @@ std::optional<BodyMatch> matchBody(const Panorama& panorama, const cv::Mat& befo
   cv::Mat body, mask, scores;
   cv::warpAffine(before, body, before_from_part, part.size(), kFlags);
   cv::warpAffine(panorama.validMask(), mask, before_from_part, part.size(), kFlags);
-  cv::Scalar mean, deviation;
-  cv::meanStdDev(body, mean, deviation);
-  if (!isVisible(mask) || deviation[0] < kTexture) {
+  if (!isVisible(mask) || !hasTexture(body)) {
     return std::nullopt;
   }
   cv::matchTemplate(now(searched), body, scores, cv::TM_CCOEFF_NORMED);
@@ -60,8 +63,7 @@ std::optional<BodyMatch> matchBody(const Panorama& panorama, const cv::Mat& befo
     return std::nullopt;  // the maximum may lie beyond
   }
   const double left = scores.at<float>(0, at.x - 1), right = scores.at<float>(0, at.x + 1);
-  const double curvature = left - 2.0 * best + right;
-  const double fraction = curvature < 0.0 ? std::clamp(0.5 * (left - right) / curvature, -0.5, 0.5) : 0.0;
+  const double fraction = peakOffset(left, best, right);
   const double column = panorama.columnOf(expected_now.azimuth_rad) - middle;  // of the body in its part
   return BodyMatch{(column - (at.x - search) - fraction) * pixel_rad, best};   // columns run clockwise
 }

@@ -2,6 +2,7 @@
 
 #include <optional>
 
+#include <Eigen/Core>
 #include <opencv2/core.hpp>
 
 #include "points/panorama.h"
@@ -13,6 +14,9 @@ namespace vcharge {
 struct BodyBearing {
   double azimuth_rad = 0.0, range_m = 0.0;
 };
+
+/// The bearing of a position from a camera, both in the vehicle's axes.
+BodyBearing bearingFrom(const Eigen::Vector2d& camera_m, const Eigen::Vector2d& position_m);
 
 struct BodyMatch {
   double shift_rad = 0.0;    ///< azimuth beyond the expected one

@@ -1,6 +1,5 @@
 #include "bodies/body_match.h"
 
-#include <cmath>
 #include <optional>
 
 #include <gtest/gtest.h>
@@ -17,9 +16,7 @@ constexpr double kHeight_m = 0.7;
 class BodyMatchTest : public testing::Test {
  protected:
   BodyBearing bearingAt(const Eigen::Vector2d& position_m) const {
-    const Eigen::Vector2d from_camera =
-        position_m - rig_.cameras[0].vehicle_from_camera->translation().head<2>();
-    return {std::atan2(from_camera.y(), from_camera.x()), from_camera.norm()};
+    return bearingFrom(rig_.cameras[0].vehicle_from_camera->translation().head<2>(), position_m);
   }
   cv::Mat see(const UprightCylinder& person, double time_s) const {
     MovingWorld world;

@@ -6,6 +6,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "bodies/body_part.h"
+
 namespace vcharge {
 namespace {
 
@@ -18,17 +20,10 @@ constexpr int kMinRows = 10;
 // Least correlation, and its least excess over that of all ranges beyond so many pixels of the second view.
 constexpr double kMinCorrelation = 0.45, kMinExcess = 0.1;
 constexpr int kPeak_px = 3;
-// Standard deviation in gray levels from which a part has texture.
-constexpr double kTexture = 3.0;
 // Pixels up or down that are searched: errors of the calibration.
 constexpr int kVertical_px = 1;
 // Errors of a match: in pixels, and since two cameras see two sides of a body.
 constexpr double kMatch_px = 0.7, kSides_m = 0.03;
-
-BodyBearing bearingOf(const PanoramaView& view, const Eigen::Vector2d& position_m) {
-  const Eigen::Vector2d offset = position_m - view.camera_in_vehicle_m.head<2>();
-  return {std::atan2(offset.y(), offset.x()), offset.norm()};
-}
 
 /// A part of a panorama, of which a pixel is `step` pixels, around a column, from a row downwards. Empty if a
 /// tenth of it is not visible, or without texture.
@@ -46,9 +41,7 @@ cv::Mat cut(const PanoramaView& view, double column, double top_row, double step
     return {};
   }
   cv::warpAffine(view.image, part, panorama_from_part, size, kFlags);
-  cv::Scalar mean, deviation;
-  cv::meanStdDev(part, mean, deviation);
-  return deviation[0] < kTexture ? cv::Mat() : part;
+  return hasTexture(part) ? part : cv::Mat();
 }
 
 /// Compares a body with a second view at any range.
@@ -106,7 +99,8 @@ class RangeSweep {
  private:
   BodyBearing seenAt(double range_m) const {
     const Eigen::Vector2d direction(std::cos(expected_.azimuth_rad), std::sin(expected_.azimuth_rad));
-    return bearingOf(second_, first_.camera_in_vehicle_m.head<2>() + range_m * direction);
+    return bearingFrom(second_.camera_in_vehicle_m.head<2>(),
+                       first_.camera_in_vehicle_m.head<2>() + range_m * direction);
   }
 
   const PanoramaView& first_;
@@ -138,9 +132,8 @@ std::optional<StereoRange> matchBodyRange(const PanoramaView& first, const Panor
       return std::nullopt;
     }
   }
-  const double before = *(best - 1), after = *(best + 1), curvature = before - 2.0 * *best + after;
-  const double fraction = curvature < 0.0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
-  return StereoRange{sweep.rangeAt(static_cast<double>(best - scores.begin()) + fraction), sweep.sigma_m()};
+  const double index = static_cast<double>(best - scores.begin()) + peakOffset(best[-1], *best, best[1]);
+  return StereoRange{sweep.rangeAt(index), sweep.sigma_m()};
 }
 
 }  // namespace vcharge

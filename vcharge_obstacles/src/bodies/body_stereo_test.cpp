@@ -1,6 +1,5 @@
 #include "bodies/body_stereo.h"
 
-#include <cmath>
 #include <optional>
 
 #include <gtest/gtest.h>
@@ -38,9 +37,10 @@ class BodyStereoTest : public testing::Test {
   }
   /// The bearing of a position from the front camera, with an error of the range.
   BodyBearing expect(const Eigen::Vector2d& position_m, double factor) const {
-    const Eigen::Vector2d offset =
-        position_m - front_.rig_camera.vehicle_from_camera->translation().head<2>();
-    return {std::atan2(offset.y(), offset.x()), factor * offset.norm()};
+    BodyBearing bearing =
+        bearingFrom(front_.rig_camera.vehicle_from_camera->translation().head<2>(), position_m);
+    bearing.range_m *= factor;
+    return bearing;
   }
   void see(const MovingWorld& world) {
     front_.see(world);

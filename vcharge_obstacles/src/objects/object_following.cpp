@@ -154,29 +154,32 @@ void followByStereo(const std::vector<PanoramaView>& views, const RigidTransform
                     ObjectFilter* filter) {
   const Eigen::Matrix2d rotation = fixed_from_vehicle.rotationMatrix().topLeftCorner<2, 2>();
   for (const ObjectFilter::Expected& object : filter->expected()) {
+    if (object.width_m > kMaxPersonWidth_m) {
+      continue;
+    }
     const Eigen::Vector2d position_m =
         rotation.transpose() * (object.position_m - fixed_from_vehicle.translation().head<2>());
     std::vector<std::pair<double, const PanoramaView*>> seen;  // and the distance from the middle of the view
     for (const PanoramaView& view : views) {
-      const Eigen::Vector2d offset = position_m - view.camera_in_vehicle_m.head<2>();
+      const BodyBearing bearing = bearingFrom(view.camera_in_vehicle_m.head<2>(), position_m);
       const double middle = 0.5 * (view.image.cols - 1);
-      const double aside = std::abs(view.panorama.columnOf(std::atan2(offset.y(), offset.x())) - middle);
-      if (aside < middle && offset.norm() > kMinRange_m && offset.norm() < kMaxRange_m) {
+      const double aside = std::abs(view.panorama.columnOf(bearing.azimuth_rad) - middle);
+      if (aside < middle && bearing.range_m > kMinRange_m && bearing.range_m < kMaxRange_m) {
         seen.emplace_back(aside, &view);
       }
     }
-    if (seen.size() < 2 || object.width_m > kMaxPersonWidth_m) {
+    if (seen.size() < 2) {
       continue;
     }
     std::sort(seen.begin(), seen.end());
     const PanoramaView& first = *seen[0].second;
-    const Eigen::Vector2d offset = position_m - first.camera_in_vehicle_m.head<2>();
-    const BodyBearing expected{std::atan2(offset.y(), offset.x()), offset.norm()};
+    const Eigen::Vector2d camera_m = first.camera_in_vehicle_m.head<2>();
+    const BodyBearing expected = bearingFrom(camera_m, position_m);
     const std::optional<StereoRange> found =
         matchBodyRange(first, *seen[1].second, expected, object.height_m);
     if (found) {
       Eigen::Vector4d row;
-      row << rotation * offset.normalized(), 0.0, 0.0;
+      row << rotation * (position_m - camera_m).normalized(), 0.0, 0.0;
       filter->correct(object.index, found->range_m - expected.range_m, row, found->sigma_m);
     }
   }

@@ -1,7 +1,5 @@
 #include "vcharge_evaluation/object_errors.h"
 
-#include <cmath>
-
 #include <gtest/gtest.h>
 
 #include "objects/object_errors_fixture.h"
@@ -25,7 +23,7 @@ TEST_F(ObjectApproachesTest, ApproachesToTheStandingVehicleAreCounted) {
       approach(index, &frame->truth);
       frame->reports.clear();
       if (index >= 8 && index <= last_report) {
-        frame->reports = {transformed(frame->truth.objects[0], RigidTransform())};
+        frame->reports = frame->truth.objects;
       }
     });
     ASSERT_EQ(errors.approaches.size(), 1U);

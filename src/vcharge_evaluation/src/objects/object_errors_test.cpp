@@ -1,8 +1,5 @@
 #include "vcharge_evaluation/object_errors.h"
 
-#include <cmath>
-#include <functional>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
