@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include "objects/moving_world.h"
-#include "vcharge_core/camera/working_camera.h"
 
 namespace vcharge {
 namespace {
@@ -21,12 +20,10 @@ class BodyMatchTest : public testing::Test {
   cv::Mat see(const UprightCylinder& person, double time_s) const {
     MovingWorld world;
     world.cylinders = {person};
-    return panorama_.render(camera_.undistort(world.render(rig_.cameras[0], RigidTransform(), time_s)));
+    return panorama_.render(world.render(rig_.cameras[0], RigidTransform(), time_s));
   }
   const CameraRig rig_ = makeFrontRig(kHeight_m);
-  const WorkingCamera camera_{rig_.cameras[0].model, rig_.cameras[0].image_size_px,
-                              rig_.cameras[0].field_of_view_rad, rig_.cameras[0].mask};
-  const Panorama panorama_{camera_, *rig_.cameras[0].vehicle_from_camera};
+  const Panorama panorama_{rig_.cameras[0]};
 };
 
 TEST_F(BodyMatchTest, FindsHowFarAPersonHasGone) {

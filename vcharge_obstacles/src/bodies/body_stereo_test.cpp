@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include "objects/moving_world.h"
-#include "vcharge_core/camera/working_camera.h"
 
 namespace vcharge {
 namespace {
@@ -14,16 +13,12 @@ namespace {
 class BodyStereoTest : public testing::Test {
  protected:
   struct Eye {
-    explicit Eye(const RigCamera& camera)
-        : rig_camera(camera),
-          working(camera.model, camera.image_size_px, camera.field_of_view_rad, camera.mask),
-          panorama(working, *camera.vehicle_from_camera) {}
+    explicit Eye(const RigCamera& camera) : rig_camera(camera), panorama(camera) {}
     void see(const MovingWorld& world) {
-      image = panorama.render(working.undistort(world.render(rig_camera, RigidTransform(), 0.0)));
+      image = panorama.render(world.render(rig_camera, RigidTransform(), 0.0));
     }
     PanoramaView view() const { return {panorama, image, rig_camera.vehicle_from_camera->translation()}; }
     const RigCamera rig_camera;
-    const WorkingCamera working;
     const Panorama panorama;
     cv::Mat image;
   };

@@ -14,9 +14,7 @@ class PersonLikenessTest : public testing::Test {
  protected:
   PersonLikenessTest()
       : camera_(makeFrontRig(kCameraHeight_m).cameras.front()),
-        working_(camera_.model, camera_.image_size_px, camera_.field_of_view_rad, camera_.mask,
-                 WorkingCameraOptions()),
-        panorama_(working_, *camera_.vehicle_from_camera),
+        panorama_(camera_),
         image_(panorama_.validMask().size(), CV_8UC1, cv::Scalar(150)) {}
 
   cv::Point at(double across_m, double height_m) const {
@@ -40,7 +38,6 @@ class PersonLikenessTest : public testing::Test {
   }
 
   const RigCamera camera_;
-  const WorkingCamera working_;
   const Panorama panorama_;
   cv::Mat image_;
 };

@@ -98,13 +98,14 @@ struct ObjectTracker::Camera {
         sigma_rad(kTracking_px * M_SQRT2 / focal_px),
         points(working, vehicle_from_camera),
         contact(working, vehicle_from_camera, options.max_range_m),
-        panorama(working, vehicle_from_camera) {}
+        panorama(camera) {}
 
-  void add(Timestamp stamp, const cv::Mat& image, const RigidTransform& previous_from_now) {
+  void add(Timestamp stamp, const cv::Mat& sensor_image, const RigidTransform& previous_from_now) {
+    const cv::Mat image = working.undistort(sensor_image);
     points.add(stamp, image, previous_from_now);
     images.emplace_back(stamp, image);
     panorama_before = panorama_now;
-    panorama_now = panorama.render(image);
+    panorama_now = panorama.render(sensor_image);
     while (toSeconds(stamp - images.front().first) > kCompareInterval_s) {
       images.pop_front();
     }
@@ -343,7 +344,7 @@ void ObjectTracker::process(const ImageFrame& frame) {
       camera->clear();
       continue;
     }
-    camera->add(frame.stamp, camera->working.undistort(frame.images[i].pixels), previous_from_now);
+    camera->add(frame.stamp, frame.images[i].pixels, previous_from_now);
     judged[i] = camera->judge(*state_);
     for (const JudgedPoint& point : judged[i]) {
       equations.push_back(point.equation);

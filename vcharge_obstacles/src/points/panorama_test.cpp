@@ -14,22 +14,17 @@ class PanoramaTest : public testing::Test {
  protected:
   static constexpr double kHeight_m = 0.7;
   const CameraRig rig_ = makeFrontRig(kHeight_m);
-  const RigidTransform vehicle_from_camera_ = *rig_.cameras[0].vehicle_from_camera;
-  const WorkingCamera camera_{rig_.cameras[0].model, rig_.cameras[0].image_size_px,
-                              rig_.cameras[0].field_of_view_rad, rig_.cameras[0].mask, [] {
-                                WorkingCameraOptions options;
-                                options.image_scale = 1.0;
-                                return options;
-                              }()};
-  const Panorama panorama_{camera_, vehicle_from_camera_};
+  const RigCamera& camera_ = rig_.cameras[0];
+  const Panorama panorama_{camera_};
 };
 
 TEST_F(PanoramaTest, ColumnsAreAzimuthsAndRowsAreSlopes) {
   for (const Eigen::Vector3d& from_camera :
        {Eigen::Vector3d(5.0, 0.0, 0.0), Eigen::Vector3d(3.0, 2.0, 0.8), Eigen::Vector3d(2.0, -4.0, -0.7)}) {
     Eigen::Vector2d pixel;
-    ASSERT_TRUE(camera_.model().project(vehicle_from_camera_.rotation().conjugate() * from_camera, &pixel));
-    cv::Mat image = cv::Mat::zeros(camera_.size(), CV_8UC1);
+    ASSERT_TRUE(
+        camera_.model.project(camera_.vehicle_from_camera->rotation().conjugate() * from_camera, &pixel));
+    cv::Mat image = cv::Mat::zeros(camera_.image_size_px, CV_8UC1);
     cv::circle(image, cv::Point(cvRound(pixel.x()), cvRound(pixel.y())), 3, cv::Scalar(255), cv::FILLED);
     const cv::Moments found = cv::moments(panorama_.render(image), true);
     ASSERT_GT(found.m00, 0.0);
@@ -39,7 +34,7 @@ TEST_F(PanoramaTest, ColumnsAreAzimuthsAndRowsAreSlopes) {
 }
 
 TEST_F(PanoramaTest, WhatTheCameraDoesNotSeeIsInvalidAndBlack) {
-  const cv::Mat panorama = panorama_.render(cv::Mat(camera_.size(), CV_8UC1, cv::Scalar(200)));
+  const cv::Mat panorama = panorama_.render(cv::Mat(camera_.image_size_px, CV_8UC1, cv::Scalar(200)));
   ASSERT_EQ(panorama.size(), panorama_.validMask().size());
   EXPECT_EQ(cv::countNonZero((panorama_.validMask() == 0) & (panorama > 200)), 0);
   EXPECT_EQ(cv::countNonZero((panorama_.validMask() != 0) & (panorama == 0)), 0);
