@@ -16,16 +16,16 @@ constexpr double kMinRange_m = 0.6, kMaxRange_m = 12.0;
 // Difference from the expected speed across the view up to which a body is searched, and its least
 // correlation.
 constexpr double kSearch_m_per_s = 1.8, kMinCorrelation = 0.6;
-// Standard deviation of a bearing, in pixels: legs and arms swing.
-constexpr double kBearing_px = 1.0;
+// Standard deviation of a bearing: legs and arms swing.
+constexpr double kBearing_rad = 0.005;
 // Contacts of successive images are alike: each counts as this much less certain.
 constexpr double kCommonContact = 3.0;
 // Half the width, and the radius, of a person.
 constexpr double kHalfWidth_m = 0.15, kRadius_m = 0.25, kMaxPersonWidth_m = 1.2;
 // Ranges, relative to the expected one, at which something static would have to be to pass for the object;
-// the excess, in pixels, from which it cannot.
+// the excess from which it cannot.
 constexpr double kStaticRanges[] = {0.7, 1.0, 1.4};
-constexpr double kMoving_px = 1.0;
+constexpr double kMoving_rad = 0.005;
 // Log-odds for an object that is seen to move, and that was measured where it is not expected.
 constexpr double kMoves = 0.4, kContradicts = -0.1;
 // Score from which a person's bearing is used, and its standard deviation across the view.
@@ -95,7 +95,7 @@ class Follower {
     Eigen::Vector4d row;
     row << now.across() / now.bearing.range_m - before.across() / before.bearing.range_m,
         views_.step_s / before.bearing.range_m * before.across();
-    if (!filter_->correct(object.index, match->shift_rad, row, kBearing_px * views_.panorama.pixel_rad())) {
+    if (!filter_->correct(object.index, match->shift_rad, row, kBearing_rad)) {
       return kContradicts;
     }
     double low_rad = std::numeric_limits<double>::infinity(), high_rad = -low_rad;
@@ -109,7 +109,7 @@ class Follower {
       high_rad = std::max(high_rad, shift_rad);
     }
     const double excess_rad = std::max(low_rad - match->shift_rad, match->shift_rad - high_rad);
-    return excess_rad > kMoving_px * views_.panorama.pixel_rad() ? kMoves : 0.0;
+    return excess_rad > kMoving_rad ? kMoves : 0.0;
   }
 
   double findContact(const ObjectFilter::Expected& object, const Seen& now) const {
