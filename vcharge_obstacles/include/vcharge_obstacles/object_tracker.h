@@ -36,6 +36,7 @@ struct ObjectTrackerOptions {
 ///  1. Points are followed through the images of each camera for 0.4 s.
 ///  2. A rotation of the body that the wheels did not measure is estimated from all of them.
 ///  3. A point moves if no static point on or above the ground explains its two rays within their errors.
+///     Where the ground mirrors, static points below it are reflections.
 ///  4. Moving points are set on the ground where the image, compared with an earlier one that is warped by
 ///     the ground plane, begins to differ below them.
 ///  5. Groups of points get a position, a velocity and their covariances.

@@ -20,6 +20,9 @@ constexpr float kTexture = 2.5F, kSame = 0.7F, kOther = 0.5F;
 // Windows without texture show the ground if their brightness differs by less than this, absolute and
 // relative.
 constexpr float kSameBrightness = 6.0F, kSameBrightnessRatio = 0.06F;
+// Inverse ranges, relative to that of the ground, at which reflections are searched: trees and clouds are far
+// away, and cars about as far behind the ground as before it.
+constexpr float kMirrorDepths[] = {0.0F, 0.33F, 0.67F};
 // Number of bins below a contact that must show ground, and their least mean label.
 constexpr int kGroundBins = 10;
 constexpr double kMinGround = 0.4;
@@ -83,10 +86,14 @@ int GroundContact::sectorOf(double azimuth_rad) const {
   return (sector % kNumSectors + kNumSectors) % kNumSectors;
 }
 
-cv::Mat GroundContact::warpOf(const RigidTransform& before_from_now) const {
+cv::Mat GroundContact::warpOf(const RigidTransform& before_from_now, float inverse_range_part) const {
   const RigidTransform camera_from_now = vehicle_from_camera_.inverse() * before_from_now;
   const Eigen::Matrix3f rotation = camera_from_now.rotationMatrix().cast<float>();
-  const Eigen::Vector3f translation = camera_from_now.translation().cast<float>();
+  // Points deeper than the ground by the reciprocal of the part, seen from the camera now, up to a factor.
+  const Eigen::Vector3f translation =
+      (camera_from_now.translation() -
+       (1.0 - inverse_range_part) * (camera_from_now * vehicle_from_camera_.translation()))
+          .cast<float>();
   const MeiCamera& model = camera_.model();
   const auto xi = static_cast<float>(model.xi());
   const auto gamma1 = static_cast<float>(model.gamma1()), gamma2 = static_cast<float>(model.gamma2());
@@ -112,13 +119,27 @@ cv::Mat GroundContact::warpOf(const RigidTransform& before_from_now) const {
   return map;
 }
 
-void GroundContact::compare(const cv::Mat& now, const cv::Mat& before,
-                            const RigidTransform& before_from_now) {
+void GroundContact::compare(const cv::Mat& now, const cv::Mat& before, const RigidTransform& before_from_now,
+                            bool is_mirror) {
   labels_ = cv::Mat::zeros(now.size(), CV_8SC1);
   if (rows_.empty()) {
     return;
   }
-  const cv::Mat map = warpOf(before_from_now);
+  labelGround(now, before, warpOf(before_from_now, 1.0F), &labels_);
+  if (!is_mirror) {
+    return;
+  }
+  // What is static and deeper than the ground is a reflection: the ground is visible there too.
+  for (const float part : kMirrorDepths) {
+    cv::Mat labels = cv::Mat::zeros(now.size(), CV_8SC1);
+    labelGround(now, before, warpOf(before_from_now, part), &labels);
+    labels_.setTo(cv::Scalar(1), labels == 1);
+    labels_.setTo(cv::Scalar(0), (labels == 0) & (labels_ == -1));
+  }
+}
+
+void GroundContact::labelGround(const cv::Mat& now, const cv::Mat& before, const cv::Mat& map,
+                                cv::Mat* labels) const {
   cv::Mat warped, is_known;
   cv::remap(before, warped, map, cv::Mat(), cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(0));
   std::vector<cv::Mat> channels;
@@ -161,7 +182,7 @@ void GroundContact::compare(const cv::Mat& now, const cv::Mat& before,
       const float ma = mean_a.at<float>(y, x), mb = mean_b.at<float>(y, x);
       const float variance_a = std::max(0.0F, square_a.at<float>(y, x) - ma * ma);
       const float variance_b = std::max(0.0F, square_b.at<float>(y, x) - mb * mb);
-      int8_t& label = labels_.at<int8_t>(y + rows_.y, x);
+      int8_t& label = labels->at<int8_t>(y + rows_.y, x);
       if (std::max(variance_a, variance_b) < kTexture * kTexture) {
         label = std::abs(ma - gain * mb) < kSameBrightness + kSameBrightnessRatio * ma ? 1 : -1;
         continue;

@@ -26,7 +26,9 @@ class GroundContact {
   GroundContact(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera, double max_range_m);
 
   /// Compares two images (CV_8UC1 of the working camera); `before_from_now` is the motion of the vehicle.
-  void compare(const cv::Mat& now, const cv::Mat& before, const RigidTransform& before_from_now);
+  /// Where the ground mirrors, static reflections, which seem to lie below it, count as ground.
+  void compare(const cv::Mat& now, const cv::Mat& before, const RigidTransform& before_from_now,
+               bool is_mirror = false);
   /// Contact below a direction in the vehicle's axes; none if no ground is visible in front of it, or nothing
   /// has been compared.
   std::optional<Contact> below(const Eigen::Vector3d& ray_in_vehicle) const;
@@ -37,8 +39,11 @@ class GroundContact {
   const cv::Mat& labels() const { return labels_; }
 
  private:
-  /// Pixels (CV_32FC2) of an earlier image that show the ground of the pixels in rows_; (-1, -1) without one.
-  cv::Mat warpOf(const RigidTransform& before_from_now) const;
+  /// Pixels (CV_32FC2) of an earlier image that show the ground of the pixels in rows_, or what lies deeper,
+  /// at this part of the ground's inverse range; (-1, -1) without one.
+  cv::Mat warpOf(const RigidTransform& before_from_now, float inverse_range_part) const;
+  /// Sets the labels where an earlier image, warped by a map of rows_, tells them.
+  void labelGround(const cv::Mat& now, const cv::Mat& before, const cv::Mat& map, cv::Mat* labels) const;
   int sectorOf(double azimuth_rad) const;
   std::optional<Contact> belowSectors(int first_sector, int num_sectors, double slope) const;
   int labelAt(int sector, int bin) const;

@@ -17,6 +17,7 @@
 #include "objects/object_following.h"
 #include "occupancy/known_obstacles.h"
 #include "points/followed_points.h"
+#include "points/mirror_evidence.h"
 #include "points/panorama.h"
 #include "points/rotation_correction.h"
 #include "points/static_motion.h"
@@ -40,16 +41,15 @@ constexpr double kTranslation_m = 0.001, kTranslationPerSqrt_m = 0.006;
 constexpr double kRotation_rad = 0.0003, kRotationPerSqrt_rad = 0.0015;
 // Deviation of the body's rotation from the odometer's that is estimated: braking pitches the body.
 constexpr double kBodyRotation_rad = 0.004;
+// A point is a reflection if it fits something below the ground, and the ground this many times worse than
+// that.
+constexpr double kReflected = 2.0;
 // A static point is at least this far away, and at most this far below the plane of the ground, plus a slope.
 constexpr double kMinRange_m = 0.3, kGroundBelow_m = 0.05, kGroundSlope = 0.015;
 // Less travel within the history of the points is none.
 constexpr double kStandstill_m = 0.05;
 // The image with which the ground is compared: at most this long ago and this far back.
 constexpr double kCompareInterval_s = 0.42, kCompareTravel_m = 0.5;
-
-}  // namespace
-
-namespace {
 
 /// A followed point that is old enough to be judged, and its equation for the body's rotation.
 struct JudgedPoint {
@@ -59,12 +59,6 @@ struct JudgedPoint {
   StaticResidual found;
   RotationEquation equation;
 };
-
-Eigen::Matrix3d crossMatrixOf(const Eigen::Vector3d& vector) {
-  Eigen::Matrix3d cross;
-  cross << 0.0, -vector.z(), vector.y(), vector.z(), 0.0, -vector.x(), -vector.y(), vector.x(), 0.0;
-  return cross;
-}
 
 WorkingCameraOptions workingOptions(const ObjectTrackerOptions& options) {
   WorkingCameraOptions working;
@@ -87,6 +81,7 @@ struct ObjectTracker::State {
   std::deque<Pose> poses;  // of the last images
   ObjectFilter filter;
   KnownObstacles obstacles;
+  MirrorEvidence mirror;
 };
 
 struct ObjectTracker::Camera {
@@ -115,7 +110,7 @@ struct ObjectTracker::Camera {
     images.clear();
     panorama_now = cv::Mat();
   }
-  std::vector<JudgedPoint> judge(const State& state) const;
+  std::vector<JudgedPoint> judge(const State& state, MirrorEvidence* mirror) const;
   std::vector<MovingPoint> movingPoints(const std::vector<JudgedPoint>& judged,
                                         const Eigen::Vector3d& rotation) const;
   bool compareGround(const State& state);
@@ -207,8 +202,9 @@ void ObjectTracker::startOver() {
   }
 }
 
-std::vector<JudgedPoint> ObjectTracker::Camera::judge(const State& state) const {
+std::vector<JudgedPoint> ObjectTracker::Camera::judge(const State& state, MirrorEvidence* mirror) const {
   std::vector<JudgedPoint> judged;
+  const bool is_mirror = mirror->isMirror();
   const State::Pose& now = state.poses.back();
   const double height_m = vehicle_from_camera.translation().z();
   for (const PointTrack& track : points.tracks()) {
@@ -221,24 +217,27 @@ std::vector<JudgedPoint> ObjectTracker::Camera::judge(const State& state) const 
     // The ground, lowered by its tolerance, is the farthest that a point can be.
     const double down = -(vehicle_from_camera.rotation() * track.back().ray_in_camera).z() - kGroundSlope;
     const double min_inverse_per_m = std::max(0.0, down / (height_m + kGroundBelow_m));
-    point.found =
-        compareWithStatic({track.back().ray_in_camera, track.front().ray_in_camera},
-                          vehicle_from_camera.inverse() * point.before_from_now * vehicle_from_camera,
-                          min_inverse_per_m, std::max(1.0 / kMinRange_m, min_inverse_per_m));
+    const auto compareFrom = [&](double least_inverse_per_m) {
+      return compareWithStatic({track.back().ray_in_camera, track.front().ray_in_camera},
+                               vehicle_from_camera.inverse() * point.before_from_now * vehicle_from_camera,
+                               least_inverse_per_m, std::max(1.0 / kMinRange_m, min_inverse_per_m));
+    };
+    point.found = compareFrom(min_inverse_per_m);
+    if (min_inverse_per_m > 0.0 && point.found.is_valid &&
+        point.before_from_now.translation().norm() > kStandstill_m) {
+      // Reflections in the ground move as static points below it do.
+      const StaticResidual deeper = compareFrom(0.0);
+      const double limit_rad = kMovingSigmas * sigma_rad;
+      mirror->add(deeper.is_valid && deeper.residual_rad.norm() < limit_rad &&
+                  point.found.residual_rad.norm() > kReflected * limit_rad);
+      point.found = is_mirror && deeper.is_valid ? deeper : point.found;
+    }
     if (!point.found.is_valid) {
       continue;
     }
-    RotationEquation& equation = point.equation;
-    equation.by_rotation = age_s / FollowedPoints::kHistory_s * point.found.tangents *
-                           crossMatrixOf(track.front().ray_in_camera) *
-                           vehicle_from_camera.rotationMatrix().transpose();
-    equation.residual_rad = point.found.residual_rad;
-    equation.sigma_rad = sigma_rad;
-    equation.has_second = point.found.normal.isZero();
-    if (!equation.has_second) {
-      equation.residual_rad = {point.found.normal.dot(point.found.residual_rad), 0.0};
-      equation.by_rotation.row(0) = point.found.normal.transpose() * equation.by_rotation;
-    }
+    point.equation =
+        rotationEquationOf(point.found, track.front().ray_in_camera, age_s / FollowedPoints::kHistory_s,
+                           vehicle_from_camera.rotationMatrix(), sigma_rad);
     judged.push_back(point);
   }
   return judged;
@@ -277,8 +276,10 @@ bool ObjectTracker::Camera::compareGround(const State& state) {
     }
     const RigidTransform before_from_now =
         before->odom_from_vehicle.inverse() * state.poses.back().odom_from_vehicle;
-    if (before_from_now.translation().norm() < kCompareTravel_m || i + 2 == images.size()) {
-      contact.compare(images.back().second, image, groundMotion(stamp, before_from_now));
+    const double travel_m = before_from_now.translation().norm();
+    if (travel_m < kCompareTravel_m || i + 2 == images.size()) {
+      contact.compare(images.back().second, image, groundMotion(stamp, before_from_now),
+                      travel_m > kStandstill_m && state.mirror.isMirror());
       return true;
     }
   }
@@ -345,11 +346,12 @@ void ObjectTracker::process(const ImageFrame& frame) {
       continue;
     }
     camera->add(frame.stamp, frame.images[i].pixels, previous_from_now);
-    judged[i] = camera->judge(*state_);
+    judged[i] = camera->judge(*state_, &state_->mirror);
     for (const JudgedPoint& point : judged[i]) {
       equations.push_back(point.equation);
     }
   }
+  state_->mirror.endImage();
   // The body of the vehicle is rigid: all cameras together tell its rotation, even if one sees little but an
   // object.
   const Eigen::Vector3d rotation = correctRotation(equations, kBodyRotation_rad);

@@ -5,6 +5,30 @@
 #include <Eigen/Cholesky>
 
 namespace vcharge {
+namespace {
+
+Eigen::Matrix3d crossMatrixOf(const Eigen::Vector3d& vector) {
+  Eigen::Matrix3d cross;
+  cross << 0.0, -vector.z(), vector.y(), vector.z(), 0.0, -vector.x(), -vector.y(), vector.x(), 0.0;
+  return cross;
+}
+
+}  // namespace
+
+RotationEquation rotationEquationOf(const StaticResidual& found, const Eigen::Vector3d& ray_before,
+                                    double part, const Eigen::Matrix3d& vehicle_from_camera,
+                                    double sigma_rad) {
+  RotationEquation equation;
+  equation.by_rotation = part * found.tangents * crossMatrixOf(ray_before) * vehicle_from_camera.transpose();
+  equation.residual_rad = found.residual_rad;
+  equation.sigma_rad = sigma_rad;
+  equation.has_second = found.normal.isZero();
+  if (!equation.has_second) {
+    equation.residual_rad = {found.normal.dot(found.residual_rad), 0.0};
+    equation.by_rotation.row(0) = found.normal.transpose() * equation.by_rotation;
+  }
+  return equation;
+}
 
 Eigen::Vector3d correctRotation(const std::vector<RotationEquation>& equations, double sigma_rad) {
   constexpr int kNumSteps = 6;

@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 
+#include "points/static_motion.h"
+
 namespace vcharge {
 
 /// A followed point as an equation for a small rotation of the vehicle: residual - by_rotation * rotation is
@@ -14,6 +16,12 @@ struct RotationEquation {
   bool has_second = false;
   double sigma_rad = 0.0;
 };
+
+/// The equation of a point by its residual and its earlier ray in the camera's axes. `part`: rotation between
+/// its two images, relative to the rotation that is searched.
+RotationEquation rotationEquationOf(const StaticResidual& found, const Eigen::Vector3d& ray_before,
+                                    double part, const Eigen::Matrix3d& vehicle_from_camera,
+                                    double sigma_rad);
 
 /// Rotation of the vehicle (vector in its axes) that wheel odometry did not measure, as of a body that
 /// pitches when the car brakes. Robust to points that move, and to many of them: iteratively reweighted least
