@@ -85,6 +85,17 @@ ObjectDetection detectionOf(double azimuth_rad, double range_m, double sigma_m, 
 
 }  // namespace
 
+CameraMotion motionOf(const RigidTransform& vehicle_from_camera, const RigidTransform& now_from_before,
+                      double duration_s) {
+  const Eigen::Vector3d position_m = vehicle_from_camera.translation();
+  const Eigen::Vector3d axis = vehicle_from_camera.rotation() * Eigen::Vector3d::UnitZ();
+  CameraMotion motion{position_m, std::atan2(axis.y(), axis.x()), Eigen::Vector2d::Zero()};
+  if (duration_s > 0.0) {
+    motion.velocity_m_per_s = (position_m - now_from_before * position_m).head<2>() / duration_s;
+  }
+  return motion;
+}
+
 std::vector<ObjectDetection> findFreestanding(const GroundContact& contact, const CameraMotion& camera) {
   const Profile profile(contact);
   std::vector<ObjectDetection> found;

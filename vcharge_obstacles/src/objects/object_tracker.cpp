@@ -287,17 +287,10 @@ bool ObjectTracker::Camera::compareGround(const State& state) {
 }
 
 CameraMotion ObjectTracker::Camera::motion(const State& state) const {
-  const Eigen::Vector3d position_m = vehicle_from_camera.translation();
-  const Eigen::Vector3d axis = vehicle_from_camera.rotation() * Eigen::Vector3d::UnitZ();
-  CameraMotion motion{position_m, std::atan2(axis.y(), axis.x()), Eigen::Vector2d::Zero()};
   const State::Pose& before = state.poses.front();
   const State::Pose& now = state.poses.back();
-  if (before.stamp < now.stamp) {
-    const RigidTransform now_from_before = now.odom_from_vehicle.inverse() * before.odom_from_vehicle;
-    motion.velocity_m_per_s =
-        (position_m - now_from_before * position_m).head<2>() / toSeconds(now.stamp - before.stamp);
-  }
-  return motion;
+  return motionOf(vehicle_from_camera, now.odom_from_vehicle.inverse() * before.odom_from_vehicle,
+                  toSeconds(now.stamp - before.stamp));
 }
 
 /// Finds the objects that are expected in the image.
