@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Measures a stage: simulates drives (or uses those of an earlier run in --work), runs the tools, and judges the results.
 #   evaluate.sh STAGE [arguments; --help]
-# STAGE: masks, calibration, mapping, localization, ranges, height_map, obstacles, steps (kerbs, holes), objects (moving),
+# STAGE: masks, calibration, mapping, localization, ranges, height_map, obstacles, standing (five minutes), steps (kerbs, holes), objects (moving),
 # conditions, faults, odometry (a real car's CAN), images (beside real ones), chain (all stages from unknown cameras), latency
 # (of the nodelets), soak (their memory). --publish puts the figures into doc/results and doc/results.md.
 set -euo pipefail

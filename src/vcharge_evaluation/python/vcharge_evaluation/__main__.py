@@ -11,6 +11,7 @@ STAGES = {
     "height_map": "height_map",
     "obstacles": "obstacles",
     "objects": "objects",
+    "standing": "standing",
     "steps": "steps",
     "conditions": "conditions",
     "faults": "faults",

@@ -14,7 +14,7 @@ DRIVING_QUICK = ("movers_lot", "movers_garage", "movers_crossing", "standing_lot
                  "bay_backwards_garage", "bay_forwards_lot", "three_point_turn_lot", "road_fast", "road_bumps")
 DRIVING = (*DRIVING_QUICK, "stop_and_go_garage", "bay_forwards_garage", "three_point_turn_garage", "road_slow", "road_slope",
            "ramp_up", "ramp_down", "layout_lot", "layout_garage", "steps_lot",
-           "standing_approached", "wheel_speeds")
+           "standing_approached", "arrive_and_stand_lot", "wheel_speeds")
 # A car that stands cannot map: the noon map of its place comes from another drive.
 MAP_DRIVES = {"standing": "short"}
 # The car needs 8 s to reach the ramp, and 25 s for a turn of it.

@@ -7,7 +7,7 @@ from vcharge_evaluation.tools import ROOT
 
 PAGE = ROOT / "doc" / "results.md"
 # In the order of the pipeline; other stages follow by name.
-ORDER = ("chain", "conditions", "masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "steps",
+ORDER = ("chain", "conditions", "masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "standing", "steps",
          "objects", "faults", "odometry", "images", "latency", "real_images", "foundations", "speed")
 INTRODUCTION = """# Results
 

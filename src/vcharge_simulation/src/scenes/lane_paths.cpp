@@ -141,6 +141,12 @@ DrivePath stopAndGo(const RigidTransform& world_from_start) {
   return path;
 }
 
+DrivePath arriveAndStand(const RigidTransform& world_from_start) {
+  DrivePath path(world_from_start, {{8.0, 0.0, 0.0}});
+  path.addStop({7.0, 300.0});
+  return path;
+}
+
 DrivePath standingPath(const RigidTransform& world_from_vehicle) {
   return DrivePath(world_from_vehicle, {{1.0, 0.0, 0.0}});
 }

@@ -33,43 +33,48 @@ DrivePlan shortDrive() {
 
 std::vector<SceneDrive> garageDrives(uint64_t layout_seed) {
   const GaragePlan plan = GaragePlan::fromSeed(layout_seed);
-  return {{{"loop", "around all rows of bays, back to the start"}, loop(plan, kMapped_m, false, 0)},
-          {{"loop_reverse_direction", "the loop, clockwise"}, loop(plan, kMapped_m, true, 0)},
-          {{"both_directions", "175 s through all lanes in both directions, for mapping"},
-           [plan] {
-             return DrivePlan{"", plan.lanes.bothDirections(kMapped_m), fromRestToRest()};
-           }},
-          {{"other_day", "2 m beside the loop on another day, with moved cars and other lamps"},
-           loop(plan, kOtherDay_m, false, 1)},
-          {{"other_day_reverse_direction", "other_day, clockwise"}, loop(plan, kOtherDay_m, true, 1)},
-          {{"figure_eight",
-            "counter-clockwise around the northern rows, then clockwise around the southern ones"},
-           [plan] { return figureEight(plan); }},
-          {{"stop_and_go", "along the middle lane with five stops"},
-           [plan] {
-             return DrivePlan{"", stopAndGo(RigidTransform::planar(-19.0, -0.3, 0.02)), fromRestToRest()};
-           }},
-          {{"bay_backwards", "backwards into a bay and out of it forwards"},
-           [plan] {
-             return DrivePlan{"", visitBayBackwards(plan.free_bay_x_m, -plan.lanes.y_m - 0.5),
-                              fromRestToRest(2.0)};
-           }},
-          {{"bay_forwards", "forwards into the space beside the last bay of a row and out of it backwards"},
-           [plan] {
-             return DrivePlan{"", visitSpaceForwards(plan.lanes.x_m + 1.5, 1.2 - plan.lanes.y_m, 5.5),
-                              fromRestToRest(2.0)};
-           }},
-          {{"three_point_turn", "a turn in three moves at the mouth of the middle lane"},
-           [plan] {
-             return DrivePlan{
-                 "", threePointTurn({plan.lanes.x_m + 0.6, plan.lanes.y_m, plan.lanes.corner_radius_m}),
-                 fromRestToRest(2.0)};
-           }},
-          {{"standing", "20 s at standstill"},
-           [plan] {
-             return DrivePlan{"", standingPath(RigidTransform::planar(-5.0, 0.2, 0.1)), standing(20.0)};
-           }},
-          {{"short", "5 s of gentle curves in the middle lane"}, shortDrive}};
+  return {
+      {{"loop", "around all rows of bays, back to the start"}, loop(plan, kMapped_m, false, 0)},
+      {{"loop_reverse_direction", "the loop, clockwise"}, loop(plan, kMapped_m, true, 0)},
+      {{"both_directions", "175 s through all lanes in both directions, for mapping"},
+       [plan] {
+         return DrivePlan{"", plan.lanes.bothDirections(kMapped_m), fromRestToRest()};
+       }},
+      {{"other_day", "2 m beside the loop on another day, with moved cars and other lamps"},
+       loop(plan, kOtherDay_m, false, 1)},
+      {{"other_day_reverse_direction", "other_day, clockwise"}, loop(plan, kOtherDay_m, true, 1)},
+      {{"figure_eight",
+        "counter-clockwise around the northern rows, then clockwise around the southern ones"},
+       [plan] { return figureEight(plan); }},
+      {{"stop_and_go", "along the middle lane with five stops"},
+       [plan] {
+         return DrivePlan{"", stopAndGo(RigidTransform::planar(-19.0, -0.3, 0.02)), fromRestToRest()};
+       }},
+      {{"bay_backwards", "backwards into a bay and out of it forwards"},
+       [plan] {
+         return DrivePlan{"", visitBayBackwards(plan.free_bay_x_m, -plan.lanes.y_m - 0.5),
+                          fromRestToRest(2.0)};
+       }},
+      {{"bay_forwards", "forwards into the space beside the last bay of a row and out of it backwards"},
+       [plan] {
+         return DrivePlan{"", visitSpaceForwards(plan.lanes.x_m + 1.5, 1.2 - plan.lanes.y_m, 5.5),
+                          fromRestToRest(2.0)};
+       }},
+      {{"three_point_turn", "a turn in three moves at the mouth of the middle lane"},
+       [plan] {
+         return DrivePlan{"",
+                          threePointTurn({plan.lanes.x_m + 0.6, plan.lanes.y_m, plan.lanes.corner_radius_m}),
+                          fromRestToRest(2.0)};
+       }},
+      {{"arrive_and_stand", "8 m along the middle lane, with a stop of five minutes after 7 m"},
+       [plan] {
+         return DrivePlan{"", arriveAndStand(RigidTransform::planar(-12.0, 0.2, 0.02)), fromRestToRest(1.5)};
+       }},
+      {{"standing", "20 s at standstill"},
+       [plan] {
+         return DrivePlan{"", standingPath(RigidTransform::planar(-5.0, 0.2, 0.1)), standing(20.0)};
+       }},
+      {{"short", "5 s of gentle curves in the middle lane"}, shortDrive}};
 }
 
 }  // namespace vcharge

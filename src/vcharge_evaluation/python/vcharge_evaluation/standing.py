@@ -1,0 +1,137 @@
+"""Five minutes of standing in a living scene: how much of what stands is still in the obstacle map, and what is there wrongly."""
+import argparse
+import math
+
+import cv2
+import numpy as np
+
+from vcharge_evaluation.drawing.obstacles import read_yaml, yaw_of
+from vcharge_evaluation.drives import found_masks, scenario_drive, scene_and_drive
+from vcharge_evaluation.obstacles import detect_obstacles
+from vcharge_evaluation.results import Figure, Results, add_arguments, figure
+from vcharge_evaluation.tools import NoResult, say
+
+DRIVES = ("arrive_and_stand_lot",)
+REST_M = 0.02  # within so much of its last position the vehicle stands
+SETTLED_S = 1.0  # after this time of standing the map is the one that has to be held
+REACH_M = 8.0
+NEAR_M = 0.2  # an obstacle of the truth this near to a cell is in it: two cells
+MIN_HEIGHT_M = 0.15
+KEPT = "cells of what stands that are still occupied, least"
+OCCUPIED, FREE = 0, 254  # gray levels of map_server
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__)
+    add_arguments(parser, "standing_evaluation")
+    parser.add_argument("--drives", nargs="*", default=DRIVES, choices=DRIVES, help="files in config/scenarios")
+    parser.add_argument("--seeds", nargs="*", type=int, default=[31], help="seeds of the scenes; those below 100 serve to choose "
+                        "options")
+    parser.add_argument("--image-scale", type=float, default=0.4)
+    parser.add_argument("--image-step", type=int, default=3, help="every n-th image is rendered")
+    parser.add_argument("--duration-s", type=float, default=310.0)
+    return parser.parse_args()
+
+
+class Map:
+    """Cells of one obstacle map by their positions in the fixed frame, which stays as long as the vehicle stands."""
+
+    def __init__(self, folder, stamp):
+        meta = read_yaml(folder / f"{stamp}.yaml")
+        self.gray = cv2.imread(str(folder / f"{stamp}.pgm"), cv2.IMREAD_UNCHANGED)[::-1]
+        self.cell_m, self.origin_m = meta["resolution"], np.array(meta["origin"][:2])
+        self.here_m = np.array(meta["fixed_from_vehicle_translation_m"][:2])
+        self.yaw = yaw_of(meta["fixed_from_vehicle_rotation_xyzw"])
+
+    def centres(self):
+        """Positions of the cells, rows x columns x 2."""
+        rows, columns = np.indices(self.gray.shape)
+        return self.origin_m + (np.stack([columns, rows], -1) + 0.5) * self.cell_m
+
+    def draw(self, outlines, world_from_fixed):
+        """Cells inside outlines in the world, corners N x 2, grown by NEAR_M."""
+        turn, shift = world_from_fixed
+        picture = np.zeros(self.gray.shape, np.uint8)
+        for outline in outlines:
+            cells = ((np.asarray(outline) - shift) @ turn - self.origin_m) / self.cell_m - 0.5
+            cv2.fillPoly(picture, [np.round(cells).astype(np.int32)], 1)
+        reach = int(math.ceil(NEAR_M / self.cell_m))
+        return cv2.dilate(picture, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) > 0
+
+
+def turn_by(yaw):
+    return np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+
+
+def world_from_fixed(trajectory, stamp, held):
+    """Rotation and translation of the frame of a map in the world, from the vehicle's true pose at its stamp."""
+    pose = trajectory[np.argmin(abs(trajectory[:, 0] - stamp * 1e-9))]
+    turn = turn_by(yaw_of(pose[4:]) - held.yaw)
+    return turn, pose[1:3] - turn @ held.here_m
+
+
+def tall(obstacles):
+    return [one["footprint_m"] for one in obstacles if one["top_z_m"] - one["base_z_m"] > MIN_HEIGHT_M]
+
+
+def judge_standing(drive, folder):
+    """Fractions of cells, for each map after the first settled one. NoResult without a standstill."""
+    trajectory = np.loadtxt(drive.trajectory)
+    last = trajectory[np.argmin(abs(trajectory[:, 0] - (trajectory[-1, 0] - 3.0)))]
+    rests = trajectory[np.linalg.norm(trajectory[:, 1:3] - last[1:3], axis=1) < REST_M]
+    stamps = sorted(int(path.stem) for path in folder.glob("*.yaml") if path.stem.isdigit())
+    stamps = [stamp for stamp in stamps if rests[0, 0] + SETTLED_S <= stamp * 1e-9 <= rests[-1, 0]]
+    if not stamps:
+        raise NoResult("no obstacle map while the vehicle stands")
+    held = Map(folder, stamps[0])
+    place = world_from_fixed(trajectory, stamps[0], held)
+    movers = {image["stamp_ns"]: image["movers"] for image in read_yaml(drive.truth / "movers.yaml")["images"]}
+    moving = {stamp: tall(movers[min(movers, key=lambda known, stamp=stamp: abs(known - stamp))]) for stamp in stamps}
+    near = np.linalg.norm(held.centres() - held.here_m, axis=-1) < REACH_M
+    standing = held.draw(tall(read_yaml(drive.truth / "obstacles.yaml")["obstacles"]), place)
+    solid = near & standing & (held.gray == OCCUPIED) & ~held.draw(moving[stamps[0]], place)
+    free = near & ~standing & (held.gray == FREE)
+    kept, still_free, wrong = [], [], []
+    for stamp in stamps[1:]:
+        gray = Map(folder, stamp).gray
+        hidden = held.draw(moving[stamp], place)
+        occupied = cv2.dilate((gray == OCCUPIED).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+        kept.append(np.mean(occupied[solid & ~hidden]))
+        still_free.append(np.mean(gray[free & ~hidden] == FREE))
+        wrong.append(np.mean(gray[free & ~hidden] == OCCUPIED))
+    return {"duration_s": (stamps[-1] - stamps[0]) * 1e-9, "cells": int(solid.sum()), "kept": np.array(kept),
+            "still_free": np.array(still_free), "wrong": np.array(wrong)}
+
+
+def standing_figures(errors):
+    yield figure(KEPT, 100 * errors["kept"].min(), "%", at_least=100)
+    yield Figure("the same, at the end", 100 * errors["kept"][-1], "%")
+    yield Figure("free cells that are still free, mean", 100 * errors["still_free"].mean(), "%")
+    yield Figure("free cells that are occupied with nothing there, mean", 100 * errors["wrong"].mean(), "%")
+    yield Figure("the same, worst map", 100 * errors["wrong"].max(), "%")
+    yield Figure("cells of what stands", errors["cells"])
+    yield Figure("stood", errors["duration_s"], "s")
+
+
+def main():
+    args = arguments()
+    args.work.mkdir(parents=True, exist_ok=True)
+    results = Results("standing", "Standing in a living scene", args)
+    title = f"Standing, within 8 m, image scale {args.image_scale:g}, every {args.image_step}. image"
+    for name, seed in ((name, seed) for name in args.drives for seed in args.seeds):
+        column = f"{name}, seed {seed}"
+        say(column)
+        drive = scenario_drive(args.work, name, seed, args.image_scale, args.duration_s, ("--image-step", args.image_step))
+        masks = found_masks(args.work, scene_and_drive(name)[0])
+        folder = drive.folder / "obstacles"
+        try:
+            detect_obstacles(drive, masks.rig_of(drive.folder), folder)
+            figures = list(standing_figures(judge_standing(drive, folder)))
+        except NoResult as error:
+            figures = [figure(KEPT, 0.0, "%", at_least=100), Figure("remarks", str(error))]
+        results.add(title, (column, figures))
+    results.end()
+
+
+if __name__ == "__main__":
+    main()
