@@ -142,7 +142,7 @@ DrivePath stopAndGo(const RigidTransform& world_from_start) {
 }
 
 DrivePath arriveAndStand(const RigidTransform& world_from_start) {
-  DrivePath path(world_from_start, {{8.0, 0.0, 0.0}});
+  DrivePath path(world_from_start, {{10.0, 0.0, 0.0}});
   path.addStop({7.0, 300.0});
   return path;
 }

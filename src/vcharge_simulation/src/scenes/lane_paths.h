@@ -50,7 +50,7 @@ DrivePath visitSpaceForwards(double space_x_m, double lane_y_m, double depth_m);
 
 /// Path of 38 m straight ahead with five stops.
 DrivePath stopAndGo(const RigidTransform& world_from_start);
-/// Path of 8 m straight ahead with a stop of five minutes before its end.
+/// Path of 10 m straight ahead with a stop of five minutes after 7 m.
 DrivePath arriveAndStand(const RigidTransform& world_from_start);
 /// Path for a car that stands, see standing().
 DrivePath standingPath(const RigidTransform& world_from_vehicle);

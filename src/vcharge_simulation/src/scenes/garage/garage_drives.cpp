@@ -66,7 +66,7 @@ std::vector<SceneDrive> garageDrives(uint64_t layout_seed) {
                           threePointTurn({plan.lanes.x_m + 0.6, plan.lanes.y_m, plan.lanes.corner_radius_m}),
                           fromRestToRest(2.0)};
        }},
-      {{"arrive_and_stand", "8 m along the middle lane, with a stop of five minutes after 7 m"},
+      {{"arrive_and_stand", "10 m along the middle lane, with a stop of five minutes after 7 m"},
        [plan] {
          return DrivePlan{"", arriveAndStand(RigidTransform::planar(-12.0, 0.2, 0.02)), fromRestToRest(1.5)};
        }},

@@ -80,7 +80,7 @@ std::vector<SceneDrive> lotDrives(uint64_t layout_seed) {
       {{"straight", "46 m straight ahead at 4 m/s"},
        straight(RigidTransform::planar(4.0 - plan.lanes.x_m, -plan.lanes.y_m, 0.0),
                 2.0 * plan.lanes.x_m - 6.0, 4.0)},
-      {{"arrive_and_stand", "8 m along the middle lane, with a stop of five minutes after 7 m"},
+      {{"arrive_and_stand", "10 m along the middle lane, with a stop of five minutes after 7 m"},
        [plan] {
          return DrivePlan{"", arriveAndStand(RigidTransform::planar(-12.0, 0.2, 0.02)), fromRestToRest(1.5)};
        }},
