@@ -40,6 +40,10 @@ constexpr double kNoPerson = -0.8, kPersonLikeness = 0.05, kPersonSigmas = 1.0, 
                  kKeptLikeness = 0.7;
 // An object that stands is reported for this time.
 constexpr double kKeptStanding_s = 2.0;
+// Errors that successive measurements of an object have in common, which the filter cannot average: of the
+// position per range along the view, since shadows and feet pull contacts, and across it; of the velocity.
+constexpr double kCommonAlong = 0.07, kCommonAcross_m = 0.1;
+constexpr double kCommonAlong_m_per_s = 0.4, kCommonAcross_m_per_s = 0.2;
 constexpr double kPersonRadius_m = 0.25;
 constexpr double kCarWidth_m = 1.8, kCarLength_m = 4.2, kMinCarWidth_m = 1.2;
 constexpr double kChildHeight_m = 1.35;
@@ -69,6 +73,27 @@ struct Measurement {
   Eigen::Vector4d state;
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
 };
+
+/// Covariance of position and velocity of what measurements have in common; zero without cameras.
+Eigen::Matrix4d commonErrors(const Eigen::Vector2d& position_m,
+                             const std::vector<Eigen::Vector2d>& cameras_m) {
+  Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
+  if (cameras_m.empty()) {
+    return covariance;
+  }
+  const Eigen::Vector2d camera_m =
+      *std::min_element(cameras_m.begin(), cameras_m.end(), [&](const auto& a, const auto& b) {
+        return (a - position_m).squaredNorm() < (b - position_m).squaredNorm();
+      });
+  const Eigen::Vector2d view_m = position_m - camera_m, along = view_m.normalized();
+  const Eigen::Matrix2d along_view = along * along.transpose();
+  const Eigen::Matrix2d across_view = Eigen::Matrix2d::Identity() - along_view;
+  covariance.topLeftCorner<2, 2>() = kCommonAlong * kCommonAlong * view_m.squaredNorm() * along_view +
+                                     kCommonAcross_m * kCommonAcross_m * across_view;
+  covariance.bottomRightCorner<2, 2>() = kCommonAlong_m_per_s * kCommonAlong_m_per_s * along_view +
+                                         kCommonAcross_m_per_s * kCommonAcross_m_per_s * across_view;
+  return covariance;
+}
 
 double widthOf(const ObjectDetection& detection) {
   return (detection.left_m - detection.right_m).norm();
@@ -290,12 +315,14 @@ TrackedObject ObjectFilter::describe(const Track& track) const {
   return object;
 }
 
-std::vector<TrackedObject> ObjectFilter::objects() const {
+std::vector<TrackedObject> ObjectFilter::objects(const std::vector<Eigen::Vector2d>& cameras_m) const {
   std::vector<TrackedObject> found;
   for (const Track& track : tracks_) {
     if (track.existence_log_odds >= 0.0 && track.has_moved &&
         toSeconds(stamp_ - track.last_moving) < kKeptStanding_s) {
-      found.push_back(describe(track));
+      Track seen = track;
+      seen.covariance += commonErrors(track.state.head<2>(), cameras_m);
+      found.push_back(describe(seen));
     }
   }
   return found;

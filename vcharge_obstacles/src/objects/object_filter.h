@@ -41,8 +41,9 @@ class ObjectFilter {
   void addLikeness(size_t index, double score);
   /// Ends the stamp: objects that no camera has detected become less probable, and some end.
   void finish();
-  /// Objects that probably exist, in the fixed frame.
-  std::vector<TrackedObject> objects() const;
+  /// Objects that probably exist, in the fixed frame. Their covariances contain the errors that successive
+  /// measurements have in common, as seen from the nearest of the cameras, if their positions are given.
+  std::vector<TrackedObject> objects(const std::vector<Eigen::Vector2d>& cameras_m = {}) const;
   void clear();
 
  private:

@@ -56,6 +56,24 @@ TEST(ObjectFilterTest, NoiseIsAveragedAndCovarianceIsTrue) {
   EXPECT_NEAR(normalized, 2.0, 1.0);
 }
 
+TEST(ObjectFilterTest, CommonErrorsLieAlongTheViewOfTheNearestCamera) {
+  ObjectFilter filter;
+  for (int frame = 0; frame < 20; ++frame) {
+    filter.predict(stampAt(frame));
+    filter.update({detect({5.0, 1.2 * kPeriod_s * frame}, {0.0, 1.2})}, RigidTransform());
+    filter.finish();
+  }
+  ASSERT_EQ(filter.objects().size(), 1U);
+  const TrackedObject own = filter.objects().front();
+  const Eigen::Vector2d here = own.frame_from_object.translation().head<2>();
+  const TrackedObject object = filter.objects({here - Eigen::Vector2d(4.0, 0.0), {0.0, 50.0}}).front();
+  const Eigen::Matrix2d common = (object.covariance - own.covariance).topLeftCorner<2, 2>();
+  EXPECT_GT(common(0, 0), 4.0 * common(1, 1));
+  EXPECT_GT(common(1, 1), 0.0);
+  EXPECT_NEAR(common(0, 1), 0.0, 1e-9);
+  EXPECT_GT(object.covariance(3, 3), own.covariance(3, 3));
+}
+
 /// A person five metres ahead who was detected five times, crossing at 1.2 m/s, and is undetected since one
 /// stamp.
 ObjectFilter filterOfUndetected() {

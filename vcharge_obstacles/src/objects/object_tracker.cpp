@@ -370,16 +370,18 @@ void ObjectTracker::process(const ImageFrame& frame) {
   }
   followByStereo(views, now, &state_->filter);
   state_->filter.finish();
-  std::vector<TrackedObject> objects = state_->filter.objects();
+  std::vector<RigidTransform> odom_from_cameras;
+  std::vector<Eigen::Vector2d> cameras_m;
+  for (const std::unique_ptr<Camera>& camera : cameras_) {
+    if (camera) {
+      odom_from_cameras.push_back(now * camera->vehicle_from_camera);
+      cameras_m.emplace_back(odom_from_cameras.back().translation().head<2>());
+    }
+  }
+  std::vector<TrackedObject> objects = state_->filter.objects(cameras_m);
   // While the vehicle stands, nothing static seems to move, and people may be in the map themselves.
   const double travel_m = (state_->poses.front().odom_from_vehicle.inverse() * now).translation().norm();
   if (options_.ignore_hidden && travel_m > kStandstill_m) {
-    std::vector<RigidTransform> odom_from_cameras;
-    for (const std::unique_ptr<Camera>& camera : cameras_) {
-      if (camera) {
-        odom_from_cameras.push_back(now * camera->vehicle_from_camera);
-      }
-    }
     state_->obstacles.removeHidden(odom_from_cameras, &objects);
   }
   on_frame_({frame.stamp, now, std::move(objects)});
