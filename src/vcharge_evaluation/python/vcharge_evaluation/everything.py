@@ -56,6 +56,7 @@ def steps():
                         "--no-experiments"] if first else None)
             yield Step("localization", [*words, "--image-scale", 0.25, "--consistency", 20],
                        [*words, "--image-scale", QUICK_SCALE, "--consistency", 5] if first else None)
+    yield Step("standing", ["--seeds", LOTS[0]])
     yield Step("steps", ["--seeds", *LOTS])
     # The quick run's drives are those of its conditions.
     moving = ["movers_crossing", "movers_lot", "standing_lot"]
