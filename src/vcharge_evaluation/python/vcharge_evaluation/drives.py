@@ -12,6 +12,7 @@ SCENARIOS = CONFIG / "scenarios"
 MASK_SEEDS = {"lot": 201, "garage": 211}
 # The loop of a scene at noon, from which come its masks, its height map and the map for other days.
 LOOP_S, LOOP_STEP, HEIGHT_CELL_M = 24, 2, 0.025
+CONDITIONS = ("noon", "dusk", "wet")
 MASK_SCALE = 0.4  # image size, over 1280x800, of the drives in which masks are found
 # Another day's drive, that of the chain too: other light, moved cars, other errors of the wheels.
 OTHER_DAY = ("--drive", "other_day", "--exposure-gain", 1.2, "--set", "odometer.scale_error=-0.0005", "--set",
@@ -55,6 +56,11 @@ def scenario_drive(work, name, seed, scale, duration_s, words=()):
     """A drive of config/scenarios with true ranges. `words` change the scenario."""
     return Drive(work, name, "--scenario", SCENARIOS / f"{name}.yaml", "--scene-seed", seed, "--seed", seed + 2, "--image-scale",
                  scale, "--duration-s", duration_s, "--truth-range", *words)
+
+
+def condition_words(condition):
+    """Words that put a drive into a light and weather of CONDITIONS; none at noon."""
+    return () if condition == "noon" else ("--set", f"condition.kind={condition}")
 
 
 def scene_and_drive(name):

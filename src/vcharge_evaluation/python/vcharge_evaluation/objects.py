@@ -2,7 +2,7 @@
 import argparse
 
 from vcharge_evaluation.drawing.moments import OBJECT_LEGEND, draw_objects
-from vcharge_evaluation.drives import found_masks, scenario_drive, scene_and_drive
+from vcharge_evaluation.drives import CONDITIONS, condition_words, found_masks, scenario_drive, scene_and_drive
 from vcharge_evaluation.obstacles import detect_obstacles
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent, quantile
 from vcharge_evaluation.tools import NoResult, judge, say
@@ -11,7 +11,6 @@ DRIVES = ("movers_lot", "movers_garage", "movers_crossing", "standing_lot", "sta
           "bay_backwards_lot")
 # Movers of the scenarios that have none.
 MOVERS = {"bay_backwards_lot": {"people": 6, "children": 3, "cars": 2, "bicycles": 2}}
-CONDITIONS = ("noon", "dusk", "wet")
 LEAST_PERCENT = 90
 LEAST_APPROACHES_PERCENT = 98
 FOUND, GOOD, KEPT = "found, of those due", "within 0.3 m and 0.3 m/s", "crossings that keep one id"
@@ -33,10 +32,8 @@ def arguments():
 
 def settings(name, condition):
     """Words that add movers and the condition to a scenario."""
-    values = {f"movers.{key}": count for key, count in MOVERS.get(name, {}).items()}
-    if condition != "noon":
-        values["condition.kind"] = condition
-    return [word for key, value in values.items() for word in ("--set", f"{key}={value}")]
+    movers = [word for key, count in MOVERS.get(name, {}).items() for word in ("--set", f"movers.{key}={count}")]
+    return [*movers, *condition_words(condition)]
 
 
 def judge_objects(drive, folder):

@@ -2,7 +2,8 @@
 import argparse
 
 from vcharge_evaluation.drawing.moments import OBSTACLE_LEGEND, draw_obstacles
-from vcharge_evaluation.drives import OTHER_DAY, Drive, found_masks
+from vcharge_evaluation.drives import (CONDITIONS, OTHER_DAY, Drive, condition_words, found_masks, scenario_drive,
+                                       scene_and_drive)
 from vcharge_evaluation.results import Figure, Results, add_arguments, calibration_figures, figure, percent
 from vcharge_evaluation.tools import CONFIG, NoResult, judge, run_tool_once
 
@@ -10,12 +11,15 @@ STOP_AND_GO = ("--drive", "stop_and_go")
 # Scene, duration, and words of each drive. pitch is the lot's drive on a soft suspension.
 DRIVES = {
     "course": ("obstacles", 19.5, ("--drive", "creep")),
+    "course_back": ("obstacles", 19.5, ("--drive", "creep_back")),
     "lot": ("lot", 6, STOP_AND_GO),
     "pitch": ("lot", 6, (*STOP_AND_GO, "--set", "faults.soft_suspension.pitch_factor=4")),
     "garage": ("garage", 4, ("--drive", "short")),
     "lot_other_day": ("lot", 8, OTHER_DAY),
     "garage_other_day": ("garage", 8, OTHER_DAY),
 }
+# Drives of config/scenarios, and their duration: backwards into a bay, and out of it forwards.
+REVERSING = {"bay_backwards_lot": 20, "bay_backwards_garage": 20}
 SMALL = 0.4
 
 
@@ -27,18 +31,29 @@ def arguments():
     parser.add_argument("--seed", type=int, default=108, help="those below 50 serve to choose options")
     parser.add_argument("--rig-seed", type=int, help="random rig in place of the Golf's")
     parser.add_argument("--duration-s", type=float, help="in place of each drive's own duration")
-    parser.add_argument("--drives", nargs="*", default=["course", "lot", "pitch", "garage"], choices=DRIVES)
+    parser.add_argument("--drives", nargs="*", default=["course", "lot", "pitch", "garage"], choices=[*DRIVES, *REVERSING])
+    parser.add_argument("--conditions", nargs="*", default=["noon"], choices=CONDITIONS, help="light and weather")
     return parser.parse_args()
 
 
-def detect(args, name):
-    """Errors of the obstacle maps of a drive, the drive, and the masks that make_masks found for its car."""
-    scene, duration_s, words = DRIVES[name]
-    car = () if args.rig_seed is None else ("--rig", "random", "--rig-seed", args.rig_seed)
+def drive_of(args, name, condition):
+    """A drive in a condition, its scene, and the words of its car."""
     scale = SMALL if args.small else 1.0
+    car = () if args.rig_seed is None else ("--rig", "random", "--rig-seed", args.rig_seed)
+    words = (*car, *condition_words(condition))
+    if name in REVERSING:
+        duration_s = args.duration_s or REVERSING[name]
+        return scenario_drive(args.work, name, args.seed, scale, duration_s, words), scene_and_drive(name)[0], car
+    scene, duration_s, driving = DRIVES[name]
     # The words of drives.other_day_drive, so that stages share this drive.
-    drive = Drive(args.work, name, "--scene", scene, *words, "--scene-seed", args.seed, "--seed", args.seed + 400,
-                  "--image-scale", scale, "--duration-s", args.duration_s or duration_s, "--truth-range", *car)
+    drive = Drive(args.work, name, "--scene", scene, *driving, "--scene-seed", args.seed, "--seed", args.seed + 400,
+                  "--image-scale", scale, "--duration-s", args.duration_s or duration_s, "--truth-range", *words)
+    return drive, scene, car
+
+
+def detect(args, name, condition):
+    """Errors of the obstacle maps of a drive, the drive, and the masks that make_masks found for its car."""
+    drive, scene, car = drive_of(args, name, condition)
     masks = found_masks(args.work, scene, car)
     return judge_obstacles(drive, masks.rig_of(drive.folder)), drive, masks
 
@@ -192,9 +207,9 @@ def main():
     args.work.mkdir(parents=True, exist_ok=True)
     results = Results("obstacles", "Obstacles", args)
     size = ", small images" if args.small else ""
-    for name in args.drives:
-        errors, drive, masks = detect(args, name)
-        found, column = summary(errors), f"{name}, seed {args.seed}"
+    for name, condition in ((name, condition) for name in args.drives for condition in args.conditions):
+        errors, drive, masks = detect(args, name, condition)
+        found, column = summary(errors), f"{name}, {condition}, seed {args.seed}"
         results.add(f"Obstacles of 20 cm and more at 0.5 to 5 m{size}",
                     (column, [*figures(found), Figure("masks", masks.text())]))
         results.add(f"By class{size}", (column, list(class_figures(found))))
