@@ -34,10 +34,8 @@ constexpr int kManyDetections = 5;
 // Nobody walks faster; part of the drift of contacts that is kept from stamp to stamp.
 constexpr double kFastest_m_per_s = 2.5, kKeptDrift = 0.7;
 // What looks like a person is reported once it moves at this least speed and number of standard deviations:
-// few things that stand do. Part of the likeness that is kept from view to view. Something narrow that looks
-// like no person has to be detected many times, or its contacts have to walk.
-constexpr double kNoPerson = -0.8, kPersonLikeness = 0.05, kPersonSigmas = 1.0, kSlowest_m_per_s = 0.2,
-                 kKeptLikeness = 0.7;
+// few things that stand do. Part of the likeness that is kept from view to view.
+constexpr double kPersonLikeness = -0.2, kPersonSigmas = 1.0, kSlowest_m_per_s = 0.2, kKeptLikeness = 0.7;
 // An object that stands is reported for this time.
 constexpr double kKeptStanding_s = 2.0;
 // Errors that successive measurements of an object have in common, which the filter cannot average: of the
@@ -253,10 +251,8 @@ void ObjectFilter::finish() {
     const bool is_fast = speed_sigmas > kMovingSigmas;
     const bool travels = is_fast && travel_m.dot(covariance.ldlt().solve(travel_m)) > kTravel;
     track.contacts.forgetBefore(stamp_);
-    const bool may_travel = track.width_m > kMinCarWidth_m || track.likeness > kNoPerson;
-    track.has_moved = track.has_moved || (travels && track.num_detections > 0 && may_travel) ||
-                      (is_fast && walks(track)) || movesLikePerson(track, speed_sigmas) ||
-                      track.num_detections >= kManyDetections;
+    track.has_moved = track.has_moved || (travels && track.num_detections > 0) || (is_fast && walks(track)) ||
+                      movesLikePerson(track, speed_sigmas) || track.num_detections >= kManyDetections;
     if (track.last_seen < stamp_) {
       track.existence_log_odds = std::min(
           kMost, track.existence_log_odds + std::clamp(kMiss + track.votes, kLeastChange, kMostChange));

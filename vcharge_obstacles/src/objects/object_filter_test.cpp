@@ -88,30 +88,6 @@ ObjectFilter filterOfUndetected() {
   return filter;
 }
 
-/// Frames until an object that crosses at 1.2 m/s is reported, which looks like a person by this score.
-int framesUntilReported(double likeness) {
-  ObjectFilter filter;
-  for (int frame = 0; frame < 20; ++frame) {
-    filter.predict(stampAt(frame));
-    if (frame % 3 == 0) {
-      filter.update({detect({5.0, 1.2 * kPeriod_s * frame}, {0.0, 1.2})}, RigidTransform());
-    }
-    for (const ObjectFilter::Expected& expected : filter.expected()) {
-      filter.addLikeness(expected.index, likeness);
-    }
-    filter.finish();
-    if (!filter.objects().empty()) {
-      return frame;
-    }
-  }
-  return 20;
-}
-
-TEST(ObjectFilterTest, WhatLooksLikeNoPersonIsReportedLater) {
-  EXPECT_LT(framesUntilReported(1.0), framesUntilReported(-2.0));
-  EXPECT_LT(framesUntilReported(-2.0), 20);
-}
-
 TEST(ObjectFilterTest, OneNumberCorrectsAnUndetectedObject) {
   ObjectFilter filter = filterOfUndetected();
   ASSERT_EQ(filter.expected().size(), 1U);
