@@ -23,6 +23,8 @@ constexpr float kRelativeDifference = 0.05F;
 // The gain between two images is estimated from at least this number of pixels of this brightness or more.
 constexpr size_t kMinCompared = 200;
 constexpr float kMinBrightness = 8.0F;
+// The light on the ground is alike over windows of this side.
+constexpr int kLight_px = 21;
 
 cv::Mat warped(const cv::Mat& before, const cv::Mat& map) {
   cv::Mat image;
@@ -37,6 +39,18 @@ cv::Mat knownIn(const cv::Mat& map) {
   known = channel >= 0.0;
   cv::erode(known, known, cv::Mat::ones(kWindow_px, kWindow_px, CV_8U));
   return known;
+}
+
+/// CV_32FC1: ratio of the mean brightness around each pixel, of known pixels. It follows lamps and shadows of
+/// the vehicle, which move over the ground.
+cv::Mat localGain(const cv::Mat& now, const cv::Mat& on_ground, const cv::Mat& known) {
+  cv::Mat compared, here, there, gain;
+  now.copyTo(compared, known);
+  cv::boxFilter(compared, here, CV_32F, cv::Size(kLight_px, kLight_px));
+  on_ground.copyTo(compared, known);
+  cv::boxFilter(compared, there, CV_32F, cv::Size(kLight_px, kLight_px));
+  cv::divide(here, cv::max(there, 1.0), gain);
+  return gain;
 }
 
 }  // namespace
@@ -157,6 +171,8 @@ std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const Grou
   const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
   std::nth_element(ratios.begin(), middle, ratios.end());
   const float gain = *middle;
+  const cv::Mat local_gain = localGain(now.smooth(warp.rows), on_ground, knows_ground);
+  const cv::Mat keeps_texture = keepsTexture(now.smooth(warp.rows), on_ground);
   cv::Mat fit(warp.rows.size(), CV_8UC1, cv::Scalar(0));
   if (wanted == Wanted::kAll) {
     fit =
@@ -175,8 +191,13 @@ std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const Grou
     const cv::Point nearest(cvRound(source[0]), cvRound(source[1]));
     const float brightness = now.smooth.data[at];
     const float tolerance = min_difference_ + kRelativeDifference * brightness;
-    const bool differs = brightness < gain * before.lowest.at<uint8_t>(nearest) - tolerance ||
-                         brightness > gain * before.highest.at<uint8_t>(nearest) + tolerance;
+    const float lowest = before.lowest.at<uint8_t>(nearest), highest = before.highest.at<uint8_t>(nearest);
+    const auto differsWith = [&](float factor) {
+      return brightness < factor * lowest - tolerance || brightness > factor * highest + tolerance;
+    };
+    const bool is_other_light =
+        keeps_texture.at<uint8_t>(row, column) != 0 && !differsWith(local_gain.at<float>(row, column));
+    const bool differs = differsWith(gain) && !is_other_light;
     result.push_back({pixel.ray, pixel.inverse, pixel.inverse * pixel.height_m / (pixel.height_m - kLow_m),
                       fit.at<uint8_t>(row, column) == PlaneFit::kGround,
                       fit.at<uint8_t>(row, column) == PlaneFit::kOther, differs});

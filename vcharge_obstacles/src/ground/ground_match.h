@@ -30,7 +30,7 @@ struct MatchedPixel {
   float from_inverse, to_inverse;  ///< strip of ground that the pixel covers, as inverse ranges
   bool is_ground;                  ///< fits the ground, and fits a plane above the ground worse
   bool is_other;                   ///< fits the plane above better, or neither
-  bool is_changed;                 ///< not the brightness of the ground
+  bool is_changed;                 ///< not the brightness of the ground, nor the ground in other light
 };
 
 /// Compares two images of a camera by the plane of the ground: the older one is warped as if all pixels

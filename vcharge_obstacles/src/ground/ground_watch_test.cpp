@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -66,8 +67,10 @@ class GroundWatchTest : public ::testing::Test {
         const Eigen::Vector3d& origin = world_from_camera.translation();
         const double range_m = world.castRay(origin, direction);
         const Eigen::Vector3d point_m = origin + range_m * direction;
-        const double brightness =
-            !std::isfinite(range_m) ? 230.0 : (point_m.z() > 1e-6 ? box_.at(point_m) : ground_.at(point_m));
+        const double light = light_ ? light_(world_from_body.inverse() * point_m) : 1.0;
+        const double brightness = !std::isfinite(range_m) ? 230.0
+                                  : point_m.z() > 1e-6    ? box_.at(point_m)
+                                                          : light * ground_.at(point_m);
         image.at<uint8_t>(y, x) = cv::saturate_cast<uint8_t>(gain_ * brightness + noise_(generator_));
       }
     }
@@ -118,6 +121,8 @@ class GroundWatchTest : public ::testing::Test {
   const Pattern ground_{110.0, 1}, box_{60.0, 2};
   std::vector<float> ground_pixels_;  // of the last comparison
   double gain_ = 1.0;
+  std::function<double(const Eigen::Vector3d& point_in_vehicle_m)>
+      light_;  // on the ground; null: 1 everywhere
   std::mt19937 generator_{3};
   std::normal_distribution<double> noise_{0.0, 2.0};
 };
@@ -156,6 +161,24 @@ TEST_F(GroundWatchTest, ChangeOfExposureIsNoChangeOfTheGround) {
                                       takeImage({}, poseAt(0.2, 0.0)), level, poseAt(0.2, 0.0))
                              .changed_fraction),
             0.02);
+}
+
+/// Light of a lamp of the vehicle, with its brightest spot beside the vehicle.
+double lampLight(const Eigen::Vector3d& point_m) {
+  return 0.5 + 1.2 * std::exp(-(point_m.head<2>() - Eigen::Vector2d(2.2, 2.4)).squaredNorm());
+}
+
+TEST_F(GroundWatchTest, LampOfTheVehicleIsNoChangeOfTheGround) {
+  light_ = lampLight;
+  EXPECT_LT(meanFraction(compare({}, {})), 0.02);
+}
+
+TEST_F(GroundWatchTest, PersonIsAChangeInTheLightOfALampToo) {
+  light_ = lampLight;
+  const std::vector<float> changed = compare({}, personAt(2.2));
+  for (const double y : {2.65, 2.8, 3.0}) {
+    EXPECT_GT(fractionAt(changed, 2.2 + 0.1 * (y - 2.65), y), 0.5) << y;
+  }
 }
 
 TEST_F(GroundWatchTest, MeasuredPitchIsNoChangeOfTheGround) {

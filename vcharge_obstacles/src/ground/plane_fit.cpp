@@ -155,4 +155,19 @@ cv::Mat fitPlanes(const cv::Mat& now, const cv::Mat& on_ground, const cv::Mat& o
   return fits;
 }
 
+cv::Mat keepsTexture(const cv::Mat& now, const cv::Mat& on_ground) {
+  Windows windows(now, {on_ground}, kWideHalf_px);
+  cv::Mat keeps(now.size(), CV_8UC1, cv::Scalar(0));
+  for (int row = 0; row < now.rows; ++row) {
+    windows.nextRow();
+    auto* result = keeps.ptr<uint8_t>(row);
+    for (int x = 0; x < now.cols; ++x) {
+      if (windows.varianceBefore(0, x) >= kTexture * kTexture && windows.correlation(0, x) >= kOther) {
+        result[x] = 255;
+      }
+    }
+  }
+  return keeps;
+}
+
 }  // namespace vcharge

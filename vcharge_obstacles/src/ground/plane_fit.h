@@ -24,4 +24,8 @@ struct PlaneFit {
 cv::Mat fitPlanes(const cv::Mat& now, const cv::Mat& on_ground, const cv::Mat& on_raised,
                   const cv::Mat& knows_raised);
 
+/// Where the ground around a pixel has texture that the newer image shows too, if only roughly and in
+/// whatever light; images as above. Returns CV_8UC1, 255 where it does and 0 elsewhere.
+cv::Mat keepsTexture(const cv::Mat& now, const cv::Mat& on_ground);
+
 }  // namespace vcharge

@@ -52,6 +52,18 @@ TEST(PlaneFitTest, GroundNeedsAPlaneAboveToCompareWith) {
             0.0);
 }
 
+TEST(PlaneFitTest, TextureIsKeptInWhateverLight) {
+  const cv::Mat now = noise(1), flat(kSize_px, kSize_px, CV_8UC1, cv::Scalar(100));
+  cv::Mat darker;
+  now.convertTo(darker, CV_8U, 0.4, 3.0);
+  EXPECT_EQ(fractionOf(keepsTexture(now, darker), 255), 1.0);
+  // Images of cv::RNG with successive seeds correlate. Windows of independent ones reach the bound in 3 %.
+  EXPECT_LT(fractionOf(keepsTexture(now, noise(12345)), 255), 0.1);
+  EXPECT_EQ(fractionOf(keepsTexture(flat, now), 255), 0.0) << "a plain body came";
+  EXPECT_EQ(fractionOf(keepsTexture(flat, flat), 255), 0.0)
+      << "plain ground cannot be told from a plain body";
+}
+
 TEST(PlaneFitTest, ImagesSmallerThanAWindowAreCompared) {
   const cv::Mat now = noise(1)(cv::Rect(0, 0, 3, 2)).clone();
   EXPECT_EQ(fitPlanes(now, now, now, known()(cv::Rect(0, 0, 3, 2))).size(), now.size());
