@@ -6,6 +6,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 
+#include "vcharge_core/motion/cross_matrix.h"
+
 namespace vcharge {
 namespace {
 
@@ -71,10 +73,8 @@ RigidTransform fitGroundMotion(const RigidTransform& before_from_now, const std:
       tangents.row(0) = first.transpose() / depth_m;
       tangents.row(1) = point.before.cross(first).transpose() / depth_m;
       const Eigen::Vector2d residual = -tangents * seen;
-      Eigen::Matrix3d cross;
-      cross << 0.0, -turned.z(), turned.y(), turned.z(), 0.0, -turned.x(), -turned.y(), turned.x(), 0.0;
       Eigen::Matrix<double, 2, 6> jacobian;
-      jacobian << -tangents * cross, tangents;
+      jacobian << -tangents * crossMatrix(turned), tangents;
       const double squared = residual.squaredNorm() / (scale * scale * sigma_rad * sigma_rad);
       const double weight = 1.0 / ((1.0 + squared) * (1.0 + squared) * sigma_rad * sigma_rad);
       information += weight * jacobian.transpose() * jacobian;

@@ -74,16 +74,18 @@ struct Measurement {
 
 /// Covariance of position and velocity of what measurements have in common; zero without cameras.
 Eigen::Matrix4d commonErrors(const Eigen::Vector2d& position_m,
-                             const std::vector<Eigen::Vector2d>& cameras_m) {
+                             const std::vector<RigidTransform>& fixed_from_cameras) {
   Eigen::Matrix4d covariance = Eigen::Matrix4d::Zero();
-  if (cameras_m.empty()) {
+  if (fixed_from_cameras.empty()) {
     return covariance;
   }
-  const Eigen::Vector2d camera_m =
-      *std::min_element(cameras_m.begin(), cameras_m.end(), [&](const auto& a, const auto& b) {
-        return (a - position_m).squaredNorm() < (b - position_m).squaredNorm();
-      });
-  const Eigen::Vector2d view_m = position_m - camera_m, along = view_m.normalized();
+  const auto viewFrom = [&](const RigidTransform& fixed_from_camera) -> Eigen::Vector2d {
+    return position_m - fixed_from_camera.translation().head<2>();
+  };
+  const auto nearest = std::min_element(
+      fixed_from_cameras.begin(), fixed_from_cameras.end(),
+      [&](const auto& a, const auto& b) { return viewFrom(a).squaredNorm() < viewFrom(b).squaredNorm(); });
+  const Eigen::Vector2d view_m = viewFrom(*nearest), along = view_m.normalized();
   const Eigen::Matrix2d along_view = along * along.transpose();
   const Eigen::Matrix2d across_view = Eigen::Matrix2d::Identity() - along_view;
   covariance.topLeftCorner<2, 2>() = kCommonAlong * kCommonAlong * view_m.squaredNorm() * along_view +
@@ -268,7 +270,7 @@ void ObjectFilter::finish() {
   mergeTwins();
 }
 
-TrackedObject ObjectFilter::describe(const Track& track) const {
+TrackedObject ObjectFilter::describe(const Track& track, const Eigen::Matrix4d& covariance) {
   TrackedObject object;
   object.id = track.id;
   object.existence_probability = 1.0 / (1.0 + std::exp(-track.existence_log_odds));
@@ -285,10 +287,10 @@ TrackedObject ObjectFilter::describe(const Track& track) const {
   object.is_standing = speed < 0.1;
   for (int row = 0; row < 2; ++row) {
     for (int column = 0; column < 2; ++column) {
-      object.covariance(row, column) = track.covariance(row, column);
-      object.covariance(row, column + 3) = track.covariance(row, column + 2);
-      object.covariance(row + 3, column) = track.covariance(row + 2, column);
-      object.covariance(row + 3, column + 3) = track.covariance(row + 2, column + 2);
+      object.covariance(row, column) = covariance(row, column);
+      object.covariance(row, column + 3) = covariance(row, column + 2);
+      object.covariance(row + 3, column) = covariance(row + 2, column);
+      object.covariance(row + 3, column + 3) = covariance(row + 2, column + 2);
     }
   }
   object.height_m = track.height_m;
@@ -311,14 +313,14 @@ TrackedObject ObjectFilter::describe(const Track& track) const {
   return object;
 }
 
-std::vector<TrackedObject> ObjectFilter::objects(const std::vector<Eigen::Vector2d>& cameras_m) const {
+std::vector<TrackedObject> ObjectFilter::objects(
+    const std::vector<RigidTransform>& fixed_from_cameras) const {
   std::vector<TrackedObject> found;
   for (const Track& track : tracks_) {
     if (track.existence_log_odds >= 0.0 && track.has_moved &&
         toSeconds(stamp_ - track.last_moving) < kKeptStanding_s) {
-      Track seen = track;
-      seen.covariance += commonErrors(track.state.head<2>(), cameras_m);
-      found.push_back(describe(seen));
+      found.push_back(
+          describe(track, track.covariance + commonErrors(track.state.head<2>(), fixed_from_cameras)));
     }
   }
   return found;

@@ -42,8 +42,8 @@ class ObjectFilter {
   /// Ends the stamp: objects that no camera has detected become less probable, and some end.
   void finish();
   /// Objects that probably exist, in the fixed frame. Their covariances contain the errors that successive
-  /// measurements have in common, as seen from the nearest of the cameras, if their positions are given.
-  std::vector<TrackedObject> objects(const std::vector<Eigen::Vector2d>& cameras_m = {}) const;
+  /// measurements have in common, as seen from the nearest of the cameras, if their poses are given.
+  std::vector<TrackedObject> objects(const std::vector<RigidTransform>& fixed_from_cameras = {}) const;
   void clear();
 
  private:
@@ -68,7 +68,7 @@ class ObjectFilter {
   bool walks(const Track& track) const;
   static bool movesLikePerson(const Track& track, double speed_sigmas);
   void note(const ObjectDetection& detection, const Eigen::Vector2d& position_m, Track* track) const;
-  TrackedObject describe(const Track& track) const;
+  static TrackedObject describe(const Track& track, const Eigen::Matrix4d& covariance);
   void mergeTwins();
 
   std::vector<Track> tracks_;

@@ -66,7 +66,10 @@ TEST(ObjectFilterTest, CommonErrorsLieAlongTheViewOfTheNearestCamera) {
   ASSERT_EQ(filter.objects().size(), 1U);
   const TrackedObject own = filter.objects().front();
   const Eigen::Vector2d here = own.frame_from_object.translation().head<2>();
-  const TrackedObject object = filter.objects({here - Eigen::Vector2d(4.0, 0.0), {0.0, 50.0}}).front();
+  const TrackedObject object = filter
+                                   .objects({RigidTransform::planar(here.x() - 4.0, here.y(), 0.0),
+                                             RigidTransform::planar(0.0, 50.0, 0.0)})
+                                   .front();
   const Eigen::Matrix2d common = (object.covariance - own.covariance).topLeftCorner<2, 2>();
   EXPECT_GT(common(0, 0), 4.0 * common(1, 1));
   EXPECT_GT(common(1, 1), 0.0);

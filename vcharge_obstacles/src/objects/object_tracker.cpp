@@ -217,10 +217,12 @@ std::vector<JudgedPoint> ObjectTracker::Camera::judge(const State& state, Mirror
     // The ground, lowered by its tolerance, is the farthest that a point can be.
     const double down = -(vehicle_from_camera.rotation() * track.back().ray_in_camera).z() - kGroundSlope;
     const double min_inverse_per_m = std::max(0.0, down / (height_m + kGroundBelow_m));
+    const RigidTransform camera_before_from_now =
+        vehicle_from_camera.inverse() * point.before_from_now * vehicle_from_camera;
     const auto compareFrom = [&](double least_inverse_per_m) {
       return compareWithStatic({track.back().ray_in_camera, track.front().ray_in_camera},
-                               vehicle_from_camera.inverse() * point.before_from_now * vehicle_from_camera,
-                               least_inverse_per_m, std::max(1.0 / kMinRange_m, min_inverse_per_m));
+                               camera_before_from_now, least_inverse_per_m,
+                               std::max(1.0 / kMinRange_m, min_inverse_per_m));
     };
     point.found = compareFrom(min_inverse_per_m);
     if (min_inverse_per_m > 0.0 && point.found.is_valid &&
@@ -371,14 +373,12 @@ void ObjectTracker::process(const ImageFrame& frame) {
   followByStereo(views, now, &state_->filter);
   state_->filter.finish();
   std::vector<RigidTransform> odom_from_cameras;
-  std::vector<Eigen::Vector2d> cameras_m;
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (camera) {
       odom_from_cameras.push_back(now * camera->vehicle_from_camera);
-      cameras_m.emplace_back(odom_from_cameras.back().translation().head<2>());
     }
   }
-  std::vector<TrackedObject> objects = state_->filter.objects(cameras_m);
+  std::vector<TrackedObject> objects = state_->filter.objects(odom_from_cameras);
   // While the vehicle stands, nothing static seems to move, and people may be in the map themselves.
   const double travel_m = (state_->poses.front().odom_from_vehicle.inverse() * now).translation().norm();
   if (options_.ignore_hidden && travel_m > kStandstill_m) {

@@ -4,22 +4,15 @@
 
 #include <Eigen/Cholesky>
 
+#include "vcharge_core/motion/cross_matrix.h"
+
 namespace vcharge {
-namespace {
-
-Eigen::Matrix3d crossMatrixOf(const Eigen::Vector3d& vector) {
-  Eigen::Matrix3d cross;
-  cross << 0.0, -vector.z(), vector.y(), vector.z(), 0.0, -vector.x(), -vector.y(), vector.x(), 0.0;
-  return cross;
-}
-
-}  // namespace
 
 RotationEquation rotationEquationOf(const StaticResidual& found, const Eigen::Vector3d& ray_before,
                                     double part, const Eigen::Matrix3d& vehicle_from_camera,
                                     double sigma_rad) {
   RotationEquation equation;
-  equation.by_rotation = part * found.tangents * crossMatrixOf(ray_before) * vehicle_from_camera.transpose();
+  equation.by_rotation = part * found.tangents * crossMatrix(ray_before) * vehicle_from_camera.transpose();
   equation.residual_rad = found.residual_rad;
   equation.sigma_rad = sigma_rad;
   equation.has_second = found.normal.isZero();

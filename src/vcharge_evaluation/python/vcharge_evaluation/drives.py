@@ -121,3 +121,9 @@ def found_masks(work, scene, words=()):
     """Masks of a car, found in a loop of the scene (or of the lot). `words` choose another car."""
     scene = scene if scene in MASK_SEEDS else "lot"
     return FoundMasks(loop_drive(work, scene, MASK_SEEDS[scene], MASK_SCALE, words=words))
+
+
+def scenario_with_masks(args, name, seed, words=()):
+    """A drive of config/scenarios as a stage's arguments want it (work, image_scale, duration_s), and its car's masks."""
+    drive = scenario_drive(args.work, name, seed, args.image_scale, args.duration_s, words)
+    return drive, found_masks(args.work, scene_and_drive(name)[0])

@@ -2,7 +2,7 @@
 import argparse
 
 from vcharge_evaluation.drawing.moments import OBJECT_LEGEND, draw_objects
-from vcharge_evaluation.drives import CONDITIONS, condition_words, found_masks, scenario_drive, scene_and_drive
+from vcharge_evaluation.drives import CONDITIONS, condition_words, scenario_with_masks
 from vcharge_evaluation.obstacles import detect_obstacles
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent, quantile
 from vcharge_evaluation.tools import NoResult, judge, say
@@ -104,8 +104,7 @@ def main():
                                   for condition in args.conditions):
         column = f"{name}, {condition}, seed {seed}"
         say(column)
-        drive = scenario_drive(args.work, name, seed, args.image_scale, args.duration_s, settings(name, condition))
-        masks = found_masks(args.work, scene_and_drive(name)[0])
+        drive, masks = scenario_with_masks(args, name, seed, settings(name, condition))
         title, folder = f"Moving objects within 8 m, {size}", drive.folder / "objects"
         try:
             detect_obstacles(drive, masks.rig_of(drive.folder), folder)

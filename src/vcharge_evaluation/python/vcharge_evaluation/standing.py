@@ -1,18 +1,19 @@
-"""Five minutes of standing in a living scene: how much of what stands is still in the obstacle map, and what is there wrongly."""
+"""Five minutes of standing in a living scene: how much of what stands is still in the obstacle map, and what is wrong in it."""
 import argparse
 import math
 
 import cv2
 import numpy as np
 
+from vcharge_evaluation.drawing.objects import rotation
 from vcharge_evaluation.drawing.obstacles import read_yaml, yaw_of
-from vcharge_evaluation.drives import found_masks, scenario_drive, scene_and_drive
+from vcharge_evaluation.drives import scenario_with_masks
 from vcharge_evaluation.obstacles import detect_obstacles
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure
 from vcharge_evaluation.tools import NoResult, say
 
 DRIVES = ("arrive_and_stand_lot",)
-REST_M = 0.02  # within so much of its last position the vehicle stands
+REST_M = 0.02  # within so much of its position in the middle of the drive the vehicle stands
 SETTLED_S = 1.0  # after this time of standing the map is the one that has to be held
 REACH_M = 8.0
 NEAR_M = 0.2  # an obstacle of the truth this near to a cell is in it: two cells
@@ -59,14 +60,10 @@ class Map:
         return cv2.dilate(picture, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) > 0
 
 
-def turn_by(yaw):
-    return np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
-
-
 def world_from_fixed(trajectory, stamp, held):
     """Rotation and translation of the frame of a map in the world, from the vehicle's true pose at its stamp."""
     pose = trajectory[np.argmin(abs(trajectory[:, 0] - stamp * 1e-9))]
-    turn = turn_by(yaw_of(pose[4:]) - held.yaw)
+    turn = rotation(yaw_of(pose[4:]) - held.yaw)
     return turn, pose[1:3] - turn @ held.here_m
 
 
@@ -77,8 +74,8 @@ def tall(obstacles):
 def judge_standing(drive, folder):
     """Fractions of cells, for each map after the first settled one. NoResult without a standstill."""
     trajectory = np.loadtxt(drive.trajectory)
-    last = trajectory[np.argmin(abs(trajectory[:, 0] - (trajectory[-1, 0] - 3.0)))]
-    rests = trajectory[np.linalg.norm(trajectory[:, 1:3] - last[1:3], axis=1) < REST_M]
+    middle = trajectory[len(trajectory) // 2]
+    rests = trajectory[np.linalg.norm(trajectory[:, 1:3] - middle[1:3], axis=1) < REST_M]
     stamps = sorted(int(path.stem) for path in folder.glob("*.yaml") if path.stem.isdigit())
     stamps = [stamp for stamp in stamps if rests[0, 0] + SETTLED_S <= stamp * 1e-9 <= rests[-1, 0]]
     if not stamps:
@@ -121,8 +118,7 @@ def main():
     for name, seed in ((name, seed) for name in args.drives for seed in args.seeds):
         column = f"{name}, seed {seed}"
         say(column)
-        drive = scenario_drive(args.work, name, seed, args.image_scale, args.duration_s, ("--image-step", args.image_step))
-        masks = found_masks(args.work, scene_and_drive(name)[0])
+        drive, masks = scenario_with_masks(args, name, seed, ("--image-step", args.image_step))
         folder = drive.folder / "obstacles"
         try:
             detect_obstacles(drive, masks.rig_of(drive.folder), folder)

@@ -1,7 +1,7 @@
 """Kerbs, steps and holes near the vehicle: the length that is found, and false steps. Bumps with ramps are no steps."""
 import argparse
 
-from vcharge_evaluation.drives import found_masks, scenario_drive, scene_and_drive
+from vcharge_evaluation.drives import scenario_with_masks, scene_and_drive
 from vcharge_evaluation.obstacles import detect_obstacles
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure
 from vcharge_evaluation.tools import NoResult, judge, say
@@ -57,8 +57,7 @@ def main():
     for name, seed in ((name, seed) for name in args.drives for seed in args.seeds):
         column = f"{name}, seed {seed}"
         say(column)
-        drive = scenario_drive(args.work, name, seed, args.image_scale, args.duration_s, plan(name, seed))
-        masks = found_masks(args.work, scene_and_drive(name)[0])
+        drive, masks = scenario_with_masks(args, name, seed, plan(name, seed))
         folder = drive.folder / "obstacles"
         try:
             detect_obstacles(drive, masks.rig_of(drive.folder), folder)

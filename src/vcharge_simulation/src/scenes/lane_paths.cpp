@@ -166,4 +166,19 @@ VehicleMotionOptions fromRestToRest(double cruise_speed_m_per_s) {
   return motion;
 }
 
+std::vector<SceneDrive> middleLaneDrives() {
+  return {
+      {{"stop_and_go", "along the middle lane with five stops"},
+       [] {
+         return DrivePlan{"", stopAndGo(RigidTransform::planar(-19.0, -0.3, 0.02)), fromRestToRest()};
+       }},
+      {{"arrive_and_stand", "10 m along the middle lane, with a stop of five minutes after 7 m"},
+       [] {
+         return DrivePlan{"", arriveAndStand(RigidTransform::planar(-12.0, 0.2, 0.02)), fromRestToRest(1.5)};
+       }},
+      {{"standing", "20 s at standstill"}, [] {
+         return DrivePlan{"", standingPath(RigidTransform::planar(-5.0, 0.2, 0.1)), standing(20.0)};
+       }}};
+}
+
 }  // namespace vcharge

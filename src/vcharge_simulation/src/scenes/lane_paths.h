@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 
+#include "scenes/scene_builders.h"
 #include "vcharge_simulation/vehicle/drive_path.h"
 #include "vcharge_simulation/vehicle/vehicle_motion.h"
 
@@ -58,5 +59,8 @@ VehicleMotionOptions standing(double duration_s);
 
 /// Motion that starts from standstill and stops at the end of the path.
 VehicleMotionOptions fromRestToRest(double cruise_speed_m_per_s = 2.5);
+
+/// The drives that all car parks have: along their middle lane, or at rest in it.
+std::vector<SceneDrive> middleLaneDrives();
 
 }  // namespace vcharge

@@ -1,3 +1,5 @@
+#include <utility>
+
 #include "scenes/garage/garage_layout.h"
 #include "scenes/lane_paths.h"
 #include "scenes/scene_builders.h"
@@ -33,7 +35,7 @@ DrivePlan shortDrive() {
 
 std::vector<SceneDrive> garageDrives(uint64_t layout_seed) {
   const GaragePlan plan = GaragePlan::fromSeed(layout_seed);
-  return {
+  std::vector<SceneDrive> drives = {
       {{"loop", "around all rows of bays, back to the start"}, loop(plan, kMapped_m, false, 0)},
       {{"loop_reverse_direction", "the loop, clockwise"}, loop(plan, kMapped_m, true, 0)},
       {{"both_directions", "175 s through all lanes in both directions, for mapping"},
@@ -46,10 +48,6 @@ std::vector<SceneDrive> garageDrives(uint64_t layout_seed) {
       {{"figure_eight",
         "counter-clockwise around the northern rows, then clockwise around the southern ones"},
        [plan] { return figureEight(plan); }},
-      {{"stop_and_go", "along the middle lane with five stops"},
-       [plan] {
-         return DrivePlan{"", stopAndGo(RigidTransform::planar(-19.0, -0.3, 0.02)), fromRestToRest()};
-       }},
       {{"bay_backwards", "backwards into a bay and out of it forwards"},
        [plan] {
          return DrivePlan{"", visitBayBackwards(plan.free_bay_x_m, -plan.lanes.y_m - 0.5),
@@ -66,15 +64,11 @@ std::vector<SceneDrive> garageDrives(uint64_t layout_seed) {
                           threePointTurn({plan.lanes.x_m + 0.6, plan.lanes.y_m, plan.lanes.corner_radius_m}),
                           fromRestToRest(2.0)};
        }},
-      {{"arrive_and_stand", "10 m along the middle lane, with a stop of five minutes after 7 m"},
-       [plan] {
-         return DrivePlan{"", arriveAndStand(RigidTransform::planar(-12.0, 0.2, 0.02)), fromRestToRest(1.5)};
-       }},
-      {{"standing", "20 s at standstill"},
-       [plan] {
-         return DrivePlan{"", standingPath(RigidTransform::planar(-5.0, 0.2, 0.1)), standing(20.0)};
-       }},
       {{"short", "5 s of gentle curves in the middle lane"}, shortDrive}};
+  for (SceneDrive& drive : middleLaneDrives()) {
+    drives.push_back(std::move(drive));
+  }
+  return drives;
 }
 
 }  // namespace vcharge

@@ -1,3 +1,5 @@
+#include <utility>
+
 #include "scenes/lane_paths.h"
 #include "scenes/lot/lot_layout.h"
 #include "scenes/scene_builders.h"
@@ -37,7 +39,7 @@ DrivePlan moving(const DrivePath& path, double duration_s) {
 std::vector<SceneDrive> lotDrives(uint64_t layout_seed) {
   const LotPlan plan = LotPlan::fromSeed(layout_seed);
   const Eigen::Vector2d middle_m(0.0, 0.0);
-  return {
+  std::vector<SceneDrive> drives = {
       {{"short", "5 s of gentle curves in the middle lane"},
        [plan] {
          return moving(gentleCurves(RigidTransform::planar(-7.0, -0.6 * plan.drive_offset, 0.06)), 5.0);
@@ -54,10 +56,6 @@ std::vector<SceneDrive> lotDrives(uint64_t layout_seed) {
       {{"other_day", "the loop in other light, with moved cars"}, loop(plan, middle_m, false, 1)},
       {{"other_day_beside", "other_day, 2 m beside both_directions"}, loop(plan, kOtherDay_m, false, 1)},
       {{"other_day_reverse_direction", "other_day_beside, clockwise"}, loop(plan, kOtherDay_m, true, 1)},
-      {{"stop_and_go", "along the middle lane with five stops"},
-       [plan] {
-         return DrivePlan{"", stopAndGo(RigidTransform::planar(-19.0, -0.3, 0.02)), fromRestToRest()};
-       }},
       {{"reverse_into_bay", "past a bay, then backwards into it"},
        [plan] {
          return DrivePlan{"", reverseIntoBay(plan.free_bay_x_m, -plan.lanes.y_m - 0.8, 12.0),
@@ -80,16 +78,12 @@ std::vector<SceneDrive> lotDrives(uint64_t layout_seed) {
       {{"straight", "46 m straight ahead at 4 m/s"},
        straight(RigidTransform::planar(4.0 - plan.lanes.x_m, -plan.lanes.y_m, 0.0),
                 2.0 * plan.lanes.x_m - 6.0, 4.0)},
-      {{"arrive_and_stand", "10 m along the middle lane, with a stop of five minutes after 7 m"},
-       [plan] {
-         return DrivePlan{"", arriveAndStand(RigidTransform::planar(-12.0, 0.2, 0.02)), fromRestToRest(1.5)};
-       }},
-      {{"standing", "20 s at standstill"},
-       [plan] {
-         return DrivePlan{"", standingPath(RigidTransform::planar(-5.0, 0.2, 0.1)), standing(20.0)};
-       }},
       {{"approach", "straight towards the plants at the western border"},
        straight(RigidTransform::planar(18.0 - plan.lanes.x_m, 0.0, 3.14159265358979323846), 15.0, 2.5)}};
+  for (SceneDrive& drive : middleLaneDrives()) {
+    drives.push_back(std::move(drive));
+  }
+  return drives;
 }
 
 }  // namespace vcharge
