@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 #include <vector>
+
+#include <Eigen/Eigenvalues>
 
 namespace vcharge {
 namespace {
@@ -11,8 +15,13 @@ namespace {
 constexpr float kLow_m = 0.2F;
 // Cells within this distance behind the first one contribute to the range of a higher obstacle.
 constexpr double kDepth_m = 0.2;
+// A surface is a line through at least this number of cells this near, of which it is this long and, at most,
+// this thick: standard deviations.
+constexpr int kMinSurfaceCells = 3;
+constexpr double kSurface_m = 0.3, kMinLength_m = 0.08, kMaxThickness_m = 0.035;
 
 struct Hit {
+  cv::Point cell;
   double range_m;
   double weight;
   float sigma_m, height_m, height_sigma_m;
@@ -44,7 +53,11 @@ std::vector<std::vector<Hit>> collectHits(const ObstacleMap& map, const Viewpoin
       const int first = static_cast<int>(std::floor((angle_rad - half_width_rad + M_PI) * per_rad));
       const int last = static_cast<int>(std::floor((angle_rad + half_width_rad + M_PI) * per_rad));
       const float sigma_m = map.point_sigma_m.at<float>(row, column);
-      const Hit hit{range_m, 1.0 / (sigma_m * sigma_m + 1e-4), sigma_m, map.height_m.at<float>(row, column),
+      const Hit hit{{column, row},
+                    range_m,
+                    1.0 / (sigma_m * sigma_m + 1e-4),
+                    sigma_m,
+                    map.height_m.at<float>(row, column),
                     map.height_sigma_m.at<float>(row, column)};
       for (int ray = first; ray <= last; ++ray) {
         hits[static_cast<size_t>(((ray % num_rays) + num_rays) % num_rays)].push_back(hit);
@@ -54,7 +67,63 @@ std::vector<std::vector<Hit>> collectHits(const ObstacleMap& map, const Viewpoin
   return hits;
 }
 
-void setRay(const std::vector<Hit>& hits, double cell_m, size_t ray, ObstacleScan* scan) {
+struct Crossing {
+  double range_m, sigma_m;  // sigma_m: of the surface's points, along the sector
+};
+
+/// Where the surface around an occupied cell, as a line through the cells' points, is nearest in a sector of
+/// this half width around an angle in the fixed frame. None if the cells form no line that crosses it.
+std::optional<Crossing> crossSurface(const ObstacleMap& map, const Viewpoint& viewpoint,
+                                     const cv::Point& cell, double angle_rad, double half_width_rad) {
+  const int reach = static_cast<int>(kSurface_m / map.cell_size_m);
+  std::vector<Eigen::Vector2d> points_m;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d square = Eigen::Matrix2d::Zero();
+  double sum = 0.0;
+  const cv::Rect window = cv::Rect(cell.x - reach, cell.y - reach, 2 * reach + 1, 2 * reach + 1) &
+                          cv::Rect(0, 0, map.state.cols, map.state.rows);
+  for (int row = window.y; row < window.br().y; ++row) {
+    for (int column = window.x; column < window.br().x; ++column) {
+      if (map.state.at<int8_t>(row, column) == kCellOccupied) {
+        const auto point = map.point_m.at<cv::Vec2f>(row, column);
+        const float sigma_m = map.point_sigma_m.at<float>(row, column);
+        const double weight = 1.0 / (sigma_m * sigma_m + 1e-4);
+        points_m.emplace_back(map.origin_m + Eigen::Vector2d(point[0], point[1]) - viewpoint.position_m);
+        mean += weight * points_m.back();
+        square += weight * points_m.back() * points_m.back().transpose();
+        sum += weight;
+      }
+    }
+  }
+  if (static_cast<int>(points_m.size()) < kMinSurfaceCells) {
+    return std::nullopt;
+  }
+  mean /= sum;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(square / sum - mean * mean.transpose());
+  const double thickness_m = std::sqrt(std::max(0.0, axes.eigenvalues()[0]));
+  if (thickness_m > kMaxThickness_m || axes.eigenvalues()[1] < kMinLength_m * kMinLength_m) {
+    return std::nullopt;
+  }
+  const Eigen::Vector2d normal = axes.eigenvectors().col(0), along = axes.eigenvectors().col(1);
+  double low_m = std::numeric_limits<double>::infinity(), high_m = -low_m;
+  for (const Eigen::Vector2d& point_m : points_m) {
+    low_m = std::min(low_m, along.dot(point_m) - 0.5 * map.cell_size_m);
+    high_m = std::max(high_m, along.dot(point_m) + 0.5 * map.cell_size_m);
+  }
+  std::optional<Crossing> nearest;
+  for (const double side_rad : {angle_rad - half_width_rad, angle_rad, angle_rad + half_width_rad}) {
+    const Eigen::Vector2d direction(std::cos(side_rad), std::sin(side_rad));
+    const double range_m = normal.dot(mean) / normal.dot(direction);
+    const double at_m = along.dot(direction) * range_m;
+    if (range_m > 0.0 && at_m >= low_m && at_m <= high_m && (!nearest || range_m < nearest->range_m)) {
+      nearest = Crossing{range_m, thickness_m / std::abs(normal.dot(direction))};
+    }
+  }
+  return nearest;
+}
+
+void setRay(const std::vector<Hit>& hits, const ObstacleMap& map, const Viewpoint& viewpoint, size_t ray,
+            ObstacleScan* scan) {
   if (hits.empty()) {
     return;
   }
@@ -79,7 +148,17 @@ void setRay(const std::vector<Hit>& hits, double cell_m, size_t ray, ObstacleSca
   const double mean_m = range_m / weight;
   scan->range_m[ray] = static_cast<float>(mean_m);
   // The position within a cell adds uncertainty.
-  const double spread_m2 = std::max(0.0, square_m2 / weight - mean_m * mean_m) + cell_m * cell_m / 12.0;
+  double spread_m2 =
+      std::max(0.0, square_m2 / weight - mean_m * mean_m) + map.cell_size_m * map.cell_size_m / 12.0;
+  const std::optional<Crossing> crossing =
+      nearest->height_m < kLow_m
+          ? std::nullopt
+          : crossSurface(map, viewpoint, nearest->cell, viewpoint.yaw_rad + scan->angle_rad(ray),
+                         0.5 * scan->angle_increment_rad);
+  if (crossing) {
+    scan->range_m[ray] = static_cast<float>(crossing->range_m);
+    spread_m2 = crossing->sigma_m * crossing->sigma_m;
+  }
   scan->range_sigma_m[ray] = static_cast<float>(std::sqrt(nearest->sigma_m * nearest->sigma_m + spread_m2));
 }
 
@@ -116,7 +195,7 @@ ObstacleScan makeScan(const ObstacleMap& map, int num_rays) {
   scan.name = "fused";
   const auto hits = collectHits(map, viewpoint, num_rays);
   for (size_t ray = 0; ray < scan.size(); ++ray) {
-    setRay(hits[ray], map.cell_size_m, ray, &scan);
+    setRay(hits[ray], map, viewpoint, ray, &scan);
     scan.free_m[ray] = freeRange(map, viewpoint, viewpoint.yaw_rad + scan.angle_rad(ray), max_range_m);
   }
   return scan;

@@ -77,6 +77,21 @@ TEST(MapScanTest, TopOfAKerbDoesNotPullItsEdgeBack) {
   }
 }
 
+TEST(MapScanTest, SurfaceIsNearestWhereItEntersASector) {
+  ObstacleMap map = makeMap();
+  constexpr float kAside_m = 0.33F;
+  for (int column = 24; column < 40; ++column) {  // a wall beside the vehicle, from 0.4 m ahead on
+    occupy(&map, column, 23, 0.5F);
+    map.point_m.at<cv::Vec2f>(23, column)[1] = 2.0F + kAside_m;
+  }
+  const ObstacleScan scan = makeScan(map, 360);
+  for (int degrees = 14; degrees < 32; ++degrees) {
+    const size_t ray = rayTo(scan, degrees * M_PI / 180.0);
+    const double entry_rad = scan.angle_rad(ray) + 0.5 * scan.angle_increment_rad;
+    EXPECT_NEAR(scan.range_m[ray], kAside_m / std::sin(entry_rad), 0.005) << degrees;
+  }
+}
+
 TEST(MapScanTest, FreeRangeEndsAtUnobservedGround) {
   ObstacleMap map = makeMap();
   map.state.colRange(30, 40).setTo(kCellUnobserved);
