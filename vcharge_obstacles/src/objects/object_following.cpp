@@ -85,6 +85,9 @@ class Follower {
   }
 
   double findBody(const ObjectFilter::Expected& object, const Seen& before, const Seen& now) const {
+    if (views_.is_at_rest) {
+      return 0.0;
+    }
     const std::optional<BodyMatch> match =
         matchBody(views_.panorama, views_.before, views_.now, before.bearing, now.bearing,
                   views_.camera_in_vehicle_m.z(), object.height_m,

@@ -22,13 +22,15 @@ struct TwoViews {
   RigidTransform fixed_from_vehicle_before, fixed_from_vehicle_now;
   double step_s = 0.0;
   Eigen::Vector3d camera_in_vehicle_m;
+  bool is_at_rest = false;
 };
 
 /// Measures the objects that the filter expects in a camera's view, without points to follow: the bearing at
-/// which the whole body is found again, and the contact with the ground below it. A bearing at which nothing
-/// static can be found makes an object more probable; one that contradicts its motion, less. `contact` is
-/// null if the ground was not compared. Each object is told how much it looks like a person, which makes a
-/// narrow one more or less probable; where it does, its bearing is that of the person.
+/// which the whole body is found again, and the contact with the ground below it. At rest, what is behind a
+/// body stays where it is and would be found again in its place, so bodies are not searched. A bearing at
+/// which nothing static can be found makes an object more probable; one that contradicts its motion, less.
+/// `contact` is null if the ground was not compared. Each object is told how much it looks like a person,
+/// which makes a narrow one more or less probable; where it does, its bearing is that of the person.
 void followObjects(const TwoViews& views, const GroundContact* contact, const PersonLikeness& people,
                    ObjectFilter* filter);
 

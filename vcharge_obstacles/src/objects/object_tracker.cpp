@@ -22,6 +22,7 @@
 #include "points/rotation_correction.h"
 #include "points/static_motion.h"
 #include "vcharge_core/base/error.h"
+#include "vcharge_core/frames/standstill.h"
 
 namespace vcharge {
 namespace {
@@ -114,7 +115,7 @@ struct ObjectTracker::Camera {
   std::vector<MovingPoint> movingPoints(const std::vector<JudgedPoint>& judged,
                                         const Eigen::Vector3d& rotation) const;
   bool compareGround(const State& state);
-  void follow(State* state, bool is_compared) const;
+  void follow(State* state, bool is_compared, bool is_at_rest) const;
   CameraMotion motion(const State& state) const;
   /// Motion of the vehicle since an image, such that the ground fits.
   RigidTransform groundMotion(Timestamp before, const RigidTransform& before_from_now) const {
@@ -296,7 +297,7 @@ CameraMotion ObjectTracker::Camera::motion(const State& state) const {
 }
 
 /// Finds the objects that are expected in the image.
-void ObjectTracker::Camera::follow(State* state, bool is_compared) const {
+void ObjectTracker::Camera::follow(State* state, bool is_compared, bool is_at_rest) const {
   if (state->poses.size() < 2 || panorama_before.empty()) {
     return;
   }
@@ -308,7 +309,8 @@ void ObjectTracker::Camera::follow(State* state, bool is_compared) const {
                        before.odom_from_vehicle,
                        now.odom_from_vehicle,
                        toSeconds(now.stamp - before.stamp),
-                       vehicle_from_camera.translation()};
+                       vehicle_from_camera.translation(),
+                       is_at_rest};
   followObjects(views, is_compared ? &contact : nullptr, people, &state->filter);
 }
 
@@ -329,6 +331,7 @@ void ObjectTracker::process(const ImageFrame& frame) {
   while (toSeconds(frame.stamp - state_->poses.front().stamp) > 1.5 * FollowedPoints::kHistory_s) {
     state_->poses.pop_front();
   }
+  const bool is_at_rest = standsAt(assembler_->odometry(), frame.stamp);
   std::vector<std::vector<JudgedPoint>> judged(cameras_.size());
   std::vector<RotationEquation> equations;
   for (size_t i = 0; i < cameras_.size(); ++i) {
@@ -362,7 +365,7 @@ void ObjectTracker::process(const ImageFrame& frame) {
       state_->filter.update(detectObjects(moving, cameras_[i]->contact, motion.position_m), now);
       state_->filter.update(findFreestanding(cameras_[i]->contact, motion), now);
     }
-    cameras_[i]->follow(state_.get(), is_compared);
+    cameras_[i]->follow(state_.get(), is_compared, is_at_rest);
   }
   std::vector<PanoramaView> views;
   for (const std::unique_ptr<Camera>& camera : cameras_) {
