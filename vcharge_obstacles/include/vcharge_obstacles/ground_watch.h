@@ -28,6 +28,13 @@ struct GroundAppearance {
   std::vector<float> ground_pixels;     ///< number of pixels that show the ground, less those that do not
 };
 
+/// What the images of a camera at rest tell about the ground, by PolarGrid::index.
+struct StandingAppearance {
+  std::vector<float> changed_fraction;  ///< pixels that have changed; empty without an earlier image
+  std::vector<float> same_fraction;  ///< pixels that show the texture of the first image; empty without one
+  Timestamp first;                   ///< stamp of the first image, taken once the body had come to rest
+};
+
 /// Compares the images of a camera by the plane of the ground. Whatever moves or rises above the ground does
 /// not fit. Motion stereo assumes a static scene and cannot range moving objects, and has few ranges near the
 /// direction of travel; this comparison needs no range. Deterministic; not thread safe.
@@ -45,10 +52,10 @@ class GroundWatch {
   /// camera's size. Uses only x, y and yaw of the pose. std::logic_error for an image of another size.
   GroundAppearance compare(Timestamp stamp, const cv::Mat& image, const GroundPlane& ground,
                            const RigidTransform& fixed_from_vehicle);
-  /// Fraction of each cell's ground pixels that have changed while the camera stood still, by
-  /// PolarGrid::index: since 0.24 s ago, or slowly within 3 s. Empty without an earlier image. Call clear()
-  /// when the vehicle has moved. std::logic_error for an image of another size.
-  std::vector<float> compareStanding(Timestamp stamp, const cv::Mat& image);
+  /// Compares an image of a camera that stands still with those 0.24 s and up to 3 s earlier, and with the
+  /// first one: what differs from any of them has changed. Call clear() when the vehicle has moved.
+  /// std::logic_error for an image of another size.
+  StandingAppearance compareStanding(Timestamp stamp, const cv::Mat& image);
   /// Drops all earlier images; call it when the poses have jumped.
   void clear();
 

@@ -83,8 +83,12 @@ class LocalObstacleMap {
   /// of the last moveTo(). Occupied cells keep their state.
   void forgetFree(const GroundArea& is_unwatched);
   /// Makes free cells within changed_margin_m of a point in the fixed frame unobserved, as the ground there
-  /// has changed; none of them becomes free within 0.3 s. Occupied cells keep their state.
-  void forgetAround(const Eigen::Vector2d& point_m, Timestamp stamp);
+  /// has changed between two stamps; none of them becomes free within 0.3 s of the last one. Occupied cells
+  /// keep their state.
+  void forgetAround(const Eigen::Vector2d& point_m, Timestamp first, Timestamp last);
+  /// Frees cells again that have lost their freedom after `since` and while the vehicle stood, for which
+  /// `is_same` is true: their ground looks as it did then. Occupied cells keep their state.
+  void restoreFree(Timestamp since, Timestamp stamp, const GroundArea& is_same);
   /// Moves all cells into a corrected fixed frame.
   void reanchor(const RigidTransform& new_from_old_fixed);
 
@@ -105,6 +109,8 @@ class LocalObstacleMap {
     int64_t last_seen_ns = kNever;  // INT64_MIN: never
     int64_t last_occupied_ns = kNever;
     int64_t held_until_ns = kNever;  // the cell cannot become free before
+    float lost_log_odds = 0.0F;      // of a free cell that became unobserved at rest, and when
+    int64_t lost_ns = kNever;
   };
   /// A camera's observation of the ground in one cell.
   struct GroundObservation;
@@ -127,10 +133,12 @@ class LocalObstacleMap {
   /// Weight of a camera's range map: maps from nearby positions use the same images, so errors correlate.
   double weightOf(const CameraObstacles& seen, const Eigen::Vector2d& position_m);
   double weightAtRest(const CameraObstacles& seen);
-  static void raiseAtRest(float log_odds, float most, Cell* cell);
-  static void hideAtRest(double weight, Cell* cell);
+  /// Makes a free cell unobserved.
+  static void takeFreedom(Timestamp stamp, Cell* cell);
+  static void raiseAtRest(float log_odds, float most, Timestamp stamp, Cell* cell);
+  static void hideAtRest(double weight, Timestamp stamp, Cell* cell);
   /// True if the cell's means shall take the observation.
-  bool occupyAtRest(double mass, Cell* cell) const;
+  bool occupyAtRest(double mass, Timestamp stamp, Cell* cell) const;
   static void clearAtRest(double mass, Cell* cell);
   void addGround(const CameraObstacles& seen, const PolarGrid& grid, const RigidTransform& fixed_from_vehicle,
                  const MapWeight& weight);
@@ -139,7 +147,7 @@ class LocalObstacleMap {
                                                const PolarGrid& grid,
                                                const RigidTransform& fixed_from_vehicle) const;
   void holdChanged(const std::vector<GroundObservation>& observations, Timestamp stamp);
-  void hold(int64_t x, int64_t y, double radius_m, Timestamp stamp);
+  void hold(int64_t x, int64_t y, double radius_m, Timestamp first, Timestamp last);
   void addGroundObservation(const GroundObservation& ground, const MapWeight& weight, Timestamp stamp);
   void addOccupied(const CameraObstacles& seen, const PolarGrid& grid,
                    const RigidTransform& fixed_from_vehicle, const MapWeight& weight);

@@ -182,13 +182,13 @@ void LocalObstacleMap::addGround(const CameraObstacles& seen, const PolarGrid& g
 void LocalObstacleMap::holdChanged(const std::vector<GroundObservation>& observations, Timestamp stamp) {
   for (const GroundObservation& ground : observations) {
     if (ground.cell.changed_fraction >= kMinChangedFraction) {
-      hold(ground.x, ground.y, ground.explained ? 0.0 : options_.changed_margin_m, stamp);
+      hold(ground.x, ground.y, ground.explained ? 0.0 : options_.changed_margin_m, stamp, stamp);
     }
   }
 }
 
-void LocalObstacleMap::hold(int64_t x, int64_t y, double radius_m, Timestamp stamp) {
-  const int64_t until_ns = (stamp + durationFromSeconds(kChangedHold_s)).nanoseconds();
+void LocalObstacleMap::hold(int64_t x, int64_t y, double radius_m, Timestamp first, Timestamp last) {
+  const int64_t until_ns = (last + durationFromSeconds(kChangedHold_s)).nanoseconds();
   const double radius = radius_m / options_.cell_size_m;
   const auto reach = static_cast<int64_t>(radius);
   for (int64_t row = y - reach; row <= y + reach; ++row) {
@@ -197,7 +197,7 @@ void LocalObstacleMap::hold(int64_t x, int64_t y, double radius_m, Timestamp sta
       if (distance <= radius && cells_.isInside(column, row)) {
         Cell& cell = cells_.at(column, row);
         cell.held_until_ns = std::max(cell.held_until_ns, until_ns);
-        cell.log_odds = std::max(cell.log_odds, 0.0F);
+        takeFreedom(first, &cell);
         cell.rest_log_odds = std::max(cell.rest_log_odds, 0.0F);
       }
     }
@@ -223,7 +223,7 @@ void LocalObstacleMap::addGroundObservation(const GroundObservation& ground, con
     cell->log_odds = static_cast<float>(std::max(least, log_odds));
   } else if (weight.is_at_rest) {
     if (cell->log_odds < 0.0F && (shows_ground || observed.hidden_fraction >= kMinHiddenFraction)) {
-      hideAtRest(weight.value, cell);
+      hideAtRest(weight.value, stamp, cell);
     }
   } else if (cell->log_odds < 0.0F &&
              (shows_ground || observed.hidden_fraction + observed.unknown_fraction >= kMinHiddenFraction)) {
@@ -245,7 +245,7 @@ void LocalObstacleMap::addObstaclePoint(const ObstaclePoint& point, Timestamp st
   if (!point.is_at_rest) {
     cell.log_odds = std::min(static_cast<float>(kMaxCellLogOdds),
                              cell.log_odds + static_cast<float>(kOccupiedLogOdds * point.mass));
-  } else if (!occupyAtRest(point.mass, &cell)) {
+  } else if (!occupyAtRest(point.mass, stamp, &cell)) {
     return;
   }
   const double sigma_m = point.sigma_m;
@@ -324,16 +324,17 @@ void LocalObstacleMap::forgetFree(const GroundArea& is_unwatched) {
   for (int64_t y = cells_.firstY(); y < cells_.firstY() + cells_.size(); ++y) {
     for (int64_t x = cells_.firstX(); x < cells_.firstX() + cells_.size(); ++x) {
       Cell& cell = cells_.at(x, y);
-      if (cell.log_odds < 0.0F &&
+      if ((cell.log_odds < 0.0F || cell.lost_ns != kNever) &&
           is_unwatched(transformed(vehicle_from_fixed, {(x + 0.5) * cell_m, (y + 0.5) * cell_m}))) {
-        cell.log_odds = 0.0F;
+        cell.log_odds = std::max(cell.log_odds, 0.0F);
+        cell.lost_ns = kNever;
       }
     }
   }
 }
 
-void LocalObstacleMap::forgetAround(const Eigen::Vector2d& point_m, Timestamp stamp) {
-  hold(cells_.indexOf(point_m.x()), cells_.indexOf(point_m.y()), options_.changed_margin_m, stamp);
+void LocalObstacleMap::forgetAround(const Eigen::Vector2d& point_m, Timestamp first, Timestamp last) {
+  hold(cells_.indexOf(point_m.x()), cells_.indexOf(point_m.y()), options_.changed_margin_m, first, last);
 }
 
 int8_t LocalObstacleMap::stateOf(const Cell& cell) const {

@@ -269,7 +269,7 @@ void ObstacleMapper::fuse(Frame* frame, const RigidTransform& fixed_from_vehicle
   }
   moveTo(frame->stamp, fixed_from_vehicle, &map_);
   steps_.moveTo(frame->stamp, fixed_from_vehicle);
-  standing_->forgetChanged(frame->stamp, anchor_, &map_);
+  standing_->apply(frame->stamp, anchor_, &map_);
   standing_->dropChanges(frame->stamp);
   last_fused_ = frame->stamp;
   std::vector<const CameraObstacles*> cameras;
@@ -338,7 +338,7 @@ void ObstacleMapper::emitAt(Timestamp stamp) {
   if (const std::optional<RigidTransform> fixed_from_vehicle = fixedFromVehicle(odomFromVehicle(stamp))) {
     LocalObstacleMap moved = map_;
     moveTo(stamp, *fixed_from_vehicle, &moved);
-    standing_->forgetChanged(stamp, anchor_, &moved);
+    standing_->apply(stamp, anchor_, &moved);
     StepMapper moved_steps = steps_;
     moved_steps.moveTo(stamp, *fixed_from_vehicle);
     emit(moved, moved_steps, {});

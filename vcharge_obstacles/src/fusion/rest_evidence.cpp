@@ -36,21 +36,48 @@ double LocalObstacleMap::weightAtRest(const CameraObstacles& seen) {
   return is_first ? 1.0 : std::clamp(waited_s / kFullWeight_s, 0.0, 1.0);
 }
 
-void LocalObstacleMap::raiseAtRest(float log_odds, float most, Cell* cell) {
-  cell->rest_log_odds = std::max(cell->rest_log_odds, std::min(cell->rest_log_odds + log_odds, most));
-  if (cell->rest_log_odds >= kTakesFreedom) {
-    cell->log_odds = std::max(cell->log_odds, 0.0F);
+void LocalObstacleMap::takeFreedom(Timestamp stamp, Cell* cell) {
+  if (cell->log_odds < 0.0F) {
+    cell->lost_log_odds = cell->log_odds;
+    cell->lost_ns = stamp.nanoseconds();
+    cell->log_odds = 0.0F;
   }
 }
 
-void LocalObstacleMap::hideAtRest(double weight, Cell* cell) {
-  raiseAtRest(static_cast<float>(weight) * kGroundLogOdds, kTakesFreedom, cell);
+void LocalObstacleMap::raiseAtRest(float log_odds, float most, Timestamp stamp, Cell* cell) {
+  cell->rest_log_odds = std::max(cell->rest_log_odds, std::min(cell->rest_log_odds + log_odds, most));
+  if (cell->rest_log_odds >= kTakesFreedom) {
+    takeFreedom(stamp, cell);
+  }
 }
 
-bool LocalObstacleMap::occupyAtRest(double mass, Cell* cell) const {
+void LocalObstacleMap::hideAtRest(double weight, Timestamp stamp, Cell* cell) {
+  raiseAtRest(static_cast<float>(weight) * kGroundLogOdds, kTakesFreedom, stamp, cell);
+}
+
+bool LocalObstacleMap::occupyAtRest(double mass, Timestamp stamp, Cell* cell) const {
   const float before = cell->rest_log_odds;
-  raiseAtRest(static_cast<float>(mass) * kOccupiedLogOdds, kMostAtRest, cell);
+  raiseAtRest(static_cast<float>(mass) * kOccupiedLogOdds, kMostAtRest, stamp, cell);
   return cell->rest_log_odds > before && cell->log_odds < static_cast<float>(options_.occupied_threshold);
+}
+
+void LocalObstacleMap::restoreFree(Timestamp since, Timestamp stamp, const GroundArea& is_same) {
+  const RigidTransform vehicle_from_fixed = fixed_from_vehicle_.inverse();
+  const double cell_m = options_.cell_size_m;
+  for (int64_t y = cells_.firstY(); y < cells_.firstY() + cells_.size(); ++y) {
+    for (int64_t x = cells_.firstX(); x < cells_.firstX() + cells_.size(); ++x) {
+      Cell& cell = cells_.at(x, y);
+      if (cell.lost_ns <= since.nanoseconds() || cell.log_odds > 0.0F || cell.rest_log_odds > 0.0F ||
+          stamp.nanoseconds() < cell.held_until_ns) {
+        continue;
+      }
+      const Eigen::Vector3d middle_m((x + 0.5) * cell_m, (y + 0.5) * cell_m, 0.0);
+      if (is_same((vehicle_from_fixed * middle_m).head<2>())) {
+        cell.log_odds = std::min(cell.log_odds, cell.lost_log_odds);
+        cell.lost_ns = kNever;
+      }
+    }
+  }
 }
 
 void LocalObstacleMap::clearAtRest(double mass, Cell* cell) {

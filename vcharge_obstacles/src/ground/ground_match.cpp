@@ -195,12 +195,12 @@ std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const Grou
     const auto differsWith = [&](float factor) {
       return brightness < factor * lowest - tolerance || brightness > factor * highest + tolerance;
     };
-    const bool is_other_light =
-        keeps_texture.at<uint8_t>(row, column) != 0 && !differsWith(local_gain.at<float>(row, column));
+    const bool has_texture = keeps_texture.at<uint8_t>(row, column) != 0;
+    const bool is_other_light = has_texture && !differsWith(local_gain.at<float>(row, column));
     const bool differs = differsWith(gain) && !is_other_light;
     result.push_back({pixel.ray, pixel.inverse, pixel.inverse * pixel.height_m / (pixel.height_m - kLow_m),
                       fit.at<uint8_t>(row, column) == PlaneFit::kGround,
-                      fit.at<uint8_t>(row, column) == PlaneFit::kOther, differs});
+                      fit.at<uint8_t>(row, column) == PlaneFit::kOther, differs, has_texture});
   }
   return result;
 }

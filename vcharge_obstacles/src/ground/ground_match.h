@@ -31,6 +31,7 @@ struct MatchedPixel {
   bool is_ground;                  ///< fits the ground, and fits a plane above the ground worse
   bool is_other;                   ///< fits the plane above better, or neither
   bool is_changed;                 ///< not the brightness of the ground, nor the ground in other light
+  bool keeps_texture;              ///< its surroundings have the texture of the ground
 };
 
 /// Compares two images of a camera by the plane of the ground: the older one is warped as if all pixels

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "ground/ground_match.h"
 #include "vcharge_core/base/error.h"
@@ -14,6 +16,8 @@ constexpr double kInterval_s = 0.24;
 constexpr double kMaxInterval_s = 1.0;
 // Images are kept for this time.
 constexpr double kMaxAge_s = 3.0;
+// The body of a vehicle that has stopped pitches for this time.
+constexpr double kSettled_s = 0.6;
 // Nearest ground that is compared.
 constexpr double kNearest_m = 0.3;
 // Range up to which the ground is decided with an image at a distance.
@@ -60,7 +64,11 @@ struct GroundWatch::Implementation {
   }
   const GroundView* viewBefore(Timestamp stamp) const;
   const GroundView* viewAt(double baseline_m) const;
-  std::vector<float> changedFraction(const GroundView& before, const GroundPlane& ground) const;
+  /// Fractions of the ground pixels of each cell, by PolarGrid::index; empty if none can be compared.
+  struct Fractions {
+    std::vector<float> changed, same;
+  };
+  Fractions compareWith(const GroundView& before, const GroundPlane& ground) const;
   std::vector<float> groundPixels(const GroundPlane& ground) const;
 
   const double max_distance_m;
@@ -70,6 +78,8 @@ struct GroundWatch::Implementation {
   const PixelRays rays;
   const GroundMatch match;
   std::deque<GroundView> views;  // the last one is the current one
+  std::optional<Timestamp> stands_since;
+  std::optional<GroundView> first_at_rest;
 };
 
 /// The view whose age is nearest to the interval; null if there is none.
@@ -103,26 +113,29 @@ const GroundView* GroundWatch::Implementation::viewAt(double baseline_m) const {
   return best;
 }
 
-std::vector<float> GroundWatch::Implementation::changedFraction(const GroundView& before,
-                                                                const GroundPlane& ground) const {
+GroundWatch::Implementation::Fractions GroundWatch::Implementation::compareWith(
+    const GroundView& before, const GroundPlane& ground) const {
   const std::vector<MatchedPixel> pixels =
       match.compare(views.back(), before, ground, kNearest_m, max_distance_m, GroundMatch::Wanted::kChanges);
   if (pixels.empty()) {
     return {};
   }
-  StripSum changed(grid), compared(grid);
+  StripSum changed(grid), same(grid), compared(grid);
   for (const MatchedPixel& pixel : pixels) {
     compared.add(rays.polar_ray[pixel.ray], pixel.from_inverse, pixel.to_inverse, 1.0F);
     if (pixel.is_changed) {
       changed.add(rays.polar_ray[pixel.ray], pixel.from_inverse, pixel.to_inverse, 1.0F);
+    } else if (pixel.keeps_texture) {
+      same.add(rays.polar_ray[pixel.ray], pixel.from_inverse, pixel.to_inverse, 1.0F);
     }
   }
-  std::vector<float> fraction = changed.finish();
+  Fractions fractions{changed.finish(), same.finish()};
   const std::vector<float> all = compared.finish();
-  for (size_t i = 0; i < fraction.size(); ++i) {
-    fraction[i] /= all[i] + 1.0F;  // the additional pixel reduces the effect of single pixels
+  for (size_t i = 0; i < all.size(); ++i) {
+    fractions.changed[i] /= all[i] + 1.0F;  // the additional pixel reduces the effect of single pixels
+    fractions.same[i] /= all[i] + 1.0F;
   }
-  return fraction;
+  return fractions;
 }
 
 std::vector<float> GroundWatch::Implementation::groundPixels(const GroundPlane& ground) const {
@@ -176,7 +189,7 @@ GroundAppearance GroundWatch::compare(Timestamp stamp, const cv::Mat& image, con
   self.addView(stamp, image, planar * levelFromBody(ground));
   GroundAppearance appearance;
   if (const GroundView* before = self.viewBefore(stamp)) {
-    appearance.changed_fraction = self.changedFraction(*before, ground);
+    appearance.changed_fraction = self.compareWith(*before, ground).changed;
   }
   if (ground.state == GroundState::kMeasured) {
     appearance.ground_pixels = self.groundPixels(ground);
@@ -184,28 +197,41 @@ GroundAppearance GroundWatch::compare(Timestamp stamp, const cv::Mat& image, con
   return appearance;
 }
 
-std::vector<float> GroundWatch::compareStanding(Timestamp stamp, const cv::Mat& image) {
+StandingAppearance GroundWatch::compareStanding(Timestamp stamp, const cv::Mat& image) {
   Implementation& self = *implementation_;
   self.addView(stamp, image, RigidTransform());
-  const GroundView* before = self.viewBefore(stamp);
-  if (before == nullptr) {
-    return {};
-  }
   const GroundPlane level;
-  std::vector<float> changed = self.changedFraction(*before, level);
-  const GroundView& oldest = self.views.front();
-  if (&oldest == before || changed.empty()) {
-    return changed;
+  StandingAppearance appearance;
+  const auto addChanges = [&](const std::vector<float>& changed) {
+    appearance.changed_fraction.resize(changed.empty() ? appearance.changed_fraction.size() : changed.size());
+    for (size_t i = 0; i < changed.size(); ++i) {
+      appearance.changed_fraction[i] = std::max(appearance.changed_fraction[i], changed[i]);
+    }
+  };
+  const GroundView* before = self.viewBefore(stamp);
+  if (before != nullptr) {
+    addChanges(self.compareWith(*before, level).changed);
+    if (before != &self.views.front()) {
+      addChanges(self.compareWith(self.views.front(), level).changed);
+    }
   }
-  const std::vector<float> slowly = self.changedFraction(oldest, level);
-  for (size_t i = 0; i < slowly.size(); ++i) {
-    changed[i] = std::max(changed[i], slowly[i]);
+  if (self.first_at_rest) {
+    appearance.first = self.first_at_rest->stamp;
+    Implementation::Fractions fractions = self.compareWith(*self.first_at_rest, level);
+    addChanges(fractions.changed);
+    appearance.same_fraction = std::move(fractions.same);
+  } else if (!self.stands_since) {
+    self.stands_since = stamp;
+  } else if (toSeconds(stamp - *self.stands_since) >= kSettled_s) {
+    self.first_at_rest = self.views.back();
   }
-  return changed;
+  return appearance;
 }
 
 void GroundWatch::clear() {
   implementation_->views.clear();
+  implementation_->stands_since.reset();
+  implementation_->first_at_rest.reset();
 }
 
 }  // namespace vcharge

@@ -21,8 +21,8 @@ namespace vcharge {
 
 /// Watches the ground while the vehicle stands and gets no range maps, or only where cameras overlap: the map
 /// keeps what it holds, except where images tell that something has changed. What changes there becomes
-/// unknown, and stays so until it is measured again. The result depends on stamps only, not on the order in
-/// which images, range maps and odometry arrive. Not thread safe.
+/// unknown, and stays so until it is measured again, or until the ground looks as it did before. The result
+/// depends on stamps only, not on the order in which images, range maps and odometry arrive. Not thread safe.
 class StandingWatch {
  public:
   using Pixels = std::function<cv::Mat()>;
@@ -40,8 +40,8 @@ class StandingWatch {
   /// Compares the images up to a stamp that the odometry has reached. std::logic_error for another size than
   /// the rig's.
   void settle(Timestamp until, const OdometryAt& odometry_at);
-  /// Makes unknown what has changed up to a stamp.
-  void forgetChanged(Timestamp until, const RigidTransform& fixed_from_odom, LocalObstacleMap* map) const;
+  /// Makes unknown what has changed up to a stamp, and free again what looks as it did when it was free.
+  void apply(Timestamp until, const RigidTransform& fixed_from_odom, LocalObstacleMap* map) const;
   /// Drops the changes up to a stamp: they are in the map.
   void dropChanges(Timestamp until);
   /// The poses have jumped, or the drive starts again.
@@ -55,6 +55,8 @@ class StandingWatch {
 
   void compare(Camera* camera, Timestamp stamp, const cv::Mat& pixels,
                const RigidTransform& odom_from_vehicle);
+  void forgetChanged(Timestamp until, const RigidTransform& fixed_from_odom, LocalObstacleMap* map) const;
+  void restoreUnchanged(Timestamp until, LocalObstacleMap* map) const;
 
   const std::shared_ptr<const CameraRig> rig_;
   const PolarGrid grid_;

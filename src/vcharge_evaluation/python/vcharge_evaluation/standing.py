@@ -4,6 +4,7 @@ import math
 
 import cv2
 import numpy as np
+from matplotlib.path import Path
 
 from vcharge_evaluation.drawing.objects import rotation
 from vcharge_evaluation.drawing.obstacles import read_yaml, yaw_of
@@ -59,6 +60,13 @@ class Map:
         reach = int(math.ceil(NEAR_M / self.cell_m))
         return cv2.dilate(picture, np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)) > 0
 
+    def inside(self, outlines, world_from_fixed):
+        """Cells whose middles are inside outlines in the world."""
+        turn, shift = world_from_fixed
+        points = (self.centres() @ turn.T + shift).reshape(-1, 2)
+        hits = [Path(outline).contains_points(points) for outline in outlines]
+        return np.any(hits, axis=0).reshape(self.gray.shape) if hits else np.zeros(self.gray.shape, bool)
+
 
 def world_from_fixed(trajectory, stamp, held):
     """Rotation and translation of the frame of a map in the world, from the vehicle's true pose at its stamp."""
@@ -88,7 +96,7 @@ def judge_standing(drive, folder):
     standing = held.draw(tall(read_yaml(drive.truth / "obstacles.yaml")["obstacles"]), place)
     solid = near & standing & (held.gray == OCCUPIED) & ~held.draw(moving[stamps[0]], place)
     free = near & ~standing & (held.gray == FREE)
-    kept, still_free, wrong = [], [], []
+    kept, still_free, wrong, under, under_free = [], [], [], 0, 0
     for stamp in stamps[1:]:
         gray = Map(folder, stamp).gray
         hidden = held.draw(moving[stamp], place)
@@ -96,8 +104,11 @@ def judge_standing(drive, folder):
         kept.append(np.mean(occupied[solid & ~hidden]))
         still_free.append(np.mean(gray[free & ~hidden] == FREE))
         wrong.append(np.mean(gray[free & ~hidden] == OCCUPIED))
+        below = near & held.inside(moving[stamp], place)
+        under += below.sum()
+        under_free += (below & (gray == FREE)).sum()
     return {"duration_s": (stamps[-1] - stamps[0]) * 1e-9, "cells": int(solid.sum()), "kept": np.array(kept),
-            "still_free": np.array(still_free), "wrong": np.array(wrong)}
+            "still_free": np.array(still_free), "wrong": np.array(wrong), "under": int(under), "under_free": int(under_free)}
 
 
 def standing_figures(errors):
@@ -106,6 +117,8 @@ def standing_figures(errors):
     yield Figure("free cells that are still free, mean", 100 * errors["still_free"].mean(), "%")
     yield Figure("free cells that are occupied with nothing there, mean", 100 * errors["wrong"].mean(), "%")
     yield Figure("the same, worst map", 100 * errors["wrong"].max(), "%")
+    yield Figure("cells under movers that are free, of all maps", errors["under_free"])
+    yield Figure("cells under movers, of all maps", errors["under"])
     yield Figure("cells of what stands", errors["cells"])
     yield Figure("stood", errors["duration_s"], "s")
 
