@@ -34,8 +34,11 @@ struct SweepImage {
   Timestamp stamp;
   cv::Mat pixels;  ///< CV_8UC1, size of the working camera
   RigidTransform world_from_camera;
-  /// Camera of a neighbour; null: the swept camera. Poses of other cameras are not refined.
+  /// Camera of a neighbour; null: the swept camera.
   std::shared_ptr<const SweepCamera> camera = nullptr;
+  /// Fraction of the variances of PoseNoiseOptions that a neighbour's pose has; less than 1 if it was
+  /// refined.
+  double rotation_variance_left = 1.0, translation_variance_left = 1.0;
 };
 
 /// Intermediate results of the sweep at full resolution, for tests and figures.

@@ -65,8 +65,6 @@ struct PlaneSweepOptions {
   VCHARGE_OPTION(int, num_refinement_steps, 16, between(0, 256),
                  "Samples of the second, finer sweep around the surface of the first; 0: no second sweep.");
   VCHARGE_OPTION_GROUP(PoseNoiseOptions, pose_noise, {}, "Random errors of the images' relative poses.");
-  VCHARGE_OPTION(bool, refine_poses, false, anyValue(),
-                 "Tracked image points correct the neighbours' relative poses within pose_noise.");
   VCHARGE_OPTION(
       double, min_texture, 2.0, notNegative(),
       "Standard deviation in gray levels of the reference window below which the range is unknown.");

@@ -19,6 +19,7 @@ namespace vcharge {
 
 class InterCameraStereo;
 struct InstantImages;
+class MotionRefinement;
 class WorkingImages;
 
 /// Numbers of planes, neighbours and refinement steps that trade accuracy for time.
@@ -51,6 +52,9 @@ struct RangeMapperOptions {
   VCHARGE_OPTION(InterCamera, inter_camera, InterCamera::kOff, anyValue(),
                  "Whether cameras with overlapping images are matched with each other: only while standing, "
                  "always, or not.");
+  VCHARGE_OPTION(bool, refine_poses, true, anyValue(),
+                 "Image points followed in all cameras correct the relative poses of images within "
+                 "plane_sweep.pose_noise.");
   VCHARGE_OPTION_GROUP(WorkingCameraOptions, working_camera, {}, "Undistorted images that are swept.");
   VCHARGE_OPTION_GROUP(NeighbourOptions, neighbours, {}, "Images that a reference is matched with.");
   VCHARGE_OPTION_GROUP(PlaneSweepOptions, plane_sweep, {}, "Planes, scores and limits of reported ranges.");
@@ -59,7 +63,6 @@ struct RangeMapperOptions {
 
   RangeMapperOptions() {
     frames.max_speed_m_per_s = 60.0;
-    plane_sweep.refine_poses = true;  // the poses of a drive usually come from odometry
     plane_sweep.coarse_pass = true;
   }
 
@@ -106,7 +109,8 @@ struct RangeTask {
 };
 
 /// Turns the images and odometry of a drive into sweeps: undistorts images, keeps the latest of each camera,
-/// interpolates their poses and selects neighbours by baseline. Used by nodelets and offline tools.
+/// interpolates their poses, refines them (see MotionRefinement), and selects neighbours by baseline. Used by
+/// nodelets and offline tools.
 ///
 /// addImage() and addOdometry() pass each reference to `on_task`, per camera in the order of stamps. The
 /// callback calls sweep() at once or later from another thread; only sweep() may be called concurrently. A
@@ -149,12 +153,15 @@ class RangeMapper : public DriveConsumer {
   struct Camera;
 
   void process(const ImageFrame& frame);
+  void followPoints(const ImageFrame& frame, WorkingImages* images);
   static void correctPoses(Camera* camera, const std::vector<CorrectedPose>& corrections);
   void addImageWithPose(Camera* camera, const ImageFrame& frame, WorkingImages* images);
   void startOver(DriveBreak drive_break);
   void addFrame(Camera* camera, const SweepImage& frame, std::shared_ptr<const InstantImages> instant);
   void emitReferences(Camera* camera, bool drive_is_over);
   void emitReference(Camera* camera, size_t index);
+  /// A neighbour with its pose relative to the reference refined.
+  SweepImage refined(const Camera& camera, const SweepImage& neighbour, const SweepImage& reference);
   void emit(Camera* camera, RangeTask task);
 
   const std::shared_ptr<const CameraRig> rig_;
@@ -162,6 +169,7 @@ class RangeMapper : public DriveConsumer {
   const TaskCallback on_task_;
   std::vector<std::unique_ptr<Camera>> cameras_;     // indexed as in the rig; null: not in use
   std::unique_ptr<const InterCameraStereo> stereo_;  // null: off
+  std::unique_ptr<MotionRefinement> motion_;         // null: poses are used as they are given
   std::unique_ptr<ImageFrameAssembler> assembler_;
 };
 

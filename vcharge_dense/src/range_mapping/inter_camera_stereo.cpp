@@ -40,7 +40,6 @@ PlaneSweepOptions stereoOptions(PlaneSweepOptions options) {
   options.num_fill_levels = 0;
   options.coarse_pass = false;  // loses a fifth of the ranges
   options.aggregation = Aggregation::kMean;
-  options.refine_poses = false;
   options.pose_noise.scale = 0.0;
   options.pose_noise.translation_m = kTranslationNoise_m;
   options.pose_noise.translation_m_per_sqrt_m = 0.0;

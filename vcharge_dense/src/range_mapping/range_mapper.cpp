@@ -1,12 +1,14 @@
 #include "vcharge_dense/range_mapper.h"
 
+#include <algorithm>
 #include <deque>
-#include <stdexcept>
-#include <string_view>
+#include <limits>
 #include <utility>
 
 #include "range_mapping/inter_camera_stereo.h"
+#include "range_mapping/motion_refinement.h"
 #include "range_mapping/range_fusion.h"
+#include "range_mapping/working_images.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/frames/standstill.h"
 
@@ -26,81 +28,6 @@ struct Frame {
 
 }  // namespace
 
-RangeMapperOptions RangeMapperOptions::offline() {
-  RangeMapperOptions options;
-  options.frames.waitForEverything();
-  options.use_later_images = true;
-  options.plane_sweep.aggregation = Aggregation::kReferenceSplit;
-  return options;
-}
-
-void RangeMapperOptions::usePreset(RangePreset new_preset) {
-  preset = new_preset;
-  const PlaneSweepOptions default_sweep;
-  neighbours.num_neighbours = NeighbourOptions().num_neighbours;
-  plane_sweep.num_planes = default_sweep.num_planes;
-  plane_sweep.num_ground_planes = default_sweep.num_ground_planes;
-  plane_sweep.num_refinement_steps = default_sweep.num_refinement_steps;
-  switch (preset) {
-    case RangePreset::kFast:
-      plane_sweep.num_planes = 40;
-      plane_sweep.num_ground_planes = 8;
-      plane_sweep.num_refinement_steps = 8;
-      break;
-    case RangePreset::kDefault:
-      break;
-    case RangePreset::kAccurate:
-      neighbours.num_neighbours = 6;
-      plane_sweep.num_planes = 96;
-      break;
-  }
-}
-
-void RangeMapperOptions::fieldWasRead(const char* field) {
-  if (std::string_view(field) == "preset") {
-    usePreset(preset);
-  }
-}
-
-void RangeMapperOptions::checkFields() const {
-  requireField(!use_later_images || neighbours.num_neighbours % 2 == 0, "neighbours.num_neighbours",
-               "must be even where later images are used", neighbours.num_neighbours);
-}
-
-/// The working images of one frame, undistorted at their first use.
-class WorkingImages {
- public:
-  WorkingImages(const ImageFrame& frame, std::vector<const WorkingCamera*> cameras,
-                const InterCameraStereo* stereo)
-      : frame_(frame), cameras_(std::move(cameras)), stereo_(stereo), pixels_(cameras_.size()) {}
-
-  const cv::Mat& of(size_t camera) {
-    if (pixels_[camera].empty()) {
-      pixels_[camera] = cameras_[camera]->undistort(frame_.images[camera].pixels);
-    }
-    return pixels_[camera];
-  }
-
-  /// The images of all cameras if this one can be matched with some of them; otherwise null.
-  std::shared_ptr<const InstantImages> instant(size_t camera) {
-    if (stereo_ != nullptr && !instant_) {
-      std::vector<cv::Mat> pixels(cameras_.size());
-      for (size_t i = 0; i < cameras_.size(); ++i) {
-        pixels[i] = cameras_[i] != nullptr && frame_.has_image[i] ? of(i) : cv::Mat();
-      }
-      instant_ = stereo_->instant(frame_.stamp, std::move(pixels));
-    }
-    return instant_ && stereo_->canMeasure(*instant_, camera) ? instant_ : nullptr;
-  }
-
- private:
-  const ImageFrame& frame_;
-  const std::vector<const WorkingCamera*> cameras_;
-  const InterCameraStereo* stereo_;
-  std::vector<cv::Mat> pixels_;
-  std::shared_ptr<const InstantImages> instant_;
-};
-
 struct RangeMapper::Camera {
   size_t index;
   RigidTransform vehicle_from_camera;
@@ -109,6 +36,14 @@ struct RangeMapper::Camera {
   std::deque<Frame> frames;
   size_t next_reference = 0;  // the first frame that was not yet passed on
   RangeMapperStatus status;
+
+  /// Distance from the last frame; infinite without one.
+  double motion_m(const RigidTransform& world_from_camera) const {
+    return frames.empty()
+               ? std::numeric_limits<double>::infinity()
+               : (world_from_camera.translation() - frames.back().image.world_from_camera.translation())
+                     .norm();
+  }
 };
 
 RangeMapper::RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapperOptions& options,
@@ -157,6 +92,14 @@ RangeMapper::RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapper
     }
     stereo_ = std::make_unique<InterCameraStereo>(views, options_.plane_sweep);
   }
+  if (options_.refine_poses) {
+    std::vector<std::optional<MotionRefinement::Camera>> followed(cameras_.size());
+    for (const size_t index : used) {
+      const WorkingCamera& working = cameras_[index]->working_camera;
+      followed[index] = {working.model(), working.validMask(), cameras_[index]->vehicle_from_camera};
+    }
+    motion_ = std::make_unique<MotionRefinement>(followed, options_.plane_sweep.pose_noise);
+  }
   assembler_ = std::make_unique<ImageFrameAssembler>(
       cameras_.size(), options_.frames, [this](const ImageFrame& frame) { process(frame); },
       [this](DriveBreak drive_break, Timestamp /*stamp*/) { startOver(drive_break); }, is_used);
@@ -180,6 +123,9 @@ void RangeMapper::startOver(DriveBreak drive_break) {
       camera->status.message = "started over: " + describe(drive_break);
     }
   }
+  if (motion_) {
+    motion_->clear();
+  }
 }
 
 void RangeMapper::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
@@ -200,6 +146,9 @@ void RangeMapper::process(const ImageFrame& frame) {
     working[i] = cameras_[i] ? &cameras_[i]->working_camera : nullptr;
   }
   WorkingImages images(frame, std::move(working), stereo_.get());
+  if (motion_ && frame.odom_from_vehicle) {
+    followPoints(frame, &images);
+  }
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (camera) {
       correctPoses(camera.get(), frame.corrections);
@@ -208,6 +157,23 @@ void RangeMapper::process(const ImageFrame& frame) {
       addImageWithPose(camera.get(), frame, &images);
     }
   }
+}
+
+/// Follows points into the images that become frames, see addImageWithPose().
+void RangeMapper::followPoints(const ImageFrame& frame, WorkingImages* images) {
+  std::vector<cv::Mat> followed(cameras_.size());
+  Timestamp oldest = frame.stamp;
+  for (const std::unique_ptr<Camera>& camera : cameras_) {
+    if (camera && frame.has_image[camera->index] &&
+        camera->motion_m(*frame.odom_from_vehicle * camera->vehicle_from_camera) >= kMinMotion_m) {
+      followed[camera->index] = images->of(camera->index);
+    }
+    if (camera && !camera->frames.empty()) {
+      oldest = std::min(oldest, camera->frames.front().image.stamp);
+    }
+  }
+  motion_->forgetBefore(oldest);
+  motion_->addFrame(frame.stamp, followed, *frame.odom_from_vehicle);
 }
 
 void RangeMapper::correctPoses(Camera* camera, const std::vector<CorrectedPose>& corrections) {
@@ -230,7 +196,7 @@ void RangeMapper::addImageWithPose(Camera* camera, const ImageFrame& frame, Work
   const RigidTransform world_from_camera = *frame.odom_from_vehicle * camera->vehicle_from_camera;
   if (!camera->frames.empty()) {
     const SweepImage& last = camera->frames.back().image;
-    const double motion_m = (world_from_camera.translation() - last.world_from_camera.translation()).norm();
+    const double motion_m = camera->motion_m(world_from_camera);
     if (motion_m < kMinMotion_m) {
       ++camera->status.standing;
       camera->status.state = RangeMapperState::kStanding;
@@ -308,7 +274,7 @@ void RangeMapper::emitReference(Camera* camera, size_t index) {
       baselines_m.push_back((camera->frames[i].image.world_from_camera.translation() - position).norm());
     }
     for (size_t i : selectNeighbours(baselines_m, options_.neighbours.num_neighbours / sides, longest_m)) {
-      task.neighbours.push_back(camera->frames[first + i].image);
+      task.neighbours.push_back(refined(*camera, camera->frames[first + i].image, reference));
     }
   }
   if (task.neighbours.empty()) {
@@ -326,6 +292,28 @@ void RangeMapper::emitReference(Camera* camera, size_t index) {
   camera->status.state = RangeMapperState::kMapping;
   camera->status.message = "mapping";
   emit(camera, std::move(task));
+}
+
+SweepImage RangeMapper::refined(const Camera& camera, const SweepImage& neighbour,
+                                const SweepImage& reference) {
+  if (!motion_) {
+    return neighbour;
+  }
+  const RigidTransform camera_from_vehicle = camera.vehicle_from_camera.inverse();
+  const RigidTransform neighbour_from_reference =
+      (neighbour.world_from_camera * camera_from_vehicle).inverse() *
+      (reference.world_from_camera * camera_from_vehicle);
+  const MotionRefinement::Result motion =
+      motion_->refine(neighbour.stamp, reference.stamp, neighbour_from_reference);
+  if (!motion.is_refined) {
+    return neighbour;
+  }
+  SweepImage result = neighbour;
+  result.world_from_camera = reference.world_from_camera * camera_from_vehicle *
+                             motion.neighbour_from_reference.inverse() * camera.vehicle_from_camera;
+  result.rotation_variance_left = motion.rotation_variance_left;
+  result.translation_variance_left = motion.translation_variance_left;
+  return result;
 }
 
 void RangeMapper::emit(Camera* camera, RangeTask task) {

@@ -59,10 +59,9 @@ TEST(PlaneSweepFillTest, UnknownPixelsTakeRightRangesAndKnownOnesStay) {
   }
 }
 
-TEST(PlaneSweepFillTest, WithRefinedPosesAndACoarsePassToo) {
+TEST(PlaneSweepFillTest, WithACoarsePassToo) {
   const Sequence s = faintSequence();
   PlaneSweepOptions options = filling(0);
-  options.refine_poses = true;
   options.coarse_pass = true;
   const int before = cv::countNonZero(sweepOf(s, options).confidence > 0.0F);
   options.num_fill_levels = 2;

@@ -6,7 +6,6 @@
 #include <tbb/parallel_for.h>
 
 #include "kernels/half_resolution.h"
-#include "range_mapping/pose_refinement.h"
 #include "refinement/range_uncertainty.h"
 #include "sweep/coarse_pass.h"
 #include "sweep/sweep_level.h"
@@ -30,25 +29,16 @@ void checkNoDistortion(const MeiCamera& camera) {
 /// Packs the neighbours' images and computes their relative poses.
 void addNeighbours(const SweepLevel& level, const SweepImage& reference,
                    const std::vector<SweepImage>& neighbours, SweepInput* input) {
-  std::optional<PoseRefinement> poses;
-  if (level.options().refine_poses) {
-    poses.emplace(level.camera(), reference.pixels, level.validMask(), level.options().pose_noise);
-  }
   std::vector<std::optional<SweepNeighbour>> prepared(neighbours.size());
   tbb::parallel_for(size_t{0}, neighbours.size(), [&](size_t n) {
     const SweepImage& image = neighbours[n];
     const SweepCamera* other = image.camera.get();
-    PoseRefinement::Result pose;
-    pose.neighbour_from_reference = image.world_from_camera.inverse() * reference.world_from_camera;
-    if (poses && other == nullptr) {
-      pose = poses->refine(image.pixels, pose.neighbour_from_reference);
-    }
+    const RigidTransform pose = image.world_from_camera.inverse() * reference.world_from_camera;
     prepared[n].emplace(SweepNeighbour{
         PackedImage(image.pixels, other != nullptr ? other->valid_mask : level.validMask()),
-        other != nullptr ? other->model : level.camera(),
-        pose.neighbour_from_reference.rotationMatrix().cast<float>(),
-        pose.neighbour_from_reference.translation().cast<float>(), image.stamp > reference.stamp,
-        static_cast<float>(pose.rotation_variance_left), static_cast<float>(pose.translation_variance_left),
+        other != nullptr ? other->model : level.camera(), pose.rotationMatrix().cast<float>(),
+        pose.translation().cast<float>(), image.stamp > reference.stamp,
+        static_cast<float>(image.rotation_variance_left), static_cast<float>(image.translation_variance_left),
         other != nullptr ? other->valid_mask : cv::Mat()});
   });
   for (std::optional<SweepNeighbour>& neighbour : prepared) {

@@ -61,8 +61,7 @@ TEST(PlaneSweepTest, EqualsThePlainReference) {
 
 TEST(PlaneSweepTest, GivesTheSameBytesOnAnyNumberOfThreads) {
   const Sequence s = makeSequence(lotScene(2), kLeft, 0.2, -4, 0, 2.0);
-  PlaneSweepOptions options;
-  options.refine_poses = true;
+  const PlaneSweepOptions options;
   expectTheSameOnAnyNumberOfThreads(options, s);
 }
 

@@ -9,7 +9,7 @@ from vcharge_evaluation.results import Figure, Results, add_arguments, calibrati
 from vcharge_evaluation.tools import NoResult, judge, run_tool_once, say
 
 DENSITIES = (0.4, 0.6, 0.8)
-TRUE_POSES = {"refine_poses": False,
+TRUE_POSES = {
               "pose_noise": {"scale": 0.0, "translation_m": 0.001, "translation_m_per_sqrt_m": 0.0, "rotation_rad": 0.0002,
                              "rotation_rad_per_sqrt_m": 0.0}}
 # Name: preset, options of the plane sweep.
@@ -122,7 +122,8 @@ def evaluate_settings(args, results):
         for number, (setting, (preset, overrides)) in enumerate(SETTINGS.items()):
             name = f"setting{number}_{'true' if true_poses else 'odometry'}"
             options = made.folder / f"{name}.yaml"
-            options.write_text(yaml.safe_dump({"plane_sweep": {**overrides, **(TRUE_POSES if true_poses else {})}}))
+            options.write_text(yaml.safe_dump({"refine_poses": not true_poses,
+                                               "plane_sweep": {**overrides, **(TRUE_POSES if true_poses else {})}}))
             poses = ["--trajectory", made.trajectory] if true_poses else []
             errors = RangeErrors(made, masks, name, "--preset", preset, "--options", options, *poses)
             columns.append((setting, [*errors.figures(), Figure("processor time per range map", errors.processor_ms(),
