@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -18,6 +19,7 @@
 namespace vcharge {
 
 class CoarsePass;
+class SurfaceMemory;
 class SweepLevel;
 struct SurfaceEstimate;
 struct SweepInput;
@@ -39,6 +41,13 @@ struct SweepImage {
   /// Fraction of the variances of PoseNoiseOptions that a neighbour's pose has; less than 1 if it was
   /// refined.
   double rotation_variance_left = 1.0, translation_variance_left = 1.0;
+};
+
+/// An earlier range map of the swept camera, which predicts the next one.
+struct RememberedRanges {
+  cv::Mat range_m;  ///< CV_32FC1 of the camera's size, NaN where unknown
+  RigidTransform world_from_camera;
+  uint32_t num_sweeps = 0;  ///< selects the tiles that are swept in full
 };
 
 /// Intermediate results of the sweep at full resolution, for tests and figures.
@@ -72,19 +81,22 @@ class PlaneSweep {
              const std::optional<Plane>& ground_in_camera = std::nullopt,
              const PlaneAxes& axes = opticalAxis());
 
-  /// Range map of `reference`: stamp, camera and images are set, names are left empty. Neighbours with a
-  /// later stamp count as after it. Without neighbours all ranges are unknown. Throws std::logic_error for
-  /// images of another size or type and for more than 32 neighbours.
+  /// Range map of `reference`: stamp, camera and images are set, names are left empty. With `remembered` and
+  /// coarse_pass, planes are swept only in tiles whose prediction has gaps or jumps or contradicts the coarse
+  /// pass, and in one of six in turn; elsewhere the second sweep searches around the prediction. Neighbours
+  /// with a later stamp count as after it. Without neighbours all ranges are unknown. Throws std::logic_error
+  /// for images of another size or type and for more than 32 neighbours.
   RangeMap sweep(const SweepImage& reference, const std::vector<SweepImage>& neighbours,
-                 SweepDetails* details = nullptr) const;
+                 SweepDetails* details = nullptr, const RememberedRanges* remembered = nullptr) const;
 
   const PlaneSweepOptions& options() const;
   const std::vector<PlaneFamily>& families() const;
 
  private:
   SurfaceEstimate sweepPlanes(const SweepInput& input, const SweepPixels& half_pixels,
-                              const std::vector<cv::Rect>& large_tiles) const;
-  RangeMap sweep(const SweepInput& input, const SweepPixels& pixels, SweepDetails* details) const;
+                              const std::vector<cv::Rect>& large_tiles, const SurfaceMemory* memory) const;
+  RangeMap sweep(const SweepInput& input, const SweepPixels& pixels, SweepDetails* details,
+                 const SurfaceMemory* memory) const;
 
   std::shared_ptr<const SweepLevel> level_;
   std::shared_ptr<const CoarsePass> coarse_;  // null: all planes are swept everywhere

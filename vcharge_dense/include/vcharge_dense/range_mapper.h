@@ -55,6 +55,8 @@ struct RangeMapperOptions {
   VCHARGE_OPTION(bool, refine_poses, true, anyValue(),
                  "Image points followed in all cameras correct the relative poses of images within "
                  "plane_sweep.pose_noise.");
+  VCHARGE_OPTION(bool, remember, false, anyValue(),
+                 "The last range map of a camera predicts the next one; most planes need not be swept then.");
   VCHARGE_OPTION_GROUP(WorkingCameraOptions, working_camera, {}, "Undistorted images that are swept.");
   VCHARGE_OPTION_GROUP(NeighbourOptions, neighbours, {}, "Images that a reference is matched with.");
   VCHARGE_OPTION_GROUP(PlaneSweepOptions, plane_sweep, {}, "Planes, scores and limits of reported ranges.");
@@ -142,7 +144,7 @@ class RangeMapper : public DriveConsumer {
   void finish();
 
   /// Thread safe. Camera name and frame of the range map come from the rig, its reference image from the
-  /// task.
+  /// task. With the option remember, results depend on the order of a camera's tasks.
   RangeMap sweep(const RangeTask& task) const;
 
   /// Status of the cameras in use, in the rig's order.
@@ -163,6 +165,7 @@ class RangeMapper : public DriveConsumer {
   /// A neighbour with its pose relative to the reference refined.
   SweepImage refined(const Camera& camera, const SweepImage& neighbour, const SweepImage& reference);
   void emit(Camera* camera, RangeTask task);
+  RangeMap sweepMotion(const RangeTask& task) const;
 
   const std::shared_ptr<const CameraRig> rig_;
   const RangeMapperOptions options_;

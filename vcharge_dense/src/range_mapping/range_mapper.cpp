@@ -8,6 +8,7 @@
 #include "range_mapping/inter_camera_stereo.h"
 #include "range_mapping/motion_refinement.h"
 #include "range_mapping/range_fusion.h"
+#include "range_mapping/range_memory.h"
 #include "range_mapping/working_images.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/frames/standstill.h"
@@ -36,6 +37,7 @@ struct RangeMapper::Camera {
   std::deque<Frame> frames;
   size_t next_reference = 0;  // the first frame that was not yet passed on
   RangeMapperStatus status;
+  RangeMemory memory;
 
   /// Distance from the last frame; infinite without one.
   double motion_m(const RigidTransform& world_from_camera) const {
@@ -77,6 +79,7 @@ RangeMapper::RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapper
                    PlaneSweep(working.model(), working.validMask(), options_.plane_sweep, ground),
                    {},
                    0,
+                   {},
                    {}});
     cameras_[index]->status.camera_name = camera.name;
     cameras_[index]->status.message = "no image yet";
@@ -118,6 +121,7 @@ void RangeMapper::startOver(DriveBreak drive_break) {
       emitReferences(camera.get(), true);
       camera->frames.clear();
       camera->next_reference = 0;
+      camera->memory.clear();
       ++camera->status.resets;
       camera->status.state = RangeMapperState::kFewNeighbours;
       camera->status.message = "started over: " + describe(drive_break);
@@ -331,6 +335,17 @@ void RangeMapper::finish() {
   }
 }
 
+RangeMap RangeMapper::sweepMotion(const RangeTask& task) const {
+  Camera& camera = *cameras_[task.camera_index];
+  if (!options_.remember) {
+    return camera.plane_sweep.sweep(task.reference, task.neighbours);
+  }
+  const std::optional<RememberedRanges> last = camera.memory.before(task.reference.stamp);
+  RangeMap map = camera.plane_sweep.sweep(task.reference, task.neighbours, nullptr, last ? &*last : nullptr);
+  camera.memory.keep(map, task.reference.world_from_camera);
+  return map;
+}
+
 RangeMap RangeMapper::sweep(const RangeTask& task) const {
   check(task.camera_index < cameras_.size() && cameras_[task.camera_index],
         "RangeMapper::sweep: unknown camera");
@@ -339,9 +354,7 @@ RangeMap RangeMapper::sweep(const RangeTask& task) const {
     check(stereo_ != nullptr, "RangeMapper::sweep: a task of another mapper");
     from_cameras = stereo_->rangeMap(*task.instant, task.camera_index);
   }
-  RangeMap map = from_cameras && task.neighbours.empty()
-                     ? *from_cameras
-                     : cameras_[task.camera_index]->plane_sweep.sweep(task.reference, task.neighbours);
+  RangeMap map = from_cameras && task.neighbours.empty() ? *from_cameras : sweepMotion(task);
   if (from_cameras && !task.neighbours.empty()) {
     map = fuseRangeMaps(map, *from_cameras);
   }

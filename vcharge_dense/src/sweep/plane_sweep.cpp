@@ -8,6 +8,7 @@
 #include "kernels/half_resolution.h"
 #include "refinement/range_uncertainty.h"
 #include "sweep/coarse_pass.h"
+#include "sweep/surface_memory.h"
 #include "sweep/sweep_level.h"
 #include "sweep/tile_scorer.h"
 #include "vcharge_core/base/error.h"
@@ -87,20 +88,25 @@ const std::vector<PlaneFamily>& PlaneSweep::families() const {
 }
 
 SurfaceEstimate PlaneSweep::sweepPlanes(const SweepInput& input, const SweepPixels& half_pixels,
-                                        const std::vector<cv::Rect>& large_tiles) const {
+                                        const std::vector<cv::Rect>& large_tiles,
+                                        const SurfaceMemory* memory) const {
   if (!coarse_) {
     return level_->sweepPlanes(input, large_tiles, {});
   }
   const SurfaceEstimate coarse = coarse_->sweep(halfInput(coarse_->level(), input, half_pixels));
   const std::vector<cv::Rect> tiles = makeTiles(level_->validMask().size(), TileSize::kSmall);
-  const std::vector<TilePlanes> choice = coarse_->choosePlanes(coarse, tiles);
-  SurfaceEstimate estimate = level_->sweepPlanes(input, tiles, choice);
+  std::vector<TilePlanes> choice = coarse_->choosePlanes(coarse, tiles);
+  SurfaceEstimate estimate(level_->validMask().size());
+  if (memory != nullptr) {
+    memory->apply(coarse, tiles, &choice, &estimate);
+  }
+  level_->sweepPlanes(input, tiles, choice, &estimate);
   coarse_->addSecondPeaks(coarse, tiles, choice, &estimate);
   return estimate;
 }
 
 RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepImage>& neighbours,
-                           SweepDetails* details) const {
+                           SweepDetails* details, const RememberedRanges* remembered) const {
   const cv::Size size = level_->validMask().size();
   checkImage(reference, size);
   SweepPixels pixels{reference.pixels, {}};
@@ -114,12 +120,21 @@ RangeMap PlaneSweep::sweep(const SweepImage& reference, const std::vector<SweepI
   check(neighbours.size() <= 32, "PlaneSweep: at most 32 neighbours");
   SweepInput input = level_->makeInput(reference.pixels);
   addNeighbours(*level_, reference, neighbours, &input);
-  RangeMap map = sweep(input, pixels, details);
+  std::optional<SurfaceMemory> memory;
+  // Only where the second sweep searches around the prediction and what it does not find is dropped.
+  if (remembered != nullptr && coarse_ && options().num_refinement_steps > 0 &&
+      options().min_confidence > 0.0) {
+    memory.emplace(*level_, remembered->range_m,
+                   reference.world_from_camera.inverse() * remembered->world_from_camera,
+                   remembered->num_sweeps);
+  }
+  RangeMap map = sweep(input, pixels, details, memory ? &*memory : nullptr);
   map.stamp = reference.stamp;
   return map;
 }
 
-RangeMap PlaneSweep::sweep(const SweepInput& input, const SweepPixels& pixels, SweepDetails* details) const {
+RangeMap PlaneSweep::sweep(const SweepInput& input, const SweepPixels& pixels, SweepDetails* details,
+                           const SurfaceMemory* memory) const {
   const cv::Size size = level_->validMask().size();
   const bool has_neighbours = !input.neighbours.empty();
   SweepPixels half_pixels;
@@ -128,7 +143,7 @@ RangeMap PlaneSweep::sweep(const SweepInput& input, const SweepPixels& pixels, S
   if (has_neighbours) {
     half_pixels = coarse_ || half_ ? halved(pixels) : SweepPixels();
     tiles = makeTiles(size);
-    estimate = sweepPlanes(input, half_pixels, tiles);
+    estimate = sweepPlanes(input, half_pixels, tiles, memory);
   }
   const bool found = cv::countNonZero(estimate.plane >= 0) > 0;
   if (found && options().num_refinement_steps > 0) {
@@ -138,7 +153,8 @@ RangeMap PlaneSweep::sweep(const SweepInput& input, const SweepPixels& pixels, S
   RangeMap map{Timestamp(), "", "", level_->camera(), {}, {}, {}};
   estimateRange(input, estimate, &map);
   if (half_ && has_neighbours) {
-    fillUnknown(half_->sweep(halfInput(*half_->level_, input, half_pixels), half_pixels, nullptr), &map);
+    fillUnknown(half_->sweep(halfInput(*half_->level_, input, half_pixels), half_pixels, nullptr, nullptr),
+                &map);
   }
   if (details != nullptr) {
     details->score = estimate.score;

@@ -101,6 +101,20 @@ SweepInput SweepLevel::makeInput(const cv::Mat& reference_pixels) const {
 SurfaceEstimate SweepLevel::sweepPlanes(const SweepInput& input, const std::vector<cv::Rect>& tiles,
                                         const std::vector<TilePlanes>& choice) const {
   SurfaceEstimate estimate(input.reference.samples.size());
+  sweepPlanes(input, tiles, choice, &estimate);
+  return estimate;
+}
+
+void SweepLevel::sweepPlanes(const SweepInput& input, const std::vector<cv::Rect>& all_tiles,
+                             const std::vector<TilePlanes>& all_choices, SurfaceEstimate* estimate) const {
+  std::vector<cv::Rect> tiles;
+  std::vector<TilePlanes> choice;
+  for (size_t i = 0; i < all_tiles.size(); ++i) {
+    if (all_choices.empty() || !all_choices[i].empty()) {
+      tiles.push_back(all_tiles[i]);
+      all_choices.empty() ? void() : choice.push_back(all_choices[i]);
+    }
+  }
   workers_->forEachTile(input, tiles, planes_.size(), [&](size_t tile, WorkerPool::Worker* worker) {
     for (size_t f = 0; f < planes_.size(); ++f) {
       if (choice.empty()) {
@@ -109,9 +123,8 @@ SurfaceEstimate SweepLevel::sweepPlanes(const SweepInput& input, const std::vect
         worker->scorer.score(planes_[f], choice[tile][f], &worker->scores[f]);
       }
     }
-    readPeaks(planes_, worker->scores, &estimate);
+    readPeaks(planes_, worker->scores, estimate);
   });
-  return estimate;
 }
 
 void SweepLevel::refineSurface(const SweepInput& input, const Hypotheses& refinement,

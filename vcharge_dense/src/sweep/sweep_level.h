@@ -36,6 +36,9 @@ class SweepLevel {
   /// planes.
   SurfaceEstimate sweepPlanes(const SweepInput& input, const std::vector<cv::Rect>& tiles,
                               const std::vector<TilePlanes>& choice) const;
+  /// The same, into an estimate; tiles whose choice is empty are left as they are.
+  void sweepPlanes(const SweepInput& input, const std::vector<cv::Rect>& tiles,
+                   const std::vector<TilePlanes>& choice, SurfaceEstimate* estimate) const;
   /// Searches for better peaks around an estimate, see makeRefinement().
   void refineSurface(const SweepInput& input, const Hypotheses& refinement,
                      const std::vector<cv::Rect>& tiles, SurfaceEstimate* estimate) const;
@@ -45,6 +48,7 @@ class SweepLevel {
   /// CV_8UC1: not 0 where all pixels of the window are valid.
   const cv::Mat& validWindows() const { return valid_windows_; }
   const PlaneSweepOptions& options() const { return options_; }
+  const RayTable& rays() const { return rays_; }
   const PlaneAxes& axes() const { return axes_; }
   const std::vector<PlaneFamily>& families() const { return families_; }
   const std::vector<Hypotheses>& planes() const { return planes_; }  ///< planes of families()

@@ -1,5 +1,6 @@
 """Runs the suite's tools and reads what they write with --json."""
 import dataclasses
+import fcntl
 import hashlib
 import json
 import os
@@ -127,15 +128,18 @@ def simulate(folder, words):
     """Simulates FOLDER/drive.bag in a scene with drawn plan and surfaces. A complete drive that was made with the same words is
     kept."""
     words = [str(word) for word in [*drawn(words), *words]]
-    done = folder / "simulated.txt"
-    if done.exists() and done.read_text() == " ".join(words):
-        say(f"{folder}: drive kept")
-        return
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    say(f"{folder}: simulating")
-    run_tool("simulate_drive", folder / "simulate.log", *words, "--output", folder / "drive.bag")
-    done.write_text(" ".join(words))
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with folder.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # another evaluation in the same folder may be making this drive
+        done = folder / "simulated.txt"
+        if done.exists() and done.read_text() == " ".join(words):
+            say(f"{folder}: drive kept")
+            return
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+        say(f"{folder}: simulating")
+        run_tool("simulate_drive", folder / "simulate.log", *words, "--output", folder / "drive.bag")
+        done.write_text(" ".join(words))
 
 
 def build_map(folder, name, *words, rig=None, options=CONFIG / "mapping.yaml", prefix=()):

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "sweep/sweep_level.h"
+#include "vcharge_core/motion/rigid_transform.h"
+
+namespace vcharge {
+
+/// The surface that an earlier range map of the same camera predicts, and the tiles in which it is believed.
+/// There the planes need not be swept: refineSurface() searches around the prediction.
+class SurfaceMemory {
+ public:
+  /// `range_m`: the earlier range map (CV_32FC1), NaN where unknown. `phase` counts the sweeps: it selects
+  /// the tiles that are swept in full, so that what a prediction hides is found.
+  SurfaceMemory(const SweepLevel& level, const cv::Mat& range_m, const RigidTransform& reference_from_earlier,
+                uint32_t phase);
+
+  /// Replaces the choice of planes of the tiles in which the prediction is believed by none, and sets the
+  /// estimate there, with a score that every peak of the refinement replaces. `coarse` is the estimate of
+  /// CoarsePass: where it is confident and contradicts the prediction, its surface is taken.
+  void apply(const SurfaceEstimate& coarse, const std::vector<cv::Rect>& tiles,
+             std::vector<TilePlanes>* choice, SurfaceEstimate* estimate) const;
+
+ private:
+  bool applyToTile(const SurfaceEstimate& coarse, const cv::Rect& tile, SurfaceEstimate* estimate) const;
+
+  const uint32_t phase_;
+  cv::Mat inverse_range_;  // CV_32FC1, NaN where nothing is predicted
+};
+
+}  // namespace vcharge
