@@ -3,7 +3,7 @@
 #   evaluate.sh STAGE [arguments; --help]
 # STAGE: masks, calibration, mapping, localization, ranges, height_map, obstacles, standing (five minutes), steps (kerbs,
 # holes), objects (moving), conditions, faults, odometry (a real car's CAN), images (beside real ones), chain (all stages from
-# unknown cameras), latency (of the nodelets), soak (their memory). --publish puts the figures into doc/results and doc/results.md.
+# unknown cameras), online (the nodelets live), soak (their memory). --publish puts the figures into doc/results and doc/results.md.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 case "${1:-}" in "" | -h | --help) sed -n '2,6s/^# \{0,1\}//p' "$0"; exit 0 ;; esac

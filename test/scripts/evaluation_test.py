@@ -3,6 +3,7 @@
 import contextlib
 import io
 import json
+import os
 import pathlib
 import random
 import shutil
@@ -26,6 +27,7 @@ sys.path.insert(0, str(ROOT / "src" / "vcharge_evaluation" / "python"))
 from vcharge_evaluation import __main__ as evaluation_main  # noqa: E402
 from vcharge_evaluation import consistency, drives, obstacles, poses, results, spoiled_drives, tools  # noqa: E402
 from vcharge_evaluation.camera_models import project  # noqa: E402
+from vcharge_evaluation.live import processes  # noqa: E402
 
 
 def run_module(module, *words):
@@ -234,10 +236,26 @@ class BenchmarkComparisonTest(FolderTest):
         self.assertIn("broken.json", errors)
 
 
+class UsageTest(unittest.TestCase):
+    def test_a_busy_process_takes_its_share_of_a_core(self):
+        usage = processes.Usage()
+        self.assertIsNone(usage.load)
+        usage.sample(os.getpid())
+        end = time.process_time() + 0.3
+        while time.process_time() < end:
+            pass
+        usage.sample(os.getpid())
+        self.assertGreater(usage.load, 0.0)
+        self.assertLess(usage.load, 1.5)
+        self.assertGreater(usage.peak_mb, 1.0)
+        usage.sample(None)  # no process: nothing changes
+        self.assertGreater(usage.load, 0.0)
+
+
 class ArgumentsTest(FolderTest):
     def test_every_stage_has_help(self):
         for stage in ("masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "objects",
-                      "conditions", "faults", "chain", "latency", "soak"):
+                      "conditions", "faults", "chain", "online", "soak"):
             output, arguments = io.StringIO(), sys.argv
             self.addCleanup(setattr, sys, "argv", arguments)
             sys.argv = ["evaluate.sh", stage, "--help"]

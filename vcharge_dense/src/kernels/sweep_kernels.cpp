@@ -2,6 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+#include <hwy/targets.h>
 
 #include "kernels/sweep_kernels_internal.h"
 
@@ -11,6 +18,21 @@ namespace {
 // A window whose sum of squares about its mean is smaller is constant.
 constexpr float kMinSquares_gray2 = 1e-3f;
 constexpr int kLargestGray = 127;  // magnitude of a gray level minus 128
+
+/// What an older computer does can be measured on a newer one.
+void forbidInstructions() {
+  const char* allowed = std::getenv("VCHARGE_INSTRUCTIONS");
+  if (allowed == nullptr || std::string_view(allowed).empty()) {
+    return;
+  }
+  if (std::string_view(allowed) != "avx2") {
+    throw std::invalid_argument(std::string("VCHARGE_INSTRUCTIONS: expected avx2 or nothing, got ") +
+                                allowed);
+  }
+#if HWY_ARCH_X86
+  hwy::DisableTargets(HWY_AVX2 - 1);  // better instruction sets have lower bits
+#endif
+}
 
 }  // namespace
 
@@ -43,6 +65,8 @@ int32_t SampleScale::sample(int gray) const {
 }
 
 SweepKernels sweepKernels() {
+  static std::once_flag once;
+  std::call_once(once, forbidInstructions);
   SweepKernels kernels{};
   addWarpKernels(&kernels);
   addCorrelationKernels(&kernels);

@@ -193,7 +193,8 @@ struct SweepKernels {
   void (*inverseRangeSigma)(const UncertaintyRow& row, float* sigma);
 };
 
-/// Kernels of the best instruction set of this machine.
+/// Kernels of the best instruction set of this machine; of AVX2 at most where the environment has
+/// VCHARGE_INSTRUCTIONS=avx2. Throws std::invalid_argument for another value.
 SweepKernels sweepKernels();
 
 /// Number of samples that one row of one neighbour takes.

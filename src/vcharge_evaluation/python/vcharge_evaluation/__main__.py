@@ -18,7 +18,7 @@ STAGES = {
     "odometry": "odometry",
     "images": "images",
     "chain": "chain.cars",
-    "latency": "live.latency",
+    "online": "live.online",
     "soak": "live.soak",
 }
 

@@ -9,15 +9,17 @@ START_S = 60.0
 
 
 class Launch:
-    """A running launch file of vcharge_launch, as a context; this process uses its ROS master."""
+    """A running launch file of vcharge_launch, as a context; this process uses its ROS master. `prefix` is put before roslaunch,
+    `environment` added to its own."""
 
-    def __init__(self, folder, name, *words):
+    def __init__(self, folder, name, *words, prefix=(), environment=None):
         port = free_port()
         uri = f"http://localhost:{port}"
         os.environ.update({"ROS_MASTER_URI": uri, "ROS_HOSTNAME": "localhost", "ROS_HOME": str(folder / "ros_home")})
         with open(folder / "roslaunch.log", "w", encoding="utf-8") as log:
-            self.process = subprocess.Popen(["roslaunch", "-p", str(port), "vcharge_launch", name, *map(str, words)], stdout=log,
-                                            stderr=subprocess.STDOUT, start_new_session=True)
+            self.process = subprocess.Popen([*prefix, "roslaunch", "-p", str(port), "vcharge_launch", name, *map(str, words)],
+                                            stdout=log, stderr=subprocess.STDOUT, start_new_session=True,
+                                            env={**os.environ, **(environment or {})})
 
     def __enter__(self):
         import rosgraph

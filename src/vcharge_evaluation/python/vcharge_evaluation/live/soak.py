@@ -9,29 +9,10 @@ import time
 import numpy as np
 
 from vcharge_evaluation.live.launch import START_S, Launch
+from vcharge_evaluation.live.processes import manager_below, memory_mb
 
 MAX_GROWTH_MB_PER_HOUR = 20.0
 SAMPLE_S = 5.0
-
-
-def manager_below(pid):
-    """Process number of the nodelet manager that roslaunch started; None without one."""
-    for path in pathlib.Path("/proc").glob("[0-9]*"):
-        try:
-            command = (path / "cmdline").read_bytes().split(b"\0")
-            parent = int((path / "stat").read_text().rpartition(")")[2].split()[1])
-        except (OSError, ValueError, IndexError):
-            continue
-        if parent == pid and b"manager" in command and command[0].endswith(b"nodelet"):
-            return int(path.name)
-    return None
-
-
-def memory_mb(pid):
-    for line in pathlib.Path(f"/proc/{pid}/status").read_text().splitlines():
-        if line.startswith("VmRSS:"):
-            return int(line.split()[1]) / 1024
-    raise OSError(f"process {pid} has no memory")
 
 
 def watch(launched, minutes):

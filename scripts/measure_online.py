@@ -1,0 +1,10 @@
+#!/usr/bin/python3
+"""Measures the nodelets online: rate, latency, drops, processor time and memory, on the machine as it is, with AVX2 only, and on
+one core. measure_online.py --bag DRIVE.bag --rig rig.yaml [--map LOT.vmap] [--json FILE]; --help lists all arguments."""
+import os
+import pathlib
+import sys
+
+SCRIPT = pathlib.Path(__file__).resolve().parent / "in_build.sh"
+WORDS = [os.path.abspath(word) if os.path.exists(word) else word for word in sys.argv[1:]]  # the script changes the folder
+os.execv(SCRIPT, [str(SCRIPT), "/usr/bin/python3", "-m", "vcharge_evaluation", "online", *WORDS])
