@@ -59,8 +59,8 @@ SurfaceMemory::SurfaceMemory(const SweepLevel& level, const cv::Mat& range_m,
       if (!(denominator > 0.1F * distance)) {
         continue;
       }
-      const cv::Point pixel(static_cast<int>(fx * point.x() / denominator + cx + 0.5F),
-                            static_cast<int>(fy * point.y() / denominator + cy + 0.5F));
+      const cv::Point pixel(cvRound(fx * point.x() / denominator + cx),
+                            cvRound(fy * point.y() / denominator + cy));
       if (image.contains(pixel)) {
         float& inverse = inverse_range_.at<float>(pixel);
         const float now = 1.0F / distance;
