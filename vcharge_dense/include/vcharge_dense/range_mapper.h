@@ -52,9 +52,6 @@ struct RangeMapperOptions {
   VCHARGE_OPTION(InterCamera, inter_camera, InterCamera::kOff, anyValue(),
                  "Whether cameras with overlapping images are matched with each other: only while standing, "
                  "always, or not.");
-  VCHARGE_OPTION(bool, refine_poses, true, anyValue(),
-                 "Image points followed in all cameras correct the relative poses of images within "
-                 "plane_sweep.pose_noise.");
   VCHARGE_OPTION(bool, remember, false, anyValue(),
                  "The last range map of a camera predicts the next one; most planes need not be swept then.");
   VCHARGE_OPTION_GROUP(WorkingCameraOptions, working_camera, {}, "Undistorted images that are swept.");
@@ -172,7 +169,7 @@ class RangeMapper : public DriveConsumer {
   const TaskCallback on_task_;
   std::vector<std::unique_ptr<Camera>> cameras_;     // indexed as in the rig; null: not in use
   std::unique_ptr<const InterCameraStereo> stereo_;  // null: off
-  std::unique_ptr<MotionRefinement> motion_;         // null: poses are used as they are given
+  std::unique_ptr<MotionRefinement> motion_;
   std::unique_ptr<ImageFrameAssembler> assembler_;
 };
 

@@ -14,7 +14,7 @@
 namespace vcharge {
 namespace {
 
-constexpr int kMaxPoints = 120;  // of a camera
+constexpr int kMaxPointsPerCamera = 120;
 constexpr double kCornerQuality = 0.01, kCornerDistance_px = 12.0;
 // New corners are searched once fewer than this fraction of the points are left.
 constexpr double kRefillBelow = 0.8;
@@ -53,7 +53,7 @@ struct PointPair {
 
 /// The points of one camera in two frames.
 struct CameraPairs {
-  Eigen::Vector3d position_m;  // of the camera on the vehicle
+  Eigen::Vector3d position_m;  // on the vehicle
   double noise_rad;
   std::vector<PointPair> points;
 };
@@ -104,7 +104,7 @@ class MotionRefinement::FollowedCamera {
     const RigidTransform odom_from_camera = odom_from_vehicle * camera_.vehicle_from_camera;
     ImagePyramid pyramid = tracker_.buildPyramid(image);
     follow(stamp, pyramid, odom_from_camera.inverse() * odom_from_camera_);
-    if (static_cast<double>(points_.size()) < kRefillBelow * kMaxPoints) {
+    if (static_cast<double>(points_.size()) < kRefillBelow * kMaxPointsPerCamera) {
       startPoints(stamp, image);
     }
     pyramid_ = std::move(pyramid);
@@ -226,8 +226,8 @@ class MotionRefinement::FollowedCamera {
       cv::circle(is_free, point.position_px, cvRound(kCornerDistance_px), cv::Scalar(0), cv::FILLED);
     }
     std::vector<cv::Point2f> corners;
-    cv::goodFeaturesToTrack(image, corners, kMaxPoints - static_cast<int>(points_.size()), kCornerQuality,
-                            kCornerDistance_px, is_free);
+    cv::goodFeaturesToTrack(image, corners, kMaxPointsPerCamera - static_cast<int>(points_.size()),
+                            kCornerQuality, kCornerDistance_px, is_free);
     for (const cv::Point2f& corner : corners) {
       Eigen::Vector3d ray;
       if (rayOf(corner, &ray)) {
@@ -238,7 +238,7 @@ class MotionRefinement::FollowedCamera {
 
   const Camera camera_;
   const PatchTracker tracker_;
-  ImagePyramid pyramid_;             // of the last image
+  ImagePyramid pyramid_;             // the last image
   RigidTransform odom_from_camera_;  // at the last image
   Timestamp stamp_;
   std::vector<Point> points_;  // in the last image

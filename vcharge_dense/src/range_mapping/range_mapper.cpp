@@ -95,14 +95,12 @@ RangeMapper::RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapper
     }
     stereo_ = std::make_unique<InterCameraStereo>(views, options_.plane_sweep);
   }
-  if (options_.refine_poses) {
-    std::vector<std::optional<MotionRefinement::Camera>> followed(cameras_.size());
-    for (const size_t index : used) {
-      const WorkingCamera& working = cameras_[index]->working_camera;
-      followed[index] = {working.model(), working.validMask(), cameras_[index]->vehicle_from_camera};
-    }
-    motion_ = std::make_unique<MotionRefinement>(followed, options_.plane_sweep.pose_noise);
+  std::vector<std::optional<MotionRefinement::Camera>> followed(cameras_.size());
+  for (const size_t index : used) {
+    const WorkingCamera& working = cameras_[index]->working_camera;
+    followed[index] = {working.model(), working.validMask(), cameras_[index]->vehicle_from_camera};
   }
+  motion_ = std::make_unique<MotionRefinement>(followed, options_.plane_sweep.pose_noise);
   assembler_ = std::make_unique<ImageFrameAssembler>(
       cameras_.size(), options_.frames, [this](const ImageFrame& frame) { process(frame); },
       [this](DriveBreak drive_break, Timestamp /*stamp*/) { startOver(drive_break); }, is_used);
@@ -127,9 +125,7 @@ void RangeMapper::startOver(DriveBreak drive_break) {
       camera->status.message = "started over: " + describe(drive_break);
     }
   }
-  if (motion_) {
-    motion_->clear();
-  }
+  motion_->clear();
 }
 
 void RangeMapper::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
@@ -150,7 +146,7 @@ void RangeMapper::process(const ImageFrame& frame) {
     working[i] = cameras_[i] ? &cameras_[i]->working_camera : nullptr;
   }
   WorkingImages images(frame, std::move(working), stereo_.get());
-  if (motion_ && frame.odom_from_vehicle) {
+  if (frame.odom_from_vehicle) {
     followPoints(frame, &images);
   }
   for (const std::unique_ptr<Camera>& camera : cameras_) {
@@ -300,9 +296,6 @@ void RangeMapper::emitReference(Camera* camera, size_t index) {
 
 SweepImage RangeMapper::refined(const Camera& camera, const SweepImage& neighbour,
                                 const SweepImage& reference) {
-  if (!motion_) {
-    return neighbour;
-  }
   const RigidTransform camera_from_vehicle = camera.vehicle_from_camera.inverse();
   const RigidTransform neighbour_from_reference =
       (neighbour.world_from_camera * camera_from_vehicle).inverse() *

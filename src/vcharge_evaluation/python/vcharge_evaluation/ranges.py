@@ -122,8 +122,7 @@ def evaluate_settings(args, results):
         for number, (setting, (preset, overrides)) in enumerate(SETTINGS.items()):
             name = f"setting{number}_{'true' if true_poses else 'odometry'}"
             options = made.folder / f"{name}.yaml"
-            options.write_text(yaml.safe_dump({"refine_poses": not true_poses,
-                                               "plane_sweep": {**overrides, **(TRUE_POSES if true_poses else {})}}))
+            options.write_text(yaml.safe_dump({"plane_sweep": {**overrides, **(TRUE_POSES if true_poses else {})}}))
             poses = ["--trajectory", made.trajectory] if true_poses else []
             errors = RangeErrors(made, masks, name, "--preset", preset, "--options", options, *poses)
             columns.append((setting, [*errors.figures(), Figure("processor time per range map", errors.processor_ms(),
