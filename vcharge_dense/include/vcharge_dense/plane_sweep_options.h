@@ -36,6 +36,14 @@ struct PoseNoiseOptions {
   /// are up to 5 mm wrong along the path, 1 mm across it, and 0.2 to 1.1 mrad (simulated lot, 75 s), because
   /// odometry interpolates between keyframes.
   static PoseNoiseOptions trajectory();
+
+  /// Variances per axis of the relative pose of two images at this distance.
+  double rotationVariance_rad2(double baseline_m) const {
+    return rotation_rad * rotation_rad + rotation_rad_per_sqrt_m * rotation_rad_per_sqrt_m * baseline_m;
+  }
+  double translationVariance_m2(double baseline_m) const {
+    return translation_m * translation_m + translation_m_per_sqrt_m * translation_m_per_sqrt_m * baseline_m;
+  }
 };
 
 /// Side of the square matching window of zero-mean normalized cross-correlation. Windows of 5 pixels left

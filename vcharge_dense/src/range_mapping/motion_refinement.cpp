@@ -109,7 +109,6 @@ class MotionRefinement::FollowedCamera {
     }
     pyramid_ = std::move(pyramid);
     odom_from_camera_ = odom_from_camera;
-    stamp_ = stamp;
   }
 
   void forgetBefore(Timestamp stamp) {
@@ -240,9 +239,8 @@ class MotionRefinement::FollowedCamera {
   const PatchTracker tracker_;
   ImagePyramid pyramid_;             // the last image
   RigidTransform odom_from_camera_;  // at the last image
-  Timestamp stamp_;
-  std::vector<Point> points_;  // in the last image
-  std::deque<Point> lost_;     // not in it, in the order in which they were lost
+  std::vector<Point> points_;        // in the last image
+  std::deque<Point> lost_;           // not in it, in the order in which they were lost
 };
 
 MotionRefinement::MotionRefinement(const std::vector<std::optional<Camera>>& cameras,
@@ -295,12 +293,9 @@ MotionRefinement::Result MotionRefinement::refine(Timestamp neighbour, Timestamp
   if (result.num_points < kMinPoints) {
     return result;
   }
-  const auto deviation = [&](double constant, double per_sqrt_m) {
-    return std::sqrt(constant * constant + per_sqrt_m * per_sqrt_m * baseline_m);
-  };
   Vector6 sigma;
-  sigma << Eigen::Vector3d::Constant(deviation(noise_.rotation_rad, noise_.rotation_rad_per_sqrt_m)),
-      Eigen::Vector3d::Constant(deviation(noise_.translation_m, noise_.translation_m_per_sqrt_m));
+  sigma << Eigen::Vector3d::Constant(std::sqrt(noise_.rotationVariance_rad2(baseline_m))),
+      Eigen::Vector3d::Constant(std::sqrt(noise_.translationVariance_m2(baseline_m)));
   // Gauss-Newton with Cauchy weights; the unknowns are in units of the motion's standard deviations.
   Vector6 x = Vector6::Zero();
   Equations equations;

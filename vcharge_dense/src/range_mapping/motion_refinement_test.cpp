@@ -102,6 +102,21 @@ TEST(MotionRefinementTest, RemovesMostOfTheOdometrysJitter) {
   EXPECT_LT(std::sqrt(across_after), 0.5 * std::sqrt(across_before));
 }
 
+TEST(MotionRefinementTest, IsTheSameOnAnyNumberOfThreads) {
+  const Drive drive(35);
+  std::vector<RigidTransform> motions;
+  for (const size_t threads : {1U, 2U, 5U}) {
+    const tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    MotionRefinement refinement(drive.cameras, PoseNoiseOptions());
+    drive.addTo(&refinement);
+    motions.push_back(drive.refine(refinement, 1, drive.motionTo(1)).neighbour_from_reference);
+  }
+  for (const RigidTransform& motion : motions) {
+    EXPECT_EQ(motion.translation(), motions[0].translation());
+    EXPECT_EQ(motion.rotation().coeffs(), motions[0].rotation().coeffs());
+  }
+}
+
 TEST(MotionRefinementTest, RangesOfJitteredPosesBecomeBetter) {
   constexpr int kBorder = 8;
   int right[2] = {0, 0}, all = 0;

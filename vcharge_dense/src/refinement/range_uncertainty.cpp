@@ -137,13 +137,10 @@ std::vector<NeighbourUncertainty> neighbourUncertainties(const SweepInput& input
   std::vector<NeighbourUncertainty> result;
   for (const SweepNeighbour& neighbour : input.neighbours) {
     const float baseline_m = neighbour.translation_m.norm();
-    const auto variance = [baseline_m](double constant, double per_sqrt_m) {
-      return static_cast<float>(constant * constant + per_sqrt_m * per_sqrt_m * baseline_m);
-    };
     result.push_back(
         {neighbour.projection(),
-         neighbour.rotation_variance_left * variance(pose.rotation_rad, pose.rotation_rad_per_sqrt_m),
-         neighbour.translation_variance_left * variance(pose.translation_m, pose.translation_m_per_sqrt_m),
+         neighbour.rotation_variance_left * static_cast<float>(pose.rotationVariance_rad2(baseline_m)),
+         neighbour.translation_variance_left * static_cast<float>(pose.translationVariance_m2(baseline_m)),
          neighbour.after});
   }
   return result;

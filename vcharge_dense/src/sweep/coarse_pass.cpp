@@ -11,8 +11,6 @@ namespace vcharge {
 namespace {
 
 // Chosen on two simulated drives that are not used for evaluation. Sizes are in pixels of the coarse image.
-// A pixel is confident if its score is high and well above the second peak.
-constexpr float kConfidentScore = 0.6f, kConfidentLead = 0.1f;
 // All planes are swept if a smaller fraction of a tile's pixels with texture is confident.
 constexpr double kMinConfidentFraction = 0.3;
 constexpr int kMinConfident = 16;
@@ -90,7 +88,7 @@ TilePlanes CoarsePass::choosePlanes(const SurfaceEstimate& coarse, const cv::Rec
     confident.clear();
     for (int x = region.x; x < region.br().x; ++x) {
       num_textured += plane[x] >= 0 ? 1 : 0;
-      if (plane[x] >= 0 && score[x] >= kConfidentScore && score[x] - second_score[x] >= kConfidentLead) {
+      if (plane[x] >= 0 && isConfident(score[x], second_score[x])) {
         confident.push_back(x);
       }
     }

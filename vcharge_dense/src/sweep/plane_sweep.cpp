@@ -94,12 +94,12 @@ SurfaceEstimate PlaneSweep::sweepPlanes(const SweepInput& input, const SweepPixe
     return level_->sweepPlanes(input, large_tiles, {});
   }
   const SurfaceEstimate coarse = coarse_->sweep(halfInput(coarse_->level(), input, half_pixels));
-  const std::vector<cv::Rect> tiles = makeTiles(level_->validMask().size(), TileSize::kSmall);
-  std::vector<TilePlanes> choice = coarse_->choosePlanes(coarse, tiles);
+  std::vector<cv::Rect> tiles = makeTiles(level_->validMask().size(), TileSize::kSmall);
   SurfaceEstimate estimate(level_->validMask().size());
   if (memory != nullptr) {
-    memory->apply(coarse, tiles, &choice, &estimate);
+    tiles = memory->apply(coarse, tiles, &estimate);
   }
+  const std::vector<TilePlanes> choice = coarse_->choosePlanes(coarse, tiles);
   level_->sweepPlanes(input, tiles, choice, &estimate);
   coarse_->addSecondPeaks(coarse, tiles, choice, &estimate);
   return estimate;

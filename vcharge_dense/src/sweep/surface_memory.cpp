@@ -7,8 +7,8 @@
 #include <tbb/parallel_for.h>
 #include <Eigen/Core>
 
-#include "kernels/parallel_rows.h"
 #include "kernels/pooled_mat.h"
+#include "sweep/coarse_pass.h"
 
 namespace vcharge {
 namespace {
@@ -16,8 +16,6 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 // Every tile is swept in full once in this number of sweeps.
 constexpr uint32_t kPeriod = 6;
-// A pixel of the coarse pass is confident if its score is high and well above the second peak.
-constexpr float kConfidentScore = 0.6F, kConfidentLead = 0.1F;
 // The prediction and the coarse pass agree within this number of its planes.
 constexpr float kAgreement = 1.5F;
 // A prediction is believed in a tile if it covers this fraction of the pixels with texture, and this fraction
@@ -74,9 +72,8 @@ bool SurfaceMemory::applyToTile(const SurfaceEstimate& coarse, const cv::Rect& t
                                 SurfaceEstimate* estimate) const {
   const cv::Size half = coarse.score.size();
   int textured = 0, covered = 0, confident = 0, agreeing = 0, jumps = 0;
-  const auto isConfident = [&](int x, int y) {
-    const float score = coarse.score.at<float>(y, x);
-    return score >= kConfidentScore && score - coarse.second_score.at<float>(y, x) >= kConfidentLead;
+  const auto confidentAt = [&](int x, int y) {
+    return isConfident(coarse.score.at<float>(y, x), coarse.second_score.at<float>(y, x));
   };
   for (int y = tile.y; y < tile.br().y; y += 2) {
     const int half_y = std::min(y / 2, half.height - 1);
@@ -94,7 +91,7 @@ bool SurfaceMemory::applyToTile(const SurfaceEstimate& coarse, const cv::Rect& t
       }
       ++covered;
       const float step = coarse.step.at<float>(half_y, half_x);
-      if (isConfident(half_x, half_y)) {
+      if (confidentAt(half_x, half_y)) {
         ++confident;
         const float off = std::abs(value - coarse.inverse_range.at<float>(half_y, half_x));
         agreeing += off <= kAgreement * step ? 1 : 0;
@@ -120,7 +117,7 @@ bool SurfaceMemory::applyToTile(const SurfaceEstimate& coarse, const cv::Rect& t
       const float seen = coarse.inverse_range.at<float>(half_y, half_x);
       const float predicted = inverse_range_.at<float>(y, x);
       const bool agrees = std::abs(predicted - seen) <= kAgreement * step;  // false without prediction
-      estimate->inverse_range.at<float>(y, x) = agrees || !isConfident(half_x, half_y) ? predicted : seen;
+      estimate->inverse_range.at<float>(y, x) = agrees || !confidentAt(half_x, half_y) ? predicted : seen;
       estimate->step.at<float>(y, x) = 0.5F * step;
       estimate->score.at<float>(y, x) = kNoCorrelation;
       estimate->second_score.at<float>(y, x) = coarse.second_score.at<float>(half_y, half_x);
@@ -130,13 +127,19 @@ bool SurfaceMemory::applyToTile(const SurfaceEstimate& coarse, const cv::Rect& t
   return true;
 }
 
-void SurfaceMemory::apply(const SurfaceEstimate& coarse, const std::vector<cv::Rect>& tiles,
-                          std::vector<TilePlanes>* choice, SurfaceEstimate* estimate) const {
+std::vector<cv::Rect> SurfaceMemory::apply(const SurfaceEstimate& coarse, const std::vector<cv::Rect>& tiles,
+                                           SurfaceEstimate* estimate) const {
+  std::vector<uint8_t> is_predicted(tiles.size());
   tbb::parallel_for(size_t{0}, tiles.size(), [&](size_t i) {
-    if ((i + phase_) % kPeriod != 0 && applyToTile(coarse, tiles[i], estimate)) {
-      (*choice)[i].clear();
-    }
+    is_predicted[i] = (i + phase_) % kPeriod != 0 && applyToTile(coarse, tiles[i], estimate) ? 1 : 0;
   });
+  std::vector<cv::Rect> left;
+  for (size_t i = 0; i < tiles.size(); ++i) {
+    if (is_predicted[i] == 0) {
+      left.push_back(tiles[i]);
+    }
+  }
+  return left;
 }
 
 }  // namespace vcharge

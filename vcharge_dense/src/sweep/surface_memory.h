@@ -19,11 +19,11 @@ class SurfaceMemory {
   SurfaceMemory(const SweepLevel& level, const cv::Mat& range_m, const RigidTransform& reference_from_earlier,
                 uint32_t phase);
 
-  /// Replaces the choice of planes of the tiles in which the prediction is believed by none, and sets the
-  /// estimate there, with a score that every peak of the refinement replaces. `coarse` is the estimate of
-  /// CoarsePass: where it is confident and contradicts the prediction, its surface is taken.
-  void apply(const SurfaceEstimate& coarse, const std::vector<cv::Rect>& tiles,
-             std::vector<TilePlanes>* choice, SurfaceEstimate* estimate) const;
+  /// Sets the estimate in the tiles in which the prediction is believed, with a score that every peak of the
+  /// refinement replaces, and returns the other tiles, whose planes must be swept. `coarse` is the estimate
+  /// of CoarsePass: where it is confident and contradicts the prediction, its surface is taken.
+  std::vector<cv::Rect> apply(const SurfaceEstimate& coarse, const std::vector<cv::Rect>& tiles,
+                              SurfaceEstimate* estimate) const;
 
  private:
   bool applyToTile(const SurfaceEstimate& coarse, const cv::Rect& tile, SurfaceEstimate* estimate) const;

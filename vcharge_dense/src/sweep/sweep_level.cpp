@@ -105,16 +105,8 @@ SurfaceEstimate SweepLevel::sweepPlanes(const SweepInput& input, const std::vect
   return estimate;
 }
 
-void SweepLevel::sweepPlanes(const SweepInput& input, const std::vector<cv::Rect>& all_tiles,
-                             const std::vector<TilePlanes>& all_choices, SurfaceEstimate* estimate) const {
-  std::vector<cv::Rect> tiles;
-  std::vector<TilePlanes> choice;
-  for (size_t i = 0; i < all_tiles.size(); ++i) {
-    if (all_choices.empty() || !all_choices[i].empty()) {
-      tiles.push_back(all_tiles[i]);
-      all_choices.empty() ? void() : choice.push_back(all_choices[i]);
-    }
-  }
+void SweepLevel::sweepPlanes(const SweepInput& input, const std::vector<cv::Rect>& tiles,
+                             const std::vector<TilePlanes>& choice, SurfaceEstimate* estimate) const {
   workers_->forEachTile(input, tiles, planes_.size(), [&](size_t tile, WorkerPool::Worker* worker) {
     for (size_t f = 0; f < planes_.size(); ++f) {
       if (choice.empty()) {

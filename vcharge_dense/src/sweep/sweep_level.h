@@ -36,7 +36,7 @@ class SweepLevel {
   /// planes.
   SurfaceEstimate sweepPlanes(const SweepInput& input, const std::vector<cv::Rect>& tiles,
                               const std::vector<TilePlanes>& choice) const;
-  /// The same, into an estimate; tiles whose choice is empty are left as they are.
+  /// The same, into an estimate, which keeps its values outside these tiles.
   void sweepPlanes(const SweepInput& input, const std::vector<cv::Rect>& tiles,
                    const std::vector<TilePlanes>& choice, SurfaceEstimate* estimate) const;
   /// Searches for better peaks around an estimate, see makeRefinement().

@@ -16,6 +16,7 @@ import yaml
 from vcharge_evaluation.live.launch import START_S, Launch
 from vcharge_evaluation.live.processes import Usage, manager_below
 from vcharge_evaluation.results import Figure, Results, add_arguments
+from vcharge_evaluation.tools import NoResult
 
 RESULTS = {"/obstacles/grid": "nav_msgs/OccupancyGrid", "/obstacles/objects": "vcharge_msgs/TrackedObjects",
            "/localization/pose": "geometry_msgs/PoseWithCovarianceStamped"}
@@ -43,6 +44,8 @@ def arguments():
     for path in (args.bag, args.rig, args.map, args.range_options):
         if path is not None and not path.is_file():
             parser.error(f"{path}: there is no such file")
+    if args.json is not None and not args.json.resolve().parent.is_dir():
+        parser.error(f"{args.json}: its folder does not exist")
     return args
 
 
@@ -89,10 +92,10 @@ def name_of(topic):
 
 
 def figures_of(listener, usage, rate):
-    """Figures of one replay; none without images."""
+    """Figures of one replay. NoResult without images."""
     stamps = sorted(listener.images)
     if len(stamps) < 2:
-        raise SystemExit("no images came: see roslaunch.log")
+        raise NoResult("no images came")
     duration_s = (stamps[-1] - stamps[0]) * 1e-9 / rate
     yield Figure("images of a camera per second", (len(stamps) - 1) / duration_s)
     for topic, came in listener.results.items():
@@ -137,7 +140,10 @@ def main():
     for machine in args.machines:
         # A process uses one ROS master.
         with multiprocessing.get_context("spawn").Pool(1) as apart:
-            figures = apart.apply(measure, (args, cameras, machine))
+            try:
+                figures = apart.apply(measure, (args, cameras, machine))
+            except NoResult as error:
+                raise SystemExit(f"{args.bag}: {error}") from error
         results.add(f"Replay, speed {args.rate:g}", (machine, [load, *figures]))
         found[machine] = {figure.name: figure.value for figure in [load, *figures]}
     if args.json:
