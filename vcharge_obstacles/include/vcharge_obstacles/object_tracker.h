@@ -14,6 +14,9 @@
 
 namespace vcharge {
 
+class ObjectCamera;
+class PersonLikeness;
+
 /// Options of ObjectTracker.
 struct ObjectTrackerOptions {
   VCHARGE_BEGIN_OPTIONS(ObjectTrackerOptions);
@@ -60,6 +63,12 @@ class ObjectTracker : public DriveConsumer {
                 FrameCallback on_frame);
   ~ObjectTracker() override;
 
+  /// Cameras that get a turn at a stamp, of those that have an image (one value per camera of the rig). The
+  /// others keep what they follow until their next turn.
+  using CameraChoice = std::function<std::vector<size_t>(Timestamp, const std::vector<bool>& has_image)>;
+  /// Without a choice, all cameras have a turn at every stamp.
+  void setCameraChoice(CameraChoice choose) { choose_ = std::move(choose); }
+
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
   /// Replaces the obstacles that hide objects of the following images. Only maps in the frame `odom` are
@@ -70,17 +79,20 @@ class ObjectTracker : public DriveConsumer {
   const FrameCounters& counters() const { return assembler_->counters(); }
 
  private:
-  struct Camera;
   struct State;
 
   void process(const ImageFrame& frame);
+  std::vector<size_t> addImages(const ImageFrame& frame);
+  void findObjects(const std::vector<ObjectCamera*>& cameras, bool is_at_rest);
   void startOver();
 
   const std::shared_ptr<const CameraRig> rig_;
   const ObjectTrackerOptions options_;
   const FrameCallback on_frame_;
-  std::vector<std::unique_ptr<Camera>> cameras_;  // indexed as in the rig; null: not in use
+  CameraChoice choose_;
+  std::vector<std::unique_ptr<ObjectCamera>> cameras_;  // indexed as in the rig; null: not in use
   std::unique_ptr<State> state_;
+  std::unique_ptr<const PersonLikeness> people_;
   std::unique_ptr<ImageFrameAssembler> assembler_;
 };
 

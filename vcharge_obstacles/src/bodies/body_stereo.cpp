@@ -33,15 +33,48 @@ cv::Mat cut(const PanoramaView& view, double column, double top_row, double step
       top_row + step * (size.height - 1) > view.image.rows - 1.0) {
     return {};
   }
-  const cv::Matx23d panorama_from_part(step, 0.0, left, 0.0, step, top_row);
-  constexpr int kFlags = cv::INTER_LINEAR | cv::WARP_INVERSE_MAP;
-  cv::Mat part, mask;
-  cv::warpAffine(view.panorama.validMask(), mask, panorama_from_part, size, kFlags);
-  if (10 * cv::countNonZero(mask) < 9 * size.area()) {
+  // Every other row and column tells how much of it is visible.
+  int visible = 0, looked_at = 0;
+  for (int y = 0; y < size.height; y += 2) {
+    const auto* row = view.panorama.validMask().ptr<uint8_t>(cvRound(top_row + y * step));
+    for (int x = 0; x < size.width; x += 2) {
+      visible += row[cvRound(left + x * step)] != 0 ? 1 : 0;
+      ++looked_at;
+    }
+  }
+  if (10 * visible < 9 * looked_at) {
     return {};
   }
-  cv::warpAffine(view.image, part, panorama_from_part, size, kFlags);
+  cv::Mat part;
+  cv::warpAffine(view.image, part, cv::Matx23d(step, 0.0, left, 0.0, step, top_row), size,
+                 cv::INTER_LINEAR | cv::WARP_INVERSE_MAP);
   return hasTexture(part) ? part : cv::Mat();
+}
+
+/// Normalized correlation of a body with the rows of a part from `first_row` on; both have texture.
+double correlate(const cv::Mat& part, int first_row, const cv::Mat& body) {
+  int64_t a_sum = 0, b_sum = 0, aa_sum = 0, bb_sum = 0, ab_sum = 0;
+  for (int y = 0; y < body.rows; ++y) {
+    const auto* a = part.ptr<uint8_t>(first_row + y);
+    const auto* b = body.ptr<uint8_t>(y);
+    int32_t row_a = 0, row_b = 0, row_aa = 0, row_bb = 0, row_ab = 0;
+    for (int x = 0; x < body.cols; ++x) {
+      row_a += a[x];
+      row_b += b[x];
+      row_aa += a[x] * a[x];
+      row_bb += b[x] * b[x];
+      row_ab += a[x] * b[x];
+    }
+    a_sum += row_a;
+    b_sum += row_b;
+    aa_sum += row_aa;
+    bb_sum += row_bb;
+    ab_sum += row_ab;
+  }
+  const auto count = static_cast<int64_t>(body.total());
+  const auto variances = static_cast<double>(count * aa_sum - a_sum * a_sum) *
+                         static_cast<double>(count * bb_sum - b_sum * b_sum);
+  return variances > 0.0 ? static_cast<double>(count * ab_sum - a_sum * b_sum) / std::sqrt(variances) : 0.0;
 }
 
 /// Compares a body with a second view at any range.
@@ -88,10 +121,10 @@ class RangeSweep {
     if (part.empty()) {
       return -1.0;
     }
-    cv::Mat correlations;
-    cv::matchTemplate(part, body_, correlations, cv::TM_CCOEFF_NORMED);
-    double best = 0.0;
-    cv::minMaxLoc(correlations, nullptr, &best);
+    double best = -1.0;
+    for (int row = 0; row <= 2 * kVertical_px; ++row) {
+      best = std::max(best, correlate(part, row, body_));
+    }
     return best;
   }
   double sigma_m() const { return std::hypot(kMatch_px * pixel_m_, kSides_m) / parallax_; }

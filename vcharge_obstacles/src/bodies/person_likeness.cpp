@@ -14,22 +14,49 @@ constexpr double kNearest_m = 0.8, kFarthest_m = 12.0;
 constexpr double kRanges[] = {0.85, 1.0, 1.18}, kHeights_m[] = {1.2, 1.7};
 // Distance across the view that is searched to each side.
 constexpr double kAside_m = 0.4;
-// The classifier's window, the height of a person in it, and the grid of its histograms.
-constexpr int kWindow_px = 64, kWindowHeight_px = 128, kPerson_px = 96, kStep_px = 8;
+// Height of a person in the classifier's window.
+constexpr int kPerson_px = 96;
+constexpr int kStep_px = PeopleClassifier::kStep_px;
 // Larger people are found in a panorama of half the size.
 constexpr double kShrink = 0.6;
-constexpr double kAllScores = -1e3;
 constexpr int kRim_px = 5;
 
-cv::HOGDescriptor makeClassifier() {
-  cv::HOGDescriptor hog;
-  hog.setSVMDetector(cv::HOGDescriptor::getDefaultPeopleDetector());
-  return hog;
+/// Samples an image (CV_8UC1) bilinearly on a grid, and continues it beyond its border. Returns CV_32FC1,
+/// square roots.
+cv::Mat sampleRoots(const cv::Mat& image, double left, double top, double step, cv::Size size) {
+  struct Sample {
+    int low, high;
+    float part;  // of the high one
+  };
+  const auto samplesOf = [step](double first, int count, int length) {
+    std::vector<Sample> samples;
+    for (int i = 0; i < count; ++i) {
+      const double at = std::clamp(first + i * step, 0.0, length - 1.0);
+      const int low = static_cast<int>(at);
+      samples.push_back({low, std::min(low + 1, length - 1), static_cast<float>(at - low)});
+    }
+    return samples;
+  };
+  const std::vector<Sample> columns = samplesOf(left, size.width, image.cols);
+  const std::vector<Sample> rows = samplesOf(top, size.height, image.rows);
+  cv::Mat roots(size, CV_32FC1);
+  for (int y = 0; y < size.height; ++y) {
+    const Sample& row = rows[static_cast<size_t>(y)];
+    const auto* upper = image.ptr<uint8_t>(row.low);
+    const auto* lower = image.ptr<uint8_t>(row.high);
+    auto* out = roots.ptr<float>(y);
+    for (int x = 0; x < size.width; ++x) {
+      const Sample& column = columns[static_cast<size_t>(x)];
+      const auto blend = [](float a, float b, float part) { return a + part * (b - a); };
+      out[x] = blend(blend(upper[column.low], upper[column.high], column.part),
+                     blend(lower[column.low], lower[column.high], column.part), row.part);
+    }
+  }
+  cv::sqrt(roots, roots);
+  return roots;
 }
 
 }  // namespace
-
-PersonLikeness::PersonLikeness() : hog_(makeClassifier()) {}
 
 std::optional<PersonMatch> PersonLikeness::find(const Panorama& panorama, const cv::Mat& now,
                                                 const BodyBearing& expected, double camera_height_m) const {
@@ -48,7 +75,8 @@ std::optional<PersonMatch> PersonLikeness::find(const Panorama& panorama, const 
       const double head = panorama.rowOf((height_m - camera_height_m) / range_m);
       const double scale = kPerson_px / (foot - head);  // pixels of the window in one of the panorama
       const int aside_px = cvRound(kAside_m / range_m / panorama.pixel_rad() * scale / kStep_px) * kStep_px;
-      const cv::Size size(kWindow_px + 2 * std::max(kStep_px, aside_px), kWindowHeight_px + 2 * kStep_px);
+      const cv::Size size(PeopleClassifier::kWidth_px + 2 * std::max(kStep_px, aside_px),
+                          PeopleClassifier::kHeight_px + 2 * kStep_px);
       double step = 1.0 / scale, left = column - 0.5 * size.width * step;
       double top = head - 0.5 * (size.height - kPerson_px) * step;
       cv::Mat source = now;
@@ -61,17 +89,13 @@ std::optional<PersonMatch> PersonLikeness::find(const Panorama& panorama, const 
         left *= 0.5;
         top *= 0.5;
       }
-      cv::Mat searched;
-      cv::warpAffine(source, searched, cv::Matx23d(step, 0.0, left, 0.0, step, top), size,
-                     cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
-      std::vector<cv::Point> places;
-      std::vector<double> scores;
-      hog_.detect(searched, places, scores, kAllScores, cv::Size(kStep_px, kStep_px), cv::Size(0, 0));
-      for (size_t i = 0; i < scores.size(); ++i) {
-        if (scores[i] > best.score) {
-          const double beside_px = places[i].x + 0.5 * kWindow_px - 0.5 * size.width;
-          best = {scores[i], -beside_px / scale * panorama.pixel_rad()};  // columns run clockwise
-        }
+      const cv::Mat scores = classifier_.scores(sampleRoots(source, left, top, step, size));
+      double highest = 0.0;
+      cv::Point at;
+      cv::minMaxLoc(scores, nullptr, &highest, nullptr, &at);
+      if (highest > best.score) {
+        const double beside_px = kStep_px * (at.x - 0.5 * (scores.cols - 1));
+        best = {highest, -beside_px / scale * panorama.pixel_rad()};  // columns run clockwise
       }
     }
   }

@@ -3,9 +3,9 @@
 #include <optional>
 
 #include <opencv2/core.hpp>
-#include <opencv2/objdetect.hpp>
 
 #include "bodies/body_match.h"
+#include "bodies/people_classifier.h"
 #include "points/panorama.h"
 
 namespace vcharge {
@@ -16,19 +16,17 @@ struct PersonMatch {
   double shift_rad = 0.0;  ///< azimuth beyond the expected one
 };
 
-/// Tells how much the view at a place on the ground looks like a person who stands or walks there: histograms
-/// of oriented gradients and OpenCV's linear classifier (Dalal and Triggs, "Histograms of Oriented Gradients
-/// for Human Detection", CVPR 2005). It tells nothing about motion. Deterministic; immutable.
+/// Tells how much the view at a place on the ground looks like a person who stands or walks there, see
+/// PeopleClassifier. It tells nothing about motion. Deterministic; immutable.
 class PersonLikeness {
  public:
-  PersonLikeness();
   /// Searches adults and children about the expected place, whose range may be wrong by a fifth. None too
   /// near to the camera and at the rim of the panorama. The camera is `camera_height_m` above the ground.
   std::optional<PersonMatch> find(const Panorama& panorama, const cv::Mat& now, const BodyBearing& expected,
                                   double camera_height_m) const;
 
  private:
-  const cv::HOGDescriptor hog_;
+  const PeopleClassifier classifier_;
 };
 
 }  // namespace vcharge

@@ -5,6 +5,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "ground/image_windows.h"
+
 namespace vcharge {
 namespace {
 
@@ -12,14 +14,16 @@ constexpr int kNumSectors = 360;
 constexpr double kMinRange_m = 0.4;
 // Rays that fall less reach the ground beyond any range of interest.
 constexpr double kLeastSlope = 1e-3;
-// Windows of this side are compared.
-constexpr int kWindow_px = 5, kSmoothing_px = 3;
+// Half the side of the windows that are compared, and the side of those that smooth.
+constexpr int kHalfWindow_px = 2, kSmoothing_px = 3;
 // Standard deviation in gray levels from which a window has texture, and the correlations above and below
 // which it shows the ground or something else.
 constexpr float kTexture = 2.5F, kSame = 0.7F, kOther = 0.5F;
 // Windows without texture show the ground if their brightness differs by less than this, absolute and
 // relative.
 constexpr float kSameBrightness = 6.0F, kSameBrightnessRatio = 0.06F;
+// Pixels darker than this do not tell the exposure.
+constexpr uint8_t kMinBrightness = 8;
 // Inverse ranges, relative to that of the ground, at which reflections are searched: trees and clouds are far
 // away, and cars about as far behind the ground as before it.
 constexpr float kMirrorDepths[] = {0.0F, 0.33F, 0.67F};
@@ -39,7 +43,8 @@ GroundContact::GroundContact(const WorkingCamera& camera, const RigidTransform& 
     : camera_(camera),
       vehicle_from_camera_(vehicle_from_camera),
       height_m_(vehicle_from_camera.translation().z()),
-      min_inverse_per_m_(1.0 / max_range_m) {
+      min_inverse_per_m_(1.0 / max_range_m),
+      warp_(camera.model(), camera.validMask()) {
   const double focal_px = camera.model().gamma1() / (1.0 + camera.model().xi());
   bin_per_m_ = 1.0 / (focal_px * height_m_);
   num_bins_ = static_cast<int>((1.0 / kMinRange_m - min_inverse_per_m_) / bin_per_m_);
@@ -69,12 +74,13 @@ GroundContact::GroundContact(const WorkingCamera& camera, const RigidTransform& 
   for (int y = rows_.y; y < rows_.y + rows_.height; ++y) {
     for (int x = 0; x < rows_.width; ++x) {
       Eigen::Vector3d ray;
-      Eigen::Vector3f& ground = ground_m_.emplace_back(Eigen::Vector3f::Constant(NAN));
       if (camera.validMask().at<uint8_t>(y, x) != 0 &&
           camera.model().unproject({static_cast<double>(x), static_cast<double>(y)}, &ray)) {
         const Eigen::Vector3d direction = vehicle_from_camera.rotation() * ray.normalized();
         if (direction.z() < -kLeastSlope) {
-          ground = (vehicle_from_camera.translation() - height_m_ / direction.z() * direction).cast<float>();
+          const Eigen::Vector3f axis = direction.cast<float>();
+          ground_.add(y * rows_.width + x, axis.x(), axis.y(), axis.z(),
+                      static_cast<float>(-direction.z() / height_m_));
         }
       }
     }
@@ -86,85 +92,47 @@ int GroundContact::sectorOf(double azimuth_rad) const {
   return (sector % kNumSectors + kNumSectors) % kNumSectors;
 }
 
-cv::Mat GroundContact::warpOf(const RigidTransform& before_from_now, float inverse_range_part) const {
-  const RigidTransform camera_from_now = vehicle_from_camera_.inverse() * before_from_now;
-  const Eigen::Matrix3f rotation = camera_from_now.rotationMatrix().cast<float>();
-  // Points deeper than the ground by the reciprocal of the part, seen from the camera now, up to a factor.
-  const Eigen::Vector3f translation =
-      (camera_from_now.translation() -
-       (1.0 - inverse_range_part) * (camera_from_now * vehicle_from_camera_.translation()))
-          .cast<float>();
-  const MeiCamera& model = camera_.model();
-  const auto xi = static_cast<float>(model.xi());
-  const auto gamma1 = static_cast<float>(model.gamma1()), gamma2 = static_cast<float>(model.gamma2());
-  const auto u0 = static_cast<float>(model.u0()), v0 = static_cast<float>(model.v0());
-  const cv::Rect image(cv::Point(), camera_.size());
-  cv::Mat map(rows_.size(), CV_32FC2, cv::Scalar::all(-1.0));
-  for (int y = 0; y < rows_.height; ++y) {
-    auto* row = map.ptr<cv::Vec2f>(y);
-    for (int x = 0; x < rows_.width; ++x) {
-      const Eigen::Vector3f point =
-          rotation * ground_m_[static_cast<size_t>(y) * rows_.width + x] + translation;
-      const float denominator = point.z() + xi * point.norm();
-      if (!(denominator > 0.1F * point.norm())) {
-        continue;  // without ground, or too far off the axis
-      }
-      const cv::Vec2f pixel(gamma1 * point.x() / denominator + u0, gamma2 * point.y() / denominator + v0);
-      const cv::Point nearest(cvRound(pixel[0]), cvRound(pixel[1]));
-      if (image.contains(nearest) && camera_.validMask().at<uint8_t>(nearest) != 0) {
-        row[x] = pixel;
-      }
-    }
-  }
-  return map;
-}
-
 void GroundContact::compare(const cv::Mat& now, const cv::Mat& before, const RigidTransform& before_from_now,
                             bool is_mirror) {
   labels_ = cv::Mat::zeros(now.size(), CV_8SC1);
   if (rows_.empty()) {
     return;
   }
-  labelGround(now, before, warpOf(before_from_now, 1.0F), &labels_);
+  cv::Mat smooth;
+  // Fine grain does not look alike from another distance.
+  cv::blur(now(rows_), smooth, cv::Size(kSmoothing_px, kSmoothing_px));
+  const RigidTransform camera_from_now = vehicle_from_camera_.inverse() * before_from_now;
+  // Points deeper than the ground have a part of its inverse range.
+  const auto compareAt = [&](float inverse_range_part, cv::Mat* labels) {
+    labelGround(smooth,
+                warp_.warp(before, camera_from_now, vehicle_from_camera_.translation(), ground_,
+                           inverse_range_part, rows_),
+                labels);
+  };
+  compareAt(1.0F, &labels_);
   if (!is_mirror) {
     return;
   }
   // What is static and deeper than the ground is a reflection: the ground is visible there too.
   for (const float part : kMirrorDepths) {
     cv::Mat labels = cv::Mat::zeros(now.size(), CV_8SC1);
-    labelGround(now, before, warpOf(before_from_now, part), &labels);
+    compareAt(part, &labels);
     labels_.setTo(cv::Scalar(1), labels == 1);
     labels_.setTo(cv::Scalar(0), (labels == 0) & (labels_ == -1));
   }
 }
 
-void GroundContact::labelGround(const cv::Mat& now, const cv::Mat& before, const cv::Mat& map,
-                                cv::Mat* labels) const {
-  cv::Mat warped, is_known;
-  cv::remap(before, warped, map, cv::Mat(), cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(0));
-  std::vector<cv::Mat> channels;
-  cv::split(map, channels);
-  is_known = channels[0] >= 0.0;
-  cv::erode(is_known, is_known, cv::Mat::ones(kWindow_px, kWindow_px, CV_8U));
-  cv::Mat a, b, mean_a, mean_b, square_a, square_b, product;
-  // Fine grain does not look alike from another distance.
-  cv::blur(now(rows_), a, cv::Size(kSmoothing_px, kSmoothing_px));
-  cv::blur(warped, b, cv::Size(kSmoothing_px, kSmoothing_px));
-  a.convertTo(a, CV_32F);
-  b.convertTo(b, CV_32F);
-  const cv::Size window(kWindow_px, kWindow_px);
-  const auto mean = [&](const cv::Mat& of, cv::Mat* result) { cv::boxFilter(of, *result, CV_32F, window); };
-  mean(a, &mean_a);
-  mean(b, &mean_b);
-  mean(a.mul(a), &square_a);
-  mean(b.mul(b), &square_b);
-  mean(a.mul(b), &product);
+void GroundContact::labelGround(const cv::Mat& now, const WarpedImage& before, cv::Mat* labels) const {
+  cv::Mat is_known, smooth;
+  cv::erode(before.known, is_known, cv::Mat::ones(2 * kHalfWindow_px + 1, 2 * kHalfWindow_px + 1, CV_8U));
+  cv::blur(before.image, smooth, cv::Size(kSmoothing_px, kSmoothing_px));
   // Most of the ground is unchanged, so the median ratio is the change of the exposure.
   std::vector<float> ratios;
   for (int y = 0; y < rows_.height; y += 4) {
     for (int x = 0; x < rows_.width; x += 4) {
-      if (is_known.at<uint8_t>(y, x) != 0 && mean_b.at<float>(y, x) > 8.0F) {
-        ratios.push_back(mean_a.at<float>(y, x) / mean_b.at<float>(y, x));
+      if (is_known.at<uint8_t>(y, x) != 0 && smooth.at<uint8_t>(y, x) > kMinBrightness) {
+        ratios.push_back(static_cast<float>(now.at<uint8_t>(y, x)) /
+                         static_cast<float>(smooth.at<uint8_t>(y, x)));
       }
     }
   }
@@ -174,22 +142,28 @@ void GroundContact::labelGround(const cv::Mat& now, const cv::Mat& before, const
                      ratios.end());
     gain = ratios[ratios.size() / 2];
   }
+  ImageWindows windows(now, {smooth}, kHalfWindow_px);
   for (int y = 0; y < rows_.height; ++y) {
+    windows.nextRow();
+    const auto* known = is_known.ptr<uint8_t>(y);
+    auto* label = labels->ptr<int8_t>(y + rows_.y);
+    const float* mean = windows.mean();
+    const float* mean_before = windows.meanBefore(0);
+    const float* variance = windows.variance();
+    const float* variance_before = windows.varianceBefore(0);
+    const float* correlation = windows.correlation(0);
     for (int x = 0; x < rows_.width; ++x) {
-      if (is_known.at<uint8_t>(y, x) == 0) {
+      if (known[x] == 0) {
         continue;
       }
-      const float ma = mean_a.at<float>(y, x), mb = mean_b.at<float>(y, x);
-      const float variance_a = std::max(0.0F, square_a.at<float>(y, x) - ma * ma);
-      const float variance_b = std::max(0.0F, square_b.at<float>(y, x) - mb * mb);
-      int8_t& label = labels->at<int8_t>(y + rows_.y, x);
-      if (std::max(variance_a, variance_b) < kTexture * kTexture) {
-        label = std::abs(ma - gain * mb) < kSameBrightness + kSameBrightnessRatio * ma ? 1 : -1;
-        continue;
+      if (std::max(variance[x], variance_before[x]) < kTexture * kTexture) {
+        const float difference = std::abs(mean[x] - gain * mean_before[x]);
+        label[x] = difference < kSameBrightness + kSameBrightnessRatio * mean[x] ? 1 : -1;
+      } else if (correlation[x] > kSame) {
+        label[x] = 1;
+      } else if (correlation[x] < kOther) {
+        label[x] = -1;
       }
-      const float correlation = (product.at<float>(y, x) - ma * mb) /
-                                std::sqrt(std::max(1.0F, variance_a) * std::max(1.0F, variance_b));
-      label = correlation > kSame ? 1 : (correlation < kOther ? -1 : 0);
     }
   }
 }

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <opencv2/core.hpp>
 
+#include "ground/point_warp.h"
 #include "vcharge_core/camera/working_camera.h"
 #include "vcharge_core/motion/rigid_transform.h"
 
@@ -39,11 +40,8 @@ class GroundContact {
   const cv::Mat& labels() const { return labels_; }
 
  private:
-  /// Pixels (CV_32FC2) of an earlier image that show the ground of the pixels in rows_, or what lies deeper,
-  /// at this part of the ground's inverse range; (-1, -1) without one.
-  cv::Mat warpOf(const RigidTransform& before_from_now, float inverse_range_part) const;
-  /// Sets the labels where an earlier image, warped by a map of rows_, tells them.
-  void labelGround(const cv::Mat& now, const cv::Mat& before, const cv::Mat& map, cv::Mat* labels) const;
+  /// Sets the labels where an earlier image, warped to rows_, tells them; `now` is smoothed and of rows_.
+  void labelGround(const cv::Mat& now, const WarpedImage& before, cv::Mat* labels) const;
   int sectorOf(double azimuth_rad) const;
   std::optional<Contact> belowSectors(int first_sector, int num_sectors, double slope) const;
   int labelAt(int sector, int bin) const;
@@ -56,8 +54,8 @@ class GroundContact {
   int num_bins_ = 0;
   std::vector<int32_t> pixels_;  // of each sector and bin: row * columns + column, or -1
   cv::Rect rows_;                // part of the image that shows ground
-  std::vector<Eigen::Vector3f>
-      ground_m_;  // in rows_, by row: the ground's point in the vehicle frame; NaN without
+  PixelPoints ground_;           // of the pixels in rows_ that show it, in the vehicle frame
+  PointWarp warp_;
   cv::Mat labels_;
 };
 

@@ -22,23 +22,26 @@ constexpr float kLow_m = 0.08F;
 constexpr float kRelativeDifference = 0.05F;
 // The gain between two images is estimated from at least this number of pixels of this brightness or more.
 constexpr size_t kMinCompared = 200;
+// It is estimated from every one of so many pixels.
+constexpr size_t kExposureStep = 8;
 constexpr float kMinBrightness = 8.0F;
 // The light on the ground is alike over windows of this side.
 constexpr int kLight_px = 21;
 
-cv::Mat warped(const cv::Mat& before, const cv::Mat& map) {
-  cv::Mat image;
-  cv::remap(before, image, map, cv::Mat(), cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(0));
-  return image;
+/// CV_8UC1: not 0 where the windows of a warped image are known.
+cv::Mat knownWindows(const WarpedImage& warped) {
+  cv::Mat known;
+  cv::erode(warped.known, known, cv::Mat::ones(kWindow_px, kWindow_px, CV_8U));
+  return known;
 }
 
-/// CV_8UC1: not 0 where the windows of a warped image are known.
-cv::Mat knownIn(const cv::Mat& map) {
-  cv::Mat channel, known;
-  cv::extractChannel(map, channel, 0);
-  known = channel >= 0.0;
-  cv::erode(known, known, cv::Mat::ones(kWindow_px, kWindow_px, CV_8U));
-  return known;
+/// Pixels of a camera's images that smoothing, windows and slack do not take beyond the valid ones.
+cv::Mat innerPixels(const WorkingCamera& camera) {
+  constexpr int kReach_px = 2 * (kSmoothing_px / 2 + kSlack_px) + 3;
+  cv::Mat inner;
+  cv::erode(camera.validMask(), inner, cv::Mat::ones(kReach_px, kReach_px, CV_8U), cv::Point(-1, -1), 1,
+            cv::BORDER_CONSTANT, cv::Scalar(0));
+  return inner;
 }
 
 /// CV_32FC1: ratio of the mean brightness around each pixel, of known pixels. It follows lamps and shadows of
@@ -66,141 +69,120 @@ GroundView::GroundView(Timestamp time, const cv::Mat& image, const RigidTransfor
 
 GroundMatch::GroundMatch(const WorkingCamera& camera, const RigidTransform& vehicle_from_camera,
                          const PixelRays& rays, double min_difference)
-    : model_(camera.model()),
-      vehicle_from_camera_(vehicle_from_camera),
+    : vehicle_from_camera_(vehicle_from_camera),
       size_(camera.size()),
       rays_(rays),
-      min_difference_(static_cast<float>(min_difference)) {
-  // Smoothing, window and slack must not reach invalid pixels.
-  const int reach = 2 * (kSmoothing_px / 2 + kSlack_px) + 3;
-  cv::erode(camera.validMask(), valid_, cv::Mat::ones(reach, reach, CV_8U), cv::Point(-1, -1), 1,
-            cv::BORDER_CONSTANT, cv::Scalar(0));
+      min_difference_(static_cast<float>(min_difference)),
+      warp_(camera.model(), innerPixels(camera)) {
+  const cv::Mat inner = innerPixels(camera);
+  for (const int32_t pixel : rays.pixel) {
+    is_inner_.push_back(inner.data[pixel] != 0);
+  }
 }
 
-/// Pixels (CV_32FC2) of the older image that show what the newer one's pixels show, if that is the ground, or
-/// the plane above it; only for rows of the newer image that matter. (-1, -1) where there is none.
-struct GroundMatch::Warp {
+/// Pixels of the newer image that matter, and the points of the ground that they show.
+struct GroundMatch::Band {
   struct Pixel {
     size_t ray;
-    float range_m, inverse, height_m;  // along the ray to the ground; inverse horizontal range
+    float inverse;  // of the horizontal range to the ground
   };
   cv::Rect rows;
-  cv::Mat ground, raised;  // raised: empty if not wanted
+  float height_m = 0.0F;  // above the ground
   std::vector<Pixel> pixels;
+  PixelPoints ground;  // of the inner ones
 };
 
-GroundMatch::Warp GroundMatch::warp(const RigidTransform& before_from_now, const GroundPlane& ground,
-                                    double near_m, double far_m, Wanted wanted) const {
-  const Eigen::Matrix3f rotation = before_from_now.rotationMatrix().cast<float>();
-  const Eigen::Vector3f translation = before_from_now.translation().cast<float>();
+GroundMatch::Band GroundMatch::pixelsIn(const GroundPlane& ground, double near_m, double far_m) const {
   const Eigen::Vector3f camera = vehicle_from_camera_.translation().cast<float>();
   const auto slope_x = static_cast<float>(ground.slope.x());
   const auto slope_y = static_cast<float>(ground.slope.y());
-  const float height =
+  Band band;
+  band.height_m =
       camera.z() - static_cast<float>(ground.offset_m) - slope_x * camera.x() - slope_y * camera.y();
   const auto near = static_cast<float>(near_m) * (1.0F - kBandMargin);
   const auto far = static_cast<float>(far_m) * (1.0F + kBandMargin);
-  Warp result;
-  result.pixels.reserve(rays_.size());
-  int top = size_.height, bottom = 0;
+  band.pixels.reserve(rays_.size());
+  band.ground.reserve(rays_.size());
   for (size_t i = 0; i < rays_.size(); ++i) {
     const float fall = slope_x * rays_.x[i] + slope_y * rays_.y[i] - rays_.z[i];
-    const float across = height * rays_.horizontal[i];
+    const float across = band.height_m * rays_.horizontal[i];
     if (fall * far > across && fall * near < across) {
-      result.pixels.push_back({i, height / fall, fall / across, height});
-      const int row = rays_.pixel[i] / size_.width;
-      top = std::min(top, row);
-      bottom = std::max(bottom, row + 1);
-    }
-  }
-  result.rows = top < bottom ? cv::Rect(0, top, size_.width, bottom - top) : cv::Rect();
-  result.ground = cv::Mat(result.rows.size(), CV_32FC2, cv::Scalar::all(-1.0));
-  result.raised = wanted == Wanted::kAll ? result.ground.clone() : cv::Mat();
-  const auto xi = static_cast<float>(model_.xi());
-  const auto project = [&](size_t i, float range_m, cv::Mat* map) {
-    const Eigen::Vector3f point =
-        rotation * (camera + range_m * Eigen::Vector3f(rays_.x[i], rays_.y[i], rays_.z[i])) + translation;
-    const float denominator = point.z() + xi * point.norm();
-    if (!(denominator > 0.1F * point.norm())) {
-      return;
-    }
-    const cv::Vec2f at(
-        static_cast<float>(model_.gamma1()) * point.x() / denominator + static_cast<float>(model_.u0()),
-        static_cast<float>(model_.gamma2()) * point.y() / denominator + static_cast<float>(model_.v0()));
-    const cv::Point nearest(cvRound(at[0]), cvRound(at[1]));
-    if (cv::Rect(1, 1, size_.width - 2, size_.height - 2).contains(nearest) &&
-        valid_.at<uint8_t>(nearest) != 0) {
-      const int pixel = rays_.pixel[i];
-      map->at<cv::Vec2f>(pixel / size_.width - top, pixel % size_.width) = at;
-    }
-  };
-  const float raised = 1.0F - static_cast<float>(kRaised_m) / height;
-  for (const Warp::Pixel& pixel : result.pixels) {
-    if (valid_.data[rays_.pixel[pixel.ray]] != 0) {
-      project(pixel.ray, pixel.range_m, &result.ground);
-      if (wanted == Wanted::kAll) {
-        project(pixel.ray, pixel.range_m * raised, &result.raised);
+      band.pixels.push_back({i, fall / across});
+      if (is_inner_[i] != 0) {
+        band.ground.add(rays_.pixel[i], rays_.x[i], rays_.y[i], rays_.z[i], fall / band.height_m);
       }
     }
   }
-  return result;
+  if (!band.pixels.empty()) {  // by row
+    const int top = rays_.pixel[band.pixels.front().ray] / size_.width;
+    const int bottom = rays_.pixel[band.pixels.back().ray] / size_.width + 1;
+    band.rows = cv::Rect(0, top, size_.width, bottom - top);
+  }
+  return band;
 }
 
 std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const GroundView& before,
                                                const GroundPlane& ground, double near_m, double far_m,
                                                Wanted wanted) const {
-  const RigidTransform before_from_now =
-      (before.fixed_from_body * vehicle_from_camera_).inverse() * now.fixed_from_body;
-  const Warp warp = this->warp(before_from_now, ground, near_m, far_m, wanted);
-  if (warp.rows.empty()) {
+  const Band band = pixelsIn(ground, near_m, far_m);
+  if (band.rows.empty()) {
     return {};
   }
-  const cv::Mat on_ground = warped(before.smooth, warp.ground), knows_ground = knownIn(warp.ground);
+  const RigidTransform before_from_now =
+      (before.fixed_from_body * vehicle_from_camera_).inverse() * now.fixed_from_body;
+  const auto warpBefore = [&](float inverse_range_factor) {
+    return warp_.warp(before.smooth, before_from_now, vehicle_from_camera_.translation(), band.ground,
+                      inverse_range_factor, band.rows);
+  };
+  const WarpedImage warped = warpBefore(1.0F);
+  const cv::Mat on_ground = warped.image, knows_ground = knownWindows(warped);
+  const cv::Mat here = now.smooth(band.rows);
+  const int first_pixel = band.rows.y * size_.width;
   // The exposure may have changed. Most of the ground has not, so the median ratio is the gain.
   std::vector<float> ratios;
-  for (const Warp::Pixel& pixel : warp.pixels) {
-    const int at = rays_.pixel[pixel.ray], row = at / size_.width - warp.rows.y, column = at % size_.width;
-    const float a = now.smooth.data[at], b = on_ground.at<uint8_t>(row, column);
-    if (knows_ground.at<uint8_t>(row, column) != 0 && std::min(a, b) >= kMinBrightness) {
+  for (size_t i = 0; i < band.pixels.size(); i += kExposureStep) {
+    const int at = rays_.pixel[band.pixels[i].ray], in_rows = at - first_pixel;
+    const float a = now.smooth.data[at], b = on_ground.data[in_rows];
+    if (knows_ground.data[in_rows] != 0 && std::min(a, b) >= kMinBrightness) {
       ratios.push_back(a / b);
     }
   }
-  if (ratios.size() < kMinCompared) {
+  if (ratios.size() * kExposureStep < kMinCompared) {
     return {};
   }
   const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
   std::nth_element(ratios.begin(), middle, ratios.end());
   const float gain = *middle;
-  const cv::Mat local_gain = localGain(now.smooth(warp.rows), on_ground, knows_ground);
-  const cv::Mat keeps_texture = keepsTexture(now.smooth(warp.rows), on_ground);
-  cv::Mat fit(warp.rows.size(), CV_8UC1, cv::Scalar(0));
+  const cv::Mat local_gain = localGain(here, on_ground, knows_ground);
+  cv::Mat keeps_texture, fit;
   if (wanted == Wanted::kAll) {
-    fit =
-        fitPlanes(now.smooth(warp.rows), on_ground, warped(before.smooth, warp.raised), knownIn(warp.raised));
+    const WarpedImage raised = warpBefore(band.height_m / (band.height_m - static_cast<float>(kRaised_m)));
+    fit = fitPlanes(here, on_ground, raised.image, knownWindows(raised), &keeps_texture);
+  } else {
+    fit = cv::Mat(here.size(), CV_8UC1, cv::Scalar(PlaneFit::kUndecided));
+    keeps_texture = keepsTexture(here, on_ground);
   }
   std::vector<MatchedPixel> result;
-  result.reserve(warp.pixels.size());
+  result.reserve(band.pixels.size());
   const auto near_inverse = static_cast<float>(1.0 / near_m), far_inverse = static_cast<float>(1.0 / far_m);
-  for (const Warp::Pixel& pixel : warp.pixels) {
-    const int at = rays_.pixel[pixel.ray], row = at / size_.width - warp.rows.y, column = at % size_.width;
-    if (pixel.inverse > near_inverse || pixel.inverse < far_inverse ||
-        knows_ground.at<uint8_t>(row, column) == 0) {
+  for (const Band::Pixel& pixel : band.pixels) {
+    const int at = rays_.pixel[pixel.ray], in_rows = at - first_pixel;
+    if (pixel.inverse > near_inverse || pixel.inverse < far_inverse || knows_ground.data[in_rows] == 0) {
       continue;
     }
-    const cv::Vec2f source = warp.ground.at<cv::Vec2f>(row, column);
-    const cv::Point nearest(cvRound(source[0]), cvRound(source[1]));
+    const int nearest = warped.nearest.ptr<int32_t>()[in_rows];
     const float brightness = now.smooth.data[at];
     const float tolerance = min_difference_ + kRelativeDifference * brightness;
-    const float lowest = before.lowest.at<uint8_t>(nearest), highest = before.highest.at<uint8_t>(nearest);
+    const float lowest = before.lowest.data[nearest], highest = before.highest.data[nearest];
     const auto differsWith = [&](float factor) {
       return brightness < factor * lowest - tolerance || brightness > factor * highest + tolerance;
     };
-    const bool has_texture = keeps_texture.at<uint8_t>(row, column) != 0;
-    const bool is_other_light = has_texture && !differsWith(local_gain.at<float>(row, column));
+    const bool has_texture = keeps_texture.data[in_rows] != 0;
+    const bool is_other_light = has_texture && !differsWith(local_gain.ptr<float>()[in_rows]);
     const bool differs = differsWith(gain) && !is_other_light;
-    result.push_back({pixel.ray, pixel.inverse, pixel.inverse * pixel.height_m / (pixel.height_m - kLow_m),
-                      fit.at<uint8_t>(row, column) == PlaneFit::kGround,
-                      fit.at<uint8_t>(row, column) == PlaneFit::kOther, differs, has_texture});
+    result.push_back({pixel.ray, pixel.inverse, pixel.inverse * band.height_m / (band.height_m - kLow_m),
+                      fit.data[in_rows] == PlaneFit::kGround, fit.data[in_rows] == PlaneFit::kOther, differs,
+                      has_texture});
   }
   return result;
 }

@@ -7,6 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "detection/pixel_rays.h"
+#include "ground/point_warp.h"
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/camera/working_camera.h"
 #include "vcharge_core/motion/rigid_transform.h"
@@ -56,17 +57,16 @@ class GroundMatch {
                                     Wanted wanted) const;
 
  private:
-  struct Warp;
+  struct Band;
 
-  Warp warp(const RigidTransform& before_from_now, const GroundPlane& ground, double near_m, double far_m,
-            Wanted wanted) const;
+  Band pixelsIn(const GroundPlane& ground, double near_m, double far_m) const;
 
-  const MeiCamera model_;
   const RigidTransform vehicle_from_camera_;
   const cv::Size size_;
   const PixelRays& rays_;
+  std::vector<uint8_t> is_inner_;  // by ray: whether the surroundings of its pixel are valid
   const float min_difference_;
-  cv::Mat valid_;
+  const PointWarp warp_;
 };
 
 }  // namespace vcharge

@@ -20,6 +20,14 @@ cv::Mat known() {
   return {kSize_px, kSize_px, CV_8UC1, cv::Scalar(255)};
 }
 
+cv::Mat fitOf(const cv::Mat& now, const cv::Mat& on_ground, const cv::Mat& on_raised,
+              const cv::Mat& knows_raised = known()) {
+  cv::Mat keeps_texture;
+  cv::Mat fits = fitPlanes(now, on_ground, on_raised, knows_raised, &keeps_texture);
+  EXPECT_EQ(cv::countNonZero(keeps_texture != keepsTexture(now, on_ground)), 0);
+  return fits;
+}
+
 double fractionOf(const cv::Mat& fits, uint8_t value) {
   return static_cast<double>(cv::countNonZero(fits == value)) / fits.size().area();
 }
@@ -28,13 +36,13 @@ TEST(PlaneFitTest, WhatFitsTheGroundIsGroundWhateverTheLight) {
   const cv::Mat now = noise(1);
   cv::Mat darker;
   now.convertTo(darker, CV_8U, 0.6, 5.0);
-  EXPECT_GT(fractionOf(fitPlanes(now, darker, noise(2), known()), PlaneFit::kGround), 0.99);
+  EXPECT_GT(fractionOf(fitOf(now, darker, noise(2)), PlaneFit::kGround), 0.99);
 }
 
 TEST(PlaneFitTest, WhatFitsThePlaneAboveOrNeitherIsOther) {
   const cv::Mat now = noise(1);
-  EXPECT_GT(fractionOf(fitPlanes(now, noise(2), now, known()), PlaneFit::kOther), 0.99);
-  const cv::Mat neither = fitPlanes(now, noise(2), noise(3), known());
+  EXPECT_GT(fractionOf(fitOf(now, noise(2), now), PlaneFit::kOther), 0.99);
+  const cv::Mat neither = fitOf(now, noise(2), noise(3));
   EXPECT_GT(fractionOf(neither, PlaneFit::kOther), 0.6);
   EXPECT_LT(fractionOf(neither, PlaneFit::kGround), 0.02)
       << "small windows fit by chance, larger ones do not";
@@ -42,13 +50,13 @@ TEST(PlaneFitTest, WhatFitsThePlaneAboveOrNeitherIsOther) {
 
 TEST(PlaneFitTest, WhatFitsBothPlanesOrHasNoTextureIsUndecided) {
   const cv::Mat now = noise(1), flat(kSize_px, kSize_px, CV_8UC1, cv::Scalar(100));
-  EXPECT_EQ(fractionOf(fitPlanes(now, now, now, known()), PlaneFit::kUndecided), 1.0);
-  EXPECT_EQ(fractionOf(fitPlanes(flat, flat, noise(2), known()), PlaneFit::kUndecided), 1.0);
+  EXPECT_EQ(fractionOf(fitOf(now, now, now), PlaneFit::kUndecided), 1.0);
+  EXPECT_EQ(fractionOf(fitOf(flat, flat, noise(2)), PlaneFit::kUndecided), 1.0);
 }
 
 TEST(PlaneFitTest, GroundNeedsAPlaneAboveToCompareWith) {
   const cv::Mat now = noise(1);
-  EXPECT_EQ(fractionOf(fitPlanes(now, now, noise(2), cv::Mat::zeros(now.size(), CV_8UC1)), PlaneFit::kGround),
+  EXPECT_EQ(fractionOf(fitOf(now, now, noise(2), cv::Mat::zeros(now.size(), CV_8UC1)), PlaneFit::kGround),
             0.0);
 }
 
@@ -66,7 +74,7 @@ TEST(PlaneFitTest, TextureIsKeptInWhateverLight) {
 
 TEST(PlaneFitTest, ImagesSmallerThanAWindowAreCompared) {
   const cv::Mat now = noise(1)(cv::Rect(0, 0, 3, 2)).clone();
-  EXPECT_EQ(fitPlanes(now, now, now, known()(cv::Rect(0, 0, 3, 2))).size(), now.size());
+  EXPECT_EQ(fitOf(now, now, now, known()(cv::Rect(0, 0, 3, 2))).size(), now.size());
 }
 
 }  // namespace

@@ -190,9 +190,13 @@ bool ObjectFilter::walks(const Track& track) const {
          found->dot(track.state.tail<2>()) > 0.5 * found->squaredNorm();
 }
 
-void ObjectFilter::addLikeness(size_t index, double score) {
-  double& likeness = tracks_[index].likeness;
-  likeness = kKeptLikeness * likeness + (1.0 - kKeptLikeness) * score;
+void ObjectFilter::addLook(size_t index, const std::vector<double>& scores, double log_odds) {
+  Track& track = tracks_[index];
+  for (const double score : scores) {
+    track.likeness = kKeptLikeness * track.likeness + (1.0 - kKeptLikeness) * score;
+  }
+  track.look_vote = log_odds;
+  track.last_look = stamp_;
 }
 
 /// Whether an object that looks like a person moves as one, at this number of its speed's standard
@@ -209,7 +213,7 @@ std::vector<ObjectFilter::Expected> ObjectFilter::expected() const {
     const Track& track = tracks_[i];
     if (track.existence_log_odds >= kFollowed) {
       result.push_back({i, track.state.head<2>(), track.state.tail<2>(), track.width_m, track.height_m,
-                        track.last_seen == stamp_});
+                        track.last_seen == stamp_, track.last_look});
     }
   }
   return result;
@@ -256,8 +260,9 @@ void ObjectFilter::finish() {
     track.has_moved = track.has_moved || (travels && track.num_detections > 0) || (is_fast && walks(track)) ||
                       movesLikePerson(track, speed_sigmas) || track.num_detections >= kManyDetections;
     if (track.last_seen < stamp_) {
-      track.existence_log_odds = std::min(
-          kMost, track.existence_log_odds + std::clamp(kMiss + track.votes, kLeastChange, kMostChange));
+      track.existence_log_odds =
+          std::min(kMost, track.existence_log_odds +
+                              std::clamp(kMiss + track.votes + track.look_vote, kLeastChange, kMostChange));
     }
     track.votes = 0.0;
     if (track.last_seen == stamp_ || is_fast) {

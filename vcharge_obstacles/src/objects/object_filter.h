@@ -28,6 +28,7 @@ class ObjectFilter {
     Eigen::Vector2d position_m, velocity_m_per_s;
     double width_m = 0.0, height_m = 0.0;
     bool is_detected = false;  ///< by a camera, at this stamp
+    Timestamp last_look;       ///< see addLook(); zero without one
   };
   /// Objects that are probable enough to be searched in the images.
   std::vector<Expected> expected() const;
@@ -37,8 +38,9 @@ class ObjectFilter {
   bool correct(size_t index, double innovation, const Eigen::Vector4d& row, double sigma);
   /// Adds log-odds to the existence of an object that no camera detects at this stamp.
   void vote(size_t index, double log_odds) { tracks_[index].votes += log_odds; }
-  /// Adds how much an object looks like a person in one view: PersonMatch::score.
-  void addLikeness(size_t index, double score);
+  /// Adds how much an object looks like a person in each view, PersonMatch::score, and the log-odds by which
+  /// it is more probable at this stamp and until the next look.
+  void addLook(size_t index, const std::vector<double>& scores, double log_odds);
   /// Ends the stamp: objects that no camera has detected become less probable, and some end.
   void finish();
   /// Objects that probably exist, in the fixed frame. Their covariances contain the errors that successive
@@ -64,6 +66,8 @@ class ObjectFilter {
     Timestamp last_moving;  // detected, or surely moving
     double votes = 0.0;     // at this stamp
     double likeness = kUnlike;
+    Timestamp last_look;
+    double look_vote = 0.0;
   };
   bool walks(const Track& track) const;
   static bool movesLikePerson(const Track& track, double speed_sigmas);

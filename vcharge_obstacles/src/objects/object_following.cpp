@@ -33,12 +33,13 @@ constexpr double kPersonScore = -0.2, kPersonAcross_m = 0.08;
 // Log-odds of something no wider than a person, per score beyond that which people and other things have
 // alike, and their bound: scores of successive views are alike.
 constexpr double kPerScore = 0.4, kEvenScore = -0.3, kPersonVote = 0.4;
+// Views of objects that are compared with people at one stamp.
+constexpr int kMaxLooks = 24;
 
 class Follower {
  public:
-  Follower(const TwoViews& views, const GroundContact* contact, const PersonLikeness& people,
-           ObjectFilter* filter)
-      : views_(views), contact_(contact), people_(people), filter_(filter) {}
+  Follower(const TwoViews& views, const GroundContact* contact, ObjectFilter* filter)
+      : views_(views), contact_(contact), filter_(filter) {}
 
   void follow(const ObjectFilter::Expected& object) const {
     const Seen now = see(views_.fixed_from_vehicle_now, object.position_m);
@@ -46,25 +47,6 @@ class Follower {
         see(views_.fixed_from_vehicle_before, object.position_m - views_.step_s * object.velocity_m_per_s);
     if (now.bearing.range_m > kMinRange_m && now.bearing.range_m < kMaxRange_m) {
       filter_->vote(object.index, findBody(object, before, now) + findContact(object, now));
-    }
-  }
-
-  void look(const ObjectFilter::Expected& object) const {
-    const Seen now = see(views_.fixed_from_vehicle_now, object.position_m);
-    const std::optional<PersonMatch> found =
-        people_.find(views_.panorama, views_.now, now.bearing, views_.camera_in_vehicle_m.z());
-    if (!found) {
-      return;
-    }
-    filter_->addLikeness(object.index, found->score);
-    if (object.width_m < kMaxPersonWidth_m) {
-      filter_->vote(object.index,
-                    std::clamp(kPerScore * (found->score - kEvenScore), -kPersonVote, kPersonVote));
-    }
-    if (found->score > kPersonScore) {
-      Eigen::Vector4d row;
-      row << now.across() / now.bearing.range_m, 0.0, 0.0;
-      filter_->correct(object.index, found->shift_rad, row, kPersonAcross_m / now.bearing.range_m);
     }
   }
 
@@ -136,53 +118,102 @@ class Follower {
 
   const TwoViews& views_;
   const GroundContact* contact_;
-  const PersonLikeness& people_;
   ObjectFilter* filter_;
 };
 
+struct ViewOfObject {
+  double aside;  // columns from the middle of the view
+  const PanoramaView* view;
+  BodyBearing bearing;
+};
+
+/// The views in which an object is seen, the one first in which it is nearest to the middle.
+std::vector<ViewOfObject> viewsOf(const std::vector<PanoramaView>& views,
+                                  const RigidTransform& fixed_from_vehicle,
+                                  const Eigen::Vector2d& fixed_position_m) {
+  const Eigen::Vector2d position_m = fixed_from_vehicle.rotationMatrix().topLeftCorner<2, 2>().transpose() *
+                                     (fixed_position_m - fixed_from_vehicle.translation().head<2>());
+  std::vector<ViewOfObject> seen;
+  for (const PanoramaView& view : views) {
+    const BodyBearing bearing = bearingFrom(view.camera_in_vehicle_m.head<2>(), position_m);
+    const double middle = 0.5 * (view.image.cols - 1);
+    const double aside = std::abs(view.panorama.columnOf(bearing.azimuth_rad) - middle);
+    if (aside < middle && bearing.range_m > kMinRange_m && bearing.range_m < kMaxRange_m) {
+      seen.push_back({aside, &view, bearing});
+    }
+  }
+  std::stable_sort(seen.begin(), seen.end(),
+                   [](const ViewOfObject& a, const ViewOfObject& b) { return a.aside < b.aside; });
+  return seen;
+}
+
+/// Corrects the bearing of an object that looks like a person in a view.
+void correctBearing(const ObjectFilter::Expected& object, const ViewOfObject& seen, const PersonMatch& found,
+                    const RigidTransform& fixed_from_vehicle, ObjectFilter* filter) {
+  const Eigen::Vector2d camera_m = (fixed_from_vehicle * seen.view->camera_in_vehicle_m).head<2>();
+  const Eigen::Vector2d along = (object.position_m - camera_m).normalized();
+  Eigen::Vector4d row;
+  row << Eigen::Vector2d(-along.y(), along.x()) / seen.bearing.range_m, 0.0, 0.0;
+  filter->correct(object.index, found.shift_rad, row, kPersonAcross_m / seen.bearing.range_m);
+}
+
 }  // namespace
 
-void followObjects(const TwoViews& views, const GroundContact* contact, const PersonLikeness& people,
-                   ObjectFilter* filter) {
-  const Follower follower(views, contact, people, filter);
+void followObjects(const TwoViews& views, const GroundContact* contact, ObjectFilter* filter) {
+  const Follower follower(views, contact, filter);
   for (const ObjectFilter::Expected& object : filter->expected()) {
     follower.follow(object);
   }
-  for (const ObjectFilter::Expected& object : filter->expected()) {
-    follower.look(object);
+}
+
+void lookForPeople(const std::vector<PanoramaView>& views, const RigidTransform& fixed_from_vehicle,
+                   const PersonLikeness& people, ObjectFilter* filter) {
+  std::vector<ObjectFilter::Expected> objects = filter->expected();
+  std::stable_sort(objects.begin(), objects.end(),
+                   [](const ObjectFilter::Expected& a, const ObjectFilter::Expected& b) {
+                     return a.last_look < b.last_look;
+                   });
+  int num_looks = 0;
+  for (const ObjectFilter::Expected& object : objects) {
+    double vote = 0.0;
+    std::vector<double> scores;
+    for (const ViewOfObject& seen : viewsOf(views, fixed_from_vehicle, object.position_m)) {
+      const std::optional<PersonMatch> found = people.find(seen.view->panorama, seen.view->image,
+                                                           seen.bearing, seen.view->camera_in_vehicle_m.z());
+      if (!found) {
+        continue;
+      }
+      scores.push_back(found->score);
+      vote += std::clamp(kPerScore * (found->score - kEvenScore), -kPersonVote, kPersonVote);
+      if (found->score > kPersonScore) {
+        correctBearing(object, seen, *found, fixed_from_vehicle, filter);
+      }
+    }
+    filter->addLook(object.index, scores, object.width_m < kMaxPersonWidth_m ? vote : 0.0);
+    num_looks += static_cast<int>(scores.size());
+    if (num_looks >= kMaxLooks) {
+      return;
+    }
   }
 }
 
 void followByStereo(const std::vector<PanoramaView>& views, const RigidTransform& fixed_from_vehicle,
                     ObjectFilter* filter) {
-  const Eigen::Matrix2d rotation = fixed_from_vehicle.rotationMatrix().topLeftCorner<2, 2>();
   for (const ObjectFilter::Expected& object : filter->expected()) {
     if (object.width_m > kMaxPersonWidth_m) {
       continue;
     }
-    const Eigen::Vector2d position_m =
-        rotation.transpose() * (object.position_m - fixed_from_vehicle.translation().head<2>());
-    std::vector<std::pair<double, const PanoramaView*>> seen;  // and the distance from the middle of the view
-    for (const PanoramaView& view : views) {
-      const BodyBearing bearing = bearingFrom(view.camera_in_vehicle_m.head<2>(), position_m);
-      const double middle = 0.5 * (view.image.cols - 1);
-      const double aside = std::abs(view.panorama.columnOf(bearing.azimuth_rad) - middle);
-      if (aside < middle && bearing.range_m > kMinRange_m && bearing.range_m < kMaxRange_m) {
-        seen.emplace_back(aside, &view);
-      }
-    }
+    const std::vector<ViewOfObject> seen = viewsOf(views, fixed_from_vehicle, object.position_m);
     if (seen.size() < 2) {
       continue;
     }
-    std::sort(seen.begin(), seen.end());
-    const PanoramaView& first = *seen[0].second;
-    const Eigen::Vector2d camera_m = first.camera_in_vehicle_m.head<2>();
-    const BodyBearing expected = bearingFrom(camera_m, position_m);
-    const std::optional<StereoRange> found =
-        matchBodyRange(first, *seen[1].second, expected, object.height_m);
+    const PanoramaView& first = *seen[0].view;
+    const BodyBearing expected = seen[0].bearing;
+    const std::optional<StereoRange> found = matchBodyRange(first, *seen[1].view, expected, object.height_m);
     if (found) {
+      const Eigen::Vector2d camera_m = (fixed_from_vehicle * first.camera_in_vehicle_m).head<2>();
       Eigen::Vector4d row;
-      row << rotation * (position_m - camera_m).normalized(), 0.0, 0.0;
+      row << (object.position_m - camera_m).normalized(), 0.0, 0.0;
       filter->correct(object.index, found->range_m - expected.range_m, row, found->sigma_m);
     }
   }

@@ -29,10 +29,14 @@ struct TwoViews {
 /// which the whole body is found again, and the contact with the ground below it. At rest, what is behind a
 /// body stays where it is and would be found again in its place, so bodies are not searched. A bearing at
 /// which nothing static can be found makes an object more probable; one that contradicts its motion, less.
-/// `contact` is null if the ground was not compared. Each object is told how much it looks like a person,
-/// which makes a narrow one more or less probable; where it does, its bearing is that of the person.
-void followObjects(const TwoViews& views, const GroundContact* contact, const PersonLikeness& people,
-                   ObjectFilter* filter);
+/// `contact` is null if the ground was not compared.
+void followObjects(const TwoViews& views, const GroundContact* contact, ObjectFilter* filter);
+
+/// Tells the objects how much they look like a person in each view, which makes a narrow one more or less
+/// probable; where one does, its bearing is that of the person. Looks are expensive: at one stamp there are
+/// at most some two dozen, and the objects take turns.
+void lookForPeople(const std::vector<PanoramaView>& views, const RigidTransform& fixed_from_vehicle,
+                   const PersonLikeness& people, ObjectFilter* filter);
 
 /// Measures the ranges of the objects that two cameras see at one stamp.
 void followByStereo(const std::vector<PanoramaView>& views, const RigidTransform& fixed_from_vehicle,

@@ -23,7 +23,7 @@ constexpr int kCornerWindow_px = 3;
 PatchTrackerOptions trackerOptions() {
   PatchTrackerOptions options;
   options.window_px = 11;  // people at 8 m are about as wide
-  options.num_levels = 4;
+  options.num_levels = 2;  // motion is predicted
   options.max_iterations = 15;
   return options;
 }
@@ -61,10 +61,14 @@ void FollowedPoints::clear() {
 }
 
 /// Points continue their image motion; new ones are expected on the ground, or far away above the horizon.
-cv::Point2f FollowedPoints::predict(const PointTrack& track, const RigidTransform& now_from_previous) const {
+cv::Point2f FollowedPoints::predict(const PointTrack& track, Timestamp stamp,
+                                    const RigidTransform& now_from_previous) const {
   const PointObservation& last = track.back();
   if (track.size() > 1) {
-    return last.position_px + (last.position_px - track[track.size() - 2].position_px);
+    const PointObservation& earlier = track[track.size() - 2];
+    const auto steps =
+        static_cast<float>(toSeconds(stamp - last.stamp) / toSeconds(last.stamp - earlier.stamp));
+    return last.position_px + steps * (last.position_px - earlier.position_px);
   }
   const Eigen::Vector3d ray = vehicle_from_camera_.rotation() * last.ray_in_camera;
   constexpr double kFar_m = 30.0;
@@ -85,7 +89,7 @@ void FollowedPoints::add(Timestamp stamp, const cv::Mat& image, const RigidTrans
     std::vector<cv::Point2f> points, predicted;
     for (const PointTrack& track : tracks_) {
       points.push_back(track.back().position_px);
-      predicted.push_back(predict(track, now_from_previous));
+      predicted.push_back(predict(track, stamp, now_from_previous));
     }
     const std::vector<TrackedPoint> found = tracker_.track(pyramid_, pyramid, points, region_, predicted);
     for (size_t i = 0; i < found.size(); ++i) {

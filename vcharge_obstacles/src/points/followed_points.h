@@ -40,7 +40,8 @@ class FollowedPoints {
   void clear();
 
  private:
-  cv::Point2f predict(const PointTrack& track, const RigidTransform& now_from_previous) const;
+  cv::Point2f predict(const PointTrack& track, Timestamp stamp,
+                      const RigidTransform& now_from_previous) const;
   void startTracks(Timestamp stamp, const cv::Mat& image);
 
   const WorkingCamera camera_;
