@@ -12,6 +12,7 @@ import rospy
 import rostest
 import yaml
 from sensor_msgs.msg import Image, PointCloud2
+from vcharge_msgs.msg import ScheduledCameras
 
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import CAMERAS, Drive, inputs_of  # noqa: E402
@@ -74,12 +75,12 @@ class DepthNodeletTest(unittest.TestCase):
         wait_until_gone("/manager", self.subscribers)
         self.assertNotIn("/depth", self.list().nodelets, "the manager outlives the nodelet")
 
-    def publish(self, change=lambda topic, message: message):
+    def publish(self, change=lambda topic, message: message, pause_s=0.002):
         for topic, message in self.messages:
             changed = change(topic, message)
             if changed is not None:
                 self.publishers[topic].publish(changed)
-                time.sleep(0.002)
+                time.sleep(pause_s)
 
     def count(self, camera="left"):
         return len(self.received.get((camera, "standard_deviation"), {}))
@@ -176,6 +177,30 @@ class DepthNodeletTest(unittest.TestCase):
         self.assertTrue(self.load("/drive_tf", "vcharge_ros/drive_tf_nodelet", [], [], [], "").success)
         self.assertEqual(sorted(self.list().nodelets), ["/depth", "/drive_tf"])
         self.assertTrue(self.unload("/drive_tf").success)
+
+    def test_cameras_take_turns_within_a_small_budget(self):
+        self.assertTrue(self.unload("/depth").success)
+        wait_until_gone("/manager", self.subscribers)
+        rospy.set_param("/depth/lossless_replay", False)
+        rospy.set_param("/depth/processor_budget", 0.05)
+        announced = []
+        subscriber = rospy.Subscriber("/dense/scheduled", ScheduledCameras, announced.append, queue_size=None)
+        try:
+            self.assertTrue(self.load("/depth", "vcharge_dense/depth_nodelet", [], [], [], "").success)
+            reach(self.publishers, self.diagnostics.heard, self.subscribers + [subscriber])
+            self.publish(pause_s=0.02)
+            self.wait_for_message("the processor budget does not suffice")
+        finally:
+            rospy.set_param("/depth/lossless_replay", True)
+            rospy.delete_param("/depth/processor_budget")
+            subscriber.unregister()
+        turns = [(message.header.stamp.to_nsec(), camera) for message in announced for camera in message.cameras]
+        self.assertEqual(len(turns), len(set(turns)))
+        self.assertEqual({camera for _, camera in turns}, set(CAMERAS), "no camera is left out for good")
+        self.assertLess(len(turns), 0.7 * sum(len(self.offline_stamps(camera)) for camera in CAMERAS))
+        wait_for(lambda: all(stamp in self.received.get((camera, "image"), {}) for stamp, camera in turns),
+                 "the announced range maps")
+        self.assertEqual(sum(self.count(camera) for camera in CAMERAS), len(turns))
 
     def test_nodelet_with_a_bad_rig_does_not_load_and_the_manager_lives_on(self):
         expect_bad_rig_is_refused(self, "vcharge_dense/depth_nodelet", self.drive.folder / "no_such_rig.yaml")

@@ -1,29 +1,29 @@
-#include <map>
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include <vcharge_msgs/TrackedObjects.h>
 #include <pluginlib/class_list_macros.hpp>
 
-#include "range_map_publisher.h"
+#include "scheduled_sweeps.h"
 #include "vcharge_dense/range_mapper.h"
-#include "vcharge_ros/live_queue.h"
 #include "vcharge_ros/nodelet.h"
+#include "vcharge_ros/stage_schedule.h"
 
 namespace vcharge {
 
 /// Computes range maps of a live or replayed drive, on the topics of RangeMapPublisher; while the vehicle
-/// stands only with the option inter_camera. Reports one status per camera in /diagnostics. Parameters: ~rig
-/// (path), ~options (RangeMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every image in
-/// order, as compute_range_maps; otherwise the newest first, and drops are counted).
-class DepthNodelet : public Nodelet {
+/// stands only with the option inter_camera. See ScheduledSweeps for what comes first; what is left out is
+/// counted. Reports one status per camera in /diagnostics. Parameters: ~rig (path), ~options
+/// (RangeMapperOptions), ~source (LiveDriveSourceOptions), ~processor_budget (see StageSchedule),
+/// ~lossless_replay (every image in order, as compute_range_maps).
+class DepthNodelet : public Nodelet, private DriveConsumer {
  public:
   DepthNodelet() : Nodelet("depth") {}
   ~DepthNodelet() override { end(); }
 
  private:
-  static constexpr uint32_t kQueueSize = 10;  // 0 would mean that nothing is ever dropped
-
   void start() override {
     rig_ = readRig();
     RangeMapperOptions options;
@@ -32,23 +32,33 @@ class DepthNodelet : public Nodelet {
     }
     readOptions("options", &options);
     openSource(rig_, options.cameras);
-    queue_ = std::make_unique<LiveQueue<RangeTask>>(
-        isLossless(), [this](const RangeTask& task) { guard().run([&] { sweep(task); }); });
-    mapper_ = std::make_unique<RangeMapper>(rig_, options, [this](RangeTask task) {
-      const size_t camera_index = task.camera_index;
-      queue_->push(camera_index, std::move(task));
-    });
+    schedule_ = std::make_unique<StageSchedule>(*rig_, processorBudget());
+    mapper_ = std::make_unique<RangeMapper>(rig_, options,
+                                            [this](RangeTask task) { tasks_.push_back(std::move(task)); });
+    sweeps_ = std::make_unique<ScheduledSweeps>(&node(), rig_, mapper_.get(), schedule_.get(), &guard(),
+                                                isLossless());
     const std::vector<RangeMapperStatus> cameras = mapper_->status();
     for (size_t i = 0; i < cameras.size(); ++i) {
-      const size_t index = rig_->cameraIndex(cameras[i].camera_name);
-      publishers_.try_emplace(index, &node(), rig_->cameras[index], isLossless() ? 0 : kQueueSize);
       addDiagnostics(
           "/" + cameras[i].camera_name, [this, i] { return report(mapper_->status().at(i)); }, Threads::kOne);
     }
-    runSource(mapper_.get());
+    if (schedule_->hasLimit()) {
+      subscribe<vcharge_msgs::TrackedObjects>(
+          "/obstacles/objects", 1,
+          [this](const vcharge_msgs::TrackedObjectsConstPtr& message) { schedule_->setObjects(*message); });
+    }
+    runSource(this);
   }
 
-  void sweep(const RangeTask& task) { publishers_.at(task.camera_index).publish(mapper_->sweep(task)); }
+  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override {
+    schedule_->run([&] { mapper_->addImage(camera_index, stamp, image); });
+    sweeps_->push(&tasks_);
+  }
+  void addOdometry(const VehicleOdometry& odometry) override {
+    schedule_->setOdometry(odometry);
+    schedule_->run([&] { mapper_->addOdometry(odometry); });
+    sweeps_->push(&tasks_);
+  }
 
   DriveMonitor::Report report(const RangeMapperStatus& status) const {
     const bool works =
@@ -62,20 +72,22 @@ class DepthNodelet : public Nodelet {
     add("images", status.images);
     add("references", status.references);
     add("inter_camera", status.inter_camera);
-    add("dropped", queue_->numDropped(rig_->cameraIndex(status.camera_name)));
+    add("dropped", sweeps_->numDropped());
     add("standing", status.standing);
     add("without_pose", status.without_pose);
     add("without_neighbours", status.without_neighbours);
     add("ignored_images", status.ignored_images);
     add("restarts", status.resets);
+    schedule_->describe(rig_->cameraIndex(status.camera_name), &report);
     addCounters(mapper_->counters(), &report);
     return report;
   }
 
   std::shared_ptr<const CameraRig> rig_;
-  std::map<size_t, RangeMapPublisher> publishers_;  // key: index of the camera
+  std::unique_ptr<StageSchedule> schedule_;
+  std::vector<RangeTask> tasks_;  // emitted by the mapper
   std::unique_ptr<RangeMapper> mapper_;
-  std::unique_ptr<LiveQueue<RangeTask>> queue_;
+  std::unique_ptr<ScheduledSweeps> sweeps_;
 };
 
 }  // namespace vcharge

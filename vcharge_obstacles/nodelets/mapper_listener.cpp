@@ -1,9 +1,11 @@
 #include "mapper_listener.h"
 
+#include <algorithm>
 #include <utility>
 
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
+#include <vcharge_msgs/ScheduledCameras.h>
 #include <vcharge_msgs/TrackedObjects.h>
 
 #include "vcharge_core/base/error.h"
@@ -17,8 +19,12 @@ namespace vcharge {
 
 MapperListener::MapperListener(ros::NodeHandle* node, const CameraRig& rig,
                                const std::vector<ObstacleCameraStatus>& cameras, uint32_t queue_size,
-                               CallbackGuard* guard, ImageCallback on_image, ObjectCallback on_objects)
-    : guard_(guard), on_image_(std::move(on_image)), on_objects_(std::move(on_objects)) {
+                               CallbackGuard* guard, ImageCallback on_image, ObjectCallback on_objects,
+                               ScheduleCallback on_schedule)
+    : guard_(guard),
+      on_image_(std::move(on_image)),
+      on_objects_(std::move(on_objects)),
+      on_schedule_(std::move(on_schedule)) {
   const DriveTopics topics;
   for (const ObstacleCameraStatus& camera : cameras) {
     const size_t index = rig.cameraIndex(camera.camera_name);
@@ -27,6 +33,26 @@ MapperListener::MapperListener(ros::NodeHandle* node, const CameraRig& rig,
                                             queue_size);
   }
   subscribeObjects(node, queue_size);
+  subscribeSchedule(node, rig, queue_size);
+}
+
+void MapperListener::subscribeSchedule(ros::NodeHandle* node, const CameraRig& rig, uint32_t queue_size) {
+  using Pointer = vcharge_msgs::ScheduledCamerasConstPtr;
+  std::vector<std::string> names;
+  for (const RigCamera& camera : rig.cameras) {
+    names.push_back(camera.name);
+  }
+  const boost::function<void(const Pointer&)> note = [this, names](const Pointer& message) {
+    guard_->run([&] {
+      std::vector<bool> cameras;
+      for (const std::string& name : names) {
+        cameras.push_back(std::count(message->cameras.begin(), message->cameras.end(), name) > 0);
+      }
+      on_schedule_(toTimestamp(message->header.stamp), cameras);
+    });
+  };
+  subscribers_.push_back(
+      node->subscribe<vcharge_msgs::ScheduledCameras>("/dense/scheduled", queue_size, note));
 }
 
 void MapperListener::subscribeObjects(ros::NodeHandle* node, uint32_t queue_size) {

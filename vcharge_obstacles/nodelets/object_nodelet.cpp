@@ -2,6 +2,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include <nav_msgs/OccupancyGrid.h>
 #include <vcharge_msgs/TrackedObjects.h>
@@ -14,6 +15,7 @@
 #include "vcharge_obstacles/object_tracker.h"
 #include "vcharge_ros/nodelet.h"
 #include "vcharge_ros/object_conversions.h"
+#include "vcharge_ros/stage_schedule.h"
 
 namespace vcharge {
 
@@ -21,18 +23,17 @@ namespace vcharge {
 /// (vcharge_msgs/TrackedObjects in `odom`, at every stamp of the images) and /obstacles/object_markers.
 /// While the vehicle drives, objects behind obstacles of obstacle_nodelet's last /obstacles/grid are left
 /// out; which grid is the last one depends on its arrival, also in a replay without loss. Parameters: ~rig
-/// (path), ~options (ObjectTrackerOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every image
-/// in order, as detect_obstacles; otherwise images that wait too long are dropped, and counted in
-/// /diagnostics).
+/// (path), ~options (ObjectTrackerOptions), ~source (LiveDriveSourceOptions), ~processor_budget (see
+/// StageSchedule), ~lossless_replay (every image in order, as detect_obstacles; otherwise images that wait
+/// too long are dropped, and counted in /diagnostics).
 class ObjectNodelet : public Nodelet, private DriveConsumer {
  public:
   ObjectNodelet() : Nodelet("objects") {}
   ~ObjectNodelet() override { end(); }
 
  private:
-  static constexpr uint32_t kOutputQueue = 10;
+  static constexpr uint32_t kOutputQueue = 10, kMaxWaitingFrames = 2;
   static constexpr const char* kGridTopic = "/obstacles/grid";
-  static constexpr size_t kMaxWaitingFrames = 2;
   using Task = std::function<void()>;
 
   void start() override {
@@ -47,13 +48,22 @@ class ObjectNodelet : public Nodelet, private DriveConsumer {
     markers_ = node().advertise<visualization_msgs::MarkerArray>("/obstacles/object_markers", queue);
     tracker_ =
         std::make_unique<ObjectTracker>(rig_, options, [this](const ObjectFrame& frame) { publish(frame); });
+    schedule_ = std::make_unique<StageSchedule>(*rig_, processorBudget());
+    if (schedule_->hasLimit()) {
+      tracker_->setCameraChoice([this](Timestamp stamp, const std::vector<bool>& has_image) {
+        const std::vector<size_t> chosen = schedule_->choose(stamp, has_image);
+        num_turns_ += chosen.size();
+        return chosen;
+      });
+    }
     worker_ = std::make_unique<OrderedWorker<Task>>(
         [this](const Task& task) { guard().run([&] { work(task); }); },
         OrderedQueue<Task>(isLossless() ? 0 : kMaxWaitingFrames * rig_->cameras.size()));
     addDiagnostics(
         "", [this] { return report(); }, Threads::kOne);
-    subscribe<nav_msgs::OccupancyGrid>(
-        kGridTopic, 1, [this](const nav_msgs::OccupancyGridConstPtr& grid) { addObstacles(*grid); });
+    subscribe<nav_msgs::OccupancyGrid>(kGridTopic, 1, [this](const nav_msgs::OccupancyGridConstPtr& grid) {
+      worker_->push([this, map = fromMessage(*grid, kGridTopic)] { tracker_->setObstacles(map); }, false);
+    });
     openSource(rig_, options.cameras);
     runSource(this);
   }
@@ -63,16 +73,17 @@ class ObjectNodelet : public Nodelet, private DriveConsumer {
                   true);
   }
   void addOdometry(const VehicleOdometry& odometry) override {
+    schedule_->setOdometry(odometry);
     worker_->push([this, odometry] { tracker_->addOdometry(odometry); }, false);
-  }
-
-  void addObstacles(const nav_msgs::OccupancyGrid& grid) {
-    worker_->push([this, map = fromMessage(grid, kGridTopic)] { tracker_->setObstacles(map); }, false);
   }
 
   void work(const Task& task) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    task();
+    schedule_->run([&] {
+      num_turns_ = 0;
+      task();
+      return num_turns_;
+    });
   }
 
   void publish(const ObjectFrame& frame) {
@@ -89,6 +100,7 @@ class ObjectNodelet : public Nodelet, private DriveConsumer {
     report.message = std::to_string(num_objects_) + " objects move";
     report.values.emplace_back("objects", std::to_string(num_objects_));
     report.values.emplace_back("dropped", std::to_string(worker_->numDropped()));
+    schedule_->describe(*rig_, &report);
     addCounters(tracker_->counters(), &report);
     return report;
   }
@@ -96,7 +108,8 @@ class ObjectNodelet : public Nodelet, private DriveConsumer {
   std::shared_ptr<const CameraRig> rig_;
   std::mutex mutex_;  // guards the tracker: diagnostics run in another thread
   ros::Publisher objects_, markers_;
-  size_t num_objects_ = 0;
+  size_t num_objects_ = 0, num_turns_ = 0;  // the latter of the current task
+  std::unique_ptr<StageSchedule> schedule_;
   std::unique_ptr<ObjectTracker> tracker_;
   std::unique_ptr<OrderedWorker<Task>> worker_;
 };

@@ -58,7 +58,8 @@ class ObstacleNodelet : public Nodelet {
     inputs_ = std::make_unique<MapperListener>(
         &node(), *rig_, cameras, inputQueue(), &guard(),
         [this](auto... image) { worker_->push([=] { mapper_->addImage(image...); }, false); },
-        [this](auto... objects) { worker_->push([=] { mapper_->setObjects(objects...); }, false); });
+        [this](auto... objects) { worker_->push([=] { mapper_->setObjects(objects...); }, false); },
+        [this](auto... next) { worker_->push([=] { mapper_->expectRangeMaps(next...); }, false); });
     subscribe<nav_msgs::Odometry>(
         odometry_topic_, inputQueue(),
         [this](const nav_msgs::OdometryConstPtr& message) { addOdometry(*message); });
@@ -75,9 +76,8 @@ class ObstacleNodelet : public Nodelet {
   }
 
   void addOdometry(const nav_msgs::Odometry& message) {
-    const VehicleOdometry odometry = fromMessage(message, odometry_topic_, rig_->vehicle_frame);
     worker_->push(
-        [this, odometry] {
+        [this, odometry = fromMessage(message, odometry_topic_, rig_->vehicle_frame)] {
           if (listener_ && transforms_.canTransform("map", "odom", ros::Time(0))) {
             mapper_->setMapFromOdom(
                 fromMessage(transforms_.lookupTransform("map", "odom", ros::Time(0)).transform, "/tf"));

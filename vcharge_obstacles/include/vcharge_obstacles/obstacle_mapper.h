@@ -125,6 +125,8 @@ class ObstacleMapper {
   void setObjects(Timestamp stamp, std::vector<TrackedObject> objects);
   /// InputError for a range map of a camera that is not in use, or that was computed with another rig.
   void addRangeMap(const RangeMap& map);
+  /// Announces the cameras of the rig whose range maps of a stamp will come: no others are waited for.
+  void expectRangeMaps(Timestamp stamp, std::vector<bool> cameras);
   /// Fuses the waiting range maps at the end of the drive.
   void finish();
 

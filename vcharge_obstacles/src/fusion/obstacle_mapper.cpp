@@ -210,6 +210,10 @@ void ObstacleMapper::addRangeMap(const RangeMap& map) {
   }
 }
 
+void ObstacleMapper::expectRangeMaps(Timestamp stamp, std::vector<bool> cameras) {
+  assembler_->expect(stamp, std::move(cameras));
+}
+
 void ObstacleMapper::updateStatus(Camera* camera, const CameraObstacles& seen) const {
   ObstacleCameraStatus& status = camera->status;
   ++status.range_maps;

@@ -69,6 +69,9 @@ class Nodelet : public nodelet::Nodelet {
   std::shared_ptr<const CameraRig> readRig() const;
   /// ~lossless_replay: every message is processed in order; otherwise, old ones are dropped and counted.
   bool isLossless() const { return parameter("lossless_replay", false); }
+  /// ~processor_budget: processor seconds per second that a stage may use, 0 without a limit; none in a
+  /// replay without loss. InputError if it is negative.
+  double processorBudget() const;
 
   /// Makes the source of a drive, with the options ~source. It is subscribed by runSource().
   void openSource(std::shared_ptr<const CameraRig> rig, const std::vector<std::string>& cameras = {});

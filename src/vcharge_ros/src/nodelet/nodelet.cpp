@@ -2,6 +2,9 @@
 
 #include <nodelet/detail/callback_queue.h>
 
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/base/text_format.h"
+
 namespace vcharge {
 namespace {
 
@@ -44,6 +47,15 @@ ros::NodeHandle& Nodelet::node() const {
 
 ros::NodeHandle& Nodelet::privateNode() const {
   return threads_ == Threads::kOne ? getPrivateNodeHandle() : getMTPrivateNodeHandle();
+}
+
+double Nodelet::processorBudget() const {
+  const double budget = parameter("processor_budget", 0.0);
+  if (!(budget >= 0.0)) {
+    throw InputError(privateNode().resolveName("processor_budget") + ": expected at least 0, got " +
+                     toText(budget, 2));
+  }
+  return isLossless() ? 0.0 : budget;
 }
 
 std::shared_ptr<const CameraRig> Nodelet::readRig() const {

@@ -58,7 +58,8 @@ using ImageFrame = AssembledFrame<Image>;
 ///
 /// A frame is handed out when odometry reaches it and all cameras have sent their image. It does not wait for
 /// cameras that have sent a later image or are silent, nor for any camera longer than max_camera_wait_s; it
-/// waits for odometry for at most max_odometry_wait_s. At most kMaxWaiting frames wait. An image that arrives
+/// waits for odometry for at most max_odometry_wait_s. Where cameras are announced by expect(), it waits for
+/// those alone. At most kMaxWaiting frames wait. An image that arrives
 /// after its frame was handed out is late: it is dropped and counted. At a break (see DriveBreak) all older
 /// frames are handed out, then `on_break` is called. With `on_break`, older images that arrive after a break
 /// are late, too, since the stage has started again. Not thread safe.
@@ -97,6 +98,8 @@ class FrameAssembler {
   /// Returns false if the image is late and was dropped.
   bool addImage(size_t camera_index, Timestamp stamp, ImageType image);
   void addOdometry(const VehicleOdometry& odometry);
+  /// Waits at this stamp for no camera but these (one per camera), which are announced to send an image.
+  void expect(Timestamp stamp, std::vector<bool> cameras);
   /// Hands out all waiting frames at the end of the drive.
   void finish() { handOut(std::nullopt); }
 
@@ -142,6 +145,7 @@ class FrameAssembler {
   const size_t num_used_;
   DriveOdometry odometry_;
   std::map<Timestamp, Pending> pending_;
+  std::map<Timestamp, std::vector<bool>> expected_;  // where announced, after last_closed_
   std::optional<Timestamp> newest_image_;
   std::vector<std::optional<Timestamp>> newest_of_camera_;
   std::vector<int> stamps_since_;         // per camera: stamps that came since its last image
@@ -226,11 +230,24 @@ void FrameAssembler<ImageType>::addOdometry(const VehicleOdometry& odometry) {
 }
 
 template <class ImageType>
+void FrameAssembler<ImageType>::expect(Timestamp stamp, std::vector<bool> cameras) {
+  check(cameras.size() == is_used_.size(), "FrameAssembler::expect: expected one value per camera");
+  if (!last_closed_ || stamp > *last_closed_) {
+    expected_[stamp] = std::move(cameras);
+    handOutReady();
+  }
+}
+
+template <class ImageType>
 bool FrameAssembler<ImageType>::hasImages(Timestamp stamp, const Pending& pending) const {
   if (pending.num_images == num_used_ || toSeconds(clock() - pending.begun) > options_.max_camera_wait_s) {
     return true;
   }
+  const auto announced = expected_.find(stamp);
   for (size_t camera = 0; camera < is_used_.size(); ++camera) {
+    if (announced != expected_.end() && !announced->second[camera]) {
+      continue;
+    }
     const std::optional<Timestamp>& newest = newest_of_camera_[camera];
     const bool has_passed = newest && *newest > stamp;
     // A silent camera may resume with this frame: when waiting for everything, only newer images exclude it.
@@ -292,6 +309,7 @@ void FrameAssembler<ImageType>::handOutFirst() {
     ++counters_.frames_without_odometry;
   }
   last_closed_ = frame.stamp;
+  expected_.erase(expected_.begin(), expected_.upper_bound(frame.stamp));
   on_frame_(std::move(frame));
 }
 
@@ -326,6 +344,7 @@ void FrameAssembler<ImageType>::startOver() {
   handed_out_.clear();
   newest_image_.reset();
   last_closed_.reset();
+  expected_.clear();
   std::fill(newest_of_camera_.begin(), newest_of_camera_.end(), std::nullopt);
   std::fill(stamps_since_.begin(), stamps_since_.end(), 0);
   if (!odometry_.isGiven()) {

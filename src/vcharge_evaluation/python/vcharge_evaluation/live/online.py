@@ -20,11 +20,11 @@ from vcharge_evaluation.tools import NoResult
 
 RESULTS = {"/obstacles/grid": "nav_msgs/OccupancyGrid", "/obstacles/objects": "vcharge_msgs/TrackedObjects",
            "/localization/pose": "geometry_msgs/PoseWithCovarianceStamped"}
-# Name: what is put before roslaunch, and environment. OpenCV and the kernels of the suite choose their instructions themselves.
+# Name: what is put before roslaunch, environment, and processors. OpenCV and the kernels of the suite choose their instructions themselves.
 MACHINES = {
-    "as it is": ([], {}),
-    "AVX2": ([], {"VCHARGE_INSTRUCTIONS": "avx2", "OPENCV_CPU_DISABLE": "AVX512_COMMON,AVX512_SKX"}),
-    "one core": (["taskset", "-c", "0"], {}),
+    "as it is": ([], {}, os.cpu_count()),
+    "AVX2": ([], {"VCHARGE_INSTRUCTIONS": "avx2", "OPENCV_CPU_DISABLE": "AVX512_COMMON,AVX512_SKX"}, os.cpu_count()),
+    "one core": (["taskset", "-c", "0"], {}, 1),
 }
 QUIET_S = 5.0  # without a message the drive is over
 
@@ -37,6 +37,7 @@ def arguments():
     parser.add_argument("--map", type=pathlib.Path, help="a map of the place: localization runs too")
     parser.add_argument("--no-objects", action="store_true", help="without what moves")
     parser.add_argument("--machines", nargs="*", default=list(MACHINES), choices=list(MACHINES))
+    parser.add_argument("--no-budget", action="store_true", help="stages compete, instead of sharing the processors")
     parser.add_argument("--rate", type=float, default=1.0, help="speed of the replay")
     parser.add_argument("--range-options", type=pathlib.Path, help="instead of config/dense_obstacles.yaml")
     parser.add_argument("--json", type=pathlib.Path, help="write all figures to this file")
@@ -80,7 +81,7 @@ class Listener:
     def take_diagnostics(self, message):
         with self.lock:
             for status in message.status:
-                self.lost[status.name] = {pair.key: pair.value for pair in status.values if pair.key.startswith("dropped")}
+                self.lost[status.name] = {pair.key: pair.value for pair in status.values if pair.key.startswith("dropped") or pair.key.endswith("left_out")}
 
     def end(self):
         for subscriber in self.subscribers:
@@ -115,9 +116,9 @@ def figures_of(listener, usage, rate):
 
 def measure(args, cameras, machine):
     """Replays the drive once. Returns figures."""
-    prefix, environment = MACHINES[machine]
+    prefix, environment, processors = MACHINES[machine]
     words = [f"bag:={args.bag.resolve()}", f"rig:={args.rig.resolve()}", f"rate:={args.rate}",
-             f"objects:={'false' if args.no_objects else 'true'}"]
+             f"objects:={'false' if args.no_objects else 'true'}", f"processors:={0 if args.no_budget else processors}"]
     words += [f"map:={args.map.resolve()}"] if args.map else []
     words += [f"range_options:={args.range_options.resolve()}"] if args.range_options else []
     launch = "vcharge.launch" if args.map else "obstacles.launch"
