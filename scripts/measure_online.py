@@ -6,6 +6,6 @@ import pathlib
 import sys
 
 SCRIPT = pathlib.Path(__file__).resolve().parent / "in_build.sh"
-PATHS = ("--bag", "--rig", "--map", "--range-options", "--json", "--work")  # the script changes the folder
+PATHS = ("--bag", "--rig", "--map", "--range-options", "--json", "--profile", "--work")  # the script changes the folder
 WORDS = [os.path.abspath(word) if before in PATHS else word for before, word in zip(sys.argv, sys.argv[1:])]
 os.execv(SCRIPT, [str(SCRIPT), "/usr/bin/python3", "-m", "vcharge_evaluation", "online", *WORDS])

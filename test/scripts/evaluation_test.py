@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 import unittest
+import xml.etree.ElementTree
 
 import cv2
 import genpy
@@ -28,7 +29,7 @@ sys.path.insert(0, str(ROOT / "src" / "vcharge_evaluation" / "python"))
 from vcharge_evaluation import __main__ as evaluation_main  # noqa: E402
 from vcharge_evaluation import consistency, drives, obstacles, poses, results, spoiled_drives, tools  # noqa: E402
 from vcharge_evaluation.camera_models import project  # noqa: E402
-from vcharge_evaluation.live import processes  # noqa: E402
+from vcharge_evaluation.live import flame_graph, processes  # noqa: E402
 
 
 def run_module(module, *words):
@@ -251,6 +252,35 @@ class UsageTest(unittest.TestCase):
         self.assertGreater(usage.peak_mb, 1.0)
         usage.sample(None)  # no process: nothing changes
         self.assertGreater(usage.load, 0.0)
+
+
+class FlameGraphTest(unittest.TestCase):
+    SAMPLES = """
+manager 1 2.0: 5 cycles:
+\tffff1 vcharge::PlaneSweep::sweep(cv::Mat const&)+0x1f (/x/libvcharge_dense.so)
+\tffff2 tbb::detail::run() (/x/libtbb.so)
+\tffff3 start_thread (/lib/libc.so.6)
+
+manager 1 2.1: 5 cycles:
+\tffff1 [unknown] (/usr/lib/libopencv_core.so)
+\tffff2 vcharge::PlaneSweep::sweep(cv::Mat const&)+0x2f (/x/libvcharge_dense.so)
+
+manager 1 2.2: 5 cycles:
+\tffff4 poll (/lib/libc.so.6)
+"""
+
+    def test_stacks_begin_with_their_stage(self):
+        stacks = flame_graph.by_stage(flame_graph.fold(self.SAMPLES.splitlines()), {"range maps": ["PlaneSweep::"]})
+        self.assertEqual(stacks, {("range maps", "vcharge::PlaneSweep::sweep"): 1, ("other", "poll"): 1,
+                                  ("range maps", "vcharge::PlaneSweep::sweep", "[libopencv_core.so]"): 1})
+        shares = flame_graph.shares(stacks)
+        self.assertEqual(list(shares), ["range maps", "other"])
+        self.assertAlmostEqual(shares["range maps"], 2 / 3)
+
+    def test_the_graph_names_functions_and_their_parts(self):
+        graph = flame_graph.draw({("<a>", "b"): 3, ("c",): 1}, "title")
+        self.assertIn("<title>&lt;a&gt;: 75.0 %</title>", graph)
+        xml.etree.ElementTree.fromstring(graph)
 
 
 class ArgumentsTest(FolderTest):

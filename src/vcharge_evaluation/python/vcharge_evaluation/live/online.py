@@ -13,6 +13,7 @@ import time
 import numpy as np
 import yaml
 
+from vcharge_evaluation.live.flame_graph import Recording, by_stage, draw, shares
 from vcharge_evaluation.live.launch import START_S, Launch
 from vcharge_evaluation.live.processes import Usage, manager_below
 from vcharge_evaluation.results import Figure, Results, add_arguments
@@ -25,6 +26,13 @@ MACHINES = {
     "as it is": ([], {}, os.cpu_count()),
     "AVX2": ([], {"VCHARGE_INSTRUCTIONS": "avx2", "OPENCV_CPU_DISABLE": "AVX512_COMMON,AVX512_SKX"}, os.cpu_count()),
     "one core": (["taskset", "-c", "0"], {}, 1),
+}
+# Stages by functions that only they call, for the profile.
+STAGES = {
+    "objects": ["ObjectTracker::", "ObjectCamera::", "FollowedPoints::", "PersonLikeness::", "lookForPeople"],
+    "obstacles": ["ObstacleMapper::", "ObstacleDetector::", "GroundWatch::", "RangeMapReader::"],
+    "localization": ["DriveLocalizer::", "MapLocalizer::"],
+    "range maps": ["RangeMapper::", "PlaneSweep::", "SweepLevel::", "TileScorer::", "MotionRefinement::", "ScheduledSweeps::"],
 }
 QUIET_S = 5.0  # without a message the drive is over
 
@@ -41,12 +49,15 @@ def arguments():
     parser.add_argument("--rate", type=float, default=1.0, help="speed of the replay")
     parser.add_argument("--range-options", type=pathlib.Path, help="instead of config/dense_obstacles.yaml")
     parser.add_argument("--json", type=pathlib.Path, help="write all figures to this file")
+    parser.add_argument("--profile", type=pathlib.Path, metavar="SVG",
+                        help="sample the first machine's replay with perf, which slows it down, and draw a flame graph")
     args = parser.parse_args()
     for path in (args.bag, args.rig, args.map, args.range_options):
         if path is not None and not path.is_file():
             parser.error(f"{path}: there is no such file")
-    if args.json is not None and not args.json.resolve().parent.is_dir():
-        parser.error(f"{args.json}: its folder does not exist")
+    for path in (args.json, args.profile):
+        if path is not None and not path.resolve().parent.is_dir():
+            parser.error(f"{path}: its folder does not exist")
     return args
 
 
@@ -124,13 +135,25 @@ def measure(args, cameras, machine):
     launch = "vcharge.launch" if args.map else "obstacles.launch"
     with tempfile.TemporaryDirectory() as folder, Launch(pathlib.Path(folder), launch, *words, prefix=prefix,
                                                          environment=environment) as launched:
-        listener, usage = Listener(cameras), Usage()
+        listener, usage, recording = Listener(cameras), Usage(), None
         while launched.runs() and time.monotonic() - listener.last_s < (QUIET_S if listener.images else START_S):
             time.sleep(0.5)
             if listener.images and time.monotonic() - listener.last_s < 1.0:  # not after the drive
-                usage.sample(manager_below(launched.process.pid))
+                manager = manager_below(launched.process.pid)
+                usage.sample(manager)
+                if args.profile and machine == args.machines[0] and recording is None:
+                    recording = Recording(manager, f"{folder}/perf.data")
         listener.end()
-    return list(figures_of(listener, usage, args.rate))
+        figures = list(figures_of(listener, usage, args.rate))
+        return figures + (profile(recording, args.profile) if recording else [])
+
+
+def profile(recording, path):
+    """Draws the flame graph. Returns the stages' shares of the processor time as figures."""
+    recording.stop()
+    stacks = by_stage(recording.stacks(), STAGES)
+    path.write_text(draw(stacks, "Processor time of the nodelets while they run together"))
+    return [Figure(f"processor time, part of {name}", 100 * part, "%") for name, part in shares(stacks).items()]
 
 
 def main():
