@@ -45,6 +45,12 @@ def picture(folder, name):
             f"({entry['date']}, {entry['commit']})\n"]
 
 
+def profile(folder, name):
+    """Lines with a stage's flame graph, if there is one."""
+    path = folder / "pictures" / f"{name}_profile.svg"
+    return [f"![where the processor time goes]({folder.name}/pictures/{path.name})\n"] if path.exists() else []
+
+
 def make_page(folder=results.RESULTS):
     parts = [INTRODUCTION]
     paths = {path.stem: path for path in folder.glob("*.json")}
@@ -53,7 +59,7 @@ def make_page(folder=results.RESULTS):
         parts.append(f"## {title}\n")
         for heading, group in results.by_title(measurements).items():
             parts.append(f"### {heading}\n\n{show(group)}\n")
-        parts += picture(folder, name)
+        parts += picture(folder, name) + profile(folder, name)
     return "\n".join(parts)
 
 

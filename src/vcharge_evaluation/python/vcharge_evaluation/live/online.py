@@ -50,7 +50,7 @@ def arguments():
     parser.add_argument("--range-options", type=pathlib.Path, help="instead of config/dense_obstacles.yaml")
     parser.add_argument("--json", type=pathlib.Path, help="write all figures to this file")
     parser.add_argument("--profile", type=pathlib.Path, metavar="SVG",
-                        help="sample the first machine's replay with perf, which slows it down, and draw a flame graph")
+                        help="sample one more replay with perf, which slows it down, and draw a flame graph")
     args = parser.parse_args()
     for path in (args.bag, args.rig, args.map, args.range_options):
         if path is not None and not path.is_file():
@@ -125,8 +125,8 @@ def figures_of(listener, usage, rate):
     yield Figure("manager: memory, largest", usage.peak_mb, "MB")
 
 
-def measure(args, cameras, machine):
-    """Replays the drive once. Returns figures."""
+def measure(args, cameras, machine, is_sampled):
+    """Replays the drive once. Returns figures: of a sampled replay, the stages' parts of the processor time."""
     prefix, environment, processors = MACHINES[machine]
     words = [f"bag:={args.bag.resolve()}", f"rig:={args.rig.resolve()}", f"rate:={args.rate}",
              f"objects:={'false' if args.no_objects else 'true'}", f"processors:={0 if args.no_budget else processors}"]
@@ -141,11 +141,10 @@ def measure(args, cameras, machine):
             if listener.images and time.monotonic() - listener.last_s < 1.0:  # not after the drive
                 manager = manager_below(launched.process.pid)
                 usage.sample(manager)
-                if args.profile and machine == args.machines[0] and recording is None:
+                if is_sampled and recording is None:
                     recording = Recording(manager, f"{folder}/perf.data")
         listener.end()
-        figures = list(figures_of(listener, usage, args.rate))
-        return figures + (profile(recording, args.profile) if recording else [])
+        return profile(recording, args.profile) if recording else list(figures_of(listener, usage, args.rate))
 
 
 def profile(recording, path):
@@ -163,9 +162,10 @@ def main():
     results, found = Results("online", "The nodelets online", args), {}
     for machine in args.machines:
         # A process uses one ROS master.
-        with multiprocessing.get_context("spawn").Pool(1) as apart:
+        with multiprocessing.get_context("spawn").Pool(1, maxtasksperchild=1) as apart:
             try:
-                figures = apart.apply(measure, (args, cameras, machine))
+                figures = apart.apply(measure, (args, cameras, machine, False))
+                figures += apart.apply(measure, (args, cameras, machine, True)) if args.profile and not found else []
             except NoResult as error:
                 raise SystemExit(f"{args.bag}: {error}") from error
         results.add(f"Replay, speed {args.rate:g}", (machine, [load, *figures]))
