@@ -109,6 +109,8 @@ class ResultsTest(unittest.TestCase):
     def test_the_command_of_a_figure_leaves_out_where_it_was_kept(self):
         self.assertEqual(results.words_that_matter(["--seed", "2", "--work", "/tmp/somewhere", "--publish", "--small"]),
                          ["--seed", "2", "--small"])
+        self.assertEqual(results.words_that_matter(["--bag", "/tmp/somewhere/drives/a.bag", "--work", "/tmp/somewhere"]),
+                         ["--bag", "WORK/drives/a.bag"])
 
     def test_results_are_published_on_request_only(self):
         args = types.SimpleNamespace(work=self.folder / "work", publish=False)

@@ -34,7 +34,7 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 PatchTrackerOptions trackerOptions() {
   PatchTrackerOptions options;
   options.window_px = 15;
-  options.num_levels = 4;
+  options.num_levels = 2;
   options.max_iterations = 20;
   return options;
 }

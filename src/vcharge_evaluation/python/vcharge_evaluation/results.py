@@ -177,11 +177,14 @@ def commit():
 
 
 def words_that_matter(words):
-    """Arguments without those that leave the figures as they are."""
+    """Arguments without those that leave the figures as they are. Paths below the folder --work begin with WORK."""
+    work = next((after for word, after in zip(words, words[1:]) if word == "--work"), None)
     kept = []
     for before, word in zip(["", *words], words):
         if before != "--work" and word not in ("--work", "--publish"):
-            kept.append(os.path.relpath(word, ROOT) if os.path.isabs(word) else word)
+            is_below = work is not None and pathlib.Path(work) in pathlib.Path(word).parents
+            kept.append(str("WORK" / pathlib.Path(word).relative_to(work)) if is_below else
+                        os.path.relpath(word, ROOT) if os.path.isabs(word) else word)
     return kept
 
 
