@@ -15,11 +15,11 @@ constexpr int kCell_px = 8;
 // A block's histograms are normalized, clipped, and normalized again, with these regularizations.
 constexpr float kClip = 0.2F, kFirstRegularization = 3.6F, kSecondRegularization = 1e-3F;
 
-/// Gaussian weights about the middle of a block, spread bilinearly over its cells; separable.
-template <typename CellWeights>
-CellWeights cellWeights() {
-  CellWeights weights{};
-  constexpr int kSide = static_cast<int>(std::tuple_size<typename CellWeights::value_type>::value);
+/// Gaussian weights about the middle of a block of two cells, spread bilinearly over them; separable.
+template <size_t kSize>
+std::array<std::array<float, kSize>, 2> cellWeights() {
+  std::array<std::array<float, kSize>, 2> weights{};
+  constexpr int kSide = static_cast<int>(kSize);
   constexpr float kSigma_px = kSide / 4.0F;
   for (int i = 0; i < kSide; ++i) {
     const float from_middle = static_cast<float>(i) - 0.5F * kSide;
@@ -63,7 +63,7 @@ void findGradients(const cv::Mat& roots, cv::Mat* magnitude, cv::Mat* direction_
 
 }  // namespace
 
-PeopleClassifier::PeopleClassifier() : weights_(cellWeights<CellWeights>()) {
+PeopleClassifier::PeopleClassifier() : weights_(cellWeights<kBlock_px>()) {
   // OpenCV orders blocks by column, and the cells of a block too.
   const std::vector<float> weights = cv::HOGDescriptor::getDefaultPeopleDetector();
   constexpr int kColumns = kWidth_px / kCell_px - 1, kRows = kHeight_px / kCell_px - 1;
@@ -78,64 +78,66 @@ PeopleClassifier::PeopleClassifier() : weights_(cellWeights<CellWeights>()) {
   offset_ = weights.back();
 }
 
+/// Histograms of one row of pixels, by column of blocks and column of cells in the block.
+void PeopleClassifier::addPixels(const float* strength, const float* direction_rad, int columns,
+                                 float* histograms) const {
+  constexpr auto kBinPerRad = static_cast<float>(kBins / M_PI);
+  for (int x = 0; x < (columns + 1) * kCell_px; ++x) {
+    const float position = direction_rad[x] * kBinPerRad - 0.5F + kBins;  // not negative
+    const auto whole = static_cast<int>(position);
+    const float high = (position - static_cast<float>(whole)) * strength[x], low = strength[x] - high;
+    const int bin = whole % kBins, next = bin + 1 < kBins ? bin + 1 : 0;
+    const auto addTo = [&](int block, int cell, int at) {
+      const float weight = weights_[static_cast<size_t>(cell)][static_cast<size_t>(at)];
+      float* histogram = histograms + (2 * block + cell) * kBins;
+      histogram[bin] += weight * low;
+      histogram[next] += weight * high;
+    };
+    // The pixel lies in two blocks, and in the outer halves of blocks only in one of the two cells.
+    const int block = x / kCell_px, at = x % kCell_px;
+    const bool is_outer = at < kCell_px / 2;
+    if (block < columns) {
+      addTo(block, 0, at);
+      if (!is_outer) {
+        addTo(block, 1, at);
+      }
+    }
+    if (block > 0) {
+      addTo(block - 1, 1, at + kCell_px);
+      if (is_outer) {
+        addTo(block - 1, 0, at + kCell_px);
+      }
+    }
+  }
+}
+
+/// Adds the histograms of the y-th row of pixels of a row of blocks to its upper and lower cells.
+void PeopleClassifier::addRow(const float* histograms, int columns, int y, float* blocks) const {
+  for (int cell = 0; cell < 2; ++cell) {
+    const float weight = weights_[static_cast<size_t>(cell)][static_cast<size_t>(y)];
+    for (int half = 0; weight > 0.0F && half < 2 * columns; ++half) {
+      const float* from = histograms + half * kBins;
+      float* to = blocks + (2 * half + cell) * kBins;
+      for (int bin = 0; bin < kBins; ++bin) {
+        to[bin] += weight * from[bin];
+      }
+    }
+  }
+}
+
 cv::Mat PeopleClassifier::blocks(const cv::Mat& roots) const {
   const int columns = roots.cols / kCell_px - 1, rows = roots.rows / kCell_px - 1;
   cv::Mat magnitude, direction_rad;
   findGradients(roots, &magnitude, &direction_rad);
   cv::Mat result(rows, columns * kPerBlock, CV_32FC1, cv::Scalar(0.0));
-  // The histograms of one row of pixels, by column of blocks and column of cells in the block.
   std::vector<float> histograms(static_cast<size_t>(columns) * 2 * kBins);
   for (int y = 0; y < (rows + 1) * kCell_px; ++y) {
     std::fill(histograms.begin(), histograms.end(), 0.0F);
-    const auto* strength = magnitude.ptr<float>(y);
-    const auto* direction = direction_rad.ptr<float>(y);
-    for (int x = 0; x < (columns + 1) * kCell_px; ++x) {
-      constexpr auto kBinPerRad = static_cast<float>(kBins / M_PI);
-      const float position = direction[x] * kBinPerRad - 0.5F + kBins;  // not negative
-      const auto whole = static_cast<int>(position);
-      const float high = (position - static_cast<float>(whole)) * strength[x], low = strength[x] - high;
-      const int bin = whole % kBins, next = bin + 1 < kBins ? bin + 1 : 0;
-      const auto addTo = [&](int block, size_t cell, int at) {
-        const float weight = weights_[cell][static_cast<size_t>(at)];
-        float* histogram = &histograms[(static_cast<size_t>(block) * 2 + cell) * kBins];
-        histogram[bin] += weight * low;
-        histogram[next] += weight * high;
-      };
-      // The pixel lies in two blocks, and in the outer halves of blocks only in one of the two cells.
-      const int block = x / kCell_px, at = x % kCell_px;
-      const bool is_outer = at < kCell_px / 2;
-      if (block < columns) {
-        addTo(block, 0, at);
-        if (!is_outer) {
-          addTo(block, 1, at);
-        }
-      }
-      if (block > 0) {
-        addTo(block - 1, 1, at + kCell_px);
-        if (is_outer) {
-          addTo(block - 1, 0, at + kCell_px);
-        }
-      }
-    }
-    // Each row belongs to the cells of two rows of blocks.
-    for (int block = y / kCell_px - 1; block <= y / kCell_px; ++block) {
-      if (block < 0 || block >= rows) {
-        continue;
-      }
-      for (size_t cell = 0; cell < 2; ++cell) {
-        const float weight = weights_[cell][static_cast<size_t>(y - block * kCell_px)];
-        if (weight == 0.0F) {
-          continue;
-        }
-        auto* sums = result.ptr<float>(block);
-        for (int half = 0; half < 2 * columns; ++half) {
-          const float* from = &histograms[static_cast<size_t>(half) * kBins];
-          float* to = sums + half * 2 * kBins + static_cast<int>(cell) * kBins;
-          for (int bin = 0; bin < kBins; ++bin) {
-            to[bin] += weight * from[bin];
-          }
-        }
-      }
+    addPixels(magnitude.ptr<float>(y), direction_rad.ptr<float>(y), columns, histograms.data());
+    // Each row of pixels belongs to two rows of blocks.
+    const int last = y / kCell_px;
+    for (int block = std::max(0, last - 1); block <= std::min(last, rows - 1); ++block) {
+      addRow(histograms.data(), columns, y - block * kCell_px, result.ptr<float>(block));
     }
   }
   for (int row = 0; row < rows; ++row) {

@@ -28,6 +28,8 @@ class PeopleClassifier {
 
   /// Histograms of all blocks (rows of kPerBlock values), normalized.
   cv::Mat blocks(const cv::Mat& roots) const;
+  void addPixels(const float* strength, const float* direction_rad, int columns, float* histograms) const;
+  void addRow(const float* histograms, int columns, int y, float* blocks) const;
 
   const CellWeights weights_;         // of the pixels along one axis of a block, for each of two cells
   std::vector<float> by_window_row_;  // the classifier's weights: by row and column of blocks
