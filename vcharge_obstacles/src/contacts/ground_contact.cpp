@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <opencv2/imgproc.hpp>
 
 #include "ground/image_windows.h"
+#include "vcharge_core/base/quantile.h"
 
 namespace vcharge {
 namespace {
@@ -127,7 +129,7 @@ void GroundContact::labelGround(const cv::Mat& now, const WarpedImage& before, c
   cv::erode(before.known, is_known, cv::Mat::ones(2 * kHalfWindow_px + 1, 2 * kHalfWindow_px + 1, CV_8U));
   cv::blur(before.image, smooth, cv::Size(kSmoothing_px, kSmoothing_px));
   // Most of the ground is unchanged, so the median ratio is the change of the exposure.
-  std::vector<float> ratios;
+  std::vector<double> ratios;
   for (int y = 0; y < rows_.height; y += 4) {
     for (int x = 0; x < rows_.width; x += 4) {
       if (is_known.at<uint8_t>(y, x) != 0 && smooth.at<uint8_t>(y, x) > kMinBrightness) {
@@ -136,12 +138,7 @@ void GroundContact::labelGround(const cv::Mat& now, const WarpedImage& before, c
       }
     }
   }
-  float gain = 1.0F;
-  if (!ratios.empty()) {
-    std::nth_element(ratios.begin(), ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2),
-                     ratios.end());
-    gain = ratios[ratios.size() / 2];
-  }
+  const float gain = ratios.empty() ? 1.0F : static_cast<float>(quantile(std::move(ratios), 0.5));
   ImageWindows windows(now, {smooth}, kHalfWindow_px);
   for (int y = 0; y < rows_.height; ++y) {
     windows.nextRow();

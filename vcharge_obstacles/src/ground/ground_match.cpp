@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
 #include <opencv2/imgproc.hpp>
 
 #include "ground/plane_fit.h"
+#include "vcharge_core/base/quantile.h"
 
 namespace vcharge {
 namespace {
@@ -73,12 +76,7 @@ GroundMatch::GroundMatch(const WorkingCamera& camera, const RigidTransform& vehi
       size_(camera.size()),
       rays_(rays),
       min_difference_(static_cast<float>(min_difference)),
-      warp_(camera.model(), innerPixels(camera)) {
-  const cv::Mat inner = innerPixels(camera);
-  for (const int32_t pixel : rays.pixel) {
-    is_inner_.push_back(inner.data[pixel] != 0);
-  }
-}
+      warp_(camera.model(), innerPixels(camera)) {}
 
 /// Pixels of the newer image that matter, and the points of the ground that they show.
 struct GroundMatch::Band {
@@ -108,7 +106,7 @@ GroundMatch::Band GroundMatch::pixelsIn(const GroundPlane& ground, double near_m
     const float across = band.height_m * rays_.horizontal[i];
     if (fall * far > across && fall * near < across) {
       band.pixels.push_back({i, fall / across});
-      if (is_inner_[i] != 0) {
+      if (warp_.isValid(rays_.pixel[i])) {
         band.ground.add(rays_.pixel[i], rays_.x[i], rays_.y[i], rays_.z[i], fall / band.height_m);
       }
     }
@@ -139,7 +137,7 @@ std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const Grou
   const cv::Mat here = now.smooth(band.rows);
   const int first_pixel = band.rows.y * size_.width;
   // The exposure may have changed. Most of the ground has not, so the median ratio is the gain.
-  std::vector<float> ratios;
+  std::vector<double> ratios;
   for (size_t i = 0; i < band.pixels.size(); i += kExposureStep) {
     const int at = rays_.pixel[band.pixels[i].ray], in_rows = at - first_pixel;
     const float a = now.smooth.data[at], b = on_ground.data[in_rows];
@@ -150,9 +148,7 @@ std::vector<MatchedPixel> GroundMatch::compare(const GroundView& now, const Grou
   if (ratios.size() * kExposureStep < kMinCompared) {
     return {};
   }
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  const float gain = *middle;
+  const auto gain = static_cast<float>(quantile(std::move(ratios), 0.5));
   const cv::Mat local_gain = localGain(here, on_ground, knows_ground);
   cv::Mat keeps_texture, fit;
   if (wanted == Wanted::kAll) {

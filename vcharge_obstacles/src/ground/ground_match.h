@@ -64,7 +64,6 @@ class GroundMatch {
   const RigidTransform vehicle_from_camera_;
   const cv::Size size_;
   const PixelRays& rays_;
-  std::vector<uint8_t> is_inner_;  // by ray: whether the surroundings of its pixel are valid
   const float min_difference_;
   const PointWarp warp_;
 };

@@ -91,7 +91,7 @@ WarpedImage PointWarp::warp(const cv::Mat& before, const RigidTransform& camera_
       }
       const auto x = static_cast<int>(u[i] * kOne), y = static_cast<int>(v[i] * kOne);
       const int nearest = ((y + kOne / 2) >> kFractionBits) * columns + ((x + kOne / 2) >> kFractionBits);
-      if (valid_.data[nearest] == 0) {
+      if (!isValid(nearest)) {
         continue;
       }
       const int a = x & (kOne - 1), b = y & (kOne - 1);

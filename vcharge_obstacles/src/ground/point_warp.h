@@ -35,6 +35,8 @@ class PointWarp {
   /// `valid`: CV_8UC1 of the camera's size, 0 where images must not be sampled.
   PointWarp(const MeiCamera& model, const cv::Mat& valid);
 
+  bool isValid(int32_t pixel) const { return valid_.data[pixel] != 0; }
+
   /// `before` is the older image, `camera_from_points` its pose, `center` is in the points' frame, and the
   /// inverse ranges are multiplied by `inverse_range_factor` (0: points at infinity). Pixels without a point
   /// stay unknown.

@@ -118,7 +118,7 @@ std::vector<JudgedPoint> ObjectCamera::judge(const PoseHistory& poses, MirrorEvi
     point.found = compareFrom(min_inverse_per_m);
     if (min_inverse_per_m > 0.0 && point.found.is_valid &&
         point.before_from_now.translation().norm() > kStandstill_m) {
-      // Reflections in the ground move as static points_ below it do.
+      // Reflections in the ground move as static points below it do.
       const StaticResidual deeper = compareFrom(0.0);
       const double limit_rad = kMovingSigmas * sigma_rad_;
       mirror->add(deeper.is_valid && deeper.residual_rad.norm() < limit_rad &&

@@ -59,10 +59,10 @@ using ImageFrame = AssembledFrame<Image>;
 /// A frame is handed out when odometry reaches it and all cameras have sent their image. It does not wait for
 /// cameras that have sent a later image or are silent, nor for any camera longer than max_camera_wait_s; it
 /// waits for odometry for at most max_odometry_wait_s. Where cameras are announced by expect(), it waits for
-/// those alone. At most kMaxWaiting frames wait. An image that arrives
-/// after its frame was handed out is late: it is dropped and counted. At a break (see DriveBreak) all older
-/// frames are handed out, then `on_break` is called. With `on_break`, older images that arrive after a break
-/// are late, too, since the stage has started again. Not thread safe.
+/// those alone. At most kMaxWaiting frames wait. An image that arrives after its frame was handed out is
+/// late: it is dropped and counted. At a break (see DriveBreak) all older frames are handed out, then
+/// `on_break` is called. With `on_break`, older images that arrive after a break are late, too, since the
+/// stage has started again. Not thread safe.
 template <class ImageType>
 class FrameAssembler {
  public:

@@ -57,7 +57,8 @@ RATIOS = (
 
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--json", "--output", dest="output", type=pathlib.Path, default=ROOT / "build" / "bench.json", help="JSON to write")
+    parser.add_argument("--json", "--output", dest="output", type=pathlib.Path, default=ROOT / "build" / "bench.json",
+                        help="JSON to write")
     parser.add_argument("--repetitions", type=int, default=5)
     parser.add_argument("--quick", action="store_true", help=f"without {', '.join(SLOW)}")
     parser.add_argument("benchmarks", nargs="*", help="names, default: all")

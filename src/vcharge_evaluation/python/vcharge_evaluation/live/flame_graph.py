@@ -13,12 +13,13 @@ MIN_PART = 0.002  # of the whole: narrower functions are left out
 COLOURS = (("vcharge", "#f4a259"), ("cv::", "#8cb369"), ("libopencv", "#8cb369"), ("tbb", "#c9ada7"), ("kernel", "#9a8c98"))
 OTHER_COLOUR = "#d9d9d9"
 FRAME = re.compile(r"\s+[0-9a-f]+ (.*) \((\S*)\)$")
-# Frames that say nothing: wrappers of std::function, and TBB between a loop and its body.
-PLUMBING = re.compile(r"^(std::|tbb::|boost::|\[libtbb|\[libstdc|\[unknown|clone|start_thread|__libc|_start|main$|vcharge::FrameAssembler)")
+# Frames that say nothing: wrappers of functions, threads, and TBB between a loop and its body.
+PLUMBING = re.compile(r"^(std::|tbb::|boost::|\[libtbb|\[libstdc|\[unknown|clone|start_thread|__libc|_start|main$"
+                      r"|vcharge::FrameAssembler)")
 
 
 class Recording:
-    """perf while a process works, as a context."""
+    """perf while a process works, until stop()."""
 
     def __init__(self, pid, path):
         if shutil.which("perf") is None:

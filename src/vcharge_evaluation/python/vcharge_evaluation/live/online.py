@@ -21,7 +21,8 @@ from vcharge_evaluation.tools import NoResult
 
 RESULTS = {"/obstacles/grid": "nav_msgs/OccupancyGrid", "/obstacles/objects": "vcharge_msgs/TrackedObjects",
            "/localization/pose": "geometry_msgs/PoseWithCovarianceStamped"}
-# Name: what is put before roslaunch, environment, and processors. OpenCV and the kernels of the suite choose their instructions themselves.
+# Name: what is put before roslaunch, environment, and processors. OpenCV and the kernels of the suite choose their instructions
+# themselves.
 MACHINES = {
     "as it is": ([], {}, os.cpu_count()),
     "AVX2": ([], {"VCHARGE_INSTRUCTIONS": "avx2", "OPENCV_CPU_DISABLE": "AVX512_COMMON,AVX512_SKX"}, os.cpu_count()),
@@ -92,7 +93,8 @@ class Listener:
     def take_diagnostics(self, message):
         with self.lock:
             for status in message.status:
-                self.lost[status.name] = {pair.key: pair.value for pair in status.values if pair.key.startswith("dropped") or pair.key.endswith("left_out")}
+                self.lost[status.name] = {pair.key: pair.value for pair in status.values
+                                          if pair.key.startswith("dropped") or pair.key.endswith("left_out")}
 
     def end(self):
         for subscriber in self.subscribers:
@@ -141,7 +143,7 @@ def measure(args, cameras, machine, is_sampled):
             if listener.images and time.monotonic() - listener.last_s < 1.0:  # not after the drive
                 manager = manager_below(launched.process.pid)
                 usage.sample(manager)
-                if is_sampled and recording is None:
+                if is_sampled and recording is None and manager is not None:
                     recording = Recording(manager, f"{folder}/perf.data")
         listener.end()
         return profile(recording, args.profile) if recording else list(figures_of(listener, usage, args.rate))
