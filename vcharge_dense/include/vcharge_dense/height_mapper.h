@@ -3,9 +3,11 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include <tbb/task_group.h>
 #include <Eigen/Geometry>
 
 #include "vcharge_core/camera/camera_rig.h"
@@ -73,8 +75,11 @@ class HeightMapper : public DriveConsumer {
     size_t camera_index;
     Timestamp stamp;
     RigidTransform world_from_camera;
+    double weight;  ///< grows with the camera's path since its last view
   };
   void addTask(const RangeTask& task);
+  void finishSweep();
+  void keepRangeMap(const RangeTask& task);
   RangeMap readView(const View& view) const;
   std::string folder() const;
   void checkCoverage() const;
@@ -89,6 +94,8 @@ class HeightMapper : public DriveConsumer {
   std::map<size_t, Eigen::Vector3d> last_position_m_;  // position of each camera at its newest view
   std::map<std::string, double> times_s_;
   size_t num_reused_ = 0;
+  std::optional<View> swept_;  // the view whose range map sweep_ computes while the next images are read
+  std::unique_ptr<tbb::task_group> sweep_ = std::make_unique<tbb::task_group>();
   Eigen::AlignedBox3d extent_m_;  // x and y: camera positions; z: vehicle poses
 };
 

@@ -1,6 +1,7 @@
 #include "vcharge_dense/height_mapper.h"
 
 #include <algorithm>
+#include <exception>
 #include <filesystem>
 #include <sstream>
 #include <utility>
@@ -24,6 +25,9 @@ namespace {
 constexpr double kFarthestFraction = 0.95;
 // finish() rejects a drive if a smaller ratio of its images has a pose.
 constexpr double kMinCoveredImages = 0.9;
+// A view counts for the path that its camera moved since the last one: thresholds of the weights' sums hold
+// for views at this distance.
+constexpr double kUsualDistance_m = 0.36;
 
 std::string imagePath(const std::string& folder, const std::string& camera, Timestamp stamp) {
   return folder + "/" + camera + "/" + std::to_string(stamp.nanoseconds()) + "_image.png";
@@ -63,7 +67,12 @@ HeightMapper::HeightMapper(std::shared_ptr<const CameraRig> rig, const HeightMap
                                                 [this](const RangeTask& task) { addTask(task); });
 }
 
-HeightMapper::~HeightMapper() = default;
+HeightMapper::~HeightMapper() {
+  try {
+    sweep_->wait();
+  } catch (const std::exception&) {  // the caller has left because of another error
+  }
+}
 
 void HeightMapper::setTrajectory(const Trajectory& map_from_vehicle, const std::string& frame_id) {
   range_mapper_->setTrajectory(map_from_vehicle);
@@ -100,8 +109,13 @@ std::string HeightMapper::folder() const {
 void HeightMapper::addTask(const RangeTask& task) {
   const Eigen::Vector3d position = task.reference.world_from_camera.translation();
   const auto last = last_position_m_.find(task.camera_index);
-  if (last != last_position_m_.end() && (position - last->second).norm() < options_.min_view_distance_m) {
-    return;
+  double moved_m = std::max(options_.min_view_distance_m, kUsualDistance_m);
+  if (last != last_position_m_.end()) {
+    const double distance_m = (position - last->second).norm();
+    if (distance_m < options_.min_view_distance_m) {
+      return;
+    }
+    moved_m = std::min(distance_m, 2.0 * moved_m);
   }
   last_position_m_[task.camera_index] = position;
   const RigCamera& camera = rig_->cameras[task.camera_index];
@@ -109,22 +123,38 @@ void HeightMapper::addTask(const RangeTask& task) {
       task.reference.world_from_camera * camera.vehicle_from_camera->inverse();
   extent_m_.extend(Eigen::Vector3d(position.x(), position.y(), world_from_vehicle.translation().z()));
   makeVoxelGrid(extent_m_, options_.fusion);  // rejects a grid that is too large before more range maps
-  const StageTimer timer("range maps", &times_s_);
+  const View view{task.camera_index, task.reference.stamp, task.reference.world_from_camera,
+                  moved_m / kUsualDistance_m};
+  finishSweep();
   if (!drive_name_.empty() && isKept(folder(), camera.name, task.reference.stamp)) {
     ++num_reused_;
+    views_.push_back(view);
   } else {
-    const std::string path = imagePath(folder(), camera.name, task.reference.stamp);
-    createFolder(fs::path(path).parent_path().string());
-    writeFileAtomically(path, [&](const std::string& temporary) {
-      if (!cv::imwrite(temporary, task.reference.pixels)) {
-        throw InputError(path + ": cannot be written (is the disk full?)");
-      }
-    });
-    RangeMap map = range_mapper_->sweep(task);
-    map.reference.release();       // already written as a separate image
-    writeRangeMap(map, folder());  // writes its YAML last, which isKept() looks for
+    swept_ = view;
+    sweep_->run([this, task] { keepRangeMap(task); });
   }
-  views_.push_back({task.camera_index, task.reference.stamp, task.reference.world_from_camera});
+}
+
+void HeightMapper::finishSweep() {
+  const std::optional<View> view = std::exchange(swept_, std::nullopt);
+  sweep_->wait();
+  if (view) {
+    views_.push_back(*view);
+  }
+}
+
+void HeightMapper::keepRangeMap(const RangeTask& task) {
+  const StageTimer timer("range maps", &times_s_);
+  const std::string path = imagePath(folder(), rig_->cameras[task.camera_index].name, task.reference.stamp);
+  createFolder(fs::path(path).parent_path().string());
+  writeFileAtomically(path, [&](const std::string& temporary) {
+    if (!cv::imwrite(temporary, task.reference.pixels)) {
+      throw InputError(path + ": cannot be written (is the disk full?)");
+    }
+  });
+  RangeMap map = range_mapper_->sweep(task);
+  map.reference.release();       // already written as a separate image
+  writeRangeMap(map, folder());  // writes its YAML last, which isKept() looks for
 }
 
 RangeMap HeightMapper::readView(const View& view) const {
@@ -153,6 +183,7 @@ void HeightMapper::checkCoverage() const {
 
 HeightMapResult HeightMapper::finish(const std::function<void(const std::string&, double)>& progress) {
   range_mapper_->finish();
+  finishSweep();
   checkCoverage();
   const auto report = [&](const char* step) {
     return [&progress, step](double fraction) {
@@ -170,8 +201,10 @@ HeightMapResult HeightMapper::finish(const std::function<void(const std::string&
   const HeightFusionOptions& fusion = options_.fusion;
   const VoxelGrid grid = makeVoxelGrid(extent_m_, fusion);
   const auto pack = [&](size_t i) {
+    RangeWeighting weighting;
+    weighting.view_weight = views_[i].weight;
     return std::make_shared<const PackedRangeMap>(
-        packRangeMap(readView(views_[i]), views_[i].world_from_camera));
+        packRangeMap(readView(views_[i]), views_[i].world_from_camera, weighting));
   };
   ColumnImages columns;
   {

@@ -44,7 +44,8 @@ class RangeWeight {
   RangeWeight(const RangeWeighting& weighting, float pixel_rad)
       : inverse_sigma_(static_cast<float>(1.0 / weighting.reference_sigma_m)),
         inverse_footprint_(static_cast<float>(1.0 / weighting.reference_footprint_m)),
-        inverse_log_odds_(1.0F / logOdds(static_cast<float>(weighting.reference_confidence))),
+        confident_weight_(static_cast<float>(weighting.view_weight) /
+                          logOdds(static_cast<float>(weighting.reference_confidence))),
         pixel_rad_(pixel_rad) {}
 
   float operator()(float inverse_range, float sigma_m, float confidence, float by_column,
@@ -52,13 +53,13 @@ class RangeWeight {
     const float range = 1.0F / inverse_range;
     const float along = range * range * std::max(std::abs(by_column), std::abs(by_row));
     const float footprint_squared = squared(range * pixel_rad_) + squared(along);
-    const float confident = inverse_log_odds_ * logOdds(std::clamp(confidence, 0.5F, kFullConfidence));
+    const float confident = confident_weight_ * logOdds(std::clamp(confidence, 0.5F, kFullConfidence));
     return confident / ((1.0F + squared(sigma_m * inverse_sigma_)) *
                         (1.0F + footprint_squared * squared(inverse_footprint_)));
   }
 
  private:
-  const float inverse_sigma_, inverse_footprint_, inverse_log_odds_, pixel_rad_;
+  const float inverse_sigma_, inverse_footprint_, confident_weight_, pixel_rad_;
 };
 
 cv::Mat inverseRange(const RangeMap& map, size_t* num_known) {

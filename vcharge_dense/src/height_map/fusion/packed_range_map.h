@@ -24,13 +24,14 @@ struct PackedRangeMap {
   size_t num_known = 0;
 };
 
-/// How much a range counts in the fusion. Only tests change the values.
+/// How much a range counts in the fusion. Only tests change the references.
 struct RangeWeighting {
   double reference_sigma_m = 0.05;    ///< the weight of a range with this standard deviation is one half
   double reference_confidence = 0.9;  ///< the weight grows with the log odds of the confidence and is 1 here
   /// The weight of a range whose pixel spans this much of the surface is one half. Distant ground is seen at
   /// grazing angles, where a matching window covers both sides of a kerb.
   double reference_footprint_m = 0.15;
+  double view_weight = 1.0;  ///< factor of all weights of a range map
 };
 
 /// Ranges that are not finite, or have a low confidence or a large standard deviation, become unknown.
