@@ -16,6 +16,7 @@
 #include "sweep/sweep_input.h"
 #include "sweep/tile_scorer.h"
 #include "vcharge_dense/plane_sweep.h"
+#include "vcharge_dense/range_mapper.h"
 
 namespace vcharge {
 namespace {
@@ -167,6 +168,28 @@ void rangeMap(benchmark::State& state, int ground_planes, int refinement_steps, 
   }
 }
 
+enum class Search { kAllPlanes, kCoarsePass, kRemembering };
+
+/// Times a range map with the numbers of planes of the preset `fast`. The remembered one is of the image before.
+void fastRangeMap(benchmark::State& state, Search search) {
+  const tbb::global_control control(tbb::global_control::max_allowed_parallelism,
+                                    static_cast<size_t>(state.range(0)));
+  const Scene& s = scene(true);
+  RangeMapperOptions options;
+  options.usePreset(RangePreset::kFast);
+  options.plane_sweep.coarse_pass = search != Search::kAllPlanes;
+  const cv::Mat valid(image_size, CV_8UC1, cv::Scalar(255));
+  const PlaneSweep sweep(s.camera, valid, options.plane_sweep, s.ground);
+  RememberedRanges remembered{
+      sweep.sweep(s.neighbours.front(), {s.neighbours.begin() + 1, s.neighbours.end()}).range_m,
+      s.neighbours.front().world_from_camera, 0};
+  for (auto _ : state) {
+    ++remembered.num_sweeps;
+    benchmark::DoNotOptimize(sweep.sweep(s.reference, s.neighbours, nullptr,
+                                         search == Search::kRemembering ? &remembered : nullptr));
+  }
+}
+
 void onOneAndTwoThreads(benchmark::internal::Benchmark* b) {
   b->Arg(1)->Arg(2)->MeasureProcessCPUTime()->UseRealTime()->Unit(benchmark::kMillisecond);
 }
@@ -184,6 +207,9 @@ BENCHMARK_CAPTURE(rangeMap, whole_of_4, 16, 16, 4, false)->Apply(onOneAndTwoThre
 BENCHMARK_CAPTURE(rangeMap, whole_of_2, 16, 16, 2, false)->Apply(onOneAndTwoThreads);
 BENCHMARK_CAPTURE(rangeMap, coarse_and_whole_of_4, 16, 16, 4, true)->Apply(onOneAndTwoThreads);
 BENCHMARK_CAPTURE(rangeMap, coarse_and_whole_of_2, 16, 16, 2, true)->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(fastRangeMap, all_planes, Search::kAllPlanes)->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(fastRangeMap, coarse_pass, Search::kCoarsePass)->Apply(onOneAndTwoThreads);
+BENCHMARK_CAPTURE(fastRangeMap, remembering, Search::kRemembering)->Apply(onOneAndTwoThreads);
 
 }  // namespace
 }  // namespace vcharge

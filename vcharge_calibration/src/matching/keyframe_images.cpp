@@ -1,5 +1,6 @@
 #include "vcharge_calibration/matching/keyframe_images.h"
 
+#include <tbb/parallel_for.h>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -10,20 +11,20 @@ void KeyframeImages::add(int32_t keyframe, const std::vector<Image>& images) {
     return;
   }
   std::vector<Jpeg>& jpegs = jpegs_[keyframe];
-  for (const Image& image : images) {
-    jpegs.emplace_back();
-    if (image.pixels.empty()) {
-      continue;
+  jpegs.resize(images.size());
+  tbb::parallel_for(size_t{0}, images.size(), [&](size_t i) {
+    cv::Mat small = images[i].pixels;
+    if (small.empty()) {
+      return;
     }
-    cv::Mat small = image.pixels;
     if (small.cols > max_width_px_) {
       const double scale = static_cast<double>(max_width_px_) / small.cols;
-      cv::resize(image.pixels, small, cv::Size(), scale, scale, cv::INTER_AREA);
+      cv::resize(images[i].pixels, small, cv::Size(), scale, scale, cv::INTER_AREA);
     }
     auto bytes = std::make_shared<std::vector<uint8_t>>();
     cv::imencode(".jpg", small, *bytes, {cv::IMWRITE_JPEG_QUALITY, quality_});
-    jpegs.back() = bytes;
-  }
+    jpegs[i] = bytes;
+  });
   if (jpegs_.size() > max_keyframes_) {
     step_ *= 2;
     for (auto entry = jpegs_.begin(); entry != jpegs_.end();) {

@@ -58,9 +58,13 @@ class CameraTracker {
   /// Ends the tracks whose entry in `is_good` (one per match of the last track()) is false.
   void keep(const std::vector<bool>& is_good);
 
-  /// Records all points at a keyframe and starts tracks at features that are not close to a tracked point.
-  void addKeyframe(int32_t keyframe, int32_t camera_index, const FeatureExtractor& extractor,
-                   ReconstructionData* data);
+  /// Aligns all patches in the last image and extracts its features, for addKeyframe(). Cameras may do so at
+  /// the same time.
+  void readKeyframe(int32_t keyframe, const FeatureExtractor& extractor, KeyframeImage* out);
+
+  /// Records all points at a keyframe that was read, and starts tracks at features that are not close to a
+  /// tracked point.
+  void addKeyframe(int32_t keyframe, int32_t camera_index, ReconstructionData* data);
 
  private:
   void alignWithAnchors(int32_t keyframe);

@@ -21,6 +21,7 @@ constexpr double kMinInformation = 1e-6;
 BundleEquations::BundleEquations(const BundleProblem& problem, const BundleErrors& errors)
     : problem_(problem), errors_(errors), points_(problem.points_in_map.size()) {
   makeSlots();
+  makeCameraTerms();
   makePattern();
 }
 
@@ -52,6 +53,9 @@ void BundleEquations::addGroundError(Slot* slot) const {
 
 void BundleEquations::linearizePoint(size_t point) {
   const Eigen::Vector3d& position = state_.points[point];
+  const auto cameras = cameras_.begin() + static_cast<std::ptrdiff_t>(first_camera_of_point_[point]);
+  const auto end_cameras = cameras_.begin() + static_cast<std::ptrdiff_t>(first_camera_of_point_[point + 1]);
+  std::for_each(cameras, end_cameras, [](CameraTerms& terms) { terms.with_point.setZero(); });
   for (size_t s = first_slot_of_point_[point]; s < first_slot_of_point_[point + 1]; ++s) {
     Slot& slot = slots_[s];
     slot.information.setZero();
@@ -71,6 +75,9 @@ void BundleEquations::linearizePoint(size_t point) {
       slot.by_camera.leftCols<3>() = -map_from_vehicle;
       slot.by_camera.rightCols<3>() = map_from_vehicle * crossMatrix(from_camera_m);
       slot.camera_with_point = slot.by_camera.transpose() * slot.information;
+      const auto of_camera = std::find_if(
+          cameras, end_cameras, [&](const CameraTerms& terms) { return terms.camera == slot.camera; });
+      of_camera->with_point += slot.camera_with_point;
     }
   }
 }
@@ -155,16 +162,19 @@ BundleEquations::TailTerms BundleEquations::tailTerms() const {
         const Eigen::Index row = cameraInTail(slot.camera);
         const Matrix6d own = slot.camera_with_point * slot.by_camera;
         const Vector6d gradient = slot.by_camera.transpose() * slot.gradient;
-        const Matrix63d over_point = slot.camera_with_point * points_[point].inverse;
         terms.information.block<6, 6>(row, row) += own;
         terms.diagonal.segment<6>(row) += own.diagonal();
         terms.gradient.segment<6>(row) += gradient;
-        terms.reduced_gradient.segment<6>(row) += gradient - over_point * points_[point].gradient;
-        for (size_t other = first_slot_of_point_[point]; other < first_slot_of_point_[point + 1]; ++other) {
-          if (hasCamera(slots_[other])) {
-            terms.information.block<6, 6>(row, cameraInTail(slots_[other].camera)).noalias() -=
-                over_point * slots_[other].camera_with_point.transpose();
-          }
+        terms.reduced_gradient.segment<6>(row) += gradient;
+      }
+      for (size_t c = first_camera_of_point_[point]; c < first_camera_of_point_[point + 1]; ++c) {
+        const Eigen::Index row = cameraInTail(cameras_[c].camera);
+        const Matrix63d over_point = cameras_[c].with_point * points_[point].inverse;
+        terms.reduced_gradient.segment<6>(row) -= over_point * points_[point].gradient;
+        for (size_t other = first_camera_of_point_[point]; other < first_camera_of_point_[point + 1];
+             ++other) {
+          terms.information.block<6, 6>(row, cameraInTail(cameras_[other].camera)).noalias() -=
+              over_point * cameras_[other].with_point.transpose();
         }
       }
     }
@@ -238,12 +248,8 @@ void BundleEquations::assemblePose(size_t pose, double damping, PriorTerms* prio
       if (hasCamera(slot)) {
         withCamera(slot.camera).noalias() += slot.with_point * slot.by_camera;
       }
-      for (size_t other = first_slot_of_point_[slot.point]; other < first_slot_of_point_[slot.point + 1];
-           ++other) {
-        if (hasCamera(slots_[other])) {
-          withCamera(slots_[other].camera).noalias() -=
-              slot.over_point * slots_[other].camera_with_point.transpose();
-        }
+      for (size_t c = first_camera_of_point_[slot.point]; c < first_camera_of_point_[slot.point + 1]; ++c) {
+        withCamera(cameras_[c].camera).noalias() -= slot.over_point * cameras_[c].with_point.transpose();
       }
     }
   }

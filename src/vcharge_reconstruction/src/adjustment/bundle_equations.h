@@ -56,6 +56,11 @@ class BundleEquations {
     Matrix36d by_camera = Matrix36d::Zero();   ///< J_camera = J_point by_camera
     Matrix63d camera_with_point = Matrix63d::Zero();  ///< J_camera^T J_point
   };
+  /// The terms of a point's slots in one camera with unknown extrinsics.
+  struct CameraTerms {
+    int32_t camera = 0;
+    Matrix63d with_point = Matrix63d::Zero();  ///< sum of camera_with_point
+  };
   struct PointTerms {
     Eigen::Vector3d gradient, damping;
     Eigen::Matrix3d inverse;  ///< inverse of the damped information
@@ -93,6 +98,7 @@ class BundleEquations {
   bool hasCamera(const Slot& slot) const { return hasCameras() && !slot.is_ground; }
 
   void makeSlots();
+  void makeCameraTerms();
   void makePattern();
   void linearizePoint(size_t point);
   void addImageErrors(const Eigen::Vector3d& point, Slot* slot) const;
@@ -115,6 +121,8 @@ class BundleEquations {
   std::vector<std::vector<size_t>> slots_of_pose_;
   std::vector<std::vector<int32_t>> rows_of_pose_;  ///< earlier poses with a common term, and itself
   std::vector<PointTerms> points_;
+  std::vector<CameraTerms> cameras_;  ///< ordered by point, then by camera; empty without unknown extrinsics
+  std::vector<size_t> first_camera_of_point_;
   Eigen::SparseMatrix<double> reduced_;                    ///< upper triangle
   Eigen::VectorXd gradient_, reduced_gradient_, damping_;  ///< one per unknown of the reduced system
   Eigen::CholmodSupernodalLLT<Eigen::SparseMatrix<double>, Eigen::Upper> factorization_;

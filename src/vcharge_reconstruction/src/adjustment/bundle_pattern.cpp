@@ -1,5 +1,6 @@
 // Construction of BundleEquations: its slots and the sparsity pattern of its reduced system.
 #include <algorithm>
+#include <set>
 
 #include <tbb/parallel_for.h>
 
@@ -45,6 +46,22 @@ void BundleEquations::makeSlots() {
     addGround(point, static_cast<int32_t>(problem_.map_from_vehicle.size()));
   }
   first_slot_of_point_.push_back(slots_.size());
+}
+
+void BundleEquations::makeCameraTerms() {
+  first_camera_of_point_.push_back(0);
+  for (size_t point = 0; point < points_.size(); ++point) {
+    std::set<int32_t> seen;
+    for (size_t s = first_slot_of_point_[point]; s < first_slot_of_point_[point + 1]; ++s) {
+      if (hasCamera(slots_[s])) {
+        seen.insert(slots_[s].camera);
+      }
+    }
+    for (const int32_t camera : seen) {
+      cameras_.emplace_back().camera = camera;
+    }
+    first_camera_of_point_.push_back(cameras_.size());
+  }
 }
 
 void BundleEquations::makePattern() {

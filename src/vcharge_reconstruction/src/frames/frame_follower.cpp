@@ -138,8 +138,11 @@ void FrameFollower::addKeyframe(Timestamp stamp, const std::vector<Image>& image
   keyframe.map_from_vehicle = map_from_vehicle_;
   keyframe.travelled_m = travelled_m_;
   const int32_t index = keyframes_.addKeyframe(std::move(keyframe), keyframe_from_vehicle, motion);
+  tbb::parallel_for(size_t{0}, trackers_.size(), [&](size_t i) {
+    trackers_[i].readKeyframe(index, *extractor_, &state_->data.keyframes[index].images[i]);
+  });
   for (size_t i = 0; i < trackers_.size(); ++i) {
-    trackers_[i].addKeyframe(index, static_cast<int32_t>(i), *extractor_, &state_->data);
+    trackers_[i].addKeyframe(index, static_cast<int32_t>(i), &state_->data);
   }
   if (on_keyframe_) {
     on_keyframe_(index, images);

@@ -192,18 +192,28 @@ void CameraTracker::alignWithAnchors(int32_t keyframe) {
   }
 }
 
-void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, const FeatureExtractor& extractor,
-                                ReconstructionData* data) {
-  KeyframeImage& out = data->keyframes[keyframe].images[camera_index];
+void CameraTracker::readKeyframe(int32_t keyframe, const FeatureExtractor& extractor, KeyframeImage* out) {
   if (image_.pixels.empty()) {
     return;
   }
   alignWithAnchors(keyframe);
-  out.features = extractor.extract(image_.pixels, mask_);
-  const size_t num_features = out.features.size();
-  out.track_of_feature.assign(num_features, -1);
-  out.rays_in_camera.resize(3, static_cast<Eigen::Index>(num_features));
+  out->features = extractor.extract(image_.pixels, mask_);
+  const size_t num_features = out->features.size();
+  out->track_of_feature.assign(num_features, -1);
+  out->rays_in_camera.resize(3, static_cast<Eigen::Index>(num_features));
+  for (size_t i = 0; i < num_features; ++i) {
+    const cv::Point2f position = out->features.keypoints[i].position_px;
+    Eigen::Vector3d ray = Eigen::Vector3d::Zero();
+    camera_.model.unproject(Eigen::Vector2d(position.x, position.y), &ray);
+    out->rays_in_camera.col(static_cast<Eigen::Index>(i)) = ray;
+  }
+}
 
+void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, ReconstructionData* data) {
+  KeyframeImage& out = data->keyframes[keyframe].images[camera_index];
+  if (image_.pixels.empty()) {
+    return;
+  }
   OccupiedCells cells(camera_.image_size_px, spacing_px_);
   std::vector<double> best_distance_px(tracks_.size(), kMaxAssociation_px);
   std::vector<int> feature_of_track(tracks_.size(), -1);
@@ -211,11 +221,8 @@ void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, const Fe
     cells.add(tracks_[i].position_px, static_cast<int>(i));
   }
   std::vector<size_t> free_features;
-  for (size_t i = 0; i < num_features; ++i) {
+  for (size_t i = 0; i < out.features.size(); ++i) {
     const cv::Point2f position = out.features.keypoints[i].position_px;
-    Eigen::Vector3d ray = Eigen::Vector3d::Zero();
-    camera_.model.unproject(Eigen::Vector2d(position.x, position.y), &ray);
-    out.rays_in_camera.col(static_cast<Eigen::Index>(i)) = ray;
     double distance_px = 0.0;
     const int track = cells.nearest(position, &distance_px);
     if (track < 0) {

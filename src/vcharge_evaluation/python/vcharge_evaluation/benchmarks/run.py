@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 
-from vcharge_evaluation.tools import ROOT, TOOLS, say
+from vcharge_evaluation.tools import ROOT, TOOLS, say, tool_path
 
 BENCHMARKS = {
     "solver_benchmark": "vcharge_geometry",
@@ -20,11 +20,12 @@ BENCHMARKS = {
     "height_map_benchmark": "vcharge_dense",
     "plane_sweep_benchmark": "vcharge_dense",
     "render_benchmark": "vcharge_simulation",
+    "bundle_benchmark": "vcharge_reconstruction",
 }
 SLOW = ("plane_sweep_benchmark", "render_benchmark")
 
-# Name, benchmark, the slower case (peer, plain, one core) and the faster one. Cases that the machine or the build lacks are
-# left out.
+# Name, benchmark, the slower case (peer, plain, one core) and the faster one: of the time per item where both count items. Cases
+# that the machine or the build lacks are left out.
 RATIOS = (
     ("two-point motion against OpenGV's 17-point", "solver_benchmark", "opengvSeventeenPoint", "ackermannTwoPoint"),
     ("two-point motion against OpenGV's six-point", "solver_benchmark", "opengvSixPoint", "ackermannTwoPoint"),
@@ -46,12 +47,26 @@ RATIOS = (
      "rangeMap/whole_of_4/1/process_time/real_time", "rangeMap/whole_of_4/2/process_time/real_time"),
     ("range map with 2 neighbours, one core over two", "plane_sweep_benchmark",
      "rangeMap/whole_of_2/1/process_time/real_time", "rangeMap/whole_of_2/2/process_time/real_time"),
+    ("plane by plane and pixel by pixel against the kernel, per sample, AVX-512", "plane_sweep_benchmark", "plain/iterations:1",
+     "kernel/avx3_fisheye"),
+    ("plane by plane and pixel by pixel against the kernel, per sample, AVX2", "plane_sweep_benchmark", "plain/iterations:1",
+     "kernel/avx2_fisheye"),
+    ("kernel over the time of its gathers alone, per sample, AVX-512", "plane_sweep_benchmark", "kernel/avx3_fisheye",
+     "gather/avx3"),
+    ("kernel over the time of its gathers alone, per sample, AVX2", "plane_sweep_benchmark", "kernel/avx2_fisheye",
+     "gather/avx2"),
+    ("range map from all planes over one that remembers", "plane_sweep_benchmark",
+     "fastRangeMap/all_planes/1/process_time/real_time", "fastRangeMap/remembering/1/process_time/real_time"),
+    ("range map with a coarse pass over one that remembers", "plane_sweep_benchmark",
+     "fastRangeMap/coarse_pass/1/process_time/real_time", "fastRangeMap/remembering/1/process_time/real_time"),
     ("fisheye kernel against pinhole (1: costs nothing), AVX-512", "plane_sweep_benchmark",
      "kernel/avx3_fisheye", "kernel/avx3_pinhole"),
     ("fisheye kernel against pinhole (1: costs nothing), AVX2", "plane_sweep_benchmark",
      "kernel/avx2_fisheye", "kernel/avx2_pinhole"),
     ("search of the whole map over a guided one", "localization_benchmark", "wholeMap/process_time/real_time",
      "guidedSearch/process_time/real_time"),
+    ("adjustment of a map against Ceres, one core", "bundle_benchmark", "ceres", "solveBundle/one core"),
+    ("adjustment of a map against Ceres, two cores", "bundle_benchmark", "ceres", "solveBundle/all cores"),
 )
 
 
@@ -92,10 +107,30 @@ def measure(name, repetitions):
         by_wall = "real_time" in entry["name"] or "manual_time" in entry["name"]
         case = cases.setdefault(entry["run_name"], {"times_ns": []})
         case["times_ns"].append(entry["real_time" if by_wall else "cpu_time"] * units[entry["time_unit"]])
+        if "items_per_second" in entry:
+            case["least_ns_per_item"] = min(1e9 / entry["items_per_second"], case.get("least_ns_per_item", float("inf")))
     for case in cases.values():
         case["median_ns"] = statistics.median(case["times_ns"])
         case["least_ns"] = min(case["times_ns"])
     return cases
+
+
+def measure_adjustment(repetitions):
+    """Times (ns) of the adjustment of a map with exact observations, and of the same problem in Ceres."""
+    keys = {"solveBundle/one core": "solve_bundle_s", "solveBundle/all cores": "solve_bundle_wall_s", "ceres": "ceres_s"}
+    times_ns = {case: [] for case in keys}
+    with tempfile.TemporaryDirectory() as folder:
+        drive_map, output = pathlib.Path(folder) / "map.vmap", pathlib.Path(folder) / "out.json"
+        subprocess.run([tool_path("write_analytic_map"), "--output", drive_map, "--keyframes", "300", "--landmarks", "6000"],
+                       stdout=subprocess.DEVNULL, check=True)
+        for _ in range(repetitions):
+            subprocess.run([tool_path("bundle_benchmark"), "--map", drive_map, "--json", output], stdout=subprocess.DEVNULL,
+                           check=True)
+            found = json.loads(output.read_text())
+            for case, key in keys.items():
+                times_ns[case].append(1e9 * found[key])
+    return {case: {"times_ns": times, "median_ns": statistics.median(times), "least_ns": min(times)}
+            for case, times in times_ns.items()}
 
 
 def readable(nanoseconds):
@@ -112,16 +147,19 @@ def main():
               "time": time.strftime("%Y-%m-%dT%H:%M:%S"), "benchmarks": {}, "ratios": {}}
     for name in args.benchmarks:
         say(name)
-        result["benchmarks"][name] = measure(name, args.repetitions)
+        result["benchmarks"][name] = (measure_adjustment(args.repetitions) if name == "bundle_benchmark" else
+                                      measure(name, args.repetitions))
     result["machine"]["load_after"] = os.getloadavg()[0]
     rows = []
     for label, name, slower, faster in RATIOS:
         cases = result["benchmarks"].get(name, {})
         if slower in cases and faster in cases:
             # The fastest repetition was disturbed least by other work of the machine.
-            ratio = cases[slower]["least_ns"] / cases[faster]["least_ns"]
+            both = (cases[slower], cases[faster])
+            key = "least_ns_per_item" if all("least_ns_per_item" in case for case in both) else "least_ns"
+            ratio = both[0][key] / both[1][key]
             result["ratios"][label] = ratio
-            rows.append((label, f"{ratio:.2f}", readable(cases[slower]["least_ns"]), readable(cases[faster]["least_ns"])))
+            rows.append((label, f"{ratio:.2f}", readable(both[0][key]), readable(both[1][key])))
     temporary = args.output.with_suffix(".tmp")
     args.output.parent.mkdir(parents=True, exist_ok=True)
     temporary.write_text(json.dumps(result, indent=1))
