@@ -170,7 +170,8 @@ void rangeMap(benchmark::State& state, int ground_planes, int refinement_steps, 
 
 enum class Search { kAllPlanes, kCoarsePass, kRemembering };
 
-/// Times a range map with the numbers of planes of the preset `fast`. The remembered one is of the image before.
+/// Times a range map with the numbers of planes of the preset `fast`. The remembered one is of the image
+/// before.
 void fastRangeMap(benchmark::State& state, Search search) {
   const tbb::global_control control(tbb::global_control::max_allowed_parallelism,
                                     static_cast<size_t>(state.range(0)));

@@ -45,8 +45,9 @@ struct HeightMapOptions {
   VCHARGE_BEGIN_OPTIONS(HeightMapOptions);
   VCHARGE_OPTION_GROUP(RangeMapperOptions, range_maps, RangeMapperOptions::offline(),
                        "Range maps to be fused.");
-  VCHARGE_OPTION(double, min_view_distance_m, 1.0, notNegative(),
-                 "Distance that a camera moves between two range maps that are fused; each counts for this path.");
+  VCHARGE_OPTION(
+      double, min_view_distance_m, 1.0, notNegative(),
+      "Distance that a camera moves between two range maps that are fused; each counts for this path.");
   VCHARGE_OPTION_GROUP(HeightFusionOptions, fusion, {}, "Voxel grid and weights of the ranges.");
   VCHARGE_OPTION(
       double, label_gamma, 10.0, notNegative(),

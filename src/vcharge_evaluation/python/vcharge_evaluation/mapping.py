@@ -8,6 +8,8 @@ import numpy as np
 import yaml
 
 from vcharge_evaluation import tools
+from vcharge_evaluation.drives import LOOP_STEP, Drive
+from vcharge_evaluation.long_drives import Place, join
 from vcharge_evaluation.poses import at_stamps, rotations, write_odometry
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
 from vcharge_evaluation.tools import CONFIG, import_published_images, judge, simulate
@@ -17,8 +19,6 @@ USUAL_MAX_ERROR_CM = 5.0
 # Change of pitch and roll from frame to frame with which a vehicle leaves the plane, or stays in it.
 LEAVES_PLANE_DEG, IN_PLANE_DEG = 0.2, 0.05
 FRAMES_OF_MEMORY_GOAL, MEMORY_GOAL_GB = 1500, 4.0
-# Short drives scatter about linear growth by this much.
-GROWTH_SCATTER = 1.1
 
 
 def arguments():
@@ -30,8 +30,8 @@ def arguments():
     parser.add_argument("--image-scale", type=float, default=1.0)
     parser.add_argument("--duration-s", type=float, default=0.0, help="end the drives early; 0: whole drives")
     parser.add_argument("--options", type=pathlib.Path, default=CONFIG / "mapping.yaml")
-    parser.add_argument("--growth-s", type=float, default=12.0,
-                        help="shortest of the three drives over which growth is measured; 0: not measured")
+    parser.add_argument("--growth-seeds", nargs="*", type=int, default=list(range(301, 309)),
+                        help="seeds of the lots that long drives are made of; none: growth is not measured")
     parser.add_argument("--growth-scale", type=float, default=0.25)
     parser.add_argument("--no-front", action="store_true", help="leave out the map of the front camera alone")
     parser.add_argument("--no-hash", action="store_true", help="leave out the second map, on one thread")
@@ -160,24 +160,40 @@ def evaluate_real(args, results):
         figure("largest rotation error against the first pose", rotation, "degrees", at_most=1.0)]))
 
 
+def linear_fit(lengths, values):
+    """R2 of a straight line through the values."""
+    line = np.polyval(np.polyfit(lengths, values, 1), lengths)
+    return 1.0 - ((values - line) ** 2).sum() / ((values - np.mean(values)) ** 2).sum()
+
+
 def evaluate_growth(args, results):
-    """The lot's loop, no part of which is a loop itself, for one, two and four times a duration."""
-    columns, first = [], None
-    for times in (1, 2, 4):
-        folder = args.work / f"growth_{args.growth_s:g}s_x{times}_scale{args.growth_scale:g}"
-        simulate(folder, ["--scene", "lot", "--drive", "loop", "--image-scale", args.growth_scale, "--duration-s",
-                          times * args.growth_s])
-        built = BuiltMap(folder, "lot", args)
-        first = first or built
-        # A drive begins slowly, so growth is counted in keyframes, not in seconds.
-        keyframes = built.map["num_keyframes"] / first.map["num_keyframes"]
-        limit = GROWTH_SCATTER * keyframes if times > 1 else None
-        columns.append((f"{times} x {args.growth_s:g} s", [
-            Figure("keyframes", built.map["num_keyframes"]),
-            figure("processor time, times the shortest drive's", built.run.cpu_s / first.run.cpu_s, at_most=limit),
-            Figure("wall time, times the shortest drive's", built.run.wall_s / first.run.wall_s),
-            figure("peak memory, times the shortest drive's", built.run.peak_gb / first.run.peak_gb, at_most=limit)]))
-    results.add(f"Growth with the drive, image scale {args.growth_scale:g}", *columns)
+    """A drive through one, two, four, ... places, none of them twice, with mapping's time and memory over its length."""
+    drives = [Drive(args.work, "growth", "--scene", "lot", "--drive", "loop", "--scene-seed", seed, "--seed", seed, "--image-step",
+                    LOOP_STEP, "--image-scale", args.growth_scale) for seed in args.growth_seeds]
+    places = [(drive, inverted) for inverted in (False, True) for drive in drives]
+    columns, lengths, builds = [], [], []
+    count = 1
+    while count <= len(places):
+        folder = args.work / "growth" / f"{count}_places"
+        length_m, drive_s = join([Place(*place) for place in places[:count]], folder)
+        build = tools.build_map(folder, "map", rig=drives[0].true_rig, options=args.options)
+        lengths.append(length_m)
+        builds.append(build)
+        columns.append((f"{length_m:.0f} m", [
+            Figure("duration", drive_s, "s"),
+            Figure("keyframes", build.found["num_keyframes"]),
+            figure("wall time over the drive's", build.wall_s / drive_s, at_most=1.0),
+            Figure("processor time", build.cpu_s, "s"),
+            *(Figure(f"wall time, {stage}", seconds, "s") for stage, seconds in build.found["stage_s"].items()),
+            Figure("peak memory", build.peak_gb, "GB"),
+            Figure("map file", (folder / "map.vmap").stat().st_size * 1e-6, "MB")]))
+        (folder / "drive.bag").unlink()
+        count *= 2
+    title = f"Growth with the drive, image scale {args.growth_scale:g}"
+    results.add(title, *columns)
+    results.add(f"{title}: linear fit over the length", ("R2", [
+        figure("processor time", linear_fit(lengths, np.array([build.cpu_s for build in builds])), at_least=0.99),
+        figure("peak memory", linear_fit(lengths, np.array([build.peak_gb for build in builds])), at_least=0.99)]))
 
 
 def main():
@@ -188,7 +204,7 @@ def main():
         for seed in args.seeds:
             evaluate_drive(scenario, seed, args, seed == args.seeds[0], results)
     evaluate_real(args, results)
-    if args.growth_s > 0:
+    if args.growth_seeds:
         evaluate_growth(args, results)
     results.end()
 
