@@ -46,32 +46,37 @@ std::vector<PlaceMatch> PlaceIndex::query(const std::vector<cv::Mat>& descriptor
   check(descriptors_by_camera.size() == static_cast<size_t>(num_cameras_),
         "PlaceIndex: one matrix of descriptors per camera");
   const int num_candidates = std::clamp(end_place, 0, num_places_);
-  std::vector<PlaceMatch> matches(static_cast<size_t>(num_candidates));
-  for (int i = 0; i < num_candidates; ++i) {
-    matches[i].place = i;
-    matches[i].cameras.assign(static_cast<size_t>(num_cameras_), -1);
-  }
-  std::vector<float> common(static_cast<size_t>(num_candidates) * num_cameras_);
-  for (int camera = 0; camera < num_cameras_; ++camera) {
-    std::fill(common.begin(), common.end(), 0.0F);
+  // Of each camera of the query: words in common with each image.
+  const size_t num_images = static_cast<size_t>(num_candidates) * static_cast<size_t>(num_cameras_);
+  std::vector<std::vector<float>> common(static_cast<size_t>(num_cameras_), std::vector<float>(num_images));
+  for (size_t camera = 0; camera < common.size(); ++camera) {
     for (const WeightedWord& entry : vocabulary_->bagOfWords(descriptors_by_camera[camera])) {
       for (const Posting& posting : postings_[entry.word]) {
-        if (static_cast<size_t>(posting.image) >= common.size()) {
+        if (static_cast<size_t>(posting.image) >= num_images) {
           break;
         }
-        common[posting.image] += std::min(entry.weight, posting.weight);
+        common[camera][posting.image] += std::min(entry.weight, posting.weight);
       }
     }
-    for (PlaceMatch& match : matches) {
-      const auto first = common.begin() + static_cast<ptrdiff_t>(match.place) * num_cameras_;
-      const auto best = std::max_element(first, first + num_cameras_);
-      if (*best > 0.0F) {
-        match.cameras[camera] = static_cast<int>(best - first);
-        match.score += *best;
-      }
+  }
+  const auto mostSimilar = [&](const std::vector<float>& of_camera, int place) {
+    const auto first = of_camera.begin() + static_cast<ptrdiff_t>(place) * num_cameras_;
+    return std::max_element(first, first + num_cameras_);
+  };
+  std::vector<PlaceMatch> matches(static_cast<size_t>(num_candidates));
+  for (int place = 0; place < num_candidates; ++place) {
+    matches[place].place = place;
+    for (const std::vector<float>& of_camera : common) {
+      matches[place].score += *mostSimilar(of_camera, place);
     }
   }
   keepBest(max_results, &matches);
+  for (PlaceMatch& match : matches) {
+    for (const std::vector<float>& of_camera : common) {
+      const auto best = mostSimilar(of_camera, match.place);
+      match.cameras.push_back(*best > 0.0F ? static_cast<int>(best - of_camera.begin()) % num_cameras_ : -1);
+    }
+  }
   return matches;
 }
 

@@ -232,23 +232,25 @@ std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
                                 const ReconstructionData& data, const LoopProgress& progress) {
   const auto num_cameras = static_cast<int>(data.rig->cameras.size());
   const auto num_keyframes = static_cast<int32_t>(data.keyframes.size());
-  PlaceIndex index(vocabulary, num_cameras);
-  std::vector<std::vector<PlaceMatch>> candidates(num_keyframes);
-  int32_t end = 0;
-  for (int32_t i = 0; i < num_keyframes; ++i) {
+  std::vector<std::vector<cv::Mat>> descriptors;
+  std::vector<int32_t> end_of(num_keyframes);  // of the keyframes that make a loop with each
+  for (int32_t i = 0, end = 0; i < num_keyframes; ++i) {
+    descriptors.push_back(descriptorsOf(data.keyframes[i]));
     while (end < i &&
            data.keyframes[i].travelled_m - data.keyframes[end].travelled_m > options.min_travel_m) {
       ++end;
     }
-    candidates[i] = index.query(descriptorsOf(data.keyframes[i]), options.max_candidates, end);
-    index.add(descriptorsOf(data.keyframes[i]));
-    progress(0.3 * i / num_keyframes);
+    end_of[i] = end;
   }
+  PlaceIndex index(vocabulary, num_cameras);
+  index.addAll(descriptors);
+  constexpr double kIndexed = 0.15;  // part of the time until here
+  progress(kIndexed);
   std::vector<std::vector<LoopEdge>> edges_of(num_keyframes);
   constexpr int32_t kBatch = 16;
   for (int32_t begin = 0; begin < num_keyframes; begin += kBatch) {
     tbb::parallel_for(begin, std::min(num_keyframes, begin + kBatch), [&](int32_t i) {
-      for (const PlaceMatch& candidate : candidates[i]) {
+      for (const PlaceMatch& candidate : index.query(descriptors[i], options.max_candidates, end_of[i])) {
         std::vector<std::pair<int, int>> pairs;
         for (int camera = 0; camera < num_cameras; ++camera) {
           if (candidate.cameras[camera] >= 0) {
@@ -258,7 +260,7 @@ std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
         edges_of[i].push_back(verifyLoop(options, data, candidate.place, i, pairs));
       }
     });
-    progress(0.3 + 0.7 * begin / num_keyframes);
+    progress(kIndexed + (1.0 - kIndexed) * begin / num_keyframes);
   }
   std::vector<LoopEdge> edges;
   for (const std::vector<LoopEdge>& of_keyframe : edges_of) {
