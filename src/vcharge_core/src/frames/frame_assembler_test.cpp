@@ -223,6 +223,29 @@ TEST_F(FrameAssemblerTest, CamerasThatAreNotUsedAreNotWaitedFor) {
   EXPECT_THROW(assembler.addImage(0, at(0.0), picture()), std::logic_error);
 }
 
+TEST_F(FrameAssemblerTest, WaitsForAnnouncedCamerasAlone) {
+  sendOdometry(0, 20);
+  assembler_.expect(at(0.08), {true, false, true});
+  send(0.08, {0});
+  EXPECT_TRUE(frames_.empty());
+  send(0.08, {2});
+  ASSERT_EQ(frames_.size(), 1u);
+  EXPECT_FALSE(frames_[0].has_image[1]);
+  // An announcement that comes after the images.
+  send(0.16, {1});
+  EXPECT_EQ(frames_.size(), 1u);
+  assembler_.expect(at(0.16), {false, true, false});
+  ASSERT_EQ(frames_.size(), 2u);
+  EXPECT_TRUE(frames_[1].has_image[1]);
+  // An announcement of a stamp that has passed is of no use, and other stamps wait for all cameras.
+  assembler_.expect(at(0.08), {true, true, true});
+  send(0.24, {0, 2});
+  EXPECT_EQ(frames_.size(), 2u);
+  send(0.24, {1});
+  EXPECT_EQ(frames_.size(), 3u);
+  EXPECT_THROW(assembler_.expect(at(0.32), {true, true}), std::logic_error);
+}
+
 TEST_F(FrameAssemblerTest, TakesPosesFromATrajectory) {
   assembler_.setTrajectory({{at(0.0), RigidTransform()}, {at(0.2), RigidTransform::planar(2.0, 0.0, 0.0)}});
   assembler_.addOdometry(odometryAt(0.1, 77.0));

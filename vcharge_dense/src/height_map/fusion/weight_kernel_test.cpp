@@ -77,6 +77,14 @@ TEST(WeightKernelTest, CountsRangesByTheLogOddsOfTheirConfidence) {
   EXPECT_EQ(weightAt(1.0), weightAt(0.99));  // finite
 }
 
+TEST(WeightKernelTest, CountsAViewByItsWeight) {
+  const RangeMap map = testing::blankView(cv::Size(64, 48));
+  RangeWeighting weighting = weightingBySigma();
+  const float once = packRangeMap(map, RigidTransform(), weighting).values[4];
+  weighting.view_weight = 3.0;
+  EXPECT_NEAR(packRangeMap(map, RigidTransform(), weighting).values[4], 3.0F * once, 1e-5);
+}
+
 TEST(WeightKernelTest, CountsRangesLessWhosePixelSpansMoreOfTheSurface) {
   // Level ground 1 m below a camera that faces the horizon: in the middle column a pixel at range r spans
   // r * r / 1 m of ground per radian.
