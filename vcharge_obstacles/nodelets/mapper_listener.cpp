@@ -38,12 +38,16 @@ MapperListener::MapperListener(ros::NodeHandle* node, const CameraRig& rig,
 
 void MapperListener::subscribeSchedule(ros::NodeHandle* node, const CameraRig& rig, uint32_t queue_size) {
   using Pointer = vcharge_msgs::ScheduledCamerasConstPtr;
+  constexpr char kTopic[] = "/dense/scheduled";
   std::vector<std::string> names;
   for (const RigCamera& camera : rig.cameras) {
     names.push_back(camera.name);
   }
-  const boost::function<void(const Pointer&)> note = [this, names](const Pointer& message) {
+  const boost::function<void(const Pointer&)> note = [this, names, kTopic](const Pointer& message) {
     guard_->run([&] {
+      if (message->header.stamp.isZero()) {
+        throw InputError(std::string(kTopic) + ": expected a stamp in the header, got 0");
+      }
       std::vector<bool> cameras;
       for (const std::string& name : names) {
         cameras.push_back(std::count(message->cameras.begin(), message->cameras.end(), name) > 0);
@@ -51,8 +55,7 @@ void MapperListener::subscribeSchedule(ros::NodeHandle* node, const CameraRig& r
       on_schedule_(toTimestamp(message->header.stamp), cameras);
     });
   };
-  subscribers_.push_back(
-      node->subscribe<vcharge_msgs::ScheduledCameras>("/dense/scheduled", queue_size, note));
+  subscribers_.push_back(node->subscribe<vcharge_msgs::ScheduledCameras>(kTopic, queue_size, note));
 }
 
 void MapperListener::subscribeObjects(ros::NodeHandle* node, uint32_t queue_size) {
