@@ -18,7 +18,7 @@ cv::Mat noise(cv::Size size, int seed) {
 struct Moments {
   double mean_a = 0.0, mean_b = 0.0, variance_a = 0.0, variance_b = 0.0, covariance = 0.0;
 
-  /// Of two images in a window that is cut off at their border, pixel by pixel.
+  /// Sums, pixel by pixel, over a window of two images that is cut off at their border.
   Moments(const cv::Mat& a, const cv::Mat& b, cv::Point middle, int half_px) {
     const cv::Rect window =
         cv::Rect(middle.x - half_px, middle.y - half_px, 2 * half_px + 1, 2 * half_px + 1) &

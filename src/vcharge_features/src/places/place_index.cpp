@@ -46,7 +46,7 @@ std::vector<PlaceMatch> PlaceIndex::query(const std::vector<cv::Mat>& descriptor
   check(descriptors_by_camera.size() == static_cast<size_t>(num_cameras_),
         "PlaceIndex: one matrix of descriptors per camera");
   const int num_candidates = std::clamp(end_place, 0, num_places_);
-  // Of each camera of the query: words in common with each image.
+  // Words in common with each image, per camera of the query.
   const size_t num_images = static_cast<size_t>(num_candidates) * static_cast<size_t>(num_cameras_);
   std::vector<std::vector<float>> common(static_cast<size_t>(num_cameras_), std::vector<float>(num_images));
   for (size_t camera = 0; camera < common.size(); ++camera) {
