@@ -79,7 +79,7 @@ class HeightMapper : public DriveConsumer {
   };
   void addTask(const RangeTask& task);
   void finishSweep();
-  void keepRangeMap(const RangeTask& task);
+  void keepRangeMap(const RangeTask& task, const std::string& to);
   RangeMap readView(const View& view) const;
   std::string folder() const;
   void checkCoverage() const;

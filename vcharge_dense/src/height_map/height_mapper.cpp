@@ -131,7 +131,7 @@ void HeightMapper::addTask(const RangeTask& task) {
     views_.push_back(view);
   } else {
     swept_ = view;
-    sweep_->run([this, task] { keepRangeMap(task); });
+    sweep_->run([this, task, to = folder()] { keepRangeMap(task, to); });
   }
 }
 
@@ -143,9 +143,9 @@ void HeightMapper::finishSweep() {
   }
 }
 
-void HeightMapper::keepRangeMap(const RangeTask& task) {
+void HeightMapper::keepRangeMap(const RangeTask& task, const std::string& to) {
   const StageTimer timer("range maps", &times_s_);
-  const std::string path = imagePath(folder(), rig_->cameras[task.camera_index].name, task.reference.stamp);
+  const std::string path = imagePath(to, rig_->cameras[task.camera_index].name, task.reference.stamp);
   createFolder(fs::path(path).parent_path().string());
   writeFileAtomically(path, [&](const std::string& temporary) {
     if (!cv::imwrite(temporary, task.reference.pixels)) {
@@ -153,8 +153,8 @@ void HeightMapper::keepRangeMap(const RangeTask& task) {
     }
   });
   RangeMap map = range_mapper_->sweep(task);
-  map.reference.release();       // already written as a separate image
-  writeRangeMap(map, folder());  // writes its YAML last, which isKept() looks for
+  map.reference.release();  // already written as a separate image
+  writeRangeMap(map, to);   // writes its YAML last, which isKept() looks for
 }
 
 RangeMap HeightMapper::readView(const View& view) const {
