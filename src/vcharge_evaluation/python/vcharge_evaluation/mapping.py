@@ -170,12 +170,12 @@ def evaluate_growth(args, results):
     """A drive through one, two, four, ... places, none of them twice, with mapping's time and memory over its length."""
     drives = [Drive(args.work, "growth", "--scene", "lot", "--drive", "loop", "--scene-seed", seed, "--seed", seed, "--image-step",
                     LOOP_STEP, "--image-scale", args.growth_scale) for seed in args.growth_seeds]
-    places = [(drive, inverted) for inverted in (False, True) for drive in drives]
+    places = [Place(drive, inverted) for inverted in (False, True) for drive in drives]
     columns, lengths, builds = [], [], []
     count = 1
     while count <= len(places):
         folder = args.work / "growth" / f"{count}_places"
-        length_m, drive_s = join([Place(*place) for place in places[:count]], folder)
+        length_m, drive_s = join(places[:count], folder)
         build = tools.build_map(folder, "map", rig=drives[0].true_rig, options=args.options)
         lengths.append(length_m)
         builds.append(build)
