@@ -10,12 +10,16 @@
 #include "vcharge_core/dense_maps/range_map_file.h"
 #include "vcharge_core/motion/trajectory.h"
 #include "vcharge_evaluation/range_evaluator.h"
+#include "vcharge_evaluation/range_gaps.h"
 #include "vcharge_evaluation/range_truth.h"
 #include "vcharge_recordings/bag_drive_source.h"
 
 namespace {
 
 using namespace vcharge;
+
+/// A drive begins at standstill: gaps count from where a camera's own motion can give ranges.
+constexpr double kFirstBaselineM = 1.0;
 
 /// Judges every range map whose image is in the bag.
 class Judge : public DriveConsumer {
@@ -28,6 +32,11 @@ class Judge : public DriveConsumer {
         total_(options) {
     for (const auto& entry : truth) {
       truth_[entry.stamp] = entry.world_from_vehicle;
+      const Eigen::Vector3d moved_m =
+          entry.world_from_vehicle.translation() - truth.front().world_from_vehicle.translation();
+      if (moved_m.norm() < kFirstBaselineM) {
+        moved_since_ = entry.stamp;
+      }
     }
     for (size_t i = 0; i < rig.cameras.size(); ++i) {
       cameras_.emplace_back(options);
@@ -60,11 +69,15 @@ class Judge : public DriveConsumer {
     for (RangeEvaluator* evaluator : {&camera.evaluator, &total_}) {
       evaluator->add(map, working_image, working_truth, camera.working->validMask(), travel);
     }
+    if (stamp >= moved_since_) {
+      camera.gaps.add(map.range_m, working_truth, camera.working->validMask());
+    }
   }
   void addOdometry(const VehicleOdometry&) override {}
 
   const RangeEvaluator& total() const { return total_; }
   const RangeEvaluator& camera(size_t index) const { return cameras_[index].evaluator; }
+  const RangeGaps& gaps(size_t index) const { return cameras_[index].gaps; }
   size_t numWithoutTruth() const { return num_without_truth_; }
 
  private:
@@ -73,6 +86,7 @@ class Judge : public DriveConsumer {
     std::set<Timestamp> stamps;
     std::optional<WorkingCamera> working;
     RangeEvaluator evaluator;
+    RangeGaps gaps;
   };
 
   /// Motion of the camera between the neighbouring true poses, in its own frame; absent below 1 cm.
@@ -96,6 +110,7 @@ class Judge : public DriveConsumer {
   std::string range_folder_;
   std::string truth_folder_;
   std::map<Timestamp, RigidTransform> truth_;
+  Timestamp moved_since_;
   std::vector<PerCamera> cameras_;
   RangeEvaluator total_;
   size_t num_without_truth_ = 0;
@@ -144,6 +159,17 @@ nlohmann::json reportErrors(const std::string& label, const RangeErrors& errors)
           {"calibration", calibrationToJson(errors.calibration)}};
 }
 
+nlohmann::json reportGaps(const RangeGapCounts& counts) {
+  std::printf(
+      "  nearer than %g m: %.1f %% known; %zu of %zu cells unknown for over %d range maps, at most %d\n",
+      RangeGaps::kNearM, 100.0 * counts.fraction_known, counts.num_gap_cells, counts.num_cells,
+      RangeGaps::kLongestGap, counts.longest_gap);
+  return {{"fraction_known", counts.fraction_known},
+          {"num_cells", counts.num_cells},
+          {"num_gap_cells", counts.num_gap_cells},
+          {"longest_gap", counts.longest_gap}};
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -162,7 +188,9 @@ fraction_within_tolerance, median_relative_error, fraction_known}] of the most c
 (m) and by_confidence [{low, high, num_judged, and of the known ranges count, fraction_within_tolerance,
 median_relative_error, fraction_within_one_sigma}]; error distribution bounded_relative_error, in which unknown ranges
 count as 0.5; calibration {expected_calibration_error, bins [{count, mean_confidence, fraction_right}]} of the
-confidence, where ranges within 10 % are right}.)");
+confidence, where ranges within 10 % are right; and for each camera near {fraction_known, num_cells, num_gap_cells,
+longest_gap} over blocks of 8 x 8 pixels nearer than 4 m, where gap cells are unknown in more than 5 range maps on end,
+counted once the vehicle has moved by 1 m.)");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (options.shown()) {
       return;
@@ -194,7 +222,9 @@ confidence, where ranges within 10 % are right}.)");
     json["sets"] = nlohmann::json::array();
     json["sets"].push_back(reportErrors("all cameras", total));
     for (const std::string& name : source_options.cameras) {
-      json["sets"].push_back(reportErrors(name, judge.camera(rig->cameraIndex(name)).errors()));
+      const size_t camera = rig->cameraIndex(name);
+      json["sets"].push_back(reportErrors(name, judge.camera(camera).errors()));
+      json["sets"].back()["near"] = reportGaps(judge.gaps(camera).counts());
     }
     *found = json;
     report.write(*found);

@@ -6,7 +6,7 @@ import yaml
 from vcharge_evaluation.drawing.moments import draw_range_map
 from vcharge_evaluation.drives import Drive, found_masks, other_day_drive
 from vcharge_evaluation.results import Figure, Results, add_arguments, calibration_figures, figure, percent
-from vcharge_evaluation.tools import NoResult, judge, run_tool_once, say
+from vcharge_evaluation.tools import CONFIG, NoResult, judge, run_tool_once, say
 
 DENSITIES = (0.4, 0.6, 0.8)
 TRUE_POSES = {
@@ -25,9 +25,9 @@ SETTINGS = {
 def arguments():
     parser = argparse.ArgumentParser(description=__doc__)
     add_arguments(parser, "range_evaluation")
-    parser.add_argument("--parts", nargs="*", default=["drive"], choices=["drive", "settings", "other_day"],
+    parser.add_argument("--parts", nargs="*", default=["drive"], choices=["drive", "settings", "other_day", "online"],
                         help="drive: four cameras on 4 s in a lot; settings: two cameras on 1.7 s each in lot and garage; "
-                        "other_day: four cameras by camera and distance")
+                        "other_day: four cameras by camera and distance; online: the same as on the car, causal, with its options")
     parser.add_argument("--drives", nargs="*", default=["lot:5", "garage:6"], help="scene:seed of the other parts' drives")
     parser.add_argument("--duration-s", type=float, default=1.7, help="duration of these drives")
     parser.add_argument("--image-scale", type=float, default=1.0, help="image size of the drives of another day over 1280x800")
@@ -57,6 +57,13 @@ class RangeErrors:
         yield from relative_errors(errors)
         yield Figure("within one standard deviation", 100 * errors["fraction_within_one_sigma"], "%")
         yield Figure("within two standard deviations", 100 * errors["fraction_within_two_sigma"], "%")
+
+    def near_figures(self, label):
+        """Ranges of what is nearer than 4 m, and how long it stays without."""
+        near = self.sets[label]["near"]
+        yield Figure("nearer than 4 m: known", 100 * near["fraction_known"], "%")
+        yield Figure("nearer than 4 m: unknown for over 5 range maps", percent(near["num_gap_cells"], near["num_cells"]), "%")
+        yield Figure("nearer than 4 m: longest gap", near["longest_gap"], "range maps")
 
     def distance_figures(self):
         """By true distance: unknown ranges count as wrong."""
@@ -98,6 +105,18 @@ def evaluate_other_day(args, results):
         results.show(draw_range_map(errors.drive.bag, errors.output, worst),
                      f"{scene}, seed {seed}, camera {worst}: mean error {100 * badness:.1f} % of the range (unknown: 50 %). Image "
                      "and ranges, red near, blue far, black unknown", badness)
+
+
+def evaluate_online(args, results):
+    """All cameras as on the car: from earlier images only, with the options of the obstacles' launch file."""
+    for drive in args.drives:
+        scene, seed = drive.split(":")
+        made = other_day_drive(args.work, scene, int(seed), args.image_scale, args.duration_s)
+        errors = RangeErrors(made, found_masks(args.work, scene), "online", "--online", "--options",
+                             CONFIG / "dense_obstacles.yaml")
+        results.add(f"On the car, image scale {args.image_scale:g}",
+                    *((f"{scene} {seed}, {label}", [*errors.figures(label), *errors.near_figures(label)])
+                      for label in errors.sets if label != "all cameras"))
 
 
 def evaluate_drive(args, results):
