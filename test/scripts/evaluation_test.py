@@ -27,7 +27,8 @@ from sensor_msgs.msg import Image
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "src" / "vcharge_evaluation" / "python"))
 from vcharge_evaluation import __main__ as evaluation_main  # noqa: E402
-from vcharge_evaluation import consistency, drives, obstacles, poses, results, spoiled_drives, tools  # noqa: E402
+from vcharge_evaluation import consistency, drives, graphs, obstacles, pose_graphs, poses, results  # noqa: E402
+from vcharge_evaluation import spoiled_drives, tools  # noqa: E402
 from vcharge_evaluation.camera_models import project  # noqa: E402
 from vcharge_evaluation.live import flame_graph, processes  # noqa: E402
 
@@ -309,6 +310,29 @@ class ArgumentsTest(FolderTest):
             self.assertFalse(work.exists())
             for word in words:
                 self.assertIn(word, errors.splitlines()[-1])
+
+
+class PoseGraphsTest(unittest.TestCase):
+    def test_false_loops_follow_the_recipe(self):
+        with tempfile.TemporaryDirectory() as folder:
+            folder = pathlib.Path(folder)
+            ring = graphs.made_graphs(folder, 1)["ring"]
+            base = ring.read_text().splitlines()
+            for local in (False, True):
+                spoiled = folder / "spoiled.g2o"
+                self.assertEqual(pose_graphs.spoil(ring, spoiled, 7, 5, local, 3), 35)
+                lines = spoiled.read_text().splitlines()
+                self.assertEqual(lines[:len(base)], base)
+                edges = [line.split() for line in lines[len(base):]]
+                self.assertEqual(len(edges), 35)
+                for group in range(7):
+                    of_group = edges[5 * group:5 * group + 5]
+                    steps = {int(edge[2]) - int(edge[1]) for edge in of_group}
+                    self.assertEqual(len(steps), 1)
+                    self.assertTrue(2 <= steps.pop() <= (20 if local else 433))
+                    self.assertEqual(len({tuple(edge[3:]) for edge in of_group}), 1)
+                pose_graphs.spoil(ring, folder / "again.g2o", 7, 5, local, 3)
+                self.assertEqual((folder / "again.g2o").read_text(), spoiled.read_text())
 
 
 if __name__ == "__main__":

@@ -98,14 +98,16 @@ std::string colourOf(MotionHypothesis motion) {
 }
 
 std::string colourOfReason(const std::string& reason) {
-  static const std::map<std::string, std::string> colours = {{"", "#2c8c4a"},
-                                                             {"contradicts the other edges", "#b3261e"},
-                                                             {"contradicts the adjusted map", "#7a1020"},
-                                                             {"matches and landmarks disagree", "#e0701e"},
-                                                             {"too uncertain", "#a05fc0"},
-                                                             {"too few landmarks agree", "#8aa8d0"},
-                                                             {"no motion explains enough matches", "#c4c4c4"},
-                                                             {"too few matches", "#c4c4c4"}};
+  static const std::map<std::string, std::string> colours = {
+      {"", "#2c8c4a"},
+      {"contradicts the other edges", "#b3261e"},
+      {"contradicts the adjusted map", "#7a1020"},
+      {"neither confirmed nor contradicted", "#d0a020"},
+      {"matches and landmarks disagree", "#e0701e"},
+      {"too uncertain", "#a05fc0"},
+      {"too few landmarks agree", "#8aa8d0"},
+      {"no motion explains enough matches", "#c4c4c4"},
+      {"too few matches", "#c4c4c4"}};
   const auto found = colours.find(reason);
   return found == colours.end() ? "#202020" : found->second;
 }

@@ -6,6 +6,7 @@ STAGES = {
     "masks": "masks",
     "calibration": "calibration",
     "mapping": "mapping",
+    "pose_graphs": "pose_graphs",
     "localization": "localization",
     "ranges": "ranges",
     "height_map": "height_map",

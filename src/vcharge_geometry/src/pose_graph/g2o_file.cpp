@@ -1,4 +1,4 @@
-#include "pose_graph/g2o_file.h"
+#include "vcharge_geometry/pose_graph/g2o_file.h"
 
 #include <cmath>
 #include <sstream>

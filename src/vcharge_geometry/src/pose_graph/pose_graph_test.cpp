@@ -11,8 +11,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pose_graph/g2o_file.h"
 #include "vcharge_core/base/error.h"
+#include "vcharge_geometry/pose_graph/g2o_file.h"
 #include "vcharge_geometry/pose_graph/pose_graph_optimizer.h"
 
 namespace vcharge {

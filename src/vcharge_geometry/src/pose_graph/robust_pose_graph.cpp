@@ -1,183 +1,152 @@
 #include "vcharge_geometry/pose_graph/robust_pose_graph.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
-#include <iterator>
+#include <optional>
 #include <utility>
 
+#include "pose_graph/loop_gate.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_geometry/pose_graph/pose_graph_optimizer.h"
 
 namespace vcharge {
 namespace {
 
-/// Maximum number of odometry steps, at either end, between two loop edges that are compared.
-constexpr int64_t kMaxCycleSteps = 5;
-/// A loop edge above this is false if the information matrices are right.
-constexpr double kMaxEdgeChiSquared = 16.0;
-/// Where the information matrices understate the accuracy of edges, the threshold is this many times the
-/// noise that consistent loop edges show per degree of freedom.
-constexpr double kNoiseFactor = 1600.0;
+constexpr int kMaxIterations = 50;
+constexpr int kMaxRounds = 10;
+/// The gate repeats while the optimum shows more noise than the gate assumed.
+constexpr double kMaxScaleRatio = 1.1;
+/// Real errors have longer tails than normal ones: how much larger than a normal one the error of a single
+/// loop may be in a group that is accepted.
+constexpr double kTailFactor = 12.0;
 
-bool isOdometry(const PoseGraphEdge& edge) {
-  return std::abs(edge.first - edge.second) == 1;
-}
-
-/// Two loop edges whose ends are close to each other along the odometry, and the error of the cycle that they
-/// form, in units of the first edge's information, per edge of the cycle.
-struct LoopPair {
-  size_t first;
-  size_t second;
-  double chi_squared_per_edge;
-};
-
-/// The graph without loop edges, with nodes placed along the odometry.
-PoseGraph odometryOf(const PoseGraph& graph) {
-  PoseGraph odometry = graph;
-  odometry.edges.clear();
-  std::copy_if(graph.edges.begin(), graph.edges.end(), std::back_inserter(odometry.edges), isOdometry);
-  if (!placeNodesAlongEdges(&odometry)) {
-    throw InputError("pose graph: edges between consecutive nodes do not connect all nodes");
-  }
-  return odometry;
-}
-
-/// All pairs of loop edges whose cycles have few odometry steps. Loop edges are indices into graph.edges.
-std::vector<LoopPair> nearbyPairs(const PoseGraph& graph, const PoseGraph& odometry,
-                                  const std::vector<size_t>& loops, int64_t max_steps) {
-  // Sorted by the lower node, so that only neighbours need to be compared.
-  struct Oriented {
-    int64_t low;
-    int64_t high;
-    RigidTransform low_from_high;
-    size_t edge;
-  };
-  std::vector<Oriented> oriented;
-  for (const size_t i : loops) {
-    const PoseGraphEdge& edge = graph.edges[i];
-    const bool forward = edge.first < edge.second;
-    oriented.push_back({std::min(edge.first, edge.second), std::max(edge.first, edge.second),
-                        forward ? edge.first_from_second : edge.first_from_second.inverse(), i});
-  }
-  std::stable_sort(oriented.begin(), oriented.end(),
-                   [](const Oriented& a, const Oriented& b) { return a.low < b.low; });
-  const auto between = [&odometry](int64_t target, int64_t source) {
-    return odometry.map_from_node.at(target).inverse() * odometry.map_from_node.at(source);
-  };
-  std::vector<LoopPair> pairs;
-  for (size_t i = 0; i < oriented.size(); ++i) {
-    const Oriented& a = oriented[i];
-    for (size_t j = i + 1; j < oriented.size() && oriented[j].low - a.low <= max_steps; ++j) {
-      const Oriented& b = oriented[j];
-      if (std::abs(b.high - a.high) > max_steps) {
-        continue;
-      }
-      PoseGraph two;
-      two.planar = graph.planar;
-      two.map_from_node[0] = RigidTransform();
-      two.map_from_node[1] = between(a.low, b.low) * b.low_from_high * between(b.high, a.high);
-      PoseGraphEdge edge = graph.edges[a.edge];
-      edge.first = 0;
-      edge.second = 1;
-      edge.first_from_second = a.low_from_high;
-      const auto num_edges = static_cast<double>(2 + (b.low - a.low) + std::abs(b.high - a.high));
-      pairs.push_back({a.edge, b.edge, chiSquared(two, edge) / num_edges});
-    }
-  }
-  return pairs;
-}
-
-/// Weights: 1 for odometry, Cauchy's for the loop edges in `members`, 0 for the others.
-std::vector<double> cauchyWeights(const PoseGraph& graph, const std::vector<bool>& members,
-                                  double c_squared) {
-  std::vector<double> weights(graph.edges.size(), 0.0);
-  for (size_t i = 0; i < weights.size(); ++i) {
-    if (isOdometry(graph.edges[i])) {
-      weights[i] = 1.0;
-    } else if (members[i]) {
-      weights[i] = c_squared / (c_squared + chiSquared(graph, graph.edges[i]));
+/// Weights of all edges: 1, or 0 for loops of groups that aren't accepted.
+std::vector<double> weightsOf(const PoseGraph& graph, const std::vector<GatedGroup>& groups) {
+  std::vector<double> weights(graph.edges.size(), 1.0);
+  for (const GatedGroup& group : groups) {
+    for (const size_t i : group.loops) {
+      weights[i] = group.verdict == LoopVerdict::kAccepted ? 1.0 : 0.0;
     }
   }
   return weights;
 }
 
-/// Optimizes with Cauchy weights while c^2 falls from the largest error to a tenth of the threshold.
-void expectationMaximization(const std::vector<bool>& members, const std::vector<size_t>& loops,
-                             double threshold, PoseGraph* graph) {
-  constexpr int kSteps = 10;
-  double c_squared = threshold;
-  for (const size_t i : loops) {
-    c_squared = std::max(c_squared, members[i] ? chiSquared(*graph, graph->edges[i]) : 0.0);
+/// Squared error per degree of freedom, where a single edge counts for no more than a maximum. Steps
+/// determine the nodes, so that only loops add degrees of freedom.
+double noiseScaleOf(const PoseGraph& graph, const std::vector<double>& weights, size_t num_steps,
+                    double max_chi_squared) {
+  double sum = 0.0;
+  size_t num_edges = 0;
+  for (size_t i = 0; i < weights.size(); ++i) {
+    if (weights[i] > 0.0) {
+      sum += std::min(max_chi_squared, chiSquared(graph, graph.edges[i]));
+      ++num_edges;
+    }
   }
-  for (; c_squared > 0.1 * threshold; c_squared *= 0.25) {
-    optimizePoseGraph(cauchyWeights(*graph, members, c_squared), kSteps, graph);
+  const double dimensions = graph.planar ? 3.0 : 6.0;
+  return sum / (dimensions * static_cast<double>(std::max<size_t>(1, num_edges - num_steps)));
+}
+
+/// Whether any edge of weight 1 has a larger squared error.
+bool isAnyBeyond(const PoseGraph& graph, const std::vector<double>& weights, double max_chi_squared) {
+  for (size_t i = 0; i < weights.size(); ++i) {
+    if (weights[i] > 0.0 && !(chiSquared(graph, graph.edges[i]) < max_chi_squared)) {
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Least squares without single loops that are rather false than true at the optimum. Returns the sum of the
+/// squared errors.
+double optimizeWithoutFalse(const LoopGate& gate, std::vector<double>* weights, PoseGraph* graph) {
+  double sum = optimizePoseGraph(*weights, kMaxIterations, graph).final_chi_squared;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const std::vector<double> before = *weights;
+    for (const auto& [edge, agrees] : gate.agreeing(graph->map_from_node)) {
+      (*weights)[edge] = agrees ? (*weights)[edge] : 0.0;
+    }
+    if (*weights == before) {
+      break;
+    }
+    sum = optimizePoseGraph(*weights, kMaxIterations, graph).final_chi_squared;
+  }
+  return sum;
+}
+
+/// Adds all groups for whose prediction the odometry is too uncertain, if least squares finds no
+/// contradiction.
+void tryUnpredicted(const std::vector<GatedGroup>& groups, double max_chi_squared,
+                    std::vector<double>* weights, PoseGraph* graph) {
+  std::vector<double> with = *weights;
+  for (const GatedGroup& group : groups) {
+    if (group.verdict == LoopVerdict::kUndecided && !group.is_predicted) {
+      for (const size_t i : group.loops) {
+        with[i] = 1.0;
+      }
+    }
+  }
+  if (with == *weights) {
+    return;
+  }
+  PoseGraph tried = *graph;
+  optimizePoseGraph(with, kMaxIterations, &tried);
+  if (!isAnyBeyond(tried, with, max_chi_squared)) {
+    *weights = std::move(with);
+    *graph = std::move(tried);
   }
 }
 
 }  // namespace
 
-RobustPoseGraphSummary optimizeRobustly(PoseGraph* graph) {
-  constexpr int kSteps = 10;
-  constexpr int kMaxRounds = 15;
-  constexpr double kWidening = 2.0;
-  const size_t num_edges = graph->edges.size();
-  const double dimensions = graph->planar ? 3.0 : 6.0;
+RobustPoseGraphSummary optimizeRobustly(InformationQuality quality, PoseGraph* graph) {
+  std::vector<size_t> odometry;
   std::vector<size_t> loops;
-  for (size_t i = 0; i < num_edges; ++i) {
-    if (!isOdometry(graph->edges[i])) {
-      loops.push_back(i);
-    }
+  for (size_t i = 0; i < graph->edges.size(); ++i) {
+    (std::abs(graph->edges[i].first - graph->edges[i].second) == 1 ? odometry : loops).push_back(i);
   }
-  const PoseGraph odometry = odometryOf(*graph);
-  const std::vector<LoopPair> pairs = nearbyPairs(*graph, odometry, loops, kMaxCycleSteps);
   RobustPoseGraphSummary summary;
-  if (!pairs.empty()) {
-    std::vector<double> errors;
-    for (const LoopPair& pair : pairs) {
-      errors.push_back(pair.chi_squared_per_edge);
+  if (loops.empty()) {
+    if (!placeNodesAlongEdges(graph)) {
+      throw InputError("pose graph: edges between consecutive nodes do not connect all nodes");
     }
-    // The lower quartile is robust if up to three quarters of the pairs contain a false edge.
-    std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 4),
-                     errors.end());
-    summary.noise_scale = std::min(1.0, errors[errors.size() / 4] / dimensions);
+    summary.accepted.assign(graph->edges.size(), true);
+    summary.undecided.assign(graph->edges.size(), false);
+    return summary;
   }
-  // Pairs are consistent within 12 standard deviations of the noise, a wide bound since the error of the
-  // odometry between their ends is neglected.
-  const double max_pair_error = std::min(1.0, 50.0 * summary.noise_scale) * dimensions * 3.0;
-  std::vector<bool> members(num_edges, pairs.empty());
-  for (const LoopPair& pair : pairs) {
-    if (pair.chi_squared_per_edge < max_pair_error) {
-      members[pair.first] = members[pair.second] = true;
-    }
+  std::optional<double> noise_scale;
+  if (quality == InformationQuality::kRight) {
+    noise_scale = 1.0;
   }
-  const double threshold = std::min(kMaxEdgeChiSquared, kNoiseFactor * summary.noise_scale);
-  optimizePoseGraph({}, 5 * kSteps, graph);
-  const bool contradiction = std::any_of(loops.begin(), loops.end(), [&](size_t i) {
-    return !(chiSquared(*graph, graph->edges[i]) < kWidening * threshold);
-  });
-  if (contradiction) {
-    graph->map_from_node = odometry.map_from_node;
-    expectationMaximization(members, loops, threshold, graph);
-  }
-  std::vector<double> weights(num_edges, 0.0);
-  // Starts with a wide threshold: a missing true edge may keep others beyond it.
-  double widening = kWidening;
+  std::optional<LoopGate> gate;
+  std::vector<double> weights;
   for (int round = 0; round < kMaxRounds; ++round) {
-    std::vector<double> next(num_edges, 1.0);
-    for (const size_t i : loops) {
-      next[i] = chiSquared(*graph, graph->edges[i]) < widening * threshold ? 1.0 : 0.0;
-    }
-    if (widening == 1.0 && next == weights) {
+    gate.emplace(*graph, odometry, loops, noise_scale);
+    gate->decide();
+    graph->map_from_node = gate->placed();
+    do {
+      weights = weightsOf(*graph, gate->groups());
+      summary.final_chi_squared = optimizeWithoutFalse(*gate, &weights, graph);
+    } while (gate->hearAgain(graph->map_from_node));
+    noise_scale = noiseScaleOf(*graph, weights, odometry.size(),
+                               maxConsistentChiSquared(graph->planar) * gate->noiseScale());
+    if (*noise_scale < kMaxScaleRatio * gate->noiseScale()) {
       break;
     }
-    weights = std::move(next);
-    summary.final_chi_squared = optimizePoseGraph(weights, 5 * kSteps, graph).final_chi_squared;
-    widening = std::max(1.0, 0.5 * widening);
   }
+  summary.noise_scale = gate->noiseScale();
+  const double max_chi_squared = kTailFactor * maxConsistentChiSquared(graph->planar) * gate->noiseScale();
+  tryUnpredicted(gate->groups(), max_chi_squared, &weights, graph);
+  summary.final_chi_squared = optimizeWithoutFalse(*gate, &weights, graph);
   for (const double weight : weights) {
     summary.accepted.push_back(weight > 0.0);
     summary.num_rejected += weight > 0.0 ? 0 : 1;
+  }
+  summary.undecided.assign(graph->edges.size(), false);
+  for (const GatedGroup& group : gate->groups()) {
+    for (const size_t i : group.loops) {
+      summary.undecided[i] = group.verdict == LoopVerdict::kUndecided && !summary.accepted[i];
+    }
   }
   return summary;
 }

@@ -6,8 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "pose_graph/g2o_file.h"
 #include "vcharge_core/base/error.h"
+#include "vcharge_geometry/pose_graph/g2o_file.h"
 
 namespace vcharge {
 namespace {
@@ -27,7 +27,7 @@ TEST_P(FalseLoopsTest, AreRejectedAndTheOptimumIsReached) {
     GTEST_SKIP() << "VCHARGE_DATA is not set";
   }
   PoseGraph graph = readG2o(std::string(data) + "/pose_graphs/" + GetParam().name + ".g2o");
-  const RobustPoseGraphSummary summary = optimizeRobustly(&graph);
+  const RobustPoseGraphSummary summary = optimizeRobustly(InformationQuality::kUpToOneScale, &graph);
   const size_t num_true = graph.edges.size() - GetParam().num_false;
   size_t num_true_kept = 0;
   double chi_squared = 0.0;
@@ -62,7 +62,7 @@ TEST(RobustPoseGraphTest, NeedsConnectedOdometry) {
   edge.information.setIdentity();
   graph.edges.push_back(edge);
   ASSERT_TRUE(placeNodesAlongEdges(&graph));
-  EXPECT_THROW(optimizeRobustly(&graph), InputError);
+  EXPECT_THROW(optimizeRobustly(InformationQuality::kUpToOneScale, &graph), InputError);
 }
 
 }  // namespace

@@ -55,8 +55,8 @@ std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
 LoopEdge verifyLoop(const LoopClosureOptions& options, const ReconstructionData& data, int32_t first,
                     int32_t second, const std::vector<std::pair<int, int>>& camera_pairs);
 
-/// Robust pose graph over all keyframes (Lee et al., IROS 2013): moves the keyframes, and sets which verified
-/// edges were accepted.
+/// Pose graph over all keyframes, which rejects false edges, alone or in groups (optimizeRobustly()): moves
+/// the keyframes, and sets which verified edges were accepted.
 void closeLoops(std::vector<LoopEdge>* edges, ReconstructionData* data);
 
 /// Rejects accepted edges that contradict the adjusted keyframes, which depend on thousands of landmarks.

@@ -294,13 +294,14 @@ void closeLoops(std::vector<LoopEdge>* edges, ReconstructionData* data) {
   if (loops.empty()) {
     return;
   }
-  const RobustPoseGraphSummary summary = optimizeRobustly(&graph);
+  const RobustPoseGraphSummary summary = optimizeRobustly(InformationQuality::kRight, &graph);
   const size_t num_steps = data->keyframes.size() - 1;
   for (size_t i = 0; i < loops.size(); ++i) {
     LoopEdge& edge = (*edges)[loops[i]];
     edge.accepted = summary.accepted[num_steps + i];
     if (!edge.accepted) {
-      edge.reason = "contradicts the other edges";
+      edge.reason = summary.undecided[num_steps + i] ? "neither confirmed nor contradicted"
+                                                     : "contradicts the other edges";
     }
   }
   for (size_t i = 0; i < data->keyframes.size(); ++i) {
