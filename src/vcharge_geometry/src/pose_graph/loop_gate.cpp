@@ -245,7 +245,7 @@ bool LoopGate::isOfOtherPlace(const GatedGroup& a, const GatedGroup& b) const {
 }
 
 LoopGate::Alliance LoopGate::supportersOf(size_t hypothesis, const std::vector<size_t>& undecided,
-                                          const std::vector<double>& alone) const {
+                                          const std::vector<Test>& alone) const {
   const double max_weight = kSupportSteps * step_weight_;
   const GatedGroup& group = groups_[undecided[hypothesis]];
   const auto middleOf = [this](const GatedGroup& of) { return loops_[of.loops[of.loops.size() / 2]]; };
@@ -270,12 +270,12 @@ LoopGate::Alliance LoopGate::supportersOf(size_t hypothesis, const std::vector<s
   }
   std::vector<std::pair<size_t, double>> gains;
   for (const auto& [j, test] : tested) {
-    const double gain = test.log_evidence - std::max(0.0, alone[j]);
-    if (test.is_sharp && gain > 0.0) {
+    const double gain = test.log_evidence - std::max(0.0, alone[j].log_evidence);
+    if (test.is_sharp && test.weight < alone[j].weight && gain > 0.0) {
       gains.emplace_back(undecided[j], gain);
     }
   }
-  Alliance alliance{alone[hypothesis] - minLogEvidence(group), {undecided[hypothesis]}};
+  Alliance alliance{alone[hypothesis].log_evidence - minLogEvidence(group), {undecided[hypothesis]}};
   const double by_chance = logChoices(tested.size(), gains.size()) / static_cast<double>(gains.size());
   for (const auto& [other, gain] : gains) {
     const GatedGroup& supporter = groups_[other];
@@ -290,15 +290,15 @@ LoopGate::Alliance LoopGate::supportersOf(size_t hypothesis, const std::vector<s
 
 bool LoopGate::decideTogether() {
   const std::vector<size_t> undecided = undecidedGroups();
-  std::vector<double> alone;  // evidence of each
+  std::vector<Test> alone;
   for (const std::optional<Test>& tested : testAll(undecided, kInfinity)) {
-    alone.push_back(tested && tested->is_sharp ? tested->log_evidence : 0.0);
+    alone.push_back(tested && tested->is_sharp ? *tested : Test{kInfinity, 0.0, false});
   }
   // The most likely ones suffice as hypotheses: what they confirm makes others likely.
   std::vector<size_t> hypotheses(undecided.size());
   std::iota(hypotheses.begin(), hypotheses.end(), size_t{0});
   std::stable_sort(hypotheses.begin(), hypotheses.end(),
-                   [&](size_t a, size_t b) { return alone[a] > alone[b]; });
+                   [&](size_t a, size_t b) { return alone[a].log_evidence > alone[b].log_evidence; });
   hypotheses.resize(std::min(hypotheses.size(), kMaxHypotheses));
   std::vector<Alliance> alliances(hypotheses.size());
   tbb::parallel_for(size_t{0}, hypotheses.size(),
@@ -309,13 +309,10 @@ bool LoopGate::decideTogether() {
       best = &alliance;
     }
   }
-  if (best == nullptr) {
-    return false;
-  }
-  for (const size_t i : best->groups) {
+  for (const size_t i : best != nullptr ? best->groups : std::vector<size_t>()) {
     accept(&groups_[i]);
   }
-  return true;
+  return best != nullptr;
 }
 
 void LoopGate::decide() {
@@ -329,6 +326,14 @@ void LoopGate::decide() {
   }
 }
 
+double LoopGate::priorOddsOfFalse() const {
+  const auto num_accepted = std::count_if(groups_.begin(), groups_.end(), [](const GatedGroup& group) {
+    return group.verdict == LoopVerdict::kAccepted;
+  });
+  const auto num_others = static_cast<std::ptrdiff_t>(groups_.size()) - num_accepted;
+  return static_cast<double>(num_others + 1) / static_cast<double>(num_accepted + 1);
+}
+
 bool LoopGate::hearAgain(const std::map<int64_t, RigidTransform>& map_from_node) {
   std::vector<size_t> heard;
   for (size_t i = 0; i < groups_.size(); ++i) {
@@ -336,7 +341,7 @@ bool LoopGate::hearAgain(const std::map<int64_t, RigidTransform>& map_from_node)
       heard.push_back(i);
     }
   }
-  const double needed = std::log(static_cast<double>(heard.size()) / kChanceAgain);
+  const double needed = std::log(static_cast<double>(heard.size()) / kChanceAgain * priorOddsOfFalse());
   std::vector<char> agrees(heard.size(), 0);
   tbb::parallel_for(size_t{0}, heard.size(), [&](size_t k) {
     const std::vector<size_t> members = membersThatStandFor(groups_[heard[k]]);
@@ -359,13 +364,7 @@ bool LoopGate::hearAgain(const std::map<int64_t, RigidTransform>& map_from_node)
 }
 
 std::map<size_t, bool> LoopGate::agreeing(const std::map<int64_t, RigidTransform>& map_from_node) const {
-  const auto num_accepted =
-      static_cast<double>(std::count_if(groups_.begin(), groups_.end(), [](const GatedGroup& group) {
-        return group.verdict == LoopVerdict::kAccepted;
-      }));
-  const double num_rejected = static_cast<double>(groups_.size()) - num_accepted;
-  // Where all groups are true, a single loop hardly is false.
-  const double needed = std::log(kKeptOdds * (num_rejected + 1.0) / (num_accepted + 1.0));
+  const double needed = std::log(kKeptOdds * priorOddsOfFalse());
   std::map<size_t, bool> agreeing;
   for (size_t i = 0; i < loops_.size(); ++i) {
     const OrderedLoop& loop = loops_[i];

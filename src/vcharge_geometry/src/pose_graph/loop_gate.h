@@ -75,12 +75,14 @@ class LoopGate {
   Test compare(const OrderedLoop& loop, const Path& predicted) const;
   bool confirms(const Test& test, const GatedGroup& group) const;
   double minLogEvidence(const GatedGroup& group) const;
+  /// Groups that aren't accepted over those that are: where nearly all are true, another hardly is false.
+  double priorOddsOfFalse() const;
   std::vector<size_t> undecidedGroups() const;
   bool isOfOtherPlace(const GatedGroup& a, const GatedGroup& b) const;
   bool decideAlone(double max_weight);
   bool decideTogether();
   Alliance supportersOf(size_t hypothesis, const std::vector<size_t>& undecided,
-                        const std::vector<double>& alone) const;
+                        const std::vector<Test>& alone) const;
   void accept(GatedGroup* group);
 
   bool planar_;

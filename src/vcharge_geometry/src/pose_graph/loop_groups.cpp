@@ -12,6 +12,11 @@ constexpr size_t kMaxSteps = 5;
 /// Simulated edges can be exact.
 constexpr double kMinNoiseScale = 1e-9;
 
+/// One in a hundred pairs of true loops is beyond; others join them.
+double maxPairChiSquared(bool planar) {
+  return planar ? 11.3 : 16.8;
+}
+
 struct Pair {
   size_t first;
   size_t second;
@@ -85,7 +90,7 @@ LoopGroups groupLoops(const std::vector<OrderedLoop>& loops, const std::vector<R
     return i;
   };
   for (const Pair& pair : pairs) {
-    if (pair.chi_squared < result.noise_scale * maxConsistentChiSquared(planar)) {
+    if (pair.chi_squared < result.noise_scale * maxPairChiSquared(planar)) {
       const size_t a = rootOf(pair.first);
       const size_t b = rootOf(pair.second);
       parent[std::max(a, b)] = std::min(a, b);
