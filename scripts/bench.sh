@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Measures performance: builds, runs the benchmarks, prints ratios as a table and writes all times as JSON.
 #   bench.sh [--json BENCH.json] [--repetitions N] [--quick] [BENCHMARK...]
-# A ratio compares two measurements of the same run (with a plain reference, OpenGV, OpenCV, Ceres, one core), so that it is valid on
-# a busy machine too. --quick leaves out benchmarks that take more than a minute.
+# A ratio compares two measurements of the same run (with a plain reference, OpenGV, OpenCV, Ceres, one core), so that it is
+# valid on a busy machine too. --quick leaves out benchmarks that take more than a minute.
 #   bench.sh --compare A.json B.json     which benchmarks became slower beyond noise
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."

@@ -46,6 +46,12 @@ double median(std::vector<double> values) {
   return *middle;
 }
 
+/// What an edge measures, from its lower to its higher node.
+RelativePose upward(const PoseGraphEdge& edge, bool planar) {
+  const RelativePose measured = measuredBy(edge, planar);
+  return edge.first < edge.second ? measured : inverseOf(measured);
+}
+
 }  // namespace
 
 LoopGate::LoopGate(const PoseGraph& graph, const std::vector<size_t>& odometry,
@@ -59,8 +65,7 @@ LoopGate::LoopGate(const PoseGraph& graph, const std::vector<size_t>& odometry,
   std::vector<std::optional<RelativePose>> found(nodes_.size());
   for (const size_t i : odometry) {
     const PoseGraphEdge& edge = graph.edges[i];
-    const RelativePose step = measuredBy(edge, planar_, 1.0);
-    found[index_of.at(std::min(edge.first, edge.second))] = edge.first < edge.second ? step : inverseOf(step);
+    found[index_of.at(std::min(edge.first, edge.second))] = upward(edge, planar_);
   }
   std::vector<RelativePose> steps;
   map_from_node_.resize(1);
@@ -75,11 +80,8 @@ LoopGate::LoopGate(const PoseGraph& graph, const std::vector<size_t>& odometry,
   }
   for (const size_t i : loops) {
     const PoseGraphEdge& edge = graph.edges[i];
-    const RelativePose measured = measuredBy(edge, planar_, 1.0);
-    const bool forward = edge.first < edge.second;
     loops_.push_back({index_of.at(std::min(edge.first, edge.second)),
-                      index_of.at(std::max(edge.first, edge.second)),
-                      forward ? measured : inverseOf(measured)});
+                      index_of.at(std::max(edge.first, edge.second)), upward(edge, planar_)});
   }
   LoopGroups grouped = groupLoops(loops_, steps, planar_, noise_scale);
   noise_scale_ = grouped.noise_scale;

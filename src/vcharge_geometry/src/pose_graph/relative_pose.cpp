@@ -43,7 +43,7 @@ double logDeterminant(const Eigen::LLT<Eigen::MatrixXd>& factor) {
 
 }  // namespace
 
-RelativePose measuredBy(const PoseGraphEdge& edge, bool planar, double noise_scale) {
+RelativePose measuredBy(const PoseGraphEdge& edge, bool planar) {
   constexpr double kMinInformation = 1e-6;
   const Eigen::MatrixXd information = usedPart(edge.information, planar);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
@@ -55,7 +55,7 @@ RelativePose measuredBy(const PoseGraphEdge& edge, bool planar, double noise_sca
   if (planar) {
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) {
-        pose.covariance(kPlanarRows[i], kPlanarRows[j]) = noise_scale * covariance(i, j);
+        pose.covariance(kPlanarRows[i], kPlanarRows[j]) = covariance(i, j);
       }
     }
     return pose;
@@ -63,7 +63,7 @@ RelativePose measuredBy(const PoseGraphEdge& edge, bool planar, double noise_sca
   // The vector part of a quaternion is half an angle.
   Vector6d scale;
   scale << 1.0, 1.0, 1.0, 2.0, 2.0, 2.0;
-  pose.covariance = noise_scale * scale.asDiagonal() * covariance * scale.asDiagonal();
+  pose.covariance = scale.asDiagonal() * covariance * scale.asDiagonal();
   return pose;
 }
 

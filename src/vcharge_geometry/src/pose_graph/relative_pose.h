@@ -16,9 +16,8 @@ struct RelativePose {
   Matrix6d covariance = Matrix6d::Zero();
 };
 
-/// What an edge measures, its covariance multiplied by `noise_scale`. Directions without information have a
-/// deviation of 1 km or radian.
-RelativePose measuredBy(const PoseGraphEdge& edge, bool planar, double noise_scale);
+/// What an edge measures. Directions without information have a deviation of 1000 m or rad.
+RelativePose measuredBy(const PoseGraphEdge& edge, bool planar);
 
 RelativePose operator*(const RelativePose& first, const RelativePose& second);
 RelativePose inverseOf(const RelativePose& pose);

@@ -16,8 +16,8 @@ constexpr int kMaxIterations = 50;
 constexpr int kMaxRounds = 10;
 /// The gate repeats while the optimum shows more noise than the gate assumed.
 constexpr double kMaxScaleRatio = 1.1;
-/// Real errors have longer tails than normal ones: how much larger than a normal one the error of a single
-/// loop may be in a group that is accepted.
+/// Real errors have longer tails than normal ones: how much larger than the largest normal one an error may
+/// be where loops are tried that the gate could not predict.
 constexpr double kTailFactor = 12.0;
 
 /// Weights of all edges: 1, or 0 for loops of groups that aren't accepted.
