@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <stdexcept>
 #include <tuple>
@@ -29,11 +30,19 @@ bool isBelow(int32_t index, size_t count) {
 void checkContents(const SparseMapContents& contents) {
   require(!contents.rig.cameras.empty() && contents.rig.hasExtrinsics(), "rig",
           "expected cameras with vehicle_from_camera");
+  for (size_t i = 0; i < contents.sessions.size(); ++i) {
+    require(contents.sessions[i].component >= 0, numbered("sessions", i), "expected a component from 0");
+  }
   for (size_t i = 0; i < contents.keyframes.size(); ++i) {
-    require(contents.keyframes[i].covariance.allFinite(), numbered("keyframes", i),
-            "expected a finite covariance");
-    require(i == 0 || contents.keyframes[i - 1].stamp < contents.keyframes[i].stamp, numbered("keyframes", i),
-            "expected increasing stamps");
+    const MapKeyframe& keyframe = contents.keyframes[i];
+    require(keyframe.covariance.allFinite(), numbered("keyframes", i), "expected a finite covariance");
+    require(isBelow(keyframe.session, contents.sessions.size()), numbered("keyframes", i),
+            "expected the index of a session");
+    if (i > 0) {
+      const MapKeyframe& previous = contents.keyframes[i - 1];
+      require(std::tie(previous.session, previous.stamp) < std::tie(keyframe.session, keyframe.stamp),
+              numbered("keyframes", i), "expected sessions in order and increasing stamps");
+    }
   }
   std::vector<bool> is_seen(contents.landmarks.size(), false);
   for (size_t i = 0; i < contents.observations.size(); ++i) {
@@ -48,6 +57,8 @@ void checkContents(const SparseMapContents& contents) {
   for (size_t i = 0; i < contents.landmarks.size(); ++i) {
     require(contents.landmarks[i].position_m.allFinite() && contents.landmarks[i].covariance_m2.allFinite(),
             numbered("landmarks", i), "expected finite numbers");
+    require(std::isfinite(contents.landmarks[i].presence_log_odds), numbered("landmarks", i),
+            "expected finite odds");
     require(is_seen[i], numbered("landmarks", i), "expected an observation");
   }
   for (size_t i = 0; i < contents.loop_edges.size(); ++i) {
@@ -62,6 +73,20 @@ void checkContents(const SparseMapContents& contents) {
           "descriptors", "expected 8-bit or 32-bit numbers");
   require(std::isfinite(contents.odometry_distance_scale) && std::isfinite(contents.odometry_turn_scale),
           "odometry scales", "expected finite numbers");
+}
+
+/// Assigns ids to the records that have none; those with one come first.
+template <class Record>
+void assignIds(const char* member, std::vector<Record>* records, int32_t* next) {
+  for (size_t i = 0; i < records->size(); ++i) {
+    int32_t& id = (*records)[i].id;
+    if (id == kNoId) {
+      require(*next < std::numeric_limits<int32_t>::max(), numbered(member, i), "no id is left");
+      id = (*next)++;
+    }
+    require(id >= 0 && id < *next && (i == 0 || (*records)[i - 1].id < id), numbered(member, i),
+            "expected increasing ids below the next one");
+  }
 }
 
 void sortObservations(SparseMapContents* contents) {
@@ -106,10 +131,30 @@ void addMatrix(const Matrix& matrix, ContentHasher* hasher) {
   }
 }
 
+/// Sessions, ids and evidence.
+void addSessions(const SparseMapContents& contents, ContentHasher* hasher) {
+  for (const MapSession& session : contents.sessions) {
+    hasher->add(session.name);
+    hasher->add(static_cast<int64_t>(session.component));
+  }
+  for (const MapKeyframe& keyframe : contents.keyframes) {
+    hasher->add(static_cast<int64_t>(keyframe.session));
+    hasher->add(static_cast<int64_t>(keyframe.id));
+  }
+  for (const MapLandmark& landmark : contents.landmarks) {
+    hasher->add(static_cast<int64_t>(landmark.id));
+    hasher->add(landmark.presence_log_odds);
+  }
+  hasher->add(static_cast<int64_t>(contents.next_keyframe_id));
+  hasher->add(static_cast<int64_t>(contents.next_landmark_id));
+}
+
 }  // namespace
 
 SparseMap::SparseMap(SparseMapContents contents) : contents_(std::move(contents)) {
   checkContents(contents_);
+  assignIds("keyframes", &contents_.keyframes, &contents_.next_keyframe_id);
+  assignIds("landmarks", &contents_.landmarks, &contents_.next_landmark_id);
   sortObservations(&contents_);
   const size_t num_images = contents_.keyframes.size() * contents_.rig.cameras.size();
   begin_of_image_.assign(num_images + 1, 0);
@@ -141,6 +186,14 @@ std::pair<const int32_t*, const int32_t*> SparseMap::observationsOfLandmark(size
 }
 
 std::string SparseMap::contentHash() const {
+  return hash(true);
+}
+
+std::string SparseMap::contentHashWithoutSessions() const {
+  return hash(false);
+}
+
+std::string SparseMap::hash(bool with_sessions) const {
   ContentHasher hasher;
   for (const RigCamera& camera : contents_.rig.cameras) {
     hasher.add(camera.name);
@@ -178,6 +231,9 @@ std::string SparseMap::contentHash() const {
   hasher.add(contents_.feature_options);
   hasher.add(contents_.odometry_distance_scale);
   hasher.add(contents_.odometry_turn_scale);
+  if (with_sessions) {
+    addSessions(contents_, &hasher);
+  }
   return hasher.hex();
 }
 

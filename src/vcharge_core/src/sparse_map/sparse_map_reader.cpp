@@ -1,12 +1,13 @@
+#include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include <opencv2/imgcodecs.hpp>
 
@@ -23,68 +24,38 @@ using namespace map_file;
 
 constexpr int64_t kMaxDescriptorSize = 1 << 16;
 
-uint32_t bigEndian(const char* bytes, int count) {
-  uint32_t value = 0;
-  for (int i = 0; i < count; ++i) {
-    value = value << 8 | static_cast<unsigned char>(bytes[i]);
-  }
-  return value;
-}
-
-/// Checks the header before SQLite opens the file (SQLite's file format, section 1.3).
-void checkHeader(const std::string& path) {
-  if (fs::is_directory(path)) {
-    throw InputError(path + ": expected a map file, is a folder");
-  }
-  if (!fs::exists(path)) {
-    throw InputError(path + ": no such file");
-  }
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    throw InputError(path + ": cannot be read: " + std::strerror(errno));
-  }
-  constexpr int kHeaderSize = 100;
-  static const char kMagic[16] = {'S', 'Q', 'L', 'i', 't', 'e', ' ', 'f',
-                                  'o', 'r', 'm', 'a', 't', ' ', '3', 0};
-  char header[kHeaderSize] = {};
-  file.read(header, kHeaderSize);
-  const auto length = static_cast<size_t>(file.gcount());
-  if (length == 0) {
-    throw InputError(path + ": expected a map file, is empty");
-  }
-  if (std::memcmp(header, kMagic, std::min(length, sizeof(kMagic))) != 0) {
-    throw InputError(path + ": expected a map file, is no SQLite file");
-  }
-  if (length < kHeaderSize) {
-    throw InputError(path + ": the map is truncated: it ends after " + std::to_string(length) + " bytes");
-  }
-  if (bigEndian(header + 68, 4) != kApplicationId) {
-    throw InputError(path + ": expected a map file, is the SQLite file of another program");
-  }
-  const uint32_t version = bigEndian(header + 60, 4);
-  if (version != kSchemaVersion) {
-    throw InputError(path + ": the map has version " + std::to_string(version) +
-                     " of the file format, this program reads version " + std::to_string(kSchemaVersion) +
-                     (version > kSchemaVersion ? ": it was written by a newer program" : ": build it again"));
-  }
-  const uint64_t page_size = bigEndian(header + 16, 2) == 1 ? 65536 : bigEndian(header + 16, 2);
-  const uint64_t expected_size = page_size * bigEndian(header + 28, 4);
-  const uint64_t size = fs::file_size(path);
-  if (size < expected_size) {
-    throw InputError(path + ": the map is truncated: it has " + std::to_string(size) + " of " +
-                     std::to_string(expected_size) + " bytes");
-  }
-}
-
 /// Reads one file. Throws InputError and std::invalid_argument, to which the caller adds the file name.
 class Reader {
  public:
   explicit Reader(const std::string& path)
       : path_(path),
+        schema_(checkHeader(path)),
         file_size_(fs::file_size(path)),
         database_(path, path, SqliteDatabase::Access::kReadOnly) {
     checkIntegrity();
     checkTables();
+    if (hasVersions()) {
+      versions_.clear();
+      SqliteStatement select(database_, "SELECT number FROM version ORDER BY number");
+      while (select.step()) {
+        versions_.push_back(select.integer(0));
+      }
+      if (versions_.empty()) {
+        damaged("it holds no version");
+      }
+    }
+    version_ = versions_.back();
+  }
+
+  const std::vector<int64_t>& versions() const { return versions_; }
+
+  /// Selects the version that is read.
+  void select(int64_t version) {
+    if (std::find(versions_.begin(), versions_.end(), version) == versions_.end()) {
+      throw InputError(path_ + ": the map has no version " + std::to_string(version) + ", expected " +
+                       std::to_string(versions_.front()) + " to " + std::to_string(versions_.back()));
+    }
+    version_ = version;
   }
 
   SparseMapContents read(MapProvenance* provenance) {
@@ -94,8 +65,13 @@ class Reader {
     contents.odometry_turn_scale = metaNumber("odometry_turn_scale");
     const MapProvenance read_provenance = readProvenance();
     readRig(read_provenance, &contents.rig);
+    readSessions(&contents);
     readKeyframes(&contents.keyframes);
     readLandmarks(&contents.landmarks);
+    if (!hasVersions()) {  // ids count from 0
+      contents.next_keyframe_id = static_cast<int32_t>(contents.keyframes.size());
+      contents.next_landmark_id = static_cast<int32_t>(contents.landmarks.size());
+    }
     readImages(&contents);
     readLoopEdges(&contents.loop_edges);
     if (provenance != nullptr) {
@@ -104,10 +80,24 @@ class Reader {
     return contents;
   }
 
+  /// Whether the map's content is what was written. Files of the oldest schema hold a hash without sessions.
+  bool hasHash(const SparseMap& map) {
+    return meta("content_hash") == (hasVersions() ? map.contentHash() : map.contentHashWithoutSessions());
+  }
+
   std::string meta(const char* key) {
     std::string value;
-    withMeta(key, [&](const SqliteStatement& row) { value = row.text(0); });
+    withMeta(key, [&](const SqliteStatement& row) { value = row.text(1); });
     return value;
+  }
+
+  MapProvenance readProvenance() {
+    MapProvenance provenance;
+    SqliteStatement select = rows("provenance", "key, value", "");
+    while (select.step()) {
+      provenance[select.text(0)] = select.text(1);
+    }
+    return provenance;
   }
 
   [[noreturn]] void damaged(const std::string& what) const {
@@ -123,20 +113,34 @@ class Reader {
     }
   }
 
+  bool hasVersions() const { return schema_ > kOldestSchemaVersion; }
+
   /// Accepts only tables exactly as they were created: no views, no generated columns.
   void checkTables() {
-    for (const Table& table : tables()) {
+    for (const auto& [name, sql] : tablesOfSchema(schema_)) {
       SqliteStatement find(database_, "SELECT sql FROM sqlite_schema WHERE type = 'table' AND name = ?");
-      find.bind(0, std::string(table.name));
-      if (!find.step() || find.text(0) != table.sql) {
-        damaged(std::string("the table ") + table.name + " is missing or not as expected");
+      find.bind(0, name);
+      if (!find.step() || find.text(0) != sql) {
+        damaged("the table " + name + " is missing or not as expected");
       }
     }
   }
 
+  /// Selects columns of a table's rows in the version that is read. `rest`: WHERE and ORDER BY.
+  SqliteStatement rows(const std::string& table, const std::string& columns, const std::string& rest) const {
+    std::string from = table;
+    if (version_ != versions_.back()) {
+      const std::string version = std::to_string(version_);
+      from = "(SELECT " + columns + " FROM " + table + " WHERE since_version <= " + version +
+             " UNION ALL SELECT " + columns + " FROM past_" + table + " WHERE since_version <= " + version +
+             " AND until_version >= " + version + ")";
+    }
+    return SqliteStatement(database_, ("SELECT " + columns + " FROM " + from + " " + rest).c_str());
+  }
+
   template <class Function>
   void withMeta(const char* key, Function&& function) {
-    SqliteStatement select(database_, "SELECT value FROM meta WHERE key = ?");
+    SqliteStatement select = rows("meta", "key, value", "WHERE key = ?");
     select.bind(0, std::string(key));
     if (!select.step()) {
       damaged(std::string("meta: ") + key + " is missing");
@@ -146,29 +150,20 @@ class Reader {
 
   double metaNumber(const char* key) {
     double value = 0.0;
-    withMeta(key, [&](const SqliteStatement& row) { value = row.number(0); });
+    withMeta(key, [&](const SqliteStatement& row) { value = row.number(1); });
     return value;
-  }
-
-  MapProvenance readProvenance() {
-    MapProvenance provenance;
-    SqliteStatement select(database_, "SELECT key, value FROM provenance");
-    while (select.step()) {
-      provenance[select.text(0)] = select.text(1);
-    }
-    return provenance;
   }
 
   void readRig(const MapProvenance& provenance, CameraRig* rig) {
     const std::string text = meta("rig");
     std::vector<std::string> names, mask_files;
     std::vector<std::vector<uint8_t>> mask_pngs;
-    SqliteStatement select(database_, "SELECT name, mask_file, mask_png FROM camera ORDER BY id");
+    SqliteStatement select = rows("camera", "id, name, mask_file, mask_png", "ORDER BY id");
     while (select.step()) {
-      names.push_back(select.text(0));
-      mask_files.push_back(select.text(1));
-      const auto* png = static_cast<const uint8_t*>(select.blob(2));
-      mask_pngs.emplace_back(png, png + select.blobSize(2));
+      names.push_back(select.text(1));
+      mask_files.push_back(select.text(2));
+      const auto* png = static_cast<const uint8_t*>(select.blob(3));
+      mask_pngs.emplace_back(png, png + select.blobSize(3));
     }
     if (attachmentsHash(text, mask_files, mask_pngs, provenance) != meta("attachments_hash")) {
       damaged("rig, masks or provenance differ from what was written");
@@ -189,10 +184,13 @@ class Reader {
     }
   }
 
-  void checkId(const SqliteStatement& select, const char* table, size_t expected) const {
-    if (select.integer(0) != static_cast<int64_t>(expected)) {
-      damaged(std::string(table) + " " + std::to_string(expected) + " is missing");
+  /// Index of a record by its id.
+  int32_t indexOf(const std::vector<int32_t>& ids, int64_t id, const std::string& owner) const {
+    const auto found = std::lower_bound(ids.begin(), ids.end(), id);
+    if (found == ids.end() || *found != id) {
+      damaged(owner + ": there is no such id: " + std::to_string(id));
     }
+    return static_cast<int32_t>(found - ids.begin());
   }
 
   /// Reads an index or count; SparseMap checks its range.
@@ -240,25 +238,42 @@ class Reader {
     }
   }
 
-  void readKeyframes(std::vector<MapKeyframe>* keyframes) {
-    SqliteStatement select(database_,
-                           "SELECT id, stamp_ns, x_m, y_m, z_m, qx, qy, qz, qw, covariance_6x6_f64"
-                           " FROM keyframe ORDER BY id");
+  void readSessions(SparseMapContents* contents) {
+    if (!hasVersions()) {
+      return;
+    }
+    contents->next_keyframe_id = static_cast<int32_t>(metaNumber("next_keyframe_id"));
+    contents->next_landmark_id = static_cast<int32_t>(metaNumber("next_landmark_id"));
+    contents->sessions.clear();
+    SqliteStatement select = rows("session", "id, name, component", "ORDER BY id");
     while (select.step()) {
-      checkId(select, "keyframe", keyframes->size());
-      keyframes->push_back({Timestamp::fromNanoseconds(select.integer(1)),
-                            transform(select, 2, "keyframe " + std::to_string(keyframes->size())),
-                            covariance<6>(select, 9, "keyframe")});
+      contents->sessions.push_back({select.text(1), index(select, 2, "session")});
+    }
+  }
+
+  void readKeyframes(std::vector<MapKeyframe>* keyframes) {
+    const std::string poses = ", stamp_ns, x_m, y_m, z_m, qx, qy, qz, qw, covariance_6x6_f64";
+    SqliteStatement select =
+        rows("keyframe", (hasVersions() ? "id, session" : "id, 0") + poses, "ORDER BY id");
+    while (select.step()) {
+      const int32_t id = index(select, 0, "keyframe");
+      keyframes->push_back({Timestamp::fromNanoseconds(select.integer(2)),
+                            transform(select, 3, "keyframe " + std::to_string(id)),
+                            covariance<6>(select, 10, "keyframe"), index(select, 1, "keyframe"), id});
+      keyframe_ids_.push_back(id);
     }
   }
 
   void readLandmarks(std::vector<MapLandmark>* landmarks) {
-    SqliteStatement select(database_,
-                           "SELECT id, x_m, y_m, z_m, covariance_3x3_f64 FROM landmark ORDER BY id");
+    SqliteStatement select = rows("landmark",
+                                  std::string("id, x_m, y_m, z_m, covariance_3x3_f64") +
+                                      (hasVersions() ? ", presence_log_odds" : ", 0"),
+                                  "ORDER BY id");
     while (select.step()) {
-      checkId(select, "landmark", landmarks->size());
+      const int32_t id = index(select, 0, "landmark");
       landmarks->push_back({Eigen::Vector3d(select.number(1), select.number(2), select.number(3)),
-                            covariance<3>(select, 4, "landmark")});
+                            covariance<3>(select, 4, "landmark"), id, select.number(5)});
+      landmark_ids_.push_back(id);
     }
   }
 
@@ -266,12 +281,12 @@ class Reader {
   cv::Mat allocateDescriptors() {
     const std::string type = meta("descriptor_type");
     int64_t size = 0;
-    withMeta("descriptor_size", [&](const SqliteStatement& row) { size = row.integer(0); });
+    withMeta("descriptor_size", [&](const SqliteStatement& row) { size = row.integer(1); });
     if ((type != "uint8" && type != "float32") || size < 0 || size > kMaxDescriptorSize) {
       damaged("meta: descriptor_type or descriptor_size");
     }
     uint64_t num_rows = 0;
-    SqliteStatement select(database_, "SELECT num_observations FROM image");
+    SqliteStatement select = rows("image", "num_observations", "");
     while (select.step()) {
       num_rows += static_cast<uint64_t>(index(select, 0, "image"));
     }
@@ -293,25 +308,27 @@ class Reader {
     std::vector<int32_t> landmarks;
     std::vector<float> positions_px;
     size_t next = 0;
-    SqliteStatement select(database_,
-                           "SELECT keyframe, camera, num_observations, landmarks_i32, positions_px_f32,"
-                           " descriptors FROM image ORDER BY id");
+    SqliteStatement select =
+        rows("image", "id, keyframe, camera, num_observations, landmarks_i32, positions_px_f32, descriptors",
+             "ORDER BY id");
     while (select.step()) {
-      const int32_t keyframe = index(select, 0, "image");
-      const int32_t camera = index(select, 1, "image");
-      const auto count = static_cast<size_t>(index(select, 2, "image"));
+      const int32_t keyframe = indexOf(keyframe_ids_, select.integer(1), "image: keyframe");
+      const int32_t camera = index(select, 2, "image");
+      const auto count = static_cast<size_t>(index(select, 3, "image"));
       if (count > contents->observations.size() - next) {
         damaged("image: more observations than counted");
       }
       landmarks.resize(count);
       positions_px.resize(2 * count);
-      copyBlob(select, 3, count * sizeof(int32_t), "image", landmarks.data());
-      copyBlob(select, 4, 2 * count * sizeof(float), "image", positions_px.data());
-      copyBlob(select, 5, count * descriptor_bytes, "image",
+      copyBlob(select, 4, count * sizeof(int32_t), "image", landmarks.data());
+      copyBlob(select, 5, 2 * count * sizeof(float), "image", positions_px.data());
+      copyBlob(select, 6, count * descriptor_bytes, "image",
                count == 0 ? nullptr : descriptors.ptr(static_cast<int>(next)));
       for (size_t i = 0; i < count; ++i) {
-        contents->observations[next++] = {
-            keyframe, camera, landmarks[i], {positions_px[2 * i], positions_px[2 * i + 1]}};
+        contents->observations[next++] = {keyframe,
+                                          camera,
+                                          indexOf(landmark_ids_, landmarks[i], "image: landmark"),
+                                          {positions_px[2 * i], positions_px[2 * i + 1]}};
       }
     }
     if (next != contents->observations.size()) {
@@ -320,31 +337,39 @@ class Reader {
   }
 
   void readLoopEdges(std::vector<MapLoopEdge>* edges) {
-    SqliteStatement select(database_,
-                           "SELECT id, first, second, x_m, y_m, z_m, qx, qy, qz, qw, num_inliers, accepted,"
-                           " reason FROM loop_edge ORDER BY id");
+    SqliteStatement select =
+        rows("loop_edge", "id, first, second, x_m, y_m, z_m, qx, qy, qz, qw, num_inliers, accepted, reason",
+             "ORDER BY id");
     while (select.step()) {
-      checkId(select, "loop_edge", edges->size());
-      edges->push_back({index(select, 1, "loop_edge"), index(select, 2, "loop_edge"),
-                        transform(select, 3, "loop_edge " + std::to_string(edges->size())),
-                        index(select, 10, "loop_edge"), select.integer(11) != 0, select.text(12)});
+      const std::string owner = "loop_edge " + std::to_string(select.integer(0));
+      edges->push_back({indexOf(keyframe_ids_, select.integer(1), owner + ": first"),
+                        indexOf(keyframe_ids_, select.integer(2), owner + ": second"),
+                        transform(select, 3, owner), index(select, 10, "loop_edge"), select.integer(11) != 0,
+                        select.text(12)});
     }
   }
 
   const std::string path_;
+  const uint32_t schema_;
   const uint64_t file_size_;
   SqliteDatabase database_;
+  std::vector<int64_t> versions_ = {1};  // without a table of versions there is one
+  int64_t version_ = 1;
+  std::vector<int32_t> keyframe_ids_, landmark_ids_;
 };
 
 }  // namespace
 
-std::shared_ptr<const SparseMap> readSparseMap(const std::string& path, MapProvenance* provenance) {
-  checkHeader(path);
+std::shared_ptr<const SparseMap> readSparseMap(const std::string& path, MapProvenance* provenance,
+                                               std::optional<int64_t> version) {
   Reader reader(path);
+  if (version) {
+    reader.select(*version);
+  }
   try {
     MapProvenance read_provenance;
     auto map = std::make_shared<const SparseMap>(reader.read(&read_provenance));
-    if (map->contentHash() != reader.meta("content_hash")) {
+    if (!reader.hasHash(*map)) {
       reader.damaged("its content does not match the written hash");
     }
     if (provenance != nullptr) {
@@ -356,6 +381,16 @@ std::shared_ptr<const SparseMap> readSparseMap(const std::string& path, MapProve
   } catch (const cv::Exception& error) {
     reader.damaged(error.what());
   }
+}
+
+std::vector<MapVersion> readMapVersions(const std::string& path) {
+  Reader reader(path);
+  std::vector<MapVersion> versions;
+  for (const int64_t number : reader.versions()) {
+    reader.select(number);
+    versions.push_back({number, reader.meta("content_hash"), reader.readProvenance()});
+  }
+  return versions;
 }
 
 }  // namespace vcharge

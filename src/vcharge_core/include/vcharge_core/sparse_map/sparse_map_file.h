@@ -1,23 +1,64 @@
 #pragma once
 
+#include <cstdint>
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "vcharge_core/sparse_map/sparse_map.h"
 
 namespace vcharge {
 
-/// A sparse map is one SQLite file, *.vmap, which can be inspected with the sqlite3 shell: keyframes,
-/// landmarks and loop edges as rows, the observations of each image as little-endian blobs, the rig as the
-/// text of a rig.yaml, and an R*Tree of the landmarks (landmark_index, if SQLite supports it). The schema is
-/// in sparse_map_schema.h.
+// A sparse map is one SQLite file, *.vmap, which can be inspected with the sqlite3 shell: sessions,
+// keyframes, landmarks and loop edges as rows, the observations of each image as little-endian blobs, the rig
+// as the text of a rig.yaml, and an R*Tree of the landmarks (landmark_index, if SQLite supports it). The file
+// also holds earlier versions of the map: only rows that changed are stored again. The schema is in
+// sparse_map_schema.h. Every change is made in a copy that replaces the file when it is complete, so that a
+// reader goes on with the version that it opened, and a crash leaves the old file.
 
-/// Writes the file in one transaction; an older file is replaced only when the new one is complete. Throws
+/// How a version of a map was made. Not part of its content hash.
+using MapProvenance = std::map<std::string, std::string>;
+
+/// A version that a map file holds.
+struct MapVersion {
+  int64_t number = 1;  ///< versions count from 1
+  std::string content_hash;
+  MapProvenance provenance;
+};
+
+/// Writes a new file with one version; an older file is replaced only when the new one is complete. Throws
 /// InputError naming the file and the reason (no such folder, disk full, ...).
 void writeSparseMap(const SparseMap& map, const MapProvenance& provenance, const std::string& path);
 
-/// Reads a map and checks its version, size, structure, indices and hashes. Throws InputError naming the file
-/// and the reason. The content hash of the result equals that of the written map. `provenance` may be null.
-std::shared_ptr<const SparseMap> readSparseMap(const std::string& path, MapProvenance* provenance = nullptr);
+/// Reads a version of a map, the newest if none is named, and checks the file's schema, size, structure,
+/// indices and hashes. Files of schema 2 are read too. Throws InputError naming the file and the reason. The
+/// content hash of the result equals that of the written map. `provenance` may be null.
+std::shared_ptr<const SparseMap> readSparseMap(const std::string& path, MapProvenance* provenance = nullptr,
+                                               std::optional<int64_t> version = std::nullopt);
+
+/// The versions in a file, oldest first. Errors as those of readSparseMap().
+std::vector<MapVersion> readMapVersions(const std::string& path);
+
+/// Adds a version to an existing file, which keeps the newest `max_versions` ones. Returns the new version's
+/// number. The caller holds the file's MapFileLock. Throws InputError naming the file and the reason; the
+/// file is unchanged then.
+int64_t addMapVersion(const SparseMap& map, const MapProvenance& provenance, int max_versions,
+                      const std::string& path);
+
+/// The right to change a map file: held by one process at a time, from reading the old version to writing the
+/// new one. Released by the destructor, and by the system if the process is killed.
+class MapFileLock {
+ public:
+  /// InputError if the file does not exist, or another process is changing it.
+  explicit MapFileLock(const std::string& path);
+  ~MapFileLock();
+  MapFileLock(const MapFileLock&) = delete;
+  MapFileLock& operator=(const MapFileLock&) = delete;
+
+ private:
+  int descriptor_ = -1;
+};
 
 }  // namespace vcharge
