@@ -7,10 +7,11 @@
 #include <string>
 #include <vector>
 
+#include "stage_bars.h"
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/options.h"
-#include "vcharge_core/base/progress_bar.h"
+#include "vcharge_core/base/utc_time.h"
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/files/content_hash.h"
 #include "vcharge_core/files/file_io.h"
@@ -104,25 +105,6 @@ std::string listFrames(const ReconstructionState& state) {
   return text;
 }
 
-/// Shows one progress bar per stage.
-class StageBars {
- public:
-  void show(const std::string& stage, int number, int num_stages, double fraction) {
-    if (stage != shown_) {
-      bar_.reset();
-      bar_ = std::make_unique<ProgressBar>(std::to_string(number) + "/" + std::to_string(num_stages) + " " +
-                                           stage);
-      shown_ = stage;
-    }
-    bar_->update(fraction);
-  }
-  void end() { bar_.reset(); }
-
- private:
-  std::unique_ptr<ProgressBar> bar_;
-  std::string shown_;
-};
-
 void buildMap(const Arguments& arguments, const SparseMapperOptions& options, nlohmann::json* found) {
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   SparseMapper mapper(rig, options);
@@ -144,7 +126,9 @@ void buildMap(const Arguments& arguments, const SparseMapperOptions& options, nl
                   {"bag_hash", fileHash(arguments.bag)},
                   {"rig", arguments.rig},
                   {"mapper_options", option_text.str()},
-                  {"program", "build_map 0.1.0"}},
+                  {"program", "build_map 0.1.0"},
+                  {"date", utcNow()},
+                  {"change", "built"}},
                  arguments.output);
   if (!arguments.trajectory.empty()) {
     writeTrajectory(mapper.trajectory(), arguments.trajectory);

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "vcharge_core/motion/trajectory.h"
-#include "vcharge_core/sparse_map/sparse_map.h"
+#include "vcharge_core/sparse_map/sparse_map_file.h"
 
 namespace vcharge {
 

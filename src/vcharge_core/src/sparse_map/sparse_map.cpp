@@ -135,6 +135,7 @@ void addMatrix(const Matrix& matrix, ContentHasher* hasher) {
 void addSessions(const SparseMapContents& contents, ContentHasher* hasher) {
   for (const MapSession& session : contents.sessions) {
     hasher->add(session.name);
+    hasher->add(session.recording_hash);
     hasher->add(static_cast<int64_t>(session.component));
   }
   for (const MapKeyframe& keyframe : contents.keyframes) {

@@ -245,9 +245,9 @@ class Reader {
     contents->next_keyframe_id = static_cast<int32_t>(metaNumber("next_keyframe_id"));
     contents->next_landmark_id = static_cast<int32_t>(metaNumber("next_landmark_id"));
     contents->sessions.clear();
-    SqliteStatement select = rows("session", "id, name, component", "ORDER BY id");
+    SqliteStatement select = rows("session", "id, name, recording_hash, component", "ORDER BY id");
     while (select.step()) {
-      contents->sessions.push_back({select.text(1), index(select, 2, "session")});
+      contents->sessions.push_back({select.text(1), select.text(2), index(select, 3, "session")});
     }
   }
 

@@ -134,8 +134,9 @@ void writeSessions(const SparseMap& map, const Target& target) {
   for (size_t i = 0; i < map.sessions().size(); ++i) {
     insert->bind(0, static_cast<int64_t>(i));
     insert->bind(1, map.sessions()[i].name);
-    insert->bind(2, static_cast<int64_t>(map.sessions()[i].component));
-    insert.run(3);
+    insert->bind(2, map.sessions()[i].recording_hash);
+    insert->bind(3, static_cast<int64_t>(map.sessions()[i].component));
+    insert.run(4);
   }
 }
 

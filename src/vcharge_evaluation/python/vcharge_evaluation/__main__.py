@@ -8,6 +8,7 @@ STAGES = {
     "mapping": "mapping",
     "pose_graphs": "pose_graphs",
     "localization": "localization",
+    "living_map": "living_map",
     "ranges": "ranges",
     "height_map": "height_map",
     "obstacles": "obstacles",

@@ -22,7 +22,10 @@ class Map:
         keyframes_path = path.parent / f"{path.stem}_keyframes.tum"
         run_tool("map_info", path.parent / f"{path.stem}_info.log", "--map", path, "--trajectory", keyframes_path)
         poses = np.loadtxt(keyframes_path)
-        truth = at_stamps(true_trajectory, poses[:, 0])
+        self.fit(poses, at_stamps(true_trajectory, poses[:, 0]))
+
+    def fit(self, poses, truth):
+        """Takes the poses of the keyframes and the true ones, as rows of TUM files."""
         self.positions, self.rotations = poses[:, 1:4], rotations(poses[:, 4:])
         self.true_positions, self.true_rotations = truth[:, 1:4], rotations(truth[:, 4:])
         # world_from_map, fitted to all keyframes.

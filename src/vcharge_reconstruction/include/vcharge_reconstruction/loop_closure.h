@@ -24,6 +24,9 @@ struct LoopClosureOptions {
   VCHARGE_END_OPTIONS();
 };
 
+/// Reason of a loop edge that the others predict too little to tell whether it is true.
+constexpr const char* kUndecidedLoop = "neither confirmed nor contradicted";
+
 /// Relative pose of two keyframes at a place that the vehicle visited twice.
 struct LoopEdge {
   int32_t first = 0;  ///< the earlier keyframe
@@ -47,6 +50,12 @@ std::shared_ptr<const VocabularyTree> trainVocabulary(const ReconstructionData& 
 std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
                                 const std::shared_ptr<const VocabularyTree>& vocabulary,
                                 const ReconstructionData& data, const LoopProgress& progress);
+
+/// The same between earlier sessions and new ones, whose keyframes begin with `first_of_new`.
+std::vector<LoopEdge> findLoopsBetween(const LoopClosureOptions& options,
+                                       const std::shared_ptr<const VocabularyTree>& vocabulary,
+                                       const ReconstructionData& data, int32_t first_of_new,
+                                       const LoopProgress& progress);
 
 /// Verifies one pair of keyframes on the pairs of cameras (of `first`, of `second`) with similar images: with
 /// the planar 3-point solver, or the 4-point solver with known vertical. The metric pose follows from the

@@ -10,6 +10,7 @@
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/motion/rigid_transform.h"
+#include "vcharge_core/sparse_map/sparse_map.h"
 #include "vcharge_features/image_features.h"
 
 namespace vcharge {
@@ -28,6 +29,8 @@ struct Keyframe {
   RigidTransform map_from_vehicle;    ///< estimated
   double travelled_m = 0.0;           ///< distance by the odometer, since the start of the drive
   std::vector<KeyframeImage> images;  ///< in the rig's order; without features where an image is missing
+  int32_t session = 0;                ///< index of the session
+  int32_t map_id = kNoId;             ///< its id in an existing map
 };
 
 /// Observation of a track in an image of a keyframe.
@@ -44,15 +47,21 @@ struct Track {
   std::vector<TrackObservation> observations;  ///< in order of keyframes
   std::optional<Eigen::Vector3d> position_m;   ///< in the map; absent where it was not triangulated
   Eigen::Matrix3d covariance_m2 = Eigen::Matrix3d::Zero();
+  int32_t map_id = kNoId;          ///< its id in an existing map
+  double presence_log_odds = 0.0;  ///< as in MapLandmark
 };
 
 /// Rig, keyframes and tracks of a reconstruction.
 struct ReconstructionData {
   std::shared_ptr<const CameraRig> rig;
-  std::vector<Keyframe> keyframes;
+  std::vector<MapSession> sessions = {MapSession()};
+  std::vector<Keyframe> keyframes;  ///< grouped by session
   std::vector<Track> tracks;
   double odometry_distance_scale = 1.0;  ///< ratio of true to counted distance
   double odometry_turn_scale = 1.0;      ///< ratio of true to counted turn
+  // As in SparseMapContents.
+  int32_t next_keyframe_id = 0;
+  int32_t next_landmark_id = 0;
 };
 
 }  // namespace vcharge

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "vcharge_core/sparse_map/sparse_map.h"
 #include "vcharge_reconstruction/bundle_adjustment.h"
@@ -22,5 +23,13 @@ void recordAdjustment(const BundleAdjustmentSummary& summary, ReconstructionRepo
 /// without a feature takes the descriptor of the landmark's nearest keyframe that has one.
 std::shared_ptr<const SparseMap> assembleMap(const ReconstructionState& state,
                                              const FeatureExtractorOptions& features);
+/// The same with the text of the options, as a map has it.
+std::shared_ptr<const SparseMap> assembleMap(const ReconstructionState& state,
+                                             const std::string& feature_options);
+
+/// The reconstruction that a map came from, as far as the map tells: features are the map's observations, all
+/// of them with a track, and the odometry of a session is that of its adjusted poses. `observation_sigma_px`:
+/// deviation of their positions.
+ReconstructionData reconstructionOf(const SparseMap& map, double observation_sigma_px);
 
 }  // namespace vcharge

@@ -26,6 +26,15 @@ Eigen::Matrix<double, 6, 6> odometryInformation(const RigidTransform& motion,
   return sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
+/// Keeps the present pose between two sessions that no landmark joins: weak, since nothing measured it.
+Eigen::Matrix<double, 6, 6> sessionBorderInformation() {
+  constexpr double kSigma_m = 10.0;
+  constexpr double kSigma_rad = 1.0;
+  Eigen::Matrix<double, 6, 1> sigmas;
+  sigmas << kSigma_m, kSigma_m, kSigma_m, kSigma_rad, kSigma_rad, kSigma_rad;
+  return sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
+}
+
 struct TrackCheck {
   int64_t kept = 0, removed = 0;
   double squares = 0.0;
@@ -133,8 +142,15 @@ BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const Re
   }
   problem.first_observation.push_back(problem.observations.size());
   for (size_t i = 1; i < data.keyframes.size(); ++i) {
-    const RigidTransform motion =
-        data.keyframes[i - 1].odom_from_vehicle.inverse() * data.keyframes[i].odom_from_vehicle;
+    const Keyframe& previous = data.keyframes[i - 1];
+    const Keyframe& keyframe = data.keyframes[i];
+    if (keyframe.session != previous.session) {
+      problem.odometer_factors.push_back({static_cast<int32_t>(i),
+                                          previous.map_from_vehicle.inverse() * keyframe.map_from_vehicle,
+                                          sessionBorderInformation()});
+      continue;
+    }
+    const RigidTransform motion = previous.odom_from_vehicle.inverse() * keyframe.odom_from_vehicle;
     problem.odometer_factors.push_back(
         {static_cast<int32_t>(i), motion, odometryInformation(motion, options)});
   }

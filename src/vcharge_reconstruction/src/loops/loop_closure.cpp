@@ -31,6 +31,9 @@ constexpr double kStepSigma_m = 0.01;
 constexpr double kStepSigma_rad = 0.001;
 constexpr double kLoopSigma_m = 0.03;
 constexpr double kLoopSigma_rad = 0.003;
+// The same between sessions that nothing has joined yet.
+constexpr double kUnknown_m = 1000.0;
+constexpr double kUnknown_rad = 3.0;
 
 VocabularyTreeOptions vocabularyOptions() {
   VocabularyTreeOptions options;
@@ -227,20 +230,18 @@ LoopEdge verifyLoop(const LoopClosureOptions& options, const ReconstructionData&
   return edge;
 }
 
-std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
-                                const std::shared_ptr<const VocabularyTree>& vocabulary,
-                                const ReconstructionData& data, const LoopProgress& progress) {
+namespace {
+
+/// Verifies candidates among the first end_of[i] keyframes for each keyframe i.
+std::vector<LoopEdge> findLoopsBefore(const LoopClosureOptions& options,
+                                      const std::shared_ptr<const VocabularyTree>& vocabulary,
+                                      const ReconstructionData& data, const std::vector<int32_t>& end_of,
+                                      const LoopProgress& progress) {
   const auto num_cameras = static_cast<int>(data.rig->cameras.size());
   const auto num_keyframes = static_cast<int32_t>(data.keyframes.size());
   std::vector<std::vector<cv::Mat>> descriptors;
-  std::vector<int32_t> end_of(num_keyframes);  // of the keyframes that make a loop with each
-  for (int32_t i = 0, end = 0; i < num_keyframes; ++i) {
-    descriptors.push_back(descriptorsOf(data.keyframes[i]));
-    while (end < i &&
-           data.keyframes[i].travelled_m - data.keyframes[end].travelled_m > options.min_travel_m) {
-      ++end;
-    }
-    end_of[i] = end;
+  for (const Keyframe& keyframe : data.keyframes) {
+    descriptors.push_back(descriptorsOf(keyframe));
   }
   PlaceIndex index(vocabulary, num_cameras);
   index.addAll(descriptors);
@@ -250,7 +251,13 @@ std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
   constexpr int32_t kBatch = 16;
   for (int32_t begin = 0; begin < num_keyframes; begin += kBatch) {
     tbb::parallel_for(begin, std::min(num_keyframes, begin + kBatch), [&](int32_t i) {
+      if (end_of[i] == 0) {
+        return;
+      }
       for (const PlaceMatch& candidate : index.query(descriptors[i], options.max_candidates, end_of[i])) {
+        if (candidate.place + 1 == i) {
+          continue;  // the last keyframe of a session and the first of the next are no step of the odometry
+        }
         std::vector<std::pair<int, int>> pairs;
         for (int camera = 0; camera < num_cameras; ++camera) {
           if (candidate.cameras[camera] >= 0) {
@@ -269,18 +276,55 @@ std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
   return edges;
 }
 
+/// The motion from a keyframe to the next one, and its information for the pose graph.
+PoseGraphEdge stepTo(const ReconstructionData& data, size_t i) {
+  const Keyframe& previous = data.keyframes[i - 1];
+  const Keyframe& keyframe = data.keyframes[i];
+  PoseGraphEdge step;
+  step.first = static_cast<int64_t>(i) - 1;
+  step.second = static_cast<int64_t>(i);
+  step.first_from_second = previous.map_from_vehicle.inverse() * keyframe.map_from_vehicle;
+  if (keyframe.session == previous.session) {
+    step.information = diagonalInformation(kStepSigma_m, kStepSigma_rad);
+  } else if (data.sessions[keyframe.session].component == data.sessions[previous.session].component) {
+    step.information = diagonalInformation(kLoopSigma_m, kLoopSigma_rad);  // joined at common places
+  } else {
+    step.information = diagonalInformation(kUnknown_m, kUnknown_rad);
+  }
+  return step;
+}
+
+}  // namespace
+
+std::vector<LoopEdge> findLoops(const LoopClosureOptions& options,
+                                const std::shared_ptr<const VocabularyTree>& vocabulary,
+                                const ReconstructionData& data, const LoopProgress& progress) {
+  std::vector<int32_t> end_of;
+  int32_t end = 0;
+  for (const Keyframe& keyframe : data.keyframes) {
+    while (keyframe.travelled_m - data.keyframes[end].travelled_m > options.min_travel_m) {
+      ++end;
+    }
+    end_of.push_back(end);
+  }
+  return findLoopsBefore(options, vocabulary, data, end_of, progress);
+}
+
+std::vector<LoopEdge> findLoopsBetween(const LoopClosureOptions& options,
+                                       const std::shared_ptr<const VocabularyTree>& vocabulary,
+                                       const ReconstructionData& data, int32_t first_of_new,
+                                       const LoopProgress& progress) {
+  std::vector<int32_t> end_of(data.keyframes.size(), 0);
+  std::fill(end_of.begin() + first_of_new, end_of.end(), first_of_new);
+  return findLoopsBefore(options, vocabulary, data, end_of, progress);
+}
+
 void closeLoops(std::vector<LoopEdge>* edges, ReconstructionData* data) {
   PoseGraph graph;
   for (size_t i = 0; i < data->keyframes.size(); ++i) {
     graph.map_from_node[static_cast<int64_t>(i)] = data->keyframes[i].map_from_vehicle;
     if (i > 0) {
-      PoseGraphEdge step;
-      step.first = static_cast<int64_t>(i) - 1;
-      step.second = static_cast<int64_t>(i);
-      step.first_from_second =
-          data->keyframes[i - 1].map_from_vehicle.inverse() * data->keyframes[i].map_from_vehicle;
-      step.information = diagonalInformation(kStepSigma_m, kStepSigma_rad);
-      graph.edges.push_back(step);
+      graph.edges.push_back(stepTo(*data, i));
     }
   }
   std::vector<size_t> loops;
@@ -300,8 +344,7 @@ void closeLoops(std::vector<LoopEdge>* edges, ReconstructionData* data) {
     LoopEdge& edge = (*edges)[loops[i]];
     edge.accepted = summary.accepted[num_steps + i];
     if (!edge.accepted) {
-      edge.reason = summary.undecided[num_steps + i] ? "neither confirmed nor contradicted"
-                                                     : "contradicts the other edges";
+      edge.reason = summary.undecided[num_steps + i] ? kUndecidedLoop : "contradicts the other edges";
     }
   }
   for (size_t i = 0; i < data->keyframes.size(); ++i) {

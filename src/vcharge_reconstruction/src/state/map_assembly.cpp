@@ -25,11 +25,22 @@ const TrackObservation* describedObservation(const Track& track, const TrackObse
 
 std::shared_ptr<const SparseMap> assembleMap(const ReconstructionState& state,
                                              const FeatureExtractorOptions& features) {
+  std::ostringstream feature_options;
+  feature_options << writeFields(features);
+  return assembleMap(state, feature_options.str());
+}
+
+std::shared_ptr<const SparseMap> assembleMap(const ReconstructionState& state,
+                                             const std::string& feature_options) {
   const ReconstructionData& data = state.data;
   SparseMapContents contents;
   contents.rig = *data.rig;
+  contents.sessions = data.sessions;
+  contents.next_keyframe_id = data.next_keyframe_id;
+  contents.next_landmark_id = data.next_landmark_id;
   for (const Keyframe& keyframe : data.keyframes) {
-    contents.keyframes.push_back({keyframe.stamp, keyframe.map_from_vehicle});
+    contents.keyframes.push_back({keyframe.stamp, keyframe.map_from_vehicle,
+                                  Eigen::Matrix<double, 6, 6>::Zero(), keyframe.session, keyframe.map_id});
   }
   std::vector<cv::Mat> descriptors;
   for (const Track& track : data.tracks) {
@@ -52,7 +63,8 @@ std::shared_ptr<const SparseMap> assembleMap(const ReconstructionState& state,
               described->feature));
     }
     if (is_described) {
-      contents.landmarks.push_back({*track.position_m, track.covariance_m2});
+      contents.landmarks.push_back(
+          {*track.position_m, track.covariance_m2, track.map_id, track.presence_log_odds});
     }
   }
   cv::vconcat(descriptors, contents.descriptors);
@@ -60,9 +72,7 @@ std::shared_ptr<const SparseMap> assembleMap(const ReconstructionState& state,
     contents.loop_edges.push_back(
         {edge.first, edge.second, edge.first_from_second, edge.num_inliers, edge.accepted, edge.reason});
   }
-  std::ostringstream feature_options;
-  feature_options << writeFields(features);
-  contents.feature_options = feature_options.str();
+  contents.feature_options = feature_options;
   contents.odometry_distance_scale = data.odometry_distance_scale;
   contents.odometry_turn_scale = data.odometry_turn_scale;
   return std::make_shared<const SparseMap>(std::move(contents));

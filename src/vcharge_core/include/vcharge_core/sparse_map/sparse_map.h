@@ -18,7 +18,8 @@ namespace vcharge {
 
 /// One drive in a map.
 struct MapSession {
-  std::string name;  ///< of the recording; empty if unknown
+  std::string name;            ///< of the recording; empty if unknown
+  std::string recording_hash;  ///< of the recording's file; empty if unknown
   /// Sessions with one number were joined at common places. Components lie side by side in the map frame;
   /// their relative pose is unknown.
   int32_t component = 0;

@@ -1,0 +1,218 @@
+"""A map over many days: drives merged and maps updated day by day, localization on the next day, summaries, other car parks."""
+import argparse
+import shutil
+import sqlite3
+
+import numpy as np
+
+from vcharge_evaluation.drives import Drive
+from vcharge_evaluation.localization_errors import BOUND_M, LocalizationErrors, Map
+from vcharge_evaluation.poses import at_stamps
+from vcharge_evaluation.results import Figure, Results, add_arguments, figure
+from vcharge_evaluation.tools import CONFIG, run_tool, run_tool_once, say
+
+OTHER_DAY = ("--drive", "other_day_beside", "--exposure-gain", 1.2)
+NIGHT = ("--set", "condition.kind=night", "--set", "faults.motion_blur.cameras=[all]", "--set",
+         "faults.motion_blur.exposure_time_s=0.02", "--set", "faults.motion_blur.renderings=4")
+STARTS = ("--forget-every", 10)
+FRAMES_WITHIN_5_M = 40  # at 1.5 m/s and 12.5 Hz
+PARTS = ("days", "exchanged", "night", "summary", "other")
+
+
+def arguments():
+    parser = argparse.ArgumentParser(description=__doc__)
+    add_arguments(parser, "living_map_evaluation")
+    parser.add_argument("--parts", nargs="*", default=list(PARTS), choices=PARTS)
+    parser.add_argument("--seeds", nargs="*", type=int, default=[201], help="seeds of the lots")
+    parser.add_argument("--num-days", type=int, default=10, help="days after that of the first map")
+    parser.add_argument("--image-scale", type=float, default=0.3)
+    parser.add_argument("--duration-s", type=float, default=0.0, help="end the drives early; 0: whole drives")
+    return parser.parse_args()
+
+
+class LivingMap(Map):
+    """A map of several drives and the true poses of its keyframes."""
+
+    def __init__(self, path, drives):
+        self.path = path
+        trajectories = {recording_of(drive.folder / "map.vmap"): drive.trajectory for drive in drives}
+        poses, truth = [], []
+        with sqlite3.connect(path) as database:
+            self.components = [row[0] for row in database.execute("SELECT component FROM session ORDER BY id")]
+            for session, recording in database.execute("SELECT id, recording_hash FROM session").fetchall():
+                rows = np.array(database.execute(
+                    "SELECT stamp_ns / 1e9, x_m, y_m, z_m, qx, qy, qz, qw FROM keyframe WHERE session = ? ORDER BY id",
+                    (session,)).fetchall())
+                # A map of one drive does not name it.
+                trajectory = trajectories[recording] if recording else drives[0].trajectory
+                poses.append(rows)
+                truth.append(at_stamps(trajectory, rows[:, 0]))
+            self.num_landmarks = database.execute("SELECT count(*) FROM landmark").fetchone()[0]
+        self.fit(np.concatenate(poses), np.concatenate(truth))
+
+    def figures(self):
+        errors_m = np.linalg.norm(self.positions @ self.turn.T + self.shift - self.true_positions, axis=1)
+        return [Figure("drives in the map", len(self.components)), Figure("keyframes", len(self.positions)),
+                Figure("landmarks", self.num_landmarks), Figure("file", self.path.stat().st_size / 1e6, "MB"),
+                figure("position of the keyframes, root mean square", 100 * float(np.sqrt((errors_m ** 2).mean())), "cm",
+                       at_most=4)]
+
+
+def recording_of(map_path):
+    """The hash of the recording that a map was built from."""
+    with sqlite3.connect(map_path) as database:
+        return database.execute("SELECT value FROM provenance WHERE key = 'bag_hash'").fetchone()[0]
+
+
+class Lot:
+    """Drives through one lot and their maps."""
+
+    def __init__(self, args, seed):
+        self.args, self.seed = args, seed
+
+    def drive(self, name, day, *words, exchanged=0.3):
+        words = [*words, "--exchanged-cars", exchanged] if day else words
+        made = Drive(self.args.work, name, "--scene", "lot", *words, "--day", day, "--scene-seed", self.seed, "--seed",
+                     self.seed + 100 * day, "--image-scale", self.args.image_scale,
+                     *(["--duration-s", self.args.duration_s] if self.args.duration_s else []))
+        made.day = day
+        _, _, made.mapping = made.map(made.true_rig)
+        return made
+
+    def first(self):
+        return self.drive("first_day", 0, "--drive", "loop")
+
+    def other(self, day, *words, exchanged=0.3):
+        return self.drive("other_day", day, *OTHER_DAY, *words, exchanged=exchanged)
+
+    def folder(self, name):
+        folder = self.args.work / f"{name}_{self.seed}"
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder
+
+
+def localize(made, mapped, name, *words):
+    """Errors of a drive in a map."""
+    output = made.folder / f"{name}.tum"
+    say(f"{made.folder}: {name}")
+    run_tool_once("localize_drive", made.folder / f"{name}.log", "--bag", made.bag, "--rig", made.true_rig, "--map", mapped.path,
+                  "--options", CONFIG / "localization.yaml", "--output", output, *words)
+    return LocalizationErrors(f"{output}.csv", made.trajectory, mapped)
+
+
+def localization_figures(result, least_percent, most_cm):
+    consistency, num_frames = result.consistency() if result.localized().any() else (None, 0)
+    return [figure("frames localized", 100 * result.ratio(), "%", at_least=least_percent),
+            figure("position, all frames (none: 50 cm), median", 100 * result.quantile(result.error_m, 50, BOUND_M), "cm",
+                   at_most=most_cm),
+            Figure("position, 95 %", 100 * result.quantile(result.error_m, 95, BOUND_M), "cm"),
+            figure("localized, but over 0.5 m or 2 degrees off", result.num_false(), equal=0),
+            figure(f"normalized error squared per degree of freedom ({num_frames} frames)", consistency, at_least=0.5,
+                   at_most=2.0),
+            Figure("time of a frame, median", 1e3 * float(np.median(result.latency_s)), "ms")]
+
+
+def start_figures(result):
+    """Starts from nothing: whether the right pose is found within 5 m of driving, or until the next start."""
+    right = result.localized() & (result.error_m < 0.5) & (result.error_deg < 2.0)
+    step = STARTS[1]
+    found = [bool(right[begin:begin + min(step, FRAMES_WITHIN_5_M)].any())
+             for begin in range(0, len(result.status) - step + 1, step)]
+    return [Figure("starts", len(found)), figure("starts with the right pose", 100 * float(np.mean(found)), "%", at_least=95),
+            figure("starts with a wrong pose", result.num_false(), equal=0)]
+
+
+def update(path, made):
+    """Updates a map file by a drive."""
+    return run_tool("update_map", made.folder / f"{path.parent.name}_update.log", "--map", path, "--session",
+                    made.folder / "map.vmap", "--max-versions", 2)
+
+
+def days(lot, results):
+    """Localizes each day's drive in the map of the days before, and then updates the map by it."""
+    path = lot.folder("days") / "living.vmap"
+    drives = [lot.first()]
+    shutil.copy(drives[0].folder / "map.vmap", path)
+    columns = []
+    for day in range(1, lot.args.num_days + 1):
+        mapped = LivingMap(path, drives)
+        made = lot.other(day)
+        found = [*mapped.figures(), *localization_figures(localize(made, mapped, "in_living_map"), 98, 1.0)]
+        updated = update(path, made)
+        drives.append(made)
+        columns.append((f"lot {lot.seed}, day {day}", [
+            *found, Figure("common landmarks in view", 100 * updated.found["common_ratio"], "%"),
+            Figure("landmarks removed", updated.found["num_removed_landmarks"]), Figure("update", updated.wall_s, "s"),
+            Figure("memory of the update", updated.peak_gb, "GB")]))
+    results.add(f"Days in a row, image scale {lot.args.image_scale:g}", *columns)
+
+
+def exchanged(lot, results):
+    """A day on which all cars are others."""
+    mapped = LivingMap(lot.first().folder / "map.vmap", [lot.first()])
+    made = lot.other(50, exchanged=1.0)
+    results.add(f"All cars exchanged, image scale {lot.args.image_scale:g}", (f"lot {lot.seed}", [
+        *localization_figures(localize(made, mapped, "in_first_map"), 95, 2.5),
+        *start_figures(localize(made, mapped, "starts_in_first_map", *STARTS))]))
+
+
+def night(lot, results):
+    """Nights before and after two night drives were merged."""
+    path = lot.folder("night") / "living.vmap"
+    drives = [lot.first()]
+    shutil.copy(drives[0].folder / "map.vmap", path)
+    made = lot.drive("night", 70, *OTHER_DAY, *NIGHT)
+    columns = [(f"lot {lot.seed}, map of a day", localization_figures(localize(made, LivingMap(path, drives), "in_day_map"), 98, 2.5))]
+    for day in (71, 72):
+        drives.append(lot.drive("night", day, *OTHER_DAY, *NIGHT))
+        run_tool("merge_maps", path.parent / f"merge_{day}.log", "--map", path, "--session", drives[-1].folder / "map.vmap",
+                 "--output", path)
+    mapped = LivingMap(path, drives)
+    columns.append((f"lot {lot.seed}, with two nights", [*mapped.figures(), *localization_figures(localize(made, mapped, "in_night_map"), 98, 2.5)]))
+    results.add(f"Night, image scale {lot.args.image_scale:g}", *columns)
+
+
+def summary(lot, results):
+    """Localization in a summary of a map."""
+    first, made = lot.first(), lot.other(1)
+    folder = lot.folder("summary")
+    (folder / "tenth.yaml").write_text("max_sigma_factor: 1\nmax_landmark_ratio: 0.1\n")
+    columns = []
+    for name, options in (("as few as needed", []), ("10 % of the landmarks", ["--options", folder / "tenth.yaml"])):
+        path = folder / f"{name.split(' ', maxsplit=1)[0]}.vmap"
+        found = run_tool("summarize_map", path.with_suffix(".log"), "--map", first.folder / "map.vmap", "--output", path,
+                         *options).found
+        result = localize(made, LivingMap(path, [first]), f"in_summary_{path.stem}")
+        columns.append((name, [Figure("landmarks", found["num_landmarks"]),
+                               Figure("file per 100 m of drive", found["kilobytes_per_100_m"] / 1e3, "MB"),
+                               Figure("deviation of a pose over that with all, worst", found["worst_sigma_factor"]),
+                               *localization_figures(result, 97, 1.2)]))
+    whole = localize(made, LivingMap(first.folder / "map.vmap", [first]), "in_first_map")
+    results.add(f"Summaries, lot {lot.seed}, image scale {lot.args.image_scale:g}",
+                ("all landmarks", localization_figures(whole, 98, 1.0)), *columns)
+
+
+def other_car_park(lot, results):
+    """A drive of another car park must be kept apart."""
+    other = Lot(lot.args, lot.seed + 1).first()
+    path = lot.folder("other") / "merged.vmap"
+    found = run_tool("merge_maps", path.with_suffix(".log"), "--map", lot.first().folder / "map.vmap", "--session",
+                     other.folder / "map.vmap", "--output", path).found["sessions"][0]
+    results.add(f"Another car park, image scale {lot.args.image_scale:g}", (f"lots {lot.seed} and {other.folder.name}", [
+        figure("joined", int(found["joined"]), equal=0), Figure("loops rejected", found["num_rejected_loops"]),
+        Figure("loops undecided", found["num_undecided_loops"])]))
+
+
+def main():
+    args = arguments()
+    args.work.mkdir(parents=True, exist_ok=True)
+    results = Results("living_map", "Living maps", args)
+    steps = {"days": days, "exchanged": exchanged, "night": night, "summary": summary, "other": other_car_park}
+    for seed in args.seeds:
+        for part in args.parts:
+            steps[part](Lot(args, seed), results)
+    results.end()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/sparse_map/sparse_map.h"
+
+namespace vcharge {
+
+/// Options of summarizeMap().
+struct SummaryOptions {
+  VCHARGE_BEGIN_OPTIONS(SummaryOptions);
+  VCHARGE_OPTION(double, max_sigma_factor, 2.0, atLeast(1.0),
+                 "Largest deviation of a pose over that with all landmarks.");
+  VCHARGE_OPTION(double, max_landmark_ratio, 1.0, above(0.0).upTo(1.0), "Largest part of landmarks to keep.");
+  VCHARGE_OPTION(int, min_landmarks_per_place, 80, atLeast(0), "Least landmarks of a keyframe.");
+  VCHARGE_OPTION(double, ray_sigma_rad, 0.002, positive(), "Deviation of an observed direction.");
+  VCHARGE_END_OPTIONS();
+};
+
+/// What a summary keeps.
+struct SummaryReport {
+  size_t num_landmarks_before = 0, num_landmarks = 0;
+  /// Deviation of the position over that with all landmarks, of keyframes.
+  double median_sigma_factor = 1.0, worst_sigma_factor = 1.0;
+};
+
+struct SummaryMap {
+  std::shared_ptr<const SparseMap> map;
+  SummaryReport report;
+};
+
+/// A map with as few landmarks as localization needs: at each keyframe, the covariance of a pose from the
+/// landmarks in view stays below a bound. Landmarks are chosen greedily by how much they add to the
+/// determinants of the poses' information, over all keyframes that observe them (a submodular function, so
+/// that this is near the best choice: Nemhauser et al., 1978), each weighted by the probability that it is
+/// still there. Ids stay. Deterministic.
+SummaryMap summarizeMap(const SparseMap& map, const SummaryOptions& options);
+
+}  // namespace vcharge

@@ -1,0 +1,181 @@
+#include "vcharge_mapping/map_summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <queue>
+#include <utility>
+#include <vector>
+
+#include <tbb/parallel_for.h>
+#include <Eigen/LU>
+
+#include "update/reduced_map.h"
+#include "vcharge_core/motion/cross_matrix.h"
+
+namespace vcharge {
+namespace {
+
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using Matrix36d = Eigen::Matrix<double, 3, 6>;
+
+/// A pose is known that well without any landmark; keeps the information regular.
+constexpr double kPriorSigma_m = 1.0;
+constexpr double kPriorSigma_rad = 0.2;
+
+/// A landmark in an image: its part of the information of the keyframe's pose is jacobian^T jacobian.
+struct View {
+  int32_t keyframe = 0;
+  Matrix36d jacobian = Matrix36d::Zero();
+};
+
+class LandmarkChooser {
+ public:
+  LandmarkChooser(const SparseMap& map, const SummaryOptions& options)
+      : map_(map),
+        options_(options),
+        views_(map.landmarks().size()),
+        chosen_(map.landmarks().size(), false),
+        num_chosen_of_(map.keyframes().size(), 0),
+        num_all_of_(map.keyframes().size(), 0) {
+    Matrix6d prior = Matrix6d::Zero();
+    prior.diagonal().head<3>().setConstant(1.0 / (kPriorSigma_m * kPriorSigma_m));
+    prior.diagonal().tail<3>().setConstant(1.0 / (kPriorSigma_rad * kPriorSigma_rad));
+    information_.assign(map.keyframes().size(), prior);
+    covariance_.assign(map.keyframes().size(), prior.inverse());
+    std::vector<Matrix6d> all = information_;
+    for (size_t l = 0; l < map.landmarks().size(); ++l) {
+      const auto [begin, end] = map.observationsOfLandmark(l);
+      for (const int32_t* i = begin; i != end; ++i) {
+        views_[l].push_back(viewOf(map.observations()[*i]));
+        const View& view = views_[l].back();
+        all[view.keyframe] += view.jacobian.transpose() * view.jacobian;
+        ++num_all_of_[view.keyframe];
+      }
+    }
+    for (const Matrix6d& information : all) {
+      sigma_of_all_m_.push_back(positionSigma_m(information.inverse()));
+    }
+  }
+
+  std::vector<bool> choose() {
+    const auto max_chosen = static_cast<size_t>(
+        std::ceil(options_.max_landmark_ratio * static_cast<double>(map_.landmarks().size())));
+    std::vector<double> gains(views_.size());
+    tbb::parallel_for(size_t{0}, views_.size(), [&](size_t l) { gains[l] = gainOf(l); });
+    // Gains only decrease while others are chosen: the best one is known without computing all of them.
+    std::priority_queue<std::pair<double, int32_t>> queue;
+    for (size_t l = 0; l < gains.size(); ++l) {
+      queue.emplace(gains[l], -static_cast<int32_t>(l));
+    }
+    size_t num_chosen = 0;
+    while (!queue.empty() && num_chosen < max_chosen) {
+      const auto landmark = static_cast<size_t>(-queue.top().second);
+      queue.pop();
+      const double gain = gainOf(landmark);
+      if (!queue.empty() && gain < queue.top().first) {
+        if (gain > 0.0) {
+          queue.emplace(gain, -static_cast<int32_t>(landmark));
+        }
+        continue;
+      }
+      if (gain <= 0.0) {
+        continue;  // it is in view only where there are enough
+      }
+      add(landmark);
+      ++num_chosen;
+    }
+    return chosen_;
+  }
+
+  /// Deviations of the position over those with all landmarks, ascending.
+  std::vector<double> sigmaFactors() const {
+    std::vector<double> factors;
+    for (size_t k = 0; k < covariance_.size(); ++k) {
+      factors.push_back(positionSigma_m(covariance_[k]) / sigma_of_all_m_[k]);
+    }
+    std::sort(factors.begin(), factors.end());
+    return factors;
+  }
+
+ private:
+  static double positionSigma_m(const Matrix6d& covariance) {
+    return std::sqrt(covariance.topLeftCorner<3, 3>().trace());
+  }
+
+  View viewOf(const MapObservation& observation) const {
+    const MapKeyframe& keyframe = map_.keyframes()[observation.keyframe];
+    const MapLandmark& landmark = map_.landmarks()[observation.landmark];
+    const Eigen::Vector3d in_vehicle = keyframe.map_from_vehicle.inverse() * landmark.position_m;
+    const Eigen::Vector3d from_camera =
+        in_vehicle - map_.rig().cameras[observation.camera].vehicle_from_camera->translation();
+    const double range_m = from_camera.norm();
+    const Eigen::Vector3d ray = from_camera / range_m;
+    // Direction of the point under a small motion of the vehicle, [dt, dphi] in its own frame.
+    Matrix36d motion;
+    motion << -Eigen::Matrix3d::Identity(), crossMatrix(in_vehicle);
+    const double variance_rad2 = options_.ray_sigma_rad * options_.ray_sigma_rad +
+                                 landmark.covariance_m2.trace() / 3.0 / (range_m * range_m);
+    const double presence = 1.0 / (1.0 + std::exp(-landmark.presence_log_odds));
+    View view;
+    view.keyframe = observation.keyframe;
+    view.jacobian = std::sqrt(presence / variance_rad2) / range_m *
+                    (Eigen::Matrix3d::Identity() - ray * ray.transpose()) * motion;
+    return view;
+  }
+
+  bool hasEnough(int32_t keyframe) const {
+    const int needed = std::min(options_.min_landmarks_per_place, num_all_of_[keyframe]);
+    return num_chosen_of_[keyframe] >= needed &&
+           positionSigma_m(covariance_[keyframe]) <= options_.max_sigma_factor * sigma_of_all_m_[keyframe];
+  }
+
+  /// How much the logarithm of the determinants grows where there are not enough landmarks yet.
+  double gainOf(size_t landmark) const {
+    double gain = 0.0;
+    for (const View& view : views_[landmark]) {
+      if (!hasEnough(view.keyframe)) {
+        const Eigen::Matrix3d ratio = Eigen::Matrix3d::Identity() +
+                                      view.jacobian * covariance_[view.keyframe] * view.jacobian.transpose();
+        gain += std::log(ratio.determinant());
+      }
+    }
+    return gain;
+  }
+
+  void add(size_t landmark) {
+    chosen_[landmark] = true;
+    for (const View& view : views_[landmark]) {
+      information_[view.keyframe] += view.jacobian.transpose() * view.jacobian;
+      covariance_[view.keyframe] = information_[view.keyframe].inverse();
+      ++num_chosen_of_[view.keyframe];
+    }
+  }
+
+  const SparseMap& map_;
+  const SummaryOptions& options_;
+  std::vector<std::vector<View>> views_;
+  std::vector<bool> chosen_;
+  std::vector<int> num_chosen_of_, num_all_of_;
+  std::vector<Matrix6d> information_, covariance_;
+  std::vector<double> sigma_of_all_m_;
+};
+
+}  // namespace
+
+SummaryMap summarizeMap(const SparseMap& map, const SummaryOptions& options) {
+  options.validate();
+  LandmarkChooser chooser(map, options);
+  const std::vector<bool> chosen = chooser.choose();
+  SummaryMap summary;
+  summary.map = reducedMap(map, std::vector<bool>(map.keyframes().size(), true), chosen);
+  summary.report.num_landmarks_before = map.landmarks().size();
+  summary.report.num_landmarks = summary.map->landmarks().size();
+  const std::vector<double> factors = chooser.sigmaFactors();
+  if (!factors.empty()) {
+    summary.report.median_sigma_factor = factors[factors.size() / 2];
+    summary.report.worst_sigma_factor = factors.back();
+  }
+  return summary;
+}
+
+}  // namespace vcharge

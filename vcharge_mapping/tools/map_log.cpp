@@ -1,0 +1,62 @@
+#include <cstdio>
+#include <memory>
+#include <optional>
+
+#include "vcharge_core/base/command_line.h"
+#include "vcharge_core/base/utc_time.h"
+#include "vcharge_core/sparse_map/sparse_map_file.h"
+
+namespace {
+
+using namespace vcharge;
+
+std::string valueOf(const MapVersion& version, const char* key) {
+  const auto found = version.provenance.find(key);
+  return found == version.provenance.end() ? "-" : found->second;
+}
+
+void goBack(const std::string& path, int64_t number, int max_versions) {
+  const MapFileLock lock(path);
+  const std::shared_ptr<const SparseMap> map = readSparseMap(path, nullptr, number);
+  const int64_t added = addMapVersion(*map,
+                                      {{"program", "map_log 0.1.0"},
+                                       {"date", utcNow()},
+                                       {"change", "back to version " + std::to_string(number)}},
+                                      max_versions, path);
+  std::printf("written: %s, version %lld\n", path.c_str(), static_cast<long long>(added));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Lists the versions of a map, and goes back to an earlier one.");
+  std::string path;
+  std::optional<int64_t> back_to;
+  int max_versions = 5;
+  app.add_option("--map", path, "the map (*.vmap)")->required()->check(requireNotEmpty);
+  app.add_option("--back-to", back_to, "version whose content becomes the newest version");
+  app.add_option("--max-versions", max_versions, "versions that the file keeps")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.footer("Keys of --json: versions (number, change, bag, date, program, content_hash).");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
+    if (back_to) {
+      goBack(path, *back_to, max_versions);
+    }
+    (*found)["versions"] = nlohmann::json::array();
+    std::printf("%7s  %-20s  %-18s  %-32s  %s\n", "version", "date", "program", "content hash",
+                "change, bag");
+    for (const MapVersion& version : readMapVersions(path)) {
+      std::printf("%7lld  %-20s  %-18s  %-32s  %s, %s\n", static_cast<long long>(version.number),
+                  valueOf(version, "date").c_str(), valueOf(version, "program").c_str(),
+                  version.content_hash.c_str(), valueOf(version, "change").c_str(),
+                  valueOf(version, "bag").c_str());
+      (*found)["versions"].push_back({{"number", version.number},
+                                      {"change", valueOf(version, "change")},
+                                      {"bag", valueOf(version, "bag")},
+                                      {"date", valueOf(version, "date")},
+                                      {"program", valueOf(version, "program")},
+                                      {"content_hash", version.content_hash}});
+    }
+  });
+}

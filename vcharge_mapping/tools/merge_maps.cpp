@@ -1,0 +1,144 @@
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "named_sessions.h"
+#include "stage_bars.h"
+#include "vcharge_core/base/command_line.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/base/utc_time.h"
+#include "vcharge_core/sparse_map/sparse_map_file.h"
+#include "vcharge_mapping/session_merger.h"
+
+namespace {
+
+using namespace vcharge;
+namespace fs = std::filesystem;
+
+struct Arguments {
+  std::string map, output, options;
+  std::vector<std::string> sessions;
+  int max_versions = 5;
+  bool requires_overlap = false;
+  bool show_options = false;
+};
+
+nlohmann::json toJson(const std::string& path, const MergeReport& report) {
+  return {{"session", path},
+          {"joined", report.joined},
+          {"remark", report.remark},
+          {"num_accepted_loops", report.num_accepted_loops},
+          {"num_undecided_loops", report.num_undecided_loops},
+          {"num_rejected_loops", report.num_rejected_loops},
+          {"common_ratio", report.common_ratio},
+          {"rms_px", report.rms_px}};
+}
+
+void print(const std::string& path, const MergeReport& report) {
+  std::cout << path << ": " << (report.joined ? "joined" : "kept apart: " + report.remark)
+            << "; loops: " << report.num_accepted_loops << " accepted, " << report.num_undecided_loops
+            << " undecided, " << report.num_rejected_loops << " rejected";
+  if (report.common_ratio > 0.0) {
+    std::cout << "; " << 100.0 * report.common_ratio << " % of the landmarks in view are common";
+  }
+  if (report.joined) {
+    std::cout << "; " << report.rms_px << " px RMS";
+  }
+  std::cout << "\n";
+}
+
+void mergeMaps(const Arguments& arguments, const MergeOptions& options, nlohmann::json* found) {
+  const bool in_place = fs::exists(arguments.output) && fs::equivalent(arguments.map, arguments.output);
+  std::optional<MapFileLock> lock;
+  if (fs::exists(arguments.output)) {
+    lock.emplace(arguments.output);
+  }
+  std::shared_ptr<const SparseMap> map = readWithSessions(arguments.map);
+  for (const std::string& path : arguments.sessions) {
+    const std::shared_ptr<const SparseMap> session = readWithSessions(path);
+    requireSameRig(*map, *session, path);
+    requireNewDrive(*map, *session, path);
+  }
+  StageBars bars;
+  (*found)["sessions"] = nlohmann::json::array();
+  for (size_t i = 0; i < arguments.sessions.size(); ++i) {
+    const std::string& path = arguments.sessions[i];
+    const std::shared_ptr<const SparseMap> session = readWithSessions(path);
+    requireNewDrive(*map, *session, path);  // nor has one of the sessions before
+    const MergedMap merged = mergeSession(*map, *session, options, [&](const StageProgress& progress) {
+      bars.show(progress.stage, progress.number, progress.num_stages, progress.fraction);
+    });
+    bars.end();
+    print(path, merged.report);
+    (*found)["sessions"].push_back(toJson(path, merged.report));
+    if (!merged.report.joined && arguments.requires_overlap) {
+      throw InputError(path + ": " + merged.report.remark + ": not merged");
+    }
+    if (i == 0 && !in_place) {
+      fs::copy_file(arguments.map, arguments.output, fs::copy_options::overwrite_existing);
+    }
+    map = merged.map;
+    const int64_t version =
+        addMapVersion(*map,
+                      {{"bag", session->sessions().front().name},
+                       {"program", "merge_maps 0.1.0"},
+                       {"date", utcNow()},
+                       {"change", std::string(merged.report.joined ? "joined " : "added apart ") +
+                                      fs::path(path).filename().string()}},
+                      arguments.max_versions, arguments.output);
+    std::cout << "written: " << arguments.output << ", version " << version << "\n";
+  }
+  int num_components = 0;
+  for (const MapSession& session : map->sessions()) {
+    num_components = std::max(num_components, session.component + 1);
+  }
+  found->update({{"num_sessions", map->sessions().size()},
+                 {"num_keyframes", map->keyframes().size()},
+                 {"num_landmarks", map->landmarks().size()},
+                 {"content_hash", map->contentHash()}});
+  std::cout << "sessions: " << map->sessions().size() << ", keyframes: " << map->keyframes().size()
+            << ", landmarks: " << map->landmarks().size() << "\ncontent hash: " << map->contentHash() << "\n";
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Adds the drives of other maps to a map. A drive without common places is kept apart, beside the "
+      "others.");
+  Arguments arguments;
+  app.add_option("--map", arguments.map, "the map (*.vmap)")->required()->check(requireNotEmpty);
+  app.add_option("--session", arguments.sessions,
+                 "a map of another drive with the same rig; several may be given")
+      ->required()
+      ->check(requireNotEmpty);
+  app.add_option("--output", arguments.output,
+                 "map to write; may be the map itself: each session adds a version")
+      ->required()
+      ->check(requireOutput);
+  app.add_option("--max-versions", arguments.max_versions, "versions that the file keeps")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_flag("--require-overlap", arguments.requires_overlap, "refuse a drive without common places");
+  app.add_option("--options", arguments.options, "YAML with overrides of MergeOptions");
+  addShowOptions(&app, &arguments.show_options);
+  app.footer(
+      "Keys of --json: sessions (session, joined, remark, num_accepted_loops, num_undecided_loops, "
+      "num_rejected_loops, common_ratio, rms_px), num_sessions, num_keyframes, num_landmarks, content_hash.");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
+    MergeOptions options;
+    if (!arguments.options.empty()) {
+      readFieldsFromFile(arguments.options, &options);
+    }
+    if (arguments.show_options) {
+      std::cout << showOptions(options);
+      return;
+    }
+    mergeMaps(arguments, options, found);
+  });
+}

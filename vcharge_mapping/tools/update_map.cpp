@@ -1,0 +1,101 @@
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include "named_sessions.h"
+#include "stage_bars.h"
+#include "vcharge_core/base/command_line.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/base/utc_time.h"
+#include "vcharge_mapping/map_updater.h"
+
+namespace {
+
+using namespace vcharge;
+namespace fs = std::filesystem;
+
+struct Arguments {
+  std::string map, session, options;
+  int max_versions = 5;
+  bool show_options = false;
+};
+
+void updateMapFile(const Arguments& arguments, const UpdateOptions& options, nlohmann::json* found) {
+  const MapFileLock lock(arguments.map);
+  const std::shared_ptr<const SparseMap> map = readWithSessions(arguments.map);
+  const std::shared_ptr<const SparseMap> session = readWithSessions(arguments.session);
+  requireSameRig(*map, *session, arguments.session);
+  requireNewDrive(*map, *session, arguments.session);
+  StageBars bars;
+  const UpdatedMap updated = updateMap(*map, *session, options, [&](const StageProgress& progress) {
+    bars.show(progress.stage, progress.number, progress.num_stages, progress.fraction);
+  });
+  bars.end();
+  const UpdateReport& report = updated.report;
+  const int64_t version = addMapVersion(*updated.map,
+                                        {{"bag", session->sessions().front().name},
+                                         {"program", "update_map 0.1.0"},
+                                         {"date", utcNow()},
+                                         {"change", "updated by " + session->sessions().front().name}},
+                                        arguments.max_versions, arguments.map);
+  std::cout << "loops: " << report.merge.num_accepted_loops << " accepted; "
+            << 100.0 * report.merge.common_ratio << " % of the landmarks in view are common; "
+            << report.merge.rms_px << " px RMS\nlandmarks: " << report.num_seen_landmarks << " seen again, "
+            << report.num_missed_landmarks << " missed, " << report.num_removed_landmarks << " removed, "
+            << report.num_new_landmarks
+            << " new\nplaces shown by later drives: " << report.num_removed_keyframes
+            << " keyframes removed, with " << report.num_forgotten_landmarks
+            << " landmarks\nsessions: " << updated.map->sessions().size()
+            << ", keyframes: " << updated.map->keyframes().size()
+            << ", landmarks: " << updated.map->landmarks().size() << "\nwritten: " << arguments.map
+            << ", version " << version << "\ncontent hash: " << updated.map->contentHash() << "\n";
+  *found = {{"num_accepted_loops", report.merge.num_accepted_loops},
+            {"common_ratio", report.merge.common_ratio},
+            {"rms_px", report.merge.rms_px},
+            {"num_seen_landmarks", report.num_seen_landmarks},
+            {"num_missed_landmarks", report.num_missed_landmarks},
+            {"num_removed_landmarks", report.num_removed_landmarks},
+            {"num_new_landmarks", report.num_new_landmarks},
+            {"num_removed_keyframes", report.num_removed_keyframes},
+            {"num_forgotten_landmarks", report.num_forgotten_landmarks},
+            {"num_sessions", updated.map->sessions().size()},
+            {"num_keyframes", updated.map->keyframes().size()},
+            {"num_landmarks", updated.map->landmarks().size()},
+            {"version", version},
+            {"content_hash", updated.map->contentHash()}};
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Updates a map by a drive of another day: adds what is new, removes what several drives missed, and "
+      "keeps the map's size.");
+  Arguments arguments;
+  app.add_option("--map", arguments.map, "the map (*.vmap); gets a new version")
+      ->required()
+      ->check(requireOutput);
+  app.add_option("--session", arguments.session, "the map that build_map made of the drive")
+      ->required()
+      ->check(requireNotEmpty);
+  app.add_option("--max-versions", arguments.max_versions, "versions that the file keeps")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  app.add_option("--options", arguments.options, "YAML with overrides of UpdateOptions");
+  addShowOptions(&app, &arguments.show_options);
+  app.footer(
+      "Keys of --json: num_accepted_loops, common_ratio, rms_px, num_seen_landmarks, num_missed_landmarks, "
+      "num_removed_landmarks, num_new_landmarks, num_removed_keyframes, num_forgotten_landmarks, "
+      "num_sessions, num_keyframes, num_landmarks, version, content_hash.");
+  return runTool(&app, argc, argv, [&](nlohmann::json* found) {
+    UpdateOptions options;
+    if (!arguments.options.empty()) {
+      readFieldsFromFile(arguments.options, &options);
+    }
+    if (arguments.show_options) {
+      std::cout << showOptions(options);
+      return;
+    }
+    updateMapFile(arguments, options, found);
+  });
+}
