@@ -17,6 +17,8 @@
 #include "vcharge_dense/height_map_options.h"
 #include "vcharge_dense/range_mapper.h"
 #include "vcharge_localization/drive_localizer.h"
+#include "vcharge_mapping/map_summary.h"
+#include "vcharge_mapping/map_updater.h"
 #include "vcharge_mapping/sparse_mapper_options.h"
 #include "vcharge_obstacles/object_tracker.h"
 #include "vcharge_obstacles/obstacle_mapper.h"
@@ -59,6 +61,9 @@ int main() {
   writeSection<vcharge::BodyMaskOptions>("Masks of the own body", "`make_masks`.");
   writeSection<vcharge::SparseMapperOptions>("Sparse map",
                                              "`build_map`, `mapping_nodelet`: `config/mapping.yaml`.");
+  writeSection<vcharge::MergeOptions>("Merged map", "`merge_maps`.");
+  writeSection<vcharge::UpdateOptions>("Updated map", "`update_map`.");
+  writeSection<vcharge::SummaryOptions>("Summary of a map", "`summarize_map`.");
   writeSection<vcharge::DriveLocalizerOptions>(
       "Localization", "`localize_drive`, `localization_nodelet`: `config/localization.yaml`.");
   writeSection<vcharge::RangeMapperOptions>("Range maps",

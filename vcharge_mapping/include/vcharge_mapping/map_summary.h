@@ -15,7 +15,6 @@ struct SummaryOptions {
                  "Largest deviation of a pose over that with all landmarks.");
   VCHARGE_OPTION(double, max_landmark_ratio, 1.0, above(0.0).upTo(1.0), "Largest part of landmarks to keep.");
   VCHARGE_OPTION(int, min_landmarks_per_place, 80, atLeast(0), "Least landmarks of a keyframe.");
-  VCHARGE_OPTION(double, ray_sigma_rad, 0.002, positive(), "Deviation of an observed direction.");
   VCHARGE_END_OPTIONS();
 };
 

@@ -14,10 +14,7 @@ namespace vcharge {
 struct UpdateOptions {
   VCHARGE_BEGIN_OPTIONS(UpdateOptions);
   VCHARGE_OPTION_GROUP(MergeOptions, merge, {}, "Joining of map and drive.");
-  VCHARGE_OPTION(double, min_presence_log_odds, -3.0, anyValue(), "Less present landmarks are removed.");
   VCHARGE_OPTION(int, max_sessions_per_place, 2, atLeast(1), "Drives that a map keeps of a place.");
-  VCHARGE_OPTION(double, place_radius_m, 1.0, positive(), "Distance of keyframes at one place.");
-  VCHARGE_OPTION(double, place_angle_rad, 0.35, positive(), "The same for their headings.");
   VCHARGE_END_OPTIONS();
 };
 

@@ -18,7 +18,6 @@ struct MergeOptions {
   VCHARGE_OPTION_GROUP(LoopClosureOptions, loops, {}, "Common places of map and session.");
   VCHARGE_OPTION_GROUP(LandmarkSearchOptions, search, {}, "Search for landmarks that both have.");
   VCHARGE_OPTION_GROUP(BundleAdjustmentOptions, bundle, {}, "Adjustment of all sessions together.");
-  VCHARGE_OPTION(double, observation_sigma_px, 0.5, positive(), "Deviation of a map's observations.");
   VCHARGE_OPTION(double, min_common_ratio, 0.1, between(0.0, 1.0),
                  "Least part of the landmarks in view that both have, where they meet.");
   VCHARGE_END_OPTIONS();

@@ -15,6 +15,8 @@ namespace vcharge {
 namespace {
 
 constexpr int kNumStages = 5;
+/// Deviation of a map's observations: tracked ones are better, found ones worse.
+constexpr double kObservationSigma_px = 0.5;
 // Larger differences of a camera's calibration make it another rig.
 constexpr double kMaxShift_m = 0.03;
 constexpr double kMaxTurn_rad = 0.01;
@@ -43,7 +45,7 @@ class SessionMerger {
         stages_(kNumStages, progress, &state_.report),
         apart_(appendSession(map, session)),
         first_of_new_(static_cast<int32_t>(map.keyframes().size())) {
-    state_.data = reconstructionOf(apart_, options_.observation_sigma_px);
+    state_.data = reconstructionOf(apart_, kObservationSigma_px);
   }
 
   MergedMap merge() {

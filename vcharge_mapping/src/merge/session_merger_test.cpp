@@ -6,66 +6,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "testing/world_drives.h"
 #include "vcharge_core/base/error.h"
-#include "vcharge_reconstruction/testing/test_map.h"
 
 namespace vcharge {
 namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-
-constexpr int kNumKeyframes = 160;
-
-std::shared_ptr<const SparseMap> makeWorld(uint32_t seed) {
-  testing::TestMapOptions options;
-  options.num_keyframes = kNumKeyframes;
-  options.seed = seed;
-  return testing::makeTestMap(options);
-}
-
-/// A drive that saw part of a world: some of its keyframes, in a frame of its own, on another day.
-std::shared_ptr<const SparseMap> driveThrough(const SparseMap& world, const std::string& name, int day,
-                                              const RigidTransform& drive_from_world,
-                                              const std::function<bool(int)>& has_keyframe) {
-  SparseMapContents contents = world.contents();
-  contents.sessions = {{name, "", 0}};
-  contents.keyframes.clear();
-  contents.landmarks.clear();
-  contents.observations.clear();
-  contents.next_keyframe_id = contents.next_landmark_id = 0;
-  contents.descriptors = cv::Mat(0, world.descriptors().cols, world.descriptors().type());
-  std::vector<int32_t> keyframe_of(world.keyframes().size(), -1);
-  std::vector<int32_t> landmark_of(world.landmarks().size(), -1);
-  for (size_t i = 0; i < world.keyframes().size(); ++i) {
-    if (has_keyframe(static_cast<int>(i))) {
-      MapKeyframe keyframe = world.keyframes()[i];
-      keyframe.stamp = Timestamp::fromNanoseconds(keyframe.stamp.nanoseconds() + day * 86'400'000'000'000LL);
-      keyframe.map_from_vehicle = drive_from_world * keyframe.map_from_vehicle;
-      keyframe.id = kNoId;
-      keyframe_of[i] = static_cast<int32_t>(contents.keyframes.size());
-      contents.keyframes.push_back(keyframe);
-    }
-  }
-  for (size_t i = 0; i < world.observations().size(); ++i) {
-    MapObservation observation = world.observations()[i];
-    if (keyframe_of[observation.keyframe] < 0) {
-      continue;
-    }
-    int32_t& landmark = landmark_of[observation.landmark];
-    if (landmark < 0) {
-      landmark = static_cast<int32_t>(contents.landmarks.size());
-      contents.landmarks.push_back(world.landmarks()[observation.landmark]);
-      contents.landmarks.back().position_m = drive_from_world * contents.landmarks.back().position_m;
-      contents.landmarks.back().id = kNoId;
-    }
-    observation.keyframe = keyframe_of[observation.keyframe];
-    observation.landmark = landmark;
-    contents.observations.push_back(observation);
-    contents.descriptors.push_back(world.descriptors().row(static_cast<int>(i)));
-  }
-  return std::make_shared<const SparseMap>(std::move(contents));
-}
 
 MergedMap merge(const SparseMap& map, const SparseMap& session) {
   return mergeSession(map, session, MergeOptions(), nullptr);
@@ -89,7 +37,7 @@ class SessionMergerTest : public ::testing::Test {
   std::vector<RigidTransform> truthOf(const std::vector<std::function<bool(int)>>& drives) const {
     std::vector<RigidTransform> truth;
     for (const auto& has_keyframe : drives) {
-      for (int i = 0; i < kNumKeyframes; ++i) {
+      for (int i = 0; i < testing::kNumKeyframes; ++i) {
         if (has_keyframe(i)) {
           truth.push_back(world_->keyframes()[static_cast<size_t>(i)].map_from_vehicle);
         }
@@ -98,15 +46,15 @@ class SessionMergerTest : public ::testing::Test {
     return truth;
   }
 
-  const std::shared_ptr<const SparseMap> world_ = makeWorld(1);
+  const std::shared_ptr<const SparseMap> world_ = testing::makeWorld(1);
   const RigidTransform elsewhere_ = RigidTransform::planar(-40.0, 17.0, 2.0);
   const std::function<bool(int)> even_ = [](int i) { return i % 2 == 0; };
   const std::function<bool(int)> odd_ = [](int i) { return i % 2 == 1; };
 };
 
 TEST_F(SessionMergerTest, JoinsTwoDrives) {
-  const auto first = driveThrough(*world_, "a.bag", 0, RigidTransform(), even_);
-  const auto second = driveThrough(*world_, "b.bag", 1, elsewhere_, odd_);
+  const auto first = testing::driveThrough(*world_, "a.bag", 0, RigidTransform(), even_);
+  const auto second = testing::driveThrough(*world_, "b.bag", 1, elsewhere_, odd_);
   const MergedMap merged = merge(*first, *second);
   EXPECT_TRUE(merged.report.joined) << merged.report.remark;
   EXPECT_GT(merged.report.num_accepted_loops, 50);
@@ -127,8 +75,8 @@ TEST_F(SessionMergerTest, JoinsTwoDrives) {
 }
 
 TEST_F(SessionMergerTest, KeepsAnotherCarParkApart) {
-  const auto first = driveThrough(*world_, "a.bag", 0, RigidTransform(), even_);
-  const auto other = driveThrough(*makeWorld(2), "b.bag", 1, RigidTransform(), even_);
+  const auto first = testing::driveThrough(*world_, "a.bag", 0, RigidTransform(), even_);
+  const auto other = testing::driveThrough(*testing::makeWorld(2), "b.bag", 1, RigidTransform(), even_);
   const MergedMap merged = merge(*first, *other);
   EXPECT_FALSE(merged.report.joined);
   EXPECT_THAT(merged.report.remark, HasSubstr("no common places"));
@@ -148,10 +96,10 @@ TEST_F(SessionMergerTest, ADriveJoinsComponents) {
   const std::function<bool(int)> begin = [](int i) { return i < 60; };
   const std::function<bool(int)> end = [](int i) { return i >= 80 && i < 140; };
   const std::function<bool(int)> across = [](int i) { return i >= 10 && i < 130; };
-  const auto first = driveThrough(*world_, "a.bag", 0, RigidTransform(), begin);
-  const MergedMap apart = merge(*first, *driveThrough(*world_, "b.bag", 1, elsewhere_, end));
+  const auto first = testing::driveThrough(*world_, "a.bag", 0, RigidTransform(), begin);
+  const MergedMap apart = merge(*first, *testing::driveThrough(*world_, "b.bag", 1, elsewhere_, end));
   ASSERT_FALSE(apart.report.joined);
-  const MergedMap joined = merge(*apart.map, *driveThrough(*world_, "c.bag", 2, elsewhere_, across));
+  const MergedMap joined = merge(*apart.map, *testing::driveThrough(*world_, "c.bag", 2, elsewhere_, across));
   EXPECT_TRUE(joined.report.joined) << joined.report.remark;
   for (const MapSession& session : joined.map->sessions()) {
     EXPECT_EQ(session.component, 0) << session.name;
@@ -160,9 +108,9 @@ TEST_F(SessionMergerTest, ADriveJoinsComponents) {
 }
 
 TEST_F(SessionMergerTest, RefusesAnotherRig) {
-  const auto first = driveThrough(*world_, "a.bag", 0, RigidTransform(), even_);
+  const auto first = testing::driveThrough(*world_, "a.bag", 0, RigidTransform(), even_);
   const auto errorOf = [&](const std::function<void(SparseMapContents*)>& change) {
-    SparseMapContents contents = driveThrough(*world_, "b.bag", 1, elsewhere_, odd_)->contents();
+    SparseMapContents contents = testing::driveThrough(*world_, "b.bag", 1, elsewhere_, odd_)->contents();
     change(&contents);
     try {
       merge(*first, SparseMap(std::move(contents)));

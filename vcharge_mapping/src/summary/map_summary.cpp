@@ -21,6 +21,8 @@ using Matrix36d = Eigen::Matrix<double, 3, 6>;
 /// A pose is known that well without any landmark; keeps the information regular.
 constexpr double kPriorSigma_m = 1.0;
 constexpr double kPriorSigma_rad = 0.2;
+/// Deviation of an observed direction.
+constexpr double kRaySigma_rad = 0.002;
 
 /// A landmark in an image: its part of the information of the keyframe's pose is jacobian^T jacobian.
 struct View {
@@ -113,8 +115,8 @@ class LandmarkChooser {
     // Direction of the point under a small motion of the vehicle, [dt, dphi] in its own frame.
     Matrix36d motion;
     motion << -Eigen::Matrix3d::Identity(), crossMatrix(in_vehicle);
-    const double variance_rad2 = options_.ray_sigma_rad * options_.ray_sigma_rad +
-                                 landmark.covariance_m2.trace() / 3.0 / (range_m * range_m);
+    const double variance_rad2 =
+        kRaySigma_rad * kRaySigma_rad + landmark.covariance_m2.trace() / 3.0 / (range_m * range_m);
     const double presence = 1.0 / (1.0 + std::exp(-landmark.presence_log_odds));
     View view;
     view.keyframe = observation.keyframe;

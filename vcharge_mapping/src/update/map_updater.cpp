@@ -14,9 +14,14 @@ namespace {
 
 /// Evidence of many drives is as easily overturned as that of a few.
 constexpr double kMaxLogOdds = 4.0;
+/// Two drives that saw all around a landmark but not it.
+constexpr double kMinLogOdds = -3.0;
+// Keyframes this close, and looking the same way, are at one place.
+constexpr double kPlaceRadius_m = 1.0;
+constexpr double kPlaceAngle_rad = 0.35;
 
 /// Adds the evidence of the newest session. Returns which landmarks are still present enough.
-std::vector<bool> weighLandmarks(double min_log_odds, SparseMapContents* contents, UpdateReport* report) {
+std::vector<bool> weighLandmarks(SparseMapContents* contents, UpdateReport* report) {
   const auto newest = static_cast<int32_t>(contents->sessions.size()) - 1;
   const SparseMap map(*contents);
   const std::vector<PresenceEvidence> evidence = weighPresence(map, newest);
@@ -24,7 +29,7 @@ std::vector<bool> weighLandmarks(double min_log_odds, SparseMapContents* content
   for (size_t i = 0; i < evidence.size(); ++i) {
     double& log_odds = contents->landmarks[i].presence_log_odds;
     log_odds = std::clamp(log_odds + evidence[i].log_odds, -kMaxLogOdds, kMaxLogOdds);
-    keeps[i] = log_odds >= min_log_odds;
+    keeps[i] = log_odds >= kMinLogOdds;
     report->num_seen_landmarks += evidence[i].is_seen ? 1 : 0;
     report->num_missed_landmarks += !evidence[i].is_seen && evidence[i].num_missed > 0 ? 1 : 0;
     report->num_removed_landmarks += keeps[i] ? 0 : 1;
@@ -66,8 +71,8 @@ class PlaceKeeper {
 
   bool isAtPlace(const MapKeyframe& a, const MapKeyframe& b) const {
     const RigidTransform between = a.map_from_vehicle.inverse() * b.map_from_vehicle;
-    return between.translation().norm() <= options_.place_radius_m &&
-           angleOfRotation(between.rotation()) <= options_.place_angle_rad;
+    return between.translation().norm() <= kPlaceRadius_m &&
+           angleOfRotation(between.rotation()) <= kPlaceAngle_rad;
   }
 
   std::map<int32_t, Coverage> coverageAt(const MapKeyframe& place) const {
@@ -102,7 +107,7 @@ class PlaceKeeper {
       return true;
     }
     const double own = coverage.at(keyframe.session).ratio();
-    // Of equal ones the later sessions stay.
+    // If two are equal, the later session stays.
     const auto num_better = std::count_if(coverage.begin(), coverage.end(), [&](const auto& other) {
       return other.second.ratio() < own || (other.second.ratio() == own && other.first > keyframe.session);
     });
@@ -131,8 +136,7 @@ UpdatedMap updateMap(const SparseMap& map, const SparseMap& session, const Updat
     throw InputError("session: it cannot update the map: " + merged.report.remark);
   }
   SparseMapContents contents = merged.map->contents();
-  const std::vector<bool> keeps_landmark =
-      weighLandmarks(options.min_presence_log_odds, &contents, &result.report);
+  const std::vector<bool> keeps_landmark = weighLandmarks(&contents, &result.report);
   const auto present = reducedMap(SparseMap(std::move(contents)),
                                   std::vector<bool>(merged.map->keyframes().size(), true), keeps_landmark);
   result.map = reducedMap(*present, PlaceKeeper(*present, options).neededKeyframes(),

@@ -16,10 +16,6 @@ namespace vcharge {
 /// Options of evaluateMap().
 struct MapErrorOptions {
   VCHARGE_BEGIN_OPTIONS(MapErrorOptions);
-  VCHARGE_OPTION(double, max_edge_error_m, 0.3, positive(), "Error up to which a loop edge is correct.");
-  VCHARGE_OPTION(double, max_edge_error_rad, 0.05235988, positive(), "Rotation error of such an edge.");
-  VCHARGE_OPTION(double, revisit_distance_m, 3.0, positive(),
-                 "Distance within which a position is revisited.");
   VCHARGE_OPTION(double, opposite_rad, 2.0943951, above(0.0).below(3.14159265358979),
                  "Difference above which two headings are opposite.");
   VCHARGE_END_OPTIONS();

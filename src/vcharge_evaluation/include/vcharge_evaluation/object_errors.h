@@ -25,8 +25,6 @@ struct ObjectEvaluationOptions {
   VCHARGE_OPTION(double, min_existence, 0.5, between(0.0, 1.0), "Least existence probability of a report.");
   VCHARGE_OPTION(double, gate_m, 1.0, positive(),
                  "Largest position error of a report of an object, and the error of a missed one.");
-  VCHARGE_OPTION(double, good_position_m, 0.3, positive(), "Largest position error of a good report.");
-  VCHARGE_OPTION(double, good_velocity_m_per_s, 0.3, positive(), "Largest velocity error of a good report.");
   VCHARGE_OPTION(double, vehicle_front_m, kVehicleFront_m, anyValue(),
                  "Front end of the vehicle in its own frame.");
   VCHARGE_OPTION(double, vehicle_rear_m, kVehicleRear_m, anyValue(),

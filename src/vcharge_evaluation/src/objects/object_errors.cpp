@@ -15,6 +15,8 @@ namespace {
 
 constexpr Duration kSpeedTime(500'000'000), kVisibleTime(500'000'000), kCrossingTime(1'000'000'000);
 constexpr double kApproached_m = 1.5, kAway_m = 2.0, kStanding_m = 0.02;
+// Largest errors of a good report.
+constexpr double kGoodPosition_m = 0.3, kGoodVelocity_m_per_s = 0.3;
 constexpr double kMissedVelocity_m_per_s = 1.0;
 constexpr size_t kMinFalseFrames = 3;
 constexpr double kFalseDistance_m = 1.0;
@@ -299,9 +301,8 @@ ObjectFigures ObjectEvaluator::figuresOf(const std::function<bool(const Sample&)
     if (!isChosen(sample)) {
       continue;
     }
-    const bool good_position = sample.found && sample.position_error_m <= options_.good_position_m;
-    const bool good_velocity =
-        sample.found && sample.velocity_error_m_per_s <= options_.good_velocity_m_per_s;
+    const bool good_position = sample.found && sample.position_error_m <= kGoodPosition_m;
+    const bool good_velocity = sample.found && sample.velocity_error_m_per_s <= kGoodVelocity_m_per_s;
     ++figures.num_due;
     figures.num_found += sample.found ? 1 : 0;
     figures.num_good_position += good_position ? 1 : 0;

@@ -8,6 +8,11 @@ namespace vcharge {
 namespace {
 
 constexpr double kPi = 3.14159265358979;
+// Errors up to which a loop edge is correct.
+constexpr double kMaxEdgeError_m = 0.3;
+constexpr double kMaxEdgeError_rad = 0.05235988;
+// Distance within which a position is revisited.
+constexpr double kRevisitDistance_m = 3.0;
 // Travel after which a position counts as revisited.
 constexpr double kMinTravel_m = 10.0;
 
@@ -66,8 +71,7 @@ LoopEdgeJudgement judge(const MapLoopEdge& edge, const std::optional<TruePose>& 
   judgement.distance_m = true_first_from_second.translation().norm();
   judgement.error_m = error.translation().norm();
   judgement.error_rad = angleOfRotation(error.rotation());
-  judgement.is_right =
-      judgement.error_m <= options.max_edge_error_m && judgement.error_rad <= options.max_edge_error_rad;
+  judgement.is_right = judgement.error_m <= kMaxEdgeError_m && judgement.error_rad <= kMaxEdgeError_rad;
   return judgement;
 }
 
@@ -115,7 +119,7 @@ void countRevisits(const SparseMap& map, const std::vector<std::optional<TruePos
     for (size_t earlier = 0; truth[k] && earlier < k; ++earlier) {
       if (truth[earlier] && truth[k]->travelled_m - truth[earlier]->travelled_m > kMinTravel_m &&
           (truth[k]->world_from_vehicle.translation() - truth[earlier]->world_from_vehicle.translation())
-                  .norm() < options.revisit_distance_m) {
+                  .norm() < kRevisitDistance_m) {
         (headingDifference(*truth[earlier], *truth[k]) > options.opposite_rad ? opposite : same) = true;
       }
     }

@@ -1,0 +1,61 @@
+#include "vcharge_mapping/map_summary.h"
+
+#include <gtest/gtest.h>
+
+#include "testing/world_drives.h"
+
+namespace vcharge {
+namespace {
+
+TEST(MapSummaryTest, KeepsThePosesAsCertainAsAsked) {
+  const auto map = testing::makeWorld(1);
+  SummaryOptions options;
+  options.min_landmarks_per_place = 0;
+  size_t last = map->landmarks().size();
+  for (const double factor : {1.2, 1.5, 2.0, 3.0}) {
+    options.max_sigma_factor = factor;
+    const SummaryMap summary = summarizeMap(*map, options);
+    EXPECT_LE(summary.report.worst_sigma_factor, factor);
+    EXPECT_GT(summary.report.worst_sigma_factor, 0.8 * factor);
+    EXPECT_LT(summary.report.num_landmarks, last);
+    last = summary.report.num_landmarks;
+  }
+  EXPECT_LT(last, map->landmarks().size() / 5);
+}
+
+TEST(MapSummaryTest, KeepsEnoughLandmarksAtEachPlaceOrNoMoreThanAsked) {
+  const auto map = testing::makeWorld(1);
+  SummaryOptions options;
+  options.max_sigma_factor = 10.0;
+  options.min_landmarks_per_place = 40;
+  const SummaryMap summary = summarizeMap(*map, options);
+  for (size_t k = 0; k < summary.map->keyframes().size(); ++k) {
+    const size_t num_kept =
+        summary.map->observationsOf(k, 1).second - summary.map->observationsOf(k, 0).first;
+    const size_t num_before = map->observationsOf(k, 1).second - map->observationsOf(k, 0).first;
+    EXPECT_GE(num_kept, std::min<size_t>(40, num_before));
+  }
+  options.max_landmark_ratio = 0.05;
+  EXPECT_LE(summarizeMap(*map, options).report.num_landmarks, map->landmarks().size() / 20 + 1);
+}
+
+// A landmark that is gone says nothing about the pose.
+TEST(MapSummaryTest, PrefersLandmarksThatAreStillThere) {
+  SparseMapContents contents = testing::makeWorld(1)->contents();
+  for (size_t i = 0; i < contents.landmarks.size(); ++i) {
+    contents.landmarks[i].presence_log_odds = i % 2 == 0 ? -2.5 : 2.5;
+  }
+  SummaryOptions options;
+  options.max_landmark_ratio = 0.2;
+  options.max_sigma_factor = 1.0;
+  int num_present = 0;
+  const SummaryMap summary = summarizeMap(SparseMap(contents), options);
+  for (const MapLandmark& landmark : summary.map->landmarks()) {
+    num_present += landmark.presence_log_odds > 0.0 ? 1 : 0;
+  }
+  EXPECT_GT(num_present, static_cast<int>(summary.report.num_landmarks) * 3 / 4);
+  EXPECT_EQ(summarizeMap(SparseMap(contents), options).map->contentHash(), summary.map->contentHash());
+}
+
+}  // namespace
+}  // namespace vcharge
