@@ -36,6 +36,7 @@ nlohmann::json toJson(const std::string& path, const MergeReport& report) {
           {"num_undecided_loops", report.num_undecided_loops},
           {"num_rejected_loops", report.num_rejected_loops},
           {"common_ratio", report.common_ratio},
+          {"chance_ratio", report.chance_ratio},
           {"rms_px", report.rms_px}};
 }
 
@@ -44,7 +45,8 @@ void print(const std::string& path, const MergeReport& report) {
             << "; loops: " << report.num_accepted_loops << " accepted, " << report.num_undecided_loops
             << " undecided, " << report.num_rejected_loops << " rejected";
   if (report.common_ratio > 0.0) {
-    std::cout << "; " << 100.0 * report.common_ratio << " % of the landmarks in view are common";
+    std::cout << "; " << 100.0 * report.common_ratio << " % of the landmarks in view are common (by chance "
+              << 100.0 * report.chance_ratio << " %)";
   }
   if (report.joined) {
     std::cout << "; " << report.rms_px << " px RMS";
@@ -129,7 +131,8 @@ int main(int argc, char** argv) {
   addShowOptions(&app, &arguments.show_options);
   app.footer(
       "Keys of --json: sessions (session, joined, remark, num_accepted_loops, num_undecided_loops, "
-      "num_rejected_loops, common_ratio, rms_px), num_sessions, num_keyframes, num_landmarks, content_hash.");
+      "num_rejected_loops, common_ratio, chance_ratio, rms_px), num_sessions, num_keyframes, num_landmarks, "
+      "content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     MergeOptions options;
     if (!arguments.options.empty()) {

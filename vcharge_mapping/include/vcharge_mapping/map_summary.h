@@ -14,7 +14,8 @@ struct SummaryOptions {
   VCHARGE_OPTION(double, max_sigma_factor, 2.0, atLeast(1.0),
                  "Largest deviation of a pose over that with all landmarks.");
   VCHARGE_OPTION(double, max_landmark_ratio, 1.0, above(0.0).upTo(1.0), "Largest part of landmarks to keep.");
-  VCHARGE_OPTION(int, min_landmarks_per_place, 80, atLeast(0), "Least landmarks of a keyframe.");
+  VCHARGE_OPTION(double, min_found_per_place, 150.0, notNegative(),
+                 "Least landmarks of a keyframe that another drive is expected to find.");
   VCHARGE_END_OPTIONS();
 };
 
@@ -31,10 +32,11 @@ struct SummaryMap {
 };
 
 /// A map with as few landmarks as localization needs: at each keyframe, the covariance of a pose from the
-/// landmarks in view stays below a bound. Landmarks are chosen greedily by how much they add to the
-/// determinants of the poses' information, over all keyframes that observe them (a submodular function, so
-/// that this is near the best choice: Nemhauser et al., 1978), each weighted by the probability that it is
-/// still there. Ids stay. Deterministic.
+/// landmarks in view stays below a bound, and another drive finds enough of them. Landmarks are chosen
+/// greedily by how much they add to the determinants of the poses' information, over all keyframes that
+/// observe them (a submodular function, so that this is near the best choice: Nemhauser et al., 1978), each
+/// weighted by the probability that another drive finds it: landmarks that several drives have seen count
+/// more. Ids stay. Deterministic.
 SummaryMap summarizeMap(const SparseMap& map, const SummaryOptions& options);
 
 }  // namespace vcharge

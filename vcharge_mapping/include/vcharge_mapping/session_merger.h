@@ -18,8 +18,8 @@ struct MergeOptions {
   VCHARGE_OPTION_GROUP(LoopClosureOptions, loops, {}, "Common places of map and session.");
   VCHARGE_OPTION_GROUP(LandmarkSearchOptions, search, {}, "Search for landmarks that both have.");
   VCHARGE_OPTION_GROUP(BundleAdjustmentOptions, bundle, {}, "Adjustment of all sessions together.");
-  VCHARGE_OPTION(double, min_common_ratio, 0.1, between(0.0, 1.0),
-                 "Least part of the landmarks in view that both have, where they meet.");
+  VCHARGE_OPTION(double, min_common_over_chance, 3.0, notNegative(),
+                 "Least common landmarks where they meet, over those that a wrong pose gives.");
   VCHARGE_END_OPTIONS();
 };
 
@@ -31,8 +31,9 @@ struct MergeReport {
   int num_rejected_loops = 0;   ///< contradicted, or of too few matches
   /// Part of the session's observations, where it passes keyframes of the map, whose landmark both have.
   double common_ratio = 0.0;
-  double rms_px = 0.0;  ///< of all observations after the adjustment
-  std::string remark;   ///< why they were not joined; empty if they were
+  double chance_ratio = 0.0;  ///< the same if each pose of the session is turned around, which is wrong
+  double rms_px = 0.0;        ///< of all observations after the adjustment
+  std::string remark;         ///< why they were not joined; empty if they were
 };
 
 /// A map with the sessions of another one.
@@ -47,9 +48,9 @@ void requireSameRig(const SparseMap& map, const SparseMap& session, const std::s
 
 /// Adds the sessions of a map to another map: common places are found by their images and verified by
 /// geometry; loops between the two are believed in groups (optimizeRobustly()); where they meet, both must
-/// have landmarks in common; then all sessions are adjusted together, with fixed rig. Without common places
-/// the session becomes a component of its own beside the others. Ids of the map stay; those of the session
-/// are assigned anew. Data parallel, deterministic. InputError as requireSameRig().
+/// have more landmarks in common than chance gives; then all sessions are adjusted together, with fixed rig.
+/// Without common places the session becomes a component of its own beside the others. Ids of the map stay;
+/// those of the session are assigned anew. Data parallel, deterministic. InputError as requireSameRig().
 MergedMap mergeSession(const SparseMap& map, const SparseMap& session, const MergeOptions& options,
                        const StageCallback& progress);
 

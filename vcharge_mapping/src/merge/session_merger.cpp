@@ -59,9 +59,12 @@ class SessionMerger {
               : "no common places";
       return keptApart();
     }
-    stages_.run("landmark search", [&] { searchLandmarks(options_.search, &state_.data); });
-    report_.common_ratio = commonRatio();
-    if (report_.common_ratio < options_.min_common_ratio) {
+    stages_.run("landmark search", [&] {
+      report_.chance_ratio = chanceRatio();
+      searchLandmarks(options_.search, &state_.data);
+      report_.common_ratio = commonRatio(state_.data);
+    });
+    if (report_.common_ratio <= options_.min_common_over_chance * report_.chance_ratio) {
       report_.joined = false;
       report_.remark = "places that look alike, but few landmarks are the same";
       return keptApart();
@@ -157,20 +160,21 @@ class SessionMerger {
                        });
   }
 
-  double commonRatio() const {
-    std::vector<char> is_in_map(state_.data.tracks.size(), 0);
-    for (size_t t = 0; t < state_.data.tracks.size(); ++t) {
-      for (const TrackObservation& observation : state_.data.tracks[t].observations) {
+  /// Part of the session's observations, where it meets the map, whose landmark both have.
+  double commonRatio(const ReconstructionData& data) const {
+    std::vector<char> is_in_map(data.tracks.size(), 0);
+    for (size_t t = 0; t < data.tracks.size(); ++t) {
+      for (const TrackObservation& observation : data.tracks[t].observations) {
         is_in_map[t] |= observation.keyframe < first_of_new_ ? 1 : 0;
       }
     }
     int64_t num_common = 0;
     int64_t num_observed = 0;
-    for (size_t k = static_cast<size_t>(first_of_new_); k < state_.data.keyframes.size(); ++k) {
+    for (auto k = static_cast<size_t>(first_of_new_); k < data.keyframes.size(); ++k) {
       if (!meetsMap(state_.data.keyframes[k])) {
         continue;
       }
-      for (const KeyframeImage& image : state_.data.keyframes[k].images) {
+      for (const KeyframeImage& image : data.keyframes[k].images) {
         for (const int32_t track : image.track_of_feature) {
           ++num_observed;
           num_common += track >= 0 && is_in_map[track] != 0 ? 1 : 0;
@@ -178,6 +182,24 @@ class SessionMerger {
       }
     }
     return num_observed == 0 ? 0.0 : static_cast<double>(num_common) / static_cast<double>(num_observed);
+  }
+
+  /// The common ratio that the search finds by chance: with the session's vehicle turned around everywhere.
+  double chanceRatio() const {
+    ReconstructionData turned = state_.data;
+    const RigidTransform around = RigidTransform::planar(0.0, 0.0, M_PI);
+    for (auto k = static_cast<size_t>(first_of_new_); k < turned.keyframes.size(); ++k) {
+      turned.keyframes[k].map_from_vehicle = turned.keyframes[k].map_from_vehicle * around;
+    }
+    for (Track& track : turned.tracks) {
+      const size_t first = static_cast<size_t>(track.observations.front().keyframe);
+      if (track.observations.front().keyframe >= first_of_new_) {
+        track.position_m = turned.keyframes[first].map_from_vehicle *
+                           (state_.data.keyframes[first].map_from_vehicle.inverse() * *track.position_m);
+      }
+    }
+    searchLandmarks(options_.search, &turned);
+    return commonRatio(turned);
   }
 
   const MergeOptions options_;

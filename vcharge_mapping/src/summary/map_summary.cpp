@@ -21,6 +21,8 @@ using Matrix36d = Eigen::Matrix<double, 3, 6>;
 /// A pose is known that well without any landmark; keeps the information regular.
 constexpr double kPriorSigma_m = 1.0;
 constexpr double kPriorSigma_rad = 0.2;
+/// A landmark that only one drive saw is found by another one with a probability of a quarter.
+constexpr double kUnconfirmedLogOdds = -1.0;
 /// Deviation of an observed direction.
 constexpr double kRaySigma_rad = 0.002;
 
@@ -28,6 +30,7 @@ constexpr double kRaySigma_rad = 0.002;
 struct View {
   int32_t keyframe = 0;
   Matrix36d jacobian = Matrix36d::Zero();
+  double found = 0.0;  ///< probability that another drive finds it
 };
 
 class LandmarkChooser {
@@ -37,8 +40,8 @@ class LandmarkChooser {
         options_(options),
         views_(map.landmarks().size()),
         chosen_(map.landmarks().size(), false),
-        num_chosen_of_(map.keyframes().size(), 0),
-        num_all_of_(map.keyframes().size(), 0) {
+        found_(map.keyframes().size(), 0.0),
+        found_of_all_(map.keyframes().size(), 0.0) {
     Matrix6d prior = Matrix6d::Zero();
     prior.diagonal().head<3>().setConstant(1.0 / (kPriorSigma_m * kPriorSigma_m));
     prior.diagonal().tail<3>().setConstant(1.0 / (kPriorSigma_rad * kPriorSigma_rad));
@@ -51,7 +54,7 @@ class LandmarkChooser {
         views_[l].push_back(viewOf(map.observations()[*i]));
         const View& view = views_[l].back();
         all[view.keyframe] += view.jacobian.transpose() * view.jacobian;
-        ++num_all_of_[view.keyframe];
+        found_of_all_[view.keyframe] += view.found;
       }
     }
     for (const Matrix6d& information : all) {
@@ -117,17 +120,16 @@ class LandmarkChooser {
     motion << -Eigen::Matrix3d::Identity(), crossMatrix(in_vehicle);
     const double variance_rad2 =
         kRaySigma_rad * kRaySigma_rad + landmark.covariance_m2.trace() / 3.0 / (range_m * range_m);
-    const double presence = 1.0 / (1.0 + std::exp(-landmark.presence_log_odds));
     View view;
     view.keyframe = observation.keyframe;
-    view.jacobian = std::sqrt(presence / variance_rad2) / range_m *
+    view.found = 1.0 / (1.0 + std::exp(-landmark.presence_log_odds - kUnconfirmedLogOdds));
+    view.jacobian = std::sqrt(view.found / variance_rad2) / range_m *
                     (Eigen::Matrix3d::Identity() - ray * ray.transpose()) * motion;
     return view;
   }
 
   bool hasEnough(int32_t keyframe) const {
-    const int needed = std::min(options_.min_landmarks_per_place, num_all_of_[keyframe]);
-    return num_chosen_of_[keyframe] >= needed &&
+    return found_[keyframe] >= std::min(options_.min_found_per_place, found_of_all_[keyframe]) &&
            positionSigma_m(covariance_[keyframe]) <= options_.max_sigma_factor * sigma_of_all_m_[keyframe];
   }
 
@@ -149,7 +151,7 @@ class LandmarkChooser {
     for (const View& view : views_[landmark]) {
       information_[view.keyframe] += view.jacobian.transpose() * view.jacobian;
       covariance_[view.keyframe] = information_[view.keyframe].inverse();
-      ++num_chosen_of_[view.keyframe];
+      found_[view.keyframe] += view.found;
     }
   }
 
@@ -157,7 +159,7 @@ class LandmarkChooser {
   const SummaryOptions& options_;
   std::vector<std::vector<View>> views_;
   std::vector<bool> chosen_;
-  std::vector<int> num_chosen_of_, num_all_of_;
+  std::vector<double> found_, found_of_all_;  // expected numbers of landmarks that another drive finds
   std::vector<Matrix6d> information_, covariance_;
   std::vector<double> sigma_of_all_m_;
 };

@@ -86,7 +86,7 @@ TEST_F(MapUpdaterTest, ImagesThatShowLittleTellLittle) {
       [](int landmark) { return landmark % 10 != 0; });
   const auto lowestOdds = [&](const SparseMap& session) {
     MergeOptions options;
-    options.min_common_ratio = 0.0;
+    options.min_common_over_chance = 0.0;
     const MergedMap merged = mergeSession(*driveOn(0), session, options, nullptr);
     EXPECT_TRUE(merged.report.joined);
     double sum = 0.0;
