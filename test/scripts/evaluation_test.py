@@ -286,8 +286,8 @@ manager 1 2.2: 5 cycles:
 
 class ArgumentsTest(FolderTest):
     def test_every_stage_has_help(self):
-        for stage in ("masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "objects",
-                      "conditions", "faults", "chain", "online", "soak"):
+        for stage in ("masks", "calibration", "mapping", "localization", "living_map", "ranges", "height_map", "obstacles",
+                      "objects", "conditions", "faults", "chain", "online", "soak"):
             output, arguments = io.StringIO(), sys.argv
             self.addCleanup(setattr, sys, "argv", arguments)
             sys.argv = ["evaluate.sh", stage, "--help"]

@@ -62,6 +62,7 @@ class MappingNodeletTest(unittest.TestCase):
         self.assertTrue(self.load("/mapping", "vcharge_mapping/mapping_nodelet", [], [], [], "").success)
         self.finish = rospy.ServiceProxy("/mapping/finish", Trigger)
         self.save = rospy.ServiceProxy("/mapping/save", Trigger)
+        self.merge = rospy.ServiceProxy("/mapping/merge", Trigger)
         self.finish.wait_for_service(TIMEOUT_S)
         self.diagnostics.clear()
         reach(self.publishers, self.diagnostics.heard, self.subscribers)
@@ -115,6 +116,9 @@ class MappingNodeletTest(unittest.TestCase):
         saved, offline = numbers_of_map(self.output), numbers_of_map(self.offline_map)
         for column, values in offline.items():
             np.testing.assert_array_equal(saved[column], values, column)
+        merged = self.merge()
+        self.assertFalse(merged.success)
+        self.assertIn("has this drive already", merged.message)
         again = self.finish()
         self.assertFalse(again.success)
         self.assertIn("made before", again.message)

@@ -55,14 +55,6 @@ class Steps {
   std::optional<ProgressBar> bar_;
 };
 
-Trajectory keyframesOf(const std::string& map_path) {
-  Trajectory trajectory;
-  for (const MapKeyframe& keyframe : readSparseMap(map_path)->keyframes()) {
-    trajectory.push_back({keyframe.stamp, keyframe.map_from_vehicle});
-  }
-  return trajectory;
-}
-
 /// Prints a summary and returns it for --json.
 nlohmann::json report(const HeightMapResult& result) {
   const HeightMapStatistics& statistics = result.statistics;
@@ -97,7 +89,7 @@ std::optional<Trajectory> readPoses(const Arguments& arguments) {
     return readTrajectory(arguments.trajectory);
   }
   if (!arguments.map.empty()) {
-    return keyframesOf(arguments.map);
+    return trajectoryOf(*readSparseMap(arguments.map));
   }
   return std::nullopt;
 }

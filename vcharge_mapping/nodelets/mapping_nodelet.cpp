@@ -6,8 +6,8 @@
 #include <visualization_msgs/MarkerArray.h>
 #include <pluginlib/class_list_macros.hpp>
 
-#include "vcharge_core/base/error.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
+#include "vcharge_mapping/map_file_update.h"
 #include "vcharge_mapping/mapping_session.h"
 #include "vcharge_reconstruction/live_view.h"
 #include "vcharge_ros/nodelet.h"
@@ -17,10 +17,10 @@ namespace vcharge {
 
 /// Maps a live or replayed drive as build_map does. Publishes the growing path and the newest landmarks on
 /// /mapping/trajectory and /mapping/landmarks; once the map is made, the whole map, latched, with
-/// /mapping/loop_edges, in the frame `map`. Services: ~finish starts to make the map and returns,
-/// /diagnostics reports the progress; ~save writes it. Parameters: ~rig (path), ~output (path of the *.vmap),
-/// ~options (SparseMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every image in order,
-/// as build_map; otherwise those that wait too long are dropped).
+/// /mapping/loop_edges, in the frame `map`. Services: ~finish starts to make the map, /diagnostics reports the
+/// progress; ~save writes it; ~merge updates the map file by it. Parameters: ~rig (path), ~output (path of
+/// the *.vmap), ~options (SparseMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every
+/// image in order, as build_map; otherwise those that wait too long are dropped).
 class MappingNodelet : public Nodelet {
  public:
   MappingNodelet() : Nodelet("mapping") {}
@@ -46,6 +46,7 @@ class MappingNodelet : public Nodelet {
     addDiagnostics(
         "/map", [this] { return report(); }, Threads::kSeveral);
     serve("finish", [this](Response* response) { finish(response); });
+    serve("merge", [this](Response* response) { merge(response); });
     serve("save", [this](Response* response) { save(response); });
     runSource(session_.get());
   }
@@ -55,14 +56,22 @@ class MappingNodelet : public Nodelet {
     response->success = session_->finish(&response->message) ? 1 : 0;
   }
 
+  void merge(Response* response) {
+    const std::string path = requireParameter("output", "the path of the map to update (*.vmap)");
+    const MapFileUpdate update =
+        updateMapFile(path, nameLiveDrive(*session_->requireMap()), "the drive", "mapping_nodelet 0.1.0",
+                      kMaxMapVersions, UpdateOptions(), nullptr);
+    publish(*update.updated.map);
+    response->success = 1;
+    response->message = path + ": version " + std::to_string(update.version);
+  }
+
   void save(Response* response) {
     const std::string path = requireParameter("output", "the path of the map to write (*.vmap)");
-    const std::shared_ptr<const SparseMap> map = session_->map();
-    if (!map) {
-      throw InputError("no map yet, expected one that ~finish made: " + session_->status().message);
-    }
+    const std::shared_ptr<const SparseMap> map = session_->requireMap();
     writeSparseMap(*map,
                    {{"rig", rig_path_},
+                    {"bag_hash", map->contentHash()},
                     {"mapper_options", YAML::Dump(writeFields(options_))},
                     {"program", "mapping_nodelet 0.1.0"}},
                    path);

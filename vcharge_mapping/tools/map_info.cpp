@@ -18,7 +18,12 @@ nlohmann::json toJson(const vcharge::SparseMap& map, const vcharge::MapProvenanc
   const auto& edges = map.contents().loop_edges;
   const auto num_accepted = std::count_if(edges.begin(), edges.end(),
                                           [](const vcharge::MapLoopEdge& edge) { return edge.accepted; });
-  return {{"num_keyframes", map.keyframes().size()},
+  nlohmann::json sessions = nlohmann::json::array();
+  for (const vcharge::MapSession& session : map.sessions()) {
+    sessions.push_back({{"name", session.name}, {"component", session.component}});
+  }
+  return {{"sessions", sessions},
+          {"num_keyframes", map.keyframes().size()},
           {"num_landmarks", map.landmarks().size()},
           {"num_observations", map.observations().size()},
           {"num_loop_edges", num_accepted},
@@ -38,7 +43,8 @@ int main(int argc, char** argv) {
   app.add_option("--trajectory", trajectory_path, "keyframe poses as TUM text")
       ->check(vcharge::requireOutput);
   app.footer(
-      "Keys of --json: num_keyframes, num_landmarks, num_observations, num_loop_edges (accepted), cameras "
+      "Keys of --json: sessions (name, component), num_keyframes, num_landmarks, num_observations, "
+      "num_loop_edges (accepted), cameras "
       "(name, "
       "num_observations, rms_px), provenance, content_hash.");
   return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {

@@ -5,6 +5,7 @@
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/base/utc_time.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
+#include "vcharge_mapping/map_file_update.h"
 
 namespace {
 
@@ -32,7 +33,7 @@ int main(int argc, char** argv) {
   CLI::App app("Lists the versions of a map, and goes back to an earlier one.");
   std::string path;
   std::optional<int64_t> back_to;
-  int max_versions = 5;
+  int max_versions = kMaxMapVersions;
   app.add_option("--map", path, "the map (*.vmap)")->required()->check(requireNotEmpty);
   app.add_option("--back-to", back_to, "version whose content becomes the newest version");
   app.add_option("--max-versions", max_versions, "versions that the file keeps")

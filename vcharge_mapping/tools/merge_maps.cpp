@@ -6,13 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "named_sessions.h"
 #include "stage_bars.h"
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/base/utc_time.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
+#include "vcharge_mapping/map_file_update.h"
 #include "vcharge_mapping/session_merger.h"
 
 namespace {
@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 struct Arguments {
   std::string map, output, options;
   std::vector<std::string> sessions;
-  int max_versions = 5;
+  int max_versions = kMaxMapVersions;
   bool requires_overlap = false;
   bool show_options = false;
 };
@@ -60,9 +60,9 @@ void mergeMaps(const Arguments& arguments, const MergeOptions& options, nlohmann
   if (fs::exists(arguments.output)) {
     lock.emplace(arguments.output);
   }
-  std::shared_ptr<const SparseMap> map = readWithSessions(arguments.map);
+  std::shared_ptr<const SparseMap> map = readMapWithSessions(arguments.map);
   for (const std::string& path : arguments.sessions) {
-    const std::shared_ptr<const SparseMap> session = readWithSessions(path);
+    const std::shared_ptr<const SparseMap> session = readMapWithSessions(path);
     requireSameRig(*map, *session, path);
     requireNewDrive(*map, *session, path);
   }
@@ -70,7 +70,7 @@ void mergeMaps(const Arguments& arguments, const MergeOptions& options, nlohmann
   (*found)["sessions"] = nlohmann::json::array();
   for (size_t i = 0; i < arguments.sessions.size(); ++i) {
     const std::string& path = arguments.sessions[i];
-    const std::shared_ptr<const SparseMap> session = readWithSessions(path);
+    const std::shared_ptr<const SparseMap> session = readMapWithSessions(path);
     requireNewDrive(*map, *session, path);  // nor has one of the sessions before
     const MergedMap merged = mergeSession(*map, *session, options, [&](const StageProgress& progress) {
       bars.show(progress.stage, progress.number, progress.num_stages, progress.fraction);

@@ -8,6 +8,7 @@
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/base/utc_time.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
+#include "vcharge_mapping/map_description.h"
 #include "vcharge_mapping/map_summary.h"
 
 namespace {
@@ -19,19 +20,6 @@ struct Arguments {
   std::string map, output, options;
   bool show_options = false;
 };
-
-/// Length of the drives in a map.
-double lengthOf_m(const SparseMap& map) {
-  double length_m = 0.0;
-  for (size_t i = 1; i < map.keyframes().size(); ++i) {
-    const MapKeyframe& previous = map.keyframes()[i - 1];
-    const MapKeyframe& keyframe = map.keyframes()[i];
-    if (keyframe.session == previous.session) {
-      length_m += (keyframe.map_from_vehicle.translation() - previous.map_from_vehicle.translation()).norm();
-    }
-  }
-  return length_m;
-}
 
 void summarize(const Arguments& arguments, const SummaryOptions& options, nlohmann::json* found) {
   MapProvenance provenance;

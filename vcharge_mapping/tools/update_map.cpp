@@ -2,42 +2,33 @@
 #include <memory>
 #include <string>
 
-#include "named_sessions.h"
 #include "stage_bars.h"
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/base/options.h"
-#include "vcharge_core/base/utc_time.h"
-#include "vcharge_mapping/map_updater.h"
+#include "vcharge_mapping/map_file_update.h"
 
 namespace {
 
 using namespace vcharge;
-namespace fs = std::filesystem;
 
 struct Arguments {
   std::string map, session, options;
-  int max_versions = 5;
+  int max_versions = kMaxMapVersions;
   bool show_options = false;
 };
 
 void updateMapFile(const Arguments& arguments, const UpdateOptions& options, nlohmann::json* found) {
-  const MapFileLock lock(arguments.map);
-  const std::shared_ptr<const SparseMap> map = readWithSessions(arguments.map);
-  const std::shared_ptr<const SparseMap> session = readWithSessions(arguments.session);
-  requireSameRig(*map, *session, arguments.session);
-  requireNewDrive(*map, *session, arguments.session);
+  const std::shared_ptr<const SparseMap> session = readMapWithSessions(arguments.session);
   StageBars bars;
-  const UpdatedMap updated = updateMap(*map, *session, options, [&](const StageProgress& progress) {
-    bars.show(progress.stage, progress.number, progress.num_stages, progress.fraction);
-  });
+  const MapFileUpdate update =
+      updateMapFile(arguments.map, *session, arguments.session, "update_map 0.1.0", arguments.max_versions,
+                    options, [&](const StageProgress& progress) {
+                      bars.show(progress.stage, progress.number, progress.num_stages, progress.fraction);
+                    });
   bars.end();
+  const UpdatedMap& updated = update.updated;
+  const int64_t version = update.version;
   const UpdateReport& report = updated.report;
-  const int64_t version = addMapVersion(*updated.map,
-                                        {{"bag", session->sessions().front().name},
-                                         {"program", "update_map 0.1.0"},
-                                         {"date", utcNow()},
-                                         {"change", "updated by " + session->sessions().front().name}},
-                                        arguments.max_versions, arguments.map);
   std::cout << "loops: " << report.merge.num_accepted_loops << " accepted; "
             << 100.0 * report.merge.common_ratio << " % of the landmarks in view are common; "
             << report.merge.rms_px << " px RMS\nlandmarks: " << report.num_seen_landmarks << " seen again, "

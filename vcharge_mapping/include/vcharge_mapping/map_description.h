@@ -2,7 +2,6 @@
 
 #include <string>
 
-#include "vcharge_core/motion/trajectory.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 
 namespace vcharge {
@@ -11,8 +10,8 @@ namespace vcharge {
 /// lists every loop edge in addition to their counts.
 std::string describeMap(const SparseMap& map, const MapProvenance& provenance, bool list_loop_edges = false);
 
-/// The poses of the keyframes, map_from_vehicle.
-Trajectory trajectoryOf(const SparseMap& map);
+/// Length of the drives in a map.
+double lengthOf_m(const SparseMap& map);
 
 /// Distances between the observations of a camera and the projections of their landmarks. `num_invisible`
 /// counts landmarks that the camera model does not project.

@@ -48,6 +48,8 @@ class MappingSession : public DriveConsumer {
   Status status() const;
   /// The finished map; null before.
   std::shared_ptr<const SparseMap> map() const;
+  /// The finished map, or an InputError with the state.
+  std::shared_ptr<const SparseMap> requireMap() const;
 
  private:
   void run();

@@ -3,6 +3,8 @@
 #include <exception>
 #include <utility>
 
+#include "vcharge_core/base/error.h"
+
 namespace vcharge {
 namespace {
 
@@ -138,6 +140,14 @@ MappingSession::Status MappingSession::status() const {
 std::shared_ptr<const SparseMap> MappingSession::map() const {
   const std::lock_guard<std::mutex> lock(status_mutex_);
   return map_;
+}
+
+std::shared_ptr<const SparseMap> MappingSession::requireMap() const {
+  std::shared_ptr<const SparseMap> finished = map();
+  if (!finished) {
+    throw InputError("no map yet, expected one that ~finish made: " + status().message);
+  }
+  return finished;
 }
 
 }  // namespace vcharge

@@ -40,15 +40,17 @@ void describeSize(const SparseMap& map, std::string* text) {
   const auto& keyframes = map.keyframes();
   append(text, "keyframes     %zu", keyframes.size());
   if (!keyframes.empty()) {
-    double length_m = 0.0;
-    for (size_t i = 1; i < keyframes.size(); ++i) {
-      length_m +=
-          (keyframes[i].map_from_vehicle.translation() - keyframes[i - 1].map_from_vehicle.translation())
-              .norm();
+    append(text, " over %.1f m", lengthOf_m(map));
+    if (map.sessions().size() == 1) {
+      append(text, " and %.1f s", toSeconds(keyframes.back().stamp - keyframes.front().stamp));
     }
-    append(text, " over %.1f m and %.1f s, from %s on", length_m,
-           toSeconds(keyframes.back().stamp - keyframes.front().stamp),
-           toString(keyframes.front().stamp).c_str());
+    append(text, ", from %s on", toString(keyframes.front().stamp).c_str());
+  }
+  if (map.sessions().size() > 1) {
+    append(text, "\nsessions      %zu", map.sessions().size());
+    for (const MapSession& session : map.sessions()) {
+      append(text, "\n  component %d: %s", session.component, session.name.c_str());
+    }
   }
   append(text, "\nlandmarks     %zu\nobservations  %zu, each with %d %s\n", map.landmarks().size(),
          map.observations().size(), map.descriptors().cols,
@@ -162,12 +164,16 @@ void describeProvenance(const MapProvenance& provenance, std::string* text) {
 
 }  // namespace
 
-Trajectory trajectoryOf(const SparseMap& map) {
-  Trajectory trajectory;
-  for (const MapKeyframe& keyframe : map.keyframes()) {
-    trajectory.push_back({keyframe.stamp, keyframe.map_from_vehicle});
+double lengthOf_m(const SparseMap& map) {
+  double length_m = 0.0;
+  for (size_t i = 1; i < map.keyframes().size(); ++i) {
+    const MapKeyframe& previous = map.keyframes()[i - 1];
+    const MapKeyframe& keyframe = map.keyframes()[i];
+    if (keyframe.session == previous.session) {
+      length_m += (keyframe.map_from_vehicle.translation() - previous.map_from_vehicle.translation()).norm();
+    }
   }
-  return trajectory;
+  return length_m;
 }
 
 ReprojectionErrors measureReprojection(const SparseMap& map, size_t camera) {

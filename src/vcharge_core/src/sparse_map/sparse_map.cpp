@@ -238,4 +238,14 @@ std::string SparseMap::hash(bool with_sessions) const {
   return hasher.hex();
 }
 
+Trajectory trajectoryOf(const SparseMap& map) {
+  Trajectory trajectory;
+  for (const MapKeyframe& keyframe : map.keyframes()) {
+    trajectory.push_back({keyframe.stamp, keyframe.map_from_vehicle});
+  }
+  std::stable_sort(trajectory.begin(), trajectory.end(),
+                   [](const StampedTransform& a, const StampedTransform& b) { return a.stamp < b.stamp; });
+  return trajectory;
+}
+
 }  // namespace vcharge

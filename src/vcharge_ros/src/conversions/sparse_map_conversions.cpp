@@ -83,11 +83,7 @@ sensor_msgs::PointCloud2 makeLandmarkCloud(const std::vector<Eigen::Vector3d>& p
 }
 
 nav_msgs::Path makePath(const SparseMap& map, const std::string& frame_id) {
-  Trajectory trajectory;
-  for (const MapKeyframe& keyframe : map.keyframes()) {
-    trajectory.push_back({keyframe.stamp, keyframe.map_from_vehicle});
-  }
-  return makePath(trajectory, frame_id);
+  return makePath(trajectoryOf(map), frame_id);
 }
 
 nav_msgs::Path makePath(const Trajectory& trajectory, const std::string& frame_id) {

@@ -13,6 +13,7 @@
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/motion/rigid_transform.h"
+#include "vcharge_core/motion/trajectory.h"
 
 namespace vcharge {
 
@@ -121,5 +122,8 @@ class SparseMap {
   std::vector<size_t> begin_of_landmark_;  // indices into observations_by_landmark_
   std::vector<int32_t> observations_by_landmark_;
 };
+
+/// Poses of the keyframes, in order of their stamps.
+Trajectory trajectoryOf(const SparseMap& map);
 
 }  // namespace vcharge
