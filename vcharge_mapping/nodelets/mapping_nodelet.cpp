@@ -17,8 +17,8 @@ namespace vcharge {
 
 /// Maps a live or replayed drive as build_map does. Publishes the growing path and the newest landmarks on
 /// /mapping/trajectory and /mapping/landmarks; once the map is made, the whole map, latched, with
-/// /mapping/loop_edges, in the frame `map`. Services: ~finish starts to make the map, /diagnostics reports the
-/// progress; ~save writes it; ~merge updates the map file by it. Parameters: ~rig (path), ~output (path of
+/// /mapping/loop_edges, in the frame `map`. Services: ~finish starts to make the map (/diagnostics tells the
+/// progress), ~save writes it, ~merge updates the map file by it. Parameters: ~rig (path), ~output (path of
 /// the *.vmap), ~options (SparseMapperOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every
 /// image in order, as build_map; otherwise those that wait too long are dropped).
 class MappingNodelet : public Nodelet {
