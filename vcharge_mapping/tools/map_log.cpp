@@ -17,13 +17,13 @@ std::string valueOf(const MapVersion& version, const char* key) {
 }
 
 void goBack(const std::string& path, int64_t number, int max_versions) {
-  const MapFileLock lock(path);
+  MapFileLock lock(path);
   const std::shared_ptr<const SparseMap> map = readSparseMap(path, nullptr, number);
   const int64_t added = addMapVersion(*map,
                                       {{"program", "map_log 0.1.0"},
                                        {"date", utcNow()},
                                        {"change", "back to version " + std::to_string(number)}},
-                                      max_versions, path);
+                                      max_versions, &lock);
   std::printf("written: %s, version %lld\n", path.c_str(), static_cast<long long>(added));
 }
 

@@ -3,6 +3,7 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -54,6 +55,23 @@ void print(const std::string& path, const MergeReport& report) {
   std::cout << "\n";
 }
 
+/// Copies a map file with its versions, and locks the copy.
+void copyLocked(const std::string& from, const std::string& to, std::optional<MapFileLock>* lock) {
+  writeFileAtomically(to, [&](const std::string& temporary) {
+    std::error_code error;
+    fs::copy_file(from, temporary, fs::copy_options::overwrite_existing, error);
+    if (error) {
+      throw InputError(to + ": cannot be written: " + error.message());
+    }
+    if (*lock) {
+      (*lock)->moveTo(temporary);
+    }
+  });
+  if (!*lock) {
+    lock->emplace(to);
+  }
+}
+
 void mergeMaps(const Arguments& arguments, const MergeOptions& options, nlohmann::json* found) {
   const bool in_place = fs::exists(arguments.output) && fs::equivalent(arguments.map, arguments.output);
   std::optional<MapFileLock> lock;
@@ -82,7 +100,7 @@ void mergeMaps(const Arguments& arguments, const MergeOptions& options, nlohmann
       throw InputError(path + ": " + merged.report.remark + ": not merged");
     }
     if (i == 0 && !in_place) {
-      fs::copy_file(arguments.map, arguments.output, fs::copy_options::overwrite_existing);
+      copyLocked(arguments.map, arguments.output, &lock);
     }
     map = merged.map;
     const int64_t version =
@@ -92,18 +110,20 @@ void mergeMaps(const Arguments& arguments, const MergeOptions& options, nlohmann
                        {"date", utcNow()},
                        {"change", std::string(merged.report.joined ? "joined " : "added apart ") +
                                       fs::path(path).filename().string()}},
-                      arguments.max_versions, arguments.output);
+                      arguments.max_versions, &*lock);
     std::cout << "written: " << arguments.output << ", version " << version << "\n";
   }
-  int num_components = 0;
+  std::set<int32_t> components;
   for (const MapSession& session : map->sessions()) {
-    num_components = std::max(num_components, session.component + 1);
+    components.insert(session.component);
   }
   found->update({{"num_sessions", map->sessions().size()},
+                 {"num_components", components.size()},
                  {"num_keyframes", map->keyframes().size()},
                  {"num_landmarks", map->landmarks().size()},
                  {"content_hash", map->contentHash()}});
-  std::cout << "sessions: " << map->sessions().size() << ", keyframes: " << map->keyframes().size()
+  std::cout << "sessions: " << map->sessions().size() << " in " << components.size()
+            << " components, keyframes: " << map->keyframes().size()
             << ", landmarks: " << map->landmarks().size() << "\ncontent hash: " << map->contentHash() << "\n";
 }
 
@@ -131,7 +151,8 @@ int main(int argc, char** argv) {
   addShowOptions(&app, &arguments.show_options);
   app.footer(
       "Keys of --json: sessions (session, joined, remark, num_accepted_loops, num_undecided_loops, "
-      "num_rejected_loops, common_ratio, chance_ratio, rms_px), num_sessions, num_keyframes, num_landmarks, "
+      "num_rejected_loops, common_ratio, chance_ratio, rms_px), num_sessions, num_components, num_keyframes, "
+      "num_landmarks, "
       "content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     MergeOptions options;

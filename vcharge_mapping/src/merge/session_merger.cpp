@@ -111,11 +111,8 @@ class SessionMerger {
     edges.insert(edges.end(), between_.begin(), between_.end());
     closeLoops(&edges, &state_.data);
     std::vector<std::pair<int32_t, int32_t>> joined;
-    for (size_t i = 0; i < edges.size(); ++i) {
+    for (size_t i = num_within; i < edges.size(); ++i) {
       const LoopEdge& edge = edges[i];
-      if (i < num_within) {
-        continue;
-      }
       if (edge.accepted) {
         ++report_.num_accepted_loops;
         joined.emplace_back(state_.data.keyframes[edge.first].session,

@@ -41,7 +41,7 @@ void requireNewDrive(const SparseMap& map, const SparseMap& session, const std::
 MapFileUpdate updateMapFile(const std::string& path, const SparseMap& session, const std::string& name,
                             const std::string& program, int max_versions, const UpdateOptions& options,
                             const StageCallback& progress) {
-  const MapFileLock lock(path);
+  MapFileLock lock(path);
   const std::shared_ptr<const SparseMap> map = readMapWithSessions(path);
   requireSameRig(*map, session, name);
   requireNewDrive(*map, session, name);
@@ -51,7 +51,7 @@ MapFileUpdate updateMapFile(const std::string& path, const SparseMap& session, c
   update.version = addMapVersion(
       *update.updated.map,
       {{"bag", drive}, {"program", program}, {"date", utcNow()}, {"change", "updated by " + drive}},
-      max_versions, path);
+      max_versions, &lock);
   return update;
 }
 

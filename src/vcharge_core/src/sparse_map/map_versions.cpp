@@ -83,7 +83,8 @@ void writeSparseMap(const SparseMap& map, const MapProvenance& provenance, const
 }
 
 int64_t addMapVersion(const SparseMap& map, const MapProvenance& provenance, int max_versions,
-                      const std::string& path) {
+                      MapFileLock* lock) {
+  const std::string& path = lock->path();
   check(max_versions >= 1, "addMapVersion: expected at least one version");
   int64_t version = 0;
   writeFileAtomically(path, [&](const std::string& temporary) {
@@ -107,6 +108,7 @@ int64_t addMapVersion(const SparseMap& map, const MapProvenance& provenance, int
     if (has_forgotten) {
       database.execute("VACUUM");
     }
+    lock->moveTo(temporary);
   });
   return version;
 }
@@ -135,7 +137,7 @@ void removeCopiesOfDeadProcesses(const fs::path& path) {
 
 }  // namespace
 
-MapFileLock::MapFileLock(const std::string& path) {
+MapFileLock::MapFileLock(const std::string& path) : path_(path) {
   // A writer replaces the file, so that the lock of the file before it means nothing.
   for (;;) {
     descriptor_ = open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -158,6 +160,17 @@ MapFileLock::MapFileLock(const std::string& path) {
     }
     close(descriptor_);
   }
+}
+
+void MapFileLock::moveTo(const std::string& replacement) {
+  const int descriptor = open(replacement.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0 || flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
+    const int reason = errno;
+    close(descriptor);
+    throw InputError(path_ + ": the new version cannot be locked: " + std::strerror(reason));
+  }
+  close(descriptor_);
+  descriptor_ = descriptor;
 }
 
 MapFileLock::~MapFileLock() {

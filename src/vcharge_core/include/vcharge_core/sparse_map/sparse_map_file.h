@@ -41,12 +41,6 @@ std::shared_ptr<const SparseMap> readSparseMap(const std::string& path, MapProve
 /// The versions in a file, oldest first. Errors as those of readSparseMap().
 std::vector<MapVersion> readMapVersions(const std::string& path);
 
-/// Adds a version to an existing file, which keeps the newest `max_versions` ones. Returns the new version's
-/// number. The caller holds the file's MapFileLock. Throws InputError naming the file and the reason; the
-/// file is unchanged then.
-int64_t addMapVersion(const SparseMap& map, const MapProvenance& provenance, int max_versions,
-                      const std::string& path);
-
 /// The right to change a map file: held by one process at a time, from reading the old version to writing the
 /// new one. Released by the destructor, and by the system if the process is killed.
 class MapFileLock {
@@ -57,8 +51,18 @@ class MapFileLock {
   MapFileLock(const MapFileLock&) = delete;
   MapFileLock& operator=(const MapFileLock&) = delete;
 
+  const std::string& path() const { return path_; }
+  /// Locks a file that is about to replace the locked one, instead of that.
+  void moveTo(const std::string& replacement);
+
  private:
+  std::string path_;
   int descriptor_ = -1;
 };
+
+/// Adds a version to the locked file, which keeps the newest `max_versions` ones. Returns the new version's
+/// number. Throws InputError naming the file and the reason; the file is unchanged then.
+int64_t addMapVersion(const SparseMap& map, const MapProvenance& provenance, int max_versions,
+                      MapFileLock* lock);
 
 }  // namespace vcharge
