@@ -206,7 +206,7 @@ def other_car_park(lot, results):
     path = lot.folder("other") / "merged.vmap"
     found = run_tool("merge_maps", path.with_suffix(".log"), "--map", lot.first().folder / "map.vmap", "--session",
                      other.folder / "map.vmap", "--output", path).found["sessions"][0]
-    results.add(f"Another car park, image scale {lot.args.image_scale:g}", (f"lots {lot.seed} and {other.folder.name}", [
+    results.add(f"Another car park, image scale {lot.args.image_scale:g}", (f"lots {lot.seed} and {lot.seed + 1}", [
         figure("joined", int(found["joined"]), equal=0), Figure("loops rejected", found["num_rejected_loops"]),
         Figure("loops undecided", found["num_undecided_loops"])]))
 
