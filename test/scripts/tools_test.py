@@ -254,7 +254,7 @@ class ToolsTest(unittest.TestCase):
             (self.work / name).write_bytes(content)
             self.fail_with("map_info", [name, *words], map=self.work / name, trajectory=self.work / "new.tum")
         for name, sql, words in (("moved.vmap", "UPDATE landmark SET z_m = z_m + 1", ["damaged", "hash"]),
-                                 ("index.vmap", "UPDATE loop_edge SET first = 24", ["loop_edges[0]"])):
+                                 ("index.vmap", "UPDATE loop_edge SET first = 24", ["loop_edge 0", "no such id: 24"])):
             shutil.copy(self.good / "map.vmap", self.work / name)
             connection = sqlite3.connect(str(self.work / name))
             with connection:

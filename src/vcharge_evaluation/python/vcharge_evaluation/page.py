@@ -7,8 +7,9 @@ from vcharge_evaluation.tools import ROOT
 
 PAGE = ROOT / "doc" / "results.md"
 # In the order of the pipeline; other stages follow by name.
-ORDER = ("chain", "conditions", "masks", "calibration", "mapping", "localization", "ranges", "height_map", "obstacles", "standing",
-         "steps", "objects", "faults", "odometry", "images", "online", "real_images", "foundations", "speed")
+ORDER = ("chain", "conditions", "masks", "calibration", "mapping", "localization", "living_map", "ranges", "height_map",
+         "obstacles", "standing", "steps", "objects", "faults", "odometry", "images", "online", "real_images", "foundations",
+         "speed")
 INTRODUCTION = """# Results
 
 Made by `python3 -m vcharge_evaluation.page` from `doc/results/*.json`: do not edit. A figure that misses its goal is
