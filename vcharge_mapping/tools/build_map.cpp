@@ -11,7 +11,6 @@
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/options.h"
-#include "vcharge_core/base/utc_time.h"
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/files/content_hash.h"
 #include "vcharge_core/files/file_io.h"
@@ -127,7 +126,6 @@ void buildMap(const Arguments& arguments, const SparseMapperOptions& options, nl
                   {"rig", arguments.rig},
                   {"mapper_options", option_text.str()},
                   {"program", "build_map 0.1.0"},
-                  {"date", utcNow()},
                   {"change", "built"}},
                  arguments.output);
   if (!arguments.trajectory.empty()) {
