@@ -45,8 +45,7 @@ int main(int argc, char** argv) {
   app.footer(
       "Keys of --json: sessions (name, component), num_keyframes, num_landmarks, num_observations, "
       "num_loop_edges (accepted), cameras "
-      "(name, "
-      "num_observations, rms_px), provenance, content_hash.");
+      "(name, num_observations, rms_px), provenance, content_hash.");
   return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     vcharge::MapProvenance provenance;
     const auto map = vcharge::readSparseMap(map_path, &provenance);

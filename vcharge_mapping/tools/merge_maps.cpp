@@ -152,8 +152,7 @@ int main(int argc, char** argv) {
   app.footer(
       "Keys of --json: sessions (session, joined, remark, num_accepted_loops, num_undecided_loops, "
       "num_rejected_loops, common_ratio, chance_ratio, rms_px), num_sessions, num_components, num_keyframes, "
-      "num_landmarks, "
-      "content_hash.");
+      "num_landmarks, content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     MergeOptions options;
     if (!arguments.options.empty()) {

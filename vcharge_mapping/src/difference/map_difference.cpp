@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
+
+#include "vcharge_core/base/quantile.h"
 
 namespace vcharge {
 namespace {
@@ -68,9 +71,7 @@ MapDifference compareVersions(const SparseMap& from, const SparseMap& to, double
       });
   result.num_common_landmarks = moves_m.size();
   if (!moves_m.empty()) {
-    const auto middle = moves_m.begin() + static_cast<std::ptrdiff_t>(moves_m.size() / 2);
-    std::nth_element(moves_m.begin(), middle, moves_m.end());
-    result.median_move_m = *middle;
+    result.median_move_m = quantile(moves_m, 0.5);
   }
   return result;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "vcharge_core/base/error.h"
+#include "vcharge_core/base/quantile.h"
 
 namespace vcharge {
 namespace {
@@ -27,13 +28,6 @@ __attribute__((format(printf, 2, 3))) void append(std::string* text, const char*
   std::vsnprintf(&(*text)[old_size], static_cast<size_t>(length) + 1, format, again);
   va_end(again);
   text->pop_back();
-}
-
-/// Quantile of values, which must not be empty.
-double percentile(std::vector<double>* values, double ratio) {
-  const std::ptrdiff_t rank = std::lround(ratio * static_cast<double>(values->size() - 1));
-  std::nth_element(values->begin(), values->begin() + rank, values->end());
-  return (*values)[static_cast<size_t>(rank)];
 }
 
 void describeSize(const SparseMap& map, std::string* text) {
@@ -90,13 +84,13 @@ void describeLandmarks(const SparseMap& map, std::string* text) {
   }
   append(text, "observations per landmark: mean %.2f, 10 %% %.0f, 50 %% %.0f, 90 %% %.0f, most %.0f\n",
          static_cast<double>(map.observations().size()) / static_cast<double>(counts.size()),
-         percentile(&counts, 0.1), percentile(&counts, 0.5), percentile(&counts, 0.9),
+         quantile(counts, 0.1), quantile(counts, 0.5), quantile(counts, 0.9),
          *std::max_element(counts.begin(), counts.end()));
   if (sigmas_m.empty()) {
     append(text, "landmark sigma: unknown\n");
   } else {
-    append(text, "landmark sigma: 50 %% %.4f m, 90 %% %.4f m, unknown for %zu\n", percentile(&sigmas_m, 0.5),
-           percentile(&sigmas_m, 0.9), counts.size() - sigmas_m.size());
+    append(text, "landmark sigma: 50 %% %.4f m, 90 %% %.4f m, unknown for %zu\n", quantile(sigmas_m, 0.5),
+           quantile(sigmas_m, 0.9), counts.size() - sigmas_m.size());
   }
 }
 

@@ -35,7 +35,7 @@ struct Expected {
 
 class PresenceJudge {
  public:
-  PresenceJudge(const SparseMap& map, int32_t session) : map_(map), session_(session) {
+  PresenceJudge(const SparseMap& map, int32_t session) : map_(map) {
     for (size_t k = 0; k < map.keyframes().size(); ++k) {
       (map.keyframes()[k].session == session ? new_ : old_).push_back(k);
     }
@@ -157,7 +157,6 @@ class PresenceJudge {
   }
 
   const SparseMap& map_;
-  const int32_t session_;
   std::vector<size_t> old_, new_;
 };
 

@@ -20,10 +20,10 @@ constexpr double kMinLogOdds = -3.0;
 constexpr double kPlaceRadius_m = 1.0;
 constexpr double kPlaceAngle_rad = 0.35;
 
-/// Adds the evidence of the newest session. Returns which landmarks are still present enough.
-std::vector<bool> weighLandmarks(SparseMapContents* contents, UpdateReport* report) {
-  const auto newest = static_cast<int32_t>(contents->sessions.size()) - 1;
-  const SparseMap map(*contents);
+/// Adds the evidence of the newest session of a map to its contents. Returns which landmarks are still
+/// present enough.
+std::vector<bool> weighLandmarks(const SparseMap& map, SparseMapContents* contents, UpdateReport* report) {
+  const auto newest = static_cast<int32_t>(map.sessions().size()) - 1;
   const std::vector<PresenceEvidence> evidence = weighPresence(map, newest);
   std::vector<bool> keeps(contents->landmarks.size(), true);
   for (size_t i = 0; i < evidence.size(); ++i) {
@@ -136,7 +136,7 @@ UpdatedMap updateMap(const SparseMap& map, const SparseMap& session, const Updat
     throw InputError("session: it cannot update the map: " + merged.report.remark);
   }
   SparseMapContents contents = merged.map->contents();
-  const std::vector<bool> keeps_landmark = weighLandmarks(&contents, &result.report);
+  const std::vector<bool> keeps_landmark = weighLandmarks(*merged.map, &contents, &result.report);
   const auto present = reducedMap(SparseMap(std::move(contents)),
                                   std::vector<bool>(merged.map->keyframes().size(), true), keeps_landmark);
   result.map = reducedMap(*present, PlaceKeeper(*present, options).neededKeyframes(),

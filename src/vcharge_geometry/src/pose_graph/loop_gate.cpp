@@ -12,6 +12,7 @@
 #include "pose_graph/loop_groups.h"
 #include "pose_graph/uncertain_graph.h"
 #include "vcharge_core/base/error.h"
+#include "vcharge_core/base/quantile.h"
 
 namespace vcharge {
 namespace {
@@ -39,12 +40,6 @@ constexpr size_t kPlaceSteps = 20;
 constexpr double kSupportSteps = 200.0;
 constexpr size_t kMaxHypotheses = 256;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// What an edge measures, from its lower to its higher node.
 RelativePose upward(const PoseGraphEdge& edge, bool planar) {
@@ -92,7 +87,7 @@ LoopGate::LoopGate(const PoseGraph& graph, const std::vector<size_t>& odometry,
     loop.measured.covariance *= noise_scale_;
   }
   constexpr double kLeverSteps = 10.0;
-  known_.emplace(nodes_.size(), kLeverSteps * median(lengths_m));
+  known_.emplace(nodes_.size(), kLeverSteps * quantile(lengths_m, 0.5));
   std::vector<double> weights;
   for (size_t i = 0; i < steps.size(); ++i) {
     steps[i].covariance *= noise_scale_;
@@ -100,7 +95,7 @@ LoopGate::LoopGate(const PoseGraph& graph, const std::vector<size_t>& odometry,
     weights.push_back(known_->weightOf(steps[i].covariance));
     odometry_weight_ += weights.back();
   }
-  step_weight_ = median(weights);
+  step_weight_ = quantile(weights, 0.5);
   measureSpread(steps);
 }
 

@@ -245,9 +245,6 @@ void joinTracks(TrackGroups* groups, ReconstructionData* data) {
       if (!data->tracks[root].position_m) {
         data->tracks[root].position_m = data->tracks[t].position_m;
       }
-      if (data->tracks[root].map_id == kNoId) {
-        data->tracks[root].map_id = data->tracks[t].map_id;
-      }
       data->tracks[t] = Track();
     }
   }

@@ -244,7 +244,8 @@ std::vector<LoopEdge> findLoopsBefore(const LoopClosureOptions& options,
     descriptors.push_back(descriptorsOf(keyframe));
   }
   PlaceIndex index(vocabulary, num_cameras);
-  index.addAll(descriptors);
+  const int32_t num_places = *std::max_element(end_of.begin(), end_of.end());
+  index.addAll({descriptors.begin(), descriptors.begin() + num_places});
   constexpr double kIndexed = 0.15;  // part of the time until here
   progress(kIndexed);
   std::vector<std::vector<LoopEdge>> edges_of(num_keyframes);
