@@ -11,6 +11,7 @@
 #include "vcharge_core/files/file_io.h"
 #include "vcharge_core/motion/trajectory.h"
 #include "vcharge_core/sparse_map/analytic_map.h"
+#include "vcharge_core/sparse_map/map_tile_reader.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 
 namespace vcharge {
@@ -31,8 +32,21 @@ std::string rigText() {
 
 std::string sparseMapBytes() {
   return bytesOf("a.vmap", [](const std::string& path) {
-    writeSparseMap(SparseMap(makeAnalyticMap({4, 12})), MapProvenance(), path);
+    MapIndex index;
+    index.writePlaceRows = [](const MapIndex::PutRow& put) { put(5, {1, 2, 3}); };
+    writeSparseMap(SparseMap(makeAnalyticMap({4, 12})), MapProvenance(), path, index);
   });
+}
+
+void readTiles(const std::string& path) {
+  const std::unique_ptr<MapTileReader> reader = MapTileReader::open(path);
+  if (reader == nullptr) {
+    return;
+  }
+  reader->readPlaceRow(5);
+  for (const auto& [tile, keyframes] : reader->tiles()) {
+    reader->readTile(tile);
+  }
 }
 
 HeightMap smallHeightMap() {
@@ -71,6 +85,7 @@ std::vector<FuzzTarget> coreTargets() {
       fileTarget("trajectory", "a.tum", {kTrajectory}, [](const std::string& path) { readTrajectory(path); }),
       fileTarget("sparse_map", "a.vmap", {sparseMapBytes()},
                  [](const std::string& path) { readSparseMap(path)->contentHash(); }),
+      fileTarget("map_tiles", "a.vmap", {sparseMapBytes()}, readTiles),
       heightMapTarget("height_map_yaml", "height_map.yaml"),
       heightMapTarget("height_map_tiff", "height_map.tiff"),
   };

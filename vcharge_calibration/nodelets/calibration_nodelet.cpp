@@ -9,6 +9,7 @@
 #include "vcharge_calibration/live/rig_calibration_session.h"
 #include "vcharge_calibration/report/rig_calibration_files.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
+#include "vcharge_reconstruction/tiled_map.h"
 #include "vcharge_ros/nodelet.h"
 
 namespace vcharge {
@@ -85,7 +86,8 @@ class CalibrationNodelet : public Nodelet {
       auto provenance = provenance_;
       provenance["verdict"] = toString(work.result.verdict);
       if (!map_.empty()) {
-        writeSparseMap(*mapOfCalibration(options_, work.state), provenance, map_);
+        const std::shared_ptr<const SparseMap> map = mapOfCalibration(options_, work.state);
+        writeSparseMap(*map, provenance, map_, indexForTiles(*map));
       }
       writeRigAndTrajectory(output_, trajectory_, work.result, work.state, provenance);
       display_->showResult(session_->status(), work);

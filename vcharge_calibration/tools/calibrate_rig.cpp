@@ -6,6 +6,7 @@
 #include "vcharge_calibration/rig/rig_calibrator.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
+#include "vcharge_reconstruction/tiled_map.h"
 
 namespace {
 
@@ -21,7 +22,8 @@ void calibrate(const RigToolArguments& arguments, const std::string& map_file,
       [&](const StageCallback& progress) { return calibrator.finish(progress); }, calibrator.images());
   const auto provenance = provenanceOf(arguments, "calibrate_rig", option_text, result);
   if (!map_file.empty()) {
-    writeSparseMap(*calibrator.map(), provenance, map_file);
+    const std::shared_ptr<const SparseMap> map = calibrator.map();
+    writeSparseMap(*map, provenance, map_file, indexForTiles(*map));
   }
   writeRigAndTrajectory(arguments.output, arguments.trajectory, result, calibrator.state(), provenance);
 }

@@ -134,7 +134,7 @@ std::shared_ptr<const CameraRig> largeRig() {
 }
 
 const MapLocalizer& localizer() {
-  static const MapLocalizer kLocalizer(largeMap(), largeRig());
+  static const MapLocalizer kLocalizer(std::make_shared<const TiledMap>(largeMap()), largeRig());
   return kLocalizer;
 }
 
@@ -214,7 +214,7 @@ BENCHMARK(readMap)->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProcess
 void prepareMap(benchmark::State& state) {
   const auto rig = largeRig();
   for (auto _ : state) {
-    const MapLocalizer prepared(largeMap(), rig);
+    const MapLocalizer prepared(std::make_shared<const TiledMap>(largeMap()), rig);
     benchmark::DoNotOptimize(&prepared);
   }
   describe(&state);
@@ -224,9 +224,9 @@ BENCHMARK(prepareMap)->Unit(benchmark::kMillisecond)->UseRealTime()->MeasureProc
 /// Does everything between the start and the first frame.
 void readAndPrepareMap(benchmark::State& state) {
   const auto rig = largeRig();
-  writeSparseMap(*largeMap(), {}, mapPath());
+  writeSparseMap(*largeMap(), {}, mapPath(), indexForTiles(*largeMap()));
   for (auto _ : state) {
-    const MapLocalizer prepared(readSparseMap(mapPath()), rig);
+    const MapLocalizer prepared(std::make_shared<const TiledMap>(mapPath()), rig);
     benchmark::DoNotOptimize(&prepared);
   }
   describe(&state);

@@ -75,7 +75,7 @@ vcharge_msgs::LocalizationStatus toStatusMessage(const LocalizationResult& resul
 }
 
 visualization_msgs::Marker toObservationMarker(const LocalizationResult& result, const CameraRig& rig,
-                                               const SparseMap& map, const std::string& map_frame) {
+                                               const std::string& map_frame) {
   visualization_msgs::Marker marker;
   marker.header.stamp = fromTimestamp(result.stamp);
   marker.header.frame_id = map_frame;
@@ -91,7 +91,7 @@ visualization_msgs::Marker toObservationMarker(const LocalizationResult& result,
     const auto camera = static_cast<size_t>(observation.camera);
     marker.points.push_back(
         toPoint(result.pose->map_from_vehicle * rig.cameras[camera].vehicle_from_camera->translation()));
-    marker.points.push_back(toPoint(map.landmarks()[static_cast<size_t>(observation.landmark)].position_m));
+    marker.points.push_back(toPoint(observation.landmark_m));
     marker.colors.insert(marker.colors.end(), 2, colourOf(camera));
   }
   return marker;

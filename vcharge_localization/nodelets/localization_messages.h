@@ -18,7 +18,7 @@ vcharge_msgs::LocalizationStatus toStatusMessage(const LocalizationResult& resul
                                                  const std::string& map_frame);
 /// Lines from the cameras to the landmarks that fit the pose, in one colour per camera.
 visualization_msgs::Marker toObservationMarker(const LocalizationResult& result, const CameraRig& rig,
-                                               const SparseMap& map, const std::string& map_frame);
+                                               const std::string& map_frame);
 /// Converts a message in the map's frame to a prior. InputError "<source>: ..." for another frame, an invalid
 /// pose or a covariance that is not finite. Zero variances are replaced by those of 0.5 m and 15 degrees.
 PosePrior fromMessage(const geometry_msgs::PoseWithCovarianceStamped& message, const std::string& source,

@@ -10,7 +10,6 @@
 #include "localization_messages.h"
 #include "localization_report.h"
 #include "vcharge_core/base/error.h"
-#include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_localization/drive_localizer.h"
 #include "vcharge_ros/conversions.h"
 #include "vcharge_ros/live_queue.h"
@@ -45,7 +44,7 @@ class LocalizationNodelet : public Nodelet {
     }
     readOptions("options", &options);
     openSource(rig_);
-    localizer_ = std::make_unique<DriveLocalizer>(readSparseMap(map_path), rig_, options);
+    localizer_ = std::make_unique<DriveLocalizer>(std::make_shared<const TiledMap>(map_path), rig_, options);
 
     pose_ = node().advertise<geometry_msgs::PoseWithCovarianceStamped>("/localization/pose", 10);
     status_ = node().advertise<vcharge_msgs::LocalizationStatus>("/localization/status", 10);
@@ -80,7 +79,7 @@ class LocalizationNodelet : public Nodelet {
     status_.publish(status);
     report_.add(status);
     if (observations_.getNumSubscribers() > 0) {
-      observations_.publish(toObservationMarker(result, *rig_, localizer_->localizer().map(), map_frame_));
+      observations_.publish(toObservationMarker(result, *rig_, map_frame_));
     }
     if (!result.pose) {
       return;

@@ -15,7 +15,6 @@
 #include "vcharge_core/files/file_io.h"
 #include "vcharge_core/frames/frame_counters_text.h"
 #include "vcharge_core/motion/trajectory.h"
-#include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_localization/drive_experiment.h"
 #include "vcharge_localization/drive_localizer.h"
 #include "vcharge_localization/localization_log.h"
@@ -53,7 +52,7 @@ void localizeDrive(const Arguments& arguments, const DriveLocalizerOptions& opti
     throw InputError(arguments.rig + ": expected vehicle_from_camera of every camera");
   }
   const auto start = std::chrono::steady_clock::now();
-  DriveLocalizer localizer(readSparseMap(arguments.map), rig, options);
+  DriveLocalizer localizer(std::make_shared<const TiledMap>(arguments.map), rig, options);
   const double map_ready_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   std::cout << "map ready after " << map_ready_s << " s\n";
   DriveExperiment experiment = makeExperiment(arguments, *rig);

@@ -6,10 +6,10 @@
 #include <visualization_msgs/MarkerArray.h>
 #include <pluginlib/class_list_macros.hpp>
 
-#include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_mapping/map_file_update.h"
 #include "vcharge_mapping/mapping_session.h"
 #include "vcharge_reconstruction/live_view.h"
+#include "vcharge_reconstruction/tiled_map.h"
 #include "vcharge_ros/nodelet.h"
 #include "vcharge_ros/sparse_map_conversions.h"
 
@@ -74,7 +74,7 @@ class MappingNodelet : public Nodelet {
                     {"bag_hash", map->contentHash()},
                     {"mapper_options", YAML::Dump(writeFields(options_))},
                     {"program", "mapping_nodelet 0.1.0"}},
-                   path);
+                   path, indexForTiles(*map));
     response->success = 1;
     response->message = path + ": content hash: " + map->contentHash();
   }

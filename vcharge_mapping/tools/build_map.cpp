@@ -19,6 +19,7 @@
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_mapping/map_report.h"
 #include "vcharge_mapping/sparse_mapper.h"
+#include "vcharge_reconstruction/tiled_map.h"
 #include "vcharge_recordings/bag_drive_source.h"
 
 namespace {
@@ -127,7 +128,7 @@ void buildMap(const Arguments& arguments, const SparseMapperOptions& options, nl
                   {"mapper_options", option_text.str()},
                   {"program", "build_map 0.1.0"},
                   {"change", "built"}},
-                 arguments.output);
+                 arguments.output, indexForTiles(*map));
   if (!arguments.trajectory.empty()) {
     writeTrajectory(mapper.trajectory(), arguments.trajectory);
   }

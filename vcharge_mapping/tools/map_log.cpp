@@ -6,6 +6,7 @@
 #include "vcharge_core/base/utc_time.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_mapping/map_file_update.h"
+#include "vcharge_reconstruction/tiled_map.h"
 
 namespace {
 
@@ -23,7 +24,7 @@ void goBack(const std::string& path, int64_t number, int max_versions) {
                                       {{"program", "map_log 0.1.0"},
                                        {"date", utcNow()},
                                        {"change", "back to version " + std::to_string(number)}},
-                                      max_versions, &lock);
+                                      max_versions, &lock, indexForTiles(*map));
   std::printf("written: %s, version %lld\n", path.c_str(), static_cast<long long>(added));
 }
 

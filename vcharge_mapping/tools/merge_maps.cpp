@@ -15,6 +15,7 @@
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_mapping/map_file_update.h"
 #include "vcharge_mapping/session_merger.h"
+#include "vcharge_reconstruction/tiled_map.h"
 
 namespace {
 
@@ -110,7 +111,7 @@ void mergeMaps(const Arguments& arguments, const MergeOptions& options, nlohmann
                        {"date", utcNow()},
                        {"change", std::string(merged.report.joined ? "joined " : "added apart ") +
                                       fs::path(path).filename().string()}},
-                      arguments.max_versions, &*lock);
+                      arguments.max_versions, &*lock, indexForTiles(*map));
     std::cout << "written: " << arguments.output << ", version " << version << "\n";
   }
   std::set<int32_t> components;

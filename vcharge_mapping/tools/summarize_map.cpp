@@ -10,6 +10,7 @@
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_mapping/map_description.h"
 #include "vcharge_mapping/map_summary.h"
+#include "vcharge_reconstruction/tiled_map.h"
 
 namespace {
 
@@ -28,7 +29,7 @@ void summarize(const Arguments& arguments, const SummaryOptions& options, nlohma
   provenance["program"] = "summarize_map 0.1.0";
   provenance["date"] = utcNow();
   provenance["change"] = "summary of " + fs::path(arguments.map).filename().string();
-  writeSparseMap(*summary.map, provenance, arguments.output);
+  writeSparseMap(*summary.map, provenance, arguments.output, indexForTiles(*summary.map));
   const double kilobytes_per_100_m =
       static_cast<double>(fs::file_size(arguments.output)) / 1e3 / (lengthOf_m(*map) / 100.0);
   const SummaryReport& report = summary.report;

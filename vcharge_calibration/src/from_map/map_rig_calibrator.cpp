@@ -58,7 +58,8 @@ MapRigCalibrator::MapRigCalibrator(std::shared_ptr<const SparseMap> map, const C
     throw InputError("rig: expected a camera");
   }
   rig_ = withCamerasAtOrigin(rig);
-  localizer_ = std::make_unique<MapLocalizer>(map_, rig_, withoutUprightVehicle(options_.localizer));
+  localizer_ = std::make_unique<MapLocalizer>(std::make_shared<const TiledMap>(map_), rig_,
+                                              withoutUprightVehicle(options_.localizer));
   state_.data.rig = rig_;
   assembler_ =
       std::make_unique<FrameAssembler<Image>>(rig_->cameras.size(), options_.assemblerOptions(),
@@ -144,7 +145,7 @@ std::optional<PoseFix> MapRigCalibrator::findCamera(const RigFeatures& features,
 
 RigCalibration MapRigCalibrator::finish(const StageCallback& progress) {
   assembler_->finish();
-  return calibrateInMap(options_, *localizer_, views_, progress, &state_, &landmark_of_track_);
+  return calibrateInMap(options_, *map_, *localizer_, views_, progress, &state_, &landmark_of_track_);
 }
 
 std::string MapRigCalibrator::reportSection() const {

@@ -28,11 +28,11 @@ constexpr double kSearchSigma_rad = 0.01;
 
 class MapRigSteps {
  public:
-  MapRigSteps(const MapRigCalibratorOptions& options, const MapLocalizer& localizer,
+  MapRigSteps(const MapRigCalibratorOptions& options, const SparseMap& map, const MapLocalizer& localizer,
               const std::vector<MapKeyframeView>& views, const StageCallback& progress,
               ReconstructionState* state, std::vector<int32_t>* landmark_of_track)
       : options_(options),
-        map_(localizer.map()),
+        map_(map),
         localizer_(localizer),
         views_(views),
         stages_(kNumStages, progress, &state->report),
@@ -102,20 +102,27 @@ class MapRigSteps {
   }
 
   void searchWithAllCameras() {
-    const std::unique_ptr<MapLocalizer> localizer = localizer_.forRig(data_->rig);
+    const MapLocalizer localizer(localizer_.map(), data_->rig, options_.localizer);
     std::vector<std::vector<LandmarkObservation>> observations(views_.size());
     tbb::parallel_for(size_t{0}, views_.size(), [&](size_t k) {
       PosePrior prior;
       prior.map_from_vehicle = data_->keyframes[k].map_from_vehicle;
       prior.covariance.diagonal().head<3>().setConstant(kSearchSigma_m * kSearchSigma_m);
       prior.covariance.diagonal().tail<3>().setConstant(kSearchSigma_rad * kSearchSigma_rad);
-      const PoseFix fix = localizer->localizeNear(views_[k].features, prior);
+      const PoseFix fix = localizer.localizeNear(views_[k].features, prior);
       if (fix.status == LocalizationStatus::kLocalized) {
         observations[k] = fix.inliers;
         data_->keyframes[k].map_from_vehicle = fix.map_from_vehicle;
       }
     });
     makeTracks(observations);
+  }
+
+  int32_t indexOf(int32_t landmark_id) const {
+    const auto found =
+        std::lower_bound(map_.landmarks().begin(), map_.landmarks().end(), landmark_id,
+                         [](const MapLandmark& landmark, int32_t id) { return landmark.id < id; });
+    return static_cast<int32_t>(found - map_.landmarks().begin());
   }
 
   /// Replaces the tracks by one per observed landmark, in the map's order.
@@ -126,7 +133,7 @@ class MapRigSteps {
     }
     for (size_t k = 0; k < observations.size(); ++k) {
       for (const LandmarkObservation& observed : observations[k]) {
-        tracks[observed.landmark].observations.push_back(
+        tracks[indexOf(observed.landmark_id)].observations.push_back(
             {static_cast<int32_t>(k), observed.camera, -1,
              Eigen::Vector2d(observed.position_px.x, observed.position_px.y), options_.feature_sigma_px});
         ++result_.cameras[observed.camera].num_tracked;
@@ -167,10 +174,11 @@ class MapRigSteps {
 
 }  // namespace
 
-RigCalibration calibrateInMap(const MapRigCalibratorOptions& options, const MapLocalizer& localizer,
-                              const std::vector<MapKeyframeView>& views, const StageCallback& progress,
-                              ReconstructionState* state, std::vector<int32_t>* landmark_of_track) {
-  return MapRigSteps(options, localizer, views, progress, state, landmark_of_track).run();
+RigCalibration calibrateInMap(const MapRigCalibratorOptions& options, const SparseMap& map,
+                              const MapLocalizer& localizer, const std::vector<MapKeyframeView>& views,
+                              const StageCallback& progress, ReconstructionState* state,
+                              std::vector<int32_t>* landmark_of_track) {
+  return MapRigSteps(options, map, localizer, views, progress, state, landmark_of_track).run();
 }
 
 }  // namespace vcharge

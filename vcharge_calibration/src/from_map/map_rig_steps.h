@@ -8,10 +8,12 @@
 namespace vcharge {
 
 /// The steps of MapRigCalibrator::finish(): calibrates from keyframes whose cameras were localized
-/// separately. Afterwards, `state` has the rig, poses and observed landmarks, `landmark_of_track` their
+/// separately. The localizer is of the
+/// same map. Afterwards, `state` has the rig, poses and observed landmarks, `landmark_of_track` their
 /// indices in the map.
-RigCalibration calibrateInMap(const MapRigCalibratorOptions& options, const MapLocalizer& localizer,
-                              const std::vector<MapKeyframeView>& views, const StageCallback& progress,
-                              ReconstructionState* state, std::vector<int32_t>* landmark_of_track);
+RigCalibration calibrateInMap(const MapRigCalibratorOptions& options, const SparseMap& map,
+                              const MapLocalizer& localizer, const std::vector<MapKeyframeView>& views,
+                              const StageCallback& progress, ReconstructionState* state,
+                              std::vector<int32_t>* landmark_of_track);
 
 }  // namespace vcharge

@@ -48,7 +48,7 @@ struct LocalizationResult {
 class DriveLocalizer {
  public:
   /// Throws the errors of MapLocalizer.
-  DriveLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
+  DriveLocalizer(std::shared_ptr<const TiledMap> map, std::shared_ptr<const CameraRig> rig,
                  const DriveLocalizerOptions& options = DriveLocalizerOptions());
 
   LocalizationResult process(const ImageFrame& frame);

@@ -17,6 +17,8 @@ constexpr double kMaxConfirmation_s = 1.0;
 // Additional uncertainty of motion without odometry, which assumes a constant velocity.
 constexpr double kUnknownMotion_m_per_s = 1.0;
 constexpr double kUnknownTurn_rad_per_s = 0.3;
+/// Tiles of the map are read before the vehicle is this close to where they are needed.
+constexpr double kLookAhead_m = 10.0;
 
 double squared(double value) {
   return value * value;
@@ -24,12 +26,12 @@ double squared(double value) {
 
 }  // namespace
 
-DriveLocalizer::DriveLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
+DriveLocalizer::DriveLocalizer(std::shared_ptr<const TiledMap> map, std::shared_ptr<const CameraRig> rig,
                                const DriveLocalizerOptions& options)
     : rig_(std::move(rig)),
       options_((options.validate(), options)),
       localizer_(std::move(map), rig_, options.localizer),
-      filter_(optionsForMapOf(localizer_.map().rig(), options.filter)),
+      filter_(optionsForMapOf(localizer_.map()->rig(), options.filter)),
       health_(rig_, options.health) {}
 
 void DriveLocalizer::seed(const PosePrior& pose) {
@@ -228,6 +230,8 @@ void DriveLocalizer::localize(const ImageFrame& frame, const RigFeatures& featur
   }
   if (filter_.hasPose() && !is_seed_) {
     result->pose = filter_.pose();
+    localizer_.map()->prefetch(result->pose->map_from_vehicle.translation(),
+                               options_.localizer.max_distance_m + kLookAhead_m);
   }
   result->since_fix_s =
       last_fix_ ? toSeconds(frame.stamp - *last_fix_) : std::numeric_limits<double>::infinity();

@@ -58,7 +58,8 @@ class DriveLocalizerTest : public ::testing::Test {
   }
 
   const std::shared_ptr<const SparseMap> map_ = testing::makeTestMap({});
-  DriveLocalizer localizer_{map_, std::shared_ptr<const CameraRig>(map_, &map_->rig())};
+  DriveLocalizer localizer_{std::make_shared<const TiledMap>(map_),
+                            std::shared_ptr<const CameraRig>(map_, &map_->rig())};
   RigidTransform odom_from_vehicle_ = RigidTransform::planar(7.0, -3.0, 1.0);
   double way_m_ = 5.0;
   int64_t num_frames_ = 0, num_resets_ = 0;

@@ -5,6 +5,7 @@
 
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/utc_time.h"
+#include "vcharge_reconstruction/tiled_map.h"
 
 namespace vcharge {
 
@@ -51,7 +52,7 @@ MapFileUpdate updateMapFile(const std::string& path, const SparseMap& session, c
   update.version = addMapVersion(
       *update.updated.map,
       {{"bag", drive}, {"program", program}, {"date", utcNow()}, {"change", "updated by " + drive}},
-      max_versions, &lock);
+      max_versions, &lock, indexForTiles(*update.updated.map));
   return update;
 }
 

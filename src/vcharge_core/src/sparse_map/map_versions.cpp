@@ -70,20 +70,21 @@ void copyMapFile(const std::string& path, const std::string& copy) {
   MapProvenance provenance;
   const std::shared_ptr<const SparseMap> map = readSparseMap(path, &provenance);
   SqliteDatabase database(copy, path, SqliteDatabase::Access::kCreate);
-  writeFirstVersion(*map, provenance, &database);
+  writeFirstVersion(*map, provenance, MapIndex(), &database);
 }
 
 }  // namespace
 
-void writeSparseMap(const SparseMap& map, const MapProvenance& provenance, const std::string& path) {
+void writeSparseMap(const SparseMap& map, const MapProvenance& provenance, const std::string& path,
+                    const MapIndex& index) {
   writeFileAtomically(path, [&](const std::string& temporary) {
     SqliteDatabase database(temporary, path, SqliteDatabase::Access::kCreate);
-    writeFirstVersion(map, provenance, &database);
+    writeFirstVersion(map, provenance, index, &database);
   });
 }
 
 int64_t addMapVersion(const SparseMap& map, const MapProvenance& provenance, int max_versions,
-                      MapFileLock* lock) {
+                      MapFileLock* lock, const MapIndex& index) {
   const std::string& path = lock->path();
   check(max_versions >= 1, "addMapVersion: expected at least one version");
   int64_t version = 0;
@@ -103,7 +104,7 @@ int64_t addMapVersion(const SparseMap& map, const MapProvenance& provenance, int
     }
     database.execute("INSERT INTO version VALUES (" + std::to_string(version) + ")");
     const bool has_forgotten = forgetOldVersions(version, max_versions, &database);
-    writeLandmarkIndex(map, &database);
+    writeIndex(map, index, &database);
     database.execute("COMMIT");
     if (has_forgotten) {
       database.execute("VACUUM");

@@ -46,10 +46,20 @@ constexpr const char* kVersionSql = "CREATE TABLE version (number INTEGER PRIMAR
 /// Names and CREATE TABLE of all tables that a schema has.
 std::vector<std::pair<std::string, std::string>> tablesOfSchema(uint32_t schema_version);
 
-/// Bounding boxes of landmarks: SELECT id FROM landmark_index WHERE min_x <= ... AND max_x >= ... Derived
-/// data, which is not read back and not covered by a hash.
-constexpr const char* kLandmarkIndexSql =
-    "CREATE VIRTUAL TABLE landmark_index USING rtree(id, min_x, max_x, min_y, max_y, min_z, max_z)";
+// Derived from the newest version, so that a map can be opened without reading it as a whole. Without these
+// tables, or if they belong to another version, a map is read as a whole.
+
+/// Squares of the x-y plane with keyframes, and the content hash of each as a map (partOf()).
+constexpr const char* kTileSql =
+    "CREATE TABLE tile (x INTEGER NOT NULL, y INTEGER NOT NULL, content_hash TEXT NOT NULL,"
+    " PRIMARY KEY (x, y)) STRICT";
+/// Rows of MapIndex::writePlaceRows, which recognizing places reads.
+constexpr const char* kPlaceSql =
+    "CREATE TABLE place (id INTEGER PRIMARY KEY, features BLOB NOT NULL) STRICT";
+/// The key map_hash has the content hash of the map that the tables belong to; others are of MapIndex.
+constexpr const char* kIndexInfoSql =
+    "CREATE TABLE index_info (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT";
+constexpr const char* kMapHashKey = "map_hash";
 
 /// Hash of what SparseMap::contentHash() excludes but must be protected from damage: the rig, its masks, and
 /// the provenance.

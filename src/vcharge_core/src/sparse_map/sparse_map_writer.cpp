@@ -3,10 +3,10 @@
 #include <cmath>
 #include <vector>
 
-#include <sqlite3.h>
 #include <opencv2/imgcodecs.hpp>
 
 #include "vcharge_core/base/error.h"
+#include "vcharge_core/sparse_map/map_tile.h"
 
 namespace vcharge::map_file {
 namespace {
@@ -250,26 +250,47 @@ void writeRows(const SparseMap& map, const MapProvenance& provenance, const std:
   writeLoopEdges(map, target);
 }
 
-void writeLandmarkIndex(const SparseMap& map, SqliteDatabase* database) {
-  if (sqlite3_compileoption_used("ENABLE_RTREE") == 0) {
+void writeIndex(const SparseMap& map, const MapIndex& index, SqliteDatabase* database) {
+  for (const char* const name : {"tile", "place", "index_info"}) {
+    database->execute(std::string("DROP TABLE IF EXISTS ") + name);
+  }
+  if (!index.writePlaceRows) {
     return;
   }
-  database->execute(std::string("DROP TABLE IF EXISTS landmark_index; ") + kLandmarkIndexSql);
-  SqliteStatement insert(*database, "INSERT INTO landmark_index VALUES (?, ?, ?, ?, ?, ?, ?)");
-  for (const MapLandmark& landmark : map.landmarks()) {
-    insert.bind(0, static_cast<int64_t>(landmark.id));
-    for (int k = 0; k < 6; ++k) {
-      insert.bind(1 + k, landmark.position_m[k / 2]);  // SQLite rounds boxes outwards
-    }
-    insert.run();
+  database->execute(kTileSql);
+  database->execute(kPlaceSql);
+  database->execute(kIndexInfoSql);
+  SqliteStatement insert_tile(*database, "INSERT INTO tile VALUES (?, ?, ?)");
+  for (const auto& [tile, keyframes] : tilesOf(map.keyframes())) {
+    insert_tile.bind(0, static_cast<int64_t>(tile.x));
+    insert_tile.bind(1, static_cast<int64_t>(tile.y));
+    insert_tile.bind(2, partOf(map, keyframes)->contentHash());
+    insert_tile.run();
+  }
+  SqliteStatement insert_place(*database, "INSERT INTO place VALUES (?, ?)");
+  index.writePlaceRows([&](int64_t id, const std::vector<uint8_t>& features) {
+    insert_place.bind(0, id);
+    insert_place.bindBlob(1, features.data(), features.size());
+    insert_place.run();
+  });
+  SqliteStatement insert_info(*database, "INSERT INTO index_info VALUES (?, ?)");
+  const auto put = [&](const std::string& key, const std::string& value) {
+    insert_info.bind(0, key);
+    insert_info.bind(1, value);
+    insert_info.run();
+  };
+  put(kMapHashKey, map.contentHash());
+  for (const auto& [key, value] : index.info) {
+    put(key, value);
   }
 }
 
-void writeFirstVersion(const SparseMap& map, const MapProvenance& provenance, SqliteDatabase* database) {
+void writeFirstVersion(const SparseMap& map, const MapProvenance& provenance, const MapIndex& index,
+                       SqliteDatabase* database) {
   createFile(database);
   database->execute("INSERT INTO version VALUES (1)");
   writeRows(map, provenance, "", 1, database);
-  writeLandmarkIndex(map, database);
+  writeIndex(map, index, database);
   database->execute("COMMIT");
 }
 

@@ -122,6 +122,10 @@ bool SqliteStatement::step() {
 
 void SqliteStatement::run() {
   step();
+  reset();
+}
+
+void SqliteStatement::reset() {
   check(sqlite3_reset(handle_));
 }
 

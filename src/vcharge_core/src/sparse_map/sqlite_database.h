@@ -55,6 +55,8 @@ class SqliteStatement {
   bool step();
   /// Executes a statement without rows and resets it for the next parameters.
   void run();
+  /// Ends the rows, for the next parameters.
+  void reset();
 
   int64_t integer(int column) const;
   double number(int column) const;

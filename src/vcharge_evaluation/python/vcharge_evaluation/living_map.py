@@ -1,4 +1,5 @@
-"""A map over many days: drives merged and maps updated day by day, localization on the next day, summaries, other car parks."""
+"""A map over many days: drives merged, maps updated day by day, localization on the next day, summaries, other car parks, maps
+of many kilometres."""
 import argparse
 import shutil
 import sqlite3
@@ -15,7 +16,7 @@ OTHER_DAY = ("--drive", "other_day_beside", "--exposure-gain", 1.2)
 DUSK, NIGHT = ("--set", "condition.kind=dusk"), ("--set", "condition.kind=night")
 STARTS = ("--forget-every", 10)
 FRAMES_WITHIN_5_M = 40  # at 1.5 m/s and 12.5 Hz
-PARTS = ("days", "exchanged", "night", "summary", "other")
+PARTS = ("days", "exchanged", "night", "summary", "other", "large")
 
 
 def arguments():
@@ -25,6 +26,7 @@ def arguments():
     parser.add_argument("--seeds", nargs="*", type=int, default=[201], help="seeds of the lots")
     parser.add_argument("--num-days", type=int, default=10, help="days after that of the first map")
     parser.add_argument("--image-scale", type=float, default=0.3)
+    parser.add_argument("--length-km", type=float, default=20.0, help="of the large map, made of this lot and the next")
     parser.add_argument("--duration-s", type=float, default=0.0, help="end the drives early; 0: whole drives")
     return parser.parse_args()
 
@@ -211,11 +213,37 @@ def other_car_park(lot, results):
         Figure("loops undecided", found["num_undecided_loops"])]))
 
 
+def large(lot, results):
+    """Localization in a map of many kilometres, which is made of copies of two lots' maps, and in that of one lot."""
+    folder, maps = lot.folder("large"), [lot.first().folder / "map.vmap", Lot(lot.args, lot.seed + 1).first().folder / "map.vmap"]
+    made, columns = lot.other(1), []
+    for name, length_m in (("one lot", 1.0), (f"{lot.args.length_km:g} km", 1e3 * lot.args.length_km)):
+        path = folder / f"{name.split(' ', maxsplit=1)[0]}.vmap"
+        repeated = run_tool("repeat_map", path.with_suffix(".log"), "--maps", *maps, "--length-m", length_m, "--output", path)
+        mapped = LivingMap(maps[0], [lot.first()])  # the first copy is where the lot was mapped
+        mapped.path = path
+        words = ("--bag", made.bag, "--rig", made.true_rig, "--map", path, "--options", CONFIG / "localization.yaml")
+        output = folder / f"{path.stem}.tum"
+        run = run_tool("localize_drive", output.with_suffix(".log"), *words, "--output", output, *STARTS)
+        result = LocalizationErrors(f"{output}.csv", made.trajectory, mapped)
+        seconds = result.latency_s[::STARTS[1]]
+        columns.append((name, [
+            Figure("length", repeated.found["length_m"] / 1e3, "km"), Figure("keyframes", repeated.found["num_keyframes"]),
+            Figure("file per 100 m of drive", path.stat().st_size / repeated.found["length_m"] / 1e4, "MB"),
+            figure("until the map is open", run.found["map_ready_s"], "s", at_most=0.2),
+            figure("memory of localization", 1e3 * run.peak_gb, "MB", at_most=500), *start_figures(result),
+            Figure("time of a frame, median", 1e3 * float(np.median(result.latency_s)), "ms"),
+            Figure("time of a start's first frame, median", 1e3 * float(np.median(seconds)), "ms"),
+            figure("the same, most", float(seconds.max()), "s", at_most=1.0)]))
+        path.unlink()
+    results.add(f"A large map, lots {lot.seed} and {lot.seed + 1}, image scale {lot.args.image_scale:g}", *columns)
+
+
 def main():
     args = arguments()
     args.work.mkdir(parents=True, exist_ok=True)
     results = Results("living_map", "Living maps", args)
-    steps = {"days": days, "exchanged": exchanged, "night": night, "summary": summary, "other": other_car_park}
+    steps = {"days": days, "exchanged": exchanged, "night": night, "summary": summary, "other": other_car_park, "large": large}
     for seed in args.seeds:
         for part in args.parts:
             steps[part](Lot(args, seed), results)

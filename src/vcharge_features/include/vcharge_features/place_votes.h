@@ -7,8 +7,8 @@
 #include <opencv2/core.hpp>
 
 #include "vcharge_core/base/options.h"
-#include "vcharge_features/hamming_index.h"
 #include "vcharge_features/place_index.h"
+#include "vcharge_features/place_table.h"
 
 namespace vcharge {
 
@@ -28,31 +28,32 @@ struct PlaceVotesOptions {
 /// place behind many others. Immutable.
 class PlaceVotes {
  public:
-  /// Descriptor i belongs to image images[i] = place * num_cameras + camera. Descriptors of numbers are
-  /// compared by 256 bits, each of which says which of two numbers is larger. Throws std::logic_error for
-  /// inconsistent counts or images, std::invalid_argument for bad options or descriptors.
-  PlaceVotes(const cv::Mat& descriptors, std::vector<int32_t> images, int num_places, int num_cameras,
-             const PlaceVotesOptions& options = PlaceVotesOptions());
+  /// The table may read a file. Its places are [0, num_places), its cameras [0, num_cameras). Throws
+  /// std::logic_error without a table or a camera, std::invalid_argument for bad options.
+  PlaceVotes(std::shared_ptr<const PlaceTable> table, PlaceSignatures signatures, int num_places,
+             int num_cameras, const PlaceVotesOptions& options = PlaceVotesOptions());
 
   /// At most `max_results` places with votes, best first, ties by number. The query may have any number of
   /// cameras. The same on any number of threads. Throws std::invalid_argument for descriptors of another
-  /// kind.
+  /// kind, and the errors of the table.
   std::vector<PlaceMatch> query(const std::vector<cv::Mat>& descriptors_by_camera, int max_results) const;
 
  private:
-  struct Vote {
-    int32_t image;
+  struct Hit {
+    int32_t first_place, num_places, camera;
     float weight;
   };
-  cv::Mat signaturesOf(const cv::Mat& descriptors) const;
-  std::vector<Vote> votesOf(const uint8_t* signature, std::vector<Vote>* best_of_place) const;
+  struct Vote {
+    int32_t image;  ///< place * number of cameras + camera
+    float weight;
+  };
+  std::vector<std::vector<Hit>> hitsOf(const cv::Mat& signatures) const;
+  std::vector<Vote> votesOf(const std::vector<Hit>& hits, std::vector<Vote>* best_of_place) const;
 
-  const PlaceVotesOptions options_;
+  const std::shared_ptr<const PlaceTable> table_;
+  const PlaceSignatures signatures_;
   const int num_places_, num_cameras_;
-  const int type_, columns_;
-  const std::vector<int32_t> images_;
-  cv::Mat mean_;  // mean descriptor, for descriptors of numbers
-  std::unique_ptr<HammingIndex> index_;
+  const PlaceVotesOptions options_;
 };
 
 }  // namespace vcharge

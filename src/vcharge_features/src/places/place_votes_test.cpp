@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <memory>
 #include <random>
 #include <stdexcept>
 #include <utility>
@@ -45,14 +48,22 @@ class AlikePlaces {
 
   PlaceVotes votes() const {
     cv::Mat descriptors;
-    std::vector<int32_t> images;
     for (int image = 0; image < kPlaces * kCameras; ++image) {
       for (int i = 0; i < kFeatures; ++i) {
         descriptors.push_back(feature(image, i));
-        images.push_back(image);
       }
     }
-    return PlaceVotes(descriptors, images, kPlaces, kCameras);
+    PlaceSignatures signatures = PlaceSignatures::learnedFrom(descriptors);
+    const cv::Mat rows = signatures.of(descriptors);
+    std::vector<PlaceFeature> features(static_cast<size_t>(rows.rows));
+    for (int i = 0; i < rows.rows; ++i) {
+      PlaceFeature& of_row = features[static_cast<size_t>(i)];
+      std::copy_n(rows.ptr(i), of_row.signature.size(), of_row.signature.begin());
+      of_row.first_place = i / kFeatures / kCameras;
+      of_row.camera = i / kFeatures % kCameras;
+    }
+    return PlaceVotes(std::make_shared<const MemoryPlaceTable>(std::move(features)), std::move(signatures),
+                      kPlaces, kCameras);
   }
 
  private:
@@ -113,6 +124,19 @@ TEST_P(PlaceVotesTest, AnotherCameraMayHaveSeenIt) {
   EXPECT_EQ(matches[0].cameras, (std::vector<int>{1, 0, -1, 1}));
 }
 
+TEST(PlaceVotesRangeTest, AFeatureVotesForAllItsPlacesAndForNoOthers) {
+  PlaceFeature feature;
+  feature.first_place = 8;
+  feature.num_places = 5;  // the table has fewer places
+  const PlaceVotes votes(std::make_shared<const MemoryPlaceTable>(std::vector<PlaceFeature>{feature}),
+                         PlaceSignatures(cv::Mat()), 10, 1);
+  const std::vector<PlaceMatch> matches = votes.query({cv::Mat::zeros(1, 32, CV_8UC1)}, 10);
+  ASSERT_EQ(matches.size(), 2U);
+  EXPECT_EQ(matches[0].place, 8);
+  EXPECT_EQ(matches[1].place, 9);
+  EXPECT_FLOAT_EQ(static_cast<float>(matches[0].score), std::log(10.0F / 2.0F));
+}
+
 TEST_P(PlaceVotesTest, GivesTheSameOnOneThread) {
   const AlikePlaces places(GetParam());
   const std::vector<cv::Mat> query = {places.onAnotherDay(0, 0.3), places.onAnotherDay(1, 0.3)};
@@ -133,11 +157,12 @@ TEST_P(PlaceVotesTest, NamesBadInput) {
       cv::Mat::zeros(3, GetParam() == CV_8UC1 ? 64 : 32, GetParam() == CV_8UC1 ? CV_32FC1 : CV_8UC1);
   EXPECT_THROW(votes.query({other_kind}, 5), std::invalid_argument);
   EXPECT_TRUE(votes.query({cv::Mat(), cv::Mat()}, 5).empty());
-  EXPECT_THROW(PlaceVotes(places.feature(0, 0), {0, 1}, 2, 1), std::logic_error);
-  EXPECT_THROW(PlaceVotes(places.feature(0, 0), {2}, 2, 1), std::logic_error);
+  const auto table = std::make_shared<const MemoryPlaceTable>(std::vector<PlaceFeature>(1));
+  EXPECT_THROW(PlaceVotes(nullptr, PlaceSignatures(cv::Mat()), 1, 1), std::logic_error);
+  EXPECT_THROW(PlaceVotes(table, PlaceSignatures(cv::Mat()), 1, 0), std::logic_error);
   PlaceVotesOptions options;
   options.max_distance_bits = -1;
-  EXPECT_THROW(PlaceVotes(places.feature(0, 0), {0}, 1, 1, options), std::invalid_argument);
+  EXPECT_THROW(PlaceVotes(table, PlaceSignatures(cv::Mat()), 1, 1, options), std::invalid_argument);
 }
 
 INSTANTIATE_TEST_SUITE_P(KindsOfDescriptors, PlaceVotesTest, ::testing::Values(CV_8UC1, CV_32FC1),

@@ -9,11 +9,11 @@
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/frames/image.h"
-#include "vcharge_core/sparse_map/sparse_map.h"
 #include "vcharge_features/feature_extractor.h"
-#include "vcharge_features/place_votes.h"
+#include "vcharge_features/place_index.h"
 #include "vcharge_geometry/robust/robust_options.h"
 #include "vcharge_reconstruction/localization_status.h"
+#include "vcharge_reconstruction/tiled_map.h"
 
 namespace vcharge {
 
@@ -46,9 +46,10 @@ struct PosePrior {
 
 /// A landmark of the map observed in the image of a camera.
 struct LandmarkObservation {
-  int32_t landmark = 0;
+  int32_t landmark_id = 0;
   int32_t camera = 0;
   cv::Point2f position_px;
+  Eigen::Vector3d landmark_m = Eigen::Vector3d::Zero();  ///< in the map frame
 };
 
 /// Pose of the vehicle from the images of one instant. Pose and covariance are valid for kLocalized; for
@@ -75,17 +76,16 @@ class LandmarkMatcher;
 struct LandmarkMatches;
 
 /// Finds the pose of a rig in a sparse map (paper, section Localization; Lee et al., IJRR 2015). Immutable,
-/// and safe to use from several threads. Data parallel inside, deterministic.
+/// and safe to use from several threads. Data parallel inside, deterministic. Localizing throws the errors of
+/// the map's tiles.
 class MapLocalizer {
  public:
-  /// The rig may differ from the map's in lenses and extrinsics. std::invalid_argument for bad options;
-  /// InputError for a rig without extrinsics, or a map with features of an unknown kind.
-  MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
+  /// Localizers may share a map. The rig may differ from the map's in lenses and extrinsics.
+  /// std::invalid_argument for bad options; InputError for a rig without extrinsics, or a map with features
+  /// of an unknown kind.
+  MapLocalizer(std::shared_ptr<const TiledMap> map, std::shared_ptr<const CameraRig> rig,
                const MapLocalizerOptions& options = MapLocalizerOptions());
   ~MapLocalizer();
-
-  /// A localizer for another rig that shares the prepared map. Errors as those of the constructor.
-  std::unique_ptr<MapLocalizer> forRig(std::shared_ptr<const CameraRig> rig) const;
 
   /// Extracts features of the map's kind. Images are in the rig's order, empty where one is missing.
   RigFeatures extract(const std::vector<Image>& images) const;
@@ -101,12 +101,9 @@ class MapLocalizer {
   /// Minimum number of inliers of a relocalization with these images.
   int minInliersWithoutPrior(const RigFeatures& features) const;
 
-  const SparseMap& map() const { return *map_; }
+  const std::shared_ptr<const TiledMap>& map() const { return map_; }
 
  private:
-  MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
-               const MapLocalizerOptions& options, std::shared_ptr<const PlaceVotes> places);
-
   /// A fix without a pose, with the numbers of matches filled in.
   PoseFix fixWithoutPose(const LandmarkMatches& matches) const;
   PoseFix estimate(const LandmarkMatches& matches, int min_inliers, double min_inlier_ratio) const;
@@ -115,14 +112,13 @@ class MapLocalizer {
   PoseFix localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const;
   bool isOtherPlace(const PoseFix& a, const PoseFix& b) const;
 
-  const std::shared_ptr<const SparseMap> map_;
+  const std::shared_ptr<const TiledMap> map_;
   const std::shared_ptr<const CameraRig> rig_;
   const MapLocalizerOptions options_;
   RobustOptions robust_;  // adapted to the resolution of the rig's images
   std::unique_ptr<FeatureExtractor> extractor_;
   std::vector<cv::Mat> masks_;  // one per camera
   std::unique_ptr<LandmarkMatcher> matcher_;
-  std::shared_ptr<const PlaceVotes> places_;
 };
 
 }  // namespace vcharge

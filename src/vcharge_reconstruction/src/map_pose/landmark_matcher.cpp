@@ -1,14 +1,12 @@
 #include "map_pose/landmark_matcher.h"
 
 #include <algorithm>
-#include <random>
 #include <unordered_set>
 #include <utility>
 
 #include <tbb/parallel_for.h>
 #include <opencv2/core.hpp>
 
-#include "map_pose/landmark_view.h"
 #include "vcharge_core/base/quantile.h"
 #include "vcharge_features/descriptor_matching.h"
 
@@ -26,7 +24,6 @@ constexpr double kRadiusSigmas = 3.0;
 constexpr double kReferencePixelsPerRadian = 450.0;
 /// Keyframes before and after a recognized one whose landmarks are searched too.
 constexpr int kNeighbours = 2;
-constexpr int kUnrelatedPairs = 1001;
 /// Largest distance of the descriptors of a match over the median distance of unrelated ones: a threshold for
 /// all kinds of descriptors.
 constexpr double kMaxRelativeDistance = 0.55;
@@ -37,26 +34,6 @@ MatchOptions closeMatches() {
   return options;
 }
 
-double medianUnrelatedDistance(const SparseMap& map) {
-  const cv::Mat& descriptors = map.descriptors();
-  if (descriptors.rows < 2) {
-    return 0.0;
-  }
-  const int norm = descriptors.type() == CV_8UC1 ? cv::NORM_HAMMING : cv::NORM_L2;
-  const auto count = static_cast<uint32_t>(descriptors.rows);
-  std::mt19937 random(1);
-  std::vector<double> distances;
-  for (int i = 0; i < kUnrelatedPairs; ++i) {
-    const auto first = static_cast<int>(random() % count);
-    const auto second = static_cast<int>(random() % count);
-    const auto landmarkOf = [&](int row) { return map.observations()[static_cast<size_t>(row)].landmark; };
-    if (landmarkOf(first) != landmarkOf(second)) {
-      distances.push_back(cv::norm(descriptors.row(first), descriptors.row(second), norm));
-    }
-  }
-  return distances.empty() ? 0.0 : quantile(distances, 0.5);
-}
-
 }  // namespace
 
 void LandmarkMatches::append(const LandmarkMatches& other) {
@@ -64,44 +41,41 @@ void LandmarkMatches::append(const LandmarkMatches& other) {
   points.insert(points.end(), other.points.begin(), other.points.end());
 }
 
-LandmarkMatcher::LandmarkMatcher(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
+LandmarkMatcher::LandmarkMatcher(std::shared_ptr<const TiledMap> map, std::shared_ptr<const CameraRig> rig,
                                  const MapLocalizerOptions& options)
-    : map_(std::move(map)),
-      rig_(std::move(rig)),
-      options_(options),
-      unrelated_distance_(medianUnrelatedDistance(*map_)),
-      matching_(closeMatches()) {
-  if (unrelated_distance_ > 0.0) {
-    matching_.max_distance = std::min(matching_.max_distance, kMaxRelativeDistance * unrelated_distance_);
+    : map_(std::move(map)), rig_(std::move(rig)), options_(options), matching_(closeMatches()) {
+  if (map_->unrelatedDistance() > 0.0) {
+    matching_.max_distance =
+        std::min(matching_.max_distance, kMaxRelativeDistance * map_->unrelatedDistance());
   }
 }
 
-cv::Mat LandmarkMatcher::descriptorsOf(const std::vector<size_t>& observations) const {
-  cv::Mat descriptors(static_cast<int>(observations.size()), map_->descriptors().cols,
-                      map_->descriptors().type());
+cv::Mat LandmarkMatcher::descriptorsOf(const std::vector<TileObservation>& observations) const {
+  cv::Mat descriptors(static_cast<int>(observations.size()), map_->descriptorColumns(),
+                      map_->descriptorType());
   for (size_t i = 0; i < observations.size(); ++i) {
-    map_->descriptors().row(static_cast<int>(observations[i])).copyTo(descriptors.row(static_cast<int>(i)));
+    observations[i].descriptor().copyTo(descriptors.row(static_cast<int>(i)));
   }
   return descriptors;
 }
 
-void LandmarkMatcher::add(const RigFeatures& features, size_t camera, size_t observation, int feature,
-                          float distance, LandmarkMatches* matches) const {
+void LandmarkMatcher::add(const RigFeatures& features, size_t camera, const TileObservation& observation,
+                          int feature, float distance, LandmarkMatches* matches) const {
   const Eigen::Vector3d ray = features.rays_in_camera[camera].col(feature);
   if (ray.isZero()) {
     return;
   }
   const RigidTransform& vehicle_from_camera = *rig_->cameras[camera].vehicle_from_camera;
-  const int32_t landmark = map_->observations()[observation].landmark;
+  const MapLandmark& landmark = observation.landmark();
   PointMatch point;
   point.ray = {vehicle_from_camera.translation(), vehicle_from_camera.rotation() * ray};
-  point.point_m = map_->landmarks()[static_cast<size_t>(landmark)].position_m;
+  point.point_m = landmark.position_m;
   point.camera = static_cast<int>(camera);
   point.quality = -distance;
   matches->points.push_back(point);
   matches->observations.push_back(
-      {landmark, static_cast<int32_t>(camera),
-       features.images[camera].keypoints[static_cast<size_t>(feature)].position_px});
+      {landmark.id, static_cast<int32_t>(camera),
+       features.images[camera].keypoints[static_cast<size_t>(feature)].position_px, landmark.position_m});
 }
 
 LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
@@ -142,21 +116,26 @@ LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
   return matches;
 }
 
-std::vector<size_t> LandmarkMatcher::observationsAround(size_t keyframe, size_t camera) const {
+std::vector<TileObservation> LandmarkMatcher::observationsAround(size_t keyframe, size_t camera,
+                                                                 std::vector<KeyframeInTile>* tiles) const {
   // Takes each landmark once, from the nearest keyframe.
-  std::vector<size_t> observations;
+  std::vector<TileObservation> observations;
   std::unordered_set<int32_t> landmarks;
   const auto num_keyframes = static_cast<std::ptrdiff_t>(map_->keyframes().size());
   for (int i = 0; i <= 2 * kNeighbours; ++i) {
     const std::ptrdiff_t neighbour =
         static_cast<std::ptrdiff_t>(keyframe) + (i % 2 == 0 ? i / 2 : -(i + 1) / 2);
-    if (neighbour < 0 || neighbour >= num_keyframes) {
+    if (neighbour < 0 || neighbour >= num_keyframes ||
+        map_->keyframes()[static_cast<size_t>(neighbour)].session != map_->keyframes()[keyframe].session) {
       continue;
     }
-    const auto [begin, end] = map_->observationsOf(static_cast<size_t>(neighbour), camera);
+    tiles->push_back(map_->tileOf(static_cast<size_t>(neighbour)));
+    const SparseMap& tile = *tiles->back().tile;
+    const auto [begin, end] = tile.observationsOf(tiles->back().index, camera);
     for (size_t k = begin; k < end; ++k) {
-      if (landmarks.insert(map_->observations()[k].landmark).second) {
-        observations.push_back(k);
+      const TileObservation observation = {&tile, k};
+      if (landmarks.insert(observation.landmark().id).second) {
+        observations.push_back(observation);
       }
     }
   }
@@ -170,8 +149,9 @@ LandmarkMatches LandmarkMatcher::searchAtPlace(const RigFeatures& features, cons
     if (place.cameras[camera] < 0 || image.empty()) {
       continue;
     }
-    const std::vector<size_t> observations =
-        observationsAround(static_cast<size_t>(place.place), static_cast<size_t>(place.cameras[camera]));
+    std::vector<KeyframeInTile> tiles;
+    const std::vector<TileObservation> observations = observationsAround(
+        static_cast<size_t>(place.place), static_cast<size_t>(place.cameras[camera]), &tiles);
     for (const FeatureMatch& match :
          matchDescriptors(image.descriptors, descriptorsOf(observations), MatchOptions())) {
       add(features, camera, observations[static_cast<size_t>(match.second_index)], match.first_index,

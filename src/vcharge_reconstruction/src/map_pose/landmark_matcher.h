@@ -3,11 +3,13 @@
 #include <memory>
 #include <vector>
 
+#include "map_pose/landmark_view.h"
 #include "vcharge_core/camera/camera_rig.h"
-#include "vcharge_core/sparse_map/sparse_map.h"
+#include "vcharge_features/descriptor_matching.h"
 #include "vcharge_features/place_index.h"
 #include "vcharge_geometry/solvers/point_match.h"
 #include "vcharge_reconstruction/map_localizer.h"
+#include "vcharge_reconstruction/tiled_map.h"
 
 namespace vcharge {
 
@@ -23,7 +25,7 @@ struct LandmarkMatches {
 /// Immutable.
 class LandmarkMatcher {
  public:
-  LandmarkMatcher(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
+  LandmarkMatcher(std::shared_ptr<const TiledMap> map, std::shared_ptr<const CameraRig> rig,
                   const MapLocalizerOptions& options);
 
   /// Searches around the projections of the landmarks; the deviations are those of `map_from_vehicle`.
@@ -35,15 +37,16 @@ class LandmarkMatcher {
   LandmarkMatches searchAtPlace(const RigFeatures& features, const PlaceMatch& place) const;
 
  private:
-  cv::Mat descriptorsOf(const std::vector<size_t>& observations) const;
-  std::vector<size_t> observationsAround(size_t keyframe, size_t camera) const;
-  void add(const RigFeatures& features, size_t camera, size_t observation, int feature, float distance,
-           LandmarkMatches* matches) const;
+  cv::Mat descriptorsOf(const std::vector<TileObservation>& observations) const;
+  /// What a camera saw at a keyframe and its neighbours; `tiles` keeps the observations alive.
+  std::vector<TileObservation> observationsAround(size_t keyframe, size_t camera,
+                                                  std::vector<KeyframeInTile>* tiles) const;
+  void add(const RigFeatures& features, size_t camera, const TileObservation& observation, int feature,
+           float distance, LandmarkMatches* matches) const;
 
-  const std::shared_ptr<const SparseMap> map_;
+  const std::shared_ptr<const TiledMap> map_;
   const std::shared_ptr<const CameraRig> rig_;
   const MapLocalizerOptions options_;
-  const double unrelated_distance_;
   MatchOptions matching_;  // with a distance for the map's kind of descriptor
 };
 

@@ -14,36 +14,27 @@ constexpr double kMaxRangeRatio = 1.8;
 
 }  // namespace
 
-LandmarkView::LandmarkView(const SparseMap& map, const CameraRig& rig, const MapLocalizerOptions& options,
+LandmarkView::LandmarkView(const TiledMap& map, const CameraRig& rig, const MapLocalizerOptions& options,
                            const RigidTransform& map_from_vehicle)
     : map_(map), rig_(rig), map_from_vehicle_(map_from_vehicle) {
-  std::vector<std::pair<double, size_t>> by_distance;
-  for (size_t i = 0; i < map.keyframes().size(); ++i) {
-    const double distance_m =
-        (map.keyframes()[i].map_from_vehicle.translation() - map_from_vehicle.translation()).norm();
-    if (distance_m <= options.max_distance_m) {
-      by_distance.emplace_back(distance_m, i);
-    }
-  }
-  std::sort(by_distance.begin(), by_distance.end());
-  by_distance.resize(std::min(by_distance.size(), static_cast<size_t>(options.max_keyframes)));
-  for (const auto& [distance_m, keyframe] : by_distance) {
-    keyframes_.push_back(keyframe);
+  for (const size_t keyframe : map.keyframesNear(map_from_vehicle.translation(), options.max_distance_m,
+                                                 static_cast<size_t>(options.max_keyframes))) {
+    keyframes_.push_back(map.tileOf(keyframe));
   }
 }
 
 std::vector<LandmarkView::Source> LandmarkView::sourcesFor(const Eigen::Vector3d& camera_centre) const {
   const double min_cos_view = std::cos(kMaxViewAngle_rad);
-  std::unordered_map<int32_t, size_t> index_of_landmark;
+  std::unordered_map<int32_t, size_t> source_of_id;
   std::vector<Source> sources;
-  for (const size_t keyframe : keyframes_) {
+  for (const auto& [tile, keyframe] : keyframes_) {
     for (size_t camera = 0; camera < map_.rig().cameras.size(); ++camera) {
-      const Eigen::Vector3d other_centre = map_.keyframes()[keyframe].map_from_vehicle *
+      const Eigen::Vector3d other_centre = tile->keyframes()[keyframe].map_from_vehicle *
                                            map_.rig().cameras[camera].vehicle_from_camera->translation();
-      const auto [begin, end] = map_.observationsOf(keyframe, camera);
+      const auto [begin, end] = tile->observationsOf(keyframe, camera);
       for (size_t i = begin; i < end; ++i) {
-        const int32_t landmark = map_.observations()[i].landmark;
-        const Eigen::Vector3d& point = map_.landmarks()[static_cast<size_t>(landmark)].position_m;
+        const TileObservation observation = {tile.get(), i};
+        const Eigen::Vector3d& point = observation.landmark().position_m;
         const Eigen::Vector3d from_here = point - camera_centre;
         const Eigen::Vector3d from_there = point - other_centre;
         const double range_m = from_here.norm(), other_range_m = from_there.norm();
@@ -52,11 +43,11 @@ std::vector<LandmarkView::Source> LandmarkView::sourcesFor(const Eigen::Vector3d
             other_range_m > kMaxRangeRatio * range_m) {
           continue;
         }
-        const auto [found, is_new] = index_of_landmark.emplace(landmark, sources.size());
+        const auto [found, is_new] = source_of_id.emplace(observation.landmark().id, sources.size());
         if (is_new) {
-          sources.push_back({i, cos_angle});
+          sources.push_back({observation, cos_angle});
         } else if (cos_angle > sources[found->second].cos_angle) {
-          sources[found->second] = {i, cos_angle};
+          sources[found->second] = {observation, cos_angle};
         }
       }
     }
@@ -71,9 +62,7 @@ ExpectedLandmarks LandmarkView::expectedIn(size_t camera) const {
   const double min_cos_field = std::cos(0.5 * rig_camera.field_of_view_rad);
   ExpectedLandmarks expected;
   for (const Source& source : sourcesFor(map_from_camera.translation())) {
-    const int32_t landmark = map_.observations()[source.observation].landmark;
-    const Eigen::Vector3d point =
-        camera_from_map * map_.landmarks()[static_cast<size_t>(landmark)].position_m;
+    const Eigen::Vector3d point = camera_from_map * source.observation.landmark().position_m;
     const double range_m = point.norm();
     Eigen::Vector2d pixel;
     if (point.z() >= min_cos_field * range_m && rig_camera.model.project(point, &pixel) && pixel.x() >= 0.0 &&

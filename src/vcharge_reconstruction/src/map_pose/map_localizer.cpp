@@ -40,10 +40,10 @@ RobustOptions robustOptions() {
   return options;
 }
 
-FeatureExtractorOptions extractorOptionsOf(const SparseMap& map) {
+FeatureExtractorOptions extractorOptionsOf(const TiledMap& map) {
   FeatureExtractorOptions options;
   try {
-    readFields(YAML::Load(map.contents().feature_options), "map: feature_options", &options);
+    readFields(YAML::Load(map.featureOptions()), "map: feature_options", &options);
   } catch (const YAML::Exception& error) {
     throw InputError(std::string("map: feature_options: expected YAML: ") + error.what());
   }
@@ -52,26 +52,17 @@ FeatureExtractorOptions extractorOptionsOf(const SparseMap& map) {
 
 }  // namespace
 
-MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
+MapLocalizer::MapLocalizer(std::shared_ptr<const TiledMap> map, std::shared_ptr<const CameraRig> rig,
                            const MapLocalizerOptions& options)
-    : MapLocalizer(std::move(map), std::move(rig), options, nullptr) {}
-
-MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr<const CameraRig> rig,
-                           const MapLocalizerOptions& options, std::shared_ptr<const PlaceVotes> places)
-    : map_(std::move(map)),
-      rig_(std::move(rig)),
-      options_(options),
-      robust_(robustOptions()),
-      places_(std::move(places)) {
+    : map_(std::move(map)), rig_(std::move(rig)), options_(options), robust_(robustOptions()) {
   options_.validate();
   check(map_ != nullptr && rig_ != nullptr, "MapLocalizer: expected a map and a rig");
   if (!rig_->hasExtrinsics()) {
     throw InputError("rig: expected vehicle_from_camera of every camera, which extrinsic calibration gives");
   }
   extractor_ = makeFeatureExtractor(extractorOptionsOf(*map_));
-  const cv::Mat& descriptors = map_->descriptors();
-  if (descriptors.type() != extractor_->descriptorType() ||
-      descriptors.cols != extractor_->descriptorColumns()) {
+  if (map_->descriptorType() != extractor_->descriptorType() ||
+      map_->descriptorColumns() != extractor_->descriptorColumns()) {
     throw InputError("map: its descriptors are not those of its feature_options");
   }
   for (const RigCamera& camera : rig_->cameras) {
@@ -79,24 +70,9 @@ MapLocalizer::MapLocalizer(std::shared_ptr<const SparseMap> map, std::shared_ptr
     robust_.max_error_rad = std::max(robust_.max_error_rad, kMinError_px * radiansPerPixel(camera));
   }
   matcher_ = std::make_unique<LandmarkMatcher>(map_, rig_, options_);
-  if (places_ != nullptr) {
-    return;
-  }
-  const size_t num_cameras = map_->rig().cameras.size();
-  std::vector<int32_t> images;
-  for (const MapObservation& observation : map_->observations()) {
-    images.push_back(observation.keyframe * static_cast<int32_t>(num_cameras) + observation.camera);
-  }
-  places_ =
-      std::make_shared<PlaceVotes>(descriptors, std::move(images), static_cast<int>(map_->keyframes().size()),
-                                   static_cast<int>(num_cameras), PlaceVotesOptions());
 }
 
 MapLocalizer::~MapLocalizer() = default;
-
-std::unique_ptr<MapLocalizer> MapLocalizer::forRig(std::shared_ptr<const CameraRig> rig) const {
-  return std::unique_ptr<MapLocalizer>(new MapLocalizer(map_, std::move(rig), options_, places_));
-}
 
 RigFeatures MapLocalizer::extract(const std::vector<Image>& images) const {
   check(images.size() == rig_->cameras.size(), "MapLocalizer::extract: expected an image per camera");
@@ -221,7 +197,8 @@ std::vector<PlaceMatch> MapLocalizer::recognizePlaces(const RigFeatures& feature
   }
   // Neighbouring keyframes are similar, so only one of them is kept, to leave room for other places.
   std::vector<PlaceMatch> places;
-  for (const PlaceMatch& match : places_->query(descriptors, kPlacesPerCandidate * options_.max_places)) {
+  for (const PlaceMatch& match :
+       map_->places().query(descriptors, kPlacesPerCandidate * options_.max_places)) {
     const RigidTransform& pose = map_->keyframes()[static_cast<size_t>(match.place)].map_from_vehicle;
     const bool is_new = std::none_of(places.begin(), places.end(), [&](const PlaceMatch& other) {
       const RigidTransform between =

@@ -30,6 +30,10 @@ PosePrior priorAbout(const RigidTransform& truth, double shift_m, double turn_ra
   return prior;
 }
 
+std::shared_ptr<const TiledMap> tiled(const std::shared_ptr<const SparseMap>& map) {
+  return std::make_shared<const TiledMap>(map);
+}
+
 double positionError(const PoseFix& fix, const RigidTransform& truth) {
   return (fix.map_from_vehicle.translation() - truth.translation()).norm();
 }
@@ -41,7 +45,7 @@ double turnError(const PoseFix& fix, const RigidTransform& truth) {
 class MapLocalizerTest : public ::testing::Test {
  protected:
   const std::shared_ptr<const SparseMap> map_ = testing::makeTestMap({});
-  const MapLocalizer localizer_{map_, rigOf(map_)};
+  const MapLocalizer localizer_{tiled(map_), rigOf(map_)};
 };
 
 TEST_F(MapLocalizerTest, FindsThePoseNearAnExpectedOne) {
@@ -111,7 +115,7 @@ TEST_F(MapLocalizerTest, RelocalizationNeedsInliersPerCamera) {
   ASSERT_EQ(fix.status, LocalizationStatus::kLocalized);
   MapLocalizerOptions options;
   options.min_inliers_per_camera_without_prior = fix.numInliers() / 2 + 20;  // two cameras
-  const MapLocalizer stricter(map_, rigOf(map_), options);
+  const MapLocalizer stricter(tiled(map_), rigOf(map_), options);
   EXPECT_NE(stricter.localizeAnywhere(view).status, LocalizationStatus::kLocalized);
   EXPECT_EQ(stricter.localizeNear(view, priorAbout(truth, 0.1, 0.0)).status, LocalizationStatus::kLocalized);
 }
@@ -148,7 +152,7 @@ TEST(MapLocalizerTwinsTest, ReportsTwoEqualPlacesAsAmbiguous) {
   testing::TestMapOptions options;
   options.twin_offset_m = 100.0;
   const auto map = testing::makeTestMap(options);
-  const MapLocalizer localizer(map, rigOf(map));
+  const MapLocalizer localizer(tiled(map), rigOf(map));
   const RigidTransform truth = posesBetween(*map, 8);
   testing::TestViewOptions view;
   const RigFeatures features = testing::makeTestView(*map, truth, view);
@@ -179,7 +183,7 @@ TEST(MapLocalizerSizeTest, AcceptsThePixelErrorsOfSmallImages) {
 )",
                                 "quarter", "");
   const auto map = std::make_shared<const SparseMap>(std::move(contents));
-  const MapLocalizer localizer(map, rigOf(map));
+  const MapLocalizer localizer(tiled(map), rigOf(map));
   for (size_t keyframe = 2; keyframe + 2 < map->keyframes().size(); keyframe += 5) {
     const RigidTransform truth = posesBetween(*map, keyframe);
     testing::TestViewOptions view;
@@ -207,14 +211,15 @@ TEST(MapLocalizerDescriptorTest, LocalizesWithRealDescriptorsAsWithBinaryOnes) {
   testing::TestViewOptions view;
   view.wrong_ratio = 0.3;
   const RigFeatures bits = testing::makeTestView(*map, truth, view);
-  const PoseFix by_bits = MapLocalizer(map, rigOf(map)).localizeNear(bits, priorAbout(truth, 0.1, 0.0));
+  const PoseFix by_bits =
+      MapLocalizer(tiled(map), rigOf(map)).localizeNear(bits, priorAbout(truth, 0.1, 0.0));
   ASSERT_EQ(by_bits.status, LocalizationStatus::kLocalized);
   for (const float one : {1.0F / 16.0F, 40.0F}) {
     SparseMapContents contents = map->contents();
     contents.descriptors = testing::descriptorsAsNumbers(contents.descriptors, one);
     contents.feature_options = "type: root_sift\n";
     const auto map_of_numbers = std::make_shared<const SparseMap>(std::move(contents));
-    const MapLocalizer localizer(map_of_numbers, rigOf(map_of_numbers));
+    const MapLocalizer localizer(tiled(map_of_numbers), rigOf(map_of_numbers));
     const RigFeatures numbers = withNumbers(bits, one);
     const PoseFix near = localizer.localizeNear(numbers, priorAbout(truth, 0.1, 0.0));
     ASSERT_EQ(near.status, LocalizationStatus::kLocalized) << one;
@@ -236,7 +241,7 @@ TEST(MapLocalizerInputTest, NamesTheDefectOfAMap) {
     change(&contents);
     const auto bad = std::make_shared<const SparseMap>(std::move(contents));
     try {
-      MapLocalizer localizer(bad, rigOf(map));
+      MapLocalizer localizer(tiled(bad), rigOf(map));
       FAIL() << "expected an error with: " << text;
     } catch (const InputError& error) {
       EXPECT_NE(std::string(error.what()).find(text), std::string::npos) << error.what();
@@ -249,10 +254,10 @@ TEST(MapLocalizerInputTest, NamesTheDefectOfAMap) {
               [](SparseMapContents* contents) { contents->feature_options = "type: root_sift\n"; });
   CameraRig bare = map->rig();
   bare.cameras[0].vehicle_from_camera.reset();
-  EXPECT_THROW(MapLocalizer(map, std::make_shared<const CameraRig>(bare)), InputError);
+  EXPECT_THROW(MapLocalizer(tiled(map), std::make_shared<const CameraRig>(bare)), InputError);
   MapLocalizerOptions options;
   options.max_radius_px = 1.0;
-  EXPECT_THROW(MapLocalizer(map, rigOf(map), options), std::invalid_argument);
+  EXPECT_THROW(MapLocalizer(tiled(map), rigOf(map), options), std::invalid_argument);
 }
 
 }  // namespace
