@@ -41,15 +41,19 @@ struct LocalizationResult {
   std::map<std::string, double> stage_s;
 };
 
+class PlaceHypotheses;
+
 /// Localizes a vehicle in a map, frame by frame (paper, section Localization). Tracking: the pose is
 /// predicted by the odometer and corrected by a fix from the images; frames without a fix are bridged.
-/// Relocalization: a lost vehicle is searched in the whole map; a pose is accepted when two frames agree.
+/// Relocalization: a lost vehicle is searched in the whole map; a pose is accepted when one place remains and
+/// two frames agree.
 /// Not thread safe.
 class DriveLocalizer {
  public:
   /// Throws the errors of MapLocalizer.
   DriveLocalizer(std::shared_ptr<const TiledMap> map, std::shared_ptr<const CameraRig> rig,
                  const DriveLocalizerOptions& options = DriveLocalizerOptions());
+  ~DriveLocalizer();
 
   LocalizationResult process(const ImageFrame& frame);
   /// Processes a frame whose features were already extracted; its images are not used.
@@ -65,20 +69,11 @@ class DriveLocalizer {
   const MapLocalizer& localizer() const { return localizer_; }
 
  private:
-  struct Candidate {
-    Timestamp stamp;
-    RigidTransform map_from_vehicle;
-    std::optional<RigidTransform> odom_from_vehicle;
-  };
   void localize(const ImageFrame& frame, const RigFeatures& features, LocalizationResult* result);
   void predict(const ImageFrame& frame);
   bool isLost() const;
   void track(const RigFeatures& features, LocalizationResult* result);
   void searchWholeMap(const ImageFrame& frame, const RigFeatures& features, LocalizationResult* result);
-  /// The unconfirmed pose of a relocalization, moved to this frame; empty if there is no recent one.
-  std::optional<RigidTransform> candidateNow(const ImageFrame& frame) const;
-  bool isConfirmed(const RigidTransform& expected, const PoseFix& fix) const;
-  PoseFix searchFrom(const std::optional<RigidTransform>& expected, const RigFeatures& features) const;
   void takeFix(const PoseFix& fix, LocalizationResult* result);
 
   const std::shared_ptr<const CameraRig> rig_;
@@ -93,7 +88,7 @@ class DriveLocalizer {
   double last_period_s_ = 0.0;
   int frames_without_fix_ = 0;
   bool is_seed_ = false;  // the filter's pose is from seed() and not yet confirmed by images
-  std::optional<Candidate> candidate_;
+  std::unique_ptr<PlaceHypotheses> hypotheses_;
 };
 
 }  // namespace vcharge

@@ -2,27 +2,21 @@
 
 #include <cmath>
 #include <limits>
+#include <string>
 #include <utility>
 
+#include "tracking/place_hypotheses.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/stage_timer.h"
 
 namespace vcharge {
 namespace {
 
-// A relocalization is accepted when two frames agree within these bounds.
-constexpr double kConfirmation_m = 0.3;
-constexpr double kConfirmation_rad = 0.03;
-constexpr double kMaxConfirmation_s = 1.0;
 // Additional uncertainty of motion without odometry, which assumes a constant velocity.
 constexpr double kUnknownMotion_m_per_s = 1.0;
 constexpr double kUnknownTurn_rad_per_s = 0.3;
 /// Tiles of the map are read before the vehicle is this close to where they are needed.
 constexpr double kLookAhead_m = 10.0;
-
-double squared(double value) {
-  return value * value;
-}
 
 }  // namespace
 
@@ -32,12 +26,15 @@ DriveLocalizer::DriveLocalizer(std::shared_ptr<const TiledMap> map, std::shared_
       options_((options.validate(), options)),
       localizer_(std::move(map), rig_, options.localizer),
       filter_(optionsForMapOf(localizer_.map()->rig(), options.filter)),
-      health_(rig_, options.health) {}
+      health_(rig_, options.health),
+      hypotheses_(std::make_unique<PlaceHypotheses>(localizer_, options.localizer.max_ambiguity)) {}
+
+DriveLocalizer::~DriveLocalizer() = default;
 
 void DriveLocalizer::seed(const PosePrior& pose) {
   filter_.reset(pose);
   is_seed_ = true;
-  candidate_.reset();
+  hypotheses_->clear();
   frames_without_fix_ = 0;
 }
 
@@ -87,7 +84,7 @@ void DriveLocalizer::takeFix(const PoseFix& fix, LocalizationResult* result) {
   result->fix = fix;
   frames_without_fix_ = 0;
   is_seed_ = false;
-  candidate_.reset();
+  hypotheses_->clear();
   last_fix_ = result->stamp;
 }
 
@@ -110,65 +107,28 @@ void DriveLocalizer::track(const RigFeatures& features, LocalizationResult* resu
   ++frames_without_fix_;
 }
 
-std::optional<RigidTransform> DriveLocalizer::candidateNow(const ImageFrame& frame) const {
-  if (!candidate_ || toSeconds(frame.stamp - candidate_->stamp) > kMaxConfirmation_s) {
-    return std::nullopt;
-  }
-  RigidTransform moved;
-  if (candidate_->odom_from_vehicle && frame.odom_from_vehicle) {
-    moved = candidate_->odom_from_vehicle->inverse() * *frame.odom_from_vehicle;
-  }
-  return candidate_->map_from_vehicle * moved;
-}
-
-bool DriveLocalizer::isConfirmed(const RigidTransform& expected, const PoseFix& fix) const {
-  const RigidTransform difference = expected.inverse() * fix.map_from_vehicle;
-  return fix.status == LocalizationStatus::kLocalized && difference.translation().norm() <= kConfirmation_m &&
-         angleOfRotation(difference.rotation()) <= kConfirmation_rad;
-}
-
-PoseFix DriveLocalizer::searchFrom(const std::optional<RigidTransform>& expected,
-                                   const RigFeatures& features) const {
-  if (expected) {
-    PosePrior prior{*expected, Eigen::Matrix<double, 6, 6>::Zero()};
-    prior.covariance.diagonal() << Eigen::Vector3d::Constant(squared(kConfirmation_m) / 9.0),
-        Eigen::Vector3d::Constant(squared(kConfirmation_rad) / 9.0);
-    const PoseFix fix = localizer_.localizeNear(features, prior);
-    if (isConfirmed(*expected, fix) && fix.numInliers() >= localizer_.minInliersWithoutPrior(features)) {
-      return fix;
-    }
-  }
-  return localizer_.localizeAnywhere(features);
-}
-
 void DriveLocalizer::searchWholeMap(const ImageFrame& frame, const RigFeatures& features,
                                     LocalizationResult* result) {
   result->searched_whole_map = true;
-  const std::optional<RigidTransform> expected = candidateNow(frame);
-  const PoseFix fix = searchFrom(expected, features);
+  const PlaceHypotheses::Result found = hypotheses_->update(frame, features);
   const bool tracks = result->status == LocalizationStatus::kBridgedByOdometry;
   if (!tracks) {
-    result->fix = fix;
-    result->status = fix.status;
+    result->fix = found.fix;
+    result->status = found.fix.status;
   }
-  if (fix.status != LocalizationStatus::kLocalized) {
-    if (!expected) {
-      candidate_.reset();  // otherwise the next frame may confirm it
-    }
+  if (found.fix.status != LocalizationStatus::kLocalized) {
     if (!tracks) {
-      result->message = fix.status == LocalizationStatus::kAmbiguous ? "two places of the map look alike"
-                                                                     : "no place of the map was recognized";
+      result->message = found.fix.status == LocalizationStatus::kAmbiguous
+                            ? std::to_string(found.num_places) + " places of the map look alike"
+                            : "no place of the map was recognized";
     }
-    return;
-  }
-  if (tracks && filter_.update(fix)) {
-    takeFix(fix, result);
-  } else if (expected && isConfirmed(*expected, fix)) {
-    filter_.reset({fix.map_from_vehicle, options_.filter.fix_covariance_factor * fix.covariance});
-    takeFix(fix, result);
+  } else if (tracks && filter_.update(found.fix)) {
+    takeFix(found.fix, result);
+  } else if (found.is_confirmed) {
+    filter_.reset({found.fix.map_from_vehicle, options_.filter.fix_covariance_factor * found.fix.covariance});
+    takeFix(found.fix, result);
     result->message = "found in the map";
   } else {
-    candidate_ = {frame.stamp, fix.map_from_vehicle, frame.odom_from_vehicle};
     if (!tracks) {
       result->status = LocalizationStatus::kLost;
     }
@@ -179,7 +139,7 @@ void DriveLocalizer::searchWholeMap(const ImageFrame& frame, const RigFeatures& 
 void DriveLocalizer::forget() {
   filter_.forget();
   is_seed_ = false;
-  candidate_.reset();
+  hypotheses_->clear();
   last_fix_.reset();
   frames_without_fix_ = 0;
 }
@@ -215,7 +175,7 @@ void DriveLocalizer::localize(const ImageFrame& frame, const RigFeatures& featur
     track(features, result);
     const bool is_stuck =
         frames_without_fix_ > 0 && frames_without_fix_ % options_.max_frames_without_fix == 0;
-    search_whole_map = is_stuck || (frames_without_fix_ > 0 && candidate_);
+    search_whole_map = is_stuck || (frames_without_fix_ > 0 && !hypotheses_->isEmpty());
     if (is_seed_) {
       result->status = LocalizationStatus::kLost;
       result->message = "the images do not confirm the given pose: " + result->message;

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "vcharge_core/sparse_map/map_tile.h"
 #include "vcharge_reconstruction/testing/test_map.h"
 
 namespace vcharge {
@@ -192,6 +193,46 @@ TEST_F(DriveLocalizerTest, AReplayThatStartsOverStartsFromNothing) {
   const LocalizationResult result = drive(1);
   EXPECT_EQ(result.status, LocalizationStatus::kLost);
   EXPECT_EQ(drive(1).status, LocalizationStatus::kLocalized);
+}
+
+/// A map of a car park on two levels that look alike; of the second, only the first part was mapped.
+class AlikeLevelsTest : public DriveLocalizerTest {
+ protected:
+  static std::shared_ptr<const TiledMap> makeLevels() {
+    testing::TestMapOptions options;
+    options.twin_offset_m = 100.0;
+    const auto map = testing::makeTestMap(options);
+    std::vector<size_t> kept;
+    for (size_t i = 0; i < map->keyframes().size() - map->keyframes().size() / 4; ++i) {
+      kept.push_back(i);
+    }
+    return std::make_shared<const TiledMap>(partOf(*map, kept));
+  }
+
+  DriveLocalizer in_levels_{makeLevels(), std::shared_ptr<const CameraRig>(map_, &map_->rig())};
+};
+
+TEST_F(AlikeLevelsTest, NoPoseIsGivenUntilOnePlaceRemains) {
+  int num_ambiguous = 0, num_localized = 0;
+  while (way_m_ < 2.0 * 3.14159 * kRadius_m - 8.0) {
+    way_m_ += kStep_m;
+    ImageFrame frame;
+    frame.stamp = Timestamp::fromNanoseconds(1'000'000'000'000LL + 80'000'000LL * num_frames_++);
+    frame.images.resize(2);
+    odom_from_vehicle_ = odom_from_vehicle_ * RigidTransform::planar(kStep_m, 0.0, kStep_m / kRadius_m);
+    frame.odom_from_vehicle = odom_from_vehicle_;
+    const LocalizationResult result = in_levels_.process(frame, viewAt(way_m_));
+    if (result.pose) {
+      ++num_localized;
+      EXPECT_LT((result.pose->map_from_vehicle.translation() - truthAt(way_m_).translation()).norm(), 0.1);
+    } else if (result.status == LocalizationStatus::kAmbiguous) {
+      ++num_ambiguous;
+      EXPECT_EQ(num_localized, 0) << "later there is one place";
+      EXPECT_EQ(result.message, "2 places of the map look alike");
+    }
+  }
+  EXPECT_GT(num_ambiguous, 100);
+  EXPECT_GT(num_localized, 50);
 }
 
 }  // namespace

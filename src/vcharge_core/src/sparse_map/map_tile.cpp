@@ -12,6 +12,19 @@ int32_t tileCoordinate(double position_m) {
   return static_cast<int32_t>(std::clamp(std::floor(position_m / kTileSize_m), -kMax, kMax));
 }
 
+/// What does not grow with the map.
+SparseMapContents headOf(const SparseMapContents& whole) {
+  SparseMapContents head;
+  head.rig = whole.rig;
+  head.sessions = whole.sessions;
+  head.feature_options = whole.feature_options;
+  head.odometry_distance_scale = whole.odometry_distance_scale;
+  head.odometry_turn_scale = whole.odometry_turn_scale;
+  head.next_keyframe_id = whole.next_keyframe_id;
+  head.next_landmark_id = whole.next_landmark_id;
+  return head;
+}
+
 }  // namespace
 
 MapTile tileAt(const Eigen::Vector3d& position_m) {
@@ -26,16 +39,19 @@ std::map<MapTile, std::vector<size_t>> tilesOf(const std::vector<MapKeyframe>& k
   return tiles;
 }
 
+SparseMapContents overviewOf(const SparseMap& map) {
+  SparseMapContents overview = headOf(map.contents());
+  overview.keyframes = map.keyframes();
+  for (MapKeyframe& keyframe : overview.keyframes) {
+    keyframe.covariance.setZero();
+  }
+  overview.descriptors.create(0, map.descriptors().cols, map.descriptors().type());
+  return overview;
+}
+
 std::shared_ptr<const SparseMap> partOf(const SparseMap& map, const std::vector<size_t>& keyframes) {
   const SparseMapContents& whole = map.contents();
-  SparseMapContents part;
-  part.rig = whole.rig;
-  part.sessions = whole.sessions;
-  part.feature_options = whole.feature_options;
-  part.odometry_distance_scale = whole.odometry_distance_scale;
-  part.odometry_turn_scale = whole.odometry_turn_scale;
-  part.next_keyframe_id = whole.next_keyframe_id;
-  part.next_landmark_id = whole.next_landmark_id;
+  SparseMapContents part = headOf(whole);
   const size_t num_cameras = whole.rig.cameras.size();
   std::vector<size_t> rows;
   std::vector<int32_t> landmarks;

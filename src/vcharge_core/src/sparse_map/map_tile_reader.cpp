@@ -74,6 +74,9 @@ MapTileReader::MapTileReader(std::unique_ptr<Connection> connection) : connectio
     info_[info.text(0)] = info.text(1);
   }
   overview_.descriptors.create(0, connection_->descriptors.second, connection_->descriptors.first);
+  if (SparseMap(overview_).contentHash() != info_[kOverviewHashKey]) {
+    file.damaged("its overview does not match the written hash");
+  }
 }
 
 MapTileReader::~MapTileReader() = default;

@@ -148,8 +148,11 @@ TEST_F(MapTileTest, AReaderGoesOnWithItsVersion) {
   EXPECT_EQ(MapTileReader::open(path_), nullptr) << "a version without an index";
 }
 
-TEST_F(MapTileTest, NamesADamagedTile) {
+TEST_F(MapTileTest, NamesWhatIsDamaged) {
   ASSERT_EQ(errorOfTiles(), "");
+  runSql("UPDATE meta SET value = value || 'x' WHERE key = 'feature_options'");
+  EXPECT_THAT(errorOfTiles(), HasSubstr("its overview does not match the written hash"));
+  runSql("UPDATE meta SET value = rtrim(value, 'x') WHERE key = 'feature_options'");
   runSql("UPDATE landmark SET x_m = x_m + 1 WHERE id = 5");
   EXPECT_THAT(errorOfTiles(), HasSubstr("the tile at"));
   EXPECT_THAT(errorOfTiles(), HasSubstr("does not match the written hash"));

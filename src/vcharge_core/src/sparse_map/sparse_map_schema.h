@@ -56,10 +56,12 @@ constexpr const char* kTileSql =
 /// Rows of MapIndex::writePlaceRows, which recognizing places reads.
 constexpr const char* kPlaceSql =
     "CREATE TABLE place (id INTEGER PRIMARY KEY, features BLOB NOT NULL) STRICT";
-/// The key map_hash has the content hash of the map that the tables belong to; others are of MapIndex.
+/// The key map_hash has the content hash of the map that the tables belong to, overview_hash that of
+/// its overview (overviewOf()); others are of MapIndex.
 constexpr const char* kIndexInfoSql =
     "CREATE TABLE index_info (key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT";
 constexpr const char* kMapHashKey = "map_hash";
+constexpr const char* kOverviewHashKey = "overview_hash";
 
 /// Hash of what SparseMap::contentHash() excludes but must be protected from damage: the rig, its masks, and
 /// the provenance.

@@ -280,6 +280,7 @@ void writeIndex(const SparseMap& map, const MapIndex& index, SqliteDatabase* dat
     insert_info.run();
   };
   put(kMapHashKey, map.contentHash());
+  put(kOverviewHashKey, SparseMap(overviewOf(map)).contentHash());
   for (const auto& [key, value] : index.info) {
     put(key, value);
   }

@@ -98,6 +98,11 @@ class MapLocalizer {
   /// if two places fit the images.
   PoseFix localizeAnywhere(const RigFeatures& features) const;
 
+  /// The poses at the candidates of place recognition that are different places, best first.
+  std::vector<PoseFix> localizeEverywhere(const RigFeatures& features) const;
+  /// Whether two poses of the vehicle belong to different places.
+  static bool isOtherPlace(const RigidTransform& a, const RigidTransform& b);
+
   /// Minimum number of inliers of a relocalization with these images.
   int minInliersWithoutPrior(const RigFeatures& features) const;
 
@@ -110,7 +115,6 @@ class MapLocalizer {
   PoseFix refine(const RigFeatures& features, const PoseFix& fix, int min_inliers) const;
   std::vector<PlaceMatch> recognizePlaces(const RigFeatures& features) const;
   PoseFix localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const;
-  bool isOtherPlace(const PoseFix& a, const PoseFix& b) const;
 
   const std::shared_ptr<const TiledMap> map_;
   const std::shared_ptr<const CameraRig> rig_;

@@ -38,7 +38,7 @@ class TiledMap {
   const std::string& featureOptions() const;
   /// All keyframes; their covariances may be left out.
   const std::vector<MapKeyframe>& keyframes() const;
-  /// Of the descriptors, as of cv::Mat.
+  /// Type and columns of the descriptors, as cv::Mat has them.
   int descriptorType() const;
   int descriptorColumns() const;
 

@@ -184,8 +184,8 @@ PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMa
   return refine(features, fix, minInliersWithoutPrior(features));
 }
 
-bool MapLocalizer::isOtherPlace(const PoseFix& a, const PoseFix& b) const {
-  const RigidTransform between = a.map_from_vehicle.inverse() * b.map_from_vehicle;
+bool MapLocalizer::isOtherPlace(const RigidTransform& a, const RigidTransform& b) {
+  const RigidTransform between = a.inverse() * b;
   return between.translation().norm() > kOtherPlace_m ||
          angleOfRotation(between.rotation()) > kOtherHeading_rad;
 }
@@ -216,25 +216,36 @@ std::vector<PlaceMatch> MapLocalizer::recognizePlaces(const RigFeatures& feature
   return places;
 }
 
-PoseFix MapLocalizer::localizeAnywhere(const RigFeatures& features) const {
+std::vector<PoseFix> MapLocalizer::localizeEverywhere(const RigFeatures& features) const {
   const std::vector<PlaceMatch> places = recognizePlaces(features);
   std::vector<PoseFix> fixes(places.size());
   tbb::parallel_for(size_t{0}, places.size(),
                     [&](size_t i) { fixes[i] = localizeAtPlace(features, places[i]); });
-  PoseFix best = fixWithoutPose(LandmarkMatches());
+  const auto rank = [](const PoseFix& fix) {
+    return std::make_pair(fix.status == LocalizationStatus::kLocalized, fix.numInliers());
+  };
+  std::stable_sort(fixes.begin(), fixes.end(),
+                   [&](const PoseFix& a, const PoseFix& b) { return rank(a) > rank(b); });
+  std::vector<PoseFix> different;
   for (const PoseFix& fix : fixes) {
-    const auto rank = [](const PoseFix& f) {
-      return std::make_pair(f.status == LocalizationStatus::kLocalized, f.numInliers());
-    };
-    if (rank(fix) > rank(best)) {
-      best = fix;
+    if (!fix.inliers.empty() && std::all_of(different.begin(), different.end(), [&](const PoseFix& better) {
+          return isOtherPlace(fix.map_from_vehicle, better.map_from_vehicle);
+        })) {
+      different.push_back(fix);
     }
   }
-  for (const PoseFix& fix : fixes) {
-    if (!fix.inliers.empty() && isOtherPlace(fix, best)) {
-      best.second_best_ratio = std::max(
-          best.second_best_ratio, static_cast<double>(fix.numInliers()) / std::max(1, best.numInliers()));
-    }
+  return different;
+}
+
+PoseFix MapLocalizer::localizeAnywhere(const RigFeatures& features) const {
+  const std::vector<PoseFix> fixes = localizeEverywhere(features);
+  if (fixes.empty()) {
+    return fixWithoutPose(LandmarkMatches());
+  }
+  PoseFix best = fixes.front();
+  for (size_t i = 1; i < fixes.size(); ++i) {
+    best.second_best_ratio = std::max(
+        best.second_best_ratio, static_cast<double>(fixes[i].numInliers()) / std::max(1, best.numInliers()));
   }
   if (best.status == LocalizationStatus::kLocalized && best.second_best_ratio > options_.max_ambiguity) {
     best.status = LocalizationStatus::kAmbiguous;

@@ -27,6 +27,9 @@ MapTile tileAt(const Eigen::Vector3d& position_m);
 /// Indices of the keyframes in each tile, ascending.
 std::map<MapTile, std::vector<size_t>> tilesOf(const std::vector<MapKeyframe>& keyframes);
 
+/// A map without observations, landmarks, loop edges and covariances of keyframes.
+SparseMapContents overviewOf(const SparseMap& map);
+
 /// The keyframes with these indices (ascending) as a map: with all that they observe and all sessions, but
 /// without the keyframes' covariances and loop edges. Ids are those of the map.
 std::shared_ptr<const SparseMap> partOf(const SparseMap& map, const std::vector<size_t>& keyframes);
