@@ -34,6 +34,11 @@ PoseFilterOptions optionsForMapOf(const CameraRig& rig, const PoseFilterOptions&
 ///
 /// Successive fixes have the error of the map in common, which averaging does not reduce. It is added to the
 /// covariance that pose() returns.
+///
+/// How accurate fixes are depends on the place, the light and the map. pose() therefore scales the covariance
+/// at the last fix by how far the last fixes were from their predictions, relative to what the covariances
+/// (without the map's, which both have in common) let expect: covariance matching, Mehra, IEEE Trans.
+/// Automatic Control 17(5), 1972. What predict() added since then is not scaled.
 class PoseFilter {
  public:
   explicit PoseFilter(const PoseFilterOptions& options = PoseFilterOptions());
@@ -41,6 +46,8 @@ class PoseFilter {
   bool hasPose() const { return has_pose_; }
   /// std::logic_error before the first reset().
   PosePrior pose() const;
+  /// The same pose with the covariance that does not depend on the last fixes' distances: where to search.
+  PosePrior prediction() const;
   double distanceScale() const { return factors_[0]; }
   double turnScale() const { return factors_[1]; }
 
@@ -63,6 +70,9 @@ class PoseFilter {
   using Matrix6d = Eigen::Matrix<double, 6, 6>;
   using Matrix8d = Eigen::Matrix<double, 8, 8>;
 
+  /// Moves a covariance through a motion, given the derivative of the next state by this one.
+  static void propagate(const Matrix8d& by_state, const Matrix6d& noise, double factor_noise,
+                        Matrix8d* covariance);
   Matrix6d noiseOf(const PoseFix& fix) const;
   Eigen::Matrix<double, 6, 1> differenceTo(const RigidTransform& map_from_vehicle) const;
   Matrix6d mapCovariance() const;
@@ -72,6 +82,8 @@ class PoseFilter {
   RigidTransform map_from_vehicle_;
   Eigen::Vector2d factors_ = Eigen::Vector2d::Ones();  ///< ratios of true to measured distance and turn
   Matrix8d covariance_ = Matrix8d::Zero();             ///< [dt, dphi] in the map's frame, factors
+  Matrix8d scaled_ = Matrix8d::Zero();                 ///< the same, scaled at the last fix
+  double consistency_ = 1.0;                           ///< mean distance of fixes over the expected one
 };
 
 }  // namespace vcharge

@@ -74,7 +74,7 @@ bool DriveLocalizer::isLost() const {
   if (is_seed_) {
     return false;  // even if uncertain: the next frames search around this pose
   }
-  const Eigen::Matrix<double, 6, 6> covariance = filter_.pose().covariance;
+  const Eigen::Matrix<double, 6, 6> covariance = filter_.prediction().covariance;
   return covariance.topLeftCorner<3, 3>().trace() > options_.lost_sigma_m * options_.lost_sigma_m ||
          covariance.bottomRightCorner<3, 3>().trace() > options_.lost_sigma_rad * options_.lost_sigma_rad;
 }
@@ -90,7 +90,7 @@ void DriveLocalizer::takeFix(const PoseFix& fix, LocalizationResult* result) {
 
 void DriveLocalizer::track(const RigFeatures& features, LocalizationResult* result) {
   result->status = LocalizationStatus::kBridgedByOdometry;
-  result->fix = localizer_.localizeNear(features, filter_.pose());
+  result->fix = localizer_.localizeNear(features, filter_.prediction());
   if (result->fix.status == LocalizationStatus::kLocalized) {
     health_.addFix(result->fix);
     result->fix_distance = filter_.distanceOf(result->fix);

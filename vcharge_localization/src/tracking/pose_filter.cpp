@@ -26,6 +26,12 @@ constexpr double kReferencePixel_rad =
     0.005;                            // map_sigma_m and map_sigma_rad were measured with these pixels
 constexpr double kFinestPixel = 0.5;  // relative to the reference; finer images were not measured
 
+/// Weight of a fix in the mean over the last ones: about as many as in four seconds.
+constexpr double kConsistencyGain = 0.02;
+// A mean beyond these says more about the filter's model than about the place.
+constexpr double kMinConsistency = 0.1;
+constexpr double kMaxConsistency = 10.0;
+
 double squared(double value) {
   return value * value;
 }
@@ -60,6 +66,11 @@ PoseFilter::Matrix6d PoseFilter::mapCovariance() const {
 
 PosePrior PoseFilter::pose() const {
   check(has_pose_, "PoseFilter::pose: nothing is known yet");
+  return {map_from_vehicle_, scaled_.topLeftCorner<6, 6>() + consistency_ * mapCovariance()};
+}
+
+PosePrior PoseFilter::prediction() const {
+  check(has_pose_, "PoseFilter::prediction: nothing is known yet");
   return {map_from_vehicle_, covariance_.topLeftCorner<6, 6>() + mapCovariance()};
 }
 
@@ -69,6 +80,15 @@ void PoseFilter::reset(const PosePrior& pose) {
   covariance_.topRows<6>().setZero();
   covariance_.leftCols<6>().setZero();
   covariance_.topLeftCorner<6, 6>() = pose.covariance;
+  scaled_ = covariance_;
+  consistency_ = 1.0;
+}
+
+void PoseFilter::propagate(const Matrix8d& by_state, const Matrix6d& noise, double factor_noise,
+                           Matrix8d* covariance) {
+  *covariance = by_state * *covariance * by_state.transpose();
+  covariance->topLeftCorner<6, 6>() += noise;
+  covariance->diagonal().tail<2>().array() += factor_noise;
 }
 
 void PoseFilter::predict(const RigidTransform& previous_from_current, double period_s) {
@@ -95,8 +115,6 @@ void PoseFilter::predict(const RigidTransform& previous_from_current, double per
   by_state.block<3, 1>(0, 6) = rotation * counted;
   by_state.block<3, 1>(0, 7) = 0.5 * turn_rad * (rotation * Eigen::Vector3d(-moved.y(), moved.x(), 0.0));
   by_state.block<3, 1>(3, 7) = turn_rad * rotation.col(2);
-  covariance_ = by_state * covariance_ * by_state.transpose();
-
   Eigen::Matrix<double, 6, 1> variances;
   const double planar = squared(options_.distance_sigma) * distance_m;
   const double tilt = squared(kTiltSigma_rad) * distance_m;
@@ -104,14 +122,19 @@ void PoseFilter::predict(const RigidTransform& previous_from_current, double per
       squared(options_.yaw_sigma_rad) * distance_m + squared(kYawTurnSigma) * std::abs(turn_rad);
   variances.head<3>().array() += squared(kTimeSigma_m) * period_s;
   variances.tail<3>().array() += squared(kTimeSigma_rad) * period_s;
-  covariance_.block<3, 3>(0, 0) += rotation * variances.head<3>().asDiagonal() * rotation.transpose();
-  covariance_.block<3, 3>(3, 3) += rotation * variances.tail<3>().asDiagonal() * rotation.transpose();
-  covariance_.diagonal().tail<2>().array() += squared(kFactorWalk) * distance_m;
+  Matrix6d noise = Matrix6d::Zero();
+  noise.topLeftCorner<3, 3>() = rotation * variances.head<3>().asDiagonal() * rotation.transpose();
+  noise.bottomRightCorner<3, 3>() = rotation * variances.tail<3>().asDiagonal() * rotation.transpose();
+  for (Matrix8d* const covariance : {&covariance_, &scaled_}) {
+    propagate(by_state, noise, squared(kFactorWalk) * distance_m, covariance);
+  }
 }
 
 void PoseFilter::addNoise(double sigma_m, double sigma_rad) {
-  covariance_.diagonal().head<3>().array() += squared(sigma_m);
-  covariance_.diagonal().segment<3>(3).array() += squared(sigma_rad);
+  for (Matrix8d* const covariance : {&covariance_, &scaled_}) {
+    covariance->diagonal().head<3>().array() += squared(sigma_m);
+    covariance->diagonal().segment<3>(3).array() += squared(sigma_rad);
+  }
 }
 
 Eigen::Matrix<double, 6, 1> PoseFilter::differenceTo(const RigidTransform& map_from_vehicle) const {
@@ -136,6 +159,15 @@ bool PoseFilter::update(const PoseFix& fix) {
   if (!(distanceOf(fix) <= options_.gate)) {
     return false;
   }
+  // The error of the map is common to the fix and the prediction.
+  const Matrix6d visible =
+      covariance_.topLeftCorner<6, 6>() + options_.fix_covariance_factor * fix.covariance;
+  const Eigen::Matrix<double, 6, 1> difference = differenceTo(fix.map_from_vehicle);
+  const double distance = difference.dot(visible.ldlt().solve(difference));
+  constexpr double kExpectedDistance = 6.0;  // of a chi-square distribution with the degrees of freedom
+  consistency_ =
+      std::clamp((1.0 - kConsistencyGain) * consistency_ + kConsistencyGain * distance / kExpectedDistance,
+                 kMinConsistency, kMaxConsistency);
   const Matrix6d noise = noiseOf(fix);
   const Matrix6d expected = covariance_.topLeftCorner<6, 6>() + noise;
   const Eigen::Matrix<double, 8, 6> gain = expected.ldlt().solve(covariance_.topRows<6>()).transpose();
@@ -147,6 +179,7 @@ bool PoseFilter::update(const PoseFix& fix) {
   Matrix8d keep = Matrix8d::Identity();
   keep.leftCols<6>() -= gain;
   covariance_ = keep * covariance_ * keep.transpose() + gain * noise * gain.transpose();
+  scaled_ = consistency_ * covariance_;
   return true;
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <random>
 
 #include <gtest/gtest.h>
@@ -71,26 +72,60 @@ TEST(PoseFilterTest, LearnsTheOdometersFactorsAndBridgesByThem) {
   EXPECT_LT(error_m, 3.0 * std::sqrt(after.covariance.topLeftCorner<3, 3>().trace()));
 }
 
-TEST(PoseFilterTest, ErrorAgreesWithTheCovariance) {
-  // Fixes cannot reveal the error of the map itself.
+/// The error of a map's places: the same for fixes at one place, and another one some metres further.
+class MapError {
+ public:
+  MapError(double sigma_m, double sigma_rad, uint32_t seed)
+      : sigma_m_(sigma_m), sigma_rad_(sigma_rad), random_(seed) {
+    for (double& value : values_) {
+      value = noise_(random_);
+    }
+  }
+  RigidTransform after(double way_m) {
+    constexpr double kCorrelation_m = 4.0;
+    const double kept = std::exp(-way_m / kCorrelation_m);
+    for (double& value : values_) {
+      value = kept * value + std::sqrt(1.0 - kept * kept) * noise_(random_);
+    }
+    return RigidTransform::planar(sigma_m_ * values_[0], sigma_m_ * values_[1], sigma_rad_ * values_[2]);
+  }
+
+ private:
+  const double sigma_m_, sigma_rad_;
+  std::mt19937 random_;
+  std::normal_distribution<double> noise_{0.0, 1.0};
+  std::array<double, 3> values_{};
+};
+
+RigidTransform noiseOfOdometer(const PoseFilterOptions& options, double way_m, std::mt19937* random) {
+  std::normal_distribution<double> noise(0.0, std::sqrt(way_m));
+  const double x_m = options.distance_sigma * noise(*random), y_m = options.distance_sigma * noise(*random);
+  return RigidTransform::planar(x_m, y_m, options.yaw_sigma_rad * noise(*random));
+}
+
+/// Mean normalized error squared per degree of freedom, where fixes and maps have `factor` times the errors
+/// that they are expected to have.
+double consistencyOf(double factor) {
   PoseFilterOptions options;
-  options.fix_covariance_factor = 1.0;  // these fixes have exact covariances
+  options.fix_covariance_factor = 1.0;
   double sum = 0.0;
   int count = 0;
   for (uint32_t seed = 1; seed <= 60; ++seed) {
     std::mt19937 random(seed);
-    std::normal_distribution<double> noise(0.0, 1.0);
     Drive drive;
     PoseFilter filter(options);
     filter.reset(priorAt(fixAt(drive.map_from_vehicle, 0.02, 0.001, &random)));
-    const double x_m = options.map_sigma_m * noise(random);
-    const double y_m = options.map_sigma_m * noise(random);
-    const RigidTransform shifted = RigidTransform::planar(x_m, y_m, options.map_sigma_rad * noise(random));
+    MapError map_error(factor * options.map_sigma_m, factor * options.map_sigma_rad, seed);
     for (int i = 0; i < 500; ++i) {
-      filter.predict(drive.step(), kPeriod_s);
+      const RigidTransform moved = drive.step();
+      const double way_m = moved.translation().norm();
+      filter.predict(moved * noiseOfOdometer(options, way_m, &random), kPeriod_s);
+      const RigidTransform shifted = map_error.after(way_m);
       const RigidTransform seen(shifted.rotation() * drive.map_from_vehicle.rotation(),
                                 drive.map_from_vehicle.translation() + shifted.translation());
-      filter.update(fixAt(seen, 0.004, 0.0003, &random));
+      PoseFix fix = fixAt(seen, factor * 0.004, factor * 0.0003, &random);
+      fix.covariance /= factor * factor;
+      filter.update(fix);
       if (i > 100 && i % 50 == 24) {
         const PosePrior pose = filter.pose();
         const Eigen::Vector3d shift =
@@ -110,8 +145,17 @@ TEST(PoseFilterTest, ErrorAgreesWithTheCovariance) {
       }
     }
   }
-  EXPECT_GT(sum / count, 0.3);
-  EXPECT_LT(sum / count, 2.0);
+  return sum / count;
+}
+
+TEST(PoseFilterTest, ErrorAgreesWithTheCovariance) {
+  for (const double factor : {0.3, 1.0, 2.0}) {
+    const double consistency = consistencyOf(factor);
+    std::printf("normalized error squared with errors of %g times the expected ones: %.2f\n", factor,
+                consistency);
+    EXPECT_GT(consistency, 0.3) << factor;
+    EXPECT_LT(consistency, factor == 1.0 ? 2.0 : 2.5) << factor;
+  }
 }
 
 TEST(PoseFilterTest, RefusesAFixThatContradicts) {
