@@ -72,10 +72,13 @@ void PlaceHypotheses::follow(const RigFeatures& features) {
   }
 }
 
-void PlaceHypotheses::search(const RigFeatures& features) {
+PoseFix PlaceHypotheses::search(const RigFeatures& features) {
   const std::vector<PoseFix> fixes = localizer_.localizeEverywhere(features);
-  if (fixes.empty() || fixes.front().status != LocalizationStatus::kLocalized) {
-    return;
+  if (fixes.empty()) {
+    return {};
+  }
+  if (fixes.front().status != LocalizationStatus::kLocalized) {
+    return fixes.front();
   }
   for (const PoseFix& fix : fixes) {
     if (fix.numInliers() <= max_ambiguity_ * fixes.front().numInliers()) {
@@ -93,6 +96,7 @@ void PlaceHypotheses::search(const RigFeatures& features) {
       known->addFix(fix);
     }
   }
+  return fixes.front();
 }
 
 void PlaceHypotheses::dropBeaten() {
@@ -124,15 +128,14 @@ PlaceHypotheses::Result PlaceHypotheses::update(const ImageFrame& frame, const R
   follow(features);
   const bool fits =
       std::any_of(places_.begin(), places_.end(), [](const Place& place) { return place.num_missed == 0; });
+  Result result;
   if (!fits || (places_.size() > 1 && --frames_until_search_ <= 0)) {
-    search(features);
+    result.fix = search(features);
     frames_until_search_ = kSearchPeriod;
   }
   dropBeaten();
-  Result result;
   result.num_places = static_cast<int>(places_.size());
   if (places_.empty()) {
-    result.fix.status = LocalizationStatus::kNoConsensus;
     return result;
   }
   const Place& best = places_.front();

@@ -16,7 +16,7 @@ class PlaceHypotheses {
  public:
   /// What a frame tells.
   struct Result {
-    PoseFix fix;         ///< of the best place; kAmbiguous if there are others
+    PoseFix fix;         ///< of the best place; kAmbiguous if there are others; without a pose if none fits
     int num_places = 0;  ///< that remain
     bool is_confirmed = false;
   };
@@ -53,7 +53,8 @@ class PlaceHypotheses {
   };
   void moveTo(const ImageFrame& frame);
   void follow(const RigFeatures& features);
-  void search(const RigFeatures& features);
+  /// Adds the places of the whole map that fit; returns the best fix, which may be none.
+  PoseFix search(const RigFeatures& features);
   void dropBeaten();
 
   const MapLocalizer& localizer_;

@@ -12,19 +12,6 @@ int32_t tileCoordinate(double position_m) {
   return static_cast<int32_t>(std::clamp(std::floor(position_m / kTileSize_m), -kMax, kMax));
 }
 
-/// What does not grow with the map.
-SparseMapContents headOf(const SparseMapContents& whole) {
-  SparseMapContents head;
-  head.rig = whole.rig;
-  head.sessions = whole.sessions;
-  head.feature_options = whole.feature_options;
-  head.odometry_distance_scale = whole.odometry_distance_scale;
-  head.odometry_turn_scale = whole.odometry_turn_scale;
-  head.next_keyframe_id = whole.next_keyframe_id;
-  head.next_landmark_id = whole.next_landmark_id;
-  return head;
-}
-
 }  // namespace
 
 MapTile tileAt(const Eigen::Vector3d& position_m) {
@@ -37,6 +24,18 @@ std::map<MapTile, std::vector<size_t>> tilesOf(const std::vector<MapKeyframe>& k
     tiles[tileAt(keyframes[i].map_from_vehicle.translation())].push_back(i);
   }
   return tiles;
+}
+
+SparseMapContents headOf(const SparseMapContents& whole) {
+  SparseMapContents head;
+  head.rig = whole.rig;
+  head.sessions = whole.sessions;
+  head.feature_options = whole.feature_options;
+  head.odometry_distance_scale = whole.odometry_distance_scale;
+  head.odometry_turn_scale = whole.odometry_turn_scale;
+  head.next_keyframe_id = whole.next_keyframe_id;
+  head.next_landmark_id = whole.next_landmark_id;
+  return head;
 }
 
 SparseMapContents overviewOf(const SparseMap& map) {

@@ -88,8 +88,7 @@ std::shared_ptr<const SparseMap> MapTileReader::readTile(const MapTile& tile) co
   const std::string name =
       "the tile at " + std::to_string(tile.x * kTileSize_m) + ", " + std::to_string(tile.y * kTileSize_m);
   try {
-    SparseMapContents part = overview_;
-    part.keyframes.clear();
+    SparseMapContents part = headOf(overview_);
     const auto [type, columns] = connection_->descriptors;
     const size_t row_bytes = static_cast<size_t>(columns) * static_cast<size_t>(CV_ELEM_SIZE(type));
     std::vector<uint8_t> descriptors;

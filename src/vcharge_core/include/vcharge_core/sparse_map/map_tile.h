@@ -27,6 +27,9 @@ MapTile tileAt(const Eigen::Vector3d& position_m);
 /// Indices of the keyframes in each tile, ascending.
 std::map<MapTile, std::vector<size_t>> tilesOf(const std::vector<MapKeyframe>& keyframes);
 
+/// What does not grow with a map.
+SparseMapContents headOf(const SparseMapContents& whole);
+
 /// A map without observations, landmarks, loop edges and covariances of keyframes.
 SparseMapContents overviewOf(const SparseMap& map);
 
