@@ -194,7 +194,7 @@ class LaunchFilesTest(unittest.TestCase):
         cameras = yaml.safe_load((CONFIG / "rigs" / "golf_nominal.yaml").read_text())["cameras"]
         published = re.compile(rf"/camera/({'|'.join(cameras)})/image_raw|"
                                rf"/dense/({'|'.join(cameras)})/(points|range/(image|confidence|standard_deviation))|"
-                               r"/calibration/(image|landmarks|trajectory|cameras)|/mapping/(landmarks|trajectory|loop_edges)|/localization/(pose|observations)|"
+                               r"/calibration/(image|landmarks|trajectory|cameras)|/mapping/(landmarks|trajectory|loop_edges|changes)|/localization/(pose|observations)|"
                                r"/obstacles/(grid|steps|scan|markers|object_markers)|/dense/height_map(/(points|grid|mesh))?|/dense/octomap/occupied")
 
         def topics(node):

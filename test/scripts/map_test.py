@@ -50,8 +50,9 @@ class MapTest(unittest.TestCase):
     def tearDownClass(cls):
         shutil.rmtree(cls.folder)
 
-    def publish(self):
-        rospy.set_param("/map_publisher/map", str(self.map))
+    def publish(self, path=None, version=0):
+        rospy.set_param("/map_publisher/map", str(path or self.map))
+        rospy.set_param("/map_publisher/version", version)
         self.assertTrue(self.load("/map_publisher", "vcharge_mapping/map_publisher_nodelet", [], [], [], "").success)
         self.addCleanup(self.unload, "/map_publisher")
 
@@ -102,6 +103,29 @@ class MapTest(unittest.TestCase):
             self.assertEqual(len(marker.points), 2)
             self.assertAlmostEqual(marker.points[1].x, keyframe_position(last)[0], delta=1e-9)
         self.assertNotEqual(by_name["accepted"].color, by_name["rejected"].color)
+
+    def test_shows_versions_and_what_changed(self):
+        first, other, path = [self.folder / f"{name}.vmap" for name in ("first", "other", "versions")]
+        for written, keyframes in ((first, NUM_KEYFRAMES), (other, 12)):
+            run([tool("vcharge_mapping", "write_analytic_map"), "--output", written, "--keyframes", keyframes,
+                 "--descriptor-bytes", 32])
+        status, _, errors = run([tool("vcharge_mapping", "merge_maps"), "--map", first, "--session", other, "--output", path])
+        self.assertEqual((status, errors), (0, []))
+        for version, num_appeared in ((1, 0), (2, 1), (0, 1)):
+            self.publish(path, version)
+            cloud = rospy.wait_for_message("/mapping/landmarks", PointCloud2, TIMEOUT_S)
+            changes = rospy.wait_for_message("/mapping/changes", MarkerArray, TIMEOUT_S)
+            by_name = {marker.ns: marker for marker in changes.markers}
+            self.assertEqual(set(by_name), {"appeared", "vanished", "moved"})
+            appeared = len(by_name["appeared"].points)
+            self.assertEqual(cloud.width * cloud.height, len(self.landmarks) + appeared)
+            self.assertEqual(appeared > 0, num_appeared > 0)
+            self.assertEqual(by_name["appeared"].action, Marker.ADD if appeared else Marker.DELETE)
+            self.assertEqual(by_name["vanished"].action, Marker.DELETE)
+            self.doCleanups()
+        rospy.set_param("/map_publisher/version", 7)
+        with self.assertRaises(rospy.ServiceException):
+            self.load("/map_publisher", "vcharge_mapping/map_publisher_nodelet", [], [], [], "")
 
     def test_a_bad_map_does_not_load_and_the_manager_lives_on(self):
         cut = self.folder / "cut.vmap"

@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   app.add_option("--output", path, "the map (*.vmap)")->required()->check(vcharge::requireOutput);
   app.add_option("--keyframes", options.num_keyframes);
   app.add_option("--landmarks", options.num_landmarks);
+  app.add_option("--descriptor-bytes", options.descriptor_size);
   return vcharge::runTool(&app, argc, argv, [&] {
     vcharge::writeSparseMap(vcharge::SparseMap(vcharge::makeAnalyticMap(options)),
                             {{"bag", "analytic.bag"}, {"options", "a: 1\nb: 2\n"}}, path);

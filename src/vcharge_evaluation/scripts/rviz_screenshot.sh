@@ -4,11 +4,16 @@
 #   rviz_screenshot.sh DRIVE.bag rig.yaml OUTPUT.png around     obstacles, free ground, steps and moving objects
 #   rviz_screenshot.sh DRIVE.bag rig.yaml OUTPUT.png LOT.vmap   the pose in a map
 #   rviz_screenshot.sh DRIVE.bag rig.yaml OUTPUT.png LOT.vmap obstacles    obstacles and free ground, the whole car running
+#   rviz_screenshot.sh LOT.vmap OUTPUT.png                      a sparse map and what changed in its newest version
 #   rviz_screenshot.sh MAP OUTPUT.png                           a height map with its OctoMap (folder of build_height_map)
 set -euo pipefail
 views=$(realpath "$(dirname "${BASH_SOURCE[0]}")/../../../config/rviz")
-[ $# -ge 2 ] && [ $# -le 5 ] || { sed -n '2,7s/^# \{0,1\}//p' "$0" >&2; exit 2; }
-if [ $# -eq 2 ]; then
+[ $# -ge 2 ] && [ $# -le 5 ] || { sed -n '2,8s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+if [ $# -eq 2 ] && [ "${1##*.}" = vmap ]; then
+  output=$2
+  wait_s=20
+  launch=(view_map.launch map:="$(realpath "$1")")
+elif [ $# -eq 2 ]; then
   output=$2
   wait_s=40  # a mesh of some hundred thousand triangles
   launch=(view_map.launch height_map:="$(realpath "$1")")
