@@ -89,10 +89,10 @@ PoseFix PlaceHypotheses::search(const RigFeatures& features) {
     });
     if (known == places_.end()) {
       places_.emplace_back().addFix(fix);
-    } else if (known->num_missed > 0 && isConfirmed(known->map_from_vehicle, fix)) {
-      known->addFix(fix);
     } else if (known->num_missed > 0) {
-      *known = Place();
+      if (!isConfirmed(known->map_from_vehicle, fix)) {
+        *known = Place();
+      }
       known->addFix(fix);
     }
   }

@@ -32,12 +32,15 @@ MapRows::MapRows(const std::string& path)
   version_ = versions_.back();
 }
 
-/// Accepts only tables exactly as they were created: no views, no generated columns.
+bool MapRows::hasTable(const std::string& name, const std::string& sql) const {
+  SqliteStatement find(database_, "SELECT sql FROM sqlite_schema WHERE type = 'table' AND name = ?");
+  find.bind(0, name);
+  return find.step() && find.text(0) == sql;
+}
+
 void MapRows::checkTables() {
   for (const auto& [name, sql] : tablesOfSchema(schema_)) {
-    SqliteStatement find(database_, "SELECT sql FROM sqlite_schema WHERE type = 'table' AND name = ?");
-    find.bind(0, name);
-    if (!find.step() || find.text(0) != sql) {
+    if (!hasTable(name, sql)) {
       damaged("the table " + name + " is missing or not as expected");
     }
   }

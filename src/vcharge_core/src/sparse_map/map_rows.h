@@ -29,6 +29,8 @@ class MapRows {
   /// Selects the version that is read; at first the newest.
   void select(int64_t version);
 
+  /// Whether there is a table exactly as created by `sql`: no view, no generated columns.
+  bool hasTable(const std::string& name, const std::string& sql) const;
   /// Columns of a table's rows in the version that is read. `rest`: WHERE and ORDER BY.
   SqliteStatement rows(const std::string& table, const std::string& columns, const std::string& rest) const;
   std::string meta(const char* key) const;
@@ -37,7 +39,8 @@ class MapRows {
   /// What does not grow with the map: rig, sessions, options, scales, next ids.
   void readHead(const MapProvenance& provenance, SparseMapContents* contents) const;
 
-  /// Selects keyframes, for keyframeOf(); landmarks, for landmarkOf(); images, for copyImage().
+  /// Selects keyframes, for keyframeOf(); landmarks, for landmarkOf(); images, for imageOf() and
+  /// copyDescriptors().
   SqliteStatement keyframes(const std::string& rest) const;
   SqliteStatement landmarks(const std::string& rest) const;
   SqliteStatement images(const std::string& rest) const;

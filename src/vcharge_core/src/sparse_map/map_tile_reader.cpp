@@ -14,13 +14,9 @@ using namespace map_file;
 
 /// Whether the file has the tables of an index, of its newest version.
 bool hasIndex(const MapRows& file) {
-  for (const auto& [name, sql] :
-       {std::make_pair("tile", kTileSql), {"place", kPlaceSql}, {"index_info", kIndexInfoSql}}) {
-    SqliteStatement find(file.database(), "SELECT sql FROM sqlite_schema WHERE type = 'table' AND name = ?");
-    find.bind(0, std::string(name));
-    if (!find.step() || find.text(0) != sql) {
-      return false;
-    }
+  if (!file.hasTable("tile", kTileSql) || !file.hasTable("place", kPlaceSql) ||
+      !file.hasTable("index_info", kIndexInfoSql)) {
+    return false;
   }
   SqliteStatement find(file.database(), "SELECT value FROM index_info WHERE key = ?");
   find.bind(0, std::string(kMapHashKey));

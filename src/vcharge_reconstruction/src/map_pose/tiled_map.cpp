@@ -1,11 +1,9 @@
 #include "vcharge_reconstruction/tiled_map.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <list>
 #include <mutex>
-#include <optional>
 #include <sstream>
 #include <utility>
 
