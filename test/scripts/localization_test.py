@@ -13,6 +13,7 @@ import rostest
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import Image
+from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker
 
@@ -288,6 +289,27 @@ class LocalizationTest(unittest.TestCase):
         for pose, error_m in zip(self.poses(), errors):
             if pose.header.stamp in fixed:
                 self.assertLess(error_m, MAX_ERROR_M)
+
+    def test_reload_goes_on_in_the_newest_version_of_the_map(self):
+        self.start()
+        stamps = sorted({message.header.stamp for topic, message in self.messages if topic != "/odom"})
+        middle, reload = stamps[len(stamps) // 2], rospy.ServiceProxy("/localization/reload", Trigger)
+        self.publish(lambda _topic, message: message if message.header.stamp < middle else None)
+        self.wait_for_frames(len(stamps) // 2 - 10)  # the last ones still wait for odometry
+        time.sleep(1.0)
+        num_before = len(self.statuses())
+        answer = reload()
+        self.assertTrue(answer.success, answer.message)
+        self.publish(lambda _topic, message: None if message.header.stamp < middle else message)
+        self.wait_for_frames(len(stamps))
+        after = self.statuses()[num_before:]
+        self.assertEqual({status.status for status in after[:10]}, {LocalizationStatus.LOCALIZED}, "at once")
+        self.assertLess(self.pose_errors_m().max(), MAX_ERROR_M)
+
+        rospy.set_param("/localization/map", "/none.vmap")
+        answer = reload()
+        self.assertFalse(answer.success)
+        self.assertIn("/none.vmap", answer.message)
 
     def test_what_is_wrong_is_told_and_the_nodelet_lives_on(self):
         self.start()

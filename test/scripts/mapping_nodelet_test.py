@@ -2,6 +2,7 @@
 """The mapping nodelet on a simulated drive: it makes the map of build_map, publishes it, and survives bad input."""
 import copy
 import os
+import shutil
 import sys
 import time
 import unittest
@@ -59,6 +60,7 @@ class MappingNodeletTest(unittest.TestCase):
         rospy.set_param("/mapping/rig", str(self.drive.rig))
         rospy.set_param("/mapping/output", str(self.output))
         rospy.set_param("/mapping/lossless_replay", True)
+        rospy.set_param("/mapping/map", "")
         self.assertTrue(self.load("/mapping", "vcharge_mapping/mapping_nodelet", [], [], [], "").success)
         self.finish = rospy.ServiceProxy("/mapping/finish", Trigger)
         self.save = rospy.ServiceProxy("/mapping/save", Trigger)
@@ -118,6 +120,10 @@ class MappingNodeletTest(unittest.TestCase):
             np.testing.assert_array_equal(saved[column], values, column)
         merged = self.merge()
         self.assertFalse(merged.success)
+        self.assertIn("/mapping/map", merged.message)
+        rospy.set_param("/mapping/map", str(self.output))
+        merged = self.merge()
+        self.assertFalse(merged.success)
         self.assertIn("has this drive already", merged.message)
         again = self.finish()
         self.assertFalse(again.success)
@@ -137,6 +143,37 @@ class MappingNodeletTest(unittest.TestCase):
         self.assertGreater(len(points), 100)
         self.assertTrue(np.isfinite(points).all())
         self.assertLess(np.abs(points).max(), 100.0)
+
+    def test_a_session_is_kept_while_driving_and_merged_on_command(self):
+        self.assertTrue(self.unload("/mapping").success)
+        living = self.drive.folder / "living.vmap"
+        shutil.copy(self.offline_map, living)
+        rospy.set_param("/mapping/map", str(living))
+        self.output.write_bytes(b"the drive of yesterday")
+        with self.assertRaises(rospy.ServiceException, msg="it is not overwritten"):
+            self.load("/mapping", "vcharge_mapping/mapping_nodelet", [], [], [], "")
+        self.output.unlink()
+        self.assertTrue(self.load("/mapping", "vcharge_mapping/mapping_nodelet", [], [], [], "").success)
+        self.finish.wait_for_service(TIMEOUT_S)
+        reach(self.publishers, self.diagnostics.heard, self.subscribers)
+        self.publish()
+        wait_for(self.output.exists, "the drive so far")
+        lost = self.drive.folder / "lost.vmap"
+        shutil.copy(self.output, lost)
+        after_crash = self.drive.folder / "after_crash.vmap"
+        shutil.copy(self.offline_map, after_crash)
+        status, found, errors = run_tool([tool("vcharge_mapping", "update_map"), "--map", after_crash, "--session", lost])
+        self.assertEqual((status, errors), (0, []))
+        self.assertGreater(found["common_ratio"], 0.3)
+        self.wait_for_frames(self.num_frames - 10)
+        time.sleep(1.0)
+        self.assertTrue(self.finish().success)
+        self.wait_until_finished()
+        answer = self.merge()
+        self.assertTrue(answer.success, answer.message)
+        self.assertFalse(self.output.exists(), "it is in the map")
+        _, log, _ = run_tool([tool("vcharge_mapping", "map_log"), "--map", living])
+        self.assertIn("updated by live until", log["versions"][-1]["change"])
 
     def test_a_drive_without_odometry_is_told_and_the_next_one_is_mapped(self):
         first = self.messages[0][1].header.stamp

@@ -4,24 +4,23 @@
 #include <utility>
 
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
-#include <tf2_ros/transform_broadcaster.h>
 #include <pluginlib/class_list_macros.hpp>
 
 #include "localization_messages.h"
 #include "localization_report.h"
+#include "localization_topics.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_localization/drive_localizer.h"
-#include "vcharge_ros/conversions.h"
 #include "vcharge_ros/live_queue.h"
 #include "vcharge_ros/nodelet.h"
 
 namespace vcharge {
 
-/// Localizes a live or replayed drive in a map. Publishes /localization/pose (while the pose is
-/// known), /localization/status (every frame), /localization/observations (markers), map -> odom on /tf, and
-/// a status in /diagnostics; /initialpose sets a prior pose. Parameters: ~rig, ~map (paths), ~options
-/// (DriveLocalizerOptions), ~source (LiveDriveSourceOptions), ~map_frame, ~odom_frame, ~lossless_replay
-/// (every frame in order, as localize_drive; otherwise the newest first, and drops are counted).
+/// Localizes a live or replayed drive in a map and publishes what LocalizationTopics says, and a status in
+/// /diagnostics; /initialpose sets a prior pose; the service ~reload goes on in the newest version of the
+/// map. Parameters: ~rig, ~map (paths), ~options (DriveLocalizerOptions), ~source (LiveDriveSourceOptions),
+/// ~map_frame, ~odom_frame, ~lossless_replay (every frame in order, as localize_drive; otherwise the newest
+/// first, and drops are counted).
 class LocalizationNodelet : public Nodelet {
  public:
   LocalizationNodelet() : Nodelet("localization") {}
@@ -35,32 +34,33 @@ class LocalizationNodelet : public Nodelet {
     if (!rig_->hasExtrinsics()) {
       throw InputError(requireParameter("rig", "") + ": expected vehicle_from_camera of every camera");
     }
-    const std::string map_path = requireParameter("map", "the path of a map (*.vmap)");
     map_frame_ = parameter("map_frame", map_frame_);
-    odom_frame_ = parameter("odom_frame", odom_frame_);
-    DriveLocalizerOptions options;
     if (isLossless()) {
-      options.frames.waitForEverything();
+      options_.frames.waitForEverything();
     }
-    readOptions("options", &options);
+    readOptions("options", &options_);
     openSource(rig_);
-    localizer_ = std::make_unique<DriveLocalizer>(std::make_shared<const TiledMap>(map_path), rig_, options);
+    localizer_ = openMap();
 
-    pose_ = node().advertise<geometry_msgs::PoseWithCovarianceStamped>("/localization/pose", 10);
-    status_ = node().advertise<vcharge_msgs::LocalizationStatus>("/localization/status", 10);
-    observations_ = node().advertise<visualization_msgs::Marker>("/localization/observations", 2);
-    broadcaster_ = std::make_unique<tf2_ros::TransformBroadcaster>();
+    topics_ = std::make_unique<LocalizationTopics>(&node(), map_frame_,
+                                                   parameter("odom_frame", std::string("odom")));
     queue_ = std::make_unique<LiveQueue<ImageFrame>>(
         isLossless(), [this](const ImageFrame& frame) { guard().run([&] { localize(frame); }); });
     assembler_ = std::make_unique<ImageFrameAssembler>(
-        rig_->cameras.size(), options.frames,
+        rig_->cameras.size(), options_.frames,
         [this](ImageFrame frame) { queue_->push(0, std::move(frame)); });
     addDiagnostics(
         "/pose", [this] { return report_.report(queue_->numDropped(0), assembler_->counters()); },
         Threads::kOne);
     subscribe<InitialPose>("/initialpose", 1,
                            [this](const InitialPose::ConstPtr& message) { seed(*message); });
+    serve("reload", [this](std_srvs::TriggerResponse* response) { reload(response); });
     runSource(assembler_.get());
+  }
+
+  std::unique_ptr<DriveLocalizer> openMap() const {
+    const std::string path = requireParameter("map", "the path of a map (*.vmap)");
+    return std::make_unique<DriveLocalizer>(std::make_shared<const TiledMap>(path), rig_, options_);
   }
 
   void seed(const InitialPose& message) {
@@ -69,36 +69,27 @@ class LocalizationNodelet : public Nodelet {
     localizer_->seed(prior);
   }
 
-  void localize(const ImageFrame& frame) {
+  void reload(std_srvs::TriggerResponse* response) {
+    std::unique_ptr<DriveLocalizer> localizer = openMap();
     const std::lock_guard<std::mutex> lock(mutex_);
-    publish(localizer_->process(frame));
+    localizer->continueFrom(*localizer_);
+    localizer_ = std::move(localizer);
+    response->success = 1;
+    response->message = "goes on in the newest version of the map";
   }
 
-  void publish(const LocalizationResult& result) {
-    const vcharge_msgs::LocalizationStatus status = toStatusMessage(result, *rig_, map_frame_);
-    status_.publish(status);
-    report_.add(status);
-    if (observations_.getNumSubscribers() > 0) {
-      observations_.publish(toObservationMarker(result, *rig_, map_frame_));
-    }
-    if (!result.pose) {
-      return;
-    }
-    pose_.publish(toPoseMessage(result, map_frame_));
-    if (result.odom_from_vehicle) {
-      broadcaster_->sendTransform(
-          toTransformStamped(result.pose->map_from_vehicle * result.odom_from_vehicle->inverse(),
-                             result.stamp, map_frame_, odom_frame_));
-    }
+  void localize(const ImageFrame& frame) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    report_.add(topics_->publish(localizer_->process(frame), *rig_));
   }
 
   std::shared_ptr<const CameraRig> rig_;
-  std::string map_frame_ = "map", odom_frame_ = "odom";
+  DriveLocalizerOptions options_;
+  std::string map_frame_ = "map";
   std::mutex mutex_;  // guards the localizer
   std::unique_ptr<DriveLocalizer> localizer_;
   std::unique_ptr<ImageFrameAssembler> assembler_;
-  std::unique_ptr<tf2_ros::TransformBroadcaster> broadcaster_;
-  ros::Publisher pose_, status_, observations_;
+  std::unique_ptr<LocalizationTopics> topics_;
   LocalizationReport report_;
   std::unique_ptr<LiveQueue<ImageFrame>> queue_;
 };

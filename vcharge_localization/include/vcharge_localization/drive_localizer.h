@@ -63,6 +63,10 @@ class DriveLocalizer {
   /// max_frames_without_fix the whole map is searched.
   void seed(const PosePrior& pose);
 
+  /// Takes over the pose of a localizer in another version of the same map, which a frame confirms. The
+  /// frames of two versions differ by what the later drives corrected.
+  void continueFrom(const DriveLocalizer& other);
+
   /// Returns to the state before the first frame.
   void forget();
 

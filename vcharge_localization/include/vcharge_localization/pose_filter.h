@@ -33,7 +33,7 @@ PoseFilterOptions optionsForMapOf(const CameraRig& rig, const PoseFilterOptions&
 /// fixes.
 ///
 /// Successive fixes have the error of the map in common, which averaging does not reduce. It is added to the
-/// covariance that pose() returns.
+/// covariance that pose() returns; the more drives saw the landmarks, the smaller it is.
 ///
 /// How accurate fixes are depends on the place, the light and the map. pose() therefore scales the covariance
 /// at the last fix by how far the last fixes were from their predictions, relative to what the covariances
@@ -75,7 +75,7 @@ class PoseFilter {
                         Matrix8d* covariance);
   Matrix6d noiseOf(const PoseFix& fix) const;
   Eigen::Matrix<double, 6, 1> differenceTo(const RigidTransform& map_from_vehicle) const;
-  Matrix6d mapCovariance() const;
+  Matrix6d mapCovariance(double variance_ratio) const;
 
   PoseFilterOptions options_;
   bool has_pose_ = false;
@@ -83,6 +83,7 @@ class PoseFilter {
   Eigen::Vector2d factors_ = Eigen::Vector2d::Ones();  ///< ratios of true to measured distance and turn
   Matrix8d covariance_ = Matrix8d::Zero();             ///< [dt, dphi] in the map's frame, factors
   Matrix8d scaled_ = Matrix8d::Zero();                 ///< the same, scaled at the last fix
+  double map_variance_ratio_ = 1.0;                    ///< of the last fix
   double consistency_ = 1.0;                           ///< mean distance of fixes over the expected one
 };
 

@@ -17,6 +17,9 @@ constexpr double kUnknownMotion_m_per_s = 1.0;
 constexpr double kUnknownTurn_rad_per_s = 0.3;
 /// Tiles of the map are read before the vehicle is this close to where they are needed.
 constexpr double kLookAhead_m = 10.0;
+// Uncertainty of a pose that is carried to another version of the map.
+constexpr double kVersionSigma_m = 0.1;
+constexpr double kVersionSigma_rad = 0.01;
 
 }  // namespace
 
@@ -36,6 +39,21 @@ void DriveLocalizer::seed(const PosePrior& pose) {
   is_seed_ = true;
   hypotheses_->clear();
   frames_without_fix_ = 0;
+}
+
+void DriveLocalizer::continueFrom(const DriveLocalizer& other) {
+  if (other.filter_.hasPose() && !other.is_seed_) {
+    PosePrior pose = other.filter_.prediction();
+    pose.covariance.diagonal().head<3>().array() += kVersionSigma_m * kVersionSigma_m;
+    pose.covariance.diagonal().tail<3>().array() += kVersionSigma_rad * kVersionSigma_rad;
+    filter_ = other.filter_;
+    seed(pose);
+    last_stamp_ = other.last_stamp_;
+    last_odom_from_vehicle_ = other.last_odom_from_vehicle_;
+    last_num_resets_ = other.last_num_resets_;
+    last_motion_ = other.last_motion_;
+    last_period_s_ = other.last_period_s_;
+  }
 }
 
 void DriveLocalizer::predict(const ImageFrame& frame) {

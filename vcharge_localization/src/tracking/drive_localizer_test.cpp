@@ -34,6 +34,9 @@ class DriveLocalizerTest : public ::testing::Test {
   }
   /// The next frame, `way_m` further along the circle; the odometer measures one step.
   LocalizationResult next(double way_m, const RigFeatures& features) {
+    return next(&localizer_, way_m, features);
+  }
+  LocalizationResult next(DriveLocalizer* localizer, double way_m, const RigFeatures& features) {
     ImageFrame frame;
     frame.stamp = Timestamp::fromNanoseconds(1'000'000'000'000LL + 80'000'000LL * num_frames_++);
     frame.images.resize(2);
@@ -43,7 +46,7 @@ class DriveLocalizerTest : public ::testing::Test {
       frame.odom_from_vehicle = odom_from_vehicle_;
     }
     frame.num_resets = num_resets_;
-    const LocalizationResult result = localizer_.process(frame, features);
+    const LocalizationResult result = localizer->process(frame, features);
     error_m_ = result.pose
                    ? (result.pose->map_from_vehicle.translation() - truthAt(way_m).translation()).norm()
                    : INFINITY;
@@ -97,6 +100,23 @@ TEST_F(DriveLocalizerTest, BridgesDarknessAsWellAsItsCovarianceTells) {
   }
   EXPECT_LT(error_m_, 0.2);
   EXPECT_EQ(drive(1).status, LocalizationStatus::kLocalized);
+}
+
+TEST_F(DriveLocalizerTest, GoesOnInAnotherVersionOfTheMap) {
+  drive(40);
+  DriveLocalizer newer(std::make_shared<const TiledMap>(map_),
+                       std::shared_ptr<const CameraRig>(map_, &map_->rig()));
+  newer.continueFrom(localizer_);
+  way_m_ += kStep_m;
+  const LocalizationResult result = next(&newer, way_m_, viewAt(way_m_));
+  EXPECT_EQ(result.status, LocalizationStatus::kLocalized);
+  EXPECT_FALSE(result.searched_whole_map);
+  EXPECT_LT(error_m_, 0.03);
+  DriveLocalizer fresh(std::make_shared<const TiledMap>(map_),
+                       std::shared_ptr<const CameraRig>(map_, &map_->rig()));
+  newer.continueFrom(fresh);  // nothing to take over
+  way_m_ += kStep_m;
+  EXPECT_EQ(next(&newer, way_m_, viewAt(way_m_)).status, LocalizationStatus::kLocalized);
 }
 
 TEST_F(DriveLocalizerTest, FindsAVehicleThatWasCarriedAway) {

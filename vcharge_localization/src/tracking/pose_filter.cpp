@@ -57,21 +57,22 @@ PoseFilter::PoseFilter(const PoseFilterOptions& options) : options_(options) {
   covariance_(7, 7) = squared(options_.turn_sigma);
 }
 
-PoseFilter::Matrix6d PoseFilter::mapCovariance() const {
+PoseFilter::Matrix6d PoseFilter::mapCovariance(double variance_ratio) const {
   Eigen::Matrix<double, 6, 1> sigmas;
   sigmas << Eigen::Vector3d::Constant(options_.map_sigma_m),
       Eigen::Vector3d::Constant(options_.map_sigma_rad);
-  return sigmas.cwiseAbs2().asDiagonal();
+  return (variance_ratio * sigmas.cwiseAbs2()).asDiagonal();
 }
 
 PosePrior PoseFilter::pose() const {
   check(has_pose_, "PoseFilter::pose: nothing is known yet");
-  return {map_from_vehicle_, scaled_.topLeftCorner<6, 6>() + consistency_ * mapCovariance()};
+  return {map_from_vehicle_,
+          scaled_.topLeftCorner<6, 6>() + consistency_ * mapCovariance(map_variance_ratio_)};
 }
 
 PosePrior PoseFilter::prediction() const {
   check(has_pose_, "PoseFilter::prediction: nothing is known yet");
-  return {map_from_vehicle_, covariance_.topLeftCorner<6, 6>() + mapCovariance()};
+  return {map_from_vehicle_, covariance_.topLeftCorner<6, 6>() + mapCovariance(map_variance_ratio_)};
 }
 
 void PoseFilter::reset(const PosePrior& pose) {
@@ -82,6 +83,7 @@ void PoseFilter::reset(const PosePrior& pose) {
   covariance_.topLeftCorner<6, 6>() = pose.covariance;
   scaled_ = covariance_;
   consistency_ = 1.0;
+  map_variance_ratio_ = 1.0;
 }
 
 void PoseFilter::propagate(const Matrix8d& by_state, const Matrix6d& noise, double factor_noise,
@@ -145,7 +147,7 @@ Eigen::Matrix<double, 6, 1> PoseFilter::differenceTo(const RigidTransform& map_f
 }
 
 PoseFilter::Matrix6d PoseFilter::noiseOf(const PoseFix& fix) const {
-  return options_.fix_covariance_factor * fix.covariance + mapCovariance();
+  return options_.fix_covariance_factor * fix.covariance + mapCovariance(fix.map_variance_ratio);
 }
 
 double PoseFilter::distanceOf(const PoseFix& fix) const {
@@ -168,6 +170,7 @@ bool PoseFilter::update(const PoseFix& fix) {
   consistency_ =
       std::clamp((1.0 - kConsistencyGain) * consistency_ + kConsistencyGain * distance / kExpectedDistance,
                  kMinConsistency, kMaxConsistency);
+  map_variance_ratio_ = fix.map_variance_ratio;
   const Matrix6d noise = noiseOf(fix);
   const Matrix6d expected = covariance_.topLeftCorner<6, 6>() + noise;
   const Eigen::Matrix<double, 8, 6> gain = expected.ldlt().solve(covariance_.topRows<6>()).transpose();

@@ -228,5 +228,22 @@ TEST(PoseFilterTest, ErrorsOfMapsAreProportionalToTheAngleOfPixels) {
   }
 }
 
+TEST(PoseFilterTest, AMapOfSeveralDrivesHasASmallerError) {
+  PoseFix fix;
+  fix.covariance = 1e-12 * Eigen::Matrix<double, 6, 6>::Identity();
+  double variance_of_one_m2 = 0.0;
+  for (const double num_drives : {1.0, 2.0, 4.0}) {
+    PoseFilter filter;
+    filter.reset({});
+    for (int i = 0; i < 50; ++i) {
+      fix.map_variance_ratio = 1.0 / num_drives;
+      ASSERT_TRUE(filter.update(fix));
+    }
+    const double variance_m2 = filter.prediction().covariance(0, 0);
+    variance_of_one_m2 = num_drives == 1.0 ? variance_m2 : variance_of_one_m2;
+    EXPECT_NEAR(variance_m2, variance_of_one_m2 / num_drives, 0.01 * variance_of_one_m2);
+  }
+}
+
 }  // namespace
 }  // namespace vcharge

@@ -11,6 +11,8 @@ namespace vcharge {
 
 /// Versions that a map file keeps if nothing else is asked for.
 constexpr int kMaxMapVersions = 5;
+/// Program and version that maps of live drives name.
+constexpr const char* kMappingNodelet = "mapping_nodelet 0.1.0";
 
 /// Reads a map; a session that has no name yet gets that of the recording that the map was built from.
 /// Errors as those of readSparseMap().
@@ -18,6 +20,10 @@ std::shared_ptr<const SparseMap> readMapWithSessions(const std::string& path);
 
 /// The map of a live drive, whose session is named by its last stamp.
 SparseMap nameLiveDrive(const SparseMap& map);
+
+/// Writes the map of a live drive; `provenance` has what only the caller knows. Errors as those of
+/// writeSparseMap().
+void writeLiveMap(const SparseMap& map, MapProvenance provenance, const std::string& path);
 
 /// InputError, which begins with `name`, if a session of the map is the same recording.
 void requireNewDrive(const SparseMap& map, const SparseMap& session, const std::string& name);

@@ -23,12 +23,15 @@ class MappingSession : public DriveConsumer {
   enum class Phase { kFollowing, kFinishing, kFinished };
   struct Status {
     Phase phase = Phase::kFollowing;
-    std::string message;  ///< one line: the current activity or result
-    std::string failure;  ///< why the last drive gave no map; empty without a failure
+    std::string message;   ///< one line: the current activity or result
+    std::string failure;   ///< why the last drive gave no map; empty without a failure
+    std::string not_kept;  ///< why on_part failed last; empty if it did not
     std::vector<std::pair<std::string, int64_t>> counts;  ///< numbers of frames, keyframes and skipped frames
   };
   using KeyframeCallback = std::function<void(const ReconstructionState&)>;
   using MapCallback = std::function<void(const SparseMap&)>;
+  /// Keyframes from one part of the drive to the next, at least.
+  static constexpr size_t kMinPartKeyframes = 20;
 
   /// `on_keyframe` is called inside addImage() and addOdometry() after new keyframes; `on_map` in the thread
   /// that made the map. Neither may throw. The constructor throws the errors of SparseMapper.
@@ -42,6 +45,10 @@ class MappingSession : public DriveConsumer {
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
 
+  /// From now on, gives out the map of the drive so far (makeMapSoFar()) whenever it has grown by a tenth, in
+  /// a thread of its own. `on_part` may throw std::exception.
+  void giveParts(MapCallback on_part);
+
   /// Starts to finish the map of the drive so far. False if that was started before; `message` has the state.
   bool finish(std::string* message);
 
@@ -54,6 +61,8 @@ class MappingSession : public DriveConsumer {
  private:
   void run();
   void tell();
+  void startPart();
+  void makePart(ReconstructionState state);
 
   const std::shared_ptr<const CameraRig> rig_;
   const SparseMapperOptions options_;
@@ -69,8 +78,12 @@ class MappingSession : public DriveConsumer {
   int64_t num_ignored_images_ = 0;  // images after finish()
   std::shared_ptr<const SparseMap> map_;
 
+  MapCallback on_part_;  // set before the drive
+  size_t num_keyframes_of_part_ = 0;
+  std::atomic<bool> makes_part_{false};
+
   std::atomic<bool> stop_{false};
-  std::thread worker_;
+  std::thread worker_, part_worker_;
 };
 
 }  // namespace vcharge

@@ -41,11 +41,15 @@ class SparseMapper : public DriveConsumer {
   void requireKeyframes() const;
   void adjustFirst();
   void adjust(const BundleAdjustmentOptions& options);
-  std::shared_ptr<const SparseMap> assemble();
 
   const SparseMapperOptions options_;
   ReconstructionState state_;
   std::unique_ptr<FrameFollower> follower_;
 };
+
+/// The map of a drive that goes on: landmarks are triangulated from the poses of tracking, nothing is
+/// adjusted yet. It keeps what was driven if the rest is lost; mergeSession() adjusts it. InputError if the
+/// drive does not suffice.
+std::shared_ptr<const SparseMap> makeMapSoFar(ReconstructionState state, const SparseMapperOptions& options);
 
 }  // namespace vcharge

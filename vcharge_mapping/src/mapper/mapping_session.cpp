@@ -1,5 +1,6 @@
 #include "vcharge_mapping/mapping_session.h"
 
+#include <algorithm>
 #include <exception>
 #include <utility>
 
@@ -25,9 +26,16 @@ MappingSession::MappingSession(std::shared_ptr<const CameraRig> rig, const Spars
 
 MappingSession::~MappingSession() {
   stop_ = true;
-  if (worker_.joinable()) {
-    worker_.join();
+  for (std::thread* worker : {&worker_, &part_worker_}) {
+    if (worker->joinable()) {
+      worker->join();
+    }
   }
+}
+
+void MappingSession::giveParts(MapCallback on_part) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  on_part_ = std::move(on_part);
 }
 
 void MappingSession::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
@@ -68,6 +76,33 @@ void MappingSession::tell() {
     num_keyframes_told_ = num_keyframes;
     on_keyframe_(mapper_->state());
   }
+  if (on_part_ && !makes_part_ &&
+      num_keyframes >= num_keyframes_of_part_ + std::max(kMinPartKeyframes, num_keyframes_of_part_ / 10)) {
+    num_keyframes_of_part_ = num_keyframes;
+    startPart();
+  }
+}
+
+void MappingSession::startPart() {
+  if (part_worker_.joinable()) {
+    part_worker_.join();  // it has returned
+  }
+  makes_part_ = true;
+  part_worker_ = std::thread([this, state = mapper_->state()]() mutable { makePart(std::move(state)); });
+}
+
+void MappingSession::makePart(ReconstructionState state) {
+  std::string not_kept;
+  try {
+    on_part_(*makeMapSoFar(std::move(state), options_));
+  } catch (const std::exception& error) {
+    not_kept = error.what();
+  }
+  {
+    const std::lock_guard<std::mutex> lock(status_mutex_);
+    status_.not_kept = not_kept;
+  }
+  makes_part_ = false;
 }
 
 bool MappingSession::finish(std::string* message) {
@@ -93,6 +128,9 @@ bool MappingSession::finish(std::string* message) {
 }
 
 void MappingSession::run() {
+  if (part_worker_.joinable()) {
+    part_worker_.join();  // no other begins in this phase
+  }
   std::string failure;
   std::shared_ptr<const SparseMap> map;
   try {
@@ -118,7 +156,7 @@ void MappingSession::run() {
     mapper_.reset();  // frees the features of the images
   } else {
     mapper_ = std::make_unique<SparseMapper>(rig_, options_);
-    num_keyframes_told_ = 0;
+    num_keyframes_told_ = num_keyframes_of_part_ = 0;
     tell();
   }
   const std::lock_guard<std::mutex> status_lock(status_mutex_);

@@ -15,6 +15,23 @@ namespace {
 /// Largest angle between a ray and its point before the first adjustment; large because odometry drifts.
 constexpr double kFirstMaxError_rad = 0.02;
 
+TriangulationOptions lenientTriangulation(const SparseMapperOptions& options) {
+  TriangulationOptions lenient = options.triangulation;
+  lenient.max_error_rad = kFirstMaxError_rad;
+  return lenient;
+}
+
+std::shared_ptr<const SparseMap> assembleWithLandmarks(const SparseMapperOptions& options,
+                                                       ReconstructionState* state) {
+  const std::vector<Track>& tracks = state->data.tracks;
+  state->report.num_landmarks = std::count_if(
+      tracks.begin(), tracks.end(), [](const Track& track) { return track.position_m.has_value(); });
+  if (state->report.num_landmarks == 0) {
+    throw InputError("no map could be made: no point of the scene was seen from enough positions");
+  }
+  return assembleMap(*state, options.features);
+}
+
 }  // namespace
 
 SparseMapper::SparseMapper(std::shared_ptr<const CameraRig> rig, const SparseMapperOptions& options)
@@ -56,7 +73,7 @@ std::shared_ptr<const SparseMap> SparseMapper::finish(const StageCallback& progr
     adjust(options_.bundle);
     checkLoops(*data, &state_.report.loop_edges);
   });
-  stages.run("assembly", [&] { map = assemble(); });
+  stages.run("assembly", [&] { map = assembleWithLandmarks(options_, &state_); });
   return map;
 }
 
@@ -71,11 +88,9 @@ void SparseMapper::requireKeyframes() const {
 }
 
 void SparseMapper::adjustFirst() {
-  TriangulationOptions lenient = options_.triangulation;
-  lenient.max_error_rad = kFirstMaxError_rad;
   BundleAdjustmentOptions lenient_bundle = options_.bundle;
   lenient_bundle.outlier_sigmas = INFINITY;
-  triangulateTracks(lenient, &state_.data);
+  triangulateTracks(lenientTriangulation(options_), &state_.data);
   adjust(lenient_bundle);
   triangulateTracks(options_.triangulation, &state_.data);
   adjust(options_.bundle);
@@ -85,14 +100,9 @@ void SparseMapper::adjust(const BundleAdjustmentOptions& options) {
   recordAdjustment(adjustBundle(options, &state_.data), &state_.report);
 }
 
-std::shared_ptr<const SparseMap> SparseMapper::assemble() {
-  const std::vector<Track>& tracks = state_.data.tracks;
-  state_.report.num_landmarks = std::count_if(
-      tracks.begin(), tracks.end(), [](const Track& track) { return track.position_m.has_value(); });
-  if (state_.report.num_landmarks == 0) {
-    throw InputError("no map could be made: no point of the scene was seen from enough positions");
-  }
-  return assembleMap(state_, options_.features);
+std::shared_ptr<const SparseMap> makeMapSoFar(ReconstructionState state, const SparseMapperOptions& options) {
+  triangulateTracks(lenientTriangulation(options), &state.data);
+  return assembleWithLandmarks(options, &state);
 }
 
 }  // namespace vcharge

@@ -67,7 +67,7 @@ class LandmarkChooser {
         std::ceil(options_.max_landmark_ratio * static_cast<double>(map_.landmarks().size())));
     std::vector<double> gains(views_.size());
     tbb::parallel_for(size_t{0}, views_.size(), [&](size_t l) { gains[l] = gainOf(l); });
-    // Gains only decrease while others are chosen: the best one is known without computing all of them.
+    // Gains seldom grow while others are chosen: the best one is known without computing all of them.
     std::priority_queue<std::pair<double, int32_t>> queue;
     for (size_t l = 0; l < gains.size(); ++l) {
       queue.emplace(gains[l], -static_cast<int32_t>(l));
@@ -133,14 +133,19 @@ class LandmarkChooser {
            positionSigma_m(covariance_[keyframe]) <= options_.max_sigma_factor * sigma_of_all_m_[keyframe];
   }
 
-  /// How much the logarithm of the determinants grows where there are not enough landmarks yet.
+  /// How much the logarithm of the positions' variances shrinks where there are not enough landmarks yet.
   double gainOf(size_t landmark) const {
     double gain = 0.0;
     for (const View& view : views_[landmark]) {
       if (!hasEnough(view.keyframe)) {
-        const Eigen::Matrix3d ratio = Eigen::Matrix3d::Identity() +
-                                      view.jacobian * covariance_[view.keyframe] * view.jacobian.transpose();
-        gain += std::log(ratio.determinant());
+        // The covariance without and with the landmark (Woodbury's identity).
+        const Matrix6d& covariance = covariance_[view.keyframe];
+        const Eigen::Matrix<double, 6, 3> cross = covariance * view.jacobian.transpose();
+        const Eigen::Matrix3d innovation = Eigen::Matrix3d::Identity() + view.jacobian * cross;
+        const double variance_m2 = covariance.topLeftCorner<3, 3>().trace();
+        const double shrunk_m2 =
+            (cross.topRows<3>() * innovation.inverse() * cross.topRows<3>().transpose()).trace();
+        gain += std::log(variance_m2 / (variance_m2 - shrunk_m2));
       }
     }
     return gain;

@@ -8,6 +8,13 @@
 #include "vcharge_reconstruction/tiled_map.h"
 
 namespace vcharge {
+namespace {
+
+std::string nameOfLiveDrive(const SparseMap& map) {
+  return "live until " + toString(map.keyframes().back().stamp) + " s";
+}
+
+}  // namespace
 
 std::shared_ptr<const SparseMap> readMapWithSessions(const std::string& path) {
   MapProvenance provenance;
@@ -24,9 +31,16 @@ std::shared_ptr<const SparseMap> readMapWithSessions(const std::string& path) {
 
 SparseMap nameLiveDrive(const SparseMap& map) {
   SparseMapContents contents = map.contents();
-  contents.sessions.front().name = "live until " + toString(contents.keyframes.back().stamp) + " s";
+  contents.sessions.front().name = nameOfLiveDrive(map);
   contents.sessions.front().recording_hash = map.contentHash();
   return SparseMap(std::move(contents));
+}
+
+void writeLiveMap(const SparseMap& map, MapProvenance provenance, const std::string& path) {
+  provenance["bag"] = nameOfLiveDrive(map);
+  provenance["bag_hash"] = map.contentHash();
+  provenance["program"] = kMappingNodelet;
+  writeSparseMap(map, provenance, path, indexForTiles(map));
 }
 
 void requireNewDrive(const SparseMap& map, const SparseMap& session, const std::string& name) {

@@ -50,6 +50,7 @@ struct LandmarkObservation {
   int32_t camera = 0;
   cv::Point2f position_px;
   Eigen::Vector3d landmark_m = Eigen::Vector3d::Zero();  ///< in the map frame
+  int32_t num_drives = 1;  ///< drives of the map that saw the landmark near here
 };
 
 /// Pose of the vehicle from the images of one instant. Pose and covariance are valid for kLocalized; for
@@ -61,6 +62,9 @@ struct PoseFix {
   int num_matches = 0;
   std::vector<int> matches_of_camera, inliers_of_camera;
   std::vector<LandmarkObservation> inliers;
+  /// Variance of the map's error here over that of one drive's map: drives have independent errors, so that
+  /// the mean over n drives has one n-th.
+  double map_variance_ratio = 1.0;
   double second_best_ratio = 0.0;  ///< inliers of the best pose elsewhere relative to these; 0 with a prior
 
   int numInliers() const { return static_cast<int>(inliers.size()); }

@@ -1,6 +1,7 @@
 #include "map_pose/landmark_matcher.h"
 
 #include <algorithm>
+#include <unordered_map>
 #include <unordered_set>
 #include <utility>
 
@@ -32,6 +33,23 @@ MatchOptions closeMatches() {
   MatchOptions options;
   options.max_ratio = 0.85;
   return options;
+}
+
+/// Keeps the nearest match of each landmark: those of different drives may find different features.
+std::vector<FeatureMatch> oneOfEachLandmark(const std::vector<FeatureMatch>& matches,
+                                            const std::vector<TileObservation>& observations) {
+  std::vector<FeatureMatch> kept;
+  std::unordered_map<int32_t, size_t> kept_of_landmark;
+  for (const FeatureMatch& match : matches) {
+    const auto [found, is_new] = kept_of_landmark.emplace(
+        observations[static_cast<size_t>(match.first_index)].landmark().id, kept.size());
+    if (is_new) {
+      kept.push_back(match);
+    } else if (match.distance < kept[found->second].distance) {
+      kept[found->second] = match;
+    }
+  }
+  return kept;
 }
 
 }  // namespace
@@ -75,7 +93,8 @@ void LandmarkMatcher::add(const RigFeatures& features, size_t camera, const Tile
   matches->points.push_back(point);
   matches->observations.push_back(
       {landmark.id, static_cast<int32_t>(camera),
-       features.images[camera].keypoints[static_cast<size_t>(feature)].position_px, landmark.position_m});
+       features.images[camera].keypoints[static_cast<size_t>(feature)].position_px, landmark.position_m,
+       observation.numDrives()});
 }
 
 LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
@@ -102,9 +121,10 @@ LandmarkMatches LandmarkMatcher::searchNear(const RigFeatures& features,
         kLeastRadius_px,
         rig_->cameras[camera].image_size_px.width / kReferenceWidth_px *
             std::clamp(kReferencePixelsPerRadian * angle_rad, kMinRadius_px, options_.max_radius_px));
-    for (const FeatureMatch& match :
-         matchNearPixels(descriptorsOf(expected.observations), expected.positions_px, image.descriptors,
-                         positions, radius_px, matching_)) {
+    const std::vector<FeatureMatch> found =
+        matchNearPixels(descriptorsOf(expected.observations), expected.positions_px, image.descriptors,
+                        positions, radius_px, matching_);
+    for (const FeatureMatch& match : oneOfEachLandmark(found, expected.observations)) {
       add(features, camera, expected.observations[static_cast<size_t>(match.first_index)], match.second_index,
           match.distance, &of_camera[camera]);
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <unordered_map>
 #include <utility>
 
@@ -11,8 +12,18 @@ namespace {
 /// Descriptors are comparable between views whose directions and ranges differ by less.
 constexpr double kMaxViewAngle_rad = 0.6;
 constexpr double kMaxRangeRatio = 1.8;
+constexpr int64_t kMaxSessions = int64_t{1} << 32;
 
 }  // namespace
+
+int32_t TileObservation::numDrives() const {
+  std::set<int32_t> drives;
+  const auto [begin, end] = tile->observationsOfLandmark(static_cast<size_t>(get().landmark));
+  for (const int32_t* i = begin; i != end; ++i) {
+    drives.insert(tile->keyframes()[static_cast<size_t>(tile->observations()[*i].keyframe)].session);
+  }
+  return static_cast<int32_t>(drives.size());
+}
 
 LandmarkView::LandmarkView(const TiledMap& map, const CameraRig& rig, const MapLocalizerOptions& options,
                            const RigidTransform& map_from_vehicle)
@@ -25,7 +36,7 @@ LandmarkView::LandmarkView(const TiledMap& map, const CameraRig& rig, const MapL
 
 std::vector<LandmarkView::Source> LandmarkView::sourcesFor(const Eigen::Vector3d& camera_centre) const {
   const double min_cos_view = std::cos(kMaxViewAngle_rad);
-  std::unordered_map<int32_t, size_t> source_of_id;
+  std::unordered_map<int64_t, size_t> source_of_id;
   std::vector<Source> sources;
   for (const auto& [tile, keyframe] : keyframes_) {
     for (size_t camera = 0; camera < map_.rig().cameras.size(); ++camera) {
@@ -43,7 +54,8 @@ std::vector<LandmarkView::Source> LandmarkView::sourcesFor(const Eigen::Vector3d
             other_range_m > kMaxRangeRatio * range_m) {
           continue;
         }
-        const auto [found, is_new] = source_of_id.emplace(observation.landmark().id, sources.size());
+        const auto [found, is_new] = source_of_id.emplace(
+            kMaxSessions * observation.landmark().id + tile->keyframes()[keyframe].session, sources.size());
         if (is_new) {
           sources.push_back({observation, cos_angle});
         } else if (cos_angle > sources[found->second].cos_angle) {

@@ -19,10 +19,13 @@ struct TileObservation {
 
   const MapObservation& get() const { return tile->observations()[index]; }
   const MapLandmark& landmark() const { return tile->landmarks()[static_cast<size_t>(get().landmark)]; }
+  /// Drives in the tile that saw the landmark.
+  int32_t numDrives() const;
   cv::Mat descriptor() const { return tile->descriptors().row(static_cast<int>(index)); }
 };
 
-/// Landmarks that a camera should see, each with the observation from the most similar direction.
+/// Landmarks that a camera should see, each with the observation from the most similar direction of every
+/// drive: a landmark looks different by day and by night.
 struct ExpectedLandmarks {
   std::vector<TileObservation> observations;
   std::vector<cv::Point2f> positions_px;  ///< expected positions in the camera's image

@@ -119,10 +119,13 @@ PoseFix MapLocalizer::estimate(const LandmarkMatches& matches, int min_inliers,
   if (pose.status != EstimationStatus::kOk) {
     return fix;
   }
+  double sum_ratios = 0.0;
   for (const int i : pose.inliers) {
     fix.inliers.push_back(matches.observations[i]);
+    sum_ratios += 1.0 / matches.observations[i].num_drives;
     ++fix.inliers_of_camera[matches.observations[i].camera];
   }
+  fix.map_variance_ratio = sum_ratios / fix.numInliers();
   fix.map_from_vehicle = pose.map_from_rig;
   fix.covariance = pose.covariance;
   if (fix.numInliers() >= min_inliers && fix.numInliers() >= min_inlier_ratio * fix.num_matches &&
