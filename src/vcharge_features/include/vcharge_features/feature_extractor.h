@@ -26,8 +26,9 @@ struct FeatureExtractorOptions {
   VCHARGE_BEGIN_OPTIONS(FeatureExtractorOptions);
   VCHARGE_OPTION(FeatureType, type, FeatureType::kFastBrief, anyValue(), "Detector and descriptor.");
   VCHARGE_OPTION(int, max_features, 1000, between(1, 1000000), "Largest number of features in an image.");
-  VCHARGE_OPTION(int, fast_threshold, 20, between(1, 254),
-                 "Gray levels between a FAST corner and its surroundings.");
+  VCHARGE_OPTION(
+      int, fast_threshold, 20, between(1, 254),
+      "Gray levels between a FAST corner and its surroundings; half of it in images with few corners.");
   VCHARGE_OPTION(double, sift_contrast_threshold, 0.04, between(0.0, 1.0),
                  "Contrast of a SIFT feature, as defined by Lowe.");
   VCHARGE_END_OPTIONS();

@@ -18,6 +18,21 @@ constexpr int kFastRadius_px = 3;
 /// fifth.
 constexpr int kBlurWindow_px = 5;
 
+std::vector<SelectionCandidate> findCorners(const cv::Mat& image, const cv::Mat& mask, int threshold) {
+  constexpr int kBorder_px = kMargin_px - kFastRadius_px;
+  const cv::Rect inside(kBorder_px, kBorder_px, image.cols - 2 * kBorder_px, image.rows - 2 * kBorder_px);
+  std::vector<cv::KeyPoint> corners;
+  cv::FAST(image(inside), corners, threshold, true);
+  std::vector<SelectionCandidate> candidates;
+  for (const cv::KeyPoint& corner : corners) {
+    const cv::Point pixel(cvRound(corner.pt.x) + inside.x, cvRound(corner.pt.y) + inside.y);
+    if (mask.empty() || mask.at<uint8_t>(pixel) != 0) {
+      candidates.push_back({cv::Point2f(pixel), corner.response});
+    }
+  }
+  return candidates;
+}
+
 class FastBriefExtractor : public FeatureExtractor {
  public:
   explicit FastBriefExtractor(const FeatureExtractorOptions& options) : FeatureExtractor(options) {}
@@ -33,16 +48,9 @@ ImageFeatures FastBriefExtractor::extractChecked(const cv::Mat& image, const cv:
   if (std::min(image.cols, image.rows) <= 2 * kMargin_px) {
     return features;
   }
-  constexpr int kBorder_px = kMargin_px - kFastRadius_px;
-  const cv::Rect inside(kBorder_px, kBorder_px, image.cols - 2 * kBorder_px, image.rows - 2 * kBorder_px);
-  std::vector<cv::KeyPoint> corners;
-  cv::FAST(image(inside), corners, options().fast_threshold, true);
-  std::vector<SelectionCandidate> candidates;
-  for (const cv::KeyPoint& corner : corners) {
-    const cv::Point pixel(cvRound(corner.pt.x) + inside.x, cvRound(corner.pt.y) + inside.y);
-    if (mask.empty() || mask.at<uint8_t>(pixel) != 0) {
-      candidates.push_back({cv::Point2f(pixel), corner.response});
-    }
+  std::vector<SelectionCandidate> candidates = findCorners(image, mask, options().fast_threshold);
+  if (static_cast<int>(candidates.size()) < options().max_features) {
+    candidates = findCorners(image, mask, std::max(1, options().fast_threshold / 2));
   }
   const std::vector<int> selected =
       selectEvenly(candidates, image.size(), kGridColumns, kGridRows, options().max_features);

@@ -64,6 +64,19 @@ TEST_P(FeatureExtractorTest, StaysInsideTheMaskAndTheMaximum) {
   EXPECT_TRUE(makeFeatureExtractor(options())->extract(image, cv::Mat::zeros(image.size(), CV_8UC1)).empty());
 }
 
+TEST(FastBriefExtractorTest, TakesWeakerCornersInADarkImage) {
+  const cv::Mat image = randomTexture({480, 340}, 4);
+  cv::Mat dark;
+  image.convertTo(dark, -1, 0.5);
+  FeatureExtractorOptions options;
+  options.max_features = 400;
+  const ImageFeatures bright = makeFeatureExtractor(options)->extract(image);
+  const ImageFeatures found = makeFeatureExtractor(options)->extract(dark);
+  ASSERT_GT(bright.size(), 300U);
+  EXPECT_GT(found.size(), bright.size() * 9 / 10);
+  EXPECT_GT(matchDescriptors(bright.descriptors, found.descriptors).size(), bright.size() / 2);
+}
+
 TEST_P(FeatureExtractorTest, SpreadsFeaturesOverTheImage) {
   // The left half has the stronger contrast and would otherwise get nearly all features.
   cv::Mat image = randomTexture({640, 400}, 3);
