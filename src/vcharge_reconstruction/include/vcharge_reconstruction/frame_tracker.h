@@ -36,14 +36,16 @@ struct LiveTrack {
   Eigen::Vector3d ray_in_camera;
   int32_t anchor_keyframe = 0;  ///< keyframe whose image has the reference patch
   cv::Point2f anchor_px;
+  double drift_variance_px2 = 0.0;  ///< of the anchor from the point where the track began
   Eigen::Matrix2d shape =
       Eigen::Matrix2d::Identity();          ///< deformation of the patch from its anchor to the last keyframe
   cv::Point2f last_step_px = {0.0F, 0.0F};  ///< motion from the previous image
 };
 
 /// Tracks the points of one camera through its images. At keyframes each patch is aligned with its anchor,
-/// including its shape, so that it does not drift. Without extrinsics, points are predicted at constant image
-/// velocity, and matches are in the camera's frame instead of the vehicle's.
+/// including its shape, so that it does not drift; with each further anchor, its observations are less
+/// certain. Without extrinsics, points are predicted at constant image velocity, and matches are in the
+/// camera's frame instead of the vehicle's.
 class CameraTracker {
  public:
   /// Both arguments must outlive this object.

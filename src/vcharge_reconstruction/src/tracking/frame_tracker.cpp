@@ -18,6 +18,9 @@ constexpr double kMaxAssociation_px = 1.5;
 /// If alignment with its anchor moves a patch further, it has slipped or changed its appearance: the current
 /// keyframe becomes its anchor.
 constexpr double kMaxAlignment_px = 2.0;
+/// Deviation of a point's new anchor from its last one. Without it, tracks along edges of objects pretend a
+/// motion that is wrong by per cents: they slide, and all in one direction.
+constexpr double kAnchorSigma_px = 1.0;
 /// Assumed range of points of unknown distance that are not on the ground.
 constexpr double kUsualRange_m = 10.0;
 constexpr double kMinRange_m = 1.0;
@@ -185,6 +188,7 @@ void CameraTracker::alignWithAnchors(int32_t keyframe) {
                                       static_cast<float>(aligned->position_px.y()));
       track.shape = aligned->shape;
     } else {
+      track.drift_variance_px2 += kAnchorSigma_px * kAnchorSigma_px;
       track.anchor_keyframe = keyframe;
       track.anchor_px = track.position_px;
       track.shape.setIdentity();
@@ -236,9 +240,11 @@ void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, Reconstr
     if (feature_of_track[i] >= 0) {
       out.track_of_feature[feature_of_track[i]] = tracks_[i].track;
     }
+    const double sigma_px =
+        std::sqrt(options_.tracking_sigma_px * options_.tracking_sigma_px + tracks_[i].drift_variance_px2);
     data->tracks[tracks_[i].track].observations.push_back(
         {keyframe, camera_index, feature_of_track[i],
-         Eigen::Vector2d(tracks_[i].position_px.x, tracks_[i].position_px.y), options_.tracking_sigma_px});
+         Eigen::Vector2d(tracks_[i].position_px.x, tracks_[i].position_px.y), sigma_px});
   }
   // Sorts the most distinct features first.
   std::stable_sort(free_features.begin(), free_features.end(), [&](size_t a, size_t b) {
