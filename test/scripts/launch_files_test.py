@@ -92,6 +92,12 @@ class LaunchFilesTest(unittest.TestCase):
                 live = load(path, rig="/rigs/rig.yaml", map="/maps/lot.vmap")
                 self.assertFalse([node for node in live.nodes if node.package == "rosbag"], path.name)
                 self.assertNotIn("/use_sim_time", live.params)
+                self.assertNotIn("/mapping/map", live.params)
+                if "session" in all_arguments(path):
+                    kept = load(path, rig="/rigs/rig.yaml", map="/maps/lot.vmap", session="/maps/today.vmap")
+                    for name, value in (("/mapping/rig", "/rigs/rig.yaml"), ("/mapping/map", "/maps/lot.vmap"),
+                                        ("/mapping/output", "/maps/today.vmap"), ("/mapping/lossless_replay", False)):
+                        self.assertEqual(kept.params[name].value, value, path.name)
                 continue
             if "map" in all_arguments(path):  # shows what was saved, and replays nothing
                 config = load(path, map="/maps/lot.vmap")

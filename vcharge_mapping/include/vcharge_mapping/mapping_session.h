@@ -30,8 +30,6 @@ class MappingSession : public DriveConsumer {
   };
   using KeyframeCallback = std::function<void(const ReconstructionState&)>;
   using MapCallback = std::function<void(const SparseMap&)>;
-  /// Keyframes from one part of the drive to the next, at least.
-  static constexpr size_t kMinPartKeyframes = 20;
 
   /// `on_keyframe` is called inside addImage() and addOdometry() after new keyframes; `on_map` in the thread
   /// that made the map. Neither may throw. The constructor throws the errors of SparseMapper.
@@ -45,8 +43,8 @@ class MappingSession : public DriveConsumer {
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
 
-  /// From now on, gives out the map of the drive so far (makeMapSoFar()) whenever it has grown by a tenth, in
-  /// a thread of its own. `on_part` may throw std::exception.
+  /// From now on, gives out the map of the drive so far (makeMapSoFar()) whenever it has grown by a tenth
+  /// and 20 keyframes, in a thread of its own. `on_part` may throw std::exception.
   void giveParts(MapCallback on_part);
 
   /// Starts to finish the map of the drive so far. False if that was started before; `message` has the state.

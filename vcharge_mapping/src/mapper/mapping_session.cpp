@@ -9,6 +9,9 @@
 namespace vcharge {
 namespace {
 
+/// Keyframes from one part of the drive to the next, at least.
+constexpr size_t kMinPartKeyframes = 20;
+
 /// Exception that ends the mapper's work.
 struct Abandoned {};
 

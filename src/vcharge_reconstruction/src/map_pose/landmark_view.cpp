@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 #include <unordered_map>
 #include <utility>
 
@@ -12,17 +11,21 @@ namespace {
 /// Descriptors are comparable between views whose directions and ranges differ by less.
 constexpr double kMaxViewAngle_rad = 0.6;
 constexpr double kMaxRangeRatio = 1.8;
+/// More than a map can have: landmark and session in one number.
 constexpr int64_t kMaxSessions = int64_t{1} << 32;
 
 }  // namespace
 
 int32_t TileObservation::numDrives() const {
-  std::set<int32_t> drives;
+  // Observations are ordered by keyframe, and keyframes by drive.
+  int32_t num_drives = 0, last = -1;
   const auto [begin, end] = tile->observationsOfLandmark(static_cast<size_t>(get().landmark));
   for (const int32_t* i = begin; i != end; ++i) {
-    drives.insert(tile->keyframes()[static_cast<size_t>(tile->observations()[*i].keyframe)].session);
+    const int32_t drive = tile->keyframes()[static_cast<size_t>(tile->observations()[*i].keyframe)].session;
+    num_drives += drive != last ? 1 : 0;
+    last = drive;
   }
-  return static_cast<int32_t>(drives.size());
+  return num_drives;
 }
 
 LandmarkView::LandmarkView(const TiledMap& map, const CameraRig& rig, const MapLocalizerOptions& options,
