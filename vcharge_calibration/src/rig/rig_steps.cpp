@@ -22,7 +22,7 @@ constexpr int kNumStages = 9;
 /// Factor on the tolerance of ground landmarks before the first adjustment.
 constexpr double kFirstGroundFactor = 4.0;
 /// Factor on the cost tolerance of the last adjustment: the cost depends only weakly on the extrinsics.
-constexpr double kFineToleranceFactor = 0.01;
+constexpr double kFineToleranceFactor = 0.1;
 
 class RigSteps {
  public:

@@ -11,8 +11,8 @@ namespace vcharge {
 
 struct BundleAdjustmentOptions {
   VCHARGE_BEGIN_OPTIONS(BundleAdjustmentOptions);
-  VCHARGE_OPTION(int, max_iterations, 25, atLeast(1), "Largest number of iterations.");
-  VCHARGE_OPTION(double, cost_tolerance, 3e-3, positive(),
+  VCHARGE_OPTION(int, max_iterations, 50, atLeast(1), "Largest number of iterations.");
+  VCHARGE_OPTION(double, cost_tolerance, 3e-4, positive(),
                  "Relative decrease of the cost that ends iterations.");
   VCHARGE_OPTION(double, outlier_sigmas, 4.0, positive(), "Error of an observation that removes it.");
   VCHARGE_OPTION(double, min_parallax_rad, 0.015, notNegative(),

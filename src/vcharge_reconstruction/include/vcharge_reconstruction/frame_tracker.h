@@ -31,21 +31,28 @@ struct FrameTrackerOptions {
 
 /// A point tracked in one camera.
 struct LiveTrack {
-  int32_t track = -1;  ///< index into ReconstructionData::tracks
+  int32_t track = -1;  ///< index into ReconstructionData::tracks; -1: begins at this keyframe
   cv::Point2f position_px;
   Eigen::Vector3d ray_in_camera;
-  int32_t anchor_keyframe = 0;  ///< keyframe whose image has the reference patch
+  cv::Point2f last_step_px = {0.0F, 0.0F};  ///< motion from the previous image
+  cv::Point2f keyframe_px;                  ///< position in the last keyframe
+  int32_t anchor_keyframe = 0;              ///< keyframe whose image has the reference patch, the anchor
   cv::Point2f anchor_px;
   double drift_variance_px2 = 0.0;  ///< of the anchor from the point where the track began
-  Eigen::Matrix2d shape =
-      Eigen::Matrix2d::Identity();          ///< deformation of the patch from its anchor to the last keyframe
-  cv::Point2f last_step_px = {0.0F, 0.0F};  ///< motion from the previous image
+  /// Deformation of the patch from where the track began to the anchor, and from there to the last keyframe.
+  Eigen::Matrix2d anchor_shape = Eigen::Matrix2d::Identity();
+  Eigen::Matrix2d shape = Eigen::Matrix2d::Identity();
+
+  /// Makes the patch at a position in a keyframe the anchor, which may lie `sigma_px` off the last one.
+  void moveAnchor(int32_t keyframe, cv::Point2f there_px, double sigma_px);
 };
 
 /// Tracks the points of one camera through its images. At keyframes each patch is aligned with its anchor,
-/// including its shape, so that it does not drift; with each further anchor, its observations are less
-/// certain. Without extrinsics, points are predicted at constant image velocity, and matches are in the
-/// camera's frame instead of the vehicle's.
+/// including its shape, so that it does not drift; where its looks have changed too much, with the last
+/// keyframe's patch, which becomes the anchor. With each further anchor, observations are less certain. A
+/// track ends where its patch has grown or shrunk so much that it shows other things than at the beginning;
+/// another begins there. Without extrinsics, points are predicted at constant image velocity, and matches are
+/// in the camera's frame instead of the vehicle's.
 class CameraTracker {
  public:
   /// Both arguments must outlive this object.
@@ -70,6 +77,7 @@ class CameraTracker {
 
  private:
   void alignWithAnchors(int32_t keyframe);
+  bool align(LiveTrack* track) const;
   bool isMasked(const Eigen::Vector2d& position_px) const;
   RigidTransform vehicleFromCamera() const;
   cv::Point2f predict(const LiveTrack& track, const RigidTransform& current_from_previous) const;

@@ -7,6 +7,8 @@
 #include <optional>
 #include <set>
 
+#include <Eigen/SVD>
+
 #include "vcharge_core/base/error.h"
 
 namespace vcharge {
@@ -15,12 +17,16 @@ namespace {
 constexpr double kReferenceWidth_px = 1280.0;
 /// A tracked point and a feature this close are the same point.
 constexpr double kMaxAssociation_px = 1.5;
-/// If alignment with its anchor moves a patch further, it has slipped or changed its appearance: the current
-/// keyframe becomes its anchor.
+/// If alignment with its anchor moves a patch further, it has slipped or changed its appearance.
 constexpr double kMaxAlignment_px = 2.0;
-/// Deviation of a point's new anchor from its last one. Without it, tracks along edges of objects pretend a
+/// Deviation of a new anchor that was aligned with the one before.
+constexpr double kAlignmentSigma_px = 0.15;
+/// Deviation of a new anchor that could not be aligned. Without it, tracks along edges of objects pretend a
 /// motion that is wrong by per cents: they slide, and all in one direction.
-constexpr double kAnchorSigma_px = 1.0;
+constexpr double kSlipSigma_px = 1.0;
+/// A track ends when its patch has grown or shrunk by this factor in any direction. Its pixels then show
+/// other things: a point on a number plate that recedes would become the car, and then the row of cars.
+constexpr double kMaxDeformation = 2.0;
 /// Assumed range of points of unknown distance that are not on the ground.
 constexpr double kUsualRange_m = 10.0;
 constexpr double kMinRange_m = 1.0;
@@ -39,6 +45,21 @@ double expectedRange(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& dir
     return std::clamp(-origin_m.z() / direction.z(), kMinRange_m, kUsualRange_m);
   }
   return kUsualRange_m;
+}
+
+/// A track that begins at a keyframe.
+LiveTrack begunTrack(int32_t keyframe, cv::Point2f position_px, const Eigen::Vector3d& ray_in_camera) {
+  LiveTrack track;
+  track.position_px = track.keyframe_px = track.anchor_px = position_px;
+  track.ray_in_camera = ray_in_camera;
+  track.anchor_keyframe = keyframe;
+  return track;
+}
+
+/// Whether a patch that is deformed like this shows other things than before.
+bool isOtherPatch(const Eigen::Matrix2d& shape) {
+  const Eigen::Vector2d scales = Eigen::JacobiSVD<Eigen::Matrix2d>(shape).singularValues();
+  return scales[0] > kMaxDeformation || scales[1] * kMaxDeformation < 1.0;
 }
 
 /// A grid of cells for finding the nearest point.
@@ -87,6 +108,14 @@ class OccupiedCells {
 };
 
 }  // namespace
+
+void LiveTrack::moveAnchor(int32_t keyframe, cv::Point2f there_px, double sigma_px) {
+  drift_variance_px2 += sigma_px * sigma_px;
+  anchor_keyframe = keyframe;
+  anchor_px = there_px;
+  anchor_shape = shape * anchor_shape;
+  shape.setIdentity();
+}
 
 CameraTracker::CameraTracker(const RigCamera& camera, const FrameTrackerOptions& options)
     : camera_(camera),
@@ -175,23 +204,36 @@ bool CameraTracker::isMasked(const Eigen::Vector2d& position_px) const {
                                              static_cast<int>(std::lround(position_px.x()))) == 0;
 }
 
+bool CameraTracker::align(LiveTrack* track) const {
+  const Eigen::Vector2d position_px(track->position_px.x, track->position_px.y);
+  const std::optional<PatchWarp> aligned = alignPatch(anchors_.at(track->anchor_keyframe).pixels,
+                                                      image_.pixels, {track->anchor_px.x, track->anchor_px.y},
+                                                      {position_px, track->shape}, PatchAlignmentOptions());
+  if (!aligned || (aligned->position_px - position_px).norm() > kMaxAlignment_px ||
+      isMasked(aligned->position_px) ||
+      !camera_.model.unproject(aligned->position_px, &track->ray_in_camera)) {
+    return false;
+  }
+  track->position_px =
+      cv::Point2f(static_cast<float>(aligned->position_px.x()), static_cast<float>(aligned->position_px.y()));
+  track->shape = aligned->shape;
+  return true;
+}
+
 void CameraTracker::alignWithAnchors(int32_t keyframe) {
   for (LiveTrack& track : tracks_) {
-    const Eigen::Vector2d position_px(track.position_px.x, track.position_px.y);
-    const std::optional<PatchWarp> aligned = alignPatch(anchors_.at(track.anchor_keyframe).pixels,
-                                                        image_.pixels, {track.anchor_px.x, track.anchor_px.y},
-                                                        {position_px, track.shape}, PatchAlignmentOptions());
-    if (aligned && (aligned->position_px - position_px).norm() <= kMaxAlignment_px &&
-        !isMasked(aligned->position_px) &&
-        camera_.model.unproject(aligned->position_px, &track.ray_in_camera)) {
-      track.position_px = cv::Point2f(static_cast<float>(aligned->position_px.x()),
-                                      static_cast<float>(aligned->position_px.y()));
-      track.shape = aligned->shape;
-    } else {
-      track.drift_variance_px2 += kAnchorSigma_px * kAnchorSigma_px;
-      track.anchor_keyframe = keyframe;
-      track.anchor_px = track.position_px;
-      track.shape.setIdentity();
+    if (!align(&track)) {
+      const int32_t last_keyframe = anchors_.rbegin()->first;
+      LiveTrack renewed = track;
+      renewed.moveAnchor(last_keyframe, track.keyframe_px, kAlignmentSigma_px);
+      if (track.anchor_keyframe != last_keyframe && align(&renewed)) {
+        track = renewed;
+      } else {
+        track.moveAnchor(keyframe, track.position_px, kSlipSigma_px);
+      }
+    }
+    if (isOtherPatch(track.shape * track.anchor_shape)) {
+      track = begunTrack(keyframe, track.position_px, track.ray_in_camera);
     }
   }
 }
@@ -237,14 +279,20 @@ void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, Reconstr
     }
   }
   for (size_t i = 0; i < tracks_.size(); ++i) {
+    LiveTrack& track = tracks_[i];
+    track.keyframe_px = track.position_px;
+    if (track.track < 0) {
+      track.track = static_cast<int32_t>(data->tracks.size());
+      data->tracks.emplace_back();
+    }
     if (feature_of_track[i] >= 0) {
-      out.track_of_feature[feature_of_track[i]] = tracks_[i].track;
+      out.track_of_feature[feature_of_track[i]] = track.track;
     }
     const double sigma_px =
-        std::sqrt(options_.tracking_sigma_px * options_.tracking_sigma_px + tracks_[i].drift_variance_px2);
-    data->tracks[tracks_[i].track].observations.push_back(
+        std::sqrt(options_.tracking_sigma_px * options_.tracking_sigma_px + track.drift_variance_px2);
+    data->tracks[track.track].observations.push_back(
         {keyframe, camera_index, feature_of_track[i],
-         Eigen::Vector2d(tracks_[i].position_px.x, tracks_[i].position_px.y), sigma_px});
+         Eigen::Vector2d(track.position_px.x, track.position_px.y), sigma_px});
   }
   // Sorts the most distinct features first.
   std::stable_sort(free_features.begin(), free_features.end(), [&](size_t a, size_t b) {
@@ -267,15 +315,12 @@ void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, Reconstr
                                                 options_.tracking_sigma_px});
     out.track_of_feature[feature] = track;
     cells.add(position, static_cast<int>(tracks_.size()));
-    LiveTrack begun;
-    begun.track = track;
-    begun.position_px = begun.anchor_px = position;
-    begun.ray_in_camera = out.rays_in_camera.col(static_cast<Eigen::Index>(feature));
-    begun.anchor_keyframe = keyframe;
-    tracks_.push_back(begun);
+    tracks_.push_back(
+        begunTrack(keyframe, position, out.rays_in_camera.col(static_cast<Eigen::Index>(feature))));
+    tracks_.back().track = track;
   }
   anchors_.emplace(keyframe, image_);
-  std::set<int32_t> used;
+  std::set<int32_t> used = {keyframe};
   for (const LiveTrack& track : tracks_) {
     used.insert(track.anchor_keyframe);
   }
