@@ -26,6 +26,10 @@ struct PatchWarp {
   Eigen::Matrix2d shape = Eigen::Matrix2d::Identity();
 };
 
+/// Whether a patch that is deformed like this still shows the same things: no direction has grown or shrunk
+/// by more than a factor of two.
+bool isSamePatch(const Eigen::Matrix2d& shape);
+
 /// Aligns the patch around `anchor_px` of `anchor` with `current`, both CV_8UC1: estimates position and shape
 /// by Gauss-Newton steps from `start` (inverse compositional, Baker and Matthews, IJCV 2004), independent of
 /// brightness and contrast. Estimating the shape avoids the bias that a translation alone has when the scene

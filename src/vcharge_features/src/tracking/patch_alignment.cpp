@@ -139,9 +139,8 @@ class Alignment {
   }
 
   bool isGood(const Eigen::VectorXf& patch, const PatchWarp& warp) const {
-    const Eigen::Vector2d scales = Eigen::JacobiSVD<Eigen::Matrix2d>(warp.shape).singularValues();
     return anchor_.dot(patch) / static_cast<float>(size_) >= options_.min_correlation &&
-           scales[0] <= kMaxScale && scales[1] * kMaxScale >= 1.0;
+           isSamePatch(warp.shape);
   }
 
   const PatchAlignmentOptions& options_;
@@ -155,6 +154,11 @@ class Alignment {
 };
 
 }  // namespace
+
+bool isSamePatch(const Eigen::Matrix2d& shape) {
+  const Eigen::Vector2d scales = Eigen::JacobiSVD<Eigen::Matrix2d>(shape).singularValues();
+  return scales[0] <= kMaxScale && scales[1] * kMaxScale >= 1.0;
+}
 
 std::optional<PatchWarp> alignPatch(const cv::Mat& anchor, const cv::Mat& current,
                                     const Eigen::Vector2d& anchor_px, const PatchWarp& start,

@@ -43,6 +43,8 @@ struct LiveTrack {
   Eigen::Matrix2d anchor_shape = Eigen::Matrix2d::Identity();
   Eigen::Matrix2d shape = Eigen::Matrix2d::Identity();
 
+  /// Begins a new track with the patch at the present position in a keyframe.
+  void begin(int32_t keyframe);
   /// Makes the patch at a position in a keyframe the anchor, which may lie `sigma_px` off the last one.
   void moveAnchor(int32_t keyframe, cv::Point2f there_px, double sigma_px);
 };
@@ -77,7 +79,11 @@ class CameraTracker {
 
  private:
   void alignWithAnchors(int32_t keyframe);
+  /// Aligns a patch with its anchor. False, with the position unchanged, if it cannot be.
   bool align(LiveTrack* track) const;
+  /// Aligns a patch with that of the last keyframe, which becomes its anchor. False, with the track
+  /// unchanged, if it cannot be, or if that is its anchor.
+  bool alignWithLastKeyframe(LiveTrack* track) const;
   bool isMasked(const Eigen::Vector2d& position_px) const;
   RigidTransform vehicleFromCamera() const;
   cv::Point2f predict(const LiveTrack& track, const RigidTransform& current_from_previous) const;

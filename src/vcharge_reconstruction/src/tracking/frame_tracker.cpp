@@ -7,8 +7,6 @@
 #include <optional>
 #include <set>
 
-#include <Eigen/SVD>
-
 #include "vcharge_core/base/error.h"
 
 namespace vcharge {
@@ -24,9 +22,6 @@ constexpr double kAlignmentSigma_px = 0.15;
 /// Deviation of a new anchor that could not be aligned. Without it, tracks along edges of objects pretend a
 /// motion that is wrong by per cents: they slide, and all in one direction.
 constexpr double kSlipSigma_px = 1.0;
-/// A track ends when its patch has grown or shrunk by this factor in any direction. Its pixels then show
-/// other things: a point on a number plate that recedes would become the car, and then the row of cars.
-constexpr double kMaxDeformation = 2.0;
 /// Assumed range of points of unknown distance that are not on the ground.
 constexpr double kUsualRange_m = 10.0;
 constexpr double kMinRange_m = 1.0;
@@ -47,19 +42,10 @@ double expectedRange(const Eigen::Vector3d& origin_m, const Eigen::Vector3d& dir
   return kUsualRange_m;
 }
 
-/// A track that begins at a keyframe.
-LiveTrack begunTrack(int32_t keyframe, cv::Point2f position_px, const Eigen::Vector3d& ray_in_camera) {
-  LiveTrack track;
-  track.position_px = track.keyframe_px = track.anchor_px = position_px;
-  track.ray_in_camera = ray_in_camera;
-  track.anchor_keyframe = keyframe;
-  return track;
-}
-
-/// Whether a patch that is deformed like this shows other things than before.
-bool isOtherPatch(const Eigen::Matrix2d& shape) {
-  const Eigen::Vector2d scales = Eigen::JacobiSVD<Eigen::Matrix2d>(shape).singularValues();
-  return scales[0] > kMaxDeformation || scales[1] * kMaxDeformation < 1.0;
+/// Index of a new track without observations.
+int32_t addTrack(ReconstructionData* data) {
+  data->tracks.emplace_back();
+  return static_cast<int32_t>(data->tracks.size()) - 1;
 }
 
 /// A grid of cells for finding the nearest point.
@@ -108,6 +94,15 @@ class OccupiedCells {
 };
 
 }  // namespace
+
+void LiveTrack::begin(int32_t keyframe) {
+  track = -1;
+  keyframe_px = anchor_px = position_px;
+  anchor_keyframe = keyframe;
+  drift_variance_px2 = 0.0;
+  anchor_shape.setIdentity();
+  shape.setIdentity();
+}
 
 void LiveTrack::moveAnchor(int32_t keyframe, cv::Point2f there_px, double sigma_px) {
   drift_variance_px2 += sigma_px * sigma_px;
@@ -220,20 +215,28 @@ bool CameraTracker::align(LiveTrack* track) const {
   return true;
 }
 
+bool CameraTracker::alignWithLastKeyframe(LiveTrack* track) const {
+  const int32_t last_keyframe = anchors_.rbegin()->first;
+  if (track->anchor_keyframe == last_keyframe) {
+    return false;
+  }
+  LiveTrack renewed = *track;
+  renewed.moveAnchor(last_keyframe, track->keyframe_px, kAlignmentSigma_px);
+  if (!align(&renewed)) {
+    return false;
+  }
+  *track = renewed;
+  return true;
+}
+
 void CameraTracker::alignWithAnchors(int32_t keyframe) {
   for (LiveTrack& track : tracks_) {
-    if (!align(&track)) {
-      const int32_t last_keyframe = anchors_.rbegin()->first;
-      LiveTrack renewed = track;
-      renewed.moveAnchor(last_keyframe, track.keyframe_px, kAlignmentSigma_px);
-      if (track.anchor_keyframe != last_keyframe && align(&renewed)) {
-        track = renewed;
-      } else {
-        track.moveAnchor(keyframe, track.position_px, kSlipSigma_px);
-      }
+    if (!align(&track) && !alignWithLastKeyframe(&track)) {
+      track.moveAnchor(keyframe, track.position_px, kSlipSigma_px);
     }
-    if (isOtherPatch(track.shape * track.anchor_shape)) {
-      track = begunTrack(keyframe, track.position_px, track.ray_in_camera);
+    // A point on a number plate that recedes would become the car, and then the row of cars.
+    if (!isSamePatch(track.shape * track.anchor_shape)) {
+      track.begin(keyframe);
     }
   }
 }
@@ -282,8 +285,7 @@ void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, Reconstr
     LiveTrack& track = tracks_[i];
     track.keyframe_px = track.position_px;
     if (track.track < 0) {
-      track.track = static_cast<int32_t>(data->tracks.size());
-      data->tracks.emplace_back();
+      track.track = addTrack(data);
     }
     if (feature_of_track[i] >= 0) {
       out.track_of_feature[feature_of_track[i]] = track.track;
@@ -308,16 +310,17 @@ void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, Reconstr
     if (cells.nearest(position, &distance_px) >= 0) {
       continue;  // near a track that began at this keyframe
     }
-    const auto track = static_cast<int32_t>(data->tracks.size());
-    data->tracks.emplace_back();
-    data->tracks.back().observations.push_back({keyframe, camera_index, static_cast<int32_t>(feature),
-                                                Eigen::Vector2d(position.x, position.y),
-                                                options_.tracking_sigma_px});
-    out.track_of_feature[feature] = track;
+    LiveTrack track;
+    track.position_px = position;
+    track.ray_in_camera = out.rays_in_camera.col(static_cast<Eigen::Index>(feature));
+    track.begin(keyframe);
+    track.track = addTrack(data);
+    data->tracks[track.track].observations.push_back({keyframe, camera_index, static_cast<int32_t>(feature),
+                                                      Eigen::Vector2d(position.x, position.y),
+                                                      options_.tracking_sigma_px});
+    out.track_of_feature[feature] = track.track;
     cells.add(position, static_cast<int>(tracks_.size()));
-    tracks_.push_back(
-        begunTrack(keyframe, position, out.rays_in_camera.col(static_cast<Eigen::Index>(feature))));
-    tracks_.back().track = track;
+    tracks_.push_back(track);
   }
   anchors_.emplace(keyframe, image_);
   std::set<int32_t> used = {keyframe};

@@ -17,8 +17,7 @@ constexpr int kFramesPerKeyframe = 4;
 RigCamera makeCamera() {
   PinholeCamera::Parameters parameters;
   parameters << 400.0, 400.0, kCentre_px.x(), kCentre_px.y(), 0.0, 0.0, 0.0, 0.0;
-  RigCamera camera{"front", "camera_front_optical", {kSide_px, kSide_px}, PinholeCamera(parameters)};
-  return camera;
+  return {"front", "camera_front_optical", {kSide_px, kSide_px}, PinholeCamera(parameters)};
 }
 
 /// A wall with texture of all sizes.
