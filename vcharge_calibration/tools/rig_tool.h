@@ -7,12 +7,12 @@
 #include <sstream>
 #include <string>
 
-#include "vcharge_calibration/matching/keyframe_images.h"
 #include "vcharge_calibration/rig/rig_calibration.h"
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/frames/drive_source.h"
+#include "vcharge_reconstruction/keyframe_images.h"
 #include "vcharge_reconstruction/reconstruction_state.h"
 #include "vcharge_reconstruction/stage_runner.h"
 

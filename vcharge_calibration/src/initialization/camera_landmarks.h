@@ -4,9 +4,9 @@
 
 #include "vcharge_calibration/rig/rig_scene.h"
 #include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_reconstruction/landmarks/triangulation.h"
 #include "vcharge_reconstruction/reconstruction_data.h"
 #include "vcharge_reconstruction/reconstruction_state.h"
-#include "vcharge_reconstruction/triangulation.h"
 
 namespace vcharge {
 

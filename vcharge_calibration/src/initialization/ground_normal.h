@@ -6,8 +6,8 @@
 #include <Eigen/Core>
 
 #include "vcharge_calibration/initialization/hand_eye.h"
+#include "vcharge_reconstruction/landmarks/triangulation.h"
 #include "vcharge_reconstruction/reconstruction_data.h"
-#include "vcharge_reconstruction/triangulation.h"
 
 namespace vcharge {
 

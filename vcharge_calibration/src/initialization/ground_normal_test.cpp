@@ -1,6 +1,6 @@
 // A camera that looks down to the left, on a straight drive beside a wall.
 #include "initialization/ground_normal.h"
-#include "intrinsics/test_camera.h"
+#include "vcharge_reconstruction/testing/test_camera.h"
 
 #include <cmath>
 #include <memory>

@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "vcharge_calibration/matching/inter_camera_options.h"
-#include "vcharge_calibration/matching/keyframe_images.h"
+#include "vcharge_reconstruction/keyframe_images.h"
 #include "vcharge_reconstruction/reconstruction_data.h"
 
 namespace vcharge {

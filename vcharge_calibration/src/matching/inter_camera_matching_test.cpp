@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "matching/wall_scene.h"
 #include "vcharge_core/base/quantile.h"
+#include "vcharge_reconstruction/testing/wall_scene.h"
 
 namespace vcharge {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "vcharge_calibration/matching/keyframe_images.h"
+#include "vcharge_reconstruction/keyframe_images.h"
 #include "vcharge_reconstruction/reconstruction_data.h"
 
 namespace vcharge {

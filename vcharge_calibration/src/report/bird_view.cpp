@@ -7,9 +7,9 @@
 #include <Eigen/Eigenvalues>
 #include <opencv2/imgproc.hpp>
 
-#include "vcharge_calibration/matching/keyframe_images.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/motion/cross_matrix.h"
+#include "vcharge_reconstruction/keyframe_images.h"
 
 namespace vcharge {
 namespace {

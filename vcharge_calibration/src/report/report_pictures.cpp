@@ -9,8 +9,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "vcharge_calibration/intrinsics/image_coverage.h"
-#include "vcharge_calibration/matching/keyframe_images.h"
 #include "vcharge_core/base/text_format.h"
+#include "vcharge_reconstruction/keyframe_images.h"
 
 namespace vcharge {
 

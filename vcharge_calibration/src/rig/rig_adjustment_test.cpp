@@ -10,9 +10,9 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
-#include "intrinsics/test_camera.h"
 #include "rig/ground.h"
 #include "vcharge_calibration/rig/rig_calibrator_options.h"
+#include "vcharge_reconstruction/testing/test_camera.h"
 
 namespace vcharge {
 namespace {

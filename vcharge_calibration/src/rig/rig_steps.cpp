@@ -7,11 +7,11 @@
 #include "initialization/ground_normal.h"
 #include "initialization/rig_initialization.h"
 #include "matching/inter_camera_matching.h"
-#include "matching/landmark_alignment.h"
 #include "rig/ground.h"
 #include "rig/rig_adjustment.h"
 #include "rig/rig_judgement.h"
 #include "vcharge_calibration/rig/rig_calibrator.h"
+#include "vcharge_reconstruction/landmarks/landmark_alignment.h"
 #include "vcharge_reconstruction/reconstruction_steps.h"
 #include "vcharge_reconstruction/stage_runner.h"
 

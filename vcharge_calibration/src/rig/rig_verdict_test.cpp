@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "intrinsics/test_camera.h"
 #include "rig/rig_judgement.h"
+#include "vcharge_reconstruction/testing/test_camera.h"
 
 namespace vcharge {
 namespace {

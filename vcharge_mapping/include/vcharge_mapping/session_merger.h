@@ -6,7 +6,7 @@
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/sparse_map/sparse_map.h"
 #include "vcharge_reconstruction/bundle_adjustment.h"
-#include "vcharge_reconstruction/landmark_search.h"
+#include "vcharge_reconstruction/landmarks/landmark_search.h"
 #include "vcharge_reconstruction/loop_closure.h"
 #include "vcharge_reconstruction/stage_runner.h"
 

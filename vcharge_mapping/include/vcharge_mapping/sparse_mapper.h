@@ -7,18 +7,19 @@
 #include "vcharge_core/sparse_map/sparse_map.h"
 #include "vcharge_mapping/sparse_mapper_options.h"
 #include "vcharge_reconstruction/frame_follower.h"
+#include "vcharge_reconstruction/keyframe_images.h"
 #include "vcharge_reconstruction/reconstruction_state.h"
 #include "vcharge_reconstruction/stage_runner.h"
 
 namespace vcharge {
 
 /// Makes a sparse map of a drive (paper, section Sparse Mapping): add the drive, then call finish().
-/// Needs a rig with extrinsics. Data parallel inside; the same input gives the same map on any number of
-/// threads.
+/// Needs a rig with extrinsics. Keeps the images of all keyframes, as JPEGs, until it ends. Data parallel
+/// inside; the same input gives the same map on any number of threads.
 class SparseMapper : public DriveConsumer {
  public:
   /// Number of stages of finish().
-  static constexpr int kNumStages = 7;
+  static constexpr int kNumStages = 8;
 
   /// std::invalid_argument for bad options; InputError for a rig without extrinsics.
   SparseMapper(std::shared_ptr<const CameraRig> rig, const SparseMapperOptions& options);
@@ -44,6 +45,7 @@ class SparseMapper : public DriveConsumer {
 
   const SparseMapperOptions options_;
   ReconstructionState state_;
+  KeyframeImages images_ = KeyframeImages::ofAllKeyframes();
   std::unique_ptr<FrameFollower> follower_;
 };
 

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <sstream>
 #include <utility>
+#include <vector>
 
 #include "vcharge_core/base/error.h"
+#include "vcharge_reconstruction/landmarks/landmark_alignment.h"
 #include "vcharge_reconstruction/reconstruction_steps.h"
 #include "vcharge_reconstruction/stage_runner.h"
 
@@ -42,7 +44,9 @@ SparseMapper::SparseMapper(std::shared_ptr<const CameraRig> rig, const SparseMap
     throw InputError("rig: expected vehicle_from_camera of every camera, which extrinsic calibration gives");
   }
   state_.data.rig = std::move(rig);
-  follower_ = std::make_unique<FrameFollower>(options_, options_.ego_motion, &state_, nullptr);
+  follower_ = std::make_unique<FrameFollower>(
+      options_, options_.ego_motion, &state_,
+      [this](int32_t keyframe, const std::vector<Image>& images) { images_.add(keyframe, images); });
 }
 
 SparseMapper::~SparseMapper() = default;
@@ -69,6 +73,7 @@ std::shared_ptr<const SparseMap> SparseMapper::finish(const StageCallback& progr
   stages.run("landmark search", [&] { searchLandmarks(options_.search, data); });
   stages.run("adjustment", [&] { adjust(options_.bundle); });
   stages.run("second landmark search", [&] { searchLandmarks(options_.search, data); });
+  stages.run("landmark patches", [&] { alignLandmarks(options_.landmark_alignment, images_, data); });
   stages.run("last adjustment", [&] {
     adjust(options_.bundle);
     checkLoops(*data, &state_.report.loop_edges);

@@ -8,8 +8,8 @@
 
 #include "merge/appended_session.h"
 #include "vcharge_core/base/error.h"
+#include "vcharge_reconstruction/landmarks/triangulation.h"
 #include "vcharge_reconstruction/reconstruction_steps.h"
-#include "vcharge_reconstruction/triangulation.h"
 
 namespace vcharge {
 namespace {

@@ -26,6 +26,13 @@ struct PatchWarp {
   Eigen::Matrix2d shape = Eigen::Matrix2d::Identity();
 };
 
+/// A patch that was found in another image.
+struct AlignedPatch : PatchWarp {
+  /// Standard deviation of the position in each direction: what differs between the aligned patches,
+  /// propagated through the least squares. Patches that straddle a near and a far surface differ most.
+  double sigma_px = 0.0;
+};
+
 /// Whether a patch that is deformed like this still shows the same things: no direction has grown or shrunk
 /// by more than a factor of two.
 bool isSamePatch(const Eigen::Matrix2d& shape);
@@ -35,8 +42,8 @@ bool isSamePatch(const Eigen::Matrix2d& shape);
 /// brightness and contrast. Estimating the shape avoids the bias that a translation alone has when the scene
 /// comes nearer. Empty if `current` is empty, or if the patch leaves an image, has no texture, does not
 /// converge, or still differs after the alignment.
-std::optional<PatchWarp> alignPatch(const cv::Mat& anchor, const cv::Mat& current,
-                                    const Eigen::Vector2d& anchor_px, const PatchWarp& start,
-                                    const PatchAlignmentOptions& options);
+std::optional<AlignedPatch> alignPatch(const cv::Mat& anchor, const cv::Mat& current,
+                                       const Eigen::Vector2d& anchor_px, const PatchWarp& start,
+                                       const PatchAlignmentOptions& options);
 
 }  // namespace vcharge

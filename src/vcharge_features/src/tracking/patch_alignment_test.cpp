@@ -112,6 +112,37 @@ TEST_F(PatchAlignmentTest, NoiseCostsNoMoreThanWithoutAShape) {
   EXPECT_LT(quantile(aligned_px, 0.9), 1.3 * quantile(tracked_px, 0.9));
 }
 
+TEST_F(PatchAlignmentTest, TellsHowFarPositionsErr) {
+  // What differs between the patches is noise of this deviation on the upper half, and much more on the lower
+  // one.
+  constexpr double kNoises_gray[] = {2.0, 8.0};
+  deform(1.05, 1.05, 0.0);
+  cv::Mat noise(second_.size(), CV_16SC1), noisy;
+  cv::RNG random(3);
+  for (int half = 0; half < 2; ++half) {
+    random.fill(noise.rowRange(half * 150, half * 150 + 150), cv::RNG::NORMAL, 0.0, kNoises_gray[half]);
+  }
+  second_.convertTo(noisy, CV_16SC1);
+  noisy += noise;
+  noisy.convertTo(second_, CV_8UC1);
+  std::vector<double> ratios[2], sigmas_px[2];
+  for (const Eigen::Vector2d& point : points()) {
+    const PatchWarp start{warped(point), Eigen::Matrix2d::Identity()};
+    if (const auto aligned = alignPatch(first_, second_, point, start, options_)) {
+      const int half = warped(point).y() < 150.0 ? 0 : 1;
+      sigmas_px[half].push_back(aligned->sigma_px);
+      ratios[half].push_back((aligned->position_px - warped(point)).norm() / aligned->sigma_px);
+    }
+  }
+  // The norm of two errors of deviation 1 has the median 1.18.
+  for (const std::vector<double>& of_half : ratios) {
+    EXPECT_GT(of_half.size(), 100U);
+    EXPECT_GT(quantile(of_half, 0.5), 0.4);
+    EXPECT_LT(quantile(of_half, 0.5), 1.4);
+  }
+  EXPECT_GT(quantile(sigmas_px[1], 0.5), 1.5 * quantile(sigmas_px[0], 0.5));
+}
+
 TEST_F(PatchAlignmentTest, BrightnessAndContrastDoNotMatter) {
   deform(1.08, 1.08, 0.0);
   cv::Mat darker;

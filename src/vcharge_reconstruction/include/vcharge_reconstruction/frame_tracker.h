@@ -25,7 +25,8 @@ struct FrameTrackerOptions {
   VCHARGE_OPTION(int, max_tracks_per_camera, 350, atLeast(10), "Points tracked at once in one camera.");
   VCHARGE_OPTION(double, min_spacing_px, 20.0, atLeast(2.0),
                  "Spacing of tracks in an image 1280 pixels wide.");
-  VCHARGE_OPTION(double, tracking_sigma_px, 0.3, above(0.0).below(10.0), "Deviation of a tracked position.");
+  VCHARGE_OPTION(double, tracking_sigma_px, 0.1, above(0.0).below(10.0),
+                 "Deviation of a tracked position in addition to that of its patch's alignment.");
   VCHARGE_END_OPTIONS();
 };
 
@@ -39,13 +40,15 @@ struct LiveTrack {
   int32_t anchor_keyframe = 0;              ///< keyframe whose image has the reference patch, the anchor
   cv::Point2f anchor_px;
   double drift_variance_px2 = 0.0;  ///< of the anchor from the point where the track began
+  double alignment_sigma_px =
+      0.0;  ///< of the position in the last keyframe, by the alignment with the anchor
   /// Deformation of the patch from where the track began to the anchor, and from there to the last keyframe.
   Eigen::Matrix2d anchor_shape = Eigen::Matrix2d::Identity();
   Eigen::Matrix2d shape = Eigen::Matrix2d::Identity();
 
   /// Begins a new track with the patch at the present position in a keyframe.
   void begin(int32_t keyframe);
-  /// Makes the patch at a position in a keyframe the anchor, which may lie `sigma_px` off the last one.
+  /// Makes the patch at a position in a keyframe the anchor, which lies about `sigma_px` off the last one.
   void moveAnchor(int32_t keyframe, cv::Point2f there_px, double sigma_px);
 };
 

@@ -6,8 +6,8 @@
 #include <Eigen/Core>
 
 #include "vcharge_core/motion/trajectory.h"
+#include "vcharge_reconstruction/landmarks/triangulation.h"
 #include "vcharge_reconstruction/reconstruction_state.h"
-#include "vcharge_reconstruction/triangulation.h"
 
 namespace vcharge {
 

@@ -4,9 +4,10 @@
 #include "vcharge_features/feature_extractor.h"
 #include "vcharge_reconstruction/frame_tracker.h"
 #include "vcharge_reconstruction/keyframe_builder.h"
-#include "vcharge_reconstruction/landmark_search.h"
+#include "vcharge_reconstruction/landmarks/landmark_alignment.h"
+#include "vcharge_reconstruction/landmarks/landmark_search.h"
+#include "vcharge_reconstruction/landmarks/triangulation.h"
 #include "vcharge_reconstruction/loop_closure.h"
-#include "vcharge_reconstruction/triangulation.h"
 
 namespace vcharge {
 
@@ -18,6 +19,8 @@ struct ReconstructionOptions : KeyframeOptions {
   VCHARGE_OPTION_GROUP(TriangulationOptions, triangulation, {}, "Triangulation of tracks.");
   VCHARGE_OPTION_GROUP(LoopClosureOptions, loops, {}, "Detection and verification of loops.");
   VCHARGE_OPTION_GROUP(LandmarkSearchOptions, search, {}, "Search for landmarks in further images.");
+  VCHARGE_OPTION_GROUP(LandmarkAlignmentOptions, landmark_alignment, {},
+                       "Alignment of a landmark's patches.");
   VCHARGE_END_OPTIONS();
 };
 

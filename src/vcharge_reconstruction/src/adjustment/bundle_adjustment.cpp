@@ -9,7 +9,7 @@
 #include <Eigen/LU>
 
 #include "vcharge_core/base/error.h"
-#include "vcharge_reconstruction/triangulation.h"
+#include "vcharge_reconstruction/landmarks/triangulation.h"
 
 namespace vcharge {
 namespace {

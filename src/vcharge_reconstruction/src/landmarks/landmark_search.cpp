@@ -1,4 +1,4 @@
-#include "vcharge_reconstruction/landmark_search.h"
+#include "vcharge_reconstruction/landmarks/landmark_search.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "vcharge_reconstruction/triangulation.h"
+#include "vcharge_reconstruction/landmarks/triangulation.h"
 
 #include <algorithm>
 #include <cmath>

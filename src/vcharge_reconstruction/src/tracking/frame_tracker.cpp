@@ -17,8 +17,6 @@ constexpr double kReferenceWidth_px = 1280.0;
 constexpr double kMaxAssociation_px = 1.5;
 /// If alignment with its anchor moves a patch further, it has slipped or changed its appearance.
 constexpr double kMaxAlignment_px = 2.0;
-/// Deviation of a new anchor that was aligned with the one before.
-constexpr double kAlignmentSigma_px = 0.15;
 /// Deviation of a new anchor that could not be aligned. Without it, tracks along edges of objects pretend a
 /// motion that is wrong by per cents: they slide, and all in one direction.
 constexpr double kSlipSigma_px = 1.0;
@@ -99,7 +97,7 @@ void LiveTrack::begin(int32_t keyframe) {
   track = -1;
   keyframe_px = anchor_px = position_px;
   anchor_keyframe = keyframe;
-  drift_variance_px2 = 0.0;
+  drift_variance_px2 = alignment_sigma_px = 0.0;
   anchor_shape.setIdentity();
   shape.setIdentity();
 }
@@ -108,6 +106,7 @@ void LiveTrack::moveAnchor(int32_t keyframe, cv::Point2f there_px, double sigma_
   drift_variance_px2 += sigma_px * sigma_px;
   anchor_keyframe = keyframe;
   anchor_px = there_px;
+  alignment_sigma_px = 0.0;
   anchor_shape = shape * anchor_shape;
   shape.setIdentity();
 }
@@ -201,9 +200,9 @@ bool CameraTracker::isMasked(const Eigen::Vector2d& position_px) const {
 
 bool CameraTracker::align(LiveTrack* track) const {
   const Eigen::Vector2d position_px(track->position_px.x, track->position_px.y);
-  const std::optional<PatchWarp> aligned = alignPatch(anchors_.at(track->anchor_keyframe).pixels,
-                                                      image_.pixels, {track->anchor_px.x, track->anchor_px.y},
-                                                      {position_px, track->shape}, PatchAlignmentOptions());
+  const std::optional<AlignedPatch> aligned = alignPatch(
+      anchors_.at(track->anchor_keyframe).pixels, image_.pixels, {track->anchor_px.x, track->anchor_px.y},
+      {position_px, track->shape}, PatchAlignmentOptions());
   if (!aligned || (aligned->position_px - position_px).norm() > kMaxAlignment_px ||
       isMasked(aligned->position_px) ||
       !camera_.model.unproject(aligned->position_px, &track->ray_in_camera)) {
@@ -212,6 +211,7 @@ bool CameraTracker::align(LiveTrack* track) const {
   track->position_px =
       cv::Point2f(static_cast<float>(aligned->position_px.x()), static_cast<float>(aligned->position_px.y()));
   track->shape = aligned->shape;
+  track->alignment_sigma_px = aligned->sigma_px;
   return true;
 }
 
@@ -221,7 +221,7 @@ bool CameraTracker::alignWithLastKeyframe(LiveTrack* track) const {
     return false;
   }
   LiveTrack renewed = *track;
-  renewed.moveAnchor(last_keyframe, track->keyframe_px, kAlignmentSigma_px);
+  renewed.moveAnchor(last_keyframe, track->keyframe_px, track->alignment_sigma_px);
   if (!align(&renewed)) {
     return false;
   }
@@ -291,7 +291,7 @@ void CameraTracker::addKeyframe(int32_t keyframe, int32_t camera_index, Reconstr
       out.track_of_feature[feature_of_track[i]] = track.track;
     }
     const double sigma_px =
-        std::sqrt(options_.tracking_sigma_px * options_.tracking_sigma_px + track.drift_variance_px2);
+        std::hypot(options_.tracking_sigma_px, track.alignment_sigma_px, std::sqrt(track.drift_variance_px2));
     data->tracks[track.track].observations.push_back(
         {keyframe, camera_index, feature_of_track[i],
          Eigen::Vector2d(track.position_px.x, track.position_px.y), sigma_px});

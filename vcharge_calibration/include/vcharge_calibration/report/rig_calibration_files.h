@@ -3,8 +3,8 @@
 #include <map>
 #include <string>
 
-#include "vcharge_calibration/matching/keyframe_images.h"
 #include "vcharge_calibration/rig/rig_calibration.h"
+#include "vcharge_reconstruction/keyframe_images.h"
 #include "vcharge_reconstruction/reconstruction_state.h"
 
 namespace vcharge {

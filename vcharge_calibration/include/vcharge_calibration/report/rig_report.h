@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "vcharge_calibration/matching/keyframe_images.h"
 #include "vcharge_calibration/rig/rig_calibration.h"
+#include "vcharge_reconstruction/keyframe_images.h"
 #include "vcharge_reconstruction/reconstruction_state.h"
 
 namespace vcharge {

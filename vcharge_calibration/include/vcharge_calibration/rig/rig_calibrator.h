@@ -3,12 +3,12 @@
 #include <memory>
 #include <vector>
 
-#include "vcharge_calibration/matching/keyframe_images.h"
 #include "vcharge_calibration/rig/rig_calibration.h"
 #include "vcharge_calibration/rig/rig_calibrator_options.h"
 #include "vcharge_core/frames/drive_source.h"
 #include "vcharge_core/sparse_map/sparse_map.h"
 #include "vcharge_reconstruction/frame_follower.h"
+#include "vcharge_reconstruction/keyframe_images.h"
 #include "vcharge_reconstruction/reconstruction_state.h"
 #include "vcharge_reconstruction/stage_runner.h"
 

@@ -1,4 +1,4 @@
-#include "matching/landmark_alignment.h"
+#include "vcharge_reconstruction/landmarks/landmark_alignment.h"
 
 #include <algorithm>
 #include <atomic>
@@ -119,7 +119,11 @@ class LandmarkAlignment {
     int64_t num_aligned = 0;
     for (const auto& [track, seen] : seen_[image_index]) {
       const LandmarkPatch& patch = patches_[track];
+      if (patch.image.empty()) {
+        continue;
+      }
       if (patch.source == seen) {
+        seen->sigma_px = options_.sigma_px;
         continue;
       }
       if (image.empty()) {
@@ -132,7 +136,7 @@ class LandmarkAlignment {
                 : std::nullopt;
       if (aligned && (aligned->position_px - seen->position_px).norm() <= kMaxShift_px) {
         seen->position_px = aligned->position_px;
-        seen->sigma_px = options_.sigma_px;
+        seen->sigma_px = aligned->sigma_px;
         ++num_aligned;
       } else {
         seen->sigma_px = std::max(seen->sigma_px, options_.unaligned_sigma_px);

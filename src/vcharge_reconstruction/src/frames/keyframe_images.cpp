@@ -1,4 +1,4 @@
-#include "vcharge_calibration/matching/keyframe_images.h"
+#include "vcharge_reconstruction/keyframe_images.h"
 
 #include <tbb/parallel_for.h>
 #include <opencv2/imgcodecs.hpp>

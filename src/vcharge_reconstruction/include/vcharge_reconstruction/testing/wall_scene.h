@@ -7,9 +7,9 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "intrinsics/test_camera.h"
-#include "vcharge_calibration/matching/keyframe_images.h"
+#include "vcharge_reconstruction/keyframe_images.h"
 #include "vcharge_reconstruction/reconstruction_data.h"
+#include "vcharge_reconstruction/testing/test_camera.h"
 
 namespace vcharge {
 
