@@ -15,8 +15,9 @@ namespace vcharge {
 namespace {
 
 constexpr int kNumStages = 5;
-/// Deviation of a map's observations: tracked ones are better, found ones worse.
-constexpr double kObservationSigma_px = 0.5;
+/// Deviation of a map's observations that were aligned with their landmark's patch. Others err more; the loss
+/// lets them count little.
+constexpr double kObservationSigma_px = 0.15;
 // Larger differences of a camera's calibration make it another rig.
 constexpr double kMaxShift_m = 0.03;
 constexpr double kMaxTurn_rad = 0.01;

@@ -35,6 +35,11 @@ Eigen::Matrix<double, 6, 6> sessionBorderInformation() {
   return sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
+/// An observation this close to its landmark shows it: where it errs more than its deviation says, it stays
+/// for its looks, with a deviation with which it counts little.
+constexpr double kSamePlace_px = 1.5;
+constexpr double kImpreciseSigma_px = 2.5;
+
 struct TrackCheck {
   int64_t kept = 0, removed = 0;
   double squares = 0.0;
@@ -91,12 +96,15 @@ TrackCheck checkTrack(const BundleAdjustmentOptions& options, const Reconstructi
   result.was_landmark = true;
   std::vector<TrackObservation> kept;
   double min_range_m = INFINITY;
-  for (const TrackObservation& observation : track->observations) {
+  for (TrackObservation observation : track->observations) {
     Eigen::Vector2d error_px;
     if (!reproject(data, *track, observation, &error_px) ||
-        error_px.norm() > options.outlier_sigmas * observation.sigma_px) {
+        error_px.norm() > std::max(kSamePlace_px, options.outlier_sigmas * observation.sigma_px)) {
       ++result.removed;
       continue;
+    }
+    if (error_px.norm() > options.outlier_sigmas * observation.sigma_px) {
+      observation.sigma_px = kImpreciseSigma_px;
     }
     result.squares += error_px.squaredNorm();
     min_range_m = std::min(
