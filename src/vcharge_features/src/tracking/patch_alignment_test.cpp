@@ -155,7 +155,7 @@ TEST_F(PatchAlignmentTest, BrightnessAndContrastDoNotMatter) {
 
 TEST_F(PatchAlignmentTest, NothingIsFoundWhereThereIsNothing) {
   deform(1.0, 1.0, 0.0);
-  const auto found = [&](const cv::Mat& current, Eigen::Vector2d anchor_px, const PatchWarp& start) {
+  const auto found = [&](const cv::Mat& current, const Eigen::Vector2d& anchor_px, const PatchWarp& start) {
     return alignPatch(first_, current, anchor_px, start, options_).has_value();
   };
   const Eigen::Vector2d middle(200.0, 150.0);
