@@ -11,6 +11,8 @@
 namespace vcharge {
 namespace {
 
+using testing::makeExtrinsics;
+
 constexpr double kDegree = 0.017453292519943295;
 constexpr int kNumKeyframes = 10;
 constexpr double kStep_m = 0.5;

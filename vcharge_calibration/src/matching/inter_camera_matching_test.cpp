@@ -12,6 +12,9 @@
 namespace vcharge {
 namespace {
 
+using testing::kKeyframes;
+using testing::WallScene;
+
 InterCameraOptions makeOptions() {
   InterCameraOptions options;
   options.keyframe_step = 1;

@@ -20,6 +20,8 @@
 namespace vcharge {
 namespace {
 
+using testing::makeExtrinsics;
+
 constexpr double kRightAngle_rad = 1.5707963267948966;
 const cv::Size kImageSize_px(640, 400);
 

@@ -17,6 +17,9 @@
 namespace vcharge {
 namespace {
 
+using testing::makeExtrinsics;
+using testing::makeFisheyeCamera;
+
 constexpr double kDegree = 0.017453292519943295;
 constexpr double kNoise_px = 0.3;
 using Vector6d = Eigen::Matrix<double, 6, 1>;

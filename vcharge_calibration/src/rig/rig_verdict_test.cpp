@@ -6,6 +6,8 @@
 namespace vcharge {
 namespace {
 
+using testing::makeExtrinsics;
+
 /// A good calibration of three cameras.
 RigCalibration makeGood() {
   RigCalibration result;

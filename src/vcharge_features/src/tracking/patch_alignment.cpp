@@ -70,12 +70,7 @@ class Alignment {
     Matrix6 information = (jacobian_.transpose() * jacobian_).cast<double>();
     information.diagonal().tail<4>().array() += shapeWeight();
     solver_.compute(information);
-    if (solver_.info() != Eigen::Success || solver_.rcond() <= 1e-9) {
-      return false;
-    }
-    const Matrix6 covariance = solver_.solve(Matrix6::Identity());
-    px_per_gray_ = std::sqrt(0.5 * (covariance(0, 0) + covariance(1, 1)));
-    return true;
+    return solver_.info() == Eigen::Success && solver_.rcond() > 1e-9;
   }
 
   std::optional<AlignedPatch> align(const PatchWarp& start) const {
@@ -100,8 +95,11 @@ class Alignment {
       warp.position_px -= move_px;
       const double rim_move_px = options_.radius_px * step.tail<4>().norm();
       if (move_px.norm() < kMinStep_px && rim_move_px < 4.0 * kMinStep_px) {
+        if (!isGood(patch, warp)) {
+          return std::nullopt;
+        }
         warp.sigma_px = positionSigma(patch);
-        return isGood(patch, warp) ? std::make_optional(warp) : std::nullopt;
+        return warp;
       }
     }
     return std::nullopt;
@@ -152,7 +150,9 @@ class Alignment {
   double positionSigma(const Eigen::VectorXf& patch) const {
     const double difference_gray =
         contrast_ * (patch - anchor_).norm() / std::sqrt(static_cast<double>(size_));
-    return std::hypot(kInterpolationSigma_px, kCorrelationFactor * px_per_gray_ * difference_gray);
+    const Matrix6 covariance = solver_.solve(Matrix6::Identity());  // of pixels with a deviation of 1
+    const double px_per_gray = std::sqrt(0.5 * (covariance(0, 0) + covariance(1, 1)));
+    return std::hypot(kInterpolationSigma_px, kCorrelationFactor * px_per_gray * difference_gray);
   }
 
   bool isGood(const Eigen::VectorXf& patch, const PatchWarp& warp) const {
@@ -168,7 +168,6 @@ class Alignment {
   Eigen::Matrix<float, Eigen::Dynamic, 6>
       jacobian_;  // gray levels by position and shape in the anchor's image
   Eigen::LDLT<Matrix6> solver_;
-  double px_per_gray_ = 0.0;  // deviation of the position per deviation of independent pixels
 };
 
 }  // namespace

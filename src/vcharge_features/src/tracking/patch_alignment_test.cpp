@@ -25,6 +25,16 @@ class PatchAlignmentTest : public ::testing::Test {
     warp_(1, 2) += 150.0 - warp_(1, 0) * 200.0 - warp_(1, 1) * 150.0;
     cv::warpAffine(first_, second_, warp_, first_.size(), cv::INTER_CUBIC, cv::BORDER_REFLECT);
   }
+  /// Adds noise of these standard deviations to the upper and the lower half of the deformed image.
+  void addNoise(double upper_gray, double lower_gray) {
+    cv::Mat noise(second_.size(), CV_16SC1), noisy;
+    cv::RNG random(3);
+    random.fill(noise.rowRange(0, 150), cv::RNG::NORMAL, 0.0, upper_gray);
+    random.fill(noise.rowRange(150, 300), cv::RNG::NORMAL, 0.0, lower_gray);
+    second_.convertTo(noisy, CV_16SC1);
+    noisy += noise;
+    noisy.convertTo(second_, CV_8UC1);
+  }
   Eigen::Vector2d warped(const Eigen::Vector2d& p) const {
     return {warp_(0, 0) * p.x() + warp_(0, 1) * p.y() + warp_(0, 2),
             warp_(1, 0) * p.x() + warp_(1, 1) * p.y() + warp_(1, 2)};
@@ -101,30 +111,15 @@ TEST_F(PatchAlignmentTest, ScaleAndSlantPullNothingAside) {
 
 TEST_F(PatchAlignmentTest, NoiseCostsNoMoreThanWithoutAShape) {
   deform(1.0, 1.0, 0.0);
-  cv::Mat noise(second_.size(), CV_16SC1), noisy;
-  cv::RNG random(3);
-  random.fill(noise, cv::RNG::NORMAL, 0.0, 4.0);
-  second_.convertTo(noisy, CV_16SC1);
-  noisy += noise;
-  noisy.convertTo(second_, CV_8UC1);
+  addNoise(4.0, 4.0);
   const std::vector<double> aligned_px = errorsOfAlignment(), tracked_px = errorsOfTracker();
   EXPECT_LT(quantile(aligned_px, 0.5), 1.2 * quantile(tracked_px, 0.5));
   EXPECT_LT(quantile(aligned_px, 0.9), 1.3 * quantile(tracked_px, 0.9));
 }
 
 TEST_F(PatchAlignmentTest, TellsHowFarPositionsErr) {
-  // What differs between the patches is noise of this deviation on the upper half, and much more on the lower
-  // one.
-  constexpr double kNoises_gray[] = {2.0, 8.0};
   deform(1.05, 1.05, 0.0);
-  cv::Mat noise(second_.size(), CV_16SC1), noisy;
-  cv::RNG random(3);
-  for (int half = 0; half < 2; ++half) {
-    random.fill(noise.rowRange(half * 150, half * 150 + 150), cv::RNG::NORMAL, 0.0, kNoises_gray[half]);
-  }
-  second_.convertTo(noisy, CV_16SC1);
-  noisy += noise;
-  noisy.convertTo(second_, CV_8UC1);
+  addNoise(2.0, 8.0);
   std::vector<double> ratios[2], sigmas_px[2];
   for (const Eigen::Vector2d& point : points()) {
     const PatchWarp start{warped(point), Eigen::Matrix2d::Identity()};

@@ -14,7 +14,8 @@ struct BundleAdjustmentOptions {
   VCHARGE_OPTION(int, max_iterations, 50, atLeast(1), "Largest number of iterations.");
   VCHARGE_OPTION(double, cost_tolerance, 3e-4, positive(),
                  "Relative decrease of the cost that ends iterations.");
-  VCHARGE_OPTION(double, outlier_sigmas, 4.0, positive(), "Error of an observation that removes it.");
+  VCHARGE_OPTION(double, outlier_sigmas, 4.0, positive(),
+                 "Error of an observation that removes it, or, where small, lets it count little.");
   VCHARGE_OPTION(double, min_parallax_rad, 0.015, notNegative(),
                  "Least angle between two rays of a landmark.");
   VCHARGE_OPTION(int, min_observations, 3, atLeast(1), "Least observations of a landmark.");
@@ -52,8 +53,9 @@ BundleAdjustmentSummary adjustBundle(const BundleAdjustmentOptions& options, Rec
 BundleProblem makeBundleProblem(const BundleAdjustmentOptions& options, const ReconstructionData& data);
 /// Copies poses, points and the odometer's factors of a problem of makeBundleProblem() back to the data.
 void writeBack(const BundleProblem& problem, ReconstructionData* data);
-/// Removes observations and landmarks that do not fit the current poses; computes the covariance of the
-/// remaining landmarks for fixed poses.
+/// Removes observations and landmarks that do not fit the current poses, and lets observations that err more
+/// than their deviation says, but little, count less; computes the covariance of the remaining landmarks for
+/// fixed poses.
 BundleAdjustmentSummary removeOutliers(const BundleAdjustmentOptions& options, ReconstructionData* data);
 
 }  // namespace vcharge

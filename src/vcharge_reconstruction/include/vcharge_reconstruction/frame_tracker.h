@@ -40,8 +40,7 @@ struct LiveTrack {
   int32_t anchor_keyframe = 0;              ///< keyframe whose image has the reference patch, the anchor
   cv::Point2f anchor_px;
   double drift_variance_px2 = 0.0;  ///< of the anchor from the point where the track began
-  double alignment_sigma_px =
-      0.0;  ///< of the position in the last keyframe, by the alignment with the anchor
+  double alignment_sigma_px = 0.0;  ///< of the position in the last keyframe, from the anchor
   /// Deformation of the patch from where the track began to the anchor, and from there to the last keyframe.
   Eigen::Matrix2d anchor_shape = Eigen::Matrix2d::Identity();
   Eigen::Matrix2d shape = Eigen::Matrix2d::Identity();

@@ -33,6 +33,10 @@ struct Keyframe {
   int32_t map_id = kNoId;             ///< its id in an existing map
 };
 
+/// Deviation of observations that show their landmark, but not precisely: they are kept for their looks, and
+/// count little.
+inline constexpr double kImpreciseSigma_px = 2.5;
+
 /// Observation of a track in an image of a keyframe.
 struct TrackObservation {
   int32_t keyframe = 0;

@@ -35,10 +35,8 @@ Eigen::Matrix<double, 6, 6> sessionBorderInformation() {
   return sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
-/// An observation this close to its landmark shows it: where it errs more than its deviation says, it stays
-/// for its looks, with a deviation with which it counts little.
+/// An observation this close to its landmark shows it, even where it errs more than its deviation says.
 constexpr double kSamePlace_px = 1.5;
-constexpr double kImpreciseSigma_px = 2.5;
 
 struct TrackCheck {
   int64_t kept = 0, removed = 0;
@@ -97,13 +95,14 @@ TrackCheck checkTrack(const BundleAdjustmentOptions& options, const Reconstructi
   std::vector<TrackObservation> kept;
   double min_range_m = INFINITY;
   for (TrackObservation observation : track->observations) {
-    Eigen::Vector2d error_px;
-    if (!reproject(data, *track, observation, &error_px) ||
-        error_px.norm() > std::max(kSamePlace_px, options.outlier_sigmas * observation.sigma_px)) {
+    Eigen::Vector2d error_px = Eigen::Vector2d::Zero();
+    const bool is_seen = reproject(data, *track, observation, &error_px);
+    const bool is_precise = error_px.norm() <= options.outlier_sigmas * observation.sigma_px;
+    if (!is_seen || (!is_precise && error_px.norm() > kSamePlace_px)) {
       ++result.removed;
       continue;
     }
-    if (error_px.norm() > options.outlier_sigmas * observation.sigma_px) {
+    if (!is_precise) {
       observation.sigma_px = kImpreciseSigma_px;
     }
     result.squares += error_px.squaredNorm();

@@ -14,6 +14,9 @@
 namespace vcharge {
 namespace {
 
+using testing::kKeyframes;
+using testing::WallScene;
+
 constexpr double kError_px = 0.7;
 
 /// Observations of all cameras and keyframes with errors up to kError_px.

@@ -5,7 +5,7 @@
 #include "vcharge_core/camera/camera_rig.h"
 #include "vcharge_core/motion/rigid_transform.h"
 
-namespace vcharge {
+namespace vcharge::testing {
 
 /// vehicle_from_camera of a forward-looking camera that is rotated by these angles.
 inline RigidTransform makeExtrinsics(double yaw_rad, double pitch_rad, double roll_rad,
@@ -28,4 +28,4 @@ inline RigCamera makeFisheyeCamera(const std::string& name, double focal_px,
   return camera;
 }
 
-}  // namespace vcharge
+}  // namespace vcharge::testing

@@ -11,7 +11,7 @@
 #include "vcharge_reconstruction/reconstruction_data.h"
 #include "vcharge_reconstruction/testing/test_camera.h"
 
-namespace vcharge {
+namespace vcharge::testing {
 
 inline constexpr double kWall_m = 6.0;  // ahead of the vehicle
 inline constexpr double kMetresPerTexel = 0.01;
@@ -96,4 +96,4 @@ struct WallScene {
   }
 };
 
-}  // namespace vcharge
+}  // namespace vcharge::testing
