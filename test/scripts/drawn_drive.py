@@ -98,8 +98,9 @@ def write_rig(file, with_extrinsics):
     file.write_text("\n".join(lines) + "\n")
 
 
-def write_bag(file, duration_fraction=1.0):
-    """Images of all cameras, and odometry ten times as often. Only pixels have noise."""
+def write_bag(file, duration_fraction=1.0, knocked=None):
+    """Images of all cameras, and odometry ten times as often. Only pixels have noise. `knocked` is like CAMERAS: where the
+    cameras are in the second half."""
     rays, inside = camera_rays()
     texture = make_texture(1)
     random = np.random.default_rng(2)
@@ -117,7 +118,8 @@ def write_bag(file, duration_fraction=1.0):
             if i % ODOMETRY_PER_FRAME != 0:
                 continue
             turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
-            for name, (cx, cy, cz, camera_yaw, down) in CAMERAS.items():
+            cameras = knocked if knocked and 2 * i > len(poses) else CAMERAS
+            for name, (cx, cy, cz, camera_yaw, down) in cameras.items():
                 room_from_camera = (turn @ camera_rotation(camera_yaw, down)).astype(np.float32)
                 pixels = draw(np.array([x, y, 0.0]) + turn @ (cx, cy, cz),
                               np.tensordot(room_from_camera, rays, axes=1), texture)

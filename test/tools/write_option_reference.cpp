@@ -11,6 +11,7 @@
 #include "vcharge_calibration/intrinsics/view_collector.h"
 #include "vcharge_calibration/live/rig_calibration_session.h"
 #include "vcharge_calibration/masks/body_mask_estimator.h"
+#include "vcharge_calibration/monitor/rig_monitor.h"
 #include "vcharge_calibration/rig/rig_calibrator_options.h"
 #include "vcharge_camera_driver/driver_options.h"
 #include "vcharge_core/base/options.h"
@@ -56,6 +57,7 @@ int main() {
       "`calibrate_rig`, `calibration_nodelet`: `config/calibration.yaml`.");
   writeSection<vcharge::RigCalibrationSessionOptions>("Extrinsic calibration, live",
                                                       "`calibration_nodelet`: `~session`.");
+  writeSection<vcharge::RigMonitorOptions>("Watch over a rig", "`monitor_rig`, `monitor_nodelet`.");
   writeSection<vcharge::MapRigCalibratorOptions>(
       "Extrinsic calibration from a map", "`calibrate_rig_from_map`: `config/calibration_in_map.yaml`.");
   writeSection<vcharge::BodyMaskOptions>("Masks of the own body", "`make_masks`.");

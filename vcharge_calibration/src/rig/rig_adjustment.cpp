@@ -7,6 +7,7 @@
 #include "rig/ground.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/quantile.h"
+#include "vcharge_core/motion/cross_matrix.h"
 
 namespace vcharge {
 
@@ -61,6 +62,19 @@ std::vector<GroundObservation> makeGroundObservations(const RigAdjustmentOptions
   return observations;
 }
 
+/// Information on the height of the cameras as one rigid body: the mean of their heights, less what tilt
+/// about the vehicle's origin adds.
+Eigen::MatrixXd commonHeightInformation(const std::vector<RigidTransform>& vehicle_from_camera,
+                                        double sigma_m) {
+  Eigen::RowVectorXd height(static_cast<Eigen::Index>(6 * vehicle_from_camera.size()));
+  for (size_t i = 0; i < vehicle_from_camera.size(); ++i) {
+    height.segment<6>(static_cast<Eigen::Index>(6 * i)) << 0.0, 0.0, 1.0,
+        crossMatrix(vehicle_from_camera[i].translation()).row(2);
+  }
+  height /= static_cast<double>(vehicle_from_camera.size()) * sigma_m;
+  return height.transpose() * height;
+}
+
 /// Builds the bundle adjustment with unknown extrinsics, ground observations and priors.
 BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPriors& priors,
                              const ReconstructionData& data) {
@@ -86,7 +100,12 @@ BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPrior
   }
   problem.ground_observations = makeGroundObservations(options, weights, data);
   if (priors.height_sigma_m > 0.0) {
-    problem.common_information(2, 2) = 1.0 / (priors.height_sigma_m * priors.height_sigma_m);
+    problem.prior_vehicle_from_camera = problem.vehicle_from_camera;
+    problem.extrinsics_information =
+        commonHeightInformation(problem.vehicle_from_camera, priors.height_sigma_m);
+  } else if (!priors.vehicle_from_camera.empty()) {
+    problem.prior_vehicle_from_camera = priors.vehicle_from_camera;
+    problem.extrinsics_information = priors.extrinsics_information;
   }
   if (priors.hasMap()) {
     problem.is_first_pose_fixed = false;
@@ -173,6 +192,7 @@ RigUncertainty rigUncertainty(const RigAdjustmentOptions& options, const RigPrio
   }
   const Eigen::Index size = tail.covariance.rows() - 2;
   result.is_valid = true;
+  result.with_odometer = tail.covariance;
   result.covariance = tail.covariance.bottomRightCorner(size, size);
   result.jackknife.setZero(size, size);
   Eigen::VectorXd segment = Eigen::VectorXd::Zero(size);

@@ -29,6 +29,9 @@ struct RigPriors {
   std::vector<Eigen::Matrix3d> landmark_information;
   /// Standard deviation of the cameras' mean height from its initial value; 0: no prior.
   double height_sigma_m = 0.0;
+  /// Extrinsics known before, and the information on [dt, dphi] of each camera; empty: none.
+  std::vector<RigidTransform> vehicle_from_camera;
+  Eigen::MatrixXd extrinsics_information;
 
   bool hasMap() const { return !landmark_information.empty(); }
 };
@@ -42,8 +45,9 @@ BundleAdjustmentSummary adjustRig(const RigAdjustmentOptions& options, const Rig
 /// Uncertainty of the adjusted extrinsics: rows and columns [dt, dphi] of each camera.
 struct RigUncertainty {
   bool is_valid = false;
-  Eigen::MatrixXd covariance;  ///< marginal, for independent errors
-  Eigen::MatrixXd jackknife;   ///< estimated by leaving out parts of the drive
+  Eigen::MatrixXd covariance;     ///< marginal, for independent errors
+  Eigen::MatrixXd jackknife;      ///< estimated by leaving out parts of the drive
+  Eigen::MatrixXd with_odometer;  ///< covariance that begins with the odometer's factors, distance and turn
 };
 RigUncertainty rigUncertainty(const RigAdjustmentOptions& options, const RigPriors& priors,
                               const ReconstructionData& data);

@@ -11,80 +11,16 @@
 #include <tbb/global_control.h>
 
 #include "rig/ground.h"
+#include "testing/analytic_drive.h"
 #include "vcharge_calibration/rig/rig_calibrator_options.h"
-#include "vcharge_reconstruction/testing/test_camera.h"
 
 namespace vcharge {
 namespace {
 
-using testing::makeExtrinsics;
-using testing::makeFisheyeCamera;
+using testing::kNoise_px;
 
 constexpr double kDegree = 0.017453292519943295;
-constexpr double kNoise_px = 0.3;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
-
-RigCamera makeCamera(const std::string& name, double yaw_rad, const Eigen::Vector3d& position_m) {
-  return makeFisheyeCamera(name, 200.0, makeExtrinsics(yaw_rad, 0.35, 0.0, position_m));
-}
-
-/// Keyframes 0.5 m apart along a figure of eight of circles of 6 m.
-ReconstructionData makeDrive(uint32_t seed, double noise_px) {
-  ReconstructionData data;
-  auto rig = std::make_shared<CameraRig>();
-  rig->cameras = {makeCamera("front", 0.0, {3.6, 0.0, 0.6}), makeCamera("left", 1.57, {1.9, 0.95, 0.9})};
-  data.rig = rig;
-  std::mt19937 random(seed);
-  std::normal_distribution<double> noise(0.0, 1.0);
-  std::uniform_real_distribution<double> uniform(0.0, 1.0);
-  constexpr int kHalf = 76;
-  RigidTransform map_from_vehicle, odom_from_vehicle;
-  for (int i = 0; i < 2 * kHalf; ++i) {
-    Keyframe keyframe;
-    keyframe.map_from_vehicle = map_from_vehicle;
-    keyframe.odom_from_vehicle = odom_from_vehicle;
-    keyframe.travelled_m = 0.5 * i;
-    data.keyframes.push_back(keyframe);
-    const double turn_rad = (i < kHalf ? 1.0 : -1.0) * 0.5 / 6.0;
-    map_from_vehicle = map_from_vehicle * RigidTransform::planar(0.5 * std::cos(0.5 * turn_rad),
-                                                                 0.5 * std::sin(0.5 * turn_rad), turn_rad);
-    const double length_m = 0.5 + 0.002 * noise(random);
-    const double side_m = 0.002 * noise(random);
-    const double counted_rad = turn_rad + 0.0005 * noise(random);
-    odom_from_vehicle =
-        odom_from_vehicle *
-        RigidTransform::planar(length_m * std::cos(0.5 * turn_rad) - side_m * std::sin(0.5 * turn_rad),
-                               length_m * std::sin(0.5 * turn_rad) + side_m * std::cos(0.5 * turn_rad),
-                               counted_rad);
-  }
-  for (int p = 0; p < 1500; ++p) {
-    const double x = -12.0 + 24.0 * uniform(random);
-    const double y = -18.0 + 36.0 * uniform(random);
-    const bool is_ground = uniform(random) < 0.5;
-    const double z = is_ground ? 0.01 * noise(random) : 0.5 + 3.0 * uniform(random);
-    Track track;
-    track.position_m = Eigen::Vector3d(x, y, z);
-    for (int32_t k = 0; k < static_cast<int32_t>(data.keyframes.size()); ++k) {
-      for (int32_t c = 0; c < 2; ++c) {
-        const RigCamera& camera = rig->cameras[c];
-        const Eigen::Vector3d in_camera =
-            (data.keyframes[k].map_from_vehicle * *camera.vehicle_from_camera).inverse() * *track.position_m;
-        Eigen::Vector2d pixel;
-        if (in_camera.norm() < 10.0 && in_camera.norm() > 0.5 && in_camera.z() > 0.1 * in_camera.norm() &&
-            camera.model.project(in_camera, &pixel) && pixel.x() >= 0.0 && pixel.x() < 640.0 &&
-            pixel.y() >= 0.0 && pixel.y() < 400.0) {
-          const double du = noise_px * noise(random);
-          const double dv = noise_px * noise(random);
-          track.observations.push_back({k, c, -1, pixel + Eigen::Vector2d(du, dv), kNoise_px});
-        }
-      }
-    }
-    if (track.observations.size() >= 3) {
-      data.tracks.push_back(track);
-    }
-  }
-  return data;
-}
 
 RigAdjustmentOptions makeOptions() {
   RigAdjustmentOptions options = RigCalibratorOptions::defaultAdjustment();
@@ -120,7 +56,7 @@ Vector6d errorOf(const CameraRig& rig, const CameraRig& truth, size_t camera) {
 }
 
 TEST(RigAdjustmentTest, FindsTheCamerasOfAKnownDrive) {
-  ReconstructionData data = makeDrive(1, kNoise_px);
+  ReconstructionData data = testing::makeAnalyticDrive(1, kNoise_px);
   const std::shared_ptr<const CameraRig> truth = data.rig;
   disturbRig(&data);
   const RigAdjustmentOptions options = makeOptions();
@@ -140,7 +76,7 @@ TEST(RigAdjustmentTest, CovarianceMatchesTheErrors) {
   Vector6d sum = Vector6d::Zero();
   constexpr int kDrives = 5;
   for (uint32_t seed = 1; seed <= kDrives; ++seed) {
-    ReconstructionData data = makeDrive(seed, kNoise_px);
+    ReconstructionData data = testing::makeAnalyticDrive(seed, kNoise_px);
     const std::shared_ptr<const CameraRig> truth = data.rig;
     const RigAdjustmentOptions options = makeOptions();
     adjustRig(options, RigPriors(), &data);
@@ -166,7 +102,7 @@ TEST(RigAdjustmentTest, CovarianceMatchesTheErrors) {
 }
 
 TEST(RigAdjustmentTest, GivesTheSameBitsOnOneThread) {
-  ReconstructionData parallel = makeDrive(2, kNoise_px);
+  ReconstructionData parallel = testing::makeAnalyticDrive(2, kNoise_px);
   disturbRig(&parallel);
   ReconstructionData serial = parallel;
   RigAdjustmentOptions options = makeOptions();
@@ -181,7 +117,7 @@ TEST(RigAdjustmentTest, GivesTheSameBitsOnOneThread) {
 }
 
 TEST(OdometryNoiseTest, MatchesTheDrive) {
-  const ReconstructionData data = makeDrive(3, kNoise_px);
+  const ReconstructionData data = testing::makeAnalyticDrive(3, kNoise_px);
   RigAdjustmentOptions loose;
   const OdometryNoise noise = estimateOdometryNoise(loose, data);
   EXPECT_NEAR(noise.sigma_m, 0.002, 0.0006);
@@ -189,7 +125,7 @@ TEST(OdometryNoiseTest, MatchesTheDrive) {
 }
 
 TEST(OdometryNoiseTest, DetectsSlippingWheels) {
-  ReconstructionData data = makeDrive(3, kNoise_px);
+  ReconstructionData data = testing::makeAnalyticDrive(3, kNoise_px);
   for (size_t i = 60; i < data.keyframes.size(); ++i) {
     RigidTransform& pose = data.keyframes[i].odom_from_vehicle;
     pose = data.keyframes[59].odom_from_vehicle * RigidTransform::planar(0.1, 0.0, 0.0) *
@@ -202,7 +138,7 @@ TEST(OdometryNoiseTest, DetectsSlippingWheels) {
 }
 
 TEST(GroundTest, FindsTheHeightOfACameraPutAtZero) {
-  ReconstructionData data = makeDrive(4, 0.0);
+  ReconstructionData data = testing::makeAnalyticDrive(4, 0.0);
   auto rig = std::make_shared<CameraRig>(*data.rig);
   const RigidTransform& extrinsics = *rig->cameras[1].vehicle_from_camera;
   rig->cameras[1].vehicle_from_camera =
@@ -220,7 +156,7 @@ TEST(GroundTest, FindsTheHeightOfACameraPutAtZero) {
 }
 
 TEST(GroundTest, UsesOnlyPointsUnderThePath) {
-  const ReconstructionData data = makeDrive(5, 0.0);
+  const ReconstructionData data = testing::makeAnalyticDrive(5, 0.0);
   const std::vector<GroundPoint> ground = findGroundPoints(data, 0.15);
   EXPECT_GT(ground.size(), 100U);
   for (const GroundPoint& point : ground) {

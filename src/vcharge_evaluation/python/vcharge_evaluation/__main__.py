@@ -5,6 +5,7 @@ import sys
 STAGES = {
     "masks": "masks",
     "calibration": "calibration",
+    "monitor": "monitor",
     "mapping": "mapping",
     "pose_graphs": "pose_graphs",
     "localization": "localization",

@@ -55,9 +55,10 @@ struct BundleProblem {
   Eigen::Vector2d odometer_sigmas = Eigen::Vector2d::Ones();  ///< prior of `odometer`, around 1
   /// Prior of each point around its initial value, 1/m^2 along the map's axes. Empty: no prior.
   std::vector<Eigen::Matrix3d> point_information;
-  /// Prior of the extrinsics around their initial values: information on the mean motion of all cameras as
-  /// one rigid body, [dt, dphi] in the vehicle's frame.
-  Eigen::Matrix<double, 6, 6> common_information = Eigen::Matrix<double, 6, 6>::Zero();
+  /// Prior of the extrinsics around `prior_vehicle_from_camera`: information on [dt, dphi] of each camera in
+  /// the vehicle's frame, all in one matrix. Empty: no prior.
+  Eigen::MatrixXd extrinsics_information;
+  std::vector<RigidTransform> prior_vehicle_from_camera;
   double loss_sigmas = 2.0;  ///< scale of the Cauchy loss
 
   size_t numFixedPoses() const { return is_first_pose_fixed ? 1 : 0; }

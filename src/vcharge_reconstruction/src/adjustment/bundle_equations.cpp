@@ -125,15 +125,9 @@ BundleEquations::PriorTerms BundleEquations::priorTerms() const {
     terms.tail.topLeftCorner<2, 2>() += motion.by_odometer.transpose() * motion.by_odometer;
     odometer_gradient += motion.by_odometer.transpose() * motion.error;
   }
-  if (hasCameras()) {
-    Eigen::MatrixXd common(6, tailSize() - 2);
-    for (size_t i = 0; i < problem_.vehicle_from_camera.size(); ++i) {
-      common.middleCols<6>(static_cast<Eigen::Index>(6 * i)) = errors_.commonMotionByCamera(i);
-    }
-    terms.tail.bottomRightCorner(tailSize() - 2, tailSize() - 2) +=
-        common.transpose() * problem_.common_information * common;
-    terms.gradient.tail(tailSize() - 2) +=
-        common.transpose() * (problem_.common_information * errors_.commonMotion(state_));
+  if (problem_.extrinsics_information.size() > 0) {
+    terms.tail.bottomRightCorner(tailSize() - 2, tailSize() - 2) += problem_.extrinsics_information;
+    terms.gradient.tail(tailSize() - 2) += problem_.extrinsics_information * errors_.cameraMoves(state_);
   }
   return terms;
 }

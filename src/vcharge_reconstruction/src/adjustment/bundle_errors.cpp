@@ -102,24 +102,15 @@ Eigen::Vector2d BundleErrors::odometerPrior(const BundleState& state) const {
   return (state.odometer - Eigen::Vector2d::Ones()).cwiseQuotient(problem_.odometer_sigmas);
 }
 
-Eigen::Matrix<double, 6, 6> BundleErrors::commonMotionByCamera(size_t camera) const {
-  // A rig that turns by dphi about the vehicle's origin moves a camera at t by dphi x t.
-  Eigen::Matrix<double, 6, 6> derivative = Eigen::Matrix<double, 6, 6>::Identity();
-  derivative.topRightCorner<3, 3>() = crossMatrix(problem_.vehicle_from_camera[camera].translation());
-  return derivative / static_cast<double>(problem_.vehicle_from_camera.size());
-}
-
-Eigen::Matrix<double, 6, 1> BundleErrors::commonMotion(const BundleState& state) const {
-  Eigen::Matrix<double, 6, 1> common = Eigen::Matrix<double, 6, 1>::Zero();
-  for (size_t i = 0; i < problem_.vehicle_from_camera.size(); ++i) {
-    const RigidTransform& before = problem_.vehicle_from_camera[i];
+Eigen::VectorXd BundleErrors::cameraMoves(const BundleState& state) const {
+  Eigen::VectorXd moves(problem_.extrinsics_information.rows());
+  for (size_t i = 0; i < problem_.prior_vehicle_from_camera.size(); ++i) {
+    const RigidTransform& before = problem_.prior_vehicle_from_camera[i];
     const RigidTransform& now = state.vehicle_from_camera[i];
-    Eigen::Matrix<double, 6, 1> move;
-    move << now.translation() - before.translation(),
+    moves.segment<6>(6 * static_cast<Eigen::Index>(i)) << now.translation() - before.translation(),
         vectorFromRotation(now.rotation() * before.rotation().conjugate());
-    common += commonMotionByCamera(i) * move;
   }
-  return common;
+  return moves;
 }
 
 double BundleErrors::cost(const BundleState& state) const {
@@ -141,9 +132,9 @@ double BundleErrors::cost(const BundleState& state) const {
   for (size_t i = 0; i < odometer_costs_.size(); ++i) {
     cost += 0.5 * odometerFactor(state, i).error.squaredNorm();
   }
-  const Eigen::Matrix<double, 6, 1> common = commonMotion(state);
+  const Eigen::VectorXd moves = cameraMoves(state);
   return cost + 0.5 * odometerPrior(state).squaredNorm() +
-         0.5 * common.dot(problem_.common_information * common);
+         0.5 * moves.dot(problem_.extrinsics_information * moves);
 }
 
 }  // namespace vcharge

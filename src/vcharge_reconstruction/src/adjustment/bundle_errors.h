@@ -57,10 +57,8 @@ class BundleErrors {
     return problem_.point_information.empty() ? Eigen::Matrix3d::Zero().eval()
                                               : problem_.point_information[point];
   }
-  /// Mean motion of the cameras as one rigid body, [dt, dphi]; zero where the extrinsics are known.
-  Eigen::Matrix<double, 6, 1> commonMotion(const BundleState& state) const;
-  /// Derivative of commonMotion() by the motion of a camera.
-  Eigen::Matrix<double, 6, 6> commonMotionByCamera(size_t camera) const;
+  /// Moves of the cameras from the prior of the extrinsics, [dt, dphi] of each; empty without a prior.
+  Eigen::VectorXd cameraMoves(const BundleState& state) const;
 
   /// Weight that linearizes the Cauchy loss at an error with this square.
   double robustWeight(double square) const { return 1.0 / (1.0 + square / squared_loss_scale_); }

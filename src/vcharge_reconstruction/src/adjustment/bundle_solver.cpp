@@ -32,6 +32,12 @@ void checkProblem(const BundleProblem& problem) {
   check(problem.vehicle_from_camera.empty() ||
             problem.vehicle_from_camera.size() == problem.rig->cameras.size(),
         "BundleProblem: expected vehicle_from_camera of every camera, or none");
+  const auto prior_size = static_cast<Eigen::Index>(6 * problem.prior_vehicle_from_camera.size());
+  check((prior_size == 0 || problem.prior_vehicle_from_camera.size() == problem.vehicle_from_camera.size()) &&
+            problem.extrinsics_information.rows() == prior_size &&
+            problem.extrinsics_information.cols() == prior_size,
+        "BundleProblem: expected extrinsics_information and prior_vehicle_from_camera of every camera with "
+        "unknown extrinsics, or none");
 }
 
 }  // namespace

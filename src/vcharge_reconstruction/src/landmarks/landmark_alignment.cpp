@@ -139,7 +139,7 @@ class LandmarkAlignment {
         seen->sigma_px = aligned->sigma_px;
         ++num_aligned;
       } else {
-        seen->sigma_px = std::max(seen->sigma_px, options_.unaligned_sigma_px);
+        seen->sigma_px = std::max(seen->sigma_px, kImpreciseSigma_px);
       }
     }
     return num_aligned;

@@ -75,8 +75,7 @@ TEST(LandmarkAlignmentTest, AlignsAllObservationsWithOnePoint) {
   EXPECT_LT(quantile(differencesOf(scene), 0.9), 0.25);
   for (const Track& track : scene.data.tracks) {
     for (const TrackObservation& seen : track.observations) {
-      EXPECT_TRUE(seen.sigma_px < 0.3 || seen.sigma_px == LandmarkAlignmentOptions().unaligned_sigma_px)
-          << seen.sigma_px;
+      EXPECT_TRUE(seen.sigma_px < 0.3 || seen.sigma_px == kImpreciseSigma_px) << seen.sigma_px;
     }
   }
 }
@@ -90,7 +89,7 @@ TEST(LandmarkAlignmentTest, LeavesAWrongObservationWithLessWeight) {
   const Eigen::Vector2d before_px = last.position_px;
   alignLandmarks(LandmarkAlignmentOptions(), scene.images, &scene.data);
   EXPECT_EQ(last.position_px, before_px);
-  EXPECT_EQ(last.sigma_px, LandmarkAlignmentOptions().unaligned_sigma_px);
+  EXPECT_EQ(last.sigma_px, kImpreciseSigma_px);
 }
 
 TEST(LandmarkAlignmentTest, ChangesNothingWithoutImages) {

@@ -12,8 +12,6 @@ struct LandmarkAlignmentOptions {
   VCHARGE_BEGIN_OPTIONS(LandmarkAlignmentOptions);
   VCHARGE_OPTION(double, sigma_px, 0.1, positive(),
                  "Deviation of the position that the patch is taken from.");
-  VCHARGE_OPTION(double, unaligned_sigma_px, kImpreciseSigma_px, positive(),
-                 "Least deviation of a position that could not be aligned.");
   VCHARGE_END_OPTIONS();
 };
 

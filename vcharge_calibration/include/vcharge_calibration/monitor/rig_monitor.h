@@ -1,0 +1,79 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "vcharge_calibration/monitor/rig_change_detector.h"
+#include "vcharge_calibration/monitor/rig_deviation.h"
+#include "vcharge_core/base/options.h"
+#include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/frames/drive_source.h"
+
+namespace vcharge {
+
+class CameraSight;
+
+struct RigMonitorOptions {
+  VCHARGE_BEGIN_OPTIONS(RigMonitorOptions);
+  VCHARGE_OPTION(double, false_alarms_per_km, 1e-3, positive(), "Accepted where nothing changes.");
+  VCHARGE_END_OPTIONS();
+};
+
+/// A camera whose sight is less sees too little: its lens is dirty, covered or blinded.
+inline constexpr double kMinSight = 0.3;
+
+/// What is known about the car at the end of a part of the drive.
+struct MonitoredPart {
+  Timestamp end;
+  double begin_m = 0.0, end_m = 0.0;  ///< driven since the start
+  Eigen::VectorXd deviation, sigmas;  ///< from the rig, in the order of RigDeviation
+  /// What each camera sees relative to what it usually sees, and to the others: 1 as usual, 0 nothing.
+  std::vector<double> sight;
+  std::optional<RigChange> change;  ///< that this part made certain
+};
+
+/// Watches a rig during ordinary driving: cuts the drive into parts, estimates from each how the car deviates
+/// from its rig, and finds changes. Parts in which a camera sees little say nothing about that camera.
+/// Memory: one part's images, and a few numbers of each part before.
+class RigMonitor : public DriveConsumer {
+ public:
+  using PartCallback = std::function<void(const MonitoredPart&)>;
+
+  /// InputError unless all cameras have extrinsics. `on_part` may be empty.
+  RigMonitor(std::shared_ptr<const CameraRig> rig, const RigCalibratorOptions& calibration,
+             const RigMonitorOptions& options, PartCallback on_part);
+  ~RigMonitor() override;
+
+  void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
+  void addOdometry(const VehicleOdometry& odometry) override;
+  /// Ends the last part.
+  void flush();
+
+  const CameraRig& rig() const { return *rig_; }
+  const std::vector<MonitoredPart>& parts() const { return parts_; }
+  std::vector<RigChange> changes() const;
+  /// Covariance of the present deviation, in the order of RigDeviation.
+  Eigen::MatrixXd covariance() const { return detector_.covariance(); }
+
+ private:
+  struct Drive;
+
+  void startPart();
+  void endPartIfDue();
+  void endPart();
+
+  const std::shared_ptr<const CameraRig> rig_;
+  const RigCalibratorOptions calibration_;
+  const RigMonitorOptions options_;
+  const PartCallback on_part_;
+  RigChangeDetector detector_;
+  std::unique_ptr<CameraSight> sight_;
+  std::unique_ptr<Drive> drive_;
+  std::vector<MonitoredPart> parts_;
+};
+
+}  // namespace vcharge

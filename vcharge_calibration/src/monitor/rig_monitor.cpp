@@ -1,0 +1,127 @@
+#include "vcharge_calibration/monitor/rig_monitor.h"
+
+#include <optional>
+#include <utility>
+
+#include "monitor/camera_sight.h"
+#include "vcharge_core/base/error.h"
+#include "vcharge_reconstruction/frame_follower.h"
+
+namespace vcharge {
+
+namespace {
+
+/// Length of the parts of a drive: long enough to show rotations well, and two are 20 m after a knock.
+constexpr double kPart_m = 10.0;
+
+const CameraRig& withExtrinsics(const std::shared_ptr<const CameraRig>& rig) {
+  check(rig != nullptr, "RigMonitor: expected a rig");
+  if (!rig->hasExtrinsics()) {
+    throw InputError("rig: expected vehicle_from_camera of every camera, which extrinsic calibration gives");
+  }
+  return *rig;
+}
+
+}  // namespace
+
+struct RigMonitor::Drive {
+  ReconstructionState state;
+  KeyframeImages images = KeyframeImages::ofAllKeyframes();
+  FrameFollower follower;
+
+  Drive(const RigCalibratorOptions& options, const std::shared_ptr<const CameraRig>& rig)
+      : state(stateOf(rig)),
+        follower(options, std::nullopt, &state, [this](int32_t keyframe, const std::vector<Image>& pictures) {
+          images.add(keyframe, pictures);
+        }) {}
+
+  static ReconstructionState stateOf(const std::shared_ptr<const CameraRig>& rig) {
+    ReconstructionState state;
+    state.data.rig = rig;
+    return state;
+  }
+
+  double length_m() const {
+    return state.data.keyframes.empty() ? 0.0 : state.data.keyframes.back().travelled_m;
+  }
+};
+
+RigMonitor::RigMonitor(std::shared_ptr<const CameraRig> rig, const RigCalibratorOptions& calibration,
+                       const RigMonitorOptions& options, PartCallback on_part)
+    : rig_(std::move(rig)),
+      calibration_(calibration),
+      options_(options),
+      on_part_(std::move(on_part)),
+      detector_(withExtrinsics(rig_), options_.false_alarms_per_km),
+      sight_(std::make_unique<CameraSight>(rig_->cameras.size())) {
+  calibration_.validate();
+  options_.validate();
+  startPart();
+}
+
+RigMonitor::~RigMonitor() = default;
+
+void RigMonitor::startPart() {
+  drive_ = std::make_unique<Drive>(calibration_, rig_);
+}
+
+void RigMonitor::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
+  drive_->follower.addImage(camera_index, stamp, image);
+  endPartIfDue();
+}
+
+void RigMonitor::addOdometry(const VehicleOdometry& odometry) {
+  drive_->follower.addOdometry(odometry);
+  endPartIfDue();
+}
+
+void RigMonitor::flush() {
+  drive_->follower.flush();
+  endPart();
+  startPart();
+}
+
+void RigMonitor::endPartIfDue() {
+  if (drive_->length_m() >= kPart_m) {
+    endPart();
+    startPart();
+  }
+}
+
+void RigMonitor::endPart() {
+  if (drive_->state.data.keyframes.empty()) {
+    return;
+  }
+  RigDeviation deviation = estimateDeviation(calibration_, drive_->images, std::move(drive_->state.data));
+  MonitoredPart part;
+  part.begin_m = parts_.empty() ? 0.0 : parts_.back().end_m;
+  part.end_m = part.begin_m + deviation.end_m;
+  part.end = deviation.end;
+  deviation.begin_m = part.begin_m;
+  deviation.end_m = part.end_m;
+  part.sight = sight_->add(deviation.num_observations, part.end_m - part.begin_m);
+  for (size_t i = 0; i < part.sight.size(); ++i) {
+    if (part.sight[i] < kMinSight) {
+      forgetCamera(i, &deviation);
+    }
+  }
+  part.change = detector_.add(deviation);
+  part.deviation = detector_.deviation();
+  part.sigmas = detector_.covariance().diagonal().cwiseSqrt();
+  parts_.push_back(part);
+  if (on_part_) {
+    on_part_(part);
+  }
+}
+
+std::vector<RigChange> RigMonitor::changes() const {
+  std::vector<RigChange> changes;
+  for (const MonitoredPart& part : parts_) {
+    if (part.change) {
+      changes.push_back(*part.change);
+    }
+  }
+  return changes;
+}
+
+}  // namespace vcharge

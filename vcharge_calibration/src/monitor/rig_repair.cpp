@@ -1,0 +1,66 @@
+#include "vcharge_calibration/monitor/rig_repair.h"
+
+#include <cmath>
+#include <set>
+
+#include "vcharge_core/base/text_format.h"
+
+namespace vcharge {
+namespace {
+
+constexpr double kDegrees = 57.29577951308232;
+/// Distance that a camera was still.
+constexpr double kMinStill_m = 20.0;
+// A repaired camera is at least this certain, per axis.
+constexpr double kMaxSigma_m = 0.02;
+constexpr double kMaxSigma_rad = 0.001;
+
+}  // namespace
+
+RigRepair repairRig(const RigMonitor& monitor) {
+  RigRepair repair;
+  std::set<size_t> moved;
+  double last_m = 0.0;
+  for (const RigChange& change : monitor.changes()) {
+    if (change.part == RigPart::kCamera) {
+      moved.insert(change.camera);
+      last_m = change.latest_m;
+    }
+  }
+  if (moved.empty()) {
+    return repair;
+  }
+  const MonitoredPart& now = monitor.parts().back();
+  const double still_m = now.end_m - last_m;
+  if (still_m < kMinStill_m) {
+    repair.remarks.push_back("a camera moved " + toText(still_m, 0) + " m ago: drive " +
+                             toText(kMinStill_m - still_m, 0) + " m more for its repair");
+    return repair;
+  }
+  const Eigen::MatrixXd covariance = monitor.covariance();
+  auto rig = std::make_shared<CameraRig>(monitor.rig());
+  for (const size_t i : moved) {
+    RigCamera& camera = rig->cameras[i];
+    const Eigen::Index row = RigDeviation::rowOf(i);
+    const double sigma_m = now.sigmas.segment<3>(row).maxCoeff();
+    const double sigma_rad = now.sigmas.segment<3>(row + 3).maxCoeff();
+    if (sigma_m > kMaxSigma_m || sigma_rad > kMaxSigma_rad) {
+      repair.remarks.push_back("camera " + camera.name + " moved, but is known only within " +
+                               toText(100.0 * sigma_m, 1) + " cm and " + toText(kDegrees * sigma_rad, 3) +
+                               " degrees: drive turns to both sides for its repair");
+      continue;
+    }
+    const RigidTransform& before = *camera.vehicle_from_camera;
+    camera.vehicle_from_camera =
+        RigidTransform(rotationFromVector(now.deviation.segment<3>(row + 3)) * before.rotation(),
+                       before.translation() + now.deviation.segment<3>(row));
+    camera.covariance = covariance.block<6, 6>(row, row);
+    repair.cameras.push_back(camera.name);
+  }
+  if (!repair.cameras.empty()) {
+    repair.rig = rig;
+  }
+  return repair;
+}
+
+}  // namespace vcharge

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstdint>
+
+#include "vcharge_reconstruction/reconstruction_data.h"
+
+namespace vcharge::testing {
+
+/// Usual noise of a drive's observations, and their stated deviation.
+inline constexpr double kNoise_px = 0.3;
+
+/// Tracks of a front and a left camera that do not overlap, of points on the ground and above it, along a
+/// figure of eight of circles of 6 m, keyframes 0.5 m apart; true rig, poses and positions, noisy
+/// observations and odometry.
+ReconstructionData makeAnalyticDrive(uint32_t seed, double noise_px);
+
+}  // namespace vcharge::testing
