@@ -35,6 +35,7 @@ std::string partName(RigPart part) {
 nlohmann::json toJson(const CameraRig& rig, const RigChange& change) {
   nlohmann::json entry = {{"part", partName(change.part)},
                           {"text", describeChange(rig, change)},
+                          {"is_slow", change.is_slow},
                           {"main_axis", change.mainAxis()},
                           {"size", toList(change.size)},
                           {"standard_deviations", toList(change.covariance.diagonal().cwiseSqrt())},
@@ -127,7 +128,7 @@ int main(int argc, char** argv) {
       "Keys of --json: verdict (PASS, WARN, FAIL), remarks, distance_m, names (of the deviations), "
       "deviation, "
       "standard_deviations (metres, radians; of the odometer: ratios, and radians per metre), changes (part, "
-      "camera, text, main_axis, size, standard_deviations, earliest_m, latest_m, found_m, log_probability), "
+      "camera, text, is_slow, main_axis, size, standard_deviations, earliest_m, latest_m, found_m, log_probability), "
       "repaired (names of cameras).");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     RigMonitorOptions options;

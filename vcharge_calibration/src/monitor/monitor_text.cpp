@@ -50,7 +50,7 @@ std::string subjectOf(const CameraRig& rig, const RigChange& change) {
     case RigPart::kCamera:
       break;
   }
-  return "camera " + rig.cameras[change.camera].name + " moved";
+  return "camera " + rig.cameras[change.camera].name + (change.is_slow ? " moves on slowly" : " moved");
 }
 
 }  // namespace

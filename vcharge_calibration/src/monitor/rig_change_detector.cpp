@@ -1,5 +1,6 @@
 #include "vcharge_calibration/monitor/rig_change_detector.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -37,6 +38,9 @@ constexpr size_t kMaxObservations = 200;
 /// before and after it is left out.
 constexpr size_t kNumUndecided = 3;
 constexpr double kSingleRatio = 0.5;
+// A change in nearly the same direction, soon after another one, goes on with it.
+constexpr double kMaxPause_m = 500.0;
+constexpr double kSameDirection = 0.7;
 /// Changes at different times are not independent.
 constexpr double kIndependentTimes = 20.0;
 
@@ -239,8 +243,23 @@ std::optional<RigChange> RigChangeDetector::add(const RigDeviation& deviation) {
   change.size = best.size;
   change.covariance = best.covariance;
   change.log_probability = best.log_probability;
+  change.is_slow = continuesEarlier(change);
+  changes_.push_back(change);
   accept(*best_hypothesis, best_first);
   return change;
+}
+
+bool RigChangeDetector::continuesEarlier(const RigChange& change) const {
+  const auto earlier = std::find_if(changes_.rbegin(), changes_.rend(), [&](const RigChange& each) {
+    return each.part == change.part && each.camera == change.camera;
+  });
+  if (earlier == changes_.rend() || change.earliest_m - earlier->found_m > kMaxPause_m) {
+    return false;
+  }
+  // Directions are compared in units of the deviations, in which the tests compare them.
+  const Eigen::VectorXd sigmas = change.covariance.diagonal().cwiseSqrt();
+  return change.size.cwiseQuotient(sigmas).normalized().dot(
+             earlier->size.cwiseQuotient(sigmas).normalized()) > kSameDirection;
 }
 
 /// From now on the deviation is that after the change; what was known before it holds for the rest.

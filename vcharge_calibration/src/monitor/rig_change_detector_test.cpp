@@ -105,6 +105,7 @@ TEST(RigChangeDetectorTest, NamesTheCameraAndItsAxis) {
       EXPECT_EQ(change->part, RigPart::kCamera);
       EXPECT_EQ(change->camera, camera);
       EXPECT_EQ(change->mainAxis(), axis);
+      EXPECT_FALSE(change->is_slow);
       EXPECT_LE(change->earliest_m, 200.0);
       EXPECT_LE(change->latest_m, 250.0);
       EXPECT_LE(change->found_m, 400.0);
@@ -116,6 +117,25 @@ TEST(RigChangeDetectorTest, NamesTheCameraAndItsAxis) {
       EXPECT_LT(error.cwiseAbs().cwiseQuotient(sigmas).maxCoeff(), 4.5);
     }
   }
+}
+
+TEST(RigChangeDetectorTest, TellsASlowChangeFromAKnock) {
+  DrawnDrive drive(9);
+  RigChangeDetector detector(makeRig(), kFalseAlarmsPerKm);
+  ASSERT_FALSE(driveUntilChange(300.0, &drive, &detector));
+  const Eigen::Index row = RigDeviation::rowOf(2) + 4;
+  std::vector<RigChange> changes;
+  for (int i = 0; i < 100; ++i) {
+    drive.truth()[row] += 0.005 * kDegree;  // in the heat, over each 10 m
+    if (const auto change = detector.add(drive.next())) {
+      EXPECT_EQ(change->camera, 2U);
+      EXPECT_EQ(change->mainAxis(), 4);
+      EXPECT_EQ(change->is_slow, !changes.empty());
+      changes.push_back(*change);
+    }
+  }
+  EXPECT_GT(changes.size(), 1U);
+  EXPECT_NEAR(detector.deviation()[row], drive.truth()[row], 0.2 * kDegree);
 }
 
 TEST(RigChangeDetectorTest, FindsLargeChangesWithin30Metres) {
@@ -177,6 +197,7 @@ TEST(RigChangeDetectorTest, FindsASecondKnock) {
   const std::optional<RigChange> change = driveUntilChange(200.0, &drive, &detector);
   ASSERT_TRUE(change);
   EXPECT_EQ(change->camera, 0U);
+  EXPECT_FALSE(change->is_slow);
   EXPECT_NEAR(change->size[4], -0.3 * kDegree, 0.002);
 }
 

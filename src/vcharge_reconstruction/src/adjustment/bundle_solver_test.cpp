@@ -103,6 +103,38 @@ TEST(BundleSolverTest, AdjustsExtrinsicsAsCeresDoes) {
   }
 }
 
+TEST(BundleSolverTest, KeepsExtrinsicsAtACertainPrior) {
+  BundleProblem weak = makeProblem();
+  for (const RigCamera& camera : weak.rig->cameras) {
+    const RigidTransform& extrinsics = *camera.vehicle_from_camera;
+    weak.vehicle_from_camera.push_back(extrinsics);
+    weak.prior_vehicle_from_camera.emplace_back(
+        rotationFromVector(Eigen::Vector3d(0.001, 0.0, -0.002)) * extrinsics.rotation(),
+        extrinsics.translation() + Eigen::Vector3d(0.005, 0.0, 0.01));
+  }
+  BundleProblem none = weak;
+  none.prior_vehicle_from_camera.clear();
+  BundleProblem certain = weak;
+  const auto size = static_cast<Eigen::Index>(6 * weak.vehicle_from_camera.size());
+  weak.extrinsics_information = 1e-6 * Eigen::MatrixXd::Identity(size, size);
+  certain.extrinsics_information = 1e12 * Eigen::MatrixXd::Identity(size, size);
+  solveBundle(40, 1e-9, &none);
+  solveBundle(40, 1e-9, &weak);
+  solveBundle(40, 1e-9, &certain);
+  for (size_t i = 0; i < weak.vehicle_from_camera.size(); ++i) {
+    const auto distance_m = [i](const BundleProblem& a, const RigidTransform& b) {
+      return (a.vehicle_from_camera[i].translation() - b.translation()).norm();
+    };
+    EXPECT_LT(distance_m(weak, none.vehicle_from_camera[i]), 1e-4);
+    EXPECT_LT(distance_m(certain, certain.prior_vehicle_from_camera[i]), 1e-6);
+    EXPECT_LT(angleOfRotation(certain.vehicle_from_camera[i].rotation().conjugate() *
+                              certain.prior_vehicle_from_camera[i].rotation()),
+              1e-6);
+  }
+  certain.prior_vehicle_from_camera.pop_back();
+  EXPECT_THROW(solveBundle(1, 1e-3, &certain), std::logic_error);
+}
+
 TEST(BundleSolverTest, UsesPriorsOfPointsAsCeresDoes) {
   BundleProblem ours = makeProblem();
   Eigen::Matrix3d information;

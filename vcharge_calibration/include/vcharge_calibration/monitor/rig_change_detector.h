@@ -18,6 +18,8 @@ enum class RigPart { kCamera, kOdometer, kBody };
 /// A change of the car that lasts.
 struct RigChange {
   RigPart part = RigPart::kCamera;
+  /// It continues an earlier change of the same part in the same direction, not far away: it goes on slowly.
+  bool is_slow = false;
   size_t camera = 0;        ///< for kCamera
   double earliest_m = 0.0;  ///< driven distance between which and `latest_m` it happened
   double latest_m = 0.0;
@@ -84,6 +86,8 @@ class RigChangeDetector {
                    const Eigen::LLT<Eigen::MatrixXd>& all_information, const Belief& after);
   /// The observation without which a change at `first` is least certain, and the test without it.
   std::pair<size_t, Test> weakestTest(const Hypothesis& hypothesis, size_t first) const;
+  /// Whether a change goes on with one of the earlier ones.
+  bool continuesEarlier(const RigChange& change) const;
   void accept(const Hypothesis& hypothesis, size_t first);
   Belief sumOf(size_t begin, size_t end) const;
   Belief present() const;
@@ -93,6 +97,7 @@ class RigChangeDetector {
   Eigen::MatrixXd own_information_;  ///< inverse covariance of the error of a part of a drive
   Belief start_;                     ///< before the observations
   std::vector<Observation> observations_;
+  std::vector<RigChange> changes_;
 };
 
 }  // namespace vcharge
