@@ -7,16 +7,23 @@
 namespace vcharge {
 
 /// How much each camera sees, relative to what it usually sees and to what the other cameras see at the
-/// time: 1 as usual, 0 nothing.
+/// time: 1 as usual, 0 nothing. A camera in the dark is taken to see as usual: that is not its lens.
 class CameraSight {
  public:
   explicit CameraSight(size_t num_cameras) : usual_(num_cameras) {}
 
-  /// Adds the observations of landmarks in the next part of a drive.
-  std::vector<double> add(const std::vector<int64_t>& num_observations, double length_m);
+  /// What a camera saw in a part of a drive.
+  struct Seen {
+    int64_t num_observations = 0;  ///< of landmarks
+    double level = 0.0;            ///< mean of its pixels
+  };
+  std::vector<double> add(const std::vector<Seen>& seen, double length_m);
 
  private:
-  std::vector<std::vector<double>> usual_;  ///< observations per metre of the last parts, by camera
+  struct Usual {
+    std::vector<double> per_metre, levels;  ///< in the last parts
+  };
+  std::vector<Usual> usual_;
 };
 
 }  // namespace vcharge

@@ -3,6 +3,8 @@
 #include <optional>
 #include <utility>
 
+#include <opencv2/core.hpp>
+
 #include "monitor/camera_sight.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_reconstruction/frame_follower.h"
@@ -27,12 +29,17 @@ const CameraRig& withExtrinsics(const std::shared_ptr<const CameraRig>& rig) {
 struct RigMonitor::Drive {
   ReconstructionState state;
   KeyframeImages images = KeyframeImages::ofAllKeyframes();
+  std::vector<double> level_sums;  ///< of the keyframes' images, by camera
   FrameFollower follower;
 
   Drive(const RigCalibratorOptions& options, const std::shared_ptr<const CameraRig>& rig)
       : state(stateOf(rig)),
+        level_sums(rig->cameras.size(), 0.0),
         follower(options, std::nullopt, &state, [this](int32_t keyframe, const std::vector<Image>& pictures) {
           images.add(keyframe, pictures);
+          for (size_t i = 0; i < pictures.size(); ++i) {
+            level_sums[i] += pictures[i].pixels.empty() ? 0.0 : cv::mean(pictures[i].pixels)[0];
+          }
         }) {}
 
   static ReconstructionState stateOf(const std::shared_ptr<const CameraRig>& rig) {
@@ -89,7 +96,8 @@ void RigMonitor::endPartIfDue() {
 }
 
 void RigMonitor::endPart() {
-  if (drive_->state.data.keyframes.empty()) {
+  const auto num_keyframes = static_cast<double>(drive_->state.data.keyframes.size());
+  if (num_keyframes == 0.0) {
     return;
   }
   RigDeviation deviation = estimateDeviation(calibration_, drive_->images, std::move(drive_->state.data));
@@ -99,7 +107,11 @@ void RigMonitor::endPart() {
   part.end = deviation.end;
   deviation.begin_m = part.begin_m;
   deviation.end_m = part.end_m;
-  part.sight = sight_->add(deviation.num_observations, part.end_m - part.begin_m);
+  std::vector<CameraSight::Seen> seen;
+  for (size_t i = 0; i < rig_->cameras.size(); ++i) {
+    seen.push_back({deviation.num_observations[i], drive_->level_sums[i] / num_keyframes});
+  }
+  part.sight = sight_->add(seen, part.end_m - part.begin_m);
   for (size_t i = 0; i < part.sight.size(); ++i) {
     if (part.sight[i] < kMinSight) {
       forgetCamera(i, &deviation);
