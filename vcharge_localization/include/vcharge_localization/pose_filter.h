@@ -19,7 +19,7 @@ struct PoseFilterOptions {
   VCHARGE_OPTION(double, distance_sigma, 0.01, notNegative(), "Position noise after a metre, in metres.");
   VCHARGE_OPTION(double, yaw_sigma_rad, 0.0012, notNegative(), "Heading noise after a metre.");
   VCHARGE_OPTION(double, fix_covariance_factor, 3.0, positive(), "Factor on the covariance of a fix.");
-  VCHARGE_OPTION(double, map_sigma_m, 0.005, notNegative(), "Position error of a map of reference pixels.");
+  VCHARGE_OPTION(double, map_sigma_m, 0.003, notNegative(), "Position error of a map of reference pixels.");
   VCHARGE_OPTION(double, map_sigma_rad, 0.0004, notNegative(), "Rotation error of such a map.");
   VCHARGE_OPTION(double, gate, 30.0, positive(), "Largest squared Mahalanobis distance of a fix.");
   VCHARGE_END_OPTIONS();
