@@ -109,7 +109,8 @@ class LaunchFilesTest(unittest.TestCase):
                 self.assertEqual(config.params["/camera_driver/options/can_interface"].value, "can0", path.name)
                 continue
             if "output" in required_arguments(path) and "rig" in required_arguments(path):  # maps a drive, or calibrates
-                nodelet = {"calibrate_rig": "/calibration", "height_map": "/height_map"}.get(path.stem, "/mapping")
+                nodelet = {"calibrate_rig": "/calibration", "monitor_rig": "/monitor",
+                           "height_map": "/height_map"}.get(path.stem, "/mapping")
                 config = load(path, rig="/rigs/rig.yaml", output="/maps/lot.vmap", bag="/drives/drive.bag",
                               lossless_replay="true")
                 for name, value in ((f"{nodelet}/rig", "/rigs/rig.yaml"), (f"{nodelet}/output", "/maps/lot.vmap"),
