@@ -128,7 +128,8 @@ int main(int argc, char** argv) {
       "Keys of --json: verdict (PASS, WARN, FAIL), remarks, distance_m, names (of the deviations), "
       "deviation, "
       "standard_deviations (metres, radians; of the odometer: ratios, and radians per metre), changes (part, "
-      "camera, text, is_slow, main_axis, size, standard_deviations, earliest_m, latest_m, found_m, log_probability), "
+      "camera, text, is_slow, main_axis, size, standard_deviations, earliest_m, latest_m, found_m, "
+      "log_probability), "
       "repaired (names of cameras).");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     RigMonitorOptions options;

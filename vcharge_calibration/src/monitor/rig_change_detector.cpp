@@ -13,8 +13,6 @@
 namespace vcharge {
 namespace {
 
-/// Factor on the variances of an adjustment, whose observations are not independent.
-constexpr double kDependence = 4.0;
 // Errors of a part of a drive: of each camera, of the body on its suspension, and of the odometer.
 constexpr double kCamera_m = 0.001;
 constexpr double kCamera_rad = 0.0002;
@@ -137,8 +135,8 @@ RigChangeDetector::RigChangeDetector(const CameraRig& rig, double false_alarms_p
 /// The information of a part of a drive whose errors have a part in common: of y = x + e + n, with e of
 /// covariance S and n of information L, L - L (L + S^-1)^-1 L.
 RigChangeDetector::Belief RigChangeDetector::withOwnErrors(const RigDeviation& deviation) const {
-  const Eigen::MatrixXd information = deviation.information / kDependence;
-  const Eigen::VectorXd vector = deviation.information_vector / kDependence;
+  const Eigen::MatrixXd& information = deviation.information;
+  const Eigen::VectorXd& vector = deviation.information_vector;
   const Eigen::LLT<Eigen::MatrixXd> sum((information + own_information_).eval());
   Belief belief;
   belief.information = information - information * sum.solve(information);

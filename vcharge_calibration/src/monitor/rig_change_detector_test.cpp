@@ -16,8 +16,8 @@ constexpr double kDegree = 0.017453292519943295;
 constexpr double kPart_m = 10.0;
 constexpr double kFalseAlarmsPerKm = 1e-3;
 // Deviations of what a part of a drive says.
-constexpr double kShift_m = 0.01;
-constexpr double kTurn_rad = 0.0004;
+constexpr double kShift_m = 0.02;
+constexpr double kTurn_rad = 0.0008;
 
 CameraRig makeRig() {
   CameraRig rig;
@@ -33,7 +33,7 @@ class DrawnDrive {
  public:
   explicit DrawnDrive(uint32_t seed) : random_(seed), truth_(Eigen::VectorXd::Zero(RigDeviation::rowOf(3))) {
     sigmas_.resize(truth_.size());
-    sigmas_.head<3>() << 0.003, 0.005, 0.0002;
+    sigmas_.head<3>() << 0.006, 0.01, 0.0004;
     for (size_t i = 0; i < 3; ++i) {
       sigmas_.segment<6>(RigDeviation::rowOf(i)) << Eigen::Vector3d::Constant(kShift_m),
           Eigen::Vector3d::Constant(kTurn_rad);
@@ -52,7 +52,7 @@ class DrawnDrive {
     deviation.information = sigmas_.cwiseAbs2().cwiseInverse().asDiagonal();
     Eigen::VectorXd found = truth_;
     for (Eigen::Index i = 0; i < found.size(); ++i) {
-      found[i] += 2.0 * sigmas_[i] * noise_(random_);  // its images are less independent than it says
+      found[i] += sigmas_[i] * noise_(random_);
     }
     const double roll_rad = 0.002 * noise_(random_), pitch_rad = 0.002 * noise_(random_);
     for (size_t i = 0; i < 3; ++i) {

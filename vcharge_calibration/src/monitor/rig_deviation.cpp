@@ -23,6 +23,8 @@ constexpr double kOdometerPrior = 0.02;
 constexpr size_t kMinKeyframes = 5;
 /// Factor on the cost tolerance of the last adjustment: the cost depends only weakly on the extrinsics.
 constexpr double kFineToleranceFactor = 0.1;
+/// Factor on the variances of an adjustment, whose observations are not independent.
+constexpr double kDependence = 4.0;
 // Errors of the odometer's heading: per square root of a metre, and relative to the turn.
 constexpr double kTurnWalk_rad = 0.0006;
 constexpr double kTurnError = 0.003;
@@ -125,8 +127,9 @@ class PartAdjuster {
     if (!information.allFinite()) {
       return;
     }
-    const Eigen::VectorXd vector = information * deviationFrom(*rig_, *part_);
+    const Eigen::VectorXd vector = information * deviationFrom(*rig_, *part_) / kDependence;
     information.diagonal() -= priorInformation(rig_->cameras.size());
+    information /= kDependence;
     const TurnPerMetre turn = measureTurnPerMetre(*part_);
     result->information_vector << vector.head<kNumFactors>(), turn.mean_rad / turn.variance_rad2,
         vector.tail(of_cameras);

@@ -40,8 +40,7 @@ struct RigChange {
 /// time against no change. All hypotheses are tested at the same rate of false alarms, and a change is
 /// believed if it is certain without any single part of the drive, too.
 ///
-/// Each part of a drive adds an error of its own: its body leans, and its images are less independent than
-/// the adjustment takes them to be.
+/// Each part of a drive adds an error of its own, above all because the body leans.
 class RigChangeDetector {
  public:
   /// `false_alarms_per_km`: the rate that is accepted where nothing changes. A camera without covariance is
