@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "vcharge_calibration/report/monitor_report.h"
+#include "vcharge_calibration/report/rig_calibration_files.h"
 #include "vcharge_core/base/utc_time.h"
 #include "vcharge_core/files/file_io.h"
 
@@ -59,14 +60,7 @@ void writeRepairedRig(const RigMonitor& monitor, const RigRepair& repair,
   }
   provenance["evidence"] = evidence;
   provenance["date"] = utcNow();
-  CameraRig rig = *repair.rig;
-  rig.provenance = std::move(provenance);
-  for (const RigCamera& camera : rig.cameras) {
-    if (!camera.mask_file.empty()) {
-      createFolder((fs::path(path).parent_path() / camera.mask_file).parent_path().string());
-    }
-  }
-  writeCameraRig(rig, path);
+  writeRigWithMasks(*repair.rig, std::move(provenance), path);
 }
 
 }  // namespace vcharge

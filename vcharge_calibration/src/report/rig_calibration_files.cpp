@@ -1,6 +1,7 @@
 #include "vcharge_calibration/report/rig_calibration_files.h"
 
 #include <filesystem>
+#include <utility>
 
 #include "vcharge_calibration/report/rig_report.h"
 #include "vcharge_core/base/error.h"
@@ -21,6 +22,18 @@ void writeRigReport(const std::string& folder, const std::string& title, const R
   }
 }
 
+void writeRigWithMasks(CameraRig rig, std::map<std::string, std::string> provenance,
+                       const std::string& path) {
+  const fs::path folder = fs::path(path).parent_path();
+  for (const RigCamera& camera : rig.cameras) {
+    if (!camera.mask_file.empty()) {
+      createFolder((folder / camera.mask_file).parent_path().string());
+    }
+  }
+  rig.provenance = std::move(provenance);
+  writeCameraRig(rig, path);
+}
+
 void writeRigAndTrajectory(const std::string& rig_file, const std::string& trajectory_file,
                            const RigCalibration& result, const ReconstructionState& state,
                            const std::map<std::string, std::string>& provenance) {
@@ -28,15 +41,7 @@ void writeRigAndTrajectory(const std::string& rig_file, const std::string& traje
   if (!trajectory_file.empty()) {
     writeTrajectory(trajectoryOf(state), trajectory_file);
   }
-  const fs::path folder = fs::path(rig_file).parent_path();
-  for (const RigCamera& camera : result.rig->cameras) {
-    if (!camera.mask_file.empty()) {
-      createFolder((folder / camera.mask_file).parent_path().string());
-    }
-  }
-  CameraRig rig = *result.rig;
-  rig.provenance = provenance;
-  writeCameraRig(rig, rig_file);
+  writeRigWithMasks(*result.rig, provenance, rig_file);
 }
 
 }  // namespace vcharge

@@ -1,5 +1,5 @@
 """Watching a rig: alarms without a change, and what is told of knocked cameras, a tyre and a dirty lens, and when; the
-repaired rig beside a new calibration of the same drive."""
+errors of repaired cameras."""
 import argparse
 import math
 
@@ -13,7 +13,6 @@ from vcharge_evaluation.tools import CONFIG, judge_rig, run_tool_once, say
 
 PARTS = ("steady", "knocks", "tyre", "lens")
 AXES = ("forwards", "sideways", "height", "roll", "pitch", "yaw")
-TURN_PER_METRE = 2  # index of the odometer's deviations
 KNOCK_S = 40.0
 # Camera, axis, size (degrees), and the distance within which it must be found.
 KNOCKS = (("left", 1, 0.1, 200.0), ("front", 2, 0.5, 30.0), ("rear", 0, 0.2, 200.0))
@@ -36,11 +35,11 @@ def make_drive(args, scene_and_seed, *words):
                  "--image-scale", args.image_scale, *(["--duration-s", args.duration_s] if args.duration_s else []), *words)
 
 
-def monitor(made, rig, name):
+def monitor(made, rig):
     """The result of monitor_rig, and the folder that it wrote."""
-    folder = made.folder / name
-    say(f"{made.folder}: monitor_rig {name}")
-    return run_tool_once("monitor_rig", made.folder / f"{name}.log", "--bag", made.bag, "--rig", rig, "--output", folder,
+    folder = made.folder / "watched"
+    say(f"{made.folder}: monitor_rig")
+    return run_tool_once("monitor_rig", folder.with_suffix(".log"), "--bag", made.bag, "--rig", rig, "--output", folder,
                          "--calibration-options", CONFIG / "calibration.yaml", may_fail=True), folder
 
 
@@ -74,7 +73,7 @@ def steady(args, results):
         for condition in args.conditions:
             words = () if condition == "noon" else ("--set", f"condition.kind={condition}")
             made = make_drive(args, scene, *words)
-            run, _ = monitor(made, made.true_rig, "watched")
+            run, _ = monitor(made, made.true_rig)
             found = run.found
             alarms += len(found.get("changes", ["no result"]))
             distance_m += found.get("distance_m", 0.0)
@@ -98,7 +97,7 @@ def knocks(args, results):
             made = make_drive(args, scene, "--set", f"faults.bumped_camera.cameras=[{camera}]", "--set",
                               f"faults.bumped_camera.start_s={KNOCK_S}", "--set",
                               f"faults.bumped_camera.rotation_rad={turn}")
-            run, folder = monitor(made, made.truth / "rig_before.yaml", "watched")
+            run, folder = monitor(made, made.truth / "rig_before.yaml")
             changes = run.found.get("changes", [])
             moved = [change for change in changes if change.get("camera") == camera and change["main_axis"] == 3 + axis]
             right.append(bool(moved) and len(changes) == 1)
@@ -125,7 +124,7 @@ def tyre(args, results):
     for scene in args.scenes:
         made = make_drive(args, scene, "--set", "faults.wheel_slip.ratio=0.003", "--set",
                           f"faults.wheel_slip.start_s={KNOCK_S}")
-        run, _ = monitor(made, made.true_rig, "watched")
+        run, _ = monitor(made, made.true_rig)
         changes = run.found.get("changes", [])
         told = [change for change in changes if change["part"] == "odometer"]
         columns.append((scene, [
@@ -141,7 +140,7 @@ def lens(args, results):
     for scene in args.scenes:
         made = make_drive(args, scene, "--set", "faults.dirty_lens.cameras=[left]", "--set",
                           f"faults.dirty_lens.start_s={KNOCK_S}")
-        run, _ = monitor(made, made.true_rig, "watched")
+        run, _ = monitor(made, made.true_rig)
         remarks = run.found.get("remarks", [])
         columns.append((scene, [
             Figure("told", "; ".join(remarks) or "nothing"),

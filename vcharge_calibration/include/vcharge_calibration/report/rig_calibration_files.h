@@ -14,6 +14,9 @@ void writeRigReport(const std::string& folder, const std::string& title, const R
                     const ReconstructionState& state, const KeyframeImages& images,
                     const std::string& more_sections = "");
 
+/// Writes rig.yaml and its masks, whose folders are created, with this provenance.
+void writeRigWithMasks(CameraRig rig, std::map<std::string, std::string> provenance, const std::string& path);
+
 /// Writes the trajectory (*.tum, unless empty), then rig.yaml, each atomically. InputError names a file that
 /// cannot be written. Must not be called for kFail.
 void writeRigAndTrajectory(const std::string& rig_file, const std::string& trajectory_file,
