@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "vcharge_core/base/error.h"
@@ -95,7 +96,9 @@ RangeMap RangeMapReader::read(const RangeMapParts& parts) {
 
 RangeMapSubscriber::RangeMapSubscriber(ros::NodeHandle* node, const std::string& topic, uint32_t queue_size,
                                        CallbackGuard* guard, Callback callback)
-    : guard_(guard), callback_(std::move(callback)) {
+    : guard_(guard),
+      callback_(std::move(callback)),
+      max_incomplete_(queue_size > 0 ? kMaxIncomplete : std::numeric_limits<size_t>::max()) {
   subscribe<sensor_msgs::Image>(node, topic + "/image", queue_size, &RangeMapParts::range);
   subscribe<sensor_msgs::Image>(node, topic + "/standard_deviation", queue_size,
                                 &RangeMapParts::standard_deviation);
@@ -113,9 +116,10 @@ void RangeMapSubscriber::subscribe(ros::NodeHandle* node, const std::string& top
     parts.*part = message;
     if (parts.complete()) {
       guard_->run([&] { callback_(parts); });
-      incomplete_.erase(message->header.stamp);
+      // Each topic keeps its order: what earlier stamps lack does not come any more.
+      incomplete_.erase(incomplete_.begin(), incomplete_.upper_bound(message->header.stamp));
     }
-    while (incomplete_.size() > kMaxIncomplete) {
+    while (incomplete_.size() > max_incomplete_) {
       incomplete_.erase(incomplete_.begin());
     }
   };

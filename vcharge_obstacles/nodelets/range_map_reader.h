@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <map>
 #include <optional>
@@ -44,13 +45,15 @@ class RangeMapReader {
   sensor_msgs::CameraInfo expected_;
 };
 
-/// Subscribes to the topics of one camera and calls back when all parts of a stamp have arrived. Stamps
-/// that stay incomplete are dropped, oldest first.
+/// Subscribes to the topics of one camera and calls back when all parts of a stamp have arrived. A stamp is
+/// dropped if a later one is complete before it, or, with a limited queue, if too many later ones wait too:
+/// a busy receiver reads some topics far ahead of others.
 class RangeMapSubscriber {
  public:
   using Callback = std::function<void(const RangeMapParts&)>;
 
-  /// `topic`: the common prefix of the parts' topics. The guard must outlive this object.
+  /// `topic`: the common prefix of the parts' topics. With queue_size = 0 any number of stamps waits. The
+  /// guard must outlive this object.
   RangeMapSubscriber(ros::NodeHandle* node, const std::string& topic, uint32_t queue_size,
                      CallbackGuard* guard, Callback callback);
 
@@ -61,6 +64,7 @@ class RangeMapSubscriber {
 
   CallbackGuard* const guard_;
   const Callback callback_;
+  const size_t max_incomplete_;
   std::map<ros::Time, RangeMapParts> incomplete_;
   std::vector<ros::Subscriber> subscribers_;
 };
