@@ -14,6 +14,7 @@
 #include "vcharge_core/base/utc_time.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_mapping/map_file_update.h"
+#include "vcharge_mapping/session_limit.h"
 #include "vcharge_mapping/session_merger.h"
 #include "vcharge_reconstruction/tiled_map.h"
 
@@ -26,6 +27,7 @@ struct Arguments {
   std::string map, output, options;
   std::vector<std::string> sessions;
   int max_versions = kMaxMapVersions;
+  int max_sessions_per_place = 4;
   bool requires_overlap = false;
   bool show_options = false;
 };
@@ -87,6 +89,7 @@ void mergeMaps(const Arguments& arguments, const MergeOptions& options, nlohmann
   }
   StageBars bars;
   (*found)["sessions"] = nlohmann::json::array();
+  size_t num_removed = 0;
   for (size_t i = 0; i < arguments.sessions.size(); ++i) {
     const std::string& path = arguments.sessions[i];
     const std::shared_ptr<const SparseMap> session = readMapWithSessions(path);
@@ -103,7 +106,8 @@ void mergeMaps(const Arguments& arguments, const MergeOptions& options, nlohmann
     if (i == 0 && !in_place) {
       copyLocked(arguments.map, arguments.output, &lock);
     }
-    map = merged.map;
+    map = limitSessionsPerPlace(*merged.map, arguments.max_sessions_per_place);
+    num_removed += merged.map->keyframes().size() - map->keyframes().size();
     const int64_t version =
         addMapVersion(*map,
                       {{"bag", session->sessions().front().name},
@@ -121,10 +125,12 @@ void mergeMaps(const Arguments& arguments, const MergeOptions& options, nlohmann
   found->update({{"num_sessions", map->sessions().size()},
                  {"num_components", components.size()},
                  {"num_keyframes", map->keyframes().size()},
+                 {"num_removed_keyframes", num_removed},
                  {"num_landmarks", map->landmarks().size()},
                  {"content_hash", map->contentHash()}});
   std::cout << "sessions: " << map->sessions().size() << " in " << components.size()
-            << " components, keyframes: " << map->keyframes().size()
+            << " components, keyframes: " << map->keyframes().size() << " (" << num_removed
+            << " removed at places of many drives)"
             << ", landmarks: " << map->landmarks().size() << "\ncontent hash: " << map->contentHash() << "\n";
 }
 
@@ -147,13 +153,17 @@ int main(int argc, char** argv) {
   app.add_option("--max-versions", arguments.max_versions, "versions that the file keeps")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  app.add_option("--max-sessions-per-place", arguments.max_sessions_per_place,
+                 "drives that the map keeps of a place: the newest, and those in the most different light")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_flag("--require-overlap", arguments.requires_overlap, "refuse a drive without common places");
   app.add_option("--options", arguments.options, "YAML with overrides of MergeOptions");
   addShowOptions(&app, &arguments.show_options);
   app.footer(
       "Keys of --json: sessions (session, joined, remark, num_accepted_loops, num_undecided_loops, "
       "num_rejected_loops, common_ratio, chance_ratio, rms_px), num_sessions, num_components, num_keyframes, "
-      "num_landmarks, content_hash.");
+      "num_removed_keyframes, num_landmarks, content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     MergeOptions options;
     if (!arguments.options.empty()) {

@@ -5,18 +5,22 @@ import shutil
 import sqlite3
 
 import numpy as np
+import rosbag
+import rospy
 
 from vcharge_evaluation.drives import Drive
 from vcharge_evaluation.localization_errors import BOUND_M, LocalizationErrors, Map
 from vcharge_evaluation.poses import at_stamps
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure
-from vcharge_evaluation.tools import CONFIG, run_tool, run_tool_once, say
+from vcharge_evaluation.tools import CONFIG, build_map, run_tool, run_tool_once, say
 
 OTHER_DAY = ("--drive", "other_day_beside", "--exposure-gain", 1.2)
 DUSK, NIGHT = ("--set", "condition.kind=dusk"), ("--set", "condition.kind=night")
 STARTS = ("--forget-every", 10)
 FRAMES_WITHIN_5_M = 40  # at 1.5 m/s and 12.5 Hz
-PARTS = ("days", "exchanged", "night", "summary", "other", "large")
+PARTS = ("days", "exchanged", "night", "summary", "merges", "other", "large")
+# Parts of a drive that are mapped as sessions of their own, as fractions of its time.
+STRETCHES = ((0.0, 0.4), (0.2, 0.6), (0.4, 0.8), (0.6, 1.0))
 
 
 def arguments():
@@ -202,6 +206,46 @@ def summary(lot, results):
     results.add(f"Summaries, lot {lot.seed}, image scale {lot.args.image_scale:g}", *columns)
 
 
+class Stretch:
+    """A part of a drive and its map."""
+
+    def __init__(self, made, number):
+        self.folder, self.trajectory = made.folder / f"stretch_{number}", made.trajectory
+        self.folder.mkdir(exist_ok=True)
+        bag_path = self.folder / "drive.bag"
+        with rosbag.Bag(str(made.bag)) as bag, rosbag.Bag(str(bag_path), "w") as output:
+            start_s, end_s = bag.get_start_time(), bag.get_end_time()
+            window = [rospy.Time.from_sec(start_s + fraction * (end_s - start_s)) for fraction in STRETCHES[number]]
+            for topic, message, stamp in bag.read_messages(start_time=window[0], end_time=window[1], raw=True):
+                output.write(topic, message, stamp, raw=True)
+        build_map(self.folder, "map", rig=made.true_rig)
+        bag_path.unlink()
+
+
+def merges(lot, results):
+    """Twenty sessions of five drives, one after the other: of two days, a dusk and two nights, each in stretches."""
+    path = lot.folder("merges") / "living.vmap"
+    sessions, joined, runs = [lot.first()], [], []
+    shutil.copy(sessions[0].folder / "map.vmap", path)
+    for made in (lot.other(1), lot.other(50, exchanged=1.0), lot.other(70, *DUSK), lot.other(71, *NIGHT), lot.other(72, *NIGHT)):
+        for number in range(len(STRETCHES)):
+            sessions.append(Stretch(made, number))
+            say(f"{path}: merging {sessions[-1].folder}")
+            runs.append(run_tool("merge_maps", path.parent / f"merge_{len(runs)}.log", "--map", path, "--session",
+                                 sessions[-1].folder / "map.vmap", "--output", path, "--max-versions", 2))
+            joined.append(runs[-1].found["sessions"][0]["joined"])
+    # The first half fills the map: after it, every place has as many drives as the map keeps.
+    half = len(runs) // 2
+    memory_gb = [max(run.peak_gb for run in part) for part in (runs[:half], runs[half:])]
+    mapped = LivingMap(path, sessions)
+    results.add(f"Many sessions merged, image scale {lot.args.image_scale:g}", (f"lot {lot.seed}", [
+        figure("sessions joined, of 20", sum(joined), equal=len(runs)), *mapped.figures(),
+        Figure("memory, most, first half", memory_gb[0], "GB"),
+        figure("memory, most, second half over first", memory_gb[1] / memory_gb[0], at_most=1.1),
+        Figure("time of a merge, median", float(np.median([run.wall_s for run in runs])), "s"),
+        *localization_figures(localize(lot.other(73, *NIGHT), mapped, "in_merged_map"), 98, 2.5)]))
+
+
 def other_car_park(lot, results):
     """A drive of another car park must be kept apart."""
     other = Lot(lot.args, lot.seed + 1).first()
@@ -243,7 +287,8 @@ def main():
     args = arguments()
     args.work.mkdir(parents=True, exist_ok=True)
     results = Results("living_map", "Living maps", args)
-    steps = {"days": days, "exchanged": exchanged, "night": night, "summary": summary, "other": other_car_park, "large": large}
+    steps = {"days": days, "exchanged": exchanged, "night": night, "summary": summary, "merges": merges,
+             "other": other_car_park, "large": large}
     for seed in args.seeds:
         for part in args.parts:
             steps[part](Lot(args, seed), results)
