@@ -33,9 +33,10 @@ struct SummaryMap {
 
 /// A map with as few landmarks as localization needs: at each keyframe, the covariance of a pose from the
 /// landmarks in view stays below a bound, and another drive finds enough of them. Landmarks are chosen
-/// greedily by how much they reduce the variances of the positions (their logarithms, so that all keyframes
-/// count alike), over all keyframes that observe them, each weighted by the probability that another drive
-/// finds it: landmarks that several drives have seen count more. Ids stay. Deterministic.
+/// greedily by how much they reduce the variances of the positions and raise the numbers of landmarks found
+/// (their logarithms, so that all keyframes count alike), over all keyframes that observe them, each weighted
+/// by the probability that another drive finds it: what several drives, or one over a long way, have seen
+/// counts more. Ids stay. Deterministic.
 SummaryMap summarizeMap(const SparseMap& map, const SummaryOptions& options);
 
 }  // namespace vcharge

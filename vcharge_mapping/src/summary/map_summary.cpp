@@ -7,6 +7,7 @@
 #include <vector>
 
 #include <tbb/parallel_for.h>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include "update/reduced_map.h"
@@ -21,10 +22,16 @@ using Matrix36d = Eigen::Matrix<double, 3, 6>;
 /// A pose is known that well without any landmark; keeps the information regular.
 constexpr double kPriorSigma_m = 1.0;
 constexpr double kPriorSigma_rad = 0.2;
-/// A landmark that only one drive saw is found by another one with a probability of a quarter.
-constexpr double kUnconfirmedLogOdds = -1.0;
+// The logarithm of the odds that another drive finds a landmark which one drive saw over an extent e (the
+// diagonal of the box around its positions) is kFoundLogOdds + kFoundSlope * log(e + kMinExtent_m), and the
+// evidence of more drives is added. Fitted to which landmarks of three simulated lots another day's drive
+// found: 4 % of those seen over 1 m, 70 % of those seen over 15 m.
+constexpr double kFoundLogOdds = -4.1, kFoundSlope = 1.6, kMinExtent_m = 0.5;
 /// Deviation of an observed direction.
 constexpr double kRaySigma_rad = 0.002;
+/// How much the number of landmarks found counts beside the variance: the pose is found without a prior only
+/// by many of them, and near ones, which tell most of the position, are few.
+constexpr double kNumberWeight = 0.1;
 
 /// A landmark in an image: its part of the information of the keyframe's pose is jacobian^T jacobian.
 struct View {
@@ -49,9 +56,10 @@ class LandmarkChooser {
     covariance_.assign(map.keyframes().size(), prior.inverse());
     std::vector<Matrix6d> all = information_;
     for (size_t l = 0; l < map.landmarks().size(); ++l) {
+      const double found = foundProbability(l);
       const auto [begin, end] = map.observationsOfLandmark(l);
       for (const int32_t* i = begin; i != end; ++i) {
-        views_[l].push_back(viewOf(map.observations()[*i]));
+        views_[l].push_back(viewOf(map.observations()[*i], found));
         const View& view = views_[l].back();
         all[view.keyframe] += view.jacobian.transpose() * view.jacobian;
         found_of_all_[view.keyframe] += view.found;
@@ -107,7 +115,20 @@ class LandmarkChooser {
     return std::sqrt(covariance.topLeftCorner<3, 3>().trace());
   }
 
-  View viewOf(const MapObservation& observation) const {
+  /// That another drive finds a landmark.
+  double foundProbability(size_t landmark) const {
+    Eigen::AlignedBox3d seen_from;
+    const auto [begin, end] = map_.observationsOfLandmark(landmark);
+    for (const int32_t* i = begin; i != end; ++i) {
+      seen_from.extend(map_.keyframes()[map_.observations()[*i].keyframe].map_from_vehicle.translation());
+    }
+    const double extent_m = begin == end ? 0.0 : seen_from.diagonal().norm();
+    const double log_odds = kFoundLogOdds + kFoundSlope * std::log(extent_m + kMinExtent_m) +
+                            map_.landmarks()[landmark].presence_log_odds;
+    return 1.0 / (1.0 + std::exp(-log_odds));
+  }
+
+  View viewOf(const MapObservation& observation, double found) const {
     const MapKeyframe& keyframe = map_.keyframes()[observation.keyframe];
     const MapLandmark& landmark = map_.landmarks()[observation.landmark];
     const Eigen::Vector3d in_vehicle = keyframe.map_from_vehicle.inverse() * landmark.position_m;
@@ -122,7 +143,7 @@ class LandmarkChooser {
         kRaySigma_rad * kRaySigma_rad + landmark.covariance_m2.trace() / 3.0 / (range_m * range_m);
     View view;
     view.keyframe = observation.keyframe;
-    view.found = 1.0 / (1.0 + std::exp(-landmark.presence_log_odds - kUnconfirmedLogOdds));
+    view.found = found;
     view.jacobian = std::sqrt(view.found / variance_rad2) / range_m *
                     (Eigen::Matrix3d::Identity() - ray * ray.transpose()) * motion;
     return view;
@@ -133,7 +154,8 @@ class LandmarkChooser {
            positionSigma_m(covariance_[keyframe]) <= options_.max_sigma_factor * sigma_of_all_m_[keyframe];
   }
 
-  /// How much the logarithm of the positions' variances shrinks where there are not enough landmarks yet.
+  /// How much the logarithms of the positions' variances shrink, and those of the numbers of landmarks found
+  /// grow, where there are not enough landmarks yet.
   double gainOf(size_t landmark) const {
     double gain = 0.0;
     for (const View& view : views_[landmark]) {
@@ -145,7 +167,8 @@ class LandmarkChooser {
         const double variance_m2 = covariance.topLeftCorner<3, 3>().trace();
         const double shrunk_m2 =
             (cross.topRows<3>() * innovation.inverse() * cross.topRows<3>().transpose()).trace();
-        gain += std::log(variance_m2 / (variance_m2 - shrunk_m2));
+        gain += std::log(variance_m2 / (variance_m2 - shrunk_m2)) +
+                kNumberWeight * std::log1p(view.found / (1.0 + found_[view.keyframe]));
       }
     }
     return gain;

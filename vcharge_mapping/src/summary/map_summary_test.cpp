@@ -1,5 +1,8 @@
 #include "vcharge_mapping/map_summary.h"
 
+#include <utility>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "testing/world_drives.h"
@@ -27,7 +30,7 @@ TEST(MapSummaryTest, KeepsEnoughLandmarksAtEachPlaceOrNoMoreThanAsked) {
   const auto map = testing::makeWorld(1);
   SummaryOptions options;
   options.max_sigma_factor = 10.0;
-  options.min_found_per_place = 10.0;  // a quarter of those that only one drive saw
+  options.min_found_per_place = 10.0;  // as expected: another drive does not find all of them
   const SummaryMap summary = summarizeMap(*map, options);
   for (size_t k = 0; k < summary.map->keyframes().size(); ++k) {
     const size_t num_kept =
@@ -55,6 +58,31 @@ TEST(MapSummaryTest, PrefersLandmarksThatAreStillThere) {
   }
   EXPECT_GT(num_present, static_cast<int>(summary.report.num_landmarks) * 3 / 4);
   EXPECT_EQ(summarizeMap(SparseMap(contents), options).map->contentHash(), summary.map->contentHash());
+}
+
+// Most of what a drive saw over a short way only, another drive does not find: more of it must be kept.
+TEST(MapSummaryTest, ExpectsLittleOfLandmarksThatWereSeenOverAShortWay) {
+  const auto world = testing::makeWorld(1);
+  SparseMapContents contents = world->contents();
+  contents.observations.clear();
+  contents.descriptors = cv::Mat();
+  std::vector<int32_t> first_of(world->landmarks().size(), -1);
+  for (size_t i = 0; i < world->observations().size(); ++i) {
+    const MapObservation& observation = world->observations()[i];
+    int32_t& first = first_of[observation.landmark];
+    first = first < 0 ? observation.keyframe : first;
+    if (observation.keyframe - first < 2) {
+      contents.observations.push_back(observation);
+      contents.descriptors.push_back(world->descriptors().row(static_cast<int>(i)));
+    }
+  }
+  SummaryOptions options;
+  options.max_sigma_factor = 10.0;
+  options.min_found_per_place = 2.0;
+  const auto num_observations = [&](const SparseMap& map) {
+    return summarizeMap(map, options).map->observations().size();
+  };
+  EXPECT_GT(num_observations(SparseMap(contents)), 3 * num_observations(*world) / 2);
 }
 
 }  // namespace
