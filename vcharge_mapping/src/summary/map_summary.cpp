@@ -115,7 +115,7 @@ class LandmarkChooser {
     return std::sqrt(covariance.topLeftCorner<3, 3>().trace());
   }
 
-  /// That another drive finds a landmark.
+  /// Probability that another drive finds a landmark.
   double foundProbability(size_t landmark) const {
     Eigen::AlignedBox3d seen_from;
     const auto [begin, end] = map_.observationsOfLandmark(landmark);
