@@ -106,7 +106,7 @@ void mergeMaps(const Arguments& arguments, const MergeOptions& options, nlohmann
     if (i == 0 && !in_place) {
       copyLocked(arguments.map, arguments.output, &lock);
     }
-    map = limitSessionsPerPlace(*merged.map, arguments.max_sessions_per_place);
+    map = limitSessionsPerPlace(merged.map, arguments.max_sessions_per_place);
     num_removed += merged.map->keyframes().size() - map->keyframes().size();
     const int64_t version =
         addMapVersion(*map,

@@ -52,7 +52,7 @@ UpdatedMap updateMap(const SparseMap& map, const SparseMap& session, const Updat
   const std::vector<bool> keeps_landmark = weighLandmarks(*merged.map, &contents, &result.report);
   const auto present = reducedMap(SparseMap(std::move(contents)),
                                   std::vector<bool>(merged.map->keyframes().size(), true), keeps_landmark);
-  result.map = limitSessionsPerPlace(*present, options.max_sessions_per_place);
+  result.map = limitSessionsPerPlace(present, options.max_sessions_per_place);
   result.report.num_removed_keyframes =
       static_cast<int64_t>(present->keyframes().size() - result.map->keyframes().size());
   result.report.num_forgotten_landmarks =

@@ -101,10 +101,14 @@ class PlaceKeeper {
 
 }  // namespace
 
-std::shared_ptr<const SparseMap> limitSessionsPerPlace(const SparseMap& map, int max_sessions_per_place) {
+std::shared_ptr<const SparseMap> limitSessionsPerPlace(const std::shared_ptr<const SparseMap>& map,
+                                                       int max_sessions_per_place) {
   check(max_sessions_per_place >= 1, "limitSessionsPerPlace: expected at least one session");
-  return reducedMap(map, PlaceKeeper(map, max_sessions_per_place).neededKeyframes(),
-                    std::vector<bool>(map.landmarks().size(), true));
+  const std::vector<bool> needed = PlaceKeeper(*map, max_sessions_per_place).neededKeyframes();
+  if (std::find(needed.begin(), needed.end(), false) == needed.end()) {
+    return map;
+  }
+  return reducedMap(*map, needed, std::vector<bool>(map->landmarks().size(), true));
 }
 
 }  // namespace vcharge

@@ -40,14 +40,14 @@ class SessionLimitTest : public ::testing::Test {
 
 TEST_F(SessionLimitTest, KeepsAMapOfFewSessionsAsItIs) {
   const auto map = merge(*drive(0, false), *drive(1, false));
-  EXPECT_EQ(limitSessionsPerPlace(*map, 2)->contentHash(), map->contentHash());
+  EXPECT_EQ(limitSessionsPerPlace(map, 2)->contentHash(), map->contentHash());
 }
 
 TEST_F(SessionLimitTest, KeepsTheNewestSessionAndAnotherLight) {
   auto map = merge(*drive(0, true), *drive(1, false));
   map = merge(*map, *drive(2, false));
   ASSERT_EQ(map->sessions().back().component, 0);
-  const auto limited = limitSessionsPerPlace(*map, 2);
+  const auto limited = limitSessionsPerPlace(map, 2);
   EXPECT_EQ(sessionsOf(*limited), (std::set<std::string>{"night 0", "day 2"}));
 }
 
@@ -55,7 +55,7 @@ TEST_F(SessionLimitTest, KeepsWhatOnlyOneSessionShows) {
   const auto half = testing::driveThrough(*world_, "half", 1, RigidTransform(),
                                           [](int i) { return i % 2 == 1 && i < testing::kNumKeyframes / 2; });
   const auto map = merge(*drive(0, false), *half);
-  const auto limited = limitSessionsPerPlace(*map, 1);
+  const auto limited = limitSessionsPerPlace(map, 1);
   int num_of_first = 0;
   for (const MapKeyframe& keyframe : limited->keyframes()) {
     num_of_first += keyframe.session == 0 ? 1 : 0;
@@ -68,7 +68,7 @@ TEST_F(SessionLimitTest, ManyMergesDoNotGrowTheMap) {
   auto map = drive(0, false);
   size_t size_of_two = 0;
   for (int i = 1; i <= 6; ++i) {
-    map = limitSessionsPerPlace(*merge(*map, *drive(i, false)), 2);
+    map = limitSessionsPerPlace(merge(*map, *drive(i, false)), 2);
     size_of_two = i == 1 ? map->observations().size() : size_of_two;
     EXPECT_LE(map->observations().size(), 11 * size_of_two / 10) << i;
   }

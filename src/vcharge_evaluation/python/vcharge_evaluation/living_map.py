@@ -234,14 +234,14 @@ def merges(lot, results):
             runs.append(run_tool("merge_maps", path.parent / f"merge_{len(runs)}.log", "--map", path, "--session",
                                  sessions[-1].folder / "map.vmap", "--output", path, "--max-versions", 2))
             joined.append(runs[-1].found["sessions"][0]["joined"])
-    # The first half fills the map: after it, every place has as many drives as the map keeps.
-    half = len(runs) // 2
-    memory_gb = [max(run.peak_gb for run in part) for part in (runs[:half], runs[half:])]
+    # With three more drives than the first, every place has as many as the map keeps.
+    filling = 3 * len(STRETCHES)
+    memory_gb = [max(run.peak_gb for run in part) for part in (runs[:filling], runs[filling:])]
     mapped = LivingMap(path, sessions)
     results.add(f"Many sessions merged, image scale {lot.args.image_scale:g}", (f"lot {lot.seed}", [
         figure("sessions joined, of 20", sum(joined), equal=len(runs)), *mapped.figures(),
-        Figure("memory, most, first half", memory_gb[0], "GB"),
-        figure("memory, most, second half over first", memory_gb[1] / memory_gb[0], at_most=1.1),
+        Figure("memory, most, until four drives are in", memory_gb[0], "GB"),
+        figure("the same, later over earlier", memory_gb[1] / memory_gb[0], at_most=1.1),
         Figure("time of a merge, median", float(np.median([run.wall_s for run in runs])), "s"),
         *localization_figures(localize(lot.other(73, *NIGHT), mapped, "in_merged_map"), 98, 2.5)]))
 
