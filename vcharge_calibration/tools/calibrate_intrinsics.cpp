@@ -117,7 +117,7 @@ void calibrate(const Arguments& arguments, const vcharge::IntrinsicCalibrationOp
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  vcharge::CommandLine app(
       "Calibrates the intrinsics of a camera from images of a chessboard or an AprilGrid, in a folder or a "
       "bag, and writes them as a rig.yaml without extrinsics. Prints every parameter with its standard "
       "deviation, the images left out and why, and a verdict: PASS, WARN with what is missing, or FAIL, "
@@ -125,36 +125,36 @@ int main(int argc, char** argv) {
       "writes no rig.yaml.");
   Arguments arguments;
   vcharge::IntrinsicCalibrationOptions options;
-  auto* images = app.add_option("--images", arguments.images, "folder of images");
-  auto* bag = app.add_option("--bag", arguments.bag, "bag with the camera's images");
-  images->excludes(bag);
-  app.add_option("--topic", arguments.topic,
-                 "topic of the images in the bag; default: /camera/CAMERA/image_raw")
-      ->needs(bag);
-  app.add_option("--max-images", arguments.max_images, "number of images taken from the bag, evenly spread")
-      ->needs(bag)
-      ->check(CLI::Range(1, 10000))
-      ->capture_default_str();
-  app.add_option("--board", arguments.board, "inner corners of the chessboard, COLUMNSxROWS")
-      ->capture_default_str();
-  app.add_option("--square_m,--square-m", arguments.square_m, "side of a square")->capture_default_str();
-  app.add_option("--target", arguments.target,
-                 "Kalibr's target YAML (aprilgrid, checkerboard), instead of --board");
-  app.add_option("--camera", arguments.output.camera_name, "name of the camera")->capture_default_str();
-  app.add_option("--model", options.model, "mei, kannala_brandt or pinhole")->capture_default_str();
-  app.add_option("--options", arguments.options, "YAML with other options of the calibration");
-  app.add_option("--field-of-view-rad", arguments.output.field_of_view_rad,
-                 "full field of view; 0: as far as corners were detected")
-      ->capture_default_str()
-      ->check(CLI::Range(0.0, 6.28));
-  app.add_option("--output", arguments.output.rig_file, "rig.yaml to write")
-      ->required()
-      ->check(vcharge::requireOutput);
-  app.add_flag("--keep-others", arguments.output.keep_others,
-               "keep the other cameras of an existing rig.yaml");
-  app.add_option("--report", arguments.output.report_file, "HTML report to write")
-      ->check(vcharge::requireOutput);
-  app.footer(
+  auto images = app.addOption("--images", &arguments.images, "folder of images");
+  const auto bag = app.addOption("--bag", &arguments.bag, "bag with the camera's images");
+  images.excludes(bag);
+  app.addOption("--topic", &arguments.topic,
+                "topic of the images in the bag; default: /camera/CAMERA/image_raw")
+      .needs(bag);
+  app.addOption("--max-images", &arguments.max_images, "number of images taken from the bag, evenly spread")
+      .needs(bag)
+      .inRange(1, 10000)
+      .showDefault();
+  app.addOption("--board", &arguments.board, "inner corners of the chessboard, COLUMNSxROWS").showDefault();
+  app.addOption("--square_m,--square-m", &arguments.square_m, "side of a square").showDefault();
+  app.addOption("--target", &arguments.target,
+                "Kalibr's target YAML (aprilgrid, checkerboard), instead of --board");
+  app.addOption("--camera", &arguments.output.camera_name, "name of the camera").showDefault();
+  const auto model_option =
+      app.addOption("--model", &options.model, "mei, kannala_brandt or pinhole").showDefault();
+  app.addOption("--options", &arguments.options, "YAML with other options of the calibration");
+  app.addOption("--field-of-view-rad", &arguments.output.field_of_view_rad,
+                "full field of view; 0: as far as corners were detected")
+      .showDefault()
+      .inRange(0.0, 6.28);
+  app.addOption("--output", &arguments.output.rig_file, "rig.yaml to write")
+      .required()
+      .check(vcharge::requireOutput);
+  app.addFlag("--keep-others", &arguments.output.keep_others,
+              "keep the other cameras of an existing rig.yaml");
+  app.addOption("--report", &arguments.output.report_file, "HTML report to write")
+      .check(vcharge::requireOutput);
+  app.setFooter(
       "Keys of --json: verdict (PASS, WARN, FAIL), remarks, num_images, rejected (name, reason), parameters "
       "and standard_deviations (by name), rms_px (per coordinate), mean_error_px, cross_validated_px, "
       "covered_ratio, max_angle_rad, bending_m and flat_rms_px (where the board bends).");
@@ -169,7 +169,7 @@ int main(int argc, char** argv) {
     if (!arguments.options.empty()) {
       const std::string model = options.model;
       vcharge::readFieldsFromFile(arguments.options, &options);
-      if (app.count("--model") > 0) {
+      if (model_option.isGiven()) {
         options.model = model;
       }
     }

@@ -31,7 +31,7 @@ void calibrate(const RigToolArguments& arguments, const std::string& map_file,
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Calibrates the extrinsics of a rig from a drive with images, /odom and intrinsics, without an "
       "initial estimate, overlap or a board. Drive 100 m or more with turns to both sides and revisit "
       "places, best a "
@@ -40,7 +40,7 @@ int main(int argc, char** argv) {
   RigToolArguments arguments;
   addRigToolArguments(&app, &arguments);
   std::string map_file;
-  app.add_option("--map", map_file, "sparse map to write (.vmap)")->check(requireOutput);
+  app.addOption("--map", &map_file, "sparse map to write (.vmap)").check(requireOutput);
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     arguments.found = found;
     runWithOptions<RigCalibratorOptions>(

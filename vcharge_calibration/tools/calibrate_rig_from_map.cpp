@@ -30,7 +30,7 @@ void calibrate(const RigToolArguments& arguments, const std::string& map_file,
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Calibrates the extrinsics of a rig from a drive in a finished map of any car, with images, /odom and "
       "intrinsics, without an initial estimate, overlap, a board or loops. Drive some turns to both sides. "
       "The map "
@@ -40,9 +40,9 @@ int main(int argc, char** argv) {
   RigToolArguments arguments;
   addRigToolArguments(&app, &arguments);
   std::string map_file;
-  app.add_option("--map", map_file, "map of build_map or calibrate_rig (.vmap)")
-      ->required()
-      ->check(requireNotEmpty);
+  app.addOption("--map", &map_file, "map of build_map or calibrate_rig (.vmap)")
+      .required()
+      .check(requireNotEmpty);
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     arguments.found = found;
     runWithOptions<MapRigCalibratorOptions>(

@@ -58,14 +58,14 @@ nlohmann::json toJson(const vcharge::RigComparison& comparison) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  vcharge::CommandLine app(
       "Compares the extrinsics of two rigs camera by camera (axes of the vehicle), the second relative to "
       "the "
       "first, and tells which differences exceed their standard deviations.");
   std::string first, second;
-  app.add_option("first", first, "rig.yaml")->required();
-  app.add_option("second", second, "rig.yaml")->required();
-  app.footer(
+  app.addOption("first", &first, "rig.yaml").required();
+  app.addOption("second", &second, "rig.yaml").required();
+  app.setFooter(
       "Keys of --json: cameras (name, difference of translation (m) and rotation (rad), and where "
       "covariances "
       "are known is_significant and chi_square), only_first, only_second.");

@@ -46,23 +46,23 @@ void convert(const Arguments& arguments, nlohmann::json* found) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  vcharge::CommandLine app(
       "Converts intrinsics between rig.yaml, Kalibr's camchain and CamOdoCal's files, and between camera "
       "models, "
       "and prints their difference in pixels. The input's format is detected from its content.");
   Arguments arguments;
-  app.add_option("--input", arguments.input, "rig.yaml, camchain.yaml or CamOdoCal's camera.yaml")
-      ->required();
-  app.add_option("--format", arguments.format, "format of the output: rig, kalibr or camodocal")
-      ->capture_default_str();
-  app.add_option("--model", arguments.model, "mei, kannala_brandt or pinhole; default: unchanged");
-  app.add_option("--camera", arguments.camera, "only this camera; default: all");
-  app.add_option("--field-of-view-rad", arguments.field_of_view_rad,
-                 "full angle, for files that have none (Kalibr, CamOdoCal)")
-      ->capture_default_str()
-      ->check(CLI::Range(0.1, 2.0 * kPi));
-  app.add_option("--output", arguments.output, "file to write")->required()->check(vcharge::requireOutput);
-  app.footer("Keys of --json: cameras that changed model (name, from, to, rms_px, max_px, covered_ratio).");
+  app.addOption("--input", &arguments.input, "rig.yaml, camchain.yaml or CamOdoCal's camera.yaml").required();
+  app.addOption("--format", &arguments.format, "format of the output: rig, kalibr or camodocal")
+      .showDefault();
+  app.addOption("--model", &arguments.model, "mei, kannala_brandt or pinhole; default: unchanged");
+  app.addOption("--camera", &arguments.camera, "only this camera; default: all");
+  app.addOption("--field-of-view-rad", &arguments.field_of_view_rad,
+                "full angle, for files that have none (Kalibr, CamOdoCal)")
+      .showDefault()
+      .inRange(0.1, 2.0 * kPi);
+  app.addOption("--output", &arguments.output, "file to write").required().check(vcharge::requireOutput);
+  app.setFooter(
+      "Keys of --json: cameras that changed model (name, from, to, rms_px, max_px, covered_ratio).");
   return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (!arguments.model.empty()) {
       vcharge::CameraModel::parameterNames(arguments.model);

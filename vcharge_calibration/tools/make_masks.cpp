@@ -99,27 +99,27 @@ void makeMasks(const Arguments& arguments, const BodyMaskOptions& options, nlohm
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Finds the pixels of each camera that show the body of the own car, from a drive of 20 m or more with "
       "turns, and writes the rig with masks, which are 0 there. The rig needs intrinsics, but no extrinsics. "
       "Masks of the given rig are replaced. Prints a verdict for each camera: PASS, WARN with a reason, or "
       "FAIL, which writes no rig.");
   Arguments arguments;
   bool show_options = false;
-  app.add_option("--bag", arguments.bag, "drive with images and /odom")->required();
-  app.add_option("--rig", arguments.rig, "rig.yaml with intrinsics")->required();
-  app.add_option("--output", arguments.output,
-                 "rig.yaml to write, with masks beside it; may be that of --rig")
-      ->required()
-      ->check(requireOutput);
-  app.add_option(
-         "--report", arguments.report,
+  app.addOption("--bag", &arguments.bag, "drive with images and /odom").required();
+  app.addOption("--rig", &arguments.rig, "rig.yaml with intrinsics").required();
+  app.addOption("--output", &arguments.output,
+                "rig.yaml to write, with masks beside it; may be that of --rig")
+      .required()
+      .check(requireOutput);
+  app.addOption(
+         "--report", &arguments.report,
          "folder for a picture of each camera: mean image with the body in red and dirt in blue; static "
          "edges; moving structure")
-      ->check(requireOutputFolder);
-  app.add_option("--options", arguments.options, "YAML with options");
+      .check(requireOutputFolder);
+  app.addOption("--options", &arguments.options, "YAML with options");
   addShowOptions(&app, &show_options);
-  app.footer(
+  app.setFooter(
       "Keys of --json: verdict (PASS, WARN, FAIL), distance_m, heading_range_rad, num_samples, cameras "
       "(name, "
       "verdict, remarks; body_fraction and spot_fraction of the field of view).");

@@ -111,20 +111,20 @@ void monitorDrive(const Arguments& arguments, const RigMonitorOptions& options, 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Watches a rig during an ordinary drive: how each camera and the odometer deviate from rig.yaml, what "
       "changed, when and by how much. Writes deviation.csv and monitor_report.html, and rig.yaml with the "
       "cameras that moved where they are now, once they are still and certain. Prints PASS, WARN with what "
       "changed, or FAIL.");
   Arguments arguments;
-  app.add_option("--bag", arguments.bag, "drive with images and /odom")->required();
-  app.add_option("--rig", arguments.rig, "rig.yaml with extrinsics")->required();
-  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
-  app.add_option("--options", arguments.options, "YAML with overrides of RigMonitorOptions");
-  app.add_option("--calibration-options", arguments.calibration,
-                 "YAML with overrides of RigCalibratorOptions, for the adjustment of each part");
+  app.addOption("--bag", &arguments.bag, "drive with images and /odom").required();
+  app.addOption("--rig", &arguments.rig, "rig.yaml with extrinsics").required();
+  app.addOption("--output", &arguments.output, "folder to write").required().check(requireOutputFolder);
+  app.addOption("--options", &arguments.options, "YAML with overrides of RigMonitorOptions");
+  app.addOption("--calibration-options", &arguments.calibration,
+                "YAML with overrides of RigCalibratorOptions, for the adjustment of each part");
   addShowOptions(&app, &arguments.show_options);
-  app.footer(
+  app.setFooter(
       "Keys of --json: verdict (PASS, WARN, FAIL), remarks, distance_m, names (of the deviations), "
       "deviation, "
       "standard_deviations (metres, radians; of the odometer: ratios, and radians per metre), changes (part, "

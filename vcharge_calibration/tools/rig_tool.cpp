@@ -14,17 +14,16 @@
 
 namespace vcharge {
 
-void addRigToolArguments(CLI::App* app, RigToolArguments* arguments) {
-  app->add_option("--bag", arguments->bag, "drive with images and /odom")->required();
-  app->add_option("--rig", arguments->rig, "rig.yaml with intrinsics; its extrinsics are ignored")
-      ->required();
-  app->add_option("--output", arguments->output, "rig.yaml to write")->required()->check(requireOutput);
-  app->add_option("--trajectory", arguments->trajectory, "poses of all frames to write (.tum)")
-      ->check(requireOutput);
-  app->add_option("--report", arguments->report, "folder for rig_report.html")->check(requireOutputFolder);
-  app->add_option("--options", arguments->options, "YAML with options of the calibration");
+void addRigToolArguments(CommandLine* app, RigToolArguments* arguments) {
+  app->addOption("--bag", &arguments->bag, "drive with images and /odom").required();
+  app->addOption("--rig", &arguments->rig, "rig.yaml with intrinsics; its extrinsics are ignored").required();
+  app->addOption("--output", &arguments->output, "rig.yaml to write").required().check(requireOutput);
+  app->addOption("--trajectory", &arguments->trajectory, "poses of all frames to write (.tum)")
+      .check(requireOutput);
+  app->addOption("--report", &arguments->report, "folder for rig_report.html").check(requireOutputFolder);
+  app->addOption("--options", &arguments->options, "YAML with options of the calibration");
   addShowOptions(app, &arguments->show_options);
-  app->footer(
+  app->setFooter(
       "Keys of --json: verdict (PASS, WARN, FAIL), remarks, distance_m, left_turn_rad, right_turn_rad, "
       "num_keyframes, num_landmarks, num_loop_edges, rms_px (per coordinate), odometer_turn_scale, "
       "time_offset_s, time_offset_sigma_s, cameras (name, num_observations, rms_px, standard_deviations of "

@@ -26,7 +26,7 @@ struct RigToolArguments {
   nlohmann::json* found = nullptr;  ///< output of --json, filled by finishAndPrint()
 };
 
-void addRigToolArguments(CLI::App* app, RigToolArguments* arguments);
+void addRigToolArguments(CommandLine* app, RigToolArguments* arguments);
 
 /// Reads the options, then prints them for --show-options, or calls `calibrate` with them and their text.
 template <class Options, class Calibrate>

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <cstdio>
+#include <exception>
 #include <iostream>
 #include <limits>
 #include <sstream>
@@ -10,6 +11,7 @@
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/text_format.h"
+#include "vcharge_core/files/file_io.h"
 #include "vcharge_core/motion/trajectory.h"
 #include "vcharge_evaluation/trajectory_errors.h"
 #include "vcharge_wheel_odometry/wheel_calibration.h"
@@ -248,24 +250,24 @@ void decode(const Arguments& arguments, nlohmann::json* found) {
 
 int main(int argc, char** argv) {
   vcharge::Arguments arguments;
-  CLI::App app(
+  vcharge::CommandLine app(
       "Decodes the wheels' messages of a CAN log as the driver does, and computes the car's path from them. "
       "With --poses, calibrates the wheels on the first half of the reference and measures the drift on the "
       "second half.");
-  app.add_option("--log", arguments.log, "log, by candump -l or candump -L")->required();
-  app.add_option("--layout", arguments.layout,
-                 "options of the driver (config/driver); `can` and `odometry` are used")
-      ->required();
-  app.add_option("--interface", arguments.interface, "bus of the wheels in a log of several, such as can0");
-  app.add_option("--output", arguments.output, "CSV file for the decoded values")
-      ->check(vcharge::requireOutput);
-  app.add_option("--path", arguments.path, "file for the path (.tum)")->check(vcharge::requireOutput);
-  app.add_option(
-      "--poses", arguments.poses,
+  app.addOption("--log", &arguments.log, "log, by candump -l or candump -L").required();
+  app.addOption("--layout", &arguments.layout,
+                "options of the driver (config/driver); `can` and `odometry` are used")
+      .required();
+  app.addOption("--interface", &arguments.interface, "bus of the wheels in a log of several, such as can0");
+  app.addOption("--output", &arguments.output, "CSV file for the decoded values")
+      .check(vcharge::requireOutput);
+  app.addOption("--path", &arguments.path, "file for the path (.tum)").check(vcharge::requireOutput);
+  app.addOption(
+      "--poses", &arguments.poses,
       "reference of the rear axle's centre: .tum, or CSV with t_s, east_m and north_m of a car that "
       "drives forwards");
   vcharge::addShowOptions(&app, &arguments.show_options);
-  app.footer(
+  app.setFooter(
       "Keys of --json: frames, measurements, duration_s, distance_m, too_short, wraps, resets, invalid, "
       "gaps, "
       "slips; with --poses: calibration {distance_m, left_scale, right_scale, and scale, right_over_left, "

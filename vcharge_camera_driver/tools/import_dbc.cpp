@@ -4,6 +4,7 @@
 #include "vcharge_camera_driver/dbc_file.h"
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/base/error.h"
+#include "vcharge_core/files/file_io.h"
 
 namespace vcharge {
 namespace {
@@ -161,31 +162,31 @@ void import(const Arguments& arguments, nlohmann::json* found) {
 
 int main(int argc, char** argv) {
   vcharge::Arguments arguments;
-  CLI::App app(
+  vcharge::CommandLine app(
       "Turns signals of a DBC file, each named MESSAGE.SIGNAL, into the driver's description of the car's "
       "messages.");
-  app.add_option("--dbc", arguments.dbc, "DBC file")->required();
-  app.add_option("--output", arguments.output, "file for the description (YAML)")
-      ->required()
-      ->check(vcharge::requireOutput);
-  app.add_option("--rear-left", arguments.rear_left, "speed of the left rear wheel");
-  app.add_option("--rear-right", arguments.rear_right, "speed of the right rear wheel");
-  app.add_option("--front-left", arguments.front_left, "speed of the left front wheel");
-  app.add_option("--front-right", arguments.front_right, "speed of the right front wheel");
-  app.add_option("--left-ticks", arguments.left_ticks, "counter of the left rear wheel, instead of speeds");
-  app.add_option("--right-ticks", arguments.right_ticks, "counter of the right rear wheel");
-  app.add_option("--backwards", arguments.backwards, "not 0 where the car rolls backwards");
-  app.add_option("--steering", arguments.steering,
-                 "steering angle, positive to the left; two signals are added")
-      ->expected(1, 2);
-  app.add_option("--steering-ratio", arguments.steering_ratio,
-                 "angle of --steering over the front wheels' angle, negative if it is positive to the right")
-      ->check([](const std::string& text) {
+  app.addOption("--dbc", &arguments.dbc, "DBC file").required();
+  app.addOption("--output", &arguments.output, "file for the description (YAML)")
+      .required()
+      .check(vcharge::requireOutput);
+  app.addOption("--rear-left", &arguments.rear_left, "speed of the left rear wheel");
+  app.addOption("--rear-right", &arguments.rear_right, "speed of the right rear wheel");
+  app.addOption("--front-left", &arguments.front_left, "speed of the left front wheel");
+  app.addOption("--front-right", &arguments.front_right, "speed of the right front wheel");
+  app.addOption("--left-ticks", &arguments.left_ticks, "counter of the left rear wheel, instead of speeds");
+  app.addOption("--right-ticks", &arguments.right_ticks, "counter of the right rear wheel");
+  app.addOption("--backwards", &arguments.backwards, "not 0 where the car rolls backwards");
+  app.addOption("--steering", &arguments.steering,
+                "steering angle, positive to the left; two signals are added")
+      .expected(1, 2);
+  app.addOption("--steering-ratio", &arguments.steering_ratio,
+                "angle of --steering over the front wheels' angle, negative if it is positive to the right")
+      .check([](const std::string& text) {
         return std::strtod(text.c_str(), nullptr) == 0.0 ? std::string("must not be 0") : std::string();
       });
-  app.add_option("--speed-unit", arguments.speed_unit, "unit of the speeds in place of the file's");
-  app.add_option("--angle-unit", arguments.angle_unit, "unit of the steering in place of the file's");
-  app.footer("Keys of --json: signals (names of the driver's options that were written).");
+  app.addOption("--speed-unit", &arguments.speed_unit, "unit of the speeds in place of the file's");
+  app.addOption("--angle-unit", &arguments.angle_unit, "unit of the steering in place of the file's");
+  app.setFooter("Keys of --json: signals (names of the driver's options that were written).");
   return vcharge::runTool(&app, argc, argv,
                           [&](nlohmann::json* found) { vcharge::import(arguments, found); });
 }

@@ -50,10 +50,11 @@ nlohmann::json toJson(const V4l2Description& camera) {
 }  // namespace vcharge
 
 int main(int argc, char** argv) {
-  CLI::App app("Lists V4L2 devices with their formats ('*': not supported by the driver) and controls.");
+  vcharge::CommandLine app(
+      "Lists V4L2 devices with their formats ('*': not supported by the driver) and controls.");
   std::vector<std::string> devices;
-  app.add_option("devices", devices, "device nodes; default: all of /dev/video*");
-  app.footer("Keys of --json: devices (path, card, driver, bus, captures, formats, controls by name).");
+  app.addOption("devices", &devices, "device nodes; default: all of /dev/video*");
+  app.setFooter("Keys of --json: devices (path, card, driver, bus, captures, formats, controls by name).");
   return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     const std::vector<std::string> paths = devices.empty() ? vcharge::videoDevices() : devices;
     if (paths.empty()) {

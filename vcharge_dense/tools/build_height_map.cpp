@@ -161,22 +161,22 @@ void buildHeightMap(const Arguments& arguments, nlohmann::json* found) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Builds a height map of a recorded drive by fusing range maps: heights with confidence, a grid of "
       "drivable cells, a mesh and an OctoMap. Range maps are kept in OUTPUT.range_maps until the end, so "
       "that "
       "an interrupted run can resume.");
   Arguments arguments;
-  app.add_option("--bag", arguments.bag, "bag of the drive")->required();
-  app.add_option("--rig", arguments.rig, "rig.yaml with extrinsics")->required();
-  app.add_option("--trajectory", arguments.trajectory,
-                 "TUM file, e.g. from build_map; without it poses come from the odometry");
-  app.add_option("--map", arguments.map, "sparse map of this drive (*.vmap), whose keyframe poses are used");
-  app.add_option("--options", arguments.options, "YAML with overrides of HeightMapOptions");
-  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
-  app.add_flag("--keep-range-maps", arguments.keep_range_maps, "keep OUTPUT.range_maps at the end");
+  app.addOption("--bag", &arguments.bag, "bag of the drive").required();
+  app.addOption("--rig", &arguments.rig, "rig.yaml with extrinsics").required();
+  app.addOption("--trajectory", &arguments.trajectory,
+                "TUM file, e.g. from build_map; without it poses come from the odometry");
+  app.addOption("--map", &arguments.map, "sparse map of this drive (*.vmap), whose keyframe poses are used");
+  app.addOption("--options", &arguments.options, "YAML with overrides of HeightMapOptions");
+  app.addOption("--output", &arguments.output, "folder to write").required().check(requireOutputFolder);
+  app.addFlag("--keep-range-maps", &arguments.keep_range_maps, "keep OUTPUT.range_maps at the end");
   addShowOptions(&app, &arguments.show_options);
-  app.footer(
+  app.setFooter(
       "Keys of --json: num_range_maps, num_reused_range_maps, size_cells, cell_size_m, num_observed_cells, "
       "num_solid_cells, converged, stage_s (wall time), content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {

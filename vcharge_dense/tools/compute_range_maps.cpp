@@ -134,24 +134,24 @@ void computeRangeMaps(const Arguments& arguments, nlohmann::json* found) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Computes range maps of a recorded drive by plane sweep on the fisheye images. Writes for each camera "
       "and image range, standard deviation and confidence as float TIFF, and the range in colours as PNG.");
   Arguments arguments;
-  app.add_option("--bag", arguments.bag, "bag of the drive")->required();
-  app.add_option("--rig", arguments.rig, "rig.yaml with extrinsics")->required();
-  app.add_option("--trajectory", arguments.trajectory, "TUM file; without it poses come from the odometry");
-  app.add_option("--options", arguments.options, "YAML with overrides of RangeMapperOptions");
-  app.add_option("--preset", arguments.preset, "speed or accuracy; --options overrides it")
-      ->check(CLI::IsMember(enumNames<RangePreset>()))
-      ->capture_default_str();
-  app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
-  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
-  app.add_flag("--online", arguments.online,
-               "like the nodelet: only images before the reference (default: before and after it)");
-  app.add_flag("--no-pictures", arguments.no_pictures, "write no PNG");
+  app.addOption("--bag", &arguments.bag, "bag of the drive").required();
+  app.addOption("--rig", &arguments.rig, "rig.yaml with extrinsics").required();
+  app.addOption("--trajectory", &arguments.trajectory, "TUM file; without it poses come from the odometry");
+  app.addOption("--options", &arguments.options, "YAML with overrides of RangeMapperOptions");
+  app.addOption("--preset", &arguments.preset, "speed or accuracy; --options overrides it")
+      .oneOf(enumNames<RangePreset>())
+      .showDefault();
+  app.addOption("--cameras", &arguments.cameras, "cameras of the rig by name (default: all)");
+  app.addOption("--output", &arguments.output, "folder to write").required().check(requireOutputFolder);
+  app.addFlag("--online", &arguments.online,
+              "like the nodelet: only images before the reference (default: before and after it)");
+  app.addFlag("--no-pictures", &arguments.no_pictures, "write no PNG");
   addShowOptions(&app, &arguments.show_options);
-  app.footer(
+  app.setFooter(
       "Keys of --json: num_range_maps, known_ratio (of their pixels), cameras (name, num_range_maps, "
       "num_inter_camera, num_images, num_standing, num_without_pose, num_without_neighbours, num_resets, "
       "message), "

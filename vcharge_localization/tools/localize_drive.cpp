@@ -113,30 +113,30 @@ void localizeDrive(const Arguments& arguments, const DriveLocalizerOptions& opti
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Localizes a recorded drive in a sparse map, frame by frame and causally. Writes the poses as TUM "
       "text, "
       "and status, covariance and matches of every frame beside it (.csv).");
   Arguments arguments;
-  app.add_option("--bag", arguments.bag, "the drive")->required();
-  app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
-  app.add_option("--map", arguments.map, "map of build_map (*.vmap)")->required();
-  app.add_option("--output", arguments.output, "TUM file to write")->required()->check(requireOutput);
-  app.add_option("--cameras", arguments.cameras, "cameras of the rig by name (default: all)");
-  app.add_option("--options", arguments.options, "YAML with overrides of DriveLocalizerOptions");
-  app.add_option("--cover-s", arguments.cover_s,
-                 "cover all cameras, from and to, in seconds since the first frame")
-      ->expected(2);
-  app.add_option("--carry-away-s", arguments.carry_s,
-                 "leave a part of the drive out, unseen by the odometer too, from and to")
-      ->expected(2);
-  app.add_option("--forget-every", arguments.forget_every,
-                 "start from nothing again after so many frames, to see how soon a place is found; 0: never")
-      ->check(CLI::NonNegativeNumber);
+  app.addOption("--bag", &arguments.bag, "the drive").required();
+  app.addOption("--rig", &arguments.rig, "rig.yaml with vehicle_from_camera").required();
+  app.addOption("--map", &arguments.map, "map of build_map (*.vmap)").required();
+  app.addOption("--output", &arguments.output, "TUM file to write").required().check(requireOutput);
+  app.addOption("--cameras", &arguments.cameras, "cameras of the rig by name (default: all)");
+  app.addOption("--options", &arguments.options, "YAML with overrides of DriveLocalizerOptions");
+  app.addOption("--cover-s", &arguments.cover_s,
+                "cover all cameras, from and to, in seconds since the first frame")
+      .expected(2);
+  app.addOption("--carry-away-s", &arguments.carry_s,
+                "leave a part of the drive out, unseen by the odometer too, from and to")
+      .expected(2);
+  app.addOption("--forget-every", &arguments.forget_every,
+                "start from nothing again after so many frames, to see how soon a place is found; 0: never")
+      .notNegative();
   addShowOptions(&app, &arguments.show_options);
-  app.footer(std::string("Keys of --json: ") + kFrameCounterKeys +
-             ", num_frames_by_status, map_ready_s (time to read and prepare the map), "
-             "warnings (text, num_frames), content_hash.");
+  app.setFooter(std::string("Keys of --json: ") + kFrameCounterKeys +
+                ", num_frames_by_status, map_ready_s (time to read and prepare the map), "
+                "warnings (text, num_frames), content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     DriveLocalizerOptions options;
     options.frames.waitForEverything();

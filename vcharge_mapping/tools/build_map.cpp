@@ -155,22 +155,22 @@ void buildMap(const Arguments& arguments, const SparseMapperOptions& options, nl
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Builds a sparse map from a recorded drive: metric, loop-closed, with the pose of every frame.");
   Arguments arguments;
-  app.add_option("--bag", arguments.bag, "the drive")->required();
-  app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
-  app.add_option("--output", arguments.output, "map to write (*.vmap)")->required()->check(requireOutput);
-  app.add_option("--trajectory", arguments.trajectory, "TUM file to write: the pose of every frame")
-      ->check(requireOutput);
-  app.add_option("--report", arguments.report, "folder for map_report.html: pictures, numbers and a verdict")
-      ->check(requireOutputFolder);
-  app.add_option("--options", arguments.options, "YAML with overrides of SparseMapperOptions");
+  app.addOption("--bag", &arguments.bag, "the drive").required();
+  app.addOption("--rig", &arguments.rig, "rig.yaml with vehicle_from_camera").required();
+  app.addOption("--output", &arguments.output, "map to write (*.vmap)").required().check(requireOutput);
+  app.addOption("--trajectory", &arguments.trajectory, "TUM file to write: the pose of every frame")
+      .check(requireOutput);
+  app.addOption("--report", &arguments.report, "folder for map_report.html: pictures, numbers and a verdict")
+      .check(requireOutputFolder);
+  app.addOption("--options", &arguments.options, "YAML with overrides of SparseMapperOptions");
   addShowOptions(&app, &arguments.show_options);
-  app.footer(std::string("Keys of --json: verdict (GOOD, CHECK, BAD), remarks, ") + kFrameCounterKeys +
-             ", num_standing_frames, num_motions (by hypothesis), num_keyframes, num_landmarks, "
-             "num_observations, rms_px, num_loop_edges, num_rejected_loop_edges (by reason), "
-             "odometry_distance_scale, odometry_turn_scale, stage_s (wall time), content_hash.");
+  app.setFooter(std::string("Keys of --json: verdict (GOOD, CHECK, BAD), remarks, ") + kFrameCounterKeys +
+                ", num_standing_frames, num_motions (by hypothesis), num_keyframes, num_landmarks, "
+                "num_observations, rms_px, num_loop_edges, num_rejected_loop_edges (by reason), "
+                "odometry_distance_scale, odometry_turn_scale, stage_s (wall time), content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     SparseMapperOptions options;
     if (!arguments.options.empty()) {

@@ -5,6 +5,7 @@
 
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/base/error.h"
+#include "vcharge_core/files/file_io.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_mapping/map_difference.h"
 
@@ -33,19 +34,19 @@ void print(const MapDifference& difference, int64_t from, int64_t to) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Shows what changed between two versions of a map.");
+  CommandLine app("Shows what changed between two versions of a map.");
   std::string path, output;
   std::optional<int64_t> from, to;
   double min_move_m = 0.1;
-  app.add_option("--map", path, "the map (*.vmap)")->required()->check(requireNotEmpty);
-  app.add_option("--from", from, "earlier version (default: the one before the newest)");
-  app.add_option("--to", to, "later version (default: the newest)");
-  app.add_option("--min-move-m", min_move_m, "least distance by which a landmark moved")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  app.add_option("--output", output, "CSV of the changed landmarks: change, id, x_m, y_m, z_m, moved_by_m")
-      ->check(requireOutput);
-  app.footer(
+  app.addOption("--map", &path, "the map (*.vmap)").required().check(requireNotEmpty);
+  app.addOption("--from", &from, "earlier version (default: the one before the newest)");
+  app.addOption("--to", &to, "later version (default: the newest)");
+  app.addOption("--min-move-m", &min_move_m, "least distance by which a landmark moved")
+      .notNegative()
+      .showDefault();
+  app.addOption("--output", &output, "CSV of the changed landmarks: change, id, x_m, y_m, z_m, moved_by_m")
+      .check(requireOutput);
+  app.setFooter(
       "Keys of --json: from, to, new_sessions, lost_sessions, num_new_keyframes, num_lost_keyframes, "
       "num_appeared, num_vanished, num_moved, num_common_landmarks, median_move_m.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {

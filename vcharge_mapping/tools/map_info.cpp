@@ -35,14 +35,13 @@ nlohmann::json toJson(const vcharge::SparseMap& map, const vcharge::MapProvenanc
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Describes a sparse map and writes the poses of its keyframes.");
+  vcharge::CommandLine app("Describes a sparse map and writes the poses of its keyframes.");
   std::string map_path, trajectory_path;
   bool list_loop_edges = false;
-  app.add_option("--map", map_path, "the map (*.vmap)")->required()->check(vcharge::requireNotEmpty);
-  app.add_flag("--loop-edges", list_loop_edges, "name every loop edge");
-  app.add_option("--trajectory", trajectory_path, "keyframe poses as TUM text")
-      ->check(vcharge::requireOutput);
-  app.footer(
+  app.addOption("--map", &map_path, "the map (*.vmap)").required().check(vcharge::requireNotEmpty);
+  app.addFlag("--loop-edges", &list_loop_edges, "name every loop edge");
+  app.addOption("--trajectory", &trajectory_path, "keyframe poses as TUM text").check(vcharge::requireOutput);
+  app.setFooter(
       "Keys of --json: sessions (name, component), num_keyframes, num_landmarks, num_observations, "
       "num_loop_edges (accepted), cameras "
       "(name, num_observations, rms_px), provenance, content_hash.");

@@ -31,16 +31,14 @@ void goBack(const std::string& path, int64_t number, int max_versions) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Lists the versions of a map, and goes back to an earlier one.");
+  CommandLine app("Lists the versions of a map, and goes back to an earlier one.");
   std::string path;
   std::optional<int64_t> back_to;
   int max_versions = kMaxMapVersions;
-  app.add_option("--map", path, "the map (*.vmap)")->required()->check(requireNotEmpty);
-  app.add_option("--back-to", back_to, "version whose content becomes the newest version");
-  app.add_option("--max-versions", max_versions, "versions that the file keeps")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.footer("Keys of --json: versions (number, change, bag, date, program, content_hash).");
+  app.addOption("--map", &path, "the map (*.vmap)").required().check(requireNotEmpty);
+  app.addOption("--back-to", &back_to, "version whose content becomes the newest version");
+  app.addOption("--max-versions", &max_versions, "versions that the file keeps").positive().showDefault();
+  app.setFooter("Keys of --json: versions (number, change, bag, date, program, content_hash).");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (back_to) {
       goBack(path, *back_to, max_versions);

@@ -12,6 +12,7 @@
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/base/utc_time.h"
+#include "vcharge_core/files/file_io.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_mapping/map_file_update.h"
 #include "vcharge_mapping/session_limit.h"
@@ -137,30 +138,30 @@ void mergeMaps(const Arguments& arguments, const MergeOptions& options, nlohmann
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Adds the drives of other maps to a map. A drive without common places is kept apart, beside the "
       "others.");
   Arguments arguments;
-  app.add_option("--map", arguments.map, "the map (*.vmap)")->required()->check(requireNotEmpty);
-  app.add_option("--session", arguments.sessions,
-                 "a map of another drive with the same rig; several may be given")
-      ->required()
-      ->check(requireNotEmpty);
-  app.add_option("--output", arguments.output,
-                 "map to write; may be the map itself: each session adds a version")
-      ->required()
-      ->check(requireOutput);
-  app.add_option("--max-versions", arguments.max_versions, "versions that the file keeps")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--max-sessions-per-place", arguments.max_sessions_per_place,
-                 "drives that the map keeps of a place: the newest, and those in the most different light")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_flag("--require-overlap", arguments.requires_overlap, "refuse a drive without common places");
-  app.add_option("--options", arguments.options, "YAML with overrides of MergeOptions");
+  app.addOption("--map", &arguments.map, "the map (*.vmap)").required().check(requireNotEmpty);
+  app.addOption("--session", &arguments.sessions,
+                "a map of another drive with the same rig; several may be given")
+      .required()
+      .check(requireNotEmpty);
+  app.addOption("--output", &arguments.output,
+                "map to write; may be the map itself: each session adds a version")
+      .required()
+      .check(requireOutput);
+  app.addOption("--max-versions", &arguments.max_versions, "versions that the file keeps")
+      .positive()
+      .showDefault();
+  app.addOption("--max-sessions-per-place", &arguments.max_sessions_per_place,
+                "drives that the map keeps of a place: the newest, and those in the most different light")
+      .positive()
+      .showDefault();
+  app.addFlag("--require-overlap", &arguments.requires_overlap, "refuse a drive without common places");
+  app.addOption("--options", &arguments.options, "YAML with overrides of MergeOptions");
   addShowOptions(&app, &arguments.show_options);
-  app.footer(
+  app.setFooter(
       "Keys of --json: sessions (session, joined, remark, num_accepted_loops, num_undecided_loops, "
       "num_rejected_loops, common_ratio, chance_ratio, rms_px), num_sessions, num_components, num_keyframes, "
       "num_removed_keyframes, num_landmarks, content_hash.");

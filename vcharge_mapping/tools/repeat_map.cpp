@@ -117,18 +117,17 @@ void repeat(const Arguments& arguments, nlohmann::json* found) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Writes a large map for measurements: copies of maps beside each other. The first stays where it is, "
       "and "
       "the copies of a second round and later have other descriptors.");
   Arguments arguments;
-  app.add_option("--maps", arguments.maps, "maps of one rig with binary descriptors (*.vmap)")
-      ->required()
-      ->check(requireNotEmpty);
-  app.add_option("--output", arguments.output, "map to write (*.vmap)")->required()->check(requireOutput);
-  app.add_option("--length-m", arguments.length_m, "least length of all drives in it")
-      ->check(CLI::PositiveNumber);
-  app.add_option("--seed", arguments.seed, "of the changed descriptors");
-  app.footer("Keys of --json: length_m, copies, num_keyframes, num_landmarks.");
+  app.addOption("--maps", &arguments.maps, "maps of one rig with binary descriptors (*.vmap)")
+      .required()
+      .check(requireNotEmpty);
+  app.addOption("--output", &arguments.output, "map to write (*.vmap)").required().check(requireOutput);
+  app.addOption("--length-m", &arguments.length_m, "least length of all drives in it").positive();
+  app.addOption("--seed", &arguments.seed, "of the changed descriptors");
+  app.setFooter("Keys of --json: length_m, copies, num_keyframes, num_landmarks.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) { repeat(arguments, found); });
 }

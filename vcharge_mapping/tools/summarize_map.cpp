@@ -51,13 +51,13 @@ void summarize(const Arguments& arguments, const SummaryOptions& options, nlohma
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Writes a map with as few landmarks as localization needs.");
+  CommandLine app("Writes a map with as few landmarks as localization needs.");
   Arguments arguments;
-  app.add_option("--map", arguments.map, "the map (*.vmap)")->required()->check(requireNotEmpty);
-  app.add_option("--output", arguments.output, "map to write (*.vmap)")->required()->check(requireOutput);
-  app.add_option("--options", arguments.options, "YAML with overrides of SummaryOptions");
+  app.addOption("--map", &arguments.map, "the map (*.vmap)").required().check(requireNotEmpty);
+  app.addOption("--output", &arguments.output, "map to write (*.vmap)").required().check(requireOutput);
+  app.addOption("--options", &arguments.options, "YAML with overrides of SummaryOptions");
   addShowOptions(&app, &arguments.show_options);
-  app.footer(
+  app.setFooter(
       "Keys of --json: num_landmarks, num_landmarks_before, median_sigma_factor, worst_sigma_factor, "
       "kilobytes_per_100_m, content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {

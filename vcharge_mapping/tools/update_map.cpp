@@ -59,22 +59,22 @@ void updateMapFile(const Arguments& arguments, const UpdateOptions& options, nlo
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Updates a map by a drive of another day: adds what is new, removes what several drives missed, and "
       "keeps the map's size.");
   Arguments arguments;
-  app.add_option("--map", arguments.map, "the map (*.vmap); gets a new version")
-      ->required()
-      ->check(requireOutput);
-  app.add_option("--session", arguments.session, "the map that build_map made of the drive")
-      ->required()
-      ->check(requireNotEmpty);
-  app.add_option("--max-versions", arguments.max_versions, "versions that the file keeps")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  app.add_option("--options", arguments.options, "YAML with overrides of UpdateOptions");
+  app.addOption("--map", &arguments.map, "the map (*.vmap); gets a new version")
+      .required()
+      .check(requireOutput);
+  app.addOption("--session", &arguments.session, "the map that build_map made of the drive")
+      .required()
+      .check(requireNotEmpty);
+  app.addOption("--max-versions", &arguments.max_versions, "versions that the file keeps")
+      .positive()
+      .showDefault();
+  app.addOption("--options", &arguments.options, "YAML with overrides of UpdateOptions");
   addShowOptions(&app, &arguments.show_options);
-  app.footer(
+  app.setFooter(
       "Keys of --json: num_accepted_loops, common_ratio, rms_px, num_seen_landmarks, num_missed_landmarks, "
       "num_removed_landmarks, num_new_landmarks, num_removed_keyframes, num_forgotten_landmarks, "
       "num_sessions, num_keyframes, num_landmarks, version, content_hash.");

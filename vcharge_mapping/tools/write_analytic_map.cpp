@@ -4,13 +4,13 @@
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 
 int main(int argc, char** argv) {
-  CLI::App app("Writes a small map with exact observations, for tests.");
+  vcharge::CommandLine app("Writes a small map with exact observations, for tests.");
   std::string path;
   vcharge::AnalyticMapOptions options;
-  app.add_option("--output", path, "the map (*.vmap)")->required()->check(vcharge::requireOutput);
-  app.add_option("--keyframes", options.num_keyframes);
-  app.add_option("--landmarks", options.num_landmarks);
-  app.add_option("--descriptor-bytes", options.descriptor_size);
+  app.addOption("--output", &path, "the map (*.vmap)").required().check(vcharge::requireOutput);
+  app.addOption("--keyframes", &options.num_keyframes);
+  app.addOption("--landmarks", &options.num_landmarks);
+  app.addOption("--descriptor-bytes", &options.descriptor_size);
   return vcharge::runTool(&app, argc, argv, [&] {
     vcharge::writeSparseMap(vcharge::SparseMap(vcharge::makeAnalyticMap(options)),
                             {{"bag", "analytic.bag"}, {"options", "a: 1\nb: 2\n"}}, path);

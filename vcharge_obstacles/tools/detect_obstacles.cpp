@@ -322,27 +322,27 @@ void detectObstacles(const Arguments& arguments, const ObstacleMapperOptions& op
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Detects obstacles and free ground around the vehicle in a recorded drive. Writes the fused map (PGM "
       "and "
       "YAML of map_server, float TIFFs) and all scans (CSV) per image stamp, the state of the cameras "
       "(status.csv), the free travel along the vehicle's arc (corridor.csv), and what moves (objects.csv, "
       "objects_frames.csv).");
   Arguments arguments;
-  app.add_option("--bag", arguments.bag, "the drive")->required();
-  app.add_option("--rig", arguments.rig, "rig.yaml with vehicle_from_camera")->required();
-  app.add_option("--options", arguments.options, "YAML with overrides of ObstacleMapperOptions");
-  app.add_option("--range-options", arguments.range_options, "YAML with overrides of RangeMapperOptions");
-  app.add_option("--object-options", arguments.object_options, "YAML with overrides of ObjectTrackerOptions");
-  app.add_option("--range", arguments.range,
-                 "folder that compute_range_maps wrote, instead of computing range maps");
-  app.add_option("--cameras", arguments.cameras,
-                 "cameras of the rig by name (default: those of --options; for objects also the rig's "
-                 "others that have extrinsics and images)");
-  app.add_option("--output", arguments.output, "folder to write")->required()->check(requireOutputFolder);
-  app.add_flag("--no-objects", arguments.no_objects, "do not follow what moves: faster");
+  app.addOption("--bag", &arguments.bag, "the drive").required();
+  app.addOption("--rig", &arguments.rig, "rig.yaml with vehicle_from_camera").required();
+  app.addOption("--options", &arguments.options, "YAML with overrides of ObstacleMapperOptions");
+  app.addOption("--range-options", &arguments.range_options, "YAML with overrides of RangeMapperOptions");
+  app.addOption("--object-options", &arguments.object_options, "YAML with overrides of ObjectTrackerOptions");
+  app.addOption("--range", &arguments.range,
+                "folder that compute_range_maps wrote, instead of computing range maps");
+  app.addOption("--cameras", &arguments.cameras,
+                "cameras of the rig by name (default: those of --options; for objects also the rig's "
+                "others that have extrinsics and images)");
+  app.addOption("--output", &arguments.output, "folder to write").required().check(requireOutputFolder);
+  app.addFlag("--no-objects", &arguments.no_objects, "do not follow what moves: faster");
   addShowOptions(&app, &arguments.show_options);
-  app.footer(
+  app.setFooter(
       "Keys of --json: num_maps, num_odometry_jumps, cameras (name, num_range_maps, num_without_pose, "
       "num_late, "
       "message), processor_ms_per_image (objects), processor_ms_per_range_map (images, ranges, obstacles), "

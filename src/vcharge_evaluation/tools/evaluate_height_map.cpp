@@ -5,6 +5,7 @@
 
 #include "tool_arguments.h"
 #include "vcharge_core/dense_maps/height_map_file.h"
+#include "vcharge_core/files/file_io.h"
 #include "vcharge_evaluation/height_map_errors.h"
 
 namespace {
@@ -130,18 +131,18 @@ void writeErrorPicture(const HeightMap& map, const HeightMapErrors& errors, cons
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Errors of a height map against the truth of a simulated drive: heights of the cells that were "
       "visible, positions "
       "of steps, heights of kerbs, tape-measure distances, and the drivable grid.");
   std::string map_path, truth_path, rig_path, trajectory_path;
-  app.add_option("--map", map_path, "folder of build_height_map")->required()->check(requireNotEmpty);
-  app.add_option("--truth", truth_path,
-                 "the drive's truth folder (height_map.yaml, obstacles.yaml, trajectory.tum)")
-      ->required();
-  app.add_option("--rig", rig_path, "rig.yaml of the drive")->required();
-  app.add_option(
-      "--trajectory", trajectory_path,
+  app.addOption("--map", &map_path, "folder of build_height_map").required().check(requireNotEmpty);
+  app.addOption("--truth", &truth_path,
+                "the drive's truth folder (height_map.yaml, obstacles.yaml, trajectory.tum)")
+      .required();
+  app.addOption("--rig", &rig_path, "rig.yaml of the drive").required();
+  app.addOption(
+      "--trajectory", &trajectory_path,
       "poses with which the map was made (TUM), to align it with the truth; without them the map must be in "
       "the world's frame");
   const OptionsArgument<HeightMapErrorOptions> options(&app);

@@ -121,12 +121,12 @@ nlohmann::json toJson(const SparseMap& map, const MapErrors& errors, const Traje
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Errors of a sparse map against the true trajectory: its keyframes, and its accepted and rejected loop "
       "edges.");
   std::string map_path, truth_path;
-  app.add_option("--map", map_path, "map to judge (.vmap)")->required()->check(requireNotEmpty);
-  app.add_option("--truth", truth_path, "true trajectory (.tum)")->required();
+  app.addOption("--map", &map_path, "map to judge (.vmap)").required().check(requireNotEmpty);
+  app.addOption("--truth", &truth_path, "true trajectory (.tum)").required();
   const OptionsArgument<MapErrorOptions> options(&app);
   const ReportArgument report(&app, "map_errors");
   describeJson(&app, R"(kind: "map"; content_hash; num_keyframes, num_landmarks, num_observations;

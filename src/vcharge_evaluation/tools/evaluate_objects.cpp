@@ -200,14 +200,14 @@ nlohmann::json evaluate(const Arguments& arguments, const ObjectEvaluationOption
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Errors of tracked moving objects against the truth of a simulated drive.");
+  CommandLine app("Errors of tracked moving objects against the truth of a simulated drive.");
   Arguments arguments;
-  app.add_option("--objects", arguments.objects,
-                 "folder with objects.csv and objects_frames.csv, as detect_obstacles writes them")
-      ->required();
-  app.add_option("--truth", arguments.truth,
-                 "folder of the drive's truth (range/, rig.yaml, trajectory.tum, movers.yaml)")
-      ->required();
+  app.addOption("--objects", &arguments.objects,
+                "folder with objects.csv and objects_frames.csv, as detect_obstacles writes them")
+      .required();
+  app.addOption("--truth", &arguments.truth,
+                "folder of the drive's truth (range/, rig.yaml, trajectory.tum, movers.yaml)")
+      .required();
   const OptionsArgument<ObjectEvaluationOptions> options(&app);
   const ReportArgument report(&app, "object_errors");
   describeJson(&app, R"(kind: "objects"; images, duration_s; all: {due: number of judged objects over all

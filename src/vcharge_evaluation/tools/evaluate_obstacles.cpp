@@ -252,12 +252,12 @@ nlohmann::json evaluate(const Arguments& arguments, const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Errors of obstacle maps against the truth of a simulated drive on level ground.");
+  CommandLine app("Errors of obstacle maps against the truth of a simulated drive on level ground.");
   Arguments arguments;
-  app.add_option("--obstacles", arguments.obstacles, "folder that detect_obstacles wrote")->required();
-  app.add_option("--truth", arguments.truth,
-                 "folder of the drive's truth (range/, rig.yaml, trajectory.tum, obstacles.yaml, ...)")
-      ->required();
+  app.addOption("--obstacles", &arguments.obstacles, "folder that detect_obstacles wrote").required();
+  app.addOption("--truth", &arguments.truth,
+                "folder of the drive's truth (range/, rig.yaml, trajectory.tum, obstacles.yaml, ...)")
+      .required();
   const OptionsArgument<Options> options(&app);
   const ReportArgument report(&app, "obstacle_errors");
   describeJson(&app,

@@ -20,14 +20,14 @@ double optimumFrom(PoseGraph graph) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Robust optimization of a pose graph whose last edges are false: squared errors of the true edges "
       "against "
       "those of least squares without false ones, and false edges that were kept.");
   std::string path;
   size_t num_false = 0;
-  app.add_option("--graph", path, "g2o file")->required();
-  app.add_option("--num-false", num_false, "how many edges at the end of the file are false");
+  app.addOption("--graph", &path, "g2o file").required();
+  app.addOption("--num-false", &num_false, "how many edges at the end of the file are false");
   describeJson(&app,
                R"(kind: "pose_graph"; num_nodes, num_edges, num_false, num_false_kept, num_true_rejected,
 chi_squared: sum of the squared errors of the true edges, optimum: the least that least squares reaches without the

@@ -173,13 +173,13 @@ nlohmann::json reportGaps(const RangeGapCounts& counts) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Errors of range maps against the truth of a simulated drive, at fixed density.");
+  CommandLine app("Errors of range maps against the truth of a simulated drive, at fixed density.");
   std::string range_folder, truth_folder, bag, rig_path;
-  app.add_option("--range", range_folder, "folder that compute_range_maps wrote")->required();
-  app.add_option("--truth", truth_folder, "folder of the drive's truth (range/ and trajectory.tum)")
-      ->required();
-  app.add_option("--bag", bag, "the drive")->required();
-  app.add_option("--rig", rig_path, "rig.yaml that the range maps were made with")->required();
+  app.addOption("--range", &range_folder, "folder that compute_range_maps wrote").required();
+  app.addOption("--truth", &truth_folder, "folder of the drive's truth (range/ and trajectory.tum)")
+      .required();
+  app.addOption("--bag", &bag, "the drive").required();
+  app.addOption("--rig", &rig_path, "rig.yaml that the range maps were made with").required();
   const OptionsArgument<RangeEvaluationOptions> options(&app);
   const ReportArgument report(&app, "range_errors");
   describeJson(&app, R"(kind: "range"; tolerance: relative; sets: for all cameras and for each one {label,

@@ -39,13 +39,13 @@ nlohmann::json print(const char* title, const std::vector<CameraErrors>& errors)
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Errors of a rig's extrinsics against the truth, per camera and degree of freedom in the axes of the "
       "vehicle. "
       "The common scale, which a calibration from a drive takes from the odometer, is judged apart.");
   std::string estimate, truth;
-  app.add_option("--estimate", estimate, "rig.yaml to judge")->required();
-  app.add_option("--truth", truth, "true rig.yaml")->required();
+  app.addOption("--estimate", &estimate, "rig.yaml to judge").required();
+  app.addOption("--truth", &truth, "true rig.yaml").required();
   describeJson(&app, R"(kind: "rig"; scale: factor on the translations that fits the truth best; as_is,
 without_scale: per camera {camera, error_m [x, y, z], error_rad [x, y, z], normalized [6]: errors over
 their standard deviations, if there are covariances}.)");

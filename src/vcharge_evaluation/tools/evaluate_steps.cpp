@@ -77,12 +77,12 @@ nlohmann::json evaluate(const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Errors of step maps against the true heights of a simulated drive.");
+  CommandLine app("Errors of step maps against the true heights of a simulated drive.");
   Arguments arguments;
-  app.add_option("--steps", arguments.steps, "folder that detect_obstacles wrote")->required();
-  app.add_option("--truth", arguments.truth,
-                 "folder of the drive's truth (range/, rig.yaml, trajectory.tum, height_map.yaml, ...)")
-      ->required();
+  app.addOption("--steps", &arguments.steps, "folder that detect_obstacles wrote").required();
+  app.addOption("--truth", &arguments.truth,
+                "folder of the drive's truth (range/, rig.yaml, trajectory.tum, height_map.yaml, ...)")
+      .required();
   const ReportArgument report(&app, "step_errors");
   describeJson(&app, R"(kind: "steps"; maps, driven_m; low (5 to 8 cm) and high: {length_m: true
 length that was due, found_length_m: found in most of the maps, found_fraction: mean over all maps, null without any,

@@ -55,13 +55,13 @@ nlohmann::json pathOf(const Trajectory& trajectory) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Errors of a trajectory against the true one (both TUM text): not aligned, aligned at the first pose, "
       "aligned "
       "over all poses, and drift over distance.");
   std::string estimate_path, truth_path;
-  app.add_option("--estimate", estimate_path, "trajectory to judge (.tum)")->required();
-  app.add_option("--truth", truth_path, "true trajectory (.tum)")->required();
+  app.addOption("--estimate", &estimate_path, "trajectory to judge (.tum)").required();
+  app.addOption("--truth", &truth_path, "true trajectory (.tum)").required();
   const ReportArgument report(&app, "trajectory_errors");
   describeJson(&app, R"(kind: "trajectory"; alignments: of the three kinds above {label, num_poses,
 num_without_truth, truth_length_m, poses [[time_s, forward_m, left_m, up_m, rotation_rad]], and error

@@ -52,13 +52,13 @@ nlohmann::json toJson(const ImageFeatures& first, const ImageFeatures& second) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Counts the features of images of one camera, and matches those of pairs of images.");
+  CommandLine app("Counts the features of images of one camera, and matches those of pairs of images.");
   std::vector<std::string> images, masks, words;
-  app.add_option("--images", images, "images of one size")->required();
-  app.add_option("--masks", masks, "one for all images, or one for each: 0 where features are not wanted");
-  app.add_option("--pairs", words, "pairs to match, FIRST:SECOND, counted from 0");
+  app.addOption("--images", &images, "images of one size").required();
+  app.addOption("--masks", &masks, "one for all images, or one for each: 0 where features are not wanted");
+  app.addOption("--pairs", &words, "pairs to match, FIRST:SECOND, counted from 0");
   const OptionsArgument<FeatureExtractorOptions> options(&app);
-  app.footer(
+  app.setFooter(
       "Keys of --json: features: per image; area_px: per image, pixels that the mask allows; matches: per "
       "pair, a list of [x, y, x, y], pixels in both images.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {

@@ -13,18 +13,18 @@
 namespace vcharge {
 
 /// Documents the keys of --json in --help.
-inline void describeJson(CLI::App* app, const std::string& keys) {
-  app->footer("Keys of --json: " + keys +
-              "\nAn error distribution has count, mean, root_mean_square, percentile_50, percentile_68,\n"
-              "percentile_90, percentile_95, percentile_99 and max. A fraction is from 0 to 1.");
+inline void describeJson(CommandLine* app, const std::string& keys) {
+  app->setFooter("Keys of --json: " + keys +
+                 "\nAn error distribution has count, mean, root_mean_square, percentile_50, percentile_68,\n"
+                 "percentile_90, percentile_95, percentile_99 and max. A fraction is from 0 to 1.");
 }
 
 /// --report of an evaluation tool: a folder for the JSON and its plots.
 class ReportArgument {
  public:
-  ReportArgument(CLI::App* app, std::string name) : name_(std::move(name)) {
-    app->add_option("--report", folder_, "folder for " + name_ + ".json, as --json, and its plots")
-        ->check(requireOutputFolder);
+  ReportArgument(CommandLine* app, std::string name) : name_(std::move(name)) {
+    app->addOption("--report", &folder_, "folder for " + name_ + ".json, as --json, and its plots")
+        .check(requireOutputFolder);
   }
   void write(const nlohmann::json& json) const {
     if (!folder_.empty()) {
@@ -41,8 +41,8 @@ class ReportArgument {
 template <class Options>
 class OptionsArgument {
  public:
-  explicit OptionsArgument(CLI::App* app) {
-    app->add_option("--options", path_, "YAML with overrides of the options, see --show-options");
+  explicit OptionsArgument(CommandLine* app) {
+    app->addOption("--options", &path_, "YAML with overrides of the options, see --show-options");
     addShowOptions(app, &show_);
   }
   /// Whether the options were printed, so that the tool has nothing else to do.

@@ -1,6 +1,7 @@
 // Compares solveBundle() with Ceres (SPARSE_SCHUR, analytic derivatives) on the landmarks of a map: both on
 // one thread, and as stages run them, solveBundle() on all threads and Ceres, for the same result on any
 // number of threads, on one.
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <ctime>
@@ -92,16 +93,15 @@ double costOf(BundleProblem problem) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine app(
       "Compares solveBundle() with Ceres on the landmarks of a map; prints times, costs and the ratio.");
   std::string path;
   int iterations = 25;
   double tolerance = 3e-3;
-  app.add_option("--map", path, "the map (*.vmap)")->required();
-  app.add_option("--iterations", iterations, "largest number of iterations")->capture_default_str();
-  app.add_option("--tolerance", tolerance, "relative decrease of the cost that ends them")
-      ->capture_default_str();
-  app.footer("Keys of --json: solve_bundle_s, solve_bundle_wall_s, ceres_s.");
+  app.addOption("--map", &path, "the map (*.vmap)").required();
+  app.addOption("--iterations", &iterations, "largest number of iterations").showDefault();
+  app.addOption("--tolerance", &tolerance, "relative decrease of the cost that ends them").showDefault();
+  app.setFooter("Keys of --json: solve_bundle_s, solve_bundle_wall_s, ceres_s.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     BundleProblem ours = makeProblem(*readSparseMap(path));
     BundleProblem theirs = ours;

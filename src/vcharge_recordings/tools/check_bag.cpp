@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <iomanip>
 #include <iostream>
 
@@ -28,20 +29,20 @@ void print(const std::vector<CheckFinding>& findings, bool quiet) {
 }  // namespace vcharge
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  vcharge::CommandLine app(
       "Judges a recorded drive before hours are spent on it: PASS, WARN or FAIL of each check, with reasons. "
       "The exit status is 0 unless something fails.");
   std::string bag, rig_path;
   bool quiet = false;
   vcharge::DriveTopics topics;
-  app.add_option("--bag", bag, "the drive")->required()->check(vcharge::requireNotEmpty);
-  app.add_option("--rig", rig_path, "rig.yaml, with extrinsics or without")
-      ->required()
-      ->check(vcharge::requireNotEmpty);
-  app.add_option("--odometry-topic", topics.odometry, "topic of the odometry")->capture_default_str();
-  app.add_option("--image-topic", topics.image, "topic of the images")->capture_default_str();
-  app.add_flag("--quiet", quiet, "print only what does not pass");
-  app.footer("Keys of --json: verdict (PASS, WARN, FAIL), findings (subject, grade, text).");
+  app.addOption("--bag", &bag, "the drive").required().check(vcharge::requireNotEmpty);
+  app.addOption("--rig", &rig_path, "rig.yaml, with extrinsics or without")
+      .required()
+      .check(vcharge::requireNotEmpty);
+  app.addOption("--odometry-topic", &topics.odometry, "topic of the odometry").showDefault();
+  app.addOption("--image-topic", &topics.image, "topic of the images").showDefault();
+  app.addFlag("--quiet", &quiet, "print only what does not pass");
+  app.setFooter("Keys of --json: verdict (PASS, WARN, FAIL), findings (subject, grade, text).");
   return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     topics.validate();
     const auto rig = std::make_shared<const vcharge::CameraRig>(vcharge::readCameraRig(rig_path));

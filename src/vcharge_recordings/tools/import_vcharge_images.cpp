@@ -43,7 +43,7 @@ void writeDriveAndRig(const vcharge::VchargeRecording& recording, const std::str
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  vcharge::CommandLine app(
       "Turns the published V-Charge images (calib.txt, system_poses.txt, images.txt and the images) into a "
       "drive: "
       "a bag with images, camera_info and /odom, and the rig.yaml of its camera. base_link is put on the "
@@ -51,20 +51,20 @@ int main(int argc, char** argv) {
   std::string folder, output, rig;
   vcharge::VchargeRecordingOptions options;
   bool no_mask = false;
-  app.add_option("--folder", folder, "folder of the images")->required();
-  app.add_option("--output", output, "bag to write")->required()->check(vcharge::requireOutput);
-  app.add_option("--rig", rig, "rig.yaml to write; the mask goes beside it")
-      ->required()
-      ->check(vcharge::requireOutput);
-  app.add_option("--camera", options.camera_name, "name of the camera")->capture_default_str();
-  app.add_option("--field-of-view-rad", options.field_of_view_rad, "full angle")->capture_default_str();
-  app.add_option("--ground-height-m", options.ground_height_m,
-                 "ground plane in the recording's vehicle frame: z = height + slope_x x + slope_y y")
-      ->capture_default_str();
-  app.add_option("--ground-slope-x", options.ground_slope_x)->capture_default_str();
-  app.add_option("--ground-slope-y", options.ground_slope_y)->capture_default_str();
-  app.add_flag("--no-mask", no_mask, "do not mask the car's body");
-  app.footer("Keys of --json: num_images, num_odometry.");
+  app.addOption("--folder", &folder, "folder of the images").required();
+  app.addOption("--output", &output, "bag to write").required().check(vcharge::requireOutput);
+  app.addOption("--rig", &rig, "rig.yaml to write; the mask goes beside it")
+      .required()
+      .check(vcharge::requireOutput);
+  app.addOption("--camera", &options.camera_name, "name of the camera").showDefault();
+  app.addOption("--field-of-view-rad", &options.field_of_view_rad, "full angle").showDefault();
+  app.addOption("--ground-height-m", &options.ground_height_m,
+                "ground plane in the recording's vehicle frame: z = height + slope_x x + slope_y y")
+      .showDefault();
+  app.addOption("--ground-slope-x", &options.ground_slope_x).showDefault();
+  app.addOption("--ground-slope-y", &options.ground_slope_y).showDefault();
+  app.addFlag("--no-mask", &no_mask, "do not mask the car's body");
+  app.setFooter("Keys of --json: num_images, num_odometry.");
   return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     options.mask_vehicle = !no_mask;
     const vcharge::VchargeRecording recording = vcharge::readVchargeRecording(folder, options);

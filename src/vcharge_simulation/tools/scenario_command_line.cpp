@@ -1,6 +1,7 @@
 #include "scenario_command_line.h"
 
 #include <algorithm>
+#include <optional>
 #include <sstream>
 #include <type_traits>
 
@@ -34,8 +35,8 @@ std::vector<CatalogueEntry> listFaults() {
 
 }  // namespace
 
-ScenarioCommandLine::ScenarioCommandLine(CLI::App* app) {
-  app->add_option("--scenario", file_, "YAML file of the scenario; options override it");
+ScenarioCommandLine::ScenarioCommandLine(CommandLine* app) {
+  app->addOption("--scenario", &file_, "YAML file of the scenario; options override it");
   add(app, &DriveScenario::scene);
   add(app, &DriveScenario::drive);
   add(app, &DriveScenario::rig);
@@ -50,37 +51,38 @@ ScenarioCommandLine::ScenarioCommandLine(CLI::App* app) {
   add(app, &DriveScenario::image_scale);
   add(app, &DriveScenario::image_step);
   add(app, &DriveScenario::duration_s);
-  add(app, &DriveScenario::cameras)->delimiter(',');
-  const CLI::Option* noise = app->add_option("--noise", noise_, "Add sensor noise to the images: on or off.")
-                                 ->check(CLI::IsMember({"on", "off"}))
-                                 ->capture_default_str();
+  add(app, &DriveScenario::cameras).delimiter(',');
+  const CommandLine::Option noise =
+      app->addOption("--noise", &noise_, "Add sensor noise to the images: on or off.")
+          .oneOf({"on", "off"})
+          .showDefault();
   overrides_.emplace_back([this, noise](DriveScenario* scenario) {
-    if (noise->count() > 0) {
+    if (noise.isGiven()) {
       scenario->noise = noise_ == "on";
     }
   });
-  app->add_option("--set", settings_,
-                  "KEY=VALUE for any key of --show-options, as in faults.dead_camera.cameras=[left]");
+  app->addOption("--set", &settings_,
+                 "KEY=VALUE for any key of --show-options, as in faults.dead_camera.cameras=[left]");
 }
 
 template <class T>
-CLI::Option* ScenarioCommandLine::add(CLI::App* app, T DriveScenario::*field) {
-  CLI::Option* option = nullptr;
+CommandLine::Option ScenarioCommandLine::add(CommandLine* app, T DriveScenario::*field) {
+  std::optional<CommandLine::Option> option;
   forEachOption(given_, [&](const OptionDeclaration& declared, auto& value) {
     if constexpr (std::is_same_v<std::decay_t<decltype(value)>, T>) {
       if (&value == &(given_.*field)) {
         std::string name = declared.name;
         std::replace(name.begin(), name.end(), '_', '-');
-        option = app->add_option("--" + name, value, declared.meaning)->capture_default_str();
+        option = app->addOption("--" + name, &value, declared.meaning).showDefault();
       }
     }
   });
-  overrides_.emplace_back([this, option, field](DriveScenario* scenario) {
-    if (option->count() > 0) {
+  overrides_.emplace_back([this, option = *option, field](DriveScenario* scenario) {
+    if (option.isGiven()) {
       scenario->*field = given_.*field;
     }
   });
-  return option;
+  return *option;
 }
 
 DriveScenario ScenarioCommandLine::scenario() const {

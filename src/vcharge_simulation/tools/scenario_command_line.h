@@ -4,8 +4,7 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
+#include "vcharge_core/base/command_line.h"
 #include "vcharge_simulation/drive/drive_scenario.h"
 
 namespace vcharge {
@@ -15,7 +14,7 @@ namespace vcharge {
 class ScenarioCommandLine {
  public:
   /// Adds the options to `app`, which must outlive this object and be parsed before scenario().
-  explicit ScenarioCommandLine(CLI::App* app);
+  explicit ScenarioCommandLine(CommandLine* app);
   ScenarioCommandLine(const ScenarioCommandLine&) = delete;
   ScenarioCommandLine& operator=(const ScenarioCommandLine&) = delete;
 
@@ -24,7 +23,7 @@ class ScenarioCommandLine {
 
  private:
   template <class T>
-  CLI::Option* add(CLI::App* app, T DriveScenario::*field);
+  CommandLine::Option add(CommandLine* app, T DriveScenario::*field);
 
   std::string file_, noise_ = "on";
   std::vector<std::string> settings_;

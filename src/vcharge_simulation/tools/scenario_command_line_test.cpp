@@ -1,6 +1,6 @@
 #include "scenario_command_line.h"
 
-#include <algorithm>
+#include <exception>
 #include <fstream>
 #include <sstream>
 
@@ -17,10 +17,9 @@ std::string writeFile(const std::string& name, const std::string& text) {
   return path;
 }
 
-DriveScenario parse(std::vector<std::string> words) {
-  CLI::App app;
+DriveScenario parse(const std::vector<std::string>& words) {
+  CommandLine app;
   const ScenarioCommandLine command_line(&app);
-  std::reverse(words.begin(), words.end());
   app.parse(words);
   return command_line.scenario();
 }

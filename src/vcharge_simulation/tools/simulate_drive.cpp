@@ -8,10 +8,11 @@
 #include "drive_recorder.h"
 #include "scenario_command_line.h"
 #include "vcharge_core/base/command_line.h"
+#include "vcharge_core/base/error.h"
 #include "vcharge_core/base/options.h"
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  vcharge::CommandLine app(
       "Simulates a drive of a car with four fisheye cameras and writes it as a bag. Beside it are written "
       "rig_truth.yaml and the folder BAG_truth with rig.yaml and masks, trajectory.tum, height_map.tiff and "
       ".yaml, obstacles.yaml, movers.yaml, faults.yaml and, depending on options and scene, board.yaml, "
@@ -21,21 +22,18 @@ int main(int argc, char** argv) {
   bool list = false;
   bool show_options = false;
   int threads = 0;
-  const CLI::Option* output =
-      app.add_option("--output", recording.bag, "bag to write")->check(vcharge::requireOutput);
-  app.add_option(
-      "--images-from", recording.images_from,
+  const vcharge::CommandLine::Option output =
+      app.addOption("--output", &recording.bag, "bag to write").check(vcharge::requireOutput);
+  app.addOption(
+      "--images-from", &recording.images_from,
       "bag of the same drive with the same --seed and --noise off, whose images are used instead of "
       "rendering");
-  app.add_flag("--truth-range", recording.truth_range, "write the range of every pixel");
-  app.add_option("--height-cell-m", recording.height_cell_m, "cell size of the height map")
-      ->capture_default_str();
-  app.add_option("--threads", threads, "number of threads; 0: one per core")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  app.add_flag("--list", list, "print scenes, drives, rigs and faults, and exit");
+  app.addFlag("--truth-range", &recording.truth_range, "write the range of every pixel");
+  app.addOption("--height-cell-m", &recording.height_cell_m, "cell size of the height map").showDefault();
+  app.addOption("--threads", &threads, "number of threads; 0: one per core").notNegative().showDefault();
+  app.addFlag("--list", &list, "print scenes, drives, rigs and faults, and exit");
   vcharge::addShowOptions(&app, &show_options);
-  app.footer("Keys of --json: scenario (all its options).");
+  app.setFooter("Keys of --json: scenario (all its options).");
   return vcharge::runTool(&app, argc, argv, [&](nlohmann::json* found) {
     if (list) {
       std::cout << vcharge::describeCatalogue();
@@ -48,8 +46,8 @@ int main(int argc, char** argv) {
     }
     vcharge::requireField(recording.height_cell_m >= 0.01 && recording.height_cell_m <= 10.0, "height_cell_m",
                           "must be in [0.01, 10]", recording.height_cell_m);
-    if (output->count() == 0) {
-      throw CLI::RequiredError("--output");
+    if (!output.isGiven()) {
+      throw vcharge::InputError("--output is required (see --help)");
     }
     std::optional<tbb::global_control> limit;
     if (threads > 0) {

@@ -1,111 +1,94 @@
 #pragma once
 
-#include <algorithm>
-#include <exception>
-#include <filesystem>
 #include <functional>
-#include <iostream>
+#include <memory>
 #include <string>
-#include <string_view>
-#include <type_traits>
+#include <vector>
 
-#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "vcharge_core/files/file_io.h"
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
 
 namespace vcharge {
 
-/// Check of a CLI::Option for a path: returns an error for an empty path, or "".
-inline std::string requireNotEmpty(const std::string& value) {
-  return value.empty() ? "expected a path, got ''" : "";
-}
+/// The options of a tool, with --help. (It hides the library that parses them, whose headers take long to
+/// compile.)
+class CommandLine {
+ public:
+  /// An option that was added; valid as long as its command line.
+  class Option {
+   public:
+    Option& required();
+    /// `error` returns what is wrong with a value, or "".
+    Option& check(const std::function<std::string(const std::string& value)>& error);
+    Option& positive();
+    Option& notNegative();
+    Option& inRange(int least, int most);
+    Option& inRange(double least, double most);
+    Option& oneOf(const std::vector<std::string>& values);
+    Option& expected(int num_values);
+    Option& expected(int least_num_values, int most_num_values);
+    Option& delimiter(char letter);
+    Option& needs(const Option& other);
+    Option& excludes(const Option& other);
+    /// Shows the present value in --help.
+    Option& showDefault();
+    /// Whether it was given, after parse().
+    bool isGiven() const;
 
-/// Check of a CLI::Option for a file to write: reports before the work starts if it cannot be written.
+   private:
+    friend class CommandLine;
+    explicit Option(CLI::Option* option) : option_(option) {}
+
+    CLI::Option* option_;
+  };
+
+  explicit CommandLine(const std::string& description = "");
+  CommandLine(const CommandLine&) = delete;
+  CommandLine& operator=(const CommandLine&) = delete;
+  ~CommandLine();
+
+  /// `name` as "--name", or without dashes for a value by its place. `value` gets what is given: a
+  /// std::string, int, uint32_t, uint64_t, double, std::optional<int64_t>, or a std::vector of strings or
+  /// doubles.
+  template <class T>
+  Option addOption(const std::string& name, T* value, const std::string& meaning = "");
+  Option addFlag(const std::string& name, bool* is_given, const std::string& meaning);
+  /// Text after the options of --help.
+  void setFooter(const std::string& text);
+
+  /// Throws std::exception naming the option and what was expected.
+  void parse(const std::vector<std::string>& words);
+
+ private:
+  friend int runTool(CommandLine* command_line, int argc, char** argv, const std::function<void()>& run);
+
+  std::unique_ptr<CLI::App> app_;
+};
+
+/// Check of an option for a path: returns an error for an empty path, or "".
+std::string requireNotEmpty(const std::string& value);
+/// Check of an option for a file to write: reports before the work starts if it cannot be written.
 /// Throws InputError naming the path.
-inline std::string requireOutput(const std::string& value) {
-  const std::string error = requireNotEmpty(value);
-  if (error.empty()) {
-    requireWritable(value);
-  }
-  return error;
-}
+std::string requireOutput(const std::string& value);
 /// The same for a folder to write.
-inline std::string requireOutputFolder(const std::string& value) {
-  const std::string error = requireNotEmpty(value);
-  if (error.empty()) {
-    requireWritableFolder(value);
-  }
-  return error;
-}
+std::string requireOutputFolder(const std::string& value);
 
 /// Adds --show-options to a tool. With it, runTool() requires no other argument.
-inline void addShowOptions(CLI::App* app, bool* show_options) {
-  app->add_flag("--show-options", *show_options,
-                "print all options with their values, units and meaning, and do nothing else");
-}
-
-namespace internal {
-
-/// Parses the arguments, runs, and turns an error into one line and an exit status.
-inline int parseAndRun(CLI::App* app, int argc, char** argv, const std::function<void()>& run) {
-  const std::string tool = std::filesystem::path(argv[0]).filename().string();
-  if (std::find(argv, argv + argc, std::string_view("--show-options")) != argv + argc) {
-    for (CLI::Option* option : app->get_options()) {
-      option->required(false);
-    }
-  }
-  try {
-    app->parse(argc, argv);
-    run();
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
-      return app->exit(error);  // --help
-    }
-    std::cerr << tool << ": " << error.what() << " (see --help)\n";
-    return error.get_exit_code();
-  } catch (const std::exception& error) {
-    std::cerr << tool << ": " << error.what() << "\n";
-    return 1;
-  }
-  return 0;
-}
-
-inline void writeJson(const nlohmann::json& found, const std::string& path) {
-  if (!path.empty()) {
-    writeTextFileAtomically(path, found.dump(1) + "\n");
-  }
-}
-
-}  // namespace internal
+void addShowOptions(CommandLine* command_line, bool* show_options);
 
 /// A tool's main(): parses its arguments, then calls `run`. Returns the exit status, which is 0 only for
 /// success. With --show-options, a tool that has it requires no other argument. An error in the arguments or
 /// thrown by `run` is printed as one line "<tool>: <what>" on standard error.
-///
-/// If `run` takes a `nlohmann::json*`, the tool also has the option `--json FILE`: the content of this object
-/// is written there when `run` returns or throws, then with the error's text as "error". The tool
-/// documents the keys in `app->footer("Keys of --json: ...")`. NaN is written as null.
-template <class Run>
-int runTool(CLI::App* app, int argc, char** argv, const Run& run) {
-  if constexpr (std::is_invocable_v<const Run&, nlohmann::json*>) {
-    std::string path;
-    app->add_option("--json", path, "file for what the tool measured or found (keys below)")
-        ->check(requireOutput);
-    return internal::parseAndRun(app, argc, argv, [&] {
-      nlohmann::json found = nlohmann::json::object();
-      try {
-        run(&found);
-      } catch (const std::exception& error) {
-        found["error"] = error.what();
-        internal::writeJson(found, path);
-        throw;
-      }
-      internal::writeJson(found, path);
-    });
-  } else {
-    return internal::parseAndRun(app, argc, argv, run);
-  }
-}
+int runTool(CommandLine* command_line, int argc, char** argv, const std::function<void()>& run);
+
+/// The same for a tool with the option `--json FILE`: the object that `run` fills is written there when `run`
+/// returns or throws, then with the error's text as "error". The tool documents the keys in
+/// `setFooter("Keys of --json: ...")`. NaN is written as null.
+int runTool(CommandLine* command_line, int argc, char** argv,
+            const std::function<void(nlohmann::json* found)>& run);
 
 }  // namespace vcharge
