@@ -25,7 +25,64 @@ macro(vcharge_build_settings)
     endif()
     add_link_options(-fsanitize=${VCHARGE_SANITIZE})
   endif()
+  cmake_language(DEFER CALL vcharge_use_precompiled_headers)
 endmacro()
+
+# Headers that most sources include, parsed once for all libraries, once for all tools, and once for all tests. Only in one build of
+# the whole suite by GCC. Sources must include what they use: clang-tidy and builds without this option check them so.
+function(vcharge_add_precompiled_headers)
+  option(VCHARGE_PRECOMPILED_HEADERS "Parse common headers once for all sources" ON)
+  if(NOT VCHARGE_PRECOMPILED_HEADERS OR NOT CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+    return()
+  endif()
+  set(common
+    <algorithm> <array> <cmath> <filesystem> <fstream> <functional> <iostream> <limits> <map> <memory> <mutex> <numeric>
+    <optional> <random> <set> <sstream> <stdexcept> <string> <thread> <unordered_map> <utility> <vector>
+    <Eigen/Core> <Eigen/Geometry> <opencv2/core.hpp>)
+  vcharge_add_headers(library HEADERS ${common})
+  set_target_properties(vcharge_library_headers PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  vcharge_add_headers(tool HEADERS ${common} <nlohmann/json.hpp>)
+  if(CATKIN_ENABLE_TESTING)
+    vcharge_add_headers(test HEADERS ${common} <gmock/gmock.h> <gtest/gtest.h>)
+    target_compile_options(vcharge_test_headers PRIVATE ${vcharge_test_options})
+    target_compile_definitions(vcharge_test_headers PRIVATE GTEST_HAS_PTHREAD=1)
+  endif()
+endfunction()
+
+# vcharge_add_headers(KIND HEADERS <header>...): a target that holds the precompiled headers of a kind of sources.
+function(vcharge_add_headers kind)
+  cmake_parse_arguments(arg "" "" "HEADERS" ${ARGN})
+  set(source ${CMAKE_CURRENT_BINARY_DIR}/${kind}_headers.cpp)
+  file(WRITE ${source}.new "// Compiled with the precompiled headers that others use.\n")
+  configure_file(${source}.new ${source} COPYONLY)
+  add_library(vcharge_${kind}_headers OBJECT ${source})
+  target_link_libraries(vcharge_${kind}_headers PRIVATE Eigen3::Eigen ${OpenCV_LIBS})
+  target_precompile_headers(vcharge_${kind}_headers PRIVATE ${arg_HEADERS})
+endfunction()
+
+# Lets every target of this package use the precompiled headers of its kind.
+function(vcharge_use_precompiled_headers)
+  if(NOT TARGET vcharge_library_headers)
+    return()
+  endif()
+  get_directory_property(targets BUILDSYSTEM_TARGETS)
+  foreach(target ${targets})
+    get_target_property(type ${target} TYPE)
+    get_target_property(kind ${target} VCHARGE_HEADERS)
+    if(kind)
+    elseif(type STREQUAL SHARED_LIBRARY)
+      set(kind library)
+    elseif(type STREQUAL EXECUTABLE)
+      set(kind tool)
+    else()
+      continue()
+    endif()
+    target_precompile_headers(${target} REUSE_FROM vcharge_${kind}_headers)
+  endforeach()
+endfunction()
+
+# Tests spend their time in libraries: their own code is compiled fast.
+set(vcharge_test_options -O1)
 
 # vcharge_add_gtest(NAME SOURCES a_test.cpp... [LIBRARIES target...])
 function(vcharge_add_gtest name)
@@ -36,6 +93,8 @@ function(vcharge_add_gtest name)
   catkin_add_gtest(${name} ${arg_SOURCES})
   if(TARGET ${name})
     target_link_libraries(${name} gtest_main gmock ${arg_LIBRARIES})
+    target_compile_options(${name} PRIVATE ${vcharge_test_options})
+    set_target_properties(${name} PROPERTIES VCHARGE_HEADERS test)
   endif()
 endfunction()
 
