@@ -42,18 +42,13 @@ class Report {
 
  private:
   void writeVerdict() {
-    const std::string verdict = toString(result_.verdict);
-    out_ << "<p class=\"verdict " << verdict << "\"><b>" << verdict << "</b>";
-    for (const std::string& remark : result_.remarks) {
-      out_ << "<br>" << escapeHtml(remark);
-    }
-    out_ << "</p>";
+    out_ << htmlVerdict(toString(result_.verdict), result_.remarks);
     if (result_.views.empty()) {
       return;
     }
     out_ << "<table>";
     const auto row = [this](const std::string& name, const std::string& value) {
-      out_ << "<tr><td>" << escapeHtml(name) << "</td><td>" << escapeHtml(value) << "</td></tr>";
+      out_ << htmlRow({name, value});
     };
     row("board", board_.description() + ", " + toText(1000.0 * board_.square_m, 1) + " mm");
     row("images used", std::to_string(result_.views.size()) + " of " +

@@ -10,6 +10,7 @@
 #include "rig/rig_judgement.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/base/text_format.h"
+#include "vcharge_core/motion/pose_step.h"
 
 namespace vcharge {
 namespace {
@@ -37,14 +38,6 @@ Vector6d formulaSigma(const HandEye& hand_eye) {
   sigma << hand_eye.position_sigma_m, hand_eye.position_sigma_m, kNaN, hand_eye.tilt_sigma_rad,
       hand_eye.tilt_sigma_rad, hand_eye.yaw_sigma_rad;
   return sigma;
-}
-
-/// [dt, dphi] that moves `from` to `to`.
-Vector6d differenceOf(const RigidTransform& from, const RigidTransform& to) {
-  Vector6d difference;
-  difference << to.translation() - from.translation(),
-      vectorFromRotation(to.rotation() * from.rotation().conjugate());
-  return difference;
 }
 
 /// Text of an angle, rounded up to tens of degrees.
@@ -122,7 +115,7 @@ CameraOutlook CalibrationCoach::cameraOutlook(size_t camera) const {
       outlook.sigma.setConstant(kNaN);  // a single part of the drive determines the result
       return outlook;
     }
-    squares += differenceOf(outlook.hand_eye.vehicle_from_camera, without.vehicle_from_camera).cwiseAbs2();
+    squares += stepBetween(outlook.hand_eye.vehicle_from_camera, without.vehicle_from_camera).cwiseAbs2();
   }
   // Variance of the jackknife times that of Student's t distribution, since there are few groups.
   const double groups = kNumGroups;

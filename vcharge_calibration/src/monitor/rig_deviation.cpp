@@ -8,6 +8,7 @@
 
 #include "matching/inter_camera_matching.h"
 #include "rig/rig_adjustment.h"
+#include "vcharge_core/motion/pose_step.h"
 #include "vcharge_reconstruction/landmarks/landmark_alignment.h"
 #include "vcharge_reconstruction/landmarks/landmark_search.h"
 #include "vcharge_reconstruction/landmarks/triangulation.h"
@@ -49,11 +50,8 @@ Eigen::VectorXd deviationFrom(const CameraRig& rig, const ReconstructionData& ad
   Eigen::VectorXd deviation(kNumFactors + 6 * static_cast<Eigen::Index>(rig.cameras.size()));
   deviation.head<kNumFactors>() << adjusted.odometry_distance_scale - 1.0, adjusted.odometry_turn_scale - 1.0;
   for (size_t i = 0; i < rig.cameras.size(); ++i) {
-    const RigidTransform& before = *rig.cameras[i].vehicle_from_camera;
-    const RigidTransform& now = *adjusted.rig->cameras[i].vehicle_from_camera;
-    deviation.segment<6>(kNumFactors + 6 * static_cast<Eigen::Index>(i))
-        << now.translation() - before.translation(),
-        vectorFromRotation(now.rotation() * before.rotation().conjugate());
+    deviation.segment<6>(kNumFactors + 6 * static_cast<Eigen::Index>(i)) =
+        stepBetween(*rig.cameras[i].vehicle_from_camera, *adjusted.rig->cameras[i].vehicle_from_camera);
   }
   return deviation;
 }

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "vcharge_core/base/text_format.h"
+#include "vcharge_core/motion/pose_step.h"
 
 namespace vcharge {
 namespace {
@@ -19,15 +20,15 @@ constexpr double kMaxSigma_rad = 0.001;
 
 RigRepair repairRig(const RigMonitor& monitor) {
   RigRepair repair;
-  std::set<size_t> moved;
+  std::set<size_t> cameras;
   double last_m = 0.0;
   for (const RigChange& change : monitor.changes()) {
     if (change.part == RigPart::kCamera) {
-      moved.insert(change.camera);
+      cameras.insert(change.camera);
       last_m = change.latest_m;
     }
   }
-  if (moved.empty()) {
+  if (cameras.empty()) {
     return repair;
   }
   const MonitoredPart& now = monitor.parts().back();
@@ -39,7 +40,7 @@ RigRepair repairRig(const RigMonitor& monitor) {
   }
   const Eigen::MatrixXd covariance = monitor.covariance();
   auto rig = std::make_shared<CameraRig>(monitor.rig());
-  for (const size_t i : moved) {
+  for (const size_t i : cameras) {
     RigCamera& camera = rig->cameras[i];
     const Eigen::Index row = RigDeviation::rowOf(i);
     const double sigma_m = now.sigmas.segment<3>(row).maxCoeff();
@@ -50,10 +51,7 @@ RigRepair repairRig(const RigMonitor& monitor) {
                                " degrees: drive turns to both sides for its repair");
       continue;
     }
-    const RigidTransform& before = *camera.vehicle_from_camera;
-    camera.vehicle_from_camera =
-        RigidTransform(rotationFromVector(now.deviation.segment<3>(row + 3)) * before.rotation(),
-                       before.translation() + now.deviation.segment<3>(row));
+    camera.vehicle_from_camera = moved(*camera.vehicle_from_camera, now.deviation.segment<6>(row));
     camera.covariance = covariance.block<6, 6>(row, row);
     repair.cameras.push_back(camera.name);
   }

@@ -62,20 +62,11 @@ std::string draw(const RigMonitor& monitor, const Curves& curves) {
   return plot.make();
 }
 
-std::string verdictOf(const MonitorVerdict& verdict) {
-  const std::string grade = toString(verdict.grade);
-  std::string text = "<p class=\"verdict " + grade + "\"><b>" + grade + "</b>";
-  for (const std::string& remark : verdict.remarks) {
-    text += "<br>" + escapeHtml(remark);
-  }
-  return text + "</p>";
-}
-
 }  // namespace
 
 std::string makeMonitorReport(const std::string& title, const RigMonitor& monitor,
                               const MonitorVerdict& verdict) {
-  std::string body = verdictOf(verdict);
+  std::string body = htmlVerdict(toString(verdict.grade), verdict.remarks);
   if (monitor.parts().empty()) {
     return htmlPage(title, body);
   }

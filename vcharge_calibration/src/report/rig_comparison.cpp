@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 
 #include "vcharge_core/base/error.h"
+#include "vcharge_core/motion/pose_step.h"
 
 namespace vcharge {
 namespace {
@@ -30,10 +31,7 @@ RigComparison compareRigs(const CameraRig& first, const CameraRig& second) {
     const RigCamera& other = second.cameras[index];
     CameraDifference of_camera;
     of_camera.name = camera.name;
-    of_camera.difference << extrinsicsOf(other, "second").translation() -
-                                extrinsicsOf(camera, "first").translation(),
-        vectorFromRotation(other.vehicle_from_camera->rotation() *
-                           camera.vehicle_from_camera->rotation().conjugate());
+    of_camera.difference = stepBetween(extrinsicsOf(camera, "first"), extrinsicsOf(other, "second"));
     Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
     for (const auto& of_rig : {camera.covariance, other.covariance}) {
       if (of_rig) {

@@ -21,35 +21,18 @@ constexpr int kPairWidth_px = 1120;
 constexpr double kVectorScale = 50.0;
 const std::vector<double> kSeamDistances_m = {2.0, 5.0, 10.0};
 
-std::string rowOf(const std::vector<std::string>& cells, bool is_head = false) {
-  std::string text = "<tr>";
-  for (const std::string& cell : cells) {
-    text += is_head ? "<th>" + escapeHtml(cell) + "</th>" : "<td>" + escapeHtml(cell) + "</td>";
-  }
-  return text + "</tr>";
-}
-
-std::string verdictOf(const RigCalibration& result) {
-  const std::string verdict = toString(result.verdict);
-  std::string text = "<p class=\"verdict " + verdict + "\"><b>" + verdict + "</b>";
-  for (const std::string& remark : result.remarks) {
-    text += "<br>" + escapeHtml(remark);
-  }
-  return text + "</p>";
-}
-
 std::string summaryOf(const RigCalibration& result) {
   return "<table>" +
-         rowOf({"drive", toText(result.distance_m, 1) + " m, " + toText(kDegrees * result.left_turn_rad, 0) +
-                             " degrees to the left, " + toText(kDegrees * result.right_turn_rad, 0) +
-                             " to the right"}) +
-         rowOf({"map", std::to_string(result.num_keyframes) + " keyframes, " +
-                           std::to_string(result.num_landmarks) + " landmarks, " +
-                           std::to_string(result.num_loop_edges) + " loop edges"}) +
-         rowOf({"reprojection error, RMS per coordinate", toText(result.rms_px, 3) + " px"}) +
-         rowOf({"odometer's turn, true over counted", toText(result.odometer_turn_scale, 5)}) +
-         rowOf({"delay of the odometer's stamps", toText(1000.0 * result.time_offset_s, 1) + " ms"}) +
-         rowOf({"height", result.height_source}) + "</table>";
+         htmlRow({"drive", toText(result.distance_m, 1) + " m, " +
+                               toText(kDegrees * result.left_turn_rad, 0) + " degrees to the left, " +
+                               toText(kDegrees * result.right_turn_rad, 0) + " to the right"}) +
+         htmlRow({"map", std::to_string(result.num_keyframes) + " keyframes, " +
+                             std::to_string(result.num_landmarks) + " landmarks, " +
+                             std::to_string(result.num_loop_edges) + " loop edges"}) +
+         htmlRow({"reprojection error, RMS per coordinate", toText(result.rms_px, 3) + " px"}) +
+         htmlRow({"odometer's turn, true over counted", toText(result.odometer_turn_scale, 5)}) +
+         htmlRow({"delay of the odometer's stamps", toText(1000.0 * result.time_offset_s, 1) + " ms"}) +
+         htmlRow({"height", result.height_source}) + "</table>";
 }
 
 /// Table row of each degree of freedom and its standard deviation; the angles are zero for an upright camera
@@ -63,8 +46,8 @@ std::string parametersOf(const RigCalibration& result) {
       " Yaw, pitch and roll are zero for an upright camera that looks forward; their deviations are about "
       "the "
       "vehicle's z, y and x.</p><table>" +
-      rowOf({"camera", "x (cm)", "y (cm)", "z (cm)", "yaw (degrees)", "pitch", "roll", "least certain"},
-            true);
+      htmlRow({"camera", "x (cm)", "y (cm)", "z (cm)", "yaw (degrees)", "pitch", "roll", "least certain"},
+              true);
   for (size_t i = 0; i < result.cameras.size(); ++i) {
     const CameraCalibration& camera = result.cameras[i];
     const Eigen::Matrix<double, 6, 1> values = positionAndAngles(*result.rig->cameras[i].vehicle_from_camera);
@@ -75,7 +58,7 @@ std::string parametersOf(const RigCalibration& result) {
       cells.push_back(toText(values[k], digits) + " \u00b1 " + toText(sigmas[k], digits));
     }
     cells.push_back(camera.weakest_direction);
-    text += rowOf(cells);
+    text += htmlRow(cells);
   }
   return text + "</table>";
 }
@@ -83,17 +66,17 @@ std::string parametersOf(const RigCalibration& result) {
 std::string checksOf(const RigCalibration& result) {
   std::string text =
       "<h2>Checks</h2><table>" +
-      rowOf({"camera", "observations tracked", "adjusted", "error (px RMS)", "common to neighbours (px)",
-             "landmarks shared with other cameras", "difference of the halves of the drive (cm)", "(degrees)",
-             "largest ratio of jackknife to formula"},
-            true);
+      htmlRow({"camera", "observations tracked", "adjusted", "error (px RMS)", "common to neighbours (px)",
+               "landmarks shared with other cameras", "difference of the halves of the drive (cm)",
+               "(degrees)", "largest ratio of jackknife to formula"},
+              true);
   for (const CameraCalibration& camera : result.cameras) {
-    text += rowOf({camera.name, std::to_string(camera.num_tracked), std::to_string(camera.num_observations),
-                   toText(camera.rms_px, 3), toText(camera.structure_px, 3),
-                   std::to_string(camera.num_common_landmarks),
-                   toText(100.0 * camera.half_difference.head<3>().norm(), 2),
-                   toText(kDegrees * camera.half_difference.tail<3>().norm(), 3),
-                   toText(camera.inflation.maxCoeff(), 1)});
+    text += htmlRow({camera.name, std::to_string(camera.num_tracked), std::to_string(camera.num_observations),
+                     toText(camera.rms_px, 3), toText(camera.structure_px, 3),
+                     std::to_string(camera.num_common_landmarks),
+                     toText(100.0 * camera.half_difference.head<3>().norm(), 2),
+                     toText(kDegrees * camera.half_difference.tail<3>().norm(), 3),
+                     toText(camera.inflation.maxCoeff(), 1)});
   }
   return text + "</table>";
 }
@@ -142,7 +125,7 @@ std::string seamsOf(const RigCalibration& result, const KeyframeImages& images) 
   for (const double distance_m : kSeamDistances_m) {
     head.push_back("at " + toText(distance_m, 0) + " m (cm)");
   }
-  text += rowOf(head, true);
+  text += htmlRow(head, true);
   std::vector<std::string> cells;
   for (const SeamPoint& point : seamPoints(rig, before, kSeamDistances_m)) {
     if (cells.empty()) {
@@ -155,7 +138,7 @@ std::string seamsOf(const RigCalibration& result, const KeyframeImages& images) 
       cells.back() += " (" + toText(100.0 * point.before_m, 1) + ")";
     }
     if (cells.size() > kSeamDistances_m.size()) {
-      text += rowOf(cells);
+      text += htmlRow(cells);
       cells.clear();
     }
   }
@@ -199,7 +182,7 @@ std::string errorsOf(const ReconstructionState& state) {
 std::string makeRigReport(const std::string& title, const RigCalibration& result,
                           const ReconstructionState& state, const KeyframeImages& images,
                           const std::string& more_sections) {
-  std::string body = verdictOf(result) + summaryOf(result);
+  std::string body = htmlVerdict(toString(result.verdict), result.remarks) + summaryOf(result);
   if (result.rig != nullptr) {
     body += parametersOf(result) +
             row(htmlFigure(drawCameras(*result.rig),
@@ -217,7 +200,7 @@ std::string makeRigReport(const std::string& title, const RigCalibration& result
   }
   body += more_sections + "<h2>Times</h2><table>";
   for (const auto& [stage, seconds] : state.report.stage_s) {
-    body += rowOf({stage, toText(seconds, 1) + " s"});
+    body += htmlRow({stage, toText(seconds, 1) + " s"});
   }
   return htmlPage(title, body + "</table>");
 }

@@ -11,6 +11,7 @@
 #include "rig/rig_adjustment.h"
 #include "vcharge_core/base/text_format.h"
 #include "vcharge_core/camera/pixel_angle.h"
+#include "vcharge_core/motion/pose_step.h"
 
 namespace vcharge {
 namespace {
@@ -132,12 +133,6 @@ std::shared_ptr<const CameraRig> calibrateHalf(const RigAdjustmentOptions& optio
   return half.rig;
 }
 
-Vector6d difference(const RigidTransform& a, const RigidTransform& b) {
-  Vector6d result;
-  result << a.translation() - b.translation(), vectorFromRotation(a.rotation() * b.rotation().conjugate());
-  return result;
-}
-
 Vector6d commonVariances(const RigAdjustmentOptions& options, const RigCamera& camera) {
   const double sigma_rad = options.common_error_px * radiansPerPixel(camera);
   Vector6d sigmas = Vector6d::Constant(sigma_rad);
@@ -236,7 +231,7 @@ void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, cons
   for (size_t i = 0; i < rig->cameras.size(); ++i) {
     CameraCalibration& camera = result->cameras[i];
     camera.half_difference =
-        difference(*odd->cameras[i].vehicle_from_camera, *even->cameras[i].vehicle_from_camera);
+        stepBetween(*even->cameras[i].vehicle_from_camera, *odd->cameras[i].vehicle_from_camera);
     if (uncertainty.is_valid) {
       const auto at = static_cast<Eigen::Index>(6 * i);
       const Matrix6d schur = uncertainty.covariance.block<6, 6>(at, at);

@@ -9,6 +9,7 @@
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/camera/pixel_angle.h"
 #include "vcharge_core/motion/cross_matrix.h"
+#include "vcharge_core/motion/pose_step.h"
 
 namespace vcharge {
 namespace {
@@ -140,10 +141,7 @@ void PoseFilter::addNoise(double sigma_m, double sigma_rad) {
 }
 
 Eigen::Matrix<double, 6, 1> PoseFilter::differenceTo(const RigidTransform& map_from_vehicle) const {
-  Eigen::Matrix<double, 6, 1> difference;
-  difference << map_from_vehicle.translation() - map_from_vehicle_.translation(),
-      vectorFromRotation(map_from_vehicle.rotation() * map_from_vehicle_.rotation().conjugate());
-  return difference;
+  return stepBetween(map_from_vehicle_, map_from_vehicle);
 }
 
 PoseFilter::Matrix6d PoseFilter::noiseOf(const PoseFix& fix) const {
@@ -175,8 +173,7 @@ bool PoseFilter::update(const PoseFix& fix) {
   const Matrix6d expected = covariance_.topLeftCorner<6, 6>() + noise;
   const Eigen::Matrix<double, 8, 6> gain = expected.ldlt().solve(covariance_.topRows<6>()).transpose();
   const Eigen::Matrix<double, 8, 1> change = gain * differenceTo(fix.map_from_vehicle);
-  map_from_vehicle_ = RigidTransform(rotationFromVector(change.segment<3>(3)) * map_from_vehicle_.rotation(),
-                                     map_from_vehicle_.translation() + change.head<3>());
+  map_from_vehicle_ = moved(map_from_vehicle_, change.head<6>());
   factors_ += change.tail<2>();
   // Joseph's form keeps the covariance symmetric and positive.
   Matrix8d keep = Matrix8d::Identity();

@@ -14,23 +14,6 @@ namespace {
 
 constexpr size_t kMaxSkippedRows = 30;
 
-std::string rowOf(const std::vector<std::string>& cells, bool is_head = false) {
-  std::string text = "<tr>";
-  for (const std::string& cell : cells) {
-    text += is_head ? "<th>" + escapeHtml(cell) + "</th>" : "<td>" + escapeHtml(cell) + "</td>";
-  }
-  return text + "</tr>";
-}
-
-std::string verdictOf(const MapVerdict& verdict) {
-  const std::string grade = toString(verdict.grade);
-  std::string text = "<p class=\"verdict " + grade + "\"><b>" + grade + "</b>";
-  for (const std::string& remark : verdict.remarks) {
-    text += "<br>" + escapeHtml(remark);
-  }
-  return text + "</p>";
-}
-
 std::string summaryOf(const SparseMap& map, const ReconstructionReport& report) {
   double length_m = 0.0;
   for (size_t k = 1; k < map.keyframes().size(); ++k) {
@@ -40,16 +23,16 @@ std::string summaryOf(const SparseMap& map, const ReconstructionReport& report) 
   }
   const double duration_s = toSeconds(map.keyframes().back().stamp - map.keyframes().front().stamp);
   return "<table>" +
-         rowOf({"drive", toText(length_m, 1) + " m in " + toText(duration_s, 1) + " s, " +
-                             std::to_string(report.counters.frames) + " frames"}) +
-         rowOf({"map", std::to_string(map.keyframes().size()) + " keyframes, " +
-                           std::to_string(map.landmarks().size()) + " landmarks, " +
-                           std::to_string(map.observations().size()) + " observations"}) +
-         rowOf({"error of reprojection, RMS per coordinate", toText(report.rms_px, 3) + " px"}) +
-         rowOf({"odometer: true over counted distance, and turn",
-                toText(map.contents().odometry_distance_scale, 5) + ", " +
-                    toText(map.contents().odometry_turn_scale, 5)}) +
-         rowOf({"content hash", map.contentHash()}) + "</table>";
+         htmlRow({"drive", toText(length_m, 1) + " m in " + toText(duration_s, 1) + " s, " +
+                               std::to_string(report.counters.frames) + " frames"}) +
+         htmlRow({"map", std::to_string(map.keyframes().size()) + " keyframes, " +
+                             std::to_string(map.landmarks().size()) + " landmarks, " +
+                             std::to_string(map.observations().size()) + " observations"}) +
+         htmlRow({"error of reprojection, RMS per coordinate", toText(report.rms_px, 3) + " px"}) +
+         htmlRow({"odometer: true over counted distance, and turn",
+                  toText(map.contents().odometry_distance_scale, 5) + ", " +
+                      toText(map.contents().odometry_turn_scale, 5)}) +
+         htmlRow({"content hash", map.contentHash()}) + "</table>";
 }
 
 std::string loopsOf(const SparseMap& map) {
@@ -57,11 +40,11 @@ std::string loopsOf(const SparseMap& map) {
   for (const MapLoopEdge& edge : map.contents().loop_edges) {
     ++by_reason[edge.accepted ? std::string() : edge.reason];
   }
-  std::string text = "<table>" + rowOf({"pairs of similar keyframes", "edges"}, true) +
-                     rowOf({"accepted", std::to_string(by_reason[""])});
+  std::string text = "<table>" + htmlRow({"pairs of similar keyframes", "edges"}, true) +
+                     htmlRow({"accepted", std::to_string(by_reason[""])});
   for (const auto& [reason, count] : by_reason) {
     if (!reason.empty()) {
-      text += rowOf({"rejected: " + reason, std::to_string(count)});
+      text += htmlRow({"rejected: " + reason, std::to_string(count)});
     }
   }
   return text + "</table>";
@@ -72,7 +55,7 @@ std::string motionsOf(const ReconstructionReport& report) {
       "too few matches agree: the odometer's motion", "a circle about a point on the rear axle's line",
       "any motion in the plane: the wheels slipped", "six degrees of freedom: a ramp, a bump"};
   const std::vector<std::string> names = enumNames<MotionHypothesis>();
-  std::string text = "<table>" + rowOf({"motion between frames", "frames", "meaning"}, true);
+  std::string text = "<table>" + htmlRow({"motion between frames", "frames", "meaning"}, true);
   for (size_t i = 0; i < names.size(); ++i) {
     text += "<tr><td>" + names[i] + "</td><td>" + std::to_string(report.num_motions[i]) +
             "</td><td class=\"text\">" + kMeanings[i] + "</td></tr>";
@@ -82,31 +65,31 @@ std::string motionsOf(const ReconstructionReport& report) {
 
 std::string camerasOf(const SparseMap& map, const ReconstructionReport& report) {
   std::string text =
-      "<table>" + rowOf({"camera", "observations", "error, RMS distance (px)", "images missing"}, true);
+      "<table>" + htmlRow({"camera", "observations", "error, RMS distance (px)", "images missing"}, true);
   for (size_t i = 0; i < map.rig().cameras.size(); ++i) {
     const ReprojectionErrors errors = measureReprojection(map, i);
-    text += rowOf({map.rig().cameras[i].name, std::to_string(errors.num_observations),
-                   toText(errors.rms_px, 3), std::to_string(report.counters.missing_images[i])});
+    text += htmlRow({map.rig().cameras[i].name, std::to_string(errors.num_observations),
+                     toText(errors.rms_px, 3), std::to_string(report.counters.missing_images[i])});
   }
   return text + "</table>";
 }
 
 std::string stagesOf(const ReconstructionReport& report) {
   double sum_s = 0.0;
-  std::string text = "<table>" + rowOf({"stage", "time (s)"}, true);
+  std::string text = "<table>" + htmlRow({"stage", "time (s)"}, true);
   for (const std::string& stage : report.stages) {
     const auto found = report.stage_s.find(stage);
     if (found != report.stage_s.end()) {
       sum_s += found->second;
-      text += rowOf({stage, toText(found->second, 2)});
+      text += htmlRow({stage, toText(found->second, 2)});
     }
   }
-  return text + rowOf({"sum", toText(sum_s, 2)}) + "</table>";
+  return text + htmlRow({"sum", toText(sum_s, 2)}) + "</table>";
 }
 
 std::string skippedOf(const ReconstructionReport& report, Timestamp start) {
   const auto count_row = [](const char* what, int64_t count) {
-    return count > 0 ? rowOf({what, std::to_string(count)}) : std::string();
+    return count > 0 ? htmlRow({what, std::to_string(count)}) : std::string();
   };
   std::string text =
       count_row("frames without odometry: not used", report.counters.frames_without_odometry) +
@@ -128,10 +111,10 @@ std::string skippedOf(const ReconstructionReport& report, Timestamp start) {
   std::stable_sort(longest.begin(), longest.end(),
                    [](const SkippedFrames& a, const SkippedFrames& b) { return a.first < b.first; });
   text += "<p>Longest, of " + std::to_string(report.skipped.size()) + ":</p><table>" +
-          rowOf({"reason", "from (s)", "to (s)", "frames"}, true);
+          htmlRow({"reason", "from (s)", "to (s)", "frames"}, true);
   for (const SkippedFrames& skipped : longest) {
-    text += rowOf({skipped.reason, toText(toSeconds(skipped.first - start), 2),
-                   toText(toSeconds(skipped.last - start), 2), std::to_string(skipped.num_frames)});
+    text += htmlRow({skipped.reason, toText(toSeconds(skipped.first - start), 2),
+                     toText(toSeconds(skipped.last - start), 2), std::to_string(skipped.num_frames)});
   }
   return text + "</table>";
 }
@@ -141,8 +124,10 @@ std::string skippedOf(const ReconstructionReport& report, Timestamp start) {
 std::string makeMapReport(const std::string& title, const SparseMap& map, const ReconstructionState& state) {
   const ReconstructionReport& report = state.report;
   std::ostringstream out;
-  out << verdictOf(judgeMap(map, state)) << summaryOf(map, report) << "<h2>From above</h2>"
-      << htmlFigure(drawTopView(map), "Path and landmarks.") << "<h2>Loops</h2>" << loopsOf(map)
+  const MapVerdict verdict = judgeMap(map, state);
+  out << htmlVerdict(toString(verdict.grade), verdict.remarks) << summaryOf(map, report)
+      << "<h2>From above</h2>" << htmlFigure(drawTopView(map), "Path and landmarks.") << "<h2>Loops</h2>"
+      << loopsOf(map)
       << htmlFigure(drawLoops(map),
                     "Lines between the keyframes of each edge. Faint: similar pairs that did not pass "
                     "verification.")

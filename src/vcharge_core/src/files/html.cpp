@@ -38,6 +38,23 @@ std::string htmlFigure(const std::string& picture, const std::string& caption) {
   return "<figure>" + picture + "<figcaption>" + escapeHtml(caption) + "</figcaption></figure>";
 }
 
+std::string htmlRow(const std::vector<std::string>& cells, bool is_head) {
+  const std::string tag = is_head ? "th>" : "td>";
+  std::string text = "<tr>";
+  for (const std::string& cell : cells) {
+    text += "<" + tag + escapeHtml(cell) + "</" + tag;
+  }
+  return text + "</tr>";
+}
+
+std::string htmlVerdict(const std::string& verdict, const std::vector<std::string>& remarks) {
+  std::string text = "<p class=\"verdict " + verdict + "\"><b>" + verdict + "</b>";
+  for (const std::string& remark : remarks) {
+    text += "<br>" + escapeHtml(remark);
+  }
+  return text + "</p>";
+}
+
 std::string htmlPage(const std::string& title, const std::string& body) {
   return "<!DOCTYPE html><html lang=\"en\"><head><meta charset=\"utf-8\"><title>" + escapeHtml(title) +
          "</title><style>" + kStyle + "</style></head><body><h1>" + escapeHtml(title) + "</h1>" + body +

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "vcharge_core/base/error.h"
+#include "vcharge_core/motion/pose_step.h"
 
 namespace vcharge {
 namespace {
@@ -38,8 +39,8 @@ RigErrors evaluateRig(const CameraRig& estimate, const CameraRig& truth) {
       const RigidTransform& estimated = extrinsicsOf(estimate, camera.name, "estimate");
       CameraErrors of_camera;
       of_camera.name = camera.name;
-      of_camera.error << camera.vehicle_from_camera->translation() - scale * estimated.translation(),
-          vectorFromRotation(camera.vehicle_from_camera->rotation() * estimated.rotation().conjugate());
+      const RigidTransform scaled(estimated.rotation(), scale * estimated.translation());
+      of_camera.error = stepBetween(scaled, *camera.vehicle_from_camera);
       const auto& covariance = estimate.cameras[estimate.findCamera(camera.name)].covariance;
       if (covariance) {
         of_camera.normalized = of_camera.error.cwiseQuotient(covariance->diagonal().cwiseSqrt());

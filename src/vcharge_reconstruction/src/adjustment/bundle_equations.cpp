@@ -9,6 +9,7 @@
 
 #include "landmarks/point_tasks.h"
 #include "vcharge_core/motion/cross_matrix.h"
+#include "vcharge_core/motion/pose_step.h"
 
 namespace vcharge {
 namespace {
@@ -283,9 +284,7 @@ double BundleEquations::step(double damping, BundleState* next) {
   }
   *next = state_;
   for (size_t pose = firstFreePose(); pose < slots_of_pose_.size(); ++pose) {
-    const auto move = change.segment<6>(columnOf(pose));
-    next->poses[pose] = RigidTransform(rotationFromVector(move.tail<3>()) * state_.poses[pose].rotation(),
-                                       state_.poses[pose].translation() + move.head<3>());
+    next->poses[pose] = moved(state_.poses[pose], change.segment<6>(columnOf(pose)));
   }
   next->odometer += change.segment<2>(tailColumn());
   for (size_t i = 0; i < problem_.vehicle_from_camera.size(); ++i) {

@@ -8,6 +8,7 @@
 
 #include "landmarks/point_tasks.h"
 #include "vcharge_core/motion/cross_matrix.h"
+#include "vcharge_core/motion/pose_step.h"
 #include "vcharge_geometry/residuals/pose_block.h"
 #include "vcharge_geometry/residuals/rig_costs.h"
 
@@ -25,9 +26,7 @@ BundleState BundleState::of(const BundleProblem& problem) {
 }
 
 void BundleState::moveCamera(size_t camera, const Eigen::Matrix<double, 6, 1>& move) {
-  const RigidTransform& before = vehicle_from_camera[camera];
-  vehicle_from_camera[camera] = RigidTransform(rotationFromVector(move.tail<3>()) * before.rotation(),
-                                               before.translation() + move.head<3>());
+  vehicle_from_camera[camera] = moved(vehicle_from_camera[camera], move);
   camera_from_vehicle[camera] = vehicle_from_camera[camera].inverse();
 }
 
@@ -105,10 +104,8 @@ Eigen::Vector2d BundleErrors::odometerPrior(const BundleState& state) const {
 Eigen::VectorXd BundleErrors::cameraMoves(const BundleState& state) const {
   Eigen::VectorXd moves(problem_.extrinsics_information.rows());
   for (size_t i = 0; i < problem_.prior_vehicle_from_camera.size(); ++i) {
-    const RigidTransform& before = problem_.prior_vehicle_from_camera[i];
-    const RigidTransform& now = state.vehicle_from_camera[i];
-    moves.segment<6>(6 * static_cast<Eigen::Index>(i)) << now.translation() - before.translation(),
-        vectorFromRotation(now.rotation() * before.rotation().conjugate());
+    moves.segment<6>(6 * static_cast<Eigen::Index>(i)) =
+        stepBetween(problem_.prior_vehicle_from_camera[i], state.vehicle_from_camera[i]);
   }
   return moves;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace vcharge {
 
@@ -9,6 +10,12 @@ std::string escapeHtml(const std::string& text);
 
 /// A figure (an <svg> or <img> element) with a caption, which is escaped.
 std::string htmlFigure(const std::string& picture, const std::string& caption);
+
+/// A row of a table; the cells' texts are escaped.
+std::string htmlRow(const std::vector<std::string>& cells, bool is_head = false);
+
+/// A verdict with its remarks, which are escaped.
+std::string htmlVerdict(const std::string& verdict, const std::vector<std::string>& remarks);
 
 /// A self-contained page in the common style of all reports: tables, rows of figures (class "row"), and
 /// verdicts (class "verdict" with PASS or GOOD, WARN or CHECK, FAIL or BAD). `body` is the HTML after the
