@@ -62,7 +62,7 @@ class SessionMerger {
     }
     stages_.run("landmark search", [&] {
       report_.chance_ratio = chanceRatio();
-      searchLandmarks(options_.search, &state_.data);
+      searchLandmarksBetween(options_.search, first_of_new_, &state_.data);
       report_.common_ratio = commonRatio(state_.data);
     });
     if (report_.common_ratio <= options_.min_common_over_chance * report_.chance_ratio) {
@@ -72,6 +72,7 @@ class SessionMerger {
     }
     stages_.run("adjustment", [&] { adjust(); });
     stages_.run("last adjustment", [&] {
+      // Within map and session, too: their poses are better now.
       searchLandmarks(options_.search, &state_.data);
       adjust();
       checkLoops(state_.data, &state_.report.loop_edges);
@@ -196,7 +197,7 @@ class SessionMerger {
                            (state_.data.keyframes[first].map_from_vehicle.inverse() * *track.position_m);
       }
     }
-    searchLandmarks(options_.search, &turned);
+    searchLandmarksBetween(options_.search, first_of_new_, &turned);
     return commonRatio(turned);
   }
 

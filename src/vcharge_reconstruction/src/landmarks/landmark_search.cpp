@@ -12,6 +12,7 @@
 
 #include <tbb/parallel_for.h>
 
+#include "vcharge_core/base/error.h"
 #include "vcharge_features/descriptor_matching.h"
 
 namespace vcharge {
@@ -45,8 +46,8 @@ struct Proposal {
 
 class LandmarkSearch {
  public:
-  LandmarkSearch(const LandmarkSearchOptions& options, const ReconstructionData& data)
-      : options_(options), data_(data), observed_(data.keyframes.size()) {
+  LandmarkSearch(const LandmarkSearchOptions& options, const ReconstructionData& data, int32_t first_of_new)
+      : options_(options), data_(data), first_of_new_(first_of_new), observed_(data.keyframes.size()) {
     for (size_t t = 0; t < data.tracks.size(); ++t) {
       if (!data.tracks[t].position_m) {
         continue;
@@ -71,11 +72,15 @@ class LandmarkSearch {
   }
 
  private:
+  bool areCompared(int32_t a, int32_t b) const {
+    return a != b && (first_of_new_ == 0 || (a < first_of_new_) != (b < first_of_new_));
+  }
+
   std::vector<size_t> neighboursOf(int32_t keyframe) const {
     std::vector<size_t> neighbours;
     const Eigen::Vector3d& position = data_.keyframes[keyframe].map_from_vehicle.translation();
     for (size_t i = 0; i < data_.keyframes.size(); ++i) {
-      if (static_cast<int32_t>(i) != keyframe &&
+      if (areCompared(static_cast<int32_t>(i), keyframe) &&
           (data_.keyframes[i].map_from_vehicle.translation() - position).norm() <= options_.max_distance_m) {
         neighbours.push_back(i);
       }
@@ -163,6 +168,7 @@ class LandmarkSearch {
 
   const LandmarkSearchOptions& options_;
   const ReconstructionData& data_;
+  const int32_t first_of_new_;  // 0: all keyframes are compared with each other
   std::vector<std::vector<std::pair<int32_t, const TrackObservation*>>> observed_;
 };
 
@@ -269,12 +275,12 @@ void joinTracks(TrackGroups* groups, ReconstructionData* data) {
   }
 }
 
-}  // namespace
-
-LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, ReconstructionData* data) {
+/// searchLandmarksBetween(), or searchLandmarks() for first_of_new = 0.
+LandmarkSearchSummary searchAndJoin(const LandmarkSearchOptions& options, int32_t first_of_new,
+                                    ReconstructionData* data) {
   const auto num_keyframes = static_cast<int32_t>(data->keyframes.size());
   std::vector<std::vector<Proposal>> proposals(num_keyframes);
-  const LandmarkSearch search(options, *data);
+  const LandmarkSearch search(options, *data, first_of_new);
   tbb::parallel_for(int32_t{0}, num_keyframes, [&](int32_t i) { proposals[i] = search.searchKeyframe(i); });
 
   LandmarkSearchSummary summary;
@@ -303,6 +309,18 @@ LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, Reco
   }
   joinTracks(&groups, data);
   return summary;
+}
+
+}  // namespace
+
+LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, ReconstructionData* data) {
+  return searchAndJoin(options, 0, data);
+}
+
+LandmarkSearchSummary searchLandmarksBetween(const LandmarkSearchOptions& options, int32_t first_of_new,
+                                             ReconstructionData* data) {
+  check(first_of_new > 0, "searchLandmarksBetween: expected keyframes on both sides");
+  return searchAndJoin(options, first_of_new, data);
 }
 
 }  // namespace vcharge

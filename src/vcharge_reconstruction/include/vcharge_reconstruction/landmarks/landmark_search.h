@@ -24,4 +24,9 @@ struct LandmarkSearchSummary {
 /// observations; merges two landmarks that share a feature. Data parallel, deterministic.
 LandmarkSearchSummary searchLandmarks(const LandmarkSearchOptions& options, ReconstructionData* data);
 
+/// The same between keyframes before `first_of_new` and those from it on, where each side was searched
+/// before.
+LandmarkSearchSummary searchLandmarksBetween(const LandmarkSearchOptions& options, int32_t first_of_new,
+                                             ReconstructionData* data);
+
 }  // namespace vcharge
