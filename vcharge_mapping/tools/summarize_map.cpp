@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <sstream>
 #include <string>
 
 #include "vcharge_core/base/command_line.h"
@@ -10,6 +11,7 @@
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 #include "vcharge_mapping/map_description.h"
 #include "vcharge_mapping/map_summary.h"
+#include "vcharge_reconstruction/map_localizer.h"
 #include "vcharge_reconstruction/tiled_map.h"
 
 namespace {
@@ -21,6 +23,19 @@ struct Arguments {
   std::string map, output, options;
   bool show_options = false;
 };
+
+/// What keeps the summary from being used; empty if nothing does.
+std::string remarkOn(const SummaryReport& report, int num_cameras) {
+  const int num_needed = MapLocalizerOptions().minInliersWithoutPrior(num_cameras);
+  if (report.median_num_found >= num_needed) {
+    return "";
+  }
+  std::ostringstream text;
+  text << "localization may not start: it needs to find " << num_needed << " landmarks with " << num_cameras
+       << " cameras, and " << report.median_num_found << " are expected (" << report.median_num_found_before
+       << " with all): keep more, or update the map by another drive";
+  return text.str();
+}
 
 void summarize(const Arguments& arguments, const SummaryOptions& options, nlohmann::json* found) {
   MapProvenance provenance;
@@ -35,16 +50,26 @@ void summarize(const Arguments& arguments, const SummaryOptions& options, nlohma
   const SummaryReport& report = summary.report;
   const double ratio =
       static_cast<double>(report.num_landmarks) / static_cast<double>(report.num_landmarks_before);
+  const std::string remark = remarkOn(report, static_cast<int>(map->rig().cameras.size()));
+  const std::string verdict = remark.empty() ? "GOOD" : "CHECK";
   std::cout << "landmarks: " << report.num_landmarks << " of " << report.num_landmarks_before << " ("
             << 100.0 * ratio
             << " %)\ndeviation of a pose over that with all landmarks: " << report.median_sigma_factor
-            << " (median), " << report.worst_sigma_factor << " (worst)\nfile: " << kilobytes_per_100_m
-            << " kB per 100 m of drive\ncontent hash: " << summary.map->contentHash() << "\n";
+            << " (median), " << report.worst_sigma_factor
+            << " (worst)\nlandmarks that a frame of another drive is expected to find: "
+            << report.median_num_found << " (median), with all landmarks " << report.median_num_found_before
+            << "\nfile: " << kilobytes_per_100_m << " kB per 100 m of drive\nverdict: " << verdict
+            << (remark.empty() ? "" : "\n  " + remark) << "\ncontent hash: " << summary.map->contentHash()
+            << "\n";
   *found = {{"num_landmarks", report.num_landmarks},
             {"num_landmarks_before", report.num_landmarks_before},
             {"median_sigma_factor", report.median_sigma_factor},
             {"worst_sigma_factor", report.worst_sigma_factor},
+            {"median_num_found", report.median_num_found},
+            {"median_num_found_before", report.median_num_found_before},
             {"kilobytes_per_100_m", kilobytes_per_100_m},
+            {"verdict", verdict},
+            {"remarks", remark.empty() ? nlohmann::json::array() : nlohmann::json::array({remark})},
             {"content_hash", summary.map->contentHash()}};
 }
 
@@ -59,7 +84,9 @@ int main(int argc, char** argv) {
   addShowOptions(&app, &arguments.show_options);
   app.setFooter(
       "Keys of --json: num_landmarks, num_landmarks_before, median_sigma_factor, worst_sigma_factor, "
-      "kilobytes_per_100_m, content_hash.");
+      "median_num_found (landmarks that a frame of another drive is expected to find), "
+      "median_num_found_before "
+      "(with all landmarks), kilobytes_per_100_m, verdict (GOOD, CHECK), remarks, content_hash.");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     SummaryOptions options;
     if (!arguments.options.empty()) {

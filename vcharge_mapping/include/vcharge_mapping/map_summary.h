@@ -14,8 +14,8 @@ struct SummaryOptions {
   VCHARGE_OPTION(double, max_sigma_factor, 2.0, atLeast(1.0),
                  "Largest deviation of a pose over that with all landmarks.");
   VCHARGE_OPTION(double, max_landmark_ratio, 1.0, above(0.0).upTo(1.0), "Largest part of landmarks to keep.");
-  VCHARGE_OPTION(double, min_found_per_place, 150.0, notNegative(),
-                 "Least landmarks of a keyframe that another drive is expected to find.");
+  VCHARGE_OPTION(double, min_found_per_frame, 80.0, notNegative(),
+                 "Least landmarks that a frame of another drive is expected to find at a keyframe.");
   VCHARGE_END_OPTIONS();
 };
 
@@ -24,6 +24,8 @@ struct SummaryReport {
   size_t num_landmarks_before = 0, num_landmarks = 0;
   /// Deviation of the position over that with all landmarks, of keyframes.
   double median_sigma_factor = 1.0, worst_sigma_factor = 1.0;
+  /// Landmarks that a frame of another drive is expected to find at a keyframe, of the median keyframe.
+  double median_num_found_before = 0.0, median_num_found = 0.0;
 };
 
 struct SummaryMap {

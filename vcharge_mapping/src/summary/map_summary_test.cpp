@@ -13,7 +13,7 @@ namespace {
 TEST(MapSummaryTest, KeepsThePosesAsCertainAsAsked) {
   const auto map = testing::makeWorld(1);
   SummaryOptions options;
-  options.min_found_per_place = 0.0;
+  options.min_found_per_frame = 0.0;
   size_t last = map->landmarks().size();
   for (const double factor : {1.2, 1.5, 2.0, 3.0}) {
     options.max_sigma_factor = factor;
@@ -30,7 +30,7 @@ TEST(MapSummaryTest, KeepsEnoughLandmarksAtEachPlaceOrNoMoreThanAsked) {
   const auto map = testing::makeWorld(1);
   SummaryOptions options;
   options.max_sigma_factor = 10.0;
-  options.min_found_per_place = 10.0;  // as expected: another drive does not find all of them
+  options.min_found_per_frame = 3.0;  // as expected: another drive does not find all of them
   const SummaryMap summary = summarizeMap(*map, options);
   for (size_t k = 0; k < summary.map->keyframes().size(); ++k) {
     const size_t num_kept =
@@ -38,8 +38,12 @@ TEST(MapSummaryTest, KeepsEnoughLandmarksAtEachPlaceOrNoMoreThanAsked) {
     const size_t num_before = map->observationsOf(k, 1).second - map->observationsOf(k, 0).first;
     EXPECT_GE(num_kept, std::min<size_t>(37, num_before));
   }
+  EXPECT_GE(summary.report.median_num_found, 3.0);
+  EXPECT_LT(summary.report.median_num_found, summary.report.median_num_found_before);
   options.max_landmark_ratio = 0.05;
-  EXPECT_LE(summarizeMap(*map, options).report.num_landmarks, map->landmarks().size() / 20 + 1);
+  const SummaryReport least = summarizeMap(*map, options).report;
+  EXPECT_LE(least.num_landmarks, map->landmarks().size() / 20 + 1);
+  EXPECT_LT(least.median_num_found, summary.report.median_num_found);
 }
 
 // A landmark that is gone says nothing about the pose.
@@ -78,7 +82,7 @@ TEST(MapSummaryTest, ExpectsLittleOfLandmarksThatWereSeenOverAShortWay) {
   }
   SummaryOptions options;
   options.max_sigma_factor = 10.0;
-  options.min_found_per_place = 2.0;
+  options.min_found_per_frame = 0.6;
   const auto num_observations = [&](const SparseMap& map) {
     return summarizeMap(map, options).map->observations().size();
   };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -36,6 +37,11 @@ struct MapLocalizerOptions {
   VCHARGE_OPTION(double, max_ambiguity, 0.7, above(0.0).upTo(1.0),
                  "Inliers of the second best over the best pose.");
   VCHARGE_END_OPTIONS();
+
+  /// Least inliers of a relocalization with images of that many cameras.
+  int minInliersWithoutPrior(int num_cameras) const {
+    return std::max(min_inliers_without_prior, min_inliers_per_camera_without_prior * num_cameras);
+  }
 };
 
 /// Expected pose of the vehicle.

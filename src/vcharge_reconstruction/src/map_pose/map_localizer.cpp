@@ -153,8 +153,7 @@ int MapLocalizer::minInliersWithoutPrior(const RigFeatures& features) const {
   const auto num_cameras =
       static_cast<int>(std::count_if(features.images.begin(), features.images.end(),
                                      [](const ImageFeatures& image) { return !image.empty(); }));
-  return std::max(options_.min_inliers_without_prior,
-                  options_.min_inliers_per_camera_without_prior * num_cameras);
+  return options_.minInliersWithoutPrior(num_cameras);
 }
 
 PoseFix MapLocalizer::localizeAtPlace(const RigFeatures& features, const PlaceMatch& place) const {
