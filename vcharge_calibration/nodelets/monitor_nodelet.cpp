@@ -14,9 +14,8 @@ namespace vcharge {
 
 /// Watches a rig during a live or replayed drive as monitor_rig does, and publishes how the car deviates from
 /// it on /calibration/health after each part of the drive. The service ~repair writes the rig with the
-/// cameras that moved where they are now; nodelets take it when they are started. While a part is adjusted,
-/// images are dropped, and the next part begins after it. Parameters: ~rig (path), ~output (rig.yaml to
-/// write), ~options (RigMonitorOptions), ~calibration (RigCalibratorOptions), ~source
+/// cameras that moved where they are now; nodelets take it when they are started. Parameters: ~rig (path),
+/// ~output (rig.yaml to write), ~options (RigMonitorOptions), ~calibration (RigCalibratorOptions), ~source
 /// (LiveDriveSourceOptions), ~lossless_replay (every image in order, as monitor_rig).
 class MonitorNodelet : public Nodelet {
  public:

@@ -86,6 +86,7 @@ void RigMonitor::flush() {
   drive_->follower.flush();
   endPart();
   startPart();
+  waitForEndedPart();
 }
 
 void RigMonitor::endPartIfDue() {
@@ -96,11 +97,23 @@ void RigMonitor::endPartIfDue() {
 }
 
 void RigMonitor::endPart() {
-  const auto num_keyframes = static_cast<double>(drive_->state.data.keyframes.size());
-  if (num_keyframes == 0.0) {
+  if (drive_->state.data.keyframes.empty()) {
     return;
   }
-  RigDeviation deviation = estimateDeviation(calibration_, drive_->images, std::move(drive_->state.data));
+  waitForEndedPart();
+  ended_ = std::move(drive_);
+  adjustment_ = std::async(std::launch::async, [this] { adjustEndedPart(); });
+}
+
+void RigMonitor::waitForEndedPart() {
+  if (adjustment_.valid()) {
+    adjustment_.get();
+  }
+}
+
+void RigMonitor::adjustEndedPart() {
+  RigDeviation deviation = estimateDeviation(calibration_, ended_->images, ended_->state.data);
+  const auto num_keyframes = static_cast<double>(ended_->state.data.keyframes.size());
   MonitoredPart part;
   part.begin_m = parts_.empty() ? 0.0 : parts_.back().end_m;
   part.end_m = part.begin_m + deviation.end_m;
@@ -109,7 +122,7 @@ void RigMonitor::endPart() {
   deviation.end_m = part.end_m;
   std::vector<CameraSight::Seen> seen;
   for (size_t i = 0; i < rig_->cameras.size(); ++i) {
-    seen.push_back({deviation.num_observations[i], drive_->level_sums[i] / num_keyframes});
+    seen.push_back({deviation.num_observations[i], ended_->level_sums[i] / num_keyframes});
   }
   part.sight = sight_->add(seen, part.end_m - part.begin_m);
   for (size_t i = 0; i < part.sight.size(); ++i) {
@@ -121,6 +134,7 @@ void RigMonitor::endPart() {
   part.deviation = detector_.deviation();
   part.sigmas = detector_.covariance().diagonal().cwiseSqrt();
   parts_.push_back(part);
+  ended_.reset();
   if (on_part_) {
     on_part_(part);
   }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -37,23 +38,26 @@ struct MonitoredPart {
 };
 
 /// Watches a rig during ordinary driving: cuts the drive into parts, estimates from each how the car deviates
-/// from its rig, and finds changes. Parts in which a camera sees little say nothing about that camera.
-/// Memory: one part's images, and a few numbers of each part before.
+/// from its rig, and finds changes. A part is adjusted in a thread of its own while the next one is driven;
+/// what comes out does not depend on how long that takes. Parts in which a camera sees little say nothing
+/// about that camera. Memory: two parts' images, and a few numbers of each part before.
 class RigMonitor : public DriveConsumer {
  public:
   using PartCallback = std::function<void(const MonitoredPart&)>;
 
-  /// InputError unless all cameras have extrinsics. `on_part` may be empty.
+  /// InputError unless all cameras have extrinsics. `on_part` may be empty; it is called by the thread
+  /// that adjusts.
   RigMonitor(std::shared_ptr<const CameraRig> rig, const RigCalibratorOptions& calibration,
              const RigMonitorOptions& options, PartCallback on_part);
   ~RigMonitor() override;
 
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
-  /// Ends the last part.
+  /// Ends the last part, and waits for it.
   void flush();
 
   const CameraRig& rig() const { return *rig_; }
+  // To be read within `on_part`, or after flush().
   const std::vector<MonitoredPart>& parts() const { return parts_; }
   std::vector<RigChange> changes() const;
   /// Covariance of the present deviation, in the order of RigDeviation.
@@ -65,6 +69,8 @@ class RigMonitor : public DriveConsumer {
   void startPart();
   void endPartIfDue();
   void endPart();
+  void adjustEndedPart();
+  void waitForEndedPart();
 
   const std::shared_ptr<const CameraRig> rig_;
   const RigCalibratorOptions calibration_;
@@ -72,8 +78,9 @@ class RigMonitor : public DriveConsumer {
   const PartCallback on_part_;
   RigChangeDetector detector_;
   std::unique_ptr<CameraSight> sight_;
-  std::unique_ptr<Drive> drive_;
+  std::unique_ptr<Drive> drive_, ended_;
   std::vector<MonitoredPart> parts_;
+  std::future<void> adjustment_;  ///< of ended_; destroyed first, since it uses the others
 };
 
 }  // namespace vcharge
