@@ -66,6 +66,13 @@ def errors_of(path, true_rig, name, camera):
     return 100 * float(np.linalg.norm(entry["error_m"])), math.degrees(np.linalg.norm(entry["error_rad"]))
 
 
+def largest_sigmas(found):
+    """The largest deviation of a result of monitor_rig over its sigma; None where it found nothing."""
+    if "deviation" not in found:
+        return None
+    return float(np.max(np.abs(found["deviation"]) / np.array(found["standard_deviations"])))
+
+
 def steady(args, results):
     """Drives on which nothing changes."""
     alarms, distance_m, columns = 0, 0.0, []
@@ -80,8 +87,7 @@ def steady(args, results):
             columns.append((f"{scene}, {condition}", [
                 Figure("verdict", found.get("verdict", "none")), Figure("driven", found.get("distance_m"), "m"),
                 figure("alarms", len(found.get("changes", ["no result"])), equal=0),
-                Figure("largest deviation over its sigma", float(np.max(np.abs(found["deviation"]) /
-                                                                         np.array(found["standard_deviations"]))))]))
+                Figure("largest deviation over its sigma", largest_sigmas(found))]))
     results.add(f"Nothing changes, image scale {args.image_scale:g}", *columns)
     results.add(f"Nothing changes, all drives, image scale {args.image_scale:g}", ("all", [
         Figure("driven", distance_m / 1e3, "km"), figure("alarms", alarms, equal=0)]))
