@@ -31,9 +31,9 @@ std::string remarkOn(const SummaryReport& report, int num_cameras) {
     return "";
   }
   std::ostringstream text;
-  text << "localization may not start: it needs to find " << num_needed << " landmarks with " << num_cameras
-       << " cameras, and " << report.median_num_found << " are expected (" << report.median_num_found_before
-       << " with all): keep more, or update the map by another drive";
+  text << "localization may start late, or not at all: it needs to find " << num_needed << " landmarks with "
+       << num_cameras << " cameras, and " << report.median_num_found << " are expected ("
+       << report.median_num_found_before << " with all): keep more, or update the map by another drive";
   return text.str();
 }
 
