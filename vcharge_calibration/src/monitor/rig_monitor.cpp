@@ -112,8 +112,8 @@ void RigMonitor::waitForEndedPart() {
 }
 
 void RigMonitor::adjustEndedPart() {
-  RigDeviation deviation = estimateDeviation(calibration_, ended_->images, ended_->state.data);
   const auto num_keyframes = static_cast<double>(ended_->state.data.keyframes.size());
+  RigDeviation deviation = estimateDeviation(calibration_, ended_->images, std::move(ended_->state.data));
   MonitoredPart part;
   part.begin_m = parts_.empty() ? 0.0 : parts_.back().end_m;
   part.end_m = part.begin_m + deviation.end_m;

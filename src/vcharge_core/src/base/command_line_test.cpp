@@ -20,14 +20,18 @@ class CommandLineTest : public testing::Test {
 
   /// Exit status of a tool that was called with these words.
   template <class Run>
-  static int call(std::vector<std::string> words, const Run& run) {
-    words.insert(words.begin(), "tool");
+  static int call(CommandLine* command_line, std::vector<std::string> words, const Run& run) {
+    words.insert(words.begin(), "/usr/bin/tool");
     std::vector<char*> argv;
     for (std::string& word : words) {
       argv.push_back(word.data());
     }
-    CommandLine app;
-    return runTool(&app, static_cast<int>(argv.size()), argv.data(), run);
+    return runTool(command_line, static_cast<int>(argv.size()), argv.data(), run);
+  }
+  template <class Run>
+  static int call(const std::vector<std::string>& words, const Run& run) {
+    CommandLine command_line;
+    return call(&command_line, words, run);
   }
 
   static nlohmann::json read(const std::string& path) { return nlohmann::json::parse(readTextFile(path)); }
@@ -110,19 +114,14 @@ TEST_F(CommandLineTest, RefusesWhatIsNotAsked) {
 }
 
 TEST_F(CommandLineTest, SaysWhichOptionIsMissing) {
-  const auto run = [](std::vector<std::string> words) {
+  const auto run = [](const std::vector<std::string>& words) {
     std::string path;
     bool show_options = false;
     CommandLine command_line;
     command_line.addOption("--path", &path).required();
     addShowOptions(&command_line, &show_options);
-    words.insert(words.begin(), "/usr/bin/tool");
-    std::vector<char*> argv;
-    for (std::string& word : words) {
-      argv.push_back(word.data());
-    }
     testing::internal::CaptureStderr();
-    const int status = runTool(&command_line, static_cast<int>(argv.size()), argv.data(), [] {});
+    const int status = call(&command_line, words, [] {});
     return std::make_pair(status, testing::internal::GetCapturedStderr());
   };
   EXPECT_EQ(run({"--path", "p"}), std::make_pair(0, std::string()));
