@@ -14,6 +14,9 @@
 
 namespace vcharge {
 
+/// Least existence probability of a reported object that is judged.
+inline constexpr double kMinExistence = 0.5;
+
 /// Options of ObjectEvaluator. The outline of the vehicle is that of the simulated car.
 struct ObjectEvaluationOptions {
   VCHARGE_BEGIN_OPTIONS(ObjectEvaluationOptions);
@@ -22,7 +25,6 @@ struct ObjectEvaluationOptions {
   VCHARGE_OPTION(double, min_speed_m_per_s, 0.15, notNegative(), "Least speed of an object that is due.");
   VCHARGE_OPTION(double, min_visible_fraction, 30.0 / (640 * 400), positive(),
                  "Least part of the pixels of one camera that show a visible object: 30 of 640x400.");
-  VCHARGE_OPTION(double, min_existence, 0.5, between(0.0, 1.0), "Least existence probability of a report.");
   VCHARGE_OPTION(double, gate_m, 1.0, positive(),
                  "Largest position error of a report of an object, and the error of a missed one.");
   VCHARGE_OPTION(double, vehicle_front_m, kVehicleFront_m, anyValue(),

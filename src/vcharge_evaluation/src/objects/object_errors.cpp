@@ -174,7 +174,7 @@ void ObjectEvaluator::add(const TrueObjectFrame& truth, const ObjectFrame& repor
     movers.push_back(bodyOf(object, vehicle_from_world));
   }
   for (const TrackedObject& object : reported.objects) {
-    if (object.existence_probability >= options_.min_existence) {
+    if (object.existence_probability >= kMinExistence) {
       reports.push_back(bodyOf(object, vehicle_from_odom));
     }
   }

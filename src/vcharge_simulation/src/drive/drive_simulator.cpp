@@ -45,6 +45,11 @@ SimulatedDrive simulateDrive(const DrivePath& path, const VehicleMotionOptions& 
                              const GroundHeight& ground_height) {
   VehicleMotionOptions faulty_motion = motion_options;
   faulty_motion.pitch_rad_per_m_per_s2 *= faults.soft_suspension.pitch_factor;
+  if (faults.loaded_boot.isActive()) {
+    faulty_motion.load_pitch_rad = [load = faults.loaded_boot](Duration since_start) {
+      return load.actsAt(since_start) ? load.pitch_rad : 0.0;
+    };
+  }
   const VehicleMotion motion(path, faulty_motion, road_seed, ground_height);
   const WheelOdometer odometer(motion, odometer_options, wheel_seed + 1, faults);
   const int duration_ms = static_cast<int>(std::floor(motion.duration() * 1000.0 + 0.5));

@@ -95,6 +95,7 @@ TEST(FaultOptionsTest, BadValuesAreNamed) {
   expectRejected("odometry_scale: {factor: .nan}", "odometry_scale.factor");
   expectRejected("counter_reset: {time_s: -1}", "counter_reset.time_s");
   expectRejected("soft_suspension: {pitch_factor: -1}", "soft_suspension.pitch_factor");
+  expectRejected("loaded_boot: {pitch_rad: -0.1}", "loaded_boot.pitch_rad");
 }
 
 }  // namespace

@@ -164,6 +164,30 @@ TEST(OdometryFaultsTest, SoftSuspensionDivesDeeperOnTheBrakes) {
   EXPECT_NEAR(deepest_rad(6.0), 6.0 * usual_rad, 0.01 * usual_rad);
 }
 
+TEST(OdometryFaultsTest, ALoadedBootTiltsAndLowersTheBody) {
+  FaultOptions faults;
+  faults.loaded_boot.pitch_rad = 0.01;
+  faults.loaded_boot.start_s = 0.5;
+  const SimulatedDrive empty = simulate({}), loaded = simulate(faults);
+  ASSERT_EQ(empty.ground_truth.size(), loaded.ground_truth.size());
+  int num_before = 0, num_after = 0;
+  for (size_t i = 0; i < empty.ground_truth.size(); ++i) {
+    const RigidTransform& usual = empty.ground_truth[i].odom_from_vehicle;
+    const RigidTransform moved = usual.inverse() * loaded.ground_truth[i].odom_from_vehicle;
+    const double time_s = toSeconds(empty.ground_truth[i].stamp - empty.ground_truth.front().stamp);
+    const double pitch_rad = vectorFromRotation(moved.rotation()).y();
+    if (time_s < 0.5) {
+      ++num_before;
+      EXPECT_EQ(moved.translation().norm() + std::abs(pitch_rad), 0.0);
+    } else if (time_s > 1.5) {
+      ++num_after;
+      EXPECT_NEAR(pitch_rad, -0.01, 1e-4);  // nose up
+      EXPECT_NEAR(moved.translation().z(), -0.01 * VehicleMotionOptions().wheelbase_m, 1e-3);
+    }
+  }
+  EXPECT_GT(std::min(num_before, num_after), 5);
+}
+
 TEST(OdometryFaultsTest, MotionOfAnImageCoversItsExposureAndReadout) {
   FaultOptions faults;
   faults.motion_blur.cameras = {"left"};

@@ -142,6 +142,7 @@ VehicleMotion::VehicleMotion(const DrivePath& path, const VehicleMotionOptions& 
   const double wave_phase_rad = random.uniform(0.0, kTwoPi);
   Spring pitch_spring;
   Spring roll_spring;
+  Spring heave_spring;
 
   const bool from_rest = options.standstill_s > 0.0;
   double speed = from_rest ? 0.0 : desiredSpeed(path, options, 0.0, wave_phase_rad);
@@ -186,13 +187,17 @@ VehicleMotion::VehicleMotion(const DrivePath& path, const VehicleMotionOptions& 
     sample.speed_m_per_s = direction * speed;
     sample.curvature_per_m = path.curvature(s_m);
     const double lateral = speed * speed * sample.curvature_per_m;
+    const double load_pitch_rad =
+        options.load_pitch_rad ? options.load_pitch_rad(durationFromSeconds(time_s)) : 0.0;
     const double pitch_rad =
-        pitch_spring.update(-options.pitch_rad_per_m_per_s2 * (direction * acceleration)) +
+        pitch_spring.update(-options.pitch_rad_per_m_per_s2 * (direction * acceleration) - load_pitch_rad) +
         options.road_noise_rad * pitch_noise.at(s_m);
     const double roll_rad =
         roll_spring.update(kRoll_rad_per_m_per_s2 * lateral) + options.road_noise_rad * roll_noise.at(s_m);
-    sample.planar_from_body = RigidTransform(rotationFromYawPitchRoll(0.0, pitch_rad, roll_rad),
-                                             {0.0, 0.0, options.road_heave_m * heave_noise.at(s_m)});
+    const double height_of_body_m = heave_spring.update(-options.wheelbase_m * load_pitch_rad) +
+                                    options.road_heave_m * heave_noise.at(s_m);
+    sample.planar_from_body =
+        RigidTransform(rotationFromYawPitchRoll(0.0, pitch_rad, roll_rad), {0.0, 0.0, height_of_body_m});
     std::optional<WheelContacts> contacts;
     if (ground_height) {
       contacts.emplace(ground_height, options, sample.world_from_planar, height_m);

@@ -236,6 +236,16 @@ struct SoftSuspensionFault {
   bool isActive() const { return pitch_factor != 1.0; }
 };
 
+/// No fault of a sensor, but the cameras see the ground otherwise. The body stays where it is over the front
+/// axle.
+struct LoadedBootFault : FaultInterval {
+  VCHARGE_BEGIN_DERIVED_OPTIONS(LoadedBootFault, FaultInterval);
+  VCHARGE_OPTION(double, pitch_rad, 0.0, between(0.0, 0.1), "Nose up; 0: no load.");
+  VCHARGE_END_OPTIONS();
+
+  bool isActive() const { return pitch_rad != 0.0; }
+};
+
 /// Faults of the sensors of a drive; none by default. Every fault has isActive().
 struct FaultOptions {
   VCHARGE_BEGIN_OPTIONS(FaultOptions);
@@ -273,6 +283,7 @@ struct FaultOptions {
                        "Wheel counters and odometry restart from zero.");
   VCHARGE_OPTION_GROUP(SoftSuspensionFault, soft_suspension, {},
                        "The body pitches more on brakes and throttle.");
+  VCHARGE_OPTION_GROUP(LoadedBootFault, loaded_boot, {}, "A load tilts and lowers the body.");
   VCHARGE_END_OPTIONS();
 };
 

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
+#include "vcharge_core/base/timestamp.h"
 #include "vcharge_core/motion/rigid_transform.h"
 #include "vcharge_simulation/scenes/ground_height.h"
 #include "vcharge_simulation/vehicle/drive_path.h"
@@ -21,6 +23,8 @@ struct VehicleMotionOptions {
   double pitch_rad_per_m_per_s2 = 0.0045;  ///< nose up when accelerating
   double road_noise_rad = 0.0012;          ///< standard deviation of pitch and roll caused by the road
   double road_heave_m = 0.002;             ///< standard deviation of the height caused by the road
+  /// Nose up, by a load that lowers the body over the rear axle; null: no load.
+  std::function<double(Duration since_start)> load_pitch_rad;
 };
 
 /// State of the vehicle at one instant.
