@@ -17,7 +17,7 @@ from vcharge_msgs.msg import ScheduledCameras
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import CAMERAS, Drive, inputs_of  # noqa: E402
 from nodelet_fixture import (Diagnostics, drive_publishers, expect_bad_rig_is_refused, manager_services,  # noqa: E402
-                             project_mei, reach, wait_for, wait_until_gone)
+                             project_mei, reach, tell_rig_health, wait_for, wait_until_gone)
 
 
 def rays_without_distortion(width, height, p):
@@ -172,6 +172,11 @@ class DepthNodeletTest(unittest.TestCase):
         self.publish(lambda topic, message: None if topic == "/camera/left/image_raw" else message)
         self.wait_for_message("/camera/left/image_raw", "no data for")
         self.expect_recovery()
+
+    def test_camera_that_moved_is_named_and_goes_on(self):
+        tell_rig_health(self.drive.rig, moved="left")
+        self.expect_recovery()
+        wait_for(lambda: self.diagnostics.tells("left: ", "it moved: its extrinsics must be repaired", level=1), "the warning")
 
     def test_drive_tf_loads_and_unloads_beside_it(self):
         self.assertTrue(self.load("/drive_tf", "vcharge_ros/drive_tf_nodelet", [], [], [], "").success)

@@ -20,7 +20,8 @@ from visualization_msgs.msg import Marker
 sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
 from drive_fixture import inputs_of  # noqa: E402
 from localization_fixture import CAMERAS, MappedRoad, count, rig_text, warnings  # noqa: E402
-from nodelet_fixture import Diagnostics, drive_publishers, manager_services, reach, wait_for, wait_until_gone  # noqa: E402
+from nodelet_fixture import Diagnostics, drive_publishers, manager_services, reach, tell_rig_health, wait_for, \
+    wait_until_gone  # noqa: E402
 from vcharge_msgs.msg import LocalizationStatus  # noqa: E402
 
 MAX_ERROR_M = 0.1
@@ -290,20 +291,29 @@ class LocalizationTest(unittest.TestCase):
             if pose.header.stamp in fixed:
                 self.assertLess(error_m, MAX_ERROR_M)
 
-    def test_reload_goes_on_in_the_newest_version_of_the_map(self):
-        self.start()
-        stamps = sorted({message.header.stamp for topic, message in self.messages if topic != "/odom"})
-        middle, reload = stamps[len(stamps) // 2], rospy.ServiceProxy("/localization/reload", Trigger)
-        self.publish(lambda _topic, message: message if message.header.stamp < middle else None)
-        self.wait_for_frames(len(stamps) // 2 - 10)  # the last ones still wait for odometry
-        time.sleep(1.0)
+    def publish_half(self, second):
+        """Publishes one half of the drive, and returns its statuses; at the end of the first, frames wait for odometry."""
         num_before = len(self.statuses())
+        stamps = sorted({message.header.stamp for topic, message in self.messages if topic != "/odom"})
+        middle = stamps[len(stamps) // 2]
+        self.publish(lambda _topic, message: message if (message.header.stamp >= middle) == second else None)
+        self.wait_for_frames(len(stamps) if second else len(stamps) // 2 - 10)
+        time.sleep(0.0 if second else 1.0)
+        return self.statuses()[num_before:]
+
+    def test_reload_goes_on_with_the_newest_versions_of_the_map_and_of_the_rig(self):
+        self.start()
+        tell_rig_health(self.road.rig, moved="left")
+        before = self.publish_half(second=False)
+        left = before[0].camera_names.index("left")
+        self.assertEqual({status.inliers_of_camera[left] for status in before}, {0}, "a camera that moved is left out")
+        self.assertIn("left: left out, since it moved", before[-1].camera_warnings[0])
+        reload = rospy.ServiceProxy("/localization/reload", Trigger)
         answer = reload()
         self.assertTrue(answer.success, answer.message)
-        self.publish(lambda _topic, message: None if message.header.stamp < middle else message)
-        self.wait_for_frames(len(stamps))
-        after = self.statuses()[num_before:]
+        after = self.publish_half(second=True)
         self.assertEqual({status.status for status in after[:10]}, {LocalizationStatus.LOCALIZED}, "at once")
+        self.assertGreater(max(status.inliers_of_camera[left] for status in after), 5)
         self.assertLess(self.pose_errors_m().max(), MAX_ERROR_M)
 
         rospy.set_param("/localization/map", "/none.vmap")

@@ -3,10 +3,13 @@ import time
 
 import rosgraph
 import rospy
+import yaml
 from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Quaternion, Transform, Vector3
 from nav_msgs.msg import Odometry
 from nodelet.srv import NodeletList, NodeletLoad, NodeletUnload
 from sensor_msgs.msg import Image
+from vcharge_msgs.msg import CameraHealth, RigHealth
 
 TIMEOUT_S = 60.0
 
@@ -138,6 +141,22 @@ def expect_bad_rig_is_refused(test, nodelet, rig):
     with test.assertRaises(rospy.ServiceException):
         test.load("/other", nodelet, [], [], [], "")
     test.assertEqual(test.list().nodelets, loaded)
+
+
+def tell_rig_health(rig, moved):
+    """Tells the nodelets on /calibration/health that a camera of a rig.yaml moved by a degree."""
+    message = RigHealth()
+    for name, camera in yaml.safe_load(rig.read_text())["cameras"].items():
+        health = CameraHealth(camera=name, state=CameraHealth.MOVED if name == moved else CameraHealth.OK)
+        pose = camera["vehicle_from_camera"]
+        health.vehicle_from_camera = Transform(Vector3(*pose["translation_m"]), Quaternion(*pose["rotation_xyzw"]))
+        health.deviation[5] = 0.0175 if name == moved else 0.0
+        message.cameras.append(health)
+    publisher = rospy.Publisher("/calibration/health", RigHealth, queue_size=1)
+    wait_for(lambda: publisher.get_num_connections() > 0, "a nodelet to hear /calibration/health")
+    publisher.publish(message)
+    time.sleep(0.5)
+    publisher.unregister()
 
 
 def announce_again(topic, kind):

@@ -9,15 +9,17 @@
 #include "scheduled_sweeps.h"
 #include "vcharge_dense/range_mapper.h"
 #include "vcharge_ros/nodelet.h"
+#include "vcharge_ros/rig_health_conversions.h"
 #include "vcharge_ros/stage_schedule.h"
 
 namespace vcharge {
 
 /// Computes range maps of a live or replayed drive, on the topics of RangeMapPublisher; while the vehicle
 /// stands only with the option inter_camera. See ScheduledSweeps for what comes first; what is left out is
-/// counted. Reports one status per camera in /diagnostics. Parameters: ~rig (path), ~options
-/// (RangeMapperOptions), ~source (LiveDriveSourceOptions), ~processor_budget (see StageSchedule),
-/// ~lossless_replay (every image in order, as compute_range_maps).
+/// counted. Cameras that moved, after /calibration/health, are matched with their own images only. Reports
+/// one status per camera in /diagnostics. Parameters: ~rig (path), ~options (RangeMapperOptions), ~source
+/// (LiveDriveSourceOptions), ~processor_budget (see StageSchedule), ~lossless_replay (every image in order,
+/// as compute_range_maps).
 class DepthNodelet : public Nodelet, private DriveConsumer {
  public:
   DepthNodelet() : Nodelet("depth") {}
@@ -47,6 +49,12 @@ class DepthNodelet : public Nodelet, private DriveConsumer {
           "/obstacles/objects", 1,
           [this](const vcharge_msgs::TrackedObjectsConstPtr& message) { schedule_->setObjects(*message); });
     }
+    subscribe<vcharge_msgs::RigHealth>(kRigHealthTopic, 1,
+                                       [this](const vcharge_msgs::RigHealthConstPtr& message) {
+                                         if (const auto condition = fromMessage(*message, *rig_)) {
+                                           mapper_->setCondition(*condition);
+                                         }
+                                       });
     runSource(this);
   }
 
@@ -64,8 +72,11 @@ class DepthNodelet : public Nodelet, private DriveConsumer {
     const bool works =
         status.state == RangeMapperState::kMapping || status.state == RangeMapperState::kStanding;
     DriveMonitor::Report report;
-    report.level = works ? DriveMonitor::Level::kOk : DriveMonitor::Level::kWarn;
+    report.level = works && !status.has_moved ? DriveMonitor::Level::kOk : DriveMonitor::Level::kWarn;
     report.message = status.camera_name + ": " + status.message;
+    if (status.has_moved) {
+      report.message += "; it moved: its extrinsics must be repaired";
+    }
     const auto add = [&](const std::string& key, uint64_t value) {
       report.values.emplace_back(key, std::to_string(value));
     };

@@ -38,9 +38,7 @@ struct SweepImage {
   RigidTransform world_from_camera;
   /// Camera of a neighbour; null: the swept camera.
   std::shared_ptr<const SweepCamera> camera = nullptr;
-  /// Fraction of the variances of PoseNoiseOptions that a neighbour's pose has; less than 1 if it was
-  /// refined.
-  double rotation_variance_left = 1.0, translation_variance_left = 1.0;
+  NeighbourNoise noise = {};
 };
 
 /// An earlier range map of the swept camera, which predicts the next one.

@@ -46,6 +46,12 @@ struct PoseNoiseOptions {
   }
 };
 
+/// How the noise of one neighbour's pose differs from PoseNoiseOptions.
+struct NeighbourNoise {
+  double rotation_left = 1.0, translation_left = 1.0;  ///< fraction of the variance that a refinement left
+  double more_rotation_rad2 = 0.0, more_translation_m2 = 0.0;  ///< variance of other causes, per axis
+};
+
 /// Side of the square matching window of zero-mean normalized cross-correlation. Windows of 5 pixels left
 /// 3 % fewer cells in height maps, and distances in them were 5.6 instead of 4.5 cm wrong.
 constexpr int kMatchingWindow_px = 7;

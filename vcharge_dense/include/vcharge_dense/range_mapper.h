@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/camera/rig_condition.h"
 #include "vcharge_core/camera/working_camera.h"
 #include "vcharge_core/dense_maps/range_map.h"
 #include "vcharge_core/frames/frame_assembler.h"
@@ -96,6 +97,7 @@ struct RangeMapperStatus {
   uint64_t references = 0;    ///< references passed on to be swept
   uint64_t inter_camera = 0;  ///< those that are matched with images of other cameras
   uint64_t resets = 0;        ///< restarts because time or poses jumped or odometry had a gap
+  bool has_moved = false;     ///< see RangeMapper::setCondition()
 };
 
 /// A reference and its neighbours, ready to be swept. The pixels are shared and never changed.
@@ -134,6 +136,10 @@ class RangeMapper : public DriveConsumer {
   /// Uses these poses instead of odometry, interpolated over gaps of at most frames.max_odometry_gap_s.
   void setTrajectory(const Trajectory& world_from_vehicle);
 
+  /// From now on, cameras that moved are matched with their own images only, and the deviations of all
+  /// extrinsics are part of the ranges'. At the beginning the condition is that of calibration.
+  void setCondition(const RigCondition& condition);
+
   /// Throws std::logic_error for an image of another size or type than the rig's.
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
@@ -159,7 +165,7 @@ class RangeMapper : public DriveConsumer {
   void addFrame(Camera* camera, const SweepImage& frame, std::shared_ptr<const InstantImages> instant);
   void emitReferences(Camera* camera, bool drive_is_over);
   void emitReference(Camera* camera, size_t index);
-  /// A neighbour with its pose relative to the reference refined.
+  /// A neighbour with its pose relative to the reference refined, and the noise of that pose.
   SweepImage refined(const Camera& camera, const SweepImage& neighbour, const SweepImage& reference);
   void emit(Camera* camera, RangeTask task);
   RangeMap sweepMotion(const RangeTask& task) const;
@@ -167,6 +173,7 @@ class RangeMapper : public DriveConsumer {
   const std::shared_ptr<const CameraRig> rig_;
   const RangeMapperOptions options_;
   const TaskCallback on_task_;
+  RigCondition condition_;
   std::vector<std::unique_ptr<Camera>> cameras_;     // indexed as in the rig; null: not in use
   std::unique_ptr<const InterCameraStereo> stereo_;  // null: off
   std::unique_ptr<MotionRefinement> motion_;

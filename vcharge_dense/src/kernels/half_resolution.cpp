@@ -68,8 +68,8 @@ SweepInput halfInput(const SweepLevel& half, const SweepInput& fine, const Sweep
     const cv::Mat other_mask = from.other_mask.empty() ? cv::Mat() : halvedMask(from.other_mask);
     halves[n].emplace(SweepNeighbour{
         PackedImage(half_pixels.neighbours[n], other_mask.empty() ? half.validMask() : other_mask),
-        halved(from.camera), from.neighbour_from_reference, from.translation_m, from.after,
-        from.rotation_variance_left, from.translation_variance_left, other_mask});
+        halved(from.camera), from.neighbour_from_reference, from.translation_m, from.after, from.noise,
+        other_mask});
   });
   for (std::optional<SweepNeighbour>& neighbour : halves) {
     input.neighbours.push_back(std::move(*neighbour));

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "range_mapping/extrinsics_noise.h"
 #include "range_mapping/inter_camera_stereo.h"
 #include "range_mapping/motion_refinement.h"
 #include "range_mapping/range_fusion.h"
@@ -50,7 +51,10 @@ struct RangeMapper::Camera {
 
 RangeMapper::RangeMapper(std::shared_ptr<const CameraRig> rig, const RangeMapperOptions& options,
                          TaskCallback on_task)
-    : rig_(std::move(rig)), options_(options), on_task_(std::move(on_task)) {
+    : rig_(std::move(rig)),
+      options_(options),
+      on_task_(std::move(on_task)),
+      condition_(conditionAsCalibrated(*rig_)) {
   options_.validate();
   cameras_.resize(rig_->cameras.size());
   std::vector<size_t> used;
@@ -112,6 +116,16 @@ void RangeMapper::setTrajectory(const Trajectory& world_from_vehicle) {
   assembler_->setTrajectory(world_from_vehicle);
 }
 
+void RangeMapper::setCondition(const RigCondition& condition) {
+  check(condition.size() == cameras_.size(), "RangeMapper::setCondition: expected one entry per camera");
+  condition_ = condition;
+  for (const std::unique_ptr<Camera>& camera : cameras_) {
+    if (camera) {
+      camera->status.has_moved = condition_[camera->index].has_moved;
+    }
+  }
+}
+
 void RangeMapper::startOver(DriveBreak drive_break) {
   for (const std::unique_ptr<Camera>& camera : cameras_) {
     if (camera) {
@@ -145,7 +159,7 @@ void RangeMapper::process(const ImageFrame& frame) {
   for (size_t i = 0; i < cameras_.size(); ++i) {
     working[i] = cameras_[i] ? &cameras_[i]->working_camera : nullptr;
   }
-  WorkingImages images(frame, std::move(working), stereo_.get());
+  WorkingImages images(frame, std::move(working), condition_, stereo_.get());
   if (frame.odom_from_vehicle) {
     followPoints(frame, &images);
   }
@@ -164,7 +178,7 @@ void RangeMapper::followPoints(const ImageFrame& frame, WorkingImages* images) {
   std::vector<cv::Mat> followed(cameras_.size());
   Timestamp oldest = frame.stamp;
   for (const std::unique_ptr<Camera>& camera : cameras_) {
-    if (camera && frame.has_image[camera->index] &&
+    if (camera && frame.has_image[camera->index] && !condition_[camera->index].has_moved &&
         camera->motion_m(*frame.odom_from_vehicle * camera->vehicle_from_camera) >= kMinMotion_m) {
       followed[camera->index] = images->of(camera->index);
     }
@@ -302,14 +316,15 @@ SweepImage RangeMapper::refined(const Camera& camera, const SweepImage& neighbou
       (reference.world_from_camera * camera_from_vehicle);
   const MotionRefinement::Result motion =
       motion_->refine(neighbour.stamp, reference.stamp, neighbour_from_reference);
-  if (!motion.is_refined) {
-    return neighbour;
-  }
   SweepImage result = neighbour;
-  result.world_from_camera = reference.world_from_camera * camera_from_vehicle *
-                             motion.neighbour_from_reference.inverse() * camera.vehicle_from_camera;
-  result.rotation_variance_left = motion.rotation_variance_left;
-  result.translation_variance_left = motion.translation_variance_left;
+  if (motion.is_refined) {
+    result.world_from_camera = reference.world_from_camera * camera_from_vehicle *
+                               motion.neighbour_from_reference.inverse() * camera.vehicle_from_camera;
+    result.noise.rotation_left = motion.rotation_variance_left;
+    result.noise.translation_left = motion.translation_variance_left;
+  }
+  addNoiseOfExtrinsics(condition_[camera.index],
+                       result.world_from_camera.inverse() * reference.world_from_camera, &result.noise);
   return result;
 }
 

@@ -82,12 +82,6 @@ double baseline(const RangeTask& task, size_t n) {
       .norm();
 }
 
-TEST(NeighbourSelectionTest, TakesEqualStepsUpToTheLongestBaseline) {
-  const std::vector<double> baselines_m = {1.2, 0.8, 0.7, 0.6, 0.41, 0.3, 0.19, 0.05};
-  EXPECT_EQ(selectNeighbours(baselines_m, 4, 0.8), (std::vector<size_t>{1, 3, 4, 6}));
-  EXPECT_EQ(selectNeighbours({0.05, 5.0}, 4, 0.8), (std::vector<size_t>{}));
-}
-
 TEST(RangeMapperTest, OnlineUsesEarlierImagesWithLongerBaselinesForwards) {
   Recorder recorder;
   RangeMapperOptions options = smallOptions();
@@ -165,6 +159,29 @@ TEST(RangeMapperTest, AStandingCameraIsMatchedWithOthersAtItsStamp) {
     }
     EXPECT_EQ(mapper.status()[0].state, RangeMapperState::kStanding);
   }
+}
+
+TEST(RangeMapperTest, ACameraThatMovedIsMatchedWithItselfAlone) {
+  Recorder recorder;
+  RangeMapperOptions options = smallOptions();
+  options.inter_camera = InterCamera::kAlways;
+  RangeMapper mapper(makeRig(), options, recorder.callback());
+  RigCondition condition(2);
+  condition[1] = {true, 0.01, 0.02};
+  mapper.setCondition(condition);
+  drive(&mapper, 10, 0.2);
+  ASSERT_EQ(recorder.tasks.size(), 18u);
+  for (const RangeTask& task : recorder.tasks) {
+    EXPECT_EQ(task.instant, nullptr);
+    for (size_t n = 0; n < task.neighbours.size(); ++n) {
+      const double swing_m = (task.camera_index == 1 ? 0.02 : 0.0) * baseline(task, n);
+      EXPECT_NEAR(task.neighbours[n].noise.more_translation_m2, swing_m * swing_m, 1e-12);
+    }
+  }
+  EXPECT_FALSE(mapper.status()[0].has_moved);
+  EXPECT_TRUE(mapper.status()[1].has_moved);
+  mapper.setCondition(RigCondition(2));
+  EXPECT_FALSE(mapper.status()[1].has_moved);
 }
 
 TEST(RangeMapperTest, MatchesNoOtherCamerasAloneWhileTheVehicleCreeps) {
@@ -373,20 +390,6 @@ TEST(RangeMapperTest, RejectsARigItCannotUse) {
   options.cameras.clear();
   options.neighbours.num_neighbours = 0;
   EXPECT_THROW(RangeMapper(rig, options, recorder.callback()), std::invalid_argument);
-}
-
-TEST(RangeMapperOptionsTest, PresetComesBeforeOtherFields) {
-  RangeMapperOptions options;
-  readFields(YAML::Load("{plane_sweep: {num_planes: 50}, preset: fast}"), "test", &options);
-  EXPECT_EQ(options.preset, RangePreset::kFast);
-  EXPECT_EQ(options.plane_sweep.num_planes, 50);
-  RangeMapperOptions fast;
-  fast.usePreset(RangePreset::kFast);
-  EXPECT_EQ(options.plane_sweep.num_ground_planes, fast.plane_sweep.num_ground_planes);
-  EXPECT_LT(fast.plane_sweep.num_planes, RangeMapperOptions().plane_sweep.num_planes);
-  fast.usePreset(RangePreset::kDefault);
-  EXPECT_EQ(YAML::Dump(writeFields(fast)), YAML::Dump(writeFields(RangeMapperOptions())));
-  EXPECT_THROW(readFields(YAML::Load("{preset: quick}"), "test", &options), InputError);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <opencv2/core.hpp>
 
 #include "range_mapping/inter_camera_stereo.h"
+#include "vcharge_core/camera/rig_condition.h"
 #include "vcharge_core/camera/working_camera.h"
 #include "vcharge_core/frames/frame_assembler.h"
 
@@ -16,9 +17,14 @@ namespace vcharge {
 /// The working images of one frame, undistorted at their first use.
 class WorkingImages {
  public:
+  /// Images of cameras that moved are not matched with those of others.
   WorkingImages(const ImageFrame& frame, std::vector<const WorkingCamera*> cameras,
-                const InterCameraStereo* stereo)
-      : frame_(frame), cameras_(std::move(cameras)), stereo_(stereo), pixels_(cameras_.size()) {}
+                const RigCondition& condition, const InterCameraStereo* stereo)
+      : frame_(frame),
+        cameras_(std::move(cameras)),
+        condition_(condition),
+        stereo_(stereo),
+        pixels_(cameras_.size()) {}
 
   const cv::Mat& of(size_t camera) {
     if (pixels_[camera].empty()) {
@@ -32,7 +38,8 @@ class WorkingImages {
     if (stereo_ != nullptr && !instant_) {
       std::vector<cv::Mat> pixels(cameras_.size());
       for (size_t i = 0; i < cameras_.size(); ++i) {
-        pixels[i] = cameras_[i] != nullptr && frame_.has_image[i] ? of(i) : cv::Mat();
+        pixels[i] =
+            cameras_[i] != nullptr && !condition_[i].has_moved && frame_.has_image[i] ? of(i) : cv::Mat();
       }
       instant_ = stereo_->instant(frame_.stamp, std::move(pixels));
     }
@@ -42,6 +49,7 @@ class WorkingImages {
  private:
   const ImageFrame& frame_;
   const std::vector<const WorkingCamera*> cameras_;
+  const RigCondition& condition_;
   const InterCameraStereo* stereo_;
   std::vector<cv::Mat> pixels_;
   std::shared_ptr<const InstantImages> instant_;

@@ -136,12 +136,14 @@ std::vector<NeighbourUncertainty> neighbourUncertainties(const SweepInput& input
   const PoseNoiseOptions& pose = input.options->pose_noise;
   std::vector<NeighbourUncertainty> result;
   for (const SweepNeighbour& neighbour : input.neighbours) {
-    const float baseline_m = neighbour.translation_m.norm();
-    result.push_back(
-        {neighbour.projection(),
-         neighbour.rotation_variance_left * static_cast<float>(pose.rotationVariance_rad2(baseline_m)),
-         neighbour.translation_variance_left * static_cast<float>(pose.translationVariance_m2(baseline_m)),
-         neighbour.after});
+    const double baseline_m = neighbour.translation_m.norm();
+    const NeighbourNoise& noise = neighbour.noise;
+    const double rotation_rad2 =
+        noise.rotation_left * pose.rotationVariance_rad2(baseline_m) + noise.more_rotation_rad2;
+    const double translation_m2 =
+        noise.translation_left * pose.translationVariance_m2(baseline_m) + noise.more_translation_m2;
+    result.push_back({neighbour.projection(), static_cast<float>(rotation_rad2),
+                      static_cast<float>(translation_m2), neighbour.after});
   }
   return result;
 }

@@ -35,12 +35,11 @@ void addNeighbours(const SweepLevel& level, const SweepImage& reference,
     const SweepImage& image = neighbours[n];
     const SweepCamera* other = image.camera.get();
     const RigidTransform pose = image.world_from_camera.inverse() * reference.world_from_camera;
-    prepared[n].emplace(SweepNeighbour{
-        PackedImage(image.pixels, other != nullptr ? other->valid_mask : level.validMask()),
-        other != nullptr ? other->model : level.camera(), pose.rotationMatrix().cast<float>(),
-        pose.translation().cast<float>(), image.stamp > reference.stamp,
-        static_cast<float>(image.rotation_variance_left), static_cast<float>(image.translation_variance_left),
-        other != nullptr ? other->valid_mask : cv::Mat()});
+    prepared[n].emplace(
+        SweepNeighbour{PackedImage(image.pixels, other != nullptr ? other->valid_mask : level.validMask()),
+                       other != nullptr ? other->model : level.camera(), pose.rotationMatrix().cast<float>(),
+                       pose.translation().cast<float>(), image.stamp > reference.stamp, image.noise,
+                       other != nullptr ? other->valid_mask : cv::Mat()});
   });
   for (std::optional<SweepNeighbour>& neighbour : prepared) {
     input->neighbours.push_back(std::move(*neighbour));

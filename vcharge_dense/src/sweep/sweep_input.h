@@ -19,8 +19,7 @@ struct SweepNeighbour {
   Eigen::Matrix3f neighbour_from_reference;  ///< rotation
   Eigen::Vector3f translation_m;             ///< translation of the same transform
   bool after = false;                        ///< taken after the reference
-  /// Remaining fraction of the variances of PoseNoiseOptions; less than 1 if the pose was refined.
-  float rotation_variance_left = 1.0f, translation_variance_left = 1.0f;
+  NeighbourNoise noise;
   cv::Mat other_mask;  ///< valid pixels of another camera than the reference's; otherwise empty
 
   Projection projection() const;

@@ -7,6 +7,7 @@
 
 #include "vcharge_core/base/options.h"
 #include "vcharge_core/camera/camera_rig.h"
+#include "vcharge_core/camera/rig_condition.h"
 #include "vcharge_core/frames/frame_assembler.h"
 #include "vcharge_reconstruction/map_localizer.h"
 
@@ -27,14 +28,20 @@ class CameraHealth {
  public:
   CameraHealth(std::shared_ptr<const CameraRig> rig, const CameraHealthOptions& options);
 
-  /// Returns the images of the frame without those of cameras that repeat one image while the vehicle moves.
-  std::vector<Image> withoutFrozen(const ImageFrame& frame);
+  /// From now on cameras that moved are left out.
+  void setCondition(const RigCondition& condition);
+
+  /// Returns the images of the frame without those of cameras that moved, or that repeat one image while the
+  /// vehicle moves.
+  std::vector<Image> usableImages(const ImageFrame& frame);
+  /// Returns the features without those of cameras that moved.
+  RigFeatures usableFeatures(RigFeatures features) const;
 
   void addFeatures(const RigFeatures& features);
   /// Adds the matches and inliers of a fix.
   void addFix(const PoseFix& fix);
 
-  /// One line per camera that is silent, frozen, blind, or contradicts the others.
+  /// One line per camera that moved, is silent, frozen, blind, or contradicts the others.
   std::vector<std::string> warnings() const;
 
  private:
@@ -42,7 +49,7 @@ class CameraHealth {
     cv::Mat sample;  // some pixels of the last image
     int equal_images = 0;
     int frames = 0, fixes = 0;
-    bool is_missing = false;
+    bool is_missing = false, has_moved = false;
     double features = 0.0;  // means over the last frames
     double matches = 0.0, inliers = 0.0;
   };

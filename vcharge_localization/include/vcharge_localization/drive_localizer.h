@@ -63,8 +63,12 @@ class DriveLocalizer {
   /// max_frames_without_fix the whole map is searched.
   void seed(const PosePrior& pose);
 
+  /// From now on cameras that moved are left out. At the beginning none has.
+  void setCondition(const RigCondition& condition) { health_.setCondition(condition); }
+
   /// Takes over the pose of a localizer in another version of the same map, which a frame confirms. The
-  /// frames of two versions differ by what the later drives corrected.
+  /// frames of two versions differ by what the later drives corrected. InputError unless the rigs have the
+  /// same cameras.
   void continueFrom(const DriveLocalizer& other);
 
   /// Returns to the state before the first frame.

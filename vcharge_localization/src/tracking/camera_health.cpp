@@ -39,7 +39,24 @@ CameraHealth::CameraHealth(std::shared_ptr<const CameraRig> rig, const CameraHea
   options_.validate();
 }
 
-std::vector<Image> CameraHealth::withoutFrozen(const ImageFrame& frame) {
+void CameraHealth::setCondition(const RigCondition& condition) {
+  check(condition.size() == cameras_.size(), "CameraHealth::setCondition: expected one entry per camera");
+  for (size_t i = 0; i < cameras_.size(); ++i) {
+    cameras_[i].has_moved = condition[i].has_moved;
+  }
+}
+
+RigFeatures CameraHealth::usableFeatures(RigFeatures features) const {
+  for (size_t i = 0; i < cameras_.size(); ++i) {
+    if (cameras_[i].has_moved) {
+      features.images[i] = ImageFeatures();
+      features.rays_in_camera[i].resize(3, 0);
+    }
+  }
+  return features;
+}
+
+std::vector<Image> CameraHealth::usableImages(const ImageFrame& frame) {
   const bool moves =
       frame.odom_from_vehicle && last_odom_from_vehicle_ &&
       (frame.odom_from_vehicle->translation() - last_odom_from_vehicle_->translation()).norm() > kMinMotion_m;
@@ -58,7 +75,7 @@ std::vector<Image> CameraHealth::withoutFrozen(const ImageFrame& frame) {
       ++camera.equal_images;
     }
     camera.sample = std::move(sample);
-    if (camera.equal_images >= options_.frozen_after_frames) {
+    if (camera.has_moved || camera.equal_images >= options_.frozen_after_frames) {
       images[i] = Image();
     }
   }
@@ -116,7 +133,9 @@ std::vector<std::string> CameraHealth::warnings() const {
     const std::string& name = rig_->cameras[i].name;
     const std::string contradiction = contradictionOf(i);
     std::ostringstream text;
-    if (camera.is_missing) {
+    if (camera.has_moved) {
+      text << name << ": left out, since it moved; its extrinsics must be repaired";
+    } else if (camera.is_missing) {
       text << name << ": no image";
     } else if (camera.equal_images >= options_.frozen_after_frames) {
       text << name << ": frozen, it repeats one image";

@@ -39,7 +39,7 @@ class CameraHealthTest : public ::testing::Test {
 
 TEST_F(CameraHealthTest, GoodCamerasHaveNoWarning) {
   for (int i = 0; i < 20; ++i) {
-    health_.withoutFrozen(frameAt(0.2 * i, i, 100 + i));
+    health_.usableImages(frameAt(0.2 * i, i, 100 + i));
   }
   addFeatures(20, 500);
   addFixes(20, 90);
@@ -48,17 +48,31 @@ TEST_F(CameraHealthTest, GoodCamerasHaveNoWarning) {
 
 TEST_F(CameraHealthTest, AFrozenCameraIsNamedAndLeftOutWhileTheVehicleMoves) {
   for (int i = 0; i < 6; ++i) {
-    health_.withoutFrozen(frameAt(0.0, i, 100));
+    health_.usableImages(frameAt(0.0, i, 100));
   }
   EXPECT_TRUE(health_.warnings().empty()) << "a vehicle that stands may see the same";
   std::vector<Image> images;
   for (int i = 1; i < 6; ++i) {
-    images = health_.withoutFrozen(frameAt(0.2 * i, i, 100));
+    images = health_.usableImages(frameAt(0.2 * i, i, 100));
   }
   EXPECT_FALSE(images[0].pixels.empty());
   EXPECT_TRUE(images[1].pixels.empty());
   ASSERT_EQ(health_.warnings().size(), 1u);
   EXPECT_NE(health_.warnings()[0].find("left: frozen"), std::string::npos) << health_.warnings()[0];
+}
+
+TEST_F(CameraHealthTest, ACameraThatMovedIsNamedAndLeftOut) {
+  RigCondition condition(2);
+  condition[1].has_moved = true;
+  health_.setCondition(condition);
+  const std::vector<Image> images = health_.usableImages(frameAt(0.2, 50, 100));
+  EXPECT_FALSE(images[0].pixels.empty());
+  EXPECT_TRUE(images[1].pixels.empty());
+  ASSERT_EQ(health_.warnings().size(), 1u);
+  EXPECT_EQ(health_.warnings()[0].find("left: left out, since it moved"), 0u) << health_.warnings()[0];
+  health_.setCondition(RigCondition(2));
+  EXPECT_FALSE(health_.usableImages(frameAt(0.4, 51, 101))[1].pixels.empty());
+  EXPECT_TRUE(health_.warnings().empty());
 }
 
 TEST_F(CameraHealthTest, ABlindCameraIsNamed) {
@@ -115,7 +129,7 @@ TEST_F(CameraHealthTest, ACameraAloneContradictsNobody) {
 TEST_F(CameraHealthTest, AMissingImageIsNamed) {
   ImageFrame frame = frameAt(0.0, 1, 2);
   frame.images[0] = Image();
-  health_.withoutFrozen(frame);
+  health_.usableImages(frame);
   ASSERT_EQ(health_.warnings().size(), 1u);
   EXPECT_EQ(health_.warnings()[0], "front: no image");
 }

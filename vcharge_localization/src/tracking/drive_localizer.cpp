@@ -42,6 +42,9 @@ void DriveLocalizer::seed(const PosePrior& pose) {
 }
 
 void DriveLocalizer::continueFrom(const DriveLocalizer& other) {
+  if (!haveSameImages(*rig_, *other.rig_)) {
+    throw InputError("rig: expected the cameras and image sizes of the rig in use");
+  }
   if (other.filter_.hasPose() && !other.is_seed_) {
     PosePrior pose = other.filter_.prediction();
     pose.covariance.diagonal().head<3>().array() += kVersionSigma_m * kVersionSigma_m;
@@ -167,7 +170,7 @@ LocalizationResult DriveLocalizer::process(const ImageFrame& frame) {
   RigFeatures features;
   {
     const StageTimer timer("features", &result.stage_s);
-    features = localizer_.extract(health_.withoutFrozen(frame));
+    features = localizer_.extract(health_.usableImages(frame));
   }
   localize(frame, features, &result);
   return result;
@@ -175,7 +178,7 @@ LocalizationResult DriveLocalizer::process(const ImageFrame& frame) {
 
 LocalizationResult DriveLocalizer::process(const ImageFrame& frame, const RigFeatures& features) {
   LocalizationResult result;
-  localize(frame, features, &result);
+  localize(frame, health_.usableFeatures(features), &result);
   return result;
 }
 

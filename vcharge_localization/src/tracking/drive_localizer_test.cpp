@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "vcharge_core/base/error.h"
 #include "vcharge_core/sparse_map/map_tile.h"
 #include "vcharge_reconstruction/testing/test_map.h"
 
@@ -71,6 +72,25 @@ class DriveLocalizerTest : public ::testing::Test {
   double error_m_ = INFINITY;
 };
 
+TEST_F(DriveLocalizerTest, ACameraThatMovedIsLeftOut) {
+  drive(3);
+  RigCondition condition(2);
+  condition[0].has_moved = true;
+  localizer_.setCondition(condition);
+  const Eigen::Matrix3d knock = rotationFromVector({0.0, 0.0, 0.02}).toRotationMatrix();
+  for (int i = 0; i < 10; ++i) {
+    way_m_ += kStep_m;
+    RigFeatures features = viewAt(way_m_);
+    features.rays_in_camera[0] = knock * features.rays_in_camera[0];
+    const LocalizationResult result = next(way_m_, features);
+    ASSERT_EQ(result.status, LocalizationStatus::kLocalized);
+    EXPECT_EQ(result.fix.inliers_of_camera[0], 0);
+    EXPECT_GT(result.fix.inliers_of_camera[1], 0);
+    EXPECT_LT(error_m_, 0.04);
+    ASSERT_EQ(result.camera_warnings.size(), 1u);
+  }
+}
+
 TEST_F(DriveLocalizerTest, StartsFromNothingOnceTwoFramesAgree) {
   const LocalizationResult first = drive(1);
   EXPECT_EQ(first.status, LocalizationStatus::kLost);
@@ -117,6 +137,10 @@ TEST_F(DriveLocalizerTest, GoesOnInAnotherVersionOfTheMap) {
   newer.continueFrom(fresh);  // nothing to take over
   way_m_ += kStep_m;
   EXPECT_EQ(next(&newer, way_m_, viewAt(way_m_)).status, LocalizationStatus::kLocalized);
+  auto one_camera = std::make_shared<CameraRig>(map_->rig());
+  one_camera->cameras.pop_back();
+  DriveLocalizer other(std::make_shared<const TiledMap>(map_), one_camera);
+  EXPECT_THROW(other.continueFrom(localizer_), InputError);
 }
 
 TEST_F(DriveLocalizerTest, FindsAVehicleThatWasCarriedAway) {

@@ -340,6 +340,13 @@ void writeCameraRig(const CameraRig& rig, const std::string& path) {
   writeTextFileAtomically(path, formatCameraRig(rig));
 }
 
+bool haveSameImages(const CameraRig& a, const CameraRig& b) {
+  return std::equal(a.cameras.begin(), a.cameras.end(), b.cameras.begin(), b.cameras.end(),
+                    [](const RigCamera& one, const RigCamera& other) {
+                      return one.name == other.name && one.image_size_px == other.image_size_px;
+                    });
+}
+
 void checkImageSize(const RigCamera& camera, cv::Size size, const std::string& source) {
   if (size != camera.image_size_px) {
     throw InputError(source + ": expected images of " + std::to_string(camera.image_size_px.width) + "x" +

@@ -156,6 +156,21 @@ TEST(CameraRigTest, RejectsAMaskOfAnotherSize) {
   }
 }
 
+TEST(CameraRigTest, ImagesAreTheSameWithOtherExtrinsics) {
+  const CameraRig rig = parseCameraRig(kRig, "rig.yaml", ".");
+  CameraRig other = rig;
+  other.cameras[0].vehicle_from_camera.reset();
+  EXPECT_TRUE(haveSameImages(rig, other));
+  std::swap(other.cameras[0], other.cameras[1]);
+  EXPECT_FALSE(haveSameImages(rig, other));
+  other = rig;
+  other.cameras[1].image_size_px = {641, 480};
+  EXPECT_FALSE(haveSameImages(rig, other));
+  other = rig;
+  other.cameras.pop_back();
+  EXPECT_FALSE(haveSameImages(rig, other));
+}
+
 TEST(CameraRigTest, NamesBothSizesOfAnImageUnlikeTheRig) {
   const CameraRig rig = parseCameraRig(kRig, "rig.yaml", ".");
   EXPECT_NO_THROW(checkImageSize(rig.cameras[0], cv::Size(1280, 800), "/camera/front/image_raw"));

@@ -60,6 +60,8 @@ std::string formatCameraRig(const CameraRig& rig);
 /// Writes rig.yaml, with numbers exact to the last bit, and the masks. Replaces an older file only when the
 /// new one is complete.
 void writeCameraRig(const CameraRig& rig, const std::string& path);
+/// Whether two rigs have cameras of the same names and image sizes, in the same order.
+bool haveSameImages(const CameraRig& a, const CameraRig& b);
 /// Throws InputError naming `source` (a file or topic) unless `size` is the camera's image size.
 void checkImageSize(const RigCamera& camera, cv::Size size, const std::string& source);
 
