@@ -98,9 +98,9 @@ def write_rig(file, with_extrinsics):
     file.write_text("\n".join(lines) + "\n")
 
 
-def write_bag(file, duration_fraction=1.0, knocked=None):
+def write_bag(file, duration_fraction=1.0, knocked=None, knocked_at=0.5):
     """Images of all cameras, and odometry ten times as often. Only pixels have noise. `knocked` is like CAMERAS: where the
-    cameras are in the second half."""
+    cameras are after this fraction of the drive."""
     rays, inside = camera_rays()
     texture = make_texture(1)
     random = np.random.default_rng(2)
@@ -118,7 +118,7 @@ def write_bag(file, duration_fraction=1.0, knocked=None):
             if i % ODOMETRY_PER_FRAME != 0:
                 continue
             turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
-            cameras = knocked if knocked and 2 * i > len(poses) else CAMERAS
+            cameras = knocked if knocked and i > knocked_at * len(poses) else CAMERAS
             for name, (cx, cy, cz, camera_yaw, down) in cameras.items():
                 room_from_camera = (turn @ camera_rotation(camera_yaw, down)).astype(np.float32)
                 pixels = draw(np.array([x, y, 0.0]) + turn @ (cx, cy, cz),

@@ -34,11 +34,14 @@ class MonitorRigTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="vcharge_tests_"))
-        cls.steady, cls.knocked, cls.rig = cls.folder / "steady.bag", cls.folder / "knocked.bag", cls.folder / "rig.yaml"
+        cls.steady, cls.knocked, cls.next_day = (cls.folder / f"{name}.bag" for name in ("steady", "knocked", "next_day"))
+        cls.rig = cls.folder / "rig.yaml"
         x, y, z, yaw, down = drawn_drive.CAMERAS["left"]
         drawn_drive.write_rig(cls.rig, with_extrinsics=True)
         drawn_drive.write_bag(cls.steady)
-        drawn_drive.write_bag(cls.knocked, knocked={**drawn_drive.CAMERAS, "left": (x, y, z, yaw + KNOCK_RAD, down)})
+        knocked = {**drawn_drive.CAMERAS, "left": (x, y, z, yaw + KNOCK_RAD, down)}
+        drawn_drive.write_bag(cls.knocked, knocked=knocked)
+        drawn_drive.write_bag(cls.next_day, duration_fraction=0.5, knocked=knocked, knocked_at=0.0)
         cls.options = cls.folder / "calibration_options.yaml"
         cls.options.write_text(yaml.safe_dump(CALIBRATION))
         cls.received, cls.diagnostics = [], Diagnostics()
@@ -51,11 +54,11 @@ class MonitorRigTest(unittest.TestCase):
     def tearDownClass(cls):
         shutil.rmtree(cls.folder)
 
-    def monitor(self, bag, *extra, rig=None):
-        output = self.folder / f"{bag.stem}_watched"
+    def monitor(self, *bags, rig=None):
+        output = self.folder / f"{bags[-1].stem}_watched"
         status, found, errors = run_tool([
-            tool("vcharge_calibration", "monitor_rig"), "--bag", bag, "--rig", rig or self.rig, "--output", output,
-            "--calibration-options", self.options, *extra])
+            tool("vcharge_calibration", "monitor_rig"), "--bag", *bags, "--rig", rig or self.rig, "--output", output,
+            "--calibration-options", self.options])
         return status, found, errors, output
 
     def test_a_sound_rig_raises_no_alarm(self):
@@ -85,6 +88,22 @@ class MonitorRigTest(unittest.TestCase):
         self.assertEqual(found["repaired"], ["left"])
         self.check_repaired(output / "rig.yaml")
         self.check_live(output)
+
+    def test_the_next_drive_is_compared_with_the_repaired_rig(self):
+        output = self.folder / "next_day_watched"
+        output.mkdir()
+        (output / "rig.yaml").write_text("older")
+        status, found, errors, output = self.monitor(self.knocked, self.next_day)
+        self.assertEqual(status, 0, errors)
+        self.assertEqual((len(found["changes"]), found["repaired"], found["num_versions"]), (1, ["left"], 1), found)
+        self.assertLess(np.max(np.abs(found["deviation"]) / np.array(found["standard_deviations"])), 3.0)
+        self.check_repaired(output / "rig.yaml")
+        self.assertEqual(yaml.safe_load((output / "rig.yaml").read_text())["provenance"]["version"], 2)
+        older = list(output.glob("rig_until_*.yaml"))
+        self.assertEqual([path.read_text() for path in older], ["older"])
+        page = (output / "monitor_report.html").read_text()
+        for event in ("drive knocked.bag", "camera left moved", "new version of the rig: left", "drive next_day.bag"):
+            self.assertIn(event, page)
 
     def check_repaired(self, path):
         before, repaired = yaml.safe_load(self.rig.read_text()), yaml.safe_load(path.read_text())
@@ -124,6 +143,7 @@ class MonitorRigTest(unittest.TestCase):
             answer = repair()
             self.assertTrue(answer.success, answer.message)
             self.check_repaired(repaired)
+            self.assertIn("no camera moved", repair().message)  # the repaired rig is watched from now on
             expect_bad_rig_is_refused(self, "vcharge_calibration/monitor_nodelet", self.folder / "none.yaml")
         finally:
             self.unload("/monitor")

@@ -28,7 +28,7 @@ vcharge_msgs::RigHealth toMessage(const RigMonitor& monitor) {
   message.header.frame_id = monitor.rig().vehicle_frame;
   message.distance_m = now.end_m;
   std::set<size_t> moved;
-  for (const RigChange& change : monitor.changes()) {
+  for (const RigChange& change : monitor.openChanges()) {
     message.changes.push_back(describeChange(monitor.rig(), change));
     if (change.part == RigPart::kCamera) {
       moved.insert(change.camera);
@@ -37,16 +37,18 @@ vcharge_msgs::RigHealth toMessage(const RigMonitor& monitor) {
   for (size_t i = 0; i < monitor.rig().cameras.size(); ++i) {
     vcharge_msgs::CameraHealth camera;
     camera.camera = monitor.rig().cameras[i].name;
-    camera.state = now.sight[i] < kMinSight ? camera.SEES_LITTLE
-                   : moved.count(i) > 0     ? camera.MOVED
-                                            : camera.OK;
+    camera.state = moved.count(i) > 0 ? camera.MOVED : now.sees_little[i] ? camera.SEES_LITTLE : camera.OK;
     camera.sight = now.sight[i];
+    camera.vehicle_from_camera = toTransformMessage(*monitor.rig().cameras[i].vehicle_from_camera);
     copyTo(now.deviation.segment<6>(RigDeviation::rowOf(i)), &camera.deviation);
     copyTo(now.sigmas.segment<6>(RigDeviation::rowOf(i)), &camera.standard_deviations);
     message.cameras.push_back(camera);
   }
   copyTo(now.deviation.head<RigDeviation::kOdometerSize>(), &message.odometer);
   copyTo(now.sigmas.head<RigDeviation::kOdometerSize>(), &message.odometer_standard_deviations);
+  message.pitch_response = monitor.pitchResponse().radPerMetrePerS2();
+  message.pitch_response_standard_deviation = monitor.pitchResponse().sigma();
+  message.is_soft = static_cast<uint8_t>(monitor.pitchResponse().isSoft());
   return message;
 }
 
@@ -55,6 +57,10 @@ DriveMonitor::Report toReport(const vcharge_msgs::RigHealth& health) {
   report.level = DriveMonitor::Level::kOk;
   report.message =
       health.cameras.empty() ? "waiting for the first part of the drive" : "the rig is as calibrated";
+  if (health.is_soft != 0) {
+    report.level = DriveMonitor::Level::kWarn;
+    report.message = "soft suspension: the body pitches far when it speeds up or brakes";
+  }
   for (const std::string& change : health.changes) {
     report.level = DriveMonitor::Level::kWarn;
     report.message = change;  // the last one

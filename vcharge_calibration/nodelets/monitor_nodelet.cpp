@@ -9,14 +9,16 @@
 #include "vcharge_calibration/report/monitor_files.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_ros/nodelet.h"
+#include "vcharge_ros/rig_health_conversions.h"
 
 namespace vcharge {
 
 /// Watches a rig during a live or replayed drive as monitor_rig does, and publishes how the car deviates from
 /// it on /calibration/health after each part of the drive. The service ~repair writes the rig with the
-/// cameras that moved where they are now; nodelets take it when they are started. Parameters: ~rig (path),
-/// ~output (rig.yaml to write), ~options (RigMonitorOptions), ~calibration (RigCalibratorOptions), ~source
-/// (LiveDriveSourceOptions), ~lossless_replay (every image in order, as monitor_rig).
+/// cameras that moved where they are now, and goes on from it. localization_nodelet takes it with its
+/// ~reload, other nodelets when they are started. Parameters: ~rig (path), ~output (rig.yaml to write),
+/// ~options (RigMonitorOptions), ~calibration (RigCalibratorOptions), ~source (LiveDriveSourceOptions),
+/// ~lossless_replay (every image in order, as monitor_rig).
 class MonitorNodelet : public Nodelet {
  public:
   MonitorNodelet() : Nodelet("monitor") {}
@@ -32,7 +34,7 @@ class MonitorNodelet : public Nodelet {
     RigCalibratorOptions calibration;
     readOptions("calibration", &calibration);
     openSource(rig);
-    publisher_ = advertiseLatched<vcharge_msgs::RigHealth>("/calibration/health");
+    publisher_ = advertiseLatched<vcharge_msgs::RigHealth>(kRigHealthTopic);
     monitor_ =
         std::make_unique<RigMonitor>(rig, calibration, options, [this](const MonitoredPart&) { publish(); });
     addDiagnostics(
@@ -55,13 +57,15 @@ class MonitorNodelet : public Nodelet {
 
   void repair(std_srvs::TriggerResponse* response) {
     flushSource();
+    monitor_->flush();
     const RigRepair repair = repairRig(*monitor_);
     if (repair.rig == nullptr) {
       response->success = 0;
       response->message = repair.remarks.empty() ? "no camera moved" : repair.remarks.front();
       return;
     }
-    writeRepairedRig(*monitor_, repair, {{"rig", rig_path_}, {"program", "monitor_nodelet 0.1.0"}}, output_);
+    writeRepairedRig(*repair.rig, {{"rig", rig_path_}, {"program", "monitor_nodelet 0.1.0"}}, output_);
+    monitor_->adopt(repair.rig);
     response->success = 1;
     response->message = output_ + ": repaired";
     for (const std::string& camera : repair.cameras) {

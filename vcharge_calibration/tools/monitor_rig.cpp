@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "vcharge_calibration/monitor/monitor_text.h"
+#include "vcharge_calibration/monitor/rig_repair.h"
 #include "vcharge_calibration/report/monitor_files.h"
 #include "vcharge_core/base/command_line.h"
 #include "vcharge_core/base/error.h"
@@ -20,7 +21,8 @@ using namespace vcharge;
 namespace fs = std::filesystem;
 
 struct Arguments {
-  std::string bag, rig, output, options, calibration;
+  std::vector<std::string> bags;
+  std::string rig, output, options, calibration;
   bool show_options = false;
 };
 
@@ -49,62 +51,81 @@ nlohmann::json toJson(const CameraRig& rig, const RigChange& change) {
   return entry;
 }
 
-nlohmann::json toJson(const RigMonitor& monitor, const MonitorVerdict& verdict, const RigRepair& repair) {
-  nlohmann::json found = {{"verdict", toString(verdict.grade)},
-                          {"remarks", verdict.remarks},
-                          {"names", deviationNames(monitor.rig())},
-                          {"repaired", repair.cameras},
-                          {"changes", nlohmann::json::array()}};
+/// What was repaired during the drives.
+struct Repairs {
+  std::vector<std::string> cameras, remarks;
+};
+
+nlohmann::json toJson(const RigMonitor& monitor, const MonitorVerdict& verdict, const Repairs& repairs) {
+  nlohmann::json found = {{"verdict", toString(verdict.grade)},         {"remarks", verdict.remarks},
+                          {"names", deviationNames(monitor.rig())},     {"repaired", repairs.cameras},
+                          {"num_versions", monitor.adoptions().size()}, {"changes", nlohmann::json::array()}};
   for (const RigChange& change : monitor.changes()) {
     found["changes"].push_back(toJson(monitor.rig(), change));
   }
   if (!monitor.parts().empty()) {
     const MonitoredPart& now = monitor.parts().back();
     found["distance_m"] = now.end_m;
+    found["pitch_response"] = {monitor.pitchResponse().radPerMetrePerS2(), monitor.pitchResponse().sigma()};
     found["deviation"] = toList(now.deviation);
     found["standard_deviations"] = toList(now.sigmas);
   }
   return found;
 }
 
-void monitorDrive(const Arguments& arguments, const RigMonitorOptions& options, nlohmann::json* found) {
+/// Watches one drive. Between two drives it is safe to go on from a repaired rig.
+void watch(const Arguments& arguments, const std::string& bag, BagDriveSource* source, RigMonitor* monitor,
+           Repairs* repairs) {
+  {
+    ProgressBar bar("following " + fs::path(bag).filename().string());
+    source->run(monitor, [&](double fraction) { bar.update(fraction); });
+    monitor->flush();
+  }
+  const RigRepair repair = repairRig(*monitor);
+  repairs->remarks = repair.remarks;
+  if (repair.rig != nullptr) {
+    writeRepairedRig(
+        *repair.rig,
+        {{"bag", bag}, {"bag_hash", fileHash(bag)}, {"rig", arguments.rig}, {"program", "monitor_rig 0.1.0"}},
+        (fs::path(arguments.output) / "rig.yaml").string());
+    repairs->cameras.insert(repairs->cameras.end(), repair.cameras.begin(), repair.cameras.end());
+    monitor->adopt(repair.rig);
+  }
+}
+
+void monitorDrives(const Arguments& arguments, const RigMonitorOptions& options, nlohmann::json* found) {
   RigCalibratorOptions calibration;
   if (!arguments.calibration.empty()) {
     readFieldsFromFile(arguments.calibration, &calibration);
   }
   const auto rig = std::make_shared<const CameraRig>(readCameraRig(arguments.rig));
   RigMonitor monitor(rig, calibration, options, nullptr);
-  {
-    ProgressBar bar("following the drive");
-    BagDriveSourceOptions source_options;
-    source_options.max_image_gap_s = INFINITY;  // frames that lack a camera are used
-    BagDriveSource source(arguments.bag, rig, source_options);
-    source.run(&monitor, [&](double fraction) { bar.update(fraction); });
-    monitor.flush();
+  BagDriveSourceOptions source_options;
+  source_options.max_image_gap_s = INFINITY;  // frames that lack a camera are used
+  std::vector<std::unique_ptr<BagDriveSource>> sources;
+  for (const std::string& bag : arguments.bags) {
+    sources.push_back(std::make_unique<BagDriveSource>(bag, rig, source_options));
   }
-  const RigRepair repair = repairRig(monitor);
-  const MonitorVerdict verdict = judgeMonitoredDrive(monitor, repair);
-  *found = toJson(monitor, verdict, repair);
-  const fs::path folder(arguments.output);
-  writeMonitorFiles(folder.string(), "Rig during " + fs::path(arguments.bag).filename().string(), monitor,
-                    verdict);
-  if (repair.rig != nullptr) {
-    writeRepairedRig(monitor, repair,
-                     {{"bag", arguments.bag},
-                      {"bag_hash", fileHash(arguments.bag)},
-                      {"rig", arguments.rig},
-                      {"program", "monitor_rig 0.1.0"}},
-                     (folder / "rig.yaml").string());
+  std::vector<MonitoredDrive> drives;
+  Repairs repairs;
+  for (size_t i = 0; i < sources.size(); ++i) {
+    const std::string& bag = arguments.bags[i];
+    watch(arguments, bag, sources[i].get(), &monitor, &repairs);
+    drives.push_back({fs::path(bag).filename().string(), monitor.travelled_m()});
   }
+  const MonitorVerdict verdict = judgeMonitoredDrive(monitor, repairs.remarks);
+  *found = toJson(monitor, verdict, repairs);
+  writeMonitorFiles(arguments.output, drives, monitor, verdict);
   std::printf("%s\n", toString(verdict.grade).c_str());
   for (const std::string& remark : verdict.remarks) {
     std::printf("  %s\n", remark.c_str());
   }
-  for (const std::string& camera : repair.cameras) {
-    std::printf("camera %s repaired in %s\n", camera.c_str(), (folder / "rig.yaml").c_str());
+  for (const std::string& camera : repairs.cameras) {
+    std::printf("camera %s repaired in %s\n", camera.c_str(),
+                (fs::path(arguments.output) / "rig.yaml").c_str());
   }
   if (verdict.grade == Verdict::kFail) {
-    throw InputError(arguments.bag + ": FAIL: " + verdict.remarks.front());
+    throw InputError(arguments.bags.front() + ": FAIL: " + verdict.remarks.front());
   }
 }
 
@@ -112,12 +133,13 @@ void monitorDrive(const Arguments& arguments, const RigMonitorOptions& options, 
 
 int main(int argc, char** argv) {
   CommandLine app(
-      "Watches a rig during an ordinary drive: how each camera and the odometer deviate from rig.yaml, what "
-      "changed, when and by how much. Writes deviation.csv and monitor_report.html, and rig.yaml with the "
-      "cameras that moved where they are now, once they are still and certain. Prints PASS, WARN with what "
-      "changed, or FAIL.");
+      "Watches a rig during ordinary drives: how each camera and the odometer deviate from rig.yaml, what "
+      "changed, when and by how much. Writes deviation.csv and monitor_report.html, and after a drive "
+      "rig.yaml "
+      "with the cameras that moved where they are now, once they are still and certain; the next drive is "
+      "compared with it. Prints PASS, WARN with what changed, or FAIL.");
   Arguments arguments;
-  app.addOption("--bag", &arguments.bag, "drive with images and /odom").required();
+  app.addOption("--bag", &arguments.bags, "drives with images and /odom, one after the other").required();
   app.addOption("--rig", &arguments.rig, "rig.yaml with extrinsics").required();
   app.addOption("--output", &arguments.output, "folder to write").required().check(requireOutputFolder);
   app.addOption("--options", &arguments.options, "YAML with overrides of RigMonitorOptions");
@@ -130,7 +152,8 @@ int main(int argc, char** argv) {
       "standard_deviations (metres, radians; of the odometer: ratios, and radians per metre), changes (part, "
       "camera, text, is_slow, main_axis, size, standard_deviations, earliest_m, latest_m, found_m, "
       "log_probability), "
-      "repaired (names of cameras).");
+      "repaired (names of cameras), num_versions (of the rig, that were written), "
+      "pitch_response (radians per m/s^2, and its standard deviation).");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
     RigMonitorOptions options;
     if (!arguments.options.empty()) {
@@ -140,6 +163,6 @@ int main(int argc, char** argv) {
       std::fputs(showOptions(options).c_str(), stdout);
       return;
     }
-    monitorDrive(arguments, options, found);
+    monitorDrives(arguments, options, found);
   });
 }

@@ -34,6 +34,12 @@ TEST(CameraSightTest, DarknessIsNoDirt) {
       EXPECT_NEAR(each, 1.0, 1e-9);
     }
   }
+  // A side that was dark from the beginning is not what is usual.
+  CameraSight begun_in_the_dark(3);
+  for (int i = 0; i < 4; ++i) {
+    begun_in_the_dark.add({{1000, 80.0}, {2000, 80.0}, {10, 30.0}}, 10.0);
+  }
+  EXPECT_NEAR(begun_in_the_dark.add({{1000, 80.0}, {2000, 80.0}, {400, 80.0}}, 10.0)[2], 1.0, 1e-9);
   EXPECT_EQ(sight.add({{0, 80.0}, {0, 80.0}, {0, 80.0}}, 0.0), std::vector<double>(3, 1.0)) << "standing";
 }
 

@@ -81,15 +81,22 @@ std::string describeChange(const CameraRig& rig, const RigChange& change) {
          ", " + when;
 }
 
-MonitorVerdict judgeMonitoredDrive(const RigMonitor& monitor, const RigRepair& repair) {
+std::string describeSoftness(const PitchResponse& response) {
+  return "soft suspension: the body pitches " + toText(kDegrees * response.radPerMetrePerS2(), 2) + " +- " +
+         toText(kDegrees * response.sigma(), 2) + " degrees per m/s^2; up to 0.3 is usual";
+}
+
+MonitorVerdict judgeMonitoredDrive(const RigMonitor& monitor, const std::vector<std::string>& remarks) {
   MonitorVerdict verdict;
   double seen_m = 0.0;
   std::vector<double> dim_m(monitor.rig().cameras.size(), 0.0);
+  std::vector<bool> sees_little(dim_m.size(), false);
   for (const MonitoredPart& part : monitor.parts()) {
     const double length_m = part.end_m - part.begin_m;
     seen_m += length_m;
     for (size_t i = 0; i < dim_m.size(); ++i) {
       dim_m[i] += part.sight[i] < kMinSight ? length_m : 0.0;
+      sees_little[i] = sees_little[i] || part.sees_little[i];
     }
   }
   if (!(seen_m > 0.0)) {
@@ -100,12 +107,15 @@ MonitorVerdict judgeMonitoredDrive(const RigMonitor& monitor, const RigRepair& r
     verdict.remarks.push_back(describeChange(monitor.rig(), change));
   }
   for (size_t i = 0; i < dim_m.size(); ++i) {
-    if (dim_m[i] > 0.0) {
+    if (sees_little[i]) {
       verdict.remarks.push_back("camera " + monitor.rig().cameras[i].name + " saw little over " +
                                 toText(dim_m[i], 0) + " m: its lens is dirty, covered or blinded");
     }
   }
-  verdict.remarks.insert(verdict.remarks.end(), repair.remarks.begin(), repair.remarks.end());
+  if (monitor.pitchResponse().isSoft()) {
+    verdict.remarks.push_back(describeSoftness(monitor.pitchResponse()));
+  }
+  verdict.remarks.insert(verdict.remarks.end(), remarks.begin(), remarks.end());
   verdict.grade = verdict.remarks.empty() ? Verdict::kPass : Verdict::kWarn;
   return verdict;
 }

@@ -275,6 +275,14 @@ void RigChangeDetector::accept(const Hypothesis& hypothesis, size_t first) {
   observations_.clear();
 }
 
+void RigChangeDetector::countFrom(const Eigen::VectorXd& deviation) {
+  check(deviation.size() == start_.vector.size(), "RigChangeDetector: expected a deviation of its rig");
+  start_.vector -= start_.information * deviation;
+  for (Observation& observation : observations_) {
+    observation.belief.vector -= observation.belief.information * deviation;
+  }
+}
+
 RigChangeDetector::Belief RigChangeDetector::present() const {
   Belief now = start_;
   now += sumOf(0, observations_.size());

@@ -201,6 +201,25 @@ TEST(RigChangeDetectorTest, FindsASecondKnock) {
   EXPECT_NEAR(change->size[4], -0.3 * kDegree, 0.002);
 }
 
+TEST(RigChangeDetectorTest, CountsFromARepairedRigWithoutForgetting) {
+  DrawnDrive drive(4);
+  RigChangeDetector detector(makeRig(), kFalseAlarmsPerKm);
+  ASSERT_FALSE(driveUntilChange(200.0, &drive, &detector));
+  drive.truth()[RigDeviation::rowOf(1) + 4] = 0.3 * kDegree;
+  ASSERT_TRUE(driveUntilChange(200.0, &drive, &detector));
+  driveUntilChange(100.0, &drive, &detector);
+  Eigen::VectorXd repair = Eigen::VectorXd::Zero(RigDeviation::rowOf(3));
+  repair.segment<6>(RigDeviation::rowOf(1)) = detector.deviation().segment<6>(RigDeviation::rowOf(1));
+  const Eigen::VectorXd before = detector.deviation();
+  const Eigen::MatrixXd covariance = detector.covariance();
+  detector.countFrom(repair);
+  EXPECT_TRUE(detector.deviation().isApprox(before - repair, 1e-9));
+  EXPECT_TRUE(detector.covariance().isApprox(covariance, 1e-12));
+  // The drive goes on with a rig that was repaired; what is left is no change.
+  drive.truth() -= repair;
+  EXPECT_FALSE(driveUntilChange(500.0, &drive, &detector));
+}
+
 TEST(RigChangeDetectorTest, ComparesWithTheCovarianceOfTheRig) {
   // The car was parked and knocked: the rig is wrong from the beginning.
   for (const bool is_certain : {false, true}) {

@@ -140,6 +140,7 @@ class PartAdjuster {
         information.bottomLeftCorner(of_cameras, kNumFactors);
     result->information.bottomRightCorner(of_cameras, of_cameras) =
         information.bottomRightCorner(of_cameras, of_cameras);
+    result->pitch.add(part_->keyframes);
     for (const Track& track : part_->tracks) {
       for (const TrackObservation& observation : track.observations) {
         result->num_observations[observation.camera] += track.position_m ? 1 : 0;

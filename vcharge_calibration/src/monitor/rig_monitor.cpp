@@ -1,5 +1,6 @@
 #include "vcharge_calibration/monitor/rig_monitor.h"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
@@ -7,6 +8,7 @@
 
 #include "monitor/camera_sight.h"
 #include "vcharge_core/base/error.h"
+#include "vcharge_core/motion/pose_step.h"
 #include "vcharge_reconstruction/frame_follower.h"
 
 namespace vcharge {
@@ -15,6 +17,8 @@ namespace {
 
 /// Length of the parts of a drive: long enough to show rotations well, and two are 20 m after a knock.
 constexpr double kPart_m = 10.0;
+/// A camera that sees little for a shorter distance passes something without texture.
+constexpr double kMinDim_m = 25.0;
 
 const CameraRig& withExtrinsics(const std::shared_ptr<const CameraRig>& rig) {
   check(rig != nullptr, "RigMonitor: expected a rig");
@@ -60,7 +64,8 @@ RigMonitor::RigMonitor(std::shared_ptr<const CameraRig> rig, const RigCalibrator
       options_(options),
       on_part_(std::move(on_part)),
       detector_(withExtrinsics(rig_), options_.false_alarms_per_km),
-      sight_(std::make_unique<CameraSight>(rig_->cameras.size())) {
+      sight_(std::make_unique<CameraSight>(rig_->cameras.size())),
+      dim_m_(rig_->cameras.size(), 0.0) {
   calibration_.validate();
   options_.validate();
   startPart();
@@ -115,7 +120,7 @@ void RigMonitor::adjustEndedPart() {
   const auto num_keyframes = static_cast<double>(ended_->state.data.keyframes.size());
   RigDeviation deviation = estimateDeviation(calibration_, ended_->images, std::move(ended_->state.data));
   MonitoredPart part;
-  part.begin_m = parts_.empty() ? 0.0 : parts_.back().end_m;
+  part.begin_m = travelled_m();
   part.end_m = part.begin_m + deviation.end_m;
   part.end = deviation.end;
   deviation.begin_m = part.begin_m;
@@ -126,10 +131,14 @@ void RigMonitor::adjustEndedPart() {
   }
   part.sight = sight_->add(seen, part.end_m - part.begin_m);
   for (size_t i = 0; i < part.sight.size(); ++i) {
-    if (part.sight[i] < kMinSight) {
+    const bool is_dim = part.sight[i] < kMinSight;
+    dim_m_[i] = is_dim ? dim_m_[i] + part.end_m - part.begin_m : 0.0;
+    part.sees_little.push_back(dim_m_[i] >= kMinDim_m);
+    if (is_dim) {
       forgetCamera(i, &deviation);
     }
   }
+  pitch_ += deviation.pitch;
   part.change = detector_.add(deviation);
   part.deviation = detector_.deviation();
   part.sigmas = detector_.covariance().diagonal().cwiseSqrt();
@@ -138,6 +147,43 @@ void RigMonitor::adjustEndedPart() {
   if (on_part_) {
     on_part_(part);
   }
+}
+
+void RigMonitor::adopt(std::shared_ptr<const CameraRig> rig) {
+  if (rig == nullptr || !haveSameImages(*rig, *rig_)) {
+    throw InputError("rig: expected the cameras and image sizes of the rig before");
+  }
+  RigAdoption adoption;
+  adoption.at_m = travelled_m();
+  Eigen::VectorXd deviation = Eigen::VectorXd::Zero(RigDeviation::rowOf(rig->cameras.size()));
+  for (size_t i = 0; i < rig->cameras.size(); ++i) {
+    const Eigen::Matrix<double, 6, 1> step = stepBetween(*rig_->cameras[i].vehicle_from_camera,
+                                                         *withExtrinsics(rig).cameras[i].vehicle_from_camera);
+    deviation.segment<6>(RigDeviation::rowOf(i)) = step;
+    if (!step.isZero(0.0)) {
+      adoption.cameras.push_back(i);
+    }
+  }
+  detector_.countFrom(deviation);
+  adoptions_.push_back(adoption);
+  rig_ = std::move(rig);
+  startPart();
+}
+
+std::vector<RigChange> RigMonitor::openChanges() const {
+  std::vector<RigChange> open;
+  for (const RigChange& change : changes()) {
+    const bool is_accounted_for =
+        change.part == RigPart::kCamera &&
+        std::any_of(adoptions_.begin(), adoptions_.end(), [&](const RigAdoption& adoption) {
+          return adoption.at_m >= change.found_m &&
+                 std::count(adoption.cameras.begin(), adoption.cameras.end(), change.camera) > 0;
+        });
+    if (!is_accounted_for) {
+      open.push_back(change);
+    }
+  }
+  return open;
 }
 
 std::vector<RigChange> RigMonitor::changes() const {

@@ -1,8 +1,11 @@
 #include "vcharge_calibration/monitor/rig_repair.h"
 
 #include <cmath>
+#include <cstdlib>
+#include <map>
 #include <set>
 
+#include "vcharge_calibration/monitor/monitor_text.h"
 #include "vcharge_core/base/text_format.h"
 #include "vcharge_core/motion/pose_step.h"
 
@@ -16,13 +19,26 @@ constexpr double kMinStill_m = 20.0;
 constexpr double kMaxSigma_m = 0.02;
 constexpr double kMaxSigma_rad = 0.001;
 
+/// What is known of a repaired rig: its version (a calibrated one is the first), and what showed that it was
+/// needed.
+std::map<std::string, std::string> provenanceOf(const RigMonitor& monitor) {
+  const std::map<std::string, std::string>& before = monitor.rig().provenance;
+  const auto version = before.find("version");
+  std::string evidence;
+  for (const RigChange& change : monitor.openChanges()) {
+    evidence += (evidence.empty() ? "" : "; ") + describeChange(monitor.rig(), change);
+  }
+  return {{"version", std::to_string(version == before.end() ? 2 : std::atoi(version->second.c_str()) + 1)},
+          {"evidence", evidence}};
+}
+
 }  // namespace
 
 RigRepair repairRig(const RigMonitor& monitor) {
   RigRepair repair;
   std::set<size_t> cameras;
   double last_m = 0.0;
-  for (const RigChange& change : monitor.changes()) {
+  for (const RigChange& change : monitor.openChanges()) {
     if (change.part == RigPart::kCamera) {
       cameras.insert(change.camera);
       last_m = change.latest_m;
@@ -56,6 +72,7 @@ RigRepair repairRig(const RigMonitor& monitor) {
     repair.cameras.push_back(camera.name);
   }
   if (!repair.cameras.empty()) {
+    rig->provenance = provenanceOf(monitor);
     repair.rig = rig;
   }
   return repair;

@@ -1,11 +1,11 @@
 #include "vcharge_calibration/report/monitor_files.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <sstream>
 #include <utility>
 #include <vector>
 
-#include "vcharge_calibration/report/monitor_report.h"
 #include "vcharge_calibration/report/rig_calibration_files.h"
 #include "vcharge_core/base/utc_time.h"
 #include "vcharge_core/files/file_io.h"
@@ -42,25 +42,35 @@ std::string tableOf(const RigMonitor& monitor) {
   return text.str() + "\n";
 }
 
+/// Copies a rig that will be replaced, with its date in the name.
+void keepOlderFile(const std::string& path) {
+  if (!fs::exists(path)) {
+    return;
+  }
+  std::string date = utcNow();
+  date.erase(std::remove(date.begin(), date.end(), ':'), date.end());
+  const fs::path folder = fs::path(path).parent_path();
+  const std::string name =
+      fs::path(path).stem().string() + "_until_" + date + fs::path(path).extension().string();
+  writeTextFileAtomically((folder / name).string(), readTextFile(path));
+}
+
 }  // namespace
 
-void writeMonitorFiles(const std::string& folder, const std::string& title, const RigMonitor& monitor,
-                       const MonitorVerdict& verdict) {
+void writeMonitorFiles(const std::string& folder, const std::vector<MonitoredDrive>& drives,
+                       const RigMonitor& monitor, const MonitorVerdict& verdict) {
   createFolder(folder);
   writeTextFileAtomically((fs::path(folder) / "deviation.csv").string(), tableOf(monitor));
   writeTextFileAtomically((fs::path(folder) / "monitor_report.html").string(),
-                          makeMonitorReport(title, monitor, verdict));
+                          makeMonitorReport(drives, monitor, verdict));
 }
 
-void writeRepairedRig(const RigMonitor& monitor, const RigRepair& repair,
-                      std::map<std::string, std::string> provenance, const std::string& path) {
-  std::string evidence;
-  for (const RigChange& change : monitor.changes()) {
-    evidence += (evidence.empty() ? "" : "; ") + describeChange(monitor.rig(), change);
-  }
-  provenance["evidence"] = evidence;
+void writeRepairedRig(const CameraRig& rig, std::map<std::string, std::string> provenance,
+                      const std::string& path) {
+  provenance.insert(rig.provenance.begin(), rig.provenance.end());
   provenance["date"] = utcNow();
-  writeRigWithMasks(*repair.rig, std::move(provenance), path);
+  keepOlderFile(path);
+  writeRigWithMasks(rig, std::move(provenance), path);
 }
 
 }  // namespace vcharge

@@ -1,5 +1,5 @@
-"""Watching a rig: alarms without a change, and what is told of knocked cameras, a tyre and a dirty lens, and when; the
-errors of repaired cameras."""
+"""Watching a rig: alarms without a change, and what is told of knocked cameras, a tyre, a load, a suspension and a dirty lens,
+and when; the errors of repaired cameras."""
 import argparse
 import math
 
@@ -11,7 +11,7 @@ from vcharge_evaluation.poses import rotations
 from vcharge_evaluation.results import Figure, Results, add_arguments, figure, percent
 from vcharge_evaluation.tools import CONFIG, judge_rig, run_tool_once, say
 
-PARTS = ("steady", "knocks", "tyre", "lens")
+PARTS = ("steady", "knocks", "tyre", "load", "suspension", "lens")
 AXES = ("forwards", "sideways", "height", "roll", "pitch", "yaw")
 KNOCK_S = 40.0
 # Camera, axis, size (degrees), and the distance within which it must be found.
@@ -124,42 +124,54 @@ def knocks(args, results):
         figure("right camera and axis, nothing else", percent(sum(right), len(right)), "%", at_least=95)]))
 
 
-def tyre(args, results):
-    """The left rear tyre loses 0.3 % of its radius, and turns more."""
+def told_as(args, results, title, is_told, *words):
+    """Drives on which something other than a camera changes, after `words` for simulate_drive."""
     columns = []
     for scene in args.scenes:
-        made = make_drive(args, scene, "--set", "faults.wheel_slip.ratio=0.003", "--set",
-                          f"faults.wheel_slip.start_s={KNOCK_S}")
+        made = make_drive(args, scene, *words)
         run, _ = monitor(made, made.true_rig)
-        changes = run.found.get("changes", [])
-        told = [change for change in changes if change["part"] == "odometer"]
+        found = run.found
+        changes = found.get("changes", [])
+        told = [change for change in changes if is_told(change)]
+        remarks = [text for text in found.get("remarks", []) if is_told({"part": "remark", "text": text})]
         columns.append((scene, [
-            Figure("told", "; ".join(change["text"] for change in changes) or "nothing"),
-            figure("told as the odometer", len(told), at_least=1), figure("other alarms", len(changes) - len(told), equal=0),
+            Figure("told", "; ".join(found.get("remarks", [])) or "nothing"),
+            figure("told as such", len(told) + len(remarks), at_least=1),
+            figure("other alarms", len(changes) - len(told), equal=0),
             Figure("found after", told[0]["found_m"] - driven_until(made, KNOCK_S) if told else None, "m")]))
-    results.add(f"A tyre loses 0.3 %, image scale {args.image_scale:g}", *columns)
+    results.add(f"{title}, image scale {args.image_scale:g}", *columns)
+
+
+def tyre(args, results):
+    """The left rear tyre loses 0.3 % of its radius, and turns more."""
+    told_as(args, results, "A tyre loses 0.3 %", lambda change: change["part"] == "odometer", "--set",
+            "faults.wheel_slip.ratio=0.003", "--set", f"faults.wheel_slip.start_s={KNOCK_S}")
+
+
+def load(args, results):
+    """The boot is loaded."""
+    told_as(args, results, "The boot is loaded", lambda change: change["part"] == "body", "--set",
+            "faults.loaded_boot.pitch_rad=0.01", "--set",
+            f"faults.loaded_boot.start_s={KNOCK_S}")
+
+
+def suspension(args, results):
+    """The suspension is five times as soft."""
+    told_as(args, results, "A soft suspension", lambda change: "suspension" in change["text"], "--set",
+            "faults.soft_suspension.pitch_factor=5")
 
 
 def lens(args, results):
     """The left lens gets dirty."""
-    columns = []
-    for scene in args.scenes:
-        made = make_drive(args, scene, "--set", "faults.dirty_lens.cameras=[left]", "--set",
-                          f"faults.dirty_lens.start_s={KNOCK_S}")
-        run, _ = monitor(made, made.true_rig)
-        remarks = run.found.get("remarks", [])
-        columns.append((scene, [
-            Figure("told", "; ".join(remarks) or "nothing"),
-            figure("told as the lens of the left camera", sum("camera left saw little" in text for text in remarks), equal=1),
-            figure("alarms", len(run.found.get("changes", ["no result"])), equal=0)]))
-    results.add(f"A lens gets dirty, image scale {args.image_scale:g}", *columns)
+    told_as(args, results, "A lens gets dirty", lambda change: "camera left saw little" in change["text"], "--set",
+            "faults.dirty_lens.cameras=[left]", "--set", f"faults.dirty_lens.start_s={KNOCK_S}")
 
 
 def main():
     args = arguments()
     args.work.mkdir(parents=True, exist_ok=True)
     results = Results("monitor", "Watching a rig", args)
-    steps = {"steady": steady, "knocks": knocks, "tyre": tyre, "lens": lens}
+    steps = {"steady": steady, "knocks": knocks, "tyre": tyre, "load": load, "suspension": suspension, "lens": lens}
     for part in args.parts:
         steps[part](args, results)
     results.end()

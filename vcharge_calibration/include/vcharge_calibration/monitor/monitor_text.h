@@ -5,7 +5,6 @@
 
 #include "vcharge_calibration/intrinsics/intrinsic_calibration.h"
 #include "vcharge_calibration/monitor/rig_monitor.h"
-#include "vcharge_calibration/monitor/rig_repair.h"
 
 namespace vcharge {
 
@@ -15,11 +14,15 @@ std::vector<std::string> deviationNames(const CameraRig& rig);
 /// A sentence, such as: camera left moved: pitch by 0.21 +- 0.02 degrees, between 51 and 72 m.
 std::string describeChange(const CameraRig& rig, const RigChange& change);
 
+/// A sentence about a body that pitches far.
+std::string describeSoftness(const PitchResponse& response);
+
 /// What a monitored drive shows. PASS: nothing changed. WARN with what changed. FAIL: it shows nothing.
 struct MonitorVerdict {
   Verdict grade = Verdict::kFail;
   std::vector<std::string> remarks;
 };
-MonitorVerdict judgeMonitoredDrive(const RigMonitor& monitor, const RigRepair& repair);
+/// `remarks`: those of the last repair.
+MonitorVerdict judgeMonitoredDrive(const RigMonitor& monitor, const std::vector<std::string>& remarks);
 
 }  // namespace vcharge

@@ -50,6 +50,9 @@ class RigChangeDetector {
   /// Adds the next part of the drive; returns a change that it made certain.
   std::optional<RigChange> add(const RigDeviation& deviation);
 
+  /// From now on deviations are counted from a rig that deviates by this from the one before.
+  void countFrom(const Eigen::VectorXd& deviation);
+
   /// The present deviation from the rig and its covariance, in the order of RigDeviation.
   Eigen::VectorXd deviation() const;
   Eigen::MatrixXd covariance() const;

@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "vcharge_calibration/monitor/pitch_response.h"
 #include "vcharge_calibration/rig/rig_calibrator_options.h"
 #include "vcharge_core/base/timestamp.h"
 #include "vcharge_reconstruction/keyframe_images.h"
@@ -23,6 +24,7 @@ struct RigDeviation {
   Eigen::VectorXd information_vector;     ///< information times the most likely deviation
   Eigen::MatrixXd information;            ///< inverse covariance
   std::vector<int64_t> num_observations;  ///< of landmarks, by camera
+  PitchResponse pitch;                    ///< in this part
 
   static constexpr Eigen::Index kOdometerSize = 3;
   static Eigen::Index rowOf(size_t camera) { return kOdometerSize + 6 * static_cast<Eigen::Index>(camera); }

@@ -24,7 +24,7 @@ struct RigMonitorOptions {
   VCHARGE_END_OPTIONS();
 };
 
-/// A camera whose sight is less sees too little: its lens is dirty, covered or blinded.
+/// A camera whose sight is less sees too little to count.
 inline constexpr double kMinSight = 0.3;
 
 /// What is known about the car at the end of a part of the drive.
@@ -34,7 +34,15 @@ struct MonitoredPart {
   Eigen::VectorXd deviation, sigmas;  ///< from the rig, in the order of RigDeviation
   /// What each camera sees relative to what it usually sees, and to the others: 1 as usual, 0 nothing.
   std::vector<double> sight;
+  /// Cameras that saw too little all the way for some time: their lenses are dirty, covered or blinded.
+  std::vector<bool> sees_little;
   std::optional<RigChange> change;  ///< that this part made certain
+};
+
+/// A rig that replaced the one before, since cameras had moved.
+struct RigAdoption {
+  double at_m = 0.0;            ///< driven until then
+  std::vector<size_t> cameras;  ///< whose extrinsics differ
 };
 
 /// Watches a rig during ordinary driving: cuts the drive into parts, estimates from each how the car deviates
@@ -53,13 +61,22 @@ class RigMonitor : public DriveConsumer {
 
   void addImage(size_t camera_index, Timestamp stamp, const Image& image) override;
   void addOdometry(const VehicleOdometry& odometry) override;
-  /// Ends the last part, and waits for it.
+  /// Ends the last part, and waits for it. Another drive may follow.
   void flush();
+  /// Goes on with a repaired rig, after flush(): from now on deviations are from this one, and changes of the
+  /// cameras that it moved are accounted for. InputError unless it has the same cameras.
+  void adopt(std::shared_ptr<const CameraRig> rig);
 
   const CameraRig& rig() const { return *rig_; }
+  /// Distance of all parts.
+  double travelled_m() const { return parts_.empty() ? 0.0 : parts_.back().end_m; }
   // To be read within `on_part`, or after flush().
   const std::vector<MonitoredPart>& parts() const { return parts_; }
   std::vector<RigChange> changes() const;
+  /// Those that the rig, as last adopted, does not account for.
+  std::vector<RigChange> openChanges() const;
+  const std::vector<RigAdoption>& adoptions() const { return adoptions_; }
+  const PitchResponse& pitchResponse() const { return pitch_; }
   /// Covariance of the present deviation, in the order of RigDeviation.
   Eigen::MatrixXd covariance() const { return detector_.covariance(); }
 
@@ -72,7 +89,7 @@ class RigMonitor : public DriveConsumer {
   void adjustEndedPart();
   void waitForEndedPart();
 
-  const std::shared_ptr<const CameraRig> rig_;
+  std::shared_ptr<const CameraRig> rig_;
   const RigCalibratorOptions calibration_;
   const RigMonitorOptions options_;
   const PartCallback on_part_;
@@ -80,6 +97,9 @@ class RigMonitor : public DriveConsumer {
   std::unique_ptr<CameraSight> sight_;
   std::unique_ptr<Drive> drive_, ended_;
   std::vector<MonitoredPart> parts_;
+  std::vector<RigAdoption> adoptions_;
+  PitchResponse pitch_;
+  std::vector<double> dim_m_;     ///< by camera, driven since it sees too little
   std::future<void> adjustment_;  ///< of ended_; destroyed first, since it uses the others
 };
 

@@ -11,9 +11,10 @@ namespace vcharge {
 
 /// A rig in which the cameras that moved are where they are now.
 struct RigRepair {
-  std::shared_ptr<const CameraRig> rig;  ///< null: nothing to repair, or not yet
-  std::vector<std::string> cameras;      ///< that moved and were repaired
-  std::vector<std::string> remarks;      ///< why a camera that moved was not repaired
+  /// Null: nothing to repair, or not yet. Its provenance is its version and the evidence.
+  std::shared_ptr<const CameraRig> rig;
+  std::vector<std::string> cameras;  ///< that moved and were repaired
+  std::vector<std::string> remarks;  ///< why a camera that moved was not repaired
 };
 
 /// Repairs the cameras that moved, with their covariances; the others keep theirs. A camera is repaired once
