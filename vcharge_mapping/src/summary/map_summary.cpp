@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <map>
+#include <numeric>
 #include <queue>
 #include <utility>
 #include <vector>
@@ -12,6 +14,7 @@
 #include <Eigen/LU>
 
 #include "update/reduced_map.h"
+#include "update/same_place.h"
 #include "vcharge_core/motion/cross_matrix.h"
 
 namespace vcharge {
@@ -28,8 +31,8 @@ constexpr double kPriorSigma_rad = 0.2;
 // evidence of more drives is added. Fitted to which landmarks of three simulated lots another day's drive
 // found: 3 % of those seen over 1 m, half of those seen over 13 m.
 constexpr double kFoundLogOdds = -4.1, kFoundSlope = 1.6, kMinExtent_m = 0.5;
-/// Part of the landmarks which a drive finds in passing that one of its frames finds. Measured: 0.27 to 0.34
-/// with maps of one drive on eight simulated lots, 0.4 to 0.5 with maps of two.
+/// Part of the landmarks which a drive finds in passing a place that one of its frames finds. Measured: 0.27
+/// to 0.34 with maps of one drive on eight simulated lots, 0.38 to 0.45 with a map of four.
 constexpr double kFoundInFrame = 0.3;
 /// Deviation of an observed direction.
 constexpr double kRaySigma_rad = 0.002;
@@ -43,6 +46,39 @@ struct View {
   Matrix36d jacobian = Matrix36d::Zero();
   double found = 0.0;  ///< probability that another drive finds it
 };
+
+/// For each keyframe, those that show what it observes too: itself, and those of other sessions of which it
+/// is the nearest of its session at their place.
+std::vector<std::vector<int32_t>> shownAt(const SparseMap& map) {
+  const std::vector<MapKeyframe>& keyframes = map.keyframes();
+  std::vector<int32_t> by_x(keyframes.size());
+  std::iota(by_x.begin(), by_x.end(), 0);
+  const auto xOf = [&](int32_t k) { return keyframes[k].map_from_vehicle.translation().x(); };
+  std::sort(by_x.begin(), by_x.end(),
+            [&](int32_t a, int32_t b) { return std::make_pair(xOf(a), a) < std::make_pair(xOf(b), b); });
+  std::vector<std::vector<int32_t>> shown_at(keyframes.size());
+  size_t first = 0;
+  for (const int32_t k : by_x) {
+    while (xOf(by_x[first]) < xOf(k) - kPlaceRadius_m) {
+      ++first;
+    }
+    std::map<int32_t, std::pair<double, int32_t>> nearest;  // by session
+    for (size_t i = first; i < by_x.size() && xOf(by_x[i]) <= xOf(k) + kPlaceRadius_m; ++i) {
+      const MapKeyframe& other = keyframes[by_x[i]];
+      if (other.session != keyframes[k].session && isAtPlace(keyframes[k], other)) {
+        const double distance_m =
+            (other.map_from_vehicle.translation() - keyframes[k].map_from_vehicle.translation()).norm();
+        const std::pair<double, int32_t> found(distance_m, by_x[i]);
+        nearest[other.session] = std::min(nearest.try_emplace(other.session, found).first->second, found);
+      }
+    }
+    shown_at[k].push_back(k);
+    for (const auto& [session, found] : nearest) {
+      shown_at[found.second].push_back(k);
+    }
+  }
+  return shown_at;
+}
 
 class LandmarkChooser {
  public:
@@ -59,14 +95,22 @@ class LandmarkChooser {
     information_.assign(map.keyframes().size(), prior);
     covariance_.assign(map.keyframes().size(), prior.inverse());
     std::vector<Matrix6d> all = information_;
+    const std::vector<std::vector<int32_t>> shown_at = shownAt(map);
     for (size_t l = 0; l < map.landmarks().size(); ++l) {
       const double found = foundProbability(l);
+      std::map<int32_t, int32_t> camera_at;  // by keyframe
       const auto [begin, end] = map.observationsOfLandmark(l);
       for (const int32_t* i = begin; i != end; ++i) {
-        views_[l].push_back(viewOf(map.observations()[*i], found));
+        const MapObservation& observation = map.observations()[*i];
+        for (const int32_t keyframe : shown_at[observation.keyframe]) {
+          camera_at.emplace(keyframe, observation.camera);
+        }
+      }
+      for (const auto& [keyframe, camera] : camera_at) {
+        views_[l].push_back(viewOf(l, keyframe, camera, found));
         const View& view = views_[l].back();
-        all[view.keyframe] += view.jacobian.transpose() * view.jacobian;
-        found_of_all_[view.keyframe] += view.found;
+        all[keyframe] += view.jacobian.transpose() * view.jacobian;
+        found_of_all_[keyframe] += view.found;
       }
     }
     for (const Matrix6d& information : all) {
@@ -146,12 +190,12 @@ class LandmarkChooser {
     return 1.0 / (1.0 + std::exp(-log_odds));
   }
 
-  View viewOf(const MapObservation& observation, double found) const {
-    const MapKeyframe& keyframe = map_.keyframes()[observation.keyframe];
-    const MapLandmark& landmark = map_.landmarks()[observation.landmark];
-    const Eigen::Vector3d in_vehicle = keyframe.map_from_vehicle.inverse() * landmark.position_m;
+  View viewOf(size_t of_landmark, int32_t keyframe, int32_t camera, double found) const {
+    const MapLandmark& landmark = map_.landmarks()[of_landmark];
+    const Eigen::Vector3d in_vehicle =
+        map_.keyframes()[keyframe].map_from_vehicle.inverse() * landmark.position_m;
     const Eigen::Vector3d from_camera =
-        in_vehicle - map_.rig().cameras[observation.camera].vehicle_from_camera->translation();
+        in_vehicle - map_.rig().cameras[camera].vehicle_from_camera->translation();
     const double range_m = from_camera.norm();
     const Eigen::Vector3d ray = from_camera / range_m;
     // Direction of the point under a small motion of the vehicle, [dt, dphi] in its own frame.
@@ -160,7 +204,7 @@ class LandmarkChooser {
     const double variance_rad2 =
         kRaySigma_rad * kRaySigma_rad + landmark.covariance_m2.trace() / 3.0 / (range_m * range_m);
     View view;
-    view.keyframe = observation.keyframe;
+    view.keyframe = keyframe;
     view.found = found;
     view.jacobian = std::sqrt(view.found / variance_rad2) / range_m *
                     (Eigen::Matrix3d::Identity() - ray * ray.transpose()) * motion;

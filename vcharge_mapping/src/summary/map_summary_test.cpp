@@ -1,11 +1,13 @@
 #include "vcharge_mapping/map_summary.h"
 
+#include <string>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "testing/world_drives.h"
+#include "vcharge_mapping/session_merger.h"
 
 namespace vcharge {
 namespace {
@@ -44,6 +46,23 @@ TEST(MapSummaryTest, KeepsEnoughLandmarksAtEachPlaceOrNoMoreThanAsked) {
   const SummaryReport least = summarizeMap(*map, options).report;
   EXPECT_LE(least.num_landmarks, map->landmarks().size() / 20 + 1);
   EXPECT_LT(least.median_num_found, summary.report.median_num_found);
+}
+
+// At a place of two drives, a frame may find what either of them saw.
+TEST(MapSummaryTest, CountsWhatAnotherDriveSawAtThePlace) {
+  const auto world = testing::makeWorld(1);
+  const auto drive = [&](int number) {
+    return testing::driveThrough(
+        *world, "day " + std::to_string(number), number, RigidTransform(),
+        [number](int keyframe) { return keyframe % 2 == number; },
+        [number](int landmark) { return landmark % 4 != 3 * number; });
+  };
+  const auto both = mergeSession(*drive(0), *drive(1), MergeOptions(), nullptr).map;
+  ASSERT_EQ(both->sessions().back().component, 0);
+  const auto expected = [](const SparseMap& map) {
+    return summarizeMap(map, SummaryOptions()).report.median_num_found_before;
+  };
+  EXPECT_GT(expected(*both), 1.2 * expected(*drive(0)));
 }
 
 // A landmark that is gone says nothing about the pose.

@@ -7,14 +7,11 @@
 #include <vector>
 
 #include "update/reduced_map.h"
+#include "update/same_place.h"
 #include "vcharge_core/base/error.h"
 
 namespace vcharge {
 namespace {
-
-// Keyframes this close, and looking the same way, are at one place.
-constexpr double kPlaceRadius_m = 1.0;
-constexpr double kPlaceAngle_rad = 0.35;
 
 /// Decides which keyframes a map needs: those of a limited number of sessions at each place.
 class PlaceKeeper {
@@ -47,12 +44,6 @@ class PlaceKeeper {
       return static_cast<double>(num_in_newest) / static_cast<double>(std::max<int64_t>(1, num_landmarks));
     }
   };
-
-  bool isAtPlace(const MapKeyframe& a, const MapKeyframe& b) const {
-    const RigidTransform between = a.map_from_vehicle.inverse() * b.map_from_vehicle;
-    return between.translation().norm() <= kPlaceRadius_m &&
-           angleOfRotation(between.rotation()) <= kPlaceAngle_rad;
-  }
 
   std::map<int32_t, Coverage> coverageAt(const MapKeyframe& place) const {
     std::map<int32_t, Coverage> coverage;
