@@ -11,6 +11,9 @@
 #include "vcharge_core/motion/cross_matrix.h"
 #include "vcharge_core/motion/pose_step.h"
 
+/// Absent unless the BLAS of this machine, with which CHOLMOD multiplies, is OpenBLAS.
+extern "C" __attribute__((weak)) void openblas_set_num_threads(int num_threads);
+
 namespace vcharge {
 namespace {
 
@@ -24,6 +27,9 @@ BundleEquations::BundleEquations(const BundleProblem& problem, const BundleError
   makeSlots();
   makeCameraTerms();
   makePattern();
+  if (openblas_set_num_threads != nullptr) {
+    openblas_set_num_threads(1);  // otherwise sums depend on the number of threads
+  }
 }
 
 void BundleEquations::linearize(const BundleState& state) {
