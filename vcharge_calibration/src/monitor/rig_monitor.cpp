@@ -150,15 +150,16 @@ void RigMonitor::adjustEndedPart() {
 }
 
 void RigMonitor::adopt(std::shared_ptr<const CameraRig> rig) {
-  if (rig == nullptr || !haveSameImages(*rig, *rig_)) {
+  const CameraRig& next = withExtrinsics(rig);
+  if (!haveSameImages(next, *rig_)) {
     throw InputError("rig: expected the cameras and image sizes of the rig before");
   }
   RigAdoption adoption;
   adoption.at_m = travelled_m();
-  Eigen::VectorXd deviation = Eigen::VectorXd::Zero(RigDeviation::rowOf(rig->cameras.size()));
-  for (size_t i = 0; i < rig->cameras.size(); ++i) {
-    const Eigen::Matrix<double, 6, 1> step = stepBetween(*rig_->cameras[i].vehicle_from_camera,
-                                                         *withExtrinsics(rig).cameras[i].vehicle_from_camera);
+  Eigen::VectorXd deviation = Eigen::VectorXd::Zero(RigDeviation::rowOf(next.cameras.size()));
+  for (size_t i = 0; i < next.cameras.size(); ++i) {
+    const Eigen::Matrix<double, 6, 1> step =
+        stepBetween(*rig_->cameras[i].vehicle_from_camera, *next.cameras[i].vehicle_from_camera);
     deviation.segment<6>(RigDeviation::rowOf(i)) = step;
     if (!step.isZero(0.0)) {
       adoption.cameras.push_back(i);
