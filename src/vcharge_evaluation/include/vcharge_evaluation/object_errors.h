@@ -14,9 +14,6 @@
 
 namespace vcharge {
 
-/// Least existence probability of a reported object that is judged.
-inline constexpr double kMinExistence = 0.5;
-
 /// Options of ObjectEvaluator. The outline of the vehicle is that of the simulated car.
 struct ObjectEvaluationOptions {
   VCHARGE_BEGIN_OPTIONS(ObjectEvaluationOptions);

@@ -15,6 +15,8 @@ namespace {
 
 constexpr Duration kSpeedTime(500'000'000), kVisibleTime(500'000'000), kCrossingTime(1'000'000'000);
 constexpr double kApproached_m = 1.5, kAway_m = 2.0, kStanding_m = 0.02;
+/// Least existence probability of a reported object that is judged.
+constexpr double kMinExistence = 0.5;
 // Largest errors of a good report.
 constexpr double kGoodPosition_m = 0.3, kGoodVelocity_m_per_s = 0.3;
 constexpr double kMissedVelocity_m_per_s = 1.0;
