@@ -53,6 +53,11 @@ std::string subjectOf(const CameraRig& rig, const RigChange& change) {
   return "camera " + rig.cameras[change.camera].name + (change.is_slow ? " moves on slowly" : " moved");
 }
 
+std::string describeSoftness(const PitchResponse& response) {
+  return "soft suspension: the body pitches " + toText(kDegrees * response.radPerMetrePerS2(), 2) + " +- " +
+         toText(kDegrees * response.sigma(), 2) + " degrees per m/s^2; up to 0.3 is usual";
+}
+
 }  // namespace
 
 std::vector<std::string> deviationNames(const CameraRig& rig) {
@@ -79,11 +84,6 @@ std::string describeChange(const CameraRig& rig, const RigChange& change) {
          toText(axis.unit * change.size[main], axis.digits) + " +- " +
          toText(axis.unit * std::sqrt(change.covariance(main, main)), axis.digits) + " " + axis.unit_name +
          ", " + when;
-}
-
-std::string describeSoftness(const PitchResponse& response) {
-  return "soft suspension: the body pitches " + toText(kDegrees * response.radPerMetrePerS2(), 2) + " +- " +
-         toText(kDegrees * response.sigma(), 2) + " degrees per m/s^2; up to 0.3 is usual";
 }
 
 MonitorVerdict judgeMonitoredDrive(const RigMonitor& monitor, const std::vector<std::string>& remarks) {

@@ -7,6 +7,7 @@
 
 #include "vcharge_core/base/error.h"
 #include "vcharge_ros/conversions.h"
+#include "vcharge_ros/test_support.h"
 
 namespace vcharge {
 namespace {
@@ -22,16 +23,7 @@ class RigHealthConversionsTest : public ::testing::Test {
       message_.cameras.push_back(health);
     }
   }
-  CameraRig rig_ = parseCameraRig(R"(
-cameras:
-  front: &camera
-    image_size_px: [640, 480]
-    model: kannala_brandt
-    intrinsics: {fx: 200, fy: 201, cx: 320, cy: 240, k1: 0.01, k2: 0, k3: 0, k4: 0}
-    vehicle_from_camera: {translation_m: [1, 2, 3], rotation_xyzw: [0, 0, 0, 1]}
-  left: *camera
-)",
-                                  "rig.yaml", ".");
+  CameraRig rig_ = testing::makeRig();
   vcharge_msgs::RigHealth message_;
 };
 
@@ -55,7 +47,7 @@ TEST_F(RigHealthConversionsTest, ACameraThatSeesLittleIsWhereItWas) {
 }
 
 TEST_F(RigHealthConversionsTest, AMessageAboutOtherExtrinsicsSaysNothing) {
-  rig_.cameras[0].vehicle_from_camera = RigidTransform::planar(1.01, 0.0, 0.0);
+  rig_.cameras[0].vehicle_from_camera = RigidTransform::planar(3.001, 0.0, 0.3);
   EXPECT_FALSE(fromMessage(message_, rig_).has_value());
 }
 

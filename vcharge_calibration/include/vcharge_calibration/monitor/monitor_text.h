@@ -14,9 +14,6 @@ std::vector<std::string> deviationNames(const CameraRig& rig);
 /// A sentence, such as: camera left moved: pitch by 0.21 +- 0.02 degrees, between 51 and 72 m.
 std::string describeChange(const CameraRig& rig, const RigChange& change);
 
-/// A sentence about a body that pitches far.
-std::string describeSoftness(const PitchResponse& response);
-
 /// What a monitored drive shows. PASS: nothing changed. WARN with what changed. FAIL: it shows nothing.
 struct MonitorVerdict {
   Verdict grade = Verdict::kFail;
