@@ -18,7 +18,8 @@ namespace vcharge {
 /// driver: /calibration/status says what to drive next, how well each camera's extrinsics are known, and when
 /// to stop. Shows the drive on /calibration/trajectory, /calibration/landmarks (by camera) and
 /// /calibration/cameras, in the frame `map`. Services: ~calibrate starts to calibrate the drive so far and
-/// returns; ~reset begins a new drive. Files are written after PASS and WARN, the report always. Parameters:
+/// returns; ~reset begins a new drive. Files are written after PASS and WARN, the report always; a rig that
+/// passed stays where the new one has a WARN, and the status says so. Parameters:
 /// ~rig (path), ~output (rig.yaml to write), optional ~map (*.vmap), ~trajectory (*.tum), ~report (folder),
 /// ~options (RigCalibratorOptions), ~session (RigCalibrationSessionOptions), ~source
 /// (LiveDriveSourceOptions), ~lossless_replay (every image in order, as calibrate_rig; otherwise those that
@@ -51,7 +52,7 @@ class CalibrationNodelet : public Nodelet {
     session_ = std::make_unique<RigCalibrationSession>(
         rig, options_, session_options, [this](const Status& status) { display_->tell(status); },
         [this](const ReconstructionState& state, const CameraRig& initial_rig) { watch(state, initial_rig); },
-        [this](const FinishedCalibration& work) { finish(work); });
+        [this](const FinishedCalibration& work) { return finish(work); });
     display_ = std::make_unique<CalibrationDisplay>(&node(), options_);
     display_->tell(session_->status());
     addDiagnostics(
@@ -80,18 +81,21 @@ class CalibrationNodelet : public Nodelet {
     }
   }
 
-  void finish(const FinishedCalibration& work) {
+  std::string finish(const FinishedCalibration& work) {
     writeRigReport(report_, "Rig by a live drive", work.result, work.state, work.images);
-    if (work.result.verdict != Verdict::kFail) {
-      auto provenance = provenance_;
-      provenance["verdict"] = toString(work.result.verdict);
-      if (!map_.empty()) {
-        const std::shared_ptr<const SparseMap> map = mapOfCalibration(options_, work.state);
-        writeSparseMap(*map, provenance, map_, indexForTiles(*map));
-      }
-      writeRigAndTrajectory(output_, trajectory_, work.result, work.state, provenance);
-      display_->showResult(session_->status(), work);
+    if (work.result.verdict == Verdict::kFail) {
+      return "";
     }
+    auto provenance = provenance_;
+    provenance["verdict"] = toString(work.result.verdict);
+    if (!map_.empty()) {
+      const std::shared_ptr<const SparseMap> map = mapOfCalibration(options_, work.state);
+      writeSparseMap(*map, provenance, map_, indexForTiles(*map));
+    }
+    const std::string written =
+        writeRigAndTrajectory(output_, trajectory_, work.result, work.state, provenance);
+    display_->showResult(session_->status(), work);
+    return written == output_ ? "" : describeKept(output_, written);
   }
 
   DriveMonitor::Report report() {

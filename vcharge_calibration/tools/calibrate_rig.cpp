@@ -2,7 +2,6 @@
 #include <string>
 
 #include "rig_tool.h"
-#include "vcharge_calibration/report/rig_calibration_files.h"
 #include "vcharge_calibration/rig/rig_calibrator.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
@@ -25,7 +24,7 @@ void calibrate(const RigToolArguments& arguments, const std::string& map_file,
     const std::shared_ptr<const SparseMap> map = calibrator.map();
     writeSparseMap(*map, provenance, map_file, indexForTiles(*map));
   }
-  writeRigAndTrajectory(arguments.output, arguments.trajectory, result, calibrator.state(), provenance);
+  writeAndTell(arguments, result, calibrator.state(), provenance);
 }
 
 }  // namespace
@@ -36,7 +35,8 @@ int main(int argc, char** argv) {
       "initial estimate, overlap or a board. Drive 100 m or more with turns to both sides and revisit "
       "places, best a "
       "figure of eight. Prints every degree of freedom with its standard deviation and a verdict: PASS, WARN "
-      "with what is missing, or FAIL, which writes no file.");
+      "with what is missing, or FAIL, which writes no file. A rig that passed is not replaced by one with a "
+      "WARN, which is written beside it.");
   RigToolArguments arguments;
   addRigToolArguments(&app, &arguments);
   std::string map_file;

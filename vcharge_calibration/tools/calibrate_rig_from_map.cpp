@@ -3,7 +3,6 @@
 
 #include "rig_tool.h"
 #include "vcharge_calibration/from_map/map_rig_calibrator.h"
-#include "vcharge_calibration/report/rig_calibration_files.h"
 #include "vcharge_core/base/error.h"
 #include "vcharge_core/sparse_map/sparse_map_file.h"
 
@@ -24,7 +23,7 @@ void calibrate(const RigToolArguments& arguments, const std::string& map_file,
   auto provenance = provenanceOf(arguments, "calibrate_rig_from_map", option_text, result);
   provenance["map"] = map_file;
   provenance["map_hash"] = map->contentHash();
-  writeRigAndTrajectory(arguments.output, arguments.trajectory, result, calibrator.state(), provenance);
+  writeAndTell(arguments, result, calibrator.state(), provenance);
 }
 
 }  // namespace
@@ -36,7 +35,8 @@ int main(int argc, char** argv) {
       "The map "
       "defines the scale. Prints every degree of freedom with its standard deviation and a verdict: PASS, "
       "WARN "
-      "with what is missing, or FAIL, which writes no file.");
+      "with what is missing, or FAIL, which writes no file. A rig that passed is not replaced by one with a "
+      "WARN, which is written beside it.");
   RigToolArguments arguments;
   addRigToolArguments(&app, &arguments);
   std::string map_file;

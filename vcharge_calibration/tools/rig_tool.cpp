@@ -29,7 +29,7 @@ void addRigToolArguments(CommandLine* app, RigToolArguments* arguments) {
       "time_offset_s, time_offset_sigma_s, cameras (name, num_observations, rms_px, standard_deviations of "
       "translation and rotation in the vehicle frame, travel_in_camera and up_in_camera as unit vectors "
       "where "
-      "known), stage_s (wall time).");
+      "known), stage_s (wall time), rig (the file that was written).");
 }
 
 void followDrive(const RigToolArguments& arguments, const std::shared_ptr<const CameraRig>& rig,
@@ -115,6 +115,18 @@ std::map<std::string, std::string> provenanceOf(const RigToolArguments& argument
                                                 const std::string& options, const RigCalibration& result) {
   return {{"bag", arguments.bag}, {"bag_hash", fileHash(arguments.bag)}, {"rig", arguments.rig},
           {"options", options},   {"verdict", toString(result.verdict)}, {"program", program + " 0.1.0"}};
+}
+
+void writeAndTell(const RigToolArguments& arguments, const RigCalibration& result,
+                  const ReconstructionState& state, const std::map<std::string, std::string>& provenance) {
+  const std::string written =
+      writeRigAndTrajectory(arguments.output, arguments.trajectory, result, state, provenance);
+  if (written != arguments.output) {
+    std::printf("  %s\n", describeKept(arguments.output, written).c_str());
+  }
+  if (arguments.found != nullptr) {
+    (*arguments.found)["rig"] = written;
+  }
 }
 
 }  // namespace vcharge

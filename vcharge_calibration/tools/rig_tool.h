@@ -59,4 +59,8 @@ RigCalibration finishAndPrint(const RigToolArguments& arguments, const Reconstru
 std::map<std::string, std::string> provenanceOf(const RigToolArguments& arguments, const std::string& program,
                                                 const std::string& options, const RigCalibration& result);
 
+/// Writes rig and trajectory, and prints where the rig went if not to --output (see writeRigAndTrajectory()).
+void writeAndTell(const RigToolArguments& arguments, const RigCalibration& result,
+                  const ReconstructionState& state, const std::map<std::string, std::string>& provenance);
+
 }  // namespace vcharge

@@ -242,8 +242,8 @@ void RigCalibrationSession::run(const std::shared_ptr<Job>& job) {
     if (job->is_abandoned) {
       throw Abandoned();
     }
-    on_result_(job->work);
-    message = describe(job->work.result);
+    const std::string more = on_result_(job->work);
+    message = describe(job->work.result) + (more.empty() ? "" : "; " + more);
     phase = job->work.result.verdict == Verdict::kFail ? Phase::kFailed : Phase::kCalibrated;
   } catch (const Abandoned&) {
     message = "abandoned";

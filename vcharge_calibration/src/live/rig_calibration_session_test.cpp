@@ -42,7 +42,7 @@ class RigCalibrationSessionTest : public testing::Test {
         oneCamera(), RigCalibratorOptions(), options,
         [this](const RigCalibrationSession::Status& /*status*/) { ++num_told_; },
         [](const ReconstructionState& /*state*/, const CameraRig& /*initial_rig*/) {},
-        [this](const FinishedCalibration& work) { on_result_(work); });
+        [this](const FinishedCalibration& work) { return on_result_(work); });
   }
 
   static Phase waitForEnd(const RigCalibrationSession& session) {
@@ -65,7 +65,8 @@ class RigCalibrationSessionTest : public testing::Test {
     return false;
   }
 
-  std::function<void(const FinishedCalibration&)> on_result_ = [](const FinishedCalibration& /*work*/) {};
+  std::function<std::string(const FinishedCalibration&)> on_result_ =
+      [](const FinishedCalibration& /*work*/) { return ""; };
   std::atomic<int> num_told_{0};
 };
 
@@ -74,6 +75,7 @@ TEST_F(RigCalibrationSessionTest, FailsWithTheReasonAndStartsAgain) {
   on_result_ = [&](const FinishedCalibration& work) {
     EXPECT_EQ(work.result.verdict, Verdict::kFail);
     ++num_results;
+    return "nothing is lost";
   };
   const auto session = makeSession();
   EXPECT_EQ(session->status().phase, Phase::kFollowing);
@@ -81,7 +83,7 @@ TEST_F(RigCalibrationSessionTest, FailsWithTheReasonAndStartsAgain) {
   for (int i = 1; i <= 2; ++i) {
     ASSERT_TRUE(beginToCalibrate(session.get()));
     EXPECT_EQ(waitForEnd(*session), Phase::kFailed);
-    EXPECT_EQ(session->status().message, "FAIL; no images in the drive");
+    EXPECT_EQ(session->status().message, "FAIL; no images in the drive; nothing is lost");
     ASSERT_NE(session->status().result, nullptr);
     EXPECT_EQ(num_results, i);
   }
@@ -93,7 +95,9 @@ TEST_F(RigCalibrationSessionTest, FailsWithTheReasonAndStartsAgain) {
 }
 
 TEST_F(RigCalibrationSessionTest, FailsWhereTheResultCannotBeWritten) {
-  on_result_ = [](const FinishedCalibration& /*work*/) { throw InputError("rig.yaml: no space left"); };
+  on_result_ = [](const FinishedCalibration& /*work*/) -> std::string {
+    throw InputError("rig.yaml: no space left");
+  };
   const auto session = makeSession();
   ASSERT_TRUE(beginToCalibrate(session.get()));
   EXPECT_EQ(waitForEnd(*session), Phase::kFailed);
@@ -108,6 +112,7 @@ TEST_F(RigCalibrationSessionTest, ReportsNothingOfAnAbandonedDrive) {
       begun.set_value();
       may_go_on.get_future().wait();
     }
+    return "";
   };
   const auto session = makeSession();
   std::string message;

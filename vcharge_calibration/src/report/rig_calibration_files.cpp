@@ -12,6 +12,32 @@ namespace vcharge {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// Whether a file is a rig of a calibration whose verdict was PASS.
+bool hasPassed(const std::string& rig_file) {
+  if (!fs::exists(rig_file)) {
+    return false;
+  }
+  try {
+    const CameraRig rig = readCameraRig(rig_file);
+    const auto verdict = rig.provenance.find("verdict");
+    return rig.hasExtrinsics() && verdict != rig.provenance.end() &&
+           verdict->second == toString(Verdict::kPass);
+  } catch (const InputError&) {
+    return false;  // nothing that could be used
+  }
+}
+
+/// `rig_WARN.yaml` for `rig.yaml`.
+std::string besideRig(const std::string& rig_file, Verdict verdict) {
+  const fs::path path(rig_file);
+  return (path.parent_path() / (path.stem().string() + "_" + toString(verdict) + path.extension().string()))
+      .string();
+}
+
+}  // namespace
+
 void writeRigReport(const std::string& folder, const std::string& title, const RigCalibration& result,
                     const ReconstructionState& state, const KeyframeImages& images,
                     const std::string& more_sections) {
@@ -34,14 +60,22 @@ void writeRigWithMasks(CameraRig rig, std::map<std::string, std::string> provena
   writeCameraRig(rig, path);
 }
 
-void writeRigAndTrajectory(const std::string& rig_file, const std::string& trajectory_file,
-                           const RigCalibration& result, const ReconstructionState& state,
-                           const std::map<std::string, std::string>& provenance) {
+std::string writeRigAndTrajectory(const std::string& rig_file, const std::string& trajectory_file,
+                                  const RigCalibration& result, const ReconstructionState& state,
+                                  const std::map<std::string, std::string>& provenance) {
   check(result.rig != nullptr, "writeRigAndTrajectory: expected a calibration that did not fail");
   if (!trajectory_file.empty()) {
     writeTrajectory(trajectoryOf(state), trajectory_file);
   }
-  writeRigWithMasks(*result.rig, provenance, rig_file);
+  const std::string path = result.verdict != Verdict::kPass && hasPassed(rig_file)
+                               ? besideRig(rig_file, result.verdict)
+                               : rig_file;
+  writeRigWithMasks(*result.rig, provenance, path);
+  return path;
+}
+
+std::string describeKept(const std::string& rig_file, const std::string& written) {
+  return rig_file + " passed and stays; this rig is " + written;
 }
 
 }  // namespace vcharge

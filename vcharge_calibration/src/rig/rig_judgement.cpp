@@ -21,6 +21,8 @@ constexpr double kUnit_m = 0.01;
 constexpr double kUnit_rad = 0.05 / 57.29577951308232;
 constexpr double kDegrees = 57.29577951308232;
 constexpr int kHalfIterations = 10;
+/// Cosines between a camera's view and the side that its name says, and another side, of swapped cameras.
+constexpr double kMaxOwnSide = 0.2, kMinOtherSide = 0.8;
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
@@ -184,19 +186,28 @@ std::string describeFailure(const std::string& camera, const HandEye& initial, c
 }
 
 std::string findWrongSign(const CameraRig& rig) {
-  const std::pair<const char*, Eigen::Vector3d> expected[] = {{"front", Eigen::Vector3d::UnitX()},
-                                                              {"rear", -Eigen::Vector3d::UnitX()},
-                                                              {"left", Eigen::Vector3d::UnitY()},
-                                                              {"right", -Eigen::Vector3d::UnitY()}};
+  const std::pair<const char*, Eigen::Vector2d> directions[] = {{"front", Eigen::Vector2d::UnitX()},
+                                                                {"rear", -Eigen::Vector2d::UnitX()},
+                                                                {"left", Eigen::Vector2d::UnitY()},
+                                                                {"right", -Eigen::Vector2d::UnitY()}};
   bool all_over = true;
   int num_named = 0, num_round = 0;
+  std::string misnamed;
   for (const RigCamera& camera : rig.cameras) {
     const Eigen::Matrix3d rotation = camera.vehicle_from_camera->rotationMatrix();
     all_over = all_over && rotation(2, 1) > 0.0;
-    for (const auto& [name, direction] : expected) {
-      if (camera.name == name) {
-        ++num_named;
-        num_round += rotation.col(2).dot(direction) < -0.3 ? 1 : 0;
+    const Eigen::Vector2d view = rotation.col(2).head<2>();
+    const auto own = std::find_if(std::begin(directions), std::end(directions),
+                                  [&](const auto& direction) { return camera.name == direction.first; });
+    if (own == std::end(directions)) {
+      continue;
+    }
+    ++num_named;
+    num_round += own->second.dot(view) < -0.3 ? 1 : 0;
+    for (const auto& [name, direction] : directions) {
+      if (own->second.dot(view) < kMaxOwnSide * view.norm() &&
+          direction.dot(view) > kMinOtherSide * view.norm()) {
+        misnamed += (misnamed.empty() ? "camera '" : ", camera '") + camera.name + "' looks to the " + name;
       }
     }
   }
@@ -207,7 +218,7 @@ std::string findWrongSign(const CameraRig& rig) {
     return "all cameras would look opposite to their names: the odometer's direction of travel has the wrong "
            "sign";
   }
-  return "";
+  return misnamed.empty() ? "" : misnamed + ": are cameras swapped? Check their cables and topics";
 }
 
 void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, const ReconstructionState& state,

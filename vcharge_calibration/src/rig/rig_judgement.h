@@ -14,7 +14,8 @@ namespace vcharge {
 std::string describeFailure(const std::string& camera, const HandEye& initial, const RigCalibration& drive);
 
 /// Reason why initial extrinsics are implausible: an odometer with wrong sign turns all cameras backwards or
-/// upside down. Empty if they are plausible.
+/// upside down, and cameras named front, left, rear or right look elsewhere if they are swapped. Empty if
+/// they are plausible.
 std::string findWrongSign(const CameraRig& rig);
 
 /// Sets covariances, statistics and verdict of an adjusted rig.

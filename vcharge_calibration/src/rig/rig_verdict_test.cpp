@@ -1,3 +1,7 @@
+#include <string>
+#include <utility>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "rig/rig_judgement.h"
@@ -91,24 +95,42 @@ TEST(RigVerdictTest, NamesDelayedStampsAndWrongIntrinsics) {
   EXPECT_EQ(verdict, Verdict::kFail);
 }
 
+using NamesAndYaws = std::vector<std::pair<const char*, double>>;
+
+CameraRig rigWith(const NamesAndYaws& names_and_yaws, const RigidTransform& vehicle_from_wrong = {}) {
+  KannalaBrandtCamera::Parameters parameters;
+  parameters << 200.0, 200.0, 319.5, 199.5, 0.0, 0.0, 0.0, 0.0;
+  CameraRig rig;
+  for (const auto& [name, yaw_rad] : names_and_yaws) {
+    RigCamera camera{name, name, cv::Size(640, 400), KannalaBrandtCamera(parameters)};
+    camera.vehicle_from_camera =
+        vehicle_from_wrong * makeExtrinsics(yaw_rad, 0.3, 0.0, Eigen::Vector3d::Zero());
+    rig.cameras.push_back(camera);
+  }
+  return rig;
+}
+
 TEST(WrongSignTest, FollowsFromNamesAndFromUpsideDownCameras) {
-  const auto rigOf = [&](const RigidTransform& vehicle_from_wrong) {
-    KannalaBrandtCamera::Parameters parameters;
-    parameters << 200.0, 200.0, 319.5, 199.5, 0.0, 0.0, 0.0, 0.0;
-    CameraRig rig;
-    for (const auto& [name, yaw_rad] : {std::make_pair("front", 0.0), std::make_pair("left", 1.57)}) {
-      RigCamera camera{name, name, cv::Size(640, 400), KannalaBrandtCamera(parameters)};
-      camera.vehicle_from_camera =
-          vehicle_from_wrong * makeExtrinsics(yaw_rad, 0.3, 0.0, Eigen::Vector3d::Zero());
-      rig.cameras.push_back(camera);
-    }
-    return rig;
+  const auto rigOf = [](const RigidTransform& vehicle_from_wrong) {
+    return rigWith({{"front", 0.0}, {"left", 1.57}}, vehicle_from_wrong);
   };
   EXPECT_EQ(findWrongSign(rigOf(RigidTransform())), "");
   expectRemark(findWrongSign(rigOf(RigidTransform::planar(0.0, 0.0, 3.14159265))), "direction of travel");
   expectRemark(findWrongSign(rigOf(
                    RigidTransform(rotationFromVector({3.14159265, 0.0, 0.0}), Eigen::Vector3d::Zero()))),
                "turns have the wrong sign");
+}
+
+TEST(WrongSignTest, NamesSwappedCameras) {
+  const auto judgeNames = [](const NamesAndYaws& names_and_yaws) {
+    return findWrongSign(rigWith(names_and_yaws));
+  };
+  expectRemark(judgeNames({{"front", 0.0}, {"left", -1.57}, {"right", 1.57}}),
+               "camera 'left' looks to the right, camera 'right' looks to the left: are cameras swapped?");
+  expectRemark(judgeNames({{"front", 1.57}, {"left", 0.0}, {"rear", 3.14}}),
+               "camera 'front' looks to the left, camera 'left' looks to the front");
+  EXPECT_EQ(judgeNames({{"front", 0.9}, {"left", 2.4}, {"rear", 3.14}}), "") << "mounted at the corners";
+  EXPECT_EQ(judgeNames({{"front", 0.0}, {"trailer", 3.14}}), "") << "a name that says no side";
 }
 
 }  // namespace

@@ -18,7 +18,12 @@ AXES = ("forwards", "sideways", "height", "roll", "pitch", "yaw")
 SCENARIO = CONFIG / "scenarios" / "calibration_figure_eight.yaml"
 USUAL_WHEELS = ("--set", "odometer.scale_error=0.0005", "--set", "odometer.left_right_error=0.0002")
 OPTIONS = {"calibrate_rig": "calibration.yaml", "calibrate_rig_from_map": "calibration_in_map.yaml"}
-PARTS = ("rigs", "seeds", "wheels", "map", "faults", "real")
+PARTS = ("rigs", "kinds", "seeds", "wheels", "map", "faults", "real")
+# Cameras of the rig `eight` that are calibrated together, of three camera models.
+KINDS = {"one camera": ["front"], "two without a common view": ["left", "right"],
+         "two pinhole cameras and a fisheye": ["roof", "rear", "left_pillar"],
+         "six": ["front", "left", "rear", "right", "roof", "trailer"],
+         "eight": ["front", "left", "rear", "right", "roof", "trailer", "left_pillar", "right_pillar"]}
 
 
 def arguments():
@@ -39,10 +44,10 @@ def arguments():
 class Drive:
     """A drive that was rendered without noise; read() adds noise and faults to it."""
 
-    def __init__(self, args, rig, image_scale):
+    def __init__(self, args, rig, image_scale, kind="random"):
         self.scene, rig_seed = rig.split(":")
-        self.folder = args.work / f"{self.scene}_rig{rig_seed}_scale{image_scale:g}"
-        self.words = ["--scenario", SCENARIO, "--scene", self.scene, "--scene-seed", args.scene_seed, "--rig", "random",
+        self.folder = args.work / f"{self.scene}_rig{rig_seed}_{kind}_scale{image_scale:g}"
+        self.words = ["--scenario", SCENARIO, "--scene", self.scene, "--scene-seed", args.scene_seed, "--rig", kind,
                       "--rig-seed", rig_seed, "--seed", 1000 + int(rig_seed), "--image-scale", image_scale,
                       "--image-step", args.image_step, "--duration-s", args.duration_s]
         simulate(self.folder, [*self.words, "--noise", "off"])
@@ -56,7 +61,7 @@ class Drive:
 class Calibration:
     """A rig that a tool calibrated, with its errors where it wrote one."""
 
-    def __init__(self, folder, rig, *words, tool="calibrate_rig", name="rig"):
+    def __init__(self, folder, rig, *words, tool="calibrate_rig", name="rig", truth=None):
         self.output = folder / f"{name}.yaml"
         self.output.unlink(missing_ok=True)
         say(f"{folder}: {tool} {name}")
@@ -66,7 +71,7 @@ class Calibration:
         self.remarks = self.run.found.get("remarks") or [self.run.error() or ""]
         self.stage_s = self.run.found.get("stage_s", {})
         self.has_rig = self.output.exists()
-        self.errors = judge_rig(self.output, folder / "rig_truth.yaml", folder / f"{name}_errors.json") if (
+        self.errors = judge_rig(self.output, truth or folder / "rig_truth.yaml", folder / f"{name}_errors.json") if (
             self.has_rig) else None
 
     def sizes(self, kind="as_is"):
@@ -88,10 +93,10 @@ class Calibration:
         yield Figure("processor time", self.run.cpu_s, "s")
 
 
-def judged(calibrations):
-    """The goals, over all cameras of all calibrations. Four cameras count as missed where there is no rig."""
+def judged(calibrations, num_cameras=4):
+    """The goals, over all cameras of all calibrations. All cameras count as missed where there is no rig."""
     sizes = [size for one in calibrations for size in one.sizes()]
-    missing = 4 * sum(one.errors is None for one in calibrations)
+    missing = num_cameras * sum(one.errors is None for one in calibrations)
     good = sum(shift <= MAX_TRANSLATION_M and turn <= MAX_ROTATION_DEG for shift, turn in sizes)
     far = sum(shift > 2 * MAX_TRANSLATION_M or turn > 2 * MAX_ROTATION_DEG for shift, turn in sizes)
     yield figure("cameras within 0.05 degrees and 1 cm", percent(good, len(sizes) + missing), "%", at_least=95)
@@ -121,6 +126,19 @@ def evaluate_rigs(args, results):
         judge_and_draw_rig(calibrations[worst].output, folder / "rig_truth.yaml", {}, folder, folder / "rig_errors.png")
         results.show(cv2.imread(str(folder / "rig_errors.png")),
                      f"{worst}: largest translation error of a camera {100 * found[worst]:.2f} cm", found[worst])
+
+
+def evaluate_kinds(args, results):
+    """Rigs of one to eight cameras of all camera models, with and without a common view."""
+    folder = Drive(args, args.rigs[0], args.image_scale, "eight").read("right_wheels", *USUAL_WHEELS)
+    rig = yaml.safe_load((folder / "rig_truth.yaml").read_text())
+    columns = []
+    for number, (kind, cameras) in enumerate(KINDS.items()):
+        part = folder / f"rig_{number}.yaml"
+        part.write_text(yaml.safe_dump({**rig, "cameras": {name: rig["cameras"][name] for name in cameras}}, sort_keys=False))
+        one = Calibration(folder, part, name=f"found_{number}", truth=part)
+        columns.append((kind, [Figure("cameras", len(cameras)), *one.figures(), *judged([one], len(cameras))]))
+    results.add(f"Rigs of other kinds, image scale {args.image_scale:g}", *columns)
 
 
 def evaluate_seeds(args, results):
@@ -170,10 +188,17 @@ def evaluate_faults(args, results):
     for name, changes, goals in (
             ("20 % of the images dropped", ["dropped_images.cameras=[all]", "dropped_images.probability=0.2"], ["PASS"]),
             ("odometer 100 ms late", ["odometry_stamp_shift.shift_s=0.1"], ["WARN", "FAIL"]),
-            ("left camera covered", ["dead_camera.cameras=[left]", "dead_camera.black_images=true"], ["FAIL"])):
+            ("left camera covered", ["dead_camera.cameras=[left]", "dead_camera.black_images=true"], ["FAIL"]),
+            ("cables of left and right exchanged", ["swapped_cameras.cameras=[left, right]"], ["FAIL"])):
         words = [word for change in changes for word in ("--set", f"faults.{change}")]
         folder = drive.read(changes[0].split(".")[0], *USUAL_WHEELS, *words)
         figures.append(verdict(name, goals, Calibration(folder, folder / "rig_truth.yaml")))
+    knocked = args.work / "knocked_twice"
+    simulate(knocked, [*drive.words, *USUAL_WHEELS, "--set", "faults.bumped_camera.cameras=[left]", *(
+        word for key, value in (("start_s", 25), ("end_s", 50), ("rotation_rad", [0.0, 0.01, 0.0]))
+        for word in ("--set", f"faults.bumped_camera.{key}={value}"))])
+    figures.append(verdict("left camera knocked by 0.6 degrees, and back", ["WARN", "FAIL"],
+                           Calibration(knocked, knocked / "rig_truth.yaml")))
     sound = drive.read("right", *USUAL_WHEELS)
     truth = sound / "rig_truth.yaml"
     figures.append(verdict("no fault", ["PASS", "WARN"], Calibration(sound, truth)))

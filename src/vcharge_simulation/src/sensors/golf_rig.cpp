@@ -37,17 +37,6 @@ Eigen::Matrix3d leftRotation() {
   return rotation;
 }
 
-// Camera whose optical axis has a yaw from straight ahead and a pitch below the horizon, with level image
-// rows.
-Eigen::Matrix3d rotationTowards(double yaw_rad, double down_rad) {
-  const Eigen::Vector3d z(std::cos(down_rad) * std::cos(yaw_rad), std::cos(down_rad) * std::sin(yaw_rad),
-                          -std::sin(down_rad));
-  const Eigen::Vector3d x(std::sin(yaw_rad), -std::cos(yaw_rad), 0.0);
-  Eigen::Matrix3d rotation;
-  rotation << x, z.cross(x), z;
-  return rotation;
-}
-
 RigidTransform disturbed(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& translation_m,
                          Random* random) {
   constexpr double kTilt_rad = 0.015;
@@ -101,6 +90,15 @@ CarMaterials makeMaterials(const Paint& paint, std::vector<Material>* materials)
 }
 
 }  // namespace
+
+Eigen::Matrix3d rotationTowards(double yaw_rad, double down_rad) {
+  const Eigen::Vector3d z(std::cos(down_rad) * std::cos(yaw_rad), std::cos(down_rad) * std::sin(yaw_rad),
+                          -std::sin(down_rad));
+  const Eigen::Vector3d x(std::sin(yaw_rad), -std::cos(yaw_rad), 0.0);
+  Eigen::Matrix3d rotation;
+  rotation << x, z.cross(x), z;
+  return rotation;
+}
 
 CameraRig makeGolfRig(uint64_t seed, double image_scale) {
   if (!(image_scale > 0.0 && image_scale <= 1.0)) {

@@ -23,7 +23,10 @@ const std::vector<CatalogueRig>& catalogue() {
        makeRecessedRig},
       {{"random",
         "the Golf's cameras moved by up to 10 cm and 10 degrees, with random lenses, by --rig-seed"},
-       makeRandomRig}};
+       makeRandomRig},
+      {{"eight",
+        "the Golf's cameras, two that look back along the sides, one on the roof, one for a trailer"},
+       makeEightRig}};
   return rigs;
 }
 

@@ -1,6 +1,8 @@
 #include "vcharge_simulation/sensors/rig_catalogue.h"
 
 #include <cmath>
+#include <set>
+#include <string>
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
@@ -31,7 +33,8 @@ TEST(RigCatalogueTest, UnknownRigsAndScalesAreNamed) {
     makeRig("tractor", 1, 1.0);
     FAIL();
   } catch (const std::invalid_argument& error) {
-    EXPECT_NE(std::string(error.what()).find("golf, recessed, random"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("golf, recessed, random, eight"), std::string::npos)
+        << error.what();
     EXPECT_NE(std::string(error.what()).find("tractor"), std::string::npos);
   }
   EXPECT_THROW(makeRig("random", 1, 1.5), std::invalid_argument);
@@ -127,6 +130,39 @@ TEST(RandomRigTest, TheOwnCarHidesLittleOfTheView) {
       const CameraView view(camera, body);
       const double visible = static_cast<double>(cv::countNonZero(view.mask())) / view.size().area();
       EXPECT_GT(visible, 0.5) << camera.name << " of seed " << seed;
+    }
+  }
+}
+
+TEST(EightRigTest, HasCamerasOfAllModelsThatSeeBesidesTheOwnCar) {
+  const auto body = makeGolfBody();
+  std::set<std::string> models;
+  for (uint64_t seed = 0; seed < 5; ++seed) {
+    const CameraRig rig = makeRig("eight", seed, 0.05);
+    ASSERT_EQ(rig.cameras.size(), 8u);
+    for (const RigCamera& camera : rig.cameras) {
+      models.insert(camera.model.name());
+      const CameraView view(camera, body);
+      const double visible = static_cast<double>(cv::countNonZero(view.mask())) / view.size().area();
+      EXPECT_GT(visible, 0.5) << camera.name << " of seed " << seed;
+    }
+  }
+  EXPECT_EQ(models, (std::set<std::string>{"kannala_brandt", "mei", "pinhole"}));
+  EXPECT_NE(makeRig("eight", 1, 1.0).cameras[7].vehicle_from_camera->matrix(),
+            makeRig("eight", 2, 1.0).cameras[7].vehicle_from_camera->matrix());
+  EXPECT_THROW(makeRig("eight", 1, 1.5), std::invalid_argument);
+}
+
+TEST(EightRigTest, EveryPixelOfANarrowCameraHasARayWithinTheFieldOfView) {
+  for (const RigCamera& camera : makeRig("eight", 3, 0.05).cameras) {
+    if (camera.model.name() == PinholeCamera::kName) {
+      for (int y = 0; y < camera.image_size_px.height; ++y) {
+        for (int x = 0; x < camera.image_size_px.width; ++x) {
+          Eigen::Vector3d ray;
+          ASSERT_TRUE(camera.model.unproject(Eigen::Vector2d(x, y), &ray)) << camera.name;
+          EXPECT_GT(ray.z(), std::cos(0.5 * camera.field_of_view_rad)) << camera.name;
+        }
+      }
     }
   }
 }

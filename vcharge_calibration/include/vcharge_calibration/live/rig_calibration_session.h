@@ -53,9 +53,9 @@ class RigCalibrationSession : public DriveConsumer {
   };
   /// Called from the thread of the drive and from the thread of the calibration; may only call status().
   using StatusCallback = std::function<void(const Status&)>;
-  /// Called in the calibration's thread with every result, including failures. If it throws, the calibration
-  /// fails with the exception's text.
-  using ResultCallback = std::function<void(const FinishedCalibration&)>;
+  /// Called in the calibration's thread with every result, including failures. Returns what the status should
+  /// say besides, or nothing. If it throws, the calibration fails with the exception's text.
+  using ResultCallback = std::function<std::string(const FinishedCalibration&)>;
   /// Called inside addImage() and addOdometry() after an update of the outlook; the rig has the extrinsics
   /// from hand-eye calibration as far as they are known.
   using DriveCallback = std::function<void(const ReconstructionState&, const CameraRig& initial_rig)>;

@@ -17,10 +17,13 @@ void writeRigReport(const std::string& folder, const std::string& title, const R
 /// Writes rig.yaml and its masks, whose folders are created, with this provenance.
 void writeRigWithMasks(CameraRig rig, std::map<std::string, std::string> provenance, const std::string& path);
 
-/// Writes the trajectory (*.tum, unless empty), then rig.yaml, each atomically. InputError names a file that
-/// cannot be written. Must not be called for kFail.
-void writeRigAndTrajectory(const std::string& rig_file, const std::string& trajectory_file,
-                           const RigCalibration& result, const ReconstructionState& state,
-                           const std::map<std::string, std::string>& provenance);
+/// Writes the trajectory (*.tum, unless empty), then rig.yaml, each atomically, and returns the rig's file: a
+/// rig that passed is not replaced by one with the verdict WARN, which becomes `<name>_WARN.yaml` beside it.
+/// InputError names a file that cannot be written. Must not be called for kFail.
+std::string writeRigAndTrajectory(const std::string& rig_file, const std::string& trajectory_file,
+                                  const RigCalibration& result, const ReconstructionState& state,
+                                  const std::map<std::string, std::string>& provenance);
+/// Says that `rig_file` stays, and which file was written instead.
+std::string describeKept(const std::string& rig_file, const std::string& written);
 
 }  // namespace vcharge

@@ -14,6 +14,10 @@ namespace vcharge {
 /// rig has no masks. Throws std::invalid_argument for a scale outside (0, 1].
 CameraRig makeGolfRig(uint64_t seed, double image_scale);
 
+/// Rotation from a camera to the vehicle whose optical axis has a yaw from straight ahead and a pitch below
+/// the horizon, with level image rows.
+Eigen::Matrix3d rotationTowards(double yaw_rad, double down_rad);
+
 /// Body of the Golf that carries the cameras, dark and glossy.
 std::shared_ptr<const VehicleBody> makeGolfBody();
 

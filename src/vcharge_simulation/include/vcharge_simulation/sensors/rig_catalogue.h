@@ -24,4 +24,10 @@ CameraRig makeRig(const std::string& name, uint64_t seed, double image_scale);
 /// The rig has no masks. Throws std::invalid_argument for a scale outside (0, 1].
 CameraRig makeRandomRig(uint64_t seed, double image_scale);
 
+/// The four cameras of makeGolfRig and four more of other kinds, varied slightly by `seed`: `roof`, a pinhole
+/// camera above the windscreen; `trailer`, a Kannala-Brandt camera of 130 degrees that looks down behind the
+/// car; `left_pillar` and `right_pillar`, pinhole cameras that look back along the sides and share no view
+/// with each other. The rig has no masks. Throws std::invalid_argument for a scale outside (0, 1].
+CameraRig makeEightRig(uint64_t seed, double image_scale);
+
 }  // namespace vcharge
