@@ -5,10 +5,12 @@
 #include <gtest/gtest.h>
 
 #include "scenes/catalogue_cases.h"
+#include "scenes/garage/garage_fittings.h"
 #include "scenes/garage/garage_layout.h"
 #include "scenes/lot/lot_ground.h"
 #include "scenes/lot/lot_layout.h"
 #include "scenes/movers/mover_planner.h"
+#include "scenes/scene_parts.h"
 #include "vcharge_simulation/drive/drive_simulator.h"
 #include "vcharge_simulation/objects/car_model.h"
 
@@ -139,6 +141,20 @@ TEST_P(LayoutTest, ADrawnSceneHoldsWhatItsLayoutNames) {
     const DrivePlan plan = planDrive(GetParam(), entry.name, 3);
     EXPECT_THAT(touchedOn(plan, scene->obstacles), testing::IsEmpty()) << entry.name;
   }
+}
+
+TEST(GarageFittingsTest, HaveNormalsUnderLowCeilingsToo) {
+  int num_low = 0;
+  for (uint64_t layout_seed = 1; layout_seed <= 3 * kLayouts; ++layout_seed) {
+    const GarageLayout layout = makeGarageLayout(3, {}, layout_seed);
+    SceneParts parts(5, 1.0);
+    addGarageFittings(layout, &parts);
+    num_low += layout.plan.height_m < 2.2 ? 1 : 0;
+    for (const MeshVertex& vertex : parts.scene().mesh.vertices) {
+      ASSERT_TRUE(vertex.position.allFinite() && vertex.normal.allFinite()) << "layout " << layout_seed;
+    }
+  }
+  EXPECT_GT(num_low, 0);
 }
 
 TEST(LayoutSeedTest, IsRefusedByScenesWithOneLayout) {

@@ -147,6 +147,7 @@ void addCableTrays(const GaragePlan& plan, SceneParts* parts) {
 }
 
 void addDownPipes(const GarageLayout& layout, SceneParts* parts) {
+  constexpr double kPieces_m = 2.2;  // length of the pieces below the last, which ends at the ceiling
   const GaragePlan& plan = layout.plan;
   const uint32_t zinc = parts->plain(SurfaceKind::kPole, 0.4, 0.04);
   const uint32_t clamp = parts->plain(SurfaceKind::kPole, 0.08);
@@ -164,8 +165,10 @@ void addDownPipes(const GarageLayout& layout, SceneParts* parts) {
       addFrustum(vector(x, pillar.y, z + 0.36), vector(x, pillar.y, z + 0.4), radius + 0.008F,
                  radius + 0.008F, 10, false, clamp, &parts->scene().mesh);
     }
-    addFrustum(vector(x, pillar.y, 2.2), vector(x, pillar.y, std::max(2.2, plan.height_m)), radius, radius,
-               10, false, zinc, &parts->scene().mesh);
+    if (plan.height_m > kPieces_m) {
+      addFrustum(vector(x, pillar.y, kPieces_m), vector(x, pillar.y, plan.height_m), radius, radius, 10,
+                 false, zinc, &parts->scene().mesh);
+    }
     // Closed at the overhead limit, so that the height map sees it as solid.
     addFrustum(vector(x, pillar.y, plan.overhead() - 0.02), vector(x, pillar.y, plan.overhead() - 0.01),
                radius, radius, 10, true, zinc, &parts->scene().mesh);
