@@ -7,8 +7,8 @@
 #include <Eigen/Cholesky>
 #include <boost/math/special_functions/gamma.hpp>
 
+#include "rig/body_move.h"
 #include "vcharge_core/base/error.h"
-#include "vcharge_core/motion/cross_matrix.h"
 
 namespace vcharge {
 namespace {
@@ -55,9 +55,7 @@ Eigen::Vector3d odometerSigmas(double factor, double turn_factor, double turn_pe
 Eigen::MatrixXd byBody(const CameraRig& rig) {
   Eigen::MatrixXd by_body = Eigen::MatrixXd::Zero(RigDeviation::rowOf(rig.cameras.size()), 6);
   for (size_t i = 0; i < rig.cameras.size(); ++i) {
-    auto rows = by_body.middleRows<6>(RigDeviation::rowOf(i));
-    rows.setIdentity();
-    rows.topRightCorner<3, 3>() = -crossMatrix(rig.cameras[i].vehicle_from_camera->translation());
+    by_body.middleRows<6>(RigDeviation::rowOf(i)) = byMoveOfBody(*rig.cameras[i].vehicle_from_camera);
   }
   return by_body;
 }

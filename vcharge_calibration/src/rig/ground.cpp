@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "initialization/rig_initialization.h"
+#include "vcharge_core/base/quantile.h"
 
 namespace vcharge {
 namespace {
@@ -13,6 +15,10 @@ constexpr double kMaxRange_m = 5.0;  // maximum horizontal distance of ground po
 constexpr double kMinBelow_m = 0.15;
 constexpr double kMaxBelow_m = 4.0;
 constexpr double kBin_m = 0.02;
+// Landmarks whose height is imprecise are too high, by a third of their deviation: those behind the side
+// cameras and behind the car would tilt it. The most precise ones count, and all within this deviation.
+constexpr double kPreciseHeight_m = 0.003;
+constexpr double kLeastPreciseRatio = 0.25;
 
 /// Calls `use` with each observation whose landmark is near its camera, and the landmark in the vehicle's
 /// frame.
@@ -32,6 +38,29 @@ void forNearPoints(const ReconstructionData& data, const Use& use) {
       }
     }
   }
+}
+
+/// Variance of a landmark's height above its keyframe; infinite where the landmark has not been adjusted.
+double heightVariance(const ReconstructionData& data, const GroundPoint& point) {
+  const Eigen::Vector3d up = data.keyframes[point.keyframe].map_from_vehicle.rotationMatrix().col(2);
+  const double variance_m2 = up.dot(data.tracks[point.track].covariance_m2 * up);
+  return variance_m2 > 0.0 ? variance_m2 : std::numeric_limits<double>::infinity();
+}
+
+std::vector<GroundPoint> preciseOnes(const std::vector<GroundPoint>& points,
+                                     const std::vector<double>& variances_m2) {
+  if (points.empty()) {
+    return points;
+  }
+  const double limit_m2 =
+      std::max(kPreciseHeight_m * kPreciseHeight_m, quantile(variances_m2, kLeastPreciseRatio));
+  std::vector<GroundPoint> precise;
+  for (size_t i = 0; i < points.size(); ++i) {
+    if (variances_m2[i] <= limit_m2) {
+      precise.push_back(points[i]);
+    }
+  }
+  return precise;
 }
 
 }  // namespace
@@ -98,6 +127,7 @@ std::shared_ptr<const CameraRig> withCameraHeights(const ReconstructionData& dat
 
 std::vector<GroundPoint> findGroundPoints(const ReconstructionData& data, double max_distance_m) {
   std::vector<GroundPoint> points;
+  std::vector<double> variances_m2;
   for (size_t t = 0; t < data.tracks.size(); ++t) {
     const Track& track = data.tracks[t];
     if (!track.position_m) {
@@ -119,9 +149,10 @@ std::vector<GroundPoint> findGroundPoints(const ReconstructionData& data, double
     }
     if (found) {
       points.push_back(*found);
+      variances_m2.push_back(heightVariance(data, *found));
     }
   }
-  return points;
+  return preciseOnes(points, variances_m2);
 }
 
 }  // namespace vcharge

@@ -24,7 +24,8 @@ struct GroundPoint {
   int32_t keyframe = 0;
 };
 
-/// Landmarks within `max_distance_m` of the vehicle's z = 0 and near its path, in order of tracks.
+/// Landmarks of precise height within `max_distance_m` of the vehicle's z = 0 and near its path, in order of
+/// tracks.
 std::vector<GroundPoint> findGroundPoints(const ReconstructionData& data, double max_distance_m);
 
 }  // namespace vcharge

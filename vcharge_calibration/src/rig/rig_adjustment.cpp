@@ -1,6 +1,7 @@
 #include "rig/rig_adjustment.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 
@@ -13,6 +14,8 @@ namespace vcharge {
 
 namespace {
 
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
 /// Factor on the odometer's standard deviation if the wheels slipped.
 constexpr double kSlipFactor = 20.0;
 constexpr double kSlipSigmas = 5.0;
@@ -23,6 +26,7 @@ constexpr double kMinOdometrySigma_m = 0.0005;
 constexpr double kMinOdometrySigma_rad = 0.0002;
 constexpr double kMinHeightSigma_m = 0.001;
 constexpr double kMinTiltSigma_rad = 0.0005;
+constexpr size_t kMinMotions = 10;
 
 /// Weights of the keyframes for the cameras' tilt. The body tilts outwards in turns, which cancels if left
 /// and right have the same sum of weights: the side with more turns gets less weight.
@@ -79,19 +83,12 @@ Eigen::MatrixXd commonHeightInformation(const std::vector<RigidTransform>& vehic
 BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPriors& priors,
                              const ReconstructionData& data) {
   const OdometryNoise& odometry = priors.odometry;
-  BundleAdjustmentOptions bundle = options.bundle;
-  if (odometry.sigma_m > 0.0) {
-    bundle.odometry_sigma_m = odometry.sigma_m;
-    bundle.odometry_sigma_rad = odometry.sigma_rad;
-    bundle.height_sigma_m = odometry.height_sigma_m;
-    bundle.tilt_sigma_rad = odometry.tilt_sigma_rad;
-    bundle.odometry_distance_sigma = bundle.odometry_turn_sigma = 0.0;
-  }
-  BundleProblem problem = makeBundleProblem(bundle, data);
+  BundleProblem problem = makeBundleProblem(options.bundle, data);
   const std::vector<double> weights = balanceTurns(data);
   for (OdometerFactor& factor : problem.odometer_factors) {
-    if (!odometry.has_slipped.empty() && odometry.has_slipped[factor.pose]) {
-      factor.information /= kSlipFactor * kSlipFactor;
+    if (odometry.isKnown()) {
+      factor.information = odometry.sigmas.cwiseAbs2().cwiseInverse().asDiagonal();
+      factor.information /= odometry.has_slipped[factor.pose] ? kSlipFactor * kSlipFactor : 1.0;
     }
     factor.information.block<2, 2>(3, 3) *= weights[factor.pose];
   }
@@ -122,38 +119,38 @@ BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPrior
 
 OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const ReconstructionData& data) {
   OdometryNoise noise;
-  std::vector<double> errors_m, errors_rad, heights_m, tilts_rad;
+  if (data.keyframes.size() <= kMinMotions) {
+    return noise;
+  }
+  std::array<std::vector<double>, 6> errors;
   for (size_t i = 1; i < data.keyframes.size(); ++i) {
     const RigidTransform counted =
         data.keyframes[i - 1].odom_from_vehicle.inverse() * data.keyframes[i].odom_from_vehicle;
     const RigidTransform seen =
         data.keyframes[i - 1].map_from_vehicle.inverse() * data.keyframes[i].map_from_vehicle;
-    const Eigen::Vector2d error_m = (seen.translation() - counted.translation()).head<2>();
-    // Standard deviation per axis of a distance in two dimensions.
-    errors_m.push_back(error_m.norm() / std::sqrt(2.0));
-    errors_rad.push_back(std::abs(yawOfRotation(seen.rotation()) -
-                                  data.odometry_turn_scale * yawOfRotation(counted.rotation())));
-    heights_m.push_back(std::abs(seen.translation().z()));
-    tilts_rad.push_back(vectorFromRotation(seen.rotation()).head<2>().norm());
+    Vector6d error;
+    error << seen.translation() - counted.translation(), vectorFromRotation(seen.rotation()).head<2>(),
+        yawOfRotation(seen.rotation()) - data.odometry_turn_scale * yawOfRotation(counted.rotation());
+    for (size_t axis = 0; axis < errors.size(); ++axis) {
+      errors[axis].push_back(std::abs(error[static_cast<Eigen::Index>(axis)]));
+    }
   }
-  if (errors_m.size() < 10) {
-    return noise;
-  }
-  // Medians of a Rayleigh distribution and of the absolute value of a standard normal variable.
-  constexpr double kRayleigh = 1.1774, kNormal = 0.6745;
   const BundleAdjustmentOptions& bundle = options.bundle;
-  noise.sigma_m = std::clamp(quantile(errors_m, 0.5) * std::sqrt(2.0) / kRayleigh, kMinOdometrySigma_m,
-                             bundle.odometry_sigma_m);
-  noise.sigma_rad =
-      std::clamp(quantile(errors_rad, 0.5) / kNormal, kMinOdometrySigma_rad, bundle.odometry_sigma_rad);
-  noise.height_sigma_m =
-      std::clamp(quantile(heights_m, 0.5) / kNormal, kMinHeightSigma_m, bundle.height_sigma_m);
-  noise.tilt_sigma_rad =
-      std::clamp(quantile(tilts_rad, 0.5) / kRayleigh, kMinTiltSigma_rad, bundle.tilt_sigma_rad);
+  Vector6d least, most;
+  least << kMinOdometrySigma_m, kMinOdometrySigma_m, kMinHeightSigma_m, kMinTiltSigma_rad, kMinTiltSigma_rad,
+      kMinOdometrySigma_rad;
+  most << bundle.odometry_sigma_m, bundle.odometry_sigma_m, bundle.height_sigma_m, bundle.tilt_sigma_rad,
+      bundle.tilt_sigma_rad, bundle.odometry_sigma_rad;
+  constexpr double kMedianOfNormal = 0.6745;  // of the absolute value of a standard normal variable
+  for (Eigen::Index axis = 0; axis < 6; ++axis) {
+    noise.sigmas[axis] = std::clamp(quantile(errors[static_cast<size_t>(axis)], 0.5) / kMedianOfNormal,
+                                    least[axis], most[axis]);
+  }
   noise.has_slipped.push_back(false);
-  for (size_t i = 0; i < errors_m.size(); ++i) {
-    noise.has_slipped.push_back(errors_m[i] > kSlipSigmas * noise.sigma_m ||
-                                errors_rad[i] > kSlipSigmas * noise.sigma_rad);
+  for (size_t i = 0; i + 1 < data.keyframes.size(); ++i) {
+    noise.has_slipped.push_back(errors[0][i] > kSlipSigmas * noise.sigmas[0] ||
+                                errors[1][i] > kSlipSigmas * noise.sigmas[1] ||
+                                errors[5][i] > kSlipSigmas * noise.sigmas[5]);
   }
   return noise;
 }

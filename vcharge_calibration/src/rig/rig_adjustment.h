@@ -11,11 +11,13 @@ namespace vcharge {
 
 /// Noise of the odometer's motions between keyframes, estimated from the adjusted keyframes.
 struct OdometryNoise {
-  double sigma_m = 0.0;  ///< 0: unknown, the options' values are used
-  double sigma_rad = 0.0;
-  double height_sigma_m = 0.0;    ///< standard deviation from the plane of motion
-  double tilt_sigma_rad = 0.0;    ///< standard deviation of the rotation out of that plane
+  /// Standard deviations along and about x, y, z of the vehicle: forwards, sideways and from the plane of
+  /// motion (m), roll, pitch and turn (rad). Wheels count distances in steps but hardly slip sideways, and a
+  /// body rolls more than it pitches. 0: unknown, the options' values are used.
+  Eigen::Matrix<double, 6, 1> sigmas = Eigen::Matrix<double, 6, 1>::Zero();
   std::vector<bool> has_slipped;  ///< by the later keyframe of a motion: the motion gets little weight
+
+  bool isKnown() const { return sigmas[0] > 0.0; }
 };
 /// Estimates an upper bound from keyframes adjusted with loose odometry: it contains their own errors.
 OdometryNoise estimateOdometryNoise(const RigAdjustmentOptions& options, const ReconstructionData& data);

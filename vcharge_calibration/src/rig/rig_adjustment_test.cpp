@@ -120,8 +120,27 @@ TEST(OdometryNoiseTest, MatchesTheDrive) {
   const ReconstructionData data = testing::makeAnalyticDrive(3, kNoise_px);
   RigAdjustmentOptions loose;
   const OdometryNoise noise = estimateOdometryNoise(loose, data);
-  EXPECT_NEAR(noise.sigma_m, 0.002, 0.0006);
-  EXPECT_NEAR(noise.sigma_rad, 0.0005, 0.00015);
+  EXPECT_NEAR(noise.sigmas[0], 0.002, 0.0006);
+  EXPECT_NEAR(noise.sigmas[1], 0.002, 0.0006);
+  EXPECT_NEAR(noise.sigmas[5], 0.0005, 0.00015);
+}
+
+TEST(OdometryNoiseTest, TellsForwardsFromSideways) {
+  ReconstructionData data = testing::makeAnalyticDrive(3, kNoise_px);
+  RigidTransform without_noise = data.keyframes.front().map_from_vehicle;
+  for (size_t i = 1; i < data.keyframes.size(); ++i) {
+    const RigidTransform step =
+        data.keyframes[i - 1].map_from_vehicle.inverse() * data.keyframes[i].map_from_vehicle;
+    const double forwards_m = step.translation().x() + (i % 2 == 0 ? 0.004 : -0.004);
+    const RigidTransform counted =
+        RigidTransform::planar(forwards_m, step.translation().y(), yawOfRotation(step.rotation()));
+    without_noise = without_noise * counted;
+    data.keyframes[i].odom_from_vehicle = without_noise;
+  }
+  data.keyframes.front().odom_from_vehicle = data.keyframes.front().map_from_vehicle;
+  const OdometryNoise noise = estimateOdometryNoise(RigAdjustmentOptions(), data);
+  EXPECT_GT(noise.sigmas[0], 0.004);
+  EXPECT_LT(noise.sigmas[1], 0.001);
 }
 
 TEST(OdometryNoiseTest, DetectsSlippingWheels) {
@@ -134,7 +153,7 @@ TEST(OdometryNoiseTest, DetectsSlippingWheels) {
   const OdometryNoise noise = estimateOdometryNoise(RigAdjustmentOptions(), data);
   EXPECT_TRUE(noise.has_slipped[60]);
   EXPECT_EQ(std::count(noise.has_slipped.begin(), noise.has_slipped.end(), true), 1);
-  EXPECT_NEAR(noise.sigma_m, 0.002, 0.0006);
+  EXPECT_NEAR(noise.sigmas[0], 0.002, 0.0006);
 }
 
 TEST(GroundTest, FindsTheHeightOfACameraPutAtZero) {
@@ -161,6 +180,21 @@ TEST(GroundTest, UsesOnlyPointsUnderThePath) {
   EXPECT_GT(ground.size(), 100U);
   for (const GroundPoint& point : ground) {
     EXPECT_LT(std::abs(data.tracks[point.track].position_m->z()), 0.15);
+  }
+}
+
+TEST(GroundTest, LeavesPointsOfImpreciseHeightOut) {
+  ReconstructionData data = testing::makeAnalyticDrive(5, 0.0);
+  const size_t num_all = findGroundPoints(data, 0.15).size();
+  for (size_t t = 0; t < data.tracks.size(); ++t) {
+    const double sigma_m = t % 3 == 0 ? 0.002 : 0.02;
+    data.tracks[t].covariance_m2 = sigma_m * sigma_m * Eigen::Matrix3d::Identity();
+  }
+  const std::vector<GroundPoint> precise = findGroundPoints(data, 0.15);
+  EXPECT_NEAR(static_cast<double>(precise.size()), static_cast<double>(num_all) / 3.0,
+              0.1 * static_cast<double>(num_all));
+  for (const GroundPoint& point : precise) {
+    EXPECT_EQ(point.track % 3, 0);
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include "rig/body_move.h"
 #include "rig/ground.h"
 #include "rig/rig_adjustment.h"
 #include "vcharge_core/base/text_format.h"
@@ -21,6 +22,12 @@ constexpr double kUnit_m = 0.01;
 constexpr double kUnit_rad = 0.05 / 57.29577951308232;
 constexpr double kDegrees = 57.29577951308232;
 constexpr int kHalfIterations = 10;
+constexpr double kJackknifeFactor = 2.0;
+/// Least variance over that for independent errors, whose steps of a wheel counter cancel one another.
+constexpr double kLeastRatio = 0.25;
+// How a body stands on its wheels while it drives, beside how it stands at rest.
+constexpr double kBodyHeight_m = 0.001;
+constexpr double kBodyTilt_rad = 0.01 / 57.29577951308232;
 /// Cosines between a camera's view and the side that its name says, and another side, of swapped cameras.
 constexpr double kMaxOwnSide = 0.2, kMinOtherSide = 0.8;
 
@@ -135,11 +142,27 @@ std::shared_ptr<const CameraRig> calibrateHalf(const RigAdjustmentOptions& optio
   return half.rig;
 }
 
-Vector6d commonVariances(const RigAdjustmentOptions& options, const RigCamera& camera) {
+/// Ratio of a camera's standard deviations to those for independent errors. The jackknife knows which errors
+/// have a cause in common, but its residuals are smaller than the errors, because the adjustment has followed
+/// half of these. It is noisy where few parts of the drive tell of a direction.
+Vector6d inflationOf(const Matrix6d& independent, const Matrix6d& jackknife) {
+  const Vector6d ratio = kJackknifeFactor * jackknife.diagonal().cwiseQuotient(independent.diagonal());
+  return ratio.cwiseMax(kLeastRatio).cwiseSqrt();
+}
+
+/// Covariance of what is the same in all parts of the drive: directions that all patches of a camera show,
+/// and how the body stands on its wheels, which moves all cameras.
+Matrix6d commonCovariance(const RigAdjustmentOptions& options, const RigCamera& camera) {
   const double sigma_rad = options.common_error_px * radiansPerPixel(camera);
-  Vector6d sigmas = Vector6d::Constant(sigma_rad);
-  sigmas.head<3>() *= options.common_range_m;
-  return sigmas.cwiseAbs2();
+  const double sigma_m = sigma_rad * options.common_range_m;
+  Vector6d own;
+  own << Eigen::Vector3d::Constant(sigma_m), Eigen::Vector3d::Constant(sigma_rad);
+  Vector6d of_body;
+  of_body << 0.0, 0.0, kBodyHeight_m, kBodyTilt_rad, kBodyTilt_rad, 0.0;
+  const Matrix6d by_body = byMoveOfBody(*camera.vehicle_from_camera);
+  Matrix6d covariance = by_body * of_body.cwiseAbs2().asDiagonal() * by_body.transpose();
+  covariance.diagonal() += own.cwiseAbs2();
+  return covariance;
 }
 
 /// Text of the longest axis of a camera's uncertainty.
@@ -246,11 +269,9 @@ void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, cons
     if (uncertainty.is_valid) {
       const auto at = static_cast<Eigen::Index>(6 * i);
       const Matrix6d schur = uncertainty.covariance.block<6, 6>(at, at);
-      const Vector6d ratio =
-          uncertainty.jackknife.block<6, 6>(at, at).diagonal().cwiseQuotient(schur.diagonal());
-      camera.inflation = ratio.cwiseMax(1.0).cwiseSqrt();
+      camera.inflation = inflationOf(schur, uncertainty.jackknife.block<6, 6>(at, at));
       camera.covariance = camera.inflation.asDiagonal() * schur * camera.inflation.asDiagonal();
-      camera.covariance.diagonal() += commonVariances(options, rig->cameras[i]);
+      camera.covariance += commonCovariance(options, rig->cameras[i]);
       camera.weakest_direction = describeWeakest(camera.covariance);
       rig->cameras[i].covariance = camera.covariance;
     }

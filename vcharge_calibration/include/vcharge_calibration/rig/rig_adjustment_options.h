@@ -14,8 +14,8 @@ struct RigAdjustmentOptions {
   VCHARGE_OPTION(double, ground_sigma_m, 0.1, positive(), "Deviation of the ground from a plane.");
   VCHARGE_OPTION(double, segment_m, 10.0, positive(),
                  "Length of parts of the drive with independent errors.");
-  VCHARGE_OPTION(double, common_error_px, 0.05, notNegative(), "Deviation of directions by common errors.");
-  VCHARGE_OPTION(double, common_range_m, 5.0, positive(), "Usual range of landmarks, for common errors.");
+  VCHARGE_OPTION(double, common_error_px, 0.015, notNegative(), "Deviation of directions by common errors.");
+  VCHARGE_OPTION(double, common_range_m, 2.5, positive(), "Usual range of landmarks, for common errors.");
   VCHARGE_OPTION_GROUP(BundleAdjustmentOptions, bundle, {}, "Bundle adjustment.");
   VCHARGE_END_OPTIONS();
 };

@@ -22,7 +22,7 @@ struct CameraCalibration {
   Eigen::Vector3d up_in_camera = Eigen::Vector3d::Zero();
   /// Covariance of vehicle_from_camera, [dt, dphi] in the vehicle's frame, for a fixed scale.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  /// Ratio of the standard deviations by a jackknife over the drive to those for independent errors; >= 1.
+  /// Ratio of the standard deviations, by a jackknife over the drive, to those for independent errors.
   Eigen::Matrix<double, 6, 1> inflation = Eigen::Matrix<double, 6, 1>::Ones();
   /// Difference between the extrinsics from the odd and the even parts of the drive.
   Eigen::Matrix<double, 6, 1> half_difference = Eigen::Matrix<double, 6, 1>::Zero();
