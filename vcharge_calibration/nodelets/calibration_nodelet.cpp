@@ -19,11 +19,10 @@ namespace vcharge {
 /// to stop. Shows the drive on /calibration/trajectory, /calibration/landmarks (by camera) and
 /// /calibration/cameras, in the frame `map`. Services: ~calibrate starts to calibrate the drive so far and
 /// returns; ~reset begins a new drive. Files are written after PASS and WARN, the report always; a rig that
-/// passed stays where the new one has a WARN, and the status says so. Parameters:
-/// ~rig (path), ~output (rig.yaml to write), optional ~map (*.vmap), ~trajectory (*.tum), ~report (folder),
-/// ~options (RigCalibratorOptions), ~session (RigCalibrationSessionOptions), ~source
-/// (LiveDriveSourceOptions), ~lossless_replay (every image in order, as calibrate_rig; otherwise those that
-/// wait too long are dropped).
+/// passed stays if the new one has a WARN, as the status says. Parameters: ~rig (path), ~output (rig.yaml to
+/// write), optional ~map (*.vmap), ~trajectory (*.tum), ~report (folder), ~options (RigCalibratorOptions),
+/// ~session (RigCalibrationSessionOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every image
+/// in order, as calibrate_rig; otherwise those that wait too long are dropped).
 class CalibrationNodelet : public Nodelet {
  public:
   CalibrationNodelet() : Nodelet("calibration") {}
@@ -86,14 +85,12 @@ class CalibrationNodelet : public Nodelet {
     if (work.result.verdict == Verdict::kFail) {
       return "";
     }
-    auto provenance = provenance_;
-    provenance["verdict"] = toString(work.result.verdict);
+    provenance_["verdict"] = toString(work.result.verdict);
     if (!map_.empty()) {
       const std::shared_ptr<const SparseMap> map = mapOfCalibration(options_, work.state);
-      writeSparseMap(*map, provenance, map_, indexForTiles(*map));
+      writeSparseMap(*map, provenance_, map_, indexForTiles(*map));
     }
-    const std::string written =
-        writeRigAndTrajectory(output_, trajectory_, work.result, work.state, provenance);
+    const auto written = writeRigAndTrajectory(output_, trajectory_, work.result, work.state, provenance_);
     display_->showResult(session_->status(), work);
     return written == output_ ? "" : describeKept(output_, written);
   }
@@ -101,8 +98,8 @@ class CalibrationNodelet : public Nodelet {
   DriveMonitor::Report report() {
     const Status status = session_->status();
     DriveMonitor::Report report;
-    const bool has_failed = status.phase == RigCalibrationSession::Phase::kFailed;
-    report.level = has_failed ? DriveMonitor::Level::kError : DriveMonitor::Level::kOk;
+    report.level = status.phase == RigCalibrationSession::Phase::kFailed ? DriveMonitor::Level::kError
+                                                                         : DriveMonitor::Level::kOk;
     report.message = status.message;
     report.values.emplace_back("next", status.outlook.next);
     for (const auto& [name, count] : status.counts) {

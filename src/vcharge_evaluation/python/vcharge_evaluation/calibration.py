@@ -104,8 +104,8 @@ def judged(calibrations, num_cameras=4):
     rows = [camera["normalized"] for one in calibrations if one.errors for camera in one.errors["without_scale"]]
     squares = np.mean(np.square(rows), axis=0) if rows else [None] * len(AXES)
     for axis, square in zip(AXES, squares):
-        yield figure(f"mean normalized squared error, {axis}", None if square is None else float(square), at_least=0.3,
-                     at_most=2.5)
+        yield figure(f"mean normalized squared error, {axis}", None if square is None else float(square), at_least=0.5,
+                     at_most=2.0)
 
 
 def evaluate_rigs(args, results):

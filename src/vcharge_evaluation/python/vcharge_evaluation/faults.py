@@ -11,7 +11,7 @@ from vcharge_evaluation.results import Figure, Results, add_arguments, figure
 from vcharge_evaluation.tools import CONFIG, judge, run_tool, say
 
 # The fault needs the renderer: these drives cannot reuse the images of the sound drive.
-RENDERED = ("motion_blur", "rolling_shutter", "sun_glare", "bright_lamps", "bumped_camera", "soft_suspension")
+RENDERED = ("motion_blur", "rolling_shutter", "sun_glare", "bright_lamps", "bumped_camera", "soft_suspension", "loaded_boot")
 MAX_LISTED_STATES = 5
 
 
