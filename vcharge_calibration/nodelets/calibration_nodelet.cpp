@@ -21,8 +21,8 @@ namespace vcharge {
 /// returns; ~reset begins a new drive. Files are written after PASS and WARN, the report always; a rig that
 /// passed stays if the new one has a WARN, as the status says. Parameters: ~rig (path), ~output (rig.yaml to
 /// write), optional ~map (*.vmap), ~trajectory (*.tum), ~report (folder), ~options (RigCalibratorOptions),
-/// ~session (RigCalibrationSessionOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every image
-/// in order, as calibrate_rig; otherwise those that wait too long are dropped).
+/// ~session (RigCalibrationSessionOptions), ~source (LiveDriveSourceOptions), ~lossless_replay (every
+/// image in order, as calibrate_rig; otherwise those that wait too long are dropped).
 class CalibrationNodelet : public Nodelet {
  public:
   CalibrationNodelet() : Nodelet("calibration") {}
@@ -32,6 +32,7 @@ class CalibrationNodelet : public Nodelet {
   }
 
  private:
+  using Phase = RigCalibrationSession::Phase;
   using Status = RigCalibrationSession::Status;
   using Response = std_srvs::TriggerResponse;
 
@@ -74,8 +75,7 @@ class CalibrationNodelet : public Nodelet {
   }
 
   void watch(const ReconstructionState& state, const CameraRig& initial_rig) {
-    const Status status = session_->status();
-    if (status.phase != RigCalibrationSession::Phase::kCalibrated) {  // otherwise the result stays visible
+    if (const Status status = session_->status(); status.phase != Phase::kCalibrated) {
       display_->showDrive(status, state, initial_rig);
     }
   }
@@ -98,8 +98,7 @@ class CalibrationNodelet : public Nodelet {
   DriveMonitor::Report report() {
     const Status status = session_->status();
     DriveMonitor::Report report;
-    report.level = status.phase == RigCalibrationSession::Phase::kFailed ? DriveMonitor::Level::kError
-                                                                         : DriveMonitor::Level::kOk;
+    report.level = status.phase == Phase::kFailed ? DriveMonitor::Level::kError : DriveMonitor::Level::kOk;
     report.message = status.message;
     report.values.emplace_back("next", status.outlook.next);
     for (const auto& [name, count] : status.counts) {
