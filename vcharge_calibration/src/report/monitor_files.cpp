@@ -49,10 +49,7 @@ void keepOlderFile(const std::string& path) {
   }
   std::string date = utcNow();
   date.erase(std::remove(date.begin(), date.end(), ':'), date.end());
-  const fs::path folder = fs::path(path).parent_path();
-  const std::string name =
-      fs::path(path).stem().string() + "_until_" + date + fs::path(path).extension().string();
-  writeTextFileAtomically((folder / name).string(), readTextFile(path));
+  writeTextFileAtomically(fileBeside(path, "_until_" + date), readTextFile(path));
 }
 
 }  // namespace

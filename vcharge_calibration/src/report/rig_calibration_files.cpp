@@ -29,14 +29,12 @@ bool hasPassed(const std::string& rig_file) {
   }
 }
 
-/// `rig_WARN.yaml` for `rig.yaml`.
-std::string besideRig(const std::string& rig_file, Verdict verdict) {
-  const fs::path path(rig_file);
-  return (path.parent_path() / (path.stem().string() + "_" + toString(verdict) + path.extension().string()))
-      .string();
-}
-
 }  // namespace
+
+std::string fileBeside(const std::string& path, const std::string& suffix) {
+  const fs::path file(path);
+  return (file.parent_path() / (file.stem().string() + suffix + file.extension().string())).string();
+}
 
 void writeRigReport(const std::string& folder, const std::string& title, const RigCalibration& result,
                     const ReconstructionState& state, const KeyframeImages& images,
@@ -68,7 +66,7 @@ std::string writeRigAndTrajectory(const std::string& rig_file, const std::string
     writeTrajectory(trajectoryOf(state), trajectory_file);
   }
   const std::string path = result.verdict != Verdict::kPass && hasPassed(rig_file)
-                               ? besideRig(rig_file, result.verdict)
+                               ? fileBeside(rig_file, "_" + toString(result.verdict))
                                : rig_file;
   writeRigWithMasks(*result.rig, provenance, path);
   return path;

@@ -1,6 +1,6 @@
-#include <cmath>
 #include <string>
 
+#include "sensors/principal_point.h"
 #include "vcharge_simulation/rendering/noise.h"
 #include "vcharge_simulation/sensors/golf_rig.h"
 #include "vcharge_simulation/sensors/rig_catalogue.h"
@@ -12,17 +12,9 @@ namespace {
 constexpr double kDegree = 3.14159265358979323846 / 180.0;
 constexpr double kMaxShift_m = 0.05;
 constexpr double kMaxTurn_rad = 5.0 * kDegree;
-const Eigen::Vector2d kCentre_px(639.5, 399.5);
-
-/// Pixel centres have integer coordinates, so the image starts at -0.5.
-Eigen::Vector2d principalPoint(double scale, Random* random) {
-  const double u0 = kCentre_px.x() + random->uniform(-5.0, 5.0);
-  const double v0 = kCentre_px.y() + random->uniform(-5.0, 5.0);
-  return {(u0 + 0.5) * scale - 0.5, (v0 + 0.5) * scale - 0.5};
-}
 
 CameraModel makePinhole(double scale, Random* random) {
-  const Eigen::Vector2d centre_px = principalPoint(scale, random);
+  const Eigen::Vector2d centre_px = randomPrincipalPoint(scale, random);
   const double focal_length_px = scale * random->uniform(690.0, 710.0);
   PinholeCamera::Parameters parameters;
   parameters << focal_length_px, focal_length_px, centre_px.x(), centre_px.y(), random->uniform(-0.05, 0.0),
@@ -31,7 +23,7 @@ CameraModel makePinhole(double scale, Random* random) {
 }
 
 CameraModel makeKannalaBrandt(double scale, Random* random) {
-  const Eigen::Vector2d centre_px = principalPoint(scale, random);
+  const Eigen::Vector2d centre_px = randomPrincipalPoint(scale, random);
   const double focal_length_px = scale * random->uniform(590.0, 610.0);
   KannalaBrandtCamera::Parameters parameters;
   parameters << focal_length_px, focal_length_px, centre_px.x(), centre_px.y(), random->uniform(-0.04, 0.0),

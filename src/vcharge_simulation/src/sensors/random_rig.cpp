@@ -1,5 +1,6 @@
 #include <cmath>
 
+#include "sensors/principal_point.h"
 #include "vcharge_simulation/rendering/noise.h"
 #include "vcharge_simulation/sensors/golf_rig.h"
 #include "vcharge_simulation/sensors/rig_catalogue.h"
@@ -13,11 +14,8 @@ constexpr double kMaxShift_m = 0.1;
 constexpr double kMaxTurn_rad = 10.0 * kDegree;
 constexpr double kMeiView_rad = 185.0 * kDegree;
 constexpr double kKannalaBrandtView_rad = 190.0 * kDegree;
-// For 1280x800 images.
-constexpr double kCentreX_px = 639.5;
-constexpr double kCentreY_px = 399.5;
-// The Golf's lens has a radius of 634 px. These circles fit the image even with the largest shift of the
-// principal point and the tangential distortion.
+// For 1280x800 images. The Golf's lens has a radius of 634 px. These circles fit the image even with the
+// largest shift of the principal point and the tangential distortion.
 constexpr double kMinCircleRadius_px = 590.0;
 constexpr double kMaxCircleRadius_px = 628.0;
 
@@ -37,13 +35,6 @@ Eigen::Vector3d inBall(double radius, Random* random) {
   return radius * point;
 }
 
-// Principal point in the scaled image. Pixel centres have integer coordinates, so the image starts at -0.5.
-Eigen::Vector2d principalPoint(double scale, Random* random) {
-  const double u0 = kCentreX_px + random->uniform(-5.0, 5.0);
-  const double v0 = kCentreY_px + random->uniform(-5.0, 5.0);
-  return {(u0 + 0.5) * scale - 0.5, (v0 + 0.5) * scale - 0.5};
-}
-
 Lens makeMeiLens(double scale, Random* random) {
   const double half_view_rad = 0.5 * kMeiView_rad;
   const double xi = random->uniform(0.9, 1.6);
@@ -58,7 +49,7 @@ Lens makeMeiLens(double scale, Random* random) {
   const double radius_px = scale * random->uniform(kMinCircleRadius_px, kMaxCircleRadius_px);
   const double gamma = radius_px / (rim * (1.0 + shrinkage));
   const double aspect = 1.0 + random->uniform(-0.003, 0.003);
-  const Eigen::Vector2d centre_px = principalPoint(scale, random);
+  const Eigen::Vector2d centre_px = randomPrincipalPoint(scale, random);
   MeiCamera::Parameters parameters;
   parameters << xi, gamma, gamma * aspect, centre_px.x(), centre_px.y(), second_power / (rim * rim),
       fourth_power / (rim * rim * rim * rim), 0.0, 0.0;
@@ -78,7 +69,7 @@ Lens makeKannalaBrandtLens(double scale, Random* random) {
   const double rim = angle * (1.0 + s * (k1 + s * (k2 + s * (k3 + s * k4))));
   const double focal_length_px = scale * random->uniform(kMinCircleRadius_px, kMaxCircleRadius_px) / rim;
   const double aspect = 1.0 + random->uniform(-0.003, 0.003);
-  const Eigen::Vector2d centre_px = principalPoint(scale, random);
+  const Eigen::Vector2d centre_px = randomPrincipalPoint(scale, random);
   KannalaBrandtCamera::Parameters parameters;
   parameters << focal_length_px, focal_length_px * aspect, centre_px.x(), centre_px.y(), k1, k2, k3, k4;
   return {KannalaBrandtCamera(parameters), kKannalaBrandtView_rad};

@@ -9,6 +9,9 @@
 
 namespace vcharge {
 
+/// The name of a file with a suffix before its extension.
+std::string fileBeside(const std::string& path, const std::string& suffix);
+
 /// Writes rig_report.html (see makeRigReport()) into a folder, which is created. An empty name: no report.
 void writeRigReport(const std::string& folder, const std::string& title, const RigCalibration& result,
                     const ReconstructionState& state, const KeyframeImages& images,
