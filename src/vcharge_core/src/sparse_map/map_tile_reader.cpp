@@ -50,12 +50,15 @@ std::unique_ptr<MapTileReader> MapTileReader::open(const std::string& path) {
 
 MapTileReader::MapTileReader(std::unique_ptr<Connection> connection) : connection_(std::move(connection)) {
   const MapRows& file = connection_->file;
-  file.readHead(file.readProvenance(), &overview_);
+  SparseMapContents overview;
+  file.readHead(file.readProvenance(), &overview);
+  SqliteStatement count(file.database(), "SELECT COUNT(*) FROM keyframe");
+  overview.keyframes.reserve(count.step() ? static_cast<size_t>(count.integer(0)) : 0);
   SqliteStatement keyframes = file.keyframes("ORDER BY id");
   while (keyframes.step()) {
-    overview_.keyframes.push_back(file.keyframeOf(keyframes, false));
+    overview.keyframes.push_back(file.keyframeOf(keyframes, false));
   }
-  tiles_ = tilesOf(overview_.keyframes);
+  tiles_ = tilesOf(overview.keyframes);
   connection_->descriptors = file.descriptorLayout();
   connection_->place =
       std::make_unique<SqliteStatement>(file.database(), "SELECT features FROM place WHERE id = ?");
@@ -69,8 +72,9 @@ MapTileReader::MapTileReader(std::unique_ptr<Connection> connection) : connectio
   while (info.step()) {
     info_[info.text(0)] = info.text(1);
   }
-  overview_.descriptors.create(0, connection_->descriptors.second, connection_->descriptors.first);
-  if (SparseMap(overview_).contentHash() != info_[kOverviewHashKey]) {
+  overview.descriptors.create(0, connection_->descriptors.second, connection_->descriptors.first);
+  overview_ = std::make_unique<SparseMap>(std::move(overview));  // a copy of many keyframes takes time
+  if (overview_->contentHash() != info_[kOverviewHashKey]) {
     file.damaged("its overview does not match the written hash");
   }
 }
@@ -84,16 +88,16 @@ std::shared_ptr<const SparseMap> MapTileReader::readTile(const MapTile& tile) co
   const std::string name =
       "the tile at " + std::to_string(tile.x * kTileSize_m) + ", " + std::to_string(tile.y * kTileSize_m);
   try {
-    SparseMapContents part = headOf(overview_);
+    SparseMapContents part = headOf(overview_->contents());
     const auto [type, columns] = connection_->descriptors;
     const size_t row_bytes = static_cast<size_t>(columns) * static_cast<size_t>(CV_ELEM_SIZE(type));
     std::vector<uint8_t> descriptors;
     SqliteStatement images = file.images("WHERE keyframe = ? AND id >= ? AND id < ? ORDER BY id");
-    const auto num_cameras = static_cast<int64_t>(overview_.rig.cameras.size());
+    const auto num_cameras = static_cast<int64_t>(overview_->rig().cameras.size());
     for (const size_t keyframe : keyframes) {
       const auto index = static_cast<int32_t>(part.keyframes.size());
-      part.keyframes.push_back(overview_.keyframes[keyframe]);
-      const int64_t id = overview_.keyframes[keyframe].id;
+      part.keyframes.push_back(overview_->keyframes()[keyframe]);
+      const int64_t id = overview_->keyframes()[keyframe].id;
       images.bind(0, id);
       images.bind(1, id * num_cameras);  // the key of an image
       images.bind(2, (id + 1) * num_cameras);

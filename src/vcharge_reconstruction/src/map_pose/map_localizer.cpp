@@ -65,8 +65,10 @@ MapLocalizer::MapLocalizer(std::shared_ptr<const TiledMap> map, std::shared_ptr<
       map_->descriptorColumns() != extractor_->descriptorColumns()) {
     throw InputError("map: its descriptors are not those of its feature_options");
   }
+  masks_.resize(rig_->cameras.size());
+  tbb::parallel_for(size_t{0}, masks_.size(),
+                    [&](size_t i) { masks_[i] = makeFeatureMask(rig_->cameras[i]); });
   for (const RigCamera& camera : rig_->cameras) {
-    masks_.push_back(makeFeatureMask(camera));
     robust_.max_error_rad = std::max(robust_.max_error_rad, kMinError_px * radiansPerPixel(camera));
   }
   matcher_ = std::make_unique<LandmarkMatcher>(map_, rig_, options_);

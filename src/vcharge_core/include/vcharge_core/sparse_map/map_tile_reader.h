@@ -23,7 +23,7 @@ class MapTileReader {
   ~MapTileReader();
 
   /// Everything but observations, landmarks and covariances of keyframes; without loop edges.
-  const SparseMapContents& overview() const { return overview_; }
+  const SparseMapContents& overview() const { return overview_->contents(); }
   /// The MapIndex's info.
   const std::map<std::string, std::string>& info() const { return info_; }
   /// Indices of the keyframes in each tile, as of tilesOf().
@@ -41,7 +41,7 @@ class MapTileReader {
 
   mutable std::mutex mutex_;  // guards the connection
   std::unique_ptr<Connection> connection_;
-  SparseMapContents overview_;
+  std::unique_ptr<const SparseMap> overview_;
   std::map<std::string, std::string> info_;
   std::map<MapTile, std::vector<size_t>> tiles_;
 };
