@@ -217,14 +217,17 @@ class CalibrationNodeletTest(unittest.TestCase):
         self.publish(0.1)
         self.assertGreater(self.states[-1].distance_m, 2.0)
 
-    def test_calibrates_itself_once_the_coach_has_enough(self):
+    def test_calibrates_itself_while_the_drive_goes_on(self):
         rospy.set_param("/calibration/session", {"calibrates_itself": True, "coach": {
             "enough_distance_m": 10.0, "enough_turn_rad": 0.001, "enough_revisited_m": 0.0, "enough_sigma_m": 0.5,
             "enough_sigma_rad": 0.05, "min_steps": 1000}})
         self.start()
         self.publish(0.5)
         end = self.wait_for_end()
-        self.assertTrue(any(state.state == CalibrationStatus.CALIBRATING for state in self.states))
+        states = [state.state for state in self.states]
+        self.assertIn(CalibrationStatus.CALIBRATING, states)
+        before = states[:states.index(CalibrationStatus.CALIBRATING)]
+        self.assertNotIn(CalibrationStatus.FAILED, before, "an early failure is no news")
         self.assertGreater(end.distance_m, 10.0)
         self.assertEqual(self.output.exists(), end.state == CalibrationStatus.DONE, end.message)
 

@@ -1,6 +1,6 @@
 #include "vcharge_calibration/live/rig_calibration_session.h"
 
-#include <atomic>
+#include <chrono>
 #include <cmath>
 #include <exception>
 #include <optional>
@@ -12,6 +12,10 @@ namespace {
 
 /// Turn after which the coach updates its outlook.
 constexpr double kOutlookTurn_rad = 0.3;
+/// Progress of a drive from which a session that calibrates itself tries to.
+constexpr double kFirstProgress = 0.5;
+/// A vehicle without a keyframe for so long stands.
+constexpr double kStanding_s = 1.0;
 
 /// Thrown through the calibration when it is abandoned.
 struct Abandoned {};
@@ -63,7 +67,9 @@ struct RigCalibrationSession::Follower {
   CalibrationCoach coach;
   DriveOutlook outlook;
   std::optional<Keyframe> last_outlook;  // keyframe at the coach's last outlook, without images
-  double next_try_m = 0.0;               // driven distance at which to calibrate automatically again
+  // Number of keyframes, and driven distance, of the last calibration.
+  size_t calibrated_keyframes = 0;
+  double calibrated_m = 0.0;
 
   Follower(const std::shared_ptr<const CameraRig>& rig, const RigCalibratorOptions& calibrator_options,
            const CalibrationCoachOptions& coach_options)
@@ -99,6 +105,7 @@ struct RigCalibrationSession::Follower {
 struct RigCalibrationSession::Job {
   FinishedCalibration work;
   KeyframeImages all_images;
+  bool is_early = false;  // its failure is no news
   std::atomic<bool> is_abandoned{false}, is_done{false};
 };
 
@@ -118,8 +125,12 @@ RigCalibrationSession::RigCalibrationSession(std::shared_ptr<const CameraRig> ri
 }
 
 RigCalibrationSession::~RigCalibrationSession() {
-  if (job_) {
-    job_->is_abandoned = true;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    is_awaited_ = true;
+    if (job_) {
+      job_->is_abandoned = true;
+    }
   }
   if (worker_.joinable()) {
     worker_.join();
@@ -137,7 +148,7 @@ void RigCalibrationSession::tell(const std::function<void(Status*)>& change) {
 }
 
 template <class Feed>
-void RigCalibrationSession::follow(const Feed& feed) {
+void RigCalibrationSession::follow(Timestamp now, const Feed& feed) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const ReconstructionState& state = follower_->calibrator.state();
   if (state.data.keyframes.size() < static_cast<size_t>(options_.max_keyframes)) {
@@ -150,6 +161,24 @@ void RigCalibrationSession::follow(const Feed& feed) {
   if (follower_->isOutlookDue(options_)) {
     updateOutlook();
   }
+  now_ = now;
+  if (isCalibrationDue()) {
+    std::string message;
+    begin(false, &message);
+  }
+}
+
+/// Whether a session that calibrates itself should do so now.
+bool RigCalibrationSession::isCalibrationDue() const {
+  const std::vector<Keyframe>& keyframes = follower_->calibrator.state().data.keyframes;
+  const bool is_free = !job_ || job_->is_done;
+  if (!options_.calibrates_itself || !is_free || follower_->outlook.progress < kFirstProgress ||
+      keyframes.size() == follower_->calibrated_keyframes) {
+    return false;
+  }
+  const bool is_longer = keyframes.back().travelled_m - follower_->calibrated_m >= options_.again_m;
+  const bool has_become_enough = job_ && job_->is_early && follower_->outlook.isEnough();
+  return is_longer || has_become_enough || toSeconds(now_ - keyframes.back().stamp) > kStanding_s;
 }
 
 void RigCalibrationSession::updateOutlook() {
@@ -167,21 +196,14 @@ void RigCalibrationSession::updateOutlook() {
       status->progress = follower.outlook.progress;
     }
   });
-  if (options_.calibrates_itself && follower.outlook.isEnough() &&
-      follower.outlook.distance_m >= follower.next_try_m && status().phase != Phase::kCalibrated) {
-    std::string message;
-    if (begin(false, &message)) {
-      follower.next_try_m = follower.outlook.distance_m + options_.retry_m;
-    }
-  }
 }
 
 void RigCalibrationSession::addImage(size_t camera_index, Timestamp stamp, const Image& image) {
-  follow([&](RigCalibrator* calibrator) { calibrator->addImage(camera_index, stamp, image); });
+  follow(stamp, [&](RigCalibrator* calibrator) { calibrator->addImage(camera_index, stamp, image); });
 }
 
 void RigCalibrationSession::addOdometry(const VehicleOdometry& odometry) {
-  follow([&](RigCalibrator* calibrator) { calibrator->addOdometry(odometry); });
+  follow(odometry.stamp, [&](RigCalibrator* calibrator) { calibrator->addOdometry(odometry); });
 }
 
 bool RigCalibrationSession::calibrate(std::string* message) {
@@ -189,30 +211,60 @@ bool RigCalibrationSession::calibrate(std::string* message) {
   return begin(true, message);
 }
 
-bool RigCalibrationSession::begin(bool flushes, std::string* message) {
+bool RigCalibrationSession::begin(bool is_asked_for, std::string* message) {
   if (job_ && !job_->is_done) {
     *message = job_->is_abandoned ? "the abandoned calibration is still ending: try again"
                                   : "already calibrating: " + status().message;
     return false;
   }
   if (worker_.joinable()) {
+    is_awaited_ = true;
     worker_.join();  // returns at once or soon
+    is_awaited_ = false;
   }
+  makeJob(is_asked_for);
+  *message = "calibrating from " + std::to_string(follower_->calibrated_keyframes) + " keyframes";
+  worker_ = std::thread([this, first = job_] {
+    for (std::shared_ptr<Job> job = first; job; job = nextJob()) {
+      run(job);
+    }
+  });
+  return true;
+}
+
+/// Makes a job of the drive so far.
+void RigCalibrationSession::makeJob(bool is_asked_for) {
   job_ = std::make_shared<Job>();
-  if (flushes) {
+  if (is_asked_for) {
     follower_->calibrator.flush();
   }
   job_->work.state = follower_->calibrator.state();
   job_->work.images = follower_->calibrator.images();
   job_->all_images = follower_->calibrator.allImages();
-  *message = "calibrating from " + std::to_string(job_->work.state.data.keyframes.size()) + " keyframes";
-  tell([&](Status* status) {
-    status->phase = Phase::kCalibrating;
-    status->message = *message;
-    status->progress = 0.0;
-  });
-  worker_ = std::thread([this, job = job_] { run(job); });
-  return true;
+  job_->is_early = !is_asked_for && !follower_->outlook.isEnough();
+  const std::vector<Keyframe>& keyframes = job_->work.state.data.keyframes;
+  follower_->calibrated_keyframes = keyframes.size();
+  follower_->calibrated_m = keyframes.empty() ? 0.0 : keyframes.back().travelled_m;
+  if (!job_->is_early) {
+    tell([&](Status* status) {
+      status->phase = Phase::kCalibrating;
+      status->message = "calibrating from " + std::to_string(keyframes.size()) + " keyframes";
+      status->progress = 0.0;
+    });
+  }
+}
+
+/// In the worker's thread: what is due after its job, also if the drive has ended meanwhile; otherwise null.
+std::shared_ptr<RigCalibrationSession::Job> RigCalibrationSession::nextJob() {
+  std::unique_lock<std::mutex> lock(mutex_, std::defer_lock);
+  while (!is_awaited_ && !lock.try_lock()) {  // who waits for this thread may hold the lock
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  if (is_awaited_ || !isCalibrationDue()) {
+    return nullptr;
+  }
+  makeJob(false);
+  return job_;
 }
 
 void RigCalibrationSession::run(const std::shared_ptr<Job>& job) {
@@ -232,6 +284,9 @@ void RigCalibrationSession::run(const std::shared_ptr<Job>& job) {
           if (job->is_abandoned) {
             throw Abandoned();
           }
+          if (job->is_early) {
+            return;
+          }
           tellOfJob([&](Status* status) {
             status->message = "stage " + std::to_string(progress.number) + " of " +
                               std::to_string(progress.num_stages) + ", " + progress.stage;
@@ -242,18 +297,24 @@ void RigCalibrationSession::run(const std::shared_ptr<Job>& job) {
     if (job->is_abandoned) {
       throw Abandoned();
     }
+    const bool has_failed = job->work.result.verdict == Verdict::kFail;
+    if (job->is_early && has_failed) {
+      throw Abandoned();
+    }
     const std::string more = on_result_(job->work);
     message = describe(job->work.result) + (more.empty() ? "" : "; " + more);
-    phase = job->work.result.verdict == Verdict::kFail ? Phase::kFailed : Phase::kCalibrated;
+    phase = has_failed ? Phase::kFailed : Phase::kCalibrated;
   } catch (const Abandoned&) {
-    message = "abandoned";
+    job->is_abandoned = true;  // tells nothing
   } catch (const std::exception& error) {
     message = error.what();
   }
   tellOfJob([&](Status* status) {
-    status->phase = phase;
-    status->message = message;
-    status->progress = 1.0;
+    if (!job->is_early || phase == Phase::kFailed) {
+      status->phase = phase;
+      status->progress = 1.0;
+    }
+    status->message = (job->is_early ? "so far " : "") + message;
     status->result = std::make_shared<const RigCalibration>(job->work.result);
   });
   job->work.state = ReconstructionState();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -19,9 +20,9 @@ namespace vcharge {
 struct RigCalibrationSessionOptions {
   VCHARGE_BEGIN_OPTIONS(RigCalibrationSessionOptions);
   VCHARGE_OPTION(bool, calibrates_itself, false, anyValue(),
-                 "Calibrates once the coach finds the drive sufficient.");
-  VCHARGE_OPTION(double, retry_m, 30.0, notNegative(),
-                 "Distance after a failure until the next calibration.");
+                 "Calibrates while the drive goes on, from when it is half of what the coach asks for.");
+  VCHARGE_OPTION(double, again_m, 20.0, notNegative(),
+                 "Least distance between calibrations of a drive that goes on.");
   VCHARGE_OPTION(double, outlook_m, 2.0, positive(), "Distance between updates of the outlook.");
   VCHARGE_OPTION(int, max_keyframes, 2000, atLeast(10), "Keyframes after which the drive is ignored.");
   VCHARGE_OPTION_GROUP(CalibrationCoachOptions, coach, {}, "Requirements on a drive.");
@@ -37,8 +38,10 @@ struct FinishedCalibration {
 
 /// Calibrates a rig while the vehicle is driven: feeds a RigCalibrator, updates the outlook of a
 /// CalibrationCoach, and calibrates in a separate thread from the drive so far. The drive may continue
-/// meanwhile and be calibrated again. The source must serialize the calls of DriveConsumer; other functions
-/// may be called from any thread.
+/// meanwhile and be calibrated again: a session that calibrates itself does so whenever the drive has become
+/// longer, and once more when the vehicle stops, so that a result is there at the end of the drive. The
+/// failure of a calibration before the coach has enough is told nobody. The source must serialize the calls
+/// of DriveConsumer; other functions may be called from any thread.
 class RigCalibrationSession : public DriveConsumer {
  public:
   /// kFailed lasts until the drive continues; kCalibrated lasts until the next calibration or reset.
@@ -84,8 +87,11 @@ class RigCalibrationSession : public DriveConsumer {
   struct Follower;
   struct Job;
   template <class Feed>
-  void follow(const Feed& feed);
-  bool begin(bool flushes, std::string* message);
+  void follow(Timestamp now, const Feed& feed);
+  bool isCalibrationDue() const;
+  bool begin(bool is_asked_for, std::string* message);
+  void makeJob(bool is_asked_for);
+  std::shared_ptr<Job> nextJob();
   void run(const std::shared_ptr<Job>& job);
   void startOver();
   void updateOutlook();
@@ -102,6 +108,9 @@ class RigCalibrationSession : public DriveConsumer {
   std::unique_ptr<Follower> follower_;
   std::shared_ptr<Job> job_;  // last job; null before the first
   std::thread worker_;        // thread of job_
+  Timestamp now_;             // stamp of the newest image or odometry
+
+  std::atomic<bool> is_awaited_{false};  // somebody waits for the end of the worker
 
   mutable std::mutex status_mutex_;  // never held during long work
   Status status_;
