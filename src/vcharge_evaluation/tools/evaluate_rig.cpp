@@ -46,12 +46,14 @@ int main(int argc, char** argv) {
   std::string estimate, truth;
   app.addOption("--estimate", &estimate, "rig.yaml to judge").required();
   app.addOption("--truth", &truth, "true rig.yaml").required();
-  describeJson(&app, R"(kind: "rig"; scale: factor on the translations that fits the truth best; as_is,
-without_scale: per camera {camera, error_m [x, y, z], error_rad [x, y, z], normalized [6]: errors over
-their standard deviations, if there are covariances}.)");
+  describeJson(&app,
+               R"(kind: "rig"; scale: factor on the translations that fits the truth best; scale_sigma: of
+the estimate; as_is, without_scale: per camera {camera, error_m [x, y, z], error_rad [x, y, z], normalized [6]:
+errors over their standard deviations, if there are covariances}.)");
   return runTool(&app, argc, argv, [&](nlohmann::json* found) {
-    const RigErrors errors = evaluateRig(readCameraRig(estimate), readCameraRig(truth));
-    nlohmann::json json = {{"kind", "rig"}, {"scale", errors.scale}};
+    const CameraRig rig = readCameraRig(estimate);
+    const RigErrors errors = evaluateRig(rig, readCameraRig(truth));
+    nlohmann::json json = {{"kind", "rig"}, {"scale", errors.scale}, {"scale_sigma", rig.scale_sigma}};
     json["as_is"] = print("as it is", errors.as_is);
     std::printf("scale: x %.5f\n", errors.scale);
     json["without_scale"] = print("without the common scale", errors.without_scale);

@@ -40,9 +40,9 @@ std::string summaryOf(const RigCalibration& result) {
 std::string parametersOf(const RigCalibration& result) {
   std::string text =
       "<h2>Extrinsics</h2><p>Axes of the vehicle: x forwards, y to the left, z up. " +
-      std::string(result.is_from_map
-                      ? "The map defines the scale."
-                      : "The odometer defines the scale: it contains the error of the wheels' size.") +
+      std::string(result.is_from_map ? "The map" : "The odometer") +
+      " defines the scale, which is known within " + toText(100.0 * result.rig->scale_sigma, 2) +
+      " %; this is not in the deviations of the positions." +
       " Yaw, pitch and roll are zero for an upright camera that looks forward; their deviations are about "
       "the "
       "vehicle's z, y and x.</p><table>" +

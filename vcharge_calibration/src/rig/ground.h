@@ -22,10 +22,18 @@ std::shared_ptr<const CameraRig> withCameraHeights(const ReconstructionData& dat
 struct GroundPoint {
   int32_t track = 0;
   int32_t keyframe = 0;
+  double height_sigma_m = 0.0;  ///< infinite where the landmark has not been adjusted
 };
 
 /// Landmarks of precise height within `max_distance_m` of the vehicle's z = 0 and near its path, in order of
 /// tracks.
 std::vector<GroundPoint> findGroundPoints(const ReconstructionData& data, double max_distance_m);
+
+/// What the ground tells wrongly, as standard deviations: the height of the cameras (m), and their roll and
+/// pitch (rad), as one rigid body. Zero where its landmarks have not been adjusted.
+struct GroundBias {
+  double height_m = 0.0, roll_rad = 0.0, pitch_rad = 0.0;
+};
+GroundBias findGroundBias(const ReconstructionData& data, const std::vector<GroundPoint>& points);
 
 }  // namespace vcharge

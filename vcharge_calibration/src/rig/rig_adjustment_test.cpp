@@ -198,5 +198,25 @@ TEST(GroundTest, LeavesPointsOfImpreciseHeightOut) {
   }
 }
 
+TEST(GroundTest, BiasFollowsTheDeviationOfHeights) {
+  ReconstructionData data = testing::makeAnalyticDrive(5, 0.0);
+  const GroundBias unknown = findGroundBias(data, findGroundPoints(data, 0.15));
+  EXPECT_EQ(unknown.height_m, 0.0) << "nothing was adjusted";
+  GroundBias bias[2];
+  for (const int i : {0, 1}) {
+    const double sigma_m = i == 0 ? 0.001 : 0.002;
+    for (Track& track : data.tracks) {
+      track.covariance_m2 = sigma_m * sigma_m * Eigen::Matrix3d::Identity();
+    }
+    bias[i] = findGroundBias(data, findGroundPoints(data, 0.15));
+    EXPECT_NEAR(bias[i].height_m, 0.25 * sigma_m, 1e-9);
+    // Ground is seen within five metres.
+    EXPECT_GT(bias[i].pitch_rad, bias[i].height_m / 5.0);
+    EXPECT_GT(bias[i].roll_rad, bias[i].height_m / 5.0);
+  }
+  EXPECT_NEAR(bias[1].pitch_rad, 2.0 * bias[0].pitch_rad, 1e-9);
+  EXPECT_EQ(findGroundBias(data, {}).pitch_rad, 0.0);
+}
+
 }  // namespace
 }  // namespace vcharge

@@ -91,7 +91,8 @@ std::string describeCalibration(const RigCalibration& result) {
   for (size_t i = 0; i < result.cameras.size(); ++i) {
     text += describeCamera(result.cameras[i], *result.rig->cameras[i].vehicle_from_camera);
   }
-  return text + "height: " + result.height_source + "\n";
+  return text + "height: " + result.height_source + "\nscale, common to all positions: +- " +
+         toText(100.0 * result.rig->scale_sigma, 2) + " %\n";
 }
 
 }  // namespace vcharge

@@ -25,6 +25,8 @@ constexpr int kHalfIterations = 10;
 constexpr double kJackknifeFactor = 2.0;
 /// Least variance over that for independent errors, whose steps of a wheel counter cancel one another.
 constexpr double kLeastRatio = 0.25;
+// Usual range of landmarks.
+constexpr double kRange_m = 2.5;
 // How a body stands on its wheels while it drives, beside how it stands at rest.
 constexpr double kBodyHeight_m = 0.001;
 constexpr double kBodyTilt_rad = 0.01 / 57.29577951308232;
@@ -151,14 +153,16 @@ Vector6d inflationOf(const Matrix6d& independent, const Matrix6d& jackknife) {
 }
 
 /// Covariance of what is the same in all parts of the drive: directions that all patches of a camera show,
-/// and how the body stands on its wheels, which moves all cameras.
-Matrix6d commonCovariance(const RigAdjustmentOptions& options, const RigCamera& camera) {
+/// and how the body stands on its wheels and on the ground that is seen, which moves all cameras.
+Matrix6d commonCovariance(const RigAdjustmentOptions& options, const RigCamera& camera,
+                          const GroundBias& ground) {
   const double sigma_rad = options.common_error_px * radiansPerPixel(camera);
-  const double sigma_m = sigma_rad * options.common_range_m;
+  const double sigma_m = sigma_rad * kRange_m;
   Vector6d own;
   own << Eigen::Vector3d::Constant(sigma_m), Eigen::Vector3d::Constant(sigma_rad);
   Vector6d of_body;
-  of_body << 0.0, 0.0, kBodyHeight_m, kBodyTilt_rad, kBodyTilt_rad, 0.0;
+  of_body << 0.0, 0.0, std::hypot(kBodyHeight_m, ground.height_m), std::hypot(kBodyTilt_rad, ground.roll_rad),
+      std::hypot(kBodyTilt_rad, ground.pitch_rad), 0.0;
   const Matrix6d by_body = byMoveOfBody(*camera.vehicle_from_camera);
   Matrix6d covariance = by_body * of_body.cwiseAbs2().asDiagonal() * by_body.transpose();
   covariance.diagonal() += own.cwiseAbs2();
@@ -253,12 +257,14 @@ void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, cons
     result->num_loop_edges += edge.accepted ? 1 : 0;
   }
   countObservations(data, result);
-  const auto num_ground = findGroundPoints(data, options.max_ground_distance_m).size();
-  result->height_source = "from " + std::to_string(num_ground) + " landmarks on the ground near the path";
+  const std::vector<GroundPoint> ground = findGroundPoints(data, options.max_ground_distance_m);
+  const GroundBias ground_bias = findGroundBias(data, ground);
+  result->height_source = "from " + std::to_string(ground.size()) + " landmarks on the ground near the path";
   if (result->is_from_map) {
     result->height_source += ", and from the ground of the map";
   }
   auto rig = std::make_shared<CameraRig>(*data.rig);
+  rig->scale_sigma = options.scale_sigma;
   const RigUncertainty uncertainty = rigUncertainty(options, priors, data);
   const auto odd = calibrateHalf(options, priors, data, true);
   const auto even = calibrateHalf(options, priors, data, false);
@@ -271,7 +277,7 @@ void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, cons
       const Matrix6d schur = uncertainty.covariance.block<6, 6>(at, at);
       camera.inflation = inflationOf(schur, uncertainty.jackknife.block<6, 6>(at, at));
       camera.covariance = camera.inflation.asDiagonal() * schur * camera.inflation.asDiagonal();
-      camera.covariance += commonCovariance(options, rig->cameras[i]);
+      camera.covariance += commonCovariance(options, rig->cameras[i], ground_bias);
       camera.weakest_direction = describeWeakest(camera.covariance);
       rig->cameras[i].covariance = camera.covariance;
     }

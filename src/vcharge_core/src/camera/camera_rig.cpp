@@ -227,6 +227,15 @@ size_t CameraRig::cameraIndex(const std::string& name) const {
   return static_cast<size_t>(index);
 }
 
+std::optional<Eigen::Matrix<double, 6, 6>> CameraRig::covarianceWithScale(size_t camera) const {
+  std::optional<Eigen::Matrix<double, 6, 6>> covariance = cameras.at(camera).covariance;
+  if (covariance) {
+    const Eigen::Vector3d by_scale_m = scale_sigma * cameras[camera].vehicle_from_camera->translation();
+    covariance->topLeftCorner<3, 3>() += by_scale_m * by_scale_m.transpose();
+  }
+  return covariance;
+}
+
 bool CameraRig::hasExtrinsics() const {
   for (const RigCamera& camera : cameras) {
     if (!camera.vehicle_from_camera) {
@@ -252,13 +261,20 @@ CameraRig parseCameraRig(const std::string& text, const std::string& source, con
   if (!root.IsMap()) {
     throw InputError(source + ": expected a rig with the keys vehicle_frame and cameras");
   }
-  checkKeys(root, source, "", {"vehicle_frame", "provenance", "cameras"});
+  checkKeys(root, source, "", {"vehicle_frame", "provenance", "scale_sigma", "cameras"});
   CameraRig rig;
   if (root["provenance"].IsDefined()) {
     rig.provenance = readProvenance(top.required("provenance"));
   }
   if (root["vehicle_frame"].IsDefined()) {
     rig.vehicle_frame = top.required("vehicle_frame").text();
+  }
+  if (root["scale_sigma"].IsDefined()) {
+    const Entry scale_sigma = top.required("scale_sigma");
+    rig.scale_sigma = scale_sigma.number();
+    if (!(rig.scale_sigma >= 0.0)) {
+      scale_sigma.fail("at least 0");
+    }
   }
   const Entry cameras = top.required("cameras");
   if (!cameras.node.IsMap() || cameras.node.size() == 0) {
@@ -291,6 +307,9 @@ std::string formatCameraRig(const CameraRig& rig) {
     provenance << YAML::BeginMap << YAML::Key << "provenance" << YAML::Value << rig.provenance
                << YAML::EndMap;
     text += std::string(provenance.c_str()) + "\n";
+  }
+  if (rig.scale_sigma > 0.0) {
+    text += "scale_sigma: " + exact(rig.scale_sigma) + "\n";
   }
   text += "cameras:\n";
   for (const RigCamera& camera : rig.cameras) {

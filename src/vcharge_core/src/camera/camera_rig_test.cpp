@@ -92,10 +92,12 @@ TEST(CameraRigTest, SurvivesWritingAndReadingExactly) {
   rig.cameras[0].covariance = covariance;
   rig.cameras[0].mask = cv::Mat(800, 1280, CV_8UC1, cv::Scalar(255));
   rig.cameras[0].mask.at<uint8_t>(3, 4) = 0;
+  rig.scale_sigma = 0.1 / 3.0;
   rig.provenance = {{"bag", "a: \"b\" # c.bag"}, {"options", "{a: 1,\n b: [2]}"}, {"verdict", "yes"}};
   writeCameraRig(rig, folder + "/rig.yaml");
   const CameraRig read = readCameraRig(folder + "/rig.yaml");
   EXPECT_EQ(read.provenance, rig.provenance);
+  EXPECT_EQ(read.scale_sigma, rig.scale_sigma);
   EXPECT_EQ(read.cameras[0].model.parameters(), rig.cameras[0].model.parameters());
   EXPECT_EQ(read.cameras[0].vehicle_from_camera->translation(),
             rig.cameras[0].vehicle_from_camera->translation());
@@ -108,7 +110,22 @@ TEST(CameraRigTest, SurvivesWritingAndReadingExactly) {
   EXPECT_FALSE(read.cameras[1].vehicle_from_camera);
 }
 
+TEST(CameraRigTest, ScaleAddsToTheCovarianceAlongTheTranslation) {
+  CameraRig rig = parseCameraRig(kRig, "rig.yaml", ".");
+  EXPECT_FALSE(rig.covarianceWithScale(0));
+  const Eigen::Vector3d translation_m(2.0, -1.0, 0.5);
+  rig.cameras[0].vehicle_from_camera = RigidTransform(Eigen::Quaterniond::Identity(), translation_m);
+  rig.cameras[0].covariance = 1e-6 * Eigen::Matrix<double, 6, 6>::Identity();
+  EXPECT_EQ(*rig.covarianceWithScale(0), *rig.cameras[0].covariance);
+  rig.scale_sigma = 0.01;
+  Eigen::Matrix<double, 6, 6> expected = *rig.cameras[0].covariance;
+  expected.topLeftCorner<3, 3>() += 1e-4 * translation_m * translation_m.transpose();
+  EXPECT_TRUE(rig.covarianceWithScale(0)->isApprox(expected, 1e-12));
+}
+
 TEST(CameraRigTest, EveryErrorNamesFileKeyAndExpectation) {
+  EXPECT_THAT(errorOf(replaced(kRig, "cameras:", "scale_sigma: -0.1\ncameras:")),
+              AllOf(HasSubstr("rig.yaml"), HasSubstr("scale_sigma"), HasSubstr("at least 0")));
   EXPECT_THAT(errorOf(replaced(kRig, "  front:", "  front left:")),
               AllOf(HasSubstr("rig.yaml"), HasSubstr("cameras.front left"), HasSubstr("underscores")));
   EXPECT_THAT(errorOf(replaced(kRig, "cameras:", "provenance: [a]\ncameras:")),

@@ -23,6 +23,7 @@ struct RigErrors {
   /// Factor on all translations that fits the truth best. A calibration from a drive has the odometer's
   /// scale.
   double scale = 1.0;
+  /// Normalized with and without the deviation of the estimate's scale.
   std::vector<CameraErrors> as_is, without_scale;
 };
 

@@ -106,6 +106,9 @@ def judged(calibrations, num_cameras=4):
     for axis, square in zip(AXES, squares):
         yield figure(f"mean normalized squared error, {axis}", None if square is None else float(square), at_least=0.5,
                      at_most=2.0)
+    # The wheels of most drives here are right, so that other errors show.
+    scales = [(one.errors["scale"] - 1) / one.errors["scale_sigma"] for one in calibrations if one.errors]
+    yield Figure("mean normalized squared error, common scale", float(np.mean(np.square(scales))) if scales else None)
 
 
 def evaluate_rigs(args, results):

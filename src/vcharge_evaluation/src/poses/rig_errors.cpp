@@ -33,7 +33,7 @@ RigErrors evaluateRig(const CameraRig& estimate, const CameraRig& truth) {
   if (square > 0.0) {
     result.scale = product / square;
   }
-  const auto errorsAt = [&](double scale) {
+  const auto errorsAt = [&](double scale, bool is_scale_known) {
     std::vector<CameraErrors> errors;
     for (const RigCamera& camera : truth.cameras) {
       const RigidTransform& estimated = extrinsicsOf(estimate, camera.name, "estimate");
@@ -41,16 +41,17 @@ RigErrors evaluateRig(const CameraRig& estimate, const CameraRig& truth) {
       of_camera.name = camera.name;
       const RigidTransform scaled(estimated.rotation(), scale * estimated.translation());
       of_camera.error = stepBetween(scaled, *camera.vehicle_from_camera);
-      const auto& covariance = estimate.cameras[estimate.findCamera(camera.name)].covariance;
-      if (covariance) {
+      const size_t index = estimate.cameraIndex(camera.name);
+      if (const auto covariance =
+              is_scale_known ? estimate.cameras[index].covariance : estimate.covarianceWithScale(index)) {
         of_camera.normalized = of_camera.error.cwiseQuotient(covariance->diagonal().cwiseSqrt());
       }
       errors.push_back(of_camera);
     }
     return errors;
   };
-  result.as_is = errorsAt(1.0);
-  result.without_scale = errorsAt(result.scale);
+  result.as_is = errorsAt(1.0, false);
+  result.without_scale = errorsAt(result.scale, true);
   return result;
 }
 

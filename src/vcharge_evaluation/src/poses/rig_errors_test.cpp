@@ -1,5 +1,7 @@
 #include "vcharge_evaluation/rig_errors.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "vcharge_core/base/error.h"
@@ -37,6 +39,11 @@ TEST(RigErrorsTest, ScaleAndRemainingErrorsAreFound) {
   EXPECT_NEAR((*errors.as_is[0].normalized)[0], -3.6, 1e-6);
   EXPECT_LT(errors.without_scale[0].error.norm(), 1e-9);
   EXPECT_NEAR(errors.without_scale[1].error[5], -0.002, 1e-9);
+
+  estimate.scale_sigma = 0.01;
+  const RigErrors uncertain = evaluateRig(estimate, truth);
+  EXPECT_NEAR((*uncertain.as_is[0].normalized)[0], -0.036 / std::hypot(0.01, 0.01 * 1.01 * 3.6), 1e-6);
+  EXPECT_NEAR((*uncertain.without_scale[1].normalized)[5], (*errors.without_scale[1].normalized)[5], 1e-12);
 }
 
 TEST(RigErrorsTest, MissingCameraIsNamed) {

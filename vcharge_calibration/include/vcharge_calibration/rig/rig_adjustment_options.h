@@ -15,7 +15,8 @@ struct RigAdjustmentOptions {
   VCHARGE_OPTION(double, segment_m, 10.0, positive(),
                  "Length of parts of the drive with independent errors.");
   VCHARGE_OPTION(double, common_error_px, 0.015, notNegative(), "Deviation of directions by common errors.");
-  VCHARGE_OPTION(double, common_range_m, 2.5, positive(), "Usual range of landmarks, for common errors.");
+  VCHARGE_OPTION(double, scale_sigma, 0.005, notNegative(),
+                 "Relative deviation of the odometer's scale, which the rig takes over.");
   VCHARGE_OPTION_GROUP(BundleAdjustmentOptions, bundle, {}, "Bundle adjustment.");
   VCHARGE_END_OPTIONS();
 };

@@ -26,7 +26,7 @@ struct RigCamera {
   cv::Mat mask;           ///< CV_8UC1 of image_size_px, 0 where the vehicle is seen; empty without a mask
   std::optional<RigidTransform> vehicle_from_camera;  ///< absent before extrinsic calibration
   /// Covariance of vehicle_from_camera, over [dt, dphi] in the vehicle frame: t = t_hat + dt, R = Exp(dphi)
-  /// R_hat.
+  /// R_hat; for a given scale of the rig, see CameraRig::scale_sigma.
   std::optional<Eigen::Matrix<double, 6, 6>> covariance;
 };
 
@@ -38,6 +38,9 @@ class CameraRig {
  public:
   std::string vehicle_frame = "base_link";
   std::vector<RigCamera> cameras;
+  /// Relative standard deviation of the scale that all translations have in common, which comes from the
+  /// wheels' size; 0 if it is unknown.
+  double scale_sigma = 0.0;
   /// How the rig was made, by keys such as `program`. For people only: nothing depends on it.
   std::map<std::string, std::string> provenance;
 
@@ -45,6 +48,8 @@ class CameraRig {
   int findCamera(const std::string& name) const;
   /// Index of the camera with this name. Throws an InputError that lists the available names.
   size_t cameraIndex(const std::string& name) const;
+  /// Covariance of a camera's vehicle_from_camera that includes the common scale; absent without covariance.
+  std::optional<Eigen::Matrix<double, 6, 6>> covarianceWithScale(size_t camera) const;
   /// True when every camera has vehicle_from_camera.
   bool hasExtrinsics() const;
 };
