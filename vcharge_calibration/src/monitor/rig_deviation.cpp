@@ -93,6 +93,7 @@ class PartAdjuster {
     options_.adjustment.bundle.odometer_turn_sigma = kOdometerPrior;
     const Eigen::VectorXd prior = priorInformation(rig_->cameras.size());
     priors_.extrinsics_information = prior.tail(prior.size() - kNumFactors).asDiagonal();
+    priors_.uses_all_ground = true;
     for (const RigCamera& camera : rig_->cameras) {
       priors_.vehicle_from_camera.push_back(*camera.vehicle_from_camera);
     }

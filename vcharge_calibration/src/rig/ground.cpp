@@ -158,7 +158,11 @@ std::vector<GroundPoint> findGroundPoints(const ReconstructionData& data, double
       points.push_back(*found);
     }
   }
-  return preciseOnes(points);
+  return points;
+}
+
+std::vector<GroundPoint> findPreciseGround(const ReconstructionData& data, double max_distance_m) {
+  return preciseOnes(findGroundPoints(data, max_distance_m));
 }
 
 GroundBias findGroundBias(const ReconstructionData& data, const std::vector<GroundPoint>& points) {

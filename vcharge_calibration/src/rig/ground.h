@@ -25,9 +25,10 @@ struct GroundPoint {
   double height_sigma_m = 0.0;  ///< infinite where the landmark has not been adjusted
 };
 
-/// Landmarks of precise height within `max_distance_m` of the vehicle's z = 0 and near its path, in order of
-/// tracks.
+/// Landmarks within `max_distance_m` of the vehicle's z = 0 and near its path, in order of tracks.
 std::vector<GroundPoint> findGroundPoints(const ReconstructionData& data, double max_distance_m);
+/// Those of them whose height is precise.
+std::vector<GroundPoint> findPreciseGround(const ReconstructionData& data, double max_distance_m);
 
 /// What the ground tells wrongly, as standard deviations: the height of the cameras (m), and their roll and
 /// pitch (rad), as one rigid body. Zero where its landmarks have not been adjusted.

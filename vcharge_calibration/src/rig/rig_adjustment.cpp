@@ -50,6 +50,7 @@ std::vector<double> balanceTurns(const ReconstructionData& data) {
 
 /// Landmarks on the ground; planar motion does not determine the cameras' height, and barely their tilt.
 std::vector<GroundObservation> makeGroundObservations(const RigAdjustmentOptions& options,
+                                                      const std::vector<GroundPoint>& ground_points,
                                                       const std::vector<double>& weights,
                                                       const ReconstructionData& data) {
   std::vector<int32_t> point_of_track(data.tracks.size(), 0);
@@ -59,7 +60,7 @@ std::vector<GroundObservation> makeGroundObservations(const RigAdjustmentOptions
     num_points += data.tracks[t].position_m ? 1 : 0;
   }
   std::vector<GroundObservation> observations;
-  for (const GroundPoint& ground : findGroundPoints(data, options.max_ground_distance_m)) {
+  for (const GroundPoint& ground : ground_points) {
     observations.push_back({point_of_track[ground.track], ground.keyframe,
                             options.ground_sigma_m / std::sqrt(weights[ground.keyframe])});
   }
@@ -95,7 +96,11 @@ BundleProblem makeRigProblem(const RigAdjustmentOptions& options, const RigPrior
   for (const RigCamera& camera : data.rig->cameras) {
     problem.vehicle_from_camera.push_back(*camera.vehicle_from_camera);
   }
-  problem.ground_observations = makeGroundObservations(options, weights, data);
+  problem.ground_observations =
+      makeGroundObservations(options,
+                             priors.uses_all_ground ? findGroundPoints(data, options.max_ground_distance_m)
+                                                    : findPreciseGround(data, options.max_ground_distance_m),
+                             weights, data);
   if (priors.height_sigma_m > 0.0) {
     problem.prior_vehicle_from_camera = problem.vehicle_from_camera;
     problem.extrinsics_information =

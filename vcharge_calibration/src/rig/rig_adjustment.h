@@ -35,6 +35,10 @@ struct RigPriors {
   std::vector<RigidTransform> vehicle_from_camera;
   Eigen::MatrixXd extrinsics_information;
 
+  /// All ground counts, and not only where its height is precise: the cameras seem tilted by some hundredths
+  /// of a degree, but a short part of a drive shows at all how the body stands.
+  bool uses_all_ground = false;
+
   bool hasMap() const { return !landmark_information.empty(); }
 };
 

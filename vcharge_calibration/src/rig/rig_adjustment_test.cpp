@@ -190,7 +190,8 @@ TEST(GroundTest, LeavesPointsOfImpreciseHeightOut) {
     const double sigma_m = t % 3 == 0 ? 0.002 : 0.02;
     data.tracks[t].covariance_m2 = sigma_m * sigma_m * Eigen::Matrix3d::Identity();
   }
-  const std::vector<GroundPoint> precise = findGroundPoints(data, 0.15);
+  EXPECT_EQ(findGroundPoints(data, 0.15).size(), num_all);
+  const std::vector<GroundPoint> precise = findPreciseGround(data, 0.15);
   EXPECT_NEAR(static_cast<double>(precise.size()), static_cast<double>(num_all) / 3.0,
               0.1 * static_cast<double>(num_all));
   for (const GroundPoint& point : precise) {
@@ -200,7 +201,7 @@ TEST(GroundTest, LeavesPointsOfImpreciseHeightOut) {
 
 TEST(GroundTest, BiasFollowsTheDeviationOfHeights) {
   ReconstructionData data = testing::makeAnalyticDrive(5, 0.0);
-  const GroundBias unknown = findGroundBias(data, findGroundPoints(data, 0.15));
+  const GroundBias unknown = findGroundBias(data, findPreciseGround(data, 0.15));
   EXPECT_EQ(unknown.height_m, 0.0) << "nothing was adjusted";
   GroundBias bias[2];
   for (const int i : {0, 1}) {
@@ -208,7 +209,7 @@ TEST(GroundTest, BiasFollowsTheDeviationOfHeights) {
     for (Track& track : data.tracks) {
       track.covariance_m2 = sigma_m * sigma_m * Eigen::Matrix3d::Identity();
     }
-    bias[i] = findGroundBias(data, findGroundPoints(data, 0.15));
+    bias[i] = findGroundBias(data, findPreciseGround(data, 0.15));
     EXPECT_NEAR(bias[i].height_m, 0.25 * sigma_m, 1e-9);
     // Ground is seen within five metres.
     EXPECT_GT(bias[i].pitch_rad, bias[i].height_m / 5.0);

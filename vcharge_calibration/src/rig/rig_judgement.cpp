@@ -257,7 +257,7 @@ void judgeRig(const RigAdjustmentOptions& options, const RigPriors& priors, cons
     result->num_loop_edges += edge.accepted ? 1 : 0;
   }
   countObservations(data, result);
-  const std::vector<GroundPoint> ground = findGroundPoints(data, options.max_ground_distance_m);
+  const std::vector<GroundPoint> ground = findPreciseGround(data, options.max_ground_distance_m);
   const GroundBias ground_bias = findGroundBias(data, ground);
   result->height_source = "from " + std::to_string(ground.size()) + " landmarks on the ground near the path";
   if (result->is_from_map) {
