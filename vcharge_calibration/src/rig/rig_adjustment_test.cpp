@@ -199,6 +199,22 @@ TEST(GroundTest, LeavesPointsOfImpreciseHeightOut) {
   }
 }
 
+TEST(GroundTest, AllOfItTellsMoreThanThePreciseOnes) {
+  ReconstructionData data = testing::makeAnalyticDrive(5, testing::kNoise_px);
+  for (size_t t = 0; t < data.tracks.size(); ++t) {
+    const double sigma_m = t % 3 == 0 ? 0.002 : 0.02;
+    data.tracks[t].covariance_m2 = sigma_m * sigma_m * Eigen::Matrix3d::Identity();
+  }
+  RigPriors priors;
+  const RigUncertainty precise = rigUncertainty(RigCalibratorOptions::defaultAdjustment(), priors, data);
+  priors.uses_all_ground = true;
+  const RigUncertainty all = rigUncertainty(RigCalibratorOptions::defaultAdjustment(), priors, data);
+  ASSERT_TRUE(precise.is_valid && all.is_valid);
+  for (const Eigen::Index height : {2, 8}) {
+    EXPECT_LT(all.covariance(height, height), 0.6 * precise.covariance(height, height));
+  }
+}
+
 TEST(GroundTest, BiasFollowsTheDeviationOfHeights) {
   ReconstructionData data = testing::makeAnalyticDrive(5, 0.0);
   const GroundBias unknown = findGroundBias(data, findPreciseGround(data, 0.15));
