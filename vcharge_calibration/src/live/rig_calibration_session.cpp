@@ -222,8 +222,7 @@ bool RigCalibrationSession::begin(bool is_asked_for, std::string* message) {
     worker_.join();  // returns at once or soon
     is_awaited_ = false;
   }
-  makeJob(is_asked_for);
-  *message = "calibrating from " + std::to_string(follower_->calibrated_keyframes) + " keyframes";
+  *message = makeJob(is_asked_for);
   worker_ = std::thread([this, first = job_] {
     for (std::shared_ptr<Job> job = first; job; job = nextJob()) {
       run(job);
@@ -232,8 +231,8 @@ bool RigCalibrationSession::begin(bool is_asked_for, std::string* message) {
   return true;
 }
 
-/// Makes a job of the drive so far.
-void RigCalibrationSession::makeJob(bool is_asked_for) {
+/// Makes a job of the drive so far, and returns what it begins with in a line.
+std::string RigCalibrationSession::makeJob(bool is_asked_for) {
   job_ = std::make_shared<Job>();
   if (is_asked_for) {
     follower_->calibrator.flush();
@@ -245,13 +244,15 @@ void RigCalibrationSession::makeJob(bool is_asked_for) {
   const std::vector<Keyframe>& keyframes = job_->work.state.data.keyframes;
   follower_->calibrated_keyframes = keyframes.size();
   follower_->calibrated_m = keyframes.empty() ? 0.0 : keyframes.back().travelled_m;
+  const std::string message = "calibrating from " + std::to_string(keyframes.size()) + " keyframes";
   if (!job_->is_early) {
     tell([&](Status* status) {
       status->phase = Phase::kCalibrating;
-      status->message = "calibrating from " + std::to_string(keyframes.size()) + " keyframes";
+      status->message = message;
       status->progress = 0.0;
     });
   }
+  return message;
 }
 
 /// In the worker's thread: what is due after its job, also if the drive has ended meanwhile; otherwise null.

@@ -149,12 +149,12 @@ std::vector<GroundPoint> findGroundPoints(const ReconstructionData& data, double
         nearest_m = range_m;
         found.reset();
         if (std::abs(point.z()) < max_distance_m) {
-          found = GroundPoint{static_cast<int32_t>(t), observation.keyframe,
-                              heightSigma(data, t, observation.keyframe)};
+          found = GroundPoint{static_cast<int32_t>(t), observation.keyframe};
         }
       }
     }
     if (found) {
+      found->height_sigma_m = heightSigma(data, t, found->keyframe);
       points.push_back(*found);
     }
   }

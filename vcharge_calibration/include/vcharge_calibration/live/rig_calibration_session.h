@@ -39,8 +39,8 @@ struct FinishedCalibration {
 /// Calibrates a rig while the vehicle is driven: feeds a RigCalibrator, updates the outlook of a
 /// CalibrationCoach, and calibrates in a separate thread from the drive so far. The drive may continue
 /// meanwhile and be calibrated again: a session that calibrates itself does so whenever the drive has become
-/// longer, and once more when the vehicle stops, so that a result is there at the end of the drive. The
-/// failure of a calibration before the coach has enough is told nobody. The source must serialize the calls
+/// longer, and once more when the vehicle stops, so that a result is there at the end of the drive. A
+/// calibration that fails before the coach has enough is not told. The source must serialize the calls
 /// of DriveConsumer; other functions may be called from any thread.
 class RigCalibrationSession : public DriveConsumer {
  public:
@@ -90,7 +90,7 @@ class RigCalibrationSession : public DriveConsumer {
   void follow(Timestamp now, const Feed& feed);
   bool isCalibrationDue() const;
   bool begin(bool is_asked_for, std::string* message);
-  void makeJob(bool is_asked_for);
+  std::string makeJob(bool is_asked_for);
   std::shared_ptr<Job> nextJob();
   void run(const std::shared_ptr<Job>& job);
   void startOver();
