@@ -5,6 +5,11 @@
 //
 #include <hwy/highway.h>
 
+#include <algorithm>
+#include <chrono>
+#include <limits>
+#include <vector>
+
 #include "kernels/lane_operations-inl.h"
 #include "kernels/sweep_kernels.h"
 #include "kernels/sweep_kernels_internal.h"
@@ -15,6 +20,7 @@ namespace HWY_NAMESPACE {
 namespace {
 
 /// Bilinear samples of a PackedImage at fixed-point positions.
+template <bool kLoadEach>
 struct Sampler {
   const int32_t* image;
   int scale_shift;
@@ -38,7 +44,12 @@ struct Sampler {
     return multiplyHalves(hn::OrAnd(column, v, high_half), pitch);
   }
   HWY_INLINE VI operator()(VI u, VI v) const {
-    const VI cells = gather(image, index(u, v), all_lanes);
+    VI cells;
+    if constexpr (kLoadEach) {
+      cells = loadEach(image, index(u, v));
+    } else {
+      cells = gather(image, index(u, v), all_lanes);
+    }
     // Weights 255 - f and f, where f is the highest eight bits of the fraction.
     const VI weights_y = hn::Xor(fractionBytes(v), flip_bytes);
     const VI weights_x = hn::Xor(fractionHalves(u), flip_low);
@@ -173,10 +184,10 @@ HWY_INLINE VI samplePairs(const int16_t* now, const int16_t* old) {
 
 /// Samples a row, two vectors at a time (see storeSamples()). Separate from the sums, which would otherwise
 /// wait in the processor's queues for a gather.
-template <bool kFromCells>
+template <bool kFromCells, bool kLoadEach>
 class BlockSampler {
  public:
-  HWY_INLINE BlockSampler(const CorrelationRow& row, const Sampler& sample)
+  HWY_INLINE BlockSampler(const CorrelationRow& row, const Sampler<kLoadEach>& sample)
       : sample_(sample),
         u_(row.u),
         v_(row.v),
@@ -207,7 +218,7 @@ class BlockSampler {
   }
 
  private:
-  const Sampler& sample_;
+  const Sampler<kLoadEach>& sample_;
   const int32_t* u_;
   const int32_t* v_;
   int16_t* HWY_RESTRICT samples_;
@@ -268,11 +279,11 @@ class RowSums {
   Sums sums_;
 };
 
-template <bool kFromCells, bool kWithVotes>
+template <bool kFromCells, bool kWithVotes, bool kLoadEach>
 void correlateRow(const CorrelationRow& row) {
   const size_t lanes = hn::Lanes(DI());
-  const Sampler sample(row);
-  BlockSampler<kFromCells> blocks(row, sample);
+  const Sampler<kLoadEach> sample(row);
+  BlockSampler<kFromCells, kLoadEach> blocks(row, sample);
   RowSums<kWithVotes> sums(row);
   const auto strip = static_cast<size_t>(row.strip);
   const size_t block_size = kFromCells ? size_t{1} << row.cell_shift : kMaxBlock;
@@ -291,18 +302,58 @@ void correlateRow(const CorrelationRow& row) {
   sums.finish();
 }
 
+template <bool kLoadEach>
 void correlateTarget(const CorrelationRow& row) {
   if (row.cells != nullptr) {
-    row.votes != nullptr ? correlateRow<true, true>(row) : correlateRow<true, false>(row);
+    row.votes != nullptr ? correlateRow<true, true, kLoadEach>(row)
+                         : correlateRow<true, false, kLoadEach>(row);
   } else {
-    row.votes != nullptr ? correlateRow<false, true>(row) : correlateRow<false, false>(row);
+    row.votes != nullptr ? correlateRow<false, true, kLoadEach>(row)
+                         : correlateRow<false, false, kLoadEach>(row);
   }
+}
+
+/// Shortest time, in nanoseconds, that sampling a few rows takes.
+template <bool kLoadEach>
+int64_t samplingTime_ns() {
+  constexpr int kStrip = 64, kRows = 8, kRounds = 8;
+  const DI di;
+  const int pitch = kStrip * static_cast<int>(hn::Lanes(di)) + 1;
+  const std::vector<int32_t> image(static_cast<size_t>(pitch * kRows), 1);
+  CorrelationRow row;
+  row.image = image.data();
+  row.pitch = pitch;
+  row.strip = kStrip;
+  row.scale = SampleScale::forWindow(7);
+  const Sampler<kLoadEach> sample(row);
+  const VI pixel = hn::Set(di, 1 << kPositionBits);
+  int64_t shortest = std::numeric_limits<int64_t>::max();
+  VI sum = hn::Zero(di);
+  for (int round = 0; round < kRounds; ++round) {
+    const auto start = std::chrono::steady_clock::now();
+    VI v = hn::Zero(di);
+    for (int y = 0; y < kRows; ++y) {
+      VI u = hn::Iota(di, 0);
+      u = hn::Mul(u, hn::Set(di, kStrip << kPositionBits));
+      for (int s = 0; s < kStrip; ++s) {
+        sum = hn::Add(sum, sample(u, v));
+        u = hn::Add(u, pixel);
+      }
+      v = hn::Add(v, pixel);
+    }
+    [[maybe_unused]] const volatile int32_t used = hn::GetLane(sum);  // so that the sum is computed
+    const auto passed = std::chrono::steady_clock::now() - start;
+    shortest = std::min<int64_t>(shortest, std::chrono::nanoseconds(passed).count());
+  }
+  return shortest;
 }
 
 }  // namespace
 
 void fillCorrelationKernels(SweepKernels* kernels) {
-  kernels->correlate = &correlateTarget;
+  // Both give the same; which one is faster depends on the processor.
+  static const bool load_each = samplingTime_ns<true>() < samplingTime_ns<false>();
+  kernels->correlate = load_each ? &correlateTarget<true> : &correlateTarget<false>;
 }
 
 }  // namespace HWY_NAMESPACE

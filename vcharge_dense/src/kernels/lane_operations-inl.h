@@ -23,13 +23,29 @@ using MI = decltype(hn::Lt(VI(), VI()));
 // multiplyHalves  sum of the products of the signed 16-bit halves
 // multiplyBytes   for each half, sum of the products of its unsigned with its signed bytes
 // gather          reads 32-bit values. On x86 a gather depends on its register's old value even where all
-// lanes
-//                 are read, so it starts from zeros; the compiler must not know that `lanes` are all set
+//                 lanes are read, so it starts from zeros; the compiler must not know that `lanes` are all
+//                 set
+// loadEach        the same with one load per lane, which is faster on processors whose gathers are slow
 // negateHighHalf  negates the high half and keeps the low one
 // fractionBytes   copies byte 1, the highest bits of a position's fraction, into all bytes
 // fractionHalves  copies byte 1 into the low byte of both halves
 // nearest         rounds floats that fit into integers
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSSE3
+#if HWY_TARGET <= HWY_AVX2
+HWY_INLINE __m128i loadFour(const int32_t* base, __m128i index) {
+  const auto first = static_cast<uint64_t>(_mm_cvtsi128_si64(index));
+  const auto last = static_cast<uint64_t>(_mm_extract_epi64(index, 1));
+  __m128i values = _mm_cvtsi32_si128(base[first & 0xffffffffu]);
+  values = _mm_insert_epi32(values, base[first >> 32], 1);
+  values = _mm_insert_epi32(values, base[last & 0xffffffffu], 2);
+  return _mm_insert_epi32(values, base[last >> 32], 3);
+}
+HWY_INLINE __m256i loadEight(const int32_t* base, __m256i index) {
+  const __m128i low = loadFour(base, _mm256_castsi256_si128(index));
+  return _mm256_inserti128_si256(_mm256_castsi128_si256(low),
+                                 loadFour(base, _mm256_extracti128_si256(index, 1)), 1);
+}
+#endif
 #if HWY_TARGET <= HWY_AVX3
 HWY_INLINE VI nearest(VF a) {
   return VI{_mm512_cvtps_epi32(a.raw)};
@@ -42,6 +58,11 @@ HWY_INLINE VI multiplyBytes(VI u, VI s) {
 }
 HWY_INLINE VI gather(const int32_t* base, VI index, MI lanes) {
   return VI{_mm512_mask_i32gather_epi32(_mm512_setzero_si512(), lanes.raw, index.raw, base, 4)};
+}
+HWY_INLINE VI loadEach(const int32_t* base, VI index) {
+  const __m256i low = loadEight(base, _mm512_castsi512_si256(index.raw));
+  return VI{_mm512_inserti64x4(_mm512_castsi256_si512(low),
+                               loadEight(base, _mm512_extracti64x4_epi64(index.raw, 1)), 1)};
 }
 #elif HWY_TARGET == HWY_AVX2
 HWY_INLINE VI nearest(VF a) {
@@ -56,6 +77,9 @@ HWY_INLINE VI multiplyBytes(VI u, VI s) {
 HWY_INLINE VI gather(const int32_t* base, VI index, MI lanes) {
   return VI{_mm256_mask_i32gather_epi32(_mm256_setzero_si256(), base, index.raw, lanes.raw, 4)};
 }
+HWY_INLINE VI loadEach(const int32_t* base, VI index) {
+  return VI{loadEight(base, index.raw)};
+}
 #else
 HWY_INLINE VI nearest(VF a) {
   return VI{_mm_cvtps_epi32(a.raw)};
@@ -67,6 +91,9 @@ HWY_INLINE VI multiplyBytes(VI u, VI s) {
   return VI{_mm_maddubs_epi16(u.raw, s.raw)};
 }
 HWY_INLINE VI gather(const int32_t* base, VI index, MI /*lanes*/) {
+  return hn::GatherIndex(DI(), base, index);
+}
+HWY_INLINE VI loadEach(const int32_t* base, VI index) {
   return hn::GatherIndex(DI(), base, index);
 }
 #endif
@@ -94,6 +121,9 @@ HWY_INLINE VI nearest(VF a) {
   return hn::NearestInt(a);
 }
 HWY_INLINE VI gather(const int32_t* base, VI index, MI /*lanes*/) {
+  return hn::GatherIndex(DI(), base, index);
+}
+HWY_INLINE VI loadEach(const int32_t* base, VI index) {
   return hn::GatherIndex(DI(), base, index);
 }
 HWY_INLINE VI lowHalf(VI a) {
@@ -124,6 +154,38 @@ HWY_INLINE VI fractionHalves(VI position) {
 HWY_INLINE VI fractionBytes(VI position) {
   const VI halves = fractionHalves(position);
   return hn::Or(halves, hn::ShiftLeft<8>(halves));
+}
+#endif
+
+// Roots and reciprocals of positive numbers with at least 22 correct bits. Where the processor's estimates
+// have 11 bits or more, one step of Newton's method doubles them, which is faster than division.
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
+HWY_INLINE VF root(VF value) {
+  const DF df;
+  const VF estimate = hn::ApproximateReciprocalSqrt(value);
+  const VF root = hn::Mul(value, estimate);
+  const VF error = hn::NegMulAdd(root, estimate, hn::Set(df, 1.0f));
+  return hn::MulAdd(hn::Mul(root, hn::Set(df, 0.5f)), error, root);
+}
+HWY_INLINE VF reciprocal(VF value) {
+  const VF estimate = hn::ApproximateReciprocal(value);
+  return hn::Mul(estimate, hn::NegMulAdd(value, estimate, hn::Set(DF(), 2.0f)));
+}
+HWY_INLINE VF reciprocalOfRoot(VF value) {
+  const DF df;
+  const VF estimate = hn::ApproximateReciprocalSqrt(value);
+  const VF error = hn::NegMulAdd(hn::Mul(value, estimate), estimate, hn::Set(df, 1.0f));
+  return hn::MulAdd(hn::Mul(estimate, hn::Set(df, 0.5f)), error, estimate);
+}
+#else
+HWY_INLINE VF root(VF value) {
+  return hn::Sqrt(value);
+}
+HWY_INLINE VF reciprocal(VF value) {
+  return hn::Div(hn::Set(DF(), 1.0f), value);
+}
+HWY_INLINE VF reciprocalOfRoot(VF value) {
+  return reciprocal(root(value));
 }
 #endif
 

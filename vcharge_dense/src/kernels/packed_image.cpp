@@ -20,10 +20,6 @@ int pitchOf(int width) {
   return kCellsPerLine * (lines | 1);
 }
 
-inline uint32_t signedByte(uint8_t gray) {
-  return static_cast<uint32_t>(std::max<uint8_t>(gray, 1)) ^ 0x80u;
-}
-
 }  // namespace
 
 PackedImage::PackedImage(const cv::Mat& pixels, const cv::Mat& valid_mask)
@@ -31,6 +27,7 @@ PackedImage::PackedImage(const cv::Mat& pixels, const cv::Mat& valid_mask)
   check(std::max(pitch_, size_.height) <= std::numeric_limits<int16_t>::max(),
         "PackedImage: an image may have at most 32,000 pixels a side");
   const auto pitch = static_cast<size_t>(pitch_);
+  const SweepKernels kernels = sweepKernels();
   cells_ = pooledMat({pitch_, size_.height}, CV_32SC1);
   forEachRow(size_.height, [&](int row) {
     auto* cells = cells_.ptr<int32_t>(row);
@@ -44,13 +41,7 @@ PackedImage::PackedImage(const cv::Mat& pixels, const cv::Mat& valid_mask)
     const auto* top_valid = valid_mask.ptr<uint8_t>(y);
     const auto* bottom_valid = valid_mask.ptr<uint8_t>(y + 1);
     cells += kMargin;
-    for (int x = 0; x + 1 < pixels.cols; ++x) {
-      const bool seen =
-          (top_valid[x] != 0) & (bottom_valid[x] != 0) & (top_valid[x + 1] != 0) & (bottom_valid[x + 1] != 0);
-      const uint32_t cell = signedByte(top[x]) | signedByte(bottom[x]) << 8 | signedByte(top[x + 1]) << 16 |
-                            signedByte(bottom[x + 1]) << 24;
-      cells[x] = seen ? static_cast<int32_t>(cell) : kUnseenCell;
-    }
+    kernels.packCells({top, bottom, top_valid, bottom_valid}, static_cast<size_t>(pixels.cols - 1), cells);
   });
 }
 

@@ -28,6 +28,14 @@ constexpr int kVoteBits = 24;
 constexpr int32_t kVote = 1 << kVoteBits;
 constexpr float kVoteScale = 262144.0f;
 
+/// Two rows of an image and of its mask.
+struct PixelRows {
+  const uint8_t* top;
+  const uint8_t* bottom;
+  const uint8_t* top_valid;
+  const uint8_t* bottom_valid;
+};
+
 /// Scale of integer samples at which the sums of a window fit into 32 bits and reveal a single unseen sample.
 struct SampleScale {
   int shift = 0;             ///< sample = (gray level - 128) * kWeightSum^2 >> shift
@@ -59,6 +67,19 @@ struct RayRow {
   const float* base;  ///< inverse range, per metre
   const float* weight;
   float offset;
+};
+
+/// Fraction bits of a StepTable's pixels per step, and the largest number of steps to each side, after which
+/// their rounding is 0.02 pixels.
+constexpr int kStepBits = 11, kMaxStepReach = 8;
+
+/// Positions of points in a neighbour whose inverse range grows in equal steps, as the quadratic through
+/// those at three steps.
+struct StepTable {
+  int32_t* u;  ///< at step 0, in fixed point; 0, the unseen corner, where one of the three is invisible
+  int32_t* v;
+  int32_t* u_steps;  ///< low half: pixels per step, high half: pixels per squared step
+  int32_t* v_steps;
 };
 
 /// Coefficients of a cell of the node grid, each a vector of floats in the unit of fixed-point positions.
@@ -168,11 +189,19 @@ struct NeighbourhoodRow {
 /// The kernels of one instruction set.
 struct SweepKernels {
   int lanes;
+  /// Makes `count` cells of a PackedImage from one pixel more.
+  void (*packCells)(const PixelRows& rows, size_t count, int32_t* cells);
   /// Positions of `count` points, NaN where they are not visible in the packed image.
   void (*project)(const Projection& projection, const RayRow& rays, size_t count, float* u, float* v);
   /// Like project(), in fixed point; 0, the unseen corner of the packed image, for invisible points.
   void (*projectFixed)(const Projection& projection, const RayRow& rays, size_t count, int32_t* u,
                        int32_t* v);
+  /// Writes the quadratics through the positions that `rays` gives at its offset and at `reach` times
+  /// `step` less and more. They are unseen, too, where a step is 16 pixels or more.
+  void (*makeSteps)(const Projection& projection, const RayRow& rays, float step, int reach, size_t count,
+                    const StepTable& table);
+  /// Positions of `count` points after this number of steps.
+  void (*walkSteps)(const StepTable& table, int steps, size_t count, int32_t* u, int32_t* v);
   /// Computes cells, [cell][kCellCoefficients][lanes], over three rows of `nodes` nodes per strip (odd),
   /// which are `spacing` pixels apart. A cell covers two steps in both directions; it is unseen if one of
   /// its nodes is not visible.

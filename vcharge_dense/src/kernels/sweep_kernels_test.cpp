@@ -15,6 +15,18 @@
 namespace vcharge {
 namespace {
 
+/// Projection of kCamera without a margin.
+Projection projectionOf(const RigidTransform& neighbour_from_reference) {
+  Projection p{224.0f, 223.5f, 162.0f, 99.5f, 1.158f, 0.0f, 0.0f, 319.0f, 199.0f, {}, {}};
+  for (int i = 0; i < 9; ++i) {
+    p.rotation[i] = static_cast<float>(neighbour_from_reference.rotationMatrix()(i / 3, i % 3));
+  }
+  for (int i = 0; i < 3; ++i) {
+    p.translation[i] = static_cast<float>(neighbour_from_reference.translation()[i]);
+  }
+  return p;
+}
+
 /// Position in the packed image that the grid's cells give for a pixel of the tile.
 Eigen::Vector2d positionFromCells(const NodeGrid& grid, const AlignedArray<float>& cells,
                                   const TileLayout& layout, int row, int column) {
@@ -52,13 +64,12 @@ TEST(NodeGridTest, ErrorOfTheInterpolatedWarpIsWithinItsBound) {
         const RigidTransform neighbour_from_reference = neighbour.inverse() * camera_pose;
         const Eigen::Matrix3d rotation = neighbour_from_reference.rotationMatrix();
         const Eigen::Vector3d& translation = neighbour_from_reference.translation();
-        Projection projection{224.0f, 223.5f, 194.0f, 131.5f, 1.158f, 4.0f, 4.0f, 379.0f, 259.0f, {}, {}};
-        for (int i = 0; i < 9; ++i) {
-          projection.rotation[i] = static_cast<float>(rotation(i / 3, i % 3));
-        }
-        for (int i = 0; i < 3; ++i) {
-          projection.translation[i] = static_cast<float>(translation[i]);
-        }
+        Projection projection = projectionOf(neighbour_from_reference);
+        projection.cx += 32.0f;
+        projection.cy += 32.0f;
+        projection.min_x = projection.min_y = 4.0f;
+        projection.max_x = 379.0f;
+        projection.max_y = 259.0f;
         const SweepKernels kernels = sweepKernels();
         const TileLayout layout{kernels.lanes, (kSize.width + kernels.lanes - 1) / kernels.lanes, 70};
         const cv::Point origin(0, 60);
@@ -170,14 +181,7 @@ TEST(SweepKernelsTest, LargestMotionIsTheProjectionsDerivative) {
   const std::vector<RigidTransform> poses = {slow, fast};
   std::vector<NeighbourUncertainty> neighbours(2);
   for (size_t n = 0; n < 2; ++n) {
-    Projection& p = neighbours[n].projection;
-    p = {224.0f, 223.5f, 162.0f, 99.5f, 1.158f, 0.0f, 0.0f, 319.0f, 199.0f, {}, {}};
-    for (int i = 0; i < 9; ++i) {
-      p.rotation[i] = static_cast<float>(poses[n].rotationMatrix()(i / 3, i % 3));
-    }
-    for (int i = 0; i < 3; ++i) {
-      p.translation[i] = static_cast<float>(poses[n].translation()[i]);
-    }
+    neighbours[n].projection = projectionOf(poses[n]);
   }
   constexpr size_t kCount = 21;  // not a multiple of any vector
   std::vector<float> x(kCount), y(kCount), z(kCount), inverse_range(kCount), expected(kCount);
@@ -210,6 +214,93 @@ TEST(SweepKernelsTest, LargestMotionIsTheProjectionsDerivative) {
     sweepKernels().largestMotion(row, motion.data());
     for (size_t i = 0; i < kCount; ++i) {
       EXPECT_NEAR(motion[i], expected[i], 1e-3f * expected[i]) << i;
+    }
+  });
+}
+
+TEST(SweepKernelsTest, StepsFollowTheProjection) {
+  const RigidTransform pose(rotationFromVector({0.01, -0.02, 0.01}), {0.4, 0.05, 0.3});
+  const Projection projection = projectionOf(pose);
+  constexpr int kReach = kMaxStepReach;
+  onEveryTarget([&] {
+    const SweepKernels kernels = sweepKernels();
+    const size_t count = 64;
+    AlignedArray<float> x, y, z, base, weight;
+    for (AlignedArray<float>* array : {&x, &y, &z, &base, &weight}) {
+      array->resize(count);
+    }
+    for (size_t i = 0; i < count; ++i) {
+      Eigen::Vector3d ray;
+      ASSERT_TRUE(
+          kCamera.unproject({4.9 * static_cast<double>(i), 40.0 + 2.0 * static_cast<double>(i)}, &ray));
+      x[i] = static_cast<float>(ray.x());
+      y[i] = static_cast<float>(ray.y());
+      z[i] = static_cast<float>(ray.z());
+      base[i] = 0.05f + 0.01f * static_cast<float>(i);
+      weight[i] = i % 7 == 0 ? std::numeric_limits<float>::quiet_NaN() : 0.005f;
+    }
+    const RayRow rays{x.data(), y.data(), z.data(), base.data(), weight.data(), 0.0f};
+    AlignedArray<int32_t> table[4], u, v, exact_u, exact_v;
+    for (AlignedArray<int32_t>* array :
+         {table, table + 1, table + 2, table + 3, &u, &v, &exact_u, &exact_v}) {
+      array->resize(count);
+    }
+    const StepTable steps{table[0].data(), table[1].data(), table[2].data(), table[3].data()};
+    kernels.makeSteps(projection, rays, 1.0f, kReach, count, steps);
+    int seen = 0;
+    for (int step = -kReach; step <= kReach; ++step) {
+      RayRow at_step = rays;
+      at_step.offset = static_cast<float>(step);
+      kernels.walkSteps(steps, step, count, u.data(), v.data());
+      kernels.projectFixed(projection, at_step, count, exact_u.data(), exact_v.data());
+      for (size_t i = 0; i < count; ++i) {
+        if (u[i] == 0 && v[i] == 0) {
+          continue;  // invisible, at this step or at another one
+        }
+        ++seen;
+        EXPECT_NEAR(u[i], exact_u[i], 0.03 * (1 << kPositionBits)) << "point " << i << ", step " << step;
+        EXPECT_NEAR(v[i], exact_v[i], 0.03 * (1 << kPositionBits)) << "point " << i << ", step " << step;
+      }
+      EXPECT_EQ(u[7], 0) << "a point without an inverse range";
+    }
+    EXPECT_GT(seen, 30 * (2 * kReach + 1));
+    // Farther than a table can tell.
+    kernels.makeSteps(projection, rays, 20.0f, 1, count, steps);
+    kernels.walkSteps(steps, 1, count, u.data(), v.data());
+    for (size_t i = 0; i < count; ++i) {
+      EXPECT_EQ(u[i] == 0, v[i] == 0);
+    }
+  });
+}
+
+TEST(PackedImageTest, CellsHoldTheFourPixelsAroundThem) {
+  cv::Mat pixels(5, 37, CV_8UC1), valid(pixels.size(), CV_8UC1, cv::Scalar(1));
+  for (int y = 0; y < pixels.rows; ++y) {
+    for (int x = 0; x < pixels.cols; ++x) {
+      pixels.at<uint8_t>(y, x) = static_cast<uint8_t>(53 * y + 7 * x);  // some are 0 and 255
+    }
+  }
+  pixels.at<uint8_t>(2, 3) = 0;
+  pixels.at<uint8_t>(2, 4) = 255;
+  valid.at<uint8_t>(3, 20) = 0;
+  onEveryTarget([&] {
+    const PackedImage packed(pixels, valid);
+    for (int y = -1; y < pixels.rows; ++y) {
+      for (int x = -1; x < pixels.cols; ++x) {
+        const int32_t cell =
+            packed.cells()[(y + PackedImage::kMargin) * packed.pitch() + x + PackedImage::kMargin];
+        const bool is_inside = x >= 0 && y >= 0 && x + 1 < pixels.cols && y + 1 < pixels.rows;
+        if (!is_inside || ((x == 19 || x == 20) && (y == 2 || y == 3))) {
+          EXPECT_EQ(cell, kUnseenCell) << x << ", " << y;
+          continue;
+        }
+        const int gray[] = {pixels.at<uint8_t>(y, x), pixels.at<uint8_t>(y + 1, x),
+                            pixels.at<uint8_t>(y, x + 1), pixels.at<uint8_t>(y + 1, x + 1)};
+        for (int i = 0; i < 4; ++i) {
+          const auto byte = static_cast<int8_t>(static_cast<uint32_t>(cell) >> 8 * i & 0xffu);
+          EXPECT_EQ(byte, std::max(gray[i] - 128, -127)) << x << ", " << y;
+        }
+      }
     }
   });
 }

@@ -37,11 +37,20 @@ struct Vector3 {
   }
 };
 
-/// Sensitivity of a point's image in a neighbour, from the derivative of the unified projection.
+// Smaller squares count as zero.
+constexpr float kTiny = 1e-30f;
+
+/// Square root of a sum of squares; 0 for NaN.
+HWY_INLINE VF length(VF squares) {
+  return hn::IfThenElseZero(hn::Gt(squares, set(kTiny)), root(squares));
+}
+
+/// Sensitivity of a point's image in a neighbour, from the derivative of the unified projection. Of points
+/// that are not visible, the first two are 0 and the others 1.
 struct Sensitivity {
-  VF pixels_per_inverse_range;  // 0 if the point is not visible
-  VF pixels_per_radian;         // in the same direction, for a rotation about the worst axis
-  VF range_ratio;               // ratio of the ranges from the neighbour and from the reference
+  VF pixels_per_inverse_range;
+  VF squared_pixels_per_radian;     // in the same direction, for a rotation about the worst axis
+  VF range_ratio, per_range_ratio;  // ratio of the ranges from the neighbour and from the reference
 };
 
 HWY_INLINE Sensitivity sensitivityOf(const Projection& camera, const Vector3& ray, VF inverse_range) {
@@ -52,26 +61,29 @@ HWY_INLINE Sensitivity sensitivityOf(const Projection& camera, const Vector3& ra
     return ray.dot({set(row[0]), set(row[1]), set(row[2])});
   };
   const Vector3 point = Vector3{rotated(r), rotated(r + 3), rotated(r + 6)}.plus(inverse_range, t);
-  const VF norm = hn::Sqrt(point.dot(point));
-  const VF per_norm = hn::Div(one, norm);
+  const VF squares = point.dot(point);
+  const VF per_norm = reciprocalOfRoot(squares);
   const Vector3 direction = point.times(per_norm);
   const VF denominator = hn::Add(direction.z, set(camera.xi));
   const float min_cosine = camera.xi > 1.0f ? -1.0f / camera.xi : -camera.xi;
-  const MF seen = hn::And(hn::And(hn::Gt(norm, set(1e-6f)), hn::Gt(denominator, set(1e-6f))),
+  const MF seen = hn::And(hn::And(hn::Gt(squares, set(1e-12f)), hn::Gt(denominator, set(1e-6f))),
                           hn::Gt(direction.z, set(min_cosine)));
-  const VF per_denominator = hn::Div(one, denominator);
+  const VF per_denominator = reciprocal(denominator);
   const VF plane_x = hn::Mul(direction.x, per_denominator), plane_y = hn::Mul(direction.y, per_denominator);
   // Derivative of the direction, then of the pixel.
   const Vector3 turn = t.plus(hn::Neg(direction.dot(t)), direction).times(per_norm);
   const VF motion_x = hn::Mul(hn::Mul(fx, per_denominator), hn::NegMulAdd(plane_x, turn.z, turn.x));
   const VF motion_y = hn::Mul(hn::Mul(fy, per_denominator), hn::NegMulAdd(plane_y, turn.z, turn.y));
-  const VF motion = hn::Sqrt(hn::MulAdd(motion_x, motion_x, hn::Mul(motion_y, motion_y)));
-  const VF scale = hn::Div(per_denominator, hn::Max(motion, set(1e-9f)));
+  const VF motion_squares = hn::MulAdd(motion_x, motion_x, hn::Mul(motion_y, motion_y));
+  const VF per_motion = reciprocalOfRoot(hn::Max(motion_squares, set(kTiny)));
+  const MF moves = hn::And(seen, hn::Gt(motion_squares, set(kTiny)));
+  const VF scale = hn::Mul(per_denominator, per_motion);
   const VF along_x = hn::Mul(fx, hn::Mul(motion_x, scale)), along_y = hn::Mul(fy, hn::Mul(motion_y, scale));
   const Vector3 row{along_x, along_y, hn::Neg(hn::MulAdd(along_x, plane_x, hn::Mul(along_y, plane_y)))};
   const Vector3 across = row.plus(hn::Neg(direction.dot(row)), direction);
-  return {hn::IfThenElseZero(seen, motion), hn::IfThenElseZero(seen, hn::Sqrt(across.dot(across))),
-          hn::IfThenElse(seen, norm, one)};
+  return {hn::IfThenElseZero(moves, hn::Mul(motion_squares, per_motion)),
+          hn::IfThenElseZero(seen, across.dot(across)), hn::IfThenElse(seen, hn::Mul(squares, per_norm), one),
+          hn::IfThenElse(seen, per_norm, one)};
 }
 
 HWY_INLINE Vector3 loadRay(const UncertaintyRow& row, size_t at) {
@@ -117,14 +129,14 @@ void inverseRangeSigmaTarget(const UncertaintyRow& row, float* sigma) {
       const MF votes = hn::RebindMask(df, hn::Eq(hn::And(voters, bit), bit));
       const Sensitivity s = sensitivityOf(neighbour.projection, ray, inverse_range);
       const VF motion = hn::IfThenElseZero(votes, s.pixels_per_inverse_range);
-      const VF shift = hn::Div(inverse_range, s.range_ratio);
-      const VF pose = hn::Sqrt(hn::MulAdd(set(neighbour.translation_variance_m2), square(shift),
-                                          set(neighbour.rotation_variance_rad2)));
+      const VF shift = hn::Mul(inverse_range, s.per_range_ratio);
+      const VF pose_variance = hn::MulAdd(set(neighbour.translation_variance_m2), square(shift),
+                                          set(neighbour.rotation_variance_rad2));
       // Windows at different scales differ by more than a shift.
-      const VF scale = hn::Max(s.range_ratio, hn::Div(one, s.range_ratio));
+      const VF scale = hn::Max(s.range_ratio, s.per_range_ratio);
       const VF matching = hn::Mul(hn::Mul(motion, set(row.matching_noise_px)), square(scale));
       VF& errors = neighbour.after ? errors_after : errors_before;
-      errors = hn::MulAdd(motion, hn::Mul(s.pixels_per_radian, pose), errors);
+      errors = hn::MulAdd(motion, length(hn::Mul(s.squared_pixels_per_radian, pose_variance)), errors);
       motion_squares = hn::MulAdd(motion, motion, motion_squares);
       matching_errors = hn::MulAdd(matching, matching, matching_errors);
       count = hn::Add(count, hn::IfThenElseZero(votes, one));

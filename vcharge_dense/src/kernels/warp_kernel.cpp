@@ -20,29 +20,6 @@ namespace {
 
 constexpr float kOne = static_cast<float>(1 << kPositionBits);
 
-// Roots and reciprocals with at least 22 correct bits (0.0002 pixels). Where the processor's estimates have
-// 11 bits or more, one step of Newton's method doubles them, which is faster than division.
-#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX2
-HWY_INLINE VF root(VF value) {
-  const DF df;
-  const VF estimate = hn::ApproximateReciprocalSqrt(value);
-  const VF root = hn::Mul(value, estimate);
-  const VF error = hn::NegMulAdd(root, estimate, hn::Set(df, 1.0f));
-  return hn::MulAdd(hn::Mul(root, hn::Set(df, 0.5f)), error, root);
-}
-HWY_INLINE VF reciprocal(VF value) {
-  const VF estimate = hn::ApproximateReciprocal(value);
-  return hn::Mul(estimate, hn::NegMulAdd(value, estimate, hn::Set(DF(), 2.0f)));
-}
-#else
-HWY_INLINE VF root(VF value) {
-  return hn::Sqrt(value);
-}
-HWY_INLINE VF reciprocal(VF value) {
-  return hn::Div(hn::Set(DF(), 1.0f), value);
-}
-#endif
-
 struct Positions {
   VF u, v;
   decltype(hn::Lt(VF(), VF())) seen;
@@ -91,6 +68,105 @@ void projectFixedTarget(const Projection& projection, const RayRow& rays, size_t
     const Positions at = projectVector(projection, rays, i);
     hn::Store(hn::NearestInt(hn::IfThenElseZero(at.seen, hn::Mul(one, at.u))), di, u + i);
     hn::Store(hn::NearestInt(hn::IfThenElseZero(at.seen, hn::Mul(one, at.v))), di, v + i);
+  }
+}
+
+/// Cell of the four pixels at column x, see PackedImage.
+int32_t cellAt(const PixelRows& rows, size_t x) {
+  const auto signedByte = [](uint8_t gray) {
+    return static_cast<uint32_t>(gray > 1 ? gray : uint8_t{1}) ^ 0x80u;
+  };
+  const bool seen = rows.top_valid[x] != 0 && rows.bottom_valid[x] != 0 && rows.top_valid[x + 1] != 0 &&
+                    rows.bottom_valid[x + 1] != 0;
+  const uint32_t cell = signedByte(rows.top[x]) | signedByte(rows.bottom[x]) << 8 |
+                        signedByte(rows.top[x + 1]) << 16 | signedByte(rows.bottom[x + 1]) << 24;
+  return seen ? static_cast<int32_t>(cell) : kUnseenCell;
+}
+
+void packCellsTarget(const PixelRows& rows, size_t count, int32_t* cells) {
+  size_t x = 0;
+#if HWY_TARGET != HWY_SCALAR
+  const hn::CappedTag<uint8_t, 16> d8;
+  const hn::Repartition<uint16_t, decltype(d8)> d16;
+  const hn::Repartition<int32_t, decltype(d8)> d32;
+  const auto top_bit = hn::Set(d8, 0x80);
+  for (; x + hn::Lanes(d8) <= count; x += hn::Lanes(d8)) {
+    const auto valid =
+        hn::Min(hn::Min(hn::LoadU(d8, rows.top_valid + x), hn::LoadU(d8, rows.bottom_valid + x)),
+                hn::Min(hn::LoadU(d8, rows.top_valid + x + 1), hn::LoadU(d8, rows.bottom_valid + x + 1)));
+    const auto unseen = hn::Eq(valid, hn::Zero(d8));
+    const auto bytes = [&](const uint8_t* pixels) HWY_ATTR {
+      const auto pixel = hn::Max(hn::LoadU(d8, pixels), hn::Set(d8, 1));
+      return hn::IfThenElse(unseen, top_bit, hn::Xor(pixel, top_bit));
+    };
+    const auto store = [&](auto left, auto right, int32_t* to) HWY_ATTR {
+      hn::StoreU(hn::BitCast(d32, hn::InterleaveLower(d16, left, right)), d32, to);
+      hn::StoreU(hn::BitCast(d32, hn::InterleaveUpper(d16, left, right)), d32, to + hn::Lanes(d32));
+    };
+    const auto left_top = bytes(rows.top + x), left_bottom = bytes(rows.bottom + x);
+    const auto right_top = bytes(rows.top + x + 1), right_bottom = bytes(rows.bottom + x + 1);
+    store(hn::BitCast(d16, hn::InterleaveLower(d8, left_top, left_bottom)),
+          hn::BitCast(d16, hn::InterleaveLower(d8, right_top, right_bottom)), cells + x);
+    store(hn::BitCast(d16, hn::InterleaveUpper(d8, left_top, left_bottom)),
+          hn::BitCast(d16, hn::InterleaveUpper(d8, right_top, right_bottom)), cells + x + 2 * hn::Lanes(d32));
+  }
+#endif
+  for (; x < count; ++x) {
+    cells[x] = cellAt(rows, x);
+  }
+}
+
+/// Quadratic of one coordinate through its positions at -reach, 0 and reach steps.
+struct Steps {
+  VI steps;                           // see StepTable
+  decltype(hn::Lt(VF(), VF())) fits;  // both coefficients fit into 16 bits
+
+  HWY_INLINE Steps(VF before, VF middle, VF after, float reach) {
+    const DF df;
+    constexpr auto kOneStep = static_cast<float>(1 << kStepBits);
+    const VF slope = hn::Mul(hn::Sub(after, before), hn::Set(df, 0.5f * kOneStep / reach));
+    const VF bend = hn::Mul(hn::Sub(hn::Add(before, after), hn::Add(middle, middle)),
+                            hn::Set(df, 0.5f * kOneStep / (reach * reach)));
+    const VF limit = hn::Set(df, 32767.0f);
+    fits = hn::And(hn::Lt(hn::Abs(slope), limit), hn::Lt(hn::Abs(bend), limit));
+    steps = hn::OrAnd(hn::ShiftLeft<16>(nearest(bend)), nearest(slope), hn::Set(DI(), 0xffff));
+  }
+};
+
+void makeStepsTarget(const Projection& projection, const RayRow& rays, float step, int reach, size_t count,
+                     const StepTable& table) {
+  const DF df;
+  const DI di;
+  const VF one = hn::Set(df, kOne);
+  const auto far = static_cast<float>(reach);
+  RayRow rays_before = rays, rays_after = rays;
+  rays_before.offset -= far * step;
+  rays_after.offset += far * step;
+  for (size_t i = 0; i < count; i += hn::Lanes(df)) {
+    const Positions before = projectVector(projection, rays_before, i);
+    const Positions middle = projectVector(projection, rays, i);
+    const Positions after = projectVector(projection, rays_after, i);
+    const Steps along_u(before.u, middle.u, after.u, far), along_v(before.v, middle.v, after.v, far);
+    const auto seen =
+        hn::And(hn::And(before.seen, middle.seen), hn::And(after.seen, hn::And(along_u.fits, along_v.fits)));
+    const auto seen_int = hn::RebindMask(di, seen);
+    hn::Store(nearest(hn::IfThenElseZero(seen, hn::Mul(one, middle.u))), di, table.u + i);
+    hn::Store(nearest(hn::IfThenElseZero(seen, hn::Mul(one, middle.v))), di, table.v + i);
+    hn::Store(hn::IfThenElseZero(seen_int, along_u.steps), di, table.u_steps + i);
+    hn::Store(hn::IfThenElseZero(seen_int, along_v.steps), di, table.v_steps + i);
+  }
+}
+
+void walkStepsTarget(const StepTable& table, int steps, size_t count, int32_t* u, int32_t* v) {
+  const DI di;
+  const VI powers = hn::Set(di, steps * steps << 16 | (steps & 0xffff));
+  for (size_t i = 0; i < count; i += hn::Lanes(di)) {
+    const VI motion_u = multiplyHalves(hn::Load(di, table.u_steps + i), powers);
+    const VI motion_v = multiplyHalves(hn::Load(di, table.v_steps + i), powers);
+    hn::Store(hn::Add(hn::Load(di, table.u + i), hn::ShiftLeft<kPositionBits - kStepBits>(motion_u)), di,
+              u + i);
+    hn::Store(hn::Add(hn::Load(di, table.v + i), hn::ShiftLeft<kPositionBits - kStepBits>(motion_v)), di,
+              v + i);
   }
 }
 
@@ -187,8 +263,11 @@ NodeDifferences nodeDifferencesTarget(const float* u, const float* v, int node_r
 
 void fillWarpKernels(SweepKernels* kernels) {
   kernels->lanes = static_cast<int>(hn::Lanes(DF()));
+  kernels->packCells = &packCellsTarget;
   kernels->project = &projectTarget;
   kernels->projectFixed = &projectFixedTarget;
+  kernels->makeSteps = &makeStepsTarget;
+  kernels->walkSteps = &walkStepsTarget;
   kernels->makeCells = &makeCellsTarget;
   kernels->nodeDifferences = &nodeDifferencesTarget;
 }

@@ -8,6 +8,7 @@
 
 #include "kernels/parallel_rows.h"
 #include "kernels/pooled_mat.h"
+#include "kernels/wide_loops.h"
 
 namespace vcharge {
 namespace {
@@ -40,7 +41,7 @@ float square(float value) {
 }
 
 /// Turns a row of products of the confidence's factors into probabilities that the ranges are right.
-void calibrate(std::vector<float>* confidence) {
+VCHARGE_WIDE_LOOPS void calibrate(std::vector<float>* confidence) {
   std::vector<float> calibrated(confidence->size(), kRightFraction[0]);
   for (size_t i = 1; i < std::size(kFactors); ++i) {
     const float length = kFactors[i] - kFactors[i - 1];
@@ -82,8 +83,8 @@ std::vector<float> neighbourhoodSupport(const SweepKernels& kernels, const cv::M
 
 /// Confidence of the pixels of row y from their score, its lead over the second peak, the standard deviation
 /// and the support of the neighbourhood.
-std::vector<float> rowConfidence(const SweepInput& input, const SurfaceEstimate& estimate,
-                                 const cv::Mat& padded, const cv::Mat& sigma, int y) {
+VCHARGE_WIDE_LOOPS std::vector<float> rowConfidence(const SweepInput& input, const SurfaceEstimate& estimate,
+                                                    const cv::Mat& padded, const cv::Mat& sigma, int y) {
   std::vector<float> confidence = neighbourhoodSupport(input.kernels, padded, sigma, y);
   const auto* inverse_range = estimate.inverse_range.ptr<float>(y);
   const auto* score = estimate.score.ptr<float>(y);
@@ -103,7 +104,7 @@ std::vector<float> rowConfidence(const SweepInput& input, const SurfaceEstimate&
 
 /// Mean second difference of the inverse ranges around the pixels of row y, divided by its value for
 /// independent inverse ranges with a standard deviation of 1; 0 where neighbours are unknown.
-std::vector<float> neighbourhoodRoughness(const cv::Mat& inverse_range, int y) {
+VCHARGE_WIDE_LOOPS std::vector<float> neighbourhoodRoughness(const cv::Mat& inverse_range, int y) {
   constexpr int kSteps[][2] = {{2, 0}, {0, 2}, {2, 2}, {2, -2}, {4, 0}, {0, 4}, {4, 4}, {4, -4}};
   constexpr float kPerDeviation = 2.45f;  // square root of 1 + 1 + 4
   const int columns = inverse_range.cols;
@@ -128,6 +129,25 @@ std::vector<float> neighbourhoodRoughness(const cv::Mat& inverse_range, int y) {
     sum[x] /= std::max(count[x], 1.0f);
   }
   return sum;
+}
+
+/// Writes row y of a range map from the ranges that are kept, whose neighbourhood's roughness adds to sigma.
+VCHARGE_WIDE_LOOPS void writeRow(const cv::Mat& accepted, const cv::Mat& sigma, int y, bool keeps_all,
+                                 RangeMap* map) {
+  const std::vector<float> roughness = neighbourhoodRoughness(accepted, y);
+  const auto* inverse_range = accepted.ptr<float>(y);
+  const auto* deviation = sigma.ptr<float>(y);
+  auto* range = map->range_m.ptr<float>(y);
+  auto* range_deviation = map->standard_deviation_m.ptr<float>(y);
+  auto* confidence = map->confidence.ptr<float>(y);
+  for (int x = 0; x < accepted.cols; ++x) {
+    const float rough = kRoughnessFactor * roughness[static_cast<size_t>(x)];
+    const float relative_sigma = std::sqrt(square(deviation[x]) + square(rough)) / inverse_range[x];
+    const bool known = (inverse_range[x] > 0.0f) & (keeps_all | !(relative_sigma > kMaxRelativeSigma));
+    range[x] = known ? 1.0f / inverse_range[x] : kNaN;
+    range_deviation[x] = known ? relative_sigma / inverse_range[x] : kNaN;
+    confidence[x] = known ? confidence[x] : 0.0f;
+  }
 }
 
 }  // namespace
@@ -183,7 +203,7 @@ void estimateRange(const SweepInput& input, const SurfaceEstimate& estimate, Ran
     input.kernels.inverseRangeSigma(row, sigma.ptr<float>(y));
     copyPadded(row.inverse_range, size.width, kSupportRadius_px, padded.ptr<float>(y));
   });
-  // Selects the ranges to be kept; the roughness of their neighbourhood then adds to the standard deviation.
+  // Selects the ranges to be kept.
   forEachRow(size.height, [&](int y) {
     const std::vector<float> confidence = rowConfidence(input, estimate, padded, sigma, y);
     const auto* inverse_range = estimate.inverse_range.ptr<float>(y);
@@ -199,22 +219,7 @@ void estimateRange(const SweepInput& input, const SurfaceEstimate& estimate, Ran
     }
     std::copy(confidence.begin(), confidence.end(), map->confidence.ptr<float>(y));
   });
-  forEachRow(size.height, [&](int y) {
-    const std::vector<float> roughness = neighbourhoodRoughness(accepted, y);
-    const auto* inverse_range = accepted.ptr<float>(y);
-    const auto* deviation = sigma.ptr<float>(y);
-    auto* range = map->range_m.ptr<float>(y);
-    auto* range_deviation = map->standard_deviation_m.ptr<float>(y);
-    auto* confidence = map->confidence.ptr<float>(y);
-    for (int x = 0; x < size.width; ++x) {
-      const float rough = kRoughnessFactor * roughness[static_cast<size_t>(x)];
-      const float relative_sigma = std::sqrt(square(deviation[x]) + square(rough)) / inverse_range[x];
-      const bool known = (inverse_range[x] > 0.0f) & (keeps_all | !(relative_sigma > kMaxRelativeSigma));
-      range[x] = known ? 1.0f / inverse_range[x] : kNaN;
-      range_deviation[x] = known ? relative_sigma / inverse_range[x] : kNaN;
-      confidence[x] = known ? confidence[x] : 0.0f;
-    }
-  });
+  forEachRow(size.height, [&](int y) { writeRow(accepted, sigma, y, keeps_all, map); });
 }
 
 }  // namespace vcharge

@@ -14,8 +14,6 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-constexpr float kPerScore = 1.0f / kScoreScale;
-
 // Step of the refinement in the neighbour that moves most: samples the peak of the score finely for every
 // baseline.
 constexpr float kRefinementStep_px = 0.5f;
@@ -27,33 +25,36 @@ class RowReader {
       : hypotheses_(hypotheses), scores_(scores), first_plane_(first_plane) {
     for (size_t slot = 0; slot < scores.slots.size(); ++slot) {
       const int hypothesis = scores.slots[slot];
-      offsets_.push_back(hypothesis == kGap ? kNaN : hypotheses.offsets[static_cast<size_t>(hypothesis)]);
+      const bool is_gap = hypothesis == kGap;
+      offsets_.push_back(is_gap ? kNaN : hypotheses.offsets[static_cast<size_t>(hypothesis)]);
+      steps_.push_back(is_gap ? kNaN : hypotheses.stepAt(static_cast<size_t>(hypothesis)));
       inside_.push_back(scores.isInside(static_cast<int>(slot)) ? 1 : 0);
     }
   }
 
   void setRow(int row) {
     row_ = static_cast<size_t>(row);
-    first_ = row_ * scores_.layout.rowSize();
+    const size_t first = row_ * scores_.layout.rowSize();
+    best_ = scores_.best.data() + first;
+    score_ = scores_.best_score.data() + first;
+    before_ = scores_.before.data() + first;
+    after_ = scores_.after.data() + first;
+    second_ = scores_.second.data() + first;
+    second_score_ = scores_.second_score.data() + first;
     weight_ = hypotheses_.weight.ptr<float>(scores_.tile.y + row) + scores_.tile.x;
   }
   // `pixel`: index in the layout's row.
-  int best(size_t pixel) const { return scores_.best[first_ + pixel]; }
-  int score(size_t pixel) const { return scores_.best_score[first_ + pixel]; }
-  Parabola parabola(size_t pixel) const {
-    return fitParabola(scores_.before[first_ + pixel], score(pixel), scores_.after[first_ + pixel]);
-  }
-  int second(size_t pixel) const { return scores_.second[first_ + pixel]; }
+  int best(size_t pixel) const { return best_[pixel]; }
+  int score(size_t pixel) const { return score_[pixel]; }
+  Parabola parabola(size_t pixel) const { return fitParabola(before_[pixel], score_[pixel], after_[pixel]); }
   float secondScore(size_t pixel) const {
-    return second(pixel) >= 0 ? kPerScore * static_cast<float>(scores_.second_score[first_ + pixel]) : -1.0f;
+    return second_[pixel] >= 0 ? kPerScore * static_cast<float>(second_score_[pixel]) : -1.0f;
   }
   uint32_t voters(int slot, size_t pixel) const { return scores_.voters(slot, row_, pixel); }
 
   float weight(int column) const { return weight_[column]; }
   float offset(int slot) const { return offsets_[static_cast<size_t>(slot)]; }
-  float step(int slot) const {
-    return hypotheses_.stepAt(static_cast<size_t>(scores_.slots[static_cast<size_t>(slot)]));
-  }
+  float step(int slot) const { return steps_[static_cast<size_t>(slot)]; }
   bool isInside(int slot) const { return inside_[static_cast<size_t>(slot)] != 0; }
   int plane(int slot) const { return first_plane_ + scores_.slots[static_cast<size_t>(slot)]; }
 
@@ -66,16 +67,18 @@ class RowReader {
     if (is_apart(best(pixel))) {
       return kPerScore * static_cast<float>(score(pixel));
     }
-    return is_apart(second(pixel)) ? secondScore(pixel) : -1.0f;
+    return is_apart(second_[pixel]) ? secondScore(pixel) : -1.0f;
   }
 
  private:
   const Hypotheses& hypotheses_;
   const TileScores& scores_;
   const int first_plane_;
-  std::vector<float> offsets_;  // indexed by slot
+  std::vector<float> offsets_, steps_;  // indexed by slot
   std::vector<uint8_t> inside_;
-  size_t row_ = 0, first_ = 0;
+  size_t row_ = 0;
+  const int16_t *best_ = nullptr, *score_ = nullptr, *before_ = nullptr, *after_ = nullptr;
+  const int16_t *second_ = nullptr, *second_score_ = nullptr;
   const float* weight_ = nullptr;
 };
 
@@ -106,17 +109,6 @@ struct EstimateRow {
 };
 
 }  // namespace
-
-Parabola fitParabola(int before, int middle, int after) {
-  Parabola parabola;
-  const int curvature = 2 * middle - before - after;
-  if (curvature > 0) {
-    const auto scaled = static_cast<float>(curvature);
-    parabola.curvature = kPerScore * scaled;
-    parabola.offset = std::clamp(0.5f * static_cast<float>(after - before) / scaled, -0.5f, 0.5f);
-  }
-  return parabola;
-}
 
 SurfaceEstimate::SurfaceEstimate(cv::Size size)
     : inverse_range(pooledMat(size, CV_32FC1)),
@@ -223,16 +215,20 @@ Hypotheses makeRefinement(const SweepInput& input, const cv::Mat& window_counts,
   }
   const cv::Mat step = fillUnknown(estimate.step);
   const std::vector<NeighbourUncertainty> neighbours = neighbourUncertainties(input);
-  forEachRow(step.rows, [&](int y) {
+  // The motion of each second row is also that of the next one.
+  forEachRow((step.rows + 1) / 2, [&](int pair) {
     std::vector<float> motion(static_cast<size_t>(step.cols));
-    input.kernels.largestMotion(uncertaintyRow(input, neighbours, refinement.base, y), motion.data());
-    const auto* coarse_row = step.ptr<float>(y);
-    auto* weight_row = refinement.weight.ptr<float>(y);
-    for (int x = 0; x < step.cols; ++x) {
-      const float fine = kRefinementStep_px / std::max(motion[static_cast<size_t>(x)], 1e-6f);
-      // The step is fine for the neighbour that moves most, but the range reaches half way to the next plane.
-      const float coarse = coarse_row[x] / static_cast<float>(half);
-      weight_row[x] = std::clamp(fine, 0.75f * coarse, 2.0f * coarse);
+    input.kernels.largestMotion(uncertaintyRow(input, neighbours, refinement.base, 2 * pair), motion.data());
+    for (int y = 2 * pair; y < std::min(2 * pair + 2, step.rows); ++y) {
+      const auto* coarse_row = step.ptr<float>(y);
+      auto* weight_row = refinement.weight.ptr<float>(y);
+      for (int x = 0; x < step.cols; ++x) {
+        const float fine = kRefinementStep_px / std::max(motion[static_cast<size_t>(x)], 1e-6f);
+        // The step is fine for the neighbour that moves most, but the range reaches half way to the next
+        // plane.
+        const float coarse = coarse_row[x] / static_cast<float>(half);
+        weight_row[x] = std::clamp(fine, 0.75f * coarse, 2.0f * coarse);
+      }
     }
   });
   return refinement;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <limits>
 #include <vector>
 
@@ -24,13 +25,24 @@ struct SurfaceEstimate {
   cv::Mat at_limit;      ///< CV_8UC1: not 0 if a plane beside the best one was not scored
 };
 
+constexpr float kPerScore = 1.0f / kScoreScale;
+
 struct Parabola {
   float offset = 0.0f;  ///< offset of the maximum from the middle, in hypotheses
   float curvature = std::numeric_limits<float>::quiet_NaN();  ///< negative second difference of correlations
 };
 
 /// Parabola through three scores (as in TileScores), the middle one being the highest (Tian and Huhns 1986).
-Parabola fitParabola(int before, int middle, int after);
+inline Parabola fitParabola(int before, int middle, int after) {
+  Parabola parabola;
+  const int curvature = 2 * middle - before - after;
+  if (curvature > 0) {
+    const auto scaled = static_cast<float>(curvature);
+    parabola.curvature = kPerScore * scaled;
+    parabola.offset = std::clamp(0.5f * static_cast<float>(after - before) / scaled, -0.5f, 0.5f);
+  }
+  return parabola;
+}
 
 /// The planes of a family as hypotheses: base 0, weight -normal . ray, NaN if the ray does not meet them.
 Hypotheses makePlaneHypotheses(const PlaneFamily& family, const RayTable& rays, const cv::Mat& valid_mask);

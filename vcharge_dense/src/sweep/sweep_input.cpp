@@ -9,6 +9,7 @@
 
 #include "kernels/parallel_rows.h"
 #include "kernels/pooled_mat.h"
+#include "kernels/wide_loops.h"
 
 namespace vcharge {
 namespace {
@@ -18,7 +19,8 @@ namespace {
 constexpr float kInset_px = 4.0f;
 
 /// Computes the reference's mean and inverse deviation in the rows `begin` to `end`.
-void findMoments(int begin, int end, int window, double min_squares, SweepReference* reference) {
+VCHARGE_WIDE_LOOPS void findMoments(int begin, int end, int window, double min_squares,
+                                    SweepReference* reference) {
   const cv::Mat& samples = reference->samples;
   const int radius = window / 2;
   const double count = window * window;

@@ -58,6 +58,13 @@ struct Hypotheses {
   std::vector<float> offsets;
   bool are_uniform = true;  ///< offsets are equally spaced
 
+  /// Number of equal steps from the middle hypothesis to both ends if a StepTable holds all of them;
+  /// otherwise 0.
+  int stepReach() const {
+    const size_t reach = offsets.size() / 2;
+    const bool fits = !are_planes && are_uniform && offsets.size() % 2 != 0 && reach <= kMaxStepReach;
+    return fits ? static_cast<int>(reach) : 0;
+  }
   /// Mean distance of an offset from its neighbours.
   float stepAt(size_t hypothesis) const {
     const size_t last = offsets.size() - 1;

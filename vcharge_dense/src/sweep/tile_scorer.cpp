@@ -22,14 +22,19 @@ void copyIntoLayout(const cv::Mat& image, cv::Point origin, const TileLayout& la
   std::vector<From> line(static_cast<size_t>(layout.columns()));
   const int begin = std::clamp(-origin.x, 0, layout.columns());
   const int end = std::clamp(image.cols - origin.x, begin, layout.columns());
+  const bool is_inside = begin == 0 && end == layout.columns();
   for (int row = 0; row < layout.rows; ++row) {
     const int y = origin.y + row;
-    std::fill(line.begin(), line.end(), outside);
-    if (y >= 0 && y < image.rows) {
-      std::copy_n(image.ptr<From>(y) + origin.x + begin, end - begin, line.begin() + begin);
+    const bool has_row = y >= 0 && y < image.rows;
+    const From* first = is_inside && has_row ? image.ptr<From>(y) + origin.x : line.data();
+    if (first == line.data()) {
+      std::fill(line.begin(), line.end(), outside);
+      if (has_row) {
+        std::copy_n(image.ptr<From>(y) + origin.x + begin, end - begin, line.begin() + begin);
+      }
     }
     for (int s = 0; s < layout.strip; ++s) {
-      const From* from = line.data() + s;
+      const From* from = first + s;
       for (int lane = 0; lane < layout.lanes; ++lane) {
         *to++ = static_cast<To>(from[lane * layout.strip]);
       }
@@ -38,20 +43,6 @@ void copyIntoLayout(const cv::Mat& image, cv::Point origin, const TileLayout& la
 }
 
 }  // namespace
-
-uint32_t TileScores::voters(int slot, size_t row, size_t pixel_in_row) const {
-  const auto lanes = static_cast<size_t>(layout.lanes);
-  const size_t bit = lanes < 8 ? pixel_in_row % lanes : pixel_in_row % 8;
-  const size_t byte = lanes < 8 ? pixel_in_row / lanes : pixel_in_row / 8;
-  const size_t row_bytes = rowVoterBytes(layout.lanes, layout.strip);
-  const uint8_t* bytes =
-      voter_bits.data() + (row * slots.size() + static_cast<size_t>(slot)) * num_neighbours * row_bytes;
-  uint32_t voters = 0;
-  for (size_t n = 0; n < num_neighbours; ++n) {
-    voters |= (static_cast<uint32_t>(bytes[n * row_bytes + byte]) >> bit & 1u) << n;
-  }
-  return voters;
-}
 
 bool TileScores::isInside(int slot) const {
   const auto s = static_cast<size_t>(slot);
@@ -65,7 +56,7 @@ std::vector<cv::Rect> makeTiles(cv::Size image, TileSize size) {
   if (all.width <= 0 || all.height <= 0) {
     return tiles;
   }
-  const int max_columns = size == TileSize::kLarge ? kMaxTileColumns : kMaxSmallTileColumns;
+  const int max_columns = size == TileSize::kSmall ? kMaxSmallTileColumns : kMaxTileColumns;
   const int rows = size == TileSize::kLarge ? kTileRows : kSmallTileRows;
   const int columns = (all.width + max_columns - 1) / max_columns;
   const int width = (all.width + columns - 1) / columns;
@@ -162,24 +153,9 @@ void TileScorer::loadSurface(const Hypotheses& hypotheses) {
   weight_.resize(0);
 }
 
-/// Selects the coarsest grid that is accurate enough, or prepares the projection of every pixel.
-void TileScorer::prepareWarp(const Hypotheses& hypotheses, float offset, Neighbour* neighbour) {
+/// Prepares the projection of every pixel.
+void TileScorer::loadRays(const Hypotheses& hypotheses) {
   const cv::Point origin(tile_.x - kRadius_px, tile_.y - kRadius_px);
-  neighbour->grid = nullptr;
-  const auto tolerance_px = static_cast<float>(input_->options->warp_tolerance_px);
-  for (size_t level = 0; hypotheses.are_planes && tolerance_px > 0.0f && level < std::size(kNodeSpacings_px);
-       ++level) {
-    if (level == grids_.size()) {
-      grids_.push_back(std::make_unique<NodeGrid>(input_->camera, *input_->near_valid, origin, halo_,
-                                                  kNodeSpacings_px[level]));
-      grids_.back()->setNormal(hypotheses.normal);
-    }
-    if (grids_[level]->makeCells(input_->kernels, neighbour->projection, offset, &neighbour->cells) <=
-        tolerance_px) {
-      neighbour->grid = grids_[level].get();
-      return;
-    }
-  }
   if (!has_rays_) {
     has_rays_ = true;
     const RayTable& rays = *input_->rays;
@@ -204,6 +180,56 @@ void TileScorer::prepareWarp(const Hypotheses& hypotheses, float offset, Neighbo
   }
 }
 
+RayRow TileScorer::raysAt(size_t at, float offset) const {
+  return {ray_x_.data() + at, ray_y_.data() + at,  ray_z_.data() + at,
+          base_.data() + at,  weight_.data() + at, offset};
+}
+
+/// Tables of positions around a surface.
+void TileScorer::makeSteps(const Hypotheses& hypotheses) {
+  const int reach = hypotheses.stepReach();
+  has_steps_ = reach > 0 && input_->options->warp_tolerance_px > 0.0;
+  if (!has_steps_) {
+    return;
+  }
+  loadRays(hypotheses);
+  const size_t first = static_cast<size_t>(first_row_) * halo_.rowSize();
+  const size_t end = static_cast<size_t>(end_row_ + kMatchingWindow_px - 1) * halo_.rowSize();
+  const float middle = hypotheses.offsets[static_cast<size_t>(reach)];
+  const float step = hypotheses.offsets[1] - hypotheses.offsets[0];
+  for (Neighbour& neighbour : neighbours_) {
+    for (AlignedArray<int32_t>* array :
+         {&neighbour.u, &neighbour.v, &neighbour.u_steps, &neighbour.v_steps}) {
+      array->resize(halo_.size());
+    }
+    input_->kernels.makeSteps(neighbour.projection, raysAt(first, middle), step, reach, end - first,
+                              neighbour.steps(first));
+  }
+}
+
+/// Selects the coarsest grid that is accurate enough, or prepares the projection of every pixel.
+void TileScorer::prepareWarp(const Hypotheses& hypotheses, float offset, Neighbour* neighbour) {
+  const cv::Point origin(tile_.x - kRadius_px, tile_.y - kRadius_px);
+  neighbour->grid = nullptr;
+  const auto tolerance_px = static_cast<float>(input_->options->warp_tolerance_px);
+  for (size_t level = 0; hypotheses.are_planes && tolerance_px > 0.0f && level < std::size(kNodeSpacings_px);
+       ++level) {
+    if (level == grids_.size()) {
+      grids_.push_back(std::make_unique<NodeGrid>(input_->camera, *input_->near_valid, origin, halo_,
+                                                  kNodeSpacings_px[level]));
+      grids_.back()->setNormal(hypotheses.normal);
+    }
+    if (grids_[level]->makeCells(input_->kernels, neighbour->projection, offset, &neighbour->cells) <=
+        tolerance_px) {
+      neighbour->grid = grids_[level].get();
+      return;
+    }
+  }
+  if (!has_steps_) {
+    loadRays(hypotheses);
+  }
+}
+
 void TileScorer::scoreSlot(const Hypotheses& hypotheses, size_t slot, TileScores* result) {
   const SweepKernels& kernels = input_->kernels;
   const size_t row_size = halo_.rowSize();
@@ -217,7 +243,8 @@ void TileScorer::scoreSlot(const Hypotheses& hypotheses, size_t slot, TileScores
     }
     return;
   }
-  const float offset = hypotheses.offsets[static_cast<size_t>(result->slots[slot])];
+  const int hypothesis = result->slots[slot];
+  const float offset = hypotheses.offsets[static_cast<size_t>(hypothesis)];
   for (Neighbour& neighbour : neighbours_) {
     prepareWarp(hypotheses, offset, &neighbour);
     std::fill_n(neighbour.samples.data(), neighbour.samples.size(), int16_t{0});
@@ -249,9 +276,12 @@ void TileScorer::scoreSlot(const Hypotheses& hypotheses, size_t slot, TileScores
         row.cell_shift = neighbour.grid->cellShift();
         row.row_in_cell = neighbour.grid->rowInCell(y);
       } else {
-        const RayRow rays{ray_x_.data() + at, ray_y_.data() + at,  ray_z_.data() + at,
-                          base_.data() + at,  weight_.data() + at, offset};
-        kernels.projectFixed(neighbour.projection, rays, row_size, u_.data(), v_.data());
+        if (has_steps_) {
+          kernels.walkSteps(neighbour.steps(at), hypothesis - hypotheses.stepReach(), row_size, u_.data(),
+                            v_.data());
+        } else {
+          kernels.projectFixed(neighbour.projection, raysAt(at, offset), row_size, u_.data(), v_.data());
+        }
         row.cells = nullptr;
         row.u = u_.data();
         row.v = v_.data();
@@ -300,6 +330,7 @@ void TileScorer::score(const Hypotheses& hypotheses, const std::vector<int>& slo
     array->resize(size);
   }
   loadSurface(hypotheses);
+  makeSteps(hypotheses);
   for (size_t slot = 0; slot < slots.size() && first_row_ < end_row_; ++slot) {
     scoreSlot(hypotheses, slot, result);
   }

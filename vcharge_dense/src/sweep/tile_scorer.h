@@ -36,8 +36,23 @@ struct TileScores {
   bool isInside(int slot) const;
 };
 
+inline uint32_t TileScores::voters(int slot, size_t row, size_t pixel_in_row) const {
+  const auto lanes = static_cast<uint32_t>(layout.lanes), pixel = static_cast<uint32_t>(pixel_in_row);
+  const uint32_t byte = lanes < 8 ? pixel / lanes : pixel / 8;
+  const uint32_t bit = lanes < 8 ? pixel % lanes : pixel % 8;
+  const size_t row_bytes = rowVoterBytes(layout.lanes, layout.strip);
+  const uint8_t* at = voter_bits.data() +
+                      (row * slots.size() + static_cast<size_t>(slot)) * num_neighbours * row_bytes + byte;
+  uint32_t voters = 0;
+  for (uint32_t n = 0; n < num_neighbours; ++n, at += row_bytes) {
+    voters |= (static_cast<uint32_t>(*at) >> bit & 1u) << n;
+  }
+  return voters;
+}
+
 enum class TileSize {
   kLarge,  ///< few windows reach beyond a tile
+  kLow,    ///< with the tables of hypotheses around a surface fits into the cache
   kSmall,  ///< few different depths in a tile
 };
 /// Cuts the pixels whose window lies inside an image into tiles, independently of the number of threads.
@@ -60,13 +75,21 @@ class TileScorer {
     AlignedArray<float> cells;
     AlignedArray<int16_t> samples;  // ring buffer of the last ringRows() rows
     AlignedArray<int32_t> column_sums;
-    const NodeGrid* grid = nullptr;  // null: every pixel is projected
+    const NodeGrid* grid = nullptr;                // null: every pixel is projected
+    AlignedArray<int32_t> u, v, u_steps, v_steps;  // StepTable, with the halo
+
+    StepTable steps(size_t at) {
+      return {u.data() + at, v.data() + at, u_steps.data() + at, v_steps.data() + at};
+    }
   };
 
   static constexpr size_t ringRows() { return kMatchingWindow_px + 1; }
   void setInput(const SweepInput& input);
   void loadSurface(const Hypotheses& hypotheses);
+  void loadRays(const Hypotheses& hypotheses);
+  void makeSteps(const Hypotheses& hypotheses);
   void prepareWarp(const Hypotheses& hypotheses, float offset, Neighbour* neighbour);
+  RayRow raysAt(size_t at, float offset) const;
   void scoreSlot(const Hypotheses& hypotheses, size_t slot, TileScores* result);
 
   const SweepInput* input_ = nullptr;
@@ -78,7 +101,7 @@ class TileScorer {
   std::vector<Neighbour> neighbours_;
   AlignedArray<int32_t> reference_pairs_;
   AlignedArray<float> mean_, vote_per_covariance_;  // without the halo
-  bool has_rays_ = false;
+  bool has_rays_ = false, has_steps_ = false;
   AlignedArray<float> ray_x_, ray_y_, ray_z_, base_, weight_;  // with the halo
   AlignedArray<int32_t> u_, v_;                                // one row
   AlignedArray<int32_t> votes_;                                // one row per neighbour
